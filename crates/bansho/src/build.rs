@@ -1,0 +1,120 @@
+//! Scenes made in code: plain structs in, a checked scene or its file out.
+
+use std::fmt::Write;
+
+use bansho_base::{
+    assets::Assets,
+    camera::CameraParameters,
+    parameters::{Parameters, Table, Value},
+    wind::WindParameters,
+};
+use bansho_render::{
+    phenomena::KINDS,
+    Scene, SceneError,
+    scene::{Describe, FORMAT, LightParameters, PictureParameters, PlateParameters},
+};
+
+/// Gathers the tables of a scene. Values are checked when it is built, by the same rules as a scene file.
+///
+/// ```
+/// use bansho::{MemoryAssets, SceneBuilder, render::scene::PictureParameters};
+///
+/// let picture = PictureParameters { size: [64, 36], frames: 2, ..Default::default() };
+/// let scene = SceneBuilder::new().picture(&picture).build(&MemoryAssets::default())?;
+/// assert_eq!(scene.picture.size, [64, 36]);
+/// # Ok::<(), bansho::SceneError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct SceneBuilder {
+    text: String,
+}
+
+impl Default for SceneBuilder {
+    fn default() -> Self {
+        Self { text: format!("bansho = {FORMAT}\n") }
+    }
+}
+
+impl SceneBuilder {
+    /// A scene with every default and nothing in it.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The picture: size, frames, exposure. State it once.
+    pub fn picture(self, parameters: &PictureParameters) -> Self {
+        self.table("[picture]", None, parameters.to_table())
+    }
+
+    /// The camera. State it once.
+    pub fn camera(self, parameters: &CameraParameters) -> Self {
+        self.table("[camera]", None, parameters.to_table())
+    }
+
+    /// The plate to lay the phenomena over. State it once.
+    pub fn plate(self, parameters: &PlateParameters) -> Self {
+        self.table("[plate]", None, parameters.to_table())
+    }
+
+    /// The wind that moves everything. State it once.
+    pub fn wind(self, parameters: &WindParameters) -> Self {
+        self.table("[wind]", None, parameters.to_table())
+    }
+
+    /// One more light.
+    pub fn light(self, parameters: &LightParameters) -> Self {
+        self.table("[[light]]", None, parameters.to_table())
+    }
+
+    /// One more phenomenon, such as a flame sheet. Names are unique in a scene.
+    pub fn phenomenon<P: Describe>(self, name: &str, parameters: &P) -> Self {
+        self.table(&format!("[[{}]]", P::KEY), Some(name), parameters.to_table())
+    }
+
+    /// The scene as a file.
+    pub fn to_toml(&self) -> &str {
+        &self.text
+    }
+
+    /// Checks all values.
+    ///
+    /// # Errors
+    /// What a scene file would be refused for; lines are those of [`to_toml`](Self::to_toml).
+    pub fn build(&self, assets: &dyn Assets) -> Result<Scene, SceneError> {
+        Scene::parse("scene", &self.text, KINDS, assets)
+    }
+
+    fn table(mut self, header: &str, name: Option<&str>, table: Table) -> Self {
+        let name = name.map(|name| ("name".to_owned(), Value::Text(name.to_owned())));
+        let entries = table.entries.into_iter().map(|entry| (entry.key, entry.node.value));
+        self.text.push_str(&format!("\n{header}\n"));
+        for (key, value) in name.into_iter().chain(entries) {
+            // Writing to a string cannot fail.
+            let _ = writeln!(self.text, "{key} = {value}");
+        }
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bansho_base::assets::MemoryAssets;
+
+    #[test]
+    fn what_is_built_is_what_was_said() {
+        let picture = PictureParameters { size: [320, 200], first_frame: -7, ..Default::default() };
+        let camera = CameraParameters { vertical_fov_deg: 55.0.into(), ..Default::default() };
+        let builder = SceneBuilder::new().picture(&picture).camera(&camera).wind(&WindParameters::default());
+        let scene = builder.light(&LightParameters::default()).build(&MemoryAssets::default()).unwrap();
+        assert_eq!((scene.picture, scene.camera), (picture, camera));
+        assert_eq!((scene.wind, scene.lights.len()), (WindParameters::default(), 1));
+    }
+
+    #[test]
+    fn values_out_of_range_are_refused_as_in_a_file() {
+        let picture = PictureParameters { size: [0, 200], ..Default::default() };
+        let error = SceneBuilder::new().picture(&picture).build(&MemoryAssets::default()).unwrap_err();
+        assert!(error.to_string().contains("picture.size"), "{error}");
+    }
+}

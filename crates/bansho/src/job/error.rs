@@ -1,0 +1,154 @@
+//! Why a job cannot be done.
+
+use std::path::PathBuf;
+
+use bansho_base::observer::Cancelled;
+use bansho_media::{error::MediaError, naming::NamingError};
+use bansho_render::{
+    PlanError, RenderError, SceneError,
+    scene::edit::EditError,
+};
+
+/// Why a job cannot be done.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum JobError {
+    /// The scene cannot be read.
+    #[error("{path}: the scene cannot be read: {source}", path = .path.display())]
+    Unreadable {
+        /// The scene's file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The scene is faulty.
+    #[error(transparent)]
+    Scene(Box<SceneError>),
+    /// An assignment (`--set`) cannot be made.
+    #[error("--set {assignment}: {source}")]
+    Edit {
+        /// The assignment.
+        assignment: String,
+        /// What is wrong with it.
+        source: EditError,
+    },
+    /// The scene is faulty only because of the assignments.
+    #[error(transparent)]
+    SetScene(Box<SceneError>),
+    /// What was asked for does not fit the scene.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// Options that do not go together.
+    #[error(transparent)]
+    Conflict(#[from] Conflict),
+    /// A GPU was asked for.
+    #[error("there is no usable GPU: this build of Bansho draws on the processor only; allowed: --backend cpu, auto")]
+    NoGpu,
+    /// The name of the output cannot be used.
+    #[error(transparent)]
+    Naming(#[from] NamingError),
+    /// Drawing failed.
+    #[error(transparent)]
+    Render(RenderError),
+    /// Writing failed.
+    #[error(transparent)]
+    Media(#[from] MediaError),
+    /// The observer asked to stop.
+    #[error("stopped; whole frames stay, and --resume goes on from there")]
+    Cancelled,
+}
+
+/// Options that do not go together.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Conflict {
+    /// Layers or AOVs in a format that has only one picture.
+    #[error("{what} need a format that holds many channels, and {path} is not one; allowed: .exr", path = .path.display())]
+    NoChannels {
+        /// `--layers` or `--aovs`.
+        what: &'static str,
+        /// The output.
+        path: PathBuf,
+    },
+    /// A sheet of tiles in a film.
+    #[error("{path}: a sheet is one picture; allowed: .png, .exr", path = .path.display())]
+    SheetInFilm {
+        /// The output.
+        path: PathBuf,
+    },
+    /// A sheet without tiles or with too many.
+    #[error("a sheet of {tiles} tiles; allowed: 1 to {most}")]
+    Tiles {
+        /// How many were asked for.
+        tiles: usize,
+        /// Most that are possible.
+        most: usize,
+    },
+    /// A sheet larger than pictures may be.
+    #[error("the sheet would have {width} x {height} pixels; allowed: up to {most} on a side, so choose smaller or fewer tiles")]
+    SheetSize {
+        /// Its width.
+        width: usize,
+        /// Its height.
+        height: usize,
+        /// Largest side.
+        most: usize,
+    },
+    /// No frame is left to draw.
+    #[error("no frame is asked for")]
+    NoFrames,
+    /// Snapshots of no frame.
+    #[error("snapshots every {0} frames; allowed: 1 or more")]
+    SnapshotStep(u64),
+    /// A loop of a length that its frames cannot fill.
+    #[error("a flipbook loop of {0} s; allowed: 0.01 to 3600 s")]
+    LoopLength(f64),
+}
+
+impl From<RenderError> for JobError {
+    fn from(error: RenderError) -> Self {
+        match error {
+            RenderError::Cancelled(Cancelled) => Self::Cancelled,
+            RenderError::Plan(error) => Self::Plan(error),
+            other => Self::Render(other),
+        }
+    }
+}
+
+/// Whose fault an error is, for exit codes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// What was asked for.
+    Usage,
+    /// The scene, or an asset that it names.
+    Scene,
+    /// There is no usable GPU.
+    Gpu,
+    /// The work failed on the way.
+    Work,
+    /// The observer asked to stop.
+    Cancelled,
+}
+
+impl JobError {
+    /// Whose fault it is.
+    pub fn cause(&self) -> Cause {
+        match self {
+            Self::Unreadable { .. } | Self::Scene(_) | Self::Plan(PlanError::Opening { .. }) => Cause::Scene,
+            Self::Edit { .. } | Self::SetScene(_) | Self::Plan(_) | Self::Conflict(_) | Self::Naming(_) => Cause::Usage,
+            Self::Render(RenderError::Asset(_) | RenderError::DepthSize { .. }) => Cause::Scene,
+            Self::NoGpu => Cause::Gpu,
+            Self::Cancelled => Cause::Cancelled,
+            Self::Media(MediaError::Naming(_)) => Cause::Usage,
+            Self::Render(_) | Self::Media(_) => Cause::Work,
+        }
+    }
+
+    /// The faults of the scene, where those are the reason.
+    pub fn scene(&self) -> Option<&SceneError> {
+        match self {
+            Self::Scene(error) | Self::SetScene(error) => Some(error),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! What a job tells its caller on the way.
+
+use std::path::PathBuf;
+
+use bansho_base::observer::{Observer, Unobserved};
+use bansho_media::naming::OutputKind;
+use bansho_render::RenderError;
+
+/// Watches a job. Called from several threads.
+pub trait JobObserver: Observer {
+    /// The work is about to begin.
+    fn started(&self, _outline: &Outline) {}
+
+    /// A frame is whole where it belongs. Frames may be finished in another order than that of their numbers.
+    fn frame_done(&self, _frame: &FrameDone) {}
+
+    /// Something that the user should know and that stops nothing.
+    fn note(&self, _note: &Note) {}
+}
+
+impl JobObserver for Unobserved {}
+
+/// What a job is about to do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// Frames that were asked for.
+    pub total: usize,
+    /// Frames that are there already and stay as they are.
+    pub kept: usize,
+    /// Size of each, pixels.
+    pub size: [usize; 2],
+}
+
+/// A finished frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameDone {
+    /// Its number.
+    pub number: i64,
+    /// The file it is in; `None` where many frames share one.
+    pub path: Option<PathBuf>,
+    /// Frames drawn and written so far, this one too.
+    pub drawn: usize,
+}
+
+/// Something that the user should know and that stops nothing.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Note {
+    /// Frames beyond those of the scene.
+    #[error("{count} of the frames lie outside the scene's own, {first} to {last}; they are drawn as if it went on")]
+    OutsideScene {
+        /// How many.
+        count: usize,
+        /// The scene's first frame.
+        first: i64,
+        /// Its last.
+        last: i64,
+    },
+    /// Frames beyond one turn of a loop.
+    #[error("{count} of the frames lie outside the loop's own, {first} to {last}; they repeat it")]
+    OutsideLoop {
+        /// How many.
+        count: usize,
+        /// The loop's first frame.
+        first: i64,
+        /// Its last.
+        last: i64,
+    },
+    /// 16 bits in a format that has other ideas.
+    #[error("--bits has no effect on .{}", .kind.extension())]
+    BitsUnused {
+        /// The format.
+        kind: OutputKind,
+    },
+    /// A view in a scene-linear format.
+    #[error("--view has no effect on .exr, which is scene-linear")]
+    ViewUnused,
+    /// A film is made as a whole.
+    #[error("--resume has no effect on .{}, which is made as a whole", .kind.extension())]
+    ResumeUnused {
+        /// The format.
+        kind: OutputKind,
+    },
+    /// A contact sheet is made as a whole.
+    #[error("--resume has no effect on a sheet, which is made as a whole")]
+    ResumeSheet,
+    /// Nothing in the scene has a state.
+    #[error("--snapshots has no effect: nothing in this scene is simulated in steps")]
+    SnapshotsUnused,
+    /// A snapshot that cannot be used.
+    #[error("{path}: not used: {reason}; it is made anew", path = .path.display())]
+    SnapshotRefused {
+        /// Its file.
+        path: PathBuf,
+        /// Why.
+        reason: RenderError,
+    },
+    /// A snapshot that cannot be read.
+    #[error("{path}: not used: it cannot be read: {reason}", path = .path.display())]
+    SnapshotUnreadable {
+        /// Its file, or the folder.
+        path: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+    /// A flipbook without motion.
+    #[error("nothing in this scene writes its motion; the motion sheet is empty")]
+    NoMotion,
+}

@@ -1,0 +1,139 @@
+//! Frames into files: view transform where the format is made to be looked at, encoding, whole files in order.
+
+use std::{
+    fs,
+    path::Path,
+    sync::atomic::{AtomicUsize, Ordering},
+};
+
+use bansho_base::{
+    color::View,
+    image::{DisplayImage, Frame},
+    observer::{Observer, Stage, StageGuard},
+};
+use bansho_media::{
+    error::MediaError,
+    naming::{OutputKind, OutputPattern},
+    sequence::{Picture, Sink, SinkOptions, Slot, Wants},
+};
+use bansho_render::{
+    Plan,
+    display::{BitDepth, display},
+};
+
+use super::{
+    error::JobError,
+    observer::{FrameDone, JobObserver},
+    shoot::Finish,
+};
+
+/// How the pictures of a job are written.
+#[derive(Clone, Debug)]
+pub(super) struct Format {
+    pub(super) pattern: OutputPattern,
+    pub(super) view: View,
+    pub(super) bits: BitDepth,
+}
+
+impl Format {
+    /// What a file's fingerprint must be: that of the frame's pixels, and of how they are stored where that may differ.
+    pub(super) fn fingerprint(&self, frame: [u8; 32]) -> [u8; 32] {
+        match (self.pattern.kind(), self.bits) {
+            (OutputKind::Png, BitDepth::Sixteen) => {
+                let mut hasher = blake3::Hasher::new();
+                hasher.update(&frame).update(b"16 bits");
+                *hasher.finalize().as_bytes()
+            }
+            _ => frame,
+        }
+    }
+
+    /// Opens the files for `count` frames of `size` pixels; `window` of them may be under way at once.
+    pub(super) fn open(&self, plan: &Plan, count: usize, size: [usize; 2], window: usize) -> Result<Sink, JobError> {
+        let fps = plan.fps();
+        let options = SinkOptions {
+            opaque: plan.scene.has_plate(),
+            sixteen_bits: self.bits == BitDepth::Sixteen,
+            window,
+            ..SinkOptions::new(size, [fps.frames, fps.seconds], count)
+        };
+        Ok(Sink::open(self.pattern.clone(), options)?)
+    }
+
+    /// Gives a frame to its sink, shown or as it is, as the sink wants it.
+    pub(super) fn write(
+        &self,
+        sink: &Sink,
+        index: usize,
+        mut frame: Frame,
+        observer: &dyn Observer,
+    ) -> Result<(), JobError> {
+        frame.header.fingerprint = self.fingerprint(frame.header.fingerprint);
+        let slot = Slot { index, number: frame.header.number };
+        let shown = match sink.wants() {
+            Wants::Frame => None,
+            Wants::Display => Some(self.show(&frame, observer)),
+            Wants::OpaqueDisplay => {
+                // Premultiplied light over black is the light itself.
+                frame.opaque = true;
+                Some(self.show(&frame, observer))
+            }
+        };
+        let _stage = StageGuard::begin(observer, Stage::Write);
+        let picture = match &shown {
+            Some(picture) => Picture::Display(picture, &frame.header.fingerprint),
+            None => Picture::Linear(&frame),
+        };
+        Ok(sink.write(slot, picture)?)
+    }
+
+    /// The view transform.
+    pub(super) fn show(&self, frame: &Frame, observer: &dyn Observer) -> DisplayImage {
+        let _stage = StageGuard::begin(observer, Stage::View);
+        display(frame, &self.view, self.bits)
+    }
+}
+
+/// Writes every frame where the sink puts it.
+pub(super) struct ToFiles<'a> {
+    pub(super) format: &'a Format,
+    pub(super) sink: Sink,
+    pub(super) window: usize,
+    pub(super) observer: &'a dyn JobObserver,
+    pub(super) drawn: AtomicUsize,
+}
+
+impl Finish for ToFiles<'_> {
+    fn finish(&self, index: usize, frame: Frame, observer: &dyn Observer) -> Result<(), JobError> {
+        let number = frame.header.number;
+        self.format.write(&self.sink, index, frame, observer)?;
+        let drawn = self.drawn.fetch_add(1, Ordering::Relaxed) + 1;
+        let path = self.sink.kind().is_sequence().then(|| self.sink.path(number));
+        self.observer.frame_done(&FrameDone { number, path, drawn });
+        Ok(())
+    }
+
+    fn window(&self) -> usize {
+        self.window
+    }
+}
+
+/// Whether `path` could be written, found out without leaving a trace: its folder, or the nearest that there is, takes
+/// a nameless file.
+///
+/// # Errors
+/// A folder stands at `path`, a file stands where a folder should be, or it is not allowed.
+pub(super) fn check_writable(path: &Path) -> Result<(), MediaError> {
+    if path.is_dir() {
+        return Err(MediaError::IsFolder { path: path.to_path_buf() });
+    }
+    let folders = path.ancestors().skip(1);
+    let mut folders = folders.map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+    let Some(folder) = folders.find(|folder| fs::symlink_metadata(folder).is_ok()) else {
+        return Ok(());
+    };
+    if !folder.is_dir() {
+        return Err(MediaError::NotAFolder { path: path.to_path_buf() });
+    }
+    tempfile::tempfile_in(folder).map(drop).map_err(|source| MediaError::from_io(path, source))
+}

@@ -1,0 +1,81 @@
+//! The text of a scene, where it lies, and changes made to it for one job.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use bansho_base::assets::Assets;
+use bansho_render::{
+    Scene,
+    phenomena::KINDS,
+    scene::edit::{self, EditError},
+};
+
+use super::error::JobError;
+
+/// A scene that was read, not yet checked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SceneFile {
+    /// What errors call it.
+    pub name: String,
+    /// Name without folder and extension, for outputs.
+    pub stem: String,
+    /// Folder that paths in it are relative to.
+    pub folder: PathBuf,
+    /// The TOML.
+    pub text: String,
+    /// Changes for this job, each `key.path=value`.
+    pub changes: Vec<String>,
+}
+
+impl SceneFile {
+    /// Reads the scene at `path`.
+    ///
+    /// # Errors
+    /// There is no such file, it cannot be read, or it is not UTF-8.
+    pub fn read(path: &Path) -> Result<Self, JobError> {
+        let text =
+            fs::read_to_string(path).map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source })?;
+        Ok(Self {
+            name: path.display().to_string(),
+            stem: path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
+            folder: path.parent().map(Path::to_path_buf).unwrap_or_default(),
+            text,
+            changes: Vec::new(),
+        })
+    }
+
+    /// Makes the changes and checks all.
+    ///
+    /// # Errors
+    /// Faults of the file if it has any, at their lines; else those of the changes.
+    pub fn check(&self, assets: &dyn Assets) -> Result<Scene, JobError> {
+        let changed = match self.changed() {
+            // The text itself is at fault, which the parser says better.
+            Err(JobError::Edit { source: EditError::Syntax(_), .. }) => self.text.clone(),
+            changed => changed?,
+        };
+        let error = match Scene::parse(&self.name, &changed, KINDS, assets) {
+            Ok(scene) => return Ok(scene),
+            Err(error) => Box::new(error),
+        };
+        if self.changes.is_empty() {
+            return Err(JobError::Scene(error));
+        }
+        match Scene::parse(&self.name, &self.text, KINDS, assets) {
+            Err(own) => Err(JobError::Scene(Box::new(own))),
+            Ok(_) => {
+                let file = format!("{} with --set", self.name);
+                Err(JobError::SetScene(Box::new(bansho_render::SceneError { file, ..*error })))
+            }
+        }
+    }
+
+    fn changed(&self) -> Result<String, JobError> {
+        self.changes.iter().try_fold(self.text.clone(), |text, assignment| {
+            edit::set(&text, assignment)
+                .map_err(|source| JobError::Edit { assignment: assignment.clone(), source })
+        })
+    }
+}

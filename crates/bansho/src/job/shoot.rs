@@ -1,0 +1,96 @@
+//! The frames of a job, one after the other: drawn here, finished by whichever thread of the pool is free.
+
+use std::sync::Arc;
+
+use bansho_base::{
+    image::Frame,
+    observer::{Observer, Stage, StageGuard, check},
+};
+use bansho_render::{Backend, Plan, Shot};
+
+use super::{
+    error::JobError,
+    flight::{Flight, Landing, Watch},
+    observer::JobObserver,
+    snapshots::Snapshots,
+};
+
+/// What becomes of a drawn frame.
+pub(super) trait Finish: Sync {
+    /// Takes the frame at position `index` of the list, in any thread and any order within [`window`](Self::window).
+    fn finish(&self, index: usize, frame: Frame, observer: &dyn Observer) -> Result<(), JobError>;
+
+    /// How many frames may be under way at once.
+    fn window(&self) -> usize;
+}
+
+/// Bytes of frames that may be under way at once, unless two frames alone are more.
+const MEMORY_IN_FLIGHT: usize = 1 << 30;
+
+/// Draws the frames `numbers` in order. The next is drawn while those before are still compressed and written.
+///
+/// Runs in the caller's rayon pool, and uses no other thread.
+///
+/// # Errors
+/// The first failure of a frame, or the observer asked to stop. Frames that were finished stay.
+pub(super) fn shoot(
+    plan: &Arc<Plan>,
+    backend: &dyn Backend,
+    numbers: &[i64],
+    snapshots: &Snapshots,
+    finish: &dyn Finish,
+    observer: &dyn JobObserver,
+) -> Result<(), JobError> {
+    let flight = Flight::default();
+    let watch = Watch { observer, flight: &flight };
+    let mut shot = backend.open(plan.clone())?;
+    let mut last = None;
+    let drawn = rayon::in_place_scope_fifo(|scope| {
+        for (index, &number) in numbers.iter().enumerate() {
+            let seek = last.is_none_or(|last| number != last + 1).then_some(last);
+            let frame = draw(shot.as_mut(), number, seek, snapshots, &watch, observer)?;
+            last = Some(number);
+            flight.depart(index, limit(&frame, finish));
+            let (flight, watch) = (&flight, &watch);
+            scope.spawn_fifo(move |_| {
+                let _landing = Landing { flight, index };
+                if !watch.cancelled()
+                    && let Err(error) = finish.finish(index, frame, watch)
+                {
+                    flight.fail(error);
+                }
+            });
+        }
+        Ok(())
+    });
+    // A frame that failed also stops the drawing, which then only says that it was stopped.
+    flight.take_error().map_or(drawn, Err)?;
+    check(observer).map_err(|_| JobError::Cancelled)
+}
+
+/// Draws frame `number`; `seek` holds the frame drawn before where the two are not neighbours.
+fn draw(
+    shot: &mut dyn Shot,
+    number: i64,
+    seek: Option<Option<i64>>,
+    snapshots: &Snapshots,
+    watch: &Watch,
+    observer: &dyn JobObserver,
+) -> Result<Frame, JobError> {
+    if let Some(last) = seek {
+        let _stage = StageGuard::begin(watch, Stage::Load);
+        snapshots.seek(shot, last, number, observer);
+    }
+    shot.advance(number, watch)?;
+    snapshots.keep(shot, number, watch)?;
+    shot.draw(watch)?;
+    shot.read().ok_or(JobError::Cancelled)
+}
+
+/// How many frames like this one may be under way: one for each thread and the next, as far as memory allows.
+fn limit(frame: &Frame, finish: &dyn Finish) -> usize {
+    let pixels = frame.beauty.width() * frame.beauty.height();
+    let bytes = pixels * size_of::<f32>() * (5 + frame.channels.len());
+    let most = (rayon::current_num_threads() + 1).min(finish.window()).max(2);
+    (MEMORY_IN_FLIGHT / bytes.max(1)).clamp(2, most)
+}

@@ -1,0 +1,144 @@
+//! What a scene refers to by name: pictures and text, wherever they are kept.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use crate::image::Image;
+
+/// How the numbers of a picture are meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// sRGB-encoded values from 0 to 1, made to be looked at (PNG, JPEG).
+    DisplaySrgb,
+    /// Linear light in the sRGB (Rec. 709) primaries, D65: an EXR file without other chromaticities.
+    LinearSrgb,
+    /// Linear light in ACEScg (AP1, D60).
+    LinearAcescg,
+}
+
+/// A picture that was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Red, green, blue, straight alpha (1 where the file has none), in `encoding`.
+    pub colour: Image<4>,
+    /// The file's depth channel (`Z`), if it has one; row after row.
+    pub depth: Option<Vec<f32>>,
+    /// What the colours mean.
+    pub encoding: Encoding,
+}
+
+/// Why an asset cannot be had.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{path}: {problem}")]
+pub struct AssetError {
+    /// The asset's name, resolved as far as it could be.
+    pub path: String,
+    /// What is wrong.
+    pub problem: AssetProblem,
+}
+
+/// What can be wrong with an asset.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum AssetProblem {
+    /// There is nothing of that name.
+    #[error("no such file")]
+    Missing,
+    /// It is there but cannot be read.
+    #[error("cannot be read: {0}")]
+    Unreadable(String),
+    /// Its name ends in something that is not a picture.
+    #[error("is not a picture Bansho reads (allowed: .png, .jpg, .jpeg, .exr)")]
+    UnknownKind,
+    /// Its contents are damaged or not what the name says.
+    #[error("is damaged or not of the kind its name says: {0}")]
+    Damaged(String),
+    /// It claims to be larger than is allowed.
+    #[error("claims {width} x {height} pixels; at most {limit} on a side are read")]
+    TooLarge {
+        /// Claimed width.
+        width: u64,
+        /// Claimed height.
+        height: u64,
+        /// Most pixels on a side.
+        limit: u64,
+    },
+    /// It claims more pixels in all than are allowed.
+    #[error("claims {width} x {height} pixels; at most {limit} in all are read")]
+    TooManyPixels {
+        /// Claimed width.
+        width: u64,
+        /// Claimed height.
+        height: u64,
+        /// Most pixels in all.
+        limit: u64,
+    },
+    /// A picture was asked for a channel that it lacks.
+    #[error("has no channel `{0}`")]
+    NoChannel(String),
+}
+
+/// Gives a scene its pictures and texts. `####` in a path stands for the frame number with leading zeros.
+///
+/// A loader may keep what it read; it may be called from several threads.
+pub trait Assets: Send + Sync {
+    /// The picture at `path`, for frame `frame` where it is a sequence.
+    ///
+    /// # Errors
+    /// The asset is missing, damaged, too large or not a picture.
+    fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError>;
+
+    /// The text at `path`.
+    ///
+    /// # Errors
+    /// The asset is missing or not UTF-8.
+    fn text(&self, path: &str) -> Result<Arc<str>, AssetError>;
+
+    /// A digest of the bytes behind `path` for frame `frame`: two assets with one digest are the same.
+    ///
+    /// # Errors
+    /// The asset is missing or unreadable.
+    fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError>;
+}
+
+/// Assets held in memory, for programs that embed Bansho and for tests. Digests are of the given name only.
+#[derive(Clone, Debug, Default)]
+pub struct MemoryAssets {
+    pictures: BTreeMap<String, Arc<Picture>>,
+    texts: BTreeMap<String, Arc<str>>,
+}
+
+impl MemoryAssets {
+    /// Keeps `picture` under `path`.
+    pub fn insert_picture(&mut self, path: impl Into<String>, picture: Picture) {
+        self.pictures.insert(path.into(), Arc::new(picture));
+    }
+
+    /// Keeps `text` under `path`.
+    pub fn insert_text(&mut self, path: impl Into<String>, text: impl Into<Arc<str>>) {
+        self.texts.insert(path.into(), text.into());
+    }
+}
+
+fn missing(path: &str) -> AssetError {
+    AssetError { path: path.to_owned(), problem: AssetProblem::Missing }
+}
+
+impl Assets for MemoryAssets {
+    fn picture(&self, path: &str, _frame: i64) -> Result<Arc<Picture>, AssetError> {
+        self.pictures.get(path).cloned().ok_or_else(|| missing(path))
+    }
+
+    fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
+        self.texts.get(path).cloned().ok_or_else(|| missing(path))
+    }
+
+    fn digest(&self, path: &str, _frame: i64) -> Result<[u8; 32], AssetError> {
+        if !self.pictures.contains_key(path) && !self.texts.contains_key(path) {
+            return Err(missing(path));
+        }
+        let mut digest = [0; 32];
+        for (slot, byte) in path.bytes().enumerate() {
+            digest[slot % 32] ^= byte.rotate_left((slot / 32) as u32);
+        }
+        Ok(digest)
+    }
+}

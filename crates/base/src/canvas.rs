@@ -1,0 +1,322 @@
+//! What phenomena draw into: strips of a picture that no two threads share.
+
+use crate::{
+    camera::{Camera, CameraParameters},
+    image::Rect,
+};
+
+/// When the shutter is open, seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shutter {
+    /// When it opens.
+    pub open: f64,
+    /// When it closes; not before `open`.
+    pub close: f64,
+}
+
+impl Shutter {
+    /// Half way between.
+    pub fn middle(&self) -> f64 {
+        0.5 * (self.open + self.close)
+    }
+
+    /// How long it is open.
+    pub fn duration(&self) -> f64 {
+        self.close - self.open
+    }
+
+    /// The middle of part `index` of `count` equal parts.
+    pub fn instant(&self, index: usize, count: usize) -> f64 {
+        self.open + self.duration() * (index as f64 + 0.5) / count as f64
+    }
+}
+
+/// A stretch of depth, m; a thing at depth z lies in it when `near <= z < far`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthInterval {
+    /// Nearest depth.
+    pub near: f64,
+    /// First depth beyond it.
+    pub far: f64,
+}
+
+impl DepthInterval {
+    /// Everything before the camera.
+    pub const ALL: Self = Self { near: 0.0, far: f64::INFINITY };
+
+    /// Whether a thing at `depth` lies in it.
+    pub fn contains(&self, depth: f64) -> bool {
+        self.near <= depth && depth < self.far
+    }
+
+    /// Whether the two share any depth.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.near < other.far && other.near < self.far
+    }
+}
+
+/// One exposure seen by one camera.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Camera at the middle of the exposure.
+    pub camera: Camera,
+    /// Camera over time.
+    pub path: CameraParameters,
+    /// When the shutter is open.
+    pub shutter: Shutter,
+    /// When the next frame's exposure has its middle, for motion vectors; s.
+    pub next_middle: f64,
+    /// Size of the whole picture with its overscan, pixels.
+    pub size: [usize; 2],
+    /// Overscan on every side, pixels.
+    pub overscan: usize,
+    /// The part of the picture that is drawn.
+    pub window: Rect,
+}
+
+impl View {
+    /// The view over `shutter` of a picture of `size` pixels with `overscan` pixels more on every side.
+    pub fn new(path: CameraParameters, shutter: Shutter, next_middle: f64, size: [usize; 2], overscan: usize) -> Self {
+        let camera = path.at(shutter.middle(), size).with_overscan(overscan);
+        let size = size.map(|side| side + 2 * overscan);
+        Self { camera, path, shutter, next_middle, size, overscan, window: Rect::of_size(size[0], size[1]) }
+    }
+
+    /// The camera at time `t`.
+    pub fn camera_at(&self, t: f64) -> Camera {
+        let display = self.size.map(|side| side - 2 * self.overscan);
+        self.path.at(t, display).with_overscan(self.overscan)
+    }
+}
+
+/// How the samples of an AOV become one number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AovRule {
+    /// Their sum; 0 where there is nothing.
+    Sum,
+    /// Their mean, weighted as the AOV says; 0 where there is nothing.
+    WeightedMean,
+}
+
+/// A measured quantity that a phenomenon can write beside its light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AovDescriptor {
+    /// Name behind the phenomenon's, such as `temperature_k` or `motion.X`.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// What it is, how it is weighted, and its empty value.
+    pub doc: &'static str,
+    /// How samples combine.
+    pub rule: AovRule,
+}
+
+/// The plane of one AOV within a strip.
+#[derive(Clone, Debug, Default)]
+pub struct AovPlane {
+    values: Vec<f32>,
+    weights: Vec<f32>,
+}
+
+impl AovPlane {
+    /// Adds a sample of `value` that counts `weight` at pixel `index` of the strip.
+    pub fn add(&mut self, index: usize, value: f32, weight: f32) {
+        self.values[index] = value.mul_add(weight, self.values[index]);
+        self.weights[index] += weight;
+    }
+
+    /// What the samples at pixel `index` come to.
+    pub fn resolve(&self, index: usize, rule: AovRule) -> f32 {
+        match rule {
+            AovRule::Sum => self.values[index],
+            AovRule::WeightedMean if self.weights[index] > 0.0 => self.values[index] / self.weights[index],
+            AovRule::WeightedMean => 0.0,
+        }
+    }
+
+    /// Adds the samples of another plane of the same size.
+    pub fn add_plane(&mut self, other: &Self) {
+        let add = |sums: &mut [f32], more: &[f32]| sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+        add(&mut self.values, &other.values);
+        add(&mut self.weights, &other.weights);
+    }
+
+    /// Makes it an empty plane of so many pixels.
+    pub fn reset(&mut self, pixels: usize) {
+        reset(&mut self.values, pixels, 0.0);
+        reset(&mut self.weights, pixels, 0.0);
+    }
+}
+
+/// A part of the picture that one thread draws: radiance L and transmittance T of one slice of depth.
+///
+/// Planes hold `rect.width * rect.height` values, row after row. L is premultiplied ACEScg, luminance in cd/m^2.
+#[derive(Clone, Debug, Default)]
+pub struct Strip {
+    /// Which pixels of the whole picture.
+    pub rect: Rect,
+    /// Red, green and blue of L.
+    pub radiance: [Vec<f32>; 3],
+    /// Red, green and blue of T; holds nothing until something absorbs.
+    transmittance: [Vec<f32>; 3],
+    /// Depth of the nearest sample, m; infinite where there is none.
+    pub depth: Vec<f32>,
+    /// Depth of the plate, m; empty where there is none. Samples at or behind it are hidden.
+    plate_depth: Vec<f32>,
+    /// The phenomenon's AOVs in the order of its descriptors; empty when nobody asked for them.
+    pub aovs: Vec<AovPlane>,
+    absorbs: bool,
+}
+
+fn reset(plane: &mut Vec<f32>, pixels: usize, value: f32) {
+    plane.clear();
+    plane.resize(pixels, value);
+}
+
+impl Strip {
+    /// Makes it an empty strip over `rect`.
+    ///
+    /// `plate_depth` gives the plate's row `y` over the whole picture's width; `aovs` is how many are wanted.
+    pub fn reset<'a>(&mut self, rect: Rect, plate_depth: Option<&dyn Fn(usize) -> &'a [f32]>, aovs: usize) {
+        let pixels = rect.width * rect.height;
+        self.rect = rect;
+        self.absorbs = false;
+        self.radiance.iter_mut().for_each(|plane| reset(plane, pixels, 0.0));
+        reset(&mut self.depth, pixels, f32::INFINITY);
+        self.plate_depth.clear();
+        if let Some(row) = plate_depth {
+            for y in rect.y..rect.bottom() {
+                self.plate_depth.extend_from_slice(&row(y)[rect.x..rect.right()]);
+            }
+        }
+        self.aovs.resize_with(aovs, AovPlane::default);
+        self.aovs.iter_mut().for_each(|plane| plane.reset(pixels));
+    }
+
+    /// Pixels in the strip.
+    pub fn len(&self) -> usize {
+        self.rect.width * self.rect.height
+    }
+
+    /// Whether the strip holds no pixel.
+    pub fn is_empty(&self) -> bool {
+        self.rect.is_empty()
+    }
+
+    /// Depth at which the plate hides what lies behind, m.
+    pub fn plate_depth(&self, index: usize) -> f32 {
+        self.plate_depth.get(index).copied().unwrap_or(f32::INFINITY)
+    }
+
+    /// Whether a sample at `depth` is before the plate.
+    pub fn visible(&self, index: usize, depth: f32) -> bool {
+        depth < self.plate_depth(index)
+    }
+
+    /// T at pixel `index`.
+    pub fn transmittance(&self, index: usize) -> [f32; 3] {
+        if self.absorbs { [0, 1, 2].map(|c| self.transmittance[c][index]) } else { [1.0; 3] }
+    }
+
+    /// Planes of T where anything absorbs.
+    pub fn transmittance_planes(&self) -> Option<&[Vec<f32>; 3]> {
+        self.absorbs.then_some(&self.transmittance)
+    }
+
+    /// Planes of T to write to; all ones at first.
+    pub fn transmittance_planes_mut(&mut self) -> &mut [Vec<f32>; 3] {
+        if !self.absorbs {
+            let pixels = self.len();
+            self.transmittance.iter_mut().for_each(|plane| reset(plane, pixels, 1.0));
+            self.absorbs = true;
+        }
+        &mut self.transmittance
+    }
+
+    /// Adds light that neither hides nor is hidden by what this strip holds so far, except by its absorption.
+    pub fn emit(&mut self, index: usize, radiance: [f32; 3], depth: f32) {
+        let transmittance = self.transmittance(index);
+        for c in 0..3 {
+            self.radiance[c][index] = radiance[c].mul_add(transmittance[c], self.radiance[c][index]);
+        }
+        self.depth[index] = self.depth[index].min(depth);
+    }
+
+    /// Adds a sample behind all that was drawn before: `L += T l; T *= t`.
+    pub fn add_behind(&mut self, index: usize, radiance: [f32; 3], transmittance: [f32; 3], depth: f32) {
+        self.emit(index, radiance, depth);
+        if transmittance != [1.0; 3] {
+            let planes = self.transmittance_planes_mut();
+            for c in 0..3 {
+                planes[c][index] *= transmittance[c];
+            }
+        }
+    }
+
+    /// [`add_behind`](Self::add_behind) for pixels that follow each other from `first` on: planes of light, and of gray opacity where
+    /// anything absorbs. Samples of infinite depth leave the depth as it is.
+    #[inline(always)]
+    pub fn add_row_behind(&mut self, first: usize, radiance: [&[f32]; 3], opacity: Option<&[f32]>, depth: &[f32]) {
+        let absorbed = self.absorbs;
+        if opacity.is_some() {
+            self.transmittance_planes_mut();
+        }
+        let count = depth.len();
+        for c in 0..3 {
+            let sum = &mut self.radiance[c][first..first + count];
+            let light = &radiance[c][..count];
+            if absorbed {
+                let transmittance = &self.transmittance[c][first..first + count];
+                for i in 0..count {
+                    sum[i] = light[i].mul_add(transmittance[i], sum[i]);
+                }
+            } else {
+                for i in 0..count {
+                    sum[i] += light[i];
+                }
+            }
+            if let Some(opacity) = opacity {
+                let transmittance = &mut self.transmittance[c][first..first + count];
+                for i in 0..count {
+                    transmittance[i] *= 1.0 - opacity[i];
+                }
+            }
+        }
+        for (nearest, depth) in self.depth[first..first + count].iter_mut().zip(depth) {
+            *nearest = if *depth < *nearest { *depth } else { *nearest };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_drawn_later_lies_behind() {
+        let mut strip = Strip::default();
+        strip.reset(Rect::of_size(1, 1), None, 0);
+        strip.add_behind(0, [1.0; 3], [0.5; 3], 2.0);
+        strip.add_behind(0, [4.0; 3], [0.25; 3], 3.0);
+        assert_eq!(strip.radiance[0][0], 3.0);
+        assert_eq!(strip.transmittance(0), [0.125; 3]);
+        assert_eq!(strip.depth[0], 2.0);
+    }
+
+    #[test]
+    fn the_plate_hides_what_is_not_before_it() {
+        let plate = [1.0_f32, 5.0];
+        let mut strip = Strip::default();
+        strip.reset(Rect { x: 1, y: 0, width: 1, height: 1 }, Some(&|_| &plate), 0);
+        assert!(strip.visible(0, 4.9) && !strip.visible(0, 5.0));
+    }
+
+    #[test]
+    fn weighted_means_ignore_the_order_of_samples() {
+        let mut strip = Strip::default();
+        strip.reset(Rect::of_size(1, 1), None, 1);
+        strip.aovs[0].add(0, 1000.0, 1.0);
+        strip.aovs[0].add(0, 2000.0, 3.0);
+        assert_eq!(strip.aovs[0].resolve(0, AovRule::WeightedMean), 1750.0);
+    }
+}

@@ -1,0 +1,44 @@
+//! Exposure values. `EV100` is the exposure value at ISO 100; the saturation-based speed of ISO 12232 puts display white at
+//! `L = 1.2 * 2^EV100` cd/m^2 (Lagarde & de Rousiers 2014, section 5.1).
+
+/// Luminance that saturates at EV100 = 0, cd/m^2.
+const WHITE_AT_EV_0: f64 = 1.2;
+
+/// Luminance that becomes display white (1.0) at `ev100`, cd/m^2.
+#[must_use]
+pub fn white_luminance(ev100: f64) -> f64 {
+    WHITE_AT_EV_0 * libm::exp2(ev100)
+}
+
+/// What scene-linear values in cd/m^2 are multiplied by, so that 1.0 is display white at `ev100`.
+#[must_use]
+pub fn exposure_scale(ev100: f64) -> f64 {
+    libm::exp2(-ev100) / WHITE_AT_EV_0
+}
+
+/// The EV100 at which `luminance` in cd/m^2 (above 0) becomes display white: the inverse of [`white_luminance`].
+#[must_use]
+pub fn ev100_of_white_luminance(luminance: f64) -> f64 {
+    libm::log2(luminance / WHITE_AT_EV_0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hand_worked_values() {
+        assert!((white_luminance(0.0) - 1.2).abs() < 1e-15);
+        assert!((white_luminance(15.0) - 39_321.6).abs() < 1e-9);
+        assert!((exposure_scale(3.0) - 1.0 / 9.6).abs() < 1e-15);
+        assert!((ev100_of_white_luminance(4.8) - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn forward_and_back() {
+        for ev100 in [-20.0, -3.5, 0.0, 7.25, 16.0] {
+            assert!((ev100_of_white_luminance(white_luminance(ev100)) - ev100).abs() < 1e-12);
+            assert!((white_luminance(ev100) * exposure_scale(ev100) - 1.0).abs() < 1e-12);
+        }
+    }
+}

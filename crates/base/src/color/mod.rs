@@ -1,0 +1,31 @@
+//! From light to colour to display.
+//!
+//! 1. [`spectrum`]: a spectrum becomes CIE 1931 XYZ; [`blackbody`] holds the Planckian ones ready made.
+//! 2. [`space`]: XYZ (D65) and linear sRGB enter the working space, ACEScg, by Bradford adaptation D65 -> D60, and leave it
+//!    by the inverse. Emitted light is absolute: [`luminance`] is in cd/m^2. Negative components are colours outside AP1; keep them.
+//! 3. [`exposure`]: `exposed = luminance * exposure_scale(ev100)`, so that 1.0 is display white.
+//! 4. [`View`]: exposed ACEScg to display pixels. The tone curve ([`tone`]) acts on the largest component, highlights take a
+//!    path to white and colours outside sRGB lose saturation ([`gamut`]), then sRGB encoding ([`encode`]), alpha and dither ([`quantise`]).
+//!    The view can be inverted on the whole sRGB cube ([`View::to_scene`]), so a plate through an empty scene is unchanged.
+
+pub mod blackbody;
+pub mod encode;
+pub mod exposure;
+pub mod gamut;
+pub mod quantise;
+mod row;
+pub mod space;
+pub mod spectrum;
+pub mod tone;
+pub mod view;
+
+pub use blackbody::{BlackBody, black_body};
+pub use encode::{decode_srgb, decode_srgb8, encode_srgb};
+pub use exposure::{ev100_of_white_luminance, exposure_scale, white_luminance};
+pub use quantise::DisplayCode;
+pub use space::{
+    ACESCG_FROM_SRGB, ACESCG_FROM_XYZ, LUMINANCE_WEIGHTS, Matrix3, SRGB_FROM_ACESCG, SRGB_FROM_XYZ, XYZ_FROM_ACESCG,
+    XYZ_FROM_SRGB, acescg_from_srgb, acescg_from_xyz, luminance, srgb_from_acescg, xyz_from_acescg,
+};
+pub use spectrum::{LUMINOUS_EFFICACY_LM_PER_W, line_xyz, planck_radiance_per_nm, xyz_of_spectrum};
+pub use view::{UnknownView, View};

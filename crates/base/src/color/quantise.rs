@@ -1,0 +1,174 @@
+//! From display light to codes: alpha, encoding, dither and rounding, one pixel at a time and alike at every vector width.
+
+use super::encode::{clamp_unit, encode_srgb};
+
+/// A number that stands for a display component.
+pub trait DisplayCode: Copy + Default + sealed::Sealed {
+    /// The code of full light.
+    const LARGEST: f32;
+    /// Width of the dither in codes.
+    const DITHER: f32;
+    /// A pixel of whole numbers from 0 to [`LARGEST`](Self::LARGEST).
+    fn from_wholes(wholes: [u32; 4]) -> [Self; 4];
+}
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for u8 {}
+    impl Sealed for u16 {}
+}
+
+impl DisplayCode for u8 {
+    const LARGEST: f32 = 255.0;
+    /// Less than one, so that a value within 1/32 of a whole code keeps that code: what was 8 bits stays as it was.
+    const DITHER: f32 = 1.0 - 2.0 / 32.0;
+    #[inline(always)]
+    fn from_wholes([r, g, b, a]: [u32; 4]) -> [Self; 4] {
+        (r | g << 8 | b << 16 | a << 24).to_le_bytes()
+    }
+}
+
+impl DisplayCode for u16 {
+    const LARGEST: f32 = 65_535.0;
+    /// A step of 1/65535 cannot be seen.
+    const DITHER: f32 = 0.0;
+    #[inline(always)]
+    fn from_wholes([r, g, b, a]: [u32; 4]) -> [Self; 4] {
+        [r as Self, g as Self, b as Self, a as Self]
+    }
+}
+
+/// Fractions of 2^32 that step the dither along x and y: the two-dimensional generalisation of the golden ratio (Roberts 2018, R2
+/// sequence), whose values spread as evenly as blue noise and need no table.
+const STEP_X: u32 = 0xC13F_A9A9;
+const STEP_Y: u32 = 0x91E1_0DA5;
+/// Places of the four channels in the pattern, far apart so that their errors do not add up to grey.
+const CHANNEL_OFFSETS: [u32; 4] = [0, 0x5555_5555, 0xAAAA_AAAA, 0x8000_0000];
+
+/// The dither's phase at a pixel.
+#[inline(always)]
+pub(super) fn dither_phase(x: u32, y: u32) -> u32 {
+    x.wrapping_mul(STEP_X).wrapping_add(y.wrapping_mul(STEP_Y))
+}
+
+/// Dither in codes, within half of `C::DITHER` of zero, evenly distributed. A triangle of the phase, so that it has no seam.
+#[inline(always)]
+fn dither<C: DisplayCode>(phase: u32, channel: usize) -> f32 {
+    let saw = phase.wrapping_add(CHANNEL_OFFSETS[channel]);
+    let triangle = (saw << 1) ^ (saw.cast_signed() >> 31).cast_unsigned();
+    let unit = (triangle >> 8).cast_signed() as f32 * (1.0 / 16_777_216.0);
+    (unit - 0.5) * C::DITHER
+}
+
+/// Rounds to the nearest whole number, ties to even; for values from -0.5 to 65535.5.
+#[inline(always)]
+fn rounded(x: f32) -> f32 {
+    // Adding 1.5 * 2^23 leaves no bits for a fraction.
+    const SHIFT: f32 = 12_582_912.0;
+    (x + SHIFT) - SHIFT
+}
+
+#[inline(always)]
+fn whole(x: f32) -> u32 {
+    const SHIFT: f32 = 12_582_912.0;
+    (x + SHIFT).to_bits() - SHIFT.to_bits()
+}
+
+/// Encodes light (0..=1) unless `RAW`, and rounds it to a code.
+#[inline(always)]
+fn component_code<C: DisplayCode, const RAW: bool>(light: f32, phase: u32, channel: usize) -> u32 {
+    let encoded = if RAW { clamp_unit(light) } else { encode_srgb(light) };
+    whole(encoded.mul_add(C::LARGEST, dither::<C>(phase, channel)))
+}
+
+/// Codes of an opaque pixel.
+#[inline(always)]
+pub(super) fn opaque_codes<C: DisplayCode, const RAW: bool>([r, g, b]: [f32; 3], phase: u32) -> [u32; 4] {
+    [
+        component_code::<C, RAW>(r, phase, 0),
+        component_code::<C, RAW>(g, phase, 1),
+        component_code::<C, RAW>(b, phase, 2),
+        C::LARGEST as u32,
+    ]
+}
+
+/// Codes of a pixel without a plate behind it: `A = max(alpha, r, g, b)` in linear light, colour `rgb / A`, encoded.
+///
+/// Alpha is rounded first and the colour divided by the rounded alpha, so that colour times alpha is exact over black even where alpha
+/// has few codes. Where light can be seen alpha is therefore rounded up, elsewhere it is dithered.
+#[inline(always)]
+pub(super) fn straight_codes<C: DisplayCode, const RAW: bool>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
+    let [r, g, b] = light;
+    let green_or_blue = if g > b { g } else { b };
+    let brightest = if r > green_or_blue { r } else { green_or_blue };
+    let alpha = clamp_unit(alpha);
+    let coverage = if alpha > brightest { alpha } else { brightest };
+
+    let needed = rounded(brightest.mul_add(C::LARGEST, 0.499));
+    // Half a code over black: 0.5 / 12.92 of one in the straight part of sRGB.
+    let needed = if brightest >= 0.5 / 12.92 / C::LARGEST { needed } else { 0.0 };
+    let dithered = rounded(coverage.mul_add(C::LARGEST, dither::<C>(phase, 3)));
+    let code = if dithered > needed { dithered } else { needed };
+
+    let quotient = C::LARGEST / code;
+    let scale = if code > 0.0 { quotient } else { 0.0 };
+    let [r, g, b, _] = opaque_codes::<C, RAW>([r * scale, g * scale, b * scale], phase);
+    [r, g, b, whole(code)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::decode_srgb8;
+
+    fn phases() -> impl Iterator<Item = u32> {
+        (0..64 * 64).map(|i| dither_phase(i % 64, i / 64))
+    }
+
+    #[test]
+    fn exact_codes_survive_dither() {
+        for phase in phases() {
+            for code in [0_u8, 1, 2, 77, 128, 254, 255] {
+                let light = decode_srgb8(code);
+                assert_eq!(opaque_codes::<u8, false>([light; 3], phase), [code, code, code, 255].map(u32::from));
+            }
+        }
+    }
+
+    #[test]
+    fn dither_keeps_the_mean() {
+        for level in [10.3_f32, 100.5, 200.75] {
+            let light = level / 255.0;
+            let sum: u32 = phases().map(|phase| opaque_codes::<u8, true>([light; 3], phase)[1]).sum();
+            let mean = sum as f32 / 4096.0;
+            assert!((mean - level).abs() < 0.03, "{mean} is not {level}");
+        }
+    }
+
+    #[test]
+    fn colour_times_alpha_is_exact_over_black() {
+        for step in 0..2000 {
+            let light = [1.0, 0.4, 0.1].map(|v| v * libm::powf(step as f32 / 2000.0, 3.0));
+            for phase in phases().step_by(997) {
+                let codes = straight_codes::<u8, false>(light, 0.0, phase);
+                for (code, expected) in codes.iter().zip(light) {
+                    let shown = decode_srgb8(*code as u8) * codes[3] as f32 / 255.0;
+                    let error = (encode_srgb(shown) - encode_srgb(expected)) * 255.0;
+                    assert!(error.abs() < 1.01, "{light:?}: {error} codes");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn alpha_is_the_larger_of_coverage_and_light() {
+        let quiet = dither_phase(0, 0);
+        assert_eq!(straight_codes::<u8, false>([0.0; 3], 0.0, quiet), [0; 4]);
+        assert_eq!(straight_codes::<u8, false>([0.0; 3], 1.0, quiet), [0, 0, 0, 255]);
+        assert_eq!(straight_codes::<u16, false>([0.0; 3], 0.25, quiet)[3], 16_384);
+        assert_eq!(straight_codes::<u8, false>([1.0; 3], 0.0, quiet), [255; 4]);
+        // Light 0.2 under alpha 0.4 = 102/255: straight 0.5 encodes to 0.7354 * 255 = 187.5.
+        let codes = straight_codes::<u8, false>([0.2, 0.2, 0.0], 0.4, quiet);
+        assert!((187..=188).contains(&codes[0]) && codes[2] == 0 && codes[3] == 102, "{codes:?}");
+    }
+}

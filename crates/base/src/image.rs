@@ -1,0 +1,233 @@
+//! Pictures in memory: floating-point images, finished frames with their layers, and display pixels.
+
+/// A picture of `N` floats a pixel, rows from the top, pixels from the left.
+///
+/// What the floats mean is the holder's business; in a [`Frame`] they are scene-linear ACEScg.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image<const N: usize> {
+    width: usize,
+    height: usize,
+    pixels: Vec<[f32; N]>,
+}
+
+impl<const N: usize> Image<N> {
+    /// A picture with every pixel set to `value`.
+    pub fn filled(width: usize, height: usize, value: [f32; N]) -> Self {
+        Self { width, height, pixels: vec![value; width * height] }
+    }
+
+    /// A picture around existing pixels; `None` unless there are `width * height` of them.
+    pub fn from_pixels(width: usize, height: usize, pixels: Vec<[f32; N]>) -> Option<Self> {
+        (pixels.len() == width * height).then_some(Self { width, height, pixels })
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// All pixels, row after row.
+    pub fn pixels(&self) -> &[[f32; N]] {
+        &self.pixels
+    }
+
+    /// All pixels, row after row.
+    pub fn pixels_mut(&mut self) -> &mut [[f32; N]] {
+        &mut self.pixels
+    }
+
+    /// One row, counted from the top.
+    pub fn row(&self, y: usize) -> &[[f32; N]] {
+        &self.pixels[y * self.width..][..self.width]
+    }
+
+    /// One row, counted from the top.
+    pub fn row_mut(&mut self, y: usize) -> &mut [[f32; N]] {
+        &mut self.pixels[y * self.width..][..self.width]
+    }
+
+    /// The pixel at column `x`, row `y`.
+    pub fn at(&self, x: usize, y: usize) -> [f32; N] {
+        self.row(y)[x]
+    }
+
+    /// The part `rect` of this picture; `None` where it reaches outside.
+    pub fn crop(&self, rect: Rect) -> Option<Self> {
+        if rect.right() > self.width || rect.bottom() > self.height {
+            return None;
+        }
+        let pixels = (rect.y..rect.bottom()).flat_map(|y| self.row(y)[rect.x..rect.right()].to_vec()).collect();
+        Self::from_pixels(rect.width, rect.height, pixels)
+    }
+}
+
+/// A rectangle of whole pixels; `y` grows downward.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Rect {
+    /// First column.
+    pub x: usize,
+    /// First row.
+    pub y: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl Rect {
+    /// The rectangle of a whole picture.
+    pub fn of_size(width: usize, height: usize) -> Self {
+        Self { x: 0, y: 0, width, height }
+    }
+
+    /// One past the last column.
+    pub fn right(&self) -> usize {
+        self.x + self.width
+    }
+
+    /// One past the last row.
+    pub fn bottom(&self) -> usize {
+        self.y + self.height
+    }
+
+    /// Whether it holds no pixel.
+    pub fn is_empty(&self) -> bool {
+        self.width == 0 || self.height == 0
+    }
+
+    /// The smallest rectangle that holds both; an empty one holds nothing.
+    pub fn union(&self, other: &Self) -> Self {
+        if self.is_empty() {
+            return *other;
+        }
+        if other.is_empty() {
+            return *self;
+        }
+        let (x, y) = (self.x.min(other.x), self.y.min(other.y));
+        Self { x, y, width: self.right().max(other.right()) - x, height: self.bottom().max(other.bottom()) - y }
+    }
+
+    /// What both rectangles cover.
+    pub fn intersection(&self, other: &Self) -> Self {
+        let (x, y) = (self.x.max(other.x), self.y.max(other.y));
+        let width = self.right().min(other.right()).saturating_sub(x);
+        let height = self.bottom().min(other.bottom()).saturating_sub(y);
+        if width == 0 || height == 0 { Self::default() } else { Self { x, y, width, height } }
+    }
+}
+
+/// How a float channel is stored in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// 16-bit float: colour.
+    Half,
+    /// 32-bit float: measured quantities and depth.
+    Single,
+}
+
+/// One named plane of floats beside the beauty, as large as the frame's data window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    /// Name as it stands in an EXR file, such as `torch.temperature_k` or `plate.R`.
+    pub name: String,
+    /// How it is stored.
+    pub precision: Precision,
+    /// Values, row after row from the top.
+    pub values: Vec<f32>,
+}
+
+/// Where the camera stood, for headers that compositing programs read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraHeader {
+    /// World to camera (row vectors, as OpenEXR's `worldToCamera`), metres.
+    pub world_to_camera: [[f32; 4]; 4],
+    /// World to the screen window from -1 to 1, as OpenEXR's `worldToNDC`; the identity for domes and panoramas.
+    pub world_to_ndc: [[f32; 4]; 4],
+    /// Vertical field of view, degrees.
+    pub vertical_fov_deg: f32,
+}
+
+/// What a frame says about itself. Nothing here depends on the machine or the hour.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameHeader {
+    /// Frame number.
+    pub number: i64,
+    /// Exposure value at ISO 100 that the pixels are scaled by.
+    pub exposure_ev100: f32,
+    /// Frames a second as a fraction.
+    pub fps: [u32; 2],
+    /// Time the shutter is open, seconds.
+    pub exposure_time_s: f32,
+    /// Camera at the middle of the exposure.
+    pub camera: CameraHeader,
+    /// Fingerprint of everything the pixels depend on.
+    pub fingerprint: [u8; 32],
+    /// Size of the whole picture, of which the pixels may be a part.
+    pub display_size: [usize; 2],
+    /// Where the pixels lie in the whole picture; may begin left of or above it (overscan).
+    pub data_origin: [i64; 2],
+}
+
+/// A finished picture, scene-linear ACEScg, exposed so that 1.0 is display white.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// What it is.
+    pub header: FrameHeader,
+    /// Premultiplied red, green, blue and alpha.
+    pub beauty: Image<4>,
+    /// Distance of the nearest thing that was drawn, m; infinite where there is nothing.
+    pub depth: Option<Vec<f32>>,
+    /// Layers and AOVs, in the order in which they were asked for.
+    pub channels: Vec<Channel>,
+    /// Whether a plate fills the picture, so that it is opaque.
+    pub opaque: bool,
+}
+
+/// Display pixels: sRGB-encoded, straight alpha.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DisplayPixels {
+    /// 8 bits a channel.
+    Eight(Vec<[u8; 4]>),
+    /// 16 bits a channel.
+    Sixteen(Vec<[u16; 4]>),
+}
+
+/// A picture ready for a screen or a display format.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DisplayImage {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Whether every pixel is opaque, so that alpha may be left out.
+    pub opaque: bool,
+    /// Pixels, row after row from the top.
+    pub pixels: DisplayPixels,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn crop_takes_the_named_pixels_and_refuses_to_reach_outside() {
+        let pixels = (0..12).map(|i| [i as f32]).collect();
+        let image = Image::<1>::from_pixels(4, 3, pixels).unwrap();
+        let part = image.crop(Rect { x: 1, y: 1, width: 2, height: 2 }).unwrap();
+        assert_eq!(part.pixels(), &[[5.0], [6.0], [9.0], [10.0]]);
+        assert!(image.crop(Rect { x: 3, y: 0, width: 2, height: 1 }).is_none());
+    }
+
+    #[test]
+    fn rectangles_meet_only_where_both_cover() {
+        let a = Rect { x: 0, y: 0, width: 4, height: 4 };
+        let b = Rect { x: 2, y: 3, width: 9, height: 9 };
+        assert_eq!(a.intersection(&b), Rect { x: 2, y: 3, width: 2, height: 1 });
+        assert!(a.intersection(&Rect { x: 4, y: 0, width: 1, height: 1 }).is_empty());
+    }
+}

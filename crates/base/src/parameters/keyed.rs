@@ -1,0 +1,207 @@
+//! Parameters made of points: curves, and values keyed over time.
+
+use super::{Kind, Node, Parameter, ProblemKind, Range, Reader, Table, Value, nearest, types::read_number};
+use crate::{
+    animation::{Animate, Animated},
+    curve::{Curve, CurveError, Interpolation},
+};
+
+crate::choice! {
+    /// How values between points are found.
+    pub enum InterpolationName {
+        /// A smooth curve that never overshoots its points.
+        Monotone = "monotone",
+        /// Straight lines.
+        Linear = "linear",
+        /// Each value holds until the next.
+        Step = "step",
+    }
+}
+
+impl From<InterpolationName> for Interpolation {
+    fn from(name: InterpolationName) -> Self {
+        match name {
+            InterpolationName::Monotone => Self::Monotone,
+            InterpolationName::Linear => Self::Linear,
+            InterpolationName::Step => Self::Step,
+        }
+    }
+}
+
+fn interpolation_name(interpolation: Interpolation) -> InterpolationName {
+    match interpolation {
+        Interpolation::Monotone => InterpolationName::Monotone,
+        Interpolation::Linear => InterpolationName::Linear,
+        Interpolation::Step => InterpolationName::Step,
+    }
+}
+
+/// Splits `{ <list_key> = [...], interpolation = "..." }` into its list and its interpolation.
+fn keyed_table<'a>(
+    table: &'a Table,
+    list_key: &str,
+    node: &Node,
+    expected: &Kind,
+    reader: &mut Reader,
+) -> Option<(&'a [Node], Interpolation)> {
+    let allowed = [list_key, "interpolation"];
+    for entry in &table.entries {
+        if !allowed.contains(&entry.key.as_str()) {
+            let kind = ProblemKind::UnknownKey {
+                key: entry.key.clone(),
+                nearest: nearest(&entry.key, allowed).map(str::to_owned),
+                allowed: allowed.map(str::to_owned).to_vec(),
+            };
+            reader.report_at(Some(entry.key_span.clone()), kind);
+            return None;
+        }
+    }
+    let interpolation = match table.get("interpolation") {
+        Some(node) => InterpolationName::read(node, &(), "", reader)?,
+        None => InterpolationName::default(),
+    };
+    match table.get(list_key).map(|list| &list.value) {
+        Some(Value::List(items)) => Some((items, interpolation.into())),
+        _ => {
+            reader.wrong_type(node, expected);
+            None
+        }
+    }
+}
+
+/// Bounds of a curve's control points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CurveLimits {
+    /// Bounds of x.
+    pub x: Range,
+    /// Bounds of y.
+    pub y: Range,
+    /// Whether it must not fall.
+    pub rising: bool,
+}
+
+impl CurveLimits {
+    /// A curve from the unit interval into `y`.
+    pub const fn unit_to(min: f64, max: f64) -> Self {
+        Self { x: Range::new(0.0, 1.0), y: Range::new(min, max), rising: false }
+    }
+
+    /// The same, but it must not fall.
+    pub const fn rising(self) -> Self {
+        Self { rising: true, ..self }
+    }
+}
+
+impl Default for CurveLimits {
+    fn default() -> Self {
+        Self::unit_to(0.0, 1.0)
+    }
+}
+
+fn read_points(items: &[Node], limits: &CurveLimits, expected: &Kind, reader: &mut Reader) -> Option<Vec<[f64; 2]>> {
+    let read_point = |item: &Node| match &item.value {
+        Value::List(pair) if pair.len() == 2 => Some([
+            read_number(&pair[0], &limits.x, "", expected, reader)?,
+            read_number(&pair[1], &limits.y, "", expected, reader)?,
+        ]),
+        _ => {
+            reader.wrong_type(item, expected);
+            None
+        }
+    };
+    items.iter().map(read_point).collect()
+}
+
+impl Parameter for Curve {
+    type Limits = CurveLimits;
+
+    fn kind(limits: &CurveLimits) -> Kind {
+        Kind::Curve { x: [limits.x.min, limits.x.max], y: [limits.y.min, limits.y.max], rising: limits.rising }
+    }
+
+    fn read(node: &Node, limits: &CurveLimits, _unit: &'static str, reader: &mut Reader) -> Option<Self> {
+        let expected = Self::kind(limits);
+        let (items, interpolation) = match &node.value {
+            Value::List(items) => (items.as_slice(), Interpolation::Monotone),
+            Value::Table(table) => keyed_table(table, "points", node, &expected, reader)?,
+            _ => {
+                reader.wrong_type(node, &expected);
+                return None;
+            }
+        };
+        let points = read_points(items, limits, &expected, reader)?;
+        if limits.rising
+            && let Some(pair) = points.windows(2).find(|pair| pair[1][1] < pair[0][1])
+        {
+            reader.report(node, ProblemKind::NotRising { from: pair[0][0], to: pair[1][0] });
+            return None;
+        }
+        match Curve::new(points, interpolation) {
+            Ok(curve) => Some(curve),
+            Err(error) => {
+                reader.report(node, error.into());
+                None
+            }
+        }
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        let points = Value::List(self.points().iter().map(|point| Value::numbers(*point).into()).collect());
+        Some(match self.interpolation() {
+            Interpolation::Monotone => points,
+            other => {
+                let mut table = Table::default();
+                table.push("points", points);
+                table.push("interpolation", Value::Text(interpolation_name(other).name().into()));
+                Value::Table(table)
+            }
+        })
+    }
+}
+
+impl<T: Parameter + Animate> Parameter for Animated<T> {
+    type Limits = T::Limits;
+
+    fn kind(limits: &T::Limits) -> Kind {
+        Kind::Animated(Box::new(T::kind(limits)))
+    }
+
+    fn read(node: &Node, limits: &T::Limits, unit: &'static str, reader: &mut Reader) -> Option<Self> {
+        let Value::Table(table) = &node.value else {
+            return T::read(node, limits, unit, reader).map(Self::from);
+        };
+        let expected = Self::kind(limits);
+        let (items, interpolation) = keyed_table(table, "keys", node, &expected, reader)?;
+        let read_key = |item: &Node| match &item.value {
+            Value::List(pair) if pair.len() == 2 => {
+                let time = read_number(&pair[0], &Range::default(), "s", &expected, reader)?;
+                Some((time, T::read(&pair[1], limits, unit, reader)?))
+            }
+            _ => {
+                reader.wrong_type(item, &expected);
+                None
+            }
+        };
+        let keys: Vec<(f64, T)> = items.iter().map(read_key).collect::<Option<_>>()?;
+        match Self::keyed(keys, interpolation) {
+            Ok(animated) => Some(animated),
+            Err(error) => {
+                reader.report(node, CurveError::into(error));
+                None
+            }
+        }
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        if let Some(constant) = self.constant() {
+            return constant.to_value();
+        }
+        let key = |(time, value): (f64, T)| {
+            Some(Value::List(vec![Value::Number(time).into(), value.to_value()?.into()]).into())
+        };
+        let mut table = Table::default();
+        table.push("keys", Value::List(self.keys().into_iter().filter_map(key).collect()));
+        table.push("interpolation", Value::Text(interpolation_name(self.interpolation()).name().into()));
+        Some(Value::Table(table))
+    }
+}

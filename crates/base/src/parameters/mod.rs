@@ -1,0 +1,19 @@
+//! One descriptor for each parameter.
+//!
+//! A phenomenon lists its parameters once, with [`parameters!`](crate::parameters): type, default, range, unit and
+//! documentation. Parser, located errors, schema, book, inspector and random scenes all read that one list.
+
+mod keyed;
+mod kind;
+mod macros;
+mod node;
+mod problem;
+mod sample;
+mod types;
+
+pub use keyed::{CurveLimits, InterpolationName};
+pub use kind::{Choice, Descriptor, Kind, TableDescriptor};
+pub use node::{Entry, Node, Span, Table, Value};
+pub use problem::{Problem, ProblemKind, Reader, nearest};
+pub use sample::sample;
+pub use types::{AssetPath, Auto, Length, Parameter, Parameters, Range};

@@ -1,0 +1,120 @@
+//! Values as a file says them, each with where it stands.
+
+/// Bytes of the source text.
+pub type Span = std::ops::Range<usize>;
+
+/// A value and its place in the source.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    /// What it says.
+    pub value: Value,
+    /// Where it says so; empty for values that no file holds.
+    pub span: Span,
+}
+
+/// What a file can say.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// `true` or `false`.
+    Bool(bool),
+    /// A whole number.
+    Integer(i64),
+    /// A number with a fraction.
+    Number(f64),
+    /// A string.
+    Text(String),
+    /// An array.
+    List(Vec<Node>),
+    /// A table, inline or not.
+    Table(Table),
+}
+
+/// Keys and values in the order of the file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// Entries in the order of the file.
+    pub entries: Vec<Entry>,
+}
+
+/// One key of a table with its value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// The key.
+    pub key: String,
+    /// Where the key stands.
+    pub key_span: Span,
+    /// Its value.
+    pub node: Node,
+}
+
+impl Table {
+    /// The value of `key`.
+    pub fn get(&self, key: &str) -> Option<&Node> {
+        self.entries.iter().find(|entry| entry.key == key).map(|entry| &entry.node)
+    }
+
+    /// Adds a key without a place in a source.
+    pub fn push(&mut self, key: impl Into<String>, value: Value) {
+        self.entries.push(Entry { key: key.into(), key_span: 0..0, node: Node::from(value) });
+    }
+}
+
+impl From<Value> for Node {
+    fn from(value: Value) -> Self {
+        Self { value, span: 0..0 }
+    }
+}
+
+impl Value {
+    /// A list of numbers.
+    pub fn numbers(numbers: impl IntoIterator<Item = f64>) -> Self {
+        Self::List(numbers.into_iter().map(|number| Self::Number(number).into()).collect())
+    }
+
+    /// What it is, for messages.
+    pub fn type_name(&self) -> &'static str {
+        match self {
+            Self::Bool(_) => "a boolean",
+            Self::Integer(_) => "a whole number",
+            Self::Number(_) => "a number",
+            Self::Text(_) => "a string",
+            Self::List(_) => "a list",
+            Self::Table(_) => "a table",
+        }
+    }
+
+    /// Its number, where it is one.
+    pub fn as_number(&self) -> Option<f64> {
+        match *self {
+            Self::Integer(integer) => Some(integer as f64),
+            Self::Number(number) => Some(number),
+            _ => None,
+        }
+    }
+}
+
+/// Writes the value as it would stand in a scene file, tables inline.
+impl std::fmt::Display for Value {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Bool(value) => write!(f, "{value}"),
+            Self::Integer(value) => write!(f, "{value}"),
+            Self::Number(value) => write!(f, "{value:?}"),
+            Self::Text(value) => write!(f, "{value:?}"),
+            Self::List(items) => {
+                f.write_str("[")?;
+                for (index, item) in items.iter().enumerate() {
+                    write!(f, "{}{}", if index > 0 { ", " } else { "" }, item.value)?;
+                }
+                f.write_str("]")
+            }
+            Self::Table(table) => {
+                f.write_str("{")?;
+                for (index, entry) in table.entries.iter().enumerate() {
+                    write!(f, "{} {} = {}", if index > 0 { "," } else { "" }, entry.key, entry.node.value)?;
+                }
+                f.write_str(" }")
+            }
+        }
+    }
+}

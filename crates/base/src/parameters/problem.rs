@@ -1,0 +1,197 @@
+//! Faults in what a file says, each with its place, what is wrong and what is allowed.
+
+use super::{Choice, Kind, Node, Span};
+use crate::assets::AssetError;
+
+/// One fault.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problem {
+    /// Where in the source; `None` where the fault is not in the text.
+    pub span: Option<Span>,
+    /// The parameter, such as `flame_sheet.speed`.
+    pub path: String,
+    /// What is wrong.
+    pub kind: ProblemKind,
+}
+
+impl std::fmt::Display for Problem {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if !self.path.is_empty() {
+            write!(f, "{}: ", self.path)?;
+        }
+        self.kind.fmt(f)
+    }
+}
+
+/// What can be wrong.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ProblemKind {
+    /// The text is not TOML.
+    #[error("{0}")]
+    Syntax(String),
+    /// The key means nothing here.
+    #[error("unknown key `{key}`{}; allowed: {}", did_you_mean(.nearest), .allowed.join(", "))]
+    UnknownKey {
+        /// The key.
+        key: String,
+        /// The allowed key most like it, if one is.
+        nearest: Option<String>,
+        /// All allowed keys.
+        allowed: Vec<String>,
+    },
+    /// A value of another type.
+    #[error("expected {expected}, found {found}")]
+    WrongType {
+        /// What is allowed.
+        expected: String,
+        /// What stands there.
+        found: &'static str,
+    },
+    /// A number beyond its bounds, or not finite.
+    #[error("{value} is out of range; allowed: {min} to {max}{}", unit_suffix(.unit))]
+    OutOfRange {
+        /// The number.
+        value: f64,
+        /// Least allowed.
+        min: f64,
+        /// Greatest allowed.
+        max: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
+    /// A name that is none of those allowed.
+    #[error("`{value}` is not known{}; allowed: {}", did_you_mean(.nearest), .allowed.join(", "))]
+    NotOneOf {
+        /// The name.
+        value: String,
+        /// The allowed name most like it, if one is.
+        nearest: Option<String>,
+        /// All allowed names.
+        allowed: Vec<String>,
+    },
+    /// A list too short or too long.
+    #[error("has {found} items; allowed: {min} to {max}")]
+    ListLength {
+        /// How many it has.
+        found: usize,
+        /// Fewest allowed.
+        min: usize,
+        /// Most allowed.
+        max: usize,
+    },
+    /// Control points or keys that make no curve.
+    #[error("{0}")]
+    Curve(#[from] crate::curve::CurveError),
+    /// A curve that falls where it must rise.
+    #[error("falls between x = {from} and x = {to}; it must rise or stay level from point to point")]
+    NotRising {
+        /// Where the fall begins.
+        from: f64,
+        /// Where it ends.
+        to: f64,
+    },
+    /// Two things of one name.
+    #[error("the name \"{name}\" is taken by another phenomenon; each needs its own")]
+    DuplicateName {
+        /// The name.
+        name: String,
+    },
+    /// Two parameters that do not go together.
+    #[error("{0}")]
+    Conflict(String),
+    /// The file is of a newer format.
+    #[error("format {found} is newer than this program knows; known: up to {known}")]
+    NewerFormat {
+        /// The file's format.
+        found: i64,
+        /// The newest known one.
+        known: i64,
+    },
+    /// The file is of an older format.
+    #[error("format {found} is old; `bansho upgrade` rewrites the file for format {known}")]
+    OlderFormat {
+        /// The file's format.
+        found: i64,
+        /// The newest known one.
+        known: i64,
+    },
+    /// Something the scene refers to cannot be had.
+    #[error("{0}")]
+    Asset(#[from] AssetError),
+}
+
+fn did_you_mean(nearest: &Option<String>) -> String {
+    nearest.as_ref().map(|name| format!(", did you mean `{name}`?")).unwrap_or_default()
+}
+
+fn unit_suffix(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" {unit}") }
+}
+
+/// The candidate most like `word`, if one is alike enough to be a slip of the hand.
+pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    candidates
+        .into_iter()
+        .map(|candidate| (strsim::jaro_winkler(word, candidate), candidate))
+        .filter(|(likeness, _)| *likeness > 0.8)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}
+
+/// Gathers problems while values are read; knows the path that is being read.
+#[derive(Debug, Default)]
+pub struct Reader {
+    path: Vec<String>,
+    problems: Vec<Problem>,
+}
+
+impl Reader {
+    /// A reader of a file's root.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Runs `read` with `segment` added to the path.
+    pub fn within<T>(&mut self, segment: impl Into<String>, read: impl FnOnce(&mut Self) -> T) -> T {
+        self.path.push(segment.into());
+        let result = read(self);
+        self.path.pop();
+        result
+    }
+
+    /// Notes a problem at `node`.
+    pub fn report(&mut self, node: &Node, kind: ProblemKind) {
+        self.report_at(Some(node.span.clone()), kind);
+    }
+
+    /// Notes a problem at `span`.
+    pub fn report_at(&mut self, span: Option<Span>, kind: ProblemKind) {
+        self.problems.push(Problem { span, path: self.path.join("."), kind });
+    }
+
+    /// Notes that `node` is not of the wanted kind.
+    pub fn wrong_type(&mut self, node: &Node, expected: &Kind) {
+        let kind = ProblemKind::WrongType { expected: expected.expectation(), found: node.value.type_name() };
+        self.report(node, kind);
+    }
+
+    /// Notes that `name` is none of `choices`.
+    pub fn not_one_of(&mut self, node: &Node, name: &str, choices: &[Choice]) {
+        let kind = ProblemKind::NotOneOf {
+            value: name.to_owned(),
+            nearest: nearest(name, choices.iter().map(|choice| choice.name)).map(str::to_owned),
+            allowed: choices.iter().map(|choice| choice.name.to_owned()).collect(),
+        };
+        self.report(node, kind);
+    }
+
+    /// All problems so far, in the order in which they were met.
+    pub fn problems(&self) -> &[Problem] {
+        &self.problems
+    }
+
+    /// Takes all problems.
+    pub fn into_problems(self) -> Vec<Problem> {
+        self.problems
+    }
+}

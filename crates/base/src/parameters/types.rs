@@ -1,0 +1,334 @@
+//! The types a parameter may have, and how each is read from a file and written back.
+
+use super::{Kind, Node, ProblemKind, Reader, Table, TableDescriptor, Value, nearest};
+
+/// A type that a parameter can have.
+pub trait Parameter: Sized {
+    /// What bounds its values.
+    type Limits: Default;
+
+    /// What it may be, within `limits`.
+    fn kind(limits: &Self::Limits) -> Kind;
+
+    /// Reads it from a file; reports and returns `None` where the file is wrong.
+    fn read(node: &Node, limits: &Self::Limits, unit: &'static str, reader: &mut Reader) -> Option<Self>;
+
+    /// Writes it as a file would say it; `None` where a file would leave it out.
+    fn to_value(&self) -> Option<Value>;
+}
+
+/// A table of parameters; made by [`parameters!`](crate::parameters).
+pub trait Parameters: Sized + Default {
+    /// All its descriptors.
+    fn table() -> &'static TableDescriptor;
+
+    /// Reads it; what the file leaves out keeps its default. Keys in `ignored` are somebody else's.
+    fn read_table(table: &Table, reader: &mut Reader, ignored: &[&str]) -> Self;
+
+    /// Writes every parameter.
+    fn to_table(&self) -> Table;
+
+    /// Reports keys that are neither parameters nor `ignored`.
+    fn report_unknown(table: &Table, reader: &mut Reader, ignored: &[&str]) {
+        let known = || Self::table().parameters.iter().map(|parameter| parameter.key).chain(ignored.iter().copied());
+        for entry in &table.entries {
+            if !known().any(|key| key == entry.key) {
+                let kind = ProblemKind::UnknownKey {
+                    key: entry.key.clone(),
+                    nearest: nearest(&entry.key, known()).map(str::to_owned),
+                    allowed: known().map(str::to_owned).collect(),
+                };
+                reader.report_at(Some(entry.key_span.clone()), kind);
+            }
+        }
+    }
+}
+
+/// Inclusive bounds of a number, or of each component of a vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Least value.
+    pub min: f64,
+    /// Greatest value.
+    pub max: f64,
+}
+
+impl Range {
+    /// From `min` to `max`, both allowed.
+    pub const fn new(min: f64, max: f64) -> Self {
+        Self { min, max }
+    }
+}
+
+impl Default for Range {
+    /// As far as a length, a speed or a time in a picture can sensibly go.
+    fn default() -> Self {
+        Self::new(-1e6, 1e6)
+    }
+}
+
+pub(super) fn read_number(
+    node: &Node,
+    range: &Range,
+    unit: &'static str,
+    expected: &Kind,
+    reader: &mut Reader,
+) -> Option<f64> {
+    let Some(value) = node.value.as_number() else {
+        reader.wrong_type(node, expected);
+        return None;
+    };
+    if !(range.min..=range.max).contains(&value) {
+        reader.report(node, ProblemKind::OutOfRange { value, min: range.min, max: range.max, unit });
+        return None;
+    }
+    Some(value)
+}
+
+impl Parameter for f64 {
+    type Limits = Range;
+
+    fn kind(limits: &Range) -> Kind {
+        Kind::Number { min: limits.min, max: limits.max }
+    }
+
+    fn read(node: &Node, limits: &Range, unit: &'static str, reader: &mut Reader) -> Option<Self> {
+        read_number(node, limits, unit, &Self::kind(limits), reader)
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        Some(Value::Number(*self))
+    }
+}
+
+impl Parameter for i64 {
+    type Limits = Range;
+
+    fn kind(limits: &Range) -> Kind {
+        Kind::Integer { min: limits.min as i64, max: limits.max as i64 }
+    }
+
+    fn read(node: &Node, limits: &Range, unit: &'static str, reader: &mut Reader) -> Option<Self> {
+        let Value::Integer(value) = node.value else {
+            reader.wrong_type(node, &Self::kind(limits));
+            return None;
+        };
+        read_number(node, limits, unit, &Self::kind(limits), reader).map(|_| value)
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        Some(Value::Integer(*self))
+    }
+}
+
+impl Parameter for bool {
+    type Limits = ();
+
+    fn kind(_: &()) -> Kind {
+        Kind::Bool
+    }
+
+    fn read(node: &Node, limits: &(), _unit: &'static str, reader: &mut Reader) -> Option<Self> {
+        if let Value::Bool(value) = node.value {
+            return Some(value);
+        }
+        reader.wrong_type(node, &Self::kind(limits));
+        None
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        Some(Value::Bool(*self))
+    }
+}
+
+impl Parameter for String {
+    type Limits = ();
+
+    fn kind(_: &()) -> Kind {
+        Kind::Text
+    }
+
+    fn read(node: &Node, limits: &(), _unit: &'static str, reader: &mut Reader) -> Option<Self> {
+        if let Value::Text(text) = &node.value {
+            return Some(text.clone());
+        }
+        reader.wrong_type(node, &Self::kind(limits));
+        None
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        Some(Value::Text(self.clone()))
+    }
+}
+
+/// The path of an asset, relative to the scene file.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct AssetPath(pub String);
+
+impl Parameter for AssetPath {
+    type Limits = ();
+
+    fn kind(_: &()) -> Kind {
+        Kind::Asset
+    }
+
+    fn read(node: &Node, limits: &(), _unit: &'static str, reader: &mut Reader) -> Option<Self> {
+        match &node.value {
+            Value::Text(path) if !path.is_empty() => Some(Self(path.clone())),
+            _ => {
+                reader.wrong_type(node, &Self::kind(limits));
+                None
+            }
+        }
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        Some(Value::Text(self.0.clone()))
+    }
+}
+
+impl<const N: usize> Parameter for [f64; N] {
+    type Limits = Range;
+
+    fn kind(limits: &Range) -> Kind {
+        Kind::Vector { length: N, min: limits.min, max: limits.max }
+    }
+
+    fn read(node: &Node, limits: &Range, unit: &'static str, reader: &mut Reader) -> Option<Self> {
+        let expected = Self::kind(limits);
+        let Value::List(items) = &node.value else {
+            reader.wrong_type(node, &expected);
+            return None;
+        };
+        if items.len() != N {
+            reader.report(node, ProblemKind::ListLength { found: items.len(), min: N, max: N });
+            return None;
+        }
+        let mut values = [0.0; N];
+        for (value, item) in values.iter_mut().zip(items) {
+            *value = read_number(item, limits, unit, &expected, reader)?;
+        }
+        Some(values)
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        Some(Value::numbers(*self))
+    }
+}
+
+impl<const N: usize> Parameter for [i64; N] {
+    type Limits = Range;
+
+    fn kind(limits: &Range) -> Kind {
+        Kind::Vector { length: N, min: limits.min, max: limits.max }
+    }
+
+    fn read(node: &Node, limits: &Range, unit: &'static str, reader: &mut Reader) -> Option<Self> {
+        let values = <[f64; N]>::read(node, limits, unit, reader)?;
+        if values.iter().any(|value| value.fract() != 0.0) {
+            reader.wrong_type(node, &Kind::Integer { min: limits.min as i64, max: limits.max as i64 });
+            return None;
+        }
+        Some(values.map(|value| value as i64))
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        Some(Value::List(self.iter().map(|value| Value::Integer(*value).into()).collect()))
+    }
+}
+
+/// `"auto"`, or a value of one's own.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Auto<T> {
+    /// Chosen by Bansho.
+    #[default]
+    Auto,
+    /// Chosen by the scene.
+    Set(T),
+}
+
+impl<T: Parameter> Parameter for Auto<T> {
+    type Limits = T::Limits;
+
+    fn kind(limits: &T::Limits) -> Kind {
+        Kind::Auto(Box::new(T::kind(limits)))
+    }
+
+    fn read(node: &Node, limits: &T::Limits, unit: &'static str, reader: &mut Reader) -> Option<Self> {
+        if node.value == Value::Text("auto".into()) {
+            return Some(Self::Auto);
+        }
+        if matches!(node.value, Value::Text(_)) {
+            reader.wrong_type(node, &Self::kind(limits));
+            return None;
+        }
+        T::read(node, limits, unit, reader).map(Self::Set)
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        match self {
+            Self::Auto => Some(Value::Text("auto".into())),
+            Self::Set(value) => value.to_value(),
+        }
+    }
+}
+
+impl<T: Parameter> Parameter for Option<T> {
+    type Limits = T::Limits;
+
+    fn kind(limits: &T::Limits) -> Kind {
+        Kind::Optional(Box::new(T::kind(limits)))
+    }
+
+    fn read(node: &Node, limits: &T::Limits, unit: &'static str, reader: &mut Reader) -> Option<Self> {
+        T::read(node, limits, unit, reader).map(Some)
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        self.as_ref().and_then(T::to_value)
+    }
+}
+
+/// How many items a list may have, and what bounds each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Length<L> {
+    /// Fewest items.
+    pub min: usize,
+    /// Most items.
+    pub max: usize,
+    /// Limits of each item.
+    pub item: L,
+}
+
+impl<L: Default> Default for Length<L> {
+    fn default() -> Self {
+        Self { min: 0, max: 10_000, item: L::default() }
+    }
+}
+
+impl<T: Parameter> Parameter for Vec<T> {
+    type Limits = Length<T::Limits>;
+
+    fn kind(limits: &Self::Limits) -> Kind {
+        Kind::List { item: Box::new(T::kind(&limits.item)), min: limits.min, max: limits.max }
+    }
+
+    fn read(node: &Node, limits: &Self::Limits, unit: &'static str, reader: &mut Reader) -> Option<Self> {
+        let Value::List(items) = &node.value else {
+            reader.wrong_type(node, &Self::kind(limits));
+            return None;
+        };
+        if !(limits.min..=limits.max).contains(&items.len()) {
+            reader.report(node, ProblemKind::ListLength { found: items.len(), min: limits.min, max: limits.max });
+            return None;
+        }
+        let read_item = |(index, item): (usize, &Node)| {
+            reader.within(index.to_string(), |reader| T::read(item, &limits.item, unit, reader))
+        };
+        items.iter().enumerate().map(read_item).collect()
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        Some(Value::List(self.iter().filter_map(T::to_value).map(Node::from).collect()))
+    }
+}

@@ -1,0 +1,116 @@
+//! What fire, rain, aurora and whatever comes next have in common for the renderer.
+
+use crate::{
+    canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
+    image::{Image, Rect},
+    observer::{Cancelled, Observer},
+    surroundings::{Publication, Surroundings},
+};
+
+/// How a stepped phenomenon moves: in steps that are fixed in seconds, whatever the frame rate, size or shutter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stepping {
+    /// Length of a step, s.
+    pub step: f64,
+    /// How long it runs before time 0, so that it begins developed, s.
+    pub preroll: f64,
+}
+
+/// Why a snapshot cannot be restored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SnapshotError {
+    /// Closed-form phenomena keep no state.
+    #[error("the phenomenon keeps no state")]
+    NoState,
+    /// It is of another version of the state.
+    #[error("the snapshot is of version {found}; this program reads {known}")]
+    Version {
+        /// The snapshot's.
+        found: u32,
+        /// This program's.
+        known: u32,
+    },
+    /// It is shorter or longer than its contents say, or does not match its checksum.
+    #[error("the snapshot is damaged")]
+    Damaged,
+}
+
+/// One phenomenon of a scene, ready to be drawn at any time (closed form) or stepped there.
+///
+/// Everything is a function of the parameters, the seed, the name and the time: never of the threads, of the frames
+/// drawn before, or of the size of the picture.
+pub trait Phenomenon: Send + Sync {
+    /// Its name in the scene, which also names its layers.
+    fn name(&self) -> &str;
+
+    /// The quantities it can write beside its light.
+    fn aovs(&self) -> &'static [AovDescriptor];
+
+    /// Luminance of its bright parts, cd/m^2, from which `exposure_ev100 = "auto"` is chosen once a shot.
+    fn luminance(&self) -> f64;
+
+    /// How it steps; `None` for a closed form, which is drawn at any time without steps.
+    fn stepping(&self) -> Option<Stepping> {
+        None
+    }
+
+    /// Steps from `time` to one step later. Closed forms do nothing.
+    fn step(&mut self, _time: f64, _surroundings: &Surroundings) {}
+
+    /// Its state; empty for a closed form.
+    fn snapshot(&self) -> Vec<u8> {
+        Vec::new()
+    }
+
+    /// Returns to a state that [`snapshot`](Self::snapshot) gave.
+    ///
+    /// # Errors
+    /// The bytes are not such a state; the phenomenon is then unchanged.
+    fn restore(&mut self, _state: &[u8]) -> Result<(), SnapshotError> {
+        Err(SnapshotError::NoState)
+    }
+
+    /// What the others see of it while the shutter is open.
+    fn publish(&self, shutter: Shutter) -> Publication;
+
+    /// The stretches of depth that it fills, in any order. Slices are cut at their ends.
+    fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval>;
+
+    /// Prepares one frame, so that strips of it can be drawn in any order by any thread.
+    ///
+    /// # Errors
+    /// The observer asked to stop.
+    fn prepare<'a>(
+        &'a self,
+        view: &'a View,
+        surroundings: &'a Surroundings<'a>,
+        observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled>;
+}
+
+/// One frame of a phenomenon, ready to draw.
+pub trait Prepared: Send + Sync {
+    /// The pixels that it can touch within a slice of depth.
+    fn bounds(&self, slice: &DepthInterval) -> Rect;
+
+    /// Draws what lies in `slice` into `strip`, nearest first, blurred over the shutter.
+    ///
+    /// Must give each pixel the same value whatever strip it comes in.
+    fn draw(&self, slice: &DepthInterval, strip: &mut Strip);
+
+    /// How it bends the light of what lies behind it.
+    fn deflection(&self) -> Option<Deflection<'_>> {
+        None
+    }
+}
+
+/// A field of small angles that displaces what lies behind it.
+#[derive(Clone, Copy, Debug)]
+pub struct Deflection<'a> {
+    /// Depth at which the light is bent, m: what begins behind it is bent.
+    pub depth: f64,
+    /// The pixels that the field covers.
+    pub rect: Rect,
+    /// Angle to the right and upward, radians.
+    pub angle: &'a Image<2>,
+}

@@ -1,0 +1,146 @@
+//! What phenomena know of each other: light, absorption and obstacles, but never names.
+
+use glam::DVec3;
+
+use crate::wind::Wind;
+
+/// How a light sends its light out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Emitter {
+    /// From a small sphere in all directions.
+    Point {
+        /// Its middle, m.
+        position: DVec3,
+        /// Its radius, m; nearer than this the light no longer grows.
+        radius: f64,
+    },
+    /// From infinitely far away.
+    Directional {
+        /// Unit vector toward the light.
+        toward: DVec3,
+    },
+    /// From a point within a cone.
+    Spot {
+        /// Its apex, m.
+        position: DVec3,
+        /// Unit vector along its axis.
+        axis: DVec3,
+        /// Cosine of the angle up to which it is full.
+        cos_inner: f64,
+        /// Cosine of the angle beyond which it is dark.
+        cos_outer: f64,
+    },
+}
+
+/// A light as every phenomenon sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Where it comes from.
+    pub emitter: Emitter,
+    /// ACEScg, its luminance in candela for points and spots, in lux on a facing plane for directional lights.
+    pub intensity: [f32; 3],
+}
+
+impl Light {
+    /// Illuminance on a plane at `point` that faces the light (lux, ACEScg), and the unit vector toward it.
+    pub fn illuminance(&self, point: DVec3) -> ([f32; 3], DVec3) {
+        let (factor, toward) = match self.emitter {
+            Emitter::Directional { toward } => (1.0, toward),
+            Emitter::Point { position, radius } => {
+                let offset = position - point;
+                let distance_squared = offset.length_squared().max(radius * radius).max(1e-12);
+                (1.0 / distance_squared, offset.normalize_or_zero())
+            }
+            Emitter::Spot { position, axis, cos_inner, cos_outer } => {
+                let offset = position - point;
+                let toward = offset.normalize_or_zero();
+                let cone = ((-toward.dot(axis) - cos_outer) / (cos_inner - cos_outer).max(1e-9)).clamp(0.0, 1.0);
+                (cone * cone * (3.0 - 2.0 * cone) / offset.length_squared().max(1e-12), toward)
+            }
+        };
+        (self.intensity.map(|value| value * factor as f32), toward)
+    }
+}
+
+/// Something solid that stands in the way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Occluder {
+    /// A ball.
+    Sphere {
+        /// Its middle, m.
+        centre: DVec3,
+        /// Its radius, m.
+        radius: f64,
+    },
+    /// All below a plane.
+    HalfSpace {
+        /// A point on the plane, m.
+        point: DVec3,
+        /// Unit normal, pointing out of the solid.
+        normal: DVec3,
+    },
+    /// A box with upright faces.
+    Cuboid {
+        /// Its least corner, m.
+        min: DVec3,
+        /// Its greatest corner, m.
+        max: DVec3,
+    },
+}
+
+/// What one phenomenon publishes to the others at one time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Publication {
+    /// Lights that stand for its emission.
+    pub lights: Vec<Light>,
+    /// How much light it takes away everywhere, 1/m.
+    pub extinction: f64,
+    /// Solids it puts in the way.
+    pub occluders: Vec<Occluder>,
+}
+
+impl Publication {
+    /// Adds what another phenomenon publishes.
+    pub fn extend(&mut self, other: &Self) {
+        self.lights.extend_from_slice(&other.lights);
+        self.extinction += other.extinction;
+        self.occluders.extend_from_slice(&other.occluders);
+    }
+}
+
+/// What a phenomenon is drawn among: the wind, and what all others published.
+#[derive(Clone, Debug)]
+pub struct Surroundings<'a> {
+    /// The one wind of the scene.
+    pub wind: &'a Wind,
+    /// Everybody else's lights, extinction and occluders, and the scene's own.
+    pub others: Publication,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn point_lights_fall_with_the_square_of_distance_outside_their_radius() {
+        let light =
+            Light { emitter: Emitter::Point { position: DVec3::ZERO, radius: 0.5 }, intensity: [8.0, 4.0, 2.0] };
+        assert_eq!(light.illuminance(DVec3::new(2.0, 0.0, 0.0)).0, [2.0, 1.0, 0.5]);
+        assert_eq!(light.illuminance(DVec3::new(0.1, 0.0, 0.0)).0, light.illuminance(DVec3::new(0.5, 0.0, 0.0)).0);
+    }
+
+    #[test]
+    fn spots_are_full_inside_and_dark_outside_their_cone() {
+        let light = Light {
+            emitter: Emitter::Spot {
+                position: DVec3::new(0.0, 2.0, 0.0),
+                axis: -DVec3::Y,
+                cos_inner: 0.9,
+                cos_outer: 0.8,
+            },
+            intensity: [4.0; 3],
+        };
+        assert_eq!(light.illuminance(DVec3::ZERO).0, [1.0; 3]);
+        assert_eq!(light.illuminance(DVec3::new(5.0, 0.0, 0.0)).0, [0.0; 3]);
+    }
+}

@@ -1,0 +1,118 @@
+//! When frames of an animation begin, in the units that its format counts in.
+
+/// Greatest common divisor.
+fn divisor(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { divisor(b, a % b) }
+}
+
+/// `fps` in lowest terms; `None` for a rate of zero or without end.
+pub(crate) fn reduced([frames, seconds]: [u32; 2]) -> Option<[u32; 2]> {
+    let common = divisor(frames, seconds);
+    (frames > 0 && seconds > 0).then(|| [frames / common, seconds / common])
+}
+
+/// Length of a frame for APNG, seconds as a fraction of 16-bit numbers. Rates whose fraction is longer lose their last
+/// bits, less than 1 part in 30,000.
+pub(crate) fn apng_delay(fps: [u32; 2]) -> Option<[u16; 2]> {
+    let [frames, seconds] = reduced(fps)?;
+    let excess = (32 - frames.max(seconds).leading_zeros()).saturating_sub(16);
+    let [frames, seconds] = [frames >> excess, seconds >> excess].map(|part| part as u16);
+    (frames > 0 && seconds > 0).then_some([seconds, frames])
+}
+
+/// Shortest length of a GIF frame that programs show as it is, in hundredths of a second; shorter ones they slow down.
+const SHORTEST_CS: u64 = 2;
+
+/// Frames of a GIF: which are kept and how long each stays.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GifTiming {
+    fps: [u64; 2],
+}
+
+impl GifTiming {
+    /// `None` for a rate of zero, or so slow that a frame's length does not fit.
+    pub(crate) fn new(fps: [u32; 2]) -> Option<Self> {
+        let fps = reduced(fps)?.map(u64::from);
+        (fps[1] * 100 / fps[0] < u64::from(u16::MAX)).then_some(Self { fps })
+    }
+
+    fn is_too_fast(&self) -> bool {
+        self.fps[0] * SHORTEST_CS > self.fps[1] * 100
+    }
+
+    /// The slot of a fiftieth of a second in which frame `index` begins.
+    fn slot(&self, index: usize) -> u64 {
+        index as u64 * self.fps[1] * (100 / SHORTEST_CS) / self.fps[0]
+    }
+
+    /// Whether frame `index` is shown: all up to 50 frames a second; of faster films the first frame in each fiftieth.
+    pub(crate) fn keeps(&self, index: usize) -> bool {
+        index == 0 || !self.is_too_fast() || self.slot(index) != self.slot(index - 1)
+    }
+
+    /// When frame `index` begins, hundredths of a second, rounded from the exact time so that no error adds up.
+    pub(crate) fn start_cs(&self, index: usize) -> u64 {
+        if self.is_too_fast() {
+            return self.slot(index) * SHORTEST_CS;
+        }
+        (index as u64 * self.fps[1] * 200 + self.fps[0]) / (2 * self.fps[0])
+    }
+
+    /// How long frame `index` of `count` stays, until the next that is kept, hundredths of a second.
+    pub(crate) fn length_cs(&self, index: usize, count: usize) -> u16 {
+        let next = (index + 1..count).find(|&next| self.keeps(next)).unwrap_or(count);
+        let length = self.start_cs(next).saturating_sub(self.start_cs(index)).max(SHORTEST_CS);
+        u16::try_from(length).unwrap_or(u16::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gif_time_does_not_drift() {
+        for fps in [[24, 1], [30, 1], [24000, 1001], [12, 1], [50, 1], [1, 3]] {
+            let timing = GifTiming::new(fps).unwrap();
+            let exact = 24_000.0 * f64::from(fps[1]) / f64::from(fps[0]);
+            let total: u64 = (0..240).map(|index| u64::from(timing.length_cs(index, 240))).sum();
+            assert!((total as f64 - exact).abs() <= 0.5, "{fps:?}: {total} for {exact}");
+            assert!((0..240).all(|index| timing.keeps(index)));
+        }
+        // 30 frames a second: 3, 4 and 3 hundredths, again and again.
+        let timing = GifTiming::new([30, 1]).unwrap();
+        assert_eq!([0, 1, 2, 3].map(|index| timing.length_cs(index, 30)), [3, 4, 3, 3]);
+    }
+
+    #[test]
+    fn gifs_faster_than_fifty_drop_frames_evenly() {
+        for (fps, kept) in [([60, 1], 50), ([100, 1], 50), ([120, 1], 50), ([240, 1], 50)] {
+            let timing = GifTiming::new(fps).unwrap();
+            let frames = fps[0] as usize;
+            let shown: Vec<usize> = (0..frames).filter(|&index| timing.keeps(index)).collect();
+            assert_eq!(shown.len(), kept, "{fps:?}");
+            assert!(shown.iter().all(|&index| timing.length_cs(index, frames) == 2));
+            let gaps: Vec<usize> = shown.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            assert!(gaps.iter().max().unwrap() - gaps.iter().min().unwrap() <= 1, "{gaps:?}");
+        }
+    }
+
+    #[test]
+    fn apng_lengths_are_exact_fractions() {
+        assert_eq!(apng_delay([30, 1]), Some([1, 30]));
+        assert_eq!(apng_delay([24000, 1001]), Some([1001, 24000]));
+        assert_eq!(apng_delay([60000, 2000]), Some([1, 30]));
+        let [seconds, frames] = apng_delay([2_997_003, 100_000]).unwrap().map(f64::from);
+        assert!((frames / seconds / 29.97003 - 1.0).abs() < 1e-3);
+        assert_eq!(apng_delay([0, 1]), None);
+        assert_eq!(apng_delay([1, 0]), None);
+        assert_eq!(apng_delay([1, 100_000]), None);
+    }
+
+    #[test]
+    fn impossible_rates_are_refused() {
+        assert!(GifTiming::new([0, 1]).is_none());
+        assert!(GifTiming::new([1, 0]).is_none());
+        assert!(GifTiming::new([1, 700]).is_none());
+    }
+}

@@ -1,0 +1,104 @@
+//! The attributes of an OpenEXR header, as bytes ("OpenEXR File Layout": name, type, size, value; little-endian).
+
+use super::{KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_VERSION, plane::Plane};
+use crate::stamp;
+use bansho_base::image::{FrameHeader, Precision};
+
+/// CIE xy of the ACEScg (AP1) red, green and blue and of its white, D60 (SMPTE ST 2065-4, S-2014-004).
+pub(crate) const AP1: [[f32; 2]; 4] = [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]];
+
+/// First bytes of every file.
+pub(crate) const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+/// Set in the version field where a name is longer than 31 bytes.
+pub(crate) const FLAG_LONG_NAMES: u32 = 0x400;
+/// Number of the compression by blocks of 16 lines.
+const COMPRESSION_ZIP16: u8 = 3;
+
+/// A rectangle as OpenEXR stores it: both ends belong to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Window {
+    pub(crate) min: [i32; 2],
+    pub(crate) max: [i32; 2],
+}
+
+/// A header being written.
+pub(crate) struct HeaderBytes(Vec<u8>);
+
+/// The header of a frame and where in it the 64 digits of the digest go, which are zeros here.
+///
+/// No attribute depends on time, host or path, and their order is fixed.
+pub(crate) fn header(frame: &FrameHeader, planes: &[Plane<'_>], data: Window, display: Window) -> (Vec<u8>, usize) {
+    let mut bytes = HeaderBytes::begin(planes.iter().any(|plane| plane.name.len() > 31));
+    bytes.attribute("channels", "chlist", &channel_list(planes));
+    bytes.attribute("compression", "compression", &[COMPRESSION_ZIP16]);
+    bytes.window("dataWindow", data);
+    bytes.window("displayWindow", display);
+    bytes.attribute("lineOrder", "lineOrder", &[0]);
+    bytes.floats("pixelAspectRatio", "float", &[1.0]);
+    bytes.floats("screenWindowCenter", "v2f", &[0.0; 2]);
+    bytes.floats("screenWindowWidth", "float", &[1.0]);
+    bytes.floats("chromaticities", "chromaticities", AP1.as_flattened());
+    bytes.floats("adoptedNeutral", "v2f", &AP1[3]);
+    let [frames, seconds] = frame.fps;
+    let rational = [frames.min(i32::MAX as u32), seconds].map(u32::to_le_bytes);
+    bytes.attribute("framesPerSecond", "rational", rational.as_flattened());
+    let number = frame.number.clamp(i32::MIN.into(), i32::MAX.into()) as i32;
+    bytes.attribute("imageCounter", "int", &number.to_le_bytes());
+    bytes.floats("expTime", "float", &[frame.exposure_time_s]);
+    bytes.floats(KEY_EXPOSURE, "float", &[frame.exposure_ev100]);
+    bytes.floats("worldToCamera", "m44f", frame.camera.world_to_camera.as_flattened());
+    bytes.floats("worldToNDC", "m44f", frame.camera.world_to_ndc.as_flattened());
+    bytes.floats("verticalFovDeg", "float", &[frame.camera.vertical_fov_deg]);
+    bytes.attribute("software", "string", format!("Bansho {}", stamp::VERSION).as_bytes());
+    bytes.attribute(KEY_VERSION, "string", stamp::VERSION.as_bytes());
+    bytes.attribute(KEY_FINGERPRINT, "string", stamp::to_hex(&frame.fingerprint).as_bytes());
+    bytes.attribute(KEY_DIGEST, "string", &[b'0'; 64]);
+    let HeaderBytes(mut bytes) = bytes;
+    let digest_at = bytes.len() - 64;
+    bytes.push(0);
+    (bytes, digest_at)
+}
+
+impl HeaderBytes {
+    fn begin(long_names: bool) -> Self {
+        let version = 2 | if long_names { FLAG_LONG_NAMES } else { 0 };
+        Self([MAGIC, version.to_le_bytes()].concat())
+    }
+
+    fn attribute(&mut self, name: &str, kind: &str, value: &[u8]) {
+        for text in [name, kind] {
+            self.0.extend(text.as_bytes());
+            self.0.push(0);
+        }
+        self.0.extend((value.len() as u32).to_le_bytes());
+        self.0.extend(value);
+    }
+
+    fn floats(&mut self, name: &str, kind: &str, values: &[f32]) {
+        let bytes: Vec<[u8; 4]> = values.iter().map(|value| value.to_le_bytes()).collect();
+        self.attribute(name, kind, bytes.as_flattened());
+    }
+
+    fn window(&mut self, name: &str, window: Window) {
+        let [x0, y0] = window.min;
+        let [x1, y1] = window.max;
+        self.attribute(name, "box2i", [x0, y0, x1, y1].map(i32::to_le_bytes).as_flattened());
+    }
+}
+
+fn channel_list(planes: &[Plane<'_>]) -> Vec<u8> {
+    let mut list = Vec::new();
+    for plane in planes {
+        list.extend(plane.name.as_bytes());
+        list.push(0);
+        let kind: u32 = match plane.precision {
+            Precision::Half => 1,
+            Precision::Single => 2,
+        };
+        list.extend(kind.to_le_bytes());
+        list.extend([0; 4]); // not perceptually linear, and three reserved bytes
+        list.extend([1_u32.to_le_bytes(); 2].as_flattened()); // a sample for every pixel
+    }
+    list.push(0);
+    list
+}

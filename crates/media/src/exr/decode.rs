@@ -1,0 +1,263 @@
+//! OpenEXR plates: colour and depth of any part, any sample type, lines or tiles.
+//!
+//! The header is first read by [`super::parse`], which trusts nothing, so that a file cannot make the decoder ask for more
+//! memory than it could ever fill.
+
+use std::io::Cursor;
+
+use ::exr::{
+    block::{UncompressedBlock, chunk::Chunk, lines::LineRef, reader::ChunksReader},
+    meta::{MetaData, attribute::SampleType, header::Header},
+};
+use bansho_base::{
+    assets::{AssetProblem, Picture},
+    image::Image,
+};
+use rayon::prelude::*;
+
+use super::{
+    parse::{self, Outline, Part},
+    primaries,
+};
+use crate::plates::limits;
+
+/// Chunks that are decompressed at a time.
+const BATCH: usize = 32;
+
+/// Reads a plate: the part and layer with `R`, `G` and `B` (or a lone grey `Y`), with `A` where there is one, and depth
+/// from `Z`, `depth.Z`, or the only channel of a file that has just one. Pixels cover the display window; where the file
+/// has none they are transparent and infinitely far. Colours are given straight, those that are no numbers as 0.
+pub(crate) fn decode(file: &[u8]) -> Result<Picture, AssetProblem> {
+    let outline = parse::outline(file).map_err(damaged)?;
+    check(&outline, file.len() as u64)?;
+    let wanted = Wanted::choose(&outline)
+        .ok_or_else(|| AssetProblem::NoChannel(format!("R, Y or Z (it has {})", all_names(&outline))))?;
+    let display = outline.parts[0].display.ok_or_else(|| damaged("it has no display window"))?;
+    let size = limits::window_size(display);
+    let (width, height) = (size[0] as usize, size[1] as usize);
+    let mut planes = Planes { width, height, display_min: display.min, values: wanted.planes(width * height) };
+    read_chunks(file, &wanted, &mut planes)?;
+    finish(&outline, &wanted, planes)
+}
+
+fn damaged(reason: impl ToString) -> AssetProblem {
+    AssetProblem::Damaged(reason.to_string())
+}
+
+fn all_names(outline: &Outline) -> String {
+    let names = outline.parts.iter().flat_map(|part| &part.channels).map(|channel| channel.name.as_str());
+    names.take(12).collect::<Vec<_>>().join(", ")
+}
+
+/// Refuses what would need more memory than is allowed, or than the file's bytes could ever fill.
+fn check(outline: &Outline, file_bytes: u64) -> Result<(), AssetProblem> {
+    if outline.deep {
+        return Err(damaged("deep pixels are not read; flatten them first"));
+    }
+    for part in &outline.parts {
+        let (Some(data), Some(display)) = (part.data, part.display) else {
+            return Err(damaged("its header lacks a window"));
+        };
+        limits::check_size(limits::window_size(display))?;
+        let [width, height] = limits::check_size(limits::window_size(data))?;
+        if part.tile.is_some_and(|tile| tile.iter().any(|side| !(1..=limits::SIDE as u32).contains(side))) {
+            return Err(damaged("its tiles have no possible size"));
+        }
+        if part.channels.is_empty() || part.channels.iter().any(|channel| channel.sampling != [1, 1]) {
+            return Err(damaged("channels of fewer samples than pixels are not read"));
+        }
+        let bytes_per_pixel: u64 = part.channels.iter().map(|channel| channel.bytes_per_sample).sum();
+        limits::check_expansion(width, height, bytes_per_pixel, file_bytes, greatest_ratio(part))?;
+    }
+    Ok(())
+}
+
+/// How many bytes of pixels a byte of the file can stand for at most.
+fn greatest_ratio(part: &Part) -> u64 {
+    match part.compression {
+        Some(0) => 1,
+        Some(1) => 64, // run lengths of up to 128 in 2 bytes
+        Some(2 | 3 | 5) => limits::DEFLATE_RATIO,
+        Some(6 | 7) => 32, // 4 x 4 halves in 3 bytes at least
+        _ => 1 << 15,      // Huffman runs over wavelets or cosines
+    }
+}
+
+/// Which channel of which part goes into which plane.
+struct Wanted {
+    part: usize,
+    /// Index in the part's list of channels, for red, green, blue, alpha.
+    colour: [Option<usize>; 4],
+    /// Part and channel of depth.
+    depth: Option<(usize, usize)>,
+}
+
+impl Wanted {
+    fn choose(outline: &Outline) -> Option<Self> {
+        let find = |part: &Part, name: &str| part.channels.iter().position(|channel| channel.name == name);
+        let parts = || outline.parts.iter().enumerate();
+        let depth = ["Z", "depth.Z", "Depth.Z", "depth.z", "depth"]
+            .iter()
+            .find_map(|name| parts().find_map(|(index, part)| Some((index, find(part, name)?))))
+            .or_else(|| (outline.parts.len() == 1 && outline.parts[0].channels.len() == 1).then_some((0, 0)));
+        let layer = |part: &Part, prefix: &str| {
+            let channel = |name: &str| find(part, &format!("{prefix}{name}"));
+            Some([Some(channel("R")?), Some(channel("G")?), Some(channel("B")?), channel("A")])
+        };
+        let grey = |part: &Part| find(part, "Y").map(|y| [Some(y), Some(y), Some(y), find(part, "A")]);
+        let colour = parts()
+            .find_map(|(index, part)| Some((index, layer(part, "").or_else(|| grey(part))?)))
+            .or_else(|| parts().find_map(|(index, part)| Some((index, first_layer(part, &layer)?))));
+        match (colour, depth) {
+            (None, None) => None,
+            (Some((part, colour)), depth) => Some(Self { part, colour, depth }),
+            (None, Some((part, channel))) => Some(Self { part, colour: [None; 4], depth: Some((part, channel)) }),
+        }
+    }
+
+    fn planes(&self, pixels: usize) -> Values {
+        let colour = self.colour[0].map(|_| {
+            // Without alpha in the file, pixels that it has are opaque and the others are not.
+            vec![[0.0; 4]; pixels]
+        });
+        Values { colour, depth: self.depth.map(|_| vec![f32::INFINITY; pixels]) }
+    }
+
+    fn wants_part(&self, part: usize) -> bool {
+        (self.colour[0].is_some() && part == self.part) || self.depth.is_some_and(|(depth, _)| depth == part)
+    }
+}
+
+/// The first layer `name.R, name.G, name.B` of a part.
+fn first_layer(
+    part: &Part,
+    layer: &impl Fn(&Part, &str) -> Option<[Option<usize>; 4]>,
+) -> Option<[Option<usize>; 4]> {
+    let prefixes = part.channels.iter().filter_map(|channel| channel.name.strip_suffix('R'));
+    prefixes.filter(|prefix| prefix.ends_with('.')).find_map(|prefix| layer(part, prefix))
+}
+
+struct Values {
+    colour: Option<Vec<[f32; 4]>>,
+    depth: Option<Vec<f32>>,
+}
+
+struct Planes {
+    width: usize,
+    height: usize,
+    display_min: [i32; 2],
+    values: Values,
+}
+
+fn read_chunks(file: &[u8], wanted: &Wanted, planes: &mut Planes) -> Result<(), AssetProblem> {
+    let reader = ::exr::block::read(Cursor::new(file), false).map_err(damaged)?;
+    let full_size = |_: &MetaData, tile: ::exr::block::chunk::TileCoordinates, block: ::exr::block::BlockIndex| {
+        tile.is_largest_resolution_level() && wanted.wants_part(block.layer)
+    };
+    let mut chunks = reader.filter_chunks(false, full_size).map_err(damaged)?;
+    let meta = chunks.meta_data().clone();
+    loop {
+        let batch: Vec<Chunk> = chunks.by_ref().take(BATCH).collect::<Result<_, _>>().map_err(damaged)?;
+        if batch.is_empty() {
+            return Ok(());
+        }
+        let blocks: Vec<UncompressedBlock> = batch
+            .into_par_iter()
+            .map(|chunk| UncompressedBlock::decompress_chunk(chunk, &meta, false))
+            .collect::<Result<_, _>>()
+            .map_err(damaged)?;
+        for block in &blocks {
+            let header = meta.headers.get(block.index.layer).ok_or_else(|| damaged("a block of no part"))?;
+            planes.place(block, header, wanted);
+        }
+    }
+}
+
+impl Planes {
+    /// Copies what a block holds of the wanted channels.
+    fn place(&mut self, block: &UncompressedBlock, header: &Header, wanted: &Wanted) {
+        for line in block.lines(&header.channels) {
+            let (channel, part) = (line.location.channel, block.index.layer);
+            let Some(kind) = header.channels.list.get(channel).map(|channel| channel.sample_type) else { continue };
+            let origin = header.own_attributes.layer_position;
+            let y = line.location.position.1 as i64 + i64::from(origin.1) - i64::from(self.display_min[1]);
+            let x = line.location.position.0 as i64 + i64::from(origin.0) - i64::from(self.display_min[0]);
+            if !(0..self.height as i64).contains(&y) {
+                continue;
+            }
+            let row = y as usize * self.width;
+            let place = |offset: usize| {
+                let x = x + offset as i64;
+                (0..self.width as i64).contains(&x).then_some(row + x as usize)
+            };
+            if let Some(depth) = self.values.depth.as_mut().filter(|_| wanted.depth == Some((part, channel))) {
+                samples(&line, kind).enumerate().for_each(|(i, value)| {
+                    if let Some(slot) = place(i).and_then(|place| depth.get_mut(place)) {
+                        *slot = value;
+                    }
+                });
+            }
+            if let Some(colour) = self.values.colour.as_mut().filter(|_| wanted.part == part) {
+                let is_opaque = wanted.colour[3].is_none();
+                for component in (0..4).filter(|component| wanted.colour[*component] == Some(channel)) {
+                    samples(&line, kind).enumerate().for_each(|(i, value)| {
+                        if let Some(pixel) = place(i).and_then(|place| colour.get_mut(place)) {
+                            pixel[component] = value;
+                            if is_opaque {
+                                pixel[3] = 1.0;
+                            }
+                        }
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// The values of a line as floats.
+fn samples<'a>(line: &LineRef<'a>, kind: SampleType) -> Box<dyn Iterator<Item = f32> + 'a> {
+    let bytes = line.value;
+    match kind {
+        SampleType::F16 => Box::new(bytes.as_chunks().0.iter().map(|pair| half::f16::from_ne_bytes(*pair).to_f32())),
+        SampleType::F32 => Box::new(bytes.as_chunks().0.iter().map(|four| f32::from_ne_bytes(*four))),
+        SampleType::U32 => Box::new(bytes.as_chunks().0.iter().map(|four| u32::from_ne_bytes(*four) as f32)),
+    }
+}
+
+/// Straight alpha, known primaries, and no values that would spoil what is composited over them.
+fn finish(outline: &Outline, wanted: &Wanted, planes: Planes) -> Result<Picture, AssetProblem> {
+    let (width, height) = (planes.width, planes.height);
+    let conversion = primaries::conversion(outline.parts[wanted.part].chromaticities)
+        .ok_or_else(|| damaged("its chromaticities describe no colours"))?;
+    let mut colour = planes.values.colour.unwrap_or_else(|| {
+        // A file of depth alone: shown as grey, opaque.
+        let depth = planes.values.depth.iter().flatten();
+        depth.map(|&z| [z, z, z, 1.0]).collect()
+    });
+    colour.par_iter_mut().for_each(|pixel| *pixel = straight(pixel.map(finite), conversion.matrix.as_ref()));
+    let depth = planes.values.depth.map(|mut depth| {
+        // No distance at all counts as infinitely far.
+        depth.iter_mut().filter(|z| z.is_nan()).for_each(|z| *z = f32::INFINITY);
+        depth
+    });
+    let colour = Image::from_pixels(width, height, colour).ok_or_else(|| damaged("its pixels do not fill it"))?;
+    Ok(Picture { colour, depth, encoding: conversion.encoding })
+}
+
+/// Greatest value that is kept: that of half floats, so that an infinity does not spread.
+const GREATEST: f32 = 65504.0;
+
+fn finite(value: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value.clamp(-GREATEST, GREATEST) }
+}
+
+fn straight([r, g, b, alpha]: [f32; 4], matrix: Option<&[[f32; 3]; 3]>) -> [f32; 4] {
+    let alpha = alpha.clamp(0.0, 1.0);
+    let scale = if alpha > 0.0 { 1.0 / alpha } else { 1.0 };
+    let colour = [r * scale, g * scale, b * scale].map(finite);
+    let [r, g, b] = match matrix {
+        None => colour,
+        Some(rows) => rows.map(|row| row[0].mul_add(colour[0], row[1].mul_add(colour[1], row[2] * colour[2]))),
+    };
+    [r, g, b, alpha]
+}

@@ -1,0 +1,137 @@
+//! Frames to OpenEXR bytes: one part, lines in increasing order, ZIP in blocks of 16 lines.
+//!
+//! The header is written here rather than by the `exr` crate, which keeps free attributes in a hash map and so writes
+//! them in another order every time; Bansho's files are the same bytes for the same frame. The compression is the crate's.
+
+use std::path::Path;
+
+use ::exr::{
+    compression::Compression,
+    math::Vec2,
+    meta::{
+        BlockDescription,
+        attribute::{ChannelDescription, IntegerBounds, LineOrder, SampleType, Text},
+        header::Header,
+    },
+};
+use bansho_base::image::{Frame, Precision};
+use rayon::prelude::*;
+
+use super::{
+    attribute::{self, Window},
+    plane::{Plane, Row, planes},
+};
+use crate::{
+    error::{MediaError, SizeRule},
+    stamp,
+};
+
+/// Lines that are compressed together.
+const LINES_PER_BLOCK: usize = 16;
+/// Most pixels on a side that are written.
+const SIDE_LIMIT: usize = 1 << 20;
+
+/// The bytes of an OpenEXR file of `frame`: beauty as half `R,G,B,A`, depth as float `Z`, and every layer and AOV under
+/// its own name. Colours are ACEScg, premultiplied. Compressed in parallel in the caller's thread pool; the same frame
+/// gives the same bytes whatever the number of threads. Colours beyond the range of half are written as 65504.
+///
+/// # Errors
+/// A size the format cannot hold, channels of another length than the picture, names that are empty, too long or
+/// double. `path` is only named in errors.
+pub fn encode(frame: &Frame, path: &Path) -> Result<Vec<u8>, MediaError> {
+    let planes = planes(frame);
+    check_planes(frame, &planes, path)?;
+    let (data, display) = windows(frame, path)?;
+    let blocks = compressed_blocks(frame, &planes, path)?;
+    let (mut file, digest_at) = attribute::header(&frame.header, &planes, data, display);
+    let mut offset = file.len() + 8 * blocks.len();
+    file.reserve(8 * blocks.len() + blocks.iter().map(|block| block.len() + 8).sum::<usize>());
+    for block in &blocks {
+        file.extend((offset as u64).to_le_bytes());
+        offset += 8 + block.len();
+    }
+    for (index, block) in blocks.iter().enumerate() {
+        let line = data.min[1] + (index * LINES_PER_BLOCK) as i32;
+        file.extend(line.to_le_bytes());
+        file.extend((block.len() as u32).to_le_bytes());
+        file.extend_from_slice(block);
+    }
+    let digest = stamp::to_hex(blake3::hash(&file).as_bytes());
+    file[digest_at..digest_at + 64].copy_from_slice(digest.as_bytes());
+    Ok(file)
+}
+
+fn check_planes(frame: &Frame, planes: &[Plane<'_>], path: &Path) -> Result<(), MediaError> {
+    let expected = frame.beauty.width() * frame.beauty.height();
+    for (index, plane) in planes.iter().enumerate() {
+        let name = plane.name;
+        let twice = index > 0 && planes[index - 1].name == name;
+        if name.is_empty() || name.len() > 255 || name.contains('\0') || twice {
+            return Err(MediaError::ChannelName { path: path.to_path_buf(), name: name.to_owned() });
+        }
+        if plane.len() != expected {
+            let (path, plane_name) = (path.to_path_buf(), name.to_owned());
+            return Err(MediaError::PlaneLength { path, plane: plane_name, got: plane.len(), expected });
+        }
+    }
+    Ok(())
+}
+
+/// Data window and display window.
+fn windows(frame: &Frame, path: &Path) -> Result<(Window, Window), MediaError> {
+    let size = [frame.beauty.width(), frame.beauty.height()];
+    let data = window(frame.header.data_origin, size);
+    let display = window([0, 0], frame.header.display_size);
+    data.zip(display).ok_or(MediaError::Size {
+        path: path.to_path_buf(),
+        width: size[0],
+        height: size[1],
+        allowed: SizeRule::UpTo(SIDE_LIMIT),
+    })
+}
+
+fn window(origin: [i64; 2], size: [usize; 2]) -> Option<Window> {
+    if size.iter().any(|&side| side == 0 || side > SIDE_LIMIT) {
+        return None;
+    }
+    let min = [i32::try_from(origin[0]).ok()?, i32::try_from(origin[1]).ok()?];
+    let max = [min[0].checked_add(size[0] as i32 - 1)?, min[1].checked_add(size[1] as i32 - 1)?];
+    Some(Window { min, max })
+}
+
+fn compressed_blocks(frame: &Frame, planes: &[Plane<'_>], path: &Path) -> Result<Vec<Vec<u8>>, MediaError> {
+    let (width, height) = (frame.beauty.width(), frame.beauty.height());
+    let header = crate_header(planes, width, height);
+    let bytes_per_line = width * planes.iter().map(Plane::bytes_per_value).sum::<usize>();
+    let block = |index: usize| {
+        let lines = index * LINES_PER_BLOCK..((index + 1) * LINES_PER_BLOCK).min(height);
+        let (mut bytes, mut row) = (Vec::with_capacity(bytes_per_line * lines.len()), Row::default());
+        for line in lines.clone() {
+            planes.iter().for_each(|plane| plane.append(line * width..(line + 1) * width, &mut row, &mut bytes));
+        }
+        let section = IntegerBounds::new(Vec2(0, lines.start as i32), Vec2(width, lines.len()));
+        header.compression.compress_image_section_to_le(&header, bytes, section)
+    };
+    (0..height.div_ceil(LINES_PER_BLOCK))
+        .into_par_iter()
+        .map(block)
+        .collect::<Result<_, _>>()
+        .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
+}
+
+/// What the crate must know of the picture in order to compress a part of it.
+fn crate_header(planes: &[Plane<'_>], width: usize, height: usize) -> Header {
+    let channel = |plane: &Plane<'_>| {
+        let kind = match plane.precision {
+            Precision::Half => SampleType::F16,
+            Precision::Single => SampleType::F32,
+        };
+        // The crate looks at the type alone; a name of its own making cannot be refused.
+        ChannelDescription::new(Text::new_or_none("c").unwrap_or_default(), kind, false)
+    };
+    Header::new(Text::default(), (width, height), planes.iter().map(channel).collect()).with_encoding(
+        Compression::ZIP16,
+        BlockDescription::ScanLines,
+        LineOrder::Increasing,
+    )
+}

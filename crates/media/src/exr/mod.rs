@@ -1,0 +1,20 @@
+//! OpenEXR: scene-linear frames with layers, AOVs, camera and exposure.
+
+pub(crate) mod attribute;
+mod decode;
+mod encode;
+pub(crate) mod parse;
+mod plane;
+mod primaries;
+
+pub(crate) use decode::decode;
+pub use encode::encode;
+
+/// Header attribute (string): fingerprint in hexadecimal digits.
+pub const KEY_FINGERPRINT: &str = "bansho:fingerprint";
+/// Header attribute (string): Bansho's version.
+pub const KEY_VERSION: &str = "bansho:version";
+/// Header attribute (string): BLAKE3 of the whole file, taken while its 64 digits were zeros.
+pub const KEY_DIGEST: &str = "bansho:digest";
+/// Header attribute (float): exposure value at ISO 100 that the pixels are scaled by.
+pub const KEY_EXPOSURE: &str = "exposure_ev100";

@@ -1,0 +1,84 @@
+//! The planes of a frame in the order in which a file holds them.
+
+use std::ops::Range;
+
+use bansho_base::image::{Frame, Precision};
+use half::slice::HalfFloatSliceExt;
+
+/// Greatest finite half: brighter pixels are written as this, since an infinity spoils every later blur.
+const HALF_MAX: f32 = 65504.0;
+
+/// One channel of the file.
+pub(crate) struct Plane<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) precision: Precision,
+    source: Source<'a>,
+}
+
+enum Source<'a> {
+    /// Component 0 to 3 of the beauty.
+    Beauty(&'a [[f32; 4]], usize),
+    Values(&'a [f32]),
+}
+
+/// Every plane of `frame`, sorted by name as the format demands.
+pub(crate) fn planes(frame: &Frame) -> Vec<Plane<'_>> {
+    let beauty = ["R", "G", "B", "A"].into_iter().enumerate().map(|(component, name)| Plane {
+        name,
+        precision: Precision::Half,
+        source: Source::Beauty(frame.beauty.pixels(), component),
+    });
+    let depth =
+        frame.depth.iter().map(|values| Plane { name: "Z", precision: Precision::Single, source: Source::Values(values) });
+    let channels = frame.channels.iter().map(|channel| Plane {
+        name: &channel.name,
+        precision: channel.precision,
+        source: Source::Values(&channel.values),
+    });
+    let mut planes: Vec<_> = beauty.chain(depth).chain(channels).collect();
+    planes.sort_by(|a, b| a.name.as_bytes().cmp(b.name.as_bytes()));
+    planes
+}
+
+impl Plane<'_> {
+    /// How many values it has; as many as the frame has pixels.
+    pub(crate) fn len(&self) -> usize {
+        match self.source {
+            Source::Beauty(pixels, _) => pixels.len(),
+            Source::Values(values) => values.len(),
+        }
+    }
+
+    /// Bytes a value takes in the file.
+    pub(crate) fn bytes_per_value(&self) -> usize {
+        match self.precision {
+            Precision::Half => 2,
+            Precision::Single => 4,
+        }
+    }
+
+    /// Appends the values of the pixels `range`, in this machine's byte order.
+    pub(crate) fn append(&self, range: Range<usize>, row: &mut Row, bytes: &mut Vec<u8>) {
+        row.floats.clear();
+        match self.source {
+            Source::Beauty(pixels, component) => row.floats.extend(pixels[range].iter().map(|pixel| pixel[component])),
+            Source::Values(values) => row.floats.extend_from_slice(&values[range]),
+        }
+        match self.precision {
+            Precision::Single => bytes.extend_from_slice(bytemuck::cast_slice(&row.floats)),
+            Precision::Half => {
+                row.floats.iter_mut().for_each(|value| *value = value.clamp(-HALF_MAX, HALF_MAX));
+                row.halves.resize(row.floats.len(), half::f16::ZERO);
+                row.halves.convert_from_f32_slice(&row.floats);
+                bytes.extend(row.halves.iter().flat_map(|half| half.to_ne_bytes()));
+            }
+        }
+    }
+}
+
+/// Room for one row while it is converted.
+#[derive(Default)]
+pub(crate) struct Row {
+    floats: Vec<f32>,
+    halves: Vec<half::f16>,
+}

@@ -1,0 +1,128 @@
+//! From a file's chromaticities to colours that Bansho knows.
+
+use bansho_base::assets::Encoding;
+
+use super::attribute::AP1;
+
+/// What the colours of a file are, after the matrix, if there is one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Conversion {
+    pub(crate) encoding: Encoding,
+    pub(crate) matrix: Option<[[f32; 3]; 3]>,
+}
+
+/// CIE xy of red, green, blue and white of Rec. 709 and sRGB.
+const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
+
+/// How far written chromaticities may lie from the ones they mean.
+const TOLERANCE: f32 = 0.001;
+
+type Matrix = [[f64; 3]; 3];
+
+/// What to do with colours of these chromaticities; a file without them means Rec. 709. `None` where they lie on a line.
+pub(crate) fn conversion(chromaticities: Option<[[f32; 2]; 4]>) -> Option<Conversion> {
+    let given = chromaticities.unwrap_or(REC709);
+    let is = |known: [[f32; 2]; 4]| {
+        given.as_flattened().iter().zip(known.as_flattened()).all(|(a, b)| (a - b).abs() <= TOLERANCE)
+    };
+    if is(REC709) {
+        return Some(Conversion { encoding: Encoding::LinearSrgb, matrix: None });
+    }
+    if is(AP1) {
+        return Some(Conversion { encoding: Encoding::LinearAcescg, matrix: None });
+    }
+    let (from, to) = (to_xyz(given)?, to_xyz(REC709)?);
+    let adapted = multiply(bradford(white(given)?, white(REC709)?)?, from);
+    let matrix = multiply(inverse(to)?, adapted).map(|row| row.map(|value| value as f32));
+    let is_finite = matrix.as_flattened().iter().all(|value| value.is_finite());
+    is_finite.then_some(Conversion { encoding: Encoding::LinearSrgb, matrix: Some(matrix) })
+}
+
+/// XYZ of chromaticity xy with Y = 1.
+fn xyz([x, y]: [f32; 2]) -> Option<[f64; 3]> {
+    let (x, y) = (f64::from(x), f64::from(y));
+    let colour = [x / y, 1.0, (1.0 - x - y) / y];
+    colour.iter().all(|value| value.is_finite()).then_some(colour)
+}
+
+fn white(chromaticities: [[f32; 2]; 4]) -> Option<[f64; 3]> {
+    xyz(chromaticities[3])
+}
+
+/// Linear RGB to XYZ so that (1, 1, 1) is the white (SMPTE RP 177).
+fn to_xyz(chromaticities: [[f32; 2]; 4]) -> Option<Matrix> {
+    let [red, green, blue, white] = chromaticities.map(xyz);
+    let columns = transposed([red?, green?, blue?]);
+    let scale = apply(inverse(columns)?, white?);
+    Some(columns.map(|row| [row[0] * scale[0], row[1] * scale[1], row[2] * scale[2]]))
+}
+
+/// Bradford's adaptation from one white to another (ICC.1:2022, annex E).
+fn bradford(from: [f64; 3], to: [f64; 3]) -> Option<Matrix> {
+    const CONES: Matrix = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]];
+    let (before, after) = (apply(CONES, from), apply(CONES, to));
+    let scaled = [0, 1, 2].map(|cone| CONES[cone].map(|value| value * after[cone] / before[cone]));
+    Some(multiply(inverse(CONES)?, scaled))
+}
+
+fn apply(matrix: Matrix, vector: [f64; 3]) -> [f64; 3] {
+    matrix.map(|row| row[0] * vector[0] + row[1] * vector[1] + row[2] * vector[2])
+}
+
+fn transposed(matrix: Matrix) -> Matrix {
+    [0, 1, 2].map(|column| [0, 1, 2].map(|row| matrix[row][column]))
+}
+
+fn multiply(a: Matrix, b: Matrix) -> Matrix {
+    let columns = transposed(b);
+    a.map(|row| columns.map(|column| row[0] * column[0] + row[1] * column[1] + row[2] * column[2]))
+}
+
+fn inverse(m: Matrix) -> Option<Matrix> {
+    let minor = |row: usize, column: usize| {
+        let (r, s) = ((row + 1) % 3, (row + 2) % 3);
+        let (c, d) = ((column + 1) % 3, (column + 2) % 3);
+        m[r][c] * m[s][d] - m[r][d] * m[s][c]
+    };
+    let determinant = m[0][0] * minor(0, 0) + m[0][1] * minor(0, 1) + m[0][2] * minor(0, 2);
+    let inverse = [0, 1, 2].map(|row| [0, 1, 2].map(|column| minor(column, row) / determinant));
+    (determinant.abs() > 1e-9).then_some(inverse)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_primaries_pass_unchanged() {
+        assert_eq!(conversion(None).unwrap(), Conversion { encoding: Encoding::LinearSrgb, matrix: None });
+        assert_eq!(conversion(Some(AP1)).unwrap(), Conversion { encoding: Encoding::LinearAcescg, matrix: None });
+    }
+
+    #[test]
+    fn rec2020_becomes_the_published_rec709() {
+        // ITU-R BT.2087, table 4 inverted: Rec. 2020 to Rec. 709, same white.
+        let rec2020 = [[0.708, 0.292], [0.170, 0.797], [0.131, 0.046], [0.3127, 0.3290]];
+        let matrix = conversion(Some(rec2020)).unwrap().matrix.unwrap();
+        let expected = [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]];
+        for (found, wanted) in matrix.as_flattened().iter().zip(expected.as_flattened()) {
+            assert!((found - wanted).abs() < 2e-4, "{matrix:?}");
+        }
+    }
+
+    #[test]
+    fn white_stays_white_whatever_the_white_was() {
+        let p3_dci = [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060], [0.314, 0.351]];
+        let matrix = conversion(Some(p3_dci)).unwrap().matrix.unwrap();
+        for row in matrix {
+            assert!((row.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{row:?}");
+        }
+    }
+
+    #[test]
+    fn impossible_primaries_are_refused() {
+        assert!(conversion(Some([[0.3, 0.3]; 4])).is_none());
+        assert!(conversion(Some([[0.0; 2]; 4])).is_none());
+        assert!(conversion(Some([[f32::NAN; 2]; 4])).is_none());
+    }
+}

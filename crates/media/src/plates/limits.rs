@@ -1,0 +1,50 @@
+//! What a plate may claim, checked before any memory is taken for it.
+
+use bansho_base::assets::AssetProblem;
+
+use crate::exr::attribute::Window;
+
+/// Most pixels on a side.
+pub const SIDE: u64 = 16384;
+/// Most pixels in all: half of the greatest square, which as floats is 2 GiB.
+pub const PIXELS: u64 = SIDE * SIDE / 2;
+/// Most bytes of a file that is read.
+pub const FILE_BYTES: u64 = 4 << 30;
+/// How many bytes one byte of DEFLATE can stand for: 258 in two bits, and a little for headers.
+pub(crate) const DEFLATE_RATIO: u64 = 1040;
+
+/// Refuses empty pictures and those beyond [`SIDE`] or [`PIXELS`].
+pub(crate) fn check_size([width, height]: [u64; 2]) -> Result<[u64; 2], AssetProblem> {
+    if width == 0 || height == 0 {
+        return Err(AssetProblem::Damaged(format!("it claims {width} x {height} pixels")));
+    }
+    if width > SIDE || height > SIDE {
+        return Err(AssetProblem::TooLarge { width, height, limit: SIDE });
+    }
+    if width * height > PIXELS {
+        return Err(AssetProblem::TooManyPixels { width, height, limit: PIXELS });
+    }
+    Ok([width, height])
+}
+
+/// Refuses a picture that claims more pixels than its file could hold even if compressed as far as its format can.
+pub(crate) fn check_expansion(
+    width: u64,
+    height: u64,
+    bytes_per_pixel: u64,
+    file_bytes: u64,
+    ratio: u64,
+) -> Result<(), AssetProblem> {
+    let claimed = width * height * bytes_per_pixel;
+    if claimed > file_bytes.saturating_mul(ratio) {
+        let reason = format!("it claims {width} x {height} pixels, more than its {file_bytes} bytes can hold");
+        return Err(AssetProblem::Damaged(reason));
+    }
+    Ok(())
+}
+
+/// Width and height of a window; 0 where it is turned inside out.
+pub(crate) fn window_size(window: Window) -> [u64; 2] {
+    let side = |axis: usize| i64::from(window.max[axis]) - i64::from(window.min[axis]) + 1;
+    [side(0).max(0) as u64, side(1).max(0) as u64]
+}

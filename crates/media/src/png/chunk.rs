@@ -1,0 +1,84 @@
+//! The chunks a PNG is made of: length, kind, contents, checksum (PNG third edition, section 5.3).
+
+use super::checksum::crc32;
+
+/// First bytes of every PNG.
+pub(crate) const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
+
+/// One chunk of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Chunk<'a> {
+    pub(crate) kind: [u8; 4],
+    pub(crate) contents: &'a [u8],
+}
+
+/// Walks the chunks of a file; `Err` once where a chunk is cut off or its checksum is wrong.
+pub(crate) struct Chunks<'a>(&'a [u8]);
+
+/// A chunk that is cut off or damaged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct BrokenChunk;
+
+/// The chunks of `file`; `None` if it does not begin as a PNG.
+pub(crate) fn chunks(file: &[u8]) -> Option<Chunks<'_>> {
+    file.strip_prefix(&SIGNATURE).map(Chunks)
+}
+
+impl<'a> Iterator for Chunks<'a> {
+    type Item = Result<Chunk<'a>, BrokenChunk>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.0.is_empty() {
+            return None;
+        }
+        let chunk = split(self.0);
+        self.0 = chunk.map_or(&[], |(_, rest)| rest);
+        Some(chunk.map(|(chunk, _)| chunk).ok_or(BrokenChunk))
+    }
+}
+
+fn split(bytes: &[u8]) -> Option<(Chunk<'_>, &[u8])> {
+    let (length, bytes) = bytes.split_first_chunk::<4>()?;
+    let (kind, bytes) = bytes.split_first_chunk::<4>()?;
+    let (contents, bytes) = bytes.split_at_checked(u32::from_be_bytes(*length) as usize)?;
+    let (checksum, rest) = bytes.split_first_chunk::<4>()?;
+    let chunk = Chunk { kind: *kind, contents };
+    (u32::from_be_bytes(*checksum) == crc32(&[kind, contents])).then_some((chunk, rest))
+}
+
+/// Appends a chunk whose contents are the parts one after the other, at most 2^31 - 1 bytes together.
+pub(crate) fn push(file: &mut Vec<u8>, kind: [u8; 4], parts: &[&[u8]]) {
+    let length: usize = parts.iter().map(|part| part.len()).sum();
+    file.extend((length as u32).to_be_bytes());
+    let start = file.len();
+    file.extend(kind);
+    parts.iter().for_each(|part| file.extend_from_slice(part));
+    let checksum = crc32(&[&file[start..]]);
+    file.extend(checksum.to_be_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chunks_are_read_as_they_were_written_and_damage_is_seen() {
+        let mut file = SIGNATURE.to_vec();
+        push(&mut file, *b"tEXt", &[b"a", b"", b"bc"]);
+        push(&mut file, *b"IEND", &[]);
+        let read: Vec<_> = chunks(&file).unwrap().collect::<Result<_, _>>().unwrap();
+        assert_eq!(read[0], Chunk { kind: *b"tEXt", contents: b"abc" });
+        assert_eq!(read[1], Chunk { kind: *b"IEND", contents: b"" });
+        for cut in 9..file.len() {
+            if cut != file.len() - 12 {
+                assert!(chunks(&file[..cut]).unwrap().any(|chunk| chunk.is_err()), "cut at {cut}");
+            }
+        }
+        for place in 8..file.len() {
+            let mut damaged = file.clone();
+            damaged[place] ^= 4;
+            assert!(chunks(&damaged).unwrap().any(|chunk| chunk.is_err()), "damaged at {place}");
+        }
+        assert!(chunks(b"GIF89a").is_none());
+    }
+}

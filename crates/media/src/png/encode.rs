@@ -1,0 +1,199 @@
+//! Display pixels to PNG bytes.
+
+use std::{borrow::Cow, path::Path};
+
+use ::png::{
+    BitDepth, ColorType, DeflateCompression, Encoder, EncodingError, Filter, ScaledFloat, SourceChromaticities, SrgbRenderingIntent,
+};
+use bansho_base::image::{DisplayImage, DisplayPixels};
+
+use super::{KEY_FINGERPRINT, KEY_VERSION};
+use crate::{
+    error::{MediaError, SizeRule},
+    stamp,
+};
+
+/// How much work goes into making a PNG small.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PngEffort {
+    /// Fast: frames of a sequence, so that writing does not hold up rendering.
+    #[default]
+    Fast,
+    /// Small: single pictures for documents.
+    Small,
+}
+
+/// The bytes of a PNG of `picture`: 8 or 16 bits as it is, without alpha where it is opaque, marked sRGB, with the
+/// fingerprint as text. The same picture gives the same bytes.
+///
+/// # Errors
+/// A side of 0 or above [`SIDE_LIMIT`], or a number of pixels other than width times height. `path` is only named in errors.
+pub fn encode(
+    picture: &DisplayImage,
+    fingerprint: &[u8; 32],
+    effort: PngEffort,
+    path: &Path,
+) -> Result<Vec<u8>, MediaError> {
+    let size = checked_size(picture, path)?;
+    compress(picture, size, Some(fingerprint), effort)
+        .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
+}
+
+/// As [`encode`], without a fingerprint: a frame of a film.
+pub(crate) fn encode_frame(picture: &DisplayImage, path: &Path) -> Result<Vec<u8>, MediaError> {
+    let size = checked_size(picture, path)?;
+    compress(picture, size, None, PngEffort::Fast)
+        .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
+}
+
+/// Most pixels on a side of a PNG, as most readers allow.
+pub const SIDE_LIMIT: usize = 1_000_000;
+
+/// Width and height, once they agree with the pixels.
+fn checked_size(picture: &DisplayImage, path: &Path) -> Result<[u32; 2], MediaError> {
+    let (width, height) = (picture.width, picture.height);
+    if [width, height].iter().any(|side| !(1..=SIDE_LIMIT).contains(side)) {
+        let allowed = SizeRule::UpTo(SIDE_LIMIT);
+        return Err(MediaError::Size { path: path.to_path_buf(), width, height, allowed });
+    }
+    let got = match &picture.pixels {
+        DisplayPixels::Eight(pixels) => pixels.len(),
+        DisplayPixels::Sixteen(pixels) => pixels.len(),
+    };
+    if got != width * height {
+        let plane = "RGBA".to_owned();
+        return Err(MediaError::PlaneLength { path: path.to_path_buf(), plane, got, expected: width * height });
+    }
+    Ok([width as u32, height as u32])
+}
+
+fn compress(
+    picture: &DisplayImage,
+    [width, height]: [u32; 2],
+    fingerprint: Option<&[u8; 32]>,
+    effort: PngEffort,
+) -> Result<Vec<u8>, EncodingError> {
+    let mut file = Vec::with_capacity(picture.width * picture.height / 2 + 1024);
+    let mut encoder = Encoder::new(&mut file, width, height);
+    encoder.set_color(if picture.opaque { ColorType::Rgb } else { ColorType::Rgba });
+    encoder.set_depth(match picture.pixels {
+        DisplayPixels::Eight(_) => BitDepth::Eight,
+        DisplayPixels::Sixteen(_) => BitDepth::Sixteen,
+    });
+    mark_srgb(&mut encoder);
+    encoder.add_text_chunk("Software".to_owned(), format!("Bansho {}", stamp::VERSION))?;
+    encoder.add_text_chunk(KEY_VERSION.to_owned(), stamp::VERSION.to_owned())?;
+    if let Some(fingerprint) = fingerprint {
+        encoder.add_text_chunk(KEY_FINGERPRINT.to_owned(), stamp::to_hex(fingerprint))?;
+    }
+    set_effort(&mut encoder, effort);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&samples(picture))?;
+    writer.finish()?;
+    Ok(file)
+}
+
+/// Marks the pixels as sRGB, with gAMA and cHRM beside it as the standard says (section 11.3.2.5), for programs that know
+/// only those.
+fn mark_srgb<W: std::io::Write>(encoder: &mut Encoder<'_, W>) {
+    encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    encoder.set_source_gamma(ScaledFloat::from_scaled(45_455));
+    let (white, red, green, blue) = ((0.3127, 0.3290), (0.64, 0.33), (0.30, 0.60), (0.15, 0.06));
+    encoder.set_source_chromaticities(SourceChromaticities::new(white, red, green, blue));
+}
+
+fn set_effort<W: std::io::Write>(encoder: &mut Encoder<'_, W>, effort: PngEffort) {
+    match effort {
+        // Measured on a dithered flame of 1280 x 720: `Sub` is a fifth smaller than `Up` here, and the adaptive choice of
+        // filters takes half as long again for the same size.
+        PngEffort::Fast => {
+            encoder.set_deflate_compression(DeflateCompression::FdeflateUltraFast);
+            encoder.set_filter(Filter::Sub);
+        }
+        PngEffort::Small => encoder.set_compression(::png::Compression::High),
+    }
+}
+
+/// The samples as they stand in the file: big-endian, alpha left out where the picture is opaque.
+fn samples(picture: &DisplayImage) -> Cow<'_, [u8]> {
+    match (&picture.pixels, picture.opaque) {
+        (DisplayPixels::Eight(pixels), false) => Cow::Borrowed(bytemuck::cast_slice(pixels)),
+        (DisplayPixels::Eight(pixels), true) => {
+            let rgb: Vec<[u8; 3]> = pixels.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+            Cow::Owned(rgb.into_flattened())
+        }
+        (DisplayPixels::Sixteen(pixels), false) => {
+            let rgba: Vec<[[u8; 2]; 4]> = pixels.iter().map(|pixel| pixel.map(u16::to_be_bytes)).collect();
+            Cow::Owned(rgba.into_flattened().into_flattened())
+        }
+        (DisplayPixels::Sixteen(pixels), true) => {
+            let rgb = |&[r, g, b, _]: &[u16; 4]| [r, g, b].map(u16::to_be_bytes);
+            let rgb: Vec<[[u8; 2]; 3]> = pixels.iter().map(rgb).collect();
+            Cow::Owned(rgb.into_flattened().into_flattened())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing;
+
+    fn read_back(file: &[u8]) -> (::png::OutputInfo, Vec<u8>) {
+        let mut reader = ::png::Decoder::new(std::io::Cursor::new(file)).read_info().unwrap();
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut bytes).unwrap();
+        (info, bytes)
+    }
+
+    #[test]
+    fn eight_bits_come_back_and_alpha_is_left_out_of_opaque_pictures() {
+        let mut picture = testing::display(9, 4, 0);
+        let DisplayPixels::Eight(pixels) = picture.pixels.clone() else { unreachable!() };
+        for effort in [PngEffort::Fast, PngEffort::Small] {
+            picture.opaque = false;
+            let (info, bytes) = read_back(&encode(&picture, &[1; 32], effort, Path::new("a.png")).unwrap());
+            assert_eq!((info.color_type, info.bit_depth), (ColorType::Rgba, BitDepth::Eight));
+            assert_eq!(bytes, pixels.as_flattened());
+            picture.opaque = true;
+            let (info, bytes) = read_back(&encode(&picture, &[1; 32], effort, Path::new("a.png")).unwrap());
+            assert_eq!(info.color_type, ColorType::Rgb);
+            assert!(bytes.as_chunks::<3>().0.iter().zip(&pixels).all(|(rgb, rgba)| rgb == &rgba[..3]));
+        }
+    }
+
+    #[test]
+    fn sixteen_bits_come_back_in_big_endian_order() {
+        let pixels: Vec<[u16; 4]> = (0..6).map(|i| [i, 257 * i, 65535 - i, 40000]).collect();
+        for opaque in [false, true] {
+            let pixels = DisplayPixels::Sixteen(pixels.clone());
+            let picture = DisplayImage { width: 3, height: 2, opaque, pixels };
+            let (info, bytes) = read_back(&encode(&picture, &[1; 32], PngEffort::Fast, Path::new("a.png")).unwrap());
+            assert_eq!(info.bit_depth, BitDepth::Sixteen);
+            let values: Vec<u16> = bytes.as_chunks().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
+            let channels = if opaque { 3 } else { 4 };
+            assert_eq!(values[channels..2 * channels], [1, 257, 65534, 40000][..channels]);
+        }
+    }
+
+    #[test]
+    fn the_file_says_that_it_is_srgb_and_nothing_of_time_or_place() {
+        let file = encode(&testing::display(9, 4, 0), &[1; 32], PngEffort::Fast, Path::new("secret/a.png")).unwrap();
+        let kinds: Vec<_> = super::super::chunk::chunks(&file).unwrap().map(|chunk| chunk.unwrap().kind).collect();
+        let expected: [&[u8; 4]; 9] =
+            [b"IHDR", b"sRGB", b"gAMA", b"cHRM", b"tEXt", b"tEXt", b"tEXt", b"IDAT", b"IEND"];
+        assert!(expected.into_iter().eq(kinds.iter()), "{kinds:?}");
+        assert!(!file.windows(6).any(|window| window == b"secret"));
+    }
+
+    #[test]
+    fn sizes_that_do_not_fit_are_refused() {
+        let mut picture = testing::display(9, 4, 0);
+        picture.width = 8;
+        let wrong = encode(&picture, &[1; 32], PngEffort::Fast, Path::new("a.png"));
+        assert!(matches!(wrong, Err(MediaError::PlaneLength { got: 36, expected: 32, .. })));
+        picture.width = 0;
+        let empty = encode(&picture, &[1; 32], PngEffort::Fast, Path::new("a.png"));
+        assert!(matches!(empty, Err(MediaError::Size { .. })));
+    }
+}

@@ -1,0 +1,43 @@
+//! Pictures for this crate's tests.
+
+use bansho_base::image::{
+    CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision,
+};
+
+/// A small frame in which every value is different, with depth, a layer and an AOV.
+pub(crate) fn frame(width: usize, height: usize) -> Frame {
+    let count = width * height;
+    let pixels = (0..count).map(|i| [i as f32, i as f32 * 0.5, -0.25 * i as f32, i as f32 / count as f32]).collect();
+    let plane = |scale: f32| (0..count).map(|i| i as f32 * scale + 0.1).collect::<Vec<_>>();
+    Frame {
+        header: header(width, height),
+        beauty: Image::from_pixels(width, height, pixels).unwrap(),
+        depth: Some(plane(3.0).into_iter().map(|z| if z > 100.0 { f32::INFINITY } else { z }).collect()),
+        channels: vec![
+            Channel { name: "torch.temperature_k".to_owned(), precision: Precision::Single, values: plane(1.7) },
+            Channel { name: "torch.R".to_owned(), precision: Precision::Half, values: plane(0.01) },
+        ],
+        opaque: false,
+    }
+}
+
+fn header(width: usize, height: usize) -> FrameHeader {
+    let matrix = |start: f32| std::array::from_fn(|i| std::array::from_fn(|j| start + (4 * i + j) as f32));
+    FrameHeader {
+        number: 1001,
+        exposure_ev100: 7.5,
+        fps: [24000, 1001],
+        exposure_time_s: 0.02,
+        camera: CameraHeader { world_to_camera: matrix(0.0), world_to_ndc: matrix(100.0), vertical_fov_deg: 40.0 },
+        fingerprint: [9; 32],
+        display_size: [width, height],
+        data_origin: [0, 0],
+    }
+}
+
+/// A small 8-bit picture with soft alpha, different for every `frame`.
+pub(crate) fn display(width: usize, height: usize, frame: usize) -> DisplayImage {
+    let pixel = |i: usize| [(i * 7 + frame * 40) as u8, (i * 3) as u8, (200 - i % 200) as u8, (i * 11 + frame) as u8];
+    let pixels = DisplayPixels::Eight((0..width * height).map(pixel).collect());
+    DisplayImage { width, height, opaque: false, pixels }
+}

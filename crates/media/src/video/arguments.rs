@@ -1,0 +1,108 @@
+//! What `ffmpeg` is told.
+
+use std::{ffi::OsString, path::Path};
+
+use super::{VideoFormat, WebmCodec};
+use crate::naming::OutputKind;
+
+/// All arguments for a film at `output`, which is there already and empty.
+pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
+    let [width, height] = format.coded_size();
+    let [frames, seconds] = format.fps;
+    let (size, rate) = (format!("{width}x{height}"), format!("{frames}/{seconds}"));
+    let input = if format.sixteen_bits { "rgba64le" } else { "rgba" };
+    let pixels = pixel_format(format);
+    // The scaler must be told the matrix, which it otherwise guesses; the frames must carry the tags, because ProRes takes
+    // them from there; the options after it are for the container.
+    let filter = format!(
+        "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+full_chroma_inp+bitexact,\
+         format={pixels},setparams=range=tv:color_primaries=bt709:color_trc=iec61966-2-1:colorspace=bt709"
+    );
+    let input = ["-f", "rawvideo", "-pixel_format", input, "-video_size", &size, "-framerate", &rate, "-i", "pipe:0"];
+    let tags = [
+        ["-color_primaries", "bt709"],
+        ["-color_trc", "iec61966-2-1"],
+        ["-colorspace", "bt709"],
+        ["-color_range", "tv"],
+        ["-fflags", "+bitexact"],
+        ["-flags:v", "+bitexact"],
+        ["-map_metadata", "-1"],
+    ];
+    let start = ["-y", "-nostdin", "-hide_banner", "-nostats", "-loglevel", "error"];
+    let words = start.into_iter().chain(input).chain(["-an", "-vf", &filter]).chain(codec(format).iter().copied());
+    let words = words.chain(tags.into_iter().flatten()).chain(["-f", container(format.kind)]);
+    words.map(OsString::from).chain([output.as_os_str().to_owned()]).collect()
+}
+
+fn pixel_format(format: &VideoFormat) -> &'static str {
+    match (format.kind, format.options.webm, format.is_flat()) {
+        (OutputKind::Mov, _, false) => "yuva444p10le",
+        (OutputKind::Mov, _, true) => "yuv444p10le",
+        (OutputKind::Webm, WebmCodec::Av1, _) => "yuv420p10le",
+        (OutputKind::Webm, WebmCodec::Vp9, false) => "yuva420p",
+        _ => "yuv420p",
+    }
+}
+
+fn codec(format: &VideoFormat) -> &'static [&'static str] {
+    match (format.kind, format.options.webm) {
+        // Straight alpha of 16 bits; the vendor that other programs expect.
+        (OutputKind::Mov, _) => {
+            &["-c:v", "prores_ks", "-profile:v", "4444", "-alpha_bits", "16", "-vendor", "apl0", "-movflags", "+write_colr"]
+        }
+        (OutputKind::Webm, WebmCodec::Av1) => &["-c:v", "libsvtav1", "-preset", "8", "-crf", "24", "-g", "120"],
+        // Alternate reference frames cannot be had with alpha.
+        (OutputKind::Webm, WebmCodec::Vp9) => {
+            &["-c:v", "libvpx-vp9", "-crf", "20", "-b:v", "0", "-row-mt", "1", "-cpu-used", "4", "-auto-alt-ref", "0"]
+        }
+        // Dark gradients of fire and night need more than the usual quality; the index goes to the front for the web.
+        _ => &["-c:v", "libx264", "-preset", "medium", "-crf", "16", "-movflags", "+faststart+write_colr"],
+    }
+}
+
+fn container(kind: OutputKind) -> &'static str {
+    match kind {
+        OutputKind::Mov => "mov",
+        OutputKind::Webm => "webm",
+        _ => "mp4",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::video::VideoOptions;
+
+    fn words(kind: OutputKind, opaque: bool, webm: WebmCodec) -> String {
+        let options = VideoOptions { webm, ..VideoOptions::default() };
+        let format = VideoFormat { kind, size: [65, 48], fps: [24000, 1001], opaque, sixteen_bits: false, options };
+        let words: Vec<_> = of(&format, Path::new("t.part")).into_iter().map(|word| word.into_string().unwrap()).collect();
+        words.join(" ")
+    }
+
+    #[test]
+    fn every_film_names_its_matrix_transfer_and_rate() {
+        for kind in [OutputKind::Mp4, OutputKind::Mov, OutputKind::Webm] {
+            let words = words(kind, false, WebmCodec::Vp9);
+            for part in ["out_color_matrix=bt709", "-colorspace bt709", "-color_trc iec61966-2-1", "-framerate 24000/1001"] {
+                assert!(words.contains(part), "{words}");
+            }
+            assert!(words.ends_with(&format!("-f {} t.part", kind.extension())), "{words}");
+        }
+    }
+
+    #[test]
+    fn alpha_is_kept_where_the_codec_has_it() {
+        assert!(words(OutputKind::Mov, false, WebmCodec::Vp9).contains("format=yuva444p10le"));
+        assert!(words(OutputKind::Mov, true, WebmCodec::Vp9).contains("format=yuv444p10le"));
+        assert!(words(OutputKind::Webm, false, WebmCodec::Vp9).contains("format=yuva420p,"));
+        assert!(words(OutputKind::Webm, false, WebmCodec::Av1).contains("format=yuv420p10le"));
+        assert!(words(OutputKind::Mp4, false, WebmCodec::Vp9).contains("format=yuv420p,"));
+    }
+
+    #[test]
+    fn odd_sides_are_padded_but_for_prores() {
+        assert!(words(OutputKind::Mp4, true, WebmCodec::Vp9).contains("66x48"));
+        assert!(words(OutputKind::Mov, true, WebmCodec::Vp9).contains("65x48"));
+    }
+}

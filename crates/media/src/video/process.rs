@@ -1,0 +1,109 @@
+//! The running `ffmpeg`.
+
+use std::{
+    io::{self, Read, Write},
+    path::Path,
+    process::{Child, ChildStdin, Command, Stdio},
+    thread::JoinHandle,
+};
+
+use super::{VideoFormat, arguments};
+use crate::{atomic::AtomicFile, error::MediaError, ordered::Film};
+
+/// How much of what `ffmpeg` says is kept.
+const TAIL_BYTES: usize = 4096;
+
+/// A film being made. Dropped before it is finished, `ffmpeg` is stopped and nothing stays behind.
+pub(crate) struct VideoFilm {
+    // Fields are dropped in this order: the program must have ended before its file is removed.
+    running: Running,
+    file: AtomicFile,
+}
+
+struct Running {
+    child: Child,
+    frames: Option<ChildStdin>,
+    said: Option<JoinHandle<Vec<u8>>>,
+}
+
+impl VideoFilm {
+    pub(crate) fn create(path: &Path, format: &VideoFormat) -> Result<Self, MediaError> {
+        let [numerator, denominator] = format.fps;
+        if numerator == 0 || denominator == 0 {
+            return Err(MediaError::FrameRate { path: path.to_path_buf(), numerator, denominator });
+        }
+        let file = AtomicFile::create(path)?;
+        let mut command = Command::new(&format.options.program);
+        command.args(arguments(format, file.temporary_path()));
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        // In a group of its own, so that Ctrl-C reaches Bansho alone and the film ends in order.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let mut child = command.spawn().map_err(|source| match source.kind() {
+            io::ErrorKind::NotFound => {
+                MediaError::NoFfmpeg { path: path.to_path_buf(), program: format.options.program.clone() }
+            }
+            _ => MediaError::from_io(path, source),
+        })?;
+        let frames = child.stdin.take();
+        let said = child.stderr.take().map(|stream| std::thread::spawn(move || tail(stream)));
+        Ok(Self { running: Running { child, frames, said }, file })
+    }
+}
+
+/// The last bytes of a stream, read to its end so that the program never waits for us.
+fn tail(mut stream: impl Read) -> Vec<u8> {
+    let (mut kept, mut part) = (Vec::new(), [0; 1024]);
+    while let Ok(length @ 1..) = stream.read(&mut part) {
+        kept.extend_from_slice(&part[..length]);
+        kept.drain(..kept.len().saturating_sub(TAIL_BYTES));
+    }
+    kept
+}
+
+impl Running {
+    /// Waits for the end; `Ok` if it was a good one.
+    fn end(&mut self, path: &Path) -> Result<(), MediaError> {
+        drop(self.frames.take());
+        let status = self.child.wait().map_err(|source| MediaError::from_io(path, source))?;
+        if status.success() {
+            return Ok(());
+        }
+        let said = self.said.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
+        let tail = String::from_utf8_lossy(&said).trim().to_owned();
+        if tail.contains("No space left on device") {
+            return Err(MediaError::DiskFull { path: path.to_path_buf() });
+        }
+        Err(MediaError::FfmpegFailed { path: path.to_path_buf(), status: status.to_string(), tail })
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // Both fail only where the program has already ended and been waited for.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Film for VideoFilm {
+    type Piece = Vec<u8>;
+
+    fn append(&mut self, piece: Vec<u8>) -> Result<(), MediaError> {
+        let written = self.running.frames.as_mut().map(|pipe| pipe.write_all(&piece));
+        match written {
+            Some(Ok(())) => Ok(()),
+            // The pipe is closed because the program gave up; its own words say why.
+            Some(Err(source)) => {
+                self.running.end(self.file.path())?;
+                Err(MediaError::from_io(self.file.path(), source))
+            }
+            None => Err(MediaError::AlreadyFailed { path: self.file.path().to_path_buf() }),
+        }
+    }
+
+    fn finish(mut self) -> Result<(), MediaError> {
+        self.running.end(self.file.path())?;
+        self.file.finish()
+    }
+}

@@ -1,0 +1,155 @@
+//! The flame sheet: a small, near flame from a scrolling two-dimensional texture.
+//!
+//! T. Ohshima and S. Itahashi, "Easy representation of flame by using 2-dimensional texture". A monochrome texture scrolls up
+//! behind an upright rectangle; it is cut by a threshold that rises with height, sharpened and coloured, and the rectangle's
+//! coordinates are warped so that the gas accelerates and its edges flutter. Nothing is simulated: any moment is a function of
+//! time alone. [`chain`] holds the paper's equations one by one; the rest turns them into pictures quickly.
+
+pub mod chain;
+
+mod clock;
+mod draw;
+mod flame;
+mod fluctuation;
+mod lanes;
+mod moment;
+mod parameters;
+mod placement;
+mod prepared;
+mod ramp;
+mod shape;
+mod tables;
+mod texture;
+
+use std::sync::Arc;
+
+use bansho_base::{
+    canvas::{AovDescriptor, AovRule, DepthInterval, Shutter, View},
+    observer::{Cancelled, Observer, check},
+    phenomenon::{Phenomenon, Prepared},
+    surroundings::{Publication, Surroundings},
+};
+
+pub use parameters::{
+    ColourParameters, Colouring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters,
+    SmokeParameters, SparkParameters, StageShown, TextureKind, TextureParameters,
+};
+pub use texture::{PaperTexture, paper_texture};
+
+use clock::Clock;
+use flame::{Flame, Source};
+use moment::Motion;
+use ramp::Ramp;
+use shape::{Shape, instance_key};
+use texture::{FractalLayers, PaperLayer};
+
+use crate::fault::{FaultKind, ParameterFault};
+
+/// A flame sheet with all its instances, ready to be drawn at any time.
+#[derive(Clone, Debug)]
+pub struct FlameSheet {
+    name: String,
+    parameters: FlameSheetParameters,
+    clock: Clock,
+    shape: Shape,
+    ramp: Ramp,
+    flames: Vec<Flame>,
+}
+
+impl FlameSheet {
+    /// The flame sheet `name` of a scene; in a seamless loop it repeats every `loop_s` seconds.
+    ///
+    /// # Errors
+    /// Parameters that do not go together; each alone is within its bounds.
+    pub fn new(parameters: FlameSheetParameters, name: &str, seed: u64, loop_s: Option<f64>) -> Result<Self, ParameterFault> {
+        if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
+            return Err(ParameterFault { key: "loop", kind: FaultKind::LoopLength { seconds } });
+        }
+        let clock = Clock::new(parameters.speed.clone(), loop_s);
+        let shape = Shape::new(&parameters.shape, &parameters.texture, &parameters.colour)?;
+        let ramp = Ramp::new(&parameters.texture, &parameters.colour, parameters.stage)?;
+        let flames = flames(&parameters, name, seed, &clock);
+        Ok(Self { name: name.to_owned(), parameters, clock, shape, ramp, flames })
+    }
+
+    /// Its parameters.
+    pub fn parameters(&self) -> &FlameSheetParameters {
+        &self.parameters
+    }
+}
+
+fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Clock) -> Vec<Flame> {
+    let texture = &parameters.texture;
+    let paper = (texture.kind == TextureKind::OhshimaItahashi)
+        .then(|| Arc::new(PaperLayer::new(texture.octaves as u32, clock)));
+    let places = if parameters.instances.is_empty() { vec![Instance::default()] } else { parameters.instances.clone() };
+    let flame = |(index, place): (usize, Instance)| {
+        let key = instance_key(seed, name, parameters.variation, index);
+        let source = match &paper {
+            Some(layer) => Source::Paper(layer.clone()),
+            None => Source::Fractal(FractalLayers::new(texture.tongue_width, texture.tongue_length, key, clock)),
+        };
+        Flame { place, key, motion: Motion::new(&parameters.shape, key, clock), source }
+    };
+    places.into_iter().enumerate().map(flame).collect()
+}
+
+/// What a flame sheet can write beside its light, in the order of a strip's planes.
+const AOVS: &[AovDescriptor] = &[
+    AovDescriptor {
+        name: "temperature_k",
+        unit: "K",
+        doc: "Soot temperature, weighted by the luminance that it adds; 0 where there is no flame.",
+        rule: AovRule::WeightedMean,
+    },
+    AovDescriptor {
+        name: "optical_depth",
+        unit: "",
+        doc: "Optical depth of soot and smoke along the line of sight, summed; 0 where there is none.",
+        rule: AovRule::Sum,
+    },
+    AovDescriptor {
+        name: "motion.X",
+        unit: "pixels",
+        doc: "Motion of the gas to the next frame, to the right, weighted by luminance; 0 where there is no flame.",
+        rule: AovRule::WeightedMean,
+    },
+    AovDescriptor {
+        name: "motion.Y",
+        unit: "pixels",
+        doc: "Motion of the gas to the next frame, downward, weighted by luminance; 0 where there is no flame.",
+        rule: AovRule::WeightedMean,
+    },
+];
+
+impl Phenomenon for FlameSheet {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn aovs(&self) -> &'static [AovDescriptor] {
+        AOVS
+    }
+
+    fn luminance(&self) -> f64 {
+        self.parameters.colour.luminance.bounds()[1]
+    }
+
+    fn publish(&self, _shutter: Shutter) -> Publication {
+        Publication::default()
+    }
+
+    fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
+        Vec::new()
+    }
+
+    fn prepare<'a>(
+        &'a self,
+        view: &'a View,
+        surroundings: &'a Surroundings<'a>,
+        observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        check(observer)?;
+        Ok(Box::new(prepared::PreparedSheet::new(self, view, surroundings, observer)?))
+    }
+}

@@ -1,0 +1,293 @@
+//! The sheet in the world and its pixels, for every lens.
+
+use bansho_base::{
+    camera::{Camera, Lens},
+    image::Rect,
+    math::{DVec2, DVec3},
+};
+
+use super::lanes::{LANES, Lanes};
+
+/// An upright rectangle in the world: x in [0, 1] across, y in [0, 1] up.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stand {
+    /// Middle of its base, m.
+    pub(crate) base: DVec3,
+    /// Unit vector across, level.
+    pub(crate) right: DVec3,
+    /// Unit vector up, leaning with the wind along the line of sight.
+    pub(crate) up: DVec3,
+    /// Width and height, m.
+    pub(crate) size: DVec2,
+}
+
+/// Level unit vector across a sheet at `base` that faces `camera`.
+pub(crate) fn right_facing(camera: &Camera, base: DVec3) -> DVec3 {
+    let toward = camera.position - base;
+    let level = DVec3::new(toward.x, 0.0, toward.z);
+    let own_right = camera.orientation.col(0);
+    // Straight from above or below there is no level direction to the camera: take the camera's own right.
+    let fallback = DVec3::new(own_right.x, 0.0, own_right.z).try_normalize().unwrap_or(DVec3::X);
+    level.try_normalize().map_or(fallback, |toward| DVec3::Y.cross(toward))
+}
+
+impl Stand {
+    /// The sheet at `base`; `lean` is how far its top leans toward `right x up`, as a tangent.
+    pub(crate) fn new(base: DVec3, right: DVec3, size: DVec2, lean: f64) -> Self {
+        let forward = right.cross(DVec3::Y);
+        Self { base, right, up: (DVec3::Y + forward * lean).normalize(), size }
+    }
+
+    /// The point (x, y) of the sheet in the world, m.
+    pub(crate) fn point(&self, x: f64, y: f64) -> DVec3 {
+        self.base + self.right * ((x - 0.5) * self.size.x) + self.up * (y * self.size.y)
+    }
+}
+
+/// Coordinates of a batch of sixteen pixels of a row on the sheet.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Batch {
+    /// Across the sheet.
+    pub(crate) x: Lanes,
+    /// Up the sheet; far outside where the pixel does not see the sheet's plane.
+    pub(crate) y: Lanes,
+    /// Depth as the lens measures it, m.
+    pub(crate) depth: Lanes,
+}
+
+/// A y that lies outside every flame.
+const NOWHERE: f32 = -1e6;
+
+/// From pixels to the sheet.
+#[derive(Clone, Debug)]
+pub(crate) enum Mapping {
+    /// Perspective: x, y and 1 over depth are x/d, y/d and d, all linear in the pixel.
+    Linear {
+        /// Constant, per column and per row, of x/depth, y/depth and 1/depth.
+        forms: [[f64; 3]; 3],
+        /// Nearest depth that is drawn.
+        near: f64,
+    },
+    /// Other lenses: a ray for some pixels of each batch.
+    Rays {
+        /// The camera.
+        camera: Camera,
+        /// The sheet.
+        stand: Stand,
+    },
+}
+
+impl Mapping {
+    /// The mapping of `stand` seen by `camera`; `None` where it is seen exactly edge on.
+    pub(crate) fn new(camera: &Camera, stand: &Stand) -> Option<Self> {
+        let normal = stand.right.cross(stand.up);
+        let offset = normal.dot(stand.base - camera.position);
+        if offset.abs() < 1e-9 * stand.size.y {
+            return None;
+        }
+        if camera.lens != Lens::Perspective {
+            return Some(Self::Rays { camera: *camera, stand: *stand });
+        }
+        // direction = constant + column px + row py, with its extent along the axis 1.
+        let scale = 1.0 / camera.focal_pixels;
+        let column = camera.orientation.col(0) * scale;
+        let row = -camera.orientation.col(1) * scale;
+        let constant = -camera.orientation.col(2) - column * camera.centre.x - row * camera.centre.y;
+        let form = |axis: DVec3| [constant, column, row].map(|direction| axis.dot(direction));
+        let inverse_depth = form(normal / offset);
+        let on_sheet = |axis: DVec3, size: f64, shift: f64| {
+            let start = axis.dot(camera.position - stand.base) / size + shift;
+            let slope = form(axis / size);
+            std::array::from_fn(|i| start.mul_add(inverse_depth[i], slope[i]))
+        };
+        let forms = [on_sheet(stand.right, stand.size.x, 0.5), on_sheet(stand.up, stand.size.y, 0.0), inverse_depth];
+        Some(Self::Linear { forms, near: camera.near })
+    }
+
+    /// Sheet coordinates of the pixels `column .. column + 16` of `row`.
+    #[inline(always)]
+    pub(crate) fn batch(&self, column: usize, row: usize) -> Batch {
+        match self {
+            Self::Linear { forms, near } => linear_batch(forms, *near, column, row),
+            Self::Rays { camera, stand } => ray_batch(camera, stand, column, row),
+        }
+    }
+}
+
+#[inline(always)]
+fn linear_batch(forms: &[[f64; 3]; 3], near: f64, column: usize, row: usize) -> Batch {
+    let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
+    let (mut start, mut step) = ([0.0_f32; 3], [0.0_f32; 3]);
+    for k in 0..3 {
+        let [constant, a, b] = forms[k];
+        start[k] = a.mul_add(px, b.mul_add(py, constant)) as f32;
+        step[k] = a as f32;
+    }
+    // A positive depth beyond `near` is an inverse depth in (0, 1/near].
+    let nearest = (1.0 / near) as f32;
+    let mut batch = Batch { x: [0.0; LANES], y: [NOWHERE; LANES], depth: [f32::INFINITY; LANES] };
+    for i in 0..LANES {
+        let inverse = step[2].mul_add(i as f32, start[2]);
+        let depth = 1.0 / inverse;
+        let seen = inverse > 0.0 && inverse <= nearest;
+        batch.x[i] = if seen { step[0].mul_add(i as f32, start[0]) * depth } else { 0.0 };
+        batch.y[i] = if seen { step[1].mul_add(i as f32, start[1]) * depth } else { NOWHERE };
+        batch.depth[i] = if seen { depth } else { f32::INFINITY };
+    }
+    batch
+}
+
+/// Where the ray of a pixel meets the sheet's plane: x, y, depth.
+fn meet(camera: &Camera, stand: &Stand, px: f64, py: f64) -> Option<[f64; 3]> {
+    let direction = camera.direction(DVec2::new(px, py))?;
+    let normal = stand.right.cross(stand.up);
+    let depth = normal.dot(stand.base - camera.position) / normal.dot(direction);
+    if !(depth >= camera.near && depth.is_finite()) {
+        return None;
+    }
+    let offset = camera.position + direction * depth - stand.base;
+    Some([offset.dot(stand.right) / stand.size.x + 0.5, offset.dot(stand.up) / stand.size.y, depth])
+}
+
+/// Rays are traced for three pixels of a batch; a parabola through them misses the others by less than a thousandth of a pixel
+/// wherever the sheet is small in the lens, and pixels are traced one by one where one of the three sees nothing or the parabola bends much.
+fn ray_batch(camera: &Camera, stand: &Stand, column: usize, row: usize) -> Batch {
+    let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
+    let mut batch = Batch { x: [0.0; LANES], y: [NOWHERE; LANES], depth: [f32::INFINITY; LANES] };
+    let knots = [0.0, 7.5, 15.0].map(|step| meet(camera, stand, px + step, py));
+    let gentle = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| {
+        (a[2] - 2.0 * b[2] + c[2]).abs() < 0.002 * b[2] && (a[2] - c[2]).abs() < 0.1 * b[2]
+    };
+    if let [Some(a), Some(b), Some(c)] = knots
+        && gentle(a, b, c)
+    {
+        for i in 0..LANES {
+            let s = i as f64 / 7.5 - 1.0;
+            let [x, y, depth] = std::array::from_fn(|k| {
+                let (slope, bend) = (0.5 * (c[k] - a[k]), 0.5 * (c[k] + a[k]) - b[k]);
+                (bend.mul_add(s, slope).mul_add(s, b[k])) as f32
+            });
+            (batch.x[i], batch.y[i], batch.depth[i]) = (x, y, depth);
+        }
+        return batch;
+    }
+    for i in 0..LANES {
+        if let Some([x, y, depth]) = meet(camera, stand, px + i as f64, py) {
+            (batch.x[i], batch.y[i], batch.depth[i]) = (x as f32, y as f32, depth as f32);
+        }
+    }
+    batch
+}
+
+/// Whole pixels of a picture that may see the sheet between `left` and `right` (x), up to `top` (y).
+pub(crate) fn bounds(camera: &Camera, stand: &Stand, left: f64, right: f64, top: f64, picture: [usize; 2]) -> Rect {
+    const STEPS: usize = 12;
+    let whole = Rect::of_size(picture[0], picture[1]);
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for i in 0..=STEPS {
+        for j in 0..=STEPS {
+            let x = left + (right - left) * i as f64 / STEPS as f64;
+            let Some(seen) = camera.project(stand.point(x, top * j as f64 / STEPS as f64)) else {
+                return whole;
+            };
+            low = low.min(seen.pixel);
+            high = high.max(seen.pixel);
+        }
+    }
+    // Curved lenses may bulge between the points.
+    let margin = DVec2::splat(2.0) + (high - low) * if camera.lens == Lens::Perspective { 0.0 } else { 0.05 };
+    let (low, high) = ((low - margin).max(DVec2::ZERO), high + margin);
+    let end = [high.x, high.y].map(|side| side.ceil().max(0.0) as usize);
+    let start = [low.x as usize, low.y as usize];
+    let size = [0, 1].map(|k| end[k].min(picture[k]).saturating_sub(start[k]));
+    if size[0] == 0 || size[1] == 0 {
+        return Rect::default();
+    }
+    Rect { x: start[0], y: start[1], width: size[0], height: size[1] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bansho_base::{animation::Animated, camera::CameraParameters};
+
+    fn camera(lens: Lens) -> Camera {
+        let parameters = CameraParameters {
+            lens,
+            position: Animated::from([0.7, 1.5, 4.0]),
+            target: Animated::from([0.1, 0.6, 0.0]),
+            roll_deg: Animated::from(5.0),
+            ..CameraParameters::default()
+        };
+        parameters.at(0.0, [640, 480])
+    }
+
+    fn stand(camera: &Camera) -> Stand {
+        let base = DVec3::new(0.2, 0.1, -0.3);
+        Stand::new(base, right_facing(camera, base), DVec2::new(1.0, 2.0), 0.2)
+    }
+
+    #[test]
+    fn a_facing_sheet_is_level_and_square_to_the_line_of_sight() {
+        let camera = camera(Lens::Perspective);
+        let stand = stand(&camera);
+        assert!(stand.right.y.abs() < 1e-12 && (stand.right.length() - 1.0).abs() < 1e-12);
+        let toward = camera.position - stand.base;
+        assert!(stand.right.dot(DVec3::new(toward.x, 0.0, toward.z)).abs() < 1e-12);
+        assert!(stand.right.dot(camera.orientation.col(0)) > 0.9);
+    }
+
+    #[test]
+    fn pixels_find_the_point_of_the_sheet_that_they_show_through_every_lens() {
+        for lens in [Lens::Perspective, Lens::Fisheye, Lens::Panorama] {
+            let camera = camera(lens);
+            let stand = stand(&camera);
+            let mapping = Mapping::new(&camera, &stand).unwrap();
+            for (x, y) in [(0.5, 0.0), (0.1, 0.3), (0.9, 0.95), (0.5, 0.5)] {
+                let seen = camera.project(stand.point(x, y)).unwrap();
+                let column = (seen.pixel.x - 0.5).floor() as usize;
+                let batch = mapping.batch(column & !15, (seen.pixel.y - 0.5).round() as usize);
+                let lane = column & 15;
+                let pixel = 1.0 / (seen.pixels_per_metre * 1.0);
+                assert!((f64::from(batch.x[lane]) - x).abs() < 1.2 * pixel, "{lens:?} {x} {y} {batch:?}");
+                assert!((f64::from(batch.y[lane]) - y).abs() < 1.2 * pixel, "{lens:?} {x} {y} {batch:?}");
+                assert!((f64::from(batch.depth[lane]) - seen.depth).abs() < 0.01);
+            }
+        }
+    }
+
+    #[test]
+    fn parabolas_through_three_rays_are_as_good_as_rays() {
+        let camera = camera(Lens::Panorama);
+        let stand = stand(&camera);
+        let mapping = Mapping::new(&camera, &stand).unwrap();
+        let middle = camera.project(stand.point(0.5, 0.5)).unwrap().pixel;
+        let (column, row) = (middle.x as usize & !15, middle.y as usize);
+        let batch = mapping.batch(column, row);
+        for i in 0..LANES {
+            let [x, y, _] = meet(&camera, &stand, (column + i) as f64 + 0.5, row as f64 + 0.5).unwrap();
+            assert!((f64::from(batch.x[i]) - x).abs() < 2e-4 && (f64::from(batch.y[i]) - y).abs() < 2e-4);
+        }
+    }
+
+    #[test]
+    fn what_lies_behind_the_camera_or_nearer_than_near_is_nowhere() {
+        let camera = camera(Lens::Perspective);
+        let base = camera.position + camera.orientation.col(2) * 2.0 - DVec3::Y;
+        let behind = Stand::new(base, right_facing(&camera, base), DVec2::ONE, 0.0);
+        let batch = Mapping::new(&camera, &behind).unwrap().batch(320, 240);
+        assert!(batch.y.iter().all(|y| *y == NOWHERE));
+    }
+
+    #[test]
+    fn bounds_hold_every_corner() {
+        let camera = camera(Lens::Perspective);
+        let stand = stand(&camera);
+        let rect = bounds(&camera, &stand, 0.0, 1.0, 1.0, [640, 480]);
+        for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+            let pixel = camera.project(stand.point(x, y)).unwrap().pixel;
+            assert!(rect.x as f64 <= pixel.x && pixel.x <= rect.right() as f64);
+            assert!(rect.y as f64 <= pixel.y.max(0.0) && pixel.y.min(480.0) <= rect.bottom() as f64);
+        }
+    }
+}

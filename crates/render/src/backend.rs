@@ -1,0 +1,81 @@
+//! What draws a plan: a backend opens a shot, and the shot owns its state and its pictures.
+
+use std::sync::Arc;
+
+use bansho_base::{
+    assets::AssetError,
+    image::Frame,
+    observer::{Cancelled, Observer},
+    phenomenon::SnapshotError,
+};
+
+use crate::plan::{Plan, PlanError};
+
+/// Why a frame cannot be drawn.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RenderError {
+    /// The caller stopped it.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The plan cannot be carried out.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A picture that the scene names cannot be had.
+    #[error(transparent)]
+    Asset(#[from] AssetError),
+    /// The plate's depth is of another size than the plate.
+    #[error("{depth}: the depth has {depth_size:?} pixels, its plate {plate_size:?}; they must be of one size")]
+    DepthSize {
+        /// The depth's path.
+        depth: String,
+        /// Its size.
+        depth_size: [usize; 2],
+        /// The plate's size.
+        plate_size: [usize; 2],
+    },
+    /// A snapshot does not fit.
+    #[error(transparent)]
+    Snapshot(#[from] SnapshotError),
+    /// The snapshot belongs to another scene, seed or version.
+    #[error("the snapshot belongs to another scene, seed or version")]
+    ForeignSnapshot,
+}
+
+/// Draws plans.
+pub trait Backend: Send + Sync {
+    /// Its name on the command line.
+    fn name(&self) -> &'static str;
+
+    /// Opens a shot at its beginning.
+    ///
+    /// # Errors
+    /// The plan cannot be carried out.
+    fn open(&self, plan: Arc<Plan>) -> Result<Box<dyn Shot>, RenderError>;
+}
+
+/// A shot that is being drawn: `advance` to a frame, `draw` it, `read` it.
+pub trait Shot: Send {
+    /// Steps every phenomenon to frame `number`; begins anew where that lies in the past.
+    ///
+    /// # Errors
+    /// The observer asked to stop; the shot then stands at some earlier step and may be advanced again.
+    fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError>;
+
+    /// Draws the frame that the shot was advanced to.
+    ///
+    /// # Errors
+    /// The observer asked to stop, or the plate cannot be had.
+    fn draw(&mut self, observer: &dyn Observer) -> Result<(), RenderError>;
+
+    /// Takes the frame that was drawn; `None` where none was since the last.
+    fn read(&mut self) -> Option<Frame>;
+
+    /// The state of every phenomenon, for [`restore`](Self::restore).
+    fn snapshot(&self) -> Vec<u8>;
+
+    /// Returns to the state of a snapshot.
+    ///
+    /// # Errors
+    /// The bytes are damaged or belong to another scene; the shot is then unchanged.
+    fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError>;
+}

@@ -1,0 +1,71 @@
+//! Time of stepped phenomena: fixed steps in one order, whatever the frames.
+
+use bansho_base::{
+    canvas::Shutter,
+    observer::{self, Cancelled, Observer},
+    phenomenon::Phenomenon,
+    surroundings::{Publication, Surroundings},
+};
+
+use crate::plan::Plan;
+
+/// How many steps a phenomenon has taken; 0 at its beginning, before the preroll.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Clock {
+    /// Steps taken.
+    pub(super) taken: u64,
+}
+
+/// Steps that make up the preroll.
+fn preroll_steps(phenomenon: &dyn Phenomenon) -> u64 {
+    phenomenon.stepping().map_or(0, |stepping| (stepping.preroll.max(0.0) / stepping.step).round() as u64)
+}
+
+/// Time of the state after `taken` steps, s.
+fn time(phenomenon: &dyn Phenomenon, taken: u64) -> Option<f64> {
+    let stepping = phenomenon.stepping()?;
+    Some((taken as f64 - preroll_steps(phenomenon) as f64) * stepping.step)
+}
+
+/// Steps after which the state is the last one not after `t`. A millionth of a step forgives rounding.
+pub(super) fn steps_until(phenomenon: &dyn Phenomenon, t: f64) -> u64 {
+    let Some(stepping) = phenomenon.stepping() else { return 0 };
+    let steps = (t / stepping.step + 1e-6).floor() + preroll_steps(phenomenon) as f64;
+    steps.max(0.0) as u64
+}
+
+/// What everybody but `index` publishes during `shutter`, and the scene's own lights.
+pub(super) fn others(plan: &Plan, publications: &[Publication], index: usize, shutter: Shutter) -> Publication {
+    let lights = plan.scene.lights.iter().map(|light| light.at(shutter.middle())).collect();
+    let mut others = Publication { lights, ..Publication::default() };
+    for (other, publication) in publications.iter().enumerate() {
+        if other != index {
+            others.extend(publication);
+        }
+    }
+    others
+}
+
+/// Steps everybody until no state lies more than a step before `t`, always the one that is furthest behind,
+/// so that the order of steps depends on nothing but the steps themselves.
+pub(super) fn advance(
+    plan: &Plan,
+    phenomena: &mut [Box<dyn Phenomenon>],
+    clocks: &mut [Clock],
+    t: f64,
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
+    loop {
+        let behind = (0..phenomena.len())
+            .filter(|&index| clocks[index].taken < steps_until(phenomena[index].as_ref(), t))
+            .filter_map(|index| Some((index, time(phenomena[index].as_ref(), clocks[index].taken)?)))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((index, now)) = behind else { return Ok(()) };
+        observer::check(observer)?;
+        let instant = Shutter { open: now, close: now };
+        let publications: Vec<Publication> = phenomena.iter().map(|other| other.publish(instant)).collect();
+        let surroundings = Surroundings { wind: &plan.wind, others: others(plan, &publications, index, instant) };
+        phenomena[index].step(now, &surroundings);
+        clocks[index].taken += 1;
+    }
+}

@@ -1,0 +1,212 @@
+//! From prepared phenomena to a frame: strip by strip, slice by slice, nearest first, the plate behind all.
+
+use bansho_base::{
+    canvas::{Strip, View},
+    image::{Channel, Frame, FrameHeader, Image, Precision, Rect},
+    observer::{self, Cancelled, Observer},
+    phenomenon::{Phenomenon, Prepared},
+};
+use fearless_simd::Level;
+use rayon::prelude::*;
+
+use super::{accumulate::Accumulator, plate::PlateFrame};
+use crate::{plan::Plan, scene::check::PLATE_LAYER, slices::Slice};
+
+/// Rows of a strip: six planes of a 1920-pixel strip stay within a core's second-level cache.
+pub(super) const STRIP_ROWS: usize = 16;
+
+/// One frame, ready to be composited.
+pub(super) struct Composition<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) view: &'a View,
+    pub(super) phenomena: &'a [Box<dyn Phenomenon>],
+    pub(super) prepared: &'a [Box<dyn Prepared + 'a>],
+    pub(super) slices: &'a [Slice],
+    pub(super) plate: &'a PlateFrame,
+}
+
+/// Scratch of one thread.
+#[derive(Default)]
+pub(super) struct Worker {
+    strip: Strip,
+    pub(super) accumulator: Accumulator,
+}
+
+impl Composition<'_> {
+    /// The strip with index `index` of the window.
+    pub(super) fn strip_rect(&self, index: usize) -> Rect {
+        let window = self.view.window;
+        let y = index * STRIP_ROWS;
+        Rect { x: window.x, y: window.y + y, width: window.width, height: STRIP_ROWS.min(window.height - y) }
+    }
+
+    fn layer_count(&self) -> usize {
+        if self.plan.layers { self.phenomena.len() } else { 0 }
+    }
+
+    fn aov_counts(&self) -> Vec<usize> {
+        let count = |phenomenon: &Box<dyn Phenomenon>| phenomenon.aovs().len();
+        if self.plan.aovs { self.phenomena.iter().map(count).collect() } else { Vec::new() }
+    }
+
+    /// Draws `slices` within `rect` into the worker's accumulator, nearest first.
+    pub(super) fn accumulate(&self, level: Level, slices: &[Slice], rect: Rect, worker: &mut Worker) {
+        let aovs = self.aov_counts();
+        worker.accumulator.reset(rect, self.layer_count(), &aovs);
+        let plate_depth = self.plate.depth.as_ref();
+        for slice in slices {
+            for &member in &slice.members {
+                let prepared = &self.prepared[member];
+                let wanted = aovs.get(member).copied().unwrap_or(0);
+                let touched = prepared.bounds(&slice.interval).intersection(&rect);
+                if touched.is_empty() {
+                    continue;
+                }
+                // AOV planes are added as wholes, so their strips keep the full size.
+                let drawn = if wanted > 0 { rect } else { touched };
+                match plate_depth {
+                    Some(image) => worker.strip.reset(drawn, Some(&|y| image.row(y).as_flattened()), wanted),
+                    None => worker.strip.reset(drawn, None, wanted),
+                }
+                prepared.draw(&slice.interval, &mut worker.strip);
+                worker.accumulator.add_behind(level, &worker.strip, member);
+            }
+        }
+    }
+
+    /// The plate's exposed pixel and coverage at a place in the picture.
+    pub(super) fn plate_row(&self, y: usize) -> Option<&[[f32; 4]]> {
+        let window = self.view.window;
+        self.plate.colour.as_ref().map(|image| &image.row(y)[window.x..window.right()])
+    }
+}
+
+/// Draws and composites the whole window, where nothing bends light.
+pub(super) fn frame(
+    composition: &Composition,
+    header: FrameHeader,
+    observer: &dyn Observer,
+) -> Result<Frame, Cancelled> {
+    let window = composition.view.window;
+    let level = Level::new();
+    let mut beauty = Image::filled(window.width, window.height, [0.0; 4]);
+    let mut depth = vec![f32::INFINITY; window.width * window.height];
+    let strip_pixels = STRIP_ROWS * window.width;
+    let planes: Vec<Vec<Vec<f32>>> = beauty
+        .pixels_mut()
+        .par_chunks_mut(strip_pixels)
+        .zip(depth.par_chunks_mut(strip_pixels))
+        .enumerate()
+        .map_init(Worker::default, |worker, (index, (beauty, depth))| {
+            observer::check(observer)?;
+            let rect = composition.strip_rect(index);
+            composition.accumulate(level, composition.slices, rect, worker);
+            finish_strip(composition, &worker.accumulator, beauty, depth);
+            Ok(channel_planes(composition, &worker.accumulator))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    let opaque = composition.plate.colour.is_some() && composition.view.overscan == 0;
+    Ok(Frame { header, beauty, depth: Some(depth), channels: channels(composition, planes), opaque })
+}
+
+/// Exposes the strip, puts the plate behind it, and gives it its alpha.
+fn finish_strip(composition: &Composition, accumulator: &Accumulator, beauty: &mut [[f32; 4]], depth: &mut [f32]) {
+    let exposure = composition.plan.exposure_scale();
+    let Accumulator { rect, colour, transmittance, .. } = accumulator;
+    depth.copy_from_slice(&accumulator.depth);
+    for row in 0..rect.height {
+        let plate = composition.plate_row(rect.y + row);
+        let plate_depth = composition.plate.depth.as_ref().map(|image| &image.row(rect.y + row)[rect.x..]);
+        for x in 0..rect.width {
+            let index = row * rect.width + x;
+            let behind = [0, 1, 2].map(|c| transmittance[c][index]);
+            let alpha = 1.0 - (behind[0] + behind[1] + behind[2]) / 3.0;
+            let light = [0, 1, 2].map(|c| exposure * colour[c][index]);
+            beauty[index] = match plate {
+                None => [light[0], light[1], light[2], alpha],
+                Some(plate) => {
+                    let lit = [0, 1, 2].map(|c| behind[c].mul_add(plate[x][c], light[c]));
+                    [lit[0], lit[1], lit[2], (1.0 - alpha).mul_add(plate[x][3], alpha)]
+                }
+            };
+            if let Some(plate_depth) = plate_depth {
+                depth[index] = depth[index].min(plate_depth[x][0]);
+            }
+        }
+    }
+}
+
+/// This strip's part of every layer and AOV, in the order of [`channels`].
+pub(super) fn channel_planes(composition: &Composition, accumulator: &Accumulator) -> Vec<Vec<f32>> {
+    let exposure = composition.plan.exposure_scale();
+    let mut planes = Vec::new();
+    for layer in &accumulator.layers {
+        planes.extend(layer[..3].iter().map(|plane| plane.iter().map(|value| exposure * value).collect()));
+        planes.push(layer[3].clone());
+    }
+    if composition.plan.layers && composition.plate.colour.is_some() {
+        planes.extend(plate_layer(composition, accumulator));
+    }
+    planes.extend(aov_planes(composition, accumulator));
+    planes
+}
+
+pub(super) fn aov_planes(composition: &Composition, accumulator: &Accumulator) -> Vec<Vec<f32>> {
+    let mut planes = Vec::new();
+    for (phenomenon, aovs) in composition.phenomena.iter().zip(&accumulator.aovs) {
+        for (descriptor, plane) in phenomenon.aovs().iter().zip(aovs) {
+            let pixels = accumulator.rect.width * accumulator.rect.height;
+            planes.push((0..pixels).map(|index| plane.resolve(index, descriptor.rule)).collect());
+        }
+    }
+    planes
+}
+
+fn plate_layer(composition: &Composition, accumulator: &Accumulator) -> [Vec<f32>; 4] {
+    let Accumulator { rect, transmittance, .. } = accumulator;
+    let mut layer: [Vec<f32>; 4] = Default::default();
+    for row in 0..rect.height {
+        let Some(plate) = composition.plate_row(rect.y + row) else { break };
+        for (x, plate) in plate.iter().enumerate() {
+            let behind = [0, 1, 2].map(|c| transmittance[c][row * rect.width + x]);
+            for c in 0..3 {
+                layer[c].push(behind[c] * plate[c]);
+            }
+            layer[3].push(plate[3] * (behind[0] + behind[1] + behind[2]) / 3.0);
+        }
+    }
+    layer
+}
+
+/// Joins the strips' planes and names them.
+pub(super) fn channels(composition: &Composition, strips: Vec<Vec<Vec<f32>>>) -> Vec<Channel> {
+    let mut channels = channel_names(composition);
+    for strip in strips {
+        for (channel, plane) in channels.iter_mut().zip(strip) {
+            channel.values.extend(plane);
+        }
+    }
+    channels
+}
+
+fn channel_names(composition: &Composition) -> Vec<Channel> {
+    let channel = |name: String, precision| Channel { name, precision, values: Vec::new() };
+    let mut channels = Vec::new();
+    if composition.plan.layers {
+        let plate = composition.plate.colour.is_some().then_some(PLATE_LAYER);
+        let names = composition.phenomena.iter().map(|phenomenon| phenomenon.name()).chain(plate);
+        for name in names {
+            let colour = |suffix| channel(format!("{name}.{suffix}"), Precision::Half);
+            channels.extend(["R", "G", "B", "A"].map(colour));
+        }
+    }
+    if composition.plan.aovs {
+        for phenomenon in composition.phenomena {
+            let aov = |aov: &bansho_base::canvas::AovDescriptor| {
+                channel(format!("{}.{}", phenomenon.name(), aov.name), Precision::Single)
+            };
+            channels.extend(phenomenon.aovs().iter().map(aov));
+        }
+    }
+    channels
+}

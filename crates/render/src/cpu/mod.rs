@@ -1,0 +1,30 @@
+//! The CPU backend: the pictures that all others are compared with.
+
+mod accumulate;
+mod clock;
+mod compose;
+mod haze;
+mod plate;
+mod shot;
+mod snapshot;
+
+use std::sync::Arc;
+
+use crate::{
+    backend::{Backend, RenderError, Shot},
+    plan::Plan,
+};
+
+/// Draws on the processor, in the rayon pool of the caller. Same plan, same bytes, whatever the threads.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CpuBackend;
+
+impl Backend for CpuBackend {
+    fn name(&self) -> &'static str {
+        "cpu"
+    }
+
+    fn open(&self, plan: Arc<Plan>) -> Result<Box<dyn Shot>, RenderError> {
+        Ok(Box::new(shot::CpuShot::open(plan)?))
+    }
+}

@@ -1,0 +1,160 @@
+//! A shot on the processor: phenomena, their clocks, and the frame that was drawn last.
+
+use std::sync::Arc;
+
+use bansho_base::{
+    canvas::View,
+    image::{Channel, Frame, Rect},
+    observer::{self, Cancelled, Observer, Stage, StageGuard},
+    phenomenon::{Phenomenon, Prepared},
+    surroundings::{Publication, Surroundings},
+};
+
+use super::{
+    clock::{self, Clock},
+    compose::{self, Composition},
+    haze,
+    plate::{PlateCache, PlateFrame},
+    snapshot,
+};
+use crate::{
+    backend::{RenderError, Shot},
+    plan::Plan,
+    slices,
+};
+
+pub(super) struct CpuShot {
+    plan: Arc<Plan>,
+    phenomena: Vec<Box<dyn Phenomenon>>,
+    clocks: Vec<Clock>,
+    plates: PlateCache,
+    number: i64,
+    frame: Option<Frame>,
+}
+
+impl CpuShot {
+    pub(super) fn open(plan: Arc<Plan>) -> Result<Self, RenderError> {
+        let phenomena = plan.open()?;
+        let clocks = vec![Clock { taken: 0 }; phenomena.len()];
+        let number = plan.frames().start;
+        Ok(Self { plan, phenomena, clocks, plates: PlateCache::default(), number, frame: None })
+    }
+
+    fn begin_anew(&mut self) -> Result<(), RenderError> {
+        self.phenomena = self.plan.open()?;
+        self.clocks.fill(Clock { taken: 0 });
+        Ok(())
+    }
+
+    /// Draws the view; `None` where only the whole picture gives its parts rightly, since bent light comes from beyond.
+    fn compose(&self, view: &View, plate: &PlateFrame, observer: &dyn Observer) -> Result<Option<Frame>, RenderError> {
+        let preparing = StageGuard::begin(observer, Stage::Prepare);
+        let surroundings = self.surroundings(view);
+        let each = || self.phenomena.iter().zip(&surroundings);
+        let intervals: Vec<_> = each().map(|(phenomenon, s)| phenomenon.depth_intervals(view, s)).collect();
+        let slices = slices::cut(&intervals);
+        let prepared: Vec<Box<dyn Prepared + '_>> =
+            each().map(|(phenomenon, s)| phenomenon.prepare(view, s, observer)).collect::<Result<_, _>>()?;
+        drop(preparing);
+        let _stage = StageGuard::begin(observer, Stage::Draw);
+        observer::check(observer)?;
+        let bends = prepared.iter().any(|prepared| prepared.deflection().is_some());
+        if bends && view.window != Rect::of_size(view.size[0], view.size[1]) {
+            return Ok(None);
+        }
+        let composition = Composition {
+            plan: &self.plan,
+            view,
+            phenomena: &self.phenomena,
+            prepared: &prepared,
+            slices: &slices,
+            plate,
+        };
+        let header = self.plan.header(self.number);
+        Ok(Some(if bends {
+            haze::frame(&composition, header, observer)?
+        } else {
+            compose::frame(&composition, header, observer)?
+        }))
+    }
+
+    /// What each phenomenon sees of all others.
+    fn surroundings(&self, view: &View) -> Vec<Surroundings<'_>> {
+        let publications: Vec<Publication> =
+            self.phenomena.iter().map(|phenomenon| phenomenon.publish(view.shutter)).collect();
+        let seen_by = |index| Surroundings {
+            wind: &self.plan.wind,
+            others: clock::others(&self.plan, &publications, index, view.shutter),
+        };
+        (0..self.phenomena.len()).map(seen_by).collect()
+    }
+}
+
+/// The part `window` of a whole frame.
+fn crop(whole: Frame, window: Rect) -> Option<Frame> {
+    let width = whole.beauty.width();
+    let plane = |values: &[f32]| -> Vec<f32> {
+        let row = |y| values[y * width + window.x..][..window.width].iter().copied();
+        (window.y..window.bottom()).flat_map(row).collect()
+    };
+    let channels = whole.channels.iter().map(|channel| Channel { values: plane(&channel.values), ..channel.clone() });
+    Some(Frame {
+        beauty: whole.beauty.crop(window)?,
+        depth: whole.depth.as_deref().map(plane),
+        channels: channels.collect(),
+        header: whole.header,
+        opaque: whole.opaque,
+    })
+}
+
+impl Shot for CpuShot {
+    fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError> {
+        let _stage = StageGuard::begin(observer, Stage::Advance);
+        self.frame = None;
+        let t = self.plan.shutter(number).middle();
+        let past = |(phenomenon, clock): (&Box<dyn Phenomenon>, &Clock)| {
+            clock.taken > clock::steps_until(phenomenon.as_ref(), t)
+        };
+        if self.phenomena.iter().zip(&self.clocks).any(past) {
+            self.begin_anew()?;
+        }
+        clock::advance(&self.plan, &mut self.phenomena, &mut self.clocks, t, observer)?;
+        self.number = number;
+        Ok(())
+    }
+
+    fn draw(&mut self, observer: &dyn Observer) -> Result<(), RenderError> {
+        let plate = {
+            let _stage = StageGuard::begin(observer, Stage::Load);
+            self.plates.frame(&self.plan, self.number)?
+        };
+        let mut view = self.plan.view(self.number);
+        let frame = match self.compose(&view, &plate, observer)? {
+            Some(frame) => frame,
+            None => {
+                view.window = Rect::of_size(view.size[0], view.size[1]);
+                let whole = self.compose(&view, &plate, observer)?;
+                whole.and_then(|whole| crop(whole, self.plan.window)).ok_or(Cancelled)?
+            }
+        };
+        self.frame = Some(frame);
+        Ok(())
+    }
+
+    fn read(&mut self) -> Option<Frame> {
+        self.frame.take()
+    }
+
+    fn snapshot(&self) -> Vec<u8> {
+        snapshot::write(&self.plan, &self.phenomena, &self.clocks)
+    }
+
+    fn restore(&mut self, bytes: &[u8]) -> Result<(), RenderError> {
+        let mut phenomena = self.plan.open()?;
+        let clocks = snapshot::read(&self.plan, bytes, &mut phenomena)?;
+        self.phenomena = phenomena;
+        self.clocks = clocks;
+        self.frame = None;
+        Ok(())
+    }
+}

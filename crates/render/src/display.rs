@@ -1,0 +1,45 @@
+//! The view transform of whole frames, for formats that are made to be looked at.
+
+use bansho_base::{
+    color::{DisplayCode, View},
+    image::{DisplayImage, DisplayPixels, Frame},
+};
+use fearless_simd::Level;
+use rayon::prelude::*;
+
+bansho_base::choice! {
+    /// Bits of each channel of a display format.
+    pub enum BitDepth {
+        /// 8 bits, dithered.
+        Eight = "8",
+        /// 16 bits.
+        Sixteen = "16",
+    }
+}
+
+/// Rows that one task turns to display pixels.
+const TASK_ROWS: usize = 16;
+
+/// The frame's beauty as display pixels: view, alpha by the largest of alpha and light, sRGB encoding, dither.
+pub fn display(frame: &Frame, view: &View, depth: BitDepth) -> DisplayImage {
+    let pixels = match depth {
+        BitDepth::Eight => DisplayPixels::Eight(rows(frame, view)),
+        BitDepth::Sixteen => DisplayPixels::Sixteen(rows(frame, view)),
+    };
+    DisplayImage { width: frame.beauty.width(), height: frame.beauty.height(), opaque: frame.opaque, pixels }
+}
+
+/// Dither goes by the place in the whole picture, so that a crop shows the same pixels.
+fn rows<C: DisplayCode + Send>(frame: &Frame, view: &View) -> Vec<[C; 4]> {
+    let level = Level::new();
+    let (width, height) = (frame.beauty.width(), frame.beauty.height());
+    let [x0, y0] = frame.header.data_origin;
+    let mut pixels = vec![[C::default(); 4]; width * height];
+    pixels.par_chunks_mut(width * TASK_ROWS).enumerate().for_each(|(task, chunk)| {
+        for (row, out) in chunk.chunks_mut(width).enumerate() {
+            let y = task * TASK_ROWS + row;
+            view.display_row(level, frame.beauty.row(y), y0 + y as i64, x0, frame.opaque, out);
+        }
+    });
+    pixels
+}

@@ -1,0 +1,286 @@
+//! The plan of a shot: everything fixed before the first frame.
+
+use std::sync::Arc;
+
+use bansho_base::{
+    assets::Assets,
+    canvas::{Shutter, View},
+    color,
+    image::{FrameHeader, Rect},
+    parameters::Auto,
+    phenomenon::Phenomenon,
+    wind::Wind,
+};
+
+use crate::{
+    fingerprint,
+    scene::{FrameRate, Opening, OpeningFault, Scene},
+};
+
+/// What a job may change of a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlanOptions {
+    /// Another picture size, pixels.
+    pub size: Option<[usize; 2]>,
+    /// Another seed.
+    pub seed: Option<u64>,
+    /// Only this part of the picture.
+    pub crop: Option<Rect>,
+    /// A seamless loop of about so many seconds.
+    pub loop_s: Option<f64>,
+    /// Whether each phenomenon gets a layer of its own.
+    pub layers: bool,
+    /// Whether phenomena write their AOVs.
+    pub aovs: bool,
+    /// How display formats will show the picture; a plate made for display is taken back through it.
+    pub display: color::View,
+}
+
+/// Why a shot cannot be planned.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlanError {
+    /// The part lies outside the picture.
+    #[error("the crop {crop:?} reaches outside the picture of {size:?} pixels")]
+    CropOutside {
+        /// x, y, width, height.
+        crop: [usize; 4],
+        /// Width and height.
+        size: [usize; 2],
+    },
+    /// A loop shorter than two frames or longer than an hour.
+    #[error("a loop of {seconds} s is out of range; allowed: {min} (two frames) to 3600 s")]
+    LoopLength {
+        /// What was asked for.
+        seconds: f64,
+        /// Two frames.
+        min: f64,
+    },
+    /// Something keyed does not end as it begins.
+    #[error("the loop of {seconds} s jumps: {what} differs between its first and its last moment")]
+    LoopJumps {
+        /// Length of the loop.
+        seconds: f64,
+        /// What is keyed.
+        what: &'static str,
+    },
+    /// The picture has more pixels than are drawn.
+    #[error("{width} x {height} pixels are too many; allowed: 1 to {most} on a side")]
+    Size {
+        /// Width.
+        width: usize,
+        /// Height.
+        height: usize,
+        /// Largest side.
+        most: usize,
+    },
+    /// A phenomenon cannot be made.
+    #[error("{name}: {key}: {}", .fault.kind)]
+    Opening {
+        /// The phenomenon's name.
+        name: String,
+        /// Its parameter.
+        key: String,
+        /// The fault.
+        fault: Box<OpeningFault>,
+    },
+}
+
+/// A shot: the scene, and all that the frames have in common.
+#[derive(Clone)]
+pub struct Plan {
+    /// The scene.
+    pub scene: Scene,
+    /// Where its pictures come from.
+    pub assets: Arc<dyn Assets>,
+    /// Size of the picture without overscan, pixels.
+    pub size: [usize; 2],
+    /// The part to draw, within the picture with its overscan.
+    pub window: Rect,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Length of the seamless loop, s: a whole number of frames.
+    pub loop_s: Option<f64>,
+    /// Exposure, chosen once for the shot.
+    pub exposure_ev100: f32,
+    /// Whether each phenomenon gets a layer of its own.
+    pub layers: bool,
+    /// Whether phenomena write their AOVs.
+    pub aovs: bool,
+    /// How display formats show the picture.
+    pub display: color::View,
+    /// The one wind.
+    pub wind: Wind,
+}
+
+impl Plan {
+    /// Plans a shot of `scene`.
+    ///
+    /// # Errors
+    /// The options do not fit the scene, or a phenomenon cannot be made.
+    pub fn new(scene: Scene, options: &PlanOptions, assets: Arc<dyn Assets>) -> Result<Self, PlanError> {
+        let size = options.size.unwrap_or(scene.picture.size.map(|side| side as usize));
+        let overscan = scene.picture.overscan as usize;
+        let loop_s = options.loop_s.map(|seconds| loop_length(seconds, scene.picture.fps)).transpose()?;
+        let seed = options.seed.unwrap_or(scene.picture.seed as u64);
+        let wind = Wind::new(scene.wind.clone(), seed, loop_s);
+        let mut plan = Self {
+            window: window(size, overscan, options.crop)?,
+            size,
+            seed,
+            loop_s,
+            exposure_ev100: 0.0,
+            layers: options.layers,
+            aovs: options.aovs,
+            display: options.display,
+            wind,
+            assets,
+            scene,
+        };
+        plan.check_loop()?;
+        plan.exposure_ev100 = plan.exposure(&plan.open()?);
+        Ok(plan)
+    }
+
+    /// Makes every enabled phenomenon, at its beginning.
+    ///
+    /// # Errors
+    /// A phenomenon cannot be made.
+    pub fn open(&self) -> Result<Vec<Box<dyn Phenomenon>>, PlanError> {
+        let open = |instance: &crate::scene::Instance| {
+            let opening =
+                Opening { name: &instance.name, seed: self.seed, loop_s: self.loop_s, assets: self.assets.as_ref() };
+            instance.source.open(&opening).map_err(|fault| PlanError::Opening {
+                name: instance.name.clone(),
+                key: fault.key.clone(),
+                fault: Box::new(fault),
+            })
+        };
+        self.scene.instances.iter().filter(|instance| instance.enabled).map(open).collect()
+    }
+
+    /// Frames a second.
+    pub fn fps(&self) -> FrameRate {
+        self.scene.picture.fps
+    }
+
+    /// The numbers of the whole shot's frames; of one turn where it is a loop.
+    pub fn frames(&self) -> std::ops::Range<i64> {
+        let count = match self.loop_s {
+            Some(seconds) => (seconds / self.fps().frame_s()).round() as i64,
+            None => self.scene.picture.frames,
+        };
+        let first = self.scene.picture.first_frame;
+        first..first + count
+    }
+
+    /// When frame `number` begins, s; a loop begins again.
+    pub fn time(&self, number: i64) -> f64 {
+        let index = number - self.scene.picture.first_frame;
+        let fps = self.fps();
+        let index = match self.loop_s {
+            Some(_) => index.rem_euclid(self.frames().end - self.frames().start),
+            None => index,
+        };
+        index as f64 * f64::from(fps.seconds) / f64::from(fps.frames)
+    }
+
+    /// When the shutter is open for frame `number`.
+    pub fn shutter(&self, number: i64) -> Shutter {
+        let camera = &self.scene.camera;
+        let open = self.time(number) + camera.shutter_offset_s;
+        Shutter { open, close: open + camera.shutter_s.unwrap_or(0.5 * self.fps().frame_s()) }
+    }
+
+    /// What frame `number` shows.
+    pub fn view(&self, number: i64) -> View {
+        let shutter = self.shutter(number);
+        let overscan = self.scene.picture.overscan as usize;
+        let next = shutter.middle() + self.fps().frame_s();
+        let mut view = View::new(self.scene.camera.clone(), shutter, next, self.size, overscan);
+        view.window = self.window;
+        view
+    }
+
+    /// The header of frame `number`.
+    pub fn header(&self, number: i64) -> FrameHeader {
+        let view = self.view(number);
+        let overscan = self.scene.picture.overscan;
+        FrameHeader {
+            number,
+            exposure_ev100: self.exposure_ev100,
+            fps: [self.fps().frames, self.fps().seconds],
+            exposure_time_s: view.shutter.duration() as f32,
+            camera: self.scene.camera.at(view.shutter.middle(), self.size).header(),
+            fingerprint: fingerprint::of_frame(self, number),
+            display_size: self.size,
+            data_origin: [self.window.x as i64 - overscan, self.window.y as i64 - overscan],
+        }
+    }
+
+    /// What absolute radiance is multiplied by, so that 1.0 is display white.
+    pub fn exposure_scale(&self) -> f32 {
+        color::exposure_scale(f64::from(self.exposure_ev100)) as f32
+    }
+
+    fn exposure(&self, phenomena: &[Box<dyn Phenomenon>]) -> f32 {
+        match self.scene.picture.exposure_ev100 {
+            Auto::Set(ev100) => ev100 as f32,
+            Auto::Auto => {
+                let brightest = phenomena.iter().map(|phenomenon| phenomenon.luminance()).fold(0.0, f64::max);
+                auto_ev100(brightest)
+            }
+        }
+    }
+
+    /// Keyed values must come back to where they began.
+    fn check_loop(&self) -> Result<(), PlanError> {
+        let Some(seconds) = self.loop_s else { return Ok(()) };
+        let camera = &self.scene.camera;
+        let same3 = |value: &bansho_base::animation::Animated<[f64; 3]>| value.at(0.0) == value.at(seconds);
+        let fixed = [
+            ("wind.velocity", same3(&self.scene.wind.velocity)),
+            ("camera.position", same3(&camera.position)),
+            ("camera.target", same3(&camera.target)),
+            ("camera.roll_deg", camera.roll_deg.at(0.0) == camera.roll_deg.at(seconds)),
+        ];
+        match fixed.into_iter().find(|(_, same)| !same) {
+            Some((what, _)) => Err(PlanError::LoopJumps { seconds, what }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// How many times display white the bright parts of a phenomenon are with an automatic exposure: enough for a core
+/// that nears white while its edges keep their colour.
+const HEADROOM: f64 = 2.5;
+
+/// The exposure value for bright parts of this luminance, cd/m^2; that of a sunlit day where nothing shines.
+fn auto_ev100(brightest: f64) -> f32 {
+    if brightest > 0.0 { color::ev100_of_white_luminance(brightest / HEADROOM) as f32 } else { 15.0 }
+}
+
+/// The nearest whole number of frames.
+fn loop_length(seconds: f64, fps: FrameRate) -> Result<f64, PlanError> {
+    let min = 2.0 * fps.frame_s();
+    if !(min * 0.999..=3600.0).contains(&seconds) {
+        return Err(PlanError::LoopLength { seconds, min });
+    }
+    Ok((seconds / fps.frame_s()).round() * f64::from(fps.seconds) / f64::from(fps.frames))
+}
+
+/// The drawn part within the picture with its overscan; crops count from the picture's own corner.
+fn window(size: [usize; 2], overscan: usize, crop: Option<Rect>) -> Result<Rect, PlanError> {
+    let most = crate::scene::picture::LARGEST_SIDE as usize;
+    let [width, height] = size;
+    if !(1..=most).contains(&width) || !(1..=most).contains(&height) {
+        return Err(PlanError::Size { width, height, most });
+    }
+    let Some(crop) = crop else {
+        return Ok(Rect::of_size(width + 2 * overscan, height + 2 * overscan));
+    };
+    let inside = |start: usize, length: usize, side: usize| length > 0 && start < side && length <= side - start;
+    if !inside(crop.x, crop.width, width) || !inside(crop.y, crop.height, height) {
+        return Err(PlanError::CropOutside { crop: [crop.x, crop.y, crop.width, crop.height], size });
+    }
+    Ok(Rect { x: crop.x + overscan, y: crop.y + overscan, ..crop })
+}

@@ -1,0 +1,128 @@
+//! What a scene must fulfil beyond the ranges of single parameters.
+
+use bansho_base::{
+    assets::Assets,
+    parameters::{Node, ProblemKind, Reader, Span, Table, Value, nearest},
+};
+
+use super::{FORMAT, Opening, PhenomenonKind, SHARED_TABLES, Scene};
+
+/// The format number must be one that this program reads.
+pub(super) fn format(root: &Table, reader: &mut Reader) {
+    let Some(node) = root.get("bansho") else {
+        let kind = ProblemKind::Conflict(format!("the scene must begin with `bansho = {FORMAT}`, its format version"));
+        reader.report_at(Some(0..0), kind);
+        return;
+    };
+    reader.within("bansho", |reader| match node.value {
+        Value::Integer(FORMAT) => {}
+        Value::Integer(found) if found > FORMAT => {
+            reader.report(node, ProblemKind::NewerFormat { found, known: FORMAT });
+        }
+        Value::Integer(found) => reader.report(node, ProblemKind::OlderFormat { found, known: FORMAT }),
+        _ => {
+            let found = node.value.type_name();
+            reader.report(node, ProblemKind::WrongType { expected: format!("the format version, {FORMAT}"), found });
+        }
+    });
+}
+
+/// Only shared tables and known kinds of phenomena may stand at the root.
+pub(super) fn root_keys(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) {
+    let known: Vec<&str> = std::iter::once("bansho")
+        .chain(SHARED_TABLES.iter().map(|table| table.key))
+        .chain(kinds.iter().map(|kind| kind.key))
+        .collect();
+    for entry in &root.entries {
+        if !known.contains(&entry.key.as_str()) {
+            let kind = ProblemKind::UnknownKey {
+                key: entry.key.clone(),
+                nearest: nearest(&entry.key, known.iter().copied()).map(str::to_owned),
+                allowed: known.iter().map(|&key| key.to_owned()).collect(),
+            };
+            reader.report_at(Some(entry.key_span.clone()), kind);
+        }
+    }
+}
+
+/// Name of the plate's own layer, which no phenomenon may take.
+pub(crate) const PLATE_LAYER: &str = "plate";
+
+/// Longest name of a phenomenon; EXR channel names have 255 characters at most.
+const LONGEST_NAME: usize = 100;
+
+/// A name becomes the prefix of EXR layers, so it may hold no dot and no control characters.
+pub(super) fn name(node: &Node, reader: &mut Reader) -> Option<String> {
+    let expected = format!("a name of 1 to {LONGEST_NAME} characters without dots, not \"{PLATE_LAYER}\"");
+    match &node.value {
+        Value::Text(name) if is_name(name) => Some(name.clone()),
+        Value::Text(_) => {
+            reader.report(node, ProblemKind::WrongType { expected, found: "another string" });
+            None
+        }
+        value => {
+            reader.report(node, ProblemKind::WrongType { expected, found: value.type_name() });
+            None
+        }
+    }
+}
+
+fn is_name(name: &str) -> bool {
+    !name.trim().is_empty()
+        && name != PLATE_LAYER
+        && name.chars().count() <= LONGEST_NAME
+        && !name.contains('.')
+        && !name.chars().any(char::is_control)
+}
+
+/// Every asset must be there, and every phenomenon must come to be.
+pub(super) fn assets_and_openings(scene: &Scene, root: &Table, assets: &dyn Assets, reader: &mut Reader) {
+    plate(scene, root, assets, reader);
+    let mut seen = std::collections::BTreeMap::new();
+    for instance in &scene.instances {
+        let index: &mut usize = seen.entry(instance.kind.key).or_default();
+        let path = format!("{}.{index}", instance.kind.key);
+        let opening = Opening { name: &instance.name, seed: scene.picture.seed as u64, loop_s: None, assets };
+        if let Err(fault) = instance.source.open(&opening) {
+            let place = place(root, &format!("{path}.{}", fault.key));
+            reader.within(path, |reader| {
+                reader.within(fault.key, |reader| reader.report_at(place, fault.kind));
+            });
+        }
+        *index += 1;
+    }
+}
+
+fn plate(scene: &Scene, root: &Table, assets: &dyn Assets, reader: &mut Reader) {
+    let frame = scene.picture.first_frame;
+    for (key, path) in [("image", &scene.plate.image), ("depth", &scene.plate.depth)] {
+        let Some(path) = path else { continue };
+        if let Err(error) = assets.digest(&path.0, frame) {
+            let place = place(root, &format!("plate.{key}"));
+            reader.within("plate", |r| r.within(key, |r| r.report_at(place, ProblemKind::Asset(error))));
+        }
+    }
+    if scene.plate.image.is_none() && scene.plate.depth.is_some() {
+        let place = place(root, "plate.depth");
+        let kind = ProblemKind::Conflict("a depth needs an `image` that it belongs to".into());
+        reader.within("plate", |r| r.within("depth", |r| r.report_at(place, kind)));
+    }
+}
+
+/// Where the value at a dotted path stands, or the nearest part of it that the file states.
+fn place(root: &Table, path: &str) -> Option<Span> {
+    let mut value = None;
+    let mut span = None;
+    for segment in path.split('.') {
+        let node = match value.unwrap_or(&Value::Bool(false)) {
+            _ if value.is_none() => root.get(segment),
+            Value::Table(table) => table.get(segment),
+            Value::List(items) => segment.parse::<usize>().ok().and_then(|index| items.get(index)),
+            _ => None,
+        };
+        let Some(node) = node else { break };
+        span = Some(node.span.clone());
+        value = Some(&node.value);
+    }
+    span
+}

@@ -1,0 +1,195 @@
+//! The scene file: what it may say, and a checked scene that cannot be invalid.
+
+pub(crate) mod check;
+pub mod edit;
+pub mod picture;
+pub mod report;
+pub mod schema;
+pub mod source;
+pub mod template;
+mod toml;
+
+use std::sync::Arc;
+
+use bansho_base::{
+    assets::Assets,
+    camera::CameraParameters,
+    parameters::{Parameters, Problem, ProblemKind, Reader, Table, TableDescriptor, Value},
+    wind::WindParameters,
+};
+
+pub use self::{
+    picture::{DepthKind, FrameRate, LightParameters, PictureParameters, PlateParameters},
+    report::SceneError,
+    source::{Describe, Opening, OpeningFault, PhenomenonKind, Source},
+};
+
+/// The scene format that this version reads and writes.
+pub const FORMAT: i64 = 1;
+
+/// A shared table of the scene file: one that is not a phenomenon.
+pub struct SharedTable {
+    /// Its name.
+    pub key: &'static str,
+    /// Whether there may be many (`[[light]]`).
+    pub many: bool,
+    /// Its parameters.
+    pub table: fn() -> &'static TableDescriptor,
+}
+
+/// Shared tables, in the order in which a scene should state them.
+pub const SHARED_TABLES: [SharedTable; 5] = [
+    SharedTable { key: "picture", many: false, table: PictureParameters::table },
+    SharedTable { key: "camera", many: false, table: CameraParameters::table },
+    SharedTable { key: "plate", many: false, table: PlateParameters::table },
+    SharedTable { key: "wind", many: false, table: WindParameters::table },
+    SharedTable { key: "light", many: true, table: LightParameters::table },
+];
+
+/// A phenomenon of the scene.
+#[derive(Clone)]
+pub struct Instance {
+    /// Its kind.
+    pub kind: PhenomenonKind,
+    /// Its name, unique in the scene.
+    pub name: String,
+    /// Whether it is drawn.
+    pub enabled: bool,
+    /// Its parameters.
+    pub source: Arc<dyn Source>,
+}
+
+/// A checked scene.
+#[derive(Clone)]
+pub struct Scene {
+    /// `[picture]`.
+    pub picture: PictureParameters,
+    /// `[camera]`.
+    pub camera: CameraParameters,
+    /// `[plate]`.
+    pub plate: PlateParameters,
+    /// `[wind]`.
+    pub wind: WindParameters,
+    /// `[[light]]`.
+    pub lights: Vec<LightParameters>,
+    /// Phenomena in the order of the file.
+    pub instances: Vec<Instance>,
+}
+
+impl Scene {
+    /// Reads and checks the scene `text`; `file` is what errors call it.
+    ///
+    /// # Errors
+    /// Every fault of the text and of the assets it names, each with its place, what is wrong and what is allowed.
+    pub fn parse(file: &str, text: &str, kinds: &[PhenomenonKind], assets: &dyn Assets) -> Result<Self, SceneError> {
+        let fail = |problems| SceneError { file: file.to_owned(), text: text.to_owned(), problems };
+        let root = toml::parse(text).map_err(|problem| fail(vec![problem]))?;
+        let mut reader = Reader::new();
+        let scene = Self::read(&root, kinds, &mut reader);
+        if reader.problems().is_empty() {
+            check::assets_and_openings(&scene, &root, assets, &mut reader);
+        }
+        let mut problems: Vec<Problem> = reader.into_problems();
+        if problems.is_empty() {
+            return Ok(scene);
+        }
+        problems.sort_by_key(|problem| problem.span.as_ref().map_or(usize::MAX, |span| span.start));
+        Err(fail(problems))
+    }
+
+    fn read(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) -> Self {
+        check::format(root, reader);
+        check::root_keys(root, kinds, reader);
+        Self {
+            picture: read_shared(root, "picture", reader),
+            camera: read_shared(root, "camera", reader),
+            plate: read_shared(root, "plate", reader),
+            wind: read_shared(root, "wind", reader),
+            lights: read_lights(root, reader),
+            instances: read_instances(root, kinds, reader),
+        }
+    }
+
+    /// Whether phenomena lie over a plate.
+    pub fn has_plate(&self) -> bool {
+        self.plate.image.is_some()
+    }
+}
+
+fn read_shared<P: Parameters>(root: &Table, key: &'static str, reader: &mut Reader) -> P {
+    let Some(node) = root.get(key) else { return P::default() };
+    reader.within(key, |reader| match &node.value {
+        Value::Table(table) => P::read_table(table, reader, &[]),
+        _ => {
+            let found = node.value.type_name();
+            reader.report(node, ProblemKind::WrongType { expected: format!("a table [{key}]"), found });
+            P::default()
+        }
+    })
+}
+
+/// The tables of a list `[[key]]`, each with its place in the list.
+fn tables<'a>(root: &'a Table, key: &str, reader: &mut Reader) -> Vec<&'a Table> {
+    let Some(node) = root.get(key) else { return Vec::new() };
+    let mut tables = Vec::new();
+    let items = match &node.value {
+        Value::List(items) => items.as_slice(),
+        _ => std::slice::from_ref(node),
+    };
+    for item in items {
+        match &item.value {
+            Value::Table(table) if matches!(node.value, Value::List(_)) => tables.push(table),
+            value => {
+                let kind = ProblemKind::WrongType {
+                    expected: format!("tables [[{key}]], with double brackets"),
+                    found: value.type_name(),
+                };
+                reader.within(key, |reader| reader.report(item, kind));
+            }
+        }
+    }
+    tables
+}
+
+fn read_lights(root: &Table, reader: &mut Reader) -> Vec<LightParameters> {
+    let tables = tables(root, "light", reader);
+    let read = |(index, table): (usize, &&Table)| {
+        reader.within(format!("light.{index}"), |reader| LightParameters::read_table(table, reader, &[]))
+    };
+    tables.iter().enumerate().map(read).collect()
+}
+
+fn read_instances(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) -> Vec<Instance> {
+    let mut instances: Vec<Instance> = Vec::new();
+    for entry in &root.entries {
+        let Some(kind) = kinds.iter().find(|kind| kind.key == entry.key) else { continue };
+        for (index, table) in tables(root, kind.key, reader).into_iter().enumerate() {
+            let instance = reader.within(format!("{}.{index}", kind.key), |reader| {
+                let instance = read_instance(*kind, index, table, reader);
+                if instances.iter().any(|other| other.name == instance.name) {
+                    let span = table.get("name").map_or(entry.key_span.clone(), |node| node.span.clone());
+                    reader.report_at(Some(span), ProblemKind::DuplicateName { name: instance.name.clone() });
+                }
+                instance
+            });
+            instances.push(instance);
+        }
+    }
+    instances
+}
+
+fn read_instance(kind: PhenomenonKind, index: usize, table: &Table, reader: &mut Reader) -> Instance {
+    use bansho_base::parameters::Parameter;
+    let name = table.get("name").and_then(|node| reader.within("name", |reader| check::name(node, reader)));
+    let enabled = table.get("enabled").and_then(|node| reader.within("enabled", |r| bool::read(node, &(), "", r)));
+    Instance {
+        kind,
+        name: name.unwrap_or_else(|| default_name(kind.key, index)),
+        enabled: enabled.unwrap_or(true),
+        source: Arc::from((kind.read)(table, reader)),
+    }
+}
+
+fn default_name(key: &str, index: usize) -> String {
+    if index == 0 { key.to_owned() } else { format!("{key} {}", index + 1) }
+}

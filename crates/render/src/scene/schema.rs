@@ -1,0 +1,135 @@
+//! A JSON schema of the scene file, for editors that complete and check while one types.
+
+use bansho_base::parameters::{Descriptor, Kind, TableDescriptor, Value};
+use serde_json::{Value as Json, json};
+
+use super::{FORMAT, PhenomenonKind, SHARED_TABLES};
+
+/// The schema (JSON Schema 2020-12) of scene files with these kinds of phenomena.
+pub fn schema(kinds: &[PhenomenonKind]) -> Json {
+    let mut properties = serde_json::Map::new();
+    properties.insert("bansho".into(), json!({ "description": "Format version.", "const": FORMAT }));
+    for shared in &SHARED_TABLES {
+        let table = table((shared.table)(), false);
+        properties.insert(shared.key.into(), if shared.many { list_of(table) } else { table });
+    }
+    for kind in kinds {
+        properties.insert(kind.key.into(), list_of(table((kind.table)(), true)));
+    }
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Bansho scene",
+        "type": "object",
+        "required": ["bansho"],
+        "additionalProperties": false,
+        "properties": properties,
+    })
+}
+
+fn list_of(item: Json) -> Json {
+    json!({ "type": "array", "items": item })
+}
+
+fn table(descriptor: &TableDescriptor, phenomenon: bool) -> Json {
+    let mut properties = serde_json::Map::new();
+    if phenomenon {
+        properties.insert("name".into(), json!({ "type": "string", "description": "Unique name; names its layers." }));
+        properties.insert("enabled".into(), json!({ "type": "boolean", "default": true }));
+    }
+    for parameter in &descriptor.parameters {
+        properties.insert(parameter.key.into(), property(parameter));
+    }
+    json!({
+        "type": "object",
+        "description": descriptor.doc,
+        "additionalProperties": false,
+        "properties": properties,
+    })
+}
+
+fn property(parameter: &Descriptor) -> Json {
+    let mut schema = kind(&parameter.kind);
+    if let Some(object) = schema.as_object_mut() {
+        let unit = if parameter.unit.is_empty() { String::new() } else { format!(" [{}]", parameter.unit) };
+        object.insert("description".into(), json!(format!("{}{unit}", parameter.doc)));
+        if let Some(default) = &parameter.default {
+            object.insert("default".into(), value(default));
+        }
+    }
+    schema
+}
+
+fn kind(kind: &Kind) -> Json {
+    match kind {
+        Kind::Bool => json!({ "type": "boolean" }),
+        Kind::Integer { min, max } => json!({ "type": "integer", "minimum": min, "maximum": max }),
+        Kind::Number { min, max } => number(*min, *max),
+        Kind::Rational { min, max } => {
+            json!({ "anyOf": [number(*min, *max), { "type": "string", "pattern": "^[0-9]+ */ *[0-9]+$" }] })
+        }
+        Kind::Vector { length, min, max } => {
+            json!({ "type": "array", "items": number(*min, *max), "minItems": length, "maxItems": length })
+        }
+        Kind::Text => json!({ "type": "string" }),
+        Kind::Asset => json!({ "type": "string", "minLength": 1 }),
+        Kind::Choice(choices) => json!({ "enum": choices.iter().map(|choice| choice.name).collect::<Vec<_>>() }),
+        Kind::Curve { x, y, .. } => curve(*x, *y),
+        Kind::Animated(inner) => json!({ "anyOf": [self::kind(inner), keys(inner)] }),
+        Kind::Optional(inner) => self::kind(inner),
+        Kind::Auto(inner) => json!({ "anyOf": [{ "const": "auto" }, self::kind(inner)] }),
+        Kind::List { item, min, max } => {
+            json!({ "type": "array", "items": self::kind(item), "minItems": min, "maxItems": max })
+        }
+        Kind::Table(descriptor) => table(descriptor(), false),
+    }
+}
+
+fn number(min: f64, max: f64) -> Json {
+    json!({ "type": "number", "minimum": min, "maximum": max })
+}
+
+fn pair(first: Json, second: Json) -> Json {
+    json!({ "type": "array", "prefixItems": [first, second], "items": false, "minItems": 2 })
+}
+
+fn interpolation() -> Json {
+    json!({ "enum": ["monotone", "linear", "step"], "default": "monotone" })
+}
+
+fn curve(x: [f64; 2], y: [f64; 2]) -> Json {
+    let points = json!({ "type": "array", "items": pair(number(x[0], x[1]), number(y[0], y[1])), "minItems": 1 });
+    let table = json!({
+        "type": "object",
+        "additionalProperties": false,
+        "required": ["points"],
+        "properties": { "points": points, "interpolation": interpolation() },
+    });
+    json!({ "anyOf": [points, table] })
+}
+
+fn keys(inner: &Kind) -> Json {
+    let key = pair(json!({ "type": "number", "description": "Time [s]." }), kind(inner));
+    json!({
+        "type": "object",
+        "additionalProperties": false,
+        "required": ["keys"],
+        "properties": {
+            "keys": { "type": "array", "items": key, "minItems": 1 },
+            "interpolation": interpolation(),
+        },
+    })
+}
+
+fn value(value: &Value) -> Json {
+    match value {
+        Value::Bool(boolean) => json!(boolean),
+        Value::Integer(integer) => json!(integer),
+        Value::Number(number) => json!(number),
+        Value::Text(text) => json!(text),
+        Value::List(items) => items.iter().map(|item| self::value(&item.value)).collect(),
+        Value::Table(table) => {
+            let entry = |entry: &bansho_base::parameters::Entry| (entry.key.clone(), self::value(&entry.node.value));
+            Json::Object(table.entries.iter().map(entry).collect())
+        }
+    }
+}

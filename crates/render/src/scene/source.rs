@@ -1,0 +1,92 @@
+//! The kinds of phenomena that a scene may hold, and how each is made from its table.
+
+use bansho_base::{
+    assets::Assets,
+    parameters::{Parameters, ProblemKind, Reader, Table, TableDescriptor},
+    phenomenon::Phenomenon,
+};
+
+/// What a phenomenon is made with, beside its own parameters.
+#[derive(Clone, Copy)]
+pub struct Opening<'a> {
+    /// Its name in the scene.
+    pub name: &'a str,
+    /// Seed of everything random in the shot.
+    pub seed: u64,
+    /// Length of a seamless loop, s.
+    pub loop_s: Option<f64>,
+    /// Where pictures and texts come from.
+    pub assets: &'a dyn Assets,
+}
+
+/// A fault that only making the phenomenon shows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OpeningFault {
+    /// The parameter at fault, with dots where it lies deeper.
+    pub key: String,
+    /// What is wrong.
+    pub kind: ProblemKind,
+}
+
+/// A phenomenon's checked parameters.
+pub trait Source: Send + Sync {
+    /// Every parameter with its value, defaults too: equal tables make equal phenomena.
+    fn canonical(&self) -> Table;
+
+    /// Paths of the assets it reads, for fingerprints.
+    fn assets(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Makes the phenomenon.
+    ///
+    /// # Errors
+    /// Parameters that do not go together, or an asset that cannot be had.
+    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault>;
+}
+
+/// One kind of phenomenon, such as `flame_sheet`.
+#[derive(Clone, Copy)]
+pub struct PhenomenonKind {
+    /// Its table's name in scene files.
+    pub key: &'static str,
+    /// Its parameters.
+    pub table: fn() -> &'static TableDescriptor,
+    /// Reads its parameters; reports faults and falls back to defaults there.
+    pub read: fn(&Table, &mut Reader) -> Box<dyn Source>,
+}
+
+/// Keys that every phenomenon has beside its own.
+pub const COMMON_KEYS: [&str; 2] = ["name", "enabled"];
+
+/// Makes a [`PhenomenonKind`] from a parameter table and a constructor.
+pub trait Describe: Parameters + Clone + Send + Sync + 'static {
+    /// The table's name in scene files.
+    const KEY: &'static str;
+
+    /// Makes the phenomenon.
+    ///
+    /// # Errors
+    /// Parameters that do not go together, or an asset that cannot be had.
+    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault>;
+
+    /// The kind that scene files call by [`KEY`](Self::KEY).
+    const KIND: PhenomenonKind =
+        PhenomenonKind { key: Self::KEY, table: <Self as Parameters>::table, read: read_described::<Self> };
+}
+
+fn read_described<P: Describe>(table: &Table, reader: &mut Reader) -> Box<dyn Source> {
+    Box::new(Described(P::read_table(table, reader, &COMMON_KEYS)))
+}
+
+struct Described<P>(P);
+
+impl<P: Describe> Source for Described<P> {
+    fn canonical(&self) -> Table {
+        self.0.to_table()
+    }
+
+    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        self.0.open(opening)
+    }
+}

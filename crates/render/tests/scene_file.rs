@@ -1,0 +1,203 @@
+//! What scene files may say: faults are located, name what is allowed, and random valid scenes draw without a fault.
+
+#[allow(dead_code, reason = "each test file uses a part of it")]
+mod support;
+
+use std::sync::Arc;
+
+use bansho_base::{
+    assets::MemoryAssets,
+    parameters::{self, Kind, Value},
+    random::{Key, Purpose, uniform},
+};
+use bansho_render::{
+    PlanOptions, Scene,
+    scene::{SHARED_TABLES, schema, template},
+};
+use support::*;
+
+/// The one problem of a scene, as a person reads it.
+fn fault(text: &str) -> String {
+    let error = parse(text, &MemoryAssets::default()).err().unwrap_or_else(|| panic!("accepted: {text}"));
+    assert_eq!(error.problems.len(), 1, "one fault, one error: {error}");
+    error.to_string()
+}
+
+#[test]
+fn faults_name_their_place_and_what_is_allowed() {
+    for (text, expected) in [
+        ("bansho = 1\n[picture]\nexposre_ev100 = 3\n", "test.toml:3:1: picture: unknown key `exposre_ev100`, did you mean `exposure_ev100`?"),
+        ("bansho = 1\n[pictre]\n", "test.toml:2:2: unknown key `pictre`, did you mean `picture`?"),
+        ("bansho = 1\n[picture]\nsize = \"big\"\n", "test.toml:3:8: picture.size: expected a list of 2 numbers from 1 to 16384, found a string"),
+        ("bansho = 1\n[picture]\nsize = [0, 100]\n", "test.toml:3:9: picture.size: 0 is out of range; allowed: 1 to 16384 pixels"),
+        ("bansho = 1\n[picture]\nsize = [100, 1000000000]\n", "1000000000 is out of range; allowed: 1 to 16384 pixels"),
+        ("bansho = 1\n[picture]\nsize = [100]\n", "has 1 items; allowed: 2 to 2"),
+        ("bansho = 1\n[picture]\nfps = \"24000/0\"\n", "inf is out of range; allowed: 0.1 to 1000"),
+        ("bansho = 1\n[picture]\nfps = \"fast\"\n", "or a fraction such as \"24000/1001\", found a string"),
+        ("bansho = 1\n[picture]\nexposure_ev100 = \"bright\"\n", "expected \"auto\" or a number from -40 to 40, found a string"),
+        ("bansho = 1\n[picture]\nframes = 1.5\n", "expected a whole number from 1 to 10000000, found a number"),
+        ("bansho = 1\n[camera]\nlens = \"fishey\"\n", "test.toml:3:8: camera.lens: `fishey` is not known, did you mean `fisheye`? allowed: perspective, fisheye, panorama".replace("? ", "?; ").as_str()),
+        ("bansho = 1\n[wind]\nvelocity = { keys = [[1, [0, 0, 0]], [1, [1, 0, 0]]] }\n", "wind.velocity: point 2 must lie after point 1"),
+        ("bansho = 1\n[wind]\nvelocity = { kes = [] }\n", "unknown key `kes`, did you mean `keys`?"),
+        ("bansho = 1\n[wind]\nvelocity = nan\n", "expected a list of 3 numbers"),
+        ("bansho = 1\n[wind]\ngust = nan\n", "NaN is out of range; allowed: 0 to 2"),
+        ("bansho = 1\n[emitter]\n", "expected tables [[emitter]], with double brackets"),
+        ("bansho = 1\n[[emitter]]\nradius = -1\n", "test.toml:3:10: emitter.0.radius: -1 is out of range; allowed: 0 to 100 m"),
+        ("bansho = 1\n[[emitter]]\nname = \"a\"\n[[absorber]]\nname = \"a\"\n", "test.toml:5:8: absorber.0: the name \"a\" is taken"),
+        ("bansho = 1\n[[emitter]]\nname = \"a.b\"\n", "expected a name of 1 to 100 characters without dots"),
+        ("bansho = 1\n[[absorber]]\nnear = 2\nfar = 1\n", "test.toml:4:7: absorber.0.far: must lie behind `near`"),
+        ("bansho = 1\n[plate]\nimage = \"gone.png\"\n", "test.toml:3:9: plate.image: gone.png: no such file"),
+        ("bansho = 2\n", "test.toml:1:10: bansho: format 2 is newer than this program knows; known: up to 1"),
+        ("bansho = 0\n", "`bansho upgrade` rewrites the file"),
+        ("[picture]\n", "the scene must begin with `bansho = 1`"),
+        ("bansho = 1\n[picture\n", "test.toml:2:"),
+        ("", "the scene must begin with `bansho = 1`"),
+    ] {
+        let shown = fault(text);
+        assert!(shown.contains(expected), "{text}\nexpected: {expected}\nshown: {shown}");
+    }
+}
+
+#[test]
+fn two_faults_are_two_errors_in_the_order_of_the_file() {
+    let text = "bansho = 1\n[camera]\nnear = 0\n[picture]\nframes = 0\n";
+    let error = parse(text, &MemoryAssets::default()).err().unwrap();
+    let paths: Vec<&str> = error.problems.iter().map(|problem| problem.path.as_str()).collect();
+    assert_eq!(paths, ["camera.near", "picture.frames"]);
+}
+
+fn random(seed: u64) -> impl FnMut() -> f64 {
+    let key = Key::new(seed, "random scene");
+    let mut drawn = 0;
+    move || {
+        drawn += 1;
+        f64::from(uniform(key.words(drawn, 0, Purpose(0))[0]))
+    }
+}
+
+/// A random valid scene with a tiny picture.
+fn random_scene(seed: u64) -> String {
+    let mut uniform = random(seed);
+    let mut text = String::from("bansho = 1\n");
+    for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate" && shared.key != "picture") {
+        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        text += &table_text(&header, &parameters::sample((shared.table)(), &mut uniform));
+    }
+    for kind in kinds() {
+        let mut table = parameters::sample((kind.table)(), &mut uniform);
+        table.entries.retain(|entry| !["near", "far", "preroll_s"].contains(&entry.key.as_str()));
+        text += &table_text(&format!("[[{}]]", kind.key), &table);
+    }
+    text + "[picture]\nsize = [17, 11]\n"
+}
+
+fn table_text(header: &str, table: &parameters::Table) -> String {
+    let lines = table.entries.iter().map(|entry| format!("{} = {}\n", entry.key, entry.node.value));
+    format!("{header}\n{}", lines.collect::<String>())
+}
+
+#[test]
+fn random_valid_scenes_draw_finite_pictures() {
+    for seed in 0..200 {
+        let text = random_scene(seed);
+        let frame = render(&text, &PlanOptions { layers: true, aovs: true, ..PlanOptions::default() }, 1);
+        assert!(frame.beauty.pixels().iter().flatten().all(|value| value.is_finite()), "{text}");
+    }
+}
+
+#[test]
+fn what_a_scene_says_is_written_back_and_read_alike() {
+    for seed in 0..200 {
+        let text = random_scene(seed);
+        let first = parse(&text, &MemoryAssets::default()).unwrap_or_else(|error| panic!("{error}"));
+        let canonical: Vec<String> =
+            first.instances.iter().map(|instance| Value::Table(instance.source.canonical()).to_string()).collect();
+        let again = "bansho = 1\n".to_owned()
+            + &first
+                .instances
+                .iter()
+                .map(|instance| table_text(&format!("[[{}]]", instance.kind.key), &instance.source.canonical()))
+                .collect::<String>();
+        let second = parse(&again, &MemoryAssets::default()).unwrap_or_else(|error| panic!("{error}\n{again}"));
+        let read: Vec<String> =
+            second.instances.iter().map(|instance| Value::Table(instance.source.canonical()).to_string()).collect();
+        assert_eq!(read, canonical);
+    }
+}
+
+#[test]
+fn every_default_lies_within_its_own_bounds_and_every_parameter_is_explained() {
+    fn check(path: &str, table: &parameters::TableDescriptor) {
+        for parameter in &table.parameters {
+            let path = format!("{path}.{}", parameter.key);
+            assert!(parameter.doc.len() > 5, "{path} is not explained");
+            let inner = match &parameter.kind {
+                Kind::Animated(inner) | Kind::Optional(inner) | Kind::Auto(inner) => inner.as_ref(),
+                kind => kind,
+            };
+            match (inner, &parameter.default) {
+                (Kind::Number { min, max }, Some(default)) => {
+                    if let Some(number) = default.as_number() {
+                        assert!((*min..=*max).contains(&number), "{path}: {number} is not from {min} to {max}");
+                    }
+                }
+                (Kind::Table(inner), _) => check(&path, inner()),
+                _ => {}
+            }
+        }
+    }
+    for shared in &SHARED_TABLES {
+        check(shared.key, (shared.table)());
+    }
+    for kind in kinds().iter().chain(bansho_render::phenomena::KINDS) {
+        check(kind.key, (kind.table)());
+    }
+}
+
+#[test]
+fn a_commented_template_is_a_valid_scene_also_when_every_line_is_uncommented() {
+    for kind in kinds().iter().chain(bansho_render::phenomena::KINDS) {
+        let text = template::commented(kind);
+        let kinds: Vec<_> = kinds().into_iter().chain(bansho_render::phenomena::KINDS.iter().copied()).collect();
+        let parse = |text: &str| Scene::parse("new.toml", text, &kinds, &MemoryAssets::default());
+        parse(&text).unwrap_or_else(|error| panic!("{error}"));
+        let uncommented: String = text
+            .lines()
+            .map(|line| line.strip_prefix("# ").filter(|rest| rest.contains(" = ") && is_key(rest)).unwrap_or(line))
+            .map(|line| format!("{line}\n"))
+            .collect();
+        parse(&uncommented).unwrap_or_else(|error| panic!("{error}\n{uncommented}"));
+    }
+}
+
+fn is_key(line: &str) -> bool {
+    let key = line.split(" = ").next().unwrap_or_default();
+    key.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || b"_.".contains(&byte))
+}
+
+#[test]
+fn the_schema_knows_every_parameter() {
+    let schema = schema::schema(&kinds());
+    assert_eq!(schema["properties"]["picture"]["properties"]["size"]["maxItems"], 2);
+    assert_eq!(schema["properties"]["camera"]["properties"]["lens"]["enum"][1], "fisheye");
+    assert_eq!(schema["properties"]["emitter"]["items"]["properties"]["radius"]["minimum"], 0.0);
+    assert!(schema["properties"]["wind"]["properties"]["velocity"]["anyOf"][1]["properties"]["keys"].is_object());
+}
+
+#[test]
+fn a_plate_of_another_depth_size_is_refused() {
+    use bansho_base::{
+        assets::{Encoding, Picture},
+        image::Image,
+        observer::Unobserved,
+    };
+    let mut assets = checkerboard(16, 12, None);
+    let colour = Image::filled(8, 6, [1.0; 4]);
+    assets.insert_picture("depth.exr", Picture { colour, depth: Some(vec![1.0; 48]), encoding: Encoding::LinearSrgb });
+    let text = format!("{CAMERA}[plate]\nimage = \"plate.png\"\ndepth = \"depth.exr\"\n");
+    let plan = plan_with(&text, &PlanOptions::default(), Arc::new(assets));
+    let mut shot = open(&plan);
+    shot.advance(0, &Unobserved).unwrap();
+    let error = shot.draw(&Unobserved).unwrap_err();
+    assert!(error.to_string().contains("depth.exr: the depth has [8, 6] pixels, its plate [16, 12]"), "{error}");
+}

@@ -1,0 +1,89 @@
+//! Two phenomena that exist only to prove the traits: an absorber in closed form and a stepped emitter.
+
+mod absorber;
+mod emitter;
+
+use std::sync::Arc;
+
+use bansho_base::{
+    assets::{Assets, Encoding, MemoryAssets, Picture},
+    image::{Frame, Image},
+    observer::Unobserved,
+};
+use bansho_render::{
+    Backend, CpuBackend, Plan, PlanOptions, Scene, SceneError, Shot,
+    scene::{Describe, PhenomenonKind},
+};
+
+pub use absorber::AbsorberParameters;
+pub use emitter::EmitterParameters;
+
+pub fn kinds() -> [PhenomenonKind; 2] {
+    [AbsorberParameters::KIND, EmitterParameters::KIND]
+}
+
+/// A camera at the origin that looks along -z; 45 pixels a metre at 1 m when the picture is 90 pixels high.
+pub const CAMERA: &str = "\
+bansho = 1
+[picture]
+size = [120, 90]
+fps = 24
+exposure_ev100 = 0
+[camera]
+position = [0, 0, 0]
+target = [0, 0, -1]
+vertical_fov_deg = 90
+";
+
+pub fn parse(text: &str, assets: &dyn Assets) -> Result<Scene, SceneError> {
+    Scene::parse("test.toml", text, &kinds(), assets)
+}
+
+pub fn plan(text: &str, options: &PlanOptions) -> Arc<Plan> {
+    plan_with(text, options, Arc::new(MemoryAssets::default()))
+}
+
+pub fn plan_with(text: &str, options: &PlanOptions, assets: Arc<dyn Assets>) -> Arc<Plan> {
+    let scene = parse(text, assets.as_ref()).unwrap_or_else(|error| panic!("{error}"));
+    Arc::new(Plan::new(scene, options, assets).unwrap())
+}
+
+pub fn open(plan: &Arc<Plan>) -> Box<dyn Shot> {
+    CpuBackend.open(plan.clone()).unwrap()
+}
+
+pub fn draw(shot: &mut dyn Shot, number: i64) -> Frame {
+    shot.advance(number, &Unobserved).unwrap();
+    shot.draw(&Unobserved).unwrap();
+    shot.read().unwrap()
+}
+
+pub fn render(text: &str, options: &PlanOptions, number: i64) -> Frame {
+    draw(open(&plan(text, options)).as_mut(), number)
+}
+
+/// Absolute luminance that a pixel stands for.
+pub fn luminance(frame: &Frame, x: usize, y: usize) -> f64 {
+    let [r, g, b, _] = frame.beauty.at(x, y);
+    f64::from(bansho_base::color::luminance([r, g, b]))
+        / bansho_base::color::exposure_scale(f64::from(frame.header.exposure_ev100))
+}
+
+pub fn channel<'a>(frame: &'a Frame, name: &str) -> &'a [f32] {
+    let named = frame.channels.iter().find(|channel| channel.name == name);
+    &named.unwrap_or_else(|| panic!("no channel {name}")).values
+}
+
+/// A checkerboard plate of 8-pixel squares with every pixel a different shade, `depth` metres away.
+pub fn checkerboard(width: usize, height: usize, depth: Option<f32>) -> MemoryAssets {
+    let shade = |index: usize| {
+        let (x, y) = (index % width, index / width);
+        let code = if (x / 8 + y / 8) % 2 == 0 { 200 + (x * 7 + y) % 56 } else { (x + y * 5) % 60 };
+        [code, code / 2, 255 - code, 255].map(|code| code as f32 / 255.0)
+    };
+    let colour = Image::from_pixels(width, height, (0..width * height).map(shade).collect()).unwrap();
+    let depth = depth.map(|depth| vec![depth; width * height]);
+    let mut assets = MemoryAssets::default();
+    assets.insert_picture("plate.png", Picture { colour, depth, encoding: Encoding::DisplaySrgb });
+    assets
+}

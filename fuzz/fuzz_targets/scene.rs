@@ -1,0 +1,40 @@
+//! Scene files: any text is refused with located errors or draws a finite picture.
+#![no_main]
+
+use bansho_base::assets::MemoryAssets;
+use bansho_fuzz::draw_small;
+use bansho_render::{Scene, phenomena::KINDS, scene::edit};
+
+libfuzzer_sys::fuzz_target!(|text: &str| {
+    edit(text);
+    match Scene::parse("fuzz.toml", text, KINDS, &MemoryAssets::default()) {
+        Ok(scene) => draw_small(scene),
+        Err(error) => {
+            assert!(!error.problems.is_empty());
+            assert!(!error.to_string().is_empty());
+        }
+    }
+});
+
+/// The first line is an assignment to what follows it; what an edit gives can be edited again.
+fn edit(text: &str) {
+    if let Some((assignment, scene)) = text.split_once('\n')
+        && let Ok(edited) = edit::set(scene, assignment)
+    {
+        edit::upgrade(&edited).expect_err_or_toml();
+    }
+    if let Ok(Some(upgraded)) = edit::upgrade(text) {
+        assert_eq!(edit::upgrade(&upgraded), Ok(None), "an upgraded scene needs no upgrade");
+    }
+}
+
+trait ExpectErrOrToml {
+    /// Any outcome but broken TOML.
+    fn expect_err_or_toml(&self);
+}
+
+impl<T> ExpectErrOrToml for Result<T, edit::EditError> {
+    fn expect_err_or_toml(&self) {
+        assert!(!matches!(self, Err(edit::EditError::Syntax(_))), "an edit broke the scene's syntax");
+    }
+}

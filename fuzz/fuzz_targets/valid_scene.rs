@@ -1,0 +1,31 @@
+//! Valid scenes whose every value the fuzzer chooses: all draw finite pictures.
+#![no_main]
+
+use bansho_base::{
+    assets::MemoryAssets,
+    parameters::{self, Table},
+};
+use bansho_fuzz::draw_small;
+use bansho_render::{Scene, phenomena::KINDS, scene::SHARED_TABLES};
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    let mut pairs = bytes.chunks_exact(2);
+    let mut uniform = || pairs.next().map_or(0.75, |pair| f64::from(u16::from_le_bytes([pair[0], pair[1]])) / 65536.0);
+    let mut text = String::from("bansho = 1\n");
+    for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate") {
+        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        text += &table_text(&header, &parameters::sample((shared.table)(), &mut uniform));
+    }
+    for kind in KINDS {
+        text += &table_text(&format!("[[{}]]", kind.key), &parameters::sample((kind.table)(), &mut uniform));
+    }
+    // Values that do not go together, such as A + D above 1, are refused; each alone is valid.
+    if let Ok(scene) = Scene::parse("fuzz.toml", &text, KINDS, &MemoryAssets::default()) {
+        draw_small(scene);
+    }
+});
+
+fn table_text(header: &str, table: &Table) -> String {
+    let lines = table.entries.iter().map(|entry| format!("{} = {}\n", entry.key, entry.node.value));
+    format!("{header}\n{}", lines.collect::<String>())
+}
