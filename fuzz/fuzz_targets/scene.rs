@@ -3,12 +3,16 @@
 
 use bansho_base::assets::MemoryAssets;
 use bansho_fuzz::draw_small;
-use bansho_render::{Scene, phenomena::KINDS, scene::edit};
+use bansho_render::{
+    Scene,
+    phenomena::KINDS,
+    scene::edit::{self, EditError},
+};
 
 libfuzzer_sys::fuzz_target!(|text: &str| {
     edit(text);
     match Scene::parse("fuzz.toml", text, KINDS, &MemoryAssets::default()) {
-        Ok(scene) => draw_small(scene),
+        Ok(scene) => draw_small(scene, MemoryAssets::default()),
         Err(error) => {
             assert!(!error.problems.is_empty());
             assert!(!error.to_string().is_empty());
@@ -16,25 +20,15 @@ libfuzzer_sys::fuzz_target!(|text: &str| {
     }
 });
 
-/// The first line is an assignment to what follows it; what an edit gives can be edited again.
+/// The first line is an assignment to what follows it; what an edit gives is TOML again.
 fn edit(text: &str) {
     if let Some((assignment, scene)) = text.split_once('\n')
         && let Ok(edited) = edit::set(scene, assignment)
     {
-        edit::upgrade(&edited).expect_err_or_toml();
+        let again = edit::upgrade(&edited);
+        assert!(!matches!(again, Err(EditError::Syntax(_))), "an edit broke the scene's syntax");
     }
     if let Ok(Some(upgraded)) = edit::upgrade(text) {
         assert_eq!(edit::upgrade(&upgraded), Ok(None), "an upgraded scene needs no upgrade");
-    }
-}
-
-trait ExpectErrOrToml {
-    /// Any outcome but broken TOML.
-    fn expect_err_or_toml(&self);
-}
-
-impl<T> ExpectErrOrToml for Result<T, edit::EditError> {
-    fn expect_err_or_toml(&self) {
-        assert!(!matches!(self, Err(edit::EditError::Syntax(_))), "an edit broke the scene's syntax");
     }
 }

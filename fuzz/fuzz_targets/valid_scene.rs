@@ -21,7 +21,7 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     }
     // Values that do not go together, such as A + D above 1, are refused; each alone is valid.
     if let Ok(scene) = Scene::parse("fuzz.toml", &text, KINDS, &MemoryAssets::default()) {
-        draw_small(scene);
+        draw_small(scene, MemoryAssets::default());
     }
 });
 

@@ -1,4 +1,4 @@
-//! What the fuzz targets share: drawing one small frame and looking for numbers that are none.
+//! What the fuzz targets share: reading a plate, drawing one small frame, looking for numbers that are not finite.
 
 use std::{
     sync::{Arc, Once},
@@ -6,9 +6,11 @@ use std::{
 };
 
 use bansho_base::{assets::MemoryAssets, image::Frame, observer::Observer};
+use bansho_media::plates::{decode_picture, limits};
 use bansho_render::{
     Backend, CpuBackend, Plan, PlanOptions, RenderError, Scene,
     display::{BitDepth, display},
+    phenomena::KINDS,
 };
 
 /// Stops a frame that takes too long: a scene may rightly ask for much work, and that is no fault.
@@ -33,18 +35,18 @@ fn one_thread() {
 ///
 /// # Panics
 /// The frame holds a number that is not finite, or a plan of a checked scene fails.
-pub fn draw_small(mut scene: Scene) {
+pub fn draw_small(mut scene: Scene, assets: MemoryAssets) {
     one_thread();
     scene.picture.overscan = scene.picture.overscan.min(4);
     let number = scene.picture.first_frame + 1;
     let size = scene.picture.size.map(|side| (side as usize).min(32));
     let options = PlanOptions { size: Some(size), layers: true, aovs: true, ..PlanOptions::default() };
-    let plan = Plan::new(scene, &options, Arc::new(MemoryAssets::default())).expect("a checked scene can be planned");
+    let plan = Plan::new(scene, &options, Arc::new(assets)).expect("a checked scene can be planned");
     let mut shot = CpuBackend.open(Arc::new(plan)).expect("a planned shot opens");
     let deadline = Deadline(Instant::now() + Duration::from_secs(2));
     match shot.advance(number, &deadline).and_then(|()| shot.draw(&deadline)) {
         Err(RenderError::Cancelled(_)) => {}
-        Err(error) => panic!("a checked scene without a plate cannot be drawn: {error}"),
+        Err(error) => panic!("a checked scene cannot be drawn: {error}"),
         Ok(()) => check(&shot.read().expect("what was drawn can be read")),
     }
 }
@@ -52,16 +54,39 @@ pub fn draw_small(mut scene: Scene) {
 /// # Panics
 /// The frame holds a number that is not finite.
 fn check(frame: &Frame) {
-    let finite = |values: &mut dyn Iterator<Item = f32>, what: &str| {
-        assert!(values.all(f32::is_finite), "{what} holds a number that is not finite");
-    };
-    finite(&mut frame.beauty.pixels().iter().flatten().copied(), "the beauty");
+    let beauty = frame.beauty.pixels().iter().flatten();
+    assert!(beauty.copied().all(f32::is_finite), "the beauty holds a number that is not finite");
     for channel in &frame.channels {
-        finite(&mut channel.values.iter().copied(), &channel.name);
+        assert!(
+            channel.values.iter().copied().all(f32::is_finite),
+            "{} holds a number that is not finite",
+            channel.name
+        );
     }
     if let Some(depth) = &frame.depth {
         assert!(depth.iter().all(|depth| *depth >= 0.0), "the depth is NaN or negative");
     }
     display(frame, &Default::default(), BitDepth::Eight);
     display(frame, &Default::default(), BitDepth::Sixteen);
+}
+
+/// Reads `bytes` as a plate whose name ends in `extension`.
+///
+/// # Panics
+/// The picture breaks what its reader promises, or a scene over it has a number that is not finite.
+pub fn read_plate(bytes: &[u8], extension: &str) {
+    one_thread();
+    let Ok(picture) = decode_picture(bytes, extension) else { return };
+    let (width, height) = (picture.colour.width(), picture.colour.height());
+    assert!(width > 0 && height > 0 && width.max(height) as u64 <= limits::SIDE, "{width} x {height}");
+    if let Some(depth) = &picture.depth {
+        assert_eq!(depth.len(), width * height);
+    }
+    if width.max(height) <= 256 {
+        let mut assets = MemoryAssets::default();
+        assets.insert_picture("plate", picture);
+        let scene = "bansho = 1\n[picture]\nsize = [16, 9]\n[plate]\nimage = \"plate\"\n[[flame_sheet]]\n";
+        let scene = Scene::parse("plate.toml", scene, KINDS, &assets).expect("a scene with its plate is valid");
+        draw_small(scene, assets);
+    }
 }

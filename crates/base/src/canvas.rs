@@ -208,6 +208,11 @@ impl Strip {
         self.plate_depth.get(index).copied().unwrap_or(f32::INFINITY)
     }
 
+    /// Whether a plate's depth may hide samples.
+    pub fn has_plate(&self) -> bool {
+        !self.plate_depth.is_empty()
+    }
+
     /// Whether a sample at `depth` is before the plate.
     pub fn visible(&self, index: usize, depth: f32) -> bool {
         depth < self.plate_depth(index)

@@ -1,2 +1,44 @@
-//! The program `bansho`.
-fn main() {}
+//! The program `bansho`: arguments in, pictures and exit codes out. All work is done by the library.
+
+mod args;
+mod command;
+mod examples;
+mod exit;
+mod interrupt;
+mod output;
+mod progress;
+mod stats;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::args::{Cli, Command};
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are no errors, and go to stdout. Nobody is left to be told that this failed.
+            let _ = error.print();
+            return ExitCode::from(error.exit_code().clamp(0, 255) as u8);
+        }
+    };
+    match run(&cli.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => exit::report(&error),
+    }
+}
+
+fn run(command: &Command) -> anyhow::Result<()> {
+    match command {
+        Command::New(args) => command::new::run(args),
+        Command::Check(args) => command::check::run(args),
+        Command::Upgrade(args) => command::upgrade::run(args),
+        Command::Schema => command::schema::run(),
+        Command::Render(args) => command::render::run(args),
+        Command::Flipbook(args) => command::flipbook::run(args),
+        Command::Completions(args) => command::completions::run(args),
+        Command::Man(args) => command::man::run(args),
+    }
+}

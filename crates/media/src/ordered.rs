@@ -51,7 +51,12 @@ impl<F: Film> Ordered<F> {
         };
         let end = self.frame_count.min(state.next + self.window);
         if !(state.next..end).contains(&index) || state.waiting.contains_key(&index) {
-            return Err(MediaError::OutOfOrder { path: self.path.clone(), index, next: state.next, window: self.window });
+            return Err(MediaError::OutOfOrder {
+                path: self.path.clone(),
+                index,
+                next: state.next,
+                window: self.window,
+            });
         }
         state.waiting.insert(index, piece);
         while let Some(piece) = state.waiting.remove(&state.next) {

@@ -222,7 +222,12 @@ impl Sink {
         if got == width * height {
             return Ok(());
         }
-        Err(MediaError::PlaneLength { path: path.to_path_buf(), plane: "RGBA".to_owned(), got, expected: width * height })
+        Err(MediaError::PlaneLength {
+            path: path.to_path_buf(),
+            plane: "RGBA".to_owned(),
+            got,
+            expected: width * height,
+        })
     }
 }
 

@@ -5,7 +5,11 @@ pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// `bytes` as lower-case hexadecimal digits.
 pub(crate) fn to_hex(bytes: &[u8; 32]) -> String {
-    bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]).filter_map(|digit| char::from_digit(digit.into(), 16)).collect()
+    bytes
+        .iter()
+        .flat_map(|byte| [byte >> 4, byte & 15])
+        .filter_map(|digit| char::from_digit(digit.into(), 16))
+        .collect()
 }
 
 /// The 32 bytes that 64 hexadecimal digits say; `None` for anything else.

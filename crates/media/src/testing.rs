@@ -1,8 +1,6 @@
 //! Pictures for this crate's tests.
 
-use bansho_base::image::{
-    CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision,
-};
+use bansho_base::image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision};
 
 /// A small frame in which every value is different, with depth, a layer and an AOV.
 pub(crate) fn frame(width: usize, height: usize) -> Frame {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bansho_base::observer::Cancelled;
-use bansho_media::{error::MediaError, naming::NamingError};
+use bansho_media::{MediaError, flipbook::TileError, naming::NamingError};
 use bansho_render::{
     PlanError, RenderError, SceneError,
     scene::edit::EditError,
@@ -53,13 +53,16 @@ pub enum JobError {
     /// Writing failed.
     #[error(transparent)]
     Media(#[from] MediaError),
+    /// Tiles that make no sheet.
+    #[error(transparent)]
+    Tiles(#[from] TileError),
     /// The observer asked to stop.
     #[error("stopped; whole frames stay, and --resume goes on from there")]
     Cancelled,
 }
 
 /// Options that do not go together.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Conflict {
     /// Layers or AOVs in a format that has only one picture.
@@ -70,11 +73,13 @@ pub enum Conflict {
         /// The output.
         path: PathBuf,
     },
-    /// A sheet of tiles in a film.
-    #[error("{path}: a sheet is one picture; allowed: .png, .exr", path = .path.display())]
-    SheetInFilm {
+    /// A sheet of tiles in a format that is not for it.
+    #[error("{path}: a sheet is one picture; allowed: {allowed}", path = .path.display())]
+    Sheet {
         /// The output.
         path: PathBuf,
+        /// Extensions that will do.
+        allowed: &'static str,
     },
     /// A sheet without tiles or with too many.
     #[error("a sheet of {tiles} tiles; allowed: 1 to {most}")]
@@ -140,7 +145,7 @@ impl JobError {
             Self::NoGpu => Cause::Gpu,
             Self::Cancelled => Cause::Cancelled,
             Self::Media(MediaError::Naming(_)) => Cause::Usage,
-            Self::Render(_) | Self::Media(_) => Cause::Work,
+            Self::Render(_) | Self::Media(_) | Self::Tiles(_) => Cause::Work,
         }
     }
 

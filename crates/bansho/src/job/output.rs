@@ -12,7 +12,7 @@ use bansho_base::{
     observer::{Observer, Stage, StageGuard},
 };
 use bansho_media::{
-    error::MediaError,
+    MediaError,
     naming::{OutputKind, OutputPattern},
     sequence::{Picture, Sink, SinkOptions, Slot, Wants},
 };

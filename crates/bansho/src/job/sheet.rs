@@ -1,46 +1,68 @@
 //! Sheets: many small pictures in one, row after row from the top left.
 
-use bansho_base::image::Rect;
+use std::sync::{Mutex, PoisonError};
 
-/// How tiles lie in a sheet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Grid {
-    /// Tiles in a row.
-    pub columns: usize,
-    /// Rows.
-    pub rows: usize,
-    /// Size of a tile, pixels.
-    pub tile: [usize; 2],
-    /// Empty pixels between tiles.
-    pub gutter: usize,
+use bansho_base::{image::Frame, observer::Observer};
+use bansho_media::flipbook::Sheet;
+
+use super::{
+    error::{Conflict, JobError},
+    observer::{FrameDone, JobObserver},
+    shoot::Finish,
+};
+
+/// Most tiles of a sheet.
+pub(super) const MOST_TILES: usize = 4096;
+
+/// The sheet nearest to a square of tiles that holds `count` of them.
+pub(super) fn holding(count: usize, cell: [usize; 2], gutter: usize) -> Result<Sheet, Conflict> {
+    let columns = (1..=count).find(|columns| columns * columns >= count).unwrap_or(1);
+    checked(Sheet { count, columns, cell, gutter })
 }
 
-impl Grid {
-    /// The grid nearest to a square of tiles that holds `count` of them.
-    pub fn holding(count: usize, tile: [usize; 2], gutter: usize) -> Self {
-        let columns = (1..=count).find(|columns| columns * columns >= count).unwrap_or(1);
-        Self { columns, rows: count.div_ceil(columns), tile, gutter }
+/// A sheet holds some tiles, and may be as large as a picture.
+pub(super) fn checked(sheet: Sheet) -> Result<Sheet, Conflict> {
+    let most = bansho_render::scene::picture::LARGEST_SIDE as usize;
+    if !(1..=MOST_TILES).contains(&sheet.count) {
+        return Err(Conflict::Tiles { tiles: sheet.count, most: MOST_TILES });
+    }
+    let [width, height] = sheet.size();
+    if width <= most && height <= most { Ok(sheet) } else { Err(Conflict::SheetSize { width, height, most }) }
+}
+
+/// Gathers a tile from each frame.
+pub(super) struct Gather<'a, T, M> {
+    make: M,
+    observer: &'a dyn JobObserver,
+    tiles: Mutex<Vec<Option<T>>>,
+}
+
+impl<'a, T, M: Fn(Frame, &dyn Observer) -> T> Gather<'a, T, M> {
+    /// Will hold `count` tiles, each made from a frame by `make`.
+    pub(super) fn new(count: usize, observer: &'a dyn JobObserver, make: M) -> Self {
+        Self { make, observer, tiles: Mutex::new((0..count).map(|_| None).collect()) }
     }
 
-    /// Size of the sheet, pixels.
-    pub fn size(&self) -> [usize; 2] {
-        let side = |tiles: usize, tile: usize| tiles * tile + tiles.saturating_sub(1) * self.gutter;
-        [side(self.columns, self.tile[0]), side(self.rows, self.tile[1])]
+    /// The tiles in the order of the frames.
+    pub(super) fn into_tiles(self) -> Vec<T> {
+        self.tiles.into_inner().unwrap_or_else(PoisonError::into_inner).into_iter().flatten().collect()
+    }
+}
+
+impl<T: Send, M: Fn(Frame, &dyn Observer) -> T + Sync> Finish for Gather<'_, T, M> {
+    fn finish(&self, index: usize, frame: Frame, observer: &dyn Observer) -> Result<(), JobError> {
+        let number = frame.header.number;
+        let tile = (self.make)(frame, observer);
+        let mut tiles = self.tiles.lock().unwrap_or_else(PoisonError::into_inner);
+        tiles[index] = Some(tile);
+        let drawn = tiles.iter().flatten().count();
+        drop(tiles);
+        self.observer.frame_done(&FrameDone { number, path: None, drawn });
+        Ok(())
     }
 
-    /// Where tile `index` lies.
-    pub fn place(&self, index: usize) -> Rect {
-        let at = |tiles: usize, tile: usize| tiles * (tile + self.gutter);
-        let (x, y) = (at(index % self.columns, self.tile[0]), at(index / self.columns, self.tile[1]));
-        Rect { x, y, width: self.tile[0], height: self.tile[1] }
-    }
-
-    /// Copies the rows of tile `index` into the sheet's pixels.
-    pub(super) fn put<P: Copy>(&self, sheet: &mut [P], index: usize, tile: &[P]) {
-        let (place, width) = (self.place(index), self.size()[0]);
-        for (row, pixels) in tile.chunks_exact(place.width).enumerate() {
-            sheet[(place.y + row) * width + place.x..][..place.width].copy_from_slice(pixels);
-        }
+    fn window(&self) -> usize {
+        usize::MAX
     }
 }
 
@@ -49,21 +71,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_grid_is_nearly_square_and_holds_all() {
+    fn a_sheet_is_nearly_square_and_holds_all() {
         for (count, columns, rows) in [(1, 1, 1), (2, 2, 1), (3, 2, 2), (5, 3, 2), (7, 3, 3), (16, 4, 4), (17, 5, 4)] {
-            let grid = Grid::holding(count, [10, 6], 2);
-            assert_eq!((grid.columns, grid.rows), (columns, rows), "{count}");
+            let sheet = holding(count, [10, 6], 2).unwrap();
+            assert_eq!((sheet.columns, sheet.rows()), (columns, rows), "{count}");
         }
-        let grid = Grid::holding(5, [10, 6], 2);
-        assert_eq!(grid.size(), [34, 14]);
-        assert_eq!(grid.place(4), Rect { x: 12, y: 8, width: 10, height: 6 });
     }
 
     #[test]
-    fn tiles_land_in_their_places_and_nowhere_else() {
-        let grid = Grid { columns: 2, rows: 1, tile: [2, 2], gutter: 1 };
-        let mut sheet = [0; 10];
-        grid.put(&mut sheet, 1, &[1, 2, 3, 4]);
-        assert_eq!(sheet, [0, 0, 0, 1, 2, 0, 0, 0, 3, 4]);
+    fn sheets_too_large_or_of_too_many_tiles_are_refused() {
+        assert!(matches!(holding(0, [8, 8], 2), Err(Conflict::Tiles { .. })));
+        assert!(matches!(holding(MOST_TILES + 1, [1, 1], 0), Err(Conflict::Tiles { .. })));
+        assert!(matches!(holding(100, [1920, 1080], 2), Err(Conflict::SheetSize { width: 19_218, .. })));
+        assert!(holding(64, [1920, 1080], 2).is_ok());
     }
 }

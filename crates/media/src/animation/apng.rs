@@ -34,8 +34,11 @@ pub(crate) struct ApngFilm {
 impl ApngFilm {
     pub(crate) fn create(path: &Path, format: ApngFormat) -> Result<Self, MediaError> {
         let [numerator, denominator] = format.fps;
-        let delay = timing::apng_delay(format.fps)
-            .ok_or_else(|| MediaError::FrameRate { path: path.to_path_buf(), numerator, denominator })?;
+        let delay = timing::apng_delay(format.fps).ok_or_else(|| MediaError::FrameRate {
+            path: path.to_path_buf(),
+            numerator,
+            denominator,
+        })?;
         Ok(Self { file: AtomicFile::create(path)?, format, delay, sequence: 0 })
     }
 

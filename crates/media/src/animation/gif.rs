@@ -88,7 +88,9 @@ pub(crate) fn prepare(
     }
     let pixels = if format.transparent {
         let mut pixels = flatten::to_eight_bits(&picture.pixels);
-        pixels.iter_mut().for_each(|pixel| *pixel = if pixel[3] < SHOWN { [0; 4] } else { [pixel[0], pixel[1], pixel[2], 255] });
+        pixels
+            .iter_mut()
+            .for_each(|pixel| *pixel = if pixel[3] < SHOWN { [0; 4] } else { [pixel[0], pixel[1], pixel[2], 255] });
         pixels
     } else {
         flatten::to_eight_bits(&flatten::over_black(picture).pixels)
@@ -121,7 +123,12 @@ impl Film for GifFilm {
         let path = self.file.path().to_path_buf();
         let entries = palette(&self.histogram, if self.format.transparent { 255 } else { 256 });
         let transparent = self.format.transparent.then_some(entries.len() as u8);
-        let writer = Writer { ditherer: Ditherer::new(&entries, &self.histogram), transparent, format: &self.format, path: &path };
+        let writer = Writer {
+            ditherer: Ditherer::new(&entries, &self.histogram),
+            transparent,
+            format: &self.format,
+            path: &path,
+        };
         let mut colours = entries.into_flattened();
         colours.extend(transparent.iter().flat_map(|_| [0; 3]));
         self.spool.seek(SeekFrom::Start(0)).map_err(|source| MediaError::from_io(&path, source))?;

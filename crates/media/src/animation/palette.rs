@@ -105,7 +105,8 @@ pub(crate) fn palette(histogram: &Histogram, size: usize) -> Vec<[u8; 3]> {
     let colours = histogram.colours();
     let mut cells = vec![Cell::new(colours.clone())];
     while cells.len() < size {
-        let widest = (0..cells.len()).fold(0, |best, next| if cells[next].spread > cells[best].spread { next } else { best });
+        let widest =
+            (0..cells.len()).fold(0, |best, next| if cells[next].spread > cells[best].spread { next } else { best });
         if cells[widest].spread <= 0.0 {
             break;
         }
@@ -163,7 +164,8 @@ impl Ditherer {
     pub(crate) fn new(palette: &[[u8; 3]], histogram: &Histogram) -> Self {
         let entries: Vec<[f32; 3]> = palette.iter().take(256).map(|colour| colour.map(f32::from)).collect();
         let counts = histogram.0.par_iter().enumerate().with_min_len(1024);
-        let pair_of = |(bin, &count): (usize, &u64)| if count > 0 { pair(centre(bin), &entries) } else { Pair::default() };
+        let pair_of =
+            |(bin, &count): (usize, &u64)| if count > 0 { pair(centre(bin), &entries) } else { Pair::default() };
         let pairs = counts.map(pair_of).collect();
         Self { entries, pairs }
     }

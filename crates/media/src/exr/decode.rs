@@ -3,7 +3,7 @@
 //! The header is first read by [`super::parse`], which trusts nothing, so that a file cannot make the decoder ask for more
 //! memory than it could ever fill.
 
-use std::io::Cursor;
+use std::{io::Cursor, ops::Range, panic::catch_unwind};
 
 use ::exr::{
     block::{UncompressedBlock, chunk::Chunk, lines::LineRef, reader::ChunksReader},
@@ -29,7 +29,7 @@ const BATCH: usize = 32;
 /// has none they are transparent and infinitely far. Colours are given straight, those that are no numbers as 0.
 pub(crate) fn decode(file: &[u8]) -> Result<Picture, AssetProblem> {
     let outline = parse::outline(file).map_err(damaged)?;
-    check(&outline, file.len() as u64)?;
+    check(&outline, file)?;
     let wanted = Wanted::choose(&outline)
         .ok_or_else(|| AssetProblem::NoChannel(format!("R, Y or Z (it has {})", all_names(&outline))))?;
     let display = outline.parts[0].display.ok_or_else(|| damaged("it has no display window"))?;
@@ -50,7 +50,7 @@ fn all_names(outline: &Outline) -> String {
 }
 
 /// Refuses what would need more memory than is allowed, or than the file's bytes could ever fill.
-fn check(outline: &Outline, file_bytes: u64) -> Result<(), AssetProblem> {
+fn check(outline: &Outline, file: &[u8]) -> Result<(), AssetProblem> {
     if outline.deep {
         return Err(damaged("deep pixels are not read; flatten them first"));
     }
@@ -67,7 +67,7 @@ fn check(outline: &Outline, file_bytes: u64) -> Result<(), AssetProblem> {
             return Err(damaged("channels of fewer samples than pixels are not read"));
         }
         let bytes_per_pixel: u64 = part.channels.iter().map(|channel| channel.bytes_per_sample).sum();
-        limits::check_expansion(width, height, bytes_per_pixel, file_bytes, greatest_ratio(part))?;
+        limits::check_expansion([width, height], width * height * bytes_per_pixel, file, greatest_ratio(part))?;
     }
     Ok(())
 }
@@ -77,9 +77,10 @@ fn greatest_ratio(part: &Part) -> u64 {
     match part.compression {
         Some(0) => 1,
         Some(1) => 64, // run lengths of up to 128 in 2 bytes
-        Some(2 | 3 | 5) => limits::DEFLATE_RATIO,
-        Some(6 | 7) => 32, // 4 x 4 halves in 3 bytes at least
-        _ => 1 << 15,      // Huffman runs over wavelets or cosines
+        Some(2 | 3) => limits::DEFLATE_RATIO,
+        Some(5) => 2 * limits::DEFLATE_RATIO, // floats of 3 bytes, then DEFLATE
+        Some(6 | 7) => 32,                    // 4 x 4 halves in 3 bytes at least
+        _ => 1 << 15,                         // Huffman runs over wavelets or cosines
     }
 }
 
@@ -116,10 +117,7 @@ impl Wanted {
     }
 
     fn planes(&self, pixels: usize) -> Values {
-        let colour = self.colour[0].map(|_| {
-            // Without alpha in the file, pixels that it has are opaque and the others are not.
-            vec![[0.0; 4]; pixels]
-        });
+        let colour = self.colour[0].map(|_| vec![[0.0; 4]; pixels]);
         Values { colour, depth: self.depth.map(|_| vec![f32::INFINITY; pixels]) }
     }
 
@@ -129,10 +127,7 @@ impl Wanted {
 }
 
 /// The first layer `name.R, name.G, name.B` of a part.
-fn first_layer(
-    part: &Part,
-    layer: &impl Fn(&Part, &str) -> Option<[Option<usize>; 4]>,
-) -> Option<[Option<usize>; 4]> {
+fn first_layer(part: &Part, layer: &impl Fn(&Part, &str) -> Option<[Option<usize>; 4]>) -> Option<[Option<usize>; 4]> {
     let prefixes = part.channels.iter().filter_map(|channel| channel.name.strip_suffix('R'));
     prefixes.filter(|prefix| prefix.ends_with('.')).find_map(|prefix| layer(part, prefix))
 }
@@ -161,11 +156,8 @@ fn read_chunks(file: &[u8], wanted: &Wanted, planes: &mut Planes) -> Result<(), 
         if batch.is_empty() {
             return Ok(());
         }
-        let blocks: Vec<UncompressedBlock> = batch
-            .into_par_iter()
-            .map(|chunk| UncompressedBlock::decompress_chunk(chunk, &meta, false))
-            .collect::<Result<_, _>>()
-            .map_err(damaged)?;
+        let blocks: Vec<UncompressedBlock> =
+            batch.into_par_iter().map(|chunk| decompress(chunk, &meta)).collect::<Result<_, _>>()?;
         for block in &blocks {
             let header = meta.headers.get(block.index.layer).ok_or_else(|| damaged("a block of no part"))?;
             planes.place(block, header, wanted);
@@ -173,43 +165,60 @@ fn read_chunks(file: &[u8], wanted: &Wanted, planes: &mut Planes) -> Result<(), 
     }
 }
 
+/// Decompresses a chunk. The crate's PIZ and B44 decoders are known to panic on damaged chunks (exr 1.74: an empty list in
+/// `piz/huffman.rs`, overflow in `b44/mod.rs`); they own all they touch, so that nothing is left half-changed.
+fn decompress(chunk: Chunk, meta: &MetaData) -> Result<UncompressedBlock, AssetProblem> {
+    catch_unwind(|| UncompressedBlock::decompress_chunk(chunk, meta, false))
+        .map_err(|_| damaged("its pixels cannot be decompressed"))?
+        .map_err(damaged)
+}
+
 impl Planes {
     /// Copies what a block holds of the wanted channels.
     fn place(&mut self, block: &UncompressedBlock, header: &Header, wanted: &Wanted) {
+        let part = block.index.layer;
         for line in block.lines(&header.channels) {
-            let (channel, part) = (line.location.channel, block.index.layer);
+            let channel = line.location.channel;
             let Some(kind) = header.channels.list.get(channel).map(|channel| channel.sample_type) else { continue };
-            let origin = header.own_attributes.layer_position;
-            let y = line.location.position.1 as i64 + i64::from(origin.1) - i64::from(self.display_min[1]);
-            let x = line.location.position.0 as i64 + i64::from(origin.0) - i64::from(self.display_min[0]);
-            if !(0..self.height as i64).contains(&y) {
-                continue;
-            }
-            let row = y as usize * self.width;
-            let place = |offset: usize| {
-                let x = x + offset as i64;
-                (0..self.width as i64).contains(&x).then_some(row + x as usize)
-            };
+            let Some((skipped, places)) = self.span(&line, header) else { continue };
+            let values = || samples(&line, kind).skip(skipped);
             if let Some(depth) = self.values.depth.as_mut().filter(|_| wanted.depth == Some((part, channel))) {
-                samples(&line, kind).enumerate().for_each(|(i, value)| {
-                    if let Some(slot) = place(i).and_then(|place| depth.get_mut(place)) {
-                        *slot = value;
-                    }
-                });
+                depth[places.clone()].iter_mut().zip(values()).for_each(|(z, value)| *z = value);
             }
             if let Some(colour) = self.values.colour.as_mut().filter(|_| wanted.part == part) {
-                let is_opaque = wanted.colour[3].is_none();
-                for component in (0..4).filter(|component| wanted.colour[*component] == Some(channel)) {
-                    samples(&line, kind).enumerate().for_each(|(i, value)| {
-                        if let Some(pixel) = place(i).and_then(|place| colour.get_mut(place)) {
-                            pixel[component] = value;
-                            if is_opaque {
-                                pixel[3] = 1.0;
-                            }
-                        }
-                    });
-                }
+                place_colour(&mut colour[places], values(), wanted.colour, channel);
             }
+        }
+    }
+
+    /// How many values of a line lie left of the picture, and which pixels the others are; `None` if it lies outside.
+    fn span(&self, line: &LineRef<'_>, header: &Header) -> Option<(usize, Range<usize>)> {
+        let origin = header.own_attributes.layer_position;
+        let x = line.location.position.0 as i64 + i64::from(origin.0) - i64::from(self.display_min[0]);
+        let y = line.location.position.1 as i64 + i64::from(origin.1) - i64::from(self.display_min[1]);
+        let row = usize::try_from(y).ok().filter(|row| *row < self.height)? * self.width;
+        let end = (x + line.location.sample_count as i64).min(self.width as i64);
+        let start = x.max(0);
+        (start < end).then(|| ((start - x) as usize, row + start as usize..row + end as usize))
+    }
+}
+
+/// Writes one channel's values into the components it stands for.
+fn place_colour(
+    pixels: &mut [[f32; 4]],
+    values: impl Iterator<Item = f32>,
+    colour: [Option<usize>; 4],
+    channel: usize,
+) {
+    let targets = colour.map(|wanted| wanted == Some(channel));
+    if !targets.contains(&true) {
+        return;
+    }
+    for (pixel, value) in pixels.iter_mut().zip(values) {
+        (0..4).filter(|component| targets[*component]).for_each(|component| pixel[component] = value);
+        // Without alpha in the file, the pixels that it has are opaque and the others are not.
+        if colour[3].is_none() {
+            pixel[3] = 1.0;
         }
     }
 }

@@ -135,3 +135,51 @@ fn crate_header(planes: &[Plane<'_>], width: usize, height: usize) -> Header {
         LineOrder::Increasing,
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing;
+
+    #[test]
+    fn the_same_frame_is_the_same_bytes_whatever_the_threads() {
+        let frame = testing::frame(50, 90);
+        let encode = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| encode(&frame, Path::new("a.exr")).unwrap())
+        };
+        let one = encode(1);
+        assert!((2..6).all(|threads| encode(threads) == one));
+    }
+
+    #[test]
+    fn names_and_lengths_that_do_not_fit_are_refused() {
+        let path = Path::new("a.exr");
+        let named = |name: &str| {
+            let mut frame = testing::frame(4, 4);
+            frame.channels[0].name = name.to_owned();
+            encode(&frame, path)
+        };
+        for name in ["", "R", "torch.R", "a\0b", &"x".repeat(256)] {
+            assert!(matches!(named(name), Err(MediaError::ChannelName { .. })), "{name}");
+        }
+        assert!(named(&"x".repeat(255)).is_ok());
+        let mut frame = testing::frame(4, 4);
+        frame.channels[1].values.pop();
+        assert!(matches!(encode(&frame, path), Err(MediaError::PlaneLength { got: 15, expected: 16, .. })));
+        frame.header.data_origin = [i64::MAX, 0];
+        frame.channels.clear();
+        assert!(matches!(encode(&frame, path), Err(MediaError::Size { .. })));
+        frame.header.data_origin = [0, 0];
+        frame.header.display_size = [0, 4];
+        assert!(matches!(encode(&frame, path), Err(MediaError::Size { .. })));
+    }
+
+    #[test]
+    fn no_path_time_or_machine_stands_in_the_file() {
+        let file = encode(&testing::frame(8, 8), Path::new("secret/a.exr")).unwrap();
+        for word in [&b"secret"[..], b"capDate", b"utcOffset", b"hostname"] {
+            assert!(!file.windows(word.len()).any(|part| part == word));
+        }
+    }
+}

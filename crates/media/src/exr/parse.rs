@@ -143,7 +143,11 @@ impl<'a> Reader<'a> {
             let bytes_per_sample = if self.int()? == 1 { 2 } else { 4 };
             self.take(4)?;
             let sampling = [self.int()?, self.int()?];
-            channels.push(ChannelEntry { name: String::from_utf8_lossy(name).into_owned(), bytes_per_sample, sampling });
+            channels.push(ChannelEntry {
+                name: String::from_utf8_lossy(name).into_owned(),
+                bytes_per_sample,
+                sampling,
+            });
         }
     }
 }

@@ -28,8 +28,11 @@ pub(crate) fn planes(frame: &Frame) -> Vec<Plane<'_>> {
         precision: Precision::Half,
         source: Source::Beauty(frame.beauty.pixels(), component),
     });
-    let depth =
-        frame.depth.iter().map(|values| Plane { name: "Z", precision: Precision::Single, source: Source::Values(values) });
+    let depth = frame.depth.iter().map(|values| Plane {
+        name: "Z",
+        precision: Precision::Single,
+        source: Source::Values(values),
+    });
     let channels = frame.channels.iter().map(|channel| Plane {
         name: &channel.name,
         precision: channel.precision,

@@ -21,16 +21,15 @@ fn damaged(reason: impl ToString) -> AssetProblem {
 /// Reads a PNG of any kind: 1 to 16 bits, grey, palette, with alpha or without. Taken as sRGB, unless it says that its
 /// values are linear (a gAMA of 1 and no sRGB chunk); colour profiles are not looked at.
 pub(crate) fn png(file: &[u8]) -> Result<Picture, AssetProblem> {
-    let mut limits = Limits::default();
     // For everything but pixels: text and profiles.
-    limits.bytes = 64 << 20;
-    let mut decoder = Decoder::new_with_limits(Cursor::new(file), limits);
+    let metadata = Limits { bytes: 64 << 20 };
+    let mut decoder = Decoder::new_with_limits(Cursor::new(file), metadata);
     decoder.set_transformations(Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(damaged)?;
     let info = reader.info();
     let [width, height] = limits::check_size([info.width.into(), info.height.into()])?;
-    let bits_per_pixel = info.bits_per_pixel() as u64;
-    limits::check_expansion(width, height, 1, (file.len() as u64).saturating_mul(8), limits::DEFLATE_RATIO / bits_per_pixel.max(1) + 1)?;
+    let claimed_bytes = width * height * info.bits_per_pixel() as u64 / 8;
+    limits::check_expansion([width, height], claimed_bytes, file, limits::DEFLATE_RATIO)?;
     let is_linear = info.srgb.is_none() && info.gamma().is_some_and(|gamma| gamma.into_scaled() == 100_000);
     let encoding = if is_linear { Encoding::LinearSrgb } else { Encoding::DisplaySrgb };
     let length = reader.output_buffer_size().ok_or_else(|| damaged("its pixels do not fit in memory"))?;
@@ -67,8 +66,8 @@ pub(crate) fn jpeg(file: &[u8]) -> Result<Picture, AssetProblem> {
     decoder.decode_headers().map_err(damaged)?;
     let (width, height) = decoder.dimensions().ok_or_else(|| damaged("it has no size"))?;
     let [width, height] = limits::check_size([width as u64, height as u64])?;
-    // A block of 8 x 8 pixels takes at least 2 bits a component, or, where runs of empty ones are named, far less.
-    limits::check_expansion(width, height, 1, file.len() as u64, 1 << 16)?;
+    // A block of 8 x 8 pixels takes at least 2 bits, but in a progressive file one code may stand for 2^15 empty ones.
+    limits::check_expansion([width, height], width * height, file, 1 << 20)?;
     let bytes = decoder.decode().map_err(damaged)?;
     let pixels = match decoder.output_colorspace() {
         Some(ColorSpace::Luma) => bytes.iter().map(|&code| grey(code)).collect(),

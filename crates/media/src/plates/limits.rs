@@ -27,16 +27,15 @@ pub(crate) fn check_size([width, height]: [u64; 2]) -> Result<[u64; 2], AssetPro
     Ok([width, height])
 }
 
-/// Refuses a picture that claims more pixels than its file could hold even if compressed as far as its format can.
+/// Refuses a picture of `claimed_bytes` that its file could not hold even if compressed as far as its format can.
 pub(crate) fn check_expansion(
-    width: u64,
-    height: u64,
-    bytes_per_pixel: u64,
-    file_bytes: u64,
+    [width, height]: [u64; 2],
+    claimed_bytes: u64,
+    file: &[u8],
     ratio: u64,
 ) -> Result<(), AssetProblem> {
-    let claimed = width * height * bytes_per_pixel;
-    if claimed > file_bytes.saturating_mul(ratio) {
+    let file_bytes = file.len() as u64;
+    if claimed_bytes > file_bytes.saturating_mul(ratio) {
         let reason = format!("it claims {width} x {height} pixels, more than its {file_bytes} bytes can hold");
         return Err(AssetProblem::Damaged(reason));
     }

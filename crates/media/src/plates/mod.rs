@@ -130,7 +130,8 @@ impl Assets for FileAssets {
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
         let path = self.root.join(path);
         let bytes = read(&path).map_err(|problem| error(&path, problem))?;
-        let text = String::from_utf8(bytes).map_err(|_| error(&path, AssetProblem::Damaged("it is not UTF-8".to_owned())))?;
+        let text =
+            String::from_utf8(bytes).map_err(|_| error(&path, AssetProblem::Damaged("it is not UTF-8".to_owned())))?;
         Ok(text.into())
     }
 

@@ -3,7 +3,8 @@
 use std::{borrow::Cow, path::Path};
 
 use ::png::{
-    BitDepth, ColorType, DeflateCompression, Encoder, EncodingError, Filter, ScaledFloat, SourceChromaticities, SrgbRenderingIntent,
+    BitDepth, ColorType, DeflateCompression, Encoder, EncodingError, Filter, ScaledFloat, SourceChromaticities,
+    SrgbRenderingIntent,
 };
 use bansho_base::image::{DisplayImage, DisplayPixels};
 
@@ -180,8 +181,7 @@ mod tests {
     fn the_file_says_that_it_is_srgb_and_nothing_of_time_or_place() {
         let file = encode(&testing::display(9, 4, 0), &[1; 32], PngEffort::Fast, Path::new("secret/a.png")).unwrap();
         let kinds: Vec<_> = super::super::chunk::chunks(&file).unwrap().map(|chunk| chunk.unwrap().kind).collect();
-        let expected: [&[u8; 4]; 9] =
-            [b"IHDR", b"sRGB", b"gAMA", b"cHRM", b"tEXt", b"tEXt", b"tEXt", b"IDAT", b"IEND"];
+        let expected: [&[u8; 4]; 9] = [b"IHDR", b"sRGB", b"gAMA", b"cHRM", b"tEXt", b"tEXt", b"tEXt", b"IDAT", b"IEND"];
         assert!(expected.into_iter().eq(kinds.iter()), "{kinds:?}");
         assert!(!file.windows(6).any(|window| window == b"secret"));
     }

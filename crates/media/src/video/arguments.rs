@@ -47,9 +47,18 @@ fn pixel_format(format: &VideoFormat) -> &'static str {
 fn codec(format: &VideoFormat) -> &'static [&'static str] {
     match (format.kind, format.options.webm) {
         // Straight alpha of 16 bits; the vendor that other programs expect.
-        (OutputKind::Mov, _) => {
-            &["-c:v", "prores_ks", "-profile:v", "4444", "-alpha_bits", "16", "-vendor", "apl0", "-movflags", "+write_colr"]
-        }
+        (OutputKind::Mov, _) => &[
+            "-c:v",
+            "prores_ks",
+            "-profile:v",
+            "4444",
+            "-alpha_bits",
+            "16",
+            "-vendor",
+            "apl0",
+            "-movflags",
+            "+write_colr",
+        ],
         (OutputKind::Webm, WebmCodec::Av1) => &["-c:v", "libsvtav1", "-preset", "8", "-crf", "24", "-g", "120"],
         // Alternate reference frames cannot be had with alpha.
         (OutputKind::Webm, WebmCodec::Vp9) => {
@@ -76,7 +85,8 @@ mod tests {
     fn words(kind: OutputKind, opaque: bool, webm: WebmCodec) -> String {
         let options = VideoOptions { webm, ..VideoOptions::default() };
         let format = VideoFormat { kind, size: [65, 48], fps: [24000, 1001], opaque, sixteen_bits: false, options };
-        let words: Vec<_> = of(&format, Path::new("t.part")).into_iter().map(|word| word.into_string().unwrap()).collect();
+        let words: Vec<_> =
+            of(&format, Path::new("t.part")).into_iter().map(|word| word.into_string().unwrap()).collect();
         words.join(" ")
     }
 
@@ -84,7 +94,9 @@ mod tests {
     fn every_film_names_its_matrix_transfer_and_rate() {
         for kind in [OutputKind::Mp4, OutputKind::Mov, OutputKind::Webm] {
             let words = words(kind, false, WebmCodec::Vp9);
-            for part in ["out_color_matrix=bt709", "-colorspace bt709", "-color_trc iec61966-2-1", "-framerate 24000/1001"] {
+            for part in
+                ["out_color_matrix=bt709", "-colorspace bt709", "-color_trc iec61966-2-1", "-framerate 24000/1001"]
+            {
                 assert!(words.contains(part), "{words}");
             }
             assert!(words.ends_with(&format!("-f {} t.part", kind.extension())), "{words}");

@@ -3,71 +3,73 @@
 //! Values of the artist's curves come in as numbers, so that the same functions serve look-up tables sixteen at a time and
 //! hand-worked tests. Nothing here branches on data or computes an elementary function beyond a square root.
 
-use super::lanes::{greatest, hold};
+pub use super::lanes::Real;
 
 /// Rise `w_p = (1-k) sqrt(y) + k y`, eq. (9); `y` in [0, 1].
 #[inline(always)]
-pub fn rise(y: f32, initial_speed: f32) -> f32 {
-    (1.0 - initial_speed).mul_add(y.sqrt(), initial_speed * y)
+pub fn rise<N: Real>(y: N, initial_speed: f32) -> N {
+    y.like(1.0 - initial_speed).fused(y.root(), y * y.like(initial_speed))
 }
 
 /// Distance from the axis `x' = 2 |x - 1/2|`, eq. (10): 0 on the axis, 1 at the sheet's edge; also eqs. (13) and (17).
 #[inline(always)]
-pub fn axis_distance(x: f32) -> f32 {
-    (2.0 * (x - 0.5)).abs()
+pub fn axis_distance<N: Real>(x: N) -> N {
+    (x.like(2.0) * (x - x.like(0.5))).size()
 }
 
 /// How far into the fringe a point lies, `(x' - A) / D` of eq. (11), held to [0, 1].
 ///
 /// Where the fringe has no width it is 0 up to `A` and 1 beyond, so nothing is divided by zero.
 #[inline(always)]
-pub fn fringe_place(distance: f32, core_width: f32, fringe_width: f32) -> f32 {
+pub fn fringe_place<N: Real>(distance: N, core_width: N, fringe_width: N) -> N {
     const NARROWEST: f32 = 1e-6;
-    hold((distance - core_width) / greatest(fringe_width, NARROWEST), 0.0, 1.0)
+    ((distance - core_width) / fringe_width.greatest(distance.like(NARROWEST))).held()
 }
 
 /// Speed profile `K = h + (1-h) F`, eq. (11), from `falling` = F((x'-A)/D).
 ///
 /// F(0) = 1 gives K = 1 in the core and F(1) = 0 gives K = h beyond the fringe, where the paper leaves K open.
 #[inline(always)]
-pub fn speed_profile(falling: f32, edge_speed: f32) -> f32 {
-    (1.0 - edge_speed).mul_add(falling, edge_speed)
+pub fn speed_profile<N: Real>(falling: N, edge_speed: f32) -> N {
+    falling.like(1.0 - edge_speed).fused(falling, falling.like(edge_speed))
 }
 
 /// Slowed rise `w = w_p / K`, eq. (12). Above 1 lies outside the flame.
 #[inline(always)]
-pub fn slowed_rise(rise: f32, speed: f32) -> f32 {
+pub fn slowed_rise<N: Real>(rise: N, speed: N) -> N {
     rise / speed
 }
 
 /// Fluttering edge `E = A(w) + D(w) P(w - s (t-t0))`, eq. (15).
 #[inline(always)]
-pub fn fluttering_edge(core_width: f32, fringe_width: f32, flutter: f32) -> f32 {
-    fringe_width.mul_add(flutter, core_width)
+pub fn fluttering_edge<N: Real>(core_width: N, fringe_width: N, flutter: N) -> N {
+    fringe_width.fused(flutter, core_width)
 }
 
 /// Place across the flame `u' = x'/E`, eq. (16): 0 on the axis, 1 at the fluttering edge, more outside.
 #[inline(always)]
-pub fn across(distance: f32, edge: f32) -> f32 {
+pub fn across<N: Real>(distance: N, edge: N) -> N {
     distance / edge
 }
 
 /// Texture coordinate `u = (1 + u')/2` right of the axis, `(1 - u')/2` left of it, eqs. (14) and (18).
 #[inline(always)]
-pub fn texture_u(across: f32, x: f32) -> f32 {
-    0.5f32.mul_add(if x < 0.5 { -across } else { across }, 0.5)
+pub fn texture_u<N: Real>(across: N, x: N) -> N {
+    let half = x.like(0.5);
+    x.choose(half, x.like(-0.5), half).fused(across, half)
 }
 
 /// Threshold `L = 1 - (1 - V(w)) (1 - H(u))`, eq. (4).
 #[inline(always)]
-pub fn threshold(vertical: f32, horizontal: f32) -> f32 {
-    (1.0 - vertical).mul_add(-(1.0 - horizontal), 1.0)
+pub fn threshold<N: Real>(vertical: N, horizontal: N) -> N {
+    let one = vertical.like(1.0);
+    (one - vertical).fused(horizontal - one, one)
 }
 
 /// What rises above the threshold, `T1 = max(0, T0 - L)`, eq. (5).
 #[inline(always)]
-pub fn above_threshold(texture: f32, threshold: f32) -> f32 {
-    greatest(texture - threshold, 0.0)
+pub fn above_threshold<N: Real>(texture: N, threshold: N) -> N {
+    (texture - threshold).greatest(texture.like(0.0))
 }
 
 #[cfg(test)]

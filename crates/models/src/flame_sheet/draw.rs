@@ -2,9 +2,11 @@
 
 use bansho_base::{canvas::Strip, image::Rect};
 
+use fearless_simd::{Simd, prelude::*};
+
 use super::{
     chain,
-    lanes::{LANES, Lanes, greatest, least},
+    lanes::{LANES, Lanes, Real, any_positive, probe},
     moment::Moment,
     placement::{Batch, Mapping},
     ramp::Ramp,
@@ -28,63 +30,38 @@ pub(crate) struct Sample {
 
 /// What sixteen pixels see of the flame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shade {
+pub(crate) struct Shade<S: Simd> {
     /// T1, eq. (5).
-    pub(crate) t1: Lanes,
-    /// Height w.
-    pub(crate) w: Lanes,
+    pub(crate) t1: Lanes<S>,
     /// Coverage times glow.
-    pub(crate) strength: Lanes,
+    pub(crate) strength: Lanes<S>,
     /// Red, green, blue of luminance up to 1, and opacity.
-    pub(crate) light: [Lanes; 4],
+    pub(crate) light: [Lanes<S>; 4],
 }
 
 /// Whether any flame reaches a batch, and what of it.
 #[inline(always)]
-pub(crate) fn shade(shape: &Shape, ramp: &Ramp, sample: &Sample, batch: &Batch) -> Option<Shade> {
-    let (x, y) = sample.moment.straighten(&batch.x, &batch.y);
-    let place = shape.place(&x, &y, &sample.moment.heights, sample.pixel)?;
-    if all_dark(&place.coverage) {
+pub(crate) fn shade<S: Simd>(shape: &Shape, ramp: &Ramp, sample: &Sample, batch: &Batch<S>) -> Option<Shade<S>> {
+    let (x, y) = sample.moment.straighten(batch.x, batch.y);
+    if shape.out_of_reach(probe(x), probe(y)) {
         return None;
     }
-    let texture = sample.texture.sample(&place.u, &place.w);
-    let (mut t1, mut strength) = ([0.0; LANES], [0.0; LANES]);
-    for i in 0..LANES {
-        t1[i] = chain::above_threshold(texture[i], place.threshold[i]);
-        strength[i] = if t1[i] > 0.0 { place.coverage[i] * place.glow[i] } else { 0.0 };
-    }
-    let blue = ramp.base_blue[2] > 0.0 && lowest(&place.w) < BLUE_TOP;
-    if !blue && all_dark(&strength) {
+    let place = shape.place(x, y, &sample.moment.edges, sample.pixel)?;
+    let t1 = chain::above_threshold(sample.texture.sample(place.u, place.w), place.threshold);
+    let zero = t1.like(0.0);
+    let strength = zero.choose(t1, place.coverage * place.glow, zero);
+    let blue = ramp.base_blue[2] > 0.0 && any_positive(place.w.like(BLUE_TOP) - place.w);
+    if !blue && !any_positive(strength) {
         return None;
     }
-    let mut light = ramp.light.sample(&t1);
+    let mut light = ramp.light(t1);
     for plane in &mut light {
-        for i in 0..LANES {
-            plane[i] *= strength[i];
-        }
+        *plane = *plane * strength;
     }
     if blue {
         add_base_blue(&mut light, ramp, &place);
     }
-    Some(Shade { t1, w: place.w, strength, light })
-}
-
-#[inline(always)]
-fn all_dark(values: &Lanes) -> bool {
-    let mut most = values[0];
-    for value in &values[1..] {
-        most = greatest(*value, most);
-    }
-    most <= 0.0
-}
-
-#[inline(always)]
-fn lowest(values: &Lanes) -> f32 {
-    let mut low = values[0];
-    for value in &values[1..] {
-        low = least(*value, low);
-    }
-    low
+    Some(Shade { t1, strength, light })
 }
 
 /// Height w up to which the base burns blue.
@@ -92,38 +69,32 @@ const BLUE_TOP: f32 = 0.45;
 
 /// The blue zone hugs the flame's lower edge, where fuel meets air before soot forms.
 #[inline(always)]
-fn add_base_blue(light: &mut [Lanes; 4], ramp: &Ramp, place: &Place) {
-    for i in 0..LANES {
-        let up = greatest(1.0 - place.w[i] * (1.0 / BLUE_TOP), 0.0);
-        let rim = 0.75f32.mul_add(place.across[i] * place.across[i], 0.25) * greatest(1.0 - place.across[i], 0.0) * 3.0;
-        let amount = up * up * rim * place.coverage[i];
-        for (plane, blue) in light.iter_mut().zip(ramp.base_blue) {
-            plane[i] = blue.mul_add(amount, plane[i]);
-        }
+fn add_base_blue<S: Simd>(light: &mut [Lanes<S>; 4], ramp: &Ramp, place: &Place<S>) {
+    let one = place.w.like(1.0);
+    let up = (one - place.w * one.like(1.0 / BLUE_TOP)).held();
+    let rim = (place.across * place.across).fused(one.like(0.75), one.like(0.25)) * (one - place.across) * one.like(3.0);
+    let amount = up * up * rim * place.coverage;
+    for (plane, blue) in light.iter_mut().zip(ramp.base_blue) {
+        *plane = amount.fused(one.like(blue), *plane);
     }
 }
 
 /// The flat texture square of the paper's pictures 1 to 4.
 #[inline(always)]
-pub(crate) fn shade_flat(shape: &Shape, ramp: &Ramp, sample: &Sample, batch: &Batch, threshold: bool) -> Option<Shade> {
-    let inside = |i: usize| (0.0..=1.0).contains(&batch.x[i]) && (0.0..=1.0).contains(&batch.y[i]);
-    if !(0..LANES).any(inside) {
+fn shade_flat<S: Simd>(shape: &Shape, ramp: &Ramp, sample: &Sample, batch: &Batch<S>, cut: bool) -> Option<Shade<S>> {
+    let (zero, one) = (batch.x.like(0.0), batch.x.like(1.0));
+    let outside = |x: Lanes<S>| (zero - x).greatest(x - one).greatest(zero);
+    let strength = zero.choose(outside(batch.x) + outside(batch.y), zero, one);
+    if !any_positive(strength) {
         return None;
     }
-    let texture = sample.texture.sample(&batch.x, &batch.y);
-    let limit = shape.flat_threshold(&batch.x, &batch.y, &sample.moment.heights);
-    let (mut t1, mut strength) = ([0.0; LANES], [0.0; LANES]);
-    for i in 0..LANES {
-        t1[i] = if threshold { chain::above_threshold(texture[i], limit[i]) } else { texture[i] };
-        strength[i] = if inside(i) { 1.0 } else { 0.0 };
-    }
-    let mut light = ramp.light.sample(&t1);
+    let texture = sample.texture.sample(batch.x, batch.y);
+    let t1 = if cut { chain::above_threshold(texture, shape.flat_threshold(batch.x, batch.y)) } else { texture };
+    let mut light = ramp.light(t1);
     for plane in &mut light {
-        for i in 0..LANES {
-            plane[i] *= strength[i];
-        }
+        *plane = *plane * strength;
     }
-    Some(Shade { t1, w: batch.y, strength, light })
+    Some(Shade { t1, strength, light })
 }
 
 /// Which part of the chain is drawn.
@@ -137,84 +108,94 @@ pub(crate) enum Drawn {
     FlatCut,
 }
 
-/// Mean light and opacity of a row's pixels over the exposure.
-struct RowSums {
-    light: [Vec<f32>; 4],
-    depth: Vec<f32>,
-}
-
-impl RowSums {
-    fn new(width: usize) -> Self {
-        Self { light: std::array::from_fn(|_| vec![0.0; width]), depth: vec![f32::INFINITY; width] }
-    }
-}
-
 /// Draws all samples of one flame into the part `rect` of `strip`, behind what it holds.
 #[inline(always)]
-pub(crate) fn draw_rows(shape: &Shape, ramp: &Ramp, samples: &[Sample], drawn: Drawn, rect: Rect, strip: &mut Strip) {
+pub(crate) fn draw_rows<S: Simd>(
+    simd: S,
+    shape: &Shape,
+    ramp: &Ramp,
+    samples: &[Sample],
+    drawn: Drawn,
+    rect: Rect,
+    strip: &mut Strip,
+) {
     // Batches begin at multiples of sixteen of the whole picture, so that strips and crops change no pixel.
     let start = rect.x / LANES * LANES;
-    let width = (rect.right() - start).div_ceil(LANES) * LANES;
-    let mut sums = RowSums::new(width);
     for y in rect.y..rect.bottom() {
-        let mut touched = false;
-        for offset in (0..width).step_by(LANES) {
-            touched |= add_batch(shape, ramp, samples, drawn, [start + offset, y], offset, &mut sums);
-        }
-        if touched {
-            compose_row(&mut sums, start, y, rect, ramp.absorbs, strip);
+        for column in (start..rect.right()).step_by(LANES) {
+            if let Some(pixels) = expose(simd, shape, ramp, samples, drawn, [column, y]) {
+                compose(&pixels, column, y, rect, ramp.absorbs, strip);
+            }
         }
     }
 }
 
-/// Adds all samples of the sixteen pixels at `pixel`; whether there was anything to add.
+/// Mean light and opacity of sixteen pixels over the exposure, and the nearest depth at which they see flame.
+struct Exposed {
+    light: [[f32; LANES]; 4],
+    depth: [f32; LANES],
+}
+
+/// Averages all samples of the sixteen pixels at `pixel`; `None` where there is nothing.
 #[inline(always)]
-fn add_batch(shape: &Shape, ramp: &Ramp, samples: &[Sample], drawn: Drawn, pixel: [usize; 2], offset: usize, sums: &mut RowSums) -> bool {
+fn expose<S: Simd>(simd: S, shape: &Shape, ramp: &Ramp, samples: &[Sample], drawn: Drawn, pixel: [usize; 2]) -> Option<Exposed> {
+    let mut sums = [Lanes::splat(simd, 0.0); 4];
+    let mut nearest = Lanes::splat(simd, f32::INFINITY);
+    let share = 1.0 / samples.len() as f32;
     let mut touched = false;
     for sample in samples {
-        let batch = sample.mapping.batch(pixel[0], pixel[1]);
+        let batch = sample.mapping.batch(simd, pixel[0], pixel[1]);
         let shade = match drawn {
             Drawn::Flame => shade(shape, ramp, sample, &batch),
-            Drawn::FlatTexture => shade_flat(shape, ramp, sample, &batch, false),
-            Drawn::FlatCut => shade_flat(shape, ramp, sample, &batch, true),
+            Drawn::FlatTexture => flat_out_of_line(shape, ramp, sample, &batch, false),
+            Drawn::FlatCut => flat_out_of_line(shape, ramp, sample, &batch, true),
         };
         let Some(shade) = shade else { continue };
         touched = true;
-        let weights = [sample.luminance, sample.luminance, sample.luminance, 1.0 / samples.len() as f32];
-        for k in 0..4 {
-            let sum = &mut sums.light[k][offset..offset + LANES];
-            for i in 0..LANES {
-                sum[i] = shade.light[k][i].mul_add(weights[k], sum[i]);
-            }
+        for (k, weight) in [sample.luminance, sample.luminance, sample.luminance, share].into_iter().enumerate() {
+            sums[k] = shade.light[k].fused(nearest.like(weight), sums[k]);
         }
-        let depth = &mut sums.depth[offset..offset + LANES];
-        for i in 0..LANES {
-            let something = shade.light[0][i] + shade.light[2][i] + shade.light[3][i] > 0.0;
-            depth[i] = if something { least(batch.depth[i], depth[i]) } else { depth[i] };
-        }
+        let something = shade.light[0] + shade.light[2] + shade.light[3];
+        nearest = nearest.like(0.0).choose(something, nearest.least(batch.depth), nearest);
     }
-    touched
+    if !touched {
+        return None;
+    }
+    let mut exposed = Exposed { light: [[0.0; LANES]; 4], depth: [0.0; LANES] };
+    for k in 0..4 {
+        sums[k].store_slice(&mut exposed.light[k]);
+    }
+    nearest.store_slice(&mut exposed.depth);
+    Some(exposed)
 }
 
-/// Moves a row's sums behind what the strip holds, where the plate does not hide them, and clears them.
+/// The flat stages are rare: kept apart, they do not weigh on the code of the flame.
 #[inline(always)]
-fn compose_row(sums: &mut RowSums, start: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
-    let first = (y - strip.rect.y) * strip.rect.width + rect.x - strip.rect.x;
-    let skip = rect.x - start;
-    let span = skip..skip + rect.width;
-    for i in span.clone() {
-        let index = first + i - skip;
-        // A share of the pixel's samples may see flame outside the plane's near end; depth is then infinite.
-        if sums.depth[i].is_finite() && !strip.visible(index, sums.depth[i]) {
-            for plane in &mut sums.light {
-                plane[i] = 0.0;
+fn flat_out_of_line<S: Simd>(shape: &Shape, ramp: &Ramp, sample: &Sample, batch: &Batch<S>, cut: bool) -> Option<Shade<S>> {
+    batch.x.simd.vectorize(
+        #[inline(always)]
+        || shade_flat(shape, ramp, sample, batch, cut),
+    )
+}
+
+/// Moves sixteen pixels behind what the strip holds, where the plate does not hide them.
+#[inline(always)]
+fn compose(pixels: &Exposed, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
+    let (first, last) = (column.max(rect.x), (column + LANES).min(rect.right()));
+    let lanes = first - column..last - column;
+    let index = (y - strip.rect.y) * strip.rect.width + first - strip.rect.x;
+    let hidden = |strip: &Strip| lanes.clone().any(|lane| !strip.visible(index + lane - lanes.start, pixels.depth[lane].min(f32::MAX)));
+    if strip.has_plate() && hidden(strip) {
+        for lane in lanes.clone().filter(|lane| pixels.depth[*lane].is_finite()) {
+            let index = index + lane - lanes.start;
+            if strip.visible(index, pixels.depth[lane]) {
+                let opacity = [pixels.light[3][lane]];
+                let light = [0, 1, 2].map(|k| &pixels.light[k][lane..lane + 1]);
+                strip.add_row_behind(index, light, absorbs.then_some(&opacity), &pixels.depth[lane..lane + 1]);
             }
-            sums.depth[i] = f32::INFINITY;
         }
+        return;
     }
-    let [red, green, blue, opacity] = &sums.light;
-    let cells = [&red[span.clone()], &green[span.clone()], &blue[span.clone()]];
-    strip.add_row_behind(first, cells, absorbs.then(|| &opacity[span.clone()]), &sums.depth[span.clone()]);
-    sums.light.iter_mut().for_each(|plane| plane.fill(0.0));
-    sums.depth.fill(f32::INFINITY);
+    let light = [&pixels.light[0][lanes.clone()], &pixels.light[1][lanes.clone()], &pixels.light[2][lanes.clone()]];
+    strip.add_row_behind(index, light, absorbs.then_some(&pixels.light[3][lanes.clone()]), &pixels.depth[lanes]);
 }

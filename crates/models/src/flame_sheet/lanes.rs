@@ -1,28 +1,161 @@
-//! Sixteen numbers at a time, as plain arrays: under `fearless_simd::dispatch!` the loops over them become vector code, alone
-//! they are their own scalar twin, bit for bit.
+//! Sixteen numbers at a time, and what they have in common with one: the equations are written once for both.
 
-/// Numbers in a batch.
+use std::ops::{Add, Div, Mul, Sub};
+
+use fearless_simd::{Level, Simd, f32x4, f32x16, prelude::*};
+
+/// Numbers in a batch, whatever the width of the machine's vectors.
 pub(crate) const LANES: usize = 16;
 
+/// One number or a batch of them. Multiply-adds are fused at every vector width, so that all give the same bits.
+pub trait Real: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
+    /// The constant `value`, as wide as `self`.
+    #[must_use]
+    fn like(self, value: f32) -> Self;
+    /// `self * factor + term`, rounded once.
+    #[must_use]
+    fn fused(self, factor: Self, term: Self) -> Self;
+    /// Square root.
+    #[must_use]
+    fn root(self) -> Self;
+    /// Absolute value.
+    #[must_use]
+    fn size(self) -> Self;
+    /// The lesser of two.
+    #[must_use]
+    fn least(self, other: Self) -> Self;
+    /// The greater of two.
+    #[must_use]
+    fn greatest(self, other: Self) -> Self;
+    /// `low` where `self` is below `limit`, else `high`.
+    #[must_use]
+    fn choose(self, limit: Self, low: Self, high: Self) -> Self;
+
+    /// Held to [0, 1].
+    #[must_use]
+    #[inline(always)]
+    fn held(self) -> Self {
+        self.greatest(self.like(0.0)).least(self.like(1.0))
+    }
+}
+
+impl Real for f32 {
+    #[inline(always)]
+    fn like(self, value: f32) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn fused(self, factor: Self, term: Self) -> Self {
+        self.mul_add(factor, term)
+    }
+    #[inline(always)]
+    fn root(self) -> Self {
+        self.sqrt()
+    }
+    #[inline(always)]
+    fn size(self) -> Self {
+        self.abs()
+    }
+    #[inline(always)]
+    fn least(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+    #[inline(always)]
+    fn greatest(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+    #[inline(always)]
+    fn choose(self, limit: Self, low: Self, high: Self) -> Self {
+        if self < limit { low } else { high }
+    }
+}
+
 /// A batch.
-pub(crate) type Lanes = [f32; LANES];
+pub(crate) type Lanes<S> = f32x16<S>;
 
-/// The lesser of two numbers; unlike `f32::min` one instruction, since it need not care for NaN.
-#[inline(always)]
-pub(crate) fn least(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
+impl<S: Simd> Real for Lanes<S> {
+    #[inline(always)]
+    fn like(self, value: f32) -> Self {
+        Self::splat(self.simd, value)
+    }
+    #[inline(always)]
+    fn fused(self, factor: Self, term: Self) -> Self {
+        if has_fused(self.simd.level()) { self.mul_add(factor, term) } else { fused_one_by_one(self, factor, term) }
+    }
+    #[inline(always)]
+    fn root(self) -> Self {
+        self.sqrt()
+    }
+    #[inline(always)]
+    fn size(self) -> Self {
+        self.abs()
+    }
+    #[inline(always)]
+    fn least(self, other: Self) -> Self {
+        self.min(other)
+    }
+    #[inline(always)]
+    fn greatest(self, other: Self) -> Self {
+        self.max(other)
+    }
+    #[inline(always)]
+    fn choose(self, limit: Self, low: Self, high: Self) -> Self {
+        self.simd_lt(limit).select(low, high)
+    }
 }
 
-/// The greater of two numbers; `b` where `a` is NaN.
+/// Whether vectors of this level have a fused multiply-add; known when the code for the level is compiled.
 #[inline(always)]
-pub(crate) fn greatest(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
+fn has_fused(level: Level) -> bool {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    return matches!(level, Level::Avx2(_) | Level::Avx512(_));
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    return !level.is_fallback();
 }
 
-/// `x` held between `low` and `high`; `low` where it is NaN.
+/// The same bits for old processors, slowly; kept out of line, since in line it would multiply the size of everything.
+#[inline(never)]
+fn fused_one_by_one<S: Simd>(value: Lanes<S>, factor: Lanes<S>, term: Lanes<S>) -> Lanes<S> {
+    let mut result = [0.0; LANES];
+    for lane in 0..LANES {
+        result[lane] = value[lane].mul_add(factor[lane], term[lane]);
+    }
+    Lanes::from_slice(value.simd, &result)
+}
+
+/// Runs code with the plainest vectors of the machine: for tests, and to compare with the widest.
+#[cfg(test)]
+macro_rules! plain {
+    ($simd:ident => $code:expr) => {
+        fearless_simd::dispatch!(fearless_simd::Level::baseline(), $simd => $code)
+    };
+}
+#[cfg(test)]
+pub(crate) use plain;
+
+/// `first + step * lane`.
 #[inline(always)]
-pub(crate) fn hold(x: f32, low: f32, high: f32) -> f32 {
-    least(greatest(x, low), high)
+pub(crate) fn ramp<S: Simd>(simd: S, first: f32, step: f32) -> Lanes<S> {
+    const LANE: [f32; LANES] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
+    Lanes::splat(simd, step).fused(Lanes::from_slice(simd, &LANE), Lanes::splat(simd, first))
+}
+
+/// Whether any of the numbers is above 0.
+#[inline(always)]
+pub(crate) fn any_positive<S: Simd>(values: Lanes<S>) -> bool {
+    values.simd_gt(values.like(0.0)).any_true()
+}
+
+/// The first, a middle and the last of the numbers.
+#[inline(always)]
+pub(crate) fn probe<S: Simd>(values: Lanes<S>) -> [f32; 3] {
+    [values[0], values[LANES / 2], values[LANES - 1]]
+}
+
+/// Numbers in even steps from `first` to `last`.
+#[inline(always)]
+pub(crate) fn between<S: Simd>(simd: S, first: f32, last: f32) -> Lanes<S> {
+    ramp(simd, first, (last - first) * (1.0 / (LANES - 1) as f32))
 }
 
 /// 3 * 2^22: adding it to a number below 2^22 in size rounds that to a whole number, which then stands in the low bits of the sum.
@@ -32,14 +165,32 @@ const ROUND: f32 = 12_582_912.0;
 ///
 /// A whole number may come out as the one below with fraction 1, which interpolates to the same.
 #[inline(always)]
-pub(crate) fn wrap_split(place: &Lanes, mask: u32) -> ([u32; LANES], Lanes) {
-    let (mut whole, mut part) = ([0; LANES], [0.0; LANES]);
-    for i in 0..LANES {
-        let rounded = (place[i] - 0.5) + ROUND;
-        whole[i] = rounded.to_bits() & mask;
-        part[i] = place[i] - (rounded - ROUND);
-    }
-    (whole, part)
+pub(crate) fn wrap_split<S: Simd>(place: Lanes<S>, mask: u32) -> (fearless_simd::u32x16<S>, Lanes<S>) {
+    let rounded = (place - place.like(0.5)) + place.like(ROUND);
+    (rounded.to_bits() & mask, place - (rounded - place.like(ROUND)))
+}
+
+/// The nearest whole number of each, from 0 to 2^22.
+#[inline(always)]
+pub(crate) fn nearest_whole<S: Simd>(value: Lanes<S>) -> fearless_simd::u32x16<S> {
+    (value + value.like(ROUND)).to_bits() & 0x003f_ffff
+}
+
+/// Fetches entry `index[lane]` of a table for each lane and turns entries of four into four batches.
+///
+/// `N` is a power of two; indices wrap.
+#[inline(always)]
+pub(crate) fn fetch<S: Simd, const N: usize>(simd: S, table: &[[f32; 4]; N], index: &[u32; LANES]) -> [Lanes<S>; 4] {
+    let quarter = |first: usize| -> [f32x4<S>; 4] {
+        let mut entries = [0.0; 16];
+        for lane in 0..4 {
+            entries[4 * lane..4 * lane + 4].copy_from_slice(&table[index[first + lane] as usize & (N - 1)]);
+        }
+        simd.load_four_interleaved_f32x4(&entries)
+    };
+    let (a, b, c, d) = (quarter(0), quarter(4), quarter(8), quarter(12));
+    let join = |k: usize| a[k].combine(b[k]).combine(c[k].combine(d[k]));
+    [join(0), join(1), join(2), join(3)]
 }
 
 #[cfg(test)]
@@ -49,12 +200,30 @@ mod tests {
     #[test]
     fn whole_and_fraction_make_the_number_again_and_wrap() {
         let place = [0.0, 0.25, 1.0, 1.75, 7.999, 8.0, 9.5, -0.25, -7.5, 511.3, 512.7, 3.0, 2.0, 1000.125, -1.0, 6.5];
-        let (whole, part) = wrap_split(&place, 7);
+        let (whole, part) = plain!(simd => {
+            let (whole, part) = wrap_split(Lanes::from_slice(simd, &place), 7);
+            let (mut wholes, mut parts) = ([0; LANES], [0.0; LANES]);
+            whole.store_slice(&mut wholes);
+            part.store_slice(&mut parts);
+            (wholes, parts)
+        });
         for i in 0..LANES {
             let value = whole[i] as f32 + part[i];
             assert!((0.0..=1.0).contains(&part[i]) && whole[i] < 8);
             let difference = (value - place[i]).rem_euclid(8.0);
             assert!(difference.min(8.0 - difference) < 1e-3, "{} {} {}", place[i], whole[i], part[i]);
+        }
+    }
+
+    #[test]
+    fn fetching_gathers_entries_lane_by_lane() {
+        let table: [[f32; 4]; 32] = std::array::from_fn(|i| std::array::from_fn(|k| (10 * i + k) as f32));
+        let index = std::array::from_fn(|lane| (7 * lane % 32) as u32);
+        let batches = plain!(simd => fetch(simd, &table, &index).map(|batch| batch.as_slice().to_vec()));
+        for lane in 0..LANES {
+            for k in 0..4 {
+                assert_eq!(batches[k][lane], table[index[lane] as usize][k]);
+            }
         }
     }
 }

@@ -6,13 +6,15 @@ use bansho_base::{
     wind::Wind,
 };
 
+use fearless_simd::Simd;
+
 use super::{
     clock::Clock,
     fluctuation::Fluctuation,
-    lanes::{LANES, Lanes},
+    lanes::{Lanes, Real},
     parameters::{FlameSheetParameters, ShapeParameters},
     shape::Shape,
-    tables::{CurveTable, SEGMENTS},
+    tables::{CurvePair, SEGMENTS},
 };
 
 /// The waves of one flame: its edges P (15), its tip's wandering and its height's flicker.
@@ -69,10 +71,10 @@ impl Push {
 /// One flame at one moment.
 #[derive(Clone, Debug)]
 pub(crate) struct Moment {
-    /// E left, E right, V and glow over w.
-    pub(crate) heights: CurveTable<4>,
+    /// E left and right over w.
+    pub(crate) edges: CurvePair,
     /// How far the centre line has moved to the right, in sheet widths, over y.
-    centre: CurveTable<1>,
+    centre: CurvePair,
     /// Least and greatest of that.
     pub(crate) centre_range: [f64; 2],
     /// What y is multiplied by, below 1 while the flame is taller than usual.
@@ -90,14 +92,9 @@ impl Moment {
 
     /// The point of the unbent, usual flame that (x, y) of the sheet shows.
     #[inline(always)]
-    pub(crate) fn straighten(&self, x: &Lanes, y: &Lanes) -> (Lanes, Lanes) {
-        let [centre] = self.centre.sample(y);
-        let (mut straight, mut squeezed) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
-            straight[i] = x[i] - centre[i];
-            squeezed[i] = y[i] * self.squeeze;
-        }
-        (straight, squeezed)
+    pub(crate) fn straighten<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
+        let [centre, _] = self.centre.along(y);
+        (x - centre, y * y.like(self.squeeze))
     }
 
     /// Where the centre line stands at height y, in sheet widths from the axis.
@@ -116,28 +113,28 @@ fn settle(parameters: &FlameSheetParameters, shape: &Shape, motion: &Motion, clo
         // P in [0, 1]; its strength takes it away from 1, where the edge is at its outermost.
         values.map(|value| (0.5 * look.flutter as f32).mul_add(value - 1.0, 1.0))
     };
-    let heights = shape.heights(&edge(&motion.left), &edge(&motion.right));
+    let edges = shape.edges(&edge(&motion.left), &edge(&motion.right));
     let centre = centre_line(parameters, motion, time, push);
     let ends = (0..=16).map(|i| f64::from(centre.at(i as f32 / 16.0)[0]));
     let centre_range = ends.fold([0.0_f64; 2], |[low, high], value| [low.min(value), high.max(value)]);
     let flicker = look.flicker * f64::from(motion.flicker.at(time));
     // Sheets leave headroom for growth: at rest the flame reaches 1 / (1 + flicker) of the sheet.
     let squeeze = ((1.0 + look.flicker) / (1.0 + flicker)) as f32;
-    Moment { heights, centre, centre_range, squeeze, scroll }
+    Moment { edges, centre, centre_range, squeeze, scroll }
 }
 
 /// Drift grows like y^1.5, as gas that is pushed evenly while it accelerates upward; sway travels up with the gas.
 #[inline(always)]
-fn centre_line(parameters: &FlameSheetParameters, motion: &Motion, time: f64, push: Push) -> CurveTable<1> {
+fn centre_line(parameters: &FlameSheetParameters, motion: &Motion, time: f64, push: Push) -> CurvePair {
     /// How long a swing takes from base to tip, as a share of its period.
     const LAG: f64 = 0.6;
     let look = &parameters.shape;
     let bend = push.across * parameters.height / parameters.width / 1.5;
     let mut swings = [0.0; SEGMENTS + 1];
     motion.sway.fill(time, -LAG / look.sway_hz / SEGMENTS as f64, &mut swings);
-    CurveTable::from_samples(|i| {
+    CurvePair::from_samples(|i| {
         let y = i as f32 / SEGMENTS as f32;
         let drift = y * y.sqrt();
-        [drift * (look.sway as f32).mul_add(swings[i], bend as f32)]
+        [drift * (look.sway as f32).mul_add(swings[i], bend as f32), 0.0]
     })
 }

@@ -6,7 +6,9 @@ use bansho_base::{
     math::{DVec2, DVec3},
 };
 
-use super::lanes::{LANES, Lanes};
+use fearless_simd::{Simd, prelude::*};
+
+use super::lanes::{LANES, Lanes, Real, ramp};
 
 /// An upright rectangle in the world: x in [0, 1] across, y in [0, 1] up.
 #[derive(Clone, Copy, Debug)]
@@ -46,13 +48,13 @@ impl Stand {
 
 /// Coordinates of a batch of sixteen pixels of a row on the sheet.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Batch {
+pub(crate) struct Batch<S: Simd> {
     /// Across the sheet.
-    pub(crate) x: Lanes,
+    pub(crate) x: Lanes<S>,
     /// Up the sheet; far outside where the pixel does not see the sheet's plane.
-    pub(crate) y: Lanes,
+    pub(crate) y: Lanes<S>,
     /// Depth as the lens measures it, m.
-    pub(crate) depth: Lanes,
+    pub(crate) depth: Lanes<S>,
 }
 
 /// A y that lies outside every flame.
@@ -106,35 +108,43 @@ impl Mapping {
 
     /// Sheet coordinates of the pixels `column .. column + 16` of `row`.
     #[inline(always)]
-    pub(crate) fn batch(&self, column: usize, row: usize) -> Batch {
+    pub(crate) fn batch<S: Simd>(&self, simd: S, column: usize, row: usize) -> Batch<S> {
         match self {
-            Self::Linear { forms, near } => linear_batch(forms, *near, column, row),
-            Self::Rays { camera, stand } => ray_batch(camera, stand, column, row),
+            Self::Linear { forms, near } => linear_batch(simd, forms, *near, column, row),
+            Self::Rays { camera, stand } => ray_batch(camera, stand, column, row).load(simd),
         }
     }
 }
 
 #[inline(always)]
-fn linear_batch(forms: &[[f64; 3]; 3], near: f64, column: usize, row: usize) -> Batch {
+fn linear_batch<S: Simd>(simd: S, forms: &[[f64; 3]; 3], near: f64, column: usize, row: usize) -> Batch<S> {
     let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
-    let (mut start, mut step) = ([0.0_f32; 3], [0.0_f32; 3]);
-    for k in 0..3 {
-        let [constant, a, b] = forms[k];
-        start[k] = a.mul_add(px, b.mul_add(py, constant)) as f32;
-        step[k] = a as f32;
+    let value = |[constant, a, b]: [f64; 3]| ramp(simd, (a * px + b * py + constant) as f32, a as f32);
+    let inverse = value(forms[2]);
+    let depth = inverse.like(1.0) / inverse;
+    // A depth beyond `near` is an inverse depth in (0, 1/near].
+    let seen = inverse.simd_gt(inverse.like(0.0)) & inverse.simd_le(inverse.like((1.0 / near) as f32));
+    Batch {
+        x: seen.select(value(forms[0]) * depth, depth.like(0.0)),
+        y: seen.select(value(forms[1]) * depth, depth.like(NOWHERE)),
+        depth: seen.select(depth, depth.like(f32::INFINITY)),
     }
-    // A positive depth beyond `near` is an inverse depth in (0, 1/near].
-    let nearest = (1.0 / near) as f32;
-    let mut batch = Batch { x: [0.0; LANES], y: [NOWHERE; LANES], depth: [f32::INFINITY; LANES] };
-    for i in 0..LANES {
-        let inverse = step[2].mul_add(i as f32, start[2]);
-        let depth = 1.0 / inverse;
-        let seen = inverse > 0.0 && inverse <= nearest;
-        batch.x[i] = if seen { step[0].mul_add(i as f32, start[0]) * depth } else { 0.0 };
-        batch.y[i] = if seen { step[1].mul_add(i as f32, start[1]) * depth } else { NOWHERE };
-        batch.depth[i] = if seen { depth } else { f32::INFINITY };
+}
+
+/// A batch as plain numbers.
+#[derive(Debug)]
+struct Traced {
+    x: [f32; LANES],
+    y: [f32; LANES],
+    depth: [f32; LANES],
+}
+
+impl Traced {
+    #[inline(always)]
+    fn load<S: Simd>(&self, simd: S) -> Batch<S> {
+        let [x, y, depth] = [&self.x, &self.y, &self.depth].map(|values| Lanes::from_slice(simd, values));
+        Batch { x, y, depth }
     }
-    batch
 }
 
 /// Where the ray of a pixel meets the sheet's plane: x, y, depth.
@@ -151,9 +161,9 @@ fn meet(camera: &Camera, stand: &Stand, px: f64, py: f64) -> Option<[f64; 3]> {
 
 /// Rays are traced for three pixels of a batch; a parabola through them misses the others by less than a thousandth of a pixel
 /// wherever the sheet is small in the lens, and pixels are traced one by one where one of the three sees nothing or the parabola bends much.
-fn ray_batch(camera: &Camera, stand: &Stand, column: usize, row: usize) -> Batch {
+fn ray_batch(camera: &Camera, stand: &Stand, column: usize, row: usize) -> Traced {
     let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
-    let mut batch = Batch { x: [0.0; LANES], y: [NOWHERE; LANES], depth: [f32::INFINITY; LANES] };
+    let mut batch = Traced { x: [0.0; LANES], y: [NOWHERE; LANES], depth: [f32::INFINITY; LANES] };
     let knots = [0.0, 7.5, 15.0].map(|step| meet(camera, stand, px + step, py));
     let gentle = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| {
         (a[2] - 2.0 * b[2] + c[2]).abs() < 0.002 * b[2] && (a[2] - c[2]).abs() < 0.1 * b[2]
@@ -209,6 +219,7 @@ pub(crate) fn bounds(camera: &Camera, stand: &Stand, left: f64, right: f64, top:
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flame_sheet::lanes::plain;
     use bansho_base::{animation::Animated, camera::CameraParameters};
 
     fn camera(lens: Lens) -> Camera {
@@ -220,6 +231,17 @@ mod tests {
             ..CameraParameters::default()
         };
         parameters.at(0.0, [640, 480])
+    }
+
+    fn seen_batch(mapping: &Mapping, column: usize, row: usize) -> Traced {
+        plain!(simd => {
+            let batch = mapping.batch(simd, column, row);
+            let mut traced = Traced { x: [0.0; LANES], y: [0.0; LANES], depth: [0.0; LANES] };
+            batch.x.store_slice(&mut traced.x);
+            batch.y.store_slice(&mut traced.y);
+            batch.depth.store_slice(&mut traced.depth);
+            traced
+        })
     }
 
     fn stand(camera: &Camera) -> Stand {
@@ -246,7 +268,7 @@ mod tests {
             for (x, y) in [(0.5, 0.0), (0.1, 0.3), (0.9, 0.95), (0.5, 0.5)] {
                 let seen = camera.project(stand.point(x, y)).unwrap();
                 let column = (seen.pixel.x - 0.5).floor() as usize;
-                let batch = mapping.batch(column & !15, (seen.pixel.y - 0.5).round() as usize);
+                let batch = seen_batch(&mapping, column & !15, (seen.pixel.y - 0.5).round() as usize);
                 let lane = column & 15;
                 let pixel = 1.0 / (seen.pixels_per_metre * 1.0);
                 assert!((f64::from(batch.x[lane]) - x).abs() < 1.2 * pixel, "{lens:?} {x} {y} {batch:?}");
@@ -263,7 +285,7 @@ mod tests {
         let mapping = Mapping::new(&camera, &stand).unwrap();
         let middle = camera.project(stand.point(0.5, 0.5)).unwrap().pixel;
         let (column, row) = (middle.x as usize & !15, middle.y as usize);
-        let batch = mapping.batch(column, row);
+        let batch = seen_batch(&mapping, column, row);
         for i in 0..LANES {
             let [x, y, _] = meet(&camera, &stand, (column + i) as f64 + 0.5, row as f64 + 0.5).unwrap();
             assert!((f64::from(batch.x[i]) - x).abs() < 2e-4 && (f64::from(batch.y[i]) - y).abs() < 2e-4);
@@ -275,7 +297,7 @@ mod tests {
         let camera = camera(Lens::Perspective);
         let base = camera.position + camera.orientation.col(2) * 2.0 - DVec3::Y;
         let behind = Stand::new(base, right_facing(&camera, base), DVec2::ONE, 0.0);
-        let batch = Mapping::new(&camera, &behind).unwrap().batch(320, 240);
+        let batch = seen_batch(&Mapping::new(&camera, &behind).unwrap(), 320, 240);
         assert!(batch.y.iter().all(|y| *y == NOWHERE));
     }
 

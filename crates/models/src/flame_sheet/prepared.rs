@@ -69,7 +69,7 @@ impl Prepared for PreparedSheet<'_> {
         for part in self.parts.iter().filter(|part| slice.contains(part.depth)) {
             let rect = part.rect.intersection(&strip.rect);
             if !rect.is_empty() {
-                fearless_simd::dispatch!(self.level, _simd => draw_rows(shape, ramp, &part.samples, drawn, rect, strip));
+                fearless_simd::dispatch!(self.level, simd => draw_rows(simd, shape, ramp, &part.samples, drawn, rect, strip));
             }
         }
     }

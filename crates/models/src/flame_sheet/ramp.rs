@@ -5,20 +5,26 @@ use bansho_base::{
     math,
 };
 
+use fearless_simd::{Simd, prelude::*};
+
 use super::{
     parameters::{ColourParameters, Colouring, StageShown, TextureParameters},
     shape::from_origin,
-    tables::CurveTable,
+    lanes::{LANES, Lanes, Real, fetch, nearest_whole},
+    tables::CurvePair,
 };
 use crate::fault::ParameterFault;
+
+/// Steps of T1; finer than a display can show, so that the nearest serves.
+const LEVELS: usize = 4096;
 
 /// Light and soot over T1.
 #[derive(Clone, Debug)]
 pub(crate) struct Ramp {
-    /// Red, green, blue (ACEScg, the brightest of luminance 1) and opacity, over T1.
-    pub(crate) light: CurveTable<4>,
-    /// T2, soot temperature in K and optical depth, over T1: what AOVs say.
-    pub(crate) matter: CurveTable<3>,
+    /// Red, green, blue (ACEScg, the brightest of luminance 1) and opacity over T1, the nearest of many.
+    light: Box<[[f32; 4]; LEVELS]>,
+    /// Soot temperature in K and optical depth over T1: what AOVs say.
+    pub(crate) matter: CurvePair,
     /// Whether there is any soot to hide what is behind.
     pub(crate) absorbs: bool,
     /// Light of the blue zone at the base, ACEScg of luminance 1 times its share.
@@ -80,14 +86,33 @@ impl Ramp {
             }
         };
         Ok(Self {
-            light: CurveTable::new(light),
-            matter: CurveTable::new(|t1| {
+            light: levels(light),
+            matter: CurvePair::new(|t1| {
                 let t2 = sharpen.eval(t1);
-                [t2, temperature(colour, t2), colour.soot_optical_depth * t2]
+                [temperature(colour, t2), colour.soot_optical_depth * t2]
             }),
             absorbs: colour.soot_optical_depth > 0.0 || stage != StageShown::Flame,
             base_blue: base_blue().map(|value| value * colour.base_blue as f32),
         })
+    }
+}
+
+fn levels(light: impl Fn(f64) -> [f64; 4]) -> Box<[[f32; 4]; LEVELS]> {
+    let mut levels = Box::new([[0.0; 4]; LEVELS]);
+    for (i, level) in levels.iter_mut().enumerate() {
+        *level = light(i as f64 / (LEVELS - 1) as f64).map(|value| value as f32);
+    }
+    levels
+}
+
+impl Ramp {
+    /// Red, green, blue of luminance up to 1 and opacity at T1.
+    #[inline(always)]
+    pub(crate) fn light<S: Simd>(&self, t1: Lanes<S>) -> [Lanes<S>; 4] {
+        let place = t1.held() * t1.like((LEVELS - 1) as f32);
+        let mut index = [0; LANES];
+        nearest_whole(place).store_slice(&mut index);
+        fetch(t1.simd, &self.light, &index)
     }
 }
 

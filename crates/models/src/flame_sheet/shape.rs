@@ -5,11 +5,13 @@ use bansho_base::{
     random::Key,
 };
 
+use fearless_simd::Simd;
+
 use super::{
     chain,
-    lanes::{LANES, Lanes, greatest, hold, least},
+    lanes::{Lanes, Real, any_positive},
     parameters::{ColourParameters, ShapeParameters, TextureParameters},
-    tables::CurveTable,
+    tables::{CurvePair, locate},
 };
 use crate::fault::{FaultKind, ParameterFault};
 
@@ -22,13 +24,13 @@ pub(crate) struct Shape {
     initial_speed: f32,
     edge_speed: f32,
     /// A and D over w.
-    widths: CurveTable<2>,
+    widths: CurvePair,
     /// F over the place in the fringe.
-    falling: CurveTable<1>,
+    falling: CurvePair,
     /// H over u'.
-    across: CurveTable<1>,
-    /// V and the glow over w, at the places of a table.
-    height_samples: Vec<[f32; 2]>,
+    across: CurvePair,
+    /// V and the glow over w.
+    heights: CurvePair,
     /// A and D over w, at the places of a table.
     width_samples: Vec<[f32; 2]>,
     /// Greatest x' at which there may be flame, over y.
@@ -71,19 +73,19 @@ fn samples(first: &Curve, second: &Curve) -> Vec<[f32; 2]> {
 }
 
 /// Where sixteen points lie in the flame.
-pub(crate) struct Place {
+pub(crate) struct Place<S: Simd> {
     /// Texture coordinate u.
-    pub(crate) u: Lanes,
+    pub(crate) u: Lanes<S>,
     /// Height w of the slowed rise.
-    pub(crate) w: Lanes,
+    pub(crate) w: Lanes<S>,
     /// u' of eq. (16).
-    pub(crate) across: Lanes,
+    pub(crate) across: Lanes<S>,
     /// Threshold L, eq. (4).
-    pub(crate) threshold: Lanes,
+    pub(crate) threshold: Lanes<S>,
     /// Brightness and soot at that height.
-    pub(crate) glow: Lanes,
+    pub(crate) glow: Lanes<S>,
     /// Share of the pixel that lies inside; 0 outside.
-    pub(crate) coverage: Lanes,
+    pub(crate) coverage: Lanes<S>,
 }
 
 impl Shape {
@@ -98,10 +100,10 @@ impl Shape {
         let mut result = Self {
             initial_speed: shape.initial_speed as f32,
             edge_speed: shape.edge_speed as f32,
-            widths: CurveTable::from_samples(|i| width_samples[i]),
-            falling: CurveTable::new(|place| [1.0 - shape.slowing.eval(place)]),
-            across: CurveTable::new(|across| [texture.threshold_across.eval(across)]),
-            height_samples: samples(&texture.threshold, &colour.glow),
+            widths: CurvePair::from_samples(|i| width_samples[i]),
+            falling: CurvePair::new(|place| [1.0 - shape.slowing.eval(place), 0.0]),
+            across: CurvePair::new(|across| [texture.threshold_across.eval(across), 0.0]),
+            heights: CurvePair::new(|w| [texture.threshold.eval(w), colour.glow.eval(w)]),
             width_samples,
             reach: Box::new([1.0; REACH_BINS]),
         };
@@ -109,110 +111,93 @@ impl Shape {
         Ok(result)
     }
 
-    /// The time-dependent edges beside the threshold and the glow, over w: E left, E right, V, glow; eq. (15).
-    pub(crate) fn heights(&self, flutter_left: &[f32], flutter_right: &[f32]) -> CurveTable<4> {
-        CurveTable::from_samples(|i| {
+    /// The fluttering edges left and right, over w, eq. (15).
+    #[inline(always)]
+    pub(crate) fn edges(&self, flutter_left: &[f32], flutter_right: &[f32]) -> CurvePair {
+        CurvePair::from_samples(|i| {
             let [core, fringe] = self.width_samples[i];
-            let [vertical, glow] = self.height_samples[i];
-            let edge = |flutter: f32| chain::fluttering_edge(core, fringe, flutter);
-            [edge(flutter_left[i]), edge(flutter_right[i]), vertical, glow]
+            [flutter_left[i], flutter_right[i]].map(|flutter| chain::fluttering_edge(core, fringe, flutter))
         })
     }
 
-    /// Rise, profile and slowed rise, eqs. (9) to (12).
+    /// Rise, profile and slowed rise, eqs. (9) to (12), and whether all points lie in the core.
     #[inline(always)]
-    fn slowed_rise(&self, distance: &Lanes, y: &Lanes) -> Lanes {
-        let mut rise = [0.0; LANES];
-        for i in 0..LANES {
-            rise[i] = chain::rise(y[i], self.initial_speed);
+    fn slowed_rise<S: Simd>(&self, distance: Lanes<S>, y: Lanes<S>) -> (Lanes<S>, bool) {
+        let rise = chain::rise(y, self.initial_speed);
+        let [core, fringe] = self.widths.along(rise);
+        if !any_positive(distance - core) {
+            return (rise, true);
         }
-        let [core, fringe] = self.widths.sample(&rise);
-        let mut furthest = -1.0;
-        for i in 0..LANES {
-            furthest = greatest(distance[i] - core[i], furthest);
+        let [falling, _] = self.falling.sample(chain::fringe_place(distance, core, fringe));
+        (chain::slowed_rise(rise, chain::speed_profile(falling, self.edge_speed)), false)
+    }
+
+    /// Edges, threshold V and glow at heights w.
+    #[inline(always)]
+    fn at_heights<S: Simd>(&self, w: Lanes<S>, edges: &CurvePair, core: bool) -> ([Lanes<S>; 2], [Lanes<S>; 2]) {
+        if core {
+            return (edges.along(w), self.heights.along(w));
         }
-        if furthest <= 0.0 {
-            return rise;
-        }
-        let mut place = [0.0; LANES];
-        for i in 0..LANES {
-            place[i] = chain::fringe_place(distance[i], core[i], fringe[i]);
-        }
-        let [falling] = self.falling.sample(&place);
-        let mut slowed = [0.0; LANES];
-        for i in 0..LANES {
-            slowed[i] = chain::slowed_rise(rise[i], chain::speed_profile(falling[i], self.edge_speed));
-        }
-        slowed
+        let height = locate(w);
+        (edges.fetch(&height), self.heights.fetch(&height))
+    }
+
+    /// The same for one point.
+    pub(crate) fn slowed_rise_at(&self, distance: f32, y: f32) -> f32 {
+        let rise = chain::rise(y, self.initial_speed);
+        let [core, fringe] = self.widths.at(rise);
+        let [falling, _] = self.falling.at(chain::fringe_place(distance, core, fringe));
+        chain::slowed_rise(rise, chain::speed_profile(falling, self.edge_speed))
     }
 
     /// The whole mapping, eqs. (9) to (18), and the threshold, eq. (4), for points of the unit square.
     ///
     /// `pixel` is the size of a pixel in x' and in y, over which edges are softened. `None` where all lie outside.
     #[inline(always)]
-    pub(crate) fn place(&self, x: &Lanes, y: &Lanes, heights: &CurveTable<4>, pixel: [f32; 2]) -> Option<Place> {
-        let (mut distance, mut inside_y) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
-            distance[i] = chain::axis_distance(x[i]);
-            inside_y[i] = hold(y[i], 0.0, 1.0);
-        }
-        if self.out_of_reach(&distance, y) {
+    pub(crate) fn place<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>, edges: &CurvePair, pixel: [f32; 2]) -> Option<Place<S>> {
+        let distance = chain::axis_distance(x);
+        let (w, core) = self.slowed_rise(distance, y.held());
+        let ([left, right], [vertical, glow]) = self.at_heights(w, edges, core);
+        let (half, one) = (x.like(0.5), x.like(1.0));
+        let edge = x.choose(half, left, right);
+        let (per_pixel_across, per_pixel_up) = (x.like(1.0 / pixel[0]), x.like(1.0 / pixel[1]));
+        let side = (edge - distance).fused(per_pixel_across, half).held();
+        let bottom = y.fused(per_pixel_up, half).held();
+        let top = (one - w).fused(per_pixel_up, half).held();
+        let coverage = side * bottom * top;
+        if !any_positive(coverage) {
             return None;
         }
-        let w = self.slowed_rise(&distance, &inside_y);
-        let [left, right, vertical, glow] = heights.sample(&w);
-        let per_pixel = [1.0 / pixel[0], 1.0 / pixel[1]];
-        let mut place = Place { u: w, w, across: w, threshold: w, glow, coverage: w };
-        for i in 0..LANES {
-            let edge = if x[i] < 0.5 { left[i] } else { right[i] };
-            place.across[i] = chain::across(distance[i], edge);
-            place.u[i] = chain::texture_u(least(place.across[i], 1.0), x[i]);
-            let side = hold((edge - distance[i]).mul_add(per_pixel[0], 0.5), 0.0, 1.0);
-            let bottom = hold(y[i].mul_add(per_pixel[1], 0.5), 0.0, 1.0);
-            let top = hold((1.0 - w[i]).mul_add(per_pixel[1], 0.5), 0.0, 1.0);
-            place.coverage[i] = side * bottom * top;
-        }
-        let [horizontal] = self.across.sample(&place.across);
-        for i in 0..LANES {
-            place.threshold[i] = chain::threshold(vertical[i], horizontal[i]);
-        }
-        Some(place)
+        let across = chain::across(distance, edge).least(one);
+        let [horizontal, _] = self.across.sample(across);
+        let threshold = chain::threshold(vertical, horizontal);
+        Some(Place { u: chain::texture_u(across, x), w, across, threshold, glow, coverage })
     }
 
     /// The threshold, eq. (4), over the flat texture square.
     #[inline(always)]
-    pub(crate) fn flat_threshold(&self, u: &Lanes, w: &Lanes, heights: &CurveTable<4>) -> Lanes {
-        let [_, _, vertical, _] = heights.sample(w);
-        let mut distance = [0.0; LANES];
-        for i in 0..LANES {
-            distance[i] = chain::axis_distance(u[i]);
-        }
-        let [horizontal] = self.across.sample(&distance);
-        let mut threshold = [0.0; LANES];
-        for i in 0..LANES {
-            threshold[i] = chain::threshold(vertical[i], horizontal[i]);
-        }
-        threshold
+    pub(crate) fn flat_threshold<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
+        let [vertical, _] = self.heights.sample(w);
+        let [horizontal, _] = self.across.sample(chain::axis_distance(u));
+        chain::threshold(vertical, horizontal)
     }
 
-    /// Whether no point of a batch, along a row or nearly, can lie in the flame.
+    /// Whether no point of a row of pixels whose ends and middle are given, x from the centre line, can lie in the flame.
     #[inline(always)]
-    fn out_of_reach(&self, distance: &Lanes, y: &Lanes) -> bool {
-        let (mut low, mut high, mut nearest) = (y[0], y[0], distance[0]);
-        for i in 1..LANES {
-            low = least(y[i], low);
-            high = greatest(y[i], high);
-            nearest = least(distance[i], nearest);
+    pub(crate) fn out_of_reach(&self, x: [f32; 3], y: [f32; 3]) -> bool {
+        /// Beyond this a pixel does not see the sheet's plane, and its neighbours say nothing of it.
+        const UNSEEN: f32 = -1e5;
+        if y[0].least(y[1]).least(y[2]) < UNSEEN {
+            return false;
         }
+        let (low, high) = (y[0].least(y[2]), y[0].greatest(y[2]));
         if !(high > -0.1 && low < 1.1) {
             return true;
         }
-        let bin = |y: f32| hold(y * REACH_BINS as f32, 0.0, (REACH_BINS - 1) as f32) as usize;
-        let mut within = false;
-        for reach in &self.reach[bin(low)..=bin(high)] {
-            within |= nearest <= *reach;
-        }
-        !within
+        let straddles = (x[0] - 0.5) * (x[2] - 0.5) <= 0.0;
+        let nearest = if straddles { 0.0 } else { chain::axis_distance(x[0]).least(chain::axis_distance(x[2])) };
+        let bin = |y: f32| (y.held() * (REACH_BINS - 1) as f32) as i32 as usize & (REACH_BINS - 1);
+        !self.reach[bin(low)..bin(high) + 1].iter().any(|reach| nearest <= *reach)
     }
 
     /// For each piece of height the greatest x' with w <= 1 and within the fringe, with a margin for soft edges.
@@ -222,19 +207,17 @@ impl Shape {
         let widest_above = self.widest_above();
         let mut reach = Box::new([0.0_f32; REACH_BINS]);
         for edge in 0..=REACH_BINS {
-            let y = edge as f32 / REACH_BINS as f32;
+            let y = (edge as f32 / (REACH_BINS - 1) as f32).min(1.0);
             let mut far = 0.0_f32;
-            for step in 0..STEPS / LANES {
-                let distance: Lanes = std::array::from_fn(|i| (step * LANES + i + 1) as f32 / STEPS as f32);
-                let w = self.slowed_rise(&distance, &[y; LANES]);
-                for i in 0..LANES {
-                    let row = ((w[i] * (widest_above.len() - 1) as f32) as usize).min(widest_above.len() - 1);
-                    if w[i] <= 1.05 && distance[i] <= widest_above[row] + MARGIN {
-                        far = far.max(distance[i] + MARGIN);
-                    }
+            for step in 1..=STEPS {
+                let distance = step as f32 / STEPS as f32;
+                let w = self.slowed_rise_at(distance, y);
+                let row = ((w * (widest_above.len() - 1) as f32) as usize).min(widest_above.len() - 1);
+                if w <= 1.05 && distance <= widest_above[row] + MARGIN {
+                    far = far.max(distance + MARGIN);
                 }
             }
-            for bin in [edge.saturating_sub(1), edge.min(REACH_BINS - 1)] {
+            for bin in edge.saturating_sub(1)..=edge.min(REACH_BINS - 1) {
                 reach[bin] = reach[bin].max(far);
             }
         }

@@ -1,72 +1,109 @@
-//! Curves over [0, 1] as tables, several side by side so that one load fetches all that is needed at one place.
+//! Curves over [0, 1] as tables, two side by side so that one load fetches both at one place.
 
-use super::lanes::{LANES, Lanes, hold, wrap_split};
+use fearless_simd::{Simd, prelude::*};
+
+use super::lanes::{LANES, Lanes, Real, between, fetch, probe, wrap_split};
 
 /// Straight pieces of a table.
 pub(crate) const SEGMENTS: usize = 512;
 /// The greatest place below 1, so that the last piece serves the end too.
 const LAST: f32 = 1.0 - f32::EPSILON / 2.0;
 
-/// `K` functions of one variable in [0, 1]: for each piece, value and rise of each function.
+/// Two functions of one variable in [0, 1]: for each piece, value and rise of the first, then of the second.
 #[derive(Clone, Debug)]
-pub(crate) struct CurveTable<const K: usize> {
-    pieces: Box<[[[f32; 2]; K]; SEGMENTS]>,
+pub(crate) struct CurvePair {
+    pieces: Box<[[f32; 4]; SEGMENTS]>,
 }
 
-impl<const K: usize> CurveTable<K> {
-    /// The table of what `values` gives at each of the `SEGMENTS + 1` places `x`.
-    pub(crate) fn new(mut values: impl FnMut(f64) -> [f64; K]) -> Self {
-        Self::from_samples(|i| values(i as f64 / SEGMENTS as f64).map(|value| value as f32))
+/// Pieces of a table and the places in them.
+pub(crate) struct Located<S: Simd> {
+    piece: [u32; LANES],
+    part: Lanes<S>,
+}
+
+/// Where sixteen places lie in any table; they are held to [0, 1].
+#[inline(always)]
+pub(crate) fn locate<S: Simd>(x: Lanes<S>) -> Located<S> {
+    let place = x.greatest(x.like(0.0)).least(x.like(LAST)) * x.like(SEGMENTS as f32);
+    let (piece, part) = wrap_split(place, SEGMENTS as u32 - 1);
+    let mut pieces = [0; LANES];
+    piece.store_slice(&mut pieces);
+    Located { piece: pieces, part }
+}
+
+impl CurvePair {
+    /// The table of what `values` gives at each of the `SEGMENTS + 1` places x.
+    pub(crate) fn new(mut values: impl FnMut(f64) -> [f64; 2]) -> Self {
+        Self::from_samples(|i| {
+            let [first, second] = values(i as f64 / SEGMENTS as f64);
+            [first as f32, second as f32]
+        })
     }
 
     /// The table of samples by their index, 0 to `SEGMENTS`.
-    pub(crate) fn from_samples(mut sample: impl FnMut(usize) -> [f32; K]) -> Self {
-        let mut pieces = Box::new([[[0.0; 2]; K]; SEGMENTS]);
+    #[inline(always)]
+    pub(crate) fn from_samples(mut sample: impl FnMut(usize) -> [f32; 2]) -> Self {
+        let mut pieces = Box::new([[0.0; 4]; SEGMENTS]);
         let mut low = sample(0);
         for (i, piece) in pieces.iter_mut().enumerate() {
             let high = sample(i + 1);
-            for k in 0..K {
-                piece[k] = [low[k], high[k] - low[k]];
-            }
+            *piece = [low[0], high[0] - low[0], low[1], high[1] - low[1]];
             low = high;
         }
         Self { pieces }
     }
 
-    /// All functions at sixteen places, which are held to [0, 1].
+    /// Both functions at located places.
     #[inline(always)]
-    pub(crate) fn sample(&self, x: &Lanes) -> [Lanes; K] {
-        let mut place = [0.0; LANES];
-        for i in 0..LANES {
-            place[i] = hold(x[i], 0.0, LAST) * SEGMENTS as f32;
-        }
-        let (index, part) = wrap_split(&place, SEGMENTS as u32 - 1);
-        let mut pieces = [[[0.0; 2]; K]; LANES];
-        for i in 0..LANES {
-            pieces[i] = self.pieces[index[i] as usize & (SEGMENTS - 1)];
-        }
-        let mut values = [[0.0; LANES]; K];
-        for k in 0..K {
-            for i in 0..LANES {
-                values[k][i] = pieces[i][k][1].mul_add(part[i], pieces[i][k][0]);
-            }
-        }
-        values
+    pub(crate) fn fetch<S: Simd>(&self, at: &Located<S>) -> [Lanes<S>; 2] {
+        let [first, first_rise, second, second_rise] = fetch(at.part.simd, &self.pieces, &at.piece);
+        [first_rise.fused(at.part, first), second_rise.fused(at.part, second)]
     }
 
-    /// All functions at one place.
-    pub(crate) fn at(&self, x: f32) -> [f32; K] {
-        self.sample(&[x; LANES]).map(|lanes| lanes[0])
+    /// Both functions at sixteen places.
+    #[inline(always)]
+    pub(crate) fn sample<S: Simd>(&self, x: Lanes<S>) -> [Lanes<S>; 2] {
+        self.fetch(&locate(x))
+    }
+
+    /// Both functions at places that hardly change within the batch, as heights along a row of pixels do.
+    ///
+    /// Between the ends they are taken as straight; where the places change too much for that, each is looked up.
+    #[inline(always)]
+    pub(crate) fn along<S: Simd>(&self, x: Lanes<S>) -> [Lanes<S>; 2] {
+        /// Change of place within which every curve is straight to a few millionths.
+        const LITTLE: f32 = 2.0 / SEGMENTS as f32;
+        let [first, middle, last] = probe(x);
+        let bend = middle - (last - first).mul_add((LANES / 2) as f32 / (LANES - 1) as f32, first);
+        if (last - first).size() > LITTLE || bend.size() > 0.1 * LITTLE {
+            return x.simd.vectorize(
+                #[inline(always)]
+                || self.sample(x),
+            );
+        }
+        let (low, high) = (self.at(first), self.at(last));
+        [between(x.simd, low[0], high[0]), between(x.simd, low[1], high[1])]
+    }
+
+    /// Both functions at one place.
+    #[inline(always)]
+    pub(crate) fn at(&self, x: f32) -> [f32; 2] {
+        let place = x.greatest(0.0).least(LAST) * SEGMENTS as f32;
+        let piece = place as i32;
+        let part = place - piece as f32;
+        let [first, first_rise, second, second_rise] = self.pieces[piece as usize & (SEGMENTS - 1)];
+        [first_rise.mul_add(part, first), second_rise.mul_add(part, second)]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flame_sheet::lanes::plain;
 
     #[test]
     fn a_table_holds_its_ends_and_is_straight_between_samples() {
-        let table = CurveTable::new(|x| [x, 1.0 - x * x]);
+        let table = CurvePair::new(|x| [x, 1.0 - x * x]);
         assert_eq!((table.at(0.0), table.at(-3.0)), ([0.0, 1.0], [0.0, 1.0]));
         let end = table.at(7.0);
         assert!((end[0] - 1.0).abs() < 1e-6 && end[1].abs() < 1e-5);
@@ -74,6 +111,8 @@ mod tests {
             let x = i as f32 / 999.0;
             let [line, parabola] = table.at(x);
             assert!((line - x).abs() < 1e-6 && (parabola - (1.0 - x * x)).abs() < 2e-6);
+            let batch = plain!(simd => table.sample(Lanes::splat(simd, x)).map(|values| values[7]));
+            assert!((batch[0] - line).abs() < 1e-6 && (batch[1] - parabola).abs() < 1e-6);
         }
     }
 }

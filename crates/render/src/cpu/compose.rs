@@ -6,7 +6,7 @@ use bansho_base::{
     observer::{self, Cancelled, Observer},
     phenomenon::{Phenomenon, Prepared},
 };
-use fearless_simd::Level;
+use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{accumulate::Accumulator, plate::PlateFrame};
@@ -101,7 +101,7 @@ pub(super) fn frame(
             observer::check(observer)?;
             let rect = composition.strip_rect(index);
             composition.accumulate(level, composition.slices, rect, worker);
-            finish_strip(composition, &worker.accumulator, beauty, depth);
+            finish_strip(composition, level, &worker.accumulator, beauty, depth);
             Ok(channel_planes(composition, &worker.accumulator))
         })
         .collect::<Result<_, Cancelled>>()?;
@@ -110,29 +110,60 @@ pub(super) fn frame(
 }
 
 /// Exposes the strip, puts the plate behind it, and gives it its alpha.
-fn finish_strip(composition: &Composition, accumulator: &Accumulator, beauty: &mut [[f32; 4]], depth: &mut [f32]) {
+fn finish_strip(
+    composition: &Composition,
+    level: Level,
+    accumulator: &Accumulator,
+    beauty: &mut [[f32; 4]],
+    depth: &mut [f32],
+) {
     let exposure = composition.plan.exposure_scale();
-    let Accumulator { rect, colour, transmittance, .. } = accumulator;
+    let rect = accumulator.rect;
     depth.copy_from_slice(&accumulator.depth);
     for row in 0..rect.height {
-        let plate = composition.plate_row(rect.y + row);
-        let plate_depth = composition.plate.depth.as_ref().map(|image| &image.row(rect.y + row)[rect.x..]);
-        for x in 0..rect.width {
-            let index = row * rect.width + x;
-            let behind = [0, 1, 2].map(|c| transmittance[c][index]);
-            let alpha = 1.0 - (behind[0] + behind[1] + behind[2]) / 3.0;
-            let light = [0, 1, 2].map(|c| exposure * colour[c][index]);
-            beauty[index] = match plate {
-                None => [light[0], light[1], light[2], alpha],
-                Some(plate) => {
-                    let lit = [0, 1, 2].map(|c| behind[c].mul_add(plate[x][c], light[c]));
-                    [lit[0], lit[1], lit[2], (1.0 - alpha).mul_add(plate[x][3], alpha)]
-                }
-            };
-            if let Some(plate_depth) = plate_depth {
-                depth[index] = depth[index].min(plate_depth[x][0]);
+        let pixels = row * rect.width..(row + 1) * rect.width;
+        let out = &mut beauty[pixels.clone()];
+        let colour = accumulator.colour.each_ref().map(|plane| &plane[pixels.clone()]);
+        match accumulator.transmittance() {
+            None => dispatch!(level, _simd => expose_row(exposure, colour, out)),
+            Some(planes) => {
+                let through = planes.each_ref().map(|plane| &plane[pixels.clone()]);
+                dispatch!(level, _simd => expose_absorbed_row(exposure, colour, through, out));
             }
         }
+        if let Some(plate) = composition.plate_row(rect.y + row) {
+            lay_over_plate(accumulator, pixels.start, plate, out);
+        }
+        if let Some(image) = &composition.plate.depth {
+            let plate_depth = &image.row(rect.y + row).as_flattened()[rect.x..];
+            depth[pixels].iter_mut().zip(plate_depth).for_each(|(depth, plate)| *depth = depth.min(*plate));
+        }
+    }
+}
+
+#[inline(always)]
+fn expose_row(exposure: f32, [red, green, blue]: [&[f32]; 3], out: &mut [[f32; 4]]) {
+    for (((out, red), green), blue) in out.iter_mut().zip(red).zip(green).zip(blue) {
+        *out = [exposure * red, exposure * green, exposure * blue, 0.0];
+    }
+}
+
+#[inline(always)]
+fn expose_absorbed_row(exposure: f32, colour: [&[f32]; 3], through: [&[f32]; 3], out: &mut [[f32; 4]]) {
+    expose_row(exposure, colour, out);
+    let [red, green, blue] = through;
+    for (((out, red), green), blue) in out.iter_mut().zip(red).zip(green).zip(blue) {
+        out[3] = 1.0 - (red + green + blue) * (1.0 / 3.0);
+    }
+}
+
+fn lay_over_plate(accumulator: &Accumulator, start: usize, plate: &[[f32; 4]], out: &mut [[f32; 4]]) {
+    for (x, (out, plate)) in out.iter_mut().zip(plate).enumerate() {
+        let through = accumulator.transmittance_at(start + x);
+        for c in 0..3 {
+            out[c] = through[c].mul_add(plate[c], out[c]);
+        }
+        out[3] = (1.0 - out[3]).mul_add(plate[3], out[3]);
     }
 }
 
@@ -163,12 +194,12 @@ pub(super) fn aov_planes(composition: &Composition, accumulator: &Accumulator) -
 }
 
 fn plate_layer(composition: &Composition, accumulator: &Accumulator) -> [Vec<f32>; 4] {
-    let Accumulator { rect, transmittance, .. } = accumulator;
+    let rect = accumulator.rect;
     let mut layer: [Vec<f32>; 4] = Default::default();
     for row in 0..rect.height {
         let Some(plate) = composition.plate_row(rect.y + row) else { break };
         for (x, plate) in plate.iter().enumerate() {
-            let behind = [0, 1, 2].map(|c| transmittance[c][row * rect.width + x]);
+            let behind = accumulator.transmittance_at(row * rect.width + x);
             for c in 0..3 {
                 layer[c].push(behind[c] * plate[c]);
             }

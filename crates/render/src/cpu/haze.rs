@@ -112,7 +112,9 @@ fn group_strip(composition: &Composition, worker: &Worker) -> Group {
     let exposure = composition.plan.exposure_scale();
     let exposed = |plane: &Vec<f32>| plane.iter().map(|value| exposure * value).collect::<Vec<f32>>();
     let mut planes: Vec<Vec<f32>> = accumulator.colour.iter().map(exposed).collect();
-    let [red, green, blue] = &accumulator.transmittance;
+    let pixels = accumulator.depth.len();
+    let transmittance = accumulator.transmittance().cloned().unwrap_or_else(|| [0, 1, 2].map(|_| vec![1.0; pixels]));
+    let [red, green, blue] = &transmittance;
     planes.push(red.iter().zip(green).zip(blue).map(|((r, g), b)| 1.0 - (r + g + b) / 3.0).collect());
     for layer in &accumulator.layers {
         planes.extend(layer[..3].iter().map(exposed));
@@ -120,7 +122,7 @@ fn group_strip(composition: &Composition, worker: &Worker) -> Group {
     }
     Group {
         picture: Picture { planes, depth: accumulator.depth.clone() },
-        transmittance: accumulator.transmittance.clone(),
+        transmittance,
         aovs: compose::aov_planes(composition, accumulator),
     }
 }

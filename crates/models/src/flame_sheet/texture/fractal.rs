@@ -12,7 +12,7 @@ use bansho_base::{
 };
 
 use super::{COLUMNS, Layer, ROWS, Texture, TextureTable};
-use crate::flame_sheet::{clock::Clock, lanes::least};
+use crate::flame_sheet::{clock::Clock, lanes::Real};
 
 /// Lattice cells of the first octave across and up the table; 32 and 64 texels wide.
 const CELLS: [usize; 2] = [8, 8];
@@ -80,7 +80,7 @@ fn warped_noise() -> Texels {
     let up = octaves(2, 0.5, key, Purpose::named("stir up"));
     let place = |i: usize| {
         let column = STIR[0].mul_add(across[i], (i % COLUMNS) as f32);
-        gas.sample(&[column; 16], &[STIR[1].mul_add(up[i], (i / COLUMNS) as f32); 16])[0]
+        gas.bilinear(column, STIR[1].mul_add(up[i], (i / COLUMNS) as f32))
     };
     spread_evenly((0..ROWS * COLUMNS).map(place).collect())
 }
@@ -107,10 +107,11 @@ fn spread_evenly(texels: Texels) -> Texels {
 
 /// Mean of two evenly distributed numbers, distributed evenly again: the distribution of the sum is a triangle.
 #[inline(always)]
-pub(super) fn mix_evenly(a: f32, b: f32) -> f32 {
-    let low = least(a + b, 2.0 - (a + b));
-    let rank = 0.5 * low * low;
-    if a + b < 1.0 { rank } else { 1.0 - rank }
+pub(super) fn mix_evenly<N: Real>(a: N, b: N) -> N {
+    let (sum, one) = (a + b, a.like(1.0));
+    let low = sum.least(a.like(2.0) - sum);
+    let rank = a.like(0.5) * low * low;
+    sum.choose(one, rank, one - rank)
 }
 
 /// How one layer crosses the table.
@@ -176,7 +177,8 @@ impl FractalLayers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flame_sheet::lanes::LANES;
+    use crate::flame_sheet::lanes::{Lanes, plain};
+    use fearless_simd::prelude::*;
     use bansho_base::animation::Animated;
 
     fn layers(loop_s: Option<f64>) -> (FractalLayers, Clock) {
@@ -187,8 +189,10 @@ mod tests {
     /// 16 x 24 samples of the sheet at time `t`.
     fn picture(layers: &FractalLayers, clock: &Clock, t: f64) -> Vec<f32> {
         let texture = layers.at(&FRACTAL, clock.scroll(t));
-        let u = std::array::from_fn(|i| i as f32 / 15.0);
-        (0..24).flat_map(|j| texture.sample(&u, &[j as f32 / 23.0; LANES])).collect()
+        plain!(simd => {
+            let u = Lanes::from_fn(simd, |i| i as f32 / 15.0);
+            (0..24).flat_map(|j| texture.sample(u, u.like(j as f32 / 23.0)).as_slice().to_vec()).collect()
+        })
     }
 
     fn correlation(a: &[f32], b: &[f32]) -> f32 {
@@ -234,8 +238,11 @@ mod tests {
             let (layers, clock) = layers(Some(length));
             let before = picture(&layers, &clock, 0.3);
             let after = picture(&layers, &clock, 0.3 + length);
-            let just_short = layers.at(&FRACTAL, clock.scroll(length * (1.0 - 1e-9))).sample(&[0.3; LANES], &[0.2; LANES])[0];
-            let start = layers.at(&FRACTAL, clock.scroll(0.0)).sample(&[0.3; LANES], &[0.2; LANES])[0];
+            let value = |t: f64| {
+                let texture = layers.at(&FRACTAL, clock.scroll(t));
+                plain!(simd => texture.sample(Lanes::splat(simd, 0.3), Lanes::splat(simd, 0.3))[0])
+            };
+            let (just_short, start) = (value(length * (1.0 - 1e-9)), value(0.0));
             assert!((just_short - start).abs() < 1e-3, "{length}: {just_short} {start}");
             before.iter().zip(&after).for_each(|(a, b)| assert!((a - b).abs() < 1e-3));
         }

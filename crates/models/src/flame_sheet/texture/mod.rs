@@ -7,7 +7,9 @@ use std::sync::Arc;
 
 pub use paper::{PaperTexture, paper_texture};
 
-use super::lanes::{LANES, Lanes, wrap_split};
+use fearless_simd::{Simd, prelude::*};
+
+use super::lanes::{LANES, Lanes, Real, fetch, wrap_split};
 
 pub(crate) use fractal::{FRACTAL, FractalLayers};
 pub(crate) use paper::PaperLayer;
@@ -46,25 +48,25 @@ impl TextureTable {
 
     /// Bilinear look-ups at wrapped places, in texels.
     #[inline(always)]
-    pub(crate) fn sample(&self, column: &Lanes, row: &Lanes) -> Lanes {
+    pub(crate) fn sample<S: Simd>(&self, column: Lanes<S>, row: Lanes<S>) -> Lanes<S> {
         let (left, across) = wrap_split(column, COLUMNS as u32 - 1);
         let (below, up) = wrap_split(row, ROWS as u32 - 1);
-        let mut index = [0_u32; LANES];
-        for i in 0..LANES {
-            index[i] = below[i] * COLUMNS as u32 + left[i];
-        }
-        let mut corners = [[0.0_f32; 4]; LANES];
-        for i in 0..LANES {
-            corners[i] = self.corners[index[i] as usize & (ROWS * COLUMNS - 1)];
-        }
-        let mut value = [0.0; LANES];
-        for i in 0..LANES {
-            let [low_left, low_right, high_left, high_right] = corners[i];
-            let low = (low_right - low_left).mul_add(across[i], low_left);
-            let high = (high_right - high_left).mul_add(across[i], high_left);
-            value[i] = (high - low).mul_add(up[i], low);
-        }
-        value
+        let mut index = [0; LANES];
+        (below * COLUMNS as u32 + left).store_slice(&mut index);
+        let [low_left, low_right, high_left, high_right] = fetch(column.simd, &self.corners, &index);
+        let low = (low_right - low_left).fused(across, low_left);
+        let high = (high_right - high_left).fused(across, high_left);
+        (high - low).fused(up, low)
+    }
+
+    /// A bilinear look-up at one wrapped place of at least -2^16 texels.
+    fn bilinear(&self, column: f32, row: f32) -> f32 {
+        let split = |place: f32| (place.floor() as i32 as usize, place - place.floor());
+        let ((left, across), (below, up)) = (split(column), split(row));
+        let [low_left, low_right, high_left, high_right] = self.corners[below % ROWS * COLUMNS + left % COLUMNS];
+        let low = (low_right - low_left).mul_add(across, low_left);
+        let high = (high_right - high_left).mul_add(across, high_left);
+        (high - low).mul_add(up, low)
     }
 
     /// A table a factor 2 coarser for each whole `level`, blended between, still of the same size: for small sheets.
@@ -105,13 +107,10 @@ pub(crate) struct Layer {
 impl Layer {
     /// Looks up the layer at sixteen places.
     #[inline(always)]
-    pub(crate) fn sample(&self, table: &TextureTable, u: &Lanes, w: &Lanes) -> Lanes {
-        let (mut column, mut row) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
-            column[i] = u[i].mul_add(self.columns[0], w[i].mul_add(self.columns[1], self.columns[2]));
-            row[i] = w[i].mul_add(self.rows[0], self.rows[1]);
-        }
-        table.sample(&column, &row)
+    fn sample<S: Simd>(&self, table: &TextureTable, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
+        let [across, slant, first] = self.columns;
+        let column = u.fused(u.like(across), w.fused(w.like(slant), w.like(first)));
+        table.sample(column, w.fused(w.like(self.rows[0]), w.like(self.rows[1])))
     }
 }
 
@@ -127,16 +126,11 @@ pub(crate) enum Texture {
 impl Texture {
     /// T0 at sixteen places; in [0, 1].
     #[inline(always)]
-    pub(crate) fn sample(&self, u: &Lanes, w: &Lanes) -> Lanes {
+    pub(crate) fn sample<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
         match self {
             Self::Single(table, layer) => layer.sample(table, u, w),
             Self::Mixed(table, [coarse, fine]) => {
-                let (a, b) = (coarse.sample(table, u, w), fine.sample(table, u, w));
-                let mut mixed = [0.0; LANES];
-                for i in 0..LANES {
-                    mixed[i] = fractal::mix_evenly(a[i], b[i]);
-                }
-                mixed
+                fractal::mix_evenly(coarse.sample(table, u, w), fine.sample(table, u, w))
             }
         }
     }
@@ -145,6 +139,7 @@ impl Texture {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flame_sheet::lanes::plain;
 
     fn waves() -> TextureTable {
         let texels: Vec<f32> = (0..ROWS * COLUMNS)
@@ -159,8 +154,10 @@ mod tests {
     #[test]
     fn look_ups_give_texels_and_halves_between_and_wrap() {
         let (table, texels) = (waves(), waves().texels());
-        let column = std::array::from_fn(|i| [3.0, 3.5, 259.0, -253.0, 255.5][i % 5]);
-        let value = table.sample(&column, &[7.0; LANES]);
+        let value = plain!(simd => {
+            let column = Lanes::from_fn(simd, |i| [3.0, 3.5, 259.0, -253.0, 255.5][i % 5]);
+            table.sample(column, column.like(7.0)).as_slice().to_vec()
+        });
         let row = &texels[7 * COLUMNS..][..COLUMNS];
         let expected = [row[3], 0.5 * (row[3] + row[4]), row[3], row[3], 0.5 * (row[255] + row[0])];
         for (got, wanted) in value.iter().zip(expected) {

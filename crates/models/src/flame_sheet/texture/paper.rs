@@ -161,7 +161,9 @@ fn fill(texture: &PaperTexture, texels: &mut [f32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flame_sheet::lanes::{Lanes, plain};
     use bansho_base::animation::Animated;
+    use fearless_simd::prelude::*;
 
     #[test]
     fn texture_20_has_hand_worked_values() {
@@ -204,9 +206,12 @@ mod tests {
     fn the_table_is_the_texture_within_its_resolution() {
         let layer = PaperLayer::new(5, &Clock::new(Animated::from(1.0), None));
         let scroll = 1234.567;
-        let u = std::array::from_fn(|i| 0.06 * i as f32 + 0.03);
-        let w = std::array::from_fn(|i| 0.055 * i as f32);
-        let values = layer.at(scroll).sample(&u, &w);
+        let (u, w): ([f32; 16], [f32; 16]) =
+            (std::array::from_fn(|i| 0.06 * i as f32 + 0.03), std::array::from_fn(|i| 0.055 * i as f32));
+        let texture = layer.at(scroll);
+        let values = plain!(simd => {
+            texture.sample(Lanes::from_slice(simd, &u), Lanes::from_slice(simd, &w)).as_slice().to_vec()
+        });
         for i in 0..16 {
             let exact = paper_texture(f64::from(u[i]), f64::from(w[i]) - scroll, 5);
             assert!((f64::from(values[i]) - exact).abs() < 0.02, "{} {exact}", values[i]);

@@ -1,0 +1,204 @@
+//! The files of a flipbook.
+
+use std::path::{Path, PathBuf};
+
+use bansho_base::{
+    color::View,
+    image::{DisplayImage, DisplayPixels, Frame, FrameHeader, Image},
+    observer::{Observer, Stage, StageGuard, check},
+};
+use bansho_media::{
+    atomic, exr,
+    flipbook::{Sheet, tile, tile_display},
+    naming::OutputKind,
+    png::{self, PngEffort},
+};
+use bansho_render::{
+    Plan,
+    display::{BitDepth, display},
+};
+use serde_json::{Value, json};
+
+use super::{
+    FlipbookSummary,
+    motion::{self, Colour, Tile},
+};
+use crate::job::error::JobError;
+
+/// Where a flipbook goes and what its sheets are.
+pub(super) struct Files {
+    /// `DIR/NAME`
+    pub(super) base: PathBuf,
+    pub(super) kind: OutputKind,
+    pub(super) view: View,
+    pub(super) bits: BitDepth,
+}
+
+impl Files {
+    fn is_linear(&self) -> bool {
+        self.kind.is_scene_linear()
+    }
+
+    fn path(&self, ending: &str) -> PathBuf {
+        let mut name = self.base.clone().into_os_string();
+        name.push(ending);
+        name.into()
+    }
+
+    fn sheet_path(&self, what: &str) -> PathBuf {
+        self.path(&format!("_{what}.{}", self.kind.extension()))
+    }
+
+    /// All files, the JSON last.
+    pub(super) fn paths(&self) -> Vec<PathBuf> {
+        let sheets: &[&str] = if self.is_linear() { &["colour", "motion"] } else { &["colour", "alpha", "motion"] };
+        sheets.iter().map(|what| self.sheet_path(what)).chain([self.path(".json")]).collect()
+    }
+
+    /// What colour sheets keep of a frame.
+    pub(super) fn colour(&self, frame: Frame, observer: &dyn Observer) -> Colour {
+        if self.is_linear() {
+            return Colour::Linear(frame.beauty);
+        }
+        let _stage = StageGuard::begin(observer, Stage::View);
+        Colour::Shown(display(&frame, &self.view, self.bits))
+    }
+
+    /// Lays out the tiles and writes every file.
+    pub(super) fn write(
+        &self,
+        plan: &Plan,
+        sheet: &Sheet,
+        numbers: &[i64],
+        tiles: &[Tile],
+        observer: &dyn Observer,
+    ) -> Result<FlipbookSummary, JobError> {
+        let _stage = StageGuard::begin(observer, Stage::Write);
+        let scale = if self.is_linear() { 1.0 } else { motion::scale(tiles) };
+        check(observer).map_err(|_| JobError::Cancelled)?;
+        if self.is_linear() {
+            self.write_linear(sheet, tiles)?;
+        } else {
+            self.write_shown(sheet, tiles, scale)?;
+        }
+        let text = format!("{:#}\n", self.description(plan, sheet, numbers, scale));
+        atomic::write_bytes(&self.path(".json"), text.as_bytes())?;
+        Ok(FlipbookSummary { files: self.paths() })
+    }
+
+    fn write_linear(&self, sheet: &Sheet, tiles: &[Tile]) -> Result<(), JobError> {
+        let header = FrameHeader { display_size: sheet.size(), data_origin: [0, 0], ..tiles[0].header.clone() };
+        let colours: Vec<Image<4>> = tiles.iter().filter_map(|tile| tile.linear().cloned()).collect();
+        let motion: Vec<Image<2>> = tiles.iter().map(|tile| tile.motion.clone()).collect();
+        let motion = tile(&motion, sheet.columns, 0, [0.0; 2])?;
+        let [width, height] = sheet.size();
+        let pixels = motion.pixels().iter().map(|&[x, y]| [x, y, 0.0, 1.0]).collect();
+        let motion = Image::from_pixels(width, height, pixels).unwrap_or_else(|| Image::filled(width, height, [0.0; 4]));
+        for (what, beauty) in [("colour", tile(&colours, sheet.columns, 0, [0.0; 4])?), ("motion", motion)] {
+            let path = self.sheet_path(what);
+            let header = FrameHeader { fingerprint: fingerprint(tiles, what), ..header.clone() };
+            let frame = Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false };
+            atomic::write_bytes(&path, &exr::encode(&frame, &path)?)?;
+        }
+        Ok(())
+    }
+
+    fn write_shown(&self, sheet: &Sheet, tiles: &[Tile], scale: f32) -> Result<(), JobError> {
+        let shown: Vec<DisplayImage> = tiles.iter().filter_map(|tile| tile.shown().cloned()).collect();
+        let colour = tile_display(&shown, sheet.columns, 0, [0; 4])?;
+        let alpha = DisplayImage { opaque: true, pixels: alpha(&colour.pixels), ..colour };
+        let coded = tiles.iter().map(|tile| DisplayImage {
+            width: tile.motion.width(),
+            height: tile.motion.height(),
+            opaque: true,
+            pixels: DisplayPixels::Sixteen(
+                tile.motion.pixels().iter().map(|&motion| motion::coded(motion, scale)).collect(),
+            ),
+        });
+        let motion = tile_display(&coded.collect::<Vec<_>>(), sheet.columns, 0, [0; 4])?;
+        for (what, picture) in [("colour", &colour), ("alpha", &alpha), ("motion", &motion)] {
+            let path = self.sheet_path(what);
+            let bytes = png::encode(picture, &fingerprint(tiles, what), PngEffort::Fast, &path)?;
+            atomic::write_bytes(&path, &bytes)?;
+        }
+        Ok(())
+    }
+
+    fn description(&self, plan: &Plan, sheet: &Sheet, numbers: &[i64], scale: f32) -> Value {
+        let fps = plan.fps();
+        let frame = |(index, &number): (usize, &i64)| {
+            let place = sheet.place(index);
+            let time_s = index as f64 * fps.frame_s();
+            json!({ "number": number, "time_s": time_s, "x": place.x, "y": place.y, "width": place.width, "height": place.height })
+        };
+        let colour = match self.is_linear() {
+            true => json!({ "file": name(&self.sheet_path("colour")), "space": "ACEScg", "alpha": "premultiplied", "exposure_ev100": plan.exposure_ev100 }),
+            false => json!({ "file": name(&self.sheet_path("colour")), "space": "sRGB", "alpha": "straight" }),
+        };
+        let mut description = json!({
+            "format": 1,
+            "size": sheet.size(),
+            "grid": [sheet.columns, sheet.rows()],
+            "tile": sheet.cell,
+            "frame_count": sheet.count,
+            "fps": f64::from(fps.frames) / f64::from(fps.seconds),
+            "duration_s": sheet.count as f64 * fps.frame_s(),
+            "loop": plan.loop_s.is_some(),
+            "colour": colour,
+        });
+        if !self.is_linear() {
+            description["alpha"] = json!({ "file": name(&self.sheet_path("alpha")), "space": "linear" });
+        }
+        description["motion"] = self.motion(scale);
+        description["frames"] = numbers.iter().enumerate().map(frame).collect();
+        description
+    }
+
+    fn motion(&self, scale: f32) -> Value {
+        let file = name(&self.sheet_path("motion"));
+        let meaning = "pixels of a tile to the next frame: red to the right, green down";
+        if self.is_linear() {
+            return json!({ "file": file, "space": "linear", "meaning": meaning });
+        }
+        json!({
+            "file": file, "space": "linear", "meaning": meaning, "bits": 16,
+            "zero_code": motion::MIDDLE, "largest_code": u16::MAX, "scale_pixels": scale,
+            "formula": "pixels = (code - zero_code) / (largest_code - zero_code) * scale_pixels",
+        })
+    }
+}
+
+impl Tile {
+    fn shown(&self) -> Option<&DisplayImage> {
+        if let Colour::Shown(picture) = &self.colour { Some(picture) } else { None }
+    }
+
+    fn linear(&self) -> Option<&Image<4>> {
+        if let Colour::Linear(picture) = &self.colour { Some(picture) } else { None }
+    }
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Alpha as grey.
+fn alpha(pixels: &DisplayPixels) -> DisplayPixels {
+    match pixels {
+        DisplayPixels::Eight(pixels) => {
+            DisplayPixels::Eight(pixels.iter().map(|&[.., a]| [a, a, a, u8::MAX]).collect())
+        }
+        DisplayPixels::Sixteen(pixels) => {
+            DisplayPixels::Sixteen(pixels.iter().map(|&[.., a]| [a, a, a, u16::MAX]).collect())
+        }
+    }
+}
+
+/// A fingerprint that no single frame and no other sheet has.
+fn fingerprint(tiles: &[Tile], what: &str) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    tiles.iter().for_each(|tile| {
+        hasher.update(&tile.header.fingerprint);
+    });
+    *hasher.update(what.as_bytes()).finalize().as_bytes()
+}

@@ -1,0 +1,174 @@
+//! Flipbooks for game engines: all frames in one sheet, their alpha and motion in sheets beside it, and a JSON that says
+//! how to read them.
+
+mod files;
+mod motion;
+
+use std::{path::PathBuf, sync::Arc};
+
+use bansho_base::color::View;
+use bansho_media::{
+    flipbook::Sheet,
+    naming::{OutputKind, OutputPattern},
+};
+use bansho_render::{
+    Backend, Plan, PlanOptions, Scene,
+    display::BitDepth,
+    scene::FrameRate,
+};
+
+use self::{files::Files, motion::Tile};
+use super::{
+    BackendChoice,
+    error::{Conflict, JobError},
+    observer::{JobObserver, Note, Outline},
+    output, prepare,
+    scene_file::SceneFile,
+    sheet::{self, Gather},
+    shoot::shoot,
+    snapshots::Snapshots,
+};
+
+/// A flipbook that is wanted. Begin with [`Flipbook::new`].
+///
+/// PNG: colour in sRGB with straight alpha; alpha again, as grey, for engines that want it apart; motion in pixels to
+/// the next frame, in 16 bits around a middle that means none. EXR: colour scene-linear with premultiplied alpha; motion in
+/// pixels as it is.
+#[derive(Clone, Debug)]
+pub struct Flipbook {
+    /// The scene.
+    pub scene: SceneFile,
+    /// Columns and rows of the sheet.
+    pub grid: [usize; 2],
+    /// Size of one frame, pixels; in the scene's proportions so that the sheet is up to 2048 wide or high when left out.
+    pub tile: Option<[usize; 2]>,
+    /// The first frame; the scene's first when left out.
+    pub first_frame: Option<i64>,
+    /// Another seed than the scene's.
+    pub seed: Option<u64>,
+    /// A seamless loop of so many seconds; the sheet then holds exactly one turn, at whatever frame rate that takes.
+    pub loop_s: Option<f64>,
+    /// How PNG sheets show the light.
+    pub view: View,
+    /// Bits of each channel of PNG sheets, but for motion.
+    pub bits: BitDepth,
+    /// Where it goes: `DIR/NAME.png` stands for `NAME_colour.png` and so on; `out/STEM/STEM.png` when left out.
+    pub out: Option<PathBuf>,
+    /// What draws.
+    pub backend: BackendChoice,
+}
+
+/// What a flipbook became.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FlipbookSummary {
+    /// Its files, the JSON last.
+    pub files: Vec<PathBuf>,
+}
+
+/// Largest side of a sheet of frames whose size is not given, pixels.
+const USUAL_SIDE: usize = 2048;
+
+impl Flipbook {
+    /// A flipbook of `grid` columns and rows from the first frames of `scene`.
+    pub fn new(scene: SceneFile, grid: [usize; 2]) -> Self {
+        Self {
+            scene,
+            grid,
+            tile: None,
+            first_frame: None,
+            seed: None,
+            loop_s: None,
+            view: View::DISPLAY,
+            bits: BitDepth::Eight,
+            out: None,
+            backend: BackendChoice::Auto,
+        }
+    }
+
+    /// Checks everything: the scene and what it names, the options, whether the sheets can be written. Writes nothing.
+    ///
+    /// # Errors
+    /// The first thing that stands in the way; of the scene all faults at once.
+    pub fn prepare(&self) -> Result<PreparedFlipbook, JobError> {
+        let backend = prepare::backend(self.backend)?;
+        let assets = prepare::assets(&self.scene);
+        let mut scene = self.scene.check(assets.as_ref())?;
+        let [columns, rows] = self.grid;
+        let sheet = Sheet { count: columns.saturating_mul(rows), columns, cell: self.cell(&scene), gutter: 0 };
+        let sheet = sheet::checked(sheet)?;
+        if let Some(seconds) = self.loop_s {
+            scene.picture.fps = turn_rate(sheet.count, seconds)?;
+        }
+        scene.picture.overscan = 0;
+        let options = PlanOptions {
+            size: Some(sheet.cell),
+            seed: self.seed,
+            loop_s: self.loop_s,
+            layers: true,
+            aovs: true,
+            display: self.view,
+            ..PlanOptions::default()
+        };
+        let plan = Arc::new(Plan::new(scene, &options, assets)?);
+        let first = self.first_frame.unwrap_or(plan.frames().start);
+        let numbers = (first..first.saturating_add(sheet.count as i64)).collect();
+        Ok(PreparedFlipbook { backend, plan, sheet, numbers, files: self.files()? })
+    }
+
+    /// Size of a frame: as asked for, or the scene's made small enough for a sheet of the usual side.
+    fn cell(&self, scene: &Scene) -> [usize; 2] {
+        let [columns, rows] = self.grid;
+        let [width, height] = scene.picture.size.map(|side| side as usize);
+        self.tile.unwrap_or_else(|| {
+            let sides = (columns.saturating_mul(width)).max(rows.saturating_mul(height)).max(USUAL_SIDE);
+            [width, height].map(|side| (side * USUAL_SIDE / sides).max(1))
+        })
+    }
+
+    fn files(&self) -> Result<Files, JobError> {
+        let stem = &self.scene.stem;
+        let path = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem).join(format!("{stem}.png")));
+        let pattern = OutputPattern::parse(&path, 1)?;
+        if !matches!(pattern.kind(), OutputKind::Png | OutputKind::Exr) || pattern.is_numbered() {
+            return Err(Conflict::Sheet { path, allowed: "NAME.png or NAME.exr" }.into());
+        }
+        let files = Files { base: path.with_extension(""), kind: pattern.kind(), view: self.view, bits: self.bits };
+        files.paths().iter().try_for_each(|path| output::check_writable(path))?;
+        Ok(files)
+    }
+}
+
+/// A flipbook that can be made, as far as can be known without doing so.
+pub struct PreparedFlipbook {
+    backend: Box<dyn Backend>,
+    plan: Arc<Plan>,
+    sheet: Sheet,
+    numbers: Vec<i64>,
+    files: Files,
+}
+
+impl PreparedFlipbook {
+    /// Draws all frames in the caller's rayon pool and writes the sheets.
+    ///
+    /// # Errors
+    /// The observer asked to stop, or a sheet cannot be written.
+    pub fn run(&self, observer: &dyn JobObserver) -> Result<FlipbookSummary, JobError> {
+        let Self { backend, plan, sheet, numbers, files } = self;
+        observer.started(&Outline { total: numbers.len(), kept: 0, size: sheet.cell });
+        let gather = Gather::new(sheet.count, observer, |frame, observer| Tile::of(frame, files, observer));
+        shoot(plan, backend.as_ref(), numbers, &Snapshots::default(), &gather, observer)?;
+        let tiles = gather.into_tiles();
+        if !tiles.iter().any(|tile| tile.has_motion) {
+            observer.note(&Note::NoMotion);
+        }
+        files.write(plan, sheet, numbers, &tiles, observer)
+    }
+}
+
+/// The frame rate at which `count` frames last `seconds`.
+fn turn_rate(count: usize, seconds: f64) -> Result<FrameRate, Conflict> {
+    if !(0.01..=3600.0).contains(&seconds) {
+        return Err(Conflict::LoopLength(seconds));
+    }
+    Ok(FrameRate { frames: count as u32 * 1000, seconds: (seconds * 1000.0).round() as u32 })
+}

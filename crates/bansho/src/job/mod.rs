@@ -1,0 +1,104 @@
+//! From a scene file to pictures on disk: what `bansho render` and `bansho flipbook` do, for any program.
+//!
+//! [`Job`] says what is wanted; [`Job::prepare`] checks all of it and writes nothing; [`PreparedJob::run`] draws each
+//! frame while those before are compressed and written by whichever thread of the caller's rayon pool is free. A few
+//! frames are in memory at once, however many there are. Every file is whole or not there at all.
+
+mod contact;
+mod error;
+mod flight;
+mod flipbook;
+mod observer;
+mod output;
+mod prepare;
+mod resume;
+mod run;
+mod scene_file;
+mod sheet;
+mod shoot;
+mod snapshots;
+
+use std::path::PathBuf;
+
+use bansho_base::{color::View, image::Rect};
+use bansho_render::display::BitDepth;
+
+pub use error::{Cause, Conflict, JobError};
+pub use flipbook::{Flipbook, FlipbookSummary, PreparedFlipbook};
+pub use observer::{FrameDone, JobObserver, Note, Outline};
+pub use prepare::{PreparedJob, check_scene};
+pub use run::Summary;
+pub use scene_file::SceneFile;
+
+bansho_base::choice! {
+    /// What draws.
+    pub enum BackendChoice {
+        /// The best there is: in this version the processor.
+        Auto = "auto",
+        /// The processor; its pictures are the ones that all others are compared with.
+        Cpu = "cpu",
+        /// A graphics processor; this version has none.
+        Gpu = "gpu",
+    }
+}
+
+/// What is to be drawn, and where it goes. Begin with [`Job::new`], which takes everything from the scene.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// The scene.
+    pub scene: SceneFile,
+    /// Frame numbers, ascending; the whole shot (or one turn of the loop) when left out.
+    pub frames: Option<Vec<i64>>,
+    /// Another picture size than the scene's, pixels.
+    pub size: Option<[usize; 2]>,
+    /// Only this part of the picture, identical to the same part of the whole.
+    pub crop: Option<Rect>,
+    /// Another seed than the scene's.
+    pub seed: Option<u64>,
+    /// A seamless loop of about so many seconds.
+    pub loop_s: Option<f64>,
+    /// Whether each phenomenon gets a layer of its own (EXR).
+    pub layers: bool,
+    /// Whether phenomena write temperature, motion and the like (EXR).
+    pub aovs: bool,
+    /// How display formats show the light.
+    pub view: View,
+    /// Bits of each channel, where the format has a choice.
+    pub bits: BitDepth,
+    /// Where frames go, such as `shot/frame.####.exr` or `fire.mp4`; `out/STEM/STEM.####.png` when left out.
+    pub out: Option<PathBuf>,
+    /// One picture of so many consecutive frames instead of all frames.
+    pub contact_sheet: Option<usize>,
+    /// Whether whole frames of this very job that are there already stay.
+    pub resume: bool,
+    /// Folder of snapshots of what is simulated in steps.
+    pub snapshots: Option<PathBuf>,
+    /// Frames between snapshots; a second's worth when left out.
+    pub snapshot_every: Option<u64>,
+    /// What draws.
+    pub backend: BackendChoice,
+}
+
+impl Job {
+    /// All frames of `scene` as it is, to PNG files.
+    pub fn new(scene: SceneFile) -> Self {
+        Self {
+            scene,
+            frames: None,
+            size: None,
+            crop: None,
+            seed: None,
+            loop_s: None,
+            layers: false,
+            aovs: false,
+            view: View::DISPLAY,
+            bits: BitDepth::Eight,
+            out: None,
+            contact_sheet: None,
+            resume: false,
+            snapshots: None,
+            snapshot_every: None,
+            backend: BackendChoice::Auto,
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! Checking a job before anything is drawn or written.
+
+use std::{path::PathBuf, sync::Arc};
+
+use bansho_base::{assets::Assets, color::View, image::Rect};
+use bansho_media::{
+    flipbook::Sheet,
+    naming::{OutputKind, OutputPattern},
+    plates::FileAssets,
+};
+use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, Scene, display::BitDepth};
+
+use super::{
+    BackendChoice, Job, contact,
+    error::{Conflict, JobError},
+    observer::Note,
+    output::{self, Format},
+    scene_file::SceneFile,
+    sheet::{self, MOST_TILES},
+    snapshots::{self, Snapshots},
+};
+
+/// A job that can be carried out, as far as can be known without doing so.
+pub struct PreparedJob {
+    pub(super) plan: Arc<Plan>,
+    pub(super) backend: Box<dyn Backend>,
+    pub(super) frames: Vec<i64>,
+    pub(super) format: Format,
+    /// Where all frames go into one picture.
+    pub(super) sheet: Option<Sheet>,
+    pub(super) resume: bool,
+    pub(super) snapshots: Snapshots,
+    pub(super) notes: Vec<Note>,
+}
+
+impl PreparedJob {
+    /// The plan of the shot.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The frames that were asked for, ascending.
+    pub fn frames(&self) -> &[i64] {
+        &self.frames
+    }
+
+    /// Where frames go.
+    pub fn output(&self) -> &OutputPattern {
+        &self.format.pattern
+    }
+
+    /// What the user should know before the work begins.
+    pub fn notes(&self) -> &[Note] {
+        &self.notes
+    }
+}
+
+/// Reads the pictures that a scene names from the folder it lies in.
+pub(super) fn assets(scene: &SceneFile) -> Arc<dyn Assets> {
+    Arc::new(FileAssets::new(&scene.folder))
+}
+
+/// Checks a scene and all it names, and plans it as it is.
+///
+/// # Errors
+/// What the scene would be refused for.
+pub fn check_scene(scene: &SceneFile) -> Result<Plan, JobError> {
+    let assets = assets(scene);
+    Ok(Plan::new(scene.check(assets.as_ref())?, &PlanOptions::default(), assets)?)
+}
+
+/// What draws.
+pub(super) fn backend(choice: BackendChoice) -> Result<Box<dyn Backend>, JobError> {
+    match choice {
+        BackendChoice::Auto | BackendChoice::Cpu => Ok(Box::new(CpuBackend)),
+        BackendChoice::Gpu => Err(JobError::NoGpu),
+    }
+}
+
+impl Job {
+    /// Checks everything: the scene and what it names, the options, whether the output can be written. Writes nothing.
+    ///
+    /// # Errors
+    /// The first thing that stands in the way; of the scene all faults at once.
+    pub fn prepare(&self) -> Result<PreparedJob, JobError> {
+        let backend = backend(self.backend)?;
+        let assets = assets(&self.scene);
+        let scene = self.scene.check(assets.as_ref())?;
+        let kind = self.output_kind()?;
+        self.check_channels(kind)?;
+        let plan = Arc::new(Plan::new(scene.clone(), &self.plan_options(&scene, kind), assets)?);
+        let frames = self.chosen_frames(&plan)?;
+        let files = if self.contact_sheet.is_some() { 1 } else { frames.len() };
+        let pattern = OutputPattern::parse(&self.output_path(), files)?;
+        output::check_writable(&pattern.path(frames[0]))?;
+        let tile = [plan.window.width, plan.window.height];
+        let sheet = self.contact_sheet.map(|tiles| sheet::holding(tiles, tile, contact::GUTTER)).transpose()?;
+        let snapshots = self.snapshots(&plan)?;
+        let mut prepared = PreparedJob {
+            format: Format { pattern, view: self.view, bits: self.bits },
+            resume: self.resume && kind.is_sequence() && sheet.is_none(),
+            notes: Vec::new(),
+            plan,
+            backend,
+            frames,
+            sheet,
+            snapshots,
+        };
+        prepared.notes = self.notes(&prepared)?;
+        Ok(prepared)
+    }
+
+    fn output_path(&self) -> PathBuf {
+        let stem = &self.scene.stem;
+        let name = if self.contact_sheet.is_some() { format!("{stem}.sheet.png") } else { format!("{stem}.####.png") };
+        self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem).join(name))
+    }
+
+    fn output_kind(&self) -> Result<OutputKind, JobError> {
+        let path = self.output_path();
+        let kind = OutputPattern::parse(&path, 2)?.kind();
+        if self.contact_sheet.is_some() && kind != OutputKind::Png {
+            return Err(Conflict::Sheet { path, allowed: ".png" }.into());
+        }
+        Ok(kind)
+    }
+
+    /// Layers and AOVs need a file that holds them.
+    fn check_channels(&self, kind: OutputKind) -> Result<(), Conflict> {
+        let what = match (self.layers, self.aovs) {
+            (true, _) => "--layers",
+            (_, true) => "--aovs",
+            _ => return Ok(()),
+        };
+        if kind == OutputKind::Exr { Ok(()) } else { Err(Conflict::NoChannels { what, path: self.output_path() }) }
+    }
+
+    fn plan_options(&self, scene: &Scene, kind: OutputKind) -> PlanOptions {
+        let size = self.size.unwrap_or(scene.picture.size.map(|side| side as usize));
+        // Only EXR has room for what lies beyond the picture.
+        let inner = (scene.picture.overscan > 0 && kind != OutputKind::Exr).then(|| Rect::of_size(size[0], size[1]));
+        PlanOptions {
+            size: self.size,
+            seed: self.seed,
+            crop: self.crop.or(inner),
+            loop_s: self.loop_s,
+            layers: self.layers,
+            aovs: self.aovs,
+            display: self.view,
+        }
+    }
+
+    fn chosen_frames(&self, plan: &Plan) -> Result<Vec<i64>, JobError> {
+        let mut frames = self.frames.clone().unwrap_or_else(|| plan.frames().collect());
+        frames.sort_unstable();
+        frames.dedup();
+        let first = *frames.first().ok_or(Conflict::NoFrames)?;
+        match self.contact_sheet {
+            Some(tiles) if !(1..=MOST_TILES).contains(&tiles) => Err(Conflict::Tiles { tiles, most: MOST_TILES }.into()),
+            Some(tiles) => Ok((first..first.saturating_add(tiles as i64)).collect()),
+            None => Ok(frames),
+        }
+    }
+
+    fn snapshots(&self, plan: &Plan) -> Result<Snapshots, JobError> {
+        let second = (1.0 / plan.fps().frame_s()).round().max(1.0) as u64;
+        let every = self.snapshot_every.unwrap_or(second);
+        match &self.snapshots {
+            _ if every == 0 => Err(Conflict::SnapshotStep(every).into()),
+            Some(folder) if snapshots::has_state(plan)? => Ok(Snapshots::new(folder.clone(), plan, every)),
+            _ => Ok(Snapshots::default()),
+        }
+    }
+
+    fn notes(&self, job: &PreparedJob) -> Result<Vec<Note>, JobError> {
+        let kind = job.format.pattern.kind();
+        let mut notes: Vec<Note> = outside(&job.plan, &job.frames).into_iter().collect();
+        let wide = matches!(kind, OutputKind::Png | OutputKind::Apng | OutputKind::Mov | OutputKind::Webm);
+        if self.bits == BitDepth::Sixteen && !wide {
+            notes.push(Note::BitsUnused { kind });
+        }
+        // With a plate the view matters to EXR too: the plate is taken back through it.
+        if kind == OutputKind::Exr && self.view != View::DISPLAY && !job.plan.scene.has_plate() {
+            notes.push(Note::ViewUnused);
+        }
+        if self.resume && !job.resume {
+            notes.push(if job.sheet.is_some() { Note::ResumeSheet } else { Note::ResumeUnused { kind } });
+        }
+        if self.snapshots.is_some() && job.snapshots == Snapshots::default() {
+            notes.push(Note::SnapshotsUnused);
+        }
+        Ok(notes)
+    }
+}
+
+/// How many frames lie outside the shot's own.
+fn outside(plan: &Plan, frames: &[i64]) -> Option<Note> {
+    let own = plan.frames();
+    let count = frames.iter().filter(|frame| !own.contains(frame)).count();
+    let (first, last) = (own.start, own.end - 1);
+    match (count, plan.loop_s) {
+        (0, _) => None,
+        (_, Some(_)) => Some(Note::OutsideLoop { count, first, last }),
+        (_, None) => Some(Note::OutsideScene { count, first, last }),
+    }
+}

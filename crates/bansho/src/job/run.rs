@@ -1,0 +1,52 @@
+//! Carrying out a prepared job.
+
+use std::{path::PathBuf, sync::atomic::AtomicUsize};
+
+use super::{
+    contact,
+    error::JobError,
+    observer::{JobObserver, Outline},
+    output::ToFiles,
+    prepare::PreparedJob,
+    shoot::shoot,
+};
+
+/// What a job did.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Summary {
+    /// Frames drawn.
+    pub drawn: usize,
+    /// Frames that were there already.
+    pub kept: usize,
+    /// The first file that it wrote or would have written.
+    pub first_file: PathBuf,
+}
+
+impl PreparedJob {
+    /// Draws and writes everything, in the caller's rayon pool.
+    ///
+    /// # Errors
+    /// The observer asked to stop, or the first failure of a frame. Frames that were finished by then stay, whole;
+    /// nothing else does.
+    pub fn run(&self, observer: &dyn JobObserver) -> Result<Summary, JobError> {
+        self.notes.iter().for_each(|note| observer.note(note));
+        let numbers = self.missing();
+        let kept = self.frames.len() - numbers.len();
+        let size = [self.plan.window.width, self.plan.window.height];
+        observer.started(&Outline { total: self.frames.len(), kept, size });
+        match &self.sheet {
+            Some(sheet) => contact::run(self, sheet, observer)?,
+            None if numbers.is_empty() => {}
+            None => self.run_files(&numbers, size, observer)?,
+        }
+        Ok(Summary { drawn: numbers.len(), kept, first_file: self.format.pattern.path(self.frames[0]) })
+    }
+
+    fn run_files(&self, numbers: &[i64], size: [usize; 2], observer: &dyn JobObserver) -> Result<(), JobError> {
+        let window = rayon::current_num_threads() + 1;
+        let sink = self.format.open(&self.plan, numbers.len(), size, window)?;
+        let files = ToFiles { format: &self.format, sink, window, observer, drawn: AtomicUsize::new(0) };
+        shoot(&self.plan, self.backend.as_ref(), numbers, &self.snapshots, &files, observer)?;
+        Ok(files.sink.finish()?)
+    }
+}

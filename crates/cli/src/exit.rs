@@ -1,0 +1,68 @@
+//! How the program ends: exit codes, and errors as a person reads them.
+
+use std::process::ExitCode;
+
+use bansho::{
+    SceneError,
+    job::{Cause, JobError},
+};
+
+use crate::{interrupt, output::to_stderr};
+
+/// Failed on the way.
+const FAILED: u8 = 1;
+/// What was asked for makes no sense.
+const USAGE: u8 = 2;
+/// The scene is faulty.
+const SCENE: u8 = 3;
+/// There is no usable GPU.
+const GPU: u8 = 4;
+
+/// An error that has been told already; only its exit code is left.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct Told(pub(crate) JobError);
+
+/// The exit code of an error.
+pub(crate) fn code(error: &anyhow::Error) -> u8 {
+    let told = || error.downcast_ref::<Told>().map(|told| &told.0);
+    match error.downcast_ref::<JobError>().or_else(told).map(JobError::cause) {
+        Some(Cause::Usage) => USAGE,
+        Some(Cause::Scene) => SCENE,
+        Some(Cause::Gpu) => GPU,
+        Some(Cause::Cancelled) => interrupt::exit_code(),
+        Some(Cause::Work) | None => FAILED,
+    }
+}
+
+/// Tells what went wrong, one `error:` for each fault, and gives the exit code.
+pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
+    if error.downcast_ref::<Told>().is_none() {
+        tell(error);
+    }
+    ExitCode::from(code(error))
+}
+
+fn tell(error: &anyhow::Error) {
+    match error.downcast_ref::<JobError>() {
+        Some(job) => tell_job(job),
+        None => to_stderr(&format!("error: {error:#}")),
+    }
+}
+
+/// Tells what went wrong with a job.
+pub(crate) fn tell_job(error: &JobError) {
+    match error.scene() {
+        Some(scene) => faults(scene).for_each(|fault| to_stderr(&format!("error: {fault}"))),
+        None => to_stderr(&format!("error: {error}")),
+    }
+}
+
+/// The faults of a scene, each by itself.
+fn faults(error: &SceneError) -> impl Iterator<Item = SceneError> + '_ {
+    error.problems.iter().map(|problem| SceneError {
+        file: error.file.clone(),
+        text: error.text.clone(),
+        problems: vec![problem.clone()],
+    })
+}

@@ -1,0 +1,17 @@
+//! Text for stdout and stderr.
+
+use std::io::{self, Write};
+
+/// Writes `text` to stdout. A reader that has seen enough (`bansho schema | head`) is no error.
+pub(crate) fn to_stdout(text: &str) -> io::Result<()> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        result => result,
+    }
+}
+
+/// Writes a line to stderr; where that fails, nobody is left to be told.
+pub(crate) fn to_stderr(line: &str) {
+    let _ = writeln!(io::stderr().lock(), "{line}");
+}

@@ -1,0 +1,128 @@
+//! What the user sees while a job runs.
+
+mod bar;
+mod json;
+
+use std::time::Instant;
+
+use bansho::{
+    Observer, Stage,
+    job::{FrameDone, JobError, JobObserver, Note, Outline},
+};
+
+use self::{bar::Bar, json::Json};
+use crate::{
+    exit::{self, Told},
+    interrupt,
+    output::to_stderr,
+    stats::Stats,
+};
+
+/// `--progress`
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum ProgressKind {
+    /// A bar on stderr with frames a second and the time left, where stderr is a terminal; then one line.
+    #[default]
+    Bar,
+    /// One JSON object a line on stdout: start, frame, done, error.
+    Json,
+    /// Nothing but warnings and errors.
+    None,
+}
+
+/// Where progress goes.
+enum Shown {
+    Bar(Bar),
+    Json(Json),
+    Nothing,
+}
+
+/// Watches a job for the user: progress, warnings, signals, times.
+pub(crate) struct Watcher {
+    shown: Shown,
+    stats: Option<Stats>,
+    since: Instant,
+}
+
+/// What a job came to, for the last line.
+pub(crate) struct Result {
+    pub(crate) drawn: usize,
+    pub(crate) kept: usize,
+    pub(crate) files: Vec<std::path::PathBuf>,
+}
+
+impl Watcher {
+    pub(crate) fn new(kind: ProgressKind, stats: bool) -> Self {
+        let shown = match kind {
+            ProgressKind::Bar => Shown::Bar(Bar::new()),
+            ProgressKind::Json => Shown::Json(Json),
+            ProgressKind::None => Shown::Nothing,
+        };
+        Self { shown, stats: stats.then(Stats::new), since: Instant::now() }
+    }
+
+    /// Tells how it ended, statistics last. `threads` drew.
+    pub(crate) fn finish(&self, result: std::result::Result<Result, JobError>, threads: usize) -> anyhow::Result<()> {
+        let seconds = self.since.elapsed().as_secs_f64();
+        let result = result.map_err(|error| self.fail(error))?;
+        match &self.shown {
+            Shown::Bar(bar) => bar.done(&result, seconds),
+            Shown::Json(json) => json.done(&result, seconds),
+            Shown::Nothing => {}
+        }
+        if let Some(stats) = &self.stats {
+            to_stderr(&stats.table(result.drawn, threads));
+        }
+        Ok(())
+    }
+
+    fn fail(&self, error: JobError) -> anyhow::Error {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.clear();
+        }
+        exit::tell_job(&error);
+        let message = error.to_string();
+        let told = anyhow::Error::new(Told(error));
+        if let Shown::Json(json) = &self.shown {
+            json.failed(&message, exit::code(&told));
+        }
+        told
+    }
+}
+
+impl Observer for Watcher {
+    fn begin(&self, stage: Stage) {
+        self.stats.iter().for_each(|stats| stats.begin(stage));
+    }
+
+    fn end(&self, stage: Stage) {
+        self.stats.iter().for_each(|stats| stats.end(stage));
+    }
+
+    fn cancelled(&self) -> bool {
+        interrupt::came()
+    }
+}
+
+impl JobObserver for Watcher {
+    fn started(&self, outline: &Outline) {
+        match &self.shown {
+            Shown::Bar(bar) => bar.started(outline),
+            Shown::Json(json) => json.started(outline),
+            Shown::Nothing => {}
+        }
+    }
+
+    fn frame_done(&self, frame: &FrameDone) {
+        match &self.shown {
+            Shown::Bar(bar) => bar.frame_done(),
+            Shown::Json(json) => json.frame_done(frame, self.since.elapsed().as_secs_f64()),
+            Shown::Nothing => {}
+        }
+    }
+
+    fn note(&self, note: &Note) {
+        let warn = || to_stderr(&format!("warning: {note}"));
+        if let Shown::Bar(bar) = &self.shown { bar.beside(warn) } else { warn() }
+    }
+}

@@ -1,0 +1,287 @@
+//! Plates of every kind are read, and no hostile file does harm.
+
+use std::{fs, path::Path};
+
+use bansho_base::{
+    assets::{AssetProblem, Assets, Encoding},
+    image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision},
+};
+use bansho_media::{
+    exr,
+    plates::{FileAssets, decode_picture},
+    png::{self, PngEffort},
+};
+
+fn display(width: usize, height: usize) -> DisplayImage {
+    let pixels = (0..width * height).map(|i| [(i * 5) as u8, (i * 3) as u8, 200, 255 - (i % 7) as u8]).collect();
+    DisplayImage { width, height, opaque: false, pixels: DisplayPixels::Eight(pixels) }
+}
+
+fn frame(width: usize, height: usize) -> Frame {
+    let count = width * height;
+    let pixels = (0..count).map(|i| [i as f32 * 0.5, 0.25, -0.5, 0.5]).collect();
+    let identity = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+    let camera = CameraHeader { world_to_camera: identity, world_to_ndc: identity, vertical_fov_deg: 40.0 };
+    let header = FrameHeader {
+        number: 1,
+        exposure_ev100: 0.0,
+        fps: [24, 1],
+        exposure_time_s: 0.02,
+        camera,
+        fingerprint: [7; 32],
+        display_size: [width, height],
+        data_origin: [0, 0],
+    };
+    let depth = (0..count).map(|i| if i % 3 == 0 { f32::INFINITY } else { i as f32 * 1.5 }).collect();
+    let channel = Channel { name: "fire.kelvin".to_owned(), precision: Precision::Single, values: vec![1500.0; count] };
+    let beauty = Image::from_pixels(width, height, pixels).unwrap();
+    Frame { header, beauty, depth: Some(depth), channels: vec![channel], opaque: false }
+}
+
+fn png_bytes(picture: &DisplayImage) -> Vec<u8> {
+    png::encode(picture, &[0; 32], PngEffort::Fast, Path::new("a.png")).unwrap()
+}
+
+fn exr_bytes(frame: &Frame) -> Vec<u8> {
+    exr::encode(frame, Path::new("a.exr")).unwrap()
+}
+
+/// A PNG of any colour type, by the plain encoder.
+fn raw_png(width: u32, height: u32, kind: ::png::ColorType, depth: ::png::BitDepth, data: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = ::png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(kind);
+    encoder.set_depth(depth);
+    if kind == ::png::ColorType::Indexed {
+        encoder.set_palette(vec![255, 0, 0, 0, 255, 0]);
+        encoder.set_trns(vec![255, 51]);
+    }
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(data).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+#[test]
+fn png_plates_of_every_kind() {
+    use ::png::{BitDepth::*, ColorType::*};
+    let first = |bytes: Vec<u8>| decode_picture(&bytes, "PNG").unwrap().colour.at(1, 0);
+    assert_eq!(first(raw_png(2, 1, Grayscale, Eight, &[0, 51])), [0.2, 0.2, 0.2, 1.0]);
+    assert_eq!(first(raw_png(2, 1, Grayscale, One, &[0b0100_0000])), [1.0; 4]);
+    assert_eq!(first(raw_png(2, 1, GrayscaleAlpha, Eight, &[0, 0, 255, 51])), [1.0, 1.0, 1.0, 0.2]);
+    assert_eq!(first(raw_png(2, 1, Rgb, Eight, &[0, 0, 0, 255, 51, 0])), [1.0, 0.2, 0.0, 1.0]);
+    assert_eq!(first(raw_png(2, 1, Indexed, One, &[0b0100_0000])), [0.0, 1.0, 0.0, 0.2]);
+    let wide = [0, 0, 0, 0, 0, 0, 0, 0, 255, 255, 0, 0, 0x33, 0x33, 255, 255];
+    assert_eq!(first(raw_png(2, 1, Rgba, Sixteen, &wide)), [1.0, 0.0, 0.2, 1.0]);
+}
+
+#[test]
+fn what_bansho_writes_it_reads() {
+    let picture = decode_picture(&png_bytes(&display(9, 5)), "png").unwrap();
+    assert_eq!(picture.encoding, Encoding::DisplaySrgb);
+    assert_eq!(picture.colour.at(2, 1), [55, 33, 200, 251].map(|code| code as f32 / 255.0));
+
+    let original = frame(21, 35);
+    let picture = decode_picture(&exr_bytes(&original), "exr").unwrap();
+    assert_eq!(picture.encoding, Encoding::LinearAcescg);
+    assert_eq!(picture.depth, original.depth);
+    // Straight colour from premultiplied.
+    assert_eq!(picture.colour.at(4, 0), [4.0, 0.5, -1.0, 0.5]);
+}
+
+#[test]
+fn an_exr_with_another_data_window_is_laid_into_its_display_window() {
+    let mut original = frame(4, 3);
+    original.header.display_size = [4, 4];
+    original.header.data_origin = [-1, 2];
+    let picture = decode_picture(&exr_bytes(&original), "exr").unwrap();
+    assert_eq!((picture.colour.width(), picture.colour.height()), (4, 4));
+    assert_eq!(picture.colour.at(0, 2)[0], 1.0);
+    assert_eq!(picture.colour.at(2, 3)[0], 7.0);
+    assert_eq!(picture.colour.at(3, 3), [0.0; 4]);
+    assert_eq!(picture.colour.at(0, 0), [0.0; 4]);
+    assert_eq!(picture.depth.unwrap()[0], f32::INFINITY);
+}
+
+#[test]
+fn tiled_float_and_depth_only_exr_files_are_read() {
+    use ::exr::prelude::{
+        AnyChannel, AnyChannels, Blocks, Compression, Encoding as ExrEncoding, FlatSamples, Image as ExrImage, Layer,
+        LayerAttributes, LineOrder, Vec2, WritableImage,
+    };
+    let write = |names: &[&str], compression: Compression| {
+        let channel = |(index, name): (usize, &&str)| {
+            let samples = (0..70 * 50).map(|i| (i + index) as f32).collect();
+            AnyChannel::new(*name, FlatSamples::F32(samples))
+        };
+        let channels = AnyChannels::sort(names.iter().enumerate().map(channel).collect());
+        let tiles = Blocks::Tiles(Vec2(16, 16));
+        let encoding = ExrEncoding { compression, blocks: tiles, line_order: LineOrder::Increasing };
+        let layer = Layer::new((70, 50), LayerAttributes::default(), encoding, channels);
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        ExrImage::from_layer(layer).write().non_parallel().to_buffered(&mut bytes).unwrap();
+        bytes.into_inner()
+    };
+    for compression in [Compression::Uncompressed, Compression::RLE, Compression::ZIP1, Compression::PIZ] {
+        let picture = decode_picture(&write(&["R", "G", "B", "depth.Z"], compression), "exr").unwrap();
+        assert_eq!(picture.encoding, Encoding::LinearSrgb);
+        assert_eq!(picture.colour.at(69, 49), [3499.0, 3500.0, 3501.0, 1.0], "{compression:?}");
+        assert_eq!(picture.depth.unwrap()[70], 73.0);
+    }
+    let depth_only = decode_picture(&write(&["distance"], Compression::ZIP16), "exr").unwrap();
+    assert_eq!(depth_only.depth.unwrap()[71], 71.0);
+    let layered = decode_picture(&write(&["plate.R", "plate.G", "plate.B"], Compression::ZIP16), "exr").unwrap();
+    assert_eq!(layered.colour.at(0, 0), [0.0, 1.0, 2.0, 1.0]);
+    let useless = decode_picture(&write(&["a", "b"], Compression::ZIP16), "exr");
+    assert!(matches!(useless, Err(AssetProblem::NoChannel(_))));
+}
+
+/// A grey JPEG of 8 x 8 pixels, all 128: the smallest baseline file there can be.
+fn grey_jpeg() -> Vec<u8> {
+    let mut file = vec![0xFF, 0xD8, 0xFF, 0xDB, 0, 67, 0];
+    file.extend([1; 64]);
+    file.extend([0xFF, 0xC0, 0, 11, 8, 0, 8, 0, 8, 1, 1, 0x11, 0]);
+    // One code each: difference of 0, and end of block.
+    for class in [0x00, 0x10] {
+        file.extend([0xFF, 0xC4, 0, 20, class, 1]);
+        file.extend([0; 15]);
+        file.push(0);
+    }
+    file.extend([0xFF, 0xDA, 0, 8, 1, 1, 0, 0, 63, 0, 0b0011_1111, 0xFF, 0xD9]);
+    file
+}
+
+#[test]
+fn a_jpeg_is_read() {
+    let picture = decode_picture(&grey_jpeg(), "JPG").unwrap();
+    assert_eq!((picture.colour.width(), picture.colour.height()), (8, 8));
+    let [r, g, b, alpha] = picture.colour.at(3, 3);
+    assert!((r - 128.0 / 255.0).abs() < 0.01 && r == g && g == b && alpha == 1.0);
+}
+
+/// CRC of the part of a PNG that was changed, by bits, as the standard's annex D gives it.
+fn crc(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0, |crc: u32, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0xEDB8_8320 } else { crc >> 1 })
+    })
+}
+
+fn with_png_size(mut file: Vec<u8>, width: u32, height: u32) -> Vec<u8> {
+    file[16..20].copy_from_slice(&width.to_be_bytes());
+    file[20..24].copy_from_slice(&height.to_be_bytes());
+    let sum = crc(&file[12..29]);
+    file[29..33].copy_from_slice(&sum.to_be_bytes());
+    file
+}
+
+/// Changes the windows in the header of an EXR file.
+fn with_exr_size(mut file: Vec<u8>, width: i32, height: i32) -> Vec<u8> {
+    for name in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+        let start = file.windows(name.len()).position(|part| part == name).unwrap() + name.len() + 4;
+        file[start + 8..start + 12].copy_from_slice(&(width - 1).to_le_bytes());
+        file[start + 12..start + 16].copy_from_slice(&(height - 1).to_le_bytes());
+    }
+    file
+}
+
+#[test]
+fn claims_of_a_hundred_thousand_pixels_are_refused() {
+    let png = with_png_size(png_bytes(&display(9, 5)), 100_000, 100_000);
+    let exr = with_exr_size(exr_bytes(&frame(9, 5)), 100_000, 100_000);
+    for (bytes, extension) in [(png, "png"), (exr, "exr")] {
+        let refused = decode_picture(&bytes, extension);
+        assert_eq!(refused, Err(AssetProblem::TooLarge { width: 100_000, height: 100_000, limit: 16384 }));
+    }
+    let mut jpeg = grey_jpeg();
+    let size = jpeg.windows(2).position(|pair| pair == [0xFF, 0xC0]).unwrap() + 5;
+    jpeg[size..size + 4].copy_from_slice(&[0xFF; 4]);
+    assert_eq!(decode_picture(&jpeg, "jpg"), Err(AssetProblem::TooLarge { width: 65535, height: 65535, limit: 16384 }));
+}
+
+#[test]
+fn claims_within_the_limit_that_the_file_cannot_hold_are_refused() {
+    let png = with_png_size(png_bytes(&display(9, 5)), 16000, 8000);
+    let exr = with_exr_size(exr_bytes(&frame(9, 5)), 16000, 8000);
+    for (bytes, extension) in [(png, "png"), (exr, "exr")] {
+        let Err(AssetProblem::Damaged(reason)) = decode_picture(&bytes, extension) else { panic!("{extension}") };
+        assert!(reason.contains("16000 x 8000"), "{reason}");
+    }
+    let square = with_png_size(png_bytes(&display(9, 5)), 16384, 16384);
+    assert!(matches!(decode_picture(&square, "png"), Err(AssetProblem::TooManyPixels { .. })));
+}
+
+#[test]
+fn files_cut_off_anywhere_are_refused() {
+    for (bytes, extension) in [(png_bytes(&display(40, 30)), "png"), (exr_bytes(&frame(40, 30)), "exr")] {
+        for length in (0..bytes.len() - 12).step_by(7) {
+            assert!(decode_picture(&bytes[..length], extension).is_err(), "{extension} cut to {length}");
+        }
+    }
+    assert!(decode_picture(&grey_jpeg()[..40], "jpg").is_err());
+}
+
+#[test]
+fn damaged_files_never_panic() {
+    let sources = [
+        (png_bytes(&display(40, 30)), "png"),
+        (exr_bytes(&frame(40, 30)), "exr"),
+        (grey_jpeg(), "jpg"),
+        (Vec::new(), "png"),
+        (Vec::new(), "exr"),
+        (Vec::new(), "jpg"),
+        (vec![0; 100], "exr"),
+    ];
+    let mut state = 1_u64;
+    let mut random = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize
+    };
+    for (bytes, extension) in &sources {
+        for _ in 0..150_000 {
+            let mut damaged = bytes.clone();
+            // Mostly in the header, where lengths and sizes are.
+            let reach = if random() % 3 == 0 { damaged.len() } else { damaged.len().min(900) };
+            for _ in 0..1 + random() % 4 {
+                if reach > 0 {
+                    damaged[random() % reach] = random() as u8;
+                }
+            }
+            // Either is right; what matters is that it comes back.
+            let _ = decode_picture(&damaged, extension);
+        }
+    }
+}
+
+#[test]
+fn files_are_found_numbered_digested_and_remembered() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("p")).unwrap();
+    let path = folder.path().join("p/street.0012.png");
+    fs::write(&path, png_bytes(&display(3, 2))).unwrap();
+    fs::write(folder.path().join("note.txt"), "火").unwrap();
+    let assets = FileAssets::new(folder.path());
+    let first = assets.picture("p/street.####.png", 12).unwrap();
+    assert_eq!(assets.digest("p/street.####.png", 12).unwrap(), *blake3::hash(&fs::read(&path).unwrap()).as_bytes());
+    fs::write(&path, png_bytes(&display(5, 2))).unwrap();
+    assert_eq!(assets.picture("p/street.0012.png", 0).unwrap(), first);
+    assets.forget();
+    assert_eq!(assets.picture("p/street.####.png", 12).unwrap().colour.width(), 5);
+    assert_eq!(&*assets.text("note.txt").unwrap(), "火");
+    assert_eq!(assets.picture(path.to_str().unwrap(), 0).unwrap().colour.width(), 5);
+}
+
+#[test]
+fn what_is_wrong_with_a_file_is_said_with_its_path() {
+    let folder = tempfile::tempdir().unwrap();
+    let assets = FileAssets::new(folder.path());
+    fs::write(folder.path().join("a.tiff"), "x").unwrap();
+    fs::write(folder.path().join("a.png"), "").unwrap();
+    fs::create_dir(folder.path().join("d.png")).unwrap();
+    let error = |path: &str| assets.picture(path, 3).unwrap_err();
+    assert_eq!(error("no.png").problem, AssetProblem::Missing);
+    assert!(error("p.##.png").path.ends_with("p.03.png"));
+    assert_eq!(error("a.tiff").problem, AssetProblem::UnknownKind);
+    assert!(matches!(error("a.png").problem, AssetProblem::Damaged(_)));
+    assert!(matches!(error("d.png").problem, AssetProblem::Unreadable(_)));
+    assert!(matches!(error("#.#.png").problem, AssetProblem::Unreadable(_)));
+}

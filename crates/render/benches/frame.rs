@@ -1,0 +1,162 @@
+//! What a frame costs beside its phenomena: compositing and view transform at 1920 x 1080.
+//!
+//! The naive way composites whole pictures in f64, pixel by pixel, and shows each pixel by itself.
+
+use std::{hint::black_box, sync::Arc};
+
+use bansho_base::{
+    assets::MemoryAssets,
+    canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
+    color::{self, encode_srgb},
+    image::{Frame, Rect},
+    observer::{Cancelled, Observer, Unobserved},
+    phenomenon::{Phenomenon, Prepared},
+    surroundings::{Publication, Surroundings},
+};
+use bansho_render::{
+    Backend, CpuBackend, Plan, PlanOptions, Scene,
+    display::{BitDepth, display},
+    scene::{Describe, Opening, OpeningFault},
+};
+use criterion::{Criterion, criterion_group, criterion_main};
+
+const SIZE: [usize; 2] = [1920, 1080];
+
+bansho_base::parameters! {
+    /// A picture that costs nothing to draw: a bright patch in the dark, as flames are.
+    pub struct PatchParameters {
+        /// Depth.
+        depth: f64 = 2.0, unit("m");
+        /// Whether it absorbs a little, too.
+        absorbs: bool = false;
+    }
+}
+
+impl Describe for PatchParameters {
+    const KEY: &'static str = "patch";
+
+    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        Ok(Box::new(Patch { name: opening.name.to_owned(), parameters: self.clone() }))
+    }
+}
+
+struct Patch {
+    name: String,
+    parameters: PatchParameters,
+}
+
+/// Radiance at a place: a soft disc over the middle half of the picture.
+fn radiance(x: usize, y: usize) -> f32 {
+    let (dx, dy) = (x as f32 / 480.0 - 2.0, y as f32 / 480.0 - 1.1);
+    (1.0 - (dx * dx + dy * dy)).max(0.0) * 4000.0
+}
+
+impl Phenomenon for Patch {
+    fn name(&self) -> &str {
+        &self.name
+    }
+    fn aovs(&self) -> &'static [AovDescriptor] {
+        &[]
+    }
+    fn luminance(&self) -> f64 {
+        2000.0
+    }
+    fn publish(&self, _shutter: Shutter) -> Publication {
+        Publication::default()
+    }
+    fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
+        vec![DepthInterval { near: self.parameters.depth, far: self.parameters.depth + 0.1 }]
+    }
+    fn prepare<'a>(
+        &'a self,
+        _view: &'a View,
+        _surroundings: &'a Surroundings<'a>,
+        _observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        let row = |y: usize| (0..SIZE[0]).map(|x| radiance(x, y)).collect();
+        let rows: Vec<Vec<f32>> = (0..16).map(|y| row(y * 67)).collect();
+        Ok(Box::new(PreparedPatch { rows, absorbs: self.parameters.absorbs }))
+    }
+}
+
+struct PreparedPatch {
+    rows: Vec<Vec<f32>>,
+    absorbs: bool,
+}
+
+impl Prepared for PreparedPatch {
+    fn bounds(&self, _slice: &DepthInterval) -> Rect {
+        Rect { x: 0, y: 100, width: SIZE[0], height: 900 }
+    }
+    fn draw(&self, _slice: &DepthInterval, strip: &mut Strip) {
+        let width = strip.rect.width;
+        for row in 0..strip.rect.height {
+            let source = &self.rows[(strip.rect.y + row) / 68 % 16];
+            for (c, share) in [1.0_f32, 0.4, 0.1].into_iter().enumerate() {
+                let plane = &mut strip.radiance[c][row * width..][..width];
+                plane.iter_mut().zip(source).for_each(|(to, from)| *to = share * from);
+            }
+        }
+        if self.absorbs {
+            strip.transmittance_planes_mut().iter_mut().for_each(|plane| plane.fill(0.9));
+        }
+    }
+}
+
+fn plan(text: &str) -> Arc<Plan> {
+    let assets = Arc::new(MemoryAssets::default());
+    let text = format!("bansho = 1\n[picture]\nsize = [1920, 1080]\n{text}");
+    let scene = Scene::parse("bench.toml", &text, &[PatchParameters::KIND], assets.as_ref()).expect("a valid scene");
+    Arc::new(Plan::new(scene, &PlanOptions::default(), assets).expect("a valid plan"))
+}
+
+fn frame(shot: &mut dyn bansho_render::Shot) -> Frame {
+    shot.draw(&Unobserved).expect("nobody cancels");
+    shot.read().expect("a frame was drawn")
+}
+
+/// Composites two layers and shows the picture, all in f64 and one pixel at a time.
+fn naive(exposure: f64) -> Vec<[u8; 4]> {
+    let pixel = |index: usize| {
+        let (x, y) = (index % SIZE[0], index / SIZE[0]);
+        let mut colour = [0.0_f64; 3];
+        let mut transmittance = [1.0_f64; 3];
+        for absorbed in [0.9, 1.0] {
+            for (c, share) in [1.0, 0.4, 0.1].into_iter().enumerate() {
+                colour[c] += transmittance[c] * f64::from(radiance(x, y / 68 * 67)) * share;
+                transmittance[c] *= absorbed;
+            }
+        }
+        let alpha = 1.0 - transmittance.iter().sum::<f64>() / 3.0;
+        let light = color::View::DISPLAY.to_display(colour.map(|value| (value * exposure) as f32));
+        let alpha = light.iter().fold(alpha as f32, |alpha, value| alpha.max(*value));
+        let code = |value: f32| (encode_srgb(if alpha > 0.0 { value / alpha } else { 0.0 }) * 255.0).round() as u8;
+        [code(light[0]), code(light[1]), code(light[2]), (alpha * 255.0).round() as u8]
+    };
+    (0..SIZE[0] * SIZE[1]).map(pixel).collect()
+}
+
+fn benches(criterion: &mut Criterion) {
+    let one = plan("[[patch]]\n");
+    let two = plan("[[patch]]\ndepth = 1\nabsorbs = true\n[[patch]]\n");
+    let exposure = f64::from(two.exposure_scale());
+    let mut group = criterion.benchmark_group("frame_1080p");
+    group.sample_size(20);
+    for (name, plan) in [("composite_one", &one), ("composite_two", &two)] {
+        let mut shot = CpuBackend.open(plan.clone()).expect("a valid plan");
+        group.bench_function(name, |bencher| bencher.iter(|| black_box(frame(shot.as_mut()))));
+    }
+    let mut shot = CpuBackend.open(two.clone()).expect("a valid plan");
+    let drawn = frame(shot.as_mut());
+    group.bench_function("view", |bencher| {
+        bencher.iter(|| black_box(display(&drawn, &color::View::DISPLAY, BitDepth::Eight)));
+    });
+    group.bench_function("composite_two_and_view", |bencher| {
+        bencher.iter(|| black_box(display(&frame(shot.as_mut()), &color::View::DISPLAY, BitDepth::Eight)));
+    });
+    group.bench_function("naive", |bencher| bencher.iter(|| black_box(naive(exposure))));
+    group.finish();
+}
+
+criterion_group!(frame_benches, benches);
+criterion_main!(frame_benches);

@@ -1,0 +1,102 @@
+//! The book's page on the scene file is what the descriptors say, so that it cannot drift from the program.
+
+use bansho_base::parameters::{Descriptor, Kind, TableDescriptor, Value};
+use bansho_render::{
+    phenomena::KINDS,
+    scene::{FORMAT, SHARED_TABLES},
+};
+
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/reference/scene.md");
+
+#[test]
+fn the_books_page_on_the_scene_file_is_up_to_date() {
+    let page = page();
+    if std::env::var_os("BANSHO_BLESS").is_some() {
+        std::fs::write(PAGE, &page).unwrap();
+    }
+    let written = std::fs::read_to_string(PAGE).unwrap();
+    let differs = written.lines().zip(page.lines()).find(|(written, now)| written != now);
+    assert_eq!(differs, None, "run BANSHO_BLESS=1 cargo test -p bansho-render --test scene_reference");
+    assert_eq!(written.len(), page.len());
+}
+
+fn page() -> String {
+    let mut page = format!(
+        "# The scene file\n\n\
+         <!-- Written by crates/render/tests/scene_reference.rs from the descriptors; edit those instead. -->\n\n\
+         A scene begins with its format, `bansho = {FORMAT}`. Everything else may be left out and then has the default given \
+         here. How values, keys and curves are written is told in [the guide](../guide/scene-file.md).\n"
+    );
+    for shared in &SHARED_TABLES {
+        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        section(&mut page, &header, "", (shared.table)());
+    }
+    for kind in KINDS {
+        section(&mut page, &format!("[[{}]]", kind.key), COMMON, (kind.table)());
+    }
+    page
+}
+
+/// What every phenomenon has beside its own parameters.
+const COMMON: &str = "| `name` | a string without dots | the kind, numbered from the second on | Unique name of this one; names its layers. |\n\
+    | `enabled` | true or false | `true` | Whether it is drawn. |\n";
+
+fn section(page: &mut String, header: &str, common: &str, table: &TableDescriptor) {
+    *page += &format!("\n## `{header}`\n\n{}\n", one_line(&table.doc));
+    parameters(page, common, table);
+    let mut inner = Vec::new();
+    tables("", table, &mut inner);
+    for (key, table) in inner {
+        *page += &format!("\n### `{key}` in `{header}`\n\n{}\n", one_line(&table.doc));
+        parameters(page, "", table);
+    }
+}
+
+fn parameters(page: &mut String, common: &str, table: &TableDescriptor) {
+    *page += &format!("\n| key | allowed | default | what it is |\n|---|---|---|---|\n{common}");
+    for parameter in &table.parameters {
+        let doc = format!("{}{}", one_line(&parameter.doc), choices(&parameter.kind));
+        let cells = [format!("`{}`", parameter.key), allowed(parameter), default(parameter), doc];
+        *page += &format!("| {} |\n", cells.map(|cell| cell.replace('|', "\\|")).join(" | "));
+    }
+}
+
+/// The tables within a table, each with its dotted key.
+fn tables(prefix: &str, table: &TableDescriptor, found: &mut Vec<(String, &'static TableDescriptor)>) {
+    for parameter in &table.parameters {
+        let (inner, suffix) = match &parameter.kind {
+            Kind::List { item, .. } => (item.as_ref(), "[]"),
+            kind => (kind, ""),
+        };
+        if let Kind::Table(inner) = inner {
+            let key = format!("{prefix}{}{suffix}", parameter.key);
+            found.push((key.clone(), inner()));
+            tables(&format!("{key}."), inner(), found);
+        }
+    }
+}
+
+fn allowed(parameter: &Descriptor) -> String {
+    let unit = if parameter.unit.is_empty() { String::new() } else { format!(" [{}]", parameter.unit) };
+    let rising = if matches!(parameter.kind, Kind::Curve { rising: true, .. }) { ", never falling" } else { "" };
+    format!("{}{unit}{rising}", parameter.kind.expectation())
+}
+
+fn default(parameter: &Descriptor) -> String {
+    match (&parameter.kind, &parameter.default) {
+        (Kind::Table(_), _) => "see below".into(),
+        (_, Some(Value::List(items))) if items.is_empty() => "none".into(),
+        (_, Some(value)) => format!("`{value}`"),
+        (_, None) => "none".into(),
+    }
+}
+
+/// What each name of a choice means.
+fn choices(kind: &Kind) -> String {
+    let Kind::Choice(choices) = kind else { return String::new() };
+    choices.iter().map(|choice| format!(" `{}`: {}", choice.name, one_line(choice.doc))).collect()
+}
+
+fn one_line(doc: &str) -> String {
+    doc.split_whitespace().collect::<Vec<_>>().join(" ")
+}
