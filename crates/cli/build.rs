@@ -39,7 +39,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
     paths.sort();
-    let mut code = String::from("/// Every scene that comes with the program, by name.\npub(crate) const EXAMPLES: &[Example] = &[\n");
+    let mut code = String::from(
+        "/// Every scene that comes with the program, by name.\npub(crate) const EXAMPLES: &[Example] = &[\n",
+    );
     for path in &paths {
         code.push_str(&example(&scenes, path)?.unwrap_or_default());
     }

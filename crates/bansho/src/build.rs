@@ -9,8 +9,8 @@ use bansho_base::{
     wind::WindParameters,
 };
 use bansho_render::{
-    phenomena::KINDS,
     Scene, SceneError,
+    phenomena::KINDS,
     scene::{Describe, FORMAT, LightParameters, PictureParameters, PlateParameters},
 };
 

@@ -19,6 +19,9 @@ pub const MOST_SLICES: usize = 24;
 /// `intervals[i]` are the stretches that phenomenon `i` fills. Neighbouring slices with the same members stay apart
 /// only where another phenomenon begins or ends between them.
 pub fn cut(intervals: &[Vec<DepthInterval>]) -> Vec<Slice> {
+    let intervals: Vec<Vec<DepthInterval>> =
+        intervals.iter().map(|filled| filled.iter().map(thickened).collect()).collect();
+    let intervals = intervals.as_slice();
     let mut edges: Vec<f64> = intervals
         .iter()
         .flatten()
@@ -38,6 +41,11 @@ pub fn cut(intervals: &[Vec<DepthInterval>]) -> Vec<Slice> {
         merge_thinnest(&mut slices);
     }
     slices
+}
+
+/// A sheet that faces the camera fills a single depth; its slice is the thinnest there is.
+fn thickened(interval: &DepthInterval) -> DepthInterval {
+    DepthInterval { near: interval.near, far: interval.far.max(interval.near.next_up()) }
 }
 
 fn members(intervals: &[Vec<DepthInterval>], slice: &DepthInterval) -> Vec<usize> {
@@ -93,6 +101,13 @@ mod tests {
         let slices = cut(&[vec![interval(1.0, 2.0), interval(2.0, 3.0), interval(5.0, 6.0)]]);
         assert_eq!(slices.len(), 1, "one phenomenon sorts itself: {slices:?}");
         assert_eq!(cut(&[]), []);
+    }
+
+    #[test]
+    fn a_sheet_without_thickness_has_a_slice_of_its_own() {
+        let slices = cut(&[vec![interval(0.0, 50.0)], vec![interval(3.0, 3.0)]]);
+        assert_eq!(slices.len(), 3);
+        assert!(slices[1].interval.contains(3.0) && slices[1].members == [0, 1]);
     }
 
     #[test]

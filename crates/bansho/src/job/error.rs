@@ -4,10 +4,7 @@ use std::path::PathBuf;
 
 use bansho_base::observer::Cancelled;
 use bansho_media::{MediaError, flipbook::TileError, naming::NamingError};
-use bansho_render::{
-    PlanError, RenderError, SceneError,
-    scene::edit::EditError,
-};
+use bansho_render::{PlanError, RenderError, SceneError, scene::edit::EditError};
 
 /// Why a job cannot be done.
 #[derive(Debug, thiserror::Error)]
@@ -90,7 +87,9 @@ pub enum Conflict {
         most: usize,
     },
     /// A sheet larger than pictures may be.
-    #[error("the sheet would have {width} x {height} pixels; allowed: up to {most} on a side, so choose smaller or fewer tiles")]
+    #[error(
+        "the sheet would have {width} x {height} pixels; allowed: up to {most} on a side, so choose smaller or fewer tiles"
+    )]
     SheetSize {
         /// Its width.
         width: usize,

@@ -156,7 +156,9 @@ impl Job {
         frames.dedup();
         let first = *frames.first().ok_or(Conflict::NoFrames)?;
         match self.contact_sheet {
-            Some(tiles) if !(1..=MOST_TILES).contains(&tiles) => Err(Conflict::Tiles { tiles, most: MOST_TILES }.into()),
+            Some(tiles) if !(1..=MOST_TILES).contains(&tiles) => {
+                Err(Conflict::Tiles { tiles, most: MOST_TILES }.into())
+            }
             Some(tiles) => Ok((first..first.saturating_add(tiles as i64)).collect()),
             None => Ok(frames),
         }

@@ -74,8 +74,7 @@ impl SceneFile {
 
     fn changed(&self) -> Result<String, JobError> {
         self.changes.iter().try_fold(self.text.clone(), |text, assignment| {
-            edit::set(&text, assignment)
-                .map_err(|source| JobError::Edit { assignment: assignment.clone(), source })
+            edit::set(&text, assignment).map_err(|source| JobError::Edit { assignment: assignment.clone(), source })
         })
     }
 }

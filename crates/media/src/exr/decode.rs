@@ -6,7 +6,13 @@
 use std::{io::Cursor, ops::Range, panic::catch_unwind};
 
 use ::exr::{
-    block::{UncompressedBlock, chunk::Chunk, lines::LineRef, reader::ChunksReader},
+    block::{
+        UncompressedBlock,
+        chunk::{Chunk, CompressedBlock},
+        lines::LineRef,
+        reader::ChunksReader,
+    },
+    compression::Compression,
     meta::{MetaData, attribute::SampleType, header::Header},
 };
 use bansho_base::{
@@ -168,9 +174,39 @@ fn read_chunks(file: &[u8], wanted: &Wanted, planes: &mut Planes) -> Result<(), 
 /// Decompresses a chunk. The crate's PIZ and B44 decoders are known to panic on damaged chunks (exr 1.74: an empty list in
 /// `piz/huffman.rs`, overflow in `b44/mod.rs`); they own all they touch, so that nothing is left half-changed.
 fn decompress(chunk: Chunk, meta: &MetaData) -> Result<UncompressedBlock, AssetProblem> {
+    check_dwa(&chunk, meta)?;
     catch_unwind(|| UncompressedBlock::decompress_chunk(chunk, meta, false))
         .map_err(|_| damaged("its pixels cannot be decompressed"))?
         .map_err(damaged)
+}
+
+/// Fields of 8 bytes at the start of a DWA chunk: version, nine lengths, and the kind of entropy coding.
+const DWA_FIELDS: usize = 11;
+
+/// Refuses a DWA chunk whose header claims more than its pixels could take, since the crate (exr 1.74,
+/// `dwa/section_stream.rs`) takes memory for whatever it claims.
+fn check_dwa(chunk: &Chunk, meta: &MetaData) -> Result<(), AssetProblem> {
+    let header = meta.headers.get(chunk.layer_index).ok_or_else(|| damaged("a block of no part"))?;
+    if !matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
+        return Ok(());
+    }
+    let bytes = match &chunk.compressed_block {
+        CompressedBlock::Tile(tile) => &tile.compressed_pixels_le,
+        CompressedBlock::ScanLine(lines) => &lines.compressed_pixels_le,
+        _ => return Err(damaged("deep pixels are not read")),
+    };
+    let place = header.get_block_data_indices(&chunk.compressed_block).map_err(damaged)?;
+    let area = header.get_absolute_block_pixel_coordinates(place).map_err(damaged)?.size.area();
+    let pixel_bytes = area * header.channels.bytes_per_pixel;
+    // A chunk that compression would have made larger is stored as it is, without the fields.
+    if bytes.is_empty() || bytes.len() == pixel_bytes {
+        return Ok(());
+    }
+    // Coefficients stand for samples one to one, with at most as many ends of blocks.
+    let most = 4 * pixel_bytes as u64 + 4096;
+    let fields: Option<&[[u8; 8]]> = bytes.as_chunks().0.get(..DWA_FIELDS);
+    let is_possible = fields.is_some_and(|fields| fields.iter().all(|field| u64::from_le_bytes(*field) <= most));
+    if is_possible { Ok(()) } else { Err(damaged("a chunk claims more than its pixels can take")) }
 }
 
 impl Planes {

@@ -8,22 +8,33 @@ use super::{
     chain,
     lanes::{LANES, Lanes, Real, any_positive, probe},
     moment::Moment,
-    placement::{Batch, Mapping},
+    placement::{Batch, Mapping, Stand},
     ramp::Ramp,
     shape::{Place, Shape},
+    smoke::{SmokeState, shade_smoke},
     texture::Texture,
 };
 
-/// One flame at one moment of the exposure, as one camera sees it.
-pub(crate) struct Sample {
-    /// From pixels to the sheet.
-    pub(crate) mapping: Mapping,
+/// What a sheet shows at one moment.
+pub(crate) struct State {
     /// Edges, centre line, scroll.
     pub(crate) moment: Moment,
     /// T0.
     pub(crate) texture: Texture,
     /// Size of a pixel in x' and in y.
     pub(crate) pixel: [f32; 2],
+}
+
+/// A sheet at one moment of the exposure, as one camera sees it.
+pub(crate) struct Sample {
+    /// From pixels to the sheet.
+    pub(crate) mapping: Mapping,
+    /// Where the sheet stands.
+    pub(crate) stand: Stand,
+    /// What it shows.
+    pub(crate) state: State,
+    /// Where it is smoke, what that is made of.
+    pub(crate) smoke: Option<SmokeState>,
     /// Luminance of the brightest colour, divided by the number of samples; cd/m^2.
     pub(crate) luminance: f32,
 }
@@ -41,13 +52,13 @@ pub(crate) struct Shade<S: Simd> {
 
 /// Whether any flame reaches a batch, and what of it.
 #[inline(always)]
-pub(crate) fn shade<S: Simd>(shape: &Shape, ramp: &Ramp, sample: &Sample, batch: &Batch<S>) -> Option<Shade<S>> {
-    let (x, y) = sample.moment.straighten(batch.x, batch.y);
+pub(crate) fn shade<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<S>) -> Option<Shade<S>> {
+    let (x, y) = state.moment.straighten(batch.x, batch.y);
     if shape.out_of_reach(probe(x), probe(y)) {
         return None;
     }
-    let place = shape.place(x, y, &sample.moment.edges, sample.pixel)?;
-    let t1 = chain::above_threshold(sample.texture.sample(place.u, place.w), place.threshold);
+    let place = shape.place(x, y, &state.moment.edges, state.pixel)?;
+    let t1 = chain::above_threshold(state.texture.sample(place.u, place.w), place.threshold);
     let zero = t1.like(0.0);
     let strength = zero.choose(t1, place.coverage * place.glow, zero);
     let blue = ramp.base_blue[2] > 0.0 && any_positive(place.w.like(BLUE_TOP) - place.w);
@@ -57,6 +68,12 @@ pub(crate) fn shade<S: Simd>(shape: &Shape, ramp: &Ramp, sample: &Sample, batch:
     let mut light = ramp.light(t1);
     for plane in &mut light {
         *plane = *plane * strength;
+    }
+    let [red, green_beside_red] = place.cooling;
+    let green = red * green_beside_red;
+    let blue_left = green * green_beside_red * green_beside_red.root();
+    for (plane, left) in light.iter_mut().zip([red, green, blue_left]) {
+        *plane = *plane * left;
     }
     if blue {
         add_base_blue(&mut light, ramp, &place);
@@ -81,14 +98,14 @@ fn add_base_blue<S: Simd>(light: &mut [Lanes<S>; 4], ramp: &Ramp, place: &Place<
 
 /// The flat texture square of the paper's pictures 1 to 4.
 #[inline(always)]
-fn shade_flat<S: Simd>(shape: &Shape, ramp: &Ramp, sample: &Sample, batch: &Batch<S>, cut: bool) -> Option<Shade<S>> {
+fn shade_flat<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<S>, cut: bool) -> Option<Shade<S>> {
     let (zero, one) = (batch.x.like(0.0), batch.x.like(1.0));
     let outside = |x: Lanes<S>| (zero - x).greatest(x - one).greatest(zero);
     let strength = zero.choose(outside(batch.x) + outside(batch.y), zero, one);
     if !any_positive(strength) {
         return None;
     }
-    let texture = sample.texture.sample(batch.x, batch.y);
+    let texture = state.texture.sample(batch.x, batch.y);
     let t1 = if cut { chain::above_threshold(texture, shape.flat_threshold(batch.x, batch.y)) } else { texture };
     let mut light = ramp.light(t1);
     for plane in &mut light {
@@ -106,25 +123,30 @@ pub(crate) enum Drawn {
     FlatTexture,
     /// The texture square after the threshold.
     FlatCut,
+    /// Smoke.
+    Smoke,
 }
 
-/// Draws all samples of one flame into the part `rect` of `strip`, behind what it holds.
+/// What is drawn of one sheet.
+#[derive(Clone, Copy)]
+pub(crate) struct Paint<'a> {
+    pub(crate) shape: &'a Shape,
+    pub(crate) ramp: &'a Ramp,
+    pub(crate) samples: &'a [Sample],
+    pub(crate) drawn: Drawn,
+    /// Whether it hides anything.
+    pub(crate) absorbs: bool,
+}
+
+/// Draws all samples of one sheet into the part `rect` of `strip`, behind what it holds.
 #[inline(always)]
-pub(crate) fn draw_rows<S: Simd>(
-    simd: S,
-    shape: &Shape,
-    ramp: &Ramp,
-    samples: &[Sample],
-    drawn: Drawn,
-    rect: Rect,
-    strip: &mut Strip,
-) {
+pub(crate) fn draw_rows<S: Simd>(simd: S, paint: &Paint, rect: Rect, strip: &mut Strip) {
     // Batches begin at multiples of sixteen of the whole picture, so that strips and crops change no pixel.
     let start = rect.x / LANES * LANES;
     for y in rect.y..rect.bottom() {
         for column in (start..rect.right()).step_by(LANES) {
-            if let Some(pixels) = expose(simd, shape, ramp, samples, drawn, [column, y]) {
-                compose(&pixels, column, y, rect, ramp.absorbs, strip);
+            if let Some(pixels) = expose(simd, paint, [column, y]) {
+                compose(&pixels, column, y, rect, paint.absorbs, strip);
             }
         }
     }
@@ -138,19 +160,15 @@ struct Exposed {
 
 /// Averages all samples of the sixteen pixels at `pixel`; `None` where there is nothing.
 #[inline(always)]
-fn expose<S: Simd>(simd: S, shape: &Shape, ramp: &Ramp, samples: &[Sample], drawn: Drawn, pixel: [usize; 2]) -> Option<Exposed> {
+fn expose<S: Simd>(simd: S, paint: &Paint, pixel: [usize; 2]) -> Option<Exposed> {
+    let Paint { shape, ramp, samples, drawn, .. } = *paint;
     let mut sums = [Lanes::splat(simd, 0.0); 4];
     let mut nearest = Lanes::splat(simd, f32::INFINITY);
     let share = 1.0 / samples.len() as f32;
     let mut touched = false;
     for sample in samples {
         let batch = sample.mapping.batch(simd, pixel[0], pixel[1]);
-        let shade = match drawn {
-            Drawn::Flame => shade(shape, ramp, sample, &batch),
-            Drawn::FlatTexture => flat_out_of_line(shape, ramp, sample, &batch, false),
-            Drawn::FlatCut => flat_out_of_line(shape, ramp, sample, &batch, true),
-        };
-        let Some(shade) = shade else { continue };
+        let Some(shade) = shade_as(shape, ramp, sample, drawn, &batch) else { continue };
         touched = true;
         for (k, weight) in [sample.luminance, sample.luminance, sample.luminance, share].into_iter().enumerate() {
             sums[k] = shade.light[k].fused(nearest.like(weight), sums[k]);
@@ -169,13 +187,21 @@ fn expose<S: Simd>(simd: S, shape: &Shape, ramp: &Ramp, samples: &[Sample], draw
     Some(exposed)
 }
 
-/// The flat stages are rare: kept apart, they do not weigh on the code of the flame.
+/// What a batch sees of a sample. All but the flame are rare and kept out of line, so that they do not weigh on its code.
 #[inline(always)]
-fn flat_out_of_line<S: Simd>(shape: &Shape, ramp: &Ramp, sample: &Sample, batch: &Batch<S>, cut: bool) -> Option<Shade<S>> {
-    batch.x.simd.vectorize(
-        #[inline(always)]
-        || shade_flat(shape, ramp, sample, batch, cut),
-    )
+pub(crate) fn shade_as<S: Simd>(shape: &Shape, ramp: &Ramp, sample: &Sample, drawn: Drawn, batch: &Batch<S>) -> Option<Shade<S>> {
+    let state = &sample.state;
+    match (&sample.smoke, drawn) {
+        (None, Drawn::Flame | Drawn::Smoke) => shade(shape, ramp, state, batch),
+        (None, Drawn::FlatTexture | Drawn::FlatCut) => batch.x.simd.vectorize(
+            #[inline(always)]
+            || shade_flat(shape, ramp, state, batch, drawn == Drawn::FlatCut),
+        ),
+        (Some(smoke), _) => batch.x.simd.vectorize(
+            #[inline(always)]
+            || shade_smoke(state, smoke, batch),
+        ),
+    }
 }
 
 /// Moves sixteen pixels behind what the strip holds, where the plate does not hide them.

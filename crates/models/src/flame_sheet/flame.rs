@@ -14,7 +14,7 @@ use bansho_base::{
 
 use super::{
     FlameSheet,
-    draw::{Drawn, Sample},
+    draw::{Drawn, Sample, State},
     moment::{Moment, Motion, Push},
     parameters::{Facing, Instance, StageShown},
     placement::{Mapping, Stand, bounds, right_facing},
@@ -50,6 +50,14 @@ pub(crate) struct Flame {
 }
 
 impl Source {
+    /// T0 after `scroll` sheet heights, at full resolution.
+    pub(crate) fn texture(&self, scroll: f64) -> Texture {
+        match self {
+            Self::Fractal(layers) => layers.at(&FRACTAL, scroll),
+            Self::Paper(layer) => layer.at(scroll),
+        }
+    }
+
     /// The same with its table filtered for a sheet `height_pixels` tall.
     pub(crate) fn filtered(&self, height_pixels: f64) -> FilteredSource {
         const MOST: f64 = 5.0;
@@ -72,8 +80,13 @@ pub(crate) enum FilteredSource {
 }
 
 impl FilteredSource {
+    /// Fractal layers for a sheet `height_pixels` tall.
+    pub(crate) fn fractal(layers: FractalLayers, height_pixels: f64) -> Self {
+        Source::Fractal(layers).filtered(height_pixels)
+    }
+
     /// T0 after `scroll` sheet heights.
-    fn texture(&self, scroll: f64) -> Texture {
+    pub(crate) fn texture(&self, scroll: f64) -> Texture {
         match self {
             Self::Fractal(layers, table) => layers.at(table, scroll),
             Self::Paper(layer) => layer.at(scroll),
@@ -159,13 +172,13 @@ impl FlameSheet {
             let [low, high] = moment.centre_range;
             rect = rect.union(&bounds(&camera, &stand, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size));
             let pixels_per_metre = pixels_per_metre(&camera, &stand);
-            samples.push(Sample {
-                mapping,
+            let state = State {
                 texture: source.texture(moment.scroll),
                 pixel: [2.0 / (pixels_per_metre * stand.size.x) as f32, 1.0 / (pixels_per_metre * stand.size.y) as f32],
-                luminance: self.luminance_at(t) as f32 / count as f32,
                 moment,
-            });
+            };
+            let luminance = self.luminance_at(t) as f32 / count as f32;
+            samples.push(Sample { mapping, stand, state, luminance, smoke: None });
         }
         (samples, rect)
     }

@@ -11,13 +11,17 @@ mod clock;
 mod draw;
 mod flame;
 mod fluctuation;
+mod glow;
 mod lanes;
+mod measure;
 mod moment;
 mod parameters;
 mod placement;
 mod prepared;
 mod ramp;
 mod shape;
+mod smoke;
+mod sparks;
 mod tables;
 mod texture;
 
@@ -87,11 +91,19 @@ fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Cloc
         let key = instance_key(seed, name, parameters.variation, index);
         let source = match &paper {
             Some(layer) => Source::Paper(layer.clone()),
-            None => Source::Fractal(FractalLayers::new(texture.tongue_width, texture.tongue_length, key, clock)),
+            None => Source::Fractal(FractalLayers::new(tongues(parameters), 1.0, key, clock)),
         };
         Flame { place, key, motion: Motion::new(&parameters.shape, key, clock), source }
     };
     places.into_iter().enumerate().map(flame).collect()
+}
+
+/// Size of the fractal's tongues in sheet widths and heights, beside the usual: they keep their form on a sheet of any aspect.
+fn tongues(parameters: &FlameSheetParameters) -> [f64; 2] {
+    /// Width over height of the sheet for which the usual size is meant.
+    const USUAL: f64 = 0.65;
+    let aspect = parameters.width / parameters.height / USUAL;
+    [parameters.texture.tongue_width / aspect.clamp(0.05, 20.0), parameters.texture.tongue_length]
 }
 
 /// What a flame sheet can write beside its light, in the order of a strip's planes.
@@ -135,12 +147,13 @@ impl Phenomenon for FlameSheet {
         self.parameters.colour.luminance.bounds()[1]
     }
 
-    fn publish(&self, _shutter: Shutter) -> Publication {
-        Publication::default()
+    fn publish(&self, shutter: Shutter) -> Publication {
+        let lights = self.flames.iter().flat_map(|flame| self.point_lights(flame, shutter)).collect();
+        Publication { lights, ..Publication::default() }
     }
 
-    fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
-        Vec::new()
+    fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
+        self.flames.iter().map(|flame| self.depth_interval(flame, view)).collect()
     }
 
     fn prepare<'a>(

@@ -125,6 +125,8 @@ bansho_base::parameters! {
         edge_temperature_k: f64 = 1250.0, limits(KELVIN), unit("K");
         /// Temperature of the soot where T2 is 1.
         core_temperature_k: f64 = 1850.0, limits(KELVIN), unit("K");
+        /// How much the soot has cooled at the tip, as a share of its temperature; for `kind = "black_body"`.
+        cooling: f64 = 0.14, limits(Range::new(0.0, 0.6));
         /// Optical depth of the soot where T2 is 1: how much the flame hides what is behind it.
         soot_optical_depth: f64 = 0.35, limits(Range::new(0.0, 20.0));
         /// Brightness and soot over height w, from the dark zone at the base.

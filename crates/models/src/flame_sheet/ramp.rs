@@ -23,8 +23,8 @@ const LEVELS: usize = 4096;
 pub(crate) struct Ramp {
     /// Red, green, blue (ACEScg, the brightest of luminance 1) and opacity over T1, the nearest of many.
     light: Box<[[f32; 4]; LEVELS]>,
-    /// Soot temperature in K and optical depth over T1: what AOVs say.
-    pub(crate) matter: CurvePair,
+    /// Soot temperature in K over T1.
+    pub(crate) temperature: CurvePair,
     /// Whether there is any soot to hide what is behind.
     pub(crate) absorbs: bool,
     /// Light of the blue zone at the base, ACEScg of luminance 1 times its share.
@@ -87,10 +87,7 @@ impl Ramp {
         };
         Ok(Self {
             light: levels(light),
-            matter: CurvePair::new(|t1| {
-                let t2 = sharpen.eval(t1);
-                [temperature(colour, t2), colour.soot_optical_depth * t2]
-            }),
+            temperature: CurvePair::new(|t1| [temperature(colour, sharpen.eval(t1)), 0.0]),
             absorbs: colour.soot_optical_depth > 0.0 || stage != StageShown::Flame,
             base_blue: base_blue().map(|value| value * colour.base_blue as f32),
         })

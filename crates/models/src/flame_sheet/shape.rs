@@ -2,6 +2,7 @@
 
 use bansho_base::{
     curve::Curve,
+    math,
     random::Key,
 };
 
@@ -10,7 +11,7 @@ use fearless_simd::Simd;
 use super::{
     chain,
     lanes::{Lanes, Real, any_positive},
-    parameters::{ColourParameters, ShapeParameters, TextureParameters},
+    parameters::{ColourParameters, Colouring, ShapeParameters, TextureParameters},
     tables::{CurvePair, locate},
 };
 use crate::fault::{FaultKind, ParameterFault};
@@ -31,6 +32,8 @@ pub(crate) struct Shape {
     across: CurvePair,
     /// V and the glow over w.
     heights: CurvePair,
+    /// Share of red light that cooling leaves, and of green beside red, over w.
+    cooling: CurvePair,
     /// A and D over w, at the places of a table.
     width_samples: Vec<[f32; 2]>,
     /// Greatest x' at which there may be flame, over y.
@@ -84,6 +87,8 @@ pub(crate) struct Place<S: Simd> {
     pub(crate) threshold: Lanes<S>,
     /// Brightness and soot at that height.
     pub(crate) glow: Lanes<S>,
+    /// Share of red light that cooling leaves, and of green beside red.
+    pub(crate) cooling: [Lanes<S>; 2],
     /// Share of the pixel that lies inside; 0 outside.
     pub(crate) coverage: Lanes<S>,
 }
@@ -104,6 +109,7 @@ impl Shape {
             falling: CurvePair::new(|place| [1.0 - shape.slowing.eval(place), 0.0]),
             across: CurvePair::new(|across| [texture.threshold_across.eval(across), 0.0]),
             heights: CurvePair::new(|w| [texture.threshold.eval(w), colour.glow.eval(w)]),
+            cooling: CurvePair::new(|w| cooled(colour, w)),
             width_samples,
             reach: Box::new([1.0; REACH_BINS]),
         };
@@ -132,14 +138,14 @@ impl Shape {
         (chain::slowed_rise(rise, chain::speed_profile(falling, self.edge_speed)), false)
     }
 
-    /// Edges, threshold V and glow at heights w.
+    /// Edges, threshold V with glow, and cooling at heights w.
     #[inline(always)]
-    fn at_heights<S: Simd>(&self, w: Lanes<S>, edges: &CurvePair, core: bool) -> ([Lanes<S>; 2], [Lanes<S>; 2]) {
+    fn at_heights<S: Simd>(&self, w: Lanes<S>, edges: &CurvePair, core: bool) -> [[Lanes<S>; 2]; 3] {
         if core {
-            return (edges.along(w), self.heights.along(w));
+            return [edges.along(w), self.heights.along(w), self.cooling.along(w)];
         }
         let height = locate(w);
-        (edges.fetch(&height), self.heights.fetch(&height))
+        [edges.fetch(&height), self.heights.fetch(&height), self.cooling.fetch(&height)]
     }
 
     /// The same for one point.
@@ -157,7 +163,7 @@ impl Shape {
     pub(crate) fn place<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>, edges: &CurvePair, pixel: [f32; 2]) -> Option<Place<S>> {
         let distance = chain::axis_distance(x);
         let (w, core) = self.slowed_rise(distance, y.held());
-        let ([left, right], [vertical, glow]) = self.at_heights(w, edges, core);
+        let [[left, right], [vertical, glow], cooling] = self.at_heights(w, edges, core);
         let (half, one) = (x.like(0.5), x.like(1.0));
         let edge = x.choose(half, left, right);
         let (per_pixel_across, per_pixel_up) = (x.like(1.0 / pixel[0]), x.like(1.0 / pixel[1]));
@@ -171,7 +177,7 @@ impl Shape {
         let across = chain::across(distance, edge).least(one);
         let [horizontal, _] = self.across.sample(across);
         let threshold = chain::threshold(vertical, horizontal);
-        Some(Place { u: chain::texture_u(across, x), w, across, threshold, glow, coverage })
+        Some(Place { u: chain::texture_u(across, x), w, across, threshold, glow, cooling, coverage })
     }
 
     /// The threshold, eq. (4), over the flat texture square.
@@ -232,6 +238,20 @@ impl Shape {
         }
         widest
     }
+}
+
+/// Share of red light that is left at height w, and of green beside red, once soot has cooled by the share `cooling` w.
+///
+/// Wien's law: a share d of the temperature costs a factor exp(-c2 d / (lambda T)); here for 610 and 540 nm at 1700 K. Blue, at
+/// 460 nm, loses what green loses beside red, to the power 2.5.
+fn cooled(colour: &ColourParameters, w: f64) -> [f64; 2] {
+    const RED: f64 = 13.87;
+    const GREEN: f64 = 15.67;
+    if colour.kind == Colouring::Paper {
+        return [1.0, 1.0];
+    }
+    let share = colour.cooling * w;
+    [math::exp(-RED * share), math::exp((RED - GREEN) * share)]
 }
 
 /// The random key of one flame among the instances of a sheet.

@@ -93,7 +93,8 @@ impl Files {
         let motion = tile(&motion, sheet.columns, 0, [0.0; 2])?;
         let [width, height] = sheet.size();
         let pixels = motion.pixels().iter().map(|&[x, y]| [x, y, 0.0, 1.0]).collect();
-        let motion = Image::from_pixels(width, height, pixels).unwrap_or_else(|| Image::filled(width, height, [0.0; 4]));
+        let motion =
+            Image::from_pixels(width, height, pixels).unwrap_or_else(|| Image::filled(width, height, [0.0; 4]));
         for (what, beauty) in [("colour", tile(&colours, sheet.columns, 0, [0.0; 4])?), ("motion", motion)] {
             let path = self.sheet_path(what);
             let header = FrameHeader { fingerprint: fingerprint(tiles, what), ..header.clone() };
@@ -132,7 +133,9 @@ impl Files {
             json!({ "number": number, "time_s": time_s, "x": place.x, "y": place.y, "width": place.width, "height": place.height })
         };
         let colour = match self.is_linear() {
-            true => json!({ "file": name(&self.sheet_path("colour")), "space": "ACEScg", "alpha": "premultiplied", "exposure_ev100": plan.exposure_ev100 }),
+            true => {
+                json!({ "file": name(&self.sheet_path("colour")), "space": "ACEScg", "alpha": "premultiplied", "exposure_ev100": plan.exposure_ev100 })
+            }
             false => json!({ "file": name(&self.sheet_path("colour")), "space": "sRGB", "alpha": "straight" }),
         };
         let mut description = json!({

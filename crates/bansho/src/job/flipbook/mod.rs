@@ -11,11 +11,7 @@ use bansho_media::{
     flipbook::Sheet,
     naming::{OutputKind, OutputPattern},
 };
-use bansho_render::{
-    Backend, Plan, PlanOptions, Scene,
-    display::BitDepth,
-    scene::FrameRate,
-};
+use bansho_render::{Backend, Plan, PlanOptions, Scene, display::BitDepth, scene::FrameRate};
 
 use self::{files::Files, motion::Tile};
 use super::{
@@ -148,6 +144,11 @@ pub struct PreparedFlipbook {
 }
 
 impl PreparedFlipbook {
+    /// How many frames it has.
+    pub fn frame_count(&self) -> usize {
+        self.numbers.len()
+    }
+
     /// Draws all frames in the caller's rayon pool and writes the sheets.
     ///
     /// # Errors

@@ -1,0 +1,192 @@
+//! Small films of scenes, and what can be measured on them.
+
+use std::{path::PathBuf, sync::Arc};
+
+use bansho::{
+    Backend, BitDepth, CpuBackend, DisplayImage, Plan, PlanOptions, Unobserved, View,
+    base::image::DisplayPixels,
+    media::plates::{FileAssets, decode_picture},
+};
+
+fn scenes() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../scenes")
+}
+
+/// The text of a shipped scene.
+pub fn scene_text(scene: &str) -> String {
+    std::fs::read_to_string(scenes().join(format!("{scene}.toml"))).unwrap_or_else(|error| panic!("{scene}: {error}"))
+}
+
+fn draw(text: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions, depth: BitDepth) -> Vec<DisplayImage> {
+    let assets = Arc::new(FileAssets::new(scenes()));
+    let scene = bansho::parse_scene("scene", text, assets.as_ref()).unwrap_or_else(|error| panic!("{error}"));
+    let options = PlanOptions { size: Some(size), ..options.clone() };
+    let plan = Arc::new(Plan::new(scene, &options, assets).unwrap());
+    let mut shot = CpuBackend.open(plan).unwrap();
+    let mut draw = |number: &i64| {
+        let frame = bansho::draw(shot.as_mut(), *number, &Unobserved).unwrap();
+        bansho::display(&frame, &View::DISPLAY, depth)
+    };
+    frames.iter().map(&mut draw).collect()
+}
+
+/// Codes over black, from 0 to 1, still sRGB-encoded.
+fn encoded(image: &DisplayImage) -> Vec<[f32; 3]> {
+    match &image.pixels {
+        DisplayPixels::Eight(pixels) => pixels.iter().map(|p| over_black(p.map(|v| f32::from(v) / 255.0))).collect(),
+        DisplayPixels::Sixteen(pixels) => {
+            pixels.iter().map(|p| over_black(p.map(|v| f32::from(v) / 65_535.0))).collect()
+        }
+    }
+}
+
+/// Straight alpha over black in linear light.
+fn over_black([red, green, blue, alpha]: [f32; 4]) -> [f32; 3] {
+    use bansho::base::color::{decode_srgb, encode_srgb};
+    if alpha >= 1.0 {
+        return [red, green, blue];
+    }
+    [red, green, blue].map(|value| encode_srgb(decode_srgb(value) * alpha))
+}
+
+/// Frames of a scene in linear display light, over black.
+pub struct Film {
+    width: usize,
+    height: usize,
+    frames: Vec<Vec<[f64; 3]>>,
+}
+
+/// Relative luminance of linear sRGB.
+pub fn luminance([red, green, blue]: [f64; 3]) -> f64 {
+    0.2126 * red + 0.7152 * green + 0.0722 * blue
+}
+
+impl Film {
+    /// Frames of a shipped scene.
+    pub fn of(scene: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions) -> Self {
+        Self::of_text(&scene_text(scene), size, frames, options)
+    }
+
+    /// Frames of a scene in a text.
+    pub fn of_text(text: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions) -> Self {
+        let linear = |image: &DisplayImage| {
+            let decode = |value: f32| f64::from(bansho::base::color::decode_srgb(value));
+            encoded(image).into_iter().map(|pixel| pixel.map(decode)).collect()
+        };
+        let images = draw(text, size, frames, options, BitDepth::Sixteen);
+        Self { width: size[0], height: size[1], frames: images.iter().map(linear).collect() }
+    }
+
+    pub fn pixels(&self) -> impl Iterator<Item = &[f64; 3]> {
+        self.frames.iter().flatten()
+    }
+
+    pub fn len(&self) -> usize {
+        self.width * self.height * self.frames.len()
+    }
+
+    pub fn row(&self, frame: usize, row: usize) -> &[[f64; 3]] {
+        &self.frames[frame][row * self.width..][..self.width]
+    }
+
+    /// Mean luminance of a frame.
+    pub fn mean(&self, frame: usize) -> f64 {
+        self.frames[frame].iter().map(|pixel| luminance(*pixel)).sum::<f64>() / (self.width * self.height) as f64
+    }
+
+    /// Mean absolute difference of two frames.
+    pub fn difference(&self, a: usize, b: usize) -> f64 {
+        let pair = self.frames[a].iter().zip(&self.frames[b]);
+        pair.map(|(a, b)| (luminance(*a) - luminance(*b)).abs()).sum::<f64>() / (self.width * self.height) as f64
+    }
+
+    /// Centre of the light in the upper half of what is lit, in pixels, over all frames.
+    pub fn centroid_of_upper_half(&self) -> [f64; 2] {
+        let lit_row = |row: usize| (0..self.frames.len()).any(|f| self.row(f, row).iter().any(|p| luminance(*p) > 0.02));
+        let rows: Vec<usize> = (0..self.height).filter(|row| lit_row(*row)).collect();
+        let middle = (rows[0] + rows[rows.len() - 1]) / 2;
+        let (mut sum, mut place) = (0.0, [0.0; 2]);
+        for frame in 0..self.frames.len() {
+            for row in rows[0]..middle {
+                for (x, pixel) in self.row(frame, row).iter().enumerate() {
+                    let light = luminance(*pixel);
+                    sum += light;
+                    place[0] += light * (x as f64 + 0.5);
+                    place[1] += light * (row as f64 + 0.5);
+                }
+            }
+        }
+        place.map(|coordinate| coordinate / sum)
+    }
+}
+
+/// Share of the length of gradients that lies in bands: more than 8 pixels of one 8-bit code where 16 bits move by a
+/// quarter of a code.
+pub fn wide_bands(text: &str, size: [usize; 2], frame: i64) -> f64 {
+    let codes = |depth| encoded(&draw(text, size, &[frame], &PlanOptions::default(), depth)[0]);
+    let (coarse, fine) = (codes(BitDepth::Eight), codes(BitDepth::Sixteen));
+    let (mut banded, mut gradient) = (0, 0);
+    for row in 0..size[1] {
+        let range = row * size[0]..(row + 1) * size[0];
+        let (coarse, fine) = (&coarse[range.clone()], &fine[range]);
+        let mut start = 0;
+        for x in 1..=size[0] {
+            if x < size[0] && coarse[x][0] == coarse[start][0] {
+                continue;
+            }
+            let change = (fine[x - 1][0] - fine[start][0]).abs() * 255.0;
+            if coarse[start][0] > 0.0 && coarse[start][0] < 1.0 {
+                gradient += x - start;
+                banded += if x - start > 8 && change > 0.25 { x - start } else { 0 };
+            }
+            start = x;
+        }
+    }
+    f64::from(banded as u32) / f64::from((gradient as u32).max(1))
+}
+
+/// Compares a frame with its golden picture, or writes that when asked to; says what differs.
+pub fn golden(scene: &str, size: [usize; 2], frame: i64) -> Option<String> {
+    let image = &draw(&scene_text(scene), size, &[frame], &PlanOptions::default(), BitDepth::Eight)[0];
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("tests/golden/{scene}.png"));
+    if std::env::var_os("BANSHO_BLESS").is_some() {
+        write_png(&path, image);
+        return None;
+    }
+    let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let known = decode_picture(&bytes, "png").unwrap();
+    let known: Vec<[f32; 3]> = known.colour.pixels().iter().map(|pixel| over_black(*pixel)).collect();
+    let drawn = encoded(image);
+    let (mean, worst) = blurred_difference(&known, &drawn, size);
+    if known.len() == drawn.len() && mean < 0.5 && worst < 10.0 {
+        return None;
+    }
+    let now = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{scene}.png"));
+    write_png(&now, image);
+    Some(format!("{scene}: differs by {mean} codes in the mean and {worst} at most; it is now {}", now.display()))
+}
+
+/// Mean and greatest difference in 8-bit codes, of means over 4 x 4 pixels: what an eye sees, and no dither.
+fn blurred_difference(a: &[[f32; 3]], b: &[[f32; 3]], size: [usize; 2]) -> (f64, f64) {
+    let (mut sum, mut worst, mut count) = (0.0, 0.0_f64, 0.0);
+    for y in (0..size[1] - 3).step_by(4) {
+        for x in (0..size[0] - 3).step_by(4) {
+            for c in 0..3 {
+                let cell = |image: &[[f32; 3]]| -> f64 {
+                    let at = |i: usize| f64::from(image[(y + i / 4) * size[0] + x + i % 4][c]);
+                    (0..16).map(at).sum::<f64>() * 255.0 / 16.0
+                };
+                let difference = (cell(a) - cell(b)).abs();
+                sum += difference;
+                worst = worst.max(difference);
+                count += 1.0;
+            }
+        }
+    }
+    (sum / count, worst)
+}
+
+fn write_png(path: &std::path::Path, image: &DisplayImage) {
+    let bytes = bansho::media::png::encode(image, &[0; 32], bansho::media::png::PngEffort::Small, path).unwrap();
+    std::fs::write(path, bytes).unwrap();
+}

@@ -1,0 +1,78 @@
+//! `bansho flipbook`
+
+use std::path::PathBuf;
+
+use bansho::{
+    BitDepth, View,
+    job::{BackendChoice, Flipbook, JobError, SceneFile},
+};
+use clap::Args;
+
+use super::{render::WorkArgs, values};
+
+/// The sheets that are wanted.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Writes NAME_colour.png (sRGB, straight alpha), NAME_alpha.png (the same alpha as grey), NAME_motion.png (16 bits: how far
+each pixel moves to the next frame) and NAME.json (grid, frame rate, rectangles, how to read the motion). As .exr: colour is
+scene-linear with premultiplied alpha, motion is in pixels, and there is no alpha sheet.
+
+Examples:
+  bansho flipbook torch.toml --grid 8x8 --loop 2        64 frames, one turn of a 2-second loop
+  bansho flipbook torch.toml --grid 4x4 --size 128x256 -o game/torch.png")]
+pub(crate) struct FlipbookArgs {
+    /// The scene file.
+    pub(crate) scene: PathBuf,
+    /// Columns and rows of the sheet; as many frames are drawn.
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = values::parse_grid)]
+    grid: [usize; 2],
+    /// Size of one frame. [default: the scene's, made small enough for a sheet of 2048 pixels]
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = values::parse_size)]
+    size: Option<[usize; 2]>,
+    /// Where it goes: NAME.png or NAME.exr. [default: out/SCENE/SCENE.png]
+    #[arg(short, long, value_name = "PATH")]
+    out: Option<PathBuf>,
+    /// Fill the sheet with exactly one turn of a seamless loop of so many seconds; without it with the scene's first
+    /// frames.
+    #[arg(long = "loop", value_name = "SECONDS", value_parser = values::parse_seconds)]
+    loop_s: Option<f64>,
+    /// The first frame. [default: the scene's first]
+    #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
+    first_frame: Option<i32>,
+    /// Another seed than the scene's.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Change a setting of the scene for this once; may be repeated.
+    #[arg(long, value_name = "KEY.PATH=VALUE")]
+    set: Vec<String>,
+    /// Bits of each channel of the colour and alpha sheets.
+    #[arg(long, default_value = "8", value_parser = values::bits_parser())]
+    bits: BitDepth,
+    /// How the light is shown in .png.
+    #[arg(long, default_value = "display", value_parser = values::view_parser())]
+    view: View,
+    /// What draws. `gpu` fails in this version, which has none.
+    #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
+    backend: BackendChoice,
+    #[command(flatten)]
+    pub(crate) work: WorkArgs,
+}
+
+impl FlipbookArgs {
+    /// The flipbook that is asked for.
+    pub(crate) fn flipbook(&self) -> Result<Flipbook, JobError> {
+        let mut scene = SceneFile::read(&self.scene)?;
+        scene.changes.clone_from(&self.set);
+        Ok(Flipbook {
+            tile: self.size,
+            first_frame: self.first_frame.map(i64::from),
+            seed: self.seed,
+            loop_s: self.loop_s,
+            view: self.view,
+            bits: self.bits,
+            out: self.out.clone(),
+            backend: self.backend,
+            ..Flipbook::new(scene, self.grid)
+        })
+    }
+}

@@ -1,0 +1,105 @@
+//! The command line.
+
+mod flipbook;
+mod render;
+mod values;
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+pub(crate) use self::{
+    flipbook::FlipbookArgs,
+    render::{RenderArgs, WorkArgs},
+};
+
+/// Flames, rain and aurora for pictures: image sequences with alpha to lay over a plate.
+#[derive(Debug, Parser)]
+#[command(
+    name = "bansho",
+    version,
+    after_help = "\
+Examples:
+  bansho new fire                      write fire.toml, a scene with every setting explained
+  bansho render fire.toml              240 PNG files with alpha in out/fire/
+  bansho render fire.toml -o fire.mp4  a film
+  bansho render --help                 all that `render` can do
+
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 faulty scene, 4 no usable GPU, 130 or 143 interrupted."
+)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Write a new scene file, every setting explained in a comment.
+    New(NewArgs),
+    /// Say whether scene files are right, and where they are not.
+    Check(CheckArgs),
+    /// Rewrite a scene file of an older format for this version; comments stay.
+    Upgrade(UpgradeArgs),
+    /// Print the JSON schema of scene files, for editors that complete and check while one types.
+    Schema,
+    /// Draw a scene: files, a film, or a contact sheet.
+    Render(RenderArgs),
+    /// Draw a scene as a flipbook for game engines: colour, alpha and motion sheets and a JSON.
+    Flipbook(FlipbookArgs),
+    /// Print a completion script for a shell.
+    Completions(CompletionsArgs),
+    /// Print the manual page, or write those of all commands.
+    Man(ManArgs),
+}
+
+/// `bansho new`
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bansho new fire                    fire.toml with every setting at its default
+  bansho new --list                  the examples that come with the program
+  bansho new camp --from campfire    camp.toml, a copy of the campfire")]
+pub(crate) struct NewArgs {
+    /// Name of the scene; `.toml` is added where it has no extension. A file that is there already stays as it is.
+    #[arg(required_unless_present = "list")]
+    pub(crate) name: Option<PathBuf>,
+    /// Copy an example that comes with the program.
+    #[arg(long, value_name = "EXAMPLE")]
+    pub(crate) from: Option<String>,
+    /// List the examples.
+    #[arg(long, conflicts_with_all = ["name", "from"])]
+    pub(crate) list: bool,
+}
+
+/// `bansho check`
+#[derive(Args, Debug)]
+pub(crate) struct CheckArgs {
+    /// Scene files.
+    #[arg(required = true, value_name = "SCENE")]
+    pub(crate) scenes: Vec<PathBuf>,
+}
+
+/// `bansho upgrade`
+#[derive(Args, Debug)]
+pub(crate) struct UpgradeArgs {
+    /// The scene file.
+    pub(crate) scene: PathBuf,
+}
+
+/// `bansho completions`
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Example:
+  bansho completions bash > ~/.local/share/bash-completion/completions/bansho")]
+pub(crate) struct CompletionsArgs {
+    /// The shell.
+    pub(crate) shell: clap_complete::Shell,
+}
+
+/// `bansho man`
+#[derive(Args, Debug)]
+pub(crate) struct ManArgs {
+    /// Folder to write the pages of all commands to; without it the main page is printed.
+    pub(crate) dir: Option<PathBuf>,
+}

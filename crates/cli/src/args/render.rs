@@ -1,0 +1,129 @@
+//! `bansho render`
+
+use std::path::PathBuf;
+
+use bansho::{
+    BitDepth, Rect, View,
+    job::{BackendChoice, Job, JobError, SceneFile},
+};
+use clap::Args;
+
+use super::values::{self, Frames};
+use crate::progress::ProgressKind;
+
+/// What to draw, how, and where it goes.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bansho render fire.toml                               PNG files in out/fire/
+  bansho render fire.toml -o shot/fire.####.exr --layers --aovs
+  bansho render fire.toml -o fire.mov                   ProRes 4444 with alpha, by ffmpeg
+  bansho render fire.toml -o fire.gif --loop 4 --size 320x180
+  bansho render fire.toml --frames 0-239x10             every tenth frame
+  bansho render fire.toml --contact-sheet 16            16 frames in one picture
+  bansho render fire.toml --crop 600,200,128,128        a part, identical to that of the whole
+  bansho render fire.toml --set flame_sheet.height=1.2 --set wind.gust=0.5
+  bansho render fire.toml --resume                      go on after an interruption
+
+A PNG is exact over black; an EXR is exact over anything.
+Interrupt at any time: whole frames stay, and nothing half-written bears a final name.")]
+pub(crate) struct RenderArgs {
+    /// The scene file.
+    pub(crate) scene: PathBuf,
+
+    /// Where frames go; the extension says what they are: .png .exr .apng .gif, and by ffmpeg .mp4 .mov .webm.
+    /// `####` or `%04d` stands for the frame number. [default: out/SCENE/SCENE.####.png]
+    #[arg(short, long, value_name = "PATH", help_heading = "Output")]
+    out: Option<PathBuf>,
+    /// Bits of each channel of .png, .apng, .mov and .webm.
+    #[arg(long, default_value = "8", value_parser = values::bits_parser(), help_heading = "Output")]
+    bits: BitDepth,
+    /// How the light is shown in formats that are made to be looked at; `raw` writes the numbers, clamped to 0 to 1.
+    #[arg(long, default_value = "display", value_parser = values::view_parser(), help_heading = "Output")]
+    view: View,
+    /// Give each phenomenon a layer of its own (.exr).
+    #[arg(long, help_heading = "Output")]
+    layers: bool,
+    /// Write temperature, optical depth, motion and the like (.exr).
+    #[arg(long, help_heading = "Output")]
+    aovs: bool,
+    /// One .png of N consecutive frames, from the first of --frames. [default out: out/SCENE/SCENE.sheet.png]
+    #[arg(long, value_name = "N", help_heading = "Output")]
+    contact_sheet: Option<usize>,
+
+    /// Frames: 0-239, 0-239x10 or 0-239:10 (every tenth), 17, -3-5, 1-5,9. Beyond the scene's own frames it goes on as
+    /// if it were longer; beyond those of a --loop it repeats. [default: all]
+    #[arg(long, value_name = "SPEC", allow_hyphen_values = true, value_parser = values::parse_frames, help_heading = "Picture")]
+    frames: Option<Frames>,
+    /// Another picture size than the scene's.
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = values::parse_size, help_heading = "Picture")]
+    size: Option<[usize; 2]>,
+    /// Only this part of the picture, identical to the same part of the whole.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = values::parse_crop, help_heading = "Picture")]
+    crop: Option<Rect>,
+    /// A seamless loop of about so many seconds, rounded to whole frames.
+    #[arg(long = "loop", value_name = "SECONDS", value_parser = values::parse_seconds, help_heading = "Picture")]
+    loop_s: Option<f64>,
+    /// Another seed than the scene's.
+    #[arg(long, value_name = "N", help_heading = "Picture")]
+    seed: Option<u64>,
+    /// Change a setting of the scene for this once; may be repeated. A name or number picks one phenomenon of many:
+    /// `flame_sheet.0.height=2`.
+    #[arg(long, value_name = "KEY.PATH=VALUE", help_heading = "Picture")]
+    set: Vec<String>,
+
+    /// Keep frames that are there already, whole, and of this very scene; draw all others. Only for .png and .exr files.
+    #[arg(long, help_heading = "Work")]
+    resume: bool,
+    /// Keep the state of what is simulated in steps here, and begin from the nearest state.
+    #[arg(long, value_name = "DIR", help_heading = "Work")]
+    snapshots: Option<PathBuf>,
+    /// Frames between snapshots. [default: a second's worth]
+    #[arg(long, value_name = "N", requires = "snapshots", help_heading = "Work")]
+    snapshot_every: Option<u64>,
+    /// What draws. `gpu` fails in this version, which has none.
+    #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
+    backend: BackendChoice,
+    #[command(flatten)]
+    pub(crate) work: WorkArgs,
+}
+
+/// Options of everything that draws.
+#[derive(Args, Debug)]
+pub(crate) struct WorkArgs {
+    /// Threads that draw and write. The pictures are the same for any number. [default: one for each core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Work")]
+    pub(crate) threads: Option<u16>,
+    /// How progress is told.
+    #[arg(long, value_enum, default_value_t, help_heading = "Work")]
+    pub(crate) progress: ProgressKind,
+    /// Say at the end where the time went.
+    #[arg(long, help_heading = "Work")]
+    pub(crate) stats: bool,
+}
+
+impl RenderArgs {
+    /// The job that is asked for.
+    pub(crate) fn job(&self) -> Result<Job, JobError> {
+        let mut scene = SceneFile::read(&self.scene)?;
+        scene.changes.clone_from(&self.set);
+        Ok(Job {
+            scene,
+            frames: self.frames.clone().map(|Frames(numbers)| numbers),
+            size: self.size,
+            crop: self.crop,
+            seed: self.seed,
+            loop_s: self.loop_s,
+            layers: self.layers,
+            aovs: self.aovs,
+            view: self.view,
+            bits: self.bits,
+            out: self.out.clone(),
+            contact_sheet: self.contact_sheet,
+            resume: self.resume,
+            snapshots: self.snapshots.clone(),
+            snapshot_every: self.snapshot_every,
+            backend: self.backend,
+        })
+    }
+}

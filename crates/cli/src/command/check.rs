@@ -1,0 +1,43 @@
+//! `bansho check`
+
+use std::path::Path;
+
+use bansho::job::{self, JobError, SceneFile};
+
+use crate::{
+    args::CheckArgs,
+    exit::{self, Told},
+    output::to_stdout,
+};
+
+/// Checks every scene and tells all faults of all of them.
+pub(crate) fn run(args: &CheckArgs) -> anyhow::Result<()> {
+    let mut last_fault = None;
+    for path in &args.scenes {
+        match describe(path) {
+            Ok(line) => to_stdout(&line)?,
+            Err(error) => {
+                exit::tell_job(&error);
+                last_fault = Some(error);
+            }
+        }
+    }
+    last_fault.map_or(Ok(()), |error| Err(Told(error).into()))
+}
+
+fn describe(path: &Path) -> Result<String, JobError> {
+    let plan = job::check_scene(&SceneFile::read(path)?)?;
+    let [width, height] = plan.size;
+    let (fps, frames) = (plan.fps(), plan.frames());
+    let rate = f64::from(fps.frames) / f64::from(fps.seconds);
+    let drawn = plan.scene.instances.iter().filter(|instance| instance.enabled);
+    let names: Vec<&str> = drawn.map(|instance| instance.name.as_str()).collect();
+    let names = if names.is_empty() { "nothing in it".to_owned() } else { names.join(", ") };
+    Ok(format!(
+        "{}: right. {width} x {height}, frames {} to {} at {rate} a second, EV100 {:.1}: {names}\n",
+        path.display(),
+        frames.start,
+        frames.end - 1,
+        plan.exposure_ev100
+    ))
+}

@@ -1,0 +1,31 @@
+//! `bansho upgrade`
+
+use bansho::{
+    MemoryAssets,
+    job::SceneFile,
+    media::atomic,
+    render::scene::{FORMAT, edit},
+};
+
+use crate::{args::UpgradeArgs, output::to_stdout};
+
+/// Rewrites a scene in place, whole or not at all.
+pub(crate) fn run(args: &UpgradeArgs) -> anyhow::Result<()> {
+    let scene = SceneFile::read(&args.scene)?;
+    let upgraded = match edit::upgrade(&scene.text) {
+        Ok(upgraded) => upgraded,
+        Err(error) => {
+            // The parser says the same with the place in the file.
+            scene.check(&MemoryAssets::default())?;
+            return Err(error.into());
+        }
+    };
+    let name = args.scene.display();
+    match upgraded {
+        None => Ok(to_stdout(&format!("{name}: is of format {FORMAT} already; unchanged\n"))?),
+        Some(text) => {
+            atomic::write_bytes(&args.scene, text.as_bytes()).map_err(bansho::job::JobError::from)?;
+            Ok(to_stdout(&format!("{name}: rewritten for format {FORMAT}; comments kept\n"))?)
+        }
+    }
+}
