@@ -1,11 +1,16 @@
 //! What the fuzz targets share: reading a plate, drawing one small frame, looking for numbers that are not finite.
 
 use std::{
-    sync::{Arc, Once},
+    panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
+    sync::{Arc, Mutex, Once, PoisonError},
     time::{Duration, Instant},
 };
 
-use bansho_base::{assets::MemoryAssets, image::Frame, observer::Observer};
+use bansho_base::{
+    assets::{MemoryAssets, Picture},
+    image::Frame,
+    observer::Observer,
+};
 use bansho_media::plates::{decode_picture, limits};
 use bansho_render::{
     Backend, CpuBackend, Plan, PlanOptions, RenderError, Scene,
@@ -70,13 +75,34 @@ fn check(frame: &Frame) {
     display(frame, &Default::default(), BitDepth::Sixteen);
 }
 
+/// Lets a panic be caught where the project catches those of a decoder, and tells of one that is not.
+///
+/// The fuzzer's own hook would end the process at the panic itself.
+fn telling_panics<T>(work: impl FnOnce() -> T) -> T {
+    static LAST: Mutex<String> = Mutex::new(String::new());
+    static ONCE: Once = Once::new();
+    let last = || LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    ONCE.call_once(|| std::panic::set_hook(Box::new(move |info| *last() = info.to_string())));
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        eprintln!("{}", last());
+        resume_unwind(panic)
+    })
+}
+
 /// Reads `bytes` as a plate whose name ends in `extension`.
 ///
 /// # Panics
 /// The picture breaks what its reader promises, or a scene over it has a number that is not finite.
 pub fn read_plate(bytes: &[u8], extension: &str) {
     one_thread();
-    let Ok(picture) = decode_picture(bytes, extension) else { return };
+    telling_panics(|| {
+        if let Ok(picture) = decode_picture(bytes, extension) {
+            check_plate(picture);
+        }
+    });
+}
+
+fn check_plate(picture: Picture) {
     let (width, height) = (picture.colour.width(), picture.colour.height());
     assert!(width > 0 && height > 0 && width.max(height) as u64 <= limits::SIDE, "{width} x {height}");
     if let Some(depth) = &picture.depth {

@@ -144,7 +144,9 @@ impl Phenomenon for FlameSheet {
     }
 
     fn luminance(&self) -> f64 {
-        self.parameters.colour.luminance.bounds()[1]
+        /// Bright parts beside the very brightest: most of a flame is far dimmer than its hottest soot.
+        const BRIGHT: f64 = 0.28;
+        BRIGHT * self.parameters.colour.luminance.bounds()[1]
     }
 
     fn publish(&self, shutter: Shutter) -> Publication {

@@ -64,19 +64,19 @@ bansho_base::parameters! {
     /// The outline of the flame and how its gas moves, eqs. (9) to (18).
     pub struct ShapeParameters {
         /// k, eq. (9): 0 starts slowly and accelerates much, 1 rises at one speed.
-        initial_speed: f64 = 0.55, limits(SHARE);
+        initial_speed: f64 = 0.7, limits(SHARE);
         /// h, eq. (11): slowest speed, at the edge, as a share of the fastest, on the axis.
-        edge_speed: f64 = 0.45, limits(Range::new(0.02, 1.0));
+        edge_speed: f64 = 0.55, limits(Range::new(0.02, 1.0));
         /// A(w), eq. (11): half width of the core that rises evenly, over height; 1 is the edge of the sheet.
-        core_width: Curve = curve(&[[0.0, 0.42], [0.12, 0.5], [0.45, 0.34], [1.0, 0.12]]), limits(CurveLimits::unit_to(0.01, 1.0));
+        core_width: Curve = curve(&[[0.0, 0.36], [0.1, 0.48], [0.22, 0.54], [0.5, 0.38], [1.0, 0.12]]), limits(CurveLimits::unit_to(0.01, 1.0));
         /// D(w), eq. (11): width of the fringe that flutters, over height; begins at (0, 0). A + D must stay within 1.
-        fringe_width: Curve = curve(&[[0.0, 0.0], [0.2, 0.34], [0.6, 0.5], [1.0, 0.45]]), limits(CurveLimits::default());
+        fringe_width: Curve = curve(&[[0.0, 0.0], [0.3, 0.22], [0.6, 0.42], [1.0, 0.4]]), limits(CurveLimits::default());
         /// 1 - F, eq. (11): how the gas slows across the fringe, from 0 at its inner edge to 1 at its outer one.
         slowing: Curve = curve(&[[0.0, 0.0], [0.5, 0.4], [1.0, 1.0]]), limits(CurveLimits::default().rising());
         /// Strength of P, eq. (15): how far the edge swings into the fringe; 0 leaves it still at its outer edge.
-        flutter: f64 = 0.8, limits(SHARE);
+        flutter: f64 = 0.6, limits(SHARE);
         /// Swings of the edge in a sheet height.
-        flutter_waves: f64 = 2.2, limits(Range::new(0.1, 20.0)), unit("1/height");
+        flutter_waves: f64 = 1.1, limits(Range::new(0.1, 20.0)), unit("1/height");
         /// How far the tip wanders sideways, in sheet widths.
         sway: f64 = 0.05, limits(SHARE);
         /// How often it wanders to and fro.
@@ -100,11 +100,11 @@ bansho_base::parameters! {
         /// Length of the fractal's tongues, 1 for about half the flame's height.
         tongue_length: f64 = 1.0, limits(Range::new(0.1, 10.0));
         /// V(w), eq. (4): threshold over height.
-        threshold: Curve = curve(&[[0.0, 0.0], [0.2, 0.12], [0.6, 0.55], [1.0, 1.0]]), limits(CurveLimits::default().rising());
+        threshold: Curve = curve(&[[0.0, 0.0], [0.25, 0.08], [0.6, 0.42], [0.85, 0.75], [1.0, 1.0]]), limits(CurveLimits::default().rising());
         /// H(u), eq. (4): threshold over the distance from the axis, 0 on the axis to 1 at both edges.
-        threshold_across: Curve = curve(&[[0.0, 0.0], [0.5, 0.12], [0.85, 0.5], [1.0, 1.0]]), limits(CurveLimits::default().rising());
+        threshold_across: Curve = curve(&[[0.0, 0.0], [0.5, 0.08], [0.85, 0.42], [1.0, 1.0]]), limits(CurveLimits::default().rising());
         /// C(s), eq. (6): begins at (0, 0), peaks below s = 1 and falls after, so that the core is not flat.
-        sharpen: Curve = curve(&[[0.0, 0.0], [0.1, 0.32], [0.3, 0.8], [0.55, 1.0], [1.0, 0.82]]), limits(CurveLimits::default());
+        sharpen: Curve = curve(&[[0.0, 0.0], [0.06, 0.22], [0.16, 0.48], [0.4, 0.82], [0.7, 1.0], [1.0, 0.86]]), limits(CurveLimits::default());
     }
 }
 
@@ -122,15 +122,15 @@ bansho_base::parameters! {
         /// B(s), eq. (7), as a display shows it; for `kind = "paper"`.
         blue: Curve = curve(&[[0.0, 0.0], [0.4, 0.02], [0.75, 0.2], [1.0, 0.72]]), limits(CurveLimits::default());
         /// Temperature of the soot where T2 is nearly 0: tips and edges.
-        edge_temperature_k: f64 = 1250.0, limits(KELVIN), unit("K");
+        edge_temperature_k: f64 = 1100.0, limits(KELVIN), unit("K");
         /// Temperature of the soot where T2 is 1.
-        core_temperature_k: f64 = 1850.0, limits(KELVIN), unit("K");
+        core_temperature_k: f64 = 1950.0, limits(KELVIN), unit("K");
         /// How much the soot has cooled at the tip, as a share of its temperature; for `kind = "black_body"`.
-        cooling: f64 = 0.14, limits(Range::new(0.0, 0.6));
+        cooling: f64 = 0.17, limits(Range::new(0.0, 0.6));
         /// Optical depth of the soot where T2 is 1: how much the flame hides what is behind it.
         soot_optical_depth: f64 = 0.35, limits(Range::new(0.0, 20.0));
         /// Brightness and soot over height w, from the dark zone at the base.
-        glow: Curve = curve(&[[0.0, 0.0], [0.05, 0.2], [0.22, 1.0], [1.0, 1.0]]), limits(CurveLimits::default());
+        glow: Curve = curve(&[[0.0, 0.0], [0.1, 0.12], [0.3, 1.0], [1.0, 1.0]]), limits(CurveLimits::default());
         /// Luminance of the blue light at the base, as a share of `luminance`.
         base_blue: f64 = 0.0, limits(SHARE);
     }
