@@ -114,7 +114,7 @@ mod tests {
     #[test]
     fn values_out_of_range_are_refused_as_in_a_file() {
         let picture = PictureParameters { size: [0, 200], ..Default::default() };
-        let error = SceneBuilder::new().picture(&picture).build(&MemoryAssets::default()).unwrap_err();
+        let error = SceneBuilder::new().picture(&picture).build(&MemoryAssets::default()).err().unwrap();
         assert!(error.to_string().contains("picture.size"), "{error}");
     }
 }

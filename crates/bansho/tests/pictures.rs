@@ -24,7 +24,13 @@ fn hues(film: &Film) -> [f64; 3] {
     let mut counts = [0.0; 3];
     for pixel in film.pixels().filter(|pixel| luminance(**pixel) > 0.01) {
         let ratio = pixel[1] / pixel[0].max(1e-6);
-        counts[if ratio < 0.12 { 0 } else if ratio < 0.45 { 1 } else { 2 }] += 1.0;
+        counts[if ratio < 0.12 {
+            0
+        } else if ratio < 0.45 {
+            1
+        } else {
+            2
+        }] += 1.0;
     }
     let all: f64 = counts.iter().sum();
     counts.map(|count| count / all)

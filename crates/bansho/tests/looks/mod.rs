@@ -102,7 +102,8 @@ impl Film {
 
     /// Centre of the light in the upper half of what is lit, in pixels, over all frames.
     pub fn centroid_of_upper_half(&self) -> [f64; 2] {
-        let lit_row = |row: usize| (0..self.frames.len()).any(|f| self.row(f, row).iter().any(|p| luminance(*p) > 0.02));
+        let lit_row =
+            |row: usize| (0..self.frames.len()).any(|f| self.row(f, row).iter().any(|p| luminance(*p) > 0.02));
         let rows: Vec<usize> = (0..self.height).filter(|row| lit_row(*row)).collect();
         let middle = (rows[0] + rows[rows.len() - 1]) / 2;
         let (mut sum, mut place) = (0.0, [0.0; 2]);

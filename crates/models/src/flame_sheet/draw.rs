@@ -44,21 +44,18 @@ pub(crate) struct Sample {
 pub(crate) struct Shade<S: Simd> {
     /// T1, eq. (5).
     pub(crate) t1: Lanes<S>,
-    /// Coverage times glow.
-    pub(crate) strength: Lanes<S>,
     /// Red, green, blue of luminance up to 1, and opacity.
     pub(crate) light: [Lanes<S>; 4],
 }
 
-/// Whether any flame reaches a batch, and what of it.
 #[inline(always)]
-pub(crate) fn shade<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<S>) -> Option<Shade<S>> {
+fn shade_inline<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<S>) -> Option<Shade<S>> {
     let (x, y) = state.moment.straighten(batch.x, batch.y);
     if shape.out_of_reach(probe(x), probe(y)) {
         return None;
     }
     let place = shape.place(x, y, &state.moment.edges, state.pixel)?;
-    let t1 = chain::above_threshold(state.texture.sample(place.u, place.w), place.threshold);
+    let t1 = chain::above_threshold(shape.gas(state.texture.sample(place.u, place.w)), place.threshold);
     let zero = t1.like(0.0);
     let strength = zero.choose(t1, place.coverage * place.glow, zero);
     let blue = ramp.base_blue[2] > 0.0 && any_positive(place.w.like(BLUE_TOP) - place.w);
@@ -78,7 +75,7 @@ pub(crate) fn shade<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &
     if blue {
         add_base_blue(&mut light, ramp, &place);
     }
-    Some(Shade { t1, strength, light })
+    Some(Shade { t1, light })
 }
 
 /// Height w up to which the base burns blue.
@@ -105,13 +102,13 @@ fn shade_flat<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<
     if !any_positive(strength) {
         return None;
     }
-    let texture = state.texture.sample(batch.x, batch.y);
+    let texture = shape.gas(state.texture.sample(batch.x, batch.y));
     let t1 = if cut { chain::above_threshold(texture, shape.flat_threshold(batch.x, batch.y)) } else { texture };
     let mut light = ramp.light(t1);
     for plane in &mut light {
         *plane = *plane * strength;
     }
-    Some(Shade { t1, strength, light })
+    Some(Shade { t1, light })
 }
 
 /// Which part of the chain is drawn.
@@ -187,8 +184,15 @@ fn expose<S: Simd>(simd: S, paint: &Paint, pixel: [usize; 2]) -> Option<Exposed>
     Some(exposed)
 }
 
-/// What a batch sees of a sample. All but the flame are rare and kept out of line, so that they do not weigh on its code.
-#[inline(always)]
+/// Whether any flame reaches a batch, and what of it; compiled once for each kind of vector.
+pub(crate) fn shade<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<S>) -> Option<Shade<S>> {
+    batch.x.simd.vectorize(
+        #[inline(always)]
+        || shade_inline(shape, ramp, state, batch),
+    )
+}
+
+/// What a batch sees of a sample.
 pub(crate) fn shade_as<S: Simd>(shape: &Shape, ramp: &Ramp, sample: &Sample, drawn: Drawn, batch: &Batch<S>) -> Option<Shade<S>> {
     let state = &sample.state;
     match (&sample.smoke, drawn) {

@@ -6,7 +6,7 @@ use bansho_base::{
     image::Rect,
     math::{self, DVec3},
 };
-use fearless_simd::{Simd, prelude::*};
+use fearless_simd::Simd;
 
 use super::{
     FlameSheet,

@@ -168,3 +168,6 @@ impl Phenomenon for FlameSheet {
         Ok(Box::new(prepared::PreparedSheet::new(self, view, surroundings, observer)?))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -93,7 +93,7 @@ impl Moment {
     /// The point of the unbent, usual flame that (x, y) of the sheet shows.
     #[inline(always)]
     pub(crate) fn straighten<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
-        let [centre, _] = self.centre.along(y);
+        let [centre, _] = self.centre.near(y);
         (x - centre, y * y.like(self.squeeze))
     }
 

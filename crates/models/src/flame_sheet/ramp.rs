@@ -116,6 +116,6 @@ impl Ramp {
 /// Colour of the CH (431 nm) and C2 (516 nm) bands of burning gas, ACEScg of luminance 1.
 fn base_blue() -> [f32; 3] {
     let (ch, c2) = (color::line_xyz(431.0), color::line_xyz(516.0));
-    let xyz: [f64; 3] = std::array::from_fn(|i| ch[i] + 0.12 * c2[i]);
+    let xyz: [f64; 3] = std::array::from_fn(|i| ch[i] + 0.3 * c2[i]);
     color::acescg_from_xyz(xyz.map(|value| value / xyz[1]))
 }

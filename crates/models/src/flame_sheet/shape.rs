@@ -12,7 +12,7 @@ use super::{
     chain,
     lanes::{Lanes, Real, any_positive},
     parameters::{ColourParameters, Colouring, ShapeParameters, TextureParameters},
-    tables::{CurvePair, locate},
+    tables::CurvePair,
 };
 use crate::fault::{FaultKind, ParameterFault};
 
@@ -24,6 +24,7 @@ const REACH_BINS: usize = 128;
 pub(crate) struct Shape {
     initial_speed: f32,
     edge_speed: f32,
+    contrast: f32,
     /// A and D over w.
     widths: CurvePair,
     /// F over the place in the fringe.
@@ -105,6 +106,7 @@ impl Shape {
         let mut result = Self {
             initial_speed: shape.initial_speed as f32,
             edge_speed: shape.edge_speed as f32,
+            contrast: texture.contrast as f32,
             widths: CurvePair::from_samples(|i| width_samples[i]),
             falling: CurvePair::new(|place| [1.0 - shape.slowing.eval(place), 0.0]),
             across: CurvePair::new(|across| [texture.threshold_across.eval(across), 0.0]),
@@ -126,26 +128,22 @@ impl Shape {
         })
     }
 
-    /// Rise, profile and slowed rise, eqs. (9) to (12), and whether all points lie in the core.
+    /// Rise, profile and slowed rise, eqs. (9) to (12).
     #[inline(always)]
-    fn slowed_rise<S: Simd>(&self, distance: Lanes<S>, y: Lanes<S>) -> (Lanes<S>, bool) {
+    fn slowed_rise<S: Simd>(&self, distance: Lanes<S>, y: Lanes<S>) -> Lanes<S> {
         let rise = chain::rise(y, self.initial_speed);
-        let [core, fringe] = self.widths.along(rise);
+        let [core, fringe] = self.widths.near(rise);
         if !any_positive(distance - core) {
-            return (rise, true);
+            return rise;
         }
-        let [falling, _] = self.falling.sample(chain::fringe_place(distance, core, fringe));
-        (chain::slowed_rise(rise, chain::speed_profile(falling, self.edge_speed)), false)
+        let [falling, _] = self.falling.near(chain::fringe_place(distance, core, fringe));
+        chain::slowed_rise(rise, chain::speed_profile(falling, self.edge_speed))
     }
 
-    /// Edges, threshold V with glow, and cooling at heights w.
+    /// The gas T0 of the texture at the artist's contrast; still within [0, 1].
     #[inline(always)]
-    fn at_heights<S: Simd>(&self, w: Lanes<S>, edges: &CurvePair, core: bool) -> [[Lanes<S>; 2]; 3] {
-        if core {
-            return [edges.along(w), self.heights.along(w), self.cooling.along(w)];
-        }
-        let height = locate(w);
-        [edges.fetch(&height), self.heights.fetch(&height), self.cooling.fetch(&height)]
+    pub(crate) fn gas<S: Simd>(&self, texture: Lanes<S>) -> Lanes<S> {
+        texture.fused(texture.like(self.contrast), texture.like(1.0 - self.contrast))
     }
 
     /// The same for one point.
@@ -162,8 +160,8 @@ impl Shape {
     #[inline(always)]
     pub(crate) fn place<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>, edges: &CurvePair, pixel: [f32; 2]) -> Option<Place<S>> {
         let distance = chain::axis_distance(x);
-        let (w, core) = self.slowed_rise(distance, y.held());
-        let [[left, right], [vertical, glow], cooling] = self.at_heights(w, edges, core);
+        let w = self.slowed_rise(distance, y.held());
+        let ([left, right], [vertical, glow], cooling) = (edges.near(w), self.heights.near(w), self.cooling.near(w));
         let (half, one) = (x.like(0.5), x.like(1.0));
         let edge = x.choose(half, left, right);
         let (per_pixel_across, per_pixel_up) = (x.like(1.0 / pixel[0]), x.like(1.0 / pixel[1]));
@@ -175,7 +173,7 @@ impl Shape {
             return None;
         }
         let across = chain::across(distance, edge).least(one);
-        let [horizontal, _] = self.across.sample(across);
+        let [horizontal, _] = self.across.near(across);
         let threshold = chain::threshold(vertical, horizontal);
         Some(Place { u: chain::texture_u(across, x), w, across, threshold, glow, cooling, coverage })
     }

@@ -70,7 +70,7 @@ pub(crate) fn shade_smoke<S: Simd>(state: &State, smoke: &SmokeState, batch: &Ba
     let (low, high) = (smoke.lit_at(first), smoke.lit_at(last));
     let scattered = |k: usize| between(x.simd, low[k], high[k]) * opacity;
     let light = [scattered(0), scattered(1), scattered(2), opacity];
-    Some(Shade { t1: density, strength: density, light })
+    Some(Shade { t1: density, light })
 }
 
 impl FlameSheet {

@@ -2,7 +2,7 @@
 
 use fearless_simd::{Simd, prelude::*};
 
-use super::lanes::{LANES, Lanes, Real, between, fetch, probe, wrap_split};
+use super::lanes::{LANES, Lanes, Real, fetch, probe, wrap_split};
 
 /// Straight pieces of a table.
 pub(crate) const SEGMENTS: usize = 512;
@@ -66,23 +66,40 @@ impl CurvePair {
         self.fetch(&locate(x))
     }
 
-    /// Both functions at places that hardly change within the batch, as heights along a row of pixels do.
+    /// Both functions at places that lie close together, as those of a row of pixels on a large sheet do.
     ///
-    /// Between the ends they are taken as straight; where the places change too much for that, each is looked up.
+    /// A parabola through three look-ups serves all sixteen; where the places spread too far for that, each is looked up.
     #[inline(always)]
-    pub(crate) fn along<S: Simd>(&self, x: Lanes<S>) -> [Lanes<S>; 2] {
-        /// Change of place within which every curve is straight to a few millionths.
-        const LITTLE: f32 = 2.0 / SEGMENTS as f32;
+    pub(crate) fn near<S: Simd>(&self, x: Lanes<S>) -> [Lanes<S>; 2] {
+        /// Spread within which a parabola misses an artist's curve by less than a display can show.
+        const SPREAD: f32 = 0.035;
         let [first, middle, last] = probe(x);
-        let bend = middle - (last - first).mul_add((LANES / 2) as f32 / (LANES - 1) as f32, first);
-        if (last - first).size() > LITTLE || bend.size() > 0.1 * LITTLE {
-            return x.simd.vectorize(
-                #[inline(always)]
-                || self.sample(x),
-            );
+        let low = first.least(middle).least(last).greatest(0.0);
+        let high = first.greatest(middle).greatest(last).least(LAST);
+        let spread = high - low;
+        if !(spread < SPREAD) {
+            return self.sample_apart(x);
         }
-        let (low, high) = (self.at(first), self.at(last));
-        [between(x.simd, low[0], high[0]), between(x.simd, low[1], high[1])]
+        let centre = low.mul_add(0.5, 0.5 * high);
+        let (below, between, above) = (self.at(low), self.at(centre), self.at(high));
+        // Newton's divided differences; without spread the places are one.
+        let inverse = if spread > 1e-6 { 1.0 / spread } else { 0.0 };
+        let (from_low, from_centre) = (x - x.like(low), x - x.like(centre));
+        let mut values = [x; 2];
+        for k in 0..2 {
+            let slope = 2.0 * inverse * (between[k] - below[k]);
+            let bend = 2.0 * inverse * inverse * (above[k] - 2.0 * between[k] + below[k]);
+            values[k] = from_low.fused(from_centre.fused(x.like(bend), x.like(slope)), x.like(below[k]));
+        }
+        values
+    }
+
+    /// [`sample`](Self::sample), out of line.
+    fn sample_apart<S: Simd>(&self, x: Lanes<S>) -> [Lanes<S>; 2] {
+        x.simd.vectorize(
+            #[inline(always)]
+            || self.sample(x),
+        )
     }
 
     /// Both functions at one place.
@@ -99,7 +116,7 @@ impl CurvePair {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flame_sheet::lanes::plain;
+    use crate::flame_sheet::lanes::{plain, ramp};
 
     #[test]
     fn a_table_holds_its_ends_and_is_straight_between_samples() {
@@ -113,6 +130,9 @@ mod tests {
             assert!((line - x).abs() < 1e-6 && (parabola - (1.0 - x * x)).abs() < 2e-6);
             let batch = plain!(simd => table.sample(Lanes::splat(simd, x)).map(|values| values[7]));
             assert!((batch[0] - line).abs() < 1e-6 && (batch[1] - parabola).abs() < 1e-6);
+            let near = plain!(simd => table.near(ramp(simd, x, 0.002)).map(|values| [values[0], values[11]]));
+            let far = table.at(x + 0.022);
+            assert!((near[0][0] - line).abs() < 1e-5 && (near[1][1] - far[1]).abs() < 1e-4, "{near:?} {far:?}");
         }
     }
 }

@@ -10,6 +10,8 @@ use bansho_base::{
     surroundings::{Publication, Surroundings},
 };
 
+use rayon::prelude::*;
+
 use super::{
     clock::{self, Clock},
     compose::{self, Composition},
@@ -50,7 +52,7 @@ impl CpuShot {
     fn compose(&self, view: &View, plate: &PlateFrame, observer: &dyn Observer) -> Result<Option<Frame>, RenderError> {
         let preparing = StageGuard::begin(observer, Stage::Prepare);
         let surroundings = self.surroundings(view);
-        let each = || self.phenomena.iter().zip(&surroundings);
+        let each = || self.phenomena.par_iter().zip(&surroundings);
         let intervals: Vec<_> = each().map(|(phenomenon, s)| phenomenon.depth_intervals(view, s)).collect();
         let slices = slices::cut(&intervals);
         let prepared: Vec<Box<dyn Prepared + '_>> =
@@ -81,7 +83,7 @@ impl CpuShot {
     /// What each phenomenon sees of all others.
     fn surroundings(&self, view: &View) -> Vec<Surroundings<'_>> {
         let publications: Vec<Publication> =
-            self.phenomena.iter().map(|phenomenon| phenomenon.publish(view.shutter)).collect();
+            self.phenomena.par_iter().map(|phenomenon| phenomenon.publish(view.shutter)).collect();
         let seen_by = |index| Surroundings {
             wind: &self.plan.wind,
             others: clock::others(&self.plan, &publications, index, view.shutter),

@@ -1,0 +1,190 @@
+//! What bad input gets: one error for each fault, with its place and what is allowed, the right exit code, and nothing
+//! written.
+
+use crate::support::{FLAME, Folder};
+
+/// Renders a bad scene and gives what the program said.
+fn refused(scene: &str, code: i32) -> String {
+    let folder = Folder::with_scene(scene);
+    let run = folder.run(&["render", "scene.toml"]);
+    assert_eq!((run.code, run.errors()), (Some(code), 1), "{}", run.stderr);
+    assert_eq!(folder.names(), ["scene.toml"], "nothing may be written");
+    assert!(!folder.path("out").exists(), "not even a folder");
+    assert_eq!(folder.run(&["check", "scene.toml"]).code, Some(code));
+    run.stderr
+}
+
+fn with_line(table: &str, line: &str) -> String {
+    FLAME.replace(&format!("{table}\n"), &format!("{table}\n{line}\n"))
+}
+
+/// Everything that must stand in an error.
+fn says(error: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(error.contains(part), "`{part}` is not in: {error}");
+    }
+}
+
+#[test]
+fn an_unknown_key_names_the_nearest() {
+    let error = refused(&with_line("[picture]", "exposre_ev100 = 3"), 3);
+    says(&error, &["error: scene.toml:4:1: ", "`exposre_ev100`", "did you mean `exposure_ev100`?", "size, frames"]);
+}
+
+#[test]
+fn an_unknown_table_names_the_nearest() {
+    says(&refused(&FLAME.replace("flame_sheet", "flame_sheat"), 3), &["scene.toml:12:", "flame_sheat", "flame_sheet"]);
+}
+
+#[test]
+fn a_wrong_type_says_what_is_wanted() {
+    let error = refused(&FLAME.replace("frames = 6", "frames = \"six\""), 3);
+    says(&error, &["scene.toml:5:10: picture.frames: ", "found a string", "1 to 10000000"]);
+}
+
+#[test]
+fn a_value_out_of_range_says_the_range() {
+    let error = refused(&with_line("[[flame_sheet]]", "height = -3.0"), 3);
+    says(&error, &["scene.toml:13:10: flame_sheet.0.height: -3 is out of range; allowed: ", " m"]);
+}
+
+#[test]
+fn a_missing_plate_is_named() {
+    let error = refused(&format!("{FLAME}[plate]\nimage = \"plates/gone.png\"\n"), 3);
+    says(&error, &["scene.toml:15:9: plate.image: ", "plates/gone.png", "no such file"]);
+}
+
+#[test]
+fn a_plate_that_is_no_picture_is_refused() {
+    let scene = format!("{FLAME}[plate]\nimage = \"plate.png\"\n");
+    for contents in [&b""[..], b"no picture", b"\x89PNG\r\n\x1a\n"] {
+        let folder = Folder::with_scene(&scene);
+        std::fs::write(folder.path("plate.png"), contents).unwrap();
+        let run = folder.run(&["render", "scene.toml"]);
+        assert_eq!((run.code, run.errors()), (Some(3), 1), "{contents:?}: {}", run.stderr);
+        says(&run.stderr, &["plate.png", "damaged"]);
+        assert_eq!(folder.names(), ["plate.png", "scene.toml"]);
+    }
+}
+
+#[test]
+fn sizes_of_nothing_and_of_a_billion_are_refused() {
+    for size in ["0, 64", "48, 1000000000"] {
+        let error = refused(&FLAME.replace("48, 64", size), 3);
+        says(&error, &["scene.toml:4:", "picture.size: ", "out of range; allowed: 1 to 16384 pixels"]);
+    }
+}
+
+#[test]
+fn a_curve_that_falls_where_it_must_rise_is_refused() {
+    let error = refused(&format!("{FLAME}texture = {{ threshold = [[0, 0.5], [1, 0.2]] }}\n"), 3);
+    says(&error, &["scene.toml:14:", "threshold", "falls between x = 0 and x = 1"]);
+}
+
+#[test]
+fn keys_that_do_not_ascend_are_refused() {
+    let error = refused(&format!("{FLAME}[wind]\nvelocity = {{ keys = [[1, [0, 0, 0]], [0, [1, 0, 0]]] }}\n"), 3);
+    says(&error, &["scene.toml:15:", "wind.velocity"]);
+}
+
+#[test]
+fn text_that_is_no_toml_is_located() {
+    says(&refused("bansho = 1\n[picture\n", 3), &["error: scene.toml:2:"]);
+}
+
+#[test]
+fn a_newer_format_is_refused() {
+    says(&refused("bansho = 99\n", 3), &["scene.toml:1:10: ", "99", "known: up to 1"]);
+}
+
+#[test]
+fn a_scene_that_is_not_there_is_named() {
+    let folder = Folder::new();
+    let run = folder.run(&["render", "gone.toml"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 1));
+    says(&run.stderr, &["error: gone.toml: the scene cannot be read"]);
+}
+
+#[test]
+fn each_fault_has_an_error_of_its_own() {
+    let folder = Folder::with_scene("bansho = 1\n[picture]\nsize = [0, 4]\nfps = true\n[wnd]\n");
+    let run = folder.run(&["render", "scene.toml"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 3), "{}", run.stderr);
+    assert_eq!(folder.names(), ["scene.toml"]);
+}
+
+/// Options that make no sense: exit code 2, one error, nothing written.
+fn misused(arguments: &[&str], parts: &[&str]) {
+    let folder = Folder::with_scene(FLAME);
+    let run = folder.run(&[&["render", "scene.toml"], arguments].concat());
+    assert_eq!((run.code, run.errors()), (Some(2), 1), "{arguments:?}: {}", run.stderr);
+    says(&run.stderr, parts);
+    assert_eq!(folder.names(), ["scene.toml"], "{arguments:?}");
+}
+
+#[test]
+fn frames_that_run_backward_are_refused() {
+    misused(&["--frames", "9-1"], &["`9-1` runs backward", "0-239x10"]);
+    misused(&["--frames", "1-9x0"], &["step of zero"]);
+    misused(&["--frames", "first"], &["`first` is no frame"]);
+}
+
+#[test]
+fn sizes_crops_and_loops_out_of_range_are_refused() {
+    misused(&["--size", "0x5"], &["1 to 16384"]);
+    misused(&["--size", "1000000000x5"], &["1 to 16384"]);
+    misused(&["--crop", "40,0,9,9"], &["reaches outside the picture", "48"]);
+    misused(&["--crop", "1,2,3"], &["x,y,width,height"]);
+    misused(&["--loop", "0"], &["out of range", "3600"]);
+    misused(&["--loop", "-1"], &["--loop"]);
+    misused(&["--threads", "0"], &["1..=1024"]);
+}
+
+#[test]
+fn names_that_cannot_be_written_are_refused() {
+    misused(&["--out", "a.tiff"], &["a.tiff", ".png, .exr, .apng, .gif, .mp4"]);
+    misused(&["--out", "a.##.##.png"], &["more than one place"]);
+    misused(&["--out", "frame"], &["no extension"]);
+}
+
+#[test]
+fn options_that_do_not_go_together_are_refused() {
+    misused(&["--layers"], &["--layers", ".exr"]);
+    misused(&["--aovs", "--out", "a.mp4"], &["--aovs", ".exr"]);
+    misused(&["--contact-sheet", "4", "--out", "a.gif"], &["a.gif", ".png"]);
+    misused(&["--contact-sheet", "0"], &["0 tiles", "allowed: 1 to"]);
+    misused(&["--contact-sheet", "99", "--size", "9000x9000"], &["16384"]);
+    misused(&["--snapshot-every", "3"], &["--snapshots"]);
+    misused(&["--snapshots", "s", "--snapshot-every", "0"], &["allowed: 1 or more"]);
+}
+
+#[test]
+fn assignments_at_fault_are_blamed_and_not_the_scene() {
+    misused(&["--set", "picture.size"], &["picture.size", "key.path=value"]);
+    misused(&["--set", "flame_sheet.7.height=2"], &["flame_sheet.7.height", "left log"]);
+    misused(&["--set", "picture.frames=0"], &["scene.toml with --set", "picture.frames", "out of range"]);
+    misused(&["--set", "picture.framse=3"], &["did you mean `frames`?"]);
+    // A fault of the scene itself is told as such, with its own line.
+    let folder = Folder::with_scene(&FLAME.replace("frames = 6", "frames = 0"));
+    let run = folder.run(&["render", "scene.toml", "--set", "wind.gust=0.5"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 1));
+    says(&run.stderr, &["scene.toml:5:10: picture.frames"]);
+    // An assignment may also mend it.
+    folder.succeed(&["render", "scene.toml", "--set", "picture.frames=1"]);
+}
+
+#[test]
+fn words_that_are_no_options_are_refused_with_the_nearest() {
+    misused(&["--frmes", "1"], &["--frmes", "--frames"]);
+    misused(&["--view", "filmic"], &["display", "standard", "raw"]);
+    misused(&["--bits", "12"], &["8", "16"]);
+}
+
+#[test]
+fn a_gpu_that_is_not_there_has_its_own_exit_code() {
+    let folder = Folder::with_scene(FLAME);
+    let run = folder.run(&["render", "scene.toml", "--backend", "gpu"]);
+    assert_eq!((run.code, run.errors()), (Some(4), 1));
+    says(&run.stderr, &["no usable GPU", "cpu, auto"]);
+    assert_eq!(folder.names(), ["scene.toml"]);
+}

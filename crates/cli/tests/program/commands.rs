@@ -1,0 +1,127 @@
+//! Everything but rendering.
+
+use crate::support::{FLAME, Folder};
+
+#[test]
+fn a_new_scene_passes_the_check_and_is_never_overwritten() {
+    let folder = Folder::new();
+    folder.succeed(&["new", "fire"]);
+    assert_eq!(folder.names(), ["fire.toml"]);
+    let check = folder.succeed(&["check", "fire.toml"]);
+    assert!(check.stdout.starts_with("fire.toml: right. 1280 x 720"), "{}", check.stdout);
+    folder.write("fire.toml", "mine");
+    let again = folder.run(&["new", "fire"]);
+    assert_eq!((again.code, again.errors()), (Some(1), 1));
+    assert!(again.stderr.contains("fire.toml: is there already"), "{}", again.stderr);
+    assert_eq!(folder.files("")["fire.toml"], b"mine");
+}
+
+#[test]
+fn every_example_can_be_copied_and_passes_the_check() {
+    let folder = Folder::new();
+    let list = folder.succeed(&["new", "--list"]).stdout;
+    for example in list.lines().filter_map(|line| line.split_whitespace().next()) {
+        let file = format!("{example} copy.toml");
+        folder.succeed(&["new", &file, "--from", example]);
+        folder.succeed(&["check", &file]);
+    }
+}
+
+#[test]
+fn an_unknown_example_is_an_error_and_writes_nothing() {
+    let folder = Folder::new();
+    let run = folder.run(&["new", "fire", "--from", "volcano"]);
+    assert_eq!((run.code, run.errors()), (Some(1), 1));
+    assert!(run.stderr.contains("no example `volcano`"), "{}", run.stderr);
+    assert!(folder.names().is_empty());
+}
+
+#[test]
+fn check_tells_of_every_scene() {
+    let folder = Folder::with_scene(FLAME);
+    folder.write("bad.toml", "bansho = 1\n[picture]\nsize = [0, 0]\n");
+    let run = folder.run(&["check", "bad.toml", "scene.toml", "gone.toml"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 3), "{}", run.stderr);
+    assert!(run.stdout.contains("scene.toml: right. 48 x 64, frames 0 to 5 at 30 a second"), "{}", run.stdout);
+    assert!(run.stdout.contains("left log"));
+}
+
+#[test]
+fn upgrade_states_the_format_keeps_comments_and_does_no_more() {
+    let folder = Folder::new();
+    folder.write("old.toml", "# mine\n[picture]\nframes = 3 # few\n");
+    let run = folder.succeed(&["upgrade", "old.toml"]);
+    assert!(run.stdout.contains("rewritten for format 1"), "{}", run.stdout);
+    let text = String::from_utf8(folder.files("")["old.toml"].clone()).unwrap();
+    assert_eq!(text, "bansho = 1\n# mine\n[picture]\nframes = 3 # few\n");
+    assert!(folder.succeed(&["upgrade", "old.toml"]).stdout.contains("unchanged"));
+    assert_eq!(folder.names(), ["old.toml"]);
+    folder.write("new.toml", "bansho = 99\n");
+    folder.write("broken.toml", "bansho = 1\n[\n");
+    for name in ["new.toml", "broken.toml"] {
+        let run = folder.run(&["upgrade", name]);
+        assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+        assert!(run.stderr.contains(&format!("error: {name}:")), "{}", run.stderr);
+    }
+}
+
+#[test]
+fn the_schema_knows_the_keys_of_scenes() {
+    let schema = Folder::new().succeed(&["schema"]).stdout;
+    let schema: serde_json::Value = serde_json::from_str(&schema).unwrap();
+    assert!(schema["properties"]["picture"]["properties"]["exposure_ev100"].is_object());
+    assert_eq!(schema["properties"]["flame_sheet"]["type"], "array");
+}
+
+#[test]
+fn completions_and_manual_pages_know_the_options() {
+    let folder = Folder::new();
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        assert!(folder.succeed(&["completions", shell]).stdout.contains("contact-sheet"), "{shell}");
+    }
+    assert!(folder.succeed(&["man"]).stdout.contains("bansho"));
+    folder.succeed(&["man", "pages"]);
+    let pages = folder.files("pages");
+    assert!(pages.contains_key("bansho.1") && pages.contains_key("bansho-render.1"), "{:?}", pages.keys());
+    assert!(String::from_utf8_lossy(&pages["bansho-render.1"]).contains("snapshots"));
+}
+
+#[test]
+fn help_and_version_are_no_errors() {
+    let folder = Folder::new();
+    assert!(folder.succeed(&["--version"]).stdout.starts_with("bansho "));
+    assert!(folder.succeed(&["render", "--help"]).stdout.contains("--resume"));
+    assert_eq!(folder.run(&[]).code, Some(2));
+}
+
+#[test]
+fn json_progress_is_one_object_a_line() {
+    let folder = Folder::with_scene(FLAME);
+    let run = folder.succeed(&["render", "scene.toml", "--progress", "json"]);
+    let events: Vec<serde_json::Value> = run.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!((events[0]["event"].as_str(), events[0]["frames"].as_u64()), (Some("start"), Some(6)));
+    let frames: Vec<_> = events.iter().filter(|event| event["event"] == "frame").collect();
+    assert_eq!(frames.len(), 6);
+    for frame in frames {
+        assert!(folder.path(frame["file"].as_str().unwrap()).is_file());
+    }
+    let last = events.last().unwrap();
+    assert_eq!((last["event"].as_str(), last["drawn"].as_u64()), (Some("done"), Some(6)));
+
+    let run = folder.run(&["render", "scene.toml", "--progress", "json", "--out", "scene.toml/a.png"]);
+    let event: serde_json::Value = serde_json::from_str(run.stdout.lines().last().unwrap()).unwrap();
+    assert_eq!((event["event"].as_str(), event["code"].as_u64()), (Some("error"), Some(1)));
+    assert_eq!(run.errors(), 1);
+}
+
+#[test]
+fn nothing_but_the_last_line_is_told_without_a_terminal() {
+    let folder = Folder::with_scene(FLAME);
+    let run = folder.succeed(&["render", "scene.toml"]);
+    assert!(run.stdout.is_empty());
+    assert_eq!(run.stderr.lines().count(), 1, "{}", run.stderr);
+    assert!(run.stderr.starts_with("6 frames in ") && run.stderr.contains("scene.0000.png"), "{}", run.stderr);
+    assert!(folder.succeed(&["render", "scene.toml", "--progress", "none"]).stderr.is_empty());
+    let stats = folder.succeed(&["render", "scene.toml", "--progress", "none", "--stats"]).stderr;
+    assert!(["load", "draw", "view", "write", "threads"].iter().all(|word| stats.contains(word)), "{stats}");
+}

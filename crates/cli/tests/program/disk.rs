@@ -1,0 +1,103 @@
+//! Places that cannot be written, and disks that are full.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use crate::support::{FLAME, Folder, Run, decode_png};
+
+#[test]
+fn a_file_in_the_way_of_a_folder_is_an_error() {
+    let folder = Folder::with_scene(FLAME);
+    let run = folder.run(&["render", "scene.toml", "--out", "scene.toml/deep/f.png"]);
+    assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("a part of this path is a file, not a folder"), "{}", run.stderr);
+    assert_eq!(folder.names(), ["scene.toml"]);
+}
+
+#[test]
+fn a_folder_in_the_way_of_a_file_is_an_error() {
+    let folder = Folder::with_scene(FLAME);
+    fs::create_dir(folder.path("film.gif")).unwrap();
+    let run = folder.run(&["render", "scene.toml", "--out", "film.gif"]);
+    assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("film.gif: is a folder"), "{}", run.stderr);
+}
+
+fn is_root() -> bool {
+    let id = Command::new("id").arg("-u").output().unwrap();
+    id.stdout == b"0\n"
+}
+
+/// What a user who may not write into `locked` is told. Root may write anywhere, so it becomes somebody else first.
+#[cfg(unix)]
+fn run_as_a_user(folder: &Folder) -> Run {
+    use std::os::unix::{fs::PermissionsExt, process::CommandExt};
+    let mode = |path: PathBuf, mode: u32| fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();
+    fs::create_dir(folder.path("locked")).unwrap();
+    mode(folder.path("locked"), 0o555);
+    mode(folder.path(""), 0o755);
+    let arguments = ["render", "scene.toml", "--out", "locked/deep/f.png"];
+    let run = if is_root() {
+        const NOBODY: u32 = 65_534;
+        let program = folder.path("program");
+        fs::copy(env!("CARGO_BIN_EXE_bansho"), &program).unwrap();
+        let mut command = Command::new(program);
+        Run::of(command.args(arguments).current_dir(folder.path("")).uid(NOBODY).gid(NOBODY).output().unwrap())
+    } else {
+        folder.run(&arguments)
+    };
+    mode(folder.path("locked"), 0o755);
+    run
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_that_may_not_be_written_is_an_error_before_anything_is_drawn() {
+    let folder = Folder::with_scene(FLAME);
+    let run = run_as_a_user(&folder);
+    assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("not allowed to write there"), "{}", run.stderr);
+    assert!(folder.files("locked").is_empty() && !folder.path("locked/deep").exists());
+}
+
+/// A disk of its own with room for a few frames, until it is dropped.
+struct SmallDisk(PathBuf);
+
+impl SmallDisk {
+    fn mount(at: &Path) -> Self {
+        fs::create_dir(at).unwrap();
+        let arguments = ["-t", "tmpfs", "-o", "size=64k", "tmpfs"];
+        let mounted = Command::new("mount").args(arguments).arg(at).status().unwrap();
+        assert!(mounted.success(), "a small disk could not be mounted");
+        Self(at.to_path_buf())
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        let unmounted = Command::new("umount").arg(&self.0).status();
+        assert!(unmounted.is_ok_and(|status| status.success()), "{} is still mounted", self.0.display());
+    }
+}
+
+#[test]
+#[ignore = "needs root, to mount a small disk"]
+fn a_full_disk_is_an_error_and_leaves_only_whole_frames() {
+    let folder = Folder::with_scene(&FLAME.replace("48, 64", "96, 128").replace("frames = 6", "frames = 100"));
+    let _disk = SmallDisk::mount(&folder.path("disk"));
+    let run = folder.run(&["render", "scene.toml", "--out", "disk/f.png", "--bits", "16"]);
+    assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("the disk is full"), "{}", run.stderr);
+    let files = folder.files("disk");
+    assert!((1..100).contains(&files.len()), "{:?}", files.keys());
+    for (name, bytes) in &files {
+        assert!(name.ends_with(".png"), "{name}");
+        assert_eq!(decode_png(bytes).width, 96, "{name}");
+    }
+    let film = folder.run(&["render", "scene.toml", "--out", "disk/film.apng"]);
+    assert_eq!((film.code, film.errors()), (Some(1), 1), "{}", film.stderr);
+    assert!(!folder.path("disk/film.apng").exists());
+}

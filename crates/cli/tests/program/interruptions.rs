@@ -1,0 +1,144 @@
+//! The program is stopped in the middle: whole frames stay, and `--resume` comes to the same bytes.
+
+use std::{
+    fs,
+    process::{Child, Command, Stdio},
+    time::{Duration, Instant},
+};
+
+use crate::support::{FLAME, Folder, Run, decode_png, read_exr, wait_until};
+
+/// Enough frames that nobody finishes them before they are stopped.
+const MANY: usize = 1500;
+
+fn long_scene() -> Folder {
+    Folder::with_scene(&FLAME.replace("48, 64", "160, 120").replace("frames = 6", &format!("frames = {MANY}")))
+}
+
+fn start(folder: &Folder, arguments: &[&str]) -> Child {
+    folder.command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+fn finished(folder: &Folder, inside: &str) -> usize {
+    folder.names().iter().filter(|name| name.starts_with(inside) && !name.ends_with(".part")).count()
+}
+
+fn signal(child: &Child, name: &str) {
+    let sent = Command::new("kill").args([&format!("-{name}"), &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+}
+
+#[test]
+fn killed_in_the_middle_only_whole_frames_bear_names_and_resume_completes_them() {
+    let folder = long_scene();
+    let numbers = ["--frames", "0-59"];
+    for extension in ["png", "exr"] {
+        let killed = format!("{extension}/f.{extension}");
+        let mut child = start(&folder, &["render", "scene.toml", "--out", &killed]);
+        wait_until("some frames", || finished(&folder, extension) >= 7);
+        child.kill().unwrap();
+        assert_eq!(child.wait().unwrap().code(), None, "it must have been killed, not have finished");
+        let there = finished(&folder, extension);
+        assert!((7..MANY).contains(&there));
+        for name in folder.names().iter().filter(|name| name.starts_with(extension) && !name.ends_with(".part")) {
+            match extension {
+                "png" => assert_eq!(decode_png(&fs::read(folder.path(name)).unwrap()).width, 160, "{name}"),
+                _ => assert_eq!(read_exr(&folder.path(name)).size, [160, 120], "{name}"),
+            }
+        }
+        let whole = format!("{extension} whole/f.{extension}");
+        folder.succeed(&[&["render", "scene.toml", "--out", &whole], &numbers[..]].concat());
+        let resumed = folder.succeed(&[&["render", "scene.toml", "--resume", "--out", &killed], &numbers[..]].concat());
+        assert!(resumed.stderr.contains("were there already"), "{}", resumed.stderr);
+        let all = folder.files(extension);
+        let expected = folder.files(&format!("{extension} whole"));
+        assert_eq!(expected.len(), 60);
+        assert!(expected.iter().all(|(name, bytes)| all[name] == *bytes), "{extension}");
+    }
+}
+
+#[test]
+fn resume_draws_broken_and_foreign_frames_and_no_others() {
+    let folder = Folder::with_scene(FLAME);
+    for extension in ["png", "exr"] {
+        let out = format!("{extension}/f.{extension}");
+        let name = |number: usize| folder.path(&format!("{extension}/f.{number:04}.{extension}"));
+        folder.succeed(&["render", "scene.toml", "--out", &out]);
+        let expected = folder.files(extension);
+        let bytes = fs::read(name(1)).unwrap();
+        fs::write(name(1), &bytes[..bytes.len() - 5]).unwrap();
+        let mut spoilt = fs::read(name(2)).unwrap();
+        let middle = spoilt.len() / 2;
+        spoilt[middle] ^= 1;
+        fs::write(name(2), spoilt).unwrap();
+        folder.succeed(&[
+            "render",
+            "scene.toml",
+            "--seed",
+            "99",
+            "--frames",
+            "3",
+            "--out",
+            &format!("{extension}/f.####.{extension}"),
+        ]);
+        fs::write(name(4), b"").unwrap();
+        fs::remove_file(name(5)).unwrap();
+        let untouched = fs::metadata(name(0)).unwrap().modified().unwrap();
+        let resumed = folder.succeed(&["render", "scene.toml", "--resume", "--out", &out]);
+        assert!(
+            resumed.stderr.starts_with("5 frames in ") && resumed.stderr.contains("1 were there already"),
+            "{}",
+            resumed.stderr
+        );
+        assert!(folder.files(extension) == expected, "{extension}");
+        assert_eq!(fs::metadata(name(0)).unwrap().modified().unwrap(), untouched);
+    }
+}
+
+#[test]
+fn resume_does_not_trust_other_bits() {
+    let folder = Folder::with_scene(FLAME);
+    folder.succeed(&["render", "scene.toml", "--frames", "0-1", "--out", "f.png"]);
+    folder.succeed(&["render", "scene.toml", "--frames", "0-1", "--out", "f.png", "--bits", "16", "--resume"]);
+    assert_eq!(decode_png(&folder.files("")["f.0001.png"]).bits, 16);
+}
+
+#[test]
+fn a_signal_stops_it_within_a_second_with_its_own_exit_code() {
+    for (name, code) in [("INT", 130), ("TERM", 143)] {
+        let folder = long_scene();
+        let child = start(&folder, &["render", "scene.toml", "--out", "f/f.png"]);
+        wait_until("a frame", || finished(&folder, "f/") >= 1);
+        signal(&child, name);
+        let since = Instant::now();
+        let run = Run::of(child.wait_with_output().unwrap());
+        assert!(since.elapsed() < Duration::from_secs(1), "{:?}", since.elapsed());
+        assert_eq!((run.code, run.errors()), (Some(code), 1), "{}", run.stderr);
+        let files = folder.files("f");
+        assert!(files.keys().all(|name| name.ends_with(".png")), "no temporary file stays: {:?}", files.keys());
+        assert!(files.values().all(|bytes| decode_png(bytes).width == 160));
+    }
+}
+
+#[test]
+fn an_interrupted_film_leaves_nothing() {
+    for extension in ["gif", "apng"] {
+        let folder = long_scene();
+        let child = start(&folder, &["render", "scene.toml", "--out", &format!("film.{extension}")]);
+        wait_until("the film to begin", || folder.names().iter().any(|name| name.ends_with(".part")));
+        signal(&child, "TERM");
+        assert_eq!(Run::of(child.wait_with_output().unwrap()).code, Some(143));
+        assert_eq!(folder.names(), ["scene.toml"], "{extension}");
+    }
+}
+
+#[test]
+fn an_interruption_is_told_in_json_too() {
+    let folder = long_scene();
+    let child = start(&folder, &["render", "scene.toml", "--out", "f/f.png", "--progress", "json"]);
+    wait_until("a frame", || finished(&folder, "f/") >= 1);
+    signal(&child, "INT");
+    let run = Run::of(child.wait_with_output().unwrap());
+    let last: serde_json::Value = serde_json::from_str(run.stdout.lines().last().unwrap()).unwrap();
+    assert_eq!((last["event"].as_str(), last["code"].as_u64()), (Some("error"), Some(130)));
+}

@@ -1,0 +1,10 @@
+//! The real program: good and bad input, exit codes, interruptions, files.
+
+mod bad_input;
+mod commands;
+mod disk;
+mod flipbook;
+mod interruptions;
+mod pictures;
+mod rooms;
+mod support;

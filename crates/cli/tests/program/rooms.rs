@@ -1,0 +1,98 @@
+//! Who may know whom: the crates of the workspace and the dependencies that only some of them may have.
+
+use std::{collections::BTreeMap, process::Command};
+
+/// Each crate with those of the workspace that it may depend on.
+const MAY_KNOW: [(&str, &[&str]); 8] = [
+    ("bansho-base", &[]),
+    ("bansho-models", &["bansho-base"]),
+    ("bansho-render", &["bansho-base", "bansho-models"]),
+    ("bansho-media", &["bansho-base"]),
+    // The job needs to draw and to write: the one edge from the face to files, behind the feature `files`.
+    ("bansho", &["bansho-base", "bansho-models", "bansho-render", "bansho-media"]),
+    ("bansho-cli", &["bansho", "bansho-media", "bansho-base"]),
+    ("bansho-gpu", &["bansho", "bansho-base", "bansho-models", "bansho-render"]),
+    ("bansho-studio", &["bansho", "bansho-media", "bansho-base", "bansho-gpu"]),
+];
+
+/// Dependencies with the only crates that may have them.
+const RESERVED: [(&str, &[&str]); 9] = [
+    ("wgpu", &["bansho-gpu", "bansho-studio"]),
+    ("egui", &["bansho-studio"]),
+    ("eframe", &["bansho-studio"]),
+    ("clap", &["bansho-cli"]),
+    ("clap_complete", &["bansho-cli"]),
+    ("clap_mangen", &["bansho-cli"]),
+    ("indicatif", &["bansho-cli"]),
+    ("anyhow", &["bansho-cli"]),
+    ("signal-hook", &["bansho-cli"]),
+];
+
+/// A dependency of a crate, not counting those of its tests.
+struct Dependency {
+    name: String,
+    optional: bool,
+}
+
+fn workspace() -> BTreeMap<String, Vec<Dependency>> {
+    let arguments = ["metadata", "--format-version", "1", "--no-deps", "--offline"];
+    let output = Command::new(env!("CARGO")).args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let text = |value: &serde_json::Value| value.as_str().unwrap().to_owned();
+    let dependencies = |package: &serde_json::Value| {
+        let all = package["dependencies"].as_array().unwrap();
+        let own = all.iter().filter(|dependency| dependency["kind"] != "dev");
+        own.map(|d| Dependency { name: text(&d["name"]), optional: d["optional"] == true }).collect()
+    };
+    let packages = metadata["packages"].as_array().unwrap();
+    packages.iter().map(|package| (text(&package["name"]), dependencies(package))).collect()
+}
+
+/// Everything in a workspace that breaks the rules.
+fn breaches(workspace: &BTreeMap<String, Vec<Dependency>>) -> Vec<String> {
+    let mut breaches = Vec::new();
+    for (name, dependencies) in workspace {
+        let Some((_, known)) = MAY_KNOW.iter().find(|(known, _)| known == name) else {
+            breaches.push(format!("{name} has no room: say here whom it may know"));
+            continue;
+        };
+        for dependency in dependencies.iter().map(|dependency| dependency.name.as_str()) {
+            if workspace.contains_key(dependency) && !known.contains(&dependency) {
+                breaches.push(format!("{name} may not know {dependency}"));
+            }
+            let reserved = RESERVED.iter().find(|(reserved, _)| *reserved == dependency);
+            if reserved.is_some_and(|(_, owners)| !owners.contains(&name.as_str())) {
+                breaches.push(format!("{name} may not use {dependency}"));
+            }
+        }
+    }
+    breaches
+}
+
+#[test]
+fn crates_know_only_whom_they_may() {
+    let workspace = workspace();
+    assert!(workspace.len() >= 6, "{:?}", workspace.keys());
+    assert_eq!(breaches(&workspace), Vec::<String>::new());
+    let media = workspace["bansho"].iter().find(|dependency| dependency.name == "bansho-media");
+    assert!(media.is_some_and(|media| media.optional), "an embedder must be able to do without files");
+}
+
+#[test]
+fn a_breach_would_be_found() {
+    let dependency = |name: &str| Dependency { name: name.to_owned(), optional: false };
+    let workspace = BTreeMap::from([
+        ("bansho-base".to_owned(), vec![dependency("clap"), dependency("bansho-cli"), dependency("glam")]),
+        ("bansho-cli".to_owned(), vec![dependency("clap")]),
+        ("bansho-extra".to_owned(), Vec::new()),
+    ]);
+    assert_eq!(
+        breaches(&workspace),
+        [
+            "bansho-base may not use clap",
+            "bansho-base may not know bansho-cli",
+            "bansho-extra has no room: say here whom it may know",
+        ]
+    );
+}
