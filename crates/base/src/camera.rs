@@ -28,7 +28,7 @@ crate::parameters! {
         /// What the lens does: straight lines, a dome, or all around.
         lens: Lens = Lens::Perspective;
         /// Vertical field of view of a perspective lens, unless `focal_length_mm` is given.
-        vertical_fov_deg: Animated<f64> = Animated::from(40.0), limits(Range::new(0.1, 170.0)), unit("degrees");
+        vertical_fov_deg: Animated<f64> = Animated::from(32.0), limits(Range::new(0.1, 170.0)), unit("degrees");
         /// Focal length; with `sensor_height_mm` it gives the field of view.
         focal_length_mm: Option<Animated<f64>> = None, limits(Range::new(0.1, 10_000.0)), unit("mm");
         /// Height of the sensor that `focal_length_mm` refers to.

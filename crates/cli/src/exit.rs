@@ -7,7 +7,7 @@ use bansho::{
     job::{Cause, JobError},
 };
 
-use crate::{interrupt, output::to_stderr};
+use crate::{command::new::UnknownExample, interrupt, output::to_stderr};
 
 /// Failed on the way.
 const FAILED: u8 = 1;
@@ -31,6 +31,7 @@ pub(crate) fn code(error: &anyhow::Error) -> u8 {
         Some(Cause::Scene) => SCENE,
         Some(Cause::Gpu) => GPU,
         Some(Cause::Cancelled) => interrupt::exit_code(),
+        None if error.is::<UnknownExample>() => USAGE,
         Some(Cause::Work) | None => FAILED,
     }
 }

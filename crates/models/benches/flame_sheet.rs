@@ -7,6 +7,7 @@ use bansho_base::{
     camera::CameraParameters,
     canvas::{DepthInterval, Shutter, Strip, View},
     image::Rect,
+    math,
     observer::Unobserved,
     parameters::Auto,
     phenomenon::Phenomenon,
@@ -26,7 +27,7 @@ fn view(parameters: &FlameSheetParameters) -> View {
     let camera = CameraParameters {
         position: Animated::from([0.0, 0.5 * height, 10.0]),
         target: Animated::from([0.0, 0.5 * height, 0.0]),
-        vertical_fov_deg: Animated::from(2.0 * f64::atan2(0.5 * height, 10.0).to_degrees()),
+        vertical_fov_deg: Animated::from(2.0 * math::atan2(0.5 * height, 10.0).to_degrees()),
         ..CameraParameters::default()
     };
     View::new(camera, Shutter { open: 3.0, close: 3.0 + 1.0 / 60.0 }, 3.03, SIZE, 0)

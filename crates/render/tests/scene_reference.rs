@@ -1,7 +1,13 @@
-//! The book's page on the scene file is what the descriptors say, so that it cannot drift from the program.
+//! The book cannot drift from the program: its page on the scene file is what the descriptors say, its examples are scenes.
 
-use bansho_base::parameters::{Descriptor, Kind, TableDescriptor, Value};
+use std::path::{Path, PathBuf};
+
+use bansho_base::{
+    assets::MemoryAssets,
+    parameters::{Descriptor, Kind, ProblemKind, TableDescriptor, Value},
+};
 use bansho_render::{
+    Scene,
     phenomena::KINDS,
     scene::{FORMAT, SHARED_TABLES},
 };
@@ -18,6 +24,27 @@ fn the_books_page_on_the_scene_file_is_up_to_date() {
     let differs = written.lines().zip(page.lines()).find(|(written, now)| written != now);
     assert_eq!(differs, None, "run BANSHO_BLESS=1 cargo test -p bansho-render --test scene_reference");
     assert_eq!(written.len(), page.len());
+}
+
+#[test]
+fn every_scene_in_readme_and_book_is_right() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let guide = std::fs::read_dir(root.join("docs/src/guide")).unwrap().map(|entry| entry.unwrap().path());
+    let pages: Vec<PathBuf> = guide.chain([root.join("README.md")]).collect();
+    let mut scenes = 0;
+    for page in pages {
+        let text = std::fs::read_to_string(&page).unwrap();
+        for block in text.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()) {
+            // Excerpts leave out the first line of a scene.
+            let scene = if block.contains("bansho = ") { block.to_owned() } else { format!("bansho = 1\n{block}") };
+            scenes += 1;
+            let Err(error) = Scene::parse("example", &scene, KINDS, &MemoryAssets::default()) else { continue };
+            // The plates of the examples are not there.
+            let wrong = error.problems.iter().any(|problem| !matches!(problem.kind, ProblemKind::Asset(_)));
+            assert!(!wrong, "{}: {error}", page.display());
+        }
+    }
+    assert!(scenes >= 5, "found only {scenes}");
 }
 
 fn page() -> String {

@@ -17,6 +17,8 @@ mod scene_file;
 mod sheet;
 mod shoot;
 mod snapshots;
+#[cfg(test)]
+mod testing;
 
 use std::path::PathBuf;
 

@@ -2,13 +2,13 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use bansho_base::{assets::Assets, color::View, image::Rect};
+use bansho_base::{assets::Assets, color::View};
 use bansho_media::{
     flipbook::Sheet,
     naming::{OutputKind, OutputPattern},
     plates::FileAssets,
 };
-use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, Scene, display::BitDepth};
+use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth};
 
 use super::{
     BackendChoice, Job, contact,
@@ -85,10 +85,14 @@ impl Job {
     pub fn prepare(&self) -> Result<PreparedJob, JobError> {
         let backend = backend(self.backend)?;
         let assets = assets(&self.scene);
-        let scene = self.scene.check(assets.as_ref())?;
+        let mut scene = self.scene.check(assets.as_ref())?;
         let kind = self.output_kind()?;
         self.check_channels(kind)?;
-        let plan = Arc::new(Plan::new(scene.clone(), &self.plan_options(&scene, kind), assets)?);
+        if kind != OutputKind::Exr {
+            // Only EXR has room for what lies beyond the picture.
+            scene.picture.overscan = 0;
+        }
+        let plan = Arc::new(Plan::new(scene, &self.plan_options(), assets)?);
         let frames = self.chosen_frames(&plan)?;
         let files = if self.contact_sheet.is_some() { 1 } else { frames.len() };
         let pattern = OutputPattern::parse(&self.output_path(), files)?;
@@ -135,14 +139,11 @@ impl Job {
         if kind == OutputKind::Exr { Ok(()) } else { Err(Conflict::NoChannels { what, path: self.output_path() }) }
     }
 
-    fn plan_options(&self, scene: &Scene, kind: OutputKind) -> PlanOptions {
-        let size = self.size.unwrap_or(scene.picture.size.map(|side| side as usize));
-        // Only EXR has room for what lies beyond the picture.
-        let inner = (scene.picture.overscan > 0 && kind != OutputKind::Exr).then(|| Rect::of_size(size[0], size[1]));
+    fn plan_options(&self) -> PlanOptions {
         PlanOptions {
             size: self.size,
             seed: self.seed,
-            crop: self.crop.or(inner),
+            crop: self.crop,
             loop_s: self.loop_s,
             layers: self.layers,
             aovs: self.aovs,

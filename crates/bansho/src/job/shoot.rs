@@ -94,3 +94,92 @@ fn limit(frame: &Frame, finish: &dyn Finish) -> usize {
     let most = (rayon::current_num_threads() + 1).min(finish.window()).max(2);
     (MEMORY_IN_FLIGHT / bytes.max(1)).clamp(2, most)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        sync::{
+            Mutex,
+            atomic::{AtomicUsize, Ordering},
+        },
+        thread,
+        time::Duration,
+    };
+
+    use super::*;
+    use crate::job::{
+        error::Conflict,
+        testing::{Counter, Finisher, Witness, plan},
+    };
+
+    fn in_pool<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
+    }
+
+    fn run(numbers: &[i64], finish: &dyn Finish, witness: &Witness) -> Result<(), JobError> {
+        let counter = Counter { steps: Arc::default() };
+        shoot(&plan(), &counter, numbers, &Snapshots::default(), finish, witness)
+    }
+
+    #[test]
+    fn every_frame_is_finished_once_at_its_place_in_any_pool() {
+        for threads in [1, 2, 7] {
+            let done = Mutex::new(Vec::new());
+            let each = |index, number| {
+                done.lock().unwrap().push((index, number));
+                Ok(())
+            };
+            in_pool(threads, || run(&[3, 4, 9, 10], &Finisher { each, window: 64 }, &Witness::default())).unwrap();
+            let mut done = done.into_inner().unwrap();
+            done.sort_unstable();
+            assert_eq!(done, [(0, 3), (1, 4), (2, 9), (3, 10)]);
+        }
+    }
+
+    #[test]
+    fn no_frame_runs_further_ahead_of_the_oldest_than_the_window() {
+        const WINDOW: usize = 3;
+        let unfinished = Mutex::new((0..60).collect::<std::collections::BTreeSet<usize>>());
+        let furthest = AtomicUsize::new(0);
+        let each = |index: usize, _| {
+            let oldest = *unfinished.lock().unwrap().first().unwrap();
+            furthest.fetch_max(index - oldest, Ordering::Relaxed);
+            thread::sleep(Duration::from_millis([5, 0, 1][index % 3]));
+            unfinished.lock().unwrap().remove(&index);
+            Ok(())
+        };
+        let numbers: Vec<i64> = (0..60).collect();
+        in_pool(8, || run(&numbers, &Finisher { each, window: WINDOW }, &Witness::default())).unwrap();
+        let furthest = furthest.into_inner();
+        assert!((1..WINDOW).contains(&furthest), "{furthest}: frames must overlap, but within the window");
+    }
+
+    #[test]
+    fn a_failure_stops_the_work_and_is_told() {
+        let finished = AtomicUsize::new(0);
+        let each = |index, _| {
+            finished.fetch_add(1, Ordering::Relaxed);
+            if index == 5 { Err(Conflict::NoFrames.into()) } else { Ok(()) }
+        };
+        let numbers: Vec<i64> = (0..100_000).collect();
+        let result = in_pool(2, || run(&numbers, &Finisher { each, window: 8 }, &Witness::default()));
+        assert!(matches!(result, Err(JobError::Conflict(Conflict::NoFrames))), "{result:?}");
+        assert!(finished.into_inner() < 100, "it must not go on");
+    }
+
+    #[test]
+    fn a_wish_to_stop_is_heard_between_frames() {
+        let witness = Witness::default();
+        let finished = AtomicUsize::new(0);
+        let each = |_, _| {
+            if finished.fetch_add(1, Ordering::Relaxed) == 9 {
+                witness.stop.store(true, Ordering::Relaxed);
+            }
+            Ok(())
+        };
+        let numbers: Vec<i64> = (0..100_000).collect();
+        let result = in_pool(2, || run(&numbers, &Finisher { each, window: 8 }, &witness));
+        assert!(matches!(result, Err(JobError::Cancelled)), "{result:?}");
+        assert!((10..100).contains(&finished.into_inner()));
+    }
+}

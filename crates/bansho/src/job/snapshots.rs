@@ -104,3 +104,82 @@ fn numbers(folder: &Path) -> io::Result<Vec<i64>> {
     };
     Ok(entries.filter_map(number).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, atomic::Ordering};
+
+    use bansho_base::{observer::Unobserved, phenomenon::SnapshotError};
+
+    use super::*;
+    use crate::job::{
+        shoot::shoot,
+        testing::{Counter, Finisher, Witness, plan},
+    };
+
+    fn snapshots(folder: &tempfile::TempDir) -> Snapshots {
+        Snapshots::new(folder.path().join("states"), &plan(), 5)
+    }
+
+    /// Draws the frames and says how many steps that took.
+    fn steps(snapshots: &Snapshots, numbers: &[i64], witness: &Witness) -> usize {
+        let counter = Counter { steps: Arc::default() };
+        let finish = Finisher { each: |_, _| Ok(()), window: 4 };
+        shoot(&plan(), &counter, numbers, snapshots, &finish, witness).unwrap();
+        counter.steps.load(Ordering::Relaxed)
+    }
+
+    #[test]
+    fn states_are_kept_every_so_many_frames_and_spare_steps() {
+        let folder = tempfile::tempdir().unwrap();
+        let snapshots = snapshots(&folder);
+        let all: Vec<i64> = (-4..12).collect();
+        assert_eq!(steps(&snapshots, &all, &Witness::default()), 16);
+        let mut there = numbers(snapshots.folder.as_deref().unwrap()).unwrap();
+        there.sort_unstable();
+        assert_eq!(there, [-4, 1, 6, 11]);
+        // From the state at 6, and then from that at 11.
+        assert_eq!(steps(&snapshots, &[8, 9, 12], &Witness::default()), 2 + 1 + 1);
+        // A state before the one that was reached already is of no use.
+        assert_eq!(steps(&snapshots, &[9, 11], &Witness::default()), 3);
+    }
+
+    #[test]
+    fn a_damaged_state_is_told_left_for_an_earlier_one_and_made_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let snapshots = snapshots(&folder);
+        steps(&snapshots, &(-4..9).collect::<Vec<_>>(), &Witness::default());
+        let path = snapshots.path(snapshots.folder.as_deref().unwrap(), 6);
+        let whole = fs::read(&path).unwrap();
+        fs::write(&path, b"cut").unwrap();
+        let witness = Witness::default();
+        assert_eq!(steps(&snapshots, &[6, 7], &witness), 6, "from the state at 1");
+        let reason = RenderError::Snapshot(SnapshotError::Damaged);
+        assert_eq!(*witness.notes.lock().unwrap(), [Note::SnapshotRefused { path: path.clone(), reason }]);
+        assert_eq!(fs::read(&path).unwrap(), whole);
+    }
+
+    #[test]
+    fn other_files_in_the_folder_are_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["state..bansho", "state.x.bansho", "state.5", "notes.txt"] {
+            fs::write(folder.path().join(name), b"mine").unwrap();
+        }
+        assert_eq!(numbers(folder.path()).unwrap(), Vec::<i64>::new());
+        assert_eq!(numbers(&folder.path().join("gone")).unwrap(), Vec::<i64>::new());
+    }
+
+    #[test]
+    fn a_loop_keeps_the_states_of_one_turn() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut snapshots = snapshots(&folder);
+        snapshots.turn = Some(10);
+        assert_eq!([-4, 5, 6, 16, -5].map(|number| snapshots.in_turn(number)), [-4, 5, -4, -4, 5]);
+        let counter = Counter { steps: Arc::default() };
+        let mut shot = counter.shot();
+        snapshots.keep(&shot, 6, &Unobserved).unwrap();
+        assert_eq!(numbers(snapshots.folder.as_deref().unwrap()).unwrap(), [-4]);
+        snapshots.seek(&mut shot, None, 7, &Witness::default());
+        assert_eq!(shot.number, -5);
+    }
+}

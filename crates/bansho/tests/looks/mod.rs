@@ -13,7 +13,7 @@ fn scenes() -> PathBuf {
 }
 
 /// The text of a shipped scene.
-pub fn scene_text(scene: &str) -> String {
+pub(crate) fn scene_text(scene: &str) -> String {
     std::fs::read_to_string(scenes().join(format!("{scene}.toml"))).unwrap_or_else(|error| panic!("{scene}: {error}"))
 }
 
@@ -50,25 +50,25 @@ fn over_black([red, green, blue, alpha]: [f32; 4]) -> [f32; 3] {
 }
 
 /// Frames of a scene in linear display light, over black.
-pub struct Film {
+pub(crate) struct Film {
     width: usize,
     height: usize,
     frames: Vec<Vec<[f64; 3]>>,
 }
 
 /// Relative luminance of linear sRGB.
-pub fn luminance([red, green, blue]: [f64; 3]) -> f64 {
+pub(crate) fn luminance([red, green, blue]: [f64; 3]) -> f64 {
     0.2126 * red + 0.7152 * green + 0.0722 * blue
 }
 
 impl Film {
     /// Frames of a shipped scene.
-    pub fn of(scene: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions) -> Self {
+    pub(crate) fn of(scene: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions) -> Self {
         Self::of_text(&scene_text(scene), size, frames, options)
     }
 
     /// Frames of a scene in a text.
-    pub fn of_text(text: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions) -> Self {
+    pub(crate) fn of_text(text: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions) -> Self {
         let linear = |image: &DisplayImage| {
             let decode = |value: f32| f64::from(bansho::base::color::decode_srgb(value));
             encoded(image).into_iter().map(|pixel| pixel.map(decode)).collect()
@@ -77,31 +77,31 @@ impl Film {
         Self { width: size[0], height: size[1], frames: images.iter().map(linear).collect() }
     }
 
-    pub fn pixels(&self) -> impl Iterator<Item = &[f64; 3]> {
+    pub(crate) fn pixels(&self) -> impl Iterator<Item = &[f64; 3]> {
         self.frames.iter().flatten()
     }
 
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.width * self.height * self.frames.len()
     }
 
-    pub fn row(&self, frame: usize, row: usize) -> &[[f64; 3]] {
+    pub(crate) fn row(&self, frame: usize, row: usize) -> &[[f64; 3]] {
         &self.frames[frame][row * self.width..][..self.width]
     }
 
     /// Mean luminance of a frame.
-    pub fn mean(&self, frame: usize) -> f64 {
+    pub(crate) fn mean(&self, frame: usize) -> f64 {
         self.frames[frame].iter().map(|pixel| luminance(*pixel)).sum::<f64>() / (self.width * self.height) as f64
     }
 
     /// Mean absolute difference of two frames.
-    pub fn difference(&self, a: usize, b: usize) -> f64 {
+    pub(crate) fn difference(&self, a: usize, b: usize) -> f64 {
         let pair = self.frames[a].iter().zip(&self.frames[b]);
         pair.map(|(a, b)| (luminance(*a) - luminance(*b)).abs()).sum::<f64>() / (self.width * self.height) as f64
     }
 
     /// Centre of the light in the upper half of what is lit, in pixels, over all frames.
-    pub fn centroid_of_upper_half(&self) -> [f64; 2] {
+    pub(crate) fn centroid_of_upper_half(&self) -> [f64; 2] {
         let lit_row =
             |row: usize| (0..self.frames.len()).any(|f| self.row(f, row).iter().any(|p| luminance(*p) > 0.02));
         let rows: Vec<usize> = (0..self.height).filter(|row| lit_row(*row)).collect();
@@ -123,7 +123,7 @@ impl Film {
 
 /// Share of the length of gradients that lies in bands: more than 8 pixels of one 8-bit code where 16 bits move by a
 /// quarter of a code.
-pub fn wide_bands(text: &str, size: [usize; 2], frame: i64) -> f64 {
+pub(crate) fn wide_bands(text: &str, size: [usize; 2], frame: i64) -> f64 {
     let codes = |depth| encoded(&draw(text, size, &[frame], &PlanOptions::default(), depth)[0]);
     let (coarse, fine) = (codes(BitDepth::Eight), codes(BitDepth::Sixteen));
     let (mut banded, mut gradient) = (0, 0);
@@ -147,7 +147,7 @@ pub fn wide_bands(text: &str, size: [usize; 2], frame: i64) -> f64 {
 }
 
 /// Compares a frame with its golden picture, or writes that when asked to; says what differs.
-pub fn golden(scene: &str, size: [usize; 2], frame: i64) -> Option<String> {
+pub(crate) fn golden(scene: &str, size: [usize; 2], frame: i64) -> Option<String> {
     let image = &draw(&scene_text(scene), size, &[frame], &PlanOptions::default(), BitDepth::Eight)[0];
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("tests/golden/{scene}.png"));
     if std::env::var_os("BANSHO_BLESS").is_some() {

@@ -34,7 +34,7 @@ pub(crate) struct FlipbookArgs {
     out: Option<PathBuf>,
     /// Fill the sheet with exactly one turn of a seamless loop of so many seconds; without it with the scene's first
     /// frames.
-    #[arg(long = "loop", value_name = "SECONDS", value_parser = values::parse_seconds)]
+    #[arg(long = "loop", value_name = "SECONDS", allow_hyphen_values = true, value_parser = values::parse_seconds)]
     loop_s: Option<f64>,
     /// The first frame. [default: the scene's first]
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]

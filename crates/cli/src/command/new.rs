@@ -22,7 +22,7 @@ use crate::{
 /// There is no example of that name.
 #[derive(Debug, thiserror::Error)]
 #[error("there is no example `{name}`{hint}; allowed: {allowed}")]
-struct UnknownExample {
+pub(crate) struct UnknownExample {
     name: String,
     hint: String,
     allowed: String,

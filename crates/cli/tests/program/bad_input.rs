@@ -136,7 +136,8 @@ fn sizes_crops_and_loops_out_of_range_are_refused() {
     misused(&["--crop", "40,0,9,9"], &["reaches outside the picture", "48"]);
     misused(&["--crop", "1,2,3"], &["x,y,width,height"]);
     misused(&["--loop", "0"], &["out of range", "3600"]);
-    misused(&["--loop", "-1"], &["--loop"]);
+    misused(&["--loop", "-1"], &["-1 s is out of range"]);
+    misused(&["--loop", "soon"], &["a number of seconds"]);
     misused(&["--threads", "0"], &["1..=1024"]);
 }
 

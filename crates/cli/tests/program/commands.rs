@@ -31,7 +31,7 @@ fn every_example_can_be_copied_and_passes_the_check() {
 fn an_unknown_example_is_an_error_and_writes_nothing() {
     let folder = Folder::new();
     let run = folder.run(&["new", "fire", "--from", "volcano"]);
-    assert_eq!((run.code, run.errors()), (Some(1), 1));
+    assert_eq!((run.code, run.errors()), (Some(2), 1));
     assert!(run.stderr.contains("no example `volcano`"), "{}", run.stderr);
     assert!(folder.names().is_empty());
 }
@@ -41,7 +41,7 @@ fn check_tells_of_every_scene() {
     let folder = Folder::with_scene(FLAME);
     folder.write("bad.toml", "bansho = 1\n[picture]\nsize = [0, 0]\n");
     let run = folder.run(&["check", "bad.toml", "scene.toml", "gone.toml"]);
-    assert_eq!((run.code, run.errors()), (Some(3), 3), "{}", run.stderr);
+    assert_eq!((run.code, run.errors()), (Some(3), 2), "{}", run.stderr);
     assert!(run.stdout.contains("scene.toml: right. 48 x 64, frames 0 to 5 at 30 a second"), "{}", run.stdout);
     assert!(run.stdout.contains("left log"));
 }

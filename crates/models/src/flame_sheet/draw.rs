@@ -1,128 +1,17 @@
-//! One flame of one frame, drawn row by row, sixteen pixels at a time.
+//! Sheets drawn into strips, sixteen pixels at a time.
+//!
+//! Where a pixel lies on the flame, its threshold and its glow change slowly from row to row of a large picture. They are found exactly on
+//! every second, fourth or eighth row and taken as straight between; texture and colour are looked up for every pixel.
 
 use bansho_base::{canvas::Strip, image::Rect};
-
 use fearless_simd::{Simd, prelude::*};
 
 use super::{
-    chain,
-    lanes::{LANES, Lanes, Real, any_positive, probe},
-    moment::Moment,
-    placement::{Batch, Mapping, Stand},
+    lanes::{LANES, Lanes, Real},
     ramp::Ramp,
+    shade::{Drawn, Sample, Shade, place, shade_as, shade_place},
     shape::{Place, Shape},
-    smoke::{SmokeState, shade_smoke},
-    texture::Texture,
 };
-
-/// What a sheet shows at one moment.
-pub(crate) struct State {
-    /// Edges, centre line, scroll.
-    pub(crate) moment: Moment,
-    /// T0.
-    pub(crate) texture: Texture,
-    /// Size of a pixel in x' and in y.
-    pub(crate) pixel: [f32; 2],
-}
-
-/// A sheet at one moment of the exposure, as one camera sees it.
-pub(crate) struct Sample {
-    /// From pixels to the sheet.
-    pub(crate) mapping: Mapping,
-    /// Where the sheet stands.
-    pub(crate) stand: Stand,
-    /// What it shows.
-    pub(crate) state: State,
-    /// Where it is smoke, what that is made of.
-    pub(crate) smoke: Option<SmokeState>,
-    /// Luminance of the brightest colour, divided by the number of samples; cd/m^2.
-    pub(crate) luminance: f32,
-}
-
-/// What sixteen pixels see of the flame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Shade<S: Simd> {
-    /// T1, eq. (5).
-    pub(crate) t1: Lanes<S>,
-    /// Red, green, blue of luminance up to 1, and opacity.
-    pub(crate) light: [Lanes<S>; 4],
-}
-
-#[inline(always)]
-fn shade_inline<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<S>) -> Option<Shade<S>> {
-    let (x, y) = state.moment.straighten(batch.x, batch.y);
-    if shape.out_of_reach(probe(x), probe(y)) {
-        return None;
-    }
-    let place = shape.place(x, y, &state.moment.edges, state.pixel)?;
-    let t1 = chain::above_threshold(shape.gas(state.texture.sample(place.u, place.w)), place.threshold);
-    let zero = t1.like(0.0);
-    let strength = zero.choose(t1, place.coverage * place.glow, zero);
-    let blue = ramp.base_blue[2] > 0.0 && any_positive(place.w.like(BLUE_TOP) - place.w);
-    if !blue && !any_positive(strength) {
-        return None;
-    }
-    let mut light = ramp.light(t1);
-    for plane in &mut light {
-        *plane = *plane * strength;
-    }
-    let [red, green_beside_red] = place.cooling;
-    let green = red * green_beside_red;
-    let blue_left = green * green_beside_red * green_beside_red.root();
-    for (plane, left) in light.iter_mut().zip([red, green, blue_left]) {
-        *plane = *plane * left;
-    }
-    if blue {
-        add_base_blue(&mut light, ramp, &place);
-    }
-    Some(Shade { t1, light })
-}
-
-/// Height w up to which the base burns blue.
-const BLUE_TOP: f32 = 0.45;
-
-/// The blue zone hugs the flame's lower edge, where fuel meets air before soot forms.
-#[inline(always)]
-fn add_base_blue<S: Simd>(light: &mut [Lanes<S>; 4], ramp: &Ramp, place: &Place<S>) {
-    let one = place.w.like(1.0);
-    let up = (one - place.w * one.like(1.0 / BLUE_TOP)).held();
-    let rim = (place.across * place.across).fused(one.like(0.75), one.like(0.25)) * (one - place.across) * one.like(3.0);
-    let amount = up * up * rim * place.coverage;
-    for (plane, blue) in light.iter_mut().zip(ramp.base_blue) {
-        *plane = amount.fused(one.like(blue), *plane);
-    }
-}
-
-/// The flat texture square of the paper's pictures 1 to 4.
-#[inline(always)]
-fn shade_flat<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<S>, cut: bool) -> Option<Shade<S>> {
-    let (zero, one) = (batch.x.like(0.0), batch.x.like(1.0));
-    let outside = |x: Lanes<S>| (zero - x).greatest(x - one).greatest(zero);
-    let strength = zero.choose(outside(batch.x) + outside(batch.y), zero, one);
-    if !any_positive(strength) {
-        return None;
-    }
-    let texture = shape.gas(state.texture.sample(batch.x, batch.y));
-    let t1 = if cut { chain::above_threshold(texture, shape.flat_threshold(batch.x, batch.y)) } else { texture };
-    let mut light = ramp.light(t1);
-    for plane in &mut light {
-        *plane = *plane * strength;
-    }
-    Some(Shade { t1, light })
-}
-
-/// Which part of the chain is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Drawn {
-    /// The mapped flame.
-    Flame,
-    /// The texture square before the threshold.
-    FlatTexture,
-    /// The texture square after the threshold.
-    FlatCut,
-    /// Smoke.
-    Smoke,
-}
 
 /// What is drawn of one sheet.
 #[derive(Clone, Copy)]
@@ -133,79 +22,164 @@ pub(crate) struct Paint<'a> {
     pub(crate) drawn: Drawn,
     /// Whether it hides anything.
     pub(crate) absorbs: bool,
+    /// Rows from one exact row to the next, a power of two.
+    pub(crate) band: usize,
 }
 
+/// Rows from one exact row to the next for a sheet of this height: 1 up to 255 pixels, 8 from 1024 on.
+pub(crate) fn band_of(height_pixels: f64) -> usize {
+    [8, 4, 2].into_iter().find(|rows| height_pixels >= 128.0 * *rows as f64).unwrap_or(1)
+}
+
+/// Pixels of a row that are tried together for whether any flame can be there.
+const GROUP: usize = 8 * LANES;
+
 /// Draws all samples of one sheet into the part `rect` of `strip`, behind what it holds.
+///
+/// Batches begin at multiples of sixteen columns of the whole picture and bands at multiples of their height, so that strips and
+/// crops change no pixel.
 #[inline(always)]
 pub(crate) fn draw_rows<S: Simd>(simd: S, paint: &Paint, rect: Rect, strip: &mut Strip) {
-    // Batches begin at multiples of sixteen of the whole picture, so that strips and crops change no pixel.
     let start = rect.x / LANES * LANES;
-    for y in rect.y..rect.bottom() {
-        for column in (start..rect.right()).step_by(LANES) {
-            if let Some(pixels) = expose(simd, paint, [column, y]) {
-                compose(&pixels, column, y, rect, paint.absorbs, strip);
-            }
+    for group in (start..rect.right()).step_by(GROUP) {
+        let end = (group + GROUP).min(rect.right());
+        match paint.drawn {
+            Drawn::Flame => draw_bands(simd, paint, group..end, rect, strip),
+            _ => draw_each_row(simd, paint, group..end, rect, strip),
         }
     }
 }
 
-/// Mean light and opacity of sixteen pixels over the exposure, and the nearest depth at which they see flame.
+#[inline(always)]
+fn draw_each_row<S: Simd>(simd: S, paint: &Paint, columns: std::ops::Range<usize>, rect: Rect, strip: &mut Strip) {
+    for y in rect.y..rect.bottom() {
+        for column in columns.clone().step_by(LANES) {
+            let mut sums = Sums::new(simd);
+            for sample in paint.samples {
+                let batch = sample.mapping.batch(simd, column, y);
+                if let Some(shade) = shade_as(paint.shape, paint.ramp, sample, paint.drawn, &batch) {
+                    sums.add(&shade, batch.depth, sample.luminance, paint.samples.len());
+                }
+            }
+            sums.compose(column, y, rect, paint.absorbs, strip);
+        }
+    }
+}
+
+/// Draws the flame in some columns, band after band; the last row of a band is the first of the next.
+#[inline(always)]
+fn draw_bands<S: Simd>(simd: S, paint: &Paint, columns: std::ops::Range<usize>, rect: Rect, strip: &mut Strip) {
+    let places = |row: usize, column: usize| paint.samples.iter().map(move |sample| {
+        let batch = sample.mapping.batch(simd, column, row);
+        (place(paint.shape, &sample.state, &batch), batch.depth)
+    });
+    let batches = columns.len().div_ceil(LANES);
+    let mut upper: Vec<(Place<S>, Lanes<S>)> = Vec::new();
+    let mut lower: Vec<(Place<S>, Lanes<S>)> = Vec::new();
+    for first in (rect.y / paint.band * paint.band..rect.bottom()).step_by(paint.band) {
+        let rows = first.max(rect.y)..(first + paint.band).min(rect.bottom());
+        if paint.samples.iter().all(|sample| dark(paint.shape, sample, &columns, [first, first + paint.band])) {
+            lower.clear();
+            continue;
+        }
+        std::mem::swap(&mut upper, &mut lower);
+        lower.clear();
+        if upper.is_empty() {
+            (0..batches).for_each(|batch| upper.extend(places(first, columns.start + batch * LANES)));
+        }
+        if paint.band > 1 {
+            (0..batches).for_each(|batch| lower.extend(places(first + paint.band, columns.start + batch * LANES)));
+        }
+        for batch in 0..batches {
+            let share = batch * paint.samples.len()..(batch + 1) * paint.samples.len();
+            let ends = [&upper[share.clone()], lower.get(share).unwrap_or(&[])];
+            for row in rows.clone() {
+                let part = (row - first) as f32 / paint.band as f32;
+                expose(simd, paint, ends, part).compose(columns.start + batch * LANES, row, rect, paint.absorbs, strip);
+            }
+        }
+        if paint.band == 1 {
+            upper.clear();
+        }
+    }
+}
+
+/// Averages all samples of sixteen pixels `part` of the way between two exact rows.
+#[inline(always)]
+fn expose<S: Simd>(simd: S, paint: &Paint, ends: [&[(Place<S>, Lanes<S>)]; 2], part: f32) -> Sums<S> {
+    let mut sums = Sums::new(simd);
+    for (index, sample) in paint.samples.iter().enumerate() {
+        let (upper, depth) = &ends[0][index];
+        let (place, depth) = match ends[1].get(index) {
+            Some((lower, lower_depth)) if part > 0.0 => {
+                (upper.toward(lower, part), (*lower_depth - *depth).fused(depth.like(part), *depth))
+            }
+            _ => (*upper, *depth),
+        };
+        if let Some(shade) = shade_place(paint.shape, paint.ramp, &sample.state, &place) {
+            sums.add(&shade, depth, sample.luminance, paint.samples.len());
+        }
+    }
+    sums
+}
+
+/// Whether no flame can be in some columns between two rows.
+#[inline(always)]
+fn dark(shape: &Shape, sample: &Sample, columns: &std::ops::Range<usize>, rows: [usize; 2]) -> bool {
+    let (mut x, mut y) = ([0.0; 6], [0.0; 6]);
+    let middle = (columns.start + columns.end) / 2;
+    for (k, column) in [columns.start, middle, columns.end].into_iter().enumerate() {
+        for (j, row) in rows.into_iter().enumerate() {
+            let Some(point) = sample.mapping.glance(column, row) else { return false };
+            let point = sample.state.moment.straighten_at(point);
+            (x[3 * j + k], y[3 * j + k]) = (point[0], point[1]);
+        }
+    }
+    shape.out_of_reach(&x, &y)
+}
+
+/// Mean light and opacity of sixteen pixels over the exposure, and the nearest depth at which they see anything.
+struct Sums<S: Simd> {
+    light: [Lanes<S>; 4],
+    depth: Lanes<S>,
+    touched: bool,
+}
+
+impl<S: Simd> Sums<S> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        Self { light: [Lanes::splat(simd, 0.0); 4], depth: Lanes::splat(simd, f32::INFINITY), touched: false }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, shade: &Shade<S>, depth: Lanes<S>, luminance: f32, samples: usize) {
+        for (k, weight) in [luminance, luminance, luminance, 1.0 / samples as f32].into_iter().enumerate() {
+            self.light[k] = shade.light[k].fused(depth.like(weight), self.light[k]);
+        }
+        let something = shade.light[0] + shade.light[2] + shade.light[3];
+        self.depth = depth.like(0.0).choose(something, self.depth.least(depth), self.depth);
+        self.touched = true;
+    }
+
+    /// Moves the pixels behind what the strip holds, where the plate does not hide them.
+    #[inline(always)]
+    fn compose(&self, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
+        if !self.touched {
+            return;
+        }
+        let mut pixels = Exposed { light: [[0.0; LANES]; 4], depth: [0.0; LANES] };
+        for k in 0..4 {
+            self.light[k].store_slice(&mut pixels.light[k]);
+        }
+        self.depth.store_slice(&mut pixels.depth);
+        compose(&pixels, column, y, rect, absorbs, strip);
+    }
+}
+
+/// [`Sums`] as plain numbers.
 struct Exposed {
     light: [[f32; LANES]; 4],
     depth: [f32; LANES],
-}
-
-/// Averages all samples of the sixteen pixels at `pixel`; `None` where there is nothing.
-#[inline(always)]
-fn expose<S: Simd>(simd: S, paint: &Paint, pixel: [usize; 2]) -> Option<Exposed> {
-    let Paint { shape, ramp, samples, drawn, .. } = *paint;
-    let mut sums = [Lanes::splat(simd, 0.0); 4];
-    let mut nearest = Lanes::splat(simd, f32::INFINITY);
-    let share = 1.0 / samples.len() as f32;
-    let mut touched = false;
-    for sample in samples {
-        let batch = sample.mapping.batch(simd, pixel[0], pixel[1]);
-        let Some(shade) = shade_as(shape, ramp, sample, drawn, &batch) else { continue };
-        touched = true;
-        for (k, weight) in [sample.luminance, sample.luminance, sample.luminance, share].into_iter().enumerate() {
-            sums[k] = shade.light[k].fused(nearest.like(weight), sums[k]);
-        }
-        let something = shade.light[0] + shade.light[2] + shade.light[3];
-        nearest = nearest.like(0.0).choose(something, nearest.least(batch.depth), nearest);
-    }
-    if !touched {
-        return None;
-    }
-    let mut exposed = Exposed { light: [[0.0; LANES]; 4], depth: [0.0; LANES] };
-    for k in 0..4 {
-        sums[k].store_slice(&mut exposed.light[k]);
-    }
-    nearest.store_slice(&mut exposed.depth);
-    Some(exposed)
-}
-
-/// Whether any flame reaches a batch, and what of it; compiled once for each kind of vector.
-pub(crate) fn shade<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<S>) -> Option<Shade<S>> {
-    batch.x.simd.vectorize(
-        #[inline(always)]
-        || shade_inline(shape, ramp, state, batch),
-    )
-}
-
-/// What a batch sees of a sample.
-pub(crate) fn shade_as<S: Simd>(shape: &Shape, ramp: &Ramp, sample: &Sample, drawn: Drawn, batch: &Batch<S>) -> Option<Shade<S>> {
-    let state = &sample.state;
-    match (&sample.smoke, drawn) {
-        (None, Drawn::Flame | Drawn::Smoke) => shade(shape, ramp, state, batch),
-        (None, Drawn::FlatTexture | Drawn::FlatCut) => batch.x.simd.vectorize(
-            #[inline(always)]
-            || shade_flat(shape, ramp, state, batch, drawn == Drawn::FlatCut),
-        ),
-        (Some(smoke), _) => batch.x.simd.vectorize(
-            #[inline(always)]
-            || shade_smoke(state, smoke, batch),
-        ),
-    }
 }
 
 /// Moves sixteen pixels behind what the strip holds, where the plate does not hide them.
@@ -214,7 +188,9 @@ fn compose(pixels: &Exposed, column: usize, y: usize, rect: Rect, absorbs: bool,
     let (first, last) = (column.max(rect.x), (column + LANES).min(rect.right()));
     let lanes = first - column..last - column;
     let index = (y - strip.rect.y) * strip.rect.width + first - strip.rect.x;
-    let hidden = |strip: &Strip| lanes.clone().any(|lane| !strip.visible(index + lane - lanes.start, pixels.depth[lane].min(f32::MAX)));
+    let hidden = |strip: &Strip| {
+        lanes.clone().any(|lane| !strip.visible(index + lane - lanes.start, pixels.depth[lane].min(f32::MAX)))
+    };
     if strip.has_plate() && hidden(strip) {
         for lane in lanes.clone().filter(|lane| pixels.depth[*lane].is_finite()) {
             let index = index + lane - lanes.start;
@@ -225,6 +201,10 @@ fn compose(pixels: &Exposed, column: usize, y: usize, rect: Rect, absorbs: bool,
             }
         }
         return;
+    }
+    if lanes.len() == LANES {
+        let [red, green, blue, opacity] = &pixels.light;
+        return strip.add_sixteen_behind(index, [red, green, blue], absorbs.then_some(opacity), &pixels.depth);
     }
     let light = [&pixels.light[0][lanes.clone()], &pixels.light[1][lanes.clone()], &pixels.light[2][lanes.clone()]];
     strip.add_row_behind(index, light, absorbs.then_some(&pixels.light[3][lanes.clone()]), &pixels.depth[lanes]);

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    canvas::{Shutter, View},
     camera::Camera,
+    canvas::{Shutter, View},
     image::Rect,
     math::{self, DVec2, DVec3},
     parameters::Auto,
@@ -14,7 +14,7 @@ use bansho_base::{
 
 use super::{
     FlameSheet,
-    draw::{Drawn, Sample, State},
+    shade::{Drawn, Sample, State},
     moment::{Moment, Motion, Push},
     parameters::{Facing, Instance, StageShown},
     placement::{Mapping, Stand, bounds, right_facing},
@@ -160,7 +160,14 @@ impl FlameSheet {
     }
 
     /// A flame's samples over the exposure and the pixels they may touch.
-    pub(crate) fn samples(&self, flame: &Flame, source: &FilteredSource, view: &View, wind: &Wind, count: usize) -> (Vec<Sample>, Rect) {
+    pub(crate) fn samples(
+        &self,
+        flame: &Flame,
+        source: &FilteredSource,
+        view: &View,
+        wind: &Wind,
+        count: usize,
+    ) -> (Vec<Sample>, Rect) {
         let mut samples = Vec::with_capacity(count);
         let mut rect = Rect::default();
         for index in 0..count {

@@ -92,7 +92,8 @@ mod tests {
         let periodic = fluctuation(|f| f.round().max(1.0));
         assert!((periodic.at(0.3) - periodic.at(5.3)).abs() < 1e-5);
         let free = fluctuation(|f| f);
-        let difference: f32 = (0..100).map(|i| (free.at(f64::from(i) * 0.1) - free.at(5.0 + f64::from(i) * 0.1)).abs()).sum();
+        let difference: f32 =
+            (0..100).map(|i| (free.at(f64::from(i) * 0.1) - free.at(5.0 + f64::from(i) * 0.1)).abs()).sum();
         assert!(difference > 5.0);
     }
 }

@@ -9,7 +9,7 @@ use fearless_simd::{Level, Simd, prelude::*};
 
 use super::{
     FlameSheet,
-    draw::{State, shade},
+    shade::{State, shade},
     flame::Flame,
     lanes::{LANES, Lanes, Real, ramp},
     moment::{Moment, Push},

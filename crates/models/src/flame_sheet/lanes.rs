@@ -146,12 +146,6 @@ pub(crate) fn any_positive<S: Simd>(values: Lanes<S>) -> bool {
     values.simd_gt(values.like(0.0)).any_true()
 }
 
-/// The first, a middle and the last of the numbers.
-#[inline(always)]
-pub(crate) fn probe<S: Simd>(values: Lanes<S>) -> [f32; 3] {
-    [values[0], values[LANES / 2], values[LANES - 1]]
-}
-
 /// Numbers in even steps from `first` to `last`.
 #[inline(always)]
 pub(crate) fn between<S: Simd>(simd: S, first: f32, last: f32) -> Lanes<S> {

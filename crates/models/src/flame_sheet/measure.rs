@@ -10,7 +10,7 @@ use fearless_simd::Simd;
 
 use super::{
     FlameSheet,
-    draw::{Drawn, Sample, shade_as},
+    shade::{Drawn, Sample, shade_as},
     flame::Flame,
     lanes::LANES,
 };
@@ -43,7 +43,14 @@ pub(crate) fn measure_rows<S: Simd>(simd: S, measured: &Measured, rect: Rect, st
 }
 
 #[inline(always)]
-fn measure_batch<S: Simd>(simd: S, measured: &Measured, sample: &Sample, pixel: [usize; 2], rect: Rect, strip: &mut Strip) {
+fn measure_batch<S: Simd>(
+    simd: S,
+    measured: &Measured,
+    sample: &Sample,
+    pixel: [usize; 2],
+    rect: Rect,
+    strip: &mut Strip,
+) {
     let batch = sample.mapping.batch(simd, pixel[0], pixel[1]);
     let sheet = measured.sheet;
     let Some(shade) = shade_as(&sheet.shape, &sheet.ramp, sample, measured.drawn, &batch) else { return };
@@ -92,7 +99,8 @@ impl FlameSheet {
         const STEP: f32 = 0.01;
         let distance = super::chain::axis_distance(x as f32);
         let y = (y as f32).clamp(0.02, 0.98);
-        let slope = (self.shape.slowed_rise_at(distance, y + STEP) - self.shape.slowed_rise_at(distance, y - STEP)) / (2.0 * STEP);
+        let slope = (self.shape.slowed_rise_at(distance, y + STEP) - self.shape.slowed_rise_at(distance, y - STEP))
+            / (2.0 * STEP);
         self.clock.speed(self.flame_time(flame, t)) / f64::from(slope.max(0.1))
     }
 }

@@ -19,6 +19,7 @@ mod parameters;
 mod placement;
 mod prepared;
 mod ramp;
+mod shade;
 mod shape;
 mod smoke;
 mod sparks;
@@ -65,7 +66,12 @@ impl FlameSheet {
     ///
     /// # Errors
     /// Parameters that do not go together; each alone is within its bounds.
-    pub fn new(parameters: FlameSheetParameters, name: &str, seed: u64, loop_s: Option<f64>) -> Result<Self, ParameterFault> {
+    pub fn new(
+        parameters: FlameSheetParameters,
+        name: &str,
+        seed: u64,
+        loop_s: Option<f64>,
+    ) -> Result<Self, ParameterFault> {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
             return Err(ParameterFault { key: "loop", kind: FaultKind::LoopLength { seconds } });
         }

@@ -33,9 +33,8 @@ impl Motion {
             let fit = |waves: f64| clock.waves(waves, 1.0);
             Fluctuation::new(key, Purpose::named(name), shape.flutter_waves, 0.9, fit)
         };
-        let in_time = |name, hz, roughness| {
-            Fluctuation::new(key, Purpose::named(name), hz, roughness, |f| clock.frequency(f))
-        };
+        let in_time =
+            |name, hz, roughness| Fluctuation::new(key, Purpose::named(name), hz, roughness, |f| clock.frequency(f));
         Self {
             left: edge("left edge"),
             right: edge("right edge"),
@@ -85,7 +84,14 @@ pub(crate) struct Moment {
 
 impl Moment {
     /// The flame at time `t` (its own, phase included), pushed across by `push`.
-    pub(crate) fn new(parameters: &FlameSheetParameters, shape: &Shape, motion: &Motion, clock: &Clock, t: f64, push: Push) -> Self {
+    pub(crate) fn new(
+        parameters: &FlameSheetParameters,
+        shape: &Shape,
+        motion: &Motion,
+        clock: &Clock,
+        t: f64,
+        push: Push,
+    ) -> Self {
         let level = fearless_simd::Level::new();
         fearless_simd::dispatch!(level, _simd => settle(parameters, shape, motion, clock, t, push))
     }
@@ -97,6 +103,12 @@ impl Moment {
         (x - centre, y * y.like(self.squeeze))
     }
 
+    /// [`straighten`](Self::straighten) for one point.
+    #[inline(always)]
+    pub(crate) fn straighten_at(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        [x - self.centre.at(y)[0], y * self.squeeze]
+    }
+
     /// Where the centre line stands at height y, in sheet widths from the axis.
     pub(crate) fn centre(&self, y: f64) -> f64 {
         f64::from(self.centre.at(y as f32)[0])
@@ -104,7 +116,14 @@ impl Moment {
 }
 
 #[inline(always)]
-fn settle(parameters: &FlameSheetParameters, shape: &Shape, motion: &Motion, clock: &Clock, t: f64, push: Push) -> Moment {
+fn settle(
+    parameters: &FlameSheetParameters,
+    shape: &Shape,
+    motion: &Motion,
+    clock: &Clock,
+    t: f64,
+    push: Push,
+) -> Moment {
     let (time, scroll) = (clock.time(t), clock.scroll(t));
     let look = &parameters.shape;
     let edge = |waves: &Fluctuation| {

@@ -57,6 +57,8 @@ pub(crate) struct Batch<S: Simd> {
     pub(crate) depth: Lanes<S>,
 }
 
+/// The depth of what is not seen; finite, so that it can be interpolated.
+const BEYOND: f32 = 1e30;
 /// A y that lies outside every flame.
 const NOWHERE: f32 = -1e6;
 
@@ -116,6 +118,19 @@ impl Mapping {
     }
 }
 
+impl Mapping {
+    /// The sheet coordinates of one pixel, where they are cheap to know.
+    #[inline(always)]
+    pub(crate) fn glance(&self, column: usize, row: usize) -> Option<[f32; 2]> {
+        let Self::Linear { forms, near } = self else { return None };
+        let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
+        let value = |[constant, a, b]: [f64; 3]| a * px + b * py + constant;
+        let inverse = value(forms[2]);
+        (inverse > 0.0 && inverse * near <= 1.0)
+            .then(|| [value(forms[0]) / inverse, value(forms[1]) / inverse].map(|v| v as f32))
+    }
+}
+
 #[inline(always)]
 fn linear_batch<S: Simd>(simd: S, forms: &[[f64; 3]; 3], near: f64, column: usize, row: usize) -> Batch<S> {
     let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
@@ -127,7 +142,7 @@ fn linear_batch<S: Simd>(simd: S, forms: &[[f64; 3]; 3], near: f64, column: usiz
     Batch {
         x: seen.select(value(forms[0]) * depth, depth.like(0.0)),
         y: seen.select(value(forms[1]) * depth, depth.like(NOWHERE)),
-        depth: seen.select(depth, depth.like(f32::INFINITY)),
+        depth: seen.select(depth, depth.like(BEYOND)),
     }
 }
 
@@ -163,7 +178,7 @@ fn meet(camera: &Camera, stand: &Stand, px: f64, py: f64) -> Option<[f64; 3]> {
 /// wherever the sheet is small in the lens, and pixels are traced one by one where one of the three sees nothing or the parabola bends much.
 fn ray_batch(camera: &Camera, stand: &Stand, column: usize, row: usize) -> Traced {
     let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
-    let mut batch = Traced { x: [0.0; LANES], y: [NOWHERE; LANES], depth: [f32::INFINITY; LANES] };
+    let mut batch = Traced { x: [0.0; LANES], y: [NOWHERE; LANES], depth: [BEYOND; LANES] };
     let knots = [0.0, 7.5, 15.0].map(|step| meet(camera, stand, px + step, py));
     let gentle = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| {
         (a[2] - 2.0 * b[2] + c[2]).abs() < 0.002 * b[2] && (a[2] - c[2]).abs() < 0.1 * b[2]
@@ -228,6 +243,7 @@ mod tests {
             position: Animated::from([0.7, 1.5, 4.0]),
             target: Animated::from([0.1, 0.6, 0.0]),
             roll_deg: Animated::from(5.0),
+            vertical_fov_deg: Animated::from(60.0),
             ..CameraParameters::default()
         };
         parameters.at(0.0, [640, 480])

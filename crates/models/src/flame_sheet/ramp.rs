@@ -1,16 +1,13 @@
 //! From the texture above the threshold to light: sharpening, eq. (6), and colour, eq. (7), in one table.
 
-use bansho_base::{
-    color,
-    math,
-};
+use bansho_base::{color, math};
 
 use fearless_simd::{Simd, prelude::*};
 
 use super::{
+    lanes::{LANES, Lanes, Real, fetch, nearest_whole},
     parameters::{ColourParameters, Colouring, StageShown, TextureParameters},
     shape::from_origin,
-    lanes::{LANES, Lanes, Real, fetch, nearest_whole},
     tables::CurvePair,
 };
 use crate::fault::ParameterFault;
@@ -50,7 +47,8 @@ fn hue(colour: &ColourParameters, t2: f64) -> [f64; 3] {
             color::black_body().radiance(temperature(colour, t2) as f32).map(|value| f64::from(value) * emissivity)
         }
         Colouring::Paper => {
-            let display = [&colour.red, &colour.green, &colour.blue].map(|curve| color::decode_srgb(curve.eval(t2) as f32));
+            let display =
+                [&colour.red, &colour.green, &colour.blue].map(|curve| color::decode_srgb(curve.eval(t2) as f32));
             color::acescg_from_srgb(display).map(f64::from)
         }
     }
@@ -66,7 +64,11 @@ impl Ramp {
     ///
     /// # Errors
     /// The sharpening curve does not begin at the origin.
-    pub(crate) fn new(texture: &TextureParameters, colour: &ColourParameters, stage: StageShown) -> Result<Self, ParameterFault> {
+    pub(crate) fn new(
+        texture: &TextureParameters,
+        colour: &ColourParameters,
+        stage: StageShown,
+    ) -> Result<Self, ParameterFault> {
         let sharpen = from_origin(&texture.sharpen, "texture.sharpen")?;
         let luminance = |rgb: [f64; 3]| f64::from(color::luminance(rgb.map(|value| value as f32)));
         let brightest = (0..=256).map(|i| luminance(hue(colour, f64::from(i) / 256.0))).fold(0.0, f64::max);

@@ -1,10 +1,6 @@
 //! What of the chain does not change with time, as tables.
 
-use bansho_base::{
-    curve::Curve,
-    math,
-    random::Key,
-};
+use bansho_base::{curve::Curve, math, random::Key};
 
 use fearless_simd::Simd;
 
@@ -77,21 +73,48 @@ fn samples(first: &Curve, second: &Curve) -> Vec<[f32; 2]> {
 }
 
 /// Where sixteen points lie in the flame.
+#[derive(Clone, Copy)]
 pub(crate) struct Place<S: Simd> {
     /// Texture coordinate u.
     pub(crate) u: Lanes<S>,
     /// Height w of the slowed rise.
     pub(crate) w: Lanes<S>,
-    /// u' of eq. (16).
-    pub(crate) across: Lanes<S>,
     /// Threshold L, eq. (4).
     pub(crate) threshold: Lanes<S>,
     /// Brightness and soot at that height.
     pub(crate) glow: Lanes<S>,
     /// Share of red light that cooling leaves, and of green beside red.
     pub(crate) cooling: [Lanes<S>; 2],
-    /// Share of the pixel that lies inside; 0 outside.
-    pub(crate) coverage: Lanes<S>,
+    /// Distance within the fluttering edge, pixels; negative outside.
+    side: Lanes<S>,
+    /// Height above the base, pixels.
+    above: Lanes<S>,
+}
+
+impl<S: Simd> Place<S> {
+    /// Share of the pixels that lies inside; 0 outside.
+    #[inline(always)]
+    pub(crate) fn coverage(&self, pixel: [f32; 2]) -> Lanes<S> {
+        let (half, one) = (self.w.like(0.5), self.w.like(1.0));
+        let top = (one - self.w).fused(one.like(1.0 / pixel[1]), half).held();
+        (self.side + half).held() * (self.above + half).held() * top
+    }
+
+    /// `part` of the way toward `other`.
+    #[inline(always)]
+    pub(crate) fn toward(&self, other: &Self, part: f32) -> Self {
+        let part = self.w.like(part);
+        let between = |a: Lanes<S>, b: Lanes<S>| (b - a).fused(part, a);
+        Self {
+            u: between(self.u, other.u),
+            w: between(self.w, other.w),
+            threshold: between(self.threshold, other.threshold),
+            glow: between(self.glow, other.glow),
+            cooling: [between(self.cooling[0], other.cooling[0]), between(self.cooling[1], other.cooling[1])],
+            side: between(self.side, other.side),
+            above: between(self.above, other.above),
+        }
+    }
 }
 
 impl Shape {
@@ -99,7 +122,11 @@ impl Shape {
     ///
     /// # Errors
     /// A curve that must begin at the origin does not, or core and fringe together are wider than the sheet.
-    pub(crate) fn new(shape: &ShapeParameters, texture: &TextureParameters, colour: &ColourParameters) -> Result<Self, ParameterFault> {
+    pub(crate) fn new(
+        shape: &ShapeParameters,
+        texture: &TextureParameters,
+        colour: &ColourParameters,
+    ) -> Result<Self, ParameterFault> {
         let fringe = from_origin(&shape.fringe_width, "shape.fringe_width")?;
         let width_samples = samples(&shape.core_width, &fringe);
         check_widths(&width_samples)?;
@@ -156,26 +183,19 @@ impl Shape {
 
     /// The whole mapping, eqs. (9) to (18), and the threshold, eq. (4), for points of the unit square.
     ///
-    /// `pixel` is the size of a pixel in x' and in y, over which edges are softened. `None` where all lie outside.
+    /// `pixel` is the size of a pixel in x' and in y, over which edges are softened.
     #[inline(always)]
-    pub(crate) fn place<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>, edges: &CurvePair, pixel: [f32; 2]) -> Option<Place<S>> {
+    pub(crate) fn place<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>, edges: &CurvePair, pixel: [f32; 2]) -> Place<S> {
         let distance = chain::axis_distance(x);
         let w = self.slowed_rise(distance, y.held());
         let ([left, right], [vertical, glow], cooling) = (edges.near(w), self.heights.near(w), self.cooling.near(w));
         let (half, one) = (x.like(0.5), x.like(1.0));
         let edge = x.choose(half, left, right);
-        let (per_pixel_across, per_pixel_up) = (x.like(1.0 / pixel[0]), x.like(1.0 / pixel[1]));
-        let side = (edge - distance).fused(per_pixel_across, half).held();
-        let bottom = y.fused(per_pixel_up, half).held();
-        let top = (one - w).fused(per_pixel_up, half).held();
-        let coverage = side * bottom * top;
-        if !any_positive(coverage) {
-            return None;
-        }
+        let side = (edge - distance) * x.like(1.0 / pixel[0]);
         let across = chain::across(distance, edge).least(one);
         let [horizontal, _] = self.across.near(across);
         let threshold = chain::threshold(vertical, horizontal);
-        Some(Place { u: chain::texture_u(across, x), w, across, threshold, glow, cooling, coverage })
+        Place { u: chain::texture_u(across, x), w, threshold, glow, cooling, side, above: y * x.like(1.0 / pixel[1]) }
     }
 
     /// The threshold, eq. (4), over the flat texture square.
@@ -186,20 +206,18 @@ impl Shape {
         chain::threshold(vertical, horizontal)
     }
 
-    /// Whether no point of a row of pixels whose ends and middle are given, x from the centre line, can lie in the flame.
+    /// Whether no point of a piece of the picture can lie in the flame, of which points around its rim are given; x from the centre line.
     #[inline(always)]
-    pub(crate) fn out_of_reach(&self, x: [f32; 3], y: [f32; 3]) -> bool {
-        /// Beyond this a pixel does not see the sheet's plane, and its neighbours say nothing of it.
-        const UNSEEN: f32 = -1e5;
-        if y[0].least(y[1]).least(y[2]) < UNSEEN {
-            return false;
-        }
-        let (low, high) = (y[0].least(y[2]), y[0].greatest(y[2]));
+    pub(crate) fn out_of_reach(&self, x: &[f32; 6], y: &[f32; 6]) -> bool {
+        let range = |values: &[f32; 6]| {
+            values[1..].iter().fold([values[0]; 2], |[low, high], value| [value.least(low), value.greatest(high)])
+        };
+        let ([left, right], [low, high]) = (range(x), range(y));
         if !(high > -0.1 && low < 1.1) {
             return true;
         }
-        let straddles = (x[0] - 0.5) * (x[2] - 0.5) <= 0.0;
-        let nearest = if straddles { 0.0 } else { chain::axis_distance(x[0]).least(chain::axis_distance(x[2])) };
+        let nearest =
+            if left < 0.5 && right > 0.5 { 0.0 } else { chain::axis_distance(left).least(chain::axis_distance(right)) };
         let bin = |y: f32| (y.held() * (REACH_BINS - 1) as f32) as i32 as usize & (REACH_BINS - 1);
         !self.reach[bin(low)..bin(high) + 1].iter().any(|reach| nearest <= *reach)
     }

@@ -9,9 +9,9 @@ use fearless_simd::{Simd, prelude::*};
 
 use super::{
     FlameSheet,
-    draw::{Sample, Shade, State},
-    flame::{Flame, FilteredSource, pixels_per_metre},
-    lanes::{LANES, Lanes, Real, any_positive, between, probe},
+    shade::{Sample, Shade, State},
+    flame::{FilteredSource, Flame, pixels_per_metre},
+    lanes::{LANES, Lanes, Real, any_positive, between},
     moment::{Moment, Motion, Push},
     placement::{Batch, Mapping, Stand, bounds},
     texture::FractalLayers,
@@ -66,7 +66,7 @@ pub(crate) fn shade_smoke<S: Simd>(state: &State, smoke: &SmokeState, batch: &Ba
         opacity[lane] = 1.0 - lanes::exp(-smoke.depth * density[lane]);
     }
     let opacity = Lanes::from_slice(x.simd, &opacity);
-    let [first, _, last] = probe(y);
+    let (first, last) = (y[0], y[LANES - 1]);
     let (low, high) = (smoke.lit_at(first), smoke.lit_at(last));
     let scattered = |k: usize| between(x.simd, low[k], high[k]) * opacity;
     let light = [scattered(0), scattered(1), scattered(2), opacity];
@@ -79,13 +79,18 @@ impl FlameSheet {
         let smoke = &self.parameters.smoke;
         let still = super::parameters::ShapeParameters { flicker: 0.0, sway: 0.08, ..self.parameters.shape.clone() };
         (smoke.optical_depth > 0.0).then(|| {
-            let layers = FractalLayers::new([0.55, 0.8], smoke.speed, flame.key, &self.clock);
+            let layers = FractalLayers::new([1.0, 0.35], smoke.speed, flame.key, &self.clock);
             (layers, Motion::new(&still, flame.key, &self.clock))
         })
     }
 
     /// A flame's smoke over the exposure, and the pixels it may touch.
-    pub(crate) fn smoke_sample(&self, flame: &Flame, view: &View, surroundings: &Surroundings) -> Option<(Sample, bansho_base::image::Rect)> {
+    pub(crate) fn smoke_sample(
+        &self,
+        flame: &Flame,
+        view: &View,
+        surroundings: &Surroundings,
+    ) -> Option<(Sample, bansho_base::image::Rect)> {
         let (layers, motion) = self.smoke_layers(flame)?;
         let smoke = &self.parameters.smoke;
         let t = view.shutter.middle();

@@ -120,7 +120,9 @@ impl FlameSheet {
         let middle = self.clock.time(self.flame_time(flame, shutter.middle()));
         // In a loop the number of births is whole, and birth n is birth n + births again.
         let (rate, births) = match self.clock.loop_s() {
-            Some(length) => ((sparks.rate * length).round().max(1.0) / length, Some((sparks.rate * length).round().max(1.0) as i64)),
+            Some(length) => {
+                ((sparks.rate * length).round().max(1.0) / length, Some((sparks.rate * length).round().max(1.0) as i64))
+            }
             None => (sparks.rate, None),
         };
         let (first, last) = (((middle - sparks.life_s) * rate).floor() as i64 - 1, (middle * rate).ceil() as i64);
@@ -160,7 +162,8 @@ impl FlameSheet {
         let angle = |phase: f64, turns: f64| std::f64::consts::TAU * (phase + turns * age);
         let wander = |phase: f64| {
             math::sin(angle(phase, spark.turns)) + 0.45 * math::sin(angle(1.7 * phase, 2.7 * spark.turns))
-                - math::sin(angle(phase, 0.0)) - 0.45 * math::sin(angle(1.7 * phase, 0.0))
+                - math::sin(angle(phase, 0.0))
+                - 0.45 * math::sin(angle(1.7 * phase, 0.0))
         };
         DVec3::new(swirl * wander(spark.phases[0]), rise, swirl * wander(spark.phases[1]))
     }
@@ -169,7 +172,8 @@ impl FlameSheet {
     fn drift(&self, wind: &Wind, origin: DVec3, t: f64, age: f64) -> DVec3 {
         const STEPS: usize = 4;
         let step = age / STEPS as f64;
-        let mean: DVec3 = (0..STEPS).map(|i| wind.at(origin, t - age + step * (i as f64 + 0.5))).sum::<DVec3>() / STEPS as f64;
+        let mean: DVec3 =
+            (0..STEPS).map(|i| wind.at(origin, t - age + step * (i as f64 + 0.5))).sum::<DVec3>() / STEPS as f64;
         // Heavy beside gas, it takes a third of a second to follow.
         mean * self.parameters.wind_response * (age + 0.33 * math::exp_m1(-age / 0.33))
     }
@@ -200,7 +204,9 @@ mod tests {
 
     #[test]
     fn a_streak_keeps_the_sparks_light_however_small_or_long_it_is() {
-        for (to, radius) in [(DVec2::new(20.3, 20.9), 0.6), (DVec2::new(48.0, 31.5), 0.6), (DVec2::new(25.0, 40.0), 4.0)] {
+        for (to, radius) in
+            [(DVec2::new(20.3, 20.9), 0.6), (DVec2::new(48.0, 31.5), 0.6), (DVec2::new(25.0, 40.0), 4.0)]
+        {
             let streak = Streak::new(DVec2::new(20.3, 20.9), to, radius, [3.0, 2.0, 1.0], 0.37, 2.0).unwrap();
             let mut strip = Strip::default();
             strip.reset(Rect::of_size(64, 64), None, 0);

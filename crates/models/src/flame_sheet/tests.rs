@@ -16,7 +16,7 @@ use bansho_base::{
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 
 use super::{
-    draw::State,
+    shade::State,
     lanes::{LANES, Lanes, ramp},
     moment::{Moment, Push},
     *,
@@ -104,11 +104,12 @@ fn field<S: Simd>(simd: S, sheet: &FlameSheet, t: f64) -> Vec<[f32; 4]> {
     for row in 0..24 {
         let (x, y) = (ramp(simd, 0.01, 0.065), Lanes::splat(simd, row as f32 / 23.0));
         let (x, y) = state.moment.straighten(x, y);
-        let Some(place) = sheet.shape.place(x, y, &state.moment.edges, state.pixel) else { continue };
+        let place = sheet.shape.place(x, y, &state.moment.edges, state.pixel);
+        let coverage = place.coverage(state.pixel);
         let texture = sheet.shape.gas(state.texture.sample(place.u, place.w));
         let cut = chain::above_threshold(texture, place.threshold);
         for lane in 0..LANES {
-            values.push([texture[lane], cut[lane], place.threshold[lane], place.coverage[lane]]);
+            values.push([texture[lane], cut[lane], place.threshold[lane], coverage[lane]]);
         }
     }
     values
@@ -176,7 +177,8 @@ fn crops_give_the_same_bytes() {
 fn wide_vectors_give_the_bits_of_narrow_ones() {
     let sheet = sheet(FlameSheetParameters::default(), None);
     let (wide, narrow) = (Level::new(), Level::baseline());
-    let (a, b) = (dispatch!(wide, simd => field(simd, &sheet, 3.3)), dispatch!(narrow, simd => field(simd, &sheet, 3.3)));
+    let (a, b) =
+        (dispatch!(wide, simd => field(simd, &sheet, 3.3)), dispatch!(narrow, simd => field(simd, &sheet, 3.3)));
     assert!(a.len() > 100);
     assert_eq!(a, b);
 }
@@ -185,7 +187,8 @@ fn wide_vectors_give_the_bits_of_narrow_ones() {
 fn a_seamless_loop_ends_where_it_began() {
     let sheet = sheet(rich(), Some(3.0));
     let planes = |t| {
-        let calm = Surroundings { wind: &Wind::new(WindParameters::default(), 1, None), others: Publication::default() };
+        let calm =
+            Surroundings { wind: &Wind::new(WindParameters::default(), 1, None), others: Publication::default() };
         let view = view(Lens::Perspective, t);
         let mut strip = Strip::default();
         strip.reset(Rect::of_size(SIZE[0], SIZE[1]), None, 0);
@@ -264,6 +267,9 @@ fn curves_that_do_not_go_together_name_the_parameter() {
     let mut parameters = FlameSheetParameters::default();
     parameters.texture.sharpen = curve(&[[0.0, 0.5], [1.0, 1.0]]);
     let fault = FlameSheet::new(parameters, "test", 1, None).unwrap_err();
-    assert_eq!((fault.key, fault.to_string().as_str()), ("texture.sharpen", "texture.sharpen: must be 0 at x = 0, but is 0.5"));
+    assert_eq!(
+        (fault.key, fault.to_string().as_str()),
+        ("texture.sharpen", "texture.sharpen: must be 0 at x = 0, but is 0.5")
+    );
     assert!(FlameSheet::new(FlameSheetParameters::default(), "test", 1, Some(0.0)).is_err());
 }

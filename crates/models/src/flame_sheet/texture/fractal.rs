@@ -40,7 +40,8 @@ fn gradient_noise(cells: [usize; 2], key: Key, purpose: Purpose) -> Texels {
                 gradient[0] * x + gradient[1] * y
             };
             let below = math::f32::lerp(dot(*left, *low, *fx, *fy), dot(*right, *low, fx - 1.0, *fy), *fade_x);
-            let above = math::f32::lerp(dot(*left, *high, *fx, fy - 1.0), dot(*right, *high, fx - 1.0, fy - 1.0), *fade_x);
+            let above =
+                math::f32::lerp(dot(*left, *high, *fx, fy - 1.0), dot(*right, *high, fx - 1.0, fy - 1.0), *fade_x);
             texels.push(math::f32::lerp(below, above, *fade_y));
         }
     }
@@ -163,7 +164,11 @@ impl FractalLayers {
             let row = math::reduce_phase(crossing.start[1] - crossing.heights * scroll);
             let (columns, rows) = (COLUMNS as f64, ROWS as f64);
             Layer {
-                columns: [(columns * crossing.widths) as f32, (columns * crossing.slant) as f32, columns as f32 * column],
+                columns: [
+                    (columns * crossing.widths) as f32,
+                    (columns * crossing.slant) as f32,
+                    columns as f32 * column,
+                ],
                 rows: [(rows * crossing.heights) as f32, rows as f32 * row],
             }
         };
@@ -180,8 +185,8 @@ impl FractalLayers {
 mod tests {
     use super::*;
     use crate::flame_sheet::lanes::{Lanes, plain};
-    use fearless_simd::prelude::*;
     use bansho_base::animation::Animated;
+    use fearless_simd::prelude::*;
 
     fn layers(loop_s: Option<f64>) -> (FractalLayers, Clock) {
         let clock = Clock::new(Animated::from(1.1), loop_s);
@@ -200,7 +205,8 @@ mod tests {
     fn correlation(a: &[f32], b: &[f32]) -> f32 {
         let mean = |values: &[f32]| values.iter().sum::<f32>() / values.len() as f32;
         let (mean_a, mean_b) = (mean(a), mean(b));
-        let dot = |x: &[f32], y: &[f32], mx: f32, my: f32| x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum::<f32>();
+        let dot =
+            |x: &[f32], y: &[f32], mx: f32, my: f32| x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum::<f32>();
         dot(a, b, mean_a, mean_b) / (dot(a, a, mean_a, mean_a) * dot(b, b, mean_b, mean_b)).sqrt()
     }
 

@@ -145,7 +145,9 @@ mod tests {
         let texels: Vec<f32> = (0..ROWS * COLUMNS)
             .map(|i| {
                 let (row, column) = ((i / COLUMNS) as f32 / ROWS as f32, (i % COLUMNS) as f32 / COLUMNS as f32);
-                0.25 * (bansho_base::math::lanes::sin_turns(3.0 * column) + bansho_base::math::lanes::sin_turns(2.0 * row)) + 0.5
+                0.25 * (bansho_base::math::lanes::sin_turns(3.0 * column)
+                    + bansho_base::math::lanes::sin_turns(2.0 * row))
+                    + 0.5
             })
             .collect();
         TextureTable::new(&texels)

@@ -7,7 +7,7 @@ use std::{
 
 use bansho_base::math;
 
-use super::{COLUMNS, Layer, ROWS, TextureTable, Texture};
+use super::{COLUMNS, Layer, ROWS, Texture, TextureTable};
 use crate::flame_sheet::clock::Clock;
 
 /// `Fx_0` of eq. (20), radians a unit of p.
@@ -87,7 +87,8 @@ impl PaperTexture {
         };
         let row_factors = |q: &f64| {
             // Own is c = Fy y, phase is b = Px(y): reorder [cc cb, cc sb, sc cb, sc sb] to match the columns.
-            let reorder = |[cc_cb, cc_sb, sc_cb, sc_sb]: [f64; 4]| [cc_cb, sc_cb, cc_sb, sc_sb].map(|value| value as f32);
+            let reorder =
+                |[cc_cb, cc_sb, sc_cb, sc_sb]: [f64; 4]| [cc_cb, sc_cb, cc_sb, sc_sb].map(|value| value as f32);
             terms.iter().flat_map(|octave| reorder(Octave::factors(*q, octave.up))).collect()
         };
         Self { across: terms.iter().flat_map(column_factors).collect(), up: q.iter().map(row_factors).collect() }

@@ -1,0 +1,135 @@
+//! A shot whose state and pictures are known, for tests of what drives it.
+
+use std::sync::{
+    Arc, Mutex,
+    atomic::{AtomicBool, AtomicUsize, Ordering},
+};
+
+use bansho_base::{
+    assets::MemoryAssets,
+    image::{Frame, Image},
+    observer::{Observer, Stage, check},
+    phenomenon::SnapshotError,
+};
+use bansho_render::{Backend, Plan, PlanOptions, RenderError, Shot};
+
+use super::{
+    error::JobError,
+    observer::{JobObserver, Note},
+    shoot::Finish,
+};
+
+/// A plan of a picture of one pixel with nothing in it.
+pub(super) fn plan() -> Arc<Plan> {
+    let assets = Arc::new(MemoryAssets::default());
+    let text = "bansho = 1\n[picture]\nsize = [1, 1]\nfps = 10\nfirst_frame = -4\n";
+    let scene = crate::parse_scene("test", text, assets.as_ref()).unwrap_or_else(|error| panic!("{error}"));
+    Arc::new(Plan::new(scene, &PlanOptions::default(), assets).unwrap())
+}
+
+/// Takes a step for each frame, and counts them all.
+pub(super) struct Counter {
+    pub(super) steps: Arc<AtomicUsize>,
+}
+
+/// State: the frame that was stepped to.
+pub(super) struct CounterShot {
+    plan: Arc<Plan>,
+    steps: Arc<AtomicUsize>,
+    pub(super) number: i64,
+    drawn: bool,
+}
+
+impl Counter {
+    pub(super) fn shot(&self) -> CounterShot {
+        let plan = plan();
+        CounterShot { number: plan.frames().start - 1, plan, steps: self.steps.clone(), drawn: false }
+    }
+}
+
+impl Backend for Counter {
+    fn name(&self) -> &'static str {
+        "counter"
+    }
+
+    fn open(&self, _plan: Arc<Plan>) -> Result<Box<dyn Shot>, RenderError> {
+        Ok(Box::new(self.shot()))
+    }
+}
+
+impl Shot for CounterShot {
+    fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError> {
+        check(observer)?;
+        if number < self.number {
+            self.number = self.plan.frames().start - 1;
+        }
+        self.steps.fetch_add((number - self.number) as usize, Ordering::Relaxed);
+        self.number = number;
+        Ok(())
+    }
+
+    fn draw(&mut self, observer: &dyn Observer) -> Result<(), RenderError> {
+        check(observer)?;
+        self.drawn = true;
+        Ok(())
+    }
+
+    fn read(&mut self) -> Option<Frame> {
+        let beauty = Image::filled(1, 1, [self.number as f32; 4]);
+        let header = self.plan.header(self.number);
+        std::mem::take(&mut self.drawn).then(|| Frame {
+            header,
+            beauty,
+            depth: None,
+            channels: Vec::new(),
+            opaque: false,
+        })
+    }
+
+    fn snapshot(&self) -> Vec<u8> {
+        self.number.to_le_bytes().to_vec()
+    }
+
+    fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError> {
+        let bytes = snapshot.try_into().map_err(|_| SnapshotError::Damaged)?;
+        self.number = i64::from_le_bytes(bytes);
+        Ok(())
+    }
+}
+
+/// Remembers what it is told, and stops the work when asked to.
+#[derive(Default)]
+pub(super) struct Witness {
+    pub(super) notes: Mutex<Vec<Note>>,
+    pub(super) stop: AtomicBool,
+}
+
+impl Observer for Witness {
+    fn begin(&self, _stage: Stage) {}
+
+    fn cancelled(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+impl JobObserver for Witness {
+    fn note(&self, note: &Note) {
+        self.notes.lock().unwrap().push(note.clone());
+    }
+}
+
+/// Finishes frames by a function of their index and number, and knows how many were under way at once.
+pub(super) struct Finisher<F> {
+    pub(super) each: F,
+    pub(super) window: usize,
+}
+
+impl<F: Fn(usize, i64) -> Result<(), JobError> + Sync> Finish for Finisher<F> {
+    fn finish(&self, index: usize, frame: Frame, _observer: &dyn Observer) -> Result<(), JobError> {
+        (self.each)(index, frame.header.number)
+    }
+
+    fn window(&self) -> usize {
+        self.window
+    }
+}

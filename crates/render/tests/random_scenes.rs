@@ -1,0 +1,78 @@
+//! Thousands of random valid scenes of every phenomenon draw a small frame: no panic, no NaN.
+
+use std::sync::Arc;
+
+use bansho_base::{
+    assets::MemoryAssets,
+    color,
+    observer::Unobserved,
+    parameters::{Table, sample},
+    random::{Key, Purpose, uniform},
+};
+use bansho_render::{
+    Backend, CpuBackend, Plan, PlanOptions, Scene,
+    display::{BitDepth, display},
+    phenomena::KINDS,
+    scene::SHARED_TABLES,
+};
+use rayon::prelude::*;
+
+/// How many, unless `BANSHO_RANDOM_SCENES` says otherwise.
+const SCENES: u64 = 2000;
+
+#[test]
+fn random_valid_scenes_draw_finite_pictures() {
+    let asked = std::env::var("BANSHO_RANDOM_SCENES").ok().and_then(|count| count.parse().ok());
+    let drawn: usize = (0..asked.unwrap_or(SCENES)).into_par_iter().filter(|&seed| draw(&scene(seed))).count();
+    // Some parameters do not go together, such as core and fringe wider than the sheet, and are refused.
+    assert!(drawn > 100, "only {drawn} scenes were drawn");
+}
+
+/// Draws a frame of a scene that is valid; `false` for one whose parameters do not go together.
+fn draw(text: &str) -> bool {
+    let assets = Arc::new(MemoryAssets::default());
+    let Ok(mut scene) = Scene::parse("random.toml", text, KINDS, assets.as_ref()) else { return false };
+    scene.picture.overscan = scene.picture.overscan.min(2);
+    let number = scene.picture.first_frame + 1;
+    let options = PlanOptions { size: Some([17, 11]), layers: true, aovs: true, ..PlanOptions::default() };
+    let plan = Plan::new(scene, &options, assets).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let mut shot = CpuBackend.open(Arc::new(plan)).unwrap();
+    shot.advance(number, &Unobserved).unwrap();
+    shot.draw(&Unobserved).unwrap();
+    let frame = shot.read().unwrap();
+    let channels = frame.channels.iter().flat_map(|channel| &channel.values);
+    let mut values = frame.beauty.pixels().iter().flatten().chain(channels);
+    assert!(values.all(|value| value.is_finite()), "{text}");
+    assert!(frame.depth.iter().flatten().all(|depth| *depth >= 0.0), "{text}");
+    display(&frame, &color::View::DISPLAY, BitDepth::Eight);
+    true
+}
+
+/// One of each phenomenon under random shared tables.
+fn scene(seed: u64) -> String {
+    let key = Key::new(seed, "random scene");
+    let mut drawn = 0;
+    let mut uniform = || {
+        drawn += 1;
+        f64::from(uniform(key.words(drawn, 0, Purpose(0))[0]))
+    };
+    let mut text = String::from("bansho = 1\n");
+    for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate") {
+        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        text += &lines(&header, &sample((shared.table)(), &mut uniform));
+    }
+    for kind in KINDS {
+        let mut table = sample((kind.table)(), &mut uniform);
+        // Half of all random shapes are wider than their sheet; most scenes do without, so that they are drawn.
+        if seed % 4 > 0 {
+            table.entries.retain(|entry| entry.key != "shape");
+        }
+        text += &lines(&format!("[[{}]]", kind.key), &table);
+    }
+    text
+}
+
+fn lines(header: &str, table: &Table) -> String {
+    let lines = table.entries.iter().map(|entry| format!("{} = {}\n", entry.key, entry.node.value));
+    format!("{header}\n{}", lines.collect::<String>())
+}
