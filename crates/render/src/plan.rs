@@ -252,7 +252,7 @@ impl Plan {
 
 /// How many times display white the bright parts of a phenomenon are with an automatic exposure: enough for a core
 /// that nears white while its edges keep their colour.
-const HEADROOM: f64 = 2.5;
+const HEADROOM: f64 = 1.7;
 
 /// The exposure value for bright parts of this luminance, cd/m^2; that of a sunlit day where nothing shines.
 fn auto_ev100(brightest: f64) -> f32 {

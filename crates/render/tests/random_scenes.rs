@@ -1,4 +1,4 @@
-//! Thousands of random valid scenes of every phenomenon draw a small frame: no panic, no NaN.
+//! Random valid scenes of every phenomenon draw a small frame: no panic, no NaN.
 
 use std::sync::Arc;
 
@@ -17,15 +17,15 @@ use bansho_render::{
 };
 use rayon::prelude::*;
 
-/// How many, unless `BANSHO_RANDOM_SCENES` says otherwise.
-const SCENES: u64 = 2000;
+/// How many, unless `BANSHO_RANDOM_SCENES` says otherwise, as in `.ci/run` and `.ci/long`.
+const SCENES: u64 = 250;
 
 #[test]
 fn random_valid_scenes_draw_finite_pictures() {
     let asked = std::env::var("BANSHO_RANDOM_SCENES").ok().and_then(|count| count.parse().ok());
     let drawn: usize = (0..asked.unwrap_or(SCENES)).into_par_iter().filter(|&seed| draw(&scene(seed))).count();
     // Some parameters do not go together, such as core and fringe wider than the sheet, and are refused.
-    assert!(drawn > 100, "only {drawn} scenes were drawn");
+    assert!(drawn > 50, "only {drawn} scenes were drawn");
 }
 
 /// Draws a frame of a scene that is valid; `false` for one whose parameters do not go together.

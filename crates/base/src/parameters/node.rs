@@ -93,6 +93,19 @@ impl Value {
     }
 }
 
+/// A TOML basic string.
+fn write_text(f: &mut std::fmt::Formatter<'_>, text: &str) -> std::fmt::Result {
+    f.write_str("\"")?;
+    for character in text.chars() {
+        match character {
+            '"' | '\\' => write!(f, "\\{character}")?,
+            control if control.is_control() => write!(f, "\\u{:04X}", u32::from(control))?,
+            other => write!(f, "{other}")?,
+        }
+    }
+    f.write_str("\"")
+}
+
 /// Writes the value as it would stand in a scene file, tables inline.
 impl std::fmt::Display for Value {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -100,7 +113,7 @@ impl std::fmt::Display for Value {
             Self::Bool(value) => write!(f, "{value}"),
             Self::Integer(value) => write!(f, "{value}"),
             Self::Number(value) => write!(f, "{value:?}"),
-            Self::Text(value) => write!(f, "{value:?}"),
+            Self::Text(value) => write_text(f, value),
             Self::List(items) => {
                 f.write_str("[")?;
                 for (index, item) in items.iter().enumerate() {
@@ -116,5 +129,16 @@ impl std::fmt::Display for Value {
                 f.write_str(" }")
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_are_written_as_toml_strings() {
+        let written = Value::Text("a\"b\\c\n\u{200b}\u{7f}é".into()).to_string();
+        assert_eq!(written, "\"a\\\"b\\\\c\\u000A\u{200b}\\u007Fé\"");
     }
 }

@@ -69,10 +69,6 @@ fn draw_each_row<S: Simd>(simd: S, paint: &Paint, columns: std::ops::Range<usize
 /// Draws the flame in some columns, band after band; the last row of a band is the first of the next.
 #[inline(always)]
 fn draw_bands<S: Simd>(simd: S, paint: &Paint, columns: std::ops::Range<usize>, rect: Rect, strip: &mut Strip) {
-    let places = |row: usize, column: usize| paint.samples.iter().map(move |sample| {
-        let batch = sample.mapping.batch(simd, column, row);
-        (place(paint.shape, &sample.state, &batch), batch.depth)
-    });
     let batches = columns.len().div_ceil(LANES);
     let mut upper: Vec<(Place<S>, Lanes<S>)> = Vec::new();
     let mut lower: Vec<(Place<S>, Lanes<S>)> = Vec::new();
@@ -85,21 +81,38 @@ fn draw_bands<S: Simd>(simd: S, paint: &Paint, columns: std::ops::Range<usize>, 
         std::mem::swap(&mut upper, &mut lower);
         lower.clear();
         if upper.is_empty() {
-            (0..batches).for_each(|batch| upper.extend(places(first, columns.start + batch * LANES)));
+            add_places(simd, paint, &columns, first, &mut upper);
         }
         if paint.band > 1 {
-            (0..batches).for_each(|batch| lower.extend(places(first + paint.band, columns.start + batch * LANES)));
+            add_places(simd, paint, &columns, first + paint.band, &mut lower);
         }
-        for batch in 0..batches {
-            let share = batch * paint.samples.len()..(batch + 1) * paint.samples.len();
-            let ends = [&upper[share.clone()], lower.get(share).unwrap_or(&[])];
-            for row in rows.clone() {
-                let part = (row - first) as f32 / paint.band as f32;
+        for row in rows.clone() {
+            let part = (row - first) as f32 / paint.band as f32;
+            for batch in 0..batches {
+                let share = batch * paint.samples.len()..(batch + 1) * paint.samples.len();
+                let ends = [&upper[share.clone()], lower.get(share).unwrap_or(&[])];
                 expose(simd, paint, ends, part).compose(columns.start + batch * LANES, row, rect, paint.absorbs, strip);
             }
         }
         if paint.band == 1 {
             upper.clear();
+        }
+    }
+}
+
+/// Exact places of all samples on a row, batch after batch.
+#[inline(always)]
+fn add_places<S: Simd>(
+    simd: S,
+    paint: &Paint,
+    columns: &std::ops::Range<usize>,
+    row: usize,
+    places: &mut Vec<(Place<S>, Lanes<S>)>,
+) {
+    for column in columns.clone().step_by(LANES) {
+        for sample in paint.samples {
+            let batch = sample.mapping.batch(simd, column, row);
+            places.push((place(paint.shape, &sample.state, &batch), batch.depth));
         }
     }
 }

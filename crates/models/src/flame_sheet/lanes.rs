@@ -175,16 +175,28 @@ pub(crate) fn nearest_whole<S: Simd>(value: Lanes<S>) -> fearless_simd::u32x16<S
 /// `N` is a power of two; indices wrap.
 #[inline(always)]
 pub(crate) fn fetch<S: Simd, const N: usize>(simd: S, table: &[[f32; 4]; N], index: &[u32; LANES]) -> [Lanes<S>; 4] {
-    let quarter = |first: usize| -> [f32x4<S>; 4] {
-        let mut entries = [0.0; 16];
-        for lane in 0..4 {
-            entries[4 * lane..4 * lane + 4].copy_from_slice(&table[index[first + lane] as usize & (N - 1)]);
-        }
-        simd.load_four_interleaved_f32x4(&entries)
-    };
-    let (a, b, c, d) = (quarter(0), quarter(4), quarter(8), quarter(12));
-    let join = |k: usize| a[k].combine(b[k]).combine(c[k].combine(d[k]));
-    [join(0), join(1), join(2), join(3)]
+    let (a, b) = (fetch_four(simd, table, index, 0), fetch_four(simd, table, index, 4));
+    let (c, d) = (fetch_four(simd, table, index, 8), fetch_four(simd, table, index, 12));
+    let mut batches = [Lanes::splat(simd, 0.0); 4];
+    for k in 0..4 {
+        batches[k] = a[k].combine(b[k]).combine(c[k].combine(d[k]));
+    }
+    batches
+}
+
+/// The entries of four lanes from `first` on, as four quarters of batches.
+#[inline(always)]
+fn fetch_four<S: Simd, const N: usize>(
+    simd: S,
+    table: &[[f32; 4]; N],
+    index: &[u32; LANES],
+    first: usize,
+) -> [f32x4<S>; 4] {
+    let mut entries = [0.0; 16];
+    for lane in 0..4 {
+        entries[4 * lane..4 * lane + 4].copy_from_slice(&table[index[first + lane] as usize & (N - 1)]);
+    }
+    simd.load_four_interleaved_f32x4(&entries)
 }
 
 #[cfg(test)]

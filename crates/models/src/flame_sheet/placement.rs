@@ -131,17 +131,22 @@ impl Mapping {
     }
 }
 
+/// A form that is linear in the pixel, at sixteen pixels of a row.
+#[inline(always)]
+fn linear<S: Simd>(simd: S, [constant, column, row]: [f64; 3], px: f64, py: f64) -> Lanes<S> {
+    ramp(simd, (column * px + row * py + constant) as f32, column as f32)
+}
+
 #[inline(always)]
 fn linear_batch<S: Simd>(simd: S, forms: &[[f64; 3]; 3], near: f64, column: usize, row: usize) -> Batch<S> {
     let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
-    let value = |[constant, a, b]: [f64; 3]| ramp(simd, (a * px + b * py + constant) as f32, a as f32);
-    let inverse = value(forms[2]);
+    let inverse = linear(simd, forms[2], px, py);
     let depth = inverse.like(1.0) / inverse;
     // A depth beyond `near` is an inverse depth in (0, 1/near].
     let seen = inverse.simd_gt(inverse.like(0.0)) & inverse.simd_le(inverse.like((1.0 / near) as f32));
     Batch {
-        x: seen.select(value(forms[0]) * depth, depth.like(0.0)),
-        y: seen.select(value(forms[1]) * depth, depth.like(NOWHERE)),
+        x: seen.select(linear(simd, forms[0], px, py) * depth, depth.like(0.0)),
+        y: seen.select(linear(simd, forms[1], px, py) * depth, depth.like(NOWHERE)),
         depth: seen.select(depth, depth.like(BEYOND)),
     }
 }

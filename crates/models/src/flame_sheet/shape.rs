@@ -91,6 +91,11 @@ pub(crate) struct Place<S: Simd> {
     above: Lanes<S>,
 }
 
+#[inline(always)]
+fn between<S: Simd>(part: f32, a: Lanes<S>, b: Lanes<S>) -> Lanes<S> {
+    (b - a).fused(a.like(part), a)
+}
+
 impl<S: Simd> Place<S> {
     /// Share of the pixels that lies inside; 0 outside.
     #[inline(always)]
@@ -103,16 +108,14 @@ impl<S: Simd> Place<S> {
     /// `part` of the way toward `other`.
     #[inline(always)]
     pub(crate) fn toward(&self, other: &Self, part: f32) -> Self {
-        let part = self.w.like(part);
-        let between = |a: Lanes<S>, b: Lanes<S>| (b - a).fused(part, a);
         Self {
-            u: between(self.u, other.u),
-            w: between(self.w, other.w),
-            threshold: between(self.threshold, other.threshold),
-            glow: between(self.glow, other.glow),
-            cooling: [between(self.cooling[0], other.cooling[0]), between(self.cooling[1], other.cooling[1])],
-            side: between(self.side, other.side),
-            above: between(self.above, other.above),
+            u: between(part, self.u, other.u),
+            w: between(part, self.w, other.w),
+            threshold: between(part, self.threshold, other.threshold),
+            glow: between(part, self.glow, other.glow),
+            cooling: [between(part, self.cooling[0], other.cooling[0]), between(part, self.cooling[1], other.cooling[1])],
+            side: between(part, self.side, other.side),
+            above: between(part, self.above, other.above),
         }
     }
 }

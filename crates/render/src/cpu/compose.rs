@@ -45,8 +45,10 @@ impl Composition<'_> {
     }
 
     fn aov_counts(&self) -> Vec<usize> {
-        let count = |phenomenon: &Box<dyn Phenomenon>| phenomenon.aovs().len();
-        if self.plan.aovs { self.phenomena.iter().map(count).collect() } else { Vec::new() }
+        if !self.plan.aovs {
+            return Vec::new();
+        }
+        self.phenomena.iter().map(|phenomenon| phenomenon.aovs().len()).collect()
     }
 
     /// Draws `slices` within `rect` into the worker's accumulator, nearest first.

@@ -25,8 +25,11 @@ pub(super) struct PlateFrame {
 /// Keeps the last plate, since most shots stand before a single picture.
 #[derive(Default)]
 pub(super) struct PlateCache {
-    last: Option<([Option<[u8; 32]>; 2], Camera, Arc<PlateFrame>)>,
+    last: Option<(PlateKey, Arc<PlateFrame>)>,
 }
+
+/// What a plate frame depends on beside the plan: digests of picture and depth, and the camera that measures depth.
+type PlateKey = ([Option<[u8; 32]>; 2], Camera);
 
 impl PlateCache {
     pub(super) fn frame(&mut self, plan: &Plan, number: i64) -> Result<Arc<PlateFrame>, RenderError> {
@@ -38,15 +41,14 @@ impl PlateCache {
         for (digest, path) in digests.iter_mut().zip([&plate.image, &plate.depth]) {
             *digest = path.as_ref().map(|path| plan.assets.digest(&path.0, number)).transpose()?;
         }
-        let camera = plan.view(number).camera;
-        if let Some((key, known_camera, frame)) = &self.last
-            && *key == digests
-            && *known_camera == camera
+        let key = (digests, plan.view(number).camera);
+        if let Some((known, frame)) = &self.last
+            && *known == key
         {
             return Ok(frame.clone());
         }
-        let frame = Arc::new(load(plan, number, &camera)?);
-        self.last = Some((digests, camera, frame.clone()));
+        let frame = Arc::new(load(plan, number, &key.1)?);
+        self.last = Some((key, frame.clone()));
         Ok(frame)
     }
 }

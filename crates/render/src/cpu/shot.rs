@@ -114,10 +114,8 @@ impl Shot for CpuShot {
         let _stage = StageGuard::begin(observer, Stage::Advance);
         self.frame = None;
         let t = self.plan.shutter(number).middle();
-        let past = |(phenomenon, clock): (&Box<dyn Phenomenon>, &Clock)| {
-            clock.taken > clock::steps_until(phenomenon.as_ref(), t)
-        };
-        if self.phenomena.iter().zip(&self.clocks).any(past) {
+        let mut pairs = self.phenomena.iter().zip(&self.clocks);
+        if pairs.any(|(phenomenon, clock)| clock.taken > clock::steps_until(phenomenon.as_ref(), t)) {
             self.begin_anew()?;
         }
         clock::advance(&self.plan, &mut self.phenomena, &mut self.clocks, t, observer)?;

@@ -15,15 +15,15 @@ use bansho_render::{
     scene::{Describe, PhenomenonKind},
 };
 
-pub use absorber::AbsorberParameters;
-pub use emitter::EmitterParameters;
+pub(crate) use absorber::AbsorberParameters;
+pub(crate) use emitter::EmitterParameters;
 
-pub fn kinds() -> [PhenomenonKind; 2] {
+pub(crate) fn kinds() -> [PhenomenonKind; 2] {
     [AbsorberParameters::KIND, EmitterParameters::KIND]
 }
 
 /// A camera at the origin that looks along -z; 45 pixels a metre at 1 m when the picture is 90 pixels high.
-pub const CAMERA: &str = "\
+pub(crate) const CAMERA: &str = "\
 bansho = 1
 [picture]
 size = [120, 90]
@@ -35,47 +35,47 @@ target = [0, 0, -1]
 vertical_fov_deg = 90
 ";
 
-pub fn parse(text: &str, assets: &dyn Assets) -> Result<Scene, SceneError> {
+pub(crate) fn parse(text: &str, assets: &dyn Assets) -> Result<Scene, SceneError> {
     Scene::parse("test.toml", text, &kinds(), assets)
 }
 
-pub fn plan(text: &str, options: &PlanOptions) -> Arc<Plan> {
+pub(crate) fn plan(text: &str, options: &PlanOptions) -> Arc<Plan> {
     plan_with(text, options, Arc::new(MemoryAssets::default()))
 }
 
-pub fn plan_with(text: &str, options: &PlanOptions, assets: Arc<dyn Assets>) -> Arc<Plan> {
+pub(crate) fn plan_with(text: &str, options: &PlanOptions, assets: Arc<dyn Assets>) -> Arc<Plan> {
     let scene = parse(text, assets.as_ref()).unwrap_or_else(|error| panic!("{error}"));
     Arc::new(Plan::new(scene, options, assets).unwrap())
 }
 
-pub fn open(plan: &Arc<Plan>) -> Box<dyn Shot> {
+pub(crate) fn open(plan: &Arc<Plan>) -> Box<dyn Shot> {
     CpuBackend.open(plan.clone()).unwrap()
 }
 
-pub fn draw(shot: &mut dyn Shot, number: i64) -> Frame {
+pub(crate) fn draw(shot: &mut dyn Shot, number: i64) -> Frame {
     shot.advance(number, &Unobserved).unwrap();
     shot.draw(&Unobserved).unwrap();
     shot.read().unwrap()
 }
 
-pub fn render(text: &str, options: &PlanOptions, number: i64) -> Frame {
+pub(crate) fn render(text: &str, options: &PlanOptions, number: i64) -> Frame {
     draw(open(&plan(text, options)).as_mut(), number)
 }
 
 /// Absolute luminance that a pixel stands for.
-pub fn luminance(frame: &Frame, x: usize, y: usize) -> f64 {
+pub(crate) fn luminance(frame: &Frame, x: usize, y: usize) -> f64 {
     let [r, g, b, _] = frame.beauty.at(x, y);
     f64::from(bansho_base::color::luminance([r, g, b]))
         / bansho_base::color::exposure_scale(f64::from(frame.header.exposure_ev100))
 }
 
-pub fn channel<'a>(frame: &'a Frame, name: &str) -> &'a [f32] {
+pub(crate) fn channel<'a>(frame: &'a Frame, name: &str) -> &'a [f32] {
     let named = frame.channels.iter().find(|channel| channel.name == name);
     &named.unwrap_or_else(|| panic!("no channel {name}")).values
 }
 
 /// A checkerboard plate of 8-pixel squares with every pixel a different shade, `depth` metres away.
-pub fn checkerboard(width: usize, height: usize, depth: Option<f32>) -> MemoryAssets {
+pub(crate) fn checkerboard(width: usize, height: usize, depth: Option<f32>) -> MemoryAssets {
     let shade = |index: usize| {
         let (x, y) = (index % width, index / width);
         let code = if (x / 8 + y / 8) % 2 == 0 { 200 + (x * 7 + y) % 56 } else { (x + y * 5) % 60 };
