@@ -42,7 +42,10 @@ fn flames_go_from_red_through_orange_to_yellow_white() {
     for (scene, least_orange) in [("campfire", 0.2), ("torch", 0.2), ("ohshima_itahashi", 0.05)] {
         let film = Film::of(scene, SMALL, &[20, 60, 100], &PlanOptions::default());
         let [red, orange, yellow] = hues(&film);
-        assert!(red > 0.02 && orange > least_orange && yellow > 0.05, "{scene}: red {red}, orange {orange}, yellow {yellow}");
+        assert!(
+            red > 0.02 && orange > least_orange && yellow > 0.05,
+            "{scene}: red {red}, orange {orange}, yellow {yellow}"
+        );
         let pink = film.pixels().filter(|p| p[2] > p[1] + 0.02 && p[0] > 0.3).count() as f64 / film.len() as f64;
         assert!(pink < 0.001, "{scene}: {pink} of the picture is pink");
     }

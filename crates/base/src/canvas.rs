@@ -1,5 +1,7 @@
 //! What phenomena draw into: strips of a picture that no two threads share.
 
+use fearless_simd::{Simd, f32x16, prelude::*};
+
 use crate::{
     camera::{Camera, CameraParameters},
     image::Rect,
@@ -258,43 +260,36 @@ impl Strip {
         }
     }
 
-    /// [`add_row_behind`](Self::add_row_behind) for exactly sixteen pixels, which is faster.
+    /// [`add_row_behind`](Self::add_row_behind) for exactly sixteen pixels held in vectors; the strip must hold them.
     #[inline(always)]
-    pub fn add_sixteen_behind(
+    pub fn add_sixteen_behind<S: Simd>(
         &mut self,
         first: usize,
-        radiance: [&[f32; 16]; 3],
-        opacity: Option<&[f32; 16]>,
-        depth: &[f32; 16],
+        radiance: [f32x16<S>; 3],
+        opacity: Option<f32x16<S>>,
+        depth: f32x16<S>,
     ) {
+        let (simd, pixels) = (depth.simd, first..first + 16);
         let absorbed = self.absorbs;
         if opacity.is_some() {
             self.transmittance_planes_mut();
         }
         for c in 0..3 {
-            let Some(sum) = self.radiance[c][first..].first_chunk_mut::<16>() else { return };
-            if absorbed && let Some(transmittance) = self.transmittance[c][first..].first_chunk::<16>() {
-                for i in 0..16 {
-                    sum[i] = radiance[c][i].mul_add(transmittance[i], sum[i]);
-                }
-            } else {
-                for i in 0..16 {
-                    sum[i] += radiance[c][i];
-                }
+            let sum = &mut self.radiance[c][pixels.clone()];
+            let before = f32x16::from_slice(simd, sum);
+            if !absorbed && opacity.is_none() {
+                (before + radiance[c]).store_slice(sum);
+                continue;
             }
-            if let Some(opacity) = opacity
-                && let Some(transmittance) = self.transmittance[c][first..].first_chunk_mut::<16>()
-            {
-                for i in 0..16 {
-                    transmittance[i] *= 1.0 - opacity[i];
-                }
+            let transmittance = &mut self.transmittance[c][pixels.clone()];
+            let left = f32x16::from_slice(simd, transmittance);
+            (before + radiance[c] * left).store_slice(sum);
+            if let Some(opacity) = opacity {
+                (left - left * opacity).store_slice(transmittance);
             }
         }
-        if let Some(nearest) = self.depth[first..].first_chunk_mut::<16>() {
-            for i in 0..16 {
-                nearest[i] = if depth[i] < nearest[i] { depth[i] } else { nearest[i] };
-            }
-        }
+        let nearest = &mut self.depth[pixels];
+        f32x16::from_slice(simd, nearest).min(depth).store_slice(nearest);
     }
 
     /// [`add_behind`](Self::add_behind) for pixels that follow each other from `first` on: planes of light, and of gray opacity where
@@ -312,7 +307,7 @@ impl Strip {
             if absorbed {
                 let transmittance = &self.transmittance[c][first..first + count];
                 for i in 0..count {
-                    sum[i] = light[i].mul_add(transmittance[i], sum[i]);
+                    sum[i] += light[i] * transmittance[i];
                 }
             } else {
                 for i in 0..count {
@@ -322,7 +317,7 @@ impl Strip {
             if let Some(opacity) = opacity {
                 let transmittance = &mut self.transmittance[c][first..first + count];
                 for i in 0..count {
-                    transmittance[i] *= 1.0 - opacity[i];
+                    transmittance[i] -= transmittance[i] * opacity[i];
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! One descriptor for each parameter.
 //!
-//! A phenomenon lists its parameters once, with [`parameters!`](crate::parameters): type, default, range, unit and
+//! A phenomenon lists its parameters once, with [`parameters!`](crate::parameters!): type, default, range, unit and
 //! documentation. Parser, located errors, schema, book, inspector and random scenes all read that one list.
 
 mod keyed;

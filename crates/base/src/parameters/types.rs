@@ -17,7 +17,7 @@ pub trait Parameter: Sized {
     fn to_value(&self) -> Option<Value>;
 }
 
-/// A table of parameters; made by [`parameters!`](crate::parameters).
+/// A table of parameters; made by [`parameters!`](crate::parameters!).
 pub trait Parameters: Sized + Default {
     /// All its descriptors.
     fn table() -> &'static TableDescriptor;

@@ -180,6 +180,11 @@ impl<S: Simd> Sums<S> {
         if !self.touched {
             return;
         }
+        let [red, green, blue, opacity] = self.light;
+        if column >= rect.x && column + LANES <= rect.right() && !strip.has_plate() {
+            let index = (y - strip.rect.y) * strip.rect.width + column - strip.rect.x;
+            return strip.add_sixteen_behind(index, [red, green, blue], absorbs.then_some(opacity), self.depth);
+        }
         let mut pixels = Exposed { light: [[0.0; LANES]; 4], depth: [0.0; LANES] };
         for k in 0..4 {
             self.light[k].store_slice(&mut pixels.light[k]);
@@ -195,30 +200,19 @@ struct Exposed {
     depth: [f32; LANES],
 }
 
-/// Moves sixteen pixels behind what the strip holds, where the plate does not hide them.
-#[inline(always)]
+/// Moves those of sixteen pixels that lie in `rect` behind what the strip holds, where the plate does not hide them.
 fn compose(pixels: &Exposed, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
-    let (first, last) = (column.max(rect.x), (column + LANES).min(rect.right()));
-    let lanes = first - column..last - column;
-    let index = (y - strip.rect.y) * strip.rect.width + first - strip.rect.x;
-    let hidden = |strip: &Strip| {
-        lanes.clone().any(|lane| !strip.visible(index + lane - lanes.start, pixels.depth[lane].min(f32::MAX)))
-    };
-    if strip.has_plate() && hidden(strip) {
-        for lane in lanes.clone().filter(|lane| pixels.depth[*lane].is_finite()) {
-            let index = index + lane - lanes.start;
-            if strip.visible(index, pixels.depth[lane]) {
-                let opacity = [pixels.light[3][lane]];
-                let light = [0, 1, 2].map(|k| &pixels.light[k][lane..lane + 1]);
-                strip.add_row_behind(index, light, absorbs.then_some(&opacity), &pixels.depth[lane..lane + 1]);
-            }
+    let row = (y - strip.rect.y) * strip.rect.width;
+    for lane in 0..LANES {
+        let (x, depth) = (column + lane, pixels.depth[lane]);
+        if !(rect.x..rect.right()).contains(&x) {
+            continue;
         }
-        return;
+        let index = row + x - strip.rect.x;
+        if depth.is_finite() && !strip.visible(index, depth) {
+            continue;
+        }
+        let light = [0, 1, 2].map(|k| &pixels.light[k][lane..=lane]);
+        strip.add_row_behind(index, light, absorbs.then_some(&pixels.light[3][lane..=lane]), &[depth]);
     }
-    if lanes.len() == LANES {
-        let [red, green, blue, opacity] = &pixels.light;
-        return strip.add_sixteen_behind(index, [red, green, blue], absorbs.then_some(opacity), &pixels.depth);
-    }
-    let light = [&pixels.light[0][lanes.clone()], &pixels.light[1][lanes.clone()], &pixels.light[2][lanes.clone()]];
-    strip.add_row_behind(index, light, absorbs.then_some(&pixels.light[3][lanes.clone()]), &pixels.depth[lanes]);
 }
