@@ -18,7 +18,7 @@ use bansho_models::flame_sheet::{FlameSheet, FlameSheetParameters, PaperTexture,
 use criterion::{Criterion, criterion_group, criterion_main};
 
 const SIZE: [usize; 2] = [1920, 1080];
-const STRIP: usize = 64;
+const STRIP: usize = 16;
 const OCTAVES: u32 = 5;
 
 /// A camera for which the sheet fills the picture exactly.
@@ -33,15 +33,27 @@ fn view(parameters: &FlameSheetParameters) -> View {
     View::new(camera, Shutter { open: 3.0, close: 3.0 + 1.0 / 60.0 }, 3.03, SIZE, 0)
 }
 
-fn draw_strips(sheet: &FlameSheet, view: &View, strip: &mut Strip, rows: std::ops::Range<usize>) {
+/// Draws one frame; each thread takes every so manieth strip.
+fn draw_frame(sheet: &FlameSheet, view: &View, strips: &mut [Strip]) {
     let wind = Wind::new(WindParameters::default(), 1, None);
     let surroundings = Surroundings { wind: &wind, others: Publication::default() };
     let Ok(prepared) = sheet.prepare(view, &surroundings, &Unobserved) else { return };
-    for y in rows.step_by(STRIP) {
-        strip.reset(Rect { x: 0, y, width: SIZE[0], height: STRIP.min(SIZE[1] - y) }, None, 0);
-        prepared.draw(&DepthInterval::ALL, strip);
-        black_box(&strip.radiance);
-    }
+    let threads = strips.len();
+    let draw = |thread: usize, strip: &mut Strip| {
+        for y in (thread * STRIP..SIZE[1]).step_by(threads * STRIP) {
+            strip.reset(Rect { x: 0, y, width: SIZE[0], height: STRIP.min(SIZE[1] - y) }, None, 0);
+            prepared.draw(&DepthInterval::ALL, strip);
+            black_box(&strip.radiance);
+        }
+    };
+    std::thread::scope(|scope| {
+        let Some((own, others)) = strips.split_first_mut() else { return };
+        for (index, strip) in others.iter_mut().enumerate() {
+            let draw = &draw;
+            scope.spawn(move || draw(index + 1, strip));
+        }
+        draw(0, own);
+    });
 }
 
 /// The chain with trigonometry and curves evaluated at every pixel.
@@ -90,21 +102,11 @@ fn sheet_1080p(criterion: &mut Criterion) {
     let sheet = FlameSheet::new(parameters.clone(), "bench", 1, None).expect("the defaults go together");
     let mut group = criterion.benchmark_group("flame sheet 1920x1080");
     group.sample_size(30);
-    group.bench_function("1 thread", |bencher| {
-        let mut strip = Strip::default();
-        bencher.iter(|| draw_strips(&sheet, &view, &mut strip, 0..SIZE[1]));
-    });
-    group.bench_function("2 threads", |bencher| {
-        let mut strips = [Strip::default(), Strip::default()];
-        bencher.iter(|| {
-            // The flame is densest below: halves of equal work, not of equal height.
-            let [upper, lower] = &mut strips;
-            std::thread::scope(|scope| {
-                scope.spawn(|| draw_strips(&sheet, &view, upper, 0..11 * STRIP));
-                draw_strips(&sheet, &view, lower, 11 * STRIP..SIZE[1]);
-            });
-        });
-    });
+    for threads in [1, 2] {
+        let mut strips = vec![Strip::default(); threads];
+        let name = if threads == 1 { "1 thread" } else { "2 threads" };
+        group.bench_function(name, |bencher| bencher.iter(|| draw_frame(&sheet, &view, &mut strips)));
+    }
     group.sample_size(10);
     group.bench_function("naive, 1 thread", |bencher| {
         bencher.iter(|| {

@@ -14,10 +14,10 @@ use bansho_base::{
 
 use super::{
     FlameSheet,
-    shade::{Drawn, Sample, State},
     moment::{Moment, Motion, Push},
     parameters::{Facing, Instance, StageShown},
     placement::{Mapping, Stand, bounds, right_facing},
+    shade::{Drawn, Sample, State},
     texture::{FRACTAL, FractalLayers, PaperLayer, Texture, TextureTable},
 };
 

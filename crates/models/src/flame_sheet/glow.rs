@@ -9,11 +9,11 @@ use fearless_simd::{Level, Simd, prelude::*};
 
 use super::{
     FlameSheet,
-    shade::{State, shade},
     flame::Flame,
     lanes::{LANES, Lanes, Real, ramp},
     moment::{Moment, Push},
     placement::Batch,
+    shade::{State, shade},
 };
 
 /// Rows of the coarse grid; it is sixteen wide.

@@ -10,9 +10,9 @@ use fearless_simd::Simd;
 
 use super::{
     FlameSheet,
-    shade::{Drawn, Sample, shade_as},
     flame::Flame,
     lanes::LANES,
+    shade::{Drawn, Sample, shade_as},
 };
 
 /// Places of the planes among a strip's AOVs.

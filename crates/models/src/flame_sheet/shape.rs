@@ -113,7 +113,10 @@ impl<S: Simd> Place<S> {
             w: between(part, self.w, other.w),
             threshold: between(part, self.threshold, other.threshold),
             glow: between(part, self.glow, other.glow),
-            cooling: [between(part, self.cooling[0], other.cooling[0]), between(part, self.cooling[1], other.cooling[1])],
+            cooling: [
+                between(part, self.cooling[0], other.cooling[0]),
+                between(part, self.cooling[1], other.cooling[1]),
+            ],
             side: between(part, self.side, other.side),
             above: between(part, self.above, other.above),
         }

@@ -9,11 +9,11 @@ use fearless_simd::{Simd, prelude::*};
 
 use super::{
     FlameSheet,
-    shade::{Sample, Shade, State},
     flame::{FilteredSource, Flame, pixels_per_metre},
     lanes::{LANES, Lanes, Real, any_positive, between},
     moment::{Moment, Motion, Push},
     placement::{Batch, Mapping, Stand, bounds},
+    shade::{Sample, Shade, State},
     texture::FractalLayers,
 };
 
