@@ -167,7 +167,19 @@ pub struct Strip {
     plate_depth: Vec<f32>,
     /// The phenomenon's AOVs in the order of its descriptors; empty when nobody asked for them.
     pub aovs: Vec<AovPlane>,
-    absorbs: bool,
+    absorption: Absorption,
+}
+
+/// How many planes of T hold something.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Absorption {
+    /// None: T is 1.
+    #[default]
+    None,
+    /// The first, which stands for all three: soot takes all colours alike.
+    Gray,
+    /// All three.
+    Coloured,
 }
 
 fn reset(plane: &mut Vec<f32>, pixels: usize, value: f32) {
@@ -182,7 +194,7 @@ impl Strip {
     pub fn reset<'a>(&mut self, rect: Rect, plate_depth: Option<&dyn Fn(usize) -> &'a [f32]>, aovs: usize) {
         let pixels = rect.width * rect.height;
         self.rect = rect;
-        self.absorbs = false;
+        self.absorption = Absorption::None;
         self.radiance.iter_mut().for_each(|plane| reset(plane, pixels, 0.0));
         reset(&mut self.depth, pixels, f32::INFINITY);
         self.plate_depth.clear();
@@ -222,22 +234,41 @@ impl Strip {
 
     /// T at pixel `index`.
     pub fn transmittance(&self, index: usize) -> [f32; 3] {
-        if self.absorbs { [0, 1, 2].map(|c| self.transmittance[c][index]) } else { [1.0; 3] }
+        match self.absorption {
+            Absorption::None => [1.0; 3],
+            Absorption::Gray => [self.transmittance[0][index]; 3],
+            Absorption::Coloured => [0, 1, 2].map(|c| self.transmittance[c][index]),
+        }
     }
 
-    /// Planes of T where anything absorbs.
-    pub fn transmittance_planes(&self) -> Option<&[Vec<f32>; 3]> {
-        self.absorbs.then_some(&self.transmittance)
+    /// Planes of T where anything absorbs; all the same one where T is gray.
+    pub fn transmittance_planes(&self) -> Option<[&[f32]; 3]> {
+        let [red, green, blue] = &self.transmittance;
+        match self.absorption {
+            Absorption::None => None,
+            Absorption::Gray => Some([red, red, red]),
+            Absorption::Coloured => Some([red, green, blue]),
+        }
     }
 
     /// Planes of T to write to; all ones at first.
     pub fn transmittance_planes_mut(&mut self) -> &mut [Vec<f32>; 3] {
-        if !self.absorbs {
-            let pixels = self.len();
-            self.transmittance.iter_mut().for_each(|plane| reset(plane, pixels, 1.0));
-            self.absorbs = true;
+        self.begin_gray();
+        if self.absorption == Absorption::Gray {
+            let [red, green, blue] = &mut self.transmittance;
+            green.clone_from(red);
+            blue.clone_from(red);
+            self.absorption = Absorption::Coloured;
         }
         &mut self.transmittance
+    }
+
+    fn begin_gray(&mut self) {
+        if self.absorption == Absorption::None {
+            let pixels = self.len();
+            reset(&mut self.transmittance[0], pixels, 1.0);
+            self.absorption = Absorption::Gray;
+        }
     }
 
     /// Adds light that neither hides nor is hidden by what this strip holds so far, except by its absorption.
@@ -270,22 +301,24 @@ impl Strip {
         depth: f32x16<S>,
     ) {
         let (simd, pixels) = (depth.simd, first..first + 16);
-        let absorbed = self.absorbs;
         if opacity.is_some() {
-            self.transmittance_planes_mut();
+            self.begin_gray();
         }
         for c in 0..3 {
             let sum = &mut self.radiance[c][pixels.clone()];
             let before = f32x16::from_slice(simd, sum);
-            if !absorbed && opacity.is_none() {
-                (before + radiance[c]).store_slice(sum);
-                continue;
-            }
-            let transmittance = &mut self.transmittance[c][pixels.clone()];
-            let left = f32x16::from_slice(simd, transmittance);
+            let left = match self.absorption {
+                Absorption::None => f32x16::splat(simd, 1.0),
+                Absorption::Gray => f32x16::from_slice(simd, &self.transmittance[0][pixels.clone()]),
+                Absorption::Coloured => f32x16::from_slice(simd, &self.transmittance[c][pixels.clone()]),
+            };
             (before + radiance[c] * left).store_slice(sum);
-            if let Some(opacity) = opacity {
-                (left - left * opacity).store_slice(transmittance);
+        }
+        if let Some(opacity) = opacity {
+            for plane in &mut self.transmittance[..if self.absorption == Absorption::Gray { 1 } else { 3 }] {
+                let plane = &mut plane[pixels.clone()];
+                let left = f32x16::from_slice(simd, plane);
+                (left - left * opacity).store_slice(plane);
             }
         }
         let nearest = &mut self.depth[pixels];
@@ -296,28 +329,20 @@ impl Strip {
     /// anything absorbs. Samples of infinite depth leave the depth as it is.
     #[inline(always)]
     pub fn add_row_behind(&mut self, first: usize, radiance: [&[f32]; 3], opacity: Option<&[f32]>, depth: &[f32]) {
-        let absorbed = self.absorbs;
         if opacity.is_some() {
-            self.transmittance_planes_mut();
+            self.begin_gray();
         }
         let count = depth.len();
-        for c in 0..3 {
-            let sum = &mut self.radiance[c][first..first + count];
-            let light = &radiance[c][..count];
-            if absorbed {
-                let transmittance = &self.transmittance[c][first..first + count];
-                for i in 0..count {
-                    sum[i] += light[i] * transmittance[i];
-                }
-            } else {
-                for i in 0..count {
-                    sum[i] += light[i];
-                }
+        for i in 0..count {
+            let left = self.transmittance(first + i);
+            for c in 0..3 {
+                self.radiance[c][first + i] += radiance[c][i] * left[c];
             }
-            if let Some(opacity) = opacity {
-                let transmittance = &mut self.transmittance[c][first..first + count];
-                for i in 0..count {
-                    transmittance[i] -= transmittance[i] * opacity[i];
+        }
+        if let Some(opacity) = opacity {
+            for plane in &mut self.transmittance[..if self.absorption == Absorption::Gray { 1 } else { 3 }] {
+                for (left, opacity) in plane[first..first + count].iter_mut().zip(opacity) {
+                    *left -= *left * opacity;
                 }
             }
         }
@@ -340,6 +365,23 @@ mod tests {
         assert_eq!(strip.radiance[0][0], 3.0);
         assert_eq!(strip.transmittance(0), [0.125; 3]);
         assert_eq!(strip.depth[0], 2.0);
+    }
+
+    #[test]
+    fn gray_and_coloured_absorption_come_to_the_same() {
+        let mut gray = Strip::default();
+        gray.reset(Rect::of_size(2, 1), None, 0);
+        let mut coloured = gray.clone();
+        coloured.transmittance_planes_mut();
+        for strip in [&mut gray, &mut coloured] {
+            strip.add_row_behind(0, [&[1.0, 2.0]; 3], Some(&[0.25, 0.5]), &[1.0, 1.0]);
+            strip.add_row_behind(0, [&[4.0, 4.0]; 3], None, &[2.0, 2.0]);
+        }
+        assert_eq!(gray.radiance, coloured.radiance);
+        assert_eq!(gray.radiance[2], [4.0, 4.0]);
+        assert_eq!((gray.transmittance(0), gray.transmittance(1)), ([0.75; 3], [0.5; 3]));
+        gray.add_behind(1, [0.0; 3], [1.0, 0.5, 0.0], 3.0);
+        assert_eq!((gray.transmittance(0), gray.transmittance(1)), ([0.75; 3], [0.5, 0.25, 0.0]));
     }
 
     #[test]

@@ -80,6 +80,9 @@ impl<S: Simd> Real for Lanes<S> {
     }
     #[inline(always)]
     fn fused(self, factor: Self, term: Self) -> Self {
+        if cfg!(feature = "broken-kernel") && has_fused(self.simd.level()) {
+            return self * factor + term;
+        }
         if has_fused(self.simd.level()) { self.mul_add(factor, term) } else { fused_one_by_one(self, factor, term) }
     }
     #[inline(always)]
