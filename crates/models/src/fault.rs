@@ -27,12 +27,6 @@ pub enum FaultKind {
         /// Their sum there.
         sum: f64,
     },
-    /// A speed that changes sign or stands still, where a seamless loop needs the gas to move on.
-    #[error("the gas rises {distance} heights in one loop; a seamless loop needs more than 0")]
-    LoopStandsStill {
-        /// Scroll in one loop, sheet heights.
-        distance: f64,
-    },
     /// A loop that is no length of time.
     #[error("a loop of {seconds} s; allowed: more than 0")]
     LoopLength {

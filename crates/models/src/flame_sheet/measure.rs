@@ -93,6 +93,9 @@ impl Measured<'_> {
     }
 }
 
+/// Gas moves at most at twice the scroll speed: sqrt(y) of eq. (9) has that slope at the top, and its steep foot only slows it.
+const LEAST_SLOPE: f32 = 0.5;
+
 impl FlameSheet {
     /// dy/dt of the gas at (x, y), sheet heights a second: s over dw/dy.
     fn gas_speed(&self, flame: &Flame, x: f64, y: f64, t: f64) -> f64 {
@@ -101,6 +104,7 @@ impl FlameSheet {
         let y = (y as f32).clamp(0.02, 0.98);
         let slope = (self.shape.slowed_rise_at(distance, y + STEP) - self.shape.slowed_rise_at(distance, y - STEP))
             / (2.0 * STEP);
-        self.clock.speed(self.flame_time(flame, t)) / f64::from(slope.max(0.1))
+        // Where the outline folds the mapping over, its slope is no speed of gas.
+        self.clock.speed(self.flame_time(flame, t)) / f64::from(slope.max(LEAST_SLOPE))
     }
 }

@@ -10,7 +10,7 @@ pub enum EditError {
     /// The text is not TOML.
     #[error("the scene is not TOML: {0}")]
     Syntax(String),
-    /// The assignment has no `=`, or nothing before it.
+    /// The assignment has no `=`, or no path of names before it.
     #[error(
         "`{0}` is no assignment; allowed: key.path=value, such as picture.size=[640,360] or flame_sheet.0.height=2"
     )]
@@ -59,7 +59,12 @@ pub fn set(text: &str, assignment: &str) -> Result<String, EditError> {
         None if segments.len() > 1 => return Err(nowhere(path, segments[0], &there)),
         _ => set_in(root, &segments, &value, path)?,
     }
-    Ok(document.to_string())
+    let edited = document.to_string();
+    // A value nested nearly as deep as readers go may lie too deep in the scene.
+    match edited.parse::<DocumentMut>() {
+        Ok(_) => Ok(edited),
+        Err(_) => Err(EditError::NoAssignment(assignment.to_owned())),
+    }
 }
 
 fn syntax(error: toml_edit::TomlError) -> EditError {
@@ -70,8 +75,15 @@ fn split(assignment: &str) -> Result<(&str, &str), EditError> {
     assignment
         .split_once('=')
         .map(|(path, value)| (path.trim(), value.trim()))
-        .filter(|(path, value)| !path.is_empty() && !value.is_empty())
+        .filter(|(path, value)| is_path(path) && !value.is_empty())
         .ok_or_else(|| EditError::NoAssignment(assignment.to_owned()))
+}
+
+/// Whether every part of a dotted path names something, and it is no deeper than TOML readers go.
+fn is_path(path: &str) -> bool {
+    /// Parts; scenes need five at most.
+    const DEEPEST: usize = 16;
+    path.split('.').all(|part| !part.trim().is_empty()) && path.split('.').count() <= DEEPEST
 }
 
 fn parse_value(text: &str) -> Value {
@@ -207,6 +219,12 @@ mod tests {
         assert!(matches!(set(SCENE, "flame_sheet.7.height=2"), Err(EditError::NoSuchPlace { .. })));
         assert!(matches!(set(SCENE, "picture.size"), Err(EditError::NoAssignment(_))));
         assert!(matches!(set(SCENE, "=3"), Err(EditError::NoAssignment(_))));
+        assert!(matches!(set(SCENE, "picture..size=3"), Err(EditError::NoAssignment(_))));
+        // Found by fuzzing: a path so deep that its result could not be read again.
+        let deep = format!("picture{}=3", ".a".repeat(100));
+        assert!(matches!(set(SCENE, &deep), Err(EditError::NoAssignment(_))));
+        let nested = format!("picture.a.b.c.d={}{}", "[".repeat(78), "]".repeat(78));
+        assert!(matches!(set(SCENE, &nested), Err(EditError::NoAssignment(_))));
     }
 
     #[test]
