@@ -30,11 +30,12 @@ pub fn display(frame: &Frame, view: &View, depth: BitDepth) -> DisplayImage {
 }
 
 /// Dither goes by the place in the whole picture, so that a crop shows the same pixels.
-fn rows<C: DisplayCode + Send>(frame: &Frame, view: &View) -> Vec<[C; 4]> {
+fn rows<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View) -> Vec<[C; 4]> {
     let level = Level::new();
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     let [x0, y0] = frame.header.data_origin;
-    let mut pixels = vec![[C::default(); 4]; width * height];
+    let mut pixels: Vec<[C; 4]> =
+        rayon::iter::repeat_n([C::default(); 4], width * height).with_min_len(1 << 16).collect();
     pixels.par_chunks_mut(width * TASK_ROWS).enumerate().for_each(|(task, chunk)| {
         for (row, out) in chunk.chunks_mut(width).enumerate() {
             let y = task * TASK_ROWS + row;
