@@ -142,7 +142,7 @@ bansho_base::parameters! {
     /// Glowing sparks that the fire throws up.
     pub struct SparkParameters {
         /// How many a second and flame; 0 for none.
-        rate: f64 = 0.0, limits(Range::new(0.0, 5_000.0)), unit("1/s");
+        rate: f64 = 0.0, limits(Range::new(0.0, 1_000.0)), unit("1/s");
         /// Speed at which they rise at first.
         speed: f64 = 2.2, limits(Range::new(0.0, 100.0)), unit("m/s");
         /// How much that differs between them, as a share.
@@ -150,7 +150,7 @@ bansho_base::parameters! {
         /// How far they swirl sideways.
         swirl: f64 = 0.12, limits(Range::new(0.0, 100.0)), unit("m");
         /// How long they glow.
-        life_s: f64 = 1.8, limits(Range::new(0.05, 60.0)), unit("s");
+        life_s: f64 = 1.8, limits(Range::new(0.05, 20.0)), unit("s");
         /// Their diameter.
         size: f64 = 0.004, limits(Range::new(1e-5, 1.0)), unit("m");
         /// Temperature at birth; they cool to 900 K.
