@@ -4,5 +4,6 @@ mod fault;
 
 pub mod flame_particles;
 pub mod flame_sheet;
+pub mod sparks;
 
 pub use fault::{FaultKind, ParameterFault};

@@ -37,6 +37,7 @@ pub struct Particles {
     pub(crate) birth: Vec<u64>,
     pub(crate) position: [Vec<f32>; 3],
     pub(crate) velocity: [Vec<f32>; 3],
+    pub(crate) birthplace: [Vec<f32>; 3],
     pub(crate) mass: Vec<f32>,
     pub(crate) density: Vec<f32>,
     pub(crate) temperature: Vec<f32>,
@@ -63,11 +64,12 @@ impl Particles {
         self.birth.is_empty()
     }
 
-    /// Adds a particle; its birth number must be greater than all others.
+    /// Adds a particle, born where it is; its birth number must be greater than all others.
     pub fn push(&mut self, particle: Particle) {
         self.birth.push(particle.birth);
         for axis in 0..3 {
             self.position[axis].push(particle.position[axis]);
+            self.birthplace[axis].push(particle.position[axis]);
             self.velocity[axis].push(particle.velocity[axis]);
         }
         for (values, value) in self.scalars_mut().into_iter().zip(particle.scalars()) {
@@ -111,6 +113,7 @@ impl Particles {
         compact(&mut self.birth, &kept);
         for axis in 0..3 {
             compact(&mut self.position[axis], &kept);
+            compact(&mut self.birthplace[axis], &kept);
             compact(&mut self.velocity[axis], &kept);
         }
         self.scalars_mut().into_iter().for_each(|values| compact(values, &kept));
@@ -129,6 +132,11 @@ impl Particles {
     /// Velocities, m/s.
     pub fn velocities(&self) -> [&[f32]; 3] {
         self.velocity.each_ref().map(Vec::as_slice)
+    }
+
+    /// Places where they were born, m from the origin: with the age they name the gas, whatever became of it.
+    pub fn birthplaces(&self) -> [&[f32]; 3] {
+        self.birthplace.each_ref().map(Vec::as_slice)
     }
 
     /// Masses m, kg.

@@ -22,7 +22,6 @@ mod ramp;
 mod shade;
 mod shape;
 mod smoke;
-mod sparks;
 mod tables;
 mod texture;
 
@@ -37,7 +36,7 @@ use bansho_base::{
 
 pub use parameters::{
     ColourParameters, Colouring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters,
-    SmokeParameters, SparkParameters, StageShown, TextureKind, TextureParameters,
+    SmokeParameters, StageShown, TextureKind, TextureParameters,
 };
 pub use texture::{PaperTexture, paper_texture};
 
@@ -47,6 +46,8 @@ use moment::Motion;
 use ramp::Ramp;
 use shape::{Shape, instance_key};
 use texture::{FractalLayers, PaperLayer};
+
+pub use crate::sparks::SparkParameters;
 
 use crate::fault::{FaultKind, ParameterFault};
 
