@@ -1,7 +1,9 @@
 //! Bansho's methods, each readable beside its paper: parameters as plain data, then functions that step and draw.
 
 mod fault;
+mod lanes;
 
 pub mod flame_sheet;
+pub mod sph;
 
 pub use fault::{FaultKind, ParameterFault};
