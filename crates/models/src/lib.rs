@@ -1,9 +1,11 @@
 //! Bansho's methods, each readable beside its paper: parameters as plain data, then functions that step and draw.
 
 mod fault;
+mod lanes;
 
 pub mod flame_particles;
 pub mod flame_sheet;
 pub mod sparks;
+pub mod sph;
 
 pub use fault::{FaultKind, ParameterFault};
