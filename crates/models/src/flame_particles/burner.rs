@@ -111,10 +111,7 @@ impl Burner {
     pub(crate) fn birthplace(&self, key: Key, birth: u64) -> Birthplace {
         let words = key.words(birth, 0, Purpose::named("birthplace"));
         let (position, direction) = self.local(words);
-        Birthplace {
-            position: self.placement.to_world(position),
-            direction: self.placement.turn(direction),
-        }
+        Birthplace { position: self.placement.to_world(position), direction: self.placement.turn(direction) }
     }
 
     /// Place and direction in the burner's own coordinates.
@@ -239,13 +236,17 @@ mod tests {
         let ends = places(&burner).filter(|place| place.direction.x.abs() > 0.5).count();
         assert!((700..900).contains(&ends), "a fifth of the area holds {ends} of 4000");
         for place in places(&burner) {
-            assert!((place.position.dot(place.direction) - if place.direction.x.abs() > 0.5 { 1.0 } else { 0.5 }).abs() < 1e-9);
+            assert!(
+                (place.position.dot(place.direction) - if place.direction.x.abs() > 0.5 { 1.0 } else { 0.5 }).abs()
+                    < 1e-9
+            );
         }
     }
 
     #[test]
     fn points_lines_and_meshes_stay_within_their_bounds() {
-        let line = burner(BurnerParameters { shape: BurnerShape::Line, length: 3.0, diameter: 0.2, ..Default::default() });
+        let line =
+            burner(BurnerParameters { shape: BurnerShape::Line, length: 3.0, diameter: 0.2, ..Default::default() });
         assert!(places(&line).all(|place| place.position.x.abs() <= 1.5 && place.position.z.abs() <= 0.1));
         let point = burner(BurnerParameters { shape: BurnerShape::Point, diameter: 0.1, ..Default::default() });
         assert!(places(&point).all(|place| place.position.length() <= 0.05));

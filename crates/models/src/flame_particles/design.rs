@@ -54,9 +54,8 @@ impl Design {
         check_count(parameters.particles)?;
         let burners = burners(parameters, assets)?;
         let domain = domain(parameters, &burners)?;
-        let stay = |burner: &Burner| {
-            (burner.rise_time() + parameters.life.afterlife_s).max(FEWEST_STEPS * parameters.step_s)
-        };
+        let stay =
+            |burner: &Burner| (burner.rise_time() + parameters.life.afterlife_s).max(FEWEST_STEPS * parameters.step_s);
         let flux = |burner: &Burner| burner.square_metres * burner.speed;
         let count = parameters.particles as f64;
         let volume = burners.iter().map(|burner| flux(burner) * stay(burner)).sum::<f64>() / count;
@@ -174,8 +173,7 @@ mod tests {
         let empty = FlameParticlesParameters { domain_max: Auto::Set([-50.0; 3]), ..default() };
         assert_eq!(fault(empty).key, "domain_max");
         let thin = [Auto::Set([-0.01; 3]), Auto::Set([0.01; 3])];
-        let wide =
-            FlameParticlesParameters { particles: 5, domain_min: thin[0], domain_max: thin[1], ..default() };
+        let wide = FlameParticlesParameters { particles: 5, domain_min: thin[0], domain_max: thin[1], ..default() };
         assert!(matches!(fault(wide).kind, ParticleFaultKind::SupportBeyondDomain { .. }));
         let many = fault(FlameParticlesParameters { particles: 900_000_000, ..default() });
         assert_eq!(many.to_string(), "particles: 900000000 particles would take 268 GiB; allowed: up to 20000000");

@@ -34,7 +34,9 @@ pub enum ParticleFaultKind {
         max: [f64; 3],
     },
     /// Particles that see farther than the domain is wide.
-    #[error("the support radius d would be {radius} m, more than the domain's {side} m; use more particles or a larger domain")]
+    #[error(
+        "the support radius d would be {radius} m, more than the domain's {side} m; use more particles or a larger domain"
+    )]
     SupportBeyondDomain {
         /// Support radius d, m.
         radius: f64,

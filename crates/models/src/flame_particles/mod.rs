@@ -2,6 +2,28 @@
 //!
 //! S. Inagaki, M. Imura, S. Ikeda, Y. Manabe and K. Chihara, "Real-time rendering of flame using particle-based fluid simulation".
 
+mod births;
+mod breeze;
+mod burner;
+mod collision;
+mod design;
+mod fault;
+mod life;
+mod narrowing;
+mod parameters;
 pub mod particles;
+mod puffing;
+mod simulation;
+mod snapshot;
+#[cfg(test)]
+mod tests;
+mod turbulence;
+mod weather;
 
+pub use burner::heskestad;
+pub use fault::{ParticleFault, ParticleFaultKind};
+pub use parameters::{
+    BurnerParameters, BurnerShape, FlameParticlesParameters, FluidParameters, ForceKernel, LifeParameters,
+    MotionParameters, TemperatureLaw, Tension, WindForce,
+};
 pub use particles::{Particle, Particles};

@@ -28,18 +28,24 @@ pub(crate) struct Axis {
     reach: f32,
 }
 
+/// The axes of all burners; the particles at `positions` came from burners of these numbers.
+pub(crate) fn axes(burners: &[Burner], positions: [&[f32]; 3], numbers: &[u32], strength: f64) -> Vec<Axis> {
+    let scale = |burner: &Burner| LAYERS as f64 / (1.5 * burner.height + burner.reach);
+    let bases: Vec<(f64, f64)> = burners.iter().map(|b| (b.placement.position.y, scale(b))).collect();
+    let mut sums = vec![[[0.0_f64; 3]; LAYERS + 1]; burners.len()];
+    for (index, &number) in numbers.iter().enumerate() {
+        let (base, scale) = bases[number as usize];
+        let layer = ((f64::from(positions[1][index]) - base) * scale + 0.5).clamp(0.0, LAYERS as f64) as usize;
+        let [x, z] = [positions[0][index], positions[2][index]].map(f64::from);
+        let sum = &mut sums[number as usize][layer];
+        *sum = [sum[0] + x, sum[1] + z, sum[2] + 1.0];
+    }
+    burners.iter().zip(&sums).map(|(burner, sums)| Axis::new(burner, scale(burner), sums, strength)).collect()
+}
+
 impl Axis {
-    /// The axis of the gas at `places` (x, y, z and the number of its burner), which is gas of `burner`, number `number`.
-    pub(crate) fn new(burner: &Burner, number: u32, positions: [&[f32]; 3], burners: &[u32], strength: f64) -> Self {
+    fn new(burner: &Burner, scale: f64, sums: &[[f64; 3]; LAYERS + 1], strength: f64) -> Self {
         let base = burner.placement.position;
-        let scale = LAYERS as f64 / (1.5 * burner.height + burner.reach);
-        let mut sums = [[0.0_f64; 3]; LAYERS + 1];
-        for index in (0..burners.len()).filter(|index| burners[*index] == number) {
-            let height = (f64::from(positions[1][index]) - base.y) * scale;
-            let sum = &mut sums[(height + 0.5).clamp(0.0, LAYERS as f64) as usize];
-            let [x, z] = [positions[0][index], positions[2][index]].map(f64::from);
-            *sum = [sum[0] + x, sum[1] + z, sum[2] + 1.0];
-        }
         let mut axis = Self {
             base: base.y as f32,
             scale: scale as f32,
@@ -49,7 +55,7 @@ impl Axis {
             strength: strength as f32,
             reach: burner.diameter as f32,
         };
-        axis.smooth(&sums);
+        axis.smooth(sums);
         axis
     }
 
@@ -74,11 +80,8 @@ impl Axis {
         let layer = (height * self.scale).min(LAYERS as f32 - 1e-3);
         let (below, part) = (layer as usize, layer.fract());
         let [low, high] = [self.middle[below], self.middle[below + 1]];
-        let away = Vec3::new(
-            place.x - low[0] - (high[0] - low[0]) * part,
-            0.0,
-            place.z - low[1] - (high[1] - low[1]) * part,
-        );
+        let away =
+            Vec3::new(place.x - low[0] - (high[0] - low[0]) * part, 0.0, place.z - low[1] - (high[1] - low[1]) * part);
         let distance = away.length();
         let speed = (self.speed_squared + 2.0 * self.acceleration * height).sqrt().max(1e-6);
         // The pull of one axis ends where a large burner has others of its own.
@@ -101,7 +104,7 @@ mod tests {
         // A column that leans to +x: x = y / 2.
         let y: Vec<f32> = (0..200).map(|i| i as f32 / 150.0).collect();
         let x: Vec<f32> = y.iter().map(|y| 0.5 * y).collect();
-        Axis::new(&burner, 0, [&x, &y, &vec![0.0; 200]], &[0; 200], strength)
+        axes(&[burner], [&x, &y, &[0.0; 200]], &[0; 200], strength).remove(0)
     }
 
     #[test]
@@ -115,6 +118,6 @@ mod tests {
 
     #[test]
     fn none_of_it_leaves_gas_alone() {
-        assert_eq!(super::tests::axis(0.0).velocity(Vec3::new(0.5, 0.8, 0.0)).length(), 0.0);
+        assert_eq!(axis(0.0).velocity(Vec3::new(0.5, 0.8, 0.0)).length(), 0.0);
     }
 }

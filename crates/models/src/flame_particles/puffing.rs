@@ -102,7 +102,10 @@ impl Shed<'_> {
             return None;
         }
         let beats = age * self.hz;
-        let extent = RING_EXTENT * burner.diameter * (1.0 + RING_GROWTH * beats) * cbrt(height / burner.diameter).clamp(0.6, 1.2);
+        let extent = RING_EXTENT
+            * burner.diameter
+            * (1.0 + RING_GROWTH * beats)
+            * cbrt(height / burner.diameter).clamp(0.6, 1.2);
         // It rolls up within a beat and fades as it leaves the flame.
         let rolled = beats / (beats + 0.35);
         let fade = (1.6 - height / burner.height).clamp(0.0, 0.6) / 0.6;
@@ -141,7 +144,8 @@ mod tests {
         let ring = ring();
         for place in [Vec3::new(0.15, 0.6, 0.1), Vec3::new(0.3, 0.45, -0.1), Vec3::new(0.0, 0.3, 0.05)] {
             let h = 2e-3;
-            let slope = |axis: Vec3| (ring.velocity(place + axis * h) - ring.velocity(place - axis * h)).dot(axis) / (2.0 * h);
+            let slope =
+                |axis: Vec3| (ring.velocity(place + axis * h) - ring.velocity(place - axis * h)).dot(axis) / (2.0 * h);
             let divergence = slope(Vec3::X) + slope(Vec3::Y) + slope(Vec3::Z);
             assert!(divergence.abs() < 0.01 * slope(Vec3::Y).abs().max(1.0), "{divergence}");
         }

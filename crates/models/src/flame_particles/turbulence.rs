@@ -112,9 +112,7 @@ mod tests {
     #[test]
     fn the_tile_is_free_of_divergence_and_of_unit_strength() {
         let turbulence = Turbulence::new(Key::new(3, "turbulence"));
-        let at = |x: usize, y: usize, z: usize| {
-            turbulence.tile[((z % SIDE) * SIDE + y % SIDE) * SIDE + x % SIDE]
-        };
+        let at = |x: usize, y: usize, z: usize| turbulence.tile[((z % SIDE) * SIDE + y % SIDE) * SIDE + x % SIDE];
         for index in (0..SIDE * SIDE * SIDE).step_by(37) {
             let [x, y, z] = [index % SIDE, index / SIDE % SIDE, index / (SIDE * SIDE)];
             let divergence = at(x + 1, y, z).x - at(x + SIDE - 1, y, z).x + at(x, y + 1, z).y
