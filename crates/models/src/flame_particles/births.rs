@@ -1,7 +1,7 @@
 //! New particles, section 4.3 (1): each a pure function of its birth number.
 
 use bansho_base::{
-    math::DVec3,
+    math::{self, DVec3},
     random::{Key, Purpose, uniform},
 };
 
@@ -17,7 +17,10 @@ const SPEED_SPREAD: f32 = 0.3;
 /// Births are counted since the preroll began, so that steps of any length give the same ones.
 pub(crate) fn add(particles: &mut Particles, design: &Design, afterlife_s: f64, key: Key, start: f64, seconds: f64) {
     for (number, (burner, rate)) in design.burners.iter().zip(&design.rates).enumerate() {
-        let born = |t: f64| rate * burner.parameters.flow.integral(-design.preroll, t);
+        // Warped time lets gas come in beats and keeps their mean.
+        let beat = std::f64::consts::TAU * design.puffing_hz[number];
+        let warped = |t: f64| t + design.pulse / beat * math::sin(beat * t);
+        let born = |t: f64| rate * burner.parameters.flow.integral(warped(-design.preroll), warped(t));
         let [before, after] = [born(start), born(start + seconds)];
         let life = design.longest_life(number, afterlife_s) as f32;
         for ordinal in before.ceil().max(0.0) as u64..after.ceil().max(0.0) as u64 {

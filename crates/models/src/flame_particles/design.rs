@@ -19,6 +19,8 @@ const MOST_PARTICLES: i64 = 20_000_000;
 const PARTICLE_BYTES: f64 = 320.0;
 /// Times until its tip that gas may take before it is removed, whatever holds it.
 const LONGEST_RISE: f64 = 3.0;
+/// How much the fuel that a fire draws from its burner rises and falls as it puffs, as a share.
+const PULSE: f64 = 0.6;
 /// Fewest steps that gas lives, so that births in one step stay bounded.
 const FEWEST_STEPS: f64 = 4.0;
 
@@ -33,6 +35,10 @@ pub(crate) struct Design {
     pub(crate) burners: Vec<Burner>,
     /// Births a second of each burner at full flow.
     pub(crate) rates: Vec<f64>,
+    /// How often each burner puffs, Hz.
+    pub(crate) puffing_hz: Vec<f64>,
+    /// How much more gas than on the mean comes at the height of a beat, as a share.
+    pub(crate) pulse: f64,
     /// Support radius d, m.
     pub(crate) support_radius: f32,
     /// Mass m, kg.
@@ -72,6 +78,8 @@ impl Design {
         let longest = burners.iter().map(stay).fold(0.0, f64::max);
         Ok(Self {
             rates: burners.iter().map(|burner| flux(burner) / volume).collect(),
+            puffing_hz: burners.iter().map(|burner| burner.puffing_hz(parameters)).collect(),
+            pulse: (PULSE * parameters.motion.puffing).min(0.9),
             support_radius: support_radius as f32,
             mass: (density * volume) as f32,
             rest_density: (parameters.fluid.rest_density * density) as f32,

@@ -2,6 +2,7 @@
 //!
 //! S. Inagaki, M. Imura, S. Ikeda, Y. Manabe and K. Chihara, "Real-time rendering of flame using particle-based fluid simulation".
 
+mod beside;
 mod births;
 mod breeze;
 mod burner;

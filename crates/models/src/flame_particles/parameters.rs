@@ -101,7 +101,7 @@ bansho_base::parameters! {
     /// Smoothed particle hydrodynamics, section 4.
     pub struct FluidParameters {
         /// Support radius d, eq. (2), in mean distances of particles at the burner.
-        support: f64 = 2.6, limits(Range::new(1.2, 6.0)), unit("distances");
+        support: f64 = 2.3, limits(Range::new(1.2, 6.0)), unit("distances");
         /// Density of reference rho_0, eq. (11), as a share of the density at the burner.
         rest_density: f64 = 0.8, limits(Range::new(0.0, 10.0));
         /// Speed of sound, `sqrt(k)` of eq. (11) at the burner's temperature, in speeds of the gas there: how hard it resists being pressed.

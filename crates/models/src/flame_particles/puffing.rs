@@ -17,9 +17,9 @@ const MOST_STREAMS: f64 = 6.0;
 /// Most rings of a stream that are alive, latest first.
 const MOST_ALIVE: i64 = 8;
 /// Speed of a ring beside the gas on the axis.
-const RING_SPEED: f64 = 0.5;
+const RING_SPEED: f64 = 0.7;
 /// Speed in a ring's middle beside the gas on the axis at its height.
-const RING_STRENGTH: f64 = 0.3;
+const RING_STRENGTH: f64 = 0.6;
 /// Extent c of a ring at birth, in diameters of the burner.
 const RING_EXTENT: f64 = 0.85;
 /// Growth of the extent a beat, by the air that the ring takes up.

@@ -4,6 +4,7 @@ use bansho_base::{math::Vec3, random::Key, surroundings::Surroundings};
 use rayon::prelude::*;
 
 use super::{
+    beside::Beside,
     births,
     collision::keep_out,
     design::Design,
@@ -13,17 +14,14 @@ use super::{
     turbulence::Turbulence,
     weather::Weather,
 };
-use crate::sph::{
-    Cells, KernelShape, PressureForce, PressureForm, StateEquation, densities, longest_step, mix, mixing_weights,
-    sub_steps,
-};
+use crate::sph::{Cells, KernelShape, PressureForce, PressureForm, StateEquation, densities, longest_step, sub_steps};
 
 /// Most sub-steps of a step.
-const MOST_SUB_STEPS: u32 = 6;
+const MOST_SUB_STEPS: u32 = 3;
 /// Gas is never faster, m/s.
 pub(crate) const GREATEST_SPEED: f32 = 150.0;
 /// Speed of gas against the gas beside it, as a share of its speed.
-const RELATIVE_SPEED: f32 = 0.2;
+const RELATIVE_SPEED: f32 = 0.15;
 /// Time in which `viscosity` and `conduction` say how far neighbours even out, s.
 const EVENING_TIME: f32 = 0.01;
 /// Distance from a solid, in support radii, at which gas stays.
@@ -48,9 +46,7 @@ pub(crate) struct Simulation {
     force: PressureForce,
     acceleration: [Vec<f32>; 3],
     pressure: Vec<f32>,
-    weights: Vec<f32>,
-    /// Sums of [`mix`]: weight, velocity, temperature, place.
-    beside: [Vec<f32>; 8],
+    beside: Beside,
 }
 
 /// A particle after a sub-step.
@@ -76,8 +72,7 @@ impl Simulation {
             force: PressureForce::new(kernel, PressureForm::Averaged),
             acceleration: Default::default(),
             pressure: Vec::new(),
-            weights: Vec::new(),
-            beside: Default::default(),
+            beside: Beside::default(),
             parameters: parameters.clone(),
             design,
             key,
@@ -118,7 +113,7 @@ impl Simulation {
         self.particles.sort(&mut self.cells);
         densities(&self.cells, KernelShape::Poly6, &self.particles.mass, &mut self.particles.density);
         self.press(seconds);
-        self.look_beside();
+        self.beside.look(&self.cells, &self.particles);
         let weather =
             Weather::new(&self.parameters, &self.design, &self.turbulence, self.key, &self.particles, around, time);
         let mover = Mover { simulation: self, weather: &weather, seconds, radius: self.cells.support_radius() };
@@ -141,14 +136,6 @@ impl Simulation {
             |(density, temperature): (&f32, &f32)| state.pressure((per_kelvin * temperature).min(most), *density);
         self.pressure.extend(density.iter().zip(temperature).map(pressure));
         self.force.accelerations(&self.cells, mass, density, &self.pressure, &mut self.acceleration);
-    }
-
-    /// How the neighbours differ in velocity and temperature, and where they lie.
-    fn look_beside(&mut self) {
-        let Particles { mass, density, temperature, position: [x, y, z], velocity: [u, v, w], .. } = &self.particles;
-        mixing_weights(mass, density, &mut self.weights);
-        let fields = [&self.weights, u, v, w, temperature, x, y, z].map(Vec::as_slice);
-        mix(&self.cells, KernelShape::Poly6, fields, self.beside.each_mut());
     }
 
     fn take_over(&mut self, moved: &[Moved], seconds: f32) {
@@ -223,7 +210,7 @@ impl Mover<'_> {
         };
         let even = self.evening(simulation.parameters.fluid.conduction, index);
         let being = Being {
-            temperature: even.mul_add(simulation.beside[4][index], temperature),
+            temperature: even.mul_add(simulation.beside.temperature(index), temperature),
             fuel: particles.fuel[index],
             soot: particles.soot[index],
             support_radius: particles.support_radius[index],
@@ -253,7 +240,7 @@ impl Mover<'_> {
             acceleration += wind * (weather.wind_gain / particles.density[index].max(1e-6));
         }
         let viscosity = self.evening(simulation.parameters.fluid.viscosity, index);
-        let pushed = own + acceleration * seconds + Self::vector(&simulation.beside[1..4], index) * viscosity;
+        let pushed = own + acceleration * seconds + Vec3::from(simulation.beside.velocity(index)) * viscosity;
         let rate = mixing * seconds;
         let air = if per_volume { Vec3::ZERO } else { wind * weather.wind_gain };
         ((pushed + air * rate) / (1.0 + rate)).clamp_length_max(GREATEST_SPEED)
@@ -261,14 +248,14 @@ impl Mover<'_> {
 
     /// How much of a particle lies at the edge of the gas: neighbours all on one side, or none.
     fn to_air(&self, index: usize) -> f32 {
-        let Simulation { beside, weights, .. } = self.simulation;
-        let sum = beside[0][index];
+        let beside = &self.simulation.beside;
+        let sum = beside.weight(index);
         if sum <= 0.0 {
             return 1.0;
         }
-        let offset = Self::vector(&beside[5..8], index).length() / (sum * self.radius * SURFACE_OFFSET);
+        let offset = Vec3::from(beside.offset(index)).length() / (sum * self.radius * SURFACE_OFFSET);
         let cube = self.radius * self.radius * self.radius;
-        let own = weights[index] * POLY6_CENTRE / (cube * sum);
+        let own = beside.weights[index] * POLY6_CENTRE / (cube * sum);
         let alone = (own - ALONE_SHARE[0]) / ALONE_SHARE[1];
         offset.max(alone).clamp(0.0, 1.0)
     }

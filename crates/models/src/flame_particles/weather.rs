@@ -91,8 +91,8 @@ impl<'a> Weather<'a> {
 }
 
 /// Share of its fuel that gas burns on a way as long as the flame is high, on the mean; and in the time that it takes there.
-const WAY_SHARE: f64 = 0.8;
-const TIME_SHARE: f64 = 0.2;
+const WAY_SHARE: f64 = 0.64;
+const TIME_SHARE: f64 = 0.16;
 
 fn density_kelvin(air: &Air) -> f32 {
     air.density_at(1.0) as f32

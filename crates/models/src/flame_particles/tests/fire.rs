@@ -37,8 +37,26 @@ fn print_fire() {
         }
     });
     let p = &simulation.particles;
+    let mut grid = [[0.0f32; 60]; 34];
+    for i in 0..p.len() {
+        let (x, y) = ((p.position[0][i] / 0.02 + 30.0) as i32, (p.position[1][i] / 0.04) as i32);
+        if (0..60).contains(&x) && (0..34).contains(&y) {
+            grid[y as usize][x as usize] += p.soot[i] * (p.temperature[i] / 1700.0).powi(8) * 1e6;
+        }
+    }
+    for row in grid.iter().rev() {
+        println!(
+            "|{}|",
+            row.iter().map(|v| b" .:-=+*#%@"[((v * 1.5).sqrt() * 2.0).min(9.0) as usize] as char).collect::<String>()
+        );
+    }
     for band in 0..14 {
         let low = band as f32 * 0.1;
+        let lit: Vec<usize> = (0..p.len())
+            .filter(|i| (low..low + 0.1).contains(&p.position[1][*i]) && p.soot[*i] > 3e-7 && p.temperature[*i] > 900.0)
+            .collect();
+        let lit_r =
+            lit.iter().map(|i| p.position[0][*i].hypot(p.position[2][*i])).sum::<f32>() / lit.len().max(1) as f32;
         let inside: Vec<usize> = (0..p.len()).filter(|i| (low..low + 0.1).contains(&p.position[1][*i])).collect();
         let mean = |f: &dyn Fn(usize) -> f32| inside.iter().map(|i| f(*i)).sum::<f32>() / inside.len().max(1) as f32;
         println!(
