@@ -2,7 +2,9 @@
 
 use glam::DVec3;
 
-use crate::wind::Wind;
+use crate::{air::Air, wind::Wind};
+
+pub use crate::occluder::Occluder;
 
 /// How a light sends its light out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,32 +64,6 @@ impl Light {
     }
 }
 
-/// Something solid that stands in the way.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Occluder {
-    /// A ball.
-    Sphere {
-        /// Its middle, m.
-        centre: DVec3,
-        /// Its radius, m.
-        radius: f64,
-    },
-    /// All below a plane.
-    HalfSpace {
-        /// A point on the plane, m.
-        point: DVec3,
-        /// Unit normal, pointing out of the solid.
-        normal: DVec3,
-    },
-    /// A box with upright faces.
-    Cuboid {
-        /// Its least corner, m.
-        min: DVec3,
-        /// Its greatest corner, m.
-        max: DVec3,
-    },
-}
-
 /// What one phenomenon publishes to the others at one time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Publication {
@@ -113,6 +89,8 @@ impl Publication {
 pub struct Surroundings<'a> {
     /// The one wind of the scene.
     pub wind: &'a Wind,
+    /// The one air of the scene.
+    pub air: &'a Air,
     /// Everybody else's lights, extinction and occluders, and the scene's own.
     pub others: Publication,
 }

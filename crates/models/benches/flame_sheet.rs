@@ -3,6 +3,7 @@
 use std::hint::black_box;
 
 use bansho_base::{
+    air::Air,
     animation::Animated,
     camera::CameraParameters,
     canvas::{DepthInterval, Shutter, Strip, View},
@@ -36,7 +37,7 @@ fn view(parameters: &FlameSheetParameters) -> View {
 /// Draws one frame; each thread takes every so manieth strip.
 fn draw_frame(sheet: &FlameSheet, view: &View, strips: &mut [Strip]) {
     let wind = Wind::new(WindParameters::default(), 1, None);
-    let surroundings = Surroundings { wind: &wind, others: Publication::default() };
+    let surroundings = Surroundings { wind: &wind, air: &Air::default(), others: Publication::default() };
     let Ok(prepared) = sheet.prepare(view, &surroundings, &Unobserved) else { return };
     let threads = strips.len();
     let draw = |thread: usize, strip: &mut Strip| {

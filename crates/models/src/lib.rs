@@ -2,9 +2,11 @@
 
 mod blue_flame;
 mod fault;
+mod lanes;
 
 pub mod flame_particles;
 pub mod flame_sheet;
 pub mod sparks;
+pub mod sph;
 
 pub use fault::{FaultKind, ParameterFault};

@@ -2,6 +2,11 @@
 
 use bansho_base::math::DVec3;
 
+use crate::sph::{Cells, retain};
+
+/// How many arrays of numbers there are.
+pub(crate) const NUMBERS: usize = 20;
+
 /// One particle, for pushing into [`Particles`] and for tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Particle {
@@ -29,7 +34,7 @@ pub struct Particle {
     pub soot: f32,
 }
 
-/// All living particles, in ascending order of [`birth`](Self::birth).
+/// All living particles, in the order of the cells that they were last sorted into.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Particles {
     /// Where the positions count from, m.
@@ -38,6 +43,10 @@ pub struct Particles {
     pub(crate) position: [Vec<f32>; 3],
     pub(crate) velocity: [Vec<f32>; 3],
     pub(crate) birthplace: [Vec<f32>; 3],
+    /// The part of the velocity with which the air's own motion carries the particle, m/s.
+    pub(crate) drift: [Vec<f32>; 3],
+    /// Number of the burner it came from.
+    pub(crate) burner: Vec<u32>,
     pub(crate) mass: Vec<f32>,
     pub(crate) density: Vec<f32>,
     pub(crate) temperature: Vec<f32>,
@@ -64,13 +73,15 @@ impl Particles {
         self.birth.is_empty()
     }
 
-    /// Adds a particle, born where it is; its birth number must be greater than all others.
+    /// Adds a particle of the first burner, born where it is; no other may have its birth number.
     pub fn push(&mut self, particle: Particle) {
         self.birth.push(particle.birth);
+        self.burner.push(0);
         for axis in 0..3 {
             self.position[axis].push(particle.position[axis]);
             self.birthplace[axis].push(particle.position[axis]);
             self.velocity[axis].push(particle.velocity[axis]);
+            self.drift[axis].push(0.0);
         }
         for (values, value) in self.scalars_mut().into_iter().zip(particle.scalars()) {
             values.push(value);
@@ -98,28 +109,24 @@ impl Particles {
     }
 
     /// Removes all for which `keep` of their index is false; the others keep their order.
-    pub fn retain(&mut self, keep: impl Fn(usize) -> bool) {
-        let kept: Vec<bool> = (0..self.len()).map(keep).collect();
-        fn compact<T>(values: &mut Vec<T>, kept: &[bool]) {
-            let mut index = 0;
-            values.retain(|_| {
-                index += 1;
-                kept[index - 1]
-            });
+    pub(crate) fn retain(&mut self, keep: impl Fn(usize) -> bool) {
+        let keep: Vec<bool> = (0..self.len()).map(keep).collect();
+        if keep.contains(&false) {
+            retain(&mut self.birth, &keep);
+            retain(&mut self.burner, &keep);
+            self.numbers_mut().into_iter().for_each(|values| retain(values, &keep));
         }
-        if kept.iter().all(|kept| *kept) {
-            return;
-        }
-        compact(&mut self.birth, &kept);
-        for axis in 0..3 {
-            compact(&mut self.position[axis], &kept);
-            compact(&mut self.birthplace[axis], &kept);
-            compact(&mut self.velocity[axis], &kept);
-        }
-        self.scalars_mut().into_iter().for_each(|values| compact(values, &kept));
     }
 
-    /// Numbers of birth, ascending.
+    /// Sorts them into cells; their numbers of birth order those of one cell.
+    pub(crate) fn sort(&mut self, cells: &mut Cells<3>) {
+        cells.assign(self.positions(), &self.birth);
+        cells.reorder(&mut self.birth);
+        cells.reorder(&mut self.burner);
+        self.numbers_mut().into_iter().for_each(|values| cells.reorder(values));
+    }
+
+    /// Numbers of birth, no two alike.
     pub fn births(&self) -> &[u64] {
         &self.birth
     }
@@ -179,12 +186,34 @@ impl Particles {
         &self.soot
     }
 
-    pub(crate) fn scalars(&self) -> [&Vec<f32>; 8] {
+    /// Every array of numbers, for what treats them all alike.
+    pub(crate) fn numbers(&self) -> [&Vec<f32>; NUMBERS] {
+        let Self { position: [x, y, z], velocity: [u, v, w], birthplace: [a, b, c], drift: [d, e, f], .. } = self;
         let Self { mass, density, temperature, support_radius, age, life, fuel, soot, .. } = self;
-        [mass, density, temperature, support_radius, age, life, fuel, soot]
+        [x, y, z, u, v, w, a, b, c, d, e, f, mass, density, temperature, support_radius, age, life, fuel, soot]
     }
 
-    pub(crate) fn scalars_mut(&mut self) -> [&mut Vec<f32>; 8] {
+    /// As [`numbers`](Self::numbers), to change them.
+    pub(crate) fn numbers_mut(&mut self) -> [&mut Vec<f32>; NUMBERS] {
+        let Self {
+            position: [x, y, z],
+            velocity: [u, v, w],
+            birthplace: [a, b, c],
+            drift: [d, e, f],
+            mass,
+            density,
+            temperature,
+            support_radius,
+            age,
+            life,
+            fuel,
+            soot,
+            ..
+        } = self;
+        [x, y, z, u, v, w, a, b, c, d, e, f, mass, density, temperature, support_radius, age, life, fuel, soot]
+    }
+
+    fn scalars_mut(&mut self) -> [&mut Vec<f32>; 8] {
         let Self { mass, density, temperature, support_radius, age, life, fuel, soot, .. } = self;
         [mass, density, temperature, support_radius, age, life, fuel, soot]
     }

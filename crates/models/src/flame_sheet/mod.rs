@@ -12,7 +12,6 @@ mod draw;
 mod flame;
 mod fluctuation;
 mod glow;
-mod lanes;
 mod measure;
 mod moment;
 mod parameters;
@@ -49,7 +48,10 @@ use texture::{FractalLayers, PaperLayer};
 
 pub use crate::sparks::SparkParameters;
 
-use crate::fault::{FaultKind, ParameterFault};
+use crate::{
+    fault::{FaultKind, ParameterFault},
+    lanes,
+};
 
 /// A flame sheet with all its instances, ready to be drawn at any time.
 #[derive(Clone, Debug)]

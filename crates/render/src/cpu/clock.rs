@@ -34,10 +34,10 @@ pub(super) fn steps_until(phenomenon: &dyn Phenomenon, t: f64) -> u64 {
     steps.max(0.0) as u64
 }
 
-/// What everybody but `index` publishes during `shutter`, and the scene's own lights.
+/// What everybody but `index` publishes during `shutter`, and the scene's own lights and obstacles.
 pub(super) fn others(plan: &Plan, publications: &[Publication], index: usize, shutter: Shutter) -> Publication {
     let lights = plan.scene.lights.iter().map(|light| light.at(shutter.middle())).collect();
-    let mut others = Publication { lights, ..Publication::default() };
+    let mut others = Publication { lights, occluders: plan.occluders.clone(), ..Publication::default() };
     for (other, publication) in publications.iter().enumerate() {
         if other != index {
             others.extend(publication);
@@ -64,7 +64,8 @@ pub(super) fn advance(
         observer::check(observer)?;
         let instant = Shutter { open: now, close: now };
         let publications: Vec<Publication> = phenomena.iter().map(|other| other.publish(instant)).collect();
-        let surroundings = Surroundings { wind: &plan.wind, others: others(plan, &publications, index, instant) };
+        let others = others(plan, &publications, index, instant);
+        let surroundings = Surroundings { wind: &plan.wind, air: &plan.scene.air, others };
         phenomena[index].step(now, &surroundings);
         clocks[index].taken += 1;
     }

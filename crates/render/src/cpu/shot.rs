@@ -86,6 +86,7 @@ impl CpuShot {
             self.phenomena.par_iter().map(|phenomenon| phenomenon.publish(view.shutter)).collect();
         let seen_by = |index| Surroundings {
             wind: &self.plan.wind,
+            air: &self.plan.scene.air,
             others: clock::others(&self.plan, &publications, index, view.shutter),
         };
         (0..self.phenomena.len()).map(seen_by).collect()

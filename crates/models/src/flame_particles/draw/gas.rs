@@ -34,6 +34,11 @@ const SOOT_ABSORPTION: f64 = 4.9 / 550e-9;
 /// Luminance of a metre of freshly burning gas in the light of CH and C2, cd/m^2: a blue cone of a few millimetres has some hundred.
 const BLUE_LUMINANCE: f64 = 6.0e4;
 
+/// Absorption coefficient of soot of a volume fraction, 1/m.
+pub fn soot_absorption(volume_fraction: f64, look: &LookParameters) -> f64 {
+    volume_fraction * SOOT_ABSORPTION * look.soot_gain
+}
+
 impl Gas<'_> {
     /// Where particle `index` is at time `t`, m: its state, moved on by its velocity.
     #[inline(always)]
@@ -55,7 +60,7 @@ impl Gas<'_> {
     /// Absorption coefficient of a particle's soot, 1/m.
     #[inline(always)]
     pub(crate) fn absorption(&self, index: usize, look: &LookParameters) -> f64 {
-        f64::from(self.particles.soot[index]) * SOOT_ABSORPTION * look.soot_gain
+        soot_absorption(f64::from(self.particles.soot[index]), look)
     }
 
     /// Luminance of a black body as hot as a particle, cd/m^2.

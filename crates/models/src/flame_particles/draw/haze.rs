@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use super::{
     gas::Gas,
     grid::{Grid, weigh},
-    look::LookParameters,
     kernel::Profile,
+    look::LookParameters,
     measure::DEFLECTION,
     splat::{Sheet, Sprite, splat},
     sprite::seen,

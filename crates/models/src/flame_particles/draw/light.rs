@@ -44,7 +44,9 @@ pub fn luminous(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Light> {
     if total.is_nan() || total <= 0.0 {
         return Vec::new();
     }
-    (0..count).filter_map(|part| part_light(&slabs, [part, part + 1].map(|edge| total * edge as f64 / count as f64), look)).collect()
+    (0..count)
+        .filter_map(|part| part_light(&slabs, [part, part + 1].map(|edge| total * edge as f64 / count as f64), look))
+        .collect()
 }
 
 /// The gas cut by height; a particle is shared by the two slabs around it.

@@ -19,7 +19,7 @@ mod splat;
 mod sprite;
 mod squares;
 
-pub use gas::Gas;
+pub use gas::{Gas, soot_absorption};
 pub use kernel::{line_gradient, line_integral};
 pub use light::luminous;
 pub use look::{GasLightParameters, LookParameters, Sprite};

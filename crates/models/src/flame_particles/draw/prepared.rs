@@ -167,13 +167,7 @@ impl<'a> PreparedGas<'a> {
 }
 
 /// Sums all sprites in their layers.
-fn sums(
-    gas: &Gas,
-    look: &LookParameters,
-    view: &View,
-    layers: &Layers,
-    surroundings: &Surroundings,
-) -> Option<Sums> {
+fn sums(gas: &Gas, look: &LookParameters, view: &View, layers: &Layers, surroundings: &Surroundings) -> Option<Sums> {
     let shown = seen(gas, view, |index| shows(gas, look, index));
     let detail = scale(gas, look, view, &shown).and_then(|scale| Detail::new(gas, look, &scale));
     let opacity = mean_density(gas).map_or(0.0, |density| look.opacity / density);

@@ -126,7 +126,8 @@ impl Placed {
         let centre = cells.place(ellipse.centre);
         let reach = ellipse.reach[1] * growth / cell;
         let last = cells.rows as i32;
-        let rows = [((centre[1] - reach).ceil() as i32).clamp(0, last), ((centre[1] + reach) as i32 + 1).clamp(0, last)];
+        let rows =
+            [((centre[1] - reach).ceil() as i32).clamp(0, last), ((centre[1] + reach) as i32 + 1).clamp(0, last)];
         Self { centre, shape: ellipse.shape.map(|value| value * scale), rows, dimmed: 1.0 / (growth * growth) }
     }
 }

@@ -99,14 +99,7 @@ impl<'a> Eye<'a> {
     /// The ellipse of a ball seen at `projection` that moves by `blur` pixels while the shutter is open.
     ///
     /// A box of that length, and the pixel's footprint, widen the sprite to the same variance; what it holds stays the same.
-    fn ellipse(
-        &self,
-        gas: &Gas,
-        index: usize,
-        place: DVec3,
-        projection: &Projection,
-        blur: DVec2,
-    ) -> Option<Ellipse> {
+    fn ellipse(&self, gas: &Gas, index: usize, place: DVec3, projection: &Projection, blur: DVec2) -> Option<Ellipse> {
         let camera = &self.view.camera;
         let radius = f64::from(gas.particles.support_radius[index]);
         let lens = lens_matrix(camera, place, projection);
