@@ -1,5 +1,6 @@
 //! Bansho's methods, each readable beside its paper: parameters as plain data, then functions that step and draw.
 
+mod blue_flame;
 mod fault;
 mod lanes;
 

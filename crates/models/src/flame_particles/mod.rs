@@ -8,7 +8,9 @@ mod breeze;
 mod burner;
 mod collision;
 mod design;
+pub mod draw;
 mod fault;
+mod flame;
 mod life;
 mod narrowing;
 mod parameters;
@@ -23,6 +25,7 @@ mod weather;
 
 pub use burner::heskestad;
 pub use fault::{ParticleFault, ParticleFaultKind};
+pub use flame::FlameParticles;
 pub use parameters::{
     BurnerParameters, BurnerShape, FlameParticlesParameters, FluidParameters, ForceKernel, LifeParameters,
     MotionParameters, TemperatureLaw, Tension, WindForce,

@@ -5,6 +5,8 @@ use bansho_base::{
     parameters::{AssetPath, Auto, Length, Range},
 };
 
+use super::draw::LookParameters;
+
 const SHARE: Range = Range::new(0.0, 1.0);
 const LENGTH: Range = Range::new(1e-3, 1e4);
 const KELVIN: Range = Range::new(250.0, 4000.0);
@@ -178,6 +180,8 @@ bansho_base::parameters! {
         motion: MotionParameters = MotionParameters::default();
         /// Burning, heating, cooling, soot.
         life: LifeParameters = LifeParameters::default();
+        /// How it looks.
+        look: LookParameters = LookParameters::default();
         /// Least corner of the box that gas may fill, from `position`; `"auto"` leaves room for flame and smoke.
         domain_min: Auto<[f64; 3]> = Auto::Auto, unit("m");
         /// Greatest corner of the box that gas may fill, from `position`.
