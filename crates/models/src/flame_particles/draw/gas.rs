@@ -2,7 +2,7 @@
 
 use bansho_base::{
     color,
-    math::{DVec2, DVec3},
+    math::{self, DVec2, DVec3},
     random::Key,
 };
 
@@ -31,8 +31,9 @@ pub struct Gas<'a> {
 /// Absorption of soot, 1/m, per volume fraction: about `4.9 / lambda` (Dalzell & Sarofim 1969), for green light.
 const SOOT_ABSORPTION: f64 = 4.9 / 550e-9;
 
-/// Luminance of a metre of freshly burning gas in the light of CH and C2, cd/m^2: a blue cone of a few millimetres has some hundred.
-const BLUE_LUMINANCE: f64 = 6.0e4;
+/// Luminance of a metre of freshly burning gas in the light of CH and C2, cd/m^2: the blue zone of a candle, a few millimetres deep,
+/// has some tens.
+const BLUE_LUMINANCE: f64 = 4.0e3;
 
 /// Absorption coefficient of soot of a volume fraction, 1/m.
 pub fn soot_absorption(volume_fraction: f64, look: &LookParameters) -> f64 {
@@ -71,14 +72,15 @@ impl Gas<'_> {
 
     /// Luminance of a metre of a particle's gas in the blue light of fresh flame, cd/m^2.
     ///
-    /// CH and C2 live only where fuel is just burning: most where half of it is left, and nowhere that soot has formed.
+    /// CH and C2 live only where fuel has just begun to burn, and nowhere that soot has formed.
     #[inline(always)]
     pub(crate) fn blue(&self, index: usize, look: &LookParameters) -> f64 {
         /// Volume fraction of soot that outshines and quenches the blue light.
-        const SOOTY: f64 = 2e-7;
-        let fuel = f64::from(self.particles.fuel[index]).clamp(0.0, 1.0);
-        let hot = f64::from((self.particles.temperature[index] - 900.0) / 600.0).clamp(0.0, 1.0);
-        let clean = 1.0 / (1.0 + f64::from(self.particles.soot[index]).max(0.0) / SOOTY);
-        BLUE_LUMINANCE * look.base_blue * 4.0 * fuel * (1.0 - fuel) * hot * clean
+        const SOOTY: f64 = 1e-7;
+        /// Share of the fuel that has burnt when the light is strongest.
+        const BEGUN: f64 = 0.06;
+        let burnt = (1.0 - f64::from(self.particles.fuel[index])).clamp(0.0, 1.0) / BEGUN;
+        let sooty = f64::from(self.particles.soot[index]).max(0.0) / SOOTY;
+        BLUE_LUMINANCE * look.base_blue * burnt * math::exp(1.0 - burnt) / (1.0 + sooty * sooty)
     }
 }
