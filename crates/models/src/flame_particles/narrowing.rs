@@ -73,15 +73,20 @@ impl Axis {
         }
     }
 
+    /// Where the axis is at `height` above the burner: x and z, m.
+    #[inline(always)]
+    pub(crate) fn at(&self, height: f32) -> [f32; 2] {
+        let layer = (height * self.scale).clamp(0.0, LAYERS as f32 - 1e-3);
+        let (below, part) = (layer as usize, layer.fract());
+        [0, 1].map(|k| self.middle[below][k] + (self.middle[below + 1][k] - self.middle[below][k]) * part)
+    }
+
     /// Velocity at which gas at `place` draws toward the axis, m/s.
     #[inline(always)]
     pub(crate) fn velocity(&self, place: Vec3) -> Vec3 {
         let height = (place.y - self.base).max(0.0);
-        let layer = (height * self.scale).min(LAYERS as f32 - 1e-3);
-        let (below, part) = (layer as usize, layer.fract());
-        let [low, high] = [self.middle[below], self.middle[below + 1]];
-        let away =
-            Vec3::new(place.x - low[0] - (high[0] - low[0]) * part, 0.0, place.z - low[1] - (high[1] - low[1]) * part);
+        let [x, z] = self.at(height);
+        let away = Vec3::new(place.x - x, 0.0, place.z - z);
         let distance = away.length();
         let speed = (self.speed_squared + 2.0 * self.acceleration * height).sqrt().max(1e-6);
         // The pull of one axis ends where a large burner has others of its own.

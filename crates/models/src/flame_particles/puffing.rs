@@ -10,7 +10,7 @@ use bansho_base::{
     random::{Key, Purpose, uniform},
 };
 
-use super::{burner::Burner, parameters::FlameParticlesParameters};
+use super::{burner::Burner, narrowing::Axis, parameters::FlameParticlesParameters};
 
 /// Most rings that a burner sheds side by side.
 const MOST_STREAMS: f64 = 6.0;
@@ -56,14 +56,14 @@ impl Ring {
     }
 }
 
-/// The rings of `burner` that are alive at time `t`, drifting with the wind.
+/// The rings of `burner`, number `number`, that are alive at time `t`, along the `axis` of its gas.
 pub(crate) fn rings(
     burner: &Burner,
     flame: &FlameParticlesParameters,
     key: Key,
     number: u32,
     t: f64,
-    wind: DVec3,
+    axis: &Axis,
 ) -> Vec<Ring> {
     if flame.motion.puffing == 0.0 {
         return Vec::new();
@@ -73,7 +73,7 @@ pub(crate) fn rings(
     let streams = (burner.square_metres / side).round().clamp(1.0, MOST_STREAMS) as u32;
     let latest = (t * hz).floor() as i64 + 1;
     let stream_rings = |stream: u32| {
-        let shed = Shed { burner, key, purpose: Purpose(number * 64 + stream), streams, hz, t, wind };
+        let shed = Shed { burner, key, purpose: Purpose(number * 64 + stream), streams, hz, t, axis };
         (0..=MOST_ALIVE).filter_map(move |back| shed.ring(latest - back, flame.motion.puffing))
     };
     (0..streams).flat_map(stream_rings).collect()
@@ -86,7 +86,7 @@ struct Shed<'a> {
     streams: u32,
     hz: f64,
     t: f64,
-    wind: DVec3,
+    axis: &'a Axis,
 }
 
 impl Shed<'_> {
@@ -110,10 +110,11 @@ impl Shed<'_> {
         let rolled = beats / (beats + 0.35);
         let fade = (1.6 - height / burner.height).clamp(0.0, 0.6) / 0.6;
         let speed = burner.axis_speed(height) * RING_STRENGTH * (0.6 + 0.8 * strong) * rolled * fade * puffing;
-        let drift = self.wind * (1.0 - 1.0 / (1.0 + 0.5 * beats)) * age;
+        let [above, base] = [height, 0.0].map(|height| self.axis.at(height as f32).map(f64::from));
+        let lean = DVec3::new(above[0] - base[0], height, above[1] - base[1]);
         let axis = DVec3::new(0.5 * (tilt_x - 0.5), 1.0, 0.5 * (tilt_z - 0.5)).normalize();
         Some(Ring {
-            centre: (self.middle(beat, [tilt_x, tilt_z]) + DVec3::Y * height + drift).as_vec3(),
+            centre: (self.middle(beat, [tilt_x, tilt_z]) + lean).as_vec3(),
             axis: axis.as_vec3(),
             inverse_extent: (1.0 / extent) as f32,
             strength: (0.5 * speed) as f32,

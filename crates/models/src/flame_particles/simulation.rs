@@ -243,7 +243,20 @@ impl Mover<'_> {
         let pushed = own + acceleration * seconds + Vec3::from(simulation.beside.velocity(index)) * viscosity;
         let rate = mixing * seconds;
         let air = if per_volume { Vec3::ZERO } else { wind * weather.wind_gain };
-        ((pushed + air * rate) / (1.0 + rate)).clamp_length_max(GREATEST_SPEED)
+        let mixed = ((pushed + air * rate) / (1.0 + rate)).clamp_length_max(GREATEST_SPEED);
+        if per_volume { mixed } else { self.dragged(index, mixed, air) }
+    }
+
+    /// Velocity after the drag of air that blows across the fire: `C rho_air / (rho r) |w - u| (w - u)`, level and implicit.
+    ///
+    /// Gas is several times thinner than air, so that a wind it would hardly mix with still bends it.
+    fn dragged(&self, index: usize, own: Vec3, air: Vec3) -> Vec3 {
+        let across = (air - own) * Vec3::new(1.0, 0.0, 1.0);
+        let particles = &self.simulation.particles;
+        let thinner = particles.temperature[index] / self.weather.air_temperature;
+        let drag = self.weather.draughts[particles.burner[index] as usize].drag;
+        let rate = drag * thinner * across.length() * self.seconds;
+        own + across * (rate / (1.0 + rate))
     }
 
     /// How much of a particle lies at the edge of the gas: neighbours all on one side, or none.

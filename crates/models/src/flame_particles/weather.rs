@@ -30,6 +30,8 @@ pub(crate) struct Draught<'a> {
     turbulent_age: f32,
     /// Entrainment coefficient over the radius of the fire, 1/m.
     pub(crate) entrainment: f32,
+    /// Coefficient of the drag of air that blows across, over the radius of the fire, 1/m.
+    pub(crate) drag: f32,
     /// Share of its fuel that gas burns in a metre of its way, and in a second.
     pub(crate) burning: [f32; 2],
 }
@@ -67,12 +69,13 @@ impl<'a> Weather<'a> {
             let size = flame.motion.eddy_size * burner.diameter;
             let speed = burner.axis_speed(0.5 * burner.height);
             Draught {
-                rings: rings(burner, flame, key, number as u32, t, mean),
+                rings: rings(burner, flame, key, number as u32, t, &axis),
                 axis,
                 eddies: turbulence.at(t, size, speed, mean * (0.5 * t)),
                 turbulence: flame.motion.turbulence as f32,
                 turbulent_age: TURBULENT_AGE * burner.rise_time() as f32,
                 entrainment: (flame.motion.entrainment / (0.5 * burner.diameter)) as f32,
+                drag: (CROSS_DRAG * flame.motion.wind_gain / (0.5 * burner.diameter)) as f32,
                 burning: [(WAY_SHARE / burner.height) as f32, (TIME_SHARE / burner.rise_time()) as f32],
             }
         };
@@ -90,6 +93,8 @@ impl<'a> Weather<'a> {
     }
 }
 
+/// Drag coefficient of a fire in wind from the side.
+const CROSS_DRAG: f64 = 0.25;
 /// Share of its fuel that gas burns on a way as long as the flame is high, on the mean; and in the time that it takes there.
 const WAY_SHARE: f64 = 0.64;
 const TIME_SHARE: f64 = 0.16;
