@@ -19,6 +19,7 @@ pub mod occluder;
 pub mod parameters;
 pub mod phenomenon;
 pub mod placement;
+pub mod point_cloud;
 pub mod random;
 pub mod surroundings;
 pub mod wind;

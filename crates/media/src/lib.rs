@@ -18,6 +18,7 @@ pub mod meshes;
 pub mod naming;
 mod ordered;
 pub mod plates;
+pub mod ply;
 pub mod png;
 pub mod resume;
 pub mod sequence;

@@ -1,4 +1,4 @@
-//! From a scene file to pictures on disk: what `bansho render` and `bansho flipbook` do, for any program.
+//! From a scene file to pictures on disk: what `bansho render`, `bansho flipbook` and `bansho simulate` do, for any program.
 //!
 //! [`Job`] says what is wanted; [`Job::prepare`] checks all of it and writes nothing; [`PreparedJob::run`] draws each
 //! frame while those before are compressed and written by whichever thread of the caller's rayon pool is free. A few
@@ -16,6 +16,7 @@ mod run;
 mod scene_file;
 mod sheet;
 mod shoot;
+mod simulate;
 mod snapshots;
 #[cfg(test)]
 mod testing;
@@ -31,6 +32,7 @@ pub use observer::{FrameDone, JobObserver, Note, Outline};
 pub use prepare::{PreparedJob, check_scene};
 pub use run::Summary;
 pub use scene_file::SceneFile;
+pub use simulate::{PreparedSimulation, Simulate};
 
 bansho_base::choice! {
     /// What draws.

@@ -10,6 +10,7 @@ use bansho_base::{
     image::{Frame, Image},
     observer::{Observer, Stage, check},
     phenomenon::SnapshotError,
+    point_cloud::PointCloud,
 };
 use bansho_render::{Backend, Plan, PlanOptions, RenderError, Shot};
 
@@ -84,6 +85,10 @@ impl Shot for CounterShot {
             channels: Vec::new(),
             opaque: false,
         })
+    }
+
+    fn particles(&self) -> PointCloud {
+        PointCloud::default()
     }
 
     fn snapshot(&self) -> Vec<u8> {

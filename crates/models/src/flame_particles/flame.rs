@@ -8,6 +8,7 @@ use bansho_base::{
     observer::{Cancelled, Observer},
     parameters::Auto,
     phenomenon::{Phenomenon, Prepared, SnapshotError, Stepping},
+    point_cloud::PointCloud,
     random::Key,
     surroundings::{Publication, Surroundings},
 };
@@ -145,6 +146,17 @@ impl Phenomenon for FlameParticles {
         self.simulation.particles = snapshot::read(&self.simulation.particles, rest, burners)?;
         (self.time, self.air_temperature_k) = (f64::from_le_bytes(*time), f64::from_le_bytes(*air));
         Ok(())
+    }
+
+    fn particles(&self, t: f64) -> Option<PointCloud> {
+        let gas = self.gas();
+        let Particles { velocity: [u, v, w], temperature, density, .. } = gas.particles;
+        Some(PointCloud {
+            positions: (0..gas.particles.len()).map(|index| gas.place(index, t).as_vec3().to_array()).collect(),
+            velocities: u.iter().zip(v).zip(w).map(|((u, v), w)| [*u, *v, *w]).collect(),
+            temperatures_k: temperature.clone(),
+            densities: density.clone(),
+        })
     }
 
     fn publish(&self, shutter: Shutter) -> Publication {

@@ -7,6 +7,7 @@ use bansho_base::{
     image::{Channel, Frame, Rect},
     observer::{self, Cancelled, Observer, Stage, StageGuard},
     phenomenon::{Phenomenon, Prepared},
+    point_cloud::PointCloud,
     surroundings::{Publication, Surroundings},
 };
 
@@ -144,6 +145,13 @@ impl Shot for CpuShot {
 
     fn read(&mut self) -> Option<Frame> {
         self.frame.take()
+    }
+
+    fn particles(&self) -> PointCloud {
+        let t = self.plan.shutter(self.number).middle();
+        let mut all = PointCloud::default();
+        self.phenomena.iter().filter_map(|phenomenon| phenomenon.particles(t)).for_each(|own| all.extend(&own));
+        all
     }
 
     fn snapshot(&self) -> Vec<u8> {

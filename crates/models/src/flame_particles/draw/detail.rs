@@ -18,7 +18,7 @@ const LOGISTIC: f32 = 1.813_799_4;
 /// Optical depth, in particles, beyond which gas burns no more densely: even cores have gaps.
 const FULLEST: f32 = 2.5;
 /// Mean number of particles in the line of sight at which half of the place burns.
-const HALF_BURNING: f64 = 0.3;
+const HALF_BURNING: f64 = 0.42;
 /// By how much more detail extends upward than sideways around a lone particle.
 const UPRIGHT: f64 = 0.45;
 /// How much hotter, as a share, gas burns where it burns most.

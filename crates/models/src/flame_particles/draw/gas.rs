@@ -31,9 +31,9 @@ pub struct Gas<'a> {
 /// Absorption of soot, 1/m, per volume fraction: about `4.9 / lambda` (Dalzell & Sarofim 1969), for green light.
 const SOOT_ABSORPTION: f64 = 4.9 / 550e-9;
 
-/// Luminance of a metre of freshly burning gas in the light of CH and C2, cd/m^2: the blue zone of a candle, a few millimetres deep,
-/// has some tens.
-const BLUE_LUMINANCE: f64 = 4.0e3;
+/// Luminance of a metre of freshly burning gas in the light of CH and C2, cd/m^2. The zone that shines is a film of a millimetre with
+/// some tens; particles spread it over centimetres.
+const BLUE_LUMINANCE: f64 = 300.0;
 
 /// Absorption coefficient of soot of a volume fraction, 1/m.
 pub fn soot_absorption(volume_fraction: f64, look: &LookParameters) -> f64 {
