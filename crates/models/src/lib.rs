@@ -3,6 +3,7 @@
 mod fault;
 mod lanes;
 
+pub mod field;
 pub mod flame_sheet;
 pub mod sph;
 
