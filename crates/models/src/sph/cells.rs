@@ -10,6 +10,8 @@ use std::ops::Range;
 const FARTHEST: i32 = 1 << 19;
 /// Cells are this much wider than the support radius, so that rounding never puts two neighbours two cells apart.
 const MARGIN: f32 = 1.001;
+/// Where particles are put that are farther away or nowhere; squares of such distances are still finite.
+pub(super) const BEYOND: f32 = 1e12;
 /// Bits sorted by in one pass.
 const DIGIT_BITS: u32 = 11;
 
@@ -23,6 +25,8 @@ pub struct Cells<const D: usize> {
     ids: Vec<u64>,
     positions: [Vec<f32>; D],
     occupied: Vec<Cell>,
+    /// For each particle which batches of its candidates hold neighbours, see [`Cells::find_hits`].
+    hits: Vec<u64>,
 }
 
 /// A cell that holds particles: its key and its first particle. The last of the list is a sentinel behind all.
@@ -75,7 +79,8 @@ impl<const D: usize> Cells<D> {
         const { assert!(D == 2 || D == 3, "particles live in two or three dimensions") };
         let none = || std::array::from_fn(|_| Vec::new());
         let keys = Keys::new([0; D], [0; D]);
-        Self { support_radius, keys, order: Vec::new(), ids: Vec::new(), positions: none(), occupied: Vec::new() }
+        let (order, ids, occupied, hits) = Default::default();
+        Self { support_radius, keys, order, ids, positions: none(), occupied, hits }
     }
 
     /// The distance from which on particles do not see each other.
@@ -119,8 +124,12 @@ impl<const D: usize> Cells<D> {
             let key = |i: usize| keys.key(positions.map(|component| cell(component[i])));
             self.sort((0..ids.len()).map(key).collect(), ids);
         }
-        self.positions = positions.map(|component| self.order.iter().map(|i| component[*i as usize]).collect());
+        let within = |x: f32| if x.abs() < BEYOND { x } else { BEYOND };
+        self.positions = positions.map(|component| self.order.iter().map(|i| within(component[*i as usize])).collect());
         self.ids = self.order.iter().map(|i| ids[*i as usize]).collect();
+        let mut hits = std::mem::take(&mut self.hits);
+        self.find_hits(&mut hits);
+        self.hits = hits;
     }
 
     /// Sorts by key, then by id, and lists the cells.
@@ -159,6 +168,11 @@ impl<const D: usize> Cells<D> {
     /// Positions in sorted order, one array a component.
     pub(super) fn positions(&self) -> [&[f32]; D] {
         self.positions.each_ref().map(Vec::as_slice)
+    }
+
+    /// For each particle which batches of its candidates hold neighbours.
+    pub(super) fn hits(&self) -> &[u64] {
+        &self.hits
     }
 
     /// Number of cells that hold particles.

@@ -23,6 +23,7 @@
 
 mod cells;
 mod density;
+mod gather;
 mod kernel;
 mod mixing;
 mod particles;

@@ -1,23 +1,27 @@
 //! Sums over the neighbours of every particle: the one loop that density, forces and whatever a model adds run in.
 //!
-//! For each cell the particles of it and its neighbours are gathered once, side by side; then each particle of the cell goes
-//! through them sixteen at a time. There is no list of neighbours: rejecting the six candidates out of seven that are too far costs less
-//! than storing and fetching the seventh. A sum depends on who is in the neighbouring cells alone, not on threads.
+//! For each cell the particles of it and its neighbours, the candidates, are gathered once, side by side; then each particle of the
+//! cell goes through them eight at a time, leaving out batches in which it has no neighbour. There is no list of neighbours: rejecting
+//! candidates within a batch costs less than storing and fetching the others one by one. A sum depends on who is in the
+//! neighbouring cells alone, not on threads.
 
 use std::ops::Range;
 
-use bansho_base::math;
-use bansho_base::random::{murmur3, uniform};
+use bansho_base::{
+    math,
+    random::{murmur3, uniform},
+};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-use super::cells::Cells;
-use crate::lanes::{LANES, Lanes, Real};
+use super::{
+    cells::{BEYOND, Cells},
+    gather::{BATCH, Gathered, Task, batches_per_bit, farthest_squared, squared},
+};
+use crate::lanes::{HalfLanes, Real};
 
 /// Particles closer than this share of the support radius count as coincident.
 const COINCIDENT: f32 = 1e-6;
-/// Particles a task of the thread pool holds at least.
-const TASK: usize = 256;
 
 /// Where a neighbour is.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +42,8 @@ pub trait PairTerm<const D: usize, const IN: usize, const OUT: usize>: Sync {
 
     /// What a neighbour with the values `other` adds to the sums of a particle with the values `own`.
     ///
-    /// Mark it `#[inline(always)]`. It is also called for candidates too far to count, whose result is dropped.
+    /// Mark it `#[inline(always)]`. It is also called for candidates too far to count, with the squared distance held to that of the
+    /// support radius; such a result is multiplied by 0, so it must be finite.
     fn term<R: Real>(&self, pair: &Pair<R, D>, own: &[R; IN], other: &[R; IN]) -> [R; OUT];
 }
 
@@ -64,80 +69,29 @@ impl<const D: usize> Cells<D> {
             values.as_mut_slice()
         });
         let level = Level::new();
-        let visit = |gathered: &mut Gathered<D, IN>, mut task: Task<'_, OUT>| {
+        let positions = self.positions();
+        let scratch = || (Gathered::<D>::new(), Gathered::<IN>::new());
+        Task::all(self, results).into_par_iter().for_each_init(scratch, |(places, values), mut task| {
             self.visit(task.cells.clone(), |particles, runs| {
-                gathered.fill(self, &fields, runs);
-                let own = Own { cells: self, fields: &fields, runs, gathered: &*gathered };
-                let results = task.results.each_mut().map(|values| {
-                    let (head, tail) = std::mem::take(values).split_at_mut(particles.len());
-                    *values = tail;
-                    head
+                let results = task.take(particles.len());
+                dispatch!(level, simd => {
+                    places.fill(&positions, runs, -BEYOND);
+                    values.fill(&fields, runs, 0.0);
+                    let around = Around { cells: self, fields: &fields, runs, places, values };
+                    sum_cell(simd, term, &around, particles, results);
                 });
-                dispatch!(level, simd => sum_cell(simd, term, &own, particles, results));
             });
-        };
-        tasks(self, results).into_par_iter().for_each_init(Gathered::new, visit);
-    }
-}
-
-/// A stretch of cells and where the results of their particles go.
-struct Task<'a, const OUT: usize> {
-    cells: Range<usize>,
-    results: [&'a mut [f32]; OUT],
-}
-
-/// Parts the cells into stretches of about as many particles.
-fn tasks<'a, const D: usize, const OUT: usize>(
-    cells: &Cells<D>,
-    mut results: [&'a mut [f32]; OUT],
-) -> Vec<Task<'a, OUT>> {
-    let mut tasks = Vec::with_capacity(cells.len() / TASK + 1);
-    let mut first = 0;
-    for next in 1..=cells.count() {
-        let count = cells.particles(first..next).len();
-        if count < TASK && next < cells.count() {
-            continue;
-        }
-        let results = results.each_mut().map(|values| {
-            let (head, tail) = std::mem::take(values).split_at_mut(count);
-            *values = tail;
-            head
         });
-        tasks.push(Task { cells: first..next, results });
-        first = next;
-    }
-    tasks
-}
-
-/// Particles of a cell and its neighbours side by side, filled up to whole batches with particles infinitely far away.
-struct Gathered<const D: usize, const IN: usize> {
-    positions: [Vec<f32>; D],
-    fields: [Vec<f32>; IN],
-}
-
-impl<const D: usize, const IN: usize> Gathered<D, IN> {
-    fn new() -> Self {
-        Self { positions: std::array::from_fn(|_| Vec::new()), fields: std::array::from_fn(|_| Vec::new()) }
-    }
-
-    fn fill(&mut self, cells: &Cells<D>, fields: &[&[f32]; IN], runs: &[Range<usize>]) {
-        let gather = |to: &mut Vec<f32>, from: &[f32], filler: f32| {
-            to.clear();
-            runs.iter().for_each(|run| to.extend_from_slice(&from[run.clone()]));
-            to.resize(to.len().next_multiple_of(LANES), filler);
-        };
-        let places = self.positions.iter_mut().zip(cells.positions());
-        places.for_each(|(to, from)| gather(to, from, f32::INFINITY));
-        self.fields.iter_mut().zip(fields).for_each(|(to, from)| gather(to, from, 0.0));
     }
 }
 
-/// What the sums of a cell read.
-struct Own<'a, const D: usize, const IN: usize> {
+/// What the sums of a cell read: its candidates, gathered.
+struct Around<'a, const D: usize, const IN: usize> {
     cells: &'a Cells<D>,
     fields: &'a [&'a [f32]; IN],
     runs: &'a [Range<usize>],
-    gathered: &'a Gathered<D, IN>,
+    places: &'a Gathered<D>,
+    values: &'a Gathered<IN>,
 }
 
 /// Sums for all particles of a cell.
@@ -145,18 +99,16 @@ struct Own<'a, const D: usize, const IN: usize> {
 fn sum_cell<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
-    own: &Own<'_, D, IN>,
+    around: &Around<'_, D, IN>,
     particles: Range<usize>,
     results: [&mut [f32]; OUT],
 ) where
     T: PairTerm<D, IN, OUT>,
 {
     for (slot, i) in particles.enumerate() {
-        let position = own.cells.positions().map(|component| component[i]);
-        let values = own.fields.map(|field| field[i]);
-        let (mut sums, coincident) = sum_one(simd, term, own, position, values);
+        let (mut sums, coincident) = sum_one(simd, term, around, i);
         if T::DIRECTED && coincident > 1.5 {
-            let more = sum_coincident(term, own, i);
+            let more = sum_coincident(term, around, i);
             sums = std::array::from_fn(|k| sums[k] + more[k]);
         }
         for k in 0..OUT {
@@ -170,34 +122,38 @@ fn sum_cell<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
 fn sum_one<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
-    own: &Own<'_, D, IN>,
-    position: [f32; D],
-    values: [f32; IN],
+    around: &Around<'_, D, IN>,
+    i: usize,
 ) -> ([f32; OUT], f32)
 where
     T: PairTerm<D, IN, OUT>,
 {
-    let support = own.cells.support_radius();
-    let zero = Lanes::splat(simd, 0.0);
-    let farthest = zero.like(support * support);
-    let nearest = zero.like(nearest_squared(support));
-    let position = position.map(|component| zero.like(component));
-    let values = values.map(|value| zero.like(value));
+    let (zero, one) = (HalfLanes::splat(simd, 0.0), HalfLanes::splat(simd, 1.0));
+    let farthest = zero.like(farthest_squared(around.cells));
+    let nearest = zero.like(nearest_squared(around.cells.support_radius()));
+    let position = around.cells.positions().map(|component| zero.like(component[i]));
+    let own = around.fields.map(|field| zero.like(field[i]));
     let mut sums = [zero; OUT];
     let mut coincident = zero;
-    for block in (0..own.gathered.positions[0].len()).step_by(LANES) {
-        let at = |from: &Vec<f32>| Lanes::from_slice(simd, &from[block..block + LANES]);
-        let theirs = own.gathered.positions.each_ref().map(at);
-        let offset = std::array::from_fn(|c| position[c] - theirs[c]);
-        let distance_squared = squared(&offset);
-        let other = own.gathered.fields.each_ref().map(at);
-        let terms = term.term(&Pair { offset, distance_squared }, &values, &other);
-        for k in 0..OUT {
-            let counted = distance_squared.choose(farthest, terms[k], zero);
-            sums[k] += if T::DIRECTED { distance_squared.choose(nearest, zero, counted) } else { counted };
-        }
-        if T::DIRECTED {
-            coincident += distance_squared.choose(nearest, zero.like(1.0), zero);
+    let per_bit = batches_per_bit(around.places.batches());
+    let mut hits = around.cells.hits()[i];
+    while hits != 0 {
+        let first = hits.trailing_zeros() as usize * per_bit;
+        hits &= hits - 1;
+        for batch in first..(first + per_bit).min(around.places.batches()) {
+            let theirs = around.places.batch(simd, batch);
+            let offset = std::array::from_fn(|c| position[c] - theirs[c]);
+            let squared = squared::<_, D>(&offset);
+            let mut counts = squared.choose(farthest, one, zero);
+            let mut distance_squared = squared.least(farthest);
+            if T::DIRECTED {
+                let same = squared.choose(nearest, one, zero);
+                coincident += same;
+                counts = counts - same;
+                distance_squared = distance_squared.greatest(nearest);
+            }
+            let terms = term.term(&Pair { offset, distance_squared }, &own, &around.values.batch(simd, batch));
+            sums = std::array::from_fn(|k| terms[k].fused(counts, sums[k]));
         }
     }
     (sums.map(total), total(coincident))
@@ -208,17 +164,12 @@ fn nearest_squared(support_radius: f32) -> f32 {
     (support_radius * COINCIDENT) * (support_radius * COINCIDENT)
 }
 
-#[inline(always)]
-fn squared<R: Real, const D: usize>(offset: &[R; D]) -> R {
-    offset[1..].iter().fold(offset[0] * offset[0], |sum, component| component.fused(*component, sum))
-}
-
 /// Sum of a batch, halves first, whatever the vector width.
 #[inline(always)]
-fn total<S: Simd>(batch: Lanes<S>) -> f32 {
-    let mut parts = [0.0; LANES];
+fn total<S: Simd>(batch: HalfLanes<S>) -> f32 {
+    let mut parts = [0.0; BATCH];
     batch.store_slice(&mut parts);
-    for half in [8, 4, 2, 1] {
+    for half in [4, 2, 1] {
         for lane in 0..half {
             parts[lane] += parts[lane + half];
         }
@@ -230,22 +181,22 @@ fn total<S: Simd>(batch: Lanes<S>) -> f32 {
 #[inline(never)]
 fn sum_coincident<T, const D: usize, const IN: usize, const OUT: usize>(
     term: &T,
-    own: &Own<'_, D, IN>,
+    around: &Around<'_, D, IN>,
     i: usize,
 ) -> [f32; OUT]
 where
     T: PairTerm<D, IN, OUT>,
 {
-    let (positions, ids) = (own.cells.positions(), own.cells.ids());
-    let support = own.cells.support_radius();
-    let values = own.fields.map(|field| field[i]);
+    let (positions, ids) = (around.cells.positions(), around.cells.ids());
+    let support = around.cells.support_radius();
+    let values = around.fields.map(|field| field[i]);
     let mut sums = [0.0; OUT];
-    for j in own.runs.iter().cloned().flatten().filter(|j| *j != i) {
+    for j in around.runs.iter().cloned().flatten().filter(|j| *j != i) {
         let between: [f32; D] = positions.map(|component| component[i] - component[j]);
         if squared(&between) < nearest_squared(support) {
             let offset = direction(ids[i], ids[j]).map(|component: f32| component * support * COINCIDENT);
             let pair = Pair { offset, distance_squared: squared(&offset) };
-            let terms = term.term(&pair, &values, &own.fields.map(|field| field[j]));
+            let terms = term.term(&pair, &values, &around.fields.map(|field| field[j]));
             sums = std::array::from_fn(|k| sums[k] + terms[k]);
         }
     }
