@@ -21,9 +21,9 @@
 //! ```
 //! Anything else that is a sum over neighbours is a [`PairTerm`] for [`Cells::sum`].
 
+mod batch;
 mod cells;
 mod density;
-mod gather;
 mod kernel;
 mod mixing;
 mod particles;

@@ -1,5 +1,7 @@
 //! What smoothed particles are made of.
 
+use rayon::prelude::*;
+
 use super::cells::Cells;
 
 /// Particles in `D` dimensions as arrays, one entry a particle.
@@ -60,9 +62,10 @@ impl<const D: usize> Particles<D> {
     /// Afterwards bring arrays of your own into the same order with [`Cells::reorder`].
     pub fn sort(&mut self, cells: &mut Cells<D>) {
         cells.assign(self.positions.each_ref().map(Vec::as_slice), &self.ids);
-        self.positions.iter_mut().chain(&mut self.velocities).for_each(|values| cells.reorder(values));
-        cells.reorder(&mut self.masses);
-        cells.reorder(&mut self.ids);
+        let arrays = self.positions.iter_mut().chain(&mut self.velocities).chain([&mut self.masses]);
+        let arrays: Vec<&mut Vec<f32>> = arrays.collect();
+        arrays.into_par_iter().for_each(|values| cells.reorder(values));
+        self.ids.copy_from_slice(cells.ids());
     }
 
     /// Greatest speed of all; 0 without particles.

@@ -27,7 +27,11 @@ impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 2, D> for PressureTerm<K
     fn term<R: Real>(&self, pair: &Pair<R, D>, own: &[R; 2], other: &[R; 2]) -> [R; D] {
         let factor = other[1].like(0.0) - self.0.gradient_factor(pair.distance_squared);
         let push = (own[0] + other[0]) * other[1] * factor;
-        pair.offset.map(|component| component * push)
+        let mut push_by_component = pair.offset;
+        for component in &mut push_by_component {
+            *component = *component * push;
+        }
+        push_by_component
     }
 }
 

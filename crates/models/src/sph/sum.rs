@@ -1,11 +1,8 @@
 //! Sums over the neighbours of every particle: the one loop that density, forces and whatever a model adds run in.
 //!
-//! For each cell the particles of it and its neighbours, the candidates, are gathered once, side by side; then each particle of the
-//! cell goes through them eight at a time, leaving out batches in which it has no neighbour. There is no list of neighbours: rejecting
+//! Each particle of a cell goes through the candidates of the cell eight at a time, leaving out batches in which it has no neighbour. There is no list of neighbours: rejecting
 //! candidates within a batch costs less than storing and fetching the others one by one. A sum depends on who is in the
 //! neighbouring cells alone, not on threads.
-
-use std::ops::Range;
 
 use bansho_base::{
     math,
@@ -15,8 +12,10 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
 use super::{
-    cells::{BEYOND, Cells},
-    gather::{BATCH, Gathered, Task, batches_per_bit, farthest_squared, squared},
+    batch::{
+        BATCH, Task, batch_starts, batches_per_bit, cut, difference, farthest_squared, load, pick, spread, squared,
+    },
+    cells::{Cells, Run},
 };
 use crate::lanes::{HalfLanes, Real};
 
@@ -42,7 +41,7 @@ pub trait PairTerm<const D: usize, const IN: usize, const OUT: usize>: Sync {
 
     /// What a neighbour with the values `other` adds to the sums of a particle with the values `own`.
     ///
-    /// Mark it `#[inline(always)]`. It is also called for candidates too far to count, with the squared distance held to that of the
+    /// Mark it `#[inline(always)]`, and loop over arrays in place of `map`, whose closure would not become vector code. It is also called for candidates too far to count, with the squared distance held to that of the
     /// support radius; such a result is multiplied by 0, so it must be finite.
     fn term<R: Real>(&self, pair: &Pair<R, D>, own: &[R; IN], other: &[R; IN]) -> [R; OUT];
 }
@@ -68,30 +67,30 @@ impl<const D: usize> Cells<D> {
             values.resize(self.len(), 0.0);
             values.as_mut_slice()
         });
-        let level = Level::new();
-        let positions = self.positions();
-        let scratch = || (Gathered::<D>::new(), Gathered::<IN>::new());
-        Task::all(self, results).into_par_iter().for_each_init(scratch, |(places, values), mut task| {
-            self.visit(task.cells.clone(), |particles, runs| {
-                let results = task.take(particles.len());
-                dispatch!(level, simd => {
-                    places.fill(&positions, runs, -BEYOND);
-                    values.fill(&fields, runs, 0.0);
-                    let around = Around { cells: self, fields: &fields, runs, places, values };
-                    sum_cell(simd, term, &around, particles, results);
-                });
+        let mut slots: [Vec<f32>; IN] = std::array::from_fn(|_| Vec::new());
+        slots
+            .par_iter_mut()
+            .zip(fields)
+            .for_each(|(slots, field)| self.fill_slots(slots, 0.0, |particle| field[particle]));
+        let (level, slots) = (Level::new(), slots.each_ref().map(Vec::as_slice));
+        Task::all(self, results).into_par_iter().for_each_init(Vec::new, |starts, mut task| {
+            self.visit(task.cells.clone(), |own, runs| {
+                let results = task.take(own.particles.len());
+                batch_starts(runs, starts);
+                let around = Around { cells: self, positions: self.positions(), fields: slots, runs, starts };
+                dispatch!(level, simd => sum_cell(simd, term, &around, &own, results));
             });
         });
     }
 }
 
-/// What the sums of a cell read: its candidates, gathered.
+/// What the sums of a cell read: positions and fields by slot, and where in them its candidates are.
 struct Around<'a, const D: usize, const IN: usize> {
     cells: &'a Cells<D>,
-    fields: &'a [&'a [f32]; IN],
-    runs: &'a [Range<usize>],
-    places: &'a Gathered<D>,
-    values: &'a Gathered<IN>,
+    positions: [&'a [f32]; D],
+    fields: [&'a [f32]; IN],
+    runs: &'a [Run],
+    starts: &'a [usize],
 }
 
 /// Sums for all particles of a cell.
@@ -100,30 +99,34 @@ fn sum_cell<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
     around: &Around<'_, D, IN>,
-    particles: Range<usize>,
+    own: &Run,
     results: [&mut [f32]; OUT],
 ) where
     T: PairTerm<D, IN, OUT>,
 {
-    for (slot, i) in particles.enumerate() {
-        let (mut sums, coincident) = sum_one(simd, term, around, i);
+    let hits = &around.cells.hits()[own.particles.clone()];
+    for (number, hits) in hits.iter().enumerate() {
+        let (mut sums, coincident) = sum_one(simd, term, around, own.slot + number, *hits);
         if T::DIRECTED && coincident > 1.5 {
-            let more = sum_coincident(term, around, i);
-            sums = std::array::from_fn(|k| sums[k] + more[k]);
+            let more = sum_coincident(term, around, own, number);
+            for k in 0..OUT {
+                sums[k] += more[k];
+            }
         }
         for k in 0..OUT {
-            results[k][slot] = sums[k];
+            results[k][number] = sums[k];
         }
     }
 }
 
-/// Sums for one particle, and how many candidates coincide with it, itself included (counted for directed terms only).
+/// Sums for the particle in a slot, and how many candidates coincide with it, itself included (counted for directed terms only).
 #[inline(always)]
 fn sum_one<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
     around: &Around<'_, D, IN>,
-    i: usize,
+    slot: usize,
+    mut hits: u64,
 ) -> ([f32; OUT], f32)
 where
     T: PairTerm<D, IN, OUT>,
@@ -131,19 +134,17 @@ where
     let (zero, one) = (HalfLanes::splat(simd, 0.0), HalfLanes::splat(simd, 1.0));
     let farthest = zero.like(farthest_squared(around.cells));
     let nearest = zero.like(nearest_squared(around.cells.support_radius()));
-    let position = around.cells.positions().map(|component| zero.like(component[i]));
-    let own = around.fields.map(|field| zero.like(field[i]));
-    let mut sums = [zero; OUT];
-    let mut coincident = zero;
-    let per_bit = batches_per_bit(around.places.batches());
-    let mut hits = around.cells.hits()[i];
+    let slots = around.positions[0].len();
+    let (positions, fields) = (cut(around.positions, slots), cut(around.fields, slots));
+    let (position, own) = (spread(simd, pick(&positions, slot)), spread(simd, pick(&fields, slot)));
+    let (mut sums, mut coincident) = ([zero; OUT], zero);
+    let per_bit = batches_per_bit(around.starts.len());
     while hits != 0 {
         let first = hits.trailing_zeros() as usize * per_bit;
         hits &= hits - 1;
-        for batch in first..(first + per_bit).min(around.places.batches()) {
-            let theirs = around.places.batch(simd, batch);
-            let offset = std::array::from_fn(|c| position[c] - theirs[c]);
-            let squared = squared::<_, D>(&offset);
+        for start in &around.starts[first..(first + per_bit).min(around.starts.len())] {
+            let offset = difference(&position, &load(simd, &positions, *start));
+            let squared = squared(&offset);
             let mut counts = squared.choose(farthest, one, zero);
             let mut distance_squared = squared.least(farthest);
             if T::DIRECTED {
@@ -152,11 +153,17 @@ where
                 counts = counts - same;
                 distance_squared = distance_squared.greatest(nearest);
             }
-            let terms = term.term(&Pair { offset, distance_squared }, &own, &around.values.batch(simd, batch));
-            sums = std::array::from_fn(|k| terms[k].fused(counts, sums[k]));
+            let terms = term.term(&Pair { offset, distance_squared }, &own, &load(simd, &fields, *start));
+            for k in 0..OUT {
+                sums[k] = terms[k].fused(counts, sums[k]);
+            }
         }
     }
-    (sums.map(total), total(coincident))
+    let mut totals = [0.0; OUT];
+    for k in 0..OUT {
+        totals[k] = total(sums[k]);
+    }
+    (totals, total(coincident))
 }
 
 /// Squared distance below which particles coincide.
@@ -177,26 +184,29 @@ fn total<S: Simd>(batch: HalfLanes<S>) -> f32 {
     parts[0]
 }
 
-/// What others at the place of particle `i` add, each pushed aside by a hair in a direction that both agree on.
+/// What others at the place of the particle that is `number` in its cell add, each pushed aside by a hair in a direction that both
+/// agree on.
 #[inline(never)]
 fn sum_coincident<T, const D: usize, const IN: usize, const OUT: usize>(
     term: &T,
     around: &Around<'_, D, IN>,
-    i: usize,
+    own: &Run,
+    number: usize,
 ) -> [f32; OUT]
 where
     T: PairTerm<D, IN, OUT>,
 {
-    let (positions, ids) = (around.cells.positions(), around.cells.ids());
-    let support = around.cells.support_radius();
-    let values = around.fields.map(|field| field[i]);
+    let (support, ids) = (around.cells.support_radius(), around.cells.ids());
+    let (id, slot) = (ids[own.particles.start + number], own.slot + number);
+    let (position, values) = (pick(&around.positions, slot), pick(&around.fields, slot));
     let mut sums = [0.0; OUT];
-    for j in around.runs.iter().cloned().flatten().filter(|j| *j != i) {
-        let between: [f32; D] = positions.map(|component| component[i] - component[j]);
+    let candidates = around.runs.iter().flat_map(|run| run.particles.clone().zip(run.slot..));
+    for (other, other_slot) in candidates.filter(|candidate| candidate.1 != slot) {
+        let between = difference(&position, &pick(&around.positions, other_slot));
         if squared(&between) < nearest_squared(support) {
-            let offset = direction(ids[i], ids[j]).map(|component: f32| component * support * COINCIDENT);
+            let offset = direction(id, ids[other]).map(|component: f32| component * support * COINCIDENT);
             let pair = Pair { offset, distance_squared: squared(&offset) };
-            let terms = term.term(&pair, &values, &around.fields.map(|field| field[j]));
+            let terms = term.term(&pair, &values, &pick(&around.fields, other_slot));
             sums = std::array::from_fn(|k| sums[k] + terms[k]);
         }
     }
