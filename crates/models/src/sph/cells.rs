@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::batch::BATCH;
+use super::{batch::BATCH, stretch::Stretch};
 
 /// Cells further than this from the origin, in cells, are taken together; so a key of three axes fits 64 bits.
 const FARTHEST: i32 = 1 << 19;
@@ -17,7 +17,7 @@ const MARGIN: f32 = 1.001;
 /// Where particles are put that are farther away or nowhere; squares of such distances are still finite.
 pub(super) const BEYOND: f32 = 1e12;
 /// Particles that a task of the thread pool takes at least where little is done for each.
-const STRETCH: usize = 4096;
+const MANY: usize = 4096;
 /// Bits sorted by in one pass.
 const DIGIT_BITS: u32 = 11;
 
@@ -32,8 +32,7 @@ pub struct Cells<const D: usize> {
     /// Positions by slot.
     positions: [Vec<f32>; D],
     occupied: Vec<Cell>,
-    /// For each particle which batches of its candidates hold neighbours, see [`Cells::find_hits`].
-    hits: Vec<u64>,
+    stretches: Vec<Stretch>,
 }
 
 /// Particles that follow each other in slots: those of up to three cells of a row.
@@ -100,8 +99,8 @@ impl<const D: usize> Cells<D> {
         const { assert!(D == 2 || D == 3, "particles live in two or three dimensions") };
         let none = || std::array::from_fn(|_| Vec::new());
         let keys = Keys::new([0; D], [0; D]);
-        let (order, ids, occupied, hits) = Default::default();
-        Self { support_radius, keys, order, ids, positions: none(), occupied, hits }
+        let (order, ids, occupied, stretches) = Default::default();
+        Self { support_radius, keys, order, ids, positions: none(), occupied, stretches }
     }
 
     /// The distance from which on particles do not see each other.
@@ -125,14 +124,14 @@ impl<const D: usize> Cells<D> {
     /// Sorts particles by cell, then by birth id, and remembers where they are. [`Cells::reorder`] then brings arrays into that order.
     ///
     /// # Panics
-    /// If there are more than 2^32 - 1 of them, or positions and ids are not equally many.
+    /// If there are more than 2^28 of them, or positions and ids are not equally many.
     pub fn assign(&mut self, positions: [&[f32]; D], ids: &[u64]) {
-        assert!(u32::try_from(ids.len()).is_ok(), "particles are counted in 32 bits");
+        assert!(ids.len() <= 1 << 28, "slots are counted in 32 bits");
         assert!(positions.iter().all(|component| component.len() == ids.len()), "one position an id");
         let cell = cell_of(self.support_radius);
         let bounds = positions.map(|component| {
             let bound = |(low, high): (i32, i32), value: &f32| (low.min(cell(*value)), high.max(cell(*value)));
-            let bounds = component.par_iter().with_min_len(STRETCH).fold(|| (i32::MAX, i32::MIN), bound);
+            let bounds = component.par_iter().with_min_len(MANY).fold(|| (i32::MAX, i32::MIN), bound);
             bounds.reduce(|| (i32::MAX, i32::MIN), |a, b| (a.0.min(b.0), a.1.max(b.1)))
         });
         if ids.is_empty() {
@@ -142,7 +141,7 @@ impl<const D: usize> Cells<D> {
             self.keys = Keys::new(bounds.map(|bound| bound.0), bounds.map(|bound| bound.1));
             let keys = self.keys;
             let entry = |i: u32| (keys.key(positions.map(|component| cell(component[i as usize]))), i);
-            self.sort((0..ids.len() as u32).into_par_iter().with_min_len(STRETCH).map(entry).collect(), ids);
+            self.sort((0..ids.len() as u32).into_par_iter().with_min_len(MANY).map(entry).collect(), ids);
         }
         let within = |x: f32| if x.abs() < BEYOND { x } else { BEYOND };
         let mut slots = std::mem::replace(&mut self.positions, std::array::from_fn(|_| Vec::new()));
@@ -152,9 +151,9 @@ impl<const D: usize> Cells<D> {
         self.positions = slots;
         self.ids.clear();
         self.ids.extend(self.order.iter().map(|i| ids[*i as usize]));
-        let mut hits = std::mem::take(&mut self.hits);
-        self.find_hits(&mut hits);
-        self.hits = hits;
+        let mut stretches = std::mem::take(&mut self.stretches);
+        self.find_stretches(&mut stretches);
+        self.stretches = stretches;
     }
 
     /// Sorts by key, then by id, and lists the cells.
@@ -208,9 +207,15 @@ impl<const D: usize> Cells<D> {
         }
     }
 
-    /// For each particle which batches of its candidates hold neighbours.
-    pub(super) fn hits(&self) -> &[u64] {
-        &self.hits
+    /// All cells, in stretches.
+    pub(super) fn stretches(&self) -> &[Stretch] {
+        &self.stretches
+    }
+
+    /// The particle in a slot that is not empty.
+    pub(super) fn particle_in(&self, slot: usize) -> usize {
+        let cell = self.occupied[self.occupied.partition_point(|cell| cell.slot <= slot) - 1];
+        cell.start as usize + slot - cell.slot
     }
 
     /// Number of cells that hold particles.

@@ -29,6 +29,7 @@ mod mixing;
 mod particles;
 mod pressure;
 mod step;
+mod stretch;
 mod sum;
 #[cfg(test)]
 mod tests;

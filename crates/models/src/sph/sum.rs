@@ -12,10 +12,9 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
 use super::{
-    batch::{
-        BATCH, Task, batch_starts, batches_per_bit, cut, difference, farthest_squared, load, pick, spread, squared,
-    },
-    cells::{Cells, Run},
+    batch::{BATCH, cut, difference, load, pick, spread, squared},
+    cells::Cells,
+    stretch::{Group, Stretch},
 };
 use crate::lanes::{HalfLanes, Real};
 
@@ -72,49 +71,61 @@ impl<const D: usize> Cells<D> {
             .par_iter_mut()
             .zip(fields)
             .for_each(|(slots, field)| self.fill_slots(slots, 0.0, |particle| field[particle]));
-        let (level, slots) = (Level::new(), slots.each_ref().map(Vec::as_slice));
-        Task::all(self, results).into_par_iter().for_each_init(Vec::new, |starts, mut task| {
-            self.visit(task.cells.clone(), |own, runs| {
-                let results = task.take(own.particles.len());
-                batch_starts(runs, starts);
-                let around = Around { cells: self, positions: self.positions(), fields: slots, runs, starts };
-                dispatch!(level, simd => sum_cell(simd, term, &around, &own, results));
-            });
+        let (level, fields) = (Level::new(), slots.each_ref().map(Vec::as_slice));
+        let tasks = self.stretches().iter().zip(split(self.stretches(), results)).collect::<Vec<_>>();
+        tasks.into_par_iter().for_each(|(stretch, results)| {
+            let around = Around { cells: self, stretch, positions: self.positions(), fields };
+            dispatch!(level, simd => sum_stretch(simd, term, &around, results));
         });
     }
 }
 
-/// What the sums of a cell read: positions and fields by slot, and where in them its candidates are.
-struct Around<'a, const D: usize, const IN: usize> {
-    cells: &'a Cells<D>,
-    positions: [&'a [f32]; D],
-    fields: [&'a [f32]; IN],
-    runs: &'a [Run],
-    starts: &'a [usize],
+/// The part of each array that belongs to each stretch.
+fn split<'a, const OUT: usize>(
+    stretches: &[Stretch],
+    mut arrays: [&'a mut [f32]; OUT],
+) -> impl Iterator<Item = [&'a mut [f32]; OUT]> {
+    stretches.iter().map(move |stretch| {
+        arrays.each_mut().map(|values| {
+            let (head, tail) = std::mem::take(values).split_at_mut(stretch.len());
+            *values = tail;
+            head
+        })
+    })
 }
 
-/// Sums for all particles of a cell.
+/// What the sums of a stretch read: where its candidates are, and positions and fields by slot.
+struct Around<'a, const D: usize, const IN: usize> {
+    cells: &'a Cells<D>,
+    stretch: &'a Stretch,
+    positions: [&'a [f32]; D],
+    fields: [&'a [f32]; IN],
+}
+
+/// Sums for all particles of a stretch.
 #[inline(always)]
-fn sum_cell<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
+fn sum_stretch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
     around: &Around<'_, D, IN>,
-    own: &Run,
     results: [&mut [f32]; OUT],
 ) where
     T: PairTerm<D, IN, OUT>,
 {
-    let hits = &around.cells.hits()[own.particles.clone()];
-    for (number, hits) in hits.iter().enumerate() {
-        let (mut sums, coincident) = sum_one(simd, term, around, own.slot + number, *hits);
-        if T::DIRECTED && coincident > 1.5 {
-            let more = sum_coincident(term, around, own, number);
-            for k in 0..OUT {
-                sums[k] += more[k];
+    let mut index = 0;
+    for group in &around.stretch.groups {
+        for slot in group.slot..group.slot + group.particles.len() {
+            let (mut sums, coincident) = sum_one(simd, term, around, group, slot, around.stretch.hits[index]);
+            if T::DIRECTED && coincident > 1.5 {
+                let more = sum_coincident(term, around, group, slot);
+                for k in 0..OUT {
+                    sums[k] += more[k];
+                }
             }
-        }
-        for k in 0..OUT {
-            results[k][number] = sums[k];
+            for k in 0..OUT {
+                results[k][index] = sums[k];
+            }
+            index += 1;
         }
     }
 }
@@ -125,6 +136,7 @@ fn sum_one<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
     around: &Around<'_, D, IN>,
+    group: &Group,
     slot: usize,
     mut hits: u64,
 ) -> ([f32; OUT], f32)
@@ -132,18 +144,19 @@ where
     T: PairTerm<D, IN, OUT>,
 {
     let (zero, one) = (HalfLanes::splat(simd, 0.0), HalfLanes::splat(simd, 1.0));
-    let farthest = zero.like(farthest_squared(around.cells));
-    let nearest = zero.like(nearest_squared(around.cells.support_radius()));
+    let support = around.cells.support_radius();
+    let (farthest, nearest) = (zero.like(support * support), zero.like(nearest_squared(support)));
     let slots = around.positions[0].len();
     let (positions, fields) = (cut(around.positions, slots), cut(around.fields, slots));
     let (position, own) = (spread(simd, pick(&positions, slot)), spread(simd, pick(&fields, slot)));
     let (mut sums, mut coincident) = ([zero; OUT], zero);
-    let per_bit = batches_per_bit(around.starts.len());
+    let starts = &around.stretch.starts[group.starts.clone()];
     while hits != 0 {
-        let first = hits.trailing_zeros() as usize * per_bit;
+        let first = (hits.trailing_zeros() as usize) << group.bit_shift;
         hits &= hits - 1;
-        for start in &around.starts[first..(first + per_bit).min(around.starts.len())] {
-            let offset = difference(&position, &load(simd, &positions, *start));
+        for start in &starts[first..(first + (1 << group.bit_shift)).min(starts.len())] {
+            let start = *start as usize;
+            let offset = difference(&position, &load(simd, &positions, start));
             let squared = squared(&offset);
             let mut counts = squared.choose(farthest, one, zero);
             let mut distance_squared = squared.least(farthest);
@@ -153,7 +166,7 @@ where
                 counts = counts - same;
                 distance_squared = distance_squared.greatest(nearest);
             }
-            let terms = term.term(&Pair { offset, distance_squared }, &own, &load(simd, &fields, *start));
+            let terms = term.term(&Pair { offset, distance_squared }, &own, &load(simd, &fields, start));
             for k in 0..OUT {
                 sums[k] = terms[k].fused(counts, sums[k]);
             }
@@ -184,29 +197,28 @@ fn total<S: Simd>(batch: HalfLanes<S>) -> f32 {
     parts[0]
 }
 
-/// What others at the place of the particle that is `number` in its cell add, each pushed aside by a hair in a direction that both
-/// agree on.
+/// What others at the place of the particle in a slot add, each pushed aside by a hair in a direction that both agree on.
 #[inline(never)]
 fn sum_coincident<T, const D: usize, const IN: usize, const OUT: usize>(
     term: &T,
     around: &Around<'_, D, IN>,
-    own: &Run,
-    number: usize,
+    group: &Group,
+    slot: usize,
 ) -> [f32; OUT]
 where
     T: PairTerm<D, IN, OUT>,
 {
-    let (support, ids) = (around.cells.support_radius(), around.cells.ids());
-    let (id, slot) = (ids[own.particles.start + number], own.slot + number);
+    let support = around.cells.support_radius();
+    let id = |slot: usize| around.cells.ids()[around.cells.particle_in(slot)];
     let (position, values) = (pick(&around.positions, slot), pick(&around.fields, slot));
+    let starts = &around.stretch.starts[group.starts.clone()];
     let mut sums = [0.0; OUT];
-    let candidates = around.runs.iter().flat_map(|run| run.particles.clone().zip(run.slot..));
-    for (other, other_slot) in candidates.filter(|candidate| candidate.1 != slot) {
-        let between = difference(&position, &pick(&around.positions, other_slot));
+    for other in starts.iter().flat_map(|start| (*start as usize..).take(BATCH)).filter(|other| *other != slot) {
+        let between = difference(&position, &pick(&around.positions, other));
         if squared(&between) < nearest_squared(support) {
-            let offset = direction(id, ids[other]).map(|component: f32| component * support * COINCIDENT);
+            let offset = direction(id(slot), id(other)).map(|component: f32| component * support * COINCIDENT);
             let pair = Pair { offset, distance_squared: squared(&offset) };
-            let terms = term.term(&pair, &values, &pick(&around.fields, other_slot));
+            let terms = term.term(&pair, &values, &pick(&around.fields, other));
             sums = std::array::from_fn(|k| sums[k] + terms[k]);
         }
     }
