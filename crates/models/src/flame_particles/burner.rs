@@ -55,6 +55,8 @@ enum Area {
 pub(crate) struct Birthplace {
     pub(crate) position: DVec3,
     pub(crate) direction: DVec3,
+    /// How far it is from the middle of a disc or a strip: 0 there to 1 at the rim, a mean place elsewhere.
+    pub(crate) outward: f64,
 }
 
 impl Burner {
@@ -111,7 +113,13 @@ impl Burner {
     pub(crate) fn birthplace(&self, key: Key, birth: u64) -> Birthplace {
         let words = key.words(birth, 0, Purpose::named("birthplace"));
         let (position, direction) = self.local(words);
-        Birthplace { position: self.placement.to_world(position), direction: self.placement.turn(direction) }
+        let radius = 0.5 * self.parameters.diameter;
+        let outward = match self.area {
+            Area::Disc | Area::Ball => position.length() / radius,
+            Area::Strip => position.z.abs() / radius,
+            Area::Cuboid | Area::Surface(_) => std::f64::consts::FRAC_1_SQRT_2,
+        };
+        Birthplace { position: self.placement.to_world(position), direction: self.placement.turn(direction), outward }
     }
 
     /// Place and direction in the burner's own coordinates.

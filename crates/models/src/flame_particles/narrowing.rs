@@ -11,7 +11,7 @@ use super::burner::Burner;
 /// Layers of height.
 const LAYERS: usize = 24;
 /// Greatest speed at which gas draws together, as a share of the speed on the axis.
-const GREATEST_SHARE: f32 = 0.13;
+const GREATEST_SHARE: f32 = 0.2;
 
 /// The axis of one burner's gas.
 #[derive(Clone, Debug)]

@@ -131,7 +131,7 @@ bansho_base::parameters! {
         /// Entrainment coefficient: speed at which air enters the gas, as a share of the speed between them; slows, dilutes and cools it.
         entrainment: f64 = 0.12, limits(SHARE);
         /// How far rising gas that grows faster grows narrower too; 1 keeps its volume.
-        narrowing: f64 = 0.75, limits(SHARE);
+        narrowing: f64 = 0.9, limits(SHARE);
         /// Strength of the vortex rings that the fire sheds as it breathes; 1 is usual, 0 is a fire that does not puff.
         puffing: f64 = 1.0, limits(Range::new(0.0, 5.0));
         /// How often it sheds them; `"auto"` is `1.5 / sqrt(D)` Hz (Cetegen and Ahmed 1993).

@@ -5,7 +5,7 @@ use bansho_base::math::DVec3;
 use crate::sph::{Cells, retain};
 
 /// How many arrays of numbers there are.
-pub(crate) const NUMBERS: usize = 20;
+pub(crate) const NUMBERS: usize = 21;
 
 /// One particle, for pushing into [`Particles`] and for tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +45,8 @@ pub struct Particles {
     pub(crate) birthplace: [Vec<f32>; 3],
     /// The part of the velocity with which the air's own motion carries the particle, m/s.
     pub(crate) drift: [Vec<f32>; 3],
+    /// How fast it burns beside the mean.
+    pub(crate) hunger: Vec<f32>,
     /// Number of the burner it came from.
     pub(crate) burner: Vec<u32>,
     pub(crate) mass: Vec<f32>,
@@ -77,6 +79,7 @@ impl Particles {
     pub fn push(&mut self, particle: Particle) {
         self.birth.push(particle.birth);
         self.burner.push(0);
+        self.hunger.push(1.0);
         for axis in 0..3 {
             self.position[axis].push(particle.position[axis]);
             self.birthplace[axis].push(particle.position[axis]);
@@ -189,8 +192,8 @@ impl Particles {
     /// Every array of numbers, for what treats them all alike.
     pub(crate) fn numbers(&self) -> [&Vec<f32>; NUMBERS] {
         let Self { position: [x, y, z], velocity: [u, v, w], birthplace: [a, b, c], drift: [d, e, f], .. } = self;
-        let Self { mass, density, temperature, support_radius, age, life, fuel, soot, .. } = self;
-        [x, y, z, u, v, w, a, b, c, d, e, f, mass, density, temperature, support_radius, age, life, fuel, soot]
+        let Self { hunger, mass, density, temperature, support_radius, age, life, fuel, soot, .. } = self;
+        [x, y, z, u, v, w, a, b, c, d, e, f, hunger, mass, density, temperature, support_radius, age, life, fuel, soot]
     }
 
     /// As [`numbers`](Self::numbers), to change them.
@@ -200,6 +203,7 @@ impl Particles {
             velocity: [u, v, w],
             birthplace: [a, b, c],
             drift: [d, e, f],
+            hunger,
             mass,
             density,
             temperature,
@@ -210,7 +214,7 @@ impl Particles {
             soot,
             ..
         } = self;
-        [x, y, z, u, v, w, a, b, c, d, e, f, mass, density, temperature, support_radius, age, life, fuel, soot]
+        [x, y, z, u, v, w, a, b, c, d, e, f, hunger, mass, density, temperature, support_radius, age, life, fuel, soot]
     }
 
     fn scalars_mut(&mut self) -> [&mut Vec<f32>; 8] {

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     beside::Beside,
-    births,
+    births::Births,
     collision::keep_out,
     design::Design,
     life::{Being, Exposure, Laws},
@@ -86,8 +86,9 @@ impl Simulation {
 
     /// Steps from `time` to `seconds` later.
     pub(crate) fn step(&mut self, time: f64, seconds: f64, around: &Surroundings) {
-        let afterlife_s = self.parameters.life.afterlife_s;
-        births::add(&mut self.particles, &self.design, afterlife_s, self.key, time, seconds);
+        let Self { design, turbulence, key, parameters, particles, .. } = self;
+        let afterlife_s = parameters.life.afterlife_s;
+        Births { design, turbulence, key: *key, afterlife_s }.add(particles, time, seconds);
         let parts = self.sub_steps(seconds as f32);
         for part in 0..parts {
             let share = seconds / f64::from(parts);
@@ -203,7 +204,7 @@ impl Mover<'_> {
         let exposure = Exposure {
             to_air,
             mixing,
-            burning: draught.burning[0] * total.length() + draught.burning[1],
+            burning: particles.hunger[index] * (draught.burning[0] * total.length() + draught.burning[1]),
             density: weather.density_kelvin / temperature.max(1.0),
             air_temperature: weather.air_temperature,
             smallest_radius: radius,

@@ -44,6 +44,12 @@ impl Turbulence {
         Self { tile }
     }
 
+    /// A number of mean 0 and standard deviation 1 that changes over a unit of `place`.
+    pub(crate) fn patch(&self, place: DVec3) -> f32 {
+        let place = (place * (SIDE as f64 / f64::from(EDDIES))).rem_euclid(DVec3::splat(SIDE as f64));
+        sample(&self.tile, place.as_vec3()).x
+    }
+
     /// The eddies at time `t`, the largest `eddy_size` m wide, rising in gas of `speed` and drifting with the wind's `drift` since time 0.
     pub(crate) fn at(&self, t: f64, eddy_size: f64, speed: f64, drift: DVec3) -> Eddies<'_> {
         let layer = |index: usize| {
@@ -61,23 +67,23 @@ impl Eddies<'_> {
     /// Velocity at `place`, m from the flame's position, of standard deviation 1 a component.
     #[inline(always)]
     pub(crate) fn velocity(&self, place: Vec3) -> Vec3 {
-        let [first, second] = self.layers.map(|(scale, origin)| self.sample(place * scale + origin));
+        let [first, second] = self.layers.map(|(scale, origin)| sample(self.tile, place * scale + origin));
         first * LAYER_SHARE[0] + second * LAYER_SHARE[1]
     }
+}
 
-    /// The tile at a place in grid points, straight between them.
-    #[inline(always)]
-    fn sample(&self, place: Vec3) -> Vec3 {
-        let floor = place.floor();
-        let f = place - floor;
-        let cell = floor.as_ivec3();
-        let wrap = |coordinate: i32, step: i32| (coordinate.wrapping_add(step) & (SIDE as i32 - 1)) as usize;
-        let row = |j: i32, k: i32| {
-            let start = (wrap(cell.z, k) * SIDE + wrap(cell.y, j)) * SIDE;
-            self.tile[start + wrap(cell.x, 0)].lerp(self.tile[start + wrap(cell.x, 1)], f.x)
-        };
-        row(0, 0).lerp(row(1, 0), f.y).lerp(row(0, 1).lerp(row(1, 1), f.y), f.z)
-    }
+/// A tile at a place in grid points, straight between them.
+#[inline(always)]
+fn sample(tile: &[Vec3], place: Vec3) -> Vec3 {
+    let floor = place.floor();
+    let f = place - floor;
+    let cell = floor.as_ivec3();
+    let wrap = |coordinate: i32, step: i32| (coordinate.wrapping_add(step) & (SIDE as i32 - 1)) as usize;
+    let row = |j: i32, k: i32| {
+        let start = (wrap(cell.z, k) * SIDE + wrap(cell.y, j)) * SIDE;
+        tile[start + wrap(cell.x, 0)].lerp(tile[start + wrap(cell.x, 1)], f.x)
+    };
+    row(0, 0).lerp(row(1, 0), f.y).lerp(row(0, 1).lerp(row(1, 1), f.y), f.z)
 }
 
 /// One potential on the grid.
