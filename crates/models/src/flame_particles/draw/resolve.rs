@@ -193,6 +193,7 @@ impl Resolve<'_> {
         let [tau, glow, heat, ..] = &sums.planes;
         let (mut depth_factor, mut heat_factor) = ([1.0; LANES], [1.0; LANES]);
         if let Some(detail) = self.detail
+            && !detail.is_lost(tau)
             && let Some(places) = self.places(sums, detail, layer, x, y)
         {
             Burning { depth: depth_factor, heat: heat_factor } = detail.burning(&places, tau);

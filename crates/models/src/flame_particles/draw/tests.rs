@@ -135,7 +135,8 @@ fn all_the_light_of_a_thin_ball_arrives() {
     let view = view(camera());
     let scale = view.camera.focal_pixels / DISTANCE;
     let strip = drawn(&cloud([ball(0, [0.11, 0.07, 0.0], 1800.0, 1e-8)]), &smooth(), &view, 0, None);
-    let sum: f64 = (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y))).map(|(x, y)| luminance(&strip, x, y)).sum();
+    let sum: f64 =
+        (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y))).map(|(x, y)| luminance(&strip, x, y)).sum();
     let intensity = black(1800.0) * 0.001 * soot_absorption(1e-8, &smooth());
     assert!((sum / (scale * scale) / intensity - 1.0).abs() < 5e-3, "{}", sum / (scale * scale) / intensity);
 }
@@ -254,9 +255,9 @@ fn no_lens_and_no_place_of_the_camera_is_too_much() {
                 assert!(finite, "{lens:?} {position:?} {sprite:?}");
                 assert!(strip.radiance[0].iter().any(|value| *value > 0.0), "{lens:?} {position:?} {sprite:?}");
                 prepared(&particles, &look, &view, |prepared| {
-                    let finite = prepared.deflection().is_none_or(|bend| {
-                        bend.angle.pixels().iter().flatten().all(|value| value.is_finite())
-                    });
+                    let finite = prepared
+                        .deflection()
+                        .is_none_or(|bend| bend.angle.pixels().iter().flatten().all(|value| value.is_finite()));
                     assert!(finite, "{lens:?} {position:?}");
                 });
             }
@@ -274,7 +275,8 @@ fn strips_crops_and_threads_change_no_bit() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             prepared(&particles, &look, &view, |prepared| {
-                for rect in [Rect { x: 0, y: 40, width: 160, height: 8 }, Rect { x: 67, y: 51, width: 31, height: 23 }] {
+                for rect in [Rect { x: 0, y: 40, width: 160, height: 8 }, Rect { x: 67, y: 51, width: 31, height: 23 }]
+                {
                     let mut strip = Strip::default();
                     strip.reset(rect, None, 0);
                     prepared.draw(&DepthInterval::ALL, &mut strip);
