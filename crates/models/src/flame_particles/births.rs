@@ -19,7 +19,7 @@ const SPEED_SPREAD: f32 = 0.3;
 /// Speed beside the mean in the middle of the burner, and how much less it is at the rim.
 const SPEED_PROFILE: [f64; 2] = [1.25, 0.5];
 /// How fast gas from the middle burns beside the mean, and how much faster gas from the rim, which finds air first.
-const HUNGER_PROFILE: [f64; 2] = [0.7, 0.65];
+const HUNGER_PROFILE: [f64; 2] = [0.62, 0.9];
 /// How unevenly patches of gas burn, which makes tongues.
 const PATCHES: f64 = 0.3;
 /// Size of those patches, in diameters.
