@@ -11,7 +11,7 @@ use bansho_base::{
     canvas::{DepthInterval, Shutter, Strip, View},
     color,
     image::Rect,
-    math::{DVec2, DVec3},
+    math::{self, DVec2, DVec3},
     observer::Unobserved,
     phenomenon::Prepared,
     random::Key,
@@ -106,7 +106,7 @@ fn gas_720p(criterion: &mut Criterion) {
     group.bench_function("naive sums", |bencher| {
         bencher.iter(|| {
             naive(&particles, &view, |index, [u, v], radius| {
-                let tau = line_integral(u.hypot(v), radius)
+                let tau = line_integral(math::hypot(u, v), radius)
                     * volume(index)
                     * soot_absorption(f64::from(particles.soots()[index]), &look);
                 let [red, green, blue] = color::black_body().radiance(particles.temperatures()[index]).map(f64::from);
@@ -118,13 +118,15 @@ fn gas_720p(criterion: &mut Criterion) {
     let clear = LookParameters { soot_gain: 0.0, base_blue: 0.0, ..look.clone() };
     group.bench_function("haze", |bencher| {
         bencher.iter(|| {
-            prepared(&particles, &clear, &view, |prepared| drop(black_box(prepared.deflection().map(|b| b.depth))))
+            prepared(&particles, &clear, &view, |prepared| {
+                black_box(prepared.deflection().map(|bend| bend.depth));
+            })
         });
     });
     group.bench_function("naive haze", |bencher| {
         bencher.iter(|| {
             naive(&particles, &view, |index, [u, v], radius| {
-                let b = u.hypot(v).max(1e-9);
+                let b = math::hypot(u, v).max(1e-9);
                 let slope = line_gradient(b, radius) * volume(index) / b;
                 [slope * u, slope * v]
             });

@@ -21,8 +21,8 @@ const FULLEST: f32 = 2.5;
 const HALF_BURNING: f64 = 0.42;
 /// By how much more detail extends upward than sideways around a lone particle.
 const UPRIGHT: f64 = 0.45;
-/// How much hotter, as a share, gas burns where it burns most.
-const HEAT: f32 = 0.025;
+/// How much hotter, as a share, gas looks where it burns most. Its luminance stays.
+const HEAT: f32 = 0.03;
 
 /// Detail of one flame in one frame.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use bansho_base::{
     canvas::{DepthInterval, Shutter, Strip, View},
     color,
     image::Rect,
-    math::{DVec2, DVec3},
+    math::{self, DVec2, DVec3},
     observer::Unobserved,
     phenomenon::Prepared,
     random::{Key, Purpose},
@@ -118,12 +118,13 @@ fn a_ball_of_gas_shines_as_kirchhoffs_law_and_its_line_integral_say() {
         let strip = drawn(&cloud([ball(0, [0.0; 3], 1800.0, soot)]), &smooth(), &view, 0, None);
         let absorption = soot_absorption(f64::from(soot), &smooth());
         for x in [80, 84, 88, 92, 96] {
-            let b = (f64::from(x as u32) + 0.5 - 80.0).hypot(0.5) / pixels_per_metre;
+            let b = math::hypot(f64::from(x as u32) + 0.5 - 80.0, 0.5) / pixels_per_metre;
             let depth = line_integral(b, 0.3) * 0.001 * absorption;
-            let expected = black(1800.0) * -(-depth).exp_m1();
-            let peak = black(1800.0) * -(-LINE_PEAK / 0.09 * 0.001 * absorption).exp_m1();
+            let expected = black(1800.0) * -math::exp_m1(-depth);
             let got = luminance(&strip, x, 60);
-            assert!((got - expected).abs() < 0.03 * peak, "soot {soot}, column {x}: {got} for {expected}");
+            // The grid is exact to a few hundredths of the depth in the middle; this is what that makes of the light.
+            let off = 0.035 * LINE_PEAK / 0.09 * 0.001 * absorption * math::exp(-depth) * black(1800.0);
+            assert!((got - expected).abs() < off + 1e-3 * expected, "soot {soot}, column {x}: {got} for {expected}");
         }
         let alpha = 1.0 - f64::from(strip.transmittance(60 * SIZE[0] + 80)[0]);
         assert!((alpha * black(1800.0) / luminance(&strip, 80, 60) - 1.0).abs() < 1e-4, "emission follows absorption");
@@ -171,8 +172,9 @@ fn detail_keeps_the_mean_light() {
         let strip = drawn(&particles, look, &view, 0, None);
         strip.radiance[1].iter().map(|value| f64::from(*value)).sum::<f64>()
     };
-    let (plain, fine) = (mean(&smooth()), mean(&LookParameters { detail: 1.0, ..LookParameters::default() }));
-    assert!((fine / plain - 1.0).abs() < 0.12, "{}", fine / plain);
+    let (plain, fine) =
+        (mean(&smooth()), mean(&LookParameters { detail: 1.0, detail_size: 0.25, ..LookParameters::default() }));
+    assert!((fine / plain - 1.0).abs() < 0.1, "{}", fine / plain);
 }
 
 #[test]
@@ -183,7 +185,7 @@ fn no_sprite_is_a_disc() {
     let radius = 0.5 * 0.3 * view.camera.focal_pixels / DISTANCE;
     let around: Vec<f64> = (0..48)
         .map(|i| {
-            let (sin, cos) = bansho_base::math::sin_cos(f64::from(i) / 48.0 * std::f64::consts::TAU);
+            let (sin, cos) = math::sin_cos(f64::from(i) / 48.0 * std::f64::consts::TAU);
             luminance(&strip, (80.0 + radius * cos) as usize, (60.0 + radius * sin) as usize)
         })
         .collect();
@@ -204,10 +206,11 @@ fn haze_bends_by_the_gradient_of_the_path_and_only_around_the_gas() {
         let peak = weight * line_gradient(0.12, 0.3);
         for x in [82, 86, 90, 94, 98] {
             let b = (x as f64 + 0.5 - 80.0) / scale;
-            let expected = weight * line_gradient(b.hypot(0.5 / scale), 0.3) * b / b.hypot(0.5 / scale);
+            let distance = math::hypot(b, 0.5 / scale);
+            let expected = weight * line_gradient(distance, 0.3) * b / distance;
             let got = f64::from(at(x, 60)[0]);
             assert!(expected > 0.0, "light bends outward, to the denser air");
-            assert!((got - expected).abs() < 0.06 * peak.abs(), "column {x}: {got} for {expected}");
+            assert!((got - expected).abs() < 0.03 * peak.abs(), "column {x}: {got} for {expected}");
             assert!((f64::from(at(159 - x, 60)[0]) + got).abs() < 0.05 * peak.abs(), "both sides alike");
         }
         assert!(f64::from(at(80, 50)[1]) > 0.0 && f64::from(at(80, 70)[1]) < 0.0, "upward above, downward below");
@@ -251,8 +254,9 @@ fn no_lens_and_no_place_of_the_camera_is_too_much() {
                 let look = LookParameters { sprite, ..LookParameters::default() };
                 let view = view(camera.clone());
                 let strip = drawn(&particles, &look, &view, AOVS.len(), None);
-                let finite = strip.radiance.iter().flatten().all(|value| value.is_finite() && *value >= -1e-3);
-                assert!(finite, "{lens:?} {position:?} {sprite:?}");
+                let finite = strip.radiance.iter().flatten().all(|value| value.is_finite());
+                let dark = (0..strip.len()).map(|i| luminance(&strip, i % SIZE[0], i / SIZE[0])).fold(0.0, f64::min);
+                assert!(finite && dark >= 0.0, "{lens:?} {position:?} {sprite:?}: {dark}");
                 assert!(strip.radiance[0].iter().any(|value| *value > 0.0), "{lens:?} {position:?} {sprite:?}");
                 prepared(&particles, &look, &view, |prepared| {
                     let finite = prepared
@@ -311,7 +315,7 @@ fn aovs_measure_temperature_depth_and_motion() {
     };
     assert!((at("temperature_k") - 1640.0).abs() < 0.5);
     let depth = LINE_PEAK / 0.09 * 0.001 * soot_absorption(1e-7, &smooth());
-    assert!((at("optical_depth") / depth - 1.0).abs() < 0.03);
+    assert!((at("optical_depth") / depth - 1.0).abs() < 0.05, "{} for {depth}", at("optical_depth"));
     let pixels = 0.04 * view.camera.focal_pixels / DISTANCE;
     assert!((at("motion.X") - 2.0 * pixels).abs() < 1e-3 && (at("motion.Y") + pixels).abs() < 1e-3);
 }
@@ -323,10 +327,10 @@ fn motion_smears_the_sprite_along_its_way_and_loses_no_light() {
     let open = View::new(camera(), Shutter { open: 0.99, close: 1.01 }, 1.04, SIZE, 0);
     let smeared = drawn(&cloud([fast]), &smooth(), &open, 0, None);
     let variance = |strip: &Strip| {
-        let row = &strip.radiance[0][60 * SIZE[0]..][..SIZE[0]];
-        let sum: f64 = row.iter().map(|value| f64::from(*value)).sum();
-        let each = row.iter().enumerate();
-        each.map(|(x, value)| f64::from(*value) * (x as f64 - 79.5) * (x as f64 - 79.5)).sum::<f64>() / sum
+        let square = |index: usize| (index % SIZE[0]) as f64 - 79.5;
+        let light = || strip.radiance[0].iter().map(|value| f64::from(*value)).enumerate();
+        light().map(|(index, value)| value * square(index) * square(index)).sum::<f64>()
+            / light().map(|(_, value)| value).sum::<f64>()
     };
     let length = 0.4 * open.camera.focal_pixels / DISTANCE;
     let grown = variance(&smeared) - variance(&still);
