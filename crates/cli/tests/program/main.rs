@@ -5,6 +5,7 @@ mod commands;
 mod disk;
 mod flipbook;
 mod interruptions;
+mod particles;
 mod pictures;
 mod rooms;
 mod support;

@@ -7,7 +7,7 @@ const LIFE: f64 = 1.1;
 const DENSITY: f64 = 0.2;
 
 /// `count` particles of a plume `height` m high at time `t`: born over a disc, drawn inward as they speed up, swaying as they rise.
-pub fn plume(count: usize, height: f64, t: f64) -> Particles {
+pub(crate) fn plume(count: usize, height: f64, t: f64) -> Particles {
     let mut particles = Particles::new(DVec3::ZERO);
     let rate = count as f64 / LIFE;
     let last = (t * rate).floor() as i64;

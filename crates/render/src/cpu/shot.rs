@@ -61,7 +61,9 @@ impl CpuShot {
         drop(preparing);
         let _stage = StageGuard::begin(observer, Stage::Draw);
         observer::check(observer)?;
-        let bends = prepared.iter().any(|prepared| prepared.deflection().is_some());
+        // Where nothing lies behind, nothing is bent.
+        let behind = plate.colour.is_some() || self.phenomena.len() > 1;
+        let bends = behind && prepared.iter().any(|prepared| prepared.deflection().is_some());
         if bends && view.window != Rect::of_size(view.size[0], view.size[1]) {
             return Ok(None);
         }

@@ -21,8 +21,8 @@ const FULLEST: f32 = 2.5;
 const HALF_BURNING: f64 = 0.42;
 /// By how much more detail extends upward than sideways around a lone particle.
 const UPRIGHT: f64 = 0.45;
-/// How much hotter, as a share, gas burns where it burns most.
-const HEAT: f32 = 0.025;
+/// How much hotter, as a share, gas looks where it burns most. Its luminance stays.
+const HEAT: f32 = 0.03;
 
 /// Detail of one flame in one frame.
 #[derive(Clone, Debug)]
@@ -99,7 +99,7 @@ impl Detail {
             rate,
             base: [0.0, -moved, 0.0].map(Coordinate::from_f64),
             shift: shift.map(|s| s as f32),
-            moments: length.ceil().clamp(1.0, 6.0) as usize,
+            moments: length.round().clamp(1.0, 6.0) as usize,
             per_depth: (1.0 / (HALF_BURNING * scale.absorption * scale.radius)) as f32,
             sharpness: (1.0 / softness) as f32,
             keep: (1.0 / (1.0 + softness * softness).sqrt()) as f32,
@@ -117,6 +117,18 @@ impl Detail {
             let age = f64::from(particles.age[index]) + since;
             if axis == 1 { carried + (self.rate * age) as f32 } else { carried }
         })
+    }
+
+    /// Whether so little gas is at sixteen places that detail could not be seen in it.
+    #[inline(always)]
+    pub(crate) fn is_lost(&self, tau: &[f32; LANES]) -> bool {
+        /// Optical depth beside that at which half of the place burns.
+        const LITTLE: f32 = 0.01;
+        let mut most = 0.0_f32;
+        for lane in 0..LANES {
+            most = most.max(tau[lane]);
+        }
+        most * self.per_depth < LITTLE
     }
 
     /// What burns at sixteen places of the noise, where the smooth optical depth is `tau`.

@@ -13,7 +13,7 @@ use super::{
     kernel::Profile,
     look::LookParameters,
     measure::DEFLECTION,
-    splat::{Sheet, Sprite, splat},
+    splat::{FINE, Sheet, Sprite, splat},
     sprite::seen,
 };
 
@@ -47,7 +47,8 @@ impl Haze {
             Sprite { ellipse: seen.ellipse, layer: 0, split: 0.0, values: [(path * f64::from(seen.scale)) as f32] }
         };
         let sprites: Vec<Sprite<1>> = shown.iter().map(sprite).collect();
-        let grid = splat(&Sheet { profile: Profile::LINE, layers: 1, window: view.window }, &sprites)?;
+        let grid =
+            splat(&Sheet { profile: Profile::LINE, least_radius: FINE, layers: 1, window: view.window }, &sprites)?;
         Some(Self::from_paths(&grid, view.window))
     }
 

@@ -53,7 +53,7 @@ mod tests {
     /// Poly6, eq. (2).
     fn poly6(r: f64, d: f64) -> f64 {
         let s = (d * d - r * r).max(0.0);
-        315.0 / (64.0 * PI * d.powi(9)) * s * s * s
+        315.0 / (64.0 * PI * bansho_base::math::pow(d, 9.0)) * s * s * s
     }
 
     #[test]

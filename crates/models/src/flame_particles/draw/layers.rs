@@ -13,7 +13,7 @@ pub(crate) struct Layers {
 }
 
 /// Most layers of a flame.
-pub(crate) const MOST_LAYERS: usize = 5;
+pub(crate) const MOST_LAYERS: usize = 4;
 
 impl Layers {
     /// Layers that hold the bulk of particles of these depths and shares of the whole; what lies further out joins the outermost.

@@ -11,7 +11,7 @@ use super::{
     kernel::Profile,
     look::LookParameters,
     resolve::{Extents, GLOW, HEAT, Layer, Resolve, Row, TAU},
-    splat::{Sheet, Sprite, splat},
+    splat::{COARSE, Sheet, Sprite, splat},
     sprite::seen,
 };
 
@@ -77,7 +77,8 @@ impl Motion {
             Sprite { ellipse: seen.ellipse, layer: 0, split: 0.0, values }
         };
         let sprites: Vec<Sprite<3>> = shown.iter().map(sprite).collect();
-        let grid = splat(&Sheet { profile: Profile::LINE, layers: 1, window: view.window }, &sprites)?;
+        let grid =
+            splat(&Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, window: view.window }, &sprites)?;
         Some(Self { weights: grid.cells.weights(), grid })
     }
 

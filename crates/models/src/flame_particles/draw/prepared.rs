@@ -27,7 +27,7 @@ use super::{
     look::{LookParameters, Sprite as Choice},
     measure::Motion,
     resolve::{BLUE, Extents, GLOW, HEAT, Layer, MATTER, PLANES, Resolve, TAU},
-    splat::{Sheet, Sprite, splat},
+    splat::{COARSE, Sheet, Sprite, splat},
     sprite::{Seen, seen},
     squares::Squares,
 };
@@ -187,7 +187,7 @@ fn sums(gas: &Gas, look: &LookParameters, view: &View, layers: &Layers, surround
     };
     let sprites: Vec<Sprite<PLANES>> = shown.iter().map(sprite).collect();
     let profile = if look.sprite == Choice::Poly6 { Profile::POLY6 } else { Profile::LINE };
-    let grid = splat(&Sheet { profile, layers: layers.count, window: view.window }, &sprites)?;
+    let grid = splat(&Sheet { profile, least_radius: COARSE, layers: layers.count, window: view.window }, &sprites)?;
     let extents = Extents::new(&grid, layers.count);
     let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.centre(layer), surroundings));
     Some(Sums {

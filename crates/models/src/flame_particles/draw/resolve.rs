@@ -193,6 +193,7 @@ impl Resolve<'_> {
         let [tau, glow, heat, ..] = &sums.planes;
         let (mut depth_factor, mut heat_factor) = ([1.0; LANES], [1.0; LANES]);
         if let Some(detail) = self.detail
+            && !detail.is_lost(tau)
             && let Some(places) = self.places(sums, detail, layer, x, y)
         {
             Burning { depth: depth_factor, heat: heat_factor } = detail.burning(&places, tau);
@@ -207,11 +208,9 @@ impl Resolve<'_> {
         }
         for lane in 0..LANES {
             if glow[lane] > 0.0 && tau[lane] > 0.0 {
-                let temperature = heat[lane] / glow[lane];
-                let mean = color::luminance(table.radiance(temperature));
-                let hue = table.radiance(temperature * heat_factor[lane]);
-                // The sum's luminance is exact; its colour is that of its own mean temperature.
-                let factor = emitting[lane] * glow[lane] / (tau[lane] * mean.max(1e-20));
+                let hue = table.radiance(heat[lane] / glow[lane] * heat_factor[lane]);
+                // The sum's luminance is exact; its colour is that of its mean temperature, a little hotter where it burns most.
+                let factor = emitting[lane] * glow[lane] / (tau[lane] * color::luminance(hue).max(1e-20));
                 for c in 0..3 {
                     planes[c][lane] = hue[c] * factor;
                 }

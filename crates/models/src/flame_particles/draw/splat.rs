@@ -16,9 +16,10 @@ use super::{
 
 /// The weights of sixteen cells are found at a time; a round sprite is never wider.
 const LANES: usize = 16;
-/// Least radius of a sprite in cells, for which cubic interpolation is exact to a few hundredths of a lone sprite's peak, and to a
-/// few thousandths of a sum of many.
-const LEAST_RADIUS: f32 = 3.25;
+/// Least radius of a sprite in cells for sums, for which cubic interpolation is exact to a few hundredths of a lone sprite's peak.
+pub(crate) const COARSE: f32 = 3.25;
+/// Least radius of a sprite in cells for slopes, which are as exact as that only on a finer grid.
+pub(crate) const FINE: f32 = 6.5;
 /// Rows of one task.
 const BAND: usize = 8;
 /// Coarsest grid: cells of 4096 pixels.
@@ -37,6 +38,8 @@ pub(crate) struct Sprite<const P: usize> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sheet {
     pub(crate) profile: Profile,
+    /// Least radius of a sprite in cells; smaller sprites are widened to it on the finest grid.
+    pub(crate) least_radius: f32,
     pub(crate) layers: usize,
     /// The part of the picture that is drawn.
     pub(crate) window: Rect,
@@ -45,10 +48,10 @@ pub(crate) struct Sheet {
 /// The sums of all sprites, on the finest grid that any of them needs; `None` where none is seen.
 pub(crate) fn splat<const P: usize>(sheet: &Sheet, sprites: &[Sprite<P>]) -> Option<Grid> {
     let rect = covered(sprites, sheet.window)?;
-    let finest = finest_level(sprites);
+    let finest = finest_level(sheet, sprites);
     let mut by_level: Vec<Vec<u32>> = vec![Vec::new(); COARSEST as usize + 1];
     for (index, sprite) in sprites.iter().enumerate() {
-        by_level[level_of(sprite.ellipse.radius).max(finest) as usize].push(index as u32);
+        by_level[sheet.level_of(sprite.ellipse.radius).max(finest) as usize].push(index as u32);
     }
     let mut coarser: Option<Grid> = None;
     for level in (finest..=COARSEST).rev() {
@@ -66,20 +69,22 @@ pub(crate) fn splat<const P: usize>(sheet: &Sheet, sprites: &[Sprite<P>]) -> Opt
     coarser
 }
 
-/// The level whose cells are just fine enough.
-fn level_of(radius: f32) -> u32 {
-    let octaves = lanes::log2((radius / LEAST_RADIUS).max(1.0));
-    (octaves as u32).min(COARSEST)
+impl Sheet {
+    /// The level whose cells are just fine enough.
+    fn level_of(&self, radius: f32) -> u32 {
+        let octaves = lanes::log2((radius / self.least_radius).max(1.0));
+        (octaves as u32).min(COARSEST)
+    }
 }
 
 /// The level that suits all but the smallest sprites; those are widened to it.
 ///
 /// A few far particles would otherwise buy a fine grid of the whole flame.
-fn finest_level<const P: usize>(sprites: &[Sprite<P>]) -> u32 {
+fn finest_level<const P: usize>(sheet: &Sheet, sprites: &[Sprite<P>]) -> u32 {
     /// Share of the sprites that may be finer.
     const FINER: usize = 50;
     let mut counts = [0_usize; COARSEST as usize + 1];
-    sprites.iter().for_each(|sprite| counts[level_of(sprite.ellipse.radius) as usize] += 1);
+    sprites.iter().for_each(|sprite| counts[sheet.level_of(sprite.ellipse.radius) as usize] += 1);
     let mut finer = 0;
     for (level, count) in counts.iter().enumerate() {
         finer += count;
@@ -119,9 +124,9 @@ struct Placed {
 
 impl Placed {
     #[inline(always)]
-    fn new(ellipse: &Ellipse, cells: &Cells) -> Self {
+    fn new(sheet: &Sheet, ellipse: &Ellipse, cells: &Cells) -> Self {
         let cell = cells.size() as f32;
-        let growth = (LEAST_RADIUS * cell / ellipse.radius.max(1e-3)).max(1.0);
+        let growth = (sheet.least_radius * cell / ellipse.radius.max(1e-3)).max(1.0);
         let scale = cell * cell / (growth * growth);
         let centre = cells.place(ellipse.centre);
         let reach = ellipse.reach[1] * growth / cell;
@@ -135,8 +140,11 @@ impl Placed {
 fn add_sprites<const P: usize>(sheet: &Sheet, sprites: &[Sprite<P>], members: &[u32], grid: &mut Grid) {
     let cells = grid.cells;
     let bands = cells.rows.div_ceil(BAND);
-    let placed: Vec<Placed> =
-        members.par_iter().with_min_len(4096).map(|&i| Placed::new(&sprites[i as usize].ellipse, &cells)).collect();
+    let placed: Vec<Placed> = members
+        .par_iter()
+        .with_min_len(4096)
+        .map(|&i| Placed::new(sheet, &sprites[i as usize].ellipse, &cells))
+        .collect();
     let bins = Bins::new(bands, placed.iter().map(|placed| placed.rows));
     let row = grid.row_length();
     let level = Level::new();
@@ -203,6 +211,13 @@ fn add_row<const P: usize>(sheet: &Sheet, placed: &Placed, sprite: &Sprite<P>, y
 /// Adds a sprite to a run of cells with their weights.
 #[inline(always)]
 fn add_cells<const P: usize>(cells: &mut [f32], depth: usize, sprite: &Sprite<P>, weights: &[f32; LANES]) {
+    if depth == 1 {
+        // One value a cell: the cells themselves fill the vector.
+        for (cell, weight) in cells.iter_mut().zip(weights) {
+            *cell = sprite.values[0].mul_add(*weight, *cell);
+        }
+        return;
+    }
     let (mut own, mut next) = (sprite.values, sprite.values);
     for i in 0..P {
         own[i] *= 1.0 - sprite.split;
