@@ -63,14 +63,19 @@ impl Wind {
         DVec3::from(self.parameters.velocity.at(t))
     }
 
+    /// How far the mean wind has carried the air since time 0, m.
+    pub fn drift(&self, t: f64) -> DVec3 {
+        DVec3::from(self.parameters.velocity.integral(0.0, t))
+    }
+
     /// Velocity at a point at time `t`, gusts included, m/s.
     pub fn at(&self, point: DVec3, t: f64) -> DVec3 {
         let mean = self.mean(t);
         let strength = self.parameters.gust * mean.length();
         let Some(gusts) = self.gusts.as_ref().filter(|_| strength > 0.0) else { return mean };
-        let WindParameters { gust_length, gust_period_s, velocity, .. } = &self.parameters;
+        let WindParameters { gust_length, gust_period_s, .. } = &self.parameters;
         let (drift, turns) = match self.loop_s {
-            None => (DVec3::from(velocity.integral(0.0, t)), t / gust_period_s),
+            None => (self.drift(t), t / gust_period_s),
             Some(seconds) => (DVec3::ZERO, t / seconds * f64::from(loop_cells(seconds, *gust_period_s))),
         };
         let place = (point - drift) / *gust_length + self.origin;
