@@ -3,5 +3,8 @@
 mod fault;
 
 pub mod flame_sheet;
+pub mod ground;
+pub mod lamps;
+pub mod sky;
 
 pub use fault::{FaultKind, ParameterFault};
