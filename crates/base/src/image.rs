@@ -186,6 +186,8 @@ pub struct Frame {
     pub channels: Vec<Channel>,
     /// Whether a plate fills the picture, so that it is opaque.
     pub opaque: bool,
+    /// The pixels beyond which all are empty: no light, no alpha, infinite depth.
+    pub content: Rect,
 }
 
 /// Display pixels: sRGB-encoded, straight alpha.

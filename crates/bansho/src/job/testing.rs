@@ -7,7 +7,7 @@ use std::sync::{
 
 use bansho_base::{
     assets::MemoryAssets,
-    image::{Frame, Image},
+    image::{Frame, Image, Rect},
     observer::{Observer, Stage, check},
     phenomenon::SnapshotError,
 };
@@ -83,6 +83,7 @@ impl Shot for CounterShot {
             depth: None,
             channels: Vec::new(),
             opaque: false,
+            content: Rect::of_size(1, 1),
         })
     }
 
@@ -125,7 +126,7 @@ pub(super) struct Finisher<F> {
 }
 
 impl<F: Fn(usize, i64) -> Result<(), JobError> + Sync> Finish for Finisher<F> {
-    fn finish(&self, index: usize, frame: Frame, _observer: &dyn Observer) -> Result<(), JobError> {
+    fn finish(&self, index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
         (self.each)(index, frame.header.number)
     }
 
