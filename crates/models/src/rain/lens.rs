@@ -66,8 +66,6 @@ impl DropLens {
 /// What leaves a drop by one path at one angle of incidence.
 #[derive(Clone, Copy, Debug)]
 struct Ray {
-    /// Which path.
-    path: usize,
     /// Angle between the light before and after, 0 to pi.
     deviation: f64,
     /// Share of the light that falls on the drop.
@@ -84,8 +82,8 @@ fn reflectances(incidence: f64, refraction: f64) -> [f64; 2] {
     ]
 }
 
-/// All paths of light through a drop of refractive index `index`, angles of incidence evenly spaced.
-fn trace(index: f64) -> Vec<Ray> {
+/// The light by path through a drop of refractive index `index`, at evenly spaced angles of incidence.
+fn trace(index: f64) -> Vec<[Ray; PATHS]> {
     let step = FRAC_PI_2 / RAYS as f64;
     let paths = |ray: usize| {
         let incidence = step * (ray as f64 + 0.5);
@@ -93,13 +91,12 @@ fn trace(index: f64) -> Vec<Ray> {
         let reflected = reflectances(incidence, refraction);
         // The disc's share at this angle, from d(sin^2 i): the shares of all angles sum to 1.
         let share = math::sin(2.0 * incidence) * math::sin(step);
-        (0..PATHS).map(move |path| Ray {
-            path,
+        std::array::from_fn(|path| Ray {
             deviation: deviation(path, incidence, refraction),
             share: share * 0.5 * (leaves(reflected[0], path) + leaves(reflected[1], path)),
         })
     };
-    (0..RAYS).flat_map(paths).collect()
+    (0..RAYS).map(paths).collect()
 }
 
 /// Share of the light of one polarisation that leaves by a path.
@@ -122,9 +119,9 @@ fn deviation(path: usize, incidence: f64, refraction: f64) -> f64 {
 }
 
 /// The phase function at each step, of mean 1 over the sphere when taken straight between the steps.
-fn phase_table(rays: &[Ray]) -> [f64; STEPS + 1] {
+fn phase_table(rays: &[[Ray; PATHS]]) -> [f64; STEPS + 1] {
     let mut energy = [0.0; STEPS + 1];
-    for ray in rays {
+    for ray in rays.as_flattened() {
         let steps = ray.deviation * STEPS as f64 / PI;
         let lower = (steps as usize).min(STEPS - 1);
         let share = steps - lower as f64;
@@ -176,24 +173,23 @@ mod tests {
     fn light_divides_among_the_paths_as_in_the_reference() {
         for [index, view, p0, p1, p2, p3, p4, p5, rest, centre, ..] in rows::<13>(include_str!("data/drop_lens.csv")) {
             let rays = trace(index);
-            let share = |path| rays.iter().filter(|ray| ray.path == path).map(|ray| ray.share).sum::<f64>();
+            let share = |path| rays.iter().map(|paths| paths[path].share).sum::<f64>();
             for (path, expected) in [p0, p1, p2, p3, p4, p5].into_iter().enumerate() {
                 assert!(near(share(path), expected, 2e-3), "n = {index}, path {path}: {}", share(path));
             }
-            let all: f64 = rays.iter().map(|ray| ray.share).sum();
+            let all: f64 = rays.as_flattened().iter().map(|ray| ray.share).sum();
             assert!((1.0 - rest..=1.0 + 1e-9).contains(&all), "{all}");
-            let widest = rays.iter().filter(|ray| ray.path == 1).map(|ray| ray.deviation).fold(0.0, f64::max);
+            let widest = rays.iter().map(|paths| paths[1].deviation).fold(0.0, f64::max);
             assert!(near(2.0 * widest.to_degrees(), view, 2e-3), "{}", 2.0 * widest.to_degrees());
-            let first = rays.iter().find(|ray| ray.path == 1).expect("a ray");
             let step = FRAC_PI_2 / RAYS as f64;
-            assert!(near(first.share / (math::sin(step) * math::sin(step)), centre, 1e-3));
+            assert!(near(rays[0][1].share / (math::sin(step) * math::sin(step)), centre, 1e-3));
         }
     }
 
     #[test]
     fn the_mean_refracted_deviation_is_that_of_the_reference() {
         for [index, .., mean] in rows::<13>(include_str!("data/drop_lens.csv")) {
-            let refracted = trace(index).into_iter().filter(|ray| ray.path == 1);
+            let refracted = trace(index).into_iter().map(|paths| paths[1]);
             let (cosines, shares) = refracted.fold((0.0, 0.0), |(cosines, shares), ray| {
                 (cosines + ray.share * math::cos(ray.deviation), shares + ray.share)
             });
