@@ -173,7 +173,7 @@ mod tests {
     fn light_divides_among_the_paths_as_in_the_reference() {
         for [index, view, p0, p1, p2, p3, p4, p5, rest, centre, ..] in rows::<13>(include_str!("data/drop_lens.csv")) {
             let rays = trace(index);
-            let share = |path| rays.iter().map(|paths| paths[path].share).sum::<f64>();
+            let share = |path: usize| rays.iter().map(|paths| paths[path].share).sum::<f64>();
             for (path, expected) in [p0, p1, p2, p3, p4, p5].into_iter().enumerate() {
                 assert!(near(share(path), expected, 2e-3), "n = {index}, path {path}: {}", share(path));
             }
