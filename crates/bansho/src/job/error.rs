@@ -6,6 +6,8 @@ use bansho_base::observer::Cancelled;
 use bansho_media::{MediaError, flipbook::TileError, naming::NamingError};
 use bansho_render::{PlanError, RenderError, SceneError, scene::edit::EditError};
 
+use super::streaks::StreaksFault;
+
 /// Why a job cannot be done.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -53,6 +55,9 @@ pub enum JobError {
     /// Tiles that make no sheet.
     #[error(transparent)]
     Tiles(#[from] TileError),
+    /// Streak textures that cannot be made.
+    #[error(transparent)]
+    Streaks(#[from] StreaksFault),
     /// The observer asked to stop.
     #[error("stopped; whole frames stay, and --resume goes on from there")]
     Cancelled,
@@ -141,6 +146,7 @@ impl JobError {
             Self::Unreadable { .. } | Self::Scene(_) | Self::Plan(PlanError::Opening { .. }) => Cause::Scene,
             Self::Edit { .. } | Self::SetScene(_) | Self::Plan(_) | Self::Conflict(_) | Self::Naming(_) => Cause::Usage,
             Self::Render(RenderError::Asset(_) | RenderError::DepthSize { .. }) => Cause::Scene,
+            Self::Streaks(_) => Cause::Usage,
             Self::NoGpu => Cause::Gpu,
             Self::Cancelled => Cause::Cancelled,
             Self::Media(MediaError::Naming(_)) => Cause::Usage,
