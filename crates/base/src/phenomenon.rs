@@ -2,7 +2,7 @@
 
 use crate::{
     canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
-    image::{Image, Rect},
+    image::{Figure, Image, Rect},
     observer::{Cancelled, Observer},
     surroundings::{Publication, Surroundings},
 };
@@ -73,6 +73,11 @@ pub trait Phenomenon: Send + Sync {
     /// What the others see of it while the shutter is open.
     fn publish(&self, shutter: Shutter) -> Publication;
 
+    /// Height of the level mirror that it is, m. It then gets a picture of everything else seen in that mirror.
+    fn mirror(&self) -> Option<f64> {
+        None
+    }
+
     /// The stretches of depth that it fills, in any order. Slices are cut at their ends.
     fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval>;
 
@@ -97,6 +102,11 @@ pub trait Prepared: Send + Sync {
     ///
     /// Must give each pixel the same value whatever strip it comes in.
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip);
+
+    /// Numbers that this frame is known by, each name once.
+    fn figures(&self) -> Vec<Figure> {
+        Vec::new()
+    }
 
     /// How it bends the light of what lies behind it.
     fn deflection(&self) -> Option<Deflection<'_>> {

@@ -75,6 +75,12 @@ pub enum Conflict {
         /// The output.
         path: PathBuf,
     },
+    /// Figures of a film or a sheet, which holds many frames.
+    #[error("--figures writes a file beside each frame's own picture, and {path} holds many frames; allowed: .png, .exr without --contact-sheet", path = .path.display())]
+    NoFigures {
+        /// The output.
+        path: PathBuf,
+    },
     /// A sheet of tiles in a format that is not for it.
     #[error("{path}: a sheet is one picture; allowed: {allowed}", path = .path.display())]
     Sheet {

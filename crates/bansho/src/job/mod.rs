@@ -6,6 +6,7 @@
 
 mod contact;
 mod error;
+mod figures;
 mod flight;
 mod flipbook;
 mod observer;
@@ -65,6 +66,8 @@ pub struct Job {
     pub layers: bool,
     /// Whether phenomena write temperature, motion and the like (EXR).
     pub aovs: bool,
+    /// Whether a JSON file beside each picture tells the figures of its frame (PNG and EXR).
+    pub figures: bool,
     /// How display formats show the light.
     pub view: View,
     /// Bits of each channel, where the format has a choice.
@@ -95,6 +98,7 @@ impl Job {
             loop_s: None,
             layers: false,
             aovs: false,
+            figures: false,
             view: View::DISPLAY,
             bits: BitDepth::Eight,
             out: None,

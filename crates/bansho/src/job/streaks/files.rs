@@ -110,7 +110,14 @@ impl Writer {
         let channel =
             |name: &str, values: Vec<f32>| Channel { name: name.to_owned(), precision: Precision::Single, values };
         let channels = vec![channel("opacity", values.to_vec())];
-        let frame = Frame { header: self.header(file, opacity), beauty, depth: None, channels, opaque: false };
+        let frame = Frame {
+            header: self.header(file, opacity),
+            beauty,
+            depth: None,
+            channels,
+            opaque: false,
+            figures: Vec::new(),
+        };
         let path = self.folder.join(file);
         atomic::write_bytes(&path, &exr::encode(&frame, &path)?)?;
         Ok(Written { scale: None, lit: None })
