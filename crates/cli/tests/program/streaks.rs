@@ -1,6 +1,10 @@
 //! Streak textures by themselves: pictures that measure what their index says.
 
-use std::{f64::consts::PI, fs, process::Command};
+use std::{
+    f64::consts::PI,
+    fs,
+    process::{Command, Stdio},
+};
 
 use serde_json::Value;
 
@@ -173,12 +177,15 @@ fn a_run_that_is_stopped_leaves_whole_textures_and_no_index_that_lies() {
     let folder = Folder::new();
     folder.succeed(&["streaks", "--rates", "1", "--diameters", "1", "--size", "32"]);
     assert!(folder.path("out/streaks/streaks.json").exists());
-    let mut child = folder.command(&["streaks", "--variants", "1000", "--size", "512"]).spawn().unwrap();
+    let mut command = folder.command(&["streaks", "--variants", "1000", "--size", "512"]);
+    let child = command.stderr(Stdio::piped()).spawn().unwrap();
     let textures = || folder.names().iter().filter(|name| name.ends_with(".png")).count();
     wait_until("some textures", || textures() > 8);
     let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(sent.success());
-    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let run = Run::of(child.wait_with_output().unwrap());
+    assert_eq!((run.code, run.errors()), (Some(130), 1));
+    assert!(run.stderr.contains("stopped; whole textures stay, without an index"), "{}", run.stderr);
     let names = folder.names();
     assert!(names.iter().all(|name| name.ends_with(".png")), "neither index nor half-written files: {names:?}");
     for name in names {
