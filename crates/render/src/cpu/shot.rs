@@ -86,11 +86,11 @@ impl CpuShot {
 
     /// The figures of every phenomenon that has any.
     fn figures(&self, prepared: &[Box<dyn Prepared + '_>]) -> Vec<FigureSet> {
-        let set = |(phenomenon, prepared): (&Box<dyn Phenomenon>, &Box<dyn Prepared + '_>)| {
-            let figures = prepared.figures();
-            (!figures.is_empty()).then(|| FigureSet { phenomenon: phenomenon.name().to_owned(), figures })
-        };
-        self.phenomena.iter().zip(prepared).filter_map(set).collect()
+        let names = self.phenomena.iter().map(|phenomenon| phenomenon.name().to_owned());
+        let each = names.zip(prepared.iter().map(|prepared| prepared.figures()));
+        each.filter(|(_, figures)| !figures.is_empty())
+            .map(|(phenomenon, figures)| FigureSet { phenomenon, figures })
+            .collect()
     }
 
     /// Everything but the first mirror, as it is seen in that mirror: radiance and alpha of the whole picture.
