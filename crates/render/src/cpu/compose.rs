@@ -186,7 +186,15 @@ pub(super) fn frame(
         .collect::<Result<_, Cancelled>>()?;
     let opaque = composition.plate.colour.is_some() && composition.view.overscan == 0;
     let content = composition.content();
-    Ok(Frame { header, beauty, depth: Some(depth), channels: channels(composition, planes), opaque, content })
+    Ok(Frame {
+        header,
+        beauty,
+        depth: Some(depth),
+        channels: channels(composition, planes),
+        opaque,
+        content,
+        figures: Vec::new(),
+    })
 }
 
 /// Exposes the strip, puts the plate behind it, and gives it its alpha.

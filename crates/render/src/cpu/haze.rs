@@ -219,6 +219,7 @@ fn finish(composition: &Composition, header: FrameHeader, picture: Picture, aovs
         depth: Some(picture.depth),
         channels,
         opaque,
+        figures: Vec::new(),
         content: Rect::of_size(window.width, window.height),
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     canvas::View,
-    image::{Channel, Frame, Image, Rect},
+    image::{Channel, FigureSet, Frame, Image, Rect},
     observer::{self, Cancelled, Observer, Stage, StageGuard},
     phenomenon::{Phenomenon, Prepared},
     surroundings::{Publication, Surroundings},
@@ -80,11 +80,24 @@ impl CpuShot {
             plate,
         };
         let header = self.plan.header(self.number);
-        Ok(Some(if bends {
+        let mut frame = if bends {
             haze::frame(&composition, header, observer)?
         } else {
             compose::frame(&composition, header, spent, observer)?
-        }))
+        };
+        if self.plan.figures {
+            frame.figures = self.figures(&prepared);
+        }
+        Ok(Some(frame))
+    }
+
+    /// The figures of every phenomenon that has any.
+    fn figures(&self, prepared: &[Box<dyn Prepared + '_>]) -> Vec<FigureSet> {
+        let names = self.phenomena.iter().map(|phenomenon| phenomenon.name().to_owned());
+        let each = names.zip(prepared.iter().map(|prepared| prepared.figures()));
+        each.filter(|(_, figures)| !figures.is_empty())
+            .map(|(phenomenon, figures)| FigureSet { phenomenon, figures })
+            .collect()
     }
 
     /// Everything but the first mirror, as it is seen in that mirror: radiance and alpha of the whole picture.
@@ -156,6 +169,7 @@ fn crop(whole: Frame, window: Rect) -> Option<Frame> {
         channels: channels.collect(),
         header: whole.header,
         opaque: whole.opaque,
+        figures: whole.figures,
         content: Rect::of_size(window.width, window.height),
     })
 }

@@ -99,7 +99,15 @@ impl Files {
             let path = self.sheet_path(what);
             let header = FrameHeader { fingerprint: fingerprint(tiles, what), ..header.clone() };
             let content = Rect::of_size(beauty.width(), beauty.height());
-            let frame = Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false, content };
+            let frame = Frame {
+                header,
+                beauty,
+                depth: None,
+                channels: Vec::new(),
+                opaque: false,
+                content,
+                figures: Vec::new(),
+            };
             atomic::write_bytes(&path, &exr::encode(&frame, &path)?)?;
         }
         Ok(())
