@@ -3,5 +3,6 @@
 mod fault;
 
 pub mod flame_sheet;
+pub mod rain;
 
 pub use fault::{FaultKind, ParameterFault};
