@@ -10,5 +10,20 @@ pub mod lens;
 pub mod streak;
 pub mod velocity;
 
+mod bands;
+mod drops;
+mod gust;
+mod lattice;
+mod light;
+mod moment;
+mod parameters;
+mod phenomenon;
+mod prepared;
+mod sight;
+mod stroke;
+
+pub use parameters::{Method, RainParameters, SplashParameters};
+pub use phenomenon::Rain;
+
 #[cfg(test)]
 mod reference;

@@ -25,7 +25,7 @@ pub(crate) struct Stroke {
 pub(crate) fn disc_share(t: f32) -> f32 {
     let t = t.clamp(-1.0, 1.0);
     let s = t * t;
-    let odd = t * (-0.022_935).mul_add(s, -0.025).mul_add(s, -1.0 / 6.0).mul_add(s, 1.0);
+    let odd = t * (-0.022_935_f32).mul_add(s, -0.025).mul_add(s, -1.0 / 6.0).mul_add(s, 1.0);
     odd.mul_add(std::f32::consts::FRAC_2_PI, 0.5)
 }
 
