@@ -74,6 +74,8 @@ pub struct View {
     pub overscan: usize,
     /// The part of the picture that is drawn.
     pub window: Rect,
+    /// Height of the level mirror that the picture is seen in, m.
+    pub mirror: Option<f64>,
 }
 
 impl View {
@@ -81,13 +83,29 @@ impl View {
     pub fn new(path: CameraParameters, shutter: Shutter, next_middle: f64, size: [usize; 2], overscan: usize) -> Self {
         let camera = path.at(shutter.middle(), size).with_overscan(overscan);
         let size = size.map(|side| side + 2 * overscan);
-        Self { camera, path, shutter, next_middle, size, overscan, window: Rect::of_size(size[0], size[1]) }
+        Self {
+            camera,
+            path,
+            shutter,
+            next_middle,
+            size,
+            overscan,
+            window: Rect::of_size(size[0], size[1]),
+            mirror: None,
+        }
+    }
+
+    /// The whole picture as it is seen in a level mirror at `height`, m.
+    pub fn mirrored(&self, height: f64) -> Self {
+        let window = Rect::of_size(self.size[0], self.size[1]);
+        Self { camera: self.camera.mirrored(height), window, mirror: Some(height), ..self.clone() }
     }
 
     /// The camera at time `t`.
     pub fn camera_at(&self, t: f64) -> Camera {
         let display = self.size.map(|side| side - 2 * self.overscan);
-        self.path.at(t, display).with_overscan(self.overscan)
+        let camera = self.path.at(t, display).with_overscan(self.overscan);
+        self.mirror.map_or(camera, |height| camera.mirrored(height))
     }
 }
 

@@ -15,5 +15,6 @@ pub mod observer;
 pub mod parameters;
 pub mod phenomenon;
 pub mod random;
+pub mod sky;
 pub mod surroundings;
 pub mod wind;

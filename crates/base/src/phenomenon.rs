@@ -73,6 +73,11 @@ pub trait Phenomenon: Send + Sync {
     /// What the others see of it while the shutter is open.
     fn publish(&self, shutter: Shutter) -> Publication;
 
+    /// Height of the level mirror that it is, m. It then gets a picture of everything else seen in that mirror.
+    fn mirror(&self) -> Option<f64> {
+        None
+    }
+
     /// The stretches of depth that it fills, in any order. Slices are cut at their ends.
     fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval>;
 

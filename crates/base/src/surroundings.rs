@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::wind::Wind;
+use crate::{image::Image, sky::Sky, wind::Wind};
 
 /// How a light sends its light out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,13 +108,25 @@ impl Publication {
     }
 }
 
-/// What a phenomenon is drawn among: the wind, and what all others published.
+/// What a phenomenon is drawn among: wind and sky, and what all others published.
 #[derive(Clone, Debug)]
 pub struct Surroundings<'a> {
     /// The one wind of the scene.
     pub wind: &'a Wind,
+    /// The light of the sky.
+    pub sky: Sky,
+    /// What is seen in the phenomenon's own [mirror](crate::phenomenon::Phenomenon::mirror): radiance (ACEScg, cd/m^2) and alpha of
+    /// the whole picture.
+    pub reflection: Option<&'a Image<4>>,
     /// Everybody else's lights, extinction and occluders, and the scene's own.
     pub others: Publication,
+}
+
+impl<'a> Surroundings<'a> {
+    /// Nothing but a wind.
+    pub fn of_wind(wind: &'a Wind) -> Self {
+        Self { wind, sky: Sky::DARK, reflection: None, others: Publication::default() }
+    }
 }
 
 #[cfg(test)]

@@ -3,6 +3,9 @@
 mod fault;
 
 pub mod flame_sheet;
+pub mod ground;
+pub mod lamps;
 pub mod rain;
+pub mod sky;
 
 pub use fault::{FaultKind, ParameterFault};

@@ -44,6 +44,12 @@ fn state(plan: &Plan, hasher: &mut blake3::Hasher) {
     for light in &plan.scene.lights {
         table("light", light.to_table());
     }
+    if let Some(sky) = &plan.scene.sky {
+        table("sky", sky.to_table());
+    }
+    if let Some(ground) = &plan.scene.ground {
+        table("ground", ground.to_table());
+    }
     let enabled = || plan.scene.instances.iter().filter(|instance| instance.enabled);
     for instance in enabled() {
         table(&format!("{} {:?}", instance.kind.key, instance.name), instance.source.canonical());

@@ -3,10 +3,16 @@
 use bansho_base::{parameters::ProblemKind, phenomenon::Phenomenon};
 use bansho_models::{
     flame_sheet::{FlameSheet, FlameSheetParameters},
+    ground::Ground,
+    lamps::{Lamp, Lamps},
     rain::{Rain, RainParameters},
+    sky::SkyBackdrop,
 };
 
-use crate::scene::source::{Describe, Opening, OpeningFault, PhenomenonKind};
+use crate::{
+    plan::Plan,
+    scene::source::{Describe, Opening, OpeningFault, PhenomenonKind},
+};
 
 /// Every kind, in the order in which schema and book list them.
 pub const KINDS: &[PhenomenonKind] = &[FlameSheetParameters::KIND, RainParameters::KIND];
@@ -36,4 +42,22 @@ impl Describe for RainParameters {
             Err(fault) => Err(opening_fault(&fault)),
         }
     }
+}
+
+/// What the scene shows beside its phenomena: lamps, ground, and a sky where there is no plate.
+pub(crate) fn of_scene(plan: &Plan) -> Vec<Box<dyn Phenomenon>> {
+    let scene = &plan.scene;
+    let mut own: Vec<Box<dyn Phenomenon>> = Vec::new();
+    let visible: Vec<_> = scene.lights.iter().filter(|light| light.visible).cloned().collect();
+    if !visible.is_empty() {
+        let at = move |t| visible.iter().map(|light| Lamp { light: light.at(t), radius: light.radius }).collect();
+        own.push(Box::new(Lamps::new(at)));
+    }
+    if let Some(ground) = &scene.ground {
+        own.push(Box::new(Ground::new(ground.clone(), plan.seed, plan.loop_s)));
+    }
+    if let Some(sky) = scene.sky.as_ref().filter(|sky| sky.visible && !scene.has_plate()) {
+        own.push(Box::new(SkyBackdrop::new(sky.clone())));
+    }
+    own
 }

@@ -13,7 +13,7 @@ use bansho_base::{
 };
 
 use crate::{
-    fingerprint,
+    fingerprint, phenomena,
     scene::{FrameRate, Opening, OpeningFault, Scene},
 };
 
@@ -141,7 +141,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Makes every enabled phenomenon, at its beginning.
+    /// Makes every enabled phenomenon, at its beginning; then the scene's own lamps, ground and sky.
     ///
     /// # Errors
     /// A phenomenon cannot be made.
@@ -155,7 +155,10 @@ impl Plan {
                 fault: Box::new(fault),
             })
         };
-        self.scene.instances.iter().filter(|instance| instance.enabled).map(open).collect()
+        let enabled = self.scene.instances.iter().filter(|instance| instance.enabled);
+        let mut phenomena: Vec<Box<dyn Phenomenon>> = enabled.map(open).collect::<Result<_, _>>()?;
+        phenomena.extend(phenomena::of_scene(self));
+        Ok(phenomena)
     }
 
     /// Frames a second.
@@ -236,12 +239,15 @@ impl Plan {
     fn check_loop(&self) -> Result<(), PlanError> {
         let Some(seconds) = self.loop_s else { return Ok(()) };
         let camera = &self.scene.camera;
+        let same = |value: &bansho_base::animation::Animated<f64>| value.at(0.0) == value.at(seconds);
         let same3 = |value: &bansho_base::animation::Animated<[f64; 3]>| value.at(0.0) == value.at(seconds);
         let fixed = [
             ("wind.velocity", same3(&self.scene.wind.velocity)),
             ("camera.position", same3(&camera.position)),
             ("camera.target", same3(&camera.target)),
-            ("camera.roll_deg", camera.roll_deg.at(0.0) == camera.roll_deg.at(seconds)),
+            ("camera.roll_deg", same(&camera.roll_deg)),
+            ("sky.luminance", self.scene.sky.as_ref().is_none_or(|sky| same(&sky.luminance))),
+            ("ground.wetness", self.scene.ground.as_ref().is_none_or(|ground| same(&ground.wetness))),
         ];
         match fixed.into_iter().find(|(_, same)| !same) {
             Some((what, _)) => Err(PlanError::LoopJumps { seconds, what }),

@@ -2,8 +2,10 @@
 
 use bansho_base::{
     canvas::Shutter,
+    image::Image,
     observer::{self, Cancelled, Observer},
     phenomenon::Phenomenon,
+    sky::Sky,
     surroundings::{Publication, Surroundings},
 };
 
@@ -34,8 +36,20 @@ pub(super) fn steps_until(phenomenon: &dyn Phenomenon, t: f64) -> u64 {
     steps.max(0.0) as u64
 }
 
+/// What phenomenon `index` is among during `shutter`.
+pub(super) fn surroundings<'a>(
+    plan: &'a Plan,
+    publications: &[Publication],
+    index: usize,
+    shutter: Shutter,
+    reflection: Option<&'a Image<4>>,
+) -> Surroundings<'a> {
+    let sky = plan.scene.sky.as_ref().map_or(Sky::DARK, |sky| sky.at(shutter.middle()));
+    Surroundings { wind: &plan.wind, sky, reflection, others: others(plan, publications, index, shutter) }
+}
+
 /// What everybody but `index` publishes during `shutter`, and the scene's own lights.
-pub(super) fn others(plan: &Plan, publications: &[Publication], index: usize, shutter: Shutter) -> Publication {
+fn others(plan: &Plan, publications: &[Publication], index: usize, shutter: Shutter) -> Publication {
     let lights = plan.scene.lights.iter().map(|light| light.at(shutter.middle())).collect();
     let mut others = Publication { lights, ..Publication::default() };
     for (other, publication) in publications.iter().enumerate() {
@@ -64,7 +78,7 @@ pub(super) fn advance(
         observer::check(observer)?;
         let instant = Shutter { open: now, close: now };
         let publications: Vec<Publication> = phenomena.iter().map(|other| other.publish(instant)).collect();
-        let surroundings = Surroundings { wind: &plan.wind, others: others(plan, &publications, index, instant) };
+        let surroundings = surroundings(plan, &publications, index, instant, None);
         phenomena[index].step(now, &surroundings);
         clocks[index].taken += 1;
     }

@@ -18,9 +18,30 @@ pub(super) const STRIP_ROWS: usize = 8;
 /// Pixels that one task clears.
 const CLEARED_AT_ONCE: usize = 1 << 16;
 
+/// What a frame is to hold.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outputs {
+    /// What absolute radiance is multiplied by.
+    pub(super) exposure: f32,
+    /// Whether each phenomenon gets a layer.
+    pub(super) layers: bool,
+    /// Whether AOVs are written.
+    pub(super) aovs: bool,
+}
+
+impl Outputs {
+    /// What the shot asks for.
+    pub(super) fn of_plan(plan: &Plan) -> Self {
+        Self { exposure: plan.exposure_scale(), layers: plan.layers, aovs: plan.aovs }
+    }
+
+    /// Nothing but absolute radiance.
+    pub(super) const RADIANCE: Self = Self { exposure: 1.0, layers: false, aovs: false };
+}
+
 /// One frame, ready to be composited.
 pub(super) struct Composition<'a> {
-    pub(super) plan: &'a Plan,
+    pub(super) outputs: Outputs,
     pub(super) view: &'a View,
     pub(super) phenomena: &'a [Box<dyn Phenomenon>],
     pub(super) prepared: &'a [Box<dyn Prepared + 'a>],
@@ -45,7 +66,7 @@ impl Composition<'_> {
 
     /// The part of a strip that can differ from nothing; all of it where there is a plate, a layer or an AOV to fill.
     fn worth_drawing(&self, rect: Rect) -> Rect {
-        if self.plate.colour.is_some() || self.plan.layers || self.plan.aovs {
+        if self.plate.colour.is_some() || self.outputs.layers || self.outputs.aovs {
             return rect;
         }
         let touched = |slice: &Slice| {
@@ -56,11 +77,11 @@ impl Composition<'_> {
     }
 
     fn layer_count(&self) -> usize {
-        if self.plan.layers { self.phenomena.len() } else { 0 }
+        if self.outputs.layers { self.phenomena.len() } else { 0 }
     }
 
     fn aov_counts(&self) -> Vec<usize> {
-        if !self.plan.aovs {
+        if !self.outputs.aovs {
             return Vec::new();
         }
         self.phenomena.iter().map(|phenomenon| phenomenon.aovs().len()).collect()
@@ -143,7 +164,7 @@ fn finish_strip(
     beauty: &mut [[f32; 4]],
     depth: &mut [f32],
 ) {
-    let exposure = composition.plan.exposure_scale();
+    let exposure = composition.outputs.exposure;
     let rect = accumulator.rect;
     for row in 0..rect.height {
         let pixels = row * rect.width..(row + 1) * rect.width;
@@ -196,13 +217,13 @@ fn lay_over_plate(accumulator: &Accumulator, start: usize, plate: &[[f32; 4]], o
 
 /// This strip's part of every layer and AOV, in the order of [`channels`].
 pub(super) fn channel_planes(composition: &Composition, accumulator: &Accumulator) -> Vec<Vec<f32>> {
-    let exposure = composition.plan.exposure_scale();
+    let exposure = composition.outputs.exposure;
     let mut planes = Vec::new();
     for layer in &accumulator.layers {
         planes.extend(layer[..3].iter().map(|plane| plane.iter().map(|value| exposure * value).collect()));
         planes.push(layer[3].clone());
     }
-    if composition.plan.layers && composition.plate.colour.is_some() {
+    if composition.outputs.layers && composition.plate.colour.is_some() {
         planes.extend(plate_layer(composition, accumulator));
     }
     planes.extend(aov_planes(composition, accumulator));
@@ -250,7 +271,7 @@ pub(super) fn channels(composition: &Composition, strips: Vec<Vec<Vec<f32>>>) ->
 fn channel_names(composition: &Composition) -> Vec<Channel> {
     let channel = |name: String, precision| Channel { name, precision, values: Vec::new() };
     let mut channels = Vec::new();
-    if composition.plan.layers {
+    if composition.outputs.layers {
         let plate = composition.plate.colour.is_some().then_some(PLATE_LAYER);
         let names = composition.phenomena.iter().map(|phenomenon| phenomenon.name()).chain(plate);
         for name in names {
@@ -258,7 +279,7 @@ fn channel_names(composition: &Composition) -> Vec<Channel> {
             channels.extend(["R", "G", "B", "A"].map(colour));
         }
     }
-    if composition.plan.aovs {
+    if composition.outputs.aovs {
         for phenomenon in composition.phenomena {
             let aov = |aov: &bansho_base::canvas::AovDescriptor| {
                 channel(format!("{}.{}", phenomenon.name(), aov.name), Precision::Single)

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     canvas::View,
-    image::{Channel, Frame, Rect},
+    image::{Channel, Frame, Image, Rect},
     observer::{self, Cancelled, Observer, Stage, StageGuard},
     phenomenon::{Phenomenon, Prepared},
     surroundings::{Publication, Surroundings},
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::{
     clock::{self, Clock},
-    compose::{self, Composition},
+    compose::{self, Composition, Outputs},
     haze,
     plate::{PlateCache, PlateFrame},
     snapshot,
@@ -22,7 +22,7 @@ use super::{
 use crate::{
     backend::{RenderError, Shot},
     plan::Plan,
-    slices,
+    slices::{self, Slice},
 };
 
 pub(super) struct CpuShot {
@@ -51,12 +51,12 @@ impl CpuShot {
     /// Draws the view; `None` where only the whole picture gives its parts rightly, since bent light comes from beyond.
     fn compose(&self, view: &View, plate: &PlateFrame, observer: &dyn Observer) -> Result<Option<Frame>, RenderError> {
         let preparing = StageGuard::begin(observer, Stage::Prepare);
-        let surroundings = self.surroundings(view);
-        let each = || self.phenomena.par_iter().zip(&surroundings);
-        let intervals: Vec<_> = each().map(|(phenomenon, s)| phenomenon.depth_intervals(view, s)).collect();
-        let slices = slices::cut(&intervals);
-        let prepared: Vec<Box<dyn Prepared + '_>> =
-            each().map(|(phenomenon, s)| phenomenon.prepare(view, s, observer)).collect::<Result<_, _>>()?;
+        let publications: Vec<Publication> =
+            self.phenomena.par_iter().map(|phenomenon| phenomenon.publish(view.shutter)).collect();
+        let reflection = self.reflection(view, &publications, observer)?;
+        let surroundings = self.surroundings(view, &publications, reflection.as_ref());
+        let all: Vec<usize> = (0..self.phenomena.len()).collect();
+        let (slices, prepared) = self.prepare(&all, view, &surroundings, observer)?;
         drop(preparing);
         let _stage = StageGuard::begin(observer, Stage::Draw);
         observer::check(observer)?;
@@ -65,7 +65,7 @@ impl CpuShot {
             return Ok(None);
         }
         let composition = Composition {
-            plan: &self.plan,
+            outputs: Outputs::of_plan(&self.plan),
             view,
             phenomena: &self.phenomena,
             prepared: &prepared,
@@ -80,14 +80,54 @@ impl CpuShot {
         }))
     }
 
-    /// What each phenomenon sees of all others.
-    fn surroundings(&self, view: &View) -> Vec<Surroundings<'_>> {
-        let publications: Vec<Publication> =
-            self.phenomena.par_iter().map(|phenomenon| phenomenon.publish(view.shutter)).collect();
-        let seen_by = |index| Surroundings {
-            wind: &self.plan.wind,
-            others: clock::others(&self.plan, &publications, index, view.shutter),
+    /// Everything but the first mirror, as it is seen in that mirror: radiance and alpha of the whole picture.
+    fn reflection(
+        &self,
+        view: &View,
+        publications: &[Publication],
+        observer: &dyn Observer,
+    ) -> Result<Option<Image<4>>, RenderError> {
+        let mirrors = self.phenomena.iter().enumerate();
+        let Some((mirror, height)) = mirrors.filter_map(|(i, each)| Some((i, each.mirror()?))).next() else {
+            return Ok(None);
         };
+        let view = view.mirrored(height);
+        let surroundings = self.surroundings(&view, publications, None);
+        let seen: Vec<usize> = (0..self.phenomena.len()).filter(|&index| index != mirror).collect();
+        let (slices, prepared) = self.prepare(&seen, &view, &surroundings, observer)?;
+        let composition = Composition {
+            outputs: Outputs::RADIANCE,
+            view: &view,
+            phenomena: &self.phenomena,
+            prepared: &prepared,
+            slices: &slices,
+            plate: &PlateFrame::default(),
+        };
+        Ok(Some(compose::frame(&composition, self.plan.header(self.number), observer)?.beauty))
+    }
+
+    /// Slices of the phenomena `which`, and those phenomena ready to draw; a slice's members count within `which`.
+    fn prepare<'a>(
+        &'a self,
+        which: &[usize],
+        view: &'a View,
+        surroundings: &'a [Surroundings<'a>],
+        observer: &dyn Observer,
+    ) -> Result<(Vec<Slice>, Vec<Box<dyn Prepared + 'a>>), RenderError> {
+        let each = || which.par_iter().map(|&index| (&self.phenomena[index], &surroundings[index]));
+        let intervals: Vec<_> = each().map(|(phenomenon, s)| phenomenon.depth_intervals(view, s)).collect();
+        let prepared = each().map(|(phenomenon, s)| phenomenon.prepare(view, s, observer)).collect::<Result<_, _>>()?;
+        Ok((slices::cut(&intervals), prepared))
+    }
+
+    /// What each phenomenon sees of all others.
+    fn surroundings<'a>(
+        &'a self,
+        view: &View,
+        publications: &[Publication],
+        reflection: Option<&'a Image<4>>,
+    ) -> Vec<Surroundings<'a>> {
+        let seen_by = |index| clock::surroundings(&self.plan, publications, index, view.shutter, reflection);
         (0..self.phenomena.len()).map(seen_by).collect()
     }
 }

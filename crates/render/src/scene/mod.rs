@@ -15,8 +15,10 @@ use bansho_base::{
     assets::Assets,
     camera::CameraParameters,
     parameters::{Parameters, Problem, ProblemKind, Reader, Table, TableDescriptor, Value},
+    sky::SkyParameters,
     wind::WindParameters,
 };
+use bansho_models::ground::GroundParameters;
 
 pub use self::{
     picture::{DepthKind, FrameRate, LightParameters, PictureParameters, PlateParameters},
@@ -38,11 +40,13 @@ pub struct SharedTable {
 }
 
 /// Shared tables, in the order in which a scene should state them.
-pub const SHARED_TABLES: [SharedTable; 5] = [
+pub const SHARED_TABLES: [SharedTable; 7] = [
     SharedTable { key: "picture", many: false, table: PictureParameters::table },
     SharedTable { key: "camera", many: false, table: CameraParameters::table },
     SharedTable { key: "plate", many: false, table: PlateParameters::table },
     SharedTable { key: "wind", many: false, table: WindParameters::table },
+    SharedTable { key: "sky", many: false, table: SkyParameters::table },
+    SharedTable { key: "ground", many: false, table: GroundParameters::table },
     SharedTable { key: "light", many: true, table: LightParameters::table },
 ];
 
@@ -70,6 +74,10 @@ pub struct Scene {
     pub plate: PlateParameters,
     /// `[wind]`.
     pub wind: WindParameters,
+    /// `[sky]`, if there is one.
+    pub sky: Option<SkyParameters>,
+    /// `[ground]`, if there is one.
+    pub ground: Option<GroundParameters>,
     /// `[[light]]`.
     pub lights: Vec<LightParameters>,
     /// Phenomena in the order of the file.
@@ -105,6 +113,8 @@ impl Scene {
             camera: read_shared(root, "camera", reader),
             plate: read_shared(root, "plate", reader),
             wind: read_shared(root, "wind", reader),
+            sky: root.get("sky").map(|_| read_shared(root, "sky", reader)),
+            ground: root.get("ground").map(|_| read_shared(root, "ground", reader)),
             lights: read_lights(root, reader),
             instances: read_instances(root, kinds, reader),
         }
