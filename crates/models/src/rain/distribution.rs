@@ -260,12 +260,14 @@ impl SizeBin {
     }
 }
 
-/// A count for part `index` of many equal parts that hold `mean` each: its fractional part is a chance, and any run of parts holds
-/// its mean to within one. `words` are random and the same for all parts.
-pub fn systematic_count(mean: f64, index: u32, words: [u32; 2]) -> u64 {
-    let offset = random::uniform_f64(words[0], words[1]);
-    let until = |parts: f64| (mean.max(0.0) * parts + offset).floor();
-    (until(index as f64 + 1.0) - until(index as f64)) as u64
+/// A number of drops for volume `index` of many alike that hold `mean` each: its fractional part is a chance, spread evenly over
+/// the volumes, so that any run of them holds its mean to within two. It never falls as the mean rises. `words` are
+/// random and the same for all volumes.
+pub fn even_count(mean: f64, index: u32, words: [u32; 2]) -> u64 {
+    /// Golden ratio less one: the multiples are the most evenly spread there are.
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let offset = random::uniform_f64(words[0], words[1]) + GOLDEN * f64::from(index);
+    (mean.max(0.0) + (offset - offset.floor())).floor() as u64
 }
 
 #[cfg(test)]

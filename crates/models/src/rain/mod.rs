@@ -8,6 +8,7 @@ pub mod distribution;
 pub mod extinction;
 pub mod lens;
 pub mod streak;
+pub mod texture;
 pub mod velocity;
 
 mod bands;

@@ -120,13 +120,17 @@ fn bins_meet_between_their_neighbours() {
 fn the_fractional_part_of_a_count_is_a_chance() {
     let key = Key::new(1, "rain");
     let words = |i: u64| key.words(i, 0, Purpose::named("count"));
-    let counts: Vec<u64> = (0..20_000).map(|i| systematic_count(2.3, 0, [words(i)[0], words(i)[1]])).collect();
+    let counts: Vec<u64> = (0..20_000).map(|i| even_count(2.3, 0, [words(i)[0], words(i)[1]])).collect();
     assert!(counts.iter().all(|count| (2..=3).contains(count)));
     let mean = counts.iter().sum::<u64>() as f64 / counts.len() as f64;
     // Four standard errors of a chance of 0.3.
     assert!((mean - 2.3).abs() < 4.0 * 0.46 / 141.0, "{mean}");
-    // Ten parts together hold 4.5 to within one.
-    let whole: u64 = (0..10).map(|part| systematic_count(0.45, part, [77, 5])).sum();
-    assert!((4..=5).contains(&whole), "{whole}");
-    assert_eq!(systematic_count(f64::NAN, 0, [1, 1]), 0);
+    // Ten volumes together hold 4.5 to within two, wherever they begin.
+    for first in [0, 7, 1000] {
+        let whole: u64 = (first..first + 10).map(|index| even_count(0.45, index, [77, 5])).sum();
+        assert!((3..=6).contains(&whole), "{whole}");
+    }
+    let rising: Vec<u64> = (0..200).map(|i| even_count(0.05 * i as f64, 3, [9, 9])).collect();
+    assert!(rising.is_sorted());
+    assert_eq!(even_count(f64::NAN, 0, [1, 1]), 0);
 }
