@@ -12,6 +12,7 @@ use super::{
     light::Lighting,
     moment::{ClassNow, Moment},
     stroke::Stroke,
+    tiles::Tiles,
 };
 
 const COUNT: Purpose = Purpose::named("rain drops of a cell");
@@ -26,6 +27,8 @@ const FADE: f64 = 0.02;
 pub(crate) struct Near<'a> {
     pub(crate) moment: &'a Moment,
     pub(crate) lighting: &'a Lighting<'a>,
+    /// What the sky shines through drops at the corners of tiles.
+    pub(crate) sky: (&'a Tiles, &'a [[f32; 3]]),
     /// How far from the camera they are, m.
     pub(crate) distance: f64,
     /// How much of a drop at a distance is drawn.
@@ -82,7 +85,11 @@ impl Near<'_> {
         let way = velocity * moment.sight.exposure;
         let flight = Flight { from: point - 0.5 * way, to: point + 0.5 * way, diameter_mm: class.diameter_mm };
         let light = self.lighting.radiance(point, toward / away);
-        flight.above(moment.ground)?.stroke(moment, weight * moment.gain, light)
+        let mut stroke = flight.above(moment.ground)?.stroke(moment, weight * moment.gain, light)?;
+        let (tiles, sky) = self.sky;
+        let sky = tiles.at(sky, stroke.middle());
+        (0..3).for_each(|c| stroke.light[c] += sky[c]);
+        Some(stroke)
     }
 }
 

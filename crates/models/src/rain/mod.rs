@@ -12,6 +12,7 @@ pub mod texture;
 pub mod velocity;
 
 mod bands;
+mod billboards;
 mod drops;
 mod gust;
 mod lattice;
@@ -21,7 +22,10 @@ mod parameters;
 mod phenomenon;
 mod prepared;
 mod sight;
+mod source;
 mod stroke;
+mod tiles;
+mod veil;
 
 pub use parameters::{Method, RainParameters, SplashParameters};
 pub use phenomenon::Rain;

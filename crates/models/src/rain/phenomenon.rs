@@ -5,11 +5,12 @@ use bansho_base::{
     observer::{Cancelled, Observer, check},
     phenomenon::{Phenomenon, Prepared},
     random::Key,
-    surroundings::{Publication, Surroundings},
+    surroundings::{Emitter, Light, Publication, Surroundings},
     wind::Wind,
 };
 
 use super::{
+    billboards::SheetCache,
     distribution::{DropSizes, SizeBin},
     extinction::{Losses, extinction},
     lattice::Lattice,
@@ -30,6 +31,7 @@ pub struct Rain {
     pub(super) lens: DropLens,
     classes: Vec<Class>,
     loop_s: Option<f64>,
+    pub(super) sheets: SheetCache,
 }
 
 /// The drops that one diameter stands for.
@@ -65,7 +67,15 @@ impl Rain {
         let sizes = DropSizes::marshall_palmer(heaviest);
         let class = |bin: SizeBin| Class { bin, speed: fall.speed(bin.diameter_mm), most: bin.count(&sizes) };
         let classes = SizeBin::around(&parameters.diameters_mm).into_iter().map(class).collect();
-        Ok(Self { name: name.to_owned(), key: Key::new(seed, name), lens: DropLens::new(), classes, loop_s, parameters })
+        Ok(Self {
+            name: name.to_owned(),
+            key: Key::new(seed, name),
+            lens: DropLens::new(),
+            classes,
+            loop_s,
+            sheets: SheetCache::default(),
+            parameters,
+        })
     }
 
     /// Its parameters.
@@ -90,6 +100,11 @@ impl Rain {
             lattice: Lattice::new(class.speed, wind, self.parameters.wind_response, self.loop_s, t),
         };
         self.classes.iter().enumerate().map(now).collect()
+    }
+
+    /// How far from the camera there is any rain, m.
+    pub(super) fn reach(&self) -> f64 {
+        1.2 * self.parameters.distance + self.parameters.veil_distance
     }
 
     /// Extinction of all drops, and of those alone that are drawn as streaks, at time `t`, Q = 1, 1/m.
@@ -143,15 +158,21 @@ impl Phenomenon for Rain {
         Publication { extinction: self.extinctions(shutter.middle())[0], ..Publication::default() }
     }
 
-    /// Streaks fill the region in thin slices, so that what stands in the rain has streaks before, within and behind it.
-    fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
-        const SLICE: f64 = 0.5;
-        const MOST: f64 = 16.0;
-        let region = 1.2 * self.parameters.distance;
-        let slices = (region / SLICE).min(MOST).ceil();
-        let edge = |index: f64| view.camera.near + (region - view.camera.near).max(0.0) * index / slices;
-        let near = (0..slices as usize).map(|i| DepthInterval { near: edge(i as f64), far: edge(i as f64 + 1.0) });
-        near.chain([DepthInterval { near: edge(slices), far: f64::INFINITY }]).collect()
+    /// Rain fills all depths; it is cut where lights stand, so that a fire has streaks before, within and behind it.
+    fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval> {
+        const MOST: usize = 8;
+        const CLOSEST: f64 = 0.05;
+        let (near, far) = (view.camera.near, self.reach());
+        let depth = |light: &Light| match light.emitter {
+            Emitter::Directional { .. } => None,
+            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => Some(view.camera.depth(position)),
+        };
+        let lights = surroundings.others.lights.iter().filter_map(depth);
+        let mut edges: Vec<f64> = lights.filter(|depth| *depth > near && *depth < far).take(MOST).collect();
+        edges.extend([near, far]);
+        edges.sort_by(f64::total_cmp);
+        edges.dedup_by(|next, last| *next - *last < CLOSEST);
+        edges.windows(2).map(|pair| DepthInterval { near: pair[0], far: pair[1] }).collect()
     }
 
     fn prepare<'a>(

@@ -3,6 +3,7 @@
 use bansho_base::{
     canvas::{DepthInterval, Strip, View},
     image::Rect,
+    math::smoothstep,
     phenomenon::Prepared,
     surroundings::Surroundings,
 };
@@ -11,11 +12,19 @@ use fearless_simd::{Level, dispatch};
 use super::{
     Rain,
     bands::{BAND, Bands},
+    billboards::{Billboards, Brush, paint},
     drops::{self, Near},
     light::Lighting,
     moment::Moment,
+    parameters::Method,
+    source::{SourceField, sky_through_drops},
     stroke::Stroke,
+    tiles::Tiles,
+    veil::Veil,
 };
+
+/// Distances between which billboards take over from single drops, m: a cubic metre that is nearer cannot be seen as flat.
+const TAKE_OVER: [f64; 2] = [0.8, 1.4];
 
 /// Streaks of single drops, sorted into bands.
 struct Strokes {
@@ -35,18 +44,55 @@ pub(super) struct PreparedRain<'a> {
     view: &'a View,
     level: Level,
     strokes: Strokes,
+    billboards: Option<(Billboards, SourceField)>,
+    veil: Option<Veil<'a>>,
 }
 
 impl<'a> PreparedRain<'a> {
     pub(super) fn new(rain: &'a Rain, view: &'a View, surroundings: &'a Surroundings) -> Self {
         let moment = Moment::new(rain, view, surroundings);
-        let [extinction, _] = rain.extinctions(view.shutter.middle());
-        let lighting = Lighting { lens: &rain.lens, lights: &surroundings.others.lights, extinction };
-        let distance = 1.1 * moment.distance;
-        let weight = |away: f64| moment.nearness(away);
-        let near = Near { moment: &moment, lighting: &lighting, distance, weight: &weight };
-        let strokes = Strokes::new(drops::strokes(&near), view.size[1]);
-        Self { view, level: Level::new(), strokes }
+        let extinctions = rain.extinctions(view.shutter.middle());
+        let lighting = Lighting { lens: &rain.lens, lights: &surroundings.others.lights, extinction: extinctions[0] };
+        let tiles = Tiles::new(view);
+        let sky = sky_through_drops(&lighting, &tiles, &surroundings.sky);
+        let frame = Frame { rain, moment: &moment, lighting: &lighting, tiles: &tiles, sky: &sky, view };
+        let (strokes, billboards) = match rain.parameters.method {
+            Method::Drops => (frame.strokes(1.1 * moment.distance, &|away| moment.nearness(away)), None),
+            Method::Billboards => {
+                let near = |away: f64| 1.0 - smoothstep(TAKE_OVER[0], TAKE_OVER[1], away);
+                let strokes = frame.strokes(TAKE_OVER[1], &|away| moment.nearness(away) * near(away));
+                (strokes, Some(frame.billboards(&|away| moment.nearness(away) * (1.0 - near(away)))))
+            }
+        };
+        let end = if rain.parameters.veil_distance > 0.0 { rain.reach() } else { 0.0 };
+        let veil = Veil::new(&moment, &lighting, &tiles, sky.clone(), view, extinctions, end);
+        Self { view, level: Level::new(), strokes: Strokes::new(strokes, view.size[1]), billboards, veil }
+    }
+}
+
+/// What a frame's parts are made from.
+struct Frame<'a> {
+    rain: &'a Rain,
+    moment: &'a Moment,
+    lighting: &'a Lighting<'a>,
+    tiles: &'a Tiles,
+    sky: &'a [[f32; 3]],
+    view: &'a View,
+}
+
+impl Frame<'_> {
+    fn strokes(&self, distance: f64, weight: &(dyn Fn(f64) -> f64 + Sync)) -> Vec<Stroke> {
+        drops::strokes(&Near { moment: self.moment, lighting: self.lighting, sky: (self.tiles, self.sky), distance, weight })
+    }
+
+    fn billboards(&self, weight: &(dyn Fn(f64) -> f64 + Sync)) -> (Billboards, SourceField) {
+        let distance = 1.1 * self.moment.distance;
+        let picture = Rect::of_size(self.view.size[0], self.view.size[1]);
+        let sheets = self.rain.sheets.sheets(self.moment);
+        let billboards = Billboards::new(self.moment, sheets, picture, distance, weight);
+        let eye = self.moment.sight.middle().position;
+        let source = SourceField::new(self.lighting, self.tiles, self.sky, eye, [TAKE_OVER[0], distance]);
+        (billboards, source)
     }
 }
 
@@ -59,31 +105,39 @@ impl Prepared for PreparedRain<'_> {
         let rect = strip.rect;
         for band in rect.y / BAND..rect.bottom().div_ceil(BAND) {
             let rows = Rect { x: rect.x, y: band * BAND, width: rect.width, height: BAND }.intersection(&rect);
-            dispatch!(self.level, _simd => draw_strokes(&self.strokes, band, slice, rows, strip));
+            dispatch!(self.level, _simd => self.draw_streaks(band, slice, rows, strip));
+            if let Some(veil) = &self.veil {
+                veil.draw(slice, band, rows, strip);
+            }
         }
     }
 }
 
-#[inline(always)]
-fn draw_strokes(strokes: &Strokes, band: usize, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
-    let rect = strip.rect;
-    let mut aovs = std::mem::take(&mut strip.aovs);
-    // Rain alone draws into its strip, and takes all colours alike.
-    if let Some(mut planes) = strip.gray_planes_mut() {
-        for &index in strokes.bands.members(band) {
-            let stroke = &strokes.strokes[index as usize];
-            if !slice.contains(f64::from(stroke.depth)) {
-                continue;
+impl PreparedRain<'_> {
+    #[inline(always)]
+    fn draw_streaks(&self, band: usize, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
+        let rect = strip.rect;
+        let mut aovs = std::mem::take(&mut strip.aovs);
+        // Rain alone draws into its strip, and takes all colours alike.
+        if let Some(mut planes) = strip.gray_planes_mut() {
+            for &index in self.strokes.bands.members(band) {
+                let stroke = &self.strokes.strokes[index as usize];
+                if !slice.contains(f64::from(stroke.depth)) {
+                    continue;
+                }
+                if aovs.is_empty() {
+                    stroke.draw(rows, rect, &mut planes, &mut |_, _| {});
+                } else {
+                    stroke.draw(rows, rect, &mut planes, &mut |index, opacity| {
+                        let values = [1.0, stroke.depth, stroke.diameter_mm];
+                        aovs.iter_mut().zip(values).for_each(|(plane, value)| plane.add(index, value, opacity));
+                    });
+                }
             }
-            if aovs.is_empty() {
-                stroke.draw(rows, rect, &mut planes, &mut |_, _| {});
-            } else {
-                stroke.draw(rows, rect, &mut planes, &mut |index, opacity| {
-                    let values = [1.0, stroke.depth, stroke.diameter_mm];
-                    aovs.iter_mut().zip(values).for_each(|(plane, value)| plane.add(index, value, opacity));
-                });
+            if let Some((billboards, source)) = &self.billboards {
+                paint(&Brush { billboards, source, slice }, band, rows, rect, &mut planes, &mut aovs);
             }
         }
+        strip.aovs = aovs;
     }
-    strip.aovs = aovs;
 }

@@ -40,6 +40,11 @@ struct Along {
 }
 
 impl Stroke {
+    /// Half way along it, pixels.
+    pub(crate) fn middle(&self) -> [f32; 2] {
+        [0, 1].map(|axis| 0.5 * (self.ends[0][axis] + self.ends[1][axis]))
+    }
+
     /// Whether it runs down the picture rather than across.
     fn upright(&self) -> bool {
         let [from, to] = self.ends;
