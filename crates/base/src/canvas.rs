@@ -76,6 +76,8 @@ pub struct View {
     pub window: Rect,
     /// Height of the level mirror that the picture is seen in, m.
     pub mirror: Option<f64>,
+    /// Luminance that a display will show as white, cd/m^2, where it is known: what is far below needs no drawing.
+    pub white_luminance: Option<f64>,
 }
 
 impl View {
@@ -92,6 +94,7 @@ impl View {
             overscan,
             window: Rect::of_size(size[0], size[1]),
             mirror: None,
+            white_luminance: None,
         }
     }
 

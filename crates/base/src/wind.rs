@@ -124,7 +124,8 @@ mod tests {
 
     #[test]
     fn the_mean_wind_travels_as_its_integral_says() {
-        let keyed = Animated::keyed(vec![(0.0, [0.0; 3]), (2.0, [4.0, 0.0, -2.0])], crate::curve::Interpolation::Linear);
+        let keyed =
+            Animated::keyed(vec![(0.0, [0.0; 3]), (2.0, [4.0, 0.0, -2.0])], crate::curve::Interpolation::Linear);
         let velocity = keyed.unwrap();
         let wind = Wind::new(WindParameters { velocity, ..WindParameters::default() }, 7, None);
         assert!((wind.travel(0.0, 2.0) - DVec3::new(4.0, 0.0, -2.0)).length() < 1e-12);

@@ -201,6 +201,7 @@ impl Plan {
         let next = shutter.middle() + self.fps().frame_s();
         let mut view = View::new(self.scene.camera.clone(), shutter, next, self.size, overscan);
         view.window = self.window;
+        view.white_luminance = Some(color::white_luminance(f64::from(self.exposure_ev100)));
         view
     }
 

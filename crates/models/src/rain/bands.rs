@@ -47,11 +47,6 @@ impl Bands {
             _ => &[],
         }
     }
-
-    /// How many things touch the picture, each counted once for every band.
-    pub(crate) fn len(&self) -> usize {
-        self.members.len()
-    }
 }
 
 #[cfg(test)]
@@ -66,6 +61,5 @@ mod tests {
         assert_eq!(bands.members(1), [1, 5]);
         assert_eq!(bands.members(2), [1, 5]);
         assert!(bands.members(3).is_empty());
-        assert_eq!(bands.len(), 7);
     }
 }

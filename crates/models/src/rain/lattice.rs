@@ -116,7 +116,8 @@ mod tests {
     #[test]
     fn after_a_loop_the_same_contents_are_where_they_were() {
         let wind = wind([3.0, 0.0, -1.0]);
-        let (first, last) = (Lattice::new(4.03, &wind, 1.0, Some(2.0), 0.4), Lattice::new(4.03, &wind, 1.0, Some(2.0), 2.4));
+        let (first, last) =
+            (Lattice::new(4.03, &wind, 1.0, Some(2.0), 0.4), Lattice::new(4.03, &wind, 1.0, Some(2.0), 2.4));
         assert!((first.height() - 1.0).abs() < 0.1);
         for cell in [[0, 0, 0], [3, 5, -2], [-4, -1, 7]] {
             let place = DVec3::from(cell.map(|count| count as f64 + 0.5));

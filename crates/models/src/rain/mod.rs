@@ -23,6 +23,7 @@ mod phenomenon;
 mod prepared;
 mod sight;
 mod source;
+mod splashes;
 mod stroke;
 mod tiles;
 mod veil;
@@ -32,3 +33,6 @@ pub use phenomenon::Rain;
 
 #[cfg(test)]
 mod reference;
+
+#[cfg(test)]
+mod tests;

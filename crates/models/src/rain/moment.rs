@@ -73,7 +73,7 @@ impl Moment {
         Self {
             key: rain.key,
             classes: rain.classes(t, wind),
-            ground: parameters.ground_height,
+            ground: ground(&surroundings.others.occluders).unwrap_or(parameters.ground_height),
             distance: parameters.distance,
             gain: parameters.opacity_gain,
             wind: DVec3::new(mean.x, 0.0, mean.z),
@@ -134,11 +134,15 @@ impl Moment {
     pub(crate) fn sheltered(&self, point: DVec3, velocity: DVec3) -> bool {
         self.roofs.iter().any(|roof| shelters(roof, point, -velocity.normalize_or_zero()))
     }
+}
 
-    /// Level velocity of drops at the camera, m/s: mean wind and gusts.
-    pub(crate) fn level_velocity(&self, point: DVec3) -> DVec3 {
-        self.wind + self.gusts.as_ref().map_or(DVec3::ZERO, |gusts| gusts.at(point)[1])
-    }
+/// Height of the highest level ground among solids, m.
+fn ground(occluders: &[Occluder]) -> Option<f64> {
+    let level = |occluder: &Occluder| match occluder {
+        Occluder::HalfSpace { point, normal } if normal.y > 0.999 => Some(point.y),
+        _ => None,
+    };
+    occluders.iter().filter_map(level).max_by(f64::total_cmp)
 }
 
 /// Whether the way from `point` toward `up` meets a solid. All below a plane is ground, not roof.

@@ -47,7 +47,7 @@ bansho_base::parameters! {
         distance: f64 = 5.0, limits(Range::new(1.0, 40.0)), unit("m");
         /// How far it rains beyond; 0 for no veil at all.
         veil_distance: f64 = 100.0, limits(Range::new(0.0, 5000.0)), unit("m");
-        /// Height of the ground, where drops end.
+        /// Height of the ground, where drops end, in a scene without `[ground]`.
         ground_height: f64 = 0.0, unit("m");
         /// Opacity beside what optics gives.
         opacity_gain: f64 = 1.0, limits(Range::new(0.0, 20.0));

@@ -30,7 +30,7 @@ pub struct Rain {
     pub(super) key: Key,
     pub(super) lens: DropLens,
     classes: Vec<Class>,
-    loop_s: Option<f64>,
+    pub(super) loop_s: Option<f64>,
     pub(super) sheets: SheetCache,
 }
 
@@ -49,12 +49,7 @@ impl Rain {
     ///
     /// # Errors
     /// Diameters that do not ascend, or a loop that is no length of time.
-    pub fn new(
-        parameters: RainParameters,
-        name: &str,
-        seed: u64,
-        loop_s: Option<f64>,
-    ) -> Result<Self, ParameterFault> {
+    pub fn new(parameters: RainParameters, name: &str, seed: u64, loop_s: Option<f64>) -> Result<Self, ParameterFault> {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
             return Err(ParameterFault { key: "loop", kind: FaultKind::LoopLength { seconds } });
         }

@@ -18,6 +18,7 @@ use super::{
     moment::Moment,
     parameters::Method,
     source::{SourceField, sky_through_drops},
+    splashes::Splashes,
     stroke::Stroke,
     tiles::Tiles,
     veil::Veil,
@@ -25,6 +26,8 @@ use super::{
 
 /// Distances between which billboards take over from single drops, m: a cubic metre that is nearer cannot be seen as flat.
 const TAKE_OVER: [f64; 2] = [0.8, 1.4];
+/// Light below this share of display white is left out: with a hundred streaks over each other it still is below a 255th.
+const LEAST_SHARE: f64 = 1.0 / (255.0 * 128.0);
 
 /// Streaks of single drops, sorted into bands.
 struct Strokes {
@@ -46,6 +49,7 @@ pub(super) struct PreparedRain<'a> {
     strokes: Strokes,
     billboards: Option<(Billboards, SourceField)>,
     veil: Option<Veil<'a>>,
+    least_light: f32,
 }
 
 impl<'a> PreparedRain<'a> {
@@ -64,9 +68,13 @@ impl<'a> PreparedRain<'a> {
                 (strokes, Some(frame.billboards(&|away| moment.nearness(away) * (1.0 - near(away)))))
             }
         };
+        let mut strokes = strokes;
+        strokes.extend(frame.splashes());
         let end = if rain.parameters.veil_distance > 0.0 { rain.reach() } else { 0.0 };
         let veil = Veil::new(&moment, &lighting, &tiles, sky.clone(), view, extinctions, end);
-        Self { view, level: Level::new(), strokes: Strokes::new(strokes, view.size[1]), billboards, veil }
+        let white = view.white_luminance.filter(|_| rain.parameters.culling);
+        let least_light = white.map_or(0.0, |white| (white * LEAST_SHARE) as f32);
+        Self { view, level: Level::new(), strokes: Strokes::new(strokes, view.size[1]), billboards, veil, least_light }
     }
 }
 
@@ -82,7 +90,25 @@ struct Frame<'a> {
 
 impl Frame<'_> {
     fn strokes(&self, distance: f64, weight: &(dyn Fn(f64) -> f64 + Sync)) -> Vec<Stroke> {
-        drops::strokes(&Near { moment: self.moment, lighting: self.lighting, sky: (self.tiles, self.sky), distance, weight })
+        drops::strokes(&Near {
+            moment: self.moment,
+            lighting: self.lighting,
+            sky: (self.tiles, self.sky),
+            distance,
+            weight,
+        })
+    }
+
+    fn splashes(&self) -> Vec<Stroke> {
+        let splashes = Splashes {
+            moment: self.moment,
+            lighting: self.lighting,
+            sky: (self.tiles, self.sky),
+            parameters: &self.rain.parameters.splashes,
+            time: self.view.shutter.middle(),
+            loop_s: self.rain.loop_s,
+        };
+        splashes.strokes()
     }
 
     fn billboards(&self, weight: &(dyn Fn(f64) -> f64 + Sync)) -> (Billboards, SourceField) {
@@ -135,7 +161,14 @@ impl PreparedRain<'_> {
                 }
             }
             if let Some((billboards, source)) = &self.billboards {
-                paint(&Brush { billboards, source, slice }, band, rows, rect, &mut planes, &mut aovs);
+                paint(
+                    &Brush { billboards, source, slice, least_light: self.least_light },
+                    band,
+                    rows,
+                    rect,
+                    &mut planes,
+                    &mut aovs,
+                );
             }
         }
         strip.aovs = aovs;

@@ -69,8 +69,8 @@ impl Sight {
 mod tests {
     use super::*;
     use bansho_base::{
-        canvas::Shutter,
         camera::CameraParameters,
+        canvas::Shutter,
         math::DVec2,
         random::{Key, Purpose},
     };

@@ -36,6 +36,43 @@ impl Density<'_> {
     }
 }
 
+/// Light scattered to the camera up to each distance, corner after corner.
+struct Scattered(Vec<Vec<[f32; 3]>>);
+
+impl Scattered {
+    fn new(lines: &[Vec<[f32; 3]>], distances: usize) -> Self {
+        Self((0..distances).map(|k| lines.iter().map(|sums| sums[k]).collect()).collect())
+    }
+
+    fn add(&mut self, other: &Self) {
+        for (sum, more) in self.0.iter_mut().flatten().zip(other.0.iter().flatten()) {
+            (0..3).for_each(|c| sum[c] += more[c]);
+        }
+    }
+}
+
+/// A lamp in the picture. Light scattered around it falls as 1/h with the distance h of the line of sight from it, which no straight
+/// line between corners of tiles can follow: near it, what is left after taking out 1/h is interpolated.
+struct Halo {
+    /// From the camera to it, m.
+    offset: DVec3,
+    /// Where it is in the picture.
+    pixel: DVec2,
+    scattered: Scattered,
+}
+
+/// Pixels around a lamp for which that is done.
+const HALO: f64 = 72.0;
+/// Most lamps for which it is.
+const MOST_HALOS: usize = 8;
+
+impl Halo {
+    /// How near a line of sight passes, m.
+    fn passes(&self, line: DVec3) -> f32 {
+        (self.offset - line * self.offset.dot(line)).length().max(SMALLEST_LAMP) as f32
+    }
+}
+
 /// Single scattering along the lines of sight of one frame.
 pub(crate) struct Veil<'a> {
     view: &'a View,
@@ -44,8 +81,10 @@ pub(crate) struct Veil<'a> {
     distances: Vec<f64>,
     /// Optical depth up to each distance.
     depths: Vec<f32>,
-    /// Light of lamps and fires scattered to the camera up to each distance, corner after corner.
-    scattered: Vec<Vec<[f32; 3]>>,
+    /// Light of all lamps and fires scattered to the camera.
+    scattered: Scattered,
+    /// Lamps in the picture.
+    halos: Vec<Halo>,
     /// Light of the sky that all drops send to the camera, by corner.
     sky: Vec<[f32; 3]>,
     ground: f64,
@@ -75,10 +114,14 @@ impl<'a> Veil<'a> {
             let depth = f64::from(depths[depths.len() - 1]);
             depths.push((depth + (pair[1] - pair[0]) * 0.5 * (density.at(pair[0]) + density.at(pair[1]))) as f32);
         }
-        let march = March { lighting, density, eye: moment.sight.middle().position, distances: &distances, depths: &depths };
-        let lines = tiles.map(|_, line| march.line(line));
-        let scattered = (0..distances.len()).map(|k| lines.iter().map(|sums| sums[k]).collect()).collect();
-        Some(Self { view, tiles: tiles.clone(), distances, depths, scattered, sky, ground: moment.ground })
+        let march =
+            March { lighting, density, eye: moment.sight.middle().position, distances: &distances, depths: &depths };
+        let (shown, others) = march.divide(view);
+        let lines = tiles.map(|_, line| march.line(line, &others));
+        let mut scattered = Scattered::new(&lines, distances.len());
+        let halos: Vec<Halo> = shown.into_iter().map(|(light, pixel)| march.halo(&light, pixel, tiles)).collect();
+        halos.iter().for_each(|halo| scattered.add(&halo.scattered));
+        Some(Self { view, tiles: tiles.clone(), distances, depths, scattered, halos, sky, ground: moment.ground })
     }
 
     /// Its end, m.
@@ -94,22 +137,74 @@ impl<'a> Veil<'a> {
         (next - 1, ((distance - near) / (far - near)).clamp(0.0, 1.0) as f32)
     }
 
+    /// Optical depth up to a distance.
+    fn depth(&self, distance: f64) -> f32 {
+        let (k, share) = self.bracket(distance);
+        (self.depths[k + 1] - self.depths[k]).mul_add(share, self.depths[k])
+    }
+
+    /// Scattered light from between two distances, at a corner.
+    fn lit(&self, scattered: &Scattered, corner: usize, range: [f64; 2]) -> [f32; 3] {
+        let [near, far] = range.map(|distance| {
+            let (k, share) = self.bracket(distance);
+            mix(scattered.0[k][corner], scattered.0[k + 1][corner], share)
+        });
+        let reach = math::f32::exp(self.depth(range[0]));
+        std::array::from_fn(|c| (far[c] - near[c]).max(0.0) * reach)
+    }
+
     /// Light and transmittance between two distances at a corner column, `down` of the way from corner row `row` to the next.
-    fn between(&self, column: usize, (row, down): (usize, f32), range: [f64; 2]) -> [f32; 4] {
+    fn between(&self, column: usize, (row, down): (usize, f32), [near, far]: [f64; 2]) -> [f32; 4] {
         let index = row * self.tiles.size[0] + column;
         let below = index + self.tiles.size[0];
-        let up_to = |distance: f64| {
-            let (k, share) = self.bracket(distance);
-            let at = |k: usize| mix(self.scattered[k][index], self.scattered[k][below], down);
-            (mix(at(k), at(k + 1), share), (self.depths[k + 1] - self.depths[k]).mul_add(share, self.depths[k]))
-        };
-        let ((near, before), (far, after)) = (up_to(range[0]), up_to(range[1].max(range[0])));
-        let through = math::f32::exp(before - after);
-        let reach = math::f32::exp(before);
+        let range = [near, far.max(near)];
+        let through = math::f32::exp(self.depth(range[0]) - self.depth(range[1]));
+        let lit = mix(self.lit(&self.scattered, index, range), self.lit(&self.scattered, below, range), down);
         let sky = mix(self.sky[index], self.sky[below], down);
-        let light: [f32; 3] =
-            std::array::from_fn(|c| (far[c] - near[c]).max(0.0).mul_add(reach, sky[c] * (1.0 - through)));
+        let light: [f32; 3] = std::array::from_fn(|c| sky[c].mul_add(1.0 - through, lit[c]));
         [light[0], light[1], light[2], through]
+    }
+
+    /// What a pixel near a lamp gets beside what is interpolated from the corners around it.
+    fn halo(&self, halo: &Halo, x: usize, y: usize, slice: &DepthInterval, hidden: f64) -> Option<[f32; 3]> {
+        let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+        let range = self.range(pixel, slice, hidden).filter(|range| range[0] < range[1])?;
+        let line = self.view.camera.direction(pixel)?.normalize_or_zero();
+        let part = pixel / TILE as f64;
+        let (column, row) = (part.x as usize, part.y as usize);
+        let (across, down) = ((part.x - part.x.floor()) as f32, (part.y - part.y.floor()) as f32);
+        let mut correction = [0.0_f32; 3];
+        let nearest = halo.passes(line);
+        for (right, below) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let corner = (row + below) * self.tiles.size[0] + column + right;
+            let weight = |step: usize, part: f32| if step == 1 { part } else { 1.0 - part };
+            let share = weight(right, across) * weight(below, down);
+            let factor = share * (halo.passes(self.tiles.lines[corner]) / nearest - 1.0);
+            let lit = self.lit(&halo.scattered, corner, range);
+            (0..3).for_each(|c| correction[c] = lit[c].mul_add(factor, correction[c]));
+        }
+        Some(correction)
+    }
+
+    /// Adds to the rows of a band what pixels near lamps get.
+    fn add_halos(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
+        for halo in &self.halos {
+            let [top, bottom] = [halo.pixel.y - HALO, halo.pixel.y + HALO].map(|y| y.max(0.0) as usize);
+            let [left, right] = [halo.pixel.x - HALO, halo.pixel.x + HALO].map(|x| x.max(0.0) as usize);
+            let rect = Rect { x: left, y: top, width: right - left, height: bottom - top }.intersection(&rows);
+            for y in rect.y..rect.bottom() {
+                for x in rect.x..rect.right() {
+                    let away = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - halo.pixel).length() / HALO;
+                    let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
+                    let hidden = f64::from(strip.plate_depth(index));
+                    let fade = 1.0 - math::smoothstep(0.6, 1.0, away) as f32;
+                    let Some(light) = self.halo(halo, x, y, slice, hidden).filter(|_| fade > 0.0) else { continue };
+                    // The veil before it lies in the strip's transmittance too; it takes little.
+                    (0..3)
+                        .for_each(|c| strip.radiance[c][index] = (strip.radiance[c][index] + fade * light[c]).max(0.0));
+                }
+            }
+        }
     }
 
     /// Distances between which a place of the picture sees the veil in a slice, behind `hidden` (depth, m) nothing.
@@ -129,8 +224,15 @@ impl<'a> Veil<'a> {
     /// Draws the rows of a band that lie in `rows`, behind what the strip holds.
     pub(crate) fn draw(&self, slice: &DepthInterval, band: usize, rows: Rect, strip: &mut Strip) {
         if strip.has_plate() {
-            return self.draw_before_plate(slice, rows, strip);
+            self.draw_before_plate(slice, rows, strip);
+        } else {
+            self.draw_open(slice, band, rows, strip);
         }
+        self.add_halos(slice, rows, strip);
+    }
+
+    /// Nothing but the ground ends the veil: it is found at the corners of tiles.
+    fn draw_open(&self, slice: &DepthInterval, band: usize, rows: Rect, strip: &mut Strip) {
         let columns = rows.x / TILE..rows.right().div_ceil(TILE) + 1;
         let edge = |y: f64| -> Vec<[f32; 4]> {
             let place = self.tiles.row_at(y as f32);
@@ -148,7 +250,8 @@ impl<'a> Veil<'a> {
                 let across = ((x % TILE) as f32 + 0.5) / TILE as f32;
                 let column = x / TILE - columns.start;
                 let value: [f32; 4] = std::array::from_fn(|c| {
-                    let at = |edge: &[[f32; 4]]| (edge[column + 1][c] - edge[column][c]).mul_add(across, edge[column][c]);
+                    let at =
+                        |edge: &[[f32; 4]]| (edge[column + 1][c] - edge[column][c]).mul_add(across, edge[column][c]);
                     let (top, bottom) = (at(&edges[0]), at(&edges[1]));
                     (bottom - top).mul_add(down, top)
                 });
@@ -192,13 +295,39 @@ struct March<'a> {
 }
 
 impl March<'_> {
-    /// Light scattered to the camera up to each distance.
-    fn line(&self, line: DVec3) -> Vec<[f32; 3]> {
+    /// Lamps in and around the picture with their places, and all other lights.
+    fn divide(&self, view: &View) -> (Vec<(Light, DVec2)>, Vec<Light>) {
+        let (mut shown, mut others) = (Vec::new(), Vec::new());
+        for light in self.lighting.lights {
+            let place = match light.emitter {
+                Emitter::Point { position, .. } | Emitter::Spot { position, .. } => view.camera.project(position),
+                Emitter::Directional { .. } => None,
+            };
+            let near = |pixel: DVec2| (0..2).all(|axis| (-HALO..view.size[axis] as f64 + HALO).contains(&pixel[axis]));
+            match place.map(|place| place.pixel).filter(|pixel| near(*pixel)) {
+                Some(pixel) if shown.len() < MOST_HALOS => shown.push((*light, pixel)),
+                _ => others.push(*light),
+            }
+        }
+        (shown, others)
+    }
+
+    fn halo(&self, light: &Light, pixel: DVec2, tiles: &Tiles) -> Halo {
+        let lines = tiles.map(|_, line| self.line(line, std::slice::from_ref(light)));
+        let offset = match light.emitter {
+            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => position - self.eye,
+            Emitter::Directional { toward } => toward,
+        };
+        Halo { offset, pixel, scattered: Scattered::new(&lines, self.distances.len()) }
+    }
+
+    /// Light of some lamps scattered to the camera up to each distance.
+    fn line(&self, line: DVec3, lights: &[Light]) -> Vec<[f32; 3]> {
         let mut sums = vec![[0.0; 3]; self.distances.len()];
         if line == DVec3::ZERO {
             return sums;
         }
-        for light in self.lighting.lights {
+        for light in lights {
             let mut sum = [0.0_f32; 3];
             for k in 0..self.distances.len() - 1 {
                 let part = self.segment(light, line, k);

@@ -5,11 +5,7 @@ use bansho_base::{
     image::Rect,
 };
 
-use crate::rain::{
-    bands::BAND,
-    source::SourceField,
-    tiles::{TILE, mix},
-};
+use crate::rain::{bands::BAND, source::SourceField, tiles::TILE};
 
 use super::{
     Billboards,
@@ -29,6 +25,8 @@ pub(crate) struct Brush<'a> {
     pub(crate) source: &'a SourceField,
     /// Those in this slice are painted.
     pub(crate) slice: &'a DepthInterval,
+    /// Radiance below which no streak's light is painted, cd/m^2.
+    pub(crate) least_light: f32,
 }
 
 /// Scratch of one band.
@@ -41,7 +39,14 @@ struct Scratch {
 
 /// Paints the billboards of a band behind what the planes of `strip` hold, within `rows`.
 #[inline(always)]
-pub(crate) fn paint(brush: &Brush, band: usize, rows: Rect, strip: Rect, planes: &mut GrayPlanes, aovs: &mut [AovPlane]) {
+pub(crate) fn paint(
+    brush: &Brush,
+    band: usize,
+    rows: Rect,
+    strip: Rect,
+    planes: &mut GrayPlanes,
+    aovs: &mut [AovPlane],
+) {
     let mut scratch = Scratch::default();
     for &index in brush.billboards.bands.members(band) {
         let card = &brush.billboards.cards[index as usize];
@@ -52,6 +57,10 @@ pub(crate) fn paint(brush: &Brush, band: usize, rows: Rect, strip: Rect, planes:
         let blocks = rect.x / LANES..rect.right().div_ceil(LANES);
         let middle = (band * BAND) as f32 + 0.5 * BAND as f32;
         brush.source.along_row(middle, card.distance, blocks.start..blocks.end + 1, &mut scratch.light);
+        let peak = card.strength * brush.billboards.sheets.sheet(card.class, card.variant).peak();
+        let brightest = scratch.light.iter().flatten().fold(0.0, |most: f32, light| most.max(*light));
+        // Streaks without light still hide what lies behind them.
+        let lit = brightest * peak >= brush.least_light;
         for y in rect.y..rect.bottom() {
             let height = y as f64 + 0.5;
             scratch.corners.clear();
@@ -60,9 +69,11 @@ pub(crate) fn paint(brush: &Brush, band: usize, rows: Rect, strip: Rect, planes:
                 Some([x as f32, y as f32])
             }));
             for (number, block) in blocks.clone().enumerate() {
-                let (Some(left), Some(right)) = (scratch.corners[number], scratch.corners[number + 1]) else { continue };
+                let (Some(left), Some(right)) = (scratch.corners[number], scratch.corners[number + 1]) else {
+                    continue;
+                };
                 if let Some(opacity) = opacities(brush, card, left, right) {
-                    let light = [scratch.light[number], scratch.light[number + 1]];
+                    let light = lit.then(|| [scratch.light[number], scratch.light[number + 1]]);
                     let pixels = Pixels { x: block * LANES, y, rect, strip };
                     put(&pixels, card, &opacity, light, planes, aovs);
                 }
@@ -80,9 +91,7 @@ fn opacities(brush: &Brush, card: &Card, left: [f32; 2], right: [f32; 2]) -> Opt
     }
     let sheet = brush.billboards.sheets.sheet(card.class, card.variant);
     let row = sheet.row(card.offset[1] + card.repeats * up);
-    let texel = |x: f32, y: f32| {
-        (card.side.mul_add(x - card.lean * (y - 0.5), card.offset[0])) * COLUMNS as f32
-    };
+    let texel = |x: f32, y: f32| (card.side.mul_add(x - card.lean * (y - 0.5), card.offset[0])) * COLUMNS as f32;
     let [from, to] = [left, right].map(|[x, y]| texel(x, y));
     let [edge, other] = [texel(0.0, up), texel(1.0, up)];
     let edges = [edge.min(other), edge.max(other)];
@@ -135,7 +144,7 @@ fn put(
     pixels: &Pixels,
     card: &Card,
     opacity: &[f32; LANES],
-    light: [[f32; 3]; 2],
+    light: Option<[[f32; 3]; 2]>,
     planes: &mut GrayPlanes,
     aovs: &mut [AovPlane],
 ) {
@@ -159,12 +168,14 @@ fn put(
         hidden[lane] = through[lane] * taken[lane];
         through[lane] -= hidden[lane];
     }
-    for c in 0..3 {
-        let radiance = &mut planes.radiance[c][start..start + count];
-        for lane in 0..count {
-            let share = ((first - x + lane) as f32 + 0.5) * (1.0 / LANES as f32);
-            let here = mix(light[0], light[1], share)[c];
-            radiance[lane] = hidden[lane].mul_add(here, radiance[lane]);
+    if let Some([left, right]) = light {
+        for c in 0..3 {
+            let radiance = &mut planes.radiance[c][start..start + count];
+            for lane in 0..count {
+                let share = ((first - x + lane) as f32 + 0.5) * (1.0 / LANES as f32);
+                let here = (right[c] - left[c]).mul_add(share, left[c]);
+                radiance[lane] = hidden[lane].mul_add(here, radiance[lane]);
+            }
         }
     }
     let depth = &mut planes.depth[start..start + count];

@@ -43,6 +43,8 @@ pub(crate) struct Sheet {
     sums: Vec<f32>,
     /// A bit for each group of texels of each row, set where there is anything.
     occupied: Vec<u64>,
+    /// Greatest opacity of any texel.
+    peak: f32,
 }
 
 impl Sheet {
@@ -57,7 +59,8 @@ impl Sheet {
             let there = (contents.count - index as f64).min(1.0);
             add_drop(contents, [uniforms[0], uniforms[1]], there as f32, rows, &mut clear);
         }
-        let mut sheet = Self { rows, sums: clear, occupied: vec![0; rows] };
+        let peak = 1.0 - clear.iter().fold(1.0, |least: f32, value| least.min(*value));
+        let mut sheet = Self { rows, sums: clear, occupied: vec![0; rows], peak };
         sheet.sum_up();
         sheet
     }
@@ -77,9 +80,9 @@ impl Sheet {
         }
     }
 
-    /// Rows of the texture.
-    pub(crate) fn rows(&self) -> usize {
-        self.rows
+    /// Greatest opacity of any texel, and so of any pixel that shows texels.
+    pub(crate) fn peak(&self) -> f32 {
+        self.peak
     }
 
     /// The row at a height in cells, which wraps.
@@ -106,7 +109,8 @@ impl Row<'_> {
     /// Whether there is anything between two places, in texels, which wrap.
     #[inline(always)]
     pub(crate) fn is_empty_between(&self, low: f32, high: f32) -> bool {
-        let (first, last) = ((low.floor() as i32).div_euclid(GROUP as i32), (high.floor() as i32).div_euclid(GROUP as i32));
+        let (first, last) =
+            ((low.floor() as i32).div_euclid(GROUP as i32), (high.floor() as i32).div_euclid(GROUP as i32));
         let count = (last - first + 1) as u32;
         if count >= 64 {
             return self.occupied == 0;
@@ -131,7 +135,8 @@ impl Row<'_> {
 fn add_drop(contents: &Contents, place: [f32; 2], there: f32, rows: usize, clear: &mut [f32]) {
     let texel = [contents.cell[0] / COLUMNS as f64, contents.cell[1] / rows as f64];
     let radius = 0.5 * contents.diameter;
-    let half = (0.5 * bansho_base::math::sqrt(contents.length * contents.length + 3.0 * radius * radius) / texel[1]).max(1e-3);
+    let half =
+        (0.5 * bansho_base::math::sqrt(contents.length * contents.length + 3.0 * radius * radius) / texel[1]).max(1e-3);
     let across = ((radius / texel[0]) as f32).max(1e-3);
     let middle = [place[0] * COLUMNS as f32, place[1] * rows as f32];
     let hidden = (PI * radius * radius / (texel[0] * texel[1])) as f32 * there;
@@ -160,9 +165,9 @@ mod tests {
 
     /// Area that the sheet hides, m^2.
     fn hidden(sheet: &Sheet) -> f64 {
-        let rows = (0..sheet.rows()).map(|row| (row as f32 + 0.5) / sheet.rows() as f32);
+        let rows = (0..sheet.rows).map(|row| (row as f32 + 0.5) / sheet.rows as f32);
         let sum: f64 = rows.map(|height| f64::from(sheet.row(height).sum_until(COLUMNS as f32 - 1e-3))).sum();
-        sum / (COLUMNS * sheet.rows()) as f64
+        sum / (COLUMNS * sheet.rows) as f64
     }
 
     #[test]
@@ -178,11 +183,12 @@ mod tests {
     fn more_rain_has_the_same_drops_and_others() {
         let (less, more) = (sheet(20.0, 1.0, 0.1), sheet(21.0, 1.0, 0.1));
         let mut differ = 0;
-        for row in 0..less.rows() {
-            let height = (row as f32 + 0.5) / less.rows() as f32;
+        for row in 0..less.rows {
+            let height = (row as f32 + 0.5) / less.rows as f32;
             for column in 0..64 {
                 let [low, high] = [column as f32 * 32.0, column as f32 * 32.0 + 32.0];
-                let [a, b] = [&less, &more].map(|sheet| sheet.row(height).sum_until(high) - sheet.row(height).sum_until(low));
+                let [a, b] =
+                    [&less, &more].map(|sheet| sheet.row(height).sum_until(high) - sheet.row(height).sum_until(low));
                 assert!(b >= a - 1e-5);
                 differ += usize::from(b > a + 1e-5);
             }
@@ -193,8 +199,8 @@ mod tests {
     #[test]
     fn rows_wrap_and_know_where_they_are_empty() {
         let sheet = sheet(2.0, 1.0, 0.5);
-        for row in 0..sheet.rows() {
-            let row = sheet.row((row as f32 + 0.5) / sheet.rows() as f32);
+        for row in 0..sheet.rows {
+            let row = sheet.row((row as f32 + 0.5) / sheet.rows as f32);
             let turn = COLUMNS as f32;
             assert!((row.sum_until(turn + 100.0) - row.sum_until(turn) - row.sum_until(100.0)).abs() < 1e-6);
             for column in (0..COLUMNS).step_by(8) {
@@ -202,6 +208,6 @@ mod tests {
                 assert!(!row.is_empty_between(low, high) || row.sum_until(high) == row.sum_until(low));
             }
         }
-        assert!((0..sheet.rows()).any(|row| sheet.row(row as f32 / sheet.rows() as f32).is_empty_between(0.0, 500.0)));
+        assert!((0..sheet.rows).any(|row| sheet.row(row as f32 / sheet.rows as f32).is_empty_between(0.0, 500.0)));
     }
 }
