@@ -2,7 +2,7 @@
 
 use crate::{
     canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
-    image::{Image, Rect},
+    image::{Figure, Image, Rect},
     observer::{Cancelled, Observer},
     surroundings::{Publication, Surroundings},
 };
@@ -102,6 +102,11 @@ pub trait Prepared: Send + Sync {
     ///
     /// Must give each pixel the same value whatever strip it comes in.
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip);
+
+    /// Numbers that this frame is known by, each name once.
+    fn figures(&self) -> Vec<Figure> {
+        Vec::new()
+    }
 
     /// How it bends the light of what lies behind it.
     fn deflection(&self) -> Option<Deflection<'_>> {

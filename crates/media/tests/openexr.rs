@@ -35,6 +35,7 @@ fn frame() -> Frame {
         depth: Some(depth),
         channels,
         opaque: false,
+        figures: Vec::new(),
     }
 }
 

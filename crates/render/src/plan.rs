@@ -32,6 +32,8 @@ pub struct PlanOptions {
     pub layers: bool,
     /// Whether phenomena write their AOVs.
     pub aovs: bool,
+    /// Whether frames carry the phenomena's figures.
+    pub figures: bool,
     /// How display formats will show the picture; a plate made for display is taken back through it.
     pub display: color::View,
 }
@@ -106,6 +108,8 @@ pub struct Plan {
     pub layers: bool,
     /// Whether phenomena write their AOVs.
     pub aovs: bool,
+    /// Whether frames carry the phenomena's figures.
+    pub figures: bool,
     /// How display formats show the picture.
     pub display: color::View,
     /// The one wind.
@@ -131,6 +135,7 @@ impl Plan {
             exposure_ev100: 0.0,
             layers: options.layers,
             aovs: options.aovs,
+            figures: options.figures,
             display: options.display,
             wind,
             assets,

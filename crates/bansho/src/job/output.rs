@@ -23,6 +23,7 @@ use bansho_render::{
 
 use super::{
     error::JobError,
+    figures,
     observer::{FrameDone, JobObserver},
     shoot::Finish,
 };
@@ -33,6 +34,8 @@ pub(super) struct Format {
     pub(super) pattern: OutputPattern,
     pub(super) view: View,
     pub(super) bits: BitDepth,
+    /// Whether figures are written beside each picture.
+    pub(super) figures: bool,
 }
 
 impl Format {
@@ -69,6 +72,10 @@ impl Format {
         observer: &dyn Observer,
     ) -> Result<(), JobError> {
         frame.header.fingerprint = self.fingerprint(frame.header.fingerprint);
+        if self.figures {
+            // Before the picture, so that a picture that is there has its figures.
+            figures::write(&frame, &sink.path(frame.header.number))?;
+        }
         let slot = Slot { index, number: frame.header.number };
         let shown = match sink.wants() {
             Wants::Frame => None,

@@ -88,6 +88,7 @@ impl Job {
         let mut scene = self.scene.check(assets.as_ref())?;
         let kind = self.output_kind()?;
         self.check_channels(kind)?;
+        self.check_figures(kind)?;
         if kind != OutputKind::Exr {
             // Only EXR has room for what lies beyond the picture.
             scene.picture.overscan = 0;
@@ -101,7 +102,7 @@ impl Job {
         let sheet = self.contact_sheet.map(|tiles| sheet::holding(tiles, tile, contact::GUTTER)).transpose()?;
         let snapshots = self.snapshots(&plan)?;
         let mut prepared = PreparedJob {
-            format: Format { pattern, view: self.view, bits: self.bits },
+            format: Format { pattern, view: self.view, bits: self.bits, figures: self.figures },
             resume: self.resume && kind.is_sequence() && sheet.is_none(),
             notes: Vec::new(),
             plan,
@@ -139,6 +140,14 @@ impl Job {
         if kind == OutputKind::Exr { Ok(()) } else { Err(Conflict::NoChannels { what, path: self.output_path() }) }
     }
 
+    /// Figures lie beside a picture of one frame.
+    fn check_figures(&self, kind: OutputKind) -> Result<(), Conflict> {
+        if self.figures && (self.contact_sheet.is_some() || !kind.is_sequence()) {
+            return Err(Conflict::NoFigures { path: self.output_path() });
+        }
+        Ok(())
+    }
+
     fn plan_options(&self) -> PlanOptions {
         PlanOptions {
             size: self.size,
@@ -147,6 +156,7 @@ impl Job {
             loop_s: self.loop_s,
             layers: self.layers,
             aovs: self.aovs,
+            figures: self.figures,
             display: self.view,
         }
     }

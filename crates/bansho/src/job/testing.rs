@@ -75,15 +75,7 @@ impl Shot for CounterShot {
     }
 
     fn read(&mut self) -> Option<Frame> {
-        let beauty = Image::filled(1, 1, [self.number as f32; 4]);
-        let header = self.plan.header(self.number);
-        std::mem::take(&mut self.drawn).then(|| Frame {
-            header,
-            beauty,
-            depth: None,
-            channels: Vec::new(),
-            opaque: false,
-        })
+        std::mem::take(&mut self.drawn).then(|| blank(&self.plan, self.number))
     }
 
     fn snapshot(&self) -> Vec<u8> {
@@ -95,6 +87,17 @@ impl Shot for CounterShot {
         self.number = i64::from_le_bytes(bytes);
         Ok(())
     }
+}
+
+/// A frame of one pixel.
+pub(super) fn frame(number: i64) -> Frame {
+    blank(&plan(), number)
+}
+
+fn blank(plan: &Plan, number: i64) -> Frame {
+    let beauty = Image::filled(1, 1, [number as f32; 4]);
+    let header = plan.header(number);
+    Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false, figures: Vec::new() }
 }
 
 /// Remembers what it is told, and stops the work when asked to.

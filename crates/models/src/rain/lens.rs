@@ -14,7 +14,7 @@ const STEPS: usize = 180;
 /// Paths followed; what is left after them is 0.02 % of the light.
 const PATHS: usize = 10;
 /// Angles of incidence traced.
-const RAYS: usize = 2048;
+const RAYS: usize = 1024;
 /// Directions that stand for a drop's surroundings.
 const DIRECTIONS: usize = 48;
 
@@ -34,7 +34,7 @@ impl Default for DropLens {
 }
 
 impl DropLens {
-    /// Traces the rays; about a millisecond.
+    /// Traces the rays; some milliseconds.
     pub fn new() -> Self {
         let channels = WATER.map(|index| phase_table(&trace(index)));
         let phase = std::array::from_fn(|i| [0, 1, 2].map(|c| channels[c][i] as f32));

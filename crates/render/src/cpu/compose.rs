@@ -152,7 +152,14 @@ pub(super) fn frame(
         })
         .collect::<Result<_, Cancelled>>()?;
     let opaque = composition.plate.colour.is_some() && composition.view.overscan == 0;
-    Ok(Frame { header, beauty, depth: Some(depth), channels: channels(composition, planes), opaque })
+    Ok(Frame {
+        header,
+        beauty,
+        depth: Some(depth),
+        channels: channels(composition, planes),
+        opaque,
+        figures: Vec::new(),
+    })
 }
 
 /// Exposes the strip, puts the plate behind it, and gives it its alpha.

@@ -213,7 +213,7 @@ fn finish(composition: &Composition, header: FrameHeader, picture: Picture, aovs
     layers.extend(aovs);
     let channels: Vec<Channel> = compose::channels(composition, vec![layers]);
     let opaque = composition.plate.colour.is_some() && composition.view.overscan == 0;
-    Frame { header, beauty, depth: Some(picture.depth), channels, opaque }
+    Frame { header, beauty, depth: Some(picture.depth), channels, opaque, figures: Vec::new() }
 }
 
 #[cfg(test)]

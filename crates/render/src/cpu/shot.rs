@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     canvas::View,
-    image::{Channel, Frame, Image, Rect},
+    image::{Channel, FigureSet, Frame, Image, Rect},
     observer::{self, Cancelled, Observer, Stage, StageGuard},
     phenomenon::{Phenomenon, Prepared},
     surroundings::{Publication, Surroundings},
@@ -73,11 +73,24 @@ impl CpuShot {
             plate,
         };
         let header = self.plan.header(self.number);
-        Ok(Some(if bends {
+        let mut frame = if bends {
             haze::frame(&composition, header, observer)?
         } else {
             compose::frame(&composition, header, observer)?
-        }))
+        };
+        if self.plan.figures {
+            frame.figures = self.figures(&prepared);
+        }
+        Ok(Some(frame))
+    }
+
+    /// The figures of every phenomenon that has any.
+    fn figures(&self, prepared: &[Box<dyn Prepared + '_>]) -> Vec<FigureSet> {
+        let set = |(phenomenon, prepared): (&Box<dyn Phenomenon>, &Box<dyn Prepared + '_>)| {
+            let figures = prepared.figures();
+            (!figures.is_empty()).then(|| FigureSet { phenomenon: phenomenon.name().to_owned(), figures })
+        };
+        self.phenomena.iter().zip(prepared).filter_map(set).collect()
     }
 
     /// Everything but the first mirror, as it is seen in that mirror: radiance and alpha of the whole picture.
@@ -146,6 +159,7 @@ fn crop(whole: Frame, window: Rect) -> Option<Frame> {
         channels: channels.collect(),
         header: whole.header,
         opaque: whole.opaque,
+        figures: whole.figures,
     })
 }
 

@@ -98,7 +98,7 @@ impl Files {
         for (what, beauty) in [("colour", tile(&colours, sheet.columns, 0, [0.0; 4])?), ("motion", motion)] {
             let path = self.sheet_path(what);
             let header = FrameHeader { fingerprint: fingerprint(tiles, what), ..header.clone() };
-            let frame = Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false };
+            let frame = Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false, figures: Vec::new() };
             atomic::write_bytes(&path, &exr::encode(&frame, &path)?)?;
         }
         Ok(())

@@ -1,6 +1,7 @@
 //! Streak textures for drawing: small numbers in 16 bits, and smaller pictures for distant billboards.
 
 use bansho_base::image::Image;
+use fearless_simd::{Level, dispatch};
 
 /// One size of a texture.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,13 +28,16 @@ pub struct StreakTexture {
 impl StreakTexture {
     /// A texture of opacities, as wide as high.
     pub fn new(image: &Image<1>) -> Self {
-        let mut values: Vec<f32> = image.pixels().as_flattened().to_vec();
-        let mut size = image.width();
-        let mut levels = vec![MipLevel::new(size, &values)];
+        let (level, mut size) = (Level::new(), image.width());
+        let quantised = |size: usize, values: &[f32]| dispatch!(level, _simd => MipLevel::new(size, values));
+        let mut levels = vec![quantised(size, image.pixels().as_flattened())];
+        let mut larger = Vec::new();
         while size > 1 && size.is_multiple_of(2) {
-            values = halved(size, &values);
+            let values = if larger.is_empty() { image.pixels().as_flattened() } else { &larger };
+            let smaller = dispatch!(level, _simd => halved(size, values));
             size /= 2;
-            levels.push(MipLevel::new(size, &values));
+            levels.push(quantised(size, &smaller));
+            larger = smaller;
         }
         Self { levels }
     }
@@ -46,10 +50,12 @@ impl StreakTexture {
 }
 
 impl MipLevel {
+    #[inline(always)]
     fn new(size: usize, values: &[f32]) -> Self {
-        let largest = values.iter().fold(0.0_f32, |largest, &value| largest.max(value));
+        let largest = largest(values);
         let units = if largest > 0.0 { f32::from(u16::MAX) / largest } else { 0.0 };
-        let texels = values.iter().map(|&value| value.mul_add(units, 0.5) as u16).collect();
+        let mut texels = vec![0; values.len()];
+        texels.iter_mut().zip(values).for_each(|(texel, &value)| *texel = (value * units + 0.5) as u16);
         Self { size, scale: largest / f32::from(u16::MAX), texels }
     }
 
@@ -60,12 +66,28 @@ impl MipLevel {
     }
 }
 
+/// The largest of values, none of which is below 0.
+#[inline(always)]
+fn largest(values: &[f32]) -> f32 {
+    let (chunks, rest) = values.as_chunks::<16>();
+    let greater = |a: f32, b: f32| if a > b { a } else { b };
+    let lanes = chunks.iter().fold([0.0_f32; 16], |mut lanes, chunk| {
+        (0..16).for_each(|i| lanes[i] = greater(lanes[i], chunk[i]));
+        lanes
+    });
+    lanes.into_iter().chain(rest.iter().copied()).fold(0.0, greater)
+}
+
 /// The means of each two by two.
+#[inline(always)]
 fn halved(size: usize, values: &[f32]) -> Vec<f32> {
-    let rows = values.chunks_exact(2 * size).map(|pair| pair.split_at(size));
-    let row = |(upper, lower): (&[f32], &[f32])| -> Vec<f32> {
-        let pairs = upper.chunks_exact(2).zip(lower.chunks_exact(2));
-        pairs.map(|(upper, lower)| 0.25 * ((upper[0] + upper[1]) + (lower[0] + lower[1]))).collect()
-    };
-    rows.flat_map(row).collect()
+    let mut means = vec![0.0; values.len() / 4];
+    for (row, pair) in means.chunks_exact_mut(size / 2).zip(values.chunks_exact(2 * size)) {
+        let (upper, lower) = pair.split_at(size);
+        let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
+        for (mean, (upper, lower)) in row.iter_mut().zip(pairs) {
+            *mean = 0.25 * ((upper[0] + upper[1]) + (lower[0] + lower[1]));
+        }
+    }
+    means
 }

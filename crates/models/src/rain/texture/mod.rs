@@ -90,8 +90,13 @@ impl StreakCube {
     /// streaks overlap, what the one lets through meets the other.
     pub fn draw(&self, drops: &[FallingDrop]) -> Image<1> {
         let mut image = Image::filled(self.size, self.size, [0.0]);
-        drops.iter().for_each(|drop| draw::streak(self, drop, &mut image));
+        self.draw_over(drops, &mut image);
         image
+    }
+
+    /// Draws more drops over those that a texture of this cube holds.
+    pub fn draw_over(&self, drops: &[FallingDrop], image: &mut Image<1>) {
+        drops.iter().for_each(|drop| draw::streak(self, drop, image));
     }
 
     /// The texture of one rain and one bin, ready to be sampled.
