@@ -2,7 +2,7 @@
 
 use bansho_base::{
     canvas::{DepthInterval, Strip, View},
-    image::Rect,
+    image::{Figure, Rect},
     math::smoothstep,
     phenomenon::Prepared,
     surroundings::Surroundings,
@@ -13,7 +13,9 @@ use super::{
     Rain,
     bands::{BAND, Bands},
     billboards::{Billboards, Brush, paint},
+    distribution::DropSizes,
     drops::{self, Near},
+    extinction::{Losses, extinction, visibility},
     light::Lighting,
     moment::Moment,
     parameters::Method,
@@ -25,7 +27,7 @@ use super::{
 };
 
 /// Distances between which billboards take over from single drops, m: a cubic metre that is nearer cannot be seen as flat.
-const TAKE_OVER: [f64; 2] = [0.8, 1.4];
+const TAKE_OVER: [f64; 2] = [1.0, 1.2];
 /// Light below this share of display white is left out: with a hundred streaks over each other it still is below a 255th.
 const LEAST_SHARE: f64 = 1.0 / (255.0 * 128.0);
 
@@ -50,6 +52,7 @@ pub(super) struct PreparedRain<'a> {
     billboards: Option<(Billboards, SourceField)>,
     veil: Option<Veil<'a>>,
     least_light: f32,
+    figures: Vec<Figure>,
 }
 
 impl<'a> PreparedRain<'a> {
@@ -74,7 +77,9 @@ impl<'a> PreparedRain<'a> {
         let veil = Veil::new(&moment, &lighting, &tiles, sky.clone(), view, extinctions, end);
         let white = view.white_luminance.filter(|_| rain.parameters.culling);
         let least_light = white.map_or(0.0, |white| (white * LEAST_SHARE) as f32);
-        Self { view, level: Level::new(), strokes: Strokes::new(strokes, view.size[1]), billboards, veil, least_light }
+        let figures = frame.figures(strokes.len(), billboards.as_ref().map(|(billboards, _)| billboards));
+        let strokes = Strokes::new(strokes, view.size[1]);
+        Self { view, level: Level::new(), strokes, billboards, veil, least_light, figures }
     }
 }
 
@@ -122,7 +127,28 @@ impl Frame<'_> {
     }
 }
 
+impl Frame<'_> {
+    /// What the frame is known by; drops on a billboard count by what of it is in the picture.
+    fn figures(&self, strokes: usize, billboards: Option<&Billboards>) -> Vec<Figure> {
+        let t = self.view.shutter.middle();
+        let sizes = DropSizes::marshall_palmer(self.rain.rate(t));
+        let on_billboards = billboards.map_or(0.0, |billboards| billboards.drops_in_view());
+        let figure = |name, unit, value| Figure { name, unit, value };
+        vec![
+            figure("rain_rate", "mm/h", self.rain.rate(t)),
+            figure("drops_in_view", "", strokes as f64 + on_billboards),
+            figure("billboards_in_view", "", billboards.map_or(0.0, |billboards| billboards.cards.len() as f64)),
+            figure("extinction", "1/m", extinction(&sizes, Losses::Geometric, DropSizes::ALL)),
+            figure("visibility", "m", visibility(&sizes)),
+        ]
+    }
+}
+
 impl Prepared for PreparedRain<'_> {
+    fn figures(&self) -> Vec<Figure> {
+        self.figures.clone()
+    }
+
     fn bounds(&self, _slice: &DepthInterval) -> Rect {
         Rect::of_size(self.view.size[0], self.view.size[1])
     }

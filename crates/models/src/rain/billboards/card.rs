@@ -58,6 +58,8 @@ pub(crate) struct Card {
     pub(crate) rows: [f32; 2],
     /// Pixels that it may touch.
     pub(crate) rect: Rect,
+    /// Share of it that lies in the picture.
+    pub(crate) in_view: f64,
 }
 
 impl Card {
@@ -110,6 +112,7 @@ impl Card {
             distance: distance as f32,
             depth: depth as f32,
             rows: [rect.y as f32, rect.bottom() as f32 - 1.0],
+            in_view: ((rect.width * rect.height) as f64 / (pixels_up * pixels_up / height)).min(1.0),
             rect,
         })
     }

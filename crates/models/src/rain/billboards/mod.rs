@@ -104,4 +104,10 @@ impl Billboards {
         let rows: Vec<[f32; 2]> = cards.iter().map(|card| card.rows).collect();
         Self { cards, bands: Bands::new(picture.height, &rows), sheets }
     }
+
+    /// Drops that they show in the picture, on average.
+    pub(super) fn drops_in_view(&self) -> f64 {
+        let share = |card: &Card| card.in_view * self.sheets.contents[card.class].count;
+        self.cards.iter().map(share).sum()
+    }
 }
