@@ -8,7 +8,7 @@ use bansho_base::{
     color,
     image::{FrameHeader, Rect},
     parameters::Auto,
-    phenomenon::Phenomenon,
+    phenomenon::{Phenomenon, Remark},
     wind::Wind,
 };
 
@@ -164,6 +164,14 @@ impl Plan {
         let mut phenomena: Vec<Box<dyn Phenomenon>> = enabled.map(open).collect::<Result<_, _>>()?;
         phenomena.extend(phenomena::of_scene(self));
         Ok(phenomena)
+    }
+
+    /// What users should know of how phenomena will look, each with its phenomenon's name.
+    ///
+    /// # Errors
+    /// A phenomenon cannot be made.
+    pub fn remarks(&self) -> Result<Vec<(String, Remark)>, PlanError> {
+        crate::cpu::remarks(self)
     }
 
     /// Frames a second.

@@ -132,6 +132,17 @@ impl Mapping {
         }
     }
 
+    /// x/depth, y/depth and 1/depth at a place of the picture and their steps a column; `None` where they are not linear.
+    #[inline(always)]
+    pub(crate) fn along_row(&self, px: f64, py: f64) -> Option<[[f64; 2]; 3]> {
+        match self {
+            Self::Rays { .. } => None,
+            Self::Linear { forms, .. } => {
+                Some(forms.map(|[constant, column, row]| [column * px + row * py + constant, column]))
+            }
+        }
+    }
+
     /// The sheet coordinates of one pixel, where they are cheap to know.
     #[inline(always)]
     pub(crate) fn glance(&self, column: usize, row: usize) -> Option<[f32; 2]> {

@@ -27,8 +27,8 @@ const FADE: f64 = 0.02;
 pub(crate) struct Near<'a> {
     pub(crate) moment: &'a Moment,
     pub(crate) lighting: &'a Lighting<'a>,
-    /// What the sky shines through drops at the corners of tiles.
-    pub(crate) sky: (&'a Tiles, &'a [[f32; 3]]),
+    /// What the sky shines through drops at the corners of tiles; `None` from a dark one.
+    pub(crate) sky: Option<(&'a Tiles, &'a [[f32; 3]])>,
     /// How far from the camera they are, m.
     pub(crate) distance: f64,
     /// How much of a drop at a distance is drawn.
@@ -86,9 +86,10 @@ impl Near<'_> {
         let flight = Flight { from: point - 0.5 * way, to: point + 0.5 * way, diameter_mm: class.diameter_mm };
         let light = self.lighting.radiance(point, toward / away);
         let mut stroke = flight.above(moment.ground)?.stroke(moment, weight * moment.gain, light)?;
-        let (tiles, sky) = self.sky;
-        let sky = tiles.at(sky, stroke.middle());
-        (0..3).for_each(|c| stroke.light[c] += sky[c]);
+        if let Some((tiles, sky)) = self.sky {
+            let sky = tiles.at(sky, stroke.middle());
+            (0..3).for_each(|c| stroke.light[c] += sky[c]);
+        }
         Some(stroke)
     }
 }

@@ -1,16 +1,43 @@
 //! The light that drops send to the camera.
 
 use bansho_base::{
-    math::{self, DVec3},
+    math::{DVec3, lanes},
     surroundings::{Emitter, Light},
 };
 
-use super::lens::DropLens;
+use super::{lens::DropLens, tiles::mix};
+
+/// Steps of [`Scattering`].
+const STEPS: usize = 2048;
+
+/// The radiance of a drop for the illuminance on it, `p / (4 pi)`, by the sine of half the angle that it turns light by: quick to look
+/// up from a cosine, and finest where a drop turns light least.
+#[derive(Debug)]
+pub(crate) struct Scattering {
+    table: Vec<[f32; 3]>,
+}
+
+impl Scattering {
+    pub(crate) fn new(lens: &DropLens) -> Self {
+        let at = |step: usize| {
+            let half_sine = step as f32 / STEPS as f32;
+            lens.phase(1.0 - 2.0 * half_sine * half_sine).map(|phase| phase * (0.25 / std::f32::consts::PI))
+        };
+        Self { table: (0..=STEPS).map(at).collect() }
+    }
+
+    /// For a deviation of the light whose cosine is given, 1/sr.
+    pub(crate) fn at(&self, cos_deviation: f32) -> [f32; 3] {
+        let place = ((1.0 - cos_deviation) * 0.5).clamp(0.0, 1.0).sqrt() * STEPS as f32;
+        let step = (place as usize).min(STEPS - 1);
+        mix(self.table[step], self.table[step + 1], place - step as f32)
+    }
+}
 
 /// What falls on drops from lamps and fires.
 #[derive(Clone, Copy)]
 pub(crate) struct Lighting<'a> {
-    pub(crate) lens: &'a DropLens,
+    pub(crate) scattering: &'a Scattering,
     pub(crate) lights: &'a [Light],
     /// What rain takes on the way from a light to a drop, 1/m.
     pub(crate) extinction: f64,
@@ -32,10 +59,9 @@ impl Lighting<'_> {
             if illuminance == [0.0; 3] {
                 return sum;
             }
-            let through = math::exp(-self.extinction * distance(light, point)) as f32;
-            let phase = self.lens.phase(toward.dot(line) as f32);
-            let scale = through * (0.25 / std::f32::consts::PI);
-            std::array::from_fn(|c| (illuminance[c] * scale).mul_add(phase[c], sum[c]))
+            let through = lanes::exp(-(self.extinction * distance(light, point)) as f32);
+            let scattered = self.scattering.at(toward.dot(line) as f32);
+            std::array::from_fn(|c| sum[c] + illuminance[c] * through * scattered[c])
         })
     }
 }

@@ -3,8 +3,9 @@
 use bansho_base::{
     canvas::{AovDescriptor, AovRule, DepthInterval, Shutter, View},
     observer::{Cancelled, Observer, check},
-    phenomenon::{Phenomenon, Prepared},
+    phenomenon::{Phenomenon, Prepared, Remark},
     random::Key,
+    sky::Sky,
     surroundings::{Emitter, Light, Publication, Surroundings},
     wind::Wind,
 };
@@ -15,6 +16,7 @@ use super::{
     extinction::{Losses, extinction},
     lattice::Lattice,
     lens::DropLens,
+    light::Scattering,
     moment::ClassNow,
     parameters::RainParameters,
     prepared::PreparedRain,
@@ -29,6 +31,7 @@ pub struct Rain {
     pub(super) parameters: RainParameters,
     pub(super) key: Key,
     pub(super) lens: DropLens,
+    pub(super) scattering: Scattering,
     classes: Vec<Class>,
     pub(super) loop_s: Option<f64>,
     pub(super) sheets: SheetCache,
@@ -62,10 +65,12 @@ impl Rain {
         let sizes = DropSizes::marshall_palmer(heaviest);
         let class = |bin: SizeBin| Class { bin, speed: fall.speed(bin.diameter_mm), most: bin.count(&sizes) };
         let classes = SizeBin::around(&parameters.diameters_mm).into_iter().map(class).collect();
+        let lens = DropLens::new();
         Ok(Self {
             name: name.to_owned(),
             key: Key::new(seed, name),
-            lens: DropLens::new(),
+            scattering: Scattering::new(&lens),
+            lens,
             classes,
             loop_s,
             sheets: SheetCache::default(),
@@ -151,6 +156,12 @@ impl Phenomenon for Rain {
 
     fn publish(&self, shutter: Shutter) -> Publication {
         Publication { extinction: self.extinctions(shutter.middle())[0], ..Publication::default() }
+    }
+
+    fn remark(&self, surroundings: &Surroundings) -> Option<Remark> {
+        let dark = |light: &Light| light.intensity.iter().all(|value| *value <= 0.0);
+        let unlit = surroundings.others.lights.iter().all(dark) && surroundings.sky == Sky::DARK;
+        unlit.then_some(Remark::Unlit)
     }
 
     /// Rain fills all depths; it is cut where lights stand, so that a fire has streaks before, within and behind it.

@@ -59,9 +59,10 @@ impl<'a> PreparedRain<'a> {
     pub(super) fn new(rain: &'a Rain, view: &'a View, surroundings: &'a Surroundings) -> Self {
         let moment = Moment::new(rain, view, surroundings);
         let extinctions = rain.extinctions(view.shutter.middle());
-        let lighting = Lighting { lens: &rain.lens, lights: &surroundings.others.lights, extinction: extinctions[0] };
+        let lights = &surroundings.others.lights;
+        let lighting = Lighting { scattering: &rain.scattering, lights, extinction: extinctions[0] };
         let tiles = Tiles::new(view);
-        let sky = sky_through_drops(&lighting, &tiles, &surroundings.sky);
+        let sky = sky_through_drops(&rain.lens, &tiles, &surroundings.sky);
         let frame = Frame { rain, moment: &moment, lighting: &lighting, tiles: &tiles, sky: &sky, view };
         let (strokes, billboards) = match rain.parameters.method {
             Method::Drops => (frame.strokes(1.1 * moment.distance, &|away| moment.nearness(away)), None),
@@ -93,12 +94,17 @@ struct Frame<'a> {
     view: &'a View,
 }
 
-impl Frame<'_> {
+impl<'a> Frame<'a> {
+    /// The sky through drops, if it shines.
+    fn shining_sky(&self) -> Option<(&'a Tiles, &'a [[f32; 3]])> {
+        self.sky.iter().flatten().any(|value| *value > 0.0).then_some((self.tiles, self.sky))
+    }
+
     fn strokes(&self, distance: f64, weight: &(dyn Fn(f64) -> f64 + Sync)) -> Vec<Stroke> {
         drops::strokes(&Near {
             moment: self.moment,
             lighting: self.lighting,
-            sky: (self.tiles, self.sky),
+            sky: self.shining_sky(),
             distance,
             weight,
         })
@@ -108,7 +114,7 @@ impl Frame<'_> {
         let splashes = Splashes {
             moment: self.moment,
             lighting: self.lighting,
-            sky: (self.tiles, self.sky),
+            sky: self.shining_sky(),
             parameters: &self.rain.parameters.splashes,
             time: self.view.shutter.middle(),
             loop_s: self.rain.loop_s,

@@ -3,6 +3,7 @@
 use bansho_base::{math::DVec3, sky::Sky};
 
 use super::{
+    lens::DropLens,
     light::Lighting,
     tiles::{Tiles, geometric, mix},
 };
@@ -21,11 +22,11 @@ pub(crate) struct SourceField {
 }
 
 /// What the sky shines through drops toward the camera from each corner of the tiles.
-pub(crate) fn sky_through_drops(lighting: &Lighting, tiles: &Tiles, sky: &Sky) -> Vec<[f32; 3]> {
+pub(crate) fn sky_through_drops(lens: &DropLens, tiles: &Tiles, sky: &Sky) -> Vec<[f32; 3]> {
     if *sky == Sky::DARK {
         return vec![[0.0; 3]; tiles.lines.len()];
     }
-    tiles.map(|_, line| lighting.lens.gather(line, |direction| sky.radiance(direction)))
+    tiles.map(|_, line| lens.gather(line, |direction| sky.radiance(direction)))
 }
 
 impl SourceField {

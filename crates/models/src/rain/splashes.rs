@@ -43,7 +43,8 @@ const DROPLET: Purpose = Purpose::named("rain splash droplet");
 pub(crate) struct Splashes<'a> {
     pub(crate) moment: &'a Moment,
     pub(crate) lighting: &'a Lighting<'a>,
-    pub(crate) sky: (&'a Tiles, &'a [[f32; 3]]),
+    /// What the sky shines through drops at the corners of tiles; `None` from a dark one.
+    pub(crate) sky: Option<(&'a Tiles, &'a [[f32; 3]])>,
     pub(crate) parameters: &'a SplashParameters,
     /// Middle of the exposure, s.
     pub(crate) time: f64,
@@ -144,8 +145,7 @@ impl Splashes<'_> {
             let words = self.moment.key.words(impact.id, impact.step, Purpose(DROPLET.0 ^ (droplet as u32) << 24));
             let random = words.map(|word| f64::from(uniform(word)));
             let Some(mut stroke) = self.droplet(impact, droplet, random) else { continue };
-            let (tiles, sky) = self.sky;
-            let sky = tiles.at(sky, stroke.middle());
+            let sky = self.sky.map_or([0.0; 3], |(tiles, sky)| tiles.at(sky, stroke.middle()));
             stroke.light = std::array::from_fn(|c| lit[c] + sky[c]);
             strokes.push(stroke);
         }

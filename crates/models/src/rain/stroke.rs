@@ -78,51 +78,70 @@ impl Stroke {
 
     /// Adds it behind what the planes of `strip` hold, within `rect`; `measure` is told each pixel's index and opacity.
     ///
-    /// The share of each pixel is that of its row times that of its column within the row. Both are differences of a distribution
-    /// function, so that they add up to one however thin or short the streak is.
+    /// The share of each pixel is that of its row times that of its column within the row (or the other way round for a level
+    /// streak). Both are differences of a distribution function, so that they add up to one however thin or short the streak is.
     #[inline(always)]
     pub(crate) fn draw(&self, rect: Rect, strip: Rect, planes: &mut GrayPlanes, measure: &mut impl FnMut(usize, f32)) {
-        let axis = usize::from(self.upright());
+        let upright = self.upright();
+        let axis = usize::from(upright);
         let along = self.along(axis);
         let (low, high) = (along.middle[axis] - along.half, along.middle[axis] + along.half);
-        let start = [rect.x, rect.y];
-        let end = [rect.right(), rect.bottom()];
-        let (first, last) = (clip(low, start[axis], end[axis]), clip(high + 1.0, start[axis], end[axis]));
-        let density = 0.5 / along.half;
-        for line in first..last {
+        let [start, end] = [[rect.x, rect.y], [rect.right(), rect.bottom()]];
+        let side = 1 - axis;
+        let scale = 1.0 / along.across;
+        for line in clip(low, start[axis], end[axis])..clip(high + 1.0, start[axis], end[axis]) {
             let (from, to) = ((line as f32).max(low), (line as f32 + 1.0).min(high));
-            let amount = self.hidden * density * (to - from);
-            if !(amount > 0.0) {
-                continue;
-            }
-            let centre = along.lean.mul_add(0.5 * (from + to) - along.middle[axis], along.middle[1 - axis]);
-            let scale = 1.0 / along.across;
-            let side = 1 - axis;
+            let amount = self.hidden * (0.5 / along.half) * (to - from);
+            let centre = along.lean.mul_add(0.5 * (from + to) - along.middle[axis], along.middle[side]);
             let begin = clip(centre - along.across, start[side], end[side]);
             let finish = clip(centre + along.across + 1.0, start[side], end[side]);
             let mut before = disc_share((begin as f32 - centre) * scale);
-            for place in begin..finish {
+            let mut share = |place: usize| {
                 let after = disc_share((place as f32 + 1.0 - centre) * scale);
-                let (x, y) = if axis == 1 { (place, line) } else { (line, place) };
-                let index = (y - strip.y) * strip.width + x - strip.x;
-                self.put(index, (amount * (after - before)).min(1.0), planes, measure);
+                let opacity = (amount * (after - before)).clamp(0.0, 1.0);
                 before = after;
+                opacity
+            };
+            if upright {
+                let first = (line - strip.y) * strip.width + begin - strip.x;
+                self.put_row(first, finish - begin, |number| share(begin + number), planes, measure);
+            } else {
+                for place in begin..finish {
+                    let index = (place - strip.y) * strip.width + line - strip.x;
+                    let opacity = share(place);
+                    self.put_row(index, 1, |_| opacity, planes, measure);
+                }
             }
         }
     }
 
+    /// Puts `count` pixels from `first` on behind what the planes hold.
     #[inline(always)]
-    fn put(&self, index: usize, opacity: f32, planes: &mut GrayPlanes, measure: &mut impl FnMut(usize, f32)) {
-        if planes.plate_depth.get(index).is_some_and(|plate| *plate <= self.depth) {
-            return;
+    fn put_row(
+        &self,
+        first: usize,
+        count: usize,
+        mut opacity: impl FnMut(usize) -> f32,
+        planes: &mut GrayPlanes,
+        measure: &mut impl FnMut(usize, f32),
+    ) {
+        let range = first..first + count;
+        let through = &mut planes.transmittance[range.clone()];
+        let [red, green, blue] = planes.radiance.each_mut().map(|plane| &mut plane[range.clone()]);
+        let depth = &mut planes.depth[range];
+        for number in 0..count {
+            let opacity = opacity(number);
+            if planes.plate_depth.get(first + number).is_some_and(|plate| *plate <= self.depth) {
+                continue;
+            }
+            let hidden = through[number] * opacity;
+            through[number] -= hidden;
+            red[number] = hidden.mul_add(self.light[0], red[number]);
+            green[number] = hidden.mul_add(self.light[1], green[number]);
+            blue[number] = hidden.mul_add(self.light[2], blue[number]);
+            depth[number] = if self.depth < depth[number] { self.depth } else { depth[number] };
+            measure(first + number, opacity);
         }
-        let hidden = planes.transmittance[index] * opacity;
-        for c in 0..3 {
-            planes.radiance[c][index] = hidden.mul_add(self.light[c], planes.radiance[c][index]);
-        }
-        planes.transmittance[index] -= hidden;
-        planes.depth[index] = planes.depth[index].min(self.depth);
-        measure(index, opacity);
     }
 }
 

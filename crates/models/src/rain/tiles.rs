@@ -67,8 +67,8 @@ pub(crate) fn geometric(first: f64, last: f64, ratio: f64) -> Vec<f64> {
     numbers
 }
 
-/// The colour `share` of the way from one to another.
+/// The colour `share` of the way from one to another. Not fused: it is needed where vectors are not.
 #[inline(always)]
 pub(crate) fn mix(from: [f32; 3], to: [f32; 3], share: f32) -> [f32; 3] {
-    std::array::from_fn(|c| (to[c] - from[c]).mul_add(share, from[c]))
+    std::array::from_fn(|c| from[c] + (to[c] - from[c]) * share)
 }

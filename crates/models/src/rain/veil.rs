@@ -140,7 +140,7 @@ impl<'a> Veil<'a> {
     /// Optical depth up to a distance.
     fn depth(&self, distance: f64) -> f32 {
         let (k, share) = self.bracket(distance);
-        (self.depths[k + 1] - self.depths[k]).mul_add(share, self.depths[k])
+        self.depths[k] + (self.depths[k + 1] - self.depths[k]) * share
     }
 
     /// Scattered light from between two distances, at a corner.
@@ -149,7 +149,7 @@ impl<'a> Veil<'a> {
             let (k, share) = self.bracket(distance);
             mix(scattered.0[k][corner], scattered.0[k + 1][corner], share)
         });
-        let reach = math::f32::exp(self.depth(range[0]));
+        let reach = math::lanes::exp(self.depth(range[0]));
         std::array::from_fn(|c| (far[c] - near[c]).max(0.0) * reach)
     }
 
@@ -158,10 +158,10 @@ impl<'a> Veil<'a> {
         let index = row * self.tiles.size[0] + column;
         let below = index + self.tiles.size[0];
         let range = [near, far.max(near)];
-        let through = math::f32::exp(self.depth(range[0]) - self.depth(range[1]));
+        let through = math::lanes::exp(self.depth(range[0]) - self.depth(range[1]));
         let lit = mix(self.lit(&self.scattered, index, range), self.lit(&self.scattered, below, range), down);
         let sky = mix(self.sky[index], self.sky[below], down);
-        let light: [f32; 3] = std::array::from_fn(|c| sky[c].mul_add(1.0 - through, lit[c]));
+        let light: [f32; 3] = std::array::from_fn(|c| lit[c] + sky[c] * (1.0 - through));
         [light[0], light[1], light[2], through]
     }
 
@@ -181,7 +181,7 @@ impl<'a> Veil<'a> {
             let share = weight(right, across) * weight(below, down);
             let factor = share * (halo.passes(self.tiles.lines[corner]) / nearest - 1.0);
             let lit = self.lit(&halo.scattered, corner, range);
-            (0..3).for_each(|c| correction[c] = lit[c].mul_add(factor, correction[c]));
+            (0..3).for_each(|c| correction[c] += lit[c] * factor);
         }
         Some(correction)
     }
@@ -371,10 +371,10 @@ impl March<'_> {
             return [0.0; 3];
         }
         let share = ((at - self.distances[k]) / (self.distances[k + 1] - self.distances[k])) as f32;
-        let depth = (self.depths[k + 1] - self.depths[k]).mul_add(share, self.depths[k]);
-        let through = math::f32::exp(-depth - (self.lighting.extinction * distance(light, point)) as f32);
-        let phase = self.lighting.lens.phase(toward.dot(line) as f32);
-        let scale = through * (density * length) as f32 * (0.25 / std::f32::consts::PI);
-        std::array::from_fn(|c| illuminance[c] * phase[c] * scale)
+        let depth = self.depths[k] + (self.depths[k + 1] - self.depths[k]) * share;
+        let through = math::lanes::exp(-depth - (self.lighting.extinction * distance(light, point)) as f32);
+        let scattered = self.lighting.scattering.at(toward.dot(line) as f32);
+        let scale = through * (density * length) as f32;
+        std::array::from_fn(|c| illuminance[c] * scattered[c] * scale)
     }
 }

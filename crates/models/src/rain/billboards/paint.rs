@@ -10,7 +10,7 @@ use crate::rain::{bands::BAND, source::SourceField, tiles::TILE};
 use super::{
     Billboards,
     card::Card,
-    sheet::{COLUMNS, Row},
+    sheet::{COLUMNS, Sheet, SheetRow},
 };
 
 /// Pixels of a block, as many as lie between corners of tiles.
@@ -32,8 +32,9 @@ pub(crate) struct Brush<'a> {
 /// Scratch of one band.
 #[derive(Default)]
 struct Scratch {
-    /// Place on the billboard at each corner of a row's blocks.
-    corners: Vec<Option<[f32; 2]>>,
+    /// Place across and up the billboard at each corner of a row's blocks; not a number where its plane is not seen.
+    across: Vec<f32>,
+    up: Vec<f32>,
     light: Vec<[f32; 3]>,
 }
 
@@ -54,44 +55,84 @@ pub(crate) fn paint(
         if rect.is_empty() || !brush.slice.contains(f64::from(card.depth)) {
             continue;
         }
+        let sheet = brush.billboards.sheets.sheet(card.class, card.variant);
         let blocks = rect.x / LANES..rect.right().div_ceil(LANES);
         let middle = (band * BAND) as f32 + 0.5 * BAND as f32;
         brush.source.along_row(middle, card.distance, blocks.start..blocks.end + 1, &mut scratch.light);
-        let peak = card.strength * brush.billboards.sheets.sheet(card.class, card.variant).peak();
         let brightest = scratch.light.iter().flatten().fold(0.0, |most: f32, light| most.max(*light));
         // Streaks without light still hide what lies behind them.
-        let lit = brightest * peak >= brush.least_light;
+        let lit = brightest * card.strength * sheet.peak() >= brush.least_light;
         for y in rect.y..rect.bottom() {
-            let height = y as f64 + 0.5;
-            scratch.corners.clear();
-            scratch.corners.extend((blocks.start..=blocks.end).map(|block| {
-                let [x, y, _] = card.mapping.at((block * LANES) as f64, height)?;
-                Some([x as f32, y as f32])
-            }));
-            for (number, block) in blocks.clone().enumerate() {
-                let (Some(left), Some(right)) = (scratch.corners[number], scratch.corners[number + 1]) else {
-                    continue;
-                };
-                if let Some(opacity) = opacities(brush, card, left, right) {
-                    let light = lit.then(|| [scratch.light[number], scratch.light[number + 1]]);
-                    let pixels = Pixels { x: block * LANES, y, rect, strip };
-                    put(&pixels, card, &opacity, light, planes, aovs);
-                }
-            }
+            corners(card, y, &blocks, &mut scratch);
+            paint_row(card, sheet, lit, &Row { y, blocks: blocks.clone(), rect, strip }, &scratch, planes, aovs);
         }
+    }
+}
+
+/// Finds where the corners of a row's blocks lie on a billboard.
+#[inline(always)]
+fn corners(card: &Card, y: usize, blocks: &std::ops::Range<usize>, scratch: &mut Scratch) {
+    let count = blocks.len() + 1;
+    scratch.across.resize(count, 0.0);
+    scratch.up.resize(count, 0.0);
+    let (first, height) = ((blocks.start * LANES) as f64, y as f64 + 0.5);
+    let Some(forms) = card.mapping.along_row(first, height) else {
+        for number in 0..count {
+            let place = card.mapping.at(first + (number * LANES) as f64, height).unwrap_or([f64::NAN; 3]);
+            (scratch.across[number], scratch.up[number]) = (place[0] as f32, place[1] as f32);
+        }
+        return;
+    };
+    let [x, y, inverse] = forms.map(|[start, step]| [start as f32, (step * LANES as f64) as f32]);
+    let corners = scratch.across[..count].iter_mut().zip(&mut scratch.up[..count]);
+    for (number, (across, up)) in corners.enumerate() {
+        let number = number as f32;
+        let depth = 1.0 / inverse[1].mul_add(number, inverse[0]);
+        // Behind the camera no depth is above 0.
+        let depth = if depth > 0.0 { depth } else { f32::NAN };
+        *across = x[1].mul_add(number, x[0]) * depth;
+        *up = y[1].mul_add(number, y[0]) * depth;
+    }
+}
+
+/// The part of a row that a billboard covers.
+struct Row {
+    y: usize,
+    blocks: std::ops::Range<usize>,
+    rect: Rect,
+    strip: Rect,
+}
+
+#[inline(always)]
+fn paint_row(
+    card: &Card,
+    sheet: &Sheet,
+    lit: bool,
+    row: &Row,
+    scratch: &Scratch,
+    planes: &mut GrayPlanes,
+    aovs: &mut [AovPlane],
+) {
+    for (number, block) in row.blocks.clone().enumerate() {
+        let left = [scratch.across[number], scratch.up[number]];
+        let right = [scratch.across[number + 1], scratch.up[number + 1]];
+        let Some(opacity) = opacities(sheet, card, left, right) else { continue };
+        let light = lit.then(|| [scratch.light[number], scratch.light[number + 1]]);
+        let pixels = Pixels { x: block * LANES, y: row.y, rect: row.rect, strip: row.strip };
+        put(&pixels, card, &opacity, light, planes, aovs);
     }
 }
 
 /// Opacities of the sixteen pixels between two places on a billboard; `None` where all are 0.
 #[inline(always)]
-fn opacities(brush: &Brush, card: &Card, left: [f32; 2], right: [f32; 2]) -> Option<[f32; LANES]> {
+fn opacities(sheet: &Sheet, card: &Card, left: [f32; 2], right: [f32; 2]) -> Option<[f32; LANES]> {
     let up = 0.5 * (left[1] + right[1]);
-    if !(card.floor..1.0).contains(&up) || left[0].max(right[0]) <= 0.0 || left[0].min(right[0]) >= 1.0 {
+    let seen = up >= card.floor && up < 1.0 && left[0].max(right[0]) > 0.0 && left[0].min(right[0]) < 1.0;
+    if !seen {
         return None;
     }
-    let sheet = brush.billboards.sheets.sheet(card.class, card.variant);
     let row = sheet.row(card.offset[1] + card.repeats * up);
-    let texel = |x: f32, y: f32| (card.side.mul_add(x - card.lean * (y - 0.5), card.offset[0])) * COLUMNS as f32;
+    let texel = |x: f32, y: f32| card.side.mul_add(x - card.lean * (y - 0.5), card.offset[0]) * COLUMNS as f32;
     let [from, to] = [left, right].map(|[x, y]| texel(x, y));
     let [edge, other] = [texel(0.0, up), texel(1.0, up)];
     let edges = [edge.min(other), edge.max(other)];
@@ -105,7 +146,7 @@ fn opacities(brush: &Brush, card: &Card, left: [f32; 2], right: [f32; 2]) -> Opt
 
 /// Mean opacity of the texture under each pixel: from `from` on, each `step` texels further, all within `edges`.
 #[inline(always)]
-fn means(row: &Row, from: f32, step: f32, edges: [f32; 2], card: &Card) -> [f32; LANES] {
+fn means(row: &SheetRow, from: f32, step: f32, edges: [f32; 2], card: &Card) -> [f32; LANES] {
     let width = step.abs().max(card.blur).max(NARROWEST);
     let scale = card.strength / width;
     let mut result = [0.0; LANES];
@@ -151,36 +192,64 @@ fn put(
     let Pixels { x, y, rect, strip } = *pixels;
     let (first, last) = (x.max(rect.x), (x + LANES).min(rect.right()));
     let start = (y - strip.y) * strip.width + first - strip.x;
-    let count = last - first;
-    let opacity = &opacity[first - x..last - x];
+    let skipped = first - x;
     if !aovs.is_empty() {
-        measure(card, start, opacity, planes, aovs);
+        measure(card, start, &opacity[skipped..last - x], planes, aovs);
     }
-    let hidden_by_plate = |index: usize| planes.plate_depth.get(index).is_some_and(|plate| *plate <= card.depth);
-    let mut taken = [0.0; LANES];
-    for lane in 0..count {
-        let index = start + lane;
-        taken[lane] = if hidden_by_plate(index) { 0.0 } else { opacity[lane].clamp(0.0, 1.0) };
+    let mut taken = opacity.map(|opacity| opacity.clamp(0.0, 1.0));
+    if !planes.plate_depth.is_empty() {
+        for (taken, plate) in taken[skipped..last - x].iter_mut().zip(&planes.plate_depth[start..]) {
+            *taken = if *plate <= card.depth { 0.0 } else { *taken };
+        }
     }
-    let through = &mut planes.transmittance[start..start + count];
+    let light = light.map(|[left, right]| {
+        [0, 1, 2].map(|c| {
+            let step = (right[c] - left[c]) * (1.0 / LANES as f32);
+            std::array::from_fn(|lane| (lane as f32 + 0.5).mul_add(step, left[c]))
+        })
+    });
+    let end = start + last - first;
+    let [through, depth] = [&mut *planes.transmittance, &mut *planes.depth].map(|plane| &mut plane[start..end]);
+    let radiance = planes.radiance.each_mut().map(|plane| &mut plane[start..end]);
+    // Of a whole block all lengths are known, so that it becomes vectors.
+    if skipped == 0 && last == x + LANES {
+        lay(LANES, &taken, &light, through, depth, radiance, card.depth);
+    } else {
+        taken.copy_within(skipped.., 0);
+        let light = light.map(|mut light: [[f32; LANES]; 3]| {
+            light.iter_mut().for_each(|plane| plane.copy_within(skipped.., 0));
+            light
+        });
+        lay(last - first, &taken, &light, through, depth, radiance, card.depth);
+    }
+}
+
+/// Puts the first `count` pixels of a block behind what as many pixels of the planes hold.
+#[inline(always)]
+fn lay(
+    count: usize,
+    taken: &[f32; LANES],
+    light: &Option<[[f32; LANES]; 3]>,
+    through: &mut [f32],
+    depth: &mut [f32],
+    radiance: [&mut [f32]; 3],
+    card_depth: f32,
+) {
     let mut hidden = [0.0; LANES];
-    for lane in 0..count {
-        hidden[lane] = through[lane] * taken[lane];
-        through[lane] -= hidden[lane];
+    for ((hidden, taken), through) in hidden[..count].iter_mut().zip(&taken[..count]).zip(&mut through[..count]) {
+        *hidden = *through * taken;
+        *through -= *hidden;
     }
-    if let Some([left, right]) = light {
-        for c in 0..3 {
-            let radiance = &mut planes.radiance[c][start..start + count];
-            for lane in 0..count {
-                let share = ((first - x + lane) as f32 + 0.5) * (1.0 / LANES as f32);
-                let here = (right[c] - left[c]).mul_add(share, left[c]);
-                radiance[lane] = hidden[lane].mul_add(here, radiance[lane]);
+    if let Some(light) = light {
+        for (plane, light) in radiance.into_iter().zip(light) {
+            for ((value, hidden), light) in plane[..count].iter_mut().zip(&hidden[..count]).zip(&light[..count]) {
+                *value = hidden.mul_add(*light, *value);
             }
         }
     }
-    let depth = &mut planes.depth[start..start + count];
-    for lane in 0..count {
-        depth[lane] = if taken[lane] > 0.0 { depth[lane].min(card.depth) } else { depth[lane] };
+    for (depth, taken) in depth[..count].iter_mut().zip(&taken[..count]) {
+        let nearer = if card_depth < *depth { card_depth } else { *depth };
+        *depth = if *taken > 0.0 { nearer } else { *depth };
     }
 }
 

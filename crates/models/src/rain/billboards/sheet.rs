@@ -87,12 +87,12 @@ impl Sheet {
 
     /// The row at a height in cells, which wraps.
     #[inline(always)]
-    pub(crate) fn row(&self, height: f32) -> Row<'_> {
+    pub(crate) fn row(&self, height: f32) -> SheetRow<'_> {
         let place = (height - height.floor()) * self.rows as f32;
         let row = (place as usize).min(self.rows - 1);
         // The slice is of that very length.
         let sums = self.sums[row * STRIDE..].first_chunk::<STRIDE>().unwrap_or(&EMPTY);
-        Row { sums, occupied: self.occupied[row] }
+        SheetRow { sums, occupied: self.occupied[row] }
     }
 }
 
@@ -100,12 +100,12 @@ static EMPTY: [f32; STRIDE] = [0.0; STRIDE];
 
 /// A row of a texture.
 #[derive(Clone, Copy)]
-pub(crate) struct Row<'a> {
+pub(crate) struct SheetRow<'a> {
     sums: &'a [f32; STRIDE],
     occupied: u64,
 }
 
-impl Row<'_> {
+impl SheetRow<'_> {
     /// Whether there is anything between two places, in texels, which wrap.
     #[inline(always)]
     pub(crate) fn is_empty_between(&self, low: f32, high: f32) -> bool {
@@ -118,14 +118,17 @@ impl Row<'_> {
         self.occupied.rotate_right(first as u32 & 63) & ((1 << count) - 1) == 0
     }
 
-    /// Sum of the opacities of all texels left of a place, which wraps.
+    /// Sum of the opacities of all texels left of a place, which wraps and lies within 2^21 of 0.
     #[inline(always)]
     pub(crate) fn sum_until(&self, place: f32) -> f32 {
-        let whole = place.floor();
-        let texel = whole as i32;
-        let column = texel as usize & (COLUMNS - 1);
+        /// 3 * 2^22: adding it rounds to a whole number, which then stands in the low bits of the sum.
+        const ROUND: f32 = 12_582_912.0;
+        // A whole number may come out as the one below with a part of 1, which interpolates to the same.
+        let rounded = (place - 0.5) + ROUND;
+        let whole = rounded - ROUND;
+        let column = rounded.to_bits() as usize & (COLUMNS - 1);
         let (low, high) = (self.sums[column], self.sums[column + 1]);
-        let turns = (texel >> COLUMNS.trailing_zeros()) as f32;
+        let turns = (whole - column as i32 as f32) * (1.0 / COLUMNS as f32);
         turns.mul_add(self.sums[COLUMNS], (high - low).mul_add(place - whole, low))
     }
 }
