@@ -35,6 +35,14 @@ pub enum SnapshotError {
     Damaged,
 }
 
+/// What a user should know of how a phenomenon will look, and that stops nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Remark {
+    /// It only shows the light of others, and there is none.
+    #[error("nothing lights it, so it is drawn black; a [[light]], a [sky] or a fire would")]
+    Unlit,
+}
+
 /// One phenomenon of a scene, ready to be drawn at any time (closed form) or stepped there.
 ///
 /// Everything is a function of the parameters, the seed, the name and the time: never of the threads, of the frames
@@ -72,6 +80,11 @@ pub trait Phenomenon: Send + Sync {
 
     /// What the others see of it while the shutter is open.
     fn publish(&self, shutter: Shutter) -> Publication;
+
+    /// What a user should know of how it will look among others.
+    fn remark(&self, _surroundings: &Surroundings) -> Option<Remark> {
+        None
+    }
 
     /// Height of the level mirror that it is, m. It then gets a picture of everything else seen in that mirror.
     fn mirror(&self) -> Option<f64> {

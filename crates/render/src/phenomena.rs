@@ -5,6 +5,7 @@ use bansho_models::{
     flame_sheet::{FlameSheet, FlameSheetParameters},
     ground::Ground,
     lamps::{Lamp, Lamps},
+    rain::{Rain, RainParameters},
     sky::SkyBackdrop,
 };
 
@@ -14,7 +15,7 @@ use crate::{
 };
 
 /// Every kind, in the order in which schema and book list them.
-pub const KINDS: &[PhenomenonKind] = &[FlameSheetParameters::KIND];
+pub const KINDS: &[PhenomenonKind] = &[FlameSheetParameters::KIND, RainParameters::KIND];
 
 /// A model's own fault, placed at the parameter that it names.
 fn opening_fault(fault: &bansho_models::ParameterFault) -> OpeningFault {
@@ -27,6 +28,17 @@ impl Describe for FlameSheetParameters {
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match FlameSheet::new(self.clone(), opening.name, opening.seed, opening.loop_s) {
             Ok(sheet) => Ok(Box::new(sheet)),
+            Err(fault) => Err(opening_fault(&fault)),
+        }
+    }
+}
+
+impl Describe for RainParameters {
+    const KEY: &'static str = "rain";
+
+    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        match Rain::new(self.clone(), opening.name, opening.seed, opening.loop_s) {
+            Ok(rain) => Ok(Box::new(rain)),
             Err(fault) => Err(opening_fault(&fault)),
         }
     }

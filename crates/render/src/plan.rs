@@ -8,7 +8,7 @@ use bansho_base::{
     color,
     image::{FrameHeader, Rect},
     parameters::Auto,
-    phenomenon::Phenomenon,
+    phenomenon::{Phenomenon, Remark},
     wind::Wind,
 };
 
@@ -166,6 +166,14 @@ impl Plan {
         Ok(phenomena)
     }
 
+    /// What users should know of how phenomena will look, each with its phenomenon's name.
+    ///
+    /// # Errors
+    /// A phenomenon cannot be made.
+    pub fn remarks(&self) -> Result<Vec<(String, Remark)>, PlanError> {
+        crate::cpu::remarks(self)
+    }
+
     /// Frames a second.
     pub fn fps(&self) -> FrameRate {
         self.scene.picture.fps
@@ -206,6 +214,7 @@ impl Plan {
         let next = shutter.middle() + self.fps().frame_s();
         let mut view = View::new(self.scene.camera.clone(), shutter, next, self.size, overscan);
         view.window = self.window;
+        view.white_luminance = Some(color::white_luminance(f64::from(self.exposure_ev100)));
         view
     }
 

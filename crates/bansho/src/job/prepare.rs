@@ -188,6 +188,7 @@ impl Job {
     fn notes(&self, job: &PreparedJob) -> Result<Vec<Note>, JobError> {
         let kind = job.format.pattern.kind();
         let mut notes: Vec<Note> = outside(&job.plan, &job.frames).into_iter().collect();
+        notes.extend(job.plan.remarks()?.into_iter().map(|(name, remark)| Note::Remark { name, remark }));
         let wide = matches!(kind, OutputKind::Png | OutputKind::Apng | OutputKind::Mov | OutputKind::Webm);
         if self.bits == BitDepth::Sixteen && !wide {
             notes.push(Note::BitsUnused { kind });

@@ -16,7 +16,7 @@ mod lanes;
 mod measure;
 mod moment;
 mod parameters;
-mod placement;
+pub(crate) mod placement;
 mod prepared;
 mod ramp;
 mod shade;

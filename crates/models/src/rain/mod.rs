@@ -12,5 +12,28 @@ pub mod streak;
 pub mod texture;
 pub mod velocity;
 
+mod bands;
+mod billboards;
+mod drops;
+mod gust;
+mod lattice;
+mod light;
+mod moment;
+mod parameters;
+mod phenomenon;
+mod prepared;
+mod sight;
+mod source;
+mod splashes;
+mod stroke;
+mod tiles;
+mod veil;
+
+pub use parameters::{Method, RainParameters, SplashParameters};
+pub use phenomenon::Rain;
+
 #[cfg(test)]
 mod reference;
+
+#[cfg(test)]
+mod tests;
