@@ -110,14 +110,15 @@ mod tests {
             let node = table.deposition().draw_node(energy_ev, [uniforms[0], uniforms[1]]);
             let pairs = table.ion_pairs_per_collision(node) / particles as f64;
             for (number, collision) in falls.fall(node, key, particle).enumerate() {
-                let mut photons = table.photons_per_ion_pair()[collision.level];
+                let mut photons = table.photons_per_ion_pair()[collision.level as usize];
                 if single {
                     let word = key.words(particle, number as u32, Purpose::named("emitter"))[0];
-                    let (emitter, all) = table.draw_emitter(collision.level, uniform(word) as f64);
+                    let (emitter, all) = table.draw_emitter(collision.level as usize, uniform(word) as f64);
                     photons = [0.0; 4];
                     photons[emitter.index()] = all;
                 }
-                sum[collision.level] = std::array::from_fn(|i| sum[collision.level][i] + photons[i] * pairs);
+                sum[collision.level as usize] =
+                    std::array::from_fn(|i| sum[collision.level as usize][i] + photons[i] * pairs);
             }
         }
         sum
@@ -146,7 +147,8 @@ mod tests {
         let all = difference(&table, 4000.0, &light(&table, &falls, 4000.0, 32_000, false));
         assert!(all.iter().all(|difference| *difference < 0.03), "{all:?}");
         let [green, red, _, nitrogen] = difference(&table, 4000.0, &light(&table, &falls, 4000.0, 32_000, true));
-        assert!(green < 0.05 && red < 0.5 && nitrogen < 0.015, "{green} {red} {nitrogen}");
+
+        assert!(green < 0.05 && red < 0.08 && nitrogen < 0.015, "{green} {red} {nitrogen}");
     }
 
     #[test]
@@ -165,7 +167,7 @@ mod tests {
     #[test]
     fn the_rules_of_the_thesis_by_hand() {
         let air = atmosphere().at(300.0);
-        // O is the first 74 % of the air there; of its photons green are 0.236 of 0.765.
+        // O is the first 74 % of the air there; of its photons green are 0.236 of 1.370.
         assert_eq!(
             hard_sphere_photons(&air, [0.1, 0.1, 0.9999]).map(|(emitter, _)| emitter),
             Some(Emitter::OxygenGreen)

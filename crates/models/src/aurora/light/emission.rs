@@ -6,7 +6,7 @@ use super::{
     PHOTONS_PER_KILORAYLEIGH,
     emitter::{EMITTERS, Emitter, PerEmitter},
     excitation::photons_per_ion_pair,
-    persistence,
+    persistence::Persistence,
 };
 use crate::aurora::{
     atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, covers, locate_level},
@@ -43,8 +43,11 @@ impl Emission {
     pub fn new(air: &Atmosphere, spectrum: Spectrum) -> Self {
         let deposition = Deposition::new(air, spectrum);
         let photons: Vec<_> = air.levels().iter().map(photons_per_ion_pair).collect();
-        let columns =
-            (0..NODES).map(|node| column(air, &photons, deposition.mixed(node), node_energy_ev(node))).collect();
+        let persistence: Vec<_> =
+            air.levels().iter().map(|air| EMITTERS.map(|emitter| Persistence::new(emitter, air))).collect();
+        let columns = (0..NODES)
+            .map(|node| column(&photons, &persistence, deposition.mixed(node), node_energy_ev(node)))
+            .collect();
         Self { deposition, photons, columns }
     }
 
@@ -119,14 +122,20 @@ pub fn colour_of(kilorayleigh: PerEmitter<f64>) -> [f64; 3] {
     })
 }
 
-fn column(air: &Atmosphere, photons: &[PerEmitter<f64>], pairs: &Profile, energy_ev: f64) -> Column {
+fn column(
+    photons: &[PerEmitter<f64>],
+    persistence: &[PerEmitter<Persistence>],
+    pairs: &Profile,
+    energy_ev: f64,
+) -> Column {
     let of = |emitter: Emitter| {
         let (mut whole, mut lifetime, mut spread) = (0.0, 0.0, 0.0);
-        for ((air, photons), pairs) in air.levels().iter().zip(photons).zip(pairs) {
+        for ((photons, persistence), pairs) in photons.iter().zip(persistence).zip(pairs) {
             let emission = photons[emitter.index()] * pairs;
+            let persistence = &persistence[emitter.index()];
             whole += emission;
-            lifetime += emission * persistence::lifetime(emitter, air);
-            spread += emission * persistence::spread(emitter, air, energy_ev);
+            lifetime += emission * persistence.lifetime;
+            spread += emission * persistence.spread(energy_ev);
         }
         let kilorayleigh = whole * LEVEL_SPACING / PHOTONS_PER_KILORAYLEIGH;
         [kilorayleigh, lifetime / whole, spread / whole * 1e-3]

@@ -1,6 +1,6 @@
 //! What the air between an observer and the sky takes away: light of auroras, and of stars.
 
-use bansho_base::math;
+use bansho_base::{math, parameters::Range};
 
 /// Magnitudes of a transmittance of 1/e.
 const MAGNITUDES_PER_OPTICAL_DEPTH: f64 = 1.085_736_204_758_13;
@@ -13,23 +13,21 @@ pub fn air_mass(elevation: f64) -> f64 {
     1.0 / (math::sin(degrees.to_radians()) + 0.50572 * math::pow(degrees + 6.07995, -1.6364))
 }
 
-/// Clear or hazy air above an observer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Extinction {
-    /// Rayleigh scattering at 550 nm, magnitudes overhead.
-    pub rayleigh: f64,
-    /// Aerosols at 550 nm, magnitudes overhead.
-    pub aerosol: f64,
-    /// Angstrom's exponent of the aerosols: how fast they take more from shorter waves.
-    pub angstrom: f64,
-    /// Ozone at its visible maximum near 600 nm, magnitudes overhead.
-    pub ozone: f64,
-}
+/// Magnitudes lost overhead; they may be many in haze.
+const MAGNITUDES: Range = Range::new(0.0, 5.0);
 
-impl Default for Extinction {
-    /// A clear night near sea level: 0.22 magnitudes in the middle of the spectrum (Hayes & Latham 1975; ozone of 300 Dobson units).
-    fn default() -> Self {
-        Self { rayleigh: 0.106, aerosol: 0.09, angstrom: 1.3, ozone: 0.04 }
+bansho_base::parameters! {
+    /// The air above an observer. The default is a clear night near sea level: 0.22 magnitudes in the middle of the spectrum (Hayes & Latham
+    /// 1975; ozone of 300 Dobson units).
+    pub struct Extinction {
+        /// Rayleigh scattering at 550 nm, overhead.
+        rayleigh: f64 = 0.106, limits(MAGNITUDES), unit("mag");
+        /// Aerosols at 550 nm, overhead; 0.3 is haze.
+        aerosol: f64 = 0.09, limits(MAGNITUDES), unit("mag");
+        /// Angstrom's exponent of the aerosols: how much more they take from shorter waves.
+        angstrom: f64 = 1.3, limits(Range::new(0.0, 4.0));
+        /// Ozone at its visible maximum near 600 nm, overhead.
+        ozone: f64 = 0.04, limits(MAGNITUDES), unit("mag");
     }
 }
 

@@ -2,8 +2,10 @@
 
 use bansho_base::math;
 
-pub use super::quenching::lifetime;
-use super::{emitter::Emitter, quenching::natural_lifetime};
+use super::{
+    emitter::Emitter,
+    quenching::{lifetime, natural_lifetime},
+};
 use crate::aurora::atmosphere::Air;
 
 /// Gyroradius of an electron of 1 eV that runs across a field of 50 microtesla, m: sqrt(2 m E) / (e B).
@@ -17,17 +19,30 @@ pub fn diffusion_coefficient(air: &Air) -> f64 {
     9.69e18 * math::pow(air.temperature, 0.774) / air.number_density()
 }
 
-/// Standard deviation along each direction across the field of the places where light leaves, about the field line of the electron, m.
-///
-/// The electrons gyrate, which every emitter shows; excited atoms diffuse while they live, by a variance of 2 D tau, which shows in the red line alone. A
-/// wind would also carry them, all alike: it is no blur.
-#[must_use]
-pub fn spread(emitter: Emitter, air: &Air, energy_ev: f64) -> f64 {
-    let gyration = GYRORADIUS_AT_1_EV * math::sqrt(energy_ev);
-    if natural_lifetime(emitter) < PROMPT {
-        return gyration;
+/// How long the light of one emitter lingers at an altitude, and how far its atoms get meanwhile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Persistence {
+    /// Mean lifetime, s: the light decays as exp(-t / lifetime).
+    pub lifetime: f64,
+    /// Variance along each direction of the way from excitation to radiation, m^2.
+    pub diffusion_variance: f64,
+}
+
+impl Persistence {
+    /// Of an emitter in this air. Excited atoms diffuse while they live, by a variance of 2 D tau, which shows in the red line alone.
+    #[must_use]
+    pub fn new(emitter: Emitter, air: &Air) -> Self {
+        let lifetime = lifetime(emitter, air);
+        let moves = natural_lifetime(emitter) > PROMPT;
+        Self { lifetime, diffusion_variance: if moves { 2.0 * diffusion_coefficient(air) * lifetime } else { 0.0 } }
     }
-    math::sqrt(gyration * gyration + 2.0 * diffusion_coefficient(air) * lifetime(emitter, air))
+
+    /// Standard deviation along each direction across the field of the places where light leaves, about the field line of electrons of an
+    /// energy, m: they gyrate, and the atoms diffuse. A wind would carry all of them alike: that is no blur.
+    #[must_use]
+    pub fn spread(&self, energy_ev: f64) -> f64 {
+        math::sqrt(GYRORADIUS_AT_1_EV * GYRORADIUS_AT_1_EV * energy_ev + self.diffusion_variance)
+    }
 }
 
 #[cfg(test)]
@@ -44,7 +59,7 @@ mod tests {
 
     #[test]
     fn spread_is_metres_for_prompt_light_and_kilometres_for_red() {
-        let root = |emitter, altitude_km| spread(emitter, &atmosphere().at(altitude_km), 1e4);
+        let root = |emitter, altitude_km| Persistence::new(emitter, &atmosphere().at(altitude_km)).spread(1e4);
         assert!((root(Emitter::NitrogenIon, 110.0) - 6.74).abs() < 0.01);
         assert!((10.0..100.0).contains(&root(Emitter::OxygenGreen, 110.0)));
         assert!((5e3..2e4).contains(&root(Emitter::OxygenRed, 250.0)));

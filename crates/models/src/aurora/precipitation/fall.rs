@@ -10,16 +10,17 @@ use super::{
 use crate::aurora::atmosphere::{LEVELS, level_altitude_km};
 
 const COLLISION: Purpose = Purpose::named("aurora collision");
+const VARIANT: Purpose = Purpose::named("aurora fall variant");
 
 /// A collision of an electron with an atom or a molecule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collision {
     /// Level of the atmosphere whose air is struck.
-    pub level: usize,
+    pub level: u32,
     /// Altitude, km: within a kilometre of the level.
-    pub altitude_km: f64,
+    pub altitude_km: f32,
     /// Displacement across the magnetic field since the fall began, km.
-    pub offset_km: [f64; 2],
+    pub offset_km: [f32; 2],
 }
 
 /// Falls of electrons of every energy of the grid.
@@ -53,13 +54,24 @@ impl Falls {
     /// # Panics
     /// For a node that is not of the grid.
     pub fn fall(&self, node: usize, key: Key, particle: u64) -> impl Iterator<Item = Collision> {
+        self.descend(node, key, particle, |_, uniform| uniform)
+    }
+
+    /// A fall whose k-th collision lies at `place(k, uniform)` in [0, 1) of its share of the energy.
+    fn descend(
+        &self,
+        node: usize,
+        key: Key,
+        particle: u64,
+        place: impl Fn(u32, f64) -> f64,
+    ) -> impl Iterator<Item = Collision> {
         let cumulative = &self.cumulative[node];
         let count = collision_count(node);
         let mut from_top = 0;
         let mut path = Path::default();
         (0..count).map(move |number| {
             let words = key.words(particle, number, COLLISION);
-            let spent = (number as f64 + uniform_f64(words[0], 0)) / count as f64;
+            let spent = (number as f64 + place(number, uniform_f64(words[0], 0))) / count as f64;
             while from_top < LEVELS - 1 && cumulative[from_top] <= spent {
                 from_top += 1;
             }
@@ -68,6 +80,53 @@ impl Falls {
             path.descend(level_altitude_km(level) + triangular(words[1]), turn);
             path.collision(level)
         })
+    }
+}
+
+/// Falls made once, for particles to share: so many for each energy of a range that their mean is the profile.
+#[derive(Clone, Debug)]
+pub struct FallLibrary {
+    first_node: usize,
+    /// Where the falls of each node begin, and the end of all.
+    starts: Vec<usize>,
+    collisions: Vec<Collision>,
+}
+
+/// Falls of each energy in a library: a power of two.
+pub const VARIANTS: u32 = 64;
+
+impl FallLibrary {
+    /// Falls for the nodes of a range of energies, by their key.
+    ///
+    /// # Panics
+    /// For nodes that are not of the grid.
+    #[must_use]
+    pub fn new(falls: &Falls, nodes: std::ops::RangeInclusive<usize>, key: Key) -> Self {
+        let first_node = *nodes.start();
+        let (mut starts, mut collisions) = (vec![0], Vec::new());
+        for node in nodes {
+            for variant in 0..VARIANTS {
+                // Each fall takes another part of each share, in an order that changes with the collision.
+                let place = |number: u32, uniform: f64| {
+                    let part = variant ^ (key.words(node as u64, number, VARIANT)[0] % VARIANTS);
+                    (part as f64 + uniform) / VARIANTS as f64
+                };
+                let particle = (node as u64) << 32 | variant as u64;
+                collisions.extend(falls.descend(node, key, particle, place));
+            }
+            starts.push(collisions.len());
+        }
+        Self { first_node, starts, collisions }
+    }
+
+    /// One of the [`VARIANTS`] falls of a node, any number; the nearest node that the library has.
+    #[must_use]
+    pub fn fall(&self, node: usize, variant: u32) -> &[Collision] {
+        let place = node.saturating_sub(self.first_node).min(self.starts.len() - 2);
+        let (start, end) = (self.starts[place], self.starts[place + 1]);
+        let count = (end - start) / VARIANTS as usize;
+        let first = start + (variant % VARIANTS) as usize * count;
+        &self.collisions[first..first + count]
     }
 }
 
@@ -103,9 +162,9 @@ impl Path {
 
     pub(super) fn collision(&self, level: usize) -> Collision {
         Collision {
-            level,
-            altitude_km: self.altitude_km.unwrap_or_else(|| level_altitude_km(level)),
-            offset_km: self.offset_km,
+            level: level as u32,
+            altitude_km: self.altitude_km.unwrap_or_else(|| level_altitude_km(level)) as f32,
+            offset_km: self.offset_km.map(|offset| offset as f32),
         }
     }
 }
@@ -134,7 +193,7 @@ mod tests {
             let mut histogram = [0.0; LEVELS];
             let particles = 20_000;
             for particle in 0..particles {
-                falls.fall(node, key, particle).for_each(|collision| histogram[collision.level] += 1.0);
+                falls.fall(node, key, particle).for_each(|collision| histogram[collision.level as usize] += 1.0);
             }
             let collisions = particles as f64 * collision_count(node) as f64;
             let profile = deposition.monoenergetic(node);
@@ -143,6 +202,33 @@ mod tests {
                 (0..LEVELS).map(|level| (histogram[level] / collisions - profile[level] / whole).abs()).sum();
             assert!(difference < tolerance, "{energy_ev} eV: {difference}");
         }
+    }
+
+    #[test]
+    fn a_library_has_the_profile_for_its_mean() {
+        let (deposition, falls) = falls(0.02);
+        let library = FallLibrary::new(&falls, 40..=70, Key::new(3, "aurora"));
+        for node in [40, 55, 70] {
+            let mut histogram = [0.0; LEVELS];
+            for variant in 0..VARIANTS {
+                let fall = library.fall(node, variant);
+                assert_eq!(fall.len(), collision_count(node) as usize);
+                assert!(fall.windows(2).all(|pair| pair[1].level <= pair[0].level));
+                fall.iter().for_each(|collision| histogram[collision.level as usize] += 1.0);
+            }
+            // Each part of each share has one collision: no running sum is off by more than one of them.
+            let all = (VARIANTS * collision_count(node)) as f64;
+            let mut sum = 0.0;
+            for (from_top, expected) in from_the_top(deposition.monoenergetic(node)).into_iter().enumerate() {
+                sum += histogram[LEVELS - 1 - from_top];
+                assert!(
+                    (sum / all - expected).abs() <= 1.0001 / all,
+                    "{node} {from_top}: {sum} of {all}, not {expected}"
+                );
+            }
+        }
+        assert_eq!(library.fall(0, 5), library.fall(40, 5));
+        assert_eq!(library.fall(96, VARIANTS + 1), library.fall(70, 1));
     }
 
     #[test]
@@ -155,11 +241,11 @@ mod tests {
         let mut counts = [0.0; 16];
         for particle in 0..20_000 {
             for collision in falls.fall(node, Key::new(1, "a"), particle) {
-                let place = (collision.altitude_km - 104.0) * 4.0;
+                let place = (collision.altitude_km as f64 - 104.0) * 4.0;
                 if (0.0..16.0).contains(&place) {
                     counts[place as usize] += 1.0 / 2e6;
                 }
-                assert!((collision.altitude_km - level_altitude_km(collision.level)).abs() <= 1.0);
+                assert!((collision.altitude_km as f64 - level_altitude_km(collision.level as usize)).abs() <= 1.0);
             }
         }
         for (i, count) in counts.iter().enumerate() {
@@ -181,7 +267,7 @@ mod tests {
             // But for the triangular reach of a level.
             assert!(path.windows(2).all(|pair| pair[1].level <= pair[0].level));
             assert_eq!(path[0].offset_km, [0.0; 2]);
-            let last = path[path.len() - 1].offset_km;
+            let last = path[path.len() - 1].offset_km.map(f64::from);
             squares = std::array::from_fn(|i| squares[i] + last[i] * last[i] / particles as f64);
         }
         assert!(squares[0] > 0.01 && (squares[0] / squares[1] - 1.0).abs() < 0.3, "{squares:?}");

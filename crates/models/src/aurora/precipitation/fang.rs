@@ -24,6 +24,26 @@ const COLUMN_SCALE: f64 = 6e-5;
 /// 1 mW in eV s^-1.
 const EV_PER_S_PER_MW: f64 = 1e-3 / 1.602_176_634e-19;
 
+/// What the deposition at an altitude takes from the air, whatever the energy.
+#[derive(Clone, Copy, Debug)]
+pub struct Layer {
+    /// ln (rho H / 6e-6 g cm^-2)^0.7, of equation (1): y = 2/E times that power, E in keV.
+    ln_column: f64,
+    /// Ion pairs, m^-3 s^-1 per mW m^-2, where the whole energy is spent over a scale height.
+    pairs_per_share: f64,
+}
+
+impl Layer {
+    /// For this air.
+    #[must_use]
+    pub fn new(air: &Air) -> Self {
+        Self {
+            ln_column: 0.7 * math::ln(air.density * air.scale_height / COLUMN_SCALE),
+            pairs_per_share: EV_PER_S_PER_MW / ION_PAIR_EV / air.scale_height,
+        }
+    }
+}
+
 /// Deposition by electrons of one energy.
 #[derive(Clone, Debug)]
 pub struct Monoenergetic {
@@ -50,11 +70,9 @@ impl Monoenergetic {
 
     /// Ion pairs made each second, m^-3 s^-1 per mW m^-2 of incident energy flux (2).
     #[must_use]
-    pub fn ionisation(&self, air: &Air) -> f64 {
-        // (1): y = 2/E (rho H / 6e-6 g cm^-2)^0.7, E in keV.
-        let column = air.density * air.scale_height;
-        let ln_y = std::f64::consts::LN_2 - self.ln_energy + 0.7 * math::ln(column / COLUMN_SCALE);
-        EV_PER_S_PER_MW / ION_PAIR_EV * self.share(ln_y) / air.scale_height
+    pub fn ionisation(&self, layer: &Layer) -> f64 {
+        let ln_y = std::f64::consts::LN_2 - self.ln_energy + layer.ln_column;
+        self.share(ln_y) * layer.pairs_per_share
     }
 }
 
@@ -76,7 +94,7 @@ mod tests {
             for row in rows(include_str!("data/fang2010_profiles.csv")) {
                 // Below this the wing is 1e-6 of the peak and less.
                 if row[column] > 1e4 {
-                    let q = beam.ionisation(&atmosphere().at(row[0]));
+                    let q = beam.ionisation(&Layer::new(&atmosphere().at(row[0])));
                     assert!((q / row[column] - 1.0).abs() < 1e-3, "{energy_ev} eV, {} km: {q}", row[0]);
                     compared += 1;
                 }
@@ -89,7 +107,7 @@ mod tests {
     fn peaks_and_columns_are_those_of_the_reference() {
         for row in rows(include_str!("data/fang2010_peaks.csv")) {
             let beam = Monoenergetic::new(row[0] * 1e3);
-            let profile: Vec<f64> = atmosphere().levels().iter().map(|air| beam.ionisation(air)).collect();
+            let profile: Vec<f64> = atmosphere().levels().iter().map(|air| beam.ionisation(&Layer::new(air))).collect();
             let peak = (0..LEVELS).max_by(|a, b| profile[*a].total_cmp(&profile[*b])).unwrap();
             assert!((level_altitude_km(peak) - row[1]).abs() < 0.6, "{} keV: {peak}", row[0]);
             assert!((profile[peak] / row[2] - 1.0).abs() < 0.01);

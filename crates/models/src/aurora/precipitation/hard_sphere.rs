@@ -84,7 +84,7 @@ mod tests {
         let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.02);
         let key = Key::new(1, "aurora");
         let ends = (0..500).filter_map(|particle| spheres.fall(energy_ev, key, particle).last());
-        ends.map(|collision| collision.altitude_km).sum::<f64>() / 500.0
+        ends.map(|collision| collision.altitude_km as f64).sum::<f64>() / 500.0
     }
 
     #[test]
@@ -114,7 +114,7 @@ mod tests {
         for particle in 0..200 {
             let path: Vec<_> = spheres.fall(1e6, Key::new(1, "b"), particle).collect();
             assert!(path.windows(2).all(|pair| pair[1].altitude_km <= pair[0].altitude_km));
-            assert!(path.iter().all(|collision| collision.level < LEVELS && collision.altitude_km >= 80.0));
+            assert!(path.iter().all(|collision| (collision.level as usize) < LEVELS && collision.altitude_km >= 80.0));
         }
     }
 }
