@@ -33,7 +33,8 @@ pub struct Column {
     pub kilorayleigh: PerEmitter<f64>,
     /// Mean lifetime of the light, s, weighted by emission.
     pub lifetime: PerEmitter<f64>,
-    /// How far the light spreads across the field: standard deviation along each direction, km, mean weighted by emission.
+    /// How far the light spreads across the field: standard deviation along each direction, km, at the altitude that halves the emission
+    /// (it grows with altitude, so this is the median).
     pub spread_km: PerEmitter<f64>,
 }
 
@@ -129,16 +130,17 @@ fn column(
     energy_ev: f64,
 ) -> Column {
     let of = |emitter: Emitter| {
-        let (mut whole, mut lifetime, mut spread) = (0.0, 0.0, 0.0);
-        for ((photons, persistence), pairs) in photons.iter().zip(persistence).zip(pairs) {
-            let emission = photons[emitter.index()] * pairs;
-            let persistence = &persistence[emitter.index()];
-            whole += emission;
-            lifetime += emission * persistence.lifetime;
-            spread += emission * persistence.spread(energy_ev);
-        }
+        let light = |level: usize| photons[level][emitter.index()] * pairs[level];
+        let whole: f64 = (0..LEVELS).map(light).sum();
+        let mut below = 0.0;
+        let half = (0..LEVELS).take_while(|level| {
+            below += light(*level);
+            below < 0.5 * whole
+        });
+        let at_half = &persistence[half.count().min(LEVELS - 1)][emitter.index()];
+        let lifetimes: f64 = (0..LEVELS).map(|level| light(level) * persistence[level][emitter.index()].lifetime).sum();
         let kilorayleigh = whole * LEVEL_SPACING / PHOTONS_PER_KILORAYLEIGH;
-        [kilorayleigh, lifetime / whole, spread / whole * 1e-3]
+        [kilorayleigh, lifetimes / whole, at_half.spread(energy_ev) * 1e-3]
     };
     let columns = EMITTERS.map(of);
     Column {
