@@ -120,6 +120,9 @@ impl FallLibrary {
     }
 
     /// One of the [`VARIANTS`] falls of a node, any number; the nearest node that the library has.
+    ///
+    /// # Panics
+    /// If the library was made for an empty range.
     #[must_use]
     pub fn fall(&self, node: usize, variant: u32) -> &[Collision] {
         let place = node.saturating_sub(self.first_node).min(self.starts.len() - 2);
