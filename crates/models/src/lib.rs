@@ -5,6 +5,7 @@ mod fault;
 mod lanes;
 
 pub mod flame_particles;
+pub mod aurora;
 pub mod flame_sheet;
 pub mod ground;
 pub mod lamps;
