@@ -2,6 +2,7 @@
 
 mod fault;
 
+pub mod aurora;
 pub mod flame_sheet;
 
 pub use fault::{FaultKind, ParameterFault};
