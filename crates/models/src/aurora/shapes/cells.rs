@@ -28,12 +28,6 @@ impl CellGrid {
         self.line(1, point.y) * self.size[0] + self.line(0, point.x)
     }
 
-    /// Whether `point` lies within the rectangle, up to `margin` beyond it.
-    pub(super) fn holds(&self, point: DVec2, margin: f64) -> bool {
-        let high = self.low + DVec2::new(self.size[0] as f64, self.size[1] as f64) * self.cell;
-        point.cmpge(self.low - margin).all() && point.cmple(high + margin).all()
-    }
-
     /// Column (`axis` 0) or row (1) of a coordinate.
     fn line(&self, axis: usize, coordinate: f64) -> usize {
         // Casts saturate, so what lies outside or is no number ends in a border cell.

@@ -36,7 +36,7 @@ impl Form {
             Self::SShape => 140.0,
             Self::Spiral => 630.0,
             Self::Fold => 105.0,
-            Self::Surge => 95.0,
+            Self::Surge => 85.0,
             Self::Omega => 110.0,
             Self::Peel => 180.0,
         }
@@ -66,7 +66,7 @@ impl Form {
             // The sine-generated curve of meanders (Langbein & Leopold 1966), quiet at both ends.
             Self::Fold => wave(count * s) * smoothstep(0.0, 0.2, s) * smoothstep(0.0, 0.2, 1.0 - s),
             Self::Surge => {
-                let rise = smoothstep(0.2, 0.4, s) - 2.6 * smoothstep(0.45, 0.85, s);
+                let rise = smoothstep(0.2, 0.4, s) - 2.3 * smoothstep(0.45, 0.85, s);
                 -rise
             }
             Self::Omega => {

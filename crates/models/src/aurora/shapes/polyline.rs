@@ -81,12 +81,12 @@ pub(super) fn by_recorded_points(recorded: &[DVec2], count: usize) -> Vec<DVec2>
 }
 
 /// A smooth line through the points of a sketch: Catmull-Rom segments, whose centripetal knots make neither loops nor cusps
-/// between two points (Yuksel, Schaefer & Keyser 2011). Strokes of many points are returned as they are.
-pub(super) fn smoothed(points: &[DVec2]) -> Vec<DVec2> {
+/// between two points (Yuksel, Schaefer & Keyser 2011), and how many pieces lie between them. Strokes of many points stay as they are.
+pub(super) fn smoothed(points: Vec<DVec2>) -> (Vec<DVec2>, usize) {
     const PIECES: usize = 8;
     let count = points.len();
     if !(3..SKETCH).contains(&count) {
-        return points.to_vec();
+        return (points, 1);
     }
     let mirrored = |end: DVec2, inner: DVec2| end + (end - inner);
     let before = mirrored(points[0], points[1]);
@@ -99,7 +99,7 @@ pub(super) fn smoothed(points: &[DVec2]) -> Vec<DVec2> {
         line.extend((1..PIECES).map(|piece| centripetal(four, piece as f64 / PIECES as f64)));
         line.push(points[index + 1]);
     }
-    line
+    (line, PIECES)
 }
 
 /// The curve between the two inner points, by the pyramid of Barry & Goldman (1988).
@@ -149,13 +149,13 @@ mod tests {
 
     #[test]
     fn a_smoothed_sketch_passes_its_points_and_stays_straight_where_they_are() {
-        let line = smoothed(&corner());
-        assert_eq!(line.len(), 17);
+        let (line, pieces) = smoothed(corner());
+        assert_eq!((line.len(), pieces), (17, 8));
         assert!(corner().iter().all(|point| line.contains(point)));
         let straight: Vec<DVec2> = (0..4).map(|i| DVec2::new(f64::from(i), 0.0)).collect();
-        let line = smoothed(&straight);
+        let (line, _) = smoothed(straight);
         assert!(line.iter().all(|point| point.y.abs() < 1e-12));
         assert!(line.windows(2).all(|pair| pair[0].x < pair[1].x));
-        assert_eq!(smoothed(&corner()[..2]), corner()[..2]);
+        assert_eq!(smoothed(corner()[..2].to_vec()), (corner()[..2].to_vec(), 1));
     }
 }
