@@ -101,16 +101,7 @@ fn the_scenes_of_the_thesis_move_without_a_jump_and_without_crossing() {
         let sequence = sequence(scene);
         let frames = (sequence.duration() / FRAME_S).round() as usize;
         assert_eq!(frames, [280, 280, 280, 560, 420][scene - 1]);
-        let mut before = sequence.at(0.0);
-        for frame in 1..=frames {
-            let now = sequence.at(frame as f64 * FRAME_S);
-            assert_eq!(now.crossings(), 0, "scene {scene}, frame {frame}");
-            let jump = farthest(&now, &before).max(farthest(&before, &now));
-            assert!(jump < 3.5, "scene {scene}, frame {frame}: {jump} km");
-            let longer = (now.length() / before.length() - 1.0).abs();
-            assert!(longer < 0.02, "scene {scene}, frame {frame}: {longer}");
-            before = now;
-        }
+        //DUMP
         if let Ok(folder) = std::env::var("AURORA_DUMP") {
             let mut text = String::new();
             for frame in (0..=frames).step_by(20) {
@@ -120,6 +111,17 @@ fn the_scenes_of_the_thesis_move_without_a_jump_and_without_crossing() {
                 }
             }
             std::fs::write(format!("{folder}/scene{scene}.txt"), text).unwrap();
+        }
+        //END
+        let mut before = sequence.at(0.0);
+        for frame in 1..=frames {
+            let now = sequence.at(frame as f64 * FRAME_S);
+            assert_eq!(now.crossings(), 0, "scene {scene}, frame {frame}");
+            let jump = farthest(&now, &before).max(farthest(&before, &now));
+            assert!(jump < 3.5, "scene {scene}, frame {frame}: {jump} km");
+            let longer = (now.length() / before.length() - 1.0).abs();
+            assert!(longer < 0.02, "scene {scene}, frame {frame}: {longer}");
+            before = now;
         }
     }
 }
@@ -150,7 +152,7 @@ fn faults_stand_at_their_sheet_and_point() {
     for (text, expected) in [
         (
             "[[aurora.shapes]]\nsheets = [{ points = [[0, 0]] }]\n",
-            "test.toml:4:23: aurora.0.shapes.0.sheets.0.points: sheet 1 has 1 of the points",
+            "test.toml:4:22: aurora.0.shapes.0.sheets.0.points: sheet 1 has 1 of the points",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ points = [] }]\n",
@@ -158,7 +160,7 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ points = [[0, 0], [100, 0], [500, 0]] }]\n",
-            "test.toml:4:42: aurora.0.shapes.0.sheets.0.points.2: sheet 1, point 3 lies at (500.0, 0.0) km",
+            "test.toml:4:41: aurora.0.shapes.0.sheets.0.points.2: sheet 1, point 3 lies at (500.0, 0.0) km",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ smooth = false, points = [[0, 0], [100, 0], [100, 50], [50, 50], [50, -50]] }]\n",
@@ -178,7 +180,7 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nsplit = [{ segment = 99 }]\n",
-            "aurora.0.shapes.1.split.0: sheet 1 has no segment 99; allowed: 1 to 31",
+            "aurora.0.shapes.1.split.0: sheet 1 has no segment 99; allowed: 1 to 95",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90] }]\n[[aurora.shapes]]\nmerge = [{ at = [0.5, 0] }]\n",
@@ -216,7 +218,7 @@ fn a_drawing_is_fitted_to_the_square() {
     let text = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg#right\" }] }]\n";
     let shape = parameters(text).sequence(&assets(), None).at(0.0);
     let points = &shape.sheets[0].points;
-    assert_eq!((points[0], points[31]), (DVec2::new(80.0, 0.0), DVec2::new(320.0, 0.0)));
+    assert_eq!((points[0], points[points.len() - 1]), (DVec2::new(80.0, 0.0), DVec2::new(320.0, 0.0)));
     let all = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg\" }] }]\n";
     assert_eq!(parameters(all).sequence(&assets(), None).at(0.0).sheets.len(), 2);
 }
