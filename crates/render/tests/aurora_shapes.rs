@@ -101,18 +101,6 @@ fn the_scenes_of_the_thesis_move_without_a_jump_and_without_crossing() {
         let sequence = sequence(scene);
         let frames = (sequence.duration() / FRAME_S).round() as usize;
         assert_eq!(frames, [280, 280, 280, 560, 420][scene - 1]);
-        //DUMP
-        if let Ok(folder) = std::env::var("AURORA_DUMP") {
-            let mut text = String::new();
-            for frame in (0..=frames).step_by(20) {
-                for sheet in &sequence.at(frame as f64 * FRAME_S).sheets {
-                    let points: Vec<String> = sheet.points.iter().map(|p| format!("{:.2},{:.2}", p.x, p.y)).collect();
-                    text += &format!("{frame} {}\n", points.join(" "));
-                }
-            }
-            std::fs::write(format!("{folder}/scene{scene}.txt"), text).unwrap();
-        }
-        //END
         let mut before = sequence.at(0.0);
         for frame in 1..=frames {
             let now = sequence.at(frame as f64 * FRAME_S);

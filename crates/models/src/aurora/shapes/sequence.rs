@@ -31,7 +31,7 @@ pub struct Sequence {
 }
 
 impl Sequence {
-    /// The sequence of `shapes` on a drawn square of side `extent_km`; two bands that become each other where there is no shape.
+    /// The sequence of `shapes` on a drawn square of side `extent_km`; a moving band before a quiet arc where there is no shape.
     ///
     /// With `loop_s` it repeats after that time, in which all of it passes: round and round if the last shape is the first
     /// again, there and back if not.
