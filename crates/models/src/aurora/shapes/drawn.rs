@@ -198,7 +198,7 @@ fn fitted(points: &[DVec2], drawing: &Drawing, extent_km: f64) -> Vec<DVec2> {
 /// The points that were given come first, so that a fault names one of them; then the smooth line between them.
 fn check_extent(sheets: &[DrawnSheet], place: Place) -> Result<(), ShapeFault> {
     let half = place.extent_km / 2.0;
-    let outside = |point: &DVec2| !(point.abs().max_element() <= half);
+    let outside = |point: &DVec2| point.abs().max_element() > half;
     for (index, sheet) in sheets.iter().enumerate() {
         let given = sheet.recorded.iter().position(outside).map(|at| at * sheet.pieces);
         let Some(at) = given.or_else(|| sheet.line.points().iter().position(outside)) else { continue };

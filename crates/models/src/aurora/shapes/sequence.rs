@@ -13,7 +13,7 @@ use super::{
 };
 
 /// Weights of even spacing against nearness, the favourite first: others are tried where sheets would cross themselves on the way.
-const EVENNESS: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
+const EVENNESS: [f64; 4] = [0.01, 0.03, 0.1, 1.0];
 
 /// Moments of each transition at which that is looked at.
 const CHECKED_MOMENTS: usize = 32;

@@ -196,7 +196,7 @@ fn random_shape(key: Key, case: u64, step: u32, sheets: usize) -> ShapeParameter
 fn random_sequences_stay_finite_and_inside() {
     let key = Key::new(6, "sequences");
     let mut made = 0;
-    for case in 0..300 {
+    for case in 0..60 {
         let mut shapes: Vec<ShapeParameters> = (0..4).map(|step| random_shape(key, case, step, 4)).collect();
         shapes[2].split = vec![SplitParameters { sheet: 1, at: Some((case % 11) as f64 / 10.0), segment: None }];
         shapes[2].merge = vec![MergeParameters { sheets: [3, 4], ..MergeParameters::default() }];
@@ -224,7 +224,7 @@ fn random_sequences_stay_finite_and_inside() {
             assert_no_jump(&sequence);
         }
     }
-    assert!(made > 100, "only {made}");
+    assert!(made > 20, "only {made}");
 }
 
 /// A scribble of 10,000 recorded points is refused at its first crossing, a long spiral accepted.
