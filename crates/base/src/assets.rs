@@ -6,6 +6,10 @@ use crate::{
     image::Image,
     mesh::{Mesh, MeshError},
 };
+//! What a scene refers to by name: pictures, drawings and text, wherever they are kept.
+
+
+use crate::{drawing::Drawing, image::Image};
 
 /// How the numbers of a picture are meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +61,12 @@ pub enum AssetProblem {
     /// It holds no usable mesh.
     #[error("holds no usable mesh: {0}")]
     Mesh(#[from] MeshError),
+    /// A drawing without strokes.
+    #[error("holds no strokes (allowed: an SVG file with path, polyline or line elements)")]
+    NoStrokes,
+    /// A drawing was asked for a stroke that it lacks.
+    #[error("has no stroke of the id `{0}`")]
+    NoStroke(String),
     /// Its contents are damaged or not what the name says.
     #[error("is damaged or not of the kind its name says: {0}")]
     Damaged(String),
@@ -100,6 +110,9 @@ pub trait Assets: Send + Sync {
     /// # Errors
     /// The asset is missing, too large, damaged, or holds no triangles.
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError>;
+    /// The strokes of the line drawing at `path`.
+    /// The asset is missing, damaged, too large, or holds no strokes.
+    fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError>;
 
     /// The text at `path`.
     ///
@@ -119,6 +132,7 @@ pub trait Assets: Send + Sync {
 pub struct MemoryAssets {
     pictures: BTreeMap<String, Arc<Picture>>,
     meshes: BTreeMap<String, Arc<Mesh>>,
+    drawings: BTreeMap<String, Arc<Drawing>>,
     texts: BTreeMap<String, Arc<str>>,
 }
 
@@ -131,6 +145,9 @@ impl MemoryAssets {
     /// Keeps `mesh` under `path`.
     pub fn insert_mesh(&mut self, path: impl Into<String>, mesh: Mesh) {
         self.meshes.insert(path.into(), Arc::new(mesh));
+    /// Keeps `drawing` under `path`.
+    pub fn insert_drawing(&mut self, path: impl Into<String>, drawing: Drawing) {
+        self.drawings.insert(path.into(), Arc::new(drawing));
     }
 
     /// Keeps `text` under `path`.
@@ -150,6 +167,8 @@ impl Assets for MemoryAssets {
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
         self.meshes.get(path).cloned().ok_or_else(|| missing(path))
+    fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
+        self.drawings.get(path).cloned().ok_or_else(|| missing(path))
     }
 
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
@@ -159,6 +178,8 @@ impl Assets for MemoryAssets {
     fn digest(&self, path: &str, _frame: i64) -> Result<[u8; 32], AssetError> {
         let known = self.pictures.contains_key(path) || self.meshes.contains_key(path) || self.texts.contains_key(path);
         if !known {
+        let drawn = self.pictures.contains_key(path) || self.drawings.contains_key(path);
+        if !drawn && !self.texts.contains_key(path) {
             return Err(missing(path));
         }
         let mut digest = [0; 32];

@@ -10,6 +10,7 @@ pub mod canvas;
 pub mod color;
 pub mod curve;
 pub mod distance_field;
+pub mod drawing;
 pub mod image;
 pub mod math;
 pub mod mesh;

@@ -6,3 +6,7 @@
 pub mod atmosphere;
 pub mod light;
 pub mod precipitation;
+//! K. Sekiguchi, "A study on artist-controllable aurora simulation". [`shapes`] are the foot of the aurora as it is drawn and as it
+//! becomes.
+
+pub mod shapes;
