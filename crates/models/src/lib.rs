@@ -6,6 +6,7 @@ mod lanes;
 
 pub mod flame_particles;
 pub mod aurora;
+pub mod field;
 pub mod flame_sheet;
 pub mod ground;
 pub mod lamps;
