@@ -1,0 +1,53 @@
+//! How long light lingers after the electrons have gone, and how far the excited atoms get before they radiate.
+
+use bansho_base::math;
+
+pub use super::quenching::lifetime;
+use super::{emitter::Emitter, quenching::natural_lifetime};
+use crate::aurora::atmosphere::Air;
+
+/// Gyroradius of an electron of 1 eV that runs across a field of 50 microtesla, m: sqrt(2 m E) / (e B).
+const GYRORADIUS_AT_1_EV: f64 = 0.067_4;
+/// States that live shorter than this radiate where they are made, s.
+const PROMPT: f64 = 1e-3;
+
+/// Coefficient of diffusion of O through the air, m^2/s (Colegrove et al. 1966: 9.69e16 T^0.774 / n cm^2/s for O in N2).
+#[must_use]
+pub fn diffusion_coefficient(air: &Air) -> f64 {
+    9.69e18 * math::pow(air.temperature, 0.774) / air.number_density()
+}
+
+/// Standard deviation along each direction across the field of the places where light leaves, about the field line of the electron, m.
+///
+/// The electrons gyrate, which every emitter shows; excited atoms diffuse while they live, by a variance of 2 D tau, which shows in the red line alone. A
+/// wind would also carry them, all alike: it is no blur.
+#[must_use]
+pub fn spread(emitter: Emitter, air: &Air, energy_ev: f64) -> f64 {
+    let gyration = GYRORADIUS_AT_1_EV * math::sqrt(energy_ev);
+    if natural_lifetime(emitter) < PROMPT {
+        return gyration;
+    }
+    math::sqrt(gyration * gyration + 2.0 * diffusion_coefficient(air) * lifetime(emitter, air))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aurora::atmosphere::atmosphere;
+
+    #[test]
+    fn diffusion_by_hand() {
+        // 9.69e18 x 995.84^0.774 / 1.774e15 at 250 km.
+        let diffusion = diffusion_coefficient(&atmosphere().at(250.0));
+        assert!((diffusion / 1.143e6 - 1.0).abs() < 0.01, "{diffusion}");
+    }
+
+    #[test]
+    fn spread_is_metres_for_prompt_light_and_kilometres_for_red() {
+        let root = |emitter, altitude_km| spread(emitter, &atmosphere().at(altitude_km), 1e4);
+        assert!((root(Emitter::NitrogenIon, 110.0) - 6.74).abs() < 0.01);
+        assert!((10.0..100.0).contains(&root(Emitter::OxygenGreen, 110.0)));
+        assert!((5e3..2e4).contains(&root(Emitter::OxygenRed, 250.0)));
+        assert!(root(Emitter::OxygenRed, 110.0) < 100.0);
+    }
+}
