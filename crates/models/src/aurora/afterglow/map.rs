@@ -22,11 +22,11 @@ pub struct GlowCell {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Tile {
-    pub(super) place: u32,
-    pub(super) powers: [f32; SIDE * SIDE],
+struct Tile {
+    place: u32,
+    powers: [f32; SIDE * SIDE],
     /// Power times energy, W eV.
-    pub(super) weighted: [f32; SIDE * SIDE],
+    weighted: [f32; SIDE * SIDE],
 }
 
 /// Power on square cells of which only lit ones are stored.
@@ -42,7 +42,7 @@ pub struct GlowMap {
     side: usize,
     /// For each place of a tile its number, or [`NO_TILE`].
     numbers: Vec<u32>,
-    pub(super) tiles: Vec<Tile>,
+    tiles: Vec<Tile>,
 }
 
 impl GlowMap {
@@ -67,6 +67,28 @@ impl GlowMap {
     #[must_use]
     pub fn power_w(&self) -> f64 {
         self.cells().map(|cell| f64::from(cell.power_w)).sum()
+    }
+
+    /// Its lit tiles: the place of each, and the powers and then the powers times energy of its cells.
+    pub(in crate::aurora) fn to_lists(&self) -> (Vec<u32>, Vec<f32>) {
+        let places = self.tiles.iter().map(|tile| tile.place).collect();
+        (places, self.tiles.iter().flat_map(|tile| tile.powers.into_iter().chain(tile.weighted)).collect())
+    }
+
+    /// A map laid out as this one that holds what [`Self::to_lists`] gave; none if the lists are no such map.
+    pub(in crate::aurora) fn from_lists(&self, places: &[u32], values: &[f32]) -> Option<Self> {
+        let (tiles, rest) = values.as_chunks::<{ 2 * SIDE * SIDE }>();
+        if tiles.len() != places.len() || !rest.is_empty() {
+            return None;
+        }
+        let mut map = Self { numbers: vec![NO_TILE; self.numbers.len()], tiles: Vec::new(), ..*self };
+        for (place, values) in places.iter().zip(tiles) {
+            let number = map.numbers.get_mut(*place as usize).filter(|number| **number == NO_TILE)?;
+            *number = map.tiles.len() as u32;
+            let half = |start: usize| std::array::from_fn(|cell| values[start + cell]);
+            map.tiles.push(Tile { place: *place, powers: half(0), weighted: half(SIDE * SIDE) });
+        }
+        Some(map)
     }
 
     fn cell(&self, tile: &Tile, cell: usize) -> Option<GlowCell> {
