@@ -11,7 +11,7 @@ use bansho_base::{
     observer::Unobserved,
     phenomenon::Prepared,
     random::{Key, Purpose},
-    surroundings::{Emitter, Publication, Surroundings},
+    surroundings::{Emitter, Surroundings},
     wind::{Wind, WindParameters},
 };
 
