@@ -125,6 +125,14 @@ impl Camera {
         self
     }
 
+    /// The camera behind a level mirror at `height`: it sees at each pixel what this one sees there in the mirror.
+    /// Its frame is left-handed.
+    pub fn mirrored(mut self, height: f64) -> Self {
+        self.position.y = 2.0 * height - self.position.y;
+        self.orientation = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0)) * self.orientation;
+        self
+    }
+
     /// `point` in the camera's frame: right, up, backward, m.
     pub fn to_camera(&self, point: DVec3) -> DVec3 {
         self.orientation.transpose() * (point - self.position)
@@ -264,6 +272,19 @@ mod tests {
                 assert!((projection.depth - 7.5).abs() < 1e-12);
             }
         }
+    }
+
+    #[test]
+    fn a_mirrored_camera_sees_the_reflected_ray() {
+        let (camera, height) = (camera(Lens::Perspective), 0.5);
+        let pixel = DVec2::new(40.0, 200.0);
+        let direction = camera.direction(pixel).unwrap();
+        assert!(direction.y < 0.0);
+        let ground = camera.position + direction * ((height - camera.position.y) / direction.y);
+        let seen = ground + DVec3::new(direction.x, -direction.y, direction.z) * 3.0;
+        let mirrored = camera.mirrored(height);
+        assert!((mirrored.project(seen).unwrap().pixel - pixel).length() < 1e-9);
+        assert_eq!(mirrored.mirrored(height), camera);
     }
 
     #[test]

@@ -74,6 +74,10 @@ pub struct View {
     pub overscan: usize,
     /// The part of the picture that is drawn.
     pub window: Rect,
+    /// Height of the level mirror that the picture is seen in, m.
+    pub mirror: Option<f64>,
+    /// Luminance that a display will show as white, cd/m^2, where it is known: what is far below needs no drawing.
+    pub white_luminance: Option<f64>,
 }
 
 impl View {
@@ -81,13 +85,30 @@ impl View {
     pub fn new(path: CameraParameters, shutter: Shutter, next_middle: f64, size: [usize; 2], overscan: usize) -> Self {
         let camera = path.at(shutter.middle(), size).with_overscan(overscan);
         let size = size.map(|side| side + 2 * overscan);
-        Self { camera, path, shutter, next_middle, size, overscan, window: Rect::of_size(size[0], size[1]) }
+        Self {
+            camera,
+            path,
+            shutter,
+            next_middle,
+            size,
+            overscan,
+            window: Rect::of_size(size[0], size[1]),
+            mirror: None,
+            white_luminance: None,
+        }
+    }
+
+    /// The whole picture as it is seen in a level mirror at `height`, m.
+    pub fn mirrored(&self, height: f64) -> Self {
+        let window = Rect::of_size(self.size[0], self.size[1]);
+        Self { camera: self.camera.mirrored(height), window, mirror: Some(height), ..self.clone() }
     }
 
     /// The camera at time `t`.
     pub fn camera_at(&self, t: f64) -> Camera {
         let display = self.size.map(|side| side - 2 * self.overscan);
-        self.path.at(t, display).with_overscan(self.overscan)
+        let camera = self.path.at(t, display).with_overscan(self.overscan);
+        self.mirror.map_or(camera, |height| camera.mirrored(height))
     }
 }
 
@@ -168,6 +189,19 @@ pub struct Strip {
     /// The phenomenon's AOVs in the order of its descriptors; empty when nobody asked for them.
     pub aovs: Vec<AovPlane>,
     absorption: Absorption,
+}
+
+/// Planes of a strip that takes all colours alike, to put samples behind each other one pixel at a time: `L += T l; T *= t`.
+#[derive(Debug)]
+pub struct GrayPlanes<'a> {
+    /// Red, green and blue of L.
+    pub radiance: [&'a mut [f32]; 3],
+    /// T.
+    pub transmittance: &'a mut [f32],
+    /// Depth of the nearest sample, m.
+    pub depth: &'a mut [f32],
+    /// Depth of the plate, m; empty where there is none.
+    pub plate_depth: &'a [f32],
 }
 
 /// How many planes of T hold something.
@@ -261,6 +295,18 @@ impl Strip {
             self.absorption = Absorption::Coloured;
         }
         &mut self.transmittance
+    }
+
+    /// Planes to write to where nothing coloured absorbs; `None` once something does.
+    pub fn gray_planes_mut(&mut self) -> Option<GrayPlanes<'_>> {
+        self.begin_gray();
+        let [red, green, blue] = &mut self.radiance;
+        (self.absorption == Absorption::Gray).then_some(GrayPlanes {
+            radiance: [red, green, blue],
+            transmittance: &mut self.transmittance[0],
+            depth: &mut self.depth,
+            plate_depth: &self.plate_depth,
+        })
     }
 
     fn begin_gray(&mut self) {

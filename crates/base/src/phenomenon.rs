@@ -2,7 +2,7 @@
 
 use crate::{
     canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
-    image::{Image, Rect},
+    image::{Figure, Image, Rect},
     observer::{Cancelled, Observer},
     point_cloud::PointCloud,
     surroundings::{Publication, Surroundings},
@@ -34,6 +34,14 @@ pub enum SnapshotError {
     /// It is shorter or longer than its contents say, or does not match its checksum.
     #[error("the snapshot is damaged")]
     Damaged,
+}
+
+/// What a user should know of how a phenomenon will look, and that stops nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Remark {
+    /// It only shows the light of others, and there is none.
+    #[error("nothing lights it, so it is drawn black; a [[light]], a [sky] or a fire would")]
+    Unlit,
 }
 
 /// One phenomenon of a scene, ready to be drawn at any time (closed form) or stepped there.
@@ -79,6 +87,16 @@ pub trait Phenomenon: Send + Sync {
     /// What the others see of it while the shutter is open.
     fn publish(&self, shutter: Shutter) -> Publication;
 
+    /// What a user should know of how it will look among others.
+    fn remark(&self, _surroundings: &Surroundings) -> Option<Remark> {
+        None
+    }
+
+    /// Height of the level mirror that it is, m. It then gets a picture of everything else seen in that mirror.
+    fn mirror(&self) -> Option<f64> {
+        None
+    }
+
     /// The stretches of depth that it fills, in any order. Slices are cut at their ends.
     fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval>;
 
@@ -103,6 +121,11 @@ pub trait Prepared: Send + Sync {
     ///
     /// Must give each pixel the same value whatever strip it comes in.
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip);
+
+    /// Numbers that this frame is known by, each name once.
+    fn figures(&self) -> Vec<Figure> {
+        Vec::new()
+    }
 
     /// How it bends the light of what lies behind it.
     fn deflection(&self) -> Option<Deflection<'_>> {

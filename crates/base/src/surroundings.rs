@@ -1,8 +1,10 @@
 //! What phenomena know of each other: light, absorption and obstacles, but never names.
 
+use std::sync::LazyLock;
+
 use glam::DVec3;
 
-use crate::{air::Air, wind::Wind};
+use crate::{air::Air, image::Image, sky::Sky, wind::Wind};
 
 pub use crate::occluder::Occluder;
 
@@ -84,15 +86,30 @@ impl Publication {
     }
 }
 
-/// What a phenomenon is drawn among: the wind, and what all others published.
+/// What a phenomenon is drawn among: wind and sky, and what all others published.
 #[derive(Clone, Debug)]
 pub struct Surroundings<'a> {
     /// The one wind of the scene.
     pub wind: &'a Wind,
     /// The one air of the scene.
     pub air: &'a Air,
+    /// The light of the sky.
+    pub sky: Sky,
+    /// What is seen in the phenomenon's own [mirror](crate::phenomenon::Phenomenon::mirror): radiance (ACEScg, cd/m^2) and alpha of
+    /// the whole picture.
+    pub reflection: Option<&'a Image<4>>,
     /// Everybody else's lights, extinction and occluders, and the scene's own.
     pub others: Publication,
+}
+
+/// Air of the usual temperature and pressure.
+static STANDARD_AIR: LazyLock<Air> = LazyLock::new(Air::default);
+
+impl<'a> Surroundings<'a> {
+    /// Nothing but a wind in ordinary air.
+    pub fn of_wind(wind: &'a Wind) -> Self {
+        Self { wind, air: &STANDARD_AIR, sky: Sky::DARK, reflection: None, others: Publication::default() }
+    }
 }
 
 #[cfg(test)]

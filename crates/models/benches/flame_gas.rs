@@ -15,7 +15,7 @@ use bansho_base::{
     observer::Unobserved,
     phenomenon::Prepared,
     random::Key,
-    surroundings::{Publication, Surroundings},
+    surroundings::Surroundings,
     wind::{Wind, WindParameters},
 };
 use bansho_models::flame_particles::{
@@ -56,7 +56,7 @@ fn gas(particles: &Particles) -> Gas<'_> {
 /// Prepares the gas and hands it to `each`.
 fn prepared(particles: &Particles, look: &LookParameters, view: &View, each: impl FnOnce(&PreparedGas)) {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
-    let surroundings = Surroundings { wind: &wind, air: &air, others: Publication::default() };
+    let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
     if let Ok(prepared) = PreparedGas::new(gas(particles), look, view, &surroundings, &Unobserved) {
         each(&prepared);
     }

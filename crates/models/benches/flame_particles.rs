@@ -9,7 +9,7 @@ use bansho_base::{
     assets::MemoryAssets,
     parameters::Auto,
     phenomenon::Phenomenon,
-    surroundings::{Publication, Surroundings},
+    surroundings::Surroundings,
     wind::{Wind, WindParameters},
 };
 use bansho_models::flame_particles::{FlameParticles, FlameParticlesParameters};
@@ -19,7 +19,7 @@ fn step(criterion: &mut Criterion) {
     let velocity = Animated::from([1.0, 0.0, 0.3]);
     let wind = Wind::new(WindParameters { velocity, ..WindParameters::default() }, 1, None);
     let air = Air::default();
-    let around = Surroundings { wind: &wind, air: &air, others: Publication::default() };
+    let around = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
     let mut group = criterion.benchmark_group("flame particles step");
     group.sample_size(10);
     for count in [3_000, 30_000, 100_000] {

@@ -3,7 +3,6 @@
 use std::hint::black_box;
 
 use bansho_base::{
-    air::Air,
     animation::Animated,
     camera::CameraParameters,
     canvas::{DepthInterval, Shutter, Strip, View},
@@ -12,7 +11,7 @@ use bansho_base::{
     observer::Unobserved,
     parameters::Auto,
     phenomenon::Phenomenon,
-    surroundings::{Publication, Surroundings},
+    surroundings::Surroundings,
     wind::{Wind, WindParameters},
 };
 use bansho_models::flame_sheet::{FlameSheet, FlameSheetParameters, PaperTexture, chain, paper_texture};
@@ -37,7 +36,7 @@ fn view(parameters: &FlameSheetParameters) -> View {
 /// Draws one frame; each thread takes every so manieth strip.
 fn draw_frame(sheet: &FlameSheet, view: &View, strips: &mut [Strip]) {
     let wind = Wind::new(WindParameters::default(), 1, None);
-    let surroundings = Surroundings { wind: &wind, air: &Air::default(), others: Publication::default() };
+    let surroundings = Surroundings::of_wind(&wind);
     let Ok(prepared) = sheet.prepare(view, &surroundings, &Unobserved) else { return };
     let threads = strips.len();
     let draw = |thread: usize, strip: &mut Strip| {

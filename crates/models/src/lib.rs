@@ -4,9 +4,14 @@ mod blue_flame;
 mod fault;
 mod lanes;
 
+pub mod aurora;
 pub mod field;
 pub mod flame_particles;
 pub mod flame_sheet;
+pub mod ground;
+pub mod lamps;
+pub mod rain;
+pub mod sky;
 pub mod sparks;
 pub mod sph;
 

@@ -45,6 +45,12 @@ fn state(plan: &Plan, hasher: &mut blake3::Hasher) {
     for light in &plan.scene.lights {
         table("light", light.to_table());
     }
+    if let Some(sky) = &plan.scene.sky {
+        table("sky", sky.to_table());
+    }
+    if let Some(ground) = &plan.scene.ground {
+        table("ground", ground.to_table());
+    }
     for obstacle in &plan.scene.obstacles {
         table("obstacle", obstacle.to_table());
     }

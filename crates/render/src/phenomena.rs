@@ -4,12 +4,20 @@ use bansho_base::{parameters::ProblemKind, phenomenon::Phenomenon};
 use bansho_models::{
     flame_particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind},
     flame_sheet::{FlameSheet, FlameSheetParameters},
+    ground::Ground,
+    lamps::{Lamp, Lamps},
+    rain::{Rain, RainParameters},
+    sky::SkyBackdrop,
 };
 
-use crate::scene::source::{Describe, Opening, OpeningFault, PhenomenonKind};
+use crate::{
+    plan::Plan,
+    scene::source::{Describe, Opening, OpeningFault, PhenomenonKind},
+};
 
 /// Every kind, in the order in which schema and book list them.
-pub const KINDS: &[PhenomenonKind] = &[FlameSheetParameters::KIND, FlameParticlesParameters::KIND];
+pub const KINDS: &[PhenomenonKind] =
+    &[FlameSheetParameters::KIND, FlameParticlesParameters::KIND, RainParameters::KIND];
 
 /// A model's own fault, placed at the parameter that it names.
 fn opening_fault(fault: &bansho_models::ParameterFault) -> OpeningFault {
@@ -42,4 +50,33 @@ impl Describe for FlameParticlesParameters {
             }
         }
     }
+}
+
+impl Describe for RainParameters {
+    const KEY: &'static str = "rain";
+
+    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        match Rain::new(self.clone(), opening.name, opening.seed, opening.loop_s) {
+            Ok(rain) => Ok(Box::new(rain)),
+            Err(fault) => Err(opening_fault(&fault)),
+        }
+    }
+}
+
+/// What the scene shows beside its phenomena: lamps, ground, and a sky where there is no plate.
+pub(crate) fn of_scene(plan: &Plan) -> Vec<Box<dyn Phenomenon>> {
+    let scene = &plan.scene;
+    let mut own: Vec<Box<dyn Phenomenon>> = Vec::new();
+    let visible: Vec<_> = scene.lights.iter().filter(|light| light.visible).cloned().collect();
+    if !visible.is_empty() {
+        let at = move |t| visible.iter().map(|light| Lamp { light: light.at(t), radius: light.radius }).collect();
+        own.push(Box::new(Lamps::new(at)));
+    }
+    if let Some(ground) = &scene.ground {
+        own.push(Box::new(Ground::new(ground.clone(), plan.seed, plan.loop_s)));
+    }
+    if let Some(sky) = scene.sky.as_ref().filter(|sky| sky.visible && !scene.has_plate()) {
+        own.push(Box::new(SkyBackdrop::new(sky.clone())));
+    }
+    own
 }

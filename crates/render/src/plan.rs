@@ -8,13 +8,13 @@ use bansho_base::{
     color,
     image::{FrameHeader, Rect},
     parameters::Auto,
-    phenomenon::Phenomenon,
+    phenomenon::{Phenomenon, Remark},
     surroundings::Occluder,
     wind::Wind,
 };
 
 use crate::{
-    fingerprint,
+    fingerprint, phenomena,
     scene::{FrameRate, ObstacleParameters, Opening, OpeningFault, Scene},
 };
 
@@ -33,6 +33,8 @@ pub struct PlanOptions {
     pub layers: bool,
     /// Whether phenomena write their AOVs.
     pub aovs: bool,
+    /// Whether frames carry the phenomena's figures.
+    pub figures: bool,
     /// How display formats will show the picture; a plate made for display is taken back through it.
     pub display: color::View,
 }
@@ -107,6 +109,8 @@ pub struct Plan {
     pub layers: bool,
     /// Whether phenomena write their AOVs.
     pub aovs: bool,
+    /// Whether frames carry the phenomena's figures.
+    pub figures: bool,
     /// How display formats show the picture.
     pub display: color::View,
     /// The one wind.
@@ -135,6 +139,7 @@ impl Plan {
             exposure_ev100: 0.0,
             layers: options.layers,
             aovs: options.aovs,
+            figures: options.figures,
             display: options.display,
             wind,
             occluders,
@@ -146,7 +151,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Makes every enabled phenomenon, at its beginning.
+    /// Makes every enabled phenomenon, at its beginning; then the scene's own lamps, ground and sky.
     ///
     /// # Errors
     /// A phenomenon cannot be made.
@@ -156,7 +161,18 @@ impl Plan {
                 Opening { name: &instance.name, seed: self.seed, loop_s: self.loop_s, assets: self.assets.as_ref() };
             instance.source.open(&opening).map_err(|fault| opening_error(instance.name.clone(), fault))
         };
-        self.scene.instances.iter().filter(|instance| instance.enabled).map(open).collect()
+        let enabled = self.scene.instances.iter().filter(|instance| instance.enabled);
+        let mut phenomena: Vec<Box<dyn Phenomenon>> = enabled.map(open).collect::<Result<_, _>>()?;
+        phenomena.extend(phenomena::of_scene(self));
+        Ok(phenomena)
+    }
+
+    /// What users should know of how phenomena will look, each with its phenomenon's name.
+    ///
+    /// # Errors
+    /// A phenomenon cannot be made.
+    pub fn remarks(&self) -> Result<Vec<(String, Remark)>, PlanError> {
+        crate::cpu::remarks(self)
     }
 
     /// Frames a second.
@@ -199,6 +215,7 @@ impl Plan {
         let next = shutter.middle() + self.fps().frame_s();
         let mut view = View::new(self.scene.camera.clone(), shutter, next, self.size, overscan);
         view.window = self.window;
+        view.white_luminance = Some(color::white_luminance(f64::from(self.exposure_ev100)));
         view
     }
 
@@ -237,12 +254,15 @@ impl Plan {
     fn check_loop(&self) -> Result<(), PlanError> {
         let Some(seconds) = self.loop_s else { return Ok(()) };
         let camera = &self.scene.camera;
+        let same = |value: &bansho_base::animation::Animated<f64>| value.at(0.0) == value.at(seconds);
         let same3 = |value: &bansho_base::animation::Animated<[f64; 3]>| value.at(0.0) == value.at(seconds);
         let fixed = [
             ("wind.velocity", same3(&self.scene.wind.velocity)),
             ("camera.position", same3(&camera.position)),
             ("camera.target", same3(&camera.target)),
-            ("camera.roll_deg", camera.roll_deg.at(0.0) == camera.roll_deg.at(seconds)),
+            ("camera.roll_deg", same(&camera.roll_deg)),
+            ("sky.luminance", self.scene.sky.as_ref().is_none_or(|sky| same(&sky.luminance))),
+            ("ground.wetness", self.scene.ground.as_ref().is_none_or(|ground| same(&ground.wetness))),
         ];
         match fixed.into_iter().find(|(_, same)| !same) {
             Some((what, _)) => Err(PlanError::LoopJumps { seconds, what }),

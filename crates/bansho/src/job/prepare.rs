@@ -91,6 +91,7 @@ impl Job {
         let mut scene = self.scene.check(assets.as_ref())?;
         let kind = self.output_kind()?;
         self.check_channels(kind)?;
+        self.check_figures(kind)?;
         if kind != OutputKind::Exr {
             // Only EXR has room for what lies beyond the picture.
             scene.picture.overscan = 0;
@@ -104,7 +105,7 @@ impl Job {
         let sheet = self.contact_sheet.map(|tiles| sheet::holding(tiles, tile, contact::GUTTER)).transpose()?;
         let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan)?;
         let mut prepared = PreparedJob {
-            format: Format { pattern, view: self.view, bits: self.bits },
+            format: Format { pattern, view: self.view, bits: self.bits, figures: self.figures },
             resume: self.resume && kind.is_sequence() && sheet.is_none(),
             notes: Vec::new(),
             plan,
@@ -142,6 +143,14 @@ impl Job {
         if kind == OutputKind::Exr { Ok(()) } else { Err(Conflict::NoChannels { what, path: self.output_path() }) }
     }
 
+    /// Figures lie beside a picture of one frame.
+    fn check_figures(&self, kind: OutputKind) -> Result<(), Conflict> {
+        if self.figures && (self.contact_sheet.is_some() || !kind.is_sequence()) {
+            return Err(Conflict::NoFigures { path: self.output_path() });
+        }
+        Ok(())
+    }
+
     fn plan_options(&self) -> PlanOptions {
         PlanOptions {
             size: self.size,
@@ -150,6 +159,7 @@ impl Job {
             loop_s: self.loop_s,
             layers: self.layers,
             aovs: self.aovs,
+            figures: self.figures,
             display: self.view,
         }
     }
@@ -168,6 +178,7 @@ impl Job {
     fn notes(&self, job: &PreparedJob) -> Result<Vec<Note>, JobError> {
         let kind = job.format.pattern.kind();
         let mut notes: Vec<Note> = outside(&job.plan, &job.frames).into_iter().collect();
+        notes.extend(job.plan.remarks()?.into_iter().map(|(name, remark)| Note::Remark { name, remark }));
         let wide = matches!(kind, OutputKind::Png | OutputKind::Apng | OutputKind::Mov | OutputKind::Webm);
         if self.bits == BitDepth::Sixteen && !wide {
             notes.push(Note::BitsUnused { kind });

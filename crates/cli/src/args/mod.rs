@@ -3,6 +3,7 @@
 mod flipbook;
 mod render;
 mod simulate;
+mod streaks;
 mod values;
 
 use std::path::PathBuf;
@@ -13,6 +14,7 @@ pub(crate) use self::{
     flipbook::FlipbookArgs,
     render::{RenderArgs, WorkArgs},
     simulate::SimulateArgs,
+    streaks::StreaksArgs,
 };
 
 /// Flames, rain and aurora for pictures: image sequences with alpha to lay over a plate.
@@ -49,6 +51,8 @@ pub(crate) enum Command {
     Render(RenderArgs),
     /// Draw a scene as a flipbook for game engines: colour, alpha and motion sheets and a JSON.
     Flipbook(FlipbookArgs),
+    /// Write streak textures of rain with every drop's diameter, velocity and opacity.
+    Streaks(StreaksArgs),
     /// Simulate a scene and write its particles, for other programs.
     Simulate(SimulateArgs),
     /// Print a completion script for a shell.

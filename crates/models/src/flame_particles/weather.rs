@@ -64,8 +64,8 @@ impl<'a> Weather<'a> {
         around: &'a Surroundings,
         t: f64,
     ) -> Self {
-        let Surroundings { wind, air, others } = around;
-        let drift = wind.drift(t) * (EDDY_DRIFT * flame.motion.wind_gain);
+        let Surroundings { wind, air, others, .. } = around;
+        let drift = wind.travel(0.0, t) * (EDDY_DRIFT * flame.motion.wind_gain);
         let axes = axes(&design.burners, particles.positions(), &particles.burner, flame.motion.narrowing);
         let draught = |(number, axis): (usize, Axis)| {
             let burner = &design.burners[number];

@@ -15,7 +15,7 @@ mod glow;
 mod measure;
 mod moment;
 mod parameters;
-mod placement;
+pub(crate) mod placement;
 mod prepared;
 mod ramp;
 mod shade;

@@ -1,7 +1,6 @@
 //! The whole sheet: valid parameters of every kind, agreement between ways of drawing, loops, light.
 
 use bansho_base::{
-    air::Air,
     animation::Animated,
     camera::{CameraParameters, Lens},
     canvas::{DepthInterval, Shutter, Strip, View},
@@ -11,7 +10,7 @@ use bansho_base::{
     parameters::{Auto, Parameters, Reader, sample},
     phenomenon::Phenomenon,
     random::{Key, Purpose, uniform},
-    surroundings::{Emitter, Publication, Surroundings},
+    surroundings::{Emitter, Surroundings},
     wind::{Wind, WindParameters},
 };
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
@@ -38,7 +37,7 @@ fn view(lens: Lens, t: f64) -> View {
 fn with_wind<T>(velocity: [f64; 3], use_it: impl FnOnce(&Surroundings) -> T) -> T {
     let parameters = WindParameters { velocity: Animated::from(velocity), ..WindParameters::default() };
     let wind = Wind::new(parameters, 3, None);
-    use_it(&Surroundings { wind: &wind, air: &Air::default(), others: Publication::default() })
+    use_it(&Surroundings::of_wind(&wind))
 }
 
 /// All planes of a picture drawn in strips of `height` rows, with AOVs.
@@ -189,11 +188,8 @@ fn wide_vectors_give_the_bits_of_narrow_ones() {
 fn a_seamless_loop_ends_where_it_began() {
     let sheet = sheet(rich(), Some(3.0));
     let planes = |t| {
-        let calm = Surroundings {
-            wind: &Wind::new(WindParameters::default(), 1, None),
-            air: &Air::default(),
-            others: Publication::default(),
-        };
+        let wind = Wind::new(WindParameters::default(), 1, None);
+        let calm = Surroundings::of_wind(&wind);
         let view = view(Lens::Perspective, t);
         let mut strip = Strip::default();
         strip.reset(Rect::of_size(SIZE[0], SIZE[1]), None, 0);

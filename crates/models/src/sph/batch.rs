@@ -21,7 +21,7 @@ pub(super) fn squared<R: Real, const D: usize>(offset: &[R; D]) -> R {
 
 /// Arrays cut to one length, so that one check of an index serves all.
 #[inline(always)]
-pub(super) fn cut<'a, const N: usize>(arrays: [&'a [f32]; N], length: usize) -> [&'a [f32]; N] {
+pub(super) fn cut<const N: usize>(arrays: [&[f32]; N], length: usize) -> [&[f32]; N] {
     let mut cut = arrays;
     for k in 0..N {
         cut[k] = &arrays[k][..length];

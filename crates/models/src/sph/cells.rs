@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{batch::BATCH, stretch::Stretch};
@@ -16,8 +17,6 @@ const FARTHEST: i32 = 1 << 19;
 const MARGIN: f32 = 1.001;
 /// Where particles are put that are farther away or nowhere; squares of such distances are still finite.
 pub(super) const BEYOND: f32 = 1e12;
-/// Particles that a task of the thread pool takes at least where little is done for each.
-const MANY: usize = 4096;
 /// Bits sorted by in one pass.
 const DIGIT_BITS: u32 = 11;
 
@@ -72,7 +71,11 @@ impl<const D: usize> Keys<D> {
     }
 
     fn key(&self, cell: [i32; D]) -> u64 {
-        (0..D).fold(0, |key, c| key | ((cell[c] - self.lower[c]) as u64) << self.shift[c])
+        let mut key = 0;
+        for c in 0..D {
+            key |= ((cell[c] - self.lower[c]) as u64) << self.shift[c];
+        }
+        key
     }
 
     /// The row of a cell: what its key says but for x.
@@ -128,20 +131,20 @@ impl<const D: usize> Cells<D> {
     pub fn assign(&mut self, positions: [&[f32]; D], ids: &[u64]) {
         assert!(ids.len() <= 1 << 28, "slots are counted in 32 bits");
         assert!(positions.iter().all(|component| component.len() == ids.len()), "one position an id");
-        let cell = cell_of(self.support_radius);
-        let bounds = positions.map(|component| {
-            let bound = |(low, high): (i32, i32), value: &f32| (low.min(cell(*value)), high.max(cell(*value)));
-            let bounds = component.par_iter().with_min_len(MANY).fold(|| (i32::MAX, i32::MIN), bound);
-            bounds.reduce(|| (i32::MAX, i32::MIN), |a, b| (a.0.min(b.0), a.1.max(b.1)))
+        let scale = 1.0 / (self.support_radius * MARGIN);
+        let mut coordinates: [Vec<i32>; D] = std::array::from_fn(|_| Vec::new());
+        coordinates.par_iter_mut().zip(positions).for_each(|(cells, component)| {
+            dispatch!(Level::new(), _simd => cells_along(component, scale, cells));
         });
         if ids.is_empty() {
             self.order.clear();
             self.occupied.clear();
         } else {
-            self.keys = Keys::new(bounds.map(|bound| bound.0), bounds.map(|bound| bound.1));
-            let keys = self.keys;
-            let entry = |i: u32| (keys.key(positions.map(|component| cell(component[i as usize]))), i);
-            self.sort((0..ids.len() as u32).into_par_iter().with_min_len(MANY).map(entry).collect(), ids);
+            let bound =
+                |c: usize, pick: fn(i32, i32) -> i32| coordinates[c].iter().copied().fold(coordinates[c][0], pick);
+            self.keys =
+                Keys::new(std::array::from_fn(|c| bound(c, i32::min)), std::array::from_fn(|c| bound(c, i32::max)));
+            self.sort(&coordinates, ids);
         }
         let within = |x: f32| if x.abs() < BEYOND { x } else { BEYOND };
         let mut slots = std::mem::replace(&mut self.positions, std::array::from_fn(|_| Vec::new()));
@@ -157,7 +160,15 @@ impl<const D: usize> Cells<D> {
     }
 
     /// Sorts by key, then by id, and lists the cells.
-    fn sort(&mut self, mut sorted: Vec<(u64, u32)>, ids: &[u64]) {
+    fn sort(&mut self, coordinates: &[Vec<i32>; D], ids: &[u64]) {
+        let mut sorted = Vec::with_capacity(ids.len());
+        for i in 0..ids.len() {
+            let mut cell = [0; D];
+            for c in 0..D {
+                cell[c] = coordinates[c][i];
+            }
+            sorted.push((self.keys.key(cell), i as u32));
+        }
         let mut spare = sorted.clone();
         for shift in (0..self.keys.bits).step_by(DIGIT_BITS as usize) {
             counting_pass(&sorted, &mut spare, shift);
@@ -254,14 +265,15 @@ impl<const D: usize> Cells<D> {
     }
 }
 
-/// The cell of a coordinate. No `floor`: where the processor lacks it that is a call.
-fn cell_of(support_radius: f32) -> impl Fn(f32) -> i32 + Copy + Sync {
-    let scale = 1.0 / (support_radius * MARGIN);
+/// The cells of coordinates, `scale` cells a unit. No `floor`: where the processor lacks it that is a call.
+#[inline(always)]
+fn cells_along(component: &[f32], scale: f32, cells: &mut Vec<i32>) {
     let farthest = FARTHEST as f32;
-    move |value| {
-        let cells = (value * scale).clamp(-farthest, farthest);
-        let whole = cells as i32;
-        whole - i32::from(whole as f32 > cells)
+    cells.resize(component.len(), 0);
+    for (cell, value) in cells.iter_mut().zip(component) {
+        let place = (value * scale).clamp(-farthest, farthest);
+        let whole = place as i32;
+        *cell = whole - i32::from(whole as f32 > place);
     }
 }
 

@@ -100,13 +100,10 @@ fn find_hits<S: Simd, const D: usize>(
         for (slot, hits) in (group.slot..).zip(own) {
             let position = spread(simd, pick(&positions, slot));
             let mut bits = 0;
-            for (bit, starts) in starts.chunks(1 << group.bit_shift).enumerate() {
-                let mut near = false;
-                for start in starts {
-                    let offset = difference(&position, &load(simd, &positions, *start as usize));
-                    near |= squared(&offset).simd_lt(farthest).any_true();
-                }
-                bits |= u64::from(near) << bit;
+            for (number, start) in starts.iter().enumerate() {
+                let offset = difference(&position, &load(simd, &positions, *start as usize));
+                let near = squared(&offset).simd_lt(farthest).any_true();
+                bits |= u64::from(near) << (number >> group.bit_shift);
             }
             *hits = bits;
         }

@@ -163,7 +163,7 @@ where
             if T::DIRECTED {
                 let same = squared.choose(nearest, one, zero);
                 coincident += same;
-                counts = counts - same;
+                counts -= same;
                 distance_squared = distance_squared.greatest(nearest);
             }
             let terms = term.term(&Pair { offset, distance_squared }, &own, &load(simd, &fields, start));

@@ -15,12 +15,30 @@ use crate::{plan::Plan, scene::check::PLATE_LAYER, slices::Slice};
 /// Rows of a strip: the planes of a 1920-pixel strip stay within a core's second-level cache.
 pub(super) const STRIP_ROWS: usize = 8;
 
-/// Pixels that one task clears.
-const CLEARED_AT_ONCE: usize = 1 << 16;
+/// What a frame is to hold.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outputs {
+    /// What absolute radiance is multiplied by.
+    pub(super) exposure: f32,
+    /// Whether each phenomenon gets a layer.
+    pub(super) layers: bool,
+    /// Whether AOVs are written.
+    pub(super) aovs: bool,
+}
+
+impl Outputs {
+    /// What the shot asks for.
+    pub(super) fn of_plan(plan: &Plan) -> Self {
+        Self { exposure: plan.exposure_scale(), layers: plan.layers, aovs: plan.aovs }
+    }
+
+    /// Nothing but absolute radiance.
+    pub(super) const RADIANCE: Self = Self { exposure: 1.0, layers: false, aovs: false };
+}
 
 /// One frame, ready to be composited.
 pub(super) struct Composition<'a> {
-    pub(super) plan: &'a Plan,
+    pub(super) outputs: Outputs,
     pub(super) view: &'a View,
     pub(super) phenomena: &'a [Box<dyn Phenomenon>],
     pub(super) prepared: &'a [Box<dyn Prepared + 'a>],
@@ -45,7 +63,7 @@ impl Composition<'_> {
 
     /// The part of a strip that can differ from nothing; all of it where there is a plate, a layer or an AOV to fill.
     fn worth_drawing(&self, rect: Rect) -> Rect {
-        if self.plate.colour.is_some() || self.plan.layers || self.plan.aovs {
+        if self.plate.colour.is_some() || self.outputs.layers || self.outputs.aovs {
             return rect;
         }
         let touched = |slice: &Slice| {
@@ -55,12 +73,21 @@ impl Composition<'_> {
         self.slices.iter().map(touched).fold(Rect::default(), |all, part| all.union(&part))
     }
 
+    /// The part of the frame that can differ from nothing, in the frame's own pixels.
+    fn content(&self) -> Rect {
+        let window = self.view.window;
+        let strips = 0..window.height.div_ceil(STRIP_ROWS);
+        let all = strips.map(|index| self.worth_drawing(self.strip_rect(index)));
+        let part = all.fold(Rect::default(), |all, part| all.union(&part));
+        Rect { x: part.x.saturating_sub(window.x), y: part.y.saturating_sub(window.y), ..part }
+    }
+
     fn layer_count(&self) -> usize {
-        if self.plan.layers { self.phenomena.len() } else { 0 }
+        if self.outputs.layers { self.phenomena.len() } else { 0 }
     }
 
     fn aov_counts(&self) -> Vec<usize> {
-        if !self.plan.aovs {
+        if !self.outputs.aovs {
             return Vec::new();
         }
         self.phenomena.iter().map(|phenomenon| phenomenon.aovs().len()).collect()
@@ -98,20 +125,46 @@ impl Composition<'_> {
     }
 }
 
+/// Memory for a frame: empty pixels, but for those of the frame that it held before.
+struct Canvas {
+    beauty: Image<4>,
+    depth: Vec<f32>,
+    stale: Rect,
+}
+
+impl Canvas {
+    /// Takes the memory of a spent frame if it fits: fresh memory costs more than drawing a sparse frame.
+    fn new(window: Rect, spent: Option<Frame>) -> Self {
+        let (width, height) = (window.width, window.height);
+        let fits = |frame: &Frame| frame.beauty.width() == width && frame.beauty.height() == height;
+        if let Some(Frame { beauty, depth: Some(depth), content, .. }) = spent.filter(fits) {
+            return Self { beauty, depth, stale: content };
+        }
+        let depth = vec![f32::INFINITY; width * height];
+        Self { beauty: Image::filled(width, height, [0.0; 4]), depth, stale: Rect::default() }
+    }
+}
+
+/// Empties what a spent frame left in the rows from `first` on.
+fn clear(stale: Rect, first: usize, width: usize, beauty: &mut [[f32; 4]], depth: &mut [f32]) {
+    for (row, (beauty, depth)) in beauty.chunks_mut(width).zip(depth.chunks_mut(width)).enumerate() {
+        if (stale.y..stale.bottom()).contains(&(first + row)) {
+            beauty[stale.x..stale.right()].fill([0.0; 4]);
+            depth[stale.x..stale.right()].fill(f32::INFINITY);
+        }
+    }
+}
+
 /// Draws and composites the whole window, where nothing bends light.
 pub(super) fn frame(
     composition: &Composition,
     header: FrameHeader,
+    spent: Option<Frame>,
     observer: &dyn Observer,
 ) -> Result<Frame, Cancelled> {
     let window = composition.view.window;
     let level = Level::new();
-    let pixels = window.width * window.height;
-    // Fresh memory is cleared by all threads: one alone takes half the time of a sparse frame.
-    let cleared: Vec<[f32; 4]> = rayon::iter::repeat_n([0.0; 4], pixels).with_min_len(CLEARED_AT_ONCE).collect();
-    let mut depth: Vec<f32> = rayon::iter::repeat_n(f32::INFINITY, pixels).with_min_len(CLEARED_AT_ONCE).collect();
-    let mut beauty =
-        Image::from_pixels(window.width, window.height, cleared).unwrap_or_else(|| Image::filled(0, 0, [0.0; 4]));
+    let Canvas { mut beauty, mut depth, stale } = Canvas::new(window, spent);
     let strip_pixels = STRIP_ROWS * window.width;
     let planes: Vec<Vec<Vec<f32>>> = beauty
         .pixels_mut()
@@ -120,6 +173,7 @@ pub(super) fn frame(
         .enumerate()
         .map_init(Worker::default, |worker, (index, (beauty, depth))| {
             observer::check(observer)?;
+            clear(stale, index * STRIP_ROWS, window.width, beauty, depth);
             let strip = composition.strip_rect(index);
             let rect = composition.worth_drawing(strip);
             if rect.is_empty() {
@@ -131,7 +185,16 @@ pub(super) fn frame(
         })
         .collect::<Result<_, Cancelled>>()?;
     let opaque = composition.plate.colour.is_some() && composition.view.overscan == 0;
-    Ok(Frame { header, beauty, depth: Some(depth), channels: channels(composition, planes), opaque })
+    let content = composition.content();
+    Ok(Frame {
+        header,
+        beauty,
+        depth: Some(depth),
+        channels: channels(composition, planes),
+        opaque,
+        content,
+        figures: Vec::new(),
+    })
 }
 
 /// Exposes the strip, puts the plate behind it, and gives it its alpha.
@@ -143,7 +206,7 @@ fn finish_strip(
     beauty: &mut [[f32; 4]],
     depth: &mut [f32],
 ) {
-    let exposure = composition.plan.exposure_scale();
+    let exposure = composition.outputs.exposure;
     let rect = accumulator.rect;
     for row in 0..rect.height {
         let pixels = row * rect.width..(row + 1) * rect.width;
@@ -196,13 +259,13 @@ fn lay_over_plate(accumulator: &Accumulator, start: usize, plate: &[[f32; 4]], o
 
 /// This strip's part of every layer and AOV, in the order of [`channels`].
 pub(super) fn channel_planes(composition: &Composition, accumulator: &Accumulator) -> Vec<Vec<f32>> {
-    let exposure = composition.plan.exposure_scale();
+    let exposure = composition.outputs.exposure;
     let mut planes = Vec::new();
     for layer in &accumulator.layers {
         planes.extend(layer[..3].iter().map(|plane| plane.iter().map(|value| exposure * value).collect()));
         planes.push(layer[3].clone());
     }
-    if composition.plan.layers && composition.plate.colour.is_some() {
+    if composition.outputs.layers && composition.plate.colour.is_some() {
         planes.extend(plate_layer(composition, accumulator));
     }
     planes.extend(aov_planes(composition, accumulator));
@@ -250,7 +313,7 @@ pub(super) fn channels(composition: &Composition, strips: Vec<Vec<Vec<f32>>>) ->
 fn channel_names(composition: &Composition) -> Vec<Channel> {
     let channel = |name: String, precision| Channel { name, precision, values: Vec::new() };
     let mut channels = Vec::new();
-    if composition.plan.layers {
+    if composition.outputs.layers {
         let plate = composition.plate.colour.is_some().then_some(PLATE_LAYER);
         let names = composition.phenomena.iter().map(|phenomenon| phenomenon.name()).chain(plate);
         for name in names {
@@ -258,7 +321,7 @@ fn channel_names(composition: &Composition) -> Vec<Channel> {
             channels.extend(["R", "G", "B", "A"].map(colour));
         }
     }
-    if composition.plan.aovs {
+    if composition.outputs.aovs {
         for phenomenon in composition.phenomena {
             let aov = |aov: &bansho_base::canvas::AovDescriptor| {
                 channel(format!("{}.{}", phenomenon.name(), aov.name), Precision::Single)

@@ -4,7 +4,7 @@
 //! near, each layer bends all that lies behind it (and the plate) before the next group is laid over.
 
 use bansho_base::{
-    image::{Channel, Frame, FrameHeader, Image},
+    image::{Channel, Frame, FrameHeader, Image, Rect},
     observer::{self, Cancelled, Observer},
     phenomenon::Deflection,
 };
@@ -57,7 +57,7 @@ pub(super) fn frame(
 fn plate(composition: &Composition) -> Picture {
     let window = composition.view.window;
     let pixels = window.width * window.height;
-    let layers = if composition.plan.layers { composition.phenomena.len() } else { 0 };
+    let layers = if composition.outputs.layers { composition.phenomena.len() } else { 0 };
     let mut planes = vec![vec![0.0; pixels]; 4 + 4 * layers];
     let mut depth = vec![f32::INFINITY; pixels];
     for row in 0..window.height {
@@ -71,7 +71,7 @@ fn plate(composition: &Composition) -> Picture {
             depth[range].copy_from_slice(&image.row(window.y + row).as_flattened()[window.x..window.right()]);
         }
     }
-    if composition.plan.layers && composition.plate.colour.is_some() {
+    if composition.outputs.layers && composition.plate.colour.is_some() {
         planes.extend_from_within(..4);
     }
     Picture { planes, depth }
@@ -109,7 +109,7 @@ fn append(planes: &mut [Vec<f32>], more: Vec<Vec<f32>>) {
 
 fn group_strip(composition: &Composition, worker: &Worker) -> Group {
     let accumulator = &worker.accumulator;
-    let exposure = composition.plan.exposure_scale();
+    let exposure = composition.outputs.exposure;
     let exposed = |plane: &Vec<f32>| plane.iter().map(|value| exposure * value).collect::<Vec<f32>>();
     let mut planes: Vec<Vec<f32>> = accumulator.colour.iter().map(exposed).collect();
     let pixels = accumulator.depth.len();
@@ -213,7 +213,15 @@ fn finish(composition: &Composition, header: FrameHeader, picture: Picture, aovs
     layers.extend(aovs);
     let channels: Vec<Channel> = compose::channels(composition, vec![layers]);
     let opaque = composition.plate.colour.is_some() && composition.view.overscan == 0;
-    Frame { header, beauty, depth: Some(picture.depth), channels, opaque }
+    Frame {
+        header,
+        beauty,
+        depth: Some(picture.depth),
+        channels,
+        opaque,
+        figures: Vec::new(),
+        content: Rect::of_size(window.width, window.height),
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     canvas::View,
-    image::{Channel, Frame, Rect},
+    image::{Channel, FigureSet, Frame, Image, Rect},
     observer::{self, Cancelled, Observer, Stage, StageGuard},
     phenomenon::{Phenomenon, Prepared},
     point_cloud::PointCloud,
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::{
     clock::{self, Clock},
-    compose::{self, Composition},
+    compose::{self, Composition, Outputs},
     haze,
     plate::{PlateCache, PlateFrame},
     snapshot,
@@ -23,7 +23,7 @@ use super::{
 use crate::{
     backend::{RenderError, Shot},
     plan::Plan,
-    slices,
+    slices::{self, Slice},
 };
 
 pub(super) struct CpuShot {
@@ -33,6 +33,7 @@ pub(super) struct CpuShot {
     plates: PlateCache,
     number: i64,
     frame: Option<Frame>,
+    spent: Option<Frame>,
 }
 
 impl CpuShot {
@@ -40,7 +41,7 @@ impl CpuShot {
         let phenomena = plan.open()?;
         let clocks = vec![Clock { taken: 0 }; phenomena.len()];
         let number = plan.frames().start;
-        Ok(Self { plan, phenomena, clocks, plates: PlateCache::default(), number, frame: None })
+        Ok(Self { plan, phenomena, clocks, plates: PlateCache::default(), number, frame: None, spent: None })
     }
 
     fn begin_anew(&mut self) -> Result<(), RenderError> {
@@ -50,14 +51,20 @@ impl CpuShot {
     }
 
     /// Draws the view; `None` where only the whole picture gives its parts rightly, since bent light comes from beyond.
-    fn compose(&self, view: &View, plate: &PlateFrame, observer: &dyn Observer) -> Result<Option<Frame>, RenderError> {
+    fn compose(
+        &self,
+        view: &View,
+        plate: &PlateFrame,
+        spent: Option<Frame>,
+        observer: &dyn Observer,
+    ) -> Result<Option<Frame>, RenderError> {
         let preparing = StageGuard::begin(observer, Stage::Prepare);
-        let surroundings = self.surroundings(view);
-        let each = || self.phenomena.par_iter().zip(&surroundings);
-        let intervals: Vec<_> = each().map(|(phenomenon, s)| phenomenon.depth_intervals(view, s)).collect();
-        let slices = slices::cut(&intervals);
-        let prepared: Vec<Box<dyn Prepared + '_>> =
-            each().map(|(phenomenon, s)| phenomenon.prepare(view, s, observer)).collect::<Result<_, _>>()?;
+        let publications: Vec<Publication> =
+            self.phenomena.par_iter().map(|phenomenon| phenomenon.publish(view.shutter)).collect();
+        let reflection = self.reflection(view, &publications, observer)?;
+        let surroundings = self.surroundings(view, &publications, reflection.as_ref());
+        let all: Vec<usize> = (0..self.phenomena.len()).collect();
+        let (slices, prepared) = self.prepare(&all, view, &surroundings, observer)?;
         drop(preparing);
         let _stage = StageGuard::begin(observer, Stage::Draw);
         observer::check(observer)?;
@@ -68,7 +75,7 @@ impl CpuShot {
             return Ok(None);
         }
         let composition = Composition {
-            plan: &self.plan,
+            outputs: Outputs::of_plan(&self.plan),
             view,
             phenomena: &self.phenomena,
             prepared: &prepared,
@@ -76,25 +83,80 @@ impl CpuShot {
             plate,
         };
         let header = self.plan.header(self.number);
-        Ok(Some(if bends {
+        let mut frame = if bends {
             haze::frame(&composition, header, observer)?
         } else {
-            compose::frame(&composition, header, observer)?
-        }))
+            compose::frame(&composition, header, spent, observer)?
+        };
+        if self.plan.figures {
+            frame.figures = self.figures(&prepared);
+        }
+        Ok(Some(frame))
+    }
+
+    /// The figures of every phenomenon that has any.
+    fn figures(&self, prepared: &[Box<dyn Prepared + '_>]) -> Vec<FigureSet> {
+        let names = self.phenomena.iter().map(|phenomenon| phenomenon.name().to_owned());
+        let each = names.zip(prepared.iter().map(|prepared| prepared.figures()));
+        each.filter(|(_, figures)| !figures.is_empty())
+            .map(|(phenomenon, figures)| FigureSet { phenomenon, figures })
+            .collect()
+    }
+
+    /// Everything but the first mirror, as it is seen in that mirror: radiance and alpha of the whole picture.
+    fn reflection(
+        &self,
+        view: &View,
+        publications: &[Publication],
+        observer: &dyn Observer,
+    ) -> Result<Option<Image<4>>, RenderError> {
+        let mirrors = self.phenomena.iter().enumerate();
+        let Some((mirror, height)) = mirrors.filter_map(|(i, each)| Some((i, each.mirror()?))).next() else {
+            return Ok(None);
+        };
+        let view = view.mirrored(height);
+        let surroundings = self.surroundings(&view, publications, None);
+        let seen: Vec<usize> = (0..self.phenomena.len()).filter(|&index| index != mirror).collect();
+        let (slices, prepared) = self.prepare(&seen, &view, &surroundings, observer)?;
+        let composition = Composition {
+            outputs: Outputs::RADIANCE,
+            view: &view,
+            phenomena: &self.phenomena,
+            prepared: &prepared,
+            slices: &slices,
+            plate: &PlateFrame::default(),
+        };
+        Ok(Some(compose::frame(&composition, self.plan.header(self.number), None, observer)?.beauty))
+    }
+
+    /// Slices of the phenomena `which`, and those phenomena ready to draw; a slice's members count within `which`.
+    fn prepare<'a>(
+        &'a self,
+        which: &[usize],
+        view: &'a View,
+        surroundings: &'a [Surroundings<'a>],
+        observer: &dyn Observer,
+    ) -> Result<Ready<'a>, RenderError> {
+        let each = || which.par_iter().map(|&index| (&self.phenomena[index], &surroundings[index]));
+        let intervals: Vec<_> = each().map(|(phenomenon, s)| phenomenon.depth_intervals(view, s)).collect();
+        let prepared = each().map(|(phenomenon, s)| phenomenon.prepare(view, s, observer)).collect::<Result<_, _>>()?;
+        Ok((slices::cut(&intervals), prepared))
     }
 
     /// What each phenomenon sees of all others.
-    fn surroundings(&self, view: &View) -> Vec<Surroundings<'_>> {
-        let publications: Vec<Publication> =
-            self.phenomena.par_iter().map(|phenomenon| phenomenon.publish(view.shutter)).collect();
-        let seen_by = |index| Surroundings {
-            wind: &self.plan.wind,
-            air: &self.plan.scene.air,
-            others: clock::others(&self.plan, &publications, index, view.shutter),
-        };
+    fn surroundings<'a>(
+        &'a self,
+        view: &View,
+        publications: &[Publication],
+        reflection: Option<&'a Image<4>>,
+    ) -> Vec<Surroundings<'a>> {
+        let seen_by = |index| clock::surroundings(&self.plan, publications, index, view.shutter, reflection);
         (0..self.phenomena.len()).map(seen_by).collect()
     }
 }
+
+/// Slices of depth, and the phenomena that they count, ready to draw.
+type Ready<'a> = (Vec<Slice>, Vec<Box<dyn Prepared + 'a>>);
 
 /// The part `window` of a whole frame.
 fn crop(whole: Frame, window: Rect) -> Option<Frame> {
@@ -110,6 +172,8 @@ fn crop(whole: Frame, window: Rect) -> Option<Frame> {
         channels: channels.collect(),
         header: whole.header,
         opaque: whole.opaque,
+        figures: whole.figures,
+        content: Rect::of_size(window.width, window.height),
     })
 }
 
@@ -133,11 +197,12 @@ impl Shot for CpuShot {
             self.plates.frame(&self.plan, self.number)?
         };
         let mut view = self.plan.view(self.number);
-        let frame = match self.compose(&view, &plate, observer)? {
+        let spent = self.spent.take();
+        let frame = match self.compose(&view, &plate, spent, observer)? {
             Some(frame) => frame,
             None => {
                 view.window = Rect::of_size(view.size[0], view.size[1]);
-                let whole = self.compose(&view, &plate, observer)?;
+                let whole = self.compose(&view, &plate, None, observer)?;
                 whole.and_then(|whole| crop(whole, self.plan.window)).ok_or(Cancelled)?
             }
         };
@@ -147,6 +212,10 @@ impl Shot for CpuShot {
 
     fn read(&mut self) -> Option<Frame> {
         self.frame.take()
+    }
+
+    fn recycle(&mut self, spent: Frame) {
+        self.spent = Some(spent);
     }
 
     fn particles(&self) -> PointCloud {

@@ -4,6 +4,7 @@ use bansho_base::{
     assets::Assets,
     parameters::{Node, ProblemKind, Reader, Span, Table, Value, nearest},
 };
+use bansho_models::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
 use super::{FORMAT, Opening, OpeningFault, PhenomenonKind, SHARED_TABLES, Scene};
 
@@ -45,15 +46,19 @@ pub(super) fn root_keys(root: &Table, kinds: &[PhenomenonKind], reader: &mut Rea
     }
 }
 
-/// Name of the plate's own layer, which no phenomenon may take.
+/// Name of the plate's own layer.
 pub(crate) const PLATE_LAYER: &str = "plate";
+
+/// Names of layers that the scene itself has, which no phenomenon may take.
+const RESERVED_NAMES: [&str; 4] = [PLATE_LAYER, SkyBackdrop::NAME, Ground::NAME, Lamps::NAME];
 
 /// Longest name of a phenomenon; EXR channel names have 255 characters at most.
 const LONGEST_NAME: usize = 100;
 
 /// A name becomes the prefix of EXR layers, so it may hold no dot and no control characters.
 pub(super) fn name(node: &Node, reader: &mut Reader) -> Option<String> {
-    let expected = format!("a name of 1 to {LONGEST_NAME} characters without dots, not \"{PLATE_LAYER}\"");
+    let reserved = RESERVED_NAMES.join(", ");
+    let expected = format!("a name of 1 to {LONGEST_NAME} characters without dots, none of {reserved}");
     match &node.value {
         Value::Text(name) if is_name(name) => Some(name.clone()),
         Value::Text(_) => {
@@ -69,7 +74,7 @@ pub(super) fn name(node: &Node, reader: &mut Reader) -> Option<String> {
 
 fn is_name(name: &str) -> bool {
     !name.trim().is_empty()
-        && name != PLATE_LAYER
+        && !RESERVED_NAMES.contains(&name)
         && name.chars().count() <= LONGEST_NAME
         && !name.contains('.')
         && !name.chars().any(char::is_control)

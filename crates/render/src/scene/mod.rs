@@ -17,8 +17,10 @@ use bansho_base::{
     assets::Assets,
     camera::CameraParameters,
     parameters::{Parameters, Problem, ProblemKind, Reader, Table, TableDescriptor, Value},
+    sky::SkyParameters,
     wind::WindParameters,
 };
+use bansho_models::ground::GroundParameters;
 
 pub use self::{
     obstacle::{ObstacleParameters, ObstacleShape},
@@ -41,12 +43,14 @@ pub struct SharedTable {
 }
 
 /// Shared tables, in the order in which a scene should state them.
-pub const SHARED_TABLES: [SharedTable; 7] = [
+pub const SHARED_TABLES: [SharedTable; 9] = [
     SharedTable { key: "picture", many: false, table: PictureParameters::table },
     SharedTable { key: "camera", many: false, table: CameraParameters::table },
     SharedTable { key: "plate", many: false, table: PlateParameters::table },
     SharedTable { key: "wind", many: false, table: WindParameters::table },
     SharedTable { key: "air", many: false, table: Air::table },
+    SharedTable { key: "sky", many: false, table: SkyParameters::table },
+    SharedTable { key: "ground", many: false, table: GroundParameters::table },
     SharedTable { key: "light", many: true, table: LightParameters::table },
     SharedTable { key: "obstacle", many: true, table: ObstacleParameters::table },
 ];
@@ -77,6 +81,10 @@ pub struct Scene {
     pub wind: WindParameters,
     /// `[air]`.
     pub air: Air,
+    /// `[sky]`, if there is one.
+    pub sky: Option<SkyParameters>,
+    /// `[ground]`, if there is one.
+    pub ground: Option<GroundParameters>,
     /// `[[light]]`.
     pub lights: Vec<LightParameters>,
     /// `[[obstacle]]`.
@@ -115,6 +123,8 @@ impl Scene {
             plate: read_shared(root, "plate", reader),
             wind: read_shared(root, "wind", reader),
             air: read_shared(root, "air", reader),
+            sky: root.get("sky").map(|_| read_shared(root, "sky", reader)),
+            ground: root.get("ground").map(|_| read_shared(root, "ground", reader)),
             lights: read_many(root, "light", reader),
             obstacles: read_many(root, "obstacle", reader),
             instances: read_instances(root, kinds, reader),

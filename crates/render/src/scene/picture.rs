@@ -145,8 +145,10 @@ bansho_base::parameters! {
         colour: [f64; 3] = [1.0, 0.9, 0.75], limits(Range::new(0.0, 1.0));
         /// Luminous intensity (candela) of points and spots, illuminance (lux) of directional lights.
         intensity: Animated<f64> = Animated::from(100.0), limits(Range::new(0.0, 1e9)), unit("cd or lx");
-        /// Radius of a point light.
-        radius: f64 = 0.05, limits(Range::new(0.0, 100.0)), unit("m");
+        /// Radius of the ball that a point or a spot is.
+        radius: f64 = 0.05, limits(Range::new(1e-4, 100.0)), unit("m");
+        /// Whether the ball itself is seen.
+        visible: bool = false;
         /// Angle from the axis up to which a spot is full.
         inner_deg: f64 = 15.0, limits(Range::new(0.0, 89.0)), unit("degrees");
         /// Angle from the axis beyond which a spot is dark.

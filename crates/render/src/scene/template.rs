@@ -7,7 +7,8 @@ use super::{FORMAT, PhenomenonKind, SHARED_TABLES};
 /// A scene with one phenomenon of `kind`, all defaults, each parameter explained in a comment.
 pub fn commented(kind: &PhenomenonKind) -> String {
     let mut text = format!("bansho = {FORMAT}   # format version\n");
-    for shared in SHARED_TABLES.iter().filter(|shared| !shared.many && shared.key != "plate") {
+    let optional = ["plate", "sky", "ground"];
+    for shared in SHARED_TABLES.iter().filter(|shared| !shared.many && !optional.contains(&shared.key)) {
         table(&mut text, &format!("[{}]", shared.key), (shared.table)());
     }
     table(&mut text, &format!("[[{}]]", kind.key), (kind.table)());

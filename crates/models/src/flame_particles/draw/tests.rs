@@ -11,7 +11,7 @@ use bansho_base::{
     observer::Unobserved,
     phenomenon::Prepared,
     random::{Key, Purpose},
-    surroundings::{Emitter, Publication, Surroundings},
+    surroundings::{Emitter, Surroundings},
     wind::{Wind, WindParameters},
 };
 
@@ -84,7 +84,7 @@ fn smooth() -> LookParameters {
 /// Prepares the gas and hands it to `each`.
 fn prepared<T>(particles: &Particles, look: &LookParameters, view: &View, each: impl FnOnce(&PreparedGas) -> T) -> T {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
-    let surroundings = Surroundings { wind: &wind, air: &air, others: Publication::default() };
+    let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
     each(&PreparedGas::new(gas(particles), look, view, &surroundings, &Unobserved).unwrap())
 }
 

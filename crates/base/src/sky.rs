@@ -1,0 +1,130 @@
+//! The sky as a light: what it shines from each direction.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+use crate::{
+    animation::Animated,
+    color::{black_body, luminance},
+    parameters::Range,
+};
+
+crate::choice! {
+    /// How the sky's luminance is spread.
+    pub enum SkyKind {
+        /// The CIE overcast sky: three times as bright overhead as at the horizon.
+        Overcast = "overcast",
+        /// The same from everywhere.
+        Uniform = "uniform",
+    }
+}
+
+crate::parameters! {
+    /// The sky behind everything. It lights the scene; where there is a plate, the plate is seen in its place.
+    pub struct SkyParameters {
+        /// How its luminance is spread.
+        kind: SkyKind = SkyKind::Overcast;
+        /// Luminance overhead: a rainy day has 500 to 5000, late dusk 1.
+        luminance: Animated<f64> = Animated::from(2000.0), limits(Range::new(0.0, 1e6)), unit("cd/m^2");
+        /// Temperature of a black body of its colour.
+        temperature_k: f64 = 7000.0, limits(Range::new(1000.0, 10_000.0)), unit("K");
+        /// Whether it is seen, or only lights.
+        visible: bool = true;
+    }
+}
+
+impl SkyParameters {
+    /// The sky at time `t`.
+    pub fn at(&self, t: f64) -> Sky {
+        let colour = black_body().radiance(self.temperature_k as f32);
+        let scale = self.luminance.at(t) / f64::from(luminance(colour)).max(f64::MIN_POSITIVE);
+        Sky { kind: self.kind, zenith: colour.map(|value| (f64::from(value) * scale) as f32) }
+    }
+}
+
+/// Share of its light that the ground, as far as the sky knows it, throws back: seen from below the horizon.
+const GROUND_ALBEDO: f64 = 0.15;
+
+/// The sky at one time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sky {
+    kind: SkyKind,
+    zenith: [f32; 3],
+}
+
+impl Sky {
+    /// No light from anywhere.
+    pub const DARK: Self = Self { kind: SkyKind::Uniform, zenith: [0.0; 3] };
+
+    /// Radiance from a direction, a unit vector (ACEScg, cd/m^2). From below the horizon comes what a dull ground throws back.
+    pub fn radiance(&self, direction: DVec3) -> [f32; 3] {
+        if direction.y < 0.0 {
+            return self.horizontal_illuminance().map(|value| value * (GROUND_ALBEDO / PI) as f32);
+        }
+        let share = match self.kind {
+            // CIE S 011: L = Lz (1 + 2 sin elevation) / 3.
+            SkyKind::Overcast => (1.0 + 2.0 * direction.y) / 3.0,
+            SkyKind::Uniform => 1.0,
+        };
+        self.zenith.map(|value| value * share as f32)
+    }
+
+    /// Illuminance of open, level ground (ACEScg, lux).
+    pub fn horizontal_illuminance(&self) -> [f32; 3] {
+        let hemisphere = match self.kind {
+            SkyKind::Overcast => 7.0 / 9.0 * PI,
+            SkyKind::Uniform => PI,
+        };
+        self.zenith.map(|value| value * hemisphere as f32)
+    }
+
+    /// Whether it gives no light.
+    pub fn is_dark(&self) -> bool {
+        self.zenith == [0.0; 3]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math;
+
+    fn sky(kind: SkyKind) -> Sky {
+        SkyParameters { kind, luminance: Animated::from(900.0), ..SkyParameters::default() }.at(0.0)
+    }
+
+    #[test]
+    fn luminance_is_as_set_overhead_and_a_third_at_an_overcast_horizon() {
+        let overcast = sky(SkyKind::Overcast);
+        assert!((luminance(overcast.radiance(DVec3::Y)) - 900.0).abs() < 0.1);
+        assert!((luminance(overcast.radiance(DVec3::X)) - 300.0).abs() < 0.1);
+        assert!((luminance(sky(SkyKind::Uniform).radiance(DVec3::X)) - 900.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn illuminance_is_the_integral_of_radiance_over_the_hemisphere() {
+        for kind in [SkyKind::Overcast, SkyKind::Uniform] {
+            let sky = sky(kind);
+            let steps = 2000;
+            let sum: f64 = (0..steps)
+                .map(|step| {
+                    let elevation = (f64::from(step) + 0.5) / f64::from(steps) * 0.5 * PI;
+                    let (sin, cos) = math::sin_cos(elevation);
+                    let radiance = luminance(sky.radiance(DVec3::new(cos, sin, 0.0)));
+                    2.0 * PI * sin * cos * f64::from(radiance) * 0.5 * PI / f64::from(steps)
+                })
+                .sum();
+            let closed = f64::from(luminance(sky.horizontal_illuminance()));
+            assert!((sum / closed - 1.0).abs() < 1e-4, "{kind:?}: {sum} against {closed}");
+        }
+    }
+
+    #[test]
+    fn a_warmer_sky_is_redder() {
+        let warm = SkyParameters { temperature_k: 3000.0, ..SkyParameters::default() }.at(0.0).radiance(DVec3::Y);
+        let cold = SkyParameters { temperature_k: 10_000.0, ..SkyParameters::default() }.at(0.0).radiance(DVec3::Y);
+        assert!(warm[0] / warm[2] > 2.0 * cold[0] / cold[2]);
+        assert!(Sky::DARK.is_dark() && !sky(SkyKind::Overcast).is_dark());
+    }
+}

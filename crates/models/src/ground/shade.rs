@@ -1,0 +1,180 @@
+//! The ground's light, pixel by pixel.
+
+use std::f32::consts::PI;
+
+use bansho_base::{
+    canvas::{DepthInterval, Strip, View},
+    image::{Image, Rect},
+    math::{self, DVec2, DVec3},
+    phenomenon::Prepared,
+    surroundings::Surroundings,
+};
+
+use super::{
+    Lake,
+    gloss::gloss,
+    parameters::{GroundKind, GroundParameters},
+    surface::{Patch, Surface, fresnel},
+    waves::Slope,
+};
+
+/// Depth at which the ground ends, m: nearer than the sky, farther than all else.
+pub(super) const HORIZON: f64 = 1e6;
+/// Share of its light that soaked ground loses, since water keeps light in (Lekner & Dorf 1988).
+const WET_DARKENING: f64 = 0.55;
+/// Share by which the depth of a plate's ground may differ from the plane's.
+const PLATE_TOLERANCE: f64 = 0.1;
+/// Albedo of deep water.
+const WATER_ALBEDO: f32 = 0.02;
+
+/// One frame of the ground.
+pub(super) struct PreparedGround<'a> {
+    pub(super) parameters: &'a GroundParameters,
+    pub(super) surface: &'a Surface,
+    pub(super) view: &'a View,
+    pub(super) surroundings: &'a Surroundings<'a>,
+    pub(super) wetness: f64,
+    pub(super) lake: Option<Lake>,
+}
+
+/// Where a pixel meets the ground.
+struct Hit {
+    pixel: DVec2,
+    point: DVec3,
+    depth: f64,
+    /// Cosine between line of sight and normal.
+    cos: f64,
+    /// Length of ground that the pixel covers, the mean of along and across the line of sight, m.
+    footprint: f64,
+    /// Share of the pixel below the horizon.
+    coverage: f64,
+}
+
+impl PreparedGround<'_> {
+    fn hit(&self, pixel: DVec2) -> Option<Hit> {
+        let camera = &self.view.camera;
+        let direction = camera.direction(pixel)?;
+        let length = direction.length();
+        let cos = -direction.y / length;
+        // A pixel spans about 1 / focal radians.
+        let coverage = (cos * camera.focal_pixels + 0.5).clamp(0.0, 1.0);
+        let drop = camera.position.y - self.parameters.height;
+        if coverage <= 0.0 || drop <= 0.0 {
+            return None;
+        }
+        let cos = cos.max(0.5 / camera.focal_pixels);
+        let distance = (drop / cos).min(HORIZON * 0.5);
+        let depth = distance / length;
+        let footprint = distance / (camera.focal_pixels * math::sqrt(cos.max(1e-6)));
+        Some(Hit { pixel, point: camera.position + direction * depth, depth, cos, footprint, coverage })
+    }
+
+    /// Light thrown back evenly to all sides: `albedo / pi` of the illuminance.
+    fn diffuse(&self, hit: &Hit, patch: &Patch) -> [f32; 3] {
+        let plate = self.parameters.kind == GroundKind::Plate;
+        // A plate was lit by its own sky.
+        let mut illuminance = if plate { [0.0; 3] } else { self.surroundings.sky.horizontal_illuminance() };
+        for light in &self.surroundings.others.lights {
+            let (each, toward) = light.illuminance(hit.point);
+            let facing = toward.y.max(0.0) as f32;
+            (0..3).for_each(|c| illuminance[c] = each[c].mul_add(facing, illuminance[c]));
+        }
+        let albedo = match self.parameters.kind {
+            GroundKind::Water => [WATER_ALBEDO; 3],
+            GroundKind::Land | GroundKind::Plate => patch.albedo.map(|value| value * self.darkening()),
+        };
+        [0, 1, 2].map(|c| illuminance[c] * albedo[c] / PI)
+    }
+
+    /// Share of its dry light that the wet ground keeps.
+    fn darkening(&self) -> f32 {
+        (1.0 - WET_DARKENING * self.wetness) as f32
+    }
+
+    /// Light that the water on the ground mirrors.
+    fn mirrored(&self, hit: &Hit, patch: &Patch) -> [f32; 3] {
+        if self.wetness <= 0.0 {
+            return [0.0; 3];
+        }
+        match &self.lake {
+            Some(lake) => self.seen_in_lake(hit, lake),
+            None => self.seen_in_film(hit, patch),
+        }
+    }
+
+    /// A wet ground mirrors sharply in its puddles, and in streaks between them.
+    fn seen_in_film(&self, hit: &Hit, patch: &Patch) -> [f32; 3] {
+        let viewer = -(hit.point - self.view.camera.position).normalize_or_zero();
+        let rough = gloss(self.surroundings, hit.point, viewer, self.parameters.roughness);
+        let still = self.surroundings.reflection.map_or([0.0; 4], |image| bilinear(image, hit.pixel));
+        let (puddle, fresnel, wetness) = (patch.puddle as f32, fresnel(hit.cos) as f32, self.wetness as f32);
+        [0, 1, 2].map(|c| wetness * (puddle * fresnel).mul_add(still[c], (1.0 - puddle) * rough[c]))
+    }
+
+    fn seen_in_lake(&self, hit: &Hit, lake: &Lake) -> [f32; 3] {
+        let slope = lake.waves.slope(DVec2::new(hit.point.x, hit.point.z), hit.footprint);
+        let still =
+            self.surroundings.reflection.map_or([0.0; 4], |image| bilinear(image, self.seen_in_wave(hit, slope)));
+        let rough = bilinear(&lake.rough, hit.pixel);
+        let (lost, fresnel) = (slope.unresolved as f32, fresnel(hit.cos) as f32);
+        [0, 1, 2].map(|c| fresnel * lost.mul_add(rough[c], (1.0 - lost) * still[c]))
+    }
+
+    /// The pixel of the mirror's picture that a tilted wave shows: what lies far away moves by twice the tilt.
+    fn seen_in_wave(&self, hit: &Hit, slope: Slope) -> DVec2 {
+        let camera = &self.view.camera;
+        let sight = (hit.point - camera.position).normalize_or_zero();
+        let normal = DVec3::new(-slope.resolved.x, 1.0, -slope.resolved.y).normalize();
+        let mirrored = sight - 2.0 * sight.dot(normal) * normal;
+        let below = DVec3::new(mirrored.x, -mirrored.y.abs(), mirrored.z);
+        camera.project(camera.position + below * HORIZON).map_or(hit.pixel, |place| place.pixel)
+    }
+
+    fn radiance(&self, hit: &Hit) -> [f32; 3] {
+        let patch = self.surface.at(DVec2::new(hit.point.x, hit.point.z), hit.footprint);
+        let (diffuse, mirrored) = (self.diffuse(hit, &patch), self.mirrored(hit, &patch));
+        [0, 1, 2].map(|c| hit.coverage as f32 * (diffuse[c] + mirrored[c]))
+    }
+
+    /// Whether the sample is to be drawn, and what it lets through.
+    fn through(&self, hit: &Hit, strip: &Strip, index: usize) -> Option<f32> {
+        if self.parameters.kind == GroundKind::Plate {
+            let plate = f64::from(strip.plate_depth(index));
+            let here = !strip.has_plate() || (plate / hit.depth - 1.0).abs() < PLATE_TOLERANCE;
+            return here.then_some(self.darkening());
+        }
+        strip.visible(index, hit.depth as f32).then_some(1.0 - hit.coverage as f32)
+    }
+}
+
+/// The picture between the middles of its pixels.
+fn bilinear(image: &Image<4>, place: DVec2) -> [f32; 4] {
+    let last = DVec2::new(image.width() as f64 - 1.0, image.height() as f64 - 1.0);
+    let place = (place - 0.5).clamp(DVec2::ZERO, last);
+    let (x, y) = (place.x as usize, place.y as usize);
+    let (right, below) = ((x + 1).min(image.width() - 1), (y + 1).min(image.height() - 1));
+    let (u, v) = (place.x.fract() as f32, place.y.fract() as f32);
+    let [a, b, c, d] = [image.at(x, y), image.at(right, y), image.at(x, below), image.at(right, below)];
+    std::array::from_fn(|i| (1.0 - v) * ((1.0 - u) * a[i] + u * b[i]) + v * ((1.0 - u) * c[i] + u * d[i]))
+}
+
+impl Prepared for PreparedGround<'_> {
+    fn bounds(&self, slice: &DepthInterval) -> Rect {
+        let all = DepthInterval { near: 0.0, far: HORIZON };
+        if slice.overlaps(&all) { Rect::of_size(self.view.size[0], self.view.size[1]) } else { Rect::default() }
+    }
+
+    fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        let rect = strip.rect;
+        for index in 0..strip.len() {
+            let pixel = DVec2::new((rect.x + index % rect.width) as f64, (rect.y + index / rect.width) as f64) + 0.5;
+            let Some(hit) = self.hit(pixel) else { continue };
+            if !slice.contains(hit.depth) {
+                continue;
+            }
+            if let Some(through) = self.through(&hit, strip, index) {
+                strip.add_behind(index, self.radiance(&hit), [through; 3], hit.depth as f32);
+            }
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! What the ground is like at a place: its colour and where water stands.
+
+use bansho_base::{
+    color::acescg_from_srgb,
+    math::{self, DVec2},
+    noise::{Coordinate, Fractal, Noise},
+    random::{Key, Purpose},
+};
+
+use super::parameters::GroundParameters;
+
+/// Octaves of the ground's texture, each half as large and as strong as the one before.
+const OCTAVES: usize = 8;
+/// Strength of an octave over that of the one before. Soil and asphalt have most of their contrast in their grain.
+const GAIN: f64 = 1.05;
+/// Height of an octave over that of the one before.
+const RELIEF_GAIN: f64 = 0.6;
+/// One octave at a time, so that each can fade where it is too small to be seen.
+const SINGLE: Fractal = Fractal { octaves: 1, lacunarity: 2, gain: 0.5 };
+
+/// The ground's pattern.
+pub(super) struct Surface {
+    albedo: [f32; 3],
+    texture: f64,
+    size: f64,
+    octaves: Vec<Noise<2>>,
+    puddles: f64,
+}
+
+/// The ground at a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Patch {
+    /// Share of light that it throws back when dry.
+    pub(super) albedo: [f32; 3],
+    /// Share covered by puddles when wet.
+    pub(super) puddle: f64,
+}
+
+impl Surface {
+    pub(super) fn new(parameters: &GroundParameters, key: Key) -> Self {
+        let words = [0, 1].map(|part| key.words(part, 0, Purpose::named("ground")));
+        let octaves =
+            words.as_flattened().iter().take(OCTAVES).filter_map(|&seed| Noise::new(seed, SINGLE, [0, 0]).ok());
+        Self {
+            albedo: acescg_from_srgb(parameters.colour.map(|value| value as f32)),
+            texture: parameters.texture,
+            size: parameters.texture_size,
+            octaves: octaves.collect(),
+            puddles: parameters.puddles,
+        }
+    }
+
+    /// The ground at a `place` (x, z), of which a pixel covers `footprint` m.
+    pub(super) fn at(&self, place: DVec2, footprint: f64) -> Patch {
+        let (mut grain, mut relief) = (0.0, 0.0);
+        let (mut size, mut strength, mut height) = (self.size, 0.45_f64, 1.0_f64);
+        for octave in &self.octaves {
+            let seen = math::smoothstep(1.0, 3.0, size / footprint.max(1e-9));
+            if seen <= 0.0 {
+                break;
+            }
+            let coordinates = [place.x / size, place.y / size].map(Coordinate::from_f64);
+            let value = seen * f64::from(octave.at(coordinates));
+            (grain, relief) = (strength.mul_add(value, grain), height.mul_add(value, relief));
+            (size, strength, height) = (0.5 * size, GAIN * strength, RELIEF_GAIN * height);
+        }
+        let shade = math::exp(self.texture * grain) as f32;
+        Patch { albedo: self.albedo.map(|value| (value * shade).min(1.0)), puddle: self.puddle(relief, footprint) }
+    }
+
+    /// Water stands where the ground lies low. Far away only the mean share is seen.
+    fn puddle(&self, relief: f64, footprint: f64) -> f64 {
+        // The relief is roughly normal with this deviation; its quantile at a share p is near the logistic's.
+        const DEVIATION: f64 = 0.34;
+        let share = self.puddles.clamp(1e-6, 1.0 - 1e-6);
+        let level = DEVIATION * math::ln(share / (1.0 - share)) / 1.7;
+        let near = 1.0 - math::smoothstep(level - 0.12, level + 0.12, relief);
+        let seen = math::smoothstep(1.0, 3.0, self.size / footprint.max(1e-9));
+        math::lerp(self.puddles, near, seen)
+    }
+}
+
+/// Share of light that water mirrors at an angle with cosine `cos` to its normal (Schlick 1994, n = 1.333).
+pub(super) fn fresnel(cos: f64) -> f64 {
+    let grazing = 1.0 - cos.clamp(0.0, 1.0);
+    let fifth = grazing * grazing * grazing * grazing * grazing;
+    0.0204 + 0.9796 * fifth
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn puddles_cover_the_share_asked_for() {
+        for share in [0.0, 0.2, 0.6, 1.0] {
+            let parameters = GroundParameters { puddles: share, ..GroundParameters::default() };
+            let surface = Surface::new(&parameters, Key::new(3, "ground"));
+            let count = 40_000;
+            let at = |i: i32| surface.at(DVec2::new(f64::from(i % 200) * 0.31, f64::from(i / 200) * 0.37), 1e-3).puddle;
+            let mean = (0..count).map(at).sum::<f64>() / f64::from(count);
+            assert!((mean - share).abs() < 0.07, "{share}: {mean}");
+            assert!((surface.at(DVec2::ZERO, 1e3).puddle - share).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn water_mirrors_two_hundredths_from_above_and_all_at_the_horizon() {
+        assert!((fresnel(1.0) - 0.0204).abs() < 1e-12);
+        assert!((fresnel(0.0) - 1.0).abs() < 1e-12);
+        assert!((0.05..0.07).contains(&fresnel(0.5)));
+    }
+}

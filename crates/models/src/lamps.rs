@@ -1,0 +1,214 @@
+//! Lamps as they are seen: a glowing ball where a point light or a spot stands.
+
+use bansho_base::{
+    canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
+    color,
+    image::Rect,
+    math::DVec2,
+    observer::{Cancelled, Observer},
+    phenomenon::{Phenomenon, Prepared},
+    surroundings::{Emitter, Light, Publication, Surroundings},
+};
+
+/// The visible lights of a scene at any time.
+pub struct Lamps {
+    at: Box<dyn Fn(f64) -> Vec<Lamp> + Send + Sync>,
+}
+
+/// A light and the ball that it is seen as.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lamp {
+    /// The light.
+    pub light: Light,
+    /// Radius of the ball, m.
+    pub radius: f64,
+}
+
+impl Lamps {
+    /// The name of their layer.
+    pub const NAME: &str = "lamps";
+
+    /// Lamps that `at` gives for a time in seconds.
+    pub fn new(at: impl Fn(f64) -> Vec<Lamp> + Send + Sync + 'static) -> Self {
+        Self { at: Box::new(at) }
+    }
+}
+
+/// Share of a spot's light that its housing scatters to where its cone does not reach.
+const STRAY: f64 = 0.02;
+
+/// A ball of radius r that sends I candela toward the camera has the luminance I / (pi r^2).
+fn luminous_disc(lamp: &Lamp, view: &View) -> Option<Disc> {
+    let (position, cone) = match lamp.light.emitter {
+        Emitter::Directional { .. } => return None,
+        Emitter::Point { position, .. } => (position, 1.0),
+        Emitter::Spot { position, .. } => {
+            // The cone's share toward the camera: its illuminance there, without the fall with distance.
+            let distance_squared = (view.camera.position - position).length_squared();
+            let toward = color::luminance(lamp.light.illuminance(view.camera.position).0) as f64 * distance_squared;
+            let full = f64::from(color::luminance(lamp.light.intensity)).max(f64::MIN_POSITIVE);
+            (position, (toward / full).max(STRAY))
+        }
+    };
+    let place = view.camera.project(position)?;
+    let radius = lamp.radius * place.pixels_per_metre;
+    // A disc below a pixel keeps its light by growing dimmer, not smaller.
+    let shown = radius.max(0.75);
+    let scale = cone / (std::f64::consts::PI * lamp.radius * lamp.radius) * (radius / shown) * (radius / shown);
+    let disc =
+        Disc { centre: place.pixel, radius: shown, depth: place.depth, radiance: [0.0; 3], solid: radius >= 0.75 };
+    let scale = scale * std::f64::consts::PI * shown * shown / disc.pixels_covered();
+    Some(Disc { radiance: lamp.light.intensity.map(|value| (f64::from(value) * scale) as f32), ..disc })
+}
+
+/// A lamp in the picture.
+#[derive(Clone, Copy, Debug)]
+struct Disc {
+    centre: DVec2,
+    radius: f64,
+    depth: f64,
+    radiance: [f32; 3],
+    solid: bool,
+}
+
+impl Disc {
+    /// Share of the pixel in column `x` and row `y` that it covers.
+    fn coverage(&self, x: f64, y: f64) -> f64 {
+        (self.radius + 0.5 - (DVec2::new(x, y) + 0.5 - self.centre).length()).clamp(0.0, 1.0)
+    }
+
+    /// Sum of all coverages, which for a small disc depends on where it falls between pixels.
+    fn pixels_covered(&self) -> f64 {
+        if self.radius > 8.0 {
+            return std::f64::consts::PI * self.radius * self.radius;
+        }
+        let corner = (self.centre - self.radius - 1.0).floor();
+        let side = (2.0 * self.radius).ceil() as i32 + 3;
+        let row = |y: i32| (0..side).map(move |x| self.coverage(corner.x + f64::from(x), corner.y + f64::from(y)));
+        (0..side).flat_map(row).sum()
+    }
+
+    fn bounds(&self, view: &View) -> Rect {
+        let reach = DVec2::splat(self.radius + 1.0);
+        let clamp = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
+        let (low, high) = (self.centre - reach, self.centre + reach);
+        let (x, y) = (clamp(low.x.floor(), view.size[0]), clamp(low.y.floor(), view.size[1]));
+        let (right, bottom) = (clamp(high.x.ceil(), view.size[0]), clamp(high.y.ceil(), view.size[1]));
+        Rect { x, y, width: right - x, height: bottom - y }
+    }
+}
+
+impl Phenomenon for Lamps {
+    fn name(&self) -> &str {
+        Self::NAME
+    }
+
+    fn aovs(&self) -> &'static [AovDescriptor] {
+        &[]
+    }
+
+    /// Lamps do not set the exposure: they are meant to be far brighter than what they light.
+    fn luminance(&self) -> f64 {
+        0.0
+    }
+
+    /// The lights are the scene's own, so all have them already.
+    fn publish(&self, _shutter: Shutter) -> Publication {
+        Publication::default()
+    }
+
+    fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
+        let discs = (self.at)(view.shutter.middle());
+        let depth = |disc: Disc| DepthInterval { near: disc.depth, far: disc.depth.next_up() };
+        discs.iter().filter_map(|lamp| luminous_disc(lamp, view)).map(depth).collect()
+    }
+
+    fn prepare<'a>(
+        &'a self,
+        view: &'a View,
+        _surroundings: &'a Surroundings<'a>,
+        _observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        let lamps = (self.at)(view.shutter.middle());
+        let mut discs: Vec<Disc> = lamps.iter().filter_map(|lamp| luminous_disc(lamp, view)).collect();
+        discs.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+        Ok(Box::new(PreparedLamps { view, discs }))
+    }
+}
+
+struct PreparedLamps<'a> {
+    view: &'a View,
+    discs: Vec<Disc>,
+}
+
+impl PreparedLamps<'_> {
+    fn within(&self, slice: &DepthInterval) -> impl Iterator<Item = &Disc> {
+        let slice = *slice;
+        self.discs.iter().filter(move |disc| slice.contains(disc.depth))
+    }
+}
+
+impl Prepared for PreparedLamps<'_> {
+    fn bounds(&self, slice: &DepthInterval) -> Rect {
+        self.within(slice).fold(Rect::default(), |all, disc| all.union(&disc.bounds(self.view)))
+    }
+
+    fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        for disc in self.within(slice) {
+            let rect = disc.bounds(self.view).intersection(&strip.rect);
+            for y in rect.y..rect.bottom() {
+                for x in rect.x..rect.right() {
+                    let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
+                    let coverage = disc.coverage(x as f64, y as f64) as f32;
+                    if coverage > 0.0 && strip.visible(index, disc.depth as f32) {
+                        let through = if disc.solid { 1.0 - coverage } else { 1.0 };
+                        let light = disc.radiance.map(|value| value * coverage);
+                        strip.add_behind(index, light, [through; 3], disc.depth as f32);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{camera::CameraParameters, math::DVec3, observer::Unobserved, wind::Wind, wind::WindParameters};
+
+    use super::*;
+
+    /// The picture's sum of luminance times solid angle, times distance squared: the intensity that the camera sees.
+    fn intensity_seen(distance: f64, radius: f64, emitter: Emitter) -> f64 {
+        let lamp = Lamp { light: Light { emitter, intensity: [50.0; 3] }, radius };
+        let lamps = Lamps::new(move |_| vec![lamp]);
+        let camera = CameraParameters {
+            position: [0.0, 0.0, distance].into(),
+            target: [0.0; 3].into(),
+            ..CameraParameters::default()
+        };
+        let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [64, 64], 0);
+        let wind = Wind::new(WindParameters::default(), 1, None);
+        let surroundings = Surroundings::of_wind(&wind);
+        let mut strip = Strip::default();
+        strip.reset(Rect::of_size(64, 64), None, 0);
+        lamps.prepare(&view, &surroundings, &Unobserved).unwrap().draw(&DepthInterval::ALL, &mut strip);
+        let pixel = distance / view.camera.focal_pixels;
+        strip.radiance[1].iter().map(|value| f64::from(*value)).sum::<f64>() * pixel * pixel
+    }
+
+    #[test]
+    fn a_lamp_sends_its_intensity_to_the_camera_however_small_it_looks() {
+        let point = Emitter::Point { position: DVec3::ZERO, radius: 0.1 };
+        for (distance, radius) in [(5.0, 0.5), (20.0, 0.1), (500.0, 0.1)] {
+            let seen = intensity_seen(distance, radius, point);
+            assert!((seen / 50.0 - 1.0).abs() < 0.02, "{seen} cd at {distance} m");
+        }
+    }
+
+    #[test]
+    fn a_spot_shines_into_its_cone_and_is_just_seen_from_elsewhere() {
+        let spot = |axis| Emitter::Spot { position: DVec3::ZERO, axis, cos_inner: 0.9, cos_outer: 0.8 };
+        assert!(intensity_seen(5.0, 0.2, spot(DVec3::Z)) > 40.0);
+        assert!((intensity_seen(5.0, 0.2, spot(-DVec3::Z)) - 50.0 * STRAY).abs() < 0.02);
+    }
+}
