@@ -125,12 +125,13 @@ impl Phenomenon for FlameParticles {
     }
 
     fn stepping(&self) -> Option<Stepping> {
-        Some(Stepping { step: self.parameters.step_s, preroll: self.simulation.design.preroll })
+        Some(Stepping { step: self.simulation.step_s(), preroll: self.simulation.design.preroll })
     }
 
     fn step(&mut self, time: f64, surroundings: &Surroundings) {
-        self.simulation.step(time, self.parameters.step_s, surroundings);
-        self.time = time + self.parameters.step_s;
+        let seconds = self.simulation.step_s();
+        self.simulation.step(time, seconds, surroundings);
+        self.time = time + seconds;
         self.air_temperature_k = surroundings.air.temperature_k;
     }
 
