@@ -4,6 +4,7 @@ mod blue_flame;
 mod fault;
 mod lanes;
 
+pub mod field;
 pub mod flame_particles;
 pub mod flame_sheet;
 pub mod sparks;

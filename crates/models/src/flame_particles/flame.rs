@@ -125,13 +125,12 @@ impl Phenomenon for FlameParticles {
     }
 
     fn stepping(&self) -> Option<Stepping> {
-        Some(Stepping { step: self.simulation.step_s(), preroll: self.simulation.design.preroll })
+        Some(Stepping { step: self.parameters.step_s, preroll: self.simulation.design.preroll })
     }
 
     fn step(&mut self, time: f64, surroundings: &Surroundings) {
-        let seconds = self.simulation.step_s();
-        self.simulation.step(time, seconds, surroundings);
-        self.time = time + seconds;
+        self.simulation.step(time, surroundings);
+        self.time = time + self.simulation.step_s();
         self.air_temperature_k = surroundings.air.temperature_k;
     }
 

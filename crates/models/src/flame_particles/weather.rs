@@ -96,8 +96,8 @@ impl<'a> Weather<'a> {
 /// Drag coefficient of a fire in wind from the side.
 const CROSS_DRAG: f64 = 0.25;
 /// Share of its fuel that gas burns on a way as long as the flame is high, on the mean; and in the time that it takes there.
-const WAY_SHARE: f64 = 0.76;
-const TIME_SHARE: f64 = 0.19;
+const WAY_SHARE: f64 = 1.02;
+const TIME_SHARE: f64 = 0.25;
 
 fn density_kelvin(air: &Air) -> f32 {
     air.density_at(1.0) as f32
