@@ -1,7 +1,11 @@
 //! Rain in the light of lamps.
 
 use super::{METHODS, Method, draw, lamp, rain, streaks, view_at, wind};
-use crate::rain::{RainParameters, lens::DropLens, light::{Lighting, Scattering}};
+use crate::rain::{
+    RainParameters,
+    lens::DropLens,
+    light::{Lighting, Scattering},
+};
 use bansho_base::{
     canvas::Strip,
     math::{self, DVec3},
