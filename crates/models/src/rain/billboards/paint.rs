@@ -5,7 +5,7 @@ use bansho_base::{
     image::Rect,
 };
 
-use crate::rain::{bands::BAND, source::SourceField, tiles::TILE};
+use crate::rain::{bands::BAND, source::SourceField};
 
 use super::{
     Billboards,
@@ -13,8 +13,8 @@ use super::{
     sheet::{COLUMNS, Sheet, SheetRow},
 };
 
-/// Pixels of a block, as many as lie between corners of tiles.
-const LANES: usize = TILE;
+/// Pixels of a block.
+const LANES: usize = 16;
 /// Narrowest stretch of texture that a pixel is given, texels.
 const NARROWEST: f32 = 0.25;
 
@@ -58,7 +58,8 @@ pub(crate) fn paint(
         let sheet = brush.billboards.sheets.sheet(card.class, card.variant);
         let blocks = rect.x / LANES..rect.right().div_ceil(LANES);
         let middle = (band * BAND) as f32 + 0.5 * BAND as f32;
-        brush.source.along_row(middle, card.distance, blocks.start..blocks.end + 1, &mut scratch.light);
+        let places = (blocks.start..=blocks.end).map(|block| (block * LANES) as f32);
+        brush.source.along_row(middle, card.distance, places, &mut scratch.light);
         let brightest = scratch.light.iter().flatten().fold(0.0, |most: f32, light| most.max(*light));
         // Streaks without light still hide what lies behind them.
         let lit = brightest * card.strength * sheet.peak() >= brush.least_light;
