@@ -63,10 +63,16 @@ impl Rays {
 
     /// The pattern at sixteen places at a time.
     pub(super) fn at(&self, level: Level, places: &Places, time: f64) -> Pattern {
-        let [left, right, black, patches] = self.noises(level, places, time);
+        let noises = self.noises(level, places, time);
+        dispatch!(level, _simd => self.combined(&noises, &places.side, time))
+    }
+
+    #[inline(always)]
+    fn combined(&self, noises: &[[f32; LANES]; 4], sides: &[f32; LANES], time: f64) -> Pattern {
+        let [left, right, black, patches] = noises;
         let mut pattern = Pattern { brightness: [1.0; LANES], dimming: [1.0; LANES], hardness: [1.0; LANES] };
         for i in 0..LANES {
-            let share = (0.5 + 0.5 * places.side[i]).clamp(0.0, 1.0);
+            let share = (0.5 + 0.5 * sides[i]).clamp(0.0, 1.0);
             // Two patterns mix to less than the variance of one.
             let variance = share * share + (1.0 - share) * (1.0 - share);
             let mixed = (left[i] + share * (right[i] - left[i])) / (self.deviation * variance.sqrt());
@@ -99,12 +105,14 @@ impl Rays {
     }
 
     /// Black rays are where a noise passes 0.
+    #[inline(always)]
     fn darkness(&self, noise: f32) -> f32 {
         let depth = (1.0 - (noise / BLACK_WIDTH).abs()).max(0.0);
         1.0 - self.rays.black_rays as f32 * depth.sqrt()
     }
 
     /// Patches go bright and dark, each in its own time.
+    #[inline(always)]
     fn pulse(&self, noise: f32, time: f64) -> f32 {
         let turns = time / self.pulsation.period_s;
         let turns = (turns - turns.floor()) as f32;
