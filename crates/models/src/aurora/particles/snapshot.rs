@@ -139,7 +139,8 @@ fn read_particles(source: &mut Source) -> Result<AuroraParticles, SnapshotError>
     let lengths: [usize; NUMBERS] = particles.numbers().map(Vec::len);
     let whole = lengths.iter().all(|length| *length == count)
         && particles.dying.len() == count
-        && particles.sheets.len() == count;
+        && particles.sheets.len() == count
+        && particles.powers_w.iter().all(|power| *power >= 0.0);
     if whole { Ok(particles) } else { Err(SnapshotError::Damaged) }
 }
 
