@@ -188,6 +188,8 @@ pub struct Frame {
     pub opaque: bool,
     /// Figures of each phenomenon that has any, where they were asked for.
     pub figures: Vec<FigureSet>,
+    /// The pixels beyond which all are empty: no light, no alpha, infinite depth.
+    pub content: Rect,
 }
 
 /// A number that a frame is known by, such as a rain rate.

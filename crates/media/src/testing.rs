@@ -1,6 +1,8 @@
 //! Pictures for this crate's tests.
 
-use bansho_base::image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision};
+use bansho_base::image::{
+    CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect,
+};
 
 /// A small frame in which every value is different, with depth, a layer and an AOV.
 pub(crate) fn frame(width: usize, height: usize) -> Frame {
@@ -17,6 +19,7 @@ pub(crate) fn frame(width: usize, height: usize) -> Frame {
         ],
         opaque: false,
         figures: Vec::new(),
+        content: Rect::of_size(width, height),
     }
 }
 

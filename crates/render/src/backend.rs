@@ -70,6 +70,9 @@ pub trait Shot: Send {
     /// Takes the frame that was drawn; `None` where none was since the last.
     fn read(&mut self) -> Option<Frame>;
 
+    /// Gives back a frame that nobody needs any more, so that the next is drawn into its memory.
+    fn recycle(&mut self, _spent: Frame) {}
+
     /// The state of every phenomenon, for [`restore`](Self::restore).
     fn snapshot(&self) -> Vec<u8>;
 

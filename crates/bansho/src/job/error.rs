@@ -58,6 +58,9 @@ pub enum JobError {
     /// Streak textures that cannot be made.
     #[error(transparent)]
     Streaks(#[from] StreaksFault),
+    /// The observer asked to stop while streak textures were made.
+    #[error("stopped; whole textures stay, without an index")]
+    StreaksCancelled,
     /// The observer asked to stop.
     #[error("stopped; whole frames stay, and --resume goes on from there")]
     Cancelled,
@@ -154,7 +157,7 @@ impl JobError {
             Self::Render(RenderError::Asset(_) | RenderError::DepthSize { .. }) => Cause::Scene,
             Self::Streaks(_) => Cause::Usage,
             Self::NoGpu => Cause::Gpu,
-            Self::Cancelled => Cause::Cancelled,
+            Self::Cancelled | Self::StreaksCancelled => Cause::Cancelled,
             Self::Media(MediaError::Naming(_)) => Cause::Usage,
             Self::Render(_) | Self::Media(_) | Self::Tiles(_) => Cause::Work,
         }

@@ -7,7 +7,7 @@ use std::sync::{
 
 use bansho_base::{
     assets::MemoryAssets,
-    image::{Frame, Image},
+    image::{Frame, Image, Rect},
     observer::{Observer, Stage, check},
     phenomenon::SnapshotError,
 };
@@ -97,7 +97,8 @@ pub(super) fn frame(number: i64) -> Frame {
 fn blank(plan: &Plan, number: i64) -> Frame {
     let beauty = Image::filled(1, 1, [number as f32; 4]);
     let header = plan.header(number);
-    Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false, figures: Vec::new() }
+    let content = Rect::of_size(1, 1);
+    Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false, figures: Vec::new(), content }
 }
 
 /// Remembers what it is told, and stops the work when asked to.
@@ -128,7 +129,7 @@ pub(super) struct Finisher<F> {
 }
 
 impl<F: Fn(usize, i64) -> Result<(), JobError> + Sync> Finish for Finisher<F> {
-    fn finish(&self, index: usize, frame: Frame, _observer: &dyn Observer) -> Result<(), JobError> {
+    fn finish(&self, index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
         (self.each)(index, frame.header.number)
     }
 

@@ -3,8 +3,10 @@
 mod bad_input;
 mod commands;
 mod disk;
+mod figures;
 mod flipbook;
 mod interruptions;
 mod pictures;
 mod rooms;
+mod streaks;
 mod support;

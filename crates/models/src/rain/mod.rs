@@ -2,7 +2,8 @@
 //!
 //! Y. Yoshida, Y. Dobashi and T. Yamamoto, "A fast rendering method of raindrop streaks for rainy scenes". How many drops of which
 //! size a rain rate has ([`distribution`]), how fast they fall ([`velocity`]), what a streak hides while the shutter is open
-//! ([`streak`]), what all drops together take from a distant light ([`extinction`]), and how a drop sends light on ([`lens`]).
+//! ([`streak`]), all drops of a size in one picture ([`texture`]), what all drops together take from a distant light
+//! ([`extinction`]), and how a drop sends light on ([`lens`]).
 
 pub mod distribution;
 pub mod extinction;

@@ -32,6 +32,7 @@ pub(super) struct CpuShot {
     plates: PlateCache,
     number: i64,
     frame: Option<Frame>,
+    spent: Option<Frame>,
 }
 
 impl CpuShot {
@@ -39,7 +40,7 @@ impl CpuShot {
         let phenomena = plan.open()?;
         let clocks = vec![Clock { taken: 0 }; phenomena.len()];
         let number = plan.frames().start;
-        Ok(Self { plan, phenomena, clocks, plates: PlateCache::default(), number, frame: None })
+        Ok(Self { plan, phenomena, clocks, plates: PlateCache::default(), number, frame: None, spent: None })
     }
 
     fn begin_anew(&mut self) -> Result<(), RenderError> {
@@ -49,7 +50,13 @@ impl CpuShot {
     }
 
     /// Draws the view; `None` where only the whole picture gives its parts rightly, since bent light comes from beyond.
-    fn compose(&self, view: &View, plate: &PlateFrame, observer: &dyn Observer) -> Result<Option<Frame>, RenderError> {
+    fn compose(
+        &self,
+        view: &View,
+        plate: &PlateFrame,
+        spent: Option<Frame>,
+        observer: &dyn Observer,
+    ) -> Result<Option<Frame>, RenderError> {
         let preparing = StageGuard::begin(observer, Stage::Prepare);
         let publications: Vec<Publication> =
             self.phenomena.par_iter().map(|phenomenon| phenomenon.publish(view.shutter)).collect();
@@ -76,7 +83,7 @@ impl CpuShot {
         let mut frame = if bends {
             haze::frame(&composition, header, observer)?
         } else {
-            compose::frame(&composition, header, observer)?
+            compose::frame(&composition, header, spent, observer)?
         };
         if self.plan.figures {
             frame.figures = self.figures(&prepared);
@@ -86,11 +93,11 @@ impl CpuShot {
 
     /// The figures of every phenomenon that has any.
     fn figures(&self, prepared: &[Box<dyn Prepared + '_>]) -> Vec<FigureSet> {
-        let set = |(phenomenon, prepared): (&Box<dyn Phenomenon>, &Box<dyn Prepared + '_>)| {
-            let figures = prepared.figures();
-            (!figures.is_empty()).then(|| FigureSet { phenomenon: phenomenon.name().to_owned(), figures })
-        };
-        self.phenomena.iter().zip(prepared).filter_map(set).collect()
+        let names = self.phenomena.iter().map(|phenomenon| phenomenon.name().to_owned());
+        let each = names.zip(prepared.iter().map(|prepared| prepared.figures()));
+        each.filter(|(_, figures)| !figures.is_empty())
+            .map(|(phenomenon, figures)| FigureSet { phenomenon, figures })
+            .collect()
     }
 
     /// Everything but the first mirror, as it is seen in that mirror: radiance and alpha of the whole picture.
@@ -116,7 +123,7 @@ impl CpuShot {
             slices: &slices,
             plate: &PlateFrame::default(),
         };
-        Ok(Some(compose::frame(&composition, self.plan.header(self.number), observer)?.beauty))
+        Ok(Some(compose::frame(&composition, self.plan.header(self.number), None, observer)?.beauty))
     }
 
     /// Slices of the phenomena `which`, and those phenomena ready to draw; a slice's members count within `which`.
@@ -126,7 +133,7 @@ impl CpuShot {
         view: &'a View,
         surroundings: &'a [Surroundings<'a>],
         observer: &dyn Observer,
-    ) -> Result<(Vec<Slice>, Vec<Box<dyn Prepared + 'a>>), RenderError> {
+    ) -> Result<Ready<'a>, RenderError> {
         let each = || which.par_iter().map(|&index| (&self.phenomena[index], &surroundings[index]));
         let intervals: Vec<_> = each().map(|(phenomenon, s)| phenomenon.depth_intervals(view, s)).collect();
         let prepared = each().map(|(phenomenon, s)| phenomenon.prepare(view, s, observer)).collect::<Result<_, _>>()?;
@@ -145,6 +152,9 @@ impl CpuShot {
     }
 }
 
+/// Slices of depth, and the phenomena that they count, ready to draw.
+type Ready<'a> = (Vec<Slice>, Vec<Box<dyn Prepared + 'a>>);
+
 /// The part `window` of a whole frame.
 fn crop(whole: Frame, window: Rect) -> Option<Frame> {
     let width = whole.beauty.width();
@@ -160,6 +170,7 @@ fn crop(whole: Frame, window: Rect) -> Option<Frame> {
         header: whole.header,
         opaque: whole.opaque,
         figures: whole.figures,
+        content: Rect::of_size(window.width, window.height),
     })
 }
 
@@ -183,11 +194,12 @@ impl Shot for CpuShot {
             self.plates.frame(&self.plan, self.number)?
         };
         let mut view = self.plan.view(self.number);
-        let frame = match self.compose(&view, &plate, observer)? {
+        let spent = self.spent.take();
+        let frame = match self.compose(&view, &plate, spent, observer)? {
             Some(frame) => frame,
             None => {
                 view.window = Rect::of_size(view.size[0], view.size[1]);
-                let whole = self.compose(&view, &plate, observer)?;
+                let whole = self.compose(&view, &plate, None, observer)?;
                 whole.and_then(|whole| crop(whole, self.plan.window)).ok_or(Cancelled)?
             }
         };
@@ -197,6 +209,10 @@ impl Shot for CpuShot {
 
     fn read(&mut self) -> Option<Frame> {
         self.frame.take()
+    }
+
+    fn recycle(&mut self, spent: Frame) {
+        self.spent = Some(spent);
     }
 
     fn snapshot(&self) -> Vec<u8> {

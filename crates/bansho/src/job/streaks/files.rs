@@ -4,7 +4,7 @@ use std::{f64::consts::PI, path::PathBuf};
 
 use bansho_base::{
     color::ev100_of_white_luminance,
-    image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision},
+    image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision, Rect},
     math::DVec3,
 };
 use bansho_media::{
@@ -110,14 +110,8 @@ impl Writer {
         let channel =
             |name: &str, values: Vec<f32>| Channel { name: name.to_owned(), precision: Precision::Single, values };
         let channels = vec![channel("opacity", values.to_vec())];
-        let frame = Frame {
-            header: self.header(file, opacity),
-            beauty,
-            depth: None,
-            channels,
-            opaque: false,
-            figures: Vec::new(),
-        };
+        let (header, content) = (self.header(file, opacity), Rect::of_size(width, height));
+        let frame = Frame { header, beauty, depth: None, channels, opaque: false, figures: Vec::new(), content };
         let path = self.folder.join(file);
         atomic::write_bytes(&path, &exr::encode(&frame, &path)?)?;
         Ok(Written { scale: None, lit: None })

@@ -163,7 +163,7 @@ impl PreparedStreaks {
                 Ok(entry)
             })
             .collect::<Result<_, JobError>>()?;
-        check(observer).map_err(|_| JobError::Cancelled)?;
+        check(observer).map_err(|_| JobError::StreaksCancelled)?;
         let text = format!("{:#}\n", index::describe(&self.streaks, &self.cube, &self.writer, &rains, &entries));
         atomic::write_bytes(&index, text.as_bytes())?;
         Ok(index)
@@ -184,10 +184,10 @@ impl PreparedStreaks {
         let drops = self.cube.drops(texture.sizes, &texture.bin, self.streaks.seed, texture.variant);
         let mut image = self.cube.draw(&[]);
         for drops in drops.chunks(DROPS_AT_ONCE) {
-            check(observer).map_err(|_| JobError::Cancelled)?;
+            check(observer).map_err(|_| JobError::StreaksCancelled)?;
             self.cube.draw_over(drops, &mut image);
         }
-        check(observer).map_err(|_| JobError::Cancelled)?;
+        check(observer).map_err(|_| JobError::StreaksCancelled)?;
         let file = self.writer.name(texture);
         let written = self.writer.write(&file, &image)?;
         Ok(Entry::new(texture, &self.cube, file, drops, &image, written))
