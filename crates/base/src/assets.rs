@@ -1,8 +1,12 @@
-//! What a scene refers to by name: pictures and text, wherever they are kept.
+//! What a scene refers to by name: pictures, meshes, drawings and text, wherever they are kept.
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use crate::image::Image;
+use crate::{
+    drawing::Drawing,
+    image::Image,
+    mesh::{Mesh, MeshError},
+};
 
 /// How the numbers of a picture are meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,9 +49,21 @@ pub enum AssetProblem {
     /// It is there but cannot be read.
     #[error("cannot be read: {0}")]
     Unreadable(String),
+    /// A drawing without strokes.
+    #[error("holds no strokes (allowed: an SVG file with path, polyline or line elements)")]
+    NoStrokes,
+    /// A drawing was asked for a stroke that it lacks.
+    #[error("has no stroke of the id `{0}`")]
+    NoStroke(String),
     /// Its name ends in something that is not a picture.
     #[error("is not a picture Bansho reads (allowed: .png, .jpg, .jpeg, .exr)")]
     UnknownKind,
+    /// Its name ends in something that is not a mesh.
+    #[error("is not a mesh Bansho reads (allowed: .glb, .gltf)")]
+    UnknownMeshKind,
+    /// It holds no usable mesh.
+    #[error("holds no usable mesh: {0}")]
+    Mesh(#[from] MeshError),
     /// Its contents are damaged or not what the name says.
     #[error("is damaged or not of the kind its name says: {0}")]
     Damaged(String),
@@ -76,7 +92,7 @@ pub enum AssetProblem {
     NoChannel(String),
 }
 
-/// Gives a scene its pictures and texts. `####` in a path stands for the frame number with leading zeros.
+/// Gives a scene its pictures, meshes and texts. `####` in a path stands for the frame number with leading zeros.
 ///
 /// A loader may keep what it read; it may be called from several threads.
 pub trait Assets: Send + Sync {
@@ -85,6 +101,18 @@ pub trait Assets: Send + Sync {
     /// # Errors
     /// The asset is missing, damaged, too large or not a picture.
     fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError>;
+
+    /// All triangles of the scene at `path`, in its own coordinates.
+    ///
+    /// # Errors
+    /// The asset is missing, too large, damaged, or holds no triangles.
+    fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError>;
+
+    /// The strokes of the line drawing at `path`.
+    ///
+    /// # Errors
+    /// The asset is missing, damaged, too large, or holds no strokes.
+    fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError>;
 
     /// The text at `path`.
     ///
@@ -103,6 +131,8 @@ pub trait Assets: Send + Sync {
 #[derive(Clone, Debug, Default)]
 pub struct MemoryAssets {
     pictures: BTreeMap<String, Arc<Picture>>,
+    drawings: BTreeMap<String, Arc<Drawing>>,
+    meshes: BTreeMap<String, Arc<Mesh>>,
     texts: BTreeMap<String, Arc<str>>,
 }
 
@@ -110,6 +140,16 @@ impl MemoryAssets {
     /// Keeps `picture` under `path`.
     pub fn insert_picture(&mut self, path: impl Into<String>, picture: Picture) {
         self.pictures.insert(path.into(), Arc::new(picture));
+    }
+
+    /// Keeps `mesh` under `path`.
+    pub fn insert_mesh(&mut self, path: impl Into<String>, mesh: Mesh) {
+        self.meshes.insert(path.into(), Arc::new(mesh));
+    }
+
+    /// Keeps `drawing` under `path`.
+    pub fn insert_drawing(&mut self, path: impl Into<String>, drawing: Drawing) {
+        self.drawings.insert(path.into(), Arc::new(drawing));
     }
 
     /// Keeps `text` under `path`.
@@ -127,12 +167,21 @@ impl Assets for MemoryAssets {
         self.pictures.get(path).cloned().ok_or_else(|| missing(path))
     }
 
+    fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
+        self.meshes.get(path).cloned().ok_or_else(|| missing(path))
+    }
+
+    fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
+        self.drawings.get(path).cloned().ok_or_else(|| missing(path))
+    }
+
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
         self.texts.get(path).cloned().ok_or_else(|| missing(path))
     }
 
     fn digest(&self, path: &str, _frame: i64) -> Result<[u8; 32], AssetError> {
-        if !self.pictures.contains_key(path) && !self.texts.contains_key(path) {
+        let drawn = self.pictures.contains_key(path) || self.drawings.contains_key(path);
+        if !drawn && !self.meshes.contains_key(path) && !self.texts.contains_key(path) {
             return Err(missing(path));
         }
         let mut digest = [0; 32];

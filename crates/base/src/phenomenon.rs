@@ -4,6 +4,7 @@ use crate::{
     canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
     image::{Figure, Image, Rect},
     observer::{Cancelled, Observer},
+    point_cloud::PointCloud,
     surroundings::{Publication, Surroundings},
 };
 
@@ -76,6 +77,11 @@ pub trait Phenomenon: Send + Sync {
     /// The bytes are not such a state; the phenomenon is then unchanged.
     fn restore(&mut self, _state: &[u8]) -> Result<(), SnapshotError> {
         Err(SnapshotError::NoState)
+    }
+
+    /// Its particles at time `t`, within a step of its state; `None` where it has none.
+    fn particles(&self, _t: f64) -> Option<PointCloud> {
+        None
     }
 
     /// What the others see of it while the shutter is open.

@@ -39,6 +39,7 @@ fn run(command: &Command) -> anyhow::Result<()> {
         Command::Render(args) => command::render::run(args),
         Command::Flipbook(args) => command::flipbook::run(args),
         Command::Streaks(args) => command::streaks::run(args),
+        Command::Simulate(args) => command::simulate::run(args),
         Command::Completions(args) => command::completions::run(args),
         Command::Man(args) => command::man::run(args),
     }

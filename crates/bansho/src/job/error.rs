@@ -115,6 +115,9 @@ pub enum Conflict {
     /// No frame is left to draw.
     #[error("no frame is asked for")]
     NoFrames,
+    /// A simulation of a scene in which nothing has particles.
+    #[error("nothing in this scene has particles to write")]
+    NoParticles,
     /// Snapshots of no frame.
     #[error("snapshots every {0} frames; allowed: 1 or more")]
     SnapshotStep(u64),

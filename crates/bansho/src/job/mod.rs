@@ -1,4 +1,4 @@
-//! From a scene file to pictures on disk: what `bansho render`, `bansho flipbook` and `bansho streaks` do, for any program.
+//! From a scene file to pictures on disk: what `bansho render`, `bansho flipbook`, `bansho simulate` and `bansho streaks` do, for any program.
 //!
 //! [`Job`] says what is wanted; [`Job::prepare`] checks all of it and writes nothing; [`PreparedJob::run`] draws each
 //! frame while those before are compressed and written by whichever thread of the caller's rayon pool is free. A few
@@ -17,6 +17,7 @@ mod run;
 mod scene_file;
 mod sheet;
 mod shoot;
+mod simulate;
 mod snapshots;
 mod streaks;
 #[cfg(test)]
@@ -33,6 +34,7 @@ pub use observer::{FrameDone, JobObserver, Note, Outline};
 pub use prepare::{PreparedJob, check_scene};
 pub use run::Summary;
 pub use scene_file::SceneFile;
+pub use simulate::{PreparedSimulation, Simulate};
 pub use streaks::{ListKind, PreparedStreaks, StreakFormat, Streaks, StreaksFault};
 
 bansho_base::choice! {

@@ -10,6 +10,7 @@ use bansho_base::{
     image::{Frame, Image, Rect},
     observer::{Observer, Stage, check},
     phenomenon::SnapshotError,
+    point_cloud::PointCloud,
 };
 use bansho_render::{Backend, Plan, PlanOptions, RenderError, Shot};
 
@@ -76,6 +77,10 @@ impl Shot for CounterShot {
 
     fn read(&mut self) -> Option<Frame> {
         std::mem::take(&mut self.drawn).then(|| blank(&self.plan, self.number))
+    }
+
+    fn particles(&self) -> PointCloud {
+        PointCloud::default()
     }
 
     fn snapshot(&self) -> Vec<u8> {

@@ -2,6 +2,7 @@
 
 mod flipbook;
 mod render;
+mod simulate;
 mod streaks;
 mod values;
 
@@ -12,6 +13,7 @@ use clap::{Args, Parser, Subcommand};
 pub(crate) use self::{
     flipbook::FlipbookArgs,
     render::{RenderArgs, WorkArgs},
+    simulate::SimulateArgs,
     streaks::StreaksArgs,
 };
 
@@ -51,6 +53,8 @@ pub(crate) enum Command {
     Flipbook(FlipbookArgs),
     /// Write streak textures of rain with every drop's diameter, velocity and opacity.
     Streaks(StreaksArgs),
+    /// Simulate a scene and write its particles, for other programs.
+    Simulate(SimulateArgs),
     /// Print a completion script for a shell.
     Completions(CompletionsArgs),
     /// Print the manual page, or write those of all commands.

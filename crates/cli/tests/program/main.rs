@@ -6,6 +6,7 @@ mod disk;
 mod figures;
 mod flipbook;
 mod interruptions;
+mod particles;
 mod pictures;
 mod rooms;
 mod streaks;

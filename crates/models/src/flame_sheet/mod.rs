@@ -12,7 +12,6 @@ mod draw;
 mod flame;
 mod fluctuation;
 mod glow;
-mod lanes;
 mod measure;
 mod moment;
 mod parameters;
@@ -22,7 +21,6 @@ mod ramp;
 mod shade;
 mod shape;
 mod smoke;
-mod sparks;
 mod tables;
 mod texture;
 
@@ -37,7 +35,7 @@ use bansho_base::{
 
 pub use parameters::{
     ColourParameters, Colouring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters,
-    SmokeParameters, SparkParameters, StageShown, TextureKind, TextureParameters,
+    SmokeParameters, StageShown, TextureKind, TextureParameters,
 };
 pub use texture::{PaperTexture, paper_texture};
 
@@ -48,7 +46,12 @@ use ramp::Ramp;
 use shape::{Shape, instance_key};
 use texture::{FractalLayers, PaperLayer};
 
-use crate::fault::{FaultKind, ParameterFault};
+pub use crate::sparks::SparkParameters;
+
+use crate::{
+    fault::{FaultKind, ParameterFault},
+    lanes,
+};
 
 /// A flame sheet with all its instances, ready to be drawn at any time.
 #[derive(Clone, Debug)]

@@ -145,39 +145,43 @@ fn ground(occluders: &[Occluder]) -> Option<f64> {
     occluders.iter().filter_map(level).max_by(f64::total_cmp)
 }
 
-/// Whether the way from `point` toward `up` meets a solid. All below a plane is ground, not roof.
+/// Steps after which a way that only grazes a solid counts as free.
+const TRACE_STEPS: usize = 64;
+/// How high roofs may stand, m.
+const HIGHEST_ROOF: f64 = 200.0;
+
+/// Whether the way from `point` toward `up` meets a solid, in steps as long as its distance allows. All below a plane is ground, not roof.
 fn shelters(roof: &Occluder, point: DVec3, up: DVec3) -> bool {
-    match *roof {
-        Occluder::HalfSpace { .. } => false,
-        Occluder::Sphere { centre, radius } => {
-            let offset = centre - point;
-            let ahead = offset.dot(up);
-            let inside = offset.length_squared() < radius * radius;
-            inside || ahead > 0.0 && offset.length_squared() - ahead * ahead < radius * radius
+    if matches!(roof, Occluder::HalfSpace { .. }) {
+        return false;
+    }
+    let mut way = 0.0;
+    for _ in 0..TRACE_STEPS {
+        let distance = roof.signed_distance(point + up * way);
+        if distance < 1e-3 {
+            return true;
         }
-        Occluder::Cuboid { min, max } => {
-            let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
-            for axis in 0..3 {
-                let [a, b] = [min[axis], max[axis]].map(|side| (side - point[axis]) / up[axis]);
-                // A way along a face divides 0 by 0: it then lies within or without for all of its length.
-                if a.is_nan() || b.is_nan() {
-                    continue;
-                }
-                enter = enter.max(a.min(b));
-                leave = leave.min(a.max(b));
-            }
-            enter < leave
+        way += distance;
+        if way > HIGHEST_ROOF {
+            break;
         }
     }
+    false
 }
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::math::DQuat;
+
     use super::*;
 
     #[test]
     fn roofs_shelter_what_is_beneath_them_and_slanted_rain_comes_in() {
-        let roof = Occluder::Cuboid { min: DVec3::new(-1.0, 3.0, -1.0), max: DVec3::new(1.0, 3.2, 1.0) };
+        let roof = Occluder::Cuboid {
+            centre: DVec3::new(0.0, 3.1, 0.0),
+            half_extents: DVec3::new(1.0, 0.1, 1.0),
+            rotation: DQuat::IDENTITY,
+        };
         let slanted = DVec3::new(1.0, 1.0, 0.0).normalize();
         assert!(shelters(&roof, DVec3::ZERO, DVec3::Y) && !shelters(&roof, DVec3::new(2.0, 0.0, 0.0), DVec3::Y));
         assert!(!shelters(&roof, DVec3::ZERO, slanted) && shelters(&roof, DVec3::new(-3.0, 0.0, 0.0), slanted));

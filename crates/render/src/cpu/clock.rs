@@ -45,13 +45,19 @@ pub(super) fn surroundings<'a>(
     reflection: Option<&'a Image<4>>,
 ) -> Surroundings<'a> {
     let sky = plan.scene.sky.as_ref().map_or(Sky::DARK, |sky| sky.at(shutter.middle()));
-    Surroundings { wind: &plan.wind, sky, reflection, others: others(plan, publications, index, shutter) }
+    Surroundings {
+        wind: &plan.wind,
+        air: &plan.scene.air,
+        sky,
+        reflection,
+        others: others(plan, publications, index, shutter),
+    }
 }
 
-/// What everybody but `index` publishes during `shutter`, and the scene's own lights.
+/// What everybody but `index` publishes during `shutter`, and the scene's own lights and obstacles.
 fn others(plan: &Plan, publications: &[Publication], index: usize, shutter: Shutter) -> Publication {
     let lights = plan.scene.lights.iter().map(|light| light.at(shutter.middle())).collect();
-    let mut others = Publication { lights, ..Publication::default() };
+    let mut others = Publication { lights, occluders: plan.occluders.clone(), ..Publication::default() };
     for (other, publication) in publications.iter().enumerate() {
         if other != index {
             others.extend(publication);

@@ -7,6 +7,7 @@ use bansho_base::{
     image::{Channel, FigureSet, Frame, Image, Rect},
     observer::{self, Cancelled, Observer, Stage, StageGuard},
     phenomenon::{Phenomenon, Prepared},
+    point_cloud::PointCloud,
     surroundings::{Publication, Surroundings},
 };
 
@@ -67,7 +68,9 @@ impl CpuShot {
         drop(preparing);
         let _stage = StageGuard::begin(observer, Stage::Draw);
         observer::check(observer)?;
-        let bends = prepared.iter().any(|prepared| prepared.deflection().is_some());
+        // Where nothing lies behind, nothing is bent.
+        let behind = plate.colour.is_some() || self.phenomena.len() > 1;
+        let bends = behind && prepared.iter().any(|prepared| prepared.deflection().is_some());
         if bends && view.window != Rect::of_size(view.size[0], view.size[1]) {
             return Ok(None);
         }
@@ -213,6 +216,13 @@ impl Shot for CpuShot {
 
     fn recycle(&mut self, spent: Frame) {
         self.spent = Some(spent);
+    }
+
+    fn particles(&self) -> PointCloud {
+        let t = self.plan.shutter(self.number).middle();
+        let mut all = PointCloud::default();
+        self.phenomena.iter().filter_map(|phenomenon| phenomenon.particles(t)).for_each(|own| all.extend(&own));
+        all
     }
 
     fn snapshot(&self) -> Vec<u8> {
