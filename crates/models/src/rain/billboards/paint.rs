@@ -76,10 +76,12 @@ fn corners(card: &Card, y: usize, blocks: &std::ops::Range<usize>, scratch: &mut
     let count = blocks.len() + 1;
     scratch.across.resize(count, 0.0);
     scratch.up.resize(count, 0.0);
-    let (first, height) = ((blocks.start * LANES) as f64, y as f64 + 0.5);
+    // Counted from the billboard's own first block, so that a crop changes no bit.
+    let (own, height) = (card.rect.x / LANES, y as f64 + 0.5);
+    let first = (own * LANES) as f64;
     let Some(forms) = card.mapping.along_row(first, height) else {
         for number in 0..count {
-            let place = card.mapping.at(first + (number * LANES) as f64, height).unwrap_or([f64::NAN; 3]);
+            let place = card.mapping.at(((blocks.start + number) * LANES) as f64, height).unwrap_or([f64::NAN; 3]);
             (scratch.across[number], scratch.up[number]) = (place[0] as f32, place[1] as f32);
         }
         return;
@@ -91,7 +93,7 @@ fn corners(card: &Card, y: usize, blocks: &std::ops::Range<usize>, scratch: &mut
     }
     let (across, up) = (&mut scratch.across[..count], &mut scratch.up[..count]);
     for number in 0..count {
-        let place = number as f32;
+        let place = (blocks.start - own + number) as f32;
         let depth = 1.0 / step[2].mul_add(place, start[2]);
         // Behind the camera no depth is above 0.
         let depth = if depth > 0.0 { depth } else { f32::NAN };

@@ -27,7 +27,7 @@ fn statistics(method: super::Method, rate: f64, frames: u64) -> Vec<[f64; 2]> {
 #[test]
 fn rows_have_the_mean_and_variance_of_the_reference() {
     // Noise of the reference itself falls with the number of streaks: weak rain needs more frames.
-    for (rate, frames) in [(1.0, 48), (5.0, 32), (20.0, 20), (100.0, 8)] {
+    for (rate, frames) in [(1.0, 40), (5.0, 24), (20.0, 12), (100.0, 6)] {
         let [billboards, drops] = METHODS.map(|method| statistics(method, rate, frames));
         let ratio = |k: usize, band: usize| billboards[band][k] / drops[band][k];
         let mean = |k: usize| (0..BANDS).map(|band| ratio(k, band)).sum::<f64>() / BANDS as f64;
