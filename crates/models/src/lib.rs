@@ -2,6 +2,7 @@
 
 mod fault;
 
+pub mod aurora;
 pub mod flame_sheet;
 pub mod ground;
 pub mod lamps;

@@ -1,0 +1,181 @@
+//! Photons of single collisions: for Fang's falls such that their mean is the emission table, and by the rules of the thesis.
+
+use bansho_base::math;
+
+use super::{
+    Emission, PHOTONS_PER_KILORAYLEIGH,
+    emitter::{EMITTERS, Emitter, PerEmitter},
+    excitation::DIRECT_PHOTONS,
+    quenching::natural_lifetime,
+};
+use crate::aurora::{
+    atmosphere::Air,
+    precipitation::{COLLISION_EV, ION_PAIR_EV, deposition::column, fall::collision_count},
+};
+
+/// k_b, J/K, and the atomic mass unit, kg.
+const BOLTZMANN: f64 = 1.380_649e-23;
+const ATOMIC_MASS: f64 = 1.660_539e-27;
+/// Radius of the molecules that quench in (2.25), m: half the distance at which N2 collides with N2.
+const MOLECULAR_RADIUS: f64 = 1.85e-10;
+
+impl Emission {
+    /// Brightness that each collision of a fall adds to the column it stands for, in kR of ion pairs per mW m^-2: times
+    /// [`photons_per_ion_pair`](Self::photons_per_ion_pair) of the collision's level it is the light of each emitter.
+    ///
+    /// # Panics
+    /// For a node that is not of the grid of energies.
+    #[must_use]
+    pub fn ion_pairs_per_collision(&self, node: usize) -> f64 {
+        let pairs = column(self.deposition().monoenergetic(node));
+        pairs / collision_count(node) as f64 / PHOTONS_PER_KILORAYLEIGH
+    }
+
+    /// The light of a collision at a level by itself, as in the thesis: one emitter, drawn by production rate, with all the photons of
+    /// an ion pair. Its mean over `uniform` in [0, 1) is [`photons_per_ion_pair`](Self::photons_per_ion_pair).
+    ///
+    /// # Panics
+    /// For a level that is not of the atmosphere.
+    #[must_use]
+    pub fn draw_emitter(&self, level: usize, uniform: f64) -> (Emitter, f64) {
+        let photons = self.photons_per_ion_pair()[level];
+        let whole: f64 = photons.iter().sum();
+        (choose(photons, uniform * whole), whole)
+    }
+}
+
+/// The emitter in whose part of the running sum a place lies.
+fn choose(weights: PerEmitter<f64>, place: f64) -> Emitter {
+    let mut sum = 0.0;
+    let passed = weights.iter().filter(|weight| {
+        sum += **weight;
+        sum <= place
+    });
+    EMITTERS[passed.count().min(EMITTERS.len() - 1)]
+}
+
+/// Mean thermal speed of molecules of a mass in atomic units, m/s (2.26).
+#[must_use]
+pub fn thermal_speed(temperature: f64, mass_u: f64) -> f64 {
+    math::sqrt(8.0 * BOLTZMANN * temperature / (std::f64::consts::PI * mass_u * ATOMIC_MASS))
+}
+
+/// Probability that a state is struck by a molecule before its mean lifetime is over (2.25). It quenches green light below 190 km, which
+/// nature does not: a molecule's touch seldom takes the energy.
+#[must_use]
+pub fn hard_sphere_quenching(emitter: Emitter, air: &Air) -> f64 {
+    let mass_u = match emitter {
+        Emitter::OxygenGreen | Emitter::OxygenRed => 15.999,
+        Emitter::NitrogenIon | Emitter::Nitrogen => 28.014,
+    };
+    let cross_section = std::f64::consts::PI * MOLECULAR_RADIUS * MOLECULAR_RADIUS;
+    let rate = std::f64::consts::SQRT_2 * air.number_density() * cross_section * thermal_speed(air.temperature, mass_u);
+    -math::exp_m1(-rate * natural_lifetime(emitter))
+}
+
+/// The light of a collision of 100 eV by the rules of the thesis (2.4.2), in counting photons: an atom or a molecule is struck by number
+/// density, then emits by production rate unless it is quenched (2.25). O2 gives nothing.
+#[must_use]
+pub fn hard_sphere_photons(air: &Air, uniforms: [f64; 3]) -> Option<(Emitter, f64)> {
+    let [oxygen_green, oxygen_red, nitrogen_ion, nitrogen] = DIRECT_PHOTONS;
+    let place = uniforms[0] * air.number_density();
+    let rates = if place < air.o {
+        [oxygen_green, oxygen_red, 0.0, 0.0]
+    } else if place < air.o + air.n2 {
+        [0.0, 0.0, nitrogen_ion, nitrogen]
+    } else {
+        return None;
+    };
+    let whole: f64 = rates.iter().sum();
+    let emitter = choose(rates, uniforms[1] * whole);
+    (uniforms[2] >= hard_sphere_quenching(emitter, air)).then_some((emitter, whole * COLLISION_EV / ION_PAIR_EV))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aurora::{
+        atmosphere::{LEVELS, atmosphere},
+        light::PHOTONS_PER_KILORAYLEIGH,
+        precipitation::{energy, fall::Falls, spectrum::ARC},
+    };
+    use bansho_base::random::{Key, Purpose, uniform};
+
+    /// Light by level and emitter, kR per mW m^-2, of `sets` sets of falls of a spectrum; `single` draws one emitter for a collision.
+    fn light(table: &Emission, falls: &Falls, energy_ev: f64, particles: u64, single: bool) -> Vec<PerEmitter<f64>> {
+        let key = Key::new(11, "aurora");
+        let mut sum = vec![[0.0; 4]; LEVELS];
+        for particle in 0..particles {
+            let uniforms = key.uniforms(particle, 0, Purpose::named("energy")).map(f64::from);
+            let node = table.deposition().draw_node(energy_ev, [uniforms[0], uniforms[1]]);
+            let pairs = table.ion_pairs_per_collision(node) / particles as f64;
+            for (number, collision) in falls.fall(node, key, particle).enumerate() {
+                let mut photons = table.photons_per_ion_pair()[collision.level as usize];
+                if single {
+                    let word = key.words(particle, number as u32, Purpose::named("emitter"))[0];
+                    let (emitter, all) = table.draw_emitter(collision.level as usize, uniform(word) as f64);
+                    photons = [0.0; 4];
+                    photons[emitter.index()] = all;
+                }
+                sum[collision.level as usize] =
+                    std::array::from_fn(|i| sum[collision.level as usize][i] + photons[i] * pairs);
+            }
+        }
+        sum
+    }
+
+    /// Sum of absolute differences from the profile over its sum, levels taken together by tens for the red line, which few collisions
+    /// high up make.
+    fn difference(table: &Emission, energy_ev: f64, found: &[PerEmitter<f64>]) -> PerEmitter<f64> {
+        let profile = table.profile(energy_ev);
+        std::array::from_fn(|i| {
+            let together = if i == Emitter::OxygenRed.index() { 20 } else { 1 };
+            let sums = |levels: &[PerEmitter<f64>]| -> Vec<f64> {
+                levels.chunks(together).map(|chunk| chunk.iter().map(|photons| photons[i]).sum()).collect()
+            };
+            let expected: Vec<f64> = sums(&profile).iter().map(|sum| sum * 1e3 / PHOTONS_PER_KILORAYLEIGH).collect();
+            let apart: f64 = sums(found).iter().zip(&expected).map(|(found, expected)| (found - expected).abs()).sum();
+            apart / expected.iter().sum::<f64>()
+        })
+    }
+
+    #[test]
+    fn the_mean_of_collisions_is_the_profile() {
+        let table = Emission::new(atmosphere(), ARC);
+        let falls = Falls::new(table.deposition(), 0.02);
+        // 64 sets of 500 particles; a picture of 120,000 has a fifteenth of this noise.
+        let all = difference(&table, 4000.0, &light(&table, &falls, 4000.0, 32_000, false));
+        assert!(all.iter().all(|difference| *difference < 0.03), "{all:?}");
+        let [green, red, _, nitrogen] = difference(&table, 4000.0, &light(&table, &falls, 4000.0, 32_000, true));
+
+        assert!(green < 0.05 && red < 0.08 && nitrogen < 0.015, "{green} {red} {nitrogen}");
+    }
+
+    #[test]
+    fn thermal_speed_by_hand() {
+        // sqrt(8 x 1.380649e-23 x 300 / (pi x 28.014 x 1.660539e-27)) = 476.2 m/s.
+        assert!((thermal_speed(300.0, 28.014) - 476.2).abs() < 0.1);
+    }
+
+    #[test]
+    fn hard_spheres_kill_green_low_down() {
+        let quenched = |altitude_km| hard_sphere_quenching(Emitter::OxygenGreen, &atmosphere().at(altitude_km));
+        assert!(quenched(110.0) > 0.999 && quenched(150.0) > 0.9 && quenched(250.0) < 0.5);
+        assert!(hard_sphere_quenching(Emitter::NitrogenIon, &atmosphere().at(110.0)) < 1e-3);
+    }
+
+    #[test]
+    fn the_rules_of_the_thesis_by_hand() {
+        let air = atmosphere().at(300.0);
+        // O is the first 74 % of the air there; of its photons green are 0.236 of 1.370.
+        assert_eq!(
+            hard_sphere_photons(&air, [0.1, 0.1, 0.9999]).map(|(emitter, _)| emitter),
+            Some(Emitter::OxygenGreen)
+        );
+        assert_eq!(hard_sphere_photons(&air, [0.1, 0.9, 0.99999]).map(|(emitter, _)| emitter), None);
+        assert_eq!(hard_sphere_photons(&air, [0.9, 0.99, 0.5]).map(|(emitter, _)| emitter), Some(Emitter::Nitrogen));
+        assert_eq!(hard_sphere_photons(&air, [0.999_999, 0.5, 0.5]), None);
+        let below = atmosphere().at(energy::LOWEST_EV);
+        assert_eq!(hard_sphere_photons(&below, [0.0, 0.0, 0.5]), None);
+    }
+}

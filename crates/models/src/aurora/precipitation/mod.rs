@@ -1,0 +1,24 @@
+//! Where electrons that fall into the atmosphere spend their energy.
+//!
+//! [`fang`] is the calibrated answer, a profile over altitude for each energy; [`energy`] the grid of energies on which tables stand;
+//! [`spectrum`] mixes energies; [`deposition`] is the table of profiles; [`fall`] draws single collisions whose mean it is.
+//! [`hard_sphere`] is the fall of Sekiguchi's thesis.
+
+pub mod deposition;
+pub mod energy;
+pub mod fall;
+pub mod fang;
+pub mod hard_sphere;
+pub mod parameters;
+pub mod spectrum;
+
+pub use deposition::Deposition;
+pub use fall::{Collision, FallLibrary, Falls};
+pub use hard_sphere::HardSphere;
+pub use parameters::{FallKind, PrecipitationParameters, SpectrumKind};
+pub use spectrum::Spectrum;
+
+/// Mean energy that an electron loses for each ion pair that it makes, eV (Rees 1989; Fang et al. 2010).
+pub const ION_PAIR_EV: f64 = 35.0;
+/// Energy that an electron loses in a collision, eV (the thesis, section 2.4.1).
+pub const COLLISION_EV: f64 = 100.0;
