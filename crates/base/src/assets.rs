@@ -1,8 +1,8 @@
-//! What a scene refers to by name: pictures and text, wherever they are kept.
+//! What a scene refers to by name: pictures, drawings and text, wherever they are kept.
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use crate::image::Image;
+use crate::{drawing::Drawing, image::Image};
 
 /// How the numbers of a picture are meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +48,12 @@ pub enum AssetProblem {
     /// Its name ends in something that is not a picture.
     #[error("is not a picture Bansho reads (allowed: .png, .jpg, .jpeg, .exr)")]
     UnknownKind,
+    /// A drawing without strokes.
+    #[error("holds no strokes (allowed: an SVG file with path, polyline or line elements)")]
+    NoStrokes,
+    /// A drawing was asked for a stroke that it lacks.
+    #[error("has no stroke of the id `{0}`")]
+    NoStroke(String),
     /// Its contents are damaged or not what the name says.
     #[error("is damaged or not of the kind its name says: {0}")]
     Damaged(String),
@@ -86,6 +92,12 @@ pub trait Assets: Send + Sync {
     /// The asset is missing, damaged, too large or not a picture.
     fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError>;
 
+    /// The strokes of the line drawing at `path`.
+    ///
+    /// # Errors
+    /// The asset is missing, damaged, too large, or holds no strokes.
+    fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError>;
+
     /// The text at `path`.
     ///
     /// # Errors
@@ -103,6 +115,7 @@ pub trait Assets: Send + Sync {
 #[derive(Clone, Debug, Default)]
 pub struct MemoryAssets {
     pictures: BTreeMap<String, Arc<Picture>>,
+    drawings: BTreeMap<String, Arc<Drawing>>,
     texts: BTreeMap<String, Arc<str>>,
 }
 
@@ -110,6 +123,11 @@ impl MemoryAssets {
     /// Keeps `picture` under `path`.
     pub fn insert_picture(&mut self, path: impl Into<String>, picture: Picture) {
         self.pictures.insert(path.into(), Arc::new(picture));
+    }
+
+    /// Keeps `drawing` under `path`.
+    pub fn insert_drawing(&mut self, path: impl Into<String>, drawing: Drawing) {
+        self.drawings.insert(path.into(), Arc::new(drawing));
     }
 
     /// Keeps `text` under `path`.
@@ -127,12 +145,17 @@ impl Assets for MemoryAssets {
         self.pictures.get(path).cloned().ok_or_else(|| missing(path))
     }
 
+    fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
+        self.drawings.get(path).cloned().ok_or_else(|| missing(path))
+    }
+
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
         self.texts.get(path).cloned().ok_or_else(|| missing(path))
     }
 
     fn digest(&self, path: &str, _frame: i64) -> Result<[u8; 32], AssetError> {
-        if !self.pictures.contains_key(path) && !self.texts.contains_key(path) {
+        let drawn = self.pictures.contains_key(path) || self.drawings.contains_key(path);
+        if !drawn && !self.texts.contains_key(path) {
             return Err(missing(path));
         }
         let mut digest = [0; 32];

@@ -8,6 +8,7 @@ pub mod camera;
 pub mod canvas;
 pub mod color;
 pub mod curve;
+pub mod drawing;
 pub mod image;
 pub mod math;
 pub mod noise;

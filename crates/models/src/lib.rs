@@ -1,11 +1,14 @@
 //! Bansho's methods, each readable beside its paper: parameters as plain data, then functions that step and draw.
 
 mod fault;
+mod lanes;
 
 pub mod aurora;
+pub mod field;
 pub mod flame_sheet;
 pub mod ground;
 pub mod lamps;
 pub mod sky;
+pub mod sph;
 
 pub use fault::{FaultKind, ParameterFault};

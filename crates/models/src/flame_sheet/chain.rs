@@ -3,7 +3,7 @@
 //! Values of the artist's curves come in as numbers, so that the same functions serve look-up tables sixteen at a time and
 //! hand-worked tests. Nothing here branches on data or computes an elementary function beyond a square root.
 
-pub use super::lanes::Real;
+pub use crate::lanes::Real;
 
 /// Rise `w_p = (1-k) sqrt(y) + k y`, eq. (9); `y` in [0, 1].
 #[inline(always)]

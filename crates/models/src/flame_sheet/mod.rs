@@ -12,7 +12,6 @@ mod draw;
 mod flame;
 mod fluctuation;
 mod glow;
-mod lanes;
 mod measure;
 mod moment;
 mod parameters;
@@ -48,7 +47,10 @@ use ramp::Ramp;
 use shape::{Shape, instance_key};
 use texture::{FractalLayers, PaperLayer};
 
-use crate::fault::{FaultKind, ParameterFault};
+use crate::{
+    fault::{FaultKind, ParameterFault},
+    lanes,
+};
 
 /// A flame sheet with all its instances, ready to be drawn at any time.
 #[derive(Clone, Debug)]

@@ -1,0 +1,23 @@
+//! Line drawings: strokes in the plane, as they come from a vector graphics file.
+
+use crate::math::DVec2;
+
+/// A stroke as a line through points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stroke {
+    /// Its name in the file, if it has one.
+    pub id: Option<String>,
+    /// Its points, x to the right and y down, in the drawing's units; at least two.
+    pub points: Vec<DVec2>,
+}
+
+/// Strokes in the order in which they were drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawing {
+    /// Its strokes.
+    pub strokes: Vec<Stroke>,
+    /// The corner of the sheet that was drawn on with the least coordinates.
+    pub low: DVec2,
+    /// The corner with the greatest.
+    pub high: DVec2,
+}

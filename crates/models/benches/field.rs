@@ -1,0 +1,51 @@
+//! Poisson's equation on the aurora's grid of 256 x 256 cells, with relaxation beside it.
+
+use std::hint::black_box;
+
+use bansho_models::field::{Grid2, PoissonSolver, relax};
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+
+const SIDE: usize = 256;
+
+/// A band of charge across the middle of a square grid.
+fn charges(side: usize) -> Grid2 {
+    let mut grid = Grid2::new([side, side], 1.0, [0.0; 2]);
+    grid.values_mut()[side * side / 2 - 3 * side..side * side / 2 + 3 * side].fill(1.0);
+    grid
+}
+
+/// A pool whose threads each stay on a core of their own: unpinned they are often packed onto one.
+fn pinned_pool(threads: usize) -> rayon::ThreadPool {
+    let cores = core_affinity::get_core_ids().unwrap_or_default();
+    let pin = move |index: usize| {
+        if let Some(core) = cores.get(index) {
+            core_affinity::set_for_current(*core);
+        }
+    };
+    rayon::ThreadPoolBuilder::new().num_threads(threads).start_handler(pin).build().expect("a pool")
+}
+
+fn benches(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("poisson");
+    for (threads, name) in [(1, "1 thread"), (2, "2 threads")] {
+        let pool = pinned_pool(threads);
+        for side in [SIDE - 1, SIDE] {
+            let (solver, source) = (PoissonSolver::new([side, side], 1.0, 0.0), charges(side));
+            group.bench_function(format!("transform {side}, {name}"), |bencher| {
+                pool.install(|| {
+                    bencher.iter_batched_ref(|| source.clone(), |grid| solver.solve(grid), BatchSize::LargeInput);
+                });
+            });
+        }
+    }
+    let source = charges(SIDE);
+    let mut potential = Grid2::new([SIDE, SIDE], 1.0, [0.0; 2]);
+    group.sample_size(10);
+    group.bench_function("naive: 100 Gauss-Seidel sweeps of 256", |bencher| {
+        bencher.iter(|| (0..100).map(|_| relax(black_box(&mut potential), &source, 0.0)).sum::<f64>());
+    });
+    group.finish();
+}
+
+criterion_group!(field_benches, benches);
+criterion_main!(field_benches);

@@ -1,0 +1,159 @@
+//! Which sheet becomes which, found from where they lie (thesis, chapter 4, asks for it).
+
+use bansho_base::math::DVec2;
+
+use super::{assignment::assign, crossing::count_crossings, polyline::Polyline};
+
+/// Points by which sheets are compared.
+const SAMPLES: usize = 32;
+
+/// Moments of the way at which sheets should not cross.
+const MOMENTS: [f64; 3] = [0.25, 0.5, 0.75];
+
+/// The target of a sheet, and whether it was drawn the other way round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Match {
+    pub(super) target: usize,
+    pub(super) reversed: bool,
+}
+
+/// Sheets and targets as evenly spaced points, as many of one as of the other.
+struct Comparison {
+    sources: Vec<Vec<DVec2>>,
+    targets: Vec<Vec<DVec2>>,
+    /// Mean length of a sheet and its target weighs their motion.
+    lengths: [Vec<f64>; 2],
+}
+
+/// The target of each source such that all together move least, and no two cross on the way where that can be had by
+/// exchanging two targets or turning one round.
+pub(super) fn match_sheets(sources: &[Polyline], targets: &[&Polyline]) -> Vec<Match> {
+    let comparison = Comparison {
+        sources: sources.iter().map(|line| line.evenly(SAMPLES)).collect(),
+        targets: targets.iter().map(|line| line.evenly(SAMPLES)).collect(),
+        lengths: [sources.iter().map(Polyline::length).collect(), targets.iter().map(|line| line.length()).collect()],
+    };
+    let count = sources.len();
+    let best: Vec<(f64, bool)> = (0..count * count).map(|pair| comparison.best(pair / count, pair % count)).collect();
+    let columns = assign(count, |source, target| best[source * count + target].0);
+    let matched = |(source, target): (usize, usize)| Match { target, reversed: best[source * count + target].1 };
+    let found = columns.into_iter().enumerate().map(matched).collect();
+    comparison.untangled(found)
+}
+
+impl Comparison {
+    fn target(&self, of: Match) -> impl Iterator<Item = DVec2> {
+        let points = &self.targets[of.target];
+        (0..SAMPLES).map(move |index| points[if of.reversed { SAMPLES - 1 - index } else { index }])
+    }
+
+    /// Mean square of the way of each point, times the length of the sheet.
+    fn motion(&self, source: usize, of: Match) -> f64 {
+        let squares = self.sources[source].iter().zip(self.target(of)).map(|(from, to)| from.distance_squared(to));
+        let length = (self.lengths[0][source] + self.lengths[1][of.target]) / 2.0;
+        squares.sum::<f64>() / SAMPLES as f64 * length
+    }
+
+    /// The lesser motion of the two ways round, and whether it is the reverse one.
+    fn best(&self, source: usize, target: usize) -> (f64, bool) {
+        let [straight, turned] = [false, true].map(|reversed| self.motion(source, Match { target, reversed }));
+        if turned < straight { (turned, true) } else { (straight, false) }
+    }
+
+    fn crossings(&self, matches: &[Match]) -> usize {
+        let at = |share: f64| {
+            let sheet = |(source, of): (&Vec<DVec2>, &Match)| -> Vec<DVec2> {
+                source.iter().zip(self.target(*of)).map(|(from, to)| from.lerp(to, share)).collect()
+            };
+            let sheets: Vec<Vec<DVec2>> = self.sources.iter().zip(matches).map(sheet).collect();
+            count_crossings(&sheets)
+        };
+        MOMENTS.into_iter().map(at).sum()
+    }
+
+    fn cost(&self, matches: &[Match]) -> (usize, f64) {
+        let motion = matches.iter().enumerate().map(|(source, of)| self.motion(source, *of)).sum();
+        (self.crossings(matches), motion)
+    }
+
+    /// Turns one or exchanges two as long as fewer cross, or as many with less motion.
+    fn untangled(&self, mut matches: Vec<Match>) -> Vec<Match> {
+        let less = |a: (usize, f64), b: (usize, f64)| a.0 < b.0 || (a.0 == b.0 && a.1 < b.1 * (1.0 - 1e-12));
+        let mut cost = self.cost(&matches);
+        while cost.0 > 0 {
+            let candidates = self.neighbours(&matches).into_iter().map(|other| (self.cost(&other), other));
+            let best = candidates.reduce(|a, b| if less(b.0, a.0) { b } else { a });
+            match best {
+                Some((better, other)) if less(better, cost) => (cost, matches) = (better, other),
+                _ => break,
+            }
+        }
+        matches
+    }
+
+    /// All matches with one sheet turned or two exchanged.
+    fn neighbours(&self, matches: &[Match]) -> Vec<Vec<Match>> {
+        let mut neighbours = Vec::new();
+        for one in 0..matches.len() {
+            let mut turned = matches.to_vec();
+            turned[one].reversed = !turned[one].reversed;
+            neighbours.push(turned);
+            for other in 0..one {
+                let mut exchanged = matches.to_vec();
+                for (source, target) in [(one, matches[other].target), (other, matches[one].target)] {
+                    exchanged[source] = Match { target, reversed: self.best(source, target).1 };
+                }
+                neighbours.push(exchanged);
+            }
+        }
+        neighbours
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(from: [f64; 2], to: [f64; 2]) -> Polyline {
+        Polyline::new(vec![from.into(), to.into()]).unwrap()
+    }
+
+    fn matches(sources: &[Polyline], targets: &[Polyline]) -> Vec<(usize, bool)> {
+        let found = match_sheets(sources, &targets.iter().collect::<Vec<_>>());
+        found.into_iter().map(|of| (of.target, of.reversed)).collect()
+    }
+
+    #[test]
+    fn sheets_go_to_the_nearest_targets_whichever_way_they_were_drawn() {
+        let sources = [line([0.0, 0.0], [10.0, 0.0]), line([0.0, 5.0], [10.0, 5.0])];
+        let targets = [line([10.0, 6.0], [0.0, 6.0]), line([0.0, 1.0], [10.0, 1.0])];
+        assert_eq!(matches(&sources, &targets), [(1, false), (0, true)]);
+    }
+
+    #[test]
+    fn all_together_move_least_even_where_one_could_move_less() {
+        // Both like the first target best, but only the second source can take the second one cheaply.
+        let sources = [line([0.0, 0.0], [10.0, 0.0]), line([0.0, 2.0], [10.0, 2.0])];
+        let targets = [line([0.0, 1.5], [10.0, 1.5]), line([0.0, 9.0], [10.0, 9.0])];
+        assert_eq!(matches(&sources, &targets), [(0, false), (1, false)]);
+    }
+
+    /// A sheet that turns a quarter while another passes its end: the two ways round move equally far, but one sweeps through.
+    #[test]
+    fn sheets_that_would_cross_midway_are_turned() {
+        let sources = [line([0.0, 0.0], [10.0, 0.0]), line([-1.0, 4.0], [-1.0, 9.0])];
+        let targets = [line([0.0, 10.1], [0.0, 0.0]), line([-1.0, 4.0], [-1.0, 9.0])];
+        let lines: Vec<&Polyline> = targets.iter().collect();
+        let found = match_sheets(&sources, &lines);
+        let comparison = |matches: &[Match]| {
+            let sampled = |line: &Polyline| line.evenly(SAMPLES);
+            Comparison {
+                sources: sources.iter().map(sampled).collect(),
+                targets: targets.iter().map(sampled).collect(),
+                lengths: [vec![1.0; 2], vec![1.0; 2]],
+            }
+            .crossings(matches)
+        };
+        assert_eq!(comparison(&found), 0);
+    }
+}

@@ -1,0 +1,120 @@
+//! How far a point is from the shape, answered near the shape only: the test with L_thr (thesis, 2.2.3).
+
+use bansho_base::math::DVec2;
+
+use super::{Shape, cells::CellGrid};
+
+/// Segments of a shape by the cells from which they can be reached.
+#[derive(Clone, Debug)]
+pub struct Neighbourhood {
+    reach: f64,
+    grid: CellGrid,
+    segments: Vec<[DVec2; 2]>,
+    /// Where the list of each cell begins in `lists`, and where the last one ends.
+    starts: Vec<u32>,
+    lists: Vec<u32>,
+}
+
+impl Neighbourhood {
+    /// What lies within `reach` km of `shape`.
+    pub fn new(shape: &Shape, reach: f64) -> Self {
+        let pairs = shape.sheets.iter().flat_map(|sheet| sheet.points.windows(2));
+        let segments: Vec<[DVec2; 2]> = pairs.map(|pair| [pair[0], pair[1]]).collect();
+        let low = segments.iter().flatten().copied().fold(DVec2::INFINITY, DVec2::min);
+        let high = segments.iter().flatten().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
+        let grid = if segments.is_empty() {
+            CellGrid::new(DVec2::ZERO, DVec2::ZERO, 1.0, 1)
+        } else {
+            CellGrid::new(low - reach, high + reach, reach, 512)
+        };
+        let mut starts = vec![0u32; grid.count() + 1];
+        for [a, b] in &segments {
+            grid.for_each_passed(*a, *b, reach, |cell| starts[cell + 1] += 1);
+        }
+        for cell in 0..grid.count() {
+            starts[cell + 1] += starts[cell];
+        }
+        let mut lists = vec![0u32; starts[grid.count()] as usize];
+        let mut ends = starts.clone();
+        for (index, [a, b]) in segments.iter().enumerate() {
+            grid.for_each_passed(*a, *b, reach, |cell| {
+                lists[ends[cell] as usize] = index as u32;
+                ends[cell] += 1;
+            });
+        }
+        Self { reach, grid, segments, starts, lists }
+    }
+
+    /// Distance from `point` to the shape, km; `None` beyond the reach.
+    pub fn distance(&self, point: DVec2) -> Option<f64> {
+        self.nearest(point).map(|(_, distance)| distance)
+    }
+
+    /// The segment nearest to `point`, counted over all sheets in turn, and the distance to it, km; the first of several that
+    /// are as near. `None` beyond the reach.
+    pub fn nearest(&self, point: DVec2) -> Option<(usize, f64)> {
+        let cell = self.grid.cell_of(point);
+        let list = &self.lists[self.starts[cell] as usize..self.starts[cell + 1] as usize];
+        let (mut nearest, mut least) = (0, f64::INFINITY);
+        for &segment in list {
+            let square = distance_squared(point, self.segments[segment as usize]);
+            if square < least {
+                (nearest, least) = (segment as usize, square);
+            }
+        }
+        (least <= self.reach * self.reach).then(|| (nearest, least.sqrt()))
+    }
+}
+
+/// Square of the distance from a point to a segment.
+fn distance_squared(point: DVec2, [a, b]: [DVec2; 2]) -> f64 {
+    let way = b - a;
+    let square = way.length_squared();
+    let share = if square > 0.0 { ((point - a).dot(way) / square).clamp(0.0, 1.0) } else { 0.0 };
+    point.distance_squared(a + way * share)
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::random::{Key, Purpose};
+
+    use super::*;
+    use crate::aurora::shapes::Sheet;
+
+    fn sheet(points: Vec<DVec2>) -> Sheet {
+        Sheet { flux: vec![1.0; points.len()], energy: vec![1.0; points.len()], points }
+    }
+
+    #[test]
+    fn distances_to_a_segment_and_beyond_its_ends() {
+        let shape = Shape { sheets: vec![sheet(vec![DVec2::ZERO, DVec2::new(10.0, 0.0)])] };
+        let near = Neighbourhood::new(&shape, 5.0);
+        assert_eq!(near.distance(DVec2::new(4.0, -3.0)), Some(3.0));
+        assert_eq!(near.distance(DVec2::new(13.0, 4.0)), Some(5.0));
+        assert_eq!(near.distance(DVec2::new(13.1, 4.0)), None);
+        assert_eq!(near.distance(DVec2::new(1e9, f64::NAN)), None);
+        assert_eq!(Neighbourhood::new(&Shape::default(), 5.0).distance(DVec2::ZERO), None);
+    }
+
+    #[test]
+    fn the_cells_find_what_comparing_all_segments_finds() {
+        let key = Key::new(2, "neighbourhood");
+        let random = |index: u64| {
+            let [x, y, ..] = key.uniforms(index, 0, Purpose::named("point"));
+            DVec2::new(f64::from(x), f64::from(y)) * 200.0 - 100.0
+        };
+        let sheets = (0..4).map(|index| sheet((0..30).map(|point| random(100 * index + point)).collect())).collect();
+        let shape = Shape { sheets };
+        let near = Neighbourhood::new(&shape, 7.0);
+        let mut within = 0;
+        for probe in 0..5_000 {
+            let point = random(1000 + probe) * 1.2;
+            let all = near.segments.iter().map(|&segment| distance_squared(point, segment));
+            let least = all.fold(f64::INFINITY, f64::min).sqrt();
+            let expected = (least <= 7.0).then_some(least);
+            within += usize::from(expected.is_some());
+            assert_eq!(near.distance(point), expected);
+        }
+        assert!(within > 500);
+    }
+}

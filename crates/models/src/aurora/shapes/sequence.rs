@@ -1,0 +1,132 @@
+//! The aurora's shape at any time.
+
+use bansho_base::{
+    assets::Assets,
+    math::{self, DVec2},
+};
+
+use super::{
+    FRAME_S, MotionParameters, Shape, ShapeFault, ShapeFaultKind, ShapeParameters, Sheet,
+    follow::{Followed, follow},
+    parameters::TRANSITION_S,
+    track::{Knot, Timing, find_velocities},
+};
+
+/// The shapes of a scene and all in-between shapes (thesis, 2.2.2): splines in time through corresponding control points.
+///
+/// A shape is a continuous function of time, also where sheets split and merge. Points that a spline would carry beyond the drawn
+/// square stop at its border.
+#[derive(Clone, Debug)]
+pub struct Sequence {
+    followed: Followed,
+    timing: Timing,
+    half_km: f64,
+    loop_s: Option<f64>,
+}
+
+impl Sequence {
+    /// The sequence of `shapes` on a drawn square of side `extent_km`; two bands that become each other where there is no shape.
+    ///
+    /// With `loop_s` it repeats after that time, in which all of it passes: round and round if the last shape is the first
+    /// again, there and back if not.
+    ///
+    /// # Errors
+    /// Shapes that are no aurora's, at their sheet and point; see [`ShapeFaultKind`].
+    pub fn new(
+        shapes: &[ShapeParameters],
+        motion: &MotionParameters,
+        extent_km: f64,
+        assets: &dyn Assets,
+        loop_s: Option<f64>,
+    ) -> Result<Self, ShapeFault> {
+        if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
+            return Err(ShapeFault { key: "loop".into(), kind: ShapeFaultKind::LoopLength { seconds } });
+        }
+        let usual = super::usual::shapes();
+        let shapes = if shapes.is_empty() { &usual[..] } else { shapes };
+        let timing = timing(shapes)?;
+        let mut followed = follow(shapes, motion, extent_km, assets)?;
+        let closed = loop_s.is_some() && followed.returns;
+        find_velocities(&mut followed.tracks, &timing, closed);
+        Ok(Self { followed, timing, half_km: extent_km / 2.0, loop_s })
+    }
+
+    /// When each shape of the scene is reached, s, without a loop.
+    pub fn arrivals(&self) -> &[f64] {
+        &self.timing.arrivals
+    }
+
+    /// How long all of it takes, s, without a loop.
+    pub fn duration(&self) -> f64 {
+        self.timing.departures[self.timing.departures.len() - 1]
+    }
+
+    /// The shape at time `t`, s. Before the first shape and after the last, these stay.
+    pub fn at(&self, t: f64) -> Shape {
+        let t = self.phase(t);
+        let next = self.timing.arrivals.partition_point(|&arrival| arrival <= t).max(1);
+        let index = next - 1;
+        let departure = self.timing.departures[index];
+        if t <= departure || next == self.timing.arrivals.len() {
+            return self.shape(&self.followed.shapes[index], |track| self.followed.tracks[track].knot(index));
+        }
+        let share = (t - departure) / (self.timing.arrivals[next] - departure);
+        let between = |track: usize| self.followed.tracks[track].between(index, share, &self.timing);
+        self.shape(&self.followed.strands[index], between)
+    }
+
+    /// How many segments cross in the in-between shapes at `count` evenly spaced times, all added up.
+    pub fn crossings(&self, count: usize) -> usize {
+        let step = self.duration() / count.max(1) as f64;
+        (0..count).map(|index| self.at((index as f64 + 0.5) * step).crossings()).sum()
+    }
+
+    /// Time within the sequence.
+    fn phase(&self, t: f64) -> f64 {
+        let Some(loop_s) = self.loop_s else { return t };
+        let turns = t / loop_s;
+        let turn = turns - turns.floor();
+        if self.followed.returns {
+            turn * self.duration()
+        } else {
+            0.5 * self.duration() * (1.0 - math::cos(std::f64::consts::TAU * turn))
+        }
+    }
+
+    fn shape(&self, sheets: &[Vec<usize>], knot: impl Fn(usize) -> Knot) -> Shape {
+        let half = DVec2::splat(self.half_km);
+        let sheet = |tracks: &Vec<usize>| {
+            let mut sheet = Sheet::default();
+            for knot in tracks.iter().map(|&track| knot(track)) {
+                sheet.points.push(knot.position.clamp(-half, half));
+                sheet.flux.push(knot.values[0]);
+                sheet.energy.push(knot.values[1]);
+            }
+            sheet
+        };
+        Shape { sheets: sheets.iter().map(sheet).collect() }
+    }
+}
+
+/// When each shape is reached and left.
+fn timing(shapes: &[ShapeParameters]) -> Result<Timing, ShapeFault> {
+    let mut timing = Timing { arrivals: Vec::new(), departures: Vec::new() };
+    for (index, shape) in shapes.iter().enumerate() {
+        let fault = |key: &str, kind| ShapeFault { key: format!("shapes.{index}.{key}"), kind };
+        let after = match (shape.after_s, shape.after_frames) {
+            (Some(_), Some(_)) => return Err(fault("after_frames", ShapeFaultKind::SecondsAndFrames)),
+            (Some(seconds), None) => seconds,
+            (None, Some(frames)) => frames * FRAME_S,
+            (None, None) => TRANSITION_S,
+        };
+        let changes = !shape.split.is_empty() || !shape.merge.is_empty();
+        if index == 0 && changes {
+            let key = if shape.split.is_empty() { "merge" } else { "split" };
+            return Err(fault(key, ShapeFaultKind::NothingBefore));
+        }
+        let arrival = timing.departures.last().map_or(0.0, |departure| departure + after);
+        timing.arrivals.push(arrival);
+        timing.departures.push(arrival + shape.hold_s);
+    }
+    Ok(timing)
+}

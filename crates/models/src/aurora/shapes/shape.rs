@@ -1,0 +1,40 @@
+//! The aurora's foot at one moment.
+
+use bansho_base::math::DVec2;
+
+/// One sheet: control points joined by segments.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sheet {
+    /// Control points, km: x east, y south. At least two; neighbours may coincide while a split opens or a merge closes.
+    pub points: Vec<DVec2>,
+    /// Factor of the aurora's flux at each control point.
+    pub flux: Vec<f64>,
+    /// Factor of the aurora's energy at each control point.
+    pub energy: Vec<f64>,
+}
+
+impl AsRef<[DVec2]> for Sheet {
+    fn as_ref(&self) -> &[DVec2] {
+        &self.points
+    }
+}
+
+/// All sheets of an aurora at one moment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shape {
+    /// Its sheets. Which one stands where in the list changes only when a shape of the scene is reached or left.
+    pub sheets: Vec<Sheet>,
+}
+
+impl Shape {
+    /// Length of all sheets together, km.
+    pub fn length(&self) -> f64 {
+        let length = |sheet: &Sheet| sheet.points.windows(2).map(|pair| pair[0].distance(pair[1])).sum::<f64>();
+        self.sheets.iter().map(length).sum()
+    }
+
+    /// How many pairs of segments cross: 0 for the shapes of a scene, perhaps more on the way between two that lie badly.
+    pub fn crossings(&self) -> usize {
+        super::count_crossings(&self.sheets)
+    }
+}

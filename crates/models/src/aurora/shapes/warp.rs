@@ -1,0 +1,102 @@
+//! Points along two lines that belong together: by length along them, and by nearness (thesis, chapter 4, asks for it).
+
+use bansho_base::math::DVec2;
+
+use super::polyline::Polyline;
+
+/// Places on the target between two control points where they lie evenly.
+const FINE: usize = 8;
+/// Fewest and most such places from one control point to the next.
+const STEPS: [usize; 2] = [3, 24];
+/// Weight of even spacing against nearness.
+const EVENNESS: f64 = 0.01;
+
+/// For each of `points` the share of `target`'s length that it goes to, from `range[0]` for the first to `range[1]` for the last.
+///
+/// Least of the sum of (distance / length)^2 and 0.01 (spacing - 1)^2, by dynamic programming over 8 places a point: what has
+/// not moved stays, and the points stay between 3/8 and 3 times as dense as even ones.
+pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2]) -> Vec<f64> {
+    let last = points.len() - 1;
+    let places = last * FINE;
+    let share = |place: usize| range[0] + (range[1] - range[0]) * (place as f64 / places.max(1) as f64);
+    let line: Vec<DVec2> = (0..=places).map(|place| target.at(share(place))).collect();
+    let scale = target.length() * (range[1] - range[0]).abs();
+    if last < 2 || scale == 0.0 {
+        return (0..=last).map(|index| share(index * FINE)).collect();
+    }
+    let nearness = |point: usize, place: usize| points[point].distance_squared(line[place]) / (scale * scale);
+    let evenness: Vec<f64> = (0..=STEPS[1])
+        .map(|step| {
+            let stretch = step as f64 / FINE as f64 - 1.0;
+            EVENNESS * stretch * stretch
+        })
+        .collect();
+    let mut costs = vec![f64::INFINITY; places + 1];
+    costs[0] = 0.0;
+    let mut steps = vec![0u8; (places + 1) * points.len()];
+    for point in 1..=last {
+        let mut next = vec![f64::INFINITY; places + 1];
+        // Places from which the rest can still be reached, and that can be reached from the start.
+        let low = (point * STEPS[0]).max(places.saturating_sub((last - point) * STEPS[1]));
+        let high = (point * STEPS[1]).min(places - (last - point) * STEPS[0]);
+        for place in low..=high {
+            for step in STEPS[0]..=STEPS[1].min(place) {
+                let cost = costs[place - step] + evenness[step];
+                if cost < next[place] {
+                    next[place] = cost;
+                    steps[point * (places + 1) + place] = step as u8;
+                }
+            }
+            next[place] += nearness(point, place);
+        }
+        costs = next;
+    }
+    let mut shares = vec![range[1]; points.len()];
+    let mut place = places;
+    for point in (1..=last).rev() {
+        shares[point] = share(place);
+        place -= usize::from(steps[point * (places + 1) + place]).min(place);
+    }
+    shares[0] = range[0];
+    shares
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn straight(from: f64, to: f64, count: usize) -> Vec<DVec2> {
+        (0..count).map(|i| DVec2::new(from + (to - from) * i as f64 / (count - 1) as f64, 0.0)).collect()
+    }
+
+    #[test]
+    fn a_line_that_has_not_moved_goes_to_itself() {
+        let points = straight(0.0, 310.0, 32);
+        let target = Polyline::new(points.clone()).unwrap();
+        let shares = warp(&points, &target, [0.0, 1.0]);
+        assert!(shares.iter().enumerate().all(|(i, share)| (share - i as f64 / 31.0).abs() < 1e-12));
+        let back = warp(&points.iter().rev().copied().collect::<Vec<_>>(), &target, [1.0, 0.0]);
+        assert!(back.iter().enumerate().all(|(i, share)| (share - (1.0 - i as f64 / 31.0)).abs() < 1e-12));
+    }
+
+    /// The line grows at its end by half: most of what was there stays, where equal shares would pull all of it along.
+    #[test]
+    fn what_has_not_moved_stays_where_the_line_grows() {
+        let points = straight(0.0, 300.0, 31);
+        let target = Polyline::new(straight(0.0, 450.0, 46)).unwrap();
+        let shares = warp(&points, &target, [0.0, 1.0]);
+        let moved = |i: usize| (target.at(shares[i]) - points[i]).length();
+        let mean: f64 = (0..31).map(moved).sum::<f64>() / 31.0;
+        let by_length: f64 = points.iter().map(|point| point.x * 0.5).sum::<f64>() / 31.0;
+        assert!(mean < 0.75 * by_length, "{mean} {by_length}");
+        assert!(shares.windows(2).all(|pair| pair[1] > pair[0]));
+    }
+
+    #[test]
+    fn few_points_and_lines_without_length_are_shared_evenly() {
+        let spot = Polyline::new(vec![DVec2::ZERO; 3]).unwrap();
+        assert_eq!(warp(&straight(0.0, 1.0, 3), &spot, [0.0, 1.0]), [0.0, 0.5, 1.0]);
+        let line = Polyline::new(straight(0.0, 1.0, 3)).unwrap();
+        assert_eq!(warp(&straight(5.0, 6.0, 2), &line, [0.25, 0.5]), [0.25, 0.5]);
+    }
+}

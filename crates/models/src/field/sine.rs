@@ -1,0 +1,107 @@
+//! Discrete sine transform of the first kind, two rows at a time.
+
+use std::{f64::consts::PI, sync::Arc};
+
+use bansho_base::math;
+use rustfft::{Fft, FftPlanner, num_complex::Complex};
+
+/// `F_k = sum_j f_j sin(pi j k / (n + 1))`, j and k from 1 to n; applied twice it is `(n + 1) / 2`.
+///
+/// A row becomes one of n + 1 values of which an ordinary transform yields both parities (Press et al. 2007, 12.4.1), and two rows are the real and
+/// the imaginary part of one transform. `rustfft` chooses its code by the instructions of the machine; where there are AVX and FMA it is
+/// always the same.
+pub(super) struct SineTransform {
+    fourier: Arc<dyn Fft<f64>>,
+    /// `sin(pi j / (n + 1))`, j from 0 to n.
+    sines: Vec<f64>,
+}
+
+/// Working memory of a thread.
+pub(super) struct Scratch {
+    spectrum: Vec<Complex<f64>>,
+    inner: Vec<Complex<f64>>,
+}
+
+impl SineTransform {
+    /// For rows of `length` values.
+    pub(super) fn new(length: usize) -> Self {
+        let whole = length + 1;
+        let sines = (0..whole).map(|j| math::sin(PI * j as f64 / whole as f64)).collect();
+        Self { fourier: FftPlanner::new().plan_fft_forward(whole), sines }
+    }
+
+    pub(super) fn scratch(&self) -> Scratch {
+        Scratch {
+            spectrum: vec![Complex::default(); self.sines.len()],
+            inner: vec![Complex::default(); self.fourier.get_inplace_scratch_len()],
+        }
+    }
+
+    /// Transforms one or two rows, one after the other in `rows`.
+    pub(super) fn apply(&self, rows: &mut [f64], scratch: &mut Scratch) {
+        let whole = self.sines.len();
+        let (first, second) = rows.split_at_mut(whole - 1);
+        let spectrum = &mut scratch.spectrum;
+        spectrum[0] = Complex::default();
+        for j in 1..whole {
+            let imaginary = if second.is_empty() { 0.0 } else { self.folded(second, j) };
+            spectrum[j] = Complex::new(self.folded(first, j), imaginary);
+        }
+        self.fourier.process_with_scratch(spectrum, &mut scratch.inner);
+        unfold(first, |k, mirror| {
+            let (one, other) = (spectrum[k], spectrum[mirror]);
+            [0.5 * (one.re + other.re), 0.5 * (other.im - one.im)]
+        });
+        unfold(second, |k, mirror| {
+            let (one, other) = (spectrum[k], spectrum[mirror]);
+            [0.5 * (one.im + other.im), 0.5 * (one.re - other.re)]
+        });
+    }
+
+    /// `sin(pi j / N) (f_j + f_(N-j)) + (f_j - f_(N-j)) / 2`, whose cosine sums are `F_(2k+1) - F_(2k-1)` and whose sine sums are `F_2k`.
+    fn folded(&self, row: &[f64], j: usize) -> f64 {
+        let (one, other) = (row[j - 1], row[self.sines.len() - j - 1]);
+        self.sines[j].mul_add(one + other, 0.5 * (one - other))
+    }
+}
+
+/// Transform of a row from the cosine and sine sums of its folded values at wave number k, whose mirror is `(N - k) mod N`.
+fn unfold(row: &mut [f64], sums: impl Fn(usize, usize) -> [f64; 2]) {
+    let whole = row.len() + 1;
+    let Some(first) = row.first_mut() else { return };
+    let mut odd = 0.5 * sums(0, 0)[0];
+    *first = odd;
+    // Two by two: F_2k, F_(2k+1); the last stands alone if their number is even.
+    for (k, values) in row[1..].chunks_mut(2).enumerate().map(|(k, values)| (k + 1, values)) {
+        let [cosine, sine] = sums(k, whole - k);
+        odd += cosine;
+        values[0] = sine;
+        if let Some(value) = values.get_mut(1) {
+            *value = odd;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_transform_is_its_sum() {
+        for length in [1, 2, 3, 8, 16, 31, 100] {
+            let transform = SineTransform::new(length);
+            let given: Vec<f64> = (0..2 * length).map(|j| ((j * j * 37) % 11) as f64 - 4.0).collect();
+            let mut rows = given.clone();
+            transform.apply(&mut rows, &mut transform.scratch());
+            let mut alone = given[..length].to_vec();
+            transform.apply(&mut alone, &mut transform.scratch());
+            for (index, value) in rows.iter().enumerate() {
+                let (row, k) = (&given[index / length * length..][..length], index % length + 1);
+                let term = |j: usize| row[j - 1] * math::sin(PI * (j * k) as f64 / (length + 1) as f64);
+                let sum: f64 = (1..=length).map(term).sum();
+                assert!((value - sum).abs() < 1e-10, "{length} {index}: {value} {sum}");
+                assert!(index >= length || (alone[index] - sum).abs() < 1e-10);
+            }
+        }
+    }
+}

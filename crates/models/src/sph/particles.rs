@@ -1,0 +1,109 @@
+//! What smoothed particles are made of.
+
+use super::cells::Cells;
+
+/// Particles in `D` dimensions as arrays, one entry a particle.
+///
+/// Positions are relative to an origin of the owner's choice; the nearer they are to it, the finer a 32-bit float resolves them.
+/// Sorting moves particles between slots: only the birth id stays with one.
+#[derive(Clone, Debug)]
+pub struct Particles<const D: usize> {
+    /// Positions, one array a component.
+    pub positions: [Vec<f32>; D],
+    /// Velocities, one array a component.
+    pub velocities: [Vec<f32>; D],
+    /// Masses, all above 0.
+    pub masses: Vec<f32>,
+    /// Birth ids, no two alike.
+    pub ids: Vec<u64>,
+}
+
+impl<const D: usize> Default for Particles<D> {
+    fn default() -> Self {
+        let none = || std::array::from_fn(|_| Vec::new());
+        Self { positions: none(), velocities: none(), masses: Vec::new(), ids: Vec::new() }
+    }
+}
+
+impl<const D: usize> Particles<D> {
+    /// Number of particles.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.ids.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.ids.is_empty()
+    }
+
+    /// Adds one at the end.
+    pub fn push(&mut self, position: [f32; D], velocity: [f32; D], mass: f32, id: u64) {
+        for c in 0..D {
+            self.positions[c].push(position[c]);
+            self.velocities[c].push(velocity[c]);
+        }
+        self.masses.push(mass);
+        self.ids.push(id);
+    }
+
+    /// Keeps those of which `keep` says so by index, in their order. Use the same mask on arrays of your own with [`retain`].
+    pub fn retain(&mut self, keep: &[bool]) {
+        self.positions.iter_mut().chain(&mut self.velocities).for_each(|values| retain(values, keep));
+        retain(&mut self.masses, keep);
+        retain(&mut self.ids, keep);
+    }
+
+    /// Sorts them into cells, by cell and then by id, and remembers the cells.
+    ///
+    /// Afterwards bring arrays of your own into the same order with [`Cells::reorder`].
+    pub fn sort(&mut self, cells: &mut Cells<D>) {
+        cells.assign(self.positions.each_ref().map(Vec::as_slice), &self.ids);
+        self.positions.iter_mut().chain(&mut self.velocities).for_each(|values| cells.reorder(values));
+        cells.reorder(&mut self.masses);
+        cells.reorder(&mut self.ids);
+    }
+
+    /// Greatest speed of all; 0 without particles.
+    #[must_use]
+    pub fn greatest_speed(&self) -> f32 {
+        let squared = |i: usize| self.velocities.iter().fold(0.0_f32, |sum, v| v[i].mul_add(v[i], sum));
+        (0..self.len()).map(squared).fold(0.0, f32::max).sqrt()
+    }
+
+    /// Shortens every velocity above `limit` to it. What is not a number becomes rest.
+    pub fn bound_speed(&mut self, limit: f32) {
+        for i in 0..self.len() {
+            let squared = self.velocities.iter().fold(0.0_f32, |sum, v| v[i].mul_add(v[i], sum));
+            if squared <= limit * limit {
+                continue;
+            }
+            let factor = if squared.is_finite() { limit / squared.sqrt() } else { 0.0 };
+            for component in &mut self.velocities {
+                component[i] = if factor > 0.0 { component[i] * factor } else { 0.0 };
+            }
+        }
+    }
+
+    /// Velocity, then position (semi-implicit Euler): `v += a dt`, `x += v dt`.
+    ///
+    /// # Panics
+    /// If `accelerations` are not one a particle.
+    pub fn advance(&mut self, accelerations: &[Vec<f32>; D], seconds: f32) {
+        for c in 0..D {
+            assert_eq!(accelerations[c].len(), self.len(), "one acceleration a particle");
+            let moved = self.positions[c].iter_mut().zip(&mut self.velocities[c]).zip(&accelerations[c]);
+            moved.for_each(|((position, velocity), acceleration)| {
+                *velocity = acceleration.mul_add(seconds, *velocity);
+                *position = velocity.mul_add(seconds, *position);
+            });
+        }
+    }
+}
+
+/// Keeps the entries of `values` whose mask is set.
+pub fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
+    let mut mask = keep.iter();
+    values.retain(|_| mask.next().copied().unwrap_or(false));
+}
