@@ -2,6 +2,7 @@
 
 use bansho_base::{parameters::ProblemKind, phenomenon::Phenomenon};
 use bansho_models::{
+    aurora::{Aurora, AuroraParameters},
     flame_sheet::{FlameSheet, FlameSheetParameters},
     ground::Ground,
     lamps::{Lamp, Lamps},
@@ -14,7 +15,7 @@ use crate::{
 };
 
 /// Every kind, in the order in which schema and book list them.
-pub const KINDS: &[PhenomenonKind] = &[FlameSheetParameters::KIND];
+pub const KINDS: &[PhenomenonKind] = &[FlameSheetParameters::KIND, AuroraParameters::KIND];
 
 /// A model's own fault, placed at the parameter that it names.
 fn opening_fault(fault: &bansho_models::ParameterFault) -> OpeningFault {
@@ -28,6 +29,17 @@ impl Describe for FlameSheetParameters {
         match FlameSheet::new(self.clone(), opening.name, opening.seed, opening.loop_s) {
             Ok(sheet) => Ok(Box::new(sheet)),
             Err(fault) => Err(opening_fault(&fault)),
+        }
+    }
+}
+
+impl Describe for AuroraParameters {
+    const KEY: &'static str = "aurora";
+
+    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        match Aurora::new(self.clone(), opening.name, opening.seed, opening.loop_s, opening.assets) {
+            Ok(aurora) => Ok(Box::new(aurora)),
+            Err(fault) => Err(OpeningFault { kind: ProblemKind::Conflict(fault.kind.to_string()), key: fault.key }),
         }
     }
 }
