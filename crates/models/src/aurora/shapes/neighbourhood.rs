@@ -47,11 +47,22 @@ impl Neighbourhood {
 
     /// Distance from `point` to the shape, km; `None` beyond the reach.
     pub fn distance(&self, point: DVec2) -> Option<f64> {
+        self.nearest(point).map(|(_, distance)| distance)
+    }
+
+    /// The segment nearest to `point`, counted over all sheets in turn, and the distance to it, km; the first of several that
+    /// are as near. `None` beyond the reach.
+    pub fn nearest(&self, point: DVec2) -> Option<(usize, f64)> {
         let cell = self.grid.cell_of(point);
         let list = &self.lists[self.starts[cell] as usize..self.starts[cell + 1] as usize];
-        let squares = list.iter().map(|&segment| distance_squared(point, self.segments[segment as usize]));
-        let least = squares.fold(f64::INFINITY, f64::min);
-        (least <= self.reach * self.reach).then(|| least.sqrt())
+        let (mut nearest, mut least) = (0, f64::INFINITY);
+        for &segment in list {
+            let square = distance_squared(point, self.segments[segment as usize]);
+            if square < least {
+                (nearest, least) = (segment as usize, square);
+            }
+        }
+        (least <= self.reach * self.reach).then(|| (nearest, least.sqrt()))
     }
 }
 
