@@ -1,4 +1,4 @@
-//! Puts the scenes of `scenes/` into the program, with the plates they name, so that `bansho new --from` needs no files.
+//! Puts the scenes of `scenes/` into the program, with the plates and meshes they name, so that `bansho new --from` needs no files.
 
 use std::{
     env,
@@ -12,7 +12,7 @@ use std::{
 fn asset(line: &str) -> Option<&str> {
     let (key, value) = line.split_once('=')?;
     let path = value.trim().strip_prefix('"')?.split('"').next()?;
-    ["image", "depth"].contains(&key.trim()).then_some(path)
+    ["image", "depth", "file"].contains(&key.trim()).then_some(path)
 }
 
 fn example(scenes: &Path, path: &Path) -> Result<Option<String>, Box<dyn Error>> {

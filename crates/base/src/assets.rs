@@ -1,6 +1,13 @@
-//! What a scene refers to by name: pictures, drawings and text, wherever they are kept.
+//! What a scene refers to by name: pictures, meshes and text, wherever they are kept.
 
 use std::{collections::BTreeMap, sync::Arc};
+
+use crate::{
+    image::Image,
+    mesh::{Mesh, MeshError},
+};
+//! What a scene refers to by name: pictures, drawings and text, wherever they are kept.
+
 
 use crate::{drawing::Drawing, image::Image};
 
@@ -48,6 +55,12 @@ pub enum AssetProblem {
     /// Its name ends in something that is not a picture.
     #[error("is not a picture Bansho reads (allowed: .png, .jpg, .jpeg, .exr)")]
     UnknownKind,
+    /// Its name ends in something that is not a mesh.
+    #[error("is not a mesh Bansho reads (allowed: .glb, .gltf)")]
+    UnknownMeshKind,
+    /// It holds no usable mesh.
+    #[error("holds no usable mesh: {0}")]
+    Mesh(#[from] MeshError),
     /// A drawing without strokes.
     #[error("holds no strokes (allowed: an SVG file with path, polyline or line elements)")]
     NoStrokes,
@@ -82,7 +95,7 @@ pub enum AssetProblem {
     NoChannel(String),
 }
 
-/// Gives a scene its pictures and texts. `####` in a path stands for the frame number with leading zeros.
+/// Gives a scene its pictures, meshes and texts. `####` in a path stands for the frame number with leading zeros.
 ///
 /// A loader may keep what it read; it may be called from several threads.
 pub trait Assets: Send + Sync {
@@ -92,9 +105,12 @@ pub trait Assets: Send + Sync {
     /// The asset is missing, damaged, too large or not a picture.
     fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError>;
 
-    /// The strokes of the line drawing at `path`.
+    /// All triangles of the scene at `path`, in its own coordinates.
     ///
     /// # Errors
+    /// The asset is missing, too large, damaged, or holds no triangles.
+    fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError>;
+    /// The strokes of the line drawing at `path`.
     /// The asset is missing, damaged, too large, or holds no strokes.
     fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError>;
 
@@ -115,6 +131,7 @@ pub trait Assets: Send + Sync {
 #[derive(Clone, Debug, Default)]
 pub struct MemoryAssets {
     pictures: BTreeMap<String, Arc<Picture>>,
+    meshes: BTreeMap<String, Arc<Mesh>>,
     drawings: BTreeMap<String, Arc<Drawing>>,
     texts: BTreeMap<String, Arc<str>>,
 }
@@ -125,6 +142,9 @@ impl MemoryAssets {
         self.pictures.insert(path.into(), Arc::new(picture));
     }
 
+    /// Keeps `mesh` under `path`.
+    pub fn insert_mesh(&mut self, path: impl Into<String>, mesh: Mesh) {
+        self.meshes.insert(path.into(), Arc::new(mesh));
     /// Keeps `drawing` under `path`.
     pub fn insert_drawing(&mut self, path: impl Into<String>, drawing: Drawing) {
         self.drawings.insert(path.into(), Arc::new(drawing));
@@ -145,6 +165,8 @@ impl Assets for MemoryAssets {
         self.pictures.get(path).cloned().ok_or_else(|| missing(path))
     }
 
+    fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
+        self.meshes.get(path).cloned().ok_or_else(|| missing(path))
     fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
         self.drawings.get(path).cloned().ok_or_else(|| missing(path))
     }
@@ -154,6 +176,8 @@ impl Assets for MemoryAssets {
     }
 
     fn digest(&self, path: &str, _frame: i64) -> Result<[u8; 32], AssetError> {
+        let known = self.pictures.contains_key(path) || self.meshes.contains_key(path) || self.texts.contains_key(path);
+        if !known {
         let drawn = self.pictures.contains_key(path) || self.drawings.contains_key(path);
         if !drawn && !self.texts.contains_key(path) {
             return Err(missing(path));

@@ -76,6 +76,8 @@ pub struct View {
     pub window: Rect,
     /// Height of the level mirror that the picture is seen in, m.
     pub mirror: Option<f64>,
+    /// Luminance that a display will show as white, cd/m^2, where it is known: what is far below needs no drawing.
+    pub white_luminance: Option<f64>,
 }
 
 impl View {
@@ -92,6 +94,7 @@ impl View {
             overscan,
             window: Rect::of_size(size[0], size[1]),
             mirror: None,
+            white_luminance: None,
         }
     }
 
@@ -188,6 +191,19 @@ pub struct Strip {
     absorption: Absorption,
 }
 
+/// Planes of a strip that takes all colours alike, to put samples behind each other one pixel at a time: `L += T l; T *= t`.
+#[derive(Debug)]
+pub struct GrayPlanes<'a> {
+    /// Red, green and blue of L.
+    pub radiance: [&'a mut [f32]; 3],
+    /// T.
+    pub transmittance: &'a mut [f32],
+    /// Depth of the nearest sample, m.
+    pub depth: &'a mut [f32],
+    /// Depth of the plate, m; empty where there is none.
+    pub plate_depth: &'a [f32],
+}
+
 /// How many planes of T hold something.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Absorption {
@@ -279,6 +295,18 @@ impl Strip {
             self.absorption = Absorption::Coloured;
         }
         &mut self.transmittance
+    }
+
+    /// Planes to write to where nothing coloured absorbs; `None` once something does.
+    pub fn gray_planes_mut(&mut self) -> Option<GrayPlanes<'_>> {
+        self.begin_gray();
+        let [red, green, blue] = &mut self.radiance;
+        (self.absorption == Absorption::Gray).then_some(GrayPlanes {
+            radiance: [red, green, blue],
+            transmittance: &mut self.transmittance[0],
+            depth: &mut self.depth,
+            plate_depth: &self.plate_depth,
+        })
     }
 
     fn begin_gray(&mut self) {

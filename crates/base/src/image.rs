@@ -186,6 +186,30 @@ pub struct Frame {
     pub channels: Vec<Channel>,
     /// Whether a plate fills the picture, so that it is opaque.
     pub opaque: bool,
+    /// Figures of each phenomenon that has any, where they were asked for.
+    pub figures: Vec<FigureSet>,
+    /// The pixels beyond which all are empty: no light, no alpha, infinite depth.
+    pub content: Rect,
+}
+
+/// A number that a frame is known by, such as a rain rate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Figure {
+    /// What it is, in words joined by `_`.
+    pub name: &'static str,
+    /// Its unit; empty for a plain number.
+    pub unit: &'static str,
+    /// Its value; not finite where there is none.
+    pub value: f64,
+}
+
+/// The figures of one phenomenon.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FigureSet {
+    /// Its name in the scene.
+    pub phenomenon: String,
+    /// Its figures.
+    pub figures: Vec<Figure>,
 }
 
 /// Display pixels: sRGB-encoded, straight alpha.

@@ -8,8 +8,8 @@ pub mod f32;
 pub mod lanes;
 
 pub use glam::{
-    Affine3A, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, EulerRot, IVec2, IVec3, Mat2, Mat3, Mat4, Quat,
-    UVec2, UVec3, Vec2, Vec3, Vec3A, Vec4,
+    Affine3A, DAffine3, DMat2, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, EulerRot, IVec2, IVec3, Mat2, Mat3, Mat4,
+    Quat, UVec2, UVec3, Vec2, Vec3, Vec3A, Vec4,
 };
 
 /// Sine of `x` radians.

@@ -2,8 +2,9 @@
 
 use crate::{
     canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
-    image::{Image, Rect},
+    image::{Figure, Image, Rect},
     observer::{Cancelled, Observer},
+    point_cloud::PointCloud,
     surroundings::{Publication, Surroundings},
 };
 
@@ -33,6 +34,14 @@ pub enum SnapshotError {
     /// It is shorter or longer than its contents say, or does not match its checksum.
     #[error("the snapshot is damaged")]
     Damaged,
+}
+
+/// What a user should know of how a phenomenon will look, and that stops nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Remark {
+    /// It only shows the light of others, and there is none.
+    #[error("nothing lights it, so it is drawn black; a [[light]], a [sky] or a fire would")]
+    Unlit,
 }
 
 /// One phenomenon of a scene, ready to be drawn at any time (closed form) or stepped there.
@@ -70,8 +79,18 @@ pub trait Phenomenon: Send + Sync {
         Err(SnapshotError::NoState)
     }
 
+    /// Its particles at time `t`, within a step of its state; `None` where it has none.
+    fn particles(&self, _t: f64) -> Option<PointCloud> {
+        None
+    }
+
     /// What the others see of it while the shutter is open.
     fn publish(&self, shutter: Shutter) -> Publication;
+
+    /// What a user should know of how it will look among others.
+    fn remark(&self, _surroundings: &Surroundings) -> Option<Remark> {
+        None
+    }
 
     /// Height of the level mirror that it is, m. It then gets a picture of everything else seen in that mirror.
     fn mirror(&self) -> Option<f64> {
@@ -102,6 +121,11 @@ pub trait Prepared: Send + Sync {
     ///
     /// Must give each pixel the same value whatever strip it comes in.
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip);
+
+    /// Numbers that this frame is known by, each name once.
+    fn figures(&self) -> Vec<Figure> {
+        Vec::new()
+    }
 
     /// How it bends the light of what lies behind it.
     fn deflection(&self) -> Option<Deflection<'_>> {

@@ -1,8 +1,12 @@
 //! What phenomena know of each other: light, absorption and obstacles, but never names.
 
+use std::sync::LazyLock;
+
 use glam::DVec3;
 
-use crate::{image::Image, sky::Sky, wind::Wind};
+use crate::{air::Air, image::Image, sky::Sky, wind::Wind};
+
+pub use crate::occluder::Occluder;
 
 /// How a light sends its light out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,32 +66,6 @@ impl Light {
     }
 }
 
-/// Something solid that stands in the way.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Occluder {
-    /// A ball.
-    Sphere {
-        /// Its middle, m.
-        centre: DVec3,
-        /// Its radius, m.
-        radius: f64,
-    },
-    /// All below a plane.
-    HalfSpace {
-        /// A point on the plane, m.
-        point: DVec3,
-        /// Unit normal, pointing out of the solid.
-        normal: DVec3,
-    },
-    /// A box with upright faces.
-    Cuboid {
-        /// Its least corner, m.
-        min: DVec3,
-        /// Its greatest corner, m.
-        max: DVec3,
-    },
-}
-
 /// What one phenomenon publishes to the others at one time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Publication {
@@ -113,6 +91,8 @@ impl Publication {
 pub struct Surroundings<'a> {
     /// The one wind of the scene.
     pub wind: &'a Wind,
+    /// The one air of the scene.
+    pub air: &'a Air,
     /// The light of the sky.
     pub sky: Sky,
     /// What is seen in the phenomenon's own [mirror](crate::phenomenon::Phenomenon::mirror): radiance (ACEScg, cd/m^2) and alpha of
@@ -122,10 +102,13 @@ pub struct Surroundings<'a> {
     pub others: Publication,
 }
 
+/// Air of the usual temperature and pressure.
+static STANDARD_AIR: LazyLock<Air> = LazyLock::new(Air::default);
+
 impl<'a> Surroundings<'a> {
-    /// Nothing but a wind.
+    /// Nothing but a wind in ordinary air.
     pub fn of_wind(wind: &'a Wind) -> Self {
-        Self { wind, sky: Sky::DARK, reflection: None, others: Publication::default() }
+        Self { wind, air: &STANDARD_AIR, sky: Sky::DARK, reflection: None, others: Publication::default() }
     }
 }
 

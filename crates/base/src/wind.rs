@@ -63,6 +63,18 @@ impl Wind {
         DVec3::from(self.parameters.velocity.at(t))
     }
 
+    /// How far the mean wind travels from one time to another, m.
+    pub fn travel(&self, from: f64, to: f64) -> DVec3 {
+        DVec3::from(self.parameters.velocity.integral(from, to))
+    }
+
+    /// Size of the gusts, m; `None` where there never are any.
+    pub fn gust_length(&self) -> Option<f64> {
+        let [low, high] = self.parameters.velocity.bounds();
+        let gusty = self.parameters.gust > 0.0 && [low, high].into_iter().flatten().any(|speed| speed != 0.0);
+        gusty.then_some(self.parameters.gust_length)
+    }
+
     /// Velocity at a point at time `t`, gusts included, m/s.
     pub fn at(&self, point: DVec3, t: f64) -> DVec3 {
         let mean = self.mean(t);
@@ -108,6 +120,17 @@ mod tests {
         let variance = speeds.iter().map(|speed| (speed - mean) * (speed - mean)).sum::<f64>() / speeds.len() as f64;
         assert!((mean - 4.0).abs() < 0.05, "{mean}");
         assert!((variance.sqrt() - 1.0).abs() < 0.08, "standard deviation {}", variance.sqrt());
+    }
+
+    #[test]
+    fn the_mean_wind_travels_as_its_integral_says() {
+        let keyed =
+            Animated::keyed(vec![(0.0, [0.0; 3]), (2.0, [4.0, 0.0, -2.0])], crate::curve::Interpolation::Linear);
+        let velocity = keyed.unwrap();
+        let wind = Wind::new(WindParameters { velocity, ..WindParameters::default() }, 7, None);
+        assert!((wind.travel(0.0, 2.0) - DVec3::new(4.0, 0.0, -2.0)).length() < 1e-12);
+        assert_eq!(wind.gust_length(), Some(6.0));
+        assert_eq!(Wind::new(WindParameters::default(), 7, None).gust_length(), None);
     }
 
     #[test]

@@ -38,6 +38,8 @@ fn run(command: &Command) -> anyhow::Result<()> {
         Command::Schema => command::schema::run(),
         Command::Render(args) => command::render::run(args),
         Command::Flipbook(args) => command::flipbook::run(args),
+        Command::Streaks(args) => command::streaks::run(args),
+        Command::Simulate(args) => command::simulate::run(args),
         Command::Completions(args) => command::completions::run(args),
         Command::Man(args) => command::man::run(args),
     }

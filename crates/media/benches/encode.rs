@@ -2,7 +2,7 @@
 
 use std::{hint::black_box, path::Path};
 
-use bansho_base::image::{CameraHeader, DisplayImage, DisplayPixels, Frame, FrameHeader, Image};
+use bansho_base::image::{CameraHeader, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Rect};
 use bansho_media::{
     exr,
     naming::OutputPattern,
@@ -58,7 +58,8 @@ fn frame() -> Frame {
         (0..WIDTH * HEIGHT).map(|i| [3.0, 1.2, 0.3, 1.0].map(|c| c * heat(i) * (1.0 + 0.01 * noise(i)))).collect();
     let depth = (0..WIDTH * HEIGHT).map(|i| if heat(i) > 0.0 { 4.0 } else { f32::INFINITY }).collect();
     let beauty = Image::from_pixels(WIDTH, HEIGHT, pixels).expect("as many pixels as the size says");
-    Frame { header, beauty, depth: Some(depth), channels: Vec::new(), opaque: false }
+    let content = Rect::of_size(beauty.width(), beauty.height());
+    Frame { header, beauty, depth: Some(depth), channels: Vec::new(), opaque: false, content, figures: Vec::new() }
 }
 
 /// The plain way: the encoder's own choice of filter and compression.

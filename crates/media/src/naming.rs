@@ -76,6 +76,16 @@ pub enum NamingError {
         /// Its extension.
         extension: String,
     },
+    /// An extension other than the only one that will do.
+    #[error("{path}: `.{extension}` is not written here; allowed: .{allowed}", path = .path.display())]
+    OtherExtension {
+        /// The name.
+        path: PathBuf,
+        /// Its extension.
+        extension: String,
+        /// The one that will do.
+        allowed: &'static str,
+    },
     /// More than one place for the frame number.
     #[error("{path}: more than one place for the frame number; use one run of # or one %04d", path = .path.display())]
     TwoPlaceholders {
@@ -175,11 +185,68 @@ fn printf_digits(text: &str) -> Option<(usize, usize)> {
     (digits <= MOST_DIGITS).then_some((digits, width.len() + 2))
 }
 
+/// A path whose last part may hold the frame number.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NumberedPath {
+    folder: PathBuf,
+    template: FrameTemplate,
+}
+
+impl NumberedPath {
+    /// Reads a name of files with this extension (without the dot), such as `gas.####.ply`. `count` is how many files there will be: a
+    /// lone `gas.ply` becomes `gas.####.ply` unless there is exactly one.
+    ///
+    /// # Errors
+    /// Another extension, two placeholders, a stray percent sign.
+    pub fn parse(path: &Path, extension: &'static str, count: usize) -> Result<Self, NamingError> {
+        let name = file_name(path)?;
+        let own = extension_of(path, name)?;
+        if !own.eq_ignore_ascii_case(extension) {
+            let path = path.to_path_buf();
+            return Err(NamingError::OtherExtension { path, extension: own.to_owned(), allowed: extension });
+        }
+        let mut numbered = Self::read(path, name)?;
+        if count != 1 {
+            numbered.number();
+        }
+        Ok(numbered)
+    }
+
+    fn read(path: &Path, name: &str) -> Result<Self, NamingError> {
+        let owned = || path.to_path_buf();
+        let template = FrameTemplate::parse(name, true).map_err(|error| match error {
+            TemplateError::TwoPlaceholders => NamingError::TwoPlaceholders { path: owned() },
+            TemplateError::BadPercent => NamingError::BadPercent { path: owned() },
+        })?;
+        Ok(Self { folder: path.parent().map(Path::to_path_buf).unwrap_or_default(), template })
+    }
+
+    /// Makes room for a number before the extension where there is none.
+    fn number(&mut self) {
+        let template = &mut self.template;
+        if template.digits.is_none() {
+            let dot = template.before.rfind('.').unwrap_or(template.before.len());
+            template.after = template.before.split_off(dot);
+            template.before.push('.');
+            template.digits = Some(4);
+        }
+    }
+
+    /// Whether the frame number stands in the name.
+    pub fn is_numbered(&self) -> bool {
+        self.template.digits.is_some()
+    }
+
+    /// The file for frame `number`.
+    pub fn path(&self, number: i64) -> PathBuf {
+        self.folder.join(self.template.name(number))
+    }
+}
+
 /// Where the frames of a job go.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutputPattern {
-    folder: PathBuf,
-    template: FrameTemplate,
+    numbered: NumberedPath,
     kind: OutputKind,
 }
 
@@ -190,25 +257,16 @@ impl OutputPattern {
     /// # Errors
     /// No extension or one that is not written, two placeholders, a stray percent sign, a placeholder in a film's name.
     pub fn parse(path: &Path, frame_count: usize) -> Result<Self, NamingError> {
-        let owned = || path.to_path_buf();
-        let name = path.file_name().ok_or_else(|| NamingError::NoExtension { path: owned() })?;
-        let name = name.to_str().ok_or_else(|| NamingError::NotUnicode { path: owned() })?;
+        let name = file_name(path)?;
         let kind = kind_of(path, name)?;
-        let mut template = FrameTemplate::parse(name, true).map_err(|error| match error {
-            TemplateError::TwoPlaceholders => NamingError::TwoPlaceholders { path: owned() },
-            TemplateError::BadPercent => NamingError::BadPercent { path: owned() },
-        })?;
-        if template.digits.is_some() && !kind.is_sequence() {
-            return Err(NamingError::NumberedFilm { path: owned(), extension: kind.extension() });
+        let mut numbered = NumberedPath::read(path, name)?;
+        if numbered.is_numbered() && !kind.is_sequence() {
+            return Err(NamingError::NumberedFilm { path: path.to_path_buf(), extension: kind.extension() });
         }
-        if template.digits.is_none() && kind.is_sequence() && frame_count != 1 {
-            let dot = template.before.rfind('.').unwrap_or(template.before.len());
-            template.after = template.before.split_off(dot);
-            template.before.push('.');
-            template.digits = Some(4);
+        if kind.is_sequence() && frame_count != 1 {
+            numbered.number();
         }
-        let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-        Ok(Self { folder, template, kind })
+        Ok(Self { numbered, kind })
     }
 
     /// What kind of file it is.
@@ -218,20 +276,29 @@ impl OutputPattern {
 
     /// Whether the frame number stands in the name.
     pub fn is_numbered(&self) -> bool {
-        self.template.digits.is_some()
+        self.numbered.is_numbered()
     }
 
     /// The file for frame `number`; for a film the same file whatever the number.
     pub fn path(&self, number: i64) -> PathBuf {
-        self.folder.join(self.template.name(number))
+        self.numbered.path(number)
+    }
+}
+
+fn file_name(path: &Path) -> Result<&str, NamingError> {
+    let name = path.file_name().ok_or_else(|| NamingError::NoExtension { path: path.to_path_buf() })?;
+    name.to_str().ok_or_else(|| NamingError::NotUnicode { path: path.to_path_buf() })
+}
+
+fn extension_of<'a>(path: &Path, name: &'a str) -> Result<&'a str, NamingError> {
+    match name.rsplit_once('.') {
+        Some((stem, extension)) if !stem.is_empty() && !extension.is_empty() => Ok(extension),
+        _ => Err(NamingError::NoExtension { path: path.to_path_buf() }),
     }
 }
 
 fn kind_of(path: &Path, name: &str) -> Result<OutputKind, NamingError> {
-    let extension = match name.rsplit_once('.') {
-        Some((stem, extension)) if !stem.is_empty() && !extension.is_empty() => extension,
-        _ => return Err(NamingError::NoExtension { path: path.to_path_buf() }),
-    };
+    let extension = extension_of(path, name)?;
     OutputKind::from_extension(extension)
         .ok_or_else(|| NamingError::UnknownExtension { path: path.to_path_buf(), extension: extension.to_owned() })
 }
@@ -242,6 +309,15 @@ mod tests {
 
     fn name(pattern: &str, frames: usize, number: i64) -> String {
         OutputPattern::parse(Path::new(pattern), frames).unwrap().path(number).display().to_string()
+    }
+
+    #[test]
+    fn particles_are_numbered_like_frames_and_have_an_extension_of_their_own() {
+        let name = |name: &str, count| NumberedPath::parse(Path::new(name), "ply", count).map(|path| path.path(7));
+        assert_eq!(name("a/gas.ply", 9), Ok("a/gas.0007.ply".into()));
+        assert_eq!((name("gas.ply", 1), name("gas.##.PLY", 1)), (Ok("gas.ply".into()), Ok("gas.07.PLY".into())));
+        assert!(matches!(name("gas.obj", 1), Err(NamingError::OtherExtension { allowed: "ply", .. })));
+        assert!(matches!(name("gas", 1), Err(NamingError::NoExtension { .. })));
     }
 
     fn error(pattern: &str) -> NamingError {

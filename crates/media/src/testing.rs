@@ -1,6 +1,8 @@
 //! Pictures for this crate's tests.
 
-use bansho_base::image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision};
+use bansho_base::image::{
+    CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect,
+};
 
 /// A small frame in which every value is different, with depth, a layer and an AOV.
 pub(crate) fn frame(width: usize, height: usize) -> Frame {
@@ -16,6 +18,8 @@ pub(crate) fn frame(width: usize, height: usize) -> Frame {
             Channel { name: "torch.R".to_owned(), precision: Precision::Half, values: plane(0.01) },
         ],
         opaque: false,
+        figures: Vec::new(),
+        content: Rect::of_size(width, height),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path, process::Command};
 
-use bansho_base::image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision};
+use bansho_base::image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision, Rect};
 use bansho_media::{atomic, exr};
 use half::f16;
 
@@ -35,6 +35,8 @@ fn frame() -> Frame {
         depth: Some(depth),
         channels,
         opaque: false,
+        figures: Vec::new(),
+        content: Rect::of_size(width, height),
     }
 }
 

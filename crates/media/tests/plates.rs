@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use bansho_base::{
     assets::{AssetProblem, Assets, Encoding},
-    image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision},
+    image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
 };
 use bansho_media::{
     exr,
@@ -35,7 +35,8 @@ fn frame(width: usize, height: usize) -> Frame {
     let depth = (0..count).map(|i| if i % 3 == 0 { f32::INFINITY } else { i as f32 * 1.5 }).collect();
     let channel = Channel { name: "fire.kelvin".to_owned(), precision: Precision::Single, values: vec![1500.0; count] };
     let beauty = Image::from_pixels(width, height, pixels).unwrap();
-    Frame { header, beauty, depth: Some(depth), channels: vec![channel], opaque: false }
+    let content = Rect::of_size(beauty.width(), beauty.height());
+    Frame { header, beauty, depth: Some(depth), channels: vec![channel], opaque: false, content, figures: Vec::new() }
 }
 
 fn png_bytes(picture: &DisplayImage) -> Vec<u8> {

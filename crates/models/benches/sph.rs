@@ -79,11 +79,11 @@ impl<const D: usize> Simulation<D> {
     }
 }
 
+/// Told of a neighbour, the offset from it, and its distance.
+type Visitor<'a> = &'a mut dyn FnMut(usize, [f32; 3], f32);
+
 /// A step one pair at a time, the neighbours of each particle found by `near`.
-fn scalar_step(
-    particles: &mut Particles<3>,
-    near: &dyn Fn(&Particles<3>, usize, &mut dyn FnMut(usize, [f32; 3], f32)),
-) {
+fn scalar_step(particles: &mut Particles<3>, near: &dyn Fn(&Particles<3>, usize, Visitor)) {
     let density_kernel = Kernel::<3>::new(KernelShape::Poly6, SUPPORT);
     let force_kernel = Kernel::<3>::new(KernelShape::Spiky, SUPPORT);
     let count = particles.len();
@@ -106,7 +106,7 @@ fn scalar_step(
 }
 
 /// Hands `j` to `visitor` if it is near `i`.
-fn visit_if_near(particles: &Particles<3>, i: usize, j: usize, visitor: &mut dyn FnMut(usize, [f32; 3], f32)) {
+fn visit_if_near(particles: &Particles<3>, i: usize, j: usize, visitor: Visitor) {
     let offset: [f32; 3] = particles.positions.each_ref().map(|x| x[i] - x[j]);
     let squared = offset.iter().map(|x| x * x).sum::<f32>();
     if squared < SUPPORT * SUPPORT {

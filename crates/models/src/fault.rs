@@ -27,6 +27,14 @@ pub enum FaultKind {
         /// Their sum there.
         sum: f64,
     },
+    /// A list that must ascend does not.
+    #[error("must ascend, but {next} follows {value}")]
+    NotAscending {
+        /// A value of the list.
+        value: f64,
+        /// The one after it.
+        next: f64,
+    },
     /// A loop that is no length of time.
     #[error("a loop of {seconds} s; allowed: more than 0")]
     LoopLength {

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
-use fearless_simd::{Level, Simd, f32x4, f32x16, prelude::*};
+use fearless_simd::{Level, Simd, f32x4, f32x8, f32x16, prelude::*};
 
 /// Numbers in a batch, whatever the width of the machine's vectors.
 pub(crate) const LANES: usize = 16;
@@ -73,39 +73,55 @@ impl Real for f32 {
 /// A batch.
 pub(crate) type Lanes<S> = f32x16<S>;
 
-impl<S: Simd> Real for Lanes<S> {
-    #[inline(always)]
-    fn like(self, value: f32) -> Self {
-        Self::splat(self.simd, value)
-    }
-    #[inline(always)]
-    fn fused(self, factor: Self, term: Self) -> Self {
-        if cfg!(feature = "broken-kernel") && has_fused(self.simd.level()) {
-            return self * factor + term;
+/// Half a batch, for loops that end or skip often.
+pub(crate) type HalfLanes<S> = f32x8<S>;
+
+/// [`Real`] for a vector type of that many numbers.
+macro_rules! real_batch {
+    ($Batch:ident, $count:expr) => {
+        impl<S: Simd> Real for $Batch<S> {
+            #[inline(always)]
+            fn like(self, value: f32) -> Self {
+                Self::splat(self.simd, value)
+            }
+            #[inline(always)]
+            fn fused(self, factor: Self, term: Self) -> Self {
+                if cfg!(feature = "broken-kernel") && has_fused(self.simd.level()) {
+                    return self * factor + term;
+                }
+                if has_fused(self.simd.level()) {
+                    return self.mul_add(factor, term);
+                }
+                let mut result = [0.0; $count];
+                fused_one_by_one(self.as_slice(), factor.as_slice(), term.as_slice(), &mut result);
+                Self::from_slice(self.simd, &result)
+            }
+            #[inline(always)]
+            fn root(self) -> Self {
+                self.sqrt()
+            }
+            #[inline(always)]
+            fn size(self) -> Self {
+                self.abs()
+            }
+            #[inline(always)]
+            fn least(self, other: Self) -> Self {
+                self.min(other)
+            }
+            #[inline(always)]
+            fn greatest(self, other: Self) -> Self {
+                self.max(other)
+            }
+            #[inline(always)]
+            fn choose(self, limit: Self, low: Self, high: Self) -> Self {
+                self.simd_lt(limit).select(low, high)
+            }
         }
-        if has_fused(self.simd.level()) { self.mul_add(factor, term) } else { fused_one_by_one(self, factor, term) }
-    }
-    #[inline(always)]
-    fn root(self) -> Self {
-        self.sqrt()
-    }
-    #[inline(always)]
-    fn size(self) -> Self {
-        self.abs()
-    }
-    #[inline(always)]
-    fn least(self, other: Self) -> Self {
-        self.min(other)
-    }
-    #[inline(always)]
-    fn greatest(self, other: Self) -> Self {
-        self.max(other)
-    }
-    #[inline(always)]
-    fn choose(self, limit: Self, low: Self, high: Self) -> Self {
-        self.simd_lt(limit).select(low, high)
-    }
+    };
 }
+
+real_batch!(Lanes, LANES);
+real_batch!(HalfLanes, LANES / 2);
 
 /// Whether vectors of this level have a fused multiply-add; known when the code for the level is compiled.
 #[inline(always)]
@@ -118,12 +134,10 @@ fn has_fused(level: Level) -> bool {
 
 /// The same bits for old processors, slowly; kept out of line, since in line it would multiply the size of everything.
 #[inline(never)]
-fn fused_one_by_one<S: Simd>(value: Lanes<S>, factor: Lanes<S>, term: Lanes<S>) -> Lanes<S> {
-    let mut result = [0.0; LANES];
-    for lane in 0..LANES {
-        result[lane] = value[lane].mul_add(factor[lane], term[lane]);
+fn fused_one_by_one(values: &[f32], factors: &[f32], terms: &[f32], results: &mut [f32]) {
+    for (lane, result) in results.iter_mut().enumerate() {
+        *result = values[lane].mul_add(factors[lane], terms[lane]);
     }
-    Lanes::from_slice(value.simd, &result)
 }
 
 /// Runs code with the plainest vectors of the machine: for tests, and to compare with the widest.

@@ -7,6 +7,7 @@ use bansho_base::{
     image::Frame,
     observer::{Cancelled, Observer},
     phenomenon::SnapshotError,
+    point_cloud::PointCloud,
 };
 
 use crate::plan::{Plan, PlanError};
@@ -69,6 +70,12 @@ pub trait Shot: Send {
 
     /// Takes the frame that was drawn; `None` where none was since the last.
     fn read(&mut self) -> Option<Frame>;
+
+    /// Gives back a frame that nobody needs any more, so that the next is drawn into its memory.
+    fn recycle(&mut self, _spent: Frame) {}
+
+    /// The particles of everything that has any, at the frame that the shot was advanced to.
+    fn particles(&self) -> PointCloud;
 
     /// The state of every phenomenon, for [`restore`](Self::restore).
     fn snapshot(&self) -> Vec<u8>;

@@ -2,7 +2,7 @@
 
 use bansho_base::{
     color::{DisplayCode, View},
-    image::{DisplayImage, DisplayPixels, Frame},
+    image::{DisplayImage, DisplayPixels, Frame, Rect},
 };
 use fearless_simd::Level;
 use rayon::prelude::*;
@@ -34,12 +34,17 @@ fn rows<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View) -> Vec<[C; 4]>
     let level = Level::new();
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     let [x0, y0] = frame.header.data_origin;
-    let mut pixels: Vec<[C; 4]> =
-        rayon::iter::repeat_n([C::default(); 4], width * height).with_min_len(1 << 16).collect();
+    // An empty pixel is code 0, unless it is opaque black.
+    let shown = if frame.opaque { Rect::of_size(width, height) } else { frame.content };
+    let mut pixels = vec![[C::default(); 4]; width * height];
     pixels.par_chunks_mut(width * TASK_ROWS).enumerate().for_each(|(task, chunk)| {
         for (row, out) in chunk.chunks_mut(width).enumerate() {
             let y = task * TASK_ROWS + row;
-            view.display_row(level, frame.beauty.row(y), y0 + y as i64, x0, frame.opaque, out);
+            if (shown.y..shown.bottom()).contains(&y) {
+                let columns = shown.x..shown.right();
+                let (light, out) = (&frame.beauty.row(y)[columns.clone()], &mut out[columns]);
+                view.display_row(level, light, y0 + y as i64, x0 + shown.x as i64, frame.opaque, out);
+            }
         }
     });
     pixels

@@ -41,6 +41,7 @@ fn state(plan: &Plan, hasher: &mut blake3::Hasher) {
         hasher.update(format!("{label} {}\n", Value::Table(table)).as_bytes());
     };
     table(&format!("bansho {VERSION} seed {} loop {:?} wind", plan.seed, plan.loop_s), plan.scene.wind.to_table());
+    table("air", plan.scene.air.to_table());
     for light in &plan.scene.lights {
         table("light", light.to_table());
     }
@@ -50,11 +51,15 @@ fn state(plan: &Plan, hasher: &mut blake3::Hasher) {
     if let Some(ground) = &plan.scene.ground {
         table("ground", ground.to_table());
     }
+    for obstacle in &plan.scene.obstacles {
+        table("obstacle", obstacle.to_table());
+    }
     let enabled = || plan.scene.instances.iter().filter(|instance| instance.enabled);
     for instance in enabled() {
         table(&format!("{} {:?}", instance.kind.key, instance.name), instance.source.canonical());
     }
-    for path in enabled().flat_map(|instance| instance.source.assets()) {
+    let obstacles = plan.scene.obstacles.iter().filter_map(|obstacle| Some(obstacle.file.as_ref()?.0.clone()));
+    for path in obstacles.chain(enabled().flat_map(|instance| instance.source.assets())) {
         asset(plan, &path, plan.scene.picture.first_frame, hasher);
     }
 }

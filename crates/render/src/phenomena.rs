@@ -3,9 +3,11 @@
 use bansho_base::{parameters::ProblemKind, phenomenon::Phenomenon};
 use bansho_models::{
     aurora::{Aurora, AuroraParameters},
+    flame_particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind},
     flame_sheet::{FlameSheet, FlameSheetParameters},
     ground::Ground,
     lamps::{Lamp, Lamps},
+    rain::{Rain, RainParameters},
     sky::SkyBackdrop,
 };
 
@@ -15,7 +17,8 @@ use crate::{
 };
 
 /// Every kind, in the order in which schema and book list them.
-pub const KINDS: &[PhenomenonKind] = &[FlameSheetParameters::KIND, AuroraParameters::KIND];
+pub const KINDS: &[PhenomenonKind] =
+    &[FlameSheetParameters::KIND, FlameParticlesParameters::KIND, RainParameters::KIND, AuroraParameters::KIND];
 
 /// A model's own fault, placed at the parameter that it names.
 fn opening_fault(fault: &bansho_models::ParameterFault) -> OpeningFault {
@@ -28,6 +31,34 @@ impl Describe for FlameSheetParameters {
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match FlameSheet::new(self.clone(), opening.name, opening.seed, opening.loop_s) {
             Ok(sheet) => Ok(Box::new(sheet)),
+            Err(fault) => Err(opening_fault(&fault)),
+        }
+    }
+}
+
+impl Describe for FlameParticlesParameters {
+    const KEY: &'static str = "flame_particles";
+
+    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        match FlameParticles::new(self.clone(), opening.name, opening.seed, opening.loop_s, opening.assets) {
+            Ok(flame) => Ok(Box::new(flame)),
+            Err(fault) => {
+                let kind = match fault.kind {
+                    ParticleFaultKind::Asset(error) => ProblemKind::Asset(error),
+                    other => ProblemKind::Conflict(other.to_string()),
+                };
+                Err(OpeningFault { key: fault.key, kind })
+            }
+        }
+    }
+}
+
+impl Describe for RainParameters {
+    const KEY: &'static str = "rain";
+
+    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        match Rain::new(self.clone(), opening.name, opening.seed, opening.loop_s) {
+            Ok(rain) => Ok(Box::new(rain)),
             Err(fault) => Err(opening_fault(&fault)),
         }
     }

@@ -8,13 +8,14 @@ use bansho_base::{
     color,
     image::{FrameHeader, Rect},
     parameters::Auto,
-    phenomenon::Phenomenon,
+    phenomenon::{Phenomenon, Remark},
+    surroundings::Occluder,
     wind::Wind,
 };
 
 use crate::{
     fingerprint, phenomena,
-    scene::{FrameRate, Opening, OpeningFault, Scene},
+    scene::{FrameRate, ObstacleParameters, Opening, OpeningFault, Scene},
 };
 
 /// What a job may change of a scene.
@@ -32,6 +33,8 @@ pub struct PlanOptions {
     pub layers: bool,
     /// Whether phenomena write their AOVs.
     pub aovs: bool,
+    /// Whether frames carry the phenomena's figures.
+    pub figures: bool,
     /// How display formats will show the picture; a plate made for display is taken back through it.
     pub display: color::View,
 }
@@ -73,7 +76,7 @@ pub enum PlanError {
         /// Largest side.
         most: usize,
     },
-    /// A phenomenon cannot be made.
+    /// A phenomenon or an obstacle cannot be made.
     #[error("{name}: {key}: {}", .fault.kind)]
     Opening {
         /// The phenomenon's name.
@@ -106,10 +109,14 @@ pub struct Plan {
     pub layers: bool,
     /// Whether phenomena write their AOVs.
     pub aovs: bool,
+    /// Whether frames carry the phenomena's figures.
+    pub figures: bool,
     /// How display formats show the picture.
     pub display: color::View,
     /// The one wind.
     pub wind: Wind,
+    /// The scene's obstacles.
+    pub occluders: Vec<Occluder>,
 }
 
 impl Plan {
@@ -123,6 +130,7 @@ impl Plan {
         let loop_s = options.loop_s.map(|seconds| loop_length(seconds, scene.picture.fps)).transpose()?;
         let seed = options.seed.unwrap_or(scene.picture.seed as u64);
         let wind = Wind::new(scene.wind.clone(), seed, loop_s);
+        let occluders = occluders(&scene, assets.as_ref())?;
         let mut plan = Self {
             window: window(size, overscan, options.crop)?,
             size,
@@ -131,8 +139,10 @@ impl Plan {
             exposure_ev100: 0.0,
             layers: options.layers,
             aovs: options.aovs,
+            figures: options.figures,
             display: options.display,
             wind,
+            occluders,
             assets,
             scene,
         };
@@ -149,16 +159,20 @@ impl Plan {
         let open = |instance: &crate::scene::Instance| {
             let opening =
                 Opening { name: &instance.name, seed: self.seed, loop_s: self.loop_s, assets: self.assets.as_ref() };
-            instance.source.open(&opening).map_err(|fault| PlanError::Opening {
-                name: instance.name.clone(),
-                key: fault.key.clone(),
-                fault: Box::new(fault),
-            })
+            instance.source.open(&opening).map_err(|fault| opening_error(instance.name.clone(), fault))
         };
         let enabled = self.scene.instances.iter().filter(|instance| instance.enabled);
         let mut phenomena: Vec<Box<dyn Phenomenon>> = enabled.map(open).collect::<Result<_, _>>()?;
         phenomena.extend(phenomena::of_scene(self));
         Ok(phenomena)
+    }
+
+    /// What users should know of how phenomena will look, each with its phenomenon's name.
+    ///
+    /// # Errors
+    /// A phenomenon cannot be made.
+    pub fn remarks(&self) -> Result<Vec<(String, Remark)>, PlanError> {
+        crate::cpu::remarks(self)
     }
 
     /// Frames a second.
@@ -201,6 +215,7 @@ impl Plan {
         let next = shutter.middle() + self.fps().frame_s();
         let mut view = View::new(self.scene.camera.clone(), shutter, next, self.size, overscan);
         view.window = self.window;
+        view.white_luminance = Some(color::white_luminance(f64::from(self.exposure_ev100)));
         view
     }
 
@@ -254,6 +269,18 @@ impl Plan {
             None => Ok(()),
         }
     }
+}
+
+fn opening_error(name: String, fault: OpeningFault) -> PlanError {
+    PlanError::Opening { name, key: fault.key.clone(), fault: Box::new(fault) }
+}
+
+/// The scene's obstacles.
+fn occluders(scene: &Scene, assets: &dyn Assets) -> Result<Vec<Occluder>, PlanError> {
+    let open = |(index, obstacle): (usize, &ObstacleParameters)| {
+        obstacle.open(assets).map_err(|fault| opening_error(format!("obstacle {index}"), fault))
+    };
+    scene.obstacles.iter().enumerate().map(open).collect()
 }
 
 /// How many times display white the bright parts of a phenomenon are with an automatic exposure: enough for a core

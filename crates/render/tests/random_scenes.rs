@@ -6,7 +6,7 @@ use bansho_base::{
     assets::MemoryAssets,
     color,
     observer::Unobserved,
-    parameters::{Table, sample},
+    parameters::{Table, Value, sample},
     random::{Key, Purpose, uniform},
 };
 use bansho_render::{
@@ -59,10 +59,14 @@ fn scene(seed: u64) -> String {
     let mut text = String::from("bansho = 1\n");
     for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate") {
         let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
-        text += &lines(&header, &sample((shared.table)(), &mut uniform));
+        let mut table = sample((shared.table)(), &mut uniform);
+        // Random tables name no files, so no obstacle can be a mesh.
+        table.entries.retain(|entry| shared.key != "obstacle" || entry.key != "shape");
+        text += &lines(&header, &table);
     }
     for kind in KINDS {
         let mut table = sample((kind.table)(), &mut uniform);
+        few_particles(&mut table, kind.key);
         // Half of all random shapes are wider than their sheet; most scenes do without, so that they are drawn.
         if !seed.is_multiple_of(4) {
             table.entries.retain(|entry| entry.key != "shape");
@@ -70,6 +74,15 @@ fn scene(seed: u64) -> String {
         text += &lines(&format!("[[{}]]", kind.key), &table);
     }
     text
+}
+
+/// Keeps a simulation short, and without meshes, which random tables cannot name.
+fn few_particles(table: &mut Table, kind: &str) {
+    if kind == "flame_particles" {
+        table.entries.retain(|entry| !["particles", "burners", "step_s", "preroll_s"].contains(&entry.key.as_str()));
+        table.push("particles", Value::Integer(60));
+        table.push("preroll_s", Value::Number(0.2));
+    }
 }
 
 fn lines(header: &str, table: &Table) -> String {

@@ -47,6 +47,10 @@ fn faults_name_their_place_and_what_is_allowed() {
         ("bansho = 1\n[[emitter]]\nname = \"a.b\"\n", "expected a name of 1 to 100 characters without dots"),
         ("bansho = 1\n[[absorber]]\nnear = 2\nfar = 1\n", "test.toml:4:7: absorber.0.far: must lie behind `near`"),
         ("bansho = 1\n[plate]\nimage = \"gone.png\"\n", "test.toml:3:9: plate.image: gone.png: no such file"),
+        ("bansho = 1\n[air]\ntemperature_k = 0\n", "test.toml:3:17: air.temperature_k: 0 is out of range; allowed: 150 to 400 K"),
+        ("bansho = 1\n[obstacle]\n", "expected tables [[obstacle]], with double brackets"),
+        ("bansho = 1\n[[obstacle]]\nradius = 1\n[[obstacle]]\nshape = \"mesh\"\n", "obstacle.1.file: an obstacle of shape \"mesh\" needs a `file`"),
+        ("bansho = 1\n[[obstacle]]\nshape = \"mesh\"\nfile = \"gone.glb\"\n", "test.toml:4:8: obstacle.0.file: gone.glb: no such file"),
         ("bansho = 2\n", "test.toml:1:10: bansho: format 2 is newer than this program knows; known: up to 1"),
         ("bansho = 0\n", "`bansho upgrade` rewrites the file"),
         ("[picture]\n", "the scene must begin with `bansho = 1`"),
@@ -55,6 +59,36 @@ fn faults_name_their_place_and_what_is_allowed() {
     ] {
         let shown = fault(text);
         assert!(shown.contains(expected), "{text}\nexpected: {expected}\nshown: {shown}");
+    }
+}
+
+#[test]
+fn faults_of_a_particle_flame_are_located() {
+    let fault = |body: &str| {
+        let text = format!("bansho = 1\n[[flame_particles]]\n{body}");
+        let scene = Scene::parse("test.toml", &text, bansho_render::phenomena::KINDS, &MemoryAssets::default());
+        scene.err().unwrap_or_else(|| panic!("accepted: {text}")).to_string()
+    };
+    for (body, expected) in [
+        ("particles = 100000000\n", "test.toml:3:13: flame_particles.0.particles: 100000000 particles would take"),
+        ("life = { flame_temperature_k = 0 }\n", "life.flame_temperature_k: 0 is out of range; allowed: 250 to 4000 K"),
+        ("life = { flame_temperature_k = 1e6 }\n", "1000000 is out of range"),
+        (
+            "burners = [{}, { position = [0, 99, 0] }]\ndomain_max = [5, 5, 5]\n",
+            "test.toml:3:29: flame_particles.0.burners.1.position: the burner stands at",
+        ),
+        ("burners = [{ shape = \"mesh\" }]\n", "burners.0.file: a burner of shape \"mesh\" needs a `file`"),
+        (
+            "burners = [{ shape = \"mesh\", file = \"gone.glb\" }]\n",
+            "test.toml:3:38: flame_particles.0.burners.0.file: gone.glb: no such file",
+        ),
+        (
+            "particles = 3\ndomain_min = [-0.01, -0.01, -0.01]\ndomain_max = [0.01, 0.01, 0.01]\n",
+            "particles: the support radius d would be",
+        ),
+    ] {
+        let shown = fault(body);
+        assert!(shown.contains(expected), "{body}\nexpected: {expected}\nshown: {shown}");
     }
 }
 
@@ -81,7 +115,10 @@ fn random_scene(seed: u64) -> String {
     let mut text = String::from("bansho = 1\n");
     for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate" && shared.key != "picture") {
         let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
-        text += &table_text(&header, &parameters::sample((shared.table)(), &mut uniform));
+        let mut table = parameters::sample((shared.table)(), &mut uniform);
+        // Random tables name no files, so no obstacle can be a mesh.
+        table.entries.retain(|entry| shared.key != "obstacle" || entry.key != "shape");
+        text += &table_text(&header, &table);
     }
     for kind in kinds() {
         let mut table = parameters::sample((kind.table)(), &mut uniform);

@@ -49,6 +49,17 @@ fn fog_dims_a_lamp_by_beers_law_wherever_it_stands() {
 }
 
 #[test]
+fn frames_carry_figures_where_they_are_asked_for() {
+    let asked = PlanOptions { figures: true, ..PlanOptions::default() };
+    let frame = render(&fogged(2.5), &asked, 0);
+    // The fog has none.
+    let [lamp] = &frame.figures[..] else { panic!("{:?}", frame.figures) };
+    assert_eq!((lamp.phenomenon.as_str(), lamp.figures.len()), ("lamp", 1));
+    assert_eq!((lamp.figures[0].name, lamp.figures[0].unit, lamp.figures[0].value), ("depth", "m", 2.5));
+    assert!(render(&fogged(2.5), &PlanOptions::default(), 0).figures.is_empty());
+}
+
+#[test]
 fn layers_and_aovs_come_to_the_beauty() {
     let options = PlanOptions { layers: true, aovs: true, ..PlanOptions::default() };
     let frame = render(&fogged(2.0), &options, 0);

@@ -18,7 +18,7 @@ pub(super) const GUTTER: usize = 2;
 /// Draws all frames of `job` into one picture and writes it.
 pub(super) fn run(job: &PreparedJob, sheet: &Sheet, observer: &dyn JobObserver) -> Result<(), JobError> {
     let sink = job.format.open(&job.plan, 1, sheet.size(), 1)?;
-    let show = |frame: Frame, observer: &dyn Observer| job.format.show(&frame, observer);
+    let show = |frame: &Frame, observer: &dyn Observer| job.format.show(frame, observer);
     let gather = Gather::new(sheet.count, observer, show);
     shoot(&job.plan, job.backend.as_ref(), &job.frames, &job.snapshots, &gather, observer)?;
     let _stage = StageGuard::begin(observer, Stage::Write);

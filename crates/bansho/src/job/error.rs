@@ -6,6 +6,8 @@ use bansho_base::observer::Cancelled;
 use bansho_media::{MediaError, flipbook::TileError, naming::NamingError};
 use bansho_render::{PlanError, RenderError, SceneError, scene::edit::EditError};
 
+use super::streaks::StreaksFault;
+
 /// Why a job cannot be done.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -53,6 +55,12 @@ pub enum JobError {
     /// Tiles that make no sheet.
     #[error(transparent)]
     Tiles(#[from] TileError),
+    /// Streak textures that cannot be made.
+    #[error(transparent)]
+    Streaks(#[from] StreaksFault),
+    /// The observer asked to stop while streak textures were made.
+    #[error("stopped; whole textures stay, without an index")]
+    StreaksCancelled,
     /// The observer asked to stop.
     #[error("stopped; whole frames stay, and --resume goes on from there")]
     Cancelled,
@@ -67,6 +75,12 @@ pub enum Conflict {
     NoChannels {
         /// `--layers` or `--aovs`.
         what: &'static str,
+        /// The output.
+        path: PathBuf,
+    },
+    /// Figures of a film or a sheet, which holds many frames.
+    #[error("--figures writes a file beside each frame's own picture, and {path} holds many frames; allowed: .png, .exr without --contact-sheet", path = .path.display())]
+    NoFigures {
         /// The output.
         path: PathBuf,
     },
@@ -101,6 +115,9 @@ pub enum Conflict {
     /// No frame is left to draw.
     #[error("no frame is asked for")]
     NoFrames,
+    /// A simulation of a scene in which nothing has particles.
+    #[error("nothing in this scene has particles to write")]
+    NoParticles,
     /// Snapshots of no frame.
     #[error("snapshots every {0} frames; allowed: 1 or more")]
     SnapshotStep(u64),
@@ -141,8 +158,9 @@ impl JobError {
             Self::Unreadable { .. } | Self::Scene(_) | Self::Plan(PlanError::Opening { .. }) => Cause::Scene,
             Self::Edit { .. } | Self::SetScene(_) | Self::Plan(_) | Self::Conflict(_) | Self::Naming(_) => Cause::Usage,
             Self::Render(RenderError::Asset(_) | RenderError::DepthSize { .. }) => Cause::Scene,
+            Self::Streaks(_) => Cause::Usage,
             Self::NoGpu => Cause::Gpu,
-            Self::Cancelled => Cause::Cancelled,
+            Self::Cancelled | Self::StreaksCancelled => Cause::Cancelled,
             Self::Media(MediaError::Naming(_)) => Cause::Usage,
             Self::Render(_) | Self::Media(_) | Self::Tiles(_) => Cause::Work,
         }

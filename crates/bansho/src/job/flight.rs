@@ -9,7 +9,10 @@ use std::{
     time::Duration,
 };
 
-use bansho_base::observer::{Observer, Stage};
+use bansho_base::{
+    image::Frame,
+    observer::{Observer, Stage},
+};
 
 use super::{error::JobError, observer::JobObserver};
 
@@ -25,6 +28,7 @@ pub(super) struct Flight {
 struct State {
     unfinished: BTreeSet<usize>,
     error: Option<JobError>,
+    spent: Option<Frame>,
 }
 
 /// How long a thread that found no work sleeps before it looks again; a landing wakes it earlier.
@@ -52,6 +56,16 @@ impl Flight {
                 drop(self.landed.wait_timeout(state, NAP));
             }
         }
+    }
+
+    /// Keeps a finished frame, so that its memory can be used again.
+    pub(super) fn keep_spent(&self, frame: Frame) {
+        self.lock().spent = Some(frame);
+    }
+
+    /// A finished frame, if there is one.
+    pub(super) fn take_spent(&self) -> Option<Frame> {
+        self.lock().spent.take()
     }
 
     /// Keeps the first failure; the rest of the work then stops.

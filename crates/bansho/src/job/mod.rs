@@ -1,4 +1,4 @@
-//! From a scene file to pictures on disk: what `bansho render` and `bansho flipbook` do, for any program.
+//! From a scene file to pictures on disk: what `bansho render`, `bansho flipbook`, `bansho simulate` and `bansho streaks` do, for any program.
 //!
 //! [`Job`] says what is wanted; [`Job::prepare`] checks all of it and writes nothing; [`PreparedJob::run`] draws each
 //! frame while those before are compressed and written by whichever thread of the caller's rayon pool is free. A few
@@ -6,6 +6,7 @@
 
 mod contact;
 mod error;
+mod figures;
 mod flight;
 mod flipbook;
 mod observer;
@@ -16,7 +17,9 @@ mod run;
 mod scene_file;
 mod sheet;
 mod shoot;
+mod simulate;
 mod snapshots;
+mod streaks;
 #[cfg(test)]
 mod testing;
 
@@ -31,6 +34,8 @@ pub use observer::{FrameDone, JobObserver, Note, Outline};
 pub use prepare::{PreparedJob, check_scene};
 pub use run::Summary;
 pub use scene_file::SceneFile;
+pub use simulate::{PreparedSimulation, Simulate};
+pub use streaks::{ListKind, PreparedStreaks, StreakFormat, Streaks, StreaksFault};
 
 bansho_base::choice! {
     /// What draws.
@@ -63,6 +68,8 @@ pub struct Job {
     pub layers: bool,
     /// Whether phenomena write temperature, motion and the like (EXR).
     pub aovs: bool,
+    /// Whether a JSON file beside each picture tells the figures of its frame (PNG and EXR).
+    pub figures: bool,
     /// How display formats show the light.
     pub view: View,
     /// Bits of each channel, where the format has a choice.
@@ -93,6 +100,7 @@ impl Job {
             loop_s: None,
             layers: false,
             aovs: false,
+            figures: false,
             view: View::DISPLAY,
             bits: BitDepth::Eight,
             out: None,

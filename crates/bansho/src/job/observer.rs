@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
-use bansho_base::observer::{Observer, Unobserved};
+use bansho_base::{
+    observer::{Observer, Unobserved},
+    phenomenon::Remark,
+};
 use bansho_media::naming::OutputKind;
 use bansho_render::RenderError;
 
@@ -102,6 +105,14 @@ pub enum Note {
         path: PathBuf,
         /// What the system said.
         reason: String,
+    },
+    /// A phenomenon will look other than one may expect.
+    #[error("{name}: {remark}")]
+    Remark {
+        /// Its name in the scene.
+        name: String,
+        /// What is to be said.
+        remark: Remark,
     },
     /// A flipbook without motion.
     #[error("nothing in this scene writes its motion; the motion sheet is empty")]

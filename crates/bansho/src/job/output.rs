@@ -23,6 +23,7 @@ use bansho_render::{
 
 use super::{
     error::JobError,
+    figures,
     observer::{FrameDone, JobObserver},
     shoot::Finish,
 };
@@ -33,6 +34,8 @@ pub(super) struct Format {
     pub(super) pattern: OutputPattern,
     pub(super) view: View,
     pub(super) bits: BitDepth,
+    /// Whether figures are written beside each picture.
+    pub(super) figures: bool,
 }
 
 impl Format {
@@ -65,24 +68,28 @@ impl Format {
         &self,
         sink: &Sink,
         index: usize,
-        mut frame: Frame,
+        frame: &mut Frame,
         observer: &dyn Observer,
     ) -> Result<(), JobError> {
         frame.header.fingerprint = self.fingerprint(frame.header.fingerprint);
+        if self.figures {
+            // Before the picture, so that a picture that is there has its figures.
+            figures::write(frame, &sink.path(frame.header.number))?;
+        }
         let slot = Slot { index, number: frame.header.number };
         let shown = match sink.wants() {
             Wants::Frame => None,
-            Wants::Display => Some(self.show(&frame, observer)),
+            Wants::Display => Some(self.show(frame, observer)),
             Wants::OpaqueDisplay => {
                 // Premultiplied light over black is the light itself.
                 frame.opaque = true;
-                Some(self.show(&frame, observer))
+                Some(self.show(frame, observer))
             }
         };
         let _stage = StageGuard::begin(observer, Stage::Write);
         let picture = match &shown {
             Some(picture) => Picture::Display(picture, &frame.header.fingerprint),
-            None => Picture::Linear(&frame),
+            None => Picture::Linear(frame),
         };
         Ok(sink.write(slot, picture)?)
     }
@@ -104,7 +111,7 @@ pub(super) struct ToFiles<'a> {
 }
 
 impl Finish for ToFiles<'_> {
-    fn finish(&self, index: usize, frame: Frame, observer: &dyn Observer) -> Result<(), JobError> {
+    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError> {
         let number = frame.header.number;
         self.format.write(&self.sink, index, frame, observer)?;
         let drawn = self.drawn.fetch_add(1, Ordering::Relaxed) + 1;

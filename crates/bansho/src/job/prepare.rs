@@ -1,6 +1,9 @@
 //! Checking a job before anything is drawn or written.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use bansho_base::{assets::Assets, color::View};
 use bansho_media::{
@@ -88,6 +91,7 @@ impl Job {
         let mut scene = self.scene.check(assets.as_ref())?;
         let kind = self.output_kind()?;
         self.check_channels(kind)?;
+        self.check_figures(kind)?;
         if kind != OutputKind::Exr {
             // Only EXR has room for what lies beyond the picture.
             scene.picture.overscan = 0;
@@ -99,9 +103,9 @@ impl Job {
         output::check_writable(&pattern.path(frames[0]))?;
         let tile = [plan.window.width, plan.window.height];
         let sheet = self.contact_sheet.map(|tiles| sheet::holding(tiles, tile, contact::GUTTER)).transpose()?;
-        let snapshots = self.snapshots(&plan)?;
+        let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan)?;
         let mut prepared = PreparedJob {
-            format: Format { pattern, view: self.view, bits: self.bits },
+            format: Format { pattern, view: self.view, bits: self.bits, figures: self.figures },
             resume: self.resume && kind.is_sequence() && sheet.is_none(),
             notes: Vec::new(),
             plan,
@@ -139,6 +143,14 @@ impl Job {
         if kind == OutputKind::Exr { Ok(()) } else { Err(Conflict::NoChannels { what, path: self.output_path() }) }
     }
 
+    /// Figures lie beside a picture of one frame.
+    fn check_figures(&self, kind: OutputKind) -> Result<(), Conflict> {
+        if self.figures && (self.contact_sheet.is_some() || !kind.is_sequence()) {
+            return Err(Conflict::NoFigures { path: self.output_path() });
+        }
+        Ok(())
+    }
+
     fn plan_options(&self) -> PlanOptions {
         PlanOptions {
             size: self.size,
@@ -147,37 +159,26 @@ impl Job {
             loop_s: self.loop_s,
             layers: self.layers,
             aovs: self.aovs,
+            figures: self.figures,
             display: self.view,
         }
     }
 
     fn chosen_frames(&self, plan: &Plan) -> Result<Vec<i64>, JobError> {
-        let mut frames = self.frames.clone().unwrap_or_else(|| plan.frames().collect());
-        frames.sort_unstable();
-        frames.dedup();
-        let first = *frames.first().ok_or(Conflict::NoFrames)?;
+        let frames = chosen_frames(self.frames.as_deref(), plan)?;
         match self.contact_sheet {
             Some(tiles) if !(1..=MOST_TILES).contains(&tiles) => {
                 Err(Conflict::Tiles { tiles, most: MOST_TILES }.into())
             }
-            Some(tiles) => Ok((first..first.saturating_add(tiles as i64)).collect()),
+            Some(tiles) => Ok((frames[0]..frames[0].saturating_add(tiles as i64)).collect()),
             None => Ok(frames),
-        }
-    }
-
-    fn snapshots(&self, plan: &Plan) -> Result<Snapshots, JobError> {
-        let second = (1.0 / plan.fps().frame_s()).round().max(1.0) as u64;
-        let every = self.snapshot_every.unwrap_or(second);
-        match &self.snapshots {
-            _ if every == 0 => Err(Conflict::SnapshotStep(every).into()),
-            Some(folder) if snapshots::has_state(plan)? => Ok(Snapshots::new(folder.clone(), plan, every)),
-            _ => Ok(Snapshots::default()),
         }
     }
 
     fn notes(&self, job: &PreparedJob) -> Result<Vec<Note>, JobError> {
         let kind = job.format.pattern.kind();
         let mut notes: Vec<Note> = outside(&job.plan, &job.frames).into_iter().collect();
+        notes.extend(job.plan.remarks()?.into_iter().map(|(name, remark)| Note::Remark { name, remark }));
         let wide = matches!(kind, OutputKind::Png | OutputKind::Apng | OutputKind::Mov | OutputKind::Webm);
         if self.bits == BitDepth::Sixteen && !wide {
             notes.push(Note::BitsUnused { kind });
@@ -196,8 +197,27 @@ impl Job {
     }
 }
 
+/// The frames that are asked for, ascending; at least one.
+pub(super) fn chosen_frames(asked: Option<&[i64]>, plan: &Plan) -> Result<Vec<i64>, JobError> {
+    let mut frames = asked.map_or_else(|| plan.frames().collect(), <[i64]>::to_vec);
+    frames.sort_unstable();
+    frames.dedup();
+    if frames.is_empty() { Err(Conflict::NoFrames.into()) } else { Ok(frames) }
+}
+
+/// Snapshots in `folder`, `every` so many frames; none where nothing in the plan has a state.
+pub(super) fn snapshots(folder: Option<&Path>, every: Option<u64>, plan: &Plan) -> Result<Snapshots, JobError> {
+    let second = (1.0 / plan.fps().frame_s()).round().max(1.0) as u64;
+    let every = every.unwrap_or(second);
+    match folder {
+        _ if every == 0 => Err(Conflict::SnapshotStep(every).into()),
+        Some(folder) if snapshots::has_state(plan)? => Ok(Snapshots::new(folder.to_path_buf(), plan, every)),
+        _ => Ok(Snapshots::default()),
+    }
+}
+
 /// How many frames lie outside the shot's own.
-fn outside(plan: &Plan, frames: &[i64]) -> Option<Note> {
+pub(super) fn outside(plan: &Plan, frames: &[i64]) -> Option<Note> {
     let own = plan.frames();
     let count = frames.iter().filter(|frame| !own.contains(frame)).count();
     let (first, last) = (own.start, own.end - 1);

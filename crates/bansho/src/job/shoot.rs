@@ -17,8 +17,8 @@ use super::{
 
 /// What becomes of a drawn frame.
 pub(super) trait Finish: Sync {
-    /// Takes the frame at position `index` of the list, in any thread and any order within [`window`](Self::window).
-    fn finish(&self, index: usize, frame: Frame, observer: &dyn Observer) -> Result<(), JobError>;
+    /// Uses the frame at position `index` of the list, in any thread and any order within [`window`](Self::window).
+    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError>;
 
     /// How many frames may be under way at once.
     fn window(&self) -> usize;
@@ -48,16 +48,21 @@ pub(super) fn shoot(
     let drawn = rayon::in_place_scope_fifo(|scope| {
         for (index, &number) in numbers.iter().enumerate() {
             let seek = last.is_none_or(|last| number != last + 1).then_some(last);
-            let frame = draw(shot.as_mut(), number, seek, snapshots, &watch, observer)?;
+            if let Some(spent) = flight.take_spent() {
+                shot.recycle(spent);
+            }
+            let mut frame = draw(shot.as_mut(), number, seek, snapshots, &watch, observer)?;
             last = Some(number);
             flight.depart(index, limit(&frame, finish));
             let (flight, watch) = (&flight, &watch);
             scope.spawn_fifo(move |_| {
                 let _landing = Landing { flight, index };
-                if !watch.cancelled()
-                    && let Err(error) = finish.finish(index, frame, watch)
-                {
-                    flight.fail(error);
+                if watch.cancelled() {
+                    return;
+                }
+                match finish.finish(index, &mut frame, watch) {
+                    Ok(()) => flight.keep_spent(frame),
+                    Err(error) => flight.fail(error),
                 }
             });
         }

@@ -7,9 +7,10 @@ use std::sync::{
 
 use bansho_base::{
     assets::MemoryAssets,
-    image::{Frame, Image},
+    image::{Frame, Image, Rect},
     observer::{Observer, Stage, check},
     phenomenon::SnapshotError,
+    point_cloud::PointCloud,
 };
 use bansho_render::{Backend, Plan, PlanOptions, RenderError, Shot};
 
@@ -75,15 +76,11 @@ impl Shot for CounterShot {
     }
 
     fn read(&mut self) -> Option<Frame> {
-        let beauty = Image::filled(1, 1, [self.number as f32; 4]);
-        let header = self.plan.header(self.number);
-        std::mem::take(&mut self.drawn).then(|| Frame {
-            header,
-            beauty,
-            depth: None,
-            channels: Vec::new(),
-            opaque: false,
-        })
+        std::mem::take(&mut self.drawn).then(|| blank(&self.plan, self.number))
+    }
+
+    fn particles(&self) -> PointCloud {
+        PointCloud::default()
     }
 
     fn snapshot(&self) -> Vec<u8> {
@@ -95,6 +92,18 @@ impl Shot for CounterShot {
         self.number = i64::from_le_bytes(bytes);
         Ok(())
     }
+}
+
+/// A frame of one pixel.
+pub(super) fn frame(number: i64) -> Frame {
+    blank(&plan(), number)
+}
+
+fn blank(plan: &Plan, number: i64) -> Frame {
+    let beauty = Image::filled(1, 1, [number as f32; 4]);
+    let header = plan.header(number);
+    let content = Rect::of_size(1, 1);
+    Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false, figures: Vec::new(), content }
 }
 
 /// Remembers what it is told, and stops the work when asked to.
@@ -125,7 +134,7 @@ pub(super) struct Finisher<F> {
 }
 
 impl<F: Fn(usize, i64) -> Result<(), JobError> + Sync> Finish for Finisher<F> {
-    fn finish(&self, index: usize, frame: Frame, _observer: &dyn Observer) -> Result<(), JobError> {
+    fn finish(&self, index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
         (self.each)(index, frame.header.number)
     }
 

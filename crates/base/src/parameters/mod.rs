@@ -3,6 +3,7 @@
 //! A phenomenon lists its parameters once, with [`parameters!`](crate::parameters!): type, default, range, unit and
 //! documentation. Parser, located errors, schema, book, inspector and random scenes all read that one list.
 
+mod assets;
 mod keyed;
 mod kind;
 mod macros;
@@ -11,6 +12,7 @@ mod problem;
 mod sample;
 mod types;
 
+pub use assets::assets;
 pub use keyed::{CurveLimits, InterpolationName};
 pub use kind::{Choice, Descriptor, Kind, TableDescriptor};
 pub use node::{Entry, Node, Span, Table, Value};

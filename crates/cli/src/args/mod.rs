@@ -2,6 +2,8 @@
 
 mod flipbook;
 mod render;
+mod simulate;
+mod streaks;
 mod values;
 
 use std::path::PathBuf;
@@ -11,6 +13,8 @@ use clap::{Args, Parser, Subcommand};
 pub(crate) use self::{
     flipbook::FlipbookArgs,
     render::{RenderArgs, WorkArgs},
+    simulate::SimulateArgs,
+    streaks::StreaksArgs,
 };
 
 /// Flames, rain and aurora for pictures: image sequences with alpha to lay over a plate.
@@ -47,6 +51,10 @@ pub(crate) enum Command {
     Render(RenderArgs),
     /// Draw a scene as a flipbook for game engines: colour, alpha and motion sheets and a JSON.
     Flipbook(FlipbookArgs),
+    /// Write streak textures of rain with every drop's diameter, velocity and opacity.
+    Streaks(StreaksArgs),
+    /// Simulate a scene and write its particles, for other programs.
+    Simulate(SimulateArgs),
     /// Print a completion script for a shell.
     Completions(CompletionsArgs),
     /// Print the manual page, or write those of all commands.

@@ -47,6 +47,9 @@ pub(crate) struct RenderArgs {
     /// Write temperature, optical depth, motion and the like (.exr).
     #[arg(long, help_heading = "Output")]
     aovs: bool,
+    /// Write a JSON file beside each picture with figures of its frame, such as the rain rate and the visibility (.png, .exr).
+    #[arg(long, help_heading = "Output")]
+    figures: bool,
     /// One .png of N consecutive frames, from the first of --frames. [default out: out/SCENE/SCENE.sheet.png]
     #[arg(long, value_name = "N", help_heading = "Output")]
     contact_sheet: Option<usize>,
@@ -116,6 +119,7 @@ impl RenderArgs {
             loop_s: self.loop_s,
             layers: self.layers,
             aovs: self.aovs,
+            figures: self.figures,
             view: self.view,
             bits: self.bits,
             out: self.out.clone(),

@@ -2,7 +2,8 @@
 
 use bansho::{
     BitDepth, Rect, View,
-    job::BackendChoice,
+    job::{BackendChoice, StreakFormat},
+    models::rain::velocity::VelocityLaw,
     render::{
         frames::{self, FrameSpecError},
         scene::picture::LARGEST_SIDE,
@@ -29,7 +30,17 @@ pub(super) enum ValueError {
     Crop,
     #[error("allowed: a number of seconds, such as 4 or 2.5")]
     Seconds,
+    #[error("allowed: numbers with commas between, such as 1,5,10")]
+    Numbers,
+    #[error("allowed: a number of seconds, such as 0.02 or 1/30")]
+    Exposure,
+    #[error("allowed: three numbers with commas between, such as 0,1,-0.5")]
+    Vector,
 }
+
+/// Numbers with commas between.
+#[derive(Clone, Debug)]
+pub(crate) struct Numbers(pub(crate) Vec<f64>);
 
 /// Two whole numbers between 1 and `most`.
 fn pair(text: &str, most: usize) -> Option<[usize; 2]> {
@@ -56,6 +67,39 @@ pub(super) fn parse_crop(text: &str) -> Result<Rect, ValueError> {
 
 pub(super) fn parse_seconds(text: &str) -> Result<f64, ValueError> {
     text.parse().ok().filter(|seconds: &f64| seconds.is_finite()).ok_or(ValueError::Seconds)
+}
+
+/// Finite numbers; nothing where one is no number.
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    text.split(',').map(|number| number.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect()
+}
+
+pub(super) fn parse_numbers(text: &str) -> Result<Numbers, ValueError> {
+    numbers(text).map(Numbers).ok_or(ValueError::Numbers)
+}
+
+pub(super) fn parse_vector(text: &str) -> Result<[f64; 3], ValueError> {
+    numbers(text).and_then(|numbers| numbers.try_into().ok()).ok_or(ValueError::Vector)
+}
+
+/// A time, or a fraction as on a camera's dial.
+pub(super) fn parse_exposure(text: &str) -> Result<f64, ValueError> {
+    let number = |text: &str| text.trim().parse::<f64>().ok();
+    let seconds = match text.split_once('/') {
+        Some((over, under)) => number(over).zip(number(under)).map(|(over, under)| over / under),
+        None => number(text),
+    };
+    seconds.filter(|seconds| seconds.is_finite()).ok_or(ValueError::Exposure)
+}
+
+pub(super) fn velocity_parser() -> impl TypedValueParser<Value = VelocityLaw> {
+    let names = VelocityLaw::CHOICES.iter().map(|choice| choice.name);
+    PossibleValuesParser::new(names).map(|name| VelocityLaw::from_name(&name).unwrap_or_default())
+}
+
+pub(super) fn streak_format_parser() -> impl TypedValueParser<Value = StreakFormat> {
+    let names = StreakFormat::CHOICES.iter().map(|choice| choice.name);
+    PossibleValuesParser::new(names).map(|name| StreakFormat::from_name(&name).unwrap_or_default())
 }
 
 pub(super) fn view_parser() -> impl TypedValueParser<Value = View> {
@@ -96,6 +140,18 @@ mod tests {
         for bad in ["1,2,3", "1,2,0,4", "1,2,3,4,5", "-1,2,3,4", "a,b,c,d", ""] {
             assert!(parse_crop(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn lists_vectors_and_exposures_are_numbers() {
+        assert_eq!(parse_numbers("1, 2.5,-3").unwrap().0, [1.0, 2.5, -3.0]);
+        assert_eq!(parse_vector("0,0.5,-1").unwrap(), [0.0, 0.5, -1.0]);
+        assert_eq!((parse_exposure("1/50").unwrap(), parse_exposure("0.25").unwrap()), (0.02, 0.25));
+        for bad in ["", "1,", "a", "1;2", "nan", "1,inf"] {
+            assert!(parse_numbers(bad).is_err(), "{bad}");
+        }
+        assert!(parse_vector("1,2").is_err() && parse_vector("1,2,3,4").is_err());
+        assert!(["1/0", "1/", "/30", "fast", "1/2/3"].iter().all(|bad| parse_exposure(bad).is_err()));
     }
 
     #[test]

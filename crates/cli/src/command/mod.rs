@@ -7,6 +7,8 @@ pub(crate) mod man;
 pub(crate) mod new;
 pub(crate) mod render;
 pub(crate) mod schema;
+pub(crate) mod simulate;
+pub(crate) mod streaks;
 pub(crate) mod upgrade;
 
 use bansho::job::JobError;

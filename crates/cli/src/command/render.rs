@@ -6,6 +6,11 @@ use crate::{args::RenderArgs, progress};
 pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
     super::watched(&args.work, |watcher| {
         let summary = args.job()?.prepare()?.run(watcher)?;
-        Ok(progress::Result { drawn: summary.drawn, kept: summary.kept, files: vec![summary.first_file] })
+        Ok(progress::Result {
+            what: "frames",
+            drawn: summary.drawn,
+            kept: summary.kept,
+            files: vec![summary.first_file],
+        })
     })
 }

@@ -51,10 +51,10 @@ impl Bar {
 
     pub(super) fn done(&self, result: &Result, seconds: f64) {
         self.clear();
-        let Result { drawn, kept, files } = result;
+        let Result { what, drawn, kept, files } = result;
         let kept = if *kept > 0 { format!(", {kept} were there already") } else { String::new() };
         let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
         let rate = *drawn as f64 / seconds.max(1e-9);
-        to_stderr(&format!("{drawn} frames in {seconds:.2} s, {rate:.1} a second{kept}: {}", files.join(", ")));
+        to_stderr(&format!("{drawn} {what} in {seconds:.2} s, {rate:.1} a second{kept}: {}", files.join(", ")));
     }
 }

@@ -23,7 +23,7 @@ impl Json {
     }
 
     pub(super) fn done(&self, result: &Result, seconds: f64) {
-        let Result { drawn, kept, files } = result;
+        let Result { drawn, kept, files, .. } = result;
         let files: Vec<String> = files.iter().map(|file| shown(file)).collect();
         say(&json!({ "event": "done", "drawn": drawn, "kept": kept, "files": files, "seconds": seconds }));
     }

@@ -46,6 +46,8 @@ pub(crate) struct Watcher {
 
 /// What a job came to, for the last line.
 pub(crate) struct Result {
+    /// What was drawn, in the plural.
+    pub(crate) what: &'static str,
     pub(crate) drawn: usize,
     pub(crate) kept: usize,
     pub(crate) files: Vec<std::path::PathBuf>,

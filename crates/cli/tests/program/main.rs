@@ -3,8 +3,11 @@
 mod bad_input;
 mod commands;
 mod disk;
+mod figures;
 mod flipbook;
 mod interruptions;
+mod particles;
 mod pictures;
 mod rooms;
+mod streaks;
 mod support;

@@ -103,7 +103,7 @@ fn mark_srgb<W: std::io::Write>(encoder: &mut Encoder<'_, W>) {
     encoder.set_source_chromaticities(SourceChromaticities::new(white, red, green, blue));
 }
 
-fn set_effort<W: std::io::Write>(encoder: &mut Encoder<'_, W>, effort: PngEffort) {
+pub(super) fn set_effort<W: std::io::Write>(encoder: &mut Encoder<'_, W>, effort: PngEffort) {
     match effort {
         // Measured on a dithered flame of 1280 x 720: `Sub` is a fifth smaller than `Up` here, and the adaptive choice of
         // filters takes half as long again for the same size.

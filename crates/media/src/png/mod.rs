@@ -1,13 +1,17 @@
-//! PNG: display pixels with straight alpha, sRGB.
+//! PNG: display pixels with straight alpha, sRGB; and measured numbers, linear.
 
 pub(crate) mod checksum;
 pub(crate) mod chunk;
 mod encode;
+mod measured;
 
 pub(crate) use encode::encode_frame;
 pub use encode::{PngEffort, SIDE_LIMIT, encode};
+pub use measured::{MeasuredImage, Samples, encode_measured};
 
 /// Key of the text chunk that holds the fingerprint in hexadecimal digits.
 pub const KEY_FINGERPRINT: &str = "bansho:fingerprint";
 /// Key of the text chunk that holds Bansho's version.
 pub const KEY_VERSION: &str = "bansho:version";
+/// Key of the text chunk that holds the number which the largest code of a measured picture stands for.
+pub const KEY_SCALE: &str = "bansho:scale";

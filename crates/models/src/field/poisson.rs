@@ -17,7 +17,7 @@ const TASK_COLUMNS: usize = 64;
 ///
 /// The sine transform along x parts the equation into one tridiagonal system along z for each wave number, which elimination solves. The
 /// answer is that of converged relaxation, the aurora thesis (2.6), to rounding. A transform is fast if columns + 1 has small
-/// prime factors only: 255 is a good number of columns; 256 takes several times as long. Rows may be any number.
+/// prime factors only: 255 is a good number of columns; 256, where 257 is prime, takes twice as long. Rows may be any number.
 #[derive(Clone)]
 pub struct PoissonSolver {
     size: [usize; 2],

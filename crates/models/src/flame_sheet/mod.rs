@@ -15,13 +15,12 @@ mod glow;
 mod measure;
 mod moment;
 mod parameters;
-mod placement;
+pub(crate) mod placement;
 mod prepared;
 mod ramp;
 mod shade;
 mod shape;
 mod smoke;
-mod sparks;
 mod tables;
 mod texture;
 
@@ -36,7 +35,7 @@ use bansho_base::{
 
 pub use parameters::{
     ColourParameters, Colouring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters,
-    SmokeParameters, SparkParameters, StageShown, TextureKind, TextureParameters,
+    SmokeParameters, StageShown, TextureKind, TextureParameters,
 };
 pub use texture::{PaperTexture, paper_texture};
 
@@ -46,6 +45,8 @@ use moment::Motion;
 use ramp::Ramp;
 use shape::{Shape, instance_key};
 use texture::{FractalLayers, PaperLayer};
+
+pub use crate::sparks::SparkParameters;
 
 use crate::{
     fault::{FaultKind, ParameterFault},

@@ -6,6 +6,8 @@ use bansho_base::{
     parameters::{Auto, CurveLimits, Length, Range},
 };
 
+use crate::sparks::SparkParameters;
+
 const SHARE: Range = Range::new(0.0, 1.0);
 const KELVIN: Range = Range::new(600.0, 4000.0);
 
@@ -135,26 +137,6 @@ bansho_base::parameters! {
         glow: Curve = curve(&[[0.0, 0.0], [0.1, 0.12], [0.3, 1.0], [1.0, 1.0]]), limits(CurveLimits::default());
         /// Luminance of the blue light at the base, as a share of `luminance`.
         base_blue: f64 = 0.0, limits(SHARE);
-    }
-}
-
-bansho_base::parameters! {
-    /// Glowing sparks that the fire throws up.
-    pub struct SparkParameters {
-        /// How many a second and flame; 0 for none.
-        rate: f64 = 0.0, limits(Range::new(0.0, 1_000.0)), unit("1/s");
-        /// Speed at which they rise at first.
-        speed: f64 = 2.2, limits(Range::new(0.0, 100.0)), unit("m/s");
-        /// How much that differs between them, as a share.
-        spread: f64 = 0.5, limits(SHARE);
-        /// How far they swirl sideways.
-        swirl: f64 = 0.12, limits(Range::new(0.0, 100.0)), unit("m");
-        /// How long they glow.
-        life_s: f64 = 1.8, limits(Range::new(0.05, 20.0)), unit("s");
-        /// Their diameter.
-        size: f64 = 0.004, limits(Range::new(1e-5, 1.0)), unit("m");
-        /// Temperature at birth; they cool to 900 K.
-        temperature_k: f64 = 1750.0, limits(Range::new(900.0, 4000.0)), unit("K");
     }
 }
 

@@ -119,15 +119,35 @@ impl Mapping {
 }
 
 impl Mapping {
+    /// Sheet coordinates and depth at a place of the picture; `None` where it does not see the sheet's plane.
+    #[inline(always)]
+    pub(crate) fn at(&self, px: f64, py: f64) -> Option<[f64; 3]> {
+        match self {
+            Self::Rays { camera, stand } => meet(camera, stand, px, py),
+            Self::Linear { forms, near } => {
+                let [x, y, inverse] = forms.map(|[constant, column, row]| column * px + row * py + constant);
+                let seen = inverse > 0.0 && inverse * near <= 1.0;
+                seen.then(|| [x / inverse, y / inverse, 1.0 / inverse])
+            }
+        }
+    }
+
+    /// x/depth, y/depth and 1/depth at a place of the picture and their steps a column; `None` where they are not linear.
+    #[inline(always)]
+    pub(crate) fn along_row(&self, px: f64, py: f64) -> Option<[[f64; 2]; 3]> {
+        match self {
+            Self::Rays { .. } => None,
+            Self::Linear { forms, .. } => {
+                Some(forms.map(|[constant, column, row]| [column * px + row * py + constant, column]))
+            }
+        }
+    }
+
     /// The sheet coordinates of one pixel, where they are cheap to know.
     #[inline(always)]
     pub(crate) fn glance(&self, column: usize, row: usize) -> Option<[f32; 2]> {
-        let Self::Linear { forms, near } = self else { return None };
-        let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
-        let value = |[constant, a, b]: [f64; 3]| a * px + b * py + constant;
-        let inverse = value(forms[2]);
-        (inverse > 0.0 && inverse * near <= 1.0)
-            .then(|| [value(forms[0]) / inverse, value(forms[1]) / inverse].map(|v| v as f32))
+        let Self::Linear { .. } = self else { return None };
+        self.at(column as f64 + 0.5, row as f64 + 0.5).map(|[x, y, _]| [x as f32, y as f32])
     }
 }
 

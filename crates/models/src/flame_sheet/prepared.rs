@@ -9,6 +9,8 @@ use bansho_base::{
 };
 use fearless_simd::Level;
 
+use crate::sparks::{Fire, Streak};
+
 use super::{
     FlameSheet,
     draw::{Paint, band_of, draw_rows},
@@ -17,7 +19,6 @@ use super::{
     parameters::StageShown,
     placement::Stand,
     shade::{Drawn, Sample},
-    sparks::Streak,
 };
 
 /// A frame, ready to draw in strips.
@@ -81,9 +82,24 @@ impl FlameSheet {
         if let Some((sample, rect)) = self.smoke_sample(flame, view, surroundings) {
             parts.push(Part { flame, depth, rect, matter: Matter::Sheet(Drawn::Smoke, vec![sample]) });
         }
-        for streak in self.streaks(flame, view, surroundings.wind) {
+        for streak in self.fire(flame, view).streaks(view, surroundings.wind) {
             let rect = streak.bounds(view.size);
             parts.push(Part { flame, depth: streak.depth, rect, matter: Matter::Spark(streak) });
+        }
+    }
+
+    /// The fire whose sparks fly.
+    fn fire(&self, flame: &Flame, view: &View) -> Fire<'_> {
+        let t = view.shutter.middle();
+        Fire {
+            parameters: &self.parameters.sparks,
+            key: flame.key,
+            now: self.clock.time(self.flame_time(flame, t)),
+            loop_s: self.clock.loop_s(),
+            base: self.base(flame, t),
+            size: self.sheet_size(flame),
+            scale: flame.place.scale,
+            wind_response: self.parameters.wind_response,
         }
     }
 

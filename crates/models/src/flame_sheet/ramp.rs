@@ -10,7 +10,7 @@ use super::{
     shape::from_origin,
     tables::CurvePair,
 };
-use crate::fault::ParameterFault;
+use crate::{blue_flame, fault::ParameterFault};
 
 /// Steps of T1; finer than a display can show, so that the nearest serves.
 const LEVELS: usize = 4096;
@@ -91,7 +91,7 @@ impl Ramp {
             light: levels(light),
             temperature: CurvePair::new(|t1| [temperature(colour, sharpen.eval(t1)), 0.0]),
             absorbs: colour.soot_optical_depth > 0.0 || stage != StageShown::Flame,
-            base_blue: base_blue().map(|value| value * colour.base_blue as f32),
+            base_blue: blue_flame::colour().map(|value| value * colour.base_blue as f32),
         })
     }
 }
@@ -113,11 +113,4 @@ impl Ramp {
         nearest_whole(place).store_slice(&mut index);
         fetch(t1.simd, &self.light, &index)
     }
-}
-
-/// Colour of the CH (431 nm) and C2 (516 nm) bands of burning gas, ACEScg of luminance 1.
-fn base_blue() -> [f32; 3] {
-    let (ch, c2) = (color::line_xyz(431.0), color::line_xyz(516.0));
-    let xyz: [f64; 3] = std::array::from_fn(|i| ch[i] + 0.3 * c2[i]);
-    color::acescg_from_xyz(xyz.map(|value| value / xyz[1]))
 }

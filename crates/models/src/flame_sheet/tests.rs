@@ -1,6 +1,7 @@
 //! The whole sheet: valid parameters of every kind, agreement between ways of drawing, loops, light.
 
 use bansho_base::{
+    air::Air,
     animation::Animated,
     camera::{CameraParameters, Lens},
     canvas::{DepthInterval, Shutter, Strip, View},

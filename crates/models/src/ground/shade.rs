@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use bansho_base::{
     canvas::{DepthInterval, Strip, View},
     image::{Image, Rect},
-    math::{DVec2, DVec3},
+    math::{self, DVec2, DVec3},
     phenomenon::Prepared,
     surroundings::Surroundings,
 };
@@ -44,7 +44,7 @@ struct Hit {
     depth: f64,
     /// Cosine between line of sight and normal.
     cos: f64,
-    /// Length of ground that the pixel covers, along the line of sight, m.
+    /// Length of ground that the pixel covers, the mean of along and across the line of sight, m.
     footprint: f64,
     /// Share of the pixel below the horizon.
     coverage: f64,
@@ -65,7 +65,7 @@ impl PreparedGround<'_> {
         let cos = cos.max(0.5 / camera.focal_pixels);
         let distance = (drop / cos).min(HORIZON * 0.5);
         let depth = distance / length;
-        let footprint = distance / (camera.focal_pixels * cos.max(1e-3));
+        let footprint = distance / (camera.focal_pixels * math::sqrt(cos.max(1e-6)));
         Some(Hit { pixel, point: camera.position + direction * depth, depth, cos, footprint, coverage })
     }
 

@@ -11,6 +11,10 @@ use super::parameters::GroundParameters;
 
 /// Octaves of the ground's texture, each half as large and as strong as the one before.
 const OCTAVES: usize = 8;
+/// Strength of an octave over that of the one before. Soil and asphalt have most of their contrast in their grain.
+const GAIN: f64 = 1.05;
+/// Height of an octave over that of the one before.
+const RELIEF_GAIN: f64 = 0.6;
 /// One octave at a time, so that each can fade where it is too small to be seen.
 const SINGLE: Fractal = Fractal { octaves: 1, lacunarity: 2, gain: 0.5 };
 
@@ -48,29 +52,29 @@ impl Surface {
 
     /// The ground at a `place` (x, z), of which a pixel covers `footprint` m.
     pub(super) fn at(&self, place: DVec2, footprint: f64) -> Patch {
-        let mut pattern = 0.0;
-        let (mut size, mut strength) = (self.size, 1.0);
+        let (mut grain, mut relief) = (0.0, 0.0);
+        let (mut size, mut strength, mut height) = (self.size, 0.45_f64, 1.0_f64);
         for octave in &self.octaves {
             let seen = math::smoothstep(1.0, 3.0, size / footprint.max(1e-9));
             if seen <= 0.0 {
                 break;
             }
             let coordinates = [place.x / size, place.y / size].map(Coordinate::from_f64);
-            pattern += seen * strength * f64::from(octave.at(coordinates));
-            size *= 0.5;
-            strength *= 0.72;
+            let value = seen * f64::from(octave.at(coordinates));
+            (grain, relief) = (strength.mul_add(value, grain), height.mul_add(value, relief));
+            (size, strength, height) = (0.5 * size, GAIN * strength, RELIEF_GAIN * height);
         }
-        let shade = math::exp(self.texture * pattern) as f32;
-        Patch { albedo: self.albedo.map(|value| (value * shade).min(1.0)), puddle: self.puddle(pattern, footprint) }
+        let shade = math::exp(self.texture * grain) as f32;
+        Patch { albedo: self.albedo.map(|value| (value * shade).min(1.0)), puddle: self.puddle(relief, footprint) }
     }
 
     /// Water stands where the ground lies low. Far away only the mean share is seen.
-    fn puddle(&self, pattern: f64, footprint: f64) -> f64 {
-        // The pattern is roughly normal with this deviation; its quantile at a share p is near the logistic's.
-        const DEVIATION: f64 = 0.36;
+    fn puddle(&self, relief: f64, footprint: f64) -> f64 {
+        // The relief is roughly normal with this deviation; its quantile at a share p is near the logistic's.
+        const DEVIATION: f64 = 0.34;
         let share = self.puddles.clamp(1e-6, 1.0 - 1e-6);
         let level = DEVIATION * math::ln(share / (1.0 - share)) / 1.7;
-        let near = 1.0 - math::smoothstep(level - 0.12, level + 0.12, pattern);
+        let near = 1.0 - math::smoothstep(level - 0.12, level + 0.12, relief);
         let seen = math::smoothstep(1.0, 3.0, self.size / footprint.max(1e-9));
         math::lerp(self.puddles, near, seen)
     }

@@ -6,10 +6,17 @@
 
 use std::ops::Range;
 
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+
+use super::{batch::BATCH, stretch::Stretch};
+
 /// Cells further than this from the origin, in cells, are taken together; so a key of three axes fits 64 bits.
 const FARTHEST: i32 = 1 << 19;
 /// Cells are this much wider than the support radius, so that rounding never puts two neighbours two cells apart.
 const MARGIN: f32 = 1.001;
+/// Where particles are put that are farther away or nowhere; squares of such distances are still finite.
+pub(super) const BEYOND: f32 = 1e12;
 /// Bits sorted by in one pass.
 const DIGIT_BITS: u32 = 11;
 
@@ -21,15 +28,26 @@ pub struct Cells<const D: usize> {
     /// For each sorted slot the index it was given at.
     order: Vec<u32>,
     ids: Vec<u64>,
+    /// Positions by slot.
     positions: [Vec<f32>; D],
     occupied: Vec<Cell>,
+    stretches: Vec<Stretch>,
 }
 
-/// A cell that holds particles: its key and its first particle. The last of the list is a sentinel behind all.
+/// Particles that follow each other in slots: those of up to three cells of a row.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Run {
+    pub(super) particles: Range<usize>,
+    /// Slot of the first.
+    pub(super) slot: usize,
+}
+
+/// A cell that holds particles: its key, its first particle and the slot of that. The last of the list is a sentinel behind all.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
     key: u64,
     start: u32,
+    slot: usize,
 }
 
 /// How coordinates of cells become keys that sort by the last axis first and by x last.
@@ -53,7 +71,16 @@ impl<const D: usize> Keys<D> {
     }
 
     fn key(&self, cell: [i32; D]) -> u64 {
-        (0..D).fold(0, |key, c| key | ((cell[c] - self.lower[c]) as u64) << self.shift[c])
+        let mut key = 0;
+        for c in 0..D {
+            key |= ((cell[c] - self.lower[c]) as u64) << self.shift[c];
+        }
+        key
+    }
+
+    /// The row of a cell: what its key says but for x.
+    fn row(&self, key: u64) -> u64 {
+        key >> self.shift[1]
     }
 
     /// What the key of the same x in each neighbouring row adds, wrapping.
@@ -75,7 +102,8 @@ impl<const D: usize> Cells<D> {
         const { assert!(D == 2 || D == 3, "particles live in two or three dimensions") };
         let none = || std::array::from_fn(|_| Vec::new());
         let keys = Keys::new([0; D], [0; D]);
-        Self { support_radius, keys, order: Vec::new(), ids: Vec::new(), positions: none(), occupied: Vec::new() }
+        let (order, ids, occupied, stretches) = Default::default();
+        Self { support_radius, keys, order, ids, positions: none(), occupied, stretches }
     }
 
     /// The distance from which on particles do not see each other.
@@ -99,47 +127,67 @@ impl<const D: usize> Cells<D> {
     /// Sorts particles by cell, then by birth id, and remembers where they are. [`Cells::reorder`] then brings arrays into that order.
     ///
     /// # Panics
-    /// If there are more than 2^32 - 1 of them, or positions and ids are not equally many.
+    /// If there are more than 2^28 of them, or positions and ids are not equally many.
     pub fn assign(&mut self, positions: [&[f32]; D], ids: &[u64]) {
-        assert!(u32::try_from(ids.len()).is_ok(), "particles are counted in 32 bits");
+        assert!(ids.len() <= 1 << 28, "slots are counted in 32 bits");
         assert!(positions.iter().all(|component| component.len() == ids.len()), "one position an id");
         let scale = 1.0 / (self.support_radius * MARGIN);
-        let cell = |value: f32| ((value * scale).floor() as i32).clamp(-FARTHEST, FARTHEST);
-        let bounds = positions.map(|component| {
-            component
-                .iter()
-                .fold((i32::MAX, i32::MIN), |(low, high), value| (low.min(cell(*value)), high.max(cell(*value))))
+        let mut coordinates: [Vec<i32>; D] = std::array::from_fn(|_| Vec::new());
+        coordinates.par_iter_mut().zip(positions).for_each(|(cells, component)| {
+            dispatch!(Level::new(), _simd => cells_along(component, scale, cells));
         });
         if ids.is_empty() {
             self.order.clear();
             self.occupied.clear();
         } else {
-            self.keys = Keys::new(bounds.map(|bound| bound.0), bounds.map(|bound| bound.1));
-            let keys = self.keys;
-            let key = |i: usize| keys.key(positions.map(|component| cell(component[i])));
-            self.sort((0..ids.len()).map(key).collect(), ids);
+            let bound =
+                |c: usize, pick: fn(i32, i32) -> i32| coordinates[c].iter().copied().fold(coordinates[c][0], pick);
+            self.keys =
+                Keys::new(std::array::from_fn(|c| bound(c, i32::min)), std::array::from_fn(|c| bound(c, i32::max)));
+            self.sort(&coordinates, ids);
         }
-        self.positions = positions.map(|component| self.order.iter().map(|i| component[*i as usize]).collect());
-        self.ids = self.order.iter().map(|i| ids[*i as usize]).collect();
+        let within = |x: f32| if x.abs() < BEYOND { x } else { BEYOND };
+        let mut slots = std::mem::replace(&mut self.positions, std::array::from_fn(|_| Vec::new()));
+        slots.par_iter_mut().zip(positions).for_each(|(to, from)| {
+            self.fill_slots(to, -BEYOND, |particle| within(from[self.order[particle] as usize]));
+        });
+        self.positions = slots;
+        self.ids.clear();
+        self.ids.extend(self.order.iter().map(|i| ids[*i as usize]));
+        let mut stretches = std::mem::take(&mut self.stretches);
+        self.find_stretches(&mut stretches);
+        self.stretches = stretches;
     }
 
     /// Sorts by key, then by id, and lists the cells.
-    fn sort(&mut self, keys: Vec<u64>, ids: &[u64]) {
-        let mut sorted: Vec<(u64, u32)> = keys.into_iter().zip(0..).collect();
+    fn sort(&mut self, coordinates: &[Vec<i32>; D], ids: &[u64]) {
+        let mut sorted = Vec::with_capacity(ids.len());
+        for i in 0..ids.len() {
+            let mut cell = [0; D];
+            for c in 0..D {
+                cell[c] = coordinates[c][i];
+            }
+            sorted.push((self.keys.key(cell), i as u32));
+        }
         let mut spare = sorted.clone();
         for shift in (0..self.keys.bits).step_by(DIGIT_BITS as usize) {
             counting_pass(&sorted, &mut spare, shift);
             std::mem::swap(&mut sorted, &mut spare);
         }
         self.occupied.clear();
-        let mut start = 0;
+        let (mut start, mut slot, mut row) = (0, 0, self.keys.row(sorted[0].0));
         for cell in sorted.chunk_by_mut(|a, b| a.0 == b.0) {
             cell.sort_unstable_by_key(|entry| ids[entry.1 as usize]);
-            self.occupied.push(Cell { key: cell[0].0, start });
-            start += cell.len() as u32;
+            let key = cell[0].0;
+            if self.keys.row(key) != row {
+                (slot, row) = (slot + BATCH, self.keys.row(key));
+            }
+            self.occupied.push(Cell { key, start, slot });
+            (start, slot) = (start + cell.len() as u32, slot + cell.len());
         }
-        self.occupied.push(Cell { key: u64::MAX, start });
-        self.order = sorted.into_iter().map(|entry| entry.1).collect();
+        self.occupied.push(Cell { key: u64::MAX, start, slot: slot + BATCH });
+        self.order.clear();
+        self.order.extend(sorted.iter().map(|entry| entry.1));
     }
 
     /// Brings values, given in the order of [`Cells::assign`], into the sorted order.
@@ -156,9 +204,29 @@ impl<const D: usize> Cells<D> {
         &self.ids
     }
 
-    /// Positions in sorted order, one array a component.
+    /// Positions by slot, one array a component.
     pub(super) fn positions(&self) -> [&[f32]; D] {
         self.positions.each_ref().map(Vec::as_slice)
+    }
+
+    /// Puts the value of each particle into its slot and `empty` into the others.
+    pub(super) fn fill_slots(&self, slots: &mut Vec<f32>, empty: f32, value: impl Fn(usize) -> f32) {
+        slots.clear();
+        for pair in self.occupied.windows(2) {
+            slots.extend((pair[0].start as usize..pair[1].start as usize).map(&value));
+            slots.resize(pair[1].slot, empty);
+        }
+    }
+
+    /// All cells, in stretches.
+    pub(super) fn stretches(&self) -> &[Stretch] {
+        &self.stretches
+    }
+
+    /// The particle in a slot that is not empty.
+    pub(super) fn particle_in(&self, slot: usize) -> usize {
+        let cell = self.occupied[self.occupied.partition_point(|cell| cell.slot <= slot) - 1];
+        cell.start as usize + slot - cell.slot
     }
 
     /// Number of cells that hold particles.
@@ -171,13 +239,13 @@ impl<const D: usize> Cells<D> {
         self.occupied[cells.start].start as usize..self.occupied[cells.end].start as usize
     }
 
-    /// For each of a range of cells in turn: its particles, and the runs of particles in it and its neighbours.
-    pub(super) fn visit(&self, cells: Range<usize>, mut visitor: impl FnMut(Range<usize>, &[Range<usize>])) {
+    /// For each of a range of cells in turn: its particles, and the runs of its candidates.
+    pub(super) fn visit(&self, cells: Range<usize>, mut visitor: impl FnMut(Run, &[Run])) {
         let Some(first) = self.occupied.get(cells.start) else { return };
         // Where each neighbouring row has got to; rows move on with the cells, so all searching is one pass.
         let from = |row: u64| (row, self.occupied.partition_point(|cell| cell.key < first.key.wrapping_add(row) - 1));
         let mut rows: Vec<(u64, usize)> = self.keys.rows().map(from).collect();
-        let mut runs = vec![0..0; rows.len()];
+        let mut runs = vec![Run::default(); rows.len()];
         for index in cells {
             let key = self.occupied[index].key;
             for (run, (row, cursor)) in runs.iter_mut().zip(&mut rows) {
@@ -189,10 +257,23 @@ impl<const D: usize> Cells<D> {
                 while self.occupied[end].key <= centre + 1 {
                     end += 1;
                 }
-                *run = self.occupied[*cursor].start as usize..self.occupied[end].start as usize;
+                *run = Run { particles: self.particles(*cursor..end), slot: self.occupied[*cursor].slot };
             }
-            visitor(self.particles(index..index + 1), &runs);
+            let own = Run { particles: self.particles(index..index + 1), slot: self.occupied[index].slot };
+            visitor(own, &runs);
         }
+    }
+}
+
+/// The cells of coordinates, `scale` cells a unit. No `floor`: where the processor lacks it that is a call.
+#[inline(always)]
+fn cells_along(component: &[f32], scale: f32, cells: &mut Vec<i32>) {
+    let farthest = FARTHEST as f32;
+    cells.resize(component.len(), 0);
+    for (cell, value) in cells.iter_mut().zip(component) {
+        let place = (value * scale).clamp(-farthest, farthest);
+        let whole = place as i32;
+        *cell = whole - i32::from(whole as f32 > place);
     }
 }
 

@@ -17,7 +17,11 @@ impl<K: SmoothingKernel<D>, const D: usize, const N: usize> PairTerm<D, N, N> fo
     #[inline(always)]
     fn term<R: Real>(&self, pair: &Pair<R, D>, own: &[R; N], other: &[R; N]) -> [R; N] {
         let weight = other[0] * self.0.value(pair.distance_squared);
-        std::array::from_fn(|k| if k == 0 { weight } else { weight * (other[k] - own[k]) })
+        let mut sums = [weight; N];
+        for k in 1..N {
+            sums[k] = weight * (other[k] - own[k]);
+        }
+        sums
     }
 }
 

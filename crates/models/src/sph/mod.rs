@@ -21,6 +21,7 @@
 //! ```
 //! Anything else that is a sum over neighbours is a [`PairTerm`] for [`Cells::sum`].
 
+mod batch;
 mod cells;
 mod density;
 mod kernel;
@@ -28,6 +29,7 @@ mod mixing;
 mod particles;
 mod pressure;
 mod step;
+mod stretch;
 mod sum;
 #[cfg(test)]
 mod tests;

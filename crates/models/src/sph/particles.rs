@@ -1,5 +1,8 @@
 //! What smoothed particles are made of.
 
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+
 use super::cells::Cells;
 
 /// Particles in `D` dimensions as arrays, one entry a particle.
@@ -60,22 +63,23 @@ impl<const D: usize> Particles<D> {
     /// Afterwards bring arrays of your own into the same order with [`Cells::reorder`].
     pub fn sort(&mut self, cells: &mut Cells<D>) {
         cells.assign(self.positions.each_ref().map(Vec::as_slice), &self.ids);
-        self.positions.iter_mut().chain(&mut self.velocities).for_each(|values| cells.reorder(values));
-        cells.reorder(&mut self.masses);
-        cells.reorder(&mut self.ids);
+        let arrays = self.positions.iter_mut().chain(&mut self.velocities).chain([&mut self.masses]);
+        let arrays: Vec<&mut Vec<f32>> = arrays.collect();
+        arrays.into_par_iter().for_each(|values| cells.reorder(values));
+        self.ids.copy_from_slice(cells.ids());
     }
 
     /// Greatest speed of all; 0 without particles.
     #[must_use]
     pub fn greatest_speed(&self) -> f32 {
-        let squared = |i: usize| self.velocities.iter().fold(0.0_f32, |sum, v| v[i].mul_add(v[i], sum));
+        let squared = |i: usize| self.velocities.iter().fold(0.0_f32, |sum, v| sum + v[i] * v[i]);
         (0..self.len()).map(squared).fold(0.0, f32::max).sqrt()
     }
 
     /// Shortens every velocity above `limit` to it. What is not a number becomes rest.
     pub fn bound_speed(&mut self, limit: f32) {
         for i in 0..self.len() {
-            let squared = self.velocities.iter().fold(0.0_f32, |sum, v| v[i].mul_add(v[i], sum));
+            let squared = self.velocities.iter().fold(0.0_f32, |sum, v| sum + v[i] * v[i]);
             if squared <= limit * limit {
                 continue;
             }
@@ -91,14 +95,20 @@ impl<const D: usize> Particles<D> {
     /// # Panics
     /// If `accelerations` are not one a particle.
     pub fn advance(&mut self, accelerations: &[Vec<f32>; D], seconds: f32) {
+        let level = Level::new();
         for c in 0..D {
             assert_eq!(accelerations[c].len(), self.len(), "one acceleration a particle");
-            let moved = self.positions[c].iter_mut().zip(&mut self.velocities[c]).zip(&accelerations[c]);
-            moved.for_each(|((position, velocity), acceleration)| {
-                *velocity = acceleration.mul_add(seconds, *velocity);
-                *position = velocity.mul_add(seconds, *position);
-            });
+            let (positions, velocities) = (&mut self.positions[c], &mut self.velocities[c]);
+            dispatch!(level, _simd => advance(positions, velocities, &accelerations[c], seconds));
         }
+    }
+}
+
+#[inline(always)]
+fn advance(positions: &mut [f32], velocities: &mut [f32], accelerations: &[f32], seconds: f32) {
+    for ((position, velocity), acceleration) in positions.iter_mut().zip(velocities).zip(accelerations) {
+        *velocity = acceleration.mul_add(seconds, *velocity);
+        *position = velocity.mul_add(seconds, *position);
     }
 }
 

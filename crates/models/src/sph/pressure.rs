@@ -17,7 +17,7 @@ bansho_base::choice! {
     }
 }
 
-/// `-(a_i + a_j) b_j` times the gradient of W, b_j above 0: one term for both forms.
+/// `(a_i + a_j) b_j` times the gradient of W: one term for both forms.
 struct PressureTerm<K>(K);
 
 impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 2, D> for PressureTerm<K> {
@@ -25,9 +25,12 @@ impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 2, D> for PressureTerm<K
 
     #[inline(always)]
     fn term<R: Real>(&self, pair: &Pair<R, D>, own: &[R; 2], other: &[R; 2]) -> [R; D] {
-        let factor = other[1].like(0.0) - self.0.gradient_factor(pair.distance_squared);
-        let push = (own[0] + other[0]) * other[1] * factor;
-        pair.offset.map(|component| component * push)
+        let pull = (own[0] + other[0]) * other[1] * self.0.gradient_factor(pair.distance_squared);
+        let mut components = pair.offset;
+        for component in &mut components {
+            *component = *component * pull;
+        }
+        components
     }
 }
 
@@ -82,10 +85,11 @@ impl PressureForce {
             KernelShape::Spiky => cells.sum(&PressureTerm(Spiky::<D>::new(support)), fields, results),
             KernelShape::CubicSpline => cells.sum(&PressureTerm(CubicSpline::<D>::new(support)), fields, results),
         }
-        if form == PressureForm::Averaged {
-            for component in accelerations {
-                component.iter_mut().zip(densities).for_each(|(value, density)| *value *= 0.5 / density);
-            }
+        for component in accelerations {
+            component.iter_mut().zip(densities).for_each(|(value, density)| match form {
+                PressureForm::Averaged => *value *= -0.5 / density,
+                PressureForm::Balanced => *value = -*value,
+            });
         }
     }
 }

@@ -1,23 +1,25 @@
 //! Sums over the neighbours of every particle: the one loop that density, forces and whatever a model adds run in.
 //!
-//! For each cell the particles of it and its neighbours are gathered once, side by side; then each particle of the cell goes
-//! through them sixteen at a time. There is no list of neighbours: rejecting the six candidates out of seven that are too far costs less
-//! than storing and fetching the seventh. A sum depends on who is in the neighbouring cells alone, not on threads.
+//! Each particle of a cell goes through the candidates of the cell eight at a time, leaving out batches in which it has no neighbour. There is no list of neighbours: rejecting
+//! candidates within a batch costs less than storing and fetching the others one by one. A sum depends on who is in the
+//! neighbouring cells alone, not on threads.
 
-use std::ops::Range;
-
-use bansho_base::math;
-use bansho_base::random::{murmur3, uniform};
+use bansho_base::{
+    math,
+    random::{murmur3, uniform},
+};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-use super::cells::Cells;
-use crate::lanes::{LANES, Lanes, Real};
+use super::{
+    batch::{BATCH, cut, difference, load, pick, spread, squared},
+    cells::Cells,
+    stretch::{Group, Stretch},
+};
+use crate::lanes::{HalfLanes, Real};
 
 /// Particles closer than this share of the support radius count as coincident.
 const COINCIDENT: f32 = 1e-6;
-/// Particles a task of the thread pool holds at least.
-const TASK: usize = 256;
 
 /// Where a neighbour is.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +40,8 @@ pub trait PairTerm<const D: usize, const IN: usize, const OUT: usize>: Sync {
 
     /// What a neighbour with the values `other` adds to the sums of a particle with the values `own`.
     ///
-    /// Mark it `#[inline(always)]`. It is also called for candidates too far to count, whose result is dropped.
+    /// Mark it `#[inline(always)]`, and loop over arrays in place of `map`, whose closure would not become vector code. It is also called for candidates too far to count, with the squared distance held to that of the
+    /// support radius; such a result is multiplied by 0, so it must be finite.
     fn term<R: Real>(&self, pair: &Pair<R, D>, own: &[R; IN], other: &[R; IN]) -> [R; OUT];
 }
 
@@ -63,144 +66,117 @@ impl<const D: usize> Cells<D> {
             values.resize(self.len(), 0.0);
             values.as_mut_slice()
         });
-        let level = Level::new();
-        let visit = |gathered: &mut Gathered<D, IN>, mut task: Task<'_, OUT>| {
-            self.visit(task.cells.clone(), |particles, runs| {
-                gathered.fill(self, &fields, runs);
-                let own = Own { cells: self, fields: &fields, runs, gathered: &*gathered };
-                let results = task.results.each_mut().map(|values| {
-                    let (head, tail) = std::mem::take(values).split_at_mut(particles.len());
-                    *values = tail;
-                    head
-                });
-                dispatch!(level, simd => sum_cell(simd, term, &own, particles, results));
-            });
-        };
-        tasks(self, results).into_par_iter().for_each_init(Gathered::new, visit);
+        let mut slots: [Vec<f32>; IN] = std::array::from_fn(|_| Vec::new());
+        slots
+            .par_iter_mut()
+            .zip(fields)
+            .for_each(|(slots, field)| self.fill_slots(slots, 0.0, |particle| field[particle]));
+        let (level, fields) = (Level::new(), slots.each_ref().map(Vec::as_slice));
+        let tasks = self.stretches().iter().zip(split(self.stretches(), results)).collect::<Vec<_>>();
+        tasks.into_par_iter().for_each(|(stretch, results)| {
+            let around = Around { cells: self, stretch, positions: self.positions(), fields };
+            dispatch!(level, simd => sum_stretch(simd, term, &around, results));
+        });
     }
 }
 
-/// A stretch of cells and where the results of their particles go.
-struct Task<'a, const OUT: usize> {
-    cells: Range<usize>,
-    results: [&'a mut [f32]; OUT],
-}
-
-/// Parts the cells into stretches of about as many particles.
-fn tasks<'a, const D: usize, const OUT: usize>(
-    cells: &Cells<D>,
-    mut results: [&'a mut [f32]; OUT],
-) -> Vec<Task<'a, OUT>> {
-    let mut tasks = Vec::with_capacity(cells.len() / TASK + 1);
-    let mut first = 0;
-    for next in 1..=cells.count() {
-        let count = cells.particles(first..next).len();
-        if count < TASK && next < cells.count() {
-            continue;
-        }
-        let results = results.each_mut().map(|values| {
-            let (head, tail) = std::mem::take(values).split_at_mut(count);
+/// The part of each array that belongs to each stretch.
+fn split<'a, const OUT: usize>(
+    stretches: &[Stretch],
+    mut arrays: [&'a mut [f32]; OUT],
+) -> impl Iterator<Item = [&'a mut [f32]; OUT]> {
+    stretches.iter().map(move |stretch| {
+        arrays.each_mut().map(|values| {
+            let (head, tail) = std::mem::take(values).split_at_mut(stretch.len());
             *values = tail;
             head
-        });
-        tasks.push(Task { cells: first..next, results });
-        first = next;
-    }
-    tasks
+        })
+    })
 }
 
-/// Particles of a cell and its neighbours side by side, filled up to whole batches with particles infinitely far away.
-struct Gathered<const D: usize, const IN: usize> {
-    positions: [Vec<f32>; D],
-    fields: [Vec<f32>; IN],
-}
-
-impl<const D: usize, const IN: usize> Gathered<D, IN> {
-    fn new() -> Self {
-        Self { positions: std::array::from_fn(|_| Vec::new()), fields: std::array::from_fn(|_| Vec::new()) }
-    }
-
-    fn fill(&mut self, cells: &Cells<D>, fields: &[&[f32]; IN], runs: &[Range<usize>]) {
-        let gather = |to: &mut Vec<f32>, from: &[f32], filler: f32| {
-            to.clear();
-            runs.iter().for_each(|run| to.extend_from_slice(&from[run.clone()]));
-            to.resize(to.len().next_multiple_of(LANES), filler);
-        };
-        let places = self.positions.iter_mut().zip(cells.positions());
-        places.for_each(|(to, from)| gather(to, from, f32::INFINITY));
-        self.fields.iter_mut().zip(fields).for_each(|(to, from)| gather(to, from, 0.0));
-    }
-}
-
-/// What the sums of a cell read.
-struct Own<'a, const D: usize, const IN: usize> {
+/// What the sums of a stretch read: where its candidates are, and positions and fields by slot.
+struct Around<'a, const D: usize, const IN: usize> {
     cells: &'a Cells<D>,
-    fields: &'a [&'a [f32]; IN],
-    runs: &'a [Range<usize>],
-    gathered: &'a Gathered<D, IN>,
+    stretch: &'a Stretch,
+    positions: [&'a [f32]; D],
+    fields: [&'a [f32]; IN],
 }
 
-/// Sums for all particles of a cell.
+/// Sums for all particles of a stretch.
 #[inline(always)]
-fn sum_cell<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
+fn sum_stretch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
-    own: &Own<'_, D, IN>,
-    particles: Range<usize>,
+    around: &Around<'_, D, IN>,
     results: [&mut [f32]; OUT],
 ) where
     T: PairTerm<D, IN, OUT>,
 {
-    for (slot, i) in particles.enumerate() {
-        let position = own.cells.positions().map(|component| component[i]);
-        let values = own.fields.map(|field| field[i]);
-        let (mut sums, coincident) = sum_one(simd, term, own, position, values);
-        if T::DIRECTED && coincident > 1.5 {
-            let more = sum_coincident(term, own, i);
-            sums = std::array::from_fn(|k| sums[k] + more[k]);
-        }
-        for k in 0..OUT {
-            results[k][slot] = sums[k];
+    let mut index = 0;
+    for group in &around.stretch.groups {
+        for slot in group.slot..group.slot + group.particles.len() {
+            let (mut sums, coincident) = sum_one(simd, term, around, group, slot, around.stretch.hits[index]);
+            if T::DIRECTED && coincident > 1.5 {
+                let more = sum_coincident(term, around, group, slot);
+                for k in 0..OUT {
+                    sums[k] += more[k];
+                }
+            }
+            for k in 0..OUT {
+                results[k][index] = sums[k];
+            }
+            index += 1;
         }
     }
 }
 
-/// Sums for one particle, and how many candidates coincide with it, itself included (counted for directed terms only).
+/// Sums for the particle in a slot, and how many candidates coincide with it, itself included (counted for directed terms only).
 #[inline(always)]
 fn sum_one<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
-    own: &Own<'_, D, IN>,
-    position: [f32; D],
-    values: [f32; IN],
+    around: &Around<'_, D, IN>,
+    group: &Group,
+    slot: usize,
+    mut hits: u64,
 ) -> ([f32; OUT], f32)
 where
     T: PairTerm<D, IN, OUT>,
 {
-    let support = own.cells.support_radius();
-    let zero = Lanes::splat(simd, 0.0);
-    let farthest = zero.like(support * support);
-    let nearest = zero.like(nearest_squared(support));
-    let position = position.map(|component| zero.like(component));
-    let values = values.map(|value| zero.like(value));
-    let mut sums = [zero; OUT];
-    let mut coincident = zero;
-    for block in (0..own.gathered.positions[0].len()).step_by(LANES) {
-        let at = |from: &Vec<f32>| Lanes::from_slice(simd, &from[block..block + LANES]);
-        let theirs = own.gathered.positions.each_ref().map(at);
-        let offset = std::array::from_fn(|c| position[c] - theirs[c]);
-        let distance_squared = squared(&offset);
-        let other = own.gathered.fields.each_ref().map(at);
-        let terms = term.term(&Pair { offset, distance_squared }, &values, &other);
-        for k in 0..OUT {
-            let counted = distance_squared.choose(farthest, terms[k], zero);
-            sums[k] += if T::DIRECTED { distance_squared.choose(nearest, zero, counted) } else { counted };
-        }
-        if T::DIRECTED {
-            coincident += distance_squared.choose(nearest, zero.like(1.0), zero);
+    let (zero, one) = (HalfLanes::splat(simd, 0.0), HalfLanes::splat(simd, 1.0));
+    let support = around.cells.support_radius();
+    let (farthest, nearest) = (zero.like(support * support), zero.like(nearest_squared(support)));
+    let slots = around.positions[0].len();
+    let (positions, fields) = (cut(around.positions, slots), cut(around.fields, slots));
+    let (position, own) = (spread(simd, pick(&positions, slot)), spread(simd, pick(&fields, slot)));
+    let (mut sums, mut coincident) = ([zero; OUT], zero);
+    let starts = &around.stretch.starts[group.starts.clone()];
+    while hits != 0 {
+        let first = (hits.trailing_zeros() as usize) << group.bit_shift;
+        hits &= hits - 1;
+        for start in &starts[first..(first + (1 << group.bit_shift)).min(starts.len())] {
+            let start = *start as usize;
+            let offset = difference(&position, &load(simd, &positions, start));
+            let squared = squared(&offset);
+            let mut counts = squared.choose(farthest, one, zero);
+            let mut distance_squared = squared.least(farthest);
+            if T::DIRECTED {
+                let same = squared.choose(nearest, one, zero);
+                coincident += same;
+                counts -= same;
+                distance_squared = distance_squared.greatest(nearest);
+            }
+            let terms = term.term(&Pair { offset, distance_squared }, &own, &load(simd, &fields, start));
+            for k in 0..OUT {
+                sums[k] = terms[k].fused(counts, sums[k]);
+            }
         }
     }
-    (sums.map(total), total(coincident))
+    let mut totals = [0.0; OUT];
+    for k in 0..OUT {
+        totals[k] = total(sums[k]);
+    }
+    (totals, total(coincident))
 }
 
 /// Squared distance below which particles coincide.
@@ -208,17 +184,12 @@ fn nearest_squared(support_radius: f32) -> f32 {
     (support_radius * COINCIDENT) * (support_radius * COINCIDENT)
 }
 
-#[inline(always)]
-fn squared<R: Real, const D: usize>(offset: &[R; D]) -> R {
-    offset[1..].iter().fold(offset[0] * offset[0], |sum, component| component.fused(*component, sum))
-}
-
 /// Sum of a batch, halves first, whatever the vector width.
 #[inline(always)]
-fn total<S: Simd>(batch: Lanes<S>) -> f32 {
-    let mut parts = [0.0; LANES];
+fn total<S: Simd>(batch: HalfLanes<S>) -> f32 {
+    let mut parts = [0.0; BATCH];
     batch.store_slice(&mut parts);
-    for half in [8, 4, 2, 1] {
+    for half in [4, 2, 1] {
         for lane in 0..half {
             parts[lane] += parts[lane + half];
         }
@@ -226,26 +197,28 @@ fn total<S: Simd>(batch: Lanes<S>) -> f32 {
     parts[0]
 }
 
-/// What others at the place of particle `i` add, each pushed aside by a hair in a direction that both agree on.
+/// What others at the place of the particle in a slot add, each pushed aside by a hair in a direction that both agree on.
 #[inline(never)]
 fn sum_coincident<T, const D: usize, const IN: usize, const OUT: usize>(
     term: &T,
-    own: &Own<'_, D, IN>,
-    i: usize,
+    around: &Around<'_, D, IN>,
+    group: &Group,
+    slot: usize,
 ) -> [f32; OUT]
 where
     T: PairTerm<D, IN, OUT>,
 {
-    let (positions, ids) = (own.cells.positions(), own.cells.ids());
-    let support = own.cells.support_radius();
-    let values = own.fields.map(|field| field[i]);
+    let support = around.cells.support_radius();
+    let id = |slot: usize| around.cells.ids()[around.cells.particle_in(slot)];
+    let (position, values) = (pick(&around.positions, slot), pick(&around.fields, slot));
+    let starts = &around.stretch.starts[group.starts.clone()];
     let mut sums = [0.0; OUT];
-    for j in own.runs.iter().cloned().flatten().filter(|j| *j != i) {
-        let between: [f32; D] = positions.map(|component| component[i] - component[j]);
+    for other in starts.iter().flat_map(|start| (*start as usize..).take(BATCH)).filter(|other| *other != slot) {
+        let between = difference(&position, &pick(&around.positions, other));
         if squared(&between) < nearest_squared(support) {
-            let offset = direction(ids[i], ids[j]).map(|component: f32| component * support * COINCIDENT);
+            let offset = direction(id(slot), id(other)).map(|component: f32| component * support * COINCIDENT);
             let pair = Pair { offset, distance_squared: squared(&offset) };
-            let terms = term.term(&pair, &values, &own.fields.map(|field| field[j]));
+            let terms = term.term(&pair, &values, &pick(&around.fields, other));
             sums = std::array::from_fn(|k| sums[k] + terms[k]);
         }
     }

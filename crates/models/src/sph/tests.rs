@@ -77,8 +77,8 @@ fn all_pairs<const D: usize>(
     (density.clone(), (0..count).map(acceleration).collect())
 }
 
-fn agrees_with_all_pairs<const D: usize>(support: f32) {
-    let mut particles = cloud::<D>(400, 1.0);
+fn agrees_with_all_pairs<const D: usize>(count: u64, support: f32) {
+    let mut particles = cloud::<D>(count, 1.0);
     let mut cells = Cells::new(support);
     particles.sort(&mut cells);
     for shapes in [[SHAPES[0], SHAPES[1]], [SHAPES[2], SHAPES[2]], [SHAPES[1], SHAPES[0]]] {
@@ -99,8 +99,14 @@ fn agrees_with_all_pairs<const D: usize>(support: f32) {
 
 #[test]
 fn sums_are_those_of_all_pairs() {
-    agrees_with_all_pairs::<2>(0.21);
-    agrees_with_all_pairs::<3>(0.45);
+    agrees_with_all_pairs::<2>(400, 0.21);
+    agrees_with_all_pairs::<3>(400, 0.45);
+}
+
+/// So many candidates that a hit stands for several batches.
+#[test]
+fn crowds_are_summed_like_all_pairs() {
+    agrees_with_all_pairs::<2>(700, 1.1);
 }
 
 /// Bits of everything that a step computes, by id.

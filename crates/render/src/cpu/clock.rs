@@ -4,12 +4,12 @@ use bansho_base::{
     canvas::Shutter,
     image::Image,
     observer::{self, Cancelled, Observer},
-    phenomenon::Phenomenon,
+    phenomenon::{Phenomenon, Remark},
     sky::Sky,
     surroundings::{Publication, Surroundings},
 };
 
-use crate::plan::Plan;
+use crate::plan::{Plan, PlanError};
 
 /// How many steps a phenomenon has taken; 0 at its beginning, before the preroll.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,19 +45,47 @@ pub(super) fn surroundings<'a>(
     reflection: Option<&'a Image<4>>,
 ) -> Surroundings<'a> {
     let sky = plan.scene.sky.as_ref().map_or(Sky::DARK, |sky| sky.at(shutter.middle()));
-    Surroundings { wind: &plan.wind, sky, reflection, others: others(plan, publications, index, shutter) }
+    Surroundings {
+        wind: &plan.wind,
+        air: &plan.scene.air,
+        sky,
+        reflection,
+        others: others(plan, publications, index, shutter),
+    }
 }
 
-/// What everybody but `index` publishes during `shutter`, and the scene's own lights.
+/// What everybody but `index` publishes during `shutter`, and the scene's own lights and obstacles.
 fn others(plan: &Plan, publications: &[Publication], index: usize, shutter: Shutter) -> Publication {
     let lights = plan.scene.lights.iter().map(|light| light.at(shutter.middle())).collect();
-    let mut others = Publication { lights, ..Publication::default() };
+    let mut others = Publication { lights, occluders: plan.occluders.clone(), ..Publication::default() };
     for (other, publication) in publications.iter().enumerate() {
         if other != index {
             others.extend(publication);
         }
     }
     others
+}
+
+/// What users should know of how phenomena will look, each with its phenomenon's name.
+///
+/// Said only of what is so in the first, the middle and the last frame, and where nothing is simulated that may shine later.
+pub(crate) fn remarks(plan: &Plan) -> Result<Vec<(String, Remark)>, PlanError> {
+    let phenomena = plan.open()?;
+    if phenomena.iter().any(|phenomenon| phenomenon.stepping().is_some()) {
+        return Ok(Vec::new());
+    }
+    let frames = plan.frames();
+    let shutters = [frames.start, (frames.start + frames.end) / 2, frames.end - 1].map(|number| plan.shutter(number));
+    let remark = |(index, phenomenon): (usize, &Box<dyn Phenomenon>)| {
+        let at = |shutter: &Shutter| {
+            let publications: Vec<Publication> = phenomena.iter().map(|each| each.publish(*shutter)).collect();
+            phenomenon.remark(&surroundings(plan, &publications, index, *shutter, None))
+        };
+        let [first, middle, last] = shutters.each_ref().map(at);
+        let always = first.filter(|_| first == middle && middle == last)?;
+        Some((phenomenon.name().to_owned(), always))
+    };
+    Ok(phenomena.iter().enumerate().filter_map(remark).collect())
 }
 
 /// Steps everybody until no state lies more than a step before `t`, always the one that is furthest behind,

@@ -15,9 +15,6 @@ use crate::{plan::Plan, scene::check::PLATE_LAYER, slices::Slice};
 /// Rows of a strip: the planes of a 1920-pixel strip stay within a core's second-level cache.
 pub(super) const STRIP_ROWS: usize = 8;
 
-/// Pixels that one task clears.
-const CLEARED_AT_ONCE: usize = 1 << 16;
-
 /// What a frame is to hold.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outputs {
@@ -76,6 +73,15 @@ impl Composition<'_> {
         self.slices.iter().map(touched).fold(Rect::default(), |all, part| all.union(&part))
     }
 
+    /// The part of the frame that can differ from nothing, in the frame's own pixels.
+    fn content(&self) -> Rect {
+        let window = self.view.window;
+        let strips = 0..window.height.div_ceil(STRIP_ROWS);
+        let all = strips.map(|index| self.worth_drawing(self.strip_rect(index)));
+        let part = all.fold(Rect::default(), |all, part| all.union(&part));
+        Rect { x: part.x.saturating_sub(window.x), y: part.y.saturating_sub(window.y), ..part }
+    }
+
     fn layer_count(&self) -> usize {
         if self.outputs.layers { self.phenomena.len() } else { 0 }
     }
@@ -119,20 +125,46 @@ impl Composition<'_> {
     }
 }
 
+/// Memory for a frame: empty pixels, but for those of the frame that it held before.
+struct Canvas {
+    beauty: Image<4>,
+    depth: Vec<f32>,
+    stale: Rect,
+}
+
+impl Canvas {
+    /// Takes the memory of a spent frame if it fits: fresh memory costs more than drawing a sparse frame.
+    fn new(window: Rect, spent: Option<Frame>) -> Self {
+        let (width, height) = (window.width, window.height);
+        let fits = |frame: &Frame| frame.beauty.width() == width && frame.beauty.height() == height;
+        if let Some(Frame { beauty, depth: Some(depth), content, .. }) = spent.filter(fits) {
+            return Self { beauty, depth, stale: content };
+        }
+        let depth = vec![f32::INFINITY; width * height];
+        Self { beauty: Image::filled(width, height, [0.0; 4]), depth, stale: Rect::default() }
+    }
+}
+
+/// Empties what a spent frame left in the rows from `first` on.
+fn clear(stale: Rect, first: usize, width: usize, beauty: &mut [[f32; 4]], depth: &mut [f32]) {
+    for (row, (beauty, depth)) in beauty.chunks_mut(width).zip(depth.chunks_mut(width)).enumerate() {
+        if (stale.y..stale.bottom()).contains(&(first + row)) {
+            beauty[stale.x..stale.right()].fill([0.0; 4]);
+            depth[stale.x..stale.right()].fill(f32::INFINITY);
+        }
+    }
+}
+
 /// Draws and composites the whole window, where nothing bends light.
 pub(super) fn frame(
     composition: &Composition,
     header: FrameHeader,
+    spent: Option<Frame>,
     observer: &dyn Observer,
 ) -> Result<Frame, Cancelled> {
     let window = composition.view.window;
     let level = Level::new();
-    let pixels = window.width * window.height;
-    // Fresh memory is cleared by all threads: one alone takes half the time of a sparse frame.
-    let cleared: Vec<[f32; 4]> = rayon::iter::repeat_n([0.0; 4], pixels).with_min_len(CLEARED_AT_ONCE).collect();
-    let mut depth: Vec<f32> = rayon::iter::repeat_n(f32::INFINITY, pixels).with_min_len(CLEARED_AT_ONCE).collect();
-    let mut beauty =
-        Image::from_pixels(window.width, window.height, cleared).unwrap_or_else(|| Image::filled(0, 0, [0.0; 4]));
+    let Canvas { mut beauty, mut depth, stale } = Canvas::new(window, spent);
     let strip_pixels = STRIP_ROWS * window.width;
     let planes: Vec<Vec<Vec<f32>>> = beauty
         .pixels_mut()
@@ -141,6 +173,7 @@ pub(super) fn frame(
         .enumerate()
         .map_init(Worker::default, |worker, (index, (beauty, depth))| {
             observer::check(observer)?;
+            clear(stale, index * STRIP_ROWS, window.width, beauty, depth);
             let strip = composition.strip_rect(index);
             let rect = composition.worth_drawing(strip);
             if rect.is_empty() {
@@ -152,7 +185,16 @@ pub(super) fn frame(
         })
         .collect::<Result<_, Cancelled>>()?;
     let opaque = composition.plate.colour.is_some() && composition.view.overscan == 0;
-    Ok(Frame { header, beauty, depth: Some(depth), channels: channels(composition, planes), opaque })
+    let content = composition.content();
+    Ok(Frame {
+        header,
+        beauty,
+        depth: Some(depth),
+        channels: channels(composition, planes),
+        opaque,
+        content,
+        figures: Vec::new(),
+    })
 }
 
 /// Exposes the strip, puts the plate behind it, and gives it its alpha.

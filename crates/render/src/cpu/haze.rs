@@ -4,7 +4,7 @@
 //! near, each layer bends all that lies behind it (and the plate) before the next group is laid over.
 
 use bansho_base::{
-    image::{Channel, Frame, FrameHeader, Image},
+    image::{Channel, Frame, FrameHeader, Image, Rect},
     observer::{self, Cancelled, Observer},
     phenomenon::Deflection,
 };
@@ -213,7 +213,15 @@ fn finish(composition: &Composition, header: FrameHeader, picture: Picture, aovs
     layers.extend(aovs);
     let channels: Vec<Channel> = compose::channels(composition, vec![layers]);
     let opaque = composition.plate.colour.is_some() && composition.view.overscan == 0;
-    Frame { header, beauty, depth: Some(picture.depth), channels, opaque }
+    Frame {
+        header,
+        beauty,
+        depth: Some(picture.depth),
+        channels,
+        opaque,
+        figures: Vec::new(),
+        content: Rect::of_size(window.width, window.height),
+    }
 }
 
 #[cfg(test)]

@@ -15,6 +15,8 @@ use crate::{
     plan::Plan,
 };
 
+pub(crate) use clock::remarks;
+
 /// Draws on the processor, in the rayon pool of the caller. Same plan, same bytes, whatever the threads.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CpuBackend;

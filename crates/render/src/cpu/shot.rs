@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use bansho_base::{
     canvas::View,
-    image::{Channel, Frame, Image, Rect},
+    image::{Channel, FigureSet, Frame, Image, Rect},
     observer::{self, Cancelled, Observer, Stage, StageGuard},
     phenomenon::{Phenomenon, Prepared},
+    point_cloud::PointCloud,
     surroundings::{Publication, Surroundings},
 };
 
@@ -32,6 +33,7 @@ pub(super) struct CpuShot {
     plates: PlateCache,
     number: i64,
     frame: Option<Frame>,
+    spent: Option<Frame>,
 }
 
 impl CpuShot {
@@ -39,7 +41,7 @@ impl CpuShot {
         let phenomena = plan.open()?;
         let clocks = vec![Clock { taken: 0 }; phenomena.len()];
         let number = plan.frames().start;
-        Ok(Self { plan, phenomena, clocks, plates: PlateCache::default(), number, frame: None })
+        Ok(Self { plan, phenomena, clocks, plates: PlateCache::default(), number, frame: None, spent: None })
     }
 
     fn begin_anew(&mut self) -> Result<(), RenderError> {
@@ -49,7 +51,13 @@ impl CpuShot {
     }
 
     /// Draws the view; `None` where only the whole picture gives its parts rightly, since bent light comes from beyond.
-    fn compose(&self, view: &View, plate: &PlateFrame, observer: &dyn Observer) -> Result<Option<Frame>, RenderError> {
+    fn compose(
+        &self,
+        view: &View,
+        plate: &PlateFrame,
+        spent: Option<Frame>,
+        observer: &dyn Observer,
+    ) -> Result<Option<Frame>, RenderError> {
         let preparing = StageGuard::begin(observer, Stage::Prepare);
         let publications: Vec<Publication> =
             self.phenomena.par_iter().map(|phenomenon| phenomenon.publish(view.shutter)).collect();
@@ -60,7 +68,9 @@ impl CpuShot {
         drop(preparing);
         let _stage = StageGuard::begin(observer, Stage::Draw);
         observer::check(observer)?;
-        let bends = prepared.iter().any(|prepared| prepared.deflection().is_some());
+        // Where nothing lies behind, nothing is bent.
+        let behind = plate.colour.is_some() || self.phenomena.len() > 1;
+        let bends = behind && prepared.iter().any(|prepared| prepared.deflection().is_some());
         if bends && view.window != Rect::of_size(view.size[0], view.size[1]) {
             return Ok(None);
         }
@@ -73,11 +83,24 @@ impl CpuShot {
             plate,
         };
         let header = self.plan.header(self.number);
-        Ok(Some(if bends {
+        let mut frame = if bends {
             haze::frame(&composition, header, observer)?
         } else {
-            compose::frame(&composition, header, observer)?
-        }))
+            compose::frame(&composition, header, spent, observer)?
+        };
+        if self.plan.figures {
+            frame.figures = self.figures(&prepared);
+        }
+        Ok(Some(frame))
+    }
+
+    /// The figures of every phenomenon that has any.
+    fn figures(&self, prepared: &[Box<dyn Prepared + '_>]) -> Vec<FigureSet> {
+        let names = self.phenomena.iter().map(|phenomenon| phenomenon.name().to_owned());
+        let each = names.zip(prepared.iter().map(|prepared| prepared.figures()));
+        each.filter(|(_, figures)| !figures.is_empty())
+            .map(|(phenomenon, figures)| FigureSet { phenomenon, figures })
+            .collect()
     }
 
     /// Everything but the first mirror, as it is seen in that mirror: radiance and alpha of the whole picture.
@@ -103,7 +126,7 @@ impl CpuShot {
             slices: &slices,
             plate: &PlateFrame::default(),
         };
-        Ok(Some(compose::frame(&composition, self.plan.header(self.number), observer)?.beauty))
+        Ok(Some(compose::frame(&composition, self.plan.header(self.number), None, observer)?.beauty))
     }
 
     /// Slices of the phenomena `which`, and those phenomena ready to draw; a slice's members count within `which`.
@@ -113,7 +136,7 @@ impl CpuShot {
         view: &'a View,
         surroundings: &'a [Surroundings<'a>],
         observer: &dyn Observer,
-    ) -> Result<(Vec<Slice>, Vec<Box<dyn Prepared + 'a>>), RenderError> {
+    ) -> Result<Ready<'a>, RenderError> {
         let each = || which.par_iter().map(|&index| (&self.phenomena[index], &surroundings[index]));
         let intervals: Vec<_> = each().map(|(phenomenon, s)| phenomenon.depth_intervals(view, s)).collect();
         let prepared = each().map(|(phenomenon, s)| phenomenon.prepare(view, s, observer)).collect::<Result<_, _>>()?;
@@ -132,6 +155,9 @@ impl CpuShot {
     }
 }
 
+/// Slices of depth, and the phenomena that they count, ready to draw.
+type Ready<'a> = (Vec<Slice>, Vec<Box<dyn Prepared + 'a>>);
+
 /// The part `window` of a whole frame.
 fn crop(whole: Frame, window: Rect) -> Option<Frame> {
     let width = whole.beauty.width();
@@ -146,6 +172,8 @@ fn crop(whole: Frame, window: Rect) -> Option<Frame> {
         channels: channels.collect(),
         header: whole.header,
         opaque: whole.opaque,
+        figures: whole.figures,
+        content: Rect::of_size(window.width, window.height),
     })
 }
 
@@ -169,11 +197,12 @@ impl Shot for CpuShot {
             self.plates.frame(&self.plan, self.number)?
         };
         let mut view = self.plan.view(self.number);
-        let frame = match self.compose(&view, &plate, observer)? {
+        let spent = self.spent.take();
+        let frame = match self.compose(&view, &plate, spent, observer)? {
             Some(frame) => frame,
             None => {
                 view.window = Rect::of_size(view.size[0], view.size[1]);
-                let whole = self.compose(&view, &plate, observer)?;
+                let whole = self.compose(&view, &plate, None, observer)?;
                 whole.and_then(|whole| crop(whole, self.plan.window)).ok_or(Cancelled)?
             }
         };
@@ -183,6 +212,17 @@ impl Shot for CpuShot {
 
     fn read(&mut self) -> Option<Frame> {
         self.frame.take()
+    }
+
+    fn recycle(&mut self, spent: Frame) {
+        self.spent = Some(spent);
+    }
+
+    fn particles(&self) -> PointCloud {
+        let t = self.plan.shutter(self.number).middle();
+        let mut all = PointCloud::default();
+        self.phenomena.iter().filter_map(|phenomenon| phenomenon.particles(t)).for_each(|own| all.extend(&own));
+        all
     }
 
     fn snapshot(&self) -> Vec<u8> {

@@ -6,7 +6,7 @@ use bansho_base::{
 };
 use bansho_models::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
-use super::{FORMAT, Opening, PhenomenonKind, SHARED_TABLES, Scene};
+use super::{FORMAT, Opening, OpeningFault, PhenomenonKind, SHARED_TABLES, Scene};
 
 /// The format number must be one that this program reads.
 pub(super) fn format(root: &Table, reader: &mut Reader) {
@@ -83,19 +83,29 @@ fn is_name(name: &str) -> bool {
 /// Every asset must be there, and every phenomenon must come to be.
 pub(super) fn assets_and_openings(scene: &Scene, root: &Table, assets: &dyn Assets, reader: &mut Reader) {
     plate(scene, root, assets, reader);
+    for (index, obstacle) in scene.obstacles.iter().enumerate() {
+        if let Err(fault) = obstacle.open(assets) {
+            report(fault, format!("obstacle.{index}"), root, reader);
+        }
+    }
     let mut seen = std::collections::BTreeMap::new();
     for instance in &scene.instances {
         let index: &mut usize = seen.entry(instance.kind.key).or_default();
         let path = format!("{}.{index}", instance.kind.key);
         let opening = Opening { name: &instance.name, seed: scene.picture.seed as u64, loop_s: None, assets };
         if let Err(fault) = instance.source.open(&opening) {
-            let place = place(root, &format!("{path}.{}", fault.key));
-            reader.within(path, |reader| {
-                reader.within(fault.key, |reader| reader.report_at(place, fault.kind));
-            });
+            report(fault, path, root, reader);
         }
         *index += 1;
     }
+}
+
+/// Notes a fault of what stands at `path`.
+fn report(fault: OpeningFault, path: String, root: &Table, reader: &mut Reader) {
+    let place = place(root, &format!("{path}.{}", fault.key));
+    reader.within(path, |reader| {
+        reader.within(fault.key, |reader| reader.report_at(place, fault.kind));
+    });
 }
 
 fn plate(scene: &Scene, root: &Table, assets: &dyn Assets, reader: &mut Reader) {

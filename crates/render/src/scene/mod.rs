@@ -2,6 +2,7 @@
 
 pub(crate) mod check;
 pub mod edit;
+pub mod obstacle;
 pub mod picture;
 pub mod report;
 pub mod schema;
@@ -12,6 +13,7 @@ mod toml;
 use std::sync::Arc;
 
 use bansho_base::{
+    air::Air,
     assets::Assets,
     camera::CameraParameters,
     parameters::{Parameters, Problem, ProblemKind, Reader, Table, TableDescriptor, Value},
@@ -21,6 +23,7 @@ use bansho_base::{
 use bansho_models::ground::GroundParameters;
 
 pub use self::{
+    obstacle::{ObstacleParameters, ObstacleShape},
     picture::{DepthKind, FrameRate, LightParameters, PictureParameters, PlateParameters},
     report::SceneError,
     source::{Describe, Opening, OpeningFault, PhenomenonKind, Source},
@@ -40,14 +43,16 @@ pub struct SharedTable {
 }
 
 /// Shared tables, in the order in which a scene should state them.
-pub const SHARED_TABLES: [SharedTable; 7] = [
+pub const SHARED_TABLES: [SharedTable; 9] = [
     SharedTable { key: "picture", many: false, table: PictureParameters::table },
     SharedTable { key: "camera", many: false, table: CameraParameters::table },
     SharedTable { key: "plate", many: false, table: PlateParameters::table },
     SharedTable { key: "wind", many: false, table: WindParameters::table },
+    SharedTable { key: "air", many: false, table: Air::table },
     SharedTable { key: "sky", many: false, table: SkyParameters::table },
     SharedTable { key: "ground", many: false, table: GroundParameters::table },
     SharedTable { key: "light", many: true, table: LightParameters::table },
+    SharedTable { key: "obstacle", many: true, table: ObstacleParameters::table },
 ];
 
 /// A phenomenon of the scene.
@@ -74,12 +79,16 @@ pub struct Scene {
     pub plate: PlateParameters,
     /// `[wind]`.
     pub wind: WindParameters,
+    /// `[air]`.
+    pub air: Air,
     /// `[sky]`, if there is one.
     pub sky: Option<SkyParameters>,
     /// `[ground]`, if there is one.
     pub ground: Option<GroundParameters>,
     /// `[[light]]`.
     pub lights: Vec<LightParameters>,
+    /// `[[obstacle]]`.
+    pub obstacles: Vec<ObstacleParameters>,
     /// Phenomena in the order of the file.
     pub instances: Vec<Instance>,
 }
@@ -113,9 +122,11 @@ impl Scene {
             camera: read_shared(root, "camera", reader),
             plate: read_shared(root, "plate", reader),
             wind: read_shared(root, "wind", reader),
+            air: read_shared(root, "air", reader),
             sky: root.get("sky").map(|_| read_shared(root, "sky", reader)),
             ground: root.get("ground").map(|_| read_shared(root, "ground", reader)),
-            lights: read_lights(root, reader),
+            lights: read_many(root, "light", reader),
+            obstacles: read_many(root, "obstacle", reader),
             instances: read_instances(root, kinds, reader),
         }
     }
@@ -161,10 +172,10 @@ fn tables<'a>(root: &'a Table, key: &str, reader: &mut Reader) -> Vec<&'a Table>
     tables
 }
 
-fn read_lights(root: &Table, reader: &mut Reader) -> Vec<LightParameters> {
-    let tables = tables(root, "light", reader);
+fn read_many<P: Parameters>(root: &Table, key: &'static str, reader: &mut Reader) -> Vec<P> {
+    let tables = tables(root, key, reader);
     let read = |(index, table): (usize, &&Table)| {
-        reader.within(format!("light.{index}"), |reader| LightParameters::read_table(table, reader, &[]))
+        reader.within(format!("{key}.{index}"), |reader| P::read_table(table, reader, &[]))
     };
     tables.iter().enumerate().map(read).collect()
 }

@@ -34,9 +34,7 @@ pub trait Source: Send + Sync {
     fn canonical(&self) -> Table;
 
     /// Paths of the assets it reads, for fingerprints.
-    fn assets(&self) -> Vec<String> {
-        Vec::new()
-    }
+    fn assets(&self) -> Vec<String>;
 
     /// Makes the phenomenon.
     ///
@@ -84,6 +82,10 @@ struct Described<P>(P);
 impl<P: Describe> Source for Described<P> {
     fn canonical(&self) -> Table {
         self.0.to_table()
+    }
+
+    fn assets(&self) -> Vec<String> {
+        bansho_base::parameters::assets(&self.0.to_table(), P::table())
     }
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {

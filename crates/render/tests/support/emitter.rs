@@ -2,7 +2,7 @@
 
 use bansho_base::{
     canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
-    image::{Image, Rect},
+    image::{Figure, Image, Rect},
     math::DVec3,
     observer::{Cancelled, Observer},
     parameters::Range,
@@ -172,6 +172,11 @@ impl PreparedEmitter<'_> {
 impl Prepared for PreparedEmitter<'_> {
     fn bounds(&self, _slice: &DepthInterval) -> Rect {
         Rect::of_size(self.view.size[0], self.view.size[1])
+    }
+
+    fn figures(&self) -> Vec<Figure> {
+        let depth = self.view.camera.depth(self.emitter.at(self.view.shutter.middle()));
+        vec![Figure { name: "depth", unit: "m", value: depth }]
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {

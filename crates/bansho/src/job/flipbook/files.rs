@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bansho_base::{
     color::View,
-    image::{DisplayImage, DisplayPixels, Frame, FrameHeader, Image},
+    image::{DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Rect},
     observer::{Observer, Stage, StageGuard, check},
 };
 use bansho_media::{
@@ -56,12 +56,12 @@ impl Files {
     }
 
     /// What colour sheets keep of a frame.
-    pub(super) fn colour(&self, frame: Frame, observer: &dyn Observer) -> Colour {
+    pub(super) fn colour(&self, frame: &Frame, observer: &dyn Observer) -> Colour {
         if self.is_linear() {
-            return Colour::Linear(frame.beauty);
+            return Colour::Linear(frame.beauty.clone());
         }
         let _stage = StageGuard::begin(observer, Stage::View);
-        Colour::Shown(display(&frame, &self.view, self.bits))
+        Colour::Shown(display(frame, &self.view, self.bits))
     }
 
     /// Lays out the tiles and writes every file.
@@ -98,7 +98,16 @@ impl Files {
         for (what, beauty) in [("colour", tile(&colours, sheet.columns, 0, [0.0; 4])?), ("motion", motion)] {
             let path = self.sheet_path(what);
             let header = FrameHeader { fingerprint: fingerprint(tiles, what), ..header.clone() };
-            let frame = Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false };
+            let content = Rect::of_size(beauty.width(), beauty.height());
+            let frame = Frame {
+                header,
+                beauty,
+                depth: None,
+                channels: Vec::new(),
+                opaque: false,
+                content,
+                figures: Vec::new(),
+            };
             atomic::write_bytes(&path, &exr::encode(&frame, &path)?)?;
         }
         Ok(())

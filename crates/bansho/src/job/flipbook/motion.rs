@@ -24,8 +24,8 @@ pub(super) enum Colour {
 }
 
 impl Tile {
-    pub(super) fn of(frame: Frame, files: &Files, observer: &dyn Observer) -> Self {
-        let fields = fields(&frame);
+    pub(super) fn of(frame: &Frame, files: &Files, observer: &dyn Observer) -> Self {
+        let fields = fields(frame);
         let (width, height) = (frame.beauty.width(), frame.beauty.height());
         let motion = (0..width * height).map(|index| mean(&fields, index)).collect();
         Self {

@@ -65,13 +65,13 @@ fn segments<S: AsRef<[DVec2]>>(sheets: &[S]) -> Vec<Segment> {
     list
 }
 
-/// Cells about as long as a segment.
+/// Cells about as long as a segment, and not many more than there are segments, since all of them are cleared.
 fn grid(segments: &[Segment]) -> CellGrid {
     let ends = || segments.iter().flat_map(|segment| segment.ends);
     let low = ends().fold(DVec2::INFINITY, DVec2::min);
     let high = ends().fold(DVec2::NEG_INFINITY, DVec2::max);
     let length: f64 = segments.iter().map(|segment| segment.ends[0].distance(segment.ends[1])).sum();
-    CellGrid::new(low, high, length / segments.len() as f64, 1024)
+    CellGrid::new(low, high, length / segments.len() as f64, (4 * segments.len()).isqrt() + 16)
 }
 
 const NONE: u32 = u32::MAX;

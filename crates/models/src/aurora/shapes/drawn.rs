@@ -195,11 +195,13 @@ fn fitted(points: &[DVec2], drawing: &Drawing, extent_km: f64) -> Vec<DVec2> {
     points.iter().map(|&point| (point - middle) * scale).collect()
 }
 
+/// The points that were given come first, so that a fault names one of them; then the smooth line between them.
 fn check_extent(sheets: &[DrawnSheet], place: Place) -> Result<(), ShapeFault> {
     let half = place.extent_km / 2.0;
+    let outside = |point: &DVec2| point.abs().max_element() > half;
     for (index, sheet) in sheets.iter().enumerate() {
-        let outside = |point: &&DVec2| !(point.abs().max_element() <= half);
-        let Some(at) = sheet.line.points().iter().position(|point| outside(&point)) else { continue };
+        let given = sheet.recorded.iter().position(outside).map(|at| at * sheet.pieces);
+        let Some(at) = given.or_else(|| sheet.line.points().iter().position(outside)) else { continue };
         let point = sheet.line.points()[at];
         let number = sheet.origin(at) + 1;
         let kind = ShapeFaultKind::Outside { sheet: index + 1, point: number, x: point.x, z: point.y, half };

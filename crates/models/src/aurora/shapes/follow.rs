@@ -24,7 +24,7 @@ pub(super) struct Followed {
     pub(super) returns: bool,
 }
 
-/// Follows the control points through all shapes.
+/// Follows the control points through all shapes; `evenness` weighs even spacing against nearness where they are matched by place.
 ///
 /// # Errors
 /// A shape that cannot be drawn, or does not come from the one before.
@@ -33,6 +33,7 @@ pub(super) fn follow(
     motion: &MotionParameters,
     extent_km: f64,
     assets: &dyn Assets,
+    evenness: f64,
 ) -> Result<Followed, ShapeFault> {
     let draw = |(shape, parameters)| drawn_sheets(parameters, Place { shape, extent_km }, assets);
     let drawn: Vec<Vec<DrawnSheet>> = shapes.iter().enumerate().map(draw).collect::<Result<_, _>>()?;
@@ -50,13 +51,22 @@ pub(super) fn follow(
         if in_order {
             followed.go_in_order(&change, &drawn[index], motion);
         } else {
-            change.refine(motion.control_points as usize, index - 1, &mut followed.tracks);
+            change.refine(motion.point_count(), index - 1, &mut followed.tracks);
             let closes = followed.returns && index == shapes.len() - 1;
-            followed.go_nearest(&change, &drawn[index], closes);
+            followed.go_nearest(&change, &drawn[index], closes, evenness);
         }
         followed.strands.push(change.strands);
     }
     Ok(followed)
+}
+
+/// Where a chain of strands goes.
+struct Goal<'a> {
+    drawn: &'a DrawnSheet,
+    of: Match,
+    /// The tracks of that sheet in the first shape, if it shall be reached again point by point.
+    first: Option<Vec<usize>>,
+    evenness: f64,
 }
 
 /// Whether two drawn shapes are the same, sheet by sheet.
@@ -88,7 +98,7 @@ impl Followed {
         let mut sheets = Vec::new();
         for sheet in drawn {
             let first = self.tracks.len();
-            let knots = control_knots(sheet, motion.control_points as usize, motion);
+            let knots = control_knots(sheet, motion.point_count(), motion);
             self.tracks.extend(knots.into_iter().map(|knot| Track::new(0, None, knot)));
             sheets.push((first..self.tracks.len()).collect());
         }
@@ -130,7 +140,7 @@ impl Followed {
     }
 
     /// By place: each chain of strands to the sheet that it is matched with, each point to one by length and nearness.
-    fn go_nearest(&mut self, change: &Change, drawn: &[DrawnSheet], closes: bool) {
+    fn go_nearest(&mut self, change: &Change, drawn: &[DrawnSheet], closes: bool, evenness: f64) {
         let knot = self.shapes.len() - 1;
         let position = |track: &usize| self.tracks[*track].knot(knot).position;
         let line = |chain: &Vec<Link>| -> Vec<DVec2> {
@@ -143,7 +153,8 @@ impl Followed {
         let mut sheets = vec![Vec::new(); drawn.len()];
         for (chain, of) in change.chains.iter().zip(matches) {
             let first = closes.then(|| self.shapes[0][of.target].clone());
-            let mut sheet = self.go_along(change, chain, &drawn[of.target], of, first);
+            let goal = Goal { drawn: &drawn[of.target], of, first, evenness };
+            let mut sheet = self.go_along(change, chain, &goal);
             if of.reversed {
                 sheet.reverse();
             }
@@ -152,16 +163,9 @@ impl Followed {
         self.shapes.push(sheets);
     }
 
-    /// Moves the strands of a chain to their parts of a sheet; the sheet's tracks, along the chain. `first` are the tracks of that
-    /// sheet in the first shape, if it shall be reached again point by point.
-    fn go_along(
-        &mut self,
-        change: &Change,
-        chain: &[Link],
-        drawn: &DrawnSheet,
-        of: Match,
-        first: Option<Vec<usize>>,
-    ) -> Vec<usize> {
+    /// Moves the strands of a chain to their parts of a sheet; the sheet's tracks, along the chain.
+    fn go_along(&mut self, change: &Change, chain: &[Link], goal: &Goal) -> Vec<usize> {
+        let Goal { drawn, of, first, evenness } = goal;
         let knot = self.shapes.len() - 1;
         let strands: Vec<Vec<usize>> = chain.iter().map(|&link| change.along(link)).collect();
         let points: Vec<Vec<DVec2>> = strands
@@ -177,7 +181,7 @@ impl Followed {
                 None => {
                     let knot =
                         |share: f64| Knot { position: drawn.line.at(share), values: values(&drawn.curves, share) };
-                    warp(points, &drawn.line, range).into_iter().map(knot).collect()
+                    warp(points, &drawn.line, range, *evenness).into_iter().map(knot).collect()
                 }
             };
             let turned = again.is_some() && of.reversed;

@@ -35,3 +35,6 @@ pub use parameters::{
 pub use segments::{Sample, Segments};
 pub use sequence::Sequence;
 pub use shape::{Shape, Sheet};
+
+#[cfg(test)]
+mod tests;

@@ -125,11 +125,22 @@ bansho_base::parameters! {
     pub struct MotionParameters {
         /// Which point becomes which.
         correspondence: Correspondence = Correspondence::Automatic;
-        /// Control points n of a sheet.
-        control_points: i64 = 32, limits(Range::new(4.0, 512.0));
+        /// Control points n of a sheet. `"auto"` is 32 in drawing order, as in the thesis, and 96 by place, so that folds that grow stay round.
+        control_points: Auto<i64> = Auto::Auto, limits(Range::new(4.0, 512.0));
         /// How they lie on a drawn stroke.
         spacing: Spacing = Spacing::ArcLength;
         /// Frames of 1/30 s from one in-between shape to the next; the thesis takes 5 to 10.
         renew_frames: f64 = 6.0, limits(Range::new(1.0, 60.0));
+    }
+}
+
+impl MotionParameters {
+    /// Control points n of a sheet.
+    pub fn point_count(&self) -> usize {
+        match (self.control_points, self.correspondence) {
+            (Auto::Set(count), _) => count as usize,
+            (Auto::Auto, Correspondence::DrawingOrder) => 32,
+            (Auto::Auto, Correspondence::Automatic) => 96,
+        }
     }
 }

@@ -6,11 +6,17 @@ use bansho_base::{
 };
 
 use super::{
-    FRAME_S, MotionParameters, Shape, ShapeFault, ShapeFaultKind, ShapeParameters, Sheet,
+    Correspondence, FRAME_S, MotionParameters, Shape, ShapeFault, ShapeFaultKind, ShapeParameters, Sheet,
     follow::{Followed, follow},
     parameters::TRANSITION_S,
     track::{Knot, Timing, find_velocities},
 };
+
+/// Weights of even spacing against nearness, the favourite first: others are tried where sheets would cross themselves on the way.
+const EVENNESS: [f64; 4] = [0.01, 0.03, 0.1, 1.0];
+
+/// Moments of each transition at which that is looked at.
+const CHECKED_MOMENTS: usize = 32;
 
 /// The shapes of a scene and all in-between shapes (thesis, 2.2.2): splines in time through corresponding control points.
 ///
@@ -25,7 +31,7 @@ pub struct Sequence {
 }
 
 impl Sequence {
-    /// The sequence of `shapes` on a drawn square of side `extent_km`; two bands that become each other where there is no shape.
+    /// The sequence of `shapes` on a drawn square of side `extent_km`; a moving band before a quiet arc where there is no shape.
     ///
     /// With `loop_s` it repeats after that time, in which all of it passes: round and round if the last shape is the first
     /// again, there and back if not.
@@ -45,10 +51,25 @@ impl Sequence {
         let usual = super::usual::shapes();
         let shapes = if shapes.is_empty() { &usual[..] } else { shapes };
         let timing = timing(shapes)?;
-        let mut followed = follow(shapes, motion, extent_km, assets)?;
-        let closed = loop_s.is_some() && followed.returns;
-        find_velocities(&mut followed.tracks, &timing, closed);
-        Ok(Self { followed, timing, half_km: extent_km / 2.0, loop_s })
+        let sequence = |evenness: f64| {
+            let mut followed = follow(shapes, motion, extent_km, assets, evenness)?;
+            let closed = loop_s.is_some() && followed.returns;
+            find_velocities(&mut followed.tracks, &timing, closed);
+            let sequence = Self { followed, timing: timing.clone(), half_km: extent_km / 2.0, loop_s: None };
+            Ok((sequence.crossings(CHECKED_MOMENTS * shapes.len()), sequence))
+        };
+        let mut best = sequence(EVENNESS[0])?;
+        let by_place = motion.correspondence == Correspondence::Automatic;
+        for &evenness in EVENNESS[1..].iter().filter(|_| by_place) {
+            if best.0 == 0 {
+                break;
+            }
+            let other = sequence(evenness)?;
+            if other.0 < best.0 {
+                best = other;
+            }
+        }
+        Ok(Self { loop_s, ..best.1 })
     }
 
     /// When each shape of the scene is reached, s, without a loop.

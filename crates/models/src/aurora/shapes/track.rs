@@ -85,24 +85,29 @@ impl Track {
 }
 
 /// Finds the velocities of all tracks. A held shape stands still; one that nothing fixes begins and ends without curvature,
-/// but eases in and out where there are only two shapes; what is born between two points moves on as they do. With `closed`,
-/// points that end where they began pass that place with one velocity.
+/// but eases in and out where there are only two shapes; what is born between two points begins as they move on, and also ends so
+/// if it lives to the next shape only. With `closed`, points that end where they began pass that place with one velocity.
 pub(super) fn find_velocities(tracks: &mut [Track], timing: &Timing, closed: bool) {
     for index in 0..tracks.len() {
         let (known, rest) = tracks.split_at_mut(index);
         let Some(track) = rest.first_mut() else { return };
-        let born = track.parents.map(|parents| {
-            let velocity = |parent: usize| {
-                let parent = &known[parent];
-                parent.velocities[track.first - parent.first]
-            };
-            velocity(parents.tracks[0]).lerp(velocity(parents.tracks[1]), parents.share)
-        });
+        let born = track.parents.map(|parents| [0, 1].map(|later| parents.velocity(track.first + later, known)));
         track.velocities = velocities(track, timing, born, closed);
     }
 }
 
-fn velocities(track: &Track, timing: &Timing, born: Option<DVec2>, closed: bool) -> Vec<DVec2> {
+impl Parents {
+    /// How they move at shape `index`.
+    fn velocity(&self, index: usize, tracks: &[Track]) -> DVec2 {
+        let [first, second] = self.tracks.map(|parent| {
+            let parent = &tracks[parent];
+            parent.velocities.get(index - parent.first).copied().unwrap_or_default()
+        });
+        first.lerp(second, self.share)
+    }
+}
+
+fn velocities(track: &Track, timing: &Timing, born: Option<[DVec2; 2]>, closed: bool) -> Vec<DVec2> {
     let count = track.knots.len();
     let round = closed.then(|| closing_velocity(track, timing)).flatten();
     let end = |place: usize| {
@@ -110,11 +115,12 @@ fn velocities(track: &Track, timing: &Timing, born: Option<DVec2>, closed: bool)
             return End::Velocity(DVec2::ZERO);
         }
         match (place, born) {
-            (0, Some(velocity)) => End::Velocity(velocity),
+            (0, Some([velocity, _])) => End::Velocity(velocity),
+            (1, Some([_, velocity])) if count == 2 => End::Velocity(velocity),
             _ => round.map_or(End::Natural, End::Velocity),
         }
     };
-    let mut velocities = vec![born.unwrap_or(DVec2::ZERO); count];
+    let mut velocities = vec![DVec2::ZERO; count];
     let mut from = 0;
     while from + 1 < count {
         let held = (from + 1..count - 1).find(|&place| timing.is_held(track.first + place));

@@ -1,4 +1,4 @@
-//! The aurora of a scene that says nothing: a band that curls and comes back.
+//! The aurora of a scene that says nothing: a band whose waves deepen and come back.
 
 use bansho_base::parameters::Auto;
 

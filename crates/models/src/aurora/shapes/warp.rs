@@ -7,15 +7,11 @@ use super::polyline::Polyline;
 /// Places on the target between two control points where they lie evenly.
 const FINE: usize = 8;
 /// Fewest and most such places from one control point to the next.
-const STEPS: [usize; 2] = [3, 24];
-/// Weight of even spacing against nearness.
-const EVENNESS: f64 = 0.01;
-
-/// For each of `points` the share of `target`'s length that it goes to, from `range[0]` for the first to `range[1]` for the last.
-///
-/// Least of the sum of (distance / length)^2 and 0.01 (spacing - 1)^2, by dynamic programming over 8 places a point: what has
-/// not moved stays, and the points stay between 3/8 and 3 times as dense as even ones.
-pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2]) -> Vec<f64> {
+const STEPS: [usize; 2] = [3, 20];
+/// For each of `points` the share of `target`'s length that it goes to, from `range[0]` for the first to `range[1]` for the last: the
+/// least sum of (distance / length)^2 and `evenness` (spacing - 1)^2, by dynamic programming over 8 places a point: what has
+/// not moved stays, and the points stay at 3/8 to 5/2 of the even distance.
+pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: f64) -> Vec<f64> {
     let last = points.len() - 1;
     let places = last * FINE;
     let share = |place: usize| range[0] + (range[1] - range[0]) * (place as f64 / places.max(1) as f64);
@@ -25,10 +21,10 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2]) -> Vec<
         return (0..=last).map(|index| share(index * FINE)).collect();
     }
     let nearness = |point: usize, place: usize| points[point].distance_squared(line[place]) / (scale * scale);
-    let evenness: Vec<f64> = (0..=STEPS[1])
+    let step_costs: Vec<f64> = (0..=STEPS[1])
         .map(|step| {
             let stretch = step as f64 / FINE as f64 - 1.0;
-            EVENNESS * stretch * stretch
+            evenness * stretch * stretch
         })
         .collect();
     let mut costs = vec![f64::INFINITY; places + 1];
@@ -41,7 +37,7 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2]) -> Vec<
         let high = (point * STEPS[1]).min(places - (last - point) * STEPS[0]);
         for place in low..=high {
             for step in STEPS[0]..=STEPS[1].min(place) {
-                let cost = costs[place - step] + evenness[step];
+                let cost = costs[place - step] + step_costs[step];
                 if cost < next[place] {
                     next[place] = cost;
                     steps[point * (places + 1) + place] = step as u8;
@@ -73,9 +69,9 @@ mod tests {
     fn a_line_that_has_not_moved_goes_to_itself() {
         let points = straight(0.0, 310.0, 32);
         let target = Polyline::new(points.clone()).unwrap();
-        let shares = warp(&points, &target, [0.0, 1.0]);
+        let shares = warp(&points, &target, [0.0, 1.0], 0.01);
         assert!(shares.iter().enumerate().all(|(i, share)| (share - i as f64 / 31.0).abs() < 1e-12));
-        let back = warp(&points.iter().rev().copied().collect::<Vec<_>>(), &target, [1.0, 0.0]);
+        let back = warp(&points.iter().rev().copied().collect::<Vec<_>>(), &target, [1.0, 0.0], 0.01);
         assert!(back.iter().enumerate().all(|(i, share)| (share - (1.0 - i as f64 / 31.0)).abs() < 1e-12));
     }
 
@@ -84,7 +80,7 @@ mod tests {
     fn what_has_not_moved_stays_where_the_line_grows() {
         let points = straight(0.0, 300.0, 31);
         let target = Polyline::new(straight(0.0, 450.0, 46)).unwrap();
-        let shares = warp(&points, &target, [0.0, 1.0]);
+        let shares = warp(&points, &target, [0.0, 1.0], 0.01);
         let moved = |i: usize| (target.at(shares[i]) - points[i]).length();
         let mean: f64 = (0..31).map(moved).sum::<f64>() / 31.0;
         let by_length: f64 = points.iter().map(|point| point.x * 0.5).sum::<f64>() / 31.0;
@@ -95,8 +91,8 @@ mod tests {
     #[test]
     fn few_points_and_lines_without_length_are_shared_evenly() {
         let spot = Polyline::new(vec![DVec2::ZERO; 3]).unwrap();
-        assert_eq!(warp(&straight(0.0, 1.0, 3), &spot, [0.0, 1.0]), [0.0, 0.5, 1.0]);
+        assert_eq!(warp(&straight(0.0, 1.0, 3), &spot, [0.0, 1.0], 0.01), [0.0, 0.5, 1.0]);
         let line = Polyline::new(straight(0.0, 1.0, 3)).unwrap();
-        assert_eq!(warp(&straight(5.0, 6.0, 2), &line, [0.25, 0.5]), [0.25, 0.5]);
+        assert_eq!(warp(&straight(5.0, 6.0, 2), &line, [0.25, 0.5], 0.01), [0.25, 0.5]);
     }
 }

@@ -1,0 +1,106 @@
+//! Particles to files, without pictures: what `bansho simulate` does.
+
+use std::{path::PathBuf, sync::Arc};
+
+use bansho_base::observer::{Stage, StageGuard, check};
+use bansho_media::{atomic, naming::NumberedPath, ply};
+use bansho_render::{Backend, Plan, PlanOptions, RenderError};
+
+use super::{
+    BackendChoice,
+    error::{Conflict, JobError},
+    observer::{FrameDone, JobObserver, Note, Outline},
+    output,
+    prepare::{assets, backend, chosen_frames, outside, snapshots},
+    run::Summary,
+    scene_file::SceneFile,
+    snapshots::Snapshots,
+};
+
+/// Which particles are wanted, and where they go. Begin with [`Simulate::new`].
+#[derive(Clone, Debug)]
+pub struct Simulate {
+    /// The scene.
+    pub scene: SceneFile,
+    /// Where particles go, such as `gas.####.ply`.
+    pub particles: PathBuf,
+    /// Frame numbers; the whole shot when left out.
+    pub frames: Option<Vec<i64>>,
+    /// Another seed than the scene's.
+    pub seed: Option<u64>,
+    /// Folder of snapshots.
+    pub snapshots: Option<PathBuf>,
+    /// Frames between snapshots; a second's worth when left out.
+    pub snapshot_every: Option<u64>,
+    /// What simulates.
+    pub backend: BackendChoice,
+}
+
+/// A simulation that can be carried out, as far as can be known without doing so.
+pub struct PreparedSimulation {
+    plan: Arc<Plan>,
+    backend: Box<dyn Backend>,
+    frames: Vec<i64>,
+    pattern: NumberedPath,
+    snapshots: Snapshots,
+    notes: Vec<Note>,
+}
+
+impl Simulate {
+    /// All frames of `scene` to `particles`.
+    pub fn new(scene: SceneFile, particles: PathBuf) -> Self {
+        let backend = BackendChoice::Auto;
+        Self { scene, particles, frames: None, seed: None, snapshots: None, snapshot_every: None, backend }
+    }
+
+    /// Checks everything and writes nothing.
+    ///
+    /// # Errors
+    /// The first thing that stands in the way: faults of the scene, a scene without particles, a name that cannot be used.
+    pub fn prepare(&self) -> Result<PreparedSimulation, JobError> {
+        let backend = backend(self.backend)?;
+        let assets = assets(&self.scene);
+        let scene = self.scene.check(assets.as_ref())?;
+        let options = PlanOptions { seed: self.seed, ..PlanOptions::default() };
+        let plan = Arc::new(Plan::new(scene, &options, assets)?);
+        let phenomena = plan.open().map_err(RenderError::from)?;
+        if phenomena.iter().all(|phenomenon| phenomenon.particles(0.0).is_none()) {
+            return Err(Conflict::NoParticles.into());
+        }
+        let frames = chosen_frames(self.frames.as_deref(), &plan)?;
+        let pattern = NumberedPath::parse(&self.particles, "ply", frames.len())?;
+        output::check_writable(&pattern.path(frames[0]))?;
+        let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan)?;
+        let notes = outside(&plan, &frames).into_iter().collect();
+        Ok(PreparedSimulation { plan, backend, frames, pattern, snapshots, notes })
+    }
+}
+
+impl PreparedSimulation {
+    /// Simulates and writes everything, in the caller's rayon pool.
+    ///
+    /// # Errors
+    /// The observer asked to stop, or the first file that cannot be written. Files that were finished stay, whole.
+    pub fn run(&self, observer: &dyn JobObserver) -> Result<Summary, JobError> {
+        self.notes.iter().for_each(|note| observer.note(note));
+        let size = [self.plan.window.width, self.plan.window.height];
+        observer.started(&Outline { total: self.frames.len(), kept: 0, size });
+        let mut shot = self.backend.open(self.plan.clone())?;
+        let mut last = None;
+        for (index, &number) in self.frames.iter().enumerate() {
+            check(observer).map_err(|_| JobError::Cancelled)?;
+            if last.is_none_or(|last| number != last + 1) {
+                let _stage = StageGuard::begin(observer, Stage::Load);
+                self.snapshots.seek(shot.as_mut(), last, number, observer);
+            }
+            shot.advance(number, observer)?;
+            self.snapshots.keep(shot.as_ref(), number, observer)?;
+            last = Some(number);
+            let _stage = StageGuard::begin(observer, Stage::Write);
+            let path = self.pattern.path(number);
+            atomic::write_bytes(&path, &ply::encode(&shot.particles()))?;
+            observer.frame_done(&FrameDone { number, path: Some(path), drawn: index + 1 });
+        }
+        Ok(Summary { drawn: self.frames.len(), kept: 0, first_file: self.pattern.path(self.frames[0]) })
+    }
+}

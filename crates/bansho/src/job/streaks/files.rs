@@ -1,0 +1,149 @@
+//! The pictures of streak textures.
+
+use std::{f64::consts::PI, path::PathBuf};
+
+use bansho_base::{
+    color::ev100_of_white_luminance,
+    image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision, Rect},
+    math::DVec3,
+};
+use bansho_media::{
+    atomic, exr,
+    png::{self, MeasuredImage, PngEffort},
+};
+use bansho_models::rain::lens::DropLens;
+use bansho_render::display::BitDepth;
+
+use super::{StreakFormat, Streaks, Texture};
+use crate::job::error::JobError;
+
+/// Version of the program, on which files depend.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// A distant light on the drops.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lit {
+    /// Unit vector toward it: right, up, toward the viewer.
+    pub(super) toward: DVec3,
+    /// Radiance of an opaque drop for each unit of illuminance, 1/sr: red, green, blue.
+    pub(super) radiance: [f32; 3],
+}
+
+impl Lit {
+    pub(super) fn new(toward: [f64; 3], lens: &DropLens) -> Self {
+        let toward = DVec3::from(toward).normalize();
+        // The light travels against `toward`, and goes on to the viewer along z.
+        let phase = lens.phase(-toward.z as f32);
+        Self { toward, radiance: phase.map(|phase| phase / (4.0 * PI) as f32) }
+    }
+}
+
+/// Where textures go and what they are.
+pub(super) struct Writer {
+    pub(super) folder: PathBuf,
+    pub(super) format: StreakFormat,
+    pub(super) bits: BitDepth,
+    pub(super) light: Option<Lit>,
+    pub(super) streaks: Streaks,
+}
+
+/// What was written of one texture.
+#[derive(Clone, Debug)]
+pub(super) struct Written {
+    /// Opacity of the largest code, of a PNG.
+    pub(super) scale: Option<f32>,
+    /// File and scale of the lit picture, of a PNG.
+    pub(super) lit: Option<(String, f32)>,
+}
+
+impl Writer {
+    pub(super) fn index_path(&self) -> PathBuf {
+        self.folder.join("streaks.json")
+    }
+
+    /// `streak_RATE_DIAMETER.png`, the variant behind it where there are several.
+    pub(super) fn name(&self, texture: &Texture) -> String {
+        let variant = if self.streaks.variants > 1 { format!("_{}", texture.variant) } else { String::new() };
+        let extension = self.format.name();
+        format!("streak_{}_{}{variant}.{extension}", texture.rate, texture.bin.diameter_mm)
+    }
+
+    /// Writes what a texture becomes.
+    pub(super) fn write(&self, file: &str, opacity: &Image<1>) -> Result<Written, JobError> {
+        match self.format {
+            StreakFormat::Png => self.write_png(file, opacity),
+            StreakFormat::Exr => self.write_exr(file, opacity),
+        }
+    }
+
+    fn write_png(&self, file: &str, opacity: &Image<1>) -> Result<Written, JobError> {
+        let scale = self.write_measured(file, 1, opacity, opacity.pixels().as_flattened())?;
+        let lit = self.light.map(|light| {
+            let name = file.replace(".png", "_lit.png");
+            let radiance: Vec<f32> = self.radiance(&light, opacity).into_flattened();
+            let scale = self.write_measured(&name, 3, opacity, &radiance)?;
+            Ok::<_, JobError>((name, scale))
+        });
+        Ok(Written { scale: Some(scale), lit: lit.transpose()? })
+    }
+
+    fn write_measured(&self, file: &str, channels: usize, image: &Image<1>, values: &[f32]) -> Result<f32, JobError> {
+        let size = [image.width(), image.height()];
+        let picture = MeasuredImage::of_values(size, channels, values, self.bits == BitDepth::Sixteen);
+        let path = self.folder.join(file);
+        let bytes = png::encode_measured(&picture, &self.fingerprint(file), PngEffort::Fast, &path)?;
+        atomic::write_bytes(&path, &bytes)?;
+        Ok(picture.scale)
+    }
+
+    fn write_exr(&self, file: &str, opacity: &Image<1>) -> Result<Written, JobError> {
+        let values = opacity.pixels().as_flattened();
+        // Without a light the streaks are a white veil of their opacity.
+        let radiance = match &self.light {
+            Some(light) => self.radiance(light, opacity),
+            None => values.iter().map(|&opacity| [opacity; 3]).collect(),
+        };
+        let pixels = radiance.iter().zip(values).map(|(&[r, g, b], &opacity)| [r, g, b, opacity]).collect();
+        let (width, height) = (opacity.width(), opacity.height());
+        let beauty =
+            Image::from_pixels(width, height, pixels).unwrap_or_else(|| Image::filled(width, height, [0.0; 4]));
+        let channel =
+            |name: &str, values: Vec<f32>| Channel { name: name.to_owned(), precision: Precision::Single, values };
+        let channels = vec![channel("opacity", values.to_vec())];
+        let (header, content) = (self.header(file, opacity), Rect::of_size(width, height));
+        let frame = Frame { header, beauty, depth: None, channels, opaque: false, figures: Vec::new(), content };
+        let path = self.folder.join(file);
+        atomic::write_bytes(&path, &exr::encode(&frame, &path)?)?;
+        Ok(Written { scale: None, lit: None })
+    }
+
+    fn radiance(&self, light: &Lit, opacity: &Image<1>) -> Vec<[f32; 3]> {
+        opacity.pixels().iter().map(|[opacity]| light.radiance.map(|radiance| radiance * opacity)).collect()
+    }
+
+    fn header(&self, file: &str, image: &Image<1>) -> FrameHeader {
+        let unit: [[f32; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+        FrameHeader {
+            number: 0,
+            // Numbers are as they are: 1.0 is 1.0.
+            exposure_ev100: ev100_of_white_luminance(1.0) as f32,
+            fps: [30, 1],
+            exposure_time_s: self.streaks.cube.exposure as f32,
+            camera: CameraHeader { world_to_camera: unit, world_to_ndc: unit, vertical_fov_deg: 0.0 },
+            fingerprint: self.fingerprint(file),
+            display_size: [image.width(), image.height()],
+            data_origin: [0, 0],
+        }
+    }
+
+    /// A fingerprint of all that a file's pixels depend on.
+    fn fingerprint(&self, file: &str) -> [u8; 32] {
+        let Streaks { cube, law, diameters, seed, light, bits, variants, .. } = &self.streaks;
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(
+            format!("bansho {VERSION} {file} {cube:?} {law:?} {diameters:?} {seed} {light:?} {bits:?} {variants}")
+                .as_bytes(),
+        );
+        *hasher.finalize().as_bytes()
+    }
+}

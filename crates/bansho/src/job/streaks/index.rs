@@ -1,0 +1,167 @@
+//! The index of streak textures: what every picture holds, drop by drop, and how to read it.
+
+use std::f64::consts::PI;
+
+use bansho_base::image::Image;
+use bansho_models::rain::{
+    distribution::{DropSizes, SizeBin},
+    extinction::{Losses, extinction, visibility},
+    texture::{FallingDrop, StreakCube},
+};
+use bansho_render::display::BitDepth;
+use serde_json::{Value, json};
+
+use super::{
+    StreakFormat, Streaks, Texture,
+    files::{Writer, Written},
+};
+
+/// One texture as the index tells it.
+pub(super) struct Entry {
+    pub(super) file: String,
+    about: Value,
+}
+
+impl Entry {
+    pub(super) fn new(
+        texture: &Texture,
+        cube: &StreakCube,
+        file: String,
+        drops: Vec<FallingDrop>,
+        image: &Image<1>,
+        written: Written,
+    ) -> Self {
+        let opacities = image.pixels().as_flattened();
+        let mean = opacities.iter().map(|&opacity| f64::from(opacity)).sum::<f64>() / opacities.len() as f64;
+        let largest = opacities.iter().fold(0.0_f32, |largest, &opacity| largest.max(opacity));
+        let mut about = json!({
+            "file": file,
+            "rate_mm_per_h": texture.rate,
+            "diameter_mm": texture.bin.diameter_mm,
+            "variant": texture.variant,
+            "mean_drop_count": cube.mean_count(texture.sizes, &texture.bin),
+            "drop_count": drops.len(),
+            "mean_opacity": mean,
+            "largest_opacity": largest,
+        });
+        if let Some(scale) = written.scale {
+            about["opacity_scale"] = json!(scale);
+        }
+        if let Some((lit, scale)) = written.lit {
+            about["lit"] = json!({ "file": lit, "radiance_scale": scale });
+        }
+        about["drops"] = drops.iter().map(|drop| describe_drop(cube, drop)).collect();
+        Self { file, about }
+    }
+}
+
+fn describe_drop(cube: &StreakCube, drop: &FallingDrop) -> Value {
+    let streak = cube.streak(drop);
+    json!({
+        "diameter_mm": drop.diameter_mm,
+        "velocity_m_per_s": drop.speed,
+        "length_m": streak.length,
+        "opacity": streak.profile(0.0),
+        "mean_opacity": streak.mean_opacity().min(1.0),
+        "position_m": drop.position,
+    })
+}
+
+/// The whole index.
+pub(super) fn describe(
+    streaks: &Streaks,
+    cube: &StreakCube,
+    writer: &Writer,
+    rains: &[DropSizes],
+    entries: &[Entry],
+) -> Value {
+    let bins = SizeBin::around(&streaks.diameters);
+    let rain = |(&rate, sizes): (&f64, &DropSizes)| describe_rain(rate, sizes, &bins, cube);
+    let mut index = json!({
+        "format": 1,
+        "program": concat!("Bansho ", env!("CARGO_PKG_VERSION")),
+        "size_pixels": cube.size,
+        "box_m": cube.edge,
+        "pixel_m": cube.pixel(),
+        "exposure_s": cube.exposure,
+        "velocity": streaks.law.name(),
+        "air": { "density_kg_per_m3": cube.fall.air.density, "viscosity_pa_s": cube.fall.air.viscosity },
+        "diameters": if cube.spread { "each drop's own, within its bin" } else { "the bin's" },
+        "seed": streaks.seed,
+        "how_to_read": how_to_read(streaks, writer),
+    });
+    if let Some(light) = &writer.light {
+        index["light"] = json!({
+            "toward": light.toward.to_array(),
+            "radiance_of_an_opaque_drop_per_illuminance_per_sr": light.radiance,
+            "space": "ACEScg",
+        });
+    }
+    index["rain"] = streaks.rates.iter().zip(rains).map(rain).collect();
+    index["bins"] = bins.iter().map(|bin| describe_bin(bin, cube)).collect();
+    index["textures"] = entries.iter().map(|entry| entry.about.clone()).collect();
+    index
+}
+
+/// What pixels and numbers mean.
+fn how_to_read(streaks: &Streaks, writer: &Writer) -> Value {
+    let pixel = match (streaks.format, streaks.bits) {
+        (StreakFormat::Exr, _) => "opacity = channel `opacity`, and A in half precision".to_owned(),
+        (StreakFormat::Png, bits) => {
+            let largest = if bits == BitDepth::Sixteen { 65_535 } else { 255 };
+            format!("opacity = code / {largest} * opacity_scale, linear: no gamma")
+        }
+    };
+    let mut about = json!({
+        "pixel": pixel,
+        "opacity": "share of the pixel that drops hide, averaged over the exposure; laid over a picture: picture * (1 - opacity) + drops",
+        "tiling": "the texture repeats in both directions: a streak that leaves at an edge enters at the opposite one",
+        "axes": "position_m is right, up, toward the viewer, from the lower left far corner; the drop's middle when the shutter opens, from where it falls straight down by length_m",
+        "drop": "a round, steady drop: opacity 2 sqrt(r^2 - b^2) / (v T) at distance b from the axis, `opacity` on it and `mean_opacity` across it; it hides (pi/4) D^2 whatever the exposure",
+        "rain": "Marshall and Palmer 1948: 8000 exp(-4.1 R^-0.21 D) drops per m^3 and mm; with these velocities it brings down 14 to 18 % more than R",
+        "extinction": "extinction_per_m counts what drops hide (Q = 1) over all diameters; visibility_m counts diffraction too (Q = 2), to 2 % of contrast",
+    });
+    if writer.light.is_some() {
+        let lit = match streaks.format {
+            StreakFormat::Exr => "R, G, B: radiance for illuminance 1 on a plane that faces the light, premultiplied",
+            StreakFormat::Png => {
+                "lit.file: radiance = code / largest code * radiance_scale for illuminance 1 on a plane that faces the light, premultiplied, linear ACEScg"
+            }
+        };
+        about["lit"] = json!(lit);
+    }
+    about
+}
+
+fn describe_rain(rate: f64, sizes: &DropSizes, bins: &[SizeBin], cube: &StreakCube) -> Value {
+    let whole = extinction(sizes, Losses::Geometric, DropSizes::ALL);
+    let within = |range| extinction(sizes, Losses::Geometric, range);
+    let in_bins: f64 = bins.iter().map(|bin| within(bin.range_mm)).sum();
+    let mut about = json!({
+        "rate_mm_per_h": rate,
+        "drops_per_m3": sizes.count(DropSizes::ALL),
+        "drops_per_m3_in_bins": bins.iter().map(|bin| bin.count(sizes)).sum::<f64>(),
+        "liquid_water_g_per_m3": sizes.liquid_water(),
+        "median_volume_diameter_mm": sizes.median_volume_diameter(),
+        "rate_from_drops_mm_per_h": sizes.rain_rate(&cube.fall, DropSizes::ALL),
+        "extinction_per_m": whole,
+        "extinction_per_m_in_bins": in_bins,
+    });
+    // Without rain one sees to infinity, which JSON cannot say.
+    about["visibility_m"] = Some(visibility(sizes)).filter(|visibility| visibility.is_finite()).into();
+    about
+}
+
+fn describe_bin(bin: &SizeBin, cube: &StreakCube) -> Value {
+    let speed = cube.fall.speed(bin.diameter_mm);
+    let streak = cube.streak(&FallingDrop { diameter_mm: bin.diameter_mm, speed, position: [0.0; 3] });
+    json!({
+        "diameter_mm": bin.diameter_mm,
+        "range_mm": bin.range_mm,
+        "velocity_m_per_s": speed,
+        "length_m": streak.length,
+        "opacity": streak.profile(0.0),
+        "mean_opacity": streak.mean_opacity().min(1.0),
+        "hidden_mm2": 0.25 * PI * bin.diameter_mm * bin.diameter_mm,
+    })
+}

@@ -1,0 +1,57 @@
+//! Where a thing stands, how it is turned and how large it is.
+
+use glam::{DQuat, DVec3, EulerRot};
+
+/// Scale, then turn, then move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Where its own origin comes to lie, m.
+    pub position: DVec3,
+    /// How it is turned.
+    pub rotation: DQuat,
+    /// How many times larger it is, the same along all axes; above 0.
+    pub scale: f64,
+}
+
+impl Placement {
+    /// Moved to `position`, turned about x, then y, then z by `rotation_deg` degrees, `scale` times as large.
+    pub fn new(position: [f64; 3], rotation_deg: [f64; 3], scale: f64) -> Self {
+        let [x, y, z] = rotation_deg.map(f64::to_radians);
+        Self { position: position.into(), rotation: DQuat::from_euler(EulerRot::ZYX, z, y, x), scale }
+    }
+
+    /// A point of the thing, in the world.
+    pub fn to_world(&self, point: DVec3) -> DVec3 {
+        self.position + self.rotation * (point * self.scale)
+    }
+
+    /// A point of the world, in the thing's own coordinates.
+    pub fn to_local(&self, point: DVec3) -> DVec3 {
+        self.rotation.inverse() * (point - self.position) / self.scale
+    }
+
+    /// A direction of the thing, in the world.
+    pub fn turn(&self, direction: DVec3) -> DVec3 {
+        self.rotation * direction
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn turns_are_about_x_then_y_then_z() {
+        let placement = Placement::new([1.0, 0.0, 0.0], [90.0, 0.0, 90.0], 2.0);
+        // y turns to z about x, and z stays when turned about z; x turns to y.
+        assert!((placement.to_world(DVec3::Y) - DVec3::new(1.0, 0.0, 2.0)).length() < 1e-12);
+        assert!((placement.turn(DVec3::X) - DVec3::Y).length() < 1e-12);
+    }
+
+    #[test]
+    fn there_and_back_is_the_same_point() {
+        let placement = Placement::new([1.0, -2.0, 3.0], [10.0, 20.0, 30.0], 0.3);
+        let point = DVec3::new(0.4, 5.0, -6.0);
+        assert!((placement.to_local(placement.to_world(point)) - point).length() < 1e-12);
+    }
+}

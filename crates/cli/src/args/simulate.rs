@@ -1,0 +1,65 @@
+//! `bansho simulate`
+
+use std::path::PathBuf;
+
+use bansho::job::{BackendChoice, JobError, SceneFile, Simulate};
+use clap::Args;
+
+use super::{
+    render::WorkArgs,
+    values::{self, Frames},
+};
+
+/// What to simulate, and where its particles go.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bansho simulate torch.toml --particles gas.####.ply               all frames
+  bansho simulate torch.toml --particles gas.ply --frames 60        one
+  bansho simulate torch.toml --particles gas.####.ply --frames 0-239x10 --snapshots states
+
+Each file is a binary PLY with x y z (m, y up), vx vy vz (m/s), temperature (K) and density (kg/m^3) of every particle at the middle of
+the frame's exposure; Blender, MeshLab and Open3D read it.")]
+pub(crate) struct SimulateArgs {
+    /// The scene file.
+    pub(crate) scene: PathBuf,
+    /// Where particles go, one .ply a frame; `####` or `%04d` stands for the frame number.
+    #[arg(long, value_name = "PATH")]
+    particles: PathBuf,
+    /// Frames: 0-239, 0-239x10 or 0-239:10 (every tenth), 17, -3-5, 1-5,9. [default: all]
+    #[arg(long, value_name = "SPEC", allow_hyphen_values = true, value_parser = values::parse_frames)]
+    frames: Option<Frames>,
+    /// Another seed than the scene's.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Change a setting of the scene for this once; may be repeated.
+    #[arg(long, value_name = "KEY.PATH=VALUE")]
+    set: Vec<String>,
+    /// Keep the state of what is simulated in steps here, and begin from the nearest state.
+    #[arg(long, value_name = "DIR", help_heading = "Work")]
+    snapshots: Option<PathBuf>,
+    /// Frames between snapshots. [default: a second's worth]
+    #[arg(long, value_name = "N", requires = "snapshots", help_heading = "Work")]
+    snapshot_every: Option<u64>,
+    /// What simulates. `gpu` fails in this version, which has none.
+    #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
+    backend: BackendChoice,
+    #[command(flatten)]
+    pub(crate) work: WorkArgs,
+}
+
+impl SimulateArgs {
+    /// The simulation that is asked for.
+    pub(crate) fn simulation(&self) -> Result<Simulate, JobError> {
+        let mut scene = SceneFile::read(&self.scene)?;
+        scene.changes.clone_from(&self.set);
+        Ok(Simulate {
+            frames: self.frames.clone().map(|Frames(numbers)| numbers),
+            seed: self.seed,
+            snapshots: self.snapshots.clone(),
+            snapshot_every: self.snapshot_every,
+            backend: self.backend,
+            ..Simulate::new(scene, self.particles.clone())
+        })
+    }
+}

@@ -1,0 +1,99 @@
+//! `bansho streaks`
+
+use std::path::PathBuf;
+
+use bansho::{
+    BitDepth,
+    job::{StreakFormat, Streaks},
+    models::rain::{texture::StreakCube, velocity::VelocityLaw},
+};
+use clap::Args;
+
+use super::{
+    render::WorkArgs,
+    values::{self, Numbers},
+};
+
+/// The textures that are wanted; without options the 24 of Yoshida, Dobashi and Yamamoto.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Each texture shows all drops of one diameter in a cube of air, from the side, as they fall through one exposure. A pixel is
+the share of it that they hide (opacity); a streak that leaves at an edge enters at the opposite one. Numbers are linear; streaks.json
+says how to read them, and lists every drop with its diameter, velocity, opacity and place.
+
+Examples:
+  bansho streaks                                        4 rates x 6 diameters in out/streaks/
+  bansho streaks --rates 50 --diameters 0.5,1,2,3,4 --exposure 1/60 -o heavy
+  bansho streaks --format exr --light 0,0.3,-1          lit from behind: radiance for illuminance 1
+  bansho streaks --box 0.25 --size 2048 --variants 8    eight close views of each")]
+pub(crate) struct StreaksArgs {
+    /// Rain rates R, ascending, mm/h.
+    #[arg(long, value_name = "R,...", default_value = "1,5,10,20", allow_hyphen_values = true, value_parser = values::parse_numbers)]
+    rates: Numbers,
+    /// Drop diameters D, ascending, mm. Each stands for the drops up to half way to its neighbours.
+    #[arg(long, value_name = "D,...", default_value = "1,1.2,1.4,1.6,1.8,2", allow_hyphen_values = true, value_parser = values::parse_numbers)]
+    diameters: Numbers,
+    /// How long the shutter is open: seconds, such as 0.02 or 1/30.
+    #[arg(long, value_name = "SECONDS", default_value = "1/30", allow_hyphen_values = true, value_parser = values::parse_exposure)]
+    exposure: f64,
+    /// Pixels on a side of a texture.
+    #[arg(long, value_name = "PIXELS", default_value_t = 512)]
+    size: usize,
+    /// Edge of the cube of air, m.
+    #[arg(long = "box", value_name = "METRES", default_value_t = 1.0, allow_hyphen_values = true)]
+    edge: f64,
+    /// How fast drops fall: as measured by Gunn and Kinzer, or by the paper's formula.
+    #[arg(long, default_value = "measured", value_parser = values::velocity_parser())]
+    velocity: VelocityLaw,
+    /// Give each drop a diameter of its own within its bin, by the distribution.
+    #[arg(long)]
+    spread: bool,
+    /// Textures with other drops for each rate and diameter.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    variants: u32,
+    /// Another seed, other drops.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Light the drops from far away; the vector toward the light: right, up, toward the viewer.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = values::parse_vector)]
+    light: Option<[f64; 3]>,
+
+    /// The folder. [default: out/streaks]
+    #[arg(short, long, value_name = "DIR", help_heading = "Output")]
+    out: Option<PathBuf>,
+    /// What the textures are written as.
+    #[arg(long, default_value = "png", value_parser = values::streak_format_parser(), help_heading = "Output")]
+    format: StreakFormat,
+    /// Bits of each channel of .png.
+    #[arg(long, default_value = "16", value_parser = values::bits_parser(), help_heading = "Output")]
+    bits: BitDepth,
+    #[command(flatten)]
+    pub(crate) work: WorkArgs,
+}
+
+impl StreaksArgs {
+    /// The textures that are asked for.
+    pub(crate) fn streaks(&self) -> Streaks {
+        let Numbers(rates) = self.rates.clone();
+        let Numbers(diameters) = self.diameters.clone();
+        let cube = StreakCube {
+            edge: self.edge,
+            size: self.size,
+            exposure: self.exposure,
+            spread: self.spread,
+            ..StreakCube::default()
+        };
+        Streaks {
+            rates,
+            diameters,
+            cube,
+            law: self.velocity,
+            variants: self.variants,
+            seed: self.seed,
+            light: self.light,
+            format: self.format,
+            bits: self.bits,
+            out: self.out.clone(),
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! Figures beside the pictures.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::support::{FLAME, Folder};
+
+#[test]
+fn every_picture_has_its_figures_and_resume_restores_them() {
+    let folder = Folder::with_scene(FLAME);
+    let render = ["render", "scene.toml", "--figures", "--out", "f/f.png"];
+    folder.succeed(&render);
+    let files = folder.files("f");
+    assert_eq!(files.len(), 12);
+    let about: Value = serde_json::from_slice(&files["f.0003.json"]).unwrap();
+    assert_eq!((&about["frame"], &about["picture"], &about["fps"]), (&3.into(), &"f.0003.png".into(), &30.0.into()));
+    assert!(about["phenomena"].is_object());
+    let fingerprint = about["fingerprint"].as_str().unwrap();
+    assert!(String::from_utf8_lossy(&files["f.0003.png"]).contains(fingerprint), "that of the picture");
+    fs::remove_file(folder.path("f/f.0001.json")).unwrap();
+    fs::write(folder.path("f/f.0002.json"), b"{\"fingerprint\": \"other\"}").unwrap();
+    let resumed = folder.succeed(&[&render[..], &["--resume"]].concat());
+    assert!(resumed.stderr.starts_with("2 frames in "), "{}", resumed.stderr);
+    assert!(folder.files("f") == files);
+}
+
+#[test]
+fn without_the_option_there_are_none() {
+    let folder = Folder::with_scene(FLAME);
+    folder.succeed(&["render", "scene.toml", "--out", "f/f.png"]);
+    assert!(folder.names().iter().all(|name| !name.ends_with(".json")));
+}
+
+#[test]
+fn films_and_sheets_have_no_place_for_figures() {
+    let folder = Folder::with_scene(FLAME);
+    for arguments in [&["--out", "f.gif"][..], &["--contact-sheet", "4"]] {
+        let run = folder.run(&[&["render", "scene.toml", "--figures"], arguments].concat());
+        assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
+        assert!(run.stderr.contains("--figures") && run.stderr.contains("allowed: .png, .exr"), "{}", run.stderr);
+        assert_eq!(folder.names(), ["scene.toml"]);
+    }
+}

@@ -1,0 +1,95 @@
+//! What is simulated in steps: particles as files, and frames from snapshots.
+
+use crate::support::Folder;
+
+/// A small particle flame that is soon developed.
+const GAS: &str = "\
+bansho = 1
+[picture]
+size = [48, 64]
+frames = 8
+[camera]
+position = [0.0, 0.4, 2.6]
+target = [0.0, 0.4, 0.0]
+[[flame_particles]]
+particles = 250
+preroll_s = 0.25
+";
+
+/// Properties and rows of a binary PLY.
+fn read_ply(bytes: &[u8]) -> (Vec<String>, Vec<Vec<f32>>) {
+    let end = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
+    let header = std::str::from_utf8(&bytes[..end]).unwrap();
+    assert!(header.starts_with("ply\nformat binary_little_endian 1.0\n"), "{header}");
+    let names: Vec<String> =
+        header.lines().filter_map(|l| l.strip_prefix("property float ")).map(str::to_owned).collect();
+    let count: usize = header.lines().find_map(|l| l.strip_prefix("element vertex ")).unwrap().parse().unwrap();
+    let values: Vec<f32> = bytes[end..].as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect();
+    assert_eq!(values.len(), names.len() * count);
+    (names.clone(), values.chunks(names.len()).map(<[f32]>::to_vec).collect())
+}
+
+#[test]
+fn particles_are_written_a_file_a_frame() {
+    let folder = Folder::with_scene(GAS);
+    folder.succeed(&["simulate", "scene.toml", "--particles", "gas/p.####.ply", "--frames", "2,5"]);
+    let files = folder.files("gas");
+    assert_eq!(files.keys().collect::<Vec<_>>(), ["p.0002.ply", "p.0005.ply"]);
+    let (names, rows) = read_ply(&files["p.0005.ply"]);
+    assert_eq!(names, ["x", "y", "z", "vx", "vy", "vz", "temperature", "density"]);
+    assert!(rows.len() > 50, "{} particles", rows.len());
+    for row in &rows {
+        assert!(row.iter().all(|value| value.is_finite()), "{row:?}");
+        assert!((-0.5..4.0).contains(&row[1]) && (250.0..2500.0).contains(&row[6]) && row[7] > 0.0, "{row:?}");
+    }
+    let rising = rows.iter().filter(|row| row[4] > 0.0).count();
+    assert!(rising * 10 > rows.len() * 9, "hot gas rises");
+    // One frame alone is the same as in its turn, and may have a plain name.
+    folder.succeed(&["simulate", "scene.toml", "--particles", "one.ply", "--frames", "5"]);
+    assert_eq!(folder.files("")["one.ply"], files["p.0005.ply"]);
+}
+
+#[test]
+fn what_has_no_particles_or_no_such_name_is_refused_before_anything_is_written() {
+    let folder = Folder::with_scene(GAS);
+    let name = folder.run(&["simulate", "scene.toml", "--particles", "gas.obj"]);
+    assert_eq!((name.code, name.errors()), (Some(2), 1));
+    assert!(name.stderr.contains("`.obj` is not written here; allowed: .ply"), "{}", name.stderr);
+    folder.write("sheet.toml", "bansho = 1\n[[flame_sheet]]\n");
+    let sheet = folder.run(&["simulate", "sheet.toml", "--particles", "gas.ply"]);
+    assert_eq!((sheet.code, sheet.errors()), (Some(2), 1));
+    assert!(sheet.stderr.contains("nothing in this scene has particles"), "{}", sheet.stderr);
+    folder.write("faulty.toml", "bansho = 1\n[[flame_particles]]\nparticles = -3\n");
+    assert_eq!(folder.run(&["simulate", "faulty.toml", "--particles", "gas.ply"]).code, Some(3));
+    let looped = folder.run(&["render", "scene.toml", "--loop", "2"]);
+    assert!(looped.code != Some(0) && looped.stderr.contains("cannot loop"), "{}", looped.stderr);
+    assert_eq!(folder.names(), ["faulty.toml", "scene.toml", "sheet.toml"]);
+}
+
+#[test]
+fn frames_from_snapshots_or_alone_are_those_of_the_whole_run() {
+    let folder = Folder::with_scene(GAS);
+    let snapshots = ["--snapshots", "states", "--snapshot-every", "3"];
+    folder.succeed(&[&["render", "scene.toml", "-o", "whole/f.####.png"], &snapshots[..]].concat());
+    assert_eq!(folder.files("states").len(), 3);
+    let whole = folder.files("whole");
+    folder.succeed(&["render", "scene.toml", "-o", "alone/f.####.png", "--frames", "5-7", "--threads", "1"]);
+    folder.succeed(&[&["render", "scene.toml", "-o", "part/f.####.png", "--frames", "5-7"], &snapshots[..]].concat());
+    for (name, bytes) in folder.files("alone").into_iter().chain(folder.files("part")) {
+        assert!(whole[&name] == bytes, "{name} differs");
+    }
+}
+
+#[test]
+fn a_damaged_snapshot_is_refused_and_made_anew() {
+    let folder = Folder::with_scene(GAS);
+    let render = ["render", "scene.toml", "-o", "f.####.png", "--snapshots", "states", "--snapshot-every", "4"];
+    folder.succeed(&render);
+    let (state, frame) = (folder.files("states")["state.4.bansho"].clone(), folder.files("")["f.0005.png"].clone());
+    let mut damaged = state.clone();
+    damaged[200] ^= 1;
+    std::fs::write(folder.path("states/state.4.bansho"), damaged).unwrap();
+    let again = folder.succeed(&[&render[..], &["--frames", "4-5"]].concat());
+    assert!(again.stderr.contains("state.4.bansho: not used: the snapshot is damaged"), "{}", again.stderr);
+    assert!(folder.files("states")["state.4.bansho"] == state && folder.files("")["f.0005.png"] == frame);
+}

@@ -1,0 +1,201 @@
+//! Strokes from SVG files: paths, polylines, polygons and lines, with the transforms of their groups.
+
+mod numbers;
+mod path;
+mod transform;
+mod xml;
+
+use bansho_base::{
+    assets::AssetProblem,
+    drawing::{Drawing, Stroke},
+    math::DVec2,
+};
+
+use self::{
+    numbers::Numbers,
+    path::PathError,
+    transform::Transform,
+    xml::{Event, Events, Tag},
+};
+
+/// Most points of all strokes together.
+const MOST_POINTS: usize = 1_000_000;
+
+/// Elements whose contents are not drawn where they stand.
+const UNDRAWN: [&str; 8] = ["defs", "symbol", "clipPath", "mask", "marker", "pattern", "metadata", "style"];
+
+fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
+    AssetProblem::Damaged(reason.to_string())
+}
+
+/// Reads the strokes of an SVG file in the order in which they are drawn. Curves become lines through 16 points each; fills,
+/// widths and style sheets are not looked at, and neither `use` nor nested coordinate systems are followed.
+///
+/// # Errors
+/// A text that is no SVG, a path that cannot be read, no strokes, or more than a million points. Never panics.
+pub fn decode_drawing(text: &str) -> Result<Drawing, AssetProblem> {
+    let mut reading = Reading::default();
+    let mut events = Events::new(text);
+    let mut is_svg = false;
+    while let Some(event) = events.next().map_err(damaged)? {
+        match event {
+            Event::Start(tag) => {
+                is_svg |= tag.name == "svg";
+                reading.start(&tag)?;
+            }
+            Event::End => drop(reading.levels.pop()),
+        }
+    }
+    if !is_svg {
+        return Err(damaged("it is no SVG"));
+    }
+    reading.finish()
+}
+
+/// What an element hands down to those in it.
+#[derive(Clone, Copy)]
+struct Level {
+    transform: Transform,
+    is_drawn: bool,
+}
+
+#[derive(Default)]
+struct Reading {
+    levels: Vec<Level>,
+    strokes: Vec<Stroke>,
+    points: usize,
+    /// The sheet that was drawn on, as the outermost element says it.
+    sheet: Option<[DVec2; 2]>,
+}
+
+impl Reading {
+    fn start(&mut self, tag: &Tag) -> Result<(), AssetProblem> {
+        let outer = self.levels.last().copied().unwrap_or(Level { transform: Transform::IDENTITY, is_drawn: true });
+        let own = Transform::parse(tag.get("transform").unwrap_or_default());
+        let own = own.ok_or_else(|| damaged("a transform cannot be read"))?;
+        let is_hidden = UNDRAWN.contains(&tag.name) || tag.get("display") == Some("none") || hides(tag);
+        let level = Level { transform: outer.transform.after(&own), is_drawn: outer.is_drawn && !is_hidden };
+        if tag.name == "svg" && self.levels.is_empty() {
+            self.sheet = sheet(tag);
+        }
+        self.levels.push(level);
+        if !level.is_drawn {
+            return Ok(());
+        }
+        for line in lines(tag).map_err(damaged)? {
+            self.points += line.len();
+            if self.points > MOST_POINTS {
+                return Err(damaged(format!("it has more than {MOST_POINTS} points")));
+            }
+            let points: Vec<DVec2> = line.into_iter().map(|point| level.transform.apply(point)).collect();
+            if !points.iter().all(|point| point.is_finite()) {
+                return Err(damaged("a point lies infinitely far away"));
+            }
+            self.strokes.push(Stroke { id: tag.get("id").map(str::to_owned), points });
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Result<Drawing, AssetProblem> {
+        if self.strokes.is_empty() {
+            return Err(AssetProblem::NoStrokes);
+        }
+        let points = || self.strokes.iter().flat_map(|stroke| stroke.points.iter().copied());
+        let bounds = || [points().fold(DVec2::INFINITY, DVec2::min), points().fold(DVec2::NEG_INFINITY, DVec2::max)];
+        let [low, high] = self.sheet.unwrap_or_else(bounds);
+        Ok(Drawing { strokes: self.strokes, low, high })
+    }
+}
+
+fn hides(tag: &Tag) -> bool {
+    let style = tag.get("style").unwrap_or_default();
+    style
+        .split(';')
+        .filter_map(|rule| rule.split_once(':'))
+        .any(|(key, value)| (key.trim(), value.trim()) == ("display", "none"))
+}
+
+/// The view box, or else width and height.
+fn sheet(tag: &Tag) -> Option<[DVec2; 2]> {
+    let [x, y, width, height] = match tag.get("viewBox") {
+        Some(view) => Numbers::new(view).take_all()?,
+        None => {
+            let side = |name: &str| Numbers::new(tag.get(name)?).next();
+            [0.0, 0.0, side("width")?, side("height")?]
+        }
+    };
+    let low = DVec2::new(x, y);
+    (width > 0.0 && height > 0.0).then_some([low, low + DVec2::new(width, height)])
+}
+
+/// The lines of an element, none where it is of another kind.
+fn lines(tag: &Tag) -> Result<Vec<Vec<DVec2>>, PathError> {
+    let number = |name: &str| tag.get(name).and_then(|value| Numbers::new(value).next()).unwrap_or(0.0);
+    Ok(match tag.name {
+        "path" => path::subpaths(tag.get("d").unwrap_or_default())?,
+        "polyline" | "polygon" => {
+            let mut numbers = Numbers::new(tag.get("points").unwrap_or_default());
+            let mut line: Vec<DVec2> = std::iter::from_fn(|| numbers.take_all::<2>()).map(DVec2::from).collect();
+            if tag.name == "polygon" {
+                line.extend(line.first().copied());
+            }
+            if line.len() > 1 { vec![line] } else { Vec::new() }
+        }
+        "line" => vec![vec![DVec2::new(number("x1"), number("y1")), DVec2::new(number("x2"), number("y2"))]],
+        _ => Vec::new(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strokes_stand_where_their_groups_put_them() {
+        let text = r#"<?xml version="1.0"?>
+            <svg xmlns="http://www.w3.org/2000/svg" viewBox="-10 0 20 40" width="5cm">
+              <defs><path d="M0 0L9 9"/></defs>
+              <g transform="translate(1 2)">
+                <path id="left" transform="scale(2)" d="M0 0L1 1"/>
+                <polyline points="0,0 1,0 1,1"/>
+                <g style="fill:none; display : none"><line x2="1" y2="1"/></g>
+              </g>
+              <line id="right" x1="1" y1="2" x2="3" y2="4"/>
+              <circle r="3"/>
+            </svg>"#;
+        let drawing = decode_drawing(text).unwrap();
+        let strokes: Vec<(Option<&str>, Vec<[f64; 2]>)> = drawing
+            .strokes
+            .iter()
+            .map(|stroke| (stroke.id.as_deref(), stroke.points.iter().map(|point| point.to_array()).collect()))
+            .collect();
+        assert_eq!(
+            strokes,
+            [
+                (Some("left"), vec![[1.0, 2.0], [3.0, 4.0]]),
+                (None, vec![[1.0, 2.0], [2.0, 2.0], [2.0, 3.0]]),
+                (Some("right"), vec![[1.0, 2.0], [3.0, 4.0]]),
+            ]
+        );
+        assert_eq!((drawing.low, drawing.high), (DVec2::new(-10.0, 0.0), DVec2::new(10.0, 40.0)));
+    }
+
+    #[test]
+    fn without_a_view_box_the_size_or_the_strokes_say_what_was_drawn_on() {
+        let drawing = decode_drawing("<svg width='30mm' height='20mm'><line x2='1'/></svg>").unwrap();
+        assert_eq!(drawing.high, DVec2::new(30.0, 20.0));
+        let drawing = decode_drawing("<svg><path d='M1 2L5 4'/></svg>").unwrap();
+        assert_eq!((drawing.low, drawing.high), (DVec2::new(1.0, 2.0), DVec2::new(5.0, 4.0)));
+    }
+
+    #[test]
+    fn what_holds_no_strokes_is_refused() {
+        assert_eq!(decode_drawing("<svg><circle r='1'/></svg>"), Err(AssetProblem::NoStrokes));
+        assert_eq!(decode_drawing("<svg><path/></svg>"), Err(AssetProblem::NoStrokes));
+        for broken in ["", "<html/>", "<svg", "<svg><path d='M1'/></svg>", "<svg transform='x'/>", "</svg></svg>"] {
+            assert!(matches!(decode_drawing(broken), Err(AssetProblem::Damaged(_))), "{broken}");
+        }
+        let far = "<svg><g transform='scale(1e300)'><path transform='scale(1e300)' d='M1 1L2 2'/></g></svg>";
+        assert!(matches!(decode_drawing(far), Err(AssetProblem::Damaged(_))));
+    }
+}

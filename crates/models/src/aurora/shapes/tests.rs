@@ -1,0 +1,250 @@
+//! Whole sequences: splits and merges as the thesis draws them, no jumps, loops that close, random shapes.
+
+use bansho_base::{
+    assets::MemoryAssets,
+    curve::{Curve, Interpolation},
+    math::DVec2,
+    parameters::Auto,
+    random::{Key, Purpose},
+};
+
+use super::*;
+
+const EXTENT_KM: f64 = 1000.0;
+
+fn sheet(points: &[[f64; 2]]) -> SheetParameters {
+    SheetParameters { points: Some(points.to_vec()), smooth: false, ..SheetParameters::default() }
+}
+
+fn shape(sheets: Vec<SheetParameters>) -> ShapeParameters {
+    ShapeParameters { after_s: Some(4.0), sheets, ..ShapeParameters::default() }
+}
+
+fn straight(from: f64, to: f64, z: f64) -> SheetParameters {
+    sheet(&[[from, z], [to, z]])
+}
+
+fn in_order(control_points: i64) -> MotionParameters {
+    MotionParameters {
+        correspondence: Correspondence::DrawingOrder,
+        control_points: Auto::Set(control_points),
+        ..MotionParameters::default()
+    }
+}
+
+fn sequence(shapes: &[ShapeParameters], motion: &MotionParameters) -> Sequence {
+    Sequence::new(shapes, motion, EXTENT_KM, &MemoryAssets::default(), None).unwrap()
+}
+
+fn points(shape: &Shape) -> Vec<Vec<[f64; 2]>> {
+    shape.sheets.iter().map(|sheet| sheet.points.iter().map(|point| point.to_array()).collect()).collect()
+}
+
+/// Greatest distance from a point of one shape to the other, both ways.
+fn apart(a: &Shape, b: &Shape) -> f64 {
+    let one_way = |from: &Shape, to: &Shape| {
+        let near = Neighbourhood::new(to, 30.0);
+        let all = from.sheets.iter().flat_map(|sheet| &sheet.points);
+        all.map(|&point| near.distance(point).unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
+    };
+    one_way(a, b).max(one_way(b, a))
+}
+
+fn assert_no_jump(sequence: &Sequence) {
+    for &arrival in sequence.arrivals() {
+        let at = sequence.at(arrival);
+        for near in [arrival - 1e-6, arrival + 1e-6] {
+            assert!(apart(&at, &sequence.at(near)) < 1e-3, "at {arrival} s");
+        }
+    }
+}
+
+/// Figs. 2.4 and 2.6: four points at x = 0, 30, 60, 90; the middle segment opens from 45 toward 30 and 60.
+#[test]
+fn in_drawing_order_a_split_segment_shrinks_to_its_ends() {
+    let mut split = shape(vec![straight(0.0, 90.0, 0.0)]);
+    split.split = vec![SplitParameters { segment: Some(2), ..SplitParameters::default() }];
+    let sequence = sequence(&[shape(vec![straight(0.0, 90.0, 0.0)]), split], &in_order(4));
+    assert_eq!(points(&sequence.at(0.0)), [[[0.0, 0.0], [30.0, 0.0], [60.0, 0.0], [90.0, 0.0]]]);
+    // Half way, by smoothstep: the new points are half way from 45 to 30 and 60.
+    assert_eq!(
+        points(&sequence.at(2.0)),
+        [[[0.0, 0.0], [30.0, 0.0], [37.5, 0.0]], [[52.5, 0.0], [60.0, 0.0], [90.0, 0.0]]]
+    );
+    assert_eq!(points(&sequence.at(4.0)), [[[0.0, 0.0], [30.0, 0.0]], [[60.0, 0.0], [90.0, 0.0]]]);
+    assert_no_jump(&sequence);
+}
+
+/// Figs. 2.5 and 2.7: ends at x = 30 and 60 grow toward 45, where the two new points become one.
+#[test]
+fn in_drawing_order_a_merge_grows_to_the_middle() {
+    let sheets = || vec![straight(0.0, 30.0, 0.0), straight(60.0, 90.0, 0.0)];
+    let mut merge = shape(sheets());
+    merge.merge = vec![MergeParameters::default()];
+    let sequence = sequence(&[shape(sheets()), merge], &in_order(4));
+    let half = points(&sequence.at(2.0));
+    assert_eq!((half[0][4], half[1][0]), ([37.5, 0.0], [52.5, 0.0]));
+    let last = points(&sequence.at(4.0));
+    assert_eq!((last.len(), last[0].len(), last[0][4]), (1, 9, [45.0, 0.0]));
+    assert_no_jump(&sequence);
+}
+
+#[test]
+fn automatic_splits_and_merges_need_only_source_and_target() {
+    let one = shape(vec![straight(-200.0, 200.0, 0.0)]);
+    let mut two = shape(vec![straight(220.0, 40.0, 30.0), straight(-220.0, -40.0, -30.0)]);
+    two.split = vec![SplitParameters::default()];
+    let mut again = shape(vec![sheet(&[[-200.0, 10.0], [0.0, 20.0], [200.0, 0.0]])]);
+    again.merge = vec![MergeParameters::default()];
+    let sequence = sequence(&[one, two, again], &MotionParameters::default());
+    assert_no_jump(&sequence);
+    // The gap opens and closes little by little.
+    let gap = |t: f64| {
+        let shape = sequence.at(t);
+        let ends = shape.sheets.iter().flat_map(|sheet| [sheet.points[0], sheet.points[sheet.points.len() - 1]]);
+        let inner: Vec<DVec2> = ends.filter(|end| end.x.abs() < 100.0).collect();
+        inner[0].distance(inner[1])
+    };
+    let opening: Vec<f64> = [0.1, 1.0, 2.0, 3.0, 4.0].map(gap).to_vec();
+    assert!(opening.is_sorted() && opening[0] < 5.0, "{opening:?}");
+    assert!((opening[4] - 100.0).abs() < 1e-9);
+    let closing: Vec<f64> = [4.0, 5.0, 6.0, 7.0, 7.9].map(gap).to_vec();
+    assert!(closing.iter().rev().is_sorted() && closing[4] < 5.0, "{closing:?}");
+    let last = sequence.at(8.0);
+    assert_eq!((last.sheets.len(), last.crossings()), (1, 0));
+    assert!((last.length() - 401.0).abs() < 1.0);
+}
+
+#[test]
+fn sheets_have_the_order_in_which_they_were_drawn() {
+    let first = shape(vec![straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 100.0)]);
+    let second = shape(vec![straight(200.0, -200.0, 110.0), straight(-200.0, 200.0, 10.0)]);
+    let sequence = sequence(&[first, second], &MotionParameters::default());
+    let last = points(&sequence.at(4.0));
+    assert_eq!((last[0][0], last[1][0]), ([200.0, 110.0], [-200.0, 10.0]));
+    let half = sequence.at(2.0);
+    assert!(half.sheets.iter().all(|sheet| sheet.points.iter().all(|point| (point.y - 5.0) % 100.0 < 1e-9)));
+}
+
+#[test]
+fn flux_and_energy_travel_with_the_sheet() {
+    let curve = |from: f64, to: f64| Curve::new(vec![[0.0, from], [1.0, to]], Interpolation::Linear).unwrap();
+    let bright = SheetParameters { flux: curve(0.0, 2.0), energy: curve(1.0, 3.0), ..straight(-200.0, 200.0, 0.0) };
+    let dim = |from: f64, to: f64| SheetParameters { flux: curve(0.5, 0.5), ..straight(from, to, 0.0) };
+    let mut split = shape(vec![dim(-220.0, -20.0), dim(20.0, 220.0)]);
+    split.split = vec![SplitParameters::default()];
+    let sequence = sequence(&[shape(vec![bright]), split], &MotionParameters::default());
+    let first = sequence.at(0.0);
+    let flux = &first.sheets[0].flux;
+    assert_eq!((flux[0], flux[flux.len() - 1]), (0.0, 2.0));
+    // Just before the split opens, its new ends have what the middle of the sheet has.
+    let open = sequence.at(1e-9);
+    let [left, right] = [&open.sheets[0], &open.sheets[1]];
+    assert!((left.flux[left.flux.len() - 1] - 1.0).abs() < 1e-6 && (right.energy[0] - 2.0).abs() < 1e-6);
+    assert!(sequence.at(4.0).sheets.iter().all(|sheet| sheet.flux.iter().all(|flux| *flux == 0.5)));
+}
+
+#[test]
+fn loops_close_whether_the_sequence_returns_or_not() {
+    let shapes = [straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 80.0), straight(-150.0, 250.0, 20.0)];
+    let mut shapes: Vec<ShapeParameters> = shapes.map(|sheet| shape(vec![sheet])).to_vec();
+    let looped = |shapes: &[ShapeParameters]| {
+        Sequence::new(shapes, &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), Some(6.0)).unwrap()
+    };
+    let there_and_back = looped(&shapes);
+    shapes.push(shapes[0].clone());
+    let round = looped(&shapes);
+    for sequence in [&there_and_back, &round] {
+        let speed = |t: f64| {
+            let h = 1e-5;
+            let at = |t: f64| sequence.at(t).sheets[0].points[5];
+            (at(t + h) - at(t)) / h
+        };
+        assert!(apart(&sequence.at(0.0), &sequence.at(6.0)) < 1e-6);
+        assert!(apart(&sequence.at(1.3), &sequence.at(7.3)) < 1e-6);
+        assert!(speed(6.0 - 2e-5).distance(speed(6.0)) < 0.01, "{} {}", speed(6.0 - 2e-5), speed(6.0));
+    }
+    // Half way round it is at the middle shape or at the last one.
+    assert!((there_and_back.at(3.0).sheets[0].points[0].y - 20.0).abs() < 1e-9);
+    assert!((round.at(2.0).sheets[0].points[0].y - 80.0).abs() < 1e-9);
+    let fault = Sequence::new(&shapes, &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), Some(0.0));
+    assert_eq!(fault.unwrap_err().to_string(), "loop: a loop of 0 s; allowed: more than 0");
+}
+
+fn random_shape(key: Key, case: u64, step: u32, sheets: usize) -> ShapeParameters {
+    let sheet = |row: usize| {
+        let random = |purpose: &str| key.uniforms(case, 16 * step + row as u32, Purpose::named(purpose)).map(f64::from);
+        let [form, length, bend, mirror] = random("form");
+        let [x, turn, points, _] = random("place");
+        let choice = Form::CHOICES[(form * Form::CHOICES.len() as f64) as usize].name;
+        SheetParameters {
+            form: Form::from_name(choice),
+            length_km: Auto::Set(120.0 + 250.0 * length),
+            bend_deg: if bend < 0.5 { Auto::Auto } else { Auto::Set(120.0 * (bend - 0.5)) },
+            count: if points < 0.7 { Auto::Auto } else { Auto::Set(1 + (points * 4.0) as i64) },
+            mirror: mirror < 0.5,
+            position_km: [200.0 * (x - 0.5), 200.0 * row as f64 - 300.0],
+            rotation_deg: 30.0 * (turn - 0.5),
+            ..SheetParameters::default()
+        }
+    };
+    shape((0..sheets).map(sheet).collect())
+}
+
+/// Random forms in four rows, one of which splits and of which two merge; some lie badly and are refused.
+#[test]
+fn random_sequences_stay_finite_and_inside() {
+    let key = Key::new(6, "sequences");
+    let mut made = 0;
+    for case in 0..60 {
+        let mut shapes: Vec<ShapeParameters> = (0..4).map(|step| random_shape(key, case, step, 4)).collect();
+        shapes[2].split = vec![SplitParameters { sheet: 1, at: Some((case % 11) as f64 / 10.0), segment: None }];
+        shapes[2].merge = vec![MergeParameters { sheets: [3, 4], ..MergeParameters::default() }];
+        let motion =
+            MotionParameters { control_points: Auto::Set(8 + (case % 40) as i64), ..MotionParameters::default() };
+        let loop_s = (case % 3 == 0).then_some(7.0);
+        let Ok(sequence) = Sequence::new(&shapes, &motion, EXTENT_KM, &MemoryAssets::default(), loop_s) else {
+            continue;
+        };
+        made += 1;
+        for step in 0..40 {
+            let shape = sequence.at(f64::from(step) * 0.37 - 1.0);
+            for sheet in &shape.sheets {
+                assert!(sheet.points.len() >= 2 && sheet.flux.len() == sheet.points.len());
+                assert!(sheet.points.iter().all(|point| point.abs().max_element() <= EXTENT_KM / 2.0), "case {case}");
+            }
+            let segments = Segments::new(&shape);
+            assert!(
+                segments
+                    .sample(0.3)
+                    .is_some_and(|sample| sample.point.is_finite() && (0.0..=1.0).contains(&sample.share))
+            );
+        }
+        if loop_s.is_none() {
+            assert_no_jump(&sequence);
+        }
+    }
+    assert!(made > 20, "only {made}");
+}
+
+/// A scribble of 10,000 recorded points is refused at its first crossing, a long spiral accepted.
+#[test]
+fn long_strokes_are_checked() {
+    let turn = |index: usize, radius: f64| {
+        let (sin, cos) = bansho_base::math::sin_cos(index as f64 * 0.05);
+        [radius * cos, radius * sin]
+    };
+    let spiral: Vec<[f64; 2]> = (0..10_000).map(|index| turn(index, 20.0 + index as f64 * 0.04)).collect();
+    let smooth = sequence(&[shape(vec![sheet(&spiral)])], &MotionParameters::default());
+    assert!(smooth.at(0.0).length() > 1000.0);
+    let crossed: Vec<[f64; 2]> =
+        (0..10_000).map(|index| turn(index, 300.0 - (index as f64 - 5000.0).abs() * 0.04)).collect();
+    let fault = Sequence::new(
+        &[shape(vec![sheet(&crossed)])],
+        &MotionParameters::default(),
+        EXTENT_KM,
+        &MemoryAssets::default(),
+        None,
+    );
+    assert!(matches!(fault.unwrap_err().kind, ShapeFaultKind::CrossesItself { sheet: 1, .. }));
+}

@@ -1,0 +1,68 @@
+//! What a particle learns of its neighbours in one sum: how they move, how hot they are, and on which side they lie.
+
+use crate::{
+    lanes::Real,
+    sph::{Cells, Pair, PairTerm, Poly6, SmoothingKernel, mixing_weights},
+};
+
+use super::particles::Particles;
+
+/// `w_j W` times 1, the differences of velocity and temperature, and the way to the neighbour.
+///
+/// Weights `m / sqrt(rho)` make it even from both sides, so that evening out keeps momentum and heat.
+struct BesideTerm(Poly6<3>);
+
+impl PairTerm<3, 5, 8> for BesideTerm {
+    const DIRECTED: bool = false;
+
+    #[inline(always)]
+    fn term<R: Real>(&self, pair: &Pair<R, 3>, own: &[R; 5], other: &[R; 5]) -> [R; 8] {
+        let weight = other[0] * self.0.value(pair.distance_squared);
+        std::array::from_fn(|k| match k {
+            0 => weight,
+            1..5 => weight * (other[k] - own[k]),
+            _ => weight * (weight.like(0.0) - pair.offset[k - 5]),
+        })
+    }
+}
+
+/// Sums over the neighbours of every particle, in sorted order.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Beside {
+    /// `m / sqrt(rho)`.
+    pub(crate) weights: Vec<f32>,
+    sums: [Vec<f32>; 8],
+}
+
+impl Beside {
+    pub(crate) fn look(&mut self, cells: &Cells<3>, particles: &Particles) {
+        let Particles { mass, density, temperature, velocity: [u, v, w], .. } = particles;
+        mixing_weights(mass, density, &mut self.weights);
+        let fields = [&self.weights, u, v, w, temperature].map(Vec::as_slice);
+        cells.sum(&BesideTerm(Poly6::new(cells.support_radius())), fields, self.sums.each_mut());
+    }
+
+    /// Sum of weights, the particle's own included.
+    #[inline(always)]
+    pub(crate) fn weight(&self, index: usize) -> f32 {
+        self.sums[0][index]
+    }
+
+    /// Differences of the neighbours' velocities.
+    #[inline(always)]
+    pub(crate) fn velocity(&self, index: usize) -> [f32; 3] {
+        [1, 2, 3].map(|k| self.sums[k][index])
+    }
+
+    /// Differences of the neighbours' temperatures.
+    #[inline(always)]
+    pub(crate) fn temperature(&self, index: usize) -> f32 {
+        self.sums[4][index]
+    }
+
+    /// Ways to the neighbours.
+    #[inline(always)]
+    pub(crate) fn offset(&self, index: usize) -> [f32; 3] {
+        [5, 6, 7].map(|k| self.sums[k][index])
+    }
+}

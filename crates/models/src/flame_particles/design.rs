@@ -1,0 +1,189 @@
+//! The numbers of the simulation that the paper leaves open, in SI, from the size and speed of the burners.
+
+use bansho_base::{
+    air::Air,
+    assets::Assets,
+    math::{self, DVec3},
+    parameters::Auto,
+};
+
+use super::{
+    burner::Burner,
+    fault::{ParticleFault, ParticleFaultKind},
+    parameters::{BurnerParameters, FlameParticlesParameters},
+};
+
+/// Most particles.
+const MOST_PARTICLES: i64 = 20_000_000;
+/// Bytes that a particle takes, buffers of a step included.
+const PARTICLE_BYTES: f64 = 320.0;
+/// Times until its tip that gas may take before it is removed, whatever holds it.
+const LONGEST_RISE: f64 = 3.0;
+/// How much the fuel that a fire draws from its burner rises and falls as it puffs, as a share.
+const PULSE: f64 = 0.6;
+/// Fewest steps that gas lives, so that births in one step stay bounded.
+const FEWEST_STEPS: f64 = 4.0;
+
+/// All that follows from the parameters and stays.
+///
+/// Every particle stands for the same volume V of gas at birth. So many live that all burners together hold `particles`:
+/// a burner gives `A w / V` a second, and gas lives for the time until the tip and its afterlife. The support radius d is
+/// `support` times the mean distance `V^(1/3)`, mass m is V times the density of air as hot as the gas, rho_0 a share of
+/// that density, and k the square of a speed of sound that is a few times the gas's own speed.
+#[derive(Clone, Debug)]
+pub(crate) struct Design {
+    pub(crate) burners: Vec<Burner>,
+    /// Births a second of each burner at full flow.
+    pub(crate) rates: Vec<f64>,
+    /// How often each burner puffs, Hz.
+    pub(crate) puffing_hz: Vec<f64>,
+    /// How much more gas than on the mean comes at the height of a beat, as a share.
+    pub(crate) pulse: f64,
+    /// Support radius d, m.
+    pub(crate) support_radius: f32,
+    /// Mass m, kg.
+    pub(crate) mass: f32,
+    /// Density of reference rho_0, kg/m^3.
+    pub(crate) rest_density: f32,
+    /// k of eq. (11) a kelvin, m^2/(s^2 K).
+    pub(crate) stiffness_per_kelvin: f32,
+    /// Corners of the domain, m, from the flame's position.
+    pub(crate) domain: [DVec3; 2],
+    /// How long it burns before the shot, s.
+    pub(crate) preroll: f64,
+    /// More than these never live.
+    pub(crate) most: usize,
+}
+
+impl Design {
+    pub(crate) fn new(parameters: &FlameParticlesParameters, assets: &dyn Assets) -> Result<Self, ParticleFault> {
+        check_count(parameters.particles)?;
+        let burners = burners(parameters, assets)?;
+        let domain = domain(parameters, &burners)?;
+        let stay =
+            |burner: &Burner| (burner.rise_time() + parameters.life.afterlife_s).max(FEWEST_STEPS * parameters.step_s);
+        let flux = |burner: &Burner| burner.square_metres * burner.speed;
+        let count = parameters.particles as f64;
+        let volume = burners.iter().map(|burner| flux(burner) * stay(burner)).sum::<f64>() / count;
+        let support_radius = parameters.fluid.support * math::cbrt(volume);
+        let side = (domain[1] - domain[0]).min_element();
+        if support_radius > side {
+            let kind = ParticleFaultKind::SupportBeyondDomain { radius: support_radius, side };
+            return Err(ParticleFault { key: "particles".into(), kind });
+        }
+        let coolest = burners.iter().map(|burner| burner.parameters.temperature_k).fold(f64::INFINITY, f64::min);
+        let density = Air::default().density_at(coolest);
+        let fastest = burners.iter().map(|burner| burner.speed).fold(0.0, f64::max);
+        let sound = parameters.fluid.stiffness * fastest;
+        let longest = burners.iter().map(stay).fold(0.0, f64::max);
+        Ok(Self {
+            rates: burners.iter().map(|burner| flux(burner) / volume).collect(),
+            puffing_hz: burners.iter().map(|burner| burner.puffing_hz(parameters)).collect(),
+            pulse: (PULSE * parameters.motion.puffing).min(0.9),
+            support_radius: support_radius as f32,
+            mass: (density * volume) as f32,
+            rest_density: (parameters.fluid.rest_density * density) as f32,
+            stiffness_per_kelvin: (sound * sound / coolest) as f32,
+            domain,
+            preroll: match parameters.preroll_s {
+                Auto::Set(seconds) => seconds,
+                Auto::Auto => (2.0 * longest).min(60.0),
+            },
+            most: 2 * parameters.particles as usize + 16,
+            burners,
+        })
+    }
+
+    /// Age at which a particle of burner `index` is removed even if it still burns, s.
+    pub(crate) fn longest_life(&self, index: usize, afterlife_s: f64) -> f64 {
+        LONGEST_RISE * self.burners[index].rise_time() + afterlife_s
+    }
+}
+
+fn check_count(count: i64) -> Result<(), ParticleFault> {
+    if count <= MOST_PARTICLES {
+        return Ok(());
+    }
+    let gib = count as f64 * PARTICLE_BYTES / f64::from(1 << 30);
+    let kind = ParticleFaultKind::TooManyParticles { count, gib, most: MOST_PARTICLES };
+    Err(ParticleFault { key: "particles".into(), kind })
+}
+
+fn burners(parameters: &FlameParticlesParameters, assets: &dyn Assets) -> Result<Vec<Burner>, ParticleFault> {
+    let single = [BurnerParameters::default()];
+    let listed = if parameters.burners.is_empty() { &single[..] } else { &parameters.burners };
+    let make = |(index, burner): (usize, &BurnerParameters)| {
+        Burner::new(burner, parameters, assets)
+            .map_err(|kind| ParticleFault { key: format!("burners.{index}.file"), kind })
+    };
+    listed.iter().enumerate().map(make).collect()
+}
+
+/// The box that gas may fill: as given, or with room for three flames above and around.
+fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[DVec3; 2], ParticleFault> {
+    let room = |burner: &Burner| burner.reach + 3.0 * burner.height;
+    let places = || burners.iter().map(|burner| (burner.placement.position, DVec3::splat(room(burner))));
+    let low = places().map(|(place, room)| place - room).fold(DVec3::INFINITY, DVec3::min);
+    let high = places().map(|(place, room)| place + room).fold(DVec3::NEG_INFINITY, DVec3::max);
+    let given = |corner: Auto<[f64; 3]>, auto| if let Auto::Set(corner) = corner { DVec3::from(corner) } else { auto };
+    let [min, max] = [given(parameters.domain_min, low), given(parameters.domain_max, high)];
+    if min.cmpge(max).any() {
+        let kind = ParticleFaultKind::EmptyDomain { min: min.into(), max: max.into() };
+        return Err(ParticleFault { key: "domain_max".into(), kind });
+    }
+    for (index, burner) in burners.iter().enumerate() {
+        let place = burner.placement.position;
+        if place.cmplt(min).any() || place.cmpgt(max).any() {
+            let kind = ParticleFaultKind::OutsideDomain { place: place.into(), min: min.into(), max: max.into() };
+            return Err(ParticleFault { key: format!("burners.{index}.position"), kind });
+        }
+    }
+    Ok([min, max])
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::assets::MemoryAssets;
+
+    use super::*;
+
+    fn design(parameters: &FlameParticlesParameters) -> Result<Design, ParticleFault> {
+        Design::new(parameters, &MemoryAssets::default())
+    }
+
+    #[test]
+    fn rates_hold_the_number_of_particles_and_volumes_meet_at_the_burner() {
+        let small = BurnerParameters { diameter: 0.1, heat_release_kw: 10.0, ..Default::default() };
+        let parameters = FlameParticlesParameters {
+            burners: vec![small, BurnerParameters::default()],
+            ..FlameParticlesParameters::default()
+        };
+        let design = design(&parameters).unwrap();
+        let stay = |burner: &Burner| burner.rise_time() + parameters.life.afterlife_s;
+        let living: f64 = design.burners.iter().zip(&design.rates).map(|(burner, rate)| rate * stay(burner)).sum();
+        assert!((living - parameters.particles as f64).abs() < 1.0);
+        let spacing = f64::from(design.support_radius) / parameters.fluid.support;
+        let layer = design.rates[1] / (design.burners[1].square_metres * design.burners[1].speed);
+        assert!((spacing * spacing * spacing * layer - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn parameters_that_do_not_go_together_are_named() {
+        let default = FlameParticlesParameters::default;
+        let fault = |parameters| design(&parameters).unwrap_err();
+        let far = BurnerParameters { position: [0.0, 90.0, 0.0], ..Default::default() };
+        let outside = FlameParticlesParameters {
+            burners: vec![BurnerParameters::default(), far],
+            domain_max: Auto::Set([5.0; 3]),
+            ..default()
+        };
+        assert_eq!(fault(outside).key, "burners.1.position");
+        let empty = FlameParticlesParameters { domain_max: Auto::Set([-50.0; 3]), ..default() };
+        assert_eq!(fault(empty).key, "domain_max");
+        let thin = [Auto::Set([-0.01; 3]), Auto::Set([0.01; 3])];
+        let wide = FlameParticlesParameters { particles: 5, domain_min: thin[0], domain_max: thin[1], ..default() };
+        assert!(matches!(fault(wide).kind, ParticleFaultKind::SupportBeyondDomain { .. }));
+        let many = fault(FlameParticlesParameters { particles: 900_000_000, ..default() });
+        assert_eq!(many.to_string(), "particles: 900000000 particles would take 268 GiB; allowed: up to 20000000");
+    }
+}

@@ -1,0 +1,86 @@
+//! The gas as the drawing sees it: where it is when the shutter is half closed, and what it radiates and absorbs.
+
+use bansho_base::{
+    color,
+    math::{self, DVec2, DVec3},
+    random::Key,
+};
+
+use super::look::LookParameters;
+use crate::flame_particles::Particles;
+
+/// The gas of one flame at one moment, with what the drawing needs to know of its surroundings.
+#[derive(Clone, Copy, Debug)]
+pub struct Gas<'a> {
+    /// The particles.
+    pub particles: &'a Particles,
+    /// The time of their state, s.
+    pub time: f64,
+    /// Temperature of the air around, K.
+    pub air_temperature_k: f64,
+    /// Speed of the gas where its detail is not stretched, m/s.
+    pub detail_speed: f64,
+    /// Middle of the fire's base, m, from where sparks fly.
+    pub base: DVec3,
+    /// Width and usual height of the fire, m.
+    pub size: DVec2,
+    /// Key of the flame's random numbers.
+    pub key: Key,
+}
+
+/// Absorption of soot, 1/m, per volume fraction: about `4.9 / lambda` (Dalzell & Sarofim 1969), for green light.
+const SOOT_ABSORPTION: f64 = 4.9 / 550e-9;
+
+/// Luminance of a metre of freshly burning gas in the light of CH and C2, cd/m^2. The zone that shines is a film of a millimetre with
+/// some tens; particles spread it over centimetres.
+const BLUE_LUMINANCE: f64 = 300.0;
+
+/// Absorption coefficient of soot of a volume fraction, 1/m.
+pub fn soot_absorption(volume_fraction: f64, look: &LookParameters) -> f64 {
+    volume_fraction * SOOT_ABSORPTION * look.soot_gain
+}
+
+impl Gas<'_> {
+    /// Where particle `index` is at time `t`, m: its state, moved on by its velocity.
+    #[inline(always)]
+    pub(crate) fn place(&self, index: usize, t: f64) -> DVec3 {
+        let since = t - self.time;
+        let coordinate = |axis: usize| {
+            f64::from(self.particles.position[axis][index]) + since * f64::from(self.particles.velocity[axis][index])
+        };
+        self.particles.origin + DVec3::new(coordinate(0), coordinate(1), coordinate(2))
+    }
+
+    /// The volume m/rho that a particle stands for, m^3.
+    #[inline(always)]
+    pub(crate) fn volume(&self, index: usize) -> f64 {
+        let density = f64::from(self.particles.density[index]);
+        if density > 0.0 { f64::from(self.particles.mass[index]) / density } else { 0.0 }
+    }
+
+    /// Absorption coefficient of a particle's soot, 1/m.
+    #[inline(always)]
+    pub(crate) fn absorption(&self, index: usize, look: &LookParameters) -> f64 {
+        soot_absorption(f64::from(self.particles.soot[index]), look)
+    }
+
+    /// Luminance of a black body as hot as a particle, cd/m^2.
+    #[inline(always)]
+    pub(crate) fn luminance(&self, index: usize) -> f64 {
+        f64::from(color::luminance(color::black_body().radiance(self.particles.temperature[index])))
+    }
+
+    /// Luminance of a metre of a particle's gas in the blue light of fresh flame, cd/m^2.
+    ///
+    /// CH and C2 live only where fuel has just begun to burn, and nowhere that soot has formed.
+    #[inline(always)]
+    pub(crate) fn blue(&self, index: usize, look: &LookParameters) -> f64 {
+        /// Volume fraction of soot that outshines and quenches the blue light.
+        const SOOTY: f64 = 1e-7;
+        /// Share of the fuel that has burnt when the light is strongest.
+        const BEGUN: f64 = 0.06;
+        let burnt = (1.0 - f64::from(self.particles.fuel[index])).clamp(0.0, 1.0) / BEGUN;
+        let sooty = f64::from(self.particles.soot[index]).max(0.0) / SOOTY;
+        BLUE_LUMINANCE * look.base_blue * burnt * math::exp(1.0 - burnt) / (1.0 + sooty * sooty)
+    }
+}

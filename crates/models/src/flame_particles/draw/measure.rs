@@ -1,0 +1,134 @@
+//! What the gas says of itself beside its light: temperature, optical depth, deflection and motion.
+
+use bansho_base::{
+    canvas::{AovDescriptor, AovRule, Strip, View},
+    image::Rect,
+};
+
+use super::{
+    gas::Gas,
+    grid::{Grid, weigh},
+    kernel::Profile,
+    look::LookParameters,
+    resolve::{Extents, GLOW, HEAT, Layer, Resolve, Row, TAU},
+    splat::{COARSE, Sheet, Sprite, splat},
+    sprite::seen,
+};
+
+/// What a particle flame can write beside its light, in the order of a strip's planes.
+pub const AOVS: &[AovDescriptor] = &[
+    AovDescriptor {
+        name: "temperature_k",
+        unit: "K",
+        doc: "Gas temperature, weighted by the luminance that its soot adds; 0 where no soot glows.",
+        rule: AovRule::WeightedMean,
+    },
+    AovDescriptor {
+        name: "optical_depth",
+        unit: "",
+        doc: "Optical depth of soot along the line of sight, before detail; 0 where there is none.",
+        rule: AovRule::Sum,
+    },
+    AovDescriptor {
+        name: "deflection.X",
+        unit: "rad",
+        doc: "Angle to the right by which hot gas bends the light of what lies behind, with the artist's gain; 0 where it is straight.",
+        rule: AovRule::Sum,
+    },
+    AovDescriptor {
+        name: "deflection.Y",
+        unit: "rad",
+        doc: "Angle upward by which hot gas bends the light of what lies behind, with the artist's gain; 0 where it is straight.",
+        rule: AovRule::Sum,
+    },
+    AovDescriptor {
+        name: "motion.X",
+        unit: "pixels",
+        doc: "Motion of the gas to the next frame, to the right, weighted by luminance; 0 where no soot glows.",
+        rule: AovRule::WeightedMean,
+    },
+    AovDescriptor {
+        name: "motion.Y",
+        unit: "pixels",
+        doc: "Motion of the gas to the next frame, downward, weighted by luminance; 0 where no soot glows.",
+        rule: AovRule::WeightedMean,
+    },
+];
+
+/// Places of the planes among a strip's AOVs.
+const TEMPERATURE: usize = 0;
+const OPTICAL_DEPTH: usize = 1;
+pub(crate) const DEFLECTION: [usize; 2] = [2, 3];
+const MOTION: [usize; 2] = [4, 5];
+
+/// Summed motion of the glowing gas: luminance, and luminance times pixels to the right and down.
+pub(crate) struct Motion {
+    grid: Grid,
+    weights: Vec<[f32; 4]>,
+}
+
+impl Motion {
+    pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View) -> Option<Self> {
+        let light = |index: usize| gas.absorption(index, look) * gas.luminance(index) * gas.volume(index);
+        let shown = seen(gas, view, |index| light(index) > 0.0);
+        let sprite = |seen: &super::sprite::Seen| {
+            let weight = (light(seen.index) * f64::from(seen.ellipse.peak)) as f32;
+            let values = [weight, weight * seen.motion[0], weight * seen.motion[1]];
+            Sprite { ellipse: seen.ellipse, layer: 0, split: 0.0, values }
+        };
+        let sprites: Vec<Sprite<3>> = shown.iter().map(sprite).collect();
+        let grid =
+            splat(&Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, window: view.window }, &sprites)?;
+        Some(Self { weights: grid.cells.weights(), grid })
+    }
+
+    /// Pixels to the right and down that the gas at a pixel moves until the next frame.
+    fn at(&self, x: usize, y: usize) -> [f32; 2] {
+        let cells = &self.grid.cells;
+        let ((column, across), (row, down)) = (cells.before(0, x), cells.before(1, y));
+        let start = 3 * self.grid.first_of_four(column);
+        let rows = [-1, 0, 1, 2].map(|k| &self.grid.row(row + k)[start..start + 12]);
+        let mut four = [0.0; 12];
+        weigh(&mut four, rows, &self.weights[down]);
+        let plane = |plane: usize| (0..4).map(|k| four[3 * k + plane] * self.weights[across][k]).sum::<f32>();
+        let weight = plane(0);
+        if weight > 0.0 { [plane(1) / weight, plane(2) / weight] } else { [0.0; 2] }
+    }
+}
+
+impl Resolve<'_> {
+    /// Adds the AOVs of a layer in the part `rect` of a strip. Only what is asked for is measured, a pixel at a time.
+    pub(crate) fn measure_layer(
+        &self,
+        layer: &Layer,
+        extents: &Extents,
+        motion: Option<&Motion>,
+        rect: Rect,
+        row: &mut Row,
+        strip: &mut Strip,
+    ) {
+        /// Luminance whose soot still counts as glowing, cd/m^2.
+        const DARK: f32 = 1e-3;
+        for y in rect.y..rect.bottom() {
+            let Some([first, last]) = self.fill(layer.index, y, extents, row) else { continue };
+            let from = first.max(rect.x) / 16 * 16;
+            for x in (from..last.min(rect.right())).step_by(16) {
+                let Some(sums) = self.sums(row, layer.index, x) else { continue };
+                for pixel in x.max(rect.x)..(x + 16).min(rect.right()) {
+                    let lane = pixel - x;
+                    let index = (y - strip.rect.y) * strip.rect.width + pixel - strip.rect.x;
+                    let [tau, glow, heat] = [TAU, GLOW, HEAT].map(|plane| sums.planes[plane][lane]);
+                    if !strip.visible(index, layer.depth as f32) {
+                        continue;
+                    }
+                    strip.aovs[OPTICAL_DEPTH].add(index, tau, 1.0);
+                    if glow > DARK {
+                        strip.aovs[TEMPERATURE].add(index, heat / glow, glow);
+                        let moved = motion.map_or([0.0; 2], |motion| motion.at(pixel, y));
+                        (0..2).for_each(|axis| strip.aovs[MOTION[axis]].add(index, moved[axis], glow));
+                    }
+                }
+            }
+        }
+    }
+}

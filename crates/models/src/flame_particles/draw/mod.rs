@@ -1,0 +1,30 @@
+//! How the gas looks: what it radiates, absorbs and bends, and the particles as the paper shows them.
+//!
+//! Each particle is a ball of gas whose line integral is known in closed form ([`kernel`]). [`sprite`] finds its ellipse in the picture,
+//! [`splat`] sums all of them on a grid that is as coarse as they are smooth, in a few layers of depth; [`resolve`] turns the sums into
+//! light at every pixel, with the detail ([`detail`]) that sums lack. [`haze`] sums deflections, [`light`] what others are lit with.
+
+mod detail;
+mod gas;
+mod grid;
+mod haze;
+mod kernel;
+mod layers;
+mod light;
+mod look;
+mod measure;
+mod prepared;
+mod resolve;
+mod splat;
+mod sprite;
+mod squares;
+
+pub use gas::{Gas, soot_absorption};
+pub use kernel::{line_gradient, line_integral};
+pub use light::luminous;
+pub use look::{GasLightParameters, LookParameters, Sprite};
+pub use measure::AOVS;
+pub use prepared::{PreparedGas, depth_intervals};
+
+#[cfg(test)]
+mod tests;

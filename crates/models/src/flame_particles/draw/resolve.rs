@@ -1,0 +1,280 @@
+//! From summed sprites to light: a row of the picture, layer by layer, sixteen pixels at a time.
+
+use bansho_base::{
+    camera::Camera,
+    canvas::Strip,
+    color,
+    image::Rect,
+    math::{DVec2, DVec3, lanes},
+};
+
+use super::{
+    detail::{Burning, Detail},
+    grid::Grid,
+};
+
+/// Sums that a layer holds in each cell, as many as fill a vector.
+pub(crate) const PLANES: usize = 8;
+/// Optical depth of soot.
+pub(crate) const TAU: usize = 0;
+/// Optical depth times luminance of a black body as hot.
+pub(crate) const GLOW: usize = 1;
+/// The same times temperature.
+pub(crate) const HEAT: usize = 2;
+/// Optical depth times where in its detail the gas lies (three planes).
+pub(crate) const MATTER: usize = 3;
+/// Luminance of the blue light.
+pub(crate) const BLUE: usize = 6;
+
+const LANES: usize = 16;
+type Batch = [f32; LANES];
+
+/// How sums become light.
+pub(crate) struct Resolve<'a> {
+    pub(crate) grid: &'a Grid,
+    pub(crate) camera: &'a Camera,
+    /// Where the places of detail count from, m.
+    pub(crate) origin: DVec3,
+    pub(crate) detail: Option<&'a Detail>,
+    /// Whether light is that of soot that hides itself, `B (1 - exp(-tau))`, or simply the sum (the paper).
+    pub(crate) hides_itself: bool,
+    /// ACEScg of luminance 1.
+    pub(crate) blue: [f32; 3],
+    /// What the soot of each layer scatters toward the camera where it hides everything, ACEScg, cd/m^2.
+    pub(crate) scattered: &'a [[f32; 3]],
+    /// Interpolation of each phase of a cell.
+    pub(crate) weights: &'a [[f32; 4]],
+}
+
+/// One layer of the gas in a strip.
+pub(crate) struct Layer {
+    pub(crate) index: usize,
+    /// Depth of its middle, m.
+    pub(crate) depth: f64,
+    pub(crate) thickness: f64,
+}
+
+/// The sums of all layers along a row of pixels, still in cells.
+pub(crate) type Row = Vec<f32>;
+
+/// The gas of one layer at sixteen pixels.
+pub(crate) struct Sums {
+    pub(crate) planes: [Batch; PLANES],
+}
+
+impl Resolve<'_> {
+    /// Scratch for [`fill`](Self::fill).
+    pub(crate) fn row(&self) -> Row {
+        vec![0.0; self.grid.row_length()]
+    }
+
+    /// The sums of a layer along row `y` of the picture, and the pixels that hold anything.
+    #[inline(always)]
+    pub(crate) fn fill(&self, layer: usize, y: usize, extents: &Extents, row: &mut Row) -> Option<[usize; 2]> {
+        let (cells, depth) = (&self.grid.cells, self.grid.depth);
+        let (cell, phase) = cells.before(1, y);
+        let [first, last] = extents.around(layer, cell)?;
+        // Pixels reach three cells further, and cubic interpolation two more.
+        let from = (first as usize).saturating_sub(6);
+        let to = (last as usize + 7).min(cells.columns);
+        let rows = [self.grid.row(cell - 1), self.grid.row(cell), self.grid.row(cell + 1), self.grid.row(cell + 2)];
+        let weights = &self.weights[phase];
+        for column in from..to {
+            let start = column * depth + layer * PLANES;
+            let Some(sums) = row[start..].first_chunk_mut::<PLANES>() else { continue };
+            *sums = weighted(rows, [start; 4], weights);
+        }
+        let pixel = |column: i64| ((column + i64::from(cells.first[0])) * cells.size() as i64).max(0) as usize;
+        Some([pixel(i64::from(first) - 2), pixel(i64::from(last) + 3)])
+    }
+
+    /// The gas at sixteen pixels; `None` where there is none.
+    #[inline(always)]
+    pub(crate) fn sums(&self, row: &[f32], layer: usize, x: usize) -> Option<Sums> {
+        let mut planes = [[0.0; LANES]; PLANES];
+        for lane in 0..LANES {
+            let (cell, phase) = self.grid.cells.before(0, x + lane);
+            let start = self.grid.first_of_four(cell) * self.grid.depth + layer * PLANES;
+            let starts = [0, 1, 2, 3].map(|k| start + k * self.grid.depth);
+            let sums = weighted([row; 4], starts, &self.weights[phase]);
+            for plane in 0..PLANES {
+                planes[plane][lane] = sums[plane];
+            }
+        }
+        // Less than this is seen neither in light nor in shade.
+        let (mut tau, mut blue) = (1e-6_f32, 1e-3_f32);
+        for lane in 0..LANES {
+            tau = tau.max(planes[TAU][lane]);
+            blue = blue.max(planes[BLUE][lane]);
+        }
+        if tau <= 1e-6 && blue <= 1e-3 {
+            return None;
+        }
+        for plane in [TAU, GLOW, HEAT, BLUE] {
+            for lane in 0..LANES {
+                // Cubics swing a little below nothing at the edges.
+                planes[plane][lane] = planes[plane][lane].max(0.0);
+            }
+        }
+        Some(Sums { planes })
+    }
+
+    /// Places in the detail of sixteen pixels.
+    #[inline(always)]
+    fn places(&self, sums: &Sums, detail: &Detail, layer: &Layer, x: usize, y: usize) -> Option<[Batch; 3]> {
+        let at = |column: f64| {
+            let direction = self.camera.direction(DVec2::new(column, y as f64 + 0.5))?;
+            Some((self.camera.position + direction * layer.depth - self.origin).as_vec3().to_array())
+        };
+        let (first, last) = (at(x as f64 + 0.5), at((x + LANES) as f64 - 0.5));
+        let (first, last) = (first.or(last)?, last.or(first)?);
+        let mut places = [[0.0; LANES]; 3];
+        for axis in 0..3 {
+            let start = first[axis] * detail.cells_per_metre[axis];
+            let step = (last[axis] - first[axis]) * detail.cells_per_metre[axis] * (1.0 / (LANES - 1) as f32);
+            for lane in 0..LANES {
+                let matter = sums.planes[MATTER + axis][lane] / sums.planes[TAU][lane].max(1e-20);
+                places[axis][lane] = step.mul_add(lane as f32, start) + matter.clamp(-1e4, 1e4);
+            }
+        }
+        Some(places)
+    }
+
+    /// Adds a layer to the part `rect` of a strip, behind what it holds.
+    #[inline(always)]
+    pub(crate) fn draw_layer(&self, layer: &Layer, extents: &Extents, rect: Rect, row: &mut Row, strip: &mut Strip) {
+        for y in rect.y..rect.bottom() {
+            let Some([first, last]) = self.fill(layer.index, y, extents, row) else { continue };
+            // Batches begin at multiples of sixteen columns of the whole picture, so that crops change nothing.
+            let from = first.max(rect.x) / LANES * LANES;
+            for x in (from..last.min(rect.right())).step_by(LANES) {
+                if let Some(sums) = self.sums(row, layer.index, x) {
+                    self.draw_batch(&sums, layer, [x, y], rect, strip);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn draw_batch(&self, sums: &Sums, layer: &Layer, [x, y]: [usize; 2], rect: Rect, strip: &mut Strip) {
+        let from = x.max(rect.x);
+        let to = (x + LANES).min(rect.right());
+        if from >= to {
+            return;
+        }
+        let start = (y - strip.rect.y) * strip.rect.width + from - strip.rect.x;
+        let mut shown = [1.0; LANES];
+        if strip.has_plate() {
+            for pixel in from..to {
+                let ahead = (f64::from(strip.plate_depth(start + pixel - from)) - layer.depth) / layer.thickness;
+                shown[pixel - x] = (ahead + 0.5).clamp(0.0, 1.0) as f32;
+            }
+        }
+        let mut light = self.light(sums, layer, x, y);
+        for plane in &mut light.planes {
+            for lane in 0..LANES {
+                plane[lane] *= shown[lane];
+            }
+        }
+        let lit = from - x..to - x;
+        let mut depth = [f32::INFINITY; LANES];
+        for lane in lit.clone() {
+            if light.planes[3][lane] > 1e-3 || light.planes[1][lane] > 1e-2 {
+                depth[lane] = layer.depth as f32;
+            }
+        }
+        let [red, green, blue, opacity] = light.planes.each_ref().map(|plane| &plane[lit.clone()]);
+        strip.add_row_behind(start, [red, green, blue], Some(opacity), &depth[lit]);
+    }
+
+    /// Red, green, blue and opacity of sixteen pixels of a layer.
+    #[inline(always)]
+    fn light(&self, sums: &Sums, layer: &Layer, x: usize, y: usize) -> Light {
+        let [tau, glow, heat, ..] = &sums.planes;
+        let (mut depth_factor, mut heat_factor) = ([1.0; LANES], [1.0; LANES]);
+        if let Some(detail) = self.detail
+            && !detail.is_lost(tau)
+            && let Some(places) = self.places(sums, detail, layer, x, y)
+        {
+            Burning { depth: depth_factor, heat: heat_factor } = detail.burning(&places, tau);
+        }
+        let table = color::black_body();
+        let mut planes = [[0.0; LANES]; 4];
+        let mut emitting = [0.0; LANES];
+        for lane in 0..LANES {
+            let depth = tau[lane] * depth_factor[lane];
+            planes[3][lane] = 1.0 - lanes::exp(-depth);
+            emitting[lane] = if self.hides_itself { planes[3][lane] } else { depth };
+        }
+        for lane in 0..LANES {
+            if glow[lane] > 0.0 && tau[lane] > 0.0 {
+                let hue = table.radiance(heat[lane] / glow[lane] * heat_factor[lane]);
+                // The sum's luminance is exact; its colour is that of its mean temperature, a little hotter where it burns most.
+                let factor = emitting[lane] * glow[lane] / (tau[lane] * color::luminance(hue).max(1e-20));
+                for c in 0..3 {
+                    planes[c][lane] = hue[c] * factor;
+                }
+            }
+        }
+        let scattered = &self.scattered[layer.index];
+        for c in 0..3 {
+            for lane in 0..LANES {
+                let blue = self.blue[c] * sums.planes[BLUE][lane];
+                planes[c][lane] += scattered[c].mul_add(planes[3][lane], blue);
+            }
+        }
+        Light { planes }
+    }
+}
+
+/// The sum of four cells' values of a layer, found at `starts` in `rows`, times weights.
+#[inline(always)]
+fn weighted(rows: [&[f32]; 4], starts: [usize; 4], weights: &[f32; 4]) -> [f32; PLANES] {
+    let mut sums = [0.0; PLANES];
+    for k in 0..4 {
+        let Some(values) = rows[k][starts[k]..].first_chunk::<PLANES>() else { continue };
+        for plane in 0..PLANES {
+            sums[plane] = weights[k].mul_add(values[plane], sums[plane]);
+        }
+    }
+    sums
+}
+
+/// Red, green, blue and opacity.
+struct Light {
+    planes: [Batch; 4],
+}
+
+/// The columns of cells of each row and layer that hold anything.
+pub(crate) struct Extents {
+    layers: usize,
+    rows: Vec<[u32; 2]>,
+}
+
+impl Extents {
+    pub(crate) fn new(grid: &Grid, layers: usize) -> Self {
+        use rayon::prelude::*;
+        let columns = grid.cells.columns;
+        let extent = |index: usize| {
+            let (row, layer) = (index / layers, index % layers);
+            let cells = grid.row(row as i32);
+            let value = |column: usize, plane: usize| cells[column * grid.depth + layer * PLANES + plane];
+            let holds = |column: &usize| value(*column, TAU) > 0.0 || value(*column, BLUE) > 0.0;
+            let first = (0..columns).find(holds);
+            let last = (0..columns).rfind(holds);
+            first.zip(last).map_or([u32::MAX, 0], |(first, last)| [first as u32, last as u32])
+        };
+        let rows = (0..grid.cells.rows * layers).into_par_iter().with_min_len(64).map(extent).collect();
+        Self { layers, rows }
+    }
+
+    /// First and last column that interpolation in the rows around `cell` can see.
+    fn around(&self, layer: usize, cell: i32) -> Option<[u32; 2]> {
+        let rows = (self.rows.len() / self.layers) as i32;
+        let extents = (cell - 1..=cell + 2)
+            .filter(|row| (0..rows).contains(row))
+            .map(|row| self.rows[row as usize * self.layers + layer]);
+        let [first, last] = extents.fold([u32::MAX, 0], |all, own| [all[0].min(own[0]), all[1].max(own[1])]);
+        (first <= last).then_some([first, last])
+    }
+}

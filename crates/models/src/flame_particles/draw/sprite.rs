@@ -1,0 +1,177 @@
+//! From particles to what the picture sees of them: ellipses of falling weight.
+
+use bansho_base::{
+    camera::{Camera, Lens, Projection},
+    canvas::View,
+    math::{DMat2, DVec2, DVec3},
+};
+use rayon::prelude::*;
+
+use super::{
+    gas::Gas,
+    kernel::{LINE_PEAK, VARIANCE},
+};
+
+/// An ellipse around a place in the picture: `q = a u^2 + 2 b u v + c v^2` is 1 on its edge.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ellipse {
+    /// Pixels from the picture's left and top edges.
+    pub(crate) centre: [f32; 2],
+    /// a, b and c, 1/pixel^2.
+    pub(crate) shape: [f32; 3],
+    /// How far it reaches sideways and upright, pixels.
+    pub(crate) reach: [f32; 2],
+    /// Half its shorter axis, pixels.
+    pub(crate) radius: f32,
+    /// What a ray through the middle sees of a particle of one cubic metre that absorbs 1/m.
+    pub(crate) peak: f32,
+}
+
+/// A particle in the picture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen {
+    pub(crate) index: usize,
+    pub(crate) ellipse: Ellipse,
+    pub(crate) depth: f64,
+    /// Pixels to the right and down that it moves until the next frame.
+    pub(crate) motion: [f32; 2],
+    /// Pixels a metre.
+    pub(crate) scale: f32,
+}
+
+/// Sprites further out than this are of no picture, pixels.
+const FAR_OUT: f64 = 1e6;
+
+/// A pixel's own footprint as the variance of a sprite: sprites are widened by it, so that the smallest neither flicker nor vanish.
+const FOOTPRINT: f64 = 0.18;
+
+/// Every particle that the view can see, in their own order, those of no `weight` left out.
+pub(crate) fn seen(gas: &Gas, view: &View, weight: impl Fn(usize) -> bool + Sync) -> Vec<Seen> {
+    /// Particles that one task takes.
+    const AT_ONCE: usize = 2048;
+    let eye = Eye::new(view);
+    let count = gas.particles.len();
+    let tasks: Vec<Vec<Seen>> = (0..count.div_ceil(AT_ONCE))
+        .into_par_iter()
+        .map(|task| {
+            let range = task * AT_ONCE..((task + 1) * AT_ONCE).min(count);
+            range.filter(|index| weight(*index)).flat_map(|index| eye.see(gas, index)).flatten().collect()
+        })
+        .collect();
+    tasks.concat()
+}
+
+/// The camera now and at the next frame.
+struct Eye<'a> {
+    view: &'a View,
+    next: Camera,
+    /// Shutter time beside the time from frame to frame.
+    open_share: f64,
+}
+
+impl<'a> Eye<'a> {
+    fn new(view: &'a View) -> Self {
+        let frame = (view.next_middle - view.shutter.middle()).max(1e-9);
+        Self { view, next: view.camera_at(view.next_middle), open_share: view.shutter.duration() / frame }
+    }
+
+    /// A particle, twice where a panorama's seam cuts it.
+    fn see(&self, gas: &Gas, index: usize) -> [Option<Seen>; 2] {
+        let middle = self.view.shutter.middle();
+        let place = gas.place(index, middle);
+        let camera = &self.view.camera;
+        let Some(first) = camera.project(place) else { return [None, None] };
+        let after = self.next.project(gas.place(index, self.view.next_middle));
+        let motion = after.map_or(DVec2::ZERO, |after| across_seam(camera, after.pixel - first.pixel));
+        let around = (camera.lens == Lens::Panorama).then(|| {
+            let turn = std::f64::consts::TAU * camera.focal_pixels;
+            let side = if first.pixel.x > camera.centre.x { -turn } else { turn };
+            Projection { pixel: first.pixel + DVec2::new(side, 0.0), ..first }
+        });
+        [Some(first), around].map(|seen| {
+            let seen = seen?;
+            let ellipse = self.ellipse(gas, index, place, &seen, motion * self.open_share)?;
+            let motion = motion.as_vec2().to_array();
+            Some(Seen { index, ellipse, depth: seen.depth, motion, scale: seen.pixels_per_metre as f32 })
+        })
+    }
+
+    /// The ellipse of a ball seen at `projection` that moves by `blur` pixels while the shutter is open.
+    ///
+    /// A box of that length, and the pixel's footprint, widen the sprite to the same variance; what it holds stays the same.
+    fn ellipse(&self, gas: &Gas, index: usize, place: DVec3, projection: &Projection, blur: DVec2) -> Option<Ellipse> {
+        let camera = &self.view.camera;
+        let radius = f64::from(gas.particles.support_radius[index]);
+        let lens = lens_matrix(camera, place, projection);
+        let ball = lens * lens.transpose() * (radius * radius);
+        let smear = outer(blur) * (1.0 / (12.0 * VARIANCE)) + DMat2::from_diagonal(DVec2::splat(FOOTPRINT / VARIANCE));
+        let matrix = ball + smear;
+        let (trace, determinant) = (matrix.x_axis.x + matrix.y_axis.y, matrix.determinant());
+        if !(determinant > 0.0 && determinant.is_finite()) {
+            return None;
+        }
+        let inverse = matrix.inverse();
+        let least = 0.5 * trace - (0.25 * trace * trace - determinant).max(0.0).sqrt();
+        let reach = DVec2::new(matrix.x_axis.x.sqrt(), matrix.y_axis.y.sqrt());
+        let size = DVec2::new(camera.size[0], camera.size[1]);
+        let centre = projection.pixel;
+        let shown = (centre + reach).cmpgt(DVec2::ZERO).all() && (centre - reach).cmplt(size).all();
+        if !(shown && centre.abs().max_element() < FAR_OUT) {
+            return None;
+        }
+        let before = in_front(projection.depth, camera.near, radius);
+        let peak = LINE_PEAK * before * lens.determinant().abs() / determinant.sqrt();
+        (peak > 0.0).then_some(Ellipse {
+            centre: centre.as_vec2().to_array(),
+            shape: [inverse.x_axis.x, inverse.x_axis.y, inverse.y_axis.y].map(|value| value as f32),
+            reach: reach.as_vec2().to_array(),
+            radius: least.max(0.0).sqrt() as f32,
+            peak: peak as f32,
+        })
+    }
+}
+
+/// The share of a ball that lies before the camera, where it stands within the ball.
+fn in_front(depth: f64, near: f64, radius: f64) -> f64 {
+    bansho_base::math::smoothstep(near, near + radius, depth)
+}
+
+/// A step across a panorama's seam is taken the short way.
+fn across_seam(camera: &Camera, step: DVec2) -> DVec2 {
+    if camera.lens != Lens::Panorama {
+        return step;
+    }
+    let turn = std::f64::consts::TAU * camera.focal_pixels;
+    DVec2::new(step.x - (step.x / turn).round() * turn, step.y)
+}
+
+fn outer(v: DVec2) -> DMat2 {
+    DMat2::from_cols(v * v.x, v * v.y)
+}
+
+/// Pixels to the right and down for a metre across the line of sight: alike in all directions for a perspective lens; the others
+/// stretch circles, by how far two short steps from the place come.
+fn lens_matrix(camera: &Camera, place: DVec3, projection: &Projection) -> DMat2 {
+    let round = DMat2::from_diagonal(DVec2::new(projection.pixels_per_metre, -projection.pixels_per_metre));
+    if camera.lens == Lens::Perspective {
+        return round;
+    }
+    let ray = (place - camera.position).normalize_or(DVec3::Z);
+    let (one, two) = ray.any_orthonormal_pair();
+    let step = 1e-4 * projection.depth;
+    let moved = |direction: DVec3| {
+        let seen = camera.project(place + direction * step)?;
+        Some(across_seam(camera, seen.pixel - projection.pixel) / step)
+    };
+    match (moved(one), moved(two)) {
+        (Some(one), Some(two)) => limited(DMat2::from_cols(one, two), projection.pixels_per_metre),
+        _ => round,
+    }
+}
+
+/// At a panorama's poles circles become bands; beyond this stretch the sprite stays as it is.
+fn limited(matrix: DMat2, scale: f64) -> DMat2 {
+    const MOST: f64 = 40.0;
+    let longest = matrix.x_axis.length().max(matrix.y_axis.length());
+    if longest > MOST * scale { matrix * (MOST * scale / longest) } else { matrix }
+}

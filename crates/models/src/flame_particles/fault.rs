@@ -1,0 +1,65 @@
+//! Faults of a particle flame that no single parameter can see by itself.
+
+use bansho_base::assets::AssetError;
+
+/// A parameter from which, with the others, no particle flame can be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{key}: {kind}")]
+pub struct ParticleFault {
+    /// The parameter, list indices and sub-tables separated by dots, as in `burners.0.file`.
+    pub key: String,
+    /// What is wrong.
+    pub kind: ParticleFaultKind,
+}
+
+/// What can be wrong with parameters that are each within their own bounds.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ParticleFaultKind {
+    /// A burner whose middle lies outside the domain.
+    #[error("the burner stands at {place:?} m, outside the domain from {min:?} to {max:?} m")]
+    OutsideDomain {
+        /// Where its middle is.
+        place: [f64; 3],
+        /// Least corner of the domain.
+        min: [f64; 3],
+        /// Greatest corner.
+        max: [f64; 3],
+    },
+    /// A domain that is inside out.
+    #[error("the domain from {min:?} to {max:?} m is empty; each coordinate of `domain_max` must be greater")]
+    EmptyDomain {
+        /// Least corner.
+        min: [f64; 3],
+        /// Greatest corner.
+        max: [f64; 3],
+    },
+    /// Particles that see farther than the domain is wide.
+    #[error(
+        "the support radius d would be {radius} m, more than the domain's {side} m; use more particles or a larger domain"
+    )]
+    SupportBeyondDomain {
+        /// Support radius d, m.
+        radius: f64,
+        /// Shortest side of the domain, m.
+        side: f64,
+    },
+    /// More particles than fit in memory.
+    #[error("{count} particles would take {gib:.0} GiB; allowed: up to {most}")]
+    TooManyParticles {
+        /// How many are asked for.
+        count: i64,
+        /// What they would take.
+        gib: f64,
+        /// How many fit.
+        most: i64,
+    },
+    /// A burner of shape mesh without a file.
+    #[error("a burner of shape \"mesh\" needs a `file`")]
+    NoFile,
+    /// A mesh that cannot be had.
+    #[error("{0}")]
+    Asset(#[from] AssetError),
+    /// A simulation does not come back to where it began.
+    #[error("a particle flame is simulated and cannot loop")]
+    Loop,
+}

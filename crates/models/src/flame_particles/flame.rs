@@ -1,0 +1,179 @@
+//! The particle flame as a phenomenon: its simulation, and how it is drawn and seen by others.
+
+use bansho_base::{
+    assets::Assets,
+    canvas::{AovDescriptor, DepthInterval, Shutter, View},
+    color,
+    math::{self, DVec2, DVec3},
+    observer::{Cancelled, Observer},
+    parameters::Auto,
+    phenomenon::{Phenomenon, Prepared, SnapshotError, Stepping},
+    point_cloud::PointCloud,
+    random::Key,
+    surroundings::{Publication, Surroundings},
+};
+
+use super::{
+    burner::Burner,
+    design::Design,
+    draw::{self, Gas, PreparedGas, Sprite},
+    fault::{ParticleFault, ParticleFaultKind},
+    parameters::{FlameParticlesParameters, TemperatureLaw},
+    particles::Particles,
+    simulation::Simulation,
+    snapshot,
+};
+
+/// A particle flame at some moment of its life.
+#[derive(Clone, Debug)]
+pub struct FlameParticles {
+    name: String,
+    key: Key,
+    parameters: FlameParticlesParameters,
+    simulation: Simulation,
+    /// Time of the state, s.
+    time: f64,
+    /// Temperature of the air at the last step, K.
+    air_temperature_k: f64,
+}
+
+impl FlameParticles {
+    /// The particle flame `name` of a scene, before its preroll. Meshes of burners come from `assets`.
+    ///
+    /// # Errors
+    /// Parameters that do not go together, a mesh that cannot be had, a seamless loop.
+    pub fn new(
+        parameters: FlameParticlesParameters,
+        name: &str,
+        seed: u64,
+        loop_s: Option<f64>,
+        assets: &dyn Assets,
+    ) -> Result<Self, ParticleFault> {
+        if loop_s.is_some() {
+            return Err(ParticleFault { key: "loop".into(), kind: ParticleFaultKind::Loop });
+        }
+        let key = Key::new(seed, name);
+        let design = Design::new(&parameters, assets)?;
+        let steps = (design.preroll / parameters.step_s).round();
+        Ok(Self {
+            name: name.to_owned(),
+            key,
+            time: -steps * parameters.step_s,
+            air_temperature_k: bansho_base::air::Air::default().temperature_k,
+            simulation: Simulation::new(&parameters, design, key),
+            parameters,
+        })
+    }
+
+    /// The gas as it is now.
+    pub fn particles(&self) -> &Particles {
+        &self.simulation.particles
+    }
+
+    /// The gas as the drawing sees it.
+    fn gas(&self) -> Gas<'_> {
+        let tallest = self.tallest();
+        let place = DVec3::from(self.parameters.position) + tallest.placement.position;
+        Gas {
+            particles: &self.simulation.particles,
+            time: self.time,
+            air_temperature_k: self.air_temperature_k,
+            detail_speed: match self.parameters.look.detail_speed {
+                Auto::Set(speed) => speed,
+                Auto::Auto => UNSTRETCHED * tallest.axis_speed(0.5 * tallest.height),
+            },
+            base: place,
+            size: DVec2::new(tallest.diameter, tallest.height),
+            key: self.key,
+        }
+    }
+
+    fn tallest(&self) -> &Burner {
+        let burners = &self.simulation.design.burners;
+        // A design has at least one burner.
+        let taller = |a: &&Burner, b: &&Burner| a.height.total_cmp(&b.height);
+        burners.iter().max_by(taller).unwrap_or(&burners[0])
+    }
+}
+
+/// Speed of gas that draws its detail as it is, beside that of gas half way up.
+const UNSTRETCHED: f64 = 0.35;
+
+impl Phenomenon for FlameParticles {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn aovs(&self) -> &'static [AovDescriptor] {
+        draw::AOVS
+    }
+
+    fn luminance(&self) -> f64 {
+        /// Bright parts beside a whole flame of the hottest soot.
+        const BRIGHT: f64 = 0.2;
+        let hottest = match self.parameters.life.temperature {
+            TemperatureLaw::Living => self.parameters.life.flame_temperature_k,
+            TemperatureLaw::Constant => self.tallest().parameters.temperature_k,
+        };
+        let black = f64::from(color::luminance(color::black_body().radiance(hottest as f32)));
+        let absorption = draw::soot_absorption(self.parameters.life.soot_ppm * 1e-6, &self.parameters.look);
+        let emissivity = match self.parameters.look.sprite {
+            Sprite::Integral => -math::exp_m1(-absorption * 0.5 * self.tallest().diameter),
+            Sprite::Poly6 | Sprite::Squares => 1.0,
+        };
+        BRIGHT * black * emissivity
+    }
+
+    fn stepping(&self) -> Option<Stepping> {
+        Some(Stepping { step: self.parameters.step_s, preroll: self.simulation.design.preroll })
+    }
+
+    fn step(&mut self, time: f64, surroundings: &Surroundings) {
+        self.simulation.step(time, self.parameters.step_s, surroundings);
+        self.time = time + self.parameters.step_s;
+        self.air_temperature_k = surroundings.air.temperature_k;
+    }
+
+    fn snapshot(&self) -> Vec<u8> {
+        let head = [self.time, self.air_temperature_k].into_iter().flat_map(f64::to_le_bytes);
+        head.chain(snapshot::write(&self.simulation.particles)).collect()
+    }
+
+    fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError> {
+        let (time, rest) = state.split_first_chunk::<8>().ok_or(SnapshotError::Damaged)?;
+        let (air, rest) = rest.split_first_chunk::<8>().ok_or(SnapshotError::Damaged)?;
+        let burners = self.simulation.design.burners.len();
+        self.simulation.particles = snapshot::read(&self.simulation.particles, rest, burners)?;
+        (self.time, self.air_temperature_k) = (f64::from_le_bytes(*time), f64::from_le_bytes(*air));
+        Ok(())
+    }
+
+    fn particles(&self, t: f64) -> Option<PointCloud> {
+        let gas = self.gas();
+        let Particles { velocity: [u, v, w], temperature, density, .. } = gas.particles;
+        Some(PointCloud {
+            positions: (0..gas.particles.len()).map(|index| gas.place(index, t).as_vec3().to_array()).collect(),
+            velocities: u.iter().zip(v).zip(w).map(|((u, v), w)| [*u, *v, *w]).collect(),
+            temperatures_k: temperature.clone(),
+            densities: density.clone(),
+        })
+    }
+
+    fn publish(&self, shutter: Shutter) -> Publication {
+        let lights = draw::luminous(&self.gas(), &self.parameters.look, shutter.middle());
+        Publication { lights, ..Publication::default() }
+    }
+
+    fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
+        draw::depth_intervals(&self.gas(), &self.parameters.look, view)
+    }
+
+    fn prepare<'a>(
+        &'a self,
+        view: &'a View,
+        surroundings: &'a Surroundings<'a>,
+        observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        Ok(Box::new(PreparedGas::new(self.gas(), &self.parameters.look, view, surroundings, observer)?))
+    }
+}

@@ -1,0 +1,202 @@
+//! What becomes of a particle: it heats where it burns, burns as fast as it finds air, cools by mixing and radiation, carries soot.
+
+use super::parameters::{LifeParameters, TemperatureLaw};
+
+/// Specific heat of hot air at constant pressure, J/(kg K).
+const SPECIFIC_HEAT: f32 = 1200.0;
+/// Stefan-Boltzmann constant, W/(m^2 K^4).
+const STEFAN_BOLTZMANN: f32 = 5.670_374e-8;
+/// Planck-mean absorption of soot, 1/(m K), per volume fraction (Tien 1968): `kappa = 1862 f_v T`.
+const SOOT_ABSORPTION: f32 = 1862.0;
+/// Temperature deep inside the flame, where gas waits for air, as a share of that at its front.
+const INNER_TEMPERATURE: f32 = 0.72;
+/// Times faster than burning gas, whose own heat makes up for it, burnt gas cools by mixing.
+const BURNT_MIXING: f32 = 2.5;
+/// Fuel below which burning soot off begins, and above which soot has not formed.
+const SOOT_FUEL: [f32; 2] = [0.16, 0.97];
+/// Share of its fuel over which soot forms.
+const SOOT_FORMING: f32 = 0.17;
+/// Most a particle's radius grows.
+const GREATEST_GROWTH: f32 = 3.0;
+
+/// What of a particle changes as it lives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Being {
+    /// Temperature, K.
+    pub(crate) temperature: f32,
+    /// Share of fuel left.
+    pub(crate) fuel: f32,
+    /// Volume fraction of soot.
+    pub(crate) soot: f32,
+    /// Support radius for drawing, m.
+    pub(crate) support_radius: f32,
+}
+
+/// What acts on a particle for a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Exposure {
+    /// How much of it lies at the edge of the gas: 0 inside to 1 alone.
+    pub(crate) to_air: f32,
+    /// Share of its own mass that it takes up from the air, 1/s.
+    pub(crate) mixing: f32,
+    /// Share of a mean particle's fuel that burns, 1/s.
+    pub(crate) burning: f32,
+    /// Density of air as hot as it is, kg/m^3.
+    pub(crate) density: f32,
+    /// Temperature of the air, K.
+    pub(crate) air_temperature: f32,
+    /// Support radius d at birth, m.
+    pub(crate) smallest_radius: f32,
+}
+
+/// The laws by which gas lives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Laws {
+    living: bool,
+    flame_temperature: f32,
+    heating_s: f32,
+    air_hunger: f32,
+    soot: f32,
+    smoke: f32,
+    radiation: f32,
+}
+
+impl From<&LifeParameters> for Laws {
+    fn from(life: &LifeParameters) -> Self {
+        Self {
+            living: life.temperature == TemperatureLaw::Living,
+            flame_temperature: life.flame_temperature_k as f32,
+            heating_s: life.heating_s as f32,
+            air_hunger: life.air_hunger as f32,
+            soot: life.soot_ppm as f32 * 1e-6,
+            smoke: life.smoke as f32,
+            radiation: life.radiation as f32,
+        }
+    }
+}
+
+impl Laws {
+    /// The particle after `seconds`.
+    #[inline(always)]
+    pub(crate) fn live(&self, being: Being, exposure: &Exposure, seconds: f32) -> Being {
+        // Gas at the edge burns faster than the mean, gas inside slower; a mean exposure of a third burns as the mean.
+        let air = 1.0 + self.air_hunger * (2.4 * exposure.to_air - 0.8);
+        let fuel = (being.fuel - exposure.burning * air * seconds).max(0.0);
+        let growth = 1.0 + exposure.mixing * seconds * (1.0 / 3.0);
+        Being {
+            fuel,
+            temperature: if self.living { self.temperature(being, exposure, seconds) } else { being.temperature },
+            soot: self.soot * self.soot_share(fuel),
+            support_radius: (being.support_radius * growth).min(GREATEST_GROWTH * exposure.smallest_radius),
+        }
+    }
+
+    /// Heating, mixing and radiation, each implicit, so that no step is too long.
+    #[inline(always)]
+    fn temperature(&self, being: Being, exposure: &Exposure, seconds: f32) -> f32 {
+        let relax = |value: f32, toward: f32, rate: f32| {
+            let rate = rate * seconds;
+            (value + rate * toward) / (1.0 + rate)
+        };
+        let burning = being.fuel > 0.0;
+        let front = INNER_TEMPERATURE + (1.0 - INNER_TEMPERATURE) * exposure.to_air.sqrt();
+        let mut temperature = being.temperature;
+        if burning {
+            temperature = relax(temperature, self.flame_temperature * front, 1.0 / self.heating_s);
+        } else {
+            temperature = relax(temperature, exposure.air_temperature, BURNT_MIXING * exposure.mixing);
+        }
+        // 4 sigma kappa (T^4 - T_air^4) / (rho c_p), as a rate toward the air's temperature.
+        let [square, air_square] = [temperature * temperature, exposure.air_temperature * exposure.air_temperature];
+        let absorption = SOOT_ABSORPTION * being.soot * temperature;
+        let rate = self.radiation
+            * 4.0
+            * STEFAN_BOLTZMANN
+            * absorption
+            * (square + air_square)
+            * (temperature + exposure.air_temperature)
+            / (exposure.density * SPECIFIC_HEAT);
+        relax(temperature, exposure.air_temperature, rate)
+    }
+
+    /// Soot beside the most that forms: none in fresh gas, most where it burns, what is left as smoke in burnt gas.
+    #[inline(always)]
+    pub(crate) fn soot_share(&self, fuel: f32) -> f32 {
+        let smooth = |x: f32| {
+            let x = x.clamp(0.0, 1.0);
+            x * x * (3.0 - 2.0 * x)
+        };
+        let formed = smooth((SOOT_FUEL[1] - fuel) / SOOT_FORMING);
+        let unburnt = smooth(fuel / SOOT_FUEL[0]);
+        formed * (self.smoke + (1.0 - self.smoke) * unburnt)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BEING: Being = Being { temperature: 1200.0, fuel: 0.6, soot: 0.0, support_radius: 0.02 };
+    const EXPOSURE: Exposure = Exposure {
+        to_air: 1.0,
+        mixing: 5.0,
+        burning: 2.0,
+        density: 0.25,
+        air_temperature: 293.0,
+        smallest_radius: 0.02,
+    };
+
+    fn laws() -> Laws {
+        Laws::from(&LifeParameters::default())
+    }
+
+    fn after(mut being: Being, exposure: Exposure, seconds: f32) -> Being {
+        for _ in 0..1000 {
+            being = laws().live(being, &exposure, seconds / 1000.0);
+        }
+        being
+    }
+
+    #[test]
+    fn burning_gas_nears_the_flame_temperature_and_burnt_gas_the_air() {
+        let hot = after(BEING, Exposure { burning: 0.0, ..EXPOSURE }, 0.3);
+        assert!((1600.0..1900.0).contains(&hot.temperature), "{}", hot.temperature);
+        let cold = after(Being { fuel: 0.0, ..BEING }, EXPOSURE, 2.0);
+        assert!(cold.temperature < 294.0 && cold.soot == 0.0);
+        assert!((cold.support_radius - 0.06).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_outside_burns_first() {
+        let inside = after(BEING, Exposure { to_air: 0.1, ..EXPOSURE }, 0.2);
+        let outside = after(BEING, EXPOSURE, 0.2);
+        assert!(outside.fuel < inside.fuel);
+        let mean = after(BEING, Exposure { to_air: 1.0 / 3.0, ..EXPOSURE }, 0.2);
+        assert!((mean.fuel - 0.2).abs() < 1e-3);
+    }
+
+    #[test]
+    fn black_body_cooling_of_dense_soot_follows_the_fourth_power() {
+        // dT/dt = -4 sigma kappa T^4 / (rho c_p), by hand at 1500 K with one part in a million of soot.
+        let laws = Laws { heating_s: 1e9, radiation: 1.0, ..laws() };
+        let being = Being { temperature: 1500.0, soot: 1e-6, ..BEING };
+        let cooled = laws.live(being, &Exposure { mixing: 0.0, ..EXPOSURE }, 1e-5);
+        let kappa = 1862.0 * 1e-6 * 1500.0;
+        let by_hand = 4.0 * 5.670_374e-8 * kappa * (1500.0_f64.powi(4) - 293.0_f64.powi(4)) / (0.25 * 1200.0) * 1e-5;
+        assert!((f64::from(1500.0 - cooled.temperature) / by_hand - 1.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn constant_temperature_stays() {
+        let laws = Laws { living: false, ..laws() };
+        assert_eq!(laws.live(BEING, &EXPOSURE, 0.1).temperature, 1200.0);
+    }
+
+    #[test]
+    fn soot_forms_in_burning_gas_and_burns_unless_it_is_smoke() {
+        let clean = laws();
+        assert_eq!((clean.soot_share(1.0), clean.soot_share(0.5), clean.soot_share(0.0)), (0.0, 1.0, 0.0));
+        let smoky = Laws { smoke: 0.4, ..clean };
+        assert!((smoky.soot_share(0.0) - 0.4).abs() < 1e-6);
+    }
+}

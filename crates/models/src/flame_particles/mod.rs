@@ -1,0 +1,33 @@
+//! The particle flame: burning gas as particles, moved by smoothed particle hydrodynamics, lit as black bodies.
+//!
+//! S. Inagaki, M. Imura, S. Ikeda, Y. Manabe and K. Chihara, "Real-time rendering of flame using particle-based fluid simulation".
+
+mod beside;
+mod births;
+mod breeze;
+mod burner;
+mod collision;
+mod design;
+pub mod draw;
+mod fault;
+mod flame;
+mod life;
+mod narrowing;
+mod parameters;
+pub mod particles;
+mod puffing;
+mod simulation;
+mod snapshot;
+#[cfg(test)]
+mod tests;
+mod turbulence;
+mod weather;
+
+pub use burner::heskestad;
+pub use fault::{ParticleFault, ParticleFaultKind};
+pub use flame::FlameParticles;
+pub use parameters::{
+    BurnerParameters, BurnerShape, FlameParticlesParameters, FluidParameters, ForceKernel, LifeParameters,
+    MotionParameters, TemperatureLaw, Tension, WindForce,
+};
+pub use particles::{Particle, Particles};

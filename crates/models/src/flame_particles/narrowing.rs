@@ -1,0 +1,128 @@
+//! Why flames narrow upward: gas that rises ever faster must draw together, since its volume stays.
+//!
+//! Where gas on the axis gains speed at the rate `du/dh`, continuity moves the gas around at `-(r/2) du/dh`; air enters a fire no faster than
+//! its entrainment allows, a share of the speed on the axis. The axis is where the gas is: the mean place in each layer of height, so
+//! that it leans with the wind.
+
+use bansho_base::math::Vec3;
+
+use super::burner::Burner;
+
+/// Layers of height.
+const LAYERS: usize = 24;
+/// Greatest speed at which gas draws together, as a share of the speed on the axis.
+const GREATEST_SHARE: f32 = 0.2;
+
+/// The axis of one burner's gas.
+#[derive(Clone, Debug)]
+pub(crate) struct Axis {
+    base: f32,
+    /// Layers a metre.
+    scale: f32,
+    /// Mean x and z of the gas in each layer.
+    middle: [[f32; 2]; LAYERS + 1],
+    speed_squared: f32,
+    acceleration: f32,
+    strength: f32,
+    /// Half the burner's width: farther out gas belongs to another part of a large burner.
+    reach: f32,
+}
+
+/// The axes of all burners; the particles at `positions` came from burners of these numbers.
+pub(crate) fn axes(burners: &[Burner], positions: [&[f32]; 3], numbers: &[u32], strength: f64) -> Vec<Axis> {
+    let scale = |burner: &Burner| LAYERS as f64 / (1.5 * burner.height + burner.reach);
+    let bases: Vec<(f64, f64)> = burners.iter().map(|b| (b.placement.position.y, scale(b))).collect();
+    let mut sums = vec![[[0.0_f64; 3]; LAYERS + 1]; burners.len()];
+    for (index, &number) in numbers.iter().enumerate() {
+        let (base, scale) = bases[number as usize];
+        let layer = ((f64::from(positions[1][index]) - base) * scale + 0.5).clamp(0.0, LAYERS as f64) as usize;
+        let [x, z] = [positions[0][index], positions[2][index]].map(f64::from);
+        let sum = &mut sums[number as usize][layer];
+        *sum = [sum[0] + x, sum[1] + z, sum[2] + 1.0];
+    }
+    burners.iter().zip(&sums).map(|(burner, sums)| Axis::new(burner, scale(burner), sums, strength)).collect()
+}
+
+impl Axis {
+    fn new(burner: &Burner, scale: f64, sums: &[[f64; 3]; LAYERS + 1], strength: f64) -> Self {
+        let base = burner.placement.position;
+        let mut axis = Self {
+            base: base.y as f32,
+            scale: scale as f32,
+            middle: [[base.x as f32, base.z as f32]; LAYERS + 1],
+            speed_squared: (burner.speed * burner.speed) as f32,
+            acceleration: burner.acceleration as f32,
+            strength: strength as f32,
+            reach: burner.diameter as f32,
+        };
+        axis.smooth(sums);
+        axis
+    }
+
+    /// Means of layers, each with the layers beside it; empty layers take over the one below.
+    fn smooth(&mut self, sums: &[[f64; 3]; LAYERS + 1]) {
+        for layer in 0..=LAYERS {
+            let beside = layer.saturating_sub(1)..(layer + 2).min(LAYERS + 1);
+            let total = |k: usize| sums[beside.clone()].iter().map(|sum| sum[k]).sum::<f64>();
+            let count = total(2);
+            if count > 0.0 {
+                self.middle[layer] = [(total(0) / count) as f32, (total(1) / count) as f32];
+            } else if layer > 0 {
+                self.middle[layer] = self.middle[layer - 1];
+            }
+        }
+    }
+
+    /// Where the axis is at `height` above the burner: x and z, m.
+    #[inline(always)]
+    pub(crate) fn at(&self, height: f32) -> [f32; 2] {
+        let layer = (height * self.scale).clamp(0.0, LAYERS as f32 - 1e-3);
+        let (below, part) = (layer as usize, layer.fract());
+        [0, 1].map(|k| self.middle[below][k] + (self.middle[below + 1][k] - self.middle[below][k]) * part)
+    }
+
+    /// Velocity at which gas at `place` draws toward the axis, m/s.
+    #[inline(always)]
+    pub(crate) fn velocity(&self, place: Vec3) -> Vec3 {
+        let height = (place.y - self.base).max(0.0);
+        let [x, z] = self.at(height);
+        let away = Vec3::new(place.x - x, 0.0, place.z - z);
+        let distance = away.length();
+        let speed = (self.speed_squared + 2.0 * self.acceleration * height).sqrt().max(1e-6);
+        // The pull of one axis ends where a large burner has others of its own.
+        let near = (2.0 - distance / self.reach).clamp(0.0, 1.0);
+        let inward = (0.5 * distance * self.acceleration / speed).min(GREATEST_SHARE * speed) * near * self.strength;
+        if distance > 0.0 { away * (-inward / distance) } else { Vec3::ZERO }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::assets::MemoryAssets;
+
+    use super::*;
+    use crate::flame_particles::parameters::{BurnerParameters, FlameParticlesParameters};
+
+    fn axis(strength: f64) -> Axis {
+        let parameters = BurnerParameters { height: bansho_base::parameters::Auto::Set(1.0), ..Default::default() };
+        let burner = Burner::new(&parameters, &FlameParticlesParameters::default(), &MemoryAssets::default()).unwrap();
+        // A column that leans to +x: x = y / 2.
+        let y: Vec<f32> = (0..200).map(|i| i as f32 / 150.0).collect();
+        let x: Vec<f32> = y.iter().map(|y| 0.5 * y).collect();
+        axes(&[burner], [&x, &y, &[0.0; 200]], &[0; 200], strength).remove(0)
+    }
+
+    #[test]
+    fn gas_draws_toward_the_axis_that_leans_with_it() {
+        let axis = axis(1.0);
+        assert!(axis.velocity(Vec3::new(0.5, 0.8, 0.0)).x < -0.05);
+        assert!(axis.velocity(Vec3::new(0.3, 0.8, 0.0)).x > 0.05);
+        assert!(axis.velocity(Vec3::new(0.4, 0.8, 0.1)).z < -0.05);
+        assert_eq!(axis.velocity(Vec3::new(0.4, 0.8, 9.0)), Vec3::ZERO);
+    }
+
+    #[test]
+    fn none_of_it_leaves_gas_alone() {
+        assert_eq!(axis(0.0).velocity(Vec3::new(0.5, 0.8, 0.0)).length(), 0.0);
+    }
+}

@@ -1,0 +1,50 @@
+//! The gas as bytes and back: version, count, then array after array.
+
+use bansho_base::phenomenon::SnapshotError;
+
+use super::particles::{NUMBERS, Particles};
+
+const VERSION: u32 = 1;
+/// Bytes of one particle: number of birth, burner, and all numbers.
+const PARTICLE: usize = 8 + 4 + 4 * NUMBERS;
+
+/// The particles' state; their origin belongs to the parameters.
+pub(crate) fn write(particles: &Particles) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(12 + PARTICLE * particles.len());
+    bytes.extend(VERSION.to_le_bytes());
+    bytes.extend((particles.len() as u64).to_le_bytes());
+    bytes.extend(particles.birth.iter().flat_map(|birth| birth.to_le_bytes()));
+    bytes.extend(particles.burner.iter().flat_map(|burner| burner.to_le_bytes()));
+    for values in particles.numbers() {
+        bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    }
+    bytes
+}
+
+/// Puts the state back into particles with the same origin, of so many burners.
+pub(crate) fn read(particles: &Particles, bytes: &[u8], burners: usize) -> Result<Particles, SnapshotError> {
+    let (version, rest) = bytes.split_first_chunk::<4>().ok_or(SnapshotError::Damaged)?;
+    let found = u32::from_le_bytes(*version);
+    if found != VERSION {
+        return Err(SnapshotError::Version { found, known: VERSION });
+    }
+    let (count, rest) = rest.split_first_chunk::<8>().ok_or(SnapshotError::Damaged)?;
+    let count = usize::try_from(u64::from_le_bytes(*count)).map_err(|_| SnapshotError::Damaged)?;
+    if count.checked_mul(PARTICLE) != Some(rest.len()) {
+        return Err(SnapshotError::Damaged);
+    }
+    let (births, rest) = rest.split_at(8 * count);
+    let (numbers_of_burners, mut rest) = rest.split_at(4 * count);
+    let mut read = Particles::new(particles.origin);
+    read.birth = births.as_chunks().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
+    read.burner = numbers_of_burners.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
+    for values in read.numbers_mut() {
+        let (head, tail) = rest.split_at(4 * count);
+        *values = head.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+        rest = tail;
+    }
+    if read.burner.iter().any(|burner| *burner as usize >= burners) {
+        return Err(SnapshotError::Damaged);
+    }
+    Ok(read)
+}

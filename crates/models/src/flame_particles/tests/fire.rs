@@ -1,0 +1,97 @@
+//! What fires do: they are as high as Heskestad says, puff as Cetegen and Ahmed say, narrow upward, and lean with the wind.
+
+use bansho_base::animation::Animated;
+
+use super::*;
+use crate::flame_particles::{heskestad, parameters::BurnerParameters};
+
+fn fire(heat_release_kw: f64, diameter: f64) -> FlameParticlesParameters {
+    FlameParticlesParameters {
+        burners: vec![BurnerParameters { heat_release_kw, diameter, ..Default::default() }],
+        particles: 2500,
+        ..Default::default()
+    }
+}
+
+/// Height below which all but a fiftieth of the visible gas lies, m.
+fn top(simulation: &Simulation) -> f64 {
+    let mut heights: Vec<f32> = lit(simulation).iter().map(|index| place(simulation, *index).y).collect();
+    heights.sort_by(f32::total_cmp);
+    heights.get(heights.len() * 98 / 100).copied().unwrap_or(0.0).into()
+}
+
+/// The frequency in Hz, between a third and three times `around`, at which `values`, `seconds` apart, swing most.
+fn strongest_frequency(values: &[f64], seconds: f64, around: f64) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let power = |hz: f64| {
+        let [mut real, mut imaginary] = [0.0; 2];
+        for (index, value) in values.iter().enumerate() {
+            let (sine, cosine) = (std::f64::consts::TAU * hz * seconds * index as f64).sin_cos();
+            real += (value - mean) * cosine;
+            imaginary += (value - mean) * sine;
+        }
+        real * real + imaginary * imaginary
+    };
+    let candidates = (0..200).map(|step| around / 3.0 * 9.0_f64.powf(f64::from(step) / 199.0));
+    candidates.max_by(|a, b| power(*a).total_cmp(&power(*b))).unwrap()
+}
+
+#[expect(clippy::disallowed_methods, reason = "a measurement, not a picture")]
+#[test]
+fn fires_are_as_high_and_puff_as_often_as_measured_ones() {
+    for (heat_release_kw, diameter) in [(60.0, 0.3), (6.0, 0.1), (1500.0, 1.2)] {
+        let expected = heskestad(heat_release_kw, diameter);
+        assert!(expected > diameter);
+        let hz = 1.5 / diameter.sqrt();
+        let mut simulation = simulation(&fire(heat_release_kw, diameter));
+        let mut tops = Vec::new();
+        World::default().run(&mut simulation, 6.0 / hz, |simulation, t| {
+            if t > 0.0 {
+                tops.push(top(simulation));
+            }
+        });
+        let mean = tops.iter().sum::<f64>() / tops.len() as f64;
+        assert!((0.67..1.33).contains(&(mean / expected)), "{mean} m high, expected {expected}");
+        let found = strongest_frequency(&tops, simulation.step_s(), hz);
+        assert!((0.67..1.33).contains(&(found / hz)), "puffs at {found} Hz, expected {hz}");
+    }
+}
+
+#[test]
+fn flames_narrow_upward_and_accelerate() {
+    let mut simulation = simulation(&fire(60.0, 0.3));
+    // Count, speed and squared distance from the axis in the lowest and the highest quarter.
+    let mut sums = [[0.0_f32; 3]; 2];
+    World::default().run(&mut simulation, 1.2, |simulation, t| {
+        for index in lit(simulation).into_iter().filter(|_| t > 0.0) {
+            let place = place(simulation, index);
+            let sum = &mut sums[usize::from(place.y > 0.45)];
+            if place.y < 0.22 || place.y > 0.68 {
+                sum[0] += 1.0;
+                sum[1] += simulation.particles.velocities()[1][index];
+                sum[2] += place.x * place.x + place.z * place.z;
+            }
+        }
+    });
+    let [[low, low_speed, low_width], [high, high_speed, high_width]] = sums;
+    assert!(high_speed / high > 1.5 * low_speed / low, "{} {}", low_speed / low, high_speed / high);
+    let widths = [low_width / low, high_width / high].map(f32::sqrt);
+    assert!(high < 0.5 * low && widths[1] < widths[0], "{low} {high} particles, {widths:?} m wide");
+}
+
+#[test]
+fn wind_bends_the_flame_the_more_the_stronger_it_is() {
+    let lean = |speed: f64| {
+        let wind = WindParameters { velocity: Animated::from([speed, 0.0, 0.0]), ..WindParameters::default() };
+        let (mut sum, mut count) = (0.0, 0.0);
+        World { wind, ..World::default() }.run(&mut simulation(&fire(60.0, 0.3)), 1.0, |simulation, t| {
+            let places = lit(simulation).into_iter().map(|index| place(simulation, index));
+            for place in places.filter(|place| t > 0.0 && place.y > 0.4) {
+                (sum, count) = (sum + place.x, count + 1.0);
+            }
+        });
+        sum / count
+    };
+    let [left, little, calm, right] = [-3.0, -1.0, 0.0, 3.0].map(lean);
+    assert!(left < little - 0.05 && little < calm - 0.03 && right > calm + 0.08, "{left} {little} {calm} {right}");
+}

@@ -1,0 +1,146 @@
+//! Turbulence: eddies of two sizes that rise with the gas, from tiles of divergence-free noise made once.
+//!
+//! The velocity is the curl of three noise potentials (Bridson, Hourihan and Nordenstam 2007), taken by central differences on a
+//! periodic grid. Two layers, one half as large, scroll at different speeds, so that eddies change while they rise.
+
+use bansho_base::{
+    math::{DVec3, Vec3},
+    noise::{Coordinate, Fractal, Noise},
+    random::{Key, Purpose},
+};
+
+/// Grid points along each side of the tile.
+const SIDE: usize = 32;
+/// Eddies along each side of the tile.
+const EDDIES: u32 = 5;
+/// Speed of the two layers beside the gas on the axis.
+const LAYER_SPEED: [f64; 2] = [0.55, 0.3];
+/// Standard deviation of the two layers; their squares sum to 1.
+const LAYER_SHARE: [f32; 2] = [0.86, 0.51];
+
+/// A periodic field of velocity, of standard deviation 1 a component.
+#[derive(Clone, Debug)]
+pub(crate) struct Turbulence {
+    tile: Vec<Vec3>,
+}
+
+/// Turbulence at one moment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Eddies<'a> {
+    tile: &'a [Vec3],
+    /// Grid points a metre, and the place of the flame's position on the grid, for each layer.
+    layers: [(f32, Vec3); 2],
+}
+
+impl Turbulence {
+    pub(crate) fn new(key: Key) -> Self {
+        let words = key.words(0, 0, Purpose::named("turbulence"));
+        let potentials = [0, 1, 2].map(|axis| potential(words[axis]));
+        let mut tile: Vec<Vec3> = (0..SIDE * SIDE * SIDE).map(|index| curl(&potentials, index)).collect();
+        let squares: f64 = tile.iter().map(|velocity| f64::from(velocity.length_squared())).sum();
+        let deviation = bansho_base::math::sqrt(squares / (3 * tile.len()) as f64);
+        let scale = if deviation > 0.0 { (1.0 / deviation) as f32 } else { 0.0 };
+        tile.iter_mut().for_each(|velocity| *velocity *= scale);
+        Self { tile }
+    }
+
+    /// A number of mean 0 and standard deviation 1 that changes over a unit of `place`.
+    pub(crate) fn patch(&self, place: DVec3) -> f32 {
+        let place = (place * (SIDE as f64 / f64::from(EDDIES))).rem_euclid(DVec3::splat(SIDE as f64));
+        sample(&self.tile, place.as_vec3()).x
+    }
+
+    /// The eddies at time `t`, the largest `eddy_size` m wide, rising in gas of `speed` and drifting with the wind's `drift` since time 0.
+    pub(crate) fn at(&self, t: f64, eddy_size: f64, speed: f64, drift: DVec3) -> Eddies<'_> {
+        let layer = |index: usize| {
+            let scale = SIDE as f64 / (f64::from(EDDIES) * eddy_size) * (index + 1) as f64;
+            let moved = DVec3::Y * (speed * LAYER_SPEED[index] * t) + drift;
+            // Shifted so that both layers do not share their zeros; reduced in f64, so that hours of time lose nothing.
+            let origin = (-moved * scale + 11.3 * index as f64).rem_euclid(DVec3::splat(SIDE as f64));
+            (scale as f32, origin.as_vec3())
+        };
+        Eddies { tile: &self.tile, layers: [layer(0), layer(1)] }
+    }
+}
+
+impl Eddies<'_> {
+    /// Velocity at `place`, m from the flame's position, of standard deviation 1 a component.
+    #[inline(always)]
+    pub(crate) fn velocity(&self, place: Vec3) -> Vec3 {
+        let [first, second] = self.layers.map(|(scale, origin)| sample(self.tile, place * scale + origin));
+        first * LAYER_SHARE[0] + second * LAYER_SHARE[1]
+    }
+}
+
+/// A tile at a place in grid points, straight between them.
+#[inline(always)]
+fn sample(tile: &[Vec3], place: Vec3) -> Vec3 {
+    let floor = place.floor();
+    let f = place - floor;
+    let cell = floor.as_ivec3();
+    let wrap = |coordinate: i32, step: i32| (coordinate.wrapping_add(step) & (SIDE as i32 - 1)) as usize;
+    let row = |j: i32, k: i32| {
+        let start = (wrap(cell.z, k) * SIDE + wrap(cell.y, j)) * SIDE;
+        tile[start + wrap(cell.x, 0)].lerp(tile[start + wrap(cell.x, 1)], f.x)
+    };
+    row(0, 0).lerp(row(1, 0), f.y).lerp(row(0, 1).lerp(row(1, 1), f.y), f.z)
+}
+
+/// One potential on the grid.
+fn potential(seed: u32) -> Vec<f32> {
+    // The fractal and the period are constants within their bounds; without noise the tile is calm.
+    let Ok(noise) = Noise::<3>::new(seed, Fractal::SINGLE, [EDDIES; 3]) else { return vec![0.0; SIDE * SIDE * SIDE] };
+    let coordinate = |step: usize| Coordinate::from_f64((step * EDDIES as usize) as f64 / SIDE as f64);
+    let at = |index: usize| {
+        noise.at([coordinate(index % SIDE), coordinate(index / SIDE % SIDE), coordinate(index / (SIDE * SIDE))])
+    };
+    (0..SIDE * SIDE * SIDE).map(at).collect()
+}
+
+/// Curl of the potentials at a grid point, by central differences.
+fn curl(potentials: &[Vec<f32>; 3], index: usize) -> Vec3 {
+    let place = [index % SIDE, index / SIDE % SIDE, index / (SIDE * SIDE)];
+    let slope = |of: usize, along: usize| {
+        let value = |step: usize| {
+            let mut beside = place;
+            beside[along] = (beside[along] + step) % SIDE;
+            potentials[of][(beside[2] * SIDE + beside[1]) * SIDE + beside[0]]
+        };
+        value(1) - value(SIDE - 1)
+    };
+    Vec3::new(slope(2, 1) - slope(1, 2), slope(0, 2) - slope(2, 0), slope(1, 0) - slope(0, 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tile_is_free_of_divergence_and_of_unit_strength() {
+        let turbulence = Turbulence::new(Key::new(3, "turbulence"));
+        let at = |x: usize, y: usize, z: usize| turbulence.tile[((z % SIDE) * SIDE + y % SIDE) * SIDE + x % SIDE];
+        for index in (0..SIDE * SIDE * SIDE).step_by(37) {
+            let [x, y, z] = [index % SIDE, index / SIDE % SIDE, index / (SIDE * SIDE)];
+            let divergence = at(x + 1, y, z).x - at(x + SIDE - 1, y, z).x + at(x, y + 1, z).y
+                - at(x, y + SIDE - 1, z).y
+                + at(x, y, z + 1).z
+                - at(x, y, z + SIDE - 1).z;
+            assert!(divergence.abs() < 1e-4, "{divergence}");
+        }
+        let eddies = turbulence.at(1.7, 0.3, 3.0, DVec3::ZERO);
+        let places = (0..20_000).map(|i| Vec3::new(0.013, 0.017, 0.023) * i as f32);
+        let squares: f32 = places.map(|place| eddies.velocity(place).length_squared()).sum();
+        let deviation = (squares / 60_000.0).sqrt();
+        assert!((0.7..1.1).contains(&deviation), "standard deviation {deviation}");
+    }
+
+    #[test]
+    fn eddies_rise_with_the_gas_and_drift_with_the_wind() {
+        let turbulence = Turbulence::new(Key::new(3, "turbulence"));
+        let place = Vec3::new(0.1, 0.2, 0.3);
+        let still = turbulence.at(0.0, 0.5, 2.0, DVec3::ZERO).velocity(place);
+        let drifted = turbulence.at(0.0, 0.5, 2.0, DVec3::X * 0.7).velocity(place + Vec3::X * 0.7);
+        assert!((still - drifted).length() < 1e-3);
+        assert!((turbulence.at(0.5, 0.5, 2.0, DVec3::ZERO).velocity(place) - still).length() > 0.01);
+    }
+}

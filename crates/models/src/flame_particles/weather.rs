@@ -1,0 +1,131 @@
+//! All that acts on the gas from outside during a step: wind, eddies, vortex rings, the draw toward the axis.
+
+use bansho_base::{
+    air::Air,
+    math::{DVec3, Vec3},
+    random::Key,
+    surroundings::{Occluder, Surroundings},
+};
+
+use super::{
+    breeze::Breeze,
+    burner::GRAVITY,
+    design::Design,
+    narrowing::{Axis, axes},
+    parameters::{FlameParticlesParameters, WindForce},
+    particles::Particles,
+    puffing::{Ring, rings},
+    turbulence::{Eddies, Turbulence},
+};
+
+/// Where turbulence has grown to half its strength, as a share of the time that gas takes to the tip.
+const TURBULENT_AGE: f32 = 0.1;
+
+/// What acts on the gas of one burner.
+pub(crate) struct Draught<'a> {
+    rings: Vec<Ring>,
+    axis: Axis,
+    eddies: Eddies<'a>,
+    turbulence: f32,
+    turbulent_age: f32,
+    /// Entrainment coefficient over the radius of the fire, 1/m.
+    pub(crate) entrainment: f32,
+    /// Coefficient of the drag of air that blows across, over the radius of the fire, 1/m.
+    pub(crate) drag: f32,
+    /// Share of its fuel that gas burns in a metre of its way, and in a second.
+    pub(crate) burning: [f32; 2],
+}
+
+/// What acts on the gas at one moment.
+pub(crate) struct Weather<'a> {
+    pub(crate) origin: DVec3,
+    pub(crate) occluders: &'a [Occluder],
+    pub(crate) breeze: Breeze,
+    pub(crate) air_temperature: f32,
+    /// Gravity against which gas rises, m/s^2.
+    pub(crate) buoyancy: f32,
+    pub(crate) wind: WindForce,
+    pub(crate) wind_gain: f32,
+    /// Density of air at 1 K, kg K/m^3.
+    pub(crate) density_kelvin: f32,
+    pub(crate) draughts: Vec<Draught<'a>>,
+}
+
+impl<'a> Weather<'a> {
+    pub(crate) fn new(
+        flame: &FlameParticlesParameters,
+        design: &Design,
+        turbulence: &'a Turbulence,
+        key: Key,
+        particles: &Particles,
+        around: &'a Surroundings,
+        t: f64,
+    ) -> Self {
+        let Surroundings { wind, air, others, .. } = around;
+        let mean = wind.mean(t) * flame.motion.wind_gain;
+        let axes = axes(&design.burners, particles.positions(), &particles.burner, flame.motion.narrowing);
+        let draught = |(number, axis): (usize, Axis)| {
+            let burner = &design.burners[number];
+            let size = flame.motion.eddy_size * burner.diameter;
+            let speed = burner.axis_speed(0.5 * burner.height);
+            Draught {
+                rings: rings(burner, flame, key, number as u32, t, &axis),
+                axis,
+                eddies: turbulence.at(t, size, speed, mean * (0.5 * t)),
+                turbulence: flame.motion.turbulence as f32,
+                turbulent_age: TURBULENT_AGE * burner.rise_time() as f32,
+                entrainment: (flame.motion.entrainment / (0.5 * burner.diameter)) as f32,
+                drag: (CROSS_DRAG * flame.motion.wind_gain / (0.5 * burner.diameter)) as f32,
+                burning: [(WAY_SHARE / burner.height) as f32, (TIME_SHARE / burner.rise_time()) as f32],
+            }
+        };
+        Self {
+            origin: particles.origin,
+            occluders: &others.occluders,
+            breeze: Breeze::new(wind, particles.origin, bounds(particles), t),
+            air_temperature: air.temperature_k as f32,
+            buoyancy: (GRAVITY * flame.motion.buoyancy) as f32,
+            wind: flame.motion.wind,
+            wind_gain: flame.motion.wind_gain as f32,
+            density_kelvin: density_kelvin(air),
+            draughts: axes.into_iter().enumerate().map(draught).collect(),
+        }
+    }
+}
+
+/// Drag coefficient of a fire in wind from the side.
+const CROSS_DRAG: f64 = 0.25;
+/// Share of its fuel that gas burns on a way as long as the flame is high, on the mean; and in the time that it takes there.
+const WAY_SHARE: f64 = 0.76;
+const TIME_SHARE: f64 = 0.19;
+
+fn density_kelvin(air: &Air) -> f32 {
+    air.density_at(1.0) as f32
+}
+
+/// Corners of the box around all particles.
+fn bounds(particles: &Particles) -> [Vec3; 2] {
+    let side = |pick: fn(f32, f32) -> f32, start: f32| {
+        Vec3::from(particles.positions().map(|values| values.iter().copied().fold(start, pick)))
+    };
+    if particles.is_empty() {
+        return [Vec3::ZERO, Vec3::ONE];
+    }
+    [side(f32::min, f32::INFINITY), side(f32::max, f32::NEG_INFINITY)]
+}
+
+impl Draught<'_> {
+    /// Velocity with which the air's own motion carries gas of `speed` and `age` at `place`, m/s.
+    #[inline(always)]
+    pub(crate) fn velocity(&self, place: Vec3, speed: f32, age: f32) -> Vec3 {
+        let mut sum = self.axis.velocity(place);
+        for ring in &self.rings {
+            sum += ring.velocity(place);
+        }
+        if self.turbulence > 0.0 {
+            let grown = age / (age + self.turbulent_age);
+            sum += self.eddies.velocity(place) * (self.turbulence * speed * grown);
+        }
+        sum
+    }
+}

@@ -1,0 +1,194 @@
+//! The rain of one exposure: how many drops of each diameter there are, where they are and how they move.
+
+use bansho_base::{
+    canvas::View,
+    math::{self, DVec3},
+    random::{Key, Purpose},
+    surroundings::{Occluder, Surroundings},
+};
+
+use super::{
+    Rain,
+    gust::Gusts,
+    lattice::{CELL, Cell, Lattice},
+    sight::Sight,
+};
+
+/// Half the diagonal of a cell, m, with what gusts differ across it.
+const CELL_RADIUS: f64 = 1.1;
+/// Part of the region's radius over which rain changes from streaks to veil, half of it on each side.
+const EDGE: f64 = 0.2;
+
+/// The drops of one diameter during an exposure.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ClassNow {
+    /// Which diameter, counted from the smallest.
+    pub(crate) index: usize,
+    /// Diameter D, mm.
+    pub(crate) diameter_mm: f64,
+    /// Terminal velocity v, m/s.
+    pub(crate) speed: f64,
+    /// Most drops a cubic metre that the shot ever has.
+    pub(crate) most: f64,
+    /// How many of them there are now, 0 to 1.
+    pub(crate) share: f64,
+    /// Where its cells are.
+    pub(crate) lattice: Lattice,
+}
+
+impl ClassNow {
+    /// Numbers for `purpose` that no other diameter shares.
+    pub(crate) fn purpose(&self, purpose: Purpose) -> Purpose {
+        Purpose(purpose.0.wrapping_add(self.index as u32))
+    }
+}
+
+/// Rain while the shutter is open.
+#[derive(Clone, Debug)]
+pub(crate) struct Moment {
+    pub(crate) key: Key,
+    pub(crate) sight: Sight,
+    pub(crate) classes: Vec<ClassNow>,
+    /// Height of the ground, m.
+    pub(crate) ground: f64,
+    /// How far streaks are drawn, m.
+    pub(crate) distance: f64,
+    /// Opacity beside what optics gives.
+    pub(crate) gain: f64,
+    /// Mean wind as drops follow it, level, m/s.
+    wind: DVec3,
+    gusts: Option<Gusts>,
+    /// Solids that rain does not fall through.
+    roofs: Vec<Occluder>,
+}
+
+impl Moment {
+    pub(crate) fn new(rain: &Rain, view: &View, surroundings: &Surroundings) -> Self {
+        let parameters = &rain.parameters;
+        let sight = Sight::new(view);
+        let t = view.shutter.middle();
+        let (wind, response) = (surroundings.wind, parameters.wind_response);
+        let radius = parameters.distance * (1.0 + EDGE) + 2.0 * CELL;
+        let mean = wind.mean(t) * response;
+        Self {
+            key: rain.key,
+            classes: rain.classes(t, wind),
+            ground: ground(&surroundings.others.occluders).unwrap_or(parameters.ground_height),
+            distance: parameters.distance,
+            gain: parameters.opacity_gain,
+            wind: DVec3::new(mean.x, 0.0, mean.z),
+            gusts: Gusts::new(wind, response, sight.middle().position, radius, t),
+            roofs: surroundings.others.occluders.clone(),
+            sight,
+        }
+    }
+
+    /// How much of a drop at `distance` from the camera is drawn as a streak: all within the region, nothing beyond its soft edge.
+    pub(crate) fn nearness(&self, distance: f64) -> f64 {
+        let half = 0.5 * EDGE * self.distance;
+        1.0 - math::smoothstep(self.distance - half, self.distance + half, distance)
+    }
+
+    /// Where a place of a class's lattice is half way through the exposure, and its velocity, m/s.
+    pub(crate) fn drop(&self, class: &ClassNow, place: DVec3) -> (DVec3, DVec3) {
+        let steady = class.lattice.world(place);
+        let velocity = self.wind - DVec3::Y * class.speed;
+        match &self.gusts {
+            None => (steady, velocity),
+            Some(gusts) => {
+                let [displacement, gust] = gusts.at(steady);
+                (steady + displacement, velocity + gust)
+            }
+        }
+    }
+
+    /// Cells of a class that may show within `distance` of the camera, nearest first, with the distances of their middles.
+    pub(crate) fn cells(&self, class: &ClassNow, distance: f64) -> Vec<(f64, Cell)> {
+        let eye = self.sight.middle().position;
+        let reach = distance + CELL_RADIUS + self.gusts.as_ref().map_or(0.0, Gusts::reach);
+        let fall = class.speed * self.sight.exposure;
+        let radius = CELL_RADIUS + fall + 0.5 * self.sight.velocity().length() * self.sight.exposure;
+        let bottom = (eye.y - reach).max(self.ground - CELL);
+        let rows = [bottom, eye.y + reach].map(|y| class.lattice.place(DVec3::new(eye.x, y, eye.z)).y.floor() as i64);
+        let mut cells = Vec::new();
+        for row in rows[0]..=rows[1] {
+            let height = class.lattice.world(DVec3::new(0.0, row as f64, 0.0)).y;
+            let middle = class.lattice.place(DVec3::new(eye.x, height, eye.z));
+            let range = |centre: f64| (centre - reach / CELL).floor() as i64..=(centre + reach / CELL).floor() as i64;
+            for x in range(middle.x) {
+                for z in range(middle.z) {
+                    let centre = DVec3::new(x as f64 + 0.5, row as f64 + 0.5, z as f64 + 0.5);
+                    let (point, _) = self.drop(class, centre);
+                    let away = (point - eye).length();
+                    if away < distance + CELL_RADIUS && self.sight.may_see(point, radius) {
+                        cells.push((away, Cell([x, row, z])));
+                    }
+                }
+            }
+        }
+        cells.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        cells
+    }
+
+    /// Whether a solid keeps the rain that comes with `velocity` from `point`.
+    pub(crate) fn sheltered(&self, point: DVec3, velocity: DVec3) -> bool {
+        self.roofs.iter().any(|roof| shelters(roof, point, -velocity.normalize_or_zero()))
+    }
+}
+
+/// Height of the highest level ground among solids, m.
+fn ground(occluders: &[Occluder]) -> Option<f64> {
+    let level = |occluder: &Occluder| match occluder {
+        Occluder::HalfSpace { point, normal } if normal.y > 0.999 => Some(point.y),
+        _ => None,
+    };
+    occluders.iter().filter_map(level).max_by(f64::total_cmp)
+}
+
+/// Steps after which a way that only grazes a solid counts as free.
+const TRACE_STEPS: usize = 64;
+/// How high roofs may stand, m.
+const HIGHEST_ROOF: f64 = 200.0;
+
+/// Whether the way from `point` toward `up` meets a solid, in steps as long as its distance allows. All below a plane is ground, not roof.
+fn shelters(roof: &Occluder, point: DVec3, up: DVec3) -> bool {
+    if matches!(roof, Occluder::HalfSpace { .. }) {
+        return false;
+    }
+    let mut way = 0.0;
+    for _ in 0..TRACE_STEPS {
+        let distance = roof.signed_distance(point + up * way);
+        if distance < 1e-3 {
+            return true;
+        }
+        way += distance;
+        if way > HIGHEST_ROOF {
+            break;
+        }
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math::DQuat;
+
+    use super::*;
+
+    #[test]
+    fn roofs_shelter_what_is_beneath_them_and_slanted_rain_comes_in() {
+        let roof = Occluder::Cuboid {
+            centre: DVec3::new(0.0, 3.1, 0.0),
+            half_extents: DVec3::new(1.0, 0.1, 1.0),
+            rotation: DQuat::IDENTITY,
+        };
+        let slanted = DVec3::new(1.0, 1.0, 0.0).normalize();
+        assert!(shelters(&roof, DVec3::ZERO, DVec3::Y) && !shelters(&roof, DVec3::new(2.0, 0.0, 0.0), DVec3::Y));
+        assert!(!shelters(&roof, DVec3::ZERO, slanted) && shelters(&roof, DVec3::new(-3.0, 0.0, 0.0), slanted));
+        assert!(!shelters(&roof, DVec3::new(0.0, 4.0, 0.0), DVec3::Y));
+        let ball = Occluder::Sphere { centre: DVec3::new(0.0, 2.0, 0.0), radius: 0.5 };
+        assert!(shelters(&ball, DVec3::ZERO, DVec3::Y) && !shelters(&ball, DVec3::new(0.6, 0.0, 0.0), DVec3::Y));
+        let ground = Occluder::HalfSpace { point: DVec3::ZERO, normal: DVec3::Y };
+        assert!(!shelters(&ground, -DVec3::Y, DVec3::Y));
+    }
+}

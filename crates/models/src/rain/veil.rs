@@ -1,0 +1,380 @@
+//! Rain that is not seen drop by drop: it greys what lies behind it and glows around lamps.
+
+use bansho_base::{
+    canvas::{DepthInterval, Strip, View},
+    image::Rect,
+    math::{self, DVec2, DVec3},
+    surroundings::{Emitter, Light},
+};
+
+use super::{
+    bands::BAND,
+    light::{Lighting, distance},
+    moment::Moment,
+    tiles::{TILE, Tiles, geometric, mix},
+};
+
+/// Nearest distance at which the light that is scattered up to there is known, m, and how much further each next one is.
+const FIRST: f64 = 0.5;
+const RATIO: f64 = 1.25;
+/// Angle, seen from a lamp, that one sample stands for.
+const ANGLE: f64 = 0.15;
+/// Lamps are at least so large for the air around them, m.
+const SMALLEST_LAMP: f64 = 0.02;
+
+/// Extinction of the rain along every line of sight.
+#[derive(Clone, Copy)]
+struct Density<'a> {
+    moment: &'a Moment,
+    /// Of all drops, and of those that are drawn as streaks in the region, 1/m.
+    extinction: [f64; 2],
+}
+
+impl Density<'_> {
+    fn at(&self, distance: f64) -> f64 {
+        self.extinction[0] - self.extinction[1] * self.moment.nearness(distance)
+    }
+}
+
+/// Light scattered to the camera up to each distance, corner after corner.
+struct Scattered(Vec<Vec<[f32; 3]>>);
+
+impl Scattered {
+    fn new(lines: &[Vec<[f32; 3]>], distances: usize) -> Self {
+        Self((0..distances).map(|k| lines.iter().map(|sums| sums[k]).collect()).collect())
+    }
+
+    fn add(&mut self, other: &Self) {
+        for (sum, more) in self.0.iter_mut().flatten().zip(other.0.iter().flatten()) {
+            (0..3).for_each(|c| sum[c] += more[c]);
+        }
+    }
+}
+
+/// A lamp in the picture. Light scattered around it falls as 1/h with the distance h of the line of sight from it, which no straight
+/// line between corners of tiles can follow: near it, what is left after taking out 1/h is interpolated.
+struct Halo {
+    /// From the camera to it, m.
+    offset: DVec3,
+    /// Where it is in the picture.
+    pixel: DVec2,
+    scattered: Scattered,
+}
+
+/// Pixels around a lamp for which that is done.
+const HALO: f64 = 72.0;
+/// Most lamps for which it is.
+const MOST_HALOS: usize = 8;
+
+impl Halo {
+    /// How near a line of sight passes, m.
+    fn passes(&self, line: DVec3) -> f32 {
+        (self.offset - line * self.offset.dot(line)).length().max(SMALLEST_LAMP) as f32
+    }
+}
+
+/// Single scattering along the lines of sight of one frame.
+pub(crate) struct Veil<'a> {
+    view: &'a View,
+    tiles: Tiles,
+    /// Ascending from 0, m.
+    distances: Vec<f64>,
+    /// Optical depth up to each distance.
+    depths: Vec<f32>,
+    /// Light of all lamps and fires scattered to the camera.
+    scattered: Scattered,
+    /// Lamps in the picture.
+    halos: Vec<Halo>,
+    /// Light of the sky that all drops send to the camera, by corner.
+    sky: Vec<[f32; 3]>,
+    ground: f64,
+}
+
+impl<'a> Veil<'a> {
+    /// The veil up to `end` (m) of drops with extinctions `[all, drawn as streaks]`; `None` where there is none.
+    pub(crate) fn new(
+        moment: &Moment,
+        lighting: &Lighting,
+        tiles: &Tiles,
+        sky: Vec<[f32; 3]>,
+        view: &'a View,
+        extinction: [f64; 2],
+        end: f64,
+    ) -> Option<Self> {
+        if end <= 0.0 || extinction[0] <= 0.0 {
+            return None;
+        }
+        let density = Density { moment, extinction };
+        let mut distances = geometric(FIRST.min(end), end, RATIO);
+        distances.insert(0, 0.0);
+        let last = distances.len() - 1;
+        distances[last] = end;
+        let mut depths = vec![0.0];
+        for pair in distances.windows(2) {
+            let depth = f64::from(depths[depths.len() - 1]);
+            depths.push((depth + (pair[1] - pair[0]) * 0.5 * (density.at(pair[0]) + density.at(pair[1]))) as f32);
+        }
+        let march =
+            March { lighting, density, eye: moment.sight.middle().position, distances: &distances, depths: &depths };
+        let (shown, others) = march.divide(view);
+        let lines = tiles.map(|_, line| march.line(line, &others));
+        let mut scattered = Scattered::new(&lines, distances.len());
+        let halos: Vec<Halo> = shown.into_iter().map(|(light, pixel)| march.halo(&light, pixel, tiles)).collect();
+        halos.iter().for_each(|halo| scattered.add(&halo.scattered));
+        Some(Self { view, tiles: tiles.clone(), distances, depths, scattered, halos, sky, ground: moment.ground })
+    }
+
+    /// Its end, m.
+    fn end(&self) -> f64 {
+        self.distances[self.distances.len() - 1]
+    }
+
+    /// Which distances a distance lies between, and how far from the first to the second.
+    fn bracket(&self, distance: f64) -> (usize, f32) {
+        let last = self.distances.len() - 1;
+        let next = self.distances.partition_point(|known| *known <= distance).clamp(1, last);
+        let (near, far) = (self.distances[next - 1], self.distances[next]);
+        (next - 1, ((distance - near) / (far - near)).clamp(0.0, 1.0) as f32)
+    }
+
+    /// Optical depth up to a distance.
+    fn depth(&self, distance: f64) -> f32 {
+        let (k, share) = self.bracket(distance);
+        self.depths[k] + (self.depths[k + 1] - self.depths[k]) * share
+    }
+
+    /// Scattered light from between two distances, at a corner.
+    fn lit(&self, scattered: &Scattered, corner: usize, range: [f64; 2]) -> [f32; 3] {
+        let [near, far] = range.map(|distance| {
+            let (k, share) = self.bracket(distance);
+            mix(scattered.0[k][corner], scattered.0[k + 1][corner], share)
+        });
+        let reach = math::lanes::exp(self.depth(range[0]));
+        std::array::from_fn(|c| (far[c] - near[c]).max(0.0) * reach)
+    }
+
+    /// Light and transmittance between two distances at a corner column, `down` of the way from corner row `row` to the next.
+    fn between(&self, column: usize, (row, down): (usize, f32), [near, far]: [f64; 2]) -> [f32; 4] {
+        let index = row * self.tiles.size[0] + column;
+        let below = index + self.tiles.size[0];
+        let range = [near, far.max(near)];
+        let through = math::lanes::exp(self.depth(range[0]) - self.depth(range[1]));
+        let lit = mix(self.lit(&self.scattered, index, range), self.lit(&self.scattered, below, range), down);
+        let sky = mix(self.sky[index], self.sky[below], down);
+        let light: [f32; 3] = std::array::from_fn(|c| lit[c] + sky[c] * (1.0 - through));
+        [light[0], light[1], light[2], through]
+    }
+
+    /// What a pixel near a lamp gets beside what is interpolated from the corners around it.
+    fn halo(&self, halo: &Halo, x: usize, y: usize, slice: &DepthInterval, hidden: f64) -> Option<[f32; 3]> {
+        let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+        let range = self.range(pixel, slice, hidden).filter(|range| range[0] < range[1])?;
+        let line = self.view.camera.direction(pixel)?.normalize_or_zero();
+        let part = pixel / TILE as f64;
+        let (column, row) = (part.x as usize, part.y as usize);
+        let (across, down) = ((part.x - part.x.floor()) as f32, (part.y - part.y.floor()) as f32);
+        let mut correction = [0.0_f32; 3];
+        let nearest = halo.passes(line);
+        for (right, below) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let corner = (row + below) * self.tiles.size[0] + column + right;
+            let weight = |step: usize, part: f32| if step == 1 { part } else { 1.0 - part };
+            let share = weight(right, across) * weight(below, down);
+            let factor = share * (halo.passes(self.tiles.lines[corner]) / nearest - 1.0);
+            let lit = self.lit(&halo.scattered, corner, range);
+            (0..3).for_each(|c| correction[c] += lit[c] * factor);
+        }
+        Some(correction)
+    }
+
+    /// Adds to the rows of a band what pixels near lamps get.
+    fn add_halos(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
+        for halo in &self.halos {
+            let [top, bottom] = [halo.pixel.y - HALO, halo.pixel.y + HALO].map(|y| y.max(0.0) as usize);
+            let [left, right] = [halo.pixel.x - HALO, halo.pixel.x + HALO].map(|x| x.max(0.0) as usize);
+            let rect = Rect { x: left, y: top, width: right - left, height: bottom - top }.intersection(&rows);
+            for y in rect.y..rect.bottom() {
+                for x in rect.x..rect.right() {
+                    let away = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - halo.pixel).length() / HALO;
+                    let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
+                    let hidden = f64::from(strip.plate_depth(index));
+                    let fade = 1.0 - math::smoothstep(0.6, 1.0, away) as f32;
+                    let Some(light) = self.halo(halo, x, y, slice, hidden).filter(|_| fade > 0.0) else { continue };
+                    // The veil before it lies in the strip's transmittance too; it takes little.
+                    (0..3)
+                        .for_each(|c| strip.radiance[c][index] = (strip.radiance[c][index] + fade * light[c]).max(0.0));
+                }
+            }
+        }
+    }
+
+    /// Distances between which a place of the picture sees the veil in a slice, behind `hidden` (depth, m) nothing.
+    fn range(&self, pixel: DVec2, slice: &DepthInterval, hidden: f64) -> Option<[f64; 2]> {
+        let camera = &self.view.camera;
+        let direction = camera.direction(pixel)?;
+        let length = direction.length();
+        let ground = (camera.position.y - self.ground) / -direction.y;
+        let far = slice.far.min(hidden).min(if ground > 0.0 { ground } else { f64::INFINITY });
+        // Seen in a mirror, the camera stands beneath the ground and rain begins there.
+        let beneath = camera.position.y < self.ground;
+        let near = if beneath { slice.near.max(ground) } else { slice.near };
+        let far = if beneath { slice.far.min(hidden) } else { far };
+        (!beneath || ground > 0.0).then(|| [near, far].map(|depth| (depth * length).min(self.end())))
+    }
+
+    /// Draws the rows of a band that lie in `rows`, behind what the strip holds.
+    pub(crate) fn draw(&self, slice: &DepthInterval, band: usize, rows: Rect, strip: &mut Strip) {
+        if strip.has_plate() {
+            self.draw_before_plate(slice, rows, strip);
+        } else {
+            self.draw_open(slice, band, rows, strip);
+        }
+        self.add_halos(slice, rows, strip);
+    }
+
+    /// Nothing but the ground ends the veil: it is found at the corners of tiles.
+    fn draw_open(&self, slice: &DepthInterval, band: usize, rows: Rect, strip: &mut Strip) {
+        let columns = rows.x / TILE..rows.right().div_ceil(TILE) + 1;
+        let edge = |y: f64| -> Vec<[f32; 4]> {
+            let place = self.tiles.row_at(y as f32);
+            let corner = |column: usize| {
+                let range = self.range(DVec2::new((column * TILE) as f64, y), slice, f64::INFINITY);
+                range.map_or([0.0, 0.0, 0.0, 1.0], |range| self.between(column, place, range))
+            };
+            columns.clone().map(corner).collect()
+        };
+        let edges = [edge((band * BAND) as f64), edge(((band + 1) * BAND) as f64)];
+        for y in rows.y..rows.bottom() {
+            let down = ((y - band * BAND) as f32 + 0.5) / BAND as f32;
+            let start = (y - strip.rect.y) * strip.rect.width;
+            for x in rows.x..rows.right() {
+                let across = ((x % TILE) as f32 + 0.5) / TILE as f32;
+                let column = x / TILE - columns.start;
+                let value: [f32; 4] = std::array::from_fn(|c| {
+                    let at =
+                        |edge: &[[f32; 4]]| (edge[column + 1][c] - edge[column][c]).mul_add(across, edge[column][c]);
+                    let (top, bottom) = (at(&edges[0]), at(&edges[1]));
+                    (bottom - top).mul_add(down, top)
+                });
+                put(strip, start + x - strip.rect.x, value);
+            }
+        }
+    }
+
+    /// A plate may end the veil anywhere, so every pixel finds its own.
+    fn draw_before_plate(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
+        for y in rows.y..rows.bottom() {
+            let place = self.tiles.row_at(y as f32 + 0.5);
+            for x in rows.x..rows.right() {
+                let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
+                let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+                let Some(range) = self.range(pixel, slice, f64::from(strip.plate_depth(index))) else { continue };
+                if range[1] <= range[0] {
+                    continue;
+                }
+                let column = x / TILE;
+                let across = ((x % TILE) as f32 + 0.5) / TILE as f32;
+                let (left, right) = (self.between(column, place, range), self.between(column + 1, place, range));
+                put(strip, index, std::array::from_fn(|c| (right[c] - left[c]).mul_add(across, left[c])));
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn put(strip: &mut Strip, index: usize, [red, green, blue, through]: [f32; 4]) {
+    strip.add_row_behind(index, [&[red], &[green], &[blue]], Some(&[1.0 - through]), &[f32::INFINITY]);
+}
+
+/// Single scattering of lamps along a line of sight.
+struct March<'a> {
+    lighting: &'a Lighting<'a>,
+    density: Density<'a>,
+    eye: DVec3,
+    distances: &'a [f64],
+    depths: &'a [f32],
+}
+
+impl March<'_> {
+    /// Lamps in and around the picture with their places, and all other lights.
+    fn divide(&self, view: &View) -> (Vec<(Light, DVec2)>, Vec<Light>) {
+        let (mut shown, mut others) = (Vec::new(), Vec::new());
+        for light in self.lighting.lights {
+            let place = match light.emitter {
+                Emitter::Point { position, .. } | Emitter::Spot { position, .. } => view.camera.project(position),
+                Emitter::Directional { .. } => None,
+            };
+            let near = |pixel: DVec2| (0..2).all(|axis| (-HALO..view.size[axis] as f64 + HALO).contains(&pixel[axis]));
+            match place.map(|place| place.pixel).filter(|pixel| near(*pixel)) {
+                Some(pixel) if shown.len() < MOST_HALOS => shown.push((*light, pixel)),
+                _ => others.push(*light),
+            }
+        }
+        (shown, others)
+    }
+
+    fn halo(&self, light: &Light, pixel: DVec2, tiles: &Tiles) -> Halo {
+        let lines = tiles.map(|_, line| self.line(line, std::slice::from_ref(light)));
+        let offset = match light.emitter {
+            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => position - self.eye,
+            Emitter::Directional { toward } => toward,
+        };
+        Halo { offset, pixel, scattered: Scattered::new(&lines, self.distances.len()) }
+    }
+
+    /// Light of some lamps scattered to the camera up to each distance.
+    fn line(&self, line: DVec3, lights: &[Light]) -> Vec<[f32; 3]> {
+        let mut sums = vec![[0.0; 3]; self.distances.len()];
+        if line == DVec3::ZERO {
+            return sums;
+        }
+        for light in lights {
+            let mut sum = [0.0_f32; 3];
+            for k in 0..self.distances.len() - 1 {
+                let part = self.segment(light, line, k);
+                for c in 0..3 {
+                    sum[c] += part[c];
+                    sums[k + 1][c] += sum[c];
+                }
+            }
+        }
+        sums
+    }
+
+    /// Light of one lamp scattered between two distances: `integral of beta E p / (4 pi) e^-tau ds`.
+    fn segment(&self, light: &Light, line: DVec3, k: usize) -> [f32; 3] {
+        let [from, to] = [self.distances[k], self.distances[k + 1]];
+        let position = match light.emitter {
+            Emitter::Directional { .. } => return self.sample(light, line, 0.5 * (from + to), to - from, k),
+            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => position,
+        };
+        // Evenly spaced in the angle seen from the lamp: there ds / r^2 is the angle's step over the nearest distance h, so the
+        // peak near the lamp costs nothing (Kulla & Fajardo 2012).
+        let nearest = (position - self.eye).dot(line);
+        let h = (position - self.eye - line * nearest).length().max(SMALLEST_LAMP);
+        let [first, last] = [from, to].map(|s| math::atan((s - nearest) / h));
+        let samples = ((last - first) / ANGLE).ceil().max(1.0);
+        let step = (last - first) / samples;
+        (0..samples as usize).fold([0.0; 3], |sum: [f32; 3], index| {
+            let offset = h * math::tan(first + step * (index as f64 + 0.5));
+            let length = step * (h * h + offset * offset) / h;
+            let part = self.sample(light, line, nearest + offset, length, k);
+            std::array::from_fn(|c| sum[c] + part[c])
+        })
+    }
+
+    /// Light scattered on `length` of the line around a distance.
+    fn sample(&self, light: &Light, line: DVec3, at: f64, length: f64, k: usize) -> [f32; 3] {
+        let point = self.eye + line * at;
+        let density = self.density.at(at);
+        let (illuminance, toward) = light.illuminance(point);
+        if illuminance == [0.0; 3] || density <= 0.0 || point.y < self.density.moment.ground {
+            return [0.0; 3];
+        }
+        let share = ((at - self.distances[k]) / (self.distances[k + 1] - self.distances[k])) as f32;
+        let depth = self.depths[k] + (self.depths[k + 1] - self.depths[k]) * share;
+        let through = math::lanes::exp(-depth - (self.lighting.extinction * distance(light, point)) as f32);
+        let scattered = self.lighting.scattering.at(toward.dot(line) as f32);
+        let scale = through * (density * length) as f32;
+        std::array::from_fn(|c| illuminance[c] * scattered[c] * scale)
+    }
+}

@@ -1,0 +1,74 @@
+//! What a scene says of its obstacles.
+
+use std::sync::Arc;
+
+use bansho_base::{
+    assets::Assets,
+    distance_field::DistanceField,
+    math::DVec3,
+    parameters::{AssetPath, ProblemKind, Range},
+    placement::Placement,
+    surroundings::Occluder,
+};
+
+use super::OpeningFault;
+
+bansho_base::choice! {
+    /// Shape of an obstacle.
+    pub enum ObstacleShape {
+        /// A ball with its middle at `position`.
+        Sphere = "sphere",
+        /// A box with its middle at `position`.
+        Box = "box",
+        /// All below a plane through `position`; unturned it is the ground.
+        Plane = "plane",
+        /// A closed surface from `file`.
+        Mesh = "mesh",
+    }
+}
+
+bansho_base::parameters! {
+    /// Something solid that gas flows around and drops fall on. It is not drawn: it stands for what the plate shows.
+    pub struct ObstacleParameters {
+        /// Its shape.
+        shape: ObstacleShape = ObstacleShape::Sphere;
+        /// Where it stands.
+        position: [f64; 3] = [0.0, 0.0, 0.0], unit("m");
+        /// Turn about x, then y, then z.
+        rotation_deg: [f64; 3] = [0.0, 0.0, 0.0], limits(Range::new(-3600.0, 3600.0)), unit("degrees");
+        /// Radius of a sphere.
+        radius: f64 = 0.5, limits(Range::new(1e-4, 1e5)), unit("m");
+        /// Sides of a box.
+        size: [f64; 3] = [1.0, 1.0, 1.0], limits(Range::new(1e-4, 1e5)), unit("m");
+        /// glTF file of a mesh.
+        file: Option<AssetPath> = None;
+        /// How many times larger a mesh is than its file says.
+        scale: f64 = 1.0, limits(Range::new(1e-4, 1e4));
+    }
+}
+
+impl ObstacleParameters {
+    /// The solid.
+    ///
+    /// # Errors
+    /// A mesh without a file, or a file without a mesh.
+    pub fn open(&self, assets: &dyn Assets) -> Result<Occluder, OpeningFault> {
+        let placement = Placement::new(self.position, self.rotation_deg, self.scale);
+        Ok(match self.shape {
+            ObstacleShape::Sphere => Occluder::Sphere { centre: placement.position, radius: self.radius },
+            ObstacleShape::Box => Occluder::Cuboid {
+                centre: placement.position,
+                half_extents: 0.5 * DVec3::from(self.size),
+                rotation: placement.rotation,
+            },
+            ObstacleShape::Plane => Occluder::HalfSpace { point: placement.position, normal: placement.turn(DVec3::Y) },
+            ObstacleShape::Mesh => {
+                let fault = |kind| OpeningFault { key: "file".into(), kind };
+                let missing = || ProblemKind::Conflict("an obstacle of shape \"mesh\" needs a `file`".into());
+                let file = self.file.as_ref().ok_or_else(|| fault(missing()))?;
+                let mesh = assets.mesh(&file.0).map_err(|error| fault(ProblemKind::Asset(error)))?;
+                Occluder::Mesh { distance: Arc::new(DistanceField::new(&mesh)), placement }
+            }
+        })
+    }
+}

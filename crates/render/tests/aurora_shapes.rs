@@ -1,0 +1,212 @@
+//! Auroral shapes in scene files: the thesis's five scenes move as it tells, and faults stand at their sheet and point.
+
+#[allow(dead_code, reason = "each test file uses a part of it")]
+mod support;
+
+use bansho_base::{
+    assets::MemoryAssets,
+    drawing::{Drawing, Stroke},
+    math::DVec2,
+    parameters::{Parameters, ProblemKind, Range, Reader},
+    phenomenon::Phenomenon,
+};
+use bansho_models::aurora::shapes::{
+    FRAME_S, MotionParameters, Neighbourhood, Sequence, Shape, ShapeFaultKind, ShapeParameters,
+};
+use bansho_render::{
+    Scene,
+    scene::{Describe, Opening, OpeningFault, PhenomenonKind},
+};
+
+bansho_base::parameters! {
+    /// An aurora of nothing but its shapes.
+    pub struct ShapesOnly {
+        /// Side of the drawn square.
+        extent_km: f64 = 800.0, limits(Range::new(10.0, 4000.0)), unit("km");
+        /// Its shapes.
+        shapes: Vec<ShapeParameters> = Vec::new();
+        /// How they follow each other.
+        motion: MotionParameters = MotionParameters::default();
+    }
+}
+
+impl ShapesOnly {
+    fn sequence(&self, assets: &MemoryAssets, loop_s: Option<f64>) -> Sequence {
+        Sequence::new(&self.shapes, &self.motion, self.extent_km, assets, loop_s).unwrap()
+    }
+}
+
+impl Describe for ShapesOnly {
+    const KEY: &'static str = "aurora";
+
+    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        match Sequence::new(&self.shapes, &self.motion, self.extent_km, opening.assets, opening.loop_s) {
+            Ok(_) => support::AbsorberParameters::default().open(opening),
+            Err(fault) => {
+                let kind = match fault.kind {
+                    ShapeFaultKind::Asset(error) => ProblemKind::Asset(error),
+                    kind => ProblemKind::Conflict(kind.to_string()),
+                };
+                Err(OpeningFault { key: fault.key, kind })
+            }
+        }
+    }
+}
+
+const KINDS: &[PhenomenonKind] = &[ShapesOnly::KIND];
+
+fn assets() -> MemoryAssets {
+    let stroke =
+        |id: &str, points: [[f64; 2]; 2]| Stroke { id: Some(id.into()), points: points.map(DVec2::from).to_vec() };
+    let strokes = vec![stroke("left", [[10.0, 50.0], [40.0, 50.0]]), stroke("right", [[60.0, 50.0], [90.0, 50.0]])];
+    let mut assets = MemoryAssets::default();
+    assets.insert_drawing("shapes.svg", Drawing { strokes, low: DVec2::ZERO, high: DVec2::splat(100.0) });
+    assets
+}
+
+fn parameters(text: &str) -> ShapesOnly {
+    let scene = Scene::parse("test.toml", text, KINDS, &assets()).unwrap_or_else(|error| panic!("{error}"));
+    ShapesOnly::read_table(&scene.instances[0].source.canonical(), &mut Reader::new(), &[])
+}
+
+fn fault(text: &str) -> String {
+    match Scene::parse("test.toml", &format!("bansho = 1\n[[aurora]]\n{text}"), KINDS, &assets()) {
+        Ok(_) => panic!("accepted: {text}"),
+        Err(error) => error.to_string(),
+    }
+}
+
+const SCENES: [&str; 5] = [
+    include_str!("data/aurora/sekiguchi_1.toml"),
+    include_str!("data/aurora/sekiguchi_2.toml"),
+    include_str!("data/aurora/sekiguchi_3.toml"),
+    include_str!("data/aurora/sekiguchi_4.toml"),
+    include_str!("data/aurora/sekiguchi_5.toml"),
+];
+
+fn sequence(scene: usize) -> Sequence {
+    parameters(SCENES[scene - 1]).sequence(&assets(), None)
+}
+
+/// Greatest distance of any control point of one shape from the other.
+fn farthest(from: &Shape, to: &Shape) -> f64 {
+    let near = Neighbourhood::new(to, 50.0);
+    let points = from.sheets.iter().flat_map(|sheet| &sheet.points);
+    points.map(|&point| near.distance(point).unwrap_or(50.0)).fold(0.0, f64::max)
+}
+
+#[test]
+fn the_scenes_of_the_thesis_move_without_a_jump_and_without_crossing() {
+    for scene in 1..=5 {
+        let sequence = sequence(scene);
+        let frames = (sequence.duration() / FRAME_S).round() as usize;
+        assert_eq!(frames, [280, 280, 280, 560, 420][scene - 1]);
+        let mut before = sequence.at(0.0);
+        for frame in 1..=frames {
+            let now = sequence.at(frame as f64 * FRAME_S);
+            assert_eq!(now.crossings(), 0, "scene {scene}, frame {frame}");
+            let jump = farthest(&now, &before).max(farthest(&before, &now));
+            assert!(jump < 3.5, "scene {scene}, frame {frame}: {jump} km");
+            let longer = (now.length() / before.length() - 1.0).abs();
+            assert!(longer < 0.02, "scene {scene}, frame {frame}: {longer}");
+            before = now;
+        }
+    }
+}
+
+#[test]
+fn the_scenes_have_as_many_sheets_as_the_thesis_tells() {
+    let sheets = |scene: usize| {
+        let sequence = sequence(scene);
+        sequence.arrivals().iter().map(|&time| sequence.at(time).sheets.len()).collect::<Vec<_>>()
+    };
+    assert_eq!(sheets(1), [1, 1, 1]);
+    assert_eq!(sheets(2), [1, 1, 2]);
+    assert_eq!(sheets(3), [3, 3, 2]);
+    assert_eq!(sheets(4), [1, 1, 1, 3, 2]);
+    assert_eq!(sheets(5), [6, 6, 6, 6]);
+}
+
+/// Scene 1's fold must stay open: the gap between its two limbs, 60 km from its bend, is far from any sheet.
+#[test]
+fn the_fold_of_scene_1_leaves_a_gap() {
+    let sequence = sequence(1);
+    let last = Neighbourhood::new(&sequence.at(sequence.duration()), 60.0);
+    assert!(last.distance(DVec2::new(180.0, -221.0)).is_none_or(|distance| distance > 45.0));
+}
+
+#[test]
+fn faults_stand_at_their_sheet_and_point() {
+    for (text, expected) in [
+        (
+            "[[aurora.shapes]]\nsheets = [{ points = [[0, 0]] }]\n",
+            "test.toml:4:22: aurora.0.shapes.0.sheets.0.points: sheet 1 has 1 of the points",
+        ),
+        (
+            "[[aurora.shapes]]\nsheets = [{ points = [] }]\n",
+            "sheet 1 has 0 of the points that a sheet needs; allowed: at least 2",
+        ),
+        (
+            "[[aurora.shapes]]\nsheets = [{ points = [[0, 0], [100, 0], [500, 0]] }]\n",
+            "test.toml:4:41: aurora.0.shapes.0.sheets.0.points.2: sheet 1, point 3 lies at (500.0, 0.0) km",
+        ),
+        (
+            "[[aurora.shapes]]\nsheets = [{ smooth = false, points = [[0, 0], [100, 0], [100, 50], [50, 50], [50, -50]] }]\n",
+            "points.3: sheet 1 crosses itself: after point 4 it meets its part after point 1",
+        ),
+        (
+            "[[aurora.shapes]]\nsheets = [{ points = [[0, 0], [9, 0]] }, { points = [[5, -5], [5, 5]] }]\n",
+            "sheets.1.points.0: sheet 2 meets sheet 1: after point 1 and after point 1",
+        ),
+        (
+            "[[aurora.shapes]]\nsheets = [{ points = [[0, 0], [9, 0]] }, { points = [[9, 0], [9, 5]] }]\n",
+            "sheet 2 meets sheet 1",
+        ),
+        (
+            "[[aurora.shapes]]\n[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90] }]\n",
+            "test.toml:5:10: aurora.0.shapes.1.sheets: has 2 sheets, but 1 come from the shape before",
+        ),
+        (
+            "[[aurora.shapes]]\n[[aurora.shapes]]\nsplit = [{ segment = 99 }]\n",
+            "aurora.0.shapes.1.split.0: sheet 1 has no segment 99; allowed: 1 to 95",
+        ),
+        (
+            "[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90] }]\n[[aurora.shapes]]\nmerge = [{ at = [0.5, 0] }]\n",
+            "the point at 0.5 of sheet 1 is not an end",
+        ),
+        ("[[aurora.shapes]]\nsplit = [{}]\n", "aurora.0.shapes.0.split: the first shape has none before it"),
+        (
+            "[[aurora.shapes]]\nsheets = [{ path = \"shapes.svg#middle\" }]\n",
+            "test.toml:4:20: aurora.0.shapes.0.sheets.0.path: shapes.svg: has no stroke of the id `middle`",
+        ),
+        ("[[aurora.shapes]]\nsheets = [{ path = \"gone.svg\" }]\n", "gone.svg: no such file"),
+        (
+            "[[aurora.shapes]]\nsheets = [{ path = \"shapes.svg\", form = \"arc\" }]\n",
+            "says more than one of `points`, `path` and `form`",
+        ),
+        ("[[aurora.shapes]]\nsheets = [{ form = \"arcc\" }]\n", "`arcc` is not known, did you mean `arc`?"),
+        ("[[aurora.shapes]]\nafter_s = 3\nafter_frames = 3\n", "says both `after_s` and `after_frames`"),
+    ] {
+        let shown = fault(text);
+        assert!(shown.contains(expected), "{text}\nexpected: {expected}\nshown: {shown}");
+    }
+}
+
+#[test]
+fn three_lines_make_an_aurora() {
+    for text in ["bansho = 1\n[[aurora]]\n", "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ form = \"fold\" }] }]\n"]
+    {
+        let sequence = parameters(text).sequence(&assets(), None);
+        assert!(sequence.at(1.0).length() > 400.0, "{text}");
+    }
+}
+
+#[test]
+fn a_drawing_is_fitted_to_the_square() {
+    let text = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg#right\" }] }]\n";
+    let shape = parameters(text).sequence(&assets(), None).at(0.0);
+    let points = &shape.sheets[0].points;
+    assert_eq!((points[0], points[points.len() - 1]), (DVec2::new(80.0, 0.0), DVec2::new(320.0, 0.0)));
+    let all = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg\" }] }]\n";
+    assert_eq!(parameters(all).sequence(&assets(), None).at(0.0).sheets.len(), 2);
+}
