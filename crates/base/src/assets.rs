@@ -1,15 +1,12 @@
-//! What a scene refers to by name: pictures, meshes and text, wherever they are kept.
+//! What a scene refers to by name: pictures, meshes, drawings and text, wherever they are kept.
 
 use std::{collections::BTreeMap, sync::Arc};
 
 use crate::{
+    drawing::Drawing,
     image::Image,
     mesh::{Mesh, MeshError},
 };
-//! What a scene refers to by name: pictures, drawings and text, wherever they are kept.
-
-
-use crate::{drawing::Drawing, image::Image};
 
 /// How the numbers of a picture are meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +49,12 @@ pub enum AssetProblem {
     /// It is there but cannot be read.
     #[error("cannot be read: {0}")]
     Unreadable(String),
+    /// A drawing without strokes.
+    #[error("holds no strokes (allowed: an SVG file with path, polyline or line elements)")]
+    NoStrokes,
+    /// A drawing was asked for a stroke that it lacks.
+    #[error("has no stroke of the id `{0}`")]
+    NoStroke(String),
     /// Its name ends in something that is not a picture.
     #[error("is not a picture Bansho reads (allowed: .png, .jpg, .jpeg, .exr)")]
     UnknownKind,
@@ -61,12 +64,6 @@ pub enum AssetProblem {
     /// It holds no usable mesh.
     #[error("holds no usable mesh: {0}")]
     Mesh(#[from] MeshError),
-    /// A drawing without strokes.
-    #[error("holds no strokes (allowed: an SVG file with path, polyline or line elements)")]
-    NoStrokes,
-    /// A drawing was asked for a stroke that it lacks.
-    #[error("has no stroke of the id `{0}`")]
-    NoStroke(String),
     /// Its contents are damaged or not what the name says.
     #[error("is damaged or not of the kind its name says: {0}")]
     Damaged(String),
@@ -110,7 +107,10 @@ pub trait Assets: Send + Sync {
     /// # Errors
     /// The asset is missing, too large, damaged, or holds no triangles.
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError>;
+
     /// The strokes of the line drawing at `path`.
+    ///
+    /// # Errors
     /// The asset is missing, damaged, too large, or holds no strokes.
     fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError>;
 
@@ -131,8 +131,8 @@ pub trait Assets: Send + Sync {
 #[derive(Clone, Debug, Default)]
 pub struct MemoryAssets {
     pictures: BTreeMap<String, Arc<Picture>>,
-    meshes: BTreeMap<String, Arc<Mesh>>,
     drawings: BTreeMap<String, Arc<Drawing>>,
+    meshes: BTreeMap<String, Arc<Mesh>>,
     texts: BTreeMap<String, Arc<str>>,
 }
 
@@ -145,6 +145,8 @@ impl MemoryAssets {
     /// Keeps `mesh` under `path`.
     pub fn insert_mesh(&mut self, path: impl Into<String>, mesh: Mesh) {
         self.meshes.insert(path.into(), Arc::new(mesh));
+    }
+
     /// Keeps `drawing` under `path`.
     pub fn insert_drawing(&mut self, path: impl Into<String>, drawing: Drawing) {
         self.drawings.insert(path.into(), Arc::new(drawing));
@@ -167,6 +169,8 @@ impl Assets for MemoryAssets {
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
         self.meshes.get(path).cloned().ok_or_else(|| missing(path))
+    }
+
     fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
         self.drawings.get(path).cloned().ok_or_else(|| missing(path))
     }
@@ -176,10 +180,8 @@ impl Assets for MemoryAssets {
     }
 
     fn digest(&self, path: &str, _frame: i64) -> Result<[u8; 32], AssetError> {
-        let known = self.pictures.contains_key(path) || self.meshes.contains_key(path) || self.texts.contains_key(path);
-        if !known {
         let drawn = self.pictures.contains_key(path) || self.drawings.contains_key(path);
-        if !drawn && !self.texts.contains_key(path) {
+        if !drawn && !self.meshes.contains_key(path) && !self.texts.contains_key(path) {
             return Err(missing(path));
         }
         let mut digest = [0; 32];

@@ -3,8 +3,7 @@
 //! - Out: [`naming`] says where frames go and as what, [`sequence::Sink`] takes them from any thread, [`atomic`] sees to it
 //!   that a file is whole or not there, [`resume`] finds those that need not be made again. [`png`], [`exr`] and [`video`]
 //!   are the formats, [`flatten`] and [`flipbook`] prepare pictures for them.
-//! - In: [`plates::FileAssets`] gives a scene its plates and meshes, with limits that no hostile file can pass.
-//! - In: [`plates::FileAssets`] gives a scene its plates and drawings, with limits that no hostile file can pass.
+//! - In: [`plates::FileAssets`] gives a scene its plates, meshes and drawings, with limits that no hostile file can pass.
 //!
 //! PNG, EXR, APNG and GIF files are the same bytes for the same frames on every machine and with any number of threads:
 //! nothing here reads the clock, the environment or the host. Work runs in the caller's rayon pool.

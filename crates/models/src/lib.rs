@@ -4,9 +4,9 @@ mod blue_flame;
 mod fault;
 mod lanes;
 
-pub mod flame_particles;
 pub mod aurora;
 pub mod field;
+pub mod flame_particles;
 pub mod flame_sheet;
 pub mod ground;
 pub mod lamps;

@@ -88,7 +88,7 @@ pub(crate) fn of_scene(plan: &Plan) -> Vec<Box<dyn Phenomenon>> {
         own.push(Box::new(Ground::new(ground.clone(), plan.seed, plan.loop_s)));
     }
     if let Some(sky) = scene.sky.as_ref().filter(|sky| sky.visible && !scene.has_plate()) {
-        own.push(Box::new(SkyBackdrop::new(sky.clone())));
+        own.push(Box::new(SkyBackdrop::new(sky.clone(), plan.seed)));
     }
     own
 }

@@ -6,6 +6,11 @@ use crate::{args::SimulateArgs, progress};
 pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
     super::watched(&args.work, |watcher| {
         let summary = args.simulation()?.prepare()?.run(watcher)?;
-        Ok(progress::Result { what: "frames", drawn: summary.drawn, kept: summary.kept, files: vec![summary.first_file] })
+        Ok(progress::Result {
+            what: "frames",
+            drawn: summary.drawn,
+            kept: summary.kept,
+            files: vec![summary.first_file],
+        })
     })
 }

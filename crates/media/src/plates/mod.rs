@@ -1,5 +1,4 @@
-//! Assets in files: plates, depth, meshes, text.
-//! Assets in files: plates, depth, drawings, text.
+//! Assets in files: plates, depth, meshes, drawings, text.
 
 mod cache;
 mod decode;
@@ -15,20 +14,17 @@ use std::{
 
 use bansho_base::{
     assets::{AssetError, AssetProblem, Assets, Picture},
+    drawing::Drawing,
     mesh::Mesh,
 };
 
 use self::cache::Cache;
-use crate::{exr, meshes::decode_mesh, naming::FrameTemplate};
-    drawing::Drawing,
-
-use crate::{drawings::decode_drawing, exr, naming::FrameTemplate};
+use crate::{drawings::decode_drawing, exr, meshes::decode_mesh, naming::FrameTemplate};
 
 /// Bytes of pictures that are kept for the next frame unless told otherwise.
 pub const CACHE_BYTES: usize = 512 << 20;
 
-/// Pictures, meshes and texts in files. Paths are relative to a folder; a run of `#` in a file's name stands for the frame
-/// Pictures, drawings and texts in files. Paths are relative to a folder; a run of `#` in a file's name stands for the frame
+/// Pictures, meshes, drawings and texts in files. Paths are relative to a folder; a run of `#` in a file's name stands for the frame
 /// number. What was read is remembered, so a file that changes is seen after [`FileAssets::forget`].
 ///
 /// A file is refused, before memory is taken for it, when it claims more than [`limits::SIDE`] pixels on a side or more
@@ -141,6 +137,8 @@ impl Assets for FileAssets {
         let beside = |name: &str| read(&path.with_file_name(name));
         let mesh = read(&path).and_then(|file| decode_mesh(&file, extension, &beside));
         Ok(Arc::new(mesh.map_err(|problem| error(&path, problem))?))
+    }
+
     fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
         let drawing = decode_drawing(&self.text(path)?);
         Ok(Arc::new(drawing.map_err(|problem| error(&self.root.join(path), problem))?))

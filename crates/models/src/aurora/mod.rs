@@ -1,7 +1,5 @@
 //! The aurora: drawn by an artist, moved by a field, lit by the atoms that precipitating electrons strike.
 //!
-//! K. Sekiguchi, "A study on artist-controllable aurora simulation". [`atmosphere`] is the air from 80 to 600 km, [`precipitation`]
-//! says where electrons of an energy spend it, [`light`] what the struck atoms give back, for how long and in which colour.
 //! K. Sekiguchi, "A study on artist-controllable aurora simulation". [`shapes`] are the foot of the aurora as it is drawn and as it
 //! becomes, [`particles`] the electrons that follow it, [`atmosphere`] is the air from 80 to 600 km, [`precipitation`] says where
 //! electrons of an energy spend it, [`light`] what the struck atoms give back, for how long and in which colour; [`afterglow`] is
@@ -14,9 +12,6 @@ pub mod light;
 mod parameters;
 pub mod particles;
 pub mod precipitation;
-//! K. Sekiguchi, "A study on artist-controllable aurora simulation". [`shapes`] are the foot of the aurora as it is drawn and as it
-//! becomes.
-
 pub mod shapes;
 
 pub use draw::{Aurora, DrawingParameters, Sampling};
