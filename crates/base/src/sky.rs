@@ -1,5 +1,7 @@
 //! The sky as a light: what it shines from each direction.
 
+mod night;
+
 use std::f64::consts::PI;
 
 use glam::DVec3;
@@ -7,8 +9,19 @@ use glam::DVec3;
 use crate::{
     animation::Animated,
     color::{black_body, luminance},
+    math,
     parameters::Range,
 };
+
+pub use night::{Night, NightParameters, Parallel};
+
+/// Air masses along a line of sight `elevation` radians above the horizon: 1 overhead, 38 at the horizon (Kasten & Young 1989). What lies
+/// below the horizon has the horizon's.
+#[must_use]
+pub fn air_mass(elevation: f64) -> f64 {
+    let degrees = elevation.to_degrees().clamp(0.0, 90.0);
+    1.0 / (math::sin(degrees.to_radians()) + 0.50572 * math::pow(degrees + 6.07995, -1.6364))
+}
 
 crate::choice! {
     /// How the sky's luminance is spread.
@@ -17,6 +30,8 @@ crate::choice! {
         Overcast = "overcast",
         /// The same from everywhere.
         Uniform = "uniform",
+        /// Airglow, stars and twilight, as `night` says.
+        Night = "night",
     }
 }
 
@@ -31,15 +46,20 @@ crate::parameters! {
         temperature_k: f64 = 7000.0, limits(Range::new(1000.0, 10_000.0)), unit("K");
         /// Whether it is seen, or only lights.
         visible: bool = true;
+        /// The sky at night.
+        night: NightParameters = NightParameters::default();
     }
 }
 
 impl SkyParameters {
     /// The sky at time `t`.
     pub fn at(&self, t: f64) -> Sky {
+        if self.kind == SkyKind::Night {
+            return Sky::of_night(self.night.at(t));
+        }
         let colour = black_body().radiance(self.temperature_k as f32);
         let scale = self.luminance.at(t) / f64::from(luminance(colour)).max(f64::MIN_POSITIVE);
-        Sky { kind: self.kind, zenith: colour.map(|value| (f64::from(value) * scale) as f32) }
+        Sky { kind: self.kind, zenith: colour.map(|value| (f64::from(value) * scale) as f32), night: None }
     }
 }
 
@@ -51,21 +71,29 @@ const GROUND_ALBEDO: f64 = 0.15;
 pub struct Sky {
     kind: SkyKind,
     zenith: [f32; 3],
+    night: Option<Night>,
 }
 
 impl Sky {
     /// No light from anywhere.
-    pub const DARK: Self = Self { kind: SkyKind::Uniform, zenith: [0.0; 3] };
+    pub const DARK: Self = Self { kind: SkyKind::Uniform, zenith: [0.0; 3], night: None };
+
+    fn of_night(night: Night) -> Self {
+        Self { kind: SkyKind::Night, zenith: night.radiance(DVec3::Y), night: Some(night) }
+    }
 
     /// Radiance from a direction, a unit vector (ACEScg, cd/m^2). From below the horizon comes what a dull ground throws back.
     pub fn radiance(&self, direction: DVec3) -> [f32; 3] {
         if direction.y < 0.0 {
             return self.horizontal_illuminance().map(|value| value * (GROUND_ALBEDO / PI) as f32);
         }
+        if let Some(night) = &self.night {
+            return night.radiance(direction);
+        }
         let share = match self.kind {
             // CIE S 011: L = Lz (1 + 2 sin elevation) / 3.
             SkyKind::Overcast => (1.0 + 2.0 * direction.y) / 3.0,
-            SkyKind::Uniform => 1.0,
+            SkyKind::Uniform | SkyKind::Night => 1.0,
         };
         self.zenith.map(|value| value * share as f32)
     }
@@ -74,9 +102,15 @@ impl Sky {
     pub fn horizontal_illuminance(&self) -> [f32; 3] {
         let hemisphere = match self.kind {
             SkyKind::Overcast => 7.0 / 9.0 * PI,
-            SkyKind::Uniform => PI,
+            // Nearly even: what the horizon has more of airglow the air takes.
+            SkyKind::Uniform | SkyKind::Night => PI,
         };
         self.zenith.map(|value| value * hemisphere as f32)
+    }
+
+    /// The night, if that is what it is.
+    pub fn night(&self) -> Option<&Night> {
+        self.night.as_ref()
     }
 
     /// Whether it gives no light.

@@ -2,6 +2,7 @@
 
 use bansho_base::{parameters::ProblemKind, phenomenon::Phenomenon};
 use bansho_models::{
+    aurora::{Aurora, AuroraParameters},
     flame_particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind},
     flame_sheet::{FlameSheet, FlameSheetParameters},
     ground::Ground,
@@ -17,7 +18,7 @@ use crate::{
 
 /// Every kind, in the order in which schema and book list them.
 pub const KINDS: &[PhenomenonKind] =
-    &[FlameSheetParameters::KIND, FlameParticlesParameters::KIND, RainParameters::KIND];
+    &[FlameSheetParameters::KIND, FlameParticlesParameters::KIND, RainParameters::KIND, AuroraParameters::KIND];
 
 /// A model's own fault, placed at the parameter that it names.
 fn opening_fault(fault: &bansho_models::ParameterFault) -> OpeningFault {
@@ -63,6 +64,17 @@ impl Describe for RainParameters {
     }
 }
 
+impl Describe for AuroraParameters {
+    const KEY: &'static str = "aurora";
+
+    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        match Aurora::new(self.clone(), opening.name, opening.seed, opening.loop_s, opening.assets) {
+            Ok(aurora) => Ok(Box::new(aurora)),
+            Err(fault) => Err(OpeningFault { kind: ProblemKind::Conflict(fault.kind.to_string()), key: fault.key }),
+        }
+    }
+}
+
 /// What the scene shows beside its phenomena: lamps, ground, and a sky where there is no plate.
 pub(crate) fn of_scene(plan: &Plan) -> Vec<Box<dyn Phenomenon>> {
     let scene = &plan.scene;
@@ -76,7 +88,7 @@ pub(crate) fn of_scene(plan: &Plan) -> Vec<Box<dyn Phenomenon>> {
         own.push(Box::new(Ground::new(ground.clone(), plan.seed, plan.loop_s)));
     }
     if let Some(sky) = scene.sky.as_ref().filter(|sky| sky.visible && !scene.has_plate()) {
-        own.push(Box::new(SkyBackdrop::new(sky.clone())));
+        own.push(Box::new(SkyBackdrop::new(sky.clone(), plan.seed)));
     }
     own
 }

@@ -109,6 +109,23 @@ fn sin_quarter(r: f32) -> f32 {
     if sine < -1.0 { -1.0 } else { sine }
 }
 
+/// Angle of the direction (`x`, `y`) from the first axis in [-pi, pi], radians; absolute error below 4e-7. 0 where both are 0.
+#[inline(always)]
+pub fn atan2(y: f32, x: f32) -> f32 {
+    let (across, along) = (f32::from_bits(y.to_bits() & !SIGN), f32::from_bits(x.to_bits() & !SIGN));
+    let steep = across > along;
+    let (least, greatest) = if steep { (along, across) } else { (across, along) };
+    // atan r = r q(r^2) on [0, 1], fit 3.8e-8.
+    let r = least / if greatest > 0.0 { greatest } else { 1.0 };
+    let r2 = r * r;
+    let q = (-4.054_555_3e-3f32).mul_add(r2, 2.186_291_5e-2).mul_add(r2, -5.591_226_6e-2).mul_add(r2, 9.642_193e-2);
+    let q = q.mul_add(r2, -1.390_862_8e-1).mul_add(r2, 1.994_656_5e-1).mul_add(r2, -3.332_986e-1);
+    let angle = r * q.mul_add(r2, 9.999_993e-1);
+    let angle = if steep { std::f32::consts::FRAC_PI_2 - angle } else { angle };
+    let angle = if x < 0.0 { std::f32::consts::PI - angle } else { angle };
+    f32::from_bits(angle.to_bits() | (y.to_bits() & SIGN))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -200,6 +217,18 @@ mod tests {
         assert_eq!((sin_turns(0.0), sin_turns(0.5), cos_turns(0.25), cos_turns(0.0)), (0.0, 0.0, 0.0, 1.0));
         assert_eq!((sin_turns(0.25), sin_turns(-0.25), cos_turns(3.5), sin_turns(1e30)), (1.0, -1.0, -1.0, 0.0));
         assert!(sin_turns(f32::INFINITY).is_nan());
+    }
+
+    #[test]
+    fn angles_keep_their_bound_in_all_quadrants() {
+        for step in 0..100_000 {
+            let angle = (step as f64 / 50_000.0 - 1.0) * 0.999_999 * std::f64::consts::PI;
+            let (sin, cos) = math::sin_cos(angle);
+            let (y, x) = ((17.0 * sin) as f32, (17.0 * cos) as f32);
+            assert!((atan2(y, x) as f64 - math::atan2(y as f64, x as f64)).abs() < 4e-7, "{angle}");
+        }
+        assert_eq!((atan2(0.0, 0.0), atan2(0.0, 2.0), atan2(3.0, 0.0)), (0.0, 0.0, std::f32::consts::FRAC_PI_2));
+        assert_eq!(atan2(0.0, -1.0), std::f32::consts::PI);
     }
 
     #[test]

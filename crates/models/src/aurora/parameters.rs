@@ -6,6 +6,7 @@ use bansho_base::{
 };
 
 use super::{
+    draw::DrawingParameters,
     precipitation::{Spectrum, spectrum::ARC},
     shapes::{MotionParameters, ShapeParameters},
 };
@@ -209,6 +210,8 @@ bansho_base::parameters! {
         folds: FoldParameters = FoldParameters::default();
         /// Pulsation.
         pulsation: PulsationParameters = PulsationParameters::default();
+        /// Drawing.
+        drawing: DrawingParameters = DrawingParameters::default();
     }
 }
 

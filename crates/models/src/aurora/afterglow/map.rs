@@ -63,6 +63,12 @@ impl GlowMap {
         self.tiles.iter().flat_map(|tile| (0..SIDE * SIDE).filter_map(|cell| self.cell(tile, cell)))
     }
 
+    /// How many cells are lit.
+    #[must_use]
+    pub fn lit_cells(&self) -> usize {
+        self.tiles.iter().flat_map(|tile| &tile.powers).filter(|power| **power > 0.0).count()
+    }
+
     /// Power of the whole map, W.
     #[must_use]
     pub fn power_w(&self) -> f64 {

@@ -2,16 +2,10 @@
 
 use bansho_base::{math, parameters::Range};
 
+pub use bansho_base::sky::air_mass;
+
 /// Magnitudes of a transmittance of 1/e.
 const MAGNITUDES_PER_OPTICAL_DEPTH: f64 = 1.085_736_204_758_13;
-
-/// Air masses along a line of sight `elevation` radians above the horizon: 1 overhead, 38 at the horizon (Kasten & Young 1989). What lies
-/// below the horizon has the horizon's.
-#[must_use]
-pub fn air_mass(elevation: f64) -> f64 {
-    let degrees = elevation.to_degrees().clamp(0.0, 90.0);
-    1.0 / (math::sin(degrees.to_radians()) + 0.50572 * math::pow(degrees + 6.07995, -1.6364))
-}
 
 /// Magnitudes lost overhead; they may be many in haze.
 const MAGNITUDES: Range = Range::new(0.0, 5.0);

@@ -1,0 +1,187 @@
+//! A random starry sky with the magnitude counts and colours of the real one.
+
+use bansho_base::{
+    camera::Camera,
+    canvas::View,
+    color::{black_body, luminance},
+    math::{self, DVec2, DVec3},
+    random::{Key, Purpose, direction, uniform},
+    sky::Night,
+};
+use rayon::prelude::*;
+
+/// Logarithm (base 10) of the number of stars over the whole sky that are brighter than magnitude -1, 0, 1 ... 9 (Allen's Astrophysical
+/// Quantities, 4th edition, table 19.9, in round numbers).
+const COUNTS: [f64; 11] = [0.15, 0.6, 1.15, 1.7, 2.25, 2.75, 3.21, 3.69, 4.16, 4.6, 5.05];
+const BRIGHTEST: f64 = -1.0;
+/// Magnitude of the faintest stars that are drawn one by one.
+const FAINTEST: f64 = 8.5;
+/// Illuminance of a star of magnitude 0, lux.
+const LUX_AT_0: f64 = 2.54e-6;
+/// Stars whose place follows the band of the Milky Way, in part, from this magnitude on.
+const BAND_FROM: f64 = 4.0;
+/// Reach of a star's image, pixels, and of those brighter than magnitude 2.
+const REACH: f64 = 3.5;
+const BRIGHT_REACH: f64 = 10.0;
+/// Shape of a star's image: (1 + (r / core)^2)^-beta (Moffat 1969), core in pixels.
+const CORE: f64 = 0.85;
+const BETA: f64 = 2.6;
+
+const STAR: Purpose = Purpose::named("star");
+
+/// A star.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Star {
+    direction: DVec3,
+    magnitude: f64,
+    /// ACEScg of unit luminance.
+    colour: [f32; 3],
+}
+
+/// The stars of a scene.
+#[derive(Clone, Debug)]
+pub(super) struct Stars(Vec<Star>);
+
+/// A star as a picture shows it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spot {
+    pub(super) pixel: DVec2,
+    pub(super) reach: f64,
+    /// Radiance at the middle of its image, cd/m^2.
+    radiance: [f32; 3],
+}
+
+/// Normal of the Milky Way's plane.
+pub(super) fn galactic_pole() -> DVec3 {
+    DVec3::new(0.62, 0.38, 0.69).normalize()
+}
+
+impl Stars {
+    /// The stars of a seed.
+    pub(super) fn new(seed: u64) -> Self {
+        let key = Key::new(seed, "stars");
+        let count = math::pow(10.0, log_count(FAINTEST)) as u64;
+        Self((0..count).map(|number| star(key, number, count)).collect())
+    }
+
+    /// Those that a picture shows, by row of their middle.
+    pub(super) fn spots(&self, view: &View, night: &Night, brightness: f64) -> Vec<Spot> {
+        let norm = 1.0 / shape_sum();
+        let spot = |star: &Star| spot(star, &view.camera, view.size, night, brightness * norm);
+        let mut spots: Vec<Spot> = self.0.par_iter().filter_map(spot).collect();
+        spots.sort_by(|a, b| a.pixel.y.total_cmp(&b.pixel.y));
+        spots
+    }
+}
+
+/// Logarithm of the number of stars brighter than a magnitude.
+fn log_count(magnitude: f64) -> f64 {
+    let place = (magnitude - BRIGHTEST).clamp(0.0, COUNTS.len() as f64 - 1.001);
+    math::lerp(COUNTS[place as usize], COUNTS[place as usize + 1], place.fract())
+}
+
+/// The magnitude of the star of that rank, from the brightest on.
+fn magnitude_of_rank(rank: f64) -> f64 {
+    let log = math::log10(rank.max(1e-9)).max(COUNTS[0] - 0.6);
+    let above = COUNTS.partition_point(|count| *count < log).clamp(1, COUNTS.len() - 1);
+    BRIGHTEST + above as f64 - 1.0 + (log - COUNTS[above - 1]) / (COUNTS[above] - COUNTS[above - 1])
+}
+
+fn star(key: Key, number: u64, count: u64) -> Star {
+    let words = key.words(number, 0, STAR);
+    let magnitude = magnitude_of_rank((number as f64 + f64::from(uniform(words[0]))).min(count as f64));
+    let mut toward = direction([words[1], words[2]]).as_dvec3();
+    let more = key.words(number, 1, STAR);
+    // Faint stars are far ones, and crowd to the plane of the galaxy.
+    if magnitude > BAND_FROM && uniform(more[0]) < 0.45 {
+        let pole = galactic_pole();
+        let height = toward.dot(pole);
+        toward = (toward - pole * (height * 0.85)).normalize();
+    }
+    // Temperatures of naked-eye stars: most from 4000 to 12000 K.
+    let spread = f64::from(uniform(words[3])) + f64::from(uniform(more[1])) - 1.0;
+    let temperature = 6300.0 * math::exp2(1.1 * spread + 0.25 * (f64::from(uniform(more[2])) - 0.5));
+    let colour = black_body().radiance(temperature.clamp(2600.0, 10_000.0) as f32);
+    let scale = 1.0 / luminance(colour);
+    Star { direction: toward, magnitude, colour: colour.map(|value| value * scale) }
+}
+
+/// Sum of the shape over all pixels.
+fn shape_sum() -> f64 {
+    std::f64::consts::PI * CORE * CORE / (BETA - 1.0)
+}
+
+fn spot(star: &Star, camera: &Camera, size: [usize; 2], night: &Night, brightness: f64) -> Option<Spot> {
+    if star.direction.y < 0.0 {
+        return None;
+    }
+    let pixel = camera.project(camera.position + star.direction * 1e9)?.pixel;
+    let reach = if star.magnitude < 2.0 { BRIGHT_REACH } else { REACH };
+    let inside = |place: f64, side: usize| place > -reach && place < side as f64 + reach;
+    if !inside(pixel.x, size[0]) || !inside(pixel.y, size[1]) {
+        return None;
+    }
+    let share = night.transmittance(math::asin(star.direction.y));
+    let illuminance = LUX_AT_0 * math::pow(10.0, -0.4 * star.magnitude) * share * brightness;
+    let radiance = (illuminance / solid_angle(camera, pixel)?) as f32;
+    Some(Spot { pixel, reach, radiance: star.colour.map(|value| value * radiance) })
+}
+
+/// Solid angle of a pixel.
+fn solid_angle(camera: &Camera, pixel: DVec2) -> Option<f64> {
+    let at = |x: f64, y: f64| camera.direction(pixel + DVec2::new(x, y)).map(DVec3::normalize);
+    let (middle, right, down) = (at(0.0, 0.0)?, at(0.5, 0.0), at(0.0, 0.5));
+    let (across, along) = (right.or(at(-0.5, 0.0))? - middle, down.or(at(0.0, -0.5))? - middle);
+    Some((4.0 * across.cross(along).length()).max(1e-18))
+}
+
+impl Spot {
+    /// Its radiance at the middle of a pixel.
+    #[inline]
+    pub(super) fn at(&self, x: usize, y: usize) -> Option<[f32; 3]> {
+        let squared = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - self.pixel).length_squared();
+        (squared < self.reach * self.reach).then(|| {
+            let shape = math::pow(1.0 + squared / (CORE * CORE), -BETA) as f32;
+            self.radiance.map(|value| value * shape)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bansho_base::{canvas::Shutter, camera::CameraParameters, sky::SkyParameters};
+
+    #[test]
+    fn there_are_as_many_stars_as_in_the_real_sky() {
+        let stars = Stars::new(7);
+        let brighter = |magnitude: f64| stars.0.iter().filter(|star| star.magnitude < magnitude).count() as f64;
+        // Whole sky: about 50 above magnitude 2, 500 above 4, 5000 above 6.
+        for (magnitude, expected) in [(2.0, 50.0), (4.0, 560.0), (6.0, 4900.0)] {
+            assert!((brighter(magnitude) / expected - 1.0).abs() < 0.15, "{magnitude}: {}", brighter(magnitude));
+        }
+        assert!(stars.0[0].magnitude < 0.0 && stars.0[0].magnitude > -2.5);
+        assert!(stars.0.iter().all(|star| (star.direction.length() - 1.0).abs() < 1e-5));
+    }
+
+    #[test]
+    fn a_star_keeps_its_light_wherever_it_lies_between_pixels() {
+        let night = *SkyParameters { kind: bansho_base::sky::SkyKind::Night, ..SkyParameters::default() }.at(0.0).night().unwrap();
+        let shutter = Shutter { open: 0.0, close: 0.0 };
+        let camera = CameraParameters { target: [0.0, 30.0, -60.0].into(), ..CameraParameters::default() };
+        let view = View::new(camera, shutter, 0.0, [64, 48], 0);
+        for offset in [0.0, 0.3, 0.5] {
+            let direction = view.camera.direction(DVec2::new(32.0 + offset, 24.2)).unwrap().normalize();
+            let star = Star { direction, magnitude: 1.0, colour: [1.0; 3] };
+            let spot = spot(&star, &view.camera, view.size, &night, 1.0 / shape_sum()).unwrap();
+            let mut lux = 0.0;
+            for (x, y) in (0..64).flat_map(|x| (0..48).map(move |y| (x, y))) {
+                let solid = solid_angle(&view.camera, DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap();
+                lux += spot.at(x, y).map_or(0.0, |value| f64::from(value[0]) * solid);
+            }
+            let expected = LUX_AT_0 * math::pow(10.0, -0.4) * night.transmittance(math::asin(direction.y));
+            // The wings beyond the reach are left out.
+            assert!((0.9..1.05).contains(&(lux / expected)), "{offset}: {}", lux / expected);
+        }
+    }
+}
