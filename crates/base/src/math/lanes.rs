@@ -118,7 +118,7 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     // atan r = r q(r^2) on [0, 1], fit 3.8e-8.
     let r = least / if greatest > 0.0 { greatest } else { 1.0 };
     let r2 = r * r;
-    let q = (-4.054_555_3e-3f32).mul_add(r2, 2.186_291_5e-2).mul_add(r2, -5.591_226_6e-2).mul_add(r2, 9.642_193e-2);
+    let q = (-4.054_555e-3_f32).mul_add(r2, 2.186_291_5e-2).mul_add(r2, -5.591_226_6e-2).mul_add(r2, 9.642_193e-2);
     let q = q.mul_add(r2, -1.390_862_8e-1).mul_add(r2, 1.994_656_5e-1).mul_add(r2, -3.332_986e-1);
     let angle = r * q.mul_add(r2, 9.999_993e-1);
     let angle = if steep { std::f32::consts::FRAC_PI_2 - angle } else { angle };

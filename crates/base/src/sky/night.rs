@@ -182,7 +182,8 @@ mod tests {
 
     #[test]
     fn twilight_falls_a_thousandfold_from_6_to_12_degrees_and_lies_over_the_sun() {
-        let at = |degrees: f64| NightParameters { sun_elevation_deg: Animated::from(degrees), ..NightParameters::default() };
+        let at =
+            |degrees: f64| NightParameters { sun_elevation_deg: Animated::from(degrees), ..NightParameters::default() };
         let ratio = overhead(&at(-6.0)) / overhead(&at(-12.0));
         assert!((200.0..1500.0).contains(&ratio), "{ratio}");
         let night = at(-9.0).at(0.0);
