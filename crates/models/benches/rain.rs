@@ -65,7 +65,7 @@ fn naive(count: u64, pixels: &mut [[f32; 4]]) {
     for index in 0..count {
         let uniforms = key.uniforms(index, 0, Purpose::named("streak")).map(f64::from);
         let middle = DVec2::new(uniforms[0] * SIZE[0] as f64, uniforms[1] * SIZE[1] as f64);
-        let scale = 990.0 / (1.0 + 4.0 * uniforms[2].cbrt());
+        let scale = 990.0 / (1.0 + 4.0 * bansho_base::math::cbrt(uniforms[2]));
         let way = DVec2::new(0.002, 0.09) * scale;
         let (from, to, radius) = (middle - 0.5 * way, middle + 0.5 * way, 0.0007 * scale);
         let soft = radius.max(0.5) + 0.5;
