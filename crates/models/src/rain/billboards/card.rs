@@ -72,7 +72,7 @@ impl Card {
         weight: &(dyn Fn(f64) -> f64 + Sync),
     ) -> Option<Self> {
         let contents = class.lattice.contents(cell);
-        let [u, v, choice, _] = moment.key.uniforms(contents, 0, class.purpose(OFFSET));
+        let [u, v, choice, mirrored] = moment.key.uniforms(contents, 0, class.purpose(OFFSET));
         let shift = moment.key.uniforms(contents, 0, class.purpose(PLACE)).map(|value| f64::from(value) - 0.5);
         // Anywhere within the cell's ground: no two stand in a row.
         let place = DVec3::from(cell.0.map(|count| count as f64 + 0.5)) + DVec3::new(shift[0], 0.0, shift[1]);
@@ -98,11 +98,11 @@ impl Card {
         let pixels_up = height * camera.focal_pixels / depth;
         Some(Self {
             class: class.index,
-            variant: ((choice * (2 * VARIANTS) as f32) as u64) / 2,
+            variant: (choice * VARIANTS as f32) as u64,
             diameter_mm: class.diameter_mm as f32,
             mapping,
             offset: [u, v],
-            side: if ((choice * (2 * VARIANTS) as f32) as u64).is_multiple_of(2) { 1.0 } else { -1.0 },
+            side: if mirrored < 0.5 { 1.0 } else { -1.0 },
             lean: slant.lean as f32,
             repeats: slant.repeats as f32,
             floor: ((moment.ground - base.y) / height).max(0.0) as f32,

@@ -8,7 +8,7 @@ const SIZE: [usize; 2] = [320, 180];
 const BANDS: usize = 6;
 
 /// Mean and variance of streak opacity within groups of rows, over frames of several rains.
-fn statistics(method: super::Method, rate: f64, frames: u64) -> Vec<[f64; 2]> {
+fn statistics(method: super::Method, rate: f64, frames: u64) -> [[f64; 2]; BANDS] {
     let calm = wind([0.0; 3], 0.0);
     let mut sums = [[0.0; 2]; BANDS];
     for frame in 0..frames {
@@ -21,7 +21,7 @@ fn statistics(method: super::Method, rate: f64, frames: u64) -> Vec<[f64; 2]> {
         }
     }
     let pixels = (frames as usize * SIZE[0] * SIZE[1] / BANDS) as f64;
-    sums.iter().map(|[sum, squares]| [sum / pixels, squares / pixels - (sum / pixels) * (sum / pixels)]).collect()
+    sums.map(|[sum, squares]| [sum / pixels, squares / pixels - (sum / pixels) * (sum / pixels)])
 }
 
 #[test]
