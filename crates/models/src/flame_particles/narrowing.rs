@@ -29,7 +29,7 @@ pub(crate) struct Axis {
     /// Speed of the air that flows in at the base, m/s.
     inflow: f32,
     strength: f32,
-    /// Half the burner's width: farther out gas belongs to another part of a large burner.
+    /// The burner's width, m: farther out gas belongs to another part of a large burner.
     reach: f32,
 }
 
