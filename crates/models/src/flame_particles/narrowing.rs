@@ -1,17 +1,20 @@
 //! Why flames narrow upward: gas that rises ever faster must draw together, since its volume stays.
 //!
 //! Where gas on the axis gains speed at the rate `du/dh`, continuity moves the gas around at `-(r/2) du/dh`; air enters a fire no faster than
-//! its entrainment allows, a share of the speed on the axis. The axis is where the gas is: the mean place in each layer of height, so
+//! its entrainment allows, a share of the speed on the axis, and at the base about a fifth of `sqrt(g D)`. The axis is where the gas is: the mean place in each layer of height, so
 //! that it leans with the wind.
 
-use bansho_base::math::Vec3;
+use bansho_base::math::{self, Vec3};
 
-use super::burner::Burner;
+use super::burner::{Burner, GRAVITY};
 
 /// Layers of height.
 const LAYERS: usize = 24;
 /// Greatest speed at which gas draws together, as a share of the speed on the axis.
 const GREATEST_SHARE: f32 = 0.2;
+
+/// What air at the base adds to that, in `sqrt(g D)`.
+const INFLOW_FROUDE: f64 = 0.2;
 
 /// The axis of one burner's gas.
 #[derive(Clone, Debug)]
@@ -23,8 +26,10 @@ pub(crate) struct Axis {
     middle: [[f32; 2]; LAYERS + 1],
     speed_squared: f32,
     acceleration: f32,
+    /// Speed of the air that flows in at the base, m/s.
+    inflow: f32,
     strength: f32,
-    /// Half the burner's width: farther out gas belongs to another part of a large burner.
+    /// The burner's width, m: farther out gas belongs to another part of a large burner.
     reach: f32,
 }
 
@@ -52,6 +57,7 @@ impl Axis {
             middle: [[base.x as f32, base.z as f32]; LAYERS + 1],
             speed_squared: (burner.speed * burner.speed) as f32,
             acceleration: burner.acceleration as f32,
+            inflow: (INFLOW_FROUDE * math::sqrt(GRAVITY * burner.diameter)) as f32,
             strength: strength as f32,
             reach: burner.diameter as f32,
         };
@@ -91,7 +97,8 @@ impl Axis {
         let speed = (self.speed_squared + 2.0 * self.acceleration * height).sqrt().max(1e-6);
         // The pull of one axis ends where a large burner has others of its own.
         let near = (2.0 - distance / self.reach).clamp(0.0, 1.0);
-        let inward = (0.5 * distance * self.acceleration / speed).min(GREATEST_SHARE * speed) * near * self.strength;
+        let greatest = GREATEST_SHARE.mul_add(speed, self.inflow);
+        let inward = (0.5 * distance * self.acceleration / speed).min(greatest) * near * self.strength;
         if distance > 0.0 { away * (-inward / distance) } else { Vec3::ZERO }
     }
 }
