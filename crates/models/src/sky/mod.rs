@@ -201,7 +201,11 @@ impl PreparedSky<'_> {
 impl Prepared for PreparedSky<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
         let hills = self.skyline.is_some() && slice.overlaps(&HILLS);
-        if hills || slice.overlaps(&FAR) { Rect::of_size(self.view.size[0], self.view.size[1]) } else { Rect::default() }
+        if hills || slice.overlaps(&FAR) {
+            Rect::of_size(self.view.size[0], self.view.size[1])
+        } else {
+            Rect::default()
+        }
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {

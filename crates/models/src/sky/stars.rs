@@ -93,7 +93,7 @@ fn star(key: Key, number: u64, count: u64) -> Star {
     let mut toward = direction([words[1], words[2]]).as_dvec3();
     let more = key.words(number, 1, STAR);
     // Faint stars are far ones, and crowd to the plane of the galaxy.
-    if magnitude > BAND_FROM && uniform(more[0]) < 0.45 {
+    if magnitude > BAND_FROM && uniform(more[0]) < 0.35 {
         let pole = galactic_pole();
         let height = toward.dot(pole);
         toward = (toward - pole * (height * 0.85)).normalize();
@@ -150,7 +150,7 @@ impl Spot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bansho_base::{canvas::Shutter, camera::CameraParameters, sky::SkyParameters};
+    use bansho_base::{camera::CameraParameters, canvas::Shutter, sky::SkyParameters};
 
     #[test]
     fn there_are_as_many_stars_as_in_the_real_sky() {
@@ -166,7 +166,10 @@ mod tests {
 
     #[test]
     fn a_star_keeps_its_light_wherever_it_lies_between_pixels() {
-        let night = *SkyParameters { kind: bansho_base::sky::SkyKind::Night, ..SkyParameters::default() }.at(0.0).night().unwrap();
+        let night = *SkyParameters { kind: bansho_base::sky::SkyKind::Night, ..SkyParameters::default() }
+            .at(0.0)
+            .night()
+            .unwrap();
         let shutter = Shutter { open: 0.0, close: 0.0 };
         let camera = CameraParameters { target: [0.0, 30.0, -60.0].into(), ..CameraParameters::default() };
         let view = View::new(camera, shutter, 0.0, [64, 48], 0);
