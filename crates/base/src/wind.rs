@@ -80,9 +80,9 @@ impl Wind {
         let mean = self.mean(t);
         let strength = self.parameters.gust * mean.length();
         let Some(gusts) = self.gusts.as_ref().filter(|_| strength > 0.0) else { return mean };
-        let WindParameters { gust_length, gust_period_s, velocity, .. } = &self.parameters;
+        let WindParameters { gust_length, gust_period_s, .. } = &self.parameters;
         let (drift, turns) = match self.loop_s {
-            None => (DVec3::from(velocity.integral(0.0, t)), t / gust_period_s),
+            None => (self.travel(0.0, t), t / gust_period_s),
             Some(seconds) => (DVec3::ZERO, t / seconds * f64::from(loop_cells(seconds, *gust_period_s))),
         };
         let place = (point - drift) / *gust_length + self.origin;

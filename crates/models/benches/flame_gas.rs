@@ -15,7 +15,7 @@ use bansho_base::{
     observer::Unobserved,
     phenomenon::Prepared,
     random::Key,
-    surroundings::{Publication, Surroundings},
+    surroundings::Surroundings,
     wind::{Wind, WindParameters},
 };
 use bansho_models::flame_particles::{

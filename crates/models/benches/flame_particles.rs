@@ -9,7 +9,7 @@ use bansho_base::{
     assets::MemoryAssets,
     parameters::Auto,
     phenomenon::Phenomenon,
-    surroundings::{Publication, Surroundings},
+    surroundings::Surroundings,
     wind::{Wind, WindParameters},
 };
 use bansho_models::flame_particles::{FlameParticles, FlameParticlesParameters};

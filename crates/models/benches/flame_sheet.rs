@@ -3,7 +3,6 @@
 use std::hint::black_box;
 
 use bansho_base::{
-    air::Air,
     animation::Animated,
     camera::CameraParameters,
     canvas::{DepthInterval, Shutter, Strip, View},

@@ -26,6 +26,7 @@ fn gather(value: &Value, kind: &Kind, paths: &mut Vec<String>) {
 }
 
 #[cfg(test)]
+#[allow(unreachable_pub, reason = "tables are public")]
 mod tests {
     use super::*;
     use crate::parameters::{AssetPath, Parameters};

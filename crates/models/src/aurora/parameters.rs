@@ -188,7 +188,7 @@ bansho_base::parameters! {
         energy_ev: Animated<f64> = Animated::from(5000.0), limits(Range::new(100.0, 100_000.0)), unit("eV");
         /// How their energies are spread.
         spectrum: SpectrumShape = SpectrumShape::Arc;
-        /// Thickness of a sheet, twice L_thr; `"auto"` is three cells of the field.
+        /// Thickness of a sheet, twice L_thr; `"auto"` is two cells of the field.
         thickness_km: Auto<f64> = Auto::Auto, limits(Range::new(0.01, 1000.0)), unit("km");
         /// Dip of the magnetic field: 90 is upright, rays lean to the south (north of the equator) by what is missing.
         dip_deg: f64 = 77.0, limits(Range::new(-90.0, 90.0)), unit("degrees");
@@ -226,7 +226,7 @@ impl AuroraParameters {
     #[must_use]
     pub fn half_thickness_km(&self) -> f64 {
         match self.thickness_km {
-            Auto::Auto => 1.5 * self.cell_km(),
+            Auto::Auto => self.cell_km(),
             Auto::Set(thickness) => thickness / 2.0,
         }
     }

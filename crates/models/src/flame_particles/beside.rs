@@ -18,11 +18,14 @@ impl PairTerm<3, 5, 8> for BesideTerm {
     #[inline(always)]
     fn term<R: Real>(&self, pair: &Pair<R, 3>, own: &[R; 5], other: &[R; 5]) -> [R; 8] {
         let weight = other[0] * self.0.value(pair.distance_squared);
-        std::array::from_fn(|k| match k {
-            0 => weight,
-            1..5 => weight * (other[k] - own[k]),
-            _ => weight * (weight.like(0.0) - pair.offset[k - 5]),
-        })
+        let mut sums = [weight; 8];
+        for k in 1..5 {
+            sums[k] = weight * (other[k] - own[k]);
+        }
+        for axis in 0..3 {
+            sums[5 + axis] = weight * (weight.like(0.0) - pair.offset[axis]);
+        }
+        sums
     }
 }
 

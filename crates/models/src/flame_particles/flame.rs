@@ -129,8 +129,8 @@ impl Phenomenon for FlameParticles {
     }
 
     fn step(&mut self, time: f64, surroundings: &Surroundings) {
-        self.simulation.step(time, self.parameters.step_s, surroundings);
-        self.time = time + self.parameters.step_s;
+        self.simulation.step(time, surroundings);
+        self.time = time + self.simulation.step_s();
         self.air_temperature_k = surroundings.air.temperature_k;
     }
 

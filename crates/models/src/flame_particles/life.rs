@@ -182,7 +182,8 @@ mod tests {
         let being = Being { temperature: 1500.0, soot: 1e-6, ..BEING };
         let cooled = laws.live(being, &Exposure { mixing: 0.0, ..EXPOSURE }, 1e-5);
         let kappa = 1862.0 * 1e-6 * 1500.0;
-        let by_hand = 4.0 * 5.670_374e-8 * kappa * (1500.0_f64.powi(4) - 293.0_f64.powi(4)) / (0.25 * 1200.0) * 1e-5;
+        let fourth = |kelvin: f64| kelvin * kelvin * kelvin * kelvin;
+        let by_hand = 4.0 * 5.670_374e-8 * kappa * (fourth(1500.0) - fourth(293.0)) / (0.25 * 1200.0) * 1e-5;
         assert!((f64::from(1500.0 - cooled.temperature) / by_hand - 1.0).abs() < 0.02);
     }
 

@@ -1,6 +1,7 @@
 //! The gas as particles: structure of arrays, one entry a particle in every array.
 
 use bansho_base::math::DVec3;
+use rayon::prelude::*;
 
 use crate::sph::{Cells, retain};
 
@@ -126,7 +127,7 @@ impl Particles {
         cells.assign(self.positions(), &self.birth);
         cells.reorder(&mut self.birth);
         cells.reorder(&mut self.burner);
-        self.numbers_mut().into_iter().for_each(|values| cells.reorder(values));
+        self.numbers_mut().into_par_iter().for_each(|values| cells.reorder(values));
     }
 
     /// Numbers of birth, no two alike.

@@ -95,7 +95,7 @@ impl Shed<'_> {
         let words = self.key.words(beat as u64, 1, self.purpose);
         let [early, strong, tilt_x, tilt_z] = words.map(|word| f64::from(uniform(word)));
         let phase = f64::from(self.purpose.0 % 64) * 0.618;
-        let age = self.t - (beat as f64 + phase.fract() + 0.35 * (early - 0.5)) / self.hz;
+        let age = self.t - (beat as f64 + phase.fract() + 0.25 * (early - 0.5)) / self.hz;
         let burner = self.burner;
         let height = RING_SPEED * (burner.speed + 0.5 * burner.acceleration * age) * age;
         if age <= 0.0 || height > 1.6 * burner.height + burner.diameter {
@@ -109,7 +109,7 @@ impl Shed<'_> {
         // It rolls up within a beat and fades as it leaves the flame.
         let rolled = beats / (beats + 0.35);
         let fade = (1.6 - height / burner.height).clamp(0.0, 0.6) / 0.6;
-        let speed = burner.axis_speed(height) * RING_STRENGTH * (0.6 + 0.8 * strong) * rolled * fade * puffing;
+        let speed = burner.axis_speed(height) * RING_STRENGTH * (0.75 + 0.5 * strong) * rolled * fade * puffing;
         let [above, base] = [height, 0.0].map(|height| self.axis.at(height as f32).map(f64::from));
         let lean = DVec3::new(above[0] - base[0], height, above[1] - base[1]);
         let axis = DVec3::new(0.5 * (tilt_x - 0.5), 1.0, 0.5 * (tilt_z - 0.5)).normalize();

@@ -80,13 +80,13 @@ impl Simulation {
     }
 
     /// Length of a step, s.
-    #[cfg(test)]
     pub(crate) fn step_s(&self) -> f64 {
         self.parameters.step_s
     }
 
-    /// Steps from `time` to `seconds` later.
-    pub(crate) fn step(&mut self, time: f64, seconds: f64, around: &Surroundings) {
+    /// Steps from `time` to one step later.
+    pub(crate) fn step(&mut self, time: f64, around: &Surroundings) {
+        let seconds = self.step_s();
         let Self { design, turbulence, key, parameters, particles, .. } = self;
         let afterlife_s = parameters.life.afterlife_s;
         Births { design, turbulence, key: *key, afterlife_s }.add(particles, time, seconds);

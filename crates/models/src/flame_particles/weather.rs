@@ -21,6 +21,9 @@ use super::{
 /// Where turbulence has grown to half its strength, as a share of the time that gas takes to the tip.
 const TURBULENT_AGE: f32 = 0.1;
 
+/// Speed at which eddies drift beside the wind: the gas that holds them takes it up as it rises.
+const EDDY_DRIFT: f64 = 0.5;
+
 /// What acts on the gas of one burner.
 pub(crate) struct Draught<'a> {
     rings: Vec<Ring>,
@@ -62,7 +65,7 @@ impl<'a> Weather<'a> {
         t: f64,
     ) -> Self {
         let Surroundings { wind, air, others, .. } = around;
-        let mean = wind.mean(t) * flame.motion.wind_gain;
+        let drift = wind.travel(0.0, t) * (EDDY_DRIFT * flame.motion.wind_gain);
         let axes = axes(&design.burners, particles.positions(), &particles.burner, flame.motion.narrowing);
         let draught = |(number, axis): (usize, Axis)| {
             let burner = &design.burners[number];
@@ -71,7 +74,7 @@ impl<'a> Weather<'a> {
             Draught {
                 rings: rings(burner, flame, key, number as u32, t, &axis),
                 axis,
-                eddies: turbulence.at(t, size, speed, mean * (0.5 * t)),
+                eddies: turbulence.at(t, size, speed, drift),
                 turbulence: flame.motion.turbulence as f32,
                 turbulent_age: TURBULENT_AGE * burner.rise_time() as f32,
                 entrainment: (flame.motion.entrainment / (0.5 * burner.diameter)) as f32,
@@ -96,8 +99,8 @@ impl<'a> Weather<'a> {
 /// Drag coefficient of a fire in wind from the side.
 const CROSS_DRAG: f64 = 0.25;
 /// Share of its fuel that gas burns on a way as long as the flame is high, on the mean; and in the time that it takes there.
-const WAY_SHARE: f64 = 0.76;
-const TIME_SHARE: f64 = 0.19;
+const WAY_SHARE: f64 = 1.02;
+const TIME_SHARE: f64 = 0.25;
 
 fn density_kelvin(air: &Air) -> f32 {
     air.density_at(1.0) as f32

@@ -138,7 +138,11 @@ impl Mapping {
         match self {
             Self::Rays { .. } => None,
             Self::Linear { forms, .. } => {
-                Some(forms.map(|[constant, column, row]| [column * px + row * py + constant, column]))
+                let mut along = [[0.0; 2]; 3];
+                for (along, [constant, column, row]) in along.iter_mut().zip(forms) {
+                    *along = [column * px + row * py + constant, *column];
+                }
+                Some(along)
             }
         }
     }

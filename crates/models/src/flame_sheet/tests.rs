@@ -1,7 +1,6 @@
 //! The whole sheet: valid parameters of every kind, agreement between ways of drawing, loops, light.
 
 use bansho_base::{
-    air::Air,
     animation::Animated,
     camera::{CameraParameters, Lens},
     canvas::{DepthInterval, Shutter, Strip, View},

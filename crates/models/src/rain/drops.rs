@@ -79,7 +79,7 @@ impl Near<'_> {
         let toward = point - moment.sight.middle().position;
         let away = toward.length();
         let weight = there * (self.weight)(away);
-        if !(weight > 0.0) || away == 0.0 || moment.sheltered(point, velocity) {
+        if weight <= 0.0 || away == 0.0 || moment.sheltered(point, velocity) {
             return None;
         }
         let way = velocity * moment.sight.exposure;

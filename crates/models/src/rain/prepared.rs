@@ -22,7 +22,7 @@ use super::{
     source::{SourceField, sky_through_drops},
     splashes::Splashes,
     stroke::Stroke,
-    tiles::Tiles,
+    tiles::{COARSE, FINE, Tiles},
     veil::Veil,
 };
 
@@ -61,7 +61,7 @@ impl<'a> PreparedRain<'a> {
         let extinctions = rain.extinctions(view.shutter.middle());
         let lights = &surroundings.others.lights;
         let lighting = Lighting { scattering: &rain.scattering, lights, extinction: extinctions[0] };
-        let tiles = Tiles::new(view);
+        let tiles = Tiles::new(view, COARSE);
         let sky = sky_through_drops(&rain.lens, &tiles, &surroundings.sky);
         let frame = Frame { rain, moment: &moment, lighting: &lighting, tiles: &tiles, sky: &sky, view };
         let (strokes, billboards) = match rain.parameters.method {
@@ -75,7 +75,9 @@ impl<'a> PreparedRain<'a> {
         let mut strokes = strokes;
         strokes.extend(frame.splashes());
         let end = if rain.parameters.veil_distance > 0.0 { rain.reach() } else { 0.0 };
-        let veil = Veil::new(&moment, &lighting, &tiles, sky.clone(), view, extinctions, end);
+        let fine = Tiles::new(view, FINE);
+        let fine_sky = sky_through_drops(&rain.lens, &fine, &surroundings.sky);
+        let veil = Veil::new(&moment, &lighting, &fine, fine_sky, view, extinctions, end);
         let white = view.white_luminance.filter(|_| rain.parameters.culling);
         let least_light = white.map_or(0.0, |white| (white * LEAST_SHARE) as f32);
         let figures = frame.figures(strokes.len(), billboards.as_ref().map(|(billboards, _)| billboards));

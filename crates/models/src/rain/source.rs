@@ -43,8 +43,8 @@ impl SourceField {
         Self { tiles: tiles.clone(), distances: distances.iter().map(|distance| *distance as f32).collect(), values }
     }
 
-    /// Radiance at the tile corners `columns` on the height `y` of the picture (pixels) at a distance, m.
-    pub(crate) fn along_row(&self, y: f32, distance: f32, columns: std::ops::Range<usize>, out: &mut Vec<[f32; 3]>) {
+    /// Radiance at the height `y` of the picture, at each of the places `across` it (pixels), at a distance, m.
+    pub(crate) fn along_row(&self, y: f32, distance: f32, across: impl Iterator<Item = f32>, out: &mut Vec<[f32; 3]>) {
         let last = self.distances.len() - 1;
         let far = self.distances.partition_point(|known| *known <= distance).clamp(1, last.max(1)).min(last);
         let near = far.saturating_sub(1);
@@ -52,11 +52,15 @@ impl SourceField {
         let share = ((distance - self.distances[near]) / gap).clamp(0.0, 1.0);
         let (row, down) = self.tiles.row_at(y);
         let width = self.tiles.size[0];
+        let at = |index: usize| {
+            let layer = |layer: usize| mix(self.values[layer][index], self.values[layer][index + width], down);
+            mix(layer(near), layer(far), share)
+        };
         out.clear();
-        out.extend(columns.map(|column| {
-            let index = row * width + column.min(width - 1);
-            let at = |layer: usize| mix(self.values[layer][index], self.values[layer][index + width], down);
-            mix(at(near), at(far), share)
-        }));
+        for x in across {
+            let (column, part) = self.tiles.column_at(x);
+            let index = row * width + column;
+            out.push(mix(at(index), at(index + 1), part));
+        }
     }
 }

@@ -7,12 +7,16 @@ use bansho_base::{
 };
 use rayon::prelude::*;
 
-/// Side of a tile, pixels.
-pub(crate) const TILE: usize = 16;
+/// Side of a tile where light changes little from one to the next, pixels.
+pub(crate) const COARSE: usize = 32;
+/// Side of a tile where lamps and the edges of their cones are seen, pixels.
+pub(crate) const FINE: usize = 16;
 
 /// Corners of the tiles of a picture.
 #[derive(Clone, Debug)]
 pub(crate) struct Tiles {
+    /// Side of a tile, pixels.
+    pub(crate) side: usize,
     /// Corners in a row, and rows of corners.
     pub(crate) size: [usize; 2],
     /// Unit vectors that are seen at the corners, row after row; 0 where the lens sees nothing.
@@ -20,10 +24,10 @@ pub(crate) struct Tiles {
 }
 
 impl Tiles {
-    pub(crate) fn new(view: &View) -> Self {
-        let size = view.size.map(|side| side.div_ceil(TILE) + 1);
-        let line = |index: usize| line(&view.camera, index % size[0], index / size[0]);
-        Self { size, lines: (0..size[0] * size[1]).map(line).collect() }
+    pub(crate) fn new(view: &View, side: usize) -> Self {
+        let size = view.size.map(|pixels| pixels.div_ceil(side) + 1);
+        let line = |index: usize| line(&view.camera, [index % size[0] * side, index / size[0] * side]);
+        Self { side, size, lines: (0..size[0] * size[1]).map(line).collect() }
     }
 
     /// One value at each corner, made in parallel.
@@ -33,7 +37,7 @@ impl Tiles {
 
     /// A colour known at the corners, at a place of the picture (pixels); beyond the picture that at its edge.
     pub(crate) fn at(&self, corners: &[[f32; 3]], [x, y]: [f32; 2]) -> [f32; 3] {
-        let ((column, across), (row, down)) = (split(x, self.size[0]), split(y, self.size[1]));
+        let ((column, across), (row, down)) = (self.column_at(x), self.row_at(y));
         let index = row * self.size[0] + column;
         let line = |index: usize| mix(corners[index], corners[index + 1], across);
         mix(line(index), line(index + self.size[0]), down)
@@ -41,19 +45,24 @@ impl Tiles {
 
     /// The corner above a height in the picture (pixels), and how far it is to the corner below, 0 to 1.
     pub(crate) fn row_at(&self, y: f32) -> (usize, f32) {
-        split(y, self.size[1])
+        self.split(y, self.size[1])
+    }
+
+    /// The corner left of a place across the picture (pixels), and how far it is to the corner right of it, 0 to 1.
+    pub(crate) fn column_at(&self, x: f32) -> (usize, f32) {
+        self.split(x, self.size[0])
+    }
+
+    fn split(&self, coordinate: f32, corners: usize) -> (usize, f32) {
+        let place = (coordinate / self.side as f32).clamp(0.0, (corners - 1) as f32);
+        let whole = (place as usize).min(corners.saturating_sub(2));
+        (whole, place - whole as f32)
     }
 }
 
-fn line(camera: &Camera, column: usize, row: usize) -> DVec3 {
-    let pixel = DVec2::new((column * TILE) as f64, (row * TILE) as f64);
+fn line(camera: &Camera, pixel: [usize; 2]) -> DVec3 {
+    let pixel = DVec2::new(pixel[0] as f64, pixel[1] as f64);
     camera.direction(pixel).map_or(DVec3::ZERO, DVec3::normalize_or_zero)
-}
-
-fn split(coordinate: f32, corners: usize) -> (usize, f32) {
-    let place = (coordinate * (1.0 / TILE as f32)).clamp(0.0, (corners - 1) as f32);
-    let whole = (place as usize).min(corners.saturating_sub(2));
-    (whole, place - whole as f32)
 }
 
 /// Numbers that grow by the same ratio from `first` to at least `last`.
@@ -70,5 +79,9 @@ pub(crate) fn geometric(first: f64, last: f64, ratio: f64) -> Vec<f64> {
 /// The colour `share` of the way from one to another. Not fused: it is needed where vectors are not.
 #[inline(always)]
 pub(crate) fn mix(from: [f32; 3], to: [f32; 3], share: f32) -> [f32; 3] {
-    std::array::from_fn(|c| from[c] + (to[c] - from[c]) * share)
+    let mut mixed = from;
+    for c in 0..3 {
+        mixed[c] += (to[c] - from[c]) * share;
+    }
+    mixed
 }

@@ -11,7 +11,7 @@ use super::{
     bands::BAND,
     light::{Lighting, distance},
     moment::Moment,
-    tiles::{TILE, Tiles, geometric, mix},
+    tiles::{Tiles, geometric, mix},
 };
 
 /// Nearest distance at which the light that is scattered up to there is known, m, and how much further each next one is.
@@ -170,7 +170,7 @@ impl<'a> Veil<'a> {
         let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
         let range = self.range(pixel, slice, hidden).filter(|range| range[0] < range[1])?;
         let line = self.view.camera.direction(pixel)?.normalize_or_zero();
-        let part = pixel / TILE as f64;
+        let part = pixel / self.tiles.side as f64;
         let (column, row) = (part.x as usize, part.y as usize);
         let (across, down) = ((part.x - part.x.floor()) as f32, (part.y - part.y.floor()) as f32);
         let mut correction = [0.0_f32; 3];
@@ -233,11 +233,12 @@ impl<'a> Veil<'a> {
 
     /// Nothing but the ground ends the veil: it is found at the corners of tiles.
     fn draw_open(&self, slice: &DepthInterval, band: usize, rows: Rect, strip: &mut Strip) {
-        let columns = rows.x / TILE..rows.right().div_ceil(TILE) + 1;
+        let side = self.tiles.side;
+        let columns = rows.x / side..rows.right().div_ceil(side) + 1;
         let edge = |y: f64| -> Vec<[f32; 4]> {
             let place = self.tiles.row_at(y as f32);
             let corner = |column: usize| {
-                let range = self.range(DVec2::new((column * TILE) as f64, y), slice, f64::INFINITY);
+                let range = self.range(DVec2::new((column * side) as f64, y), slice, f64::INFINITY);
                 range.map_or([0.0, 0.0, 0.0, 1.0], |range| self.between(column, place, range))
             };
             columns.clone().map(corner).collect()
@@ -247,8 +248,8 @@ impl<'a> Veil<'a> {
             let down = ((y - band * BAND) as f32 + 0.5) / BAND as f32;
             let start = (y - strip.rect.y) * strip.rect.width;
             for x in rows.x..rows.right() {
-                let across = ((x % TILE) as f32 + 0.5) / TILE as f32;
-                let column = x / TILE - columns.start;
+                let across = ((x % side) as f32 + 0.5) / side as f32;
+                let column = x / side - columns.start;
                 let value: [f32; 4] = std::array::from_fn(|c| {
                     let at =
                         |edge: &[[f32; 4]]| (edge[column + 1][c] - edge[column][c]).mul_add(across, edge[column][c]);
@@ -271,8 +272,9 @@ impl<'a> Veil<'a> {
                 if range[1] <= range[0] {
                     continue;
                 }
-                let column = x / TILE;
-                let across = ((x % TILE) as f32 + 0.5) / TILE as f32;
+                let side = self.tiles.side;
+                let column = x / side;
+                let across = ((x % side) as f32 + 0.5) / side as f32;
                 let (left, right) = (self.between(column, place, range), self.between(column + 1, place, range));
                 put(strip, index, std::array::from_fn(|c| (right[c] - left[c]).mul_add(across, left[c])));
             }

@@ -76,7 +76,8 @@ pub(crate) fn remarks(plan: &Plan) -> Result<Vec<(String, Remark)>, PlanError> {
     }
     let frames = plan.frames();
     let shutters = [frames.start, (frames.start + frames.end) / 2, frames.end - 1].map(|number| plan.shutter(number));
-    let remark = |(index, phenomenon): (usize, &Box<dyn Phenomenon>)| {
+    let remark = |index: usize| {
+        let phenomenon = &phenomena[index];
         let at = |shutter: &Shutter| {
             let publications: Vec<Publication> = phenomena.iter().map(|each| each.publish(*shutter)).collect();
             phenomenon.remark(&surroundings(plan, &publications, index, *shutter, None))
@@ -85,7 +86,7 @@ pub(crate) fn remarks(plan: &Plan) -> Result<Vec<(String, Remark)>, PlanError> {
         let always = first.filter(|_| first == middle && middle == last)?;
         Some((phenomenon.name().to_owned(), always))
     };
-    Ok(phenomena.iter().enumerate().filter_map(remark).collect())
+    Ok((0..phenomena.len()).filter_map(remark).collect())
 }
 
 /// Steps everybody until no state lies more than a step before `t`, always the one that is furthest behind,

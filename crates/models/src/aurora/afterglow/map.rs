@@ -82,7 +82,7 @@ impl GlowMap {
     }
 
     /// A map laid out as this one that holds what [`Self::to_lists`] gave; none if the lists are no such map.
-    pub(in crate::aurora) fn from_lists(&self, places: &[u32], values: &[f32]) -> Option<Self> {
+    pub(in crate::aurora) fn with_lists(&self, places: &[u32], values: &[f32]) -> Option<Self> {
         let (tiles, rest) = values.as_chunks::<{ 2 * SIDE * SIDE }>();
         if tiles.len() != places.len() || !rest.is_empty() {
             return None;

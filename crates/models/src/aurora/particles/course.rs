@@ -94,14 +94,21 @@ impl Course {
         Segments::new(&self.shape)
     }
 
-    /// Integral of the flux factor along all sheets, km.
-    pub(super) fn flux_length(&self) -> f64 {
-        let sheet = |sheet: &Sheet| -> f64 {
-            let piece =
-                |i: usize| 0.5 * (sheet.flux[i] + sheet.flux[i + 1]) * sheet.points[i].distance(sheet.points[i + 1]);
-            (0..sheet.points.len().saturating_sub(1)).map(piece).sum()
-        };
-        self.shape.sheets.iter().map(sheet).sum()
+    /// Length of each sheet, km.
+    pub(super) fn sheet_lengths(&self) -> Vec<f64> {
+        let length = |points: &[DVec2]| points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+        self.shape.sheets.iter().map(|sheet| length(&sheet.points)).collect()
+    }
+
+    /// Each piece of the sheets in turn: its sheet, the share of the sheet's length before its middle, the flux factor there, its length in km.
+    pub(super) fn pieces(&self) -> impl Iterator<Item = (usize, f64, f64, f64)> + '_ {
+        self.starts.iter().map(|start| {
+            let [number, index] = start.map(|part| part as usize);
+            let (sheet, shares) = (&self.shape.sheets[number], &self.shares[number]);
+            let middle = |values: &[f64]| 0.5 * (values[index] + values[index + 1]);
+            let length = sheet.points[index].distance(sheet.points[index + 1]);
+            (number, middle(shares), middle(&sheet.flux), length)
+        })
     }
 
     /// Distance to the shape, km; none beyond the reach.

@@ -4,13 +4,13 @@
 //! is natural here is the cell and the frame, as the constants say.
 
 use bansho_base::{
-    math::DVec2,
     noise::{Coordinate, Fractal, Noise},
     parameters::Auto,
     random::{Key, Purpose},
 };
 use fearless_simd::Level;
 
+use super::scatter::Charge;
 use crate::{
     aurora::{AuroraParameters, FieldSolver, shapes::FRAME_S},
     field::{Grid2, PoissonSolver, relax},
@@ -74,36 +74,41 @@ impl FieldMaker {
         Grid2::new([cells; 2], self.parameters.cell_km(), [-self.parameters.extent_km / 2.0; 2])
     }
 
+    /// Screening length, km.
+    pub(super) fn reach_km(&self) -> f64 {
+        1.0 / self.screening.sqrt()
+    }
+
     /// The field of particles scattered about a shape, with the noise of a time.
-    pub(super) fn make(&self, scattered: &[DVec2], time: f64) -> Field {
-        let counts = self.counts(scattered);
-        let potential = self.potential(&counts);
+    pub(super) fn make(&self, scattered: &[Charge], time: f64) -> Field {
+        let counts = self.sum(scattered, |_| 1.0);
+        let potential = self.potential(&counts, self.sum(scattered, |particle| particle.charge));
         let table = self.table(&potential, time);
         Field { counts, potential, table }
     }
 
-    fn counts(&self, scattered: &[DVec2]) -> Grid2 {
-        let mut counts = self.grid();
-        let columns = counts.size()[0];
-        for place in scattered {
-            if let Some([column, row]) = counts.cell(place.to_array()) {
-                counts.values_mut()[row * columns + column] += 1.0;
+    /// Sum of a value over the particles in each cell.
+    fn sum(&self, scattered: &[Charge], value: impl Fn(&Charge) -> f64) -> Grid2 {
+        let mut sums = self.grid();
+        let columns = sums.size()[0];
+        for particle in scattered {
+            if let Some([column, row]) = sums.cell(particle.place.to_array()) {
+                sums.values_mut()[row * columns + column] += value(particle);
             }
         }
-        counts
+        sums
     }
 
     /// Charge density, eq. (2.2), and potential: `laplacian(phi) - phi / l^2 = rho`, phi = 0 around the grid; negative, lowest on the
     /// shape. The charge is such that all sheets pull alike, however many particles stand for them.
-    fn potential(&self, counts: &Grid2) -> Grid2 {
-        let (sum, occupied) = mean_of_occupied(counts);
-        let mut source = counts.clone();
-        if occupied == 0.0 {
+    fn potential(&self, counts: &Grid2, mut source: Grid2) -> Grid2 {
+        let full = full_count(counts);
+        if full == 0.0 {
             return source;
         }
         let cell = self.parameters.cell_km();
         let edge = self.parameters.field.pull * EDGE_FIELD * cell / (FRAME_S * FRAME_S);
-        let charge = edge / self.parameters.half_thickness_km() / (sum / occupied);
+        let charge = edge / self.parameters.half_thickness_km() / full;
         source.values_mut().iter_mut().for_each(|value| *value *= charge);
         match self.parameters.field.solver {
             FieldSolver::SineTransform => self.solver.solve(&mut source),
@@ -155,11 +160,11 @@ impl FieldMaker {
     }
 }
 
-/// Sum over all cells, and how many cells hold as much as most of them do: the number that (sum of N)^2 / (sum of N^2) gives.
-fn mean_of_occupied(counts: &Grid2) -> (f64, f64) {
+/// How many a cell holds that lies all within a sheet: the mean over particles of the count where they are.
+pub(super) fn full_count(counts: &Grid2) -> f64 {
     let sum: f64 = counts.values().iter().sum();
     let squares: f64 = counts.values().iter().map(|count| count * count).sum();
-    (sum, if squares > 0.0 { sum * sum / squares } else { 0.0 })
+    if sum > 0.0 { squares / sum } else { 0.0 }
 }
 
 impl Field {

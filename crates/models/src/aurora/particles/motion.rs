@@ -1,6 +1,7 @@
 //! Forces and the step (thesis, 2.3.1 to 2.3.3).
 
 use bansho_base::math;
+use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{AuroraParticles, field::Field};
@@ -119,12 +120,24 @@ impl Mover {
         let places = xs.par_chunks_mut(TASK).zip(zs.par_chunks_mut(TASK));
         let speeds = us.par_chunks_mut(TASK).zip(ws.par_chunks_mut(TASK));
         let pushes = pushes[0].par_chunks(TASK).zip(pushes[1].par_chunks(TASK));
-        places.zip(speeds).zip(pushes).for_each(|(((xs, zs), (us, ws)), (east, south))| {
-            for i in 0..xs.len() {
-                let moved = self.moved([xs[i], zs[i]], [us[i], ws[i]], [east[i], south[i]], field);
-                ([xs[i], zs[i]], [us[i], ws[i]]) = moved;
-            }
+        let level = Level::new();
+        places.zip(speeds).zip(pushes).for_each(|((places, speeds), pushes)| {
+            dispatch!(level, _simd => self.advance_part(places, speeds, pushes, field));
         });
+    }
+
+    #[inline(always)]
+    fn advance_part(
+        &self,
+        (xs, zs): (&mut [f32], &mut [f32]),
+        (us, ws): (&mut [f32], &mut [f32]),
+        (east, south): (&[f32], &[f32]),
+        field: &Field,
+    ) {
+        for i in 0..xs.len() {
+            let moved = self.moved([xs[i], zs[i]], [us[i], ws[i]], [east[i], south[i]], field);
+            ([xs[i], zs[i]], [us[i], ws[i]]) = moved;
+        }
     }
 
     /// Eqs. (2.10), (2.19) and (2.20), friction, and the bound on energy. The magnetic part of (2.10) only turns the velocity,

@@ -18,6 +18,10 @@ use crate::aurora::{
 const TASK: usize = 4096;
 /// What a particle far from every sheet keeps of its power in a step.
 const STRAY: f32 = 0.85;
+/// Stretches of a sheet that have their drawn power each.
+const STRETCHES: usize = 32;
+/// Where particles are scarce, one gets at most this many times what it would have if all were evenly spread.
+const MOST_UNEVEN: f64 = 6.0;
 /// W for one mW/m^2 on one km^2.
 const W_PER_KM2: f64 = 1e3;
 
@@ -28,7 +32,11 @@ pub(super) struct Precipitation {
     rays: Rays,
 }
 
-/// A stretch of the arrays that one task works on.
+/// Values at nodes along each sheet, evenly spaced; between two of them is a stretch.
+#[derive(Clone, Debug)]
+struct Nodes(Vec<[f64; STRETCHES + 1]>);
+
+/// A part of the arrays that one task works on.
 struct Stretch<'a> {
     positions: [&'a [f32]; 2],
     fades: &'a [f32],
@@ -43,27 +51,41 @@ impl Precipitation {
         Self { parameters: parameters.clone(), rays: Rays::new(parameters, key) }
     }
 
-    /// Power of the electrons on all sheets without pulsation and black rays, W: flux times length times thickness.
-    pub(super) fn power_w(&self, course: &Course, time: f64) -> f64 {
-        let area = course.flux_length() * 2.0 * self.parameters.half_thickness_km();
-        self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * area
+    /// Power of the electrons on all sheets without pulsation and black rays, by sheet and node, W: flux times length times thickness.
+    fn wanted(&self, course: &Course, time: f64) -> Nodes {
+        let width = 2.0 * self.parameters.half_thickness_km();
+        let flux = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * width;
+        let mut wanted = Nodes::new(course.shape.sheets.len());
+        course
+            .pieces()
+            .for_each(|(sheet, share, factor, length)| wanted.add(sheet as u32, share as f32, flux * factor * length));
+        wanted
     }
 
-    /// Gives every particle its share of the power. All together have the power of the sheets whatever their number, so that no
-    /// birth, death, split or merge can make the whole flicker.
+    /// Gives every particle its share of the power.
+    ///
+    /// All together have the power of the sheets, and those along a stretch that of the stretch, however many they are: no
+    /// birth, death, split or merge can make the aurora flicker, and the flux along it is the one that was drawn. What is finer than
+    /// a stretch is the particles' own.
     pub(super) fn share_out(&self, particles: &mut AuroraParticles, course: &Course, time: f64) {
-        let sums: Vec<f64> = stretches(particles).into_par_iter().map(|part| self.weigh(part, course, time)).collect();
-        let sum: f64 = sums.iter().sum();
-        let factor = if sum > 0.0 { (self.power_w(course, time) / sum) as f32 } else { 0.0 };
-        // What is still negative waits for the factor; strays have their power already.
-        particles.powers_w.iter_mut().filter(|power| **power < 0.0).for_each(|power| *power *= -factor);
+        let sheets = course.shape.sheets.len();
+        let weigh = |part| self.weigh(part, course, time, Nodes::new(sheets));
+        let weights: Vec<Nodes> = stretches(particles).into_par_iter().map(weigh).collect();
+        let weights = weights.iter().fold(Nodes::new(sheets), |sum, part| sum.plus(part));
+        let factors = self.wanted(course, time).shared_by(&weights);
+        stretches(particles).into_par_iter().for_each(|part| {
+            let places = part.sheets.iter().zip(part.shares.iter());
+            // What is still negative waits for its factor; strays have their power already.
+            for (power, (sheet, share)) in part.powers.iter_mut().zip(places).filter(|(power, _)| **power < 0.0) {
+                *power *= -factors.at(*sheet, *share) as f32;
+            }
+        });
     }
 
-    /// Weighs a stretch of particles, as negative powers, and gives the sum of weights before black rays and pulsation.
-    fn weigh(&self, part: Stretch, course: &Course, time: f64) -> f64 {
+    /// Weighs a stretch of particles, as negative powers, and adds up the weights before black rays and pulsation.
+    fn weigh(&self, part: Stretch, course: &Course, time: f64, mut weights: Nodes) -> Nodes {
         let (level, energy) = (Level::new(), self.parameters.energy_ev.at(time));
         let side_scale = 1.0 / self.parameters.half_thickness_km();
-        let mut sum = 0.0;
         for first in (0..part.fades.len()).step_by(LANES) {
             let count = LANES.min(part.fades.len() - first);
             let foot = |lane: usize| if lane < count { part.foot(course, first + lane) } else { None };
@@ -80,7 +102,7 @@ impl Precipitation {
                     continue;
                 };
                 let weight = part.fades[index] * foot.flux as f32 * pattern.brightness[lane];
-                sum += f64::from(weight);
+                weights.add(foot.sheet, foot.share as f32, f64::from(weight));
                 part.powers[index] = -weight * pattern.dimming[lane];
                 let own = energy * foot.energy * f64::from(pattern.hardness[lane]);
                 part.energies[index] = own.clamp(LOWEST_EV, HIGHEST_EV) as f32;
@@ -88,7 +110,58 @@ impl Precipitation {
                 part.sheets[index] = foot.sheet;
             }
         }
-        sum
+        weights
+    }
+}
+
+impl Nodes {
+    fn new(sheets: usize) -> Self {
+        Self(vec![[0.0; STRETCHES + 1]; sheets])
+    }
+
+    /// The node before a place and how much of it belongs to the node after.
+    fn split(share: f32) -> (usize, f64) {
+        let place = (share * STRETCHES as f32).clamp(0.0, STRETCHES as f32);
+        let node = (place as usize).min(STRETCHES - 1);
+        (node, f64::from(place) - node as f64)
+    }
+
+    /// Adds a value to the two nodes around a place.
+    fn add(&mut self, sheet: u32, share: f32, value: f64) {
+        let (node, part) = Self::split(share);
+        let nodes = &mut self.0[sheet as usize];
+        nodes[node] += value * (1.0 - part);
+        nodes[node + 1] += value * part;
+    }
+
+    /// Value at a place, linear between nodes.
+    fn at(&self, sheet: u32, share: f32) -> f64 {
+        let (node, part) = Self::split(share);
+        let nodes = &self.0[sheet as usize];
+        nodes[node] + part * (nodes[node + 1] - nodes[node])
+    }
+
+    fn plus(mut self, other: &Self) -> Self {
+        self.0.iter_mut().flatten().zip(other.0.iter().flatten()).for_each(|(sum, value)| *sum += value);
+        self
+    }
+
+    fn sum(&self) -> f64 {
+        self.0.iter().flatten().sum()
+    }
+
+    /// What a unit of weight gets of these powers, by sheet and node, so that all is given out. Where there is next to no weight, not
+    /// everything can be given out there.
+    fn shared_by(mut self, weights: &Self) -> Self {
+        let (whole, even) = (self.sum(), self.sum() / weights.sum().max(f64::MIN_POSITIVE));
+        let mut given = 0.0;
+        for (power, weight) in self.0.iter_mut().flatten().zip(weights.0.iter().flatten()) {
+            *power = (*power / weight.max(f64::MIN_POSITIVE)).min(MOST_UNEVEN * even);
+            given += *power * weight;
+        }
+        let rest = if given > 0.0 { whole / given } else { 0.0 };
+        self.0.iter_mut().flatten().for_each(|factor| *factor *= rest);
+        self
     }
 }
 

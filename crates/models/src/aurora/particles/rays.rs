@@ -63,72 +63,72 @@ impl Rays {
 
     /// The pattern at sixteen places at a time.
     pub(super) fn at(&self, level: Level, places: &Places, time: f64) -> Pattern {
-        dispatch!(level, _simd => self.lanes(places, time))
+        let noises = self.noises(level, places, time);
+        dispatch!(level, _simd => self.combined(&noises, &places.side, time))
     }
 
     #[inline(always)]
-    fn lanes(&self, places: &Places, time: f64) -> Pattern {
-        let rays = &self.rays;
-        let way = rays.shear_km_per_s * time;
-        // Groups of rays are four rays long.
-        let scale = 4.0 * rays.scale_km;
-        let left = values(&self.noise[0], &places.along, [way, scale], time / rays.life_s);
-        let right = values(&self.noise[1], &places.along, [-way, scale], time / rays.life_s);
+    fn combined(&self, noises: &[[f32; LANES]; 4], sides: &[f32; LANES], time: f64) -> Pattern {
+        let [left, right, black, patches] = noises;
         let mut pattern = Pattern { brightness: [1.0; LANES], dimming: [1.0; LANES], hardness: [1.0; LANES] };
         for i in 0..LANES {
-            let share = places.side[i].mul_add(0.5, 0.5).clamp(0.0, 1.0);
+            let share = (0.5 + 0.5 * sides[i]).clamp(0.0, 1.0);
             // Two patterns mix to less than the variance of one.
-            let variance = share.mul_add(share, (1.0 - share) * (1.0 - share));
-            let mixed = share.mul_add(right[i] - left[i], left[i]) / (self.deviation * variance.sqrt());
-            pattern.brightness[i] = lanes::exp(rays.contrast as f32 * mixed);
-            pattern.hardness[i] = lanes::exp(rays.energy as f32 * mixed);
+            let variance = share * share + (1.0 - share) * (1.0 - share);
+            let mixed = (left[i] + share * (right[i] - left[i])) / (self.deviation * variance.sqrt());
+            pattern.brightness[i] = lanes::exp(self.rays.contrast as f32 * mixed);
+            pattern.hardness[i] = lanes::exp(self.rays.energy as f32 * mixed);
+            pattern.dimming[i] = self.darkness(black[i]) * self.pulse(patches[i], time);
         }
-        self.darken(&mut pattern, places, time);
-        self.pulsate(&mut pattern, places, time);
         pattern
     }
 
-    /// Black rays are where a noise passes 0; they run against the rays of the one side.
-    #[inline(always)]
-    fn darken(&self, pattern: &mut Pattern, places: &Places, time: f64) {
+    /// The noise of the rays on both sides, of black rays and of patches; what is not asked for is 0.
+    fn noises(&self, level: Level, places: &Places, time: f64) -> [[f32; LANES]; 4] {
         let rays = &self.rays;
-        if rays.black_rays == 0.0 {
-            return;
-        }
-        let way = -rays.shear_km_per_s * time;
-        let noise = values(&self.black, &places.along, [way, rays.black_scale_km], time / rays.life_s);
-        for (dimming, noise) in pattern.dimming.iter_mut().zip(noise) {
-            let depth = (1.0 - (noise / BLACK_WIDTH).abs()).max(0.0);
-            *dimming *= 1.0 - rays.black_rays as f32 * depth.sqrt();
-        }
+        let (way, age) = (rays.shear_km_per_s * time, time / rays.life_s);
+        // Groups of rays are four rays long. Black rays run against the rays of the one side.
+        let [group, black, patch] = [4.0 * rays.scale_km, rays.black_scale_km, self.pulsation.patch_km];
+        let wanted = [
+            (rays.contrast.max(rays.energy), &self.noise[0], way, group, age),
+            (rays.contrast.max(rays.energy), &self.noise[1], -way, group, age),
+            (rays.black_rays, &self.black, -way, black, age),
+            (self.pulsation.depth, &self.patches, 0.0, patch, 0.0),
+        ];
+        wanted.map(|(strength, noise, way, scale, age)| {
+            if strength > 0.0 {
+                values(level, noise, places.along.map(|along| (along - way) / scale), age)
+            } else {
+                [0.0; LANES]
+            }
+        })
     }
 
-    /// Patches that go bright and dark, each in its own time.
+    /// Black rays are where a noise passes 0.
     #[inline(always)]
-    fn pulsate(&self, pattern: &mut Pattern, places: &Places, time: f64) {
-        let pulsation = &self.pulsation;
-        if pulsation.depth == 0.0 {
-            return;
-        }
-        let turns = time / pulsation.period_s;
+    fn darkness(&self, noise: f32) -> f32 {
+        let depth = (1.0 - (noise / BLACK_WIDTH).abs()).max(0.0);
+        1.0 - self.rays.black_rays as f32 * depth.sqrt()
+    }
+
+    /// Patches go bright and dark, each in its own time.
+    #[inline(always)]
+    fn pulse(&self, noise: f32, time: f64) -> f32 {
+        let turns = time / self.pulsation.period_s;
         let turns = (turns - turns.floor()) as f32;
-        let phases = values(&self.patches, &places.along, [0.0, pulsation.patch_km], 0.0);
-        for (dimming, phase) in pattern.dimming.iter_mut().zip(phases) {
-            let dark = lanes::cos_turns(turns + 2.0 * phase).mul_add(-0.5, 0.5);
-            *dimming *= 1.0 - pulsation.depth as f32 * dark;
-        }
+        let dark = 0.5 - 0.5 * lanes::cos_turns(turns + 2.0 * noise);
+        1.0 - self.pulsation.depth as f32 * dark
     }
 }
 
-/// Noise along the sheets, moved by `way` and `scale` km to a cell, at a time.
-#[inline(always)]
-fn values(noise: &Noise<2>, along: &[f64; LANES], [way, scale]: [f64; 2], time: f64) -> [f32; LANES] {
+/// Noise at sixteen places, in cells, and an age, in lives.
+fn values(level: Level, noise: &Noise<2>, places: [f64; LANES], age: f64) -> [f32; LANES] {
     let (mut cells, mut fractions) = ([[0; LANES]; 2], [[0.0; LANES]; 2]);
-    let time = Coordinate::from_f64(time);
+    let age = Coordinate::from_f64(age);
     for i in 0..LANES {
-        let place = Coordinate::from_f64((along[i] - way) / scale);
+        let place = Coordinate::from_f64(places[i]);
         (cells[0][i], fractions[0][i]) = (place.cell, place.fraction);
-        (cells[1][i], fractions[1][i]) = (time.cell, time.fraction);
+        (cells[1][i], fractions[1][i]) = (age.cell, age.fraction);
     }
-    noise.lanes(&cells, &fractions)
+    dispatch!(level, _simd => noise.lanes(&cells, &fractions))
 }

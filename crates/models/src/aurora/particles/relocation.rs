@@ -5,7 +5,11 @@ use bansho_base::{
     random::{Key, Purpose, uniform},
 };
 
-use super::{AuroraParticles, course::Course, field::Field};
+use super::{
+    AuroraParticles,
+    course::Course,
+    field::{Field, full_count},
+};
 use crate::aurora::{AuroraParameters, RelocationParameters};
 
 const BIRTH: Purpose = Purpose::named("aurora birth");
@@ -13,7 +17,7 @@ const THINNING: Purpose = Purpose::named("aurora thinning");
 /// The counts of table 3.3 are taken as those of a near cell that holds this many particles on average.
 const TABLE_COUNT: f64 = 100.0;
 /// Share of surplus particles that one renewal takes away.
-const THINNED: f64 = 0.2;
+const THINNED: f64 = 0.4;
 
 /// Table 3.3 for a number of particles, and the random numbers of births.
 #[derive(Clone, Debug)]
@@ -99,10 +103,13 @@ impl Relocation {
         renewal: u32,
         next_id: &mut u64,
     ) {
-        let least = self.parameters.births_below * scale;
+        let full = full_count(&field.counts);
         let columns = field.counts.size()[0];
         let origin = DVec2::from(field.counts.origin());
         for cell in (0..near.len()).filter(|cell| near[*cell]) {
+            // A cell of which the sheet covers a part shall hold that part.
+            let covered = if self.parameters.scaled { (field.counts.values()[cell] / full).min(1.0) } else { 1.0 };
+            let least = self.parameters.births_below * scale * covered;
             let deficit = (least - residents.of(cell).len() as f64).min(self.parameters.births_at_most * scale).ceil();
             if deficit < 1.0 {
                 continue;

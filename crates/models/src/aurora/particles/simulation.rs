@@ -128,8 +128,9 @@ impl AuroraSimulation {
         let course = &self.target.course;
         let count = self.parameters.particles.count as usize;
         let state = &mut self.state;
-        for place in scatter(course, self.parameters.half_thickness_km(), count, self.key, state.renewals) {
-            state.particles.push(state.next_id, place, [0.0; 2], 1.0);
+        let sizes = [self.parameters.half_thickness_km(), self.fields.reach_km()];
+        for charge in scatter(course, sizes, count, self.key, state.renewals) {
+            state.particles.push(state.next_id, charge.place, [0.0; 2], 1.0);
             state.next_id += 1;
         }
         state.support_km = self.repulsion.support_km(self.target.rest_density);
@@ -149,7 +150,7 @@ impl AuroraSimulation {
         let course = self.course(&state.target_along, state.target_time);
         let count = self.parameters.particles.count as usize;
         let half = self.parameters.half_thickness_km();
-        let scattered = scatter(&course, half, count, self.key, state.renewals);
+        let scattered = scatter(&course, [half, self.fields.reach_km()], count, self.key, state.renewals);
         let field = self.fields.make(&scattered, state.target_time);
         let near = self.relocation.near(&field).iter().filter(|near| **near).count().max(1) as f64;
         let cell = self.parameters.cell_km();

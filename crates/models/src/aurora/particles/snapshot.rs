@@ -139,11 +139,12 @@ fn read_particles(source: &mut Source) -> Result<AuroraParticles, SnapshotError>
     let lengths: [usize; NUMBERS] = particles.numbers().map(Vec::len);
     let whole = lengths.iter().all(|length| *length == count)
         && particles.dying.len() == count
-        && particles.sheets.len() == count;
+        && particles.sheets.len() == count
+        && particles.powers_w.iter().all(|power| *power >= 0.0);
     if whole { Ok(particles) } else { Err(SnapshotError::Damaged) }
 }
 
 fn read_map(source: &mut Source, like: &GlowMap) -> Result<GlowMap, SnapshotError> {
     let (places, values) = (source.list::<u32>()?, source.list::<f32>()?);
-    like.from_lists(&places, &values).ok_or(SnapshotError::Damaged)
+    like.with_lists(&places, &values).ok_or(SnapshotError::Damaged)
 }

@@ -9,26 +9,34 @@ use super::{Shape, cells::CellGrid};
 pub struct Neighbourhood {
     reach: f64,
     grid: CellGrid,
-    segments: Vec<[DVec2; 2]>,
+    segments: Vec<Segment>,
     /// Where the list of each cell begins in `lists`, and where the last one ends.
     starts: Vec<u32>,
     lists: Vec<u32>,
+}
+
+/// A segment: its start, the way to its end, and one over the square of its length (0 where it has none).
+#[derive(Clone, Copy, Debug)]
+struct Segment {
+    start: DVec2,
+    way: DVec2,
+    inverse_square: f64,
 }
 
 impl Neighbourhood {
     /// What lies within `reach` km of `shape`.
     pub fn new(shape: &Shape, reach: f64) -> Self {
         let pairs = shape.sheets.iter().flat_map(|sheet| sheet.points.windows(2));
-        let segments: Vec<[DVec2; 2]> = pairs.map(|pair| [pair[0], pair[1]]).collect();
-        let low = segments.iter().flatten().copied().fold(DVec2::INFINITY, DVec2::min);
-        let high = segments.iter().flatten().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
-        let grid = if segments.is_empty() {
+        let lines: Vec<[DVec2; 2]> = pairs.map(|pair| [pair[0], pair[1]]).collect();
+        let low = lines.iter().flatten().copied().fold(DVec2::INFINITY, DVec2::min);
+        let high = lines.iter().flatten().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
+        let grid = if lines.is_empty() {
             CellGrid::new(DVec2::ZERO, DVec2::ZERO, 1.0, 1)
         } else {
             CellGrid::new(low - reach, high + reach, reach, 512)
         };
         let mut starts = vec![0u32; grid.count() + 1];
-        for [a, b] in &segments {
+        for [a, b] in &lines {
             grid.for_each_passed(*a, *b, reach, |cell| starts[cell + 1] += 1);
         }
         for cell in 0..grid.count() {
@@ -36,13 +44,13 @@ impl Neighbourhood {
         }
         let mut lists = vec![0u32; starts[grid.count()] as usize];
         let mut ends = starts.clone();
-        for (index, [a, b]) in segments.iter().enumerate() {
+        for (index, [a, b]) in lines.iter().enumerate() {
             grid.for_each_passed(*a, *b, reach, |cell| {
                 lists[ends[cell] as usize] = index as u32;
                 ends[cell] += 1;
             });
         }
-        Self { reach, grid, segments, starts, lists }
+        Self { reach, grid, segments: lines.into_iter().map(Segment::new).collect(), starts, lists }
     }
 
     /// Distance from `point` to the shape, km; `None` beyond the reach.
@@ -57,7 +65,7 @@ impl Neighbourhood {
         let list = &self.lists[self.starts[cell] as usize..self.starts[cell + 1] as usize];
         let (mut nearest, mut least) = (0, f64::INFINITY);
         for &segment in list {
-            let square = distance_squared(point, self.segments[segment as usize]);
+            let square = self.segments[segment as usize].distance_squared(point);
             if square < least {
                 (nearest, least) = (segment as usize, square);
             }
@@ -66,12 +74,19 @@ impl Neighbourhood {
     }
 }
 
-/// Square of the distance from a point to a segment.
-fn distance_squared(point: DVec2, [a, b]: [DVec2; 2]) -> f64 {
-    let way = b - a;
-    let square = way.length_squared();
-    let share = if square > 0.0 { ((point - a).dot(way) / square).clamp(0.0, 1.0) } else { 0.0 };
-    point.distance_squared(a + way * share)
+impl Segment {
+    fn new([start, end]: [DVec2; 2]) -> Self {
+        let square = start.distance_squared(end);
+        Self { start, way: end - start, inverse_square: if square > 0.0 { 1.0 / square } else { 0.0 } }
+    }
+
+    /// Square of the distance from a point.
+    #[inline]
+    fn distance_squared(&self, point: DVec2) -> f64 {
+        let from_start = point - self.start;
+        let share = (from_start.dot(self.way) * self.inverse_square).clamp(0.0, 1.0);
+        from_start.distance_squared(self.way * share)
+    }
 }
 
 #[cfg(test)]
@@ -109,7 +124,7 @@ mod tests {
         let mut within = 0;
         for probe in 0..5_000 {
             let point = random(1000 + probe) * 1.2;
-            let all = near.segments.iter().map(|&segment| distance_squared(point, segment));
+            let all = near.segments.iter().map(|segment| segment.distance_squared(point));
             let least = all.fold(f64::INFINITY, f64::min).sqrt();
             let expected = (least <= 7.0).then_some(least);
             within += usize::from(expected.is_some());

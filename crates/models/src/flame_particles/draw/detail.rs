@@ -122,8 +122,8 @@ impl Detail {
     /// Whether so little gas is at sixteen places that detail could not be seen in it.
     #[inline(always)]
     pub(crate) fn is_lost(&self, tau: &[f32; LANES]) -> bool {
-        /// Optical depth beside that at which half of the place burns.
-        const LITTLE: f32 = 0.01;
+        /// Optical depth beside that at which half of the place burns; even the densest noise leaves this dark.
+        const LITTLE: f32 = 2e-4;
         let mut most = 0.0_f32;
         for lane in 0..LANES {
             most = most.max(tau[lane]);

@@ -328,7 +328,8 @@ impl PreparedGas<'_> {
     }
 
     fn measure_deflection(&self, slice: &DepthInterval, strip: &mut Strip) {
-        if let (Some(haze), Some(_)) = (self.haze(), self.layers_in(slice).last()) {
+        // Once, however many slices the layers fall into.
+        if let Some(haze) = self.haze().filter(|_| slice.contains(self.layers.centre(self.layers.count - 1))) {
             haze.measure(strip);
         }
     }

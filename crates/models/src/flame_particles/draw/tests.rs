@@ -11,7 +11,7 @@ use bansho_base::{
     observer::Unobserved,
     phenomenon::Prepared,
     random::{Key, Purpose},
-    surroundings::{Emitter, Publication, Surroundings},
+    surroundings::{Emitter, Surroundings},
     wind::{Wind, WindParameters},
 };
 
@@ -204,7 +204,7 @@ fn haze_bends_by_the_gradient_of_the_path_and_only_around_the_gas() {
         let at = |x: usize, y: usize| bend.angle.at(x - bend.rect.x, y - bend.rect.y);
         let weight = 3.0 * (refractivity(1500.0) - refractivity(293.15)) * 0.001;
         let peak = weight * line_gradient(0.12, 0.3);
-        for x in [82, 86, 90, 94, 98] {
+        for x in [82, 86, 90, 94] {
             let b = (x as f64 + 0.5 - 80.0) / scale;
             let distance = math::hypot(b, 0.5 / scale);
             let expected = weight * line_gradient(distance, 0.3) * b / distance;

@@ -41,7 +41,7 @@ impl World {
         let around = Surroundings { air: &air, others, ..Surroundings::of_wind(&wind) };
         let seconds = simulation.step_s();
         for step in first..last {
-            simulation.step(step as f64 * seconds, seconds, &around);
+            simulation.step(step as f64 * seconds, &around);
             each(simulation, (step + 1) as f64 * seconds);
         }
     }

@@ -82,7 +82,7 @@ impl Card {
         let distance = offset.length();
         let shown = weight(distance);
         let height = class.lattice.height();
-        if !(shown > 0.0) || moment.sheltered(middle, velocity) || middle.y + 0.5 * height < moment.ground {
+        if shown <= 0.0 || moment.sheltered(middle, velocity) || middle.y + 0.5 * height < moment.ground {
             return None;
         }
         let base = middle - DVec3::Y * (0.5 * height);
@@ -102,7 +102,7 @@ impl Card {
             diameter_mm: class.diameter_mm as f32,
             mapping,
             offset: [u, v],
-            side: if (choice * (2 * VARIANTS) as f32) as u64 % 2 == 0 { 1.0 } else { -1.0 },
+            side: if ((choice * (2 * VARIANTS) as f32) as u64).is_multiple_of(2) { 1.0 } else { -1.0 },
             lean: slant.lean as f32,
             repeats: slant.repeats as f32,
             floor: ((moment.ground - base.y) / height).max(0.0) as f32,

@@ -5,7 +5,7 @@ use bansho_base::{
     image::Rect,
 };
 
-use crate::rain::{bands::BAND, source::SourceField, tiles::TILE};
+use crate::rain::{bands::BAND, source::SourceField};
 
 use super::{
     Billboards,
@@ -13,8 +13,8 @@ use super::{
     sheet::{COLUMNS, Sheet, SheetRow},
 };
 
-/// Pixels of a block, as many as lie between corners of tiles.
-const LANES: usize = TILE;
+/// Pixels of a block.
+const LANES: usize = 16;
 /// Narrowest stretch of texture that a pixel is given, texels.
 const NARROWEST: f32 = 0.25;
 
@@ -58,7 +58,8 @@ pub(crate) fn paint(
         let sheet = brush.billboards.sheets.sheet(card.class, card.variant);
         let blocks = rect.x / LANES..rect.right().div_ceil(LANES);
         let middle = (band * BAND) as f32 + 0.5 * BAND as f32;
-        brush.source.along_row(middle, card.distance, blocks.start..blocks.end + 1, &mut scratch.light);
+        let places = (blocks.start..=blocks.end).map(|block| (block * LANES) as f32);
+        brush.source.along_row(middle, card.distance, places, &mut scratch.light);
         let brightest = scratch.light.iter().flatten().fold(0.0, |most: f32, light| most.max(*light));
         // Streaks without light still hide what lies behind them.
         let lit = brightest * card.strength * sheet.peak() >= brush.least_light;
@@ -75,23 +76,29 @@ fn corners(card: &Card, y: usize, blocks: &std::ops::Range<usize>, scratch: &mut
     let count = blocks.len() + 1;
     scratch.across.resize(count, 0.0);
     scratch.up.resize(count, 0.0);
-    let (first, height) = ((blocks.start * LANES) as f64, y as f64 + 0.5);
+    // Counted from the billboard's own first block, so that a crop changes no bit.
+    let (own, height) = (card.rect.x / LANES, y as f64 + 0.5);
+    let first = (own * LANES) as f64;
     let Some(forms) = card.mapping.along_row(first, height) else {
         for number in 0..count {
-            let place = card.mapping.at(first + (number * LANES) as f64, height).unwrap_or([f64::NAN; 3]);
+            let place = card.mapping.at(((blocks.start + number) * LANES) as f64, height).unwrap_or([f64::NAN; 3]);
             (scratch.across[number], scratch.up[number]) = (place[0] as f32, place[1] as f32);
         }
         return;
     };
-    let [x, y, inverse] = forms.map(|[start, step]| [start as f32, (step * LANES as f64) as f32]);
-    let corners = scratch.across[..count].iter_mut().zip(&mut scratch.up[..count]);
-    for (number, (across, up)) in corners.enumerate() {
-        let number = number as f32;
-        let depth = 1.0 / inverse[1].mul_add(number, inverse[0]);
+    let mut start = [0.0_f32; 3];
+    let mut step = [0.0_f32; 3];
+    for form in 0..3 {
+        (start[form], step[form]) = (forms[form][0] as f32, (forms[form][1] * LANES as f64) as f32);
+    }
+    let (across, up) = (&mut scratch.across[..count], &mut scratch.up[..count]);
+    for number in 0..count {
+        let place = (blocks.start - own + number) as f32;
+        let depth = 1.0 / step[2].mul_add(place, start[2]);
         // Behind the camera no depth is above 0.
         let depth = if depth > 0.0 { depth } else { f32::NAN };
-        *across = x[1].mul_add(number, x[0]) * depth;
-        *up = y[1].mul_add(number, y[0]) * depth;
+        across[number] = step[0].mul_add(place, start[0]) * depth;
+        up[number] = step[1].mul_add(place, start[1]) * depth;
     }
 }
 
@@ -132,16 +139,22 @@ fn opacities(sheet: &Sheet, card: &Card, left: [f32; 2], right: [f32; 2]) -> Opt
         return None;
     }
     let row = sheet.row(card.offset[1] + card.repeats * up);
-    let texel = |x: f32, y: f32| card.side.mul_add(x - card.lean * (y - 0.5), card.offset[0]) * COLUMNS as f32;
-    let [from, to] = [left, right].map(|[x, y]| texel(x, y));
-    let [edge, other] = [texel(0.0, up), texel(1.0, up)];
+    let from = texel(card, left[0], left[1]);
+    let to = texel(card, right[0], right[1]);
+    let (edge, other) = (texel(card, 0.0, up), texel(card, 1.0, up));
     let edges = [edge.min(other), edge.max(other)];
     let reach = 0.5 * card.blur;
-    let [low, high] = [(from.min(to) - reach).max(edges[0]), (from.max(to) + reach).min(edges[1])];
+    let (low, high) = ((from.min(to) - reach).max(edges[0]), (from.max(to) + reach).min(edges[1]));
     if low >= high || row.is_empty_between(low, high) {
         return None;
     }
     Some(means(&row, from, (to - from) * (1.0 / LANES as f32), edges, card))
+}
+
+/// The texel at a place of a billboard, before it wraps.
+#[inline(always)]
+fn texel(card: &Card, x: f32, y: f32) -> f32 {
+    card.side.mul_add(x - card.lean * (y - 0.5), card.offset[0]) * COLUMNS as f32
 }
 
 /// Mean opacity of the texture under each pixel: from `from` on, each `step` texels further, all within `edges`.
@@ -150,23 +163,31 @@ fn means(row: &SheetRow, from: f32, step: f32, edges: [f32; 2], card: &Card) -> 
     let width = step.abs().max(card.blur).max(NARROWEST);
     let scale = card.strength / width;
     let mut result = [0.0; LANES];
+    let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
     if width > step.abs() {
         // Each pixel reads a stretch of its own, wider than the step.
         for lane in 0..LANES {
             let middle = (lane as f32 + 0.5).mul_add(step, from);
-            let [low, high] = [middle - 0.5 * width, middle + 0.5 * width].map(|place| place.clamp(edges[0], edges[1]));
-            result[lane] = (row.sum_until(high) - row.sum_until(low)) * scale;
+            low[lane] = (middle - 0.5 * width).max(edges[0]).min(edges[1]);
+            high[lane] = (middle + 0.5 * width).max(edges[0]).min(edges[1]);
+        }
+        let (low, high) = (row.sums_until(&low), row.sums_until(&high));
+        for lane in 0..LANES {
+            result[lane] = (high[lane] - low[lane]) * scale;
         }
         return result;
     }
     // Stretches of neighbours meet: one look-up for each edge between pixels.
     let scale = if step < 0.0 { -scale } else { scale };
-    let mut sums = [0.0; LANES + 1];
-    for lane in 0..=LANES {
-        sums[lane] = row.sum_until((lane as f32).mul_add(step, from).clamp(edges[0], edges[1]));
-    }
     for lane in 0..LANES {
-        result[lane] = (sums[lane + 1] - sums[lane]) * scale;
+        low[lane] = (lane as f32).mul_add(step, from).max(edges[0]).min(edges[1]);
+    }
+    let low = row.sums_until(&low);
+    let last = row.sum_until((LANES as f32).mul_add(step, from).max(edges[0]).min(edges[1]));
+    high[..LANES - 1].copy_from_slice(&low[1..]);
+    high[LANES - 1] = last;
+    for lane in 0..LANES {
+        result[lane] = (high[lane] - low[lane]) * scale;
     }
     result
 }
@@ -196,60 +217,69 @@ fn put(
     if !aovs.is_empty() {
         measure(card, start, &opacity[skipped..last - x], planes, aovs);
     }
-    let mut taken = opacity.map(|opacity| opacity.clamp(0.0, 1.0));
+    let mut taken = [0.0; LANES];
+    for lane in 0..LANES {
+        taken[lane] = opacity[lane].clamp(0.0, 1.0);
+    }
     if !planes.plate_depth.is_empty() {
         for (taken, plate) in taken[skipped..last - x].iter_mut().zip(&planes.plate_depth[start..]) {
             *taken = if *plate <= card.depth { 0.0 } else { *taken };
         }
     }
-    let light = light.map(|[left, right]| {
-        [0, 1, 2].map(|c| {
+    let mut shades = [[0.0; LANES]; 3];
+    if let Some([left, right]) = light {
+        for c in 0..3 {
             let step = (right[c] - left[c]) * (1.0 / LANES as f32);
-            std::array::from_fn(|lane| (lane as f32 + 0.5).mul_add(step, left[c]))
-        })
-    });
-    let end = start + last - first;
-    let [through, depth] = [&mut *planes.transmittance, &mut *planes.depth].map(|plane| &mut plane[start..end]);
-    let radiance = planes.radiance.each_mut().map(|plane| &mut plane[start..end]);
+            for lane in 0..LANES {
+                shades[c][lane] = (lane as f32 + 0.5).mul_add(step, left[c]);
+            }
+        }
+    }
+    let shades = light.is_some().then_some(&mut shades);
     // Of a whole block all lengths are known, so that it becomes vectors.
-    if skipped == 0 && last == x + LANES {
-        lay(LANES, &taken, &light, through, depth, radiance, card.depth);
+    if last - first == LANES {
+        lay(LANES, &taken, shades.as_deref(), planes, start, card.depth);
     } else {
         taken.copy_within(skipped.., 0);
-        let light = light.map(|mut light: [[f32; LANES]; 3]| {
-            light.iter_mut().for_each(|plane| plane.copy_within(skipped.., 0));
-            light
-        });
-        lay(last - first, &taken, &light, through, depth, radiance, card.depth);
+        if let Some(shades) = shades {
+            for plane in shades.iter_mut() {
+                plane.copy_within(skipped.., 0);
+            }
+            lay(last - first, &taken, Some(shades), planes, start, card.depth);
+        } else {
+            lay(last - first, &taken, None, planes, start, card.depth);
+        }
     }
 }
 
-/// Puts the first `count` pixels of a block behind what as many pixels of the planes hold.
+/// Puts the first `count` pixels of a block behind what as many pixels of the planes hold from `start` on.
 #[inline(always)]
 fn lay(
     count: usize,
     taken: &[f32; LANES],
-    light: &Option<[[f32; LANES]; 3]>,
-    through: &mut [f32],
-    depth: &mut [f32],
-    radiance: [&mut [f32]; 3],
+    light: Option<&[[f32; LANES]; 3]>,
+    planes: &mut GrayPlanes,
+    start: usize,
     card_depth: f32,
 ) {
     let mut hidden = [0.0; LANES];
-    for ((hidden, taken), through) in hidden[..count].iter_mut().zip(&taken[..count]).zip(&mut through[..count]) {
-        *hidden = *through * taken;
-        *through -= *hidden;
+    let through = &mut planes.transmittance[start..start + count];
+    for lane in 0..count {
+        hidden[lane] = through[lane] * taken[lane];
+        through[lane] -= hidden[lane];
     }
     if let Some(light) = light {
-        for (plane, light) in radiance.into_iter().zip(light) {
-            for ((value, hidden), light) in plane[..count].iter_mut().zip(&hidden[..count]).zip(&light[..count]) {
-                *value = hidden.mul_add(*light, *value);
+        for c in 0..3 {
+            let plane = &mut planes.radiance[c][start..start + count];
+            for lane in 0..count {
+                plane[lane] = hidden[lane].mul_add(light[c][lane], plane[lane]);
             }
         }
     }
-    for (depth, taken) in depth[..count].iter_mut().zip(&taken[..count]) {
-        let nearer = if card_depth < *depth { card_depth } else { *depth };
-        *depth = if *taken > 0.0 { nearer } else { *depth };
+    let depth = &mut planes.depth[start..start + count];
+    for lane in 0..count {
+        let nearer = if card_depth < depth[lane] { card_depth } else { depth[lane] };
+        depth[lane] = if taken[lane] > 0.0 { nearer } else { depth[lane] };
     }
 }
 

@@ -121,15 +121,34 @@ impl SheetRow<'_> {
     /// Sum of the opacities of all texels left of a place, which wraps and lies within 2^21 of 0.
     #[inline(always)]
     pub(crate) fn sum_until(&self, place: f32) -> f32 {
+        self.sums_until(&[place])[0]
+    }
+
+    /// [`sum_until`](Self::sum_until) for many places, in steps that become vectors but for the look-up itself.
+    #[inline(always)]
+    pub(crate) fn sums_until<const N: usize>(&self, places: &[f32; N]) -> [f32; N] {
         /// 3 * 2^22: adding it rounds to a whole number, which then stands in the low bits of the sum.
         const ROUND: f32 = 12_582_912.0;
-        // A whole number may come out as the one below with a part of 1, which interpolates to the same.
-        let rounded = (place - 0.5) + ROUND;
-        let whole = rounded - ROUND;
-        let column = rounded.to_bits() as usize & (COLUMNS - 1);
-        let (low, high) = (self.sums[column], self.sums[column + 1]);
-        let turns = (whole - column as i32 as f32) * (1.0 / COLUMNS as f32);
-        turns.mul_add(self.sums[COLUMNS], (high - low).mul_add(place - whole, low))
+        let (mut columns, mut parts, mut turns) = ([0_u32; N], [0.0_f32; N], [0.0_f32; N]);
+        for lane in 0..N {
+            // A whole number may come out as the one below with a part of 1, which interpolates to the same.
+            let rounded = (places[lane] - 0.5) + ROUND;
+            columns[lane] = rounded.to_bits() & (COLUMNS as u32 - 1);
+            let whole = rounded - ROUND;
+            parts[lane] = places[lane] - whole;
+            turns[lane] = (whole - columns[lane] as i32 as f32) * (1.0 / COLUMNS as f32);
+        }
+        let (mut low, mut high) = ([0.0_f32; N], [0.0_f32; N]);
+        for lane in 0..N {
+            let column = columns[lane] as usize & (COLUMNS - 1);
+            (low[lane], high[lane]) = (self.sums[column], self.sums[column + 1]);
+        }
+        let all = self.sums[COLUMNS];
+        let mut result = [0.0_f32; N];
+        for lane in 0..N {
+            result[lane] = turns[lane].mul_add(all, (high[lane] - low[lane]).mul_add(parts[lane], low[lane]));
+        }
+        result
     }
 }
 
