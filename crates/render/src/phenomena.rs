@@ -2,7 +2,7 @@
 
 use bansho_base::{parameters::ProblemKind, phenomenon::Phenomenon};
 use bansho_models::{
-    aurora::{Aurora, AuroraParameters},
+    aurora::{Aurora, AuroraParameters, shapes::ShapeFaultKind},
     flame_particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind},
     flame_sheet::{FlameSheet, FlameSheetParameters},
     ground::Ground,
@@ -70,7 +70,13 @@ impl Describe for AuroraParameters {
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match Aurora::new(self.clone(), opening.name, opening.seed, opening.loop_s, opening.assets) {
             Ok(aurora) => Ok(Box::new(aurora)),
-            Err(fault) => Err(OpeningFault { kind: ProblemKind::Conflict(fault.kind.to_string()), key: fault.key }),
+            Err(fault) => {
+                let kind = match fault.kind {
+                    ShapeFaultKind::Asset(error) => ProblemKind::Asset(error),
+                    other => ProblemKind::Conflict(other.to_string()),
+                };
+                Err(OpeningFault { key: fault.key, kind })
+            }
         }
     }
 }

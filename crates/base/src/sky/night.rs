@@ -35,12 +35,12 @@ crate::parameters! {
 }
 
 /// Lines of the airglow: wavelength in nm, brightness overhead in kR, altitude of the layer in km (Roach & Gordon 1973; Leinert et al. 1998).
-/// The last stands for the hydroxyl bands below 700 nm.
+/// The last stands for the hydroxyl bands that the eye sees.
 const AIRGLOW: [(f64, f64, f64); 4] =
-    [(557.7, 0.25, 97.0), (630.0, 0.1, 250.0), (589.3, 0.05, 92.0), (660.0, 0.6, 87.0)];
+    [(557.7, 0.22, 97.0), (630.0, 0.08, 250.0), (589.3, 0.03, 92.0), (660.0, 0.2, 87.0)];
 /// Luminance of zodiacal light, faint stars and the airglow's continuum together, cd/m^2 (Leinert et al. 1998), and its colour, K.
-const BACKGROUND: f64 = 1.1e-4;
-const BACKGROUND_K: f32 = 5500.0;
+const BACKGROUND: f64 = 1.2e-4;
+const BACKGROUND_K: f32 = 9500.0;
 /// Logarithm (base 10) of the luminance overhead, cd/m^2, for every 3 degrees that the sun is lower, from the horizon on (Koomen et al. 1952).
 const TWILIGHT: [f64; 7] = [2.3, 1.2, -0.2, -1.7, -3.0, -4.1, -5.6];
 /// Height of the twilight arch, radians.
@@ -122,8 +122,8 @@ impl Night {
     #[must_use]
     pub fn parallel(&self, elevation: f64) -> Parallel {
         let overhead = self.transmittance(std::f64::consts::FRAC_PI_2);
-        // Scattered light fills up half of what the air takes.
-        let diffuse = 0.5 + 0.5 * self.transmittance(elevation) / overhead.max(f64::MIN_POSITIVE);
+        // Scattered light fills up a third of what the air takes.
+        let diffuse = 0.3 + 0.7 * self.transmittance(elevation) / overhead.max(f64::MIN_POSITIVE);
         let mut even = of_kind(BACKGROUND_K, BACKGROUND * diffuse);
         for (wavelength_nm, kilorayleigh, altitude_km) in AIRGLOW {
             let scale = LUMINOUS_EFFICACY_LM_PER_W * KILORAYLEIGH / wavelength_nm;
@@ -177,7 +177,7 @@ mod tests {
         assert_eq!(van_rhijn(std::f64::consts::FRAC_PI_2, 100.0), 1.0);
         let night = NightParameters::default().at(0.0);
         let low = DVec3::new(0.97, 0.24, 0.0).normalize();
-        assert!(luminance(night.radiance(low)) > 1.3 * luminance(night.radiance(DVec3::Y)));
+        assert!(luminance(night.radiance(low)) > 1.1 * luminance(night.radiance(DVec3::Y)));
     }
 
     #[test]

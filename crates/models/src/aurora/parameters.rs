@@ -61,11 +61,11 @@ bansho_base::parameters! {
     /// The field that pulls particles to the shape (2.2.3). Lengths of the grid are cells, times frames of 1/30 s, the charge is such that a sheet's potential is of order one.
     pub struct FieldParameters {
         /// Cells of the grid along each side; 255 is solved fastest, the thesis has 256.
-        cells: i64 = 255, limits(Range::new(16.0, 1023.0));
+        cells: i64 = 255, limits(Range::new(16.0, 511.0));
         /// How the potential is found.
         solver: FieldSolver = FieldSolver::SineTransform;
         /// Most Gauss-Seidel sweeps.
-        sweeps: i64 = 200, limits(Range::new(1.0, 100_000.0));
+        sweeps: i64 = 200, limits(Range::new(1.0, 2000.0));
         /// Greatest change at which Gauss-Seidel sweeps stop, as a share of the potential of a sheet.
         tolerance: f64 = 1e-4, limits(Range::new(0.0, 1.0));
         /// How far the sheets reach out for particles (screening length); `"auto"` is four cells.
@@ -107,7 +107,7 @@ bansho_base::parameters! {
     /// The particles and how they move (2.3).
     pub struct ParticleParameters {
         /// About how many there are.
-        count: i64 = 60_000, limits(Range::new(1000.0, 4e6));
+        count: i64 = 60_000, limits(Range::new(100.0, 1e6));
         /// Weight w_L of the Lorentz force, eq. (2.20).
         pull_weight: f64 = 0.6, limits(Range::new(0.0, 10.0));
         /// Weight w_P of the repulsion, eq. (2.20).
@@ -195,7 +195,7 @@ bansho_base::parameters! {
         /// Direction of magnetic north, east of true north.
         declination_deg: f64 = 0.0, limits(Range::new(-180.0, 180.0)), unit("degrees");
         /// Time that it runs before the shot.
-        preroll_s: f64 = 1.5, limits(Range::new(0.0, 600.0)), unit("s");
+        preroll_s: f64 = 1.5, limits(Range::new(0.0, 60.0)), unit("s");
         /// The shapes that it takes one after the other; a moving band and an arc where the list is empty.
         shapes: Vec<ShapeParameters> = Vec::new(), limits(Length { min: 0, max: 1000, item: () });
         /// How one shape becomes the next.

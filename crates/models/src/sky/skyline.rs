@@ -12,9 +12,9 @@ const SAMPLES: usize = 1 << 15;
 const OCTAVES: u32 = 7;
 const FIRST_WAVES: u64 = 5;
 /// Trees for each width of a tree: a closed wood.
-const DENSITY: f64 = 2.2;
+const DENSITY: f64 = 3.0;
 /// Width of a tree beside its height.
-const SLENDERNESS: f64 = 0.34;
+const SLENDERNESS: f64 = 0.42;
 
 const HILL: Purpose = Purpose::named("skyline hill");
 const TREE: Purpose = Purpose::named("skyline tree");
@@ -76,7 +76,7 @@ fn plant(heights: &mut [f64], tree_deg: f64, key: Key) {
     for number in 0..count.min(SAMPLES as u64) {
         let [place, size, shape, lean] = key.uniforms(number, 0, TREE).map(f64::from);
         let middle = place * SAMPLES as f64;
-        let height = tree_deg * (0.35 + 0.65 * size * size);
+        let height = tree_deg * (0.4 + 0.6 * size * size);
         let half = (0.5 * SLENDERNESS * (0.6 + 0.8 * shape) * height / degrees_per_sample).max(1.0);
         let foot = hills[middle as usize % SAMPLES];
         for sample in (middle - half).ceil() as i64..=(middle + half).floor() as i64 {

@@ -93,7 +93,7 @@ fn star(key: Key, number: u64, count: u64) -> Star {
     let mut toward = direction([words[1], words[2]]).as_dvec3();
     let more = key.words(number, 1, STAR);
     // Faint stars are far ones, and crowd to the plane of the galaxy.
-    if magnitude > BAND_FROM && uniform(more[0]) < 0.45 {
+    if magnitude > BAND_FROM && uniform(more[0]) < 0.35 {
         let pole = galactic_pole();
         let height = toward.dot(pole);
         toward = (toward - pole * (height * 0.85)).normalize();

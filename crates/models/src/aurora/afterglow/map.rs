@@ -158,3 +158,53 @@ impl GlowMap {
         &mut self.tiles[self.numbers[place] as usize]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Particles of 3 W and 1 W at those places, of 1 and 5 keV.
+    fn particles(places: [[f32; 2]; 2]) -> AuroraParticles {
+        AuroraParticles {
+            positions: [0, 1].map(|axis| places.iter().map(|place| place[axis]).collect()),
+            powers_w: vec![3.0, 1.0],
+            energies_ev: vec![1000.0, 5000.0],
+            ..AuroraParticles::default()
+        }
+    }
+
+    #[test]
+    fn a_cell_follows_what_feeds_it_and_fades_by_e_in_a_lifetime() {
+        let mut map = GlowMap::new(100.0, 0.5);
+        let fed = particles([[10.1, -20.1], [10.2, -20.2]]);
+        // Half a lifetime: 1 - exp(-1/2) of 4 W.
+        map.step(&fed, 0.4, 0.8);
+        assert!((map.power_w() - 4.0 * 0.393_469).abs() < 1e-5);
+        (0..40).for_each(|_| map.step(&fed, 0.4, 0.8));
+        let cells: Vec<GlowCell> = map.cells().collect();
+        assert_eq!(cells.len(), 1);
+        assert_eq!(cells[0].position_km, [10.25, -20.25]);
+        assert!((cells[0].power_w - 4.0).abs() < 1e-4 && (cells[0].energy_ev - 2000.0).abs() < 0.1);
+        let dark = AuroraParticles::default();
+        map.step(&dark, 0.8, 0.8);
+        assert!((map.power_w() - 4.0 / std::f64::consts::E).abs() < 1e-4);
+        (0..20).for_each(|_| map.step(&dark, 0.8, 0.8));
+        assert_eq!(map.tiles.len(), 0, "dark tiles are let go");
+    }
+
+    #[test]
+    fn tiles_come_and_go_without_losing_their_place() {
+        let mut map = GlowMap::new(100.0, 0.5);
+        map.step(&particles([[-49.9, -49.9], [49.9, 49.9]]), 1.0, 0.0);
+        // The first tile goes, the second takes its number, a third comes.
+        map.step(&particles([[49.9, 49.9], [0.1, 0.1]]), 1.0, 0.0);
+        let mut cells: Vec<_> = map.cells().map(|cell| (cell.position_km[0], cell.power_w)).collect();
+        cells.sort_by(|a, b| a.0.total_cmp(&b.0));
+        assert_eq!(cells, [(0.25, 1.0), (49.75, 3.0)]);
+        let (places, values) = map.to_lists();
+        assert_eq!(map.from_lists(&places, &values), Some(map.clone()));
+        assert_eq!(map.from_lists(&places[..1], &values), None);
+        assert_eq!(map.from_lists(&[places[0], places[0]], &values), None);
+        assert_eq!(map.from_lists(&[u32::MAX, places[1]], &values), None);
+    }
+}

@@ -3,6 +3,8 @@
 //! Every source is a small patch with a smooth edge, `(1 - r^2)^2` in each direction: broad enough for the chart's cells, so that none
 //! is ever seen alone. Sources are sorted into strips of columns, so that no two threads share a sum and every sum has one order.
 
+use std::ops::Range;
+
 use bansho_base::math::{self, lanes};
 use rayon::prelude::*;
 
@@ -68,6 +70,13 @@ impl Bins {
         Self { step, count: (math::atan(FARTHEST_KM / SCALE_KM) / step).ceil() as usize }
     }
 
+    /// Least reach of a patch along a meridian at a distance, km.
+    #[inline(always)]
+    pub(super) fn least_reach(&self, distance: f32) -> f32 {
+        const SCALE: f32 = SCALE_KM as f32;
+        LEAST_CELLS * self.step as f32 * distance.mul_add(distance / SCALE, SCALE)
+    }
+
     /// Distance of a bin's middle, and its width, km.
     pub(super) fn distance(&self, bin: usize) -> [f64; 2] {
         let (sin, cos) = math::sin_cos((bin as f64 + 0.5) * self.step);
@@ -124,25 +133,36 @@ impl<'a> Footprint<'a> {
         &self.bins
     }
 
+    /// Calls `each` with the index of every source that a strip shows, the source, and the columns of the strip that it reaches.
+    #[inline(always)]
+    pub(super) fn for_each(&self, strip: usize, chart: &Chart, mut each: impl FnMut(u32, &Source, Range<usize>)) {
+        // A span that passes the seam of a whole chart shows on its other side too.
+        let (turn, shifts) = if chart.whole { (chart.columns as i32, &[0, -1, 1][..]) } else { (0, &[0][..]) };
+        for entry in &self.entries[self.starts[strip] as usize..self.starts[strip + 1] as usize] {
+            let span = self.spans[*entry as usize];
+            for shift in shifts {
+                let first = span.first + shift * turn - (strip * STRIP) as i32;
+                let columns = first.max(0)..(first + span.count).min(STRIP as i32);
+                if !columns.is_empty() {
+                    let columns = columns.start as usize..columns.end as usize;
+                    each(*entry, &self.sources[*entry as usize], columns);
+                }
+            }
+        }
+    }
+
     /// Adds up the sources of a strip whose columns have these cosines and sines.
     #[inline(always)]
     pub(super) fn sum(&self, strip: usize, chart: &Chart, units: &[[f32; 2]; STRIP], sums: &mut StripSums) {
         sums.bins.clear();
         sums.bins.resize(STRIP * self.bins.count, [0.0; 4]);
         sums.filled = [[usize::MAX, 0]; STRIP];
-        let turn = if chart.whole { chart.columns as i32 } else { 0 };
-        for entry in &self.entries[self.starts[strip] as usize..self.starts[strip + 1] as usize] {
-            let (source, span) = (&self.sources[*entry as usize], self.spans[*entry as usize]);
+        self.for_each(strip, chart, |_, source, columns| {
             let patch = Patch::new(source, chart, &self.bins);
-            // A span that passes the seam of a whole chart shows on its other side too.
-            let shifts = if turn > 0 { &[0, -1, 1][..] } else { &[0][..] };
-            for shift in shifts {
-                let first = span.first + shift * turn - (strip * STRIP) as i32;
-                for column in first.max(0)..(first + span.count).min(STRIP as i32) {
-                    patch.add(column as usize, units[column as usize], &self.bins, sums);
-                }
+            for column in columns {
+                patch.add(column, units[column], &self.bins, sums);
             }
-        }
+        });
         for filled in &mut sums.filled {
             filled[0] = filled[0].min(filled[1]);
         }
@@ -192,55 +212,72 @@ fn strips_of(span: Span, chart: &Chart, mut each: impl FnMut(usize)) {
 }
 
 /// A source, made ready to be added to columns.
-struct Patch {
+pub(super) struct Patch {
     across: [f32; 2],
     weights: Bin,
     /// Inverse reach to the side, 1/km.
     per_reach: f32,
     reach: f32,
-    least_bins: f32,
     per_step: f32,
 }
 
 impl Patch {
     #[inline(always)]
-    fn new(source: &Source, chart: &Chart, bins: &Bins) -> Self {
+    pub(super) fn new(source: &Source, chart: &Chart, bins: &Bins) -> Self {
         let [x, y] = source.across;
         let distance = x.mul_add(x, y * y).sqrt();
         let per_reach = 1.0 / source.reach.max(LEAST_CELLS * chart.column_step as f32 * distance);
         let [green, red, prompt] = source.power;
         let all = (green + red + prompt) * source.node;
-        let norm = NORM * NORM * per_reach;
         Self {
             across: source.across,
-            weights: [green * norm, red * norm, prompt * norm, all * norm],
+            weights: [green, red, prompt, all],
             per_reach,
             reach: source.reach,
-            least_bins: LEAST_CELLS,
             per_step: (1.0 / bins.step) as f32,
         }
     }
 
+    /// Distance from the observer's own field line, km.
     #[inline(always)]
-    fn add(&self, column: usize, [cos, sin]: [f32; 2], bins: &Bins, sums: &mut StripSums) {
-        const PER_SCALE: f32 = (1.0 / SCALE_KM) as f32;
+    pub(super) fn distance(&self) -> f32 {
+        let [x, y] = self.across;
+        x.mul_add(x, y * y).sqrt()
+    }
+
+    /// Share of it per km of width at a column, from the column's cosine and sine.
+    #[inline(always)]
+    pub(super) fn side(&self, [cos, sin]: [f32; 2]) -> f32 {
         let [x, y] = self.across;
         let side = y.mul_add(cos, -(x * sin)) * self.per_reach;
-        let side = 1.0 - side * side;
+        let shape = side.mul_add(-side, 1.0).max(0.0);
+        shape * shape * NORM * self.per_reach
+    }
+
+    /// How far out it lies along a column, km.
+    #[inline(always)]
+    pub(super) fn along(&self, [cos, sin]: [f32; 2]) -> f32 {
+        self.across[0].mul_add(cos, self.across[1] * sin)
+    }
+
+    #[inline(always)]
+    fn add(&self, column: usize, unit: [f32; 2], bins: &Bins, sums: &mut StripSums) {
+        const PER_SCALE: f32 = (1.0 / SCALE_KM) as f32;
+        let side = self.side(unit);
         if side <= 0.0 {
             return;
         }
         // Along the column in bins, and its reach there.
-        let along = x.mul_add(cos, y * sin) * PER_SCALE;
+        let along = self.along(unit) * PER_SCALE;
         let middle = lanes::atan2(along, 1.0) * self.per_step;
-        let reach = (self.reach * PER_SCALE / along.mul_add(along, 1.0) * self.per_step).max(self.least_bins);
+        let reach = (self.reach * PER_SCALE / along.mul_add(along, 1.0) * self.per_step).max(LEAST_CELLS);
         let first = (middle - reach - 0.5).ceil().max(0.0) as usize;
         let end = ((middle + reach - 0.5).floor() + 1.0).clamp(0.0, bins.count as f32) as usize;
         if first >= end {
             return;
         }
         let per_reach = 1.0 / reach;
-        let weight = side * side * per_reach;
+        let weight = side * NORM * per_reach;
         let weights = self.weights.map(|value| value * weight);
         let filled = &mut sums.filled[column];
         *filled = [filled[0].min(first), filled[1].max(end)];

@@ -112,6 +112,13 @@ impl Meridian {
     pub(super) fn line(&self, distance: f64) -> FieldLine {
         FieldLine { excess: self.squared + distance * (2.0 * self.outward + distance), along: self.along }
     }
+
+    /// In single precision: square of the observer's distance from the Earth's middle less that of the ground, and the parts of that
+    /// distance outward and along the field.
+    #[inline(always)]
+    pub(super) fn single(&self) -> [f32; 3] {
+        [self.squared, self.outward, self.along].map(|value| value as f32)
+    }
 }
 
 impl FieldLine {

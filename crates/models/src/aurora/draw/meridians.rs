@@ -8,7 +8,7 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{
-    chart::{Chart, STRIP},
+    chart::{Chart, Finder, STRIP},
     footprint::{Bin, Bins, Footprint, StripSums},
     geometry::{FieldLine, FieldLines, Meridian, altitude},
     profile::{BOTTOM_KM, Profile, Profiles, SPACINGS},
@@ -57,6 +57,43 @@ impl Meridians {
             },
         );
         Self { chart, light }
+    }
+
+    /// The picture with how to find places on it.
+    pub(super) fn sampler(&self) -> Sampler<'_> {
+        Sampler { meridians: self, finder: self.chart.finder() }
+    }
+}
+
+/// A chart with how to find places on it.
+pub(super) struct Sampler<'a> {
+    meridians: &'a Meridians,
+    finder: Finder,
+}
+
+impl Sampler<'_> {
+    /// Light at a direction, linear between the cells of the chart.
+    #[inline(always)]
+    pub(super) fn light(&self, longitude: f32, colatitude: f32) -> PerEmitter<f32> {
+        let chart = &self.meridians.chart;
+        let (columns, rows) = (chart.columns as i32, chart.rows);
+        let column = self.finder.column(longitude) - 0.5;
+        let row = (self.finder.row(colatitude) - 0.5).clamp(0.0, (rows - 1) as f32);
+        let left = column.floor();
+        let (upper, part) = (row as usize, row - row.floor());
+        let lower = (upper + 1).min(rows - 1);
+        let across = column - left;
+        let held = |column: i32| { if chart.whole { column.rem_euclid(columns) } else { column.clamp(0, columns - 1) } }
+            as usize;
+        let [left, right] =
+            [left as i32, left as i32 + 1].map(|column| &self.meridians.light[held(column) * rows..][..rows]);
+        let mut light = [0.0; 4];
+        for i in 0..4 {
+            let above = across.mul_add(right[upper][i] - left[upper][i], left[upper][i]);
+            let below = across.mul_add(right[lower][i] - left[lower][i], left[lower][i]);
+            light[i] = part.mul_add(below - above, above);
+        }
+        light
     }
 }
 

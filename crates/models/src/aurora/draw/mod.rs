@@ -6,8 +6,10 @@
 //! the chart (`prepared`) and dimmed and coloured by the air below (`shading`). The cost grows with pixels and particles, not with shapes.
 
 mod chart;
+mod collisions;
 mod footprint;
 mod geometry;
+mod lighting;
 mod meridians;
 mod parameters;
 mod phenomenon;
@@ -15,6 +17,8 @@ mod prepared;
 mod profile;
 mod shading;
 mod sources;
+#[cfg(test)]
+mod tests;
 
 pub use parameters::{DrawingParameters, Sampling};
 pub use phenomenon::Aurora;

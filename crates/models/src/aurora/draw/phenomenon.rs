@@ -12,6 +12,8 @@ use bansho_base::{
 };
 
 use super::{
+    Sampling,
+    collisions::Collisions,
     geometry::FieldLines,
     prepared::{DEPTHS, PreparedAurora},
     profile::Profiles,
@@ -26,7 +28,10 @@ use crate::aurora::{
 };
 
 /// Sheets are seen aslant: their bright parts beside what looks straight up through one.
-const BRIGHT_PER_COLUMN: f64 = 2.2;
+const BRIGHT_PER_COLUMN: f64 = 1.5;
+
+/// How far a spectrum reaches beyond its energy, and rays beyond that, in nodes of the grid of energies: sixfold.
+const SPECTRUM_NODES: usize = 25;
 
 /// An aurora, ready to be stepped and drawn.
 #[derive(Clone, Debug)]
@@ -35,6 +40,8 @@ pub struct Aurora {
     pub(super) simulation: AuroraSimulation,
     pub(super) profiles: Profiles,
     pub(super) shading: Shading,
+    /// What single collisions are drawn from, where they are asked for.
+    pub(super) collisions: Option<Collisions>,
     /// How far collisions wander from their field line, km.
     wander_km: f64,
 }
@@ -57,8 +64,13 @@ impl Aurora {
         let falls = Falls::new(simulation.emission().deposition(), 0.0);
         let node = nearest_node(parameters.energy_ev.at(0.0));
         let fall = falls.fall(node, Key::new(seed, name), 0).map(|collision| f64::from(collision.altitude_km));
+        let by_collisions = parameters.drawing.sampling == Sampling::Collisions;
+        let hardest = nearest_node(parameters.energy_ev.bounds()[1]) + SPECTRUM_NODES;
+        let key = Key::new(seed, name);
+        let collisions = || Collisions::new(simulation.emission(), parameters.drawing.wobble, hardest, key);
         Ok(Self {
             name: name.to_owned(),
+            collisions: by_collisions.then(collisions),
             profiles: Profiles::new(simulation.emission()),
             shading: Shading::new(&parameters.drawing.air),
             wander_km: wander_km(&fall.collect::<Vec<_>>(), parameters.drawing.wobble),
@@ -147,8 +159,8 @@ impl Phenomenon for Aurora {
         self.simulation.restore(state)
     }
 
-    fn publish(&self, _shutter: Shutter) -> Publication {
-        Publication::default()
+    fn publish(&self, shutter: Shutter) -> Publication {
+        Publication { lights: self.lamp(shutter.middle()).into_iter().collect(), ..Publication::default() }
     }
 
     fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {

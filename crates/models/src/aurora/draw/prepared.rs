@@ -12,13 +12,16 @@ use fearless_simd::{Level, dispatch};
 
 use super::{
     Aurora,
-    chart::{Chart, Coverage, Finder},
+    chart::{Chart, Coverage},
     footprint::{Footprint, REACH},
     geometry::{EARTH_RADIUS_KM, FieldLines},
-    meridians::Meridians,
+    meridians::{Meridians, Sampler},
     sources::Sources,
 };
-use crate::aurora::light::{LINES, PerEmitter};
+use crate::aurora::{
+    light::{LINES, PerEmitter},
+    particles::AuroraSimulation,
+};
 
 /// Pixels that are worked on at once.
 const BATCH: usize = 16;
@@ -53,11 +56,15 @@ impl<'a> PreparedAurora<'a> {
         check(observer)?;
         let coverage = Coverage::of_view(view, &field);
         let [sharp, soft] = sources.spread_km;
+        let step = (aurora.simulation.time() / AuroraSimulation::STEP_S).round() as i64 as u32;
         let draw = |sources: &[_], spread_km: f64, [column, row]: [f64; 2]| {
             let chart = Chart::new(&coverage, column, row);
             let bins = (spread_km * f64::from(REACH) / 250.0).clamp(row, 4.0 * row);
             let footprint = Footprint::new(sources, &chart, bins);
-            Meridians::new(chart, &field, &aurora.profiles, &footprint)
+            match &aurora.collisions {
+                Some(collisions) => collisions.draw(chart, &field, &footprint, step),
+                None => Meridians::new(chart, &field, &aurora.profiles, &footprint),
+            }
         };
         let pixel = coverage.pixel;
         // The angle at which the spread is seen from the nearest place where such light is.
@@ -97,17 +104,17 @@ impl Aurora {
         let count = ways.ceil().clamp(1.0, MOST_INSTANTS) as usize;
         let now = self.simulation.time();
         // A long exposure has its own afterglow: particles are never taken further than a step.
-        let step = crate::aurora::particles::AuroraSimulation::STEP_S;
+        let step = AuroraSimulation::STEP_S;
         (0..count).map(|instant| (view.shutter.instant(instant, count) - now).clamp(-step, step)).collect()
     }
 }
 
 /// Directions of a batch of pixels in the field's frame, and what is needed of them.
 #[derive(Default)]
-struct Batch {
+pub(super) struct Batch {
     /// Colatitude and longitude about the magnetic zenith.
-    colatitude: [f32; BATCH],
-    longitude: [f32; BATCH],
+    pub(super) colatitude: [f32; BATCH],
+    pub(super) longitude: [f32; BATCH],
     /// Sine of the elevation.
     sine: [f32; BATCH],
     /// Length of the direction that [`Camera::direction`] gives.
@@ -119,7 +126,7 @@ struct Batch {
 impl Batch {
     /// Pixels from `x` on in row `y`.
     #[inline(always)]
-    fn new(camera: &Camera, field: &FieldLines, x: usize, y: usize) -> Self {
+    pub(super) fn new(camera: &Camera, field: &FieldLines, x: usize, y: usize) -> Self {
         let mut batch = Self::default();
         let at = |x: usize| camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
         let mut directions = [DVec3::Y.as_vec3(); BATCH];
@@ -151,42 +158,10 @@ impl Batch {
     }
 }
 
-/// A chart with how to find places on it.
-struct Sampler<'a> {
-    meridians: &'a Meridians,
-    finder: Finder,
-}
-
-impl Sampler<'_> {
-    /// Light at a direction, linear between the cells of the chart.
-    #[inline(always)]
-    fn light(&self, longitude: f32, colatitude: f32) -> PerEmitter<f32> {
-        let chart = &self.meridians.chart;
-        let (columns, rows) = (chart.columns as i32, chart.rows);
-        let column = self.finder.column(longitude) - 0.5;
-        let row = (self.finder.row(colatitude) - 0.5).clamp(0.0, (rows - 1) as f32);
-        let left = column.floor();
-        let (upper, part) = (row as usize, row - row.floor());
-        let lower = (upper + 1).min(rows - 1);
-        let across = column - left;
-        let held = |column: i32| { if chart.whole { column.rem_euclid(columns) } else { column.clamp(0, columns - 1) } }
-            as usize;
-        let [left, right] =
-            [left as i32, left as i32 + 1].map(|column| &self.meridians.light[held(column) * rows..][..rows]);
-        let mut light = [0.0; 4];
-        for i in 0..4 {
-            let above = across.mul_add(right[upper][i] - left[upper][i], left[upper][i]);
-            let below = across.mul_add(right[lower][i] - left[lower][i], left[lower][i]);
-            light[i] = part.mul_add(below - above, above);
-        }
-        light
-    }
-}
-
 impl PreparedAurora<'_> {
     #[inline(always)]
     fn rows(&self, slice: &DepthInterval, strip: &mut Strip) {
-        let samplers = self.charts.each_ref().map(|meridians| Sampler { meridians, finder: meridians.chart.finder() });
+        let samplers = self.charts.each_ref().map(Meridians::sampler);
         let rect = strip.rect;
         for row in 0..rect.height {
             for x in (0..rect.width).step_by(BATCH) {

@@ -38,19 +38,19 @@ pub(super) struct Sources {
 
 /// A kind of light.
 #[derive(Clone, Copy)]
-enum Kind {
+pub(super) enum Kind {
     Green = 0,
     Red = 1,
     Prompt = 2,
 }
 
 /// How electrons become sources.
-struct Maker<'a> {
-    field: &'a FieldLines,
-    kind: Kind,
-    reach: f32,
+pub(super) struct Maker<'a> {
+    pub(super) field: &'a FieldLines,
+    pub(super) kind: Kind,
+    pub(super) reach: f32,
     /// Part of the power that each of several instants has.
-    share: f32,
+    pub(super) share: f32,
 }
 
 impl Maker<'_> {
@@ -62,7 +62,7 @@ impl Maker<'_> {
         Source { across: foot.across, reach: self.reach, node: node_of(energy_ev), power }
     }
 
-    fn cells(&self, cells: &[GlowCell]) -> Vec<Source> {
+    pub(super) fn cells(&self, cells: &[GlowCell]) -> Vec<Source> {
         let level = Level::new();
         let make = |part: &[GlowCell]| -> Vec<Source> {
             let make = |cell: &GlowCell| self.make(cell.position_km, cell.power_w, cell.energy_ev);

@@ -8,12 +8,14 @@ use bansho_base::{
 
 use super::along::Along;
 use crate::aurora::{
-    FoldParameters,
+    AuroraParameters, FoldParameters,
     shapes::{Neighbourhood, Segments, Shape, Sheet},
 };
 
 /// Pieces that a fold is made of, at least.
 const PIECES_PER_FOLD: f64 = 12.0;
+/// Pieces are not shorter than L_thr over this.
+const PIECES_PER_THICKNESS: f64 = 4.0;
 /// About as many pieces as all sheets together have at most.
 const MOST_PIECES: f64 = 20_000.0;
 /// Gradient noise seldom leaves half of its bounds: this makes its swings those that are asked for.
@@ -29,12 +31,15 @@ pub(super) struct Folding {
 }
 
 impl Folding {
-    pub(super) fn new(parameters: FoldParameters, key: Key, cell_km: f64, extent_km: f64) -> Self {
+    pub(super) fn new(aurora: &AuroraParameters, key: Key) -> Self {
+        let parameters = aurora.folds.clone();
         let [seed, ..] = key.words(0, 0, bansho_base::random::Purpose::named("aurora folds"));
         let fractal = Fractal { octaves: 2, ..Fractal::default() };
         let noise = Noise::new(seed, fractal, [0; 2]).expect("two octaves without a period are noise");
         let fold = if parameters.amplitude_km > 0.0 { parameters.scale_km / PIECES_PER_FOLD } else { f64::INFINITY };
-        Self { noise, piece_km: fold.min(cell_km), half_km: extent_km / 2.0, parameters }
+        // Nothing finer than a part of its thickness can be seen of a sheet.
+        let piece_km = fold.min(aurora.cell_km()).max(aurora.half_thickness_km() / PIECES_PER_THICKNESS);
+        Self { noise, piece_km, half_km: aurora.extent_km / 2.0, parameters }
     }
 
     /// How far the sheet swings at a coordinate along it and a time, km.

@@ -81,7 +81,7 @@ impl FieldMaker {
 
     /// The field of particles scattered about a shape, with the noise of a time.
     pub(super) fn make(&self, scattered: &[Charge], time: f64) -> Field {
-        let counts = self.sum(scattered, |_| 1.0);
+        let counts = self.sum(scattered, |particle| f64::from(u8::from(particle.counted)));
         let potential = self.potential(&counts, self.sum(scattered, |particle| particle.charge));
         let table = self.table(&potential, time);
         Field { counts, potential, table }

@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Gas constant k at a repulsion of 1, cells^2 per frame^2.
-const STIFFNESS: f64 = 0.03;
+const STIFFNESS: f64 = 0.1;
 /// Particles that a task of the thread pool moves.
 const TASK: usize = 4096;
 /// The support radius follows the density by this share each step.

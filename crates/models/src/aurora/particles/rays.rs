@@ -132,3 +132,82 @@ fn values(level: Level, noise: &Noise<2>, places: [f64; LANES], age: f64) -> [f3
     }
     dispatch!(level, _simd => noise.lanes(&cells, &fractions))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aurora::AuroraParameters;
+
+    const KEY: Key = Key::new(4, "rays");
+
+    /// Brightness, dimming and hardness every 50 m along the left side of a sheet.
+    fn along(parameters: &AuroraParameters, time: f64) -> [Vec<f64>; 3] {
+        let rays = Rays::new(parameters, KEY);
+        let mut all: [Vec<f64>; 3] = Default::default();
+        for first in 0..1000 {
+            let place = |lane: usize| 0.05 * (first * LANES + lane) as f64;
+            let places = Places { along: std::array::from_fn(place), side: [-1.0; LANES] };
+            let Pattern { brightness, dimming, hardness } = rays.at(Level::new(), &places, time);
+            for (all, values) in all.iter_mut().zip([brightness, dimming, hardness]) {
+                all.extend(values.map(f64::from));
+            }
+        }
+        all
+    }
+
+    fn deviation(values: &[f64]) -> f64 {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        (values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / values.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn contrast_is_the_deviation_of_the_logarithm_and_hardness_goes_with_it() {
+        let mut parameters = AuroraParameters::default();
+        parameters.rays.contrast = 0.5;
+        parameters.rays.energy = 0.1;
+        let [brightness, dimming, hardness] = along(&parameters, 3.0);
+        let logarithm = |values: &[f64]| values.iter().map(|value| bansho_base::math::ln(*value)).collect::<Vec<_>>();
+        assert!((deviation(&logarithm(&brightness)) / 0.5 - 1.0).abs() < 0.15);
+        assert!((deviation(&logarithm(&hardness)) / 0.1 - 1.0).abs() < 0.15);
+        assert!(dimming.iter().all(|dimming| *dimming == 1.0));
+        parameters.rays.contrast = 0.0;
+        assert!(along(&parameters, 3.0)[0].iter().all(|brightness| *brightness == 1.0));
+    }
+
+    #[test]
+    fn rays_run_along_the_sheet() {
+        let mut parameters = AuroraParameters::default();
+        parameters.rays.shear_km_per_s = 3.0;
+        parameters.rays.life_s = 1e5;
+        let [before, ..] = along(&parameters, 1.0);
+        let [after, ..] = along(&parameters, 1.5);
+        // 1.5 km are 30 places; on the left they run onward.
+        let moved = |shift: isize| -> f64 {
+            (100..15_000).map(|i| (after[(i as isize + shift) as usize] - before[i]).abs()).sum()
+        };
+        assert!(moved(30) < 0.01 * moved(0) && moved(30) < 0.01 * moved(-30));
+    }
+
+    #[test]
+    fn black_rays_are_narrow_and_dark() {
+        let mut parameters = AuroraParameters::default();
+        parameters.rays.black_rays = 1.0;
+        let [_, dimming, _] = along(&parameters, 3.0);
+        let dark = dimming.iter().filter(|dimming| **dimming < 0.3).count() as f64 / dimming.len() as f64;
+        let whole = dimming.iter().filter(|dimming| **dimming == 1.0).count() as f64 / dimming.len() as f64;
+        assert!((0.02..0.3).contains(&dark) && whole > 0.5, "{dark} {whole}");
+    }
+
+    #[test]
+    fn patches_pulsate_with_their_period() {
+        let mut parameters = AuroraParameters::default();
+        parameters.pulsation.depth = 0.8;
+        parameters.pulsation.period_s = 5.0;
+        let at = |time: f64| along(&parameters, time)[1].clone();
+        let same = at(1.0).iter().zip(at(6.0)).all(|(a, b)| (a - b).abs() < 1e-5);
+        let range =
+            (0..20).map(|i| at(0.25 * f64::from(i))[7]).fold((1.0_f64, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)));
+        assert!(same && range.0 < 0.22 && range.1 > 0.98, "{range:?}");
+        assert!(deviation(&at(1.0)) > 0.1, "patches have phases of their own");
+    }
+}

@@ -11,6 +11,9 @@ use super::course::Course;
 
 const SCATTER: Purpose = Purpose::named("aurora scatter");
 
+/// How far charge reaches beyond the end of a sheet, screening lengths: so its particles find their lowest place up to the end.
+const BEYOND: f64 = 0.3;
+
 /// A particle that stands for the charge about a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Charge {
@@ -18,9 +21,12 @@ pub(super) struct Charge {
     pub(super) place: DVec2,
     /// Its charge beside that of one far from the ends of the sheet.
     pub(super) charge: f64,
+    /// Whether it is within L_thr of the shape, not just beyond an end.
+    pub(super) counted: bool,
 }
 
-/// Particles within `half_thickness` km of the shape, evenly over the area that it covers; the `renewal`th set of `count` trials.
+/// Particles within `half_thickness` km of the shape, evenly over the area that it covers; the `renewal`th set of `count` trials. Beyond
+/// the ends of sheets there are some more that do not count.
 ///
 /// A place counts for the segment that it is nearest to, so that nothing is counted twice where segments overlap. `reach` is the
 /// screening length of the field, km.
@@ -33,16 +39,26 @@ pub(super) fn scatter(
 ) -> Vec<Charge> {
     let segments = course.segments();
     let lengths: Vec<f64> = course.sheet_lengths();
-    let charge = |index: usize| {
+    let charges = |index: usize| {
         let [u, v, ..] = key.words(index as u64, renewal, SCATTER).map(|word| f64::from(uniform(word)));
         let sample = segments.sample((index as f64 + u) / count as f64)?;
         let place = sample.point + sample.tangent.perp() * (half_thickness * (2.0 * v - 1.0));
         let own = [sample.segment.sheet, sample.segment.segment];
-        let length = lengths[sample.segment.sheet] / reach;
-        let charge = end_charge(length * sample.share) * end_charge(length * (1.0 - sample.share));
-        (course.nearest_segment(place) == Some(own)).then_some(Charge { place, charge })
+        let (length, share) = (lengths[sample.segment.sheet] / reach, sample.share);
+        // To its mirror image beyond an end, in screening lengths along the sheet.
+        let images = [-2.0 * share * length, 2.0 * (1.0 - share) * length];
+        let charge = move |shift: f64| {
+            let from_start = share * length + shift + BEYOND;
+            Charge {
+                place: place + sample.tangent * (shift * reach),
+                charge: end_charge(from_start) * end_charge(length + 2.0 * BEYOND - from_start),
+                counted: shift == 0.0,
+            }
+        };
+        let images = images.into_iter().filter(|shift| (0.0..2.0 * BEYOND).contains(&shift.abs()) && *shift != 0.0);
+        (course.nearest_segment(place) == Some(own)).then(|| std::iter::once(0.0).chain(images).map(charge))
     };
-    (0..count).into_par_iter().with_min_len(1024).filter_map(charge).collect()
+    (0..count).into_par_iter().with_min_len(1024).filter_map(charges).flatten_iter().collect()
 }
 
 /// Charge at `way` screening lengths from the end of a long sheet that is at one potential all along, as a conductor, 1 far from the end: the

@@ -82,7 +82,7 @@ impl AuroraSimulation {
         let time = -parameters.preroll_s;
         let along = Along::begin(&sequence.at(time));
         let fields = FieldMaker::new(&parameters, key);
-        let folding = Folding::new(parameters.folds.clone(), key, parameters.cell_km(), parameters.extent_km);
+        let folding = Folding::new(&parameters, key);
         let state = State {
             steps: 0,
             next_id: 0,
@@ -129,7 +129,8 @@ impl AuroraSimulation {
         let count = self.parameters.particles.count as usize;
         let state = &mut self.state;
         let sizes = [self.parameters.half_thickness_km(), self.fields.reach_km()];
-        for charge in scatter(course, sizes, count, self.key, state.renewals) {
+        let places = scatter(course, sizes, count, self.key, state.renewals);
+        for charge in places.into_iter().filter(|charge| charge.counted) {
             state.particles.push(state.next_id, charge.place, [0.0; 2], 1.0);
             state.next_id += 1;
         }
