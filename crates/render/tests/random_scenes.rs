@@ -48,7 +48,7 @@ fn draw(text: &str) -> bool {
     true
 }
 
-/// One of each phenomenon under random shared tables.
+/// A phenomenon, in every eighth scene one of each, under random shared tables.
 fn scene(seed: u64) -> String {
     let key = Key::new(seed, "random scene");
     let mut drawn = 0;
@@ -64,14 +64,17 @@ fn scene(seed: u64) -> String {
         table.entries.retain(|entry| shared.key != "obstacle" || entry.key != "shape");
         text += &lines(&header, &table);
     }
-    for kind in KINDS {
+    for (index, kind) in KINDS.iter().enumerate() {
         let mut table = sample((kind.table)(), &mut uniform);
         few_particles(&mut table, kind.key);
         // Half of all random shapes are wider than their sheet; most scenes do without, so that they are drawn.
         if !seed.is_multiple_of(4) {
             table.entries.retain(|entry| entry.key != "shape");
         }
-        text += &lines(&format!("[[{}]]", kind.key), &table);
+        // Many together are refused if one of them is, so most scenes hold one.
+        if seed.is_multiple_of(8) || seed as usize % KINDS.len() == index {
+            text += &lines(&format!("[[{}]]", kind.key), &table);
+        }
     }
     text
 }

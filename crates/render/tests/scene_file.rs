@@ -80,7 +80,7 @@ fn faults_of_a_particle_flame_are_located() {
         ("burners = [{ shape = \"mesh\" }]\n", "burners.0.file: a burner of shape \"mesh\" needs a `file`"),
         (
             "burners = [{ shape = \"mesh\", file = \"gone.glb\" }]\n",
-            "test.toml:3:38: flame_particles.0.burners.0.file: gone.glb: no such file",
+            "test.toml:3:37: flame_particles.0.burners.0.file: gone.glb: no such file",
         ),
         (
             "particles = 3\ndomain_min = [-0.01, -0.01, -0.01]\ndomain_max = [0.01, 0.01, 0.01]\n",
