@@ -1,8 +1,8 @@
 //! How the gas looks: what it radiates, absorbs and bends, and the particles as the paper shows them.
 //!
-//! Each particle is a ball of gas whose line integral is known in closed form ([`kernel`]). [`sprite`] finds its ellipse in the picture,
-//! [`splat`] sums all of them on a grid that is as coarse as they are smooth, in a few layers of depth; [`resolve`] turns the sums into
-//! light at every pixel, with the detail ([`detail`]) that sums lack. [`haze`] sums deflections, [`light`] what others are lit with.
+//! Each particle is a ball of gas whose line integral is known in closed form (`kernel`). `sprite` finds its ellipse in the picture,
+//! `splat` sums all of them on a grid that is as coarse as they are smooth, in a few layers of depth; `resolve` turns the sums into
+//! light at every pixel, with the detail (`detail`) that sums lack. `haze` sums deflections, `light` what others are lit with.
 
 mod detail;
 mod gas;
