@@ -38,6 +38,9 @@ fn one_thread() {
 
 /// Draws the second frame of `scene`, at most 32 pixels on a side, with layers and AOVs.
 ///
+/// Scenes with burning gas or rain are only planned: at their limits one step or frame of them takes longer than a fuzzer waits, and
+/// cannot be interrupted. The random-scene tests draw them.
+///
 /// # Panics
 /// The frame holds a number that is not finite, or a plan of a checked scene fails.
 pub fn draw_small(mut scene: Scene, assets: MemoryAssets) {
@@ -46,7 +49,11 @@ pub fn draw_small(mut scene: Scene, assets: MemoryAssets) {
     let number = scene.picture.first_frame + 1;
     let size = scene.picture.size.map(|side| (side as usize).min(32));
     let options = PlanOptions { size: Some(size), layers: true, aovs: true, ..PlanOptions::default() };
+    let interruptible = scene.instances.iter().all(|instance| instance.kind.key == "flame_sheet");
     let plan = Plan::new(scene, &options, Arc::new(assets)).expect("a checked scene can be planned");
+    if !interruptible {
+        return;
+    }
     let mut shot = CpuBackend.open(Arc::new(plan)).expect("a planned shot opens");
     let deadline = Deadline(Instant::now() + Duration::from_secs(2));
     match shot.advance(number, &deadline).and_then(|()| shot.draw(&deadline)) {
