@@ -84,8 +84,11 @@ impl Near<'_> {
         }
         let way = velocity * moment.sight.exposure;
         let flight = Flight { from: point - 0.5 * way, to: point + 0.5 * way, diameter_mm: class.diameter_mm };
-        let light = self.lighting.radiance(point, toward / away);
-        let mut stroke = flight.above(moment.ground)?.stroke(moment, weight * moment.gain, light)?;
+        let mut stroke = flight.above(moment.ground)?.stroke(moment, weight * moment.gain, [0.0; 3])?;
+        if !stroke.meets(moment.sight.middle().size) {
+            return None;
+        }
+        stroke.light = self.lighting.radiance(point, toward / away);
         if let Some((tiles, sky)) = self.sky {
             let sky = tiles.at(sky, stroke.middle());
             (0..3).for_each(|c| stroke.light[c] += sky[c]);

@@ -8,10 +8,11 @@ use bansho_base::{
     surroundings::Surroundings,
 };
 use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
 
 use super::{
     Rain,
-    bands::{BAND, Bands},
+    bands::{BAND, Bands, Extent},
     billboards::{Billboards, Brush, paint},
     distribution::DropSizes,
     drops::{self, Near},
@@ -31,6 +32,9 @@ const TAKE_OVER: [f64; 2] = [1.0, 1.2];
 /// Light below this share of display white is left out: with a hundred streaks over each other it still is below a 255th.
 const LEAST_SHARE: f64 = 1.0 / (255.0 * 128.0);
 
+/// Columns that streaks are drawn in at a time: the planes of so many fit into a core's first cache.
+const STRETCH: usize = 128;
+
 /// Streaks of single drops, sorted into bands.
 struct Strokes {
     strokes: Vec<Stroke>,
@@ -38,9 +42,9 @@ struct Strokes {
 }
 
 impl Strokes {
-    fn new(strokes: Vec<Stroke>, height: usize) -> Self {
-        let rows: Vec<[f32; 2]> = strokes.iter().map(Stroke::rows).collect();
-        Self { bands: Bands::new(height, &rows), strokes }
+    fn new(strokes: Vec<Stroke>, size: [usize; 2]) -> Self {
+        let extents: Vec<Extent> = strokes.par_iter().with_min_len(4096).map(Stroke::extent).collect();
+        Self { bands: Bands::new(size, STRETCH, extents.iter().copied()), strokes }
     }
 }
 
@@ -81,7 +85,7 @@ impl<'a> PreparedRain<'a> {
         let white = view.white_luminance.filter(|_| rain.parameters.culling);
         let least_light = white.map_or(0.0, |white| (white * LEAST_SHARE) as f32);
         let figures = frame.figures(strokes.len(), billboards.as_ref().map(|(billboards, _)| billboards));
-        let strokes = Strokes::new(strokes, view.size[1]);
+        let strokes = Strokes::new(strokes, view.size);
         Self { view, level: Level::new(), strokes, billboards, veil, least_light, figures }
     }
 }
@@ -180,18 +184,21 @@ impl PreparedRain<'_> {
         let mut aovs = std::mem::take(&mut strip.aovs);
         // Rain alone draws into its strip, and takes all colours alike.
         if let Some(mut planes) = strip.gray_planes_mut() {
-            for &index in self.strokes.bands.members(band) {
-                let stroke = &self.strokes.strokes[index as usize];
-                if !slice.contains(f64::from(stroke.depth)) {
-                    continue;
-                }
-                if aovs.is_empty() {
-                    stroke.draw(rows, rect, &mut planes, &mut |_, _| {});
-                } else {
-                    stroke.draw(rows, rect, &mut planes, &mut |index, opacity| {
-                        let values = [1.0, stroke.depth, stroke.diameter_mm];
-                        aovs.iter_mut().zip(values).for_each(|(plane, value)| plane.add(index, value, opacity));
-                    });
+            for ([from, to], members) in self.strokes.bands.stretches(band, rows.x, rows.right()) {
+                let rows = rows.intersection(&Rect { x: from, width: to - from, ..rows });
+                for &index in members {
+                    let stroke = &self.strokes.strokes[index as usize];
+                    if !slice.contains(f64::from(stroke.depth)) {
+                        continue;
+                    }
+                    if aovs.is_empty() {
+                        stroke.draw(rows, rect, &mut planes, &mut |_, _| {});
+                    } else {
+                        stroke.draw(rows, rect, &mut planes, &mut |index, opacity| {
+                            let values = [1.0, stroke.depth, stroke.diameter_mm];
+                            aovs.iter_mut().zip(values).for_each(|(plane, value)| plane.add(index, value, opacity));
+                        });
+                    }
                 }
             }
             if let Some((billboards, source)) = &self.billboards {

@@ -101,8 +101,12 @@ impl Billboards {
             .collect();
         let mut cards = lists.concat();
         cards.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-        let rows: Vec<[f32; 2]> = cards.iter().map(|card| card.rows).collect();
-        Self { cards, bands: Bands::new(picture.height, &rows), sheets }
+        let bands = {
+            let columns = [0.0, picture.width as f32];
+            let extents = cards.iter().map(|card: &Card| [columns, card.rows]);
+            Bands::new([picture.width, picture.height], picture.width.max(1), extents)
+        };
+        Self { cards, bands, sheets }
     }
 
     /// Drops that they show in the picture, on average.

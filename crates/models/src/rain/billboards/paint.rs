@@ -49,7 +49,8 @@ pub(crate) fn paint(
     aovs: &mut [AovPlane],
 ) {
     let mut scratch = Scratch::default();
-    for &index in brush.billboards.bands.members(band) {
+    let members = brush.billboards.bands.stretches(band, rows.x, rows.right()).flat_map(|(_, members)| members);
+    for &index in members {
         let card = &brush.billboards.cards[index as usize];
         let rect = card.rect.intersection(&rows);
         if rect.is_empty() || !brush.slice.contains(f64::from(card.depth)) {
