@@ -22,24 +22,23 @@ impl Bands {
     pub(crate) fn new(size: [usize; 2], width: usize, extents: impl Iterator<Item = Extent> + Clone) -> Self {
         let stretches = size[0].div_ceil(width);
         let count = size[1].div_ceil(BAND) * stretches;
-        let touched = |[columns, rows]: Extent| {
-            let columns = spans(columns, size[0], width);
-            spans(rows, size[1], BAND).flat_map(move |band| columns.clone().map(move |stretch| band * stretches + stretch))
+        let places = |[columns, rows]: Extent| Places {
+            bands: spans(rows, size[1], BAND),
+            columns: spans(columns, size[0], width),
+            stretches,
         };
         let mut starts = vec![0_u32; count + 1];
-        for place in extents.clone().flat_map(touched) {
-            starts[place + 1] += 1;
-        }
+        extents.clone().for_each(|extent| places(extent).each(|place| starts[place + 1] += 1));
         for place in 0..count {
             starts[place + 1] += starts[place];
         }
         let mut members = vec![0; starts[count] as usize];
         let mut next = starts.clone();
         for (index, extent) in extents.enumerate() {
-            for place in touched(extent) {
+            places(extent).each(|place| {
                 members[next[place] as usize] = index as u32;
                 next[place] += 1;
-            }
+            });
         }
         Self { width, stretches, starts, members }
     }
@@ -54,6 +53,24 @@ impl Bands {
             let columns = [stretch * self.width, (stretch + 1) * self.width];
             (start < end).then(|| (columns, &self.members[start as usize..end as usize]))
         })
+    }
+}
+
+/// The stretches that a thing touches.
+struct Places {
+    bands: std::ops::Range<usize>,
+    columns: std::ops::Range<usize>,
+    stretches: usize,
+}
+
+impl Places {
+    #[inline(always)]
+    fn each(self, mut visit: impl FnMut(usize)) {
+        for band in self.bands {
+            for column in self.columns.clone() {
+                visit(band * self.stretches + column);
+            }
+        }
     }
 }
 

@@ -95,45 +95,54 @@ impl Stroke {
         let along = self.along(axis);
         let (low, high) = (along.middle[axis] - along.half, along.middle[axis] + along.half);
         let [start, end] = [[rect.x, rect.y], [rect.right(), rect.bottom()]];
+        let lines = clip(low, start[axis], end[axis])..clip(high + 1.0, start[axis], end[axis]);
         let side = 1 - axis;
-        let scale = 1.0 / along.across;
-        for line in clip(low, start[axis], end[axis])..clip(high + 1.0, start[axis], end[axis]) {
-            let (from, to) = ((line as f32).max(low), (line as f32 + 1.0).min(high));
-            let amount = self.hidden * (0.5 / along.half) * (to - from);
-            let centre = along.lean.mul_add(0.5 * (from + to) - along.middle[axis], along.middle[side]);
-            let begin = clip(centre - along.across, start[side], end[side]);
-            let finish = clip(centre + along.across + 1.0, start[side], end[side]);
-            let across = Across { begin: begin as f32 - centre, count: (finish - begin) as f32, scale, amount };
-            if axis == 1 {
-                let first = (line - strip.y) * strip.width + begin - strip.x;
-                self.put_row(first, finish - begin, &across, planes, measure);
-            } else {
-                for place in begin..finish {
-                    let index = (place - strip.y) * strip.width + line - strip.x;
-                    let [opacity, ..] = across.opacities((place - begin) as f32);
-                    self.put::<1>(index, [opacity], planes, measure);
+        for first in lines.clone().step_by(LINES) {
+            let spans = along.spans(axis, self.hidden, first as f32, [start[side], end[side]]);
+            for (number, line) in (first..lines.end.min(first + LINES)).enumerate() {
+                let [begin, finish] = [spans.begin[number] as usize, spans.finish[number] as usize];
+                let across = Across {
+                    begin: spans.begin[number] - spans.centre[number],
+                    scale: spans.scale,
+                    amount: spans.amount[number],
+                };
+                if axis == 1 {
+                    let index = (line - strip.y) * strip.width + begin - strip.x;
+                    let room = end[0] - begin >= LANES;
+                    self.put_row(index, finish - begin, room, &across, planes, measure);
+                } else {
+                    for place in begin..finish {
+                        let index = (place - strip.y) * strip.width + line - strip.x;
+                        let [opacity, ..] = across.opacities((place - begin) as f32);
+                        self.put(index, [opacity], planes, measure);
+                    }
                 }
             }
         }
     }
 
-    /// Puts `count` pixels from `first` on behind what the planes hold. Beyond them opacity is zero.
+    /// Puts `count` pixels from `first` on behind what the planes hold; where there is `room` for a whole run, as one: no streak reaches
+    /// beyond its own pixels.
     #[inline(always)]
     fn put_row(
         &self,
         first: usize,
         count: usize,
+        room: bool,
         across: &Across,
         planes: &mut GrayPlanes,
         measure: &mut impl FnMut(usize, f32),
     ) {
+        if count <= LANES && room {
+            return self.put(first, across.opacities(0.0), planes, measure);
+        }
         for begin in (0..count).step_by(LANES) {
             let opacities = across.opacities(begin as f32);
-            if first + begin + LANES <= planes.transmittance.len() {
+            if count - begin >= LANES {
                 self.put(first + begin, opacities, planes, measure);
                 continue;
             }
-            for (number, opacity) in opacities[..LANES.min(count - begin)].iter().enumerate() {
+            for (number, opacity) in opacities[..count - begin].iter().enumerate() {
                 self.put(first + begin + number, [*opacity], planes, measure);
             }
         }
@@ -183,13 +192,47 @@ impl Stroke {
 
 /// Pixels that are put at a time: about as many as a row of a streak has.
 const LANES: usize = 4;
+/// Rows, or columns, of a streak of which the pixels are found at a time.
+const LINES: usize = 8;
+/// Places of pixels' ends beyond the beginning of the first.
+const ENDS: [f32; LINES] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
+
+/// What a streak covers of each of some lines across it.
+struct Spans {
+    /// First pixel, and one past the last.
+    begin: [f32; LINES],
+    finish: [f32; LINES],
+    /// The streak's middle, pixels.
+    centre: [f32; LINES],
+    /// The sum of all opacities.
+    amount: [f32; LINES],
+    /// One over half the streak's width.
+    scale: f32,
+}
+
+impl Along {
+    /// The lines from `first` on, cut to pixels `[start, end]`.
+    #[inline(always)]
+    fn spans(&self, axis: usize, hidden: f32, first: f32, [start, end]: [usize; 2]) -> Spans {
+        let (low, high) = (self.middle[axis] - self.half, self.middle[axis] + self.half);
+        let (start, end) = (start as f32, end as f32);
+        let density = hidden * (0.5 / self.half);
+        let (mut begin, mut finish, mut centre, mut amount) = ([0.0; LINES], [0.0; LINES], [0.0; LINES], [0.0; LINES]);
+        for line in 0..LINES {
+            let (from, to) = ((first + (ENDS[line] - 1.0)).max(low), (first + ENDS[line]).min(high));
+            amount[line] = density * (to - from);
+            centre[line] = self.lean.mul_add(0.5 * (from + to) - self.middle[axis], self.middle[1 - axis]);
+            begin[line] = (centre[line] - self.across).floor().max(start).min(end);
+            finish[line] = (centre[line] + self.across + 1.0).floor().max(begin[line]).min(end);
+        }
+        Spans { begin, finish, centre, amount, scale: 1.0 / self.across }
+    }
+}
 
 /// How opacity is spread over the pixels across a streak.
 struct Across {
     /// Where the first pixel begins, from the streak's middle, pixels.
     begin: f32,
-    /// How many pixels there are.
-    count: f32,
     /// One over half the streak's width.
     scale: f32,
     /// The sum of all opacities.
@@ -197,17 +240,15 @@ struct Across {
 }
 
 impl Across {
-    /// Opacities of the pixels from number `from` on, 0 beyond the last; they add up to the amount.
+    /// Opacities of the pixels from number `from` on; they add up to the amount.
     #[inline(always)]
     fn opacities(&self, from: f32) -> [f32; LANES] {
-        const EDGES: [f32; LANES] = [1.0, 2.0, 3.0, 4.0];
         let begin = self.begin + from;
         let mut opacities = [0.0; LANES];
         for lane in 0..LANES {
-            let before = disc_share((begin + EDGES[lane] - 1.0) * self.scale);
-            let after = disc_share((begin + EDGES[lane]) * self.scale);
-            let opacity = (self.amount * (after - before)).clamp(0.0, 1.0);
-            opacities[lane] = if from + EDGES[lane] <= self.count { opacity } else { 0.0 };
+            let before = disc_share((begin + (ENDS[lane] - 1.0)) * self.scale);
+            let after = disc_share((begin + ENDS[lane]) * self.scale);
+            opacities[lane] = (self.amount * (after - before)).clamp(0.0, 1.0);
         }
         opacities
     }
