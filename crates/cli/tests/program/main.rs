@@ -8,6 +8,7 @@ mod flipbook;
 mod interruptions;
 mod particles;
 mod pictures;
+mod rain;
 mod rooms;
 mod streaks;
 mod support;

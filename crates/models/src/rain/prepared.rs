@@ -3,7 +3,7 @@
 use bansho_base::{
     canvas::{DepthInterval, Strip, View},
     image::{Figure, Rect},
-    math::smoothstep,
+    math::DVec3,
     phenomenon::Prepared,
     surroundings::Surroundings,
 };
@@ -12,14 +12,16 @@ use rayon::prelude::*;
 
 use super::{
     Rain,
+    aovs::measure,
     bands::{BAND, Bands, Extent},
     billboards::{Billboards, Brush, paint},
     distribution::DropSizes,
     drops::{self, Near},
     extinction::{Losses, extinction, visibility},
     light::Lighting,
-    moment::Moment,
+    moment::{Ball, Moment},
     parameters::Method,
+    singles::{NEAREST, NEAREST_TO_LAMP, Singles},
     source::{SourceField, sky_through_drops},
     splashes::Splashes,
     stroke::Stroke,
@@ -27,8 +29,6 @@ use super::{
     veil::Veil,
 };
 
-/// Distances between which billboards take over from single drops, m: a cubic metre that is nearer cannot be seen as flat.
-const TAKE_OVER: [f64; 2] = [1.0, 1.2];
 /// Light below this share of display white is left out: with a hundred streaks over each other it still is below a 255th.
 const LEAST_SHARE: f64 = 1.0 / (255.0 * 128.0);
 
@@ -64,16 +64,18 @@ impl<'a> PreparedRain<'a> {
         let moment = Moment::new(rain, view, surroundings);
         let extinctions = rain.extinctions(view.shutter.middle());
         let lights = &surroundings.others.lights;
-        let lighting = Lighting { scattering: &rain.scattering, lights, extinction: extinctions[0] };
+        let lighting = Lighting { scattering: &rain.scattering, lights, extinction: extinctions[0], nearest: 0.0 };
         let tiles = Tiles::new(view, COARSE);
         let sky = sky_through_drops(&rain.lens, &tiles, &surroundings.sky);
         let frame = Frame { rain, moment: &moment, lighting: &lighting, tiles: &tiles, sky: &sky, view };
+        let eye = moment.sight.middle().position;
+        let nearness = |point: DVec3| moment.nearness((point - eye).length());
         let (strokes, billboards) = match rain.parameters.method {
-            Method::Drops => (frame.strokes(1.1 * moment.distance, &|away| moment.nearness(away)), None),
+            Method::Drops => (frame.strokes(&[moment.around_camera(1.1 * moment.distance)], &nearness), None),
             Method::Billboards => {
-                let near = |away: f64| 1.0 - smoothstep(TAKE_OVER[0], TAKE_OVER[1], away);
-                let strokes = frame.strokes(TAKE_OVER[1], &|away| moment.nearness(away) * near(away));
-                (strokes, Some(frame.billboards(&|away| moment.nearness(away) * (1.0 - near(away)))))
+                let singles = Singles::new(&moment, lights);
+                let strokes = frame.strokes(singles.balls(), &|point| nearness(point) * singles.share(point));
+                (strokes, Some(frame.billboards(&|point| nearness(point) * (1.0 - singles.share(point)))))
             }
         };
         let mut strokes = strokes;
@@ -106,14 +108,8 @@ impl<'a> Frame<'a> {
         self.sky.iter().flatten().any(|value| *value > 0.0).then_some((self.tiles, self.sky))
     }
 
-    fn strokes(&self, distance: f64, weight: &(dyn Fn(f64) -> f64 + Sync)) -> Vec<Stroke> {
-        drops::strokes(&Near {
-            moment: self.moment,
-            lighting: self.lighting,
-            sky: self.shining_sky(),
-            distance,
-            weight,
-        })
+    fn strokes(&self, within: &[Ball], weight: &(dyn Fn(DVec3) -> f64 + Sync)) -> Vec<Stroke> {
+        drops::strokes(&Near { moment: self.moment, lighting: self.lighting, sky: self.shining_sky(), within, weight })
     }
 
     fn splashes(&self) -> Vec<Stroke> {
@@ -128,13 +124,14 @@ impl<'a> Frame<'a> {
         splashes.strokes()
     }
 
-    fn billboards(&self, weight: &(dyn Fn(f64) -> f64 + Sync)) -> (Billboards, SourceField) {
-        let distance = 1.1 * self.moment.distance;
+    fn billboards(&self, weight: &(dyn Fn(DVec3) -> f64 + Sync)) -> (Billboards, SourceField) {
+        let within = self.moment.around_camera(1.1 * self.moment.distance);
         let picture = Rect::of_size(self.view.size[0], self.view.size[1]);
         let sheets = self.rain.sheets.sheets(self.moment);
-        let billboards = Billboards::new(self.moment, sheets, picture, distance, weight);
-        let eye = self.moment.sight.middle().position;
-        let source = SourceField::new(self.lighting, self.tiles, self.sky, eye, [TAKE_OVER[0], distance]);
+        let billboards = Billboards::new(self.moment, sheets, picture, within, weight);
+        // What is nearer to a lamp is not on billboards; a light that grows on would be seen between the corners of tiles.
+        let lighting = Lighting { nearest: NEAREST_TO_LAMP, ..*self.lighting };
+        let source = SourceField::new(&lighting, self.tiles, self.sky, within.centre, [NEAREST, within.radius]);
         (billboards, source)
     }
 }
@@ -195,8 +192,7 @@ impl PreparedRain<'_> {
                         stroke.draw(rows, rect, &mut planes, &mut |_, _| {});
                     } else {
                         stroke.draw(rows, rect, &mut planes, &mut |index, opacity| {
-                            let values = [1.0, stroke.depth, stroke.diameter_mm];
-                            aovs.iter_mut().zip(values).for_each(|(plane, value)| plane.add(index, value, opacity));
+                            measure(&mut aovs, index, opacity, stroke.depth, stroke.diameter_mm);
                         });
                     }
                 }
