@@ -202,9 +202,9 @@ mod tests {
         cells.sort_by(|a, b| a.0.total_cmp(&b.0));
         assert_eq!(cells, [(0.25, 1.0), (49.75, 3.0)]);
         let (places, values) = map.to_lists();
-        assert_eq!(map.from_lists(&places, &values), Some(map.clone()));
-        assert_eq!(map.from_lists(&places[..1], &values), None);
-        assert_eq!(map.from_lists(&[places[0], places[0]], &values), None);
-        assert_eq!(map.from_lists(&[u32::MAX, places[1]], &values), None);
+        assert_eq!(map.with_lists(&places, &values), Some(map.clone()));
+        assert_eq!(map.with_lists(&places[..1], &values), None);
+        assert_eq!(map.with_lists(&[places[0], places[0]], &values), None);
+        assert_eq!(map.with_lists(&[u32::MAX, places[1]], &values), None);
     }
 }

@@ -146,5 +146,5 @@ fn read_particles(source: &mut Source) -> Result<AuroraParticles, SnapshotError>
 
 fn read_map(source: &mut Source, like: &GlowMap) -> Result<GlowMap, SnapshotError> {
     let (places, values) = (source.list::<u32>()?, source.list::<f32>()?);
-    like.from_lists(&places, &values).ok_or(SnapshotError::Damaged)
+    like.with_lists(&places, &values).ok_or(SnapshotError::Damaged)
 }
