@@ -3,12 +3,12 @@
 //! Lines of a uniform field are parallel, so that from one place each is seen on a meridian of the sky about the magnetic zenith, the
 //! point to which all of them converge: its longitude never changes along the line. Everything here rests on that.
 
-use bansho_base::math::{self, DVec3, lanes};
+use bansho_base::math::{self, DVec2, DVec3, lanes};
 
 /// Radius of the Earth, km.
-pub(super) const EARTH_RADIUS_KM: f64 = 6371.0;
+pub(in crate::aurora) const EARTH_RADIUS_KM: f64 = 6371.0;
 /// Altitude of the plane on which feet are drawn, km.
-const FOOT_KM: f64 = 100.0;
+pub(in crate::aurora) const FOOT_KM: f64 = 100.0;
 /// Least dip that is drawn, degrees: nearer the magnetic equator there are no auroras, and field lines would not reach the ground.
 const LEAST_DIP_DEG: f64 = 30.0;
 
@@ -67,6 +67,18 @@ impl FieldLines {
             across: [dot(self.across[0], place), dot(self.across[1], place)],
             upright: dot(self.along, up).max(0.05),
         }
+    }
+
+    /// The place of the drawn plane, km east and south, that is seen in a direction; none where it is not seen.
+    pub(super) fn drawn(&self, direction: DVec3) -> Option<DVec2> {
+        const SHELL: f64 = EARTH_RADIUS_KM + FOOT_KM;
+        let direction = direction.normalize();
+        let nearest = -self.observer.dot(direction);
+        let squared = nearest * nearest + SHELL * SHELL - self.observer.length_squared();
+        let place = self.observer + direction * (nearest + math::sqrt(squared.max(0.0)));
+        let level = DVec2::new(place.x, place.z);
+        let distance = SHELL * math::atan2(level.length(), place.y);
+        (squared >= 0.0).then(|| level.normalize_or_zero() * distance)
     }
 
     /// The lines through the half-plane of a longitude, given by its cosine and sine.
@@ -180,6 +192,20 @@ mod tests {
             let found = altitude((place as f32).mul_add(place as f32 + linear, constant));
             assert!((found - 100.0).abs() < 0.01, "{found}");
         }
+    }
+
+    #[test]
+    fn a_drawn_place_is_seen_where_it_is() {
+        let field = FieldLines::new(77.0, 5.0, DVec3::new(20e3, 1.7, -300e3));
+        let radius = EARTH_RADIUS_KM + FOOT_KM;
+        for place in [DVec2::ZERO, DVec2::new(120.0, -80.0), DVec2::new(-300.0, -700.0)] {
+            let (sin, cos) = math::sin_cos(place.length() / radius);
+            let level = place.normalize_or_zero() * sin;
+            let direction = DVec3::new(level.x, cos, level.y) * radius - field.observer;
+            assert!((field.drawn(direction).unwrap() - place).length() < 1e-6);
+        }
+        // From above the shell and looking away.
+        assert_eq!(FieldLines::new(77.0, 0.0, DVec3::Y * 2e5).drawn(DVec3::X), None);
     }
 
     #[test]

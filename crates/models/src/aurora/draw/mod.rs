@@ -6,10 +6,12 @@
 //! the chart (`prepared`) and dimmed and coloured by the air below (`shading`). The cost grows with pixels and particles, not with shapes.
 
 mod chart;
+mod cloud;
 mod collisions;
 mod footprint;
 mod geometry;
 mod lighting;
+mod maps;
 mod meridians;
 mod parameters;
 mod phenomenon;

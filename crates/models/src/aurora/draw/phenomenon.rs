@@ -7,14 +7,17 @@ use bansho_base::{
     math::DVec3,
     observer::{Cancelled, Observer},
     phenomenon::{Phenomenon, Prepared, SnapshotError, Stepping},
+    point_cloud::PointCloud,
     random::Key,
     surroundings::{Publication, Surroundings},
 };
 
 use super::{
     Sampling,
+    cloud::point_cloud,
     collisions::Collisions,
     geometry::FieldLines,
+    maps::MAPS,
     prepared::{DEPTHS, PreparedAurora},
     profile::Profiles,
     shading::Shading,
@@ -112,7 +115,7 @@ const fn brightness(name: &'static str, doc: &'static str) -> AovDescriptor {
 /// Which of the [`LINES`](crate::aurora::light::LINES) the AOVs measure.
 pub(super) const MEASURED: [usize; 5] = [0, 1, 4, 3, 6];
 
-/// What an aurora can write beside its light, in the order of [`MEASURED`].
+/// What an aurora can write beside its light, in the order of [`MEASURED`] and then of [`MAPS`].
 const AOVS: &[AovDescriptor] = &[
     brightness(
         "kilorayleigh_557",
@@ -125,6 +128,10 @@ const AOVS: &[AovDescriptor] = &[
     brightness("kilorayleigh_427", "Brightness of the band of N2+ at 427.8 nm, above the air; 0 where there is none."),
     brightness("kilorayleigh_391", "Brightness of the band of N2+ at 391.4 nm, above the air; 0 where there is none."),
     brightness("kilorayleigh_670", "Brightness of the band of N2 at 670.5 nm, above the air; 0 where there is none."),
+    MAPS[0],
+    MAPS[1],
+    MAPS[2],
+    MAPS[3],
 ];
 
 impl Phenomenon for Aurora {
@@ -157,6 +164,10 @@ impl Phenomenon for Aurora {
 
     fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError> {
         self.simulation.restore(state)
+    }
+
+    fn particles(&self, t: f64) -> Option<PointCloud> {
+        Some(point_cloud(self.simulation.particles(), t - self.simulation.time()))
     }
 
     fn publish(&self, shutter: Shutter) -> Publication {

@@ -1,5 +1,7 @@
 //! One frame of an aurora: from its chart to pixels.
 
+use std::sync::OnceLock;
+
 use bansho_base::{
     camera::Camera,
     canvas::{DepthInterval, Strip, View},
@@ -15,7 +17,9 @@ use super::{
     chart::{Chart, Coverage},
     footprint::{Footprint, REACH},
     geometry::{EARTH_RADIUS_KM, FieldLines},
+    maps::Maps,
     meridians::{Meridians, Sampler},
+    phenomenon::MEASURED,
     sources::Sources,
 };
 use crate::aurora::{
@@ -47,6 +51,8 @@ pub(super) struct PreparedAurora<'a> {
     field: FieldLines,
     /// Chart of the sharp light, and a coarser one of what is soft.
     charts: [Meridians; 2],
+    /// Made where they are asked for.
+    maps: OnceLock<Maps<'a>>,
 }
 
 impl<'a> PreparedAurora<'a> {
@@ -73,7 +79,15 @@ impl<'a> PreparedAurora<'a> {
         let sharp = draw(&sources.sharp, sharp, [pixel, row]);
         check(observer)?;
         let soft = draw(&sources.soft, soft, [coarse, coarse]);
-        Ok(Self { aurora, view, level: Level::new(), cameras: cameras(view), field, charts: [sharp, soft] })
+        Ok(Self {
+            aurora,
+            view,
+            level: Level::new(),
+            cameras: cameras(view),
+            field,
+            charts: [sharp, soft],
+            maps: OnceLock::new(),
+        })
     }
 }
 
@@ -173,13 +187,7 @@ impl PreparedAurora<'_> {
     }
 
     #[inline(always)]
-    fn batch(
-        &self,
-        samplers: &[Sampler; 2],
-        slice: &DepthInterval,
-        strip: &mut Strip,
-        [x, y]: [usize; 2],
-    ) {
+    fn batch(&self, samplers: &[Sampler; 2], slice: &DepthInterval, strip: &mut Strip, [x, y]: [usize; 2]) {
         let rect = strip.rect;
         let inside = rect.x.max(x) - x..rect.right().min(x + BATCH) - x;
         let share = 1.0 / self.cameras.len() as f32;
@@ -201,11 +209,24 @@ impl PreparedAurora<'_> {
                 let brightness = light[0] + light[1] + light[2];
                 let seen = if brightness > FAINTEST * share { depth } else { f32::INFINITY };
                 strip.emit(index, self.aurora.shading.colour(&light, batch.sine[i]), seen);
-                for (plane, line) in strip.aovs.iter_mut().zip(super::phenomenon::MEASURED) {
+                for (plane, line) in strip.aovs.iter_mut().zip(MEASURED) {
                     let line = &LINES[line];
                     plane.add(index, light[line.emitter.index()] * line.photons as f32, 1.0);
                 }
+                if !strip.aovs.is_empty() {
+                    self.map(strip, index, camera.direction(DVec2::new((x + i) as f64 + 0.5, y as f64 + 0.5)), share);
+                }
             }
+        }
+    }
+
+    /// Adds what the cells in a direction hold.
+    #[inline(never)]
+    fn map(&self, strip: &mut Strip, index: usize, direction: Option<DVec3>, share: f32) {
+        let maps = self.maps.get_or_init(|| Maps::new(&self.aurora.simulation));
+        let Some(place) = direction.and_then(|direction| self.field.drawn(direction)) else { return };
+        for (plane, value) in strip.aovs.iter_mut().skip(MEASURED.len()).zip(maps.at(place)) {
+            plane.add(index, value, share);
         }
     }
 

@@ -105,6 +105,15 @@ impl Course {
         self.shape.sheets.iter().map(|sheet| length(&sheet.points)).collect()
     }
 
+    /// The place at a share of a sheet's length, km.
+    pub(super) fn place(&self, sheet: usize, share: f64) -> DVec2 {
+        let (points, shares) = (&self.shape.sheets[sheet].points, &self.shares[sheet]);
+        let after = shares.partition_point(|end| *end <= share).clamp(1, shares.len() - 1);
+        let [before, end] = [shares[after - 1], shares[after]];
+        let part = (share - before) / (end - before).max(f64::MIN_POSITIVE);
+        points[after - 1].lerp(points[after], part.clamp(0.0, 1.0))
+    }
+
     /// Each piece of the sheets in turn: its sheet, the share of the sheet's length before its middle, the flux factor there, its length in km.
     pub(super) fn pieces(&self) -> impl Iterator<Item = (usize, f64, f64, f64)> + '_ {
         self.starts.iter().map(|start| {

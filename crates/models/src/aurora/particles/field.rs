@@ -4,13 +4,14 @@
 //! is natural here is the cell and the frame, as the constants say.
 
 use bansho_base::{
+    math::{self, DVec2},
     noise::{Coordinate, Fractal, Noise},
     parameters::Auto,
     random::{Key, Purpose},
 };
 use fearless_simd::Level;
 
-use super::scatter::Charge;
+use super::{conductor::LineCharge, course::Course, scatter::Scattered};
 use crate::{
     aurora::{AuroraParameters, FieldSolver, shapes::FRAME_S},
     field::{Grid2, PoissonSolver, relax},
@@ -18,6 +19,8 @@ use crate::{
 
 /// Screening length l unless a scene says otherwise, cells: particles are drawn in from a few cells, strays beyond can die.
 const REACH_CELLS: f64 = 4.0;
+/// How often the charge along the sheets is made better.
+const ADJUSTMENTS: usize = 4;
 /// Field at the edge of a sheet at a pull of 1, cells per frame^2.
 const EDGE_FIELD: f64 = 0.25;
 
@@ -81,35 +84,46 @@ impl FieldMaker {
     }
 
     /// The field of particles scattered about a shape, with the noise of a time.
-    pub(super) fn make(&self, scattered: &[Charge], time: f64) -> Field {
-        let counts = self.sum(scattered, |particle| f64::from(u8::from(particle.counted)));
-        let source = self.source(&counts, self.sum(scattered, |particle| particle.charge));
-        let potential = self.potential(source);
+    pub(super) fn make(&self, course: &Course, scattered: &[Scattered], time: f64) -> Field {
+        let counts = self.sum(scattered.iter().map(|particle| (particle.place, 1.0)));
+        let source = self.source(course, scattered, &counts);
+        let potential = match self.parameters.field.solver {
+            FieldSolver::SineTransform => self.solved(source),
+            FieldSolver::GaussSeidel => self.relaxed(&source),
+        };
         let table = self.table(&potential, time);
         Field { counts, potential, table }
     }
 
-    /// Sum of a value over the particles in each cell.
-    pub(super) fn sum(&self, scattered: &[Charge], value: impl Fn(&Charge) -> f64) -> Grid2 {
+    /// Sum of values at places over those in each cell.
+    pub(super) fn sum(&self, values: impl Iterator<Item = (DVec2, f64)>) -> Grid2 {
         let mut sums = self.grid();
         let columns = sums.size()[0];
-        for particle in scattered {
-            if let Some([column, row]) = sums.cell(particle.place.to_array()) {
-                sums.values_mut()[row * columns + column] += value(particle);
+        for (place, value) in values {
+            if let Some([column, row]) = sums.cell(place.to_array()) {
+                sums.values_mut()[row * columns + column] += value;
             }
         }
         sums
     }
 
-    /// Charge density over eps, eq. (2.2), from the charge in each cell. It is such that all sheets pull alike, however many particles
-    /// stand for them.
-    pub(super) fn source(&self, counts: &Grid2, mut charges: Grid2) -> Grid2 {
-        let full = full_count(counts);
-        if full > 0.0 {
-            let charge = self.edge_field() / self.parameters.half_thickness_km() / full;
-            charges.values_mut().iter_mut().for_each(|value| *value *= charge);
+    /// Charge density over eps, eq. (2.2): such that all sheets pull alike, however many particles stand for them, and are at one
+    /// potential all along.
+    pub(super) fn source(&self, course: &Course, scattered: &[Scattered], counts: &Grid2) -> Grid2 {
+        let half_thickness = self.parameters.half_thickness_km();
+        let density = self.edge_field() / half_thickness;
+        let unit = density / full_count(counts).max(1.0);
+        // In the middle of a long, straight, lone sheet.
+        let reach = self.reach_km();
+        let wanted = density * reach * reach * (math::exp(-half_thickness / reach) - 1.0);
+        let mut charge = LineCharge::even(course, self.parameters.cell_km());
+        let source = |charge: &LineCharge| {
+            self.sum(scattered.iter().map(|particle| (particle.place, unit * charge.of(particle))))
+        };
+        for _ in 0..ADJUSTMENTS {
+            charge.adjust(course, &self.solved(source(&charge)), wanted);
         }
-        charges
+        source(&charge)
     }
 
     /// Field at the edge of a sheet, km/s^2.
@@ -118,11 +132,8 @@ impl FieldMaker {
     }
 
     /// `laplacian(phi) - phi / l^2 = rho`, phi = 0 around the grid; negative, lowest on the shape.
-    fn potential(&self, mut source: Grid2) -> Grid2 {
-        match self.parameters.field.solver {
-            FieldSolver::SineTransform => self.solver.solve(&mut source),
-            FieldSolver::GaussSeidel => source = self.relaxed(&source),
-        }
+    fn solved(&self, mut source: Grid2) -> Grid2 {
+        self.solver.solve(&mut source);
         source
     }
 

@@ -4,6 +4,7 @@
 //! shape is renewed some are born where they are missing and die where they are strays.
 
 mod along;
+mod conductor;
 mod course;
 mod field;
 mod motion;

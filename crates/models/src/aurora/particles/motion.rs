@@ -68,13 +68,14 @@ impl Repulsion {
     /// Sorts the particles and finds how they push each other, eqs. (2.11) to (2.18); `rest_density` per km^2 is delta_0. Gives the
     /// support radius for the next step, km.
     pub(super) fn find(&mut self, particles: &mut AuroraParticles, support_km: f64, rest_density: f64) -> f64 {
-        if self.cells.support_radius() != support_km as f32 {
-            self.cells = Cells::new(support_km as f32);
-        }
+        self.cells.set_support_radius(support_km as f32);
         particles.sort(&mut self.cells);
         self.masses.clear();
         self.masses.extend(particles.fades.iter().map(|fade| fade.mul_add(1.0 - LEAST_MASS, LEAST_MASS)));
         densities(&self.cells, self.density_kernel, &self.masses, &mut self.densities);
+        // To itself a particle is all there: one that is just appearing would be next to weightless, and be flung away.
+        let whole = self.density_kernel.at_centre::<2>(self.cells.support_radius());
+        self.densities.iter_mut().zip(&self.masses).for_each(|(density, mass)| *density += (1.0 - mass) * whole);
         let state = StateEquation { rest_density: rest_density as f32, tension: true };
         let stiffness = self.stiffness;
         self.pressures.clear();

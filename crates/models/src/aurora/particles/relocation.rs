@@ -15,7 +15,7 @@ use crate::aurora::{AuroraParameters, RelocationParameters};
 const BIRTH: Purpose = Purpose::named("aurora birth");
 const THINNING: Purpose = Purpose::named("aurora thinning");
 /// The counts of table 3.3 are taken as those of a near cell that holds this many particles on average.
-const TABLE_COUNT: f64 = 100.0;
+const TABLE_COUNT: f64 = 75.0;
 /// Share of surplus particles that one renewal takes away.
 const THINNED: f64 = 0.4;
 
@@ -45,17 +45,6 @@ impl Relocation {
         }
     }
 
-    /// Cells that are near the shape: their scatter count is high and their potential low enough, beside the means over all cells.
-    pub(super) fn near(&self, field: &Field) -> Vec<bool> {
-        let (counts, potential) = (field.counts.values(), field.potential.values());
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-        let least = self.parameters.count * mean(counts);
-        let greatest = self.parameters.potential * mean(potential);
-        // An empty shape has no near cells, whatever the shares.
-        let near = |(count, potential): (&f64, &f64)| *count > 0.0 && *count >= least && *potential <= greatest;
-        counts.iter().zip(potential).map(near).collect()
-    }
-
     /// Lets strays and the surplus die and fills what is thin, by the shape and field from before the renewal.
     pub(super) fn relocate(
         &self,
@@ -65,7 +54,7 @@ impl Relocation {
         renewal: u32,
         next_id: &mut u64,
     ) {
-        let near = self.near(field);
+        let near = near_cells(field, &self.parameters);
         let shares = self.shares(field, &near);
         let scale = self.scale(&shares);
         let homes: Vec<Option<usize>> = (0..particles.len()).map(|i| home(particles, field, i)).collect();
@@ -158,6 +147,16 @@ impl Relocation {
             }
         }
     }
+}
+
+/// Cells that are near the shape: their scatter count is high and their potential low enough, beside the means over all cells.
+pub(super) fn near_cells(field: &Field, table: &RelocationParameters) -> Vec<bool> {
+    let (counts, potential) = (field.counts.values(), field.potential.values());
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let (least, greatest) = (table.count * mean(counts), table.potential * mean(potential));
+    // An empty shape has no near cells, whatever the shares.
+    let near = |(count, potential): (&f64, &f64)| *count > 0.0 && *count >= least && *potential <= greatest;
+    counts.iter().zip(potential).map(near).collect()
 }
 
 /// The cell that a particle is in.

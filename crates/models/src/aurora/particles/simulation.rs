@@ -1,6 +1,6 @@
 //! The simulation: what it is made of and what a step does.
 
-use bansho_base::{phenomenon::SnapshotError, random::Key};
+use bansho_base::{math::DVec2, phenomenon::SnapshotError, random::Key};
 
 use super::{
     AuroraParticles,
@@ -9,8 +9,8 @@ use super::{
     field::{Field, FieldMaker},
     motion::{Mover, Repulsion},
     precipitation::Precipitation,
-    relocation::Relocation,
-    scatter::scatter,
+    relocation::{Relocation, near_cells},
+    scatter::{Scattered, scatter},
     snapshot,
 };
 use crate::{
@@ -30,12 +30,8 @@ const REACH: f64 = 3.0;
 /// An aurora's particles, afterglow and field, stepped by frames of 1/30 s.
 #[derive(Clone, Debug)]
 pub struct AuroraSimulation {
-    key: Key,
-    parameters: AuroraParameters,
-    sequence: Sequence,
     emission: Emission,
-    folding: Folding,
-    fields: FieldMaker,
+    making: Making,
     relocation: Relocation,
     repulsion: Repulsion,
     mover: Mover,
@@ -43,6 +39,16 @@ pub struct AuroraSimulation {
     state: State,
     /// The in-between shape that the particles are drawn to, and what follows from it alone.
     target: Target,
+}
+
+/// What in-between shapes are made from.
+#[derive(Clone, Debug)]
+struct Making {
+    key: Key,
+    parameters: AuroraParameters,
+    sequence: Sequence,
+    folding: Folding,
+    fields: FieldMaker,
 }
 
 /// What a step changes.
@@ -71,6 +77,26 @@ struct Target {
     rest_density: f64,
 }
 
+impl Making {
+    /// The course of the shape at a time, by the coordinate along it.
+    fn course(&self, along: &Along, time: f64) -> Course {
+        let reach = REACH * self.parameters.half_thickness_km();
+        Course::new(&self.sequence.at(time), along, &self.folding, time, reach)
+    }
+
+    /// The target that a state speaks of, and the particles that were scattered about it.
+    fn target(&self, state: &State) -> (Target, Vec<Scattered>) {
+        let course = self.course(&state.target_along, state.target_time);
+        let count = self.parameters.particles.count as usize;
+        let scattered = scatter(&course, self.parameters.half_thickness_km(), count, self.key, state.renewals);
+        let field = self.fields.make(&course, &scattered, state.target_time);
+        let near = near_cells(&field, &self.parameters.particles.relocation);
+        let near = near.into_iter().filter(|near| *near).count().max(1) as f64;
+        let cell = self.parameters.cell_km();
+        (Target { course, field, rest_density: count as f64 / (near * cell * cell) }, scattered)
+    }
+}
+
 impl AuroraSimulation {
     /// Length of a step, s.
     pub const STEP_S: f64 = FRAME_S;
@@ -81,9 +107,9 @@ impl AuroraSimulation {
         let key = Key::new(seed, name);
         let time = -parameters.preroll_s;
         let along = Along::begin(&sequence.at(time));
-        let fields = FieldMaker::new(&parameters, key);
-        let folding = Folding::new(&parameters, key);
-        let state = State {
+        let repulsion = Repulsion::new(&parameters);
+        let precipitation = Precipitation::new(&parameters, key);
+        let mut state = State {
             steps: 0,
             next_id: 0,
             support_km: parameters.cell_km(),
@@ -94,68 +120,27 @@ impl AuroraSimulation {
             particles: AuroraParticles::default(),
             afterglow: Afterglow::new(parameters.extent_km, parameters.cell_km()),
         };
-        let target = Target {
-            course: Course::new(
-                &sequence.at(time),
-                &state.along,
-                &folding,
-                time,
-                REACH * parameters.half_thickness_km(),
-            ),
-            field: fields.make(&[], time),
-            rest_density: 0.0,
-        };
-        let mut simulation = Self {
+        let (folding, fields) = (Folding::new(&parameters, key), FieldMaker::new(&parameters, key));
+        let making = Making { key, parameters, sequence, folding, fields };
+        let (target, scattered) = making.target(&state);
+        for (id, particle) in scattered.iter().enumerate() {
+            state.particles.push(id as u64, particle.place, [0.0; 2], 1.0);
+        }
+        state.next_id = scattered.len() as u64;
+        state.support_km = repulsion.support_km(target.rest_density);
+        precipitation.share_out(&mut state.particles, &target.course, time);
+        state.afterglow.settle(&state.particles);
+        let parameters = &making.parameters;
+        Self {
             emission: Emission::new(atmosphere(), parameters.spectrum.spectrum()),
-            relocation: Relocation::new(&parameters, key),
-            repulsion: Repulsion::new(&parameters),
-            mover: Mover::new(&parameters),
-            precipitation: Precipitation::new(&parameters, key),
-            key,
-            parameters,
-            sequence,
-            folding,
-            fields,
+            relocation: Relocation::new(parameters, key),
+            mover: Mover::new(parameters),
+            repulsion,
+            precipitation,
+            making,
             state,
             target,
-        };
-        simulation.begin();
-        simulation
-    }
-
-    fn begin(&mut self) {
-        self.make_target();
-        let course = &self.target.course;
-        let count = self.parameters.particles.count as usize;
-        let state = &mut self.state;
-        let sizes = [self.parameters.half_thickness_km(), self.fields.reach_km()];
-        let places = scatter(course, sizes, count, self.key, state.renewals);
-        for charge in places.into_iter().filter(|charge| charge.counted) {
-            state.particles.push(state.next_id, charge.place, [0.0; 2], 1.0);
-            state.next_id += 1;
         }
-        state.support_km = self.repulsion.support_km(self.target.rest_density);
-        self.precipitation.share_out(&mut state.particles, course, state.target_time);
-        state.afterglow.settle(&state.particles);
-    }
-
-    /// The course of the shape at a time, by the coordinate along it.
-    fn course(&self, along: &Along, time: f64) -> Course {
-        let reach = REACH * self.parameters.half_thickness_km();
-        Course::new(&self.sequence.at(time), along, &self.folding, time, reach)
-    }
-
-    /// Makes the target that the state speaks of.
-    fn make_target(&mut self) {
-        let state = &self.state;
-        let course = self.course(&state.target_along, state.target_time);
-        let count = self.parameters.particles.count as usize;
-        let half = self.parameters.half_thickness_km();
-        let scattered = scatter(&course, [half, self.fields.reach_km()], count, self.key, state.renewals);
-        let field = self.fields.make(&scattered, state.target_time);
-        let near = self.relocation.near(&field).iter().filter(|near| **near).count().max(1) as f64;
-        let cell = self.parameters.cell_km();
-        self.target = Target { course, field, rest_density: count as f64 / (near * cell * cell) };
     }
 
     /// Renews the in-between shape: births and deaths by the one before, then the field of the new one. It is the shape of the
@@ -170,20 +155,20 @@ impl AuroraSimulation {
             &mut state.next_id,
         );
         state.renewals += 1;
-        state.target_time = (state.steps + frames) as f64 * Self::STEP_S - self.parameters.preroll_s;
-        state.target_along = state.along.follow(&self.sequence.at(state.target_time));
-        self.make_target();
+        state.target_time = (state.steps + frames) as f64 * Self::STEP_S - self.making.parameters.preroll_s;
+        state.target_along = state.along.follow(&self.making.sequence.at(state.target_time));
+        self.target = self.making.target(&self.state).0;
     }
 
     /// Time of the state, s.
     #[must_use]
     pub fn time(&self) -> f64 {
-        self.state.steps as f64 * Self::STEP_S - self.parameters.preroll_s
+        self.state.steps as f64 * Self::STEP_S - self.making.parameters.preroll_s
     }
 
     /// Steps to [`Self::STEP_S`] later.
     pub fn step(&mut self) {
-        let frames = self.parameters.motion.renew_frames.round().max(1.0) as u64;
+        let frames = self.making.parameters.motion.renew_frames.round().max(1.0) as u64;
         if self.state.steps.is_multiple_of(frames) {
             self.renew(frames);
         }
@@ -191,12 +176,12 @@ impl AuroraSimulation {
         self.fade();
         self.state.steps += 1;
         let time = self.time();
-        self.state.along = self.state.along.follow(&self.sequence.at(time));
+        self.state.along = self.state.along.follow(&self.making.sequence.at(time));
         self.state.along.relax(Self::STEP_S);
-        let course = self.course(&self.state.along, time);
+        let course = self.making.course(&self.state.along, time);
         let state = &mut self.state;
         self.precipitation.share_out(&mut state.particles, &course, time);
-        state.afterglow.step(&state.particles, &self.emission, self.parameters.energy_ev.at(time), Self::STEP_S);
+        state.afterglow.step(&state.particles, &self.emission, self.making.parameters.energy_ev.at(time), Self::STEP_S);
     }
 
     /// Forces and motion.
@@ -209,7 +194,7 @@ impl AuroraSimulation {
     /// Particles appear and vanish; those that have vanished are gone.
     fn fade(&mut self) {
         let particles = &mut self.state.particles;
-        let fade_s = self.parameters.particles.fade_s;
+        let fade_s = self.making.parameters.particles.fade_s;
         let step = if fade_s > 0.0 { (Self::STEP_S / fade_s) as f32 } else { 1.0 };
         for (fade, dying) in particles.fades.iter_mut().zip(&particles.dying) {
             *fade = if *dying { *fade - step } else { (*fade + step).min(1.0) };
@@ -233,21 +218,21 @@ impl AuroraSimulation {
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
         let state = snapshot::read(bytes, &self.state)?;
         let points =
-            |time: f64| self.sequence.at(time).sheets.iter().map(|sheet| sheet.points.len()).collect::<Vec<_>>();
+            |time: f64| self.making.sequence.at(time).sheets.iter().map(|sheet| sheet.points.len()).collect::<Vec<_>>();
         let counts = |along: &Along| along.points.iter().map(Vec::len).collect::<Vec<_>>();
-        let time = state.steps as f64 * Self::STEP_S - self.parameters.preroll_s;
+        let time = state.steps as f64 * Self::STEP_S - self.making.parameters.preroll_s;
         if counts(&state.target_along) != points(state.target_time) || counts(&state.along) != points(time) {
             return Err(SnapshotError::Damaged);
         }
         self.state = state;
-        self.make_target();
+        self.target = self.making.target(&self.state).0;
         Ok(())
     }
 
     /// Its parameters.
     #[must_use]
     pub fn parameters(&self) -> &AuroraParameters {
-        &self.parameters
+        &self.making.parameters
     }
 
     /// Light by energy and altitude for its spectrum.
@@ -279,5 +264,19 @@ impl AuroraSimulation {
     #[must_use]
     pub fn scatter_counts(&self) -> &Grid2 {
         &self.target.field.counts
+    }
+
+    /// What noise adds to the potential at a place, km^2/s^2 (thesis, figure 2.11).
+    #[must_use]
+    pub fn potential_noise(&self, place: DVec2) -> f64 {
+        let noisy = self.target.field.sample(place.x as f32, place.y as f32).potential;
+        f64::from(noisy) - self.potential().sample(place.to_array())
+    }
+
+    /// How many particles are in each cell now (thesis, figure 2.14).
+    #[must_use]
+    pub fn particle_counts(&self) -> Grid2 {
+        let particles = self.particles();
+        self.making.fields.sum((0..particles.len()).map(|index| (particles.place(index), 1.0)))
     }
 }
