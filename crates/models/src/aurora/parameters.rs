@@ -68,7 +68,7 @@ bansho_base::parameters! {
         sweeps: i64 = 200, limits(Range::new(1.0, 2000.0));
         /// Greatest change at which Gauss-Seidel sweeps stop, as a share of the potential of a sheet.
         tolerance: f64 = 1e-4, limits(Range::new(0.0, 1.0));
-        /// How far the sheets reach out for particles (screening length); `"auto"` is four cells.
+        /// How far the sheets reach out for particles (screening length); `"auto"` is three cells.
         reach_km: Auto<f64> = Auto::Auto, limits(Range::new(0.05, 20_000.0)), unit("km");
         /// Strength of the pull; 1 draws a particle in from three cells within about half a second.
         pull: f64 = 1.0, limits(Range::new(0.0, 20.0));
@@ -98,7 +98,7 @@ bansho_base::parameters! {
         deaths_above: f64 = 500.0, limits(Range::new(1.0, 1e6));
         /// At most this many at a time.
         deaths_at_most: f64 = 100.0, limits(Range::new(0.0, 1e6));
-        /// Takes the four counts as those of a near cell that holds 100 particles on average, and scales them to as many as there are, so that the look does not depend on `count` of the particles; if not, they are taken as they are.
+        /// Takes the four counts as those of a near cell that holds 75 particles on average, and scales them to as many as there are, so that the look does not depend on `count` of the particles; if not, they are taken as they are.
         scaled: bool = true;
     }
 }

@@ -145,8 +145,9 @@ impl GlowMap {
             let (column, row) = (cell_of(*x), cell_of(*z));
             let tile = self.tile_mut(row / SIDE * self.side + column / SIDE);
             let cell = row % SIDE * SIDE + column % SIDE;
-            tile.powers[cell] = power.mul_add(share, tile.powers[cell]);
-            tile.weighted[cell] = (power * energy).mul_add(share, tile.weighted[cell]);
+            // No `mul_add`: outside a vector loop that is a call where the machine is not known to have it.
+            tile.powers[cell] += power * share;
+            tile.weighted[cell] += power * energy * share;
         }
     }
 

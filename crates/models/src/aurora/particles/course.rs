@@ -68,7 +68,6 @@ pub(super) struct Course {
 pub(super) struct Foot {
     pub(super) sheet: u32,
     pub(super) share: f64,
-    pub(super) along: f64,
     pub(super) flux: f64,
     pub(super) energy: f64,
     /// Distance, km, negative on the left of the way along the sheet.
@@ -107,11 +106,24 @@ impl Course {
 
     /// The place at a share of a sheet's length, km.
     pub(super) fn place(&self, sheet: usize, share: f64) -> DVec2 {
-        let (points, shares) = (&self.shape.sheets[sheet].points, &self.shares[sheet]);
+        let (point, part) = self.split(sheet, share);
+        let points = &self.shape.sheets[sheet].points;
+        points[point].lerp(points[point + 1], part)
+    }
+
+    /// The coordinate at a share of a sheet's length, km.
+    pub(super) fn along(&self, sheet: usize, share: f64) -> f64 {
+        let (point, part) = self.split(sheet, share);
+        let alongs = &self.alongs[sheet];
+        lerp(alongs[point], alongs[point + 1], part)
+    }
+
+    /// The point before a share of a sheet's length, and how far it is on the way to the next.
+    fn split(&self, sheet: usize, share: f64) -> (usize, f64) {
+        let shares = &self.shares[sheet];
         let after = shares.partition_point(|end| *end <= share).clamp(1, shares.len() - 1);
         let [before, end] = [shares[after - 1], shares[after]];
-        let part = (share - before) / (end - before).max(f64::MIN_POSITIVE);
-        points[after - 1].lerp(points[after], part.clamp(0.0, 1.0))
+        (after - 1, ((share - before) / (end - before).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0))
     }
 
     /// Each piece of the sheets in turn: its sheet, the share of the sheet's length before its middle, the flux factor there, its length in km.
@@ -164,7 +176,6 @@ impl Course {
         Some(Foot {
             sheet: sheet as u32,
             share: between(&self.shares[sheet]),
-            along: between(&self.alongs[sheet]),
             flux: between(&on.flux),
             energy: between(&on.energy),
             side: (point - place).perp_dot(way.normalize_or_zero()),

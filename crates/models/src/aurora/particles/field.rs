@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Screening length l unless a scene says otherwise, cells: particles are drawn in from a few cells, strays beyond can die.
-const REACH_CELLS: f64 = 4.0;
+const REACH_CELLS: f64 = 3.0;
 /// How often the charge along the sheets is made better.
 const ADJUSTMENTS: usize = 4;
 /// Field at the edge of a sheet at a pull of 1, cells per frame^2.

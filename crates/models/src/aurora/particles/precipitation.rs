@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{
     AuroraParticles,
     course::{Course, Foot},
-    rays::{Places, Rays},
+    rays::{Places, RayTable, Rays},
 };
 use crate::aurora::{
     AuroraParameters,
@@ -72,7 +72,9 @@ impl Precipitation {
     /// a stretch is the particles' own.
     pub(super) fn share_out(&self, particles: &mut AuroraParticles, course: &Course, time: f64) {
         let sheets = course.shape.sheets.len();
-        let weigh = |part| self.weigh(part, course, time, Nodes::new(sheets));
+        let along = |sheet, share| course.along(sheet, share);
+        let rays = self.rays.table(&course.sheet_lengths(), along, time);
+        let weigh = |part| self.weigh(part, course, (&rays, time), Nodes::new(sheets));
         let weights: Vec<Nodes> = stretches(particles).into_par_iter().map(weigh).collect();
         let weights = weights.iter().fold(Nodes::new(sheets), |sum, part| sum.plus(part));
         let factors = self.wanted(course, time).shared_by(&weights);
@@ -80,7 +82,7 @@ impl Precipitation {
     }
 
     /// Weighs a stretch of particles, as negative powers while they wait for their factor, and adds up the weights before black rays and pulsation.
-    fn weigh(&self, part: Stretch, course: &Course, time: f64, mut weights: Nodes) -> Nodes {
+    fn weigh(&self, part: Stretch, course: &Course, (rays, time): (&RayTable, f64), mut weights: Nodes) -> Nodes {
         let (level, energy) = (Level::new(), self.parameters.energy_ev.at(time));
         let side_scale = 1.0 / self.parameters.half_thickness_km();
         for first in (0..part.fades.len()).step_by(LANES) {
@@ -88,7 +90,7 @@ impl Precipitation {
             let foot = |lane: usize| if lane < count { part.foot(course, first + lane) } else { None };
             let feet: [Option<Foot>; LANES] = std::array::from_fn(foot);
             let places = Places {
-                along: feet.map(|foot| foot.map_or(0.0, |foot| foot.along)),
+                noises: feet.map(|foot| foot.map_or([0.0; 4], |foot| rays.at(foot.sheet, foot.share))),
                 side: feet.map(|foot| foot.map_or(0.0, |foot| (foot.side * side_scale) as f32)),
             };
             let pattern = self.rays.at(level, &places, time);

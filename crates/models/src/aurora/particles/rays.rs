@@ -11,6 +11,10 @@ use crate::aurora::{AuroraParameters, PulsationParameters, RayParameters};
 
 /// Octaves of the rays: groups of rays, rays, and streaks in them.
 const RAYS: Fractal = Fractal { octaves: 3, lacunarity: 2, gain: 0.7 };
+/// Nodes of the table for the length of the finest cell of noise: with straight lines between them within a hundredth of it.
+const NODES_PER_CELL: f64 = 12.0;
+/// Most nodes of a sheet; finer rays on a longer one are finer than its particles.
+const MOST_NODES: f64 = 50_000.0;
 /// Width of a black ray beside the distance between two.
 const BLACK_WIDTH: f32 = 0.12;
 
@@ -26,10 +30,19 @@ pub(super) struct Rays {
     deviation: f32,
 }
 
+/// The noises of rays on both sides, of black rays and of patches.
+type Noises = [f32; 4];
+
+/// The noises along the sheets at a moment, in a table: they cost what the sheets' detail costs, not the particles.
+pub(super) struct RayTable {
+    /// By sheet, evenly spaced over its length.
+    sheets: Vec<Vec<Noises>>,
+}
+
 /// Sixteen places on the sheets.
 pub(super) struct Places {
-    /// Coordinate along the sheets, km.
-    pub(super) along: [f64; LANES],
+    /// The noises there.
+    pub(super) noises: [Noises; LANES],
     /// Which side of the sheet, from -1 to 1 within its thickness.
     pub(super) side: [f32; LANES],
 }
@@ -61,30 +74,53 @@ impl Rays {
         }
     }
 
+    /// The noises at a time along a sheet whose coordinate after each share of its length is `along`, for sheets of those lengths in km.
+    pub(super) fn table(&self, lengths: &[f64], along: impl Fn(usize, f64) -> f64, time: f64) -> RayTable {
+        let (level, node) = (Level::new(), self.node_km());
+        let sheet = |(sheet, length): (usize, &f64)| {
+            let last = (length / node).clamp(1.0, MOST_NODES).ceil();
+            let batch = |first: usize| {
+                let places = std::array::from_fn(|lane| along(sheet, ((first + lane) as f64 / last).min(1.0)));
+                let noises = self.noises(level, &places, time);
+                (0..LANES).map(move |lane| noises.map(|values| values[lane]))
+            };
+            (0..=last as usize).step_by(LANES).flat_map(batch).take(last as usize + 1).collect()
+        };
+        RayTable { sheets: lengths.iter().enumerate().map(sheet).collect() }
+    }
+
+    /// Distance of nodes that shows the finest of what is asked for.
+    fn node_km(&self) -> f64 {
+        let finest = |strength: f64, scale: f64| if strength > 0.0 { scale } else { f64::INFINITY };
+        let rays = finest(self.rays.contrast.max(self.rays.energy), self.rays.scale_km);
+        let others = finest(self.rays.black_rays, self.rays.black_scale_km)
+            .min(finest(self.pulsation.depth, self.pulsation.patch_km));
+        rays.min(others) / NODES_PER_CELL
+    }
+
     /// The pattern at sixteen places at a time.
     pub(super) fn at(&self, level: Level, places: &Places, time: f64) -> Pattern {
-        let noises = self.noises(level, places, time);
-        dispatch!(level, _simd => self.combined(&noises, &places.side, time))
+        dispatch!(level, _simd => self.combined(places, time))
     }
 
     #[inline(always)]
-    fn combined(&self, noises: &[[f32; LANES]; 4], sides: &[f32; LANES], time: f64) -> Pattern {
-        let [left, right, black, patches] = noises;
+    fn combined(&self, places: &Places, time: f64) -> Pattern {
         let mut pattern = Pattern { brightness: [1.0; LANES], dimming: [1.0; LANES], hardness: [1.0; LANES] };
         for i in 0..LANES {
-            let share = (0.5 + 0.5 * sides[i]).clamp(0.0, 1.0);
+            let [left, right, black, patch] = places.noises[i];
+            let share = (0.5 + 0.5 * places.side[i]).clamp(0.0, 1.0);
             // Two patterns mix to less than the variance of one.
             let variance = share * share + (1.0 - share) * (1.0 - share);
-            let mixed = (left[i] + share * (right[i] - left[i])) / (self.deviation * variance.sqrt());
+            let mixed = (left + share * (right - left)) / (self.deviation * variance.sqrt());
             pattern.brightness[i] = lanes::exp(self.rays.contrast as f32 * mixed);
             pattern.hardness[i] = lanes::exp(self.rays.energy as f32 * mixed);
-            pattern.dimming[i] = self.darkness(black[i]) * self.pulse(patches[i], time);
+            pattern.dimming[i] = self.darkness(black) * self.pulse(patch, time);
         }
         pattern
     }
 
     /// The noise of the rays on both sides, of black rays and of patches; what is not asked for is 0.
-    fn noises(&self, level: Level, places: &Places, time: f64) -> [[f32; LANES]; 4] {
+    fn noises(&self, level: Level, places: &[f64; LANES], time: f64) -> [[f32; LANES]; 4] {
         let rays = &self.rays;
         let (way, age) = (rays.shear_km_per_s * time, time / rays.life_s);
         // Groups of rays are four rays long. Black rays run against the rays of the one side.
@@ -97,7 +133,7 @@ impl Rays {
         ];
         wanted.map(|(strength, noise, way, scale, age)| {
             if strength > 0.0 {
-                values(level, noise, places.along.map(|along| (along - way) / scale), age)
+                values(level, noise, places.map(|along| (along - way) / scale), age)
             } else {
                 [0.0; LANES]
             }
@@ -118,6 +154,18 @@ impl Rays {
         let turns = (turns - turns.floor()) as f32;
         let dark = 0.5 - 0.5 * lanes::cos_turns(turns + 2.0 * noise);
         1.0 - self.pulsation.depth as f32 * dark
+    }
+}
+
+impl RayTable {
+    /// The noises at a share of a sheet's length.
+    #[inline]
+    pub(super) fn at(&self, sheet: u32, share: f64) -> Noises {
+        let nodes = &self.sheets[sheet as usize];
+        let place = share.clamp(0.0, 1.0) * (nodes.len() - 1) as f64;
+        let node = (place as usize).min(nodes.len() - 2);
+        let part = (place - node as f64) as f32;
+        std::array::from_fn(|k| nodes[node][k] + part * (nodes[node + 1][k] - nodes[node][k]))
     }
 }
 
@@ -144,9 +192,11 @@ mod tests {
     fn along(parameters: &AuroraParameters, time: f64) -> [Vec<f64>; 3] {
         let rays = Rays::new(parameters, KEY);
         let mut all: [Vec<f64>; 3] = Default::default();
+        // A sheet of 800 km whose coordinate is its length.
+        let table = rays.table(&[800.0], |_, share| 800.0 * share, time);
         for first in 0..1000 {
-            let place = |lane: usize| 0.05 * (first * LANES + lane) as f64;
-            let places = Places { along: std::array::from_fn(place), side: [-1.0; LANES] };
+            let place = |lane: usize| table.at(0, (first * LANES + lane) as f64 / 16_000.0);
+            let places = Places { noises: std::array::from_fn(place), side: [-1.0; LANES] };
             let Pattern { brightness, dimming, hardness } = rays.at(Level::new(), &places, time);
             for (all, values) in all.iter_mut().zip([brightness, dimming, hardness]) {
                 all.extend(values.map(f64::from));
@@ -172,6 +222,19 @@ mod tests {
         assert!(dimming.iter().all(|dimming| *dimming == 1.0));
         parameters.rays.contrast = 0.0;
         assert!(along(&parameters, 3.0)[0].iter().all(|brightness| *brightness == 1.0));
+    }
+
+    #[test]
+    fn the_table_holds_the_finest_noise() {
+        let rays = Rays::new(&AuroraParameters::default(), KEY);
+        let table = rays.table(&[300.0], |_, share| 300.0 * share, 2.0);
+        for first in 0..500 {
+            let along = std::array::from_fn(|lane| 0.0371 * (first * LANES + lane) as f64);
+            let [left, ..] = rays.noises(Level::new(), &along, 2.0);
+            for lane in 0..LANES {
+                assert!((table.at(0, along[lane] / 300.0)[0] - left[lane]).abs() < 0.01 * rays.deviation * 4.0);
+            }
+        }
     }
 
     #[test]

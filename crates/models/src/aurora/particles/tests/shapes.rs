@@ -4,8 +4,11 @@ use super::*;
 use crate::aurora::{RepulsionKernel, shapes::Neighbourhood};
 
 /// Steps to two and a half seconds after the second shape is reached.
-fn after_the_transition(shapes: Vec<ShapeParameters>) -> (AuroraSimulation, Shape) {
-    let parameters = AuroraParameters { shapes, ..small() };
+fn after_the_transition(shapes: Vec<ShapeParameters>, cells: i64) -> (AuroraSimulation, Shape) {
+    let mut parameters = AuroraParameters { shapes, ..small() };
+    parameters.field.cells = cells;
+    // Rays brighten and darken stretches on purpose.
+    parameters.rays.contrast = 0.0;
     let sequence = sequence(&parameters);
     let mut simulation = simulation(parameters);
     let end = sequence.arrivals()[1] + 2.5;
@@ -17,14 +20,15 @@ fn after_the_transition(shapes: Vec<ShapeParameters>) -> (AuroraSimulation, Shap
 
 #[test]
 fn after_a_transition_particles_lie_on_the_target_and_everywhere_along_it() {
-    for (name, shapes) in [
-        ("peel", becoming(Form::Peel)),
-        ("s", becoming(Form::SShape)),
-        ("split", splitting()),
-        ("merge", merging()),
-        ("spiral", becoming(Form::Spiral)),
+    // A turn of the spiral lies 12 km from the next: sheets of 9 km, as on the coarse grid, would be one.
+    for (name, cells, shapes) in [
+        ("peel", 127, becoming(Form::Peel)),
+        ("s", 127, becoming(Form::SShape)),
+        ("split", 127, splitting()),
+        ("merge", 127, merging()),
+        ("spiral", 255, becoming(Form::Spiral)),
     ] {
-        let (simulation, target) = after_the_transition(shapes);
+        let (simulation, target) = after_the_transition(shapes, cells);
         let half = simulation.parameters().half_thickness_km();
         let near = Neighbourhood::new(&target, 2.0 * half);
         let particles = live(&simulation);
