@@ -41,11 +41,6 @@ fn after_a_transition_particles_lie_on_the_target_and_everywhere_along_it() {
             let mean = sums.iter().sum::<f64>() / sums.len() as f64;
             sums.iter().copied().fold(f64::INFINITY, f64::min) / mean
         };
-        println!(
-            "{name}: within {share:.3}, far {far:.4}, least power {:.2}, least count {:.2}",
-            least(&powers),
-            least(&counts)
-        );
         assert!(share >= 0.95, "{name}: {share} within L_thr");
         assert!(far < 1e-3, "{name}: {far} in the gaps");
         assert!(least(&powers) >= 0.5, "{name}: a stretch has {} of its power", least(&powers));
@@ -88,7 +83,6 @@ fn greatest_jumps(shapes: Vec<ShapeParameters>) -> [f64; 2] {
 fn nothing_jumps_from_frame_to_frame_through_split_merge_and_relocation() {
     for (name, shapes) in [("split", splitting()), ("merge", merging()), ("peel", becoming(Form::Peel))] {
         let [whole, local] = greatest_jumps(shapes);
-        println!("{name}: whole {whole:.4}, local {local:.4}");
         assert!(whole < 0.02, "{name}: all light changes by {whole} in a frame");
         // What moves from block to block counts here too.
         assert!(local < 0.06, "{name}: {local} of the light changes its place in a frame");
@@ -123,6 +117,5 @@ fn unevenness(kernel: RepulsionKernel) -> f64 {
 #[test]
 fn the_spline_keeps_rays_and_poly6_with_spiky_blurs_them() {
     let [spline, blurred] = [RepulsionKernel::Spline, RepulsionKernel::Poly6Spiky].map(unevenness);
-    println!("spline {spline:.2}, poly6 and spiky {blurred:.2}");
     assert!(spline > 1.15 * blurred, "{spline} {blurred}");
 }
