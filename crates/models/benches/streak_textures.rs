@@ -1,4 +1,4 @@
-//! The paper's 24 streak textures of 512 x 512, drops, mipmaps and all, with the naive way beside it: each sample of each pixel
+//! The paper's 24 streak textures of 512 x 512, drops and all, with the naive way beside it: each sample of each pixel
 //! that a streak touches by itself.
 
 use std::hint::black_box;

@@ -134,6 +134,14 @@ bansho_base::parameters! {
     }
 }
 
+impl SheetParameters {
+    /// The SVG file of `path`, and the id of the one path in it that is meant.
+    pub fn drawing(&self) -> Option<(&str, Option<&str>)> {
+        let path = self.path.as_ref()?.0.as_str();
+        Some(path.rsplit_once('#').map_or((path, None), |(file, id)| (file, Some(id))))
+    }
+}
+
 impl MotionParameters {
     /// Control points n of a sheet.
     pub fn point_count(&self) -> usize {
