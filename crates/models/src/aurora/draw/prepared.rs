@@ -173,13 +173,7 @@ impl PreparedAurora<'_> {
     }
 
     #[inline(always)]
-    fn batch(
-        &self,
-        samplers: &[Sampler; 2],
-        slice: &DepthInterval,
-        strip: &mut Strip,
-        [x, y]: [usize; 2],
-    ) {
+    fn batch(&self, samplers: &[Sampler; 2], slice: &DepthInterval, strip: &mut Strip, [x, y]: [usize; 2]) {
         let rect = strip.rect;
         let inside = rect.x.max(x) - x..rect.right().min(x + BATCH) - x;
         let share = 1.0 / self.cameras.len() as f32;

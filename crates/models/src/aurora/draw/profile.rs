@@ -11,7 +11,7 @@ use crate::aurora::{
 /// Tables between two nodes of the grid of energies: a step moves the lower edge by less than a hundred metres.
 const FINENESS: usize = 4;
 /// Tables of one energy, each of them smoothed to and sampled at twice the spacing of the one before, from 1 km on.
-pub(super) const SPACINGS: usize = 10;
+pub(super) const SPACINGS: usize = 12;
 /// Entries of all tables of one energy.
 const STRIDE: usize = entries_before(SPACINGS);
 /// A column is drawn up to where this share of its light is left above.
@@ -56,7 +56,8 @@ impl Profiles {
             let profile = emission.profile(fine_energy_ev(fine));
             tops.push([Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| top_km(&profile, emitter)));
             let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
-            let mut table: Vec<PerEmitter<f64>> = std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect();
+            let mut table: Vec<PerEmitter<f64>> =
+                std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect();
             for spacing in 0..SPACINGS {
                 let entry = |at: usize| table.get(at).copied().unwrap_or_default();
                 light.extend((0..entries(spacing)).map(|at| entry(at).map(|value| value as f32)));

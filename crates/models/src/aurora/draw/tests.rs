@@ -120,8 +120,11 @@ fn a_ray_is_seen_where_every_lens_puts_it() {
     let [x, y] = sources[0].across.map(f64::from);
     let line = field.meridian([x, y].map(|value| value / math::hypot(x, y))).line(math::hypot(x, y));
     let mut shown = 0;
-    let targets =
-        [(Lens::Perspective, [20.0, 60.0, -40.0]), (Lens::Fisheye, [0.0, 1.0, 0.0]), (Lens::Panorama, [0.0, 0.0, -1.0])];
+    let targets = [
+        (Lens::Perspective, [20.0, 60.0, -40.0]),
+        (Lens::Fisheye, [0.0, 1.0, 0.0]),
+        (Lens::Panorama, [0.0, 0.0, -1.0]),
+    ];
     for (lens, target) in targets {
         let view = view(lens, target, [640, 480]);
         let views = [view.clone(), view.mirrored(0.0)];
