@@ -182,8 +182,8 @@ bansho_base::parameters! {
     pub struct AuroraParameters {
         /// Side of the drawn square, its middle under the observer's zenith.
         extent_km: f64 = 600.0, limits(Range::new(1.0, 20_000.0)), unit("km");
-        /// Energy flux of the electrons within a sheet; 1 is a faint aurora, 10 a bright one, 100 a storm.
-        flux_mw_per_m2: Animated<f64> = Animated::from(12.0), limits(Range::new(0.0, 10_000.0)), unit("mW/m^2");
+        /// Energy flux of the electrons within a sheet; 10 is a faint arc, 50 a bright one, 300 a storm.
+        flux_mw_per_m2: Animated<f64> = Animated::from(50.0), limits(Range::new(0.0, 10_000.0)), unit("mW/m^2");
         /// Energy of the electrons: 500 eV gives a high and red aurora, 5000 a green one, 20000 one with a low purple edge.
         energy_ev: Animated<f64> = Animated::from(5000.0), limits(Range::new(100.0, 100_000.0)), unit("eV");
         /// How their energies are spread.

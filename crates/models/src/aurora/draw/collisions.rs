@@ -142,7 +142,8 @@ impl Drawing<'_> {
     /// Places the collisions of a fall at a distance along a meridian.
     #[inline(always)]
     fn place(&self, fall: &Fall, meridian: &Meridian, along: f32, points: &mut Vec<Point>) {
-        const DIAMETER: f32 = (2.0 * EARTH_RADIUS_KM) as f32;
+        const RADIUS: f32 = EARTH_RADIUS_KM as f32;
+        const DIAMETER: f32 = 2.0 * RADIUS;
         let reach = fall.source.reach.max(Bins::least_reach(self.footprint.bins(), along));
         let [constant, outward, own] = meridian.single();
         let [green, red, prompt] = fall.source.power.map(|power| power * fall.pairs / self.chart.row_step as f32);
@@ -151,9 +152,12 @@ impl Drawing<'_> {
             let distance = deviation.mul_add(reach, along) + collision.offset_km[0];
             let altitude = collision.altitude_km;
             let squared = altitude.mul_add(DIAMETER + altitude, -distance.mul_add(2.0 * outward + distance, constant));
-            let place = own.mul_add(own, squared).max(0.0).sqrt() - own;
+            let upward = own.mul_add(own, squared).max(1.0).sqrt();
+            let place = upward - own;
             let far = distance.mul_add(distance, place * place).sqrt();
-            let shown = if distance > 0.0 && far > 1.0 { 1.0 / far } else { 0.0 };
+            // A source's power is that across the field; a collision stands for all of it, so the cosine to the vertical is taken out again.
+            let slant = (RADIUS + altitude) / upward;
+            let shown = if distance > 0.0 && far > 1.0 { slant / far } else { 0.0 };
             let photons = &self.collisions.photons[collision.level as usize];
             let weights = [green, red, prompt, prompt];
             points.push(Point {

@@ -3,6 +3,8 @@
 //! On a line of sight at colatitude a, the field line at distance r from the observer's own is passed at the place r cot a along the
 //! field. So brightness is the integral over r of precipitation times the volume emission at the altitude of that place, over sin a.
 
+use std::ops::Range;
+
 use bansho_base::math::lanes;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -22,6 +24,13 @@ const STEP_KM: f32 = 1.5;
 
 /// Nearer than so many widths of a bin, smoothed tables may be taken: 600 km / [`STEP_KM`].
 const NEAR_BINS: f64 = 400.0;
+/// Spacing of such tables in steps: at least 1 / [`STEP_KM`]. Steps as long as the light is high need 2, or linear interpolation lets the bins'
+/// own pattern through; shorter ones need less, since the light itself is smooth, and keep its lower edge.
+const ENTRY_PER_STEP: [f32; 2] = [1.0 / STEP_KM, 2.0];
+/// Steps above which tables are more than a step apart, km.
+const SMOOTH_KM: f32 = 12.0;
+/// Widths of a bin that smoothing spreads light over at most: it reaches two entries far, each less than twice as wide as asked for.
+const BLURRED_BINS: f64 = 4.0 * ENTRY_PER_STEP[1] as f64;
 
 /// Brightness by emitter in kR, column after column, without what the air takes away.
 pub(super) struct Meridians {
@@ -133,7 +142,7 @@ impl Drawing<'_> {
         let [distance, width] = self.distances[number];
         let line = meridian.line(distance);
         // Where tables are smoothed, light reaches rows of neighbouring bins.
-        let blurred = if distance < NEAR_BINS * width { 2.0 * width } else { 0.0 };
+        let blurred = if distance < NEAR_BINS * width { BLURRED_BINS * width } else { 0.0 };
         let row = |distance: f64, altitude_km: f32| {
             let colatitude = lanes::atan2(distance.max(0.0) as f32, line.place(f64::from(altitude_km)) as f32);
             self.chart.finder().row(colatitude) - 0.5
@@ -142,11 +151,22 @@ impl Drawing<'_> {
         let end = ((row(distance + blurred, BOTTOM_KM).floor() + 1.0).max(0.0) as usize).min(light.len());
         // The bin holds precipitation times its width already; what is left is per km of sight.
         let weights = [green, red, prompt, prompt];
-        let stretch =
-            Stretch { line: &line, profile: &profile, distance: distance as f32, width: width as f32, weights };
-        let mut from = first;
-        while from < end {
-            let to = (from + ROWS).min(end);
+        let width = width as f32;
+        let stretch = Stretch { line: &line, profile: &profile, distance: distance as f32, width, weights };
+        self.rows(&stretch, first..end, light);
+        if distance < blurred {
+            // Beyond the observer's own field line the sheet goes on: what smoothing spreads from there would be missed.
+            let line = meridian.line(-distance);
+            let beyond = Stretch { line: &line, profile: &profile, distance: -distance as f32, width, weights };
+            self.rows(&beyond, first..end, light);
+        }
+    }
+
+    #[inline(always)]
+    fn rows(&self, stretch: &Stretch, rows: Range<usize>, light: &mut [PerEmitter<f32>]) {
+        let mut from = rows.start;
+        while from < rows.end {
+            let to = (from + ROWS).min(rows.end);
             stretch.add(&self.cotangents[from..to], &mut light[from..to]);
             from = to;
         }
@@ -182,7 +202,9 @@ impl Stretch<'_> {
             return;
         }
         for ((light, height), cotangent) in light.iter_mut().zip(heights).zip(padded) {
-            let spacing = lanes::log2((self.width * cotangent.abs() / STEP_KM).max(1.0)).ceil();
+            let step = self.width * cotangent.abs();
+            let entry = step * (step * (1.0 / SMOOTH_KM)).clamp(ENTRY_PER_STEP[0], ENTRY_PER_STEP[1]);
+            let spacing = lanes::log2(entry.max(1.0)).ceil();
             let spacing = (spacing as usize).min(SPACINGS - 1);
             let scale = 1.0 / (1_u32 << spacing) as f32;
             self.add_row(self.profile.table(spacing), height.mul_add(scale, 1.0), light);

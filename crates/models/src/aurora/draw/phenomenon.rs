@@ -30,8 +30,8 @@ use crate::aurora::{
     shapes::{Sequence, ShapeFault},
 };
 
-/// Sheets are seen aslant: their bright parts beside what looks straight up through one.
-const BRIGHT_PER_COLUMN: f64 = 1.5;
+/// Sheets are thin: their bright parts seen aslant beside what looks straight up through one.
+const BRIGHT_PER_COLUMN: f64 = 0.75;
 
 /// How far a spectrum reaches beyond its energy, and rays beyond that, in nodes of the grid of energies: sixfold.
 const SPECTRUM_NODES: usize = 25;

@@ -11,7 +11,7 @@ use crate::aurora::{
 /// Tables between two nodes of the grid of energies: a step moves the lower edge by less than a hundred metres.
 const FINENESS: usize = 4;
 /// Tables of one energy, each of them smoothed to and sampled at twice the spacing of the one before, from 1 km on.
-pub(super) const SPACINGS: usize = 10;
+pub(super) const SPACINGS: usize = 12;
 /// Entries of all tables of one energy.
 const STRIDE: usize = entries_before(SPACINGS);
 /// A column is drawn up to where this share of its light is left above.
