@@ -8,8 +8,8 @@ use crate::aurora::{
     precipitation::energy::NODES,
 };
 
-/// Tables between two nodes of the grid of energies: a step moves the lower edge by less than a hundred metres.
-const FINENESS: usize = 4;
+/// Tables between two nodes of the grid of energies: the nearest is within 0.5 % of the energy, and the red column, which falls fastest, within 1 %.
+const FINENESS: usize = 8;
 /// Tables of one energy, each of them smoothed to and sampled at twice the spacing of the one before, from 1 km on.
 pub(super) const SPACINGS: usize = 12;
 /// Entries of all tables of one energy.
