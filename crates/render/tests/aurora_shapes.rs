@@ -158,7 +158,9 @@ fn three_lines_make_an_aurora() {
     for text in ["bansho = 1\n[[aurora]]\n", "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ form = \"fold\" }] }]\n"]
     {
         let sequence = sequence_of(text);
-        assert!(sequence.at(1.0).length() > 400.0, "{text}");
+        // Half the side of the drawn square and more.
+        let length = sequence.at(1.0).length();
+        assert!(length > 300.0, "{length} km: {text}");
     }
 }
 
@@ -167,7 +169,7 @@ fn a_drawing_is_fitted_to_the_square() {
     let text = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg#right\" }] }]\n";
     let shape = sequence_of(text).at(0.0);
     let points = &shape.sheets[0].points;
-    assert_eq!((points[0], points[points.len() - 1]), (DVec2::new(80.0, 0.0), DVec2::new(320.0, 0.0)));
+    assert_eq!((points[0], points[points.len() - 1]), (DVec2::new(60.0, 0.0), DVec2::new(240.0, 0.0)));
     let all = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg\" }] }]\n";
     assert_eq!(sequence_of(all).at(0.0).sheets.len(), 2);
 }
