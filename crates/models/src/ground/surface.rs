@@ -76,7 +76,7 @@ impl Surface {
             albedo,
             puddle: math::lerp(self.puddles, self.puddle(relief), seen(1.0, 3.0)),
             // Its edges are sharp and its light strong: patches of a few pixels would be dashes at the horizon.
-            film: math::lerp(0.5, film(relief), seen(4.0, 16.0)),
+            film: math::lerp(0.5, film(relief), seen(2.0, 8.0)),
         }
     }
 
