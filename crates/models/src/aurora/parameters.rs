@@ -200,17 +200,17 @@ bansho_base::parameters! {
         shapes: Vec<ShapeParameters> = Vec::new(), limits(Length { min: 0, max: 1000, item: () });
         /// How one shape becomes the next.
         motion: MotionParameters = MotionParameters::default();
-        /// The field.
+        /// The electric field that draws particles to the shapes.
         field: FieldParameters = FieldParameters::default();
-        /// The particles.
+        /// The particles that stand for the electrons.
         particles: ParticleParameters = ParticleParameters::default();
-        /// Rays.
+        /// Rays: fine streaks of more and less light along a sheet.
         rays: RayParameters = RayParameters::default();
-        /// Folds.
+        /// Folds that run along a sheet.
         folds: FoldParameters = FoldParameters::default();
-        /// Pulsation.
+        /// Patches that brighten and fade.
         pulsation: PulsationParameters = PulsationParameters::default();
-        /// Drawing.
+        /// How light is drawn.
         drawing: DrawingParameters = DrawingParameters::default();
     }
 }
