@@ -54,7 +54,7 @@ fn across_radii(film: &Film, centre: [f64; 2]) -> f64 {
             let at = |x: usize, y: usize| luminance(film.row(0, y)[x]).sqrt();
             let gradient = [at(column + 1, row) - at(column - 1, row), at(column, row + 1) - at(column, row - 1)];
             let offset = [column as f64 + 0.5 - centre[0], row as f64 + 0.5 - centre[1]];
-            let distance = offset[0].hypot(offset[1]);
+            let distance = bansho::base::math::hypot(offset[0], offset[1]);
             if !(20.0..60.0).contains(&distance) {
                 continue;
             }
