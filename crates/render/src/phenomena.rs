@@ -67,11 +67,6 @@ impl Describe for RainParameters {
 impl Describe for AuroraParameters {
     const KEY: &'static str = "aurora";
 
-    /// Paths of drawings without the id of the path that is meant.
-    fn assets(&self) -> Vec<String> {
-        self.drawings().map(str::to_owned).collect()
-    }
-
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match Aurora::new(self.clone(), opening.name, opening.seed, opening.loop_s, opening.assets) {
             Ok(aurora) => Ok(Box::new(aurora)),

@@ -135,8 +135,12 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         ("[[aurora.shapes]]\nsplit = [{}]\n", "aurora.0.shapes.0.split: the first shape has none before it"),
         (
-            "[[aurora.shapes]]\nsheets = [{ path = \"shapes.svg#middle\" }]\n",
-            "test.toml:4:20: aurora.0.shapes.0.sheets.0.path: shapes.svg: has no stroke of the id `middle`",
+            "[[aurora.shapes]]\nsheets = [{ path = \"shapes.svg\", stroke = \"middle\" }]\n",
+            "test.toml:4:43: aurora.0.shapes.0.sheets.0.stroke: shapes.svg: has no stroke of the id `middle`",
+        ),
+        (
+            "[[aurora.shapes]]\nsheets = [{ stroke = \"left\" }]\n",
+            "sheets.0.stroke: names a path of an SVG file, but no file",
         ),
         ("[[aurora.shapes]]\nsheets = [{ path = \"gone.svg\" }]\n", "gone.svg: no such file"),
         (
@@ -166,7 +170,7 @@ fn three_lines_make_an_aurora() {
 
 #[test]
 fn a_drawing_is_fitted_to_the_square() {
-    let text = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg#right\" }] }]\n";
+    let text = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg\", stroke = \"right\" }] }]\n";
     let shape = sequence_of(text).at(0.0);
     let points = &shape.sheets[0].points;
     assert_eq!((points[0], points[points.len() - 1]), (DVec2::new(60.0, 0.0), DVec2::new(240.0, 0.0)));

@@ -222,12 +222,6 @@ impl AuroraParameters {
         self.extent_km / self.field.cells as f64
     }
 
-    /// The SVG files of its shapes, each as often as it is named.
-    pub fn drawings(&self) -> impl Iterator<Item = &str> {
-        let sheets = self.shapes.iter().flat_map(|shape| &shape.sheets);
-        sheets.filter_map(|sheet| sheet.drawing().map(|(file, _)| file))
-    }
-
     /// L_thr, km: how far from the line a sheet reaches to each side.
     #[must_use]
     pub fn half_thickness_km(&self) -> f64 {

@@ -68,11 +68,6 @@ pub trait Describe: Parameters + Clone + Send + Sync + 'static {
     /// Parameters that do not go together, or an asset that cannot be had.
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault>;
 
-    /// Paths of the assets it reads, for fingerprints: what its asset parameters say.
-    fn assets(&self) -> Vec<String> {
-        bansho_base::parameters::assets(&self.to_table(), Self::table())
-    }
-
     /// The kind that scene files call by [`KEY`](Self::KEY).
     const KIND: PhenomenonKind =
         PhenomenonKind { key: Self::KEY, table: <Self as Parameters>::table, read: read_described::<Self> };
@@ -90,7 +85,7 @@ impl<P: Describe> Source for Described<P> {
     }
 
     fn assets(&self) -> Vec<String> {
-        self.0.assets()
+        bansho_base::parameters::assets(&self.0.to_table(), P::table())
     }
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {

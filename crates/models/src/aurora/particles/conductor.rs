@@ -1,6 +1,6 @@
 //! Charge that lies on the sheets as on conductors.
 
-use super::{course::Course, scatter::Scattered};
+use super::{course::Course, nodes::split, scatter::Scattered};
 use crate::field::Grid2;
 
 /// How much a node changes at a time, and how little and how much charge it has at most beside one of a long, straight, lone sheet.
@@ -27,9 +27,8 @@ impl LineCharge {
     /// Charge of a particle.
     pub(super) fn of(&self, particle: &Scattered) -> f64 {
         let nodes = &self.nodes[particle.sheet as usize];
-        let place = f64::from(particle.share) * (nodes.len() - 1) as f64;
-        let node = (place as usize).min(nodes.len() - 2);
-        nodes[node] + (place - node as f64) * (nodes[node + 1] - nodes[node])
+        let (node, part) = split(f64::from(particle.share), nodes.len());
+        nodes[node] + part * (nodes[node + 1] - nodes[node])
     }
 
     /// Changes it where the potential that it makes is not the one that is wanted; negative both.

@@ -8,6 +8,7 @@ mod conductor;
 mod course;
 mod field;
 mod motion;
+mod nodes;
 mod population;
 mod precipitation;
 mod rays;

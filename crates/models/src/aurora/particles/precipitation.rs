@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::{
     AuroraParticles,
     course::{Course, Foot},
+    nodes::split,
     rays::{Places, RayTable, Rays},
 };
 use crate::aurora::{
@@ -119,16 +120,9 @@ impl Nodes {
         Self(vec![[0.0; STRETCHES + 1]; sheets])
     }
 
-    /// The node before a place and how much of it belongs to the node after.
-    fn split(share: f32) -> (usize, f64) {
-        let place = (share * STRETCHES as f32).clamp(0.0, STRETCHES as f32);
-        let node = (place as usize).min(STRETCHES - 1);
-        (node, f64::from(place) - node as f64)
-    }
-
     /// Adds a value to the two nodes around a place.
     fn add(&mut self, sheet: u32, share: f32, value: f64) {
-        let (node, part) = Self::split(share);
+        let (node, part) = split(f64::from(share), STRETCHES + 1);
         let nodes = &mut self.0[sheet as usize];
         nodes[node] += value * (1.0 - part);
         nodes[node + 1] += value * part;
@@ -136,7 +130,7 @@ impl Nodes {
 
     /// Value at a place, linear between nodes.
     fn at(&self, sheet: u32, share: f32) -> f64 {
-        let (node, part) = Self::split(share);
+        let (node, part) = split(f64::from(share), STRETCHES + 1);
         let nodes = &self.0[sheet as usize];
         nodes[node] + part * (nodes[node + 1] - nodes[node])
     }

@@ -7,6 +7,7 @@ use bansho_base::{
 };
 use fearless_simd::{Level, dispatch};
 
+use super::nodes::split;
 use crate::aurora::{AuroraParameters, PulsationParameters, RayParameters};
 
 /// Octaves of the rays: groups of rays, rays, and streaks in them.
@@ -162,9 +163,8 @@ impl RayTable {
     #[inline]
     pub(super) fn at(&self, sheet: u32, share: f64) -> Noises {
         let nodes = &self.sheets[sheet as usize];
-        let place = share.clamp(0.0, 1.0) * (nodes.len() - 1) as f64;
-        let node = (place as usize).min(nodes.len() - 2);
-        let part = (place - node as f64) as f32;
+        let (node, part) = split(share, nodes.len());
+        let part = part as f32;
         std::array::from_fn(|k| nodes[node][k] + part * (nodes[node + 1][k] - nodes[node][k]))
     }
 }

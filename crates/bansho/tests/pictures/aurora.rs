@@ -1,18 +1,14 @@
-//! The shipped auroras as pictures: small goldens, and for each scene a number that a toy would fail.
-//!
-//! `BANSHO_BLESS=1 cargo test -p bansho --test auroras` rewrites the goldens.
-#![cfg(feature = "files")]
-
-#[allow(dead_code, reason = "shared with the test of the other pictures")]
-mod looks;
+//! The aurora.
 
 use std::ops::Range;
 
 use bansho::PlanOptions;
-use looks::{Film, golden, luminance};
 
-/// Size of goldens and of measurements.
-const SMALL: [usize; 2] = [256, 144];
+use crate::{
+    SMALL,
+    looks::{Film, luminance},
+};
+
 /// A frame soon after the start: the aurora has settled before it.
 const EARLY: i64 = 4;
 
@@ -20,24 +16,10 @@ fn film(scene: &str, frames: &[i64]) -> Film {
     Film::of(scene, SMALL, frames, &PlanOptions::default())
 }
 
-/// Mean of a colour, or another number, over a part of the first frame.
-fn mean(film: &Film, rows: Range<usize>, columns: Range<usize>, of: impl Fn([f64; 3]) -> f64) -> f64 {
-    let pixels = rows.clone().flat_map(|row| film.row(0, row)[columns.clone()].iter());
-    pixels.map(|pixel| of(*pixel)).sum::<f64>() / (rows.len() * columns.len()) as f64
-}
-
-#[test]
-fn golden_auroras_are_as_they_were() {
-    let scenes = ["quiet_arc", "corona", "red_aurora", "lake", "sekiguchi_2", "sekiguchi_5"];
-    let mut changed: Vec<String> = scenes.into_iter().filter_map(|scene| golden(scene, SMALL, EARLY)).collect();
-    changed.extend(golden("dome_night", [160, 160], EARLY));
-    assert!(changed.is_empty(), "{}", changed.join("\n"));
-}
-
 #[test]
 fn an_arc_has_a_thin_lower_edge_and_a_fading_top() {
     let film = film("quiet_arc", &[EARLY]);
-    let rows: Vec<f64> = (0..100).map(|row| mean(&film, row..row + 1, 60..200, luminance)).collect();
+    let rows: Vec<f64> = (0..100).map(|row| film.mean_over(row..row + 1, 60..200, luminance)).collect();
     let peak = (0..rows.len()).max_by(|a, b| rows[*a].total_cmp(&rows[*b])).unwrap_or(0);
     let dark = rows[80..].iter().copied().fold(f64::MAX, f64::min);
     let faint = |row: &usize| rows[*row] - dark < 0.25 * (rows[peak] - dark);
@@ -80,7 +62,8 @@ fn the_rays_of_a_corona_converge_at_the_magnetic_zenith() {
 fn soft_electrons_make_a_red_top_over_a_green_foot() {
     let film = film("red_aurora", &[EARLY]);
     let ratio = |rows: Range<usize>| {
-        mean(&film, rows.clone(), 0..SMALL[0], |[red, ..]| red) / mean(&film, rows, 0..SMALL[0], |[_, green, _]| green)
+        film.mean_over(rows.clone(), 0..SMALL[0], |[red, ..]| red)
+            / film.mean_over(rows, 0..SMALL[0], |[_, green, _]| green)
     };
     let (top, foot) = (ratio(5..40), ratio(92..100));
     assert!(top > 5.0 && foot < 1.5, "red beside green: {top} at the top, {foot} at the foot");
@@ -91,7 +74,7 @@ fn a_lake_mirrors_the_sky_and_is_darker() {
     const HORIZON: usize = 78;
     let film = film("lake", &[EARLY]);
     let column_means = |row: usize| -> Vec<f64> {
-        let of = |block: usize| mean(&film, row..row + 3, 16 * block..16 * block + 16, luminance);
+        let of = |block: usize| film.mean_over(row..row + 3, 16 * block..16 * block + 16, luminance);
         (0..16).map(of).collect()
     };
     let (mut above, mut below) = (Vec::new(), Vec::new());
