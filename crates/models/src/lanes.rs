@@ -1,8 +1,10 @@
 //! Sixteen numbers at a time, and what they have in common with one: the equations are written once for both.
 
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::{__m256, _mm256_shuffle_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps};
 use std::ops::{Add, Div, Mul, Sub};
 
-use fearless_simd::{Level, Simd, f32x4, f32x8, f32x16, prelude::*};
+use fearless_simd::{Level, Simd, f32x4, f32x8, f32x16, prelude::*, u32x16};
 
 /// Numbers in a batch, whatever the width of the machine's vectors.
 pub(crate) const LANES: usize = 16;
@@ -176,14 +178,14 @@ const ROUND: f32 = 12_582_912.0;
 ///
 /// A whole number may come out as the one below with fraction 1, which interpolates to the same.
 #[inline(always)]
-pub(crate) fn wrap_split<S: Simd>(place: Lanes<S>, mask: u32) -> (fearless_simd::u32x16<S>, Lanes<S>) {
+pub(crate) fn wrap_split<S: Simd>(place: Lanes<S>, mask: u32) -> (u32x16<S>, Lanes<S>) {
     let rounded = (place - place.like(0.5)) + place.like(ROUND);
     (rounded.to_bits() & mask, place - (rounded - place.like(ROUND)))
 }
 
 /// The nearest whole number of each, from 0 to 2^22.
 #[inline(always)]
-pub(crate) fn nearest_whole<S: Simd>(value: Lanes<S>) -> fearless_simd::u32x16<S> {
+pub(crate) fn nearest_whole<S: Simd>(value: Lanes<S>) -> u32x16<S> {
     (value + value.like(ROUND)).to_bits() & 0x003f_ffff
 }
 
@@ -191,30 +193,66 @@ pub(crate) fn nearest_whole<S: Simd>(value: Lanes<S>) -> fearless_simd::u32x16<S
 ///
 /// `N` is a power of two; indices wrap.
 #[inline(always)]
-pub(crate) fn fetch<S: Simd, const N: usize>(simd: S, table: &[[f32; 4]; N], index: &[u32; LANES]) -> [Lanes<S>; 4] {
-    let (a, b) = (fetch_four(simd, table, index, 0), fetch_four(simd, table, index, 4));
-    let (c, d) = (fetch_four(simd, table, index, 8), fetch_four(simd, table, index, 12));
+pub(crate) fn fetch<S: Simd, const N: usize>(simd: S, table: &[[f32; 4]; N], index: u32x16<S>) -> [Lanes<S>; 4] {
+    let mut offsets = [0; LANES];
+    ((index << 2) & (4 * N as u32 - 4)).store_slice(&mut offsets);
+    let values = table.as_flattened();
+    let (low, high) = (fetch_half(simd, values, &offsets, 0), fetch_half(simd, values, &offsets, LANES / 2));
     let mut batches = [Lanes::splat(simd, 0.0); 4];
     for k in 0..4 {
-        batches[k] = a[k].combine(b[k]).combine(c[k].combine(d[k]));
+        batches[k] = low[k].combine(high[k]);
     }
     batches
 }
 
-/// The entries of four lanes from `first` on, as four quarters of batches.
+/// The entries of eight lanes from `first` on, as four halves of batches.
 #[inline(always)]
-fn fetch_four<S: Simd, const N: usize>(
-    simd: S,
-    table: &[[f32; 4]; N],
-    index: &[u32; LANES],
-    first: usize,
-) -> [f32x4<S>; 4] {
-    let mut entries = [0.0; 16];
-    for lane in 0..4 {
-        entries[4 * lane..4 * lane + 4].copy_from_slice(&table[index[first + lane] as usize & (N - 1)]);
+fn fetch_half<S: Simd>(simd: S, values: &[f32], offsets: &[u32; LANES], first: usize) -> [HalfLanes<S>; 4] {
+    let mut pairs = [HalfLanes::splat(simd, 0.0); 4];
+    for (lane, pair) in pairs.iter_mut().enumerate() {
+        let [near, far] = [first + lane, first + lane + 4].map(|lane| {
+            let offset = offsets[lane] as usize;
+            f32x4::from_slice(simd, &values[offset..offset + 4])
+        });
+        *pair = near.combine(far);
     }
-    simd.load_four_interleaved_f32x4(&entries)
+    transpose(simd, pairs)
 }
+
+/// Turns eight entries, of which a batch holds the `i`th and the one four after it, into their four columns.
+#[inline(always)]
+fn transpose<S: Simd>(simd: S, pairs: [HalfLanes<S>; 4]) -> [HalfLanes<S>; 4] {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(avx2) = simd.level().as_avx2() {
+        let [a, b, c, d] = pairs;
+        let [red, green, blue, alpha] = transpose_avx2(avx2, a.into(), b.into(), c.into(), d.into());
+        return [red.simd_into(simd), green.simd_into(simd), blue.simd_into(simd), alpha.simd_into(simd)];
+    }
+    let mut entries = [[0.0; 16]; 2];
+    for (i, pair) in pairs.iter().enumerate() {
+        let (first, second) = pair.split();
+        first.store_slice(&mut entries[0][4 * i..4 * i + 4]);
+        second.store_slice(&mut entries[1][4 * i..4 * i + 4]);
+    }
+    let [low, high] = entries.map(|entries| simd.load_four_interleaved_f32x4(&entries));
+    [0, 1, 2, 3].map(|k| low[k].combine(high[k]))
+}
+
+#[cfg(target_arch = "x86_64")]
+fearless_simd::kernel!(
+    /// Within each half of the vectors, in half the shuffles that entries one by one would take.
+    #[inline(always)]
+    fn transpose_avx2(avx2: Avx2, a: __m256, b: __m256, c: __m256, d: __m256) -> [__m256; 4] {
+        let (low, high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+        let (low_after, high_after) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+        [
+            _mm256_shuffle_ps::<0b01_00_01_00>(low, low_after),
+            _mm256_shuffle_ps::<0b11_10_11_10>(low, low_after),
+            _mm256_shuffle_ps::<0b01_00_01_00>(high, high_after),
+            _mm256_shuffle_ps::<0b11_10_11_10>(high, high_after),
+        ]
+    }
+);
 
 #[cfg(test)]
 mod tests {
@@ -241,8 +279,8 @@ mod tests {
     #[test]
     fn fetching_gathers_entries_lane_by_lane() {
         let table: [[f32; 4]; 32] = std::array::from_fn(|i| std::array::from_fn(|k| (10 * i + k) as f32));
-        let index = std::array::from_fn(|lane| (7 * lane % 32) as u32);
-        let batches = plain!(simd => fetch(simd, &table, &index).map(|batch| batch.as_slice().to_vec()));
+        let index: [u32; LANES] = std::array::from_fn(|lane| (7 * lane % 32) as u32);
+        let batches = plain!(simd => fetch(simd, &table, u32x16::from_slice(simd, &index)).map(|batch| batch.as_slice().to_vec()));
         for lane in 0..LANES {
             for k in 0..4 {
                 assert_eq!(batches[k][lane], table[index[lane] as usize][k]);

@@ -1,7 +1,9 @@
 //! Sheets drawn into strips, sixteen pixels at a time.
 //!
 //! Where a pixel lies on the flame, its threshold and its glow change slowly from row to row of a large picture. They are found exactly on
-//! every second, fourth or eighth row and taken as straight between; texture and colour are looked up for every pixel.
+//! every second, fourth or sixteenth row and taken as straight between; texture and colour are looked up for every pixel.
+
+use std::ops::Range;
 
 use bansho_base::{canvas::Strip, image::Rect};
 use fearless_simd::{Simd, prelude::*};
@@ -26,13 +28,15 @@ pub(crate) struct Paint<'a> {
     pub(crate) band: usize,
 }
 
-/// Rows from one exact row to the next for a sheet of this height: 1 up to 255 pixels, 8 from 1024 on.
+/// Rows from one exact row to the next for a sheet of this height: 1 up to 255 pixels, 16 from 1024 on.
 pub(crate) fn band_of(height_pixels: f64) -> usize {
-    [8, 4, 2].into_iter().find(|rows| height_pixels >= 128.0 * *rows as f64).unwrap_or(1)
+    /// Rows of a band, and from which height on they are taken.
+    const BANDS: [(usize, f64); 3] = [(16, 1024.0), (4, 512.0), (2, 256.0)];
+    BANDS.into_iter().find(|(_, least)| height_pixels >= *least).map_or(1, |(rows, _)| rows)
 }
 
 /// Pixels of a row that are tried together for whether any flame can be there.
-const GROUP: usize = 8 * LANES;
+const GROUP: usize = 4 * LANES;
 
 /// Draws all samples of one sheet into the part `rect` of `strip`, behind what it holds.
 ///
@@ -41,17 +45,18 @@ const GROUP: usize = 8 * LANES;
 #[inline(always)]
 pub(crate) fn draw_rows<S: Simd>(simd: S, paint: &Paint, rect: Rect, strip: &mut Strip) {
     let start = rect.x / LANES * LANES;
+    let mut band = Band::new(paint);
     for group in (start..rect.right()).step_by(GROUP) {
         let end = (group + GROUP).min(rect.right());
         match paint.drawn {
-            Drawn::Flame => draw_bands(simd, paint, group..end, rect, strip),
+            Drawn::Flame => draw_bands(simd, paint, group..end, rect, &mut band, strip),
             _ => draw_each_row(simd, paint, group..end, rect, strip),
         }
     }
 }
 
 #[inline(always)]
-fn draw_each_row<S: Simd>(simd: S, paint: &Paint, columns: std::ops::Range<usize>, rect: Rect, strip: &mut Strip) {
+fn draw_each_row<S: Simd>(simd: S, paint: &Paint, columns: Range<usize>, rect: Rect, strip: &mut Strip) {
     for y in rect.y..rect.bottom() {
         for column in columns.clone().step_by(LANES) {
             let mut sums = Sums::new(simd);
@@ -66,68 +71,107 @@ fn draw_each_row<S: Simd>(simd: S, paint: &Paint, columns: std::ops::Range<usize
     }
 }
 
+/// Sixteen points of one sample, and how far they are from the camera.
+#[derive(Clone, Copy)]
+struct Spot<S: Simd> {
+    place: Place<S>,
+    depth: Lanes<S>,
+}
+
+/// What is known of the rows of a band, batch after batch and in each all samples.
+struct Band<S: Simd> {
+    /// Exact places on the first row.
+    first: Vec<Spot<S>>,
+    /// How they differ on the first row of the next band.
+    change: Vec<Spot<S>>,
+    /// Exact places on that row.
+    next: Vec<Spot<S>>,
+}
+
+impl<S: Simd> Band<S> {
+    /// Room for a group of columns.
+    #[inline(always)]
+    fn new(paint: &Paint) -> Self {
+        let room = || Vec::with_capacity(GROUP / LANES * paint.samples.len());
+        Self { first: room(), change: room(), next: room() }
+    }
+
+    /// Forgets both rows: what comes next does not follow on them.
+    #[inline(always)]
+    fn clear(&mut self) {
+        self.first.clear();
+        self.next.clear();
+    }
+
+    /// Moves on to the band that begins at `row`.
+    #[inline(always)]
+    fn advance(&mut self, simd: S, paint: &Paint, columns: &Range<usize>, row: usize) {
+        std::mem::swap(&mut self.first, &mut self.next);
+        if self.first.is_empty() {
+            add_spots(simd, paint, columns, row, &mut self.first);
+        }
+        self.next.clear();
+        self.change.clear();
+        if paint.band > 1 {
+            add_spots(simd, paint, columns, row + paint.band, &mut self.next);
+            for (first, next) in self.first.iter().zip(&self.next) {
+                self.change.push(Spot { place: next.place.less(&first.place), depth: next.depth - first.depth });
+            }
+        }
+    }
+}
+
 /// Draws the flame in some columns, band after band; the last row of a band is the first of the next.
 #[inline(always)]
-fn draw_bands<S: Simd>(simd: S, paint: &Paint, columns: std::ops::Range<usize>, rect: Rect, strip: &mut Strip) {
+fn draw_bands<S: Simd>(
+    simd: S,
+    paint: &Paint,
+    columns: Range<usize>,
+    rect: Rect,
+    band: &mut Band<S>,
+    strip: &mut Strip,
+) {
+    band.clear();
     let batches = columns.len().div_ceil(LANES);
-    let mut upper: Vec<(Place<S>, Lanes<S>)> = Vec::new();
-    let mut lower: Vec<(Place<S>, Lanes<S>)> = Vec::new();
     for first in (rect.y / paint.band * paint.band..rect.bottom()).step_by(paint.band) {
-        let rows = first.max(rect.y)..(first + paint.band).min(rect.bottom());
         if paint.samples.iter().all(|sample| dark(paint.shape, sample, &columns, [first, first + paint.band])) {
-            lower.clear();
+            band.clear();
             continue;
         }
-        std::mem::swap(&mut upper, &mut lower);
-        lower.clear();
-        if upper.is_empty() {
-            add_places(simd, paint, &columns, first, &mut upper);
-        }
-        if paint.band > 1 {
-            add_places(simd, paint, &columns, first + paint.band, &mut lower);
-        }
-        for row in rows.clone() {
+        band.advance(simd, paint, &columns, first);
+        for row in first.max(rect.y)..(first + paint.band).min(rect.bottom()) {
             let part = (row - first) as f32 / paint.band as f32;
             for batch in 0..batches {
                 let share = batch * paint.samples.len()..(batch + 1) * paint.samples.len();
-                let ends = [&upper[share.clone()], lower.get(share).unwrap_or(&[])];
-                expose(simd, paint, ends, part).compose(columns.start + batch * LANES, row, rect, paint.absorbs, strip);
+                let change = band.change.get(share.clone()).unwrap_or(&[]);
+                let sums = expose(simd, paint, &band.first[share], change, part);
+                sums.compose(columns.start + batch * LANES, row, rect, paint.absorbs, strip);
             }
-        }
-        if paint.band == 1 {
-            upper.clear();
         }
     }
 }
 
 /// Exact places of all samples on a row, batch after batch.
 #[inline(always)]
-fn add_places<S: Simd>(
-    simd: S,
-    paint: &Paint,
-    columns: &std::ops::Range<usize>,
-    row: usize,
-    places: &mut Vec<(Place<S>, Lanes<S>)>,
-) {
+fn add_spots<S: Simd>(simd: S, paint: &Paint, columns: &Range<usize>, row: usize, spots: &mut Vec<Spot<S>>) {
     for column in columns.clone().step_by(LANES) {
         for sample in paint.samples {
             let batch = sample.mapping.batch(simd, column, row);
-            places.push((place(paint.shape, &sample.state, &batch), batch.depth));
+            spots.push(Spot { place: place(paint.shape, &sample.state, &batch), depth: batch.depth });
         }
     }
 }
 
 /// Averages all samples of sixteen pixels `part` of the way between two exact rows.
 #[inline(always)]
-fn expose<S: Simd>(simd: S, paint: &Paint, ends: [&[(Place<S>, Lanes<S>)]; 2], part: f32) -> Sums<S> {
+fn expose<S: Simd>(simd: S, paint: &Paint, spots: &[Spot<S>], changes: &[Spot<S>], part: f32) -> Sums<S> {
     let mut sums = Sums::new(simd);
-    for (index, sample) in paint.samples.iter().enumerate() {
-        let (upper, depth) = &ends[0][index];
-        let (place, depth) = match ends[1].get(index) {
-            Some((lower, lower_depth)) if part > 0.0 => {
-                (upper.toward(lower, part), (*lower_depth - *depth).fused(depth.like(part), *depth))
+    for (index, (sample, spot)) in paint.samples.iter().zip(spots).enumerate() {
+        let (place, depth) = match changes.get(index) {
+            Some(change) => {
+                (spot.place.moved(part, &change.place), change.depth.fused(spot.depth.like(part), spot.depth))
             }
-            _ => (*upper, *depth),
+            None => (spot.place, spot.depth),
         };
         if let Some(shade) = shade_place(paint.shape, paint.ramp, &sample.state, &place) {
             sums.add(&shade, depth, sample.luminance, paint.samples.len());
@@ -138,7 +182,7 @@ fn expose<S: Simd>(simd: S, paint: &Paint, ends: [&[(Place<S>, Lanes<S>)]; 2], p
 
 /// Whether no flame can be in some columns between two rows.
 #[inline(always)]
-fn dark(shape: &Shape, sample: &Sample, columns: &std::ops::Range<usize>, rows: [usize; 2]) -> bool {
+fn dark(shape: &Shape, sample: &Sample, columns: &Range<usize>, rows: [usize; 2]) -> bool {
     let (mut x, mut y) = ([0.0; 6], [0.0; 6]);
     let middle = (columns.start + columns.end) / 2;
     for (k, column) in [columns.start, middle, columns.end].into_iter().enumerate() {

@@ -14,7 +14,7 @@ use super::{
     lanes::{Lanes, Real},
     parameters::{FlameSheetParameters, ShapeParameters},
     shape::Shape,
-    tables::{CurvePair, SEGMENTS},
+    tables::{CurvePair, SEGMENTS, locate_near},
 };
 
 /// The waves of one flame: its edges P (15), its tip's wandering and its height's flicker.
@@ -99,7 +99,7 @@ impl Moment {
     /// The point of the unbent, usual flame that (x, y) of the sheet shows.
     #[inline(always)]
     pub(crate) fn straighten<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
-        let [centre, _] = self.centre.near(y);
+        let [centre, _] = self.centre.near(&locate_near(y));
         (x - centre, y * y.like(self.squeeze))
     }
 

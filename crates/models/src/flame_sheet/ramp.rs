@@ -2,10 +2,10 @@
 
 use bansho_base::{color, math};
 
-use fearless_simd::{Simd, prelude::*};
+use fearless_simd::Simd;
 
 use super::{
-    lanes::{LANES, Lanes, Real, fetch, nearest_whole},
+    lanes::{Lanes, Real, fetch, nearest_whole},
     parameters::{ColourParameters, Colouring, StageShown, TextureParameters},
     shape::from_origin,
     tables::CurvePair,
@@ -109,8 +109,6 @@ impl Ramp {
     #[inline(always)]
     pub(crate) fn light<S: Simd>(&self, t1: Lanes<S>) -> [Lanes<S>; 4] {
         let place = t1.held() * t1.like((LEVELS - 1) as f32);
-        let mut index = [0; LANES];
-        nearest_whole(place).store_slice(&mut index);
-        fetch(t1.simd, &self.light, &index)
+        fetch(t1.simd, &self.light, nearest_whole(place))
     }
 }

@@ -8,7 +8,7 @@ use super::{
     chain,
     lanes::{Lanes, Real, any_positive},
     parameters::{ColourParameters, Colouring, ShapeParameters, TextureParameters},
-    tables::CurvePair,
+    tables::{CurvePair, locate_near},
 };
 use crate::fault::{FaultKind, ParameterFault};
 
@@ -91,11 +91,6 @@ pub(crate) struct Place<S: Simd> {
     above: Lanes<S>,
 }
 
-#[inline(always)]
-fn between<S: Simd>(part: f32, a: Lanes<S>, b: Lanes<S>) -> Lanes<S> {
-    (b - a).fused(a.like(part), a)
-}
-
 impl<S: Simd> Place<S> {
     /// Share of the pixels that lies inside; 0 outside.
     #[inline(always)]
@@ -105,20 +100,28 @@ impl<S: Simd> Place<S> {
         (self.side + half).held() * (self.above + half).held() * top
     }
 
-    /// `part` of the way toward `other`.
+    /// Moved by `part` of a change.
     #[inline(always)]
-    pub(crate) fn toward(&self, other: &Self, part: f32) -> Self {
+    pub(crate) fn moved(&self, part: f32, change: &Self) -> Self {
+        self.with(change, |value, change| change.fused(value.like(part), value))
+    }
+
+    /// The change from `other` to this place.
+    #[inline(always)]
+    pub(crate) fn less(&self, other: &Self) -> Self {
+        self.with(other, |value, other| value - other)
+    }
+
+    #[inline(always)]
+    fn with(&self, other: &Self, join: impl Fn(Lanes<S>, Lanes<S>) -> Lanes<S>) -> Self {
         Self {
-            u: between(part, self.u, other.u),
-            w: between(part, self.w, other.w),
-            threshold: between(part, self.threshold, other.threshold),
-            glow: between(part, self.glow, other.glow),
-            cooling: [
-                between(part, self.cooling[0], other.cooling[0]),
-                between(part, self.cooling[1], other.cooling[1]),
-            ],
-            side: between(part, self.side, other.side),
-            above: between(part, self.above, other.above),
+            u: join(self.u, other.u),
+            w: join(self.w, other.w),
+            threshold: join(self.threshold, other.threshold),
+            glow: join(self.glow, other.glow),
+            cooling: [join(self.cooling[0], other.cooling[0]), join(self.cooling[1], other.cooling[1])],
+            side: join(self.side, other.side),
+            above: join(self.above, other.above),
         }
     }
 }
@@ -165,11 +168,11 @@ impl Shape {
     #[inline(always)]
     fn slowed_rise<S: Simd>(&self, distance: Lanes<S>, y: Lanes<S>) -> Lanes<S> {
         let rise = chain::rise(y, self.initial_speed);
-        let [core, fringe] = self.widths.near(rise);
+        let [core, fringe] = self.widths.near(&locate_near(rise));
         if !any_positive(distance - core) {
             return rise;
         }
-        let [falling, _] = self.falling.near(chain::fringe_place(distance, core, fringe));
+        let [falling, _] = self.falling.near(&locate_near(chain::fringe_place(distance, core, fringe)));
         chain::slowed_rise(rise, chain::speed_profile(falling, self.edge_speed))
     }
 
@@ -194,12 +197,14 @@ impl Shape {
     pub(crate) fn place<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>, edges: &CurvePair, pixel: [f32; 2]) -> Place<S> {
         let distance = chain::axis_distance(x);
         let w = self.slowed_rise(distance, y.held());
-        let ([left, right], [vertical, glow], cooling) = (edges.near(w), self.heights.near(w), self.cooling.near(w));
+        let at = locate_near(w);
+        let ([left, right], [vertical, glow], cooling) =
+            (edges.near(&at), self.heights.near(&at), self.cooling.near(&at));
         let (half, one) = (x.like(0.5), x.like(1.0));
         let edge = x.choose(half, left, right);
         let side = (edge - distance) * x.like(1.0 / pixel[0]);
         let across = chain::across(distance, edge).least(one);
-        let [horizontal, _] = self.across.near(across);
+        let [horizontal, _] = self.across.near(&locate_near(across));
         let threshold = chain::threshold(vertical, horizontal);
         Place { u: chain::texture_u(across, x), w, threshold, glow, cooling, side, above: y * x.like(1.0 / pixel[1]) }
     }

@@ -1,8 +1,8 @@
 //! Curves over [0, 1] as tables, two side by side so that one load fetches both at one place.
 
-use fearless_simd::{Simd, prelude::*};
+use fearless_simd::{Simd, u32x16};
 
-use super::lanes::{LANES, Lanes, Real, any_positive, fetch, wrap_split};
+use super::lanes::{Lanes, Real, any_positive, fetch, wrap_split};
 
 /// Straight pieces of a table.
 pub(crate) const SEGMENTS: usize = 512;
@@ -17,7 +17,7 @@ pub(crate) struct CurvePair {
 
 /// Pieces of a table and the places in them.
 pub(crate) struct Located<S: Simd> {
-    piece: [u32; LANES],
+    piece: u32x16<S>,
     part: Lanes<S>,
 }
 
@@ -26,9 +26,24 @@ pub(crate) struct Located<S: Simd> {
 pub(crate) fn locate<S: Simd>(x: Lanes<S>) -> Located<S> {
     let place = x.greatest(x.like(0.0)).least(x.like(LAST)) * x.like(SEGMENTS as f32);
     let (piece, part) = wrap_split(place, SEGMENTS as u32 - 1);
-    let mut pieces = [0; LANES];
-    piece.store_slice(&mut pieces);
-    Located { piece: pieces, part }
+    Located { piece, part }
+}
+
+/// Where sixteen places lie that are often all the same, as the heights of a level row of pixels: then one look-up serves.
+pub(crate) enum Near<S: Simd> {
+    /// All at one place.
+    Same(f32, Lanes<S>),
+    /// Each at its own.
+    Apart(Located<S>),
+}
+
+/// Whether sixteen places are the same in any table, and where they lie.
+#[inline(always)]
+pub(crate) fn locate_near<S: Simd>(x: Lanes<S>) -> Near<S> {
+    /// Spread within which one look-up serves all: a twentieth of a piece.
+    const STEADY: f32 = 0.05 / SEGMENTS as f32;
+    let first = x.like(x[0]);
+    if any_positive((x - first).size() - x.like(STEADY)) { Near::Apart(locate(x)) } else { Near::Same(x[0], first) }
 }
 
 impl CurvePair {
@@ -56,7 +71,7 @@ impl CurvePair {
     /// Both functions at located places.
     #[inline(always)]
     pub(crate) fn fetch<S: Simd>(&self, at: &Located<S>) -> [Lanes<S>; 2] {
-        let [first, first_rise, second, second_rise] = fetch(at.part.simd, &self.pieces, &at.piece);
+        let [first, first_rise, second, second_rise] = fetch(at.part.simd, &self.pieces, at.piece);
         [first_rise.fused(at.part, first), second_rise.fused(at.part, second)]
     }
 
@@ -66,24 +81,20 @@ impl CurvePair {
         self.fetch(&locate(x))
     }
 
-    /// Both functions at places that are often all the same, as the heights of a level row of pixels: then one look-up serves.
+    /// Both functions at places that are often all the same.
     #[inline(always)]
-    pub(crate) fn near<S: Simd>(&self, x: Lanes<S>) -> [Lanes<S>; 2] {
-        /// Spread within which one look-up serves all: a twentieth of a piece.
-        const STEADY: f32 = 0.05 / SEGMENTS as f32;
-        let first = x.like(x[0]);
-        if any_positive((x - first).size() - x.like(STEADY)) {
-            return self.sample_apart(x);
+    pub(crate) fn near<S: Simd>(&self, at: &Near<S>) -> [Lanes<S>; 2] {
+        match at {
+            Near::Same(x, lanes) => self.at(*x).map(|value| lanes.like(value)),
+            Near::Apart(located) => self.fetch_apart(located),
         }
-        let [value, other] = self.at(x[0]);
-        [x.like(value), x.like(other)]
     }
 
-    /// [`sample`](Self::sample), out of line.
-    fn sample_apart<S: Simd>(&self, x: Lanes<S>) -> [Lanes<S>; 2] {
-        x.simd.vectorize(
+    /// [`fetch`](Self::fetch), out of line.
+    fn fetch_apart<S: Simd>(&self, at: &Located<S>) -> [Lanes<S>; 2] {
+        at.part.simd.vectorize(
             #[inline(always)]
-            || self.sample(x),
+            || self.fetch(at),
         )
     }
 
@@ -100,6 +111,8 @@ impl CurvePair {
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::SimdBase;
+
     use super::*;
     use crate::flame_sheet::lanes::{plain, ramp};
 
@@ -115,7 +128,7 @@ mod tests {
             assert!((line - x).abs() < 1e-6 && (parabola - (1.0 - x * x)).abs() < 2e-6);
             let batch = plain!(simd => table.sample(Lanes::splat(simd, x)).map(|values| values[7]));
             assert!((batch[0] - line).abs() < 1e-6 && (batch[1] - parabola).abs() < 1e-6);
-            let near = plain!(simd => table.near(ramp(simd, x, 1e-5)).map(|values| values[11]));
+            let near = plain!(simd => table.near(&locate_near(ramp(simd, x, 1e-5))).map(|values| values[11]));
             assert!((near[0] - line).abs() < 2e-4 && (near[1] - parabola).abs() < 4e-4, "{near:?}");
         }
     }

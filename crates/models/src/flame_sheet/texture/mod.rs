@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 pub use paper::{PaperTexture, paper_texture};
 
-use fearless_simd::{Simd, prelude::*};
+use fearless_simd::Simd;
 
-use super::lanes::{LANES, Lanes, Real, fetch, wrap_split};
+use super::lanes::{Lanes, Real, fetch, wrap_split};
 
 pub(crate) use fractal::{FRACTAL, FractalLayers};
 pub(crate) use paper::PaperLayer;
@@ -51,9 +51,8 @@ impl TextureTable {
     pub(crate) fn sample<S: Simd>(&self, column: Lanes<S>, row: Lanes<S>) -> Lanes<S> {
         let (left, across) = wrap_split(column, COLUMNS as u32 - 1);
         let (below, up) = wrap_split(row, ROWS as u32 - 1);
-        let mut index = [0; LANES];
-        (below * COLUMNS as u32 + left).store_slice(&mut index);
-        let [low_left, low_right, high_left, high_right] = fetch(column.simd, &self.corners, &index);
+        let index = below * COLUMNS as u32 + left;
+        let [low_left, low_right, high_left, high_right] = fetch(column.simd, &self.corners, index);
         let low = (low_right - low_left).fused(across, low_left);
         let high = (high_right - high_left).fused(across, high_left);
         (high - low).fused(up, low)
@@ -138,6 +137,8 @@ impl Texture {
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::SimdBase;
+
     use super::*;
     use crate::flame_sheet::lanes::plain;
 
