@@ -12,6 +12,9 @@ const FALL: f64 = 5.5;
 /// Least distance of nodes as a share of the region's radius: gusts that are finer are smoothed.
 const FINEST: f64 = 0.4;
 
+/// Furthest displacement in distances of nodes: storms may shake rain about, but must not fetch it from far outside the region.
+const FURTHEST: f64 = 1.5;
+
 /// Gusts around the camera at one time: on nodes that are fixed in the world, straight between them.
 #[derive(Clone, Debug)]
 pub(crate) struct Gusts {
@@ -35,7 +38,8 @@ impl Gusts {
         let node = |index: usize| {
             let place = [index % columns, index / columns % rows, index / columns / rows];
             let point = DVec3::from(std::array::from_fn(|axis| (first[axis] + place[axis] as i64) as f64 * spacing));
-            along_the_way(wind, point, t).map(|vector| vector * response)
+            let [displacement, velocity] = along_the_way(wind, point, t).map(|vector| vector * response);
+            [held(displacement, FURTHEST * spacing), velocity]
         };
         Some(Self { spacing, first, count, nodes: (0..columns * rows * layers).map(node).collect() })
     }
@@ -89,6 +93,12 @@ fn displacement(wind: &Wind, point: DVec3, t: f64) -> DVec3 {
     (0..STEPS).map(part).sum()
 }
 
+/// As it is up to half of `most`, beyond that ever less more, never as long as `most`.
+fn held(vector: DVec3, most: f64) -> DVec3 {
+    let (length, half) = (vector.length(), 0.5 * most);
+    if length <= half { vector } else { vector * ((most - half * half / length) / length) }
+}
+
 /// Without what is up or down: near the ground wind is level.
 fn level(vector: DVec3) -> DVec3 {
     DVec3::new(vector.x, 0.0, vector.z)
@@ -102,6 +112,25 @@ mod tests {
     fn wind(gust: f64) -> Wind {
         let velocity = Animated::from([5.0, 0.0, 0.0]);
         Wind::new(WindParameters { velocity, gust, ..WindParameters::default() }, 3, None)
+    }
+
+    #[test]
+    fn displacements_are_held_smoothly() {
+        let along = |length: f64| held(DVec3::X * length, 3.0).x;
+        assert_eq!((along(0.0), along(1.5)), (0.0, 1.5));
+        // 3 - 1.5^2 / 3 at twice the half, with the slope 1 where it begins to bend.
+        assert!((along(3.0) - 2.25).abs() < 1e-12 && (along(1.5 + 1e-6) - 1.5 - 1e-6).abs() < 1e-11);
+        assert!(along(1e6) < 3.0 && along(1e6) > 2.99);
+    }
+
+    #[test]
+    fn storms_fetch_no_rain_from_far_away() {
+        let velocity = Animated::from([90.0, 0.0, 40.0]);
+        let storm = Wind::new(WindParameters { velocity, gust: 0.9, ..WindParameters::default() }, 3, None);
+        let gusts = Gusts::new(&storm, 1.0, DVec3::ZERO, 7.0, 1.0).expect("gusts");
+        assert!(gusts.reach() < FURTHEST * gusts.spacing && gusts.reach() > 0.5 * FURTHEST * gusts.spacing);
+        let fastest = gusts.nodes.iter().map(|[_, velocity]| velocity.length()).fold(0.0, f64::max);
+        assert!(fastest > 20.0, "{fastest}");
     }
 
     #[test]
