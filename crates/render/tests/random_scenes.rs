@@ -66,7 +66,7 @@ fn scene(seed: u64) -> String {
     }
     for (index, kind) in KINDS.iter().enumerate() {
         let mut table = sample((kind.table)(), &mut uniform);
-        few_particles(&mut table, kind.key);
+        keep_small(&mut table, kind.key);
         // Most random shapes are refused: flames wider than their sheet, auroras that cross. Most scenes do without, so that they are drawn.
         if !seed.is_multiple_of(4) {
             table.entries.retain(|entry| !["shape", "shapes"].contains(&entry.key.as_str()));
@@ -79,20 +79,37 @@ fn scene(seed: u64) -> String {
     text
 }
 
-/// Keeps a simulation short, and without meshes, which random tables cannot name.
-fn few_particles(table: &mut Table, kind: &str) {
-    if kind == "flame_particles" {
-        table.entries.retain(|entry| !["particles", "burners", "step_s", "preroll_s"].contains(&entry.key.as_str()));
-        table.push("particles", Value::Integer(60));
-        table.push("preroll_s", Value::Number(0.2));
+/// Keeps a simulation short and rain near, and leaves out meshes, which random tables cannot name.
+fn keep_small(table: &mut Table, kind: &str) {
+    let mut drop = |keys: &[&str]| table.entries.retain(|entry| !keys.contains(&entry.key.as_str()));
+    match kind {
+        "flame_particles" => {
+            drop(&["particles", "burners", "step_s", "preroll_s"]);
+            table.push("particles", Value::Integer(60));
+            table.push("preroll_s", Value::Number(0.2));
+        }
+        "rain" => drop(&["distance"]),
+        "aurora" => {
+            drop(&["particles", "preroll_s"]);
+            table.push("particles", one("count", 500));
+            table.push("preroll_s", Value::Number(0.1));
+            match table.entries.iter_mut().find(|entry| entry.key == "field").map(|entry| &mut entry.node.value) {
+                Some(Value::Table(field)) => {
+                    field.entries.retain(|entry| entry.key != "cells");
+                    field.push("cells", Value::Integer(48));
+                }
+                _ => table.push("field", one("cells", 48)),
+            }
+        }
+        _ => {}
     }
-    if kind == "aurora" {
-        table.entries.retain(|entry| !["particles", "preroll_s"].contains(&entry.key.as_str()));
-        let mut particles = Table::default();
-        particles.push("count", Value::Integer(500));
-        table.push("particles", Value::Table(particles));
-        table.push("preroll_s", Value::Number(0.1));
-    }
+}
+
+/// A table of one whole number.
+fn one(key: &str, value: i64) -> Value {
+    let mut table = Table::default();
+    table.push(key, Value::Integer(value));
+    Value::Table(table)
 }
 
 fn lines(header: &str, table: &Table) -> String {
