@@ -17,15 +17,16 @@ use bansho_render::{
 };
 use rayon::prelude::*;
 
-/// How many, unless `BANSHO_RANDOM_SCENES` says otherwise, as in `.ci/run` and `.ci/long`.
+/// How many are drawn, unless `BANSHO_RANDOM_SCENES` says otherwise, as in `.ci/run` and `.ci/long`.
 const SCENES: u64 = 250;
 
 #[test]
 fn random_valid_scenes_draw_finite_pictures() {
-    let asked = std::env::var("BANSHO_RANDOM_SCENES").ok().and_then(|count| count.parse().ok());
-    let drawn: usize = (0..asked.unwrap_or(SCENES)).into_par_iter().filter(|&seed| draw(&scene(seed))).count();
-    // Some parameters do not go together, such as core and fringe wider than the sheet, and are refused.
-    assert!(drawn > 50, "only {drawn} scenes were drawn");
+    let asked = std::env::var("BANSHO_RANDOM_SCENES").ok().and_then(|count| count.parse().ok()).unwrap_or(SCENES);
+    // Some parameters do not go together, such as core and fringe wider than the sheet, and are refused: fewer than one scene in four.
+    let tried = asked + asked.div_ceil(3);
+    let drawn = (0..tried).into_par_iter().filter(|&seed| draw(&scene(seed))).count() as u64;
+    assert!(drawn >= asked, "only {drawn} of {tried} scenes were valid");
 }
 
 /// Draws a frame of a scene that is valid; `false` for one whose parameters do not go together.
@@ -60,8 +61,9 @@ fn scene(seed: u64) -> String {
     for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate") {
         let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
         let mut table = sample((shared.table)(), &mut uniform);
-        // Random tables name no files, so no obstacle can be a mesh.
-        table.entries.retain(|entry| shared.key != "obstacle" || entry.key != "shape");
+        // Random tables name no files, so no obstacle can be a mesh; the picture's size is whole and given anyhow.
+        let left_out = [("obstacle", "shape"), ("picture", "size")];
+        table.entries.retain(|entry| !left_out.contains(&(shared.key, &entry.key)));
         text += &lines(&header, &table);
     }
     for (index, kind) in KINDS.iter().enumerate() {
@@ -84,11 +86,11 @@ fn keep_small(table: &mut Table, kind: &str) {
     let mut drop = |keys: &[&str]| table.entries.retain(|entry| !keys.contains(&entry.key.as_str()));
     match kind {
         "flame_particles" => {
-            drop(&["particles", "burners", "step_s", "preroll_s"]);
+            drop(&["particles", "burners", "step_s", "preroll_s", "domain_min", "domain_max"]);
             table.push("particles", Value::Integer(60));
             table.push("preroll_s", Value::Number(0.2));
         }
-        "rain" => drop(&["distance"]),
+        "rain" => drop(&["distance", "diameters_mm"]),
         "aurora" => {
             drop(&["particles", "preroll_s"]);
             table.push("particles", one("count", 500));

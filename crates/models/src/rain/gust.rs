@@ -44,9 +44,35 @@ impl Gusts {
         Some(Self { spacing, first, count, nodes: (0..columns * rows * layers).map(node).collect() })
     }
 
-    /// The furthest displacement at any node, m.
-    pub(crate) fn reach(&self) -> f64 {
-        self.nodes.iter().map(|[displacement, _]| displacement.length()).fold(0.0, f64::max)
+    /// A box that holds every point which is displaced into the box between two corners.
+    pub(crate) fn origins(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
+        /// After these the box no longer shrinks by much.
+        const ROUNDS: usize = 8;
+        // Displacements anywhere first, then those within the box that this leaves, and so on.
+        let mut origins = [DVec3::splat(f64::NEG_INFINITY), DVec3::splat(f64::INFINITY)];
+        for _ in 0..ROUNDS {
+            let [least, most] = self.range(origins);
+            origins = [low - most, high - least];
+        }
+        origins
+    }
+
+    /// Least and greatest displacement along each axis within a box: between nodes it is straight along every axis, so the ends lie at nodes and
+    /// on the box's corners.
+    fn range(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
+        let ends = |axis: usize| {
+            let node = |index: usize| (self.first[axis] + index as i64) as f64 * self.spacing;
+            let inside = (0..self.count[axis]).map(node).filter(move |place| *place > low[axis] && *place < high[axis]);
+            let border = [low[axis], high[axis]].map(|place| place.clamp(node(0), node(self.count[axis] - 1)));
+            inside.chain(border).collect::<Vec<f64>>()
+        };
+        let [xs, ys, zs] = [0, 1, 2].map(ends);
+        let mut range = [DVec3::splat(f64::INFINITY), DVec3::splat(f64::NEG_INFINITY)];
+        for point in xs.iter().flat_map(|x| ys.iter().flat_map(|y| zs.iter().map(|z| DVec3::new(*x, *y, *z)))) {
+            let [displacement, _] = self.at(point);
+            range = [range[0].min(displacement), range[1].max(displacement)];
+        }
+        range
     }
 
     /// Displacement (m) and velocity (m/s) at a point.
@@ -107,11 +133,22 @@ fn level(vector: DVec3) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bansho_base::{animation::Animated, wind::WindParameters};
+    use bansho_base::{
+        animation::Animated,
+        random::{Key, Purpose},
+        wind::WindParameters,
+    };
 
     fn wind(gust: f64) -> Wind {
         let velocity = Animated::from([5.0, 0.0, 0.0]);
         Wind::new(WindParameters { velocity, gust, ..WindParameters::default() }, 3, None)
+    }
+
+    impl Gusts {
+        /// The furthest displacement at any node, m.
+        fn reach(&self) -> f64 {
+            self.nodes.iter().map(|[displacement, _]| displacement.length()).fold(0.0, f64::max)
+        }
     }
 
     #[test]
@@ -121,6 +158,31 @@ mod tests {
         // 3 - 1.5^2 / 3 at twice the half, with the slope 1 where it begins to bend.
         assert!((along(3.0) - 2.25).abs() < 1e-12 && (along(1.5 + 1e-6) - 1.5 - 1e-6).abs() < 1e-11);
         assert!(along(1e6) < 3.0 && along(1e6) > 2.99);
+    }
+
+    #[test]
+    fn origins_hold_all_that_is_displaced_into_a_box_and_little_else() {
+        let (low, high) = (DVec3::splat(-2.0), DVec3::splat(2.0));
+        for (gust_length, slack) in [(6.0, 3.0), (900.0, 0.1)] {
+            let velocity = Animated::from([60.0, 0.0, 20.0]);
+            let storm =
+                Wind::new(WindParameters { velocity, gust: 0.9, gust_length, ..WindParameters::default() }, 3, None);
+            let gusts = Gusts::new(&storm, 1.0, DVec3::ZERO, 7.0, 1.0).expect("gusts");
+            let [first, last] = gusts.origins([low, high]);
+            assert!((last - first - (high - low)).max_element() < slack * gusts.reach(), "{first} {last}");
+            let mut hits = 0;
+            for i in 0..20_000 {
+                let u = Key::new(5, "gust").uniforms(i, 0, Purpose(0)).map(f64::from);
+                let share = 2.0 * DVec3::new(u[0], u[1], u[2]) - 0.5;
+                let point = first + (last - first) * share;
+                let moved = point + gusts.at(point)[0];
+                if moved.cmpge(low).all() && moved.cmple(high).all() {
+                    hits += 1;
+                    assert!(point.cmpge(first).all() && point.cmple(last).all(), "{point}");
+                }
+            }
+            assert!(hits > 20, "{hits}");
+        }
     }
 
     #[test]

@@ -118,19 +118,19 @@ impl Moment {
     /// Cells of a class that may show within a ball, nearest to the camera first, with the distances of their middles from it.
     pub(crate) fn cells(&self, class: &ClassNow, Ball { centre, radius: distance }: Ball) -> Vec<(f64, Cell)> {
         let eye = self.sight.middle().position;
-        let reach = distance + CELL_RADIUS + self.gusts.as_ref().map_or(0.0, Gusts::reach);
+        let reach = distance + CELL_RADIUS;
+        let around = [centre - reach, centre + reach];
+        let [low, high] = self.gusts.as_ref().map_or(around, |gusts| gusts.origins(around));
         let fall = class.speed * self.sight.exposure;
         let radius = CELL_RADIUS + fall + 0.5 * self.sight.velocity().length() * self.sight.exposure;
-        let bottom = (centre.y - reach).max(self.ground - CELL);
-        let row = |y: f64| class.lattice.place(DVec3::new(centre.x, y, centre.z)).y.floor() as i64;
-        let rows = [bottom, centre.y + reach].map(row);
+        let row = |y: f64| class.lattice.place(DVec3::new(low.x, y, low.z)).y.floor() as i64;
+        let rows = [low.y.max(self.ground - CELL), high.y].map(row);
         let mut cells = Vec::new();
         for row in rows[0]..=rows[1] {
             let height = class.lattice.world(DVec3::new(0.0, row as f64, 0.0)).y;
-            let middle = class.lattice.place(DVec3::new(centre.x, height, centre.z));
-            let range = |place: f64| (place - reach / CELL).floor() as i64..=(place + reach / CELL).floor() as i64;
-            for x in range(middle.x) {
-                for z in range(middle.z) {
+            let [first, last] = [low, high].map(|corner| class.lattice.place(DVec3::new(corner.x, height, corner.z)));
+            for x in first.x.floor() as i64..=last.x.floor() as i64 {
+                for z in first.z.floor() as i64..=last.z.floor() as i64 {
                     let place = DVec3::new(x as f64 + 0.5, row as f64 + 0.5, z as f64 + 0.5);
                     let (point, _) = self.drop(class, place);
                     if (point - centre).length() < distance + CELL_RADIUS && self.sight.may_see(point, radius) {
