@@ -3,9 +3,11 @@
 
 Reads what criterion measured in the same run, so that the speed of the machine does not matter.
 Usage: ratios.py CRITERION_DIR RATIOS_FILE
+       ratios.py --select RATIOS_FILE       which benchmarks to run for that
 """
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -20,26 +22,40 @@ def medians(folder):
     return found
 
 
-def main():
-    measured = medians(Path(sys.argv[1]))
-    failed = False
-    for line in Path(sys.argv[2]).read_text().splitlines():
+def pairs(path):
+    """What the file asks: names of the fast and the naive way, and how many times faster the one must be."""
+    for line in Path(path).read_text().splitlines():
         line = line.split("#")[0].strip()
-        if not line:
-            continue
-        fast, naive, floor = (part.strip() for part in line.split("|"))
+        if line:
+            fast, naive, floor = (part.strip() for part in line.split("|"))
+            yield fast, naive, float(floor)
+
+
+def selection(path):
+    """A regular expression for exactly the benchmarks that the file names."""
+    names = {re.escape(name) for fast, naive, _ in pairs(path) for name in (fast, naive)}
+    return f"^({'|'.join(sorted(names))})$"
+
+
+def holds(folder, path):
+    """Whether every pair of the file holds in what was measured."""
+    measured = medians(Path(folder))
+    good = True
+    for fast, naive, floor in pairs(path):
         missing = [name for name in (fast, naive) if name not in measured]
         if missing:
             print(f"FAIL  no such benchmark: {', '.join(missing)}; measured: {', '.join(sorted(measured))}")
-            failed = True
+            good = False
             continue
         ratio = measured[naive] / measured[fast]
-        good = ratio >= float(floor)
-        failed |= not good
-        print(f"{'ok  ' if good else 'FAIL'}  {fast}: {measured[fast] / 1e6:.3f} ms, {ratio:.1f} times faster than "
-              f"`{naive}` (at least {floor})")
-    return failed
+        good &= ratio >= floor
+        print(f"{'ok  ' if ratio >= floor else 'FAIL'}  {fast}: {measured[fast] / 1e6:.3f} ms, {ratio:.1f} times faster than "
+              f"`{naive}` (at least {floor:g})")
+    return good
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    if sys.argv[1] == "--select":
+        print(selection(sys.argv[2]))
+    else:
+        sys.exit(not holds(sys.argv[1], sys.argv[2]))
