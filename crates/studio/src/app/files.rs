@@ -1,0 +1,243 @@
+//! The window's files: what lies where, what is kept while it is unsaved, what is rendered.
+
+use std::path::{Path, PathBuf};
+
+use eframe::egui::{self, Ui};
+
+use super::{
+    question::{Answer, Leaving, Question, answer},
+    session::Session,
+};
+use crate::{
+    document::{
+        files::{self, Recent},
+        recovery::{self, Autosave, Recovered},
+    },
+    player::shoot::{self, Shooting},
+};
+
+/// Seconds between two looks at unsaved work.
+const AUTOSAVE_S: f64 = 5.0;
+
+/// Files of the window: what lies where, and what waits to be asked.
+pub(super) struct Files {
+    pub(super) question: Option<Question>,
+    pub(super) recent: Recent,
+    autosave: Option<Autosave>,
+    pub(super) recovered: Vec<Recovered>,
+    last_kept: f64,
+    focused: bool,
+    closing: bool,
+    pub(super) shooting: Option<Shooting>,
+}
+
+impl Files {
+    /// Files of a window that keeps what it must in `home`.
+    pub(super) fn new(home: Option<PathBuf>) -> Self {
+        let unsaved = home.as_ref().map(|home| home.join("unsaved"));
+        Self {
+            question: None,
+            recovered: unsaved.as_deref().map(recovery::recoverable).unwrap_or_default(),
+            // Where nothing can be kept, the studio works without.
+            autosave: unsaved.and_then(|folder| Autosave::begin(&folder, "studio").ok()),
+            recent: home.map(|home| Recent::read(home.join("recent"))).unwrap_or_default(),
+            last_kept: 0.0,
+            focused: true,
+            closing: false,
+            shooting: None,
+        }
+    }
+
+    /// What goes on with a job, for the status line.
+    pub(super) fn progress(&self) -> Option<String> {
+        let [done, total] = self.shooting.as_ref()?.progress();
+        Some(if total == 0 { "rendering…".into() } else { format!("rendering: {done} of {total}") })
+    }
+
+    /// Asks which file to open.
+    pub(super) fn ask_to_open(&mut self) {
+        self.question = Some(Question::Open(String::new()));
+    }
+
+    /// Saves, or asks where to.
+    pub(super) fn save(&mut self, session: &mut Session) {
+        match session.path.clone() {
+            Some(path) => self.save_to(session, path),
+            None => self.question = Some(Question::SaveAs("scene.toml".into())),
+        }
+    }
+
+    fn save_to(&mut self, session: &mut Session, path: PathBuf) {
+        match files::save(&mut session.document, &path) {
+            Ok(()) => {
+                session.set_notice(None);
+                self.remember(&path);
+                if session.path.as_ref() != Some(&path) {
+                    session.path = Some(path);
+                    session.reload_assets();
+                }
+            }
+            Err(error) => session.set_notice(Some(error.to_string())),
+        }
+    }
+
+    fn remember(&mut self, path: &Path) {
+        // A list that cannot be kept is right until the window closes.
+        let _ = self.recent.note(path);
+    }
+
+    /// Opens `path`, after asking where that would lose work.
+    pub(super) fn open(&mut self, session: &mut Session, path: PathBuf) {
+        if session.document.is_dirty() {
+            self.question = Some(Question::Leave(Leaving::Open(path)));
+        } else {
+            self.open_now(session, path);
+        }
+    }
+
+    fn open_now(&mut self, session: &mut Session, path: PathBuf) {
+        match files::open(&path) {
+            Ok(document) => {
+                self.remember(&path);
+                session.open(document, Some(path));
+            }
+            Err(error) => session.set_notice(Some(error.to_string())),
+        }
+    }
+
+    /// Renders the present frame, or the whole shot, as `bansho render` does.
+    pub(super) fn render(&mut self, session: &mut Session, still: bool) {
+        let Some(path) = session.path.clone() else {
+            session.set_notice(Some("save the scene first; pictures are written beside its name, in out/".into()));
+            return;
+        };
+        let number = still.then(|| session.transport.number());
+        match Shooting::start(shoot::job(session.document.text(), &path, number), || {}) {
+            Ok(shooting) => self.shooting = Some(shooting),
+            Err(error) => session.set_notice(Some(format!("the system gives no thread to render on: {error}"))),
+        }
+    }
+
+    /// What must be done now and then, and the question that waits.
+    pub(super) fn tend(&mut self, ui: &mut Ui, session: &mut Session) {
+        self.keep_unsaved(ui, session);
+        self.watch_outside(ui, session);
+        self.take_dropped(ui, session);
+        self.hold_close(ui, session);
+        self.finish_job(ui, session);
+        self.ask(ui, session);
+    }
+
+    fn keep_unsaved(&mut self, ui: &Ui, session: &mut Session) {
+        let now = ui.input(|input| input.time);
+        if now - self.last_kept < AUTOSAVE_S {
+            return;
+        }
+        self.last_kept = now;
+        if let Some(Err(error)) =
+            self.autosave.as_ref().map(|kept| kept.keep(&session.document, session.path.as_deref()))
+        {
+            session.set_notice(Some(format!("unsaved work cannot be kept: {error}")));
+        }
+        if session.document.is_dirty() {
+            ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64(AUTOSAVE_S));
+        }
+    }
+
+    /// Looks whether another program wrote the file, whenever the window is looked at again.
+    fn watch_outside(&mut self, ui: &Ui, session: &mut Session) {
+        let focused = ui.input(|input| input.focused);
+        let back = focused && !self.focused;
+        self.focused = focused;
+        let Some(path) = session.path.clone().filter(|_| back) else { return };
+        let Some(text) = files::changed_outside(&session.document, &path) else { return };
+        if session.document.is_dirty() {
+            self.question = Some(Question::ChangedOutside(text.to_string()));
+        } else {
+            take_outside(session, &text);
+        }
+    }
+
+    fn take_dropped(&mut self, ui: &Ui, session: &mut Session) {
+        let dropped = ui.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_path_buf()));
+        let Some(path) = dropped else { return };
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            self.open(session, path);
+        } else {
+            session.lay_over(&path);
+        }
+    }
+
+    /// Closing with unsaved work asks first.
+    fn hold_close(&mut self, ui: &Ui, session: &Session) {
+        let wants = ui.input(|input| input.viewport().close_requested());
+        if wants && session.document.is_dirty() && !self.closing {
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::CancelClose);
+            self.question = Some(Question::Leave(Leaving::Close));
+        }
+    }
+
+    fn finish_job(&mut self, ui: &Ui, session: &mut Session) {
+        let Some(shooting) = &mut self.shooting else { return };
+        ui.ctx().request_repaint_after(std::time::Duration::from_millis(200));
+        if let Some(result) = shooting.finished() {
+            self.shooting = None;
+            session.set_notice(Some(match result {
+                Ok(file) => format!("written: {}", file.display()),
+                Err(reason) => reason,
+            }));
+        }
+    }
+
+    fn ask(&mut self, ui: &mut Ui, session: &mut Session) {
+        let Some(mut question) = self.question.take() else { return };
+        let answer = egui::Modal::new(ui.scope_id().with("question")).show(ui.ctx(), |ui| answer(ui, &mut question));
+        match answer.inner {
+            None if answer.should_close() => {}
+            None => self.question = Some(question),
+            Some(yes) => self.answered(ui, session, question, yes),
+        }
+    }
+
+    fn answered(&mut self, ui: &Ui, session: &mut Session, question: Question, answer: Answer) {
+        match (question, answer) {
+            (_, Answer::Cancel) => {}
+            (Question::Open(path), _) => self.open(session, PathBuf::from(path.trim())),
+            (Question::SaveAs(path), _) => self.save_to(session, PathBuf::from(path.trim())),
+            (Question::ChangedOutside(text), Answer::Do) => take_outside(session, &text),
+            (Question::ChangedOutside(_), Answer::Save) => self.save(session),
+            (Question::Leave(leaving), answer) => {
+                if answer == Answer::Save {
+                    self.save(session);
+                }
+                if answer == Answer::Do || !session.document.is_dirty() {
+                    self.leave(ui, session, leaving);
+                }
+            }
+        }
+    }
+
+    fn leave(&mut self, ui: &Ui, session: &mut Session, leaving: Leaving) {
+        match leaving {
+            Leaving::Open(path) => self.open_now(session, path),
+            Leaving::Close => {
+                self.closing = true;
+                ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+            }
+        }
+    }
+
+    /// The window closed well.
+    pub(super) fn end(&mut self) {
+        if let Some(autosave) = self.autosave.take() {
+            autosave.end();
+        }
+    }
+}
+
+/// Takes what another program wrote as an edit that can be undone.
+fn take_outside(session: &mut Session, text: &str) {
+    session.document.replace("edited elsewhere", text);
+    session.document.seal();
+    session.document.mark_saved(text.into());
+}

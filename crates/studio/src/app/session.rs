@@ -1,0 +1,291 @@
+//! What the window works on: the document, its file, its player and the time. No widgets.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use bansho::{
+    Assets, Plan,
+    base::parameters::Value,
+    render::scene::{Place, edit::EditError, operation::Operation},
+};
+
+use super::keyed;
+use crate::{
+    document::{Document, Revision},
+    player::{Event, Pace, Picture, Player, Transport, Wish},
+};
+
+/// Makes the assets of a scene that lies in a folder.
+pub type AssetsOf = fn(&Path) -> Arc<dyn Assets>;
+
+/// A document that is open, with its player.
+pub struct Session {
+    /// The scene.
+    pub document: Document,
+    /// Its file, once it has one.
+    pub path: Option<PathBuf>,
+    /// The time.
+    pub transport: Transport,
+    /// Whether hands in the viewport leave keyframes.
+    pub recording: bool,
+    player: Box<dyn Player>,
+    assets_of: AssetsOf,
+    assets: Arc<dyn Assets>,
+    pace: Pace,
+    picture: Option<Picture>,
+    drawn: u64,
+    asked: Option<Asked>,
+    /// A state that panicked, which is not drawn again.
+    broken: Option<Revision>,
+    notice: Option<String>,
+    rate: Rate,
+}
+
+/// What was wished for last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Asked {
+    revision: Revision,
+    number: Option<i64>,
+    within: [usize; 2],
+}
+
+/// Pictures a second, as they come while time passes.
+#[derive(Default)]
+struct Rate {
+    last: Option<f64>,
+    mean_s: Option<f64>,
+}
+
+impl Rate {
+    fn came(&mut self, now: f64) {
+        /// Share of the newest interval in the mean.
+        const NEWEST: f64 = 0.15;
+        if let Some(last) = self.last.replace(now) {
+            let interval = now - last;
+            self.mean_s = Some(self.mean_s.map_or(interval, |mean| mean + NEWEST * (interval - mean)));
+        }
+    }
+}
+
+impl Session {
+    /// Opens `document`, which lies in `path`.
+    pub fn new(document: Document, path: Option<PathBuf>, player: Box<dyn Player>, assets_of: AssetsOf) -> Self {
+        let assets = assets_of(folder(path.as_deref()));
+        Self {
+            document,
+            path,
+            transport: Transport::default(),
+            recording: false,
+            player,
+            assets_of,
+            assets,
+            pace: Pace::default(),
+            picture: None,
+            drawn: 0,
+            asked: None,
+            broken: None,
+            notice: None,
+            rate: Rate::default(),
+        }
+    }
+
+    /// Opens another document in place of this one.
+    pub fn open(&mut self, document: Document, path: Option<PathBuf>) {
+        self.assets = (self.assets_of)(folder(path.as_deref()));
+        (self.document, self.path) = (document, path);
+        (self.picture, self.asked, self.broken, self.notice) = (None, None, None, None);
+        self.transport = Transport::default();
+    }
+
+    /// Reads all assets anew, as after one was replaced.
+    pub fn reload_assets(&mut self) {
+        self.assets = (self.assets_of)(folder(self.path.as_deref()));
+        self.asked = None;
+    }
+
+    /// The last picture, and which it is.
+    pub fn picture(&self) -> Option<(&Picture, u64)> {
+        self.picture.as_ref().map(|picture| (picture, self.drawn))
+    }
+
+    /// The last good plan.
+    pub fn plan(&self) -> Option<&Arc<Plan>> {
+        self.document.plan()
+    }
+
+    /// Whether a picture is under way.
+    pub fn is_busy(&self) -> bool {
+        self.player.is_busy()
+    }
+
+    /// Pictures a second while time passes.
+    pub fn pictures_per_s(&self) -> Option<f64> {
+        self.rate.mean_s.filter(|_| self.transport.is_playing()).map(|mean| 1.0 / mean)
+    }
+
+    /// What the user should know.
+    pub fn notice(&self) -> Option<&str> {
+        self.notice.as_deref()
+    }
+
+    /// Tells the user something, or takes it back.
+    pub fn set_notice(&mut self, notice: Option<String>) {
+        self.notice = notice;
+    }
+
+    /// Whether what is shown panicked.
+    pub fn is_broken(&self) -> bool {
+        self.broken == Some(self.document.revision())
+    }
+
+    /// Carries out `operations`; what cannot be done is told.
+    pub fn edit(&mut self, label: &str, operations: &[Operation]) {
+        match self.document.edit(label, operations) {
+            Ok(()) => self.notice = None,
+            Err(EditError::Syntax(reason)) => {
+                self.notice = Some(format!("the text is not TOML; mend it or undo first: {reason}"));
+            }
+            Err(error) => self.notice = Some(error.to_string()),
+        }
+    }
+
+    /// Sets the value at `place`; where it is keyed, as it is at the present time.
+    pub fn set(&mut self, label: &str, place: &Place, value: Value) {
+        let operation = match place.find(self.document.values()) {
+            Some(node) if keyed::is_keyed(&node.value) => self.keyframe(place, value),
+            _ => Operation::Set { place: place.clone(), value },
+        };
+        self.edit(label, &[operation]);
+    }
+
+    /// The operation that keys `place` now.
+    pub fn keyframe(&self, place: &Place, value: Value) -> Operation {
+        Operation::SetKeyframe { place: place.clone(), time: self.transport.time_s(), value }
+    }
+
+    /// Takes in what the player did, lets time pass and says what is to be drawn for a viewport of `viewport` pixels.
+    /// `hands` tells that something is being dragged, so that speed matters more than size. How long the window may sleep, s.
+    pub fn update(&mut self, now: f64, viewport: [usize; 2], hands: bool) -> Option<f64> {
+        let hurry = hands || self.transport.is_playing();
+        for event in self.player.poll() {
+            self.take_in(event, now, hands);
+        }
+        if !self.transport.is_playing() {
+            self.rate = Rate::default();
+        }
+        let shown = self.picture.as_ref().is_some_and(|picture| picture.number == self.transport.number());
+        self.transport.tick(now, shown || self.is_broken());
+        self.wish(viewport, hurry);
+        if self.player.waits_for_poll() {
+            return Some(0.0);
+        }
+        self.transport.sleep_s(now).filter(|_| !self.is_busy())
+    }
+
+    fn wish(&mut self, viewport: [usize; 2], hurry: bool) {
+        let share = if hurry { self.pace.share() } else { 1.0 };
+        let number = self.plan().map(|_| self.transport.number());
+        let asked = Asked {
+            revision: self.document.revision(),
+            number,
+            within: viewport.map(|side| ((side as f64 * share).round() as usize).max(1)),
+        };
+        // In a hurry a frame is drawn once, whatever size would have been better.
+        let same = |last: Asked| last == Asked { within: if hurry { last.within } else { asked.within }, ..asked };
+        if self.asked.is_some_and(same) || self.is_broken() {
+            return;
+        }
+        self.asked = Some(asked);
+        self.send(asked, false);
+    }
+
+    /// Draws the present frame once more from the scene's beginning, at the viewport's full size.
+    pub fn draw_exactly(&mut self) {
+        if let Some(asked) = self.asked {
+            self.send(asked, true);
+        }
+    }
+
+    fn send(&mut self, asked: Asked, exact: bool) {
+        self.player.wish(Wish {
+            revision: asked.revision,
+            name: self.document.name().to_owned(),
+            text: self.document.text().clone(),
+            assets: self.assets.clone(),
+            number: asked.number,
+            within: asked.within,
+            exact,
+        });
+    }
+
+    fn take_in(&mut self, event: Event, now: f64, hands: bool) {
+        match event {
+            Event::Judged { revision, outcome } => self.judged(revision, outcome),
+            Event::Drawn(picture) => self.show(picture, now, hands),
+            Event::Failed { revision, reason } if revision == self.document.revision() => self.notice = Some(reason),
+            Event::Failed { .. } => {}
+            Event::Panicked { revision, message } => {
+                self.broken = Some(revision);
+                self.transport.set_playing(false);
+                self.notice = Some(format!("a phenomenon panicked, which is a bug in it: {message}{}", self.rescue()));
+            }
+        }
+    }
+
+    /// Saves the work beside its file after a panic, and says so.
+    #[cfg(not(target_arch = "wasm32"))]
+    fn rescue(&self) -> String {
+        let Some(path) = self.path.as_ref().filter(|_| self.document.is_dirty()) else { return String::new() };
+        match crate::document::files::rescue(self.document.text(), path) {
+            Ok(beside) => format!("; the scene was saved as {}", beside.display()),
+            Err(error) => format!("; the scene could not be saved beside its file: {error}"),
+        }
+    }
+
+    #[cfg(target_arch = "wasm32")]
+    fn rescue(&self) -> String {
+        String::new()
+    }
+
+    fn judged(&mut self, revision: Revision, outcome: Result<Arc<Plan>, bansho::SceneError>) {
+        self.document.judge(revision, outcome);
+        if let Some(plan) = self.document.plan() {
+            let frames = plan.frames();
+            self.transport.set_shot(frames.start..=frames.end - 1, 1.0 / plan.fps().frame_s());
+            if let Some(asked) = self.asked.as_mut().filter(|asked| asked.number.is_none()) {
+                // The scene's first frame is being drawn, which nobody knew the number of.
+                asked.number = Some(frames.start);
+                self.transport.go_to(frames.start);
+            }
+        }
+    }
+
+    fn show(&mut self, picture: Picture, now: f64, hands: bool) {
+        /// Wanted of a preview while something is dragged, s.
+        const AT_HAND_S: f64 = 0.05;
+        if hands || self.transport.is_playing() {
+            let target = if hands { AT_HAND_S } else { self.transport.frame_s() };
+            self.pace.learn(picture.draw_s, target);
+            self.rate.came(now);
+        }
+        self.drawn += 1;
+        self.picture = Some(picture);
+    }
+}
+
+/// The folder that paths in a scene are relative to.
+fn folder(path: Option<&Path>) -> &Path {
+    path.and_then(Path::parent).unwrap_or(Path::new(""))
+}
+
+impl Session {
+    /// Takes a file that was dropped on the window: a picture becomes the plate.
+    pub fn lay_over(&mut self, file: &Path) {
+        let relative = file.strip_prefix(folder(self.path.as_deref())).unwrap_or(file);
+        let place = Place::root().key("plate").key("image");
+        let value = Value::Text(relative.to_string_lossy().replace('\\', "/"));
+        self.edit("plate", &[Operation::Set { place, value }]);
+    }
+}
