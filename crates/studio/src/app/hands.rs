@@ -83,13 +83,17 @@ mod tests {
 
     const STAND: Stand = Stand { position: DVec3::new(0.0, 1.0, 4.0), target: DVec3::new(0.0, 1.0, 0.0) };
 
-    fn camera() -> Camera {
+    fn camera_at(stand: Stand) -> Camera {
         let parameters = CameraParameters {
-            position: STAND.position.to_array().into(),
-            target: STAND.target.to_array().into(),
+            position: stand.position.to_array().into(),
+            target: stand.target.to_array().into(),
             ..CameraParameters::default()
         };
         parameters.at(0.0, [160, 90])
+    }
+
+    fn camera() -> Camera {
+        camera_at(STAND)
     }
 
     fn near(a: DVec3, b: DVec3) -> bool {
@@ -110,8 +114,7 @@ mod tests {
         let camera = camera();
         let before = camera.project(STAND.target).unwrap().pixel;
         let stand = STAND.panned(DVec2::new(0.25, -0.1), &camera);
-        let moved = Camera { position: stand.position, ..camera };
-        let after = moved.project(STAND.target).unwrap().pixel;
+        let after = camera_at(stand).project(STAND.target).unwrap().pixel;
         assert!((after - before - DVec2::new(0.25, -0.1) * 90.0).length() < 1e-6, "{before} {after}");
     }
 

@@ -4,10 +4,7 @@ use std::{path::Path, sync::Arc, time::Instant};
 
 use bansho::{Assets, MemoryAssets};
 use eframe::egui::{self, Key, Modifiers, Role, vec2};
-use egui_kittest::{
-    Harness,
-    kittest::{NodeT, Queryable},
-};
+use egui_kittest::{Harness, kittest::Queryable};
 
 use super::{Session, Studio};
 use crate::{document::Document, player::SlicePlayer};

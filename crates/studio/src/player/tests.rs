@@ -139,7 +139,7 @@ fn wait(player: &mut ThreadPlayer, woken: &mpsc::Receiver<()>) -> Vec<Event> {
 #[test]
 fn the_newest_wish_wins() {
     let (sender, woken) = mpsc::channel();
-    let mut player = ThreadPlayer::start(move || drop(sender.send(()))).unwrap();
+    let mut player = ThreadPlayer::start(move || sender.send(()).unwrap_or_default()).unwrap();
     for number in 0..20 {
         player.wish(wish(SCENE, number));
     }
@@ -179,7 +179,7 @@ impl Assets for Broken {
 #[test]
 fn a_panic_is_told_and_the_player_lives_on() {
     let (sender, woken) = mpsc::channel();
-    let mut player = ThreadPlayer::start(move || drop(sender.send(()))).unwrap();
+    let mut player = ThreadPlayer::start(move || sender.send(()).unwrap_or_default()).unwrap();
     let text = format!("{SCENE}[plate]\nimage = \"plate.png\"\n");
     player.wish(Wish { assets: Arc::new(Broken), ..wish(&text, 0) });
     let events = wait(&mut player, &woken);
