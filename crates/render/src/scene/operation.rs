@@ -249,6 +249,16 @@ fn is_at(key: &Written, time: f64) -> bool {
     time_of(key).is_some_and(|own| (own - time).abs() <= SAME_TIME_S)
 }
 
+/// One space between items, and none before the first; lines and comments that a person made stay.
+fn space(items: &mut Array) {
+    for (index, item) in items.iter_mut().enumerate() {
+        let prefix = item.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or_default();
+        if prefix.chars().all(|character| character == ' ') {
+            item.decor_mut().set_prefix(if index == 0 { "" } else { " " });
+        }
+    }
+}
+
 fn set_keyframe(root: &mut Table, place: &Place, time: f64, value: &Written) -> Result<(), EditError> {
     let key = Array::from_iter([Written::from(time), value.clone()]);
     let Some(keys) = keys(root, place) else {
@@ -266,6 +276,7 @@ fn set_keyframe(root: &mut Table, place: &Place, time: f64, value: &Written) -> 
         None => {
             let after = keys.iter().take_while(|key| time_of(key).is_some_and(|own| own < time)).count();
             keys.insert(after, key);
+            space(keys);
         }
     }
     Ok(())
@@ -277,6 +288,7 @@ fn remove_keyframe(root: &mut Table, place: &Place, time: f64) -> Result<(), Edi
     let index = keys.iter().position(|key| is_at(key, time)).ok_or_else(missing)?;
     if keys.len() > 1 {
         keys.remove(index);
+        space(keys);
         return Ok(());
     }
     let last = keys.get(index).and_then(|key| key.as_array()?.get(1)).cloned().ok_or_else(missing)?;

@@ -69,8 +69,8 @@ impl Engine {
         self.states.keep(plan, opened.shot.as_ref(), number);
         let advanced = Instant::now();
         opened.shot.draw(observer)?;
-        let frame = opened.shot.read().ok_or(RenderError::Cancelled(bansho::Cancelled))?;
-        let pixels = shown(&frame);
+        let mut frame = opened.shot.read().ok_or(RenderError::Cancelled(bansho::Cancelled))?;
+        let pixels = shown(&mut frame);
         let exact = opened.shot.is_exact();
         opened.shot.recycle(frame);
         Ok(Picture {
@@ -121,8 +121,11 @@ fn fitted(size: [usize; 2], within: [usize; 2]) -> [usize; 2] {
     size.map(|side| ((side as f64 * scale).round() as usize).max(1))
 }
 
-fn shown(frame: &Frame) -> Vec<[u8; 4]> {
+/// The frame over black: premultiplied light over black is the light itself.
+fn shown(frame: &mut Frame) -> Vec<[u8; 4]> {
+    let opaque = std::mem::replace(&mut frame.opaque, true);
     let DisplayImage { pixels, .. } = display(frame, &View::DISPLAY, BitDepth::Eight);
+    frame.opaque = opaque;
     match pixels {
         DisplayPixels::Eight(pixels) => pixels,
         DisplayPixels::Sixteen(pixels) => pixels.into_iter().map(|pixel| pixel.map(|code| (code >> 8) as u8)).collect(),

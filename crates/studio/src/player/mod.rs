@@ -58,7 +58,7 @@ pub struct Picture {
     pub size: [usize; 2],
     /// The scene's size, pixels.
     pub scene_size: [usize; 2],
-    /// Display pixels, straight alpha, row after row from the top.
+    /// Display pixels over black, row after row from the top.
     pub pixels: Vec<[u8; 4]>,
     /// Whether the state is the one that the scene leads to from its beginning.
     pub exact: bool,

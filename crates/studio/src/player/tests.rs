@@ -47,13 +47,18 @@ fn picture(events: Vec<Event>) -> Picture {
     drawn.expect("a picture")
 }
 
-/// What `bansho render` would show of the frame.
+/// What `bansho render` would show of the frame, over black.
 fn rendered(text: &str, number: i64) -> Vec<[u8; 4]> {
+    rendered_with_alpha(text, number, true)
+}
+
+fn rendered_with_alpha(text: &str, number: i64, opaque: bool) -> Vec<[u8; 4]> {
     let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
     let scene = parse_scene("scene", text, assets.as_ref()).unwrap();
     let plan = Plan::new(scene, &PlanOptions::default(), assets).unwrap();
     let mut shot = CpuBackend.open(Arc::new(plan)).unwrap();
-    let frame = bansho::draw(shot.as_mut(), number, &Unobserved).unwrap();
+    let mut frame = bansho::draw(shot.as_mut(), number, &Unobserved).unwrap();
+    frame.opaque = opaque;
     match display(&frame, &View::DISPLAY, BitDepth::Eight).pixels {
         DisplayPixels::Eight(pixels) => pixels,
         DisplayPixels::Sixteen(_) => unreachable!("eight bits were asked for"),
@@ -257,5 +262,5 @@ fn a_still_is_the_file_that_render_writes() {
     let decoded = bansho::media::plates::FileAssets::new(folder.path());
     let plate = decoded.picture("still.png", 0).unwrap();
     let codes = plate.colour.pixels().iter().map(|pixel| pixel.map(|value| (value * 255.0).round() as u8));
-    assert!(codes.eq(rendered(SCENE, 5)));
+    assert!(codes.eq(rendered_with_alpha(SCENE, 5, false)));
 }

@@ -26,7 +26,7 @@ impl Transport {
         self.fps = fps;
         if self.frames != frames {
             self.frames = frames;
-            self.range = self.range.take().map(|range| self.within_shot(&range));
+            self.range = self.range.take().and_then(|range| self.within_shot(&range));
             self.go_to(self.number);
         }
     }
@@ -69,13 +69,13 @@ impl Transport {
 
     /// Plays only `range`, or the whole shot again.
     pub fn set_range(&mut self, range: Option<RangeInclusive<i64>>) {
-        self.range = range.map(|range| self.within_shot(&range));
+        self.range = range.and_then(|range| self.within_shot(&range));
     }
 
-    fn within_shot(&self, range: &RangeInclusive<i64>) -> RangeInclusive<i64> {
-        let (first, last) = (*self.frames.start(), *self.frames.end());
-        let start = (*range.start()).clamp(first, last);
-        start..=(*range.end()).clamp(start, last)
+    /// The part of `range` that the shot has; `None` where that is nothing, or all of it.
+    fn within_shot(&self, range: &RangeInclusive<i64>) -> Option<RangeInclusive<i64>> {
+        let part = *range.start().max(self.frames.start())..=*range.end().min(self.frames.end());
+        (!part.is_empty() && part != self.frames).then_some(part)
     }
 
     /// Goes to frame `number`, or to the nearest of the shot.
