@@ -119,6 +119,8 @@ pub enum AovRule {
     Sum,
     /// Their mean, weighted as the AOV says; 0 where there is nothing.
     WeightedMean,
+    /// That of the nearest; 0 where there is nothing.
+    Nearest,
 }
 
 /// A measured quantity that a phenomenon can write beside its light.
@@ -138,6 +140,7 @@ pub struct AovDescriptor {
 #[derive(Clone, Debug, Default)]
 pub struct AovPlane {
     values: Vec<f32>,
+    /// Sums of weights; of the nearest sample 1/depth, so that no sample is 0 too.
     weights: Vec<f32>,
 }
 
@@ -148,17 +151,33 @@ impl AovPlane {
         self.weights[index] += weight;
     }
 
+    /// Keeps a sample of `value` at `depth` (m, above 0) if it is nearer than what pixel `index` of the strip has, for [`AovRule::Nearest`].
+    pub fn keep_nearest(&mut self, index: usize, value: f32, depth: f32) {
+        self.keep(index, value, 1.0 / depth);
+    }
+
+    fn keep(&mut self, index: usize, value: f32, nearness: f32) {
+        if nearness > self.weights[index] {
+            (self.values[index], self.weights[index]) = (value, nearness);
+        }
+    }
+
     /// What the samples at pixel `index` come to.
     pub fn resolve(&self, index: usize, rule: AovRule) -> f32 {
         match rule {
-            AovRule::Sum => self.values[index],
+            AovRule::Sum | AovRule::Nearest => self.values[index],
             AovRule::WeightedMean if self.weights[index] > 0.0 => self.values[index] / self.weights[index],
             AovRule::WeightedMean => 0.0,
         }
     }
 
-    /// Adds the samples of another plane of the same size.
-    pub fn add_plane(&mut self, other: &Self) {
+    /// Adds the samples of another plane of the same size and AOV.
+    pub fn add_plane(&mut self, other: &Self, rule: AovRule) {
+        if rule == AovRule::Nearest {
+            let samples = other.values.iter().zip(&other.weights).enumerate();
+            samples.for_each(|(index, (value, nearness))| self.keep(index, *value, *nearness));
+            return;
+        }
         let add = |sums: &mut [f32], more: &[f32]| sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
         add(&mut self.values, &other.values);
         add(&mut self.weights, &other.weights);
@@ -445,5 +464,22 @@ mod tests {
         strip.aovs[0].add(0, 1000.0, 1.0);
         strip.aovs[0].add(0, 2000.0, 3.0);
         assert_eq!(strip.aovs[0].resolve(0, AovRule::WeightedMean), 1750.0);
+    }
+
+    #[test]
+    fn of_the_nearest_sample_the_order_does_not_matter_either() {
+        let planes = [[(7.0, 4.0), (5.0, 2.0)], [(5.0, 2.0), (7.0, 4.0)]].map(|samples| {
+            let mut plane = AovPlane::default();
+            plane.reset(2);
+            samples.into_iter().for_each(|(value, depth)| plane.keep_nearest(0, value, depth));
+            plane
+        });
+        assert_eq!(planes[0].values, planes[1].values);
+        let mut nearer = planes[0].clone();
+        nearer.keep_nearest(0, 3.0, 1.0);
+        for (mut sum, other) in [(planes[0].clone(), &nearer), (nearer.clone(), &planes[0])] {
+            sum.add_plane(other, AovRule::Nearest);
+            assert_eq!([0, 1].map(|index| sum.resolve(index, AovRule::Nearest)), [3.0, 0.0]);
+        }
     }
 }

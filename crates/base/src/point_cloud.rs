@@ -1,5 +1,44 @@
 //! Particles as other programs take them.
 
+use std::collections::BTreeMap;
+
+/// What can be known of a particle beside its place and velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Quantity {
+    /// Of a gas, K.
+    Temperature,
+    /// Of a gas, kg/m^3.
+    Density,
+    /// Of each electron that the particle stands for, eV.
+    Energy,
+    /// That the particle brings into the air, W.
+    Power,
+}
+
+impl Quantity {
+    /// Its name in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Temperature => "temperature",
+            Self::Density => "density",
+            Self::Energy => "energy",
+            Self::Power => "power",
+        }
+    }
+
+    /// Its unit.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Temperature => "K",
+            Self::Density => "kg/m^3",
+            Self::Energy => "eV",
+            Self::Power => "W",
+        }
+    }
+}
+
 /// Particles of everything in a scene that has any, at one time. All lists are of one length.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloud {
@@ -7,10 +46,8 @@ pub struct PointCloud {
     pub positions: Vec<[f32; 3]>,
     /// Velocities, m/s.
     pub velocities: Vec<[f32; 3]>,
-    /// Temperatures, K.
-    pub temperatures_k: Vec<f32>,
-    /// Densities, kg/m^3.
-    pub densities: Vec<f32>,
+    /// What else is known of some of them; 0 for the others.
+    pub quantities: BTreeMap<Quantity, Vec<f32>>,
 }
 
 impl PointCloud {
@@ -26,9 +63,35 @@ impl PointCloud {
 
     /// Adds the particles of another.
     pub fn extend(&mut self, other: &Self) {
+        let before = self.len();
         self.positions.extend_from_slice(&other.positions);
         self.velocities.extend_from_slice(&other.velocities);
-        self.temperatures_k.extend_from_slice(&other.temperatures_k);
-        self.densities.extend_from_slice(&other.densities);
+        for (quantity, values) in &other.quantities {
+            let own = self.quantities.entry(*quantity).or_default();
+            own.resize(before, 0.0);
+            own.extend_from_slice(values);
+        }
+        let count = self.len();
+        self.quantities.values_mut().for_each(|values| values.resize(count, 0.0));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_known_of_a_particle_is_0() {
+        let one = |quantity: Quantity, value: f32| PointCloud {
+            positions: vec![[value; 3]],
+            velocities: vec![[0.0; 3]],
+            quantities: [(quantity, vec![value])].into(),
+        };
+        let mut all = one(Quantity::Density, 1.0);
+        all.extend(&one(Quantity::Energy, 2.0));
+        all.extend(&one(Quantity::Density, 3.0));
+        assert_eq!(all.positions, [[1.0; 3], [2.0; 3], [3.0; 3]]);
+        assert_eq!(all.quantities[&Quantity::Density], [1.0, 0.0, 3.0]);
+        assert_eq!(all.quantities[&Quantity::Energy], [0.0, 2.0, 0.0]);
     }
 }

@@ -2,10 +2,10 @@
 
 use bansho_base::point_cloud::PointCloud;
 
-/// Properties of each particle, in order: m, m/s, K, kg/m^3.
-const PROPERTIES: [&str; 8] = ["x", "y", "z", "vx", "vy", "vz", "temperature", "density"];
+/// Properties that every particle has, in order: m, m/s.
+const PROPERTIES: [&str; 6] = ["x", "y", "z", "vx", "vy", "vz"];
 
-/// A whole file. The same particles give the same bytes.
+/// A whole file: places, velocities, then the cloud's quantities. The same particles give the same bytes.
 ///
 /// ```
 /// let file = bansho_media::ply::encode(&bansho_base::point_cloud::PointCloud::default());
@@ -14,22 +14,26 @@ const PROPERTIES: [&str; 8] = ["x", "y", "z", "vx", "vy", "vz", "temperature", "
 #[must_use]
 pub fn encode(points: &PointCloud) -> Vec<u8> {
     let mut header = String::from("ply\nformat binary_little_endian 1.0\n");
-    header.push_str("comment Bansho: x y z in m, y up; vx vy vz in m/s; temperature in K; density in kg/m^3\n");
-    header.push_str(&format!("element vertex {}\n", points.len()));
-    PROPERTIES.iter().for_each(|name| header.push_str(&format!("property float {name}\n")));
+    header.push_str("comment Bansho: x y z in m, y up; vx vy vz in m/s");
+    let quantities = || points.quantities.keys();
+    quantities().for_each(|quantity| header.push_str(&format!("; {} in {}", quantity.name(), quantity.unit())));
+    header.push_str(&format!("\nelement vertex {}\n", points.len()));
+    let names = PROPERTIES.into_iter().chain(quantities().map(|quantity| quantity.name()));
+    names.for_each(|name| header.push_str(&format!("property float {name}\n")));
     header.push_str("end_header\n");
     let mut bytes = header.into_bytes();
-    bytes.reserve(points.len() * PROPERTIES.len() * size_of::<f32>());
-    let places = points.positions.iter().zip(&points.velocities);
-    for ((place, velocity), (temperature, density)) in places.zip(points.temperatures_k.iter().zip(&points.densities)) {
-        let scalars = [*temperature, *density];
-        bytes.extend(place.iter().chain(velocity).chain(&scalars).flat_map(|value| value.to_le_bytes()));
+    bytes.reserve(points.len() * (PROPERTIES.len() + points.quantities.len()) * size_of::<f32>());
+    for (index, (place, velocity)) in points.positions.iter().zip(&points.velocities).enumerate() {
+        let scalars = points.quantities.values().map(|values| values.get(index).unwrap_or(&0.0));
+        bytes.extend(place.iter().chain(velocity).chain(scalars).flat_map(|value| value.to_le_bytes()));
     }
     bytes
 }
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::point_cloud::Quantity;
+
     use super::*;
 
     #[test]
@@ -37,14 +41,14 @@ mod tests {
         let points = PointCloud {
             positions: vec![[1.0, 2.0, 3.0], [-1.0, 0.5, 0.25]],
             velocities: vec![[0.0, 4.0, 0.0], [7.0, 8.0, 9.0]],
-            temperatures_k: vec![1500.0, 300.0],
-            densities: vec![0.25, 1.2],
+            quantities: [(Quantity::Temperature, vec![1500.0, 300.0]), (Quantity::Density, vec![0.25, 1.2])].into(),
         };
         let bytes = encode(&points);
         let end = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
         let header = std::str::from_utf8(&bytes[..end]).unwrap();
         assert!(
-            header.contains("element vertex 2\n") && header.contains("property float vz\nproperty float temperature\n")
+            header.contains("in m/s; temperature in K; density in kg/m^3\nelement vertex 2\n")
+                && header.contains("property float vz\nproperty float temperature\n")
         );
         let values: Vec<f32> = bytes[end..].as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect();
         let expected = [

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, process::Command};
 
-use bansho_base::point_cloud::PointCloud;
+use bansho_base::point_cloud::{PointCloud, Quantity};
 use bansho_media::{atomic, ply};
 
 #[test]
@@ -11,8 +11,8 @@ fn plyfile_reads_every_particle() {
     let points = PointCloud {
         positions: vec![[1.5, -2.0, 3.0e-5], [4.0, 5.0, 6.0], [0.1, 0.2, 0.3]],
         velocities: vec![[0.0, 1.0, 0.0], [-7.0, 8.0, 9.5], [0.0; 3]],
-        temperatures_k: vec![1850.0, 293.15, 900.0],
-        densities: vec![0.19, 1.2, 0.4],
+        quantities: [(Quantity::Temperature, vec![1850.0, 293.15, 900.0]), (Quantity::Density, vec![0.19, 1.2, 0.4])]
+            .into(),
     };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("gas.ply");
@@ -25,7 +25,7 @@ fn plyfile_reads_every_particle() {
     assert_eq!(lines.next(), Some("x y z vx vy vz temperature density"));
     for (index, line) in lines.enumerate() {
         let values: Vec<f32> = line.split(' ').map(|value| value.parse().unwrap()).collect();
-        let scalars = [points.temperatures_k[index], points.densities[index]];
+        let scalars: Vec<f32> = points.quantities.values().map(|values| values[index]).collect();
         let expected = [&points.positions[index][..], &points.velocities[index], &scalars].concat();
         assert_eq!(values, expected);
     }

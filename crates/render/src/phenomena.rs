@@ -2,6 +2,7 @@
 
 use bansho_base::{parameters::ProblemKind, phenomenon::Phenomenon};
 use bansho_models::{
+    aurora::{Aurora, AuroraParameters, shapes::ShapeFaultKind},
     flame_particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind},
     flame_sheet::{FlameSheet, FlameSheetParameters},
     ground::Ground,
@@ -17,7 +18,7 @@ use crate::{
 
 /// Every kind, in the order in which schema and book list them.
 pub const KINDS: &[PhenomenonKind] =
-    &[FlameSheetParameters::KIND, FlameParticlesParameters::KIND, RainParameters::KIND];
+    &[FlameSheetParameters::KIND, FlameParticlesParameters::KIND, RainParameters::KIND, AuroraParameters::KIND];
 
 /// A model's own fault, placed at the parameter that it names.
 fn opening_fault(fault: &bansho_models::ParameterFault) -> OpeningFault {
@@ -59,6 +60,23 @@ impl Describe for RainParameters {
         match Rain::new(self.clone(), opening.name, opening.seed, opening.loop_s) {
             Ok(rain) => Ok(Box::new(rain)),
             Err(fault) => Err(opening_fault(&fault)),
+        }
+    }
+}
+
+impl Describe for AuroraParameters {
+    const KEY: &'static str = "aurora";
+
+    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        match Aurora::new(self.clone(), opening.name, opening.seed, opening.loop_s, opening.assets) {
+            Ok(aurora) => Ok(Box::new(aurora)),
+            Err(fault) => {
+                let kind = match fault.kind {
+                    ShapeFaultKind::Asset(error) => ProblemKind::Asset(error),
+                    other => ProblemKind::Conflict(other.to_string()),
+                };
+                Err(OpeningFault { key: fault.key, kind })
+            }
         }
     }
 }

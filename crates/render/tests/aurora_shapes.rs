@@ -1,59 +1,16 @@
 //! Auroral shapes in scene files: the thesis's five scenes move as it tells, and faults stand at their sheet and point.
 
-#[allow(dead_code, reason = "each test file uses a part of it")]
-mod support;
-
 use bansho_base::{
     assets::MemoryAssets,
     drawing::{Drawing, Stroke},
     math::DVec2,
-    parameters::{Parameters, ProblemKind, Range, Reader},
-    phenomenon::Phenomenon,
+    parameters::{Parameters, Reader},
 };
-use bansho_models::aurora::shapes::{
-    FRAME_S, MotionParameters, Neighbourhood, Sequence, Shape, ShapeFaultKind, ShapeParameters,
+use bansho_models::aurora::{
+    AuroraParameters,
+    shapes::{FRAME_S, Neighbourhood, Sequence, Shape},
 };
-use bansho_render::{
-    Scene,
-    scene::{Describe, Opening, OpeningFault, PhenomenonKind},
-};
-
-bansho_base::parameters! {
-    /// An aurora of nothing but its shapes.
-    pub struct ShapesOnly {
-        /// Side of the drawn square.
-        extent_km: f64 = 800.0, limits(Range::new(10.0, 4000.0)), unit("km");
-        /// Its shapes.
-        shapes: Vec<ShapeParameters> = Vec::new();
-        /// How they follow each other.
-        motion: MotionParameters = MotionParameters::default();
-    }
-}
-
-impl ShapesOnly {
-    fn sequence(&self, assets: &MemoryAssets, loop_s: Option<f64>) -> Sequence {
-        Sequence::new(&self.shapes, &self.motion, self.extent_km, assets, loop_s).unwrap()
-    }
-}
-
-impl Describe for ShapesOnly {
-    const KEY: &'static str = "aurora";
-
-    fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
-        match Sequence::new(&self.shapes, &self.motion, self.extent_km, opening.assets, opening.loop_s) {
-            Ok(_) => support::AbsorberParameters::default().open(opening),
-            Err(fault) => {
-                let kind = match fault.kind {
-                    ShapeFaultKind::Asset(error) => ProblemKind::Asset(error),
-                    kind => ProblemKind::Conflict(kind.to_string()),
-                };
-                Err(OpeningFault { key: fault.key, kind })
-            }
-        }
-    }
-}
-
-const KINDS: &[PhenomenonKind] = &[ShapesOnly::KIND];
+use bansho_render::{Scene, phenomena::KINDS};
 
 fn assets() -> MemoryAssets {
     let stroke =
@@ -64,9 +21,11 @@ fn assets() -> MemoryAssets {
     assets
 }
 
-fn parameters(text: &str) -> ShapesOnly {
+/// How the shapes of a scene's aurora move.
+fn sequence_of(text: &str) -> Sequence {
     let scene = Scene::parse("test.toml", text, KINDS, &assets()).unwrap_or_else(|error| panic!("{error}"));
-    ShapesOnly::read_table(&scene.instances[0].source.canonical(), &mut Reader::new(), &[])
+    let aurora = AuroraParameters::read_table(&scene.instances[0].source.canonical(), &mut Reader::new(), &[]);
+    Sequence::new(&aurora.shapes, &aurora.motion, aurora.extent_km, &assets(), None).unwrap()
 }
 
 fn fault(text: &str) -> String {
@@ -77,15 +36,15 @@ fn fault(text: &str) -> String {
 }
 
 const SCENES: [&str; 5] = [
-    include_str!("data/aurora/sekiguchi_1.toml"),
-    include_str!("data/aurora/sekiguchi_2.toml"),
-    include_str!("data/aurora/sekiguchi_3.toml"),
-    include_str!("data/aurora/sekiguchi_4.toml"),
-    include_str!("data/aurora/sekiguchi_5.toml"),
+    include_str!("../../../scenes/sekiguchi_1.toml"),
+    include_str!("../../../scenes/sekiguchi_2.toml"),
+    include_str!("../../../scenes/sekiguchi_3.toml"),
+    include_str!("../../../scenes/sekiguchi_4.toml"),
+    include_str!("../../../scenes/sekiguchi_5.toml"),
 ];
 
 fn sequence(scene: usize) -> Sequence {
-    parameters(SCENES[scene - 1]).sequence(&assets(), None)
+    sequence_of(SCENES[scene - 1])
 }
 
 /// Greatest distance of any control point of one shape from the other.
@@ -176,8 +135,12 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         ("[[aurora.shapes]]\nsplit = [{}]\n", "aurora.0.shapes.0.split: the first shape has none before it"),
         (
-            "[[aurora.shapes]]\nsheets = [{ path = \"shapes.svg#middle\" }]\n",
-            "test.toml:4:20: aurora.0.shapes.0.sheets.0.path: shapes.svg: has no stroke of the id `middle`",
+            "[[aurora.shapes]]\nsheets = [{ path = \"shapes.svg\", stroke = \"middle\" }]\n",
+            "test.toml:4:43: aurora.0.shapes.0.sheets.0.stroke: shapes.svg: has no stroke of the id `middle`",
+        ),
+        (
+            "[[aurora.shapes]]\nsheets = [{ stroke = \"left\" }]\n",
+            "sheets.0.stroke: names a path of an SVG file, but no file",
         ),
         ("[[aurora.shapes]]\nsheets = [{ path = \"gone.svg\" }]\n", "gone.svg: no such file"),
         (
@@ -186,6 +149,8 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         ("[[aurora.shapes]]\nsheets = [{ form = \"arcc\" }]\n", "`arcc` is not known, did you mean `arc`?"),
         ("[[aurora.shapes]]\nafter_s = 3\nafter_frames = 3\n", "says both `after_s` and `after_frames`"),
+        ("energy_ev = 0\n", "test.toml:3:13: aurora.0.energy_ev: 0 is out of range; allowed: 100 to 100000 eV"),
+        ("energy_ev = 1e6\n", "test.toml:3:13: aurora.0.energy_ev: 1000000 is out of range; allowed: 100 to 100000 eV"),
     ] {
         let shown = fault(text);
         assert!(shown.contains(expected), "{text}\nexpected: {expected}\nshown: {shown}");
@@ -196,17 +161,19 @@ fn faults_stand_at_their_sheet_and_point() {
 fn three_lines_make_an_aurora() {
     for text in ["bansho = 1\n[[aurora]]\n", "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ form = \"fold\" }] }]\n"]
     {
-        let sequence = parameters(text).sequence(&assets(), None);
-        assert!(sequence.at(1.0).length() > 400.0, "{text}");
+        let sequence = sequence_of(text);
+        // Half the side of the drawn square and more.
+        let length = sequence.at(1.0).length();
+        assert!(length > 300.0, "{length} km: {text}");
     }
 }
 
 #[test]
 fn a_drawing_is_fitted_to_the_square() {
-    let text = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg#right\" }] }]\n";
-    let shape = parameters(text).sequence(&assets(), None).at(0.0);
+    let text = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg\", stroke = \"right\" }] }]\n";
+    let shape = sequence_of(text).at(0.0);
     let points = &shape.sheets[0].points;
-    assert_eq!((points[0], points[points.len() - 1]), (DVec2::new(80.0, 0.0), DVec2::new(320.0, 0.0)));
+    assert_eq!((points[0], points[points.len() - 1]), (DVec2::new(60.0, 0.0), DVec2::new(240.0, 0.0)));
     let all = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg\" }] }]\n";
-    assert_eq!(parameters(all).sequence(&assets(), None).at(0.0).sheets.len(), 2);
+    assert_eq!(sequence_of(all).at(0.0).sheets.len(), 2);
 }

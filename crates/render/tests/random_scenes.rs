@@ -67,9 +67,9 @@ fn scene(seed: u64) -> String {
     for (index, kind) in KINDS.iter().enumerate() {
         let mut table = sample((kind.table)(), &mut uniform);
         few_particles(&mut table, kind.key);
-        // Half of all random shapes are wider than their sheet; most scenes do without, so that they are drawn.
+        // Most random shapes are refused: flames wider than their sheet, auroras that cross. Most scenes do without, so that they are drawn.
         if !seed.is_multiple_of(4) {
-            table.entries.retain(|entry| entry.key != "shape");
+            table.entries.retain(|entry| !["shape", "shapes"].contains(&entry.key.as_str()));
         }
         // Many together are refused if one of them is, so most scenes hold one.
         if seed.is_multiple_of(8) || seed as usize % KINDS.len() == index {
@@ -85,6 +85,13 @@ fn few_particles(table: &mut Table, kind: &str) {
         table.entries.retain(|entry| !["particles", "burners", "step_s", "preroll_s"].contains(&entry.key.as_str()));
         table.push("particles", Value::Integer(60));
         table.push("preroll_s", Value::Number(0.2));
+    }
+    if kind == "aurora" {
+        table.entries.retain(|entry| !["particles", "preroll_s"].contains(&entry.key.as_str()));
+        let mut particles = Table::default();
+        particles.push("count", Value::Integer(500));
+        table.push("particles", Value::Table(particles));
+        table.push("preroll_s", Value::Number(0.1));
     }
 }
 

@@ -1,5 +1,6 @@
 //! The real program: good and bad input, exit codes, interruptions, files.
 
+mod aurora;
 mod bad_input;
 mod commands;
 mod disk;
@@ -8,6 +9,7 @@ mod flipbook;
 mod interruptions;
 mod particles;
 mod pictures;
+mod rain;
 mod rooms;
 mod streaks;
 mod support;

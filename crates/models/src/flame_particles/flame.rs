@@ -8,7 +8,7 @@ use bansho_base::{
     observer::{Cancelled, Observer},
     parameters::Auto,
     phenomenon::{Phenomenon, Prepared, SnapshotError, Stepping},
-    point_cloud::PointCloud,
+    point_cloud::{PointCloud, Quantity},
     random::Key,
     surroundings::{Publication, Surroundings},
 };
@@ -154,8 +154,7 @@ impl Phenomenon for FlameParticles {
         Some(PointCloud {
             positions: (0..gas.particles.len()).map(|index| gas.place(index, t).as_vec3().to_array()).collect(),
             velocities: u.iter().zip(v).zip(w).map(|((u, v), w)| [*u, *v, *w]).collect(),
-            temperatures_k: temperature.clone(),
-            densities: density.clone(),
+            quantities: [(Quantity::Temperature, temperature.clone()), (Quantity::Density, density.clone())].into(),
         })
     }
 

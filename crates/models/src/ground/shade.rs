@@ -108,7 +108,8 @@ impl PreparedGround<'_> {
         let rough = gloss(self.surroundings, hit.point, viewer, self.parameters.roughness);
         let still = self.surroundings.reflection.map_or([0.0; 4], |image| bilinear(image, hit.pixel));
         let (puddle, fresnel, wetness) = (patch.puddle as f32, fresnel(hit.cos) as f32, self.wetness as f32);
-        [0, 1, 2].map(|c| wetness * (puddle * fresnel).mul_add(still[c], (1.0 - puddle) * rough[c]))
+        let film = (1.0 - puddle) * patch.film as f32;
+        [0, 1, 2].map(|c| wetness * (puddle * fresnel).mul_add(still[c], film * rough[c]))
     }
 
     fn seen_in_lake(&self, hit: &Hit, lake: &Lake) -> [f32; 3] {

@@ -15,6 +15,8 @@ const OCTAVES: usize = 8;
 const GAIN: f64 = 1.05;
 /// Height of an octave over that of the one before.
 const RELIEF_GAIN: f64 = 0.6;
+/// Standard deviation of the relief, which is roughly normal.
+const DEVIATION: f64 = 0.34;
 /// One octave at a time, so that each can fade where it is too small to be seen.
 const SINGLE: Fractal = Fractal { octaves: 1, lacunarity: 2, gain: 0.5 };
 
@@ -34,6 +36,8 @@ pub(super) struct Patch {
     pub(super) albedo: [f32; 3],
     /// Share covered by puddles when wet.
     pub(super) puddle: f64,
+    /// Share of the rest whose film of water is whole: grains stand out of it where the ground is high.
+    pub(super) film: f64,
 }
 
 impl Surface {
@@ -65,19 +69,29 @@ impl Surface {
             (size, strength, height) = (0.5 * size, GAIN * strength, RELIEF_GAIN * height);
         }
         let shade = math::exp(self.texture * grain) as f32;
-        Patch { albedo: self.albedo.map(|value| (value * shade).min(1.0)), puddle: self.puddle(relief, footprint) }
+        let albedo = self.albedo.map(|value| (value * shade).min(1.0));
+        let pixels = self.size / footprint.max(1e-9);
+        let seen = |first: f64, whole: f64| math::smoothstep(first, whole, pixels);
+        Patch {
+            albedo,
+            puddle: math::lerp(self.puddles, self.puddle(relief), seen(1.0, 3.0)),
+            // Its edges are sharp and its light strong: patches of a few pixels would be dashes at the horizon.
+            film: math::lerp(0.5, film(relief), seen(2.0, 8.0)),
+        }
     }
 
-    /// Water stands where the ground lies low. Far away only the mean share is seen.
-    fn puddle(&self, relief: f64, footprint: f64) -> f64 {
-        // The relief is roughly normal with this deviation; its quantile at a share p is near the logistic's.
-        const DEVIATION: f64 = 0.34;
+    /// Water stands where the ground lies low.
+    fn puddle(&self, relief: f64) -> f64 {
+        // The quantile at a share p of what is roughly normal is near the logistic's.
         let share = self.puddles.clamp(1e-6, 1.0 - 1e-6);
         let level = DEVIATION * math::ln(share / (1.0 - share)) / 1.7;
-        let near = 1.0 - math::smoothstep(level - 0.12, level + 0.12, relief);
-        let seen = math::smoothstep(1.0, 3.0, self.size / footprint.max(1e-9));
-        math::lerp(self.puddles, near, seen)
+        1.0 - math::smoothstep(level - 0.12, level + 0.12, relief)
     }
+}
+
+/// Half of the ground has a film, with soft edges.
+fn film(relief: f64) -> f64 {
+    1.0 - math::smoothstep(-DEVIATION, DEVIATION, relief)
 }
 
 /// Share of light that water mirrors at an angle with cosine `cos` to its normal (Schlick 1994, n = 1.333).
@@ -92,14 +106,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn puddles_cover_the_share_asked_for() {
+    fn puddles_cover_the_share_asked_for_and_films_half_of_the_ground() {
         for share in [0.0, 0.2, 0.6, 1.0] {
             let parameters = GroundParameters { puddles: share, ..GroundParameters::default() };
             let surface = Surface::new(&parameters, Key::new(3, "ground"));
             let count = 40_000;
-            let at = |i: i32| surface.at(DVec2::new(f64::from(i % 200) * 0.31, f64::from(i / 200) * 0.37), 1e-3).puddle;
-            let mean = (0..count).map(at).sum::<f64>() / f64::from(count);
-            assert!((mean - share).abs() < 0.07, "{share}: {mean}");
+            let at = |i: i32| surface.at(DVec2::new(f64::from(i % 200) * 0.31, f64::from(i / 200) * 0.37), 1e-3);
+            let mean = |of: fn(Patch) -> f64| (0..count).map(|i| of(at(i))).sum::<f64>() / f64::from(count);
+            let (puddle, film) = (mean(|patch| patch.puddle), mean(|patch| patch.film));
+            assert!((puddle - share).abs() < 0.07, "{share}: {puddle}");
+            assert!((film - 0.5).abs() < 0.07, "{film}");
             assert!((surface.at(DVec2::ZERO, 1e3).puddle - share).abs() < 1e-9);
         }
     }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::{
     lattice::Cell,
     light::Lighting,
-    moment::{ClassNow, Moment},
+    moment::{Ball, ClassNow, Moment},
     stroke::Stroke,
     tiles::Tiles,
 };
@@ -29,10 +29,10 @@ pub(crate) struct Near<'a> {
     pub(crate) lighting: &'a Lighting<'a>,
     /// What the sky shines through drops at the corners of tiles; `None` from a dark one.
     pub(crate) sky: Option<(&'a Tiles, &'a [[f32; 3]])>,
-    /// How far from the camera they are, m.
-    pub(crate) distance: f64,
-    /// How much of a drop at a distance is drawn.
-    pub(crate) weight: &'a (dyn Fn(f64) -> f64 + Sync),
+    /// Where they are.
+    pub(crate) within: &'a [Ball],
+    /// How much of a drop at a point is drawn.
+    pub(crate) weight: &'a (dyn Fn(DVec3) -> f64 + Sync),
 }
 
 /// Strokes of all drops that may show, those of the nearest cells first.
@@ -42,7 +42,7 @@ pub(crate) fn strokes(near: &Near) -> Vec<Stroke> {
         .classes
         .iter()
         .filter(|class| class.share > 0.0)
-        .flat_map(|class| moment.cells(class, near.distance).into_iter().map(move |(away, cell)| (away, cell, class)))
+        .flat_map(|class| near.cells(class).into_iter().map(move |(away, cell)| (away, cell, class)))
         .collect();
     cells.sort_by(|a, b| a.0.total_cmp(&b.0));
     let fill = |cells: &[(f64, Cell, &ClassNow)]| {
@@ -55,6 +55,14 @@ pub(crate) fn strokes(near: &Near) -> Vec<Stroke> {
 }
 
 impl Near<'_> {
+    /// The cells of a class, each once.
+    fn cells(&self, class: &ClassNow) -> Vec<(f64, Cell)> {
+        let mut cells: Vec<_> = self.within.iter().flat_map(|ball| self.moment.cells(class, *ball)).collect();
+        cells.sort_by_key(|(_, cell)| *cell);
+        cells.dedup_by_key(|(_, cell)| *cell);
+        cells
+    }
+
     fn add_cell(&self, class: &ClassNow, cell: Cell, strokes: &mut Vec<Stroke>) {
         let key = self.moment.key;
         let contents = class.lattice.contents(cell);
@@ -78,14 +86,17 @@ impl Near<'_> {
         let (point, velocity) = moment.drop(class, place);
         let toward = point - moment.sight.middle().position;
         let away = toward.length();
-        let weight = there * (self.weight)(away);
+        let weight = there * (self.weight)(point);
         if weight <= 0.0 || away == 0.0 || moment.sheltered(point, velocity) {
             return None;
         }
         let way = velocity * moment.sight.exposure;
         let flight = Flight { from: point - 0.5 * way, to: point + 0.5 * way, diameter_mm: class.diameter_mm };
-        let light = self.lighting.radiance(point, toward / away);
-        let mut stroke = flight.above(moment.ground)?.stroke(moment, weight * moment.gain, light)?;
+        let mut stroke = flight.above(moment.ground)?.stroke(moment, weight * moment.gain, [0.0; 3])?;
+        if !stroke.meets(moment.sight.middle().size) {
+            return None;
+        }
+        stroke.light = self.lighting.radiance(point, toward / away);
         if let Some((tiles, sky)) = self.sky {
             let sky = tiles.at(sky, stroke.middle());
             (0..3).for_each(|c| stroke.light[c] += sky[c]);

@@ -41,6 +41,8 @@ pub(crate) struct Lighting<'a> {
     pub(crate) lights: &'a [Light],
     /// What rain takes on the way from a light to a drop, 1/m.
     pub(crate) extinction: f64,
+    /// Nearer to a lamp than this its light grows no more, m.
+    pub(crate) nearest: f64,
 }
 
 /// Distance from a point to a light; 0 for one that is infinitely far, whose light is given where it arrives.
@@ -59,7 +61,9 @@ impl Lighting<'_> {
             if illuminance == [0.0; 3] {
                 return sum;
             }
-            let through = lanes::exp(-(self.extinction * distance(light, point)) as f32);
+            let away = distance(light, point);
+            let held = if away > 0.0 && away < self.nearest { away / self.nearest } else { 1.0 };
+            let through = lanes::exp(-(self.extinction * away) as f32) * (held * held) as f32;
             let scattered = self.scattering.at(toward.dot(line) as f32);
             std::array::from_fn(|c| sum[c] + illuminance[c] * through * scattered[c])
         })

@@ -12,6 +12,7 @@ pub mod streak;
 pub mod texture;
 pub mod velocity;
 
+mod aovs;
 mod bands;
 mod billboards;
 mod drops;
@@ -23,6 +24,7 @@ mod parameters;
 mod phenomenon;
 mod prepared;
 mod sight;
+mod singles;
 mod source;
 mod splashes;
 mod stroke;

@@ -43,6 +43,14 @@ impl ClassNow {
     }
 }
 
+/// A part of the air.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ball {
+    pub(crate) centre: DVec3,
+    /// m.
+    pub(crate) radius: f64,
+}
+
 /// Rain while the shutter is open.
 #[derive(Clone, Debug)]
 pub(crate) struct Moment {
@@ -89,6 +97,11 @@ impl Moment {
         1.0 - math::smoothstep(self.distance - half, self.distance + half, distance)
     }
 
+    /// All that is within `radius` (m) of the camera.
+    pub(crate) fn around_camera(&self, radius: f64) -> Ball {
+        Ball { centre: self.sight.middle().position, radius }
+    }
+
     /// Where a place of a class's lattice is half way through the exposure, and its velocity, m/s.
     pub(crate) fn drop(&self, class: &ClassNow, place: DVec3) -> (DVec3, DVec3) {
         let steady = class.lattice.world(place);
@@ -102,26 +115,26 @@ impl Moment {
         }
     }
 
-    /// Cells of a class that may show within `distance` of the camera, nearest first, with the distances of their middles.
-    pub(crate) fn cells(&self, class: &ClassNow, distance: f64) -> Vec<(f64, Cell)> {
+    /// Cells of a class that may show within a ball, nearest to the camera first, with the distances of their middles from it.
+    pub(crate) fn cells(&self, class: &ClassNow, Ball { centre, radius: distance }: Ball) -> Vec<(f64, Cell)> {
         let eye = self.sight.middle().position;
         let reach = distance + CELL_RADIUS + self.gusts.as_ref().map_or(0.0, Gusts::reach);
         let fall = class.speed * self.sight.exposure;
         let radius = CELL_RADIUS + fall + 0.5 * self.sight.velocity().length() * self.sight.exposure;
-        let bottom = (eye.y - reach).max(self.ground - CELL);
-        let rows = [bottom, eye.y + reach].map(|y| class.lattice.place(DVec3::new(eye.x, y, eye.z)).y.floor() as i64);
+        let bottom = (centre.y - reach).max(self.ground - CELL);
+        let row = |y: f64| class.lattice.place(DVec3::new(centre.x, y, centre.z)).y.floor() as i64;
+        let rows = [bottom, centre.y + reach].map(row);
         let mut cells = Vec::new();
         for row in rows[0]..=rows[1] {
             let height = class.lattice.world(DVec3::new(0.0, row as f64, 0.0)).y;
-            let middle = class.lattice.place(DVec3::new(eye.x, height, eye.z));
-            let range = |centre: f64| (centre - reach / CELL).floor() as i64..=(centre + reach / CELL).floor() as i64;
+            let middle = class.lattice.place(DVec3::new(centre.x, height, centre.z));
+            let range = |place: f64| (place - reach / CELL).floor() as i64..=(place + reach / CELL).floor() as i64;
             for x in range(middle.x) {
                 for z in range(middle.z) {
-                    let centre = DVec3::new(x as f64 + 0.5, row as f64 + 0.5, z as f64 + 0.5);
-                    let (point, _) = self.drop(class, centre);
-                    let away = (point - eye).length();
-                    if away < distance + CELL_RADIUS && self.sight.may_see(point, radius) {
-                        cells.push((away, Cell([x, row, z])));
+                    let place = DVec3::new(x as f64 + 0.5, row as f64 + 0.5, z as f64 + 0.5);
+                    let (point, _) = self.drop(class, place);
+                    if (point - centre).length() < distance + CELL_RADIUS && self.sight.may_see(point, radius) {
+                        cells.push(((point - eye).length(), Cell([x, row, z])));
                     }
                 }
             }

@@ -1,7 +1,7 @@
 //! Rain as a phenomenon of a scene.
 
 use bansho_base::{
-    canvas::{AovDescriptor, AovRule, DepthInterval, Shutter, View},
+    canvas::{AovDescriptor, DepthInterval, Shutter, View},
     observer::{Cancelled, Observer, check},
     phenomenon::{Phenomenon, Prepared, Remark},
     random::Key,
@@ -11,6 +11,7 @@ use bansho_base::{
 };
 
 use super::{
+    aovs::AOVS,
     billboards::SheetCache,
     distribution::{DropSizes, SizeBin},
     extinction::{Losses, extinction},
@@ -117,28 +118,6 @@ impl Rain {
         [gain * all.max(drawn), gain * drawn]
     }
 }
-
-/// What rain can write beside its light, in the order of a strip's planes.
-const AOVS: &[AovDescriptor] = &[
-    AovDescriptor {
-        name: "streak_opacity",
-        unit: "",
-        doc: "Opacity of the streaks in a pixel, summed; 0 where there are none. The veil of far rain is not in it.",
-        rule: AovRule::Sum,
-    },
-    AovDescriptor {
-        name: "streak_depth",
-        unit: "m",
-        doc: "Depth of the streaks in a pixel, weighted by opacity; 0 where there are none.",
-        rule: AovRule::WeightedMean,
-    },
-    AovDescriptor {
-        name: "diameter_mm",
-        unit: "mm",
-        doc: "Diameter of the drops of the streaks in a pixel, weighted by opacity; 0 where there are none.",
-        rule: AovRule::WeightedMean,
-    },
-];
 
 impl Phenomenon for Rain {
     fn name(&self) -> &str {

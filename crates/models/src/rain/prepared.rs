@@ -3,22 +3,25 @@
 use bansho_base::{
     canvas::{DepthInterval, Strip, View},
     image::{Figure, Rect},
-    math::smoothstep,
+    math::DVec3,
     phenomenon::Prepared,
     surroundings::Surroundings,
 };
 use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
 
 use super::{
     Rain,
-    bands::{BAND, Bands},
+    aovs::measure,
+    bands::{BAND, Bands, Extent},
     billboards::{Billboards, Brush, paint},
     distribution::DropSizes,
     drops::{self, Near},
     extinction::{Losses, extinction, visibility},
     light::Lighting,
-    moment::Moment,
+    moment::{Ball, Moment},
     parameters::Method,
+    singles::{NEAREST, NEAREST_TO_LAMP, Singles},
     source::{SourceField, sky_through_drops},
     splashes::Splashes,
     stroke::Stroke,
@@ -26,10 +29,11 @@ use super::{
     veil::Veil,
 };
 
-/// Distances between which billboards take over from single drops, m: a cubic metre that is nearer cannot be seen as flat.
-const TAKE_OVER: [f64; 2] = [1.0, 1.2];
 /// Light below this share of display white is left out: with a hundred streaks over each other it still is below a 255th.
 const LEAST_SHARE: f64 = 1.0 / (255.0 * 128.0);
+
+/// Columns that streaks are drawn in at a time: the planes of so many fit into a core's first cache.
+const STRETCH: usize = 128;
 
 /// Streaks of single drops, sorted into bands.
 struct Strokes {
@@ -38,9 +42,9 @@ struct Strokes {
 }
 
 impl Strokes {
-    fn new(strokes: Vec<Stroke>, height: usize) -> Self {
-        let rows: Vec<[f32; 2]> = strokes.iter().map(Stroke::rows).collect();
-        Self { bands: Bands::new(height, &rows), strokes }
+    fn new(strokes: Vec<Stroke>, size: [usize; 2]) -> Self {
+        let extents: Vec<Extent> = strokes.par_iter().with_min_len(4096).map(Stroke::extent).collect();
+        Self { bands: Bands::new(size, STRETCH, extents.iter().copied()), strokes }
     }
 }
 
@@ -60,16 +64,18 @@ impl<'a> PreparedRain<'a> {
         let moment = Moment::new(rain, view, surroundings);
         let extinctions = rain.extinctions(view.shutter.middle());
         let lights = &surroundings.others.lights;
-        let lighting = Lighting { scattering: &rain.scattering, lights, extinction: extinctions[0] };
+        let lighting = Lighting { scattering: &rain.scattering, lights, extinction: extinctions[0], nearest: 0.0 };
         let tiles = Tiles::new(view, COARSE);
         let sky = sky_through_drops(&rain.lens, &tiles, &surroundings.sky);
         let frame = Frame { rain, moment: &moment, lighting: &lighting, tiles: &tiles, sky: &sky, view };
+        let eye = moment.sight.middle().position;
+        let nearness = |point: DVec3| moment.nearness((point - eye).length());
         let (strokes, billboards) = match rain.parameters.method {
-            Method::Drops => (frame.strokes(1.1 * moment.distance, &|away| moment.nearness(away)), None),
+            Method::Drops => (frame.strokes(&[moment.around_camera(1.1 * moment.distance)], &nearness), None),
             Method::Billboards => {
-                let near = |away: f64| 1.0 - smoothstep(TAKE_OVER[0], TAKE_OVER[1], away);
-                let strokes = frame.strokes(TAKE_OVER[1], &|away| moment.nearness(away) * near(away));
-                (strokes, Some(frame.billboards(&|away| moment.nearness(away) * (1.0 - near(away)))))
+                let singles = Singles::new(&moment, lights);
+                let strokes = frame.strokes(singles.balls(), &|point| nearness(point) * singles.share(point));
+                (strokes, Some(frame.billboards(&|point| nearness(point) * (1.0 - singles.share(point)))))
             }
         };
         let mut strokes = strokes;
@@ -81,7 +87,7 @@ impl<'a> PreparedRain<'a> {
         let white = view.white_luminance.filter(|_| rain.parameters.culling);
         let least_light = white.map_or(0.0, |white| (white * LEAST_SHARE) as f32);
         let figures = frame.figures(strokes.len(), billboards.as_ref().map(|(billboards, _)| billboards));
-        let strokes = Strokes::new(strokes, view.size[1]);
+        let strokes = Strokes::new(strokes, view.size);
         Self { view, level: Level::new(), strokes, billboards, veil, least_light, figures }
     }
 }
@@ -102,14 +108,8 @@ impl<'a> Frame<'a> {
         self.sky.iter().flatten().any(|value| *value > 0.0).then_some((self.tiles, self.sky))
     }
 
-    fn strokes(&self, distance: f64, weight: &(dyn Fn(f64) -> f64 + Sync)) -> Vec<Stroke> {
-        drops::strokes(&Near {
-            moment: self.moment,
-            lighting: self.lighting,
-            sky: self.shining_sky(),
-            distance,
-            weight,
-        })
+    fn strokes(&self, within: &[Ball], weight: &(dyn Fn(DVec3) -> f64 + Sync)) -> Vec<Stroke> {
+        drops::strokes(&Near { moment: self.moment, lighting: self.lighting, sky: self.shining_sky(), within, weight })
     }
 
     fn splashes(&self) -> Vec<Stroke> {
@@ -124,13 +124,14 @@ impl<'a> Frame<'a> {
         splashes.strokes()
     }
 
-    fn billboards(&self, weight: &(dyn Fn(f64) -> f64 + Sync)) -> (Billboards, SourceField) {
-        let distance = 1.1 * self.moment.distance;
+    fn billboards(&self, weight: &(dyn Fn(DVec3) -> f64 + Sync)) -> (Billboards, SourceField) {
+        let within = self.moment.around_camera(1.1 * self.moment.distance);
         let picture = Rect::of_size(self.view.size[0], self.view.size[1]);
         let sheets = self.rain.sheets.sheets(self.moment);
-        let billboards = Billboards::new(self.moment, sheets, picture, distance, weight);
-        let eye = self.moment.sight.middle().position;
-        let source = SourceField::new(self.lighting, self.tiles, self.sky, eye, [TAKE_OVER[0], distance]);
+        let billboards = Billboards::new(self.moment, sheets, picture, within, weight);
+        // What is nearer to a lamp is not on billboards; a light that grows on would be seen between the corners of tiles.
+        let lighting = Lighting { nearest: NEAREST_TO_LAMP, ..*self.lighting };
+        let source = SourceField::new(&lighting, self.tiles, self.sky, within.centre, [NEAREST, within.radius]);
         (billboards, source)
     }
 }
@@ -180,18 +181,20 @@ impl PreparedRain<'_> {
         let mut aovs = std::mem::take(&mut strip.aovs);
         // Rain alone draws into its strip, and takes all colours alike.
         if let Some(mut planes) = strip.gray_planes_mut() {
-            for &index in self.strokes.bands.members(band) {
-                let stroke = &self.strokes.strokes[index as usize];
-                if !slice.contains(f64::from(stroke.depth)) {
-                    continue;
-                }
-                if aovs.is_empty() {
-                    stroke.draw(rows, rect, &mut planes, &mut |_, _| {});
-                } else {
-                    stroke.draw(rows, rect, &mut planes, &mut |index, opacity| {
-                        let values = [1.0, stroke.depth, stroke.diameter_mm];
-                        aovs.iter_mut().zip(values).for_each(|(plane, value)| plane.add(index, value, opacity));
-                    });
+            for ([from, to], members) in self.strokes.bands.stretches(band, rows.x, rows.right()) {
+                let rows = rows.intersection(&Rect { x: from, width: to - from, ..rows });
+                for &index in members {
+                    let stroke = &self.strokes.strokes[index as usize];
+                    if !slice.contains(f64::from(stroke.depth)) {
+                        continue;
+                    }
+                    if aovs.is_empty() {
+                        stroke.draw(rows, rect, &mut planes, &mut |_, _| {});
+                    } else {
+                        stroke.draw(rows, rect, &mut planes, &mut |index, opacity| {
+                            measure(&mut aovs, index, opacity, stroke.depth, stroke.diameter_mm);
+                        });
+                    }
                 }
             }
             if let Some((billboards, source)) = &self.billboards {

@@ -4,12 +4,14 @@ use bansho_base::{math::DVec3, sky::Sky};
 
 use super::{
     lens::DropLens,
-    light::Lighting,
-    tiles::{Tiles, geometric, mix},
+    light::{Lighting, distance},
+    tiles::{Tiles, mix},
 };
 
-/// How much further each distance is than the one before.
-const RATIO: f64 = 1.2;
+/// Steps of distance as a share of the distance from the camera, and of that from the nearest lamp; the least, m.
+const STEP: f64 = 0.2;
+const STEP_AT_LAMP: f64 = 0.4;
+const LEAST_STEP: f64 = 0.3;
 
 /// Radiance of drops at the corners of tiles, at several distances from the camera.
 #[derive(Clone, Debug)]
@@ -29,10 +31,23 @@ pub(crate) fn sky_through_drops(lens: &DropLens, tiles: &Tiles, sky: &Sky) -> Ve
     tiles.map(|_, line| lens.gather(line, |direction| sky.radiance(direction)))
 }
 
+/// Distances from `near` to at least `far` from which light can be told between them: the closer to a lamp the denser.
+fn distances(lighting: &Lighting, eye: DVec3, [near, far]: [f64; 2]) -> Vec<f64> {
+    let lamps: Vec<f64> = lighting.lights.iter().map(|light| distance(light, eye)).collect();
+    let mut distances = vec![near];
+    let mut at = near;
+    while at < far {
+        let lamp = lamps.iter().map(|lamp| (lamp - at).abs()).fold(f64::INFINITY, f64::min);
+        at += (STEP * at).min((STEP_AT_LAMP * lamp).max(LEAST_STEP));
+        distances.push(at);
+    }
+    distances
+}
+
 impl SourceField {
     /// The field from `near` to `far` around `eye`, m; `sky` is what the sky shines through drops at each corner.
     pub(crate) fn new(lighting: &Lighting, tiles: &Tiles, sky: &[[f32; 3]], eye: DVec3, [near, far]: [f64; 2]) -> Self {
-        let distances = geometric(near.max(0.05), far, RATIO);
+        let distances = distances(lighting, eye, [near.max(0.05), far]);
         let layer = |distance: &f64| {
             tiles.map(|index, line| {
                 let lit = lighting.radiance(eye + line * *distance, line);

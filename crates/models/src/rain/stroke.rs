@@ -2,6 +2,8 @@
 
 use bansho_base::{canvas::GrayPlanes, image::Rect};
 
+use super::bands::Extent;
+
 /// A streak in the picture: what a drop hides and the light it sends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stroke {
@@ -66,14 +68,21 @@ impl Stroke {
         }
     }
 
-    /// Rows of the picture that it may touch; may reach beyond the picture.
-    pub(crate) fn rows(&self) -> [f32; 2] {
+    /// Whether it may touch a picture of so many columns and rows.
+    pub(crate) fn meets(&self, size: [f64; 2]) -> bool {
+        let extent = self.extent();
+        (0..2).all(|axis| extent[axis][1] > 0.0 && f64::from(extent[axis][0]) < size[axis])
+    }
+
+    /// Where it may touch the picture.
+    pub(crate) fn extent(&self) -> Extent {
         let [from, to] = self.ends;
         let axis = usize::from(self.upright());
         let along = self.along(axis);
         // Ends are softened by the drop's own size, sides by the lean.
-        let reach = if axis == 1 { along.half - 0.5 * (from[1] - to[1]).abs() } else { along.across };
-        [from[1].min(to[1]) - reach, from[1].max(to[1]) + reach]
+        let mut reach = [along.across; 2];
+        reach[axis] = along.half - 0.5 * (from[axis] - to[axis]).abs();
+        [0, 1].map(|axis| [from[axis].min(to[axis]) - reach[axis], from[axis].max(to[axis]) + reach[axis]])
     }
 
     /// Adds it behind what the planes of `strip` hold, within `rect`; `measure` is told each pixel's index and opacity.
@@ -82,66 +91,166 @@ impl Stroke {
     /// streak). Both are differences of a distribution function, so that they add up to one however thin or short the streak is.
     #[inline(always)]
     pub(crate) fn draw(&self, rect: Rect, strip: Rect, planes: &mut GrayPlanes, measure: &mut impl FnMut(usize, f32)) {
-        let upright = self.upright();
-        let axis = usize::from(upright);
+        let axis = usize::from(self.upright());
         let along = self.along(axis);
         let (low, high) = (along.middle[axis] - along.half, along.middle[axis] + along.half);
         let [start, end] = [[rect.x, rect.y], [rect.right(), rect.bottom()]];
+        let lines = clip(low, start[axis], end[axis])..clip(high + 1.0, start[axis], end[axis]);
         let side = 1 - axis;
-        let scale = 1.0 / along.across;
-        for line in clip(low, start[axis], end[axis])..clip(high + 1.0, start[axis], end[axis]) {
-            let (from, to) = ((line as f32).max(low), (line as f32 + 1.0).min(high));
-            let amount = self.hidden * (0.5 / along.half) * (to - from);
-            let centre = along.lean.mul_add(0.5 * (from + to) - along.middle[axis], along.middle[side]);
-            let begin = clip(centre - along.across, start[side], end[side]);
-            let finish = clip(centre + along.across + 1.0, start[side], end[side]);
-            let mut before = disc_share((begin as f32 - centre) * scale);
-            let mut share = |place: usize| {
-                let after = disc_share((place as f32 + 1.0 - centre) * scale);
-                let opacity = (amount * (after - before)).clamp(0.0, 1.0);
-                before = after;
-                opacity
-            };
-            if upright {
-                let first = (line - strip.y) * strip.width + begin - strip.x;
-                self.put_row(first, finish - begin, |number| share(begin + number), planes, measure);
-            } else {
-                for place in begin..finish {
-                    let index = (place - strip.y) * strip.width + line - strip.x;
-                    let opacity = share(place);
-                    self.put_row(index, 1, |_| opacity, planes, measure);
+        for first in lines.clone().step_by(LINES) {
+            let spans = along.spans(axis, self.hidden, first as f32, [start[side], end[side]]);
+            for (number, line) in (first..lines.end.min(first + LINES)).enumerate() {
+                let [begin, finish] = [spans.begin[number] as usize, spans.finish[number] as usize];
+                let across = Across {
+                    begin: spans.begin[number] - spans.centre[number],
+                    scale: spans.scale,
+                    amount: spans.amount[number],
+                };
+                if axis == 1 {
+                    let index = (line - strip.y) * strip.width + begin - strip.x;
+                    let room = end[0] - begin >= LANES;
+                    self.put_row(index, finish - begin, room, &across, planes, measure);
+                } else {
+                    for place in begin..finish {
+                        let index = (place - strip.y) * strip.width + line - strip.x;
+                        let [opacity, ..] = across.opacities((place - begin) as f32);
+                        self.put(index, [opacity], planes, measure);
+                    }
                 }
             }
         }
     }
 
-    /// Puts `count` pixels from `first` on behind what the planes hold.
+    /// Puts `count` pixels from `first` on behind what the planes hold; where there is `room` for a whole run, as one: no streak reaches
+    /// beyond its own pixels.
     #[inline(always)]
     fn put_row(
         &self,
         first: usize,
         count: usize,
-        mut opacity: impl FnMut(usize) -> f32,
+        room: bool,
+        across: &Across,
         planes: &mut GrayPlanes,
         measure: &mut impl FnMut(usize, f32),
     ) {
-        let range = first..first + count;
-        let through = &mut planes.transmittance[range.clone()];
-        let [red, green, blue] = planes.radiance.each_mut().map(|plane| &mut plane[range.clone()]);
-        let depth = &mut planes.depth[range];
-        for number in 0..count {
-            let opacity = opacity(number);
-            if planes.plate_depth.get(first + number).is_some_and(|plate| *plate <= self.depth) {
+        if count <= LANES && room {
+            return self.put(first, across.opacities(0.0), planes, measure);
+        }
+        for begin in (0..count).step_by(LANES) {
+            let opacities = across.opacities(begin as f32);
+            if count - begin >= LANES {
+                self.put(first + begin, opacities, planes, measure);
                 continue;
             }
-            let hidden = through[number] * opacity;
-            through[number] -= hidden;
-            red[number] = hidden.mul_add(self.light[0], red[number]);
-            green[number] = hidden.mul_add(self.light[1], green[number]);
-            blue[number] = hidden.mul_add(self.light[2], blue[number]);
-            depth[number] = if self.depth < depth[number] { self.depth } else { depth[number] };
-            measure(first + number, opacity);
+            for (number, opacity) in opacities[..count - begin].iter().enumerate() {
+                self.put(first + begin + number, [*opacity], planes, measure);
+            }
         }
+    }
+
+    /// Puts a run of pixels from `first` on behind what the planes hold.
+    #[inline(always)]
+    fn put<const N: usize>(
+        &self,
+        first: usize,
+        mut opacities: [f32; N],
+        planes: &mut GrayPlanes,
+        measure: &mut impl FnMut(usize, f32),
+    ) {
+        if let Some(plate) = planes.plate_depth.get(first..).and_then(<[f32]>::first_chunk::<N>) {
+            for lane in 0..N {
+                opacities[lane] = if plate[lane] <= self.depth { 0.0 } else { opacities[lane] };
+            }
+        }
+        let mut hidden = [0.0; N];
+        if let Some(through) = planes.transmittance[first..].first_chunk_mut::<N>() {
+            for lane in 0..N {
+                hidden[lane] = through[lane] * opacities[lane];
+                through[lane] -= hidden[lane];
+            }
+        }
+        for c in 0..3 {
+            if let Some(radiance) = planes.radiance[c][first..].first_chunk_mut::<N>() {
+                for lane in 0..N {
+                    radiance[lane] = hidden[lane].mul_add(self.light[c], radiance[lane]);
+                }
+            }
+        }
+        if let Some(depth) = planes.depth[first..].first_chunk_mut::<N>() {
+            for lane in 0..N {
+                let shown = opacities[lane] > 0.0 && self.depth < depth[lane];
+                depth[lane] = if shown { self.depth } else { depth[lane] };
+            }
+        }
+        for lane in 0..N {
+            if opacities[lane] > 0.0 {
+                measure(first + lane, opacities[lane]);
+            }
+        }
+    }
+}
+
+/// Pixels that are put at a time: about as many as a row of a streak has.
+const LANES: usize = 4;
+/// Rows, or columns, of a streak of which the pixels are found at a time.
+const LINES: usize = 8;
+/// Places of pixels' ends beyond the beginning of the first.
+const ENDS: [f32; LINES] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
+
+/// What a streak covers of each of some lines across it.
+struct Spans {
+    /// First pixel, and one past the last.
+    begin: [f32; LINES],
+    finish: [f32; LINES],
+    /// The streak's middle, pixels.
+    centre: [f32; LINES],
+    /// The sum of all opacities.
+    amount: [f32; LINES],
+    /// One over half the streak's width.
+    scale: f32,
+}
+
+impl Along {
+    /// The lines from `first` on, cut to pixels `[start, end]`.
+    #[inline(always)]
+    fn spans(&self, axis: usize, hidden: f32, first: f32, [start, end]: [usize; 2]) -> Spans {
+        let (low, high) = (self.middle[axis] - self.half, self.middle[axis] + self.half);
+        let (start, end) = (start as f32, end as f32);
+        let density = hidden * (0.5 / self.half);
+        let (mut begin, mut finish, mut centre, mut amount) = ([0.0; LINES], [0.0; LINES], [0.0; LINES], [0.0; LINES]);
+        for line in 0..LINES {
+            let (from, to) = ((first + (ENDS[line] - 1.0)).max(low), (first + ENDS[line]).min(high));
+            amount[line] = density * (to - from);
+            centre[line] = self.lean.mul_add(0.5 * (from + to) - self.middle[axis], self.middle[1 - axis]);
+            begin[line] = (centre[line] - self.across).floor().max(start).min(end);
+            finish[line] = (centre[line] + self.across + 1.0).floor().max(begin[line]).min(end);
+        }
+        Spans { begin, finish, centre, amount, scale: 1.0 / self.across }
+    }
+}
+
+/// How opacity is spread over the pixels across a streak.
+struct Across {
+    /// Where the first pixel begins, from the streak's middle, pixels.
+    begin: f32,
+    /// One over half the streak's width.
+    scale: f32,
+    /// The sum of all opacities.
+    amount: f32,
+}
+
+impl Across {
+    /// Opacities of the pixels from number `from` on; they add up to the amount.
+    #[inline(always)]
+    fn opacities(&self, from: f32) -> [f32; LANES] {
+        let begin = self.begin + from;
+        let mut opacities = [0.0; LANES];
+        for lane in 0..LANES {
+            let before = disc_share((begin + (ENDS[lane] - 1.0)) * self.scale);
+            let after = disc_share((begin + ENDS[lane]) * self.scale);
+            opacities[lane] = (self.amount * (after - before)).clamp(0.0, 1.0);
+        }
+        opacities
     }
 }
 
@@ -206,7 +315,7 @@ mod tests {
             let stroke = stroke([20.3, 20.9], to, 1.3);
             let whole = drawn(&stroke, [64, 64], 64);
             assert_eq!(whole, drawn(&stroke, [64, 64], 8));
-            let [low, high] = stroke.rows();
+            let [low, high] = stroke.extent()[1];
             for (index, opacity) in whole.iter().enumerate() {
                 let row = (index / 64) as f32;
                 assert!(*opacity == 0.0 || (row + 1.0 >= low && row <= high), "{row} {low} {high}");

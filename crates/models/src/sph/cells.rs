@@ -112,6 +112,11 @@ impl<const D: usize> Cells<D> {
         self.support_radius
     }
 
+    /// Changes that distance for the next [`Cells::assign`], finite and above 0; buffers are kept.
+    pub fn set_support_radius(&mut self, support_radius: f32) {
+        self.support_radius = support_radius;
+    }
+
     /// Number of particles.
     #[must_use]
     pub fn len(&self) -> usize {

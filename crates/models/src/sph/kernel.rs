@@ -19,6 +19,18 @@ bansho_base::choice! {
     }
 }
 
+impl KernelShape {
+    /// Value W(0) of the kernel of that support radius: what a particle of mass 1 adds to its own density.
+    #[must_use]
+    pub fn at_centre<const D: usize>(self, support_radius: f32) -> f32 {
+        match self {
+            Self::Poly6 => Poly6::<D>::new(support_radius).value(0.0),
+            Self::Spiky => Spiky::<D>::new(support_radius).value(0.0),
+            Self::CubicSpline => CubicSpline::<D>::new(support_radius).value(0.0),
+        }
+    }
+}
+
 /// A smoothing kernel in `D` dimensions, two or three.
 ///
 /// Distances come squared and must be less than the support radius; for the gradient they must also be more than 0.

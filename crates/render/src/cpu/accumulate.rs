@@ -1,7 +1,7 @@
 //! Compositing front to back: `C += Tacc L; Tacc *= T` (the hot loop of a frame that holds little).
 
 use bansho_base::{
-    canvas::{AovPlane, Strip},
+    canvas::{AovDescriptor, AovPlane, Strip},
     image::Rect,
 };
 use fearless_simd::{Level, dispatch};
@@ -63,8 +63,8 @@ impl Accumulator {
         }
     }
 
-    /// Puts `strip`, drawn by `phenomenon`, behind what is there.
-    pub(super) fn add_behind(&mut self, level: Level, strip: &Strip, phenomenon: usize) {
+    /// Puts `strip`, drawn by the phenomenon of a number with such `aovs`, behind what is there.
+    pub(super) fn add_behind(&mut self, level: Level, strip: &Strip, phenomenon: usize, aovs: &[AovDescriptor]) {
         if strip.transmittance_planes().is_some() {
             self.begin_to_absorb();
         }
@@ -77,7 +77,8 @@ impl Accumulator {
             self.add_row(level, strip, from, to);
         }
         if let Some(planes) = self.aovs.get_mut(phenomenon) {
-            planes.iter_mut().zip(&strip.aovs).for_each(|(sum, plane)| sum.add_plane(plane));
+            let each = planes.iter_mut().zip(&strip.aovs).zip(aovs);
+            each.for_each(|((sum, plane), aov)| sum.add_plane(plane, aov.rule));
         }
     }
 

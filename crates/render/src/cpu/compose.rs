@@ -113,7 +113,7 @@ impl Composition<'_> {
                     None => worker.strip.reset(drawn, None, wanted),
                 }
                 prepared.draw(&slice.interval, &mut worker.strip);
-                worker.accumulator.add_behind(level, &worker.strip, member);
+                worker.accumulator.add_behind(level, &worker.strip, member, self.phenomena[member].aovs());
             }
         }
     }

@@ -7,7 +7,7 @@ use bansho_base::{
     curve::Curve,
     drawing::Drawing,
     math::{self, DVec2},
-    parameters::{AssetPath, Auto},
+    parameters::Auto,
 };
 
 use super::{
@@ -109,10 +109,19 @@ fn draw_entry(
     sheets: &mut Vec<DrawnSheet>,
 ) -> Result<(), ShapeFault> {
     let fault = |key: &str, kind| place.fault(&format!(".sheets.{entry}{key}"), kind);
+    if parameters.stroke.is_some() && parameters.path.is_none() {
+        return Err(fault(".stroke", ShapeFaultKind::StrokeOfNoFile));
+    }
     let strokes = match (&parameters.points, &parameters.path, parameters.form) {
         (Some(points), None, None) => vec![points.iter().map(|&point| DVec2::from(point)).collect()],
         (None, Some(path), None) => {
-            strokes(path, place.extent_km, assets).map_err(|error| fault(".path", error.into()))?
+            let id = parameters.stroke.as_deref();
+            strokes(&path.0, id, place.extent_km, assets).map_err(|error| {
+                fault(
+                    if matches!(error.problem, AssetProblem::NoStroke(_)) { ".stroke" } else { ".path" },
+                    error.into(),
+                )
+            })?
         }
         (None, None, _) => vec![form_line(parameters, place.extent_km)],
         _ => return Err(fault("", ShapeFaultKind::SeveralSources { sheet: sheets.len() + 1 })),
@@ -174,11 +183,7 @@ fn placed(point: DVec2, offset: f64, parameters: &SheetParameters) -> DVec2 {
 }
 
 /// The strokes of a drawing whose sheet is fitted to the drawn square.
-fn strokes(path: &AssetPath, extent_km: f64, assets: &dyn Assets) -> Result<Vec<Vec<DVec2>>, AssetError> {
-    let (file, id) = match path.0.rsplit_once('#') {
-        Some((file, id)) => (file, Some(id)),
-        None => (path.0.as_str(), None),
-    };
+fn strokes(file: &str, id: Option<&str>, extent_km: f64, assets: &dyn Assets) -> Result<Vec<Vec<DVec2>>, AssetError> {
     let drawing = assets.drawing(file)?;
     let wanted = drawing.strokes.iter().filter(|stroke| id.is_none() || stroke.id.as_deref() == id);
     let strokes: Vec<Vec<DVec2>> = wanted.map(|stroke| fitted(&stroke.points, &drawing, extent_km)).collect();

@@ -145,6 +145,9 @@ pub enum ShapeFaultKind {
         /// The sheet.
         sheet: usize,
     },
+    /// A path of an SVG file that is not named.
+    #[error("names a path of an SVG file, but no file; allowed: together with `path`")]
+    StrokeOfNoFile,
     /// A time that is said in two ways.
     #[error("says both `after_s` and `after_frames`; allowed: one of them")]
     SecondsAndFrames,

@@ -49,8 +49,10 @@ bansho_base::parameters! {
     pub struct SheetParameters {
         /// Points [east, south] of the stroke.
         points: Option<Vec<[f64; 2]>> = None, limits(Length { min: 0, max: 100_000, item: KM }), unit("km");
-        /// An SVG file whose paths are the strokes, or one of them by its id, as in `"shapes.svg#left"`. Its view box is fitted to the drawn square.
+        /// An SVG file whose paths are the strokes. Its view box is fitted to the drawn square.
         path: Option<AssetPath> = None;
+        /// The id of the one path of the SVG file that is meant; all of them where it is not given.
+        stroke: Option<String> = None;
         /// A named form; an arc where neither `points` nor `path` is given.
         form: Option<Form> = None;
         /// Length of the form along the sheet; `"auto"` is 0.6 of the drawn square.

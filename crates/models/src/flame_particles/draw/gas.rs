@@ -70,11 +70,20 @@ impl Gas<'_> {
         f64::from(color::luminance(color::black_body().radiance(self.particles.temperature[index])))
     }
 
+    /// Whether a particle's gas has begun to burn, and its blue light is drawn.
+    #[inline(always)]
+    pub(crate) fn is_blue(&self, index: usize, look: &LookParameters) -> bool {
+        look.base_blue > 0.0 && self.particles.fuel[index] < 1.0
+    }
+
     /// Luminance of a metre of a particle's gas in the blue light of fresh flame, cd/m^2.
     ///
     /// CH and C2 live only where fuel has just begun to burn, and nowhere that soot has formed.
     #[inline(always)]
     pub(crate) fn blue(&self, index: usize, look: &LookParameters) -> f64 {
+        if !self.is_blue(index, look) {
+            return 0.0;
+        }
         /// Volume fraction of soot that outshines and quenches the blue light.
         const SOOTY: f64 = 1e-7;
         /// Share of the fuel that has burnt when the light is strongest.

@@ -13,6 +13,7 @@ use super::{
     kernel::Profile,
     look::LookParameters,
     measure::DEFLECTION,
+    prepared::AT_ONCE,
     splat::{FINE, Sheet, Sprite, splat},
     sprite::seen,
 };
@@ -46,7 +47,7 @@ impl Haze {
             let path = look.haze_gain * excess(seen.index) * gas.volume(seen.index) * f64::from(seen.ellipse.peak);
             Sprite { ellipse: seen.ellipse, layer: 0, split: 0.0, values: [(path * f64::from(seen.scale)) as f32] }
         };
-        let sprites: Vec<Sprite<1>> = shown.iter().map(sprite).collect();
+        let sprites: Vec<Sprite<1>> = shown.par_iter().with_min_len(AT_ONCE).map(sprite).collect();
         let grid =
             splat(&Sheet { profile: Profile::LINE, least_radius: FINE, layers: 1, window: view.window }, &sprites)?;
         Some(Self::from_paths(&grid, view.window))

@@ -11,6 +11,7 @@ use bansho_base::{
     surroundings::Surroundings,
 };
 use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
 
 use crate::{
     blue_flame,
@@ -44,6 +45,9 @@ pub struct PreparedGas<'a> {
     haze: OnceLock<Option<Haze>>,
 }
 
+/// Particles that one task takes.
+pub(crate) const AT_ONCE: usize = 2048;
+
 /// What is drawn of the particles.
 enum Matter {
     /// Nothing that the view could see.
@@ -66,7 +70,7 @@ struct Sums {
 /// Whether a particle adds anything to the picture's light or shade.
 fn shows(gas: &Gas, look: &LookParameters, index: usize) -> bool {
     match look.sprite {
-        Choice::Integral => gas.absorption(index, look) > 0.0 || gas.blue(index, look) > 0.0,
+        Choice::Integral => gas.absorption(index, look) > 0.0 || gas.is_blue(index, look),
         Choice::Poly6 | Choice::Squares => true,
     }
 }
@@ -90,10 +94,12 @@ fn layers(gas: &Gas, look: &LookParameters, view: &View) -> Layers {
     /// Thickness of a layer in support radii.
     const THICKNESS: f64 = 1.6;
     let t = view.shutter.middle();
-    let shown = || (0..gas.particles.len()).filter(|index| shows(gas, look, *index));
-    let share = |index: usize| gas.volume(index);
-    let depths = shown().map(|index| (view.camera.depth(gas.place(index, t)), share(index)));
-    Layers::new(depths.filter(|(depth, _)| *depth > 0.0), THICKNESS * mean_radius(gas))
+    let of = |index: usize| {
+        let depth = view.camera.depth(gas.place(index, t));
+        (depth, if shows(gas, look, index) { gas.volume(index) } else { 0.0 })
+    };
+    let depths: Vec<(f64, f64)> = (0..gas.particles.len()).into_par_iter().with_min_len(AT_ONCE).map(of).collect();
+    Layers::new(depths.into_iter().filter(|(depth, _)| *depth > 0.0), THICKNESS * mean_radius(gas))
 }
 
 /// Mean support radius, m; does not depend on the view, so that layers stand still.
@@ -185,7 +191,7 @@ fn sums(gas: &Gas, look: &LookParameters, view: &View, layers: &Layers, surround
         }
         Sprite { ellipse: seen.ellipse, layer, split, values }
     };
-    let sprites: Vec<Sprite<PLANES>> = shown.iter().map(sprite).collect();
+    let sprites: Vec<Sprite<PLANES>> = shown.par_iter().with_min_len(AT_ONCE).map(sprite).collect();
     let profile = if look.sprite == Choice::Poly6 { Profile::POLY6 } else { Profile::LINE };
     let grid = splat(&Sheet { profile, least_radius: COARSE, layers: layers.count, window: view.window }, &sprites)?;
     let extents = Extents::new(&grid, layers.count);
@@ -235,15 +241,17 @@ fn scale(gas: &Gas, look: &LookParameters, view: &View, shown: &[Seen]) -> Optio
     if look.sprite != Choice::Integral {
         return None;
     }
-    let (mut total, mut radius, mut absorption, mut pixels) = (0.0, 0.0, 0.0, 0.0);
-    for seen in shown {
-        let own = gas.absorption(seen.index, look);
-        let weight = own * gas.volume(seen.index) * gas.luminance(seen.index);
-        total += weight;
-        radius += weight * f64::from(gas.particles.support_radius[seen.index]);
-        absorption += weight * own;
-        pixels += weight * f64::from(seen.scale);
-    }
+    let own = |seen: &Seen| {
+        let absorption = gas.absorption(seen.index, look);
+        let weight = absorption * gas.volume(seen.index) * gas.luminance(seen.index);
+        let radius = f64::from(gas.particles.support_radius[seen.index]);
+        [weight, weight * radius, weight * absorption, weight * f64::from(seen.scale)]
+    };
+    let add = |sums: [f64; 4], own: [f64; 4]| [0, 1, 2, 3].map(|i| sums[i] + own[i]);
+    // Sums of whole tasks, added in order, are the same however many threads there are.
+    let of_task = |task: &[Seen]| task.iter().map(own).fold([0.0; 4], add);
+    let of_tasks: Vec<[f64; 4]> = shown.par_chunks(AT_ONCE).map(of_task).collect();
+    let [total, radius, absorption, pixels] = of_tasks.into_iter().fold([0.0; 4], add);
     (total > 0.0).then(|| Scale {
         radius: radius / total,
         absorption: absorption / total,

@@ -4,7 +4,7 @@
 //! and so do sprites that fill the picture. Sprites of different sizes go to grids of different fineness; coarse grids are added to finer
 //! ones by cubic interpolation.
 
-use bansho_base::{image::Rect, math::lanes};
+use bansho_base::image::Rect;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
@@ -14,14 +14,17 @@ use super::{
     sprite::Ellipse,
 };
 
-/// The weights of sixteen cells are found at a time; a round sprite is never wider.
-const LANES: usize = 16;
+/// The weights of eight cells are found at a time: about a row of a sprite.
+const LANES: usize = 8;
+/// How far the cells of a run, or the rows of a band, lie beyond the one before the first. (Without a zero, of which compilers make a
+/// special case.)
+const BEYOND: [f32; LANES] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
 /// Least radius of a sprite in cells for sums, for which cubic interpolation is exact to a few hundredths of a lone sprite's peak.
 pub(crate) const COARSE: f32 = 3.25;
 /// Least radius of a sprite in cells for slopes, which are as exact as that only on a finer grid.
 pub(crate) const FINE: f32 = 6.5;
 /// Rows of one task.
-const BAND: usize = 8;
+const BAND: usize = LANES;
 /// Coarsest grid: cells of 4096 pixels.
 const COARSEST: u32 = 12;
 
@@ -72,8 +75,10 @@ pub(crate) fn splat<const P: usize>(sheet: &Sheet, sprites: &[Sprite<P>]) -> Opt
 impl Sheet {
     /// The level whose cells are just fine enough.
     fn level_of(&self, radius: f32) -> u32 {
-        let octaves = lanes::log2((radius / self.least_radius).max(1.0));
-        (octaves as u32).min(COARSEST)
+        /// The exponent's bits of a number between one and two.
+        const ONE: u32 = 127;
+        // The exponent of a number is its whole octaves.
+        (((radius / self.least_radius).max(1.0).to_bits() >> 23) - ONE).min(COARSEST)
     }
 }
 
@@ -116,6 +121,12 @@ fn covered<const P: usize>(sprites: &[Sprite<P>], window: Rect) -> Option<Rect> 
 struct Placed {
     centre: [f32; 2],
     shape: [f32; 3],
+    /// How far the middle of a row lies to the left, for each row below the centre: b/a.
+    lean: f32,
+    /// Square of half the width of a row: this much at the centre, 1/a,
+    widest: f32,
+    /// and less for the square of each row's distance, (c - b^2/a) / a.
+    narrowing: f32,
     /// First row and one past the last.
     rows: [i32; 2],
     /// By how much the values are dimmed where the sprite had to be widened.
@@ -133,7 +144,10 @@ impl Placed {
         let last = cells.rows as i32;
         let rows =
             [((centre[1] - reach).ceil() as i32).clamp(0, last), ((centre[1] + reach) as i32 + 1).clamp(0, last)];
-        Self { centre, shape: ellipse.shape.map(|value| value * scale), rows, dimmed: 1.0 / (growth * growth) }
+        let [a, b, c] = ellipse.shape.map(|value| value * scale);
+        let (lean, widest) = (b / a, 1.0 / a);
+        let narrowing = (c - b * lean) * widest;
+        Self { centre, shape: [a, b, c], lean, widest, narrowing, rows, dimmed: 1.0 / (growth * growth) }
     }
 }
 
@@ -170,70 +184,120 @@ fn add_band<const P: usize>(
     band: &Band,
     values: &mut [f32],
 ) {
+    let depth = sheet.layers * P;
     let row_length = values.len() / band.rows;
+    let columns = row_length / depth;
     for &member in band.members {
         let (placed, sprite) = (&placed[member as usize], &sprites[members[member as usize] as usize]);
         let from = placed.rows[0].max(band.first);
         let to = placed.rows[1].min(band.first + band.rows as i32);
+        let share = Share::new(sprite, placed.dimmed);
+        let [first, end] = placed.columns(band.first, columns as i32);
         for y in from..to {
-            let row = &mut values[(y - band.first) as usize * row_length..][..row_length];
-            add_row(sheet, placed, sprite, y, row);
+            let index = (y - band.first) as usize;
+            let row = &mut values[index * row_length..][..row_length];
+            let below = y as f32 - placed.centre[1];
+            for x in (first[index]..end[index]).step_by(LANES) {
+                let weights = placed.weights(sheet.profile, x, below);
+                share.add(row, [x, end[index]].map(|column| column as usize), depth, &weights);
+            }
         }
     }
 }
 
-#[inline(always)]
-fn add_row<const P: usize>(sheet: &Sheet, placed: &Placed, sprite: &Sprite<P>, y: i32, row: &mut [f32]) {
-    let depth = sheet.layers * P;
-    let [a, b, c] = placed.shape;
-    let v = y as f32 - placed.centre[1];
-    // Where a u^2 + 2 b u v + c v^2 = 1.
-    let middle = placed.centre[0] - b / a * v;
-    let half = ((1.0 - (c - b * b / a) * v * v) / a).max(0.0).sqrt();
-    let first = ((middle - half).ceil() as i32).max(0) as usize;
-    let end = ((middle + half).floor() as i32 + 1).clamp(0, (row.len() / depth) as i32) as usize;
-    let mut x = first;
-    while x < end {
+impl Placed {
+    /// The first cell that the sprite covers in each row of a band, where a u^2 + 2 b u v + c v^2 = 1, and one past the last.
+    #[inline(always)]
+    fn columns(&self, first_row: i32, columns: i32) -> [[i32; BAND]; 2] {
+        let start = (first_row - 1) as f32 - self.centre[1];
+        let (mut first, mut end) = ([0; BAND], [0; BAND]);
+        for row in 0..BAND {
+            let v = start + BEYOND[row];
+            let middle = self.centre[0] - self.lean * v;
+            let half = (self.widest - self.narrowing * v * v).max(0.0).sqrt();
+            first[row] = whole((middle - half).ceil(), columns);
+            end[row] = whole((middle + half).floor() + 1.0, columns);
+        }
+        [first, end]
+    }
+
+    /// Weights of the cells from column `x` on, in the row `v` below the centre.
+    #[inline(always)]
+    fn weights(&self, profile: Profile, x: i32, v: f32) -> [f32; LANES] {
+        let [a, b, c] = self.shape;
+        let (linear, constant) = (2.0 * b * v, 1.0 - c * v * v);
+        let start = (x - 1) as f32 - self.centre[0];
         let mut weights = [0.0; LANES];
         for lane in 0..LANES {
-            let u = (x + lane) as f32 - placed.centre[0];
-            let q = (a * u).mul_add(u, (2.0 * b * v).mul_add(u, c * v * v));
-            let s = 1.0 - q;
+            let u = start + BEYOND[lane];
+            let s = constant - u * a.mul_add(u, linear);
             let s = if s > 0.0 { s } else { 0.0 };
-            weights[lane] = sheet.profile.at(s) * placed.dimmed;
+            weights[lane] = profile.at(s);
         }
-        let cells = &mut row[x * depth..(x + LANES).min(end) * depth];
-        add_cells(cells, depth, sprite, &weights);
-        x += LANES;
+        weights
     }
 }
 
-/// Adds a sprite to a run of cells with their weights.
+/// A whole number, clamped from 0 to `most`: the last bits of its sum with 2^23. (A cast checks each lane of a vector by itself.)
 #[inline(always)]
-fn add_cells<const P: usize>(cells: &mut [f32], depth: usize, sprite: &Sprite<P>, weights: &[f32; LANES]) {
-    if depth == 1 {
-        // One value a cell: the cells themselves fill the vector.
-        for (cell, weight) in cells.iter_mut().zip(weights) {
-            *cell = sprite.values[0].mul_add(*weight, *cell);
-        }
-        return;
-    }
-    let (mut own, mut next) = (sprite.values, sprite.values);
-    for i in 0..P {
-        own[i] *= 1.0 - sprite.split;
-        next[i] *= sprite.split;
-    }
-    for (cell, weight) in cells.chunks_exact_mut(depth).zip(weights) {
-        let Some(sums) = cell[sprite.layer * P..].first_chunk_mut::<P>() else { continue };
+fn whole(value: f32, most: i32) -> i32 {
+    const SHIFT: f32 = 8_388_608.0;
+    let clamped = value.max(0.0).min(most as f32);
+    (clamped + SHIFT).to_bits() as i32 - SHIFT.to_bits() as i32
+}
+
+/// What a sprite gives to its own layer and to the next.
+struct Share<const P: usize> {
+    first: usize,
+    own: [f32; P],
+    next: [f32; P],
+    both: bool,
+}
+
+impl<const P: usize> Share<P> {
+    #[inline(always)]
+    fn new(sprite: &Sprite<P>, dimmed: f32) -> Self {
+        let (mut own, mut next) = (sprite.values, sprite.values);
         for i in 0..P {
-            sums[i] = own[i].mul_add(*weight, sums[i]);
+            own[i] *= dimmed * (1.0 - sprite.split);
+            next[i] *= dimmed * sprite.split;
         }
-        if sprite.split > 0.0
-            && let Some(sums) = cell[(sprite.layer + 1) * P..].first_chunk_mut::<P>()
-        {
+        Self { first: sprite.layer * P, own, next, both: sprite.split > 0.0 }
+    }
+
+    /// Adds to a run of a row's cells, `depth` values each, that begins at column `from`, and ends before `end`.
+    #[inline(always)]
+    fn add(&self, row: &mut [f32], [from, end]: [usize; 2], depth: usize, weights: &[f32; LANES]) {
+        if depth == 1 {
+            return self.add_lone(&mut row[from..], weights);
+        }
+        let (own, next) = (self.own, self.next);
+        let mut rest = &mut row[from * depth + self.first..];
+        for weight in &weights[..(end - from).min(LANES)] {
+            let Some((sums, beyond)) = rest.split_first_chunk_mut::<P>() else { return };
             for i in 0..P {
-                sums[i] = next[i].mul_add(*weight, sums[i]);
+                sums[i] = own[i].mul_add(*weight, sums[i]);
             }
+            if self.both
+                && let Some(sums) = beyond.first_chunk_mut::<P>()
+            {
+                for i in 0..P {
+                    sums[i] = next[i].mul_add(*weight, sums[i]);
+                }
+            }
+            let Some(after) = rest.get_mut(depth..) else { return };
+            rest = after;
+        }
+    }
+
+    /// The same where a cell holds one value: the cells themselves fill the vector. (Beyond the sprite weights are zero.)
+    #[inline(always)]
+    fn add_lone(&self, cells: &mut [f32], weights: &[f32; LANES]) {
+        let value = self.own[0];
+        let add = |(cell, weight): (&mut f32, &f32)| *cell = value.mul_add(*weight, *cell);
+        match cells.first_chunk_mut::<LANES>() {
+            Some(cells) => cells.iter_mut().zip(weights).for_each(add),
+            None => cells.iter_mut().zip(weights).for_each(add),
         }
     }
 }

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::{
     gas::Gas,
     kernel::{LINE_PEAK, VARIANCE},
+    prepared::AT_ONCE,
 };
 
 /// An ellipse around a place in the picture: `q = a u^2 + 2 b u v + c v^2` is 1 on its edge.
@@ -47,8 +48,6 @@ const FOOTPRINT: f64 = 0.18;
 
 /// Every particle that the view can see, in their own order, those of no `weight` left out.
 pub(crate) fn seen(gas: &Gas, view: &View, weight: impl Fn(usize) -> bool + Sync) -> Vec<Seen> {
-    /// Particles that one task takes.
-    const AT_ONCE: usize = 2048;
     let eye = Eye::new(view);
     let count = gas.particles.len();
     let tasks: Vec<Vec<Seen>> = (0..count.div_ceil(AT_ONCE))

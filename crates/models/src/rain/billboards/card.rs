@@ -63,13 +63,13 @@ pub(crate) struct Card {
 }
 
 impl Card {
-    /// The billboard of a cell; `None` where it does not show. `weight` is how much of it is drawn at a distance.
+    /// The billboard of a cell; `None` where it does not show. `weight` is how much of it is drawn where its middle is.
     pub(super) fn new(
         moment: &Moment,
         class: &ClassNow,
         cell: Cell,
         picture: Rect,
-        weight: &(dyn Fn(f64) -> f64 + Sync),
+        weight: &(dyn Fn(DVec3) -> f64 + Sync),
     ) -> Option<Self> {
         let contents = class.lattice.contents(cell);
         let [u, v, choice, mirrored] = moment.key.uniforms(contents, 0, class.purpose(OFFSET));
@@ -80,7 +80,7 @@ impl Card {
         let camera = moment.sight.middle();
         let offset = middle - camera.position;
         let distance = offset.length();
-        let shown = weight(distance);
+        let shown = weight(middle);
         let height = class.lattice.height();
         if shown <= 0.0 || moment.sheltered(middle, velocity) || middle.y + 0.5 * height < moment.ground {
             return None;

@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use bansho_base::{
     image::Rect,
+    math::DVec3,
     random::{Key, Purpose},
 };
 use rayon::prelude::*;
@@ -15,7 +16,8 @@ use rayon::prelude::*;
 use super::{
     bands::Bands,
     lattice::CELL,
-    moment::{ClassNow, Moment},
+    moment::{Ball, ClassNow, Moment},
+    streak::Streak,
 };
 
 pub(super) use card::Card;
@@ -58,8 +60,7 @@ impl SheetCache {
     pub(super) fn sheets(&self, moment: &Moment) -> Arc<Sheets> {
         let contents = |class: &ClassNow| Contents {
             count: class.most * class.share * class.lattice.volume(),
-            diameter: 1e-3 * class.diameter_mm,
-            length: class.speed * moment.sight.exposure,
+            streak: Streak::new(class.diameter_mm, class.speed, moment.sight.exposure),
             cell: [CELL, class.lattice.height()],
         };
         let contents: Vec<Contents> = moment.classes.iter().map(contents).collect();
@@ -82,27 +83,31 @@ pub(super) struct Billboards {
 }
 
 impl Billboards {
-    /// Those between `near` and the end of the region; how much of one at a distance is drawn, `weight` says.
+    /// Those within a ball; `weight` says how much of one is drawn where its middle is.
     pub(super) fn new(
         moment: &Moment,
         sheets: Arc<Sheets>,
         picture: Rect,
-        distance: f64,
-        weight: &(dyn Fn(f64) -> f64 + Sync),
+        within: Ball,
+        weight: &(dyn Fn(DVec3) -> f64 + Sync),
     ) -> Self {
         let lists: Vec<Vec<Card>> = moment
             .classes
             .par_iter()
             .filter(|class| class.share > 0.0)
             .map(|class| {
-                let cells = moment.cells(class, distance);
+                let cells = moment.cells(class, within);
                 cells.iter().filter_map(|(_, cell)| Card::new(moment, class, *cell, picture, weight)).collect()
             })
             .collect();
         let mut cards = lists.concat();
         cards.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-        let rows: Vec<[f32; 2]> = cards.iter().map(|card| card.rows).collect();
-        Self { cards, bands: Bands::new(picture.height, &rows), sheets }
+        let bands = {
+            let columns = [0.0, picture.width as f32];
+            let extents = cards.iter().map(|card: &Card| [columns, card.rows]);
+            Bands::new([picture.width, picture.height], picture.width.max(1), extents)
+        };
+        Self { cards, bands, sheets }
     }
 
     /// Drops that they show in the picture, on average.

@@ -5,7 +5,7 @@ use bansho_base::{
     image::Rect,
 };
 
-use crate::rain::{bands::BAND, source::SourceField};
+use crate::rain::{aovs::measure, bands::BAND, source::SourceField};
 
 use super::{
     Billboards,
@@ -49,7 +49,8 @@ pub(crate) fn paint(
     aovs: &mut [AovPlane],
 ) {
     let mut scratch = Scratch::default();
-    for &index in brush.billboards.bands.members(band) {
+    let members = brush.billboards.bands.stretches(band, rows.x, rows.right()).flat_map(|(_, members)| members);
+    for &index in members {
         let card = &brush.billboards.cards[index as usize];
         let rect = card.rect.intersection(&rows);
         if rect.is_empty() || !brush.slice.contains(f64::from(card.depth)) {
@@ -215,7 +216,7 @@ fn put(
     let start = (y - strip.y) * strip.width + first - strip.x;
     let skipped = first - x;
     if !aovs.is_empty() {
-        measure(card, start, &opacity[skipped..last - x], planes, aovs);
+        measure_block(card, start, &opacity[skipped..last - x], planes, aovs);
     }
     let mut taken = [0.0; LANES];
     for lane in 0..LANES {
@@ -283,12 +284,10 @@ fn lay(
     }
 }
 
-fn measure(card: &Card, start: usize, opacity: &[f32], planes: &GrayPlanes, aovs: &mut [AovPlane]) {
-    let values = [1.0, card.depth, card.diameter_mm];
-    for (lane, opacity) in opacity.iter().enumerate().filter(|(_, opacity)| **opacity > 0.0) {
-        let index = start + lane;
+fn measure_block(card: &Card, start: usize, opacity: &[f32], planes: &GrayPlanes, aovs: &mut [AovPlane]) {
+    for (index, opacity) in (start..).zip(opacity) {
         if planes.plate_depth.get(index).is_none_or(|plate| *plate > card.depth) {
-            aovs.iter_mut().zip(values).for_each(|(plane, value)| plane.add(index, value, opacity.min(1.0)));
+            measure(aovs, index, opacity.min(1.0), card.depth, card.diameter_mm);
         }
     }
 }

@@ -3,11 +3,12 @@
 //! Each row holds the running sum of its opacities, so that the mean over any stretch is a difference of two look-ups: a pixel
 //! gets exactly what its width covers, near and far, without a pyramid of smaller textures.
 
-use std::f64::consts::PI;
+use bansho_base::{
+    image::Image,
+    random::{Key, Purpose},
+};
 
-use bansho_base::random::{Key, Purpose};
-
-use crate::rain::stroke::disc_share;
+use crate::rain::{streak::Streak, texture::draw_streak};
 
 /// Texels across a cell, 0.5 mm each: narrower than the drops that are seen one by one.
 pub(crate) const COLUMNS: usize = 2048;
@@ -27,10 +28,8 @@ const PLACE: Purpose = Purpose::named("rain drops of a texture");
 pub(crate) struct Contents {
     /// Drops; the last one counts by the fractional part.
     pub(crate) count: f64,
-    /// Their diameter, m.
-    pub(crate) diameter: f64,
-    /// How far they fall while the shutter is open, m.
-    pub(crate) length: f64,
+    /// What each of them leaves.
+    pub(crate) streak: Streak,
     /// Width and height of the cell, m.
     pub(crate) cell: [f64; 2],
 }
@@ -50,34 +49,37 @@ pub(crate) struct Sheet {
 impl Sheet {
     /// Draws the drops `variant` of `purpose`: drop after drop, so that one with more drops has the same and others.
     pub(crate) fn new(contents: &Contents, key: Key, purpose: Purpose, variant: u64) -> Self {
-        let wanted = ROWS_OF_STREAK * contents.cell[1] / contents.length.max(contents.diameter).max(1e-9);
+        let Streak { radius, length } = contents.streak;
+        let wanted = ROWS_OF_STREAK * contents.cell[1] / length.max(2.0 * radius).max(1e-9);
         let rows = (wanted.min(1e6) as usize).next_power_of_two().clamp(ROWS[0], ROWS[1]);
-        let mut clear = vec![1.0_f32; rows * STRIDE];
+        let mut image = Image::filled(COLUMNS, rows, [0.0]);
+        let [width, height] = contents.cell;
+        let pixel = [width / COLUMNS as f64, height / rows as f64];
         let purpose = Purpose(PLACE.0 ^ purpose.0);
         for index in 0..contents.count.ceil() as u64 {
-            let uniforms = key.uniforms(variant << 32 | index, 0, purpose);
-            let there = (contents.count - index as f64).min(1.0);
-            add_drop(contents, [uniforms[0], uniforms[1]], there as f32, rows, &mut clear);
+            let [x, y, ..] = key.uniforms(variant << 32 | index, 0, purpose).map(f64::from);
+            let share = (contents.count - index as f64).min(1.0);
+            draw_streak(&contents.streak, [x * width, y * height], pixel, share, &mut image);
         }
-        let peak = 1.0 - clear.iter().fold(1.0, |least: f32, value| least.min(*value));
-        let mut sheet = Self { rows, sums: clear, occupied: vec![0; rows], peak };
-        sheet.sum_up();
-        sheet
+        Self::sum_up(&image)
     }
 
-    /// Turns transparencies into running sums of opacity.
-    fn sum_up(&mut self) {
-        for (row, occupied) in self.sums.chunks_exact_mut(STRIDE).zip(&mut self.occupied) {
+    /// Turns opacities into their running sums.
+    fn sum_up(image: &Image<1>) -> Self {
+        let rows = image.height();
+        let mut sheet = Self { rows, sums: vec![0.0; rows * STRIDE], occupied: vec![0; rows], peak: 0.0 };
+        for (y, (sums, occupied)) in sheet.sums.chunks_exact_mut(STRIDE).zip(&mut sheet.occupied).enumerate() {
             let mut sum = 0.0_f64;
-            for (column, value) in row.iter_mut().enumerate() {
-                let opacity = 1.0 - *value;
-                *value = sum as f32;
-                if opacity > 0.0 {
+            for (column, [opacity]) in image.row(y).iter().enumerate() {
+                if *opacity > 0.0 {
                     *occupied |= 1 << (column / GROUP);
                 }
-                sum += f64::from(opacity);
+                sheet.peak = sheet.peak.max(*opacity);
+                sum += f64::from(*opacity);
+                sums[column + 1] = sum as f32;
             }
         }
+        sheet
     }
 
     /// Greatest opacity of any texel, and so of any pixel that shows texels.
@@ -152,36 +154,14 @@ impl SheetRow<'_> {
     }
 }
 
-/// Multiplies the transparency of one drop's streak in, its middle at `place` in cells; shares of rows and columns as in a
-/// [`Stroke`](crate::rain::stroke::Stroke).
-fn add_drop(contents: &Contents, place: [f32; 2], there: f32, rows: usize, clear: &mut [f32]) {
-    let texel = [contents.cell[0] / COLUMNS as f64, contents.cell[1] / rows as f64];
-    let radius = 0.5 * contents.diameter;
-    let half =
-        (0.5 * bansho_base::math::sqrt(contents.length * contents.length + 3.0 * radius * radius) / texel[1]).max(1e-3);
-    let across = ((radius / texel[0]) as f32).max(1e-3);
-    let middle = [place[0] * COLUMNS as f32, place[1] * rows as f32];
-    let hidden = (PI * radius * radius / (texel[0] * texel[1])) as f32 * there;
-    let (low, high) = (f64::from(middle[1]) - half, f64::from(middle[1]) + half);
-    for line in low.floor() as i64..high.ceil() as i64 {
-        let covered = (line as f64 + 1.0).min(high) - (line as f64).max(low);
-        let amount = hidden * (0.5 * covered.max(0.0) / half) as f32;
-        let row = line.rem_euclid(rows as i64) as usize * STRIDE;
-        let (first, last) = ((middle[0] - across).floor() as i64, (middle[0] + across).ceil() as i64);
-        for column in first..last {
-            let share = |edge: i64| disc_share((edge as f32 - middle[0]) / across);
-            let opacity = (amount * (share(column + 1) - share(column))).min(1.0);
-            clear[row + column.rem_euclid(COLUMNS as i64) as usize] *= 1.0 - opacity;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     fn sheet(count: f64, diameter_mm: f64, length: f64) -> Sheet {
-        let contents = Contents { count, diameter: 1e-3 * diameter_mm, length, cell: [1.0, 1.0] };
+        let contents = Contents { count, streak: Streak { radius: 0.5e-3 * diameter_mm, length }, cell: [1.0, 1.0] };
         Sheet::new(&contents, Key::new(1, "rain"), Purpose::named("test"), 0)
     }
 

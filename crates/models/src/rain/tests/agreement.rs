@@ -29,39 +29,60 @@ fn rows_have_the_mean_and_variance_of_the_reference() {
     // Noise of the reference itself falls with the number of streaks: weak rain needs more frames.
     for (rate, frames) in [(1.0, 40), (5.0, 24), (20.0, 12), (100.0, 6)] {
         let [billboards, drops] = METHODS.map(|method| statistics(method, rate, frames));
-        let ratio = |k: usize, band: usize| billboards[band][k] / drops[band][k];
-        let mean = |k: usize| (0..BANDS).map(|band| ratio(k, band)).sum::<f64>() / BANDS as f64;
+        let ratio = |k: usize, band: usize| billboards[band][k] / drops[band][k] - 1.0;
+        // At 1 mm/h a few hundred streaks make the variance of some rows: a part of the difference is chance.
+        let most = [0.05, if rate > 1.0 { 0.05 } else { 0.06 }];
         for k in 0..2 {
-            assert!((mean(k) - 1.0).abs() < 0.05, "R {rate}: {}", mean(k));
+            let mean = (0..BANDS).map(|band| ratio(k, band)).sum::<f64>() / BANDS as f64;
+            assert!(mean.abs() < 0.05, "R {rate}: {mean}");
+            for band in 0..BANDS {
+                assert!(ratio(k, band).abs() < most[k], "R {rate}, rows {band}: {}", ratio(k, band));
+            }
         }
     }
 }
 
-/// Autocorrelation of a picture at a lag across, its rows' means taken out.
-fn autocorrelation(picture: &[f32], lag: usize) -> f64 {
-    let (mut product, mut power, mut count) = (0.0, 0.0, 0.0);
-    for row in picture.chunks(SIZE[0]) {
-        let mean = row.iter().sum::<f32>() / row.len() as f32;
-        for x in 0..SIZE[0] - lag {
-            product += f64::from((row[x] - mean) * (row[x + lag] - mean));
-            count += 1.0;
+/// Correlation of a picture of `width` columns with one that lies `lag` columns to the right in it, both about the means of their rows.
+fn correlation(picture: &[f32], shifted: &[f32], width: usize, lag: usize) -> f64 {
+    let (mut product, mut power) = (0.0, [0.0; 2]);
+    for (row, other) in picture.chunks(width).zip(shifted.chunks(width)) {
+        let mean = |values: &[f32]| values.iter().sum::<f32>() / values.len() as f32;
+        let (row, other) = (&row[..width - lag], &other[lag..]);
+        let means = [mean(row), mean(other)];
+        for (a, b) in row.iter().zip(other) {
+            let (a, b) = (f64::from(a - means[0]), f64::from(b - means[1]));
+            product += a * b;
+            power = [power[0] + a * a, power[1] + b * b];
         }
-        power += row.iter().map(|value| f64::from((value - mean) * (value - mean))).sum::<f64>();
     }
-    product / count / (power / picture.len() as f64)
+    product / (power[0] * power[1]).sqrt()
 }
 
 #[test]
 fn nothing_repeats_at_the_distance_of_cells() {
+    const LARGE: [usize; 2] = [1920, 1080];
     let calm = wind([0.0; 3], 0.0);
-    for rate in [5.0, 50.0] {
-        let rain = rain(streaks(super::Method::Billboards, rate), 3);
-        let surroundings = Surroundings::of_wind(&calm);
-        let frame = |i: u32| opacity(&draw(&rain, &view_at(0.7 * f64::from(i), 1.0 / 60.0, SIZE), &surroundings));
-        let pictures: Vec<Vec<f32>> = (0..8).map(frame).collect();
-        // A cell is 314 / depth pixels wide: from 5.5 m up to 1.2 m. Chance is averaged away, a grid would stay.
-        let mean = |lag| pictures.iter().map(|picture| autocorrelation(picture, lag)).sum::<f64>() / 8.0;
-        let worst = (50..260).map(mean).fold(0.0, f64::max);
-        assert!(worst < 0.1, "R {rate}: {worst}");
+    let surroundings = Surroundings::of_wind(&calm);
+    let rain = rain(streaks(super::Method::Billboards, 20.0), 3);
+    let picture = opacity(&draw(&rain, &view_at(0.7, 1.0 / 60.0, LARGE), &surroundings));
+    // A cell is 1883 / depth pixels wide: from the end of the region at 5.5 m up to 1.2 m.
+    let worst = (330..1570).step_by(5).map(|lag| correlation(&picture, &picture, LARGE[0], lag)).fold(0.0, f64::max);
+    assert!(worst < 0.1, "{worst}");
+}
+
+#[test]
+fn a_cell_that_has_fallen_by_its_height_holds_other_drops() {
+    let calm = wind([0.0; 3], 0.0);
+    let surroundings = Surroundings::of_wind(&calm);
+    let parameters = super::RainParameters { diameters_mm: vec![1.4], ..streaks(super::Method::Billboards, 50.0) };
+    let rain = rain(parameters, 3);
+    let speed = rain.classes(0.0, &calm)[0].speed;
+    let at = |t: f64| opacity(&draw(&rain, &view_at(t, 1.0 / 60.0, SIZE), &surroundings));
+    let first = at(1.0);
+    assert!(correlation(&first, &first, SIZE[0], 0) > 0.999);
+    for cells in 1..=3 {
+        let later = at(1.0 + f64::from(cells) / speed);
+        let found = correlation(&first, &later, SIZE[0], 0);
+        assert!(found < 0.1, "{cells} cells: {found}");
     }
 }

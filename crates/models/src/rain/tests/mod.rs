@@ -147,6 +147,52 @@ fn slices_of_depth_come_to_the_whole() {
 }
 
 #[test]
+fn depth_and_diameter_are_those_of_the_nearest_streak() {
+    let wind = wind([0.0; 3], 0.0);
+    let view = view_at(1.0, 0.02, [96, 54]);
+    for method in METHODS {
+        let rain = rain(streaks(method, 20.0), 1);
+        let strip = draw(&rain, &view, &lit(&wind));
+        let mut covered = 0;
+        for (index, opacity) in opacity(&strip).into_iter().enumerate() {
+            let [depth, diameter] = [1, 2].map(|plane: usize| strip.aovs[plane].resolve(index, AovRule::Nearest));
+            if opacity > 0.0 {
+                assert_eq!(depth, strip.depth[index]);
+                assert!(rain.parameters().diameters_mm.iter().any(|known| *known as f32 == diameter), "{diameter}");
+                covered += 1;
+            } else {
+                assert_eq!([depth, diameter], [0.0; 2]);
+            }
+        }
+        assert!(covered > strip.len() / 4, "{method:?}: {covered}");
+    }
+}
+
+#[test]
+fn splashes_stay_near_the_ground_and_grow_with_the_rain() {
+    let calm = wind([0.0; 3], 0.0);
+    let mut view = view_at(1.0, 0.02, [160, 90]);
+    view.path.target = Animated::from([0.0, 0.6, -4.0]);
+    let view = View::new(view.path, view.shutter, 1.1, view.size, 0);
+    let picture = |rate: f64, amount: f64| {
+        let mut parameters = streaks(Method::Drops, rate);
+        parameters.splashes.amount = amount;
+        opacity(&draw(&rain(parameters, 1), &view, &Surroundings::of_wind(&calm)))
+    };
+    // How much splashes add to the rows above and below the one that shows 0.3 m above the ground at the end of their reach.
+    let end = bansho_base::math::DVec3::new(0.0, 0.3, -8.0);
+    let line = view.camera.project(end).map_or(0, |place| place.pixel.y as usize);
+    let added = |rate: f64| {
+        let pairs = picture(rate, 1.0).into_iter().zip(picture(rate, 0.0)).map(|(with, without)| with - without);
+        let (above, below): (Vec<_>, Vec<_>) = pairs.enumerate().partition(|(index, _)| index / 160 < line);
+        [above, below].map(|part| part.iter().map(|(_, opacity)| opacity.abs()).sum::<f32>())
+    };
+    let ([none, weak], [nothing, strong]) = (added(5.0), added(50.0));
+    assert_eq!([none, nothing], [0.0; 2]);
+    assert!(weak > 0.0 && strong > 3.0 * weak, "{weak} {strong}");
+}
+
+#[test]
 fn the_plate_hides_all_rain_behind_it() {
     let wind = wind([0.0; 3], 0.0);
     let surroundings = lit(&wind);

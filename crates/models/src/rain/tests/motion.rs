@@ -2,7 +2,12 @@
 
 use super::{METHODS, Method, draw, opacity, rain, streaks, view_at, wind};
 use crate::rain::{Rain, RainParameters};
-use bansho_base::{animation::Animated, canvas::View, curve::Interpolation, surroundings::Surroundings};
+use bansho_base::{
+    animation::Animated,
+    canvas::{AovRule, Strip, View},
+    curve::Interpolation,
+    surroundings::Surroundings,
+};
 
 const SIZE: [usize; 2] = [320, 180];
 
@@ -50,6 +55,63 @@ fn streaks_lean_with_the_wind_and_with_the_camera() {
             let found = slant(&opacity(&strip), 8);
             assert!((found - expected).abs() <= 1, "{method:?}, camera {speed}: {found} {expected}");
         }
+    }
+}
+
+/// Length of each streak of a picture and what it should be, pixels: streaks that stand apart and wholly
+/// within the middle of the picture, where billboards have the depth that they say.
+fn lengths(strip: &Strip, focal_pixels: f64, fall: f64) -> Vec<[f64; 2]> {
+    let opacity = opacity(strip);
+    let depth = |index: usize| strip.aovs[1].resolve(index, AovRule::Nearest);
+    let mut found = Vec::new();
+    let mut depths: Vec<f32> = (0..strip.len()).map(depth).filter(|depth| *depth > 0.0).collect();
+    depths.sort_by(f32::total_cmp);
+    depths.dedup();
+    for one in depths {
+        let pixels: Vec<usize> = (0..strip.len()).filter(|index| depth(*index) == one).collect();
+        let column = |index: &usize| index % SIZE[0];
+        let (left, right) = (pixels.iter().map(column).min(), pixels.iter().map(column).max());
+        let [top, bottom] = [pixels[0] / SIZE[0], pixels[pixels.len() - 1] / SIZE[0]];
+        let (left, right) = (left.unwrap_or(0), right.unwrap_or(0));
+        let aside = right - left > 3 || left < SIZE[0] / 2 - 40 || right > SIZE[0] / 2 + 40;
+        if aside || top == 0 || bottom == SIZE[1] - 1 {
+            continue;
+        }
+        // What a row hides within the streak, over what all rows hide: ends fade within their pixels.
+        let row = |y: usize| -> f64 {
+            pixels.iter().filter(|index| **index / SIZE[0] == y).map(|index| f64::from(opacity[*index])).sum()
+        };
+        let rows: Vec<f64> = (top..=bottom).map(row).collect();
+        if rows.iter().any(|row| *row <= 0.0) {
+            continue;
+        }
+        let length = rows.iter().sum::<f64>() / rows.iter().copied().fold(0.0, f64::max);
+        found.push([length, focal_pixels * fall / f64::from(one)]);
+    }
+    found
+}
+
+#[test]
+fn streaks_are_as_long_as_drops_fall_while_the_shutter_is_open() {
+    let calm = wind([0.0; 3], 0.0);
+    let surroundings = Surroundings::of_wind(&calm);
+    for method in METHODS {
+        let (mut measured, mut whole) = (0, 0);
+        for seed in 0..12 {
+            let parameters = RainParameters { diameters_mm: vec![2.0], ..streaks(method, 1.0) };
+            let mut view = view_at(1.0, 1.0 / 60.0, SIZE);
+            view.path.target = Animated::from([0.0, 1.6, -4.0]);
+            let view = View::new(view.path, view.shutter, 1.1, SIZE, 0);
+            let strip = draw(&rain(parameters, seed), &view, &surroundings);
+            for [found, expected] in lengths(&strip, view.camera.focal_pixels, 6.49 / 60.0) {
+                assert!(found < expected + 1.0, "{method:?}: {found} {expected}");
+                measured += 1;
+                whole += usize::from(found > expected - 1.0);
+            }
+        }
+        // A streak in ten crosses the edge of its billboard and is seen in two parts.
+        let least = if method == Method::Drops { measured } else { measured * 4 / 5 };
+        assert!(measured > 10 && whole >= least, "{method:?}: {whole} of {measured} streaks");
     }
 }
 

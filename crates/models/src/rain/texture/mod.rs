@@ -4,7 +4,6 @@
 //! repeats in both directions: a streak that leaves at an edge enters at the opposite one.
 
 mod draw;
-mod mipmap;
 
 use bansho_base::{
     image::Image,
@@ -17,7 +16,7 @@ use super::{
     velocity::Fall,
 };
 
-pub use mipmap::{MipLevel, StreakTexture};
+pub(super) use draw::draw_streak;
 
 /// How streak textures are made; the default is the paper's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,12 +95,11 @@ impl StreakCube {
 
     /// Draws more drops over those that a texture of this cube holds.
     pub fn draw_over(&self, drops: &[FallingDrop], image: &mut Image<1>) {
-        drops.iter().for_each(|drop| draw::streak(self, drop, image));
-    }
-
-    /// The texture of one rain and one bin, ready to be sampled.
-    pub fn texture(&self, sizes: &DropSizes, bin: &SizeBin, seed: u64, variant: u32) -> StreakTexture {
-        StreakTexture::new(&self.draw(&self.drops(sizes, bin, seed, variant)))
+        for drop in drops {
+            // Downward from the upper edge, as rows run; the drop falls along it.
+            let [x, y, _] = drop.position;
+            draw_streak(&self.streak(drop), [x, self.edge - y], [self.pixel(); 2], 1.0, image);
+        }
     }
 }
 

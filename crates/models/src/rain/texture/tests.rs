@@ -162,30 +162,6 @@ fn spread_drops_fill_their_bin() {
 }
 
 #[test]
-fn every_level_has_the_same_mean() {
-    let cube = StreakCube::default();
-    let [bin] = SizeBin::around(&[1.4])[..] else { panic!("one bin") };
-    let image = cube.draw(&cube.drops(&DropSizes::marshall_palmer(20.0), &bin, 1, 0));
-    let texture = StreakTexture::new(&image);
-    assert_eq!(
-        texture.levels.iter().map(|level| level.size).collect::<Vec<_>>(),
-        [512, 256, 128, 64, 32, 16, 8, 4, 2, 1]
-    );
-    let mean = sum(&image) / (512.0 * 512.0);
-    for level in &texture.levels {
-        let texels = level.texels.iter().map(|&texel| f64::from(texel)).sum::<f64>();
-        let found = texels * f64::from(level.scale) / (level.size * level.size) as f64;
-        assert!(near(found, mean, 1e-3), "{}: {found} {mean}", level.size);
-    }
-    assert!(near(texture.mean(), mean, 1e-3));
-    let error =
-        (0..512).map(|x| (texture.levels[0].at(x, 700) - image.at(x as usize, 188)[0]).abs()).fold(0.0, f32::max);
-    assert!(error <= texture.levels[0].scale);
-    let empty = StreakTexture::new(&Image::filled(6, 6, [0.0]));
-    assert_eq!((empty.levels.len(), empty.mean()), (2, 0.0));
-}
-
-#[test]
 fn any_shutter_gives_opacities() {
     for exposure in [1e-6, 1e-5, 0.5, 10.0] {
         let cube = StreakCube { exposure, size: 64, ..StreakCube::default() };

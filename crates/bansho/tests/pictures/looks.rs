@@ -1,6 +1,6 @@
 //! Small films of scenes, and what can be measured on them.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{ops::Range, path::PathBuf, sync::Arc};
 
 use bansho::{
     Backend, BitDepth, CpuBackend, DisplayImage, Plan, PlanOptions, Unobserved, View,
@@ -94,6 +94,12 @@ impl Film {
         self.frames[frame].iter().map(|pixel| luminance(*pixel)).sum::<f64>() / (self.width * self.height) as f64
     }
 
+    /// Mean of a number that pixels have, over a part of the first frame.
+    pub(crate) fn mean_over(&self, rows: Range<usize>, columns: Range<usize>, of: impl Fn([f64; 3]) -> f64) -> f64 {
+        let pixels = rows.clone().flat_map(|row| self.row(0, row)[columns.clone()].iter());
+        pixels.map(|pixel| of(*pixel)).sum::<f64>() / (rows.len() * columns.len()) as f64
+    }
+
     /// Mean absolute difference of two frames.
     pub(crate) fn difference(&self, a: usize, b: usize) -> f64 {
         let pair = self.frames[a].iter().zip(&self.frames[b]);
@@ -119,6 +125,23 @@ impl Film {
         }
         place.map(|coordinate| coordinate / sum)
     }
+}
+
+/// Shares of the lit pixels that are red, orange and yellow to white, by the ratio of green to red in linear light.
+pub(crate) fn hues(film: &Film) -> [f64; 3] {
+    let mut counts = [0.0; 3];
+    for pixel in film.pixels().filter(|pixel| luminance(**pixel) > 0.01) {
+        let ratio = pixel[1] / pixel[0].max(1e-6);
+        counts[if ratio < 0.12 {
+            0
+        } else if ratio < 0.45 {
+            1
+        } else {
+            2
+        }] += 1.0;
+    }
+    let all: f64 = counts.iter().sum();
+    counts.map(|count| count / all)
 }
 
 /// Share of the length of gradients that lies in bands: more than 8 pixels of one 8-bit code where 16 bits move by a

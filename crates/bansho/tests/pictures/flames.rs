@@ -1,50 +1,11 @@
-//! The shipped scenes as pictures: small goldens, and for each scene numbers that a toy would fail.
-//!
-//! `BANSHO_BLESS=1 cargo test -p bansho --test pictures` rewrites the goldens; the reason goes into CHANGELOG.md under
-//! "Changes the picture".
-#![cfg(feature = "files")]
-
-mod looks;
+//! The flame sheet.
 
 use bansho::PlanOptions;
-use looks::{Film, golden, luminance, scene_text};
 
-/// Size of goldens and of most measurements.
-const SMALL: [usize; 2] = [256, 144];
-
-#[test]
-fn golden_pictures_are_as_they_were() {
-    let scenes = [
-        "candle",
-        "torch",
-        "campfire",
-        "hearth",
-        "ohshima_itahashi",
-        "inagaki_still",
-        "inagaki_wind_left",
-        "inagaki_haze",
-        "inagaki_density",
-    ];
-    let changed: Vec<String> = scenes.into_iter().filter_map(|scene| golden(scene, SMALL, 40)).collect();
-    assert!(changed.is_empty(), "{}", changed.join("\n"));
-}
-
-/// Shares of the lit pixels that are red, orange and yellow to white, by the ratio of green to red in linear light.
-fn hues(film: &Film) -> [f64; 3] {
-    let mut counts = [0.0; 3];
-    for pixel in film.pixels().filter(|pixel| luminance(**pixel) > 0.01) {
-        let ratio = pixel[1] / pixel[0].max(1e-6);
-        counts[if ratio < 0.12 {
-            0
-        } else if ratio < 0.45 {
-            1
-        } else {
-            2
-        }] += 1.0;
-    }
-    let all: f64 = counts.iter().sum();
-    counts.map(|count| count / all)
-}
+use crate::{
+    SMALL,
+    looks::{Film, hues, luminance, scene_text, wide_bands},
+};
 
 #[test]
 fn flames_go_from_red_through_orange_to_yellow_white() {
@@ -148,7 +109,7 @@ fn a_loop_closes_as_smoothly_as_it_runs() {
 #[test]
 fn gradients_show_no_bands() {
     let text = scene_text("campfire");
-    let bands = looks::wide_bands(&text, [1280, 720], 60);
+    let bands = wide_bands(&text, [1280, 720], 60);
     assert!(bands < 0.01, "{bands} of the gradient's length lies in bands wider than 8 pixels");
 }
 
@@ -166,70 +127,4 @@ fn the_papers_stages_follow_from_each_other() {
     assert!(sharpened.mean(0) > thresholded.mean(0), "sharpening raises what is above the threshold");
     let grey = |film: &Film| film.pixels().all(|p| (p[0] - p[1]).abs() < 0.02 && (p[1] - p[2]).abs() < 0.02);
     assert!(grey(&texture) && grey(&thresholded) && grey(&sharpened) && !grey(&coloured));
-}
-
-/// The paper's flame in wind of `speed` m/s, twelve frames of it.
-fn gas_in_wind(speed: f64) -> Film {
-    let text = scene_text("inagaki_still").replace(
-        "[[flame_particles]]",
-        &format!("[wind]\nvelocity = [{speed:?}, 0, 0]\ngust = 0\n[[flame_particles]]"),
-    );
-    let frames: Vec<i64> = (1..=12).map(|index| 10 * index).collect();
-    Film::of_text(&text, [160, 90], &frames, &PlanOptions::default())
-}
-
-#[test]
-fn wind_bends_burning_gas_and_more_wind_bends_it_more() {
-    let lean = |speed: f64| gas_in_wind(speed).centroid_of_upper_half()[0] - 80.0;
-    let [left, still, right, strong] = [-0.8, 0.0, 0.8, 1.6].map(lean);
-    assert!(still.abs() < 6.0, "still: {still}");
-    assert!(left < still - 2.0 && right > still + 2.0 && strong > right + 2.0, "{left} {still} {right} {strong}");
-}
-
-#[test]
-fn burning_gas_has_sharp_rims_bright_cores_and_gaps() {
-    let text = scene_text("inagaki_still");
-    let film = Film::of_text(&text, [640, 360], &[20, 60], &PlanOptions::default());
-    let smooth = Film::of_text(
-        &format!("{text}[flame_particles.look]\ndetail = 0\n"),
-        [640, 360],
-        &[20, 60],
-        &PlanOptions::default(),
-    );
-    // How steeply luminance changes from pixel to pixel, beside how much there is: sums of kernels alone are a blur.
-    let steepness = |film: &Film| {
-        let (mut change, mut light) = (0.0, 0.0);
-        for frame in 0..2 {
-            for row in 0..360 {
-                for pair in film.row(frame, row).windows(2) {
-                    change += (luminance(pair[1]) - luminance(pair[0])).abs();
-                    light += luminance(pair[0]);
-                }
-            }
-        }
-        change / light
-    };
-    let (fine, blurred) = (steepness(&film), steepness(&smooth));
-    assert!(fine > 1.5 * blurred, "steepness {fine}, without detail {blurred}");
-    let [_, orange, yellow] = hues(&film);
-    assert!(orange > 0.1 && yellow > 0.05, "orange {orange}, yellow {yellow}");
-    let flat = film.pixels().filter(|p| p.iter().all(|value| *value > 0.99)).count() as f64 / film.len() as f64;
-    assert!(flat < 0.001, "{flat} of the picture is clipped");
-}
-
-#[test]
-fn haze_displaces_the_plate_around_the_flame_and_nowhere_else() {
-    let text = scene_text("inagaki_haze");
-    let draw = |text: &str| Film::of_text(text, [320, 180], &[40], &PlanOptions::default());
-    let (bent, straight) = (draw(&text), draw(&text.replace("haze_gain = 14.0", "haze_gain = 0.0")));
-    let moved = |columns: std::ops::Range<usize>| {
-        let pixels = || (0..180).flat_map(|row| columns.clone().map(move |x| (row, x)));
-        let differs = |(row, x): &(usize, usize)| {
-            (luminance(bent.row(0, *row)[*x]) - luminance(straight.row(0, *row)[*x])).abs() > 0.02
-        };
-        pixels().filter(differs).count() as f64 / pixels().count() as f64
-    };
-    let (around, left, right) = (moved(130..190), moved(0..80), moved(240..320));
-    assert!(around > 0.02, "{around} of the plate around the flame moves");
-    assert_eq!((left, right), (0.0, 0.0), "the plate beside the flame stays");
 }

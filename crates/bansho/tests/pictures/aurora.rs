@@ -1,0 +1,104 @@
+//! The aurora.
+
+use std::ops::Range;
+
+use bansho::PlanOptions;
+
+use crate::{
+    SMALL,
+    looks::{Film, luminance},
+};
+
+/// A frame soon after the start: the aurora has settled before it.
+const EARLY: i64 = 4;
+
+fn film(scene: &str, frames: &[i64]) -> Film {
+    Film::of(scene, SMALL, frames, &PlanOptions::default())
+}
+
+#[test]
+fn an_arc_has_a_thin_lower_edge_and_a_fading_top() {
+    let film = film("quiet_arc", &[EARLY]);
+    let rows: Vec<f64> = (0..100).map(|row| film.mean_over(row..row + 1, 60..200, luminance)).collect();
+    let peak = (0..rows.len()).max_by(|a, b| rows[*a].total_cmp(&rows[*b])).unwrap_or(0);
+    let dark = rows[80..].iter().copied().fold(f64::MAX, f64::min);
+    let faint = |row: &usize| rows[*row] - dark < 0.25 * (rows[peak] - dark);
+    let up = peak - (0..peak).rev().find(faint).unwrap_or(0);
+    let down = (peak..100).find(faint).unwrap_or(100) - peak;
+    assert!((30..80).contains(&peak) && up as f64 > 1.8 * down as f64, "peak {peak}, {up} up, {down} down");
+}
+
+/// Share of what the picture changes by that it changes around a place rather than toward it.
+fn across_radii(film: &Film, centre: [f64; 2]) -> f64 {
+    let (mut around, mut all) = (0.0, 0.0);
+    for row in 1..SMALL[1] - 1 {
+        for column in 1..SMALL[0] - 1 {
+            let at = |x: usize, y: usize| luminance(film.row(0, y)[x]).sqrt();
+            let gradient = [at(column + 1, row) - at(column - 1, row), at(column, row + 1) - at(column, row - 1)];
+            let offset = [column as f64 + 0.5 - centre[0], row as f64 + 0.5 - centre[1]];
+            let distance = bansho::base::math::hypot(offset[0], offset[1]);
+            if !(20.0..60.0).contains(&distance) {
+                continue;
+            }
+            let tangential = (gradient[1] * offset[0] - gradient[0] * offset[1]) / distance;
+            around += tangential * tangential;
+            all += gradient[0] * gradient[0] + gradient[1] * gradient[1];
+        }
+    }
+    around / all
+}
+
+#[test]
+fn the_rays_of_a_corona_converge_at_the_magnetic_zenith() {
+    let film = film("corona", &[EARLY]);
+    let zenith = across_radii(&film, [128.0, 76.5]);
+    for [x, y] in [[-45.0, 0.0], [45.0, 0.0], [0.0, -30.0], [0.0, 30.0]] {
+        let elsewhere = across_radii(&film, [128.0 + x, 76.5 + y]);
+        assert!(zenith > 0.65 && zenith > elsewhere + 0.05, "{zenith} at the zenith, {elsewhere} at {x} {y}");
+    }
+}
+
+#[test]
+fn soft_electrons_make_a_red_top_over_a_green_foot() {
+    let film = film("red_aurora", &[EARLY]);
+    let ratio = |rows: Range<usize>| {
+        film.mean_over(rows.clone(), 0..SMALL[0], |[red, ..]| red)
+            / film.mean_over(rows, 0..SMALL[0], |[_, green, _]| green)
+    };
+    let (top, foot) = (ratio(5..40), ratio(92..100));
+    assert!(top > 5.0 && foot < 1.5, "red beside green: {top} at the top, {foot} at the foot");
+}
+
+#[test]
+fn a_lake_mirrors_the_sky_and_is_darker() {
+    const HORIZON: usize = 78;
+    let film = film("lake", &[EARLY]);
+    let column_means = |row: usize| -> Vec<f64> {
+        let of = |block: usize| film.mean_over(row..row + 3, 16 * block..16 * block + 16, luminance);
+        (0..16).map(of).collect()
+    };
+    let (mut above, mut below) = (Vec::new(), Vec::new());
+    for height in (6..60).step_by(3) {
+        above.extend(column_means(HORIZON - height - 3));
+        below.extend(column_means(HORIZON + height));
+    }
+    let centre = |values: &[f64]| -> (f64, Vec<f64>) {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        (mean, values.iter().map(|value| value - mean).collect())
+    };
+    let ((bright, above), (dim, below)) = (centre(&above), centre(&below));
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let alike = product(&above, &below) / (product(&above, &above) * product(&below, &below)).sqrt();
+    assert!(alike > 0.4 && dim < 0.7 * bright, "correlation {alike}, brightness {bright} and {dim}");
+}
+
+#[test]
+fn a_transition_shows_no_jump() {
+    let frames: Vec<i64> = (60..76).collect();
+    let film = film("sekiguchi_2", &frames);
+    let mut steps: Vec<f64> = (1..frames.len()).map(|frame| film.difference(frame - 1, frame)).collect();
+    let greatest = steps.iter().copied().fold(0.0, f64::max);
+    steps.sort_by(f64::total_cmp);
+    let median = steps[steps.len() / 2];
+    assert!(median > 0.0 && greatest < 2.0 * median, "from frame to frame {median}, once {greatest}");
+}

@@ -1,0 +1,71 @@
+//! The particle flame.
+
+use bansho::PlanOptions;
+
+use crate::looks::{Film, hues, luminance, scene_text};
+
+/// The paper's flame in wind of `speed` m/s, twelve frames of it.
+fn gas_in_wind(speed: f64) -> Film {
+    let text = scene_text("inagaki_still").replace(
+        "[[flame_particles]]",
+        &format!("[wind]\nvelocity = [{speed:?}, 0, 0]\ngust = 0\n[[flame_particles]]"),
+    );
+    let frames: Vec<i64> = (1..=12).map(|index| 10 * index).collect();
+    Film::of_text(&text, [160, 90], &frames, &PlanOptions::default())
+}
+
+#[test]
+fn wind_bends_burning_gas_and_more_wind_bends_it_more() {
+    let lean = |speed: f64| gas_in_wind(speed).centroid_of_upper_half()[0] - 80.0;
+    let [left, still, right, strong] = [-0.8, 0.0, 0.8, 1.6].map(lean);
+    assert!(still.abs() < 6.0, "still: {still}");
+    assert!(left < still - 2.0 && right > still + 2.0 && strong > right + 2.0, "{left} {still} {right} {strong}");
+}
+
+#[test]
+fn burning_gas_has_sharp_rims_bright_cores_and_gaps() {
+    let text = scene_text("inagaki_still");
+    let film = Film::of_text(&text, [640, 360], &[20, 60], &PlanOptions::default());
+    let smooth = Film::of_text(
+        &format!("{text}[flame_particles.look]\ndetail = 0\n"),
+        [640, 360],
+        &[20, 60],
+        &PlanOptions::default(),
+    );
+    // How steeply luminance changes from pixel to pixel, beside how much there is: sums of kernels alone are a blur.
+    let steepness = |film: &Film| {
+        let (mut change, mut light) = (0.0, 0.0);
+        for frame in 0..2 {
+            for row in 0..360 {
+                for pair in film.row(frame, row).windows(2) {
+                    change += (luminance(pair[1]) - luminance(pair[0])).abs();
+                    light += luminance(pair[0]);
+                }
+            }
+        }
+        change / light
+    };
+    let (fine, blurred) = (steepness(&film), steepness(&smooth));
+    assert!(fine > 1.5 * blurred, "steepness {fine}, without detail {blurred}");
+    let [_, orange, yellow] = hues(&film);
+    assert!(orange > 0.1 && yellow > 0.05, "orange {orange}, yellow {yellow}");
+    let flat = film.pixels().filter(|p| p.iter().all(|value| *value > 0.99)).count() as f64 / film.len() as f64;
+    assert!(flat < 0.001, "{flat} of the picture is clipped");
+}
+
+#[test]
+fn haze_displaces_the_plate_around_the_flame_and_nowhere_else() {
+    let text = scene_text("inagaki_haze");
+    let draw = |text: &str| Film::of_text(text, [320, 180], &[40], &PlanOptions::default());
+    let (bent, straight) = (draw(&text), draw(&text.replace("haze_gain = 14.0", "haze_gain = 0.0")));
+    let moved = |columns: std::ops::Range<usize>| {
+        let pixels = || (0..180).flat_map(|row| columns.clone().map(move |x| (row, x)));
+        let differs = |(row, x): &(usize, usize)| {
+            (luminance(bent.row(0, *row)[*x]) - luminance(straight.row(0, *row)[*x])).abs() > 0.02
+        };
+        pixels().filter(differs).count() as f64 / pixels().count() as f64
+    };
+    let (around, left, right) = (moved(130..190), moved(0..80), moved(240..320));
+    assert!(around > 0.02, "{around} of the plate around the flame moves");
+    assert_eq!((left, right), (0.0, 0.0), "the plate beside the flame stays");
+}

@@ -1,0 +1,211 @@
+//! A sparse map of power in the plane that follows what feeds it with a delay.
+
+use bansho_base::math;
+
+use crate::aurora::particles::AuroraParticles;
+
+/// Cells along a tile.
+const SIDE: usize = 8;
+/// A tile without a cell above this power is dark, W.
+const DARK_W: f32 = 1e-3;
+const NO_TILE: u32 = u32::MAX;
+
+/// A lit cell of a map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GlowCell {
+    /// Its middle, km: x east, z south.
+    pub position_km: [f32; 2],
+    /// Power that electrons would have to bring now for the light that it gives, W: a steady aurora's own.
+    pub power_w: f32,
+    /// Central energy of those electrons, eV.
+    pub energy_ev: f32,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Tile {
+    place: u32,
+    powers: [f32; SIDE * SIDE],
+    /// Power times energy, W eV.
+    weighted: [f32; SIDE * SIDE],
+}
+
+/// Power on square cells of which only lit ones are stored.
+///
+/// The power of a cell follows that of the particles in it, `dP/dt = (P_particles - P) / lifetime`: so a steady sheet shows its own
+/// power, and one that is gone fades. Excited atoms do not move here: how far they diffuse is a blur of the light
+/// ([`Column::spread_km`](crate::aurora::light::emission::Column)).
+#[derive(Clone, Debug, PartialEq)]
+pub struct GlowMap {
+    cell_km: f64,
+    half_km: f64,
+    /// Tiles along each side.
+    side: usize,
+    /// For each place of a tile its number, or [`NO_TILE`].
+    numbers: Vec<u32>,
+    tiles: Vec<Tile>,
+}
+
+impl GlowMap {
+    /// A dark map.
+    pub(super) fn new(extent_km: f64, cell_km: f64) -> Self {
+        let side = (extent_km / (cell_km * SIDE as f64)).ceil().max(1.0) as usize;
+        Self { cell_km, half_km: extent_km / 2.0, side, numbers: vec![NO_TILE; side * side], tiles: Vec::new() }
+    }
+
+    /// Width of a cell, km.
+    #[must_use]
+    pub fn cell_km(&self) -> f64 {
+        self.cell_km
+    }
+
+    /// All cells that are lit, in an order that does not depend on threads.
+    pub fn cells(&self) -> impl Iterator<Item = GlowCell> + '_ {
+        self.tiles.iter().flat_map(|tile| (0..SIDE * SIDE).filter_map(|cell| self.cell(tile, cell)))
+    }
+
+    /// How many cells are lit.
+    #[must_use]
+    pub fn lit_cells(&self) -> usize {
+        self.tiles.iter().flat_map(|tile| &tile.powers).filter(|power| **power > 0.0).count()
+    }
+
+    /// Power of the whole map, W.
+    #[must_use]
+    pub fn power_w(&self) -> f64 {
+        self.cells().map(|cell| f64::from(cell.power_w)).sum()
+    }
+
+    /// Its lit tiles: the place of each, and the powers and then the powers times energy of its cells.
+    pub(in crate::aurora) fn to_lists(&self) -> (Vec<u32>, Vec<f32>) {
+        let places = self.tiles.iter().map(|tile| tile.place).collect();
+        (places, self.tiles.iter().flat_map(|tile| tile.powers.into_iter().chain(tile.weighted)).collect())
+    }
+
+    /// A map laid out as this one that holds what [`Self::to_lists`] gave; none if the lists are no such map.
+    pub(in crate::aurora) fn with_lists(&self, places: &[u32], values: &[f32]) -> Option<Self> {
+        let (tiles, rest) = values.as_chunks::<{ 2 * SIDE * SIDE }>();
+        if tiles.len() != places.len() || !rest.is_empty() {
+            return None;
+        }
+        let mut map = Self { numbers: vec![NO_TILE; self.numbers.len()], tiles: Vec::new(), ..*self };
+        for (place, values) in places.iter().zip(tiles) {
+            let number = map.numbers.get_mut(*place as usize).filter(|number| **number == NO_TILE)?;
+            *number = map.tiles.len() as u32;
+            let half = |start: usize| std::array::from_fn(|cell| values[start + cell]);
+            map.tiles.push(Tile { place: *place, powers: half(0), weighted: half(SIDE * SIDE) });
+        }
+        Some(map)
+    }
+
+    fn cell(&self, tile: &Tile, cell: usize) -> Option<GlowCell> {
+        let power_w = tile.powers[cell];
+        let place = tile.place as usize;
+        let middle =
+            |tiles: usize, cells: usize| (((tiles * SIDE + cells) as f64 + 0.5) * self.cell_km - self.half_km) as f32;
+        (power_w > 0.0).then(|| GlowCell {
+            position_km: [middle(place % self.side, cell % SIDE), middle(place / self.side, cell / SIDE)],
+            power_w,
+            energy_ev: tile.weighted[cell] / power_w,
+        })
+    }
+
+    /// Lets `seconds` pass at a lifetime in seconds.
+    pub(super) fn step(&mut self, particles: &AuroraParticles, seconds: f64, lifetime: f64) {
+        let kept = if lifetime > 0.0 { math::exp(-seconds / lifetime) } else { 0.0 };
+        self.fade(kept as f32);
+        self.feed(particles, (1.0 - kept) as f32);
+    }
+
+    fn fade(&mut self, kept: f32) {
+        for tile in &mut self.tiles {
+            tile.powers.iter_mut().chain(&mut tile.weighted).for_each(|value| *value *= kept);
+        }
+        let mut number = 0;
+        while number < self.tiles.len() {
+            if self.tiles[number].powers.iter().all(|power| *power < DARK_W) {
+                self.numbers[self.tiles[number].place as usize] = NO_TILE;
+                self.tiles.swap_remove(number);
+                if let Some(moved) = self.tiles.get(number) {
+                    self.numbers[moved.place as usize] = number as u32;
+                }
+            } else {
+                number += 1;
+            }
+        }
+    }
+
+    /// Adds that share of the particles' power, one after the other, so that sums do not depend on threads.
+    fn feed(&mut self, particles: &AuroraParticles, share: f32) {
+        let (to_cells, half_km) = (1.0 / self.cell_km, self.half_km);
+        let last = (self.side * SIDE) as f64 - 1.0;
+        let cell_of = |km: f32| ((f64::from(km) + half_km) * to_cells).clamp(0.0, last) as usize;
+        let [xs, zs] = &particles.positions;
+        let values = particles.powers_w.iter().zip(&particles.energies_ev);
+        for ((x, z), (power, energy)) in xs.iter().zip(zs).zip(values) {
+            let (column, row) = (cell_of(*x), cell_of(*z));
+            let tile = self.tile_mut(row / SIDE * self.side + column / SIDE);
+            let cell = row % SIDE * SIDE + column % SIDE;
+            // No `mul_add`: outside a vector loop that is a call where the machine is not known to have it.
+            tile.powers[cell] += power * share;
+            tile.weighted[cell] += power * energy * share;
+        }
+    }
+
+    fn tile_mut(&mut self, place: usize) -> &mut Tile {
+        if self.numbers[place] == NO_TILE {
+            self.numbers[place] = self.tiles.len() as u32;
+            self.tiles.push(Tile { place: place as u32, powers: [0.0; SIDE * SIDE], weighted: [0.0; SIDE * SIDE] });
+        }
+        &mut self.tiles[self.numbers[place] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Particles of 3 W and 1 W at those places, of 1 and 5 keV.
+    fn particles(places: [[f32; 2]; 2]) -> AuroraParticles {
+        AuroraParticles {
+            positions: [0, 1].map(|axis| places.iter().map(|place| place[axis]).collect()),
+            powers_w: vec![3.0, 1.0],
+            energies_ev: vec![1000.0, 5000.0],
+            ..AuroraParticles::default()
+        }
+    }
+
+    #[test]
+    fn a_cell_follows_what_feeds_it_and_fades_by_e_in_a_lifetime() {
+        let mut map = GlowMap::new(100.0, 0.5);
+        let fed = particles([[10.1, -20.1], [10.2, -20.2]]);
+        // Half a lifetime: 1 - exp(-1/2) of 4 W.
+        map.step(&fed, 0.4, 0.8);
+        assert!((map.power_w() - 4.0 * 0.393_469).abs() < 1e-5);
+        (0..40).for_each(|_| map.step(&fed, 0.4, 0.8));
+        let cells: Vec<GlowCell> = map.cells().collect();
+        assert_eq!(cells.len(), 1);
+        assert_eq!(cells[0].position_km, [10.25, -20.25]);
+        assert!((cells[0].power_w - 4.0).abs() < 1e-4 && (cells[0].energy_ev - 2000.0).abs() < 0.1);
+        let dark = AuroraParticles::default();
+        map.step(&dark, 0.8, 0.8);
+        assert!((map.power_w() - 4.0 / std::f64::consts::E).abs() < 1e-4);
+        (0..20).for_each(|_| map.step(&dark, 0.8, 0.8));
+        assert_eq!(map.tiles.len(), 0, "dark tiles are let go");
+    }
+
+    #[test]
+    fn tiles_come_and_go_without_losing_their_place() {
+        let mut map = GlowMap::new(100.0, 0.5);
+        map.step(&particles([[-49.9, -49.9], [49.9, 49.9]]), 1.0, 0.0);
+        // The first tile goes, the second takes its number, a third comes.
+        map.step(&particles([[49.9, 49.9], [0.1, 0.1]]), 1.0, 0.0);
+        let mut cells: Vec<_> = map.cells().map(|cell| (cell.position_km[0], cell.power_w)).collect();
+        cells.sort_by(|a, b| a.0.total_cmp(&b.0));
+        assert_eq!(cells, [(0.25, 1.0), (49.75, 3.0)]);
+        let (places, values) = map.to_lists();
+        assert_eq!(map.with_lists(&places, &values), Some(map.clone()));
+        assert_eq!(map.with_lists(&places[..1], &values), None);
+        assert_eq!(map.with_lists(&[places[0], places[0]], &values), None);
+        assert_eq!(map.with_lists(&[u32::MAX, places[1]], &values), None);
+    }
+}

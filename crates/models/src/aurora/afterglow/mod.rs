@@ -1,0 +1,46 @@
+//! Light that lingers where electrons have been: the green and the red line, on maps of the plane at 100 km altitude.
+//!
+//! Blue and purple light leaves at once, where the electrons are. Oxygen keeps its green for 0.8 s and its red for up to two
+//! minutes, less where the air quenches it; so the green follows a moving sheet softly and the red stays behind.
+
+mod map;
+
+pub use map::{GlowCell, GlowMap};
+
+use super::{
+    light::{Emission, Emitter},
+    particles::AuroraParticles,
+};
+
+/// Cells of the green map along a cell of the field; the green is sharp.
+const GREEN_FINENESS: f64 = 8.0;
+
+/// The maps of both slow emitters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Afterglow {
+    /// O(1S), 557.7 nm: cells an eighth as wide as the field's.
+    pub green: GlowMap,
+    /// O(1D), 630.0 and 636.4 nm: cells as wide as the field's.
+    pub red: GlowMap,
+}
+
+impl Afterglow {
+    /// Dark maps of a square of side `extent_km` whose field has cells of `cell_km`.
+    #[must_use]
+    pub fn new(extent_km: f64, cell_km: f64) -> Self {
+        Self { green: GlowMap::new(extent_km, cell_km / GREEN_FINENESS), red: GlowMap::new(extent_km, cell_km) }
+    }
+
+    /// Lets `seconds` pass while `particles` feed both maps. `emission` says how long light of electrons of an energy lives.
+    pub(crate) fn step(&mut self, particles: &AuroraParticles, emission: &Emission, energy_ev: f64, seconds: f64) {
+        let lifetime = emission.column(energy_ev).lifetime;
+        let [green, red] = [Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| lifetime[emitter as usize]);
+        rayon::join(|| self.green.step(particles, seconds, green), || self.red.step(particles, seconds, red));
+    }
+
+    /// Fills the maps as if `particles` had been as they are for long.
+    pub(crate) fn settle(&mut self, particles: &AuroraParticles) {
+        self.green.step(particles, 1.0, 0.0);
+        self.red.step(particles, 1.0, 0.0);
+    }
+}

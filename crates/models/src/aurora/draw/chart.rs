@@ -1,0 +1,171 @@
+//! The chart that auroras are drawn on: the part of the sky that a picture shows, by longitude and colatitude about the magnetic zenith.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use bansho_base::{
+    camera::Camera,
+    canvas::View,
+    math::{self, DVec2},
+};
+
+use super::geometry::FieldLines;
+
+/// Columns of a strip, which one thread draws.
+pub(super) const STRIP: usize = 16;
+/// Places along each side of the picture at which its directions are sampled.
+const SAMPLES: usize = 24;
+/// Most columns and rows.
+const MOST: f64 = 16_384.0;
+/// Lower than this below the horizon nothing is drawn: sine of the elevation.
+const LOWEST: f64 = -0.35;
+
+/// What a chart covers, radians.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Coverage {
+    /// Longitude of the middle and how far it reaches to both sides; all around from pi on.
+    longitude: [f64; 2],
+    /// Least and greatest colatitude.
+    colatitude: [f64; 2],
+    /// Angle of a pixel.
+    pub(super) pixel: f64,
+}
+
+/// A grid of directions; columns are meridians, rows parallels.
+#[derive(Clone, Debug)]
+pub(super) struct Chart {
+    /// Number of columns, a multiple of [`STRIP`].
+    pub(super) columns: usize,
+    /// Number of rows.
+    pub(super) rows: usize,
+    /// Width of a column, radians.
+    pub(super) column_step: f64,
+    /// Height of a row, radians.
+    pub(super) row_step: f64,
+    first_longitude: f64,
+    first_colatitude: f64,
+    /// Whether it goes all around.
+    pub(super) whole: bool,
+}
+
+impl Coverage {
+    /// What the whole picture shows while the shutter is open.
+    pub(super) fn of_view(view: &View, field: &FieldLines) -> Self {
+        let cameras = [view.shutter.open, view.shutter.middle(), view.shutter.close].map(|t| view.camera_at(t));
+        let directions: Vec<[f64; 3]> = cameras.iter().flat_map(|camera| directions(camera, field)).collect();
+        // The longitude of the middle of what is seen.
+        let sum = directions.iter().fold([0.0; 2], |sum, [_, x, y]| [sum[0] + x, sum[1] + y]);
+        let middle = math::atan2(sum[1], sum[0]);
+        let (mut reach, mut least, mut greatest) = (0.0_f64, PI, 0.0_f64);
+        for [along, x, y] in &directions {
+            let colatitude = math::atan2(math::hypot(*x, *y), *along);
+            let turned = math::atan2(*y, *x) - middle;
+            reach = reach.max((turned - TAU * (turned / TAU).round()).abs());
+            (least, greatest) = (least.min(colatitude), greatest.max(colatitude));
+        }
+        let camera = &view.camera;
+        let pixel = 1.0 / camera.focal_pixels;
+        let margin = 1.5 * camera.size[0].max(camera.size[1]) / (SAMPLES - 1) as f64 * pixel;
+        let around = least < margin || reach > 0.8 * PI;
+        let sine = math::sin(least.min(FRAC_PI_2)).max(1e-3);
+        Self {
+            longitude: [middle, if around { PI } else { (reach + margin / sine).min(PI) }],
+            colatitude: [if around { 0.0 } else { least - margin }.max(0.0), (greatest + margin).min(PI)],
+            pixel,
+        }
+    }
+}
+
+/// Parts along and across the field of directions all over the picture, without those far below the horizon.
+fn directions<'a>(camera: &'a Camera, field: &'a FieldLines) -> impl Iterator<Item = [f64; 3]> + 'a {
+    (0..SAMPLES * SAMPLES).filter_map(move |index| {
+        let share = |at: usize| at as f64 / (SAMPLES - 1) as f64;
+        let pixel = DVec2::new(share(index % SAMPLES) * camera.size[0], share(index / SAMPLES) * camera.size[1]);
+        let direction = camera.direction(pixel)?.normalize();
+        (direction.y > LOWEST).then(|| [field.along, field.across[0], field.across[1]].map(|axis| direction.dot(axis)))
+    })
+}
+
+impl Chart {
+    /// A chart over `coverage` whose cells are `column` by `row` radians where they are widest, or somewhat less.
+    pub(super) fn new(coverage: &Coverage, column: f64, row: f64) -> Self {
+        let [least, greatest] = coverage.colatitude;
+        let widest = if least < FRAC_PI_2 && greatest > FRAC_PI_2 {
+            1.0
+        } else {
+            math::sin(least).max(math::sin(greatest)).max(1e-3)
+        };
+        let [middle, reach] = coverage.longitude;
+        let whole = reach >= PI;
+        let range = 2.0 * reach;
+        let columns = (range * widest / column).min(MOST).ceil() as usize;
+        let columns = columns.max(1).next_multiple_of(STRIP);
+        let column_step = if whole { range / columns as f64 } else { (column / widest).max(range / columns as f64) };
+        // On multiples of the step, so that a chart does not crawl over the sky as the camera turns.
+        let first_longitude = if whole { -PI } else { ((middle - reach) / column_step).floor() * column_step };
+        let row = row.max((greatest - least) / MOST);
+        let first_row = (least / row).floor();
+        let rows = ((greatest / row).ceil() - first_row).max(1.0) as usize;
+        Self { columns, rows, column_step, row_step: row, first_longitude, first_colatitude: first_row * row, whole }
+    }
+
+    /// Longitude of the middle of a column.
+    fn longitude(&self, column: usize) -> f64 {
+        self.first_longitude + (column as f64 + 0.5) * self.column_step
+    }
+
+    /// Colatitude of the middle of a row.
+    fn colatitude(&self, row: usize) -> f64 {
+        self.first_colatitude + (row as f64 + 0.5) * self.row_step
+    }
+
+    /// Cosine and sine of the longitude of a column.
+    pub(super) fn unit(&self, column: usize) -> [f64; 2] {
+        let (sin, cos) = math::sin_cos(self.longitude(column));
+        [cos, sin]
+    }
+
+    /// Cotangent and inverse sine of the colatitude of every row.
+    pub(super) fn row_tables(&self) -> [Vec<f32>; 2] {
+        let trigonometry = |row| math::sin_cos(self.colatitude(row));
+        let cotangents = (0..self.rows).map(trigonometry).map(|(sin, cos)| (cos / sin.max(1e-9)) as f32);
+        let inverses = (0..self.rows).map(trigonometry).map(|(sin, _)| (1.0 / sin.max(1e-9)) as f32);
+        [cotangents.collect(), inverses.collect()]
+    }
+
+    /// How places on the chart are found.
+    pub(super) fn finder(&self) -> Finder {
+        Finder {
+            per_column: (1.0 / self.column_step) as f32,
+            per_row: (1.0 / self.row_step) as f32,
+            middle: (self.first_longitude + 0.5 * self.columns as f64 * self.column_step) as f32,
+            half: 0.5 * self.columns as f32,
+            first_row: (self.first_colatitude / self.row_step) as f32,
+        }
+    }
+}
+
+/// Places on a chart in cells: 0 is the chart's edge, 0.5 the middle of its first column or row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Finder {
+    per_column: f32,
+    per_row: f32,
+    middle: f32,
+    half: f32,
+    first_row: f32,
+}
+
+impl Finder {
+    /// The column of a longitude in radians, within half a turn of the chart's middle.
+    #[inline(always)]
+    pub(super) fn column(&self, longitude: f32) -> f32 {
+        let turned = longitude - self.middle;
+        let turned = turned - (turned * (1.0 / std::f32::consts::TAU)).round_ties_even() * std::f32::consts::TAU;
+        turned.mul_add(self.per_column, self.half)
+    }
+
+    /// The row of a colatitude in radians.
+    #[inline(always)]
+    pub(super) fn row(&self, colatitude: f32) -> f32 {
+        colatitude.mul_add(self.per_row, -self.first_row)
+    }
+}

@@ -1,0 +1,189 @@
+//! The aurora as the renderer knows it.
+
+use bansho_base::{
+    assets::Assets,
+    canvas::{AovDescriptor, AovRule, DepthInterval, Shutter, View},
+    color,
+    math::DVec3,
+    observer::{Cancelled, Observer},
+    phenomenon::{Phenomenon, Prepared, SnapshotError, Stepping},
+    point_cloud::PointCloud,
+    random::Key,
+    surroundings::{Publication, Surroundings},
+};
+
+use super::{
+    Sampling,
+    cloud::point_cloud,
+    collisions::Collisions,
+    geometry::FieldLines,
+    maps::MAPS,
+    prepared::{DEPTHS, PreparedAurora},
+    profile::Profiles,
+    shading::Shading,
+    sources::{Light, nearest_node, wander_km},
+};
+use crate::aurora::{
+    AuroraParameters,
+    particles::AuroraSimulation,
+    precipitation::fall::Falls,
+    shapes::{Sequence, ShapeFault},
+};
+
+/// Sheets are thin: their bright parts seen aslant beside what looks straight up through one.
+const BRIGHT_PER_COLUMN: f64 = 0.75;
+
+/// How far a spectrum reaches beyond its energy, and rays beyond that, in nodes of the grid of energies: sixfold.
+const SPECTRUM_NODES: usize = 25;
+
+/// An aurora, ready to be stepped and drawn.
+#[derive(Clone, Debug)]
+pub struct Aurora {
+    name: String,
+    pub(super) simulation: AuroraSimulation,
+    pub(super) profiles: Profiles,
+    pub(super) shading: Shading,
+    /// What single collisions are drawn from, where they are asked for.
+    pub(super) collisions: Option<Collisions>,
+    /// How far collisions wander from their field line, km.
+    wander_km: f64,
+}
+
+impl Aurora {
+    /// The aurora `name` of a scene; drawings of its shapes come from `assets`.
+    ///
+    /// # Errors
+    /// Shapes that are no aurora's.
+    pub fn new(
+        parameters: AuroraParameters,
+        name: &str,
+        seed: u64,
+        loop_s: Option<f64>,
+        assets: &dyn Assets,
+    ) -> Result<Self, ShapeFault> {
+        let sequence = Sequence::new(&parameters.shapes, &parameters.motion, parameters.extent_km, assets, loop_s)?;
+        let simulation = AuroraSimulation::new(parameters, sequence, name, seed);
+        let parameters = simulation.parameters();
+        let falls = Falls::new(simulation.emission().deposition(), 0.0);
+        let node = nearest_node(parameters.energy_ev.at(0.0));
+        let fall = falls.fall(node, Key::new(seed, name), 0).map(|collision| f64::from(collision.altitude_km));
+        let by_collisions = parameters.drawing.sampling == Sampling::Collisions;
+        let hardest = nearest_node(parameters.energy_ev.bounds()[1]) + SPECTRUM_NODES;
+        let key = Key::new(seed, name);
+        let collisions = || Collisions::new(simulation.emission(), parameters.drawing.wobble, hardest, key);
+        Ok(Self {
+            name: name.to_owned(),
+            collisions: by_collisions.then(collisions),
+            profiles: Profiles::new(simulation.emission()),
+            shading: Shading::new(&parameters.drawing.air),
+            wander_km: wander_km(&fall.collect::<Vec<_>>(), parameters.drawing.wobble),
+            simulation,
+        })
+    }
+
+    /// Its particles, field and afterglow.
+    #[must_use]
+    pub fn simulation(&self) -> &AuroraSimulation {
+        &self.simulation
+    }
+
+    /// The magnetic field about an observer at a place in m.
+    pub(super) fn field_lines(&self, place: DVec3) -> FieldLines {
+        let parameters = self.simulation.parameters();
+        FieldLines::new(parameters.dip_deg, parameters.declination_deg, place)
+    }
+
+    /// What its light is made from.
+    pub(super) fn light(&self, view: &View) -> Light<'_> {
+        let (simulation, parameters) = (&self.simulation, self.simulation.parameters());
+        let afterglow = simulation.afterglow();
+        Light {
+            particles: simulation.particles(),
+            glow: [&afterglow.green, &afterglow.red],
+            emission: simulation.emission(),
+            parameters: &parameters.drawing,
+            energy_ev: parameters.energy_ev.at(view.shutter.middle()),
+            wander_km: self.wander_km,
+        }
+    }
+}
+
+const fn brightness(name: &'static str, doc: &'static str) -> AovDescriptor {
+    AovDescriptor { name, unit: "kR", doc, rule: AovRule::Sum }
+}
+
+/// Which of the [`LINES`](crate::aurora::light::LINES) the AOVs measure.
+pub(super) const MEASURED: [usize; 5] = [0, 1, 4, 3, 6];
+
+/// What an aurora can write beside its light, in the order of [`MEASURED`] and then of [`MAPS`].
+const AOVS: &[AovDescriptor] = &[
+    brightness(
+        "kilorayleigh_557",
+        "Brightness of the green line of oxygen, 557.7 nm, above the air; 0 where there is none.",
+    ),
+    brightness(
+        "kilorayleigh_630",
+        "Brightness of the red line of oxygen, 630.0 nm, above the air; 0 where there is none.",
+    ),
+    brightness("kilorayleigh_427", "Brightness of the band of N2+ at 427.8 nm, above the air; 0 where there is none."),
+    brightness("kilorayleigh_391", "Brightness of the band of N2+ at 391.4 nm, above the air; 0 where there is none."),
+    brightness("kilorayleigh_670", "Brightness of the band of N2 at 670.5 nm, above the air; 0 where there is none."),
+    MAPS[0],
+    MAPS[1],
+    MAPS[2],
+    MAPS[3],
+];
+
+impl Phenomenon for Aurora {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn aovs(&self) -> &'static [AovDescriptor] {
+        AOVS
+    }
+
+    fn luminance(&self) -> f64 {
+        let parameters = self.simulation.parameters();
+        let column = self.simulation.emission().column_colour(parameters.energy_ev.bounds()[0]);
+        let flux = parameters.flux_mw_per_m2.bounds()[1];
+        BRIGHT_PER_COLUMN * flux * f64::from(color::luminance(column.map(|value| value as f32)))
+    }
+
+    fn stepping(&self) -> Option<Stepping> {
+        Some(Stepping { step: AuroraSimulation::STEP_S, preroll: self.simulation.parameters().preroll_s })
+    }
+
+    fn step(&mut self, _time: f64, _surroundings: &Surroundings) {
+        self.simulation.step();
+    }
+
+    fn snapshot(&self) -> Vec<u8> {
+        self.simulation.snapshot()
+    }
+
+    fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError> {
+        self.simulation.restore(state)
+    }
+
+    fn particles(&self, t: f64) -> Option<PointCloud> {
+        Some(point_cloud(self.simulation.particles(), t - self.simulation.time()))
+    }
+
+    fn publish(&self, shutter: Shutter) -> Publication {
+        Publication { lights: self.lamp(shutter.middle()).into_iter().collect(), ..Publication::default() }
+    }
+
+    fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
+        vec![DEPTHS]
+    }
+
+    fn prepare<'a>(
+        &'a self,
+        view: &'a View,
+        _surroundings: &'a Surroundings<'a>,
+        observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        Ok(Box::new(PreparedAurora::new(self, view, observer)?))
+    }
+}

@@ -1,0 +1,150 @@
+//! Light by altitude for every energy, as single precision tables that the drawing walks.
+
+use bansho_base::math;
+
+use crate::aurora::{
+    atmosphere::{HIGHEST_KM, LEVELS, LOWEST_KM, level_altitude_km},
+    light::{Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter},
+    precipitation::energy::NODES,
+};
+
+/// Tables between two nodes of the grid of energies: the nearest is within 0.5 % of the energy, and the red column, which falls fastest, within 1 %.
+const FINENESS: usize = 8;
+/// Tables of one energy, each of them smoothed to and sampled at twice the spacing of the one before, from 1 km on.
+pub(super) const SPACINGS: usize = 12;
+/// Entries of all tables of one energy.
+const STRIDE: usize = entries_before(SPACINGS);
+/// A column is drawn up to where this share of its light is left above.
+const LEFT_ABOVE: f64 = 3e-4;
+
+/// Entries of the table of one spacing: one below the levels, and dark ones above them, so that smoothing loses nothing.
+const fn entries(spacing: usize) -> usize {
+    ((LEVELS - 1) >> spacing) + 4
+}
+
+const fn entries_before(spacing: usize) -> usize {
+    let (mut sum, mut each) = (0, 0);
+    while each < spacing {
+        sum += entries(each);
+        each += 1;
+    }
+    sum
+}
+
+/// Light of precipitation by energy and altitude, in kR per km of sight and mW/m^2.
+#[derive(Clone, Debug)]
+pub(super) struct Profiles {
+    light: Vec<PerEmitter<f32>>,
+    tops: Vec<[f32; 2]>,
+}
+
+/// Light by altitude of one energy.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Profile<'a> {
+    light: &'a [PerEmitter<f32>],
+    /// Altitude above which there is hardly any light, km.
+    pub(super) top_km: f32,
+}
+
+impl Profiles {
+    /// The tables for a spectrum. Some tens of milliseconds.
+    pub(super) fn new(emission: &Emission) -> Self {
+        let count = (NODES - 1) * FINENESS + 1;
+        let mut light = Vec::with_capacity(count * STRIDE);
+        let mut tops = Vec::with_capacity(count);
+        for fine in 0..count {
+            let profile = emission.profile(fine_energy_ev(fine));
+            tops.push([Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| top_km(&profile, emitter)));
+            let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
+            let mut table: Vec<PerEmitter<f64>> =
+                std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect();
+            for spacing in 0..SPACINGS {
+                let entry = |at: usize| table.get(at).copied().unwrap_or_default();
+                light.extend((0..entries(spacing)).map(|at| entry(at).map(|value| value as f32)));
+                table = halved(&table);
+            }
+        }
+        Self { light, tops }
+    }
+
+    /// The light of an energy, given as its place among the nodes of the grid; `red` includes the red line's height.
+    #[inline(always)]
+    pub(super) fn at(&self, node: f32, red: bool) -> Profile<'_> {
+        let last = self.tops.len() - 1;
+        let fine = ((node * FINENESS as f32 + 0.5).max(0.0) as usize).min(last);
+        let [prompt_km, red_km] = self.tops[fine];
+        let top_km = if red { red_km.max(prompt_km) } else { prompt_km };
+        Profile { light: &self.light[fine * STRIDE..(fine + 1) * STRIDE], top_km }
+    }
+}
+
+impl<'a> Profile<'a> {
+    /// The table smoothed over 2^`spacing` km. Entries lie so far apart, the second at 80 km; the last is dark.
+    #[inline(always)]
+    pub(super) fn table(&self, spacing: usize) -> &'a [PerEmitter<f32>] {
+        &self.light[entries_before(spacing)..entries_before(spacing) + entries(spacing)]
+    }
+}
+
+/// Energy of a table, eV.
+fn fine_energy_ev(fine: usize) -> f64 {
+    use crate::aurora::precipitation::energy::{HIGHEST_EV, LOWEST_EV};
+    let share = fine as f64 / ((NODES - 1) * FINENESS) as f64;
+    LOWEST_EV * math::pow(HIGHEST_EV / LOWEST_EV, share)
+}
+
+/// Every other entry from the second on, and one before, smoothed so that none of the light is lost.
+fn halved(table: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
+    let entry = |at: Option<usize>| at.and_then(|at| table.get(at)).copied().unwrap_or_default();
+    let smoothed = |number: usize| -> PerEmitter<f64> {
+        let near = [2, 1, 0].map(|before| entry((2 * number).checked_sub(before)));
+        std::array::from_fn(|i| 0.25 * near[0][i] + 0.5 * near[1][i] + 0.25 * near[2][i])
+    };
+    (0..table.len() / 2 + 2).map(smoothed).collect()
+}
+
+fn top_km(profile: &[PerEmitter<f64>], emitter: Emitter) -> f32 {
+    let light = |level: usize| profile[level][emitter.index()];
+    let whole: f64 = (0..LEVELS).map(light).sum();
+    let mut above = 0.0;
+    let passed = (0..LEVELS).rev().take_while(|level| {
+        above += light(*level);
+        above < LEFT_ABOVE * whole
+    });
+    level_altitude_km(LEVELS - 1 - passed.count().min(LEVELS - 2)).min(HIGHEST_KM) as f32
+}
+
+/// Altitude of the second entry of all tables, km.
+pub(super) const BOTTOM_KM: f32 = LOWEST_KM as f32;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aurora::{atmosphere::atmosphere, light::emission, precipitation::spectrum::ARC};
+
+    #[test]
+    fn every_table_of_an_energy_holds_the_same_column() {
+        let table = emission::Emission::new(atmosphere(), ARC);
+        let profiles = Profiles::new(&table);
+        for node in [20.0, 48.0, 60.25] {
+            let profile = profiles.at(node, true);
+            let energy = fine_energy_ev((node * FINENESS as f32) as usize);
+            let expected = table.column(energy).kilorayleigh;
+            for spacing in 0..SPACINGS {
+                let sum = profile.table(spacing).iter().fold([0.0; 4], |sum: [f64; 4], light| {
+                    std::array::from_fn(|i| sum[i] + f64::from(light[i]) * f64::from(1 << spacing))
+                });
+                for i in 0..4 {
+                    assert!((sum[i] / expected[i] - 1.0).abs() < 2e-3, "{node} {spacing} {i}: {sum:?} {expected:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn hard_electrons_stop_lower() {
+        let profiles = Profiles::new(&emission::Emission::new(atmosphere(), ARC));
+        assert!(profiles.at(64.0, false).top_km < profiles.at(32.0, false).top_km);
+        assert!(profiles.at(48.0, true).top_km > 300.0);
+    }
+}

@@ -1,0 +1,89 @@
+//! From kilorayleighs to the colour that reaches the observer through the air.
+
+use std::f64::consts::FRAC_PI_2;
+
+use bansho_base::math::{self, DVec3};
+
+use crate::aurora::light::{EMITTERS, Emitter, LINES, PerEmitter, extinction::Extinction};
+
+/// Steps from the horizon to the zenith, even in the root of the sine of the elevation: the air changes fast near the horizon.
+const STEPS: usize = 1024;
+/// Where the visible light of the first positive bands has its middle, nm.
+const BANDS_NM: f64 = 655.0;
+
+/// ACEScg of a kilorayleigh of each emitter by elevation; luminance in cd/m^2.
+#[derive(Clone, Debug)]
+pub(super) struct Shading {
+    colours: Vec<PerEmitter<[f32; 3]>>,
+}
+
+impl Shading {
+    /// Through this air.
+    pub(super) fn new(air: &Extinction) -> Self {
+        let colours = (0..=STEPS).map(|step| {
+            let root = step as f64 / STEPS as f64;
+            let elevation = math::asin(root * root).min(FRAC_PI_2);
+            EMITTERS.map(|emitter| seen(emitter, air, elevation).map(|value| value as f32))
+        });
+        Self { colours: colours.collect() }
+    }
+
+    /// The colour of light by emitter in kR from an elevation of that sine; as at the horizon below it.
+    #[inline(always)]
+    pub(super) fn colour(&self, light: &PerEmitter<f32>, sine: f32) -> [f32; 3] {
+        let step = (sine.max(0.0).sqrt() * STEPS as f32 + 0.5) as usize;
+        let colours = &self.colours[step.min(STEPS)];
+        let mut sum = [0.0; 3];
+        for (light, colour) in light.iter().zip(colours) {
+            for c in 0..3 {
+                sum[c] = light.mul_add(colour[c], sum[c]);
+            }
+        }
+        sum
+    }
+}
+
+/// A kilorayleigh of an emitter, all its lines together, as it arrives.
+fn seen(emitter: Emitter, air: &Extinction, elevation: f64) -> [f64; 3] {
+    if emitter == Emitter::Nitrogen {
+        let share = air.transmittance(BANDS_NM, elevation);
+        return emitter.colour_per_kilorayleigh().map(|value| value * share);
+    }
+    let lines = LINES.iter().filter(|line| line.emitter == emitter);
+    let sum = lines.fold(DVec3::ZERO, |sum, line| {
+        sum + DVec3::from(line.colour_per_kilorayleigh())
+            * (line.photons * air.transmittance(line.wavelength_nm, elevation))
+    });
+    sum.to_array()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_air_every_emitter_has_its_own_colour() {
+        let none = Extinction { rayleigh: 0.0, aerosol: 0.0, ozone: 0.0, ..Extinction::default() };
+        let shading = Shading::new(&none);
+        for emitter in EMITTERS {
+            let mut light = [0.0; 4];
+            light[emitter.index()] = 2.0;
+            let colour = shading.colour(&light, 0.3);
+            let expected = emitter.colour_per_kilorayleigh();
+            assert!(
+                (0..3).all(|c| (f64::from(colour[c]) - 2.0 * expected[c]).abs() < 1e-4 * expected[1].abs().max(1e-6))
+            );
+        }
+    }
+
+    #[test]
+    fn blue_fades_before_red_toward_the_horizon() {
+        let shading = Shading::new(&Extinction::default());
+        let share = |emitter: Emitter| {
+            let mut light = [0.0; 4];
+            light[emitter.index()] = 1.0;
+            shading.colour(&light, 0.02)[2] / shading.colour(&light, 1.0)[2]
+        };
+        assert!(share(Emitter::NitrogenIon) < 0.5 * share(Emitter::OxygenGreen).abs());
+    }
+}

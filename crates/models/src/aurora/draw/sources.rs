@@ -1,0 +1,165 @@
+//! What shines: particles for light that leaves at once, the afterglow's cells for green and red.
+
+use bansho_base::{
+    math::{self, lanes},
+    parameters::Auto,
+};
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+
+use super::{
+    DrawingParameters,
+    footprint::{REACH, Source},
+    geometry::FieldLines,
+};
+use crate::aurora::{
+    afterglow::{GlowCell, GlowMap},
+    light::{Emission, Emitter},
+    particles::AuroraParticles,
+    precipitation::energy::{LOWEST_EV, NODES, node_energy_ev},
+};
+
+/// Sources that a task of the thread pool makes.
+const TASK: usize = 4096;
+/// Spread of a particle beside the distance to its neighbours: none is seen by itself.
+const SPREAD_PER_SPACING: f64 = 1.2;
+/// 1000 W, the power of one mW/m^2 on one km^2.
+const PER_UNIT: f32 = 1e-3;
+
+/// What an aurora shines with at a moment.
+pub(super) struct Sources {
+    /// Light with fine detail: particles and the green map.
+    pub(super) sharp: Vec<Source>,
+    /// The red map.
+    pub(super) soft: Vec<Source>,
+    /// Standard deviations of both, km.
+    pub(super) spread_km: [f64; 2],
+}
+
+/// A kind of light.
+#[derive(Clone, Copy)]
+pub(super) enum Kind {
+    Green = 0,
+    Red = 1,
+    Prompt = 2,
+}
+
+/// How electrons become sources.
+pub(super) struct Maker<'a> {
+    pub(super) field: &'a FieldLines,
+    pub(super) kind: Kind,
+    pub(super) reach: f32,
+    /// Part of the power that each of several instants has.
+    pub(super) share: f32,
+}
+
+impl Maker<'_> {
+    #[inline(always)]
+    fn make(&self, [east, south]: [f32; 2], power_w: f32, energy_ev: f32) -> Source {
+        let foot = self.field.foot(east, south);
+        let mut power = [0.0; 3];
+        power[self.kind as usize] = power_w * self.share * PER_UNIT * foot.upright;
+        Source { across: foot.across, reach: self.reach, node: node_of(energy_ev), power }
+    }
+
+    pub(super) fn cells(&self, cells: &[GlowCell]) -> Vec<Source> {
+        let level = Level::new();
+        let make = |part: &[GlowCell]| -> Vec<Source> {
+            let make = |cell: &GlowCell| self.make(cell.position_km, cell.power_w, cell.energy_ev);
+            dispatch!(level, _simd => part.iter().map(make).collect())
+        };
+        cells.par_chunks(TASK).flat_map_iter(make).collect()
+    }
+
+    /// Particles as they are `later` seconds after their step.
+    fn particles(&self, particles: &AuroraParticles, later: f32) -> Vec<Source> {
+        let level = Level::new();
+        let make = |part: usize| -> Vec<Source> {
+            let range = part * TASK..((part + 1) * TASK).min(particles.len());
+            let place = |axis: usize, index: usize| {
+                particles.velocities[axis][index].mul_add(later, particles.positions[axis][index])
+            };
+            let make = |index: usize| {
+                let place = [place(0, index), place(1, index)];
+                self.make(place, particles.powers_w[index], particles.energies_ev[index])
+            };
+            dispatch!(level, _simd => range.map(make).collect())
+        };
+        (0..particles.len().div_ceil(TASK)).into_par_iter().flat_map_iter(make).collect()
+    }
+}
+
+/// Place of an energy among the nodes of the grid of energies.
+#[inline(always)]
+pub(super) fn node_of(energy_ev: f32) -> f32 {
+    const PER_OCTAVE: f32 = 32.0 * std::f32::consts::LOG10_2;
+    (PER_OCTAVE * lanes::log2(energy_ev * (1.0 / LOWEST_EV) as f32)).clamp(0.0, (NODES - 1) as f32)
+}
+
+impl Sources {
+    /// What shines at the `instants`, seconds after the particles' step; each has an equal part of the power.
+    pub(super) fn new(light: &Light, field: &FieldLines, instants: &[f64]) -> Self {
+        let [green, red] = [&light.glow[0], &light.glow[1]].map(|map| map.cells().collect::<Vec<_>>());
+        let column = light.emission.column(light.energy_ev);
+        let spread = light.spread_km();
+        let with = |emitter: Emitter, map: &GlowMap| {
+            let diffusion = column.spread_km[emitter.index()];
+            math::sqrt(spread * spread + diffusion * diffusion + map.cell_km() * map.cell_km() / 6.0)
+        };
+        let maker = |kind, spread: f64, share| Maker { field, kind, reach: spread as f32 * REACH, share };
+        let red_spread = with(Emitter::OxygenRed, light.glow[1]);
+        let mut sharp = maker(Kind::Green, with(Emitter::OxygenGreen, light.glow[0]), 1.0).cells(&green);
+        let prompt = maker(Kind::Prompt, spread, 1.0 / instants.len().max(1) as f32);
+        for later in instants {
+            sharp.extend(prompt.particles(light.particles, *later as f32));
+        }
+        let soft = maker(Kind::Red, red_spread, 1.0).cells(&red);
+        Self { sharp, soft, spread_km: [spread, red_spread] }
+    }
+}
+
+/// What an aurora's light is made from.
+pub(super) struct Light<'a> {
+    pub(super) particles: &'a AuroraParticles,
+    /// The green and the red map.
+    pub(super) glow: [&'a GlowMap; 2],
+    pub(super) emission: &'a Emission,
+    pub(super) parameters: &'a DrawingParameters,
+    /// Energy of the electrons where nothing varies it, eV.
+    pub(super) energy_ev: f64,
+    /// Spread of collisions about their field line, km.
+    pub(super) wander_km: f64,
+}
+
+impl Light<'_> {
+    /// Standard deviation of the light of a particle across the field, km.
+    pub(super) fn spread_km(&self) -> f64 {
+        let own = match self.parameters.spread_km {
+            Auto::Set(spread) => spread,
+            Auto::Auto => {
+                let area = self.glow[0].lit_cells() as f64 * self.glow[0].cell_km() * self.glow[0].cell_km();
+                SPREAD_PER_SPACING * math::sqrt(area / self.particles.len().max(1) as f64)
+            }
+        };
+        math::hypot(own, self.wander_km).max(1e-3)
+    }
+}
+
+/// Root mean square distance from the field line, along one direction, of the collisions of an electron whose altitudes in km these are
+/// (from the first on) and whose every collision turns it by a tangent of rms `wobble`.
+pub(super) fn wander_km(altitudes_km: &[f64], wobble: f64) -> f64 {
+    let mut variance = 0.0;
+    let mut sum = 0.0;
+    for pair in altitudes_km.windows(2) {
+        let step = wobble * (pair[0] - pair[1]).max(0.0);
+        variance += step * step;
+        sum += variance;
+    }
+    math::sqrt(sum / altitudes_km.len().max(1) as f64)
+}
+
+/// The node of the grid that is nearest to an energy.
+pub(super) fn nearest_node(energy_ev: f64) -> usize {
+    let least = |node: &usize| (math::ln(node_energy_ev(*node) / energy_ev.max(1.0))).abs();
+    (0..NODES).min_by(|a, b| least(a).total_cmp(&least(b))).unwrap_or(0)
+}

@@ -1,0 +1,211 @@
+//! The field that pulls particles to the in-between shape (thesis, 2.2.3).
+//!
+//! Units: km and s, the particle's charge and mass are 1, so the field is an acceleration in km/s^2 and the potential is in km^2/s^2. What
+//! is natural here is the cell and the frame, as the constants say.
+
+use bansho_base::{
+    math::{self, DVec2},
+    noise::{Coordinate, Fractal, Noise},
+    parameters::Auto,
+    random::{Key, Purpose},
+};
+use fearless_simd::Level;
+
+use super::{conductor::LineCharge, course::Course, scatter::Scattered};
+use crate::{
+    aurora::{AuroraParameters, FieldSolver, shapes::FRAME_S},
+    field::{Grid2, PoissonSolver, relax},
+};
+
+/// Screening length l unless a scene says otherwise, cells: particles are drawn in from a few cells, strays beyond can die.
+const REACH_CELLS: f64 = 3.0;
+/// How often the charge along the sheets is made better.
+const ADJUSTMENTS: usize = 4;
+/// Field at the edge of a sheet at a pull of 1, cells per frame^2.
+const EDGE_FIELD: f64 = 0.25;
+
+/// Everything about fields that does not change from shape to shape.
+#[derive(Clone, Debug)]
+pub(super) struct FieldMaker {
+    parameters: AuroraParameters,
+    solver: PoissonSolver,
+    /// 1 / l^2, 1/km^2.
+    pub(super) screening: f64,
+    noise: Noise<3>,
+}
+
+/// The field of one in-between shape.
+#[derive(Clone, Debug)]
+pub(super) struct Field {
+    /// N(i, j): how many particles were scattered into each cell.
+    pub(super) counts: Grid2,
+    /// phi(i, j) without noise, which relocation looks at.
+    pub(super) potential: Grid2,
+    /// Potential with noise, and the field from it by (2.7) to (2.9), one a cell and one row and column of ghosts around.
+    table: Vec<[f32; 3]>,
+}
+
+/// Potential and field where a particle is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct FieldSample {
+    /// km^2/s^2.
+    pub(super) potential: f32,
+    /// km/s^2, x and z.
+    pub(super) field: [f32; 2],
+}
+
+impl FieldMaker {
+    pub(super) fn new(parameters: &AuroraParameters, key: Key) -> Self {
+        let cells = parameters.field.cells as usize;
+        let reach = match parameters.field.reach_km {
+            Auto::Auto => REACH_CELLS * parameters.cell_km(),
+            Auto::Set(reach) => reach,
+        };
+        let screening = 1.0 / (reach * reach);
+        let [seed, ..] = key.words(0, 0, Purpose::named("aurora field noise"));
+        Self {
+            solver: PoissonSolver::new([cells; 2], parameters.cell_km(), screening),
+            screening,
+            noise: Noise::new(seed, Fractal { octaves: 3, ..Fractal::default() }, [0; 3])
+                .expect("three octaves without a period are noise"),
+            parameters: parameters.clone(),
+        }
+    }
+
+    /// An empty grid over the drawn square.
+    pub(super) fn grid(&self) -> Grid2 {
+        let cells = self.parameters.field.cells as usize;
+        Grid2::new([cells; 2], self.parameters.cell_km(), [-self.parameters.extent_km / 2.0; 2])
+    }
+
+    /// Screening length, km.
+    pub(super) fn reach_km(&self) -> f64 {
+        1.0 / self.screening.sqrt()
+    }
+
+    /// The field of particles scattered about a shape, with the noise of a time.
+    pub(super) fn make(&self, course: &Course, scattered: &[Scattered], time: f64) -> Field {
+        let counts = self.sum(scattered.iter().map(|particle| (particle.place, 1.0)));
+        let source = self.source(course, scattered, &counts);
+        let potential = match self.parameters.field.solver {
+            FieldSolver::SineTransform => self.solved(source),
+            FieldSolver::GaussSeidel => self.relaxed(&source),
+        };
+        let table = self.table(&potential, time);
+        Field { counts, potential, table }
+    }
+
+    /// Sum of values at places over those in each cell.
+    pub(super) fn sum(&self, values: impl Iterator<Item = (DVec2, f64)>) -> Grid2 {
+        let mut sums = self.grid();
+        let columns = sums.size()[0];
+        for (place, value) in values {
+            if let Some([column, row]) = sums.cell(place.to_array()) {
+                sums.values_mut()[row * columns + column] += value;
+            }
+        }
+        sums
+    }
+
+    /// Charge density over eps, eq. (2.2): such that all sheets pull alike, however many particles stand for them, and are at one
+    /// potential all along.
+    pub(super) fn source(&self, course: &Course, scattered: &[Scattered], counts: &Grid2) -> Grid2 {
+        let half_thickness = self.parameters.half_thickness_km();
+        let density = self.edge_field() / half_thickness;
+        let unit = density / full_count(counts).max(1.0);
+        // In the middle of a long, straight, lone sheet.
+        let reach = self.reach_km();
+        let wanted = density * reach * reach * (math::exp(-half_thickness / reach) - 1.0);
+        let mut charge = LineCharge::even(course, self.parameters.cell_km());
+        let source = |charge: &LineCharge| {
+            self.sum(scattered.iter().map(|particle| (particle.place, unit * charge.of(particle))))
+        };
+        for _ in 0..ADJUSTMENTS {
+            charge.adjust(course, &self.solved(source(&charge)), wanted);
+        }
+        source(&charge)
+    }
+
+    /// Field at the edge of a sheet, km/s^2.
+    fn edge_field(&self) -> f64 {
+        self.parameters.field.pull * EDGE_FIELD * self.parameters.cell_km() / (FRAME_S * FRAME_S)
+    }
+
+    /// `laplacian(phi) - phi / l^2 = rho`, phi = 0 around the grid; negative, lowest on the shape.
+    fn solved(&self, mut source: Grid2) -> Grid2 {
+        self.solver.solve(&mut source);
+        source
+    }
+
+    /// Eq. (2.6), stopped after so many sweeps or where no cell changes by more than the tolerance.
+    fn relaxed(&self, source: &Grid2) -> Grid2 {
+        let mut potential = self.grid();
+        let least = self.parameters.field.tolerance * self.edge_field() * self.reach_km();
+        let sweeps = self.parameters.field.sweeps;
+        (0..sweeps).take_while(|_| relax(&mut potential, source, self.screening) > least).count();
+        potential
+    }
+
+    /// Adds the noise of (x, z, t) and takes the gradient.
+    fn table(&self, potential: &Grid2, time: f64) -> Vec<[f32; 3]> {
+        let mut noisy = potential.clone();
+        self.add_noise(&mut noisy, time);
+        let gradient = noisy.gradient();
+        let [columns, rows] = noisy.size();
+        let value = |index: usize| {
+            let held = |place: usize, count: usize| place.clamp(1, count) - 1;
+            let (column, row) = (index % (columns + 2), index / (columns + 2));
+            let inner = held(row, rows) * columns + held(column, columns);
+            let [x, z] = gradient.values()[inner];
+            [noisy.values()[inner] as f32, -x as f32, -z as f32]
+        };
+        (0..(columns + 2) * (rows + 2)).map(value).collect()
+    }
+
+    fn add_noise(&self, potential: &mut Grid2, time: f64) {
+        let field = &self.parameters.field;
+        if field.noise == 0.0 {
+            return;
+        }
+        let depth = potential.values().iter().fold(0.0_f64, |low, value| low.min(*value)).abs();
+        let scale = potential.spacing() / field.noise_scale_km;
+        let columns = potential.size()[0];
+        let along: Vec<f32> = (0..columns).map(|column| (column as f64 * scale) as f32).collect();
+        let (level, mut values) = (Level::new(), vec![0.0_f32; columns]);
+        for (row, cells) in potential.values_mut().chunks_mut(columns).enumerate() {
+            let origin = [0.0, row as f64 * scale, time / field.noise_life_s].map(Coordinate::from_f64);
+            self.noise.row(level, origin, &along, &mut values);
+            cells.iter_mut().zip(&values).for_each(|(cell, noise)| *cell += field.noise * depth * f64::from(*noise));
+        }
+    }
+}
+
+/// How many a cell holds that lies all within a sheet: the mean over particles of the count where they are.
+pub(super) fn full_count(counts: &Grid2) -> f64 {
+    let sum: f64 = counts.values().iter().sum();
+    let squares: f64 = counts.values().iter().map(|count| count * count).sum();
+    if sum > 0.0 { squares / sum } else { 0.0 }
+}
+
+impl Field {
+    /// Bilinear between the middles of cells; as at the nearest middle beyond the outermost.
+    #[inline(always)]
+    pub(super) fn sample(&self, x: f32, z: f32) -> FieldSample {
+        let [columns, rows] = self.counts.size();
+        let [left, low] = self.counts.origin();
+        let to_cells = 1.0 / self.counts.spacing();
+        let split = |value: f32, origin: f64, count: usize| {
+            let place = ((f64::from(value) - origin) * to_cells + 0.5).clamp(0.0, count as f64 + 0.999) as f32;
+            (place as usize, place - place.floor())
+        };
+        let ((column, s), (row, t)) = (split(x, left, columns), split(z, low, rows));
+        let first = row * (columns + 2) + column;
+        let second = first + columns + 2;
+        let [a, b, c, d] = [self.table[first], self.table[first + 1], self.table[second], self.table[second + 1]];
+        let [potential, east, south] = std::array::from_fn(|k| {
+            let (lower, upper) = (s.mul_add(b[k] - a[k], a[k]), s.mul_add(d[k] - c[k], c[k]));
+            t.mul_add(upper - lower, lower)
+        });
+        FieldSample { potential, field: [east, south] }
+    }
+}

@@ -1,0 +1,195 @@
+//! What each particle brings into the air: energy and power, by its place on the sheets.
+
+use bansho_base::{noise::LANES, random::Key};
+use fearless_simd::Level;
+use rayon::prelude::*;
+
+use super::{
+    AuroraParticles,
+    course::{Course, Foot},
+    nodes::split,
+    rays::{Places, RayTable, Rays},
+};
+use crate::aurora::{
+    AuroraParameters,
+    precipitation::energy::{HIGHEST_EV, LOWEST_EV},
+};
+
+/// Particles that a task of the thread pool takes, a multiple of the lanes.
+const TASK: usize = 4096;
+/// What a particle far from every sheet keeps of its power in a step.
+const STRAY: f32 = 0.85;
+/// Stretches of a sheet that have their drawn power each.
+const STRETCHES: usize = 32;
+/// Where particles are scarce, one gets at most this many times what it would have if all were evenly spread.
+const MOST_UNEVEN: f64 = 6.0;
+/// The power of a particle comes this share nearer in a step to what it shall be.
+const FOLLOWING: f32 = 0.2;
+/// W for one mW/m^2 on one km^2.
+const W_PER_KM2: f64 = 1e3;
+
+/// The flux and energy of an aurora and the pattern along its sheets.
+#[derive(Clone, Debug)]
+pub(super) struct Precipitation {
+    parameters: AuroraParameters,
+    rays: Rays,
+}
+
+/// Values at nodes along each sheet, evenly spaced; between two of them is a stretch.
+#[derive(Clone, Debug)]
+struct Nodes(Vec<[f64; STRETCHES + 1]>);
+
+/// A part of the arrays that one task works on.
+struct Stretch<'a> {
+    positions: [&'a [f32]; 2],
+    fades: &'a [f32],
+    energies: &'a mut [f32],
+    powers: &'a mut [f32],
+    full_powers: &'a mut [f32],
+    shares: &'a mut [f32],
+    sheets: &'a mut [u32],
+}
+
+impl Precipitation {
+    pub(super) fn new(parameters: &AuroraParameters, key: Key) -> Self {
+        Self { parameters: parameters.clone(), rays: Rays::new(parameters, key) }
+    }
+
+    /// Power of the electrons on all sheets without pulsation and black rays, by sheet and node, W: flux times length times thickness.
+    fn wanted(&self, course: &Course, time: f64) -> Nodes {
+        let width = 2.0 * self.parameters.half_thickness_km();
+        let flux = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * width;
+        let mut wanted = Nodes::new(course.shape.sheets.len());
+        course
+            .pieces()
+            .for_each(|(sheet, share, factor, length)| wanted.add(sheet as u32, share as f32, flux * factor * length));
+        wanted
+    }
+
+    /// Gives every particle its share of the power.
+    ///
+    /// All together have the power of the sheets, and those along a stretch that of the stretch, however many they are: no
+    /// birth, death, split or merge can make the aurora flicker, and the flux along it is the one that was drawn. What is finer than
+    /// a stretch is the particles' own.
+    pub(super) fn share_out(&self, particles: &mut AuroraParticles, course: &Course, time: f64) {
+        let sheets = course.shape.sheets.len();
+        let along = |sheet, share| course.along(sheet, share);
+        let rays = self.rays.table(&course.sheet_lengths(), along, time);
+        let weigh = |part| self.weigh(part, course, (&rays, time), Nodes::new(sheets));
+        let weights: Vec<Nodes> = stretches(particles).into_par_iter().map(weigh).collect();
+        let weights = weights.iter().fold(Nodes::new(sheets), |sum, part| sum.plus(part));
+        let factors = self.wanted(course, time).shared_by(&weights);
+        stretches(particles).into_par_iter().for_each(|part| part.brighten(&factors));
+    }
+
+    /// Weighs a stretch of particles, as negative powers while they wait for their factor, and adds up the weights before black rays and pulsation.
+    fn weigh(&self, part: Stretch, course: &Course, (rays, time): (&RayTable, f64), mut weights: Nodes) -> Nodes {
+        let (level, energy) = (Level::new(), self.parameters.energy_ev.at(time));
+        let side_scale = 1.0 / self.parameters.half_thickness_km();
+        for first in (0..part.fades.len()).step_by(LANES) {
+            let count = LANES.min(part.fades.len() - first);
+            let foot = |lane: usize| if lane < count { part.foot(course, first + lane) } else { None };
+            let feet: [Option<Foot>; LANES] = std::array::from_fn(foot);
+            let places = Places {
+                noises: feet.map(|foot| foot.map_or([0.0; 4], |foot| rays.at(foot.sheet, foot.share))),
+                side: feet.map(|foot| foot.map_or(0.0, |foot| (foot.side * side_scale) as f32)),
+            };
+            let pattern = self.rays.at(level, &places, time);
+            for (lane, foot) in feet.into_iter().enumerate().take(count) {
+                let index = first + lane;
+                let Some(foot) = foot else {
+                    part.full_powers[index] *= STRAY;
+                    part.powers[index] = part.fades[index] * part.full_powers[index];
+                    continue;
+                };
+                let weight = foot.flux as f32 * pattern.brightness[lane];
+                weights.add(foot.sheet, foot.share as f32, f64::from(part.fades[index] * weight));
+                part.powers[index] = -weight * pattern.dimming[lane];
+                let own = energy * foot.energy * f64::from(pattern.hardness[lane]);
+                part.energies[index] = own.clamp(LOWEST_EV, HIGHEST_EV) as f32;
+                part.shares[index] = foot.share as f32;
+                part.sheets[index] = foot.sheet;
+            }
+        }
+        weights
+    }
+}
+
+impl Nodes {
+    fn new(sheets: usize) -> Self {
+        Self(vec![[0.0; STRETCHES + 1]; sheets])
+    }
+
+    /// Adds a value to the two nodes around a place.
+    fn add(&mut self, sheet: u32, share: f32, value: f64) {
+        let (node, part) = split(f64::from(share), STRETCHES + 1);
+        let nodes = &mut self.0[sheet as usize];
+        nodes[node] += value * (1.0 - part);
+        nodes[node + 1] += value * part;
+    }
+
+    /// Value at a place, linear between nodes.
+    fn at(&self, sheet: u32, share: f32) -> f64 {
+        let (node, part) = split(f64::from(share), STRETCHES + 1);
+        let nodes = &self.0[sheet as usize];
+        nodes[node] + part * (nodes[node + 1] - nodes[node])
+    }
+
+    fn plus(mut self, other: &Self) -> Self {
+        self.0.iter_mut().flatten().zip(other.0.iter().flatten()).for_each(|(sum, value)| *sum += value);
+        self
+    }
+
+    fn sum(&self) -> f64 {
+        self.0.iter().flatten().sum()
+    }
+
+    /// What a unit of weight gets of these powers, by sheet and node, so that all is given out. Where there is next to no weight, not
+    /// everything can be given out there.
+    fn shared_by(mut self, weights: &Self) -> Self {
+        let (whole, even) = (self.sum(), self.sum() / weights.sum().max(f64::MIN_POSITIVE));
+        let mut given = 0.0;
+        for (power, weight) in self.0.iter_mut().flatten().zip(weights.0.iter().flatten()) {
+            *power = (*power / weight.max(f64::MIN_POSITIVE)).min(MOST_UNEVEN * even);
+            given += *power * weight;
+        }
+        let rest = if given > 0.0 { whole / given } else { 0.0 };
+        self.0.iter_mut().flatten().for_each(|factor| *factor *= rest);
+        self
+    }
+}
+
+impl Stretch<'_> {
+    fn foot(&self, course: &Course, index: usize) -> Option<Foot> {
+        course.foot([f64::from(self.positions[0][index]), f64::from(self.positions[1][index])].into())
+    }
+
+    /// Gives particles that wait for it their factor. Their power follows what it shall be with a delay: where two parts of a sheet
+    /// lie close together, a particle that passes from the one to the other does not flash.
+    fn brighten(self, factors: &Nodes) {
+        for (index, power) in self.powers.iter_mut().enumerate().filter(|(_, power)| power.is_sign_negative()) {
+            let wanted = -*power * factors.at(self.sheets[index], self.shares[index]) as f32;
+            let full = &mut self.full_powers[index];
+            *full = if *full > 0.0 { *full + FOLLOWING * (wanted - *full) } else { wanted };
+            *power = self.fades[index] * *full;
+        }
+    }
+}
+
+fn stretches(particles: &mut AuroraParticles) -> Vec<Stretch<'_>> {
+    let [xs, zs] = &particles.positions;
+    let reads = xs.chunks(TASK).zip(zs.chunks(TASK)).zip(particles.fades.chunks(TASK));
+    let powers = particles.powers_w.chunks_mut(TASK).zip(particles.full_powers_w.chunks_mut(TASK));
+    let light = particles.energies_ev.chunks_mut(TASK).zip(powers);
+    let places = particles.shares.chunks_mut(TASK).zip(particles.sheets.chunks_mut(TASK));
+    let stretch = |(((xs, zs), fades), ((energies, (powers, full_powers)), (shares, sheets)))| Stretch {
+        positions: [xs, zs],
+        fades,
+        energies,
+        powers,
+        full_powers,
+        shares,
+        sheets,
+    };
+    reads.zip(light.zip(places)).map(stretch).collect()
+}

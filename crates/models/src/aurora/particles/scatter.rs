@@ -1,0 +1,39 @@
+//! Particles scattered evenly about a shape, within L_thr (thesis, 2.2.3): sampled along its segments, so that the cost grows with
+//! their number alone.
+
+use bansho_base::{
+    math::DVec2,
+    random::{Key, Purpose, uniform},
+};
+use rayon::prelude::*;
+
+use super::course::Course;
+
+const SCATTER: Purpose = Purpose::named("aurora scatter");
+
+/// A particle that stands for the charge about a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scattered {
+    /// Where it is, km.
+    pub(super) place: DVec2,
+    /// The sheet that it is nearest to.
+    pub(super) sheet: u32,
+    /// Share of that sheet's length before it.
+    pub(super) share: f32,
+}
+
+/// Particles within `half_thickness` km of the shape, evenly over the area that it covers; the `renewal`th set of `count` trials.
+///
+/// A place counts for the segment that it is nearest to, so that nothing is counted twice where segments overlap.
+pub(super) fn scatter(course: &Course, half_thickness: f64, count: usize, key: Key, renewal: u32) -> Vec<Scattered> {
+    let segments = course.segments();
+    let particle = |index: usize| {
+        let [u, v, ..] = key.words(index as u64, renewal, SCATTER).map(|word| f64::from(uniform(word)));
+        let sample = segments.sample((index as f64 + u) / count as f64)?;
+        let place = sample.point + sample.tangent.perp() * (half_thickness * (2.0 * v - 1.0));
+        let own = [sample.segment.sheet, sample.segment.segment];
+        let scattered = Scattered { place, sheet: own[0] as u32, share: sample.share as f32 };
+        (course.nearest_segment(place) == Some(own)).then_some(scattered)
+    };
+    (0..count).into_par_iter().with_min_len(1024).filter_map(particle).collect()
+}

@@ -1,0 +1,121 @@
+//! Particles go where the shapes are.
+
+use super::*;
+use crate::aurora::{RepulsionKernel, shapes::Neighbourhood};
+
+/// Steps to two and a half seconds after the second shape is reached.
+fn after_the_transition(shapes: Vec<ShapeParameters>, cells: i64) -> (AuroraSimulation, Shape) {
+    let mut parameters = AuroraParameters { shapes, ..small() };
+    parameters.field.cells = cells;
+    // Rays brighten and darken stretches on purpose.
+    parameters.rays.contrast = 0.0;
+    let sequence = sequence(&parameters);
+    let mut simulation = simulation(parameters);
+    let end = sequence.arrivals()[1] + 2.5;
+    while simulation.time() < end {
+        simulation.step();
+    }
+    (simulation, sequence.at(end))
+}
+
+#[test]
+fn after_a_transition_particles_lie_on_the_target_and_everywhere_along_it() {
+    // A turn of the spiral lies 12 km from the next: sheets of 9 km, as on the coarse grid, would be one.
+    for (name, cells, shapes) in [
+        ("peel", 127, becoming(Form::Peel)),
+        ("s", 127, becoming(Form::SShape)),
+        ("split", 127, splitting()),
+        ("merge", 127, merging()),
+        ("spiral", 255, becoming(Form::Spiral)),
+    ] {
+        let (simulation, target) = after_the_transition(shapes, cells);
+        let half = simulation.parameters().half_thickness_km();
+        let near = Neighbourhood::new(&target, 2.0 * half);
+        let particles = live(&simulation);
+        let distances: Vec<Option<f64>> = particles.iter().map(|(place, _)| near.distance(*place)).collect();
+        let within = distances.iter().flatten().filter(|distance| **distance <= half).count();
+        let share = within as f64 / particles.len() as f64;
+        let far = distances.iter().filter(|distance| distance.is_none()).count() as f64 / particles.len() as f64;
+        let [powers, counts] = stretches(&target, &particles);
+        let least = |sums: &[f64]| {
+            let mean = sums.iter().sum::<f64>() / sums.len() as f64;
+            sums.iter().copied().fold(f64::INFINITY, f64::min) / mean
+        };
+        assert!(share >= 0.95, "{name}: {share} within L_thr");
+        assert!(far < 1e-3, "{name}: {far} in the gaps");
+        assert!(least(&powers) >= 0.5, "{name}: a stretch has {} of its power", least(&powers));
+        assert!(least(&counts) >= 0.5, "{name}: a stretch has {} of its particles", least(&counts));
+    }
+}
+
+/// The square is cut into blocks of a sixteenth; what changes in any of them counts.
+fn greatest_jumps(shapes: Vec<ShapeParameters>) -> [f64; 2] {
+    const BLOCKS: usize = 16;
+    let parameters = AuroraParameters { shapes, ..small() };
+    let end = sequence(&parameters).duration();
+    let extent = parameters.extent_km;
+    let mut simulation = simulation(parameters);
+    let blocks = |simulation: &AuroraSimulation| {
+        let mut blocks = vec![0.0; BLOCKS * BLOCKS];
+        let particles = simulation.particles();
+        for index in 0..particles.len() {
+            let block =
+                ((particles.place(index) / extent + 0.5) * BLOCKS as f64).clamp(DVec2::ZERO, DVec2::splat(15.9));
+            blocks[block.y as usize * BLOCKS + block.x as usize] += f64::from(particles.powers_w[index]);
+        }
+        blocks
+    };
+    let (mut whole, mut local) = (0.0_f64, 0.0_f64);
+    let mut before = blocks(&simulation);
+    while simulation.time() < end {
+        simulation.step();
+        let after = blocks(&simulation);
+        let sums = [&before, &after].map(|blocks| blocks.iter().sum::<f64>());
+        whole = whole.max((sums[1] / sums[0] - 1.0).abs());
+        let change: f64 = before.iter().zip(&after).map(|(before, after)| (after - before).abs()).sum();
+        local = local.max(change / 2.0 / sums[0]);
+        before = after;
+    }
+    [whole, local]
+}
+
+#[test]
+fn nothing_jumps_from_frame_to_frame_through_split_merge_and_relocation() {
+    for (name, shapes) in [("split", splitting()), ("merge", merging()), ("peel", becoming(Form::Peel))] {
+        let [whole, local] = greatest_jumps(shapes);
+        assert!(whole < 0.02, "{name}: all light changes by {whole} in a frame");
+        // What moves from block to block counts here too.
+        assert!(local < 0.06, "{name}: {local} of the light changes its place in a frame");
+    }
+}
+
+/// Variance of the particles' density along a straight sheet beside that of particles strewn at random, in pieces of a fifth of the support
+/// radius: over longer ones both kernels push alike, it is close particles that spiky parts.
+fn unevenness(kernel: RepulsionKernel) -> f64 {
+    const PIECES: usize = 800;
+    let mut parameters = AuroraParameters { shapes: vec![shape(vec![line([-200.0, 0.0], [200.0, 0.0])])], ..small() };
+    parameters.particles.kernel = kernel;
+    let mut simulation = simulation(parameters);
+    (0..60).for_each(|_| simulation.step());
+    let mut total = 0.0;
+    for _ in 0..10 {
+        (0..3).for_each(|_| simulation.step());
+        let mut counts = [0.0; PIECES];
+        for (place, _) in live(&simulation) {
+            let piece = (place.x + 150.0) / 300.0 * PIECES as f64;
+            if (0.0..PIECES as f64).contains(&piece) {
+                counts[piece as usize] += 1.0;
+            }
+        }
+        // Beside the pieces around, so that the large scale does not count.
+        let squares: f64 = counts.windows(3).map(|c| (c[1] - 0.5 * (c[0] + c[2])) * (c[1] - 0.5 * (c[0] + c[2]))).sum();
+        total += squares / 1.5 / counts.iter().sum::<f64>();
+    }
+    total / 10.0
+}
+
+#[test]
+fn the_spline_keeps_rays_and_poly6_with_spiky_blurs_them() {
+    let [spline, blurred] = [RepulsionKernel::Spline, RepulsionKernel::Poly6Spiky].map(unevenness);
+    assert!(spline > 1.15 * blurred, "{spline} {blurred}");
+}
