@@ -1,6 +1,6 @@
 //! What editors do to a scene: operations on places of its text. Everything else in it stays, comments too.
 
-use bansho_base::parameters::{Table as Values, Value};
+use bansho_base::parameters::{Node, Table as Values, Value};
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, Value as Written};
 
 use super::{
@@ -104,7 +104,10 @@ fn written(value: &Value) -> Result<Written, EditError> {
 
 /// Something that a place may lead into.
 enum Slot<'a> {
-    Table(&'a mut dyn TableLike),
+    /// Under a header of its own.
+    Headed(&'a mut Table),
+    /// In a line.
+    Inline(&'a mut InlineTable),
     Tables(&'a mut ArrayOfTables),
     Value(&'a mut Written),
 }
@@ -114,22 +117,32 @@ impl<'a> Slot<'a> {
         match item {
             Item::None => None,
             Item::Value(value) => Some(Self::of_value(value)),
-            Item::Table(table) => Some(Self::Table(table)),
+            Item::Table(table) => Some(Self::Headed(table)),
             Item::ArrayOfTables(tables) => Some(Self::Tables(tables)),
         }
     }
 
     fn of_value(value: &'a mut Written) -> Self {
         match value {
-            Written::InlineTable(table) => Self::Table(table),
+            Written::InlineTable(table) => Self::Inline(table),
             other => Self::Value(other),
+        }
+    }
+
+    /// Its keys, where it is a table.
+    fn table(self) -> Option<&'a mut dyn TableLike> {
+        match self {
+            Self::Headed(table) => Some(table),
+            Self::Inline(table) => Some(table),
+            Self::Tables(_) | Self::Value(_) => None,
         }
     }
 
     fn into(self, segment: &Segment) -> Option<Self> {
         match (self, segment) {
-            (Self::Table(table), Segment::Key(key)) => Self::of_item(table.get_mut(key)?),
-            (Self::Tables(tables), Segment::Index(index)) => Some(Self::Table(tables.get_mut(*index)?)),
+            (Self::Headed(table), Segment::Key(key)) => Self::of_item(table.get_mut(key)?),
+            (Self::Inline(table), Segment::Key(key)) => Some(Self::of_value(table.get_mut(key)?)),
+            (Self::Tables(tables), Segment::Index(index)) => Some(Self::Headed(tables.get_mut(*index)?)),
             (Self::Value(Written::Array(items)), Segment::Index(index)) => Some(Self::of_value(items.get_mut(*index)?)),
             _ => None,
         }
@@ -149,14 +162,21 @@ fn holder<'a, 'p>(root: &'a mut Table, place: &'p Place, make: bool) -> Result<(
     let Some((last, way)) = place.segments().split_last() else {
         return Err(EditError::NoAssignment(String::new()));
     };
-    let mut slot = Slot::Table(root);
+    let mut slot = Slot::Headed(root);
     for (depth, segment) in way.iter().enumerate() {
-        if let (true, Slot::Table(table), Segment::Key(key)) = (make, &mut slot, segment)
-            && !table.contains_key(key)
-        {
-            // A table at the root gets a header of its own; one within stands in a line.
-            let made = if depth == 0 { Item::Table(Table::new()) } else { InlineTable::new().into() };
-            table.insert(key, made);
+        if let (true, Segment::Key(key)) = (make, segment) {
+            let missing = |table: &dyn TableLike| !table.contains_key(key);
+            match &mut slot {
+                // A table at the root gets a header of its own; one within stands in a line.
+                Slot::Headed(table) if missing(*table) => {
+                    let made = if depth == 0 { Item::Table(Table::new()) } else { InlineTable::new().into() };
+                    table.insert(key, made);
+                }
+                Slot::Inline(table) if missing(*table) => {
+                    table.insert(key, InlineTable::new().into());
+                }
+                _ => {}
+            }
         }
         slot = slot.into(segment).ok_or_else(|| nowhere(place, segment))?;
     }
@@ -166,18 +186,20 @@ fn holder<'a, 'p>(root: &'a mut Table, place: &'p Place, make: bool) -> Result<(
 fn set(root: &mut Table, place: &Place, value: Written) -> Result<(), EditError> {
     let (slot, last) = holder(root, place, true)?;
     match (slot, last) {
-        (Slot::Table(table), Segment::Key(key)) => match table.get_mut(key) {
-            Some(Item::Value(old)) => replace(old, value),
-            _ => {
-                table.insert(key, Item::Value(value));
-            }
-        },
         (Slot::Value(Written::Array(items)), Segment::Index(index)) if *index < items.len() => {
             if let Some(old) = items.get_mut(*index) {
                 replace(old, value);
             }
         }
-        (_, last) => return Err(nowhere(place, last)),
+        (slot, last) => {
+            let (Some(table), Segment::Key(key)) = (slot.table(), last) else { return Err(nowhere(place, last)) };
+            match table.get_mut(key) {
+                Some(Item::Value(old)) => replace(old, value),
+                _ => {
+                    table.insert(key, Item::Value(value));
+                }
+            }
+        }
     }
     Ok(())
 }
@@ -192,7 +214,8 @@ fn replace(old: &mut Written, value: Written) {
 fn remove(root: &mut Table, place: &Place) -> Result<(), EditError> {
     let (slot, last) = holder(root, place, false)?;
     let removed = match (slot, last) {
-        (Slot::Table(table), Segment::Key(key)) => table.remove(key).is_some(),
+        (Slot::Headed(table), Segment::Key(key)) => table.remove(key).is_some(),
+        (Slot::Inline(table), Segment::Key(key)) => table.remove(key).is_some(),
         (Slot::Tables(tables), Segment::Index(index)) if *index < tables.len() => {
             tables.remove(*index);
             true
@@ -208,10 +231,12 @@ fn remove(root: &mut Table, place: &Place) -> Result<(), EditError> {
 
 fn append(root: &mut Table, place: &Place, value: &Value) -> Result<(), EditError> {
     let (slot, last) = holder(root, place, true)?;
-    let (Slot::Table(table), Segment::Key(key)) = (slot, last) else { return Err(nowhere(place, last)) };
+    let headed_holder = matches!(slot, Slot::Headed(_));
+    let (Some(table), Segment::Key(key)) = (slot.table(), last) else { return Err(nowhere(place, last)) };
     if !table.contains_key(key) {
-        // Tables stand under headers of their own where they can, which is at the root.
-        let own_headers = place.segments().len() == 1 && matches!(value, Value::Table(_));
+        // Tables stand under headers of their own at the root, and within where a line would be too long for them.
+        let at_root = place.segments().len() == 1;
+        let own_headers = headed_holder && matches!(value, Value::Table(values) if at_root || holds_tables(values));
         let list = if own_headers { Item::ArrayOfTables(ArrayOfTables::new()) } else { Array::new().into() };
         table.insert(key, list);
     }
@@ -221,6 +246,12 @@ fn append(root: &mut Table, place: &Place, value: &Value) -> Result<(), EditErro
         _ => return Err(nowhere(place, last)),
     }
     Ok(())
+}
+
+/// Whether a table has lists of tables in it.
+fn holds_tables(values: &Values) -> bool {
+    let is_table = |item: &Node| matches!(item.value, Value::Table(_));
+    values.entries.iter().any(|entry| matches!(&entry.node.value, Value::List(items) if items.iter().any(is_table)))
 }
 
 /// A table to stand under a header, with an empty line before.
@@ -236,8 +267,7 @@ fn headed(values: &Values) -> Result<Table, EditError> {
 /// The keys of the value at `place`, where it is keyed.
 fn keys<'a>(root: &'a mut Table, place: &Place) -> Option<&'a mut Array> {
     let (slot, last) = holder(root, place, false).ok()?;
-    let Slot::Table(keyed) = slot.into(last)? else { return None };
-    keyed.get_mut("keys")?.as_array_mut()
+    slot.into(last)?.table()?.get_mut("keys")?.as_array_mut()
 }
 
 fn time_of(key: &Written) -> Option<f64> {

@@ -7,6 +7,7 @@ use bansho::{
 use eframe::egui::{CollapsingHeader, RichText, Ui};
 
 use super::{
+    icon::{self, Icon},
     keyed,
     scene_panel::Subject,
     session::Session,
@@ -65,7 +66,7 @@ fn list(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descripto
 
 fn list_item(ui: &mut Ui, session: &mut Session, place: &Place, kind: &Kind, value: &Value) {
     ui.horizontal(|ui| {
-        if ui.small_button("−").on_hover_text("Remove").clicked() {
+        if icon::button(ui, Icon::Cross, &format!("Remove {place}")).clicked() {
             session.edit("remove", &[Operation::Remove { place: place.clone() }]);
         }
         match kind {
@@ -118,7 +119,7 @@ fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor
 
 fn reset(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, stated: bool) {
     let name = format!("Default of {}", words(parameter.key));
-    if stated && ui.small_button("⟲").on_hover_text(&name).accessible_name(name).clicked() {
+    if stated && icon::button(ui, Icon::Reset, &name).clicked() {
         session.edit("default", &[Operation::Remove { place: place.clone() }]);
     }
 }
@@ -130,11 +131,11 @@ fn key_button(ui: &mut Ui, session: &mut Session, place: &Place, stated: Option<
     let keys = stated.map(keyed::keys).unwrap_or_default();
     let here = keys.iter().map(|(own, _)| *own).find(|own| (own - time).abs() < half);
     let (sign, doc) = match here {
-        Some(_) => ("◆", "Take out the key at this time"),
-        None if keys.is_empty() => ("◇", "Key the value at this time"),
-        None => ("◈", "Keyed; key the value at this time"),
+        Some(_) => (Icon::KeyHere, "Take out the key at this time"),
+        None if keys.is_empty() => (Icon::Key, "Key the value at this time"),
+        None => (Icon::Keyed, "Keyed; key the value at this time"),
     };
-    if ui.small_button(sign).on_hover_text(doc).accessible_name(format!("{doc}: {place}")).clicked() {
+    if icon::button(ui, sign, &format!("{doc}: {place}")).clicked() {
         let operation = match here {
             Some(time) => Operation::RemoveKeyframe { place: place.clone(), time },
             None => session.keyframe(place, present),

@@ -1,9 +1,11 @@
 //! The window: panels over one [`Session`]. It holds no formulas of any phenomenon.
 
+mod aurora;
 mod curve_editor;
 mod files;
 mod gesture;
 mod hands;
+mod icon;
 mod inspector;
 mod keyed;
 mod menu;
@@ -25,13 +27,17 @@ use std::time::Duration;
 use eframe::egui;
 
 pub use self::session::{AssetsOf, Session};
-use self::{files::Files, scene_panel::Subject, text_panel::TextPanel, viewport::Viewport};
+use self::{aurora::AuroraEditor, files::Files, scene_panel::Subject, text_panel::TextPanel, viewport::Viewport};
+
+/// The kind of phenomenon whose shapes are drawn.
+const KIND_WITH_SHAPES: &str = "aurora";
 
 /// The whole window.
 pub struct Studio {
     session: Session,
     subject: Subject,
     viewport: Viewport,
+    aurora: AuroraEditor,
     text: TextPanel,
     files: Files,
     shows: Shows,
@@ -47,10 +53,12 @@ struct Shows {
 impl Studio {
     /// A window on `session`. `home` is where the studio keeps recent files and unsaved work; without it, nothing is kept.
     pub fn new(session: Session, home: Option<std::path::PathBuf>) -> Self {
+        let subject = Subject::first_of(&session.document);
         Self {
             session,
-            subject: Subject::default(),
+            subject,
             viewport: Viewport::default(),
+            aurora: AuroraEditor::default(),
             text: TextPanel::default(),
             files: Files::new(home),
             shows: Shows::default(),
@@ -70,6 +78,11 @@ impl Studio {
         egui::Panel::bottom("status").show(ui, |ui| status::show(ui, &mut self.session, &self.files));
         egui::Panel::bottom("timeline").show(ui, |ui| timeline::show(ui, &mut self.session));
         self.side_panels(ui);
+        if let (KIND_WITH_SHAPES, Some(index)) = (self.subject.key, self.subject.index) {
+            egui::Panel::bottom("aurora").resizable(true).default_size(420.0).show(ui, |ui| {
+                self.aurora.show(ui, &mut self.session, index);
+            });
+        }
         egui::CentralPanel::default().show(ui, |ui| self.viewport.show(ui, &mut self.session));
         if self.shows.shortcuts {
             shortcuts::window(ui.ctx(), &mut self.shows.shortcuts);

@@ -8,7 +8,7 @@ use bansho::{
 use eframe::egui::{self, Ui};
 
 use super::session::Session;
-use crate::document::{Listed, operations};
+use crate::document::{Document, Listed, operations};
 
 /// What the inspector shows: a table of the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +26,12 @@ impl Default for Subject {
 }
 
 impl Subject {
+    /// What a hand would reach for first: the first phenomenon, if there is one.
+    pub(super) fn first_of(document: &Document) -> Self {
+        let first = document.phenomena().into_iter().next();
+        first.map_or_else(Self::default, |listed| Self { key: listed.kind, index: Some(listed.index) })
+    }
+
     /// Where it stands.
     pub(super) fn place(&self) -> Place {
         let place = Place::root().key(self.key);

@@ -13,7 +13,7 @@ use bansho::{
 
 use super::keyed;
 use crate::{
-    document::{Document, Revision},
+    document::{Document, Revision, drawing::Refusal},
     player::{Event, Pace, Picture, Player, Transport, Wish},
 };
 
@@ -149,6 +149,21 @@ impl Session {
             }
             Err(error) => self.notice = Some(error.to_string()),
         }
+    }
+
+    /// Carries out `operations` on the shapes of aurora `index`.
+    ///
+    /// # Errors
+    /// An aurora cannot take the shapes that would come of them; nothing is changed then.
+    pub fn reshape(&mut self, label: &str, operations: &[Operation], index: usize) -> Result<(), Refusal> {
+        self.document.reshape(label, operations, index, &self.assets)?;
+        self.notice = None;
+        Ok(())
+    }
+
+    /// Where the scene's pictures and drawings come from.
+    pub fn assets(&self) -> &Arc<dyn Assets> {
+        &self.assets
     }
 
     /// Sets the value at `place`; where it is keyed, as it is at the present time.

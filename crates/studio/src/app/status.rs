@@ -2,7 +2,11 @@
 
 use eframe::egui::Ui;
 
-use super::{files::Files, session::Session};
+use super::{
+    files::Files,
+    icon::{self, Icon},
+    session::Session,
+};
 
 /// Shows the line.
 pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &Files) {
@@ -28,7 +32,7 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &Files) {
         if let Some(notice) = session.notice() {
             let notice = notice.to_owned();
             ui.colored_label(ui.visuals().warn_fg_color, &notice);
-            if ui.small_button("✖").on_hover_text("Dismiss").clicked() {
+            if icon::button(ui, Icon::Cross, "Dismiss").clicked() {
                 session.set_notice(None);
             }
         }

@@ -2,7 +2,11 @@
 
 use eframe::egui::{self, Color32, CornerRadius, PointerButton, Rect, Sense, Stroke, Ui, pos2, vec2};
 
-use super::{keyed, session::Session};
+use super::{
+    icon::{self, Icon},
+    keyed,
+    session::Session,
+};
 
 /// Shows the controls and the bar.
 pub(super) fn show(ui: &mut Ui, session: &mut Session) {
@@ -15,19 +19,18 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session) {
 
 fn controls(ui: &mut Ui, session: &mut Session) {
     let transport = &mut session.transport;
-    let button =
-        |ui: &mut Ui, sign: &str, name: &str| ui.button(sign).on_hover_text(name).accessible_name(name).clicked();
-    if button(ui, "⏮", "First frame") {
+    let button = |ui: &mut Ui, icon: Icon, name: &str| icon::button(ui, icon, name).clicked();
+    if button(ui, Icon::First, "First frame") {
         transport.go_to(*transport.range().start());
     }
-    if button(ui, "⏴", "Frame back") {
+    if button(ui, Icon::Back, "Frame back") {
         transport.step(-1);
     }
-    let (sign, name) = if transport.is_playing() { ("⏸", "Pause") } else { ("▶", "Play") };
+    let (sign, name) = if transport.is_playing() { (Icon::Pause, "Pause") } else { (Icon::Play, "Play") };
     if button(ui, sign, name) {
         transport.set_playing(!transport.is_playing());
     }
-    if button(ui, "⏵", "Frame on") {
+    if button(ui, Icon::On, "Frame on") {
         transport.step(1);
     }
     let frames = transport.frames();
@@ -46,8 +49,8 @@ fn range_controls(ui: &mut Ui, session: &mut Session) {
     let label = ui.label("Loop").on_hover_text("The frames that are played, over and over").id;
     let frames = session.transport.frames();
     let mut changed = ui.add(egui::DragValue::new(&mut first).range(frames.clone())).labelled_by(label).changed();
-    ui.label("to");
-    changed |= ui.add(egui::DragValue::new(&mut last).range(frames.clone())).changed();
+    let label = ui.label("to").id;
+    changed |= ui.add(egui::DragValue::new(&mut last).range(frames.clone())).labelled_by(label).changed();
     if changed {
         session.transport.set_range(Some(first..=last.max(first)));
     }

@@ -1,6 +1,7 @@
 //! The scene as text: edits that keep its comments, undo, faults at their lines, and the last plan that was good.
 
 mod check;
+pub mod drawing;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod files;
 mod history;

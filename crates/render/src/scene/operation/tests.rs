@@ -92,6 +92,19 @@ fn items_are_added_under_headers_at_the_root_and_in_line_within() {
 }
 
 #[test]
+fn tables_that_hold_tables_get_headers_within_one_that_has() {
+    let mut sheet = Values::default();
+    sheet.push("scale", Value::Number(2.0));
+    let mut shape = Values::default();
+    shape.push("sheets", Value::List(vec![Value::Table(sheet).into()]));
+    let shape = Operation::Append { place: at("aurora.0.shapes"), value: Value::Table(shape) };
+    let aurora = Operation::Append { place: at("aurora"), value: Value::Table(Values::default()) };
+    let text = apply("bansho = 1\n", &[aurora, shape.clone(), shape]).unwrap();
+    let shape = "\n[[aurora.shapes]]\nsheets = [{ scale = 2.0 }]\n";
+    assert_eq!(text, format!("bansho = 1\n\n[[aurora]]\n{shape}{shape}"));
+}
+
+#[test]
 fn keys_are_put_in_order_replaced_and_taken_out() {
     let mut text = apply(SCENE, &[keyframe("flame_sheet.0.height", 2.0, 1.0)]).unwrap();
     assert!(text.contains("height = { keys = [[2.0, 1.0]] } # low"), "{text}");
