@@ -12,6 +12,8 @@ use super::{hands::rounded, keyed, session::Session};
 pub(super) struct Blowing {
     calm: [f64; 3],
     recorded: bool,
+    /// When it began, s.
+    began: f64,
 }
 
 /// The name of the step in the history.
@@ -27,7 +29,7 @@ impl Blowing {
         let stated = place().find(session.document.values());
         let now = stated.and_then(|node| keyed::at(&node.value, session.transport.time_s()));
         let calm = now.and_then(|value| three(&value)).unwrap_or_default();
-        let blowing = Self { calm, recorded: session.recording };
+        let blowing = Self { calm, recorded: session.recording, began: session.transport.time_s() };
         session.document.seal();
         if blowing.recorded {
             session.transport.set_playing(true);
@@ -40,7 +42,10 @@ impl Blowing {
     pub(super) fn blow(&self, session: &mut Session, wind: DVec3) {
         let velocity = rounded(DVec3::from(self.calm) + wind);
         if self.recorded {
-            self.key(session, velocity);
+            // The key of the calm before the drag stays.
+            if session.transport.time_s() != self.began {
+                self.key(session, velocity);
+            }
         } else {
             session.edit(LABEL, &[Operation::Set { place: place(), value: Value::numbers(velocity) }]);
         }

@@ -4,7 +4,7 @@ use bansho::{
     base::parameters::{Descriptor, Kind, TableDescriptor, Value},
     render::scene::{Place, operation::Operation},
 };
-use eframe::egui::{CollapsingHeader, RichText, Ui};
+use eframe::egui::{Align, CollapsingHeader, Label, Layout, Response, RichText, Ui, vec2};
 
 use super::{
     icon::{self, Icon},
@@ -18,7 +18,7 @@ use super::{
 pub(super) fn show(ui: &mut Ui, session: &mut Session, subject: &Subject) {
     let Some(descriptor) = subject.descriptor() else { return };
     let place = subject.place();
-    ui.heading(place.to_string());
+    ui.heading(subject.title(&session.document));
     ui.weak(&descriptor.doc);
     ui.separator();
     if subject.index.is_some() && subject.place().find(session.document.values()).is_none() {
@@ -90,7 +90,7 @@ fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor
     let name = RichText::new(words(parameter.key));
     let name = if stated.is_some() { name.strong() } else { name };
     ui.horizontal_wrapped(|ui| {
-        let label = ui.label(name).on_hover_text(help(parameter)).id;
+        let label = name_column(ui, name).on_hover_text(help(parameter)).id;
         let Some(present) = present else {
             if ui.button("Set").labelled_by(label).clicked() {
                 session.edit(
@@ -115,6 +115,18 @@ fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor
             reset(ui, session, place, parameter, stated.is_some());
         }
     });
+}
+
+/// The name in a column of its own, so that values stand under one another.
+fn name_column(ui: &mut Ui, name: RichText) -> Response {
+    const WIDTH: f32 = 118.0;
+    let size = vec2(WIDTH, ui.spacing().interact_size.y);
+    let layout = Layout::left_to_right(Align::Center);
+    ui.allocate_ui_with_layout(size, layout, |ui| {
+        ui.set_min_width(WIDTH);
+        ui.add(Label::new(name).truncate())
+    })
+    .inner
 }
 
 fn reset(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, stated: bool) {

@@ -38,6 +38,17 @@ impl Subject {
         self.index.map_or(place.clone(), |index| place.index(index))
     }
 
+    /// What a person calls it.
+    pub(super) fn title(&self, document: &Document) -> String {
+        let listed =
+            document.phenomena().into_iter().find(|listed| Some(listed.index) == self.index && listed.kind == self.key);
+        match (listed, self.index) {
+            (Some(listed), _) => listed.name,
+            (None, Some(index)) => format!("{} {}", self.key, index + 1),
+            (None, None) => self.key.to_owned(),
+        }
+    }
+
     /// Its parameters.
     pub(super) fn descriptor(&self) -> Option<&'static TableDescriptor> {
         let shared = SHARED_TABLES.iter().find(|table| table.key == self.key).map(|table| (table.table)());

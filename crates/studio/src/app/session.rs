@@ -168,11 +168,17 @@ impl Session {
 
     /// Sets the value at `place`; where it is keyed, as it is at the present time.
     pub fn set(&mut self, label: &str, place: &Place, value: Value) {
-        let operation = match place.find(self.document.values()) {
-            Some(node) if keyed::is_keyed(&node.value) => self.keyframe(place, value),
-            _ => Operation::Set { place: place.clone(), value },
+        self.set_all(label, [(place.clone(), value)]);
+    }
+
+    /// Sets several values in one step.
+    pub fn set_all(&mut self, label: &str, values: impl IntoIterator<Item = (Place, Value)>) {
+        let operation = |(place, value): (Place, Value)| match place.find(self.document.values()) {
+            Some(node) if keyed::is_keyed(&node.value) => self.keyframe(&place, value),
+            _ => Operation::Set { place, value },
         };
-        self.edit(label, &[operation]);
+        let operations: Vec<Operation> = values.into_iter().map(operation).collect();
+        self.edit(label, &operations);
     }
 
     /// The operation that keys `place` now.

@@ -197,11 +197,8 @@ fn lamps(session: &Session) -> Vec<(usize, DVec3)> {
 
 fn move_camera(session: &mut Session, stand: Stand) {
     let camera = Place::root().key("camera");
-    let mut set = |key: &str, to: DVec3| {
-        session.set("camera", &camera.key(key), Value::numbers(rounded(to)));
-    };
-    set("position", stand.position);
-    set("target", stand.target);
+    let value = |key: &str, to: DVec3| (camera.key(key), Value::numbers(rounded(to)));
+    session.set_all("camera", [value("position", stand.position), value("target", stand.target)]);
 }
 
 /// The exposure of the scene, which a hand sets in place of the automatic one.

@@ -1,5 +1,7 @@
 //! The window driven as a person with a screen reader would: by what widgets are called.
 
+mod aurora;
+
 use std::{path::Path, sync::Arc, time::Instant};
 
 use bansho::{Assets, MemoryAssets};
@@ -62,10 +64,11 @@ fn a_scene_is_shown_and_then_the_window_rests() {
 #[test]
 fn parameters_are_edited_by_their_names_and_comments_stay() {
     let mut harness = window(SCENE);
-    harness.get_by_label("fire").click();
+    harness.get_by_role_and_label(Role::Button, "fire").click();
     harness.run_steps(3);
-    let height = harness.get_all_by_role(Role::SpinButton).find(|node| node.value().as_deref() == Some("0.9 m"));
-    height.expect("the height, with its unit").set_value_accesskit(1.5);
+    let height = harness.get_by_role_and_label(Role::SpinButton, "height");
+    assert_eq!(height.value().as_deref(), Some("0.900 m"));
+    height.set_value_accesskit(1.5);
     drawn(&mut harness);
     let edited = text(&mut harness);
     assert!(edited.contains("height = 1.5") && edited.contains("# the only one"), "{edited}");
