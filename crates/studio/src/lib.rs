@@ -6,4 +6,5 @@
 
 pub mod app;
 pub mod document;
+pub mod examples;
 pub mod player;

@@ -2,14 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
+#[cfg(target_arch = "wasm32")]
+use super::browser;
+
 use eframe::egui::{self, Ui};
 
 use super::{
+    chooser::Chooser,
     question::{Answer, Leaving, Question, answer},
     session::Session,
 };
 use crate::{
     document::{
+        Document,
         files::{self, Recent},
         recovery::{self, Autosave, Recovered},
     },
@@ -29,6 +34,9 @@ pub(super) struct Files {
     focused: bool,
     closing: bool,
     pub(super) shooting: Option<Shooting>,
+    /// Files that came by way of the browser.
+    #[cfg(target_arch = "wasm32")]
+    inbox: browser::Inbox,
 }
 
 impl Files {
@@ -45,6 +53,8 @@ impl Files {
             focused: true,
             closing: false,
             shooting: None,
+            #[cfg(target_arch = "wasm32")]
+            inbox: browser::Inbox::default(),
         }
     }
 
@@ -55,16 +65,48 @@ impl Files {
     }
 
     /// Asks which file to open.
-    pub(super) fn ask_to_open(&mut self) {
-        self.question = Some(Question::Open(String::new()));
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(super) fn ask_to_open(&mut self, _ctx: &egui::Context, session: &mut Session) {
+        self.question = Some(Question::Open(Chooser::beside(session.path.as_deref())));
+    }
+
+    /// Asks which file to open.
+    #[cfg(target_arch = "wasm32")]
+    pub(super) fn ask_to_open(&mut self, ctx: &egui::Context, session: &mut Session) {
+        if browser::ask_for_file(&self.inbox, ctx).is_err() {
+            session.set_notice(Some("the browser cannot ask for files here".into()));
+        }
+    }
+
+    /// Hands the scene to the browser, which saves it where it saves what it is given.
+    #[cfg(target_arch = "wasm32")]
+    pub(super) fn save(&mut self, session: &mut Session) {
+        let name = session.document.name().to_owned();
+        let name = if name.ends_with(".toml") { name } else { format!("{name}.toml") };
+        let text = session.document.text().clone();
+        match browser::download(&name, &text) {
+            Ok(()) => session.document.mark_saved(text),
+            Err(_) => session.set_notice(Some("the browser cannot save files here".into())),
+        }
     }
 
     /// Saves, or asks where to.
+    #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn save(&mut self, session: &mut Session) {
         match session.path.clone() {
             Some(path) => self.save_to(session, path),
-            None => self.question = Some(Question::SaveAs("scene.toml".into())),
+            None => self.ask_where_to_save(session),
         }
+    }
+
+    /// Asks where to save.
+    pub(super) fn ask_where_to_save(&mut self, session: &Session) {
+        let name = match &session.path {
+            Some(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            None if session.document.name().ends_with(".toml") => session.document.name().to_owned(),
+            None => "scene.toml".to_owned(),
+        };
+        self.question = Some(Question::SaveAs(Chooser::beside(session.path.as_deref()).naming(name)));
     }
 
     fn save_to(&mut self, session: &mut Session, path: PathBuf) {
@@ -92,6 +134,20 @@ impl Files {
             self.question = Some(Question::Leave(Leaving::Open(path)));
         } else {
             self.open_now(session, path);
+        }
+    }
+
+    /// Opens one of the examples, after asking where that would lose work.
+    pub(super) fn open_example(&mut self, session: &mut Session, name: &'static str, text: &'static str) {
+        self.open_given(session, name, text.to_owned());
+    }
+
+    /// Opens a scene that no folder holds.
+    fn open_given(&mut self, session: &mut Session, name: &str, text: String) {
+        if session.document.is_dirty() {
+            self.question = Some(Question::Leave(Leaving::OpenGiven(name.to_owned(), text)));
+        } else {
+            session.open(Document::new(name, text), None);
         }
     }
 
@@ -158,6 +214,31 @@ impl Files {
         }
     }
 
+    /// Takes in what the browser gave: a scene is opened, anything else laid into the one that is open.
+    #[cfg(target_arch = "wasm32")]
+    fn take_given(&mut self, session: &mut Session) {
+        let given = std::mem::take(&mut *self.inbox.borrow_mut());
+        for (name, bytes) in given {
+            if name.ends_with(".toml") {
+                match String::from_utf8(bytes) {
+                    Ok(text) => self.open_given(session, &name, text),
+                    Err(_) => session.set_notice(Some(format!("{name}: is not UTF-8"))),
+                }
+            } else {
+                session.give(&name, bytes);
+                session.lay_over(Path::new(&name));
+            }
+        }
+    }
+
+    #[cfg(target_arch = "wasm32")]
+    fn take_dropped(&mut self, ui: &Ui, session: &mut Session) {
+        let dropped = ui.input(|input| input.raw.dropped_files.clone());
+        dropped.into_iter().for_each(|file| browser::take_dropped(file, &self.inbox, ui.ctx()));
+        self.take_given(session);
+    }
+
+    #[cfg(not(target_arch = "wasm32"))]
     fn take_dropped(&mut self, ui: &Ui, session: &mut Session) {
         let dropped = ui.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_path_buf()));
         let Some(path) = dropped else { return };
@@ -202,8 +283,8 @@ impl Files {
     fn answered(&mut self, ui: &Ui, session: &mut Session, question: Question, answer: Answer) {
         match (question, answer) {
             (_, Answer::Cancel) => {}
-            (Question::Open(path), _) => self.open(session, PathBuf::from(path.trim())),
-            (Question::SaveAs(path), _) => self.save_to(session, PathBuf::from(path.trim())),
+            (Question::Open(chooser), _) => self.open(session, chooser.path()),
+            (Question::SaveAs(chooser), _) => self.save_to(session, chooser.path()),
             (Question::ChangedOutside(text), Answer::Do) => take_outside(session, &text),
             (Question::ChangedOutside(_), Answer::Save) => self.save(session),
             (Question::Leave(leaving), answer) => {
@@ -220,6 +301,7 @@ impl Files {
     fn leave(&mut self, ui: &Ui, session: &mut Session, leaving: Leaving) {
         match leaving {
             Leaving::Open(path) => self.open_now(session, path),
+            Leaving::OpenGiven(name, text) => session.open(Document::new(name, text), None),
             Leaving::Close => {
                 self.closing = true;
                 ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);

@@ -4,8 +4,11 @@ use std::path::PathBuf;
 
 use eframe::egui::{self, Ui};
 
-use super::{Studio, question::Question};
-use crate::document::{Document, files, recovery::Recovered};
+use super::Studio;
+use crate::{
+    document::{Document, files, recovery::Recovered},
+    examples,
+};
 
 impl Studio {
     /// The bar at the top.
@@ -22,8 +25,9 @@ impl Studio {
 
     fn file_menu(&mut self, ui: &mut Ui) {
         if ui.button("Open…").clicked() {
-            self.files.ask_to_open();
+            self.files.ask_to_open(ui.ctx(), &mut self.session);
         }
+        ui.menu_button("Examples", |ui| self.examples_menu(ui));
         ui.menu_button("Recent", |ui| {
             for path in self.files.recent.paths().to_vec() {
                 if ui.button(path.display().to_string()).clicked() {
@@ -35,9 +39,7 @@ impl Studio {
             self.files.save(&mut self.session);
         }
         if ui.button("Save as…").clicked() {
-            let path =
-                self.session.path.as_ref().map_or_else(|| "scene.toml".into(), |path| path.display().to_string());
-            self.files.question = Some(Question::SaveAs(path));
+            self.files.ask_where_to_save(&self.session);
         }
         ui.separator();
         if ui.button("Render still").clicked() {
@@ -54,6 +56,17 @@ impl Studio {
         if ui.button("Reload plates and meshes").clicked() {
             self.session.reload_assets();
         }
+    }
+
+    fn examples_menu(&mut self, ui: &mut Ui) {
+        egui::ScrollArea::vertical().show(ui, |ui| {
+            for &(name, text) in examples::SCENES {
+                let words = name.trim_end_matches(".toml").replace('_', " ");
+                if ui.button(words).clicked() {
+                    self.files.open_example(&mut self.session, name, text);
+                }
+            }
+        });
     }
 
     fn edit_menu(&mut self, ui: &mut Ui) {

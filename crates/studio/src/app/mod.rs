@@ -1,6 +1,9 @@
 //! The window: panels over one [`Session`]. It holds no formulas of any phenomenon.
 
 mod aurora;
+#[cfg(target_arch = "wasm32")]
+mod browser;
+mod chooser;
 mod curve_editor;
 mod files;
 mod gesture;

@@ -2,15 +2,17 @@
 
 use std::path::PathBuf;
 
-use eframe::egui::{self, Ui};
+use eframe::egui::Ui;
+
+use super::chooser::Chooser;
 
 /// A question that waits for an answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Question {
     /// Which file to open.
-    Open(String),
+    Open(Chooser),
     /// Which file to save to.
-    SaveAs(String),
+    SaveAs(Chooser),
     /// Whether unsaved work may be left, to open this or to close.
     Leave(Leaving),
     /// Whether to take what another program wrote.
@@ -21,6 +23,8 @@ pub(super) enum Question {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Leaving {
     Open(PathBuf),
+    /// A scene that no folder holds: its name and its text.
+    OpenGiven(String, String),
     Close,
 }
 
@@ -35,12 +39,14 @@ pub(super) enum Answer {
 /// Asks; what was answered, once it was.
 pub(super) fn answer(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
     let choices: &[(&str, Answer)] = match question {
-        Question::Open(path) => {
-            path_field(ui, "Open which scene?", path);
+        Question::Open(chooser) => {
+            if chooser.show(ui, "Open which scene?") {
+                return Some(Answer::Do);
+            }
             &[("Open", Answer::Do), ("Cancel", Answer::Cancel)]
         }
-        Question::SaveAs(path) => {
-            path_field(ui, "Save as", path);
+        Question::SaveAs(chooser) => {
+            chooser.show(ui, "Save as");
             &[("Save", Answer::Do), ("Cancel", Answer::Cancel)]
         }
         Question::Leave(_) => {
@@ -61,9 +67,4 @@ pub(super) fn answer(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
         }
     });
     chosen
-}
-
-fn path_field(ui: &mut Ui, title: &str, path: &mut String) {
-    let label = ui.label(title).id;
-    ui.add(egui::TextEdit::singleline(path).desired_width(420.0)).labelled_by(label);
 }

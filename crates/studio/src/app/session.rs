@@ -13,11 +13,15 @@ use bansho::{
 
 use super::keyed;
 use crate::{
-    document::{Document, Revision, drawing::Refusal},
+    document::{
+        Document, Revision,
+        drawing::{Drawing, Refusal},
+    },
+    examples::Bundle,
     player::{Event, Pace, Picture, Player, Transport, Wish},
 };
 
-/// Makes the assets of a scene that lies in a folder.
+/// Makes the assets of a scene that lies in a folder. Without one it finds the files of the examples, and given ones.
 pub type AssetsOf = fn(&Path) -> Arc<dyn Assets>;
 
 /// A document that is open, with its player.
@@ -32,6 +36,7 @@ pub struct Session {
     pub recording: bool,
     player: Box<dyn Player>,
     assets_of: AssetsOf,
+    bundle: Bundle,
     assets: Arc<dyn Assets>,
     pace: Pace,
     picture: Option<Picture>,
@@ -72,15 +77,16 @@ impl Rate {
 impl Session {
     /// Opens `document`, which lies in `path`.
     pub fn new(document: Document, path: Option<PathBuf>, player: Box<dyn Player>, assets_of: AssetsOf) -> Self {
-        let assets = assets_of(folder(path.as_deref()));
+        let bundle = Bundle::default();
         Self {
+            assets: assets(&bundle, path.as_deref(), assets_of),
+            bundle,
             document,
             path,
             transport: Transport::default(),
             recording: false,
             player,
             assets_of,
-            assets,
             pace: Pace::default(),
             picture: None,
             drawn: 0,
@@ -93,7 +99,7 @@ impl Session {
 
     /// Opens another document in place of this one.
     pub fn open(&mut self, document: Document, path: Option<PathBuf>) {
-        self.assets = (self.assets_of)(folder(path.as_deref()));
+        self.assets = assets(&self.bundle, path.as_deref(), self.assets_of);
         (self.document, self.path) = (document, path);
         (self.picture, self.asked, self.broken, self.notice) = (None, None, None, None);
         self.transport = Transport::default();
@@ -101,8 +107,14 @@ impl Session {
 
     /// Reads all assets anew, as after one was replaced.
     pub fn reload_assets(&mut self) {
-        self.assets = (self.assets_of)(folder(self.path.as_deref()));
+        self.assets = assets(&self.bundle, self.path.as_deref(), self.assets_of);
         self.asked = None;
+    }
+
+    /// Takes the bytes of a file that no folder holds.
+    pub fn give(&mut self, name: &str, bytes: Vec<u8>) {
+        self.bundle.give(name, bytes);
+        self.reload_assets();
     }
 
     /// The last picture, and which it is.
@@ -296,17 +308,32 @@ impl Session {
     }
 }
 
+/// What a scene in `path` finds.
+fn assets(bundle: &Bundle, path: Option<&Path>, assets_of: AssetsOf) -> Arc<dyn Assets> {
+    match path {
+        Some(_) => assets_of(folder(path)),
+        None => Arc::new(bundle.clone()),
+    }
+}
+
 /// The folder that paths in a scene are relative to.
 fn folder(path: Option<&Path>) -> &Path {
     path.and_then(Path::parent).unwrap_or(Path::new(""))
 }
 
 impl Session {
-    /// Takes a file that was dropped on the window: a picture becomes the plate.
+    /// Takes a file that was dropped on the window: a drawing becomes the aurora's first shape, a picture the plate.
     pub fn lay_over(&mut self, file: &Path) {
         let relative = file.strip_prefix(folder(self.path.as_deref())).unwrap_or(file);
-        let place = Place::root().key("plate").key("image");
         let value = Value::Text(relative.to_string_lossy().replace('\\', "/"));
-        self.edit("plate", &[Operation::Set { place, value }]);
+        if file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg")) {
+            match Drawing::read(self.document.values(), 0, &self.assets) {
+                Ok(drawing) => self.edit("drawing", &drawing.trace(value)),
+                Err(reason) => self.notice = Some(reason.to_string()),
+            }
+        } else {
+            let place = Place::root().key("plate").key("image");
+            self.edit("plate", &[Operation::Set { place, value }]);
+        }
     }
 }

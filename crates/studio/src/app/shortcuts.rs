@@ -62,12 +62,12 @@ impl Studio {
         for shortcut in &SHORTCUTS {
             let mine = !typing || shortcut.keys.modifiers.command || shortcut.keys.logical_key == Key::F12;
             if mine && ctx.input_mut(|input| pressed(input, shortcut)) {
-                self.act(shortcut.action);
+                self.act(ctx, shortcut.action);
             }
         }
     }
 
-    fn act(&mut self, action: Action) {
+    fn act(&mut self, ctx: &Context, action: Action) {
         let transport = &mut self.session.transport;
         match action {
             Action::Undo => {
@@ -77,7 +77,7 @@ impl Studio {
                 self.session.document.redo();
             }
             Action::Save => self.files.save(&mut self.session),
-            Action::Open => self.files.ask_to_open(),
+            Action::Open => self.files.ask_to_open(ctx, &mut self.session),
             Action::RenderStill => self.files.render(&mut self.session, true),
             Action::PlayPause => transport.set_playing(!transport.is_playing()),
             Action::FrameBack => transport.step(-1),

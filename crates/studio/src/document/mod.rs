@@ -2,11 +2,9 @@
 
 mod check;
 pub mod drawing;
-#[cfg(not(target_arch = "wasm32"))]
 pub mod files;
 mod history;
 mod phenomena;
-#[cfg(not(target_arch = "wasm32"))]
 pub mod recovery;
 #[cfg(test)]
 mod tests;

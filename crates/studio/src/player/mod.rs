@@ -6,7 +6,6 @@
 
 mod engine;
 mod pace;
-#[cfg(not(target_arch = "wasm32"))]
 pub mod shoot;
 mod slices;
 mod states;

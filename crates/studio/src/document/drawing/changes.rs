@@ -48,6 +48,19 @@ impl Drawing {
         self.write(shape, &sheets)
     }
 
+    /// The strokes of the SVG file `path` in stead of the sheets of the first shape.
+    pub fn trace(&self, path: Value) -> Vec<Operation> {
+        let mut sheet = Table::default();
+        sheet.push("path", path);
+        let sheets = Value::List(vec![Value::Table(sheet).into()]);
+        if self.is_stated() {
+            return vec![Operation::Set { place: self.shape(0).key("sheets"), value: sheets }];
+        }
+        let mut shape = Table::default();
+        shape.push("sheets", sheets);
+        vec![Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) }]
+    }
+
     /// Other points for sheet `sheet`, as they are moved and mended.
     pub fn set_points(&self, shape: usize, sheet: usize, points: &[DVec2]) -> Vec<Operation> {
         let mut sheets = self.sheets(shape);
