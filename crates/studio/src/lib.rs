@@ -5,6 +5,8 @@
 //! [`player`] draws frames off the window's thread and keeps the time; [`app`] is the window.
 
 pub mod app;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod bench;
 pub mod document;
 pub mod examples;
 pub mod player;

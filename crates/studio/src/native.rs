@@ -10,10 +10,14 @@ use std::{
 use bansho::{Assets, media::plates::FileAssets};
 use bansho_studio::{
     app::{Session, Studio},
+    bench,
     document::{Document, files},
     player::ThreadPlayer,
 };
 use eframe::egui;
+
+const USAGE: &str =
+    "usage: bansho-studio [SCENE]\n       bansho-studio --bench    pictures a second of each phenomenon here";
 
 /// What a studio without a scene begins with.
 const BEGINNING: &str = "bansho = 1\n\n[[flame_sheet]]\nname = \"fire\"\n";
@@ -21,13 +25,35 @@ const BEGINNING: &str = "bansho = 1\n\n[[flame_sheet]]\nname = \"fire\"\n";
 pub(super) fn main() -> ExitCode {
     let mut arguments = std::env::args_os().skip(1);
     let scene = arguments.next().map(PathBuf::from);
-    if arguments.next().is_some() || scene.as_ref().is_some_and(|scene| scene.as_os_str() == "--help") {
-        return fail("usage: bansho-studio [SCENE]");
+    match scene.as_deref().and_then(Path::to_str) {
+        _ if arguments.next().is_some() => return fail(USAGE),
+        Some("--help") => return say(USAGE),
+        Some("--bench") => return bench(),
+        _ => {}
     }
     match run(scene) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&format!("error: {error}")),
     }
+}
+
+/// How fast the studio follows hands here.
+fn bench() -> ExitCode {
+    let speeds = match bench::measure() {
+        Ok(speeds) => speeds,
+        Err(error) => return fail(&format!("error: {error}")),
+    };
+    let line = |speed: bench::Speed| {
+        let bench::Speed { name, pictures_per_s, answer_s } = speed;
+        format!("{name:24} {pictures_per_s:6.1} pictures/s, a change shows after {:4.0} ms", 1000.0 * answer_s)
+    };
+    say(&speeds.into_iter().map(line).collect::<Vec<_>>().join("\n"))
+}
+
+fn say(message: &str) -> ExitCode {
+    // Nobody is left to be told that this failed.
+    let _ = writeln!(std::io::stdout(), "{message}");
+    ExitCode::SUCCESS
 }
 
 fn fail(message: &str) -> ExitCode {

@@ -9,22 +9,29 @@ use eframe::egui::{self, Ui};
 pub(super) struct Chooser {
     folder: PathBuf,
     name: String,
-    /// What the folder holds: folders first, then scenes.
+    /// What names of files end in.
+    endings: &'static [&'static str],
+    /// What the folder holds: folders first, then files.
     entries: Vec<Entry>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Entry {
     Folder(String),
-    Scene(String),
+    File(String),
 }
+
+const SCENES: &[&str] = &[".toml"];
+
+/// What scenes name.
+const PICTURES: &[&str] = &[".png", ".jpg", ".jpeg", ".exr", ".svg", ".glb", ".gltf"];
 
 impl Chooser {
     /// Begins in the folder of `path`, or where the program was started.
     pub(super) fn beside(path: Option<&Path>) -> Self {
         let folder = path.and_then(Path::parent).unwrap_or(Path::new("."));
         let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
-        let mut chooser = Self { folder, name: String::new(), entries: Vec::new() };
+        let mut chooser = Self { folder, name: String::new(), endings: SCENES, entries: Vec::new() };
         chooser.read();
         chooser
     }
@@ -33,6 +40,14 @@ impl Chooser {
     #[must_use]
     pub(super) fn naming(self, name: String) -> Self {
         Self { name, ..self }
+    }
+
+    /// The same for what scenes name.
+    #[must_use]
+    pub(super) fn of_pictures(self) -> Self {
+        let mut chooser = Self { endings: PICTURES, ..self };
+        chooser.read();
+        chooser
     }
 
     /// What is chosen; a whole path may be typed as the name.
@@ -48,7 +63,8 @@ impl Chooser {
             if found.path().is_dir() {
                 return Some(Entry::Folder(name));
             }
-            name.ends_with(".toml").then_some(Entry::Scene(name))
+            let ending = name.to_ascii_lowercase();
+            self.endings.iter().any(|own| ending.ends_with(own)).then_some(Entry::File(name))
         };
         self.entries = found.filter_map(entry).collect();
         self.entries.sort();
@@ -59,7 +75,7 @@ impl Chooser {
         self.read();
     }
 
-    /// Shows it under `title`; whether a scene was chosen for good, by a double-click.
+    /// Shows it under `title`; whether a file was chosen for good, by a double-click.
     pub(super) fn show(&mut self, ui: &mut Ui, title: &str) -> bool {
         ui.set_width(460.0);
         ui.heading(title);
@@ -87,7 +103,7 @@ impl Chooser {
                         entered = Some(self.folder.join(name));
                     }
                 }
-                Entry::Scene(name) => {
+                Entry::File(name) => {
                     let response = ui.selectable_label(self.name == *name, name);
                     if response.clicked() {
                         self.name.clone_from(name);
@@ -108,15 +124,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn folders_come_first_and_only_scenes_are_listed() {
+    fn folders_come_first_and_only_files_of_the_kind_are_listed() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("zoo")).unwrap();
         for name in ["b.toml", "a.toml", "picture.png", ".hidden.toml"] {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
         let mut chooser = Chooser::beside(Some(&folder.path().join("b.toml")));
-        let listed = [Entry::Folder("zoo".into()), Entry::Scene("a.toml".into()), Entry::Scene("b.toml".into())];
+        let listed = [Entry::Folder("zoo".into()), Entry::File("a.toml".into()), Entry::File("b.toml".into())];
         assert_eq!(chooser.entries, listed);
+        let pictures = chooser.clone().of_pictures();
+        assert_eq!(pictures.entries, [Entry::Folder("zoo".into()), Entry::File("picture.png".into())]);
         chooser.go_to(folder.path().join("zoo"));
         assert!(chooser.entries.is_empty());
         assert_eq!(chooser.naming("c.toml".into()).path(), folder.path().join("zoo/c.toml"));

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 #[cfg(target_arch = "wasm32")]
 use super::browser;
 
+use bansho::render::scene::Place;
 use eframe::egui::{self, Ui};
 
 use super::{
@@ -12,6 +13,8 @@ use super::{
     question::{Answer, Leaving, Question, answer},
     session::Session,
 };
+#[cfg(not(target_arch = "wasm32"))]
+use crate::document::watch::Watch;
 use crate::{
     document::{
         Document,
@@ -31,7 +34,8 @@ pub(super) struct Files {
     autosave: Option<Autosave>,
     pub(super) recovered: Vec<Recovered>,
     last_kept: f64,
-    focused: bool,
+    #[cfg(not(target_arch = "wasm32"))]
+    watch: Option<Watch>,
     closing: bool,
     pub(super) shooting: Option<Shooting>,
     /// Files that came by way of the browser.
@@ -50,7 +54,8 @@ impl Files {
             autosave: unsaved.and_then(|folder| Autosave::begin(&folder, "studio").ok()),
             recent: home.map(|home| Recent::read(home.join("recent"))).unwrap_or_default(),
             last_kept: 0.0,
-            focused: true,
+            #[cfg(not(target_arch = "wasm32"))]
+            watch: None,
             closing: false,
             shooting: None,
             #[cfg(target_arch = "wasm32")]
@@ -76,6 +81,18 @@ impl Files {
         if browser::ask_for_file(&self.inbox, ctx).is_err() {
             session.set_notice(Some("the browser cannot ask for files here".into()));
         }
+    }
+
+    /// Asks which file `place` shall name.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(super) fn ask_to_relink(&mut self, _ctx: &egui::Context, session: &mut Session, place: Place) {
+        self.question = Some(Question::Relink(place, Chooser::beside(session.path.as_deref()).of_pictures()));
+    }
+
+    /// Asks for a file, which then stands for the one that the scene names.
+    #[cfg(target_arch = "wasm32")]
+    pub(super) fn ask_to_relink(&mut self, ctx: &egui::Context, session: &mut Session, _place: Place) {
+        self.ask_to_open(ctx, session);
     }
 
     /// Hands the scene to the browser, which saves it where it saves what it is given.
@@ -200,12 +217,22 @@ impl Files {
         }
     }
 
-    /// Looks whether another program wrote the file, whenever the window is looked at again.
+    /// A page's files are nobody else's.
+    #[cfg(target_arch = "wasm32")]
+    fn watch_outside(&mut self, _ui: &Ui, _session: &mut Session) {}
+
+    /// Takes in what another program wrote into the file.
+    #[cfg(not(target_arch = "wasm32"))]
     fn watch_outside(&mut self, ui: &Ui, session: &mut Session) {
-        let focused = ui.input(|input| input.focused);
-        let back = focused && !self.focused;
-        self.focused = focused;
-        let Some(path) = session.path.clone().filter(|_| back) else { return };
+        let Some(path) = session.path.clone() else { return };
+        if self.watch.as_ref().is_none_or(|watch| watch.path() != path) {
+            let ctx = ui.ctx().clone();
+            // Without a thread to look, the file is not watched.
+            self.watch = Watch::start(&path, move || ctx.request_repaint()).ok();
+        }
+        if !self.watch.as_ref().is_some_and(Watch::touched) {
+            return;
+        }
         let Some(text) = files::changed_outside(&session.document, &path) else { return };
         if session.document.is_dirty() {
             self.question = Some(Question::ChangedOutside(text.to_string()));
@@ -284,6 +311,7 @@ impl Files {
         match (question, answer) {
             (_, Answer::Cancel) => {}
             (Question::Open(chooser), _) => self.open(session, chooser.path()),
+            (Question::Relink(place, chooser), _) => session.relink(&place, &chooser.path()),
             (Question::SaveAs(chooser), _) => self.save_to(session, chooser.path()),
             (Question::ChangedOutside(text), Answer::Do) => take_outside(session, &text),
             (Question::ChangedOutside(_), Answer::Save) => self.save(session),

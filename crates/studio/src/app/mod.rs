@@ -11,6 +11,7 @@ mod hands;
 mod icon;
 mod inspector;
 mod keyed;
+mod layout;
 mod menu;
 mod problems;
 mod question;
@@ -21,6 +22,7 @@ mod status;
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests;
 mod text_panel;
+mod things;
 mod timeline;
 mod value;
 mod viewport;
@@ -30,7 +32,10 @@ use std::time::Duration;
 use eframe::egui;
 
 pub use self::session::{AssetsOf, Session};
-use self::{aurora::AuroraEditor, files::Files, scene_panel::Subject, text_panel::TextPanel, viewport::Viewport};
+use self::{
+    aurora::AuroraEditor, files::Files, layout::Layout, problems::Wanted, scene_panel::Subject, text_panel::TextPanel,
+    viewport::Viewport,
+};
 
 /// The kind of phenomenon whose shapes are drawn.
 const KIND_WITH_SHAPES: &str = "aurora";
@@ -44,6 +49,9 @@ pub struct Studio {
     text: TextPanel,
     files: Files,
     shows: Shows,
+    layout: Layout,
+    /// Which of the documents that were opened is shown.
+    opened: u64,
 }
 
 /// Which parts of the window are open.
@@ -57,6 +65,7 @@ impl Studio {
     /// A window on `session`. `home` is where the studio keeps recent files and unsaved work; without it, nothing is kept.
     pub fn new(session: Session, home: Option<std::path::PathBuf>) -> Self {
         let subject = Subject::first_of(&session.document);
+        let layout = Layout::read(home.as_deref());
         Self {
             session,
             subject,
@@ -64,7 +73,9 @@ impl Studio {
             aurora: AuroraEditor::default(),
             text: TextPanel::default(),
             files: Files::new(home),
-            shows: Shows::default(),
+            shows: Shows { text: layout.get("text shown", 0.0) > 0.0, shortcuts: false },
+            layout,
+            opened: 0,
         }
     }
 
@@ -75,40 +86,59 @@ impl Studio {
 
     /// Shows everything and takes in what hands do.
     pub fn show(&mut self, ui: &mut egui::Ui) {
+        if ui.ctx().cumulative_pass_nr() == 0 {
+            self.layout.apply_theme(ui.ctx());
+        }
         self.take_shortcuts(ui.ctx());
         self.files.tend(ui, &mut self.session);
         egui::Panel::top("menu").show(ui, |ui| self.menu(ui));
         egui::Panel::bottom("status").show(ui, |ui| status::show(ui, &mut self.session, &self.files));
         egui::Panel::bottom("timeline").show(ui, |ui| timeline::show(ui, &mut self.session));
+        self.follow_opening();
         self.side_panels(ui);
         if let (KIND_WITH_SHAPES, Some(index)) = (self.subject.key, self.subject.index) {
-            egui::Panel::bottom("aurora").resizable(true).default_size(420.0).show(ui, |ui| {
-                self.aurora.show(ui, &mut self.session, index);
-            });
+            let panel = egui::Panel::bottom("aurora").resizable(true);
+            let Self { aurora, session, layout, .. } = self;
+            layout.panel("aurora", panel, 420.0, ui, |ui| aurora.show(ui, session, index));
         }
         egui::CentralPanel::default().show(ui, |ui| self.viewport.show(ui, &mut self.session));
         if self.shows.shortcuts {
             shortcuts::window(ui.ctx(), &mut self.shows.shortcuts);
         }
         self.end_gestures(ui);
+        self.layout.note_theme(ui.ctx());
+        self.layout.note("text shown", f32::from(u8::from(self.shows.text)));
         self.update(ui);
     }
 
+    /// Begins with what a hand would reach for first in a scene that was just opened.
+    fn follow_opening(&mut self) {
+        let gone = self.subject.index.is_some() && self.subject.place().find(self.session.document.values()).is_none();
+        if self.opened != self.session.opened || gone {
+            self.opened = self.session.opened;
+            self.subject = Subject::first_of(&self.session.document);
+            self.aurora = AuroraEditor::default();
+        }
+    }
+
     fn side_panels(&mut self, ui: &mut egui::Ui) {
-        if let Some(jump) = problems::show(ui, &self.session) {
-            self.shows.text = true;
-            self.text.jump_to(jump);
+        match problems::show(ui, &self.session) {
+            Some(Wanted::Sight(span)) => {
+                self.shows.text = true;
+                self.text.jump_to(span);
+            }
+            Some(Wanted::File(place)) => self.files.ask_to_relink(ui.ctx(), &mut self.session, place),
+            None => {}
         }
-        egui::Panel::left("scene").default_size(200.0).show(ui, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| scene_panel::show(ui, &mut self.session, &mut self.subject));
+        let Self { session, subject, text, layout, shows, .. } = self;
+        layout.panel("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
+            egui::ScrollArea::vertical().show(ui, |ui| scene_panel::show(ui, session, subject));
         });
-        if self.shows.text {
-            egui::Panel::right("text").default_size(380.0).show(ui, |ui| self.text.show(ui, &mut self.session));
+        if shows.text {
+            layout.panel("text", egui::Panel::right("text"), 380.0, ui, |ui| text.show(ui, session));
         }
-        egui::Panel::right("inspector").default_size(330.0).show(ui, |ui| {
-            egui::ScrollArea::vertical()
-                .auto_shrink(false)
-                .show(ui, |ui| inspector::show(ui, &mut self.session, &self.subject));
+        layout.panel("inspector", egui::Panel::right("inspector"), 330.0, ui, |ui| {
+            egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| inspector::show(ui, session, subject));
         });
     }
 
@@ -136,6 +166,8 @@ impl eframe::App for Studio {
 
     fn on_exit(&mut self) {
         self.files.end();
+        // A layout that cannot be kept is the usual one at the next start.
+        let _ = self.layout.keep();
     }
 
     #[cfg(target_arch = "wasm32")]

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use bansho::render::scene::Place;
 use eframe::egui::Ui;
 
 use super::chooser::Chooser;
@@ -11,6 +12,8 @@ use super::chooser::Chooser;
 pub(super) enum Question {
     /// Which file to open.
     Open(Chooser),
+    /// Which file this place shall name.
+    Relink(Place, Chooser),
     /// Which file to save to.
     SaveAs(Chooser),
     /// Whether unsaved work may be left, to open this or to close.
@@ -44,6 +47,12 @@ pub(super) fn answer(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
                 return Some(Answer::Do);
             }
             &[("Open", Answer::Do), ("Cancel", Answer::Cancel)]
+        }
+        Question::Relink(_, chooser) => {
+            if chooser.show(ui, "Which file in its stead?") {
+                return Some(Answer::Do);
+            }
+            &[("Relink", Answer::Do), ("Cancel", Answer::Cancel)]
         }
         Question::SaveAs(chooser) => {
             chooser.show(ui, "Save as");

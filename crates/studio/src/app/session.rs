@@ -34,6 +34,10 @@ pub struct Session {
     pub transport: Transport,
     /// Whether hands in the viewport leave keyframes.
     pub recording: bool,
+    /// Counts documents that were opened here.
+    pub opened: u64,
+    /// Whether pictures may be simulated with fewer particles than the scene has.
+    pub draft: bool,
     player: Box<dyn Player>,
     assets_of: AssetsOf,
     bundle: Bundle,
@@ -54,6 +58,7 @@ struct Asked {
     revision: Revision,
     number: Option<i64>,
     within: [usize; 2],
+    draft: bool,
 }
 
 /// Pictures a second, as they come while time passes.
@@ -85,6 +90,8 @@ impl Session {
             path,
             transport: Transport::default(),
             recording: false,
+            opened: 0,
+            draft: true,
             player,
             assets_of,
             pace: Pace::default(),
@@ -103,6 +110,7 @@ impl Session {
         (self.document, self.path) = (document, path);
         (self.picture, self.asked, self.broken, self.notice) = (None, None, None, None);
         self.transport = Transport::default();
+        self.opened += 1;
     }
 
     /// Reads all assets anew, as after one was replaced.
@@ -224,6 +232,7 @@ impl Session {
             revision: self.document.revision(),
             number,
             within: viewport.map(|side| ((side as f64 * share).round() as usize).max(1)),
+            draft: self.draft,
         };
         // In a hurry a frame is drawn once, whatever size would have been better.
         let same = |last: Asked| last == Asked { within: if hurry { last.within } else { asked.within }, ..asked };
@@ -250,6 +259,7 @@ impl Session {
             number: asked.number,
             within: asked.within,
             exact,
+            draft: asked.draft,
         });
     }
 
@@ -322,10 +332,24 @@ fn folder(path: Option<&Path>) -> &Path {
 }
 
 impl Session {
+    /// Lets `place` name the file `file`.
+    pub fn relink(&mut self, place: &Place, file: &Path) {
+        let value = self.named(file);
+        self.edit("relink", &[Operation::Set { place: place.clone(), value }]);
+        self.reload_assets();
+    }
+
+    /// `file` as the scene names it: relative to its folder where it lies there.
+    fn named(&self, file: &Path) -> Value {
+        let folder = folder(self.path.as_deref());
+        let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
+        let relative = file.strip_prefix(folder).or_else(|_| file.strip_prefix(whole)).unwrap_or(file);
+        Value::Text(relative.to_string_lossy().replace('\\', "/"))
+    }
+
     /// Takes a file that was dropped on the window: a drawing becomes the aurora's first shape, a picture the plate.
     pub fn lay_over(&mut self, file: &Path) {
-        let relative = file.strip_prefix(folder(self.path.as_deref())).unwrap_or(file);
-        let value = Value::Text(relative.to_string_lossy().replace('\\', "/"));
+        let value = self.named(file);
         if file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg")) {
             match Drawing::read(self.document.values(), 0, &self.assets) {
                 Ok(drawing) => self.edit("drawing", &drawing.trace(value)),

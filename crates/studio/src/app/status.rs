@@ -19,6 +19,9 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &Files) {
             let preview = if picture.size == picture.scene_size { "" } else { "preview " };
             ui.label(format!("{preview}{width} × {height} of {whole_width} × {whole_height}"));
             ui.weak(format!("{:.0} ms", 1000.0 * (picture.draw_s + picture.advance_s)));
+            if picture.draft {
+                ui.weak("draft").on_hover_text("Simulated with fewer particles than the scene has; see Draft above");
+            }
             if !picture.exact && ui.link("live state").on_hover_text(LIVE).clicked() {
                 session.draw_exactly();
             }

@@ -17,6 +17,7 @@ use super::{
     gesture::Blowing,
     hands::{self, Stand, rounded},
     session::Session,
+    things::{Thing, things},
 };
 
 /// What a drag with the first button does.
@@ -27,8 +28,8 @@ pub(super) enum Tool {
     Camera,
     /// Blows: the drag is the wind.
     Wind,
-    /// Moves lamps.
-    Lamps,
+    /// Moves what stands somewhere.
+    Place,
 }
 
 /// The picture on the screen.
@@ -38,7 +39,7 @@ pub(super) struct Viewport {
     pixels: [usize; 2],
     pub(super) tool: Tool,
     blowing: Option<Blowing>,
-    lamp: Option<usize>,
+    held: Option<Place>,
 }
 
 impl Viewport {
@@ -67,7 +68,7 @@ impl Viewport {
             painter.image(texture.id(), frame, whole, Color32::WHITE);
         }
         self.hands(ui, session, &response, frame);
-        self.paint_lamps(session, &painter, frame);
+        self.paint_things(session, &painter, frame);
     }
 
     fn tools(&mut self, ui: &mut Ui, session: &mut Session) {
@@ -75,9 +76,11 @@ impl Viewport {
             ui.selectable_value(&mut self.tool, Tool::Camera, "Camera")
                 .on_hover_text("Drag to orbit, with Shift or the middle button to pan, scroll to dolly");
             ui.selectable_value(&mut self.tool, Tool::Wind, "Blow").on_hover_text("Drag to blow: the drag is the wind");
-            ui.selectable_value(&mut self.tool, Tool::Lamps, "Lamps").on_hover_text("Drag lamps");
+            ui.selectable_value(&mut self.tool, Tool::Place, "Place").on_hover_text("Drag lamps, flames and burners");
             ui.toggle_value(&mut session.recording, "Record")
                 .on_hover_text("Blowing leaves keyframes of the wind, and time passes while it lasts");
+            ui.toggle_value(&mut session.draft, "Draft")
+                .on_hover_text("Simulates with fewer particles, to follow your hands; rendering never does");
             ui.separator();
             exposure(ui, session);
         });
@@ -117,7 +120,7 @@ impl Viewport {
         }
         self.dolly(ui, session, response, stand);
         self.blow(session, response, &camera, heights(response.total_drag_delta().unwrap_or_default()));
-        self.drag_lamp(ui, session, response, &camera, frame);
+        self.drag_thing(ui, session, response, &camera, frame);
     }
 
     fn dolly(&self, ui: &Ui, session: &mut Session, response: &Response, stand: Stand) {
@@ -149,50 +152,43 @@ impl Viewport {
         }
     }
 
-    fn drag_lamp(&mut self, ui: &Ui, session: &mut Session, response: &Response, camera: &Camera, frame: Rect) {
-        /// Lamps nearer to the pointer than this are meant, points of the screen.
+    fn drag_thing(&mut self, ui: &Ui, session: &mut Session, response: &Response, camera: &Camera, frame: Rect) {
+        /// Things nearer to the pointer than this are meant, points of the screen.
         const REACH: f32 = 14.0;
-        let lamps = if self.tool == Tool::Lamps { lamps(session) } else { Vec::new() };
-        let on_screen = |point: DVec3| camera.project(point).map(|seen| to_screen(seen.pixel, camera, frame));
+        if self.tool != Tool::Place {
+            return;
+        }
+        let things = things(session);
+        let on_screen = |thing: &Thing| Some(to_screen(camera.project(thing.point)?.pixel, camera, frame));
         if response.drag_started_by(PointerButton::Primary) {
             let from = ui.input(|input| input.pointer.press_origin());
-            let near = |point: DVec3| Some(on_screen(point)?.distance(from?)).filter(|distance| *distance < REACH);
-            let candidates = lamps.iter().filter_map(|(index, point)| Some((*index, near(*point)?)));
-            self.lamp = candidates.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index);
+            let near = |thing: &&Thing| Some((on_screen(thing)?.distance(from?), thing.place.clone()));
+            let nearest = things.iter().filter_map(|thing| near(&thing)).min_by(|a, b| a.0.total_cmp(&b.0));
+            self.held = nearest.filter(|(distance, _)| *distance < REACH).map(|(_, place)| place);
         }
         if !response.dragged_by(PointerButton::Primary) {
-            self.lamp = None;
+            self.held = None;
         }
-        let held = lamps.iter().find(|(index, _)| Some(*index) == self.lamp);
-        if let (Some((index, point)), Some(at)) = (held, response.interact_pointer_pos())
-            && let Some(moved) = hands::dragged(*point, to_picture(at, camera, frame), camera)
+        let held = things.iter().find(|thing| Some(&thing.place) == self.held.as_ref());
+        if let (Some(thing), Some(at)) = (held, response.interact_pointer_pos())
+            && let Some(moved) = hands::dragged(thing.point, to_picture(at, camera, frame), camera)
         {
-            let place = Place::root().key("light").index(*index).key("position");
-            session.set("lamp", &place, Value::numbers(rounded(moved)));
+            session.set("place", &thing.place, Value::numbers(rounded(moved - thing.origin)));
         }
     }
 
-    fn paint_lamps(&self, session: &Session, painter: &egui::Painter, frame: Rect) {
-        let Some(plan) = session.plan().filter(|_| self.tool == Tool::Lamps) else { return };
+    fn paint_things(&self, session: &Session, painter: &egui::Painter, frame: Rect) {
+        let Some(plan) = session.plan().filter(|_| self.tool == Tool::Place) else { return };
         let camera = plan.scene.camera.at(session.transport.time_s(), plan.size);
-        for (index, point) in lamps(session) {
-            let Some(seen) = camera.project(point) else { continue };
+        for thing in things(session) {
+            let Some(seen) = camera.project(thing.point) else { continue };
             let at = to_screen(seen.pixel, &camera, frame);
-            let width = if Some(index) == self.lamp { 3.0 } else { 1.5 };
+            let width = if Some(&thing.place) == self.held.as_ref() { 3.0 } else { 1.5 };
             painter.circle_stroke(at, 8.0, Stroke::new(width, Color32::from_rgb(255, 210, 90)));
             let font = egui::FontId::proportional(12.0);
-            painter.text(at + vec2(11.0, 0.0), egui::Align2::LEFT_CENTER, index + 1, font, Color32::from_gray(220));
+            painter.text(at + vec2(11.0, 0.0), egui::Align2::LEFT_CENTER, thing.name, font, Color32::from_gray(220));
         }
     }
-}
-
-/// The lamps of the scene that stand somewhere, with their places now.
-fn lamps(session: &Session) -> Vec<(usize, DVec3)> {
-    let Some(plan) = session.plan() else { return Vec::new() };
-    let time = session.transport.time_s();
-    let lights = plan.scene.lights.iter().enumerate();
-    let standing = lights.filter(|(_, light)| light.stands());
-    standing.map(|(index, light)| (index, DVec3::from(light.position.at(time)))).collect()
 }
 
 fn move_camera(session: &mut Session, stand: Stand) {

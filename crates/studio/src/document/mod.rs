@@ -8,6 +8,8 @@ mod phenomena;
 pub mod recovery;
 #[cfg(test)]
 mod tests;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod watch;
 
 use std::sync::Arc;
 
@@ -22,7 +24,7 @@ use bansho::{
     },
 };
 
-pub use check::check;
+pub use check::{check, check_draft};
 pub use phenomena::{Listed, operations};
 
 use history::History;

@@ -10,14 +10,15 @@ use bansho::{
 use web_time::Instant;
 
 use super::{Event, Picture, Wish, states::States};
-use crate::document::{Revision, check};
+use crate::document::{Revision, check, check_draft};
 
 /// What is kept from one wish to the next.
 #[derive(Default)]
 pub(super) struct Engine {
-    judged: Option<Revision>,
-    /// The last good plan, at the scene's own size.
-    plan: Option<Arc<Plan>>,
+    /// Which state was judged, and whether as a draft if it could be one.
+    judged: Option<(Revision, bool)>,
+    /// The last good plan, at the scene's own size, and whether it is a draft.
+    plan: Option<(Arc<Plan>, bool)>,
     shot: Option<Opened>,
     states: States,
 }
@@ -40,17 +41,21 @@ impl Engine {
         observer: &dyn Observer,
         emit: &mut dyn FnMut(Event),
     ) -> Result<(), RenderError> {
-        if self.judged != Some(wish.revision) {
-            let outcome = check(&wish.name, &wish.text, &wish.assets);
-            self.judged = Some(wish.revision);
+        let draft = wish.draft && !wish.exact;
+        if self.judged != Some((wish.revision, draft)) {
+            let Wish { name, text, assets, .. } = wish;
+            let drafted = if draft { check_draft(name, text, assets) } else { None };
+            let is_draft = drafted.is_some();
+            let outcome = drafted.unwrap_or_else(|| check(name, text, assets));
+            self.judged = Some((wish.revision, draft));
             if let Ok(plan) = &outcome {
-                self.plan = Some(plan.clone());
+                self.plan = Some((plan.clone(), is_draft));
             }
             emit(Event::Judged { revision: wish.revision, outcome });
         }
-        let Some(plan) = self.plan.clone() else { return Ok(()) };
+        let Some((plan, draft)) = self.plan.clone() else { return Ok(()) };
         let picture = self.draw(&plan, wish, observer)?;
-        emit(Event::Drawn(picture));
+        emit(Event::Drawn(Picture { draft, ..picture }));
         Ok(())
     }
 
@@ -80,6 +85,7 @@ impl Engine {
             scene_size: plan.size,
             pixels,
             exact,
+            draft: false,
             draw_s: advanced.elapsed().as_secs_f64(),
             advance_s: advanced.duration_since(began).as_secs_f64(),
         })

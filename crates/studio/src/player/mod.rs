@@ -24,7 +24,7 @@ use crate::document::Revision;
 pub use pace::Pace;
 pub use slices::SlicePlayer;
 #[cfg(not(target_arch = "wasm32"))]
-pub use thread::ThreadPlayer;
+pub use thread::{StartError, ThreadPlayer};
 pub use transport::Transport;
 
 /// What a window wants to see.
@@ -44,6 +44,8 @@ pub struct Wish {
     pub within: [usize; 2],
     /// Whether the state must be the one that the scene leads to from its beginning.
     pub exact: bool,
+    /// Whether it may be simulated with fewer particles.
+    pub draft: bool,
 }
 
 /// A picture that was drawn.
@@ -61,6 +63,8 @@ pub struct Picture {
     pub pixels: Vec<[u8; 4]>,
     /// Whether the state is the one that the scene leads to from its beginning.
     pub exact: bool,
+    /// Whether it was simulated with fewer particles than the scene has.
+    pub draft: bool,
     /// How long drawing took, without the simulation, s.
     pub draw_s: f64,
     /// How long the simulation took, s.

@@ -30,6 +30,7 @@ fn wish(text: &str, number: i64) -> Wish {
         number: Some(number),
         within: [10_000; 2],
         exact: false,
+        draft: false,
     }
 }
 

@@ -4,7 +4,7 @@ mod aurora;
 
 use std::{path::Path, sync::Arc, time::Instant};
 
-use bansho::{Assets, MemoryAssets};
+use bansho::{Assets, media::plates::FileAssets};
 use eframe::egui::{self, Key, Modifiers, Role, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
@@ -24,8 +24,8 @@ height = 0.9
 position = [0.0, 1.0, 0.0]
 ";
 
-fn assets(_: &Path) -> Arc<dyn Assets> {
-    Arc::new(MemoryAssets::default())
+fn assets(folder: &Path) -> Arc<dyn Assets> {
+    Arc::new(FileAssets::new(folder))
 }
 
 fn window(text: &str) -> Harness<'static, Studio> {
@@ -163,7 +163,7 @@ fn blowing_is_wind_while_it_lasts_and_keyframes_when_recorded() {
 #[test]
 fn lamps_are_dragged() {
     let mut harness = window(SCENE);
-    harness.get_by_label("Lamps").click();
+    harness.get_by_label("Place").click();
     harness.run_steps(2);
     // The camera looks at (0, 0.9, 0) from 4 m, so that the lamp stands a little above the middle.
     let viewport = harness.get_by_label("Viewport").rect();
@@ -173,6 +173,42 @@ fn lamps_are_dragged() {
     let edited = text(&mut harness);
     let line = edited.lines().find(|line| line.starts_with("position")).unwrap();
     assert_ne!(line, "position = [0.0, 1.0, 0.0]", "{edited}");
+}
+
+#[test]
+fn a_plate_that_vanished_is_told_and_linked_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let plate = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/plates/checkerboard.png");
+    std::fs::copy(plate, folder.path().join("board.png")).unwrap();
+    let mut harness = window(&format!("{SCENE}[plate]\nimage = \"gone.png\" # the ground\n"));
+    harness.get_by_label_contains("gone.png: no such file");
+    harness.state_mut().session().path = Some(folder.path().join("scene.toml"));
+    harness.get_by_label("Relink").click();
+    harness.run_steps(3);
+    harness.get_by_label("board.png").click();
+    harness.run_steps(3);
+    harness.get_all_by_label("Relink").last().expect("the answer").click();
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("image = \"board.png\" # the ground"));
+}
+
+#[test]
+fn burners_are_dragged() {
+    let scene = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 2\n\
+        [[flame_particles]]\nparticles = 50\nposition = [0.0, 0.5, 0.0]\n[[flame_particles.burners]]\nposition = [0.5, 0.0, 0.0] # aside\n";
+    let mut harness = window(scene);
+    harness.get_by_label("Place").click();
+    harness.run_steps(2);
+    let plan = harness.state_mut().session().plan().cloned().unwrap();
+    let camera = plan.scene.camera.at(0.0, plan.size);
+    let seen = camera.project(bansho::base::math::DVec3::new(0.5, 0.5, 0.0)).unwrap().pixel;
+    let viewport = harness.get_by_label("Viewport").rect();
+    let scale = (viewport.width() / 64.0).min(viewport.height() / 36.0);
+    let burner = viewport.center() + vec2(seen.x as f32 - 32.0, seen.y as f32 - 18.0) * scale;
+    drag(&mut harness, burner, vec2(60.0, 0.0));
+    let edited = text(&mut harness);
+    assert!(edited.contains("# aside") && !edited.contains("[0.5, 0.0, 0.0]"), "{edited}");
+    assert!(edited.contains("position = [0.0, 0.5, 0.0]"), "the flame itself stays: {edited}");
 }
 
 #[test]
