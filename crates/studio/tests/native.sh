@@ -30,13 +30,10 @@ particles = { count = 800 } # few, to be quick
 field = { cells = 63 }
 SCENE
 
-cd "$folder"
-"$studio" sky.toml >"$folder/studio.log" 2>&1 &
-window=$!
-
 fail() {
   echo "FAILED: $1" >&2
-  cat "$folder/studio.log" "$folder/sky.toml" >&2
+  [ ! -e "$folder/studio.log" ] || cat "$folder/studio.log" >&2
+  cat "$folder/sky.toml" >&2
   import -window root "$folder/failed.png" 2>/dev/null && echo "see $folder/failed.png" >&2
   exit 1
 }
@@ -51,18 +48,21 @@ within() {
   done
 }
 
-click() { xdotool mousemove "$1" "$2" sleep 0.4 mousedown 1 sleep 0.2 mouseup 1 sleep 0.6; }
+# What the window takes for a picture at most, s: hands that are faster click where nothing is yet.
+pace="${STUDIO_PACE:-0.5}"
+
+click() { xdotool mousemove "$1" "$2" sleep "$pace" mousedown 1 sleep "$pace" mouseup 1 sleep "$pace"; }
 
 # stroke X Y X Y...: by small steps, as a hand goes.
 stroke() {
-  xdotool mousemove "$1" "$2" sleep 0.4 mousedown 1 sleep 0.2
+  xdotool mousemove "$1" "$2" sleep "$pace" mousedown 1 sleep "$pace"
   while [ "$#" -ge 4 ]; do
     for step in 1 2 3 4 5 6 7 8; do
       xdotool mousemove "$(($1 + ($3 - $1) * step / 8))" "$(($2 + ($4 - $2) * step / 8))" sleep 0.05
     done
     shift 2
   done
-  xdotool sleep 0.2 mouseup 1 sleep 0.8
+  xdotool sleep "$pace" mouseup 1 sleep "$pace"
 }
 
 # saved PATTERN: saves, and looks for the pattern in the file.
@@ -70,17 +70,22 @@ saved() { xdotool key ctrl+s sleep 1 && grep -q "$1" sky.toml; }
 
 shapes_are_two() { xdotool key ctrl+s sleep 1 && [ "$(grep -c 'aurora.shapes' sky.toml)" = 2 ]; }
 
-within 60 "no window" xdotool search --name "Bansho Studio"
-xdotool search --name "Bansho Studio" windowfocus 2>/dev/null || true
+within 30 "no X server" xdotool getdisplaygeometry
+cd "$folder"
+"$studio" sky.toml >"$folder/studio.log" 2>&1 &
+window=$!
+within 120 "no window" xdotool search --onlyvisible --name "Bansho Studio"
 sleep "${STUDIO_WAIT:-8}"
+# No window manager gives the window the keys.
+within 20 "no focus" xdotool search --onlyvisible --name "Bansho Studio" windowfocus
 
-stroke 640 600 760 570 890 600
-stroke 640 690 760 660 890 690
+stroke 640 490 760 460 890 490
+stroke 640 580 760 550 890 580
 within 30 "two strokes are not in the file" saved 'points = .*points = '
-click 246 406 # Add shape
+click 246 402 # Add shape
 within 30 "no second shape" shapes_are_two
-click 464 384 # Split
-click 389 571 # the middle of the first sheet, on the left
+click 464 378 # Split
+click 388 464 # the middle of the first sheet, on the left
 within 30 "no split" saved 'split = \[{ sheet = 1'
 
 xdotool key F12

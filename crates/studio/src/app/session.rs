@@ -50,6 +50,8 @@ pub struct Session {
     broken: Option<Revision>,
     notice: Option<String>,
     rate: Rate,
+    /// A time that is gone to once the scene is checked, s.
+    seek: Option<f64>,
 }
 
 /// What was wished for last.
@@ -101,6 +103,7 @@ impl Session {
             broken: None,
             notice: None,
             rate: Rate::default(),
+            seek: None,
         }
     }
 
@@ -179,6 +182,17 @@ impl Session {
         self.document.reshape(label, operations, index, &self.assets)?;
         self.notice = None;
         Ok(())
+    }
+
+    /// Goes to the frame at `time`, s; once the scene is checked, also where that makes the shot longer.
+    pub fn go_to_time(&mut self, time: f64) {
+        self.seek = (!self.document.is_checked()).then_some(time);
+        self.seek_now(time);
+    }
+
+    fn seek_now(&mut self, time: f64) {
+        let first = *self.transport.frames().start();
+        self.transport.go_to(first + (time / self.transport.frame_s()).round() as i64);
     }
 
     /// Where the scene's pictures and drawings come from.
@@ -302,6 +316,9 @@ impl Session {
                 asked.number = Some(frames.start);
                 self.transport.go_to(frames.start);
             }
+        }
+        if let Some(time) = self.seek.take_if(|_| self.document.is_checked()) {
+            self.seek_now(time);
         }
     }
 

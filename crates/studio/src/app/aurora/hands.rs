@@ -1,7 +1,7 @@
 //! What hands do in the planes.
 
 use bansho::base::math::DVec2;
-use eframe::egui::{PointerButton, Pos2, Response, Ui};
+use eframe::egui::{Event, PointerButton, Pos2, Response, Ui};
 
 use super::{
     AuroraEditor,
@@ -56,9 +56,10 @@ impl AuroraEditor {
             self.refusal = None;
         }
         let hand = Hand { plane, at, response, from: ui.input(|input| input.pointer.press_origin()).unwrap_or(at) };
+        let way = way(ui);
         let lower = ui.input(|input| input.modifiers.shift);
         match (self.tool, side) {
-            (Tool::Draw, Side::Target) => self.draw(session, drawing, &hand),
+            (Tool::Draw, Side::Target) => self.draw(session, drawing, &hand, &way),
             (Tool::Move, Side::Target) => self.move_point(session, drawing, &hand),
             (Tool::Smooth | Tool::Erase, Side::Target) => self.mend(session, drawing, &hand),
             (Tool::Brightness, Side::Target) => self.brush(session, drawing, &hand, Factor::Flux, lower),
@@ -70,7 +71,7 @@ impl AuroraEditor {
         }
     }
 
-    fn draw(&mut self, session: &mut Session, drawing: &Drawing, hand: &Hand) {
+    fn draw(&mut self, session: &mut Session, drawing: &Drawing, hand: &Hand, way: &[Pos2]) {
         /// Points of the screen that a hand moves at least between two points of a stroke.
         const STEP: f32 = 2.0;
         if hand.response.clicked() {
@@ -80,9 +81,10 @@ impl AuroraEditor {
             self.gesture = Gesture::Stroke(vec![hand.plane.to_plane(hand.from)]);
         }
         let Gesture::Stroke(stroke) = &mut self.gesture else { return };
-        let point = hand.point();
-        if stroke.last().is_none_or(|last| last.distance(point) >= hand.plane.km(STEP)) {
-            stroke.push(point);
+        for point in way.iter().map(|&at| hand.plane.to_plane(at)) {
+            if stroke.last().is_none_or(|last| last.distance(point) >= hand.plane.km(STEP)) {
+                stroke.push(point);
+            }
         }
         if !hand.response.drag_stopped() {
             return;
@@ -224,6 +226,22 @@ impl AuroraEditor {
         }
         Some(drawing.lines(self.target - 1))
     }
+}
+
+/// Where the pointer went with its button down since the last picture: a hand may be faster than the window.
+fn way(ui: &Ui) -> Vec<Pos2> {
+    let mut way = Vec::new();
+    ui.input(|input| {
+        for event in &input.events {
+            match event {
+                Event::PointerButton { pressed: true, .. } => way.clear(),
+                Event::PointerButton { pressed: false, .. } => break,
+                Event::PointerMoved(at) => way.push(*at),
+                _ => {}
+            }
+        }
+    });
+    way
 }
 
 /// The pointer on a plane.

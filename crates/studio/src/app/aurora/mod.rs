@@ -43,18 +43,20 @@ impl AuroraEditor {
         if self.index != index {
             *self = Self { index, tool: self.tool, ..Self::default() };
         }
-        let drawing = match self.drawing(session) {
-            Ok(drawing) => drawing,
-            Err(reason) => {
-                ui.colored_label(ui.visuals().warn_fg_color, reason);
-                ui.weak("Mend the text or undo (Ctrl+Z); the shapes come back then.");
-                return;
+        // Each part may change the shapes that the next one shows.
+        for part in [Self::tools, targets::show, Self::planes] {
+            match self.drawing(session) {
+                Ok(drawing) => {
+                    self.target = self.target.min(drawing.arrivals().len() - 1);
+                    part(self, ui, session, &drawing);
+                }
+                Err(reason) => {
+                    ui.colored_label(ui.visuals().warn_fg_color, reason);
+                    ui.weak("Mend the text or undo (Ctrl+Z); the shapes come back then.");
+                    return;
+                }
             }
-        };
-        self.target = self.target.min(drawing.arrivals().len() - 1);
-        self.tools(ui, session, &drawing);
-        targets::show(self, ui, session, &drawing);
-        self.planes(ui, session, &drawing);
+        }
         self.tell_refusal(ui);
     }
 

@@ -14,12 +14,14 @@ pub(super) fn show(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session
     ui.horizontal(|ui| {
         if ui.button("Add shape").on_hover_text("One more shape after the last, to be drawn over it").clicked() {
             add(editor, ui, session, drawing);
+            return;
         }
         let several = drawing.arrivals().len() > 1;
         let remove = ui.add_enabled(several, egui::Button::new("Remove shape"));
         if remove.on_hover_text("Without the shape that is shown on the right").clicked() {
             let removal = drawing.remove_shape(editor.target);
             editor.change(session, "remove shape", &removal, ui.cursor().min);
+            return;
         }
         if editor.target > 0 {
             let label = ui.label("reached after").id;
@@ -61,9 +63,8 @@ pub(super) fn choose(editor: &mut AuroraEditor, session: &mut Session, drawing: 
     (editor.target, editor.next) = (shape, None);
     (editor.gesture, editor.refusal) = (Gesture::None, None);
     let arrival = drawing.arrivals().get(shape).copied().unwrap_or_default();
-    let first = *session.transport.frames().start();
     session.transport.set_playing(false);
-    session.transport.go_to(first + (arrival / session.transport.frame_s()).round() as i64);
+    session.go_to_time(arrival);
 }
 
 fn line(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &Drawing) {
