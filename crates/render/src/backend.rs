@@ -74,6 +74,17 @@ pub trait Shot: Send {
     /// Gives back a frame that nobody needs any more, so that the next is drawn into its memory.
     fn recycle(&mut self, _spent: Frame) {}
 
+    /// Goes on with another plan of the scene, as an editor does while it is played. What is simulated keeps the state
+    /// that it came to under the old plan, where it can; what cannot begins anew.
+    ///
+    /// # Errors
+    /// The plan cannot be carried out; the shot then goes on with its own.
+    fn replan(&mut self, plan: Arc<Plan>) -> Result<(), RenderError>;
+
+    /// Whether the state is the one that the plan leads to from its beginning. After [`replan`](Self::replan) it need not
+    /// be, until the shot begins anew.
+    fn is_exact(&self) -> bool;
+
     /// The particles of everything that has any, at the frame that the shot was advanced to.
     fn particles(&self) -> PointCloud;
 

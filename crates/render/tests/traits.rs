@@ -189,6 +189,30 @@ fn snapshots_restore_to_the_byte_and_refuse_what_is_damaged_or_foreign() {
 }
 
 #[test]
+fn a_new_plan_goes_on_from_the_state_and_says_whether_it_is_the_plans_own() {
+    let text = format!("{CAMERA}{SHAKEN}");
+    let changed = |from: &str, to: &str| support::plan(&text.replace(from, to), &PlanOptions::default());
+    let (own, brighter, shaken_more) = (
+        changed("shake", "shake"),
+        changed("exposure_ev100 = 0", "exposure_ev100 = 3"),
+        changed("shake = 3", "shake = 4"),
+    );
+    let mut shot = open(&own);
+    shot.advance(10, &Unobserved).unwrap();
+
+    shot.replan(brighter.clone()).unwrap();
+    assert!(shot.is_exact(), "exposure does not matter to the state");
+    assert_eq!(draw(shot.as_mut(), 20), draw(open(&brighter).as_mut(), 20));
+
+    shot.replan(shaken_more.clone()).unwrap();
+    assert!(!shot.is_exact());
+    let carried = draw(shot.as_mut(), 21);
+    assert_ne!(carried, draw(open(&shaken_more).as_mut(), 21));
+    assert_eq!(draw(shot.as_mut(), 5), draw(open(&shaken_more).as_mut(), 5), "the past is drawn from the beginning");
+    assert!(shot.is_exact());
+}
+
+#[test]
 fn one_thread_and_many_draw_the_same() {
     let draw_with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -79,6 +79,15 @@ impl Shot for CounterShot {
         std::mem::take(&mut self.drawn).then(|| blank(&self.plan, self.number))
     }
 
+    fn replan(&mut self, plan: Arc<Plan>) -> Result<(), RenderError> {
+        self.plan = plan;
+        Ok(())
+    }
+
+    fn is_exact(&self) -> bool {
+        true
+    }
+
     fn particles(&self) -> PointCloud {
         PointCloud::default()
     }

@@ -55,6 +55,8 @@ pub(crate) enum Command {
     Streaks(StreaksArgs),
     /// Simulate a scene and write its particles, for other programs.
     Simulate(SimulateArgs),
+    /// Open a scene in the studio, a program of its own: shape it with the mouse and see it at once.
+    Studio(StudioArgs),
     /// Print a completion script for a shell.
     Completions(CompletionsArgs),
     /// Print the manual page, or write those of all commands.
@@ -93,6 +95,13 @@ pub(crate) struct CheckArgs {
 pub(crate) struct UpgradeArgs {
     /// The scene file.
     pub(crate) scene: PathBuf,
+}
+
+/// `bansho studio`
+#[derive(Args, Debug)]
+pub(crate) struct StudioArgs {
+    /// The scene file; a new scene without it.
+    pub(crate) scene: Option<PathBuf>,
 }
 
 /// `bansho completions`

@@ -9,6 +9,7 @@ pub(crate) mod render;
 pub(crate) mod schema;
 pub(crate) mod simulate;
 pub(crate) mod streaks;
+pub(crate) mod studio;
 pub(crate) mod upgrade;
 
 use bansho::job::JobError;

@@ -125,3 +125,26 @@ fn nothing_but_the_last_line_is_told_without_a_terminal() {
     let stats = folder.succeed(&["render", "scene.toml", "--progress", "none", "--stats"]).stderr;
     assert!(["load", "draw", "view", "write", "threads"].iter().all(|word| stats.contains(word)), "{stats}");
 }
+
+#[cfg(unix)]
+#[test]
+fn the_studio_is_the_program_beside_this_one_and_where_there_is_none_it_says_how_to_get_it() {
+    use std::{fs, os::unix::fs::PermissionsExt, process::Command};
+    let folder = Folder::new();
+    let program = folder.path("bansho");
+    fs::copy(env!("CARGO_BIN_EXE_bansho"), &program).unwrap();
+    let run = || {
+        let path = folder.path("");
+        Command::new(&program).args(["studio", "fire.toml"]).current_dir(&path).env("PATH", &path).output().unwrap()
+    };
+    let missing = run();
+    let told = String::from_utf8(missing.stderr).unwrap();
+    assert_eq!((missing.status.code(), told.matches("error:").count()), (Some(1), 1), "{told}");
+    assert!(told.contains("cargo install --path crates/studio"), "{told}");
+
+    let studio = folder.path("bansho-studio");
+    fs::write(&studio, "#!/bin/sh\necho \"$@\" > opened\n").unwrap();
+    fs::set_permissions(&studio, fs::Permissions::from_mode(0o755)).unwrap();
+    assert!(run().status.success());
+    assert_eq!(folder.files("")["opened"], b"fire.toml\n");
+}

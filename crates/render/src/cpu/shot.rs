@@ -22,6 +22,7 @@ use super::{
 };
 use crate::{
     backend::{RenderError, Shot},
+    fingerprint,
     plan::Plan,
     slices::{self, Slice},
 };
@@ -32,6 +33,8 @@ pub(super) struct CpuShot {
     clocks: Vec<Clock>,
     plates: PlateCache,
     number: i64,
+    /// Whether the state was reached under another plan.
+    carried: bool,
     frame: Option<Frame>,
     spent: Option<Frame>,
 }
@@ -41,13 +44,34 @@ impl CpuShot {
         let phenomena = plan.open()?;
         let clocks = vec![Clock { taken: 0 }; phenomena.len()];
         let number = plan.frames().start;
-        Ok(Self { plan, phenomena, clocks, plates: PlateCache::default(), number, frame: None, spent: None })
+        Ok(Self {
+            plan,
+            phenomena,
+            clocks,
+            plates: PlateCache::default(),
+            number,
+            carried: false,
+            frame: None,
+            spent: None,
+        })
     }
 
     fn begin_anew(&mut self) -> Result<(), RenderError> {
         self.phenomena = self.plan.open()?;
         self.clocks.fill(Clock { taken: 0 });
+        self.carried = false;
         Ok(())
+    }
+
+    /// The clock of `phenomenon` after it took up the state that its namesake came to; at its beginning where it cannot.
+    fn take_up(&self, phenomenon: &mut dyn Phenomenon) -> Clock {
+        let beginning = Clock { taken: 0 };
+        let same = |old: &dyn Phenomenon| old.name() == phenomenon.name() && old.stepping() == phenomenon.stepping();
+        let Some(index) = self.phenomena.iter().position(|old| same(old.as_ref())) else { return beginning };
+        if phenomenon.stepping().is_none() || phenomenon.restore(&self.phenomena[index].snapshot()).is_err() {
+            return beginning;
+        }
+        self.clocks[index]
     }
 
     /// Draws the view; `None` where only the whole picture gives its parts rightly, since bent light comes from beyond.
@@ -218,6 +242,24 @@ impl Shot for CpuShot {
         self.spent = Some(spent);
     }
 
+    fn replan(&mut self, plan: Arc<Plan>) -> Result<(), RenderError> {
+        let mut phenomena = plan.open()?;
+        let clocks: Vec<Clock> = phenomena.iter_mut().map(|phenomenon| self.take_up(phenomenon.as_mut())).collect();
+        let goes_on = clocks.iter().any(|clock| clock.taken > 0);
+        let same = fingerprint::of_state(&self.plan) == fingerprint::of_state(&plan);
+        self.carried = goes_on && (self.carried || !same);
+        if self.plan.scene.plate != plan.scene.plate {
+            self.plates = PlateCache::default();
+        }
+        (self.plan, self.phenomena, self.clocks) = (plan, phenomena, clocks);
+        (self.frame, self.spent) = (None, None);
+        Ok(())
+    }
+
+    fn is_exact(&self) -> bool {
+        !self.carried
+    }
+
     fn particles(&self) -> PointCloud {
         let t = self.plan.shutter(self.number).middle();
         let mut all = PointCloud::default();
@@ -234,6 +276,7 @@ impl Shot for CpuShot {
         let clocks = snapshot::read(&self.plan, bytes, &mut phenomena)?;
         self.phenomena = phenomena;
         self.clocks = clocks;
+        self.carried = false;
         self.frame = None;
         Ok(())
     }

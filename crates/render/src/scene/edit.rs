@@ -5,7 +5,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, TableLike, Value};
 use super::{FORMAT, SHARED_TABLES};
 
 /// Why an edit cannot be made.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EditError {
     /// The text is not TOML.
     #[error("the scene is not TOML: {0}")]
@@ -24,6 +24,17 @@ pub enum EditError {
         segment: String,
         /// What is there instead.
         there: String,
+    },
+    /// The value is nothing that TOML can say.
+    #[error("`{0}` cannot stand in a scene")]
+    NoValue(String),
+    /// Nothing is keyed at that time.
+    #[error("`{path}` has no key at {time} s")]
+    NoKeyframe {
+        /// What should be keyed.
+        path: String,
+        /// When, s.
+        time: f64,
     },
     /// The scene's format is not one that this version can upgrade.
     #[error("format {found} is newer than this program knows; known: up to {FORMAT}")]
@@ -67,7 +78,7 @@ pub fn set(text: &str, assignment: &str) -> Result<String, EditError> {
     }
 }
 
-fn syntax(error: toml_edit::TomlError) -> EditError {
+pub(super) fn syntax(error: toml_edit::TomlError) -> EditError {
     EditError::Syntax(error.message().to_owned())
 }
 

@@ -3,7 +3,9 @@
 pub(crate) mod check;
 pub mod edit;
 pub mod obstacle;
+pub mod operation;
 pub mod picture;
+mod place;
 pub mod report;
 pub mod schema;
 pub mod source;
@@ -25,12 +27,21 @@ use bansho_models::ground::GroundParameters;
 pub use self::{
     obstacle::{ObstacleParameters, ObstacleShape},
     picture::{DepthKind, FrameRate, LightParameters, PictureParameters, PlateParameters},
+    place::{Place, Segment},
     report::SceneError,
     source::{Describe, Opening, OpeningFault, PhenomenonKind, Source},
 };
 
 /// The scene format that this version reads and writes.
 pub const FORMAT: i64 = 1;
+
+/// What the TOML `text` says, with the place of every value, unchecked.
+///
+/// # Errors
+/// The text is not TOML; the problem says where and why.
+pub fn values(text: &str) -> Result<Table, Problem> {
+    toml::parse(text)
+}
 
 /// A shared table of the scene file: one that is not a phenomenon.
 pub struct SharedTable {

@@ -157,6 +157,11 @@ bansho_base::parameters! {
 }
 
 impl LightParameters {
+    /// Whether it stands somewhere, so that its position matters.
+    pub fn stands(&self) -> bool {
+        self.kind != LightKind::Directional
+    }
+
     /// The light at time `t`.
     pub fn at(&self, t: f64) -> Light {
         let position = DVec3::from(self.position.at(t));

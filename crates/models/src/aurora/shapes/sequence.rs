@@ -96,6 +96,14 @@ impl Sequence {
         self.shape(&self.followed.strands[index], between)
     }
 
+    /// The ways of all control points from shape `index` to the next: where each leaves and where it arrives, km. They are listed
+    /// strand by strand: a sheet that splits is two strands, two that merge are two still. Empty for the last shape.
+    pub fn ways(&self, index: usize) -> Vec<Vec<[DVec2; 2]>> {
+        let way = |&track: &usize| [index, index + 1].map(|knot| self.followed.tracks[track].knot(knot).position);
+        let strands = self.followed.strands.get(index).into_iter().flatten();
+        strands.map(|strand| strand.iter().map(way).collect()).collect()
+    }
+
     /// How many segments cross in the in-between shapes at `count` evenly spaced times, all added up.
     pub fn crossings(&self, count: usize) -> usize {
         let step = self.duration() / count.max(1) as f64;

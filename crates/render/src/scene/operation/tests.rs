@@ -1,0 +1,143 @@
+use bansho_base::parameters::Table as Values;
+
+use super::*;
+
+const SCENE: &str = "\
+# What it shows.
+bansho = 1
+
+[wind] # from the left
+velocity = [0.5, 0, 0] # m/s
+
+[[flame_sheet]]
+name = \"left log\"
+height = 0.8 # low
+sparks = { rate = 3.0 }
+
+# behind it
+[[flame_sheet]]
+name = \"right log\"
+";
+
+fn at(path: &str) -> Place {
+    path.split('.').fold(Place::root(), |place, part| match part.parse() {
+        Ok(index) => place.index(index),
+        Err(_) => place.key(part),
+    })
+}
+
+fn set_to(path: &str, value: Value) -> Operation {
+    Operation::Set { place: at(path), value }
+}
+
+fn keyframe(path: &str, time: f64, value: f64) -> Operation {
+    Operation::SetKeyframe { place: at(path), time, value: Value::Number(value) }
+}
+
+fn lines_that_differ<'a>(before: &'a str, after: &'a str) -> Vec<&'a str> {
+    after.lines().filter(|line| !before.lines().any(|old| old == *line)).collect()
+}
+
+#[test]
+fn a_value_changes_and_nothing_else_does() {
+    let text = apply(SCENE, &[set_to("flame_sheet.0.height", Value::Number(1.25))]).unwrap();
+    assert_eq!(lines_that_differ(SCENE, &text), ["height = 1.25 # low"]);
+    assert_eq!(text.lines().count(), SCENE.lines().count());
+}
+
+#[test]
+fn values_of_inner_tables_and_lists_change_where_they_stand() {
+    let operations =
+        [set_to("flame_sheet.0.sparks.rate", Value::Number(9.0)), set_to("wind.velocity.2", Value::Number(-1.0))];
+    let text = apply(SCENE, &operations).unwrap();
+    assert_eq!(lines_that_differ(SCENE, &text), ["velocity = [0.5, 0, -1.0] # m/s", "sparks = { rate = 9.0 }"]);
+}
+
+#[test]
+fn tables_that_are_missing_are_made() {
+    let operations =
+        [set_to("picture.frames", Value::Integer(9)), set_to("flame_sheet.1.smoke.optical_depth", Value::Number(0.4))];
+    let text = apply(SCENE, &operations).unwrap();
+    assert!(text.contains("[picture]\nframes = 9"), "{text}");
+    assert!(text.contains("smoke = { optical_depth = 0.4 }"), "{text}");
+}
+
+#[test]
+fn what_is_removed_takes_only_itself_along() {
+    let text = apply(SCENE, &[Operation::Remove { place: at("flame_sheet.0") }]).unwrap();
+    assert!(!text.contains("left log") && text.contains("# behind it") && text.contains("# from the left"), "{text}");
+    let text = apply(SCENE, &[Operation::Remove { place: at("flame_sheet.0.height") }]).unwrap();
+    assert_eq!(text.lines().count(), SCENE.lines().count() - 1);
+}
+
+#[test]
+fn items_are_added_under_headers_at_the_root_and_in_line_within() {
+    let mut rain = Values::default();
+    rain.push("name", Value::Text("shower".into()));
+    let burner = |diameter: f64| {
+        let mut burner = Values::default();
+        burner.push("diameter", Value::Number(diameter));
+        Operation::Append { place: at("flame_particles.0.burners"), value: Value::Table(burner) }
+    };
+    let operations = [
+        Operation::Append { place: at("rain"), value: Value::Table(rain) },
+        Operation::Append { place: at("flame_particles"), value: Value::Table(Values::default()) },
+        burner(0.5),
+        burner(0.25),
+    ];
+    let text = apply(SCENE, &operations).unwrap();
+    assert!(text.ends_with(
+        "\n\n[[rain]]\nname = \"shower\"\n\n[[flame_particles]]\nburners = [{ diameter = 0.5 }, { diameter = 0.25 }]\n"
+    ), "{text}");
+}
+
+#[test]
+fn tables_that_hold_tables_get_headers_within_one_that_has() {
+    let mut sheet = Values::default();
+    sheet.push("scale", Value::Number(2.0));
+    let mut shape = Values::default();
+    shape.push("sheets", Value::List(vec![Value::Table(sheet).into()]));
+    let shape = Operation::Append { place: at("aurora.0.shapes"), value: Value::Table(shape) };
+    let aurora = Operation::Append { place: at("aurora"), value: Value::Table(Values::default()) };
+    let text = apply("bansho = 1\n", &[aurora, shape.clone(), shape]).unwrap();
+    let shape = "\n[[aurora.shapes]]\nsheets = [{ scale = 2.0 }]\n";
+    assert_eq!(text, format!("bansho = 1\n\n[[aurora]]\n{shape}{shape}"));
+}
+
+#[test]
+fn keys_are_put_in_order_replaced_and_taken_out() {
+    let mut text = apply(SCENE, &[keyframe("flame_sheet.0.height", 2.0, 1.0)]).unwrap();
+    assert!(text.contains("height = { keys = [[2.0, 1.0]] } # low"), "{text}");
+    text = apply(&text, &[keyframe("flame_sheet.0.height", 4.0, 3.0), keyframe("flame_sheet.0.height", 0.0, 0.5)])
+        .unwrap();
+    assert!(text.contains("keys = [[0.0, 0.5], [2.0, 1.0], [4.0, 3.0]]"), "{text}");
+    text = apply(&text, &[keyframe("flame_sheet.0.height", 2.000_000_1, 1.5)]).unwrap();
+    assert!(text.contains("keys = [[0.0, 0.5], [2.0, 1.5], [4.0, 3.0]]"), "{text}");
+    let take_out = |time| Operation::RemoveKeyframe { place: at("flame_sheet.0.height"), time };
+    text = apply(&text, &[take_out(0.0), take_out(4.0)]).unwrap();
+    assert!(text.contains("keys = [[2.0, 1.5]]"), "{text}");
+    text = apply(&text, &[take_out(2.0)]).unwrap();
+    assert!(text.contains("height = 1.5 # low"), "{text}");
+}
+
+#[test]
+fn places_that_are_not_there_are_refused_and_nothing_is_done() {
+    let nowhere = |path: &str| Operation::Remove { place: at(path) };
+    for path in ["flame_sheet.7", "flame_sheet.0.nothing", "wind.velocity.5", "rain.0.x", "bansho.0"] {
+        assert!(matches!(apply(SCENE, &[nowhere(path)]), Err(EditError::NoSuchPlace { .. })), "{path}");
+    }
+    let missing_key = Operation::RemoveKeyframe { place: at("wind.velocity"), time: 1.0 };
+    assert!(matches!(apply(SCENE, &[missing_key]), Err(EditError::NoKeyframe { .. })));
+    let not_finite = set_to("wind.gust", Value::List(vec![Value::Text("a".into()).into()]));
+    assert!(apply(SCENE, &[not_finite]).is_ok(), "types are the scene's business");
+    assert!(matches!(apply("= 3", &[]), Err(EditError::Syntax(_))));
+}
+
+#[test]
+fn places_find_values_as_the_reader_sees_them() {
+    let root = crate::scene::values(SCENE).unwrap();
+    assert_eq!(at("flame_sheet.0.sparks.rate").find(&root).unwrap().value, Value::Number(3.0));
+    assert_eq!(at("wind.velocity.0").find(&root).unwrap().value, Value::Number(0.5));
+    assert!(at("flame_sheet.2").find(&root).is_none() && Place::root().find(&root).is_none());
+    assert_eq!(at("flame_sheet.0.sparks.rate").to_string(), "flame_sheet.0.sparks.rate");
+}

@@ -1,0 +1,75 @@
+//! A drag of the hand that blows: while it lasts the wind is what the hand says, and then what it was.
+
+use bansho::{
+    base::{math::DVec3, parameters::Value},
+    render::scene::{Place, operation::Operation},
+};
+
+use super::{hands::rounded, keyed, session::Session};
+
+/// The wind before a drag began.
+#[derive(Clone, Debug)]
+pub(super) struct Blowing {
+    calm: [f64; 3],
+    recorded: bool,
+    /// When it began, s.
+    began: f64,
+}
+
+/// The name of the step in the history.
+const LABEL: &str = "blow";
+
+fn place() -> Place {
+    Place::root().key("wind").key("velocity")
+}
+
+impl Blowing {
+    /// Begins a drag. Where keyframes are recorded, time passes while it lasts.
+    pub(super) fn begin(session: &mut Session) -> Self {
+        let stated = place().find(session.document.values());
+        let now = stated.and_then(|node| keyed::at(&node.value, session.transport.time_s()));
+        let calm = now.and_then(|value| three(&value)).unwrap_or_default();
+        let blowing = Self { calm, recorded: session.recording, began: session.transport.time_s() };
+        session.document.seal();
+        if blowing.recorded {
+            session.transport.set_playing(true);
+            blowing.key(session, calm);
+        }
+        blowing
+    }
+
+    /// The hand says `wind`, m/s, on top of what blows anyway.
+    pub(super) fn blow(&self, session: &mut Session, wind: DVec3) {
+        let velocity = rounded(DVec3::from(self.calm) + wind);
+        if self.recorded {
+            // The key of the calm before the drag stays.
+            if session.transport.time_s() != self.began {
+                self.key(session, velocity);
+            }
+        } else {
+            session.edit(LABEL, &[Operation::Set { place: place(), value: Value::numbers(velocity) }]);
+        }
+    }
+
+    /// The hand lets go: recorded wind calms down again, unrecorded wind never was.
+    pub(super) fn end(self, session: &mut Session) {
+        if self.recorded {
+            self.key(session, self.calm);
+            session.transport.set_playing(false);
+            session.document.seal();
+        } else {
+            session.document.abandon(LABEL);
+        }
+    }
+
+    fn key(&self, session: &mut Session, velocity: [f64; 3]) {
+        let key = session.keyframe(&place(), Value::numbers(velocity));
+        session.edit(LABEL, &[key]);
+    }
+}
+
+fn three(value: &Value) -> Option<[f64; 3]> {
+    let Value::List(items) = value else { return None };
+    let numbers: Vec<f64> = items.iter().map(|item| item.value.as_number()).collect::<Option<_>>()?;
+    numbers.try_into().ok()
+}

@@ -1,0 +1,122 @@
+//! The menu at the top.
+
+use std::path::PathBuf;
+
+use eframe::egui::{self, Ui};
+
+use super::Studio;
+use crate::{
+    document::{Document, files, recovery::Recovered},
+    examples,
+};
+
+impl Studio {
+    /// The bar at the top.
+    pub(super) fn menu(&mut self, ui: &mut Ui) {
+        egui::MenuBar::new().ui(ui, |ui| {
+            ui.menu_button("File", |ui| self.file_menu(ui));
+            ui.menu_button("Edit", |ui| self.edit_menu(ui));
+            ui.menu_button("View", |ui| self.view_menu(ui));
+            self.offer_recovered(ui);
+            let star = if self.session.document.is_dirty() { " •" } else { "" };
+            ui.weak(format!("{}{star}", self.session.document.name()));
+        });
+    }
+
+    fn file_menu(&mut self, ui: &mut Ui) {
+        if ui.button("Open…").clicked() {
+            self.files.ask_to_open(ui.ctx(), &mut self.session);
+        }
+        ui.menu_button("Examples", |ui| self.examples_menu(ui));
+        ui.menu_button("Recent", |ui| {
+            for path in self.files.recent.paths().to_vec() {
+                if ui.button(path.display().to_string()).clicked() {
+                    self.files.open(&mut self.session, path);
+                }
+            }
+        });
+        if ui.button("Save").clicked() {
+            self.files.save(&mut self.session);
+        }
+        if ui.button("Save as…").clicked() {
+            self.files.ask_where_to_save(&self.session);
+        }
+        ui.separator();
+        if ui.button("Render still").clicked() {
+            self.files.render(&mut self.session, true);
+        }
+        if ui.button("Render shot").clicked() {
+            self.files.render(&mut self.session, false);
+        }
+        if let Some(shooting) = &self.files.shooting
+            && ui.button("Stop rendering").clicked()
+        {
+            shooting.stop();
+        }
+        if ui.button("Reload plates and meshes").clicked() {
+            self.session.reload_assets();
+        }
+    }
+
+    fn examples_menu(&mut self, ui: &mut Ui) {
+        egui::ScrollArea::vertical().show(ui, |ui| {
+            for &(name, text) in examples::SCENES {
+                let words = name.trim_end_matches(".toml").replace('_', " ");
+                if ui.button(words).clicked() {
+                    self.files.open_example(&mut self.session, name, text);
+                }
+            }
+        });
+    }
+
+    fn edit_menu(&mut self, ui: &mut Ui) {
+        let named = |verb: &str, label: Option<&str>| label.map_or(verb.to_owned(), |label| format!("{verb} {label}"));
+        let document = &mut self.session.document;
+        let undo = named("Undo", document.undo_label());
+        if ui.add_enabled(document.undo_label().is_some(), egui::Button::new(undo)).clicked() {
+            document.undo();
+        }
+        let redo = named("Redo", document.redo_label());
+        if ui.add_enabled(document.redo_label().is_some(), egui::Button::new(redo)).clicked() {
+            document.redo();
+        }
+    }
+
+    fn view_menu(&mut self, ui: &mut Ui) {
+        ui.checkbox(&mut self.shows.text, "Text");
+        ui.checkbox(&mut self.shows.shortcuts, "Shortcuts");
+        ui.separator();
+        let mut theme = ui.ctx().options(|options| options.theme_preference);
+        theme.buttons(ui);
+        ui.ctx().set_theme(theme);
+    }
+
+    /// Unsaved work of a studio that did not end well.
+    fn offer_recovered(&mut self, ui: &mut Ui) {
+        if self.files.recovered.is_empty() {
+            return;
+        }
+        ui.menu_button("Recover", |ui| {
+            for recovered in self.files.recovered.clone() {
+                let origin = if recovered.origin.is_empty() { "a scene never saved" } else { &recovered.origin };
+                if ui.button(origin).clicked() {
+                    self.recover(&recovered);
+                }
+            }
+        })
+        .response
+        .on_hover_text("Unsaved work of a studio that did not end well");
+    }
+
+    fn recover(&mut self, recovered: &Recovered) {
+        let path = (!recovered.origin.is_empty()).then(|| PathBuf::from(&recovered.origin));
+        let saved = path.as_deref().and_then(|path| files::read(path).ok()).unwrap_or_default();
+        let name = path.as_ref().map_or_else(|| "scene".into(), |path| path.display().to_string());
+        let mut document = Document::new(name, saved);
+        document.replace("recover", &recovered.text);
+        document.seal();
+        self.session.open(document, path);
+        recovered.forget();
+        self.files.recovered.retain(|other| other != recovered);
+    }
+}

@@ -1,0 +1,177 @@
+//! The window: panels over one [`Session`]. It holds no formulas of any phenomenon.
+
+mod aurora;
+#[cfg(target_arch = "wasm32")]
+mod browser;
+mod chooser;
+mod curve_editor;
+mod files;
+mod gesture;
+mod hands;
+mod icon;
+mod inspector;
+mod keyed;
+mod layout;
+mod menu;
+mod problems;
+mod question;
+mod scene_panel;
+mod session;
+mod shortcuts;
+mod status;
+#[cfg(all(test, not(target_arch = "wasm32")))]
+mod tests;
+mod text_panel;
+mod things;
+mod timeline;
+mod value;
+mod viewport;
+
+use std::time::Duration;
+
+use eframe::egui;
+
+pub use self::session::{AssetsOf, Session};
+use self::{
+    aurora::AuroraEditor, files::Files, layout::Layout, problems::Wanted, scene_panel::Subject, text_panel::TextPanel,
+    viewport::Viewport,
+};
+
+/// The kind of phenomenon whose shapes are drawn.
+const KIND_WITH_SHAPES: &str = "aurora";
+
+/// The whole window.
+pub struct Studio {
+    session: Session,
+    subject: Subject,
+    viewport: Viewport,
+    aurora: AuroraEditor,
+    text: TextPanel,
+    files: Files,
+    shows: Shows,
+    layout: Layout,
+    /// Which of the documents that were opened is shown.
+    opened: u64,
+}
+
+/// Which parts of the window are open.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shows {
+    text: bool,
+    shortcuts: bool,
+}
+
+impl Studio {
+    /// A window on `session`. `home` is where the studio keeps recent files and unsaved work; without it, nothing is kept.
+    pub fn new(session: Session, home: Option<std::path::PathBuf>) -> Self {
+        let subject = Subject::first_of(&session.document);
+        let layout = Layout::read(home.as_deref());
+        Self {
+            session,
+            subject,
+            viewport: Viewport::default(),
+            aurora: AuroraEditor::default(),
+            text: TextPanel::default(),
+            files: Files::new(home),
+            shows: Shows { text: layout.get("text shown", 0.0) > 0.0, shortcuts: false },
+            layout,
+            opened: 0,
+        }
+    }
+
+    /// What it works on.
+    pub fn session(&mut self) -> &mut Session {
+        &mut self.session
+    }
+
+    /// Shows everything and takes in what hands do.
+    pub fn show(&mut self, ui: &mut egui::Ui) {
+        if ui.ctx().cumulative_pass_nr() == 0 {
+            self.layout.apply_theme(ui.ctx());
+        }
+        self.take_shortcuts(ui.ctx());
+        self.files.tend(ui, &mut self.session);
+        egui::Panel::top("menu").show(ui, |ui| self.menu(ui));
+        egui::Panel::bottom("status").show(ui, |ui| status::show(ui, &mut self.session, &self.files));
+        egui::Panel::bottom("timeline").show(ui, |ui| timeline::show(ui, &mut self.session));
+        self.follow_opening();
+        self.side_panels(ui);
+        if let (KIND_WITH_SHAPES, Some(index)) = (self.subject.key, self.subject.index) {
+            let panel = egui::Panel::bottom("aurora").resizable(true);
+            let Self { aurora, session, layout, .. } = self;
+            layout.panel("aurora", panel, 420.0, ui, |ui| aurora.show(ui, session, index));
+        }
+        egui::CentralPanel::default().show(ui, |ui| self.viewport.show(ui, &mut self.session));
+        if self.shows.shortcuts {
+            shortcuts::window(ui.ctx(), &mut self.shows.shortcuts);
+        }
+        self.end_gestures(ui);
+        self.layout.note_theme(ui.ctx());
+        self.layout.note("text shown", f32::from(u8::from(self.shows.text)));
+        self.update(ui);
+    }
+
+    /// Begins with what a hand would reach for first in a scene that was just opened.
+    fn follow_opening(&mut self) {
+        let gone = self.subject.index.is_some() && self.subject.place().find(self.session.document.values()).is_none();
+        if self.opened != self.session.opened || gone {
+            self.opened = self.session.opened;
+            self.subject = Subject::first_of(&self.session.document);
+            self.aurora = AuroraEditor::default();
+        }
+    }
+
+    fn side_panels(&mut self, ui: &mut egui::Ui) {
+        match problems::show(ui, &self.session) {
+            Some(Wanted::Sight(span)) => {
+                self.shows.text = true;
+                self.text.jump_to(span);
+            }
+            Some(Wanted::File(place)) => self.files.ask_to_relink(ui.ctx(), &mut self.session, place),
+            None => {}
+        }
+        let Self { session, subject, text, layout, shows, .. } = self;
+        layout.panel("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
+            egui::ScrollArea::vertical().show(ui, |ui| scene_panel::show(ui, session, subject));
+        });
+        if shows.text {
+            layout.panel("text", egui::Panel::right("text"), 380.0, ui, |ui| text.show(ui, session));
+        }
+        layout.panel("inspector", egui::Panel::right("inspector"), 330.0, ui, |ui| {
+            egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| inspector::show(ui, session, subject));
+        });
+    }
+
+    /// When everything is let go, what was done is one step of the history.
+    fn end_gestures(&mut self, ui: &egui::Ui) {
+        let typing = ui.ctx().egui_wants_keyboard_input();
+        if !ui.input(|input| input.pointer.any_down()) && !typing {
+            self.session.document.seal();
+        }
+    }
+
+    fn update(&mut self, ui: &egui::Ui) {
+        let now = ui.input(|input| input.time);
+        let hands = ui.input(|input| input.pointer.any_down()) && ui.ctx().dragged_id().is_some();
+        if let Some(sleep_s) = self.session.update(now, self.viewport.pixels(), hands) {
+            ui.ctx().request_repaint_after(Duration::from_secs_f64(sleep_s));
+        }
+    }
+}
+
+impl eframe::App for Studio {
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        self.show(ui);
+    }
+
+    fn on_exit(&mut self) {
+        self.files.end();
+        // A layout that cannot be kept is the usual one at the next start.
+        let _ = self.layout.keep();
+    }
+
+    #[cfg(target_arch = "wasm32")]
+    fn as_any_mut(&mut self) -> Option<&mut dyn std::any::Any> {
+        Some(&mut *self)
+    }
+}

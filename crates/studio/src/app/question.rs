@@ -1,0 +1,79 @@
+//! Questions in the middle of the window: what to open, where to save, whether to leave unsaved work.
+
+use std::path::PathBuf;
+
+use bansho::render::scene::Place;
+use eframe::egui::Ui;
+
+use super::chooser::Chooser;
+
+/// A question that waits for an answer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Question {
+    /// Which file to open.
+    Open(Chooser),
+    /// Which file this place shall name.
+    Relink(Place, Chooser),
+    /// Which file to save to.
+    SaveAs(Chooser),
+    /// Whether unsaved work may be left, to open this or to close.
+    Leave(Leaving),
+    /// Whether to take what another program wrote.
+    ChangedOutside(String),
+}
+
+/// Where to, once unsaved work may be left.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Leaving {
+    Open(PathBuf),
+    /// A scene that no folder holds: its name and its text.
+    OpenGiven(String, String),
+    Close,
+}
+
+/// What a question was answered with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    Do,
+    Save,
+    Cancel,
+}
+
+/// Asks; what was answered, once it was.
+pub(super) fn answer(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
+    let choices: &[(&str, Answer)] = match question {
+        Question::Open(chooser) => {
+            if chooser.show(ui, "Open which scene?") {
+                return Some(Answer::Do);
+            }
+            &[("Open", Answer::Do), ("Cancel", Answer::Cancel)]
+        }
+        Question::Relink(_, chooser) => {
+            if chooser.show(ui, "Which file in its stead?") {
+                return Some(Answer::Do);
+            }
+            &[("Relink", Answer::Do), ("Cancel", Answer::Cancel)]
+        }
+        Question::SaveAs(chooser) => {
+            chooser.show(ui, "Save as");
+            &[("Save", Answer::Do), ("Cancel", Answer::Cancel)]
+        }
+        Question::Leave(_) => {
+            ui.label("There is unsaved work.");
+            &[("Save", Answer::Save), ("Leave it", Answer::Do), ("Cancel", Answer::Cancel)]
+        }
+        Question::ChangedOutside(_) => {
+            ui.label("Another program changed the file, and there is unsaved work here.");
+            &[("Take theirs", Answer::Do), ("Save mine", Answer::Save), ("Decide later", Answer::Cancel)]
+        }
+    };
+    let mut chosen = None;
+    ui.horizontal(|ui| {
+        for (text, answer) in choices {
+            if ui.button(*text).clicked() {
+                chosen = Some(*answer);
+            }
+        }
+    });
+    chosen
+}

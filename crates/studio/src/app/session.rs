@@ -1,0 +1,380 @@
+//! What the window works on: the document, its file, its player and the time. No widgets.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use bansho::{
+    Assets, Plan,
+    base::parameters::Value,
+    render::scene::{Place, edit::EditError, operation::Operation},
+};
+
+use super::keyed;
+use crate::{
+    document::{
+        Document, Revision,
+        drawing::{Drawing, Refusal},
+    },
+    examples::Bundle,
+    player::{Event, Pace, Picture, Player, Transport, Wish},
+};
+
+/// Makes the assets of a scene that lies in a folder. Without one it finds the files of the examples, and given ones.
+pub type AssetsOf = fn(&Path) -> Arc<dyn Assets>;
+
+/// A document that is open, with its player.
+pub struct Session {
+    /// The scene.
+    pub document: Document,
+    /// Its file, once it has one.
+    pub path: Option<PathBuf>,
+    /// The time.
+    pub transport: Transport,
+    /// Whether hands in the viewport leave keyframes.
+    pub recording: bool,
+    /// Counts documents that were opened here.
+    pub opened: u64,
+    /// Whether pictures may be simulated with fewer particles than the scene has.
+    pub draft: bool,
+    player: Box<dyn Player>,
+    assets_of: AssetsOf,
+    bundle: Bundle,
+    assets: Arc<dyn Assets>,
+    pace: Pace,
+    picture: Option<Picture>,
+    drawn: u64,
+    asked: Option<Asked>,
+    /// A state that panicked, which is not drawn again.
+    broken: Option<Revision>,
+    notice: Option<String>,
+    rate: Rate,
+    /// A time that is gone to once the scene is checked, s.
+    seek: Option<f64>,
+}
+
+/// What was wished for last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Asked {
+    revision: Revision,
+    number: Option<i64>,
+    within: [usize; 2],
+    draft: bool,
+}
+
+/// Pictures a second, as they come while time passes.
+#[derive(Default)]
+struct Rate {
+    last: Option<f64>,
+    mean_s: Option<f64>,
+}
+
+impl Rate {
+    fn came(&mut self, now: f64) {
+        /// Share of the newest interval in the mean.
+        const NEWEST: f64 = 0.15;
+        if let Some(last) = self.last.replace(now) {
+            let interval = now - last;
+            self.mean_s = Some(self.mean_s.map_or(interval, |mean| mean + NEWEST * (interval - mean)));
+        }
+    }
+}
+
+impl Session {
+    /// Opens `document`, which lies in `path`.
+    pub fn new(document: Document, path: Option<PathBuf>, player: Box<dyn Player>, assets_of: AssetsOf) -> Self {
+        let bundle = Bundle::default();
+        Self {
+            assets: assets(&bundle, path.as_deref(), assets_of),
+            bundle,
+            document,
+            path,
+            transport: Transport::default(),
+            recording: false,
+            opened: 0,
+            draft: true,
+            player,
+            assets_of,
+            pace: Pace::default(),
+            picture: None,
+            drawn: 0,
+            asked: None,
+            broken: None,
+            notice: None,
+            rate: Rate::default(),
+            seek: None,
+        }
+    }
+
+    /// Opens another document in place of this one.
+    pub fn open(&mut self, document: Document, path: Option<PathBuf>) {
+        self.assets = assets(&self.bundle, path.as_deref(), self.assets_of);
+        (self.document, self.path) = (document, path);
+        (self.picture, self.asked, self.broken, self.notice) = (None, None, None, None);
+        self.transport = Transport::default();
+        self.opened += 1;
+    }
+
+    /// Reads all assets anew, as after one was replaced.
+    pub fn reload_assets(&mut self) {
+        self.assets = assets(&self.bundle, self.path.as_deref(), self.assets_of);
+        self.asked = None;
+    }
+
+    /// Takes the bytes of a file that no folder holds.
+    pub fn give(&mut self, name: &str, bytes: Vec<u8>) {
+        self.bundle.give(name, bytes);
+        self.reload_assets();
+    }
+
+    /// The last picture, and which it is.
+    pub fn picture(&self) -> Option<(&Picture, u64)> {
+        self.picture.as_ref().map(|picture| (picture, self.drawn))
+    }
+
+    /// The last good plan.
+    pub fn plan(&self) -> Option<&Arc<Plan>> {
+        self.document.plan()
+    }
+
+    /// Whether a picture is under way.
+    pub fn is_busy(&self) -> bool {
+        self.player.is_busy()
+    }
+
+    /// Pictures a second while time passes.
+    pub fn pictures_per_s(&self) -> Option<f64> {
+        self.rate.mean_s.filter(|_| self.transport.is_playing()).map(|mean| 1.0 / mean)
+    }
+
+    /// What the user should know.
+    pub fn notice(&self) -> Option<&str> {
+        self.notice.as_deref()
+    }
+
+    /// Tells the user something, or takes it back.
+    pub fn set_notice(&mut self, notice: Option<String>) {
+        self.notice = notice;
+    }
+
+    /// Whether what is shown panicked.
+    pub fn is_broken(&self) -> bool {
+        self.broken == Some(self.document.revision())
+    }
+
+    /// Carries out `operations`; what cannot be done is told.
+    pub fn edit(&mut self, label: &str, operations: &[Operation]) {
+        match self.document.edit(label, operations) {
+            Ok(()) => self.notice = None,
+            Err(EditError::Syntax(reason)) => {
+                self.notice = Some(format!("the text is not TOML; mend it or undo first: {reason}"));
+            }
+            Err(error) => self.notice = Some(error.to_string()),
+        }
+    }
+
+    /// Carries out `operations` on the shapes of aurora `index`.
+    ///
+    /// # Errors
+    /// An aurora cannot take the shapes that would come of them; nothing is changed then.
+    pub fn reshape(&mut self, label: &str, operations: &[Operation], index: usize) -> Result<(), Refusal> {
+        self.document.reshape(label, operations, index, &self.assets)?;
+        self.notice = None;
+        Ok(())
+    }
+
+    /// Goes to the frame at `time`, s; once the scene is checked, also where that makes the shot longer.
+    pub fn go_to_time(&mut self, time: f64) {
+        self.seek = (!self.document.is_checked()).then_some(time);
+        self.seek_now(time);
+    }
+
+    fn seek_now(&mut self, time: f64) {
+        let first = *self.transport.frames().start();
+        self.transport.go_to(first + (time / self.transport.frame_s()).round() as i64);
+    }
+
+    /// Where the scene's pictures and drawings come from.
+    pub fn assets(&self) -> &Arc<dyn Assets> {
+        &self.assets
+    }
+
+    /// Sets the value at `place`; where it is keyed, as it is at the present time.
+    pub fn set(&mut self, label: &str, place: &Place, value: Value) {
+        self.set_all(label, [(place.clone(), value)]);
+    }
+
+    /// Sets several values in one step.
+    pub fn set_all(&mut self, label: &str, values: impl IntoIterator<Item = (Place, Value)>) {
+        let operation = |(place, value): (Place, Value)| match place.find(self.document.values()) {
+            Some(node) if keyed::is_keyed(&node.value) => self.keyframe(&place, value),
+            _ => Operation::Set { place, value },
+        };
+        let operations: Vec<Operation> = values.into_iter().map(operation).collect();
+        self.edit(label, &operations);
+    }
+
+    /// The operation that keys `place` now.
+    pub fn keyframe(&self, place: &Place, value: Value) -> Operation {
+        Operation::SetKeyframe { place: place.clone(), time: self.transport.time_s(), value }
+    }
+
+    /// Takes in what the player did, lets time pass and says what is to be drawn for a viewport of `viewport` pixels.
+    /// `hands` tells that something is being dragged, so that speed matters more than size. How long the window may sleep, s.
+    pub fn update(&mut self, now: f64, viewport: [usize; 2], hands: bool) -> Option<f64> {
+        let hurry = hands || self.transport.is_playing();
+        for event in self.player.poll() {
+            self.take_in(event, now, hands);
+        }
+        if !self.transport.is_playing() {
+            self.rate = Rate::default();
+        }
+        let shown = self.picture.as_ref().is_some_and(|picture| picture.number == self.transport.number());
+        self.transport.tick(now, shown || self.is_broken());
+        self.wish(viewport, hurry);
+        if self.player.waits_for_poll() {
+            return Some(0.0);
+        }
+        self.transport.sleep_s(now).filter(|_| !self.is_busy())
+    }
+
+    fn wish(&mut self, viewport: [usize; 2], hurry: bool) {
+        let share = if hurry { self.pace.share() } else { 1.0 };
+        let number = self.plan().map(|_| self.transport.number());
+        let asked = Asked {
+            revision: self.document.revision(),
+            number,
+            within: viewport.map(|side| ((side as f64 * share).round() as usize).max(1)),
+            draft: self.draft,
+        };
+        // In a hurry a frame is drawn once, whatever size would have been better.
+        let same = |last: Asked| last == Asked { within: if hurry { last.within } else { asked.within }, ..asked };
+        if self.asked.is_some_and(same) || self.is_broken() {
+            return;
+        }
+        self.asked = Some(asked);
+        self.send(asked, false);
+    }
+
+    /// Draws the present frame once more from the scene's beginning, at the viewport's full size.
+    pub fn draw_exactly(&mut self) {
+        if let Some(asked) = self.asked {
+            self.send(asked, true);
+        }
+    }
+
+    fn send(&mut self, asked: Asked, exact: bool) {
+        self.player.wish(Wish {
+            revision: asked.revision,
+            name: self.document.name().to_owned(),
+            text: self.document.text().clone(),
+            assets: self.assets.clone(),
+            number: asked.number,
+            within: asked.within,
+            exact,
+            draft: asked.draft,
+        });
+    }
+
+    fn take_in(&mut self, event: Event, now: f64, hands: bool) {
+        match event {
+            Event::Judged { revision, outcome } => self.judged(revision, outcome),
+            Event::Drawn(picture) => self.show(picture, now, hands),
+            Event::Failed { revision, reason } if revision == self.document.revision() => self.notice = Some(reason),
+            Event::Failed { .. } => {}
+            Event::Panicked { revision, message } => {
+                self.broken = Some(revision);
+                self.transport.set_playing(false);
+                self.notice = Some(format!("a phenomenon panicked, which is a bug in it: {message}{}", self.rescue()));
+            }
+        }
+    }
+
+    /// Saves the work beside its file after a panic, and says so.
+    #[cfg(not(target_arch = "wasm32"))]
+    fn rescue(&self) -> String {
+        let Some(path) = self.path.as_ref().filter(|_| self.document.is_dirty()) else { return String::new() };
+        match crate::document::files::rescue(self.document.text(), path) {
+            Ok(beside) => format!("; the scene was saved as {}", beside.display()),
+            Err(error) => format!("; the scene could not be saved beside its file: {error}"),
+        }
+    }
+
+    #[cfg(target_arch = "wasm32")]
+    fn rescue(&self) -> String {
+        String::new()
+    }
+
+    fn judged(&mut self, revision: Revision, outcome: Result<Arc<Plan>, bansho::SceneError>) {
+        self.document.judge(revision, outcome);
+        if let Some(plan) = self.document.plan() {
+            let frames = plan.frames();
+            self.transport.set_shot(frames.start..=frames.end - 1, 1.0 / plan.fps().frame_s());
+            if let Some(asked) = self.asked.as_mut().filter(|asked| asked.number.is_none()) {
+                // The scene's first frame is being drawn, which nobody knew the number of.
+                asked.number = Some(frames.start);
+                self.transport.go_to(frames.start);
+            }
+        }
+        if let Some(time) = self.seek.take_if(|_| self.document.is_checked()) {
+            self.seek_now(time);
+        }
+    }
+
+    fn show(&mut self, picture: Picture, now: f64, hands: bool) {
+        /// Wanted of a preview while something is dragged, s.
+        const AT_HAND_S: f64 = 0.05;
+        if hands || self.transport.is_playing() {
+            let target = if hands { AT_HAND_S } else { self.transport.frame_s() };
+            self.pace.learn(picture.draw_s, target);
+            self.rate.came(now);
+        }
+        self.drawn += 1;
+        self.picture = Some(picture);
+    }
+}
+
+/// What a scene in `path` finds.
+fn assets(bundle: &Bundle, path: Option<&Path>, assets_of: AssetsOf) -> Arc<dyn Assets> {
+    match path {
+        Some(_) => assets_of(folder(path)),
+        None => Arc::new(bundle.clone()),
+    }
+}
+
+/// The folder that paths in a scene are relative to.
+fn folder(path: Option<&Path>) -> &Path {
+    path.and_then(Path::parent).unwrap_or(Path::new(""))
+}
+
+impl Session {
+    /// Lets `place` name the file `file`.
+    pub fn relink(&mut self, place: &Place, file: &Path) {
+        let value = self.named(file);
+        self.edit("relink", &[Operation::Set { place: place.clone(), value }]);
+        self.reload_assets();
+    }
+
+    /// `file` as the scene names it: relative to its folder where it lies there.
+    fn named(&self, file: &Path) -> Value {
+        let folder = folder(self.path.as_deref());
+        let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
+        let relative = file.strip_prefix(folder).or_else(|_| file.strip_prefix(whole)).unwrap_or(file);
+        Value::Text(relative.to_string_lossy().replace('\\', "/"))
+    }
+
+    /// Takes a file that was dropped on the window: a drawing becomes the aurora's first shape, a picture the plate.
+    pub fn lay_over(&mut self, file: &Path) {
+        let value = self.named(file);
+        if file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg")) {
+            match Drawing::read(self.document.values(), 0, &self.assets) {
+                Ok(drawing) => self.edit("drawing", &drawing.trace(value)),
+                Err(reason) => self.notice = Some(reason.to_string()),
+            }
+        } else {
+            let place = Place::root().key("plate").key("image");
+            self.edit("plate", &[Operation::Set { place, value }]);
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Keys: one list, from which they are both taken and shown.
+
+use eframe::egui::{self, Context, Key, KeyboardShortcut, Modifiers};
+
+use super::Studio;
+
+/// What a key does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Action {
+    Undo,
+    Redo,
+    Save,
+    Open,
+    RenderStill,
+    PlayPause,
+    FrameBack,
+    FrameOn,
+    FirstFrame,
+    Text,
+    Shortcuts,
+}
+
+/// A key, what it does, and how that is called.
+pub(super) struct Shortcut {
+    pub(super) keys: KeyboardShortcut,
+    pub(super) action: Action,
+    pub(super) name: &'static str,
+}
+
+const fn with_command(key: Key, action: Action, name: &'static str) -> Shortcut {
+    Shortcut { keys: KeyboardShortcut::new(Modifiers::COMMAND, key), action, name }
+}
+
+const fn plain(key: Key, action: Action, name: &'static str) -> Shortcut {
+    Shortcut { keys: KeyboardShortcut::new(Modifiers::NONE, key), action, name }
+}
+
+/// All of them. Longer combinations come first, since a shorter one is part of them.
+pub(super) const SHORTCUTS: [Shortcut; 12] = [
+    Shortcut {
+        keys: KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z),
+        action: Action::Redo,
+        name: "Redo",
+    },
+    with_command(Key::Z, Action::Undo, "Undo"),
+    with_command(Key::Y, Action::Redo, "Redo"),
+    with_command(Key::S, Action::Save, "Save"),
+    with_command(Key::O, Action::Open, "Open"),
+    with_command(Key::T, Action::Text, "Show or hide the text"),
+    plain(Key::F12, Action::RenderStill, "Render the still"),
+    plain(Key::Space, Action::PlayPause, "Play or pause"),
+    plain(Key::ArrowLeft, Action::FrameBack, "Frame back"),
+    plain(Key::ArrowRight, Action::FrameOn, "Frame on"),
+    plain(Key::Home, Action::FirstFrame, "First frame"),
+    plain(Key::Questionmark, Action::Shortcuts, "These shortcuts"),
+];
+
+impl Studio {
+    /// Does what pressed keys say. Keys without Ctrl or Cmd belong to whatever is being typed in.
+    pub(super) fn take_shortcuts(&mut self, ctx: &Context) {
+        let typing = ctx.egui_wants_keyboard_input();
+        for shortcut in &SHORTCUTS {
+            let mine = !typing || shortcut.keys.modifiers.command || shortcut.keys.logical_key == Key::F12;
+            if mine && ctx.input_mut(|input| pressed(input, shortcut)) {
+                self.act(ctx, shortcut.action);
+            }
+        }
+    }
+
+    fn act(&mut self, ctx: &Context, action: Action) {
+        let transport = &mut self.session.transport;
+        match action {
+            Action::Undo => {
+                self.session.document.undo();
+            }
+            Action::Redo => {
+                self.session.document.redo();
+            }
+            Action::Save => self.files.save(&mut self.session),
+            Action::Open => self.files.ask_to_open(ctx, &mut self.session),
+            Action::RenderStill => self.files.render(&mut self.session, true),
+            Action::PlayPause => transport.set_playing(!transport.is_playing()),
+            Action::FrameBack => transport.step(-1),
+            Action::FrameOn => transport.step(1),
+            Action::FirstFrame => transport.go_to(*transport.range().start()),
+            Action::Text => self.shows.text = !self.shows.text,
+            Action::Shortcuts => self.shows.shortcuts = !self.shows.shortcuts,
+        }
+    }
+}
+
+/// A question mark needs Shift on many keyboards and not on others.
+fn pressed(input: &mut egui::InputState, shortcut: &Shortcut) -> bool {
+    let shifted = KeyboardShortcut::new(Modifiers::SHIFT, shortcut.keys.logical_key);
+    input.consume_shortcut(&shortcut.keys) || (shortcut.action == Action::Shortcuts && input.consume_shortcut(&shifted))
+}
+
+/// The window that lists them.
+pub(super) fn window(ctx: &Context, open: &mut bool) {
+    egui::Window::new("Shortcuts").open(open).resizable(false).show(ctx, |ui| {
+        egui::Grid::new("shortcuts").num_columns(2).striped(true).show(ui, |ui| {
+            for shortcut in &SHORTCUTS {
+                ui.monospace(ctx.format_shortcut(&shortcut.keys));
+                ui.label(shortcut.name);
+                ui.end_row();
+            }
+        });
+    });
+}

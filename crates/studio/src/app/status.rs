@@ -1,0 +1,46 @@
+//! One line that says what is shown and what goes on.
+
+use eframe::egui::Ui;
+
+use super::{
+    files::Files,
+    icon::{self, Icon},
+    session::Session,
+};
+
+/// Shows the line.
+pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &Files) {
+    ui.horizontal(|ui| {
+        if session.is_busy() {
+            ui.spinner();
+        }
+        if let Some((picture, _)) = session.picture() {
+            let ([width, height], [whole_width, whole_height]) = (picture.size, picture.scene_size);
+            let preview = if picture.size == picture.scene_size { "" } else { "preview " };
+            ui.label(format!("{preview}{width} × {height} of {whole_width} × {whole_height}"));
+            ui.weak(format!("{:.0} ms", 1000.0 * (picture.draw_s + picture.advance_s)));
+            if picture.draft {
+                ui.weak("draft").on_hover_text("Simulated with fewer particles than the scene has; see Draft above");
+            }
+            if !picture.exact && ui.link("live state").on_hover_text(LIVE).clicked() {
+                session.draw_exactly();
+            }
+        }
+        if let Some(rate) = session.pictures_per_s() {
+            ui.weak(format!("{rate:.0} pictures/s"));
+        }
+        if let Some(text) = files.progress() {
+            ui.label(text);
+        }
+        if let Some(notice) = session.notice() {
+            let notice = notice.to_owned();
+            ui.colored_label(ui.visuals().warn_fg_color, &notice);
+            if icon::button(ui, Icon::Cross, "Dismiss").clicked() {
+                session.set_notice(None);
+            }
+        }
+    });
+}
+
+const LIVE: &str = "What is simulated went on from where it was when the scene changed. \
+    Click to see what the scene leads to from its beginning, as it will be rendered.";

@@ -1,0 +1,173 @@
+//! From an empty sky to a saved scene that splits, as a newcomer would go.
+
+use eframe::egui::{Key, Modifiers, Pos2, Rect, pos2, vec2};
+use egui_kittest::{Harness, kittest::Queryable};
+
+use super::{super::Studio, drawn, press, release, text, window};
+use crate::document::{Document, drawing::Drawing, files};
+
+const SKY: &str = "\
+bansho = 1
+[picture]
+size = [48, 27]
+frames = 4
+[[aurora]]
+preroll_s = 0.0
+particles = { count = 300 } # few, to be quick
+field = { cells = 31 }
+";
+
+fn plane(harness: &Harness<'_, Studio>, name: &str) -> Rect {
+    harness.get_by_label(name).rect()
+}
+
+/// Shares of the plane, from its north-west corner.
+fn at(plane: Rect, x: f32, y: f32) -> Pos2 {
+    pos2(plane.left() + x * plane.width(), plane.top() + y * plane.height())
+}
+
+/// Draws a line through shares of the target plane.
+fn stroke(harness: &mut Harness<'_, Studio>, line: &[[f32; 2]]) {
+    let plane = plane(harness, "Aurora target");
+    let place = |share: &[f32; 2]| at(plane, share[0], share[1]);
+    press(harness, place(&line[0]));
+    for pair in line.windows(2) {
+        for step in 1..=6 {
+            harness.hover_at(place(&pair[0]).lerp(place(&pair[1]), step as f32 / 6.0));
+            harness.step();
+        }
+    }
+    release(harness, place(&line[line.len() - 1]));
+}
+
+fn click(harness: &mut Harness<'_, Studio>, at: Pos2) {
+    press(harness, at);
+    release(harness, at);
+}
+
+fn choose(harness: &mut Harness<'_, Studio>, button: &str) {
+    harness.get_by_label(button).click();
+    drawn(harness);
+}
+
+fn drawing(harness: &mut Harness<'_, Studio>) -> Drawing {
+    let session = harness.state_mut().session();
+    Drawing::read(session.document.values(), 0, session.assets()).unwrap()
+}
+
+#[test]
+fn an_s_is_drawn_split_played_saved_and_opened_again() {
+    let mut harness = window(SKY);
+    stroke(&mut harness, &[[0.1, 0.5], [0.5, 0.45], [0.9, 0.5]]);
+    assert_eq!(drawing(&mut harness).lines(0).len(), 1);
+    choose(&mut harness, "Add shape");
+    harness.get_by_label("next stroke: sheet 1 of 1");
+    stroke(&mut harness, &[[0.1, 0.6], [0.7, 0.6], [0.7, 0.5], [0.3, 0.5], [0.3, 0.4], [0.9, 0.4]]);
+    choose(&mut harness, "Add shape");
+    choose(&mut harness, "Split");
+    let source = plane(&harness, "Aurora source");
+    click(&mut harness, at(source, 0.5, 0.5));
+    let split = drawing(&mut harness);
+    assert_eq!([split.lines(1).len(), split.lines(2).len()], [1, 2], "{}", text(&mut harness));
+    harness.get_by_label("next stroke: sheet 1 of 2");
+    stroke(&mut harness, &[[0.1, 0.65], [0.6, 0.65], [0.7, 0.55]]);
+    harness.get_by_label("next stroke: sheet 2 of 2");
+    stroke(&mut harness, &[[0.3, 0.42], [0.4, 0.35], [0.9, 0.35]]);
+
+    harness.get_by_label("Play").click();
+    harness.run_steps(12);
+    assert!(harness.state_mut().session().transport.is_playing());
+    harness.get_by_label("Pause").click();
+    drawn(&mut harness);
+
+    let edited = text(&mut harness);
+    assert!(edited.contains("# few, to be quick") && edited.matches("[[aurora.shapes]]").count() == 3, "{edited}");
+    assert!(edited.contains("split = [{ sheet = 1, at = 0."), "{edited}");
+    assert!(harness.state_mut().session().document.error().is_none());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.toml");
+    harness.state_mut().session().path = Some(path.clone());
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::S);
+    drawn(&mut harness);
+    assert!(!harness.state_mut().session().document.is_dirty());
+
+    let mut again = window("bansho = 1\n[[aurora]]\n");
+    let opened: Document = files::open(&path).unwrap();
+    again.state_mut().session().open(opened, Some(path));
+    drawn(&mut again);
+    assert_eq!(drawing(&mut again).lines(2).len(), 2);
+    assert_eq!(text(&mut again), edited);
+}
+
+#[test]
+fn impossible_choices_are_refused_with_the_reason() {
+    let mut harness = window(SKY);
+    stroke(&mut harness, &[[0.1, 0.5], [0.9, 0.5]]);
+    let before = text(&mut harness);
+    stroke(&mut harness, &[[0.5, 0.2], [0.5, 0.8]]);
+    assert_eq!(text(&mut harness), before);
+    harness.get_by_label_contains("sheet 2 meets sheet 1");
+    stroke(&mut harness, &[[0.3, 0.3], [0.6, 0.3]]);
+    assert!(harness.query_by_label_contains("meets").is_none(), "gone with the next stroke");
+    choose(&mut harness, "Split");
+    let target = plane(&harness, "Aurora target");
+    click(&mut harness, at(target, 0.5, 0.5));
+    harness.get_by_label_contains("the first shape comes from nothing");
+    choose(&mut harness, "Add shape");
+    choose(&mut harness, "Merge");
+    let source = plane(&harness, "Aurora source");
+    click(&mut harness, at(source, 0.5, 0.5));
+    harness.get_by_label_contains("sheets never branch");
+    click(&mut harness, at(source, 0.9, 0.5));
+    click(&mut harness, at(source, 0.6, 0.3));
+    assert_eq!(drawing(&mut harness).lines(1).len(), 1, "{}", text(&mut harness));
+    choose(&mut harness, "Merge");
+    click(&mut harness, at(source, 0.1, 0.5));
+    click(&mut harness, at(source, 0.3, 0.3));
+    harness.get_by_label_contains("ring");
+}
+
+#[test]
+fn points_are_moved_smoothed_brightened_and_erased() {
+    let mut harness = window(SKY);
+    stroke(&mut harness, &[[0.1, 0.5], [0.5, 0.3], [0.9, 0.5]]);
+    let peak = |harness: &mut Harness<'_, Studio>| {
+        drawing(harness).points(0, 0).iter().map(|point| point.y).fold(f64::INFINITY, f64::min)
+    };
+    let drawn_peak = peak(&mut harness);
+    choose(&mut harness, "Move");
+    let target = plane(&harness, "Aurora target");
+    let top = at(target, 0.5, 0.3);
+    press(&mut harness, top);
+    harness.hover_at(top - vec2(0.0, 20.0));
+    harness.step();
+    release(&mut harness, top - vec2(0.0, 40.0));
+    let moved_peak = peak(&mut harness);
+    assert!(moved_peak < drawn_peak - 20.0, "{drawn_peak} {moved_peak}");
+    choose(&mut harness, "Smooth");
+    let over = top - vec2(0.0, 40.0);
+    press(&mut harness, over);
+    for step in 0..6 {
+        harness.hover_at(over + vec2(2.0 * step as f32, 0.0));
+        harness.step();
+    }
+    release(&mut harness, over);
+    assert!(peak(&mut harness) > moved_peak + 5.0);
+    choose(&mut harness, "Brightness");
+    let end = at(target, 0.12, 0.49);
+    press(&mut harness, end);
+    for step in 0..10 {
+        harness.hover_at(end + vec2(if step % 2 == 0 { 8.0 } else { 0.0 }, 0.0));
+        harness.step();
+    }
+    release(&mut harness, end);
+    assert!(text(&mut harness).contains("flux = [["), "{}", text(&mut harness));
+    choose(&mut harness, "Erase");
+    let end = at(target, 0.9, 0.5);
+    press(&mut harness, end);
+    harness.hover_at(end - vec2(3.0, 0.0));
+    harness.step();
+    release(&mut harness, end);
+    let points = drawing(&mut harness).points(0, 0);
+    assert!(points[points.len() - 1].x < 230.0, "{points:?}");
+}

@@ -1,0 +1,242 @@
+//! The window driven as a person with a screen reader would: by what widgets are called.
+
+mod aurora;
+
+use std::{path::Path, sync::Arc, time::Instant};
+
+use bansho::{Assets, media::plates::FileAssets};
+use eframe::egui::{self, Key, Modifiers, Role, vec2};
+use egui_kittest::{Harness, kittest::Queryable};
+
+use super::{Session, Studio};
+use crate::{document::Document, player::SlicePlayer};
+
+const SCENE: &str = "\
+# A fire.
+bansho = 1
+[picture]
+size = [64, 36]
+frames = 10
+[[flame_sheet]]
+name = \"fire\" # the only one
+height = 0.9
+[[light]]
+position = [0.0, 1.0, 0.0]
+";
+
+fn assets(folder: &Path) -> Arc<dyn Assets> {
+    Arc::new(FileAssets::new(folder))
+}
+
+fn window(text: &str) -> Harness<'static, Studio> {
+    let session = Session::new(Document::new("fire.toml", text), None, Box::<SlicePlayer>::default(), assets);
+    let builder = Harness::builder().with_size(vec2(1400.0, 900.0)).with_max_steps(64);
+    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.show(ui), Studio::new(session, None));
+    drawn(&mut harness);
+    harness
+}
+
+/// Lets the window work until its picture is there.
+fn drawn(harness: &mut Harness<'_, Studio>) {
+    let began = Instant::now();
+    harness.run_steps(3);
+    while harness.state_mut().session().is_busy() {
+        harness.step();
+        assert!(began.elapsed().as_secs() < 60, "no picture");
+    }
+    harness.run_steps(2);
+}
+
+fn text(harness: &mut Harness<'_, Studio>) -> String {
+    harness.state_mut().session().document.text().to_string()
+}
+
+#[test]
+fn a_scene_is_shown_and_then_the_window_rests() {
+    let mut harness = window(SCENE);
+    let (picture, _) = harness.state_mut().session().picture().expect("a picture");
+    assert_eq!(picture.size, [64, 36]);
+    assert!(picture.pixels.iter().any(|pixel| pixel[0] > 100), "the fire is bright");
+    harness.try_run().expect("nothing moves any more, so nothing is drawn any more");
+    harness.get_by_label("64 × 36 of 64 × 36");
+}
+
+#[test]
+fn parameters_are_edited_by_their_names_and_comments_stay() {
+    let mut harness = window(SCENE);
+    harness.get_by_role_and_label(Role::Button, "fire").click();
+    harness.run_steps(3);
+    let height = harness.get_by_role_and_label(Role::SpinButton, "height");
+    assert_eq!(height.value().as_deref(), Some("0.900 m"));
+    height.set_value_accesskit(1.5);
+    drawn(&mut harness);
+    let edited = text(&mut harness);
+    assert!(edited.contains("height = 1.5") && edited.contains("# the only one"), "{edited}");
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    drawn(&mut harness);
+    assert_eq!(text(&mut harness), SCENE);
+}
+
+#[test]
+fn phenomena_are_hidden_and_shown_alone() {
+    let mut harness = window(&format!("{SCENE}[[rain]]\n"));
+    harness.get_by_label("Draw rain").click();
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("[[rain]]\nenabled = false"));
+    harness.get_by_label("Solo rain").click();
+    drawn(&mut harness);
+    let edited = text(&mut harness);
+    assert!(!edited.contains("[[rain]]\nenabled") && edited.contains("enabled = false"), "{edited}");
+}
+
+#[test]
+fn time_is_stepped_played_and_stopped() {
+    let mut harness = window(SCENE);
+    harness.get_by_label("Frame on").click();
+    drawn(&mut harness);
+    assert_eq!(harness.state_mut().session().transport.number(), 1);
+    harness.get_by_label("Play").click();
+    harness.run_steps(40);
+    let session = harness.state_mut().session();
+    assert!(session.transport.is_playing() && session.transport.number() != 1);
+    harness.get_by_label("Pause").click();
+    drawn(&mut harness);
+    let number = harness.state_mut().session().transport.number();
+    let shown = harness.state_mut().session().picture().map(|(picture, _)| picture.number);
+    assert_eq!(shown, Some(number));
+}
+
+#[test]
+fn faults_are_told_with_their_lines_and_lead_to_the_text() {
+    let mut harness = window(SCENE);
+    let faulty = SCENE.replace("height", "heigth");
+    harness.state_mut().session().document.replace("typing", &faulty);
+    drawn(&mut harness);
+    assert!(harness.state_mut().session().picture().is_some(), "the last good picture stays");
+    let fault = harness.get_by_label_contains("line 8: flame_sheet.0: unknown key `heigth`");
+    fault.click();
+    harness.run_steps(4);
+    let editor = harness.get_by_role(Role::MultilineTextInput);
+    assert!(editor.is_focused());
+}
+
+#[test]
+fn dragging_the_picture_turns_the_camera() {
+    let mut harness = window(SCENE);
+    let middle = harness.get_by_label("Viewport").rect().center();
+    drag(&mut harness, middle, vec2(120.0, 0.0));
+    let edited = text(&mut harness);
+    assert!(edited.contains("[camera]\nposition = ["), "{edited}");
+    assert_eq!(harness.state_mut().session().document.undo_label(), Some("camera"));
+    harness.state_mut().session().document.undo();
+    assert_eq!(text(&mut harness), SCENE, "a drag is one step");
+}
+
+#[test]
+fn blowing_is_wind_while_it_lasts_and_keyframes_when_recorded() {
+    let mut harness = window(SCENE);
+    harness.get_by_label("Blow").click();
+    harness.run_steps(2);
+    let middle = harness.get_by_label("Viewport").rect().center();
+    press(&mut harness, middle);
+    harness.hover_at(middle + vec2(100.0, 0.0));
+    harness.run_steps(3);
+    assert!(text(&mut harness).contains("velocity = ["));
+    release(&mut harness, middle + vec2(100.0, 0.0));
+    assert_eq!(text(&mut harness), SCENE, "as if it had never been");
+
+    harness.get_by_label("Record").click();
+    harness.run_steps(2);
+    press(&mut harness, middle);
+    for step in 1..30 {
+        harness.hover_at(middle + vec2(4.0 * step as f32, 0.0));
+        harness.step();
+    }
+    release(&mut harness, middle + vec2(116.0, 0.0));
+    let recorded = text(&mut harness);
+    assert!(recorded.contains("velocity = { keys = [[0.0, [0.0, 0.0, 0.0]]"), "{recorded}");
+    assert!(recorded.matches("], [").count() > 2, "{recorded}");
+    harness.state_mut().session().document.undo();
+    assert_eq!(text(&mut harness), SCENE, "a recording is one step");
+}
+
+#[test]
+fn lamps_are_dragged() {
+    let mut harness = window(SCENE);
+    harness.get_by_label("Place").click();
+    harness.run_steps(2);
+    // The camera looks at (0, 0.9, 0) from 4 m, so that the lamp stands a little above the middle.
+    let viewport = harness.get_by_label("Viewport").rect();
+    let height = viewport.width().min(viewport.height() * 64.0 / 36.0) * 36.0 / 64.0;
+    let lamp = viewport.center() - vec2(0.0, height * 0.1 / (2.0 * 4.01 * 0.286_7));
+    drag(&mut harness, lamp, vec2(80.0, 0.0));
+    let edited = text(&mut harness);
+    let line = edited.lines().find(|line| line.starts_with("position")).unwrap();
+    assert_ne!(line, "position = [0.0, 1.0, 0.0]", "{edited}");
+}
+
+#[test]
+fn a_plate_that_vanished_is_told_and_linked_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let plate = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/plates/checkerboard.png");
+    std::fs::copy(plate, folder.path().join("board.png")).unwrap();
+    let mut harness = window(&format!("{SCENE}[plate]\nimage = \"gone.png\" # the ground\n"));
+    harness.get_by_label_contains("gone.png: no such file");
+    harness.state_mut().session().path = Some(folder.path().join("scene.toml"));
+    harness.get_by_label("Relink").click();
+    harness.run_steps(3);
+    harness.get_by_label("board.png").click();
+    harness.run_steps(3);
+    harness.get_all_by_label("Relink").last().expect("the answer").click();
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("image = \"board.png\" # the ground"));
+}
+
+#[test]
+fn burners_are_dragged() {
+    let scene = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 2\n\
+        [[flame_particles]]\nparticles = 50\nposition = [0.0, 0.5, 0.0]\n[[flame_particles.burners]]\nposition = [0.5, 0.0, 0.0] # aside\n";
+    let mut harness = window(scene);
+    harness.get_by_label("Place").click();
+    harness.run_steps(2);
+    let plan = harness.state_mut().session().plan().cloned().unwrap();
+    let camera = plan.scene.camera.at(0.0, plan.size);
+    let seen = camera.project(bansho::base::math::DVec3::new(0.5, 0.5, 0.0)).unwrap().pixel;
+    let viewport = harness.get_by_label("Viewport").rect();
+    let scale = (viewport.width() / 64.0).min(viewport.height() / 36.0);
+    let burner = viewport.center() + vec2(seen.x as f32 - 32.0, seen.y as f32 - 18.0) * scale;
+    drag(&mut harness, burner, vec2(60.0, 0.0));
+    let edited = text(&mut harness);
+    assert!(edited.contains("# aside") && !edited.contains("[0.5, 0.0, 0.0]"), "{edited}");
+    assert!(edited.contains("position = [0.0, 0.5, 0.0]"), "the flame itself stays: {edited}");
+}
+
+#[test]
+fn a_question_mark_lists_the_shortcuts() {
+    let mut harness = window(SCENE);
+    assert!(harness.query_by_label("Play or pause").is_none());
+    harness.key_press(Key::Questionmark);
+    harness.run_steps(3);
+    harness.get_by_label("Play or pause");
+}
+
+fn press(harness: &mut Harness<'_, Studio>, at: egui::Pos2) {
+    harness.hover_at(at);
+    harness.step();
+    harness.drag_at(at);
+    harness.step();
+}
+
+fn release(harness: &mut Harness<'_, Studio>, at: egui::Pos2) {
+    harness.drop_at(at);
+    drawn(harness);
+}
+
+fn drag(harness: &mut Harness<'_, Studio>, from: egui::Pos2, by: egui::Vec2) {
+    press(harness, from);
+    for step in 1..=4 {
+        harness.hover_at(from + by * (step as f32 / 4.0));
+        harness.step();
+    }
+    release(harness, from + by);
+}

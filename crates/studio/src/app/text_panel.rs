@@ -1,0 +1,52 @@
+//! The scene file itself, to be typed in.
+
+use bansho::base::parameters::Span;
+use eframe::egui::{
+    self, TextEdit, Ui,
+    text::{CCursor, CCursorRange},
+};
+
+use super::session::Session;
+
+/// The panel with the text.
+#[derive(Default)]
+pub(super) struct TextPanel {
+    jump: Option<Span>,
+}
+
+impl TextPanel {
+    /// Marks these bytes of the text when it is shown next.
+    pub(super) fn jump_to(&mut self, span: Span) {
+        self.jump = Some(span);
+    }
+
+    /// Shows the text; what is typed is an edit like any other.
+    pub(super) fn show(&mut self, ui: &mut Ui, session: &mut Session) {
+        ui.heading("Text");
+        let mut text = session.document.text().to_string();
+        egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+            let editor = TextEdit::multiline(&mut text).code_editor().desired_width(f32::INFINITY).desired_rows(30);
+            let mut output = editor.show(ui);
+            if let Some(span) = self.jump.take() {
+                let marked = marked(&text, &span);
+                output.state.cursor.set_char_range(Some(marked));
+                output.state.store(ui.ctx(), output.response.id);
+                output.response.request_focus();
+                let at = output.galley.pos_from_cursor(marked.primary).translate(output.galley_pos.to_vec2());
+                ui.scroll_to_rect(at, Some(egui::Align::Center));
+            }
+            if output.response.changed() {
+                session.document.replace("typing", &text);
+            }
+            if output.response.lost_focus() {
+                session.document.seal();
+            }
+        });
+    }
+}
+
+/// The characters that bytes of the text stand for.
+fn marked(text: &str, span: &Span) -> CCursorRange {
+    let characters = |byte: usize| text.char_indices().take_while(|(at, _)| *at < byte).count();
+    CCursorRange::two(CCursor::new(characters(span.start)), CCursor::new(characters(span.end)))
+}

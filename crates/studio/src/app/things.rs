@@ -1,0 +1,66 @@
+//! What stands somewhere in the scene and can be dragged there: lamps, flames and their burners.
+
+use bansho::{
+    base::{
+        math::DVec3,
+        parameters::{Table, Value},
+    },
+    render::scene::Place,
+};
+
+use super::{keyed, session::Session};
+
+/// One of them.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Thing {
+    /// The value that says where it stands.
+    pub(super) place: Place,
+    /// What its value counts from, m.
+    pub(super) origin: DVec3,
+    /// Where it is now, m.
+    pub(super) point: DVec3,
+    /// What it is called.
+    pub(super) name: String,
+}
+
+/// Kinds of phenomena that stand at a `position`, and the list of their parts that have a place of their own.
+const STANDING: [(&str, &str); 2] = [("flame_sheet", "instances"), ("flame_particles", "burners")];
+
+/// All that stands somewhere at the present time.
+pub(super) fn things(session: &Session) -> Vec<Thing> {
+    let Some(plan) = session.plan() else { return Vec::new() };
+    let time = session.transport.time_s();
+    let lights = plan.scene.lights.iter().enumerate().filter(|(_, light)| light.stands());
+    let mut things: Vec<Thing> = lights
+        .map(|(index, light)| Thing {
+            place: Place::root().key("light").index(index).key("position"),
+            origin: DVec3::ZERO,
+            point: DVec3::from(light.position.at(time)),
+            name: format!("light {}", index + 1),
+        })
+        .collect();
+    let root = session.document.values();
+    for listed in session.document.phenomena() {
+        let Some((_, parts)) = STANDING.iter().find(|(kind, _)| *kind == listed.kind) else { continue };
+        let origin = position(root, &listed.place(), time);
+        let own = listed.place().key("position");
+        things.push(Thing { place: own, origin: DVec3::ZERO, point: origin, name: listed.name.clone() });
+        let list = listed.place().key(parts);
+        let Some(Value::List(items)) = list.find(root).map(|node| &node.value) else { continue };
+        things.extend((0..items.len()).map(|index| Thing {
+            place: list.index(index).key("position"),
+            origin,
+            point: origin + position(root, &list.index(index), time),
+            name: format!("{} {parts} {}", listed.name, index + 1),
+        }));
+    }
+    things
+}
+
+/// The `position` of the table at `place`; the origin where it states none.
+fn position(root: &Table, place: &Place, time: f64) -> DVec3 {
+    let stated = place.key("position").find(root).and_then(|node| keyed::at(&node.value, time));
+    let Some(Value::List(items)) = stated else { return DVec3::ZERO };
+    let axis = |index: usize| items.get(index).and_then(|item| item.value.as_number()).unwrap_or_default();
+    DVec3::new(axis(0), axis(1), axis(2))
+}

@@ -1,0 +1,108 @@
+//! From text to a plan, with every fault at its line.
+
+use std::sync::Arc;
+
+use bansho::{
+    Assets, KINDS, Plan, PlanError, PlanOptions, SceneError,
+    base::parameters::{Problem, ProblemKind, Table, Value},
+    parse_scene,
+    render::scene::{
+        Place,
+        operation::{self, Operation},
+        values,
+    },
+};
+
+/// The plan of the scene `text`. Makes every phenomenon once, which may take a while.
+///
+/// # Errors
+/// Every fault of the text and of the assets it names.
+pub fn check(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<Arc<Plan>, SceneError> {
+    let scene = parse_scene(name, text, assets.as_ref())?;
+    match Plan::new(scene, &PlanOptions::default(), assets.clone()) {
+        Ok(plan) => Ok(Arc::new(plan)),
+        Err(error) => {
+            Err(SceneError { file: name.to_owned(), text: text.to_owned(), problems: vec![unplaced(&error)] })
+        }
+    }
+}
+
+/// The plan of a draft of the scene `text`, which is simulated with fewer particles; `None` where no fewer would do.
+///
+/// # Errors
+/// As [`check`]; faults are those of the scene itself.
+pub fn check_draft(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Option<Result<Arc<Plan>, SceneError>> {
+    let fewer = fewer_particles(&values(text).ok()?);
+    let draft = operation::apply(text, &fewer).ok().filter(|_| !fewer.is_empty())?;
+    let scene = parse_scene(name, text, assets.as_ref());
+    Some(scene.and_then(|_| check(name, &draft, assets)))
+}
+
+/// What a draft makes do with: a kind of phenomenon, the key of its number of particles, and how many.
+const DRAFT: [(&str, &[&str], i64); 2] =
+    [("aurora", &["particles", "count"], 24_000), ("flame_particles", &["particles"], 4_000)];
+
+fn fewer_particles(root: &Table) -> Vec<Operation> {
+    let mut operations = Vec::new();
+    for (kind, keys, most) in DRAFT {
+        let Some(Value::List(all)) = root.get(kind).map(|node| &node.value) else { continue };
+        for index in 0..all.len() {
+            let place = keys.iter().fold(Place::root().key(kind).index(index), |place, key| place.key(key));
+            let stated = place.find(root).and_then(|node| node.value.as_number());
+            if stated.or_else(|| usual(kind, keys)).is_some_and(|count| count > most as f64) {
+                operations.push(Operation::Set { place, value: Value::Integer(most) });
+            }
+        }
+    }
+    operations
+}
+
+/// The default of a number of `kind`.
+fn usual(kind: &str, keys: &[&str]) -> Option<f64> {
+    let kind = KINDS.iter().find(|own| own.key == kind)?;
+    let (last, way) = keys.split_last()?;
+    let table = way.iter().try_fold((kind.table)(), |table, key| {
+        let parameter = table.parameters.iter().find(|parameter| parameter.key == *key)?;
+        match &parameter.kind {
+            bansho::base::parameters::Kind::Table(inner) => Some(inner()),
+            _ => None,
+        }
+    })?;
+    let parameter = table.parameters.iter().find(|parameter| parameter.key == *last)?;
+    parameter.default.as_ref()?.as_number()
+}
+
+/// A fault that only planning shows, which lies in no one line.
+fn unplaced(error: &PlanError) -> Problem {
+    Problem { span: None, path: String::new(), kind: ProblemKind::Conflict(error.to_string()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho::MemoryAssets;
+
+    use super::*;
+
+    fn draft(text: &str) -> Option<Result<Arc<Plan>, SceneError>> {
+        let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
+        check_draft("scene", text, &assets)
+    }
+
+    #[test]
+    fn a_draft_has_fewer_particles_where_there_are_many() {
+        let many = "bansho = 1\n[[aurora]]\n[[aurora]]\nparticles = { count = 500 }\n[[flame_particles]]\n";
+        let fewer = fewer_particles(&values(many).unwrap());
+        let places: Vec<String> = fewer.iter().map(|operation| operation.place().to_string()).collect();
+        assert_eq!(places, ["aurora.0.particles.count", "flame_particles.0.particles"]);
+        assert!(draft("bansho = 1\n[[flame_particles]]\n").is_some_and(|plan| plan.is_ok()));
+        assert!(draft("bansho = 1\n[[rain]]\n[[flame_particles]]\nparticles = 900\n").is_none());
+    }
+
+    #[test]
+    fn faults_are_those_of_the_scene_itself() {
+        let text = "bansho = 1\n[[flame_particles]]\nparticles = 9000\nno_such_key = 1\n";
+        let error = draft(text).and_then(Result::err).unwrap();
+        assert_eq!(error.text, text);
+        assert!(error.problems[0].to_string().contains("no_such_key"));
+    }
+}

@@ -1,0 +1,287 @@
+//! What hands do to shapes, as operations on the scene.
+
+use bansho::{
+    base::{
+        curve::Curve,
+        math::DVec2,
+        parameters::{Node, Parameters, Table, Value},
+    },
+    models::aurora::shapes::{Correspondence, Form, SheetParameters},
+    render::scene::{Place, operation::Operation},
+};
+
+use super::{
+    Drawing, Factor, lines,
+    sheets::{curve_chain, curve_part, stated, with_form, with_points},
+};
+
+/// An end of a sheet: which sheet, and whether its last point rather than its first.
+pub type End = (usize, bool);
+
+/// Half of the gap between the two parts of a sheet that was split, as a share of the square's side.
+const HALF_GAP: f64 = 0.012;
+
+impl Drawing {
+    /// A stroke in stead of sheet `sheet` of shape `shape`, or as a new one.
+    pub fn draw(&self, shape: usize, sheet: Option<usize>, stroke: &[DVec2]) -> Vec<Operation> {
+        let points = self.written(stroke);
+        self.put(shape, sheet, |old| with_points(old, points))
+    }
+
+    /// A named form in stead of sheet `sheet`, or as a new one.
+    pub fn put_form(&self, shape: usize, sheet: Option<usize>, form: Form) -> Vec<Operation> {
+        self.put(shape, sheet, |old| with_form(old, form))
+    }
+
+    fn put(
+        &self,
+        shape: usize,
+        sheet: Option<usize>,
+        change: impl FnOnce(&SheetParameters) -> SheetParameters,
+    ) -> Vec<Operation> {
+        // Shapes that the scene does not state give way to what is drawn.
+        let mut sheets = if self.is_stated() { self.sheets(shape) } else { Vec::new() };
+        match sheet.and_then(|sheet| sheets.get_mut(sheet)) {
+            Some(old) => *old = change(old),
+            None => sheets.push(change(&SheetParameters::default())),
+        }
+        self.write(shape, &sheets)
+    }
+
+    /// The strokes of the SVG file `path` in stead of the sheets of the first shape.
+    pub fn trace(&self, path: Value) -> Vec<Operation> {
+        let mut sheet = Table::default();
+        sheet.push("path", path);
+        let sheets = Value::List(vec![Value::Table(sheet).into()]);
+        if self.is_stated() {
+            return vec![Operation::Set { place: self.shape(0).key("sheets"), value: sheets }];
+        }
+        let mut shape = Table::default();
+        shape.push("sheets", sheets);
+        vec![Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) }]
+    }
+
+    /// Other points for sheet `sheet`, as they are moved and mended.
+    pub fn set_points(&self, shape: usize, sheet: usize, points: &[DVec2]) -> Vec<Operation> {
+        let mut sheets = self.sheets(shape);
+        let points = points.iter().map(|&point| self.rounded(point)).collect();
+        if let Some(old) = sheets.get_mut(sheet) {
+            *old = with_points(old, points);
+        }
+        self.write(shape, &sheets)
+    }
+
+    /// Without sheet `sheet`.
+    pub fn remove_sheet(&self, shape: usize, sheet: usize) -> Vec<Operation> {
+        let mut sheets = self.sheets(shape);
+        if sheet < sheets.len() {
+            sheets.remove(sheet);
+        }
+        self.write(shape, &sheets)
+    }
+
+    /// More or less of `factor` around the share `at` of sheet `sheet`.
+    pub fn paint(&self, shape: usize, sheet: usize, factor: Factor, at: f64, by: f64) -> Vec<Operation> {
+        const POINTS: usize = 16;
+        const REACH: f64 = 0.12;
+        let mut sheets = self.sheets(shape);
+        let Some(curve) = sheets.get_mut(sheet).map(|sheet| factor.of(sheet)) else { return Vec::new() };
+        let even: Vec<[f64; 2]> =
+            (0..=POINTS).map(|step| step as f64 / POINTS as f64).map(|at| [at, curve.eval(at)]).collect();
+        let [low, high] = factor.bounds();
+        let value = |value: f64| (value.clamp(low, high) * 1000.0).round() / 1000.0;
+        let points = lines::brushed(&even, at, by, REACH).into_iter().map(|[at, factor]| [at, value(factor)]).collect();
+        if let Ok(painted) = Curve::new(points, curve.interpolation()) {
+            *curve = painted;
+        }
+        self.write(shape, &sheets)
+    }
+
+    /// Splits sheet `sheet` of the shape before `shape` at the share `at` of its length; what it became is cut there too.
+    pub fn split(&self, shape: usize, sheet: usize, at: f64) -> Vec<Operation> {
+        let at = (at * 1000.0).round() / 1000.0;
+        let mut change = Table::default();
+        change.push("sheet", Value::Integer(sheet as i64 + 1));
+        change.push("at", Value::Number(at));
+        let mut operations =
+            vec![Operation::Append { place: self.shape(shape).key("split"), value: Value::Table(change) }];
+        let from = self.lines(shape - 1).get(sheet).and_then(|line| lines::part(line, [at, 1.0]).first().copied());
+        if let Some(target) = from.and_then(|from| self.arrival_of(shape, from)).filter(|_| self.shows_changes()) {
+            operations.extend(self.write(shape, &self.cut_at(shape, target)));
+        }
+        operations
+    }
+
+    /// Merges two ends of the shape before `shape`; what they became is joined too.
+    pub fn merge(&self, shape: usize, ends: [End; 2]) -> Vec<Operation> {
+        let mut change = Table::default();
+        let list = |numbers: [i64; 2]| Value::List(numbers.map(|number| Node::from(Value::Integer(number))).into());
+        change.push("sheets", list(ends.map(|(sheet, _)| sheet as i64 + 1)));
+        change.push("at", list(ends.map(|(_, last)| i64::from(last))));
+        let mut operations =
+            vec![Operation::Append { place: self.shape(shape).key("merge"), value: Value::Table(change) }];
+        let before = self.lines(shape - 1);
+        let at = |(sheet, last): End| {
+            let line = before.get(sheet)?;
+            self.arrival_of(shape, *if last { line.last()? } else { line.first()? })
+        };
+        if let [Some(first), Some(second)] = ends.map(at)
+            && self.shows_changes()
+        {
+            operations.extend(self.write(shape, &self.joined_at(shape, [first, second])));
+        }
+        operations
+    }
+
+    /// Makes sheet `from` of the shape before `shape` become sheet `to`: sheets then go in the order of the list.
+    pub fn correspond(&self, shape: usize, from: usize, to: usize) -> Vec<Operation> {
+        let mut sheets = self.sheets(shape);
+        if from < sheets.len() && to < sheets.len() {
+            sheets.swap(from, to);
+        }
+        let place = self.place.key("motion").key("correspondence");
+        let value = Value::Text(Correspondence::DrawingOrder.name().into());
+        let order = self.shows_changes().then_some(Operation::Set { place, value });
+        order.into_iter().chain(self.write(shape, &sheets)).collect()
+    }
+
+    /// One more shape, as the last one is.
+    pub fn add_shape(&self) -> Vec<Operation> {
+        let mut shape = Table::default();
+        shape.push("sheets", list_of(&self.sheets(self.arrivals().len() - 1)));
+        let shape = Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) };
+        // Shapes that the scene does not state must be stated before another can come of them.
+        if self.is_stated() { vec![shape] } else { vec![shape.clone(), shape] }
+    }
+
+    /// Without shape `shape`.
+    pub fn remove_shape(&self, shape: usize) -> Vec<Operation> {
+        vec![Operation::Remove { place: self.shape(shape) }]
+    }
+
+    /// Reaches shape `shape` so long after the one before was left, s.
+    pub fn retime(&self, shape: usize, after_s: f64) -> Vec<Operation> {
+        let place = self.shape(shape);
+        let in_frames = self.parameters.shapes.get(shape).is_some_and(|shape| shape.after_frames.is_some());
+        let frames = in_frames.then(|| Operation::Remove { place: place.key("after_frames") });
+        let seconds = Value::Number((after_s.max(0.1) * 100.0).round() / 100.0);
+        frames.into_iter().chain([Operation::Set { place: place.key("after_s"), value: seconds }]).collect()
+    }
+
+    /// Time from the shape before `shape` to this one, s.
+    pub fn after_s(&self, shape: usize) -> f64 {
+        let hold = self.parameters.shapes.get(shape.wrapping_sub(1)).map_or(0.0, |before| before.hold_s);
+        let at = |shape: usize| self.arrivals().get(shape).copied().unwrap_or_default();
+        at(shape) - at(shape.saturating_sub(1)) - hold
+    }
+
+    /// Whether a shape is drawn as it is after its splits and merges, rather than before.
+    pub fn shows_changes(&self) -> bool {
+        self.parameters.motion.correspondence == Correspondence::Automatic
+    }
+
+    fn shape(&self, shape: usize) -> Place {
+        self.place.key("shapes").index(shape)
+    }
+
+    /// Where in shape `shape` a point of the one before arrives.
+    fn arrival_of(&self, shape: usize, from: DVec2) -> Option<DVec2> {
+        let strands = self.ways(shape - 1);
+        let on = |ways: &Vec<[DVec2; 2]>| {
+            let [leaving, arriving] = [0, 1].map(|end| ways.iter().map(|way| way[end]).collect::<Vec<_>>());
+            let on = lines::nearest(&leaving, from)?;
+            Some((on.distance, arriving.get(on.segment)?.lerp(*arriving.get(on.segment + 1)?, on.share)))
+        };
+        strands.iter().filter_map(on).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point)
+    }
+
+    /// The sheets of shape `shape`, the one at `target` cut there.
+    fn cut_at(&self, shape: usize, target: DVec2) -> Vec<SheetParameters> {
+        let mut sheets = self.sheets(shape);
+        let all = self.lines(shape);
+        let on = |(sheet, line): (usize, &Vec<DVec2>)| Some((sheet, lines::nearest(line, target)?));
+        let nearest = all.iter().enumerate().filter_map(on).min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
+        let Some((sheet, on)) = nearest else { return sheets };
+        let line = &all[sheet];
+        let share = lines::share_of(line, on);
+        // A short part keeps most of itself.
+        if share * (1.0 - share) < f64::EPSILON {
+            // Where the sheet is cut already there is nothing to cut; the scene has the words for it.
+            return sheets;
+        }
+        let gap = HALF_GAP * self.extent_km() / lines::length(line).max(f64::MIN_POSITIVE);
+        let ranges = [[0.0, share - gap.min(0.25 * share)], [share + gap.min(0.25 * (1.0 - share)), 1.0]];
+        let parts = ranges.map(|range| SheetParameters {
+            flux: curve_part(&sheets[sheet].flux, range),
+            energy: curve_part(&sheets[sheet].energy, range),
+            ..with_points(&sheets[sheet], self.written(&lines::part(line, range)))
+        });
+        sheets.splice(sheet..=sheet, parts);
+        sheets
+    }
+
+    /// The sheets of shape `shape`, those that end at `targets` joined there.
+    fn joined_at(&self, shape: usize, targets: [DVec2; 2]) -> Vec<SheetParameters> {
+        let mut sheets = self.sheets(shape);
+        let all = self.lines(shape);
+        let ends = targets.map(|target| nearest_end(&all, target));
+        let [Some(first), Some(second)] = ends else { return sheets };
+        if first.0 == second.0 {
+            return sheets;
+        }
+        // The first runs toward the seam, the second away from it.
+        let turned = [!first.1, second.1];
+        let mut parts = [self.points(shape, first.0), self.points(shape, second.0)];
+        parts.iter_mut().zip(turned).filter(|(_, turned)| *turned).for_each(|(part, _)| part.reverse());
+        let [one, other] = [lines::length(&parts[0]), lines::length(&parts[1])];
+        let curves = |curve: fn(&SheetParameters) -> &Curve| {
+            let of = |sheet: usize, turned: bool| (curve(&sheets[sheet]), turned);
+            curve_chain([of(first.0, turned[0]), of(second.0, turned[1])], one / (one + other))
+        };
+        let (flux, energy) = (curves(|sheet| &sheet.flux), curves(|sheet| &sheet.energy));
+        let points = parts.concat().into_iter().map(|point| self.rounded(point)).collect();
+        let joined = SheetParameters { flux, energy, ..with_points(&sheets[first.0], points) };
+        sheets[first.0.min(second.0)] = joined;
+        sheets.remove(first.0.max(second.0));
+        sheets
+    }
+
+    /// The operations that make the sheets of shape `shape` to be `sheets`, and leave everything else as it stands.
+    fn write(&self, shape: usize, sheets: &[SheetParameters]) -> Vec<Operation> {
+        let place = self.shape(shape).key("sheets");
+        let Some(old) = self.parameters.shapes.get(shape).map(|shape| &shape.sheets) else {
+            let mut shape = Table::default();
+            shape.push("sheets", list_of(sheets));
+            return vec![Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) }];
+        };
+        if old.len() != sheets.len() {
+            return vec![Operation::Set { place, value: list_of(sheets) }];
+        }
+        let pairs = old.iter().zip(sheets).enumerate();
+        pairs.flat_map(|(sheet, (old, new))| differences(&place.index(sheet), old, new)).collect()
+    }
+}
+
+fn nearest_end(all: &[Vec<DVec2>], target: DVec2) -> Option<End> {
+    let ends = all.iter().enumerate().flat_map(|(sheet, line)| {
+        let end = |last: bool, point: Option<&DVec2>| point.map(|point| (point.distance(target), (sheet, last)));
+        [end(false, line.first()), end(true, line.last())]
+    });
+    ends.flatten().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, end)| end)
+}
+
+fn list_of(sheets: &[SheetParameters]) -> Value {
+    Value::List(sheets.iter().map(|sheet| Value::Table(stated(sheet)).into()).collect())
+}
+
+/// What must be stated and taken out so that `old` becomes `new`.
+fn differences(place: &Place, old: &SheetParameters, new: &SheetParameters) -> Vec<Operation> {
+    let [old, new] = [stated(old), stated(new)];
+    let keys = SheetParameters::table().parameters.iter().map(|parameter| parameter.key);
+    let change = |key: &'static str| match (old.get(key), new.get(key)) {
+        (old, new) if old == new => None,
+        (_, Some(node)) => Some(Operation::Set { place: place.key(key), value: node.value.clone() }),
+        (_, None) => Some(Operation::Remove { place: place.key(key) }),
+    };
+    keys.filter_map(change).collect()
+}

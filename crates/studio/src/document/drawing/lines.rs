@@ -1,0 +1,146 @@
+//! Lines as hands draw and mend them. Points are km, x east and y south.
+
+use bansho::base::math::{DVec2, lerp};
+
+/// A place on a line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OnLine {
+    /// The segment, from the point of that number to the next.
+    pub segment: usize,
+    /// The share of the segment.
+    pub share: f64,
+    /// Where it is, km.
+    pub point: DVec2,
+    /// How far that is from what was asked for, km.
+    pub distance: f64,
+}
+
+/// The place on `line` that is nearest to `to`; `None` where the line has no segment.
+pub fn nearest(line: &[DVec2], to: DVec2) -> Option<OnLine> {
+    let on = |(segment, ends): (usize, &[DVec2])| {
+        let (from, way) = (ends[0], ends[1] - ends[0]);
+        let squared = way.length_squared();
+        let share = if squared > 0.0 { ((to - from).dot(way) / squared).clamp(0.0, 1.0) } else { 0.0 };
+        let point = from + share * way;
+        OnLine { segment, share, point, distance: point.distance(to) }
+    };
+    line.windows(2).enumerate().map(on).min_by(|a, b| a.distance.total_cmp(&b.distance))
+}
+
+/// Length of `line`, km.
+pub fn length(line: &[DVec2]) -> f64 {
+    line.windows(2).map(|ends| ends[0].distance(ends[1])).sum()
+}
+
+/// The share of the whole length up to `at`.
+pub fn share_of(line: &[DVec2], at: OnLine) -> f64 {
+    let before = length(line.get(..=at.segment).unwrap_or(line));
+    let here = line.get(at.segment..at.segment + 2).map_or(0.0, length);
+    let total = length(line);
+    if total > 0.0 { (before + at.share * here) / total } else { 0.5 }
+}
+
+/// The part of `line` between two shares of its length.
+pub fn part(line: &[DVec2], [from, to]: [f64; 2]) -> Vec<DVec2> {
+    let total = length(line);
+    let mut way = 0.0;
+    let mut points = Vec::new();
+    for ends in line.windows(2) {
+        let step = ends[0].distance(ends[1]);
+        let at = |share: f64| ends[0].lerp(ends[1], (share * total - way) / step);
+        let [starts, stops] = [from, to].map(|share| (way..way + step).contains(&(share * total)));
+        if starts {
+            points.push(at(from));
+        }
+        if stops && to < 1.0 {
+            points.push(at(to));
+        }
+        way += step;
+        if way > from * total && (way < to * total || to >= 1.0) {
+            points.push(ends[1]);
+        }
+    }
+    points
+}
+
+/// The line with as few of its points as keep it within `tolerance` (Douglas & Peucker 1973).
+pub fn simplified(points: &[DVec2], tolerance: f64) -> Vec<DVec2> {
+    let mut kept = vec![false; points.len()];
+    let mut spans = vec![[0, points.len().saturating_sub(1)]];
+    kept.iter_mut().take(1).for_each(|first| *first = true);
+    while let Some([first, last]) = spans.pop() {
+        kept.iter_mut().skip(last).take(1).for_each(|end| *end = true);
+        let chord = [points.get(first), points.get(last)].map(|end| end.copied().unwrap_or_default());
+        let off = |index: usize| nearest(&chord, points[index]).map_or(0.0, |on| on.distance);
+        let farthest = (first + 1..last).map(|index| (index, off(index))).max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((index, _)) = farthest.filter(|(_, distance)| *distance > tolerance) {
+            spans.extend([[first, index], [index, last]]);
+        }
+    }
+    points.iter().zip(kept).filter(|(_, kept)| *kept).map(|(point, _)| *point).collect()
+}
+
+/// Points within `radius` of `around` drawn toward the middle of their neighbours, most in the middle; ends stay.
+pub fn smoothed(points: &[DVec2], around: DVec2, radius: f64) -> Vec<DVec2> {
+    let mut smooth = points.to_vec();
+    for (index, three) in points.windows(3).enumerate() {
+        let weight = 0.5 * (1.0 - three[1].distance(around) / radius).max(0.0);
+        smooth[index + 1] = three[1].lerp(three[0].midpoint(three[2]), weight);
+    }
+    smooth
+}
+
+/// Factors along a sheet, as (share, factor), brushed by `by` at the share `at`, less and less up to `reach` to both sides.
+pub fn brushed(factors: &[[f64; 2]], at: f64, by: f64, reach: f64) -> Vec<[f64; 2]> {
+    let weight = |share: f64| (1.0 - (share - at).abs() / reach).max(0.0);
+    factors.iter().map(|&[share, factor]| [share, lerp(factor, factor + by, weight(share))]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(points: &[[f64; 2]]) -> Vec<DVec2> {
+        points.iter().map(|&point| DVec2::from(point)).collect()
+    }
+
+    #[test]
+    fn the_nearest_place_is_on_a_segment_or_at_an_end() {
+        let corner = line(&[[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]]);
+        let on = nearest(&corner, DVec2::new(1.0, -2.0)).unwrap();
+        assert_eq!((on.segment, on.point, on.distance), (0, DVec2::new(1.0, 0.0), 2.0));
+        assert_eq!(share_of(&corner, on), 0.25);
+        let end = nearest(&corner, DVec2::new(4.0, 1.0)).unwrap();
+        assert_eq!((end.segment, end.share, share_of(&corner, end)), (1, 1.0, 1.0));
+        assert_eq!(nearest(&corner[..1], DVec2::ZERO), None);
+    }
+
+    #[test]
+    fn parts_begin_and_end_where_they_should() {
+        let corner = line(&[[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]]);
+        assert_eq!(part(&corner, [0.25, 0.5]), line(&[[1.0, 0.0], [2.0, 0.0]]));
+        assert_eq!(part(&corner, [0.5, 1.0]), line(&[[2.0, 0.0], [3.0, 0.0], [3.0, 1.0]]));
+        assert_eq!(part(&corner, [0.0, 0.875]), line(&[[0.0, 0.0], [3.0, 0.0], [3.0, 0.5]]));
+        assert_eq!(part(&corner, [0.0, 1.0]), corner);
+    }
+
+    #[test]
+    fn a_line_keeps_only_the_points_that_shape_it() {
+        let wavering = line(&[[0.0, 0.0], [1.0, 0.01], [2.0, -0.01], [3.0, 0.0], [3.0, 1.0]]);
+        assert_eq!(simplified(&wavering, 0.1), line(&[[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]]));
+        assert_eq!(simplified(&wavering, 0.001), wavering);
+        assert_eq!(simplified(&[], 0.1), []);
+    }
+
+    #[test]
+    fn smoothing_takes_a_kink_back_and_leaves_the_rest() {
+        let kink = line(&[[0.0, 0.0], [1.0, 2.0], [2.0, 0.0], [9.0, 0.0], [10.0, 1.0]]);
+        let smooth = smoothed(&kink, DVec2::new(1.0, 2.0), 2.0);
+        assert_eq!(smooth, line(&[[0.0, 0.0], [1.0, 1.0], [2.0, 0.0], [9.0, 0.0], [10.0, 1.0]]));
+    }
+
+    #[test]
+    fn a_brush_raises_most_in_its_middle() {
+        assert_eq!(brushed(&[[0.0, 1.0], [0.5, 1.0], [1.0, 1.0]], 0.5, 0.4, 1.0), [[0.0, 1.2], [0.5, 1.4], [1.0, 1.2]]);
+    }
+}

@@ -1,0 +1,161 @@
+//! Sheets as the scene states them, changed by hands.
+
+use bansho::{
+    base::{
+        curve::Curve,
+        math::{DVec2, lerp},
+        parameters::{Auto, Parameters, Table},
+    },
+    models::aurora::shapes::SheetParameters,
+};
+
+use super::{Drawing, lines};
+
+/// What can be painted along a sheet, each a factor of the aurora's own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Factor {
+    /// Energy flux: how bright it is.
+    Flux,
+    /// Energy of the electrons: how low it reaches, and its colours.
+    Energy,
+}
+
+impl Factor {
+    /// Its curve in `sheet`.
+    pub(super) fn of(self, sheet: &mut SheetParameters) -> &mut Curve {
+        match self {
+            Self::Flux => &mut sheet.flux,
+            Self::Energy => &mut sheet.energy,
+        }
+    }
+
+    /// Its least and its greatest value by hand; a file may say more.
+    pub(super) fn bounds(self) -> [f64; 2] {
+        match self {
+            Self::Flux => [0.0, 8.0],
+            Self::Energy => [0.1, 8.0],
+        }
+    }
+}
+
+impl Drawing {
+    /// A line is kept within this share of the square's side.
+    const TOLERANCE: f64 = 0.002;
+
+    /// A line with few points, as a person would write them down.
+    pub(super) fn written(&self, line: &[DVec2]) -> Vec<[f64; 2]> {
+        let points = lines::simplified(line, Self::TOLERANCE * self.extent_km());
+        points.into_iter().map(|point| self.rounded(point)).collect()
+    }
+
+    /// To a thousandth of the square's side or finer, within the square.
+    pub(super) fn rounded(&self, point: DVec2) -> [f64; 2] {
+        let half = self.extent_km() / 2.0;
+        let places = if self.extent_km() >= 100.0 { 10.0 } else { 1000.0 };
+        point.clamp(DVec2::splat(-half), DVec2::splat(half)).to_array().map(|km| (km * places).round() / places)
+    }
+
+    /// The points of sheet `sheet` of shape `shape` as hands move them: those of the file where it lists them.
+    pub fn points(&self, shape: usize, sheet: usize) -> Vec<DVec2> {
+        let entry = self.sheets(shape).into_iter().nth(sheet);
+        match entry.filter(is_plain).and_then(|entry| entry.points) {
+            Some(points) => points.into_iter().map(DVec2::from).collect(),
+            None => {
+                let line = self.lines(shape).into_iter().nth(sheet).unwrap_or_default();
+                lines::simplified(&line, Self::TOLERANCE * self.extent_km())
+            }
+        }
+    }
+
+    /// One entry a sheet: what the file says where it says so sheet by sheet, else the lines that come of it.
+    pub(super) fn sheets(&self, shape: usize) -> Vec<SheetParameters> {
+        let stated = self.parameters.shapes.get(shape).map(|shape| shape.sheets.clone()).unwrap_or_default();
+        let lines = self.lines(shape);
+        if stated.len() == lines.len() {
+            return stated;
+        }
+        lines.iter().map(|line| with_points(&SheetParameters::default(), self.written(line))).collect()
+    }
+}
+
+/// Whether the points of `sheet` are where they are said to be.
+fn is_plain(sheet: &SheetParameters) -> bool {
+    let placing = |sheet: &SheetParameters| (sheet.position_km, sheet.rotation_deg, sheet.scale, sheet.mirror);
+    placing(sheet) == placing(&SheetParameters::default())
+}
+
+/// `sheet` as a stroke through `points`, whatever it was before.
+pub(super) fn with_points(sheet: &SheetParameters, points: Vec<[f64; 2]>) -> SheetParameters {
+    SheetParameters {
+        points: Some(points),
+        smooth: sheet.smooth,
+        flux: sheet.flux.clone(),
+        energy: sheet.energy.clone(),
+        ..SheetParameters::default()
+    }
+}
+
+/// `sheet` as a named form of the usual size, where it was.
+pub(super) fn with_form(sheet: &SheetParameters, form: bansho::models::aurora::shapes::Form) -> SheetParameters {
+    SheetParameters {
+        points: None,
+        path: None,
+        stroke: None,
+        form: Some(form),
+        bend_deg: Auto::Auto,
+        count: Auto::Auto,
+        smooth: true,
+        ..sheet.clone()
+    }
+}
+
+/// The part of a factor's curve between two shares of the length.
+pub(super) fn curve_part(curve: &Curve, [from, to]: [f64; 2]) -> Curve {
+    if curve.points().len() < 2 {
+        return curve.clone();
+    }
+    let inner = curve.points().iter().filter(|point| point[0] > from && point[0] < to);
+    let mut points = vec![[0.0, curve.eval(from)]];
+    points.extend(inner.map(|&[at, value]| [(at - from) / (to - from), value]));
+    points.push([1.0, curve.eval(to)]);
+    Curve::new(points, curve.interpolation()).unwrap_or_else(|_| curve.clone())
+}
+
+/// Two curves end to end, the first up to the share `share`; each may run against its own direction.
+pub(super) fn curve_chain(parts: [(&Curve, bool); 2], share: f64) -> Curve {
+    /// What the two meet over, as a share of the whole.
+    const SEAM: f64 = 1e-3;
+    let [first, second] = parts;
+    if first.0 == second.0 && first.0.points().len() < 2 {
+        return first.0.clone();
+    }
+    let ranges = [[0.0, share - SEAM], [share + SEAM, 1.0]];
+    let mut points = Vec::new();
+    for ((curve, reversed), [from, to]) in parts.into_iter().zip(ranges) {
+        let mut own = curve_part(&sampled(curve), [0.0, 1.0]).points().to_vec();
+        if reversed {
+            own = own.iter().rev().map(|&[at, value]| [1.0 - at, value]).collect();
+        }
+        points.extend(own.iter().map(|&[at, value]| [lerp(from, to, at), value]));
+    }
+    Curve::new(points, first.0.interpolation()).unwrap_or_else(|_| first.0.clone())
+}
+
+/// The curve with points from end to end.
+pub(super) fn sampled(curve: &Curve) -> Curve {
+    let value = |at: f64| [at, curve.eval(at)];
+    let ends = Curve::new(vec![value(0.0), value(1.0)], curve.interpolation()).unwrap_or_else(|_| curve.clone());
+    if curve.points().len() < 2 { ends } else { curve.clone() }
+}
+
+/// What `parameters` say beside the defaults.
+pub(super) fn stated<P: Parameters>(parameters: &P) -> Table {
+    let usual = P::default().to_table();
+    let mut table = Table::default();
+    for entry in parameters.to_table().entries {
+        if usual.get(&entry.key) != Some(&entry.node) {
+            table.push(entry.key, entry.node.value);
+        }
+    }
+    table
+}

@@ -1,0 +1,141 @@
+use std::sync::Arc;
+
+use bansho::{Assets, MemoryAssets, base::math::DVec2, models::aurora::shapes::Form};
+
+use super::{Drawing, Factor, Refusal};
+use crate::document::Document;
+
+const ARC: &str = "\
+bansho = 1
+[[aurora]]
+extent_km = 800.0 # wide
+[[aurora.shapes]]
+sheets = [{ points = [[-200, 0], [0, 0], [200, 0]] }] # the arc
+";
+
+fn assets() -> Arc<dyn Assets> {
+    Arc::new(MemoryAssets::default())
+}
+
+fn open(text: &str) -> (Document, Drawing) {
+    let document = Document::new("aurora", text);
+    let drawing = Drawing::read(document.values(), 0, &assets()).unwrap();
+    (document, drawing)
+}
+
+fn change(document: &mut Document, operations: &[bansho::render::scene::operation::Operation]) -> Drawing {
+    document.reshape("change", operations, 0, &assets()).unwrap()
+}
+
+fn stroke(points: &[[f64; 2]]) -> Vec<DVec2> {
+    points.iter().map(|&point| DVec2::from(point)).collect()
+}
+
+fn is_good(document: &mut Document) -> bool {
+    document.check_now(&assets());
+    document.error().is_none()
+}
+
+#[test]
+fn strokes_are_drawn_as_new_sheets_and_in_stead_of_old_ones() {
+    let (mut document, drawing) = open("bansho = 1\n[[aurora]]\n");
+    assert!(!drawing.is_stated() && drawing.arrivals() == [0.0]);
+    let drawing = change(&mut document, &drawing.draw(0, None, &stroke(&[[-100.0, 0.0], [0.0, 0.04], [100.0, 0.0]])));
+    let drawing = change(&mut document, &drawing.draw(0, None, &stroke(&[[-100.0, 50.0], [100.0, 50.0]])));
+    assert!(document.text().contains("points = [[-100.0, 0.0], [100.0, 0.0]]"), "{}", document.text());
+    let drawing = change(&mut document, &drawing.draw(0, Some(1), &stroke(&[[-100.0, -50.0], [100.0, -50.0]])));
+    assert_eq!(drawing.lines(0).len(), 2);
+    assert_eq!(drawing.points(0, 1), stroke(&[[-100.0, -50.0], [100.0, -50.0]]));
+    assert!(is_good(&mut document));
+}
+
+#[test]
+fn impossible_strokes_are_refused_in_the_scene_s_words() {
+    let (mut document, drawing) = open(ARC);
+    let across = drawing.draw(0, None, &stroke(&[[0.0, -100.0], [0.0, 100.0]]));
+    let refusal = document.reshape("draw", &across, 0, &assets()).unwrap_err();
+    assert!(refusal.to_string().starts_with("shape 1: sheet 2 meets sheet 1"), "{refusal}");
+    assert_eq!(**document.text(), *ARC);
+    assert!(matches!(Drawing::read(document.values(), 1, &assets()), Err(Refusal::Missing)));
+}
+
+#[test]
+fn a_split_cuts_what_the_sheet_became() {
+    let (mut document, drawing) = open(ARC);
+    let drawing = change(&mut document, &drawing.add_shape());
+    let bent = stroke(&[[-200.0, 100.0], [0.0, 60.0], [200.0, 100.0]]);
+    let drawing = change(&mut document, &drawing.draw(1, Some(0), &bent));
+    let drawing = change(&mut document, &drawing.split(1, 0, 0.5));
+    assert_eq!([drawing.lines(0).len(), drawing.lines(1).len()], [1, 2]);
+    assert_eq!(drawing.ways(0).len(), 2);
+    let ends = [drawing.points(1, 0), drawing.points(1, 1)];
+    assert!(ends[0].last().unwrap().x < -5.0 && ends[1].first().unwrap().x > 5.0, "{ends:?}");
+    assert!((ends[0].last().unwrap().y - 60.0).abs() < 2.0, "{ends:?}");
+    assert!(document.text().contains("# the arc") && document.text().contains("# wide"), "{}", document.text());
+    let twice = drawing.split(1, 0, 0.5);
+    let refusal = document.reshape("split", &twice, 0, &assets()).unwrap_err();
+    assert!(refusal.to_string().contains("split already"), "{refusal}");
+    assert!(is_good(&mut document));
+}
+
+#[test]
+fn two_ends_grow_together_and_a_ring_is_refused() {
+    let (mut document, drawing) = open(ARC);
+    let drawing = change(&mut document, &drawing.draw(0, None, &stroke(&[[220.0, 60.0], [-200.0, 60.0]])));
+    let drawing = change(&mut document, &drawing.add_shape());
+    let merge = drawing.merge(1, [(0, true), (1, false)]);
+    let drawing = change(&mut document, &merge);
+    assert_eq!(drawing.lines(1).len(), 1);
+    let points = drawing.points(1, 0);
+    assert_eq!((points[0], points[points.len() - 1]), (DVec2::new(-200.0, 0.0), DVec2::new(-200.0, 60.0)));
+    let refusal = document.reshape("merge", &drawing.merge(1, [(0, false), (1, true)]), 0, &assets()).unwrap_err();
+    assert!(refusal.to_string().contains("ring"), "{refusal}");
+    assert!(is_good(&mut document));
+}
+
+#[test]
+fn forms_are_put_and_moved_point_by_point() {
+    let (mut document, drawing) = open(ARC);
+    let drawing = change(&mut document, &drawing.put_form(0, Some(0), Form::SShape));
+    assert!(document.text().contains("sheets = [{ form = \"s_shape\" }]"), "{}", document.text());
+    let mut points = drawing.points(0, 0);
+    assert!((5..60).contains(&points.len()), "{}", points.len());
+    points[0].y += 10.0;
+    let drawing = change(&mut document, &drawing.set_points(0, 0, &points));
+    assert!(!document.text().contains("form ="));
+    assert!((drawing.points(0, 0)[0].y - points[0].y).abs() < 0.1);
+}
+
+#[test]
+fn brightness_is_painted_where_the_brush_is() {
+    let (mut document, drawing) = open(ARC);
+    let drawing = change(&mut document, &drawing.paint(0, 0, Factor::Flux, 0.25, 1.0));
+    assert!(document.text().contains("flux = [[0.0, 1.0]"), "{}", document.text());
+    let drawing = change(&mut document, &drawing.paint(0, 0, Factor::Energy, 0.75, -0.5));
+    let mut sheets = drawing.sheets(0);
+    assert_eq!(Factor::Flux.of(&mut sheets[0]).eval(0.25), 2.0);
+    assert_eq!(Factor::Energy.of(&mut sheets[0]).eval(0.75), 0.5);
+    assert_eq!(Factor::Flux.of(&mut sheets[0]).eval(0.75), 1.0);
+}
+
+#[test]
+fn shapes_are_added_timed_and_removed() {
+    let (mut document, drawing) = open("bansho = 1\n[[aurora]]\n");
+    let drawing = change(&mut document, &drawing.add_shape());
+    assert_eq!(drawing.arrivals().len(), 2);
+    let drawing = change(&mut document, &drawing.retime(1, 2.5));
+    assert_eq!((drawing.arrivals()[1], drawing.after_s(1)), (2.5, 2.5));
+    let drawing = change(&mut document, &drawing.remove_shape(1));
+    assert_eq!(drawing.arrivals().len(), 1);
+    assert!(is_good(&mut document));
+}
+
+#[test]
+fn sheets_are_told_which_they_become() {
+    let (mut document, drawing) = open(ARC);
+    let drawing = change(&mut document, &drawing.draw(0, None, &stroke(&[[-200.0, 60.0], [200.0, 60.0]])));
+    let drawing = change(&mut document, &drawing.add_shape());
+    let drawing = change(&mut document, &drawing.correspond(1, 0, 1));
+    assert!(document.text().contains("motion = { correspondence = \"drawing_order\" }"), "{}", document.text());
+    assert!(drawing.ways(0)[0].iter().all(|[from, to]| from.y.abs() < 1e-9 && (to.y - 60.0).abs() < 1e-9));
+}

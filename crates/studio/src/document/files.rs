@@ -1,0 +1,103 @@
+//! Documents in files: opening, saving whole or not at all, and the list of recent ones.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use bansho::media::{MediaError, atomic};
+
+use super::Document;
+
+/// Why a document cannot be opened.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: cannot be opened: {source}", path = .path.display())]
+pub struct OpenError {
+    /// Its file.
+    pub path: PathBuf,
+    /// What the system said.
+    pub source: io::Error,
+}
+
+/// The text in `path`.
+///
+/// # Errors
+/// There is no such file, it cannot be read, or it is not UTF-8.
+pub fn read(path: &Path) -> Result<String, OpenError> {
+    fs::read_to_string(path).map_err(|source| OpenError { path: path.to_path_buf(), source })
+}
+
+/// Opens the scene in `path`.
+///
+/// # Errors
+/// As [`read`].
+pub fn open(path: &Path) -> Result<Document, OpenError> {
+    Ok(Document::new(path.display().to_string(), read(path)?))
+}
+
+/// Saves `document` to `path`, whole or not at all.
+///
+/// # Errors
+/// The file cannot be written; the one that was there stays.
+pub fn save(document: &mut Document, path: &Path) -> Result<(), MediaError> {
+    let text = document.text().clone();
+    atomic::write_bytes(path, text.as_bytes())?;
+    document.mark_saved(text);
+    document.rename(path.display().to_string());
+    Ok(())
+}
+
+/// Writes a copy beside `path`, where it is found after a failure, and says where.
+///
+/// # Errors
+/// The copy cannot be written.
+pub fn rescue(text: &str, path: &Path) -> Result<PathBuf, MediaError> {
+    let beside = path.with_extension("rescued.toml");
+    atomic::write_bytes(&beside, text.as_bytes())?;
+    Ok(beside)
+}
+
+/// What another program made of the file since it was opened or saved here, if anything.
+pub fn changed_outside(document: &Document, path: &Path) -> Option<Arc<str>> {
+    let there = fs::read_to_string(path).ok()?;
+    (*there != *document.saved).then(|| there.into())
+}
+
+/// Files that were open lately, the last first, kept as one path a line.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Recent {
+    file: Option<PathBuf>,
+    paths: Vec<PathBuf>,
+}
+
+/// Most files that are remembered.
+const MOST_RECENT: usize = 12;
+
+impl Recent {
+    /// The list in `file`; empty where there is none.
+    pub fn read(file: PathBuf) -> Self {
+        let text = fs::read_to_string(&file).unwrap_or_default();
+        let paths = text.lines().filter(|line| !line.is_empty()).map(PathBuf::from).take(MOST_RECENT).collect();
+        Self { file: Some(file), paths }
+    }
+
+    /// The files, the last first.
+    pub fn paths(&self) -> &[PathBuf] {
+        &self.paths
+    }
+
+    /// Puts `path` first and keeps the list.
+    ///
+    /// # Errors
+    /// The list cannot be written; it is then right until the program ends.
+    pub fn note(&mut self, path: &Path) -> Result<(), MediaError> {
+        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        self.paths.retain(|other| *other != path);
+        self.paths.insert(0, path);
+        self.paths.truncate(MOST_RECENT);
+        let Some(file) = &self.file else { return Ok(()) };
+        let lines: Vec<String> = self.paths.iter().map(|path| path.display().to_string()).collect();
+        atomic::write_bytes(file, (lines.join("\n") + "\n").as_bytes())
+    }
+}

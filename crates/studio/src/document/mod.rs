@@ -1,0 +1,221 @@
+//! The scene as text: edits that keep its comments, undo, faults at their lines, and the last plan that was good.
+
+mod check;
+pub mod drawing;
+pub mod files;
+mod history;
+mod phenomena;
+pub mod recovery;
+#[cfg(test)]
+mod tests;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod watch;
+
+use std::sync::Arc;
+
+use bansho::{
+    Assets, Plan, SceneError,
+    base::parameters::{Problem, Table},
+    render::scene::{
+        Place,
+        edit::EditError,
+        operation::{self, Operation},
+        values,
+    },
+};
+
+pub use check::{check, check_draft};
+pub use phenomena::{Listed, operations};
+
+use history::History;
+
+/// Counts the states of a document, so that work on one can be told from work on another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Revision(u64);
+
+/// A scene that is being edited.
+pub struct Document {
+    name: String,
+    text: Arc<str>,
+    saved: Arc<str>,
+    revision: Revision,
+    history: History,
+    values: Table,
+    syntax: Option<Problem>,
+    verdict: Verdict,
+}
+
+/// What checking found out so far.
+#[derive(Default)]
+struct Verdict {
+    of: Option<Revision>,
+    plan: Option<Arc<Plan>>,
+    error: Option<Arc<SceneError>>,
+}
+
+impl Document {
+    /// A document with this text, unchanged so far; `name` is what errors call it.
+    pub fn new(name: impl Into<String>, text: impl Into<Arc<str>>) -> Self {
+        let text = text.into();
+        let mut document = Self {
+            name: name.into(),
+            saved: text.clone(),
+            text,
+            revision: Revision::default(),
+            history: History::default(),
+            values: Table::default(),
+            syntax: None,
+            verdict: Verdict::default(),
+        };
+        document.read();
+        document
+    }
+
+    /// What errors call it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Calls it otherwise, as after saving it elsewhere.
+    pub fn rename(&mut self, name: impl Into<String>) {
+        self.name = name.into();
+    }
+
+    /// The scene file, as it would be saved.
+    pub fn text(&self) -> &Arc<str> {
+        &self.text
+    }
+
+    /// Which state this is.
+    pub fn revision(&self) -> Revision {
+        self.revision
+    }
+
+    /// What the text says, or said when it was TOML last.
+    pub fn values(&self) -> &Table {
+        &self.values
+    }
+
+    /// Whether it differs from what was saved.
+    pub fn is_dirty(&self) -> bool {
+        self.text != self.saved
+    }
+
+    /// Notes that `text` is what lies in its file now.
+    pub fn mark_saved(&mut self, text: Arc<str>) {
+        self.saved = text;
+    }
+
+    /// The last plan that was good, if there ever was one.
+    pub fn plan(&self) -> Option<&Arc<Plan>> {
+        self.verdict.plan.as_ref()
+    }
+
+    /// What is wrong with the text, as far as is known.
+    pub fn error(&self) -> Option<&Arc<SceneError>> {
+        self.verdict.error.as_ref()
+    }
+
+    /// Whether this state has been checked.
+    pub fn is_checked(&self) -> bool {
+        self.verdict.of == Some(self.revision)
+    }
+
+    /// Takes what [`check`] found out about state `revision`; stale news is no news.
+    pub fn judge(&mut self, revision: Revision, outcome: Result<Arc<Plan>, SceneError>) {
+        if revision != self.revision {
+            return;
+        }
+        self.verdict.of = Some(revision);
+        match outcome {
+            Ok(plan) => {
+                self.verdict.plan = Some(plan);
+                self.verdict.error = None;
+            }
+            Err(error) => self.verdict.error = Some(Arc::new(error)),
+        }
+    }
+
+    /// Checks this state here and now.
+    pub fn check_now(&mut self, assets: &Arc<dyn Assets>) {
+        let outcome = check(&self.name, &self.text, assets);
+        self.judge(self.revision, outcome);
+    }
+
+    /// Carries out `operations` as one step of the history. Steps that only change the same value again, as a slider
+    /// does while it is dragged, are one until [`seal`](Self::seal).
+    ///
+    /// # Errors
+    /// The text is no TOML, or an operation leads nowhere; nothing is changed then.
+    pub fn edit(&mut self, label: &str, operations: &[Operation]) -> Result<(), EditError> {
+        let text = operation::apply(&self.text, operations)?;
+        let subject: Vec<Place> = operations.iter().map(|operation| operation.place().clone()).collect();
+        self.history.note(label, subject, &self.text, &text);
+        self.show(text.into());
+        Ok(())
+    }
+
+    /// Replaces the whole text, as typing does; typing is one step until [`seal`](Self::seal).
+    pub fn replace(&mut self, label: &str, text: &str) {
+        self.history.note(label, vec![Place::root()], &self.text, text);
+        self.show(text.into());
+    }
+
+    /// Ends a step: what comes next is a step of its own.
+    pub fn seal(&mut self) {
+        self.history.seal();
+    }
+
+    /// Takes back the step `label` while it is still open, as if it had never been.
+    pub fn abandon(&mut self, label: &str) {
+        if let Some(text) = self.history.abandon(label) {
+            self.show(text);
+        }
+    }
+
+    /// What undoing would take back.
+    pub fn undo_label(&self) -> Option<&str> {
+        self.history.undo_label()
+    }
+
+    /// What redoing would do again.
+    pub fn redo_label(&self) -> Option<&str> {
+        self.history.redo_label()
+    }
+
+    /// Takes back the last step; whether there was one.
+    pub fn undo(&mut self) -> bool {
+        let text = self.history.undo();
+        text.map(|text| self.show(text)).is_some()
+    }
+
+    /// Does the step again that was taken back last; whether there was one.
+    pub fn redo(&mut self) -> bool {
+        let text = self.history.redo();
+        text.map(|text| self.show(text)).is_some()
+    }
+
+    fn show(&mut self, text: Arc<str>) {
+        if text == self.text {
+            return;
+        }
+        self.text = text;
+        self.revision.0 += 1;
+        self.read();
+    }
+
+    fn read(&mut self) {
+        match values(&self.text) {
+            Ok(values) => {
+                self.values = values;
+                self.syntax = None;
+            }
+            Err(problem) => self.syntax = Some(problem),
+        }
+    }
+
+    /// Where the text stops being TOML; operations cannot be carried out then.
+    pub fn syntax_problem(&self) -> Option<&Problem> {
+        self.syntax.as_ref()
+    }
+}

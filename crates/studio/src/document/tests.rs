@@ -1,0 +1,231 @@
+use std::{fs, sync::Arc};
+
+use bansho::{
+    Assets, MemoryAssets,
+    base::parameters::{ProblemKind, Value},
+    render::scene::{Place, operation::Operation},
+};
+
+use super::{
+    files::{self, Recent},
+    operations,
+    recovery::{self, Autosave},
+    *,
+};
+
+const SCENE: &str = "\
+# A fire in the rain.
+bansho = 1
+[picture]
+size = [32, 18]
+[[flame_sheet]]
+name = \"fire\" # the only one
+[[rain]]
+";
+
+fn scene() -> Document {
+    Document::new("fire.toml", SCENE)
+}
+
+fn assets() -> Arc<dyn Assets> {
+    Arc::new(MemoryAssets::default())
+}
+
+fn height(value: f64) -> Operation {
+    Operation::Set { place: Place::root().key("flame_sheet").index(0).key("height"), value: Value::Number(value) }
+}
+
+#[test]
+fn edits_are_undone_and_done_again_one_by_one() {
+    let mut document = scene();
+    document.edit("height", &[height(1.0)]).unwrap();
+    document.seal();
+    let once = document.text().clone();
+    document.edit("height", &[height(2.0)]).unwrap();
+    assert_eq!(document.undo_label(), Some("height"));
+    assert!(document.undo());
+    assert_eq!(*document.text(), once);
+    assert!(document.undo() && !document.undo());
+    assert_eq!(**document.text(), *SCENE);
+    assert!(document.redo() && document.redo() && !document.redo());
+    assert!(document.text().contains("height = 2.0"));
+}
+
+#[test]
+fn what_a_drag_does_is_one_step() {
+    let mut document = scene();
+    for step in 1..=50 {
+        document.edit("height", &[height(f64::from(step) * 0.1)]).unwrap();
+    }
+    document.seal();
+    assert!(document.undo());
+    assert_eq!(**document.text(), *SCENE);
+}
+
+#[test]
+fn an_open_step_can_be_abandoned_as_if_it_had_never_been() {
+    let mut document = scene();
+    document.edit("height", &[height(1.0)]).unwrap();
+    document.abandon("blow");
+    assert!(document.text().contains("height"), "that was another step");
+    document.seal();
+    document.edit("blow", &[height(2.0)]).unwrap();
+    document.edit("blow", &[height(3.0)]).unwrap();
+    document.abandon("blow");
+    assert!(document.text().contains("height = 1.0") && document.redo_label().is_none());
+    document.abandon("height");
+    assert_eq!(document.undo_label(), Some("height"), "sealed steps stay");
+}
+
+#[test]
+fn a_new_edit_after_undoing_forgets_what_was_undone() {
+    let mut document = scene();
+    document.edit("height", &[height(1.0)]).unwrap();
+    document.undo();
+    document.edit("height", &[height(3.0)]).unwrap();
+    assert!(!document.redo());
+    assert!(document.text().contains("height = 3.0"));
+}
+
+#[test]
+fn it_is_dirty_until_saved_or_undone_to_what_was_saved() {
+    let mut document = scene();
+    assert!(!document.is_dirty());
+    document.edit("height", &[height(1.0)]).unwrap();
+    assert!(document.is_dirty());
+    document.undo();
+    assert!(!document.is_dirty());
+}
+
+#[test]
+fn faults_keep_the_last_good_plan_and_say_where_they_are() {
+    let mut document = scene();
+    document.check_now(&assets());
+    let good = document.plan().unwrap().clone();
+    document.edit("height", &[height(-5.0)]).unwrap();
+    assert!(!document.is_checked());
+    document.check_now(&assets());
+    let error = document.error().unwrap();
+    assert!(matches!(error.problems[0].kind, ProblemKind::OutOfRange { value: -5.0, .. }));
+    let line = error.position(error.problems[0].span.clone().unwrap().start).0;
+    assert_eq!(document.text().lines().nth(line - 1), Some("height = -5.0"));
+    assert!(Arc::ptr_eq(document.plan().unwrap(), &good));
+    document.undo();
+    document.check_now(&assets());
+    assert!(document.error().is_none() && document.is_checked());
+}
+
+#[test]
+fn stale_news_is_no_news() {
+    let mut document = scene();
+    let before = document.revision();
+    document.edit("height", &[height(1.0)]).unwrap();
+    document.judge(before, check("fire.toml", SCENE, &assets()));
+    assert!(document.plan().is_none() && !document.is_checked());
+}
+
+#[test]
+fn text_that_is_no_toml_keeps_its_last_values_and_refuses_operations() {
+    let mut document = scene();
+    document.replace("typing", "bansho = ");
+    assert!(document.syntax_problem().is_some());
+    assert_eq!(document.phenomena().len(), 2);
+    assert!(document.edit("height", &[height(1.0)]).is_err());
+    assert_eq!(**document.text(), *"bansho = ");
+    document.undo();
+    assert!(document.syntax_problem().is_none());
+}
+
+#[test]
+fn phenomena_are_listed_with_the_names_the_scene_gives_them() {
+    let document = scene();
+    let names: Vec<String> = document.phenomena().into_iter().map(|listed| listed.name).collect();
+    assert_eq!(names, ["fire", "rain"]);
+}
+
+#[test]
+fn added_and_duplicated_phenomena_get_free_names_and_stay_valid() {
+    let mut document = scene();
+    let add = operations::add(&document, "rain");
+    document.edit("add", &add).unwrap();
+    let copy = operations::duplicate(&document, &document.phenomena()[0]);
+    document.edit("duplicate", &copy).unwrap();
+    document.check_now(&assets());
+    assert!(document.error().is_none(), "{}", document.error().unwrap());
+    let names: Vec<String> = document.phenomena().into_iter().map(|listed| listed.name).collect();
+    assert_eq!(names, ["fire", "fire 2", "rain", "rain 2"]);
+    assert!(document.text().contains("# the only one"));
+}
+
+#[test]
+fn solo_hides_all_others_and_shows_them_again() {
+    let mut document = scene();
+    let enabled = |document: &Document| document.phenomena().iter().map(|each| each.enabled).collect::<Vec<_>>();
+    let rain = document.phenomena()[1].clone();
+    let alone = operations::solo(&document, &rain);
+    document.edit("solo", &alone).unwrap();
+    assert_eq!(enabled(&document), [false, true]);
+    let back = operations::solo(&document, &document.phenomena()[1]);
+    document.edit("solo", &back).unwrap();
+    assert_eq!(**document.text(), *SCENE, "as if nothing had been");
+}
+
+#[test]
+fn saving_is_whole_and_outside_edits_are_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("deep").join("fire.toml");
+    let mut document = scene();
+    document.edit("height", &[height(1.0)]).unwrap();
+    files::save(&mut document, &path).unwrap();
+    assert!(!document.is_dirty());
+    assert_eq!(fs::read_to_string(&path).unwrap(), **document.text());
+    assert_eq!(files::changed_outside(&document, &path), None);
+    fs::write(&path, "bansho = 1\n").unwrap();
+    assert_eq!(files::changed_outside(&document, &path).as_deref(), Some("bansho = 1\n"));
+    assert!(files::open(&folder.path().join("none.toml")).is_err());
+    assert_eq!(files::rescue("x", &path).unwrap(), path.with_file_name("fire.rescued.toml"));
+}
+
+#[test]
+fn recent_files_are_remembered_the_last_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = folder.path().join("recent");
+    let mut recent = Recent::read(list.clone());
+    for name in ["a.toml", "b.toml", "a.toml"] {
+        recent.note(&folder.path().join(name)).unwrap();
+    }
+    assert_eq!(Recent::read(list), recent);
+    let names: Vec<_> = recent.paths().iter().map(|path| path.file_name().unwrap()).collect();
+    assert_eq!(names, ["a.toml", "b.toml"]);
+}
+
+#[test]
+fn unsaved_work_outlives_its_studio_but_a_living_ones_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let autosave = Autosave::begin(folder.path(), "studio").unwrap();
+    let other = Autosave::begin(folder.path(), "studio").unwrap();
+    let mut document = scene();
+    document.edit("height", &[height(1.0)]).unwrap();
+    autosave.keep(&document, Some("scenes/fire.toml".as_ref())).unwrap();
+    other.keep(&scene(), None).unwrap();
+    assert_eq!(recovery::recoverable(folder.path()), [], "both are running");
+    drop(autosave);
+    let found = recovery::recoverable(folder.path());
+    assert_eq!(found.len(), 1);
+    assert_eq!((found[0].origin.as_str(), found[0].text.as_str()), ("scenes/fire.toml", &**document.text()));
+    found[0].forget();
+    assert_eq!(recovery::recoverable(folder.path()), []);
+}
+
+#[test]
+fn work_that_ended_well_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let autosave = Autosave::begin(folder.path(), "studio").unwrap();
+    let mut document = scene();
+    document.edit("height", &[height(1.0)]).unwrap();
+    autosave.keep(&document, None).unwrap();
+    document.undo();
+    autosave.keep(&document, None).unwrap();
+    autosave.end();
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}

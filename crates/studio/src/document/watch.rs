@@ -1,0 +1,97 @@
+//! A file that another program may write: whether it was touched, told by a thread that looks now and then.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+    time::{Duration, SystemTime},
+};
+
+/// Between two looks.
+const LOOK: Duration = Duration::from_millis(700);
+
+/// Looks at one file until it is dropped.
+#[derive(Debug)]
+pub struct Watch {
+    path: PathBuf,
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    touched: AtomicBool,
+    closing: AtomicBool,
+}
+
+/// What tells one writing from another.
+fn mark(path: &Path) -> Option<(SystemTime, u64)> {
+    let about = fs::metadata(path).ok()?;
+    Some((about.modified().ok()?, about.len()))
+}
+
+impl Watch {
+    /// Looks at `path` from now on; `wake` is called from another thread when it was touched.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn start(path: &Path, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared::default());
+        let (watched, own) = (path.to_path_buf(), shared.clone());
+        let look = move || {
+            let mut last = mark(&watched);
+            while !own.closing.load(Ordering::Relaxed) {
+                thread::sleep(LOOK);
+                let now = mark(&watched);
+                if now != last {
+                    last = now;
+                    own.touched.store(true, Ordering::Relaxed);
+                    wake();
+                }
+            }
+        };
+        thread::Builder::new().name("watch".into()).spawn(look)?;
+        Ok(Self { path: path.to_path_buf(), shared })
+    }
+
+    /// What it looks at.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether it was touched since this was asked last.
+    pub fn touched(&self) -> bool {
+        self.shared.touched.swap(false, Ordering::Relaxed)
+    }
+}
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        self.shared.closing.store(true, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+
+    use super::*;
+
+    #[test]
+    fn a_writing_is_told_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        fs::write(&path, "bansho = 1\n").unwrap();
+        let (sender, woken) = mpsc::channel();
+        let watch = Watch::start(&path, move || sender.send(()).unwrap_or_default()).unwrap();
+        assert!(!watch.touched());
+        // The thread may have taken its first look before or after this.
+        thread::sleep(Duration::from_millis(200));
+        fs::write(&path, "bansho = 1 # longer\n").unwrap();
+        woken.recv_timeout(Duration::from_secs(20)).unwrap();
+        assert!(watch.touched() && !watch.touched());
+    }
+}

@@ -1,0 +1,94 @@
+//! The studio in a window of the system.
+
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    sync::Arc,
+};
+
+use bansho::{Assets, media::plates::FileAssets};
+use bansho_studio::{
+    app::{Session, Studio},
+    bench,
+    document::{Document, files},
+    player::ThreadPlayer,
+};
+use eframe::egui;
+
+const USAGE: &str =
+    "usage: bansho-studio [SCENE]\n       bansho-studio --bench    pictures a second of each phenomenon here";
+
+/// What a studio without a scene begins with.
+const BEGINNING: &str = "bansho = 1\n\n[[flame_sheet]]\nname = \"fire\"\n";
+
+pub(super) fn main() -> ExitCode {
+    let mut arguments = std::env::args_os().skip(1);
+    let scene = arguments.next().map(PathBuf::from);
+    match scene.as_deref().and_then(Path::to_str) {
+        _ if arguments.next().is_some() => return fail(USAGE),
+        Some("--help") => return say(USAGE),
+        Some("--bench") => return bench(),
+        _ => {}
+    }
+    match run(scene) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => fail(&format!("error: {error}")),
+    }
+}
+
+/// How fast the studio follows hands here.
+fn bench() -> ExitCode {
+    let speeds = match bench::measure() {
+        Ok(speeds) => speeds,
+        Err(error) => return fail(&format!("error: {error}")),
+    };
+    let line = |speed: bench::Speed| {
+        let bench::Speed { name, pictures_per_s, answer_s } = speed;
+        format!("{name:24} {pictures_per_s:6.1} pictures/s, a change shows after {:4.0} ms", 1000.0 * answer_s)
+    };
+    say(&speeds.into_iter().map(line).collect::<Vec<_>>().join("\n"))
+}
+
+fn say(message: &str) -> ExitCode {
+    // Nobody is left to be told that this failed.
+    let _ = writeln!(std::io::stdout(), "{message}");
+    ExitCode::SUCCESS
+}
+
+fn fail(message: &str) -> ExitCode {
+    // Nobody is left to be told that this failed.
+    let _ = writeln!(std::io::stderr(), "{message}");
+    ExitCode::FAILURE
+}
+
+fn run(scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
+    let document = match &scene {
+        Some(path) => files::open(path)?,
+        None => Document::new("scene", BEGINNING),
+    };
+    let options = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default().with_title("Bansho Studio").with_inner_size([1400.0, 860.0]),
+        ..eframe::NativeOptions::default()
+    };
+    let build = |creation: &eframe::CreationContext| {
+        let ctx = creation.egui_ctx.clone();
+        let player = ThreadPlayer::start(move || ctx.request_repaint())?;
+        let session = Session::new(document, scene, Box::new(player), assets);
+        Ok(Box::new(Studio::new(session, home())) as Box<dyn eframe::App>)
+    };
+    Ok(eframe::run_native("Bansho Studio", options, Box::new(build))?)
+}
+
+fn assets(folder: &Path) -> Arc<dyn Assets> {
+    Arc::new(FileAssets::new(folder))
+}
+
+/// Where the user's programs keep their own files.
+fn home() -> Option<PathBuf> {
+    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let base = variable("XDG_DATA_HOME")
+        .or_else(|| variable("APPDATA"))
+        .or_else(|| Some(variable("HOME")?.join(".local/share")))?;
+    Some(base.join("bansho-studio"))
+}

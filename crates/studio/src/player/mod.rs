@@ -1,0 +1,114 @@
+//! Pictures of a document, drawn off the window's thread, and the time that is played.
+//!
+//! A window says what it wants to see ([`Wish`]); the newest wish wins. Natively a thread with a rayon pool fulfils it
+//! ([`ThreadPlayer`]); where there are no threads, as on the web, [`SlicePlayer`] works in slices between two pictures of
+//! the window. Both report [`Event`]s.
+
+mod engine;
+mod pace;
+pub mod shoot;
+mod slices;
+mod states;
+#[cfg(test)]
+mod tests;
+#[cfg(not(target_arch = "wasm32"))]
+mod thread;
+mod transport;
+
+use std::sync::Arc;
+
+use bansho::{Assets, Plan, SceneError};
+
+use crate::document::Revision;
+
+pub use pace::Pace;
+pub use slices::SlicePlayer;
+#[cfg(not(target_arch = "wasm32"))]
+pub use thread::{StartError, ThreadPlayer};
+pub use transport::Transport;
+
+/// What a window wants to see.
+#[derive(Clone)]
+pub struct Wish {
+    /// The state of the document.
+    pub revision: Revision,
+    /// What errors call it.
+    pub name: String,
+    /// Its text.
+    pub text: Arc<str>,
+    /// Where its pictures come from.
+    pub assets: Arc<dyn Assets>,
+    /// The frame; the scene's first where it is left out.
+    pub number: Option<i64>,
+    /// Pixels that the picture may have at most; it keeps the scene's proportions and is never larger than the scene's.
+    pub within: [usize; 2],
+    /// Whether the state must be the one that the scene leads to from its beginning.
+    pub exact: bool,
+    /// Whether it may be simulated with fewer particles.
+    pub draft: bool,
+}
+
+/// A picture that was drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// The state of the document that was wished for; with faults in it the last good one is shown.
+    pub revision: Revision,
+    /// The frame.
+    pub number: i64,
+    /// Its size, pixels.
+    pub size: [usize; 2],
+    /// The scene's size, pixels.
+    pub scene_size: [usize; 2],
+    /// Display pixels over black, row after row from the top.
+    pub pixels: Vec<[u8; 4]>,
+    /// Whether the state is the one that the scene leads to from its beginning.
+    pub exact: bool,
+    /// Whether it was simulated with fewer particles than the scene has.
+    pub draft: bool,
+    /// How long drawing took, without the simulation, s.
+    pub draw_s: f64,
+    /// How long the simulation took, s.
+    pub advance_s: f64,
+}
+
+/// What a player reports.
+pub enum Event {
+    /// A state of the document was checked.
+    Judged {
+        /// Which.
+        revision: Revision,
+        /// Its plan, or its faults.
+        outcome: Result<Arc<Plan>, SceneError>,
+    },
+    /// A picture is there.
+    Drawn(Picture),
+    /// No picture could be drawn.
+    Failed {
+        /// Of which state.
+        revision: Revision,
+        /// Why.
+        reason: String,
+    },
+    /// A phenomenon panicked, which is a bug in it. The state is not drawn again.
+    Panicked {
+        /// Of which state.
+        revision: Revision,
+        /// What it said.
+        message: String,
+    },
+}
+
+/// Fulfils wishes.
+pub trait Player {
+    /// What is wanted now, in place of anything that was.
+    fn wish(&mut self, wish: Wish);
+
+    /// What happened since the last time. A player without threads works here, for less than a tenth of a second.
+    fn poll(&mut self) -> Vec<Event>;
+
+    /// Whether a wish is not fulfilled yet.
+    fn is_busy(&self) -> bool;
+
+    /// Whether nothing more happens unless it is polled.
+    fn waits_for_poll(&self) -> bool;
+}

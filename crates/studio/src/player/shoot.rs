@@ -1,0 +1,109 @@
+//! The finished still and the finished shot: the very job that `bansho render` does, on a thread of its own.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+    },
+    thread::JoinHandle,
+};
+
+use bansho::{
+    Observer,
+    job::{FrameDone, Job, JobError, JobObserver, Outline, SceneFile},
+};
+
+/// A job under way.
+pub struct Shooting {
+    progress: Arc<Progress>,
+    worker: Option<JoinHandle<Result<PathBuf, String>>>,
+}
+
+struct Progress {
+    total: AtomicUsize,
+    done: AtomicUsize,
+    stop: AtomicBool,
+    wake: Mutex<Box<dyn Fn() + Send>>,
+}
+
+impl Observer for Progress {
+    fn cancelled(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+impl JobObserver for Progress {
+    fn started(&self, outline: &Outline) {
+        self.total.store(outline.total, Ordering::Relaxed);
+        self.done.store(outline.kept, Ordering::Relaxed);
+    }
+
+    fn frame_done(&self, _frame: &FrameDone) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+        self.wake();
+    }
+}
+
+impl Progress {
+    fn wake(&self) {
+        self.wake.lock().unwrap_or_else(PoisonError::into_inner)();
+    }
+}
+
+/// The job that renders `text` as if it lay in `path`: all frames, or only `number`.
+pub fn job(text: &str, path: &Path, number: Option<i64>) -> Job {
+    let scene = SceneFile {
+        name: path.display().to_string(),
+        stem: path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
+        folder: path.parent().map(Path::to_path_buf).unwrap_or_default(),
+        text: text.to_owned(),
+        changes: Vec::new(),
+    };
+    Job { frames: number.map(|number| vec![number]), ..Job::new(scene) }
+}
+
+impl Shooting {
+    /// Starts `job`; `wake` is called whenever something changed.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn start(job: Job, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+        let progress = Arc::new(Progress {
+            total: AtomicUsize::new(0),
+            done: AtomicUsize::new(0),
+            stop: AtomicBool::new(false),
+            wake: Mutex::new(Box::new(wake)),
+        });
+        let watched = progress.clone();
+        let work = move || {
+            let result = job.prepare().and_then(|prepared| prepared.run(watched.as_ref()));
+            watched.wake();
+            result.map(|summary| summary.first_file).map_err(|error: JobError| error.to_string())
+        };
+        let worker = std::thread::Builder::new().name("render".into()).spawn(work)?;
+        Ok(Self { progress, worker: Some(worker) })
+    }
+
+    /// Frames that are done, and all.
+    pub fn progress(&self) -> [usize; 2] {
+        [&self.progress.done, &self.progress.total].map(|count| count.load(Ordering::Relaxed))
+    }
+
+    /// Asks it to stop; whole frames stay.
+    pub fn stop(&self) {
+        self.progress.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// The first file, or why there is none, once it has ended.
+    pub fn finished(&mut self) -> Option<Result<PathBuf, String>> {
+        let worker = self.worker.take_if(|worker| worker.is_finished())?;
+        Some(worker.join().unwrap_or_else(|_| Err("a phenomenon panicked, which is a bug in it".into())))
+    }
+}
+
+impl Drop for Shooting {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}

@@ -1,0 +1,56 @@
+//! States of stepped phenomena along the way, so that going back in time does not begin at its beginning.
+
+use std::collections::BTreeMap;
+
+use bansho::{Plan, Shot, render::fingerprint};
+
+/// Bytes of states that are kept.
+const MOST_BYTES: usize = 256 << 20;
+/// Frames between two states.
+const APART: i64 = 10;
+
+/// States of one plan, by frame.
+#[derive(Default)]
+pub(super) struct States {
+    of: [u8; 32],
+    by_frame: BTreeMap<i64, Vec<u8>>,
+    bytes: usize,
+    /// The frame that the shot stands at.
+    last: Option<i64>,
+}
+
+impl States {
+    /// Brings `shot` nearer to frame `number` where that lies behind it and a state does not.
+    pub(super) fn seek(&mut self, plan: &Plan, shot: &mut dyn Shot, number: i64) {
+        self.turn_to(plan);
+        if self.last.is_none_or(|last| last <= number) {
+            return;
+        }
+        if let Some((_, state)) = self.by_frame.range(..=number).next_back() {
+            // A state that is refused leaves the shot as it was, which then begins anew.
+            let _ = shot.restore(state);
+        }
+    }
+
+    /// Keeps the state at frame `number` where it is worth it: only states that the plan leads to are.
+    pub(super) fn keep(&mut self, plan: &Plan, shot: &dyn Shot, number: i64) {
+        self.turn_to(plan);
+        self.last = Some(number);
+        let near = self.by_frame.range(number - APART + 1..=number).next().is_some();
+        if near || !shot.is_exact() || self.bytes >= MOST_BYTES {
+            return;
+        }
+        let state = shot.snapshot();
+        self.bytes += state.len();
+        self.by_frame.insert(number, state);
+    }
+
+    /// States of another plan are of no use.
+    fn turn_to(&mut self, plan: &Plan) {
+        let of = fingerprint::of_state(plan);
+        if of != self.of {
+            (self.of, self.bytes) = (of, 0);
+            self.by_frame.clear();
+        }
+    }
+}

@@ -1,0 +1,267 @@
+use std::{
+    sync::{Arc, mpsc},
+    time::Duration,
+};
+
+use bansho::{
+    Assets, Backend, BitDepth, CpuBackend, MemoryAssets, Plan, PlanOptions, Unobserved, View,
+    base::{
+        assets::{AssetError, Picture as Plate},
+        drawing::Drawing,
+        image::DisplayPixels,
+        mesh::Mesh,
+    },
+    display, parse_scene,
+};
+
+use super::*;
+use crate::document::Document;
+
+const SCENE: &str = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 20\n[[flame_sheet]]\n";
+const STEPPED: &str =
+    "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 20\n[[flame_particles]]\nparticles = 200\npreroll_s = 0.1\n";
+
+fn wish(text: &str, number: i64) -> Wish {
+    Wish {
+        revision: Document::new("", "").revision(),
+        name: "scene".into(),
+        text: text.into(),
+        assets: Arc::new(MemoryAssets::default()),
+        number: Some(number),
+        within: [10_000; 2],
+        exact: false,
+        draft: false,
+    }
+}
+
+fn fulfil(engine: &mut engine::Engine, wish: &Wish) -> Vec<Event> {
+    let mut events = Vec::new();
+    engine.fulfil(wish, &Unobserved, &mut |event| events.push(event)).unwrap();
+    events
+}
+
+fn picture(events: Vec<Event>) -> Picture {
+    let drawn = events.into_iter().find_map(|event| match event {
+        Event::Drawn(picture) => Some(picture),
+        _ => None,
+    });
+    drawn.expect("a picture")
+}
+
+/// What `bansho render` would show of the frame, over black.
+fn rendered(text: &str, number: i64) -> Vec<[u8; 4]> {
+    rendered_with_alpha(text, number, true)
+}
+
+fn rendered_with_alpha(text: &str, number: i64, opaque: bool) -> Vec<[u8; 4]> {
+    let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
+    let scene = parse_scene("scene", text, assets.as_ref()).unwrap();
+    let plan = Plan::new(scene, &PlanOptions::default(), assets).unwrap();
+    let mut shot = CpuBackend.open(Arc::new(plan)).unwrap();
+    let mut frame = bansho::draw(shot.as_mut(), number, &Unobserved).unwrap();
+    frame.opaque = opaque;
+    match display(&frame, &View::DISPLAY, BitDepth::Eight).pixels {
+        DisplayPixels::Eight(pixels) => pixels,
+        DisplayPixels::Sixteen(_) => unreachable!("eight bits were asked for"),
+    }
+}
+
+#[test]
+fn a_picture_of_the_scenes_size_is_the_one_that_is_rendered() {
+    let mut engine = engine::Engine::default();
+    for (text, number) in [(SCENE, 7), (STEPPED, 9), (STEPPED, 3)] {
+        let wish = Wish { revision: bumped(text), ..wish(text, number) };
+        let drawn = picture(fulfil(&mut engine, &wish));
+        assert!(drawn.exact || text == STEPPED);
+        let exact = picture(fulfil(&mut engine, &Wish { exact: true, ..wish }));
+        assert_eq!((exact.size, exact.exact), ([64, 36], true));
+        assert!(exact.pixels == rendered(text, number), "frame {number}");
+        assert!(exact.pixels.iter().any(|pixel| pixel[0] > 0), "it is not black");
+    }
+}
+
+/// A revision of its own for each text.
+fn bumped(text: &str) -> crate::document::Revision {
+    let mut document = Document::new("", "");
+    for step in 0..text.len() {
+        document.replace("typing", &" ".repeat(step));
+    }
+    document.revision()
+}
+
+#[test]
+fn small_windows_get_small_pictures_of_the_same_proportions() {
+    let drawn = picture(fulfil(&mut engine::Engine::default(), &Wish { within: [32, 400], ..wish(SCENE, 0) }));
+    assert_eq!((drawn.size, drawn.scene_size, drawn.pixels.len()), ([32, 18], [64, 36], 32 * 18));
+}
+
+#[test]
+fn going_back_in_time_comes_to_the_same_picture() {
+    let mut engine = engine::Engine::default();
+    let first = picture(fulfil(&mut engine, &wish(STEPPED, 11)));
+    fulfil(&mut engine, &wish(STEPPED, 19));
+    let again = picture(fulfil(&mut engine, &wish(STEPPED, 11)));
+    assert!(again.exact && again.pixels == first.pixels);
+}
+
+#[test]
+fn a_changed_wind_goes_on_from_where_the_flame_is_and_says_so() {
+    let mut engine = engine::Engine::default();
+    fulfil(&mut engine, &wish(STEPPED, 10));
+    let text = format!("{STEPPED}[wind]\nvelocity = [2.0, 0, 0]\n");
+    let blown = Wish { revision: bumped(&text), ..wish(&text, 11) };
+    assert!(!picture(fulfil(&mut engine, &blown)).exact);
+    let exact = picture(fulfil(&mut engine, &Wish { exact: true, ..blown }));
+    assert!(exact.exact && exact.pixels == rendered(&text, 11));
+}
+
+#[test]
+fn faults_are_judged_and_the_last_good_scene_is_drawn() {
+    let mut engine = engine::Engine::default();
+    let good = picture(fulfil(&mut engine, &wish(SCENE, 4)));
+    let faulty = Wish { revision: bumped(SCENE), ..wish("bansho = 1\n[[flame_shet]]\n", 4) };
+    let events = fulfil(&mut engine, &faulty);
+    assert!(matches!(&events[0], Event::Judged { outcome: Err(error), .. } if error.problems.len() == 1));
+    assert!(picture(events).pixels == good.pixels);
+}
+
+#[test]
+fn slices_come_to_the_same_picture() {
+    let mut player = SlicePlayer::default();
+    player.wish(wish(STEPPED, 9));
+    let mut events = Vec::new();
+    while player.is_busy() {
+        events.extend(player.poll());
+    }
+    assert!(picture(events).pixels == rendered(STEPPED, 9));
+}
+
+/// The next events of a player on a thread.
+fn wait(player: &mut ThreadPlayer, woken: &mpsc::Receiver<()>) -> Vec<Event> {
+    woken.recv_timeout(Duration::from_secs(60)).expect("something happens");
+    player.poll()
+}
+
+#[test]
+fn the_newest_wish_wins() {
+    let (sender, woken) = mpsc::channel();
+    let mut player = ThreadPlayer::start(move || sender.send(()).unwrap_or_default()).unwrap();
+    for number in 0..20 {
+        player.wish(wish(SCENE, number));
+    }
+    let mut drawn = Vec::new();
+    while drawn.last() != Some(&19) {
+        let numbers = wait(&mut player, &woken).into_iter().filter_map(|event| match event {
+            Event::Drawn(picture) => Some(picture.number),
+            _ => None,
+        });
+        drawn.extend(numbers);
+    }
+    assert!(drawn.len() < 20, "wishes in between are left out: {drawn:?}");
+    assert!(drawn.is_sorted());
+}
+
+/// Assets whose maker made a mistake.
+struct Broken;
+
+impl Assets for Broken {
+    fn picture(&self, _: &str, _: i64) -> Result<Arc<Plate>, AssetError> {
+        panic!("broken on purpose")
+    }
+    fn mesh(&self, _: &str) -> Result<Arc<Mesh>, AssetError> {
+        panic!("broken on purpose")
+    }
+    fn drawing(&self, _: &str) -> Result<Arc<Drawing>, AssetError> {
+        panic!("broken on purpose")
+    }
+    fn text(&self, _: &str) -> Result<Arc<str>, AssetError> {
+        panic!("broken on purpose")
+    }
+    fn digest(&self, _: &str, _: i64) -> Result<[u8; 32], AssetError> {
+        panic!("broken on purpose")
+    }
+}
+
+#[test]
+fn a_panic_is_told_and_the_player_lives_on() {
+    let (sender, woken) = mpsc::channel();
+    let mut player = ThreadPlayer::start(move || sender.send(()).unwrap_or_default()).unwrap();
+    let text = format!("{SCENE}[plate]\nimage = \"plate.png\"\n");
+    player.wish(Wish { assets: Arc::new(Broken), ..wish(&text, 0) });
+    let events = wait(&mut player, &woken);
+    assert!(matches!(&events[..], [Event::Panicked { message, .. }] if message == "broken on purpose"));
+    player.wish(Wish { revision: bumped(&text), ..wish(SCENE, 0) });
+    while !wait(&mut player, &woken).iter().any(|event| matches!(event, Event::Drawn(_))) {}
+}
+
+#[test]
+fn previews_shrink_when_they_are_late_and_grow_when_there_is_room() {
+    let mut pace = Pace::default();
+    pace.learn(0.4, 0.1);
+    assert_eq!(pace.share(), 0.5, "a quarter of the pixels");
+    pace.learn(0.09, 0.1);
+    assert_eq!(pace.share(), 0.5, "larger would be late");
+    pace.learn(0.02, 0.1);
+    assert_eq!(pace.share(), 0.75);
+    pace.learn(100.0, 0.1);
+    assert_eq!(pace.share(), 0.125, "never smaller than an eighth");
+}
+
+fn playing() -> Transport {
+    let mut transport = Transport::default();
+    transport.set_shot(10..=19, 10.0);
+    transport.set_playing(true);
+    transport
+}
+
+#[test]
+fn frames_come_when_they_are_due_and_the_one_before_was_shown() {
+    let mut transport = playing();
+    assert_eq!(transport.number(), 10);
+    assert!(!transport.tick(5.0, true) && !transport.tick(5.09, true));
+    assert!(!transport.tick(5.11, false), "the first frame is not there yet");
+    assert!(transport.tick(5.11, true));
+    assert_eq!(transport.number(), 11);
+    assert!((transport.sleep_s(5.15).unwrap() - 0.05).abs() < 1e-9);
+    assert!(transport.tick(5.35, true));
+    assert_eq!(transport.number(), 13, "a late frame is left out");
+    assert!(transport.tick(60.0, true));
+    assert_eq!(transport.number(), 17, "but never many");
+}
+
+#[test]
+fn the_range_repeats_and_stays_within_the_shot() {
+    let mut transport = playing();
+    transport.set_range(Some(12..=13));
+    transport.go_to(13);
+    transport.tick(0.0, true);
+    transport.tick(0.101, true);
+    assert_eq!(transport.number(), 12);
+    transport.set_range(Some(-5..=99));
+    assert_eq!(transport.range(), 10..=19);
+    transport.step(-7);
+    assert_eq!((transport.number(), transport.is_playing()), (10, false));
+    transport.set_shot(0..=4, 25.0);
+    assert_eq!((transport.number(), transport.range()), (4, 0..=4));
+    assert!((transport.time_s() - 0.16).abs() < 1e-12);
+}
+
+#[test]
+fn a_still_is_the_file_that_render_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("still.png");
+    let mut job = shoot::job(SCENE, &folder.path().join("scene.toml"), Some(5));
+    job.out = Some(out.clone());
+    let mut shooting = shoot::Shooting::start(job, || {}).unwrap();
+    let file = loop {
+        match shooting.finished() {
+            Some(result) => break result.unwrap(),
+            None => std::thread::sleep(Duration::from_millis(2)),
+        }
+    };
+    assert_eq!((file.as_path(), shooting.progress()), (out.as_path(), [1, 1]));
+    let decoded = bansho::media::plates::FileAssets::new(folder.path());
+    let plate = decoded.picture("still.png", 0).unwrap();
+    let codes = plate.colour.pixels().iter().map(|pixel| pixel.map(|value| (value * 255.0).round() as u8));
+    assert!(codes.eq(rendered_with_alpha(SCENE, 5, false)));
+}

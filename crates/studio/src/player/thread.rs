@@ -1,0 +1,180 @@
+//! Wishes fulfilled by a thread with a rayon pool of its own.
+
+use std::{
+    any::Any,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{
+        Arc, Condvar, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+        mpsc,
+    },
+    thread::JoinHandle,
+};
+
+use bansho::{Observer, RenderError, Stage};
+
+use super::{Event, Player, Wish, engine::Engine};
+
+/// Draws on a thread of its own, in a pool of as many threads as the machine has cores.
+pub struct ThreadPlayer {
+    desk: Arc<Desk>,
+    events: mpsc::Receiver<Event>,
+    worker: Option<JoinHandle<()>>,
+}
+
+/// Where wishes are left.
+#[derive(Default)]
+struct Desk {
+    wish: Mutex<Option<Wish>>,
+    left: Condvar,
+    /// Counts wishes, so that work on an old one knows it.
+    newest: AtomicU64,
+    /// Counts wishes that were dealt with.
+    done: AtomicU64,
+    closing: AtomicBool,
+}
+
+impl Desk {
+    fn wish(&self) -> MutexGuard<'_, Option<Wish>> {
+        // A wish is only ever replaced whole.
+        self.wish.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits for a wish; `None` when the player closes.
+    fn take(&self) -> Option<(Wish, u64)> {
+        let mut slot = self.wish();
+        loop {
+            if self.closing.load(Ordering::Relaxed) {
+                return None;
+            }
+            if let Some(wish) = slot.take() {
+                return Some((wish, self.newest.load(Ordering::Relaxed)));
+            }
+            slot = self.left.wait(slot).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}
+
+/// Stops work that nobody wants any more: a simulation at once, for it goes on where it stands; a drawing only where
+/// the one before it was not stopped too, so that hands that never rest still see pictures.
+struct Watch<'a> {
+    desk: &'a Desk,
+    number: u64,
+    advancing: AtomicBool,
+    must_draw: bool,
+}
+
+impl Observer for Watch<'_> {
+    fn begin(&self, stage: Stage) {
+        if stage == Stage::Advance {
+            self.advancing.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn end(&self, stage: Stage) {
+        if stage == Stage::Advance {
+            self.advancing.store(false, Ordering::Relaxed);
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        let stale = self.desk.newest.load(Ordering::Relaxed) != self.number;
+        self.desk.closing.load(Ordering::Relaxed)
+            || (stale && (self.advancing.load(Ordering::Relaxed) || !self.must_draw))
+    }
+}
+
+impl ThreadPlayer {
+    /// Starts the thread; `wake` is called from it whenever there is something to [`poll`](Player::poll).
+    ///
+    /// # Errors
+    /// The system gives no threads.
+    pub fn start(wake: impl Fn() + Send + 'static) -> Result<Self, StartError> {
+        let pool = rayon::ThreadPoolBuilder::new().thread_name(|index| format!("draw {index}")).build()?;
+        let desk = Arc::new(Desk::default());
+        let (sender, events) = mpsc::channel();
+        let work = {
+            let desk = desk.clone();
+            move || {
+                pool.install(move || {
+                    work(&desk, &mut |event| {
+                        // Nobody listens any more when the window is closing.
+                        let _ = sender.send(event);
+                        wake();
+                    });
+                });
+            }
+        };
+        let worker = std::thread::Builder::new().name("player".into()).spawn(work)?;
+        Ok(Self { desk, events, worker: Some(worker) })
+    }
+}
+
+/// Why a player cannot start.
+#[derive(Debug, thiserror::Error)]
+#[error("the system gives no threads to draw on: {0}")]
+pub enum StartError {
+    /// For the pool.
+    Pool(#[from] rayon::ThreadPoolBuildError),
+    /// For the player itself.
+    Thread(#[from] std::io::Error),
+}
+
+fn work(desk: &Desk, emit: &mut dyn FnMut(Event)) {
+    let mut engine = Engine::default();
+    let mut must_draw = false;
+    while let Some((wish, number)) = desk.take() {
+        let watch = Watch { desk, number, advancing: AtomicBool::new(false), must_draw };
+        let outcome = catch_unwind(AssertUnwindSafe(|| engine.fulfil(&wish, &watch, emit)));
+        desk.done.store(number, Ordering::Relaxed);
+        must_draw = matches!(outcome, Ok(Err(RenderError::Cancelled(_))));
+        match outcome {
+            Ok(Ok(()) | Err(RenderError::Cancelled(_))) => {}
+            Ok(Err(error)) => emit(Event::Failed { revision: wish.revision, reason: error.to_string() }),
+            Err(panic) => {
+                engine.forget();
+                emit(Event::Panicked { revision: wish.revision, message: said(panic.as_ref()) });
+            }
+        }
+    }
+}
+
+fn said(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no reason given".into())
+}
+
+impl Player for ThreadPlayer {
+    fn wish(&mut self, wish: Wish) {
+        let mut slot = self.desk.wish();
+        *slot = Some(wish);
+        // Counted while nobody can take the wish, so that it is taken with its own number.
+        self.desk.newest.fetch_add(1, Ordering::Relaxed);
+        drop(slot);
+        self.desk.left.notify_one();
+    }
+
+    fn poll(&mut self) -> Vec<Event> {
+        self.events.try_iter().collect()
+    }
+
+    fn is_busy(&self) -> bool {
+        self.desk.done.load(Ordering::Relaxed) != self.desk.newest.load(Ordering::Relaxed)
+    }
+
+    fn waits_for_poll(&self) -> bool {
+        false
+    }
+}
+
+impl Drop for ThreadPlayer {
+    fn drop(&mut self) {
+        self.desk.closing.store(true, Ordering::Relaxed);
+        drop(self.desk.wish());
+        self.desk.left.notify_one();
+        if let Some(worker) = self.worker.take() {
+            // Panics of phenomena are caught; nothing is left to tell.
+            let _ = worker.join();
+        }
+    }
+}

@@ -1,0 +1,99 @@
+#!/usr/bin/env bash
+# The studio under real mouse events: two strokes are drawn, one is split, a still is rendered. The still must be what
+# `bansho render` makes of the saved file, byte for byte.
+#   crates/studio/tests/native.sh [STUDIO] [BANSHO]
+# It needs Xvfb, xdotool and a Vulkan driver (Mesa's lavapipe will do).
+set -eu
+studio="$(realpath "${1:-target/debug/bansho-studio}")"
+bansho="$(realpath "${2:-target/debug/bansho}")"
+display=":${STUDIO_DISPLAY:-91}"
+folder="$(mktemp -d)"
+export DISPLAY="$display" XDG_DATA_HOME="$folder/home" XDG_RUNTIME_DIR="$folder"
+
+Xvfb "$display" -screen 0 1400x900x24 >"$folder/xvfb.log" 2>&1 &
+xvfb=$!
+trap 'kill "$xvfb" "${window:-$xvfb}" 2>/dev/null || true' EXIT
+
+cat >"$folder/sky.toml" <<'SCENE'
+# An empty sky.
+bansho = 1
+[picture]
+size = [320, 180]
+frames = 2
+[camera]
+position = [0.0, 1.7, 0.0]
+target = [0.0, 30.0, -60.0]
+vertical_fov_deg = 62.0
+[[aurora]]
+preroll_s = 0.0
+particles = { count = 800 } # few, to be quick
+field = { cells = 63 }
+SCENE
+
+fail() {
+  echo "FAILED: $1" >&2
+  [ ! -e "$folder/studio.log" ] || cat "$folder/studio.log" >&2
+  cat "$folder/sky.toml" >&2
+  import -window root "$folder/failed.png" 2>/dev/null && echo "see $folder/failed.png" >&2
+  exit 1
+}
+
+# within SECONDS WHAT COMMAND...: repeats the command until it succeeds.
+within() {
+  local end=$((SECONDS + $1)) what="$2"
+  shift 2
+  while ! "$@" >/dev/null 2>&1; do
+    [ "$SECONDS" -lt "$end" ] || fail "$what"
+    sleep 0.5
+  done
+}
+
+# What the window takes for a picture at most, s: hands that are faster click where nothing is yet.
+pace="${STUDIO_PACE:-0.5}"
+
+click() { xdotool mousemove "$1" "$2" sleep "$pace" mousedown 1 sleep "$pace" mouseup 1 sleep "$pace"; }
+
+# stroke X Y X Y...: by small steps, as a hand goes.
+stroke() {
+  xdotool mousemove "$1" "$2" sleep "$pace" mousedown 1 sleep "$pace"
+  while [ "$#" -ge 4 ]; do
+    for step in 1 2 3 4 5 6 7 8; do
+      xdotool mousemove "$(($1 + ($3 - $1) * step / 8))" "$(($2 + ($4 - $2) * step / 8))" sleep 0.05
+    done
+    shift 2
+  done
+  xdotool sleep "$pace" mouseup 1 sleep "$pace"
+}
+
+# saved PATTERN: saves, and looks for the pattern in the file.
+saved() { xdotool key ctrl+s sleep 1 && grep -q "$1" sky.toml; }
+
+shapes_are_two() { xdotool key ctrl+s sleep 1 && [ "$(grep -c 'aurora.shapes' sky.toml)" = 2 ]; }
+
+within 30 "no X server" xdotool getdisplaygeometry
+cd "$folder"
+"$studio" sky.toml >"$folder/studio.log" 2>&1 &
+window=$!
+within 120 "no window" xdotool search --onlyvisible --name "Bansho Studio"
+sleep "${STUDIO_WAIT:-8}"
+# No window manager gives the window the keys.
+within 20 "no focus" xdotool search --onlyvisible --name "Bansho Studio" windowfocus
+
+stroke 640 490 760 460 890 490
+stroke 640 580 760 550 890 580
+within 30 "two strokes are not in the file" saved 'points = .*points = '
+click 246 402 # Add shape
+within 30 "no second shape" shapes_are_two
+click 464 378 # Split
+click 388 464 # the middle of the first sheet, on the left
+within 30 "no split" saved 'split = \[{ sheet = 1'
+
+xdotool key F12
+within 300 "no still" sh -c 'find . -name "*.png" | grep -q .'
+sleep 1
+still="$(find "$folder" -name '*.png' | head -1)"
+number="$(basename "$still" .png | grep -oE '[0-9]+$' | sed 's/^0*\(.\)/\1/')"
+"$bansho" render sky.toml --frames "$number" --out "$folder/again/s.####.png" >"$folder/render.log" 2>&1 || fail "$(cat "$folder/render.log")"
+again="$(find "$folder/again" -name '*.png' | head -1)"
+cmp "$still" "$again" || fail "the still is not what is rendered"
+echo "the still of frame $number is what bansho render makes of the saved file, byte for byte"

@@ -1,0 +1,142 @@
+// The page as a visitor meets it: loads, shows a picture, answers to hands, gives the scene back.
+//   node crates/studio/web/test.mjs DIST [CHROMIUM] [BANSHO]
+// It needs playwright-core (npm install playwright-core) and a Chromium; BANSHO checks the scene that was downloaded.
+import { spawnSync } from "node:child_process";
+import { createServer } from "node:http";
+import { mkdtempSync, readFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { extname, join } from "node:path";
+import { createRequire } from "node:module";
+
+const require = createRequire(join(process.cwd(), "package.json"));
+const { chromium } = require("playwright-core");
+const [dist, executablePath = "/usr/bin/chromium", bansho = "target/debug/bansho"] = process.argv.slice(2);
+const SIZE = { width: 1400, height: 860 };
+const TYPES = { ".html": "text/html", ".js": "text/javascript", ".wasm": "application/wasm" };
+
+function fail(message) {
+  console.error(`FAILED: ${message}`);
+  process.exit(1);
+}
+
+const server = createServer((request, response) => {
+  const path = request.url === "/" ? "/index.html" : request.url.split("?")[0];
+  try {
+    const body = readFileSync(join(dist, path));
+    response.writeHead(200, { "content-type": TYPES[extname(path)] ?? "application/octet-stream" }).end(body);
+  } catch {
+    response.writeHead(path === "/favicon.ico" ? 204 : 404).end();
+  }
+});
+await new Promise((listening) => server.listen(0, "127.0.0.1", listening));
+const address = `http://127.0.0.1:${server.address().port}/`;
+
+const webgpu = ["--enable-unsafe-webgpu", "--enable-features=Vulkan", "--use-vulkan=swiftshader", "--use-angle=swiftshader"];
+const quiet = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
+const browser = await chromium.launch({ executablePath, headless: true, args: [...quiet, ...webgpu] });
+const context = await browser.newContext({ viewport: SIZE, acceptDownloads: true });
+const errors = [];
+
+async function open(example) {
+  const page = await context.newPage();
+  page.on("console", (message) => message.type() === "error" && errors.push(message.text()));
+  page.on("pageerror", (error) => errors.push(String(error)));
+  const began = Date.now();
+  await page.goto(`${address}#${example}`);
+  await page.waitForFunction(() => document.getElementById("status").textContent === "");
+  console.log(`${example}: running after ${Date.now() - began} ms`);
+  if (Date.now() - began > 5000) fail("it took more than 5 s to load");
+  return page;
+}
+
+// What a part of the window shows: its mean luminance, and the share of the width where the middle of its light lies.
+async function look(page, clip) {
+  const png = (await page.screenshot({ clip })).toString("base64");
+  return page.evaluate(async (png) => {
+    const blob = await (await fetch(`data:image/png;base64,${png}`)).blob();
+    const image = await createImageBitmap(blob);
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const drawing = canvas.getContext("2d");
+    drawing.drawImage(image, 0, 0);
+    const { data } = drawing.getImageData(0, 0, image.width, image.height);
+    let [sum, moment] = [0, 0];
+    for (let pixel = 0; pixel < data.length / 4; pixel += 1) {
+      const light = 0.2126 * data[4 * pixel] + 0.7152 * data[4 * pixel + 1] + 0.0722 * data[4 * pixel + 2];
+      sum += light;
+      moment += light * (pixel % image.width);
+    }
+    return { mean: sum / (data.length / 4), middle: moment / Math.max(sum, 1) / image.width };
+  }, png);
+}
+
+async function until(page, clip, wanted, what, seconds = 60) {
+  const end = Date.now() + 1000 * seconds;
+  let seen;
+  do {
+    seen = await look(page, clip);
+    if (wanted(seen)) return seen;
+    await page.waitForTimeout(250);
+  } while (Date.now() < end);
+  await page.screenshot({ path: join(tmpdir(), "studio-failed.png") });
+  fail(`${what}; saw ${JSON.stringify(seen)}`);
+}
+
+// The longest that the page answered nobody, ms.
+const watch = (page) =>
+  page.evaluate(() => {
+    window.longest = 0;
+    let last = performance.now();
+    const tick = () => {
+      const now = performance.now();
+      window.longest = Math.max(window.longest, now - last);
+      last = now;
+      setTimeout(tick, 0);
+    };
+    tick();
+  });
+
+async function stroke(page, points) {
+  await page.mouse.move(...points[0]);
+  await page.mouse.down();
+  for (const point of points.slice(1)) await page.mouse.move(...point, { steps: 8 });
+  await page.mouse.up();
+}
+
+// A flame bends with a dragged wind. The picture lies between the panels.
+const picture = { x: 215, y: 60, width: 840, height: 660 };
+const flame = await open("torch");
+const still = await until(flame, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
+console.log(`a flame: mean ${still.mean.toFixed(1)}, middle ${still.middle.toFixed(3)}`);
+await flame.mouse.click(298, 44);
+await flame.mouse.move(635, 400);
+await flame.mouse.down();
+await flame.mouse.move(935, 400, { steps: 10 });
+const blown = await until(flame, picture, ({ middle }) => Math.abs(middle - still.middle) > 0.01, "the wind bends nothing");
+console.log(`blown: middle ${blown.middle.toFixed(3)}`);
+await flame.mouse.up();
+await flame.close();
+
+// A stroke makes an aurora. The editor's squares lie below the picture.
+const sky = await open("quiet_arc");
+await watch(sky);
+const above = { x: 215, y: 60, width: 840, height: 300 };
+await until(sky, above, ({ mean }) => mean > 1.5, "no aurora", 120);
+const [low, high] = [0.35, 0.6];
+const square = { x: 584, y: 428, side: 350 };
+const at = (x, y) => [square.x + x * square.side, square.y + y * square.side];
+await stroke(sky, [at(0.1, low), at(0.4, low - 0.1), at(0.7, high - 0.2), at(0.9, low - 0.1)]);
+await sky.waitForTimeout(1500);
+const [download] = await Promise.all([sky.waitForEvent("download"), sky.keyboard.press("Control+s")]);
+const saved = join(mkdtempSync(join(tmpdir(), "studio-")), "drawn.toml");
+await download.saveAs(saved);
+const text = readFileSync(saved, "utf8");
+if (!/points = \[\[/.test(text)) fail(`the stroke is not in the scene:\n${text}`);
+const checked = spawnSync(bansho, ["check", saved], { encoding: "utf8" });
+if (checked.status !== 0) fail(`bansho check: ${checked.stderr || checked.error}`);
+console.log(`a stroke is in the downloaded scene; the page was silent for at most ${(await sky.evaluate(() => window.longest)).toFixed(0)} ms`);
+await sky.close();
+
+await browser.close();
+server.close();
+if (errors.length > 0) fail(`the console has errors:\n${errors.join("\n")}`);
+console.log("the page works");
