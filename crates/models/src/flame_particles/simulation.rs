@@ -141,21 +141,26 @@ impl Simulation {
     }
 
     fn take_over(&mut self, moved: &[Moved], seconds: f32) {
-        let particles = &mut self.particles;
-        for (index, moved) in moved.iter().enumerate() {
-            for axis in 0..3 {
-                particles.position[axis][index] = moved.place[axis];
-                particles.velocity[axis][index] = moved.velocity[axis];
-                particles.drift[axis][index] = moved.drift[axis];
-            }
-            let Being { temperature, fuel, soot, support_radius } = moved.being;
-            particles.temperature[index] = temperature;
-            particles.fuel[index] = fuel;
-            particles.soot[index] = soot;
-            particles.support_radius[index] = support_radius;
-            particles.life[index] = moved.life;
-            particles.age[index] += seconds;
-        }
+        let Particles { position, velocity, drift, temperature, fuel, soot, support_radius, life, age, .. } =
+            &mut self.particles;
+        type Of = fn(&Moved) -> f32;
+        let place: [Of; 3] = [|moved| moved.place.x, |moved| moved.place.y, |moved| moved.place.z];
+        let speed: [Of; 3] = [|moved| moved.velocity.x, |moved| moved.velocity.y, |moved| moved.velocity.z];
+        let aside: [Of; 3] = [|moved| moved.drift.x, |moved| moved.drift.y, |moved| moved.drift.z];
+        let being: [(&mut Vec<f32>, Of); 5] = [
+            (temperature, |moved| moved.being.temperature),
+            (fuel, |moved| moved.being.fuel),
+            (soot, |moved| moved.being.soot),
+            (support_radius, |moved| moved.being.support_radius),
+            (life, |moved| moved.life),
+        ];
+        let vectors = [(position, place), (velocity, speed), (drift, aside)];
+        let mut columns: Vec<(&mut Vec<f32>, Of)> = being.into();
+        columns.extend(vectors.into_iter().flat_map(|(vector, of)| vector.iter_mut().zip(of)));
+        columns.into_par_iter().for_each(|(values, of)| {
+            values.iter_mut().zip(moved).for_each(|(value, moved)| *value = of(moved));
+        });
+        age.iter_mut().for_each(|age| *age += seconds);
     }
 
     /// Removes what has lived its time or left the domain, and whatever is not a number.

@@ -17,6 +17,8 @@ const FARTHEST: i32 = 1 << 19;
 const MARGIN: f32 = 1.001;
 /// Where particles are put that are farther away or nowhere; squares of such distances are still finite.
 pub(super) const BEYOND: f32 = 1e12;
+/// Particles that one task takes at least.
+pub(super) const AT_ONCE: usize = 4096;
 /// Bits sorted by in one pass.
 const DIGIT_BITS: u32 = 11;
 
@@ -158,7 +160,7 @@ impl<const D: usize> Cells<D> {
         });
         self.positions = slots;
         self.ids.clear();
-        self.ids.extend(self.order.iter().map(|i| ids[*i as usize]));
+        self.ids.par_extend(self.order.par_iter().with_min_len(AT_ONCE).map(|i| ids[*i as usize]));
         let mut stretches = std::mem::take(&mut self.stretches);
         self.find_stretches(&mut stretches);
         self.stretches = stretches;
@@ -166,23 +168,32 @@ impl<const D: usize> Cells<D> {
 
     /// Sorts by key, then by id, and lists the cells.
     fn sort(&mut self, coordinates: &[Vec<i32>; D], ids: &[u64]) {
-        let mut sorted = Vec::with_capacity(ids.len());
-        for i in 0..ids.len() {
+        let keys = self.keys;
+        let entry = |i: usize| {
             let mut cell = [0; D];
             for c in 0..D {
                 cell[c] = coordinates[c][i];
             }
-            sorted.push((self.keys.key(cell), i as u32));
-        }
+            (keys.key(cell), i as u32)
+        };
+        let mut sorted: Vec<(u64, u32)> = (0..ids.len()).into_par_iter().with_min_len(AT_ONCE).map(entry).collect();
         let mut spare = sorted.clone();
-        for shift in (0..self.keys.bits).step_by(DIGIT_BITS as usize) {
+        for shift in (0..keys.bits).step_by(DIGIT_BITS as usize) {
             counting_pass(&sorted, &mut spare, shift);
             std::mem::swap(&mut sorted, &mut spare);
         }
+        let by_id = |cell: &mut [(u64, u32)]| cell.sort_unstable_by_key(|entry| ids[entry.1 as usize]);
+        sorted.par_chunk_by_mut(|a, b| a.0 == b.0).for_each(by_id);
+        self.list(&sorted);
+        self.order.clear();
+        self.order.par_extend(sorted.par_iter().with_min_len(AT_ONCE).map(|entry| entry.1));
+    }
+
+    /// Lists the cells of sorted keys.
+    fn list(&mut self, sorted: &[(u64, u32)]) {
         self.occupied.clear();
         let (mut start, mut slot, mut row) = (0, 0, self.keys.row(sorted[0].0));
-        for cell in sorted.chunk_by_mut(|a, b| a.0 == b.0) {
-            cell.sort_unstable_by_key(|entry| ids[entry.1 as usize]);
+        for cell in sorted.chunk_by(|a, b| a.0 == b.0) {
             let key = cell[0].0;
             if self.keys.row(key) != row {
                 (slot, row) = (slot + BATCH, self.keys.row(key));
@@ -191,17 +202,15 @@ impl<const D: usize> Cells<D> {
             (start, slot) = (start + cell.len() as u32, slot + cell.len());
         }
         self.occupied.push(Cell { key: u64::MAX, start, slot: slot + BATCH });
-        self.order.clear();
-        self.order.extend(sorted.iter().map(|entry| entry.1));
     }
 
     /// Brings values, given in the order of [`Cells::assign`], into the sorted order.
     ///
     /// # Panics
     /// If they are not one a particle.
-    pub fn reorder<T: Copy>(&self, values: &mut Vec<T>) {
+    pub fn reorder<T: Copy + Send + Sync>(&self, values: &mut Vec<T>) {
         assert_eq!(values.len(), self.order.len(), "one value a particle");
-        *values = self.order.iter().map(|i| values[*i as usize]).collect();
+        *values = self.order.par_iter().with_min_len(AT_ONCE).map(|i| values[*i as usize]).collect();
     }
 
     /// Birth ids in sorted order.

@@ -3,7 +3,7 @@
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::cells::Cells;
+use super::cells::{AT_ONCE, Cells};
 
 /// Particles in `D` dimensions as arrays, one entry a particle.
 ///
@@ -98,8 +98,11 @@ impl<const D: usize> Particles<D> {
         let level = Level::new();
         for c in 0..D {
             assert_eq!(accelerations[c].len(), self.len(), "one acceleration a particle");
-            let (positions, velocities) = (&mut self.positions[c], &mut self.velocities[c]);
-            dispatch!(level, _simd => advance(positions, velocities, &accelerations[c], seconds));
+            let positions = self.positions[c].par_chunks_mut(AT_ONCE);
+            let moving = positions.zip(self.velocities[c].par_chunks_mut(AT_ONCE));
+            moving.zip(accelerations[c].par_chunks(AT_ONCE)).for_each(|((positions, velocities), accelerations)| {
+                dispatch!(level, _simd => advance(positions, velocities, accelerations, seconds));
+            });
         }
     }
 }

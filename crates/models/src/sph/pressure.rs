@@ -1,7 +1,9 @@
 //! Accelerations by pressure.
 
+use rayon::prelude::*;
+
 use super::{
-    cells::Cells,
+    cells::{AT_ONCE, Cells},
     kernel::{CubicSpline, KernelShape, Poly6, SmoothingKernel, Spiky},
     sum::{Pair, PairTerm},
 };
@@ -68,16 +70,16 @@ impl PressureForce {
     ) {
         assert!(masses.len() == densities.len() && densities.len() == pressures.len(), "one value a particle");
         let form = self.form;
-        self.stress.clear();
-        self.stress.extend(pressures.iter().zip(densities).map(|(pressure, density)| match form {
+        let stress = |(pressure, density): (&f32, &f32)| match form {
             PressureForm::Averaged => *pressure,
             PressureForm::Balanced => pressure / (density * density),
-        }));
-        self.weight.clear();
-        self.weight.extend(masses.iter().zip(densities).map(|(mass, density)| match form {
+        };
+        let weight = |(mass, density): (&f32, &f32)| match form {
             PressureForm::Averaged => mass / density,
             PressureForm::Balanced => *mass,
-        }));
+        };
+        pressures.par_iter().zip(densities).with_min_len(AT_ONCE).map(stress).collect_into_vec(&mut self.stress);
+        masses.par_iter().zip(densities).with_min_len(AT_ONCE).map(weight).collect_into_vec(&mut self.weight);
         let fields = [self.stress.as_slice(), self.weight.as_slice()];
         let (support, results) = (cells.support_radius(), accelerations.each_mut());
         match self.kernel {
@@ -86,7 +88,7 @@ impl PressureForce {
             KernelShape::CubicSpline => cells.sum(&PressureTerm(CubicSpline::<D>::new(support)), fields, results),
         }
         for component in accelerations {
-            component.iter_mut().zip(densities).for_each(|(value, density)| match form {
+            component.par_iter_mut().zip(densities).with_min_len(AT_ONCE).for_each(|(value, density)| match form {
                 PressureForm::Averaged => *value *= -0.5 / density,
                 PressureForm::Balanced => *value = -*value,
             });
