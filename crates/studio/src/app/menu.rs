@@ -28,6 +28,20 @@ impl Studio {
             self.files.ask_to_open(ui.ctx(), &mut self.session);
         }
         ui.menu_button("Examples", |ui| self.examples_menu(ui));
+        if ui.button("Save").clicked() {
+            self.files.save(&mut self.session);
+        }
+        // A page knows no folders.
+        if !cfg!(target_arch = "wasm32") {
+            self.folder_menu(ui);
+        }
+    }
+
+    /// What needs files of the system.
+    fn folder_menu(&mut self, ui: &mut Ui) {
+        if ui.button("Save as…").clicked() {
+            self.files.ask_where_to_save(&self.session);
+        }
         ui.menu_button("Recent", |ui| {
             for path in self.files.recent.paths().to_vec() {
                 if ui.button(path.display().to_string()).clicked() {
@@ -35,12 +49,6 @@ impl Studio {
                 }
             }
         });
-        if ui.button("Save").clicked() {
-            self.files.save(&mut self.session);
-        }
-        if ui.button("Save as…").clicked() {
-            self.files.ask_where_to_save(&self.session);
-        }
         ui.separator();
         if ui.button("Render still").clicked() {
             self.files.render(&mut self.session, true);

@@ -20,6 +20,9 @@ use super::{
     things::{Thing, things},
 };
 
+/// Around the picture: so dark that it does not blind, and not black, so that the picture's border is seen.
+const SURROUND: Color32 = Color32::from_gray(18);
+
 /// What a drag with the first button does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Tool {
@@ -55,7 +58,7 @@ impl Viewport {
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
         let scale = ui.ctx().pixels_per_point();
         self.pixels = [response.rect.width(), response.rect.height()].map(|side| (side * scale).max(1.0) as usize);
-        painter.rect_filled(response.rect, 0.0, Color32::BLACK);
+        painter.rect_filled(response.rect, 0.0, SURROUND);
         let Some(size) = self.take_picture(ui, session) else {
             let text = if session.document.error().is_some() { "nothing to show yet" } else { "drawing…" };
             let font = egui::FontId::proportional(16.0);
