@@ -4,12 +4,12 @@ use bansho_base::{
     canvas::{DepthInterval, Strip, View},
     image::Rect,
     math::{self, DVec2, DVec3},
-    surroundings::{Emitter, Light},
+    surroundings::{Arrival, Emitter, Light},
 };
 
 use super::{
     bands::BAND,
-    light::{Lighting, distance},
+    light::Lighting,
     moment::Moment,
     tiles::{Tiles, geometric, mix},
 };
@@ -368,13 +368,13 @@ impl March<'_> {
     fn sample(&self, light: &Light, line: DVec3, at: f64, length: f64, k: usize) -> [f32; 3] {
         let point = self.eye + line * at;
         let density = self.density.at(at);
-        let (illuminance, toward) = light.illuminance(point);
+        let Arrival { illuminance, toward, distance } = light.arriving(point);
         if illuminance == [0.0; 3] || density <= 0.0 || point.y < self.density.moment.ground {
             return [0.0; 3];
         }
         let share = ((at - self.distances[k]) / (self.distances[k + 1] - self.distances[k])) as f32;
         let depth = self.depths[k] + (self.depths[k + 1] - self.depths[k]) * share;
-        let through = math::lanes::exp(-depth - (self.lighting.extinction * distance(light, point)) as f32);
+        let through = math::lanes::exp(-depth - (self.lighting.extinction * distance) as f32);
         let scattered = self.lighting.scattering.at(toward.dot(line) as f32);
         let scale = through * (density * length) as f32;
         std::array::from_fn(|c| illuminance[c] * scattered[c] * scale)
