@@ -7,11 +7,13 @@ use bansho_base::{
     surroundings::{Arrival, Emitter, Light},
 };
 
+use fearless_simd::{Level, dispatch};
+
 use super::{
     bands::BAND,
     light::Lighting,
     moment::Moment,
-    tiles::{Tiles, geometric, mix},
+    tiles::{FINE, Tiles, geometric, mix},
 };
 
 /// Nearest distance at which the light that is scattered up to there is known, m, and how much further each next one is.
@@ -19,6 +21,8 @@ const FIRST: f64 = 0.5;
 const RATIO: f64 = 1.25;
 /// Angle, seen from a lamp, that one sample stands for.
 const ANGLE: f64 = 0.15;
+/// A veil has no depth of its own, m.
+const NOWHERE: [f32; FINE] = [f32::INFINITY; FINE];
 /// Lamps are at least so large for the air around them, m.
 const SMALLEST_LAMP: f64 = 0.02;
 
@@ -75,6 +79,7 @@ impl Halo {
 
 /// Single scattering along the lines of sight of one frame.
 pub(crate) struct Veil<'a> {
+    level: Level,
     view: &'a View,
     tiles: Tiles,
     /// Ascending from 0, m.
@@ -121,7 +126,17 @@ impl<'a> Veil<'a> {
         let mut scattered = Scattered::new(&lines, distances.len());
         let halos: Vec<Halo> = shown.into_iter().map(|(light, pixel)| march.halo(&light, pixel, tiles)).collect();
         halos.iter().for_each(|halo| scattered.add(&halo.scattered));
-        Some(Self { view, tiles: tiles.clone(), distances, depths, scattered, halos, sky, ground: moment.ground })
+        Some(Self {
+            level: Level::new(),
+            view,
+            tiles: tiles.clone(),
+            distances,
+            depths,
+            scattered,
+            halos,
+            sky,
+            ground: moment.ground,
+        })
     }
 
     /// Its end, m.
@@ -226,12 +241,13 @@ impl<'a> Veil<'a> {
         if strip.has_plate() {
             self.draw_before_plate(slice, rows, strip);
         } else {
-            self.draw_open(slice, band, rows, strip);
+            dispatch!(self.level, _simd => self.draw_open(slice, band, rows, strip));
         }
         self.add_halos(slice, rows, strip);
     }
 
     /// Nothing but the ground ends the veil: it is found at the corners of tiles.
+    #[inline(always)]
     fn draw_open(&self, slice: &DepthInterval, band: usize, rows: Rect, strip: &mut Strip) {
         let side = self.tiles.side;
         let columns = rows.x / side..rows.right().div_ceil(side) + 1;
@@ -246,17 +262,26 @@ impl<'a> Veil<'a> {
         let edges = [edge((band * BAND) as f64), edge(((band + 1) * BAND) as f64)];
         for y in rows.y..rows.bottom() {
             let down = ((y - band * BAND) as f32 + 0.5) / BAND as f32;
+            let corner = |column: usize, c: usize| {
+                let (top, bottom) = (edges[0][column][c], edges[1][column][c]);
+                (bottom - top).mul_add(down, top)
+            };
             let start = (y - strip.rect.y) * strip.rect.width;
-            for x in rows.x..rows.right() {
-                let across = ((x % side) as f32 + 0.5) / side as f32;
-                let column = x / side - columns.start;
-                let value: [f32; 4] = std::array::from_fn(|c| {
-                    let at =
-                        |edge: &[[f32; 4]]| (edge[column + 1][c] - edge[column][c]).mul_add(across, edge[column][c]);
-                    let (top, bottom) = (at(&edges[0]), at(&edges[1]));
-                    (bottom - top).mul_add(down, top)
-                });
-                put(strip, start + x - strip.rect.x, value);
+            for column in 0..edges[0].len() - 1 {
+                let left = (columns.start + column) * side;
+                let shown = left.max(rows.x)..(left + side).min(rows.right());
+                let mut values = [[0.0_f32; FINE]; 4];
+                for (c, values) in values.iter_mut().enumerate() {
+                    let (from, to) = (corner(column, c), corner(column + 1, c));
+                    for (x, value) in values.iter_mut().enumerate() {
+                        *value = (to - from).mul_add((x as f32 + 0.5) * (1.0 / FINE as f32), from);
+                    }
+                }
+                values[3].iter_mut().for_each(|through| *through = 1.0 - *through);
+                let [red, green, blue, opacity] =
+                    values.each_ref().map(|row| &row[shown.start - left..shown.end - left]);
+                let first = start + shown.start - strip.rect.x;
+                strip.add_row_behind(first, [red, green, blue], Some(opacity), &NOWHERE[..shown.len()]);
             }
         }
     }
