@@ -13,7 +13,7 @@ use super::{
     bands::BAND,
     light::Lighting,
     moment::Moment,
-    tiles::{FINE, Tiles, geometric, mix},
+    tiles::{FINE, FINEST, Tiles, geometric, mix},
 };
 
 /// Nearest distance at which the light that is scattered up to there is known, m, and how much further each next one is.
@@ -55,20 +55,35 @@ impl Scattered {
     }
 }
 
-/// A lamp in the picture. Light scattered around it falls as 1/h with the distance h of the line of sight from it, which no straight
-/// line between corners of tiles can follow: near it, what is left after taking out 1/h is interpolated.
+/// A lamp in the picture. Light scattered around it falls as 1/h with the distance h of the line of sight from it, and its cone has an
+/// edge, which no straight line between corners of tiles can follow: near it tiles are finer, and what is left after taking out 1/h is
+/// interpolated.
 struct Halo {
     /// From the camera to it, m.
     offset: DVec3,
     /// Where it is in the picture.
     pixel: DVec2,
+    /// The pixels near it.
+    rect: Rect,
+    /// Its light at the corners of the whole picture's tiles.
     scattered: Scattered,
+    /// Finer tiles over the pixels near it, and its light at their corners.
+    near: Tiles,
+    sharp: Scattered,
 }
 
 /// Pixels around a lamp for which that is done.
 const HALO: f64 = 72.0;
 /// Most lamps for which it is.
 const MOST_HALOS: usize = 8;
+
+/// The pixels of a picture near a lamp.
+fn around(lamp: DVec2, size: [usize; 2]) -> Rect {
+    let [left, top] = [lamp.x - HALO, lamp.y - HALO].map(|side| side.max(0.0) as usize);
+    let [right, bottom] = [lamp.x + HALO, lamp.y + HALO].map(|side| side.max(0.0) as usize);
+    let rect = Rect { x: left, y: top, width: right - left, height: bottom - top };
+    rect.intersection(&Rect::of_size(size[0], size[1]))
+}
 
 impl Halo {
     /// How near a line of sight passes, m.
@@ -124,7 +139,7 @@ impl<'a> Veil<'a> {
         let (shown, others) = march.divide(view);
         let lines = tiles.map(|_, line| march.line(line, &others));
         let mut scattered = Scattered::new(&lines, distances.len());
-        let halos: Vec<Halo> = shown.into_iter().map(|(light, pixel)| march.halo(&light, pixel, tiles)).collect();
+        let halos: Vec<Halo> = shown.into_iter().map(|(light, pixel)| march.halo(&light, pixel, tiles, view)).collect();
         halos.iter().for_each(|halo| scattered.add(&halo.scattered));
         Some(Self {
             level: Level::new(),
@@ -185,18 +200,17 @@ impl<'a> Veil<'a> {
         let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
         let range = self.range(pixel, slice, hidden).filter(|range| range[0] < range[1])?;
         let line = self.view.camera.direction(pixel)?.normalize_or_zero();
-        let part = pixel / self.tiles.side as f64;
-        let (column, row) = (part.x as usize, part.y as usize);
-        let (across, down) = ((part.x - part.x.floor()) as f32, (part.y - part.y.floor()) as f32);
+        let place = pixel.as_vec2().to_array();
         let mut correction = [0.0_f32; 3];
         let nearest = halo.passes(line);
-        for (right, below) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            let corner = (row + below) * self.tiles.size[0] + column + right;
-            let weight = |step: usize, part: f32| if step == 1 { part } else { 1.0 - part };
-            let share = weight(right, across) * weight(below, down);
-            let factor = share * (halo.passes(self.tiles.lines[corner]) / nearest - 1.0);
-            let lit = self.lit(&halo.scattered, corner, range);
+        for (corner, share) in halo.near.corners(place) {
+            let factor = share * halo.passes(halo.near.lines[corner]) / nearest;
+            let lit = self.lit(&halo.sharp, corner, range);
             (0..3).for_each(|c| correction[c] += lit[c] * factor);
+        }
+        for (corner, share) in self.tiles.corners(place) {
+            let lit = self.lit(&halo.scattered, corner, range);
+            (0..3).for_each(|c| correction[c] -= lit[c] * share);
         }
         Some(correction)
     }
@@ -204,9 +218,7 @@ impl<'a> Veil<'a> {
     /// Adds to the rows of a band what pixels near lamps get.
     fn add_halos(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
         for halo in &self.halos {
-            let [top, bottom] = [halo.pixel.y - HALO, halo.pixel.y + HALO].map(|y| y.max(0.0) as usize);
-            let [left, right] = [halo.pixel.x - HALO, halo.pixel.x + HALO].map(|x| x.max(0.0) as usize);
-            let rect = Rect { x: left, y: top, width: right - left, height: bottom - top }.intersection(&rows);
+            let rect = halo.rect.intersection(&rows);
             for y in rect.y..rect.bottom() {
                 for x in rect.x..rect.right() {
                     let away = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - halo.pixel).length() / HALO;
@@ -339,13 +351,18 @@ impl March<'_> {
         (shown, others)
     }
 
-    fn halo(&self, light: &Light, pixel: DVec2, tiles: &Tiles) -> Halo {
-        let lines = tiles.map(|_, line| self.line(line, std::slice::from_ref(light)));
+    fn halo(&self, light: &Light, pixel: DVec2, tiles: &Tiles, view: &View) -> Halo {
         let offset = match light.emitter {
             Emitter::Point { position, .. } | Emitter::Spot { position, .. } => position - self.eye,
             Emitter::Directional { toward } => toward,
         };
-        Halo { offset, pixel, scattered: Scattered::new(&lines, self.distances.len()) }
+        let rect = around(pixel, view.size);
+        let near = Tiles::over(view, FINEST, rect);
+        let [scattered, sharp] = [tiles, &near].map(|tiles| {
+            let lines = tiles.map(|_, line| self.line(line, std::slice::from_ref(light)));
+            Scattered::new(&lines, self.distances.len())
+        });
+        Halo { offset, pixel, rect, scattered, near, sharp }
     }
 
     /// Light of some lamps scattered to the camera up to each distance.
