@@ -134,11 +134,13 @@ impl Camera {
     }
 
     /// `point` in the camera's frame: right, up, backward, m.
+    #[inline(always)]
     pub fn to_camera(&self, point: DVec3) -> DVec3 {
         self.orientation.transpose() * (point - self.position)
     }
 
     /// Depth of `point` as this lens measures it, m; negative behind a perspective camera.
+    #[inline(always)]
     pub fn depth(&self, point: DVec3) -> f64 {
         match self.lens {
             Lens::Perspective => -self.to_camera(point).z,
@@ -147,6 +149,7 @@ impl Camera {
     }
 
     /// Where `point` lies in the picture; `None` where the lens cannot see it or it is nearer than `near`.
+    #[inline(always)]
     pub fn project(&self, point: DVec3) -> Option<Projection> {
         let local = self.to_camera(point);
         let depth = self.depth(point);

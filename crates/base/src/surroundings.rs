@@ -45,24 +45,49 @@ pub struct Light {
     pub intensity: [f32; 3],
 }
 
+/// What arrives from a light at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrival {
+    /// Illuminance on a plane that faces the light, lux, ACEScg.
+    pub illuminance: [f32; 3],
+    /// Unit vector toward the light; 0 where it stands.
+    pub toward: DVec3,
+    /// Way from the light, m; 0 for one that is infinitely far, whose light is given where it arrives.
+    pub distance: f64,
+}
+
 impl Light {
-    /// Illuminance on a plane at `point` that faces the light (lux, ACEScg), and the unit vector toward it.
-    pub fn illuminance(&self, point: DVec3) -> ([f32; 3], DVec3) {
-        let (factor, toward) = match self.emitter {
-            Emitter::Directional { toward } => (1.0, toward),
-            Emitter::Point { position, radius } => {
-                let offset = position - point;
-                let distance_squared = offset.length_squared().max(radius * radius).max(1e-12);
-                (1.0 / distance_squared, offset.normalize_or_zero())
-            }
-            Emitter::Spot { position, axis, cos_inner, cos_outer } => {
-                let offset = position - point;
-                let toward = offset.normalize_or_zero();
-                let cone = ((-toward.dot(axis) - cos_outer) / (cos_inner - cos_outer).max(1e-9)).clamp(0.0, 1.0);
-                (cone * cone * (3.0 - 2.0 * cone) / offset.length_squared().max(1e-12), toward)
-            }
+    /// What arrives at `point`.
+    #[inline]
+    pub fn arriving(&self, point: DVec3) -> Arrival {
+        let (position, radius) = match self.emitter {
+            Emitter::Directional { toward } => return Arrival { illuminance: self.intensity, toward, distance: 0.0 },
+            Emitter::Point { position, radius } => (position, radius),
+            Emitter::Spot { position, .. } => (position, 0.0),
         };
-        (self.intensity.map(|value| value * factor as f32), toward)
+        let offset = position - point;
+        let square = offset.length_squared();
+        let distance = square.sqrt();
+        let toward = if distance > 0.0 { offset * (1.0 / distance) } else { DVec3::ZERO };
+        let factor = self.emitter.share(-toward) / square.max(radius * radius).max(1e-12);
+        Arrival { illuminance: self.intensity.map(|value| value * factor as f32), toward, distance }
+    }
+
+    /// Illuminance on a plane at `point` that faces the light (lux, ACEScg), and the unit vector toward it.
+    #[inline]
+    pub fn illuminance(&self, point: DVec3) -> ([f32; 3], DVec3) {
+        let Arrival { illuminance, toward, .. } = self.arriving(point);
+        (illuminance, toward)
+    }
+}
+
+impl Emitter {
+    /// Share of its intensity that it sends in a direction (unit vector): all, but for a cone.
+    #[inline]
+    fn share(&self, direction: DVec3) -> f64 {
+        let Self::Spot { axis, cos_inner, cos_outer, .. } = *self else { return 1.0 };
+        let cone = ((direction.dot(axis) - cos_outer) / (cos_inner - cos_outer).max(1e-9)).clamp(0.0, 1.0);
+        cone * cone * (3.0 - 2.0 * cone)
     }
 }
 

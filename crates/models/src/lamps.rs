@@ -1,10 +1,10 @@
-//! Lamps as they are seen: a glowing ball where a point light or a spot stands.
+//! Lamps as they are seen: a glowing ball where a point light or a spot stands, and the glare that a camera's lens makes of it.
 
 use bansho_base::{
     canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
     color,
     image::Rect,
-    math::DVec2,
+    math::{self, DVec2},
     observer::{Cancelled, Observer},
     phenomenon::{Phenomenon, Prepared},
     surroundings::{Emitter, Light, Publication, Surroundings},
@@ -37,6 +37,23 @@ impl Lamps {
 /// Share of a spot's light that its housing scatters to where its cone does not reach.
 const STRAY: f64 = 0.02;
 
+/// Share of a lamp's light that a lens scatters around its image.
+const GLARE: f64 = 0.01;
+/// Angles between which that light falls with the square of the angle, as in the eye (Stiles & Holladay): it is even within
+/// the one and ends at the other, radians.
+const GLARE_ANGLES: [f64; 2] = [0.002, 0.12];
+
+/// Radiance of the glare at an angle from a lamp for each lux that arrives from it: `k / (theta^2 + a^2)`, brought to 0 at its end.
+fn glare(angle: f64) -> f64 {
+    let [core, end] = GLARE_ANGLES.map(|angle| angle * angle);
+    let square = angle * angle;
+    let fade = (1.0 - square / end).max(0.0);
+    // Of (1 - s/e)^2 / (s + c) over pi ds: (1 + c/e)^2 ln(1 + e/c) - c/e - 3/2.
+    let ratio = core / end;
+    let whole = std::f64::consts::PI * ((1.0 + ratio) * (1.0 + ratio) * math::ln(1.0 + 1.0 / ratio) - ratio - 1.5);
+    GLARE * fade * fade / ((square + core) * whole)
+}
+
 /// A ball of radius r that sends I candela toward the camera has the luminance I / (pi r^2).
 fn luminous_disc(lamp: &Lamp, view: &View) -> Option<Disc> {
     let (position, cone) = match lamp.light.emitter {
@@ -55,9 +72,16 @@ fn luminous_disc(lamp: &Lamp, view: &View) -> Option<Disc> {
     // A disc below a pixel keeps its light by growing dimmer, not smaller.
     let shown = radius.max(0.75);
     let scale = cone / (std::f64::consts::PI * lamp.radius * lamp.radius) * (radius / shown) * (radius / shown);
-    let disc =
-        Disc { centre: place.pixel, radius: shown, depth: place.depth, radiance: [0.0; 3], solid: radius >= 0.75 };
-    let scale = scale * std::f64::consts::PI * shown * shown / disc.pixels_covered();
+    let away = (position - view.camera.position).length_squared();
+    let disc = Disc {
+        centre: place.pixel,
+        radius: shown,
+        depth: place.depth,
+        radiance: [0.0; 3],
+        solid: radius >= 0.75,
+        illuminance: lamp.light.intensity.map(|value| (f64::from(value) * cone / away) as f32),
+    };
+    let scale = (1.0 - GLARE) * scale * std::f64::consts::PI * shown * shown / disc.pixels_covered();
     Some(Disc { radiance: lamp.light.intensity.map(|value| (f64::from(value) * scale) as f32), ..disc })
 }
 
@@ -69,6 +93,8 @@ struct Disc {
     depth: f64,
     radiance: [f32; 3],
     solid: bool,
+    /// What arrives at the camera, lux.
+    illuminance: [f32; 3],
 }
 
 impl Disc {
@@ -89,7 +115,17 @@ impl Disc {
     }
 
     fn bounds(&self, view: &View) -> Rect {
-        let reach = DVec2::splat(self.radius + 1.0);
+        self.around(self.radius + 1.0, view)
+    }
+
+    /// The pixels that its glare may touch.
+    fn glare_bounds(&self, view: &View) -> Rect {
+        self.around(GLARE_ANGLES[1] * view.camera.focal_pixels, view)
+    }
+
+    /// The pixels within a square around it.
+    fn around(&self, reach: f64, view: &View) -> Rect {
+        let reach = DVec2::splat(reach);
         let clamp = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
         let (low, high) = (self.centre - reach, self.centre + reach);
         let (x, y) = (clamp(low.x.floor(), view.size[0]), clamp(low.y.floor(), view.size[1]));
@@ -119,7 +155,9 @@ impl Phenomenon for Lamps {
 
     fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
         let discs = (self.at)(view.shutter.middle());
-        let depth = |disc: Disc| DepthInterval { near: disc.depth, far: disc.depth.next_up() };
+        // Glare lies in the lens, before everything.
+        let near = |disc: &Disc| if glares(view) { 0.0 } else { disc.depth };
+        let depth = |disc: Disc| DepthInterval { near: near(&disc), far: disc.depth.next_up() };
         discs.iter().filter_map(|lamp| luminous_disc(lamp, view)).map(depth).collect()
     }
 
@@ -136,6 +174,11 @@ impl Phenomenon for Lamps {
     }
 }
 
+/// Whether the view is a lens's own picture, not one in a mirror.
+fn glares(view: &View) -> bool {
+    view.mirror.is_none()
+}
+
 struct PreparedLamps<'a> {
     view: &'a View,
     discs: Vec<Disc>,
@@ -146,14 +189,37 @@ impl PreparedLamps<'_> {
         let slice = *slice;
         self.discs.iter().filter(move |disc| slice.contains(disc.depth))
     }
+
+    /// The lamps whose glare lies in a slice: all in the nearest.
+    fn glaring(&self, slice: &DepthInterval) -> &[Disc] {
+        if glares(self.view) && slice.contains(0.0) { &self.discs } else { &[] }
+    }
+
+    /// Adds the glare of a lamp wherever nothing of the plate stands before that lamp.
+    fn add_glare(&self, disc: &Disc, strip: &mut Strip) {
+        let rect = disc.glare_bounds(self.view).intersection(&strip.rect);
+        for y in rect.y..rect.bottom() {
+            for x in rect.x..rect.right() {
+                let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
+                let away = (DVec2::new(x as f64, y as f64) + 0.5 - disc.centre).length();
+                let share = glare(away / self.view.camera.focal_pixels) as f32;
+                if share > 0.0 && strip.visible(index, disc.depth as f32) {
+                    strip.emit(index, disc.illuminance.map(|value| value * share), f32::INFINITY);
+                }
+            }
+        }
+    }
 }
 
 impl Prepared for PreparedLamps<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
-        self.within(slice).fold(Rect::default(), |all, disc| all.union(&disc.bounds(self.view)))
+        let discs = self.within(slice).map(|disc| disc.bounds(self.view));
+        let glares = self.glaring(slice).iter().map(|disc| disc.glare_bounds(self.view));
+        discs.chain(glares).fold(Rect::default(), |all, rect| all.union(&rect))
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        self.glaring(slice).iter().for_each(|disc| self.add_glare(disc, strip));
         for disc in self.within(slice) {
             let rect = disc.bounds(self.view).intersection(&strip.rect);
             for y in rect.y..rect.bottom() {
@@ -203,6 +269,18 @@ mod tests {
             let seen = intensity_seen(distance, radius, point);
             assert!((seen / 50.0 - 1.0).abs() < 0.02, "{seen} cd at {distance} m");
         }
+    }
+
+    #[test]
+    fn glare_is_a_hundredth_of_the_light_and_falls_with_the_square_of_the_angle() {
+        let (steps, end) = (200_000, GLARE_ANGLES[1]);
+        let ring = |i: u32| {
+            let angle = end * (f64::from(i) + 0.5) / f64::from(steps);
+            glare(angle) * 2.0 * std::f64::consts::PI * angle * end / f64::from(steps)
+        };
+        let whole: f64 = (0..steps).map(ring).sum();
+        assert!((whole / GLARE - 1.0).abs() < 1e-4, "{whole}");
+        assert!((glare(0.02) / glare(0.01) - 0.25).abs() < 0.02 && glare(end) == 0.0);
     }
 
     #[test]

@@ -132,21 +132,6 @@ impl Mapping {
         }
     }
 
-    /// x/depth, y/depth and 1/depth at a place of the picture and their steps a column; `None` where they are not linear.
-    #[inline(always)]
-    pub(crate) fn along_row(&self, px: f64, py: f64) -> Option<[[f64; 2]; 3]> {
-        match self {
-            Self::Rays { .. } => None,
-            Self::Linear { forms, .. } => {
-                let mut along = [[0.0; 2]; 3];
-                for (along, [constant, column, row]) in along.iter_mut().zip(forms) {
-                    *along = [column * px + row * py + constant, *column];
-                }
-                Some(along)
-            }
-        }
-    }
-
     /// The sheet coordinates of one pixel, where they are cheap to know.
     #[inline(always)]
     pub(crate) fn glance(&self, column: usize, row: usize) -> Option<[f32; 2]> {

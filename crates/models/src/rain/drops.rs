@@ -1,68 +1,126 @@
-//! Every drop by itself.
+//! Drops and the streaks that they leave.
 
 use bansho_base::{
     camera::{Camera, Lens},
     math::DVec3,
     random::{self, Purpose},
 };
+use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{
-    lattice::Cell,
+    lattice::{CELL, Cell},
     light::Lighting,
     moment::{Ball, ClassNow, Moment},
-    stroke::Stroke,
+    part::Part,
+    singles::Singles,
+    stroke::{Stroke, Way},
     tiles::Tiles,
 };
 
 const COUNT: Purpose = Purpose::named("rain drops of a cell");
 const DROP: Purpose = Purpose::named("rain drop");
-/// Cells that one task fills.
-const CELLS_AT_ONCE: usize = 16;
+/// Parts that all cells make, and fewest and most cells of each.
+const PARTS: usize = 64;
+const CELLS_OF_PART: [usize; 2] = [8, 256];
+/// Radius of the largest drop, m.
+const LARGEST: f64 = 4e-3;
 /// Over which part of the number of drops a drop fades in, so that a rising rate shows no drop at once.
-const FADE: f64 = 0.02;
+pub(crate) const FADE: f64 = 0.02;
 
-/// Which drops are drawn one by one.
+/// What turns drops into streaks.
 #[derive(Clone, Copy)]
-pub(crate) struct Near<'a> {
+pub(crate) struct Shower<'a> {
+    pub(crate) level: Level,
     pub(crate) moment: &'a Moment,
     pub(crate) lighting: &'a Lighting<'a>,
     /// What the sky shines through drops at the corners of tiles; `None` from a dark one.
     pub(crate) sky: Option<(&'a Tiles, &'a [[f32; 3]])>,
-    /// Where they are.
-    pub(crate) within: &'a [Ball],
-    /// How much of a drop at a point is drawn.
-    pub(crate) weight: &'a (dyn Fn(DVec3) -> f64 + Sync),
+    /// Which share of a drop is drawn.
+    pub(crate) share: Share<'a>,
 }
 
-/// Strokes of all drops that may show, those of the nearest cells first.
-pub(crate) fn strokes(near: &Near) -> Vec<Stroke> {
-    let moment = near.moment;
-    let mut cells: Vec<(f64, Cell, &ClassNow)> = moment
-        .classes
-        .iter()
-        .filter(|class| class.share > 0.0)
-        .flat_map(|class| near.cells(class).into_iter().map(move |(away, cell)| (away, cell, class)))
-        .collect();
-    cells.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let fill = |cells: &[(f64, Cell, &ClassNow)]| {
-        let mut strokes = Vec::new();
-        cells.iter().for_each(|(_, cell, class)| near.add_cell(class, *cell, &mut strokes));
-        strokes
-    };
-    let parts: Vec<Vec<Stroke>> = cells.par_chunks(CELLS_AT_ONCE).map(fill).collect();
-    parts.concat()
+/// Which share of a drop is drawn, where some are drawn by themselves and others on billboards.
+#[derive(Clone, Copy)]
+pub(crate) enum Share<'a> {
+    /// All of it.
+    Whole,
+    /// That which is drawn by itself.
+    Single(&'a Singles),
+    /// That which is on billboards.
+    OnBillboard(&'a Singles),
 }
 
-impl Near<'_> {
+impl Share<'_> {
+    #[inline(always)]
+    fn of(&self, point: DVec3) -> f64 {
+        match self {
+            Self::Whole => 1.0,
+            Self::Single(singles) => singles.share(point),
+            Self::OnBillboard(singles) => 1.0 - singles.share(point),
+        }
+    }
+}
+
+/// A drop half way through the exposure.
+#[derive(Clone, Copy)]
+pub(crate) struct Drop {
+    pub(crate) point: DVec3,
+    /// m/s.
+    pub(crate) velocity: DVec3,
+    pub(crate) diameter_mm: f64,
+    /// How much of it is there, 0 to 1.
+    pub(crate) there: f64,
+}
+
+impl Shower<'_> {
+    /// The streaks of all cells that may show within some balls, drop by drop.
+    pub(crate) fn drops(&self, within: &[Ball]) -> Vec<Part> {
+        self.parts(
+            within,
+            0.5 * CELL,
+            |class, cell, strokes| dispatch!(self.level, _simd => self.add_cell(class, cell, strokes)),
+        )
+    }
+
+    /// The streaks of all cells that may show within some balls, those of the nearest cells first; `add` adds those of a cell, up to
+    /// `aside` (m) level from its middle.
+    pub(crate) fn parts(
+        &self,
+        within: &[Ball],
+        aside: f64,
+        add: impl Fn(&ClassNow, Cell, &mut Vec<Stroke>) + Sync,
+    ) -> Vec<Part> {
+        let classes = self.moment.classes.par_iter().filter(|class| class.share > 0.0);
+        let lists: Vec<Vec<_>> = classes
+            .map(|class| self.cells(class, within, aside).into_iter().map(|(away, cell)| (away, cell, class)).collect())
+            .collect();
+        let mut cells = lists.concat();
+        cells.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let size = self.moment.sight.size();
+        let fill = |cells: &[(f64, Cell, &ClassNow)]| {
+            let (mut strokes, mut filled) = (Vec::new(), 0);
+            for (_, cell, class) in cells {
+                let before = strokes.len();
+                add(class, *cell, &mut strokes);
+                filled += usize::from(strokes.len() > before);
+            }
+            Part::new(strokes, filled, size)
+        };
+        let [fewest, most] = CELLS_OF_PART;
+        cells.par_chunks((cells.len() / PARTS).clamp(fewest, most)).map(fill).collect()
+    }
+
     /// The cells of a class, each once.
-    fn cells(&self, class: &ClassNow) -> Vec<(f64, Cell)> {
-        let mut cells: Vec<_> = self.within.iter().flat_map(|ball| self.moment.cells(class, *ball)).collect();
+    fn cells(&self, class: &ClassNow, within: &[Ball], aside: f64) -> Vec<(f64, Cell)> {
+        let mut cells: Vec<_> = within.iter().flat_map(|ball| self.moment.cells(class, *ball, aside)).collect();
         cells.sort_by_key(|(_, cell)| *cell);
         cells.dedup_by_key(|(_, cell)| *cell);
         cells
     }
 
+    /// Adds the streaks of a cell, drop by drop.
+    #[inline(always)]
     fn add_cell(&self, class: &ClassNow, cell: Cell, strokes: &mut Vec<Stroke>) {
         let key = self.moment.key;
         let contents = class.lattice.contents(cell);
@@ -76,30 +134,36 @@ impl Near<'_> {
                 continue;
             }
             let place = corner + DVec3::new(uniforms[0], uniforms[1], uniforms[2]);
-            strokes.extend(self.stroke(class, place, there));
+            let (point, velocity) = self.moment.drop(class, place);
+            let drop = Drop { point, velocity, diameter_mm: class.diameter_mm, there };
+            strokes.extend(self.stroke(&drop, |_| true));
         }
     }
 
-    /// The stroke of the drop at a place of its lattice, of which so much is there.
-    fn stroke(&self, class: &ClassNow, place: DVec3, there: f64) -> Option<Stroke> {
-        let moment = self.moment;
-        let (point, velocity) = moment.drop(class, place);
-        let toward = point - moment.sight.middle().position;
-        let away = toward.length();
-        let weight = there * (self.weight)(point);
-        if weight <= 0.0 || away == 0.0 || moment.sheltered(point, velocity) {
+    /// The streak of a drop, if it shows; `lit` says whether the light of lamps and fires on it may be seen.
+    #[inline(always)]
+    pub(crate) fn stroke(&self, drop: &Drop, lit: impl FnOnce(&Stroke) -> bool) -> Option<Stroke> {
+        let (moment, point) = (self.moment, drop.point);
+        let way = drop.velocity * moment.sight.exposure;
+        if !moment.sight.may_see(point, DVec3::ZERO, 0.5 * way.length() + LARGEST) {
             return None;
         }
-        let way = velocity * moment.sight.exposure;
-        let flight = Flight { from: point - 0.5 * way, to: point + 0.5 * way, diameter_mm: class.diameter_mm };
-        let mut stroke = flight.above(moment.ground)?.stroke(moment, weight * moment.gain, [0.0; 3])?;
+        let toward = point - moment.sight.middle().position;
+        let away = toward.length();
+        let weight = drop.there * moment.nearness(away) * self.share.of(point);
+        if weight <= 0.0 || away == 0.0 || moment.sheltered(point, drop.velocity) {
+            return None;
+        }
+        let flight = Flight { from: point - 0.5 * way, to: point + 0.5 * way, diameter_mm: drop.diameter_mm };
+        let mut stroke = flight.above(moment.ground)?.stroke(moment, weight * moment.gain)?;
         if !stroke.meets(moment.sight.middle().size) {
             return None;
         }
-        stroke.light = self.lighting.radiance(point, toward / away);
+        if lit(&stroke) {
+            stroke.layer.add_light(self.lighting.radiance(point, toward / away));
+        }
         if let Some((tiles, sky)) = self.sky {
-            let sky = tiles.at(sky, stroke.middle());
-            (0..3).for_each(|c| stroke.light[c] += sky[c]);
+            stroke.layer.add_light(tiles.at(sky, stroke.middle()));
         }
         Some(stroke)
     }
@@ -115,6 +179,7 @@ pub(crate) struct Flight {
 
 impl Flight {
     /// The part of a falling drop's way above the ground; what is cut off is not hidden, see [`Cut`].
+    #[inline(always)]
     fn above(self, ground: f64) -> Option<Cut> {
         let fall = self.from.y - self.to.y;
         let share = if fall > 0.0 { ((self.from.y - ground) / fall).min(1.0) } else { 1.0 };
@@ -135,8 +200,9 @@ pub(crate) struct Cut {
 }
 
 impl Cut {
-    /// What the picture shows of it with an opacity `gain`; `None` where the lens does not see all of it.
-    pub(crate) fn stroke(&self, moment: &Moment, gain: f64, light: [f32; 3]) -> Option<Stroke> {
+    /// What the picture shows of it with an opacity `gain`, still without light; `None` where the lens does not see all of it.
+    #[inline(always)]
+    pub(crate) fn stroke(&self, moment: &Moment, gain: f64) -> Option<Stroke> {
         let [open, _, close] = &moment.sight.cameras;
         let Flight { from, to, diameter_mm } = self.flight;
         // The shutter's end comes early for a drop that ends on the way; cameras hardly move in between.
@@ -144,14 +210,9 @@ impl Cut {
         let depth = 0.5 * (from.depth + to.depth);
         let radius = 0.25e-3 * diameter_mm * (from.pixels_per_metre + to.pixels_per_metre);
         let area = std::f64::consts::PI * radius * radius * stretch(moment.sight.middle(), &self.flight, depth);
-        Some(Stroke {
-            ends: [from.pixel, to.pixel].map(|pixel| pixel.as_vec2().to_array()),
-            radius: radius as f32,
-            hidden: (area * self.share * gain) as f32,
-            depth: depth as f32,
-            diameter_mm: diameter_mm as f32,
-            light,
-        })
+        let ends = [from.pixel, to.pixel].map(|pixel| pixel.as_vec2().to_array());
+        let way = Way { ends, radius: radius as f32, hidden: (area * self.share * gain) as f32 };
+        Some(Stroke::new(way, depth as f32, diameter_mm as f32))
     }
 }
 

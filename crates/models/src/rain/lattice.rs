@@ -64,6 +64,12 @@ impl Lattice {
         self.height
     }
 
+    /// How far a cell's drops are from its middle along the world's axes, m: up to `aside` level, and with its rows.
+    pub(crate) fn half_extents(&self, aside: f64) -> DVec3 {
+        let [x, z] = self.shear.to_array().map(|shear| aside + 0.5 * shear.abs());
+        DVec3::new(x, 0.5 * self.height, z)
+    }
+
     /// The place of a point within the lattice, in cells.
     pub(crate) fn place(&self, point: DVec3) -> DVec3 {
         let row = (point.y + self.fallen) / self.height;

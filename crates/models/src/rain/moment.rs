@@ -14,8 +14,8 @@ use super::{
     sight::Sight,
 };
 
-/// Half the diagonal of a cell, m, with what gusts differ across it.
-const CELL_RADIUS: f64 = 1.1;
+/// What gusts displace a drop more or less than the middle of its cell, m.
+const GUST_SLACK: f64 = 0.2;
 /// Part of the region's radius over which rain changes from streaks to veil, half of it on each side.
 const EDGE: f64 = 0.2;
 
@@ -37,6 +37,11 @@ pub(crate) struct ClassNow {
 }
 
 impl ClassNow {
+    /// Drops of a cell now, on average.
+    pub(crate) fn count(&self) -> f64 {
+        self.most * self.share * self.lattice.volume()
+    }
+
     /// Numbers for `purpose` that no other diameter shares.
     pub(crate) fn purpose(&self, purpose: Purpose) -> Purpose {
         Purpose(purpose.0.wrapping_add(self.index as u32))
@@ -94,6 +99,9 @@ impl Moment {
     /// How much of a drop at `distance` from the camera is drawn as a streak: all within the region, nothing beyond its soft edge.
     pub(crate) fn nearness(&self, distance: f64) -> f64 {
         let half = 0.5 * EDGE * self.distance;
+        if distance <= self.distance - half {
+            return 1.0;
+        }
         1.0 - math::smoothstep(self.distance - half, self.distance + half, distance)
     }
 
@@ -115,14 +123,16 @@ impl Moment {
         }
     }
 
-    /// Cells of a class that may show within a ball, nearest to the camera first, with the distances of their middles from it.
-    pub(crate) fn cells(&self, class: &ClassNow, Ball { centre, radius: distance }: Ball) -> Vec<(f64, Cell)> {
+    /// Cells of a class of which any drop may show within a ball, with the distances of their middles from the camera; its drops are
+    /// drawn up to `aside` (m) level from its middle in x and z.
+    pub(crate) fn cells(&self, class: &ClassNow, Ball { centre, radius }: Ball, aside: f64) -> Vec<(f64, Cell)> {
         let eye = self.sight.middle().position;
-        let reach = distance + CELL_RADIUS;
+        let slack = self.gusts.as_ref().map_or(0.0, |_| GUST_SLACK);
+        let half = class.lattice.half_extents(aside) + slack;
+        let reach = radius + half.max_element();
         let around = [centre - reach, centre + reach];
         let [low, high] = self.gusts.as_ref().map_or(around, |gusts| gusts.origins(around));
-        let fall = class.speed * self.sight.exposure;
-        let radius = CELL_RADIUS + fall + 0.5 * self.sight.velocity().length() * self.sight.exposure;
+        let way = 0.5 * (class.speed + self.sight.velocity().length()) * self.sight.exposure + slack;
         let row = |y: f64| class.lattice.place(DVec3::new(low.x, y, low.z)).y.floor() as i64;
         let rows = [low.y.max(self.ground - CELL), high.y].map(row);
         let mut cells = Vec::new();
@@ -132,14 +142,15 @@ impl Moment {
             for x in first.x.floor() as i64..=last.x.floor() as i64 {
                 for z in first.z.floor() as i64..=last.z.floor() as i64 {
                     let place = DVec3::new(x as f64 + 0.5, row as f64 + 0.5, z as f64 + 0.5);
-                    let (point, _) = self.drop(class, place);
-                    if (point - centre).length() < distance + CELL_RADIUS && self.sight.may_see(point, radius) {
+                    let (point, velocity) = self.drop(class, place);
+                    let nearest = ((point - centre).abs() - half).max(DVec3::ZERO).length();
+                    let blown = 0.5 * DVec3::new(velocity.x, 0.0, velocity.z).length() * self.sight.exposure;
+                    if nearest < radius && self.sight.may_see(point, half, way + blown) {
                         cells.push(((point - eye).length(), Cell([x, row, z])));
                     }
                 }
             }
         }
-        cells.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         cells
     }
 

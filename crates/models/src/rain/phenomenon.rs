@@ -12,7 +12,6 @@ use bansho_base::{
 
 use super::{
     aovs::AOVS,
-    billboards::SheetCache,
     distribution::{DropSizes, SizeBin},
     extinction::{Losses, extinction},
     lattice::Lattice,
@@ -35,7 +34,6 @@ pub struct Rain {
     pub(super) scattering: Scattering,
     classes: Vec<Class>,
     pub(super) loop_s: Option<f64>,
-    pub(super) sheets: SheetCache,
 }
 
 /// The drops that one diameter stands for.
@@ -74,7 +72,6 @@ impl Rain {
             lens,
             classes,
             loop_s,
-            sheets: SheetCache::default(),
             parameters,
         })
     }

@@ -3,28 +3,27 @@
 use bansho_base::{
     canvas::{DepthInterval, Strip, View},
     image::{Figure, Rect},
-    math::DVec3,
     phenomenon::Prepared,
     surroundings::Surroundings,
 };
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::{
     Rain,
     aovs::measure,
-    bands::{BAND, Bands, Extent},
-    billboards::{Billboards, Brush, paint},
+    bands::BAND,
+    billboards::Billboards,
     distribution::DropSizes,
-    drops::{self, Near},
+    drops::{Share, Shower},
     extinction::{Losses, extinction, visibility},
     light::Lighting,
-    moment::{Ball, Moment},
+    moment::Moment,
     parameters::Method,
-    singles::{NEAREST, NEAREST_TO_LAMP, Singles},
-    source::{SourceField, sky_through_drops},
+    part::Part,
+    patch::{Patch, STRETCH},
+    singles::Singles,
+    sky::sky_through_drops,
     splashes::Splashes,
-    stroke::Stroke,
     tiles::{COARSE, FINE, Tiles},
     veil::Veil,
 };
@@ -32,30 +31,13 @@ use super::{
 /// Light below this share of display white is left out: with a hundred streaks over each other it still is below a 255th.
 const LEAST_SHARE: f64 = 1.0 / (255.0 * 128.0);
 
-/// Columns that streaks are drawn in at a time: the planes of so many fit into a core's first cache.
-const STRETCH: usize = 128;
-
-/// Streaks of single drops, sorted into bands.
-struct Strokes {
-    strokes: Vec<Stroke>,
-    bands: Bands,
-}
-
-impl Strokes {
-    fn new(strokes: Vec<Stroke>, size: [usize; 2]) -> Self {
-        let extents: Vec<Extent> = strokes.par_iter().with_min_len(4096).map(Stroke::extent).collect();
-        Self { bands: Bands::new(size, STRETCH, extents.iter().copied()), strokes }
-    }
-}
-
 /// A frame, ready to draw.
 pub(super) struct PreparedRain<'a> {
     view: &'a View,
     level: Level,
-    strokes: Strokes,
-    billboards: Option<(Billboards, SourceField)>,
+    /// Nearest first.
+    parts: Vec<Part>,
     veil: Option<Veil<'a>>,
-    least_light: f32,
     figures: Vec<Figure>,
 }
 
@@ -64,31 +46,31 @@ impl<'a> PreparedRain<'a> {
         let moment = Moment::new(rain, view, surroundings);
         let extinctions = rain.extinctions(view.shutter.middle());
         let lights = &surroundings.others.lights;
-        let lighting = Lighting { scattering: &rain.scattering, lights, extinction: extinctions[0], nearest: 0.0 };
+        let lighting = Lighting { scattering: &rain.scattering, lights, extinction: extinctions[0] };
         let tiles = Tiles::new(view, COARSE);
         let sky = sky_through_drops(&rain.lens, &tiles, &surroundings.sky);
         let frame = Frame { rain, moment: &moment, lighting: &lighting, tiles: &tiles, sky: &sky, view };
-        let eye = moment.sight.middle().position;
-        let nearness = |point: DVec3| moment.nearness((point - eye).length());
-        let (strokes, billboards) = match rain.parameters.method {
-            Method::Drops => (frame.strokes(&[moment.around_camera(1.1 * moment.distance)], &nearness), None),
+        let region = moment.around_camera(1.1 * moment.distance);
+        let mut billboards = 0;
+        let mut parts = match rain.parameters.method {
+            Method::Drops => frame.shower(Share::Whole).drops(&[region]),
             Method::Billboards => {
                 let singles = Singles::new(&moment, lights);
-                let strokes = frame.strokes(singles.balls(), &|point| nearness(point) * singles.share(point));
-                (strokes, Some(frame.billboards(&|point| nearness(point) * (1.0 - singles.share(point)))))
+                let mut parts = frame.shower(Share::Single(&singles)).drops(singles.balls());
+                let shower = frame.shower(Share::OnBillboard(&singles));
+                let cards = Billboards::new(shower, frame.least_light()).parts(region);
+                billboards = cards.iter().map(|part| part.cells).sum();
+                parts.extend(cards);
+                parts
             }
         };
-        let mut strokes = strokes;
-        strokes.extend(frame.splashes());
+        parts.extend(frame.splashes());
         let end = if rain.parameters.veil_distance > 0.0 { rain.reach() } else { 0.0 };
         let fine = Tiles::new(view, FINE);
         let fine_sky = sky_through_drops(&rain.lens, &fine, &surroundings.sky);
         let veil = Veil::new(&moment, &lighting, &fine, fine_sky, view, extinctions, end);
-        let white = view.white_luminance.filter(|_| rain.parameters.culling);
-        let least_light = white.map_or(0.0, |white| (white * LEAST_SHARE) as f32);
-        let figures = frame.figures(strokes.len(), billboards.as_ref().map(|(billboards, _)| billboards));
-        let strokes = Strokes::new(strokes, view.size);
-        Self { view, level: Level::new(), strokes, billboards, veil, least_light, figures }
+        let figures = frame.figures(parts.iter().map(Part::count).sum(), billboards);
+        Self { view, level: Level::new(), parts, veil, figures }
     }
 }
 
@@ -103,16 +85,17 @@ struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
+    /// What turns drops into streaks.
+    fn shower(&self, share: Share<'a>) -> Shower<'a> {
+        Shower { level: Level::new(), moment: self.moment, lighting: self.lighting, sky: self.shining_sky(), share }
+    }
+
     /// The sky through drops, if it shines.
     fn shining_sky(&self) -> Option<(&'a Tiles, &'a [[f32; 3]])> {
         self.sky.iter().flatten().any(|value| *value > 0.0).then_some((self.tiles, self.sky))
     }
 
-    fn strokes(&self, within: &[Ball], weight: &(dyn Fn(DVec3) -> f64 + Sync)) -> Vec<Stroke> {
-        drops::strokes(&Near { moment: self.moment, lighting: self.lighting, sky: self.shining_sky(), within, weight })
-    }
-
-    fn splashes(&self) -> Vec<Stroke> {
+    fn splashes(&self) -> Vec<Part> {
         let splashes = Splashes {
             moment: self.moment,
             lighting: self.lighting,
@@ -121,32 +104,24 @@ impl<'a> Frame<'a> {
             time: self.view.shutter.middle(),
             loop_s: self.rain.loop_s,
         };
-        splashes.strokes()
+        splashes.parts()
     }
 
-    fn billboards(&self, weight: &(dyn Fn(DVec3) -> f64 + Sync)) -> (Billboards, SourceField) {
-        let within = self.moment.around_camera(1.1 * self.moment.distance);
-        let picture = Rect::of_size(self.view.size[0], self.view.size[1]);
-        let sheets = self.rain.sheets.sheets(self.moment);
-        let billboards = Billboards::new(self.moment, sheets, picture, within, weight);
-        // What is nearer to a lamp is not on billboards; a light that grows on would be seen between the corners of tiles.
-        let lighting = Lighting { nearest: NEAREST_TO_LAMP, ..*self.lighting };
-        let source = SourceField::new(&lighting, self.tiles, self.sky, within.centre, [NEAREST, within.radius]);
-        (billboards, source)
+    /// Light that no display would show, cd/m^2.
+    fn least_light(&self) -> f32 {
+        let white = self.view.white_luminance.filter(|_| self.rain.parameters.culling);
+        white.map_or(0.0, |white| (white * LEAST_SHARE) as f32)
     }
-}
 
-impl Frame<'_> {
-    /// What the frame is known by; drops on a billboard count by what of it is in the picture.
-    fn figures(&self, strokes: usize, billboards: Option<&Billboards>) -> Vec<Figure> {
+    /// What the frame is known by.
+    fn figures(&self, streaks: usize, billboards: usize) -> Vec<Figure> {
         let t = self.view.shutter.middle();
         let sizes = DropSizes::marshall_palmer(self.rain.rate(t));
-        let on_billboards = billboards.map_or(0.0, |billboards| billboards.drops_in_view());
         let figure = |name, unit, value| Figure { name, unit, value };
         vec![
             figure("rain_rate", "mm/h", self.rain.rate(t)),
-            figure("drops_in_view", "", strokes as f64 + on_billboards),
-            figure("billboards_in_view", "", billboards.map_or(0.0, |billboards| billboards.cards.len() as f64)),
+            figure("drops_in_view", "", streaks as f64),
+            figure("billboards_in_view", "", billboards as f64),
             figure("extinction", "1/m", extinction(&sizes, Losses::Geometric, DropSizes::ALL)),
             figure("visibility", "m", visibility(&sizes)),
         ]
@@ -181,31 +156,27 @@ impl PreparedRain<'_> {
         let mut aovs = std::mem::take(&mut strip.aovs);
         // Rain alone draws into its strip, and takes all colours alike.
         if let Some(mut planes) = strip.gray_planes_mut() {
-            for ([from, to], members) in self.strokes.bands.stretches(band, rows.x, rows.right()) {
-                let rows = rows.intersection(&Rect { x: from, width: to - from, ..rows });
-                for &index in members {
-                    let stroke = &self.strokes.strokes[index as usize];
-                    if !slice.contains(f64::from(stroke.depth)) {
+            let (mut patch, mut streaks) = (Patch::default(), Vec::new());
+            for stretch in rows.x / STRETCH..rows.right().div_ceil(STRETCH) {
+                let origin = [stretch * STRETCH, band * BAND];
+                let shown = rows.intersection(&Rect { x: origin[0], width: STRETCH, ..rows });
+                patch.load(origin, shown, rect, &planes);
+                streaks.clear();
+                self.parts.iter().for_each(|part| part.collect(band, stretch, &mut streaks));
+                for stroke in streaks.iter().filter(|stroke| slice.contains(f64::from(stroke.layer.depth))) {
+                    if aovs.is_empty() {
+                        stroke.draw(&mut patch, &mut |_, _| {});
                         continue;
                     }
-                    if aovs.is_empty() {
-                        stroke.draw(rows, rect, &mut planes, &mut |_, _| {});
-                    } else {
-                        stroke.draw(rows, rect, &mut planes, &mut |index, opacity| {
-                            measure(&mut aovs, index, opacity, stroke.depth, stroke.diameter_mm);
-                        });
-                    }
+                    stroke.draw(&mut patch, &mut |[column, row], opacity| {
+                        let [x, y] = [origin[0] + column, origin[1] + row];
+                        if (shown.x..shown.right()).contains(&x) && (shown.y..shown.bottom()).contains(&y) {
+                            let index = (y - rect.y) * rect.width + x - rect.x;
+                            measure(&mut aovs, index, opacity, stroke.layer.depth, stroke.diameter_mm);
+                        }
+                    });
                 }
-            }
-            if let Some((billboards, source)) = &self.billboards {
-                paint(
-                    &Brush { billboards, source, slice, least_light: self.least_light },
-                    band,
-                    rows,
-                    rect,
-                    &mut planes,
-                    &mut aovs,
-                );
+                patch.store(shown, rect, &mut planes);
             }
         }
         strip.aovs = aovs;

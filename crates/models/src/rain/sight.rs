@@ -3,7 +3,8 @@
 use bansho_base::{
     camera::{Camera, Lens},
     canvas::View,
-    math::{DVec3, sqrt},
+    image::Rect,
+    math::DVec3,
 };
 
 /// An exposure's cameras.
@@ -13,24 +14,55 @@ pub(crate) struct Sight {
     pub(crate) cameras: [Camera; 3],
     /// How long the shutter is open, s.
     pub(crate) exposure: f64,
-    /// Part of the picture that is drawn, pixels: left, top, right, bottom.
-    window: [f64; 4],
+    /// What the cameras see of the part of the picture that is drawn; none where they see all around.
+    frusta: Vec<Frustum>,
+}
+
+/// What a camera sees: all that no side has before it.
+#[derive(Clone, Debug)]
+struct Frustum {
+    position: DVec3,
+    /// Unit vectors outward: right, left, bottom, top and back.
+    sides: [DVec3; 5],
+}
+
+impl Frustum {
+    /// `None` where a lens has no flat sides.
+    fn new(camera: &Camera, window: &Rect) -> Option<Self> {
+        let [across, up, back] = [0, 1, 2].map(|axis| camera.orientation.col(axis));
+        let tangent = |pixels: usize, centre: f64| (pixels as f64 - centre) / camera.focal_pixels;
+        let [left, right] = [window.x, window.right()].map(|side| across + back * tangent(side, camera.centre.x));
+        let [top, bottom] = [window.y, window.bottom()].map(|side| -up + back * tangent(side, camera.centre.y));
+        let sides = [right, -left, bottom, -top, back].map(DVec3::normalize);
+        (camera.lens == Lens::Perspective).then_some(Self { position: camera.position, sides })
+    }
+
+    #[inline(always)]
+    fn may_see(&self, point: DVec3, half: DVec3, radius: f64) -> bool {
+        let offset = point - self.position;
+        // Not one after the other: a branch for each side would be guessed wrongly.
+        self.sides.iter().fold(true, |seen, side| seen & (side.dot(offset) - side.abs().dot(half) <= radius))
+    }
 }
 
 impl Sight {
     pub(crate) fn new(view: &View) -> Self {
         let shutter = view.shutter;
-        let window = view.window;
-        Self {
-            cameras: [view.camera_at(shutter.open), view.camera, view.camera_at(shutter.close)],
-            exposure: shutter.duration(),
-            window: [window.x, window.y, window.right(), window.bottom()].map(|side| side as f64),
-        }
+        let cameras = [view.camera_at(shutter.open), view.camera, view.camera_at(shutter.close)];
+        let mut distinct = cameras.to_vec();
+        distinct.dedup();
+        let frusta = distinct.iter().filter_map(|camera| Frustum::new(camera, &view.window)).collect();
+        Self { cameras, exposure: shutter.duration(), frusta }
     }
 
     /// The camera half way.
     pub(crate) fn middle(&self) -> &Camera {
         &self.cameras[1]
+    }
+
+    /// Columns and rows of the picture.
+    pub(crate) fn size(&self) -> [usize; 2] {
+        self.cameras[1].size.map(|side| side as usize)
     }
 
     /// Velocity of the camera's place while the shutter is open, m/s.
@@ -39,29 +71,15 @@ impl Sight {
         if self.exposure > 0.0 { way / self.exposure } else { DVec3::ZERO }
     }
 
-    /// Whether anything within `radius` of `point` may be seen at any time of the exposure.
-    pub(crate) fn may_see(&self, point: DVec3, radius: f64) -> bool {
-        self.cameras.iter().any(|camera| self.within(camera, point, radius))
-    }
-
-    fn within(&self, camera: &Camera, point: DVec3, radius: f64) -> bool {
-        if camera.lens != Lens::Perspective {
-            return true;
+    /// Whether anything within `radius` (m) of a box may be seen at any time of the exposure; the box reaches as far as `half` to both
+    /// sides of `point` along the world's axes.
+    #[inline(always)]
+    pub(crate) fn may_see(&self, point: DVec3, half: DVec3, radius: f64) -> bool {
+        let mut seen = self.frusta.is_empty();
+        for frustum in &self.frusta {
+            seen |= frustum.may_see(point, half, radius);
         }
-        let local = camera.to_camera(point);
-        let depth = -local.z;
-        if depth < -radius {
-            return false;
-        }
-        let [left, top, right, bottom] = self.window;
-        let tangent = |pixels: f64| pixels / camera.focal_pixels;
-        // Distance from a plane through the camera's place that holds an edge of the window; positive is outside.
-        let outside = |coordinate: f64, edge: f64| (coordinate - edge * depth) / sqrt(1.0 + edge * edge) > radius;
-        let (x, y) = (local.x, -local.y);
-        !(outside(x, tangent(right - camera.centre.x))
-            || outside(-x, -tangent(left - camera.centre.x))
-            || outside(y, tangent(bottom - camera.centre.y))
-            || outside(-y, -tangent(top - camera.centre.y)))
+        seen
     }
 }
 
@@ -87,9 +105,9 @@ mod tests {
                 (0.0..view.size[0] as f64).contains(&pixel.x) && (0.0..view.size[1] as f64).contains(&pixel.y)
             };
             let projects = view.camera.project(point).is_some_and(|place| inside(place.pixel));
-            assert!(!projects || sight.may_see(point, 0.0));
+            assert!(!projects || sight.may_see(point, DVec3::ZERO, 0.0));
             seen += usize::from(projects);
-            hidden += usize::from(!sight.may_see(point, 0.5));
+            hidden += usize::from(!sight.may_see(point, DVec3::splat(0.5), 0.0));
         }
         assert!(seen > 50 && hidden > 3000, "{seen} {hidden}");
     }

@@ -37,8 +37,13 @@ impl Singles {
 
     /// How much of a drop at a point is drawn by itself, 0 to 1.
     pub(super) fn share(&self, point: DVec3) -> f64 {
-        let share =
-            |ball: &Ball| 1.0 - smoothstep(ball.radius - TAKE_OVER, ball.radius, (point - ball.centre).length());
+        let share = |ball: &Ball| {
+            let square = (point - ball.centre).length_squared();
+            if square >= ball.radius * ball.radius {
+                return 0.0;
+            }
+            1.0 - smoothstep(ball.radius - TAKE_OVER, ball.radius, square.sqrt())
+        };
         self.0.iter().map(share).fold(0.0, f64::max)
     }
 }

@@ -16,12 +16,15 @@ use super::{
     light::Lighting,
     moment::{ClassNow, Moment},
     parameters::SplashParameters,
+    part::Part,
     stroke::Stroke,
     tiles::Tiles,
 };
 
 /// Side of a square of ground, m.
 const SQUARE: f64 = 0.5;
+/// Squares whose droplets make a part.
+const SQUARES_OF_PART: usize = 32;
 /// Length of a turn, s; no splash lasts longer.
 const TURN: f64 = 0.25;
 /// Fall acceleration, m/s^2.
@@ -67,8 +70,8 @@ struct Impact {
 }
 
 impl Splashes<'_> {
-    /// Strokes of all droplets that may show.
-    pub(crate) fn strokes(&self) -> Vec<Stroke> {
+    /// The streaks of all droplets that may show.
+    pub(crate) fn parts(&self) -> Vec<Part> {
         let (moment, reach) = (self.moment, self.parameters.distance);
         let eye = moment.sight.middle().position;
         let high = (eye.y - moment.ground).abs();
@@ -80,12 +83,16 @@ impl Splashes<'_> {
         let squares: Vec<[i64; 2]> = range(eye.x).flat_map(|x| range(eye.z).map(move |z| [x, z])).collect();
         let middle = |[x, z]: [i64; 2]| DVec3::new((x as f64 + 0.5) * SQUARE, moment.ground, (z as f64 + 0.5) * SQUARE);
         let shows = |square: &&[i64; 2]| {
-            (middle(**square) - eye).length() < reach && moment.sight.may_see(middle(**square), 0.7 * SQUARE + 0.3)
+            (middle(**square) - eye).length() < reach
+                && moment.sight.may_see(middle(**square), DVec3::new(0.5 * SQUARE, 0.0, 0.5 * SQUARE), 0.3)
         };
         let squares: Vec<&[i64; 2]> = squares.iter().filter(shows).collect();
-        let parts: Vec<Vec<Stroke>> =
-            squares.par_iter().map(|square| self.square(**square, middle(**square))).collect();
-        parts.concat()
+        let part = |squares: &[&[i64; 2]]| {
+            let mut strokes = Vec::new();
+            squares.iter().for_each(|square| self.square(**square, middle(**square), &mut strokes));
+            Part::new(strokes, 0, moment.sight.size())
+        };
+        squares.par_chunks(SQUARES_OF_PART).map(part).collect()
     }
 
     /// Turns until now, as a number and a part; in a loop a whole number of turns fits.
@@ -95,8 +102,8 @@ impl Splashes<'_> {
         (turns.floor() as i64, turns - turns.floor(), length)
     }
 
-    /// The droplets over one square of ground.
-    fn square(&self, [x, z]: [i64; 2], middle: DVec3) -> Vec<Stroke> {
+    /// Adds the droplets over one square of ground.
+    fn square(&self, [x, z]: [i64; 2], middle: DVec3, strokes: &mut Vec<Stroke>) {
         let (turn, part, length) = self.turn();
         let key = self.moment.key;
         let id = (x as u64 & 0xffff_ffff) << 32 | z as u64 & 0xffff_ffff;
@@ -104,7 +111,6 @@ impl Splashes<'_> {
         let thinned = (away / ALL_WITHIN).max(1.0);
         let share = self.parameters.amount / (thinned * thinned);
         let fading = 1.0 - math::smoothstep(0.7, 1.0, away / self.parameters.distance);
-        let mut strokes = Vec::new();
         for back in 0..2 {
             let step =
                 self.loop_s.map_or(turn - back, |seconds| (turn - back).rem_euclid((seconds / length).round() as i64));
@@ -125,12 +131,11 @@ impl Splashes<'_> {
                     self.add(
                         class,
                         &Impact { place, age, diameter_mm: class.diameter_mm, id, step, strength },
-                        &mut strokes,
+                        strokes,
                     );
                 }
             }
         }
-        strokes
     }
 
     fn add(&self, class: &ClassNow, impact: &Impact, strokes: &mut Vec<Stroke>) {
@@ -145,8 +150,13 @@ impl Splashes<'_> {
             let words = self.moment.key.words(impact.id, impact.step, Purpose(DROPLET.0 ^ (droplet as u32) << 24));
             let random = words.map(|word| f64::from(uniform(word)));
             let Some(mut stroke) = self.droplet(impact, droplet, random) else { continue };
-            let sky = self.sky.map_or([0.0; 3], |(tiles, sky)| tiles.at(sky, stroke.middle()));
-            stroke.light = std::array::from_fn(|c| lit[c] + sky[c]);
+            if !stroke.meets(self.moment.sight.middle().size) {
+                continue;
+            }
+            stroke.layer.add_light(lit);
+            if let Some((tiles, sky)) = self.sky {
+                stroke.layer.add_light(tiles.at(sky, stroke.middle()));
+            }
             strokes.push(stroke);
         }
     }
@@ -170,6 +180,6 @@ impl Splashes<'_> {
         let diameter_mm = impact.diameter_mm * (0.16 + 0.14 * random[3]);
         let flight = Flight { from: at(from), to: at(to), diameter_mm };
         let share = if half > 0.0 { (to - from) / (2.0 * half) } else { 1.0 };
-        flight.whole().stroke(self.moment, impact.strength * share, [0.0; 3])
+        flight.whole().stroke(self.moment, impact.strength * share)
     }
 }

@@ -3,6 +3,7 @@
 use bansho_base::{
     camera::Camera,
     canvas::View,
+    image::Rect,
     math::{DVec2, DVec3},
 };
 use rayon::prelude::*;
@@ -12,9 +13,14 @@ pub(crate) const COARSE: usize = 32;
 /// Side of a tile where lamps and the edges of their cones are seen, pixels.
 pub(crate) const FINE: usize = 16;
 
-/// Corners of the tiles of a picture.
+/// Side of a tile close to a lamp, pixels.
+pub(crate) const FINEST: usize = 4;
+
+/// Corners of the tiles of a picture, or of a part of it.
 #[derive(Clone, Debug)]
 pub(crate) struct Tiles {
+    /// Place of the first corner, pixels.
+    origin: [usize; 2],
     /// Side of a tile, pixels.
     pub(crate) side: usize,
     /// Corners in a row, and rows of corners.
@@ -25,9 +31,16 @@ pub(crate) struct Tiles {
 
 impl Tiles {
     pub(crate) fn new(view: &View, side: usize) -> Self {
-        let size = view.size.map(|pixels| pixels.div_ceil(side) + 1);
-        let line = |index: usize| line(&view.camera, [index % size[0] * side, index / size[0] * side]);
-        Self { side, size, lines: (0..size[0] * size[1]).map(line).collect() }
+        Self::over(view, side, Rect::of_size(view.size[0], view.size[1]))
+    }
+
+    /// Tiles that cover a part of the picture.
+    pub(crate) fn over(view: &View, side: usize, rect: Rect) -> Self {
+        let origin = [rect.x, rect.y];
+        let size = [rect.width, rect.height].map(|pixels| pixels.max(1).div_ceil(side) + 1);
+        let place = |index: usize| [origin[0] + index % size[0] * side, origin[1] + index / size[0] * side];
+        let lines = (0..size[0] * size[1]).map(|index| line(&view.camera, place(index))).collect();
+        Self { origin, side, size, lines }
     }
 
     /// One value at each corner, made in parallel.
@@ -43,18 +56,32 @@ impl Tiles {
         mix(line(index), line(index + self.size[0]), down)
     }
 
+    /// The four corners around a place of the picture (pixels), each with its share.
+    pub(crate) fn corners(&self, [x, y]: [f32; 2]) -> [(usize, f32); 4] {
+        let ((column, across), (row, down)) = (self.column_at(x), self.row_at(y));
+        let index = row * self.size[0] + column;
+        let below = index + self.size[0];
+        [
+            (index, (1.0 - across) * (1.0 - down)),
+            (index + 1, across * (1.0 - down)),
+            (below, (1.0 - across) * down),
+            (below + 1, across * down),
+        ]
+    }
+
     /// The corner above a height in the picture (pixels), and how far it is to the corner below, 0 to 1.
     pub(crate) fn row_at(&self, y: f32) -> (usize, f32) {
-        self.split(y, self.size[1])
+        self.split(y, 1)
     }
 
     /// The corner left of a place across the picture (pixels), and how far it is to the corner right of it, 0 to 1.
     pub(crate) fn column_at(&self, x: f32) -> (usize, f32) {
-        self.split(x, self.size[0])
+        self.split(x, 0)
     }
 
-    fn split(&self, coordinate: f32, corners: usize) -> (usize, f32) {
-        let place = (coordinate / self.side as f32).clamp(0.0, (corners - 1) as f32);
+    fn split(&self, coordinate: f32, axis: usize) -> (usize, f32) {
+        let corners = self.size[axis];
+        let place = ((coordinate - self.origin[axis] as f32) / self.side as f32).clamp(0.0, (corners - 1) as f32);
         let whole = (place as usize).min(corners.saturating_sub(2));
         (whole, place - whole as f32)
     }

@@ -4,14 +4,16 @@ use bansho_base::{
     canvas::{DepthInterval, Strip, View},
     image::Rect,
     math::{self, DVec2, DVec3},
-    surroundings::{Emitter, Light},
+    surroundings::{Arrival, Emitter, Light},
 };
+
+use fearless_simd::{Level, dispatch};
 
 use super::{
     bands::BAND,
-    light::{Lighting, distance},
+    light::Lighting,
     moment::Moment,
-    tiles::{Tiles, geometric, mix},
+    tiles::{FINE, FINEST, Tiles, geometric, mix},
 };
 
 /// Nearest distance at which the light that is scattered up to there is known, m, and how much further each next one is.
@@ -19,6 +21,8 @@ const FIRST: f64 = 0.5;
 const RATIO: f64 = 1.25;
 /// Angle, seen from a lamp, that one sample stands for.
 const ANGLE: f64 = 0.15;
+/// A veil has no depth of its own, m.
+const NOWHERE: [f32; FINE] = [f32::INFINITY; FINE];
 /// Lamps are at least so large for the air around them, m.
 const SMALLEST_LAMP: f64 = 0.02;
 
@@ -51,20 +55,35 @@ impl Scattered {
     }
 }
 
-/// A lamp in the picture. Light scattered around it falls as 1/h with the distance h of the line of sight from it, which no straight
-/// line between corners of tiles can follow: near it, what is left after taking out 1/h is interpolated.
+/// A lamp in the picture. Light scattered around it falls as 1/h with the distance h of the line of sight from it, and its cone has an
+/// edge, which no straight line between corners of tiles can follow: near it tiles are finer, and what is left after taking out 1/h is
+/// interpolated.
 struct Halo {
     /// From the camera to it, m.
     offset: DVec3,
     /// Where it is in the picture.
     pixel: DVec2,
+    /// The pixels near it.
+    rect: Rect,
+    /// Its light at the corners of the whole picture's tiles.
     scattered: Scattered,
+    /// Finer tiles over the pixels near it, and its light at their corners.
+    near: Tiles,
+    sharp: Scattered,
 }
 
 /// Pixels around a lamp for which that is done.
 const HALO: f64 = 72.0;
 /// Most lamps for which it is.
 const MOST_HALOS: usize = 8;
+
+/// The pixels of a picture near a lamp.
+fn around(lamp: DVec2, size: [usize; 2]) -> Rect {
+    let [left, top] = [lamp.x - HALO, lamp.y - HALO].map(|side| side.max(0.0) as usize);
+    let [right, bottom] = [lamp.x + HALO, lamp.y + HALO].map(|side| side.max(0.0) as usize);
+    let rect = Rect { x: left, y: top, width: right - left, height: bottom - top };
+    rect.intersection(&Rect::of_size(size[0], size[1]))
+}
 
 impl Halo {
     /// How near a line of sight passes, m.
@@ -75,6 +94,7 @@ impl Halo {
 
 /// Single scattering along the lines of sight of one frame.
 pub(crate) struct Veil<'a> {
+    level: Level,
     view: &'a View,
     tiles: Tiles,
     /// Ascending from 0, m.
@@ -119,9 +139,19 @@ impl<'a> Veil<'a> {
         let (shown, others) = march.divide(view);
         let lines = tiles.map(|_, line| march.line(line, &others));
         let mut scattered = Scattered::new(&lines, distances.len());
-        let halos: Vec<Halo> = shown.into_iter().map(|(light, pixel)| march.halo(&light, pixel, tiles)).collect();
+        let halos: Vec<Halo> = shown.into_iter().map(|(light, pixel)| march.halo(&light, pixel, tiles, view)).collect();
         halos.iter().for_each(|halo| scattered.add(&halo.scattered));
-        Some(Self { view, tiles: tiles.clone(), distances, depths, scattered, halos, sky, ground: moment.ground })
+        Some(Self {
+            level: Level::new(),
+            view,
+            tiles: tiles.clone(),
+            distances,
+            depths,
+            scattered,
+            halos,
+            sky,
+            ground: moment.ground,
+        })
     }
 
     /// Its end, m.
@@ -170,18 +200,17 @@ impl<'a> Veil<'a> {
         let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
         let range = self.range(pixel, slice, hidden).filter(|range| range[0] < range[1])?;
         let line = self.view.camera.direction(pixel)?.normalize_or_zero();
-        let part = pixel / self.tiles.side as f64;
-        let (column, row) = (part.x as usize, part.y as usize);
-        let (across, down) = ((part.x - part.x.floor()) as f32, (part.y - part.y.floor()) as f32);
+        let place = pixel.as_vec2().to_array();
         let mut correction = [0.0_f32; 3];
         let nearest = halo.passes(line);
-        for (right, below) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            let corner = (row + below) * self.tiles.size[0] + column + right;
-            let weight = |step: usize, part: f32| if step == 1 { part } else { 1.0 - part };
-            let share = weight(right, across) * weight(below, down);
-            let factor = share * (halo.passes(self.tiles.lines[corner]) / nearest - 1.0);
-            let lit = self.lit(&halo.scattered, corner, range);
+        for (corner, share) in halo.near.corners(place) {
+            let factor = share * halo.passes(halo.near.lines[corner]) / nearest;
+            let lit = self.lit(&halo.sharp, corner, range);
             (0..3).for_each(|c| correction[c] += lit[c] * factor);
+        }
+        for (corner, share) in self.tiles.corners(place) {
+            let lit = self.lit(&halo.scattered, corner, range);
+            (0..3).for_each(|c| correction[c] -= lit[c] * share);
         }
         Some(correction)
     }
@@ -189,9 +218,7 @@ impl<'a> Veil<'a> {
     /// Adds to the rows of a band what pixels near lamps get.
     fn add_halos(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
         for halo in &self.halos {
-            let [top, bottom] = [halo.pixel.y - HALO, halo.pixel.y + HALO].map(|y| y.max(0.0) as usize);
-            let [left, right] = [halo.pixel.x - HALO, halo.pixel.x + HALO].map(|x| x.max(0.0) as usize);
-            let rect = Rect { x: left, y: top, width: right - left, height: bottom - top }.intersection(&rows);
+            let rect = halo.rect.intersection(&rows);
             for y in rect.y..rect.bottom() {
                 for x in rect.x..rect.right() {
                     let away = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - halo.pixel).length() / HALO;
@@ -226,12 +253,13 @@ impl<'a> Veil<'a> {
         if strip.has_plate() {
             self.draw_before_plate(slice, rows, strip);
         } else {
-            self.draw_open(slice, band, rows, strip);
+            dispatch!(self.level, _simd => self.draw_open(slice, band, rows, strip));
         }
         self.add_halos(slice, rows, strip);
     }
 
     /// Nothing but the ground ends the veil: it is found at the corners of tiles.
+    #[inline(always)]
     fn draw_open(&self, slice: &DepthInterval, band: usize, rows: Rect, strip: &mut Strip) {
         let side = self.tiles.side;
         let columns = rows.x / side..rows.right().div_ceil(side) + 1;
@@ -246,17 +274,26 @@ impl<'a> Veil<'a> {
         let edges = [edge((band * BAND) as f64), edge(((band + 1) * BAND) as f64)];
         for y in rows.y..rows.bottom() {
             let down = ((y - band * BAND) as f32 + 0.5) / BAND as f32;
+            let corner = |column: usize, c: usize| {
+                let (top, bottom) = (edges[0][column][c], edges[1][column][c]);
+                (bottom - top).mul_add(down, top)
+            };
             let start = (y - strip.rect.y) * strip.rect.width;
-            for x in rows.x..rows.right() {
-                let across = ((x % side) as f32 + 0.5) / side as f32;
-                let column = x / side - columns.start;
-                let value: [f32; 4] = std::array::from_fn(|c| {
-                    let at =
-                        |edge: &[[f32; 4]]| (edge[column + 1][c] - edge[column][c]).mul_add(across, edge[column][c]);
-                    let (top, bottom) = (at(&edges[0]), at(&edges[1]));
-                    (bottom - top).mul_add(down, top)
-                });
-                put(strip, start + x - strip.rect.x, value);
+            for column in 0..edges[0].len() - 1 {
+                let left = (columns.start + column) * side;
+                let shown = left.max(rows.x)..(left + side).min(rows.right());
+                let mut values = [[0.0_f32; FINE]; 4];
+                for (c, values) in values.iter_mut().enumerate() {
+                    let (from, to) = (corner(column, c), corner(column + 1, c));
+                    for (x, value) in values.iter_mut().enumerate() {
+                        *value = (to - from).mul_add((x as f32 + 0.5) * (1.0 / FINE as f32), from);
+                    }
+                }
+                values[3].iter_mut().for_each(|through| *through = 1.0 - *through);
+                let [red, green, blue, opacity] =
+                    values.each_ref().map(|row| &row[shown.start - left..shown.end - left]);
+                let first = start + shown.start - strip.rect.x;
+                strip.add_row_behind(first, [red, green, blue], Some(opacity), &NOWHERE[..shown.len()]);
             }
         }
     }
@@ -314,13 +351,18 @@ impl March<'_> {
         (shown, others)
     }
 
-    fn halo(&self, light: &Light, pixel: DVec2, tiles: &Tiles) -> Halo {
-        let lines = tiles.map(|_, line| self.line(line, std::slice::from_ref(light)));
+    fn halo(&self, light: &Light, pixel: DVec2, tiles: &Tiles, view: &View) -> Halo {
         let offset = match light.emitter {
             Emitter::Point { position, .. } | Emitter::Spot { position, .. } => position - self.eye,
             Emitter::Directional { toward } => toward,
         };
-        Halo { offset, pixel, scattered: Scattered::new(&lines, self.distances.len()) }
+        let rect = around(pixel, view.size);
+        let near = Tiles::over(view, FINEST, rect);
+        let [scattered, sharp] = [tiles, &near].map(|tiles| {
+            let lines = tiles.map(|_, line| self.line(line, std::slice::from_ref(light)));
+            Scattered::new(&lines, self.distances.len())
+        });
+        Halo { offset, pixel, rect, scattered, near, sharp }
     }
 
     /// Light of some lamps scattered to the camera up to each distance.
@@ -368,13 +410,13 @@ impl March<'_> {
     fn sample(&self, light: &Light, line: DVec3, at: f64, length: f64, k: usize) -> [f32; 3] {
         let point = self.eye + line * at;
         let density = self.density.at(at);
-        let (illuminance, toward) = light.illuminance(point);
+        let Arrival { illuminance, toward, distance } = light.arriving(point);
         if illuminance == [0.0; 3] || density <= 0.0 || point.y < self.density.moment.ground {
             return [0.0; 3];
         }
         let share = ((at - self.distances[k]) / (self.distances[k + 1] - self.distances[k])) as f32;
         let depth = self.depths[k] + (self.depths[k + 1] - self.depths[k]) * share;
-        let through = math::lanes::exp(-depth - (self.lighting.extinction * distance(light, point)) as f32);
+        let through = math::lanes::exp(-depth - (self.lighting.extinction * distance) as f32);
         let scattered = self.lighting.scattering.at(toward.dot(line) as f32);
         let scale = through * (density * length) as f32;
         std::array::from_fn(|c| illuminance[c] * scattered[c] * scale)

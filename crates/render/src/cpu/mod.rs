@@ -5,6 +5,7 @@ mod clock;
 mod compose;
 mod haze;
 mod plate;
+mod plate_mirror;
 mod shot;
 mod snapshot;
 

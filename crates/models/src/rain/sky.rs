@@ -1,0 +1,13 @@
+//! The sky that is seen through drops.
+
+use bansho_base::sky::Sky;
+
+use super::{lens::DropLens, tiles::Tiles};
+
+/// What the sky shines through drops toward the camera from each corner of the tiles.
+pub(crate) fn sky_through_drops(lens: &DropLens, tiles: &Tiles, sky: &Sky) -> Vec<[f32; 3]> {
+    if *sky == Sky::DARK {
+        return vec![[0.0; 3]; tiles.lines.len()];
+    }
+    tiles.map(|_, line| lens.gather(line, |direction| sky.radiance(direction)))
+}
