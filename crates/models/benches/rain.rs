@@ -96,7 +96,7 @@ fn frames(criterion: &mut Criterion) {
         ("billboards and veil, 20 mm/h to 5 m", rain(Method::Billboards, 20.0, 5.0, 100.0)),
         ("billboards and veil, 100 mm/h to 50 m", rain(Method::Billboards, 100.0, 5.0, 45.0)),
         ("drops, 20 mm/h to 5 m", rain(Method::Drops, 20.0, 5.0, 0.0)),
-        ("drops, 150,000 streaks", rain(Method::Drops, 100.0, 7.4, 0.0)),
+        ("drops, 150,000 streaks", rain(Method::Drops, 100.0, 7.5, 0.0)),
     ];
     for (name, rain) in &cases {
         if let Ok(prepared) = rain.prepare(&view, &surroundings, &Unobserved) {
