@@ -112,6 +112,12 @@ impl Patch {
         self.has_plate
     }
 
+    /// Whether a pixel is one of the patch's: places before its first column or row count as far beyond its last.
+    #[inline(always)]
+    pub(crate) fn holds(&self, [column, row]: [usize; 2]) -> bool {
+        column < STRETCH && row < BAND
+    }
+
     /// Whether the plate hides what lies at a depth in a pixel of the patch.
     pub(crate) fn hides(&self, [column, row]: [usize; 2], depth: f32) -> bool {
         self.plate_depth.get(row).and_then(|row| row.get(column)).is_some_and(|plate| *plate <= depth)

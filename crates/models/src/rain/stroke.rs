@@ -163,7 +163,7 @@ impl Stroke {
             }
             for line in touched.clone() {
                 patch.put_behind(place(line), opacities[line], depths[line], &self.layer);
-                if opacities[line] > 0.0 {
+                if opacities[line] > 0.0 && patch.holds(place(line)) {
                     measure(place(line), opacities[line]);
                 }
             }
