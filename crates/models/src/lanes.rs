@@ -78,6 +78,9 @@ pub(crate) type Lanes<S> = f32x16<S>;
 /// Half a batch, for loops that end or skip often.
 pub(crate) type HalfLanes<S> = f32x8<S>;
 
+/// A quarter of a batch: four numbers that belong to one thing.
+pub(crate) type FourLanes<S> = f32x4<S>;
+
 /// [`Real`] for a vector type of that many numbers.
 macro_rules! real_batch {
     ($Batch:ident, $count:expr) => {
@@ -124,6 +127,7 @@ macro_rules! real_batch {
 
 real_batch!(Lanes, LANES);
 real_batch!(HalfLanes, LANES / 2);
+real_batch!(FourLanes, LANES / 4);
 
 /// Whether vectors of this level have a fused multiply-add; known when the code for the level is compiled.
 #[inline(always)]

@@ -82,6 +82,12 @@ impl Grid2 {
         inside.then(|| cell.map(|cell| cell as usize))
     }
 
+    /// Number among the [`values`](Self::values) of the cell that holds a place; none outside.
+    #[must_use]
+    pub fn index(&self, place: [f64; 2]) -> Option<usize> {
+        self.cell(place).map(|[column, row]| row * self.layout.size[0] + column)
+    }
+
     /// Value at a place, bilinear between middles.
     #[must_use]
     pub fn sample(&self, place: [f64; 2]) -> f64 {

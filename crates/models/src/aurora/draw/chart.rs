@@ -35,7 +35,7 @@ pub(super) struct Coverage {
 pub(super) struct Chart {
     /// Number of columns, a multiple of [`STRIP`].
     pub(super) columns: usize,
-    /// Number of rows.
+    /// Number of rows, at least 2.
     pub(super) rows: usize,
     /// Width of a column, radians.
     pub(super) column_step: f64,
@@ -104,7 +104,7 @@ impl Chart {
         let first_longitude = if whole { -PI } else { ((middle - reach) / column_step).floor() * column_step };
         let row = row.max((greatest - least) / MOST);
         let first_row = (least / row).floor();
-        let rows = ((greatest / row).ceil() - first_row).max(1.0) as usize;
+        let rows = ((greatest / row).ceil() - first_row).max(2.0) as usize;
         Self { columns, rows, column_step, row_step: row, first_longitude, first_colatitude: first_row * row, whole }
     }
 
@@ -122,6 +122,17 @@ impl Chart {
     pub(super) fn unit(&self, column: usize) -> [f64; 2] {
         let (sin, cos) = math::sin_cos(self.longitude(column));
         [cos, sin]
+    }
+
+    /// Cosines and sines of the longitudes of a strip's columns.
+    pub(super) fn single_units(&self, strip: usize) -> [[f32; STRIP]; 2] {
+        let mut units = [[0.0; STRIP]; 2];
+        for column in 0..STRIP {
+            for (values, value) in units.iter_mut().zip(self.unit(strip * STRIP + column)) {
+                values[column] = value as f32;
+            }
+        }
+        units
     }
 
     /// Cotangent and inverse sine of the colatitude of every row.

@@ -3,31 +3,41 @@
 //! Heights and places along the line of sight are random; to the side each point has the smooth edge of its source, so that rays are as
 //! sharp as those of the mean. That mean is [`Meridians`], but for the noise.
 
+use std::ops::Range;
+
 use bansho_base::{
     math::lanes,
     random::{Key, Purpose, uniform, uniform_f64},
 };
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
 use super::{
     chart::{Chart, Finder, STRIP},
-    footprint::{Bins, Footprint, Patch, Source},
+    footprint::{Footprint, Patch, Source},
     geometry::{EARTH_RADIUS_KM, FieldLines, Meridian},
-    meridians::Meridians,
+    meridians::{LightStrip, Meridians},
 };
-use crate::aurora::{
-    light::{Emission, PerEmitter},
-    precipitation::{
-        Deposition,
-        energy::{NODES, node_energy_ev},
-        fall::{Collision, FallLibrary, Falls},
+use crate::{
+    aurora::{
+        atmosphere::LEVELS,
+        light::{Emission, PerEmitter},
+        precipitation::{
+            Deposition,
+            energy::{NODES, node_energy_ev},
+            fall::{Collision, FallLibrary, Falls, VARIANTS},
+        },
     },
+    lanes::{FourLanes, Lanes, Real},
 };
 
 const SOURCE: Purpose = Purpose::named("aurora collisions");
-/// Random deviations, a power of two.
+/// Random deviations, a multiple of [`BATCH`].
 const DEVIATIONS: usize = 4096;
+/// Collisions that are worked on at once.
+const BATCH: usize = 16;
+/// Level of a collision that a batch lacks.
+const NOTHING: u16 = LEVELS as u16;
 /// Nearer to the observer's own field line than so many reaches, points are placed anew for every column.
 const NEAR: f32 = 4.0;
 
@@ -35,14 +45,68 @@ const NEAR: f32 = 4.0;
 #[derive(Clone, Debug)]
 pub(super) struct Collisions {
     key: Key,
-    library: FallLibrary,
+    falls: FallTable,
     deposition: Deposition,
-    /// Counting photons for each ion pair, by level.
+    /// Counting photons for each ion pair, by level, and none for [`NOTHING`].
     photons: Vec<PerEmitter<f32>>,
     /// kR of ion pairs that a collision of a node's fall stands for, per mW/m^2.
     pairs: Vec<f32>,
     /// Deviations with the density of a source's edge, in reaches.
     deviations: Vec<f32>,
+}
+
+/// Falls of a library, their collisions in batches.
+///
+/// Neighbours in a batch lie far apart in altitude: sums in neighbouring rows would wait for each other.
+#[derive(Clone, Debug)]
+struct FallTable {
+    /// Where the falls of each node begin, and the end of all, in batches.
+    starts: Vec<usize>,
+    batches: Vec<FallBatch>,
+}
+
+/// [`BATCH`] collisions of a fall.
+#[derive(Clone, Debug)]
+struct FallBatch {
+    altitudes_km: [f32; BATCH],
+    offsets_km: [f32; BATCH],
+    levels: [u16; BATCH],
+}
+
+impl FallTable {
+    fn new(library: &FallLibrary, nodes: usize) -> Self {
+        let (mut starts, mut batches) = (vec![0], Vec::new());
+        for node in 0..nodes {
+            for variant in 0..VARIANTS {
+                let fall = library.fall(node, variant);
+                let count = fall.len().div_ceil(BATCH);
+                batches.extend((0..count).map(|first| FallBatch::new(fall, first, count)));
+            }
+            starts.push(batches.len());
+        }
+        Self { starts, batches }
+    }
+
+    /// One of the falls of a node, any number; the nearest node that there is.
+    fn fall(&self, node: usize, variant: u32) -> &[FallBatch] {
+        let node = node.min(self.starts.len() - 2);
+        let (start, end) = (self.starts[node], self.starts[node + 1]);
+        let count = (end - start) / VARIANTS as usize;
+        &self.batches[start + (variant % VARIANTS) as usize * count..][..count]
+    }
+}
+
+impl FallBatch {
+    /// Every `stride`th collision of a fall from `first` on.
+    fn new(fall: &[Collision], first: usize, stride: usize) -> Self {
+        let mut batch = Self { altitudes_km: [100.0; BATCH], offsets_km: [0.0; BATCH], levels: [NOTHING; BATCH] };
+        for (lane, collision) in fall.iter().skip(first).step_by(stride).enumerate() {
+            batch.altitudes_km[lane] = collision.altitude_km;
+            batch.offsets_km[lane] = collision.offset_km[0];
+            batch.levels[lane] = collision.level as u16;
+        }
+        batch
+    }
 }
 
 impl Collisions {
@@ -54,11 +118,13 @@ impl Collisions {
             let [a, b, c, _] = key.uniforms(index as u64, 1, SOURCE);
             (a + b + c - 1.5) * (4.0_f32 / 7.0).sqrt()
         };
+        let highest = highest.min(NODES - 1);
+        let photons = emission.photons_per_ion_pair().iter().map(|photons| photons.map(|value| value as f32));
         Self {
             key,
-            library: FallLibrary::new(&falls, 0..=highest.min(NODES - 1), key),
+            falls: FallTable::new(&FallLibrary::new(&falls, 0..=highest, key), highest + 1),
             deposition: emission.deposition().clone(),
-            photons: emission.photons_per_ion_pair().iter().map(|photons| photons.map(|value| value as f32)).collect(),
+            photons: photons.chain([[0.0; 4]]).collect(),
             pairs: (0..NODES).map(|node| emission.ion_pairs_per_collision(node) as f32).collect(),
             deviations: (0..DEVIATIONS).map(deviation).collect(),
         }
@@ -67,26 +133,34 @@ impl Collisions {
     /// The sources' picture at a step of the simulation: other steps have other falls.
     pub(super) fn draw(&self, chart: Chart, field: &FieldLines, footprint: &Footprint, step: u32) -> Meridians {
         let level = Level::new();
-        let mut light = vec![[0.0; 4]; chart.columns * chart.rows];
-        light.par_chunks_mut(STRIP * chart.rows).enumerate().for_each_init(Vec::new, |points, (strip, light)| {
-            let drawing = Drawing { collisions: self, chart: &chart, finder: chart.finder(), footprint, step };
-            dispatch!(level, _simd => drawing.strip(strip, field, points, light));
-        });
-        Meridians { chart, light }
+        let mut picture = Meridians::dark(chart);
+        let (chart, strips) = picture.strips();
+        let drawing = Drawing { collisions: self, chart, finder: chart.finder(), footprint, step };
+        strips.for_each_init(
+            || Trace::new(chart.rows),
+            |trace, strip| dispatch!(level, simd => drawing.strip(simd, strip, field, trace)),
+        );
+        picture
     }
 
-    /// The fall of a source, and what its collisions are worth.
-    fn fall(&self, index: u32, source: &Source, step: u32) -> (&[Collision], f32, usize) {
+    /// The fall of a source.
+    fn fall(&self, index: u32, source: &Source, step: u32) -> Fall<'_> {
         let [a, b, c, d] = self.key.words(u64::from(index), step, SOURCE);
         let node = (source.node as usize).min(NODES - 1);
         let energy_ev = node_energy_ev(node) * f64::from(lanes::exp2((source.node - node as f32) * NODE_OCTAVES));
         let node = self.deposition.draw_node(energy_ev, [f64::from(uniform(a)), uniform_f64(b, d)]);
-        (self.library.fall(node, c), self.pairs[node], (c >> 8) as usize)
+        Fall { batches: self.falls.fall(node, c), pairs: self.pairs[node], first: (c >> 8) as usize / BATCH * BATCH }
     }
 }
 
-/// Octaves of energy from node to node.
-const NODE_OCTAVES: f32 = std::f32::consts::LOG2_10 / 32.0;
+/// The random fall of a source.
+struct Fall<'a> {
+    batches: &'a [FallBatch],
+    /// kR of ion pairs that a collision stands for, per mW/m^2.
+    pairs: f32,
+    /// Where its deviations begin.
+    first: usize,
+}
 
 /// What the points of a strip have in common.
 struct Drawing<'a> {
@@ -97,91 +171,145 @@ struct Drawing<'a> {
     step: u32,
 }
 
-/// A collision on the chart.
-#[derive(Clone, Copy)]
-pub(super) struct Point {
-    row: f32,
-    light: PerEmitter<f32>,
+/// Photons of the collisions of one fall by row of the chart.
+struct Trace {
+    light: Vec<PerEmitter<f32>>,
+    /// Rows that may hold some.
+    lit: Range<usize>,
 }
 
-/// The random fall of a source.
-struct Fall<'a> {
-    source: &'a Source,
-    collisions: &'a [Collision],
-    pairs: f32,
-    /// Where its deviations begin.
-    first: usize,
+impl Trace {
+    fn new(rows: usize) -> Self {
+        Self { light: vec![[0.0; 4]; rows + 1], lit: 0..0 }
+    }
+
+    #[inline(always)]
+    fn clear(&mut self) {
+        self.light[self.lit.clone()].fill([0.0; 4]);
+        self.lit = 0..0;
+    }
+
+    /// Adds photons to a row and the one below it.
+    #[inline(always)]
+    fn add<S: Simd>(&mut self, simd: S, row: usize, [upper, lower]: [f32; 2], photons: &PerEmitter<f32>) {
+        let photons = FourLanes::simd_from(simd, *photons);
+        for (light, weight) in self.light[row..row + 2].iter_mut().zip([upper, lower]) {
+            *light = photons.fused(photons.like(weight), FourLanes::simd_from(simd, *light)).into();
+        }
+    }
+
+    /// Adds it with weights to a column.
+    #[inline(always)]
+    fn add_to<S: Simd>(&self, light: &mut [PerEmitter<f32>], weights: FourLanes<S>) {
+        let simd = weights.simd;
+        let (light, light_rest) = light[self.lit.clone()].as_chunks_mut::<4>();
+        let (own, own_rest) = self.light[self.lit.clone()].as_chunks::<4>();
+        let two = weights.combine(weights);
+        let four = two.combine(two);
+        for (light, own) in light.iter_mut().zip(own) {
+            let (light, own) = (light.as_flattened_mut(), own.as_flattened());
+            Lanes::from_slice(simd, own).fused(four, Lanes::from_slice(simd, light)).store_slice(light);
+        }
+        for (light, own) in light_rest.iter_mut().zip(own_rest) {
+            *light = FourLanes::simd_from(simd, *own).fused(weights, FourLanes::simd_from(simd, *light)).into();
+        }
+    }
 }
 
 impl Drawing<'_> {
     #[inline(always)]
-    fn strip(&self, strip: usize, field: &FieldLines, points: &mut Vec<Point>, light: &mut [PerEmitter<f32>]) {
-        let units: [[f64; 2]; STRIP] = std::array::from_fn(|column| self.chart.unit(strip * STRIP + column));
-        let single = units.map(|unit| unit.map(|value| value as f32));
-        let meridians = units.map(|unit| field.meridian(unit));
-        self.footprint.for_each(strip, self.chart, |index, source, columns| {
-            let (collisions, pairs, first) = self.collisions.fall(index, source, self.step);
-            let fall = Fall { source, collisions, pairs, first };
-            let patch = Patch::new(source, self.chart, self.footprint.bins());
-            let near = patch.distance() < NEAR * source.reach;
-            points.clear();
-            for column in columns {
-                let weight = patch.side(single[column]);
-                if weight <= 0.0 {
-                    continue;
+    fn strip<S: Simd>(&self, simd: S, mut strip: LightStrip, field: &FieldLines, trace: &mut Trace) {
+        let units = self.chart.single_units(strip.number);
+        let meridians: [Meridian; STRIP] =
+            std::array::from_fn(|column| field.meridian(self.chart.unit(strip.number * STRIP + column)));
+        for entry in self.footprint.entries(strip.number) {
+            let source = self.footprint.source(entry);
+            let fall = self.collisions.fall(entry.source, source, self.step);
+            let patch = Patch::new(source, self.chart, &units);
+            let [green, red, prompt] = source.power;
+            let scale = fall.pairs / self.chart.row_step as f32;
+            let columns = entry.columns();
+            // Seen from afar its meridian is that of all columns.
+            let shared = source.distance() >= NEAR * source.reach;
+            let middle = (columns.start + columns.end) / 2;
+            for column in columns.clone() {
+                if !shared || column == columns.start {
+                    let placed = if shared { middle } else { column };
+                    trace.clear();
+                    self.place(simd, &fall, source, &meridians[placed], patch.along[placed], trace);
                 }
-                if near || points.is_empty() {
-                    points.clear();
-                    self.place(&fall, &meridians[column], patch.along(single[column]), points);
+                let side = patch.side[column] * scale;
+                if side > 0.0 && !trace.lit.is_empty() {
+                    let weights = FourLanes::simd_from(simd, [green, red, prompt, prompt]) * side;
+                    let light = strip.light_up(column, &trace.lit, self.chart.rows);
+                    trace.add_to(light, weights);
                 }
-                self.add(points, weight, &mut light[column * self.chart.rows..][..self.chart.rows]);
             }
-        });
+        }
     }
 
     /// Places the collisions of a fall at a distance along a meridian.
     #[inline(always)]
-    fn place(&self, fall: &Fall, meridian: &Meridian, along: f32, points: &mut Vec<Point>) {
+    fn place<S: Simd>(
+        &self,
+        simd: S,
+        fall: &Fall,
+        source: &Source,
+        meridian: &Meridian,
+        along: f32,
+        trace: &mut Trace,
+    ) {
+        let reach = source.reach.max(self.footprint.bins().least_reach(along));
+        let meridian = meridian.single();
+        let last = (self.chart.rows - 1) as f32;
+        let (mut first, mut end) = (usize::MAX, 0);
+        for (number, batch) in fall.batches.iter().enumerate() {
+            let from = (fall.first + number * BATCH) % DEVIATIONS;
+            let Some(deviations) = self.collisions.deviations[from..].first_chunk() else { continue };
+            let (rows, shown) = self.project(batch, deviations, reach, along, &meridian);
+            for lane in 0..BATCH {
+                let upper = rows[lane].floor();
+                if !(upper >= 0.0 && upper < last) {
+                    continue;
+                }
+                let (row, part) = (upper as usize, rows[lane] - upper);
+                (first, end) = (first.min(row), end.max(row + 2));
+                let photons = &self.collisions.photons[batch.levels[lane] as usize];
+                trace.add(simd, row, [shown[lane] * (1.0 - part), shown[lane] * part], photons);
+            }
+        }
+        trace.lit = first.min(end)..end;
+    }
+
+    /// The rows of collisions, and how bright they are seen.
+    #[inline(always)]
+    fn project(
+        &self,
+        batch: &FallBatch,
+        deviations: &[f32; BATCH],
+        reach: f32,
+        along: f32,
+        &[constant, outward, own]: &[f32; 3],
+    ) -> ([f32; BATCH], [f32; BATCH]) {
         const RADIUS: f32 = EARTH_RADIUS_KM as f32;
         const DIAMETER: f32 = 2.0 * RADIUS;
-        let reach = fall.source.reach.max(Bins::least_reach(self.footprint.bins(), along));
-        let [constant, outward, own] = meridian.single();
-        let [green, red, prompt] = fall.source.power.map(|power| power * fall.pairs / self.chart.row_step as f32);
-        for (number, collision) in fall.collisions.iter().enumerate() {
-            let deviation = self.collisions.deviations[(fall.first + number) % DEVIATIONS];
-            let distance = deviation.mul_add(reach, along) + collision.offset_km[0];
-            let altitude = collision.altitude_km;
+        let (mut rows, mut shown) = ([0.0; BATCH], [0.0; BATCH]);
+        for lane in 0..BATCH {
+            let altitude = batch.altitudes_km[lane];
+            let distance = deviations[lane].mul_add(reach, along) + batch.offsets_km[lane];
             let squared = altitude.mul_add(DIAMETER + altitude, -distance.mul_add(2.0 * outward + distance, constant));
-            let upward = own.mul_add(own, squared).max(1.0).sqrt();
+            let squared = own.mul_add(own, squared);
+            let upward = if squared > 1.0 { squared } else { 1.0 }.sqrt();
             let place = upward - own;
             let far = distance.mul_add(distance, place * place).sqrt();
             // A source's power is that across the field; a collision stands for all of it, so the cosine to the vertical is taken out again.
-            let slant = (RADIUS + altitude) / upward;
-            let shown = if distance > 0.0 && far > 1.0 { slant / far } else { 0.0 };
-            let photons = &self.collisions.photons[collision.level as usize];
-            let weights = [green, red, prompt, prompt];
-            points.push(Point {
-                row: self.finder.row(lanes::atan2(distance, place)) - 0.5,
-                light: std::array::from_fn(|i| photons[i] * weights[i] * shown),
-            });
+            let slant = (RADIUS + altitude) / (upward * far);
+            shown[lane] = if distance > 0.0 && far > 1.0 { slant } else { 0.0 };
+            rows[lane] = self.finder.row(lanes::atan2(distance, place)) - 0.5;
         }
-    }
-
-    /// Adds points to a column, linearly to the two rows about them.
-    #[inline(always)]
-    fn add(&self, points: &[Point], weight: f32, light: &mut [PerEmitter<f32>]) {
-        for point in points {
-            let row = point.row.floor();
-            let part = point.row - row;
-            if row < 0.0 || row >= (light.len() - 1) as f32 {
-                continue;
-            }
-            let row = row as usize;
-            let (below, above) = (weight * part, weight * (1.0 - part));
-            for i in 0..4 {
-                light[row][i] = point.light[i].mul_add(above, light[row][i]);
-                light[row + 1][i] = point.light[i].mul_add(below, light[row + 1][i]);
-            }
-        }
+        (rows, shown)
     }
 }
+
+/// Octaves of energy from node to node.
+const NODE_OCTAVES: f32 = std::f32::consts::LOG2_10 / 32.0;

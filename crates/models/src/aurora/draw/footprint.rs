@@ -6,10 +6,14 @@
 use std::ops::Range;
 
 use bansho_base::math::{self, lanes};
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-use super::chart::{Chart, STRIP};
+use super::chart::{Chart, Finder, STRIP};
+use crate::lanes::{FourLanes, Real};
 
+/// Sources that a task of the thread pool sorts.
+const TASK: usize = 4096;
 /// Scale of the distances, km: bins are as narrow as a row of the chart at 100 km altitude.
 const SCALE_KM: f64 = 100.0;
 /// Distances beyond this lie behind the horizon, km.
@@ -32,6 +36,15 @@ pub(super) struct Source {
     pub(super) power: [f32; 3],
 }
 
+impl Source {
+    /// Distance from the observer's own field line, km.
+    #[inline(always)]
+    pub(super) fn distance(&self) -> f32 {
+        let [x, y] = self.across;
+        x.mul_add(x, y * y).sqrt()
+    }
+}
+
 /// Reach of a patch for a standard deviation of 1.
 pub(super) const REACH: f32 = 2.645_751_3;
 
@@ -44,9 +57,25 @@ pub(super) struct Footprint<'a> {
     sources: &'a [Source],
     /// Index of the first entry of every strip, and of the end.
     starts: Vec<u32>,
-    entries: Vec<u32>,
-    spans: Vec<Span>,
+    entries: Vec<Entry>,
     bins: Bins,
+}
+
+/// A source that shows in a strip.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Entry {
+    /// Number of the source.
+    pub(super) source: u32,
+    /// The first column of the strip that it may reach, and the one after the last.
+    columns: [u16; 2],
+}
+
+impl Entry {
+    /// The columns of the strip that it may reach.
+    #[inline(always)]
+    pub(super) fn columns(&self) -> Range<usize> {
+        self.columns[0] as usize..self.columns[1] as usize
+    }
 }
 
 /// Columns that a source reaches: the first, which may lie before or behind the chart, and how many.
@@ -106,28 +135,28 @@ impl<'a> Footprint<'a> {
     /// Sorts sources by the strips of a chart; distances are in bins of `step` radians.
     pub(super) fn new(sources: &'a [Source], chart: &Chart, step: f64) -> Self {
         let finder = chart.finder();
-        let level = fearless_simd::Level::new();
-        let spans: Vec<Span> = sources
-            .par_chunks(4096)
-            .flat_map_iter(|part| fearless_simd::dispatch!(level, _simd => spans(part, chart, &finder)))
-            .collect();
+        let level = Level::new();
+        let mut spans = vec![Span::default(); sources.len()];
+        spans.par_chunks_mut(TASK).zip(sources.par_chunks(TASK)).for_each(|(spans, sources)| {
+            dispatch!(level, _simd => find_spans(sources, chart, &finder, spans));
+        });
         let strips = chart.columns / STRIP;
         let mut starts = vec![0_u32; strips + 1];
         for span in &spans {
-            strips_of(*span, chart, |strip| starts[strip + 1] += 1);
+            pieces(*span, chart, |strip, _| starts[strip + 1] += 1);
         }
         for strip in 0..strips {
             starts[strip + 1] += starts[strip];
         }
         let mut next = starts.clone();
-        let mut entries = vec![0; starts[strips] as usize];
-        for (index, span) in spans.iter().enumerate() {
-            strips_of(*span, chart, |strip| {
-                entries[next[strip] as usize] = index as u32;
+        let mut entries = vec![Entry::default(); starts[strips] as usize];
+        for (source, span) in spans.iter().enumerate() {
+            pieces(*span, chart, |strip, columns| {
+                entries[next[strip] as usize] = Entry { source: source as u32, columns };
                 next[strip] += 1;
             });
         }
-        Self { sources, starts, entries, spans, bins: Bins::new(step) }
+        Self { sources, starts, entries, bins: Bins::new(step) }
     }
 
     /// Bins of distance.
@@ -135,162 +164,159 @@ impl<'a> Footprint<'a> {
         &self.bins
     }
 
-    /// Calls `each` with the index of every source that a strip shows, the source, and the columns of the strip that it reaches.
+    /// What shows in a strip.
     #[inline(always)]
-    pub(super) fn for_each(&self, strip: usize, chart: &Chart, mut each: impl FnMut(u32, &Source, Range<usize>)) {
-        // A span that passes the seam of a whole chart shows on its other side too.
-        let (turn, shifts) = if chart.whole { (chart.columns as i32, &[0, -1, 1][..]) } else { (0, &[0][..]) };
-        for entry in &self.entries[self.starts[strip] as usize..self.starts[strip + 1] as usize] {
-            let span = self.spans[*entry as usize];
-            for shift in shifts {
-                let first = span.first + shift * turn - (strip * STRIP) as i32;
-                let columns = first.max(0)..(first + span.count).min(STRIP as i32);
-                if !columns.is_empty() {
-                    let columns = columns.start as usize..columns.end as usize;
-                    each(*entry, &self.sources[*entry as usize], columns);
-                }
-            }
-        }
+    pub(super) fn entries(&self, strip: usize) -> &[Entry] {
+        &self.entries[self.starts[strip] as usize..self.starts[strip + 1] as usize]
+    }
+
+    /// The source of an entry.
+    #[inline(always)]
+    pub(super) fn source(&self, entry: &Entry) -> &Source {
+        &self.sources[entry.source as usize]
     }
 
     /// Adds up the sources of a strip whose columns have these cosines and sines.
     #[inline(always)]
-    pub(super) fn sum(&self, strip: usize, chart: &Chart, units: &[[f32; 2]; STRIP], sums: &mut StripSums) {
+    pub(super) fn sum<S: Simd>(
+        &self,
+        simd: S,
+        strip: usize,
+        chart: &Chart,
+        units: &[[f32; STRIP]; 2],
+        sums: &mut StripSums,
+    ) {
         sums.bins.clear();
         sums.bins.resize(STRIP * self.bins.count, [0.0; 4]);
         sums.filled = [[usize::MAX, 0]; STRIP];
-        self.for_each(strip, chart, |_, source, columns| {
-            let patch = Patch::new(source, chart, &self.bins);
-            for column in columns {
-                patch.add(column, units[column], &self.bins, sums);
+        for entry in self.entries(strip) {
+            let source = self.source(entry);
+            let patch = Patch::new(source, chart, units);
+            let span = patch.bins(source, &self.bins);
+            let [green, red, prompt] = source.power;
+            let weights = FourLanes::simd_from(simd, [green, red, prompt, (green + red + prompt) * source.node]);
+            for column in entry.columns() {
+                span.add(column, weights * patch.side[column], &self.bins, sums);
             }
-        });
+        }
         for filled in &mut sums.filled {
             filled[0] = filled[0].min(filled[1]);
         }
     }
 }
 
+/// The columns that every source reaches.
 #[inline(always)]
-fn spans(sources: &[Source], chart: &Chart, finder: &super::chart::Finder) -> Vec<Span> {
-    let step = chart.column_step as f32;
-    let span = |source: &Source| {
+fn find_spans(sources: &[Source], chart: &Chart, finder: &Finder, spans: &mut [Span]) {
+    for (source, span) in sources.iter().zip(spans) {
+        *span = Span::of(source, chart, finder);
+    }
+}
+
+impl Span {
+    #[inline(always)]
+    fn of(source: &Source, chart: &Chart, finder: &Finder) -> Self {
+        let step = chart.column_step as f32;
         let [x, y] = source.across;
         let distance = x.mul_add(x, y * y).sqrt();
         let reach = source.reach.max(LEAST_CELLS * step * distance);
         if source.power == [0.0; 3] || distance > FARTHEST_KM as f32 {
-            return Span::default();
+            return Self::default();
         }
         if reach * 1.001 >= distance {
             // It lies about the observer's own field line and may show anywhere.
-            return Span { first: 0, count: chart.columns as i32 };
+            return Self { first: 0, count: chart.columns as i32 };
         }
         let share = reach / distance;
         let half = lanes::atan2(share, (1.0 - share * share).sqrt()) / step;
         let column = finder.column(lanes::atan2(y, x));
         let (first, end) = ((column - half - 0.5).ceil(), (column + half - 0.5).floor() + 1.0);
-        let count = (end - first) as i32;
-        if chart.whole {
-            Span { first: first as i32, count: count.min(chart.columns as i32) }
-        } else {
-            let first = (first as i32).max(0);
-            Span { first, count: (end.min(chart.columns as f32) as i32 - first).max(0) }
+        Self { first: first as i32, count: ((end - first) as i32).min(chart.columns as i32) }
+    }
+}
+
+/// Calls `each` with every strip that a span touches and the columns there.
+#[inline]
+fn pieces(span: Span, chart: &Chart, mut each: impl FnMut(usize, [u16; 2])) {
+    let columns = chart.columns as i32;
+    // A span that passes the seam of a whole chart shows on its other side too.
+    let turns = if chart.whole { &[0, columns, -columns][..] } else { &[0] };
+    for turn in turns {
+        let mut first = (span.first + turn).max(0) as usize;
+        let end = (span.first + turn + span.count).clamp(0, columns) as usize;
+        while first < end {
+            let strip = first / STRIP;
+            let from = first % STRIP;
+            let to = STRIP.min(from + end - first);
+            each(strip, [from as u16, to as u16]);
+            first += to - from;
         }
-    };
-    sources.iter().map(span).collect()
-}
-
-/// Calls `each` once for every strip that a span touches.
-fn strips_of(span: Span, chart: &Chart, mut each: impl FnMut(usize)) {
-    if span.count <= 0 {
-        return;
-    }
-    let strips = (chart.columns / STRIP) as i32;
-    let first = span.first.div_euclid(STRIP as i32);
-    let last = (span.first + span.count - 1).div_euclid(STRIP as i32).min(first + strips - 1);
-    for strip in first..=last {
-        each(strip.rem_euclid(strips) as usize);
     }
 }
 
-/// A source, made ready to be added to columns.
+/// A source as the columns of a strip see it.
 pub(super) struct Patch {
-    across: [f32; 2],
-    weights: Bin,
-    /// Inverse reach to the side, 1/km.
-    per_reach: f32,
-    reach: f32,
-    per_step: f32,
+    /// Share of it per km of width.
+    pub(super) side: [f32; STRIP],
+    /// How far out it lies, km.
+    pub(super) along: [f32; STRIP],
 }
 
 impl Patch {
     #[inline(always)]
-    pub(super) fn new(source: &Source, chart: &Chart, bins: &Bins) -> Self {
+    pub(super) fn new(source: &Source, chart: &Chart, [cosines, sines]: &[[f32; STRIP]; 2]) -> Self {
         let [x, y] = source.across;
-        let distance = x.mul_add(x, y * y).sqrt();
-        let per_reach = 1.0 / source.reach.max(LEAST_CELLS * chart.column_step as f32 * distance);
-        let [green, red, prompt] = source.power;
-        let all = (green + red + prompt) * source.node;
-        Self {
-            across: source.across,
-            weights: [green, red, prompt, all],
-            per_reach,
-            reach: source.reach,
-            per_step: (1.0 / bins.step) as f32,
+        let per_reach = 1.0 / source.reach.max(LEAST_CELLS * chart.column_step as f32 * source.distance());
+        let (mut side, mut along) = ([0.0; STRIP], [0.0; STRIP]);
+        for column in 0..STRIP {
+            let away = y.mul_add(cosines[column], -(x * sines[column])) * per_reach;
+            let shape = away.mul_add(-away, 1.0).max(0.0);
+            side[column] = shape * shape * (NORM * per_reach);
+            along[column] = x.mul_add(cosines[column], y * sines[column]);
         }
+        Self { side, along }
     }
 
-    /// Distance from the observer's own field line, km.
+    /// The bins that it covers along the columns.
     #[inline(always)]
-    pub(super) fn distance(&self) -> f32 {
-        let [x, y] = self.across;
-        x.mul_add(x, y * y).sqrt()
-    }
-
-    /// Share of it per km of width at a column, from the column's cosine and sine.
-    #[inline(always)]
-    pub(super) fn side(&self, [cos, sin]: [f32; 2]) -> f32 {
-        let [x, y] = self.across;
-        let side = y.mul_add(cos, -(x * sin)) * self.per_reach;
-        let shape = side.mul_add(-side, 1.0).max(0.0);
-        shape * shape * NORM * self.per_reach
-    }
-
-    /// How far out it lies along a column, km.
-    #[inline(always)]
-    pub(super) fn along(&self, [cos, sin]: [f32; 2]) -> f32 {
-        self.across[0].mul_add(cos, self.across[1] * sin)
-    }
-
-    #[inline(always)]
-    fn add(&self, column: usize, unit: [f32; 2], bins: &Bins, sums: &mut StripSums) {
+    fn bins(&self, source: &Source, bins: &Bins) -> BinSpans {
         const PER_SCALE: f32 = (1.0 / SCALE_KM) as f32;
-        let side = self.side(unit);
-        if side <= 0.0 {
-            return;
+        let (mut middles, mut reaches) = ([0.0; STRIP], [0.0; STRIP]);
+        let per_step = (1.0 / bins.step) as f32;
+        for column in 0..STRIP {
+            let along = self.along[column] * PER_SCALE;
+            middles[column] = lanes::atan2(along, 1.0) * per_step;
+            let reach = source.reach * PER_SCALE / along.mul_add(along, 1.0) * per_step;
+            reaches[column] = if reach > LEAST_CELLS { reach } else { LEAST_CELLS };
         }
-        // Along the column in bins, and its reach there.
-        let along = self.along(unit) * PER_SCALE;
-        let middle = lanes::atan2(along, 1.0) * self.per_step;
-        let reach = (self.reach * PER_SCALE / along.mul_add(along, 1.0) * self.per_step).max(LEAST_CELLS);
+        BinSpans { middles, reaches }
+    }
+}
+
+/// Where along each column of a strip a patch lies, and how far it reaches, in bins.
+struct BinSpans {
+    middles: [f32; STRIP],
+    reaches: [f32; STRIP],
+}
+
+impl BinSpans {
+    #[inline(always)]
+    fn add<S: Simd>(&self, column: usize, weights: FourLanes<S>, bins: &Bins, sums: &mut StripSums) {
+        let (middle, reach) = (self.middles[column], self.reaches[column]);
         let first = (middle - reach - 0.5).ceil().max(0.0) as usize;
         let end = ((middle + reach - 0.5).floor() + 1.0).clamp(0.0, bins.count as f32) as usize;
         if first >= end {
             return;
         }
         let per_reach = 1.0 / reach;
-        let weight = side * NORM * per_reach;
-        let weights = self.weights.map(|value| value * weight);
+        let weights = weights * (NORM * per_reach);
         let filled = &mut sums.filled[column];
         *filled = [filled[0].min(first), filled[1].max(end)];
-        let target = &mut sums.bins[column * bins.count..][first..end];
-        for (number, bin) in target.iter_mut().enumerate() {
-            let away = ((first + number) as f32 + 0.5 - middle) * per_reach;
+        let mut away = (first as f32 + 0.5 - middle) * per_reach;
+        for bin in &mut sums.bins[column * bins.count..][first..end] {
             let shape = away.mul_add(-away, 1.0);
-            let shape = shape * shape;
-            for i in 0..4 {
-                bin[i] = weights[i].mul_add(shape, bin[i]);
-            }
+            *bin = weights.like(shape * shape).fused(weights, FourLanes::simd_from(weights.simd, *bin)).into();
+            away += per_reach;
         }
     }
 }

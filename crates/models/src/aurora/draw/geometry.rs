@@ -56,17 +56,13 @@ impl FieldLines {
         let (sin, cos) = (lanes::sin_turns(turns), lanes::cos_turns(turns));
         let share = if distance > 0.0 { sin / distance } else { 0.0 };
         let up = [east * share, cos, south * share];
-        let dot = |vector: DVec3, other: [f32; 3]| {
-            let [x, y, z] = vector.as_vec3().to_array();
-            x.mul_add(other[0], y.mul_add(other[1], z * other[2]))
-        };
-        let observer = self.observer.as_vec3();
-        let place =
-            [up[0].mul_add(SHELL, -observer.x), up[1].mul_add(SHELL, -observer.y), up[2].mul_add(SHELL, -observer.z)];
-        Foot {
-            across: [dot(self.across[0], place), dot(self.across[1], place)],
-            upright: dot(self.along, up).max(0.05),
+        let observer = self.observer.as_vec3().to_array();
+        let mut place = [0.0; 3];
+        for axis in 0..3 {
+            place[axis] = up[axis].mul_add(SHELL, -observer[axis]);
         }
+        let [along, first, second] = self.single();
+        Foot { across: [dot(first, place), dot(second, place)], upright: dot(along, up).max(0.05) }
     }
 
     /// The place of the drawn plane, km east and south, that is seen in a direction; none where it is not seen.
@@ -89,6 +85,13 @@ impl FieldLines {
             outward: self.observer.dot(outward),
             along: self.observer.dot(self.along),
         }
+    }
+
+    /// The axes along the field and across it in single precision.
+    #[inline(always)]
+    pub(super) fn single(&self) -> [[f32; 3]; 3] {
+        let [first, second] = self.across;
+        [self.along.as_vec3().to_array(), first.as_vec3().to_array(), second.as_vec3().to_array()]
     }
 
     /// Cosine of the colatitude, and the two parts across the field, of a direction.
@@ -144,6 +147,12 @@ impl FieldLine {
     pub(super) fn square(&self) -> [f32; 2] {
         [self.excess as f32, (2.0 * self.along) as f32]
     }
+}
+
+/// Scalar product.
+#[inline(always)]
+pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 
 /// Altitude from what [`FieldLine::square`] comes to, km; written so that little is lost to rounding.

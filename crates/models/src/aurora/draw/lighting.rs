@@ -5,6 +5,8 @@ use bansho_base::{
     surroundings::{Emitter, Light},
 };
 
+use fearless_simd::{Level, dispatch};
+
 use super::Aurora;
 
 /// Particles that are asked for their light, about.
@@ -20,6 +22,7 @@ impl Aurora {
         let (simulation, particles) = (&self.simulation, self.simulation.particles());
         let energy_ev = simulation.parameters().energy_ev.at(t);
         let column = simulation.emission().column(energy_ev).kilorayleigh.map(|value| value as f32);
+        let level = Level::new();
         let stride = particles.len().div_ceil(ASKED).max(1);
         let (mut way, mut sum) = (DVec3::ZERO, DVec3::ZERO);
         for index in (0..particles.len()).step_by(stride) {
@@ -29,7 +32,8 @@ impl Aurora {
             let direction = toward / squared.sqrt();
             // A patch of 1 mW/m^2 over 1 km^2 at 1 km has 1 sr and the column's brightness.
             let share = f64::from(particles.powers_w[index]) / W_PER_UNIT * stride as f64 / squared;
-            let colour = self.shading.colour(&column, direction.y as f32).map(f64::from);
+            let elevation = direction.y as f32;
+            let colour = dispatch!(level, simd => self.shading.colour(simd, &column, elevation)).map(f64::from);
             sum += DVec3::from(colour) * share;
             way += direction * (share * colour[1].max(0.0));
         }

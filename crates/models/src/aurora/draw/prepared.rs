@@ -10,25 +10,30 @@ use bansho_base::{
     observer::{Cancelled, Observer, check},
     phenomenon::Prepared,
 };
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
 
 use super::{
     Aurora,
     chart::{Chart, Coverage},
     footprint::{Footprint, REACH},
-    geometry::{EARTH_RADIUS_KM, FieldLines},
+    geometry::{EARTH_RADIUS_KM, FieldLines, dot},
     maps::Maps,
-    meridians::{Meridians, Sampler},
+    meridians::{Meridians, Sampler, mixed},
     phenomenon::MEASURED,
     sources::Sources,
 };
-use crate::aurora::{
-    light::{LINES, PerEmitter},
-    particles::AuroraSimulation,
+use crate::{
+    aurora::{
+        light::{LINES, PerEmitter},
+        particles::AuroraSimulation,
+    },
+    lanes::FourLanes,
 };
 
 /// Pixels that are worked on at once.
-const BATCH: usize = 16;
+pub(super) const BATCH: usize = 16;
+/// Pixels from one to the next at which soft light is looked up: a divisor of the distance from the first of a batch to the last.
+const KNOT_PIXELS: usize = 5;
 /// Altitude whose distance is an aurora's depth, km.
 const DEPTH_KM: f64 = 110.0;
 /// Fainter than this is no aurora to a depth, kR.
@@ -49,8 +54,14 @@ pub(super) struct PreparedAurora<'a> {
     level: Level,
     cameras: Vec<Camera>,
     field: FieldLines,
+    /// Sine of the horizon's elevation.
+    horizon: f32,
+    /// Distance of the observer from the Earth's middle, km.
+    from_middle: f32,
     /// Chart of the sharp light, and a coarser one of what is soft.
     charts: [Meridians; 2],
+    /// Whether the soft light is so coarse that not every pixel needs to look it up.
+    soft_is_coarse: bool,
     /// Made where they are asked for.
     maps: OnceLock<Maps<'a>>,
 }
@@ -84,8 +95,11 @@ impl<'a> PreparedAurora<'a> {
             view,
             level: Level::new(),
             cameras: cameras(view),
+            horizon: -math::sqrt(2.0 * field.observer_altitude_km().max(0.0) / EARTH_RADIUS_KM) as f32,
+            from_middle: (EARTH_RADIUS_KM + field.observer_altitude_km()) as f32,
             field,
             charts: [sharp, soft],
+            soft_is_coarse: coarse >= 2.0 * KNOT_PIXELS as f64 * pixel,
             maps: OnceLock::new(),
         })
     }
@@ -143,86 +157,163 @@ impl Batch {
     #[inline(always)]
     pub(super) fn new(camera: &Camera, field: &FieldLines, x: usize, y: usize) -> Self {
         let mut batch = Self::default();
-        let at = |x: usize| camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-        let mut directions = [DVec3::Y.as_vec3(); BATCH];
-        if let (Some(first), Some(last)) = (at(x), at(x + BATCH)) {
-            // Exact for a perspective lens; elsewhere within a few hundredths of a pixel.
-            let (first, step) = (first.as_vec3(), ((last - first) / BATCH as f64).as_vec3());
-            directions = std::array::from_fn(|i| first + step * i as f32);
-            batch.seen = [true; BATCH];
-        } else {
-            for i in 0..BATCH {
-                if let Some(direction) = at(x + i) {
-                    (directions[i], batch.seen[i]) = (direction.as_vec3(), true);
-                }
-            }
-        }
-        let [along, first, second] =
-            [field.along, field.across[0], field.across[1]].map(|axis| axis.as_vec3().to_array());
-        let dot = |axis: [f32; 3], d: [f32; 3]| axis[0].mul_add(d[0], axis[1].mul_add(d[1], axis[2] * d[2]));
+        let [xs, ys, zs] = batch.look(camera, x, y);
+        let [along, first, second] = field.single();
         for i in 0..BATCH {
-            let direction = directions[i].to_array();
-            let (x, y) = (dot(first, direction), dot(second, direction));
-            let length = dot(direction, direction).sqrt();
+            let direction = [xs[i], ys[i], zs[i]];
+            let (x, y, length) = (dot(first, direction), dot(second, direction), dot(direction, direction).sqrt());
             batch.colatitude[i] = lanes::atan2(x.mul_add(x, y * y).sqrt(), dot(along, direction));
             batch.longitude[i] = lanes::atan2(y, x);
-            batch.sine[i] = direction[1] / length;
+            batch.sine[i] = ys[i] / length;
             batch.length[i] = length;
         }
         batch
+    }
+
+    /// Notes which pixels the lens sees, and gives their directions: x, y, z.
+    #[inline(always)]
+    fn look(&mut self, camera: &Camera, x: usize, y: usize) -> [[f32; BATCH]; 3] {
+        let at = |x: usize| camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
+        let mut directions = [[0.0; BATCH], [1.0; BATCH], [0.0; BATCH]];
+        if let (Some(first), Some(last)) = (at(x), at(x + BATCH)) {
+            // Exact for a perspective lens; elsewhere within a few hundredths of a pixel.
+            let (first, step) = (first.as_vec3().to_array(), ((last - first) / BATCH as f64).as_vec3().to_array());
+            for axis in 0..3 {
+                for i in 0..BATCH {
+                    directions[axis][i] = step[axis].mul_add(i as f32, first[axis]);
+                }
+            }
+            self.seen = [true; BATCH];
+        } else {
+            for i in 0..BATCH {
+                if let Some(direction) = at(x + i) {
+                    self.seen[i] = true;
+                    for (axis, part) in direction.as_vec3().to_array().into_iter().enumerate() {
+                        directions[axis][i] = part;
+                    }
+                }
+            }
+        }
+        directions
+    }
+}
+
+/// Adds the light at a few pixels of a batch, and straight between them.
+#[inline(always)]
+fn add_at_knots<S: Simd>(simd: S, sampler: &Sampler, batch: &Batch, light: &mut [PerEmitter<f32>; BATCH]) {
+    const KNOTS: usize = (BATCH - 1) / KNOT_PIXELS + 1;
+    let (mut longitude, mut colatitude) = ([0.0; KNOTS], [0.0; KNOTS]);
+    for knot in 0..KNOTS {
+        longitude[knot] = batch.longitude[knot * KNOT_PIXELS];
+        colatitude[knot] = batch.colatitude[knot * KNOT_PIXELS];
+    }
+    let mut knots = [[0.0; 4]; KNOTS];
+    sampler.add(simd, &longitude, &colatitude, &mut knots);
+    if knots == [[0.0; 4]; KNOTS] {
+        return;
+    }
+    for i in 0..BATCH {
+        let knot = (i / KNOT_PIXELS).min(KNOTS - 2);
+        let part = (i - knot * KNOT_PIXELS) as f32 * (1.0 / KNOT_PIXELS as f32);
+        let between = mixed(simd, &knots[knot], &knots[knot + 1], part);
+        light[i] = (between + FourLanes::simd_from(simd, light[i])).into();
     }
 }
 
 impl PreparedAurora<'_> {
     #[inline(always)]
-    fn rows(&self, slice: &DepthInterval, strip: &mut Strip) {
-        let samplers = self.charts.each_ref().map(Meridians::sampler);
+    fn rows<S: Simd>(&self, simd: S, slice: &DepthInterval, strip: &mut Strip) {
+        let samplers = [self.charts[0].sampler(), self.charts[1].sampler()];
         let rect = strip.rect;
-        for row in 0..rect.height {
-            // Batches lie on the picture's own grid, so that a crop changes no pixel.
-            for x in (rect.x / BATCH * BATCH..rect.right()).step_by(BATCH) {
-                self.batch(&samplers, slice, strip, [x, rect.y + row]);
+        // Batches lie on the picture's own grid, so that a crop changes no pixel; those of one column follow each other, since they look
+        // up the same part of the chart.
+        let mut x = rect.x / BATCH * BATCH;
+        while x < rect.right() {
+            for y in rect.y..rect.bottom() {
+                self.batch(simd, &samplers, slice, strip, [x, y]);
             }
+            x += BATCH;
         }
     }
 
     #[inline(always)]
-    fn batch(&self, samplers: &[Sampler; 2], slice: &DepthInterval, strip: &mut Strip, [x, y]: [usize; 2]) {
+    fn batch<S: Simd>(
+        &self,
+        simd: S,
+        samplers: &[Sampler; 2],
+        slice: &DepthInterval,
+        strip: &mut Strip,
+        [x, y]: [usize; 2],
+    ) {
         let rect = strip.rect;
         let inside = rect.x.max(x) - x..rect.right().min(x + BATCH) - x;
+        let first = (y - rect.y) * rect.width + x + inside.start - rect.x;
         let share = 1.0 / self.cameras.len() as f32;
         for camera in &self.cameras {
             let batch = Batch::new(camera, &self.field, x, y);
+            let (sky, mut depths) = self.sky(&batch, share);
+            if sky == [0.0; BATCH] {
+                continue;
+            }
+            let mut light = [[0.0; 4]; BATCH];
+            samplers[0].add(simd, &batch.longitude, &batch.colatitude, &mut light);
+            if self.soft_is_coarse && batch.seen == [true; BATCH] {
+                add_at_knots(simd, &samplers[1], &batch, &mut light);
+            } else {
+                samplers[1].add(simd, &batch.longitude, &batch.colatitude, &mut light);
+            }
+            if strip.aovs.is_empty() && light == [[0.0; 4]; BATCH] {
+                continue;
+            }
+            let mut colours = [[0.0; BATCH]; 3];
+            let mut shown = [false; BATCH];
             for i in inside.clone() {
-                let index = (y - rect.y) * rect.width + x + i - rect.x;
-                let sky = self.above_horizon(batch.sine[i]) * share;
-                if !batch.seen[i] || sky <= 0.0 {
-                    continue;
+                let (index, depth) = (first + i - inside.start, depths[i]);
+                shown[i] = sky[i] > 0.0 && slice.contains(f64::from(depth)) && strip.visible(index, depth);
+                let sky = if shown[i] { sky[i] } else { 0.0 };
+                let light = &mut light[i];
+                for emitter in 0..4 {
+                    light[emitter] *= sky;
                 }
-                let depth = self.depth(batch.sine[i]) / batch.length[i];
-                if !slice.contains(f64::from(depth)) || !strip.visible(index, depth) {
-                    continue;
-                }
-                let [sharp, soft] =
-                    samplers.each_ref().map(|sampler| sampler.light(batch.longitude[i], batch.colatitude[i]));
-                let light: PerEmitter<f32> = std::array::from_fn(|e| (sharp[e] + soft[e]) * sky);
                 let brightness = light[0] + light[1] + light[2];
-                let seen = if brightness > FAINTEST * share { depth } else { f32::INFINITY };
-                strip.emit(index, self.aurora.shading.colour(&light, batch.sine[i]), seen);
-                for (plane, line) in strip.aovs.iter_mut().zip(MEASURED) {
-                    let line = &LINES[line];
-                    plane.add(index, light[line.emitter.index()] * line.photons as f32, 1.0);
+                depths[i] = if brightness > FAINTEST * share { depth } else { f32::INFINITY };
+                let colour = self.aurora.shading.colour(simd, light, batch.sine[i]);
+                for c in 0..3 {
+                    colours[c][i] = colour[c];
                 }
-                if !strip.aovs.is_empty() {
-                    self.map(strip, index, camera.direction(DVec2::new((x + i) as f64 + 0.5, y as f64 + 0.5)), share);
+            }
+            let [red, green, blue] = &colours;
+            let radiance = [&red[inside.clone()], &green[inside.clone()], &blue[inside.clone()]];
+            strip.add_row_behind(first, radiance, None, &depths[inside.clone()]);
+            if !strip.aovs.is_empty() {
+                for i in inside.clone().filter(|i| shown[*i]) {
+                    let direction = camera.direction(DVec2::new((x + i) as f64 + 0.5, y as f64 + 0.5));
+                    self.measure(strip, first + i - inside.start, &light[i], direction, share);
                 }
             }
         }
     }
 
-    /// Adds what the cells in a direction hold.
+    /// How much of each pixel is sky, times `share`, and the depth of an aurora there, m.
+    #[inline(always)]
+    fn sky(&self, batch: &Batch, share: f32) -> ([f32; BATCH], [f32; BATCH]) {
+        let (mut sky, mut depths) = ([0.0; BATCH], [0.0; BATCH]);
+        for i in 0..BATCH {
+            let pixels = (batch.sine[i] - self.horizon) * self.view.camera.focal_pixels as f32;
+            let above = (pixels + 0.5).clamp(0.0, 1.0) * share;
+            sky[i] = if batch.seen[i] { above } else { 0.0 };
+            depths[i] = self.depth(batch.sine[i]) / batch.length[i];
+        }
+        (sky, depths)
+    }
+
+    /// Adds what the AOVs tell of a pixel.
     #[inline(never)]
-    fn map(&self, strip: &mut Strip, index: usize, direction: Option<DVec3>, share: f32) {
+    fn measure(&self, strip: &mut Strip, index: usize, light: &PerEmitter<f32>, direction: Option<DVec3>, share: f32) {
+        for (plane, line) in strip.aovs.iter_mut().zip(MEASURED) {
+            let line = &LINES[line];
+            plane.add(index, light[line.emitter.index()] * line.photons as f32, 1.0);
+        }
         let maps = self.maps.get_or_init(|| Maps::new(&self.aurora.simulation));
         let Some(place) = direction.and_then(|direction| self.field.drawn(direction)) else { return };
         for (plane, value) in strip.aovs.iter_mut().skip(MEASURED.len()).zip(maps.at(place)) {
@@ -233,20 +324,10 @@ impl PreparedAurora<'_> {
     /// Distance of the aurora in a direction of that elevation, m.
     #[inline(always)]
     fn depth(&self, sine: f32) -> f32 {
-        let from_middle = (EARTH_RADIUS_KM + self.field.observer_altitude_km()) as f32;
-        let shell = (EARTH_RADIUS_KM + DEPTH_KM) as f32;
-        let along = from_middle * sine;
-        let squared = along.mul_add(along, (shell - from_middle) * (shell + from_middle));
+        const SHELL: f32 = (EARTH_RADIUS_KM + DEPTH_KM) as f32;
+        let along = self.from_middle * sine;
+        let squared = along.mul_add(along, (SHELL - self.from_middle) * (SHELL + self.from_middle));
         1e3 * (squared.max(0.0).sqrt() - along).abs()
-    }
-
-    /// How much of a pixel of that elevation is above the horizon.
-    #[inline(always)]
-    fn above_horizon(&self, sine: f32) -> f32 {
-        let height = self.field.observer_altitude_km().max(0.0);
-        let horizon = -(2.0 * height / EARTH_RADIUS_KM).sqrt();
-        let pixels = (sine - horizon as f32) * self.view.camera.focal_pixels as f32;
-        (pixels + 0.5).clamp(0.0, 1.0)
     }
 }
 
@@ -257,7 +338,7 @@ impl Prepared for PreparedAurora<'_> {
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         if slice.overlaps(&DEPTHS) {
-            dispatch!(self.level, _simd => self.rows(slice, strip));
+            dispatch!(self.level, simd => self.rows(simd, slice, strip));
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Light by altitude for every energy, as single precision tables that the drawing walks.
 
+use std::sync::OnceLock;
+
 use bansho_base::math;
 
 use crate::aurora::{
@@ -12,8 +14,8 @@ use crate::aurora::{
 const FINENESS: usize = 8;
 /// Tables of one energy, each of them smoothed to and sampled at twice the spacing of the one before, from 1 km on.
 pub(super) const SPACINGS: usize = 12;
-/// Entries of all tables of one energy.
-const STRIDE: usize = entries_before(SPACINGS);
+/// Where the table of each spacing begins among those of one energy, and the end of all.
+const STARTS: [usize; SPACINGS + 1] = starts();
 /// A column is drawn up to where this share of its light is left above.
 const LEFT_ABOVE: f64 = 3e-4;
 
@@ -22,20 +24,28 @@ const fn entries(spacing: usize) -> usize {
     ((LEVELS - 1) >> spacing) + 4
 }
 
-const fn entries_before(spacing: usize) -> usize {
-    let (mut sum, mut each) = (0, 0);
-    while each < spacing {
-        sum += entries(each);
-        each += 1;
+const fn starts() -> [usize; SPACINGS + 1] {
+    let (mut starts, mut spacing) = ([0; SPACINGS + 1], 0);
+    while spacing < SPACINGS {
+        starts[spacing + 1] = starts[spacing] + entries(spacing);
+        spacing += 1;
     }
-    sum
+    starts
 }
 
-/// Light of precipitation by energy and altitude, in kR per km of sight and mW/m^2.
+/// Light of precipitation by energy and altitude, in kR per km of sight and mW/m^2; tables are made when they are first asked for.
 #[derive(Clone, Debug)]
 pub(super) struct Profiles {
+    emission: Emission,
+    tables: Vec<OnceLock<Table>>,
+}
+
+/// The tables of one energy, one after the other.
+#[derive(Clone, Debug)]
+struct Table {
     light: Vec<PerEmitter<f32>>,
-    tops: Vec<[f32; 2]>,
+    /// Altitudes above which there is hardly any prompt, and any red light, km.
+    tops_km: [f32; 2],
 }
 
 /// Light by altitude of one energy.
@@ -47,34 +57,38 @@ pub(super) struct Profile<'a> {
 }
 
 impl Profiles {
-    /// The tables for a spectrum. Some tens of milliseconds.
+    /// The tables for a spectrum.
     pub(super) fn new(emission: &Emission) -> Self {
-        let count = (NODES - 1) * FINENESS + 1;
-        let mut light = Vec::with_capacity(count * STRIDE);
-        let mut tops = Vec::with_capacity(count);
-        for fine in 0..count {
-            let profile = emission.profile(fine_energy_ev(fine));
-            tops.push([Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| top_km(&profile, emitter)));
-            let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
-            let mut table: Vec<PerEmitter<f64>> =
-                std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect();
-            for spacing in 0..SPACINGS {
-                let entry = |at: usize| table.get(at).copied().unwrap_or_default();
-                light.extend((0..entries(spacing)).map(|at| entry(at).map(|value| value as f32)));
-                table = halved(&table);
-            }
-        }
-        Self { light, tops }
+        Self { emission: emission.clone(), tables: vec![OnceLock::new(); (NODES - 1) * FINENESS + 1] }
     }
 
     /// The light of an energy, given as its place among the nodes of the grid; `red` includes the red line's height.
     #[inline(always)]
     pub(super) fn at(&self, node: f32, red: bool) -> Profile<'_> {
-        let last = self.tops.len() - 1;
+        let last = self.tables.len() - 1;
         let fine = ((node * FINENESS as f32 + 0.5).max(0.0) as usize).min(last);
-        let [prompt_km, red_km] = self.tops[fine];
-        let top_km = if red { red_km.max(prompt_km) } else { prompt_km };
-        Profile { light: &self.light[fine * STRIDE..(fine + 1) * STRIDE], top_km }
+        let Table { light, tops_km: [prompt_km, red_km] } = self.table(fine);
+        Profile { light, top_km: if red { red_km.max(*prompt_km) } else { *prompt_km } }
+    }
+
+    #[inline(never)]
+    fn table(&self, fine: usize) -> &Table {
+        self.tables[fine].get_or_init(|| Table::new(&self.emission.profile(fine_energy_ev(fine))))
+    }
+}
+
+impl Table {
+    /// From the volume emission at each level.
+    fn new(profile: &[PerEmitter<f64>]) -> Self {
+        let mut light = Vec::with_capacity(STARTS[SPACINGS]);
+        let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
+        let mut table: Vec<PerEmitter<f64>> = std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect();
+        for spacing in 0..SPACINGS {
+            let entry = |at: usize| table.get(at).copied().unwrap_or_default();
+            light.extend((0..entries(spacing)).map(|at| entry(at).map(|value| value as f32)));
+            table = halved(&table);
+        }
+        Self { light, tops_km: [Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| top_km(profile, emitter)) }
     }
 }
 
@@ -82,7 +96,7 @@ impl<'a> Profile<'a> {
     /// The table smoothed over 2^`spacing` km. Entries lie so far apart, the second at 80 km; the last is dark.
     #[inline(always)]
     pub(super) fn table(&self, spacing: usize) -> &'a [PerEmitter<f32>] {
-        &self.light[entries_before(spacing)..entries_before(spacing) + entries(spacing)]
+        &self.light[STARTS[spacing]..STARTS[spacing + 1]]
     }
 }
 

@@ -3,8 +3,12 @@
 use std::f64::consts::FRAC_PI_2;
 
 use bansho_base::math::{self, DVec3};
+use fearless_simd::{Simd, prelude::*};
 
-use crate::aurora::light::{EMITTERS, Emitter, LINES, PerEmitter, extinction::Extinction};
+use crate::{
+    aurora::light::{EMITTERS, Emitter, LINES, PerEmitter, extinction::Extinction},
+    lanes::{FourLanes, Real},
+};
 
 /// Steps from the horizon to the zenith, even in the root of the sine of the elevation: the air changes fast near the horizon.
 const STEPS: usize = 1024;
@@ -14,7 +18,8 @@ const BANDS_NM: f64 = 655.0;
 /// ACEScg of a kilorayleigh of each emitter by elevation; luminance in cd/m^2.
 #[derive(Clone, Debug)]
 pub(super) struct Shading {
-    colours: Vec<PerEmitter<[f32; 3]>>,
+    /// Red, green, blue and nothing: four lanes.
+    colours: Vec<PerEmitter<[f32; 4]>>,
 }
 
 impl Shading {
@@ -23,23 +28,24 @@ impl Shading {
         let colours = (0..=STEPS).map(|step| {
             let root = step as f64 / STEPS as f64;
             let elevation = math::asin(root * root).min(FRAC_PI_2);
-            EMITTERS.map(|emitter| seen(emitter, air, elevation).map(|value| value as f32))
+            EMITTERS.map(|emitter| {
+                let [red, green, blue] = seen(emitter, air, elevation).map(|value| value as f32);
+                [red, green, blue, 0.0]
+            })
         });
         Self { colours: colours.collect() }
     }
 
     /// The colour of light by emitter in kR from an elevation of that sine; as at the horizon below it.
     #[inline(always)]
-    pub(super) fn colour(&self, light: &PerEmitter<f32>, sine: f32) -> [f32; 3] {
+    pub(super) fn colour<S: Simd>(&self, simd: S, light: &PerEmitter<f32>, sine: f32) -> [f32; 3] {
         let step = (sine.max(0.0).sqrt() * STEPS as f32 + 0.5) as usize;
-        let colours = &self.colours[step.min(STEPS)];
-        let mut sum = [0.0; 3];
-        for (light, colour) in light.iter().zip(colours) {
-            for c in 0..3 {
-                sum[c] = light.mul_add(colour[c], sum[c]);
-            }
+        let mut sum = FourLanes::splat(simd, 0.0);
+        for (light, colour) in light.iter().zip(&self.colours[step.min(STEPS)]) {
+            sum = sum.like(*light).fused(FourLanes::simd_from(simd, *colour), sum);
         }
-        sum
+        let [red, green, blue, _] = sum.into();
+        [red, green, blue]
     }
 }
 
@@ -59,6 +65,8 @@ fn seen(emitter: Emitter, air: &Extinction, elevation: f64) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::{Level, dispatch};
+
     use super::*;
 
     #[test]
@@ -68,7 +76,7 @@ mod tests {
         for emitter in EMITTERS {
             let mut light = [0.0; 4];
             light[emitter.index()] = 2.0;
-            let colour = shading.colour(&light, 0.3);
+            let colour = dispatch!(Level::new(), simd => shading.colour(simd, &light, 0.3));
             let expected = emitter.colour_per_kilorayleigh();
             assert!(
                 (0..3).all(|c| (f64::from(colour[c]) - 2.0 * expected[c]).abs() < 1e-4 * expected[1].abs().max(1e-6))
@@ -82,7 +90,8 @@ mod tests {
         let share = |emitter: Emitter| {
             let mut light = [0.0; 4];
             light[emitter.index()] = 1.0;
-            shading.colour(&light, 0.02)[2] / shading.colour(&light, 1.0)[2]
+            let blue = |sine: f32| dispatch!(Level::new(), simd => shading.colour(simd, &light, sine)[2]);
+            blue(0.02) / blue(1.0)
         };
         assert!(share(Emitter::NitrogenIon) < 0.5 * share(Emitter::OxygenGreen).abs());
     }

@@ -62,30 +62,41 @@ impl Maker<'_> {
         Source { across: foot.across, reach: self.reach, node: node_of(energy_ev), power }
     }
 
+    /// A source for each of the cells.
     pub(super) fn cells(&self, cells: &[GlowCell]) -> Vec<Source> {
         let level = Level::new();
-        let make = |part: &[GlowCell]| -> Vec<Source> {
-            let make = |cell: &GlowCell| self.make(cell.position_km, cell.power_w, cell.energy_ev);
-            dispatch!(level, _simd => part.iter().map(make).collect())
-        };
-        cells.par_chunks(TASK).flat_map_iter(make).collect()
+        let mut sources = vec![Source::default(); cells.len()];
+        sources.par_chunks_mut(TASK).zip(cells.par_chunks(TASK)).for_each(|(sources, cells)| {
+            dispatch!(level, _simd => self.fill_from_cells(sources, cells));
+        });
+        sources
+    }
+
+    #[inline(always)]
+    fn fill_from_cells(&self, sources: &mut [Source], cells: &[GlowCell]) {
+        for (source, cell) in sources.iter_mut().zip(cells) {
+            *source = self.make(cell.position_km, cell.power_w, cell.energy_ev);
+        }
     }
 
     /// Particles as they are `later` seconds after their step.
     fn particles(&self, particles: &AuroraParticles, later: f32) -> Vec<Source> {
         let level = Level::new();
-        let make = |part: usize| -> Vec<Source> {
-            let range = part * TASK..((part + 1) * TASK).min(particles.len());
-            let place = |axis: usize, index: usize| {
-                particles.velocities[axis][index].mul_add(later, particles.positions[axis][index])
-            };
-            let make = |index: usize| {
-                let place = [place(0, index), place(1, index)];
-                self.make(place, particles.powers_w[index], particles.energies_ev[index])
-            };
-            dispatch!(level, _simd => range.map(make).collect())
-        };
-        (0..particles.len().div_ceil(TASK)).into_par_iter().flat_map_iter(make).collect()
+        let mut sources = vec![Source::default(); particles.len()];
+        sources.par_chunks_mut(TASK).enumerate().for_each(|(task, sources)| {
+            dispatch!(level, _simd => self.fill_from_particles(sources, particles, task * TASK, later));
+        });
+        sources
+    }
+
+    #[inline(always)]
+    fn fill_from_particles(&self, sources: &mut [Source], particles: &AuroraParticles, first: usize, later: f32) {
+        let ([xs, zs], [us, ws]) = (&particles.positions, &particles.velocities);
+        for (number, source) in sources.iter_mut().enumerate() {
+            let index = first + number;
+            let place = [us[index].mul_add(later, xs[index]), ws[index].mul_add(later, zs[index])];
+            *source = self.make(place, particles.powers_w[index], particles.energies_ev[index]);
+        }
     }
 }
 

@@ -13,27 +13,48 @@ const CHARGE: [f64; 2] = [0.1, 4.0];
 /// together: all particles would gather there. Here it is the same along all sheets.
 #[derive(Clone, Debug)]
 pub(super) struct LineCharge {
-    /// By sheet; evenly spaced over its length, one at each end.
-    nodes: Vec<Vec<f64>>,
+    /// One sheet's after those of another; evenly spaced over its length, one at each end.
+    nodes: Vec<f64>,
+    /// Where each sheet's begin, and the end of all.
+    starts: Vec<usize>,
+}
+
+/// Where a particle is among the nodes: the one before it, and the part of the way to the next.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    node: u32,
+    part: f32,
 }
 
 impl LineCharge {
     /// The same charge everywhere, at nodes about `spacing` km apart.
     pub(super) fn even(course: &Course, spacing: f64) -> Self {
-        let node_count = |length: f64| (length / spacing).ceil().max(1.0) as usize + 1;
-        Self { nodes: course.sheet_lengths().into_iter().map(|length| vec![1.0; node_count(length)]).collect() }
+        let mut starts = vec![0];
+        for length in course.sheet_lengths() {
+            let count = (length / spacing).ceil().max(1.0) as usize + 1;
+            starts.push(starts[starts.len() - 1] + count);
+        }
+        Self { nodes: vec![1.0; starts[starts.len() - 1]], starts }
     }
 
-    /// Charge of a particle.
-    pub(super) fn of(&self, particle: &Scattered) -> f64 {
-        let nodes = &self.nodes[particle.sheet as usize];
-        let (node, part) = split(f64::from(particle.share), nodes.len());
-        nodes[node] + part * (nodes[node + 1] - nodes[node])
+    /// Where a particle is.
+    pub(super) fn place(&self, particle: &Scattered) -> Place {
+        let sheet = particle.sheet as usize;
+        let (first, end) = (self.starts[sheet], self.starts[sheet + 1]);
+        let (node, part) = split(f64::from(particle.share), end - first);
+        Place { node: (first + node) as u32, part: part as f32 }
+    }
+
+    /// Charge of a particle that is there.
+    pub(super) fn at(&self, place: Place) -> f64 {
+        let [before, after] = [0, 1].map(|next| self.nodes[place.node as usize + next]);
+        before + f64::from(place.part) * (after - before)
     }
 
     /// Changes it where the potential that it makes is not the one that is wanted; negative both.
     pub(super) fn adjust(&mut self, course: &Course, potential: &Grid2, wanted: f64) {
-        for (sheet, nodes) in self.nodes.iter_mut().enumerate() {
+        for (sheet, ends) in self.starts.windows(2).enumerate() {
+            let nodes = &mut self.nodes[ends[0]..ends[1]];
             let last = (nodes.len() - 1) as f64;
             for (number, charge) in nodes.iter_mut().enumerate() {
                 let found = potential.sample(course.place(sheet, number as f64 / last).to_array());

@@ -10,8 +10,13 @@ use bansho_base::{
     random::{Key, Purpose},
 };
 use fearless_simd::Level;
+use rayon::prelude::*;
 
-use super::{conductor::LineCharge, course::Course, scatter::Scattered};
+use super::{
+    conductor::{LineCharge, Place},
+    course::Course,
+    scatter::Scattered,
+};
 use crate::{
     aurora::{AuroraParameters, FieldSolver, shapes::FRAME_S},
     field::{Grid2, PoissonSolver, relax},
@@ -21,6 +26,8 @@ use crate::{
 const REACH_CELLS: f64 = 3.0;
 /// How often the charge along the sheets is made better.
 const ADJUSTMENTS: usize = 4;
+/// Scattered particles that a task of the thread pool finds the places of, at least.
+const TASK: usize = 4096;
 /// Field at the edge of a sheet at a pull of 1, cells per frame^2.
 const EDGE_FIELD: f64 = 0.25;
 
@@ -98,10 +105,9 @@ impl FieldMaker {
     /// Sum of values at places over those in each cell.
     pub(super) fn sum(&self, values: impl Iterator<Item = (DVec2, f64)>) -> Grid2 {
         let mut sums = self.grid();
-        let columns = sums.size()[0];
         for (place, value) in values {
-            if let Some([column, row]) = sums.cell(place.to_array()) {
-                sums.values_mut()[row * columns + column] += value;
+            if let Some(cell) = sums.index(place.to_array()) {
+                sums.values_mut()[cell] += value;
             }
         }
         sums
@@ -117,8 +123,16 @@ impl FieldMaker {
         let reach = self.reach_km();
         let wanted = density * reach * reach * (math::exp(-half_thickness / reach) - 1.0);
         let mut charge = LineCharge::even(course, self.parameters.cell_km());
+        let places: Vec<(usize, Place)> = scattered
+            .par_iter()
+            .with_min_len(TASK)
+            .filter_map(|particle| Some((counts.index(particle.place.to_array())?, charge.place(particle))))
+            .collect();
         let source = |charge: &LineCharge| {
-            self.sum(scattered.iter().map(|particle| (particle.place, unit * charge.of(particle))))
+            let mut source = self.grid();
+            let cells = source.values_mut();
+            places.iter().for_each(|(cell, place)| cells[*cell] += unit * charge.at(*place));
+            source
         };
         for _ in 0..ADJUSTMENTS {
             charge.adjust(course, &self.solved(source(&charge)), wanted);
@@ -194,18 +208,22 @@ impl Field {
         let [columns, rows] = self.counts.size();
         let [left, low] = self.counts.origin();
         let to_cells = 1.0 / self.counts.spacing();
-        let split = |value: f32, origin: f64, count: usize| {
-            let place = ((f64::from(value) - origin) * to_cells + 0.5).clamp(0.0, count as f64 + 0.999) as f32;
-            (place as usize, place - place.floor())
+        let place = |value: f32, origin: f64, count: usize| {
+            ((f64::from(value) - origin) * to_cells + 0.5).clamp(0.0, count as f64 + 0.999) as f32
         };
-        let ((column, s), (row, t)) = (split(x, left, columns), split(z, low, rows));
+        let (x, z) = (place(x, left, columns), place(z, low, rows));
+        let (column, row) = (x as usize, z as usize);
+        let (s, t) = (x - column as f32, z - row as f32);
         let first = row * (columns + 2) + column;
         let second = first + columns + 2;
-        let [a, b, c, d] = [self.table[first], self.table[first + 1], self.table[second], self.table[second + 1]];
-        let [potential, east, south] = std::array::from_fn(|k| {
-            let (lower, upper) = (s.mul_add(b[k] - a[k], a[k]), s.mul_add(d[k] - c[k], c[k]));
-            t.mul_add(upper - lower, lower)
-        });
+        let (lower, upper) = (&self.table[first..first + 2], &self.table[second..second + 2]);
+        let mut sample = [0.0; 3];
+        for k in 0..3 {
+            let lower = s.mul_add(lower[1][k] - lower[0][k], lower[0][k]);
+            let upper = s.mul_add(upper[1][k] - upper[0][k], upper[0][k]);
+            sample[k] = t.mul_add(upper - lower, lower);
+        }
+        let [potential, east, south] = sample;
         FieldSample { potential, field: [east, south] }
     }
 }

@@ -149,13 +149,13 @@ impl Mover {
         let here = field.sample(place[0], place[1]);
         let [cosine, sine] = self.turn;
         let speed = [cosine.mul_add(speed[0], sine * speed[1]), cosine.mul_add(speed[1], -sine * speed[0])];
-        let force: [f32; 2] =
-            std::array::from_fn(|c| self.pull_weight.mul_add(here.field[c], self.repulsion_weight * push[c]));
-        let to: [f32; 2] = std::array::from_fn(|c| {
-            let to = (0.5 * STEP * STEP).mul_add(force[c], STEP.mul_add(speed[c], place[c]));
-            if to.is_finite() { to.clamp(-self.half_km, self.half_km) } else { place[c] }
-        });
-        let new: [f32; 2] = std::array::from_fn(|c| self.kept_speed * STEP.mul_add(force[c], speed[c]));
+        let (mut to, mut new) = ([0.0; 2], [0.0; 2]);
+        for c in 0..2 {
+            let force = self.pull_weight.mul_add(here.field[c], self.repulsion_weight * push[c]);
+            let moved = (0.5 * STEP * STEP).mul_add(force, STEP.mul_add(speed[c], place[c]));
+            to[c] = if moved.is_finite() { moved.clamp(-self.half_km, self.half_km) } else { place[c] };
+            new[c] = self.kept_speed * STEP.mul_add(force, speed[c]);
+        }
         let fall = here.potential - field.sample(to[0], to[1]).potential;
         let factor = self.allowed(speed, new, fall);
         (to, if factor > 0.0 { new.map(|value| value * factor) } else { [0.0; 2] })

@@ -16,8 +16,8 @@ const BIRTH: Purpose = Purpose::named("aurora birth");
 const THINNING: Purpose = Purpose::named("aurora thinning");
 /// The counts of table 3.3 are taken as those of a near cell that holds this many particles on average.
 const TABLE_COUNT: f64 = 75.0;
-/// Share of surplus particles that one renewal takes away.
-const THINNED: f64 = 0.4;
+/// How much a cell counts beside each of those around it where it is found what it lacks.
+const OWN_WEIGHT: f64 = 12.0;
 
 /// Table 3.3 for a number of particles, and the random numbers of births.
 #[derive(Clone, Debug)]
@@ -119,9 +119,9 @@ impl Relocation {
         let columns = field.counts.size()[0];
         let origin = DVec2::from(field.counts.origin());
         let mut births = Vec::new();
-        for (cell, share) in shares.iter().enumerate().filter(|(_, share)| **share > 0.0) {
-            let least = self.parameters.births_below * scale * share;
-            let deficit = (least - residents.of(cell).len() as f64).min(self.parameters.births_at_most * scale).ceil();
+        for cell in (0..shares.len()).filter(|cell| shares[*cell] > 0.0) {
+            let lack = self.lack(residents, (shares, scale), cell, columns);
+            let deficit = lack.min(self.parameters.births_at_most * scale).round();
             if deficit < 1.0 {
                 continue;
             }
@@ -137,10 +137,27 @@ impl Relocation {
         births
     }
 
-    /// Lets part of the surplus over the wanted count die, evenly.
+    /// How many a near cell lacks. Where the table is not taken to the letter, the cells around count too: particles that have swung to the
+    /// one side of a sheet leave little to fill up on the other.
+    fn lack(&self, residents: &Residents, (shares, scale): (&[f64], f64), cell: usize, columns: usize) -> f64 {
+        let least = self.parameters.births_below * scale;
+        if !self.parameters.scaled {
+            return least * shares[cell] - residents.of(cell).len() as f64;
+        }
+        let (mut wanted, mut found) = (0.0, 0.0);
+        for other in cells_around(cell, columns, shares.len()) {
+            let weight = if other == cell { OWN_WEIGHT } else { 1.0 };
+            wanted += weight * shares[other];
+            found += weight * residents.of(other).len() as f64;
+        }
+        // The cell's own part of what all of them lack.
+        (least * wanted - found) * shares[cell] / wanted
+    }
+
+    /// Lets the surplus over the wanted count die, evenly.
     fn thin(&self, particles: &mut AuroraParticles, renewal: u32) {
         let live = particles.dying.iter().filter(|dying| !**dying).count() as f64;
-        let share = ((live - self.count) / live.max(1.0) * THINNED) as f32;
+        let share = ((live - self.count) / live.max(1.0)) as f32;
         if self.parameters.scaled && share > 0.0 {
             for (dying, id) in particles.dying.iter_mut().zip(&particles.ids) {
                 *dying |= self.key.uniforms(*id, renewal, THINNING)[0] < share;
@@ -161,8 +178,7 @@ pub(super) fn near_cells(field: &Field, table: &RelocationParameters) -> Vec<boo
 
 /// The cell that a particle is in.
 fn home(particles: &AuroraParticles, field: &Field, index: usize) -> Option<usize> {
-    let columns = field.counts.size()[0];
-    field.counts.cell(particles.place(index).to_array()).map(|[column, row]| row * columns + column)
+    field.counts.index(particles.place(index).to_array())
 }
 
 impl Residents {
@@ -188,18 +204,21 @@ impl Residents {
 
     /// Mean velocity of those in the cell and the eight around it; rest where there is nobody.
     fn mean_velocity(&self, particles: &AuroraParticles, cell: usize, columns: usize) -> [f32; 2] {
-        let rows = (self.starts.len() - 1) / columns;
-        let around = |place: usize, count: usize| place.saturating_sub(1)..(place + 2).min(count);
         let (mut sum, mut count) = ([0.0_f64; 2], 0.0);
-        for row in around(cell / columns, rows) {
-            for column in around(cell % columns, columns) {
-                let list = self.of(row * columns + column);
-                count += list.len() as f64;
-                for (axis, sum) in sum.iter_mut().enumerate() {
-                    *sum += list.iter().map(|i| f64::from(particles.velocities[axis][*i as usize])).sum::<f64>();
-                }
+        for list in cells_around(cell, columns, self.starts.len() - 1).map(|cell| self.of(cell)) {
+            count += list.len() as f64;
+            for (axis, sum) in sum.iter_mut().enumerate() {
+                *sum += list.iter().map(|i| f64::from(particles.velocities[axis][*i as usize])).sum::<f64>();
             }
         }
         sum.map(|sum| if count > 0.0 { (sum / count) as f32 } else { 0.0 })
     }
+}
+
+/// A cell and the eight around it, of so many in rows of `columns`.
+fn cells_around(cell: usize, columns: usize, cells: usize) -> impl Iterator<Item = usize> {
+    let around = |place: usize, count: usize| place.saturating_sub(1)..(place + 2).min(count);
+    let across = around(cell % columns, columns);
+    around(cell / columns, cells / columns)
+        .flat_map(move |row| across.clone().map(move |column| row * columns + column))
 }

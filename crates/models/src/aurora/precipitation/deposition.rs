@@ -7,6 +7,7 @@ use super::{
 };
 use crate::aurora::atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, locate_level};
 use bansho_base::math::lerp;
+use rayon::prelude::*;
 
 /// A profile over the levels of the atmosphere.
 pub type Profile = [f64; LEVELS];
@@ -26,13 +27,14 @@ impl Deposition {
     pub fn new(air: &Atmosphere, spectrum: Spectrum) -> Self {
         let layers: Vec<Layer> = air.levels().iter().map(Layer::new).collect();
         let monoenergetic: Vec<Profile> = (0..NODES)
+            .into_par_iter()
             .map(|node| {
                 let beam = Monoenergetic::new(node_energy_ev(node));
                 std::array::from_fn(|level| beam.ionisation(&layers[level]))
             })
             .collect();
-        let shares: Vec<_> = (0..NODES).map(|node| spectrum.shares(node)).collect();
-        let mixed = shares.iter().map(|shares| mix(&monoenergetic, shares)).collect();
+        let shares: Vec<_> = (0..NODES).into_par_iter().map(|node| spectrum.shares(node)).collect();
+        let mixed = shares.par_iter().map(|shares| mix(&monoenergetic, shares)).collect();
         Self { monoenergetic, cumulative_shares: shares.iter().map(running_sum).collect(), mixed }
     }
 

@@ -1,6 +1,7 @@
 //! Single collisions of falling electrons, drawn such that the deposition of Fang et al. (2010) is their mean.
 
 use bansho_base::random::{Key, Purpose, normal_pair, uniform, uniform_f64};
+use rayon::prelude::*;
 
 use super::{
     COLLISION_EV,
@@ -83,6 +84,17 @@ impl Falls {
     }
 }
 
+impl Falls {
+    /// One of the [`VARIANTS`] falls of a node: each takes another part of each share, in an order that changes with the collision.
+    fn variant(&self, node: usize, variant: u32, key: Key) -> impl Iterator<Item = Collision> {
+        let place = move |number: u32, uniform: f64| {
+            let part = variant ^ (key.words(node as u64, number, VARIANT)[0] % VARIANTS);
+            (part as f64 + uniform) / VARIANTS as f64
+        };
+        self.descend(node, key, (node as u64) << 32 | variant as u64, place)
+    }
+}
+
 /// Falls made once, for particles to share: so many for each energy of a range that their mean is the profile.
 #[derive(Clone, Debug)]
 pub struct FallLibrary {
@@ -103,20 +115,16 @@ impl FallLibrary {
     #[must_use]
     pub fn new(falls: &Falls, nodes: std::ops::RangeInclusive<usize>, key: Key) -> Self {
         let first_node = *nodes.start();
-        let (mut starts, mut collisions) = (vec![0], Vec::new());
-        for node in nodes {
-            for variant in 0..VARIANTS {
-                // Each fall takes another part of each share, in an order that changes with the collision.
-                let place = |number: u32, uniform: f64| {
-                    let part = variant ^ (key.words(node as u64, number, VARIANT)[0] % VARIANTS);
-                    (part as f64 + uniform) / VARIANTS as f64
-                };
-                let particle = (node as u64) << 32 | variant as u64;
-                collisions.extend(falls.descend(node, key, particle, place));
-            }
-            starts.push(collisions.len());
-        }
-        Self { first_node, starts, collisions }
+        let by_node: Vec<Vec<Collision>> = nodes
+            .into_par_iter()
+            .map(|node| (0..VARIANTS).flat_map(|v| falls.variant(node, v, key)).collect())
+            .collect();
+        let mut starts = vec![0];
+        starts.extend(by_node.iter().scan(0, |end, collisions| {
+            *end += collisions.len();
+            Some(*end)
+        }));
+        Self { first_node, starts, collisions: by_node.concat() }
     }
 
     /// One of the [`VARIANTS`] falls of a node, any number; the nearest node that the library has.

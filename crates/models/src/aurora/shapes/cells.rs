@@ -28,6 +28,17 @@ impl CellGrid {
         self.line(1, point.y) * self.size[0] + self.line(0, point.x)
     }
 
+    /// The middle of a cell.
+    pub(super) fn middle(&self, cell: usize) -> DVec2 {
+        let [column, row] = [cell % self.size[0], cell / self.size[0]].map(|place| place as f64 + 0.5);
+        self.low + DVec2::new(column, row) * self.cell
+    }
+
+    /// From the middle of a cell to its corners.
+    pub(super) fn half_diagonal(&self) -> f64 {
+        self.cell * std::f64::consts::FRAC_1_SQRT_2
+    }
+
     /// Column (`axis` 0) or row (1) of a coordinate.
     fn line(&self, axis: usize, coordinate: f64) -> usize {
         // Casts saturate, so what lies outside or is no number ends in a border cell.

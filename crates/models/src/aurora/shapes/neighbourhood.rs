@@ -4,20 +4,25 @@ use bansho_base::math::DVec2;
 
 use super::{Shape, cells::CellGrid};
 
-/// Segments of a shape by the cells from which they can be reached.
+/// Cells along the reach: the finer they are, the fewer segments can be nearest to a place in one.
+const CELLS_PER_REACH: f64 = 4.0;
+/// Most cells along a side.
+const MOST_CELLS: usize = 512;
+
+/// Segments of a shape by the cells to whose places they can be nearest.
 #[derive(Clone, Debug)]
 pub struct Neighbourhood {
     reach: f64,
     grid: CellGrid,
-    segments: Vec<Segment>,
     /// Where the list of each cell begins in `lists`, and where the last one ends.
     starts: Vec<u32>,
-    lists: Vec<u32>,
+    lists: Vec<Segment>,
 }
 
-/// A segment: its start, the way to its end, and one over the square of its length (0 where it has none).
+/// A segment: its number, its start, the way to its end, and one over the square of its length (0 where it has none).
 #[derive(Clone, Copy, Debug)]
 struct Segment {
+    number: u32,
     start: DVec2,
     way: DVec2,
     inverse_square: f64,
@@ -27,30 +32,19 @@ impl Neighbourhood {
     /// What lies within `reach` km of `shape`.
     pub fn new(shape: &Shape, reach: f64) -> Self {
         let pairs = shape.sheets.iter().flat_map(|sheet| sheet.points.windows(2));
-        let lines: Vec<[DVec2; 2]> = pairs.map(|pair| [pair[0], pair[1]]).collect();
-        let low = lines.iter().flatten().copied().fold(DVec2::INFINITY, DVec2::min);
-        let high = lines.iter().flatten().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
-        let grid = if lines.is_empty() {
+        let segments: Vec<Segment> =
+            pairs.zip(0..).map(|(pair, number)| Segment::new(number, pair[0], pair[1])).collect();
+        let ends = || segments.iter().flat_map(|segment| [segment.start, segment.start + segment.way]);
+        let low = ends().fold(DVec2::INFINITY, DVec2::min);
+        let high = ends().fold(DVec2::NEG_INFINITY, DVec2::max);
+        let grid = if segments.is_empty() {
             CellGrid::new(DVec2::ZERO, DVec2::ZERO, 1.0, 1)
         } else {
-            CellGrid::new(low - reach, high + reach, reach, 512)
+            CellGrid::new(low - reach, high + reach, reach / CELLS_PER_REACH, MOST_CELLS)
         };
-        let mut starts = vec![0u32; grid.count() + 1];
-        for [a, b] in &lines {
-            grid.for_each_passed(*a, *b, reach, |cell| starts[cell + 1] += 1);
-        }
-        for cell in 0..grid.count() {
-            starts[cell + 1] += starts[cell];
-        }
-        let mut lists = vec![0u32; starts[grid.count()] as usize];
-        let mut ends = starts.clone();
-        for (index, [a, b]) in lines.iter().enumerate() {
-            grid.for_each_passed(*a, *b, reach, |cell| {
-                lists[ends[cell] as usize] = index as u32;
-                ends[cell] += 1;
-            });
-        }
-        Self { reach, grid, segments: lines.into_iter().map(Segment::new).collect(), starts, lists }
+        let (starts, lists) = within(&grid, &segments, reach);
+        let (starts, lists) = nearest_ones(&grid, &starts, &lists);
+        Self { reach, grid, starts, lists }
     }
 
     /// Distance from `point` to the shape, km; `None` beyond the reach.
@@ -62,22 +56,62 @@ impl Neighbourhood {
     /// are as near. `None` beyond the reach.
     pub fn nearest(&self, point: DVec2) -> Option<(usize, f64)> {
         let cell = self.grid.cell_of(point);
-        let list = &self.lists[self.starts[cell] as usize..self.starts[cell + 1] as usize];
         let (mut nearest, mut least) = (0, f64::INFINITY);
-        for &segment in list {
-            let square = self.segments[segment as usize].distance_squared(point);
+        for segment in &self.lists[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
+            let square = segment.distance_squared(point);
             if square < least {
-                (nearest, least) = (segment as usize, square);
+                (nearest, least) = (segment.number, square);
             }
         }
-        (least <= self.reach * self.reach).then(|| (nearest, least.sqrt()))
+        (least <= self.reach * self.reach).then(|| (nearest as usize, least.sqrt()))
     }
 }
 
+/// The segments within `reach` of each cell, one cell's after those of another, and where each cell's begin.
+fn within(grid: &CellGrid, segments: &[Segment], reach: f64) -> (Vec<u32>, Vec<Segment>) {
+    let mut starts = vec![0_u32; grid.count() + 1];
+    let for_each = |segment: &Segment, visit: &mut dyn FnMut(usize)| {
+        grid.for_each_passed(segment.start, segment.start + segment.way, reach, visit);
+    };
+    segments.iter().for_each(|segment| for_each(segment, &mut |cell| starts[cell + 1] += 1));
+    for cell in 0..grid.count() {
+        starts[cell + 1] += starts[cell];
+    }
+    let mut ends = starts.clone();
+    let mut lists = vec![Segment::new(0, DVec2::ZERO, DVec2::ZERO); starts[grid.count()] as usize];
+    for segment in segments {
+        for_each(segment, &mut |cell| {
+            lists[ends[cell] as usize] = *segment;
+            ends[cell] += 1;
+        });
+    }
+    (starts, lists)
+}
+
+/// Those of each cell that can be nearest to a place in it: no farther from its middle than the nearest one by more than twice the way from
+/// there to its corners.
+fn nearest_ones(grid: &CellGrid, starts: &[u32], lists: &[Segment]) -> (Vec<u32>, Vec<Segment>) {
+    // A little more, so that rounding loses nothing.
+    let slack = 2.0 * 1.001 * grid.half_diagonal();
+    let (mut kept_starts, mut kept) = (vec![0], Vec::new());
+    for (cell, ends) in starts.windows(2).enumerate() {
+        let list = &lists[ends[0] as usize..ends[1] as usize];
+        if !list.is_empty() {
+            let middle = grid.middle(cell);
+            let distance = |segment: &Segment| segment.distance_squared(middle).sqrt();
+            let most = list.iter().map(distance).fold(f64::INFINITY, f64::min) + slack;
+            kept.extend(list.iter().filter(|segment| distance(segment) <= most));
+        }
+        kept_starts.push(kept.len() as u32);
+    }
+    (kept_starts, kept)
+}
+
 impl Segment {
-    fn new([start, end]: [DVec2; 2]) -> Self {
+    fn new(number: u32, start: DVec2, end: DVec2) -> Self {
         let square = start.distance_squared(end);
-        Self { start, way: end - start, inverse_square: if square > 0.0 { 1.0 / square } else { 0.0 } }
+        let inverse_square = if square > 0.0 { 1.0 / square } else { 0.0 };
+        Self { number, start, way: end - start, inverse_square }
     }
 
     /// Square of the distance from a point.
@@ -121,10 +155,13 @@ mod tests {
         let sheets = (0..4).map(|index| sheet((0..30).map(|point| random(100 * index + point)).collect())).collect();
         let shape = Shape { sheets };
         let near = Neighbourhood::new(&shape, 7.0);
+        let pairs = shape.sheets.iter().flat_map(|sheet| sheet.points.windows(2));
+        let segments: Vec<Segment> =
+            pairs.zip(0..).map(|(pair, number)| Segment::new(number, pair[0], pair[1])).collect();
         let mut within = 0;
         for probe in 0..5_000 {
             let point = random(1000 + probe) * 1.2;
-            let all = near.segments.iter().map(|segment| segment.distance_squared(point));
+            let all = segments.iter().map(|segment| segment.distance_squared(point));
             let least = all.fold(f64::INFINITY, f64::min).sqrt();
             let expected = (least <= 7.0).then_some(least);
             within += usize::from(expected.is_some());

@@ -48,6 +48,16 @@ fn after_a_transition_particles_lie_on_the_target_and_everywhere_along_it() {
     }
 }
 
+#[test]
+fn there_are_about_as_many_particles_as_are_asked_for() {
+    let mut simulation = simulation(AuroraParameters { shapes: becoming(Form::Peel), ..small() });
+    for _ in 0..120 {
+        simulation.step();
+        let share = simulation.particles().len() as f64 / 12_000.0;
+        assert!((0.9..1.2).contains(&share), "{share} at {} s", simulation.time());
+    }
+}
+
 /// The square is cut into blocks of a sixteenth; what changes in any of them counts.
 fn greatest_jumps(shapes: Vec<ShapeParameters>) -> [f64; 2] {
     const BLOCKS: usize = 16;
