@@ -106,10 +106,7 @@ impl PreparedGround<'_> {
     fn seen_in_film(&self, hit: &Hit, patch: &Patch) -> [f32; 3] {
         let viewer = -(hit.point - self.view.camera.position).normalize_or_zero();
         let rough = gloss(self.surroundings, hit.point, viewer, self.parameters.roughness);
-        let mut still = self.surroundings.reflection.map_or([0.0; 4], |image| bilinear(image, hit.pixel));
-        let sky = self.surroundings.sky.radiance(DVec3::new(-viewer.x, viewer.y, -viewer.z));
-        // Where the picture in the mirror shows nothing, there is sky.
-        (0..3).for_each(|c| still[c] = (1.0 - still[3]).max(0.0).mul_add(sky[c], still[c]));
+        let still = self.surroundings.reflection.map_or([0.0; 4], |image| bilinear(image, hit.pixel));
         let (puddle, fresnel, wetness) = (patch.puddle as f32, fresnel(hit.cos) as f32, self.wetness as f32);
         let film = (1.0 - puddle) * patch.film as f32;
         [0, 1, 2].map(|c| wetness * (puddle * fresnel).mul_add(still[c], film * rough[c]))

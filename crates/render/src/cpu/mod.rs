@@ -5,7 +5,6 @@ mod clock;
 mod compose;
 mod haze;
 mod plate;
-mod plate_mirror;
 mod shot;
 mod snapshot;
 

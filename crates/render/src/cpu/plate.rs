@@ -11,7 +11,6 @@ use bansho_base::{
 };
 use rayon::prelude::*;
 
-use super::plate_mirror::MirrorImage;
 use crate::{backend::RenderError, plan::Plan, scene::DepthKind};
 
 /// A plate, as large as the picture with its overscan.
@@ -21,8 +20,6 @@ pub(super) struct PlateFrame {
     pub(super) colour: Option<Image<4>>,
     /// Depth as the camera's lens measures it, m.
     pub(super) depth: Option<Image<1>>,
-    /// What level ground mirrors of it.
-    pub(super) mirror: MirrorImage,
 }
 
 /// Keeps the last plate, since most shots stand before a single picture.
@@ -83,7 +80,7 @@ fn load(plan: &Plan, number: i64, camera: &Camera) -> Result<PlateFrame, RenderE
             Some(fit_depth(plan, camera, depth.depth.as_ref().ok_or_else(missing)?, size(depth)[0], &fit))
         }
     };
-    Ok(PlateFrame { colour: Some(fit_colour(plan, &picture, &fit)), depth, mirror: MirrorImage::default() })
+    Ok(PlateFrame { colour: Some(fit_colour(plan, &picture, &fit)), depth })
 }
 
 /// How the picture's pixels fall on the plate's: the plate fills the picture, centred, its longer side cut.

@@ -85,7 +85,7 @@ impl CpuShot {
         let preparing = StageGuard::begin(observer, Stage::Prepare);
         let publications: Vec<Publication> =
             self.phenomena.par_iter().map(|phenomenon| phenomenon.publish(view.shutter)).collect();
-        let reflection = self.reflection(view, plate, &publications, observer)?;
+        let reflection = self.reflection(view, &publications, observer)?;
         let surroundings = self.surroundings(view, &publications, reflection.as_ref());
         let all: Vec<usize> = (0..self.phenomena.len()).collect();
         let (slices, prepared) = self.prepare(&all, view, &surroundings, observer)?;
@@ -127,12 +127,10 @@ impl CpuShot {
             .collect()
     }
 
-    /// Everything but the first mirror, as it is seen in that mirror: radiance and alpha of the whole picture. Of a plate it is what
-    /// the plate's depth tells.
+    /// Everything but the first mirror, as it is seen in that mirror: radiance and alpha of the whole picture.
     fn reflection(
         &self,
         view: &View,
-        plate: &PlateFrame,
         publications: &[Publication],
         observer: &dyn Observer,
     ) -> Result<Option<Image<4>>, RenderError> {
@@ -140,7 +138,6 @@ impl CpuShot {
         let Some((mirror, height)) = mirrors.filter_map(|(i, each)| Some((i, each.mirror()?))).next() else {
             return Ok(None);
         };
-        let plate = plate.mirrored(&view.camera, height);
         let view = view.mirrored(height);
         let surroundings = self.surroundings(&view, publications, None);
         let seen: Vec<usize> = (0..self.phenomena.len()).filter(|&index| index != mirror).collect();
@@ -151,7 +148,7 @@ impl CpuShot {
             phenomena: &self.phenomena,
             prepared: &prepared,
             slices: &slices,
-            plate,
+            plate: &PlateFrame::default(),
         };
         Ok(Some(compose::frame(&composition, self.plan.header(self.number), None, observer)?.beauty))
     }
