@@ -39,19 +39,37 @@ const STRAY: f64 = 0.02;
 
 /// Share of a lamp's light that a lens scatters around its image.
 const GLARE: f64 = 0.01;
-/// Angles between which that light falls with the square of the angle, as in the eye (Stiles & Holladay): it is even within
-/// the one and ends at the other, radians.
+/// Angles between which that light falls with the square of the angle, as in the eye (Stiles & Holladay): it is even within the one, or
+/// within the lamp if that looks larger, and ends at the other, radians.
 const GLARE_ANGLES: [f64; 2] = [0.002, 0.12];
 
 /// Radiance of the glare at an angle from a lamp for each lux that arrives from it: `k / (theta^2 + a^2)`, brought to 0 at its end.
-fn glare(angle: f64) -> f64 {
-    let [core, end] = GLARE_ANGLES.map(|angle| angle * angle);
-    let square = angle * angle;
-    let fade = (1.0 - square / end).max(0.0);
-    // Of (1 - s/e)^2 / (s + c) over pi ds: (1 + c/e)^2 ln(1 + e/c) - c/e - 3/2.
-    let ratio = core / end;
-    let whole = std::f64::consts::PI * ((1.0 + ratio) * (1.0 + ratio) * math::ln(1.0 + 1.0 / ratio) - ratio - 1.5);
-    GLARE * fade * fade / ((square + core) * whole)
+#[derive(Clone, Copy, Debug)]
+struct Glare {
+    /// a^2.
+    core: f64,
+    /// k.
+    strength: f64,
+}
+
+impl Glare {
+    /// Square of the angle at which it ends.
+    const END: f64 = GLARE_ANGLES[1] * GLARE_ANGLES[1];
+
+    /// The glare of a lamp that looks so large, radians.
+    fn new(radius: f64) -> Self {
+        let core = radius.clamp(GLARE_ANGLES[0], GLARE_ANGLES[1]);
+        let ratio = core * core / Self::END;
+        // Of (1 - s/e)^2 / (s + c) over pi ds: (1 + c/e)^2 ln(1 + e/c) - c/e - 3/2.
+        let whole = std::f64::consts::PI * ((1.0 + ratio) * (1.0 + ratio) * math::ln(1.0 + 1.0 / ratio) - ratio - 1.5);
+        Self { core: core * core, strength: GLARE / whole }
+    }
+
+    fn at(&self, angle: f64) -> f64 {
+        let square = angle * angle;
+        let fade = (1.0 - square / Self::END).max(0.0);
+        self.strength * fade * fade / (square + self.core)
+    }
 }
 
 /// A ball of radius r that sends I candela toward the camera has the luminance I / (pi r^2).
@@ -198,11 +216,13 @@ impl PreparedLamps<'_> {
     /// Adds the glare of a lamp wherever nothing of the plate stands before that lamp.
     fn add_glare(&self, disc: &Disc, strip: &mut Strip) {
         let rect = disc.glare_bounds(self.view).intersection(&strip.rect);
+        let focal = self.view.camera.focal_pixels;
+        let glare = Glare::new(disc.radius / focal);
         for y in rect.y..rect.bottom() {
             for x in rect.x..rect.right() {
                 let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
                 let away = (DVec2::new(x as f64, y as f64) + 0.5 - disc.centre).length();
-                let share = glare(away / self.view.camera.focal_pixels) as f32;
+                let share = glare.at(away / focal) as f32;
                 if share > 0.0 && strip.visible(index, disc.depth as f32) {
                     strip.emit(index, disc.illuminance.map(|value| value * share), f32::INFINITY);
                 }
@@ -274,13 +294,18 @@ mod tests {
     #[test]
     fn glare_is_a_hundredth_of_the_light_and_falls_with_the_square_of_the_angle() {
         let (steps, end) = (200_000, GLARE_ANGLES[1]);
-        let ring = |i: u32| {
-            let angle = end * (f64::from(i) + 0.5) / f64::from(steps);
-            glare(angle) * 2.0 * std::f64::consts::PI * angle * end / f64::from(steps)
-        };
-        let whole: f64 = (0..steps).map(ring).sum();
-        assert!((whole / GLARE - 1.0).abs() < 1e-4, "{whole}");
-        assert!((glare(0.02) / glare(0.01) - 0.25).abs() < 0.02 && glare(end) == 0.0);
+        for radius in [0.0, 0.01, 0.05] {
+            let glare = Glare::new(radius);
+            let ring = |i: u32| {
+                let angle = end * (f64::from(i) + 0.5) / f64::from(steps);
+                glare.at(angle) * 2.0 * std::f64::consts::PI * angle * end / f64::from(steps)
+            };
+            let whole: f64 = (0..steps).map(ring).sum();
+            assert!((whole / GLARE - 1.0).abs() < 1e-4, "{radius}: {whole}");
+            assert_eq!(glare.at(end), 0.0);
+        }
+        let small = Glare::new(0.0);
+        assert!((small.at(0.02) / small.at(0.01) - 0.25).abs() < 0.02);
     }
 
     #[test]

@@ -208,12 +208,24 @@ impl Cut {
         // The shutter's end comes early for a drop that ends on the way; cameras hardly move in between.
         let (from, to) = (open.project(from)?, close.project(to)?);
         let depth = 0.5 * (from.depth + to.depth);
-        let radius = 0.25e-3 * diameter_mm * (from.pixels_per_metre + to.pixels_per_metre);
+        let scale = 0.5 * (from.pixels_per_metre + to.pixels_per_metre);
+        let radius = 0.5e-3 * diameter_mm * scale;
         let area = std::f64::consts::PI * radius * radius * stretch(moment.sight.middle(), &self.flight, depth);
         let ends = [from.pixel, to.pixel].map(|pixel| pixel.as_vec2().to_array());
-        let way = Way { ends, radius: radius as f32, hidden: (area * self.share * gain) as f32 };
+        let blurred = radius + blur(depth) * scale;
+        let way = Way { ends, radius: blurred as f32, hidden: (area * self.share * gain) as f32 };
         Some(Stroke::new(way, depth as f32, diameter_mm as f32))
     }
+}
+
+/// By how much a lens that is focused on a metre or beyond spreads what is nearer, m at its place: the drop hides as much of the picture, but
+/// more thinly.
+fn blur(depth: f64) -> f64 {
+    /// Radius of the pupil, m: that of a 24 mm lens at f/3.
+    const PUPIL: f64 = 4e-3;
+    /// m.
+    const FOCUS: f64 = 1.0;
+    PUPIL * (1.0 - depth / FOCUS).clamp(0.0, 1.0)
 }
 
 /// How many times more of the picture a ball covers because a flat picture stretches toward its corners.
