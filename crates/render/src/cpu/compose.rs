@@ -13,7 +13,7 @@ use super::{accumulate::Accumulator, plate::PlateFrame};
 use crate::{plan::Plan, scene::check::PLATE_LAYER, slices::Slice};
 
 /// Rows of a strip: the planes of a 1920-pixel strip stay within a core's second-level cache.
-pub(super) const STRIP_ROWS: usize = 16;
+pub(super) const STRIP_ROWS: usize = 8;
 
 /// What a frame is to hold.
 #[derive(Clone, Copy, Debug)]
