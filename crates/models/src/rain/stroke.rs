@@ -52,7 +52,7 @@ pub(crate) fn disc_share(t: f32) -> f32 {
 
 /// Lines across a streak that are drawn at a time: the rows of a band.
 const LINES: usize = BAND;
-const _: () = assert!(STRETCH % LINES == 0);
+const _: () = assert!(STRETCH.is_multiple_of(LINES));
 
 impl Stroke {
     /// The streak of a drop, still without light.
