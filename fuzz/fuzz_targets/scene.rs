@@ -2,7 +2,7 @@
 #![no_main]
 
 use bansho_base::assets::MemoryAssets;
-use bansho_fuzz::draw_small;
+use bansho_fuzz::{draw_small, one_thread};
 use bansho_render::{
     Scene,
     phenomena::KINDS,
@@ -10,6 +10,7 @@ use bansho_render::{
 };
 
 libfuzzer_sys::fuzz_target!(|text: &str| {
+    one_thread();
     edit(text);
     match Scene::parse("fuzz.toml", text, KINDS, &MemoryAssets::default()) {
         Ok(scene) => draw_small(scene, MemoryAssets::default()),

@@ -5,10 +5,11 @@ use bansho_base::{
     assets::MemoryAssets,
     parameters::{self, Table},
 };
-use bansho_fuzz::draw_small;
+use bansho_fuzz::{draw_small, one_thread};
 use bansho_render::{Scene, phenomena::KINDS, scene::SHARED_TABLES};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    one_thread();
     let mut pairs = bytes.chunks_exact(2);
     let mut uniform = || pairs.next().map_or(0.75, |pair| f64::from(u16::from_le_bytes([pair[0], pair[1]])) / 65536.0);
     let mut text = String::from("bansho = 1\n");

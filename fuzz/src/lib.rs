@@ -27,8 +27,11 @@ impl Observer for Deadline {
     }
 }
 
-/// One thread, so that the same input takes the same way through the code each time.
-fn one_thread() {
+/// One thread, so that the same input takes the same way through the code each time; to be called before anything else.
+///
+/// # Panics
+/// Work was given to threads before.
+pub fn one_thread() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
