@@ -38,9 +38,13 @@ impl<const N: usize> Animate for [f64; N] {
     }
 }
 
-/// A constant, or a value keyed over time; before the first key and after the last, their values hold. Times are seconds.
+/// A constant, or a value keyed over time; before the first key and after the last, their values hold, unless it repeats. Times are
+/// seconds.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Animated<T>(Motion<T>);
+pub struct Animated<T> {
+    motion: Motion<T>,
+    period: Option<f64>,
+}
 
 #[derive(Clone, Debug, PartialEq)]
 enum Motion<T> {
@@ -51,7 +55,7 @@ enum Motion<T> {
 
 impl<T: Animate> From<T> for Animated<T> {
     fn from(value: T) -> Self {
-        Self(Motion::Constant(value))
+        Self { motion: Motion::Constant(value), period: None }
     }
 }
 
@@ -66,27 +70,49 @@ impl<T: Animate> Animated<T> {
             Curve::new(points, interpolation)
         };
         let curves: Vec<Curve> = (0..T::COMPONENTS).map(curve).collect::<Result<_, _>>()?;
-        Ok(Self(Motion::Keyed(curves)))
+        Ok(Self { motion: Motion::Keyed(curves), period: None })
+    }
+
+    /// Makes it repeat what it does between 0 and `period` (s, above 0); says whether it ends there as it began.
+    pub fn close(&mut self, period: f64) -> bool {
+        self.period = None;
+        let closes = self.at(0.0) == self.at(period);
+        self.period = Some(period);
+        closes
     }
 
     /// Value at time `t`.
     pub fn at(&self, t: f64) -> T {
+        let (_, t) = self.turns(t);
         self.each(|value| value, |curve| curve.eval(t))
     }
 
     /// Change a second at time `t`; see [`Curve::derivative`].
     pub fn rate(&self, t: f64) -> T {
+        let (_, t) = self.turns(t);
         self.each(|_| 0.0, |curve| curve.derivative(t))
     }
 
     /// Integral over time from `from` to `to`, exact but for rounding: the way that a keyed speed covers, so that any frame alone is right.
     pub fn integral(&self, from: f64, to: f64) -> T {
-        self.each(|value| value * (to - from), |curve| curve.integral(from, to))
+        let keyed = |curve: &Curve| {
+            let Some(period) = self.period else { return curve.integral(from, to) };
+            let [(before, from), (after, to)] = [from, to].map(|t| self.turns(t));
+            (after - before).mul_add(curve.integral(0.0, period), curve.integral(from, to))
+        };
+        self.each(|value| value * (to - from), keyed)
+    }
+
+    /// Whole periods before time `t`, and the time within its period.
+    fn turns(&self, t: f64) -> (f64, f64) {
+        let Some(period) = self.period else { return (0.0, t) };
+        let turns = (t / period).floor();
+        (turns, t - turns * period)
     }
 
     /// The value, if it never changes: no keys, or keys that all agree.
     pub fn constant(&self) -> Option<T> {
-        match &self.0 {
+        match &self.motion {
             Motion::Constant(value) => Some(*value),
             Motion::Keyed(_) => {
                 let [low, high] = self.bounds();
@@ -102,7 +128,7 @@ impl<T: Animate> Animated<T> {
 
     /// Keys (time, value), ascending; none for a constant.
     pub fn keys(&self) -> Vec<(f64, T)> {
-        match &self.0 {
+        match &self.motion {
             Motion::Keyed(curves) if !curves.is_empty() => {
                 let key = |index: usize| {
                     let time = curves[0].points()[index][0];
@@ -116,7 +142,7 @@ impl<T: Animate> Animated<T> {
 
     /// How values between keys are found; a constant says [`Interpolation::Step`].
     pub fn interpolation(&self) -> Interpolation {
-        match &self.0 {
+        match &self.motion {
             Motion::Keyed(curves) if !curves.is_empty() => curves[0].interpolation(),
             Motion::Keyed(_) | Motion::Constant(_) => Interpolation::Step,
         }
@@ -124,7 +150,7 @@ impl<T: Animate> Animated<T> {
 
     /// The value whose components are `constant` of a constant's, or `keyed` of the curves.
     fn each(&self, constant: impl Fn(f64) -> f64, keyed: impl Fn(&Curve) -> f64) -> T {
-        match &self.0 {
+        match &self.motion {
             Motion::Constant(value) => T::from_components(|index| constant(value.component(index))),
             Motion::Keyed(curves) => T::from_components(|index| keyed(&curves[index])),
         }
@@ -144,6 +170,20 @@ mod tests {
         assert_eq!(constant.constant(), Some([1.0, 2.0, 3.0]));
         assert_eq!(constant.bounds(), [[1.0, 2.0, 3.0]; 2]);
         assert!(constant.keys().is_empty());
+    }
+
+    #[test]
+    fn what_repeats_has_the_same_values_and_integrals_in_every_period() {
+        let once = Animated::keyed(vec![(0.0, 1.0), (1.0, 3.0), (4.0, 1.0)], Interpolation::Linear).unwrap();
+        let mut repeating = once.clone();
+        assert!(!repeating.close(3.0) && repeating.close(4.0));
+        for t in [0.0, 0.5, 1.0, 2.75] {
+            assert_eq!([-8.0, -4.0, 0.0, 4.0].map(|turn| repeating.at(t + turn)), [once.at(t); 4]);
+            assert_eq!(repeating.rate(t + 4.0), once.rate(t));
+        }
+        // The mean is 2: 3 s from the second half of a period into the next but one.
+        assert_eq!(repeating.integral(2.0, 2.0 + 12.0), 24.0);
+        assert_eq!(repeating.integral(-1.0, 1.0), once.integral(3.0, 4.0) + once.integral(0.0, 1.0));
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! What phenomena draw into: strips of a picture that no two threads share.
 
+use std::sync::Arc;
+
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 use crate::{
@@ -78,6 +80,8 @@ pub struct View {
     pub mirror: Option<f64>,
     /// Luminance that a display will show as white, cd/m^2, where it is known: what is far below needs no drawing.
     pub white_luminance: Option<f64>,
+    /// In a loop: the same at the time of the turn before or after, whichever is nearer, for runs that pass from one turn to the next.
+    pub other_turn: Option<Arc<Self>>,
 }
 
 impl View {
@@ -95,13 +99,39 @@ impl View {
             window: Rect::of_size(size[0], size[1]),
             mirror: None,
             white_luminance: None,
+            other_turn: None,
         }
+    }
+
+    /// The view of another part of the picture.
+    pub fn through(self, window: Rect) -> Self {
+        self.and_other_turn(|view| view.window = window)
+    }
+
+    /// The view within a loop of `turn` seconds.
+    pub fn in_loop(self, turn: f64) -> Self {
+        let by = if self.shutter.middle() < 0.5 * turn { turn } else { -turn };
+        let shutter = Shutter { open: self.shutter.open + by, close: self.shutter.close + by };
+        let other = Self { shutter, next_middle: self.next_middle + by, ..self.clone() };
+        Self { other_turn: Some(Arc::new(other)), ..self }
+    }
+
+    /// The view after `change`, made at the other time too.
+    fn and_other_turn(mut self, change: impl Fn(&mut Self)) -> Self {
+        change(&mut self);
+        if let Some(other) = &mut self.other_turn {
+            change(Arc::make_mut(other));
+        }
+        self
     }
 
     /// The whole picture as it is seen in a level mirror at `height`, m.
     pub fn mirrored(&self, height: f64) -> Self {
-        let window = Rect::of_size(self.size[0], self.size[1]);
-        Self { camera: self.camera.mirrored(height), window, mirror: Some(height), ..self.clone() }
+        let mirrored = self.clone().and_other_turn(|view| {
+            view.camera = view.camera.mirrored(height);
+            view.mirror = Some(height);
+        });
+        mirrored.through(Rect::of_size(self.size[0], self.size[1]))
     }
 
     /// The camera at time `t`.
@@ -183,6 +213,15 @@ impl AovPlane {
         add(&mut self.weights, &other.weights);
     }
 
+    /// Its samples count `share`, those of another plane of the same size and AOV the rest.
+    fn dissolve(&mut self, other: &Self, share: f32, rule: AovRule) {
+        if rule == AovRule::Nearest {
+            return self.add_plane(other, rule);
+        }
+        mix(&mut self.values, &other.values, share);
+        mix(&mut self.weights, &other.weights, share);
+    }
+
     /// Makes it an empty plane of so many pixels.
     pub fn reset(&mut self, pixels: usize) {
         reset(&mut self.values, pixels, 0.0);
@@ -224,7 +263,7 @@ pub struct GrayPlanes<'a> {
 }
 
 /// How many planes of T hold something.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 enum Absorption {
     /// None: T is 1.
     #[default]
@@ -233,6 +272,21 @@ enum Absorption {
     Gray,
     /// All three.
     Coloured,
+}
+
+impl Absorption {
+    fn planes(self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::Gray => 1,
+            Self::Coloured => 3,
+        }
+    }
+}
+
+/// Of each value `share`, and the rest of the other.
+fn mix(values: &mut [f32], others: &[f32], share: f32) {
+    values.iter_mut().zip(others).for_each(|(value, other)| *value = share.mul_add(*value - other, *other));
 }
 
 fn reset(plane: &mut Vec<f32>, pixels: usize, value: f32) {
@@ -328,11 +382,43 @@ impl Strip {
         })
     }
 
+    fn absorb_as(&mut self, absorption: Absorption) {
+        match absorption {
+            Absorption::None => {}
+            Absorption::Gray => self.begin_gray(),
+            Absorption::Coloured => _ = self.transmittance_planes_mut(),
+        }
+    }
+
     fn begin_gray(&mut self) {
         if self.absorption == Absorption::None {
             let pixels = self.len();
             reset(&mut self.transmittance[0], pixels, 1.0);
             self.absorption = Absorption::Gray;
+        }
+    }
+
+    /// An empty strip over the same pixels before the same plate.
+    pub fn emptied(&self) -> Self {
+        let mut empty = Self::default();
+        empty.reset(self.rect, None, self.aovs.len());
+        empty.plate_depth.clone_from(&self.plate_depth);
+        empty
+    }
+
+    /// Makes it the mean of itself, which counts `share`, and another strip over the same pixels: as one take dissolves into the next.
+    pub fn dissolve(&mut self, mut other: Self, share: f32, aovs: &[AovDescriptor]) {
+        for (own, other) in self.radiance.iter_mut().zip(&other.radiance) {
+            mix(own, other, share);
+        }
+        let absorption = self.absorption.max(other.absorption);
+        self.absorb_as(absorption);
+        other.absorb_as(absorption);
+        let planes = self.transmittance.iter_mut().zip(&other.transmittance);
+        planes.take(absorption.planes()).for_each(|(own, other)| mix(own, other, share));
+        self.depth.iter_mut().zip(&other.depth).for_each(|(own, other)| *own = own.min(*other));
+        for ((own, other), aov) in self.aovs.iter_mut().zip(&other.aovs).zip(aovs) {
+            own.dissolve(other, share, aov.rule);
         }
     }
 
@@ -447,6 +533,26 @@ mod tests {
         assert_eq!((gray.transmittance(0), gray.transmittance(1)), ([0.75; 3], [0.5; 3]));
         gray.add_behind(1, [0.0; 3], [1.0, 0.5, 0.0], 3.0);
         assert_eq!((gray.transmittance(0), gray.transmittance(1)), ([0.75; 3], [0.5, 0.25, 0.0]));
+    }
+
+    #[test]
+    fn dissolves_mix_light_and_transmittance_and_keep_what_is_nearest() {
+        let mut strip = Strip::default();
+        strip.reset(Rect::of_size(1, 1), Some(&|_| &[9.0]), 2);
+        let mut other = strip.emptied();
+        assert_eq!((other.rect, other.plate_depth(0), other.aovs.len()), (strip.rect, 9.0, 2));
+        strip.add_behind(0, [8.0; 3], [1.0; 3], 2.0);
+        strip.aovs[0].add(0, 100.0, 1.0);
+        strip.aovs[1].keep_nearest(0, 5.0, 2.0);
+        other.add_behind(0, [0.0, 4.0, 16.0], [0.0, 0.5, 1.0], 1.0);
+        other.aovs[0].add(0, 20.0, 3.0);
+        other.aovs[1].keep_nearest(0, 7.0, 1.0);
+        let aov = |rule| AovDescriptor { name: "", unit: "", doc: "", rule };
+        strip.dissolve(other, 0.75, &[aov(AovRule::WeightedMean), aov(AovRule::Nearest)]);
+        assert_eq!(strip.radiance.map(|plane| plane[0]), [6.0, 7.0, 10.0]);
+        assert_eq!((strip.transmittance[0][0], strip.transmittance[1][0], strip.depth[0]), (0.75, 0.875, 1.0));
+        assert_eq!(strip.aovs[0].resolve(0, AovRule::WeightedMean), (75.0 + 15.0) / 1.5);
+        assert_eq!(strip.aovs[1].resolve(0, AovRule::Nearest), 7.0);
     }
 
     #[test]

@@ -15,6 +15,8 @@ pub struct Stepping {
     pub step: f64,
     /// How long it runs before time 0, so that it begins developed, s.
     pub preroll: f64,
+    /// In a loop: for how long one run of it passes into the next, s. The preroll is then longer by half of that.
+    pub dissolve: f64,
 }
 
 /// Why a snapshot cannot be restored.

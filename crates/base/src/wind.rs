@@ -43,7 +43,7 @@ pub struct Wind {
 
 impl Wind {
     /// The wind with these parameters; in a loop it blows the same every `loop_s` seconds.
-    pub fn new(parameters: WindParameters, seed: u64, loop_s: Option<f64>) -> Self {
+    pub fn new(mut parameters: WindParameters, seed: u64, loop_s: Option<f64>) -> Self {
         let key = Key::new(seed, "wind");
         let words = key.words(0, 0, Purpose::named("gusts"));
         let period = loop_s.map_or(0, |seconds| loop_cells(seconds, parameters.gust_period_s));
@@ -55,6 +55,9 @@ impl Wind {
         let origin = DVec3::from(
             key.uniforms(1, 0, Purpose::named("gusts")).first_chunk().map_or([0.0; 3], |u: &[f32; 3]| u.map(f64::from)),
         );
+        if let Some(seconds) = loop_s {
+            parameters.velocity.close(seconds);
+        }
         Self { parameters, gusts, origin: origin * 64.0, loop_s }
     }
 

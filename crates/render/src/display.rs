@@ -23,14 +23,14 @@ const TASK_ROWS: usize = 16;
 /// The frame's beauty as display pixels: view, alpha by the largest of alpha and light, sRGB encoding, dither.
 pub fn display(frame: &Frame, view: &View, depth: BitDepth) -> DisplayImage {
     let pixels = match depth {
-        BitDepth::Eight => DisplayPixels::Eight(rows(frame, view)),
-        BitDepth::Sixteen => DisplayPixels::Sixteen(rows(frame, view)),
+        BitDepth::Eight => DisplayPixels::Eight(codes(frame, view)),
+        BitDepth::Sixteen => DisplayPixels::Sixteen(codes(frame, view)),
     };
     DisplayImage { width: frame.beauty.width(), height: frame.beauty.height(), opaque: frame.opaque, pixels }
 }
 
-/// Dither goes by the place in the whole picture, so that a crop shows the same pixels.
-fn rows<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View) -> Vec<[C; 4]> {
+/// Pixels as display codes, row after row. Dither goes by the place in the whole picture, so that a crop shows the same pixels.
+pub(crate) fn codes<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View) -> Vec<[C; 4]> {
     let level = Level::new();
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     let [x0, y0] = frame.header.data_origin;

@@ -3,6 +3,7 @@
 pub mod backend;
 mod cpu;
 pub mod display;
+mod dissolving;
 pub mod fingerprint;
 pub mod frames;
 pub mod phenomena;

@@ -14,6 +14,7 @@ use bansho_base::{
 };
 
 use crate::{
+    dissolving::Dissolving,
     fingerprint, phenomena,
     scene::{FrameRate, ObstacleParameters, Opening, OpeningFault, Scene},
 };
@@ -103,6 +104,8 @@ pub struct Plan {
     pub seed: u64,
     /// Length of the seamless loop, s: a whole number of frames.
     pub loop_s: Option<f64>,
+    /// Frames from the beginning of the loop's turn to the first one.
+    pub loop_start: i64,
     /// Exposure, chosen once for the shot.
     pub exposure_ev100: f32,
     /// Whether each phenomenon gets a layer of its own.
@@ -136,6 +139,7 @@ impl Plan {
             size,
             seed,
             loop_s,
+            loop_start: 0,
             exposure_ev100: 0.0,
             layers: options.layers,
             aovs: options.aovs,
@@ -146,8 +150,12 @@ impl Plan {
             assets,
             scene,
         };
-        plan.check_loop()?;
+        plan.close_loop()?;
         plan.exposure_ev100 = plan.exposure(&plan.open()?);
+        if plan.loop_s.is_some() {
+            // What cannot be drawn here will say so when it is drawn.
+            plan.loop_start = crate::cpu::calmest_start(&plan).unwrap_or_default();
+        }
         Ok(plan)
     }
 
@@ -156,13 +164,18 @@ impl Plan {
     /// # Errors
     /// A phenomenon cannot be made.
     pub fn open(&self) -> Result<Vec<Box<dyn Phenomenon>>, PlanError> {
-        let open = |instance: &crate::scene::Instance| {
+        let open = |instance: &crate::scene::Instance| -> Result<Box<dyn Phenomenon>, PlanError> {
             let opening =
                 Opening { name: &instance.name, seed: self.seed, loop_s: self.loop_s, assets: self.assets.as_ref() };
-            instance.source.open(&opening).map_err(|fault| opening_error(instance.name.clone(), fault))
+            let make = || instance.source.open(&opening).map_err(|fault| opening_error(instance.name.clone(), fault));
+            let phenomenon = make()?;
+            match (self.loop_s, phenomenon.stepping()) {
+                (Some(turn), Some(stepping)) => Ok(Box::new(Dissolving::new(turn, stepping, [phenomenon, make()?]))),
+                _ => Ok(phenomenon),
+            }
         };
         let enabled = self.scene.instances.iter().filter(|instance| instance.enabled);
-        let mut phenomena: Vec<Box<dyn Phenomenon>> = enabled.map(open).collect::<Result<_, _>>()?;
+        let mut phenomena = enabled.map(open).collect::<Result<Vec<_>, _>>()?;
         phenomena.extend(phenomena::of_scene(self));
         Ok(phenomena)
     }
@@ -190,12 +203,12 @@ impl Plan {
         first..first + count
     }
 
-    /// When frame `number` begins, s; a loop begins again.
+    /// When frame `number` begins, s; a loop begins again, at a calm moment of its turn.
     pub fn time(&self, number: i64) -> f64 {
         let index = number - self.scene.picture.first_frame;
         let fps = self.fps();
         let index = match self.loop_s {
-            Some(_) => index.rem_euclid(self.frames().end - self.frames().start),
+            Some(_) => (index + self.loop_start).rem_euclid(self.frames().end - self.frames().start),
             None => index,
         };
         index as f64 * f64::from(fps.seconds) / f64::from(fps.frames)
@@ -214,9 +227,12 @@ impl Plan {
         let overscan = self.scene.picture.overscan as usize;
         let next = shutter.middle() + self.fps().frame_s();
         let mut view = View::new(self.scene.camera.clone(), shutter, next, self.size, overscan);
-        view.window = self.window;
         view.white_luminance = Some(color::white_luminance(f64::from(self.exposure_ev100)));
-        view
+        let view = view.through(self.window);
+        match self.loop_s {
+            Some(turn) => view.in_loop(turn),
+            None => view,
+        }
     }
 
     /// The header of frame `number`.
@@ -250,21 +266,19 @@ impl Plan {
         }
     }
 
-    /// Keyed values must come back to where they began.
-    fn check_loop(&self) -> Result<(), PlanError> {
+    /// Makes keyed values repeat, which must come back to where they began.
+    fn close_loop(&mut self) -> Result<(), PlanError> {
         let Some(seconds) = self.loop_s else { return Ok(()) };
-        let camera = &self.scene.camera;
-        let same = |value: &bansho_base::animation::Animated<f64>| value.at(0.0) == value.at(seconds);
-        let same3 = |value: &bansho_base::animation::Animated<[f64; 3]>| value.at(0.0) == value.at(seconds);
-        let fixed = [
-            ("wind.velocity", same3(&self.scene.wind.velocity)),
-            ("camera.position", same3(&camera.position)),
-            ("camera.target", same3(&camera.target)),
-            ("camera.roll_deg", same(&camera.roll_deg)),
-            ("sky.luminance", self.scene.sky.as_ref().is_none_or(|sky| same(&sky.luminance))),
-            ("ground.wetness", self.scene.ground.as_ref().is_none_or(|ground| same(&ground.wetness))),
+        let scene = &mut self.scene;
+        let closed = [
+            ("wind.velocity", scene.wind.velocity.close(seconds)),
+            ("camera.position", scene.camera.position.close(seconds)),
+            ("camera.target", scene.camera.target.close(seconds)),
+            ("camera.roll_deg", scene.camera.roll_deg.close(seconds)),
+            ("sky.luminance", scene.sky.as_mut().is_none_or(|sky| sky.luminance.close(seconds))),
+            ("ground.wetness", scene.ground.as_mut().is_none_or(|ground| ground.wetness.close(seconds))),
         ];
-        match fixed.into_iter().find(|(_, same)| !same) {
+        match closed.into_iter().find(|(_, closed)| !closed) {
             Some((what, _)) => Err(PlanError::LoopJumps { seconds, what }),
             None => Ok(()),
         }

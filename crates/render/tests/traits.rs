@@ -9,7 +9,6 @@ use std::sync::{
 };
 
 use bansho_base::{
-    assets::MemoryAssets,
     color::View,
     image::{DisplayPixels, Frame, Rect},
     math,
@@ -322,16 +321,4 @@ fn overscan_adds_pixels_around_the_same_picture() {
     assert_eq!(wide.header.data_origin, [-10, -10]);
     let inner = wide.beauty.crop(Rect { x: 10, y: 10, width: 120, height: 90 }).unwrap();
     assert_eq!(inner, plain.beauty);
-}
-
-#[test]
-fn a_loop_comes_back_and_refuses_what_jumps() {
-    let options = PlanOptions { loop_s: Some(1.0), ..PlanOptions::default() };
-    let looped = plan(&fogged(2.0), &options);
-    assert_eq!(looped.frames(), 0..24);
-    assert_eq!(looped.time(24), looped.time(0));
-    let keyed = format!("{}[wind]\nvelocity = {{ keys = [[0, [0, 0, 0]], [9, [3, 0, 0]]] }}\n", fogged(2.0));
-    let scene = parse(&keyed, &MemoryAssets::default()).unwrap();
-    let error = bansho_render::Plan::new(scene, &options, Arc::new(MemoryAssets::default())).err().unwrap();
-    assert!(error.to_string().contains("wind.velocity"), "{error}");
 }

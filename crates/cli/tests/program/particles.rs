@@ -61,9 +61,19 @@ fn what_has_no_particles_or_no_such_name_is_refused_before_anything_is_written()
     assert!(sheet.stderr.contains("nothing in this scene has particles"), "{}", sheet.stderr);
     folder.write("faulty.toml", "bansho = 1\n[[flame_particles]]\nparticles = -3\n");
     assert_eq!(folder.run(&["simulate", "faulty.toml", "--particles", "gas.ply"]).code, Some(3));
-    let looped = folder.run(&["render", "scene.toml", "--loop", "2"]);
-    assert!(looped.code != Some(0) && looped.stderr.contains("cannot loop"), "{}", looped.stderr);
     assert_eq!(folder.names(), ["faulty.toml", "scene.toml", "sheet.toml"]);
+}
+
+#[test]
+fn a_simulated_loop_is_one_turn_and_refuses_fuel_that_jumps() {
+    let folder = Folder::with_scene(GAS);
+    folder.succeed(&["render", "scene.toml", "--loop", "0.2", "-o", "turn/f.####.png"]);
+    assert_eq!(folder.files("turn").len(), 6);
+    folder
+        .write("jumps.toml", &format!("{GAS}[[flame_particles.burners]]\nflow = {{ keys = [[0, 1], [0.1, 0.5]] }}\n"));
+    let jumps = folder.run(&["render", "jumps.toml", "--loop", "0.2"]);
+    assert_eq!((jumps.code != Some(0), jumps.errors()), (true, 1));
+    assert!(jumps.stderr.contains("burners.0.flow") && jumps.stderr.contains("0.2 s jumps"), "{}", jumps.stderr);
 }
 
 #[test]

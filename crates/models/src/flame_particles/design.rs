@@ -51,12 +51,18 @@ pub(crate) struct Design {
     pub(crate) domain: [DVec3; 2],
     /// How long it burns before the shot, s.
     pub(crate) preroll: f64,
+    /// In a loop: for how long one run passes into the next, s.
+    pub(crate) dissolve: f64,
     /// More than these never live.
     pub(crate) most: usize,
 }
 
 impl Design {
-    pub(crate) fn new(parameters: &FlameParticlesParameters, assets: &dyn Assets) -> Result<Self, ParticleFault> {
+    pub(crate) fn new(
+        parameters: &FlameParticlesParameters,
+        loop_s: Option<f64>,
+        assets: &dyn Assets,
+    ) -> Result<Self, ParticleFault> {
         check_count(parameters.particles)?;
         let burners = burners(parameters, assets)?;
         let domain = domain(parameters, &burners)?;
@@ -76,6 +82,12 @@ impl Design {
         let fastest = burners.iter().map(|burner| burner.speed).fold(0.0, f64::max);
         let sound = parameters.fluid.stiffness * fastest;
         let longest = burners.iter().map(stay).fold(0.0, f64::max);
+        // By then all gas is other gas.
+        let dissolve = loop_s.map_or(0.0, |turn| longest.min(turn));
+        let preroll = match parameters.preroll_s {
+            Auto::Set(seconds) => seconds,
+            Auto::Auto => (2.0 * longest).min(60.0),
+        };
         Ok(Self {
             rates: burners.iter().map(|burner| flux(burner) / volume).collect(),
             puffing_hz: burners.iter().map(|burner| burner.puffing_hz(parameters)).collect(),
@@ -85,10 +97,8 @@ impl Design {
             rest_density: (parameters.fluid.rest_density * density) as f32,
             stiffness_per_kelvin: (sound * sound / coolest) as f32,
             domain,
-            preroll: match parameters.preroll_s {
-                Auto::Set(seconds) => seconds,
-                Auto::Auto => (2.0 * longest).min(60.0),
-            },
+            preroll: preroll + 0.5 * dissolve,
+            dissolve,
             most: 2 * parameters.particles as usize + 16,
             burners,
         })
@@ -148,7 +158,7 @@ mod tests {
     use super::*;
 
     fn design(parameters: &FlameParticlesParameters) -> Result<Design, ParticleFault> {
-        Design::new(parameters, &MemoryAssets::default())
+        Design::new(parameters, None, &MemoryAssets::default())
     }
 
     #[test]

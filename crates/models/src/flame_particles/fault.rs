@@ -59,7 +59,10 @@ pub enum ParticleFaultKind {
     /// A mesh that cannot be had.
     #[error("{0}")]
     Asset(#[from] AssetError),
-    /// A simulation does not come back to where it began.
-    #[error("a particle flame is simulated and cannot loop")]
-    Loop,
+    /// A keyed value that does not end as it begins.
+    #[error("the loop of {seconds} s jumps: its first and its last moment differ")]
+    LoopJumps {
+        /// Length of the loop.
+        seconds: f64,
+    },
 }

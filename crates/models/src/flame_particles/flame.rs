@@ -41,19 +41,19 @@ impl FlameParticles {
     /// The particle flame `name` of a scene, before its preroll. Meshes of burners come from `assets`.
     ///
     /// # Errors
-    /// Parameters that do not go together, a mesh that cannot be had, a seamless loop.
+    /// Parameters that do not go together, a mesh that cannot be had, a flow that does not end a loop as it begins it.
     pub fn new(
-        parameters: FlameParticlesParameters,
+        mut parameters: FlameParticlesParameters,
         name: &str,
         seed: u64,
         loop_s: Option<f64>,
         assets: &dyn Assets,
     ) -> Result<Self, ParticleFault> {
-        if loop_s.is_some() {
-            return Err(ParticleFault { key: "loop".into(), kind: ParticleFaultKind::Loop });
+        if let Some(seconds) = loop_s {
+            close_loop(&mut parameters, seconds)?;
         }
         let key = Key::new(seed, name);
-        let design = Design::new(&parameters, assets)?;
+        let design = Design::new(&parameters, loop_s, assets)?;
         let steps = (design.preroll / parameters.step_s).round();
         Ok(Self {
             name: name.to_owned(),
@@ -96,6 +96,14 @@ impl FlameParticles {
     }
 }
 
+/// Makes what is keyed repeat.
+fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result<(), ParticleFault> {
+    let jumps = parameters.burners.iter_mut().position(|burner| !burner.flow.close(seconds));
+    let fault =
+        |index| ParticleFault { key: format!("burners.{index}.flow"), kind: ParticleFaultKind::LoopJumps { seconds } };
+    jumps.map_or(Ok(()), |index| Err(fault(index)))
+}
+
 /// Speed of gas that draws its detail as it is, beside that of gas half way up.
 const UNSTRETCHED: f64 = 0.35;
 
@@ -125,7 +133,8 @@ impl Phenomenon for FlameParticles {
     }
 
     fn stepping(&self) -> Option<Stepping> {
-        Some(Stepping { step: self.parameters.step_s, preroll: self.simulation.design.preroll })
+        let Design { preroll, dissolve, .. } = self.simulation.design;
+        Some(Stepping { step: self.parameters.step_s, preroll, dissolve })
     }
 
     fn step(&mut self, time: f64, surroundings: &Surroundings) {

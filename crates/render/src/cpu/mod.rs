@@ -1,6 +1,7 @@
 //! The CPU backend: the pictures that all others are compared with.
 
 mod accumulate;
+mod calm;
 mod clock;
 mod compose;
 mod haze;
@@ -15,6 +16,7 @@ use crate::{
     plan::Plan,
 };
 
+pub(crate) use calm::calmest_start;
 pub(crate) use clock::remarks;
 
 /// Draws on the processor, in the rayon pool of the caller. Same plan, same bytes, whatever the threads.

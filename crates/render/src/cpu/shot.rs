@@ -225,7 +225,8 @@ impl Shot for CpuShot {
         let frame = match self.compose(&view, &plate, spent, observer)? {
             Some(frame) => frame,
             None => {
-                view.window = Rect::of_size(view.size[0], view.size[1]);
+                let all = Rect::of_size(view.size[0], view.size[1]);
+                view = view.through(all);
                 let whole = self.compose(&view, &plate, None, observer)?;
                 whole.and_then(|whole| crop(whole, self.plan.window)).ok_or(Cancelled)?
             }

@@ -38,13 +38,16 @@ impl Describe for EmitterParameters {
     const KEY: &'static str = "emitter";
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        let dissolve = opening.loop_s.unwrap_or(0.0);
+        let preroll_s = self.preroll_s + 0.5 * dissolve;
         Ok(Box::new(Emitter {
             name: opening.name.to_owned(),
             key: Key::new(opening.seed, opening.name),
             position: DVec3::from(self.position),
             velocity: DVec3::from(self.velocity),
             steps: 0,
-            parameters: self.clone(),
+            parameters: Self { preroll_s, ..self.clone() },
+            dissolve,
         }))
     }
 }
@@ -59,6 +62,7 @@ struct Emitter {
     name: String,
     key: Key,
     parameters: EmitterParameters,
+    dissolve: f64,
     position: DVec3,
     velocity: DVec3,
     steps: u32,
@@ -85,7 +89,7 @@ impl Phenomenon for Emitter {
     }
 
     fn stepping(&self) -> Option<Stepping> {
-        Some(Stepping { step: STEP, preroll: self.parameters.preroll_s })
+        Some(Stepping { step: STEP, preroll: self.parameters.preroll_s, dissolve: self.dissolve })
     }
 
     fn step(&mut self, _time: f64, _surroundings: &Surroundings) {

@@ -27,7 +27,7 @@ use crate::aurora::{
     AuroraParameters,
     particles::AuroraSimulation,
     precipitation::fall::Falls,
-    shapes::{Sequence, ShapeFault},
+    shapes::{Sequence, ShapeFault, ShapeFaultKind},
 };
 
 /// Sheets are thin: their bright parts seen aslant beside what looks straight up through one.
@@ -47,21 +47,39 @@ pub struct Aurora {
     pub(super) collisions: Option<Collisions>,
     /// How far collisions wander from their field line, km.
     wander_km: f64,
+    /// In a loop: for how long one run passes into the next, s.
+    dissolve: f64,
+}
+
+/// Longest dissolve in a loop, s: by then particles have gone a long way along their sheets.
+const LONGEST_DISSOLVE_S: f64 = 10.0;
+
+/// Makes what is keyed repeat after `turn` seconds, and room in the preroll for half the dissolve that it gives.
+fn close_loop(parameters: &mut AuroraParameters, turn: f64) -> Result<f64, ShapeFault> {
+    let closed = [("flux_mw_per_m2", &mut parameters.flux_mw_per_m2), ("energy_ev", &mut parameters.energy_ev)]
+        .map(|(key, value)| (key, value.close(turn)));
+    if let Some((key, _)) = closed.into_iter().find(|(_, closes)| !closes) {
+        return Err(ShapeFault { key: key.into(), kind: ShapeFaultKind::LoopJumps { seconds: turn } });
+    }
+    let dissolve = turn.min(LONGEST_DISSOLVE_S);
+    parameters.preroll_s += 0.5 * dissolve;
+    Ok(dissolve)
 }
 
 impl Aurora {
     /// The aurora `name` of a scene; drawings of its shapes come from `assets`.
     ///
     /// # Errors
-    /// Shapes that are no aurora's.
+    /// Shapes that are no aurora's, flux or energy that do not end a loop as they begin it.
     pub fn new(
-        parameters: AuroraParameters,
+        mut parameters: AuroraParameters,
         name: &str,
         seed: u64,
         loop_s: Option<f64>,
         assets: &dyn Assets,
     ) -> Result<Self, ShapeFault> {
         let sequence = Sequence::new(&parameters.shapes, &parameters.motion, parameters.extent_km, assets, loop_s)?;
+        let dissolve = loop_s.map_or(Ok(0.0), |turn| close_loop(&mut parameters, turn))?;
         let simulation = AuroraSimulation::new(parameters, sequence, name, seed);
         let parameters = simulation.parameters();
         let falls = Falls::new(simulation.emission().deposition(), 0.0);
@@ -78,6 +96,7 @@ impl Aurora {
             shading: Shading::new(&parameters.drawing.air),
             wander_km: wander_km(&fall.collect::<Vec<_>>(), parameters.drawing.wobble),
             simulation,
+            dissolve,
         })
     }
 
@@ -151,7 +170,8 @@ impl Phenomenon for Aurora {
     }
 
     fn stepping(&self) -> Option<Stepping> {
-        Some(Stepping { step: AuroraSimulation::STEP_S, preroll: self.simulation.parameters().preroll_s })
+        let preroll = self.simulation.parameters().preroll_s;
+        Some(Stepping { step: AuroraSimulation::STEP_S, preroll, dissolve: self.dissolve })
     }
 
     fn step(&mut self, _time: f64, _surroundings: &Surroundings) {

@@ -157,6 +157,12 @@ pub enum ShapeFaultKind {
         /// The length asked for, s.
         seconds: f64,
     },
+    /// A keyed value that does not end as it begins.
+    #[error("the loop of {seconds} s jumps: its first and its last moment differ")]
+    LoopJumps {
+        /// Length of the loop, s.
+        seconds: f64,
+    },
     /// A drawing that cannot be had.
     #[error("{0}")]
     Asset(#[from] AssetError),

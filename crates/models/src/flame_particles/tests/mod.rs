@@ -17,7 +17,7 @@ use bansho_base::{
 use super::{design::Design, parameters::FlameParticlesParameters, simulation::Simulation};
 
 fn simulation(parameters: &FlameParticlesParameters) -> Simulation {
-    let design = Design::new(parameters, &MemoryAssets::default()).unwrap();
+    let design = Design::new(parameters, None, &MemoryAssets::default()).unwrap();
     Simulation::new(parameters, design, Key::new(1, "flame"))
 }
 

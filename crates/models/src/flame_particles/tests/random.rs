@@ -33,7 +33,7 @@ fn draw(seed: u64) -> Option<(FlameParticlesParameters, WindParameters)> {
     let wind = WindParameters::read_table(&wind, &mut reader, &[]);
     assert!(reader.problems().is_empty(), "{:?}", reader.problems());
     parameters.particles = 1 + (uniform() * 250.0) as i64;
-    Design::new(&parameters, &MemoryAssets::default()).ok().map(|_| (parameters, wind))
+    Design::new(&parameters, None, &MemoryAssets::default()).ok().map(|_| (parameters, wind))
 }
 
 fn check(seed: u64, simulation: &Simulation) {
