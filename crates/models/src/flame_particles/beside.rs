@@ -16,16 +16,15 @@ impl PairTerm<3, 5, 8> for BesideTerm {
     const DIRECTED: bool = false;
 
     #[inline(always)]
-    fn term<R: Real>(&self, pair: &Pair<R, 3>, own: &[R; 5], other: &[R; 5]) -> [R; 8] {
+    fn add<R: Real>(&self, pair: &Pair<R, 3>, own: &[R; 5], other: &[R; 5], sums: &mut [R; 8]) {
         let weight = other[0] * self.0.value(pair.distance_squared);
-        let mut sums = [weight; 8];
+        sums[0] = sums[0] + weight;
         for k in 1..5 {
-            sums[k] = weight * (other[k] - own[k]);
+            sums[k] = weight.fused(other[k] - own[k], sums[k]);
         }
         for axis in 0..3 {
-            sums[5 + axis] = weight * (weight.like(0.0) - pair.offset[axis]);
+            sums[5 + axis] = weight.fused(weight.like(0.0) - pair.offset[axis], sums[5 + axis]);
         }
-        sums
     }
 }
 

@@ -4,7 +4,7 @@
 
 use fearless_simd::{Simd, prelude::*};
 
-use crate::lanes::{HalfLanes, Real};
+use crate::lanes::{HalfLanes, Lanes, Real};
 
 /// Candidates looked at together.
 pub(super) const BATCH: usize = 8;
@@ -67,4 +67,14 @@ pub(super) fn difference<R: Real, const D: usize>(one: &[R; D], other: &[R; D]) 
         result[c] = one[c] - other[c];
     }
     result
+}
+
+/// Two batches side by side.
+#[inline(always)]
+pub(super) fn pair<S: Simd, const N: usize>(first: &[HalfLanes<S>; N], second: &[HalfLanes<S>; N]) -> [Lanes<S>; N] {
+    let mut pairs = [first[0].combine(second[0]); N];
+    for k in 1..N {
+        pairs[k] = first[k].combine(second[k]);
+    }
+    pairs
 }

@@ -161,9 +161,9 @@ impl<const D: usize> Cells<D> {
         self.positions = slots;
         self.ids.clear();
         self.ids.par_extend(self.order.par_iter().with_min_len(AT_ONCE).map(|i| ids[*i as usize]));
-        let mut stretches = std::mem::take(&mut self.stretches);
+        let mut stretches = self.take_stretches();
         self.find_stretches(&mut stretches);
-        self.stretches = stretches;
+        self.put_stretches(stretches);
     }
 
     /// Sorts by key, then by id, and lists the cells.
@@ -235,6 +235,15 @@ impl<const D: usize> Cells<D> {
     /// All cells, in stretches.
     pub(super) fn stretches(&self) -> &[Stretch] {
         &self.stretches
+    }
+
+    /// The stretches, to be put back.
+    pub(super) fn take_stretches(&mut self) -> Vec<Stretch> {
+        std::mem::take(&mut self.stretches)
+    }
+
+    pub(super) fn put_stretches(&mut self, stretches: Vec<Stretch>) {
+        self.stretches = stretches;
     }
 
     /// The particle in a slot that is not empty.

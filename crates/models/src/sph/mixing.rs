@@ -15,13 +15,12 @@ impl<K: SmoothingKernel<D>, const D: usize, const N: usize> PairTerm<D, N, N> fo
     const DIRECTED: bool = false;
 
     #[inline(always)]
-    fn term<R: Real>(&self, pair: &Pair<R, D>, own: &[R; N], other: &[R; N]) -> [R; N] {
+    fn add<R: Real>(&self, pair: &Pair<R, D>, own: &[R; N], other: &[R; N], sums: &mut [R; N]) {
         let weight = other[0] * self.0.value(pair.distance_squared);
-        let mut sums = [weight; N];
+        sums[0] = sums[0] + weight;
         for k in 1..N {
-            sums[k] = weight * (other[k] - own[k]);
+            sums[k] = weight.fused(other[k] - own[k], sums[k]);
         }
-        sums
     }
 }
 

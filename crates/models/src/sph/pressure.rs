@@ -26,13 +26,11 @@ impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 2, D> for PressureTerm<K
     const DIRECTED: bool = true;
 
     #[inline(always)]
-    fn term<R: Real>(&self, pair: &Pair<R, D>, own: &[R; 2], other: &[R; 2]) -> [R; D] {
+    fn add<R: Real>(&self, pair: &Pair<R, D>, own: &[R; 2], other: &[R; 2], sums: &mut [R; D]) {
         let pull = (own[0] + other[0]) * other[1] * self.0.gradient_factor(pair.distance_squared);
-        let mut components = pair.offset;
-        for component in &mut components {
-            *component = *component * pull;
+        for c in 0..D {
+            sums[c] = pair.offset[c].fused(pull, sums[c]);
         }
-        components
     }
 }
 

@@ -1,15 +1,10 @@
-//! Stretches of cells, the tasks of the thread pool, and who is near whom in them.
+//! Stretches of cells, the tasks of the thread pool.
 
 use std::ops::Range;
 
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-use super::{
-    batch::{BATCH, cut, difference, load, pick, spread, squared},
-    cells::Cells,
-};
-use crate::lanes::HalfLanes;
+use super::{batch::BATCH, cells::Cells};
 
 /// Particles a stretch holds at least, if there are so many.
 const PARTICLES: usize = 256;
@@ -21,8 +16,10 @@ pub(super) struct Stretch {
     pub(super) groups: Vec<Group>,
     /// Slots at which batches of candidates begin, group after group.
     pub(super) starts: Vec<u32>,
-    /// For each particle which batches of its candidates hold neighbours, see [`Group::bit_shift`].
+    /// For each particle which batches of its candidates may hold neighbours, see [`Group::bit_shift`]: all, until a sum notes them.
     pub(super) hits: Vec<u64>,
+    /// Indices of the particles that coincide with others; `None` until a sum notes them.
+    pub(super) crowded: Option<Vec<u64>>,
 }
 
 /// The particles of one cell, which share their candidates.
@@ -45,27 +42,27 @@ impl Stretch {
     }
 
     fn fill<const D: usize>(&mut self, cells: &Cells<D>, range: Range<usize>) {
-        let Self { groups, starts, hits } = self;
+        let Self { groups, starts, hits, crowded } = self;
+        *crowded = None;
         groups.clear();
         starts.clear();
         hits.clear();
-        hits.resize(cells.particles(range.clone()).len(), 0);
         cells.visit(range, |own, runs| {
             let first = starts.len();
             for run in runs {
                 starts.extend((0..run.particles.len()).step_by(BATCH).map(|along| (run.slot + along) as u32));
             }
-            let bits = (starts.len() - first).div_ceil(u64::BITS as usize).max(1);
-            let bit_shift = bits.next_power_of_two().trailing_zeros();
+            let batches = starts.len() - first;
+            let bit_shift = batches.div_ceil(u64::BITS as usize).max(1).next_power_of_two().trailing_zeros();
+            let all = u64::MAX >> (u64::BITS as usize - batches.div_ceil(1 << bit_shift));
+            hits.resize(hits.len() + own.particles.len(), all);
             groups.push(Group { particles: own.particles, slot: own.slot, starts: first..starts.len(), bit_shift });
         });
-        let farthest = cells.support_radius() * cells.support_radius();
-        dispatch!(Level::new(), simd => find_hits(simd, farthest, cells.positions(), groups, starts, hits));
     }
 }
 
 impl<const D: usize> Cells<D> {
-    /// Parts the cells into stretches and finds who is near whom. A stretch's results depend on its cells and their neighbours
+    /// Parts the cells into stretches. A stretch's results depend on its cells and their neighbours
     /// alone, so it does not matter where one ends.
     pub(super) fn find_stretches(&self, stretches: &mut Vec<Stretch>) {
         let mut ranges = Vec::with_capacity(self.len() / PARTICLES + 1);
@@ -78,34 +75,5 @@ impl<const D: usize> Cells<D> {
         }
         stretches.resize_with(ranges.len(), Stretch::default);
         stretches.par_iter_mut().zip(ranges).for_each(|(stretch, range)| stretch.fill(self, range));
-    }
-}
-
-/// One bit for each batch in which a particle has a neighbour, so that sums skip the others: about half.
-#[inline(always)]
-fn find_hits<S: Simd, const D: usize>(
-    simd: S,
-    farthest: f32,
-    positions: [&[f32]; D],
-    groups: &[Group],
-    starts: &[u32],
-    mut hits: &mut [u64],
-) {
-    let positions = cut(positions, positions[0].len());
-    let farthest = HalfLanes::splat(simd, farthest);
-    for group in groups {
-        let (own, rest) = std::mem::take(&mut hits).split_at_mut(group.particles.len());
-        hits = rest;
-        let starts = &starts[group.starts.clone()];
-        for (slot, hits) in (group.slot..).zip(own) {
-            let position = spread(simd, pick(&positions, slot));
-            let mut bits = 0;
-            for (number, start) in starts.iter().enumerate() {
-                let offset = difference(&position, &load(simd, &positions, *start as usize));
-                let near = squared(&offset).simd_lt(farthest).any_true();
-                bits |= u64::from(near) << (number >> group.bit_shift);
-            }
-            *hits = bits;
-        }
     }
 }
