@@ -125,18 +125,33 @@ impl Plan {
     /// # Errors
     /// The options do not fit the scene, or a phenomenon cannot be made.
     pub fn new(scene: Scene, options: &PlanOptions, assets: Arc<dyn Assets>) -> Result<Self, PlanError> {
+        let mut plan = Self::exposed(scene, options, assets, 0.0)?;
+        plan.exposure_ev100 = plan.exposure(&plan.open()?);
+        Ok(plan)
+    }
+
+    /// Plans a shot whose exposure is known, as from planning it elsewhere: no phenomenon is made for it.
+    ///
+    /// # Errors
+    /// The options do not fit the scene.
+    pub fn exposed(
+        scene: Scene,
+        options: &PlanOptions,
+        assets: Arc<dyn Assets>,
+        exposure_ev100: f32,
+    ) -> Result<Self, PlanError> {
         let size = options.size.unwrap_or(scene.picture.size.map(|side| side as usize));
         let overscan = scene.picture.overscan as usize;
         let loop_s = options.loop_s.map(|seconds| loop_length(seconds, scene.picture.fps)).transpose()?;
         let seed = options.seed.unwrap_or(scene.picture.seed as u64);
         let wind = Wind::new(scene.wind.clone(), seed, loop_s);
         let occluders = occluders(&scene, assets.as_ref())?;
-        let mut plan = Self {
+        let plan = Self {
             window: window(size, overscan, options.crop)?,
             size,
             seed,
             loop_s,
-            exposure_ev100: 0.0,
+            exposure_ev100,
             layers: options.layers,
             aovs: options.aovs,
             figures: options.figures,
@@ -147,7 +162,6 @@ impl Plan {
             scene,
         };
         plan.check_loop()?;
-        plan.exposure_ev100 = plan.exposure(&plan.open()?);
         Ok(plan)
     }
 

@@ -12,6 +12,8 @@ use super::{
     chooser::Chooser,
     question::{Answer, Leaving, Question, answer},
     session::Session,
+    store::Store,
+    unsaved::Unsaved,
 };
 #[cfg(not(target_arch = "wasm32"))]
 use crate::document::watch::Watch;
@@ -19,21 +21,15 @@ use crate::{
     document::{
         Document,
         files::{self, Recent},
-        recovery::{self, Autosave, Recovered},
     },
     player::shoot::{self, Shooting},
 };
-
-/// Seconds between two looks at unsaved work.
-const AUTOSAVE_S: f64 = 5.0;
 
 /// Files of the window: what lies where, and what waits to be asked.
 pub(super) struct Files {
     pub(super) question: Option<Question>,
     pub(super) recent: Recent,
-    autosave: Option<Autosave>,
-    pub(super) recovered: Vec<Recovered>,
-    last_kept: f64,
+    pub(super) unsaved: Unsaved,
     #[cfg(not(target_arch = "wasm32"))]
     watch: Option<Watch>,
     closing: bool,
@@ -44,16 +40,12 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// Files of a window that keeps what it must in `home`.
-    pub(super) fn new(home: Option<PathBuf>) -> Self {
-        let unsaved = home.as_ref().map(|home| home.join("unsaved"));
+    /// Files of a window that keeps what it must in `store`.
+    pub(super) fn new(store: &Store) -> Self {
         Self {
             question: None,
-            recovered: unsaved.as_deref().map(recovery::recoverable).unwrap_or_default(),
-            // Where nothing can be kept, the studio works without.
-            autosave: unsaved.and_then(|folder| Autosave::begin(&folder, "studio").ok()),
-            recent: home.map(|home| Recent::read(home.join("recent"))).unwrap_or_default(),
-            last_kept: 0.0,
+            unsaved: Unsaved::new(store),
+            recent: store.file("recent").map(Recent::read).unwrap_or_default(),
             #[cfg(not(target_arch = "wasm32"))]
             watch: None,
             closing: false,
@@ -193,28 +185,12 @@ impl Files {
 
     /// What must be done now and then, and the question that waits.
     pub(super) fn tend(&mut self, ui: &mut Ui, session: &mut Session) {
-        self.keep_unsaved(ui, session);
+        self.unsaved.tend(ui, session);
         self.watch_outside(ui, session);
         self.take_dropped(ui, session);
         self.hold_close(ui, session);
         self.finish_job(ui, session);
         self.ask(ui, session);
-    }
-
-    fn keep_unsaved(&mut self, ui: &Ui, session: &mut Session) {
-        let now = ui.input(|input| input.time);
-        if now - self.last_kept < AUTOSAVE_S {
-            return;
-        }
-        self.last_kept = now;
-        if let Some(Err(error)) =
-            self.autosave.as_ref().map(|kept| kept.keep(&session.document, session.path.as_deref()))
-        {
-            session.set_notice(Some(format!("unsaved work cannot be kept: {error}")));
-        }
-        if session.document.is_dirty() {
-            ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64(AUTOSAVE_S));
-        }
     }
 
     /// A page's files are nobody else's.
@@ -334,13 +310,6 @@ impl Files {
                 self.closing = true;
                 ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
             }
-        }
-    }
-
-    /// The window closed well.
-    pub(super) fn end(&mut self) {
-        if let Some(autosave) = self.autosave.take() {
-            autosave.end();
         }
     }
 }

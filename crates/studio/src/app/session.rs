@@ -124,6 +124,7 @@ impl Session {
 
     /// Takes the bytes of a file that no folder holds.
     pub fn give(&mut self, name: &str, bytes: Vec<u8>) {
+        self.player.give(name, &bytes);
         self.bundle.give(name, bytes);
         self.reload_assets();
     }

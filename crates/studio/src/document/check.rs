@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bansho::{
-    Assets, KINDS, Plan, PlanError, PlanOptions, SceneError,
+    Assets, KINDS, Plan, PlanOptions, SceneError,
     base::parameters::{Problem, ProblemKind, Table, Value},
     parse_scene,
     render::scene::{
@@ -19,12 +19,25 @@ use bansho::{
 /// Every fault of the text and of the assets it names.
 pub fn check(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<Arc<Plan>, SceneError> {
     let scene = parse_scene(name, text, assets.as_ref())?;
-    match Plan::new(scene, &PlanOptions::default(), assets.clone()) {
-        Ok(plan) => Ok(Arc::new(plan)),
-        Err(error) => {
-            Err(SceneError { file: name.to_owned(), text: text.to_owned(), problems: vec![unplaced(&error)] })
-        }
-    }
+    let plan = Plan::new(scene, &PlanOptions::default(), assets.clone());
+    plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
+}
+
+/// The plan of the scene `text` where another [`check`] found its exposure, or why it cannot be planned. No phenomenon is
+/// made, so that it takes a moment.
+///
+/// # Errors
+/// Every fault of the text and of the assets it names, or what the other check found.
+pub fn recheck(
+    name: &str,
+    text: &str,
+    assets: &Arc<dyn Assets>,
+    exposure_ev100: Result<f32, String>,
+) -> Result<Arc<Plan>, SceneError> {
+    let scene = parse_scene(name, text, assets.as_ref())?;
+    let unplaced = |reason: String| unplaced(name, text, reason);
+    let plan = Plan::exposed(scene, &PlanOptions::default(), assets.clone(), exposure_ev100.map_err(unplaced)?);
+    plan.map(Arc::new).map_err(|error| unplaced(error.to_string()))
 }
 
 /// The plan of a draft of the scene `text`, which is simulated with fewer particles; `None` where no fewer would do.
@@ -73,8 +86,9 @@ fn usual(kind: &str, keys: &[&str]) -> Option<f64> {
 }
 
 /// A fault that only planning shows, which lies in no one line.
-fn unplaced(error: &PlanError) -> Problem {
-    Problem { span: None, path: String::new(), kind: ProblemKind::Conflict(error.to_string()) }
+fn unplaced(name: &str, text: &str, reason: String) -> SceneError {
+    let problem = Problem { span: None, path: String::new(), kind: ProblemKind::Conflict(reason) };
+    SceneError { file: name.to_owned(), text: text.to_owned(), problems: vec![problem] }
 }
 
 #[cfg(test)]
@@ -104,5 +118,18 @@ mod tests {
         let error = draft(text).and_then(Result::err).unwrap();
         assert_eq!(error.text, text);
         assert!(error.problems[0].to_string().contains("no_such_key"));
+    }
+
+    #[test]
+    fn what_another_check_found_gives_the_same_plan_without_its_work() {
+        let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
+        let text = "bansho = 1\n[picture]\nframes = 9\n[[flame_sheet]]\n";
+        let first = check("scene", text, &assets).unwrap();
+        let again = recheck("scene", text, &assets, Ok(first.exposure_ev100)).unwrap();
+        assert_eq!((again.exposure_ev100, again.frames()), (first.exposure_ev100, 0..9));
+        let told = recheck("scene", text, &assets, Err("a burner lies in a wall".into())).err().unwrap();
+        assert!(told.to_string().contains("a burner lies in a wall"));
+        let faulty = recheck("scene", "bansho = 1\n[[flame_shet]]\n", &assets, Ok(0.0)).err().unwrap();
+        assert!(faulty.to_string().contains("flame_shet"));
     }
 }
