@@ -31,39 +31,7 @@ impl Studio {
         if ui.button("Save").clicked() {
             self.files.save(&mut self.session);
         }
-        // A page knows no folders.
-        if !cfg!(target_arch = "wasm32") {
-            self.folder_menu(ui);
-        }
-    }
-
-    /// What needs files of the system.
-    fn folder_menu(&mut self, ui: &mut Ui) {
-        if ui.button("Save as…").clicked() {
-            self.files.ask_where_to_save(&self.session);
-        }
-        ui.menu_button("Recent", |ui| {
-            for path in self.files.recent.paths().to_vec() {
-                if ui.button(path.display().to_string()).clicked() {
-                    self.files.open(&mut self.session, path);
-                }
-            }
-        });
-        ui.separator();
-        if ui.button("Render still").clicked() {
-            self.files.render(&mut self.session, true);
-        }
-        if ui.button("Render shot").clicked() {
-            self.files.render(&mut self.session, false);
-        }
-        if let Some(shooting) = &self.files.shooting
-            && ui.button("Stop rendering").clicked()
-        {
-            shooting.stop();
-        }
-        if ui.button("Reload plates and meshes").clicked() {
-            self.session.reload_assets();
-        }
+        self.files.menu(ui, &mut self.session);
     }
 
     fn examples_menu(&mut self, ui: &mut Ui) {

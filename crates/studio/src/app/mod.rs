@@ -1,9 +1,6 @@
 //! The window: panels over one [`Session`]. It holds no formulas of any phenomenon.
 
 mod aurora;
-#[cfg(target_arch = "wasm32")]
-mod browser;
-mod chooser;
 mod curve_editor;
 mod files;
 mod gesture;
@@ -14,7 +11,8 @@ mod keyed;
 mod layout;
 mod menu;
 mod problems;
-mod question;
+mod rate;
+mod relink;
 mod scene_panel;
 mod session;
 mod shortcuts;
@@ -25,7 +23,6 @@ mod tests;
 mod text_panel;
 mod things;
 mod timeline;
-mod unsaved;
 mod value;
 mod viewport;
 

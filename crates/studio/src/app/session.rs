@@ -11,12 +11,9 @@ use bansho::{
     render::scene::{Place, edit::EditError, operation::Operation},
 };
 
-use super::keyed;
+use super::{keyed, rate::Rate};
 use crate::{
-    document::{
-        Document, Revision,
-        drawing::{Drawing, Refusal},
-    },
+    document::{Document, Revision, drawing::Refusal},
     examples::Bundle,
     player::{Event, Pace, Picture, Player, Transport, Wish},
 };
@@ -61,24 +58,6 @@ struct Asked {
     number: Option<i64>,
     within: [usize; 2],
     draft: bool,
-}
-
-/// Pictures a second, as they come while time passes.
-#[derive(Default)]
-struct Rate {
-    last: Option<f64>,
-    mean_s: Option<f64>,
-}
-
-impl Rate {
-    fn came(&mut self, now: f64) {
-        /// Share of the newest interval in the mean.
-        const NEWEST: f64 = 0.15;
-        if let Some(last) = self.last.replace(now) {
-            let interval = now - last;
-            self.mean_s = Some(self.mean_s.map_or(interval, |mean| mean + NEWEST * (interval - mean)));
-        }
-    }
 }
 
 impl Session {
@@ -146,7 +125,7 @@ impl Session {
 
     /// Pictures a second while time passes.
     pub fn pictures_per_s(&self) -> Option<f64> {
-        self.rate.mean_s.filter(|_| self.transport.is_playing()).map(|mean| 1.0 / mean)
+        self.rate.pictures_per_s().filter(|_| self.transport.is_playing())
     }
 
     /// What the user should know.
@@ -345,37 +324,6 @@ fn assets(bundle: &Bundle, path: Option<&Path>, assets_of: AssetsOf) -> Arc<dyn 
 }
 
 /// The folder that paths in a scene are relative to.
-fn folder(path: Option<&Path>) -> &Path {
+pub(super) fn folder(path: Option<&Path>) -> &Path {
     path.and_then(Path::parent).unwrap_or(Path::new(""))
-}
-
-impl Session {
-    /// Lets `place` name the file `file`.
-    pub fn relink(&mut self, place: &Place, file: &Path) {
-        let value = self.named(file);
-        self.edit("relink", &[Operation::Set { place: place.clone(), value }]);
-        self.reload_assets();
-    }
-
-    /// `file` as the scene names it: relative to its folder where it lies there.
-    fn named(&self, file: &Path) -> Value {
-        let folder = folder(self.path.as_deref());
-        let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
-        let relative = file.strip_prefix(folder).or_else(|_| file.strip_prefix(whole)).unwrap_or(file);
-        Value::Text(relative.to_string_lossy().replace('\\', "/"))
-    }
-
-    /// Takes a file that was dropped on the window: a drawing becomes the aurora's first shape, a picture the plate.
-    pub fn lay_over(&mut self, file: &Path) {
-        let value = self.named(file);
-        if file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg")) {
-            match Drawing::read(self.document.values(), 0, &self.assets) {
-                Ok(drawing) => self.edit("drawing", &drawing.trace(value)),
-                Err(reason) => self.notice = Some(reason.to_string()),
-            }
-        } else {
-            let place = Place::root().key("plate").key("image");
-            self.edit("plate", &[Operation::Set { place, value }]);
-        }
-    }
 }

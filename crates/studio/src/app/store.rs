@@ -4,22 +4,30 @@
 use std::path::PathBuf;
 
 #[cfg(target_arch = "wasm32")]
-use super::browser;
+use super::files::browser;
 
 /// Where they are kept.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Store {
-    /// A page has none.
+    #[cfg(not(target_arch = "wasm32"))]
     home: Option<PathBuf>,
 }
 
 impl Store {
     /// In `home`; nowhere without one.
+    #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn new(home: Option<PathBuf>) -> Self {
         Self { home }
     }
 
-    /// The file of `name`, if there are files.
+    /// At the browser: a page has no home.
+    #[cfg(target_arch = "wasm32")]
+    pub(super) fn new(_home: Option<PathBuf>) -> Self {
+        Self {}
+    }
+
+    /// The file of `name`, if there is a home.
+    #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn file(&self, name: &str) -> Option<PathBuf> {
         self.home.as_ref().map(|home| home.join(name))
     }

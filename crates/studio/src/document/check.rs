@@ -7,7 +7,7 @@ use bansho::{
     base::parameters::{Problem, ProblemKind, Table, Value},
     parse_scene,
     render::scene::{
-        Place,
+        Place, Scene,
         operation::{self, Operation},
         values,
     },
@@ -23,8 +23,8 @@ pub fn check(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<Arc<Pla
     plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
 }
 
-/// The plan of the scene `text` where another [`check`] found its exposure, or why it cannot be planned. No phenomenon is
-/// made, so that it takes a moment.
+/// The plan of the scene `text` where another [`check`] found its exposure, or why it cannot be planned. Of a good scene no
+/// phenomenon is made, so that it takes a moment.
 ///
 /// # Errors
 /// Every fault of the text and of the assets it names, or what the other check found.
@@ -34,10 +34,16 @@ pub fn recheck(
     assets: &Arc<dyn Assets>,
     exposure_ev100: Result<f32, String>,
 ) -> Result<Arc<Plan>, SceneError> {
-    let scene = parse_scene(name, text, assets.as_ref())?;
     let unplaced = |reason: String| unplaced(name, text, reason);
-    let plan = Plan::exposed(scene, &PlanOptions::default(), assets.clone(), exposure_ev100.map_err(unplaced)?);
-    plan.map(Arc::new).map_err(|error| unplaced(error.to_string()))
+    match exposure_ev100 {
+        Ok(ev100) => {
+            let plan =
+                Plan::exposed(Scene::reparse(name, text, KINDS)?, &PlanOptions::default(), assets.clone(), ev100);
+            plan.map(Arc::new).map_err(|error| unplaced(error.to_string()))
+        }
+        // The faults with their places, where they have any.
+        Err(reason) => Err(parse_scene(name, text, assets.as_ref()).err().unwrap_or_else(|| unplaced(reason))),
+    }
 }
 
 /// The plan of a draft of the scene `text`, which is simulated with fewer particles; `None` where no fewer would do.
@@ -129,7 +135,7 @@ mod tests {
         assert_eq!((again.exposure_ev100, again.frames()), (first.exposure_ev100, 0..9));
         let told = recheck("scene", text, &assets, Err("a burner lies in a wall".into())).err().unwrap();
         assert!(told.to_string().contains("a burner lies in a wall"));
-        let faulty = recheck("scene", "bansho = 1\n[[flame_shet]]\n", &assets, Ok(0.0)).err().unwrap();
+        let faulty = recheck("scene", "bansho = 1\n[[flame_shet]]\n", &assets, Err("a fault".into())).err().unwrap();
         assert!(faulty.to_string().contains("flame_shet"));
     }
 }

@@ -63,6 +63,7 @@ impl Engine {
     }
 
     /// Forgets the shot, as after a panic in it.
+    #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn forget(&mut self) {
         *self = Self { judged: self.judged.take(), plan: self.plan.take(), ..Self::default() };
     }

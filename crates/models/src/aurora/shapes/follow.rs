@@ -182,13 +182,14 @@ impl Followed {
         let mut sheet: Vec<usize> = Vec::new();
         for ((strand, points), range) in strands.iter().zip(&points).zip(parts(&points)) {
             let range = if of.reversed { range.map(|share| 1.0 - share) } else { range };
+            let linked = anchors.along(strand, range);
             let again = first.as_ref().filter(|first| chain.len() == 1 && first.len() == strand.len());
+            let again = again.filter(|_| linked.is_empty());
             let knots: Vec<Knot> = match again {
                 Some(first) => first.iter().map(|&track| self.tracks[track].knot(0)).collect(),
                 None => {
                     let knot =
                         |share: f64| Knot { position: drawn.line.at(share), values: values(&drawn.curves, share) };
-                    let linked = anchors.along(strand, range);
                     warp_through(points, &drawn.line, range, &linked, *evenness).into_iter().map(knot).collect()
                 }
             };

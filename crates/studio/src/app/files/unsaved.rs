@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use eframe::egui::Ui;
 
-use super::{session::Session, store::Store};
+use crate::app::{session::Session, store::Store};
 #[cfg(not(target_arch = "wasm32"))]
 use crate::document::recovery::Autosave;
 use crate::document::recovery::{self, Recovered};
@@ -16,9 +16,9 @@ const EVERY_S: f64 = 5.0;
 const NAME: &str = "unsaved";
 
 /// Unsaved work, of now and of before.
-pub(super) struct Unsaved {
+pub(in crate::app) struct Unsaved {
     /// Work of a studio that did not end well.
-    pub(super) recovered: Vec<Recovered>,
+    pub(in crate::app) recovered: Vec<Recovered>,
     last_kept: f64,
     #[cfg(not(target_arch = "wasm32"))]
     autosave: Option<Autosave>,
@@ -79,14 +79,14 @@ impl Unsaved {
     }
 
     /// Forgets work that is open again.
-    pub(super) fn forget(&mut self, recovered: &Recovered) {
+    pub(in crate::app) fn forget(&mut self, recovered: &Recovered) {
         recovered.forget();
         self.recovered.retain(|other| other != recovered);
     }
 
     /// The window closed well.
     #[cfg(not(target_arch = "wasm32"))]
-    pub(super) fn end(&mut self) {
+    pub(in crate::app) fn end(&mut self) {
         if let Some(autosave) = self.autosave.take() {
             autosave.end();
         }
@@ -94,5 +94,5 @@ impl Unsaved {
 
     /// Pages end without being asked.
     #[cfg(target_arch = "wasm32")]
-    pub(super) fn end(&mut self) {}
+    pub(in crate::app) fn end(&mut self) {}
 }

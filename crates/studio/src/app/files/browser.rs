@@ -58,7 +58,7 @@ pub(super) fn download(name: &str, text: &str) -> Result<(), JsValue> {
 }
 
 /// What the browser keeps for this page's server, where it does.
-pub(super) fn storage() -> Option<Storage> {
+pub(in crate::app) fn storage() -> Option<Storage> {
     web_sys::window()?.local_storage().ok()?
 }
 
