@@ -13,7 +13,10 @@ use bansho::{
 
 use super::{keyed, rate::Rate};
 use crate::{
-    document::{Document, Revision, drawing::Refusal},
+    document::{
+        Document, Revision,
+        drawing::{Drawing, Refusal},
+    },
     examples::Bundle,
     player::{Event, Pace, Picture, Player, Transport, Wish},
 };
@@ -154,14 +157,14 @@ impl Session {
         }
     }
 
-    /// Carries out `operations` on the shapes of aurora `index`.
+    /// Carries out `operations` on the shapes of aurora `index`; what it has then.
     ///
     /// # Errors
     /// An aurora cannot take the shapes that would come of them; nothing is changed then.
-    pub fn reshape(&mut self, label: &str, operations: &[Operation], index: usize) -> Result<(), Refusal> {
-        self.document.reshape(label, operations, index, &self.assets)?;
+    pub fn reshape(&mut self, label: &str, operations: &[Operation], index: usize) -> Result<Drawing, Refusal> {
+        let drawing = self.document.reshape(label, operations, index, &self.assets)?;
         self.notice = None;
-        Ok(())
+        Ok(drawing)
     }
 
     /// Goes to the frame at `time`, s; once the scene is checked, also where that makes the shot longer.

@@ -150,8 +150,9 @@ impl AuroraEditor {
     /// Carries out a change of the shapes, or says at `at` why it cannot be; whether it was.
     fn change(&mut self, session: &mut Session, label: &str, operations: &[Operation], at: Pos2) -> bool {
         match session.reshape(label, operations, self.index) {
-            Ok(_) => {
+            Ok(drawing) => {
                 self.refusal = None;
+                self.read = Some((session.document.revision(), Ok(drawing)));
                 true
             }
             Err(refusal) => {
