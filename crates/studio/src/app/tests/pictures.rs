@@ -28,7 +28,7 @@ fn painted(text: &str) -> Harness<'static, Studio> {
 
 /// Compares what the window shows, but for the line at the bottom that tells how long drawing took.
 fn looks(harness: &mut Harness<'_, Studio>, name: &str) {
-    let status = harness.get_by_label_contains(" of ").rect().top();
+    let status = harness.get_by_label_contains("of 64 × 36").rect().top();
     let mut picture = harness.render().unwrap();
     picture.rows_mut().skip(status as usize - 4).flatten().for_each(|pixel| pixel.0 = [0, 0, 0, 255]);
     let options = SnapshotOptions::new().output_path(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/snapshots"));
@@ -66,6 +66,7 @@ bansho = 1
 size = [64, 36]
 frames = 150
 [[aurora]]
+extent_km = 800.0
 preroll_s = 0.0
 particles = { count = 300 }
 field = { cells = 31 }
