@@ -151,6 +151,8 @@ await mustNotFreeze(sky, "drawing", 6, (tried) => {
 });
 const joined = await until(sky, above, ({ mean }) => mean > 1.1 * alone.mean, "the stroke makes no aurora", 60);
 console.log(`a stroke: mean ${alone.mean.toFixed(1)} became ${joined.mean.toFixed(1)}`);
+await sky.waitForFunction(() => /points = \[\[/.test(localStorage.getItem("bansho-studio unsaved") ?? ""), null, { timeout: 20000 });
+console.log("the browser keeps it while it is unsaved");
 const [download] = await Promise.all([sky.waitForEvent("download"), sky.keyboard.press("Control+s")]);
 const saved = join(mkdtempSync(join(tmpdir(), "studio-")), "drawn.toml");
 await download.saveAs(saved);

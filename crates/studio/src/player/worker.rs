@@ -32,10 +32,18 @@ pub struct WorkerPlayer {
 /// A worker, and what it said.
 struct Link {
     worker: Worker,
-    inbox: Rc<RefCell<Vec<Reply>>>,
+    inbox: Rc<RefCell<Vec<Heard>>>,
     /// What waits until it listens.
     outbox: Option<Vec<Array>>,
     _listen: Closure<dyn FnMut(MessageEvent)>,
+    _mourn: Closure<dyn FnMut()>,
+}
+
+/// What comes from a worker.
+enum Heard {
+    Said(Reply),
+    /// It ended without a word, as where memory runs out.
+    Ended,
 }
 
 impl Link {
@@ -44,15 +52,21 @@ impl Link {
         options.set_type(WorkerType::Module);
         let worker = Worker::new_with_options(SCRIPT, &options)?;
         let inbox = Rc::new(RefCell::new(Vec::new()));
-        let heard = inbox.clone();
+        let (heard, woken) = (inbox.clone(), wake.clone());
         let listen = Closure::new(move |event: MessageEvent| {
-            heard.borrow_mut().extend(Reply::read(&event.data()));
-            wake();
+            heard.borrow_mut().extend(Reply::read(&event.data()).map(Heard::Said));
+            woken();
         });
         worker.set_onmessage(Some(listen.as_ref().unchecked_ref()));
+        let heard = inbox.clone();
+        let mourn = Closure::new(move || {
+            heard.borrow_mut().push(Heard::Ended);
+            wake();
+        });
+        worker.set_onerror(Some(mourn.as_ref().unchecked_ref()));
         // The program, compiled already.
         worker.post_message(&wasm_bindgen::module())?;
-        Ok(Self { worker, inbox, outbox: Some(Vec::new()), _listen: listen })
+        Ok(Self { worker, inbox, outbox: Some(Vec::new()), _listen: listen, _mourn: mourn })
     }
 
     fn say(&mut self, message: Array) {
@@ -72,6 +86,9 @@ impl Link {
 
 impl Drop for Link {
     fn drop(&mut self) {
+        // Nobody is there any more for what is still on its way.
+        self.worker.set_onmessage(None);
+        self.worker.set_onerror(None);
         self.worker.terminate();
     }
 }
@@ -87,7 +104,14 @@ impl WorkerPlayer {
         Ok(Self { link, wake, files: Vec::new(), wishes: VecDeque::new(), newest: 0, done: 0 })
     }
 
-    fn take_in(&mut self, reply: Reply) -> Option<Event> {
+    fn take_in(&mut self, heard: Heard) -> Option<Event> {
+        let reply = match heard {
+            Heard::Said(reply) => reply,
+            Heard::Ended => {
+                let message = "it ended without a word, as where memory runs out".into();
+                Reply::Panicked { number: self.wishes.front()?.0, message }
+            }
+        };
         match reply {
             Reply::Ready => {
                 self.link.flush();
@@ -139,7 +163,7 @@ impl Player for WorkerPlayer {
 
     fn poll(&mut self) -> Vec<Event> {
         let heard = self.link.inbox.take();
-        heard.into_iter().filter_map(|reply| self.take_in(reply)).collect()
+        heard.into_iter().filter_map(|heard| self.take_in(heard)).collect()
     }
 
     fn is_busy(&self) -> bool {
