@@ -128,6 +128,26 @@ impl Plan {
     /// # Errors
     /// The options do not fit the scene, or a phenomenon cannot be made.
     pub fn new(scene: Scene, options: &PlanOptions, assets: Arc<dyn Assets>) -> Result<Self, PlanError> {
+        let mut plan = Self::unexposed(scene, options, assets)?;
+        plan.exposure_ev100 = plan.exposure(&plan.open()?);
+        Ok(plan.begun_calmly())
+    }
+
+    /// Plans a shot whose exposure is known, as from planning it elsewhere: no phenomenon is made for it, unless it is a loop.
+    ///
+    /// # Errors
+    /// The options do not fit the scene.
+    pub fn exposed(
+        scene: Scene,
+        options: &PlanOptions,
+        assets: Arc<dyn Assets>,
+        exposure_ev100: f32,
+    ) -> Result<Self, PlanError> {
+        let plan = Self { exposure_ev100, ..Self::unexposed(scene, options, assets)? };
+        Ok(plan.begun_calmly())
+    }
+
+    fn unexposed(scene: Scene, options: &PlanOptions, assets: Arc<dyn Assets>) -> Result<Self, PlanError> {
         let size = options.size.unwrap_or(scene.picture.size.map(|side| side as usize));
         let overscan = scene.picture.overscan as usize;
         let loop_s = options.loop_s.map(|seconds| loop_length(seconds, scene.picture.fps)).transpose()?;
@@ -151,12 +171,13 @@ impl Plan {
             scene,
         };
         plan.close_loop()?;
-        plan.exposure_ev100 = plan.exposure(&plan.open()?);
-        if plan.loop_s.is_some() {
-            // What cannot be drawn here will say so when it is drawn.
-            plan.loop_start = crate::cpu::calmest_start(&plan).unwrap_or_default();
-        }
         Ok(plan)
+    }
+
+    /// The shot, its loop begun at a calm moment. What cannot be drawn to find that will say so when it is drawn.
+    fn begun_calmly(self) -> Self {
+        let loop_start = self.loop_s.and_then(|_| crate::cpu::calmest_start(&self).ok()).unwrap_or_default();
+        Self { loop_start, ..self }
     }
 
     /// Makes every enabled phenomenon, at its beginning; then the scene's own lamps, ground and sky.

@@ -2,7 +2,11 @@
 
 #[cfg(target_arch = "wasm32")]
 fn main() {
-    wasm_bindgen_futures::spawn_local(page::main());
+    match web_sys::window() {
+        Some(_) => wasm_bindgen_futures::spawn_local(page::main()),
+        // The page's worker runs the same program.
+        None => bansho_studio::player::serve(),
+    }
 }
 
 #[cfg(not(target_arch = "wasm32"))]

@@ -9,7 +9,7 @@ use std::{
 
 use bansho::{Assets, media::plates::FileAssets};
 use bansho_studio::{
-    app::{Session, Studio},
+    app::{Session, Studio, window_size},
     bench,
     document::{Document, files},
     player::ThreadPlayer,
@@ -71,7 +71,9 @@ fn run(scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
         None => Document::new("scene", BEGINNING),
     };
     let options = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default().with_title("Bansho Studio").with_inner_size([1400.0, 860.0]),
+        viewport: egui::ViewportBuilder::default()
+            .with_title("Bansho Studio")
+            .with_inner_size(window_size(home().as_deref())),
         ..eframe::NativeOptions::default()
     };
     let build = |creation: &eframe::CreationContext| {

@@ -7,8 +7,9 @@ use bansho_studio::{
     app::{Session, Studio},
     document::Document,
     examples::{Bundle, SCENES},
-    player::SlicePlayer,
+    player::{Player, SlicePlayer, WorkerPlayer},
 };
+use eframe::egui::Context;
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::HtmlCanvasElement;
 
@@ -27,13 +28,22 @@ async fn start() -> Result<(), JsValue> {
     let canvas = document.get_element_by_id("studio").ok_or("there is no canvas")?;
     let canvas: HtmlCanvasElement = canvas.dyn_into()?;
     let named = window.location().hash()?.trim_start_matches('#').to_owned();
-    let build = move |_: &eframe::CreationContext| {
-        let session = Session::new(scene(&named), None, Box::<SlicePlayer>::default(), no_folder);
+    let build = move |creation: &eframe::CreationContext| {
+        let ctx = creation.egui_ctx.clone();
+        let session = Session::new(scene(&named), None, player(ctx), no_folder);
         Ok(Box::new(Studio::new(session, None)) as Box<dyn eframe::App>)
     };
     eframe::WebRunner::new().start(canvas, eframe::WebOptions::default(), Box::new(build)).await?;
     say("");
     Ok(())
+}
+
+/// A worker, or slices of the page's own time where the browser gives none.
+fn player(ctx: Context) -> Box<dyn Player> {
+    match WorkerPlayer::start(move || ctx.request_repaint()) {
+        Ok(player) => Box::new(player),
+        Err(_) => Box::<SlicePlayer>::default(),
+    }
 }
 
 /// The example `name`, or the first one.

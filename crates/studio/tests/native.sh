@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The studio under real mouse events: two strokes are drawn, one is split, a still is rendered. The still must be what
-# `bansho render` makes of the saved file, byte for byte.
+# `bansho render` makes of the saved file, byte for byte, and then the window must rest.
 #   crates/studio/tests/native.sh [STUDIO] [BANSHO]
 # It needs Xvfb, xdotool and a Vulkan driver (Mesa's lavapipe will do).
 set -eu
@@ -102,4 +102,12 @@ number="$(basename "$still" .png | grep -oE '[0-9]+$' | sed 's/^0*\(.\)/\1/')"
 "$bansho" render sky.toml --frames "$number" --out "$folder/again/s.####.png" >"$folder/render.log" 2>&1 || fail "$(cat "$folder/render.log")"
 again="$(find "$folder/again" -name '*.png' | head -1)"
 cmp "$still" "$again" || fail "the still is not what is rendered"
+# The window rests when nothing moves.
+spent_s() { awk -v hertz="$(getconf CLK_TCK)" '{ print ($14 + $15) / hertz }' "/proc/$window/stat"; }
+sleep 3
+before="$(spent_s)"
+sleep 10
+idle="$(awk -v before="$before" -v after="$(spent_s)" 'BEGIN { printf "%.1f", 10 * (after - before) }')"
+awk -v idle="$idle" 'BEGIN { exit !(idle < 2) }' || fail "an idle window takes $idle % of a core"
+echo "an idle window takes $idle % of a core"
 echo "the still of frame $number is what bansho render makes of the saved file, byte for byte"

@@ -110,12 +110,31 @@ impl Scene {
     /// # Errors
     /// Every fault of the text and of the assets it names, each with its place, what is wrong and what is allowed.
     pub fn parse(file: &str, text: &str, kinds: &[PhenomenonKind], assets: &dyn Assets) -> Result<Self, SceneError> {
+        Self::parse_and(file, text, kinds, |scene, root, reader| {
+            check::assets_and_openings(scene, root, assets, reader);
+        })
+    }
+
+    /// Reads a scene `text` in which [`parse`](Self::parse) found no fault elsewhere: no asset is read and no phenomenon made.
+    ///
+    /// # Errors
+    /// Every fault of the text alone.
+    pub fn reparse(file: &str, text: &str, kinds: &[PhenomenonKind]) -> Result<Self, SceneError> {
+        Self::parse_and(file, text, kinds, |_, _, _| {})
+    }
+
+    fn parse_and(
+        file: &str,
+        text: &str,
+        kinds: &[PhenomenonKind],
+        check: impl FnOnce(&Self, &Table, &mut Reader),
+    ) -> Result<Self, SceneError> {
         let fail = |problems| SceneError { file: file.to_owned(), text: text.to_owned(), problems };
         let root = toml::parse(text).map_err(|problem| fail(vec![problem]))?;
         let mut reader = Reader::new();
         let scene = Self::read(&root, kinds, &mut reader);
         if reader.problems().is_empty() {
-            check::assets_and_openings(&scene, &root, assets, &mut reader);
+            check(&scene, &root, &mut reader);
         }
         let mut problems: Vec<Problem> = reader.into_problems();
         if problems.is_empty() {

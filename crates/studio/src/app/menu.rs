@@ -31,39 +31,7 @@ impl Studio {
         if ui.button("Save").clicked() {
             self.files.save(&mut self.session);
         }
-        // A page knows no folders.
-        if !cfg!(target_arch = "wasm32") {
-            self.folder_menu(ui);
-        }
-    }
-
-    /// What needs files of the system.
-    fn folder_menu(&mut self, ui: &mut Ui) {
-        if ui.button("Save as…").clicked() {
-            self.files.ask_where_to_save(&self.session);
-        }
-        ui.menu_button("Recent", |ui| {
-            for path in self.files.recent.paths().to_vec() {
-                if ui.button(path.display().to_string()).clicked() {
-                    self.files.open(&mut self.session, path);
-                }
-            }
-        });
-        ui.separator();
-        if ui.button("Render still").clicked() {
-            self.files.render(&mut self.session, true);
-        }
-        if ui.button("Render shot").clicked() {
-            self.files.render(&mut self.session, false);
-        }
-        if let Some(shooting) = &self.files.shooting
-            && ui.button("Stop rendering").clicked()
-        {
-            shooting.stop();
-        }
-        if ui.button("Reload plates and meshes").clicked() {
-            self.session.reload_assets();
-        }
+        self.files.menu(ui, &mut self.session);
     }
 
     fn examples_menu(&mut self, ui: &mut Ui) {
@@ -101,11 +69,11 @@ impl Studio {
 
     /// Unsaved work of a studio that did not end well.
     fn offer_recovered(&mut self, ui: &mut Ui) {
-        if self.files.recovered.is_empty() {
+        if self.files.unsaved.recovered.is_empty() {
             return;
         }
         ui.menu_button("Recover", |ui| {
-            for recovered in self.files.recovered.clone() {
+            for recovered in self.files.unsaved.recovered.clone() {
                 let origin = if recovered.origin.is_empty() { "a scene never saved" } else { &recovered.origin };
                 if ui.button(origin).clicked() {
                     self.recover(&recovered);
@@ -117,14 +85,15 @@ impl Studio {
     }
 
     fn recover(&mut self, recovered: &Recovered) {
-        let path = (!recovered.origin.is_empty()).then(|| PathBuf::from(&recovered.origin));
+        let named = Some(&recovered.origin).filter(|origin| !origin.is_empty());
+        // A page knows names, but no files.
+        let path = named.filter(|_| !cfg!(target_arch = "wasm32")).map(PathBuf::from);
         let saved = path.as_deref().and_then(|path| files::read(path).ok()).unwrap_or_default();
-        let name = path.as_ref().map_or_else(|| "scene".into(), |path| path.display().to_string());
+        let name = named.map_or("scene", String::as_str);
         let mut document = Document::new(name, saved);
         document.replace("recover", &recovered.text);
         document.seal();
         self.session.open(document, path);
-        recovered.forget();
-        self.files.recovered.retain(|other| other != recovered);
+        self.files.unsaved.forget(recovered);
     }
 }

@@ -1,9 +1,6 @@
 //! The window: panels over one [`Session`]. It holds no formulas of any phenomenon.
 
 mod aurora;
-#[cfg(target_arch = "wasm32")]
-mod browser;
-mod chooser;
 mod curve_editor;
 mod files;
 mod gesture;
@@ -14,11 +11,13 @@ mod keyed;
 mod layout;
 mod menu;
 mod problems;
-mod question;
+mod rate;
+mod relink;
 mod scene_panel;
 mod session;
 mod shortcuts;
 mod status;
+mod store;
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests;
 mod text_panel;
@@ -33,8 +32,8 @@ use eframe::egui;
 
 pub use self::session::{AssetsOf, Session};
 use self::{
-    aurora::AuroraEditor, files::Files, layout::Layout, problems::Wanted, scene_panel::Subject, text_panel::TextPanel,
-    viewport::Viewport,
+    aurora::AuroraEditor, files::Files, layout::Layout, problems::Wanted, scene_panel::Subject, store::Store,
+    text_panel::TextPanel, viewport::Viewport,
 };
 
 /// The kind of phenomenon whose shapes are drawn.
@@ -54,6 +53,11 @@ pub struct Studio {
     opened: u64,
 }
 
+/// How large the window was when it was closed last, or is at first, points of the screen.
+pub fn window_size(home: Option<&std::path::Path>) -> [f32; 2] {
+    Layout::read(Store::new(home.map(Into::into))).window_size()
+}
+
 /// Which parts of the window are open.
 #[derive(Clone, Copy, Debug, Default)]
 struct Shows {
@@ -65,14 +69,15 @@ impl Studio {
     /// A window on `session`. `home` is where the studio keeps recent files and unsaved work; without it, nothing is kept.
     pub fn new(session: Session, home: Option<std::path::PathBuf>) -> Self {
         let subject = Subject::first_of(&session.document);
-        let layout = Layout::read(home.as_deref());
+        let store = Store::new(home);
+        let layout = Layout::read(store.clone());
         Self {
             session,
             subject,
             viewport: Viewport::default(),
             aurora: AuroraEditor::default(),
             text: TextPanel::default(),
-            files: Files::new(home),
+            files: Files::new(&store),
             shows: Shows { text: layout.get("text shown", 0.0) > 0.0, shortcuts: false },
             layout,
             opened: 0,
@@ -108,6 +113,7 @@ impl Studio {
         self.end_gestures(ui);
         self.layout.note_theme(ui.ctx());
         self.layout.note("text shown", f32::from(u8::from(self.shows.text)));
+        self.layout.note_window(ui.ctx());
         self.update(ui);
     }
 
@@ -147,6 +153,10 @@ impl Studio {
         let typing = ui.ctx().egui_wants_keyboard_input();
         if !ui.input(|input| input.pointer.any_down()) && !typing {
             self.session.document.seal();
+            // Pages end without being asked.
+            if cfg!(target_arch = "wasm32") {
+                self.layout.keep();
+            }
         }
     }
 
@@ -165,9 +175,8 @@ impl eframe::App for Studio {
     }
 
     fn on_exit(&mut self) {
-        self.files.end();
-        // A layout that cannot be kept is the usual one at the next start.
-        let _ = self.layout.keep();
+        self.files.unsaved.end();
+        self.layout.keep();
     }
 
     #[cfg(target_arch = "wasm32")]

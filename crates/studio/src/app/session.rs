@@ -11,7 +11,7 @@ use bansho::{
     render::scene::{Place, edit::EditError, operation::Operation},
 };
 
-use super::keyed;
+use super::{keyed, rate::Rate};
 use crate::{
     document::{
         Document, Revision,
@@ -63,24 +63,6 @@ struct Asked {
     draft: bool,
 }
 
-/// Pictures a second, as they come while time passes.
-#[derive(Default)]
-struct Rate {
-    last: Option<f64>,
-    mean_s: Option<f64>,
-}
-
-impl Rate {
-    fn came(&mut self, now: f64) {
-        /// Share of the newest interval in the mean.
-        const NEWEST: f64 = 0.15;
-        if let Some(last) = self.last.replace(now) {
-            let interval = now - last;
-            self.mean_s = Some(self.mean_s.map_or(interval, |mean| mean + NEWEST * (interval - mean)));
-        }
-    }
-}
-
 impl Session {
     /// Opens `document`, which lies in `path`.
     pub fn new(document: Document, path: Option<PathBuf>, player: Box<dyn Player>, assets_of: AssetsOf) -> Self {
@@ -124,6 +106,7 @@ impl Session {
 
     /// Takes the bytes of a file that no folder holds.
     pub fn give(&mut self, name: &str, bytes: Vec<u8>) {
+        self.player.give(name, &bytes);
         self.bundle.give(name, bytes);
         self.reload_assets();
     }
@@ -145,7 +128,7 @@ impl Session {
 
     /// Pictures a second while time passes.
     pub fn pictures_per_s(&self) -> Option<f64> {
-        self.rate.mean_s.filter(|_| self.transport.is_playing()).map(|mean| 1.0 / mean)
+        self.rate.pictures_per_s().filter(|_| self.transport.is_playing())
     }
 
     /// What the user should know.
@@ -174,14 +157,14 @@ impl Session {
         }
     }
 
-    /// Carries out `operations` on the shapes of aurora `index`.
+    /// Carries out `operations` on the shapes of aurora `index`; what it has then.
     ///
     /// # Errors
     /// An aurora cannot take the shapes that would come of them; nothing is changed then.
-    pub fn reshape(&mut self, label: &str, operations: &[Operation], index: usize) -> Result<(), Refusal> {
-        self.document.reshape(label, operations, index, &self.assets)?;
+    pub fn reshape(&mut self, label: &str, operations: &[Operation], index: usize) -> Result<Drawing, Refusal> {
+        let drawing = self.document.reshape(label, operations, index, &self.assets)?;
         self.notice = None;
-        Ok(())
+        Ok(drawing)
     }
 
     /// Goes to the frame at `time`, s; once the scene is checked, also where that makes the shot longer.
@@ -344,37 +327,6 @@ fn assets(bundle: &Bundle, path: Option<&Path>, assets_of: AssetsOf) -> Arc<dyn 
 }
 
 /// The folder that paths in a scene are relative to.
-fn folder(path: Option<&Path>) -> &Path {
+pub(super) fn folder(path: Option<&Path>) -> &Path {
     path.and_then(Path::parent).unwrap_or(Path::new(""))
-}
-
-impl Session {
-    /// Lets `place` name the file `file`.
-    pub fn relink(&mut self, place: &Place, file: &Path) {
-        let value = self.named(file);
-        self.edit("relink", &[Operation::Set { place: place.clone(), value }]);
-        self.reload_assets();
-    }
-
-    /// `file` as the scene names it: relative to its folder where it lies there.
-    fn named(&self, file: &Path) -> Value {
-        let folder = folder(self.path.as_deref());
-        let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
-        let relative = file.strip_prefix(folder).or_else(|_| file.strip_prefix(whole)).unwrap_or(file);
-        Value::Text(relative.to_string_lossy().replace('\\', "/"))
-    }
-
-    /// Takes a file that was dropped on the window: a drawing becomes the aurora's first shape, a picture the plate.
-    pub fn lay_over(&mut self, file: &Path) {
-        let value = self.named(file);
-        if file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg")) {
-            match Drawing::read(self.document.values(), 0, &self.assets) {
-                Ok(drawing) => self.edit("drawing", &drawing.trace(value)),
-                Err(reason) => self.notice = Some(reason.to_string()),
-            }
-        } else {
-            let place = Place::root().key("plate").key("image");
-            self.edit("plate", &[Operation::Set { place, value }]);
-        }
-    }
 }

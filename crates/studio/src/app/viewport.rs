@@ -75,7 +75,7 @@ impl Viewport {
     }
 
     fn tools(&mut self, ui: &mut Ui, session: &mut Session) {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.selectable_value(&mut self.tool, Tool::Camera, "Camera")
                 .on_hover_text("Drag to orbit, with Shift or the middle button to pan, scroll to dolly");
             ui.selectable_value(&mut self.tool, Tool::Wind, "Blow").on_hover_text("Drag to blow: the drag is the wind");

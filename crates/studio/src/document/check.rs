@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use bansho::{
-    Assets, KINDS, Plan, PlanError, PlanOptions, SceneError,
+    Assets, KINDS, Plan, PlanOptions, SceneError,
     base::parameters::{Problem, ProblemKind, Table, Value},
     parse_scene,
     render::scene::{
-        Place,
+        Place, Scene,
         operation::{self, Operation},
         values,
     },
@@ -19,11 +19,30 @@ use bansho::{
 /// Every fault of the text and of the assets it names.
 pub fn check(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<Arc<Plan>, SceneError> {
     let scene = parse_scene(name, text, assets.as_ref())?;
-    match Plan::new(scene, &PlanOptions::default(), assets.clone()) {
-        Ok(plan) => Ok(Arc::new(plan)),
-        Err(error) => {
-            Err(SceneError { file: name.to_owned(), text: text.to_owned(), problems: vec![unplaced(&error)] })
+    let plan = Plan::new(scene, &PlanOptions::default(), assets.clone());
+    plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
+}
+
+/// The plan of the scene `text` where another [`check`] found its exposure, or why it cannot be planned. Of a good scene no
+/// phenomenon is made, so that it takes a moment.
+///
+/// # Errors
+/// Every fault of the text and of the assets it names, or what the other check found.
+pub fn recheck(
+    name: &str,
+    text: &str,
+    assets: &Arc<dyn Assets>,
+    exposure_ev100: Result<f32, String>,
+) -> Result<Arc<Plan>, SceneError> {
+    let unplaced = |reason: String| unplaced(name, text, reason);
+    match exposure_ev100 {
+        Ok(ev100) => {
+            let plan =
+                Plan::exposed(Scene::reparse(name, text, KINDS)?, &PlanOptions::default(), assets.clone(), ev100);
+            plan.map(Arc::new).map_err(|error| unplaced(error.to_string()))
         }
+        // The faults with their places, where they have any.
+        Err(reason) => Err(parse_scene(name, text, assets.as_ref()).err().unwrap_or_else(|| unplaced(reason))),
     }
 }
 
@@ -73,8 +92,9 @@ fn usual(kind: &str, keys: &[&str]) -> Option<f64> {
 }
 
 /// A fault that only planning shows, which lies in no one line.
-fn unplaced(error: &PlanError) -> Problem {
-    Problem { span: None, path: String::new(), kind: ProblemKind::Conflict(error.to_string()) }
+fn unplaced(name: &str, text: &str, reason: String) -> SceneError {
+    let problem = Problem { span: None, path: String::new(), kind: ProblemKind::Conflict(reason) };
+    SceneError { file: name.to_owned(), text: text.to_owned(), problems: vec![problem] }
 }
 
 #[cfg(test)]
@@ -104,5 +124,18 @@ mod tests {
         let error = draft(text).and_then(Result::err).unwrap();
         assert_eq!(error.text, text);
         assert!(error.problems[0].to_string().contains("no_such_key"));
+    }
+
+    #[test]
+    fn what_another_check_found_gives_the_same_plan_without_its_work() {
+        let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
+        let text = "bansho = 1\n[picture]\nframes = 9\n[[flame_sheet]]\n";
+        let first = check("scene", text, &assets).unwrap();
+        let again = recheck("scene", text, &assets, Ok(first.exposure_ev100)).unwrap();
+        assert_eq!((again.exposure_ev100, again.frames()), (first.exposure_ev100, 0..9));
+        let told = recheck("scene", text, &assets, Err("a burner lies in a wall".into())).err().unwrap();
+        assert!(told.to_string().contains("a burner lies in a wall"));
+        let faulty = recheck("scene", "bansho = 1\n[[flame_shet]]\n", &assets, Err("a fault".into())).err().unwrap();
+        assert!(faulty.to_string().contains("flame_shet"));
     }
 }

@@ -24,14 +24,14 @@ use bansho::{
     },
 };
 
-pub use check::{check, check_draft};
+pub use check::{check, check_draft, recheck};
 pub use phenomena::{Listed, operations};
 
 use history::History;
 
 /// Counts the states of a document, so that work on one can be told from work on another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Revision(u64);
+pub struct Revision(pub(crate) u64);
 
 /// A scene that is being edited.
 pub struct Document {

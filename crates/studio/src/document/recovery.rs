@@ -62,7 +62,7 @@ impl Autosave {
             return Ok(());
         }
         let origin = origin.map(|path| path.display().to_string()).unwrap_or_default();
-        atomic::write_bytes(&self.kept, format!("{HEADING}{origin}\n{}", document.text()).as_bytes())
+        atomic::write_bytes(&self.kept, kept(&origin, document.text()).as_bytes())
     }
 
     /// Ends well: nothing is left to recover.
@@ -71,6 +71,11 @@ impl Autosave {
         let _ = fs::remove_file(&self.kept);
         let _ = fs::remove_file(&self.lock);
     }
+}
+
+/// Work of `origin` as it is kept.
+pub fn kept(origin: &str, text: &str) -> String {
+    format!("{HEADING}{origin}\n{text}")
 }
 
 /// The work in `folder` that no running studio holds.
@@ -87,13 +92,18 @@ fn is_held(kept: &Path) -> bool {
 }
 
 fn read(file: PathBuf) -> Option<Recovered> {
-    let kept = fs::read_to_string(&file).ok()?;
-    let (heading, text) = kept.split_once('\n')?;
-    let origin = heading.strip_prefix(HEADING)?;
-    Some(Recovered { origin: origin.to_owned(), text: text.to_owned(), file })
+    let recovered = Recovered::of(&fs::read_to_string(&file).ok()?)?;
+    Some(Recovered { file, ..recovered })
 }
 
 impl Recovered {
+    /// Work as it was [`kept`], in no file.
+    pub fn of(kept: &str) -> Option<Self> {
+        let (heading, text) = kept.split_once('\n')?;
+        let origin = heading.strip_prefix(HEADING)?;
+        Some(Self { origin: origin.to_owned(), text: text.to_owned(), file: PathBuf::new() })
+    }
+
     /// Forgets it, once it is open again or not wanted.
     pub fn forget(&self) {
         // What cannot be removed is offered again, which does no harm.

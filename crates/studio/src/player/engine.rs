@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bansho::{
-    Backend, BitDepth, CpuBackend, DisplayImage, Observer, Plan, RenderError, Shot, View,
+    Assets, Backend, BitDepth, CpuBackend, DisplayImage, Observer, Plan, RenderError, Shot, View,
     base::image::{DisplayPixels, Frame, Rect},
     display,
 };
@@ -15,8 +15,8 @@ use crate::document::{Revision, check, check_draft};
 /// What is kept from one wish to the next.
 #[derive(Default)]
 pub(super) struct Engine {
-    /// Which state was judged, and whether as a draft if it could be one.
-    judged: Option<(Revision, bool)>,
+    /// Which state was judged with which assets, and whether as a draft if it could be one.
+    judged: Option<(Revision, Arc<dyn Assets>, bool)>,
     /// The last good plan, at the scene's own size, and whether it is a draft.
     plan: Option<(Arc<Plan>, bool)>,
     shot: Option<Opened>,
@@ -42,12 +42,15 @@ impl Engine {
         emit: &mut dyn FnMut(Event),
     ) -> Result<(), RenderError> {
         let draft = wish.draft && !wish.exact;
-        if self.judged != Some((wish.revision, draft)) {
-            let Wish { name, text, assets, .. } = wish;
+        let Wish { name, text, assets, .. } = wish;
+        let same = |(revision, own, as_draft): &(Revision, Arc<dyn Assets>, bool)| {
+            (*revision, *as_draft) == (wish.revision, draft) && Arc::ptr_eq(own, assets)
+        };
+        if !self.judged.as_ref().is_some_and(same) {
             let drafted = if draft { check_draft(name, text, assets) } else { None };
             let is_draft = drafted.is_some();
             let outcome = drafted.unwrap_or_else(|| check(name, text, assets));
-            self.judged = Some((wish.revision, draft));
+            self.judged = Some((wish.revision, assets.clone(), draft));
             if let Ok(plan) = &outcome {
                 self.plan = Some((plan.clone(), is_draft));
             }
@@ -60,8 +63,9 @@ impl Engine {
     }
 
     /// Forgets the shot, as after a panic in it.
+    #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn forget(&mut self) {
-        *self = Self { judged: self.judged, plan: self.plan.take(), ..Self::default() };
+        *self = Self { judged: self.judged.take(), plan: self.plan.take(), ..Self::default() };
     }
 
     fn draw(&mut self, plan: &Arc<Plan>, wish: &Wish, observer: &dyn Observer) -> Result<Picture, RenderError> {

@@ -1,19 +1,24 @@
 //! Pictures of a document, drawn off the window's thread, and the time that is played.
 //!
 //! A window says what it wants to see ([`Wish`]); the newest wish wins. Natively a thread with a rayon pool fulfils it
-//! ([`ThreadPlayer`]); where there are no threads, as on the web, [`SlicePlayer`] works in slices between two pictures of
-//! the window. Both report [`Event`]s.
+//! (`ThreadPlayer`), in a page a worker (`WorkerPlayer`), in which [`SlicePlayer`] works in slices between two looks at what
+//! is wanted. All report [`Event`]s.
 
 mod engine;
+#[cfg(target_arch = "wasm32")]
+mod message;
 mod pace;
 pub mod shoot;
 mod slices;
+mod stages;
 mod states;
 #[cfg(test)]
 mod tests;
 #[cfg(not(target_arch = "wasm32"))]
 mod thread;
 mod transport;
+#[cfg(target_arch = "wasm32")]
+mod worker;
 
 use std::sync::Arc;
 
@@ -26,6 +31,8 @@ pub use slices::SlicePlayer;
 #[cfg(not(target_arch = "wasm32"))]
 pub use thread::{StartError, ThreadPlayer};
 pub use transport::Transport;
+#[cfg(target_arch = "wasm32")]
+pub use worker::{WorkerPlayer, serve};
 
 /// What a window wants to see.
 #[derive(Clone)]
@@ -108,6 +115,10 @@ pub trait Player {
 
     /// Whether a wish is not fulfilled yet.
     fn is_busy(&self) -> bool;
+
+    /// Takes the bytes of a file that no folder holds. Only players that work elsewhere need them: others find the file in
+    /// the assets of a wish.
+    fn give(&mut self, _name: &str, _bytes: &[u8]) {}
 
     /// Whether nothing more happens unless it is polled.
     fn waits_for_poll(&self) -> bool;

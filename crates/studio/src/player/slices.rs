@@ -1,15 +1,14 @@
-//! Wishes fulfilled in slices of the window's own thread, where there is no other.
+//! Wishes fulfilled in slices of the caller's own thread.
 
 use std::time::Duration;
 
-use bansho::{Observer, RenderError, Stage};
-use std::sync::atomic::{AtomicBool, Ordering};
+use bansho::RenderError;
 use web_time::Instant;
 
-use super::{Event, Player, Wish, engine::Engine};
+use super::{Event, Player, Wish, engine::Engine, stages::Stages};
 
-/// Longest stretch of simulation between two pictures of the window; drawing comes on top, and [`Pace`](super::Pace)
-/// keeps that as short.
+/// Longest stretch of simulation between two looks at what else is wanted; drawing comes on top, and
+/// [`Pace`](super::Pace) keeps that as short.
 const SLICE: Duration = Duration::from_millis(40);
 
 /// Works while it is polled.
@@ -19,30 +18,6 @@ pub struct SlicePlayer {
     wish: Option<Wish>,
 }
 
-/// Stops a simulation, which goes on where it stands, when its slice is over; never a drawing, which would be lost.
-struct Slice {
-    began: Instant,
-    advancing: AtomicBool,
-}
-
-impl Observer for Slice {
-    fn begin(&self, stage: Stage) {
-        if stage == Stage::Advance {
-            self.advancing.store(true, Ordering::Relaxed);
-        }
-    }
-
-    fn end(&self, stage: Stage) {
-        if stage == Stage::Advance {
-            self.advancing.store(false, Ordering::Relaxed);
-        }
-    }
-
-    fn cancelled(&self) -> bool {
-        self.advancing.load(Ordering::Relaxed) && self.began.elapsed() > SLICE
-    }
-}
-
 impl Player for SlicePlayer {
     fn wish(&mut self, wish: Wish) {
         self.wish = Some(wish);
@@ -50,7 +25,8 @@ impl Player for SlicePlayer {
 
     fn poll(&mut self) -> Vec<Event> {
         let Some(wish) = self.wish.take() else { return Vec::new() };
-        let slice = Slice { began: Instant::now(), advancing: AtomicBool::new(false) };
+        let began = Instant::now();
+        let slice = Stages::new(|advancing| advancing && began.elapsed() > SLICE);
         let mut events = Vec::new();
         match self.engine.fulfil(&wish, &slice, &mut |event| events.push(event)) {
             Ok(()) => {}

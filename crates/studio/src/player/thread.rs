@@ -11,9 +11,9 @@ use std::{
     thread::JoinHandle,
 };
 
-use bansho::{Observer, RenderError, Stage};
+use bansho::RenderError;
 
-use super::{Event, Player, Wish, engine::Engine};
+use super::{Event, Player, Wish, engine::Engine, stages::Stages};
 
 /// Draws on a thread of its own, in a pool of as many threads as the machine has cores.
 pub struct ThreadPlayer {
@@ -53,34 +53,10 @@ impl Desk {
             slot = self.left.wait(slot).unwrap_or_else(PoisonError::into_inner);
         }
     }
-}
 
-/// Stops work that nobody wants any more: a simulation at once, for it goes on where it stands; a drawing only where
-/// the one before it was not stopped too, so that hands that never rest still see pictures.
-struct Watch<'a> {
-    desk: &'a Desk,
-    number: u64,
-    advancing: AtomicBool,
-    must_draw: bool,
-}
-
-impl Observer for Watch<'_> {
-    fn begin(&self, stage: Stage) {
-        if stage == Stage::Advance {
-            self.advancing.store(true, Ordering::Relaxed);
-        }
-    }
-
-    fn end(&self, stage: Stage) {
-        if stage == Stage::Advance {
-            self.advancing.store(false, Ordering::Relaxed);
-        }
-    }
-
-    fn cancelled(&self) -> bool {
-        let stale = self.desk.newest.load(Ordering::Relaxed) != self.number;
-        self.desk.closing.load(Ordering::Relaxed)
-            || (stale && (self.advancing.load(Ordering::Relaxed) || !self.must_draw))
+    /// Whether nobody wants wish `number` any more: the player closes, or what is under way `may_stop` for a newer wish.
+    fn has_moved_on(&self, number: u64, may_stop: bool) -> bool {
+        self.closing.load(Ordering::Relaxed) || (may_stop && self.newest.load(Ordering::Relaxed) != number)
     }
 }
 
@@ -120,11 +96,14 @@ pub enum StartError {
     Thread(#[from] std::io::Error),
 }
 
+/// Fulfils wishes until the player closes. Work that nobody wants any more is stopped: a simulation at once, for it goes
+/// on where it stands; a drawing only where the one before it was not stopped too, so that hands that never rest still
+/// see pictures.
 fn work(desk: &Desk, emit: &mut dyn FnMut(Event)) {
     let mut engine = Engine::default();
     let mut must_draw = false;
     while let Some((wish, number)) = desk.take() {
-        let watch = Watch { desk, number, advancing: AtomicBool::new(false), must_draw };
+        let watch = Stages::new(|advancing| desk.has_moved_on(number, advancing || !must_draw));
         let outcome = catch_unwind(AssertUnwindSafe(|| engine.fulfil(&wish, &watch, emit)));
         desk.done.store(number, Ordering::Relaxed);
         must_draw = matches!(outcome, Ok(Err(RenderError::Cancelled(_))));

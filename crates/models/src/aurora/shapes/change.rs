@@ -119,6 +119,11 @@ impl Change {
         }
     }
 
+    /// The tracks of chain `chain`, along it.
+    pub(super) fn tracks_of(&self, chain: usize) -> Vec<usize> {
+        self.chains[chain].iter().flat_map(|&link| self.along(link)).collect()
+    }
+
     /// The tracks of a strand in the direction of its chain.
     pub(super) fn along(&self, link: Link) -> Vec<usize> {
         let mut tracks = self.strands[link.strand].clone();
@@ -137,7 +142,7 @@ fn born(parents: Parents, knot: usize, tracks: &mut Vec<Track>) -> usize {
 }
 
 /// The index of the sheet that a person calls `number`.
-fn sheet_index(number: i64, count: usize) -> Result<usize, ShapeFaultKind> {
+pub(super) fn sheet_index(number: i64, count: usize) -> Result<usize, ShapeFaultKind> {
     let index = usize::try_from(number - 1).ok().filter(|&index| index < count);
     index.ok_or(ShapeFaultKind::NoSuchSheet { sheet: number, count })
 }

@@ -84,7 +84,9 @@ pub enum ShapeFaultKind {
         most: usize,
     },
     /// The first shape comes from nothing.
-    #[error("the first shape has none before it; `split` and `merge` stand at the shape that the change leads to")]
+    #[error(
+        "the first shape has none before it; `split`, `merge` and `link` stand at the shape that the change leads to"
+    )]
     NothingBefore,
     /// A sheet that is not there.
     #[error("there is no sheet {sheet} in the shape before; allowed: 1 to {count}")]
@@ -139,6 +141,21 @@ pub enum ShapeFaultKind {
         /// The sheet.
         sheet: usize,
     },
+    /// Links of one sheet to two, or of two to one.
+    #[error("sheet {sheet} is linked to another sheet already; allowed: one sheet each")]
+    LinkedTwice {
+        /// The sheet of this shape.
+        sheet: usize,
+    },
+    /// A link that says where a point arrives and not where it leaves.
+    #[error("says `arrives`, but not which point does; allowed: together with `at`")]
+    HalfALink,
+    /// Linked points that change their order.
+    #[error("two linked points of a sheet would pass each other; allowed: points in the order of the sheet")]
+    LinksCross,
+    /// A link where nothing goes by place.
+    #[error("sheets and points go in drawing order here; allowed with `correspondence = \"automatic\"`")]
+    LinkInOrder,
     /// A sheet that is said in several ways.
     #[error("sheet {sheet} says more than one of `points`, `path` and `form`; allowed: one of them")]
     SeveralSources {

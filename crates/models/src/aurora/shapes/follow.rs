@@ -4,12 +4,13 @@ use bansho_base::{assets::Assets, curve::Curve, math::DVec2};
 
 use super::{
     Correspondence, MotionParameters, ShapeFault, ShapeFaultKind, ShapeParameters,
+    anchors::Anchors,
     change::{Change, Link},
     drawn::{DrawnSheet, Place, drawn_sheets},
     matching::{Match, match_sheets},
     polyline::{Polyline, shares},
     track::{Knot, Track},
-    warp::warp,
+    warp::warp_through,
 };
 
 /// Tracks, and which of them make up the sheets.
@@ -48,12 +49,17 @@ pub(super) fn follow(
             let kind = ShapeFaultKind::Unmatched { found: drawn[index].len(), expected };
             return Err(ShapeFault { key: format!("shapes.{index}.sheets"), kind });
         }
+        if in_order && !parameters.link.is_empty() {
+            return Err(ShapeFault { key: format!("shapes.{index}.link"), kind: ShapeFaultKind::LinkInOrder });
+        }
         if in_order {
             followed.go_in_order(&change, &drawn[index], motion);
         } else {
             change.refine(motion.point_count(), index - 1, &mut followed.tracks);
+            let before = &followed.shapes[index - 1];
+            let anchors = Anchors::new(&parameters.link, index, before, &change, &followed.tracks)?;
             let closes = followed.returns && index == shapes.len() - 1;
-            followed.go_nearest(&change, &drawn[index], closes, evenness);
+            followed.go_nearest(&change, &drawn[index], &anchors, closes, evenness);
         }
         followed.strands.push(change.strands);
     }
@@ -67,6 +73,7 @@ struct Goal<'a> {
     /// The tracks of that sheet in the first shape, if it shall be reached again point by point.
     first: Option<Vec<usize>>,
     evenness: f64,
+    anchors: &'a Anchors,
 }
 
 /// Whether two drawn shapes are the same, sheet by sheet.
@@ -140,7 +147,7 @@ impl Followed {
     }
 
     /// By place: each chain of strands to the sheet that it is matched with, each point to one by length and nearness.
-    fn go_nearest(&mut self, change: &Change, drawn: &[DrawnSheet], closes: bool, evenness: f64) {
+    fn go_nearest(&mut self, change: &Change, drawn: &[DrawnSheet], anchors: &Anchors, closes: bool, evenness: f64) {
         let knot = self.shapes.len() - 1;
         let position = |track: &usize| self.tracks[*track].knot(knot).position;
         let line = |chain: &Vec<Link>| -> Vec<DVec2> {
@@ -149,11 +156,11 @@ impl Followed {
         // A strand has at least two points, so that no line is left out.
         let sources: Vec<Polyline> = change.chains.iter().filter_map(|chain| Polyline::new(line(chain))).collect();
         let targets: Vec<&Polyline> = drawn.iter().map(|sheet| &sheet.line).collect();
-        let matches = match_sheets(&sources, &targets);
+        let matches = match_sheets(&sources, &targets, &anchors.wanted);
         let mut sheets = vec![Vec::new(); drawn.len()];
         for (chain, of) in change.chains.iter().zip(matches) {
             let first = closes.then(|| self.shapes[0][of.target].clone());
-            let goal = Goal { drawn: &drawn[of.target], of, first, evenness };
+            let goal = Goal { drawn: &drawn[of.target], of, first, evenness, anchors };
             let mut sheet = self.go_along(change, chain, &goal);
             if of.reversed {
                 sheet.reverse();
@@ -165,7 +172,7 @@ impl Followed {
 
     /// Moves the strands of a chain to their parts of a sheet; the sheet's tracks, along the chain.
     fn go_along(&mut self, change: &Change, chain: &[Link], goal: &Goal) -> Vec<usize> {
-        let Goal { drawn, of, first, evenness } = goal;
+        let Goal { drawn, of, first, evenness, anchors } = goal;
         let knot = self.shapes.len() - 1;
         let strands: Vec<Vec<usize>> = chain.iter().map(|&link| change.along(link)).collect();
         let points: Vec<Vec<DVec2>> = strands
@@ -175,13 +182,15 @@ impl Followed {
         let mut sheet: Vec<usize> = Vec::new();
         for ((strand, points), range) in strands.iter().zip(&points).zip(parts(&points)) {
             let range = if of.reversed { range.map(|share| 1.0 - share) } else { range };
+            let linked = anchors.along(strand, range);
             let again = first.as_ref().filter(|first| chain.len() == 1 && first.len() == strand.len());
+            let again = again.filter(|_| linked.is_empty());
             let knots: Vec<Knot> = match again {
                 Some(first) => first.iter().map(|&track| self.tracks[track].knot(0)).collect(),
                 None => {
                     let knot =
                         |share: f64| Knot { position: drawn.line.at(share), values: values(&drawn.curves, share) };
-                    warp(points, &drawn.line, range, *evenness).into_iter().map(knot).collect()
+                    warp_through(points, &drawn.line, range, &linked, *evenness).into_iter().map(knot).collect()
                 }
             };
             let turned = again.is_some() && of.reversed;

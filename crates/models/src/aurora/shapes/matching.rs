@@ -17,8 +17,22 @@ pub(super) struct Match {
     pub(super) reversed: bool,
 }
 
+/// What a person asks of a sheet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Wanted {
+    pub(super) target: Option<usize>,
+    pub(super) reversed: Option<bool>,
+}
+
+impl Wanted {
+    fn allows(&self, of: Match) -> bool {
+        self.target.is_none_or(|target| target == of.target) && self.reversed.is_none_or(|turned| turned == of.reversed)
+    }
+}
+
 /// Sheets and targets as evenly spaced points, as many of one as of the other.
-struct Comparison {
+struct Comparison<'a> {
+    wanted: &'a [Wanted],
     sources: Vec<Vec<DVec2>>,
     targets: Vec<Vec<DVec2>>,
     /// Mean length of a sheet and its target weighs their motion.
@@ -26,22 +40,28 @@ struct Comparison {
 }
 
 /// The target of each source such that all together move least, and no two cross on the way where that can be had by
-/// exchanging two targets or turning one round.
-pub(super) fn match_sheets(sources: &[Polyline], targets: &[&Polyline]) -> Vec<Match> {
+/// exchanging two targets or turning one round. What is `wanted` of a source comes first.
+pub(super) fn match_sheets(sources: &[Polyline], targets: &[&Polyline], wanted: &[Wanted]) -> Vec<Match> {
     let comparison = Comparison {
+        wanted,
         sources: sources.iter().map(|line| line.evenly(SAMPLES)).collect(),
         targets: targets.iter().map(|line| line.evenly(SAMPLES)).collect(),
         lengths: [sources.iter().map(Polyline::length).collect(), targets.iter().map(|line| line.length()).collect()],
     };
     let count = sources.len();
     let best: Vec<(f64, bool)> = (0..count * count).map(|pair| comparison.best(pair / count, pair % count)).collect();
-    let columns = assign(count, |source, target| best[source * count + target].0);
+    // More than all sheets could move together.
+    let forbidden = 1.0 + best.iter().map(|(motion, _)| motion).sum::<f64>();
+    let columns = assign(count, |source, target| {
+        let elsewhere = wanted[source].target.is_some_and(|own| own != target);
+        best[source * count + target].0 + if elsewhere { forbidden } else { 0.0 }
+    });
     let matched = |(source, target): (usize, usize)| Match { target, reversed: best[source * count + target].1 };
     let found = columns.into_iter().enumerate().map(matched).collect();
     comparison.untangled(found)
 }
 
-impl Comparison {
+impl Comparison<'_> {
     fn target(&self, of: Match) -> impl Iterator<Item = DVec2> {
         let points = &self.targets[of.target];
         (0..SAMPLES).map(move |index| points[if of.reversed { SAMPLES - 1 - index } else { index }])
@@ -57,6 +77,9 @@ impl Comparison {
     /// The lesser motion of the two ways round, and whether it is the reverse one.
     fn best(&self, source: usize, target: usize) -> (f64, bool) {
         let [straight, turned] = [false, true].map(|reversed| self.motion(source, Match { target, reversed }));
+        if let Some(reversed) = self.wanted[source].reversed {
+            return (if reversed { turned } else { straight }, reversed);
+        }
         if turned < straight { (turned, true) } else { (straight, false) }
     }
 
@@ -81,7 +104,9 @@ impl Comparison {
         let less = |a: (usize, f64), b: (usize, f64)| a.0 < b.0 || (a.0 == b.0 && a.1 < b.1 * (1.0 - 1e-12));
         let mut cost = self.cost(&matches);
         while cost.0 > 0 {
-            let candidates = self.neighbours(&matches).into_iter().map(|other| (self.cost(&other), other));
+            let allowed = |other: &Vec<Match>| other.iter().zip(self.wanted).all(|(of, wanted)| wanted.allows(*of));
+            let candidates = self.neighbours(&matches).into_iter().filter(allowed);
+            let candidates = candidates.map(|other| (self.cost(&other), other));
             let best = candidates.reduce(|a, b| if less(b.0, a.0) { b } else { a });
             match best {
                 Some((better, other)) if less(better, cost) => (cost, matches) = (better, other),
@@ -119,7 +144,11 @@ mod tests {
     }
 
     fn matches(sources: &[Polyline], targets: &[Polyline]) -> Vec<(usize, bool)> {
-        let found = match_sheets(sources, &targets.iter().collect::<Vec<_>>());
+        wanted_matches(sources, targets, &vec![Wanted::default(); sources.len()])
+    }
+
+    fn wanted_matches(sources: &[Polyline], targets: &[Polyline], wanted: &[Wanted]) -> Vec<(usize, bool)> {
+        let found = match_sheets(sources, &targets.iter().collect::<Vec<_>>(), wanted);
         found.into_iter().map(|of| (of.target, of.reversed)).collect()
     }
 
@@ -128,6 +157,16 @@ mod tests {
         let sources = [line([0.0, 0.0], [10.0, 0.0]), line([0.0, 5.0], [10.0, 5.0])];
         let targets = [line([10.0, 6.0], [0.0, 6.0]), line([0.0, 1.0], [10.0, 1.0])];
         assert_eq!(matches(&sources, &targets), [(1, false), (0, true)]);
+    }
+
+    #[test]
+    fn what_a_person_wants_comes_before_what_is_near() {
+        let sources = [line([0.0, 0.0], [10.0, 0.0]), line([0.0, 5.0], [10.0, 5.0])];
+        let targets = [line([10.0, 6.0], [0.0, 6.0]), line([0.0, 1.0], [10.0, 1.0])];
+        let mut wanted = [Wanted::default(), Wanted { target: Some(1), reversed: None }];
+        assert_eq!(wanted_matches(&sources, &targets, &wanted), [(0, true), (1, false)]);
+        wanted[1].reversed = Some(true);
+        assert_eq!(wanted_matches(&sources, &targets, &wanted), [(0, true), (1, true)]);
     }
 
     #[test]
@@ -144,10 +183,12 @@ mod tests {
         let sources = [line([0.0, 0.0], [10.0, 0.0]), line([-1.0, 4.0], [-1.0, 9.0])];
         let targets = [line([0.0, 10.1], [0.0, 0.0]), line([-1.0, 4.0], [-1.0, 9.0])];
         let lines: Vec<&Polyline> = targets.iter().collect();
-        let found = match_sheets(&sources, &lines);
+        let wanted = [Wanted::default(); 2];
+        let found = match_sheets(&sources, &lines, &wanted);
         let comparison = |matches: &[Match]| {
             let sampled = |line: &Polyline| line.evenly(SAMPLES);
             Comparison {
+                wanted: &wanted,
                 sources: sources.iter().map(sampled).collect(),
                 targets: targets.iter().map(sampled).collect(),
                 lengths: [vec![1.0; 2], vec![1.0; 2]],

@@ -5,6 +5,7 @@
 //! Geometry is in km in the plane at 100 km altitude: x east, z south, the observer's nadir at the origin. Points are
 //! [`DVec2`](bansho_base::math::DVec2)s whose second component is z.
 
+mod anchors;
 mod assignment;
 mod cells;
 mod change;
@@ -29,8 +30,8 @@ pub use fault::{ShapeFault, ShapeFaultKind};
 pub use form::Form;
 pub use neighbourhood::Neighbourhood;
 pub use parameters::{
-    Correspondence, FRAME_S, MergeParameters, MotionParameters, ShapeParameters, SheetParameters, Spacing,
-    SplitParameters,
+    Correspondence, FRAME_S, LinkParameters, MergeParameters, MotionParameters, ShapeParameters, SheetParameters,
+    Spacing, SplitParameters,
 };
 pub use segments::{Sample, Segments};
 pub use sequence::Sequence;

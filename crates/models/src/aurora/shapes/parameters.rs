@@ -105,6 +105,20 @@ bansho_base::parameters! {
 }
 
 bansho_base::parameters! {
+    /// A sheet of the shape before that becomes the sheet told, where it would become another by place; or a point on it that arrives where told.
+    pub struct LinkParameters {
+        /// The sheet of the shape before, counted from 1.
+        from: i64 = 1, limits(Range::new(1.0, 1000.0));
+        /// The sheet of this shape that it becomes, counted from 1.
+        to: i64 = 1, limits(Range::new(1.0, 1000.0));
+        /// Share of the first one's length at which a point leaves; where that sheet splits, the part that is meant.
+        at: Option<f64> = None, limits(Range::new(0.0, 1.0));
+        /// Share of the second one's length at which that point arrives; the whole sheet is linked where it is not given. Ends of sheets go to ends.
+        arrives: Option<f64> = None, limits(Range::new(0.0, 1.0));
+    }
+}
+
+bansho_base::parameters! {
     /// The aurora's shape at a moment: its sheets, and what splits or merges on the way there.
     pub struct ShapeParameters {
         /// Time since the shape before was left; 4.667 s (140 frames of the thesis) where nothing is said. The first shape is there at the beginning.
@@ -119,6 +133,8 @@ bansho_base::parameters! {
         split: Vec<SplitParameters> = Vec::new(), limits(Length { min: 0, max: 64, item: () });
         /// Ends of sheets of the shape before that merge on the way.
         merge: Vec<MergeParameters> = Vec::new(), limits(Length { min: 0, max: 64, item: () });
+        /// Sheets of the shape before, and points on them, that go where told rather than by place.
+        link: Vec<LinkParameters> = Vec::new(), limits(Length { min: 0, max: 256, item: () });
     }
 }
 

@@ -148,9 +148,9 @@ fn timing(shapes: &[ShapeParameters]) -> Result<Timing, ShapeFault> {
             (None, Some(frames)) => frames * FRAME_S,
             (None, None) => TRANSITION_S,
         };
-        let changes = !shape.split.is_empty() || !shape.merge.is_empty();
-        if index == 0 && changes {
-            let key = if shape.split.is_empty() { "merge" } else { "split" };
+        let changes =
+            [("split", shape.split.is_empty()), ("merge", shape.merge.is_empty()), ("link", shape.link.is_empty())];
+        if let Some((key, _)) = changes.into_iter().find(|(_, none)| index == 0 && !none) {
             return Err(fault(key, ShapeFaultKind::NothingBefore));
         }
         let arrival = timing.departures.last().map_or(0.0, |departure| departure + after);

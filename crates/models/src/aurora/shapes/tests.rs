@@ -248,3 +248,57 @@ fn long_strokes_are_checked() {
     );
     assert!(matches!(fault.unwrap_err().kind, ShapeFaultKind::CrossesItself { sheet: 1, .. }));
 }
+
+/// Two sheets that stay where they are, with links to the second shape.
+fn linked(link: Vec<LinkParameters>) -> Result<Sequence, ShapeFault> {
+    let sheets = vec![straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 50.0)];
+    let shapes = [shape(sheets.clone()), ShapeParameters { link, ..shape(sheets) }];
+    let motion = MotionParameters { control_points: Auto::Set(11), ..MotionParameters::default() };
+    Sequence::new(&shapes, &motion, EXTENT_KM, &MemoryAssets::default(), None)
+}
+
+fn link(from: i64, to: i64, point: Option<[f64; 2]>) -> LinkParameters {
+    LinkParameters { from, to, at: point.map(|point| point[0]), arrives: point.map(|point| point[1]) }
+}
+
+#[test]
+fn linked_sheets_become_what_they_are_linked_to() {
+    let [straight, exchanged] = [vec![], vec![link(1, 2, None)]].map(|links| linked(links).unwrap().ways(0));
+    assert!(straight.iter().flatten().all(|[from, to]| from.distance(*to) < 1e-6));
+    assert!(
+        exchanged.iter().flatten().all(|[from, to]| (from.y - to.y).abs() > 49.9),
+        "the other goes where one is left"
+    );
+}
+
+#[test]
+fn linked_points_arrive_where_they_are_linked_to() {
+    let ways = linked(vec![link(1, 1, Some([0.3, 0.5])), link(1, 1, Some([0.8, 0.9]))]).unwrap().ways(0);
+    let arrives = |from: f64| ways[0].iter().find(|way| (way[0].x - from).abs() < 1e-6).map(|way| way[1].x);
+    for (from, to) in [(-200.0, -200.0), (-80.0, 0.0), (120.0, 160.0), (200.0, 200.0)] {
+        assert!(arrives(from).is_some_and(|x| (x - to).abs() < 1e-6), "{from}: {:?}", arrives(from));
+    }
+    assert!(ways[1].iter().all(|[from, to]| from.distance(*to) < 1e-6), "the other stays");
+    let turned = linked(vec![link(1, 1, Some([0.3, 0.7])), link(1, 1, Some([0.8, 0.2]))]).unwrap().ways(0);
+    assert!((turned[0][0][1].x - 200.0).abs() < 1e-6, "points that arrive in the other order turn the sheet round");
+}
+
+#[test]
+fn impossible_links_are_refused() {
+    let refused = |links: &[LinkParameters]| linked(links.to_vec()).unwrap_err();
+    let missing = refused(&[link(1, 3, None)]);
+    assert_eq!(
+        (missing.key.as_str(), missing.kind),
+        ("shapes.1.link.0", ShapeFaultKind::NoSuchSheet { sheet: 3, count: 2 })
+    );
+    let twice = refused(&[link(1, 2, None), link(2, 2, None)]);
+    assert_eq!((twice.key.as_str(), twice.kind), ("shapes.1.link.1", ShapeFaultKind::LinkedTwice { sheet: 2 }));
+    let half = LinkParameters { arrives: Some(0.5), ..LinkParameters::default() };
+    assert_eq!(refused(&[half]).kind, ShapeFaultKind::HalfALink);
+    let passing = [[0.2, 0.3], [0.5, 0.8], [0.8, 0.6]].map(|point| link(1, 1, Some(point)));
+    assert_eq!(refused(&passing).kind, ShapeFaultKind::LinksCross);
+    let first = [ShapeParameters { link: vec![link(1, 1, None)], ..shape(vec![straight(0.0, 9.0, 0.0)]) }];
+    let fault =
+        Sequence::new(&first, &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), None).unwrap_err();
+    assert_eq!(fault.kind, ShapeFaultKind::NothingBefore);
+}

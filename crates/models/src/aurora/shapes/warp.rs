@@ -57,6 +57,24 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
     shares
 }
 
+/// As [`warp`], but each of `anchors`, a point and its share, arrives there; both are in order along the points.
+pub(super) fn warp_through(
+    points: &[DVec2],
+    target: &Polyline,
+    range: [f64; 2],
+    anchors: &[(usize, f64)],
+    evenness: f64,
+) -> Vec<f64> {
+    let mut shares = vec![range[0]];
+    let mut start = 0;
+    for (end, share) in anchors.iter().copied().chain([(points.len() - 1, range[1])]) {
+        let part = [shares[start], share];
+        shares.extend(&warp(&points[start..=end], target, part, evenness)[1..]);
+        start = end;
+    }
+    shares
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -86,6 +104,16 @@ mod tests {
         let by_length: f64 = points.iter().map(|point| point.x * 0.5).sum::<f64>() / 31.0;
         assert!(mean < 0.75 * by_length, "{mean} {by_length}");
         assert!(shares.windows(2).all(|pair| pair[1] > pair[0]));
+    }
+
+    #[test]
+    fn anchored_points_arrive_where_they_are_told_and_the_others_between_them() {
+        let points = straight(0.0, 100.0, 11);
+        let target = Polyline::new(points.clone()).unwrap();
+        let shares = warp_through(&points, &target, [0.0, 1.0], &[(3, 0.5), (8, 0.75)], 0.01);
+        assert_eq!((shares.len(), shares[0], shares[3], shares[8], shares[10]), (11, 0.0, 0.5, 0.75, 1.0));
+        assert!(shares.windows(2).all(|pair| pair[1] > pair[0]), "{shares:?}");
+        assert_eq!(warp_through(&points, &target, [0.0, 1.0], &[], 0.01), warp(&points, &target, [0.0, 1.0], 0.01));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     app::session::Session,
-    document::drawing::{Drawing, End, Factor, lines},
+    document::drawing::{Drawing, End, Factor, OnSheet, lines},
 };
 
 /// What is under way.
@@ -24,8 +24,8 @@ pub(super) enum Gesture {
     Holding(usize, usize),
     /// The first of two ends that shall merge.
     FirstEnd(End),
-    /// From a sheet of the source, to be let go over a sheet of the target.
-    Linking { from: usize, at: Pos2 },
+    /// From a place on the source, to be let go over a sheet of the target: the sheet is linked, or the point alone.
+    Linking { from: OnSheet, point_alone: bool, at: Pos2 },
 }
 
 impl Tool {
@@ -47,7 +47,7 @@ impl AuroraEditor {
         ui: &Ui,
         session: &mut Session,
         drawing: &Drawing,
-        plane: &Plane,
+        planes: &[Plane; 2],
         side: Side,
         response: &Response,
     ) {
@@ -55,7 +55,8 @@ impl AuroraEditor {
         if response.is_pointer_button_down_on() && ui.input(|input| input.pointer.any_pressed()) {
             self.refusal = None;
         }
-        let hand = Hand { plane, at, response, from: ui.input(|input| input.pointer.press_origin()).unwrap_or(at) };
+        let from = ui.input(|input| input.pointer.press_origin()).unwrap_or(at);
+        let hand = Hand { plane: &planes[side as usize], at, response, from };
         let way = way(ui);
         let lower = ui.input(|input| input.modifiers.shift);
         match (self.tool, side) {
@@ -66,7 +67,7 @@ impl AuroraEditor {
             (Tool::Energy, Side::Target) => self.brush(session, drawing, &hand, Factor::Energy, lower),
             (Tool::Split, _) if response.clicked() => self.split(session, drawing, &hand),
             (Tool::Merge, _) if response.clicked() => self.merge(session, drawing, &hand),
-            (Tool::Link, _) => self.link(session, drawing, &hand),
+            (Tool::Link, _) => self.link(session, drawing, &hand, side, planes),
             _ => {}
         }
     }
@@ -199,21 +200,41 @@ impl AuroraEditor {
         }
     }
 
-    fn link(&mut self, session: &mut Session, drawing: &Drawing, hand: &Hand) {
+    /// On the left a sheet is taken, on the right one of the points that arrive there; a click there lets a linked one go.
+    fn link(&mut self, session: &mut Session, drawing: &Drawing, hand: &Hand, side: Side, planes: &[Plane; 2]) {
         if hand.response.drag_started_by(PointerButton::Primary) {
             let Some(all) = self.source(drawing, hand) else { return };
-            let from = Hand { at: hand.from, ..*hand }.near(&all, self.tool);
-            self.gesture = from.map_or(Gesture::None, |from| Gesture::Linking { from, at: hand.at });
+            let pressed = Hand { at: hand.from, ..*hand };
+            let from = match side {
+                Side::Source => Some(pressed.point()),
+                Side::Target => pressed.arrival(drawing, self.target - 1),
+            };
+            let from = from.and_then(|from| on_sheet(&all, from, hand.reach(self.tool)));
+            let linking = |from| Gesture::Linking { from, point_alone: side == Side::Target, at: hand.at };
+            self.gesture = from.map_or(Gesture::None, linking);
         }
-        let Gesture::Linking { from, at } = &mut self.gesture else { return };
+        if hand.response.clicked() && side == Side::Target {
+            let freed = drawing.unlink(self.target, hand.point(), hand.reach(self.tool));
+            if !freed.is_empty() {
+                self.change(session, "unlink", &freed, hand.at);
+            }
+        }
+        let Gesture::Linking { from, point_alone, at } = &mut self.gesture else { return };
         *at = hand.at;
-        let from = *from;
+        let (from, point_alone) = (*from, *point_alone);
         if hand.response.drag_stopped() {
             self.gesture = Gesture::None;
-            if let Some(to) = hand.near(&drawing.lines(self.target), self.tool) {
-                let change = drawing.correspond(self.target, from, to);
-                self.change(session, "link", &change, hand.at);
-            }
+            let over = planes.iter().find(|plane| plane.rect.contains(hand.at)).unwrap_or(hand.plane);
+            let let_go = Hand { plane: over, ..*hand };
+            let Some(to) = on_sheet(&drawing.lines(self.target), let_go.point(), let_go.reach(self.tool)) else {
+                return;
+            };
+            let change = if point_alone {
+                drawing.correspond_at(self.target, from, to)
+            } else {
+                drawing.correspond(self.target, from, to.0)
+            };
+            self.change(session, "link", &change, hand.at);
         }
     }
 
@@ -226,6 +247,14 @@ impl AuroraEditor {
         }
         Some(drawing.lines(self.target - 1))
     }
+}
+
+/// The place on one of `all` that is nearest to `point`, within `reach`, km.
+fn on_sheet(all: &[Vec<DVec2>], point: DVec2, reach: f64) -> Option<OnSheet> {
+    let on = |(sheet, line): (usize, &Vec<DVec2>)| Some((sheet, lines::nearest(line, point)?));
+    let nearest = all.iter().enumerate().filter_map(on).min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
+    let (sheet, on) = nearest.filter(|(_, on)| on.distance < reach)?;
+    Some((sheet, lines::share_of(&all[sheet], on)))
 }
 
 /// Where the pointer went with its button down since the last picture: a hand may be faster than the window.
@@ -267,9 +296,15 @@ impl Hand<'_> {
 
     /// The sheet nearest to the pointer, within the reach of `tool`.
     fn near(&self, all: &[Vec<DVec2>], tool: Tool) -> Option<usize> {
-        let on = |(sheet, line): (usize, &Vec<DVec2>)| Some((lines::nearest(line, self.point())?.distance, sheet));
-        let nearest = all.iter().enumerate().filter_map(on).min_by(|a, b| a.0.total_cmp(&b.0));
-        nearest.filter(|near| near.0 < self.reach(tool)).map(|(_, sheet)| sheet)
+        on_sheet(all, self.point(), self.reach(tool)).map(|(sheet, _)| sheet)
+    }
+
+    /// Where the control point leaves shape `before` that arrives nearest to the pointer.
+    fn arrival(&self, drawing: &Drawing, before: usize) -> Option<DVec2> {
+        let ways = drawing.ways(before);
+        let off = |way: &&[DVec2; 2]| way[1].distance(self.point());
+        let nearest = ways.iter().flatten().min_by(|a, b| off(a).total_cmp(&off(b)));
+        nearest.filter(|way| off(way) < self.reach(Tool::Link)).map(|way| way[0])
     }
 
     fn sheet_of(&self, all: &[Vec<DVec2>]) -> Option<usize> {

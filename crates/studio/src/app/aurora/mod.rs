@@ -134,12 +134,15 @@ impl AuroraEditor {
         let gap = ui.spacing().item_spacing.x;
         let side = ui.available_height().min((ui.available_width() - gap) / 2.0).max(80.0);
         ui.horizontal(|ui| {
-            for (which, name) in [(Side::Source, "Aurora source"), (Side::Target, "Aurora target")] {
+            let areas = [(Side::Source, "Aurora source"), (Side::Target, "Aurora target")].map(|(which, name)| {
                 let (response, painter) = ui.allocate_painter(vec2(side, side), Sense::click_and_drag());
                 response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, name));
-                let plane = Plane::new(response.rect, drawing.extent_km());
-                self.hands(ui, session, drawing, &plane, which, &response);
-                self.paint(&painter, drawing, &plane, which, &response);
+                (which, response, painter)
+            });
+            let planes = [0, 1].map(|area: usize| Plane::new(areas[area].1.rect, drawing.extent_km()));
+            for (which, response, painter) in areas {
+                self.hands(ui, session, drawing, &planes, which, &response);
+                self.paint(&painter, drawing, &planes[which as usize], which, &response);
             }
         });
     }
@@ -147,8 +150,9 @@ impl AuroraEditor {
     /// Carries out a change of the shapes, or says at `at` why it cannot be; whether it was.
     fn change(&mut self, session: &mut Session, label: &str, operations: &[Operation], at: Pos2) -> bool {
         match session.reshape(label, operations, self.index) {
-            Ok(_) => {
+            Ok(drawing) => {
                 self.refusal = None;
+                self.read = Some((session.document.revision(), Ok(drawing)));
                 true
             }
             Err(refusal) => {

@@ -9,7 +9,7 @@ use super::{
     plane::{Plane, Side},
     tool::Tool,
 };
-use crate::document::drawing::{Drawing, Factor, lines};
+use crate::document::drawing::{Drawing, Factor, OnSheet, lines};
 
 const GROUND: Color32 = Color32::from_rgb(12, 15, 20);
 const GRID: Color32 = Color32::from_rgb(30, 36, 44);
@@ -64,6 +64,11 @@ impl AuroraEditor {
                 painter.line_segment(way.map(|end| plane.to_screen(end)), Stroke::new(1.0, WAY));
             }
         }
+        for (_, way) in drawing.linked(self.target) {
+            let [from, to] = way.map(|end| plane.to_screen(end));
+            painter.line_segment([from, to], Stroke::new(1.5, MARK));
+            painter.circle_filled(to, 3.5, MARK);
+        }
         let next = self.slot(drawing);
         let usual = !drawing.is_stated();
         for (number, sheet) in drawing.lines(self.target).iter().enumerate() {
@@ -86,8 +91,8 @@ impl AuroraEditor {
             Gesture::Stroke(stroke) => {
                 painter.line(plane.line(stroke), Stroke::new(2.5, NEXT));
             }
-            Gesture::Linking { from, at } => {
-                let start = self.target.checked_sub(1).and_then(|source| middle(&drawing.lines(source), *from));
+            Gesture::Linking { from, at, .. } => {
+                let start = self.target.checked_sub(1).and_then(|source| place_of(&drawing.lines(source), *from));
                 if let Some(start) = start {
                     painter.line_segment([plane.to_screen(start), *at], Stroke::new(2.0, MARK));
                 }
@@ -150,9 +155,9 @@ impl AuroraEditor {
     }
 }
 
-/// The middle of sheet `sheet`.
-fn middle(all: &[Vec<DVec2>], sheet: usize) -> Option<DVec2> {
-    lines::part(all.get(sheet)?, [0.5, 1.0]).first().copied()
+/// Where a place on a sheet lies.
+fn place_of(all: &[Vec<DVec2>], (sheet, share): OnSheet) -> Option<DVec2> {
+    lines::part(all.get(sheet)?, [share, 1.0]).first().copied()
 }
 
 fn ground(painter: &Painter, plane: &Plane) {

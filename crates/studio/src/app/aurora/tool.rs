@@ -38,7 +38,11 @@ impl Tool {
             Self::Erase => ("Erase", "Brush away points of the sheets on the right; a sheet goes with its last two"),
             Self::Split => ("Split", "Click a sheet of the source where it shall split on the way"),
             Self::Merge => ("Merge", "Click two ends of the source that shall grow together on the way"),
-            Self::Link => ("Link", "Drag from a sheet of the source to the sheet on the right that it shall become"),
+            Self::Link => (
+                "Link",
+                "Drag from a sheet of the source to the sheet on the right that it shall become, or on the right one point along \
+                 its sheet to where it shall arrive; click a linked point to let it go",
+            ),
             Self::Brightness => {
                 ("Brightness", "Brush along a sheet on the right to brighten it; with Shift to darken it")
             }

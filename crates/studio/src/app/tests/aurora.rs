@@ -171,3 +171,30 @@ fn points_are_moved_smoothed_brightened_and_erased() {
     let points = drawing(&mut harness).points(0, 0);
     assert!(points[points.len() - 1].x < 230.0, "{points:?}");
 }
+
+#[test]
+fn sheets_and_points_are_linked_by_dragging() {
+    let mut harness = window(SKY);
+    stroke(&mut harness, &[[0.1, 0.4], [0.9, 0.4]]);
+    stroke(&mut harness, &[[0.1, 0.6], [0.9, 0.6]]);
+    choose(&mut harness, "Add shape");
+    choose(&mut harness, "Link");
+    let [source, target] = ["Aurora source", "Aurora target"].map(|name| plane(&harness, name));
+    let link = |harness: &mut Harness<'_, Studio>, from: Pos2, to: Pos2| {
+        press(harness, from);
+        for step in 1..=4 {
+            harness.hover_at(from.lerp(to, step as f32 / 4.0));
+            harness.step();
+        }
+        release(harness, to);
+    };
+    link(&mut harness, at(source, 0.5, 0.4), at(target, 0.5, 0.6));
+    assert!(text(&mut harness).contains("link = [{ from = 1, to = 2 }]"), "{}", text(&mut harness));
+    link(&mut harness, at(source, 0.5, 0.4), at(target, 0.5, 0.4));
+    link(&mut harness, at(target, 0.3, 0.4), at(target, 0.5, 0.4));
+    let linked = drawing(&mut harness).linked(1);
+    assert_eq!(linked.len(), 1, "{}", text(&mut harness));
+    assert!(text(&mut harness).contains("to = 1, at = 0.2"), "{}", text(&mut harness));
+    click(&mut harness, at(target, 0.5, 0.4));
+    assert!(drawing(&mut harness).linked(1).is_empty(), "{}", text(&mut harness));
+}

@@ -1,12 +1,13 @@
 //! The window driven as a person with a screen reader would: by what widgets are called.
 
 mod aurora;
+mod pictures;
 
 use std::{path::Path, sync::Arc, time::Instant};
 
 use bansho::{Assets, media::plates::FileAssets};
 use eframe::egui::{self, Key, Modifiers, Role, vec2};
-use egui_kittest::{Harness, kittest::Queryable};
+use egui_kittest::{Harness, HarnessBuilder, kittest::Queryable};
 
 use super::{Session, Studio};
 use crate::{document::Document, player::SlicePlayer};
@@ -29,8 +30,12 @@ fn assets(folder: &Path) -> Arc<dyn Assets> {
 }
 
 fn window(text: &str) -> Harness<'static, Studio> {
+    window_by(Harness::builder().with_size(vec2(1400.0, 900.0)), text)
+}
+
+fn window_by(builder: HarnessBuilder<Studio>, text: &str) -> Harness<'static, Studio> {
     let session = Session::new(Document::new("fire.toml", text), None, Box::<SlicePlayer>::default(), assets);
-    let builder = Harness::builder().with_size(vec2(1400.0, 900.0)).with_max_steps(64);
+    let builder = builder.with_max_steps(64);
     let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.show(ui), Studio::new(session, None));
     drawn(&mut harness);
     harness

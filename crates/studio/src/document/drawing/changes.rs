@@ -133,16 +133,13 @@ impl Drawing {
         operations
     }
 
-    /// Makes sheet `from` of the shape before `shape` become sheet `to`: sheets then go in the order of the list.
-    pub fn correspond(&self, shape: usize, from: usize, to: usize) -> Vec<Operation> {
+    /// Exchanges two sheets in the list of shape `shape`.
+    pub(super) fn exchange_sheets(&self, shape: usize, one: usize, other: usize) -> Vec<Operation> {
         let mut sheets = self.sheets(shape);
-        if from < sheets.len() && to < sheets.len() {
-            sheets.swap(from, to);
+        if one < sheets.len() && other < sheets.len() {
+            sheets.swap(one, other);
         }
-        let place = self.place.key("motion").key("correspondence");
-        let value = Value::Text(Correspondence::DrawingOrder.name().into());
-        let order = self.shows_changes().then_some(Operation::Set { place, value });
-        order.into_iter().chain(self.write(shape, &sheets)).collect()
+        self.write(shape, &sheets)
     }
 
     /// One more shape, as the last one is.
@@ -180,7 +177,7 @@ impl Drawing {
         self.parameters.motion.correspondence == Correspondence::Automatic
     }
 
-    fn shape(&self, shape: usize) -> Place {
+    pub(super) fn shape(&self, shape: usize) -> Place {
         self.place.key("shapes").index(shape)
     }
 

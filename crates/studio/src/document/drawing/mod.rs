@@ -3,6 +3,7 @@
 
 mod changes;
 pub mod lines;
+mod links;
 mod sheets;
 #[cfg(test)]
 mod tests;
@@ -30,6 +31,7 @@ use bansho::{
 use super::Document;
 
 pub use changes::End;
+pub use links::OnSheet;
 pub use sheets::Factor;
 
 /// The drawn shapes of one aurora of a scene.

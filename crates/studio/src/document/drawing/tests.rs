@@ -131,11 +131,35 @@ fn shapes_are_added_timed_and_removed() {
 }
 
 #[test]
-fn sheets_are_told_which_they_become() {
+fn sheets_and_points_are_told_what_they_become() {
     let (mut document, drawing) = open(ARC);
     let drawing = change(&mut document, &drawing.draw(0, None, &stroke(&[[-200.0, 60.0], [200.0, 60.0]])));
     let drawing = change(&mut document, &drawing.add_shape());
-    let drawing = change(&mut document, &drawing.correspond(1, 0, 1));
-    assert!(document.text().contains("motion = { correspondence = \"drawing_order\" }"), "{}", document.text());
-    assert!(drawing.ways(0)[0].iter().all(|[from, to]| from.y.abs() < 1e-9 && (to.y - 60.0).abs() < 1e-9));
+    let drawing = change(&mut document, &drawing.add_shape());
+    let exchanged = change(&mut document, &drawing.correspond(1, (0, 0.3), 1));
+    assert!(document.text().contains("link = [{ from = 1, to = 2 }]"), "{}", document.text());
+    let crosses =
+        |drawing: &Drawing, shape: usize| drawing.ways(shape)[0].iter().all(|[from, to]| (to.y - from.y).abs() > 59.0);
+    assert!(crosses(&exchanged, 0) && !crosses(&exchanged, 1), "only that transition goes otherwise");
+    let back = change(&mut document, &exchanged.correspond(1, (0, 0.3), 0));
+    assert!(!crosses(&back, 0));
+
+    let moved = change(&mut document, &back.correspond_at(1, (0, 0.25), (0, 0.5)));
+    let [from, to] = moved.linked(1)[0].1;
+    assert!((from.x + 100.0).abs() < 1e-6 && to.x.abs() < 1e-6, "{from} {to}");
+    let arrives = |drawing: &Drawing, from: f64| {
+        let ways = drawing.ways(0).concat();
+        ways.iter()
+            .filter(|way| way[0].y.abs() < 1.0)
+            .map(|way| ((way[0].x - from).abs(), way[1].x))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .unwrap()
+            .1
+    };
+    assert!(arrives(&moved, -100.0).abs() < 5.0, "{}", arrives(&moved, -100.0));
+    let again = change(&mut document, &moved.correspond_at(1, (0, 0.26), (0, 0.4)));
+    assert_eq!(again.linked(1).len(), 1, "the same point is linked anew: {}", document.text());
+    let freed = change(&mut document, &again.unlink(1, DVec2::new(-40.0, 0.0), 5.0));
+    assert!(freed.linked(1).is_empty() && (arrives(&freed, -100.0) + 100.0).abs() < 5.0);
+    assert!(is_good(&mut document));
 }

@@ -2,32 +2,41 @@
 
 use std::path::PathBuf;
 
+#[cfg(not(target_arch = "wasm32"))]
 use bansho::render::scene::Place;
 use eframe::egui::Ui;
 
+#[cfg(not(target_arch = "wasm32"))]
 use super::chooser::Chooser;
 
 /// A question that waits for an answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Question {
     /// Which file to open.
+    #[cfg(not(target_arch = "wasm32"))]
     Open(Chooser),
     /// Which file this place shall name.
+    #[cfg(not(target_arch = "wasm32"))]
     Relink(Place, Chooser),
     /// Which file to save to.
+    #[cfg(not(target_arch = "wasm32"))]
     SaveAs(Chooser),
     /// Whether unsaved work may be left, to open this or to close.
     Leave(Leaving),
     /// Whether to take what another program wrote.
+    #[cfg(not(target_arch = "wasm32"))]
     ChangedOutside(String),
 }
 
 /// Where to, once unsaved work may be left.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Leaving {
-    Open(PathBuf),
-    /// A scene that no folder holds: its name and its text.
-    OpenGiven(String, String),
+    /// A scene, and where it lies if it lies anywhere.
+    Open {
+        name: String,
+        text: String,
+        path: Option<PathBuf>,
+    },
     Close,
 }
 
@@ -42,18 +51,21 @@ pub(super) enum Answer {
 /// Asks; what was answered, once it was.
 pub(super) fn answer(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
     let choices: &[(&str, Answer)] = match question {
+        #[cfg(not(target_arch = "wasm32"))]
         Question::Open(chooser) => {
             if chooser.show(ui, "Open which scene?") {
                 return Some(Answer::Do);
             }
             &[("Open", Answer::Do), ("Cancel", Answer::Cancel)]
         }
+        #[cfg(not(target_arch = "wasm32"))]
         Question::Relink(_, chooser) => {
             if chooser.show(ui, "Which file in its stead?") {
                 return Some(Answer::Do);
             }
             &[("Relink", Answer::Do), ("Cancel", Answer::Cancel)]
         }
+        #[cfg(not(target_arch = "wasm32"))]
         Question::SaveAs(chooser) => {
             chooser.show(ui, "Save as");
             &[("Save", Answer::Do), ("Cancel", Answer::Cancel)]
@@ -62,6 +74,7 @@ pub(super) fn answer(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
             ui.label("There is unsaved work.");
             &[("Save", Answer::Save), ("Leave it", Answer::Do), ("Cancel", Answer::Cancel)]
         }
+        #[cfg(not(target_arch = "wasm32"))]
         Question::ChangedOutside(_) => {
             ui.label("Another program changed the file, and there is unsaved work here.");
             &[("Take theirs", Answer::Do), ("Save mine", Answer::Save), ("Decide later", Answer::Cancel)]

@@ -5,7 +5,7 @@ use std::{cell::RefCell, rc::Rc};
 use eframe::egui::{Context, DroppedFileHandle};
 use wasm_bindgen::{JsCast, JsValue, closure::Closure};
 use wasm_bindgen_futures::{JsFuture, spawn_local};
-use web_sys::{Blob, File, HtmlAnchorElement, HtmlInputElement, Url};
+use web_sys::{Blob, File, HtmlAnchorElement, HtmlInputElement, Storage, Url};
 
 /// Files that came in, by name.
 pub(super) type Inbox = Rc<RefCell<Vec<(String, Vec<u8>)>>>;
@@ -55,6 +55,11 @@ pub(super) fn download(name: &str, text: &str) -> Result<(), JsValue> {
     link.set_download(name);
     link.click();
     Url::revoke_object_url(&url)
+}
+
+/// What the browser keeps for this page's server, where it does.
+pub(in crate::app) fn storage() -> Option<Storage> {
+    web_sys::window()?.local_storage().ok()?
 }
 
 async fn bytes_of(file: &File) -> Result<Vec<u8>, JsValue> {

@@ -1,0 +1,213 @@
+//! Files on the disk: chosen, opened, saved, watched for what other programs do to them, and rendered.
+
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use bansho::render::scene::Place;
+use eframe::egui::{Context, Ui};
+
+use super::{
+    Files,
+    chooser::Chooser,
+    question::{Answer, Question},
+};
+use crate::{
+    app::{session::Session, store::Store},
+    document::{
+        files::{self, Recent},
+        watch::Watch,
+    },
+    player::shoot::{self, Shooting},
+};
+
+/// What the window knows of the disk.
+pub(super) struct Shelf {
+    recent: Recent,
+    watch: Option<Watch>,
+    shooting: Option<Shooting>,
+}
+
+impl Shelf {
+    pub(super) fn new(store: &Store) -> Self {
+        let recent = store.file("recent").map(Recent::read).unwrap_or_default();
+        Self { recent, watch: None, shooting: None }
+    }
+
+    fn remember(&mut self, path: &Path) {
+        // A list that cannot be kept is right until the window closes.
+        let _ = self.recent.note(path);
+    }
+}
+
+impl Files {
+    /// Asks which file to open.
+    pub(in crate::app) fn ask_to_open(&mut self, _ctx: &Context, session: &mut Session) {
+        self.question = Some(Question::Open(Chooser::beside(session.path.as_deref())));
+    }
+
+    /// Asks which file `place` shall name.
+    pub(in crate::app) fn ask_to_relink(&mut self, _ctx: &Context, session: &mut Session, place: Place) {
+        self.question = Some(Question::Relink(place, Chooser::beside(session.path.as_deref()).of_pictures()));
+    }
+
+    /// Saves, or asks where to.
+    pub(in crate::app) fn save(&mut self, session: &mut Session) {
+        match session.path.clone() {
+            Some(path) => self.save_to(session, path),
+            None => self.ask_where_to_save(session),
+        }
+    }
+
+    fn ask_where_to_save(&mut self, session: &Session) {
+        let name = match &session.path {
+            Some(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            None if session.document.name().ends_with(".toml") => session.document.name().to_owned(),
+            None => "scene.toml".to_owned(),
+        };
+        self.question = Some(Question::SaveAs(Chooser::beside(session.path.as_deref()).naming(name)));
+    }
+
+    fn save_to(&mut self, session: &mut Session, path: PathBuf) {
+        match files::save(&mut session.document, &path) {
+            Ok(()) => {
+                session.set_notice(None);
+                self.shelf.remember(&path);
+                if session.path.as_ref() != Some(&path) {
+                    session.path = Some(path);
+                    session.reload_assets();
+                }
+            }
+            Err(error) => session.set_notice(Some(error.to_string())),
+        }
+    }
+
+    fn open(&mut self, session: &mut Session, path: PathBuf) {
+        match files::read(&path) {
+            Ok(text) => {
+                self.shelf.remember(&path);
+                self.open_text(session, &path.display().to_string(), text, Some(path));
+            }
+            Err(error) => session.set_notice(Some(error.to_string())),
+        }
+    }
+
+    /// What the menu has for files on the disk.
+    pub(in crate::app) fn menu(&mut self, ui: &mut Ui, session: &mut Session) {
+        if ui.button("Save as…").clicked() {
+            self.ask_where_to_save(session);
+        }
+        ui.menu_button("Recent", |ui| {
+            for path in self.shelf.recent.paths().to_vec() {
+                if ui.button(path.display().to_string()).clicked() {
+                    self.open(session, path);
+                }
+            }
+        });
+        ui.separator();
+        if ui.button("Render still").clicked() {
+            self.render(session, true);
+        }
+        if ui.button("Render shot").clicked() {
+            self.render(session, false);
+        }
+        if let Some(shooting) = &self.shelf.shooting
+            && ui.button("Stop rendering").clicked()
+        {
+            shooting.stop();
+        }
+        if ui.button("Reload plates and meshes").clicked() {
+            session.reload_assets();
+        }
+    }
+
+    /// Renders the present frame as `bansho render` does.
+    pub(in crate::app) fn render_still(&mut self, session: &mut Session) {
+        self.render(session, true);
+    }
+
+    /// Renders the present frame, or the whole shot, as `bansho render` does.
+    fn render(&mut self, session: &mut Session, still: bool) {
+        let Some(path) = session.path.clone() else {
+            session.set_notice(Some("save the scene first; pictures are written beside its name, in out/".into()));
+            return;
+        };
+        let number = still.then(|| session.transport.number());
+        match Shooting::start(shoot::job(session.document.text(), &path, number), || {}) {
+            Ok(shooting) => self.shelf.shooting = Some(shooting),
+            Err(error) => session.set_notice(Some(format!("the system gives no thread to render on: {error}"))),
+        }
+    }
+
+    /// What goes on with a job, for the status line.
+    pub(in crate::app) fn progress(&self) -> Option<String> {
+        let [done, total] = self.shelf.shooting.as_ref()?.progress();
+        Some(if total == 0 { "rendering…".into() } else { format!("rendering: {done} of {total}") })
+    }
+
+    pub(super) fn tend_shelf(&mut self, ui: &Ui, session: &mut Session) {
+        self.watch_outside(ui, session);
+        self.take_dropped(ui, session);
+        self.finish_job(ui, session);
+    }
+
+    /// Takes in what another program wrote into the file.
+    fn watch_outside(&mut self, ui: &Ui, session: &mut Session) {
+        let Some(path) = session.path.clone() else { return };
+        if self.shelf.watch.as_ref().is_none_or(|watch| watch.path() != path) {
+            let ctx = ui.ctx().clone();
+            // Without a thread to look, the file is not watched.
+            self.shelf.watch = Watch::start(&path, move || ctx.request_repaint()).ok();
+        }
+        if !self.shelf.watch.as_ref().is_some_and(Watch::touched) {
+            return;
+        }
+        let Some(text) = files::changed_outside(&session.document, &path) else { return };
+        if session.document.is_dirty() {
+            self.question = Some(Question::ChangedOutside(text.to_string()));
+        } else {
+            take_outside(session, &text);
+        }
+    }
+
+    fn take_dropped(&mut self, ui: &Ui, session: &mut Session) {
+        let dropped = ui.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_path_buf()));
+        let Some(path) = dropped else { return };
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            self.open(session, path);
+        } else {
+            session.lay_over(&path);
+        }
+    }
+
+    fn finish_job(&mut self, ui: &Ui, session: &mut Session) {
+        let Some(shooting) = &mut self.shelf.shooting else { return };
+        ui.ctx().request_repaint_after(Duration::from_millis(200));
+        if let Some(result) = shooting.finished() {
+            self.shelf.shooting = None;
+            session.set_notice(Some(match result {
+                Ok(file) => format!("written: {}", file.display()),
+                Err(reason) => reason,
+            }));
+        }
+    }
+
+    pub(super) fn answered_about_disk(&mut self, session: &mut Session, question: Question, answer: Answer) {
+        match (question, answer) {
+            (Question::Open(chooser), _) => self.open(session, chooser.path()),
+            (Question::Relink(place, chooser), _) => session.relink(&place, &chooser.path()),
+            (Question::SaveAs(chooser), _) => self.save_to(session, chooser.path()),
+            (Question::ChangedOutside(text), Answer::Do) => take_outside(session, &text),
+            (Question::ChangedOutside(_), Answer::Save) => self.save(session),
+            (Question::ChangedOutside(_), Answer::Cancel) | (Question::Leave(_), _) => {}
+        }
+    }
+}
+
+/// Takes what another program wrote as an edit that can be undone.
+fn take_outside(session: &mut Session, text: &str) {
+    session.document.replace("edited elsewhere", text);
+    session.document.seal();
+    session.document.mark_saved(text.into());
+}

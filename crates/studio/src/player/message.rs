@@ -1,0 +1,177 @@
+//! What a page and its worker say to each other, as arrays that the browser copies from one to the other.
+
+use std::sync::Arc;
+
+use bansho::Assets;
+use js_sys::{Array, Uint8Array};
+use wasm_bindgen::{JsCast, JsValue};
+
+use super::{Picture, Wish};
+use crate::document::Revision;
+
+/// What the page says.
+pub(super) enum Order {
+    /// A file that no folder holds.
+    File(String, Vec<u8>),
+    /// A wish, with its number.
+    Wish(u64, Wish),
+}
+
+/// What the worker says.
+pub(super) enum Reply {
+    /// It listens.
+    Ready,
+    /// The scene of wish `number` was checked: its exposure, or why it cannot be planned.
+    Judged { number: u64, exposure_ev100: Result<f32, String> },
+    /// The picture of wish `number`.
+    Drawn { number: u64, picture: Picture },
+    /// Why wish `number` has none.
+    Failed { number: u64, reason: String },
+    /// What a phenomenon said when it panicked over wish `number`. The worker is gone.
+    Panicked { number: u64, message: String },
+    /// Nothing more comes of wish `number`.
+    Done { number: u64 },
+}
+
+impl Order {
+    pub(super) fn file(name: &str, bytes: &[u8]) -> Array {
+        array(["file".into(), name.into(), Uint8Array::from(bytes).into()])
+    }
+
+    pub(super) fn wish(number: u64, wish: &Wish) -> Array {
+        let frame = wish.number.map_or(JsValue::NULL, |frame| (frame as f64).into());
+        let [width, height] = wish.within.map(|side| JsValue::from(side as f64));
+        let flags = [wish.exact, wish.draft].map(JsValue::from);
+        let head =
+            [JsValue::from("wish"), count(number), count(wish.revision.0), (&*wish.name).into(), (&*wish.text).into()];
+        head.into_iter().chain([frame, width, height]).chain(flags).collect()
+    }
+
+    /// Reads a message; wishes find their files in `assets`.
+    pub(super) fn read(message: &JsValue, assets: &Arc<dyn Assets>) -> Option<Self> {
+        let mut fields = Fields::of(message)?;
+        Some(match fields.text()?.as_str() {
+            "file" => Self::File(fields.text()?, fields.bytes()?),
+            "wish" => {
+                let number = fields.number()? as u64;
+                let wish = Wish {
+                    revision: Revision(fields.number()? as u64),
+                    name: fields.text()?,
+                    text: fields.text()?.into(),
+                    assets: assets.clone(),
+                    number: fields.next()?.as_f64().map(|frame| frame as i64),
+                    within: fields.size()?,
+                    exact: fields.flag()?,
+                    draft: fields.flag()?,
+                };
+                Self::Wish(number, wish)
+            }
+            _ => return None,
+        })
+    }
+}
+
+impl Reply {
+    pub(super) fn write(self) -> Array {
+        match self {
+            Self::Ready => array(["ready".into()]),
+            Self::Judged { number, exposure_ev100: Ok(ev100) } => array(["judged".into(), count(number), ev100.into()]),
+            Self::Judged { number, exposure_ev100: Err(reason) } => {
+                array(["judged".into(), count(number), reason.into()])
+            }
+            Self::Drawn { number, picture } => drawn(number, &picture),
+            Self::Failed { number, reason } => array(["failed".into(), count(number), reason.into()]),
+            Self::Panicked { number, message } => array(["panicked".into(), count(number), message.into()]),
+            Self::Done { number } => array(["done".into(), count(number)]),
+        }
+    }
+
+    pub(super) fn read(message: &JsValue) -> Option<Self> {
+        let mut fields = Fields::of(message)?;
+        let kind = fields.text()?;
+        if kind == "ready" {
+            return Some(Self::Ready);
+        }
+        let number = fields.number()? as u64;
+        Some(match kind.as_str() {
+            "judged" => {
+                let found = fields.next()?;
+                let reason = || found.as_string().unwrap_or_default();
+                Self::Judged { number, exposure_ev100: found.as_f64().map(|ev100| ev100 as f32).ok_or_else(reason) }
+            }
+            "drawn" => Self::Drawn { number, picture: fields.picture()? },
+            "failed" => Self::Failed { number, reason: fields.text()? },
+            "panicked" => Self::Panicked { number, message: fields.text()? },
+            "done" => Self::Done { number },
+            _ => return None,
+        })
+    }
+}
+
+fn array<const N: usize>(fields: [JsValue; N]) -> Array {
+    fields.into_iter().collect()
+}
+
+/// Counts stay far below 2^53.
+fn count(number: u64) -> JsValue {
+    (number as f64).into()
+}
+
+fn drawn(number: u64, picture: &Picture) -> Array {
+    let Picture { revision, number: frame, size, scene_size, pixels, exact, draft, draw_s, advance_s } = picture;
+    let head = [JsValue::from("drawn"), count(number), count(revision.0), (*frame as f64).into()];
+    let sizes = [*size, *scene_size].concat().into_iter().map(|side| JsValue::from(side as f64));
+    let pixels = Uint8Array::from(pixels.as_flattened());
+    let tail = [pixels.into(), (*exact).into(), (*draft).into(), (*draw_s).into(), (*advance_s).into()];
+    head.into_iter().chain(sizes).chain(tail).collect()
+}
+
+/// The fields of a message, one after another.
+struct Fields(std::vec::IntoIter<JsValue>);
+
+impl Fields {
+    fn of(message: &JsValue) -> Option<Self> {
+        Some(Self(message.dyn_ref::<Array>()?.to_vec().into_iter()))
+    }
+
+    fn next(&mut self) -> Option<JsValue> {
+        self.0.next()
+    }
+
+    fn text(&mut self) -> Option<String> {
+        self.next()?.as_string()
+    }
+
+    fn number(&mut self) -> Option<f64> {
+        self.next()?.as_f64()
+    }
+
+    fn flag(&mut self) -> Option<bool> {
+        self.next()?.as_bool()
+    }
+
+    fn size(&mut self) -> Option<[usize; 2]> {
+        Some([self.number()? as usize, self.number()? as usize])
+    }
+
+    fn bytes(&mut self) -> Option<Vec<u8>> {
+        Some(self.next()?.dyn_into::<Uint8Array>().ok()?.to_vec())
+    }
+
+    fn picture(&mut self) -> Option<Picture> {
+        let (revision, number) = (Revision(self.number()? as u64), self.number()? as i64);
+        let (size, scene_size, bytes) = (self.size()?, self.size()?, self.bytes()?);
+        let (pixels, _) = bytes.as_chunks();
+        Some(Picture {
+            revision,
+            number,
+            size,
+            scene_size,
+            pixels: pixels.to_vec(),
+            exact: self.flag()?,
+            draft: self.flag()?,
+            draw_s: self.number()?,
+            advance_s: self.number()?,
+        })
+    }
+}

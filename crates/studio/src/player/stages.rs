@@ -1,0 +1,37 @@
+//! When work may be stopped: a simulation goes on where it stands, a drawing that is stopped is lost.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use bansho::{Observer, Stage};
+
+/// Asks `stop` whether to stop, and tells it whether the shot is being advanced rather than drawn.
+pub(super) struct Stages<F> {
+    advancing: AtomicBool,
+    stop: F,
+}
+
+impl<F: Fn(bool) -> bool + Send + Sync> Stages<F> {
+    pub(super) fn new(stop: F) -> Self {
+        Self { advancing: AtomicBool::new(false), stop }
+    }
+
+    fn note(&self, stage: Stage, under_way: bool) {
+        if stage == Stage::Advance {
+            self.advancing.store(under_way, Ordering::Relaxed);
+        }
+    }
+}
+
+impl<F: Fn(bool) -> bool + Send + Sync> Observer for Stages<F> {
+    fn begin(&self, stage: Stage) {
+        self.note(stage, true);
+    }
+
+    fn end(&self, stage: Stage) {
+        self.note(stage, false);
+    }
+
+    fn cancelled(&self) -> bool {
+        (self.stop)(self.advancing.load(Ordering::Relaxed))
+    }
+}
