@@ -7,24 +7,36 @@ use super::bands::BAND;
 /// Columns of a patch: its pixels and their depths fit into a core's first cache.
 pub(crate) const STRETCH: usize = 128;
 
-/// Eight rows of so many columns. Light and what is let through stand side by side, so that one instruction lays a streak over all four.
+/// A number for each of eight pixels that stand below each other.
+pub(crate) type Rows = [f32; BAND];
+
+/// Eight rows of so many columns. The pixels of a column stand side by side, so that one instruction lays a streak over all eight: most
+/// streaks run down.
 pub(crate) struct Patch {
     /// Its first column and row in the picture.
     origin: [usize; 2],
-    /// Red, green and blue of L, and T.
-    pixels: [[[f32; 4]; STRETCH]; BAND],
-    /// Depth of the nearest sample, m.
-    depth: [[f32; STRETCH]; BAND],
-    /// Depth of the plate, m; where there is none, it is not asked for.
-    plate_depth: [[f32; STRETCH]; BAND],
+    columns: [Column; STRETCH],
+    /// Depth of the plate by column, m; where there is none, it is not asked for.
+    plate_depth: [Rows; STRETCH],
     has_plate: bool,
+}
+
+/// Eight pixels below each other.
+#[derive(Clone, Copy)]
+struct Column {
+    /// L of red, green and blue.
+    light: [Rows; 3],
+    /// T.
+    through: Rows,
+    /// Depth of the nearest sample, m.
+    depth: Rows,
 }
 
 /// What is laid over the pixels of a patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Layer {
-    /// Radiance where it hides all, ACEScg, cd/m^2; and -1, as much as T changes by there.
-    light: [f32; 4],
+    /// Radiance where it hides all, ACEScg, cd/m^2.
+    light: [f32; 3],
     /// m.
     pub(crate) depth: f32,
 }
@@ -32,7 +44,7 @@ pub(crate) struct Layer {
 impl Layer {
     /// A dark one.
     pub(crate) fn new(depth: f32) -> Self {
-        Self { light: [0.0, 0.0, 0.0, -1.0], depth }
+        Self { light: [0.0; 3], depth }
     }
 
     /// Adds radiance where it hides all, ACEScg, cd/m^2.
@@ -43,11 +55,11 @@ impl Layer {
 
 impl Default for Patch {
     fn default() -> Self {
+        let column = Column { light: [[0.0; BAND]; 3], through: [0.0; BAND], depth: [0.0; BAND] };
         Self {
             origin: [0; 2],
-            pixels: [[[0.0; 4]; STRETCH]; BAND],
-            depth: [[0.0; STRETCH]; BAND],
-            plate_depth: [[0.0; STRETCH]; BAND],
+            columns: [column; STRETCH],
+            plate_depth: [[0.0; BAND]; STRETCH],
             has_plate: false,
         }
     }
@@ -59,18 +71,17 @@ impl Patch {
     pub(crate) fn load(&mut self, origin: [usize; 2], rect: Rect, strip: Rect, planes: &GrayPlanes) {
         self.origin = origin;
         self.has_plate = !planes.plate_depth.is_empty();
-        let [red, green, blue] = &planes.radiance;
         for Run { row, column, start, count } in self.runs(rect, strip) {
-            let pixels = self.pixels[row][column..][..count].iter_mut();
-            let light = red[start..][..count].iter().zip(&green[start..][..count]).zip(&blue[start..][..count]);
-            for ((pixel, ((red, green), blue)), through) in
-                pixels.zip(light).zip(&planes.transmittance[start..][..count])
-            {
-                *pixel = [*red, *green, *blue, *through];
+            let columns = &mut self.columns[column..][..count];
+            for (c, plane) in planes.radiance.iter().enumerate() {
+                columns.iter_mut().zip(&plane[start..][..count]).for_each(|(to, from)| to.light[c][row] = *from);
             }
-            self.depth[row][column..][..count].copy_from_slice(&planes.depth[start..][..count]);
+            let through = &planes.transmittance[start..][..count];
+            columns.iter_mut().zip(through).for_each(|(to, from)| to.through[row] = *from);
+            columns.iter_mut().zip(&planes.depth[start..][..count]).for_each(|(to, from)| to.depth[row] = *from);
             if self.has_plate {
-                self.plate_depth[row][column..][..count].copy_from_slice(&planes.plate_depth[start..][..count]);
+                let depths = &planes.plate_depth[start..][..count];
+                self.plate_depth[column..].iter_mut().zip(depths).for_each(|(to, from)| to[row] = *from);
             }
         }
     }
@@ -79,13 +90,13 @@ impl Patch {
     #[inline(always)]
     pub(crate) fn store(&self, rect: Rect, strip: Rect, planes: &mut GrayPlanes) {
         for Run { row, column, start, count } in self.runs(rect, strip) {
-            let pixels = &self.pixels[row][column..][..count];
+            let columns = &self.columns[column..][..count];
             for (c, plane) in planes.radiance.iter_mut().enumerate() {
-                plane[start..][..count].iter_mut().zip(pixels).for_each(|(value, pixel)| *value = pixel[c]);
+                plane[start..][..count].iter_mut().zip(columns).for_each(|(to, from)| *to = from.light[c][row]);
             }
             let through = &mut planes.transmittance[start..][..count];
-            through.iter_mut().zip(pixels).for_each(|(value, pixel)| *value = pixel[3]);
-            planes.depth[start..][..count].copy_from_slice(&self.depth[row][column..][..count]);
+            through.iter_mut().zip(columns).for_each(|(to, from)| *to = from.through[row]);
+            planes.depth[start..][..count].iter_mut().zip(columns).for_each(|(to, from)| *to = from.depth[row]);
         }
     }
 
@@ -106,34 +117,36 @@ impl Patch {
         self.origin
     }
 
-    /// Whether there is a plate.
+    /// Takes from the opacities of a column's pixels those that the plate hides at a depth.
     #[inline(always)]
-    pub(crate) fn has_plate(&self) -> bool {
-        self.has_plate
-    }
-
-    /// Whether a pixel is one of the patch's: places before its first column or row count as far beyond its last.
-    #[inline(always)]
-    pub(crate) fn holds(&self, [column, row]: [usize; 2]) -> bool {
-        column < STRETCH && row < BAND
-    }
-
-    /// Whether the plate hides what lies at a depth in a pixel of the patch.
-    pub(crate) fn hides(&self, [column, row]: [usize; 2], depth: f32) -> bool {
-        self.plate_depth.get(row).and_then(|row| row.get(column)).is_some_and(|plate| *plate <= depth)
-    }
-
-    /// Lays a layer of some opacity behind what a pixel holds, `L += T a l; T -= T a`; `depth` is the layer's, infinite where the opacity
-    /// is 0. Outside the patch there is nothing.
-    #[inline(always)]
-    pub(crate) fn put_behind(&mut self, [column, row]: [usize; 2], opacity: f32, depth: f32, layer: &Layer) {
-        let Some(pixel) = self.pixels.get_mut(row).and_then(|row| row.get_mut(column)) else { return };
-        let hidden = pixel[3] * opacity;
-        for c in 0..4 {
-            pixel[c] = hidden.mul_add(layer.light[c], pixel[c]);
+    pub(crate) fn hide_by_plate(&self, column: usize, depth: f32, opacities: &mut Rows) {
+        if !self.has_plate {
+            return;
         }
-        let nearest = &mut self.depth[row][column];
-        *nearest = if depth < *nearest { depth } else { *nearest };
+        let Some(plate) = self.plate_depth.get(column) else { return };
+        for row in 0..BAND {
+            opacities[row] = if plate[row] <= depth { 0.0 } else { opacities[row] };
+        }
+    }
+
+    /// Lays a layer of some opacities behind what the pixels of a column hold, `L += T a l; T -= T a`.
+    #[inline(always)]
+    pub(crate) fn put_behind(&mut self, column: usize, opacities: &Rows, layer: &Layer) {
+        let Some(pixels) = self.columns.get_mut(column) else { return };
+        let mut hidden = [0.0; BAND];
+        for row in 0..BAND {
+            hidden[row] = pixels.through[row] * opacities[row];
+        }
+        for c in 0..3 {
+            for row in 0..BAND {
+                pixels.light[c][row] = hidden[row].mul_add(layer.light[c], pixels.light[c][row]);
+            }
+        }
+        for row in 0..BAND {
+            pixels.through[row] -= hidden[row];
+            let depth = if opacities[row] > 0.0 { layer.depth } else { f32::INFINITY };
+            pixels.depth[row] = if depth < pixels.depth[row] { depth } else { pixels.depth[row] };
+        }
     }
 }
 
