@@ -48,22 +48,59 @@ impl Key {
     }
 }
 
+impl Key {
+    /// The [`uniforms`](Self::uniforms) of `N` steps from `first` on, each of the four for all steps: loops over steps become vectors.
+    #[inline(always)]
+    pub fn uniforms_of_steps<const N: usize>(self, birth_id: u64, first: u32, purpose: Purpose) -> [[f32; N]; 4] {
+        let mut words = [[birth_id as u32; N], [(birth_id >> 32) as u32; N], [first; N], [purpose.0; N]];
+        for step in 0..N {
+            words[2][step] = first.wrapping_add(step as u32);
+        }
+        let [mut k0, mut k1] = self.0;
+        for _ in 0..ROUNDS {
+            for step in 0..N {
+                let counter = [words[0][step], words[1][step], words[2][step], words[3][step]];
+                [words[0][step], words[1][step], words[2][step], words[3][step]] = philox_round(counter, [k0, k1]);
+            }
+            [k0, k1] = next_key([k0, k1]);
+        }
+        let mut uniforms = [[0.0; N]; 4];
+        for (uniforms, words) in uniforms.iter_mut().zip(&words) {
+            for step in 0..N {
+                uniforms[step] = uniform(words[step]);
+            }
+        }
+        uniforms
+    }
+}
+
+/// Rounds of Philox.
+const ROUNDS: u32 = 10;
+
 /// Philox4x32 with 10 rounds: a bijection of the 128-bit `counter` for each `key`.
 #[inline(always)]
 pub const fn philox4x32_10(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
-    let [mut a, mut b, mut c, mut d] = counter;
-    let [mut k0, mut k1] = key;
+    let (mut words, mut key) = (counter, key);
     let mut round = 0;
-    while round < 10 {
-        let (high0, low0) = multiply(0xd251_1f53, a);
-        let (high1, low1) = multiply(0xcd9e_8d57, c);
-        (a, b, c, d) = (high1 ^ b ^ k0, low1, high0 ^ d ^ k1, low0);
-        // Weyl sequence of the key: golden ratio and sqrt(3) - 1.
-        k0 = k0.wrapping_add(0x9e37_79b9);
-        k1 = k1.wrapping_add(0xbb67_ae85);
+    while round < ROUNDS {
+        words = philox_round(words, key);
+        key = next_key(key);
         round += 1;
     }
-    [a, b, c, d]
+    words
+}
+
+#[inline(always)]
+const fn philox_round([a, b, c, d]: [u32; 4], [k0, k1]: [u32; 2]) -> [u32; 4] {
+    let (high0, low0) = multiply(0xd251_1f53, a);
+    let (high1, low1) = multiply(0xcd9e_8d57, c);
+    [high1 ^ b ^ k0, low1, high0 ^ d ^ k1, low0]
+}
+
+/// Weyl sequence of the key: golden ratio and sqrt(3) - 1.
+#[inline(always)]
+const fn next_key([k0, k1]: [u32; 2]) -> [u32; 2] {
+    [k0.wrapping_add(0x9e37_79b9), k1.wrapping_add(0xbb67_ae85)]
 }
 
 /// High and low half of a product.

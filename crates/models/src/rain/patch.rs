@@ -1,6 +1,7 @@
 //! The part of a picture that streaks are laid into at a time.
 
 use bansho_base::{canvas::GrayPlanes, image::Rect};
+use fearless_simd::{Simd, f32x8, prelude::*};
 
 use super::bands::BAND;
 
@@ -21,22 +22,16 @@ pub(crate) struct Patch {
     has_plate: bool,
 }
 
-/// Eight pixels below each other.
-#[derive(Clone, Copy)]
-struct Column {
-    /// L of red, green and blue.
-    light: [Rows; 3],
-    /// T.
-    through: Rows,
-    /// Depth of the nearest sample, m.
-    depth: Rows,
-}
+/// Eight pixels below each other: red, green and blue of L, T, and the depth of the nearest sample, m.
+type Column = [Rows; 5];
+const THROUGH: usize = 3;
+const DEPTH: usize = 4;
 
 /// What is laid over the pixels of a patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Layer {
     /// Radiance where it hides all, ACEScg, cd/m^2.
-    light: [f32; 3],
+    pub(crate) light: [f32; 3],
     /// m.
     pub(crate) depth: f32,
 }
@@ -55,10 +50,9 @@ impl Layer {
 
 impl Default for Patch {
     fn default() -> Self {
-        let column = Column { light: [[0.0; BAND]; 3], through: [0.0; BAND], depth: [0.0; BAND] };
         Self {
             origin: [0; 2],
-            columns: [column; STRETCH],
+            columns: [[[0.0; BAND]; 5]; STRETCH],
             plate_depth: [[0.0; BAND]; STRETCH],
             has_plate: false,
         }
@@ -68,47 +62,42 @@ impl Default for Patch {
 impl Patch {
     /// Takes the pixels of `rect` from the planes of `strip`; those around it hold anything.
     #[inline(always)]
-    pub(crate) fn load(&mut self, origin: [usize; 2], rect: Rect, strip: Rect, planes: &GrayPlanes) {
+    pub(crate) fn load<S: Simd>(&mut self, simd: S, origin: [usize; 2], rect: Rect, strip: Rect, planes: &GrayPlanes) {
         self.origin = origin;
         self.has_plate = !planes.plate_depth.is_empty();
-        for Run { row, column, start, count } in self.runs(rect, strip) {
-            let columns = &mut self.columns[column..][..count];
-            for (c, plane) in planes.radiance.iter().enumerate() {
-                columns.iter_mut().zip(&plane[start..][..count]).for_each(|(to, from)| to.light[c][row] = *from);
+        let [red, green, blue] = &planes.radiance;
+        for block in self.blocks(rect, strip) {
+            for (k, plane) in [red, green, blue, &planes.transmittance, &planes.depth].into_iter().enumerate() {
+                block.load(simd, plane, &mut self.columns, |column| &mut column[k]);
             }
-            let through = &planes.transmittance[start..][..count];
-            columns.iter_mut().zip(through).for_each(|(to, from)| to.through[row] = *from);
-            columns.iter_mut().zip(&planes.depth[start..][..count]).for_each(|(to, from)| to.depth[row] = *from);
             if self.has_plate {
-                let depths = &planes.plate_depth[start..][..count];
-                self.plate_depth[column..].iter_mut().zip(depths).for_each(|(to, from)| to[row] = *from);
+                block.load(simd, planes.plate_depth, &mut self.plate_depth, |column| column);
             }
         }
     }
 
     /// Gives the pixels of `rect` back to the planes of `strip`.
     #[inline(always)]
-    pub(crate) fn store(&self, rect: Rect, strip: Rect, planes: &mut GrayPlanes) {
-        for Run { row, column, start, count } in self.runs(rect, strip) {
-            let columns = &self.columns[column..][..count];
-            for (c, plane) in planes.radiance.iter_mut().enumerate() {
-                plane[start..][..count].iter_mut().zip(columns).for_each(|(to, from)| *to = from.light[c][row]);
+    pub(crate) fn store<S: Simd>(&self, simd: S, rect: Rect, strip: Rect, planes: &mut GrayPlanes) {
+        let [red, green, blue] = &mut planes.radiance;
+        let mut planes = [&mut **red, &mut **green, &mut **blue, &mut *planes.transmittance, &mut *planes.depth];
+        for block in self.blocks(rect, strip) {
+            for (k, plane) in planes.iter_mut().enumerate() {
+                block.store(simd, &self.columns, |column| &column[k], plane);
             }
-            let through = &mut planes.transmittance[start..][..count];
-            through.iter_mut().zip(columns).for_each(|(to, from)| *to = from.through[row]);
-            planes.depth[start..][..count].iter_mut().zip(columns).for_each(|(to, from)| *to = from.depth[row]);
         }
     }
 
-    /// Where the rows of `rect` lie in the patch and in a strip.
+    /// The parts of `rect` of up to eight columns.
     #[inline(always)]
-    fn runs(&self, rect: Rect, strip: Rect) -> impl Iterator<Item = Run> + use<> {
+    fn blocks(&self, rect: Rect, strip: Rect) -> impl Iterator<Item = Block> + use<> {
         let [x, y] = self.origin;
-        (rect.y..rect.bottom()).map(move |row| Run {
-            row: row - y,
-            column: rect.x - x,
-            start: (row - strip.y) * strip.width + rect.x - strip.x,
-            count: rect.width,
+        (rect.x..rect.right()).step_by(BAND).map(move |column| Block {
+            column: column - x,
+            row: rect.y - y,
+            size: [BAND.min(rect.right() - column), rect.height],
+            start: (rect.y - strip.y) * strip.width + column - strip.x,
+            pitch: strip.width,
         })
     }
 
@@ -135,25 +124,87 @@ impl Patch {
         let Some(pixels) = self.columns.get_mut(column) else { return };
         let mut hidden = [0.0; BAND];
         for row in 0..BAND {
-            hidden[row] = pixels.through[row] * opacities[row];
+            hidden[row] = pixels[THROUGH][row] * opacities[row];
         }
         for c in 0..3 {
             for row in 0..BAND {
-                pixels.light[c][row] = hidden[row].mul_add(layer.light[c], pixels.light[c][row]);
+                pixels[c][row] = hidden[row].mul_add(layer.light[c], pixels[c][row]);
             }
         }
         for row in 0..BAND {
-            pixels.through[row] -= hidden[row];
+            pixels[THROUGH][row] -= hidden[row];
             let depth = if opacities[row] > 0.0 { layer.depth } else { f32::INFINITY };
-            pixels.depth[row] = if depth < pixels.depth[row] { depth } else { pixels.depth[row] };
+            pixels[DEPTH][row] = if depth < pixels[DEPTH][row] { depth } else { pixels[DEPTH][row] };
         }
     }
 }
 
-/// A row of pixels: in the patch, and in a strip's planes.
-struct Run {
-    row: usize,
+/// Up to eight columns of up to eight rows: in the patch, and in a strip's planes.
+#[derive(Clone, Copy)]
+struct Block {
     column: usize,
+    row: usize,
+    size: [usize; 2],
+    /// Where its first pixel is in a plane.
     start: usize,
-    count: usize,
+    /// How far it is from there to the row below.
+    pitch: usize,
+}
+
+impl Block {
+    /// Takes it from a plane.
+    #[inline(always)]
+    fn load<S: Simd, C>(&self, simd: S, plane: &[f32], columns: &mut [C], rows: impl Fn(&mut C) -> &mut Rows) {
+        let columns = &mut columns[self.column..][..self.size[0]];
+        if self.size != [BAND; 2] {
+            for (x, column) in columns.iter_mut().enumerate() {
+                let below = plane[self.start + x..].iter().step_by(self.pitch);
+                rows(column)[self.row..].iter_mut().zip(below).take(self.size[1]).for_each(|(to, from)| *to = *from);
+            }
+            return;
+        }
+        let mut vectors = [f32x8::splat(simd, 0.0); BAND];
+        for y in 0..BAND {
+            vectors[y] = f32x8::from_slice(simd, &plane[self.start + y * self.pitch..][..BAND]);
+        }
+        let vectors = transpose(vectors);
+        for x in 0..BAND {
+            vectors[x].store_slice(rows(&mut columns[x]));
+        }
+    }
+
+    /// Gives it back to a plane.
+    #[inline(always)]
+    fn store<S: Simd, C>(&self, simd: S, columns: &[C], rows: impl Fn(&C) -> &Rows, plane: &mut [f32]) {
+        let columns = &columns[self.column..][..self.size[0]];
+        if self.size != [BAND; 2] {
+            for (x, column) in columns.iter().enumerate() {
+                let below = plane[self.start + x..].iter_mut().step_by(self.pitch);
+                rows(column)[self.row..].iter().zip(below).take(self.size[1]).for_each(|(from, to)| *to = *from);
+            }
+            return;
+        }
+        let mut vectors = [f32x8::splat(simd, 0.0); BAND];
+        for x in 0..BAND {
+            vectors[x] = f32x8::from_slice(simd, rows(&columns[x]));
+        }
+        let vectors = transpose(vectors);
+        for y in 0..BAND {
+            vectors[y].store_slice(&mut plane[self.start + y * self.pitch..][..BAND]);
+        }
+    }
+}
+
+/// Rows as columns: three perfect shuffles.
+#[inline(always)]
+fn transpose<S: Simd>(mut vectors: [f32x8<S>; BAND]) -> [f32x8<S>; BAND] {
+    const HALF: usize = BAND / 2;
+    for _ in 0..BAND.ilog2() {
+        let before = vectors;
+        for i in 0..HALF {
+            vectors[2 * i] = before[i].zip_low(before[i + HALF]);
+            vectors[2 * i + 1] = before[i].zip_high(before[i + HALF]);
+        }
+    }
+    vectors
 }

@@ -1,8 +1,11 @@
 //! One drop's way while the shutter is open, as the picture shows it.
 
 mod lay;
+mod record;
 
 use super::{bands::Extent, patch::Layer};
+
+pub(crate) use record::Record;
 
 /// A streak in the picture: what a drop hides and the light it sends.
 ///
@@ -52,10 +55,10 @@ impl Stroke {
         let way = [to[0] - from[0], to[1] - from[1]];
         let upright = way[1].abs() >= way[0].abs();
         let (length, aside) = if upright { (way[1], way[0]) } else { (way[0], way[1]) };
-        let lean = if length == 0.0 { 0.0 } else { aside / length };
+        let lean = record::lean(if length == 0.0 { 0.0 } else { aside / length });
         // A disc that moves: variances add, that of a disc is r^2/4, that of a way L^2/12. Not fused: this is needed where vectors are not.
         let square = radius * radius;
-        let across = (square * (lean * lean + 1.0) + lean * lean * (1.0 / 3.0)).sqrt().max(1e-4);
+        let across = record::short((square * (lean * lean + 1.0) + lean * lean * (1.0 / 3.0)).sqrt().max(1e-4));
         let half = if across < WIDE {
             (0.5 * (length * length + 3.0 * square).sqrt()).max(1e-3)
         } else {
@@ -126,6 +129,7 @@ mod tests {
         *,
     };
     use bansho_base::{canvas::Strip, image::Rect};
+    use fearless_simd::{Level, dispatch};
 
     /// What a drop hides that does not overlap itself.
     fn disc(radius: f32) -> f32 {
@@ -145,13 +149,14 @@ mod tests {
             strip.reset(rect, None, 0);
             let mut planes = strip.gray_planes_mut().unwrap();
             let mut patch = Patch::default();
-            patch.load([0, y], rect, rect, &planes);
+            let level = Level::new();
+            dispatch!(level, simd => patch.load(simd, [0, y], rect, rect, &planes));
             stroke.draw(&mut patch, &mut |[column, row], value| {
                 if (left..size[0]).contains(&column) && row < rect.height {
                     opacity[(y + row) * size[0] + column] += value;
                 }
             });
-            patch.store(rect, rect, &mut planes);
+            dispatch!(level, simd => patch.store(simd, rect, rect, &mut planes));
             let hidden = planes.transmittance.iter().map(|through| 1.0 - through);
             for (index, hidden) in hidden.enumerate() {
                 let known = opacity[(y + index / rect.width) * size[0] + left + index % rect.width];

@@ -31,6 +31,8 @@ fn at_most(most: f32, value: f32) -> f32 {
 
 /// 0, 1 and so on, of each row.
 const NUMBERS: Rows = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+/// Those of the next rows.
+const NEXT: Rows = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
 
 /// The opacities of a streak in eight rows, column after column.
 trait Columns {
@@ -94,10 +96,10 @@ impl Stroke {
         }
     }
 
-    /// What a line of pixels across it that begins at `along` takes of a thin one: its sum, and where it crosses that line.
+    /// What a line of pixels across it between two places along takes of a thin one: its sum, and where it crosses that line.
     #[inline(always)]
-    fn line(&self, along: f32) -> (f32, f32) {
-        let (from, to) = (at_least(-self.half, along), at_most(self.half, along + 1.0));
+    fn line(&self, from: f32, to: f32) -> (f32, f32) {
+        let (from, to) = (at_least(-self.half, from), at_most(self.half, to));
         (self.density * at_least(0.0, to - from), self.lean * 0.5 * (from + to))
     }
 }
@@ -119,7 +121,7 @@ impl Down {
         let mut down =
             Self { amount: [0.0; BAND], centre: [0.0; BAND], scale: 1.0 / stroke.across, before: [0.0; BAND] };
         for row in 0..BAND {
-            (down.amount[row], down.centre[row]) = stroke.line(top + NUMBERS[row]);
+            (down.amount[row], down.centre[row]) = stroke.line(top + NUMBERS[row], top + NEXT[row]);
             down.before[row] = disc_share((first - down.centre[row]) * down.scale);
         }
         down
@@ -148,12 +150,12 @@ struct Level<'a> {
 impl Columns for Level<'_> {
     #[inline(always)]
     fn next(&mut self, x: f32) -> Rows {
-        let (amount, centre) = self.stroke.line(x);
+        let (amount, centre) = self.stroke.line(x, x + 1.0);
         let (above, scale) = (self.top - centre, 1.0 / self.stroke.across);
         let mut opacities = [0.0; BAND];
         for row in 0..BAND {
-            let aside = above + NUMBERS[row];
-            opacities[row] = opacity(amount * (disc_share((aside + 1.0) * scale) - disc_share(aside * scale)));
+            let [before, after] = [above + NUMBERS[row], above + NEXT[row]];
+            opacities[row] = opacity(amount * (disc_share(after * scale) - disc_share(before * scale)));
         }
         opacities
     }
