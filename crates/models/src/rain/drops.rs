@@ -23,8 +23,10 @@ const DROP: Purpose = Purpose::named("rain drop");
 /// Parts that all cells make, and fewest and most cells of each.
 const PARTS: usize = 64;
 const CELLS_OF_PART: [usize; 2] = [8, 256];
-/// Radius of the largest drop, m.
-const LARGEST: f64 = 4e-3;
+/// Radius of the pupil, m: that of a 24 mm lens at f/3.
+const PUPIL: f64 = 4e-3;
+/// Furthest that a drop is seen from its middle, m: the radius of the largest, and what the lens spreads.
+pub(crate) const LARGEST: f64 = 4e-3 + PUPIL;
 /// Over which part of the number of drops a drop fades in, so that a rising rate shows no drop at once.
 pub(crate) const FADE: f64 = 0.02;
 
@@ -224,8 +226,6 @@ impl Cut {
 /// By how much a lens that is focused on a metre or beyond spreads what is nearer, m at its place: the drop hides as much of the picture, but
 /// more thinly.
 fn blur(depth: f64) -> f64 {
-    /// Radius of the pupil, m: that of a 24 mm lens at f/3.
-    const PUPIL: f64 = 4e-3;
     /// m.
     const FOCUS: f64 = 1.0;
     PUPIL * (1.0 - depth / FOCUS).clamp(0.0, 1.0)

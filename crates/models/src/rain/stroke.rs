@@ -263,7 +263,11 @@ mod tests {
                 opacity[if along == 1 { step * 128 + aside } else { aside * 128 + step }]
             };
             let steepest = (1..128).map(|step| (at(step) - at(step - 1)).abs()).fold(0.0, f32::max);
-            assert!(steepest < 1.2 * stroke.peak() / (2.0 * radius) + 0.02 * stroke.peak(), "{steepest} {}", stroke.peak());
+            assert!(
+                steepest < 1.2 * stroke.peak() / (2.0 * radius) + 0.02 * stroke.peak(),
+                "{steepest} {}",
+                stroke.peak()
+            );
         }
     }
 }
