@@ -52,20 +52,20 @@ impl Key {
     /// The [`uniforms`](Self::uniforms) of `N` steps from `first` on, each of the four for all steps: loops over steps become vectors.
     #[inline(always)]
     pub fn uniforms_of_steps<const N: usize>(self, birth_id: u64, first: u32, purpose: Purpose) -> [[f32; N]; 4] {
-        let mut words = [[birth_id as u32; N], [(birth_id >> 32) as u32; N], [first; N], [purpose.0; N]];
+        let (mut a, mut b) = ([birth_id as u32; N], [(birth_id >> 32) as u32; N]);
+        let (mut c, mut d) = ([first; N], [purpose.0; N]);
         for step in 0..N {
-            words[2][step] = first.wrapping_add(step as u32);
+            c[step] = first.wrapping_add(step as u32);
         }
-        let [mut k0, mut k1] = self.0;
+        let mut key = self.0;
         for _ in 0..ROUNDS {
             for step in 0..N {
-                let counter = [words[0][step], words[1][step], words[2][step], words[3][step]];
-                [words[0][step], words[1][step], words[2][step], words[3][step]] = philox_round(counter, [k0, k1]);
+                [a[step], b[step], c[step], d[step]] = philox_round([a[step], b[step], c[step], d[step]], key);
             }
-            [k0, k1] = next_key([k0, k1]);
+            key = next_key(key);
         }
         let mut uniforms = [[0.0; N]; 4];
-        for (uniforms, words) in uniforms.iter_mut().zip(&words) {
+        for (uniforms, words) in uniforms.iter_mut().zip([a, b, c, d]) {
             for step in 0..N {
                 uniforms[step] = uniform(words[step]);
             }
@@ -138,7 +138,8 @@ const fn murmur3_block(block: u32) -> u32 {
 /// A number in [0, 1) from the upper 24 bits of a word, exactly.
 #[inline(always)]
 pub fn uniform(word: u32) -> f32 {
-    (word >> 8) as f32 * (1.0 / 16_777_216.0)
+    // By way of a signed number: all machines turn those into floats at once.
+    (word >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
 }
 
 /// A number in [0, 1) from the upper 53 bits of two words, exactly.
@@ -265,6 +266,16 @@ mod tests {
 
     const POSITION: Purpose = Purpose::named("position");
     const COUNT: u64 = 100_000;
+
+    #[test]
+    fn steps_drawn_together_are_those_drawn_one_by_one() {
+        let key = Key::new(7, "steps");
+        let together: [[f32; 16]; 4] = key.uniforms_of_steps(0x12_3456_789a, u32::MAX - 5, POSITION);
+        for step in 0..16 {
+            let alone = key.uniforms(0x12_3456_789a, (u32::MAX - 5).wrapping_add(step as u32), POSITION);
+            assert_eq!(alone, [0, 1, 2, 3].map(|k| together[k][step]));
+        }
+    }
 
     #[test]
     fn philox_gives_the_published_answers() {

@@ -123,7 +123,7 @@ impl Shower<'_> {
     #[inline(always)]
     fn add_cell(&self, class: &ClassNow, cell: Cell, gathering: &mut Gathering) {
         /// Drops whose numbers are drawn together.
-        const BATCH: usize = 8;
+        const BATCH: usize = 16;
         let key = self.moment.key;
         let contents = class.lattice.contents(cell);
         let words = key.words(contents, 0, class.purpose(COUNT));

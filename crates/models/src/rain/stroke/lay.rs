@@ -47,9 +47,10 @@ impl Stroke {
         // All places are counted from the streak's middle.
         let [left, top] = [0, 1].map(|axis| patch.origin()[axis] as i32 as f32 - self.middle[axis]);
         let touched = self.touched(left, top);
-        let first = left + touched.start as i32 as f32;
+        // Nothing of it lies left of its first column, unless the patch begins there.
+        let cut = if touched.start > 0 { None } else { Some(left) };
         match (self.is_wide(), self.upright) {
-            (false, true) => self.lay(touched, left, Down::new(self, first, top), patch, measure),
+            (false, true) => self.lay(touched, left, Down::new(self, cut, top), patch, measure),
             (false, false) => self.lay(touched, left, Level { stroke: self, top }, patch, measure),
             (true, true) => self.lay(touched, left, Swept::<true> { stroke: self, top }, patch, measure),
             (true, false) => self.lay(touched, left, Swept::<false> { stroke: self, top }, patch, measure),
@@ -117,12 +118,16 @@ struct Down {
 
 impl Down {
     #[inline(always)]
-    fn new(stroke: &Stroke, first: f32, top: f32) -> Self {
+    fn new(stroke: &Stroke, cut: Option<f32>, top: f32) -> Self {
         let mut down =
             Self { amount: [0.0; BAND], centre: [0.0; BAND], scale: 1.0 / stroke.across, before: [0.0; BAND] };
         for row in 0..BAND {
             (down.amount[row], down.centre[row]) = stroke.line(top + NUMBERS[row], top + NEXT[row]);
-            down.before[row] = disc_share((first - down.centre[row]) * down.scale);
+        }
+        if let Some(left) = cut {
+            for row in 0..BAND {
+                down.before[row] = disc_share((left - down.centre[row]) * down.scale);
+            }
         }
         down
     }
