@@ -87,7 +87,7 @@ impl Record {
             lean: f32::from(self.lean) * (1.0 / LEANS),
             across: whole(self.across),
             density: self.density,
-            diameter_mm: f32::from(self.drop & !UPRIGHT) * (1.0 / PER_MM),
+            diameter_mm: f32::from(self.drop & !UPRIGHT) / PER_MM,
             layer: Layer { light, depth: self.depth },
         }
     }
