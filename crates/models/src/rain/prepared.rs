@@ -161,9 +161,12 @@ impl PreparedRain<'_> {
             for stretch in rows.x / STRETCH..rows.right().div_ceil(STRETCH) {
                 let origin = [stretch * STRETCH, band * BAND];
                 let shown = rows.intersection(&Rect { x: origin[0], width: STRETCH, ..rows });
-                patch.load(simd, origin, shown, rect, &planes);
                 streaks.clear();
                 self.parts.iter().for_each(|part| part.collect(band, stretch, &mut streaks));
+                if streaks.is_empty() {
+                    continue;
+                }
+                patch.load(simd, origin, shown, rect, &planes);
                 let strokes = streaks.iter().map(Record::stroke);
                 for stroke in strokes.filter(|stroke| slice.contains(f64::from(stroke.layer.depth))) {
                     if aovs.is_empty() {
