@@ -48,22 +48,59 @@ impl Key {
     }
 }
 
+impl Key {
+    /// The [`uniforms`](Self::uniforms) of `N` steps from `first` on, each of the four for all steps: loops over steps become vectors.
+    #[inline(always)]
+    pub fn uniforms_of_steps<const N: usize>(self, birth_id: u64, first: u32, purpose: Purpose) -> [[f32; N]; 4] {
+        let (mut a, mut b) = ([birth_id as u32; N], [(birth_id >> 32) as u32; N]);
+        let (mut c, mut d) = ([first; N], [purpose.0; N]);
+        for step in 0..N {
+            c[step] = first.wrapping_add(step as u32);
+        }
+        let mut key = self.0;
+        for _ in 0..ROUNDS {
+            for step in 0..N {
+                [a[step], b[step], c[step], d[step]] = philox_round([a[step], b[step], c[step], d[step]], key);
+            }
+            key = next_key(key);
+        }
+        let mut uniforms = [[0.0; N]; 4];
+        for (uniforms, words) in uniforms.iter_mut().zip([a, b, c, d]) {
+            for step in 0..N {
+                uniforms[step] = uniform(words[step]);
+            }
+        }
+        uniforms
+    }
+}
+
+/// Rounds of Philox.
+const ROUNDS: u32 = 10;
+
 /// Philox4x32 with 10 rounds: a bijection of the 128-bit `counter` for each `key`.
 #[inline(always)]
 pub const fn philox4x32_10(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
-    let [mut a, mut b, mut c, mut d] = counter;
-    let [mut k0, mut k1] = key;
+    let (mut words, mut key) = (counter, key);
     let mut round = 0;
-    while round < 10 {
-        let (high0, low0) = multiply(0xd251_1f53, a);
-        let (high1, low1) = multiply(0xcd9e_8d57, c);
-        (a, b, c, d) = (high1 ^ b ^ k0, low1, high0 ^ d ^ k1, low0);
-        // Weyl sequence of the key: golden ratio and sqrt(3) - 1.
-        k0 = k0.wrapping_add(0x9e37_79b9);
-        k1 = k1.wrapping_add(0xbb67_ae85);
+    while round < ROUNDS {
+        words = philox_round(words, key);
+        key = next_key(key);
         round += 1;
     }
-    [a, b, c, d]
+    words
+}
+
+#[inline(always)]
+const fn philox_round([a, b, c, d]: [u32; 4], [k0, k1]: [u32; 2]) -> [u32; 4] {
+    let (high0, low0) = multiply(0xd251_1f53, a);
+    let (high1, low1) = multiply(0xcd9e_8d57, c);
+    [high1 ^ b ^ k0, low1, high0 ^ d ^ k1, low0]
+}
+
+/// Weyl sequence of the key: golden ratio and sqrt(3) - 1.
+#[inline(always)]
+const fn next_key([k0, k1]: [u32; 2]) -> [u32; 2] {
+    [k0.wrapping_add(0x9e37_79b9), k1.wrapping_add(0xbb67_ae85)]
 }
 
 /// High and low half of a product.
@@ -101,7 +138,8 @@ const fn murmur3_block(block: u32) -> u32 {
 /// A number in [0, 1) from the upper 24 bits of a word, exactly.
 #[inline(always)]
 pub fn uniform(word: u32) -> f32 {
-    (word >> 8) as f32 * (1.0 / 16_777_216.0)
+    // By way of a signed number: all machines turn those into floats at once.
+    (word >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
 }
 
 /// A number in [0, 1) from the upper 53 bits of two words, exactly.
@@ -228,6 +266,16 @@ mod tests {
 
     const POSITION: Purpose = Purpose::named("position");
     const COUNT: u64 = 100_000;
+
+    #[test]
+    fn steps_drawn_together_are_those_drawn_one_by_one() {
+        let key = Key::new(7, "steps");
+        let together: [[f32; 16]; 4] = key.uniforms_of_steps(0x12_3456_789a, u32::MAX - 5, POSITION);
+        for step in 0..16 {
+            let alone = key.uniforms(0x12_3456_789a, (u32::MAX - 5).wrapping_add(step as u32), POSITION);
+            assert_eq!(alone, [0, 1, 2, 3].map(|k| together[k][step]));
+        }
+    }
 
     #[test]
     fn philox_gives_the_published_answers() {

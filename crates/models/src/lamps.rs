@@ -37,8 +37,8 @@ impl Lamps {
 /// Share of a spot's light that its housing scatters to where its cone does not reach.
 const STRAY: f64 = 0.02;
 
-/// Share of a lamp's light that a lens scatters around its image.
-const GLARE: f64 = 0.01;
+/// Share of a lamp's light that a lens scatters around its image: that of a clean one.
+const GLARE: f64 = 0.003;
 /// Angles between which that light falls with the square of the angle, as in the eye (Stiles & Holladay): it is even within the one, or
 /// within the lamp if that looks larger, and ends at the other, radians.
 const GLARE_ANGLES: [f64; 2] = [0.002, 0.12];
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn glare_is_a_hundredth_of_the_light_and_falls_with_the_square_of_the_angle() {
+    fn glare_is_its_share_of_the_light_and_falls_with_the_square_of_the_angle() {
         let (steps, end) = (200_000, GLARE_ANGLES[1]);
         for radius in [0.0, 0.01, 0.05] {
             let glare = Glare::new(radius);

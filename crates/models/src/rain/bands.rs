@@ -15,22 +15,57 @@ pub(crate) struct Bands {
     members: Vec<u32>,
 }
 
+/// Which bands, and which stretches of them, a thing touches: the first, and one past the last.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Spans {
+    bands: [u16; 2],
+    stretches: [u16; 2],
+}
+
+impl Spans {
+    /// Those of a thing in a picture of `size` pixels, in stretches of `width` columns.
+    #[inline(always)]
+    pub(crate) fn new([columns, rows]: Extent, size: [usize; 2], width: usize) -> Self {
+        Self { bands: span(rows, size[1], BAND), stretches: span(columns, size[0], width) }
+    }
+
+    /// Visits the stretches, of which a band has so many.
+    #[inline(always)]
+    fn each(&self, of_band: usize, mut visit: impl FnMut(usize)) {
+        for band in self.bands[0]..self.bands[1] {
+            for stretch in self.stretches[0]..self.stretches[1] {
+                visit(usize::from(band) * of_band + usize::from(stretch));
+            }
+        }
+    }
+}
+
+/// The parts of `part` pixels each, of `length` pixels, that `[low, high]` touches.
+#[inline(always)]
+fn span([low, high]: [f32; 2], length: usize, part: usize) -> [u16; 2] {
+    // Not a number touches nothing.
+    if !(high >= 0.0 && low < length as f32) {
+        return [0, 0];
+    }
+    let (last, scale) = (((length - 1) / part) as f32, 1.0 / part as f32);
+    let held = |place: f32| (place * scale).clamp(0.0, last) as i32 as u16;
+    [held(low), held(high) + 1]
+}
+
 impl Bands {
-    /// Sorts things of these extents into the bands of a picture of `size` pixels, in stretches of `width` columns.
-    pub(crate) fn new(size: [usize; 2], width: usize, extents: impl Iterator<Item = Extent>) -> Self {
+    /// Sorts things into the bands of a picture of `size` pixels, in stretches of `width` columns.
+    pub(crate) fn new(size: [usize; 2], width: usize, things: &[Spans]) -> Self {
         let stretches = size[0].div_ceil(width);
         let count = size[1].div_ceil(BAND) * stretches;
-        let places = extents.map(|[columns, rows]| [spans(rows, size[1], BAND), spans(columns, size[0], width)]);
-        let places: Vec<[Span; 2]> = places.collect();
         let mut starts = vec![0_u32; count + 1];
-        places.iter().for_each(|spans| each(spans, stretches, |place| starts[place + 1] += 1));
+        things.iter().for_each(|spans| spans.each(stretches, |place| starts[place + 1] += 1));
         for place in 0..count {
             starts[place + 1] += starts[place];
         }
         let mut members = vec![0; starts[count] as usize];
         let mut next = starts.clone();
-        for (index, spans) in places.iter().enumerate() {
-            each(spans, stretches, |place| {
+        for (index, spans) in things.iter().enumerate() {
+            spans.each(stretches, |place| {
                 members[next[place] as usize] = index as u32;
                 next[place] += 1;
             });
@@ -49,31 +84,6 @@ impl Bands {
     }
 }
 
-/// From which part to which: the first, and one past the last.
-type Span = [u32; 2];
-
-/// Visits the stretches that a thing touches.
-#[inline(always)]
-fn each([bands, columns]: &[Span; 2], stretches: usize, mut visit: impl FnMut(usize)) {
-    for band in bands[0]..bands[1] {
-        for column in columns[0]..columns[1] {
-            visit(band as usize * stretches + column as usize);
-        }
-    }
-}
-
-/// The parts of `part` pixels each, of `length` pixels, that `[low, high]` touches.
-#[inline(always)]
-fn spans([low, high]: [f32; 2], length: usize, part: usize) -> Span {
-    // Not a number touches nothing.
-    if !(high >= 0.0 && low < length as f32) {
-        return [0, 0];
-    }
-    let count = length.div_ceil(part) as u32;
-    let span = |place: f32| (place.max(0.0) as u32 / part as u32).min(count);
-    [span(low), (span(high) + 1).min(count)]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -84,7 +94,8 @@ mod tests {
         let rows = [[-5.0, 3.0], [7.5, 16.5], [30.0, 40.0], [-9.0, -1.0], [f32::NAN, 3.0], [0.0, 1e9]];
         let narrow = [[31.0, 33.0], [0.0, 3.0]];
         let extents = rows.into_iter().map(|rows| [all, rows]).chain([narrow]);
-        let bands = Bands::new([48, 21], 32, extents);
+        let spans: Vec<Spans> = extents.map(|extent| Spans::new(extent, [48, 21], 32)).collect();
+        let bands = Bands::new([48, 21], 32, &spans);
         assert_eq!(bands.members(0, 0), [0, 1, 5, 6]);
         assert_eq!(bands.members(0, 1), [0, 1, 5, 6]);
         assert_eq!([0, 1].map(|stretch| bands.members(1, stretch)), [[1, 5]; 2]);

@@ -16,7 +16,7 @@ use super::{
     drops::{Drop, FADE, Shower},
     lattice::{CELL, Cell},
     moment::{Ball, ClassNow},
-    part::Part,
+    part::{Gathering, Part},
     stroke::Stroke,
 };
 
@@ -96,13 +96,13 @@ impl<'a> Billboards<'a> {
         self.shower.parts(
             &[within],
             CELL,
-            |class, cell, strokes| dispatch!(self.shower.level, _simd => self.add_card(class, cell, strokes)),
+            |class, cell, gathering| dispatch!(self.shower.level, _simd => self.add_card(class, cell, gathering)),
         )
     }
 
     /// Adds the streaks of a cell's billboard.
     #[inline(always)]
-    fn add_card(&self, class: &ClassNow, cell: Cell, strokes: &mut Vec<Stroke>) {
+    fn add_card(&self, class: &ClassNow, cell: Cell, gathering: &mut Gathering) {
         let card = self.card(class, cell);
         let middle = card.stand.point(0.5, 0.5);
         // A bound that holds for all its streaks is worth finding only where it may spare some their light.
@@ -116,7 +116,7 @@ impl<'a> Billboards<'a> {
                 there: card.shows(class.count() - number as f64),
             };
             let lit = |stroke: &Stroke| brightest * stroke.peak() >= self.least_light;
-            strokes.extend(self.shower.stroke(&drop, lit));
+            gathering.add(self.shower.stroke(&drop, lit));
         }
     }
 

@@ -12,7 +12,7 @@ use super::{
     lattice::{CELL, Cell},
     light::Lighting,
     moment::{Ball, ClassNow, Moment},
-    part::Part,
+    part::{Gathering, Part},
     singles::Singles,
     stroke::{Stroke, Way},
     tiles::Tiles,
@@ -23,8 +23,10 @@ const DROP: Purpose = Purpose::named("rain drop");
 /// Parts that all cells make, and fewest and most cells of each.
 const PARTS: usize = 64;
 const CELLS_OF_PART: [usize; 2] = [8, 256];
-/// Radius of the largest drop, m.
-const LARGEST: f64 = 4e-3;
+/// Radius of the pupil, m: that of a 24 mm lens at f/3.
+const PUPIL: f64 = 4e-3;
+/// Furthest that a drop is seen from its middle, m: the radius of the largest, and what the lens spreads.
+pub(crate) const LARGEST: f64 = 4e-3 + PUPIL;
 /// Over which part of the number of drops a drop fades in, so that a rising rate shows no drop at once.
 pub(crate) const FADE: f64 = 0.02;
 
@@ -79,7 +81,7 @@ impl Shower<'_> {
         self.parts(
             within,
             0.5 * CELL,
-            |class, cell, strokes| dispatch!(self.level, _simd => self.add_cell(class, cell, strokes)),
+            |class, cell, gathering| dispatch!(self.level, _simd => self.add_cell(class, cell, gathering)),
         )
     }
 
@@ -89,7 +91,7 @@ impl Shower<'_> {
         &self,
         within: &[Ball],
         aside: f64,
-        add: impl Fn(&ClassNow, Cell, &mut Vec<Stroke>) + Sync,
+        add: impl Fn(&ClassNow, Cell, &mut Gathering) + Sync,
     ) -> Vec<Part> {
         let classes = self.moment.classes.par_iter().filter(|class| class.share > 0.0);
         let lists: Vec<Vec<_>> = classes
@@ -99,13 +101,11 @@ impl Shower<'_> {
         cells.sort_by(|a, b| a.0.total_cmp(&b.0));
         let size = self.moment.sight.size();
         let fill = |cells: &[(f64, Cell, &ClassNow)]| {
-            let (mut strokes, mut filled) = (Vec::new(), 0);
+            let mut gathering = Gathering::new(size);
             for (_, cell, class) in cells {
-                let before = strokes.len();
-                add(class, *cell, &mut strokes);
-                filled += usize::from(strokes.len() > before);
+                gathering.add_cell(|gathering| add(class, *cell, gathering));
             }
-            Part::new(strokes, filled, size)
+            gathering.part()
         };
         let [fewest, most] = CELLS_OF_PART;
         cells.par_chunks((cells.len() / PARTS).clamp(fewest, most)).map(fill).collect()
@@ -121,22 +121,27 @@ impl Shower<'_> {
 
     /// Adds the streaks of a cell, drop by drop.
     #[inline(always)]
-    fn add_cell(&self, class: &ClassNow, cell: Cell, strokes: &mut Vec<Stroke>) {
+    fn add_cell(&self, class: &ClassNow, cell: Cell, gathering: &mut Gathering) {
+        /// Drops whose numbers are drawn together.
+        const BATCH: usize = 16;
         let key = self.moment.key;
         let contents = class.lattice.contents(cell);
         let words = key.words(contents, 0, class.purpose(COUNT));
-        let count = random::poisson(class.most * class.lattice.volume(), [words[0], words[1]]);
+        let count = random::poisson(class.most * class.lattice.volume(), [words[0], words[1]]) as usize;
         let corner = DVec3::from(cell.0.map(|count| count as f64));
-        for index in 0..count {
-            let uniforms = key.uniforms(contents, index as u32, class.purpose(DROP)).map(f64::from);
-            let there = ((class.share * (1.0 + FADE) - uniforms[3]) / FADE).min(1.0);
-            if there <= 0.0 {
-                continue;
+        for first in (0..count).step_by(BATCH) {
+            let uniforms: [[f32; BATCH]; 4] = key.uniforms_of_steps(contents, first as u32, class.purpose(DROP));
+            for index in 0..BATCH.min(count - first) {
+                let there = ((class.share * (1.0 + FADE) - f64::from(uniforms[3][index])) / FADE).min(1.0);
+                if there <= 0.0 {
+                    continue;
+                }
+                let [x, y, z] = [uniforms[0][index], uniforms[1][index], uniforms[2][index]];
+                let place = corner + DVec3::new(x.into(), y.into(), z.into());
+                let (point, velocity) = self.moment.drop(class, place);
+                let drop = Drop { point, velocity, diameter_mm: class.diameter_mm, there };
+                gathering.add(self.stroke(&drop, |_| true));
             }
-            let place = corner + DVec3::new(uniforms[0], uniforms[1], uniforms[2]);
-            let (point, velocity) = self.moment.drop(class, place);
-            let drop = Drop { point, velocity, diameter_mm: class.diameter_mm, there };
-            strokes.extend(self.stroke(&drop, |_| true));
         }
     }
 
@@ -221,8 +226,6 @@ impl Cut {
 /// By how much a lens that is focused on a metre or beyond spreads what is nearer, m at its place: the drop hides as much of the picture, but
 /// more thinly.
 fn blur(depth: f64) -> f64 {
-    /// Radius of the pupil, m: that of a 24 mm lens at f/3.
-    const PUPIL: f64 = 4e-3;
     /// m.
     const FOCUS: f64 = 1.0;
     PUPIL * (1.0 - depth / FOCUS).clamp(0.0, 1.0)

@@ -9,6 +9,7 @@ use bansho_base::{
 
 use super::{
     Rain,
+    drops::LARGEST,
     gust::Gusts,
     lattice::{CELL, Cell, Lattice},
     sight::Sight,
@@ -132,7 +133,7 @@ impl Moment {
         let reach = radius + half.max_element();
         let around = [centre - reach, centre + reach];
         let [low, high] = self.gusts.as_ref().map_or(around, |gusts| gusts.origins(around));
-        let way = 0.5 * (class.speed + self.sight.velocity().length()) * self.sight.exposure + slack;
+        let way = 0.5 * (class.speed + self.sight.velocity().length()) * self.sight.exposure + slack + LARGEST;
         let row = |y: f64| class.lattice.place(DVec3::new(low.x, y, low.z)).y.floor() as i64;
         let rows = [low.y.max(self.ground - CELL), high.y].map(row);
         let mut cells = Vec::new();

@@ -1,34 +1,70 @@
 //! Streaks of a part of the rain, ready to draw.
 
-use super::{bands::Bands, patch::STRETCH, stroke::Stroke};
+use super::{
+    bands::{Bands, Spans},
+    patch::STRETCH,
+    stroke::{Record, Stroke},
+};
 
 /// Streaks in the order in which they are drawn, each known to the bands and stretches of the picture that it touches.
 ///
 /// Parts are made by themselves, so that no thread waits for all streaks to be sorted.
-#[derive(Default)]
 pub(crate) struct Part {
-    strokes: Vec<Stroke>,
+    records: Vec<Record>,
     bands: Bands,
     /// How many cells have streaks in it.
     pub(crate) cells: usize,
 }
 
-impl Part {
-    /// A part of a picture of `size` pixels.
-    pub(crate) fn new(strokes: Vec<Stroke>, cells: usize, size: [usize; 2]) -> Self {
-        let bands = Bands::new(size, STRETCH, strokes.iter().map(Stroke::extent));
-        Self { strokes, bands, cells }
+/// A part that streaks are added to.
+pub(crate) struct Gathering {
+    /// Columns and rows of the picture.
+    size: [usize; 2],
+    records: Vec<Record>,
+    spans: Vec<Spans>,
+    cells: usize,
+}
+
+impl Gathering {
+    /// Nothing yet, of a picture of `size` pixels.
+    pub(crate) fn new(size: [usize; 2]) -> Self {
+        Self { size, records: Vec::new(), spans: Vec::new(), cells: 0 }
     }
 
+    /// Adds what there is of a streak.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, stroke: Option<Stroke>) {
+        if let Some(stroke) = stroke {
+            self.spans.push(Spans::new(stroke.extent(), self.size, STRETCH));
+            self.records.push(Record::new(&stroke));
+        }
+    }
+
+    /// Adds a cell's streaks and counts it, if there are any.
+    #[inline(always)]
+    pub(crate) fn add_cell(&mut self, add: impl FnOnce(&mut Self)) {
+        let before = self.records.len();
+        add(self);
+        self.cells += usize::from(self.records.len() > before);
+    }
+
+    /// All of it, sorted.
+    pub(crate) fn part(self) -> Part {
+        Part { bands: Bands::new(self.size, STRETCH, &self.spans), records: self.records, cells: self.cells }
+    }
+}
+
+impl Part {
     /// Its streaks.
     pub(crate) fn count(&self) -> usize {
-        self.strokes.len()
+        self.records.len()
     }
 
     /// Adds its streaks that touch a stretch of a band.
     ///
     /// They stand far apart in memory; copied together they are waited for all at once instead of one by one as they are drawn.
-    pub(crate) fn collect(&self, band: usize, stretch: usize, streaks: &mut Vec<Stroke>) {
-        streaks.extend(self.bands.members(band, stretch).iter().map(|index| self.strokes[*index as usize]));
+    #[inline(always)]
+    pub(crate) fn collect(&self, band: usize, stretch: usize, streaks: &mut Vec<Record>) {
+        streaks.extend(self.bands.members(band, stretch).iter().map(|index| self.records[*index as usize]));
     }
 }

@@ -1,30 +1,37 @@
 //! The part of a picture that streaks are laid into at a time.
 
 use bansho_base::{canvas::GrayPlanes, image::Rect};
+use fearless_simd::{Simd, f32x8, prelude::*};
 
 use super::bands::BAND;
 
 /// Columns of a patch: its pixels and their depths fit into a core's first cache.
 pub(crate) const STRETCH: usize = 128;
 
-/// Eight rows of so many columns. Light and what is let through stand side by side, so that one instruction lays a streak over all four.
+/// A number for each of eight pixels that stand below each other.
+pub(crate) type Rows = [f32; BAND];
+
+/// Eight rows of so many columns. The pixels of a column stand side by side, so that one instruction lays a streak over all eight: most
+/// streaks run down.
 pub(crate) struct Patch {
     /// Its first column and row in the picture.
     origin: [usize; 2],
-    /// Red, green and blue of L, and T.
-    pixels: [[[f32; 4]; STRETCH]; BAND],
-    /// Depth of the nearest sample, m.
-    depth: [[f32; STRETCH]; BAND],
-    /// Depth of the plate, m; where there is none, it is not asked for.
-    plate_depth: [[f32; STRETCH]; BAND],
+    columns: [Column; STRETCH],
+    /// Depth of the plate by column, m; where there is none, it is not asked for.
+    plate_depth: [Rows; STRETCH],
     has_plate: bool,
 }
+
+/// Eight pixels below each other: red, green and blue of L, T, and the depth of the nearest sample, m.
+type Column = [Rows; 5];
+const THROUGH: usize = 3;
+const DEPTH: usize = 4;
 
 /// What is laid over the pixels of a patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Layer {
-    /// Radiance where it hides all, ACEScg, cd/m^2; and -1, as much as T changes by there.
-    light: [f32; 4],
+    /// Radiance where it hides all, ACEScg, cd/m^2.
+    pub(crate) light: [f32; 3],
     /// m.
     pub(crate) depth: f32,
 }
@@ -32,7 +39,7 @@ pub(crate) struct Layer {
 impl Layer {
     /// A dark one.
     pub(crate) fn new(depth: f32) -> Self {
-        Self { light: [0.0, 0.0, 0.0, -1.0], depth }
+        Self { light: [0.0; 3], depth }
     }
 
     /// Adds radiance where it hides all, ACEScg, cd/m^2.
@@ -45,9 +52,8 @@ impl Default for Patch {
     fn default() -> Self {
         Self {
             origin: [0; 2],
-            pixels: [[[0.0; 4]; STRETCH]; BAND],
-            depth: [[0.0; STRETCH]; BAND],
-            plate_depth: [[0.0; STRETCH]; BAND],
+            columns: [[[0.0; BAND]; 5]; STRETCH],
+            plate_depth: [[0.0; BAND]; STRETCH],
             has_plate: false,
         }
     }
@@ -56,48 +62,42 @@ impl Default for Patch {
 impl Patch {
     /// Takes the pixels of `rect` from the planes of `strip`; those around it hold anything.
     #[inline(always)]
-    pub(crate) fn load(&mut self, origin: [usize; 2], rect: Rect, strip: Rect, planes: &GrayPlanes) {
+    pub(crate) fn load<S: Simd>(&mut self, simd: S, origin: [usize; 2], rect: Rect, strip: Rect, planes: &GrayPlanes) {
         self.origin = origin;
         self.has_plate = !planes.plate_depth.is_empty();
         let [red, green, blue] = &planes.radiance;
-        for Run { row, column, start, count } in self.runs(rect, strip) {
-            let pixels = self.pixels[row][column..][..count].iter_mut();
-            let light = red[start..][..count].iter().zip(&green[start..][..count]).zip(&blue[start..][..count]);
-            for ((pixel, ((red, green), blue)), through) in
-                pixels.zip(light).zip(&planes.transmittance[start..][..count])
-            {
-                *pixel = [*red, *green, *blue, *through];
+        for block in self.blocks(rect, strip) {
+            for (k, plane) in [red, green, blue, &planes.transmittance, &planes.depth].into_iter().enumerate() {
+                block.load(simd, plane, &mut self.columns, |column| &mut column[k]);
             }
-            self.depth[row][column..][..count].copy_from_slice(&planes.depth[start..][..count]);
             if self.has_plate {
-                self.plate_depth[row][column..][..count].copy_from_slice(&planes.plate_depth[start..][..count]);
+                block.load(simd, planes.plate_depth, &mut self.plate_depth, |column| column);
             }
         }
     }
 
     /// Gives the pixels of `rect` back to the planes of `strip`.
     #[inline(always)]
-    pub(crate) fn store(&self, rect: Rect, strip: Rect, planes: &mut GrayPlanes) {
-        for Run { row, column, start, count } in self.runs(rect, strip) {
-            let pixels = &self.pixels[row][column..][..count];
-            for (c, plane) in planes.radiance.iter_mut().enumerate() {
-                plane[start..][..count].iter_mut().zip(pixels).for_each(|(value, pixel)| *value = pixel[c]);
+    pub(crate) fn store<S: Simd>(&self, simd: S, rect: Rect, strip: Rect, planes: &mut GrayPlanes) {
+        let [red, green, blue] = &mut planes.radiance;
+        let mut planes = [&mut **red, &mut **green, &mut **blue, &mut *planes.transmittance, &mut *planes.depth];
+        for block in self.blocks(rect, strip) {
+            for (k, plane) in planes.iter_mut().enumerate() {
+                block.store(simd, &self.columns, |column| &column[k], plane);
             }
-            let through = &mut planes.transmittance[start..][..count];
-            through.iter_mut().zip(pixels).for_each(|(value, pixel)| *value = pixel[3]);
-            planes.depth[start..][..count].copy_from_slice(&self.depth[row][column..][..count]);
         }
     }
 
-    /// Where the rows of `rect` lie in the patch and in a strip.
+    /// The parts of `rect` of up to eight columns.
     #[inline(always)]
-    fn runs(&self, rect: Rect, strip: Rect) -> impl Iterator<Item = Run> + use<> {
+    fn blocks(&self, rect: Rect, strip: Rect) -> impl Iterator<Item = Block> + use<> {
         let [x, y] = self.origin;
-        (rect.y..rect.bottom()).map(move |row| Run {
-            row: row - y,
-            column: rect.x - x,
-            start: (row - strip.y) * strip.width + rect.x - strip.x,
-            count: rect.width,
+        (rect.x..rect.right()).step_by(BAND).map(move |column| Block {
+            column: column - x,
+            row: rect.y - y,
+            size: [BAND.min(rect.right() - column), rect.height],
+            start: (rect.y - strip.y) * strip.width + column - strip.x,
+            pitch: strip.width,
         })
     }
 
@@ -106,41 +106,105 @@ impl Patch {
         self.origin
     }
 
-    /// Whether there is a plate.
+    /// Takes from the opacities of a column's pixels those that the plate hides at a depth.
     #[inline(always)]
-    pub(crate) fn has_plate(&self) -> bool {
-        self.has_plate
-    }
-
-    /// Whether a pixel is one of the patch's: places before its first column or row count as far beyond its last.
-    #[inline(always)]
-    pub(crate) fn holds(&self, [column, row]: [usize; 2]) -> bool {
-        column < STRETCH && row < BAND
-    }
-
-    /// Whether the plate hides what lies at a depth in a pixel of the patch.
-    pub(crate) fn hides(&self, [column, row]: [usize; 2], depth: f32) -> bool {
-        self.plate_depth.get(row).and_then(|row| row.get(column)).is_some_and(|plate| *plate <= depth)
-    }
-
-    /// Lays a layer of some opacity behind what a pixel holds, `L += T a l; T -= T a`; `depth` is the layer's, infinite where the opacity
-    /// is 0. Outside the patch there is nothing.
-    #[inline(always)]
-    pub(crate) fn put_behind(&mut self, [column, row]: [usize; 2], opacity: f32, depth: f32, layer: &Layer) {
-        let Some(pixel) = self.pixels.get_mut(row).and_then(|row| row.get_mut(column)) else { return };
-        let hidden = pixel[3] * opacity;
-        for c in 0..4 {
-            pixel[c] = hidden.mul_add(layer.light[c], pixel[c]);
+    pub(crate) fn hide_by_plate(&self, column: usize, depth: f32, opacities: &mut Rows) {
+        if !self.has_plate {
+            return;
         }
-        let nearest = &mut self.depth[row][column];
-        *nearest = if depth < *nearest { depth } else { *nearest };
+        let Some(plate) = self.plate_depth.get(column) else { return };
+        for row in 0..BAND {
+            opacities[row] = if plate[row] <= depth { 0.0 } else { opacities[row] };
+        }
+    }
+
+    /// Lays a layer of some opacities behind what the pixels of a column hold, `L += T a l; T -= T a`.
+    #[inline(always)]
+    pub(crate) fn put_behind(&mut self, column: usize, opacities: &Rows, layer: &Layer) {
+        let Some(pixels) = self.columns.get_mut(column) else { return };
+        let mut hidden = [0.0; BAND];
+        for row in 0..BAND {
+            hidden[row] = pixels[THROUGH][row] * opacities[row];
+        }
+        for c in 0..3 {
+            for row in 0..BAND {
+                pixels[c][row] = hidden[row].mul_add(layer.light[c], pixels[c][row]);
+            }
+        }
+        for row in 0..BAND {
+            pixels[THROUGH][row] -= hidden[row];
+            let depth = if opacities[row] > 0.0 { layer.depth } else { f32::INFINITY };
+            pixels[DEPTH][row] = if depth < pixels[DEPTH][row] { depth } else { pixels[DEPTH][row] };
+        }
     }
 }
 
-/// A row of pixels: in the patch, and in a strip's planes.
-struct Run {
-    row: usize,
+/// Up to eight columns of up to eight rows: in the patch, and in a strip's planes.
+#[derive(Clone, Copy)]
+struct Block {
     column: usize,
+    row: usize,
+    size: [usize; 2],
+    /// Where its first pixel is in a plane.
     start: usize,
-    count: usize,
+    /// How far it is from there to the row below.
+    pitch: usize,
+}
+
+impl Block {
+    /// Takes it from a plane.
+    #[inline(always)]
+    fn load<S: Simd, C>(&self, simd: S, plane: &[f32], columns: &mut [C], rows: impl Fn(&mut C) -> &mut Rows) {
+        let columns = &mut columns[self.column..][..self.size[0]];
+        if self.size != [BAND; 2] {
+            for (x, column) in columns.iter_mut().enumerate() {
+                let below = plane[self.start + x..].iter().step_by(self.pitch);
+                rows(column)[self.row..].iter_mut().zip(below).take(self.size[1]).for_each(|(to, from)| *to = *from);
+            }
+            return;
+        }
+        let mut vectors = [f32x8::splat(simd, 0.0); BAND];
+        for y in 0..BAND {
+            vectors[y] = f32x8::from_slice(simd, &plane[self.start + y * self.pitch..][..BAND]);
+        }
+        let vectors = transpose(vectors);
+        for x in 0..BAND {
+            vectors[x].store_slice(rows(&mut columns[x]));
+        }
+    }
+
+    /// Gives it back to a plane.
+    #[inline(always)]
+    fn store<S: Simd, C>(&self, simd: S, columns: &[C], rows: impl Fn(&C) -> &Rows, plane: &mut [f32]) {
+        let columns = &columns[self.column..][..self.size[0]];
+        if self.size != [BAND; 2] {
+            for (x, column) in columns.iter().enumerate() {
+                let below = plane[self.start + x..].iter_mut().step_by(self.pitch);
+                rows(column)[self.row..].iter().zip(below).take(self.size[1]).for_each(|(from, to)| *to = *from);
+            }
+            return;
+        }
+        let mut vectors = [f32x8::splat(simd, 0.0); BAND];
+        for x in 0..BAND {
+            vectors[x] = f32x8::from_slice(simd, rows(&columns[x]));
+        }
+        let vectors = transpose(vectors);
+        for y in 0..BAND {
+            vectors[y].store_slice(&mut plane[self.start + y * self.pitch..][..BAND]);
+        }
+    }
+}
+
+/// Rows as columns: three perfect shuffles.
+#[inline(always)]
+fn transpose<S: Simd>(mut vectors: [f32x8<S>; BAND]) -> [f32x8<S>; BAND] {
+    const HALF: usize = BAND / 2;
+    for _ in 0..BAND.ilog2() {
+        let before = vectors;
+        for i in 0..HALF {
+            vectors[2 * i] = before[i].zip_low(before[i + HALF]);
+            vectors[2 * i + 1] = before[i].zip_high(before[i + HALF]);
+        }
+    }
+    vectors
 }

@@ -6,7 +6,7 @@ use bansho_base::{
     phenomenon::Prepared,
     surroundings::Surroundings,
 };
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{Level, Simd, dispatch};
 
 use super::{
     Rain,
@@ -24,6 +24,7 @@ use super::{
     singles::Singles,
     sky::sky_through_drops,
     splashes::Splashes,
+    stroke::Record,
     tiles::{COARSE, FINE, Tiles},
     veil::Veil,
 };
@@ -141,7 +142,7 @@ impl Prepared for PreparedRain<'_> {
         let rect = strip.rect;
         for band in rect.y / BAND..rect.bottom().div_ceil(BAND) {
             let rows = Rect { x: rect.x, y: band * BAND, width: rect.width, height: BAND }.intersection(&rect);
-            dispatch!(self.level, _simd => self.draw_streaks(band, slice, rows, strip));
+            dispatch!(self.level, simd => self.draw_streaks(simd, band, slice, rows, strip));
             if let Some(veil) = &self.veil {
                 veil.draw(slice, band, rows, strip);
             }
@@ -151,7 +152,7 @@ impl Prepared for PreparedRain<'_> {
 
 impl PreparedRain<'_> {
     #[inline(always)]
-    fn draw_streaks(&self, band: usize, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
+    fn draw_streaks<S: Simd>(&self, simd: S, band: usize, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
         let rect = strip.rect;
         let mut aovs = std::mem::take(&mut strip.aovs);
         // Rain alone draws into its strip, and takes all colours alike.
@@ -160,10 +161,14 @@ impl PreparedRain<'_> {
             for stretch in rows.x / STRETCH..rows.right().div_ceil(STRETCH) {
                 let origin = [stretch * STRETCH, band * BAND];
                 let shown = rows.intersection(&Rect { x: origin[0], width: STRETCH, ..rows });
-                patch.load(origin, shown, rect, &planes);
                 streaks.clear();
                 self.parts.iter().for_each(|part| part.collect(band, stretch, &mut streaks));
-                for stroke in streaks.iter().filter(|stroke| slice.contains(f64::from(stroke.layer.depth))) {
+                if streaks.is_empty() {
+                    continue;
+                }
+                patch.load(simd, origin, shown, rect, &planes);
+                let strokes = streaks.iter().map(Record::stroke);
+                for stroke in strokes.filter(|stroke| slice.contains(f64::from(stroke.layer.depth))) {
                     if aovs.is_empty() {
                         stroke.draw(&mut patch, &mut |_, _| {});
                         continue;
@@ -176,7 +181,7 @@ impl PreparedRain<'_> {
                         }
                     });
                 }
-                patch.store(shown, rect, &mut planes);
+                patch.store(simd, shown, rect, &mut planes);
             }
         }
         strip.aovs = aovs;

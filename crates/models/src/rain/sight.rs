@@ -22,9 +22,12 @@ pub(crate) struct Sight {
 #[derive(Clone, Debug)]
 struct Frustum {
     position: DVec3,
-    /// Unit vectors outward: right, left, bottom, top and back.
-    sides: [DVec3; 5],
+    /// Unit vectors outward: right, left, bottom, top and back; all x, all y and all z, and after them zeros.
+    sides: [[f64; SIDES]; 3],
 }
+
+/// Sides of a frustum, and as many more as vectors are filled with.
+const SIDES: usize = 8;
 
 impl Frustum {
     /// `None` where a lens has no flat sides.
@@ -33,15 +36,25 @@ impl Frustum {
         let tangent = |pixels: usize, centre: f64| (pixels as f64 - centre) / camera.focal_pixels;
         let [left, right] = [window.x, window.right()].map(|side| across + back * tangent(side, camera.centre.x));
         let [top, bottom] = [window.y, window.bottom()].map(|side| -up + back * tangent(side, camera.centre.y));
-        let sides = [right, -left, bottom, -top, back].map(DVec3::normalize);
+        let mut sides = [[0.0; SIDES]; 3];
+        for (side, outward) in [right, -left, bottom, -top, back].map(DVec3::normalize).into_iter().enumerate() {
+            (0..3).for_each(|axis| sides[axis][side] = outward[axis]);
+        }
         (camera.lens == Lens::Perspective).then_some(Self { position: camera.position, sides })
     }
 
     #[inline(always)]
     fn may_see(&self, point: DVec3, half: DVec3, radius: f64) -> bool {
         let offset = point - self.position;
+        let [xs, ys, zs] = &self.sides;
+        let mut before = false;
         // Not one after the other: a branch for each side would be guessed wrongly.
-        self.sides.iter().fold(true, |seen, side| seen & (side.dot(offset) - side.abs().dot(half) <= radius))
+        for side in 0..SIDES {
+            let place = xs[side] * offset.x + ys[side] * offset.y + zs[side] * offset.z;
+            let reach = xs[side].abs() * half.x + ys[side].abs() * half.y + zs[side].abs() * half.z;
+            before |= place - reach > radius;
+        }
+        !before
     }
 }
 

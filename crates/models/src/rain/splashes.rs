@@ -16,7 +16,7 @@ use super::{
     light::Lighting,
     moment::{ClassNow, Moment},
     parameters::SplashParameters,
-    part::Part,
+    part::{Gathering, Part},
     stroke::Stroke,
     tiles::Tiles,
 };
@@ -88,9 +88,9 @@ impl Splashes<'_> {
         };
         let squares: Vec<&[i64; 2]> = squares.iter().filter(shows).collect();
         let part = |squares: &[&[i64; 2]]| {
-            let mut strokes = Vec::new();
-            squares.iter().for_each(|square| self.square(**square, middle(**square), &mut strokes));
-            Part::new(strokes, 0, moment.sight.size())
+            let mut gathering = Gathering::new(moment.sight.size());
+            squares.iter().for_each(|square| self.square(**square, middle(**square), &mut gathering));
+            gathering.part()
         };
         squares.par_chunks(SQUARES_OF_PART).map(part).collect()
     }
@@ -103,7 +103,7 @@ impl Splashes<'_> {
     }
 
     /// Adds the droplets over one square of ground.
-    fn square(&self, [x, z]: [i64; 2], middle: DVec3, strokes: &mut Vec<Stroke>) {
+    fn square(&self, [x, z]: [i64; 2], middle: DVec3, gathering: &mut Gathering) {
         let (turn, part, length) = self.turn();
         let key = self.moment.key;
         let id = (x as u64 & 0xffff_ffff) << 32 | z as u64 & 0xffff_ffff;
@@ -131,14 +131,14 @@ impl Splashes<'_> {
                     self.add(
                         class,
                         &Impact { place, age, diameter_mm: class.diameter_mm, id, step, strength },
-                        strokes,
+                        gathering,
                     );
                 }
             }
         }
     }
 
-    fn add(&self, class: &ClassNow, impact: &Impact, strokes: &mut Vec<Stroke>) {
+    fn add(&self, class: &ClassNow, impact: &Impact, gathering: &mut Gathering) {
         let fall = DVec3::Y * -class.speed;
         if !(0.0..TURN).contains(&impact.age) || self.moment.sheltered(impact.place, fall) {
             return;
@@ -157,7 +157,7 @@ impl Splashes<'_> {
             if let Some((tiles, sky)) = self.sky {
                 stroke.layer.add_light(tiles.at(sky, stroke.middle()));
             }
-            strokes.push(stroke);
+            gathering.add(Some(stroke));
         }
     }
 

@@ -117,6 +117,23 @@ fn strips_crops_and_threads_change_no_pixel() {
 }
 
 #[test]
+fn a_window_shows_near_drops_that_only_their_blur_brings_into_it() {
+    let calm = wind([0.0; 3], 0.0);
+    let surroundings = lit(&calm);
+    let diameters_mm = vec![3.0, 4.0, 5.0];
+    let rain = rain(RainParameters { distance: 1.0, diameters_mm, ..streaks(Method::Drops, 300.0) }, 1);
+    let rect = Rect { x: 56, y: 32, width: 80, height: 40 };
+    for frame in 0..200 {
+        let view = view_at(1.0 + 0.1 * f64::from(frame), 1e-4, [192, 108]);
+        let whole = draw_part(&rain, &view, &surroundings, rect, &DepthInterval::ALL);
+        let part = draw_part(&rain, &View { window: rect, ..view }, &surroundings, rect, &DepthInterval::ALL);
+        for index in 0..whole.len() {
+            assert_eq!(whole.transmittance(index), part.transmittance(index), "frame {frame}, {index}");
+        }
+    }
+}
+
+#[test]
 fn slices_of_depth_come_to_the_whole() {
     let wind = wind([0.0; 3], 0.0);
     let surroundings = lit(&wind);
