@@ -3,6 +3,7 @@
 use std::{f64::consts::PI, sync::Arc};
 
 use bansho_base::math;
+use fearless_simd::{Level, dispatch};
 use rustfft::{Fft, FftPlanner, num_complex::Complex};
 
 /// `F_k = sum_j f_j sin(pi j k / (n + 1))`, j and k from 1 to n; applied twice it is `(n + 1) / 2`.
@@ -14,6 +15,7 @@ pub(super) struct SineTransform {
     fourier: Arc<dyn Fft<f64>>,
     /// `sin(pi j / (n + 1))`, j from 0 to n.
     sines: Vec<f64>,
+    level: Level,
 }
 
 /// Working memory of a thread.
@@ -27,7 +29,7 @@ impl SineTransform {
     pub(super) fn new(length: usize) -> Self {
         let whole = length + 1;
         let sines = (0..whole).map(|j| math::sin(PI * j as f64 / whole as f64)).collect();
-        Self { fourier: FftPlanner::new().plan_fft_forward(whole), sines }
+        Self { fourier: FftPlanner::new().plan_fft_forward(whole), sines, level: Level::new() }
     }
 
     pub(super) fn scratch(&self) -> Scratch {
@@ -39,14 +41,9 @@ impl SineTransform {
 
     /// Transforms one or two rows, one after the other in `rows`.
     pub(super) fn apply(&self, rows: &mut [f64], scratch: &mut Scratch) {
-        let whole = self.sines.len();
-        let (first, second) = rows.split_at_mut(whole - 1);
+        let (first, second) = rows.split_at_mut(self.sines.len() - 1);
         let spectrum = &mut scratch.spectrum;
-        spectrum[0] = Complex::default();
-        for j in 1..whole {
-            let imaginary = if second.is_empty() { 0.0 } else { self.folded(second, j) };
-            spectrum[j] = Complex::new(self.folded(first, j), imaginary);
-        }
+        dispatch!(self.level, _simd => self.fold(first, second, spectrum));
         self.fourier.process_with_scratch(spectrum, &mut scratch.inner);
         unfold(first, |k, mirror| {
             let (one, other) = (spectrum[k], spectrum[mirror]);
@@ -58,10 +55,22 @@ impl SineTransform {
         });
     }
 
-    /// `sin(pi j / N) (f_j + f_(N-j)) + (f_j - f_(N-j)) / 2`, whose cosine sums are `F_(2k+1) - F_(2k-1)` and whose sine sums are `F_2k`.
-    fn folded(&self, row: &[f64], j: usize) -> f64 {
-        let (one, other) = (row[j - 1], row[self.sines.len() - j - 1]);
-        self.sines[j].mul_add(one + other, 0.5 * (one - other))
+    /// `sin(pi j / N) (f_j + f_(N-j)) + (f_j - f_(N-j)) / 2`, whose cosine sums are `F_(2k+1) - F_(2k-1)` and whose sine sums are `F_2k`; of
+    /// the first row as the real part, of the second, if there is one, as the imaginary part.
+    #[inline(always)]
+    fn fold(&self, first: &[f64], second: &[f64], spectrum: &mut [Complex<f64>]) {
+        spectrum.fill(Complex::default());
+        let folded = &mut spectrum[1..];
+        for ((value, sine), (one, other)) in
+            folded.iter_mut().zip(&self.sines[1..]).zip(first.iter().zip(first.iter().rev()))
+        {
+            value.re = sine.mul_add(one + other, 0.5 * (one - other));
+        }
+        for ((value, sine), (one, other)) in
+            folded.iter_mut().zip(&self.sines[1..]).zip(second.iter().zip(second.iter().rev()))
+        {
+            value.im = sine.mul_add(one + other, 0.5 * (one - other));
+        }
     }
 }
 

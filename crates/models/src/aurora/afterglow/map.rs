@@ -1,11 +1,13 @@
 //! A sparse map of power in the plane that follows what feeds it with a delay.
 
 use bansho_base::math;
+use rayon::prelude::*;
 
 use crate::aurora::particles::AuroraParticles;
 
 /// Cells along a tile.
 const SIDE: usize = 8;
+const CELLS: usize = SIDE * SIDE;
 /// A tile without a cell above this power is dark, W.
 const DARK_W: f32 = 1e-3;
 const NO_TILE: u32 = u32::MAX;
@@ -24,9 +26,9 @@ pub struct GlowCell {
 #[derive(Clone, Debug, PartialEq)]
 struct Tile {
     place: u32,
-    powers: [f32; SIDE * SIDE],
+    powers: [f32; CELLS],
     /// Power times energy, W eV.
-    weighted: [f32; SIDE * SIDE],
+    weighted: [f32; CELLS],
 }
 
 /// Power on square cells of which only lit ones are stored.
@@ -60,13 +62,50 @@ impl GlowMap {
 
     /// All cells that are lit, in an order that does not depend on threads.
     pub fn cells(&self) -> impl Iterator<Item = GlowCell> + '_ {
-        self.tiles.iter().flat_map(|tile| (0..SIDE * SIDE).filter_map(|cell| self.cell(tile, cell)))
+        self.tiles.iter().flat_map(|tile| (0..CELLS).filter_map(|cell| self.cell(tile, cell)))
     }
 
-    /// How many cells are lit.
-    #[must_use]
-    pub fn lit_cells(&self) -> usize {
-        self.tiles.iter().flat_map(|tile| &tile.powers).filter(|power| **power > 0.0).count()
+    /// The map's light as that of particles: each cell's power is shared out among those in it as they bring power. Gives the share of each
+    /// particle, W, and the lit cells that hold none; cells fainter than `faintest` of a typical one are left out.
+    pub(in crate::aurora) fn shared_out(
+        &self,
+        particles: &AuroraParticles,
+        faintest: f32,
+    ) -> (Vec<f32>, Vec<GlowCell>) {
+        let cells = self.cells_of(particles);
+        let mut sums = vec![0.0_f32; self.tiles.len() * CELLS];
+        for (cell, power) in cells.iter().zip(&particles.powers_w) {
+            if let Some(sum) = sums.get_mut(*cell as usize) {
+                *sum += power;
+            }
+        }
+        let own = |(cell, power): (&u32, &f32)| {
+            let cell = *cell as usize;
+            let sum = sums.get(cell).copied().unwrap_or_default();
+            if sum > 0.0 { self.tiles[cell / CELLS].powers[cell % CELLS] * (power / sum) } else { 0.0 }
+        };
+        let shares = cells.par_iter().zip(&particles.powers_w).map(own).collect();
+        let faintest = faintest * self.typical_w();
+        let left = (0..sums.len()).filter(|cell| sums[*cell] <= 0.0);
+        let lit = left.filter_map(|cell| self.cell(&self.tiles[cell / CELLS], cell % CELLS));
+        (shares, lit.filter(|cell| cell.power_w > faintest).collect())
+    }
+
+    /// Number of the cell that each particle is in, tile after tile; one that does not exist where the map is dark.
+    fn cells_of(&self, particles: &AuroraParticles) -> Vec<u32> {
+        let [xs, zs] = &particles.positions;
+        let cell = |(x, z): (&f32, &f32)| {
+            let (place, cell) = self.locate([*x, *z]);
+            self.numbers[place].saturating_mul(CELLS as u32).saturating_add(cell as u32)
+        };
+        xs.par_iter().zip(zs).map(cell).collect()
+    }
+
+    /// Power of a cell, weighted by power, W: faint cells, however many, do not count.
+    fn typical_w(&self) -> f32 {
+        let powers = || self.tiles.iter().flat_map(|tile| &tile.powers).map(|power| f64::from(*power));
+        let (sum, squares) = powers().fold((0.0, 0.0), |(sum, squares), power| (sum + power, squares + power * power));
+        (squares / f64::max(sum, f64::MIN_POSITIVE)) as f32
     }
 
     /// Power of the whole map, W.
@@ -83,7 +122,7 @@ impl GlowMap {
 
     /// A map laid out as this one that holds what [`Self::to_lists`] gave; none if the lists are no such map.
     pub(in crate::aurora) fn with_lists(&self, places: &[u32], values: &[f32]) -> Option<Self> {
-        let (tiles, rest) = values.as_chunks::<{ 2 * SIDE * SIDE }>();
+        let (tiles, rest) = values.as_chunks::<{ 2 * CELLS }>();
         if tiles.len() != places.len() || !rest.is_empty() {
             return None;
         }
@@ -92,7 +131,7 @@ impl GlowMap {
             let number = map.numbers.get_mut(*place as usize).filter(|number| **number == NO_TILE)?;
             *number = map.tiles.len() as u32;
             let half = |start: usize| std::array::from_fn(|cell| values[start + cell]);
-            map.tiles.push(Tile { place: *place, powers: half(0), weighted: half(SIDE * SIDE) });
+            map.tiles.push(Tile { place: *place, powers: half(0), weighted: half(CELLS) });
         }
         Some(map)
     }
@@ -136,25 +175,30 @@ impl GlowMap {
 
     /// Adds that share of the particles' power, one after the other, so that sums do not depend on threads.
     fn feed(&mut self, particles: &AuroraParticles, share: f32) {
-        let (to_cells, half_km) = (1.0 / self.cell_km, self.half_km);
-        let last = (self.side * SIDE) as f64 - 1.0;
-        let cell_of = |km: f32| ((f64::from(km) + half_km) * to_cells).clamp(0.0, last) as usize;
         let [xs, zs] = &particles.positions;
         let values = particles.powers_w.iter().zip(&particles.energies_ev);
         for ((x, z), (power, energy)) in xs.iter().zip(zs).zip(values) {
-            let (column, row) = (cell_of(*x), cell_of(*z));
-            let tile = self.tile_mut(row / SIDE * self.side + column / SIDE);
-            let cell = row % SIDE * SIDE + column % SIDE;
+            let (place, cell) = self.locate([*x, *z]);
+            let tile = self.tile_mut(place);
             // No `mul_add`: outside a vector loop that is a call where the machine is not known to have it.
             tile.powers[cell] += power * share;
             tile.weighted[cell] += power * energy * share;
         }
     }
 
+    /// The place of the tile that a place in km lies in, and the cell of the tile.
+    #[inline(always)]
+    fn locate(&self, place_km: [f32; 2]) -> (usize, usize) {
+        let last = (self.side * SIDE) as f64 - 1.0;
+        let per_km = 1.0 / self.cell_km;
+        let [column, row] = place_km.map(|km| ((f64::from(km) + self.half_km) * per_km).clamp(0.0, last) as usize);
+        (row / SIDE * self.side + column / SIDE, row % SIDE * SIDE + column % SIDE)
+    }
+
     fn tile_mut(&mut self, place: usize) -> &mut Tile {
         if self.numbers[place] == NO_TILE {
             self.numbers[place] = self.tiles.len() as u32;
-            self.tiles.push(Tile { place: place as u32, powers: [0.0; SIDE * SIDE], weighted: [0.0; SIDE * SIDE] });
+            self.tiles.push(Tile { place: place as u32, powers: [0.0; CELLS], weighted: [0.0; CELLS] });
         }
         &mut self.tiles[self.numbers[place] as usize]
     }
@@ -191,6 +235,22 @@ mod tests {
         assert!((map.power_w() - 4.0 / std::f64::consts::E).abs() < 1e-4);
         (0..20).for_each(|_| map.step(&dark, 0.8, 0.8));
         assert_eq!(map.tiles.len(), 0, "dark tiles are let go");
+    }
+
+    #[test]
+    fn a_map_is_shared_out_among_the_particles_in_its_cells() {
+        let mut map = GlowMap::new(100.0, 0.5);
+        let fed = particles([[10.1, -20.1], [10.2, -20.2]]);
+        map.step(&fed, 1.0, 0.0);
+        assert_eq!(map.shared_out(&fed, 0.01), (vec![3.0, 1.0], vec![]));
+        // One has left its cell for a dark one, the other is still where all of the light is.
+        let moved = particles([[-40.0, 40.0], [10.2, -20.2]]);
+        assert_eq!(map.shared_out(&moved, 0.01), (vec![0.0, 4.0], vec![]));
+        // Both have left: the cell itself shines, unless that is too faint.
+        let gone = particles([[-40.0, 40.0], [-40.0, 40.0]]);
+        let (shares, cells) = map.shared_out(&gone, 0.01);
+        assert_eq!((shares, cells.len(), cells[0].power_w), (vec![0.0; 2], 1, 4.0));
+        assert_eq!(map.shared_out(&gone, 1.5).1, []);
     }
 
     #[test]

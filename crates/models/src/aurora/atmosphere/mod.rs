@@ -1,4 +1,4 @@
-//! The air in which auroras shine, 80 to 600 km, from NRLMSISE-00 (Picone et al. 2002, J. Geophys. Res. 107, 1468).
+//! The air in which auroras shine, 80 to 800 km, from NRLMSISE-00 (Picone et al. 2002, J. Geophys. Res. 107, 1468).
 
 use std::sync::LazyLock;
 
@@ -10,9 +10,9 @@ const TABLE_TEXT: &str = include_str!("data/nrlmsise00.csv");
 /// Altitude of the lowest level, km.
 pub const LOWEST_KM: f64 = 80.0;
 /// Altitude of the highest level, km.
-pub const HIGHEST_KM: f64 = 600.0;
+pub const HIGHEST_KM: f64 = 800.0;
 /// Levels of every table over altitude: one each km, both ends included.
-pub const LEVELS: usize = 521;
+pub const LEVELS: usize = 721;
 /// Distance of two levels, m.
 pub const LEVEL_SPACING: f64 = 1000.0;
 
@@ -88,7 +88,7 @@ impl Atmosphere {
         &self.levels
     }
 
-    /// The air at an altitude, held to 80-600 km; logarithmic between levels.
+    /// The air at an altitude, held to 80-800 km; logarithmic between levels.
     #[must_use]
     pub fn at(&self, altitude_km: f64) -> Air {
         let (level, part) = locate_level(altitude_km);
@@ -102,7 +102,7 @@ pub fn level_altitude_km(level: usize) -> f64 {
     LOWEST_KM + level as f64
 }
 
-/// The level below an altitude and the part of the way to the next; held to 80-600 km.
+/// The level below an altitude and the part of the way to the next; held to 80-800 km.
 #[must_use]
 pub fn locate_level(altitude_km: f64) -> (usize, f64) {
     let place = (altitude_km - LOWEST_KM).clamp(0.0, (LEVELS - 1) as f64);
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn the_table_is_whole() {
         let rows = read_rows();
-        assert_eq!((rows.len(), rows[0].0, rows[rows.len() - 1].0), (201, LOWEST_KM, HIGHEST_KM));
+        assert_eq!((rows.len(), rows[0].0, rows[rows.len() - 1].0), (241, LOWEST_KM, HIGHEST_KM));
         assert!(rows.iter().all(|(_, air)| air.fields().iter().all(|value| *value > 0.0 && value.is_finite())));
         assert!(rows.windows(2).all(|pair| pair[0].0 < pair[1].0 && pair[0].1.density > pair[1].1.density));
     }
@@ -149,7 +149,7 @@ mod tests {
         // Rows lie 5 km apart there: two fifths of the way in the logarithm.
         let (low, high) = (air.at(300.0), air.at(305.0));
         assert!(close(air.at(302.0).density, low.density * math::pow(high.density / low.density, 0.4)));
-        assert!(close(air.at(20.0).n2, air.at(80.0).n2) && close(air.at(1e9).n2, air.at(600.0).n2));
+        assert!(close(air.at(20.0).n2, air.at(80.0).n2) && close(air.at(1e9).n2, air.at(800.0).n2));
     }
 
     #[test]

@@ -24,7 +24,7 @@ use crate::{
         light::{Emission, PerEmitter},
         precipitation::{
             Deposition,
-            energy::{NODES, node_energy_ev},
+            energy::NODES,
             fall::{Collision, FallLibrary, Falls, VARIANTS},
         },
     },
@@ -146,9 +146,9 @@ impl Collisions {
     /// The fall of a source.
     fn fall(&self, index: u32, source: &Source, step: u32) -> Fall<'_> {
         let [a, b, c, d] = self.key.words(u64::from(index), step, SOURCE);
-        let node = (source.node as usize).min(NODES - 1);
-        let energy_ev = node_energy_ev(node) * f64::from(lanes::exp2((source.node - node as f32) * NODE_OCTAVES));
-        let node = self.deposition.draw_node(energy_ev, [f64::from(uniform(a)), uniform_f64(b, d)]);
+        let below = (source.node as usize).min(NODES - 2);
+        let about = below + usize::from(uniform(a) < source.node - below as f32);
+        let node = self.deposition.draw_node_about(about, uniform_f64(b, d));
         Fall { batches: self.falls.fall(node, c), pairs: self.pairs[node], first: (c >> 8) as usize / BATCH * BATCH }
     }
 }
@@ -193,9 +193,9 @@ impl Trace {
     #[inline(always)]
     fn add<S: Simd>(&mut self, simd: S, row: usize, [upper, lower]: [f32; 2], photons: &PerEmitter<f32>) {
         let photons = FourLanes::simd_from(simd, *photons);
-        for (light, weight) in self.light[row..row + 2].iter_mut().zip([upper, lower]) {
-            *light = photons.fused(photons.like(weight), FourLanes::simd_from(simd, *light)).into();
-        }
+        let [above, below] = &mut self.light[row..row + 2] else { return };
+        *above = photons.fused(photons.like(upper), FourLanes::simd_from(simd, *above)).into();
+        *below = photons.fused(photons.like(lower), FourLanes::simd_from(simd, *below)).into();
     }
 
     /// Adds it with weights to a column.
@@ -213,6 +213,62 @@ impl Trace {
         for (light, own) in light_rest.iter_mut().zip(own_rest) {
             *light = FourLanes::simd_from(simd, *own).fused(weights, FourLanes::simd_from(simd, *light)).into();
         }
+    }
+}
+
+/// Rows of a batch of collisions, and the weights there and in the row below; nothing in row 0 where one is outside.
+struct Points {
+    rows: [u32; BATCH],
+    upper: [f32; BATCH],
+    lower: [f32; BATCH],
+}
+
+/// The least and the greatest row of each lane.
+struct Lit {
+    least: [f32; BATCH],
+    greatest: [f32; BATCH],
+}
+
+impl Default for Lit {
+    fn default() -> Self {
+        Self { least: [f32::INFINITY; BATCH], greatest: [-1.0; BATCH] }
+    }
+}
+
+impl Lit {
+    /// All rows that hold something.
+    #[inline(always)]
+    fn rows(&self) -> Range<usize> {
+        let (mut least, mut greatest) = (f32::INFINITY, -1.0_f32);
+        for lane in 0..BATCH {
+            least = least.min(self.least[lane]);
+            greatest = greatest.max(self.greatest[lane]);
+        }
+        if greatest < least { 0..0 } else { least as usize..greatest as usize + 2 }
+    }
+}
+
+impl Points {
+    #[inline(always)]
+    fn new(rows: &[f32; BATCH], shown: &[f32; BATCH], last: f32, lit: &mut Lit) -> Self {
+        /// Added to a whole number below it, this leaves the number in the lowest bits.
+        const SHIFT: f32 = 8_388_608.0;
+        let mut points = Self { rows: [0; BATCH], upper: [0.0; BATCH], lower: [0.0; BATCH] };
+        for lane in 0..BATCH {
+            let row = rows[lane];
+            let inside = row >= 0.0 && row < last;
+            let held = if inside { row } else { 0.0 };
+            let whole = held.floor();
+            let weight = if inside { shown[lane] } else { 0.0 };
+            points.rows[lane] = (whole + SHIFT).to_bits() & 0x7f_ffff;
+            points.lower[lane] = weight * (held - whole);
+            points.upper[lane] = weight - points.lower[lane];
+            let least = if inside { whole } else { f32::INFINITY };
+            let greatest = if inside { whole } else { -1.0 };
+            lit.least[lane] = if least < lit.least[lane] { least } else { lit.least[lane] };
+            lit.greatest[lane] = if greatest > lit.greatest[lane] { greatest } else { lit.greatest[lane] };
+        }
+        points
     }
 }
 
@@ -262,23 +318,18 @@ impl Drawing<'_> {
         let reach = source.reach.max(self.footprint.bins().least_reach(along));
         let meridian = meridian.single();
         let last = (self.chart.rows - 1) as f32;
-        let (mut first, mut end) = (usize::MAX, 0);
+        let mut lit = Lit::default();
         for (number, batch) in fall.batches.iter().enumerate() {
             let from = (fall.first + number * BATCH) % DEVIATIONS;
             let Some(deviations) = self.collisions.deviations[from..].first_chunk() else { continue };
             let (rows, shown) = self.project(batch, deviations, reach, along, &meridian);
+            let points = Points::new(&rows, &shown, last, &mut lit);
             for lane in 0..BATCH {
-                let upper = rows[lane].floor();
-                if !(upper >= 0.0 && upper < last) {
-                    continue;
-                }
-                let (row, part) = (upper as usize, rows[lane] - upper);
-                (first, end) = (first.min(row), end.max(row + 2));
                 let photons = &self.collisions.photons[batch.levels[lane] as usize];
-                trace.add(simd, row, [shown[lane] * (1.0 - part), shown[lane] * part], photons);
+                trace.add(simd, points.rows[lane] as usize, [points.upper[lane], points.lower[lane]], photons);
             }
         }
-        trace.lit = first.min(end)..end;
+        trace.lit = lit.rows();
     }
 
     /// The rows of collisions, and how bright they are seen.
@@ -310,6 +361,3 @@ impl Drawing<'_> {
         (rows, shown)
     }
 }
-
-/// Octaves of energy from node to node.
-const NODE_OCTAVES: f32 = std::f32::consts::LOG2_10 / 32.0;

@@ -14,8 +14,11 @@ use crate::lanes::{FourLanes, Real};
 
 /// Sources that a task of the thread pool sorts.
 const TASK: usize = 4096;
-/// Scale of the distances, km: bins are as narrow as a row of the chart at 100 km altitude.
+/// Altitude of the light whose rows are told apart, km: that of lower edges.
 const SCALE_KM: f64 = 100.0;
+/// Bins within the reach of a patch, where so many take up 1 to [`MOST_ROWS`] rows of the chart each.
+const BINS_PER_REACH: f64 = 2.5;
+const MOST_ROWS: f64 = 2.5;
 /// Distances beyond this lie behind the horizon, km.
 const FARTHEST_KM: f64 = 3000.0;
 /// Least reach of a patch in cells, so that its sum does not depend on where between the cells it lies.
@@ -85,32 +88,67 @@ struct Span {
     count: i32,
 }
 
-/// Bins of distance: even in the angle at which they are seen at [`SCALE_KM`] above.
+/// Bins of distance: of one width as far as patches need it, even in the angle at which they are seen at [`SCALE_KM`] above from there on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bins {
+    /// Width of near bins, km, and its inverse.
+    width: f64,
+    per_width: f64,
+    /// How far they go, km, at what angle that is, and how many there are to there.
+    near_to: f64,
+    near_angle: f64,
+    near: f64,
+    /// Angle of a far bin, radians, and its inverse.
     step: f64,
+    per_step: f64,
     /// How many there are.
     pub(super) count: usize,
 }
 
 impl Bins {
-    /// Bins of at most `step` radians.
-    pub(super) fn new(step: f64) -> Self {
-        let farthest = math::atan(FARTHEST_KM / SCALE_KM);
-        let count = (farthest / step).ceil().max(1.0);
-        Self { step: farthest / count, count: count as usize }
+    /// Bins for patches of a standard deviation in km or more, on a chart with rows of `step` radians.
+    pub(super) fn new(spread_km: f64, step: f64) -> Self {
+        let row = step * SCALE_KM;
+        let width = (spread_km * f64::from(REACH) / BINS_PER_REACH).clamp(row, MOST_ROWS * row);
+        // From there on even angles are wider.
+        let near_to = (SCALE_KM * math::sqrt(width / row - 1.0)).min(FARTHEST_KM);
+        let (near, near_angle) = (near_to / width, math::atan(near_to / SCALE_KM));
+        let far = math::atan(FARTHEST_KM / SCALE_KM) - near_angle;
+        let count = (near + far / step).ceil();
+        let step = far.max(1e-9) / (count - near).max(1e-9);
+        let (per_width, per_step) = (1.0 / width, 1.0 / step);
+        Self { width, per_width, near_to, near_angle, near, step, per_step, count: count as usize }
+    }
+
+    /// Width of a bin at a distance, km.
+    #[inline(always)]
+    fn width(&self, distance: f32) -> f32 {
+        const SCALE: f32 = SCALE_KM as f32;
+        (self.step as f32 * distance.mul_add(distance / SCALE, SCALE)).max(self.width as f32)
+    }
+
+    /// Place of a distance among the bins; 0 is the nearer edge of the first.
+    #[inline(always)]
+    fn place(&self, distance: f32) -> f32 {
+        const PER_SCALE: f32 = (1.0 / SCALE_KM) as f32;
+        let beyond = lanes::atan2(distance * PER_SCALE, 1.0) - self.near_angle as f32;
+        let far = beyond.mul_add(self.per_step as f32, self.near as f32);
+        if distance < self.near_to as f32 { distance * self.per_width as f32 } else { far }
     }
 
     /// Least reach of a patch along a meridian at a distance, km.
     #[inline(always)]
     pub(super) fn least_reach(&self, distance: f32) -> f32 {
-        const SCALE: f32 = SCALE_KM as f32;
-        LEAST_CELLS * self.step as f32 * distance.mul_add(distance / SCALE, SCALE)
+        LEAST_CELLS * self.width(distance)
     }
 
     /// Distance of a bin's middle, and its width, km.
     pub(super) fn distance(&self, bin: usize) -> [f64; 2] {
-        let (sin, cos) = math::sin_cos((bin as f64 + 0.5) * self.step);
+        let place = bin as f64 + 0.5;
+        if place < self.near {
+            return [place * self.width, self.width];
+        }
+        let (sin, cos) = math::sin_cos((place - self.near).mul_add(self.step, self.near_angle));
         [SCALE_KM * sin / cos, SCALE_KM * self.step / (cos * cos)]
     }
 }
@@ -132,8 +170,8 @@ impl StripSums {
 }
 
 impl<'a> Footprint<'a> {
-    /// Sorts sources by the strips of a chart; distances are in bins of `step` radians.
-    pub(super) fn new(sources: &'a [Source], chart: &Chart, step: f64) -> Self {
+    /// Sorts sources, of this standard deviation in km or more, by the strips of a chart.
+    pub(super) fn new(sources: &'a [Source], chart: &Chart, spread_km: f64) -> Self {
         let finder = chart.finder();
         let level = Level::new();
         let mut spans = vec![Span::default(); sources.len()];
@@ -156,7 +194,7 @@ impl<'a> Footprint<'a> {
                 next[strip] += 1;
             });
         }
-        Self { sources, starts, entries, bins: Bins::new(step) }
+        Self { sources, starts, entries, bins: Bins::new(spread_km, chart.row_step) }
     }
 
     /// Bins of distance.
@@ -280,13 +318,11 @@ impl Patch {
     /// The bins that it covers along the columns.
     #[inline(always)]
     fn bins(&self, source: &Source, bins: &Bins) -> BinSpans {
-        const PER_SCALE: f32 = (1.0 / SCALE_KM) as f32;
         let (mut middles, mut reaches) = ([0.0; STRIP], [0.0; STRIP]);
-        let per_step = (1.0 / bins.step) as f32;
         for column in 0..STRIP {
-            let along = self.along[column] * PER_SCALE;
-            middles[column] = lanes::atan2(along, 1.0) * per_step;
-            let reach = source.reach * PER_SCALE / along.mul_add(along, 1.0) * per_step;
+            let along = self.along[column];
+            middles[column] = bins.place(along);
+            let reach = source.reach / bins.width(along);
             reaches[column] = if reach > LEAST_CELLS { reach } else { LEAST_CELLS };
         }
         BinSpans { middles, reaches }

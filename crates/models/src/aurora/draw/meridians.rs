@@ -25,8 +25,8 @@ const ROWS: usize = 16;
 /// Steps of altitude from bin to bin above which smoothed tables are taken, km: near the magnetic zenith a line of sight runs along the field.
 const STEP_KM: f32 = 1.5;
 
-/// Nearer than so many widths of a bin, smoothed tables may be taken: 600 km / [`STEP_KM`].
-const NEAR_BINS: f64 = 400.0;
+/// Nearer than so many widths of a bin, smoothed tables may be taken: 800 km / [`STEP_KM`].
+const NEAR_BINS: f64 = 533.0;
 /// Spacing of such tables in steps: at least 1 / [`STEP_KM`]. Steps as long as the light is high need 2, or linear interpolation lets the bins'
 /// own pattern through; shorter ones need less, since the light itself is smooth, and keep its lower edge.
 const ENTRY_PER_STEP: [f32; 2] = [1.0 / STEP_KM, 2.0];
@@ -230,8 +230,8 @@ impl Drawing<'_> {
         let line = meridian.line(distance);
         // Where tables are smoothed, light reaches rows of neighbouring bins.
         let blurred = if distance < NEAR_BINS * width { BLURRED_BINS * width } else { 0.0 };
-        let top = self.row(&line, distance - blurred, profile.top_km);
-        let bottom = self.row(&line, distance + blurred, BOTTOM_KM);
+        let top = self.row(&line, distance, -blurred, profile.top_km);
+        let bottom = self.row(&line, distance, blurred, BOTTOM_KM);
         let end = ((bottom.floor() + 1.0).max(0.0) as usize).min(self.chart.rows);
         let rows = (top.ceil().max(0.0) as usize).min(end)..end;
         let light = &mut strip.light_up(column, &rows, self.chart.rows)[rows.clone()];
@@ -248,10 +248,13 @@ impl Drawing<'_> {
         }
     }
 
-    /// The row in which a line of sight at a distance passes an altitude on a field line.
+    /// The row in which a line of sight passes an altitude on the field line at a distance, moved down by what smoothing over bins of
+    /// distance spreads: where the line of sight sinks along the field, nearer bins are those that show farther down.
     #[inline(always)]
-    fn row(&self, line: &FieldLine, distance: f64, altitude_km: f32) -> f32 {
-        let colatitude = lanes::atan2(distance.max(0.0) as f32, line.place(f64::from(altitude_km)) as f32);
+    fn row(&self, line: &FieldLine, distance: f64, blurred: f64, altitude_km: f32) -> f32 {
+        let place = line.place(f64::from(altitude_km));
+        let distance = distance + if place < 0.0 { -blurred } else { blurred };
+        let colatitude = lanes::atan2(distance.max(0.0) as f32, place as f32);
         self.chart.finder().row(colatitude) - 0.5
     }
 
@@ -322,7 +325,7 @@ impl<S: Simd> Stretch<'_, S> {
     /// Adds the light at a height in entries of `table`, which is dark at both ends.
     #[inline(always)]
     fn add_row(&self, table: &[PerEmitter<f32>], height: f32, light: &mut PerEmitter<f32>) {
-        let height = height.max(0.0).min((table.len() - 2) as f32);
+        let height = height.max(0.0).min((table.len() - 1) as f32);
         let entry = (height as usize).min(table.len() - 2);
         let part = height - entry as f32;
         let value = mixed(self.weights.simd, &table[entry], &table[entry + 1], part);

@@ -121,6 +121,7 @@ impl Aurora {
             glow: [&afterglow.green, &afterglow.red],
             emission: simulation.emission(),
             parameters: &parameters.drawing,
+            spacing_km: simulation.spacing_km(),
             energy_ev: parameters.energy_ev.at(view.shutter.middle()),
             wander_km: self.wander_km,
         }

@@ -15,7 +15,7 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use super::{
     Aurora,
     chart::{Chart, Coverage},
-    footprint::{Footprint, REACH},
+    footprint::{Footprint, Source},
     geometry::{EARTH_RADIUS_KM, FieldLines, dot},
     maps::Maps,
     meridians::{Meridians, Sampler, mixed},
@@ -71,25 +71,11 @@ impl<'a> PreparedAurora<'a> {
         let field = aurora.field_lines(view.camera.position);
         let sources = Sources::new(&aurora.light(view), &field, &aurora.instants(view));
         check(observer)?;
-        let coverage = Coverage::of_view(view, &field);
-        let [sharp, soft] = sources.spread_km;
-        let step = (aurora.simulation.time() / AuroraSimulation::STEP_S).round() as i64 as u32;
-        let draw = |sources: &[_], spread_km: f64, [column, row]: [f64; 2]| {
-            let chart = Chart::new(&coverage, column, row);
-            let bins = (spread_km * f64::from(REACH) / 250.0).clamp(row, 4.0 * row);
-            let footprint = Footprint::new(sources, &chart, bins);
-            match &aurora.collisions {
-                Some(collisions) => collisions.draw(chart, &field, &footprint, step),
-                None => Meridians::new(chart, &field, &aurora.profiles, &footprint),
-            }
-        };
-        let pixel = coverage.pixel;
-        // The angle at which the spread is seen from the nearest place where such light is.
-        let row = (sharp / 130.0).clamp(pixel, 2.0 * pixel);
-        let coarse = (soft / 500.0).clamp(pixel, 16.0 * pixel);
-        let sharp = draw(&sources.sharp, sharp, [pixel, row]);
+        let charts = Charts { aurora, field: &field, coverage: Coverage::of_view(view, &field) };
+        let pixel = charts.coverage.pixel;
+        let sharp = charts.sharp(&sources);
         check(observer)?;
-        let soft = draw(&sources.soft, soft, [coarse, coarse]);
+        let soft = charts.soft(&sources);
         Ok(Self {
             aurora,
             view,
@@ -98,10 +84,44 @@ impl<'a> PreparedAurora<'a> {
             horizon: -math::sqrt(2.0 * field.observer_altitude_km().max(0.0) / EARTH_RADIUS_KM) as f32,
             from_middle: (EARTH_RADIUS_KM + field.observer_altitude_km()) as f32,
             field,
+            soft_is_coarse: soft.chart.column_step >= 2.0 * KNOT_PIXELS as f64 * pixel,
             charts: [sharp, soft],
-            soft_is_coarse: coarse >= 2.0 * KNOT_PIXELS as f64 * pixel,
             maps: OnceLock::new(),
         })
+    }
+}
+
+/// What the charts of a frame have in common.
+pub(super) struct Charts<'a> {
+    pub(super) aurora: &'a Aurora,
+    pub(super) field: &'a FieldLines,
+    pub(super) coverage: Coverage,
+}
+
+impl Charts<'_> {
+    /// The chart of light with fine detail.
+    pub(super) fn sharp(&self, sources: &Sources) -> Meridians {
+        let (pixel, [spread_km, _]) = (self.coverage.pixel, sources.spread_km);
+        // The angle at which the spread is seen from the nearest place where such light is.
+        let row = (spread_km / 130.0).clamp(pixel, 2.0 * pixel);
+        self.draw(&sources.sharp, spread_km, [pixel, row])
+    }
+
+    /// The coarser chart of light that lingers and spreads.
+    pub(super) fn soft(&self, sources: &Sources) -> Meridians {
+        let (pixel, [_, spread_km]) = (self.coverage.pixel, sources.spread_km);
+        let column = (spread_km / 500.0).clamp(pixel, 16.0 * pixel);
+        // To the side it is as smooth as its sources, but upward it changes with the air.
+        self.draw(&sources.soft, spread_km, [column, (0.25 * column).max(pixel)])
+    }
+
+    fn draw(&self, sources: &[Source], spread_km: f64, [column, row]: [f64; 2]) -> Meridians {
+        let Aurora { simulation, profiles, collisions, .. } = self.aurora;
+        let chart = Chart::new(&self.coverage, column, row);
+        let footprint = Footprint::new(sources, &chart, spread_km);
+        let Some(collisions) = collisions else { return Meridians::new(chart, self.field, profiles, &footprint) };
+        let step = (simulation.time() / AuroraSimulation::STEP_S).round() as i64 as u32;
+        collisions.draw(chart, self.field, &footprint, step)
     }
 }
 

@@ -23,6 +23,8 @@ use crate::aurora::{
 const TASK: usize = 4096;
 /// Spread of a particle beside the distance to its neighbours: none is seen by itself.
 const SPREAD_PER_SPACING: f64 = 1.2;
+/// Afterglow without particles that is fainter than this share of a typical cell is not seen.
+const FAINTEST: f32 = 2e-4;
 /// 1000 W, the power of one mW/m^2 on one km^2.
 const PER_UNIT: f32 = 1e-3;
 
@@ -36,18 +38,14 @@ pub(super) struct Sources {
     pub(super) spread_km: [f64; 2],
 }
 
-/// A kind of light.
-#[derive(Clone, Copy)]
-pub(super) enum Kind {
-    Green = 0,
-    Red = 1,
-    Prompt = 2,
-}
+/// Shares of green, red and prompt light.
+pub(super) type Shares = [f32; 3];
+const GREEN: Shares = [1.0, 0.0, 0.0];
+const RED: Shares = [0.0, 1.0, 0.0];
 
 /// How electrons become sources.
 pub(super) struct Maker<'a> {
     pub(super) field: &'a FieldLines,
-    pub(super) kind: Kind,
     pub(super) reach: f32,
     /// Part of the power that each of several instants has.
     pub(super) share: f32,
@@ -55,47 +53,57 @@ pub(super) struct Maker<'a> {
 
 impl Maker<'_> {
     #[inline(always)]
-    fn make(&self, [east, south]: [f32; 2], power_w: f32, energy_ev: f32) -> Source {
+    fn make(&self, [east, south]: [f32; 2], powers_w: [f32; 3], energy_ev: f32) -> Source {
         let foot = self.field.foot(east, south);
-        let mut power = [0.0; 3];
-        power[self.kind as usize] = power_w * self.share * PER_UNIT * foot.upright;
+        let scale = self.share * PER_UNIT * foot.upright;
+        let [green, red, prompt] = powers_w;
+        let power = [green * scale, red * scale, prompt * scale];
         Source { across: foot.across, reach: self.reach, node: node_of(energy_ev), power }
     }
 
-    /// A source for each of the cells.
-    pub(super) fn cells(&self, cells: &[GlowCell]) -> Vec<Source> {
+    /// A source for each of the cells, which gives these shares of its light.
+    pub(super) fn cells(&self, cells: &[GlowCell], shares: Shares) -> Vec<Source> {
         let level = Level::new();
         let mut sources = vec![Source::default(); cells.len()];
         sources.par_chunks_mut(TASK).zip(cells.par_chunks(TASK)).for_each(|(sources, cells)| {
-            dispatch!(level, _simd => self.fill_from_cells(sources, cells));
+            dispatch!(level, _simd => self.fill_from_cells(sources, cells, shares));
         });
         sources
     }
 
     #[inline(always)]
-    fn fill_from_cells(&self, sources: &mut [Source], cells: &[GlowCell]) {
+    fn fill_from_cells(&self, sources: &mut [Source], cells: &[GlowCell], shares: Shares) {
         for (source, cell) in sources.iter_mut().zip(cells) {
-            *source = self.make(cell.position_km, cell.power_w, cell.energy_ev);
+            let powers = shares.map(|share| share * cell.power_w);
+            *source = self.make(cell.position_km, powers, cell.energy_ev);
         }
     }
 
-    /// Particles as they are `later` seconds after their step.
-    fn particles(&self, particles: &AuroraParticles, later: f32) -> Vec<Source> {
+    /// Particles as they are `later` seconds after their step, with the green light of each.
+    fn particles(&self, particles: &AuroraParticles, green_w: &[f32], later: f32) -> Vec<Source> {
         let level = Level::new();
         let mut sources = vec![Source::default(); particles.len()];
         sources.par_chunks_mut(TASK).enumerate().for_each(|(task, sources)| {
-            dispatch!(level, _simd => self.fill_from_particles(sources, particles, task * TASK, later));
+            dispatch!(level, _simd => self.fill_from_particles(sources, particles, green_w, task * TASK, later));
         });
         sources
     }
 
     #[inline(always)]
-    fn fill_from_particles(&self, sources: &mut [Source], particles: &AuroraParticles, first: usize, later: f32) {
+    fn fill_from_particles(
+        &self,
+        sources: &mut [Source],
+        particles: &AuroraParticles,
+        green_w: &[f32],
+        first: usize,
+        later: f32,
+    ) {
         let ([xs, zs], [us, ws]) = (&particles.positions, &particles.velocities);
         for (number, source) in sources.iter_mut().enumerate() {
             let index = first + number;
             let place = [us[index].mul_add(later, xs[index]), ws[index].mul_add(later, zs[index])];
-            *source = self.make(place, particles.powers_w[index], particles.energies_ev[index]);
+            let powers = [green_w[index], 0.0, particles.powers_w[index]];
+            *source = self.make(place, powers, particles.energies_ev[index]);
         }
     }
 }
@@ -110,21 +118,22 @@ pub(super) fn node_of(energy_ev: f32) -> f32 {
 impl Sources {
     /// What shines at the `instants`, seconds after the particles' step; each has an equal part of the power.
     pub(super) fn new(light: &Light, field: &FieldLines, instants: &[f64]) -> Self {
-        let [green, red] = [&light.glow[0], &light.glow[1]].map(|map| map.cells().collect::<Vec<_>>());
+        let (green_w, green) = light.glow[0].shared_out(light.particles, FAINTEST);
+        let red: Vec<_> = light.glow[1].cells().collect();
         let column = light.emission.column(light.energy_ev);
         let spread = light.spread_km();
         let with = |emitter: Emitter, map: &GlowMap| {
             let diffusion = column.spread_km[emitter.index()];
             math::sqrt(spread * spread + diffusion * diffusion + map.cell_km() * map.cell_km() / 6.0)
         };
-        let maker = |kind, spread: f64, share| Maker { field, kind, reach: spread as f32 * REACH, share };
+        let maker = |spread: f64, share| Maker { field, reach: spread as f32 * REACH, share };
         let red_spread = with(Emitter::OxygenRed, light.glow[1]);
-        let mut sharp = maker(Kind::Green, with(Emitter::OxygenGreen, light.glow[0]), 1.0).cells(&green);
-        let prompt = maker(Kind::Prompt, spread, 1.0 / instants.len().max(1) as f32);
+        let mut sharp = maker(with(Emitter::OxygenGreen, light.glow[0]), 1.0).cells(&green, GREEN);
+        let moving = maker(spread, 1.0 / instants.len().max(1) as f32);
         for later in instants {
-            sharp.extend(prompt.particles(light.particles, *later as f32));
+            sharp.extend(moving.particles(light.particles, &green_w, *later as f32));
         }
-        let soft = maker(Kind::Red, red_spread, 1.0).cells(&red);
+        let soft = maker(red_spread, 1.0).cells(&red, RED);
         Self { sharp, soft, spread_km: [spread, red_spread] }
     }
 }
@@ -136,6 +145,8 @@ pub(super) struct Light<'a> {
     pub(super) glow: [&'a GlowMap; 2],
     pub(super) emission: &'a Emission,
     pub(super) parameters: &'a DrawingParameters,
+    /// Mean distance of neighbouring particles, km.
+    pub(super) spacing_km: f64,
     /// Energy of the electrons where nothing varies it, eV.
     pub(super) energy_ev: f64,
     /// Spread of collisions about their field line, km.
@@ -147,10 +158,7 @@ impl Light<'_> {
     pub(super) fn spread_km(&self) -> f64 {
         let own = match self.parameters.spread_km {
             Auto::Set(spread) => spread,
-            Auto::Auto => {
-                let area = self.glow[0].lit_cells() as f64 * self.glow[0].cell_km() * self.glow[0].cell_km();
-                SPREAD_PER_SPACING * math::sqrt(area / self.particles.len().max(1) as f64)
-            }
+            Auto::Auto => SPREAD_PER_SPACING * self.spacing_km,
         };
         math::hypot(own, self.wander_km).max(1e-3)
     }

@@ -1,6 +1,8 @@
 //! What the drawing must get right: brightness, place, and the same for every way of drawing.
 
 use bansho_base::{
+    animation::Animated,
+    assets::MemoryAssets,
     camera::{CameraParameters, Lens},
     canvas::{Shutter, View},
     math::{self, DVec2, DVec3},
@@ -8,24 +10,29 @@ use bansho_base::{
 };
 
 use super::{
+    Aurora,
     chart::{Chart, Coverage},
     collisions::Collisions,
     footprint::{Footprint, REACH, Source},
     geometry::{EARTH_RADIUS_KM, FieldLines},
     meridians::Meridians,
-    prepared::Batch,
+    prepared::{Batch, Charts},
     profile::Profiles,
-    sources::{Kind, Maker, nearest_node},
+    sources::{Maker, Shares, Sources, nearest_node},
 };
 use crate::aurora::{
+    AuroraParameters, ParticleParameters, SpectrumShape,
     afterglow::GlowCell,
     atmosphere::atmosphere,
-    light::{Emission, PerEmitter},
+    light::{EMITTERS, Emission, Emitter, PerEmitter},
     precipitation::spectrum::ARC,
 };
 
 const ENERGY_EV: f64 = 5000.0;
 const STEP: f64 = 0.01;
+const GREEN: Shares = [1.0, 0.0, 0.0];
+const RED: Shares = [0.0, 1.0, 0.0];
+const PROMPT: Shares = [0.0, 0.0, 1.0];
 
 fn emission() -> Emission {
     Emission::new(atmosphere(), ARC)
@@ -46,13 +53,18 @@ fn field(dip_deg: f64) -> FieldLines {
     FieldLines::new(dip_deg, 0.0, DVec3::ZERO)
 }
 
-fn sources(cells: &[GlowCell], kind: Kind, spread_km: f64, field: &FieldLines) -> Vec<Source> {
-    Maker { field, kind, reach: spread_km as f32 * REACH, share: 1.0 }.cells(cells)
+fn sources(cells: &[GlowCell], shares: Shares, spread_km: f64, field: &FieldLines) -> Vec<Source> {
+    Maker { field, reach: spread_km as f32 * REACH, share: 1.0 }.cells(cells, shares)
+}
+
+/// Least standard deviation of sources, km.
+fn spread_of(sources: &[Source]) -> f64 {
+    f64::from(sources.iter().fold(f32::INFINITY, |least, source| least.min(source.reach)) / REACH)
 }
 
 fn draw(sources: &[Source], view: &View, field: &FieldLines, profiles: &Profiles, step: f64) -> Meridians {
     let chart = Chart::new(&Coverage::of_view(view, field), step, step);
-    let footprint = Footprint::new(sources, &chart, step);
+    let footprint = Footprint::new(sources, &chart, spread_of(sources));
     Meridians::new(chart, field, profiles, &footprint)
 }
 
@@ -89,15 +101,15 @@ fn colatitude_and_longitude(field: &FieldLines, direction: DVec3) -> [f32; 2] {
 fn an_even_sheet_overhead_shows_its_column() {
     let (emission, view) = (emission(), view(Lens::Fisheye, [0.0, 1.0, 0.0], [64, 64]));
     let profiles = Profiles::new(&emission);
-    for (kind, emitters) in [(Kind::Green, 0..1), (Kind::Red, 1..2), (Kind::Prompt, 2..4)] {
+    for (shares, emitters) in [(GREEN, 0..1), (RED, 1..2), (PROMPT, 2..4)] {
         for dip_deg in [90.0, 77.0, -60.0] {
             let field = field(dip_deg);
-            let picture = draw(&sources(&slab(), kind, 5.0, &field), &view, &field, &profiles, STEP);
+            let picture = draw(&sources(&slab(), shares, 5.0, &field), &view, &field, &profiles, STEP);
             let column = emission.column(ENERGY_EV).kilorayleigh;
             for slant_deg in [0.0, 8.0, 30.0, 50.0] {
                 let (sin, cos) = math::sin_cos(f64::to_radians(slant_deg));
                 // Longer the way that is slanted, less so over a round Earth: van Rhijn for 120 or 250 km.
-                let altitude = if matches!(kind, Kind::Red) { 250.0 } else { 120.0 };
+                let altitude = if shares == RED { 250.0 } else { 120.0 };
                 let share = EARTH_RADIUS_KM / (EARTH_RADIUS_KM + altitude) * sin;
                 let longer = 1.0 / math::sqrt(1.0 - share * share);
                 let [colatitude, longitude] = colatitude_and_longitude(&field, DVec3::new(sin * 0.8, cos, -sin * 0.6));
@@ -116,7 +128,7 @@ fn a_ray_is_seen_where_every_lens_puts_it() {
     let profiles = Profiles::new(&emission());
     let field = field(77.0);
     let cell = GlowCell { position_km: [40.0, -90.0], power_w: 1e6, energy_ev: ENERGY_EV as f32 };
-    let sources = sources(&[cell], Kind::Prompt, 0.4, &field);
+    let sources = sources(&[cell], PROMPT, 0.4, &field);
     let [x, y] = sources[0].across.map(f64::from);
     let line = field.meridian([x, y].map(|value| value / math::hypot(x, y))).line(math::hypot(x, y));
     let mut shown = 0;
@@ -167,10 +179,10 @@ fn the_mean_of_many_collision_pictures_is_the_profile() {
     let emission = emission();
     let (profiles, view, field) =
         (Profiles::new(&emission), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
-    let sources = sources(&arc(8000), Kind::Prompt, 1.5, &field);
+    let sources = sources(&arc(8000), PROMPT, 1.5, &field);
     // Low rows, since single points are spread over two of them.
     let chart = || Chart::new(&Coverage::of_view(&view, &field), STEP, 0.5 * STEP);
-    let footprint = Footprint::new(&sources, &chart(), 0.5 * STEP);
+    let footprint = Footprint::new(&sources, &chart(), spread_of(&sources));
     let expected = Meridians::new(chart(), &field, &profiles, &footprint);
     let collisions = Collisions::new(&emission, 0.002, nearest_node(6.0 * ENERGY_EV), Key::new(5, "aurora"));
     let mut mean = vec![[0.0; 4]; expected.light.len()];
@@ -184,11 +196,63 @@ fn the_mean_of_many_collision_pictures_is_the_profile() {
     assert!(apart < 0.03, "{apart}");
 }
 
+/// A straight, even arc from west to east, so far to the north.
+fn even_arc(north_km: f64, energy_ev: f32) -> Vec<GlowCell> {
+    let place = |index: i32| [(4.0 * f64::from(index)) as f32, -north_km as f32];
+    (-100..=100).map(|index| GlowCell { position_km: place(index), power_w: 1e6, energy_ev }).collect()
+}
+
+#[test]
+fn far_and_near_arcs_are_smooth_up_and_down() {
+    let (field, view) = (field(77.0), view(Lens::Perspective, [0.0, 24.0, -60.0], [1280, 720]));
+    for (energy_ev, spectrum, lower_edge) in
+        [(350.0, SpectrumShape::Maxwellian, 0.02), (5000.0, SpectrumShape::Arc, 0.08)]
+    {
+        let parameters = AuroraParameters {
+            energy_ev: Animated::from(energy_ev),
+            spectrum,
+            particles: ParticleParameters { count: 100, ..ParticleParameters::default() },
+            ..AuroraParameters::default()
+        };
+        let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
+        for north_km in [100.0, 250.0, 640.0, 1100.0] {
+            let cells = even_arc(north_km, energy_ev as f32);
+            let spread_km = [6.0, 15.0];
+            let of = |shares, spread_km| sources(&cells, shares, spread_km, &field);
+            let sharp = [of(GREEN, 6.0), of(PROMPT, 6.0)].concat();
+            let sources = Sources { sharp, soft: of(RED, 15.0), spread_km };
+            let charts = Charts { aurora: &aurora, field: &field, coverage: Coverage::of_view(&view, &field) };
+            let charts = [charts.sharp(&sources), charts.soft(&sources)];
+            let column: Vec<PerEmitter<f32>> = (0..600)
+                .map(|row| {
+                    let Batch { longitude, colatitude, .. } = Batch::new(&view.camera, &field, 640, row);
+                    let [sharp, soft] =
+                        [0, 1].map(|chart: usize| charts[chart].sampler().light(longitude[0], colatitude[0]));
+                    std::array::from_fn(|i| sharp[i] + soft[i])
+                })
+                .collect();
+            for emitter in EMITTERS {
+                let light = |row: usize| column[row][emitter.index()];
+                let most = (0..600).map(light).fold(0.0, f32::max);
+                let bend = |row: usize| (light(row - 1) + light(row + 1) - 2.0 * light(row)).abs() / most;
+                let worst = (1..599).max_by(|a, b| bend(*a).total_cmp(&bend(*b))).unwrap();
+                // Lower edges are a few pixels high in the distance; red light has none.
+                let bound = if emitter == Emitter::OxygenRed { 0.01 } else { lower_edge };
+                assert!(
+                    bend(worst) < bound,
+                    "{energy_ev} eV, {north_km} km, {emitter:?}, row {worst}: {}",
+                    bend(worst)
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn pictures_do_not_depend_on_the_number_of_threads() {
     let (profiles, view, field) =
         (Profiles::new(&emission()), view(Lens::Fisheye, [0.0, 1.0, 0.0], [200, 200]), field(77.0));
-    let sources = sources(&arc(3000), Kind::Green, 0.5, &field);
+    let sources = sources(&arc(3000), GREEN, 0.5, &field);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| draw(&sources, &view, &field, &profiles, STEP).light)
@@ -203,7 +267,7 @@ fn few_particles_are_as_smooth_and_as_bright_as_many() {
     let picture = |count: usize| {
         let mut cells = arc(count);
         cells.iter_mut().for_each(|cell| cell.power_w *= 16_000.0 / count as f32);
-        draw(&sources(&cells, Kind::Green, 1.5, &field), &view, &field, &profiles, STEP).light
+        draw(&sources(&cells, GREEN, 1.5, &field), &view, &field, &profiles, STEP).light
     };
     let apart = difference(&picture(2000), &picture(16_000));
     assert!(apart < 0.1, "{apart}");

@@ -78,7 +78,7 @@ impl Emission {
     }
 
     /// Volume emission of each emitter, photons m^-3 s^-1 per mW m^-2, for the spectrum about an energy at one altitude. Nothing
-    /// outside 80-600 km.
+    /// outside 80-800 km.
     #[must_use]
     pub fn at(&self, energy_ev: f64, altitude_km: f64) -> PerEmitter<f64> {
         if !covers(altitude_km) {
@@ -172,7 +172,7 @@ mod tests {
             let kilorayleigh = table.column(energy_ev).kilorayleigh;
             assert!((0..4).all(|i| (kilorayleigh[i] / sums[i] - 1.0).abs() < 1e-9), "{kilorayleigh:?} {sums:?}");
         }
-        assert_eq!(table.at(1e4, 700.0), [0.0; 4]);
+        assert_eq!(table.at(1e4, 900.0), [0.0; 4]);
     }
 
     #[test]

@@ -247,6 +247,11 @@ impl AuroraSimulation {
         &self.state.particles
     }
 
+    /// Mean distance of neighbouring particles, km: the side of a square that holds one.
+    pub(in crate::aurora) fn spacing_km(&self) -> f64 {
+        (std::f64::consts::PI / self.making.parameters.particles.neighbours).sqrt() * self.state.support_km
+    }
+
     /// Where green and red linger.
     #[must_use]
     pub fn afterglow(&self) -> &Afterglow {

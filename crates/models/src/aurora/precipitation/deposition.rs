@@ -57,7 +57,7 @@ impl Deposition {
     }
 
     /// Ion pairs, m^-3 s^-1 per mW m^-2, for a spectrum about any energy at any altitude: linear between levels and, in the logarithm
-    /// of the energy, between nodes. Nothing outside 80-600 km.
+    /// of the energy, between nodes. Nothing outside 80-800 km.
     #[must_use]
     pub fn ionisation(&self, energy_ev: f64, altitude_km: f64) -> f64 {
         interpolate(&self.mixed, energy_ev, altitude_km)
@@ -67,8 +67,16 @@ impl Deposition {
     /// [`ionisation`](Self::ionisation) for the mean of their [`monoenergetic`](Self::monoenergetic) profiles.
     #[must_use]
     pub fn draw_node(&self, energy_ev: f64, uniforms: [f64; 2]) -> usize {
-        let shares = &self.cumulative_shares[energy::choose_node(energy_ev, uniforms[0])];
-        shares.partition_point(|sum| *sum <= uniforms[1]).min(NODES - 1)
+        self.draw_node_about(energy::choose_node(energy_ev, uniforms[0]), uniforms[1])
+    }
+
+    /// The same for the spectrum about the energy of a node.
+    ///
+    /// # Panics
+    /// For a node that is not of the grid.
+    #[must_use]
+    pub fn draw_node_about(&self, node: usize, uniform: f64) -> usize {
+        self.cumulative_shares[node].partition_point(|sum| *sum <= uniform).min(NODES - 1)
     }
 }
 
@@ -142,7 +150,7 @@ mod tests {
             }
             assert!(difference < 0.01 * sum, "{energy_ev}: {}", difference / sum);
         }
-        assert_eq!((table.ionisation(1e4, 79.9), table.ionisation(1e4, 600.1)), (0.0, 0.0));
+        assert_eq!((table.ionisation(1e4, 79.9), table.ionisation(1e4, 800.1)), (0.0, 0.0));
     }
 
     #[test]
