@@ -219,7 +219,7 @@ fn note_stretch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
                 let squared = sum.add(simd, term, [start, starts.get(1).map_or(none, |start| *start as usize)]);
                 coincident += squared.choose(nearest, one, one.like(0.0));
                 let (farthest, halves) = (HalfLanes::splat(simd, sum.farthest), squared.split());
-                noted |= u64::from(halves.0.simd_lt(farthest).any_true()) << (2 * number >> group.bit_shift);
+                noted |= u64::from(halves.0.simd_lt(farthest).any_true()) << ((2 * number) >> group.bit_shift);
                 noted |= u64::from(halves.1.simd_lt(farthest).any_true()) << ((2 * number + 1) >> group.bit_shift);
             }
             hits[index] = noted;
