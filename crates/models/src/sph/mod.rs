@@ -13,7 +13,7 @@
 //! let (mut density, mut acceleration) = (Vec::new(), Default::default());
 //!
 //! particles.sort(&mut cells); // then `cells.reorder` for arrays of the model's own
-//! densities(&cells, KernelShape::Poly6, &particles.masses, &mut density);
+//! densities(&mut cells, KernelShape::Poly6, &particles.masses, &mut density);
 //! let pressure: Vec<f32> = density.iter().map(|density| state.pressure(10.0, *density)).collect();
 //! force.accelerations(&cells, &particles.masses, &density, &pressure, &mut acceleration);
 //! particles.advance(&acceleration, 1e-3);
