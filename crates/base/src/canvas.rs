@@ -1,5 +1,7 @@
 //! What phenomena draw into: strips of a picture that no two threads share.
 
+mod aov;
+
 use std::sync::Arc;
 
 use fearless_simd::{Simd, f32x16, prelude::*};
@@ -8,6 +10,8 @@ use crate::{
     camera::{Camera, CameraParameters},
     image::Rect,
 };
+
+pub use aov::{AovDescriptor, AovPlane, AovRule};
 
 /// When the shutter is open, seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,93 +143,6 @@ impl View {
         let display = self.size.map(|side| side - 2 * self.overscan);
         let camera = self.path.at(t, display).with_overscan(self.overscan);
         self.mirror.map_or(camera, |height| camera.mirrored(height))
-    }
-}
-
-/// How the samples of an AOV become one number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AovRule {
-    /// Their sum; 0 where there is nothing.
-    Sum,
-    /// Their mean, weighted as the AOV says; 0 where there is nothing.
-    WeightedMean,
-    /// That of the nearest; 0 where there is nothing.
-    Nearest,
-}
-
-/// A measured quantity that a phenomenon can write beside its light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct AovDescriptor {
-    /// Name behind the phenomenon's, such as `temperature_k` or `motion.X`.
-    pub name: &'static str,
-    /// Unit.
-    pub unit: &'static str,
-    /// What it is, how it is weighted, and its empty value.
-    pub doc: &'static str,
-    /// How samples combine.
-    pub rule: AovRule,
-}
-
-/// The plane of one AOV within a strip.
-#[derive(Clone, Debug, Default)]
-pub struct AovPlane {
-    values: Vec<f32>,
-    /// Sums of weights; of the nearest sample 1/depth, so that no sample is 0 too.
-    weights: Vec<f32>,
-}
-
-impl AovPlane {
-    /// Adds a sample of `value` that counts `weight` at pixel `index` of the strip.
-    pub fn add(&mut self, index: usize, value: f32, weight: f32) {
-        self.values[index] = value.mul_add(weight, self.values[index]);
-        self.weights[index] += weight;
-    }
-
-    /// Keeps a sample of `value` at `depth` (m, above 0) if it is nearer than what pixel `index` of the strip has, for [`AovRule::Nearest`].
-    pub fn keep_nearest(&mut self, index: usize, value: f32, depth: f32) {
-        self.keep(index, value, 1.0 / depth);
-    }
-
-    fn keep(&mut self, index: usize, value: f32, nearness: f32) {
-        if nearness > self.weights[index] {
-            (self.values[index], self.weights[index]) = (value, nearness);
-        }
-    }
-
-    /// What the samples at pixel `index` come to.
-    pub fn resolve(&self, index: usize, rule: AovRule) -> f32 {
-        match rule {
-            AovRule::Sum | AovRule::Nearest => self.values[index],
-            AovRule::WeightedMean if self.weights[index] > 0.0 => self.values[index] / self.weights[index],
-            AovRule::WeightedMean => 0.0,
-        }
-    }
-
-    /// Adds the samples of another plane of the same size and AOV.
-    pub fn add_plane(&mut self, other: &Self, rule: AovRule) {
-        if rule == AovRule::Nearest {
-            let samples = other.values.iter().zip(&other.weights).enumerate();
-            samples.for_each(|(index, (value, nearness))| self.keep(index, *value, *nearness));
-            return;
-        }
-        let add = |sums: &mut [f32], more: &[f32]| sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
-        add(&mut self.values, &other.values);
-        add(&mut self.weights, &other.weights);
-    }
-
-    /// Its samples count `share`, those of another plane of the same size and AOV the rest.
-    fn dissolve(&mut self, other: &Self, share: f32, rule: AovRule) {
-        if rule == AovRule::Nearest {
-            return self.add_plane(other, rule);
-        }
-        mix(&mut self.values, &other.values, share);
-        mix(&mut self.weights, &other.weights, share);
-    }
-
-    /// Makes it an empty plane of so many pixels.
-    pub fn reset(&mut self, pixels: usize) {
-        reset(&mut self.values, pixels, 0.0);
-        reset(&mut self.weights, pixels, 0.0);
     }
 }
 
@@ -570,22 +487,5 @@ mod tests {
         strip.aovs[0].add(0, 1000.0, 1.0);
         strip.aovs[0].add(0, 2000.0, 3.0);
         assert_eq!(strip.aovs[0].resolve(0, AovRule::WeightedMean), 1750.0);
-    }
-
-    #[test]
-    fn of_the_nearest_sample_the_order_does_not_matter_either() {
-        let planes = [[(7.0, 4.0), (5.0, 2.0)], [(5.0, 2.0), (7.0, 4.0)]].map(|samples| {
-            let mut plane = AovPlane::default();
-            plane.reset(2);
-            samples.into_iter().for_each(|(value, depth)| plane.keep_nearest(0, value, depth));
-            plane
-        });
-        assert_eq!(planes[0].values, planes[1].values);
-        let mut nearer = planes[0].clone();
-        nearer.keep_nearest(0, 3.0, 1.0);
-        for (mut sum, other) in [(planes[0].clone(), &nearer), (nearer.clone(), &planes[0])] {
-            sum.add_plane(other, AovRule::Nearest);
-            assert_eq!([0, 1].map(|index| sum.resolve(index, AovRule::Nearest)), [3.0, 0.0]);
-        }
     }
 }

@@ -9,13 +9,11 @@ pub mod energy;
 pub mod fall;
 pub mod fang;
 pub mod hard_sphere;
-pub mod parameters;
 pub mod spectrum;
 
 pub use deposition::Deposition;
 pub use fall::{Collision, FallLibrary, Falls};
 pub use hard_sphere::HardSphere;
-pub use parameters::{FallKind, PrecipitationParameters, SpectrumKind};
 pub use spectrum::Spectrum;
 
 /// Mean energy that an electron loses for each ion pair that it makes, eV (Rees 1989; Fang et al. 2010).
