@@ -6,11 +6,11 @@
 set -eu
 studio="$(realpath "${1:-target/debug/bansho-studio}")"
 bansho="$(realpath "${2:-target/debug/bansho}")"
-display=":${STUDIO_DISPLAY:-91}"
 folder="$(mktemp -d)"
-export DISPLAY="$display" XDG_DATA_HOME="$folder/home" XDG_RUNTIME_DIR="$folder"
+export XDG_DATA_HOME="$folder/home" XDG_RUNTIME_DIR="$folder"
 
-Xvfb "$display" -screen 0 1400x900x24 >"$folder/xvfb.log" 2>&1 &
+# Without -noreset the server starts anew whenever its last client leaves, and refuses who comes meanwhile.
+Xvfb -displayfd 3 -noreset -screen 0 1400x900x24 3>"$folder/display" >"$folder/xvfb.log" 2>&1 &
 xvfb=$!
 trap 'kill "$xvfb" "${window:-$xvfb}" 2>/dev/null || true' EXIT
 
@@ -32,7 +32,9 @@ SCENE
 
 fail() {
   echo "FAILED: $1" >&2
-  [ ! -e "$folder/studio.log" ] || cat "$folder/studio.log" >&2
+  for log in xvfb studio; do
+    [ ! -e "$folder/$log.log" ] || cat "$folder/$log.log" >&2
+  done
   cat "$folder/sky.toml" >&2
   import -window root "$folder/failed.png" 2>/dev/null && echo "see $folder/failed.png" >&2
   exit 1
@@ -70,7 +72,9 @@ saved() { xdotool key ctrl+s sleep 1 && grep -q "$1" sky.toml; }
 
 shapes_are_two() { xdotool key ctrl+s sleep 1 && [ "$(grep -c 'aurora.shapes' sky.toml)" = 2 ]; }
 
-within 30 "no X server" xdotool getdisplaygeometry
+within 60 "no X server" test -s "$folder/display"
+DISPLAY=":$(cat "$folder/display")"
+export DISPLAY
 cd "$folder"
 "$studio" sky.toml >"$folder/studio.log" 2>&1 &
 window=$!
