@@ -52,7 +52,11 @@ impl BlackBody {
     fn interpolate(&self, temperature_k: f32) -> [f32; 4] {
         let (below, fraction) = Self::locate(temperature_k);
         let (a, b) = (self.entries[below], self.entries[below + 1]);
-        [0, 1, 2, 3].map(|i| (b[i] - a[i]).mul_add(fraction, a[i]))
+        let mut between = [0.0; 4];
+        for i in 0..4 {
+            between[i] = (b[i] - a[i]).mul_add(fraction, a[i]);
+        }
+        between
     }
 
     /// Light of a black body as ACEScg whose luminance is in cd/m^2. Linear between whole kelvins; dark (0) below about 150 K.

@@ -111,12 +111,14 @@ impl Detail {
     #[inline(always)]
     pub(crate) fn matter(&self, gas: &Gas, index: usize, since: f64) -> [f32; 3] {
         let particles = gas.particles;
-        std::array::from_fn(|axis| {
+        let mut matter = [0.0; 3];
+        for axis in 0..3 {
             let now = (since as f32).mul_add(particles.velocity[axis][index], particles.position[axis][index]);
-            let carried = (particles.birthplace[axis][index] - now) * self.cells_per_metre[axis];
-            let age = f64::from(particles.age[index]) + since;
-            if axis == 1 { carried + (self.rate * age) as f32 } else { carried }
-        })
+            matter[axis] = (particles.birthplace[axis][index] - now) * self.cells_per_metre[axis];
+        }
+        let age = f64::from(particles.age[index]) + since;
+        matter[1] += (self.rate * age) as f32;
+        matter
     }
 
     /// Whether so little gas is at sixteen places that detail could not be seen in it.

@@ -35,7 +35,11 @@ const SOOT_ABSORPTION: f64 = 4.9 / 550e-9;
 /// some tens; particles spread it over centimetres.
 const BLUE_LUMINANCE: f64 = 300.0;
 
+/// Share of the fuel that has burnt when the blue light is strongest.
+const BEGUN: f64 = 0.06;
+
 /// Absorption coefficient of soot of a volume fraction, 1/m.
+#[inline(always)]
 pub fn soot_absorption(volume_fraction: f64, look: &LookParameters) -> f64 {
     volume_fraction * SOOT_ABSORPTION * look.soot_gain
 }
@@ -70,10 +74,13 @@ impl Gas<'_> {
         f64::from(color::luminance(color::black_body().radiance(self.particles.temperature[index])))
     }
 
-    /// Whether a particle's gas has begun to burn, and its blue light is drawn.
+    /// Whether a particle's gas has begun to burn and has not burnt out, and its blue light is drawn.
     #[inline(always)]
     pub(crate) fn is_blue(&self, index: usize, look: &LookParameters) -> bool {
-        look.base_blue > 0.0 && self.particles.fuel[index] < 1.0
+        /// Fuel at which less than 1e-4 of the most light is left.
+        const BURNT_OUT: f32 = 1.0 - 14.0 * BEGUN as f32;
+        let fuel = self.particles.fuel[index];
+        look.base_blue > 0.0 && fuel < 1.0 && fuel > BURNT_OUT
     }
 
     /// Luminance of a metre of a particle's gas in the blue light of fresh flame, cd/m^2.
@@ -86,8 +93,6 @@ impl Gas<'_> {
         }
         /// Volume fraction of soot that outshines and quenches the blue light.
         const SOOTY: f64 = 1e-7;
-        /// Share of the fuel that has burnt when the light is strongest.
-        const BEGUN: f64 = 0.06;
         let burnt = (1.0 - f64::from(self.particles.fuel[index])).clamp(0.0, 1.0) / BEGUN;
         let sooty = f64::from(self.particles.soot[index]).max(0.0) / SOOTY;
         BLUE_LUMINANCE * look.base_blue * burnt * math::exp(1.0 - burnt) / (1.0 + sooty * sooty)

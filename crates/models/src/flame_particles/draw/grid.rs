@@ -3,14 +3,17 @@
 use bansho_base::image::Rect;
 use rayon::prelude::*;
 
-/// Cells around what is covered that interpolation looks at.
-const MARGIN: i32 = 3;
+use super::spline;
 
-/// Where the cells of a grid lie: cell (i, j) of a level has its middle at `(i + 1/2) 2^level` pixels of the whole picture, whatever
-/// part of it is drawn.
+/// Cells around what is covered that interpolation looks at.
+const MARGIN: i32 = 4;
+
+/// Where the cells of a grid lie: cell (i, j) has its middle at `(i + 1/2) size` pixels of the whole picture, whatever part of it is
+/// drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Cells {
-    pub(crate) level: u32,
+    /// Side of a cell, pixels.
+    pub(crate) size: usize,
     /// The first column and row of cells, counted from the picture's corner.
     pub(crate) first: [i32; 2],
     pub(crate) columns: usize,
@@ -18,22 +21,17 @@ pub(crate) struct Cells {
 }
 
 impl Cells {
-    /// The cells of a level that hold `rect` with a margin.
-    pub(crate) fn around(rect: Rect, level: u32) -> Self {
-        let low = [rect.x, rect.y].map(|value| (value >> level) as i32 - MARGIN);
-        let high = [rect.right(), rect.bottom()].map(|value| (value >> level) as i32 + 1 + MARGIN);
-        Self { level, first: low, columns: (high[0] - low[0]) as usize, rows: (high[1] - low[1]) as usize }
-    }
-
-    /// Side of a cell, pixels.
-    pub(crate) fn size(&self) -> usize {
-        1 << self.level
+    /// The cells of `size` pixels that hold `rect` with a margin.
+    pub(crate) fn around(rect: Rect, size: usize) -> Self {
+        let low = [rect.x, rect.y].map(|value| (value / size) as i32 - MARGIN);
+        let high = [rect.right(), rect.bottom()].map(|value| (value / size) as i32 + 1 + MARGIN);
+        Self { size, first: low, columns: (high[0] - low[0]) as usize, rows: (high[1] - low[1]) as usize }
     }
 
     /// A place of the picture, counted in cells from the middle of the first.
     #[inline(always)]
     pub(crate) fn place(&self, pixel: [f32; 2]) -> [f32; 2] {
-        let scale = 1.0 / self.size() as f32;
+        let scale = 1.0 / self.size as f32;
         [0, 1].map(|axis| pixel[axis].mul_add(scale, -0.5 - self.first[axis] as f32))
     }
 
@@ -41,57 +39,44 @@ impl Cells {
     #[inline(always)]
     pub(crate) fn before(&self, axis: usize, pixel: usize) -> (i32, usize) {
         // In halves of a pixel, so that the whole part is the cell whose middle comes before.
-        let halves = 2 * pixel as i32 + 1 - (1 << self.level);
-        let phase = halves & ((2 << self.level) - 1);
-        ((halves >> (self.level + 1)) - self.first[axis], (phase >> 1) as usize)
+        let size = self.size as i32;
+        let halves = 2 * pixel as i32 + 1 - size;
+        (halves.div_euclid(2 * size) - self.first[axis], (halves.rem_euclid(2 * size) / 2) as usize)
     }
 
-    /// Weights of the four cells around, for every phase: cubic interpolation (Catmull & Rom 1974).
-    pub(crate) fn weights(&self) -> Vec<[f32; 4]> {
-        let size = self.size();
-        // A pixel of an even cell lies half a pixel off the middle of the cell before.
-        let half = if size == 1 { 0.0 } else { 0.5 };
-        (0..size).map(|phase| catmull_rom((phase as f32 + half) / size as f32)).collect()
+    /// How far pixels of each phase lie from the middle of the cell before, cells.
+    pub(crate) fn phases(&self) -> impl Iterator<Item = f32> + use<> {
+        let size = self.size;
+        // The middles of even cells lie between pixels.
+        let half = if size.is_multiple_of(2) { 0.5 } else { 0.0 };
+        (0..size).map(move |phase| (phase as f32 + half) / size as f32)
     }
-
-    /// The same for the slope, a pixel.
-    pub(crate) fn slope_weights(&self) -> Vec<[f32; 4]> {
-        let size = self.size();
-        let half = if size == 1 { 0.0 } else { 0.5 };
-        let slope = |phase: usize| catmull_rom_slope((phase as f32 + half) / size as f32);
-        (0..size).map(|phase| slope(phase).map(|weight| weight / size as f32)).collect()
-    }
-}
-
-/// Weights of the cells at -1, 0, 1 and 2 for the place `t` between 0 and 1.
-pub(crate) fn catmull_rom(t: f32) -> [f32; 4] {
-    let (t2, t3) = (t * t, t * t * t);
-    [0.5 * (2.0 * t2 - t3 - t), 0.5 * (3.0 * t3 - 5.0 * t2 + 2.0), 0.5 * (4.0 * t2 - 3.0 * t3 + t), 0.5 * (t3 - t2)]
-}
-
-/// Derivatives of [`catmull_rom`] by `t`.
-fn catmull_rom_slope(t: f32) -> [f32; 4] {
-    let t2 = t * t;
-    [
-        0.5 * (4.0 * t - 3.0 * t2 - 1.0),
-        0.5 * (9.0 * t2 - 10.0 * t),
-        0.5 * (8.0 * t - 9.0 * t2 + 1.0),
-        0.5 * (3.0 * t2 - 2.0 * t),
-    ]
 }
 
 /// Values over cells: those of a cell lie side by side, so that one vector adds all of a sprite to it.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Grid {
     pub(crate) cells: Cells,
     /// Values of a cell.
     pub(crate) depth: usize,
-    pub(crate) values: Vec<f32>,
+    values: Vec<f32>,
+    /// Where they begin: so that no cell of eight lies across two lines of the cache.
+    start: usize,
 }
 
 impl Grid {
     pub(crate) fn new(cells: Cells, depth: usize) -> Self {
-        Self { cells, depth, values: vec![0.0; cells.columns * cells.rows * depth] }
+        /// A line of the cache, bytes.
+        const LINE: usize = 64;
+        let values = vec![0.0; cells.columns * cells.rows * depth + LINE / size_of::<f32>()];
+        let start = values.as_ptr().align_offset(LINE).min(LINE / size_of::<f32>());
+        Self { cells, depth, values, start }
+    }
+
+    /// All values.
+    pub(crate) fn values_mut(&mut self) -> &mut [f32] {
+        let count = self.cells.rows * self.row_length();
+        &mut self.values[self.start..][..count]
     }
 
     /// Values from a row to the next.
@@ -102,7 +87,7 @@ impl Grid {
     /// The pixels of the picture that the cells cover.
     pub(crate) fn covered(&self) -> Rect {
         let side = |axis: usize, count: usize| {
-            let pixel = |cell: i64| (cell.max(0) as usize) << self.cells.level;
+            let pixel = |cell: i64| cell.max(0) as usize * self.cells.size;
             let first = i64::from(self.cells.first[axis]);
             (pixel(first), pixel(first + count as i64))
         };
@@ -113,7 +98,16 @@ impl Grid {
     /// A row of cells; rows beyond the grid are those at its edge, which hold nothing.
     pub(crate) fn row(&self, row: i32) -> &[f32] {
         let row = row.clamp(0, self.cells.rows as i32 - 1) as usize;
-        &self.values[row * self.row_length()..][..self.row_length()]
+        &self.values[self.start + row * self.row_length()..][..self.row_length()]
+    }
+
+    /// The first of the four columns around each pixel of a row from `x` on, and its phase.
+    pub(crate) fn columns(&self, x: usize, count: usize) -> Vec<(usize, usize)> {
+        let column = |x: usize| {
+            let (cell, phase) = self.cells.before(0, x);
+            (self.first_of_four(cell), phase)
+        };
+        (x..x + count).map(column).collect()
     }
 
     /// The first of the four columns around a place whose cell before is `cell`.
@@ -122,13 +116,24 @@ impl Grid {
         (cell - 1).clamp(0, self.cells.columns as i32 - 4) as usize
     }
 
-    /// Adds a grid of cells twice as large, interpolated.
+    /// One value a cell: the sum over its layers of one of each layer's `planes` values.
+    pub(crate) fn one_plane(&self, plane: usize, planes: usize) -> Self {
+        let mut one = Self::new(self.cells, 1);
+        one.values_mut().par_chunks_mut(self.cells.columns).enumerate().for_each(|(row, out)| {
+            for (sum, cell) in out.iter_mut().zip(self.row(row as i32).chunks_exact(self.depth)) {
+                *sum = cell[plane..].iter().step_by(planes).sum();
+            }
+        });
+        one
+    }
+
+    /// Adds sharpened cells twice as large, interpolated.
     pub(crate) fn add_coarser(&mut self, coarser: &Self) {
         let (cells, depth) = (self.cells, self.depth);
         // Middles of fine cells lie a quarter before and behind those of coarse ones.
-        let quarters = [catmull_rom(0.75), catmull_rom(0.25)];
+        let quarters = [spline::value(0.75), spline::value(0.25)];
         let row_length = self.row_length();
-        self.values.par_chunks_mut(row_length).enumerate().for_each(|(row, values)| {
+        self.values_mut().par_chunks_mut(row_length).enumerate().for_each(|(row, values)| {
             let fine = cells.first[1] + row as i32;
             let first = (fine - 1).div_euclid(2) - coarser.cells.first[1];
             let rows = [-1, 0, 1, 2].map(|k| coarser.row(first + k));

@@ -13,9 +13,11 @@ use super::{
     kernel::Profile,
     look::LookParameters,
     measure::DEFLECTION,
-    prepared::AT_ONCE,
-    splat::{FINE, Sheet, Sprite, splat},
-    sprite::seen,
+    resolve::{PATH, PLANES},
+    splat::{COARSE, Sheet, Sprite, splat},
+    spline,
+    sprite::{Kind, Seen, seen},
+    survey::shows,
 };
 
 /// n - 1 of air at [`REFERENCE_K`] and atmospheric pressure; it falls with 1/T (Gladstone & Dale).
@@ -23,6 +25,7 @@ const REFRACTIVITY: f64 = 2.72e-4;
 const REFERENCE_K: f64 = 293.15;
 
 /// Refractivity n - 1 of air and of the gases of a flame at a temperature.
+#[inline(always)]
 pub(crate) fn refractivity(temperature_k: f64) -> f64 {
     REFRACTIVITY * REFERENCE_K / temperature_k.max(1.0)
 }
@@ -33,37 +36,72 @@ pub(crate) struct Haze {
     pub(crate) angle: Image<2>,
 }
 
+/// By how much the gas of a particle is optically shorter than air along a ray through its middle, in the picture's pixels there: the
+/// gradient of summed paths is an angle.
+#[inline(always)]
+pub(crate) fn path(gas: &Gas, look: &LookParameters, seen: &Seen) -> f32 {
+    let excess = excess(gas, seen.index);
+    let length = look.haze_gain * excess * gas.volume(seen.index) * f64::from(seen.ellipse.peak);
+    (length * f64::from(seen.scale)) as f32
+}
+
+/// Refractivity of a particle's gas beside that of the air around.
+#[inline(always)]
+fn excess(gas: &Gas, index: usize) -> f64 {
+    refractivity(f64::from(gas.particles.temperature[index])) - refractivity(gas.air_temperature_k)
+}
+
+/// The gas that only bends, or all of it, as sprites of its paths.
+struct Rest<'a> {
+    gas: &'a Gas<'a>,
+    look: &'a LookParameters,
+    all: bool,
+}
+
+impl Kind for Rest<'_> {
+    type Record = Sprite<1>;
+
+    #[inline(always)]
+    fn wants(&self, index: usize) -> bool {
+        (self.all || !shows(self.gas, self.look, index)) && excess(self.gas, index) != 0.0
+    }
+
+    #[inline(always)]
+    fn record(&self, seen: &Seen) -> Sprite<1> {
+        Sprite { ellipse: seen.ellipse, layer: 0, split: 0.0, values: [path(self.gas, self.look, seen)] }
+    }
+}
+
 impl Haze {
     /// `None` where nothing bends.
-    pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View) -> Option<Self> {
+    ///
+    /// `summed` holds the paths of the gas that shows; only those of the rest are summed here.
+    pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View, summed: Option<&Grid>) -> Option<Self> {
         if look.haze_gain <= 0.0 {
             return None;
         }
-        let air = refractivity(gas.air_temperature_k);
-        let excess = |index: usize| refractivity(f64::from(gas.particles.temperature[index])) - air;
-        let shown = seen(gas, view, |index| excess(index) != 0.0);
-        // Path lengths, in units of the picture's pixels: their gradient is an angle.
-        let sprite = |seen: &super::sprite::Seen| {
-            let path = look.haze_gain * excess(seen.index) * gas.volume(seen.index) * f64::from(seen.ellipse.peak);
-            Sprite { ellipse: seen.ellipse, layer: 0, split: 0.0, values: [(path * f64::from(seen.scale)) as f32] }
-        };
-        let sprites: Vec<Sprite<1>> = shown.par_iter().with_min_len(AT_ONCE).map(sprite).collect();
-        let grid =
-            splat(&Sheet { profile: Profile::LINE, least_radius: FINE, layers: 1, window: view.window }, &sprites)?;
-        Some(Self::from_paths(&grid, view.window))
+        let sheet = Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, window: view.window };
+        let rest = splat(&sheet, &seen(gas, view, &Rest { gas, look, all: summed.is_none() }));
+        let paths: Vec<Paths> = [(summed, PATH, PLANES), (rest.as_ref(), 0, 1)]
+            .into_iter()
+            .filter_map(|(grid, plane, planes)| Some(Paths::new(grid?, plane, planes)))
+            .collect();
+        Self::from_paths(&paths, view.window)
     }
 
     /// The gradient of the summed paths at every pixel: to the right and upward.
-    fn from_paths(grid: &Grid, window: Rect) -> Self {
-        let rect = grid.covered().intersection(&window);
+    fn from_paths(paths: &[Paths], window: Rect) -> Option<Self> {
+        let covered = paths.iter().map(|paths| paths.sums.covered().intersection(&window));
+        let rect = covered.reduce(|all, own| all.union(&own))?;
         let mut angle = Image::filled(rect.width, rect.height, [0.0; 2]);
-        let (values, slopes) = (grid.cells.weights(), grid.cells.slope_weights());
         let level = Level::new();
-        angle.pixels_mut().par_chunks_mut(rect.width).enumerate().for_each(|(row, out)| {
-            let row = Row { grid, values: &values, slopes: &slopes, x: rect.x, y: rect.y + row };
-            dispatch!(level, _simd => row.gradient(out));
+        let columns: Vec<_> = paths.iter().map(|paths| paths.sums.columns(rect.x, rect.width)).collect();
+        angle.pixels_mut().par_chunks_mut(rect.width.max(1)).enumerate().for_each(|(row, out)| {
+            for (paths, columns) in paths.iter().zip(&columns) {
+                dispatch!(level, _simd => paths.add_gradient(columns, rect.y + row, out));
+            }
         });
-        Self { rect, angle }
+        Some(Self { rect, angle })
     }
 
     /// Adds the angles to the AOVs of a strip.
@@ -81,35 +119,40 @@ impl Haze {
     }
 }
 
-/// A row of pixels over summed paths.
-struct Row<'a> {
-    grid: &'a Grid,
-    values: &'a [[f32; 4]],
-    slopes: &'a [[f32; 4]],
-    x: usize,
-    y: usize,
+/// Summed paths, whose slopes are angles.
+struct Paths {
+    sums: Grid,
+    weights: Vec<[f32; 4]>,
+    slopes: Vec<[f32; 4]>,
 }
 
-impl Row<'_> {
+impl Paths {
+    fn new(grid: &Grid, plane: usize, planes: usize) -> Self {
+        Self {
+            sums: grid.one_plane(plane, planes),
+            weights: spline::weights(&grid.cells),
+            slopes: spline::slopes(&grid.cells),
+        }
+    }
+
+    /// Adds the gradient at row `y` of pixels that lie among `columns`.
     #[inline(always)]
-    fn gradient(&self, out: &mut [[f32; 2]]) {
-        let cells = &self.grid.cells;
-        let (cell, phase) = cells.before(1, self.y);
-        let rows = [-1, 0, 1, 2].map(|k| self.grid.row(cell + k));
+    fn add_gradient(&self, columns: &[(usize, usize)], y: usize, out: &mut [[f32; 2]]) {
+        let cells = &self.sums.cells;
+        let (cell, phase) = cells.before(1, y);
+        let rows = [-1, 0, 1, 2].map(|k| self.sums.row(cell + k));
         let (mut level, mut steep) = (vec![0.0; cells.columns], vec![0.0; cells.columns]);
-        weigh(&mut level, rows, &self.values[phase]);
+        weigh(&mut level, rows, &self.weights[phase]);
         weigh(&mut steep, rows, &self.slopes[phase]);
-        for (index, angle) in out.iter_mut().enumerate() {
-            let (cell, phase) = cells.before(0, self.x + index);
-            let first = self.grid.first_of_four(cell);
-            let (along, across) = (&self.slopes[phase], &self.values[phase]);
+        for (angle, &(first, phase)) in out.iter_mut().zip(columns) {
+            let (along, across) = (&self.slopes[phase], &self.weights[phase]);
             let (mut right, mut down) = (0.0_f32, 0.0_f32);
             for k in 0..4 {
                 right = along[k].mul_add(level[first + k], right);
                 down = across[k].mul_add(steep[first + k], down);
             }
             // Rows count downward, angles upward.
-            *angle = [right, -down];
+            *angle = [angle[0] + right, angle[1] - down];
         }
     }
 }

@@ -15,17 +15,34 @@ pub(crate) struct Layers {
 /// Most layers of a flame.
 pub(crate) const MOST_LAYERS: usize = 4;
 
+/// How gas is spread in depth: shares of the whole, and these times depth and its square.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Spread {
+    total: f64,
+    first: f64,
+    second: f64,
+}
+
+impl Spread {
+    #[inline(always)]
+    pub(crate) fn add(&mut self, depth: f64, share: f64) {
+        self.total += share;
+        self.first += share * depth;
+        self.second += share * depth * depth;
+    }
+
+    pub(crate) fn join(&mut self, other: &Self) {
+        self.total += other.total;
+        self.first += other.first;
+        self.second += other.second;
+    }
+}
+
 impl Layers {
-    /// Layers that hold the bulk of particles of these depths and shares of the whole; what lies further out joins the outermost.
+    /// Layers that hold the bulk of the gas; what lies further out joins the outermost.
     ///
     /// `thin` is the least thickness that pays, m.
-    pub(crate) fn new(depths_and_shares: impl Iterator<Item = (f64, f64)>, thin: f64) -> Self {
-        let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);
-        for (depth, share) in depths_and_shares {
-            total += share;
-            first += share * depth;
-            second += share * depth * depth;
-        }
+    pub(crate) fn new(&Spread { total, first, second }: &Spread, thin: f64) -> Self {
         let mean = if total > 0.0 { first / total } else { 0.0 };
         let deviation = if total > 0.0 { (second / total - mean * mean).max(0.0).sqrt() } else { 0.0 };
         let mut thickness = thin.max(1e-6);
@@ -65,8 +82,9 @@ mod tests {
     #[test]
     fn layers_hold_the_bulk_and_stay_few() {
         for spread in [0.0, 0.01, 0.3, 5.0, 400.0] {
-            let depths = (0..100).map(|i| (1000.0 + spread * (f64::from(i) / 99.0 - 0.5), 1.0));
-            let layers = Layers::new(depths, 0.1);
+            let mut gas = Spread::default();
+            (0..100).for_each(|i| gas.add(1000.0 + spread * (f64::from(i) / 99.0 - 0.5), 1.0));
+            let layers = Layers::new(&gas, 0.1);
             assert!((1..=MOST_LAYERS).contains(&layers.count), "{layers:?}");
             assert!(layers.intervals().any(|interval| interval.contains(1000.0)), "{layers:?}");
         }

@@ -12,7 +12,8 @@ use super::{
     look::LookParameters,
     resolve::{Extents, GLOW, HEAT, Layer, Resolve, Row, TAU},
     splat::{COARSE, Sheet, Sprite, splat},
-    sprite::seen,
+    spline,
+    sprite::{Kind, Seen, seen},
 };
 
 /// What a particle flame can write beside its light, in the order of a strip's planes.
@@ -67,19 +68,41 @@ pub(crate) struct Motion {
     weights: Vec<[f32; 4]>,
 }
 
+/// Glowing gas as sprites of its motion.
+struct Glowing<'a> {
+    gas: &'a Gas<'a>,
+    look: &'a LookParameters,
+}
+
+impl Glowing<'_> {
+    #[inline(always)]
+    fn light(&self, index: usize) -> f64 {
+        self.gas.absorption(index, self.look) * self.gas.luminance(index) * self.gas.volume(index)
+    }
+}
+
+impl Kind for Glowing<'_> {
+    type Record = Sprite<3>;
+
+    #[inline(always)]
+    fn wants(&self, index: usize) -> bool {
+        self.light(index) > 0.0
+    }
+
+    #[inline(always)]
+    fn record(&self, seen: &Seen) -> Sprite<3> {
+        let weight = (self.light(seen.index) * f64::from(seen.ellipse.peak)) as f32;
+        let values = [weight, weight * seen.motion[0], weight * seen.motion[1]];
+        Sprite { ellipse: seen.ellipse, layer: 0, split: 0.0, values }
+    }
+}
+
 impl Motion {
     pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View) -> Option<Self> {
-        let light = |index: usize| gas.absorption(index, look) * gas.luminance(index) * gas.volume(index);
-        let shown = seen(gas, view, |index| light(index) > 0.0);
-        let sprite = |seen: &super::sprite::Seen| {
-            let weight = (light(seen.index) * f64::from(seen.ellipse.peak)) as f32;
-            let values = [weight, weight * seen.motion[0], weight * seen.motion[1]];
-            Sprite { ellipse: seen.ellipse, layer: 0, split: 0.0, values }
-        };
-        let sprites: Vec<Sprite<3>> = shown.iter().map(sprite).collect();
+        let sprites = seen(gas, view, &Glowing { gas, look });
         let grid =
             splat(&Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, window: view.window }, &sprites)?;
-        Some(Self { weights: grid.cells.weights(), grid })
+        Some(Self { weights: spline::weights(&grid.cells), grid })
     }
 
     /// Pixels to the right and down that the gas at a pixel moves until the next frame.

@@ -1,6 +1,6 @@
 //! How the gas looks: what it radiates, absorbs and bends, and the particles as the paper shows them.
 //!
-//! Each particle is a ball of gas whose line integral is known in closed form (`kernel`). `sprite` finds its ellipse in the picture,
+//! Each particle is a ball of gas whose line integral is known in closed form (`kernel`). `survey` finds how the gas is spread, `sprite` each ball's ellipse in the picture,
 //! `splat` sums all of them on a grid that is as coarse as they are smooth, in a few layers of depth; `resolve` turns the sums into
 //! light at every pixel, with the detail (`detail`) that sums lack. `haze` sums deflections, `light` what others are lit with.
 
@@ -13,11 +13,14 @@ mod layers;
 mod light;
 mod look;
 mod measure;
+mod perspective;
 mod prepared;
 mod resolve;
 mod splat;
+mod spline;
 mod sprite;
 mod squares;
+mod survey;
 
 pub use gas::{Gas, soot_absorption};
 pub use kernel::{line_gradient, line_integral};

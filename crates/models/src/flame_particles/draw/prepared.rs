@@ -11,7 +11,6 @@ use bansho_base::{
     surroundings::Surroundings,
 };
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use crate::{
     blue_flame,
@@ -19,18 +18,20 @@ use crate::{
 };
 
 use super::{
-    detail::{Detail, Scale},
+    detail::Detail,
     gas::Gas,
     grid::Grid,
-    haze::Haze,
+    haze::{self, Haze},
     kernel::Profile,
     layers::Layers,
     look::{LookParameters, Sprite as Choice},
     measure::Motion,
-    resolve::{BLUE, Extents, GLOW, HEAT, Layer, MATTER, PLANES, Resolve, TAU},
+    resolve::{BLUE, Extents, GLOW, HEAT, Layer, MATTER, PATH, PLANES, Resolve, TAU},
     splat::{COARSE, Sheet, Sprite, splat},
-    sprite::{Seen, seen},
+    spline,
+    sprite::{Kind, Seen, seen},
     squares::Squares,
+    survey::{Survey, shows},
 };
 
 /// The gas of one frame.
@@ -62,17 +63,10 @@ struct Sums {
     grid: Grid,
     extents: Extents,
     weights: Vec<[f32; 4]>,
+    columns: Vec<(usize, usize)>,
     detail: Option<Detail>,
     scattered: Vec<[f32; 3]>,
     motion: OnceLock<Option<Motion>>,
-}
-
-/// Whether a particle adds anything to the picture's light or shade.
-fn shows(gas: &Gas, look: &LookParameters, index: usize) -> bool {
-    match look.sprite {
-        Choice::Integral => gas.absorption(index, look) > 0.0 || gas.is_blue(index, look),
-        Choice::Poly6 | Choice::Squares => true,
-    }
 }
 
 /// The fire whose sparks fly.
@@ -89,32 +83,12 @@ fn fire<'a>(gas: &Gas, look: &'a LookParameters, view: &View) -> Fire<'a> {
     }
 }
 
-/// The layers of the gas as a view sees them.
-fn layers(gas: &Gas, look: &LookParameters, view: &View) -> Layers {
-    /// Thickness of a layer in support radii.
-    const THICKNESS: f64 = 1.6;
-    let t = view.shutter.middle();
-    let of = |index: usize| {
-        let depth = view.camera.depth(gas.place(index, t));
-        (depth, if shows(gas, look, index) { gas.volume(index) } else { 0.0 })
-    };
-    let depths: Vec<(f64, f64)> = (0..gas.particles.len()).into_par_iter().with_min_len(AT_ONCE).map(of).collect();
-    Layers::new(depths.into_iter().filter(|(depth, _)| *depth > 0.0), THICKNESS * mean_radius(gas))
-}
-
-/// Mean support radius, m; does not depend on the view, so that layers stand still.
-fn mean_radius(gas: &Gas) -> f64 {
-    let radii = &gas.particles.support_radius;
-    let sum: f64 = radii.iter().map(|radius| f64::from(*radius)).sum();
-    if radii.is_empty() { 0.0 } else { sum / radii.len() as f64 }
-}
-
 /// The stretches of depth that the gas and its sparks fill.
 pub fn depth_intervals(gas: &Gas, look: &LookParameters, view: &View) -> Vec<DepthInterval> {
     if gas.particles.is_empty() && look.sparks.rate <= 0.0 {
         return Vec::new();
     }
-    let layers = layers(gas, look, view);
+    let layers = Survey::new(gas, look, view).layers(gas);
     let mut intervals: Vec<DepthInterval> = layers.intervals().collect();
     if look.sparks.rate > 0.0 {
         let middle = layers.centre(layers.count / 2);
@@ -137,10 +111,11 @@ impl<'a> PreparedGas<'a> {
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
         check(observer)?;
-        let layers = layers(&gas, look, view);
+        let survey = Survey::new(&gas, look, view);
+        let layers = survey.layers(&gas);
         let matter = match look.sprite {
             Choice::Squares => Matter::Squares(Squares::new(&gas, look, view)),
-            _ => match sums(&gas, look, view, &layers, surroundings) {
+            _ => match sums(&gas, look, view, &survey, surroundings) {
                 Some(sums) => Matter::Sums(Box::new(sums)),
                 None => Matter::Nothing,
             },
@@ -168,37 +143,32 @@ impl<'a> PreparedGas<'a> {
             blue: blue_flame::colour(),
             scattered: &sums.scattered,
             weights: &sums.weights,
+            columns: &sums.columns,
         }
     }
 }
 
 /// Sums all sprites in their layers.
-fn sums(gas: &Gas, look: &LookParameters, view: &View, layers: &Layers, surroundings: &Surroundings) -> Option<Sums> {
-    let shown = seen(gas, view, |index| shows(gas, look, index));
-    let detail = scale(gas, look, view, &shown).and_then(|scale| Detail::new(gas, look, &scale));
-    let opacity = mean_density(gas).map_or(0.0, |density| look.opacity / density);
-    let since = view.shutter.middle() - gas.time;
-    let sprite = |seen: &Seen| {
-        let (layer, split) = layers.place(seen.depth);
-        let index = seen.index;
-        let mut values = match look.sprite {
-            Choice::Poly6 => paper_values(gas, index, opacity),
-            _ => values(gas, look, index, seen.ellipse.peak),
-        };
-        if let Some(detail) = &detail {
-            let matter = detail.matter(gas, index, since);
-            (0..3).for_each(|axis| values[MATTER + axis] = values[TAU] * matter[axis]);
-        }
-        Sprite { ellipse: seen.ellipse, layer, split, values }
+fn sums(gas: &Gas, look: &LookParameters, view: &View, survey: &Survey, surroundings: &Surroundings) -> Option<Sums> {
+    let layers = survey.layers(gas);
+    let detail = survey.scale(gas, view).and_then(|scale| Detail::new(gas, look, &scale));
+    let shining = Shining {
+        gas,
+        look,
+        layers: &layers,
+        opacity: mean_density(gas).map_or(0.0, |density| look.opacity / density),
+        detail: detail.as_ref(),
+        since: view.shutter.middle() - gas.time,
     };
-    let sprites: Vec<Sprite<PLANES>> = shown.par_iter().with_min_len(AT_ONCE).map(sprite).collect();
+    let sprites = seen(gas, view, &shining);
     let profile = if look.sprite == Choice::Poly6 { Profile::POLY6 } else { Profile::LINE };
     let grid = splat(&Sheet { profile, least_radius: COARSE, layers: layers.count, window: view.window }, &sprites)?;
     let extents = Extents::new(&grid, layers.count);
     let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.centre(layer), surroundings));
     Some(Sums {
         extents,
-        weights: grid.cells.weights(),
+        weights: spline::weights(&grid.cells),
+        columns: grid.columns(0, view.size[0]),
         grid,
         detail,
         scattered: scattered.collect(),
@@ -206,68 +176,78 @@ fn sums(gas: &Gas, look: &LookParameters, view: &View, layers: &Layers, surround
     })
 }
 
-/// What a ray through the middle of a particle's sprite sees.
-fn values(gas: &Gas, look: &LookParameters, index: usize, peak: f32) -> [f32; PLANES] {
-    let length = gas.volume(index) * f64::from(peak);
-    let tau = length * gas.absorption(index, look);
-    let glow = tau * gas.luminance(index);
-    let mut values = [0.0; PLANES];
-    values[TAU] = tau as f32;
-    values[GLOW] = glow as f32;
-    values[HEAT] = (glow * f64::from(gas.particles.temperature[index])) as f32;
-    values[BLUE] = (length * gas.blue(index, look)) as f32;
-    values
+/// The gas that shows, as sprites of its light and shade.
+struct Shining<'a> {
+    gas: &'a Gas<'a>,
+    look: &'a LookParameters,
+    layers: &'a Layers,
+    /// Opacity of a poly6 sprite beside the gas's density.
+    opacity: f64,
+    detail: Option<&'a Detail>,
+    /// Time from the particles' state, s.
+    since: f64,
 }
 
-/// The paper's sprite (section 5.2): opacity by density, colour by temperature.
-fn paper_values(gas: &Gas, index: usize, opacity_per_density: f64) -> [f32; PLANES] {
-    let opacity = opacity_per_density * f64::from(gas.particles.density[index]);
-    let glow = opacity * gas.luminance(index);
-    let mut values = [0.0; PLANES];
-    values[TAU] = opacity as f32;
-    values[GLOW] = glow as f32;
-    values[HEAT] = (glow * f64::from(gas.particles.temperature[index])) as f32;
-    values
+impl Kind for Shining<'_> {
+    type Record = Sprite<PLANES>;
+
+    #[inline(always)]
+    fn wants(&self, index: usize) -> bool {
+        shows(self.gas, self.look, index)
+    }
+
+    #[inline(always)]
+    fn record(&self, seen: &Seen) -> Sprite<PLANES> {
+        let (layer, split) = self.layers.place(seen.depth);
+        let mut values = match self.look.sprite {
+            Choice::Poly6 => self.paper_values(seen.index),
+            _ => self.values(seen),
+        };
+        if let Some(detail) = self.detail {
+            let matter = detail.matter(self.gas, seen.index, self.since);
+            for axis in 0..3 {
+                values[MATTER + axis] = values[TAU] * matter[axis];
+            }
+        }
+        Sprite { ellipse: seen.ellipse, layer, split, values }
+    }
+}
+
+impl Shining<'_> {
+    /// What a ray through the middle of a particle's sprite sees.
+    #[inline(always)]
+    fn values(&self, seen: &Seen) -> [f32; PLANES] {
+        let (gas, index) = (self.gas, seen.index);
+        let length = gas.volume(index) * f64::from(seen.ellipse.peak);
+        let tau = length * gas.absorption(index, self.look);
+        let mut values = self.glowing(index, tau);
+        values[BLUE] = (length * gas.blue(index, self.look)) as f32;
+        values[PATH] = haze::path(gas, self.look, seen);
+        values
+    }
+
+    /// The paper's sprite (section 5.2): opacity by density, colour by temperature.
+    #[inline(always)]
+    fn paper_values(&self, index: usize) -> [f32; PLANES] {
+        self.glowing(index, self.opacity * f64::from(self.gas.particles.density[index]))
+    }
+
+    /// Optical depth, and what shines with it.
+    #[inline(always)]
+    fn glowing(&self, index: usize, tau: f64) -> [f32; PLANES] {
+        let glow = tau * self.gas.luminance(index);
+        let mut values = [0.0; PLANES];
+        values[TAU] = tau as f32;
+        values[GLOW] = glow as f32;
+        values[HEAT] = (glow * f64::from(self.gas.particles.temperature[index])) as f32;
+        values
+    }
 }
 
 fn mean_density(gas: &Gas) -> Option<f64> {
     let densities = &gas.particles.density;
     let sum: f64 = densities.iter().map(|density| f64::from(*density)).sum();
     (sum > 0.0).then(|| sum / densities.len() as f64)
-}
-
-/// Means that set the scale of detail, by light.
-fn scale(gas: &Gas, look: &LookParameters, view: &View, shown: &[Seen]) -> Option<Scale> {
-    if look.sprite != Choice::Integral {
-        return None;
-    }
-    let own = |seen: &Seen| {
-        let absorption = gas.absorption(seen.index, look);
-        let weight = absorption * gas.volume(seen.index) * gas.luminance(seen.index);
-        let radius = f64::from(gas.particles.support_radius[seen.index]);
-        [weight, weight * radius, weight * absorption, weight * f64::from(seen.scale)]
-    };
-    let add = |sums: [f64; 4], own: [f64; 4]| [0, 1, 2, 3].map(|i| sums[i] + own[i]);
-    // Sums of whole tasks, added in order, are the same however many threads there are.
-    let of_task = |task: &[Seen]| task.iter().map(own).fold([0.0; 4], add);
-    let of_tasks: Vec<[f64; 4]> = shown.par_chunks(AT_ONCE).map(of_task).collect();
-    let [total, radius, absorption, pixels] = of_tasks.into_iter().fold([0.0; 4], add);
-    (total > 0.0).then(|| Scale {
-        radius: radius / total,
-        absorption: absorption / total,
-        pixels_per_metre: pixels / total,
-        time: view.shutter.middle(),
-        open: view.shutter.duration(),
-        sway: camera_sway(gas, view),
-    })
-}
-
-/// How far what stands still at the flame moves before the camera while the shutter is open, m in the world.
-fn camera_sway(gas: &Gas, view: &View) -> [f64; 3] {
-    let place = gas.particles.origin;
-    let (opened, closed) = (view.camera_at(view.shutter.open), view.camera_at(view.shutter.close));
-    let local = closed.to_camera(place) - opened.to_camera(place);
-    (view.camera.orientation * local).to_array().map(|value| -value)
 }
 
 /// What soot at a depth along the line of sight to the flame scatters where it hides everything: light of others, alike in all directions.
@@ -332,7 +312,11 @@ impl Prepared for PreparedGas<'_> {
 
 impl PreparedGas<'_> {
     fn haze(&self) -> Option<&Haze> {
-        self.haze.get_or_init(|| Haze::new(&self.gas, self.look, self.view)).as_ref()
+        let summed = match &self.matter {
+            Matter::Sums(sums) if self.look.sprite == Choice::Integral => Some(&sums.grid),
+            _ => None,
+        };
+        self.haze.get_or_init(|| Haze::new(&self.gas, self.look, self.view, summed)).as_ref()
     }
 
     fn measure_deflection(&self, slice: &DepthInterval, strip: &mut Strip) {

@@ -25,6 +25,8 @@ pub(crate) const HEAT: usize = 2;
 pub(crate) const MATTER: usize = 3;
 /// Luminance of the blue light.
 pub(crate) const BLUE: usize = 6;
+/// Path lengths by which the gas is optically shorter than the air, in pixels, for `haze`.
+pub(crate) const PATH: usize = 7;
 
 const LANES: usize = 16;
 type Batch = [f32; LANES];
@@ -44,6 +46,8 @@ pub(crate) struct Resolve<'a> {
     pub(crate) scattered: &'a [[f32; 3]],
     /// Interpolation of each phase of a cell.
     pub(crate) weights: &'a [[f32; 4]],
+    /// The first of the four columns around each pixel of the whole picture's rows, and the pixel's phase.
+    pub(crate) columns: &'a [(usize, usize)],
 }
 
 /// One layer of the gas in a strip.
@@ -84,7 +88,7 @@ impl Resolve<'_> {
             let Some(sums) = row[start..].first_chunk_mut::<PLANES>() else { continue };
             *sums = weighted(rows, [start; 4], weights);
         }
-        let pixel = |column: i64| ((column + i64::from(cells.first[0])) * cells.size() as i64).max(0) as usize;
+        let pixel = |column: i64| ((column + i64::from(cells.first[0])) * cells.size as i64).max(0) as usize;
         Some([pixel(i64::from(first) - 2), pixel(i64::from(last) + 3)])
     }
 
@@ -93,8 +97,8 @@ impl Resolve<'_> {
     pub(crate) fn sums(&self, row: &[f32], layer: usize, x: usize) -> Option<Sums> {
         let mut planes = [[0.0; LANES]; PLANES];
         for lane in 0..LANES {
-            let (cell, phase) = self.grid.cells.before(0, x + lane);
-            let start = self.grid.first_of_four(cell) * self.grid.depth + layer * PLANES;
+            let (column, phase) = self.columns[(x + lane).min(self.columns.len() - 1)];
+            let start = column * self.grid.depth + layer * PLANES;
             let starts = [0, 1, 2, 3].map(|k| start + k * self.grid.depth);
             let sums = weighted([row; 4], starts, &self.weights[phase]);
             for plane in 0..PLANES {

@@ -11,22 +11,24 @@ use rayon::prelude::*;
 use super::{
     grid::{Cells, Grid},
     kernel::Profile,
+    spline,
     sprite::Ellipse,
 };
 
-/// The weights of eight cells are found at a time: about a row of a sprite.
+/// The weights of eight cells are found at a time: about a row of a sprite,
 const LANES: usize = 8;
-/// How far the cells of a run, or the rows of a band, lie beyond the one before the first. (Without a zero, of which compilers make a
-/// special case.)
-const BEYOND: [f32; LANES] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
-/// Least radius of a sprite in cells for sums, for which cubic interpolation is exact to a few hundredths of a lone sprite's peak.
-pub(crate) const COARSE: f32 = 3.25;
-/// Least radius of a sprite in cells for slopes, which are as exact as that only on a finer grid.
-pub(crate) const FINE: f32 = 6.5;
+/// and chords of sixteen rows: about all of it.
+const ROWS: usize = 16;
+/// How far cells and rows lie beyond the one before the first. (Without a zero, of which compilers make a special case.)
+const BEYOND: [f32; ROWS] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0];
+/// Least radius of a sprite in cells, for which splines are exact to a few hundredths of a lone sprite's peak.
+pub(crate) const COARSE: f32 = 2.75;
 /// Rows of one task.
-const BAND: usize = LANES;
-/// Coarsest grid: cells of 4096 pixels.
-const COARSEST: u32 = 12;
+const BAND: usize = 32;
+/// Where `s = 1 - b^2/d^2` is less, a sprite has less than 1e-4 of its peak, and is not added.
+const FAINT: f32 = 0.045;
+/// Coarsest grid: cells of 4096 pixels, twelve octaves.
+const COARSEST: usize = 24;
 
 /// One sprite: `P` values, weighted by its profile, go to layer `layer` and, with the share `split`, to the next.
 #[derive(Clone, Copy, Debug)]
@@ -48,189 +50,287 @@ pub(crate) struct Sheet {
     pub(crate) window: Rect,
 }
 
-/// The sums of all sprites, on the finest grid that any of them needs; `None` where none is seen.
-pub(crate) fn splat<const P: usize>(sheet: &Sheet, sprites: &[Sprite<P>]) -> Option<Grid> {
-    let rect = covered(sprites, sheet.window)?;
-    let finest = finest_level(sheet, sprites);
-    let mut by_level: Vec<Vec<u32>> = vec![Vec::new(); COARSEST as usize + 1];
-    for (index, sprite) in sprites.iter().enumerate() {
-        by_level[sheet.level_of(sprite.ellipse.radius).max(finest) as usize].push(index as u32);
-    }
+/// The sums of all sprites, task by task, on the finest grid that any of them needs, sharpened for splines; `None` where none is seen.
+pub(crate) fn splat<const P: usize>(sheet: &Sheet, tasks: &[Vec<Sprite<P>>]) -> Option<Grid> {
+    let whole = Whole::new(sheet, tasks);
+    let rect = whole.covered(sheet.window)?;
+    let finest = whole.finest();
     let mut coarser: Option<Grid> = None;
-    for level in (finest..=COARSEST).rev() {
-        let members = &by_level[level as usize];
-        if members.is_empty() && coarser.is_none() {
+    for fineness in (finest..COARSEST + 1).step_by(2).rev() {
+        let any = whole.counts[fineness..].iter().take(2).any(|count| *count > 0);
+        if !any && fineness != finest && coarser.is_none() {
             continue;
         }
-        let mut grid = Grid::new(Cells::around(rect, level), sheet.layers * P);
-        add_sprites(sheet, sprites, members, &mut grid);
+        let mut grid = Grid::new(Cells::around(rect, cell_size(fineness)), sheet.layers * P);
+        let here = |radius: f32| sheet.fineness(radius).max(finest).wrapping_sub(fineness) < 2;
+        add_sprites(sheet, tasks, here, &mut grid);
         if let Some(coarser) = coarser {
             grid.add_coarser(&coarser);
         }
-        coarser = Some(grid);
+        coarser = Some(spline::sharpened(&grid));
     }
     coarser
 }
 
+/// Side of the cells of a fineness, pixels: two to an octave, 1, 2, 3, 4, 6, 8, 12... (There is none of 1.5.)
+fn cell_size(fineness: usize) -> usize {
+    if fineness.is_multiple_of(2) { 1 << (fineness / 2) } else { 3 << (fineness / 2 - 1) }
+}
+
 impl Sheet {
-    /// The level whose cells are just fine enough.
-    fn level_of(&self, radius: f32) -> u32 {
-        /// The exponent's bits of a number between one and two.
-        const ONE: u32 = 127;
-        // The exponent of a number is its whole octaves.
-        (((radius / self.least_radius).max(1.0).to_bits() >> 23) - ONE).min(COARSEST)
+    /// The largest cells that are fine enough for a sprite.
+    fn fineness(&self, radius: f32) -> usize {
+        // The exponent of a number is its whole octaves, the first bit after it says whether it is half-way to the next.
+        let octaves = ((radius / self.least_radius).max(1.0).to_bits() >> 22) as usize - (127 << 1);
+        if octaves == 1 { 0 } else { octaves.min(COARSEST) }
     }
 }
 
-/// The level that suits all but the smallest sprites; those are widened to it.
-///
-/// A few far particles would otherwise buy a fine grid of the whole flame.
-fn finest_level<const P: usize>(sheet: &Sheet, sprites: &[Sprite<P>]) -> u32 {
-    /// Share of the sprites that may be finer.
-    const FINER: usize = 50;
-    let mut counts = [0_usize; COARSEST as usize + 1];
-    sprites.iter().for_each(|sprite| counts[sheet.level_of(sprite.ellipse.radius) as usize] += 1);
-    let mut finer = 0;
-    for (level, count) in counts.iter().enumerate() {
-        finer += count;
-        if finer * FINER > sprites.len() {
-            return level as u32;
-        }
-    }
-    0
+/// What all sprites together cover and need.
+struct Whole {
+    low: [f32; 2],
+    high: [f32; 2],
+    /// How many sprites each fineness suits.
+    counts: [usize; COARSEST + 1],
 }
 
-/// The pixels of the window that sprites touch.
-fn covered<const P: usize>(sprites: &[Sprite<P>], window: Rect) -> Option<Rect> {
-    let (mut low, mut high) = ([f32::MAX; 2], [f32::MIN; 2]);
-    for Sprite { ellipse, .. } in sprites {
+impl Whole {
+    const NOTHING: Self = Self { low: [f32::MAX; 2], high: [f32::MIN; 2], counts: [0; COARSEST + 1] };
+
+    fn new<const P: usize>(sheet: &Sheet, tasks: &[Vec<Sprite<P>>]) -> Self {
+        let of_task = |task: &Vec<Sprite<P>>| {
+            let mut whole = Self::NOTHING;
+            for Sprite { ellipse, .. } in task {
+                for axis in 0..2 {
+                    whole.low[axis] = whole.low[axis].min(ellipse.centre[axis] - ellipse.reach[axis]);
+                    whole.high[axis] = whole.high[axis].max(ellipse.centre[axis] + ellipse.reach[axis]);
+                }
+                whole.counts[sheet.fineness(ellipse.radius)] += 1;
+            }
+            whole
+        };
+        tasks.par_iter().map(of_task).reduce(|| Self::NOTHING, Self::and)
+    }
+
+    fn and(mut self, other: Self) -> Self {
         for axis in 0..2 {
-            low[axis] = low[axis].min(ellipse.centre[axis] - ellipse.reach[axis]);
-            high[axis] = high[axis].max(ellipse.centre[axis] + ellipse.reach[axis]);
+            self.low[axis] = self.low[axis].min(other.low[axis]);
+            self.high[axis] = self.high[axis].max(other.high[axis]);
         }
+        self.counts.iter_mut().zip(other.counts).for_each(|(own, other)| *own += other);
+        self
     }
-    let clip = |value: f32, from: usize, to: usize| (value.max(0.0) as usize).clamp(from, to);
-    let (x, y) = (clip(low[0], window.x, window.right()), clip(low[1], window.y, window.bottom()));
-    let right = clip(high[0] + 1.0, window.x, window.right());
-    let bottom = clip(high[1] + 1.0, window.y, window.bottom());
-    (right > x && bottom > y).then(|| Rect { x, y, width: right - x, height: bottom - y })
+
+    /// The fineness that suits all but the smallest sprites; those are widened to it.
+    ///
+    /// A few far particles would otherwise buy a fine grid of the whole flame.
+    fn finest(&self) -> usize {
+        /// Share of the sprites that may be finer.
+        const FINER: usize = 50;
+        let total: usize = self.counts.iter().sum();
+        let mut finer = 0;
+        let suits = |count: &usize| {
+            finer += count;
+            finer * FINER > total
+        };
+        self.counts.iter().position(suits).unwrap_or(0)
+    }
+
+    /// The pixels of the window that sprites touch.
+    fn covered(&self, window: Rect) -> Option<Rect> {
+        let clip = |value: f32, from: usize, to: usize| (value.max(0.0) as usize).clamp(from, to);
+        let [x, y] = [(0, window.x, window.right()), (1, window.y, window.bottom())]
+            .map(|(axis, from, to)| clip(self.low[axis], from, to));
+        let [right, bottom] = [(0, window.x, window.right()), (1, window.y, window.bottom())]
+            .map(|(axis, from, to)| clip(self.high[axis] + 1.0, from, to));
+        (right > x && bottom > y).then(|| Rect { x, y, width: right - x, height: bottom - y })
+    }
 }
 
 /// A sprite in the coordinates of a grid.
 #[derive(Clone, Copy, Debug)]
-struct Placed {
+struct Placed<const P: usize> {
     centre: [f32; 2],
-    shape: [f32; 3],
+    /// How `s` falls along a row, for the square of the distance from its middle: a.
+    fall: f32,
     /// How far the middle of a row lies to the left, for each row below the centre: b/a.
     lean: f32,
-    /// Square of half the width of a row: this much at the centre, 1/a,
-    widest: f32,
-    /// and less for the square of each row's distance, (c - b^2/a) / a.
-    narrowing: f32,
+    /// How `s` falls from middle to middle, for the square of the distance from the centre: c - b^2/a.
+    fading: f32,
     /// First row and one past the last.
     rows: [i32; 2],
-    /// By how much the values are dimmed where the sprite had to be widened.
-    dimmed: f32,
+    /// What goes to its own layer and, if anything, to the next.
+    layer: usize,
+    own: [f32; P],
+    next: [f32; P],
+    both: bool,
 }
 
-impl Placed {
+impl<const P: usize> Placed<P> {
     #[inline(always)]
-    fn new(sheet: &Sheet, ellipse: &Ellipse, cells: &Cells) -> Self {
-        let cell = cells.size() as f32;
+    fn new(sheet: &Sheet, sprite: &Sprite<P>, cells: &Cells) -> Self {
+        let ellipse = &sprite.ellipse;
+        let cell = cells.size as f32;
         let growth = (sheet.least_radius * cell / ellipse.radius.max(1e-3)).max(1.0);
         let scale = cell * cell / (growth * growth);
         let centre = cells.place(ellipse.centre);
-        let reach = ellipse.reach[1] * growth / cell;
+        let reach = ellipse.reach[1] * growth / cell * (1.0 - FAINT).sqrt();
         let last = cells.rows as i32;
         let rows =
             [((centre[1] - reach).ceil() as i32).clamp(0, last), ((centre[1] + reach) as i32 + 1).clamp(0, last)];
         let [a, b, c] = ellipse.shape.map(|value| value * scale);
-        let (lean, widest) = (b / a, 1.0 / a);
-        let narrowing = (c - b * lean) * widest;
-        Self { centre, shape: [a, b, c], lean, widest, narrowing, rows, dimmed: 1.0 / (growth * growth) }
+        let lean = b / a;
+        let fading = c - b * lean;
+        // Sprites that had to be widened are dimmed.
+        let dimmed = 1.0 / (growth * growth);
+        let (mut own, mut next) = (sprite.values, sprite.values);
+        for i in 0..P {
+            own[i] *= dimmed * (1.0 - sprite.split);
+            next[i] *= dimmed * sprite.split;
+        }
+        let (layer, both) = (sprite.layer, sprite.split > 0.0);
+        Self { centre, fall: a, lean, fading, rows, layer, own, next, both }
     }
 }
 
-fn add_sprites<const P: usize>(sheet: &Sheet, sprites: &[Sprite<P>], members: &[u32], grid: &mut Grid) {
+/// Adds the sprites whose radius belongs `here`, on this grid.
+fn add_sprites<const P: usize>(
+    sheet: &Sheet,
+    tasks: &[Vec<Sprite<P>>],
+    here: impl Fn(f32) -> bool + Sync,
+    grid: &mut Grid,
+) {
     let cells = grid.cells;
-    let bands = cells.rows.div_ceil(BAND);
-    let placed: Vec<Placed> = members
-        .par_iter()
-        .with_min_len(4096)
-        .map(|&i| Placed::new(sheet, &sprites[i as usize].ellipse, &cells))
-        .collect();
-    let bins = Bins::new(bands, placed.iter().map(|placed| placed.rows));
-    let row = grid.row_length();
-    let level = Level::new();
-    grid.values.par_chunks_mut(BAND * row).enumerate().for_each(|(band, values)| {
-        let band = Band { first: (band * BAND) as i32, rows: values.len() / row, members: bins.of(band) };
-        dispatch!(level, _simd => add_band(sheet, sprites, members, &placed, &band, values));
+    let (row_length, level) = (grid.row_length(), Level::new());
+    let bin = |task: &Vec<Sprite<P>>| dispatch!(level, _simd => Binned::new(sheet, task, &cells, &here));
+    let binned: Vec<Binned<P>> = tasks.par_iter().map(bin).collect();
+    grid.values_mut().par_chunks_mut(BAND * row_length).enumerate().for_each(|(index, values)| {
+        let mut band = Band { first: (index * BAND) as i32, columns: cells.columns, layers: sheet.layers, values };
+        for task in &binned {
+            dispatch!(level, _simd => band.add(sheet.profile, task, index));
+        }
     });
 }
 
-/// Rows of the grid that one task fills.
+/// Rows of the grid that one thread fills.
 struct Band<'a> {
     first: i32,
-    rows: usize,
-    members: &'a [u32],
+    columns: usize,
+    layers: usize,
+    values: &'a mut [f32],
 }
 
-#[inline(always)]
-fn add_band<const P: usize>(
-    sheet: &Sheet,
-    sprites: &[Sprite<P>],
-    members: &[u32],
-    placed: &[Placed],
-    band: &Band,
-    values: &mut [f32],
-) {
-    let depth = sheet.layers * P;
-    let row_length = values.len() / band.rows;
-    let columns = row_length / depth;
-    for &member in band.members {
-        let (placed, sprite) = (&placed[member as usize], &sprites[members[member as usize] as usize]);
-        let from = placed.rows[0].max(band.first);
-        let to = placed.rows[1].min(band.first + band.rows as i32);
-        let share = Share::new(sprite, placed.dimmed);
-        let [first, end] = placed.columns(band.first, columns as i32);
-        for y in from..to {
-            let index = (y - band.first) as usize;
-            let row = &mut values[index * row_length..][..row_length];
-            let below = y as f32 - placed.centre[1];
-            for x in (first[index]..end[index]).step_by(LANES) {
-                let weights = placed.weights(sheet.profile, x, below);
-                share.add(row, [x, end[index]].map(|column| column as usize), depth, &weights);
+impl Band<'_> {
+    #[inline(always)]
+    fn add<const P: usize>(&mut self, profile: Profile, task: &Binned<P>, index: usize) {
+        let sums = self.values.as_chunks_mut::<P>().0;
+        let row_length = self.columns * self.layers;
+        let rows = (sums.len() / row_length) as i32;
+        for &member in task.of(index) {
+            let placed = &task.placed[usize::from(member)];
+            let from = placed.rows[0].max(self.first);
+            let to = placed.rows[1].min(self.first + rows);
+            for start in (from..to).step_by(ROWS) {
+                let chords = placed.chords(start, self.columns as i32);
+                for y in start..to.min(start + ROWS as i32) {
+                    let row = &mut sums[(y - self.first) as usize * row_length..][..row_length];
+                    let index = (y - start) as usize;
+                    for x in (chords.first[index]..chords.end[index]).step_by(LANES) {
+                        let weights = chords.weights(profile, placed.fall, index, x);
+                        placed.add(row, x as usize, self.layers, &weights);
+                    }
+                }
             }
         }
     }
 }
 
-impl Placed {
-    /// The first cell that the sprite covers in each row of a band, where a u^2 + 2 b u v + c v^2 = 1, and one past the last.
+impl<const P: usize> Placed<P> {
+    /// The sprite in the rows from `first` on, where `s = 1 - (a u^2 + 2 b u v + c v^2)`.
     #[inline(always)]
-    fn columns(&self, first_row: i32, columns: i32) -> [[i32; BAND]; 2] {
-        let start = (first_row - 1) as f32 - self.centre[1];
-        let (mut first, mut end) = ([0; BAND], [0; BAND]);
-        for row in 0..BAND {
+    fn chords(&self, first: i32, columns: i32) -> Chords {
+        let start = (first - 1) as f32 - self.centre[1];
+        let widest = 1.0 / self.fall;
+        let mut chords = Chords { middle: [0.0; ROWS], most: [0.0; ROWS], first: [0; ROWS], end: [0; ROWS] };
+        for row in 0..ROWS {
             let v = start + BEYOND[row];
             let middle = self.centre[0] - self.lean * v;
-            let half = (self.widest - self.narrowing * v * v).max(0.0).sqrt();
-            first[row] = whole((middle - half).ceil(), columns);
-            end[row] = whole((middle + half).floor() + 1.0, columns);
+            let most = 1.0 - self.fading * v * v;
+            let half = ((most - FAINT).max(0.0) * widest).sqrt();
+            chords.middle[row] = middle;
+            chords.most[row] = most;
+            chords.first[row] = whole((middle - half).ceil(), columns);
+            chords.end[row] = whole((middle + half).floor() + 1.0, columns);
         }
-        [first, end]
+        chords
     }
 
-    /// Weights of the cells from column `x` on, in the row `v` below the centre.
+    /// Adds to a run of a row's cells that begins at column `x`. (Beyond the sprite weights are zero.)
     #[inline(always)]
-    fn weights(&self, profile: Profile, x: i32, v: f32) -> [f32; LANES] {
-        let [a, b, c] = self.shape;
-        let (linear, constant) = (2.0 * b * v, 1.0 - c * v * v);
-        let start = (x - 1) as f32 - self.centre[0];
+    fn add(&self, row: &mut [[f32; P]], x: usize, layers: usize, weights: &[f32; LANES]) {
+        match (P == 1 && layers == 1, self.both) {
+            (true, _) => self.add_lone(&mut row.as_flattened_mut()[x..], weights),
+            (_, true) => self.add_run::<true>(&mut row[x * layers + self.layer..], layers, weights),
+            (_, false) => self.add_run::<false>(&mut row[x * layers + self.layer..], layers, weights),
+        }
+    }
+
+    #[inline(always)]
+    fn add_run<const BOTH: bool>(&self, run: &mut [[f32; P]], layers: usize, weights: &[f32; LANES]) {
+        let mut rest = run;
+        for weight in weights {
+            let Some((own, next)) = rest.split_first_mut() else { return };
+            for i in 0..P {
+                own[i] = self.own[i].mul_add(*weight, own[i]);
+            }
+            if BOTH && let Some(next) = next.first_mut() {
+                for i in 0..P {
+                    next[i] = self.next[i].mul_add(*weight, next[i]);
+                }
+            }
+            let Some((_, after)) = rest.split_at_mut_checked(layers) else { return };
+            rest = after;
+        }
+    }
+
+    /// The same where a cell holds one value: the cells themselves fill the vector.
+    #[inline(always)]
+    fn add_lone(&self, cells: &mut [f32], weights: &[f32; LANES]) {
+        let value = self.own[0];
+        match cells.first_chunk_mut::<LANES>() {
+            Some(cells) => {
+                for lane in 0..LANES {
+                    cells[lane] = value.mul_add(weights[lane], cells[lane]);
+                }
+            }
+            None => {
+                for (cell, weight) in cells.iter_mut().zip(weights) {
+                    *cell = value.mul_add(*weight, *cell);
+                }
+            }
+        }
+    }
+}
+
+/// What a sprite is in each of sixteen rows.
+struct Chords {
+    /// The column where it is strongest, and its `s` there.
+    middle: [f32; ROWS],
+    most: [f32; ROWS],
+    /// The first cell that it covers, and one past the last.
+    first: [i32; ROWS],
+    end: [i32; ROWS],
+}
+
+impl Chords {
+    /// Weights of the cells of a row from column `x` on, where `s` falls by `fall` for the square of each column's distance.
+    #[inline(always)]
+    fn weights(&self, profile: Profile, fall: f32, row: usize, x: i32) -> [f32; LANES] {
+        let (start, most) = ((x - 1) as f32 - self.middle[row], self.most[row]);
         let mut weights = [0.0; LANES];
         for lane in 0..LANES {
             let u = start + BEYOND[lane];
-            let s = constant - u * a.mul_add(u, linear);
+            let s = (-fall * u).mul_add(u, most);
             let s = if s > 0.0 { s } else { 0.0 };
             weights[lane] = profile.at(s);
         }
@@ -246,93 +346,48 @@ fn whole(value: f32, most: i32) -> i32 {
     (clamped + SHIFT).to_bits() as i32 - SHIFT.to_bits() as i32
 }
 
-/// What a sprite gives to its own layer and to the next.
-struct Share<const P: usize> {
-    first: usize,
-    own: [f32; P],
-    next: [f32; P],
-    both: bool,
-}
-
-impl<const P: usize> Share<P> {
-    #[inline(always)]
-    fn new(sprite: &Sprite<P>, dimmed: f32) -> Self {
-        let (mut own, mut next) = (sprite.values, sprite.values);
-        for i in 0..P {
-            own[i] *= dimmed * (1.0 - sprite.split);
-            next[i] *= dimmed * sprite.split;
-        }
-        Self { first: sprite.layer * P, own, next, both: sprite.split > 0.0 }
-    }
-
-    /// Adds to a run of a row's cells, `depth` values each, that begins at column `from`, and ends before `end`.
-    #[inline(always)]
-    fn add(&self, row: &mut [f32], [from, end]: [usize; 2], depth: usize, weights: &[f32; LANES]) {
-        if depth == 1 {
-            return self.add_lone(&mut row[from..], weights);
-        }
-        let (own, next) = (self.own, self.next);
-        let mut rest = &mut row[from * depth + self.first..];
-        for weight in &weights[..(end - from).min(LANES)] {
-            let Some((sums, beyond)) = rest.split_first_chunk_mut::<P>() else { return };
-            for i in 0..P {
-                sums[i] = own[i].mul_add(*weight, sums[i]);
-            }
-            if self.both
-                && let Some(sums) = beyond.first_chunk_mut::<P>()
-            {
-                for i in 0..P {
-                    sums[i] = next[i].mul_add(*weight, sums[i]);
-                }
-            }
-            let Some(after) = rest.get_mut(depth..) else { return };
-            rest = after;
-        }
-    }
-
-    /// The same where a cell holds one value: the cells themselves fill the vector. (Beyond the sprite weights are zero.)
-    #[inline(always)]
-    fn add_lone(&self, cells: &mut [f32], weights: &[f32; LANES]) {
-        let value = self.own[0];
-        let add = |(cell, weight): (&mut f32, &f32)| *cell = value.mul_add(*weight, *cell);
-        match cells.first_chunk_mut::<LANES>() {
-            Some(cells) => cells.iter_mut().zip(weights).for_each(add),
-            None => cells.iter_mut().zip(weights).for_each(add),
-        }
-    }
-}
-
-/// Which sprites touch which band: a counting sort that keeps their order.
-struct Bins {
+/// The sprites of a task on a grid, and which of them touch which band: a counting sort that keeps their order.
+struct Binned<const P: usize> {
+    placed: Vec<Placed<P>>,
     starts: Vec<u32>,
-    members: Vec<u32>,
+    members: Vec<u16>,
 }
 
-impl Bins {
-    fn new(bands: usize, rows: impl Iterator<Item = [i32; 2]> + Clone) -> Self {
-        let bands_of = |[from, to]: [i32; 2]| {
-            let first = from as usize / BAND;
-            if from < to { first..(to as usize).div_ceil(BAND) } else { first..first }
+impl<const P: usize> Binned<P> {
+    #[inline(always)]
+    fn new(sheet: &Sheet, task: &[Sprite<P>], cells: &Cells, here: impl Fn(f32) -> bool) -> Self {
+        let mut placed = Vec::with_capacity(task.len());
+        for sprite in task {
+            if here(sprite.ellipse.radius) {
+                placed.push(Placed::new(sheet, sprite, cells));
+            }
+        }
+        let bands_of = |placed: &Placed<P>| {
+            let [from, to] = placed.rows.map(|row| row as usize);
+            if from < to { from / BAND..to.div_ceil(BAND) } else { 0..0 }
         };
+        let bands = cells.rows.div_ceil(BAND);
         let mut starts = vec![0_u32; bands + 1];
-        for band in rows.clone().flat_map(bands_of) {
-            starts[band + 1] += 1;
+        for placed in &placed {
+            for band in bands_of(placed) {
+                starts[band + 1] += 1;
+            }
         }
         for band in 0..bands {
             starts[band + 1] += starts[band];
         }
         let mut ends = starts.clone();
         let mut members = vec![0; starts[bands] as usize];
-        for (index, rows) in rows.enumerate() {
-            for band in bands_of(rows) {
-                members[ends[band] as usize] = index as u32;
+        for (index, placed) in placed.iter().enumerate() {
+            for band in bands_of(placed) {
+                members[ends[band] as usize] = index as u16;
                 ends[band] += 1;
             }
         }
-        Self { starts, members }
+        Self { placed, starts, members }
     }
 
-    fn of(&self, band: usize) -> &[u32] {
+    fn of(&self, band: usize) -> &[u16] {
         &self.members[self.starts[band] as usize..self.starts[band + 1] as usize]
     }
 }

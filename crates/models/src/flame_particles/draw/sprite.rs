@@ -5,11 +5,13 @@ use bansho_base::{
     canvas::View,
     math::{DMat2, DVec2, DVec3},
 };
+use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{
     gas::Gas,
     kernel::{LINE_PEAK, VARIANCE},
+    perspective::Perspective,
     prepared::AT_ONCE,
 };
 
@@ -41,23 +43,39 @@ pub(crate) struct Seen {
 }
 
 /// Sprites further out than this are of no picture, pixels.
-const FAR_OUT: f64 = 1e6;
+pub(crate) const FAR_OUT: f64 = 1e6;
 
 /// A pixel's own footprint as the variance of a sprite: sprites are widened by it, so that the smallest neither flicker nor vanish.
-const FOOTPRINT: f64 = 0.18;
+pub(crate) const FOOTPRINT: f64 = 0.18;
 
-/// Every particle that the view can see, in their own order, those of no `weight` left out.
-pub(crate) fn seen(gas: &Gas, view: &View, weight: impl Fn(usize) -> bool + Sync) -> Vec<Seen> {
+/// Which particles are drawn, and as what.
+pub(crate) trait Kind: Sync {
+    type Record: Send;
+    fn wants(&self, index: usize) -> bool;
+    fn record(&self, seen: &Seen) -> Self::Record;
+}
+
+/// The records of all particles that a view can see, in their own order, task by task.
+pub(crate) fn seen<K: Kind>(gas: &Gas, view: &View, kind: &K) -> Vec<Vec<K::Record>> {
     let eye = Eye::new(view);
-    let count = gas.particles.len();
-    let tasks: Vec<Vec<Seen>> = (0..count.div_ceil(AT_ONCE))
-        .into_par_iter()
-        .map(|task| {
-            let range = task * AT_ONCE..((task + 1) * AT_ONCE).min(count);
-            range.filter(|index| weight(*index)).flat_map(|index| eye.see(gas, index)).flatten().collect()
-        })
-        .collect();
-    tasks.concat()
+    let perspective = Perspective::new(gas, view, &eye.next, eye.open_share);
+    let (count, level) = (gas.particles.len(), Level::new());
+    let of_task = |task: usize| {
+        let range = task * AT_ONCE..((task + 1) * AT_ONCE).min(count);
+        let mut records = Vec::with_capacity(AT_ONCE);
+        match &perspective {
+            Some(perspective) => {
+                dispatch!(level, _simd => perspective.see(gas, range.clone(), kind, &mut records));
+            }
+            None => {
+                for index in range.filter(|index| kind.wants(*index)) {
+                    eye.see(gas, index, |seen| records.push(kind.record(&seen)));
+                }
+            }
+        }
+        records
+    };
+    (0..count.div_ceil(AT_ONCE)).into_par_iter().map(of_task).collect()
 }
 
 /// The camera now and at the next frame.
@@ -74,25 +92,26 @@ impl<'a> Eye<'a> {
         Self { view, next: view.camera_at(view.next_middle), open_share: view.shutter.duration() / frame }
     }
 
-    /// A particle, twice where a panorama's seam cuts it.
-    fn see(&self, gas: &Gas, index: usize) -> [Option<Seen>; 2] {
-        let middle = self.view.shutter.middle();
-        let place = gas.place(index, middle);
+    /// Hands a particle to `each`, twice where a panorama's seam cuts it.
+    #[inline(always)]
+    fn see(&self, gas: &Gas, index: usize, mut each: impl FnMut(Seen)) {
+        let place = gas.place(index, self.view.shutter.middle());
         let camera = &self.view.camera;
-        let Some(first) = camera.project(place) else { return [None, None] };
+        let Some(first) = camera.project(place) else { return };
         let after = self.next.project(gas.place(index, self.view.next_middle));
         let motion = after.map_or(DVec2::ZERO, |after| across_seam(camera, after.pixel - first.pixel));
-        let around = (camera.lens == Lens::Panorama).then(|| {
+        let mut at = |projection: Projection| {
+            if let Some(ellipse) = self.ellipse(gas, index, place, &projection, motion * self.open_share) {
+                let (depth, scale) = (projection.depth, projection.pixels_per_metre as f32);
+                each(Seen { index, ellipse, depth, motion: motion.as_vec2().to_array(), scale });
+            }
+        };
+        at(first);
+        if camera.lens == Lens::Panorama {
             let turn = std::f64::consts::TAU * camera.focal_pixels;
             let side = if first.pixel.x > camera.centre.x { -turn } else { turn };
-            Projection { pixel: first.pixel + DVec2::new(side, 0.0), ..first }
-        });
-        [Some(first), around].map(|seen| {
-            let seen = seen?;
-            let ellipse = self.ellipse(gas, index, place, &seen, motion * self.open_share)?;
-            let motion = motion.as_vec2().to_array();
-            Some(Seen { index, ellipse, depth: seen.depth, motion, scale: seen.pixels_per_metre as f32 })
-        })
+            at(Projection { pixel: first.pixel + DVec2::new(side, 0.0), ..first });
+        }
     }
 
     /// The ellipse of a ball seen at `projection` that moves by `blur` pixels while the shutter is open.

@@ -10,7 +10,7 @@ use bansho_base::{
 use super::{
     gas::Gas,
     look::LookParameters,
-    sprite::{Seen, seen},
+    sprite::{Kind, Seen, seen},
 };
 
 /// Luminance of a square, cd/m^2: as bright as the flame, so that one exposure serves both pictures.
@@ -23,20 +23,38 @@ struct Square {
     colour: [f32; 3],
 }
 
+/// How all particles become squares.
+struct Drawn<'a> {
+    gas: &'a Gas<'a>,
+    /// Side, support radii.
+    side: f32,
+    window: Rect,
+    densest: f64,
+}
+
+impl Kind for Drawn<'_> {
+    type Record = Option<Square>;
+
+    fn wants(&self, _index: usize) -> bool {
+        true
+    }
+
+    fn record(&self, seen: &Seen) -> Option<Square> {
+        let radius = self.gas.particles.support_radius[seen.index];
+        let side = (self.side * radius * seen.scale).max(1.0);
+        let rect = square_rect(seen.ellipse.centre, side, self.window)?;
+        let density = f64::from(self.gas.particles.density[seen.index]) / self.densest;
+        Some(Square { rect, depth: seen.depth, colour: colour(density) })
+    }
+}
+
 /// All squares, nearest first.
 pub(crate) struct Squares(Vec<Square>);
 
 impl Squares {
     pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View) -> Self {
-        let densest = usual_density(gas);
-        let square = |seen: &Seen| {
-            let radius = gas.particles.support_radius[seen.index];
-            let side = (look.square_size as f32 * radius * seen.scale).max(1.0);
-            let rect = square_rect(seen.ellipse.centre, side, view.window)?;
-            let density = f64::from(gas.particles.density[seen.index]) / densest;
-            Some(Square { rect, depth: seen.depth, colour: colour(density) })
-        };
-        let mut squares: Vec<Square> = seen(gas, view, |_| true).iter().filter_map(square).collect();
+        let kind = Drawn { gas, side: look.square_size as f32, window: view.window, densest: usual_density(gas) };
+        let mut squares: Vec<Square> = seen(gas, view, &kind).into_iter().flatten().flatten().collect();
         // A stable sort: at one depth the elder lies before the younger.
         squares.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         Self(squares)

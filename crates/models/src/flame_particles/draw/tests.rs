@@ -203,16 +203,20 @@ fn haze_bends_by_the_gradient_of_the_path_and_only_around_the_gas() {
         let bend = prepared.deflection().unwrap();
         let at = |x: usize, y: usize| bend.angle.at(x - bend.rect.x, y - bend.rect.y);
         let weight = 3.0 * (refractivity(1500.0) - refractivity(293.15)) * 0.001;
-        let peak = weight * line_gradient(0.12, 0.3);
-        for x in [82, 86, 90, 94] {
-            let b = (x as f64 + 0.5 - 80.0) / scale;
-            let distance = math::hypot(b, 0.5 / scale);
-            let expected = weight * line_gradient(distance, 0.3) * b / distance;
-            let got = f64::from(at(x, 60)[0]);
-            assert!(expected > 0.0, "light bends outward, to the denser air");
-            assert!((got - expected).abs() < 0.03 * peak.abs(), "column {x}: {got} for {expected}");
-            assert!((f64::from(at(159 - x, 60)[0]) + got).abs() < 0.05 * peak.abs(), "both sides alike");
+        let peak = (weight * line_gradient(0.12, 0.3)).abs();
+        let (mut squares, mut count) = (0.0, 0.0);
+        for (x, y) in (62..98).flat_map(|x| (42..78).map(move |y| (x, y))) {
+            let [right, up] = [f64::from(x) + 0.5 - 80.0, 60.0 - f64::from(y) - 0.5].map(|pixels| pixels / scale);
+            let distance = math::hypot(right, up);
+            let slope = weight * line_gradient(distance, 0.3) / distance;
+            for (got, expected) in at(x as usize, y as usize).into_iter().zip([right, up].map(|along| slope * along)) {
+                let off = f64::from(got) - expected;
+                assert!(off.abs() < 0.05 * peak, "{x}, {y}: {got} for {expected}, at most {peak}");
+                (squares, count) = (squares + off * off, count + 1.0);
+            }
         }
+        assert!((squares / count).sqrt() < 0.015 * peak, "{} of {peak}", (squares / count).sqrt());
+        assert!(f64::from(at(86, 60)[0]) > 0.9 * peak, "light bends outward, to the denser air");
         assert!(f64::from(at(80, 50)[1]) > 0.0 && f64::from(at(80, 70)[1]) < 0.0, "upward above, downward below");
         for (x, y) in [(130, 60), (80, 110), (20, 20)] {
             let inside = x >= bend.rect.x && x < bend.rect.right() && y >= bend.rect.y && y < bend.rect.bottom();
