@@ -118,7 +118,7 @@ impl Phenomenon for FlameParticles {
 
     fn luminance(&self) -> f64 {
         /// Bright parts beside a whole flame of the hottest soot.
-        const BRIGHT: f64 = 0.2;
+        const BRIGHT: f64 = 0.09;
         let hottest = match self.parameters.life.temperature {
             TemperatureLaw::Living => self.parameters.life.flame_temperature_k,
             TemperatureLaw::Constant => self.tallest().parameters.temperature_k,
