@@ -28,11 +28,11 @@ impl Cells {
         Self { size, first: low, columns: (high[0] - low[0]) as usize, rows: (high[1] - low[1]) as usize }
     }
 
-    /// A place of the picture, counted in cells from the middle of the first.
+    /// A place of the picture in cells: whole numbers are their middles.
     #[inline(always)]
     pub(crate) fn place(&self, pixel: [f32; 2]) -> [f32; 2] {
         let scale = 1.0 / self.size as f32;
-        [0, 1].map(|axis| pixel[axis].mul_add(scale, -0.5 - self.first[axis] as f32))
+        [pixel[0].mul_add(scale, -0.5), pixel[1].mul_add(scale, -0.5)]
     }
 
     /// The cell before the middle of pixel `pixel` of an axis, and the pixel's phase between that cell and the next.

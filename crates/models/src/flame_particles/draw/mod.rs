@@ -1,8 +1,9 @@
 //! How the gas looks: what it radiates, absorbs and bends, and the particles as the paper shows them.
 //!
-//! Each particle is a ball of gas whose line integral is known in closed form (`kernel`). `survey` finds how the gas is spread, `sprite` each ball's ellipse in the picture,
-//! `splat` sums all of them on a grid that is as coarse as they are smooth, in a few layers of depth; `resolve` turns the sums into
-//! light at every pixel, with the detail (`detail`) that sums lack. `haze` sums deflections, `light` what others are lit with.
+//! Each particle is a ball of gas whose line integral is known in closed form (`kernel`). `survey` finds how the gas is spread, `sprite`
+//! each ball's ellipse in the picture (`perspective` sixteen at a time), `splat` sums all of them (`placed` among its cells) on a grid as
+//! coarse as they are smooth, in a few layers of depth; `resolve` turns the sums into light at every pixel, by splines (`spline`) and
+//! with the detail (`detail`) that sums lack. `haze` finds deflections, `light` what others are lit with.
 
 mod detail;
 mod gas;
@@ -14,6 +15,7 @@ mod light;
 mod look;
 mod measure;
 mod perspective;
+mod placed;
 mod prepared;
 mod resolve;
 mod splat;

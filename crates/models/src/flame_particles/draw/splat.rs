@@ -4,6 +4,8 @@
 //! and so do sprites that fill the picture. Sprites of different sizes go to grids of different fineness; coarse grids are added to finer
 //! ones by cubic interpolation.
 
+use std::ops::Range;
+
 use bansho_base::image::Rect;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -11,22 +13,15 @@ use rayon::prelude::*;
 use super::{
     grid::{Cells, Grid},
     kernel::Profile,
+    placed::{LANES, Placed, ROWS},
     spline,
     sprite::Ellipse,
 };
 
-/// The weights of eight cells are found at a time: about a row of a sprite,
-const LANES: usize = 8;
-/// and chords of sixteen rows: about all of it.
-const ROWS: usize = 16;
-/// How far cells and rows lie beyond the one before the first. (Without a zero, of which compilers make a special case.)
-const BEYOND: [f32; ROWS] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0];
 /// Least radius of a sprite in cells, for which splines are exact to a few hundredths of a lone sprite's peak.
 pub(crate) const COARSE: f32 = 2.75;
 /// Rows of one task.
 const BAND: usize = 32;
-/// Where `s = 1 - b^2/d^2` is less, a sprite has less than 1e-4 of its peak, and is not added.
-const FAINT: f32 = 0.045;
 /// Coarsest grid: cells of 4096 pixels, twelve octaves.
 const COARSEST: usize = 24;
 
@@ -147,52 +142,6 @@ impl Whole {
     }
 }
 
-/// A sprite in the coordinates of a grid.
-#[derive(Clone, Copy, Debug)]
-struct Placed<const P: usize> {
-    centre: [f32; 2],
-    /// How `s` falls along a row, for the square of the distance from its middle: a.
-    fall: f32,
-    /// How far the middle of a row lies to the left, for each row below the centre: b/a.
-    lean: f32,
-    /// How `s` falls from middle to middle, for the square of the distance from the centre: c - b^2/a.
-    fading: f32,
-    /// First row and one past the last.
-    rows: [i32; 2],
-    /// What goes to its own layer and, if anything, to the next.
-    layer: usize,
-    own: [f32; P],
-    next: [f32; P],
-    both: bool,
-}
-
-impl<const P: usize> Placed<P> {
-    #[inline(always)]
-    fn new(sheet: &Sheet, sprite: &Sprite<P>, cells: &Cells) -> Self {
-        let ellipse = &sprite.ellipse;
-        let cell = cells.size as f32;
-        let growth = (sheet.least_radius * cell / ellipse.radius.max(1e-3)).max(1.0);
-        let scale = cell * cell / (growth * growth);
-        let centre = cells.place(ellipse.centre);
-        let reach = ellipse.reach[1] * growth / cell * (1.0 - FAINT).sqrt();
-        let last = cells.rows as i32;
-        let rows =
-            [((centre[1] - reach).ceil() as i32).clamp(0, last), ((centre[1] + reach) as i32 + 1).clamp(0, last)];
-        let [a, b, c] = ellipse.shape.map(|value| value * scale);
-        let lean = b / a;
-        let fading = c - b * lean;
-        // Sprites that had to be widened are dimmed.
-        let dimmed = 1.0 / (growth * growth);
-        let (mut own, mut next) = (sprite.values, sprite.values);
-        for i in 0..P {
-            own[i] *= dimmed * (1.0 - sprite.split);
-            next[i] *= dimmed * sprite.split;
-        }
-        let (layer, both) = (sprite.layer, sprite.split > 0.0);
-        Self { centre, fall: a, lean, fading, rows, layer, own, next, both }
-    }
-}
-
 /// Adds the sprites whose radius belongs `here`, on this grid.
 fn add_sprites<const P: usize>(
     sheet: &Sheet,
@@ -205,7 +154,9 @@ fn add_sprites<const P: usize>(
     let bin = |task: &Vec<Sprite<P>>| dispatch!(level, _simd => Binned::new(sheet, task, &cells, &here));
     let binned: Vec<Binned<P>> = tasks.par_iter().map(bin).collect();
     grid.values_mut().par_chunks_mut(BAND * row_length).enumerate().for_each(|(index, values)| {
-        let mut band = Band { first: (index * BAND) as i32, columns: cells.columns, layers: sheet.layers, values };
+        let (first, end) = (cells.first[0], cells.first[0] + cells.columns as i32);
+        let top = cells.first[1] + (index * BAND) as i32;
+        let mut band = Band { first: top, columns: first..end, layers: sheet.layers, values };
         for task in &binned {
             dispatch!(level, _simd => band.add(sheet.profile, task, index));
         }
@@ -214,8 +165,9 @@ fn add_sprites<const P: usize>(
 
 /// Rows of the grid that one thread fills.
 struct Band<'a> {
+    /// The first row, and the columns, of the whole picture's cells.
     first: i32,
-    columns: usize,
+    columns: Range<i32>,
     layers: usize,
     values: &'a mut [f32],
 }
@@ -224,126 +176,24 @@ impl Band<'_> {
     #[inline(always)]
     fn add<const P: usize>(&mut self, profile: Profile, task: &Binned<P>, index: usize) {
         let sums = self.values.as_chunks_mut::<P>().0;
-        let row_length = self.columns * self.layers;
-        let rows = (sums.len() / row_length) as i32;
+        let row_length = self.columns.len() * self.layers;
+        let end = self.first + (sums.len() / row_length) as i32;
         for &member in task.of(index) {
             let placed = &task.placed[usize::from(member)];
-            let from = placed.rows[0].max(self.first);
-            let to = placed.rows[1].min(self.first + rows);
+            let (from, to) = (placed.rows[0].max(self.first), placed.rows[1].min(end));
             for start in (from..to).step_by(ROWS) {
-                let chords = placed.chords(start, self.columns as i32);
+                let chords = placed.chords(start, &self.columns);
                 for y in start..to.min(start + ROWS as i32) {
                     let row = &mut sums[(y - self.first) as usize * row_length..][..row_length];
                     let index = (y - start) as usize;
                     for x in (chords.first[index]..chords.end[index]).step_by(LANES) {
                         let weights = chords.weights(profile, placed.fall, index, x);
-                        placed.add(row, x as usize, self.layers, &weights);
+                        placed.add(row, (x - self.columns.start) as usize, self.layers, &weights);
                     }
                 }
             }
         }
     }
-}
-
-impl<const P: usize> Placed<P> {
-    /// The sprite in the rows from `first` on, where `s = 1 - (a u^2 + 2 b u v + c v^2)`.
-    #[inline(always)]
-    fn chords(&self, first: i32, columns: i32) -> Chords {
-        let start = (first - 1) as f32 - self.centre[1];
-        let widest = 1.0 / self.fall;
-        let mut chords = Chords { middle: [0.0; ROWS], most: [0.0; ROWS], first: [0; ROWS], end: [0; ROWS] };
-        for row in 0..ROWS {
-            let v = start + BEYOND[row];
-            let middle = self.centre[0] - self.lean * v;
-            let most = 1.0 - self.fading * v * v;
-            let half = ((most - FAINT).max(0.0) * widest).sqrt();
-            chords.middle[row] = middle;
-            chords.most[row] = most;
-            chords.first[row] = whole((middle - half).ceil(), columns);
-            chords.end[row] = whole((middle + half).floor() + 1.0, columns);
-        }
-        chords
-    }
-
-    /// Adds to a run of a row's cells that begins at column `x`. (Beyond the sprite weights are zero.)
-    #[inline(always)]
-    fn add(&self, row: &mut [[f32; P]], x: usize, layers: usize, weights: &[f32; LANES]) {
-        match (P == 1 && layers == 1, self.both) {
-            (true, _) => self.add_lone(&mut row.as_flattened_mut()[x..], weights),
-            (_, true) => self.add_run::<true>(&mut row[x * layers + self.layer..], layers, weights),
-            (_, false) => self.add_run::<false>(&mut row[x * layers + self.layer..], layers, weights),
-        }
-    }
-
-    #[inline(always)]
-    fn add_run<const BOTH: bool>(&self, run: &mut [[f32; P]], layers: usize, weights: &[f32; LANES]) {
-        let mut rest = run;
-        for weight in weights {
-            let Some((own, next)) = rest.split_first_mut() else { return };
-            for i in 0..P {
-                own[i] = self.own[i].mul_add(*weight, own[i]);
-            }
-            if BOTH && let Some(next) = next.first_mut() {
-                for i in 0..P {
-                    next[i] = self.next[i].mul_add(*weight, next[i]);
-                }
-            }
-            let Some((_, after)) = rest.split_at_mut_checked(layers) else { return };
-            rest = after;
-        }
-    }
-
-    /// The same where a cell holds one value: the cells themselves fill the vector.
-    #[inline(always)]
-    fn add_lone(&self, cells: &mut [f32], weights: &[f32; LANES]) {
-        let value = self.own[0];
-        match cells.first_chunk_mut::<LANES>() {
-            Some(cells) => {
-                for lane in 0..LANES {
-                    cells[lane] = value.mul_add(weights[lane], cells[lane]);
-                }
-            }
-            None => {
-                for (cell, weight) in cells.iter_mut().zip(weights) {
-                    *cell = value.mul_add(*weight, *cell);
-                }
-            }
-        }
-    }
-}
-
-/// What a sprite is in each of sixteen rows.
-struct Chords {
-    /// The column where it is strongest, and its `s` there.
-    middle: [f32; ROWS],
-    most: [f32; ROWS],
-    /// The first cell that it covers, and one past the last.
-    first: [i32; ROWS],
-    end: [i32; ROWS],
-}
-
-impl Chords {
-    /// Weights of the cells of a row from column `x` on, where `s` falls by `fall` for the square of each column's distance.
-    #[inline(always)]
-    fn weights(&self, profile: Profile, fall: f32, row: usize, x: i32) -> [f32; LANES] {
-        let (start, most) = ((x - 1) as f32 - self.middle[row], self.most[row]);
-        let mut weights = [0.0; LANES];
-        for lane in 0..LANES {
-            let u = start + BEYOND[lane];
-            let s = (-fall * u).mul_add(u, most);
-            let s = if s > 0.0 { s } else { 0.0 };
-            weights[lane] = profile.at(s);
-        }
-        weights
-    }
-}
-
-/// A whole number, clamped from 0 to `most`: the last bits of its sum with 2^23. (A cast checks each lane of a vector by itself.)
-#[inline(always)]
-fn whole(value: f32, most: i32) -> i32 {
-    const SHIFT: f32 = 8_388_608.0;
-    let clamped = value.max(0.0).min(most as f32);
-    (clamped + SHIFT).to_bits() as i32 - SHIFT.to_bits() as i32
 }
 
 /// The sprites of a task on a grid, and which of them touch which band: a counting sort that keeps their order.
@@ -363,7 +213,7 @@ impl<const P: usize> Binned<P> {
             }
         }
         let bands_of = |placed: &Placed<P>| {
-            let [from, to] = placed.rows.map(|row| row as usize);
+            let [from, to] = placed.rows.map(|row| (row - cells.first[1]) as usize);
             if from < to { from / BAND..to.div_ceil(BAND) } else { 0..0 }
         };
         let bands = cells.rows.div_ceil(BAND);
@@ -389,5 +239,25 @@ impl<const P: usize> Binned<P> {
 
     fn of(&self, band: usize) -> &[u16] {
         &self.members[self.starts[band] as usize..self.starts[band + 1] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_are_the_coarsest_that_are_fine_enough() {
+        let sheet = Sheet { profile: Profile::LINE, least_radius: 2.75, layers: 1, window: Rect::default() };
+        let sizes: Vec<usize> = (2..10).map(cell_size).collect();
+        assert_eq!((cell_size(0), sizes), (1, vec![2, 3, 4, 6, 8, 12, 16, 24]));
+        for step in 0..4000 {
+            let radius = 0.5 + 0.25 * step as f32;
+            let size = cell_size(sheet.fineness(radius));
+            let next =
+                [1, 2, 3, 4].into_iter().chain((1..).flat_map(|k| [6 << (k - 1), 8 << (k - 1)])).find(|s| *s > size);
+            assert!(size == 1 || size as f32 * 2.75 <= radius, "{radius} {size}");
+            assert!(next.is_none_or(|next| radius < 2.75 * next as f32), "{radius} {size} {next:?}");
+        }
     }
 }

@@ -193,3 +193,86 @@ fn limited(matrix: DMat2, scale: f64) -> DMat2 {
     let longest = matrix.x_axis.length().max(matrix.y_axis.length());
     if longest > MOST * scale { matrix * (MOST * scale / longest) } else { matrix }
 }
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{
+        animation::Animated,
+        camera::CameraParameters,
+        canvas::Shutter,
+        random::{Key, Purpose},
+    };
+
+    use super::*;
+    use crate::flame_particles::{Particle, Particles};
+
+    struct Everything;
+
+    impl Kind for Everything {
+        type Record = Seen;
+
+        fn wants(&self, _index: usize) -> bool {
+            true
+        }
+
+        fn record(&self, seen: &Seen) -> Seen {
+            *seen
+        }
+    }
+
+    #[test]
+    fn sixteen_at_a_time_are_seen_as_one_by_one() {
+        let camera = CameraParameters {
+            position: Animated::from([0.3, 0.4, 1.5]),
+            target: Animated::from([0.0, 0.2, 0.0]),
+            roll_deg: Animated::from(7.0),
+            shift: [0.02, -0.01],
+            ..CameraParameters::default()
+        };
+        let view = View::new(camera, Shutter { open: 1.0, close: 1.02 }, 1.04, [320, 180], 0);
+        let mut particles = Particles::new(DVec3::new(0.1, -0.2, 0.05));
+        for birth in 0..333 {
+            let random = Key::new(5, "seen").uniforms(birth, 0, Purpose::named("place")).map(|u| 4.0 * (u - 0.5));
+            let [x, y, z, w] = random;
+            particles.push(Particle {
+                birth,
+                position: [x, y, z],
+                velocity: [3.0 * w, 2.0 * x, y],
+                mass: 1e-4,
+                density: 0.2,
+                temperature: 1700.0,
+                support_radius: 0.05 + 0.04 * w.abs(),
+                age: 0.1,
+                life: 1.0,
+                fuel: 0.5,
+                soot: 1e-7,
+            });
+        }
+        let gas = Gas {
+            particles: &particles,
+            time: 0.99,
+            air_temperature_k: 293.15,
+            detail_speed: 0.5,
+            base: DVec3::ZERO,
+            size: DVec2::ONE,
+            key: Key::new(1, "flame"),
+        };
+        let (eye, mut one_by_one) = (Eye::new(&view), Vec::new());
+        (0..particles.len()).for_each(|index| eye.see(&gas, index, |seen| one_by_one.push(seen)));
+        let together = seen(&gas, &view, &Everything).concat();
+        assert!(one_by_one.len() > 40 && one_by_one.len() < 300, "{}", one_by_one.len());
+        assert_eq!(together.len(), one_by_one.len());
+        for (a, b) in together.iter().zip(&one_by_one) {
+            let near = |a: f32, b: f32, allowed: f32| (a - b).abs() <= allowed * (1.0 + b.abs());
+            let (e, f) = (&a.ellipse, &b.ellipse);
+            assert_eq!(a.index, b.index);
+            assert!((a.depth - b.depth).abs() < 1e-5 && near(a.scale, b.scale, 1e-5));
+            assert!(near(e.radius, f.radius, 1e-5) && (e.peak / f.peak - 1.0).abs() < 1e-3, "{e:?} {f:?}");
+            for axis in 0..2 {
+                assert!(near(e.centre[axis], f.centre[axis], 1e-5) && near(e.reach[axis], f.reach[axis], 1e-5));
+                assert!(near(a.motion[axis], b.motion[axis], 1e-4), "{a:?} {b:?}");
+            }
+            assert!((0..3).all(|i| (e.shape[i] - f.shape[i]).abs() < 1e-4 * f.shape[0].max(f.shape[2])), "{e:?} {f:?}");
+        }
+    }
+}

@@ -299,6 +299,29 @@ fn strips_crops_and_threads_change_no_bit() {
 }
 
 #[test]
+fn a_part_of_the_picture_alone_is_the_same_to_the_bit() {
+    let particles = glowing_cloud(500);
+    let look = LookParameters::default();
+    let whole_view = view(camera());
+    let part = Rect { x: 67, y: 51, width: 31, height: 23 };
+    let part_view = View { window: part, ..view(camera()) };
+    let seen = |view: &View| {
+        prepared(&particles, &look, view, |prepared| {
+            let mut strip = Strip::default();
+            strip.reset(part, None, 0);
+            prepared.draw(&DepthInterval::ALL, &mut strip);
+            let bend = prepared.deflection().unwrap();
+            let at =
+                |i: usize| bend.angle.at(part.x + i % part.width - bend.rect.x, part.y + i / part.width - bend.rect.y);
+            ((0..strip.len()).map(at).collect::<Vec<_>>(), strip.radiance)
+        })
+    };
+    let (whole, alone) = (seen(&whole_view), seen(&part_view));
+    assert!(whole.0.iter().any(|angle| angle[0] != 0.0) && whole.1[0].iter().any(|value| *value > 0.0));
+    assert_eq!(whole, alone);
+}
+
+#[test]
 fn the_plate_hides_what_is_behind_it() {
     let view = view(camera());
     let particles = cloud([ball(0, [0.0; 3], 1800.0, 1e-6)]);
