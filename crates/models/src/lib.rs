@@ -1,6 +1,7 @@
 //! Bansho's methods, each readable beside its paper: parameters as plain data, then functions that step and draw.
 
 mod blue_flame;
+mod directions;
 mod fault;
 mod lanes;
 

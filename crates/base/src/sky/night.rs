@@ -89,6 +89,12 @@ pub struct Parallel {
 }
 
 impl Parallel {
+    /// What radiance is made of: all around, over the sun by the fourth power of how far a direction turns to it, and in proportion to that.
+    #[must_use]
+    pub fn terms(&self) -> [[f32; 3]; 3] {
+        [self.even, self.glow, self.blue]
+    }
+
     /// Radiance where a direction turns toward the sun by `toward`: 1 over it, 0 opposite.
     #[inline(always)]
     #[must_use]
@@ -106,9 +112,14 @@ impl Night {
         self.parallel(elevation).radiance(self.toward(direction) as f32)
     }
 
-    /// How far a direction turns toward the sun: 1 over it, 0 opposite.
+    /// Unit vector to where the sun stands below the horizon.
     #[must_use]
-    pub fn toward(&self, direction: DVec3) -> f64 {
+    pub fn sunward(&self) -> DVec3 {
+        self.sunward
+    }
+
+    /// How far a direction turns toward the sun: 1 over it, 0 opposite.
+    fn toward(&self, direction: DVec3) -> f64 {
         0.5 + 0.5 * DVec3::new(direction.x, 0.0, direction.z).normalize_or_zero().dot(self.sunward)
     }
 

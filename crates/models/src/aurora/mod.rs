@@ -14,7 +14,7 @@ pub mod particles;
 pub mod precipitation;
 pub mod shapes;
 
-pub use draw::{Aurora, DrawingParameters, Sampling};
+pub use draw::{Aurora, Blur, BlurParameters, DrawingParameters, FallModel, Sampling};
 pub use parameters::{
     AuroraParameters, FieldParameters, FieldSolver, FoldParameters, ParticleParameters, PulsationParameters,
     RayParameters, RelocationParameters, RepulsionKernel, SpectrumShape,

@@ -1,5 +1,6 @@
 //! The sky as a backdrop: what lies behind everything where there is no plate.
 
+mod night;
 mod skyline;
 mod stars;
 
@@ -9,13 +10,16 @@ use bansho_base::{
     canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
     color,
     image::Rect,
-    math::{self, DVec2, DVec3},
+    math::{DVec3, lanes},
     observer::{Cancelled, Observer},
     phenomenon::{Phenomenon, Prepared},
-    sky::{Night, Parallel, Sky, SkyKind, SkyParameters},
+    sky::{Sky, SkyKind, SkyParameters},
     surroundings::{Publication, Surroundings},
 };
+use fearless_simd::{Level, Simd, dispatch};
 
+use crate::{directions::Directions, lanes::LANES};
+use night::NightSky;
 use skyline::Skyline;
 use stars::{Spot, Stars};
 
@@ -45,12 +49,6 @@ const FAR: DepthInterval = DepthInterval { near: 1e12, far: f64::INFINITY };
 const HILLS: DepthInterval = DepthInterval { near: 8e3, far: 8.001e3 };
 /// Light of hills and trees beside that of the sky overhead.
 const HILL_SHADE: f32 = 0.04;
-/// Steps of elevation from the horizon to the zenith, even in the root of its sine.
-const STEPS: usize = 512;
-/// Luminance of the Milky Way's middle, cd/m^2, its width in sines, and its colour's temperature, K.
-const MILKY_WAY: f64 = 1.6e-4;
-const MILKY_WAY_WIDTH: f64 = 0.14;
-const MILKY_WAY_K: f32 = 5200.0;
 
 impl Phenomenon for SkyBackdrop {
     fn name(&self) -> &str {
@@ -82,7 +80,7 @@ impl Phenomenon for SkyBackdrop {
         let sky = surroundings.sky;
         let shown = sky.night().zip(self.stars.as_ref());
         let spots = shown.map(|(night, stars)| stars.spots(view, night, self.parameters.night.stars));
-        let night = sky.night().map(|night| NightSky::new(night, self.parameters.night.milky_way));
+        let night = sky.night().map(|night| NightSky::new(&sky, night, self.parameters.night.milky_way));
         Ok(Box::new(PreparedSky { view, sky, night, spots: spots.unwrap_or_default(), skyline: self.skyline.as_ref() }))
     }
 }
@@ -96,72 +94,52 @@ struct PreparedSky<'a> {
     skyline: Option<&'a Skyline>,
 }
 
-/// The night by elevation.
-struct NightSky {
-    night: Night,
-    parallels: Vec<Parallel>,
-    /// Light of the Milky Way's middle, by elevation.
-    milky_way: Vec<[f32; 3]>,
-    pole: [f32; 3],
-}
-
-impl NightSky {
-    fn new(night: &Night, milky_way: f64) -> Self {
-        let elevations = || (0..=STEPS).map(|step| math::asin(math::pow(step as f64 / STEPS as f64, 2.0)));
-        let colour = color::black_body().radiance(MILKY_WAY_K);
-        let scale = milky_way * MILKY_WAY / f64::from(color::luminance(colour));
-        let dimmed = |elevation| (scale * night.transmittance(elevation)) as f32;
-        Self {
-            night: *night,
-            parallels: elevations().map(|elevation| night.parallel(elevation)).collect(),
-            milky_way: elevations().map(|elevation| colour.map(|value| value * dimmed(elevation))).collect(),
-            pole: stars::galactic_pole().as_vec3().to_array(),
-        }
-    }
-
-    /// Radiance from a direction above the horizon, a unit vector.
-    fn radiance(&self, direction: DVec3) -> [f32; 3] {
-        let step = ((direction.y.clamp(0.0, 1.0) as f32).sqrt() * STEPS as f32 + 0.5) as usize;
-        let even = self.parallels[step].radiance(self.night.toward(direction) as f32);
-        let [x, y, z] = direction.as_vec3().to_array();
-        let height = self.pole[0] * x + self.pole[1] * y + self.pole[2] * z;
-        let across = height * (1.0 / MILKY_WAY_WIDTH) as f32;
-        // A band with soft edges; what lies far from it gives a little.
-        let share = 1.0 / (1.0 + across * across * across * across);
-        std::array::from_fn(|c| self.milky_way[step][c].mul_add(share, even[c]))
-    }
-}
-
 impl PreparedSky<'_> {
-    fn radiance(&self, direction: DVec3) -> [f32; 3] {
-        match &self.night {
-            Some(night) if direction.y >= 0.0 => night.radiance(direction),
-            _ => self.sky.radiance(direction),
-        }
-    }
-
-    fn draw_sky(&self, strip: &mut Strip) {
+    #[inline(always)]
+    fn draw_sky<S: Simd>(&self, simd: S, strip: &mut Strip) {
         let rect = strip.rect;
         let far = vec![f32::INFINITY; rect.width];
-        for row in 0..rect.height {
-            let first = row * rect.width;
-            let [mut opacity, mut red, mut green, mut blue] = [0; 4].map(|_| vec![0.0; rect.width]);
-            for x in 0..rect.width {
-                let pixel = DVec2::new((rect.x + x) as f64, (rect.y + row) as f64) + 0.5;
-                let Some(direction) = self.view.camera.direction(pixel) else { continue };
-                if strip.visible(first + x, FAR.near as f32) {
-                    [red[x], green[x], blue[x]] = self.radiance(direction.normalize());
-                    opacity[x] = 1.0;
+        let mut row = SkyRow::default();
+        for y in rect.y..rect.bottom() {
+            let first = (y - rect.y) * rect.width;
+            row.clear(rect.width);
+            // Batches lie on the picture's own grid, so that a crop changes no pixel.
+            let mut x = rect.x / LANES * LANES;
+            while x < rect.right() {
+                let mut directions = Directions::new(&self.view.camera, x, y);
+                directions.normalize();
+                let colours = self.radiance(simd, &directions);
+                for i in rect.x.max(x) - x..rect.right().min(x + LANES) - x {
+                    let at = x + i - rect.x;
+                    if directions.seen[i] && strip.visible(first + at, FAR.near as f32) {
+                        row.set(at, colours[i]);
+                    }
                 }
+                x += LANES;
             }
-            self.add_stars(rect, row, [&mut red, &mut green, &mut blue], &opacity);
-            strip.add_row_behind(first, [&red, &green, &blue], Some(&opacity), &far);
+            let SkyRow { planes: [red, green, blue], opacity } = &mut row;
+            self.add_stars(rect, y, [red, green, blue], opacity);
+            strip.add_row_behind(first, [red, green, blue], Some(opacity), &far);
         }
+    }
+
+    /// Radiance from directions, red, green, blue and nothing.
+    #[inline(always)]
+    fn radiance<S: Simd>(&self, simd: S, directions: &Directions) -> [[f32; 4]; LANES] {
+        if let Some(night) = &self.night {
+            return night.radiance(simd, directions);
+        }
+        let [xs, ys, zs] = &directions.axes;
+        let mut colours = [[0.0; 4]; LANES];
+        for (i, colour) in colours.iter_mut().enumerate() {
+            let [red, green, blue] = self.sky.radiance(DVec3::new(xs[i].into(), ys[i].into(), zs[i].into()));
+            *colour = [red, green, blue, 0.0];
+        }
+        colours
     }
 
     /// Adds the stars of one row where the sky is seen.
-    fn add_stars(&self, rect: Rect, row: usize, planes: [&mut [f32]; 3], opacity: &[f32]) {
-        let y = rect.y + row;
+    fn add_stars(&self, rect: Rect, y: usize, planes: [&mut [f32]; 3], opacity: &[f32]) {
         let from = self.spots.partition_point(|spot| spot.pixel.y < y as f64 - 12.0);
         let near = self.spots[from..].iter().take_while(|spot| spot.pixel.y < y as f64 + 12.0);
         for spot in near {
@@ -178,23 +156,54 @@ impl PreparedSky<'_> {
     }
 
     /// Hills and trees, black before the sky.
+    #[inline(always)]
     fn draw_hills(&self, skyline: &Skyline, strip: &mut Strip) {
         let rect = strip.rect;
         let shade = self.sky.radiance(DVec3::Y).map(|value| value * HILL_SHADE);
         let sharpness = self.view.camera.focal_pixels as f32;
-        for index in 0..strip.len() {
-            let pixel = DVec2::new((rect.x + index % rect.width) as f64, (rect.y + index / rect.width) as f64) + 0.5;
-            let Some(direction) = self.view.camera.direction(pixel).map(DVec3::normalize) else { continue };
-            let sine = direction.y as f32;
-            if sine > skyline.highest + 1.0 / sharpness || !strip.visible(index, HILLS.near as f32) {
-                continue;
-            }
-            let hidden = skyline.sine(math::atan2(direction.x, -direction.z) / TAU);
-            let cover = ((hidden - sine) * sharpness + 0.5).clamp(0.0, 1.0);
-            if cover > 0.0 {
-                strip.add_behind(index, shade.map(|value| value * cover), [1.0 - cover; 3], HILLS.near as f32);
+        let highest = skyline.highest + 1.0 / sharpness;
+        for y in rect.y..rect.bottom() {
+            let mut x = rect.x / LANES * LANES;
+            while x < rect.right() {
+                let mut directions = Directions::new(&self.view.camera, x, y);
+                directions.normalize();
+                let Directions { axes: [xs, sines, zs], seen } = directions;
+                for i in rect.x.max(x) - x..rect.right().min(x + LANES) - x {
+                    let index = (y - rect.y) * rect.width + x + i - rect.x;
+                    if sines[i] > highest || !seen[i] || !strip.visible(index, HILLS.near as f32) {
+                        continue;
+                    }
+                    let hidden = skyline.sine(f64::from(lanes::atan2(xs[i], -zs[i])) / TAU);
+                    let cover = ((hidden - sines[i]) * sharpness + 0.5).clamp(0.0, 1.0);
+                    if cover > 0.0 {
+                        strip.add_behind(index, shade.map(|value| value * cover), [1.0 - cover; 3], HILLS.near as f32);
+                    }
+                }
+                x += LANES;
             }
         }
+    }
+}
+
+/// A row of sky.
+#[derive(Default)]
+struct SkyRow {
+    planes: [Vec<f32>; 3],
+    opacity: Vec<f32>,
+}
+
+impl SkyRow {
+    fn clear(&mut self, width: usize) {
+        for plane in self.planes.iter_mut().chain([&mut self.opacity]) {
+            plane.clear();
+            plane.resize(width, 0.0);
+        }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, x: usize, [red, green, blue, _]: [f32; 4]) {
+        let [reds, greens, blues] = &mut self.planes;
+        (reds[x], greens[x], blues[x], self.opacity[x]) = (red, green, blue, 1.0);
     }
 }
 
@@ -209,11 +218,12 @@ impl Prepared for PreparedSky<'_> {
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        let level = Level::new();
         if let Some(skyline) = self.skyline.filter(|_| slice.contains(HILLS.near)) {
-            self.draw_hills(skyline, strip);
+            dispatch!(level, _simd => self.draw_hills(skyline, strip));
         }
         if slice.overlaps(&FAR) {
-            self.draw_sky(strip);
+            dispatch!(level, simd => self.draw_sky(simd, strip));
         }
     }
 }

@@ -23,9 +23,9 @@ const BAND_FROM: f64 = 4.0;
 /// Reach of a star's image, pixels, and of those brighter than magnitude 2.
 const REACH: f64 = 3.5;
 const BRIGHT_REACH: f64 = 10.0;
-/// Shape of a star's image: (1 + (r / core)^2)^-beta (Moffat 1969), core in pixels.
+/// Shape of a star's image: (1 + (r / core)^2)^-beta (Moffat 1969), core in pixels and beta = 5/2.
 const CORE: f64 = 0.85;
-const BETA: f64 = 2.6;
+const BETA: f64 = 2.5;
 
 const STAR: Purpose = Purpose::named("star");
 
@@ -141,7 +141,8 @@ impl Spot {
     pub(super) fn at(&self, x: usize, y: usize) -> Option<[f32; 3]> {
         let squared = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - self.pixel).length_squared();
         (squared < self.reach * self.reach).then(|| {
-            let shape = math::pow(1.0 + squared / (CORE * CORE), -BETA) as f32;
+            let base = 1.0 + squared / (CORE * CORE);
+            let shape = (1.0 / (base * base * base.sqrt())) as f32;
             self.radiance.map(|value| value * shape)
         })
     }

@@ -166,12 +166,24 @@ pub(super) struct Finder {
 }
 
 impl Finder {
+    /// One for rows of so many radians from the magnetic zenith on.
+    #[cfg(test)]
+    pub(super) fn of_rows(step: f32) -> Self {
+        Self { per_column: 1.0 / step, per_row: 1.0 / step, middle: 0.0, half: 0.0, first_row: 0.0 }
+    }
+
     /// The column of a longitude in radians, within half a turn of the chart's middle.
     #[inline(always)]
     pub(super) fn column(&self, longitude: f32) -> f32 {
         let turned = longitude - self.middle;
         let turned = turned - (turned * (1.0 / std::f32::consts::TAU)).round_ties_even() * std::f32::consts::TAU;
         turned.mul_add(self.per_column, self.half)
+    }
+
+    /// How many rows an angle in radians is.
+    #[inline(always)]
+    pub(super) fn rows(&self, angle: f32) -> f32 {
+        angle * self.per_row
     }
 
     /// The row of a colatitude in radians.

@@ -5,41 +5,50 @@
 
 use std::ops::Range;
 
-use bansho_base::{
-    math::lanes,
-    random::{Key, Purpose, uniform, uniform_f64},
-};
+use bansho_base::random::{Key, Purpose, uniform, uniform_f64};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
 use super::{
+    DrawingParameters, FallModel,
     chart::{Chart, Finder, STRIP},
-    footprint::{Footprint, Patch, Source},
-    geometry::{EARTH_RADIUS_KM, FieldLines, Meridian},
+    descent::{Descents, LineOfFall},
+    footprint::{Entry, Footprint, Patch, Source},
+    geometry::FieldLines,
     meridians::{LightStrip, Meridians},
 };
 use crate::{
     aurora::{
-        atmosphere::LEVELS,
-        light::{Emission, PerEmitter},
+        atmosphere::{LEVELS, atmosphere},
+        light::{
+            EMITTERS, Emission, Emitter, PerEmitter,
+            collisions::{draw_hard_sphere_emitter, hard_sphere_photons},
+        },
         precipitation::{
             Deposition,
-            energy::NODES,
-            fall::{Collision, FallLibrary, Falls, VARIANTS},
+            energy::{NODES, node_energy_ev},
+            fall::{Collision, FallLibrary, Falls, VARIANTS, collision_count},
+            hard_sphere::{DEFAULT_RADIUS, HardSphere},
         },
     },
-    lanes::{FourLanes, Lanes, Real},
+    lanes::{FourLanes, HalfLanes, LANES, Lanes, Real, nearest_whole, ramp},
 };
 
 const SOURCE: Purpose = Purpose::named("aurora collisions");
+const EMITTER_DRAW: Purpose = Purpose::named("aurora collision emitter");
 /// Random deviations, a multiple of [`BATCH`].
 const DEVIATIONS: usize = 4096;
 /// Collisions that are worked on at once.
-const BATCH: usize = 16;
-/// Level of a collision that a batch lacks.
+const BATCH: usize = LANES;
+/// What shines after a collision: the mean of a level, or nothing, or a single emitter.
 const NOTHING: u16 = LEVELS as u16;
-/// Nearer to the observer's own field line than so many reaches, points are placed anew for every column.
+const EMITTER: u16 = NOTHING + 1;
+/// Strips that a thread draws at once: the wider they are together, the fewer sources are placed twice.
+const GROUP: usize = 4;
+/// Nearer to the observer's own field line than so many reaches, points are placed anew for every column; and nearer than so many, each by
+/// its own root and divisions.
 const NEAR: f32 = 4.0;
+const SINGLE: f32 = 16.0;
 
 /// What falls are drawn from.
 #[derive(Clone, Debug)]
@@ -47,8 +56,9 @@ pub(super) struct Collisions {
     key: Key,
     falls: FallTable,
     deposition: Deposition,
-    /// Counting photons for each ion pair, by level, and none for [`NOTHING`].
+    /// Counting photons for each ion pair by source.
     photons: Vec<PerEmitter<f32>>,
+    descents: Descents,
     /// kR of ion pairs that a collision of a node's fall stands for, per mW/m^2.
     pairs: Vec<f32>,
     /// Deviations with the density of a source's edge, in reaches.
@@ -68,23 +78,29 @@ struct FallTable {
 /// [`BATCH`] collisions of a fall.
 #[derive(Clone, Debug)]
 struct FallBatch {
+    /// Places among the altitudes, [`Descents::place`].
+    places: [f32; BATCH],
     altitudes_km: [f32; BATCH],
     offsets_km: [f32; BATCH],
-    levels: [u16; BATCH],
+    /// Places among the photons.
+    lights: [u16; BATCH],
 }
 
 impl FallTable {
-    fn new(library: &FallLibrary, nodes: usize) -> Self {
-        let (mut starts, mut batches) = (vec![0], Vec::new());
-        for node in 0..nodes {
-            for variant in 0..VARIANTS {
-                let fall = library.fall(node, variant);
-                let count = fall.len().div_ceil(BATCH);
-                batches.extend((0..count).map(|first| FallBatch::new(fall, first, count)));
-            }
-            starts.push(batches.len());
-        }
-        Self { starts, batches }
+    /// Falls of so many nodes of the grid of energies, and where the light of each collision stands among the photons.
+    fn new(nodes: usize, fall: impl Fn(usize, u32) -> Vec<(Collision, u16)> + Sync) -> Self {
+        let of_node = |node: usize| -> Vec<FallBatch> {
+            let count = (collision_count(node) as usize).div_ceil(BATCH);
+            let batches = |fall: Vec<_>| (0..count).map(move |first| FallBatch::new(&fall, first, count));
+            (0..VARIANTS).flat_map(|variant| batches(fall(node, variant))).collect()
+        };
+        let by_node: Vec<_> = (0..nodes).into_par_iter().map(of_node).collect();
+        let mut starts = vec![0];
+        starts.extend(by_node.iter().scan(0, |end, batches| {
+            *end += batches.len();
+            Some(*end)
+        }));
+        Self { starts, batches: by_node.concat() }
     }
 
     /// One of the falls of a node, any number; the nearest node that there is.
@@ -98,12 +114,14 @@ impl FallTable {
 
 impl FallBatch {
     /// Every `stride`th collision of a fall from `first` on.
-    fn new(fall: &[Collision], first: usize, stride: usize) -> Self {
-        let mut batch = Self { altitudes_km: [100.0; BATCH], offsets_km: [0.0; BATCH], levels: [NOTHING; BATCH] };
-        for (lane, collision) in fall.iter().skip(first).step_by(stride).enumerate() {
+    fn new(fall: &[(Collision, u16)], first: usize, stride: usize) -> Self {
+        let (altitudes_km, lights) = ([100.0; BATCH], [NOTHING; BATCH]);
+        let mut batch = Self { places: [0.0; BATCH], altitudes_km, offsets_km: [0.0; BATCH], lights };
+        for (lane, (collision, light)) in fall.iter().skip(first).step_by(stride).enumerate() {
+            batch.places[lane] = Descents::place(collision.altitude_km);
             batch.altitudes_km[lane] = collision.altitude_km;
             batch.offsets_km[lane] = collision.offset_km[0];
-            batch.levels[lane] = collision.level as u16;
+            batch.lights[lane] = *light;
         }
         batch
     }
@@ -111,20 +129,25 @@ impl FallBatch {
 
 impl Collisions {
     /// Falls of electrons of all energies up to that of a node.
-    pub(super) fn new(emission: &Emission, wobble: f64, highest: usize, key: Key) -> Self {
-        let falls = Falls::new(emission.deposition(), wobble);
+    pub(super) fn new(emission: &Emission, drawing: &DrawingParameters, highest: usize, key: Key) -> Self {
         let deviation = |index: usize| {
             // The sum of three uniforms nearly has that density; its variance is made the same, 1/7.
             let [a, b, c, _] = key.uniforms(index as u64, 1, SOURCE);
             (a + b + c - 1.5) * (4.0_f32 / 7.0).sqrt()
         };
         let highest = highest.min(NODES - 1);
-        let photons = emission.photons_per_ion_pair().iter().map(|photons| photons.map(|value| value as f32));
+        let levels = emission.photons_per_ion_pair().iter().copied();
+        let photons = levels.chain([[0.0; 4]]).chain(EMITTERS.map(single_photons));
+        let falls = match drawing.fall {
+            FallModel::Fang => measured_falls(&Falls::new(emission.deposition(), drawing.wobble), highest, key),
+            FallModel::HardSphere => hard_sphere_falls(drawing.wobble, highest, key),
+        };
         Self {
             key,
-            falls: FallTable::new(&FallLibrary::new(&falls, 0..=highest, key), highest + 1),
+            falls,
             deposition: emission.deposition().clone(),
-            photons: photons.chain([[0.0; 4]]).collect(),
+            photons: photons.map(|photons| photons.map(|value| value as f32)).collect(),
+            descents: Descents::new(),
             pairs: (0..NODES).map(|node| emission.ion_pairs_per_collision(node) as f32).collect(),
             deviations: (0..DEVIATIONS).map(deviation).collect(),
         }
@@ -136,9 +159,9 @@ impl Collisions {
         let mut picture = Meridians::dark(chart);
         let (chart, strips) = picture.strips();
         let drawing = Drawing { collisions: self, chart, finder: chart.finder(), footprint, step };
-        strips.for_each_init(
+        strips.chunks(GROUP).for_each_init(
             || Trace::new(chart.rows),
-            |trace, strip| dispatch!(level, simd => drawing.strip(simd, strip, field, trace)),
+            |trace, strips| dispatch!(level, simd => drawing.strips(simd, strips, field, trace)),
         );
         picture
     }
@@ -151,6 +174,35 @@ impl Collisions {
         let node = self.deposition.draw_node_about(about, uniform_f64(b, d));
         Fall { batches: self.falls.fall(node, c), pairs: self.pairs[node], first: (c >> 8) as usize / BATCH * BATCH }
     }
+}
+
+/// Falls whose mean is the deposition; each collision gives the mean light of its level.
+fn measured_falls(falls: &Falls, highest: usize, key: Key) -> FallTable {
+    let library = FallLibrary::new(falls, 0..=highest, key);
+    let light = |collision: &Collision| (*collision, collision.level as u16);
+    FallTable::new(highest + 1, |node, variant| library.fall(node, variant).iter().map(light).collect())
+}
+
+/// Falls through hard spheres; each collision gives the light of one emitter, or none.
+fn hard_sphere_falls(wobble: f64, highest: usize, key: Key) -> FallTable {
+    let air = atmosphere();
+    let spheres = HardSphere::new(air, DEFAULT_RADIUS, wobble);
+    FallTable::new(highest + 1, |node, variant| {
+        let particle = (node as u64) << 32 | u64::from(variant);
+        let light = |(number, collision): (usize, Collision)| {
+            let [a, b, c, _] = key.uniforms(particle, number as u32, EMITTER_DRAW).map(f64::from);
+            let emitter = draw_hard_sphere_emitter(&air.levels()[collision.level as usize], [a, b, c]);
+            (collision, emitter.map_or(NOTHING, |emitter| EMITTER + emitter.index() as u16))
+        };
+        spheres.fall(node_energy_ev(node), key, particle).enumerate().map(light).collect()
+    })
+}
+
+/// The light of one emitter alone.
+fn single_photons(emitter: Emitter) -> PerEmitter<f64> {
+    let mut photons = [0.0; 4];
+    photons[emitter.index()] = hard_sphere_photons(emitter);
+    photons
 }
 
 /// The random fall of a source.
@@ -171,7 +223,7 @@ struct Drawing<'a> {
     step: u32,
 }
 
-/// Photons of the collisions of one fall by row of the chart.
+/// Photons of the collisions of one fall by row of the chart, and beyond them rows for points that are outside.
 struct Trace {
     light: Vec<PerEmitter<f32>>,
     /// Rows that may hold some.
@@ -180,7 +232,7 @@ struct Trace {
 
 impl Trace {
     fn new(rows: usize) -> Self {
-        Self { light: vec![[0.0; 4]; rows + 1], lit: 0..0 }
+        Self { light: vec![[0.0; 4]; rows + 2 * BATCH], lit: 0..0 }
     }
 
     #[inline(always)]
@@ -189,13 +241,18 @@ impl Trace {
         self.lit = 0..0;
     }
 
-    /// Adds photons to a row and the one below it.
+    /// Adds the light of points.
     #[inline(always)]
-    fn add<S: Simd>(&mut self, simd: S, row: usize, [upper, lower]: [f32; 2], photons: &PerEmitter<f32>) {
-        let photons = FourLanes::simd_from(simd, *photons);
-        let [above, below] = &mut self.light[row..row + 2] else { return };
-        *above = photons.fused(photons.like(upper), FourLanes::simd_from(simd, *above)).into();
-        *below = photons.fused(photons.like(lower), FourLanes::simd_from(simd, *below)).into();
+    fn add<S: Simd>(&mut self, simd: S, points: &Points, lights: &[u16; BATCH], photons: &[PerEmitter<f32>]) {
+        let trace = self.light.as_mut_slice();
+        for lane in 0..BATCH {
+            let (row, light) = (points.rows[lane] as usize, lights[lane] as usize);
+            let (Some(both), Some(photons)) = (trace.get_mut(row..row + 2), photons.get(light)) else { continue };
+            let (both, photons) = (both.as_flattened_mut(), FourLanes::simd_from(simd, *photons));
+            let weights =
+                FourLanes::splat(simd, points.upper[lane]).combine(FourLanes::splat(simd, points.lower[lane]));
+            photons.combine(photons).fused(weights, HalfLanes::from_slice(simd, both)).store_slice(both);
+        }
     }
 
     /// Adds it with weights to a column.
@@ -216,7 +273,8 @@ impl Trace {
     }
 }
 
-/// Rows of a batch of collisions, and the weights there and in the row below; nothing in row 0 where one is outside.
+/// Rows of a batch of collisions, and the weights there and in the row below. Those outside have no weight and a row each below the chart, for sums
+/// in one row would wait for each other.
 struct Points {
     rows: [u32; BATCH],
     upper: [f32; BATCH],
@@ -224,18 +282,17 @@ struct Points {
 }
 
 /// The least and the greatest row of each lane.
-struct Lit {
-    least: [f32; BATCH],
-    greatest: [f32; BATCH],
+struct Lit<S: Simd> {
+    least: Lanes<S>,
+    greatest: Lanes<S>,
 }
 
-impl Default for Lit {
-    fn default() -> Self {
-        Self { least: [f32::INFINITY; BATCH], greatest: [-1.0; BATCH] }
+impl<S: Simd> Lit<S> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        Self { least: Lanes::splat(simd, f32::INFINITY), greatest: Lanes::splat(simd, -1.0) }
     }
-}
 
-impl Lit {
     /// All rows that hold something.
     #[inline(always)]
     fn rows(&self) -> Range<usize> {
@@ -249,115 +306,123 @@ impl Lit {
 }
 
 impl Points {
+    /// Points at rows above `last`, or outside.
     #[inline(always)]
-    fn new(rows: &[f32; BATCH], shown: &[f32; BATCH], last: f32, lit: &mut Lit) -> Self {
-        /// Added to a whole number below it, this leaves the number in the lowest bits.
-        const SHIFT: f32 = 8_388_608.0;
+    fn new<S: Simd>(rows: Lanes<S>, shown: Lanes<S>, last: f32, lit: &mut Lit<S>) -> Self {
+        let (zero, end, outside) = (rows.like(0.0), rows.like(last), ramp(rows.simd, last + 1.0, 2.0));
+        let whole = rows.floor();
+        let (least, greatest) = (rows.like(f32::INFINITY), rows.like(-1.0));
+        lit.least = lit.least.least(inside(rows, end, [whole, least]));
+        lit.greatest = lit.greatest.greatest(inside(rows, end, [whole, greatest]));
+        let weights = inside(rows, end, [shown, zero]);
+        let lower = weights * (rows - whole);
         let mut points = Self { rows: [0; BATCH], upper: [0.0; BATCH], lower: [0.0; BATCH] };
-        for lane in 0..BATCH {
-            let row = rows[lane];
-            let inside = row >= 0.0 && row < last;
-            let held = if inside { row } else { 0.0 };
-            let whole = held.floor();
-            let weight = if inside { shown[lane] } else { 0.0 };
-            points.rows[lane] = (whole + SHIFT).to_bits() & 0x7f_ffff;
-            points.lower[lane] = weight * (held - whole);
-            points.upper[lane] = weight - points.lower[lane];
-            let least = if inside { whole } else { f32::INFINITY };
-            let greatest = if inside { whole } else { -1.0 };
-            lit.least[lane] = if least < lit.least[lane] { least } else { lit.least[lane] };
-            lit.greatest[lane] = if greatest > lit.greatest[lane] { greatest } else { lit.greatest[lane] };
-        }
+        nearest_whole(inside(rows, end, [whole, outside])).store_slice(&mut points.rows);
+        (weights - lower).store_slice(&mut points.upper);
+        lower.store_slice(&mut points.lower);
         points
     }
 }
 
-impl Drawing<'_> {
+/// The first where rows lie from 0 to `end`, the second elsewhere.
+#[inline(always)]
+fn inside<S: Simd>(rows: Lanes<S>, end: Lanes<S>, [within, without]: [Lanes<S>; 2]) -> Lanes<S> {
+    rows.choose(rows.like(0.0), without, rows.choose(end, within, without))
+}
+
+/// A strip that is being drawn.
+struct Columns<'a> {
+    strip: LightStrip<'a>,
+    meridians: [[f32; 3]; STRIP],
+    units: [[f32; STRIP]; 2],
+    /// What is still to be drawn.
+    entries: &'a [Entry],
+}
+
+impl<'a> Columns<'a> {
+    fn new(strip: LightStrip<'a>, drawing: &Drawing<'a>, field: &FieldLines) -> Self {
+        let (chart, first) = (drawing.chart, strip.number * STRIP);
+        Self {
+            meridians: std::array::from_fn(|column| field.meridian(chart.unit(first + column)).single()),
+            units: chart.single_units(strip.number),
+            entries: drawing.footprint.entries(strip.number),
+            strip,
+        }
+    }
+
+    /// Number of the next source that shows.
     #[inline(always)]
-    fn strip<S: Simd>(&self, simd: S, mut strip: LightStrip, field: &FieldLines, trace: &mut Trace) {
-        let units = self.chart.single_units(strip.number);
-        let meridians: [Meridian; STRIP] =
-            std::array::from_fn(|column| field.meridian(self.chart.unit(strip.number * STRIP + column)));
-        for entry in self.footprint.entries(strip.number) {
-            let source = self.footprint.source(entry);
-            let fall = self.collisions.fall(entry.source, source, self.step);
-            let patch = Patch::new(source, self.chart, &units);
+    fn next_source(&self) -> Option<u32> {
+        self.entries.first().map(|entry| entry.source)
+    }
+
+    /// The next source as the columns see it, and which of them; it is done then.
+    #[inline(always)]
+    fn take(&mut self, source: &Source, chart: &Chart) -> (Patch, Range<usize>) {
+        let (entry, others) =
+            self.entries.split_first().map_or((Entry::default(), self.entries), |(entry, others)| (*entry, others));
+        self.entries = others;
+        (Patch::new(source, chart, &self.units), entry.columns())
+    }
+}
+
+impl Drawing<'_> {
+    /// Draws strips beside each other, every source once for all of them.
+    #[inline(always)]
+    fn strips<S: Simd>(&self, simd: S, strips: Vec<LightStrip>, field: &FieldLines, trace: &mut Trace) {
+        let mut strips: Vec<_> = strips.into_iter().map(|strip| Columns::new(strip, self, field)).collect();
+        // Entries of every strip are sorted by source.
+        while let Some(number) = strips.iter().filter_map(Columns::next_source).min() {
+            let source = self.footprint.source(number);
+            let fall = self.collisions.fall(number, source, self.step);
             let [green, red, prompt] = source.power;
-            let scale = fall.pairs / self.chart.row_step as f32;
-            let columns = entry.columns();
+            let powers = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
+            let weights = powers * (fall.pairs / self.chart.row_step as f32);
             // Seen from afar its meridian is that of all columns.
             let shared = source.distance() >= NEAR * source.reach;
-            let middle = (columns.start + columns.end) / 2;
-            for column in columns.clone() {
-                if !shared || column == columns.start {
-                    let placed = if shared { middle } else { column };
-                    trace.clear();
-                    self.place(simd, &fall, source, &meridians[placed], patch.along[placed], trace);
-                }
-                let side = patch.side[column] * scale;
-                if side > 0.0 && !trace.lit.is_empty() {
-                    let weights = FourLanes::simd_from(simd, [green, red, prompt, prompt]) * side;
-                    let light = strip.light_up(column, &trace.lit, self.chart.rows);
-                    trace.add_to(light, weights);
+            let mut placed = false;
+            for strip in strips.iter_mut().filter(|strip| strip.next_source() == Some(number)) {
+                let (patch, columns) = strip.take(source, self.chart);
+                let middle = (columns.start + columns.end) / 2;
+                for column in columns {
+                    if !(shared && placed) {
+                        let seen_by = if shared { middle } else { column };
+                        trace.clear();
+                        let line = LineOfFall::new(&strip.meridians[seen_by], patch.along[seen_by], &self.finder);
+                        self.place(simd, &fall, source, &line, trace);
+                        placed = true;
+                    }
+                    if patch.side[column] > 0.0 && !trace.lit.is_empty() {
+                        let light = strip.strip.light_up(column, &trace.lit, self.chart.rows);
+                        trace.add_to(light, weights * patch.side[column]);
+                    }
                 }
             }
         }
     }
 
-    /// Places the collisions of a fall at a distance along a meridian.
+    /// Places the collisions of a fall down a line.
     #[inline(always)]
-    fn place<S: Simd>(
-        &self,
-        simd: S,
-        fall: &Fall,
-        source: &Source,
-        meridian: &Meridian,
-        along: f32,
-        trace: &mut Trace,
-    ) {
-        let reach = source.reach.max(self.footprint.bins().least_reach(along));
-        let meridian = meridian.single();
+    fn place<S: Simd>(&self, simd: S, fall: &Fall, source: &Source, line: &LineOfFall, trace: &mut Trace) {
+        let reach = source.reach.max(self.footprint.bins().least_reach(line.distance));
+        let descent = (line.distance >= SINGLE * reach).then(|| self.collisions.descents.along(simd, line));
+        if descent.as_ref().is_some_and(|descent| !descent.shows(reach, self.chart.rows)) {
+            return;
+        }
         let last = (self.chart.rows - 1) as f32;
-        let mut lit = Lit::default();
+        let mut lit = Lit::new(simd);
         for (number, batch) in fall.batches.iter().enumerate() {
             let from = (fall.first + number * BATCH) % DEVIATIONS;
-            let Some(deviations) = self.collisions.deviations[from..].first_chunk() else { continue };
-            let (rows, shown) = self.project(batch, deviations, reach, along, &meridian);
-            let points = Points::new(&rows, &shown, last, &mut lit);
-            for lane in 0..BATCH {
-                let photons = &self.collisions.photons[batch.levels[lane] as usize];
-                trace.add(simd, points.rows[lane] as usize, [points.upper[lane], points.lower[lane]], photons);
-            }
+            let Some(deviations) = self.collisions.deviations.get(from..from + BATCH) else { continue };
+            let offsets = Lanes::from_slice(simd, deviations)
+                .fused(Lanes::splat(simd, reach), Lanes::from_slice(simd, &batch.offsets_km));
+            let [rows, shown] = match &descent {
+                Some(descent) => descent.points(Lanes::from_slice(simd, &batch.places), offsets),
+                None => line.points(&batch.altitudes_km, offsets),
+            };
+            let points = Points::new(rows, shown, last, &mut lit);
+            trace.add(simd, &points, &batch.lights, &self.collisions.photons);
         }
         trace.lit = lit.rows();
-    }
-
-    /// The rows of collisions, and how bright they are seen.
-    #[inline(always)]
-    fn project(
-        &self,
-        batch: &FallBatch,
-        deviations: &[f32; BATCH],
-        reach: f32,
-        along: f32,
-        &[constant, outward, own]: &[f32; 3],
-    ) -> ([f32; BATCH], [f32; BATCH]) {
-        const RADIUS: f32 = EARTH_RADIUS_KM as f32;
-        const DIAMETER: f32 = 2.0 * RADIUS;
-        let (mut rows, mut shown) = ([0.0; BATCH], [0.0; BATCH]);
-        for lane in 0..BATCH {
-            let altitude = batch.altitudes_km[lane];
-            let distance = deviations[lane].mul_add(reach, along) + batch.offsets_km[lane];
-            let squared = altitude.mul_add(DIAMETER + altitude, -distance.mul_add(2.0 * outward + distance, constant));
-            let squared = own.mul_add(own, squared);
-            let upward = if squared > 1.0 { squared } else { 1.0 }.sqrt();
-            let place = upward - own;
-            let far = distance.mul_add(distance, place * place).sqrt();
-            // A source's power is that across the field; a collision stands for all of it, so the cosine to the vertical is taken out again.
-            let slant = (RADIUS + altitude) / (upward * far);
-            shown[lane] = if distance > 0.0 && far > 1.0 { slant } else { 0.0 };
-            rows[lane] = self.finder.row(lanes::atan2(distance, place)) - 0.5;
-        }
-        (rows, shown)
     }
 }

@@ -208,10 +208,10 @@ impl<'a> Footprint<'a> {
         &self.entries[self.starts[strip] as usize..self.starts[strip + 1] as usize]
     }
 
-    /// The source of an entry.
+    /// A source by its number.
     #[inline(always)]
-    pub(super) fn source(&self, entry: &Entry) -> &Source {
-        &self.sources[entry.source as usize]
+    pub(super) fn source(&self, number: u32) -> &Source {
+        &self.sources[number as usize]
     }
 
     /// Adds up the sources of a strip whose columns have these cosines and sines.
@@ -228,7 +228,7 @@ impl<'a> Footprint<'a> {
         sums.bins.resize(STRIP * self.bins.count, [0.0; 4]);
         sums.filled = [[usize::MAX, 0]; STRIP];
         for entry in self.entries(strip) {
-            let source = self.source(entry);
+            let source = self.source(entry.source);
             let patch = Patch::new(source, chart, units);
             let span = patch.bins(source, &self.bins);
             let [green, red, prompt] = source.power;

@@ -5,9 +5,11 @@
 //! every field line runs along its meridian (`meridians`), its altitudes from tables (`profile`). What a pixel of any lens shows is looked up on
 //! the chart (`prepared`) and dimmed and coloured by the air below (`shading`). The cost grows with pixels and particles, not with shapes.
 
+mod blur;
 mod chart;
 mod cloud;
 mod collisions;
+mod descent;
 mod footprint;
 mod geometry;
 mod lighting;
@@ -22,5 +24,5 @@ mod sources;
 #[cfg(test)]
 mod tests;
 
-pub use parameters::{DrawingParameters, Sampling};
+pub use parameters::{Blur, BlurParameters, DrawingParameters, FallModel, Sampling};
 pub use phenomenon::Aurora;

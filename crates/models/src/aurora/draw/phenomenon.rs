@@ -88,7 +88,7 @@ impl Aurora {
         let by_collisions = parameters.drawing.sampling == Sampling::Collisions;
         let hardest = nearest_node(parameters.energy_ev.bounds()[1]) + SPECTRUM_NODES;
         let key = Key::new(seed, name);
-        let collisions = || Collisions::new(simulation.emission(), parameters.drawing.wobble, hardest, key);
+        let collisions = || Collisions::new(simulation.emission(), &parameters.drawing, hardest, key);
         Ok(Self {
             name: name.to_owned(),
             collisions: by_collisions.then(collisions),

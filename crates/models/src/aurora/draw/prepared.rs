@@ -13,9 +13,10 @@ use bansho_base::{
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 
 use super::{
-    Aurora,
+    Aurora, Blur,
+    blur::Blurred,
     chart::{Chart, Coverage},
-    footprint::{Footprint, Source},
+    footprint::Footprint,
     geometry::{EARTH_RADIUS_KM, FieldLines, dot},
     maps::Maps,
     meridians::{Meridians, Sampler, mixed},
@@ -27,6 +28,7 @@ use crate::{
         light::{LINES, PerEmitter},
         particles::AuroraSimulation,
     },
+    directions::Directions,
     lanes::FourLanes,
 };
 
@@ -62,6 +64,8 @@ pub(super) struct PreparedAurora<'a> {
     charts: [Meridians; 2],
     /// Whether the soft light is so coarse that not every pixel needs to look it up.
     soft_is_coarse: bool,
+    /// The picture of both, where the blur is one of the picture.
+    blurred: Option<Blurred>,
     /// Made where they are asked for.
     maps: OnceLock<Maps<'a>>,
 }
@@ -76,11 +80,16 @@ impl<'a> PreparedAurora<'a> {
         let sharp = charts.sharp(&sources);
         check(observer)?;
         let soft = charts.soft(&sources);
+        let drawing = &aurora.simulation.parameters().drawing;
+        let blurred = (drawing.blur == Blur::Pixels)
+            .then(|| Blurred::new(view, &field, &[sharp.sampler(), soft.sampler()], &drawing.blur_radii));
         Ok(Self {
             aurora,
             view,
             level: Level::new(),
-            cameras: cameras(view),
+            // What is blurred in the picture is blurred at one instant.
+            cameras: if blurred.is_some() { vec![view.camera] } else { cameras(view) },
+            blurred,
             horizon: -math::sqrt(2.0 * field.observer_altitude_km().max(0.0) / EARTH_RADIUS_KM) as f32,
             from_middle: (EARTH_RADIUS_KM + field.observer_altitude_km()) as f32,
             field,
@@ -104,7 +113,12 @@ impl Charts<'_> {
         let (pixel, [spread_km, _]) = (self.coverage.pixel, sources.spread_km);
         // The angle at which the spread is seen from the nearest place where such light is.
         let row = (spread_km / 130.0).clamp(pixel, 2.0 * pixel);
-        self.draw(&sources.sharp, spread_km, [pixel, row])
+        let chart = Chart::new(&self.coverage, pixel, row);
+        let footprint = Footprint::new(&sources.sharp, &chart, spread_km);
+        let Aurora { simulation, profiles, collisions, .. } = self.aurora;
+        let Some(collisions) = collisions else { return Meridians::new(chart, self.field, profiles, &footprint) };
+        let step = (simulation.time() / AuroraSimulation::STEP_S).round() as i64 as u32;
+        collisions.draw(chart, self.field, &footprint, step)
     }
 
     /// The coarser chart of light that lingers and spreads.
@@ -112,16 +126,10 @@ impl Charts<'_> {
         let (pixel, [_, spread_km]) = (self.coverage.pixel, sources.spread_km);
         let column = (spread_km / 500.0).clamp(pixel, 16.0 * pixel);
         // To the side it is as smooth as its sources, but upward it changes with the air.
-        self.draw(&sources.soft, spread_km, [column, (0.25 * column).max(pixel)])
-    }
-
-    fn draw(&self, sources: &[Source], spread_km: f64, [column, row]: [f64; 2]) -> Meridians {
-        let Aurora { simulation, profiles, collisions, .. } = self.aurora;
-        let chart = Chart::new(&self.coverage, column, row);
-        let footprint = Footprint::new(sources, &chart, spread_km);
-        let Some(collisions) = collisions else { return Meridians::new(chart, self.field, profiles, &footprint) };
-        let step = (simulation.time() / AuroraSimulation::STEP_S).round() as i64 as u32;
-        collisions.draw(chart, self.field, &footprint, step)
+        let chart = Chart::new(&self.coverage, column, (0.25 * column).max(pixel));
+        let footprint = Footprint::new(&sources.soft, &chart, spread_km);
+        // Always by the mean fall: in a cell that shines for a minute thousands of falls have come together.
+        Meridians::new(chart, self.field, &self.aurora.profiles, &footprint)
     }
 }
 
@@ -176,45 +184,18 @@ impl Batch {
     /// Pixels from `x` on in row `y`.
     #[inline(always)]
     pub(super) fn new(camera: &Camera, field: &FieldLines, x: usize, y: usize) -> Self {
-        let mut batch = Self::default();
-        let [xs, ys, zs] = batch.look(camera, x, y);
+        let mut directions = Directions::new(camera, x, y);
+        let mut batch = Self { length: directions.normalize(), seen: directions.seen, ..Self::default() };
+        let [xs, ys, zs] = directions.axes;
         let [along, first, second] = field.single();
         for i in 0..BATCH {
             let direction = [xs[i], ys[i], zs[i]];
-            let (x, y, length) = (dot(first, direction), dot(second, direction), dot(direction, direction).sqrt());
+            let (x, y) = (dot(first, direction), dot(second, direction));
             batch.colatitude[i] = lanes::atan2(x.mul_add(x, y * y).sqrt(), dot(along, direction));
             batch.longitude[i] = lanes::atan2(y, x);
-            batch.sine[i] = ys[i] / length;
-            batch.length[i] = length;
         }
+        batch.sine = ys;
         batch
-    }
-
-    /// Notes which pixels the lens sees, and gives their directions: x, y, z.
-    #[inline(always)]
-    fn look(&mut self, camera: &Camera, x: usize, y: usize) -> [[f32; BATCH]; 3] {
-        let at = |x: usize| camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-        let mut directions = [[0.0; BATCH], [1.0; BATCH], [0.0; BATCH]];
-        if let (Some(first), Some(last)) = (at(x), at(x + BATCH)) {
-            // Exact for a perspective lens; elsewhere within a few hundredths of a pixel.
-            let (first, step) = (first.as_vec3().to_array(), ((last - first) / BATCH as f64).as_vec3().to_array());
-            for axis in 0..3 {
-                for i in 0..BATCH {
-                    directions[axis][i] = step[axis].mul_add(i as f32, first[axis]);
-                }
-            }
-            self.seen = [true; BATCH];
-        } else {
-            for i in 0..BATCH {
-                if let Some(direction) = at(x + i) {
-                    self.seen[i] = true;
-                    for (axis, part) in direction.as_vec3().to_array().into_iter().enumerate() {
-                        directions[axis][i] = part;
-                    }
-                }
-            }
-        }
-        directions
     }
 }
 
@@ -275,13 +256,10 @@ impl PreparedAurora<'_> {
             if sky == [0.0; BATCH] {
                 continue;
             }
-            let mut light = [[0.0; 4]; BATCH];
-            samplers[0].add(simd, &batch.longitude, &batch.colatitude, &mut light);
-            if self.soft_is_coarse && batch.seen == [true; BATCH] {
-                add_at_knots(simd, &samplers[1], &batch, &mut light);
-            } else {
-                samplers[1].add(simd, &batch.longitude, &batch.colatitude, &mut light);
-            }
+            let mut light = match &self.blurred {
+                Some(blurred) => blurred.batch(x, y),
+                None => self.look_up(simd, samplers, &batch),
+            };
             if strip.aovs.is_empty() && light == [[0.0; 4]; BATCH] {
                 continue;
             }
@@ -312,6 +290,19 @@ impl PreparedAurora<'_> {
                 }
             }
         }
+    }
+
+    /// The light that the charts have for a batch.
+    #[inline(always)]
+    fn look_up<S: Simd>(&self, simd: S, samplers: &[Sampler; 2], batch: &Batch) -> [PerEmitter<f32>; BATCH] {
+        let mut light = [[0.0; 4]; BATCH];
+        samplers[0].add(simd, &batch.longitude, &batch.colatitude, &mut light);
+        if self.soft_is_coarse && batch.seen == [true; BATCH] {
+            add_at_knots(simd, &samplers[1], batch, &mut light);
+        } else {
+            samplers[1].add(simd, &batch.longitude, &batch.colatitude, &mut light);
+        }
+        light
     }
 
     /// How much of each pixel is sky, times `share`, and the depth of an aurora there, m.

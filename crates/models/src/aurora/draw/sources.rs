@@ -8,7 +8,7 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{
-    DrawingParameters,
+    Blur, DrawingParameters,
     footprint::{REACH, Source},
     geometry::FieldLines,
 };
@@ -156,9 +156,10 @@ pub(super) struct Light<'a> {
 impl Light<'_> {
     /// Standard deviation of the light of a particle across the field, km.
     pub(super) fn spread_km(&self) -> f64 {
-        let own = match self.parameters.spread_km {
-            Auto::Set(spread) => spread,
-            Auto::Auto => SPREAD_PER_SPACING * self.spacing_km,
+        let own = match (self.parameters.blur, self.parameters.spread_km) {
+            (Blur::Pixels, _) => 0.0,
+            (Blur::Kilometres, Auto::Set(spread)) => spread,
+            (Blur::Kilometres, Auto::Auto) => SPREAD_PER_SPACING * self.spacing_km,
         };
         math::hypot(own, self.wander_km).max(1e-3)
     }

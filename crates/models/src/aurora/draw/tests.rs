@@ -10,7 +10,8 @@ use bansho_base::{
 };
 
 use super::{
-    Aurora,
+    Aurora, BlurParameters, DrawingParameters, FallModel,
+    blur::Blurred,
     chart::{Chart, Coverage},
     collisions::Collisions,
     footprint::{Footprint, REACH, Source},
@@ -33,6 +34,7 @@ const STEP: f64 = 0.01;
 const GREEN: Shares = [1.0, 0.0, 0.0];
 const RED: Shares = [0.0, 1.0, 0.0];
 const PROMPT: Shares = [0.0, 0.0, 1.0];
+const PROMPT_AND_GREEN: Shares = [1.0, 0.0, 1.0];
 
 fn emission() -> Emission {
     Emission::new(atmosphere(), ARC)
@@ -174,17 +176,16 @@ fn difference(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> f64 {
     apart / sum(&mut b.as_flattened().iter().map(|value| f64::from(*value)))
 }
 
-#[test]
-fn the_mean_of_many_collision_pictures_is_the_profile() {
-    let emission = emission();
+/// How far the mean of 64 pictures of collisions is from the picture of the mean fall, and that one.
+fn collisions_beside_profile(emission: &Emission, drawing: &DrawingParameters) -> (f64, Meridians) {
     let (profiles, view, field) =
-        (Profiles::new(&emission), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
-    let sources = sources(&arc(8000), PROMPT, 1.5, &field);
+        (Profiles::new(emission), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
+    let sources = sources(&arc(8000), PROMPT_AND_GREEN, 1.5, &field);
     // Low rows, since single points are spread over two of them.
     let chart = || Chart::new(&Coverage::of_view(&view, &field), STEP, 0.5 * STEP);
     let footprint = Footprint::new(&sources, &chart(), spread_of(&sources));
     let expected = Meridians::new(chart(), &field, &profiles, &footprint);
-    let collisions = Collisions::new(&emission, 0.002, nearest_node(6.0 * ENERGY_EV), Key::new(5, "aurora"));
+    let collisions = Collisions::new(emission, drawing, nearest_node(6.0 * ENERGY_EV), Key::new(5, "aurora"));
     let mut mean = vec![[0.0; 4]; expected.light.len()];
     for step in 0..64 {
         let picture = collisions.draw(chart(), &field, &footprint, step);
@@ -192,8 +193,73 @@ fn the_mean_of_many_collision_pictures_is_the_profile() {
             *sum = std::array::from_fn(|i| light[i].mul_add(1.0 / 64.0, sum[i]));
         }
     }
-    let apart = difference(&mean, &expected.light);
+    (difference(&mean, &expected.light), expected)
+}
+
+#[test]
+fn the_mean_of_many_collision_pictures_is_the_profile() {
+    let (apart, _) = collisions_beside_profile(&emission(), &DrawingParameters::default());
     assert!(apart < 0.03, "{apart}");
+}
+
+/// The row of a picture above which half of an emitter's light is, from the magnetic zenith on.
+fn middle_row(picture: &Meridians, emitter: Emitter) -> usize {
+    let mut rows = vec![0.0; picture.chart.rows];
+    for (at, light) in picture.light.iter().enumerate() {
+        rows[at % picture.chart.rows] += f64::from(light[emitter.index()]);
+    }
+    let whole: f64 = rows.iter().sum();
+    let mut above = 0.0;
+    rows.iter()
+        .take_while(|row| {
+            above += **row;
+            above < 0.5 * whole
+        })
+        .count()
+}
+
+#[test]
+fn the_fall_of_the_thesis_can_be_drawn_and_lies_elsewhere() {
+    let drawing = DrawingParameters { fall: FallModel::HardSphere, ..DrawingParameters::default() };
+    let spheres = FallModel::HardSphere.emission(ARC);
+    let (apart, thesis) = collisions_beside_profile(&spheres, &drawing);
+    // One emitter a collision, and falls that have not been evened out: more noise.
+    assert!(apart < 0.1, "{apart}");
+    let (_, measured) = collisions_beside_profile(&emission(), &DrawingParameters::default());
+    // Rows of 5 mrad: green light only above 190 km, the rest hardly elsewhere at this energy.
+    let [green, violet] = [Emitter::OxygenGreen, Emitter::NitrogenIon]
+        .map(|emitter| [&measured, &thesis].map(|picture| middle_row(picture, emitter)));
+    assert!(green[1] + 20 < green[0], "{green:?}");
+    assert!(violet[0].abs_diff(violet[1]) < 25, "{violet:?}");
+}
+
+/// Standard deviation in pixels, from left to right, of the violet light of a lone field line to the north where it is 110 km high, blurred in the picture.
+fn blurred_width(north_km: f32, radii: &BlurParameters) -> f64 {
+    let (profiles, view, field) =
+        (Profiles::new(&emission()), view(Lens::Perspective, [0.0, 40.0, -60.0], [320, 240]), field(77.0));
+    let cell = GlowCell { position_km: [0.0, -north_km], power_w: 1e6, energy_ev: ENERGY_EV as f32 };
+    let sources = sources(&[cell], PROMPT, 0.01, &field);
+    let pixel = 1.0 / view.camera.focal_pixels;
+    let picture = draw(&sources, &view, &field, &profiles, pixel);
+    let dark = Meridians::dark(Chart::new(&Coverage::of_view(&view, &field), 16.0 * pixel, 4.0 * pixel));
+    let blurred = Blurred::new(&view, &field, &[picture.sampler(), dark.sampler()], radii);
+    let row: Vec<f64> = (0..240)
+        .map(|y| (0..320).step_by(16).flat_map(|x| blurred.batch(x, y)).map(|light| f64::from(light[2])).collect())
+        .max_by(|a: &Vec<f64>, b: &Vec<f64>| a.iter().sum::<f64>().total_cmp(&b.iter().sum()))
+        .unwrap_or_default();
+    let places = || row.iter().zip(0..).map(|(light, x)| (light, f64::from(x)));
+    let whole: f64 = row.iter().sum();
+    let middle = places().map(|(light, x)| light * x).sum::<f64>() / whole;
+    math::sqrt(places().map(|(light, x)| light * (x - middle) * (x - middle)).sum::<f64>() / whole)
+}
+
+#[test]
+fn the_blur_of_the_thesis_is_as_wide_near_and_far() {
+    let radii = BlurParameters { violet_px: 2.5, ..BlurParameters::default() };
+    for north_km in [60.0, 120.0, 250.0] {
+        let width = blurred_width(north_km, &radii);
+        assert!((width / 2.5 - 1.0).abs() < 0.1, "{north_km} km: {width}");
+    }
 }
 
 /// A straight, even arc from west to east, so far to the north.

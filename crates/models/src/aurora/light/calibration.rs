@@ -204,6 +204,8 @@ impl fmt::Display for Calibration {
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::math;
+
     use super::*;
     use crate::aurora::atmosphere::atmosphere;
 
@@ -219,6 +221,68 @@ mod tests {
         let broken = check("nothing".to_owned(), 2.0, [0.0, 1.0]);
         let printed = Calibration { figures: Vec::new(), checks: vec![broken] }.to_string();
         assert!(printed.contains("FAILS  nothing: 2.0000 in [0.0000, 1.0000]"), "{printed}");
+    }
+
+    /// The rows of the method's page below a heading, cell by cell.
+    fn table_of_page(heading: &str) -> Vec<Vec<String>> {
+        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/methods/aurora.md");
+        let page = std::fs::read_to_string(page).unwrap();
+        let lines = page.lines().skip_while(|line| !line.starts_with(heading)).skip_while(|line| !line.starts_with('|'));
+        let cells = |line: &str| line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect();
+        lines.take_while(|line| line.starts_with('|')).skip(2).map(cells).collect()
+    }
+
+    /// Whether a number, printed with its unit, is `found` to its last digit.
+    fn printed(cell: &str, found: f64) -> bool {
+        let number = cell.split(' ').next().unwrap();
+        let digits = number.split_once('.').map_or(0, |(_, digits)| digits.len());
+        (number.parse::<f64>().unwrap() - found).abs() <= 0.51 * math::pow(0.1, digits as f64)
+    }
+
+    #[test]
+    fn the_page_prints_what_comes_of_it() {
+        let table = Emission::new(atmosphere(), ARC);
+        let rows = table_of_page("### What comes of it");
+        assert_eq!(rows.len(), 5);
+        for row in &rows {
+            let energy_kev = row[0].trim_end_matches(" keV").parse().unwrap();
+            let figures = figures_at(&table, energy_kev);
+            let Figures { deposition_peak_km, peaks_km, blue_rayleigh, green_to_blue, .. } = figures;
+            let spread_km = table.column(energy_kev * 1e3).spread_km[Emitter::OxygenRed.index()];
+            let found = [
+                deposition_peak_km,
+                peaks_km[0],
+                peaks_km[1],
+                blue_rayleigh,
+                1e-3 * green_to_blue * blue_rayleigh,
+                green_to_blue,
+                figures.red_to_blue,
+                100.0 * figures.red_above_200_km,
+                figures.red_lifetime,
+                spread_km,
+            ];
+            for (cell, found) in row[1..].iter().zip(found) {
+                assert!(printed(cell, found), "{energy_kev} keV: {cell}, not {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_page_prints_the_emission() {
+        let table = Emission::new(atmosphere(), ARC);
+        let rows = table_of_page("Emission of 557.7 / 630.0 / 427.8 nm");
+        assert_eq!(rows.len(), 12);
+        for row in &rows {
+            for (cell, energy_ev) in row[1..].iter().zip([1e3, 3e3, 1e4, 3e4]) {
+                let light = table.at(energy_ev, row[0].parse().unwrap()).map(|photons| photons * 1e-6);
+                let cells: Vec<&str> = cell.split(" / ").collect();
+                for (cell, found) in cells.iter().zip(&light[..3]) {
+                    // A bare 0 is less than what the table prints at all.
+                    let holds = if *cell == "0" { *found < 0.0051 } else { printed(cell, *found) };
+                    assert!(holds, "{} km, {energy_ev} eV: {cell}, not {found}", row[0]);
+                }
+            }
+        }
     }
 
     #[test]

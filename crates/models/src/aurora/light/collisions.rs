@@ -10,7 +10,7 @@ use super::{
 };
 use crate::aurora::{
     atmosphere::Air,
-    precipitation::{COLLISION_EV, ION_PAIR_EV, deposition::column, fall::collision_count},
+    precipitation::{deposition::column, fall::collision_count},
 };
 
 /// k_b, J/K, and the atomic mass unit, kg.
@@ -73,10 +73,10 @@ pub fn hard_sphere_quenching(emitter: Emitter, air: &Air) -> f64 {
     -math::exp_m1(-rate * natural_lifetime(emitter))
 }
 
-/// The light of a collision of 100 eV by the rules of the thesis (2.4.2), in counting photons: an atom or a molecule is struck by number
-/// density, then emits by production rate unless it is quenched (2.25). O2 gives nothing.
+/// What shines after a collision by the rules of the thesis (2.4.2): an atom or a molecule is struck by number density, then emits by
+/// production rate unless it is quenched (2.25). O2 gives nothing.
 #[must_use]
-pub fn hard_sphere_photons(air: &Air, uniforms: [f64; 3]) -> Option<(Emitter, f64)> {
+pub fn draw_hard_sphere_emitter(air: &Air, uniforms: [f64; 3]) -> Option<Emitter> {
     let [oxygen_green, oxygen_red, nitrogen_ion, nitrogen] = DIRECT_PHOTONS;
     let place = uniforms[0] * air.number_density();
     let rates = if place < air.o {
@@ -86,9 +86,31 @@ pub fn hard_sphere_photons(air: &Air, uniforms: [f64; 3]) -> Option<(Emitter, f6
     } else {
         return None;
     };
-    let whole: f64 = rates.iter().sum();
-    let emitter = choose(rates, uniforms[1] * whole);
-    (uniforms[2] >= hard_sphere_quenching(emitter, air)).then_some((emitter, whole * COLLISION_EV / ION_PAIR_EV))
+    let emitter = choose(rates, uniforms[1] * rates.iter().sum::<f64>());
+    (uniforms[2] >= hard_sphere_quenching(emitter, air)).then_some(emitter)
+}
+
+/// Counting photons of an emitter so drawn, for each ion pair that its collision makes: all that its species has.
+#[must_use]
+pub fn hard_sphere_photons(emitter: Emitter) -> f64 {
+    let [oxygen_green, oxygen_red, nitrogen_ion, nitrogen] = DIRECT_PHOTONS;
+    match emitter {
+        Emitter::OxygenGreen | Emitter::OxygenRed => oxygen_green + oxygen_red,
+        Emitter::NitrogenIon | Emitter::Nitrogen => nitrogen_ion + nitrogen,
+    }
+}
+
+/// Counting photons of each emitter for each ion pair made in this air: the mean over all draws.
+#[must_use]
+pub fn mean_hard_sphere_photons(air: &Air) -> PerEmitter<f64> {
+    EMITTERS.map(|emitter| {
+        let struck = match emitter {
+            Emitter::OxygenGreen | Emitter::OxygenRed => air.o,
+            Emitter::NitrogenIon | Emitter::Nitrogen => air.n2,
+        };
+        let radiated = 1.0 - hard_sphere_quenching(emitter, air);
+        struck / air.number_density() * DIRECT_PHOTONS[emitter.index()] * radiated
+    })
 }
 
 #[cfg(test)]
@@ -97,7 +119,7 @@ mod tests {
     use crate::aurora::{
         atmosphere::{LEVELS, atmosphere},
         light::PHOTONS_PER_KILORAYLEIGH,
-        precipitation::{energy, fall::Falls, spectrum::ARC},
+        precipitation::{fall::Falls, spectrum::ARC},
     };
     use bansho_base::random::{Key, Purpose, uniform};
 
@@ -168,14 +190,29 @@ mod tests {
     fn the_rules_of_the_thesis_by_hand() {
         let air = atmosphere().at(300.0);
         // O is the first 74 % of the air there; of its photons green are 0.236 of 1.370.
-        assert_eq!(
-            hard_sphere_photons(&air, [0.1, 0.1, 0.9999]).map(|(emitter, _)| emitter),
-            Some(Emitter::OxygenGreen)
-        );
-        assert_eq!(hard_sphere_photons(&air, [0.1, 0.9, 0.99999]).map(|(emitter, _)| emitter), None);
-        assert_eq!(hard_sphere_photons(&air, [0.9, 0.99, 0.5]).map(|(emitter, _)| emitter), Some(Emitter::Nitrogen));
-        assert_eq!(hard_sphere_photons(&air, [0.999_999, 0.5, 0.5]), None);
-        let below = atmosphere().at(energy::LOWEST_EV);
-        assert_eq!(hard_sphere_photons(&below, [0.0, 0.0, 0.5]), None);
+        assert_eq!(draw_hard_sphere_emitter(&air, [0.1, 0.1, 0.9999]), Some(Emitter::OxygenGreen));
+        assert_eq!(draw_hard_sphere_emitter(&air, [0.1, 0.9, 0.99999]), None);
+        assert_eq!(draw_hard_sphere_emitter(&air, [0.9, 0.99, 0.5]), Some(Emitter::Nitrogen));
+        assert_eq!(draw_hard_sphere_emitter(&air, [0.999_999, 0.5, 0.5]), None);
+        let below = atmosphere().at(100.0);
+        assert_eq!(draw_hard_sphere_emitter(&below, [0.0, 0.0, 0.5]), None);
+    }
+
+    #[test]
+    fn the_mean_of_the_rules_is_what_they_draw() {
+        let air = atmosphere().at(220.0);
+        let (mut sum, draws) = ([0.0; 4], 100_000_u64);
+        for draw in 0..draws {
+            let [a, b, c, _] = Key::new(1, "rules").uniforms(draw, 0, Purpose::named("draw")).map(f64::from);
+            if let Some(emitter) = draw_hard_sphere_emitter(&air, [a, b, c]) {
+                sum[emitter.index()] += hard_sphere_photons(emitter) / draws as f64;
+            }
+        }
+        let mean = mean_hard_sphere_photons(&air);
+        // Hardly any red is left, and 1,700 photons of the violet: 2.4 %.
+        for i in [0, 2, 3] {
+            assert!((sum[i] / mean[i] - 1.0).abs() < 0.08, "{i}: {sum:?} {mean:?}");
+        }
+        assert!(mean[1] < 1e-3 && sum[1] < 1e-3, "{sum:?} {mean:?}");
     }
 }

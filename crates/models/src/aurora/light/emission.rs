@@ -4,6 +4,7 @@ use bansho_base::math::lerp;
 
 use super::{
     PHOTONS_PER_KILORAYLEIGH,
+    collisions::mean_hard_sphere_photons,
     emitter::{EMITTERS, Emitter, PerEmitter},
     excitation::photons_per_ion_pair,
     persistence::Persistence,
@@ -42,8 +43,18 @@ impl Emission {
     /// The table for a spectrum. A few milliseconds.
     #[must_use]
     pub fn new(air: &Atmosphere, spectrum: Spectrum) -> Self {
-        let deposition = Deposition::new(air, spectrum);
-        let photons: Vec<_> = air.levels().iter().map(photons_per_ion_pair).collect();
+        let photons = air.levels().iter().map(photons_per_ion_pair).collect();
+        Self::of(air, Deposition::new(air, spectrum), photons)
+    }
+
+    /// The table of the thesis's fall through hard spheres, and of its rules for what shines after a collision.
+    #[must_use]
+    pub fn of_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
+        let photons = air.levels().iter().map(mean_hard_sphere_photons).collect();
+        Self::of(air, Deposition::of_hard_spheres(air, spectrum), photons)
+    }
+
+    fn of(air: &Atmosphere, deposition: Deposition, photons: Vec<PerEmitter<f64>>) -> Self {
         let persistence: Vec<_> =
             air.levels().iter().map(|air| EMITTERS.map(|emitter| Persistence::new(emitter, air))).collect();
         let columns = (0..NODES)
@@ -189,6 +200,23 @@ mod tests {
         assert!((0.6..0.75).contains(&green) && (20.0..110.0).contains(&red) && ion < 1e-6 && nitrogen < 1e-5);
         let [green, red, ion, _] = column.spread_km;
         assert!((3.0..30.0).contains(&red) && green < 1.0 && ion < 0.05, "{:?}", column.spread_km);
+    }
+
+    #[test]
+    fn hard_spheres_shine_where_nature_does_not() {
+        let (measured, spheres) = (Emission::new(atmosphere(), ARC), Emission::of_hard_spheres(atmosphere(), ARC));
+        let peak_km = |table: &Emission, energy_ev: f64, emitter: Emitter| {
+            let profile = table.profile(energy_ev);
+            let light = |level: &usize| profile[*level][emitter.index()];
+            level_altitude_km((0..LEVELS).max_by(|a, b| light(a).total_cmp(&light(b))).unwrap_or(0))
+        };
+        // (2.25) leaves no green light below 190 km; electrons of 1 keV come far too low, as violet light shows.
+        let green = [&measured, &spheres].map(|table| peak_km(table, 5000.0, Emitter::OxygenGreen));
+        assert!(green[0] < 115.0 && green[1] > 180.0, "{green:?}");
+        let violet = [&measured, &spheres].map(|table| peak_km(table, 1000.0, Emitter::NitrogenIon));
+        assert!(violet[0] > 148.0 && violet[1] < 140.0, "{violet:?}");
+        let column = spheres.column(5000.0);
+        assert!(column.kilorayleigh.iter().chain(&column.lifetime).all(|value| *value > 0.0 && value.is_finite()));
     }
 
     #[test]

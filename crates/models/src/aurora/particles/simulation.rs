@@ -17,7 +17,6 @@ use crate::{
     aurora::{
         AuroraParameters,
         afterglow::Afterglow,
-        atmosphere::atmosphere,
         light::Emission,
         shapes::{FRAME_S, Sequence},
     },
@@ -132,7 +131,7 @@ impl AuroraSimulation {
         state.afterglow.settle(&state.particles);
         let parameters = &making.parameters;
         Self {
-            emission: Emission::new(atmosphere(), parameters.spectrum.spectrum()),
+            emission: parameters.drawing.fall.emission(parameters.spectrum.spectrum()),
             relocation: Relocation::new(parameters, key),
             mover: Mover::new(parameters),
             repulsion,

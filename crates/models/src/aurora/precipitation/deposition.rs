@@ -3,6 +3,7 @@
 use super::{
     energy::{self, NODES, node_energy_ev},
     fang::{Layer, Monoenergetic},
+    hard_sphere::{DEFAULT_RADIUS, HardSphere},
     spectrum::Spectrum,
 };
 use crate::aurora::atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, locate_level};
@@ -33,6 +34,16 @@ impl Deposition {
                 std::array::from_fn(|level| beam.ionisation(&layers[level]))
             })
             .collect();
+        Self::of_profiles(monoenergetic, spectrum)
+    }
+
+    /// The table of the thesis's fall through hard spheres, [`DEFAULT_RADIUS`].
+    #[must_use]
+    pub fn of_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
+        Self::of_profiles(HardSphere::new(air, DEFAULT_RADIUS, 0.0).profiles(air), spectrum)
+    }
+
+    fn of_profiles(monoenergetic: Vec<Profile>, spectrum: Spectrum) -> Self {
         let shares: Vec<_> = (0..NODES).into_par_iter().map(|node| spectrum.shares(node)).collect();
         let mixed = shares.par_iter().map(|shares| mix(&monoenergetic, shares)).collect();
         Self { monoenergetic, cumulative_shares: shares.iter().map(running_sum).collect(), mixed }

@@ -5,7 +5,7 @@
 
 use bansho_base::math;
 
-use super::ION_PAIR_EV;
+use super::{EV_PER_S_PER_MW, ION_PAIR_EV};
 use crate::aurora::atmosphere::Air;
 
 /// P_ij of table 1: C_i is the exponential of a cubic in the logarithm of the energy in keV.
@@ -21,8 +21,6 @@ const COEFFICIENTS: [[f64; 4]; 8] = [
 ];
 /// Column that scales y in equation (1): 6e-6 g cm^-2, in kg m^-2.
 const COLUMN_SCALE: f64 = 6e-5;
-/// 1 mW in eV s^-1.
-const EV_PER_S_PER_MW: f64 = 1e-3 / 1.602_176_634e-19;
 
 /// What the deposition at an altitude takes from the air, whatever the energy.
 #[derive(Clone, Copy, Debug)]

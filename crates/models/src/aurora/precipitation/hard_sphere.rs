@@ -6,8 +6,10 @@ use bansho_base::{
 };
 
 use super::{
-    COLLISION_EV,
-    fall::{Collision, Path},
+    COLLISION_EV, EV_PER_S_PER_MW, ION_PAIR_EV,
+    deposition::Profile,
+    energy::{NODES, node_energy_ev},
+    fall::{Collision, Path, collision_count},
 };
 use crate::aurora::atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, level_altitude_km};
 
@@ -64,6 +66,23 @@ impl HardSphere {
         })
     }
 
+    /// Ion pairs, m^-3 s^-1 per mW m^-2, for each energy of the grid and each level of the same air: the mean of all falls without wobble.
+    ///
+    /// An electron that has not struck its last sphere yet goes on; how many it strikes down to a column is a Poisson number.
+    #[must_use]
+    pub fn profiles(&self, air: &Atmosphere) -> Vec<Profile> {
+        let counts: [u32; NODES] = std::array::from_fn(collision_count);
+        let mut profiles = vec![[0.0; LEVELS]; NODES];
+        for (level, air) in air.levels().iter().enumerate() {
+            let falling = fewer_than(&counts, self.columns[LEVELS - 1 - level] * self.cross_section);
+            let pairs_per_m = air.number_density() * self.cross_section * (COLLISION_EV / ION_PAIR_EV);
+            for (node, share) in falling.into_iter().enumerate() {
+                profiles[node][level] = EV_PER_S_PER_MW / node_energy_ev(node) * pairs_per_m * share;
+            }
+        }
+        profiles
+    }
+
     /// Where the column is reached, between the level `from_top` and the one above; none below the lowest.
     fn altitude_km(&self, from_top: usize, column: f64) -> Option<f64> {
         let low = *self.columns.get(from_top)?;
@@ -72,6 +91,19 @@ impl HardSphere {
         let high = self.columns[above];
         Some(low_km + math::ln(low / column) / math::ln(low / high))
     }
+}
+
+/// Probabilities that a Poisson number of that mean is below each of the counts, which ascend.
+fn fewer_than(counts: &[u32; NODES], mean: f64) -> [f64; NODES] {
+    let (mut number, mut log_probability, mut sum) = (0, -mean, 0.0);
+    counts.map(|count| {
+        while number < count {
+            sum += math::exp(log_probability);
+            number += 1;
+            log_probability += math::ln(mean / f64::from(number));
+        }
+        sum
+    })
 }
 
 #[cfg(test)]
@@ -91,6 +123,29 @@ mod tests {
     fn ten_kilovolts_end_near_their_peak_and_one_does_not() {
         assert!((end_km(1e4) - 105.0).abs() < 1.5, "{}", end_km(1e4));
         assert!((end_km(1e3) - 129.0).abs() < 2.5, "{}", end_km(1e3));
+    }
+
+    #[test]
+    fn profiles_are_the_mean_of_many_falls() {
+        let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.0);
+        let profiles = spheres.profiles(atmosphere());
+        for node in [32, 64] {
+            let falls = 4000;
+            let mut histogram = [0.0; LEVELS / 4 + 1];
+            for particle in 0..falls {
+                for collision in spheres.fall(node_energy_ev(node), Key::new(4, "aurora"), particle) {
+                    histogram[collision.level as usize / 4] += 1.0 / (falls * u64::from(collision_count(node))) as f64;
+                }
+            }
+            let whole: f64 = profiles[node].iter().sum();
+            let expected = profiles[node].chunks(4).map(|levels| levels.iter().sum::<f64>() / whole);
+            let difference: f64 = expected.zip(histogram).map(|(expected, found)| (expected - found).abs()).sum();
+            // Shot noise, and levels taken as a kilometre high.
+            assert!(difference < 0.05, "{node}: {difference}");
+            // All of the energy that collisions take, but for what electrons of 1 keV leave above 800 km.
+            let pairs = whole * LEVEL_SPACING * ION_PAIR_EV / EV_PER_S_PER_MW;
+            assert!((pairs - 1.0).abs() < 0.02, "{node}: {pairs}");
+        }
     }
 
     #[test]

@@ -20,3 +20,5 @@ pub use spectrum::Spectrum;
 pub const ION_PAIR_EV: f64 = 35.0;
 /// Energy that an electron loses in a collision, eV (the thesis, section 2.4.1).
 pub const COLLISION_EV: f64 = 100.0;
+/// 1 mW in eV s^-1.
+const EV_PER_S_PER_MW: f64 = 1e-3 / 1.602_176_634e-19;

@@ -1,0 +1,243 @@
+//! Where on the chart the altitudes of a field line are seen: of single points exactly, of many by polynomials.
+
+use std::f64::consts::PI;
+
+use bansho_base::math::{self, lanes};
+use fearless_simd::{Simd, prelude::*};
+
+use super::{chart::Finder, geometry::EARTH_RADIUS_KM};
+use crate::{
+    aurora::atmosphere::{HIGHEST_KM, LOWEST_KM},
+    lanes::{HalfLanes, LANES, Lanes, Real},
+};
+
+/// Altitudes at which a line is seen exactly, and terms of the polynomial through its rows.
+const NODES: usize = 8;
+/// Terms of the polynomials through slopes and brightness, which are smoother.
+const TERMS: usize = 5;
+/// Points of a level lie up to a kilometre from it.
+const MARGIN_KM: f64 = 1.0;
+/// Polynomials are those of `1 / (altitude + PIVOT_KM)`, nearly in proportion to which rays are foreshortened.
+const PIVOT_KM: f64 = 100.0;
+/// That quantity at both ends, per km.
+const ENDS: [f64; 2] = [1.0 / (HIGHEST_KM + MARGIN_KM + PIVOT_KM), 1.0 / (LOWEST_KM - MARGIN_KM + PIVOT_KM)];
+const MIDDLE: f64 = 0.5 * (ENDS[0] + ENDS[1]);
+const HALF: f64 = 0.5 * (ENDS[1] - ENDS[0]);
+
+/// A field line that electrons fall down, as it is seen.
+pub(super) struct LineOfFall<'a> {
+    /// Distance from the observer's own field line, km.
+    pub(super) distance: f32,
+    /// Of its meridian, [`Meridian::single`](super::geometry::Meridian::single).
+    meridian: &'a [f32; 3],
+    finder: &'a Finder,
+}
+
+impl<'a> LineOfFall<'a> {
+    #[inline(always)]
+    pub(super) fn new(meridian: &'a [f32; 3], distance: f32, finder: &'a Finder) -> Self {
+        Self { distance, meridian, finder }
+    }
+
+    /// Rows of points at altitudes in km, so far from the line in km, and how bright they are seen.
+    #[inline(always)]
+    pub(super) fn points<S: Simd>(&self, altitudes_km: &[f32; LANES], offsets: Lanes<S>) -> [Lanes<S>; 2] {
+        let (simd, mut rows, mut shown) = (offsets.simd, [0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            let Seen { row, light, .. } = self.seen(altitudes_km[lane], self.distance + offsets[lane]);
+            (rows[lane], shown[lane]) = (row, light);
+        }
+        [Lanes::from_slice(simd, &rows), Lanes::from_slice(simd, &shown)]
+    }
+
+    /// A point of the meridian at an altitude and a distance, km.
+    #[inline(always)]
+    fn seen(&self, altitude: f32, distance: f32) -> Seen {
+        const RADIUS: f32 = EARTH_RADIUS_KM as f32;
+        const DIAMETER: f32 = 2.0 * RADIUS;
+        let [constant, outward, own] = *self.meridian;
+        let squared = altitude.mul_add(DIAMETER + altitude, -distance.mul_add(2.0 * outward + distance, constant));
+        let squared = own.mul_add(own, squared);
+        let upward = if squared > 1.0 { squared } else { 1.0 }.sqrt();
+        let place = upward - own;
+        let far_squared = distance.mul_add(distance, place * place);
+        let far = far_squared.sqrt();
+        // A source's power is that across the field; a collision stands for all of it, so the cosine to the vertical is taken out again.
+        let slant = (RADIUS + altitude) / (upward * far);
+        Seen {
+            row: self.finder.row(lanes::atan2(distance, place)) - 0.5,
+            slope: self.finder.rows(distance.mul_add((outward + distance) / upward, place) / far_squared),
+            light: if distance > 0.0 && far > 1.0 { slant } else { 0.0 },
+        }
+    }
+}
+
+/// How a point is seen.
+struct Seen {
+    row: f32,
+    /// Rows for each km of distance.
+    slope: f32,
+    light: f32,
+}
+
+/// From nodes to polynomials.
+#[derive(Clone, Debug)]
+pub(super) struct Descents {
+    altitudes_km: [f32; NODES],
+    /// What the value at each node adds to each coefficient: of all terms, and of the first [`TERMS`].
+    whole: [[f32; NODES]; NODES],
+    short: [[f32; NODES]; NODES],
+}
+
+/// Rows, slopes and brightness by place among the altitudes.
+pub(super) struct Descent {
+    rows: [f32; NODES],
+    slopes: [f32; NODES],
+    lights: [f32; NODES],
+    /// Rows of the highest and the lowest node, and the steepest slope.
+    ends: [f32; 2],
+    steepest: f32,
+}
+
+impl Descents {
+    pub(super) fn new() -> Self {
+        let altitude = |node: usize| (1.0 / HALF.mul_add(node_place(node), MIDDLE) - PIVOT_KM) as f32;
+        Self {
+            altitudes_km: std::array::from_fn(altitude),
+            whole: std::array::from_fn(|node| coefficients(node, NODES)),
+            short: std::array::from_fn(|node| coefficients(node, TERMS)),
+        }
+    }
+
+    /// Place of an altitude: 1 at the lowest, -1 at the highest.
+    pub(super) fn place(altitude_km: f32) -> f32 {
+        ((1.0 / (f64::from(altitude_km) + PIVOT_KM) - MIDDLE) / HALF) as f32
+    }
+
+    /// How the points of a line are seen.
+    #[inline(always)]
+    pub(super) fn along<S: Simd>(&self, simd: S, line: &LineOfFall) -> Descent {
+        let (mut rows, mut slopes, mut lights) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
+        for node in 0..NODES {
+            let seen = line.seen(self.altitudes_km[node], line.distance);
+            (rows[node], slopes[node], lights[node]) = (seen.row, seen.slope, seen.light);
+        }
+        let mut steepest = 0.0_f32;
+        for slope in slopes {
+            steepest = if slope.abs() > steepest { slope.abs() } else { steepest };
+        }
+        Descent {
+            ends: [rows[NODES - 1], rows[0]],
+            steepest,
+            rows: sum(simd, &self.whole, &rows),
+            slopes: sum(simd, &self.short, &slopes),
+            lights: sum(simd, &self.short, &lights),
+        }
+    }
+}
+
+impl Descent {
+    /// Whether any of its points within `reach` km may lie on a chart of so many rows.
+    #[inline(always)]
+    pub(super) fn shows(&self, reach: f32, rows: usize) -> bool {
+        // A row more for what lies beyond the outermost nodes.
+        let beyond = self.steepest.mul_add(2.0 * reach, 0.1 * (self.ends[1] - self.ends[0]).abs() + 1.0);
+        self.ends[1] + beyond > 0.0 && self.ends[0] - beyond < rows as f32
+    }
+
+    /// Rows of points at places, so far from the line in km, and how bright they are seen.
+    #[inline(always)]
+    pub(super) fn points<S: Simd>(&self, places: Lanes<S>, offsets: Lanes<S>) -> [Lanes<S>; 2] {
+        let slopes = polynomial(places, &self.slopes[..TERMS]);
+        let rows = slopes.fused(offsets, polynomial(places, &self.rows));
+        [rows, polynomial(places, &self.lights[..TERMS])]
+    }
+}
+
+/// Its value at `places`, coefficients from the constant on.
+#[inline(always)]
+fn polynomial<S: Simd>(places: Lanes<S>, coefficients: &[f32]) -> Lanes<S> {
+    let Some((highest, others)) = coefficients.split_last() else { return places.like(0.0) };
+    let mut value = places.like(*highest);
+    for coefficient in others.iter().rev() {
+        value = value.fused(places, places.like(*coefficient));
+    }
+    value
+}
+
+/// The coefficients for values at the nodes.
+#[inline(always)]
+fn sum<S: Simd>(simd: S, shares: &[[f32; NODES]; NODES], values: &[f32; NODES]) -> [f32; NODES] {
+    let mut sum = HalfLanes::splat(simd, 0.0);
+    for node in 0..NODES {
+        sum = HalfLanes::splat(simd, values[node]).fused(HalfLanes::from_slice(simd, &shares[node]), sum);
+    }
+    sum.into()
+}
+
+/// Place of a node: Chebyshev's.
+fn node_place(node: usize) -> f64 {
+    math::cos(PI * (node as f64 + 0.5) / NODES as f64)
+}
+
+/// What a value of 1 at a node and 0 at all others adds to the coefficients of the first `terms` Chebyshev polynomials, in powers of the place.
+fn coefficients(node: usize, terms: usize) -> [f32; NODES] {
+    let mut powers = [0.0; NODES];
+    let (mut last, mut polynomial) = ([0.0; NODES], [0.0; NODES]);
+    polynomial[0] = 1.0;
+    for term in 0..terms {
+        let angle = PI * term as f64 * (node as f64 + 0.5) / NODES as f64;
+        let share = if term == 0 { 1.0 } else { 2.0 } / NODES as f64 * math::cos(angle);
+        for (power, coefficient) in powers.iter_mut().zip(&polynomial) {
+            *power += share * coefficient;
+        }
+        // T(n + 1) = 2 x T(n) - T(n - 1), and T(1) = x.
+        let scale = if term == 0 { 1.0 } else { 2.0 };
+        let times_place = |power: usize| if power == 0 { 0.0 } else { scale * polynomial[power - 1] };
+        let next = std::array::from_fn(|power| times_place(power) - last[power]);
+        (last, polynomial) = (polynomial, next);
+    }
+    powers.map(|power| power as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math::DVec3;
+    use fearless_simd::{Level, dispatch};
+
+    use super::*;
+    use crate::aurora::draw::geometry::FieldLines;
+
+    #[test]
+    fn polynomials_place_points_where_they_are_seen() {
+        // A row is 1.5 mrad high, a pixel of an ordinary picture.
+        let finder = Finder::of_rows(1.5e-3);
+        let descents = Descents::new();
+        for dip_deg in [90.0, 77.0, 60.0] {
+            let field = FieldLines::new(dip_deg, 0.0, DVec3::ZERO);
+            for (longitude, distance) in [(0.3, 15.0), (1.6, 60.0), (-1.5, 150.0), (-1.6, 400.0), (-1.2, 900.0)] {
+                let (sin, cos) = math::sin_cos(longitude);
+                let meridian = field.meridian([cos, sin]).single();
+                let line = LineOfFall::new(&meridian, distance, &finder);
+                for first_km in [82.0, 130.0, 400.0] {
+                    let altitudes_km: [f32; LANES] = std::array::from_fn(|i| first_km + 3.0 * i as f32);
+                    let offset = |i: usize| distance * 0.01 * (i as f32 / 7.5 - 1.0);
+                    let offsets: [f32; LANES] = std::array::from_fn(offset);
+                    let [[rows, lights], [exact_rows, exact_lights]] = dispatch!(Level::new(), simd => {
+                        let places = altitudes_km.map(Descents::place);
+                        let offsets = Lanes::from_slice(simd, &offsets);
+                        let found = descents.along(simd, &line).points(Lanes::from_slice(simd, &places), offsets);
+                        [found, line.points(&altitudes_km, offsets)].map(|pair| pair.map(|lanes| <[f32; LANES]>::from(lanes)))
+                    });
+                    for i in 0..LANES {
+                        let what = || format!("dip {dip_deg}, {distance} km away, {} km high", altitudes_km[i]);
+                        assert!((rows[i] - exact_rows[i]).abs() < 0.3, "{}: {} {}", what(), rows[i], exact_rows[i]);
+                        // Brightness does not follow the offset.
+                        let ratio = lights[i] / exact_lights[i];
+                        assert!((ratio - 1.0).abs() < 0.025, "{}: {ratio}", what());
+                    }
+                }
+            }
+        }
+    }
+}
