@@ -46,6 +46,12 @@ crate::parameters! {
         temperature_k: f64 = 7000.0, limits(Range::new(1000.0, 10_000.0)), unit("K");
         /// Whether it is seen, or only lights.
         visible: bool = true;
+        /// Height of the hills all around, before the sky; 0 for none.
+        hills_deg: f64 = 0.0, limits(Range::new(0.0, 30.0)), unit("degrees");
+        /// Height of the trees on them; 0 for none.
+        trees_deg: f64 = 0.0, limits(Range::new(0.0, 30.0)), unit("degrees");
+        /// How far away hills and trees stand.
+        hills_distance: f64 = 8000.0, limits(Range::new(1.0, 1e5)), unit("m");
         /// The sky at night.
         night: NightParameters = NightParameters::default();
     }

@@ -38,12 +38,12 @@ impl Lamps {
 const STRAY: f64 = 0.02;
 
 /// Share of a lamp's light that a lens scatters around its image: that of a clean one.
-const GLARE: f64 = 0.003;
-/// Angles between which that light falls with the square of the angle, as in the eye (Stiles & Holladay): it is even within the one, or
+const GLARE: f64 = 0.0012;
+/// Angles between which that light falls with the cube of the angle, as close to a lamp in the eye (Vos 1984): it is even within the one, or
 /// within the lamp if that looks larger, and ends at the other, radians.
 const GLARE_ANGLES: [f64; 2] = [0.002, 0.12];
 
-/// Radiance of the glare at an angle from a lamp for each lux that arrives from it: `k / (theta^2 + a^2)`, brought to 0 at its end.
+/// Radiance of the glare at an angle from a lamp for each lux that arrives from it: `k / (theta^2 + a^2)^(3/2)`, brought to 0 at its end.
 #[derive(Clone, Copy, Debug)]
 struct Glare {
     /// a^2.
@@ -59,16 +59,19 @@ impl Glare {
     /// The glare of a lamp that looks so large, radians.
     fn new(radius: f64) -> Self {
         let core = radius.clamp(GLARE_ANGLES[0], GLARE_ANGLES[1]);
-        let ratio = core * core / Self::END;
-        // Of (1 - s/e)^2 / (s + c) over pi ds: (1 + c/e)^2 ln(1 + e/c) - c/e - 3/2.
-        let whole = std::f64::consts::PI * ((1.0 + ratio) * (1.0 + ratio) * math::ln(1.0 + 1.0 / ratio) - ratio - 1.5);
-        Self { core: core * core, strength: GLARE / whole }
+        let (c, e) = (core * core, Self::END);
+        let (rise, end) = ((e + c) / e, math::sqrt(e + c));
+        // Of (1 - s/e)^2 / (s + c)^(3/2) over pi ds, with u = s + c: (rise - u/e)^2 u^(-3/2).
+        let whole = 2.0 * rise * rise / core
+            + (4.0 * rise * core - 2.0 / 3.0 * c * core / e - 16.0 / 3.0 * end * (e + c) / e) / e;
+        Self { core: c, strength: GLARE / (std::f64::consts::PI * whole) }
     }
 
     fn at(&self, angle: f64) -> f64 {
         let square = angle * angle;
         let fade = (1.0 - square / Self::END).max(0.0);
-        self.strength * fade * fade / (square + self.core)
+        let from = square + self.core;
+        self.strength * fade * fade / (from * math::sqrt(from))
     }
 }
 
@@ -292,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn glare_is_its_share_of_the_light_and_falls_with_the_square_of_the_angle() {
+    fn glare_is_its_share_of_the_light_and_falls_with_the_cube_of_the_angle() {
         let (steps, end) = (200_000, GLARE_ANGLES[1]);
         for radius in [0.0, 0.01, 0.05] {
             let glare = Glare::new(radius);
@@ -305,7 +308,12 @@ mod tests {
             assert_eq!(glare.at(end), 0.0);
         }
         let small = Glare::new(0.0);
-        assert!((small.at(0.02) / small.at(0.01) - 0.25).abs() < 0.02);
+        let fade = |angle: f64| {
+            let left = 1.0 - angle * angle / Glare::END;
+            left * left
+        };
+        let fall = small.at(0.02) / fade(0.02) / (small.at(0.01) / fade(0.01));
+        assert!((fall - 0.125).abs() < 0.01, "{fall}");
     }
 
     #[test]

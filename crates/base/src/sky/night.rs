@@ -27,10 +27,6 @@ crate::parameters! {
         milky_way: f64 = 1.0, limits(SHARE);
         /// Magnitudes that the air takes overhead.
         extinction: f64 = 0.22, limits(Range::new(0.0, 5.0)), unit("mag");
-        /// Height of the hills all around; 0 for none.
-        hills_deg: f64 = 0.0, limits(Range::new(0.0, 30.0)), unit("degrees");
-        /// Height of the trees on them; 0 for none.
-        trees_deg: f64 = 0.0, limits(Range::new(0.0, 30.0)), unit("degrees");
     }
 }
 

@@ -31,7 +31,7 @@ bansho_base::parameters! {
         wetness: Animated<f64> = Animated::from(0.0), limits(Range::new(0.0, 1.0));
         /// Share of wet ground that is covered by puddles.
         puddles: f64 = 0.25, limits(Range::new(0.0, 1.0));
-        /// R.m.s. slope of wet ground between puddles: it draws lamps out into streaks.
+        /// R.m.s. slope of the film of water between puddles: it draws lamps out into streaks.
         roughness: f64 = 0.06, limits(Range::new(0.0, 0.5));
         /// R.m.s. slope of the waves of a lake.
         waves: f64 = 0.02, limits(Range::new(0.0, 0.3));

@@ -105,11 +105,12 @@ impl PreparedGround<'_> {
     /// A wet ground mirrors sharply in its puddles, and in streaks between them.
     fn seen_in_film(&self, hit: &Hit, patch: &Patch) -> [f32; 3] {
         let viewer = -(hit.point - self.view.camera.position).normalize_or_zero();
-        let rough = gloss(self.surroundings, hit.point, viewer, self.parameters.roughness);
+        let place = DVec2::new(hit.point.x, hit.point.z);
+        let facets = self.surface.facets(place, hit.footprint, patch.film);
+        let rough = gloss(self.surroundings, hit.point, viewer, &facets);
         let still = self.surroundings.reflection.map_or([0.0; 4], |image| bilinear(image, hit.pixel));
         let (puddle, fresnel, wetness) = (patch.puddle as f32, fresnel(hit.cos) as f32, self.wetness as f32);
-        let film = (1.0 - puddle) * patch.film as f32;
-        [0, 1, 2].map(|c| wetness * (puddle * fresnel).mul_add(still[c], film * rough[c]))
+        [0, 1, 2].map(|c| wetness * (puddle * fresnel).mul_add(still[c], (1.0 - puddle) * rough[c]))
     }
 
     fn seen_in_lake(&self, hit: &Hit, lake: &Lake) -> [f32; 3] {

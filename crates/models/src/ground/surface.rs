@@ -3,11 +3,11 @@
 use bansho_base::{
     color::acescg_from_srgb,
     math::{self, DVec2},
-    noise::{Coordinate, Fractal, Noise},
+    noise::{Coordinate, Fractal, Noise, VARIANCE},
     random::{Key, Purpose},
 };
 
-use super::parameters::GroundParameters;
+use super::{gloss::Facets, parameters::GroundParameters};
 
 /// Octaves of the ground's texture, each half as large and as strong as the one before.
 const OCTAVES: usize = 8;
@@ -20,6 +20,15 @@ const DEVIATION: f64 = 0.34;
 /// One octave at a time, so that each can fade where it is too small to be seen.
 const SINGLE: Fractal = Fractal { octaves: 1, lacunarity: 2, gain: 0.5 };
 
+/// Bumps of a film of water: size of the largest, m, octaves, each half as large as the one before, and their share of the film's mean square slope.
+const BUMP: f64 = 0.15;
+const BUMPS: usize = 3;
+const BUMP_SHARE: f64 = 0.4;
+/// Slope of grains that stand out of the film, over that of the film.
+const GRAIN: f64 = 3.0;
+/// Greatest share of wet ground that is film between the grains.
+const FILM_SHARE: f64 = 0.6;
+
 /// The ground's pattern.
 pub(super) struct Surface {
     albedo: [f32; 3],
@@ -27,6 +36,7 @@ pub(super) struct Surface {
     size: f64,
     octaves: Vec<Noise<2>>,
     puddles: f64,
+    roughness: f64,
 }
 
 /// The ground at a place.
@@ -51,6 +61,7 @@ impl Surface {
             size: parameters.texture_size,
             octaves: octaves.collect(),
             puddles: parameters.puddles,
+            roughness: parameters.roughness,
         }
     }
 
@@ -78,6 +89,27 @@ impl Surface {
             // Its edges are sharp and its light strong: patches of a few pixels would be dashes at the horizon.
             film: math::lerp(0.5, film(relief), seen(2.0, 8.0)),
         }
+    }
+
+    /// The facets of wet ground at a `place` (x, z), of which a pixel covers `footprint` m, where `film` of it is whole.
+    pub(super) fn facets(&self, place: DVec2, footprint: f64, film: f64) -> Facets {
+        let each = math::sqrt(BUMP_SHARE / BUMPS as f64) * self.roughness;
+        let deviation = math::sqrt(VARIANCE[0]);
+        let (mut tilt, mut rest, mut size) = (DVec2::ZERO, self.roughness * self.roughness, BUMP);
+        for pair in self.octaves.chunks_exact(2).take(BUMPS) {
+            let seen = math::smoothstep(1.5, 5.0, size / footprint.max(1e-9));
+            if seen <= 0.0 {
+                break;
+            }
+            // Aside of the texture that has the same noise.
+            let coordinates = [place.x / size + 61.3, place.y / size - 17.7].map(Coordinate::from_f64);
+            let slope = [0, 1].map(|axis| f64::from(pair[axis].at(coordinates)) / deviation);
+            tilt += DVec2::from(slope) * (seen * each);
+            rest -= seen * seen * each * each;
+            size *= 0.5;
+        }
+        let grain = GRAIN * self.roughness;
+        Facets { tilt, slopes: [math::sqrt(rest), grain], film: FILM_SHARE * film }
     }
 
     /// Water stands where the ground lies low.

@@ -10,14 +10,18 @@ use bansho_base::{
 
 use fearless_simd::dispatch;
 
-use crate::flame_sheet::placement::{Stand, right_facing};
+use crate::{
+    flame_sheet::placement::{Stand, right_facing},
+    lanes::LANES,
+};
 
 use super::{
-    drops::{Drop, FADE, Shower},
+    drops::{Drops, FADE, Shower},
+    flights::{NOTHING, Row},
     lattice::{CELL, Cell},
     moment::{Ball, ClassNow},
     part::{Gathering, Part},
-    stroke::Stroke,
+    stroke::{at_least, at_most},
 };
 
 const SHEET: Purpose = Purpose::named("rain texture");
@@ -28,8 +32,8 @@ const RADIUS: f64 = 0.75;
 /// Textures of each diameter, so that the same streaks are seldom near each other.
 const VARIANTS: usize = 2;
 
-/// Where the drops of a texture are, across and up, 0 to 1.
-type Sheet = Vec<[f64; 2]>;
+/// Where the drops of a texture are, across and up, 0 to 1, sixteen at a time.
+type Sheet = Vec<[Row; 2]>;
 
 /// The textures of all diameters at one rate.
 struct Sheets(Vec<[Sheet; VARIANTS]>);
@@ -38,11 +42,14 @@ impl Sheets {
     /// Drop after drop, so that a texture with more of them has the same and others.
     fn new(key: Key, classes: &[ClassNow]) -> Self {
         let sheet = |class: &ClassNow, variant: usize| -> Sheet {
-            let place = |index: u64| {
-                let [x, y, ..] = key.uniforms((variant as u64) << 32 | index, 0, class.purpose(SHEET)).map(f64::from);
-                [x, y]
-            };
-            (0..class.count().ceil() as u64).map(place).collect()
+            let drops = class.count().ceil() as u64;
+            let mut sheet = vec![[NOTHING; 2]; (drops as usize).div_ceil(LANES)];
+            for index in 0..drops {
+                let [x, y, ..] = key.uniforms((variant as u64) << 32 | index, 0, class.purpose(SHEET));
+                let (part, i) = (&mut sheet[index as usize / LANES], index as usize % LANES);
+                (part[0][i], part[1][i]) = (x, y);
+            }
+            sheet
         };
         Self(classes.iter().map(|class| std::array::from_fn(|variant| sheet(class, variant))).collect())
     }
@@ -55,25 +62,26 @@ struct Card<'a> {
     velocity: DVec3,
     sheet: &'a Sheet,
     /// Where in the texture it begins.
-    offset: [f64; 2],
+    offset: [f32; 2],
     /// 1, or -1 where it is mirrored.
-    side: f64,
+    side: f32,
     /// Which part of a drop its texture must hold for the card to show that drop.
-    chance: f64,
+    chance: f32,
 }
 
 impl Card<'_> {
     /// How much it shows of the last drop of a texture, of which this holds a part: that of all billboards together, each all of it or
     /// nothing but for those that change.
-    fn shows(&self, part: f64) -> f64 {
-        ((part - self.chance * (1.0 - FADE)) / FADE).clamp(0.0, 1.0)
+    #[inline(always)]
+    fn shows(&self, part: f32) -> f32 {
+        at_most(1.0, at_least(0.0, (part - self.chance * (1.0 - FADE) as f32) * (1.0 / FADE) as f32))
     }
+}
 
-    /// Where a drop of its texture is, m. A texture repeats in both directions.
-    fn point(&self, [x, y]: [f64; 2]) -> DVec3 {
-        let wrapped = |place: f64| place - place.floor();
-        self.stand.point(wrapped(self.side * (x - self.offset[0])), wrapped(y - self.offset[1]))
-    }
+/// A place in a texture, which repeats in both directions.
+#[inline(always)]
+fn wrapped(place: f32) -> f32 {
+    place - place.floor()
 }
 
 /// What billboards are made from.
@@ -104,29 +112,44 @@ impl<'a> Billboards<'a> {
     #[inline(always)]
     fn add_card(&self, class: &ClassNow, cell: Cell, gathering: &mut Gathering) {
         let card = self.card(class, cell);
-        let middle = card.stand.point(0.5, 0.5);
+        let [base, right, up] = self.edges(&card.stand);
         // A bound that holds for all its streaks is worth finding only where it may spare some their light.
-        let brightest =
-            if self.least_light > 0.0 { self.shower.lighting.brightest(middle, RADIUS) } else { f32::INFINITY };
-        for (number, place) in card.sheet.iter().enumerate() {
-            let drop = Drop {
-                point: card.point(*place),
-                velocity: card.velocity,
-                diameter_mm: class.diameter_mm,
-                there: card.shows(class.count() - number as f64),
-            };
-            let lit = |stroke: &Stroke| brightest * stroke.peak() >= self.least_light;
-            gathering.add(self.shower.stroke(&drop, lit));
+        let least_peak = if self.least_light > 0.0 {
+            self.least_light / self.shower.lighting.brightest(card.stand.point(0.5, 0.5), RADIUS)
+        } else {
+            0.0
+        };
+        let velocity = card.velocity.as_vec3().to_array();
+        let (diameter_mm, count) = (class.diameter_mm as f32, class.count() as f32);
+        for (part, sheet) in card.sheet.iter().enumerate() {
+            let mut drops =
+                Drops { places: [NOTHING; 3], velocities: velocity.map(|v| [v; LANES]), diameter_mm, there: NOTHING };
+            for i in 0..LANES {
+                drops.there[i] = card.shows(count - (part * LANES + i) as i32 as f32);
+                let (x, y) =
+                    (wrapped(card.side * (sheet[0][i] - card.offset[0])), wrapped(sheet[1][i] - card.offset[1]));
+                for axis in 0..3 {
+                    drops.places[axis][i] = up[axis].mul_add(y, right[axis].mul_add(x, base[axis]));
+                }
+            }
+            self.shower.add_drops(&drops, least_peak, gathering);
         }
+    }
+
+    /// The first corner of a square from the camera, and its edges, m.
+    fn edges(&self, stand: &Stand) -> [[f32; 3]; 3] {
+        let eye = self.shower.moment.sight.middle().position;
+        let [corner, right, up] = [stand.point(0.0, 0.0), stand.point(1.0, 0.0), stand.point(0.0, 1.0)];
+        [corner - eye, right - corner, up - corner].map(|vector| vector.as_vec3().to_array())
     }
 
     fn card(&self, class: &ClassNow, cell: Cell) -> Card<'_> {
         let moment = self.shower.moment;
         let contents = class.lattice.contents(cell);
-        let [across, up, choice, mirrored] = moment.key.uniforms(contents, 0, class.purpose(OFFSET)).map(f64::from);
-        let [x, z, chance, _] = moment.key.uniforms(contents, 0, class.purpose(PLACE)).map(f64::from);
+        let [across, up, choice, mirrored] = moment.key.uniforms(contents, 0, class.purpose(OFFSET));
+        let [x, z, chance, _] = moment.key.uniforms(contents, 0, class.purpose(PLACE));
         // Anywhere within the cell's ground: no two stand in a row.
-        let place = DVec3::from(cell.0.map(|count| count as f64)) + DVec3::new(x, 0.5, z);
+        let place = DVec3::from(cell.0.map(|count| count as f64)) + DVec3::new(x.into(), 0.5, z.into());
         let (middle, velocity) = moment.drop(class, place);
         let height = class.lattice.height();
         let base = middle - DVec3::Y * (0.5 * height);
@@ -134,7 +157,7 @@ impl<'a> Billboards<'a> {
         Card {
             stand: Stand::new(base, right, DVec2::new(CELL, height), 0.0),
             velocity,
-            sheet: &self.sheets.0[class.index][(choice * VARIANTS as f64) as usize],
+            sheet: &self.sheets.0[class.index][(choice * VARIANTS as f32) as usize],
             offset: [across, up],
             side: if mirrored < 0.5 { 1.0 } else { -1.0 },
             chance,

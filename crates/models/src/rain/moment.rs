@@ -2,17 +2,19 @@
 
 use bansho_base::{
     canvas::View,
-    math::{self, DVec3},
+    math::DVec3,
     random::{Key, Purpose},
     surroundings::{Occluder, Surroundings},
 };
 
 use super::{
     Rain,
-    drops::LARGEST,
+    cell::{Blown, CellNow},
+    flights::LARGEST,
     gust::Gusts,
     lattice::{CELL, Cell, Lattice},
     sight::Sight,
+    stroke::{at_least, at_most},
 };
 
 /// What gusts displace a drop more or less than the middle of its cell, m.
@@ -92,23 +94,43 @@ impl Moment {
             gain: parameters.opacity_gain,
             wind: DVec3::new(mean.x, 0.0, mean.z),
             gusts: Gusts::new(wind, response, sight.middle().position, radius, t),
-            roofs: surroundings.others.occluders.clone(),
+            roofs: surroundings.others.occluders.iter().filter(|solid| !is_ground(solid)).cloned().collect(),
             sight,
         }
     }
 
     /// How much of a drop at `distance` from the camera is drawn as a streak: all within the region, nothing beyond its soft edge.
-    pub(crate) fn nearness(&self, distance: f64) -> f64 {
-        let half = 0.5 * EDGE * self.distance;
-        if distance <= self.distance - half {
-            return 1.0;
-        }
-        1.0 - math::smoothstep(self.distance - half, self.distance + half, distance)
+    #[inline(always)]
+    pub(crate) fn nearness(&self, distance: f32) -> f32 {
+        let region = self.distance as f32;
+        smoothstep(((1.0 + 0.5 * EDGE as f32) * region - distance) / (EDGE as f32 * region))
     }
 
     /// All that is within `radius` (m) of the camera.
     pub(crate) fn around_camera(&self, radius: f64) -> Ball {
         Ball { centre: self.sight.middle().position, radius }
+    }
+
+    /// The drops of a cell of a class.
+    pub(crate) fn cell(&self, class: &ClassNow, Cell(cell): Cell) -> CellNow {
+        let eye = self.sight.middle().position;
+        let corner =
+            |step: [f64; 3]| class.lattice.world(DVec3::from(cell.map(|count| count as f64)) + DVec3::from(step));
+        let origin = corner([0.0; 3]);
+        let [base, right, up, back] = [
+            origin - eye,
+            corner([1.0, 0.0, 0.0]) - origin,
+            corner([0.0, 1.0, 0.0]) - origin,
+            corner([0.0, 0.0, 1.0]) - origin,
+        ]
+        .map(|vector| vector.as_vec3().to_array());
+        let velocity = (self.wind - DVec3::Y * class.speed).as_vec3().to_array();
+        let blown = self.gusts.as_ref().map(|gusts| {
+            Blown::new(std::array::from_fn(|index| {
+                gusts.at(corner([index & 1, index >> 1 & 1, index >> 2].map(|step| step as f64)))
+            }))
+        });
+        CellNow { base, axes: [right, up, back], velocity, blown }
     }
 
     /// Where a place of a class's lattice is half way through the exposure, and its velocity, m/s.
@@ -155,14 +177,31 @@ impl Moment {
         cells
     }
 
+    /// Whether any solid may keep rain from what is beneath it.
+    pub(crate) fn has_roofs(&self) -> bool {
+        !self.roofs.is_empty()
+    }
+
     /// Whether a solid keeps the rain that comes with `velocity` from `point`.
     pub(crate) fn sheltered(&self, point: DVec3, velocity: DVec3) -> bool {
         self.roofs.iter().any(|roof| shelters(roof, point, -velocity.normalize_or_zero()))
     }
 }
 
+/// The cubic `3 t^2 - 2 t^3` of `t` held to 0 to 1.
+#[inline(always)]
+pub(super) fn smoothstep(t: f32) -> f32 {
+    let t = at_most(1.0, at_least(0.0, t));
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// All below a plane is ground, not roof.
+fn is_ground(solid: &Occluder) -> bool {
+    matches!(solid, Occluder::HalfSpace { .. })
+}
+
 /// Height of the highest level ground among solids, m.
-fn ground(occluders: &[Occluder]) -> Option<f64> {
+pub(super) fn ground(occluders: &[Occluder]) -> Option<f64> {
     let level = |occluder: &Occluder| match occluder {
         Occluder::HalfSpace { point, normal } if normal.y > 0.999 => Some(point.y),
         _ => None,
@@ -175,11 +214,8 @@ const TRACE_STEPS: usize = 64;
 /// How high roofs may stand, m.
 const HIGHEST_ROOF: f64 = 200.0;
 
-/// Whether the way from `point` toward `up` meets a solid, in steps as long as its distance allows. All below a plane is ground, not roof.
+/// Whether the way from `point` toward `up` meets a solid, in steps as long as its distance allows.
 fn shelters(roof: &Occluder, point: DVec3, up: DVec3) -> bool {
-    if matches!(roof, Occluder::HalfSpace { .. }) {
-        return false;
-    }
     let mut way = 0.0;
     for _ in 0..TRACE_STEPS {
         let distance = roof.signed_distance(point + up * way);
@@ -214,6 +250,6 @@ mod tests {
         let ball = Occluder::Sphere { centre: DVec3::new(0.0, 2.0, 0.0), radius: 0.5 };
         assert!(shelters(&ball, DVec3::ZERO, DVec3::Y) && !shelters(&ball, DVec3::new(0.6, 0.0, 0.0), DVec3::Y));
         let ground = Occluder::HalfSpace { point: DVec3::ZERO, normal: DVec3::Y };
-        assert!(!shelters(&ground, -DVec3::Y, DVec3::Y));
+        assert!(is_ground(&ground) && !is_ground(&roof) && !is_ground(&ball));
     }
 }

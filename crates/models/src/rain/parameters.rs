@@ -45,7 +45,7 @@ bansho_base::parameters! {
         velocity: VelocityLaw = VelocityLaw::Measured;
         /// How far from the camera streaks are drawn; rain further away only veils.
         distance: f64 = 5.0, limits(Range::new(1.0, 40.0)), unit("m");
-        /// How far it rains beyond; 0 for no veil at all.
+        /// How far it rains beyond, over a `[ground]` without a plate to the horizon; 0 for no veil at all.
         veil_distance: f64 = 100.0, limits(Range::new(0.0, 5000.0)), unit("m");
         /// Height of the ground, where drops end, in a scene without `[ground]`.
         ground_height: f64 = 0.0, unit("m");

@@ -1,7 +1,7 @@
 //! Streaks of a part of the rain, ready to draw.
 
 use super::{
-    bands::{Bands, Spans},
+    bands::{Bands, Extent, Spans},
     patch::STRETCH,
     stroke::{Record, Stroke},
 };
@@ -31,13 +31,11 @@ impl Gathering {
         Self { size, records: Vec::new(), spans: Vec::new(), cells: 0 }
     }
 
-    /// Adds what there is of a streak.
+    /// Adds a streak that may touch so much of the picture.
     #[inline(always)]
-    pub(crate) fn add(&mut self, stroke: Option<Stroke>) {
-        if let Some(stroke) = stroke {
-            self.spans.push(Spans::new(stroke.extent(), self.size, STRETCH));
-            self.records.push(Record::new(&stroke));
-        }
+    pub(crate) fn add(&mut self, stroke: &Stroke, extent: Extent) {
+        self.spans.push(Spans::new(extent, self.size, STRETCH));
+        self.records.push(Record::new(stroke));
     }
 
     /// Adds a cell's streaks and counts it, if there are any.
@@ -65,6 +63,10 @@ impl Part {
     /// They stand far apart in memory; copied together they are waited for all at once instead of one by one as they are drawn.
     #[inline(always)]
     pub(crate) fn collect(&self, band: usize, stretch: usize, streaks: &mut Vec<Record>) {
-        streaks.extend(self.bands.members(band, stretch).iter().map(|index| self.records[*index as usize]));
+        let members = self.bands.members(band, stretch);
+        streaks.reserve(members.len());
+        for index in members {
+            streaks.push(self.records[*index as usize]);
+        }
     }
 }

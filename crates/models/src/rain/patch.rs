@@ -155,50 +155,49 @@ impl Block {
     /// Takes it from a plane.
     #[inline(always)]
     fn load<S: Simd, C>(&self, simd: S, plane: &[f32], columns: &mut [C], rows: impl Fn(&mut C) -> &mut Rows) {
-        let columns = &mut columns[self.column..][..self.size[0]];
-        if self.size != [BAND; 2] {
-            for (x, column) in columns.iter_mut().enumerate() {
-                let below = plane[self.start + x..].iter().step_by(self.pitch);
-                rows(column)[self.row..].iter_mut().zip(below).take(self.size[1]).for_each(|(to, from)| *to = *from);
-            }
-            return;
+        let [width, height] = self.size;
+        let mut square = [[0.0; BAND]; BAND];
+        for y in 0..height {
+            copy(&plane[self.start + y * self.pitch..][..width], &mut square[self.row + y][..width]);
         }
-        let mut vectors = [f32x8::splat(simd, 0.0); BAND];
-        for y in 0..BAND {
-            vectors[y] = f32x8::from_slice(simd, &plane[self.start + y * self.pitch..][..BAND]);
-        }
-        let vectors = transpose(vectors);
-        for x in 0..BAND {
-            vectors[x].store_slice(rows(&mut columns[x]));
+        transpose(simd, &mut square);
+        for x in 0..width {
+            *rows(&mut columns[self.column + x]) = square[x];
         }
     }
 
     /// Gives it back to a plane.
     #[inline(always)]
     fn store<S: Simd, C>(&self, simd: S, columns: &[C], rows: impl Fn(&C) -> &Rows, plane: &mut [f32]) {
-        let columns = &columns[self.column..][..self.size[0]];
-        if self.size != [BAND; 2] {
-            for (x, column) in columns.iter().enumerate() {
-                let below = plane[self.start + x..].iter_mut().step_by(self.pitch);
-                rows(column)[self.row..].iter().zip(below).take(self.size[1]).for_each(|(from, to)| *to = *from);
-            }
-            return;
+        let [width, height] = self.size;
+        let mut square = [[0.0; BAND]; BAND];
+        for x in 0..width {
+            square[x] = *rows(&columns[self.column + x]);
         }
-        let mut vectors = [f32x8::splat(simd, 0.0); BAND];
-        for x in 0..BAND {
-            vectors[x] = f32x8::from_slice(simd, rows(&columns[x]));
+        transpose(simd, &mut square);
+        for y in 0..height {
+            copy(&square[self.row + y][..width], &mut plane[self.start + y * self.pitch..][..width]);
         }
-        let vectors = transpose(vectors);
-        for y in 0..BAND {
-            vectors[y].store_slice(&mut plane[self.start + y * self.pitch..][..BAND]);
-        }
+    }
+}
+
+/// Copies up to eight numbers: nearly always eight, in one instruction.
+#[inline(always)]
+fn copy(from: &[f32], to: &mut [f32]) {
+    match (<&Rows>::try_from(from), <&mut Rows>::try_from(&mut *to)) {
+        (Ok(from), Ok(to)) => *to = *from,
+        _ => to.copy_from_slice(from),
     }
 }
 
 /// Rows as columns: three perfect shuffles.
 #[inline(always)]
-fn transpose<S: Simd>(mut vectors: [f32x8<S>; BAND]) -> [f32x8<S>; BAND] {
+fn transpose<S: Simd>(simd: S, square: &mut [Rows; BAND]) {
     const HALF: usize = BAND / 2;
+    let mut vectors = [f32x8::splat(simd, 0.0); BAND];
+    for y in 0..BAND {
+        vectors[y] = f32x8::from_slice(simd, &square[y]);
+    }
     for _ in 0..BAND.ilog2() {
         let before = vectors;
         for i in 0..HALF {
@@ -206,5 +205,7 @@ fn transpose<S: Simd>(mut vectors: [f32x8<S>; BAND]) -> [f32x8<S>; BAND] {
             vectors[2 * i + 1] = before[i].zip_high(before[i + HALF]);
         }
     }
-    vectors
+    for x in 0..BAND {
+        vectors[x].store_slice(&mut square[x]);
+    }
 }

@@ -17,12 +17,15 @@ use super::{
     lattice::Lattice,
     lens::DropLens,
     light::Scattering,
-    moment::ClassNow,
+    moment::{ClassNow, ground},
     parameters::RainParameters,
     prepared::PreparedRain,
     velocity::{Air, Fall},
 };
 use crate::fault::{FaultKind, ParameterFault};
+
+/// How far it rains over ground that leads to the horizon, m.
+const HORIZON: f64 = 2e4;
 
 /// Rain, ready to be drawn at any time.
 #[derive(Debug)]
@@ -100,9 +103,20 @@ impl Rain {
         self.classes.iter().enumerate().map(now).collect()
     }
 
-    /// How far from the camera there is any rain, m.
-    pub(super) fn reach(&self) -> f64 {
+    /// No streak is further from the camera, m.
+    pub(super) fn streaks_end(&self) -> f64 {
+        (1.2 * self.parameters.distance).max(self.parameters.splashes.distance + 1.0)
+    }
+
+    /// How far from the camera there is any rain before a plate, m.
+    pub(super) fn near_reach(&self) -> f64 {
         1.2 * self.parameters.distance + self.parameters.veil_distance
+    }
+
+    /// How far from the camera there is any rain, m: over ground that leads to the horizon as far as it.
+    pub(super) fn reach(&self, surroundings: &Surroundings) -> f64 {
+        let horizon = self.parameters.veil_distance > 0.0 && ground(&surroundings.others.occluders).is_some();
+        if horizon { HORIZON.max(self.near_reach()) } else { self.near_reach() }
     }
 
     /// Extinction of all drops, and of those alone that are drawn as streaks, at time `t`, Q = 1, 1/m.
@@ -144,7 +158,7 @@ impl Phenomenon for Rain {
     fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval> {
         const MOST: usize = 8;
         const CLOSEST: f64 = 0.05;
-        let (near, far) = (view.camera.near, self.reach());
+        let (near, far) = (view.camera.near, self.reach(surroundings));
         let depth = |light: &Light| match light.emitter {
             Emitter::Directional { .. } => None,
             Emitter::Point { position, .. } | Emitter::Spot { position, .. } => Some(view.camera.depth(position)),

@@ -16,13 +16,13 @@ use super::{
     distribution::DropSizes,
     drops::{Share, Shower},
     extinction::{Losses, extinction, visibility},
-    light::Lighting,
+    light::{Beam, Lighting},
     moment::Moment,
     parameters::Method,
     part::Part,
     patch::{Patch, STRETCH},
     singles::Singles,
-    sky::sky_through_drops,
+    sky::{endless_rain, sky_through_drops},
     splashes::Splashes,
     stroke::Record,
     tiles::{COARSE, FINE, Tiles},
@@ -38,6 +38,8 @@ pub(super) struct PreparedRain<'a> {
     level: Level,
     /// Nearest first.
     parts: Vec<Part>,
+    /// No streak is further away, m.
+    streaks_end: f64,
     veil: Option<Veil<'a>>,
     figures: Vec<Figure>,
 }
@@ -50,7 +52,8 @@ impl<'a> PreparedRain<'a> {
         let lighting = Lighting { scattering: &rain.scattering, lights, extinction: extinctions[0] };
         let tiles = Tiles::new(view, COARSE);
         let sky = sky_through_drops(&rain.lens, &tiles, &surroundings.sky);
-        let frame = Frame { rain, moment: &moment, lighting: &lighting, tiles: &tiles, sky: &sky, view };
+        let beams = lighting.beams(moment.sight.middle().position);
+        let frame = Frame { rain, moment: &moment, lighting: &lighting, beams: &beams, tiles: &tiles, sky: &sky, view };
         let region = moment.around_camera(1.1 * moment.distance);
         let mut billboards = 0;
         let mut parts = match rain.parameters.method {
@@ -66,12 +69,14 @@ impl<'a> PreparedRain<'a> {
             }
         };
         parts.extend(frame.splashes());
-        let end = if rain.parameters.veil_distance > 0.0 { rain.reach() } else { 0.0 };
+        let ends =
+            [if rain.parameters.veil_distance > 0.0 { rain.near_reach() } else { 0.0 }, rain.reach(surroundings)];
         let fine = Tiles::new(view, FINE);
-        let fine_sky = sky_through_drops(&rain.lens, &fine, &surroundings.sky);
-        let veil = Veil::new(&moment, &lighting, &fine, fine_sky, view, extinctions, end);
+        let fine_sky =
+            [sky_through_drops(&rain.lens, &fine, &surroundings.sky), endless_rain(&fine, &surroundings.sky)];
+        let veil = Veil::new(&moment, &lighting, &fine, fine_sky, view, extinctions, ends);
         let figures = frame.figures(parts.iter().map(Part::count).sum(), billboards);
-        Self { view, level: Level::new(), parts, veil, figures }
+        Self { view, level: Level::new(), parts, streaks_end: rain.streaks_end(), veil, figures }
     }
 }
 
@@ -80,6 +85,7 @@ struct Frame<'a> {
     rain: &'a Rain,
     moment: &'a Moment,
     lighting: &'a Lighting<'a>,
+    beams: &'a [Beam],
     tiles: &'a Tiles,
     sky: &'a [[f32; 3]],
     view: &'a View,
@@ -88,7 +94,14 @@ struct Frame<'a> {
 impl<'a> Frame<'a> {
     /// What turns drops into streaks.
     fn shower(&self, share: Share<'a>) -> Shower<'a> {
-        Shower { level: Level::new(), moment: self.moment, lighting: self.lighting, sky: self.shining_sky(), share }
+        Shower {
+            level: Level::new(),
+            moment: self.moment,
+            lighting: self.lighting,
+            beams: self.beams,
+            sky: self.shining_sky(),
+            share,
+        }
     }
 
     /// The sky through drops, if it shines.
@@ -98,9 +111,7 @@ impl<'a> Frame<'a> {
 
     fn splashes(&self) -> Vec<Part> {
         let splashes = Splashes {
-            moment: self.moment,
-            lighting: self.lighting,
-            sky: self.shining_sky(),
+            shower: self.shower(Share::Whole),
             parameters: &self.rain.parameters.splashes,
             time: self.view.shutter.middle(),
             loop_s: self.rain.loop_s,
@@ -142,7 +153,9 @@ impl Prepared for PreparedRain<'_> {
         let rect = strip.rect;
         for band in rect.y / BAND..rect.bottom().div_ceil(BAND) {
             let rows = Rect { x: rect.x, y: band * BAND, width: rect.width, height: BAND }.intersection(&rect);
-            dispatch!(self.level, simd => self.draw_streaks(simd, band, slice, rows, strip));
+            if slice.near < self.streaks_end {
+                dispatch!(self.level, simd => self.draw_streaks(simd, band, slice, rows, strip));
+            }
             if let Some(veil) = &self.veil {
                 veil.draw(slice, band, rows, strip);
             }
@@ -162,7 +175,9 @@ impl PreparedRain<'_> {
                 let origin = [stretch * STRETCH, band * BAND];
                 let shown = rows.intersection(&Rect { x: origin[0], width: STRETCH, ..rows });
                 streaks.clear();
-                self.parts.iter().for_each(|part| part.collect(band, stretch, &mut streaks));
+                for part in &self.parts {
+                    part.collect(band, stretch, &mut streaks);
+                }
                 if streaks.is_empty() {
                     continue;
                 }

@@ -4,18 +4,115 @@ use bansho_base::{
     camera::{Camera, Lens},
     canvas::View,
     image::Rect,
-    math::DVec3,
+    math::{DVec2, DVec3},
 };
+
+use super::{
+    bands::Extent,
+    flights::{NOTHING, Row, Vectors},
+};
+use crate::lanes::LANES;
 
 /// An exposure's cameras.
 #[derive(Clone, Debug)]
 pub(crate) struct Sight {
     /// When the shutter opens, half way, and when it closes.
     pub(crate) cameras: [Camera; 3],
+    /// The same, for sixteen points at a time.
+    pub(crate) eyes: [Eye; 3],
+    /// Columns and rows of the part of the picture that is drawn, pixels.
+    pub(crate) window: Extent,
     /// How long the shutter is open, s.
     pub(crate) exposure: f64,
     /// What the cameras see of the part of the picture that is drawn; none where they see all around.
     frusta: Vec<Frustum>,
+}
+
+/// A camera for sixteen points at a time.
+#[derive(Clone, Debug)]
+pub(crate) struct Eye {
+    camera: Camera,
+    /// Where points are counted from, m.
+    origin: DVec3,
+    /// Right, up and backward.
+    axes: [[f32; 3]; 3],
+    /// Place of the origin along these, m.
+    offset: [f32; 3],
+    centre: [f32; 2],
+    focal: f32,
+    near: f32,
+}
+
+/// Where sixteen points lie in the picture.
+pub(crate) struct Places {
+    /// Pixels; not a number where the lens does not see the point.
+    pub(crate) x: Row,
+    pub(crate) y: Row,
+    /// As the lens measures it, m.
+    pub(crate) depth: Row,
+    /// Pixels that a metre across the line of sight covers there.
+    pub(crate) scale: Row,
+}
+
+impl Eye {
+    fn new(camera: Camera, origin: DVec3) -> Self {
+        let axes = [0, 1, 2].map(|axis| camera.orientation.col(axis).as_vec3().to_array());
+        Self {
+            axes,
+            offset: camera.to_camera(origin).as_vec3().to_array(),
+            centre: camera.centre.as_vec2().to_array(),
+            focal: camera.focal_pixels as f32,
+            near: camera.near as f32,
+            camera,
+            origin,
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn lens(&self) -> Lens {
+        self.camera.lens
+    }
+
+    #[inline(always)]
+    pub(crate) fn project(&self, points: &Vectors) -> Places {
+        match self.camera.lens {
+            Lens::Perspective => self.project_flat(points),
+            Lens::Fisheye | Lens::Panorama => self.project_round(points),
+        }
+    }
+
+    /// As [`Camera::project`] in single precision.
+    #[inline(always)]
+    fn project_flat(&self, [xs, ys, zs]: &Vectors) -> Places {
+        let mut places = Places { x: NOTHING, y: NOTHING, depth: NOTHING, scale: NOTHING };
+        let [right, up, back] = &self.axes;
+        for i in 0..LANES {
+            let (x, y, z) = (xs[i], ys[i], zs[i]);
+            let across = right[2].mul_add(z, right[1].mul_add(y, right[0].mul_add(x, self.offset[0])));
+            let above = up[2].mul_add(z, up[1].mul_add(y, up[0].mul_add(x, self.offset[1])));
+            let depth = -back[2].mul_add(z, back[1].mul_add(y, back[0].mul_add(x, self.offset[2])));
+            let scale = self.focal / depth;
+            let scale = if depth >= self.near { scale } else { f32::NAN };
+            places.x[i] = across.mul_add(scale, self.centre[0]);
+            places.y[i] = self.centre[1] - above * scale;
+            (places.depth[i], places.scale[i]) = (depth, scale);
+        }
+        places
+    }
+
+    fn project_round(&self, [xs, ys, zs]: &Vectors) -> Places {
+        const NOWHERE: Row = [f32::NAN; LANES];
+        let mut places = Places { x: NOWHERE, y: NOWHERE, depth: NOWHERE, scale: NOWHERE };
+        for i in 0..LANES {
+            let point = self.origin + DVec3::new(xs[i].into(), ys[i].into(), zs[i].into());
+            if let Some(place) = self.camera.project(point) {
+                let DVec2 { x, y } = place.pixel;
+                (places.x[i], places.y[i]) = (x as f32, y as f32);
+                (places.depth[i], places.scale[i]) = (place.depth as f32, place.pixels_per_metre as f32);
+            }
+        }
+        places
+    }
 }
 
 /// What a camera sees: all that no side has before it.
@@ -65,7 +162,11 @@ impl Sight {
         let mut distinct = cameras.to_vec();
         distinct.dedup();
         let frusta = distinct.iter().filter_map(|camera| Frustum::new(camera, &view.window)).collect();
-        Self { cameras, exposure: shutter.duration(), frusta }
+        let eyes = cameras.map(|camera| Eye::new(camera, view.camera.position));
+        let window = &view.window;
+        let window =
+            [[window.x, window.right()], [window.y, window.bottom()]].map(|sides| sides.map(|side| side as f32));
+        Self { cameras, eyes, window, exposure: shutter.duration(), frusta }
     }
 
     /// The camera half way.

@@ -1,11 +1,16 @@
 //! Where drops are drawn one by one beside billboards.
 
 use bansho_base::{
-    math::{DVec3, smoothstep},
+    math::DVec3,
     surroundings::{Emitter, Light},
 };
 
-use super::moment::{Ball, Moment};
+use super::{
+    flights::{NOTHING, Row, Vectors},
+    moment::{Ball, Moment, smoothstep},
+    stroke::at_least,
+};
+use crate::lanes::LANES;
 
 /// Distance from the camera at which billboards begin, m: a cubic metre that is nearer cannot be seen as flat.
 pub(super) const NEAREST: f64 = 1.0;
@@ -15,7 +20,11 @@ pub(super) const NEAREST_TO_LAMP: f64 = 1.3;
 const TAKE_OVER: f64 = 0.2;
 
 /// The air around the camera and around lamps in the region.
-pub(super) struct Singles(Vec<Ball>);
+pub(super) struct Singles {
+    balls: Vec<Ball>,
+    /// Their middles from the camera, and their radii, m.
+    from_camera: Vec<([f32; 3], f32)>,
+}
 
 impl Singles {
     pub(super) fn new(moment: &Moment, lights: &[Light]) -> Self {
@@ -27,23 +36,27 @@ impl Singles {
         let radius = NEAREST_TO_LAMP + TAKE_OVER;
         let near = |place: &DVec3| (*place - eye).length() < 1.1 * moment.distance + radius;
         let lamps = lights.iter().filter_map(lamp).filter(near).map(|centre| Ball { centre, radius });
-        Self([moment.around_camera(NEAREST + TAKE_OVER)].into_iter().chain(lamps).collect())
+        let balls: Vec<Ball> = [moment.around_camera(NEAREST + TAKE_OVER)].into_iter().chain(lamps).collect();
+        let from_camera = |ball: &Ball| ((ball.centre - eye).as_vec3().to_array(), ball.radius as f32);
+        Self { from_camera: balls.iter().map(from_camera).collect(), balls }
     }
 
     /// Outside of these no drop is drawn by itself.
     pub(super) fn balls(&self) -> &[Ball] {
-        &self.0
+        &self.balls
     }
 
-    /// How much of a drop at a point is drawn by itself, 0 to 1.
-    pub(super) fn share(&self, point: DVec3) -> f64 {
-        let share = |ball: &Ball| {
-            let square = (point - ball.centre).length_squared();
-            if square >= ball.radius * ball.radius {
-                return 0.0;
+    /// How much of drops at places from the camera is drawn by itself, 0 to 1.
+    #[inline(always)]
+    pub(super) fn shares(&self, [xs, ys, zs]: &Vectors) -> Row {
+        let mut shares = NOTHING;
+        for &([x, y, z], radius) in &self.from_camera {
+            for i in 0..LANES {
+                let offset = [xs[i] - x, ys[i] - y, zs[i] - z];
+                let away = (offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]).sqrt();
+                shares[i] = at_least(shares[i], smoothstep((radius - away) * (1.0 / TAKE_OVER) as f32));
             }
-            1.0 - smoothstep(ball.radius - TAKE_OVER, ball.radius, square.sqrt())
-        };
-        self.0.iter().map(share).fold(0.0, f64::max)
+        }
+        shares
     }
 }

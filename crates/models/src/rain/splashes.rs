@@ -9,17 +9,17 @@ use bansho_base::{
     math::{self, DVec3},
     random::{self, Purpose, uniform},
 };
+use fearless_simd::dispatch;
 use rayon::prelude::*;
 
 use super::{
-    drops::Flight,
-    light::Lighting,
-    moment::{ClassNow, Moment},
+    drops::Shower,
+    flights::{Flights, NOTHING},
+    moment::ClassNow,
     parameters::SplashParameters,
     part::{Gathering, Part},
-    stroke::Stroke,
-    tiles::Tiles,
 };
+use crate::lanes::LANES;
 
 /// Side of a square of ground, m.
 const SQUARE: f64 = 0.5;
@@ -44,10 +44,7 @@ const DROPLET: Purpose = Purpose::named("rain splash droplet");
 /// What splashes are made from.
 #[derive(Clone, Copy)]
 pub(crate) struct Splashes<'a> {
-    pub(crate) moment: &'a Moment,
-    pub(crate) lighting: &'a Lighting<'a>,
-    /// What the sky shines through drops at the corners of tiles; `None` from a dark one.
-    pub(crate) sky: Option<(&'a Tiles, &'a [[f32; 3]])>,
+    pub(crate) shower: Shower<'a>,
     pub(crate) parameters: &'a SplashParameters,
     /// Middle of the exposure, s.
     pub(crate) time: f64,
@@ -72,7 +69,7 @@ struct Impact {
 impl Splashes<'_> {
     /// The streaks of all droplets that may show.
     pub(crate) fn parts(&self) -> Vec<Part> {
-        let (moment, reach) = (self.moment, self.parameters.distance);
+        let (moment, reach) = (self.shower.moment, self.parameters.distance);
         let eye = moment.sight.middle().position;
         let high = (eye.y - moment.ground).abs();
         if self.parameters.amount <= 0.0 || high >= reach {
@@ -105,9 +102,9 @@ impl Splashes<'_> {
     /// Adds the droplets over one square of ground.
     fn square(&self, [x, z]: [i64; 2], middle: DVec3, gathering: &mut Gathering) {
         let (turn, part, length) = self.turn();
-        let key = self.moment.key;
+        let key = self.shower.moment.key;
         let id = (x as u64 & 0xffff_ffff) << 32 | z as u64 & 0xffff_ffff;
-        let away = (middle - self.moment.sight.middle().position).length();
+        let away = (middle - self.shower.moment.sight.middle().position).length();
         let thinned = (away / ALL_WITHIN).max(1.0);
         let share = self.parameters.amount / (thinned * thinned);
         let fading = 1.0 - math::smoothstep(0.7, 1.0, away / self.parameters.distance);
@@ -115,7 +112,7 @@ impl Splashes<'_> {
             let step =
                 self.loop_s.map_or(turn - back, |seconds| (turn - back).rem_euclid((seconds / length).round() as i64));
             let step = step as u32;
-            for class in self.moment.classes.iter().filter(|class| class.diameter_mm >= LEAST_MM) {
+            for class in self.shower.moment.classes.iter().filter(|class| class.diameter_mm >= LEAST_MM) {
                 let words = key.words(id, step, class.purpose(COUNT));
                 let mean = class.most * class.speed * SQUARE * SQUARE * length;
                 for number in 0..random::poisson(mean, [words[0], words[1]]) {
@@ -126,7 +123,7 @@ impl Splashes<'_> {
                     }
                     let age = (part - uniforms[2] + back as f64) * length;
                     let place = middle + DVec3::new(uniforms[0] - 0.5, 0.0, uniforms[1] - 0.5) * SQUARE;
-                    let strength = fading * thinned * self.moment.gain;
+                    let strength = fading * thinned * self.shower.moment.gain;
                     let step = step.wrapping_mul(1 << 16).wrapping_add((class.index as u32) << 12 | number as u32);
                     self.add(
                         class,
@@ -139,30 +136,28 @@ impl Splashes<'_> {
     }
 
     fn add(&self, class: &ClassNow, impact: &Impact, gathering: &mut Gathering) {
+        let Shower { moment, level, .. } = self.shower;
         let fall = DVec3::Y * -class.speed;
-        if !(0.0..TURN).contains(&impact.age) || self.moment.sheltered(impact.place, fall) {
+        if !(0.0..TURN).contains(&impact.age) || moment.sheltered(impact.place, fall) {
             return;
         }
-        let eye = self.moment.sight.middle().position;
-        let offset = impact.place + DVec3::Y * 0.01 - eye;
-        let lit = self.lighting.radiance(impact.place + DVec3::Y * 0.01, offset.normalize_or_zero());
+        let mut flights = Flights { from: [NOTHING; 3], to: [NOTHING; 3], diameter_mm: NOTHING, gain: NOTHING };
         for droplet in 0..RING + HIGH {
-            let words = self.moment.key.words(impact.id, impact.step, Purpose(DROPLET.0 ^ (droplet as u32) << 24));
-            let random = words.map(|word| f64::from(uniform(word)));
-            let Some(mut stroke) = self.droplet(impact, droplet, random) else { continue };
-            if !stroke.meets(self.moment.sight.middle().size) {
-                continue;
-            }
-            stroke.layer.add_light(lit);
-            if let Some((tiles, sky)) = self.sky {
-                stroke.layer.add_light(tiles.at(sky, stroke.middle()));
-            }
-            gathering.add(Some(stroke));
+            let words = moment.key.words(impact.id, impact.step, Purpose(DROPLET.0 ^ (droplet as u32) << 24));
+            self.droplet(impact, droplet, words.map(|word| f64::from(uniform(word))), &mut flights);
         }
+        // Light is even over so small a place.
+        let place = (impact.place + DVec3::Y * 0.01 - moment.sight.middle().position).as_vec3().to_array();
+        let places = place.map(|coordinate| [coordinate; LANES]);
+        dispatch!(level, _simd => {
+            let streaks = flights.streaks(&moment.sight);
+            self.shower.add(&streaks, &places, &flights.diameter_mm, 0.0, gathering);
+        });
     }
 
-    /// One droplet on its way, if it has not fallen back.
-    fn droplet(&self, impact: &Impact, index: usize, random: [f64; 4]) -> Option<Stroke> {
+    /// Notes one droplet's way, if it has not fallen back.
+    fn droplet(&self, impact: &Impact, index: usize, random: [f64; 4], flights: &mut Flights) {
+        let sight = &self.shower.moment.sight;
         let high = index >= RING;
         let turns = if high { random[0] } else { (index as f64 + 0.6 * random[0]) / RING as f64 };
         let elevation = if high { 1.2 + 0.3 * random[1] } else { 0.85 + 0.3 * random[1] };
@@ -170,16 +165,19 @@ impl Splashes<'_> {
         let speed = (speed * self.parameters.speed).min(0.5 * GRAVITY * TURN);
         let ((sin_turn, cos_turn), (sin_up, cos_up)) = (math::sin_cos(TAU * turns), math::sin_cos(elevation));
         let velocity = DVec3::new(cos_turn * cos_up, sin_up, sin_turn * cos_up) * speed;
-        let half = 0.5 * self.moment.sight.exposure;
+        let half = 0.5 * sight.exposure;
         let landing = 2.0 * velocity.y / GRAVITY;
         let (from, to) = ((impact.age - half).max(0.0), (impact.age + half).min(landing));
         if from >= to {
-            return None;
+            return;
         }
-        let at = |age: f64| impact.place + velocity * age - DVec3::Y * (0.5 * GRAVITY * age * age);
-        let diameter_mm = impact.diameter_mm * (0.16 + 0.14 * random[3]);
-        let flight = Flight { from: at(from), to: at(to), diameter_mm };
+        let place = impact.place - sight.middle().position;
+        let at = |age: f64| place + velocity * age - DVec3::Y * (0.5 * GRAVITY * age * age);
         let share = if half > 0.0 { (to - from) / (2.0 * half) } else { 1.0 };
-        flight.whole().stroke(self.moment, impact.strength * share)
+        for (vectors, point) in [(&mut flights.from, at(from)), (&mut flights.to, at(to))] {
+            (0..3).for_each(|axis| vectors[axis][index] = point[axis] as f32);
+        }
+        flights.diameter_mm[index] = (impact.diameter_mm * (0.16 + 0.14 * random[3])) as f32;
+        flights.gain[index] = (impact.strength * share) as f32;
     }
 }

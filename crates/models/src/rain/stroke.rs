@@ -15,17 +15,17 @@ pub(crate) use record::Record;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stroke {
     /// Half way along it, pixels.
-    middle: [f32; 2],
+    pub(super) middle: [f32; 2],
     /// Whether it runs down the picture rather than across: its axis is then 1, else 0.
-    upright: bool,
+    pub(super) upright: bool,
     /// Half its length along that axis, pixels: of a thin one as a line that spreads as much, of a wide one that of its disc's way.
-    half: f32,
+    pub(super) half: f32,
     /// How far it leans to the other axis for each pixel along.
-    lean: f32,
+    pub(super) lean: f32,
     /// Half width across at each pixel along, as a disc that spreads as much: the drop's, and its lean within a pixel.
-    across: f32,
+    pub(super) across: f32,
     /// What it hides of each line of pixels across it, square pixels.
-    density: f32,
+    pub(super) density: f32,
     /// Diameter of the drop, mm.
     pub(crate) diameter_mm: f32,
     /// What it shows.
@@ -76,12 +76,8 @@ impl Stroke {
         }
     }
 
-    /// Half way along it, pixels.
-    pub(crate) fn middle(&self) -> [f32; 2] {
-        self.middle
-    }
-
     /// Greatest opacity of any of its pixels: that of its axis, or all that a line hides where it is narrower than a pixel.
+    #[inline(always)]
     pub(crate) fn peak(&self) -> f32 {
         let short = if self.is_wide() { (self.half / self.chord(0.0)).min(1.0) } else { 1.0 };
         short * self.density * (std::f32::consts::FRAC_2_PI / self.across).min(1.0)
@@ -113,13 +109,17 @@ impl Stroke {
         let reach = if self.upright { [aside, along] } else { [along, aside] };
         [0, 1].map(|axis| [self.middle[axis] - reach[axis], self.middle[axis] + reach[axis]])
     }
+}
 
-    /// Whether it may touch a picture of so many columns and rows.
-    #[inline(always)]
-    pub(crate) fn meets(&self, size: [f64; 2]) -> bool {
-        let extent = self.extent();
-        (0..2).all(|axis| extent[axis][1] > 0.0 && f64::from(extent[axis][0]) < size[axis])
-    }
+/// Comparisons that become one instruction each, unlike those that ask what is not a number.
+#[inline(always)]
+pub(super) fn at_least(least: f32, value: f32) -> f32 {
+    if value > least { value } else { least }
+}
+
+#[inline(always)]
+pub(super) fn at_most(most: f32, value: f32) -> f32 {
+    if value < most { value } else { most }
 }
 
 #[cfg(test)]

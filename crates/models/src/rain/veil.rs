@@ -4,7 +4,7 @@ use bansho_base::{
     canvas::{DepthInterval, Strip, View},
     image::Rect,
     math::{self, DVec2, DVec3},
-    surroundings::{Arrival, Emitter, Light},
+    surroundings::{Emitter, Light},
 };
 
 use fearless_simd::{Level, dispatch};
@@ -19,6 +19,8 @@ use super::{
 /// Nearest distance at which the light that is scattered up to there is known, m, and how much further each next one is.
 const FIRST: f64 = 0.5;
 const RATIO: f64 = 1.25;
+/// The same where the light of lamps does not matter.
+const FAR_RATIO: f64 = 2.0;
 /// Angle, seen from a lamp, that one sample stands for.
 const ANGLE: f64 = 0.15;
 /// A veil has no depth of its own, m.
@@ -36,7 +38,7 @@ struct Density<'a> {
 
 impl Density<'_> {
     fn at(&self, distance: f64) -> f64 {
-        self.extinction[0] - self.extinction[1] * self.moment.nearness(distance)
+        self.extinction[0] - self.extinction[1] * f64::from(self.moment.nearness(distance as f32))
     }
 }
 
@@ -105,21 +107,24 @@ pub(crate) struct Veil<'a> {
     scattered: Scattered,
     /// Lamps in the picture.
     halos: Vec<Halo>,
-    /// Light of the sky that all drops send to the camera, by corner.
-    sky: Vec<[f32; 3]>,
+    /// Light of the sky that each drop sends to the camera, and that of the sky itself where rain is endless, by corner.
+    sky: [Vec<[f32; 3]>; 2],
+    /// How far the light of lamps is known, and the veil before a plate reaches, m.
+    end: f64,
     ground: f64,
 }
 
 impl<'a> Veil<'a> {
-    /// The veil up to `end` (m) of drops with extinctions `[all, drawn as streaks]`; `None` where there is none.
+    /// The veil of drops with extinctions `[all, drawn as streaks]` up to the first of `ends` (m), and to the second where there is no plate; `None` where
+    /// there is none. `sky` is what drops show of it, and itself.
     pub(crate) fn new(
         moment: &Moment,
         lighting: &Lighting,
         tiles: &Tiles,
-        sky: Vec<[f32; 3]>,
+        sky: [Vec<[f32; 3]>; 2],
         view: &'a View,
         extinction: [f64; 2],
-        end: f64,
+        [end, farthest]: [f64; 2],
     ) -> Option<Self> {
         if end <= 0.0 || extinction[0] <= 0.0 {
             return None;
@@ -129,13 +134,16 @@ impl<'a> Veil<'a> {
         distances.insert(0, 0.0);
         let last = distances.len() - 1;
         distances[last] = end;
+        while distances[distances.len() - 1] < farthest {
+            distances.push((FAR_RATIO * distances[distances.len() - 1]).min(farthest));
+        }
         let mut depths = vec![0.0];
         for pair in distances.windows(2) {
             let depth = f64::from(depths[depths.len() - 1]);
             depths.push((depth + (pair[1] - pair[0]) * 0.5 * (density.at(pair[0]) + density.at(pair[1]))) as f32);
         }
-        let march =
-            March { lighting, density, eye: moment.sight.middle().position, distances: &distances, depths: &depths };
+        let eye = moment.sight.middle().position;
+        let march = March { lighting, density, eye, distances: &distances, depths: &depths, end };
         let (shown, others) = march.divide(view);
         let lines = tiles.map(|_, line| march.line(line, &others));
         let mut scattered = Scattered::new(&lines, distances.len());
@@ -150,13 +158,9 @@ impl<'a> Veil<'a> {
             scattered,
             halos,
             sky,
+            end,
             ground: moment.ground,
         })
-    }
-
-    /// Its end, m.
-    fn end(&self) -> f64 {
-        self.distances[self.distances.len() - 1]
     }
 
     /// Which distances a distance lies between, and how far from the first to the second.
@@ -175,6 +179,9 @@ impl<'a> Veil<'a> {
 
     /// Scattered light from between two distances, at a corner.
     fn lit(&self, scattered: &Scattered, corner: usize, range: [f64; 2]) -> [f32; 3] {
+        if range[0] >= self.end {
+            return [0.0; 3];
+        }
         let [near, far] = range.map(|distance| {
             let (k, share) = self.bracket(distance);
             mix(scattered.0[k][corner], scattered.0[k + 1][corner], share)
@@ -188,17 +195,22 @@ impl<'a> Veil<'a> {
         let index = row * self.tiles.size[0] + column;
         let below = index + self.tiles.size[0];
         let range = [near, far.max(near)];
-        let through = math::lanes::exp(self.depth(range[0]) - self.depth(range[1]));
+        let depths = range.map(|distance| self.depth(distance));
+        let through = math::lanes::exp(depths[0] - depths[1]);
+        let opacities = depths.map(|depth| 1.0 - math::lanes::exp(-depth));
         let lit = mix(self.lit(&self.scattered, index, range), self.lit(&self.scattered, below, range), down);
-        let sky = mix(self.sky[index], self.sky[below], down);
+        let [once, endless] = [0, 1].map(|k| mix(self.sky[k][index], self.sky[k][below], down));
+        // Up to opacity o rain shows `o (1 - o)` of what it scatters once, and `o^2` of what it scatters ever again: endless rain is the sky.
+        let again = opacities[0] + opacities[1];
+        let sky: [f32; 3] = std::array::from_fn(|c| (once[c] + (endless[c] - once[c]) * again).max(0.0));
         let light: [f32; 3] = std::array::from_fn(|c| lit[c] + sky[c] * (1.0 - through));
         [light[0], light[1], light[2], through]
     }
 
     /// What a pixel near a lamp gets beside what is interpolated from the corners around it.
-    fn halo(&self, halo: &Halo, x: usize, y: usize, slice: &DepthInterval, hidden: f64) -> Option<[f32; 3]> {
+    fn halo(&self, halo: &Halo, x: usize, y: usize, slice: &DepthInterval, plate: Option<f64>) -> Option<[f32; 3]> {
         let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-        let range = self.range(pixel, slice, hidden).filter(|range| range[0] < range[1])?;
+        let range = self.range(pixel, slice, plate).filter(|range| range[0] < range[1])?;
         let line = self.view.camera.direction(pixel)?.normalize_or_zero();
         let place = pixel.as_vec2().to_array();
         let mut correction = [0.0_f32; 3];
@@ -223,9 +235,9 @@ impl<'a> Veil<'a> {
                 for x in rect.x..rect.right() {
                     let away = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - halo.pixel).length() / HALO;
                     let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
-                    let hidden = f64::from(strip.plate_depth(index));
+                    let plate = strip.has_plate().then(|| f64::from(strip.plate_depth(index)));
                     let fade = 1.0 - math::smoothstep(0.6, 1.0, away) as f32;
-                    let Some(light) = self.halo(halo, x, y, slice, hidden).filter(|_| fade > 0.0) else { continue };
+                    let Some(light) = self.halo(halo, x, y, slice, plate).filter(|_| fade > 0.0) else { continue };
                     // The veil before it lies in the strip's transmittance too; it takes little.
                     (0..3)
                         .for_each(|c| strip.radiance[c][index] = (strip.radiance[c][index] + fade * light[c]).max(0.0));
@@ -234,8 +246,10 @@ impl<'a> Veil<'a> {
         }
     }
 
-    /// Distances between which a place of the picture sees the veil in a slice, behind `hidden` (depth, m) nothing.
-    fn range(&self, pixel: DVec2, slice: &DepthInterval, hidden: f64) -> Option<[f64; 2]> {
+    /// Distances between which a place of the picture sees the veil in a slice, behind a `plate` (depth, m) nothing.
+    fn range(&self, pixel: DVec2, slice: &DepthInterval, plate: Option<f64>) -> Option<[f64; 2]> {
+        let hidden = plate.unwrap_or(f64::INFINITY);
+        let end = if plate.is_some() { self.end } else { self.distances[self.distances.len() - 1] };
         let camera = &self.view.camera;
         let direction = camera.direction(pixel)?;
         let length = direction.length();
@@ -245,7 +259,7 @@ impl<'a> Veil<'a> {
         let beneath = camera.position.y < self.ground;
         let near = if beneath { slice.near.max(ground) } else { slice.near };
         let far = if beneath { slice.far.min(hidden) } else { far };
-        (!beneath || ground > 0.0).then(|| [near, far].map(|depth| (depth * length).min(self.end())))
+        (!beneath || ground > 0.0).then(|| [near, far].map(|depth| (depth * length).min(end)))
     }
 
     /// Draws the rows of a band that lie in `rows`, behind what the strip holds.
@@ -266,7 +280,7 @@ impl<'a> Veil<'a> {
         let edge = |y: f64| -> Vec<[f32; 4]> {
             let place = self.tiles.row_at(y as f32);
             let corner = |column: usize| {
-                let range = self.range(DVec2::new((column * side) as f64, y), slice, f64::INFINITY);
+                let range = self.range(DVec2::new((column * side) as f64, y), slice, None);
                 range.map_or([0.0, 0.0, 0.0, 1.0], |range| self.between(column, place, range))
             };
             columns.clone().map(corner).collect()
@@ -305,7 +319,7 @@ impl<'a> Veil<'a> {
             for x in rows.x..rows.right() {
                 let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
                 let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-                let Some(range) = self.range(pixel, slice, f64::from(strip.plate_depth(index))) else { continue };
+                let Some(range) = self.range(pixel, slice, Some(f64::from(strip.plate_depth(index)))) else { continue };
                 if range[1] <= range[0] {
                     continue;
                 }
@@ -331,6 +345,8 @@ struct March<'a> {
     eye: DVec3,
     distances: &'a [f64],
     depths: &'a [f32],
+    /// Light from beyond it is left out, m.
+    end: f64,
 }
 
 impl March<'_> {
@@ -374,7 +390,8 @@ impl March<'_> {
         for light in lights {
             let mut sum = [0.0_f32; 3];
             for k in 0..self.distances.len() - 1 {
-                let part = self.segment(light, line, k);
+                let lit = self.distances[k] < self.end;
+                let part = if lit { self.segment(light, line, k) } else { [0.0; 3] };
                 for c in 0..3 {
                     sum[c] += part[c];
                     sums[k + 1][c] += sum[c];
@@ -410,15 +427,13 @@ impl March<'_> {
     fn sample(&self, light: &Light, line: DVec3, at: f64, length: f64, k: usize) -> [f32; 3] {
         let point = self.eye + line * at;
         let density = self.density.at(at);
-        let Arrival { illuminance, toward, distance } = light.arriving(point);
-        if illuminance == [0.0; 3] || density <= 0.0 || point.y < self.density.moment.ground {
+        if density <= 0.0 || point.y < self.density.moment.ground {
             return [0.0; 3];
         }
+        let radiance = self.lighting.radiance(light, point, line);
         let share = ((at - self.distances[k]) / (self.distances[k + 1] - self.distances[k])) as f32;
         let depth = self.depths[k] + (self.depths[k + 1] - self.depths[k]) * share;
-        let through = math::lanes::exp(-depth - (self.lighting.extinction * distance) as f32);
-        let scattered = self.lighting.scattering.at(toward.dot(line) as f32);
-        let scale = through * (density * length) as f32;
-        std::array::from_fn(|c| illuminance[c] * scattered[c] * scale)
+        let scale = math::lanes::exp(-depth) * (density * length) as f32;
+        radiance.map(|value| value * scale)
     }
 }

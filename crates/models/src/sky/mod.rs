@@ -23,7 +23,7 @@ use night::NightSky;
 use skyline::Skyline;
 use stars::{Spot, Stars};
 
-/// The sky of a scene, infinitely far and opaque; at night with stars, and hills before it.
+/// The sky of a scene, infinitely far and opaque, with hills before it; at night with stars.
 pub struct SkyBackdrop {
     parameters: SkyParameters,
     stars: Option<Stars>,
@@ -38,15 +38,18 @@ impl SkyBackdrop {
     pub fn new(parameters: SkyParameters, seed: u64) -> Self {
         let night = parameters.kind == SkyKind::Night;
         let stars = (night && parameters.night.stars > 0.0).then(|| Stars::new(seed));
-        let skyline = if night { Skyline::new(&parameters.night, seed) } else { None };
-        Self { parameters, stars, skyline }
+        Self { stars, skyline: Skyline::new(&parameters, seed), parameters }
+    }
+
+    /// Where the hills stand.
+    fn hills(&self) -> DepthInterval {
+        let near = self.parameters.hills_distance;
+        DepthInterval { near, far: near * (1.0 + 1e-4) }
     }
 }
 
 /// Behind everything that has a depth.
 const FAR: DepthInterval = DepthInterval { near: 1e12, far: f64::INFINITY };
-/// Where the hills stand.
-const HILLS: DepthInterval = DepthInterval { near: 8e3, far: 8.001e3 };
 /// Light of hills and trees beside that of the sky overhead.
 const HILL_SHADE: f32 = 0.04;
 
@@ -68,7 +71,7 @@ impl Phenomenon for SkyBackdrop {
     }
 
     fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
-        if self.skyline.is_some() { vec![HILLS, FAR] } else { vec![FAR] }
+        if self.skyline.is_some() { vec![self.hills(), FAR] } else { vec![FAR] }
     }
 
     fn prepare<'a>(
@@ -81,7 +84,14 @@ impl Phenomenon for SkyBackdrop {
         let shown = sky.night().zip(self.stars.as_ref());
         let spots = shown.map(|(night, stars)| stars.spots(view, night, self.parameters.night.stars));
         let night = sky.night().map(|night| NightSky::new(&sky, night, self.parameters.night.milky_way));
-        Ok(Box::new(PreparedSky { view, sky, night, spots: spots.unwrap_or_default(), skyline: self.skyline.as_ref() }))
+        Ok(Box::new(PreparedSky {
+            view,
+            sky,
+            night,
+            spots: spots.unwrap_or_default(),
+            skyline: self.skyline.as_ref(),
+            hills: self.hills(),
+        }))
     }
 }
 
@@ -92,6 +102,8 @@ struct PreparedSky<'a> {
     /// Stars, from the top down.
     spots: Vec<Spot>,
     skyline: Option<&'a Skyline>,
+    /// Where it stands.
+    hills: DepthInterval,
 }
 
 impl PreparedSky<'_> {
@@ -170,13 +182,18 @@ impl PreparedSky<'_> {
                 let Directions { axes: [xs, sines, zs], seen } = directions;
                 for i in rect.x.max(x) - x..rect.right().min(x + LANES) - x {
                     let index = (y - rect.y) * rect.width + x + i - rect.x;
-                    if sines[i] > highest || !seen[i] || !strip.visible(index, HILLS.near as f32) {
+                    if sines[i] > highest || !seen[i] || !strip.visible(index, self.hills.near as f32) {
                         continue;
                     }
                     let hidden = skyline.sine(f64::from(lanes::atan2(xs[i], -zs[i])) / TAU);
                     let cover = ((hidden - sines[i]) * sharpness + 0.5).clamp(0.0, 1.0);
                     if cover > 0.0 {
-                        strip.add_behind(index, shade.map(|value| value * cover), [1.0 - cover; 3], HILLS.near as f32);
+                        strip.add_behind(
+                            index,
+                            shade.map(|value| value * cover),
+                            [1.0 - cover; 3],
+                            self.hills.near as f32,
+                        );
                     }
                 }
                 x += LANES;
@@ -209,7 +226,7 @@ impl SkyRow {
 
 impl Prepared for PreparedSky<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
-        let hills = self.skyline.is_some() && slice.overlaps(&HILLS);
+        let hills = self.skyline.is_some() && slice.overlaps(&self.hills);
         if hills || slice.overlaps(&FAR) {
             Rect::of_size(self.view.size[0], self.view.size[1])
         } else {
@@ -219,7 +236,7 @@ impl Prepared for PreparedSky<'_> {
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let level = Level::new();
-        if let Some(skyline) = self.skyline.filter(|_| slice.contains(HILLS.near)) {
+        if let Some(skyline) = self.skyline.filter(|_| slice.contains(self.hills.near)) {
             dispatch!(level, _simd => self.draw_hills(skyline, strip));
         }
         if slice.overlaps(&FAR) {

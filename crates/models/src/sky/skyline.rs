@@ -3,7 +3,7 @@
 use bansho_base::{
     math,
     random::{Key, Purpose},
-    sky::NightParameters,
+    sky::SkyParameters,
 };
 
 /// Samples around the horizon, a power of two.
@@ -29,7 +29,7 @@ pub(super) struct Skyline {
 
 impl Skyline {
     /// Hills and trees; none where neither has any height.
-    pub(super) fn new(parameters: &NightParameters, seed: u64) -> Option<Self> {
+    pub(super) fn new(parameters: &SkyParameters, seed: u64) -> Option<Self> {
         if parameters.hills_deg == 0.0 && parameters.trees_deg == 0.0 {
             return None;
         }
@@ -96,11 +96,11 @@ mod tests {
 
     #[test]
     fn it_is_as_high_as_asked_and_closes_all_around() {
-        let parameters = NightParameters { hills_deg: 3.0, trees_deg: 1.0, ..NightParameters::default() };
+        let parameters = SkyParameters { hills_deg: 3.0, trees_deg: 1.0, ..SkyParameters::default() };
         let skyline = Skyline::new(&parameters, 3).unwrap();
         let highest = math::asin(f64::from(skyline.highest)).to_degrees();
         assert!((1.5..4.1).contains(&highest), "{highest}");
         assert!((skyline.sine(0.0) - skyline.sine(1.0)).abs() < 1e-6);
-        assert!(Skyline::new(&NightParameters::default(), 3).is_none());
+        assert!(Skyline::new(&SkyParameters::default(), 3).is_none());
     }
 }

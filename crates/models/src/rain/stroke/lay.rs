@@ -5,7 +5,7 @@ use super::{
         bands::BAND,
         patch::{Patch, Rows, STRETCH},
     },
-    Stroke,
+    Stroke, at_least, at_most,
 };
 
 /// Share of a disc's area that lies left of `t`, with the disc from -1 to 1: the integral of `2 sqrt(1 - t^2) / pi`, eq. of the streak's
@@ -16,17 +16,6 @@ fn disc_share(t: f32) -> f32 {
     let s = t * t;
     let odd = t * (-0.022_935_f32).mul_add(s, -0.025).mul_add(s, -1.0 / 6.0).mul_add(s, 1.0);
     odd.mul_add(std::f32::consts::FRAC_2_PI, 0.5)
-}
-
-/// Comparisons that become one instruction each, unlike those that ask what is not a number.
-#[inline(always)]
-fn at_least(least: f32, value: f32) -> f32 {
-    if value > least { value } else { least }
-}
-
-#[inline(always)]
-fn at_most(most: f32, value: f32) -> f32 {
-    if value < most { value } else { most }
 }
 
 /// 0, 1 and so on, of each row.

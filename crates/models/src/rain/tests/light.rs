@@ -33,7 +33,7 @@ fn along_a_beam_light_falls_with_the_square_of_the_distance() {
     let samples: Vec<[f64; 2]> = (1..40)
         .map(|i| {
             let distance = 0.5 * f64::from(i);
-            let radiance = lighting.radiance(DVec3::X * distance, -DVec3::Z)[1];
+            let radiance = lighting.radiance(&lights[0], DVec3::X * distance, -DVec3::Z)[1];
             [math::ln(distance), math::ln(f64::from(radiance))]
         })
         .collect();
@@ -90,13 +90,13 @@ fn the_veil_is_single_scattering_along_each_line_of_sight() {
     let lighting = Lighting { scattering: &rain.scattering, lights: &[light], extinction: beta };
     for (x, y) in [(80, 20), (40, 32), (100, 40), (128, 16), (92, 33)] {
         let line = view.camera.direction(math::DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap().normalize();
-        let end = rain.reach();
+        let end = rain.near_reach();
         let steps = 20_000;
         let step = end / f64::from(steps);
         let expected: f64 = (0..steps)
             .map(|i| {
                 let at = (f64::from(i) + 0.5) * step;
-                let radiance = f64::from(lighting.radiance(view.camera.position + line * at, line)[1]);
+                let radiance = f64::from(lighting.radiance(&light, view.camera.position + line * at, line)[1]);
                 radiance * beta * math::exp(-beta * at) * step
             })
             .sum();
