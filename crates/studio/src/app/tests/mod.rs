@@ -1,7 +1,9 @@
 //! The window driven as a person with a screen reader would: by what widgets are called.
 
 mod aurora;
+mod keeping;
 mod pictures;
+mod values;
 
 use std::{path::Path, sync::Arc, time::Instant};
 
@@ -50,6 +52,14 @@ fn drawn(harness: &mut Harness<'_, Studio>) {
         assert!(began.elapsed().as_secs() < 60, "no picture");
     }
     harness.run_steps(2);
+}
+
+/// A small scene with an aurora of few particles, to be quick; `rest` goes on in its table.
+fn sky(frames: u32, rest: &str) -> String {
+    format!(
+        "bansho = 1\n[picture]\nsize = [64, 36]\nframes = {frames}\n[[aurora]]\npreroll_s = 0.0\n\
+         particles = {{ count = 300 }} # few, to be quick\nfield = {{ cells = 31 }}\n{rest}"
+    )
 }
 
 fn text(harness: &mut Harness<'_, Studio>) -> String {

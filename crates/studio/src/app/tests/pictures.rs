@@ -2,7 +2,7 @@
 //! device; Mesa's lavapipe is one.
 
 use eframe::{
-    egui::{Theme, vec2},
+    egui::{Role, Theme, vec2},
     egui_wgpu::WgpuSetup,
 };
 use egui_kittest::{
@@ -11,7 +11,7 @@ use egui_kittest::{
     wgpu::{WgpuTestRenderer, default_wgpu_setup},
 };
 
-use super::{super::Studio, SCENE, drawn, window_by};
+use super::{super::Studio, SCENE, drawn, sky, window_by};
 
 /// Small, for they are kept with the code.
 const SIZE: [f32; 2] = [960.0, 620.0];
@@ -51,7 +51,7 @@ fn curves_look_as_they_did() {
     let mut harness = painted(SCENE);
     harness.get_by_label("texture").click();
     harness.run_steps(12);
-    harness.get_by_label("threshold").scroll_to_me();
+    harness.get_by_role_and_label(Role::Canvas, "threshold").scroll_to_me();
     harness.run_steps(12);
     looks(&mut harness, "curves");
 }
@@ -59,17 +59,8 @@ fn curves_look_as_they_did() {
 #[test]
 #[ignore = "needs a Vulkan device"]
 fn the_aurora_editor_looks_as_it_did() {
-    let mut harness = painted(
-        "\
-bansho = 1
-[picture]
-size = [64, 36]
-frames = 150
-[[aurora]]
+    let shapes = "\
 extent_km = 800.0
-preroll_s = 0.0
-particles = { count = 300 }
-field = { cells = 31 }
 [[aurora.shapes]]
 sheets = [{ points = [[-300, 0], [0, 60], [300, 0]] }, { points = [[-200, -150], [200, -120]] }]
 [[aurora.shapes]]
@@ -80,8 +71,8 @@ sheets = [
 ]
 split = [{ sheet = 1, at = 0.5 }]
 link = [{ from = 2, to = 3, at = 0.3, arrives = 0.5 }]
-",
-    );
+";
+    let mut harness = painted(&sky(150, shapes));
     harness.get_by_label("Shape 2").click();
     drawn(&mut harness);
     looks(&mut harness, "aurora_editor");
