@@ -101,7 +101,7 @@ impl Session {
         self.assets = assets(&self.bundle, path.as_deref(), self.assets_of);
         (self.document, self.path) = (document, path);
         (self.picture, self.asked, self.broken, self.notice) = (None, None, None, None);
-        (self.stages, self.stage_pictures) = (None, Vec::new());
+        (self.stages, self.stage_pictures, self.pace) = (None, Vec::new(), Pace::default());
         self.transport = Transport::default();
         self.opened += 1;
     }

@@ -33,7 +33,7 @@ impl StagesView {
 
     fn stage(&mut self, ui: &mut Ui, session: &Session, stage: usize, name: &str, width: f32) {
         ui.vertical(|ui| {
-            let (rect, response) = ui.allocate_exact_size(vec2(width, width * 4.0 / 3.0), Sense::hover());
+            let (rect, response) = ui.allocate_exact_size(vec2(width, width), Sense::hover());
             let label = format!("Stage {name}");
             response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &label));
             ui.painter().rect_filled(rect, 2.0, Color32::BLACK);

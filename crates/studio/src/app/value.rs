@@ -77,7 +77,7 @@ impl Widget<'_> {
     /// Slides over what is allowed, by decades where it spans many; nothing where there are no bounds.
     fn slider(&self, ui: &mut Ui, mut number: f64, bounds: [f64; 2]) -> Option<f64> {
         let scale = Scale::over(bounds, self.usual)?;
-        ui.spacing_mut().slider_width = (ui.available_width() - BESIDE).max(NARROWEST);
+        ui.spacing_mut().slider_width = (ui.available_size_before_wrap().x - BESIDE).max(NARROWEST);
         let slider = egui::Slider::new(&mut number, bounds[0]..=bounds[1]).show_value(false);
         let slider = match scale {
             Scale::Even => slider,

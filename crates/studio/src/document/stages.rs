@@ -6,6 +6,7 @@ use bansho::{
     Assets, KINDS, Plan, PlanOptions,
     base::{
         camera::CameraParameters,
+        color::ev100_of_white_luminance,
         parameters::{Auto, Parameters, Reader, Value},
     },
     models::flame_sheet::{FlameSheetParameters, StageShown},
@@ -17,7 +18,7 @@ use bansho::{
 };
 
 /// Size of a stage's picture, pixels.
-const SIZE: [usize; 2] = [96, 128];
+const SIZE: [usize; 2] = [112, 112];
 
 /// Vertical field of view, degrees: narrow, for a flat square is shown.
 const FIELD: f64 = 20.0;
@@ -50,7 +51,11 @@ fn plan(name: &str, text: &str, assets: &Arc<dyn Assets>, index: usize, stage: &
     let sheets = scene.instances.iter().filter(|instance| instance.kind.key == FlameSheetParameters::KEY);
     let alone = Instance { enabled: true, ..sheets.skip(index).next()?.clone() };
     let mut picture = scene.picture.clone();
-    (picture.overscan, picture.exposure_ev100) = (0, Auto::Auto);
+    picture.overscan = 0;
+    // Grays are shares of the full luminance.
+    let full = sheet.colour.luminance.bounds()[1].max(f64::MIN_POSITIVE);
+    let coloured = stage == StageShown::Coloured.name();
+    picture.exposure_ev100 = if coloured { Auto::Auto } else { Auto::Set(ev100_of_white_luminance(full)) };
     let scene = Scene {
         picture,
         camera: camera(sheet.width, sheet.height),
