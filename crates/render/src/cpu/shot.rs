@@ -316,3 +316,36 @@ impl Shot for CpuShot {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::assets::MemoryAssets;
+
+    use super::*;
+    use crate::{phenomena::KINDS, plan::PlanOptions, scene::Scene};
+
+    fn plan(text: &str) -> Arc<Plan> {
+        let assets = Arc::new(MemoryAssets::default());
+        let scene = Scene::parse("scene", text, KINDS, assets.as_ref()).unwrap();
+        Arc::new(Plan::new(scene, &PlanOptions::default(), assets).unwrap())
+    }
+
+    #[test]
+    fn only_what_changed_is_made_anew() {
+        let text = "bansho = 1\n[wind]\n[sky]\n[[flame_sheet]]\n[[flame_sheet]]\nname = \"second\"\nheight = 1.0\n";
+        let mut shot = CpuShot::open(plan(text)).unwrap();
+        let made = |shot: &CpuShot| -> Vec<usize> {
+            shot.phenomena.iter().map(|own| std::ptr::from_ref(own.as_ref()).addr()).collect()
+        };
+        let first = made(&shot);
+        shot.replan(plan(&text.replace("[wind]", "[wind]\nvelocity = [1, 0, 0]"))).unwrap();
+        assert_eq!(made(&shot), first, "wind is not theirs");
+        shot.replan(plan(&text.replace("height = 1.0", "height = 2.0"))).unwrap();
+        let second = made(&shot);
+        assert_eq!([second[0], second[2]], [first[0], first[2]]);
+        assert_ne!(second[1], first[1]);
+        shot.replan(plan("bansho = 1\n[[flame_sheet]]\nname = \"second\"\nheight = 2.0\n")).unwrap();
+        assert_eq!(made(&shot), [second[1]]);
+        assert_eq!(shot.clocks.len(), 1);
+    }
+}

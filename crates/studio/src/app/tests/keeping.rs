@@ -19,7 +19,7 @@ use bansho::{
 use eframe::egui::{DroppedFile, ViewportEvent, ViewportId};
 use egui_kittest::{Harness, kittest::Queryable};
 
-use super::{super::Studio, SCENE, Session, assets, drawn, sky, text, window};
+use super::{super::Studio, PATIENCE, SCENE, Session, assets, drawn, sky, text, window};
 use crate::{
     document::{Document, recovery::Autosave},
     player::{SlicePlayer, ThreadPlayer},
@@ -48,7 +48,7 @@ fn until(harness: &mut Harness<'_, Studio>, what: &str, done: impl Fn(&mut Harne
     while !done(harness) {
         harness.step();
         thread::sleep(Duration::from_millis(10));
-        assert!(began.elapsed().as_secs() < 60, "{what}");
+        assert!(began.elapsed() < PATIENCE, "{what}");
     }
 }
 
