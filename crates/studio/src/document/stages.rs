@@ -48,8 +48,8 @@ fn plan(name: &str, text: &str, assets: &Arc<dyn Assets>, index: usize, stage: &
     ];
     operations.extend(stated("instances").then(|| Operation::Remove { place: place.key("instances") }));
     let scene = Scene::reparse(name, &operation::apply(text, &operations).ok()?, KINDS).ok()?;
-    let sheets = scene.instances.iter().filter(|instance| instance.kind.key == FlameSheetParameters::KEY);
-    let alone = Instance { enabled: true, ..sheets.skip(index).next()?.clone() };
+    let mut sheets = scene.instances.iter().filter(|instance| instance.kind.key == FlameSheetParameters::KEY);
+    let alone = Instance { enabled: true, ..sheets.nth(index)?.clone() };
     let mut picture = scene.picture.clone();
     picture.overscan = 0;
     // Grays are shares of the full luminance.
