@@ -9,6 +9,7 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 use crate::{
     camera::{Camera, CameraParameters},
     image::Rect,
+    math::Fused,
 };
 
 pub use aov::{AovDescriptor, AovPlane, AovRule};
@@ -203,7 +204,7 @@ impl Absorption {
 
 /// Of each value `share`, and the rest of the other.
 fn mix(values: &mut [f32], others: &[f32], share: f32) {
-    values.iter_mut().zip(others).for_each(|(value, other)| *value = share.mul_add(*value - other, *other));
+    values.iter_mut().zip(others).for_each(|(value, other)| *value = share.fused(*value - other, *other));
 }
 
 fn reset(plane: &mut Vec<f32>, pixels: usize, value: f32) {
@@ -343,7 +344,7 @@ impl Strip {
     pub fn emit(&mut self, index: usize, radiance: [f32; 3], depth: f32) {
         let transmittance = self.transmittance(index);
         for c in 0..3 {
-            self.radiance[c][index] = radiance[c].mul_add(transmittance[c], self.radiance[c][index]);
+            self.radiance[c][index] = radiance[c].fused(transmittance[c], self.radiance[c][index]);
         }
         self.depth[index] = self.depth[index].min(depth);
     }

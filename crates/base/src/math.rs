@@ -1,7 +1,8 @@
 //! Mathematics with the same result on every machine.
 //!
 //! The platform's `sin`, `exp` or `pow` differ in their last bits between systems, so a picture made with them is not
-//! reproducible. Here every function is computed by `libm`, written in Rust with IEEE operations only.
+//! reproducible. Here every function is computed by `libm`, written in Rust with IEEE operations only. Of glam's functions those are used
+//! that need no more than these and a square root.
 //! The free functions take `f64`; [`f32`](mod@f32) holds the same for `f32`; [`lanes`] holds branch-free approximations for hot loops.
 
 pub mod f32;
@@ -11,6 +12,26 @@ pub use glam::{
     Affine3A, DAffine3, DMat2, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, EulerRot, IVec2, IVec3, Mat2, Mat3, Mat4,
     Quat, UVec2, UVec3, Vec2, Vec3, Vec3A, Vec4,
 };
+
+/// Multiply-adds of hot loops.
+pub trait Fused: Sized {
+    /// `self * factor + term`, rounded once; rounded twice in WebAssembly, where rounding once would be thirty times slower.
+    #[must_use]
+    fn fused(self, factor: Self, term: Self) -> Self;
+}
+
+macro_rules! fused {
+    ($($float:ty),*) => {
+        $(impl Fused for $float {
+            #[inline(always)]
+            fn fused(self, factor: Self, term: Self) -> Self {
+                if cfg!(target_arch = "wasm32") { self * factor + term } else { self.mul_add(factor, term) }
+            }
+        })*
+    };
+}
+
+fused!(::core::primitive::f32, ::core::primitive::f64);
 
 /// Sine of `x` radians.
 pub fn sin(x: f64) -> f64 {

@@ -1,6 +1,8 @@
 //! Where a thing stands, how it is turned and how large it is.
 
-use glam::{DQuat, DVec3, EulerRot};
+use glam::{DQuat, DVec3};
+
+use crate::math;
 
 /// Scale, then turn, then move.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,8 +18,7 @@ pub struct Placement {
 impl Placement {
     /// Moved to `position`, turned about x, then y, then z by `rotation_deg` degrees, `scale` times as large.
     pub fn new(position: [f64; 3], rotation_deg: [f64; 3], scale: f64) -> Self {
-        let [x, y, z] = rotation_deg.map(f64::to_radians);
-        Self { position: position.into(), rotation: DQuat::from_euler(EulerRot::ZYX, z, y, x), scale }
+        Self { position: position.into(), rotation: turn(rotation_deg.map(f64::to_radians)), scale }
     }
 
     /// A point of the thing, in the world.
@@ -34,6 +35,13 @@ impl Placement {
     pub fn turn(&self, direction: DVec3) -> DVec3 {
         self.rotation * direction
     }
+}
+
+/// The turn about x, then y, then z by these angles, radians.
+fn turn(angles: [f64; 3]) -> DQuat {
+    let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(|angle| math::sin_cos(0.5 * angle));
+    let (cc, cs, sc, ss) = (cx * cz, cx * sz, sx * cz, sx * sz);
+    DQuat::from_xyzw(cy * sc - sy * cs, cy * ss + sy * cc, cy * cs - sy * sc, cy * cc + sy * ss)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use bansho_base::parameters::{Parameters, Table, Value};
 
-use crate::plan::Plan;
+use crate::{phenomena::Part, plan::Plan, scene::Instance};
 
 /// The version whose pictures these are; another version's frames are drawn anew.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -36,32 +36,55 @@ pub fn of_state(plan: &Plan) -> [u8; 32] {
     *hasher.finalize().as_bytes()
 }
 
+/// A fingerprint of all that a part of the plan is made from.
+pub(crate) fn of_part(plan: &Plan, part: &Part) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(format!("seed {} loop {:?}\n", plan.seed, plan.loop_s).as_bytes());
+    match part {
+        Part::Instance(own) => {
+            instance(own, &mut hasher);
+            own.source.assets().iter().for_each(|path| shared_asset(plan, path, &mut hasher));
+        }
+        Part::Lamps(lights) => lights.iter().for_each(|light| table("light", light.to_table(), &mut hasher)),
+        Part::Ground(ground) => table("ground", ground.to_table(), &mut hasher),
+        Part::Sky(sky) => table("sky", sky.to_table(), &mut hasher),
+    }
+    *hasher.finalize().as_bytes()
+}
+
 fn state(plan: &Plan, hasher: &mut blake3::Hasher) {
-    let mut table = |label: &str, table: Table| {
-        hasher.update(format!("{label} {}\n", Value::Table(table)).as_bytes());
-    };
-    table(&format!("bansho {VERSION} seed {} loop {:?} wind", plan.seed, plan.loop_s), plan.scene.wind.to_table());
-    table("air", plan.scene.air.to_table());
+    let seeded = format!("bansho {VERSION} seed {} loop {:?} wind", plan.seed, plan.loop_s);
+    table(&seeded, plan.scene.wind.to_table(), hasher);
+    table("air", plan.scene.air.to_table(), hasher);
     for light in &plan.scene.lights {
-        table("light", light.to_table());
+        table("light", light.to_table(), hasher);
     }
     if let Some(sky) = &plan.scene.sky {
-        table("sky", sky.to_table());
+        table("sky", sky.to_table(), hasher);
     }
     if let Some(ground) = &plan.scene.ground {
-        table("ground", ground.to_table());
+        table("ground", ground.to_table(), hasher);
     }
     for obstacle in &plan.scene.obstacles {
-        table("obstacle", obstacle.to_table());
+        table("obstacle", obstacle.to_table(), hasher);
     }
     let enabled = || plan.scene.instances.iter().filter(|instance| instance.enabled);
-    for instance in enabled() {
-        table(&format!("{} {:?}", instance.kind.key, instance.name), instance.source.canonical());
-    }
+    enabled().for_each(|own| instance(own, hasher));
     let obstacles = plan.scene.obstacles.iter().filter_map(|obstacle| Some(obstacle.file.as_ref()?.0.clone()));
-    for path in obstacles.chain(enabled().flat_map(|instance| instance.source.assets())) {
-        asset(plan, &path, plan.scene.picture.first_frame, hasher);
-    }
+    obstacles.chain(enabled().flat_map(|own| own.source.assets())).for_each(|path| shared_asset(plan, &path, hasher));
+}
+
+fn table(label: &str, table: Table, hasher: &mut blake3::Hasher) {
+    hasher.update(format!("{label} {}\n", Value::Table(table)).as_bytes());
+}
+
+fn instance(instance: &Instance, hasher: &mut blake3::Hasher) {
+    table(&format!("{} {:?}", instance.kind.key, instance.name), instance.source.canonical(), hasher);
+}
+
+/// An asset that all frames have in common.
+fn shared_asset(plan: &Plan, path: &str, hasher: &mut blake3::Hasher) {
+    asset(plan, path, plan.scene.picture.first_frame, hasher);
 }
 
 /// An asset that vanished has a fingerprint too, so that its return draws the frame anew.

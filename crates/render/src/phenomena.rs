@@ -1,19 +1,23 @@
 //! The kinds of phenomena that scenes may hold: the one place where models meet the renderer.
 
-use bansho_base::{parameters::ProblemKind, phenomenon::Phenomenon};
+use bansho_base::{parameters::ProblemKind, phenomenon::Phenomenon, sky::SkyParameters};
 use bansho_models::{
     aurora::{Aurora, AuroraParameters, shapes::ShapeFaultKind},
     flame_particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind},
     flame_sheet::{FlameSheet, FlameSheetParameters},
-    ground::Ground,
+    ground::{Ground, GroundParameters},
     lamps::{Lamp, Lamps},
     rain::{Rain, RainParameters},
     sky::SkyBackdrop,
 };
 
 use crate::{
-    plan::Plan,
-    scene::source::{Describe, Opening, OpeningFault, PhenomenonKind},
+    dissolving::Dissolving,
+    plan::{Plan, PlanError, opening_error},
+    scene::{
+        Instance, LightParameters, Scene,
+        source::{Describe, Opening, OpeningFault, PhenomenonKind},
+    },
 };
 
 /// Every kind, in the order in which schema and book list them.
@@ -81,20 +85,63 @@ impl Describe for AuroraParameters {
     }
 }
 
-/// What the scene shows beside its phenomena: lamps, ground, and a sky where there is no plate.
-pub(crate) fn of_scene(plan: &Plan) -> Vec<Box<dyn Phenomenon>> {
-    let scene = &plan.scene;
-    let mut own: Vec<Box<dyn Phenomenon>> = Vec::new();
+/// One of the phenomena that a plan draws.
+pub(crate) enum Part<'a> {
+    /// A phenomenon of the scene.
+    Instance(&'a Instance),
+    /// The lamps that are seen.
+    Lamps(Vec<LightParameters>),
+    /// The ground.
+    Ground(&'a GroundParameters),
+    /// The sky, where there is no plate.
+    Sky(&'a SkyParameters),
+}
+
+/// Everything that `scene` shows: its phenomena, then its own lamps, ground and sky.
+pub(crate) fn parts(scene: &Scene) -> Vec<Part<'_>> {
+    let enabled = scene.instances.iter().filter(|instance| instance.enabled);
+    let mut parts: Vec<Part> = enabled.map(Part::Instance).collect();
     let visible: Vec<_> = scene.lights.iter().filter(|light| light.visible).cloned().collect();
     if !visible.is_empty() {
-        let at = move |t| visible.iter().map(|light| Lamp { light: light.at(t), radius: light.radius }).collect();
-        own.push(Box::new(Lamps::new(at)));
+        parts.push(Part::Lamps(visible));
     }
-    if let Some(ground) = &scene.ground {
-        own.push(Box::new(Ground::new(ground.clone(), plan.seed, plan.loop_s)));
+    parts.extend(scene.ground.as_ref().map(Part::Ground));
+    parts.extend(scene.sky.as_ref().filter(|sky| sky.visible && !scene.has_plate()).map(Part::Sky));
+    parts
+}
+
+impl Part<'_> {
+    /// Luminance of its bright parts, cd/m^2, where that is known without making it.
+    pub(crate) fn luminance(&self) -> Option<f64> {
+        match self {
+            Self::Instance(instance) => instance.luminance,
+            _ => None,
+        }
     }
-    if let Some(sky) = scene.sky.as_ref().filter(|sky| sky.visible && !scene.has_plate()) {
-        own.push(Box::new(SkyBackdrop::new(sky.clone(), plan.seed)));
+
+    /// Makes it, at its beginning.
+    pub(crate) fn open(&self, plan: &Plan) -> Result<Box<dyn Phenomenon>, PlanError> {
+        Ok(match self {
+            Self::Instance(instance) => return open(instance, plan),
+            Self::Lamps(lights) => {
+                let lights = lights.clone();
+                let at =
+                    move |t| lights.iter().map(|light| Lamp { light: light.at(t), radius: light.radius }).collect();
+                Box::new(Lamps::new(at))
+            }
+            Self::Ground(ground) => Box::new(Ground::new((*ground).clone(), plan.seed, plan.loop_s)),
+            Self::Sky(sky) => Box::new(SkyBackdrop::new((*sky).clone(), plan.seed)),
+        })
     }
-    own
+}
+
+/// Makes a phenomenon of the scene; in a loop one run of it passes into the next.
+fn open(instance: &Instance, plan: &Plan) -> Result<Box<dyn Phenomenon>, PlanError> {
+    let opening = Opening { name: &instance.name, seed: plan.seed, loop_s: plan.loop_s, assets: plan.assets.as_ref() };
+    let make = || instance.source.open(&opening).map_err(|fault| opening_error(instance.name.clone(), fault));
+    let phenomenon = make()?;
+    Ok(match (plan.loop_s, phenomenon.stepping()) {
+        (Some(turn), Some(stepping)) => Box::new(Dissolving::new(turn, stepping, [phenomenon, make()?])),
+        _ => phenomenon,
+    })
 }

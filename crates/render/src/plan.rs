@@ -14,9 +14,8 @@ use bansho_base::{
 };
 
 use crate::{
-    dissolving::Dissolving,
     fingerprint, phenomena,
-    scene::{FrameRate, ObstacleParameters, Opening, OpeningFault, Scene},
+    scene::{FrameRate, ObstacleParameters, OpeningFault, Scene},
 };
 
 /// What a job may change of a scene.
@@ -129,7 +128,7 @@ impl Plan {
     /// The options do not fit the scene, or a phenomenon cannot be made.
     pub fn new(scene: Scene, options: &PlanOptions, assets: Arc<dyn Assets>) -> Result<Self, PlanError> {
         let mut plan = Self::unexposed(scene, options, assets)?;
-        plan.exposure_ev100 = plan.exposure(&plan.open()?);
+        plan.exposure_ev100 = plan.exposure()?;
         Ok(plan.begun_calmly())
     }
 
@@ -185,20 +184,7 @@ impl Plan {
     /// # Errors
     /// A phenomenon cannot be made.
     pub fn open(&self) -> Result<Vec<Box<dyn Phenomenon>>, PlanError> {
-        let open = |instance: &crate::scene::Instance| -> Result<Box<dyn Phenomenon>, PlanError> {
-            let opening =
-                Opening { name: &instance.name, seed: self.seed, loop_s: self.loop_s, assets: self.assets.as_ref() };
-            let make = || instance.source.open(&opening).map_err(|fault| opening_error(instance.name.clone(), fault));
-            let phenomenon = make()?;
-            match (self.loop_s, phenomenon.stepping()) {
-                (Some(turn), Some(stepping)) => Ok(Box::new(Dissolving::new(turn, stepping, [phenomenon, make()?]))),
-                _ => Ok(phenomenon),
-            }
-        };
-        let enabled = self.scene.instances.iter().filter(|instance| instance.enabled);
-        let mut phenomena = enabled.map(open).collect::<Result<Vec<_>, _>>()?;
-        phenomena.extend(phenomena::of_scene(self));
-        Ok(phenomena)
+        phenomena::parts(&self.scene).iter().map(|part| part.open(self)).collect()
     }
 
     /// What users should know of how phenomena will look, each with its phenomenon's name.
@@ -277,14 +263,21 @@ impl Plan {
         color::exposure_scale(f64::from(self.exposure_ev100)) as f32
     }
 
-    fn exposure(&self, phenomena: &[Box<dyn Phenomenon>]) -> f32 {
-        match self.scene.picture.exposure_ev100 {
-            Auto::Set(ev100) => ev100 as f32,
-            Auto::Auto => {
-                let brightest = phenomena.iter().map(|phenomenon| phenomenon.luminance()).fold(0.0, f64::max);
-                auto_ev100(brightest)
-            }
+    fn exposure(&self) -> Result<f32, PlanError> {
+        // Those that were made already need not be made again.
+        let as_read = self.loop_s.is_none() && self.seed == self.scene.picture.seed as u64;
+        let mut brightest = 0.0_f64;
+        for part in phenomena::parts(&self.scene) {
+            let luminance = match part.luminance().filter(|_| as_read) {
+                Some(luminance) => luminance,
+                None => part.open(self)?.luminance(),
+            };
+            brightest = brightest.max(luminance);
         }
+        Ok(match self.scene.picture.exposure_ev100 {
+            Auto::Set(ev100) => ev100 as f32,
+            Auto::Auto => auto_ev100(brightest),
+        })
     }
 
     /// Makes keyed values repeat, which must come back to where they began.
@@ -306,7 +299,7 @@ impl Plan {
     }
 }
 
-fn opening_error(name: String, fault: OpeningFault) -> PlanError {
+pub(crate) fn opening_error(name: String, fault: OpeningFault) -> PlanError {
     PlanError::Opening { name, key: fault.key.clone(), fault: Box::new(fault) }
 }
 

@@ -37,6 +37,10 @@ pub struct Speed {
     pub name: &'static str,
     /// Pictures a second while it plays.
     pub pictures_per_s: f64,
+    /// What of each the simulation takes, s.
+    pub advance_s: f64,
+    /// What of each drawing takes, s. The rest is the studio's own.
+    pub draw_s: f64,
     /// From a change to its picture, s.
     pub answer_s: f64,
 }
@@ -71,36 +75,43 @@ fn speed(name: &'static str, text: &str) -> Result<Speed, BenchError> {
     let text = format!("bansho = 1\n[picture]\nsize = [{width}, {height}]\nframes = 240\n{text}");
     let mut document = Document::new(name, text);
     let mut player = ThreadPlayer::start(|| {})?;
-    let mut draw = |document: &Document, number: i64| drawn(&mut player, document, name, number);
+    // The same all the while: others would be read anew.
+    let assets: Arc<dyn Assets> = Arc::new(Bundle::default());
+    let mut draw = |document: &Document, number: i64| drawn(&mut player, document, &assets, name, number);
     // The first picture makes what is made once.
     draw(&document, 0)?;
     let began = Instant::now();
+    let (mut advance_s, mut draw_s) = (0.0, 0.0);
     for number in 1..=PLAYED {
-        draw(&document, number)?;
+        let picture = draw(&document, number)?;
+        advance_s += picture.advance_s / PLAYED as f64;
+        draw_s += picture.draw_s / PLAYED as f64;
     }
     let pictures_per_s = PLAYED as f64 / began.elapsed().as_secs_f64();
     let began = Instant::now();
     document.replace("wind", &format!("{}[wind]\nvelocity = [1.0, 0.0, 0.0]\n", document.text()));
     draw(&document, PLAYED)?;
-    Ok(Speed { name, pictures_per_s, answer_s: began.elapsed().as_secs_f64() })
+    Ok(Speed { name, pictures_per_s, advance_s, draw_s, answer_s: began.elapsed().as_secs_f64() })
 }
 
 fn drawn(
     player: &mut ThreadPlayer,
     document: &Document,
+    assets: &Arc<dyn Assets>,
     scene: &'static str,
     number: i64,
 ) -> Result<Picture, BenchError> {
-    let assets: Arc<dyn Assets> = Arc::new(Bundle::default());
     player.wish(Wish {
         revision: document.revision(),
         name: document.name().to_owned(),
         text: document.text().clone(),
-        assets,
+        assets: assets.clone(),
         number: Some(number),
         within: SIZE,
         exact: false,
         draft: false,
+        still: false,
+        stages: None,
     });
     let failed = |reason: String| BenchError::Picture { scene, reason };
     loop {
@@ -110,7 +121,7 @@ fn drawn(
                 Event::Judged { outcome: Err(error), .. } => return Err(failed(error.to_string())),
                 Event::Failed { reason, .. } => return Err(failed(reason)),
                 Event::Panicked { message, .. } => return Err(failed(message)),
-                Event::Judged { .. } => {}
+                Event::Judged { .. } | Event::Stage(..) | Event::Still { .. } => {}
             }
         }
         thread::sleep(Duration::from_micros(200));

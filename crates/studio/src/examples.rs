@@ -83,6 +83,11 @@ impl Bundle {
         self.given.push((name, bytes.into()));
     }
 
+    /// The files that were given, by name.
+    pub fn given(&self) -> &[(String, Arc<[u8]>)] {
+        &self.given
+    }
+
     fn bytes(&self, name: &str) -> Result<&[u8], AssetError> {
         let given = self.given.iter().find(|(own, _)| own == name).map(|(_, bytes)| bytes.as_ref());
         let bundled = || FILES.iter().find(|(own, _)| *own == name).map(|(_, bytes)| *bytes);

@@ -43,12 +43,14 @@ pub(super) fn main() -> ExitCode {
 /// How fast the studio follows hands here, of the phenomena whose name contains `wanted`.
 fn bench(wanted: &str) -> ExitCode {
     for speed in bench::measure(wanted) {
-        let bench::Speed { name, pictures_per_s, answer_s } = match speed {
+        let bench::Speed { name, pictures_per_s, advance_s, draw_s, answer_s } = match speed {
             Ok(speed) => speed,
             Err(error) => return fail(&format!("error: {error}")),
         };
-        let answer_ms = 1000.0 * answer_s;
-        say(&format!("{name:24} {pictures_per_s:6.1} pictures/s, a change shows after {answer_ms:4.0} ms"));
+        let [advance, draw, answer] = [advance_s, draw_s, answer_s].map(|seconds| 1000.0 * seconds);
+        say(&format!(
+            "{name:24} {pictures_per_s:6.1} pictures/s ({advance:5.1} ms simulated, {draw:5.1} ms drawn), a change shows after {answer:4.0} ms"
+        ));
     }
     ExitCode::SUCCESS
 }

@@ -1,6 +1,7 @@
 //! Quantities beside light: how their samples become one number a pixel.
 
 use super::{mix, reset};
+use crate::math::Fused;
 
 /// How the samples of an AOV become one number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +38,7 @@ pub struct AovPlane {
 impl AovPlane {
     /// Adds a sample of `value` that counts `weight` at pixel `index` of the strip.
     pub fn add(&mut self, index: usize, value: f32, weight: f32) {
-        self.values[index] = value.mul_add(weight, self.values[index]);
+        self.values[index] = value.fused(weight, self.values[index]);
         self.weights[index] += weight;
     }
 

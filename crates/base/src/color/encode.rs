@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use crate::math::Fused;
+
 /// Linear value below which sRGB is a straight line.
 const LINEAR_LIMIT: f32 = 0.003_130_8;
 const LINEAR_SLOPE: f32 = 12.92;
@@ -30,7 +32,7 @@ pub fn encode_srgb(linear: f32) -> f32 {
     let [a, b, c, d, e, f, g, h] = rest;
     let mut power = h;
     for coefficient in [g, f, e, d, c, b, a, start] {
-        power = power.mul_add(s, coefficient);
+        power = power.fused(s, coefficient);
     }
     if x <= LINEAR_LIMIT { x * LINEAR_SLOPE } else { power }
 }

@@ -14,6 +14,7 @@
 //! Each step is a bijection onto its range and depends only on what is undone before it, so the whole has an exact inverse on the cube.
 
 use super::tone::ToneCurve;
+use crate::math::Fused;
 
 /// Compression at which a colour is half way to white (`c0`): chosen by eye on ramps of black bodies from 1000 to 3000 K.
 const HALF_WHITE_COMPRESSION: f32 = 17.0;
@@ -88,7 +89,7 @@ fn whitened(s: f32, c: f32) -> f32 {
 /// The saturation that [`whitened`] takes to `s`, 0 to 1.
 #[inline(always)]
 fn unwhitened(s: f32, c: f32) -> f32 {
-    let sum = c.mul_add(c, HALF_WHITE_SQUARED);
+    let sum = c.fused(c, HALF_WHITE_SQUARED);
     let w = c * c / sum;
     let outside = 1.0 - ((1.0 - s) * w).sqrt();
     let v = if 1.0 - s < w { outside } else { s };
@@ -109,11 +110,11 @@ pub(super) fn to_cube(tone: &ToneCurve, rgb: [f32; 3]) -> [f32; 3] {
     // t' with t = rise / range and a = bend / scale, brought to one division.
     let warm_bend = BEND * c * min(range, most);
     let bend = if is_warm(rgb, parts) { warm_bend } else { 0.0 };
-    let scale = most * c.mul_add(BEND / BEND_LIMIT, 1.0);
-    let t = rise * (scale + bend) / max(range.mul_add(scale, bend * rise), 1e-35);
+    let scale = most * c.fused(BEND / BEND_LIMIT, 1.0);
+    let t = rise * (scale + bend) / max(range.fused(scale, bend * rise), 1e-35);
 
     let chroma = brightness * saturation;
-    placed(rgb, parts, [brightness, chroma.mul_add(min(t, 1.0) - 1.0, brightness), brightness - chroma])
+    placed(rgb, parts, [brightness, chroma.fused(min(t, 1.0) - 1.0, brightness), brightness - chroma])
 }
 
 /// The linear sRGB that [`to_cube`] takes to `display`, whose components lie within 0..=1; reaches outside sRGB for the brightest colours.
@@ -125,14 +126,14 @@ pub(super) fn from_cube(tone: &ToneCurve, display: [f32; 3]) -> [f32; 3] {
     let (most, c) = tone.invert(brightness);
 
     let saturation = unwhitened(range / brightness, c);
-    let warm_bend = BEND * c / c.mul_add(BEND / BEND_LIMIT, 1.0) * min(saturation, 1.0);
+    let warm_bend = BEND * c / c.fused(BEND / BEND_LIMIT, 1.0) * min(saturation, 1.0);
     let bend = if is_warm(display, parts) { warm_bend } else { 0.0 };
     let bent = rise / max(range, 1e-35);
-    let t = bent / bend.mul_add(1.0 - bent, 1.0);
+    let t = bent / bend.fused(1.0 - bent, 1.0);
 
     let most = most - BLACK;
     let chroma = most * saturation;
-    placed(display, parts, [most, chroma.mul_add(t - 1.0, most), most - chroma])
+    placed(display, parts, [most, chroma.fused(t - 1.0, most), most - chroma])
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! From display light to codes: alpha, encoding, dither and rounding, one pixel at a time and alike at every vector width.
 
 use super::encode::{clamp_unit, encode_srgb};
+use crate::math::Fused;
 
 /// A number that stands for a display component.
 pub trait DisplayCode: Copy + Default + sealed::Sealed {
@@ -78,7 +79,7 @@ fn whole(x: f32) -> u32 {
 #[inline(always)]
 fn component_code<C: DisplayCode, const RAW: bool>(light: f32, phase: u32, channel: usize) -> u32 {
     let encoded = if RAW { clamp_unit(light) } else { encode_srgb(light) };
-    whole(encoded.mul_add(C::LARGEST, dither::<C>(phase, channel)))
+    whole(encoded.fused(C::LARGEST, dither::<C>(phase, channel)))
 }
 
 /// Codes of an opaque pixel.
@@ -104,10 +105,10 @@ pub(super) fn straight_codes<C: DisplayCode, const RAW: bool>(light: [f32; 3], a
     let alpha = clamp_unit(alpha);
     let coverage = if alpha > brightest { alpha } else { brightest };
 
-    let needed = rounded(brightest.mul_add(C::LARGEST, 0.499));
+    let needed = rounded(brightest.fused(C::LARGEST, 0.499));
     // Half a code over black: 0.5 / 12.92 of one in the straight part of sRGB.
     let needed = if brightest >= 0.5 / 12.92 / C::LARGEST { needed } else { 0.0 };
-    let dithered = rounded(coverage.mul_add(C::LARGEST, dither::<C>(phase, 3)));
+    let dithered = rounded(coverage.fused(C::LARGEST, dither::<C>(phase, 3)));
     let code = if dithered > needed { dithered } else { needed };
 
     let quotient = C::LARGEST / code;

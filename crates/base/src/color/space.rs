@@ -3,6 +3,8 @@
 //! XYZ here is always relative to D65, as for sRGB. Working values are ACEScg (AP1 primaries, D60 white); Bradford adaptation
 //! D65 -> D60 lies in every matrix that leads into the working space, its inverse in every matrix that leads out.
 
+use crate::math::Fused;
+
 /// A 3 x 3 matrix, row by row, acting on column vectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Matrix3(pub [[f64; 3]; 3]);
@@ -128,7 +130,7 @@ pub fn luminance(acescg: [f32; 3]) -> f32 {
 
 #[inline(always)]
 fn dot_single([a, b, c]: [f32; 3], [x, y, z]: [f32; 3]) -> f32 {
-    x.mul_add(a, y.mul_add(b, z * c))
+    x.fused(a, y.fused(b, z * c))
 }
 
 #[inline(always)]

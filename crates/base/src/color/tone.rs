@@ -1,5 +1,7 @@
 //! The tone curve: how scene brightness without limit becomes display brightness from 0 to 1.
 
+use crate::math::Fused;
+
 /// Identity up to a knee; above it a shoulder that meets the identity with the same slope and reaches 1 exactly at a finite white.
 ///
 /// With `x = (m - knee) / (1 - knee)` and `X` the same of the white, the shoulder is the extended Reinhard curve
@@ -40,8 +42,8 @@ impl ToneCurve {
         let over = (m - self.knee) * self.inverse_span;
         let x = if over > 0.0 { over } else { 0.0 };
         let reciprocal = 1.0 / (1.0 + x);
-        let rise = x * x.mul_add(self.curvature, 1.0) * reciprocal;
-        let n = self.span.mul_add(rise, self.below_knee(m));
+        let rise = x * x.fused(self.curvature, 1.0) * reciprocal;
+        let n = self.span.fused(rise, self.below_knee(m));
         (if n < 1.0 { n } else { 1.0 }, self.compression(x, reciprocal))
     }
 
@@ -53,9 +55,9 @@ impl ToneCurve {
         let y = if over > 0.0 { over } else { 0.0 };
         // x^2 / X^2 + (1 - y) x - y = 0, in the form that does not cancel.
         let rest = 1.0 - y;
-        let root = rest.mul_add(rest, 4.0 * y * self.curvature).sqrt();
+        let root = rest.fused(rest, 4.0 * y * self.curvature).sqrt();
         let x = 2.0 * y / (rest + root);
-        (self.span.mul_add(x, self.below_knee(n)), self.compression(x, 1.0 / (1.0 + x)))
+        (self.span.fused(x, self.below_knee(n)), self.compression(x, 1.0 / (1.0 + x)))
     }
 
     #[inline(always)]

@@ -1,9 +1,11 @@
 //! Branch-free `f32` approximations for hot loops.
 //!
 //! Each takes one number and is always inlined: a plain loop over `[f32; 16]` under `fearless_simd::dispatch!` becomes vector code, and the
-//! same function called alone is its scalar twin, bit for bit. Multiply-adds are fused explicitly: exact everywhere, slow where
+//! same function called alone is its scalar twin, bit for bit. Multiply-adds are [`Fused`] explicitly: slow where
 //! the processor (or the enclosing function, outside `dispatch!`) has no such instruction; outside hot loops use [`super::f32`].
 //! Coefficients are minimax fits with the stated error before rounding; the stated bounds include rounding and are tested.
+
+use super::Fused;
 
 // 3 * 2^22: adding it to |x| < 2^22 rounds x to a whole number that then stands in the low bits of the sum.
 const ROUND: f32 = 12_582_912.0;
@@ -17,9 +19,9 @@ pub fn exp2(x: f32) -> f32 {
     let rounded = held + ROUND;
     let f = held - (rounded - ROUND);
     // 2^f = 1 + f q(f) on [-1/2, 1/2], fit 2.0e-9.
-    let q = 1.535_336e-4f32.mul_add(f, 1.339_887_5e-3).mul_add(f, 9.618_437e-3);
-    let q = q.mul_add(f, 5.550_332_5e-2).mul_add(f, 2.402_264_8e-1).mul_add(f, 6.931_472e-1);
-    let result = scale(q.mul_add(f, 1.0), rounded);
+    let q = 1.535_336e-4f32.fused(f, 1.339_887_5e-3).fused(f, 9.618_437e-3);
+    let q = q.fused(f, 5.550_332_5e-2).fused(f, 2.402_264_8e-1).fused(f, 6.931_472e-1);
+    let result = scale(q.fused(f, 1.0), rounded);
     let result = if x < -126.0 { 0.0 } else { result };
     let result = if x >= 128.0 { f32::INFINITY } else { result };
     if x.is_nan() { x } else { result }
@@ -30,15 +32,15 @@ pub fn exp2(x: f32) -> f32 {
 pub fn exp(x: f32) -> f32 {
     let held = if x > -88.0 { x } else { -88.0 };
     let held = if held < 89.0 { held } else { 89.0 };
-    let rounded = held.mul_add(std::f32::consts::LOG2_E, ROUND);
+    let rounded = held.fused(std::f32::consts::LOG2_E, ROUND);
     let whole = rounded - ROUND;
     // ln 2 in two parts, so that what is left of a large x is not rounded away.
-    let f = whole.mul_add(-0.693_359_4, held);
-    let f = whole.mul_add(2.121_944_4e-4, f);
+    let f = whole.fused(-0.693_359_4, held);
+    let f = whole.fused(2.121_944_4e-4, f);
     // e^f = 1 + f + f^2 q(f) on [-ln 2 / 2, ln 2 / 2], fit 3.1e-9.
-    let q = 1.381_461_5e-3f32.mul_add(f, 8.368_71e-3).mul_add(f, 4.166_839e-2);
-    let q = q.mul_add(f, 1.666_652_1e-1).mul_add(f, 4.999_999_3e-1);
-    let result = scale((f * f).mul_add(q, f) + 1.0, rounded);
+    let q = 1.381_461_5e-3f32.fused(f, 8.368_71e-3).fused(f, 4.166_839e-2);
+    let q = q.fused(f, 1.666_652_1e-1).fused(f, 4.999_999_3e-1);
+    let result = scale((f * f).fused(q, f) + 1.0, rounded);
     let result = if x < -87.336_54 { 0.0 } else { result };
     let result = if x > 88.722_83 { f32::INFINITY } else { result };
     if x.is_nan() { x } else { result }
@@ -62,8 +64,8 @@ pub fn log2(x: f32) -> f32 {
     // log2 m = s q(s^2), s = (m - 1) / (m + 1), |s| < 0.172, fit 6.7e-9.
     let s = (mantissa - 1.0) / (mantissa + 1.0);
     let s2 = s * s;
-    let q = 4.547_422e-1f32.mul_add(s2, 5.757_17e-1).mul_add(s2, 9.618_095e-1).mul_add(s2, 2.885_39);
-    let result = s.mul_add(q, exponent);
+    let q = 4.547_422e-1f32.fused(s2, 5.757_17e-1).fused(s2, 9.618_095e-1).fused(s2, 2.885_39);
+    let result = s.fused(q, exponent);
     let result = if x == 0.0 { f32::NEG_INFINITY } else { result };
     let result = if x == f32::INFINITY { x } else { result };
     if x >= 0.0 { result } else { f32::NAN }
@@ -102,8 +104,7 @@ pub fn cos_turns(x: f32) -> f32 {
 #[inline(always)]
 fn sin_quarter(r: f32) -> f32 {
     let r2 = r * r;
-    let q =
-        39.711_13f32.mul_add(r2, -76.575_02).mul_add(r2, 81.602_234).mul_add(r2, -41.341_68).mul_add(r2, 6.283_185_5);
+    let q = 39.711_13f32.fused(r2, -76.575_02).fused(r2, 81.602_234).fused(r2, -41.341_68).fused(r2, 6.283_185_5);
     let sine = r * q;
     let sine = if sine > 1.0 { 1.0 } else { sine };
     if sine < -1.0 { -1.0 } else { sine }
@@ -118,9 +119,9 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     // atan r = r q(r^2) on [0, 1], fit 3.8e-8.
     let r = least / if greatest > 0.0 { greatest } else { 1.0 };
     let r2 = r * r;
-    let q = (-4.054_555e-3_f32).mul_add(r2, 2.186_291_5e-2).mul_add(r2, -5.591_226_6e-2).mul_add(r2, 9.642_193e-2);
-    let q = q.mul_add(r2, -1.390_862_8e-1).mul_add(r2, 1.994_656_5e-1).mul_add(r2, -3.332_986e-1);
-    let angle = r * q.mul_add(r2, 9.999_993e-1);
+    let q = (-4.054_555e-3_f32).fused(r2, 2.186_291_5e-2).fused(r2, -5.591_226_6e-2).fused(r2, 9.642_193e-2);
+    let q = q.fused(r2, -1.390_862_8e-1).fused(r2, 1.994_656_5e-1).fused(r2, -3.332_986e-1);
+    let angle = r * q.fused(r2, 9.999_993e-1);
     let angle = if steep { std::f32::consts::FRAC_PI_2 - angle } else { angle };
     let angle = if x < 0.0 { std::f32::consts::PI - angle } else { angle };
     f32::from_bits(angle.to_bits() | (y.to_bits() & SIGN))

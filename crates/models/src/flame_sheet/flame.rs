@@ -60,8 +60,7 @@ impl Source {
 
     /// The same with its table filtered for a sheet `height_pixels` tall.
     pub(crate) fn filtered(&self, height_pixels: f64) -> FilteredSource {
-        const MOST: f64 = 5.0;
-        let level = math::log2(self.texels_up() / height_pixels.max(1.0)).min(MOST) as f32;
+        let level = math::log2(self.texels_up() / height_pixels.max(1.0)) as f32;
         match self {
             Self::Fractal(layers) if level > 0.0 => FilteredSource::Fractal(*layers, Arc::new(FRACTAL.filtered(level))),
             Self::Fractal(layers) => FilteredSource::Fractal(*layers, FRACTAL.clone()),

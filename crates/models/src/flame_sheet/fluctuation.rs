@@ -1,7 +1,7 @@
 //! Fluctuations in closed form: sums of sine waves whose periods share no multiple within a shot.
 
 use bansho_base::{
-    math::{self, lanes},
+    math::{self, Fused, lanes},
     random::{Key, Purpose},
 };
 
@@ -40,8 +40,8 @@ impl Fluctuation {
     pub(crate) fn at(&self, x: f64) -> f32 {
         let mut sum = 0.0_f32;
         for i in 0..WAVES {
-            let phase = math::reduce_phase(self.frequencies[i].mul_add(x, self.phases[i]));
-            sum = self.amplitudes[i].mul_add(lanes::sin_turns(phase), sum);
+            let phase = math::reduce_phase(self.frequencies[i].fused(x, self.phases[i]));
+            sum = self.amplitudes[i].fused(lanes::sin_turns(phase), sum);
         }
         sum.clamp(-1.0, 1.0)
     }
@@ -50,10 +50,10 @@ impl Fluctuation {
     pub(crate) fn fill(&self, start: f64, step: f64, values: &mut [f32]) {
         values.fill(0.0);
         for i in 0..WAVES {
-            let phase = math::reduce_phase(self.frequencies[i].mul_add(start, self.phases[i]));
+            let phase = math::reduce_phase(self.frequencies[i].fused(start, self.phases[i]));
             let turn = (self.frequencies[i] * step) as f32;
             for (index, value) in values.iter_mut().enumerate() {
-                *value = self.amplitudes[i].mul_add(lanes::sin_turns(turn.mul_add(index as f32, phase)), *value);
+                *value = self.amplitudes[i].fused(lanes::sin_turns(turn.fused(index as f32, phase)), *value);
             }
         }
         values.iter_mut().for_each(|value| *value = value.clamp(-1.0, 1.0));

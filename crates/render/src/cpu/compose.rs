@@ -3,6 +3,7 @@
 use bansho_base::{
     canvas::{Strip, View},
     image::{Channel, Frame, FrameHeader, Image, Precision, Rect},
+    math::Fused,
     observer::{self, Cancelled, Observer},
     phenomenon::{Phenomenon, Prepared},
 };
@@ -251,9 +252,9 @@ fn lay_over_plate(accumulator: &Accumulator, start: usize, plate: &[[f32; 4]], o
     for (x, (out, plate)) in out.iter_mut().zip(plate).enumerate() {
         let through = accumulator.transmittance_at(start + x);
         for c in 0..3 {
-            out[c] = through[c].mul_add(plate[c], out[c]);
+            out[c] = through[c].fused(plate[c], out[c]);
         }
-        out[3] = (1.0 - out[3]).mul_add(plate[3], out[3]);
+        out[3] = (1.0 - out[3]).fused(plate[3], out[3]);
     }
 }
 

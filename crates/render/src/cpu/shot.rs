@@ -23,6 +23,7 @@ use super::{
 use crate::{
     backend::{RenderError, Shot},
     fingerprint,
+    phenomena::{self, Part},
     plan::Plan,
     slices::{self, Slice},
 };
@@ -30,6 +31,8 @@ use crate::{
 pub(super) struct CpuShot {
     plan: Arc<Plan>,
     phenomena: Vec<Box<dyn Phenomenon>>,
+    /// What each phenomenon was made from.
+    made_from: Vec<[u8; 32]>,
     clocks: Vec<Clock>,
     plates: PlateCache,
     number: i64,
@@ -45,6 +48,7 @@ impl CpuShot {
         let clocks = vec![Clock { taken: 0 }; phenomena.len()];
         let number = plan.frames().start;
         Ok(Self {
+            made_from: made_from(&plan),
             plan,
             phenomena,
             clocks,
@@ -61,6 +65,19 @@ impl CpuShot {
         self.clocks.fill(Clock { taken: 0 });
         self.carried = false;
         Ok(())
+    }
+
+    /// The phenomena of `plan` that are not here already, each with its clock; `None` for those that are.
+    fn make_others(&self, plan: &Plan, made_from: &[[u8; 32]]) -> Result<Vec<Option<Made>>, RenderError> {
+        let make = |(part, from): (&Part, &[u8; 32])| {
+            if self.made_from.contains(from) {
+                return Ok(None);
+            }
+            let mut phenomenon = part.open(plan)?;
+            let clock = self.take_up(phenomenon.as_mut());
+            Ok(Some((phenomenon, clock)))
+        };
+        phenomena::parts(&plan.scene).iter().zip(made_from).map(make).collect()
     }
 
     /// The clock of `phenomenon` after it took up the state that its namesake came to; at its beginning where it cannot.
@@ -179,6 +196,14 @@ impl CpuShot {
     }
 }
 
+/// What each phenomenon of `plan` is made from. No two are alike, since names are unique.
+fn made_from(plan: &Plan) -> Vec<[u8; 32]> {
+    phenomena::parts(&plan.scene).iter().map(|part| fingerprint::of_part(plan, part)).collect()
+}
+
+/// A phenomenon with its clock.
+type Made = (Box<dyn Phenomenon>, Clock);
+
 /// Slices of depth, and the phenomena that they count, ready to draw.
 type Ready<'a> = (Vec<Slice>, Vec<Box<dyn Prepared + 'a>>);
 
@@ -244,15 +269,24 @@ impl Shot for CpuShot {
     }
 
     fn replan(&mut self, plan: Arc<Plan>) -> Result<(), RenderError> {
-        let mut phenomena = plan.open()?;
-        let clocks: Vec<Clock> = phenomena.iter_mut().map(|phenomenon| self.take_up(phenomenon.as_mut())).collect();
+        let made_from = made_from(&plan);
+        let new = self.make_others(&plan, &made_from)?;
+        let mut old: Vec<_> = std::mem::take(&mut self.phenomena).into_iter().map(Some).collect();
+        let mut carry = |(new, from): (Option<Made>, &[u8; 32])| match new {
+            Some(made) => Some(made),
+            None => {
+                let index = self.made_from.iter().position(|own| own == from)?;
+                Some((old[index].take()?, self.clocks[index]))
+            }
+        };
+        let (phenomena, clocks): (Vec<_>, Vec<_>) = new.into_iter().zip(&made_from).filter_map(&mut carry).unzip();
         let goes_on = clocks.iter().any(|clock| clock.taken > 0);
         let same = fingerprint::of_state(&self.plan) == fingerprint::of_state(&plan);
         self.carried = goes_on && (self.carried || !same);
         if self.plan.scene.plate != plan.scene.plate {
             self.plates = PlateCache::default();
         }
-        (self.plan, self.phenomena, self.clocks) = (plan, phenomena, clocks);
+        (self.plan, self.phenomena, self.clocks, self.made_from) = (plan, phenomena, clocks, made_from);
         (self.frame, self.spent) = (None, None);
         Ok(())
     }
@@ -280,5 +314,38 @@ impl Shot for CpuShot {
         self.carried = false;
         self.frame = None;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::assets::MemoryAssets;
+
+    use super::*;
+    use crate::{phenomena::KINDS, plan::PlanOptions, scene::Scene};
+
+    fn plan(text: &str) -> Arc<Plan> {
+        let assets = Arc::new(MemoryAssets::default());
+        let scene = Scene::parse("scene", text, KINDS, assets.as_ref()).unwrap();
+        Arc::new(Plan::new(scene, &PlanOptions::default(), assets).unwrap())
+    }
+
+    #[test]
+    fn only_what_changed_is_made_anew() {
+        let text = "bansho = 1\n[wind]\n[sky]\n[[flame_sheet]]\n[[flame_sheet]]\nname = \"second\"\nheight = 1.0\n";
+        let mut shot = CpuShot::open(plan(text)).unwrap();
+        let made = |shot: &CpuShot| -> Vec<usize> {
+            shot.phenomena.iter().map(|own| std::ptr::from_ref(own.as_ref()).addr()).collect()
+        };
+        let first = made(&shot);
+        shot.replan(plan(&text.replace("[wind]", "[wind]\nvelocity = [1, 0, 0]"))).unwrap();
+        assert_eq!(made(&shot), first, "wind is not theirs");
+        shot.replan(plan(&text.replace("height = 1.0", "height = 2.0"))).unwrap();
+        let second = made(&shot);
+        assert_eq!([second[0], second[2]], [first[0], first[2]]);
+        assert_ne!(second[1], first[1]);
+        shot.replan(plan("bansho = 1\n[[flame_sheet]]\nname = \"second\"\nheight = 2.0\n")).unwrap();
+        assert_eq!(made(&shot), [second[1]]);
+        assert_eq!(shot.clocks.len(), 1);
     }
 }

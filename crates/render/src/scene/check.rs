@@ -81,7 +81,7 @@ fn is_name(name: &str) -> bool {
 }
 
 /// Every asset must be there, and every phenomenon must come to be.
-pub(super) fn assets_and_openings(scene: &Scene, root: &Table, assets: &dyn Assets, reader: &mut Reader) {
+pub(super) fn assets_and_openings(scene: &mut Scene, root: &Table, assets: &dyn Assets, reader: &mut Reader) {
     plate(scene, root, assets, reader);
     for (index, obstacle) in scene.obstacles.iter().enumerate() {
         if let Err(fault) = obstacle.open(assets) {
@@ -89,12 +89,13 @@ pub(super) fn assets_and_openings(scene: &Scene, root: &Table, assets: &dyn Asse
         }
     }
     let mut seen = std::collections::BTreeMap::new();
-    for instance in &scene.instances {
+    let seed = scene.picture.seed as u64;
+    for instance in &mut scene.instances {
         let index: &mut usize = seen.entry(instance.kind.key).or_default();
         let path = format!("{}.{index}", instance.kind.key);
-        let opening = Opening { name: &instance.name, seed: scene.picture.seed as u64, loop_s: None, assets };
-        if let Err(fault) = instance.source.open(&opening) {
-            report(fault, path, root, reader);
+        match instance.source.open(&Opening { name: &instance.name, seed, loop_s: None, assets }) {
+            Ok(phenomenon) => instance.luminance = Some(phenomenon.luminance()),
+            Err(fault) => report(fault, path, root, reader),
         }
         *index += 1;
     }

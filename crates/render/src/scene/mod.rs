@@ -77,6 +77,8 @@ pub struct Instance {
     pub enabled: bool,
     /// Its parameters.
     pub source: Arc<dyn Source>,
+    /// Luminance of its bright parts, cd/m^2, where it was made once to see whether it can be: with the scene's own seed, in no loop.
+    pub luminance: Option<f64>,
 }
 
 /// A checked scene.
@@ -127,14 +129,14 @@ impl Scene {
         file: &str,
         text: &str,
         kinds: &[PhenomenonKind],
-        check: impl FnOnce(&Self, &Table, &mut Reader),
+        check: impl FnOnce(&mut Self, &Table, &mut Reader),
     ) -> Result<Self, SceneError> {
         let fail = |problems| SceneError { file: file.to_owned(), text: text.to_owned(), problems };
         let root = toml::parse(text).map_err(|problem| fail(vec![problem]))?;
         let mut reader = Reader::new();
-        let scene = Self::read(&root, kinds, &mut reader);
+        let mut scene = Self::read(&root, kinds, &mut reader);
         if reader.problems().is_empty() {
-            check(&scene, &root, &mut reader);
+            check(&mut scene, &root, &mut reader);
         }
         let mut problems: Vec<Problem> = reader.into_problems();
         if problems.is_empty() {
@@ -238,6 +240,7 @@ fn read_instance(kind: PhenomenonKind, index: usize, table: &Table, reader: &mut
         name: name.unwrap_or_else(|| default_name(kind.key, index)),
         enabled: enabled.unwrap_or(true),
         source: Arc::from((kind.read)(table, reader)),
+        luminance: None,
     }
 }
 

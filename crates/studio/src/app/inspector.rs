@@ -73,7 +73,7 @@ fn list_item(ui: &mut Ui, session: &mut Session, place: &Place, kind: &Kind, val
             Kind::Table(inner) => section(ui, session, place, &place.to_string(), inner()),
             kind => {
                 let label = ui.label(place.to_string()).id;
-                if let Some(value) = (Widget { kind, unit: "", label }).show(ui, value) {
+                if let Some(value) = (Widget { kind, unit: "", label, usual: None }).show(ui, value) {
                     session.set(&place.to_string(), place, value);
                 }
             }
@@ -104,7 +104,8 @@ fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor
             reset(ui, session, place, parameter, stated.is_some());
             ui.end_row();
         }
-        let widget = Widget { kind: &parameter.kind, unit: parameter.unit, label };
+        let usual = parameter.default.as_ref().and_then(Value::as_number);
+        let widget = Widget { kind: &parameter.kind, unit: parameter.unit, label, usual };
         if let Some(value) = widget.show(ui, &present) {
             session.set(parameter.key, place, value);
         }

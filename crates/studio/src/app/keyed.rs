@@ -1,9 +1,44 @@
 //! Values keyed over time, as a scene states them.
 
-use bansho::base::{
-    curve::{Curve, Interpolation},
-    parameters::{InterpolationName, Node, Value},
+use bansho::{
+    KINDS,
+    base::{
+        curve::{Curve, Interpolation},
+        parameters::{Descriptor, InterpolationName, Kind, Node, TableDescriptor, Value},
+    },
+    render::scene::{Place, SHARED_TABLES, Segment},
 };
+
+/// Whether what stands at `place` of a scene may be keyed over time.
+pub(super) fn animatable(place: &Place) -> bool {
+    let keys: Vec<&str> = place.segments().iter().filter_map(key).collect();
+    let [root, inner @ .., last] = keys.as_slice() else { return false };
+    let shared = SHARED_TABLES.iter().find(|table| table.key == *root).map(|table| (table.table)());
+    let table = shared.or_else(|| KINDS.iter().find(|kind| kind.key == *root).map(|kind| (kind.table)()));
+    let within = |table: &'static TableDescriptor, key: &&str| table_of(&parameter(table, key)?.kind);
+    let table = table.and_then(|table| inner.iter().try_fold(table, within));
+    table.and_then(|table| parameter(table, last)).is_some_and(Descriptor::animatable)
+}
+
+/// Items of a list are alike.
+fn key(segment: &Segment) -> Option<&str> {
+    match segment {
+        Segment::Key(key) => Some(key),
+        Segment::Index(_) => None,
+    }
+}
+
+fn parameter(table: &'static TableDescriptor, key: &str) -> Option<&'static Descriptor> {
+    table.parameters.iter().find(|parameter| parameter.key == key)
+}
+
+fn table_of(kind: &Kind) -> Option<&'static TableDescriptor> {
+    match kind {
+        Kind::Table(table) => Some(table()),
+        Kind::List { item, .. } => table_of(item),
+        _ => None,
+    }
+}
 
 /// Whether `value` is keyed: `{ keys = [[seconds, value], ...] }`.
 pub(super) fn is_keyed(value: &Value) -> bool {
@@ -59,4 +94,20 @@ fn interpolation(value: &Value) -> Interpolation {
         _ => None,
     };
     name.unwrap_or_default().into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_know_whether_they_may_be_keyed() {
+        let within = |root: &str, keys: &[&str]| keys.iter().fold(Place::root().key(root), |place, key| place.key(key));
+        assert!(animatable(&within("wind", &["velocity"])) && animatable(&within("camera", &["position"])));
+        assert!(animatable(&Place::root().key("light").index(3).key("position")));
+        assert!(animatable(&Place::root().key("flame_sheet").index(0).key("colour").key("luminance")));
+        assert!(!animatable(&Place::root().key("flame_sheet").index(0).key("height")));
+        assert!(!animatable(&within("picture", &["size"])) && !animatable(&Place::root()));
+        assert!(!animatable(&within("no_such_table", &["at_all"])));
+    }
 }

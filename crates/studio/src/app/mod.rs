@@ -16,6 +16,7 @@ mod relink;
 mod scene_panel;
 mod session;
 mod shortcuts;
+mod stages_view;
 mod status;
 mod store;
 #[cfg(all(test, not(target_arch = "wasm32")))]
@@ -32,12 +33,15 @@ use eframe::egui;
 
 pub use self::session::{AssetsOf, Session};
 use self::{
-    aurora::AuroraEditor, files::Files, layout::Layout, problems::Wanted, scene_panel::Subject, store::Store,
-    text_panel::TextPanel, viewport::Viewport,
+    aurora::AuroraEditor, files::Files, layout::Layout, problems::Wanted, scene_panel::Subject,
+    stages_view::StagesView, store::Store, text_panel::TextPanel, viewport::Viewport,
 };
 
 /// The kind of phenomenon whose shapes are drawn.
 const KIND_WITH_SHAPES: &str = "aurora";
+
+/// The kind of phenomenon that comes to be in stages.
+const KIND_WITH_STAGES: &str = "flame_sheet";
 
 /// The whole window.
 pub struct Studio {
@@ -45,6 +49,7 @@ pub struct Studio {
     subject: Subject,
     viewport: Viewport,
     aurora: AuroraEditor,
+    stages: StagesView,
     text: TextPanel,
     files: Files,
     shows: Shows,
@@ -76,6 +81,7 @@ impl Studio {
             subject,
             viewport: Viewport::default(),
             aurora: AuroraEditor::default(),
+            stages: StagesView::default(),
             text: TextPanel::default(),
             files: Files::new(&store),
             shows: Shows { text: layout.get("text shown", 0.0) > 0.0, shortcuts: false },
@@ -136,7 +142,7 @@ impl Studio {
             Some(Wanted::File(place)) => self.files.ask_to_relink(ui.ctx(), &mut self.session, place),
             None => {}
         }
-        let Self { session, subject, text, layout, shows, .. } = self;
+        let Self { session, subject, text, stages, layout, shows, .. } = self;
         layout.panel("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| scene_panel::show(ui, session, subject));
         });
@@ -144,6 +150,10 @@ impl Studio {
             layout.panel("text", egui::Panel::right("text"), 380.0, ui, |ui| text.show(ui, session));
         }
         layout.panel("inspector", egui::Panel::right("inspector"), 330.0, ui, |ui| {
+            session.stages = None;
+            if let (KIND_WITH_STAGES, Some(index)) = (subject.key, subject.index) {
+                stages.show(ui, session, index);
+            }
             egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| inspector::show(ui, session, subject));
         });
     }

@@ -18,7 +18,7 @@ use crate::{
         drawing::{Drawing, Refusal},
     },
     examples::Bundle,
-    player::{Event, Pace, Picture, Player, Transport, Wish},
+    player::{Event, Pace, Picture, Player, Took, Transport, Wish},
 };
 
 /// Makes the assets of a scene that lies in a folder. Without one it finds the files of the examples, and given ones.
@@ -38,6 +38,8 @@ pub struct Session {
     pub opened: u64,
     /// Whether pictures may be simulated with fewer particles than the scene has.
     pub draft: bool,
+    /// The flame sheet whose stages are seen.
+    pub stages: Option<usize>,
     player: Box<dyn Player>,
     assets_of: AssetsOf,
     bundle: Bundle,
@@ -45,6 +47,8 @@ pub struct Session {
     pace: Pace,
     picture: Option<Picture>,
     drawn: u64,
+    /// Pictures of the stages, each with its number.
+    stage_pictures: Vec<(Picture, u64)>,
     asked: Option<Asked>,
     /// A state that panicked, which is not drawn again.
     broken: Option<Revision>,
@@ -61,6 +65,7 @@ struct Asked {
     number: Option<i64>,
     within: [usize; 2],
     draft: bool,
+    stages: Option<usize>,
 }
 
 impl Session {
@@ -76,6 +81,8 @@ impl Session {
             recording: false,
             opened: 0,
             draft: true,
+            stages: None,
+            stage_pictures: Vec::new(),
             player,
             assets_of,
             pace: Pace::default(),
@@ -94,6 +101,7 @@ impl Session {
         self.assets = assets(&self.bundle, path.as_deref(), self.assets_of);
         (self.document, self.path) = (document, path);
         (self.picture, self.asked, self.broken, self.notice) = (None, None, None, None);
+        (self.stages, self.stage_pictures, self.pace) = (None, Vec::new(), Pace::default());
         self.transport = Transport::default();
         self.opened += 1;
     }
@@ -114,6 +122,11 @@ impl Session {
     /// The last picture, and which it is.
     pub fn picture(&self) -> Option<(&Picture, u64)> {
         self.picture.as_ref().map(|picture| (picture, self.drawn))
+    }
+
+    /// The last picture of a stage of the flame sheet that is chosen, and which it is.
+    pub fn stage(&self, stage: usize) -> Option<(&Picture, u64)> {
+        self.stage_pictures.get(stage).map(|(picture, drawn)| (picture, *drawn))
     }
 
     /// The last good plan.
@@ -183,16 +196,20 @@ impl Session {
         &self.assets
     }
 
-    /// Sets the value at `place`; where it is keyed, as it is at the present time.
+    /// Sets the value at `place`; where it is keyed, as it is at the present time. While keyframes are recorded, all that may be keyed is.
     pub fn set(&mut self, label: &str, place: &Place, value: Value) {
         self.set_all(label, [(place.clone(), value)]);
     }
 
     /// Sets several values in one step.
     pub fn set_all(&mut self, label: &str, values: impl IntoIterator<Item = (Place, Value)>) {
-        let operation = |(place, value): (Place, Value)| match place.find(self.document.values()) {
-            Some(node) if keyed::is_keyed(&node.value) => self.keyframe(&place, value),
-            _ => Operation::Set { place, value },
+        let keyed = |place: &Place| place.find(self.document.values()).is_some_and(|node| keyed::is_keyed(&node.value));
+        let operation = |(place, value): (Place, Value)| {
+            if keyed(&place) || (self.recording && keyed::animatable(&place)) {
+                self.keyframe(&place, value)
+            } else {
+                Operation::Set { place, value }
+            }
         };
         let operations: Vec<Operation> = values.into_iter().map(operation).collect();
         self.edit(label, &operations);
@@ -230,6 +247,7 @@ impl Session {
             number,
             within: viewport.map(|side| ((side as f64 * share).round() as usize).max(1)),
             draft: self.draft,
+            stages: self.stages.filter(|_| !hurry || self.is_quick()),
         };
         // In a hurry a frame is drawn once, whatever size would have been better.
         let same = |last: Asked| last == Asked { within: if hurry { last.within } else { asked.within }, ..asked };
@@ -240,6 +258,12 @@ impl Session {
         self.send(asked, false);
     }
 
+    /// Whether there is time for more than the picture itself.
+    fn is_quick(&self) -> bool {
+        const QUICK_S: f64 = 0.05;
+        self.picture.as_ref().is_none_or(|picture| picture.draw_s + picture.advance_s < QUICK_S)
+    }
+
     /// Draws the present frame once more from the scene's beginning, at the viewport's full size.
     pub fn draw_exactly(&mut self) {
         if let Some(asked) = self.asked {
@@ -248,7 +272,24 @@ impl Session {
     }
 
     fn send(&mut self, asked: Asked, exact: bool) {
-        self.player.wish(Wish {
+        let wish = self.wish_for(asked, exact);
+        self.player.wish(wish);
+    }
+
+    /// The wish for the finished picture of the present frame, for a player of its own.
+    pub fn still(&self) -> Wish {
+        let number = self.plan().map(|_| self.transport.number());
+        let asked = Asked { revision: self.document.revision(), number, within: [1; 2], draft: false, stages: None };
+        Wish { still: true, ..self.wish_for(asked, true) }
+    }
+
+    /// Files that no folder holds, by name.
+    pub fn given(&self) -> &[(String, Arc<[u8]>)] {
+        self.bundle.given()
+    }
+
+    fn wish_for(&self, asked: Asked, exact: bool) -> Wish {
+        Wish {
             revision: asked.revision,
             name: self.document.name().to_owned(),
             text: self.document.text().clone(),
@@ -257,15 +298,27 @@ impl Session {
             within: asked.within,
             exact,
             draft: asked.draft,
-        });
+            still: false,
+            stages: asked.stages,
+        }
     }
 
     fn take_in(&mut self, event: Event, now: f64, hands: bool) {
         match event {
             Event::Judged { revision, outcome } => self.judged(revision, outcome),
             Event::Drawn(picture) => self.show(picture, now, hands),
+            Event::Stage(stage, picture) => {
+                self.drawn += 1;
+                let stages = &mut self.stage_pictures;
+                if let Some(own) = stages.get_mut(stage) {
+                    *own = (picture, self.drawn);
+                } else {
+                    stages.push((picture, self.drawn));
+                }
+            }
             Event::Failed { revision, reason } if revision == self.document.revision() => self.notice = Some(reason),
-            Event::Failed { .. } => {}
+            // Finished pictures are asked of other players.
+            Event::Failed { .. } | Event::Still { .. } => {}
             Event::Panicked { revision, message } => {
                 self.broken = Some(revision);
                 self.transport.set_playing(false);
@@ -310,7 +363,8 @@ impl Session {
         const AT_HAND_S: f64 = 0.05;
         if hands || self.transport.is_playing() {
             let target = if hands { AT_HAND_S } else { self.transport.frame_s() };
-            self.pace.learn(picture.draw_s, target);
+            let Picture { size: [width, height], draw_s, advance_s, .. } = picture;
+            self.pace.learn(Took { pixels: width * height, draw_s, advance_s }, target);
             self.rate.came(now);
         }
         self.drawn += 1;

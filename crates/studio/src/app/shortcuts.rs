@@ -78,7 +78,7 @@ impl Studio {
             }
             Action::Save => self.files.save(&mut self.session),
             Action::Open => self.files.ask_to_open(ctx, &mut self.session),
-            Action::RenderStill => self.files.render_still(&mut self.session),
+            Action::RenderStill => self.files.render_still(ctx, &mut self.session),
             Action::PlayPause => transport.set_playing(!transport.is_playing()),
             Action::FrameBack => transport.step(-1),
             Action::FrameOn => transport.step(1),

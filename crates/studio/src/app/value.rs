@@ -13,7 +13,15 @@ pub(super) struct Widget<'a> {
     pub(super) unit: &'a str,
     /// The label that names it, for screen readers.
     pub(super) label: Id,
+    /// What it usually is, where that is a number: sliders are finest around it.
+    pub(super) usual: Option<f64>,
 }
+
+/// Beside a slider: a number with its unit, and the buttons after it, points of the screen.
+const BESIDE: f32 = 126.0;
+
+/// Sliders are so wide at least, points of the screen.
+const NARROWEST: f32 = 40.0;
 
 impl Widget<'_> {
     /// Shows `value`; what it becomes where a hand changed it.
@@ -46,16 +54,36 @@ impl Widget<'_> {
 
     fn integer(&self, ui: &mut Ui, value: &Value, [min, max]: [i64; 2]) -> Option<Value> {
         let mut number = value.as_number()? as i64;
+        let bounds = [min as f64, max as f64];
+        let slid = self.slider(ui, number as f64, bounds).map(|slid| slid.round() as i64);
         let drag = DragValue::new(&mut number).range(min..=max).suffix(self.suffix());
-        let changed = ui.add(drag).labelled_by(self.label).changed();
-        changed.then_some(Value::Integer(number))
+        let dragged = ui.add(drag).labelled_by(self.label).changed().then_some(number);
+        slid.or(dragged).map(Value::Integer)
     }
 
-    fn number(&self, ui: &mut Ui, mut number: f64, [min, max]: [f64; 2]) -> Option<f64> {
+    fn number(&self, ui: &mut Ui, number: f64, bounds: [f64; 2]) -> Option<f64> {
+        let slid = self.slider(ui, number, bounds).map(decimal);
+        let dragged = self.drag(ui, number, bounds);
+        slid.or(dragged)
+    }
+
+    fn drag(&self, ui: &mut Ui, mut number: f64, [min, max]: [f64; 2]) -> Option<f64> {
         let speed = speed(number);
         let drag = DragValue::new(&mut number).range(min..=max).speed(speed).max_decimals(4);
         let changed = ui.add(drag.suffix(self.suffix())).labelled_by(self.label).changed();
         changed.then(|| decimal(number))
+    }
+
+    /// Slides over what is allowed, by decades where it spans many; nothing where there are no bounds.
+    fn slider(&self, ui: &mut Ui, mut number: f64, bounds: [f64; 2]) -> Option<f64> {
+        let scale = Scale::over(bounds, self.usual)?;
+        ui.spacing_mut().slider_width = (ui.available_size_before_wrap().x - BESIDE).max(NARROWEST);
+        let slider = egui::Slider::new(&mut number, bounds[0]..=bounds[1]).show_value(false);
+        let slider = match scale {
+            Scale::Even => slider,
+            Scale::Decades { least } => slider.logarithmic(true).smallest_positive(least),
+        };
+        ui.add(slider).labelled_by(self.label).changed().then_some(number)
     }
 
     fn suffix(&self) -> String {
@@ -71,7 +99,7 @@ impl Widget<'_> {
         ui.horizontal(|ui| {
             for item in &mut edited {
                 let Some(number) = item.value.as_number() else { continue };
-                if let Some(number) = part.number(ui, number, bounds) {
+                if let Some(number) = part.drag(ui, number, bounds) {
                     changed = true;
                     item.value = if whole { Value::Integer(number.round() as i64) } else { Value::Number(number) };
                 }
@@ -138,6 +166,36 @@ pub(super) fn somewhere_in(kind: &Kind) -> Value {
     }
 }
 
+/// How a slider divides what is allowed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Scale {
+    Even,
+    /// By decades, down to `least`.
+    Decades {
+        least: f64,
+    },
+}
+
+impl Scale {
+    /// For `[min, max]` around what is `usual`; `None` without bounds that a hand could mean.
+    fn over([min, max]: [f64; 2], usual: Option<f64>) -> Option<Self> {
+        /// Limits so far apart only say that a value is a number.
+        const FARTHEST: f64 = 2e6;
+        /// Ratios from which on the same step is too coarse below and too fine above.
+        const WIDE: f64 = 50.0;
+        if !(min < max && max - min < FARTHEST) {
+            return None;
+        }
+        let usual = usual.filter(|usual| *usual > 0.0);
+        let wide = match usual {
+            Some(usual) => max / usual >= WIDE,
+            None => min > 0.0 && max / min >= WIDE,
+        };
+        let least = if min > 0.0 { min } else { usual.map_or(1e-6 * max, |usual| 1e-3 * usual) };
+        Some(if wide { Self::Decades { least } } else { Self::Even })
+    }
+}
+
 /// What a pixel of dragging changes a number by: a hundredth of it, and never nothing.
 fn speed(number: f64) -> f64 {
     (number.abs() * 0.01).max(0.002)
@@ -148,4 +206,19 @@ fn decimal(number: f64) -> f64 {
     let rounded = (number * 10_000.0).round() / 10_000.0;
     // Numbers so small that nothing would be left of them keep all their places.
     if rounded == 0.0 || !rounded.is_finite() { number } else { rounded }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sliders_go_by_decades_where_the_range_does() {
+        assert_eq!(Scale::over([0.0, 1.0], Some(0.5)), Some(Scale::Even));
+        assert_eq!(Scale::over([-40.0, 40.0], None), Some(Scale::Even));
+        assert_eq!(Scale::over([0.0, 1000.0], Some(2.0)), Some(Scale::Decades { least: 0.002 }));
+        assert_eq!(Scale::over([0.01, 100.0], None), Some(Scale::Decades { least: 0.01 }));
+        assert_eq!(Scale::over([f64::MIN, f64::MAX], Some(1.0)), None);
+        assert_eq!(Scale::over([1.0, 1.0], None), None);
+    }
 }

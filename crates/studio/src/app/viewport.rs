@@ -9,14 +9,15 @@ use bansho::{
     render::scene::Place,
 };
 use eframe::egui::{
-    self, Color32, ColorImage, PointerButton, Pos2, Rect, Response, Sense, Stroke, TextureHandle, TextureOptions, Ui,
-    Vec2, pos2, vec2,
+    self, Color32, PointerButton, Pos2, Rect, Response, Sense, Stroke, TextureHandle, TextureOptions, Ui, Vec2, pos2,
+    vec2,
 };
 
 use super::{
     gesture::Blowing,
     hands::{self, Stand, rounded},
     session::Session,
+    stages_view::image,
     things::{Thing, things},
 };
 
@@ -81,7 +82,7 @@ impl Viewport {
             ui.selectable_value(&mut self.tool, Tool::Wind, "Blow").on_hover_text("Drag to blow: the drag is the wind");
             ui.selectable_value(&mut self.tool, Tool::Place, "Place").on_hover_text("Drag lamps, flames and burners");
             ui.toggle_value(&mut session.recording, "Record")
-                .on_hover_text("Blowing leaves keyframes of the wind, and time passes while it lasts");
+                .on_hover_text("What is dragged leaves keyframes; time passes while you blow or drag things");
             ui.toggle_value(&mut session.draft, "Draft")
                 .on_hover_text("Simulates with fewer particles, to follow your hands; rendering never does");
             ui.separator();
@@ -93,8 +94,7 @@ impl Viewport {
     fn take_picture(&mut self, ui: &Ui, session: &Session) -> Option<[usize; 2]> {
         let (picture, drawn) = session.picture()?;
         if self.texture.as_ref().is_none_or(|(_, shown)| *shown != drawn) {
-            let colours = picture.pixels.iter().map(|[r, g, b, _]| Color32::from_rgb(*r, *g, *b)).collect();
-            let image = ColorImage::new(picture.size, colours);
+            let image = image(picture);
             match &mut self.texture {
                 Some((texture, shown)) => {
                     texture.set(image, TextureOptions::LINEAR);
@@ -168,9 +168,12 @@ impl Viewport {
             let near = |thing: &&Thing| Some((on_screen(thing)?.distance(from?), thing.place.clone()));
             let nearest = things.iter().filter_map(|thing| near(&thing)).min_by(|a, b| a.0.total_cmp(&b.0));
             self.held = nearest.filter(|(distance, _)| *distance < REACH).map(|(_, place)| place);
+            if session.recording && self.held.is_some() {
+                session.transport.set_playing(true);
+            }
         }
-        if !response.dragged_by(PointerButton::Primary) {
-            self.held = None;
+        if !response.dragged_by(PointerButton::Primary) && self.held.take().is_some() && session.recording {
+            session.transport.set_playing(false);
         }
         let held = things.iter().find(|thing| Some(&thing.place) == self.held.as_ref());
         if let (Some(thing), Some(at)) = (held, response.interact_pointer_pos())

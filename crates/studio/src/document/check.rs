@@ -53,8 +53,7 @@ pub fn recheck(
 pub fn check_draft(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Option<Result<Arc<Plan>, SceneError>> {
     let fewer = fewer_particles(&values(text).ok()?);
     let draft = operation::apply(text, &fewer).ok().filter(|_| !fewer.is_empty())?;
-    let scene = parse_scene(name, text, assets.as_ref());
-    Some(scene.and_then(|_| check(name, &draft, assets)))
+    Some(check(name, text, assets).and_then(|plan| recheck(name, &draft, assets, Ok(plan.exposure_ev100))))
 }
 
 /// What a draft makes do with: a kind of phenomenon, the key of its number of particles, and how many.

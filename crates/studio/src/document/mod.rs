@@ -6,6 +6,7 @@ pub mod files;
 mod history;
 mod phenomena;
 pub mod recovery;
+pub mod stages;
 #[cfg(test)]
 mod tests;
 #[cfg(not(target_arch = "wasm32"))]

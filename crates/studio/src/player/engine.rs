@@ -1,16 +1,17 @@
 //! One wish fulfilled: the text checked where it is new, the shot brought to the frame, the frame drawn and shown.
 
-use std::sync::Arc;
+use std::{path::Path, sync::Arc};
 
 use bansho::{
     Assets, Backend, BitDepth, CpuBackend, DisplayImage, Observer, Plan, RenderError, Shot, View,
     base::image::{DisplayPixels, Frame, Rect},
     display,
+    media::png::{self, PngEffort},
 };
 use web_time::Instant;
 
 use super::{Event, Picture, Wish, states::States};
-use crate::document::{Revision, check, check_draft};
+use crate::document::{Revision, check, check_draft, stages};
 
 /// What is kept from one wish to the next.
 #[derive(Default)]
@@ -20,7 +21,10 @@ pub(super) struct Engine {
     /// The last good plan, at the scene's own size, and whether it is a draft.
     plan: Option<(Arc<Plan>, bool)>,
     shot: Option<Opened>,
+    /// Of the finished picture that is under way.
+    still: Option<(Arc<Plan>, Box<dyn Shot>)>,
     states: States,
+    stages: StageShots,
 }
 
 /// A shot, with the plan and the size that it was last planned for.
@@ -41,7 +45,7 @@ impl Engine {
         observer: &dyn Observer,
         emit: &mut dyn FnMut(Event),
     ) -> Result<(), RenderError> {
-        let draft = wish.draft && !wish.exact;
+        let draft = wish.draft && !wish.exact && !wish.still;
         let Wish { name, text, assets, .. } = wish;
         let same = |(revision, own, as_draft): &(Revision, Arc<dyn Assets>, bool)| {
             (*revision, *as_draft) == (wish.revision, draft) && Arc::ptr_eq(own, assets)
@@ -57,8 +61,20 @@ impl Engine {
             emit(Event::Judged { revision: wish.revision, outcome });
         }
         let Some((plan, draft)) = self.plan.clone() else { return Ok(()) };
+        if wish.still {
+            let number = wish.number.unwrap_or(plan.frames().start);
+            emit(Event::Still { number, png: self.finish(&plan, number, observer)? });
+            return Ok(());
+        }
         let picture = self.draw(&plan, wish, observer)?;
         emit(Event::Drawn(Picture { draft, ..picture }));
+        if let Some(sheet) = wish.stages {
+            self.stages.turn_to(&plan, sheet, wish)?;
+            for (stage, opened) in self.stages.shots.iter_mut().enumerate() {
+                let picture = opened.draw(wish, wish.number.unwrap_or(plan.frames().start), &mut None, observer)?;
+                emit(Event::Stage(stage, picture));
+            }
+        }
         Ok(())
     }
 
@@ -68,31 +84,80 @@ impl Engine {
         *self = Self { judged: self.judged.take(), plan: self.plan.take(), ..Self::default() };
     }
 
+    /// The file of the finished frame `number`. Where it was stopped it goes on.
+    fn finish(&mut self, plan: &Arc<Plan>, number: i64, observer: &dyn Observer) -> Result<Vec<u8>, RenderError> {
+        let begun = self.still.take().filter(|(of, _)| Arc::ptr_eq(of, plan));
+        let (_, shot) = self.still.insert(match begun {
+            Some(begun) => begun,
+            None => (plan.clone(), CpuBackend.open(plan.clone())?),
+        });
+        let frame = bansho::draw(shot.as_mut(), number, observer)?;
+        self.still = None;
+        Ok(encoded(&frame))
+    }
+
     fn draw(&mut self, plan: &Arc<Plan>, wish: &Wish, observer: &dyn Observer) -> Result<Picture, RenderError> {
         let number = wish.number.unwrap_or(plan.frames().start);
         let size = fitted(plan.size, wish.within);
         let opened = open(&mut self.shot, plan, size, wish.exact)?;
+        opened.draw(wish, number, &mut Some(&mut self.states), observer)
+    }
+}
+
+impl Opened {
+    /// Draws frame `number`, by way of the nearest of `states` where there are any.
+    fn draw(
+        &mut self,
+        wish: &Wish,
+        number: i64,
+        states: &mut Option<&mut States>,
+        observer: &dyn Observer,
+    ) -> Result<Picture, RenderError> {
+        let Self { shot, of, size } = self;
         let began = Instant::now();
-        self.states.seek(plan, opened.shot.as_mut(), number);
-        opened.shot.advance(number, observer)?;
-        self.states.keep(plan, opened.shot.as_ref(), number);
+        states.iter_mut().for_each(|states| states.seek(of, shot.as_mut(), number));
+        shot.advance(number, observer)?;
+        states.iter_mut().for_each(|states| states.keep(of, shot.as_ref(), number));
         let advanced = Instant::now();
-        opened.shot.draw(observer)?;
-        let mut frame = opened.shot.read().ok_or(RenderError::Cancelled(bansho::Cancelled))?;
+        shot.draw(observer)?;
+        let mut frame = shot.read().ok_or(RenderError::Cancelled(bansho::Cancelled))?;
         let pixels = shown(&mut frame);
-        let exact = opened.shot.is_exact();
-        opened.shot.recycle(frame);
+        shot.recycle(frame);
         Ok(Picture {
             revision: wish.revision,
             number,
-            size,
-            scene_size: plan.size,
+            size: *size,
+            scene_size: of.size,
             pixels,
-            exact,
+            exact: shot.is_exact(),
             draft: false,
             draw_s: advanced.elapsed().as_secs_f64(),
             advance_s: advanced.duration_since(began).as_secs_f64(),
         })
+    }
+}
+
+/// Shots of the stages of a flame sheet.
+#[derive(Default)]
+struct StageShots {
+    /// Of which plan and which sheet.
+    of: Option<(Arc<Plan>, usize)>,
+    shots: Vec<Opened>,
+}
+
+impl StageShots {
+    fn turn_to(&mut self, plan: &Arc<Plan>, sheet: usize, wish: &Wish) -> Result<(), RenderError> {
+        if self.of.as_ref().is_some_and(|(of, own)| Arc::ptr_eq(of, plan) && *own == sheet) {
+            return Ok(());
+        }
+        // Of a text with faults there are none; the last pictures stay.
+        let plans = stages::plans(&wish.name, &wish.text, &wish.assets, sheet).unwrap_or_default();
+        let open = |plan: Arc<Plan>| -> Result<Opened, RenderError> {
+            Ok(Opened { shot: CpuBackend.open(plan.clone())?, size: plan.size, of: plan })
+        };
+        self.shots = plans.into_iter().map(open).collect::<Result<_, _>>()?;
+        self.of = Some((plan.clone(), sheet));
+        Ok(())
     }
 }
 
@@ -140,4 +205,12 @@ fn shown(frame: &mut Frame) -> Vec<[u8; 4]> {
         DisplayPixels::Eight(pixels) => pixels,
         DisplayPixels::Sixteen(pixels) => pixels.into_iter().map(|pixel| pixel.map(|code| (code >> 8) as u8)).collect(),
     }
+}
+
+/// The frame as `bansho render` writes it unless it is told otherwise.
+fn encoded(frame: &Frame) -> Vec<u8> {
+    let shown = display(frame, &View::DISPLAY, BitDepth::Eight);
+    let png = png::encode(&shown, &frame.header.fingerprint, PngEffort::default(), Path::new("still.png"));
+    // A frame has a size that PNG allows, and all its pixels.
+    png.unwrap_or_default()
 }

@@ -25,6 +25,10 @@ pub(super) enum Reply {
     Judged { number: u64, exposure_ev100: Result<f32, String> },
     /// The picture of wish `number`.
     Drawn { number: u64, picture: Picture },
+    /// A small picture of a stage, for wish `number`.
+    Stage { number: u64, stage: usize, picture: Picture },
+    /// The finished picture of wish `number`: its frame, and the file.
+    Still { number: u64, frame: i64, png: Vec<u8> },
     /// Why wish `number` has none.
     Failed { number: u64, reason: String },
     /// What a phenomenon said when it panicked over wish `number`. The worker is gone.
@@ -41,10 +45,11 @@ impl Order {
     pub(super) fn wish(number: u64, wish: &Wish) -> Array {
         let frame = wish.number.map_or(JsValue::NULL, |frame| (frame as f64).into());
         let [width, height] = wish.within.map(|side| JsValue::from(side as f64));
-        let flags = [wish.exact, wish.draft].map(JsValue::from);
+        let flags = [wish.exact, wish.draft, wish.still].map(JsValue::from);
         let head =
             [JsValue::from("wish"), count(number), count(wish.revision.0), (&*wish.name).into(), (&*wish.text).into()];
-        head.into_iter().chain([frame, width, height]).chain(flags).collect()
+        let stages = wish.stages.map_or(JsValue::NULL, |sheet| (sheet as f64).into());
+        head.into_iter().chain([frame, width, height]).chain(flags).chain([stages]).collect()
     }
 
     /// Reads a message; wishes find their files in `assets`.
@@ -63,6 +68,8 @@ impl Order {
                     within: fields.size()?,
                     exact: fields.flag()?,
                     draft: fields.flag()?,
+                    still: fields.flag()?,
+                    stages: fields.next()?.as_f64().map(|sheet| sheet as usize),
                 };
                 Self::Wish(number, wish)
             }
@@ -79,7 +86,13 @@ impl Reply {
             Self::Judged { number, exposure_ev100: Err(reason) } => {
                 array(["judged".into(), count(number), reason.into()])
             }
-            Self::Drawn { number, picture } => drawn(number, &picture),
+            Self::Drawn { number, picture } => drawn("drawn", number, &picture).collect(),
+            Self::Stage { number, stage, picture } => {
+                drawn("stage", number, &picture).chain([JsValue::from(stage as f64)]).collect()
+            }
+            Self::Still { number, frame, png } => {
+                array(["still".into(), count(number), (frame as f64).into(), Uint8Array::from(png.as_slice()).into()])
+            }
             Self::Failed { number, reason } => array(["failed".into(), count(number), reason.into()]),
             Self::Panicked { number, message } => array(["panicked".into(), count(number), message.into()]),
             Self::Done { number } => array(["done".into(), count(number)]),
@@ -100,6 +113,11 @@ impl Reply {
                 Self::Judged { number, exposure_ev100: found.as_f64().map(|ev100| ev100 as f32).ok_or_else(reason) }
             }
             "drawn" => Self::Drawn { number, picture: fields.picture()? },
+            "stage" => {
+                let picture = fields.picture()?;
+                Self::Stage { number, stage: fields.number()? as usize, picture }
+            }
+            "still" => Self::Still { number, frame: fields.number()? as i64, png: fields.bytes()? },
             "failed" => Self::Failed { number, reason: fields.text()? },
             "panicked" => Self::Panicked { number, message: fields.text()? },
             "done" => Self::Done { number },
@@ -117,13 +135,13 @@ fn count(number: u64) -> JsValue {
     (number as f64).into()
 }
 
-fn drawn(number: u64, picture: &Picture) -> Array {
+fn drawn(kind: &str, number: u64, picture: &Picture) -> impl Iterator<Item = JsValue> {
     let Picture { revision, number: frame, size, scene_size, pixels, exact, draft, draw_s, advance_s } = picture;
-    let head = [JsValue::from("drawn"), count(number), count(revision.0), (*frame as f64).into()];
+    let head = [JsValue::from(kind), count(number), count(revision.0), (*frame as f64).into()];
     let sizes = [*size, *scene_size].concat().into_iter().map(|side| JsValue::from(side as f64));
     let pixels = Uint8Array::from(pixels.as_flattened());
     let tail = [pixels.into(), (*exact).into(), (*draft).into(), (*draw_s).into(), (*advance_s).into()];
-    head.into_iter().chain(sizes).chain(tail).collect()
+    head.into_iter().chain(sizes).chain(tail)
 }
 
 /// The fields of a message, one after another.

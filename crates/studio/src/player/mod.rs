@@ -26,7 +26,7 @@ use bansho::{Assets, Plan, SceneError};
 
 use crate::document::Revision;
 
-pub use pace::Pace;
+pub use pace::{Pace, Took};
 pub use slices::SlicePlayer;
 #[cfg(not(target_arch = "wasm32"))]
 pub use thread::{StartError, ThreadPlayer};
@@ -53,6 +53,10 @@ pub struct Wish {
     pub exact: bool,
     /// Whether it may be simulated with fewer particles.
     pub draft: bool,
+    /// Whether the finished picture is wanted, as `bansho render` writes it, in place of one for a window.
+    pub still: bool,
+    /// The flame sheet whose stages are wanted besides.
+    pub stages: Option<usize>,
 }
 
 /// A picture that was drawn.
@@ -89,6 +93,15 @@ pub enum Event {
     },
     /// A picture is there.
     Drawn(Picture),
+    /// A small picture of a stage of the flame sheet that was asked for, which of [`stages`](crate::document::stages::names).
+    Stage(usize, Picture),
+    /// The finished picture of a frame is there.
+    Still {
+        /// The frame.
+        number: i64,
+        /// The file that `bansho render` writes, a PNG.
+        png: Vec<u8>,
+    },
     /// No picture could be drawn.
     Failed {
         /// Of which state.

@@ -51,7 +51,7 @@ impl Progress {
     }
 }
 
-/// The job that renders `text` as if it lay in `path`: all frames, or only `number`.
+/// The job that renders `text` as if it lay in `path`, into `out/` beside that: all frames, or only `number`.
 pub fn job(text: &str, path: &Path, number: Option<i64>) -> Job {
     let scene = SceneFile {
         name: path.display().to_string(),
@@ -60,7 +60,8 @@ pub fn job(text: &str, path: &Path, number: Option<i64>) -> Job {
         text: text.to_owned(),
         changes: Vec::new(),
     };
-    Job { frames: number.map(|number| vec![number]), ..Job::new(scene) }
+    let out = scene.folder.join("out").join(&scene.stem).join(format!("{}.####.png", scene.stem));
+    Job { frames: number.map(|number| vec![number]), out: Some(out), ..Job::new(scene) }
 }
 
 impl Shooting {

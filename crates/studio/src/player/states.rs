@@ -1,6 +1,6 @@
 //! States of stepped phenomena along the way, so that going back in time does not begin at its beginning.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use bansho::{Plan, Shot, render::fingerprint};
 
@@ -12,7 +12,7 @@ const APART: i64 = 10;
 /// States of one plan, by frame.
 #[derive(Default)]
 pub(super) struct States {
-    of: [u8; 32],
+    of: Option<(Arc<Plan>, [u8; 32])>,
     by_frame: BTreeMap<i64, Vec<u8>>,
     bytes: usize,
     /// The frame that the shot stands at.
@@ -21,7 +21,7 @@ pub(super) struct States {
 
 impl States {
     /// Brings `shot` nearer to frame `number` where that lies behind it and a state does not.
-    pub(super) fn seek(&mut self, plan: &Plan, shot: &mut dyn Shot, number: i64) {
+    pub(super) fn seek(&mut self, plan: &Arc<Plan>, shot: &mut dyn Shot, number: i64) {
         self.turn_to(plan);
         if self.last.is_none_or(|last| last <= number) {
             return;
@@ -33,7 +33,7 @@ impl States {
     }
 
     /// Keeps the state at frame `number` where it is worth it: only states that the plan leads to are.
-    pub(super) fn keep(&mut self, plan: &Plan, shot: &dyn Shot, number: i64) {
+    pub(super) fn keep(&mut self, plan: &Arc<Plan>, shot: &dyn Shot, number: i64) {
         self.turn_to(plan);
         self.last = Some(number);
         let near = self.by_frame.range(number - APART + 1..=number).next().is_some();
@@ -46,11 +46,15 @@ impl States {
     }
 
     /// States of another plan are of no use.
-    fn turn_to(&mut self, plan: &Plan) {
+    fn turn_to(&mut self, plan: &Arc<Plan>) {
+        if self.of.as_ref().is_some_and(|(own, _)| Arc::ptr_eq(own, plan)) {
+            return;
+        }
         let of = fingerprint::of_state(plan);
-        if of != self.of {
-            (self.of, self.bytes) = (of, 0);
+        if self.of.as_ref().is_none_or(|(_, own)| *own != of) {
+            self.bytes = 0;
             self.by_frame.clear();
         }
+        self.of = Some((plan.clone(), of));
     }
 }

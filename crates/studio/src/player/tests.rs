@@ -31,6 +31,8 @@ fn wish(text: &str, number: i64) -> Wish {
         within: [10_000; 2],
         exact: false,
         draft: false,
+        still: false,
+        stages: None,
     }
 }
 
@@ -194,19 +196,6 @@ fn a_panic_is_told_and_the_player_lives_on() {
     while !wait(&mut player, &woken).iter().any(|event| matches!(event, Event::Drawn(_))) {}
 }
 
-#[test]
-fn previews_shrink_when_they_are_late_and_grow_when_there_is_room() {
-    let mut pace = Pace::default();
-    pace.learn(0.4, 0.1);
-    assert_eq!(pace.share(), 0.5, "a quarter of the pixels");
-    pace.learn(0.09, 0.1);
-    assert_eq!(pace.share(), 0.5, "larger would be late");
-    pace.learn(0.02, 0.1);
-    assert_eq!(pace.share(), 0.75);
-    pace.learn(100.0, 0.1);
-    assert_eq!(pace.share(), 0.125, "never smaller than an eighth");
-}
-
 fn playing() -> Transport {
     let mut transport = Transport::default();
     transport.set_shot(10..=19, 10.0);
@@ -262,6 +251,11 @@ fn a_still_is_the_file_that_render_writes() {
     assert_eq!((file.as_path(), shooting.progress()), (out.as_path(), [1, 1]));
     let decoded = bansho::media::plates::FileAssets::new(folder.path());
     let plate = decoded.picture("still.png", 0).unwrap();
+    let mut events = Vec::new();
+    let still = Wish { still: true, ..wish(SCENE, 5) };
+    engine::Engine::default().fulfil(&still, &Unobserved, &mut |event| events.push(event)).unwrap();
+    let written = std::fs::read(&out).unwrap();
+    assert!(matches!(&events[1..], [Event::Still { number: 5, png }] if *png == written));
     let codes = plate.colour.pixels().iter().map(|pixel| pixel.map(|value| (value * 255.0).round() as u8));
     assert!(codes.eq(rendered_with_alpha(SCENE, 5, false)));
 }

@@ -123,6 +123,8 @@ impl WorkerPlayer {
                 Some(Event::Judged { revision: wish.revision, outcome })
             }
             Reply::Drawn { picture, .. } => Some(Event::Drawn(picture)),
+            Reply::Stage { stage, picture, .. } => Some(Event::Stage(stage, picture)),
+            Reply::Still { frame, png, .. } => Some(Event::Still { number: frame, png }),
             Reply::Failed { number, reason } => {
                 Some(Event::Failed { revision: self.wish_of(number)?.revision, reason })
             }
@@ -274,6 +276,8 @@ fn reply(number: u64, event: Event) -> Reply {
     match event {
         Event::Judged { outcome, .. } => Reply::Judged { number, exposure_ev100: exposure(outcome) },
         Event::Drawn(picture) => Reply::Drawn { number, picture },
+        Event::Stage(stage, picture) => Reply::Stage { number, stage, picture },
+        Event::Still { number: frame, png } => Reply::Still { number, frame, png },
         Event::Failed { reason, .. } => Reply::Failed { number, reason },
         Event::Panicked { message, .. } => Reply::Panicked { number, message },
     }

@@ -139,7 +139,7 @@ fn cameras(view: &View) -> Vec<Camera> {
     let moved = |x: f64, y: f64| {
         let place = |camera: &Camera| camera.direction(DVec2::new(x * camera.size[0], y * camera.size[1]));
         let pair = place(&open).zip(place(&close));
-        pair.map_or(0.0, |(a, b)| a.normalize().angle_between(b.normalize()) * open.focal_pixels)
+        pair.map_or(0.0, |(a, b)| math::acos(a.normalize().dot(b.normalize()).clamp(-1.0, 1.0)) * open.focal_pixels)
     };
     let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.5, 0.5]].map(|[x, y]| moved(x, y));
     let most = corners.into_iter().fold(0.0, f64::max);

@@ -80,8 +80,8 @@ fn warped_noise() -> Texels {
     let across = octaves(2, 0.5, key, Purpose::named("stir across"));
     let up = octaves(2, 0.5, key, Purpose::named("stir up"));
     let place = |i: usize| {
-        let column = STIR[0].mul_add(across[i], (i % COLUMNS) as f32);
-        gas.bilinear(column, STIR[1].mul_add(up[i], (i / COLUMNS) as f32))
+        let column = STIR[0].fused(across[i], (i % COLUMNS) as f32);
+        gas.bilinear(column, STIR[1].fused(up[i], (i / COLUMNS) as f32))
     };
     spread_evenly((0..ROWS * COLUMNS).map(place).collect())
 }

@@ -3,11 +3,11 @@
 mod fractal;
 mod paper;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 pub use paper::{PaperTexture, paper_texture};
 
-use fearless_simd::Simd;
+use fearless_simd::{Level, Simd, dispatch};
 
 use super::lanes::{Lanes, Real, fetch, wrap_split};
 
@@ -18,6 +18,8 @@ pub(crate) use paper::PaperLayer;
 pub(crate) const COLUMNS: usize = 256;
 /// Rows of a table, along q.
 pub(crate) const ROWS: usize = 512;
+/// The coarsest level of a table.
+pub(crate) const COARSEST: usize = 5;
 
 /// A periodic texture of [`ROWS`] x [`COLUMNS`] texels.
 ///
@@ -25,6 +27,8 @@ pub(crate) const ROWS: usize = 512;
 #[derive(Clone, Debug)]
 pub(crate) struct TextureTable {
     corners: Box<[[f32; 4]; ROWS * COLUMNS]>,
+    /// Texels of ever coarser tables, made when they are needed.
+    coarser: [OnceLock<Box<[f32]>>; COARSEST],
 }
 
 impl TextureTable {
@@ -38,7 +42,7 @@ impl TextureTable {
         let corners: Vec<[f32; 4]> = (0..ROWS * COLUMNS).map(corner).collect();
         // The range above makes exactly the array's length.
         let corners = corners.into_boxed_slice().try_into().unwrap_or_else(|_| Box::new([[0.0; 4]; ROWS * COLUMNS]));
-        Self { corners }
+        Self { corners, coarser: Default::default() }
     }
 
     /// The texels themselves, row after row.
@@ -63,34 +67,63 @@ impl TextureTable {
         let split = |place: f32| (place.floor() as i32 as usize, place - place.floor());
         let ((left, across), (below, up)) = (split(column), split(row));
         let [low_left, low_right, high_left, high_right] = self.corners[below % ROWS * COLUMNS + left % COLUMNS];
-        let low = (low_right - low_left).mul_add(across, low_left);
-        let high = (high_right - high_left).mul_add(across, high_left);
-        (high - low).mul_add(up, low)
+        let low = (low_right - low_left).fused(across, low_left);
+        let high = (high_right - high_left).fused(across, high_left);
+        (high - low).fused(up, low)
     }
 
-    /// A table a factor 2 coarser for each whole `level`, blended between, still of the same size: for small sheets.
+    /// A table a factor 2 coarser for each whole `level`, up to [`COARSEST`], blended between, still of the same size: for small sheets.
     pub(crate) fn filtered(&self, level: f32) -> Self {
-        let mut texels = self.texels();
-        let (whole, part) = (level.floor().max(0.0), level - level.floor().max(0.0));
-        for step in 0..whole as usize {
-            smooth(&mut texels, 1 << step, 1.0);
-        }
-        smooth(&mut texels, 1 << whole as usize, part);
+        let level = level.clamp(0.0, COARSEST as f32);
+        let whole = (level as usize).min(COARSEST - 1);
+        let mut texels = self.coarse(whole).to_vec();
+        smooth(&mut texels, 1 << whole, level - whole as f32);
         Self::new(&texels)
+    }
+
+    /// The texels of a table `level` factors of 2 coarser, which are kept.
+    fn coarse(&self, level: usize) -> &[f32] {
+        self.coarser[level].get_or_init(|| match level.checked_sub(1) {
+            None => self.texels().into(),
+            Some(finer) => {
+                let mut texels = self.coarse(finer).to_vec();
+                smooth(&mut texels, 1 << finer, 1.0);
+                texels.into()
+            }
+        })
     }
 }
 
 /// Blends each texel by `amount` with the binomial mean (1 2 1)/4 of texels `spacing` apart, in both directions.
-fn smooth(texels: &mut Vec<f32>, spacing: usize, amount: f32) {
-    for (count, stride) in [(COLUMNS, 1), (ROWS, COLUMNS)] {
-        let blurred = |i: usize| {
-            let place = (i / stride) % count;
-            let base = i - place * stride;
-            let at = |p: usize| texels[base + (p % count) * stride];
-            let mean = 0.25 * (at(place + spacing % count) + at(place + count - spacing % count)) + 0.5 * texels[i];
-            (mean - texels[i]).mul_add(amount, texels[i])
-        };
-        *texels = (0..texels.len()).map(blurred).collect();
+fn smooth(texels: &mut [f32], spacing: usize, amount: f32) {
+    let before = texels.to_vec();
+    dispatch!(Level::new(), _simd => smooth_across(&before, texels, spacing, amount));
+    let before = texels.to_vec();
+    dispatch!(Level::new(), _simd => smooth_up(&before, texels, spacing, amount));
+}
+
+#[inline(always)]
+fn smooth_across(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
+    for (row, smooth) in before.chunks_exact(COLUMNS).zip(texels.chunks_exact_mut(COLUMNS)) {
+        let wrapped = [&row[COLUMNS - spacing..], row, &row[..spacing]].concat();
+        blend(row, [&wrapped[2 * spacing..], &wrapped], amount, smooth);
+    }
+}
+
+#[inline(always)]
+fn smooth_up(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
+    let row = |row: usize| &before[row % ROWS * COLUMNS..][..COLUMNS];
+    for (place, smooth) in texels.chunks_exact_mut(COLUMNS).enumerate() {
+        blend(row(place), [row(place + spacing), row(place + ROWS - spacing)], amount, smooth);
+    }
+}
+
+#[inline(always)]
+fn blend(row: &[f32], [next, last]: [&[f32]; 2], amount: f32, smooth: &mut [f32]) {
+    let (row, next, last) = (&row[..COLUMNS], &next[..COLUMNS], &last[..COLUMNS]);
+    for (i, value) in smooth.iter_mut().enumerate() {
+        let mean = 0.25 * (next[i] + last[i]) + 0.5 * row[i];
+        *value = (mean - row[i]).fused(amount, row[i]);
     }
 }
 

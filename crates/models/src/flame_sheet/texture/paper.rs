@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
 };
 
-use bansho_base::math;
+use bansho_base::math::{self, Fused};
 
 use super::{COLUMNS, Layer, ROWS, Texture, TextureTable};
 use crate::flame_sheet::clock::Clock;
@@ -25,8 +25,8 @@ const PERIOD_UP: f64 = 2.0 * PI / 13.0;
 pub fn paper_texture(p: f64, q: f64, octaves: u32) -> f64 {
     let (mut sum, mut weights) = (0.0, 0.0);
     for octave in Octave::all(octaves) {
-        let phi = octave.across.mul_add(p, FRAC_PI_2 * math::sin(0.5 * octave.up * q));
-        let psi = octave.up.mul_add(q, FRAC_PI_2 * math::sin(0.5 * octave.across * p));
+        let phi = octave.across.fused(p, FRAC_PI_2 * math::sin(0.5 * octave.up * q));
+        let psi = octave.up.fused(q, FRAC_PI_2 * math::sin(0.5 * octave.across * p));
         sum += octave.weight * (math::cos(phi) * math::cos(psi) + 1.0);
         weights += octave.weight;
     }
@@ -101,8 +101,8 @@ impl PaperTexture {
         for (column_factor, row_factor) in self.across.chunks_exact(4).zip(self.up[row].chunks_exact(4)) {
             let [a, b, c, d] = [0, 1, 2, 3].map(|k| &column_factor[k][..values.len()]);
             for (i, value) in values.iter_mut().enumerate() {
-                let first = a[i].mul_add(row_factor[0], b[i].mul_add(row_factor[1], *value));
-                *value = c[i].mul_add(row_factor[2], d[i].mul_add(row_factor[3], first));
+                let first = a[i].fused(row_factor[0], b[i].fused(row_factor[1], *value));
+                *value = c[i].fused(row_factor[2], d[i].fused(row_factor[3], first));
             }
         }
     }

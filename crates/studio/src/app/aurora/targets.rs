@@ -11,29 +11,43 @@ use crate::{app::session::Session, document::drawing::Drawing};
 
 /// Shows the line and its buttons.
 pub(super) fn show(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &Drawing) {
-    ui.horizontal(|ui| {
-        if ui.button("Add shape").on_hover_text("One more shape after the last, to be drawn over it").clicked() {
-            add(editor, ui, session, drawing);
-            return;
+    /// A narrower line has a row of its own.
+    const BESIDE: f32 = 220.0;
+    let beside = ui.horizontal(|ui| {
+        buttons(editor, ui, session, drawing);
+        let beside = ui.available_width() >= BESIDE;
+        if beside {
+            line(editor, ui, session, drawing);
         }
-        let several = drawing.arrivals().len() > 1;
-        let remove = ui.add_enabled(several, egui::Button::new("Remove shape"));
-        if remove.on_hover_text("Without the shape that is shown on the right").clicked() {
-            let removal = drawing.remove_shape(editor.target);
-            editor.change(session, "remove shape", &removal, ui.cursor().min);
-            return;
-        }
-        if editor.target > 0 {
-            let label = ui.label("reached after").id;
-            let mut after_s = drawing.after_s(editor.target);
-            let drag = egui::DragValue::new(&mut after_s).range(0.1..=1e5).speed(0.05).max_decimals(2).suffix(" s");
-            if ui.add(drag).labelled_by(label).changed() {
-                let change = drawing.retime(editor.target, after_s);
-                editor.change(session, "time of shape", &change, ui.cursor().min);
-            }
-        }
-        line(editor, ui, session, drawing);
+        beside
     });
+    if !beside.inner {
+        line(editor, ui, session, drawing);
+    }
+}
+
+/// What is done with the shape that is shown on the right.
+fn buttons(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &Drawing) {
+    if ui.button("Add shape").on_hover_text("One more shape after the last, to be drawn over it").clicked() {
+        add(editor, ui, session, drawing);
+        return;
+    }
+    let several = drawing.arrivals().len() > 1;
+    let remove = ui.add_enabled(several, egui::Button::new("Remove shape"));
+    if remove.on_hover_text("Without the shape that is shown on the right").clicked() {
+        let removal = drawing.remove_shape(editor.target);
+        editor.change(session, "remove shape", &removal, ui.cursor().min);
+        return;
+    }
+    if editor.target > 0 {
+        let label = ui.label("reached after").id;
+        let mut after_s = drawing.after_s(editor.target);
+        let drag = egui::DragValue::new(&mut after_s).range(0.1..=1e5).speed(0.05).max_decimals(2).suffix(" s");
+        if ui.add(drag).labelled_by(label).changed() {
+            let change = drawing.retime(editor.target, after_s);
+            editor.change(session, "time of shape", &change, ui.cursor().min);
+        }
+    }
 }
 
 fn add(editor: &mut AuroraEditor, ui: &Ui, session: &mut Session, drawing: &Drawing) {

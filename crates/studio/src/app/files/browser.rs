@@ -43,12 +43,12 @@ pub(super) fn take_dropped(file: DroppedFileHandle, inbox: &Inbox, ctx: &Context
     });
 }
 
-/// Hands `text` to the user as a file called `name`.
+/// Hands `bytes` to the user as a file called `name`.
 ///
 /// # Errors
 /// The page cannot make files.
-pub(super) fn download(name: &str, text: &str) -> Result<(), JsValue> {
-    let blob = Blob::new_with_str_sequence(&js_sys::Array::of1(&text.into()))?;
+pub(super) fn download(name: &str, bytes: &[u8]) -> Result<(), JsValue> {
+    let blob = Blob::new_with_u8_array_sequence(&js_sys::Array::of1(&js_sys::Uint8Array::from(bytes)))?;
     let url = Url::create_object_url_with_blob(&blob)?;
     let link: HtmlAnchorElement = element("a")?;
     link.set_href(&url);

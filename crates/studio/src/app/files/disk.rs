@@ -123,7 +123,7 @@ impl Files {
     }
 
     /// Renders the present frame as `bansho render` does.
-    pub(in crate::app) fn render_still(&mut self, session: &mut Session) {
+    pub(in crate::app) fn render_still(&mut self, _ctx: &Context, session: &mut Session) {
         self.render(session, true);
     }
 

@@ -9,7 +9,10 @@ use super::{
     Files,
     browser::{self, Inbox},
 };
-use crate::app::{session::Session, store::Store};
+use crate::{
+    app::{session::Session, store::Store},
+    player::{Event, Player, WorkerPlayer},
+};
 
 /// What the page knows of files.
 pub(super) struct Shelf {
@@ -17,11 +20,13 @@ pub(super) struct Shelf {
     inbox: Inbox,
     /// What shall name the next file that comes.
     relink: Option<Place>,
+    /// Makes a finished picture, in a worker of its own, so that the window's pictures go on meanwhile.
+    finishing: Option<WorkerPlayer>,
 }
 
 impl Shelf {
     pub(super) fn new(_store: &Store) -> Self {
-        Self { inbox: Inbox::default(), relink: None }
+        Self { inbox: Inbox::default(), relink: None, finishing: None }
     }
 }
 
@@ -46,30 +51,62 @@ impl Files {
 
     /// Hands the scene to the browser, which saves it where it saves what it is given.
     pub(in crate::app) fn save(&mut self, session: &mut Session) {
-        let name = session.document.name().to_owned();
-        let name = if name.ends_with(".toml") { name } else { format!("{name}.toml") };
         let text = session.document.text().clone();
-        match browser::download(&name, &text) {
+        match browser::download(&format!("{}.toml", stem(session)), text.as_bytes()) {
             Ok(()) => session.document.mark_saved(text),
             Err(_) => session.set_notice(Some("the browser cannot save files here".into())),
         }
     }
 
-    /// A page has no folders.
-    pub(in crate::app) fn menu(&mut self, _ui: &mut Ui, _session: &mut Session) {}
-
-    /// A page has nowhere to write to.
-    pub(in crate::app) fn render_still(&mut self, session: &mut Session) {
-        session.set_notice(Some("save the scene; the program `bansho render` makes its pictures".into()));
+    /// What the menu has for files of a page.
+    pub(in crate::app) fn menu(&mut self, ui: &mut Ui, session: &mut Session) {
+        ui.separator();
+        if ui.button("Render still").on_hover_text("The finished picture of this frame, as a PNG").clicked() {
+            self.render_still(ui.ctx(), session);
+        }
+        if self.shelf.finishing.is_some() && ui.button("Stop rendering").clicked() {
+            self.shelf.finishing = None;
+        }
     }
 
-    /// Nothing is rendered here.
+    /// Makes the present frame as `bansho render` does, to be saved once it is there.
+    pub(in crate::app) fn render_still(&mut self, ctx: &Context, session: &mut Session) {
+        let ctx = ctx.clone();
+        let Ok(mut player) = WorkerPlayer::start(move || ctx.request_repaint()) else {
+            session.set_notice(Some("the browser gives no worker to render in".into()));
+            return;
+        };
+        session.given().iter().for_each(|(name, bytes)| player.give(name, bytes));
+        player.wish(session.still());
+        self.shelf.finishing = Some(player);
+    }
+
+    /// What goes on, for the status line.
     pub(in crate::app) fn progress(&self) -> Option<String> {
-        None
+        self.shelf.finishing.as_ref().map(|_| "rendering the still…".into())
+    }
+
+    /// Hands a finished picture to the browser.
+    fn take_still(&mut self, session: &mut Session) {
+        let Some(player) = &mut self.shelf.finishing else { return };
+        let notice = player.poll().into_iter().find_map(|event| match event {
+            Event::Still { number, png } => Some(match browser::download(&still_name(session, number), &png) {
+                Ok(()) => format!("rendered: {}", still_name(session, number)),
+                Err(_) => "the browser cannot save files here".into(),
+            }),
+            Event::Judged { outcome: Err(error), .. } => Some(format!("the scene has faults: {error}")),
+            Event::Failed { reason, .. } | Event::Panicked { message: reason, .. } => Some(reason),
+            Event::Judged { .. } | Event::Drawn(_) | Event::Stage(..) => None,
+        });
+        if notice.is_some() {
+            self.shelf.finishing = None;
+            session.set_notice(notice);
+        }
     }
 
     /// Takes in what the browser gave: a scene is opened, anything else laid into the one that is open.
     pub(super) fn tend_shelf(&mut self, ui: &Ui, session: &mut Session) {
+        self.take_still(session);
         let dropped = ui.input(|input| input.raw.dropped_files.clone());
         dropped.into_iter().for_each(|file| browser::take_dropped(file, &self.shelf.inbox, ui.ctx()));
         let given = self.shelf.inbox.take();
@@ -88,4 +125,15 @@ impl Files {
             }
         }
     }
+}
+
+/// The document's name without its ending.
+fn stem(session: &Session) -> &str {
+    let name = session.document.name();
+    name.strip_suffix(".toml").unwrap_or(name)
+}
+
+/// What `bansho render` calls the picture of frame `number`.
+fn still_name(session: &Session, number: i64) -> String {
+    format!("{}.{number:04}.png", stem(session))
 }

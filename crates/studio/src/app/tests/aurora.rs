@@ -3,19 +3,8 @@
 use eframe::egui::{Key, Modifiers, Pos2, Rect, pos2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
-use super::{super::Studio, drawn, press, release, text, window};
+use super::{super::Studio, drawn, press, release, sky, text, window};
 use crate::document::{Document, drawing::Drawing, files};
-
-const SKY: &str = "\
-bansho = 1
-[picture]
-size = [48, 27]
-frames = 4
-[[aurora]]
-preroll_s = 0.0
-particles = { count = 300 } # few, to be quick
-field = { cells = 31 }
-";
 
 fn plane(harness: &Harness<'_, Studio>, name: &str) -> Rect {
     harness.get_by_label(name).rect()
@@ -57,7 +46,7 @@ fn drawing(harness: &mut Harness<'_, Studio>) -> Drawing {
 
 #[test]
 fn an_s_is_drawn_split_played_saved_and_opened_again() {
-    let mut harness = window(SKY);
+    let mut harness = window(&sky(4, ""));
     stroke(&mut harness, &[[0.1, 0.5], [0.5, 0.45], [0.9, 0.5]]);
     assert_eq!(drawing(&mut harness).lines(0).len(), 1);
     choose(&mut harness, "Add shape");
@@ -101,7 +90,7 @@ fn an_s_is_drawn_split_played_saved_and_opened_again() {
 
 #[test]
 fn impossible_choices_are_refused_with_the_reason() {
-    let mut harness = window(SKY);
+    let mut harness = window(&sky(4, ""));
     stroke(&mut harness, &[[0.1, 0.5], [0.9, 0.5]]);
     let before = text(&mut harness);
     stroke(&mut harness, &[[0.5, 0.2], [0.5, 0.8]]);
@@ -129,7 +118,7 @@ fn impossible_choices_are_refused_with_the_reason() {
 
 #[test]
 fn points_are_moved_smoothed_brightened_and_erased() {
-    let mut harness = window(SKY);
+    let mut harness = window(&sky(4, ""));
     stroke(&mut harness, &[[0.1, 0.5], [0.5, 0.3], [0.9, 0.5]]);
     let peak = |harness: &mut Harness<'_, Studio>| {
         drawing(harness).points(0, 0).iter().map(|point| point.y).fold(f64::INFINITY, f64::min)
@@ -174,7 +163,7 @@ fn points_are_moved_smoothed_brightened_and_erased() {
 
 #[test]
 fn sheets_and_points_are_linked_by_dragging() {
-    let mut harness = window(SKY);
+    let mut harness = window(&sky(4, ""));
     stroke(&mut harness, &[[0.1, 0.4], [0.9, 0.4]]);
     stroke(&mut harness, &[[0.1, 0.6], [0.9, 0.6]]);
     choose(&mut harness, "Add shape");

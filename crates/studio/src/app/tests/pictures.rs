@@ -11,7 +11,7 @@ use egui_kittest::{
     wgpu::{WgpuTestRenderer, default_wgpu_setup},
 };
 
-use super::{super::Studio, SCENE, drawn, window_by};
+use super::{super::Studio, SCENE, drawn, sky, window_by};
 
 /// Small, for they are kept with the code.
 const SIZE: [f32; 2] = [960.0, 620.0];
@@ -49,7 +49,8 @@ fn the_window_looks_as_it_did_dark_and_light() {
 #[ignore = "needs a Vulkan device"]
 fn curves_look_as_they_did() {
     let mut harness = painted(SCENE);
-    harness.get_by_label("texture").click();
+    // The stage above is called so too.
+    harness.get_all_by_label("texture").last().expect("the section").click();
     harness.run_steps(12);
     harness.get_by_label("threshold").scroll_to_me();
     harness.run_steps(12);
@@ -59,17 +60,8 @@ fn curves_look_as_they_did() {
 #[test]
 #[ignore = "needs a Vulkan device"]
 fn the_aurora_editor_looks_as_it_did() {
-    let mut harness = painted(
-        "\
-bansho = 1
-[picture]
-size = [64, 36]
-frames = 150
-[[aurora]]
+    let shapes = "\
 extent_km = 800.0
-preroll_s = 0.0
-particles = { count = 300 }
-field = { cells = 31 }
 [[aurora.shapes]]
 sheets = [{ points = [[-300, 0], [0, 60], [300, 0]] }, { points = [[-200, -150], [200, -120]] }]
 [[aurora.shapes]]
@@ -80,8 +72,8 @@ sheets = [
 ]
 split = [{ sheet = 1, at = 0.5 }]
 link = [{ from = 2, to = 3, at = 0.3, arrives = 0.5 }]
-",
-    );
+";
+    let mut harness = painted(&sky(150, shapes));
     harness.get_by_label("Shape 2").click();
     drawn(&mut harness);
     looks(&mut harness, "aurora_editor");

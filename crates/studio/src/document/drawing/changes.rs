@@ -6,17 +6,22 @@ use bansho::{
         math::DVec2,
         parameters::{Node, Parameters, Table, Value},
     },
-    models::aurora::shapes::{Correspondence, Form, SheetParameters},
+    models::aurora::shapes::{Correspondence, Form, LinkParameters, SheetParameters},
     render::scene::{Place, operation::Operation},
 };
 
 use super::{
-    Drawing, Factor, lines,
+    Drawing, Factor, OnSheet, lines,
+    links::rounded,
+    renumber::Fate,
     sheets::{curve_chain, curve_part, stated, with_form, with_points},
 };
 
 /// An end of a sheet: which sheet, and whether its last point rather than its first.
 pub type End = (usize, bool);
+
+/// The sheets of a shape after a change, and what became of places on those before.
+type Changed = (Vec<SheetParameters>, Fate);
 
 /// Half of the gap between the two parts of a sheet that was split, as a share of the square's side.
 const HALF_GAP: f64 = 0.012;
@@ -74,10 +79,11 @@ impl Drawing {
     /// Without sheet `sheet`.
     pub fn remove_sheet(&self, shape: usize, sheet: usize) -> Vec<Operation> {
         let mut sheets = self.sheets(shape);
-        if sheet < sheets.len() {
-            sheets.remove(sheet);
+        if sheet >= sheets.len() {
+            return Vec::new();
         }
-        self.write(shape, &sheets)
+        sheets.remove(sheet);
+        self.write_all(shape, &[(sheets, Fate::Gone(sheet))], LinkParameters::clone)
     }
 
     /// More or less of `factor` around the share `at` of sheet `sheet`.
@@ -97,7 +103,7 @@ impl Drawing {
         self.write(shape, &sheets)
     }
 
-    /// Splits sheet `sheet` of the shape before `shape` at the share `at` of its length; what it became is cut there too.
+    /// Splits sheet `sheet` of the shape before `shape` at the share `at` of its length; what it becomes from there on is cut too.
     pub fn split(&self, shape: usize, sheet: usize, at: f64) -> Vec<Operation> {
         let at = (at * 1000.0).round() / 1000.0;
         let mut change = Table::default();
@@ -105,14 +111,22 @@ impl Drawing {
         change.push("at", Value::Number(at));
         let mut operations =
             vec![Operation::Append { place: self.shape(shape).key("split"), value: Value::Table(change) }];
-        let from = self.lines(shape - 1).get(sheet).and_then(|line| lines::part(line, [at, 1.0]).first().copied());
-        if let Some(target) = from.and_then(|from| self.arrival_of(shape, from)).filter(|_| self.shows_changes()) {
-            operations.extend(self.write(shape, &self.cut_at(shape, target)));
-        }
+        // Of the two parts that come of a linked sheet the first is meant from now on.
+        let part = |link: &LinkParameters| match link.at {
+            None if link.from == sheet as i64 + 1 => LinkParameters { at: Some(rounded(0.5 * at)), ..link.clone() },
+            _ => link.clone(),
+        };
+        let line = self.lines(shape - 1).into_iter().nth(sheet).unwrap_or_default();
+        let from = lines::part(&line, [at, 1.0]).first().copied();
+        let changed = self.carried(shape, from.as_slice(), |shape, targets| {
+            let (sheets, cut) = self.cut_at(shape, *targets.first()?)?;
+            Some((sheets, Fate::Cut(cut)))
+        });
+        operations.extend(self.write_all(shape, &changed, part));
         operations
     }
 
-    /// Merges two ends of the shape before `shape`; what they became is joined too.
+    /// Merges two ends of the shape before `shape`; what they become from there on is joined too.
     pub fn merge(&self, shape: usize, ends: [End; 2]) -> Vec<Operation> {
         let mut change = Table::default();
         let list = |numbers: [i64; 2]| Value::List(numbers.map(|number| Node::from(Value::Integer(number))).into());
@@ -123,13 +137,53 @@ impl Drawing {
         let before = self.lines(shape - 1);
         let at = |(sheet, last): End| {
             let line = before.get(sheet)?;
-            self.arrival_of(shape, *if last { line.last()? } else { line.first()? })
+            if last { line.last().copied() } else { line.first().copied() }
         };
-        if let [Some(first), Some(second)] = ends.map(at)
-            && self.shows_changes()
-        {
-            operations.extend(self.write(shape, &self.joined_at(shape, [first, second])));
+        if let [Some(first), Some(second)] = ends.map(at) {
+            let joined = self.carried(shape, &[first, second], |shape, targets| match targets {
+                &[first, second] => self.joined_at(shape, [first, second]),
+                _ => None,
+            });
+            operations.extend(self.write_all(shape, &joined, LinkParameters::clone));
         }
+        operations
+    }
+
+    /// What `change` makes of shape `shape` and of all that come of it, where points of the shape before arrive, for as long as it
+    /// makes something of them.
+    fn carried(
+        &self,
+        shape: usize,
+        from: &[DVec2],
+        change: impl Fn(usize, &[DVec2]) -> Option<Changed>,
+    ) -> Vec<Changed> {
+        let mut points = from.to_vec();
+        let mut changed = Vec::new();
+        let shapes = if self.shows_changes() { shape..self.arrivals().len() } else { 0..0 };
+        for shape in shapes {
+            let arrived: Option<Vec<DVec2>> = points.iter().map(|&point| self.arrival_of(shape, point)).collect();
+            let Some(new) = arrived.and_then(|arrived| {
+                points = arrived;
+                change(shape, &points)
+            }) else {
+                break;
+            };
+            changed.push(new);
+        }
+        changed
+    }
+
+    /// The operations that make shapes from `first` on what they were changed to, and let everything follow that counts their sheets.
+    fn write_all(
+        &self,
+        first: usize,
+        changed: &[Changed],
+        links: impl Fn(&LinkParameters) -> LinkParameters,
+    ) -> Vec<Operation> {
+        let written = changed.iter().enumerate().flat_map(|(index, (sheets, _))| self.write(first + index, sheets));
+        let mut operations: Vec<Operation> = written.collect();
+        let fates: Vec<Fate> = changed.iter().map(|(_, fate)| *fate).collect();
+        operations.extend(self.renumbered(first, &fates, links));
         operations
     }
 
@@ -192,19 +246,19 @@ impl Drawing {
         strands.iter().filter_map(on).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point)
     }
 
-    /// The sheets of shape `shape`, the one at `target` cut there.
-    fn cut_at(&self, shape: usize, target: DVec2) -> Vec<SheetParameters> {
+    /// The sheets of shape `shape`, the one at `target` cut there, and where that is; `None` where there is nothing to cut.
+    fn cut_at(&self, shape: usize, target: DVec2) -> Option<(Vec<SheetParameters>, OnSheet)> {
         let mut sheets = self.sheets(shape);
         let all = self.lines(shape);
         let on = |(sheet, line): (usize, &Vec<DVec2>)| Some((sheet, lines::nearest(line, target)?));
         let nearest = all.iter().enumerate().filter_map(on).min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
-        let Some((sheet, on)) = nearest else { return sheets };
+        let (sheet, on) = nearest?;
         let line = &all[sheet];
         let share = lines::share_of(line, on);
         // A short part keeps most of itself.
         if share * (1.0 - share) < f64::EPSILON {
-            // Where the sheet is cut already there is nothing to cut; the scene has the words for it.
-            return sheets;
+            // Where the sheet is cut already the scene has the words for it.
+            return None;
         }
         let gap = HALF_GAP * self.extent_km() / lines::length(line).max(f64::MIN_POSITIVE);
         let ranges = [[0.0, share - gap.min(0.25 * share)], [share + gap.min(0.25 * (1.0 - share)), 1.0]];
@@ -214,17 +268,17 @@ impl Drawing {
             ..with_points(&sheets[sheet], self.written(&lines::part(line, range)))
         });
         sheets.splice(sheet..=sheet, parts);
-        sheets
+        Some((sheets, (sheet, share)))
     }
 
-    /// The sheets of shape `shape`, those that end at `targets` joined there.
-    fn joined_at(&self, shape: usize, targets: [DVec2; 2]) -> Vec<SheetParameters> {
+    /// The sheets of shape `shape`, those that end at `targets` joined there, and what becomes of places on them; `None` where they are one.
+    fn joined_at(&self, shape: usize, targets: [DVec2; 2]) -> Option<Changed> {
         let mut sheets = self.sheets(shape);
         let all = self.lines(shape);
         let ends = targets.map(|target| nearest_end(&all, target));
-        let [Some(first), Some(second)] = ends else { return sheets };
+        let [Some(first), Some(second)] = ends else { return None };
         if first.0 == second.0 {
-            return sheets;
+            return None;
         }
         // The first runs toward the seam, the second away from it.
         let turned = [!first.1, second.1];
@@ -240,7 +294,8 @@ impl Drawing {
         let joined = SheetParameters { flux, energy, ..with_points(&sheets[first.0], points) };
         sheets[first.0.min(second.0)] = joined;
         sheets.remove(first.0.max(second.0));
-        sheets
+        let fate = Fate::Joined([(first.0, turned[0]), (second.0, turned[1])], one / (one + other));
+        Some((sheets, fate))
     }
 
     /// The operations that make the sheets of shape `shape` to be `sheets`, and leave everything else as it stands.

@@ -61,17 +61,12 @@ impl Drawing {
         self.links(shape).iter().enumerate().filter_map(ends).collect()
     }
 
-    fn links(&self, shape: usize) -> &[LinkParameters] {
+    pub(super) fn links(&self, shape: usize) -> &[LinkParameters] {
         self.parameters.shapes.get(shape).map_or(&[], |shape| &shape.link)
     }
 
-    fn set_links(&self, shape: usize, links: Vec<LinkParameters>) -> Vec<Operation> {
-        let place = self.shape(shape).key("link");
-        if links.is_empty() {
-            return vec![Operation::Remove { place }];
-        }
-        let value = Value::List(links.iter().map(|link| Value::Table(table(link)).into()).collect());
-        vec![Operation::Set { place, value }]
+    pub(super) fn set_links(&self, shape: usize, links: Vec<LinkParameters>) -> Vec<Operation> {
+        vec![self.set_list(shape, "link", links.iter().map(table).collect())]
     }
 }
 
@@ -80,7 +75,7 @@ fn between(from: usize, to: usize) -> LinkParameters {
     LinkParameters { from: from as i64 + 1, to: to as i64 + 1, ..LinkParameters::default() }
 }
 
-fn rounded(share: f64) -> f64 {
+pub(super) fn rounded(share: f64) -> f64 {
     (share * 1000.0).round() / 1000.0
 }
 

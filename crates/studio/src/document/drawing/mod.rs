@@ -4,6 +4,7 @@
 mod changes;
 pub mod lines;
 mod links;
+mod renumber;
 mod sheets;
 #[cfg(test)]
 mod tests;

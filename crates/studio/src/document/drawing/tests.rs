@@ -163,3 +163,35 @@ fn sheets_and_points_are_told_what_they_become() {
     assert!(freed.linked(1).is_empty() && (arrives(&freed, -100.0) + 100.0).abs() < 5.0);
     assert!(is_good(&mut document));
 }
+
+#[test]
+fn what_counts_sheets_follows_them() {
+    let text = "\
+bansho = 1
+[[aurora]]
+extent_km = 800.0
+[[aurora.shapes]]
+sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
+[[aurora.shapes]]
+sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
+link = [{ from = 2, to = 3 }, { from = 3, to = 2 }]
+[[aurora.shapes]]
+sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [-10, 80]] }, { points = [[10, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
+split = [{ sheet = 2, at = 0.5 }]
+link = [{ from = 3, to = 4, at = 0.5, arrives = 0.25 }]
+";
+    let (document, drawing) = open(text);
+    let after = |operations: &[bansho::render::scene::operation::Operation]| {
+        let mut document = Document::new("aurora", document.text().clone());
+        change(&mut document, operations);
+        assert!(is_good(&mut document), "{}", document.text());
+        document.text().to_string()
+    };
+    let cut = after(&drawing.split(1, 0, 0.5));
+    assert!(cut.contains("link = [{ from = 2, to = 4 }, { from = 3, to = 3 }]"), "{cut}");
+    assert!(cut.contains("split = [{ sheet = 3, at = 0.5 }]"), "{cut}");
+    assert!(cut.contains("link = [{ from = 4, to = 5, at = 0.5, arrives = 0.25 }]"), "{cut}");
+    assert_eq!(cut.matches("sheets = ").count(), 3, "{cut}");
+    let linked = after(&drawing.split(1, 1, 0.5));
+    assert!(linked.contains("link = [{ from = 2, to = 3, at = 0.25 }, { from = 3, to = 2 }]"), "{linked}");
+}

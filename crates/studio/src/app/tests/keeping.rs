@@ -1,0 +1,216 @@
+//! Work is never lost without a question: closing, crashes, panics, other programs, and files dropped on the window.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::Arc,
+    thread,
+    time::{Duration, Instant},
+};
+
+use bansho::{
+    Assets,
+    base::{
+        assets::{AssetError, Picture},
+        drawing::Drawing,
+        mesh::Mesh,
+    },
+};
+use eframe::egui::{DroppedFile, ViewportEvent, ViewportId};
+use egui_kittest::{Harness, kittest::Queryable};
+
+use super::{super::Studio, PATIENCE, SCENE, Session, assets, drawn, sky, text, window};
+use crate::{
+    document::{Document, recovery::Autosave},
+    player::{SlicePlayer, ThreadPlayer},
+};
+
+/// A window on a scene that lies in `folder`.
+fn window_on_file(folder: &Path, scene: &str) -> (Harness<'static, Studio>, PathBuf) {
+    let path = folder.join("scene.toml");
+    fs::write(&path, scene).unwrap();
+    let mut harness = window("bansho = 1\n");
+    let document = Document::new(path.display().to_string(), scene);
+    harness.state_mut().session().open(document, Some(path.clone()));
+    drawn(&mut harness);
+    (harness, path)
+}
+
+fn edit(harness: &mut Harness<'_, Studio>, from: &str, to: &str) {
+    let edited = text(harness).replace(from, to);
+    harness.state_mut().session().document.replace("typing", &edited);
+    drawn(harness);
+}
+
+/// Lets the window work until `done`.
+fn until(harness: &mut Harness<'_, Studio>, what: &str, done: impl Fn(&mut Harness<'_, Studio>) -> bool) {
+    let began = Instant::now();
+    while !done(harness) {
+        harness.step();
+        thread::sleep(Duration::from_millis(10));
+        assert!(began.elapsed() < PATIENCE, "{what}");
+    }
+}
+
+#[test]
+fn closing_with_unsaved_work_asks() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut harness, path) = window_on_file(folder.path(), SCENE);
+    edit(&mut harness, "height = 0.9", "height = 1.7");
+    let close = |harness: &mut Harness<'_, Studio>| {
+        harness.input_mut().viewports.entry(ViewportId::ROOT).or_default().events.push(ViewportEvent::Close);
+        harness.step();
+        harness.input_mut().viewports.entry(ViewportId::ROOT).or_default().events.clear();
+        harness.run_steps(2);
+    };
+    close(&mut harness);
+    harness.get_by_label("There is unsaved work.");
+    harness.get_by_label("Cancel").click();
+    harness.run_steps(3);
+    assert!(harness.query_by_label("There is unsaved work.").is_none());
+    assert_eq!(fs::read_to_string(&path).unwrap(), SCENE);
+    close(&mut harness);
+    harness.get_all_by_label("Save").last().expect("the answer").click();
+    harness.run_steps(3);
+    assert!(fs::read_to_string(&path).unwrap().contains("height = 1.7"));
+}
+
+#[test]
+fn what_other_programs_write_is_taken_or_asked_about() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut harness, path) = window_on_file(folder.path(), SCENE);
+    // The watch begins with the window's first look.
+    thread::sleep(Duration::from_millis(300));
+    fs::write(&path, SCENE.replace("height = 0.9", "height = 1.25")).unwrap();
+    until(&mut harness, "an outside edit is taken", |harness| text(harness).contains("height = 1.25"));
+    assert!(!harness.state_mut().session().document.is_dirty());
+    edit(&mut harness, "1.25", "1.5");
+    fs::write(&path, SCENE.replace("height = 0.9", "height = 2.75")).unwrap();
+    until(&mut harness, "a conflict is asked about", |harness| harness.query_by_label("Take theirs").is_some());
+    assert!(text(&mut harness).contains("height = 1.5"));
+    harness.get_by_label("Take theirs").click();
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("height = 2.75"));
+    harness.state_mut().session().document.undo();
+    assert!(text(&mut harness).contains("height = 1.5"), "and can be taken back");
+}
+
+#[test]
+fn work_of_a_studio_that_crashed_is_offered() {
+    let home = tempfile::tempdir().unwrap();
+    {
+        let kept = Autosave::begin(&home.path().join("unsaved"), "studio").unwrap();
+        let mut document = Document::new("fire.toml", SCENE);
+        document.replace("typing", &SCENE.replace("height = 0.9", "height = 3.5"));
+        kept.keep(&document, None).unwrap();
+        // Dropped without its end, as in a crash.
+    }
+    let session = Session::new(Document::new("scene", "bansho = 1\n"), None, Box::<SlicePlayer>::default(), assets);
+    let studio = Studio::new(session, Some(home.path().to_path_buf()));
+    let mut harness =
+        Harness::builder().with_max_steps(64).build_ui_state(|ui, studio: &mut Studio| studio.show(ui), studio);
+    drawn(&mut harness);
+    harness.get_by_label("Recover").click();
+    harness.run_steps(3);
+    harness.get_by_label("a scene never saved").click();
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("height = 3.5"));
+    assert!(harness.query_by_label("Recover").is_none());
+}
+
+/// Assets whose maker made a mistake.
+struct Broken;
+
+impl Assets for Broken {
+    fn picture(&self, _: &str, _: i64) -> Result<Arc<Picture>, AssetError> {
+        panic!("broken on purpose")
+    }
+    fn mesh(&self, _: &str) -> Result<Arc<Mesh>, AssetError> {
+        panic!("broken on purpose")
+    }
+    fn drawing(&self, _: &str) -> Result<Arc<Drawing>, AssetError> {
+        panic!("broken on purpose")
+    }
+    fn text(&self, _: &str) -> Result<Arc<str>, AssetError> {
+        panic!("broken on purpose")
+    }
+    fn digest(&self, _: &str, _: i64) -> Result<[u8; 32], AssetError> {
+        panic!("broken on purpose")
+    }
+}
+
+#[test]
+fn a_panic_is_told_and_the_scene_saved_beside_the_original() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    fs::write(&path, SCENE).unwrap();
+    let player = ThreadPlayer::start(|| {}).unwrap();
+    let session = Session::new(Document::new("scene.toml", SCENE), Some(path), Box::new(player), |_| Arc::new(Broken));
+    let mut harness = Harness::builder()
+        .with_max_steps(64)
+        .build_ui_state(|ui, studio: &mut Studio| studio.show(ui), Studio::new(session, None));
+    drawn(&mut harness);
+    edit(&mut harness, "[[light]]", "[plate]\nimage = \"plate.png\"\n[[light]]");
+    until(&mut harness, "the panic is told", |harness| {
+        harness.query_by_label_contains("a phenomenon panicked, which is a bug in it: broken on purpose").is_some()
+    });
+    let rescued = fs::read_to_string(folder.path().join("scene.rescued.toml")).unwrap();
+    assert_eq!(rescued, text(&mut harness));
+    assert!(harness.state_mut().session().picture().is_some(), "the last good picture stays");
+    harness.get_by_label("Play").click();
+    harness.run_steps(5);
+    edit(&mut harness, "[plate]\nimage = \"plate.png\"\n", "");
+    until(&mut harness, "it goes on", |harness| !harness.state_mut().session().is_broken());
+}
+
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        fs::read(&self.0).map_err(|error| error.to_string())
+    }
+}
+
+fn drop_on(harness: &mut Harness<'_, Studio>, file: PathBuf) {
+    harness.input_mut().dropped_files.push(Arc::new(Dropped(file)));
+    harness.step();
+    harness.input_mut().dropped_files.clear();
+    drawn(harness);
+}
+
+#[test]
+fn scenes_plates_and_drawings_are_dropped_on_the_window() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut harness, _) = window_on_file(folder.path(), &sky(2, ""));
+    let plate = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/plates/checkerboard.png");
+    fs::copy(plate, folder.path().join("board.png")).unwrap();
+    drop_on(&mut harness, folder.path().join("board.png"));
+    assert!(text(&mut harness).contains("image = \"board.png\""), "{}", text(&mut harness));
+    let svg = "<svg viewBox=\"0 0 100 100\"><path d=\"M 10 50 L 90 50\" stroke=\"black\" fill=\"none\"/></svg>";
+    fs::write(folder.path().join("arc.svg"), svg).unwrap();
+    drop_on(&mut harness, folder.path().join("arc.svg"));
+    assert!(text(&mut harness).contains("sheets = [{ path = \"arc.svg\" }]"), "{}", text(&mut harness));
+    assert!(harness.state_mut().session().document.error().is_none());
+    let now = text(&mut harness);
+    harness.state_mut().session().document.mark_saved(now.into());
+    fs::write(folder.path().join("other.toml"), SCENE).unwrap();
+    drop_on(&mut harness, folder.path().join("other.toml"));
+    assert_eq!(text(&mut harness), SCENE);
+}
+
+#[test]
+fn a_shot_is_rendered_with_progress() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut harness, _) = window_on_file(folder.path(), SCENE);
+    harness.get_by_label("File").click();
+    harness.run_steps(3);
+    harness.get_by_label("Render shot").click();
+    harness.step();
+    until(&mut harness, "the shot is written", |harness| harness.query_by_label_contains("written: ").is_some());
+    let frames = fs::read_dir(folder.path().join("out/scene")).unwrap().count();
+    assert_eq!(frames, 10);
+}

@@ -1,0 +1,129 @@
+//! Values that hands change: sliders, keys, what is recorded, and the stages that show what they do.
+
+use eframe::egui::{Role, vec2};
+use egui_kittest::{Harness, kittest::Queryable};
+
+use super::{super::Studio, SCENE, drag, drawn, press, release, text, window};
+
+fn slide(harness: &mut Harness<'_, Studio>, name: &str, to: f64) {
+    harness.get_by_role_and_label(Role::Slider, name).set_value_accesskit(to);
+    drawn(harness);
+}
+
+#[test]
+fn bounded_values_have_sliders_with_their_numbers_beside() {
+    let mut harness = window(SCENE);
+    slide(&mut harness, "height", 2.5);
+    assert!(text(&mut harness).contains("height = 2.5\n"), "{}", text(&mut harness));
+    let number = harness.get_by_role_and_label(Role::SpinButton, "height");
+    assert_eq!(number.value().as_deref(), Some("2.50 m"));
+    assert!(
+        harness.query_by_role_and_label(Role::Slider, "position").is_none(),
+        "a place has no bounds to slide between"
+    );
+    harness.state_mut().session().document.undo();
+    drawn(&mut harness);
+    assert_eq!(text(&mut harness), SCENE, "one step");
+}
+
+#[test]
+fn a_particle_flame_is_slid_hotter_and_lighter() {
+    let mut harness =
+        window("bansho = 1\n[picture]\nsize = [32, 18]\nframes = 2\n[[flame_particles]]\nparticles = 50\n");
+    for (section, name, to, written) in [
+        ("motion", "buoyancy", 2.0, "buoyancy = 2.0"),
+        ("life", "flame temperature k", 2100.0, "flame_temperature_k = 2100.0"),
+    ] {
+        harness.get_by_label(section).click_accesskit();
+        harness.run_steps(12);
+        slide(&mut harness, name, to);
+        assert!(text(&mut harness).contains(written), "{}", text(&mut harness));
+    }
+    assert!(harness.state_mut().session().document.error().is_none());
+}
+
+#[test]
+fn values_are_keyed_at_two_times_and_unkeyed() {
+    let mut harness = window(SCENE);
+    let place = "flame_sheet.0.position";
+    harness.get_by_label(&format!("Key the value at this time: {place}")).click();
+    drawn(&mut harness);
+    harness.get_by_label("Frame on").click();
+    drawn(&mut harness);
+    harness.get_by_label(&format!("Keyed; key the value at this time: {place}")).click();
+    drawn(&mut harness);
+    let keyed = text(&mut harness);
+    let line = keyed.lines().find(|line| line.starts_with("position = { keys")).unwrap_or_default();
+    assert_eq!(line.matches("[0.0, 0.0, 0.0]").count(), 2, "{keyed}");
+    harness.get_by_label(&format!("Take out the key at this time: {place}")).click();
+    drawn(&mut harness);
+    assert_eq!(text(&mut harness).matches("[0.0, 0.0, 0.0]").count(), 1, "{}", text(&mut harness));
+    assert!(harness.state_mut().session().document.error().is_none());
+}
+
+#[test]
+fn a_lamp_that_is_dragged_while_recording_leaves_keyframes() {
+    let mut harness = window(SCENE);
+    harness.get_by_label("Place").click();
+    harness.get_by_label("Record").click();
+    harness.run_steps(2);
+    let viewport = harness.get_by_label("Viewport").rect();
+    let height = viewport.width().min(viewport.height() * 64.0 / 36.0) * 36.0 / 64.0;
+    let lamp = viewport.center() - vec2(0.0, height * 0.1 / (2.0 * 4.01 * 0.286_7));
+    press(&mut harness, lamp);
+    for step in 1..30 {
+        harness.hover_at(lamp + vec2(3.0 * step as f32, 0.0));
+        harness.step();
+    }
+    assert!(harness.state_mut().session().transport.is_playing(), "time passes");
+    release(&mut harness, lamp + vec2(90.0, 0.0));
+    assert!(!harness.state_mut().session().transport.is_playing());
+    let recorded = text(&mut harness);
+    assert!(recorded.contains("position = { keys = [["), "{recorded}");
+    assert!(recorded.matches("], [").count() > 2, "{recorded}");
+    harness.state_mut().session().document.undo();
+    assert_eq!(text(&mut harness), SCENE, "a recording is one step");
+}
+
+#[test]
+fn a_camera_that_is_turned_while_recording_is_keyed_now() {
+    let mut harness = window(SCENE);
+    harness.get_by_label("Record").click();
+    harness.get_by_label("Frame on").click();
+    drawn(&mut harness);
+    let middle = harness.get_by_label("Viewport").rect().center();
+    drag(&mut harness, middle, vec2(120.0, 0.0));
+    let edited = text(&mut harness);
+    assert!(edited.contains("position = { keys = [["), "{edited}");
+    assert!(!harness.state_mut().session().transport.is_playing());
+}
+
+#[test]
+fn stages_of_the_flame_are_seen_live() {
+    let mut harness = window(SCENE);
+    for name in ["texture", "thresholded", "sharpened", "coloured"] {
+        harness.get_by_label(&format!("Stage {name}"));
+    }
+    let shown = |harness: &mut Harness<'_, Studio>| {
+        let session = harness.state_mut().session();
+        (0..4).map(|stage| session.stage(stage).unwrap().0.pixels.clone()).collect::<Vec<_>>()
+    };
+    let before = shown(&mut harness);
+    for (index, pixels) in before.iter().enumerate() {
+        assert!(pixels.iter().any(|pixel| pixel[0] > 100), "stage {index} is not black");
+        assert!(before[..index].iter().all(|other| other != pixels), "stage {index} is none of those before");
+    }
+    slide(&mut harness, "turn_deg".replace('_', " ").as_str(), 30.0);
+    let edited = SCENE.replace("height = 0.9", "height = 0.9\ntexture = { contrast = 0.2 }");
+    harness.state_mut().session().document.replace("typing", &edited);
+    drawn(&mut harness);
+    let after = shown(&mut harness);
+    assert!((0..4).all(|stage| before[stage] != after[stage]), "they follow");
+    harness.get_by_label("Frame on").click();
+    drawn(&mut harness);
+    assert!(shown(&mut harness)[0] != after[0], "and move");
+    harness.get_by_label("Stages").click();
+    harness.run_steps(12);
+    assert!(harness.query_by_label("Stage texture").is_none());
+    assert_eq!(harness.state_mut().session().stages, None, "what is not seen is not drawn");
+}

@@ -1,0 +1,108 @@
+//! How a flame sheet comes to be, stage by stage: plans of small pictures that show it alone, in the middle.
+
+use std::sync::Arc;
+
+use bansho::{
+    Assets, KINDS, Plan, PlanOptions,
+    base::{
+        camera::CameraParameters,
+        color::ev100_of_white_luminance,
+        parameters::{Auto, Parameters, Reader, Value},
+    },
+    models::flame_sheet::{FlameSheetParameters, StageShown},
+    render::scene::{
+        Describe, Instance, Place, PlateParameters, Scene,
+        operation::{self, Operation},
+        values,
+    },
+};
+
+/// Size of a stage's picture, pixels.
+const SIZE: [usize; 2] = [112, 112];
+
+/// Vertical field of view, degrees: narrow, for a flat square is shown.
+const FIELD: f64 = 20.0;
+
+/// Height of the picture, as a share of the sheet's.
+const AROUND: f64 = 1.08;
+
+/// What the stages are called in a scene, in their order; the finished flame is none of them.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    StageShown::CHOICES.iter().map(|choice| choice.name).filter(|name| *name != StageShown::Flame.name())
+}
+
+/// Plans of the stages of flame sheet `index` of the scene `text`; `None` where it is faulty or has no such sheet.
+pub fn plans(name: &str, text: &str, assets: &Arc<dyn Assets>, index: usize) -> Option<Vec<Arc<Plan>>> {
+    names().map(|stage| plan(name, text, assets, index, stage)).collect()
+}
+
+fn plan(name: &str, text: &str, assets: &Arc<dyn Assets>, index: usize, stage: &str) -> Option<Arc<Plan>> {
+    let root = values(text).ok()?;
+    let place = Place::root().key(FlameSheetParameters::KEY).index(index);
+    let Value::Table(table) = &place.find(&root)?.value else { return None };
+    let sheet = FlameSheetParameters::read_table(table, &mut Reader::new(), &[]);
+    let stated = |key: &str| place.key(key).find(&root).is_some();
+    let mut operations = vec![
+        Operation::Set { place: place.key("stage"), value: Value::Text(stage.to_owned()) },
+        Operation::Set { place: place.key("position"), value: Value::numbers([0.0; 3]) },
+    ];
+    operations.extend(stated("instances").then(|| Operation::Remove { place: place.key("instances") }));
+    let scene = Scene::reparse(name, &operation::apply(text, &operations).ok()?, KINDS).ok()?;
+    let mut sheets = scene.instances.iter().filter(|instance| instance.kind.key == FlameSheetParameters::KEY);
+    let alone = Instance { enabled: true, ..sheets.nth(index)?.clone() };
+    let mut picture = scene.picture.clone();
+    picture.overscan = 0;
+    // Grays are shares of the full luminance.
+    let full = sheet.colour.luminance.bounds()[1].max(f64::MIN_POSITIVE);
+    let coloured = stage == StageShown::Coloured.name();
+    picture.exposure_ev100 = if coloured { Auto::Auto } else { Auto::Set(ev100_of_white_luminance(full)) };
+    let scene = Scene {
+        picture,
+        camera: camera(sheet.width, sheet.height),
+        plate: PlateParameters::default(),
+        sky: None,
+        ground: None,
+        lights: Vec::new(),
+        obstacles: Vec::new(),
+        instances: vec![alone],
+        ..scene
+    };
+    let options = PlanOptions { size: Some(SIZE), ..PlanOptions::default() };
+    Plan::new(scene, &options, assets.clone()).ok().map(Arc::new)
+}
+
+/// A camera before a sheet at the origin that sees all of it.
+fn camera(width: f64, height: f64) -> CameraParameters {
+    let [across, up] = SIZE.map(|side| side as f64);
+    let seen = AROUND * height.max(width * up / across);
+    let away = 0.5 * seen / bansho::base::math::tan(0.5 * FIELD.to_radians());
+    CameraParameters {
+        position: [0.0, 0.5 * height, away].into(),
+        target: [0.0, 0.5 * height, 0.0].into(),
+        vertical_fov_deg: FIELD.into(),
+        ..CameraParameters::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho::MemoryAssets;
+
+    use super::*;
+
+    #[test]
+    fn each_stage_shows_that_sheet_alone() {
+        let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
+        let text = "bansho = 1\n[[rain]]\n[[flame_sheet]]\n[[flame_sheet]]\nname = \"second\"\nenabled = false\nheight = 3.0\n";
+        let plans = plans("scene", text, &assets, 1).unwrap();
+        assert_eq!(names().collect::<Vec<_>>(), ["texture", "thresholded", "sharpened", "coloured"]);
+        assert_eq!(plans.len(), 4);
+        for plan in &plans {
+            let names: Vec<&str> = plan.scene.instances.iter().map(|instance| instance.name.as_str()).collect();
+            assert_eq!((names, plan.size), (vec!["second"], SIZE));
+            assert_eq!(plan.scene.camera.target.at(0.0), [0.0, 1.5, 0.0]);
+        }
+        assert!(super::plans("scene", text, &assets, 2).is_none());
+        assert!(super::plans("scene", "bansho = 1\n[[flame_shet]]\n", &assets, 0).is_none());
+    }
+}
