@@ -227,7 +227,8 @@ mod tests {
     fn table_of_page(heading: &str) -> Vec<Vec<String>> {
         let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/methods/aurora.md");
         let page = std::fs::read_to_string(page).unwrap();
-        let lines = page.lines().skip_while(|line| !line.starts_with(heading)).skip_while(|line| !line.starts_with('|'));
+        let lines =
+            page.lines().skip_while(|line| !line.starts_with(heading)).skip_while(|line| !line.starts_with('|'));
         let cells = |line: &str| line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect();
         lines.take_while(|line| line.starts_with('|')).skip(2).map(cells).collect()
     }
