@@ -227,7 +227,7 @@ mod tests {
                         let places = altitudes_km.map(Descents::place);
                         let offsets = Lanes::from_slice(simd, &offsets);
                         let found = descents.along(simd, &line).points(Lanes::from_slice(simd, &places), offsets);
-                        [found, line.points(&altitudes_km, offsets)].map(|pair| pair.map(|lanes| <[f32; LANES]>::from(lanes)))
+                        [found, line.points(&altitudes_km, offsets)].map(|pair| pair.map(<[f32; LANES]>::from))
                     });
                     for i in 0..LANES {
                         let what = || format!("dip {dip_deg}, {distance} km away, {} km high", altitudes_km[i]);
