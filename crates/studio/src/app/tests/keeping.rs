@@ -160,7 +160,7 @@ fn a_panic_is_told_and_the_scene_saved_beside_the_original() {
     harness.get_by_label("Play").click();
     harness.run_steps(5);
     // It plays, and so is never done drawing.
-    let number = |harness: &mut Harness<'_, Studio>| harness.state_mut().session().picture().map(|own| own.number);
+    let number = |harness: &mut Harness<'_, Studio>| harness.state_mut().session().picture().map(|(own, _)| own.number);
     let (last, mended) = (number(&mut harness), text(&mut harness).replace("[plate]\nimage = \"plate.png\"\n", ""));
     harness.state_mut().session().document.replace("typing", &mended);
     until(&mut harness, "it goes on", |harness| number(harness) != last);
