@@ -97,11 +97,33 @@ impl Sky {
             return night.radiance(direction);
         }
         let share = match self.kind {
-            // CIE S 011: L = Lz (1 + 2 sin elevation) / 3.
-            SkyKind::Overcast => (1.0 + 2.0 * direction.y) / 3.0,
+            SkyKind::Overcast => overcast(direction.y),
             SkyKind::Uniform | SkyKind::Night => 1.0,
         };
         self.zenith.map(|value| value * share as f32)
+    }
+
+    /// [`radiance`](Self::radiance) from directions whose sines of elevation these are, by component; `None` of a night, which is not the
+    /// same all around.
+    #[inline(always)]
+    pub fn radiance_at_elevations<const N: usize>(&self, sines: &[f32; N]) -> Option<[[f32; N]; 3]> {
+        if self.night.is_some() {
+            return None;
+        }
+        let ground = self.radiance(-DVec3::Y);
+        let mut shares = [1.0; N];
+        if self.kind == SkyKind::Overcast {
+            for i in 0..N {
+                shares[i] = overcast(f64::from(sines[i])) as f32;
+            }
+        }
+        let mut planes = [[0.0; N]; 3];
+        for c in 0..3 {
+            for i in 0..N {
+                planes[c][i] = if sines[i] < 0.0 { ground[c] } else { self.zenith[c] * shares[i] };
+            }
+        }
+        Some(planes)
     }
 
     /// Illuminance of open, level ground (ACEScg, lux).
@@ -125,6 +147,12 @@ impl Sky {
     }
 }
 
+/// Luminance of an overcast sky beside that of its zenith, by the sine of the elevation: CIE S 011, `L = Lz (1 + 2 sin elevation) / 3`.
+#[inline(always)]
+fn overcast(sine: f64) -> f64 {
+    (1.0 + 2.0 * sine) / 3.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -140,6 +168,19 @@ mod tests {
         assert!((luminance(overcast.radiance(DVec3::Y)) - 900.0).abs() < 0.1);
         assert!((luminance(overcast.radiance(DVec3::X)) - 300.0).abs() < 0.1);
         assert!((luminance(sky(SkyKind::Uniform).radiance(DVec3::X)) - 900.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn many_elevations_have_the_radiance_of_each() {
+        let sines = [-1.0, -0.25, 0.0, 0.3, 0.71, 1.0_f32];
+        for kind in [SkyKind::Overcast, SkyKind::Uniform] {
+            let planes = sky(kind).radiance_at_elevations(&sines).unwrap();
+            for (i, sine) in sines.into_iter().map(f64::from).enumerate() {
+                let direction = DVec3::new(math::sqrt(1.0 - sine * sine), sine, 0.0);
+                assert_eq!(planes.map(|plane| plane[i]), sky(kind).radiance(direction));
+            }
+        }
+        assert_eq!(sky(SkyKind::Night).radiance_at_elevations(&sines), None);
     }
 
     #[test]

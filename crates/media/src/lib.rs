@@ -27,5 +27,6 @@ mod stamp;
 #[cfg(test)]
 mod testing;
 pub mod video;
+pub mod zip;
 
 pub use error::{MediaError, SizeRule};

@@ -1,6 +1,9 @@
 //! Directions of pixels that follow each other in a row.
 
-use bansho_base::{camera::Camera, math::DVec2};
+use bansho_base::{
+    camera::Camera,
+    math::{DVec2, Fused},
+};
 
 use crate::lanes::LANES;
 
@@ -23,7 +26,7 @@ impl Directions {
             let (first, step) = (first.as_vec3().to_array(), ((last - first) / LANES as f64).as_vec3().to_array());
             for axis in 0..3 {
                 for i in 0..LANES {
-                    axes[axis][i] = step[axis].mul_add(i as f32, first[axis]);
+                    axes[axis][i] = step[axis].fused(i as f32, first[axis]);
                 }
             }
             return Self { axes, seen };
@@ -46,7 +49,7 @@ impl Directions {
         let [x, y, z] = &mut self.axes;
         let mut lengths = [0.0; LANES];
         for i in 0..LANES {
-            lengths[i] = x[i].mul_add(x[i], y[i].mul_add(y[i], z[i] * z[i])).sqrt();
+            lengths[i] = x[i].fused(x[i], y[i].fused(y[i], z[i] * z[i])).sqrt();
             let scale = 1.0 / lengths[i];
             x[i] *= scale;
             y[i] *= scale;

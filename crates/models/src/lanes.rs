@@ -48,7 +48,7 @@ impl Real for f32 {
     }
     #[inline(always)]
     fn fused(self, factor: Self, term: Self) -> Self {
-        self.mul_add(factor, term)
+        bansho_base::math::Fused::fused(self, factor, term)
     }
     #[inline(always)]
     fn root(self) -> Self {

@@ -1,17 +1,17 @@
 //! What a frame costs beside its phenomena: compositing and view transform at 1920 x 1080, of flames within 960 x 900
-//! pixels in the dark: one that only shines, and two of which one absorbs.
+//! pixels in the dark: one that only shines, and two of which one absorbs; and one before a plate whose light it bends.
 //!
 //! The naive way composites whole pictures in f64, pixel by pixel, and shows each pixel by itself.
 
 use std::{hint::black_box, sync::Arc};
 
 use bansho_base::{
-    assets::MemoryAssets,
+    assets::{Encoding, MemoryAssets, Picture},
     canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
     color::{self, encode_srgb},
-    image::{Frame, Rect},
+    image::{Frame, Image, Rect},
     observer::{Cancelled, Observer, Unobserved},
-    phenomenon::{Phenomenon, Prepared},
+    phenomenon::{Deflection, Phenomenon, Prepared},
     surroundings::{Publication, Surroundings},
 };
 use bansho_render::{
@@ -30,6 +30,8 @@ bansho_base::parameters! {
         depth: f64 = 2.0, unit("m");
         /// Whether it absorbs a little, too.
         absorbs: bool = false;
+        /// Whether it bends light.
+        bends: bool = false;
     }
 }
 
@@ -76,18 +78,36 @@ impl Phenomenon for Patch {
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         let row = |y: usize| (0..SIZE[0]).map(|x| radiance(x, y)).collect();
         let rows: Vec<Vec<f32>> = (0..16).map(|y| row(y * 67)).collect();
-        Ok(Box::new(PreparedPatch { rows, absorbs: self.parameters.absorbs }))
+        let angles = || {
+            let angles = (0..PATCH.width * PATCH.height).map(|index| bent(index % PATCH.width, index / PATCH.width));
+            Image::from_pixels(PATCH.width, PATCH.height, angles.collect())
+        };
+        let angles = if self.parameters.bends { angles() } else { None };
+        Ok(Box::new(PreparedPatch { rows, absorbs: self.parameters.absorbs, depth: self.parameters.depth, angles }))
     }
+}
+
+/// The pixels that a patch covers.
+const PATCH: Rect = Rect { x: 480, y: 100, width: 960, height: 900 };
+
+/// Angles of some pixels, radians.
+fn bent(x: usize, y: usize) -> [f32; 2] {
+    [(x % 64) as f32 * 1e-4 + 1e-5, (y % 64) as f32 * -1e-4]
 }
 
 struct PreparedPatch {
     rows: Vec<Vec<f32>>,
     absorbs: bool,
+    depth: f64,
+    angles: Option<Image<2>>,
 }
 
 impl Prepared for PreparedPatch {
     fn bounds(&self, _slice: &DepthInterval) -> Rect {
-        Rect { x: 480, y: 100, width: 960, height: 900 }
+        PATCH
+    }
+    fn deflection(&self) -> Option<Deflection<'_>> {
+        self.angles.as_ref().map(|angle| Deflection { depth: self.depth, rect: PATCH, angle })
     }
     fn draw(&self, _slice: &DepthInterval, strip: &mut Strip) {
         let width = strip.rect.width;
@@ -104,8 +124,17 @@ impl Prepared for PreparedPatch {
     }
 }
 
+/// A plate's pixel.
+fn plate(x: usize, y: usize) -> [f32; 4] {
+    [(x % 97) as f32 / 97.0, (y % 89) as f32 / 89.0, ((x + y) % 83) as f32 / 83.0, 1.0]
+}
+
 fn plan(text: &str) -> Arc<Plan> {
-    let assets = Arc::new(MemoryAssets::default());
+    let mut assets = MemoryAssets::default();
+    let pixels = (0..SIZE[0] * SIZE[1]).map(|index| plate(index % SIZE[0], index / SIZE[0])).collect();
+    let colour = Image::from_pixels(SIZE[0], SIZE[1], pixels).expect("as many pixels as the size says");
+    assets.insert_picture("plate.png", Picture { colour, depth: None, encoding: Encoding::DisplaySrgb });
+    let assets = Arc::new(assets);
     let text = format!("bansho = 1\n[picture]\nsize = [1920, 1080]\n{text}");
     let scene = Scene::parse("bench.toml", &text, &[PatchParameters::KIND], assets.as_ref()).expect("a valid scene");
     Arc::new(Plan::new(scene, &PlanOptions::default(), assets).expect("a valid plan"))
@@ -145,6 +174,27 @@ fn naive(exposure: f64) -> Vec<[u8; 4]> {
     (0..SIZE[0] * SIZE[1]).map(pixel).collect()
 }
 
+/// Composites a patch before the plate that it bends, all in f64 and one pixel at a time.
+fn naive_bent(exposure: f64, focal_pixels: f64) -> Vec<[f64; 3]> {
+    let pixel = |index: usize| {
+        let (x, y) = (index % SIZE[0], index / SIZE[0]);
+        let inside = (480..1440).contains(&x) && (100..1000).contains(&y);
+        let angle = if inside { bent(x - 480, y - 100).map(f64::from) } else { [0.0; 2] };
+        let place = [x as f64 + focal_pixels * angle[0], y as f64 - focal_pixels * angle[1]];
+        let place = [0, 1].map(|axis| place[axis].clamp(0.0, (SIZE[axis] - 1) as f64));
+        let low = [0, 1].map(|axis| (place[axis] as usize).min(SIZE[axis] - 2));
+        let share = [0, 1].map(|axis| place[axis] - low[axis] as f64);
+        let at = |dx: usize, dy: usize| plate(low[0] + dx, low[1] + dy).map(f64::from);
+        let corners = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
+        std::array::from_fn(|c| {
+            let upper = corners[0][c] + share[0] * (corners[1][c] - corners[0][c]);
+            let lower = corners[2][c] + share[0] * (corners[3][c] - corners[2][c]);
+            exposure * f64::from(radiance(x, y / 68 * 67)) + upper + share[1] * (lower - upper)
+        })
+    };
+    (0..SIZE[0] * SIZE[1]).map(pixel).collect()
+}
+
 /// Two threads, each on a core of its own: unpinned they are often packed onto one.
 fn pinned_pool() -> rayon::ThreadPool {
     let cores = core_affinity::get_core_ids().unwrap_or_default();
@@ -163,7 +213,15 @@ fn benches(criterion: &mut Criterion) {
     let exposure = f64::from(two.exposure_scale());
     let mut group = criterion.benchmark_group("frame_1080p");
     group.sample_size(20);
-    for (name, plan) in [("composite_one", &one), ("composite_two", &two)] {
+    let before = |bends: bool| plan(&format!("[plate]\nimage = \"plate.png\"\n[[patch]]\nbends = {bends}\n"));
+    let [straight, bent] = [false, true].map(before);
+    let scenes = [
+        ("composite_one", &one),
+        ("composite_two", &two),
+        ("composite_before_plate", &straight),
+        ("composite_before_bent_plate", &bent),
+    ];
+    for (name, plan) in scenes {
         let mut shot = CpuBackend.open(plan.clone()).expect("a valid plan");
         group.bench_function(name, |bencher| {
             pool.install(|| bencher.iter(|| frame_used(shot.as_mut(), |frame| black_box(frame).content)))
@@ -190,6 +248,8 @@ fn benches(criterion: &mut Criterion) {
         });
     });
     group.bench_function("naive", |bencher| bencher.iter(|| black_box(naive(exposure))));
+    let focal_pixels = bent.view(0).camera.focal_pixels;
+    group.bench_function("naive_bent", |bencher| bencher.iter(|| black_box(naive_bent(exposure, focal_pixels))));
     group.finish();
 }
 

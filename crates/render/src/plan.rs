@@ -7,7 +7,7 @@ use bansho_base::{
     canvas::{Shutter, View},
     color,
     image::{FrameHeader, Rect},
-    parameters::Auto,
+    parameters::{Auto, Parameter, path},
     phenomenon::{Phenomenon, Remark},
     surroundings::Occluder,
     wind::Wind,
@@ -64,7 +64,7 @@ pub enum PlanError {
         /// Length of the loop.
         seconds: f64,
         /// What is keyed.
-        what: &'static str,
+        what: String,
     },
     /// The picture has more pixels than are drawn.
     #[error("{width} x {height} pixels are too many; allowed: 1 to {most} on a side")]
@@ -283,17 +283,16 @@ impl Plan {
     /// Makes keyed values repeat, which must come back to where they began.
     fn close_loop(&mut self) -> Result<(), PlanError> {
         let Some(seconds) = self.loop_s else { return Ok(()) };
-        let scene = &mut self.scene;
-        let closed = [
-            ("wind.velocity", scene.wind.velocity.close(seconds)),
-            ("camera.position", scene.camera.position.close(seconds)),
-            ("camera.target", scene.camera.target.close(seconds)),
-            ("camera.roll_deg", scene.camera.roll_deg.close(seconds)),
-            ("sky.luminance", scene.sky.as_mut().is_none_or(|sky| sky.luminance.close(seconds))),
-            ("ground.wetness", scene.ground.as_mut().is_none_or(|ground| ground.wetness.close(seconds))),
+        let Scene { wind, camera, sky, ground, lights, .. } = &mut self.scene;
+        let jumps = [
+            ("wind", wind.close_loop(seconds)),
+            ("camera", camera.close_loop(seconds)),
+            ("sky", sky.close_loop(seconds)),
+            ("ground", ground.close_loop(seconds)),
+            ("light", lights.close_loop(seconds)),
         ];
-        match closed.into_iter().find(|(_, closed)| !closed) {
-            Some((what, _)) => Err(PlanError::LoopJumps { seconds, what }),
+        match jumps.into_iter().find_map(|(table, rest)| rest.map(|rest| path(table, &rest))) {
+            Some(what) => Err(PlanError::LoopJumps { seconds, what }),
             None => Ok(()),
         }
     }

@@ -5,8 +5,17 @@ mod support;
 
 use std::sync::Arc;
 
-use bansho_base::{assets::MemoryAssets, image::Frame, observer::Unobserved};
-use bansho_render::{Plan, PlanOptions};
+use bansho_base::{
+    assets::MemoryAssets,
+    image::Frame,
+    observer::Unobserved,
+    parameters::{Kind, TableDescriptor, Value},
+};
+use bansho_render::{
+    Backend, CpuBackend, Plan, PlanOptions, Scene,
+    phenomena::KINDS,
+    scene::{SHARED_TABLES, SharedTable},
+};
 use support::*;
 
 /// A shaken lamp that travels while a turn of one second, 24 frames, passes; all of it is dissolve.
@@ -49,6 +58,82 @@ fn a_loop_comes_back_and_refuses_what_jumps() {
     assert!(error.to_string().contains("wind.velocity"), "{error}");
     let wind = keyed(0).unwrap().wind;
     assert_eq!(wind.mean(0.25), wind.mean(-1.75), "what is keyed repeats");
+}
+
+/// Every value of a table that can be keyed, as text that keys it from its default to another value and, at 1 s, perhaps back.
+fn keyed(table: &TableDescriptor, back: bool) -> Vec<String> {
+    table.parameters.iter().flat_map(|own| keyed_value(own.key, &own.kind, own.default.as_ref(), back)).collect()
+}
+
+fn keyed_value(key: &str, kind: &Kind, default: Option<&Value>, back: bool) -> Vec<String> {
+    match kind {
+        Kind::Animated(inner) => {
+            let values = two_values(inner, default);
+            let last = if back { &values[0] } else { &values[1] };
+            vec![format!("{key} = {{ keys = [[0, {}], [0.5, {}], [1, {last}]] }}", values[0], values[1])]
+        }
+        Kind::Optional(inner) | Kind::Auto(inner) => keyed_value(key, inner, default, back),
+        Kind::Table(table) => keyed(table(), back).into_iter().map(|text| format!("{key} = {{ {text} }}")).collect(),
+        Kind::List { item, .. } => {
+            let Kind::Table(table) = &**item else { return Vec::new() };
+            keyed(table(), back).into_iter().map(|text| format!("{key} = [{{ {text} }}]")).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The default, or the least value, and another.
+fn two_values(kind: &Kind, default: Option<&Value>) -> [String; 2] {
+    let other =
+        |value: f64, min: f64, max: f64| if value + 0.25 <= max { value + 0.25 } else { (value - 0.25).max(min) };
+    let number = |value: &Value| if let Value::Number(number) = value { Some(*number) } else { None };
+    match kind {
+        Kind::Vector { length, min, max } => {
+            let own = match default {
+                Some(Value::List(items)) => items.iter().filter_map(|item| number(&item.value)).collect(),
+                _ => vec![min.max(0.0).min(*max); *length],
+            };
+            [own.clone(), own.iter().map(|value| other(*value, *min, *max)).collect()]
+                .map(|values| format!("{values:?}"))
+        }
+        Kind::Number { min, max } => {
+            let value = default.and_then(number).unwrap_or(min.max(0.0).min(*max));
+            [value, other(value, *min, *max)].map(|value| format!("{value:?}"))
+        }
+        other => panic!("{} is animated; give it two values here", other.expectation()),
+    }
+}
+
+#[test]
+fn whatever_is_keyed_must_end_a_loop_as_it_begins() {
+    let header =
+        |table: &SharedTable| if table.many { format!("[[{}]]", table.key) } else { format!("[{}]", table.key) };
+    let shared = SHARED_TABLES.iter().map(|table| (header(table), (table.table)()));
+    let kinds = KINDS.iter().map(|kind| (format!("[[{}]]", kind.key), (kind.table)()));
+    let plan = |text: &str| -> Result<Plan, String> {
+        let assets = Arc::new(MemoryAssets::default());
+        let scene = Scene::parse("loop", text, KINDS, assets.as_ref()).map_err(|error| error.to_string())?;
+        Plan::new(scene, &turn(), assets).map_err(|error| error.to_string())
+    };
+    let mut tried = 0;
+    for (header, table) in shared.chain(kinds) {
+        for (open, closed) in keyed(table, false).iter().zip(keyed(table, true)) {
+            let [open, closed] = [open.as_str(), closed.as_str()]
+                .map(|text| format!("bansho = 1\n[picture]\nsize = [16, 9]\n{header}\n{text}\n"));
+            let made =
+                plan(&closed).and_then(|plan| CpuBackend.open(Arc::new(plan)).map_err(|error| error.to_string()));
+            if let Err(error) = made.map(|_| ()) {
+                // What needs more than its own key to be valid says so; it must not be the loop.
+                assert!(!error.contains("jumps"), "{closed}{error}");
+            }
+            let opened =
+                plan(&open).and_then(|plan| CpuBackend.open(Arc::new(plan)).map_err(|error| error.to_string()));
+            let error = opened.map(|_| ()).expect_err(&open);
+            assert!(error.contains("the loop of 1 s jumps"), "{open}{error}");
+            tried += 1;
+        }
+    }
+    assert!(tried >= 14, "{tried} values can be keyed");
 }
 
 #[test]

@@ -266,6 +266,57 @@ fn bent_light_displaces_the_plate_around_the_lamp_and_nowhere_else() {
 }
 
 #[test]
+fn only_what_lies_behind_the_air_is_displaced_and_nothing_nearer_gets_into_it() {
+    let drawn = |bend: f64| {
+        let text = format!(
+            "{CAMERA}[plate]\nimage = \"plate.png\"\n[[emitter]]\nradius = 0.2\nluminance = 0\nbend = {bend}\n"
+        );
+        // The air is 2 m away: the left half of the plate stands before it, the right half behind.
+        let depth = (0..120 * 90).map(|index| if index % 120 < 60 { 1.0 } else { 8.0 }).collect();
+        let plan = plan_with(&text, &PlanOptions::default(), Arc::new(checkerboard_at(120, 90, Some(depth))));
+        draw(open(&plan).as_mut(), 0)
+    };
+    let straight = drawn(0.0);
+    let [right, left] = [0.1, -0.1].map(drawn);
+    for x in 0..60 {
+        assert_eq!(right.beauty.at(x, 45), straight.beauty.at(x, 45), "{x} is nearer");
+        assert_eq!(left.beauty.at(x, 45), straight.beauty.at(x, 45), "{x} is nearer");
+    }
+    // 0.1 rad at 45 pixels a radian, of which six eighths are left: 3.375 pixels.
+    let between = |x: usize, share: f32| {
+        let [a, b] = [x, x + 1].map(|x| straight.beauty.at(x, 45)[0]);
+        a + share * (b - a)
+    };
+    for x in 60..64 {
+        assert!((right.beauty.at(x, 45)[0] - between(x + 3, 0.375)).abs() < 1e-4, "{x}");
+    }
+    assert!((left.beauty.at(64, 45)[0] - between(60, 0.625)).abs() < 1e-4);
+    for x in 60..63 {
+        assert_eq!(left.beauty.at(x, 45), straight.beauty.at(x, 45), "{x} would see what is nearer");
+    }
+}
+
+#[test]
+fn layers_come_to_the_beauty_behind_several_bends() {
+    let lamp = |name: &str, depth: f64| {
+        format!("[[emitter]]\nname = \"{name}\"\nposition = [0, 0, -{depth}]\nradius = 0.3\nbend = 0.05\n")
+    };
+    let fog = "[[absorber]]\nname = \"fog\"\nnear = 1\nfar = 6\nextinction = [0.1, 0.2, 0.3]\n";
+    let text = format!("{CAMERA}[plate]\nimage = \"plate.png\"\n{fog}{}{}", lamp("near", 2.0), lamp("far", 4.0));
+    let options = PlanOptions { layers: true, ..PlanOptions::default() };
+    let plan = plan_with(&text, &options, Arc::new(checkerboard(120, 90, Some(8.0))));
+    let frame = draw(open(&plan).as_mut(), 1);
+    for (c, suffix) in ["R", "G", "B"].into_iter().enumerate() {
+        let layers: Vec<&[f32]> =
+            ["fog", "near", "far", "plate"].map(|layer| channel(&frame, &format!("{layer}.{suffix}"))).into();
+        for (index, pixel) in frame.beauty.pixels().iter().enumerate() {
+            let sum: f32 = layers.iter().map(|layer| layer[index]).sum();
+            assert!((sum - pixel[c]).abs() < 1e-4 * pixel[c].max(1.0), "{suffix} of {index}: {sum} {}", pixel[c]);
+        }
+    }
+}
+
+#[test]
 fn work_stops_when_the_observer_asks() {
     struct After(AtomicUsize);
     impl Observer for After {

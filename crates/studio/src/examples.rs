@@ -36,6 +36,7 @@ pub const SCENES: &[(&str, &str)] = files!(
     "hearth.toml",
     "inagaki_density.toml",
     "inagaki_haze.toml",
+    "inagaki_paper.toml",
     "inagaki_still.toml",
     "inagaki_wind_left.toml",
     "inagaki_wind_right.toml",

@@ -2,41 +2,22 @@
 //   node crates/studio/web/test.mjs DIST [CHROMIUM] [BANSHO]
 // It needs playwright-core (npm install playwright-core) and a Chromium; BANSHO checks the scene that was downloaded.
 import { spawnSync } from "node:child_process";
-import { createServer } from "node:http";
 import { mkdtempSync, readFileSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { extname, join } from "node:path";
-import { createRequire } from "node:module";
+import { join } from "node:path";
+import { launch, serve, SIZE } from "./browser.mjs";
 
-// NODE_PATH says where it is; `import` does not look there.
-const require = createRequire(import.meta.url);
-const { chromium } = require("playwright-core");
 const [dist, executablePath = "/usr/bin/chromium", bansho = "target/debug/bansho"] = process.argv.slice(2);
 // Longest that the page may work without answering, and that it may be silent where other programs hold it up too, ms.
 const [LONGEST_MS, LONGEST_SILENCE_MS] = [100, 300];
-const SIZE = { width: 1400, height: 860 };
-const TYPES = { ".html": "text/html", ".js": "text/javascript", ".wasm": "application/wasm" };
 
 function fail(message) {
   console.error(`FAILED: ${message}`);
   process.exit(1);
 }
 
-const server = createServer((request, response) => {
-  const path = request.url === "/" ? "/index.html" : request.url.split("?")[0];
-  try {
-    const body = readFileSync(join(dist, path));
-    response.writeHead(200, { "content-type": TYPES[extname(path)] ?? "application/octet-stream" }).end(body);
-  } catch {
-    response.writeHead(path === "/favicon.ico" ? 204 : 404).end();
-  }
-});
-await new Promise((listening) => server.listen(0, "127.0.0.1", listening));
-const address = `http://127.0.0.1:${server.address().port}/`;
-
-const webgpu = ["--enable-unsafe-webgpu", "--enable-features=Vulkan", "--use-vulkan=swiftshader", "--use-angle=swiftshader"];
-const quiet = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
-const browser = await chromium.launch({ executablePath, headless: true, args: [...quiet, ...webgpu] });
+const { server, address } = await serve(dist);
+const browser = await launch(executablePath);
 const context = await browser.newContext({ viewport: SIZE, acceptDownloads: true });
 const errors = [];
 
@@ -165,6 +146,40 @@ const checked = spawnSync(bansho, ["check", saved], { encoding: "utf8" });
 if (checked.status !== 0) fail(`bansho check: ${checked.stderr || checked.error}`);
 console.log("the stroke is in the scene that was downloaded, which passes bansho check");
 await sky.close();
+
+// A scene of the user's own is opened through the browser, and its still and its shot come back.
+const small = `bansho = 1
+[picture]
+size = [64, 36]
+frames = 4
+[[flame_particles]]
+particles = 200
+preroll_s = 0.2
+`;
+const own = await open("torch");
+await until(own, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
+const [chooser] = await Promise.all([own.waitForEvent("filechooser"), own.keyboard.press("Control+o")]);
+await chooser.setFiles({ name: "small.toml", mimeType: "text/plain", buffer: Buffer.from(small) });
+await own.waitForTimeout(2000);
+async function rendered(keys) {
+  const [download] = await Promise.all([own.waitForEvent("download", { timeout: 120000 }), own.keyboard.press(keys)]);
+  const path = join(mkdtempSync(join(tmpdir(), "studio-")), download.suggestedFilename());
+  await download.saveAs(path);
+  return { path, name: download.suggestedFilename() };
+}
+const one = await rendered("F12");
+if (one.name !== "small.0000.png") fail(`the still is called ${one.name}`);
+const shot = await rendered("Shift+F12");
+if (shot.name !== "small.zip") fail(`the shot is called ${shot.name}`);
+const look_into = `import sys, zipfile
+shot = zipfile.ZipFile(sys.argv[1])
+assert shot.testzip() is None
+assert shot.namelist() == [f"small.{number:04}.png" for number in range(4)], shot.namelist()
+assert shot.read("small.0000.png") == open(sys.argv[2], "rb").read(), "the first frame is not the still"`;
+const zipped = spawnSync("python3", ["-c", look_into, shot.path, one.path], { encoding: "utf8" });
+if (zipped.status !== 0) fail(`the shot: ${zipped.stderr || zipped.error}`);
+console.log("a scene was opened; its still and its shot were rendered");
+await own.close();
 
 await browser.close();
 server.close();

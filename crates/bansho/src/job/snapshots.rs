@@ -67,15 +67,16 @@ impl Snapshots {
         }
     }
 
-    /// Writes the state at frame `number` where one is due and the very same does not lie there yet.
+    /// Writes the state at frame `number` where one is due, or lies there, and it is not the very same.
     pub(super) fn keep(&self, shot: &dyn Shot, number: i64, observer: &dyn Observer) -> Result<(), JobError> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let number = self.in_turn(number);
-        if !number.abs_diff(self.first_frame).is_multiple_of(self.every) {
+        let path = self.path(folder, number);
+        if !number.abs_diff(self.first_frame).is_multiple_of(self.every) && !path.exists() {
             return Ok(());
         }
         let _stage = StageGuard::begin(observer, Stage::Write);
-        let (path, state) = (self.path(folder, number), shot.snapshot());
+        let state = shot.snapshot();
         if fs::read(&path).is_ok_and(|there| there == state) {
             return Ok(());
         }

@@ -4,9 +4,9 @@ use bansho::PlanOptions;
 
 use crate::looks::{Film, hues, luminance, scene_text};
 
-/// The paper's flame in wind of `speed` m/s, twelve frames of it.
-fn gas_in_wind(speed: f64) -> Film {
-    let text = scene_text("inagaki_still").replace(
+/// A scene's flame in wind of `speed` m/s, twelve frames of it.
+fn gas_in_wind(scene: &str, speed: f64) -> Film {
+    let text = scene_text(scene).replace(
         "[[flame_particles]]",
         &format!("[wind]\nvelocity = [{speed:?}, 0, 0]\ngust = 0\n[[flame_particles]]"),
     );
@@ -16,10 +16,17 @@ fn gas_in_wind(speed: f64) -> Film {
 
 #[test]
 fn wind_bends_burning_gas_and_more_wind_bends_it_more() {
-    let lean = |speed: f64| gas_in_wind(speed).centroid_of_upper_half()[0] - 80.0;
+    let lean = |speed: f64| gas_in_wind("inagaki_still", speed).centroid_of_upper_half()[0] - 80.0;
     let [left, still, right, strong] = [-0.5, 0.0, 0.5, 1.2].map(lean);
     assert!(still.abs() < 6.0, "still: {still}");
     assert!(left < still - 2.0 && right > still + 2.0 && strong > right + 2.0, "{left} {still} {right} {strong}");
+}
+
+#[test]
+fn the_papers_own_wind_bends_the_papers_own_gas() {
+    let lean = |speed: f64| gas_in_wind("inagaki_paper", speed).centroid_of_upper_half()[0] - 80.0;
+    let [left, still, right] = [-0.5, 0.0, 0.5].map(lean);
+    assert!(still.abs() < 6.0 && left < still - 2.0 && right > still + 2.0, "{left} {still} {right}");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::{ops::Range, path::PathBuf, sync::Arc};
 
 use bansho::{
     Backend, BitDepth, CpuBackend, DisplayImage, Plan, PlanOptions, Unobserved, View,
-    base::image::DisplayPixels,
+    base::image::{DisplayPixels, Frame},
     media::plates::{FileAssets, decode_picture},
 };
 
@@ -17,17 +17,32 @@ pub(crate) fn scene_text(scene: &str) -> String {
     std::fs::read_to_string(scenes().join(format!("{scene}.toml"))).unwrap_or_else(|error| panic!("{scene}: {error}"))
 }
 
-fn draw(text: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions, depth: BitDepth) -> Vec<DisplayImage> {
+/// What `look` sees in each of those frames.
+fn look_at<T>(
+    text: &str,
+    size: [usize; 2],
+    frames: &[i64],
+    options: &PlanOptions,
+    look: impl Fn(&Frame) -> T,
+) -> Vec<T> {
     let assets = Arc::new(FileAssets::new(scenes()));
     let scene = bansho::parse_scene("scene", text, assets.as_ref()).unwrap_or_else(|error| panic!("{error}"));
     let options = PlanOptions { size: Some(size), ..options.clone() };
     let plan = Arc::new(Plan::new(scene, &options, assets).unwrap());
     let mut shot = CpuBackend.open(plan).unwrap();
-    let mut draw = |number: &i64| {
-        let frame = bansho::draw(shot.as_mut(), *number, &Unobserved).unwrap();
-        bansho::display(&frame, &View::DISPLAY, depth)
-    };
-    frames.iter().map(&mut draw).collect()
+    frames.iter().map(|number| look(&bansho::draw(shot.as_mut(), *number, &Unobserved).unwrap())).collect()
+}
+
+fn draw(text: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions, depth: BitDepth) -> Vec<DisplayImage> {
+    look_at(text, size, frames, options, |frame| bansho::display(frame, &View::DISPLAY, depth))
+}
+
+/// Mean luminance of the scene's light in each of those frames, before it is shown: 1.0 is display white.
+pub(crate) fn mean_luminances(text: &str, size: [usize; 2], frames: &[i64]) -> Vec<f64> {
+    look_at(text, size, frames, &PlanOptions::default(), |frame| {
+        let of = |[red, green, blue, _]: &[f32; 4]| f64::from(bansho::base::color::luminance([*red, *green, *blue]));
+        frame.beauty.pixels().iter().map(of).sum::<f64>() / (size[0] * size[1]) as f64
+    })
 }
 
 /// Codes over black, from 0 to 1, still sRGB-encoded.

@@ -16,7 +16,7 @@ use looks::golden;
 const SMALL: [usize; 2] = [256, 144];
 
 /// Scenes with the frame that is compared: of an aurora an early one, since it has settled before the first.
-const GOLDENS: [(&str, [usize; 2], i64); 24] = [
+const GOLDENS: [(&str, [usize; 2], i64); 28] = [
     ("candle", SMALL, 40),
     ("torch", SMALL, 40),
     ("campfire", SMALL, 40),
@@ -24,8 +24,12 @@ const GOLDENS: [(&str, [usize; 2], i64); 24] = [
     ("ohshima_itahashi", SMALL, 40),
     ("inagaki_still", SMALL, 40),
     ("inagaki_wind_left", SMALL, 40),
+    ("inagaki_wind_right", SMALL, 40),
+    ("inagaki_paper", SMALL, 40),
     ("inagaki_haze", SMALL, 40),
     ("inagaki_density", SMALL, 40),
+    ("torch_in_gusts", SMALL, 40),
+    ("burning_mesh", SMALL, 40),
     ("street_lamp", SMALL, 40),
     ("street_lamp_near", SMALL, 40),
     ("headlights", SMALL, 40),

@@ -204,4 +204,8 @@ impl<T: Parameter + Animate> Parameter for Animated<T> {
         table.push("interpolation", Value::Text(interpolation_name(self.interpolation()).name().into()));
         Some(Value::Table(table))
     }
+
+    fn close_loop(&mut self, period: f64) -> Option<String> {
+        (!self.close(period)).then(String::new)
+    }
 }

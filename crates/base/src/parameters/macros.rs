@@ -97,6 +97,13 @@ macro_rules! parameters {
             fn to_value(&self) -> Option<$crate::parameters::Value> {
                 Some($crate::parameters::Value::Table(<Self as $crate::parameters::Parameters>::to_table(self)))
             }
+
+            fn close_loop(&mut self, _period: f64) -> Option<String> {
+                $(if let Some(rest) = $crate::parameters::Parameter::close_loop(&mut self.$key, _period) {
+                    return Some($crate::parameters::path(stringify!($key), &rest));
+                })*
+                None
+            }
         }
     };
     (@limits $type:ty) => { <<$type as $crate::parameters::Parameter>::Limits as Default>::default() };

@@ -18,4 +18,4 @@ pub use kind::{Choice, Descriptor, Kind, TableDescriptor};
 pub use node::{Entry, Node, Span, Table, Value};
 pub use problem::{Problem, ProblemKind, Reader, nearest};
 pub use sample::sample;
-pub use types::{AssetPath, Auto, Length, Parameter, Parameters, Range};
+pub use types::{AssetPath, Auto, Length, Parameter, Parameters, Range, path};

@@ -69,6 +69,12 @@ pub enum ProblemKind {
         /// All allowed names.
         allowed: Vec<String>,
     },
+    /// A keyed value that does not end a seamless loop as it begins it.
+    #[error("the loop of {seconds} s jumps: its first and its last moment differ")]
+    LoopJumps {
+        /// Length of the loop, s.
+        seconds: f64,
+    },
     /// A list too short or too long.
     #[error("has {found} items; allowed: {min} to {max}")]
     ListLength {

@@ -15,6 +15,12 @@ pub trait Parameter: Sized {
 
     /// Writes it as a file would say it; `None` where a file would leave it out.
     fn to_value(&self) -> Option<Value>;
+
+    /// Makes what is keyed over time repeat what it does between 0 and `period` (s, above 0); gives the path of the first that does not end
+    /// there as it began, empty for the value itself.
+    fn close_loop(&mut self, _period: f64) -> Option<String> {
+        None
+    }
 }
 
 /// A table of parameters; made by [`parameters!`](crate::parameters!).
@@ -271,6 +277,13 @@ impl<T: Parameter> Parameter for Auto<T> {
             Self::Set(value) => value.to_value(),
         }
     }
+
+    fn close_loop(&mut self, period: f64) -> Option<String> {
+        match self {
+            Self::Auto => None,
+            Self::Set(value) => value.close_loop(period),
+        }
+    }
 }
 
 impl<T: Parameter> Parameter for Option<T> {
@@ -286,6 +299,10 @@ impl<T: Parameter> Parameter for Option<T> {
 
     fn to_value(&self) -> Option<Value> {
         self.as_ref().and_then(T::to_value)
+    }
+
+    fn close_loop(&mut self, period: f64) -> Option<String> {
+        self.as_mut().and_then(|value| value.close_loop(period))
     }
 }
 
@@ -331,4 +348,15 @@ impl<T: Parameter> Parameter for Vec<T> {
     fn to_value(&self) -> Option<Value> {
         Some(Value::List(self.iter().filter_map(T::to_value).map(Node::from).collect()))
     }
+
+    fn close_loop(&mut self, period: f64) -> Option<String> {
+        let mut items = self.iter_mut().enumerate();
+        items.find_map(|(index, item)| Some(path(&index.to_string(), &item.close_loop(period)?)))
+    }
+}
+
+/// The path of something at `rest` within what `key` names.
+#[must_use]
+pub fn path(key: &str, rest: &str) -> String {
+    if rest.is_empty() { key.to_owned() } else { format!("{key}.{rest}") }
 }

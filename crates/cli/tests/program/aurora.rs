@@ -46,13 +46,25 @@ fn kilorayleighs_and_the_field_come_as_aovs() {
     let folder = Folder::with_scene(AURORA);
     folder.succeed(&["render", "scene.toml", "--frames", "2", "--aovs", "--out", "f.exr"]);
     let picture = read_exr(&folder.path("f.exr"));
-    let greatest = |ending: &str| -> f32 {
+    let values = |ending: &str| {
         let channel = picture.channels.iter().find(|(name, _)| name.ends_with(ending));
         let (_, values) = channel.unwrap_or_else(|| panic!("{ending} is missing"));
         assert!(values.iter().all(|value| value.is_finite()), "{ending}");
-        values.iter().copied().fold(0.0, f32::max)
+        values
     };
-    let [green, blue] = ["kilorayleigh_557", "kilorayleigh_427"].map(greatest);
+    let greatest = |ending: &str| values(ending).iter().copied().fold(0.0, f32::max);
+    let [green, red, blue, violet, deep_red] =
+        ["557", "630", "427", "391", "670"].map(|line| greatest(&format!("kilorayleigh_{line}")));
     assert!(green > 1.0 && green > 2.0 * blue && blue > 0.0, "{green} kR green, {blue} kR blue");
-    assert!(greatest("particle_count") >= 1.0);
+    assert!(red > 0.0 && red < green && deep_red > 0.0, "{red} kR and {deep_red} kR red");
+    assert!((violet / blue - 3.28).abs() < 0.01, "{violet} kR violet, {blue} kR blue");
+    // Counts are whole; what is scattered makes the potential, which is negative and lowest where they are.
+    for count in ["scatter_count", "particle_count"] {
+        assert!(greatest(count) >= 1.0 && values(count).iter().all(|count| count.fract() == 0.0), "{count}");
+    }
+    let (potential, scattered) = (values("potential"), values("scatter_count"));
+    let (lowest, _) = (0..potential.len()).map(|i| (i, potential[i])).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+    assert!(potential.iter().all(|value| *value <= 0.0) && potential[lowest] < 0.0 && scattered[lowest] > 0.0);
+    let noise = values("potential_noise");
+    assert!(noise.iter().any(|value| *value > 0.0) && noise.iter().any(|value| *value < 0.0));
 }

@@ -189,3 +189,38 @@ fn a_gpu_that_is_not_there_has_its_own_exit_code() {
     says(&run.stderr, &["no usable GPU", "cpu, auto"]);
     assert_eq!(folder.names(), ["scene.toml"]);
 }
+
+/// What the program says of a particle flame with these lines.
+fn refused_gas(lines: &str) -> String {
+    refused(&format!("bansho = 1\n[picture]\nsize = [32, 18]\n[[flame_particles]]\n{lines}"), 3)
+}
+
+#[test]
+fn a_burner_outside_the_domain_names_the_corner_that_it_lies_beyond() {
+    let error = refused_gas("domain_max = [5, 5, 5]\n[[flame_particles.burners]]\nposition = [0, 90, 0]\n");
+    says(&error, &["scene.toml:7:12: ", "burners.0.position", "[0.0, 90.0, 0.0] m", "`domain_max` [5.0, 5.0, 5.0] m"]);
+    let error = refused_gas("domain_min = [1, -1, -1]\n[[flame_particles.burners]]\nposition = [0, 0, 0]\n");
+    says(&error, &["scene.toml:7:12: ", "`domain_min` [1.0, -1.0, -1.0] m"]);
+}
+
+#[test]
+fn gas_that_cannot_be_says_what_can() {
+    let inside_out = refused_gas("domain_min = [-9, -9, -9]\ndomain_max = [9, -9.5, 9]\n");
+    says(&inside_out, &["flame_particles.0.", "domain_max"]);
+    let coarse = refused_gas("particles = 1\ndomain_min = [-0.02, -0.02, -0.02]\ndomain_max = [0.02, 0.02, 0.02]\n");
+    says(&coarse, &["scene.toml:5:13: ", "support radius d", "the domain's 0.0400 m", "more particles"]);
+    let many = refused_gas("particles = 900000000\n");
+    says(&many, &["scene.toml:5:13: ", "900000000 particles would take 268 GiB", "allowed: up to 20000000"]);
+    for temperature in ["0", "1e6"] {
+        let error = refused_gas(&format!("[[flame_particles.burners]]\ntemperature_k = {temperature}\n"));
+        says(&error, &["scene.toml:6:17: ", "temperature_k", "is out of range", " K"]);
+    }
+    let empty = "o nothing\nv 0 0 0\n";
+    let folder = Folder::with_scene(
+        "bansho = 1\n[[flame_particles]]\n[[flame_particles.burners]]\nshape = \"mesh\"\nfile = \"mesh.gltf\"\n",
+    );
+    folder.write("mesh.gltf", empty);
+    let run = folder.run(&["check", "scene.toml"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+    says(&run.stderr, &["scene.toml:5:8: ", "mesh.gltf"]);
+}

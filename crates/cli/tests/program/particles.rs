@@ -50,6 +50,27 @@ fn particles_are_written_a_file_a_frame() {
 }
 
 #[test]
+fn an_auroras_electrons_lie_on_the_shell_at_100_km() {
+    let folder = Folder::with_scene(
+        "bansho = 1\n[[aurora]]\npreroll_s = 0.2\nflux_mw_per_m2 = 20\nenergy_ev = 3000\nparticles = { count = 2000 }\n",
+    );
+    folder.succeed(&["simulate", "scene.toml", "--particles", "aurora.ply", "--frames", "3"]);
+    let (names, rows) = read_ply(&folder.files("")["aurora.ply"]);
+    assert_eq!(names, ["x", "y", "z", "vx", "vy", "vz", "energy", "power"]);
+    assert!((1800..2400).contains(&rows.len()), "{} particles", rows.len());
+    let mut power = 0.0;
+    for row in &rows {
+        let [x, y, z] = [row[0], row[1] + 6.371e6, row[2]].map(f64::from);
+        assert!(((x * x + y * y + z * z).sqrt() - 6.471e6).abs() < 2.0, "{row:?}");
+        assert!(row[..2].iter().chain([&row[2]]).all(|place| place.abs() < 3.1e5), "{row:?}");
+        assert!((1000.0..9000.0).contains(&row[6]) && row[7] >= 0.0, "{row:?}");
+        power += f64::from(row[7]);
+    }
+    // Two sheets, 800 km together and as thick as two cells of 600 / 255 km, at 0.02 W/m^2: 75 MW.
+    assert!((5e7..1e8).contains(&power), "{power} W");
+}
+
+#[test]
 fn what_has_no_particles_or_no_such_name_is_refused_before_anything_is_written() {
     let folder = Folder::with_scene(GAS);
     let name = folder.run(&["simulate", "scene.toml", "--particles", "gas.obj"]);

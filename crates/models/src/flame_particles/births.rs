@@ -64,7 +64,7 @@ impl Births<'_> {
     /// Adds particle `birth`, born at `t`, which is `age` old.
     fn add_one(&self, particles: &mut Particles, number: usize, birth: u64, t: f64, age: f64) {
         let (design, burner) = (self.design, &self.design.burners[number]);
-        let place = burner.birthplace(self.key, birth);
+        let place = burner.birthplace(self.key, birth, t);
         let chance = uniform(self.key.words(birth, 0, Purpose::named("birth speed"))[0]);
         let outward = place.outward * place.outward;
         let profile = (SPEED_PROFILE[0] - SPEED_PROFILE[1] * outward) as f32;

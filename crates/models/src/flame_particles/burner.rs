@@ -25,7 +25,8 @@ const BASE_FROUDE: f64 = 0.4;
 #[derive(Clone, Debug)]
 pub(crate) struct Burner {
     pub(crate) parameters: BurnerParameters,
-    pub(crate) placement: Placement,
+    /// How it is turned and scaled; where it is changes over time.
+    turned: Placement,
     area: Area,
     /// Width D across which gas burns: sets puffing and eddies, m.
     pub(crate) diameter: f64,
@@ -37,7 +38,7 @@ pub(crate) struct Burner {
     pub(crate) speed: f64,
     /// Acceleration of gas along the axis, m/s^2.
     pub(crate) acceleration: f64,
-    /// Radius of a ball around `placement.position` that holds the burner, m.
+    /// Radius of a ball around its middle that holds the burner, m.
     pub(crate) reach: f64,
 }
 
@@ -66,7 +67,7 @@ impl Burner {
         assets: &dyn Assets,
     ) -> Result<Self, ParticleFaultKind> {
         let scale = if parameters.shape == BurnerShape::Mesh { parameters.scale } else { 1.0 };
-        let placement = Placement::new(parameters.position, parameters.rotation_deg, scale);
+        let turned = Placement::new([0.0; 3], parameters.rotation_deg, scale);
         let (area, size) = area(parameters, assets)?;
         let equivalent = math::sqrt(4.0 * size.square_metres / std::f64::consts::PI);
         let height = match parameters.height {
@@ -79,7 +80,7 @@ impl Burner {
         };
         Ok(Self {
             parameters: parameters.clone(),
-            placement,
+            turned,
             area,
             diameter: size.diameter,
             square_metres: size.square_metres,
@@ -88,6 +89,11 @@ impl Burner {
             acceleration: AXIS_ACCELERATION * flame.motion.buoyancy,
             reach: size.reach,
         })
+    }
+
+    /// Where its middle is at `t`, m from the flame's position.
+    pub(crate) fn position(&self, t: f64) -> DVec3 {
+        self.parameters.position.at(t).into()
     }
 
     /// Speed of gas at `height` along the axis, m/s.
@@ -109,8 +115,8 @@ impl Burner {
         }
     }
 
-    /// Where the particle `birth` is born: as likely anywhere on the burner.
-    pub(crate) fn birthplace(&self, key: Key, birth: u64) -> Birthplace {
+    /// Where the particle `birth` is born at `t`: as likely anywhere on the burner.
+    pub(crate) fn birthplace(&self, key: Key, birth: u64, t: f64) -> Birthplace {
         let words = key.words(birth, 0, Purpose::named("birthplace"));
         let (position, direction) = self.local(words);
         let radius = 0.5 * self.parameters.diameter;
@@ -119,7 +125,8 @@ impl Burner {
             Area::Strip => position.z.abs() / radius,
             Area::Cuboid | Area::Surface(_) => std::f64::consts::FRAC_1_SQRT_2,
         };
-        Birthplace { position: self.placement.to_world(position), direction: self.placement.turn(direction), outward }
+        let placement = Placement { position: self.position(t), ..self.turned };
+        Birthplace { position: placement.to_world(position), direction: placement.turn(direction), outward }
     }
 
     /// Place and direction in the burner's own coordinates.
@@ -211,7 +218,7 @@ mod tests {
     }
 
     fn places(burner: &Burner) -> impl Iterator<Item = Birthplace> + '_ {
-        (0..4000).map(|birth| burner.birthplace(Key::new(1, "burner"), birth))
+        (0..4000).map(|birth| burner.birthplace(Key::new(1, "burner"), birth, 0.0))
     }
 
     #[test]

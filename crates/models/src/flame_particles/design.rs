@@ -131,24 +131,35 @@ fn burners(parameters: &FlameParticlesParameters, assets: &dyn Assets) -> Result
 
 /// The box that gas may fill: as given, or with room for three flames above and around.
 fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[DVec3; 2], ParticleFault> {
-    let room = |burner: &Burner| burner.reach + 3.0 * burner.height;
-    let places = || burners.iter().map(|burner| (burner.placement.position, DVec3::splat(room(burner))));
-    let low = places().map(|(place, room)| place - room).fold(DVec3::INFINITY, DVec3::min);
-    let high = places().map(|(place, room)| place + room).fold(DVec3::NEG_INFINITY, DVec3::max);
-    let given = |corner: Auto<[f64; 3]>, auto| if let Auto::Set(corner) = corner { DVec3::from(corner) } else { auto };
-    let [min, max] = [given(parameters.domain_min, low), given(parameters.domain_max, high)];
-    if min.cmpge(max).any() {
-        let kind = ParticleFaultKind::EmptyDomain { min: min.into(), max: max.into() };
-        return Err(ParticleFault { key: "domain_max".into(), kind });
+    if let (Auto::Set(min), Auto::Set(max)) = (parameters.domain_min, parameters.domain_max)
+        && DVec3::from(min).cmpge(DVec3::from(max)).any()
+    {
+        return Err(ParticleFault { key: "domain_max".into(), kind: ParticleFaultKind::EmptyDomain { min, max } });
     }
     for (index, burner) in burners.iter().enumerate() {
-        let place = burner.placement.position;
-        if place.cmplt(min).any() || place.cmpgt(max).any() {
-            let kind = ParticleFaultKind::OutsideDomain { place: place.into(), min: min.into(), max: max.into() };
-            return Err(ParticleFault { key: format!("burners.{index}.position"), kind });
+        for corner in burner.parameters.position.bounds() {
+            stands_within(parameters, DVec3::from(corner))
+                .map_err(|kind| ParticleFault { key: format!("burners.{index}.position"), kind })?;
         }
     }
-    Ok([min, max])
+    let room = |burner: &Burner| burner.reach + 3.0 * burner.height;
+    // The corners of the box in which each burner moves.
+    let ways = || burners.iter().map(|burner| (burner, burner.parameters.position.bounds().map(DVec3::from)));
+    let low = ways().map(|(burner, [low, _])| low - room(burner)).fold(DVec3::INFINITY, DVec3::min);
+    let high = ways().map(|(burner, [_, high])| high + room(burner)).fold(DVec3::NEG_INFINITY, DVec3::max);
+    let given = |corner: Auto<[f64; 3]>, auto| if let Auto::Set(corner) = corner { DVec3::from(corner) } else { auto };
+    Ok([given(parameters.domain_min, low), given(parameters.domain_max, high)])
+}
+
+/// Whether a corner of a burner's way lies within the corners of the domain that are given.
+fn stands_within(parameters: &FlameParticlesParameters, place: DVec3) -> Result<(), ParticleFaultKind> {
+    let FlameParticlesParameters { domain_min, domain_max, .. } = parameters;
+    let beyond = |corner, limit| Err(ParticleFaultKind::OutsideDomain { place: place.into(), corner, limit });
+    match (domain_min, domain_max) {
+        (Auto::Set(min), _) if place.cmplt(DVec3::from(*min)).any() => beyond("domain_min", *min),
+        (_, Auto::Set(max)) if place.cmpgt(DVec3::from(*max)).any() => beyond("domain_max", *max),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -181,14 +192,15 @@ mod tests {
     fn parameters_that_do_not_go_together_are_named() {
         let default = FlameParticlesParameters::default;
         let fault = |parameters| design(&parameters).unwrap_err();
-        let far = BurnerParameters { position: [0.0, 90.0, 0.0], ..Default::default() };
+        let far = BurnerParameters { position: [0.0, 90.0, 0.0].into(), ..Default::default() };
         let outside = FlameParticlesParameters {
             burners: vec![BurnerParameters::default(), far],
             domain_max: Auto::Set([5.0; 3]),
             ..default()
         };
         assert_eq!(fault(outside).key, "burners.1.position");
-        let empty = FlameParticlesParameters { domain_max: Auto::Set([-50.0; 3]), ..default() };
+        let corners = [Auto::Set([-40.0; 3]), Auto::Set([-50.0; 3])];
+        let empty = FlameParticlesParameters { domain_min: corners[0], domain_max: corners[1], ..default() };
         assert_eq!(fault(empty).key, "domain_max");
         let thin = [Auto::Set([-0.01; 3]), Auto::Set([0.01; 3])];
         let wide = FlameParticlesParameters { particles: 5, domain_min: thin[0], domain_max: thin[1], ..default() };

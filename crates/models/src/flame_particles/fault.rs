@@ -16,17 +16,17 @@ pub struct ParticleFault {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ParticleFaultKind {
     /// A burner whose middle lies outside the domain.
-    #[error("the burner stands at {place:?} m, outside the domain from {min:?} to {max:?} m")]
+    #[error("the burner stands at {place:?} m, beyond `{corner}` {limit:?} m")]
     OutsideDomain {
         /// Where its middle is.
         place: [f64; 3],
-        /// Least corner of the domain.
-        min: [f64; 3],
-        /// Greatest corner.
-        max: [f64; 3],
+        /// Which corner of the domain it lies beyond.
+        corner: &'static str,
+        /// That corner.
+        limit: [f64; 3],
     },
     /// A domain that is inside out.
-    #[error("the domain from {min:?} to {max:?} m is empty; each coordinate of `domain_max` must be greater")]
+    #[error("the domain from {min:.3?} to {max:.3?} m is empty; each coordinate of `domain_max` must be greater")]
     EmptyDomain {
         /// Least corner.
         min: [f64; 3],
@@ -35,7 +35,7 @@ pub enum ParticleFaultKind {
     },
     /// Particles that see farther than the domain is wide.
     #[error(
-        "the support radius d would be {radius} m, more than the domain's {side} m; use more particles or a larger domain"
+        "the support radius d would be {radius:.4} m, more than the domain's {side:.4} m; use more particles or a larger domain"
     )]
     SupportBeyondDomain {
         /// Support radius d, m.

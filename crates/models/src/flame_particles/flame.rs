@@ -6,7 +6,7 @@ use bansho_base::{
     color,
     math::{self, DVec2, DVec3},
     observer::{Cancelled, Observer},
-    parameters::Auto,
+    parameters::{Auto, Parameter},
     phenomenon::{Phenomenon, Prepared, SnapshotError, Stepping},
     point_cloud::{PointCloud, Quantity},
     random::Key,
@@ -73,7 +73,7 @@ impl FlameParticles {
     /// The gas as the drawing sees it.
     fn gas(&self) -> Gas<'_> {
         let tallest = self.tallest();
-        let place = DVec3::from(self.parameters.position) + tallest.placement.position;
+        let place = DVec3::from(self.parameters.position) + tallest.position(self.time);
         Gas {
             particles: &self.simulation.particles,
             time: self.time,
@@ -98,10 +98,10 @@ impl FlameParticles {
 
 /// Makes what is keyed repeat.
 fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result<(), ParticleFault> {
-    let jumps = parameters.burners.iter_mut().position(|burner| !burner.flow.close(seconds));
-    let fault =
-        |index| ParticleFault { key: format!("burners.{index}.flow"), kind: ParticleFaultKind::LoopJumps { seconds } };
-    jumps.map_or(Ok(()), |index| Err(fault(index)))
+    match parameters.close_loop(seconds) {
+        Some(key) => Err(ParticleFault { key, kind: ParticleFaultKind::LoopJumps { seconds } }),
+        None => Ok(()),
+    }
 }
 
 /// Speed of gas that draws its detail as it is, beside that of gas half way up.

@@ -4,7 +4,7 @@
 //! its entrainment allows, a share of the speed on the axis, and at the base about a fifth of `sqrt(g D)`. The axis is where the gas is: the mean place in each layer of height, so
 //! that it leans with the wind.
 
-use bansho_base::math::{self, Vec3};
+use bansho_base::math::{self, DVec3, Vec3};
 
 use super::burner::{Burner, GRAVITY};
 
@@ -33,10 +33,10 @@ pub(crate) struct Axis {
     reach: f32,
 }
 
-/// The axes of all burners; the particles at `positions` came from burners of these numbers.
-pub(crate) fn axes(burners: &[Burner], positions: [&[f32]; 3], numbers: &[u32], strength: f64) -> Vec<Axis> {
+/// The axes of all burners at `t`; the particles at `positions` came from burners of these numbers.
+pub(crate) fn axes(burners: &[Burner], positions: [&[f32]; 3], numbers: &[u32], strength: f64, t: f64) -> Vec<Axis> {
     let scale = |burner: &Burner| LAYERS as f64 / (1.5 * burner.height + burner.reach);
-    let bases: Vec<(f64, f64)> = burners.iter().map(|b| (b.placement.position.y, scale(b))).collect();
+    let bases: Vec<(f64, f64)> = burners.iter().map(|b| (b.position(t).y, scale(b))).collect();
     let mut sums = vec![[[0.0_f64; 3]; LAYERS + 1]; burners.len()];
     for (index, &number) in numbers.iter().enumerate() {
         let (base, scale) = bases[number as usize];
@@ -45,12 +45,15 @@ pub(crate) fn axes(burners: &[Burner], positions: [&[f32]; 3], numbers: &[u32], 
         let sum = &mut sums[number as usize][layer];
         *sum = [sum[0] + x, sum[1] + z, sum[2] + 1.0];
     }
-    burners.iter().zip(&sums).map(|(burner, sums)| Axis::new(burner, scale(burner), sums, strength)).collect()
+    burners
+        .iter()
+        .zip(&sums)
+        .map(|(burner, sums)| Axis::new(burner, burner.position(t), scale(burner), sums, strength))
+        .collect()
 }
 
 impl Axis {
-    fn new(burner: &Burner, scale: f64, sums: &[[f64; 3]; LAYERS + 1], strength: f64) -> Self {
-        let base = burner.placement.position;
+    fn new(burner: &Burner, base: DVec3, scale: f64, sums: &[[f64; 3]; LAYERS + 1], strength: f64) -> Self {
         let mut axis = Self {
             base: base.y as f32,
             scale: scale as f32,
@@ -116,7 +119,7 @@ mod tests {
         // A column that leans to +x: x = y / 2.
         let y: Vec<f32> = (0..200).map(|i| i as f32 / 150.0).collect();
         let x: Vec<f32> = y.iter().map(|y| 0.5 * y).collect();
-        axes(&[burner], [&x, &y, &[0.0; 200]], &[0; 200], strength).remove(0)
+        axes(&[burner], [&x, &y, &[0.0; 200]], &[0; 200], strength, 0.0).remove(0)
     }
 
     #[test]

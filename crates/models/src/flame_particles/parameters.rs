@@ -72,8 +72,8 @@ bansho_base::parameters! {
     pub struct BurnerParameters {
         /// Shape of the area.
         shape: BurnerShape = BurnerShape::Disc;
-        /// Where its middle is, from `position` of the flame.
-        position: [f64; 3] = [0.0, 0.0, 0.0], unit("m");
+        /// Where its middle is, from `position` of the flame. Gas leaves a moving burner where it is then, no faster for its motion.
+        position: Animated<[f64; 3]> = Animated::from([0.0, 0.0, 0.0]), unit("m");
         /// Turn about x, then y, then z; unturned it blows upward.
         rotation_deg: [f64; 3] = [0.0, 0.0, 0.0], limits(Range::new(-3600.0, 3600.0)), unit("degrees");
         /// Diameter D of a disc or a point, width of a line.
@@ -172,8 +172,8 @@ bansho_base::parameters! {
         position: [f64; 3] = [0.0, 0.0, 0.0], unit("m");
         /// Burners; where the list is empty, one that is all default.
         burners: Vec<BurnerParameters> = Vec::new(), limits(Length { min: 0, max: 200, item: () });
-        /// About how many particles live at a time, all burners together.
-        particles: i64 = 12_000, limits(Range::new(1.0, 1e9));
+        /// About how many particles live at a time, all burners together. More than 20 million are refused with the memory that they would take.
+        particles: i64 = 12_000, limits(Range::new(1.0, 1e12));
         /// Pressure and viscosity.
         fluid: FluidParameters = FluidParameters::default();
         /// Buoyancy, wind, entrainment, puffing, turbulence.

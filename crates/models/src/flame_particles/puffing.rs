@@ -126,9 +126,9 @@ impl Shed<'_> {
         let burner = self.burner;
         if self.streams == 1 {
             let offset = DVec3::new(z - 0.5, 0.0, x - 0.5) * (0.4 * burner.diameter);
-            return burner.placement.position + offset;
+            return burner.position(self.t) + offset;
         }
-        burner.birthplace(self.key, beat as u64 ^ u64::from(self.purpose.0) << 48).position
+        burner.birthplace(self.key, beat as u64 ^ u64::from(self.purpose.0) << 48, self.t).position
     }
 }
 

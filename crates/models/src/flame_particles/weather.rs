@@ -66,7 +66,7 @@ impl<'a> Weather<'a> {
     ) -> Self {
         let Surroundings { wind, air, others, .. } = around;
         let drift = wind.travel(0.0, t) * (EDDY_DRIFT * flame.motion.wind_gain);
-        let axes = axes(&design.burners, particles.positions(), &particles.burner, flame.motion.narrowing);
+        let axes = axes(&design.burners, particles.positions(), &particles.burner, flame.motion.narrowing, t);
         let draught = |(number, axis): (usize, Axis)| {
             let burner = &design.burners[number];
             let size = flame.motion.eddy_size * burner.diameter;

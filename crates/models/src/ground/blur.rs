@@ -3,7 +3,7 @@
 use bansho_base::{
     canvas::View,
     image::Image,
-    math::{self, DVec2},
+    math::{self, DVec2, Fused},
 };
 use rayon::prelude::*;
 
@@ -70,7 +70,7 @@ fn running_mean(line: &mut [Pixel], whole: usize, part: f64) {
         for (index, pixel) in line.iter_mut().enumerate() {
             sum += at(index.checked_add(whole), c);
             let edges = at(index.checked_sub(whole + 1), c) + at(index.checked_add(whole + 1), c);
-            pixel[c] = (part.mul_add(edges, sum) / width) as f32;
+            pixel[c] = (part.fused(edges, sum) / width) as f32;
             sum -= at(index.checked_sub(whole), c);
         }
     }

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use bansho_base::{
-    math::{self, DVec2, DVec3},
+    math::{self, DVec2, DVec3, Fused},
     surroundings::{Emitter, Surroundings},
 };
 
@@ -67,7 +67,7 @@ pub(super) fn gloss(surroundings: &Surroundings, point: DVec3, viewer: DVec3, fa
             Emitter::Directional { .. } | Emitter::Spot { .. } => 0.0,
         };
         let share = facets.lobe(toward, viewer, width) as f32;
-        (0..3).for_each(|c| radiance[c] = illuminance[c].mul_add(share, radiance[c]));
+        (0..3).for_each(|c| radiance[c] = illuminance[c].fused(share, radiance[c]));
     }
     radiance
 }

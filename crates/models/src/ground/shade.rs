@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use bansho_base::{
     canvas::{DepthInterval, Strip, View},
     image::{Image, Rect},
-    math::{self, DVec2, DVec3},
+    math::{self, DVec2, DVec3, Fused},
     phenomenon::Prepared,
     surroundings::Surroundings,
 };
@@ -77,7 +77,7 @@ impl PreparedGround<'_> {
         for light in &self.surroundings.others.lights {
             let (each, toward) = light.illuminance(hit.point);
             let facing = toward.y.max(0.0) as f32;
-            (0..3).for_each(|c| illuminance[c] = each[c].mul_add(facing, illuminance[c]));
+            (0..3).for_each(|c| illuminance[c] = each[c].fused(facing, illuminance[c]));
         }
         let albedo = match self.parameters.kind {
             GroundKind::Water => [WATER_ALBEDO; 3],
@@ -110,7 +110,7 @@ impl PreparedGround<'_> {
         let rough = gloss(self.surroundings, hit.point, viewer, &facets);
         let still = self.surroundings.reflection.map_or([0.0; 4], |image| bilinear(image, hit.pixel));
         let (puddle, fresnel, wetness) = (patch.puddle as f32, fresnel(hit.cos) as f32, self.wetness as f32);
-        [0, 1, 2].map(|c| wetness * (puddle * fresnel).mul_add(still[c], (1.0 - puddle) * rough[c]))
+        [0, 1, 2].map(|c| wetness * (puddle * fresnel).fused(still[c], (1.0 - puddle) * rough[c]))
     }
 
     fn seen_in_lake(&self, hit: &Hit, lake: &Lake) -> [f32; 3] {
@@ -119,7 +119,7 @@ impl PreparedGround<'_> {
             self.surroundings.reflection.map_or([0.0; 4], |image| bilinear(image, self.seen_in_wave(hit, slope)));
         let rough = bilinear(&lake.rough, hit.pixel);
         let (lost, fresnel) = (slope.unresolved as f32, fresnel(hit.cos) as f32);
-        [0, 1, 2].map(|c| fresnel * lost.mul_add(rough[c], (1.0 - lost) * still[c]))
+        [0, 1, 2].map(|c| fresnel * lost.fused(rough[c], (1.0 - lost) * still[c]))
     }
 
     /// The pixel of the mirror's picture that a tilted wave shows: what lies far away moves by twice the tilt.

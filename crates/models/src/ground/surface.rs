@@ -2,7 +2,7 @@
 
 use bansho_base::{
     color::acescg_from_srgb,
-    math::{self, DVec2},
+    math::{self, DVec2, Fused},
     noise::{Coordinate, Fractal, Noise, VARIANCE},
     random::{Key, Purpose},
 };
@@ -76,7 +76,7 @@ impl Surface {
             }
             let coordinates = [place.x / size, place.y / size].map(Coordinate::from_f64);
             let value = seen * f64::from(octave.at(coordinates));
-            (grain, relief) = (strength.mul_add(value, grain), height.mul_add(value, relief));
+            (grain, relief) = (strength.fused(value, grain), height.fused(value, relief));
             (size, strength, height) = (0.5 * size, GAIN * strength, RELIEF_GAIN * height);
         }
         let shade = math::exp(self.texture * grain) as f32;

@@ -4,7 +4,7 @@
 //! nearly all of a picture of them is empty, and what is drawn from places is as sharp at any size.
 
 use bansho_base::{
-    math::{DVec2, DVec3},
+    math::{DVec2, DVec3, Fused},
     random::{Key, Purpose},
 };
 
@@ -129,7 +129,7 @@ impl<'a> Billboards<'a> {
                 let (x, y) =
                     (wrapped(card.side * (sheet[0][i] - card.offset[0])), wrapped(sheet[1][i] - card.offset[1]));
                 for axis in 0..3 {
-                    drops.places[axis][i] = up[axis].mul_add(y, right[axis].mul_add(x, base[axis]));
+                    drops.places[axis][i] = up[axis].fused(y, right[axis].fused(x, base[axis]));
                 }
             }
             self.shower.add_drops(&drops, least_peak, gathering);

@@ -1,6 +1,6 @@
 //! The drops of one cell half way through an exposure.
 
-use bansho_base::math::DVec3;
+use bansho_base::math::{DVec3, Fused};
 
 use super::flights::{NOTHING, Row, Vectors};
 use crate::lanes::LANES;
@@ -46,9 +46,9 @@ impl Blown {
         let mut values = NOTHING;
         let [one, x, y, xy, z, xz, yz, xyz] = *coefficients;
         for i in 0..LANES {
-            let low = xy.mul_add(ys[i], x).mul_add(xs[i], y.mul_add(ys[i], one));
-            let high = xyz.mul_add(ys[i], xz).mul_add(xs[i], yz.mul_add(ys[i], z));
-            values[i] = high.mul_add(zs[i], low);
+            let low = xy.fused(ys[i], x).fused(xs[i], y.fused(ys[i], one));
+            let high = xyz.fused(ys[i], xz).fused(xs[i], yz.fused(ys[i], z));
+            values[i] = high.fused(zs[i], low);
         }
         values
     }
@@ -62,8 +62,8 @@ impl CellNow {
         let [right, up, back] = &self.axes;
         for axis in 0..3 {
             for i in 0..LANES {
-                let across = right[axis].mul_add(shares[0][i], self.base[axis]);
-                places[axis][i] = back[axis].mul_add(shares[2][i], up[axis].mul_add(shares[1][i], across));
+                let across = right[axis].fused(shares[0][i], self.base[axis]);
+                places[axis][i] = back[axis].fused(shares[2][i], up[axis].fused(shares[1][i], across));
                 velocities[axis][i] = self.velocity[axis];
             }
         }

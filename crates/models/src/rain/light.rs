@@ -1,7 +1,7 @@
 //! The light that drops send to the camera.
 
 use bansho_base::{
-    math::{self, DVec3, lanes},
+    math::{self, DVec3, Fused, lanes},
     surroundings::{Arrival, Emitter, Light},
 };
 
@@ -165,7 +165,7 @@ impl Beam {
             let distance = square.sqrt();
             let inverse = 1.0 / at_least(f32::MIN_POSITIVE, distance);
             let from = -(offset[0] * self.axis[0] + offset[1] * self.axis[1] + offset[2] * self.axis[2]) * inverse;
-            let cone = at_most(1.0, at_least(0.0, from.mul_add(self.cone[0], self.cone[1])));
+            let cone = at_most(1.0, at_least(0.0, from.fused(self.cone[0], self.cone[1])));
             let share = cone * cone * (3.0 - 2.0 * cone);
             let fall = at_least(self.least_square, near * square + (1.0 - near));
             factors[i] = share / fall * lanes::exp(-extinction * near * distance);

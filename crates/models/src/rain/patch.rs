@@ -1,6 +1,6 @@
 //! The part of a picture that streaks are laid into at a time.
 
-use bansho_base::{canvas::GrayPlanes, image::Rect};
+use bansho_base::{canvas::GrayPlanes, image::Rect, math::Fused};
 use fearless_simd::{Simd, f32x8, prelude::*};
 
 use super::bands::BAND;
@@ -128,7 +128,7 @@ impl Patch {
         }
         for c in 0..3 {
             for row in 0..BAND {
-                pixels[c][row] = hidden[row].mul_add(layer.light[c], pixels[c][row]);
+                pixels[c][row] = hidden[row].fused(layer.light[c], pixels[c][row]);
             }
         }
         for row in 0..BAND {

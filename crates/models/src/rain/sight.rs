@@ -4,7 +4,7 @@ use bansho_base::{
     camera::{Camera, Lens},
     canvas::View,
     image::Rect,
-    math::{DVec2, DVec3},
+    math::{DVec2, DVec3, Fused},
 };
 
 use super::{
@@ -88,12 +88,12 @@ impl Eye {
         let [right, up, back] = &self.axes;
         for i in 0..LANES {
             let (x, y, z) = (xs[i], ys[i], zs[i]);
-            let across = right[2].mul_add(z, right[1].mul_add(y, right[0].mul_add(x, self.offset[0])));
-            let above = up[2].mul_add(z, up[1].mul_add(y, up[0].mul_add(x, self.offset[1])));
-            let depth = -back[2].mul_add(z, back[1].mul_add(y, back[0].mul_add(x, self.offset[2])));
+            let across = right[2].fused(z, right[1].fused(y, right[0].fused(x, self.offset[0])));
+            let above = up[2].fused(z, up[1].fused(y, up[0].fused(x, self.offset[1])));
+            let depth = -back[2].fused(z, back[1].fused(y, back[0].fused(x, self.offset[2])));
             let scale = self.focal / depth;
             let scale = if depth >= self.near { scale } else { f32::NAN };
-            places.x[i] = across.mul_add(scale, self.centre[0]);
+            places.x[i] = across.fused(scale, self.centre[0]);
             places.y[i] = self.centre[1] - above * scale;
             (places.depth[i], places.scale[i]) = (depth, scale);
         }

@@ -3,7 +3,7 @@
 use bansho_base::{
     canvas::{DepthInterval, Strip, View},
     image::Rect,
-    math::{self, DVec2, DVec3},
+    math::{self, DVec2, DVec3, Fused},
     surroundings::{Emitter, Light},
 };
 
@@ -69,9 +69,10 @@ struct Halo {
     rect: Rect,
     /// Its light at the corners of the whole picture's tiles.
     scattered: Scattered,
-    /// Finer tiles over the pixels near it, and its light at their corners.
+    /// Finer tiles over the pixels near it; its light at their corners, and how near it their lines of sight pass, m.
     near: Tiles,
     sharp: Scattered,
+    passes: Vec<f32>,
 }
 
 /// Pixels around a lamp for which that is done.
@@ -87,10 +88,30 @@ fn around(lamp: DVec2, size: [usize; 2]) -> Rect {
     rect.intersection(&Rect::of_size(size[0], size[1]))
 }
 
-impl Halo {
-    /// How near a line of sight passes, m.
-    fn passes(&self, line: DVec3) -> f32 {
-        (self.offset - line * self.offset.dot(line)).length().max(SMALLEST_LAMP) as f32
+/// How near a line of sight passes what is at `offset` from the camera, m.
+fn passes(offset: DVec3, line: DVec3) -> f32 {
+    (offset - line * offset.dot(line)).length().max(SMALLEST_LAMP) as f32
+}
+
+/// A part of a line of sight.
+struct Span {
+    /// Between which known distances its ends lie.
+    brackets: [(usize, f32); 2],
+    /// Optical depths up to its ends.
+    depths: [f32; 2],
+    /// How many times brighter its light is where it begins than at the camera; 0 beyond the light of lamps.
+    gain: f32,
+}
+
+impl Span {
+    /// Light scattered within it, at a corner.
+    fn lit(&self, scattered: &Scattered, corner: usize) -> [f32; 3] {
+        if self.gain == 0.0 {
+            return [0.0; 3];
+        }
+        let [near, far] =
+            self.brackets.map(|(k, share)| mix(scattered.0[k][corner], scattered.0[k + 1][corner], share));
+        std::array::from_fn(|c| (far[c] - near[c]).max(0.0) * self.gain)
     }
 }
 
@@ -171,34 +192,22 @@ impl<'a> Veil<'a> {
         (next - 1, ((distance - near) / (far - near)).clamp(0.0, 1.0) as f32)
     }
 
-    /// Optical depth up to a distance.
-    fn depth(&self, distance: f64) -> f32 {
-        let (k, share) = self.bracket(distance);
-        self.depths[k] + (self.depths[k + 1] - self.depths[k]) * share
+    /// What lies between two distances.
+    fn span(&self, [near, far]: [f64; 2]) -> Span {
+        let brackets = [near, far.max(near)].map(|distance| self.bracket(distance));
+        let depths = brackets.map(|(k, share)| self.depths[k] + (self.depths[k + 1] - self.depths[k]) * share);
+        let gain = if near < self.end { math::lanes::exp(depths[0]) } else { 0.0 };
+        Span { brackets, depths, gain }
     }
 
-    /// Scattered light from between two distances, at a corner.
-    fn lit(&self, scattered: &Scattered, corner: usize, range: [f64; 2]) -> [f32; 3] {
-        if range[0] >= self.end {
-            return [0.0; 3];
-        }
-        let [near, far] = range.map(|distance| {
-            let (k, share) = self.bracket(distance);
-            mix(scattered.0[k][corner], scattered.0[k + 1][corner], share)
-        });
-        let reach = math::lanes::exp(self.depth(range[0]));
-        std::array::from_fn(|c| (far[c] - near[c]).max(0.0) * reach)
-    }
-
-    /// Light and transmittance between two distances at a corner column, `down` of the way from corner row `row` to the next.
-    fn between(&self, column: usize, (row, down): (usize, f32), [near, far]: [f64; 2]) -> [f32; 4] {
+    /// Light and transmittance of a span at a corner column, `down` of the way from corner row `row` to the next.
+    fn between(&self, column: usize, (row, down): (usize, f32), span: &Span) -> [f32; 4] {
         let index = row * self.tiles.size[0] + column;
         let below = index + self.tiles.size[0];
-        let range = [near, far.max(near)];
-        let depths = range.map(|distance| self.depth(distance));
-        let through = math::lanes::exp(depths[0] - depths[1]);
-        let opacities = depths.map(|depth| 1.0 - math::lanes::exp(-depth));
-        let lit = mix(self.lit(&self.scattered, index, range), self.lit(&self.scattered, below, range), down);
+        let [near, far] = span.depths;
+        let through = math::lanes::exp(near - far);
+        let opacities = span.depths.map(|depth| 1.0 - math::lanes::exp(-depth));
+        let lit = mix(span.lit(&self.scattered, index), span.lit(&self.scattered, below), down);
         let [once, endless] = [0, 1].map(|k| mix(self.sky[k][index], self.sky[k][below], down));
         // Up to opacity o rain shows `o (1 - o)` of what it scatters once, and `o^2` of what it scatters ever again: endless rain is the sky.
         let again = opacities[0] + opacities[1];
@@ -214,14 +223,15 @@ impl<'a> Veil<'a> {
         let line = self.view.camera.direction(pixel)?.normalize_or_zero();
         let place = pixel.as_vec2().to_array();
         let mut correction = [0.0_f32; 3];
-        let nearest = halo.passes(line);
+        let span = self.span(range);
+        let nearest = passes(halo.offset, line);
         for (corner, share) in halo.near.corners(place) {
-            let factor = share * halo.passes(halo.near.lines[corner]) / nearest;
-            let lit = self.lit(&halo.sharp, corner, range);
+            let factor = share * halo.passes[corner] / nearest;
+            let lit = span.lit(&halo.sharp, corner);
             (0..3).for_each(|c| correction[c] += lit[c] * factor);
         }
         for (corner, share) in self.tiles.corners(place) {
-            let lit = self.lit(&halo.scattered, corner, range);
+            let lit = span.lit(&halo.scattered, corner);
             (0..3).for_each(|c| correction[c] -= lit[c] * share);
         }
         Some(correction)
@@ -281,7 +291,7 @@ impl<'a> Veil<'a> {
             let place = self.tiles.row_at(y as f32);
             let corner = |column: usize| {
                 let range = self.range(DVec2::new((column * side) as f64, y), slice, None);
-                range.map_or([0.0, 0.0, 0.0, 1.0], |range| self.between(column, place, range))
+                range.map_or([0.0, 0.0, 0.0, 1.0], |range| self.between(column, place, &self.span(range)))
             };
             columns.clone().map(corner).collect()
         };
@@ -290,7 +300,7 @@ impl<'a> Veil<'a> {
             let down = ((y - band * BAND) as f32 + 0.5) / BAND as f32;
             let corner = |column: usize, c: usize| {
                 let (top, bottom) = (edges[0][column][c], edges[1][column][c]);
-                (bottom - top).mul_add(down, top)
+                (bottom - top).fused(down, top)
             };
             let start = (y - strip.rect.y) * strip.rect.width;
             for column in 0..edges[0].len() - 1 {
@@ -300,7 +310,7 @@ impl<'a> Veil<'a> {
                 for (c, values) in values.iter_mut().enumerate() {
                     let (from, to) = (corner(column, c), corner(column + 1, c));
                     for (x, value) in values.iter_mut().enumerate() {
-                        *value = (to - from).mul_add((x as f32 + 0.5) * (1.0 / FINE as f32), from);
+                        *value = (to - from).fused((x as f32 + 0.5) * (1.0 / FINE as f32), from);
                     }
                 }
                 values[3].iter_mut().for_each(|through| *through = 1.0 - *through);
@@ -326,8 +336,9 @@ impl<'a> Veil<'a> {
                 let side = self.tiles.side;
                 let column = x / side;
                 let across = ((x % side) as f32 + 0.5) / side as f32;
-                let (left, right) = (self.between(column, place, range), self.between(column + 1, place, range));
-                put(strip, index, std::array::from_fn(|c| (right[c] - left[c]).mul_add(across, left[c])));
+                let span = self.span(range);
+                let [left, right] = [column, column + 1].map(|column| self.between(column, place, &span));
+                put(strip, index, std::array::from_fn(|c| (right[c] - left[c]).fused(across, left[c])));
             }
         }
     }
@@ -378,7 +389,8 @@ impl March<'_> {
             let lines = tiles.map(|_, line| self.line(line, std::slice::from_ref(light)));
             Scattered::new(&lines, self.distances.len())
         });
-        Halo { offset, pixel, rect, scattered, near, sharp }
+        let passes = near.lines.iter().map(|line| passes(offset, *line)).collect();
+        Halo { offset, pixel, rect, scattered, near, sharp, passes }
     }
 
     /// Light of some lamps scattered to the camera up to each distance.

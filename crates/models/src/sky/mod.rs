@@ -10,7 +10,7 @@ use bansho_base::{
     canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
     color,
     image::Rect,
-    math::{DVec3, lanes},
+    math::{DVec2, DVec3, Fused, lanes},
     observer::{Cancelled, Observer},
     phenomenon::{Phenomenon, Prepared},
     sky::{Sky, SkyKind, SkyParameters},
@@ -141,11 +141,13 @@ impl PreparedSky<'_> {
         if let Some(night) = &self.night {
             return night.radiance(simd, directions);
         }
-        let [xs, ys, zs] = &directions.axes;
         let mut colours = [[0.0; 4]; LANES];
-        for (i, colour) in colours.iter_mut().enumerate() {
-            let [red, green, blue] = self.sky.radiance(DVec3::new(xs[i].into(), ys[i].into(), zs[i].into()));
-            *colour = [red, green, blue, 0.0];
+        if let Some(planes) = self.sky.radiance_at_elevations(&directions.axes[1]) {
+            for i in 0..LANES {
+                for c in 0..3 {
+                    colours[i][c] = planes[c][i];
+                }
+            }
         }
         colours
     }
@@ -154,13 +156,13 @@ impl PreparedSky<'_> {
     fn add_stars(&self, rect: Rect, y: usize, planes: [&mut [f32]; 3], opacity: &[f32]) {
         let from = self.spots.partition_point(|spot| spot.pixel.y < y as f64 - 12.0);
         let near = self.spots[from..].iter().take_while(|spot| spot.pixel.y < y as f64 + 12.0);
-        for spot in near {
+        for spot in near.filter(|spot| (y as f64 + 0.5 - spot.pixel.y).abs() < spot.reach) {
             let low = (spot.pixel.x - spot.reach).floor().max(rect.x as f64) as usize;
             let high = (spot.pixel.x + spot.reach).ceil().clamp(0.0, rect.right() as f64) as usize;
             for x in low..high {
                 if let Some(light) = spot.at(x, y) {
                     for c in 0..3 {
-                        planes[c][x - rect.x] = light[c].mul_add(opacity[x - rect.x], planes[c][x - rect.x]);
+                        planes[c][x - rect.x] = light[c].fused(opacity[x - rect.x], planes[c][x - rect.x]);
                     }
                 }
             }
@@ -174,9 +176,13 @@ impl PreparedSky<'_> {
         let shade = self.sky.radiance(DVec3::Y).map(|value| value * HILL_SHADE);
         let sharpness = self.view.camera.focal_pixels as f32;
         let highest = skyline.highest + 1.0 / sharpness;
-        for y in rect.y..rect.bottom() {
-            let mut x = rect.x / LANES * LANES;
-            while x < rect.right() {
+        let mut x = rect.x / LANES * LANES;
+        while x < rect.right() {
+            if self.is_above(rect, x, highest) {
+                x += LANES;
+                continue;
+            }
+            for y in rect.y..rect.bottom() {
                 let mut directions = Directions::new(&self.view.camera, x, y);
                 directions.normalize();
                 let Directions { axes: [xs, sines, zs], seen } = directions;
@@ -196,9 +202,21 @@ impl PreparedSky<'_> {
                         );
                     }
                 }
-                x += LANES;
             }
+            x += LANES;
         }
+    }
+
+    /// Whether the pixels of a strip from `x` on surely look higher than at that sine of the elevation.
+    fn is_above(&self, rect: Rect, x: usize, sine: f32) -> bool {
+        // From corner to corner the sine hardly bends.
+        let angle = LANES as f64 / self.view.camera.focal_pixels;
+        let least = f64::from(sine) + angle * angle;
+        let rows = [rect.y, rect.bottom()].map(|y| y as f64);
+        let corners = rows.into_iter().flat_map(|y| [x, x + LANES].map(|x| DVec2::new(x as f64, y)));
+        corners
+            .map(|corner| self.view.camera.direction(corner))
+            .all(|direction| direction.is_some_and(|direction| direction.y > least * direction.length()))
     }
 }
 

@@ -70,15 +70,15 @@ impl NightSky {
         let (mut steps, mut toward, mut shares) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
             let held = if ys[i] > 0.0 { ys[i] } else { 0.0 };
-            steps[i] = held.sqrt().mul_add(STEPS as f32, 0.5);
-            let level = xs[i].mul_add(xs[i], zs[i] * zs[i]);
-            let turned = xs[i].mul_add(self.sunward[0], zs[i] * self.sunward[2]) / level.sqrt().max(1e-9);
-            toward[i] = turned.mul_add(0.5, 0.5);
-            let height = self.pole[0].mul_add(xs[i], self.pole[1].mul_add(ys[i], self.pole[2] * zs[i]));
+            steps[i] = held.sqrt().fused(STEPS as f32, 0.5);
+            let level = xs[i].fused(xs[i], zs[i] * zs[i]);
+            let turned = xs[i].fused(self.sunward[0], zs[i] * self.sunward[2]) / level.sqrt().max(1e-9);
+            toward[i] = turned.fused(0.5, 0.5);
+            let height = self.pole[0].fused(xs[i], self.pole[1].fused(ys[i], self.pole[2] * zs[i]));
             let across = height * (1.0 / MILKY_WAY_WIDTH) as f32;
             let squared = across * across;
             // A band with soft edges; what lies far from it gives a little.
-            shares[i] = 1.0 / squared.mul_add(squared, 1.0);
+            shares[i] = 1.0 / squared.fused(squared, 1.0);
         }
         let mut colours = [self.ground; LANES];
         for i in 0..LANES {

@@ -1,7 +1,7 @@
 //! Hills and trees along the horizon: how high they stand by direction.
 
 use bansho_base::{
-    math,
+    math::{self, Fused},
     random::{Key, Purpose},
     sky::SkyParameters,
 };
@@ -49,7 +49,7 @@ impl Skyline {
         let (first, part) = (place.floor(), (place - place.floor()) as f32);
         let at = |index: i64| self.sines[index.rem_euclid(SAMPLES as i64) as usize];
         let (low, high) = (at(first as i64), at(first as i64 + 1));
-        part.mul_add(high - low, low)
+        part.fused(high - low, low)
     }
 }
 

@@ -34,6 +34,8 @@ const STAR: Purpose = Purpose::named("star");
 struct Star {
     direction: DVec3,
     magnitude: f64,
+    /// Above the air, lux.
+    illuminance: f64,
     /// ACEScg of unit luminance.
     colour: [f32; 3],
 }
@@ -103,7 +105,8 @@ fn star(key: Key, number: u64, count: u64) -> Star {
     let temperature = 6300.0 * math::exp2(1.1 * spread + 0.25 * (f64::from(uniform(more[2])) - 0.5));
     let colour = black_body().radiance(temperature.clamp(2600.0, 10_000.0) as f32);
     let scale = 1.0 / luminance(colour);
-    Star { direction: toward, magnitude, colour: colour.map(|value| value * scale) }
+    let illuminance = LUX_AT_0 * math::pow(10.0, -0.4 * magnitude);
+    Star { direction: toward, magnitude, illuminance, colour: colour.map(|value| value * scale) }
 }
 
 /// Sum of the shape over all pixels.
@@ -122,7 +125,7 @@ fn spot(star: &Star, camera: &Camera, size: [usize; 2], night: &Night, brightnes
         return None;
     }
     let share = night.transmittance(math::asin(star.direction.y));
-    let illuminance = LUX_AT_0 * math::pow(10.0, -0.4 * star.magnitude) * share * brightness;
+    let illuminance = star.illuminance * share * brightness;
     let radiance = (illuminance / solid_angle(camera, pixel)?) as f32;
     Some(Spot { pixel, reach, radiance: star.colour.map(|value| value * radiance) })
 }
@@ -176,7 +179,8 @@ mod tests {
         let view = View::new(camera, shutter, 0.0, [64, 48], 0);
         for offset in [0.0, 0.3, 0.5] {
             let direction = view.camera.direction(DVec2::new(32.0 + offset, 24.2)).unwrap().normalize();
-            let star = Star { direction, magnitude: 1.0, colour: [1.0; 3] };
+            let star =
+                Star { direction, magnitude: 1.0, illuminance: LUX_AT_0 * math::pow(10.0, -0.4), colour: [1.0; 3] };
             let spot = spot(&star, &view.camera, view.size, &night, 1.0 / shape_sum()).unwrap();
             let mut lux = 0.0;
             for (x, y) in (0..64).flat_map(|x| (0..48).map(move |y| (x, y))) {

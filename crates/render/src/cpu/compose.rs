@@ -1,7 +1,7 @@
 //! From prepared phenomena to a frame: strip by strip, slice by slice, nearest first, the plate behind all.
 
 use bansho_base::{
-    canvas::{Strip, View},
+    canvas::{AovRule, Strip, View},
     image::{Channel, Frame, FrameHeader, Image, Precision, Rect},
     math::Fused,
     observer::{self, Cancelled, Observer},
@@ -10,7 +10,11 @@ use bansho_base::{
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::{accumulate::Accumulator, plate::PlateFrame};
+use super::{
+    accumulate::Accumulator,
+    behind::{Behind, Source},
+    plate::PlateFrame,
+};
 use crate::{plan::Plan, scene::check::PLATE_LAYER, slices::Slice};
 
 /// Rows of a strip: the planes of a 1920-pixel strip stay within a core's second-level cache.
@@ -38,6 +42,7 @@ impl Outputs {
 }
 
 /// One frame, ready to be composited.
+#[derive(Clone, Copy)]
 pub(super) struct Composition<'a> {
     pub(super) outputs: Outputs,
     pub(super) view: &'a View,
@@ -45,26 +50,31 @@ pub(super) struct Composition<'a> {
     pub(super) prepared: &'a [Box<dyn Prepared + 'a>],
     pub(super) slices: &'a [Slice],
     pub(super) plate: &'a PlateFrame,
+    /// What the slices stand before.
+    pub(super) behind: Behind<'a>,
 }
 
 /// Scratch of one thread.
 #[derive(Default)]
-pub(super) struct Worker {
+struct Worker {
     strip: Strip,
-    pub(super) accumulator: Accumulator,
+    accumulator: Accumulator,
+    /// Where the light behind the strip comes from, if any is bent, and a row of it.
+    sources: Vec<Source>,
+    row: Vec<[f32; 4]>,
 }
 
 impl Composition<'_> {
     /// The strip with index `index` of the window.
-    pub(super) fn strip_rect(&self, index: usize) -> Rect {
+    fn strip_rect(&self, index: usize) -> Rect {
         let window = self.view.window;
         let y = index * STRIP_ROWS;
         Rect { x: window.x, y: window.y + y, width: window.width, height: STRIP_ROWS.min(window.height - y) }
     }
 
-    /// The part of a strip that can differ from nothing; all of it where there is a plate, a layer or an AOV to fill.
+    /// The part of a strip that can differ from nothing; all of it where there is something behind, a layer or an AOV to fill.
     fn worth_drawing(&self, rect: Rect) -> Rect {
-        if self.plate.colour.is_some() || self.outputs.layers || self.outputs.aovs {
+        if self.behind.colour.is_some() || self.outputs.layers || self.outputs.aovs {
             return rect;
         }
         let touched = |slice: &Slice| {
@@ -94,12 +104,12 @@ impl Composition<'_> {
         self.phenomena.iter().map(|phenomenon| phenomenon.aovs().len()).collect()
     }
 
-    /// Draws `slices` within `rect` into the worker's accumulator, nearest first.
-    pub(super) fn accumulate(&self, level: Level, slices: &[Slice], rect: Rect, worker: &mut Worker) {
+    /// Draws the slices within `rect` into the worker's accumulator, nearest first.
+    fn accumulate(&self, level: Level, rect: Rect, worker: &mut Worker) {
         let aovs = self.aov_counts();
         worker.accumulator.reset(rect, self.layer_count(), &aovs);
         let plate_depth = self.plate.depth.as_ref();
-        for slice in slices {
+        for slice in self.slices {
             for &member in &slice.members {
                 let prepared = &self.prepared[member];
                 let wanted = aovs.get(member).copied().unwrap_or(0);
@@ -117,12 +127,6 @@ impl Composition<'_> {
                 worker.accumulator.add_behind(level, &worker.strip, member, self.phenomena[member].aovs());
             }
         }
-    }
-
-    /// The plate's exposed pixel and coverage at a place in the picture.
-    pub(super) fn plate_row(&self, y: usize) -> Option<&[[f32; 4]]> {
-        let window = self.view.window;
-        self.plate.colour.as_ref().map(|image| &image.row(y)[window.x..window.right()])
     }
 }
 
@@ -156,7 +160,7 @@ fn clear(stale: Rect, first: usize, width: usize, beauty: &mut [[f32; 4]], depth
     }
 }
 
-/// Draws and composites the whole window, where nothing bends light.
+/// Draws and composites the whole window.
 pub(super) fn frame(
     composition: &Composition,
     header: FrameHeader,
@@ -180,9 +184,10 @@ pub(super) fn frame(
             if rect.is_empty() {
                 return Ok(Vec::new());
             }
-            composition.accumulate(level, composition.slices, rect, worker);
-            finish_strip(composition, level, &worker.accumulator, strip, beauty, depth);
-            Ok(channel_planes(composition, &worker.accumulator))
+            composition.accumulate(level, rect, worker);
+            composition.behind.trace(rect, &mut worker.sources);
+            finish_strip(composition, level, worker, strip, beauty, depth);
+            Ok(channel_planes(composition, worker))
         })
         .collect::<Result<_, Cancelled>>()?;
     let opaque = composition.plate.colour.is_some() && composition.view.overscan == 0;
@@ -198,16 +203,17 @@ pub(super) fn frame(
     })
 }
 
-/// Exposes the strip, puts the plate behind it, and gives it its alpha.
+/// Exposes the strip, puts behind it what is there, and gives it its alpha.
 fn finish_strip(
     composition: &Composition,
     level: Level,
-    accumulator: &Accumulator,
+    worker: &mut Worker,
     strip: Rect,
     beauty: &mut [[f32; 4]],
     depth: &mut [f32],
 ) {
-    let exposure = composition.outputs.exposure;
+    let (exposure, behind) = (composition.outputs.exposure, &composition.behind);
+    let Worker { accumulator, sources, row: buffer, .. } = worker;
     let rect = accumulator.rect;
     for row in 0..rect.height {
         let pixels = row * rect.width..(row + 1) * rect.width;
@@ -222,12 +228,11 @@ fn finish_strip(
                 dispatch!(level, _simd => expose_absorbed_row(exposure, colour, through, out));
             }
         }
-        if let Some(plate) = composition.plate_row(rect.y + row) {
-            lay_over_plate(accumulator, pixels.start, plate, out);
+        if let Some(colours) = behind.colour_row(rect, row, sources, buffer) {
+            lay_over(accumulator, pixels.start, colours, out);
         }
-        if let Some(image) = &composition.plate.depth {
-            let plate_depth = &image.row(rect.y + row).as_flattened()[rect.x..];
-            depth.iter_mut().zip(plate_depth).for_each(|(depth, plate)| *depth = depth.min(*plate));
+        if let Some(depths) = behind.depth_row(rect, row, composition.view.size[0]) {
+            depth.iter_mut().zip(depths).for_each(|(depth, behind)| *depth = depth.min(*behind));
         }
     }
 }
@@ -248,32 +253,67 @@ fn expose_absorbed_row(exposure: f32, colour: [&[f32]; 3], through: [&[f32]; 3],
     }
 }
 
-fn lay_over_plate(accumulator: &Accumulator, start: usize, plate: &[[f32; 4]], out: &mut [[f32; 4]]) {
-    for (x, (out, plate)) in out.iter_mut().zip(plate).enumerate() {
+fn lay_over(accumulator: &Accumulator, start: usize, behind: &[[f32; 4]], out: &mut [[f32; 4]]) {
+    for (x, (out, behind)) in out.iter_mut().zip(behind).enumerate() {
         let through = accumulator.transmittance_at(start + x);
         for c in 0..3 {
-            out[c] = through[c].fused(plate[c], out[c]);
+            out[c] = through[c].fused(behind[c], out[c]);
         }
-        out[3] = (1.0 - out[3]).fused(plate[3], out[3]);
+        out[3] = (1.0 - out[3]).fused(behind[3], out[3]);
     }
 }
 
 /// This strip's part of every layer and AOV, in the order of [`channels`].
-pub(super) fn channel_planes(composition: &Composition, accumulator: &Accumulator) -> Vec<Vec<f32>> {
-    let exposure = composition.outputs.exposure;
-    let mut planes = Vec::new();
-    for layer in &accumulator.layers {
-        planes.extend(layer[..3].iter().map(|plane| plane.iter().map(|value| exposure * value).collect()));
-        planes.push(layer[3].clone());
+fn channel_planes(composition: &Composition, worker: &mut Worker) -> Vec<Vec<f32>> {
+    let mut planes = layer_planes(composition, worker);
+    let layers = planes.len();
+    planes.extend(aov_planes(composition, &worker.accumulator));
+    let rules = composition.phenomena.iter().flat_map(|phenomenon| phenomenon.aovs()).map(|aov| aov.rule);
+    let behind = composition.behind.channels.get(layers..).unwrap_or_default();
+    for ((plane, behind), rule) in planes[layers..].iter_mut().zip(behind).zip(rules) {
+        let values = composition.behind.plane(&behind.values, worker.accumulator.rect, &[], composition.view.size[0]);
+        plane.iter_mut().zip(values).for_each(|(own, behind)| *own = nearest_aov(*own, behind, rule));
     }
-    if composition.outputs.layers && composition.plate.colour.is_some() {
-        planes.extend(plate_layer(composition, accumulator));
-    }
-    planes.extend(aov_planes(composition, accumulator));
     planes
 }
 
-pub(super) fn aov_planes(composition: &Composition, accumulator: &Accumulator) -> Vec<Vec<f32>> {
+/// An AOV of a phenomenon that reaches into several groups of slices: of the nearest group with a value, unless values are added.
+fn nearest_aov(own: f32, behind: f32, rule: AovRule) -> f32 {
+    match rule {
+        AovRule::Sum => own + behind,
+        AovRule::WeightedMean | AovRule::Nearest if own == 0.0 => behind,
+        AovRule::WeightedMean | AovRule::Nearest => own,
+    }
+}
+
+/// Layers of the phenomena and of the plate: what is behind the strip, as far as it lets it through, and its own.
+fn layer_planes(composition: &Composition, worker: &mut Worker) -> Vec<Vec<f32>> {
+    let (exposure, behind) = (composition.outputs.exposure, &composition.behind);
+    let accumulator = &worker.accumulator;
+    let mut planes = Vec::new();
+    for layer in &accumulator.layers {
+        planes.extend(layer[..3].iter().map(|plane| plane.iter().map(|value| exposure * value).collect::<Vec<f32>>()));
+        planes.push(layer[3].clone());
+    }
+    if composition.outputs.layers && composition.plate.colour.is_some() {
+        match behind.channels {
+            [] => planes.extend(plate_layer(composition, worker)),
+            _ => planes.extend([0; 4].map(|_| vec![0.0; accumulator.depth.len()])),
+        }
+    }
+    let accumulator = &worker.accumulator;
+    for (number, (plane, drawn)) in planes.iter_mut().zip(behind.channels).enumerate() {
+        let values = behind.plane(&drawn.values, accumulator.rect, &worker.sources, composition.view.size[0]);
+        for (index, (own, value)) in plane.iter_mut().zip(values).enumerate() {
+            let through = accumulator.transmittance_at(index);
+            let share = through.get(number % 4).copied().unwrap_or((through[0] + through[1] + through[2]) / 3.0);
+            *own = share.fused(value, *own);
+        }
+    }
+    planes
+}
+
+fn aov_planes(composition: &Composition, accumulator: &Accumulator) -> Vec<Vec<f32>> {
     let mut planes = Vec::new();
     for (phenomenon, aovs) in composition.phenomena.iter().zip(&accumulator.aovs) {
         for (descriptor, plane) in phenomenon.aovs().iter().zip(aovs) {
@@ -284,24 +324,25 @@ pub(super) fn aov_planes(composition: &Composition, accumulator: &Accumulator) -
     planes
 }
 
-fn plate_layer(composition: &Composition, accumulator: &Accumulator) -> [Vec<f32>; 4] {
+fn plate_layer(composition: &Composition, worker: &mut Worker) -> [Vec<f32>; 4] {
+    let Worker { accumulator, sources, row: buffer, .. } = worker;
     let rect = accumulator.rect;
     let mut layer: [Vec<f32>; 4] = Default::default();
     for row in 0..rect.height {
-        let Some(plate) = composition.plate_row(rect.y + row) else { break };
+        let Some(plate) = composition.behind.colour_row(rect, row, sources, buffer) else { break };
         for (x, plate) in plate.iter().enumerate() {
-            let behind = accumulator.transmittance_at(row * rect.width + x);
+            let through = accumulator.transmittance_at(row * rect.width + x);
             for c in 0..3 {
-                layer[c].push(behind[c] * plate[c]);
+                layer[c].push(through[c] * plate[c]);
             }
-            layer[3].push(plate[3] * (behind[0] + behind[1] + behind[2]) / 3.0);
+            layer[3].push(plate[3] * (through[0] + through[1] + through[2]) / 3.0);
         }
     }
     layer
 }
 
 /// Joins the strips' planes and names them.
-pub(super) fn channels(composition: &Composition, strips: Vec<Vec<Vec<f32>>>) -> Vec<Channel> {
+fn channels(composition: &Composition, strips: Vec<Vec<Vec<f32>>>) -> Vec<Channel> {
     let mut channels = channel_names(composition);
     for strip in strips {
         for (channel, plane) in channels.iter_mut().zip(strip) {

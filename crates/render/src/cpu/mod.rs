@@ -1,6 +1,7 @@
 //! The CPU backend: the pictures that all others are compared with.
 
 mod accumulate;
+mod behind;
 mod calm;
 mod clock;
 mod compose;

@@ -14,6 +14,7 @@ use bansho_base::{
 use rayon::prelude::*;
 
 use super::{
+    behind::Behind,
     clock::{self, Clock},
     compose::{self, Composition, Outputs},
     haze,
@@ -122,10 +123,11 @@ impl CpuShot {
             prepared: &prepared,
             slices: &slices,
             plate,
+            behind: Behind::plate(plate),
         };
         let header = self.plan.header(self.number);
         let mut frame = if bends {
-            haze::frame(&composition, header, observer)?
+            haze::frame(&composition, header, spent, observer)?
         } else {
             compose::frame(&composition, header, spent, observer)?
         };
@@ -159,13 +161,15 @@ impl CpuShot {
         let surroundings = self.surroundings(&view, publications, None);
         let seen: Vec<usize> = (0..self.phenomena.len()).filter(|&index| index != mirror).collect();
         let (slices, prepared) = self.prepare(&seen, &view, &surroundings, observer)?;
+        let plate = PlateFrame::default();
         let composition = Composition {
             outputs: Outputs::RADIANCE,
             view: &view,
             phenomena: &self.phenomena,
             prepared: &prepared,
             slices: &slices,
-            plate: &PlateFrame::default(),
+            plate: &plate,
+            behind: Behind::plate(&plate),
         };
         Ok(Some(compose::frame(&composition, self.plan.header(self.number), None, observer)?.beauty))
     }

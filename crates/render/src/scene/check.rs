@@ -6,7 +6,7 @@ use bansho_base::{
 };
 use bansho_models::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
-use super::{FORMAT, Opening, OpeningFault, PhenomenonKind, SHARED_TABLES, Scene};
+use super::{FORMAT, Instance, Opening, OpeningFault, PhenomenonKind, SHARED_TABLES, Scene};
 
 /// The format number must be one that this program reads.
 pub(super) fn format(root: &Table, reader: &mut Reader) {
@@ -80,8 +80,14 @@ fn is_name(name: &str) -> bool {
         && !name.chars().any(char::is_control)
 }
 
-/// Every asset must be there, and every phenomenon must come to be.
-pub(super) fn assets_and_openings(scene: &mut Scene, root: &Table, assets: &dyn Assets, reader: &mut Reader) {
+/// Every asset must be there, and every phenomenon must come to be, unless it is as it was in a `good` scene.
+pub(super) fn assets_and_openings(
+    scene: &mut Scene,
+    good: Option<&Scene>,
+    root: &Table,
+    assets: &dyn Assets,
+    reader: &mut Reader,
+) {
     plate(scene, root, assets, reader);
     for (index, obstacle) in scene.obstacles.iter().enumerate() {
         if let Err(fault) = obstacle.open(assets) {
@@ -90,15 +96,27 @@ pub(super) fn assets_and_openings(scene: &mut Scene, root: &Table, assets: &dyn 
     }
     let mut seen = std::collections::BTreeMap::new();
     let seed = scene.picture.seed as u64;
+    let good = good.filter(|good| good.picture.seed == scene.picture.seed);
     for instance in &mut scene.instances {
         let index: &mut usize = seen.entry(instance.kind.key).or_default();
         let path = format!("{}.{index}", instance.kind.key);
+        *index += 1;
+        instance.luminance = good.and_then(|good| known_luminance(good, instance));
+        if instance.luminance.is_some() {
+            continue;
+        }
         match instance.source.open(&Opening { name: &instance.name, seed, loop_s: None, assets }) {
             Ok(phenomenon) => instance.luminance = Some(phenomenon.luminance()),
             Err(fault) => report(fault, path, root, reader),
         }
-        *index += 1;
     }
+}
+
+/// The luminance of a phenomenon that is as it was in a scene that was good.
+fn known_luminance(good: &Scene, instance: &Instance) -> Option<f64> {
+    let canonical = instance.source.canonical();
+    let same = |old: &&Instance| old.name == instance.name && old.kind.key == instance.kind.key;
+    good.instances.iter().find(same).filter(|old| old.source.canonical() == canonical)?.luminance
 }
 
 /// Notes a fault of what stands at `path`.

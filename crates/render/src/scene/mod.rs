@@ -112,8 +112,23 @@ impl Scene {
     /// # Errors
     /// Every fault of the text and of the assets it names, each with its place, what is wrong and what is allowed.
     pub fn parse(file: &str, text: &str, kinds: &[PhenomenonKind], assets: &dyn Assets) -> Result<Self, SceneError> {
+        Self::parse_after(None, file, text, kinds, assets)
+    }
+
+    /// [`parse`](Self::parse) after an edit: phenomena that are as they were in `good`, which was parsed with the same assets, are not
+    /// made again to see whether they can be.
+    ///
+    /// # Errors
+    /// Those of [`parse`](Self::parse).
+    pub fn parse_after(
+        good: Option<&Self>,
+        file: &str,
+        text: &str,
+        kinds: &[PhenomenonKind],
+        assets: &dyn Assets,
+    ) -> Result<Self, SceneError> {
         Self::parse_and(file, text, kinds, |scene, root, reader| {
-            check::assets_and_openings(scene, root, assets, reader);
+            check::assets_and_openings(scene, good, root, assets, reader);
         })
     }
 

@@ -11,7 +11,7 @@ use super::{
 /// One change of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Operation {
-    /// States `value` at `place`, in stead of any that stands there. Tables on the way are made.
+    /// States `value` at `place`, in stead of any that stands there. Tables on the way are made, and lists with one table in them.
     Set {
         /// Where.
         place: Place,
@@ -157,7 +157,7 @@ fn nowhere(place: &Place, segment: &Segment) -> EditError {
     EditError::NoSuchPlace { path: place.to_string(), segment, there: "nothing of that name or number".to_owned() }
 }
 
-/// What holds the value at `place`, and the last step to that; tables on the way are made where `make` says so.
+/// What holds the value at `place`, and the last step to that; tables on the way, and first items of lists, are made where `make` says so.
 fn holder<'a, 'p>(root: &'a mut Table, place: &'p Place, make: bool) -> Result<(Slot<'a>, &'p Segment), EditError> {
     let Some((last, way)) = place.segments().split_last() else {
         return Err(EditError::NoAssignment(String::new()));
@@ -166,14 +166,17 @@ fn holder<'a, 'p>(root: &'a mut Table, place: &'p Place, make: bool) -> Result<(
     for (depth, segment) in way.iter().enumerate() {
         if let (true, Segment::Key(key)) = (make, segment) {
             let missing = |table: &dyn TableLike| !table.contains_key(key);
+            let in_a_line = || match place.segments().get(depth + 1) {
+                Some(Segment::Index(0)) => Array::from_iter([InlineTable::new()]).into(),
+                _ => Written::from(InlineTable::new()),
+            };
             match &mut slot {
                 // A table at the root gets a header of its own; one within stands in a line.
                 Slot::Headed(table) if missing(*table) => {
-                    let made = if depth == 0 { Item::Table(Table::new()) } else { InlineTable::new().into() };
-                    table.insert(key, made);
+                    table.insert(key, if depth == 0 { Item::Table(Table::new()) } else { in_a_line().into() });
                 }
                 Slot::Inline(table) if missing(*table) => {
-                    table.insert(key, InlineTable::new().into());
+                    table.insert(key, in_a_line());
                 }
                 _ => {}
             }

@@ -2,7 +2,7 @@
 
 use bansho_base::{
     assets::Assets,
-    parameters::{Parameters, ProblemKind, Reader, Table, TableDescriptor},
+    parameters::{Parameter, Parameters, ProblemKind, Reader, Table, TableDescriptor},
     phenomenon::Phenomenon,
 };
 
@@ -58,7 +58,7 @@ pub struct PhenomenonKind {
 pub const COMMON_KEYS: [&str; 2] = ["name", "enabled"];
 
 /// Makes a [`PhenomenonKind`] from a parameter table and a constructor.
-pub trait Describe: Parameters + Clone + Send + Sync + 'static {
+pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     /// The table's name in scene files.
     const KEY: &'static str;
 
@@ -89,6 +89,11 @@ impl<P: Describe> Source for Described<P> {
     }
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
-        self.0.open(opening)
+        let Some(seconds) = opening.loop_s else { return self.0.open(opening) };
+        let mut repeating = self.0.clone();
+        match repeating.close_loop(seconds) {
+            Some(key) => Err(OpeningFault { key, kind: ProblemKind::LoopJumps { seconds } }),
+            None => repeating.open(opening),
+        }
     }
 }

@@ -76,13 +76,17 @@ pub(crate) fn channel<'a>(frame: &'a Frame, name: &str) -> &'a [f32] {
 
 /// A checkerboard plate of 8-pixel squares with every pixel a different shade, `depth` metres away.
 pub(crate) fn checkerboard(width: usize, height: usize, depth: Option<f32>) -> MemoryAssets {
+    checkerboard_at(width, height, depth.map(|depth| vec![depth; width * height]))
+}
+
+/// The same with a depth for each pixel.
+pub(crate) fn checkerboard_at(width: usize, height: usize, depth: Option<Vec<f32>>) -> MemoryAssets {
     let shade = |index: usize| {
         let (x, y) = (index % width, index / width);
         let code = if (x / 8 + y / 8) % 2 == 0 { 200 + (x * 7 + y) % 56 } else { (x + y * 5) % 60 };
         [code, code / 2, 255 - code, 255].map(|code| code as f32 / 255.0)
     };
     let colour = Image::from_pixels(width, height, (0..width * height).map(shade).collect()).unwrap();
-    let depth = depth.map(|depth| vec![depth; width * height]);
     let mut assets = MemoryAssets::default();
     assets.insert_picture("plate.png", Picture { colour, depth, encoding: Encoding::DisplaySrgb });
     assets

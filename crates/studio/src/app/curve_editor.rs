@@ -50,7 +50,10 @@ pub(super) fn show(ui: &mut Ui, label: Id, value: &Value, [x, y]: [[f64; 2]; 2])
     let (points, interpolation) = read(value)?;
     let curve = Curve::new(points.clone(), interpolation.into()).ok()?;
     let width = ui.available_width().clamp(120.0, 260.0);
-    let (response, painter) = ui.allocate_painter(vec2(width, 90.0), Sense::click_and_drag());
+    let (_, rect) = ui.allocate_space(vec2(width, 90.0));
+    // Under the label's name, whatever comes to stand between them while a point is held.
+    let response = ui.interact(rect, label.with("curve"), Sense::click_and_drag());
+    let painter = ui.painter_at(rect);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "curve"));
     let response = response.labelled_by(label);
     let top = y[1].min(highest(&points).max(y[0] + 1e-3) * 1.25);

@@ -72,7 +72,8 @@ pub(super) fn dragged(point: DVec3, pixel: DVec2, camera: &Camera) -> Option<DVe
 
 /// Numbers as a hand means them, to a millimetre: a file is read by people too.
 pub(super) fn rounded(vector: DVec3) -> [f64; 3] {
-    vector.to_array().map(|number| (number * 1000.0).round() / 1000.0)
+    // No number is written as -0.
+    vector.to_array().map(|number| (number * 1000.0).round() / 1000.0 + 0.0)
 }
 
 #[cfg(test)]
@@ -136,6 +137,6 @@ mod tests {
         let moved = dragged(lamp, pixel, &camera).unwrap();
         assert!((camera.depth(moved) - camera.depth(lamp)).abs() < 1e-9);
         assert!((camera.project(moved).unwrap().pixel - pixel).length() < 1e-9);
-        assert_eq!(rounded(DVec3::new(1.234_56, -0.000_4, 2.0)), [1.235, -0.0, 2.0]);
+        assert_eq!(rounded(DVec3::new(1.234_56, -0.000_4, 2.0)), [1.235, 0.0, 2.0]);
     }
 }

@@ -104,7 +104,7 @@ fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor
             reset(ui, session, place, parameter, stated.is_some());
             ui.end_row();
         }
-        let usual = parameter.default.as_ref().and_then(Value::as_number);
+        let usual = parameter.default.as_ref();
         let widget = Widget { kind: &parameter.kind, unit: parameter.unit, label, usual };
         if let Some(value) = widget.show(ui, &present) {
             session.set(parameter.key, place, value);

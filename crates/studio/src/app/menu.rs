@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use eframe::egui::{self, Ui};
+use eframe::egui::{self, ThemePreference, Ui};
 
 use super::Studio;
 use crate::{
@@ -63,7 +63,13 @@ impl Studio {
         ui.checkbox(&mut self.shows.shortcuts, "Shortcuts");
         ui.separator();
         let mut theme = ui.ctx().options(|options| options.theme_preference);
-        theme.buttons(ui);
+        for (choice, name) in [
+            (ThemePreference::System, "As the system"),
+            (ThemePreference::Dark, "Dark"),
+            (ThemePreference::Light, "Light"),
+        ] {
+            ui.radio_value(&mut theme, choice, name);
+        }
         ui.ctx().set_theme(theme);
     }
 

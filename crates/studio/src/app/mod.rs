@@ -103,7 +103,7 @@ impl Studio {
         self.take_shortcuts(ui.ctx());
         self.files.tend(ui, &mut self.session);
         egui::Panel::top("menu").show(ui, |ui| self.menu(ui));
-        egui::Panel::bottom("status").show(ui, |ui| status::show(ui, &mut self.session, &self.files));
+        egui::Panel::bottom("status").show(ui, |ui| status::show(ui, &mut self.session, &mut self.files));
         egui::Panel::bottom("timeline").show(ui, |ui| timeline::show(ui, &mut self.session));
         self.follow_opening();
         self.side_panels(ui);

@@ -276,10 +276,10 @@ impl Session {
         self.player.wish(wish);
     }
 
-    /// The wish for the finished picture of the present frame, for a player of its own.
-    pub fn still(&self) -> Wish {
-        let number = self.plan().map(|_| self.transport.number());
-        let asked = Asked { revision: self.document.revision(), number, within: [1; 2], draft: false, stages: None };
+    /// The wish for the finished picture of frame `number`, for a player of its own.
+    pub fn finished(&self, number: i64) -> Wish {
+        let revision = self.document.revision();
+        let asked = Asked { revision, number: Some(number), within: [1; 2], draft: false, stages: None };
         Wish { still: true, ..self.wish_for(asked, true) }
     }
 

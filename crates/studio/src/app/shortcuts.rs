@@ -12,6 +12,7 @@ pub(super) enum Action {
     Save,
     Open,
     RenderStill,
+    RenderShot,
     PlayPause,
     FrameBack,
     FrameOn,
@@ -36,7 +37,7 @@ const fn plain(key: Key, action: Action, name: &'static str) -> Shortcut {
 }
 
 /// All of them. Longer combinations come first, since a shorter one is part of them.
-pub(super) const SHORTCUTS: [Shortcut; 12] = [
+pub(super) const SHORTCUTS: [Shortcut; 13] = [
     Shortcut {
         keys: KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z),
         action: Action::Redo,
@@ -47,6 +48,11 @@ pub(super) const SHORTCUTS: [Shortcut; 12] = [
     with_command(Key::S, Action::Save, "Save"),
     with_command(Key::O, Action::Open, "Open"),
     with_command(Key::T, Action::Text, "Show or hide the text"),
+    Shortcut {
+        keys: KeyboardShortcut::new(Modifiers::SHIFT, Key::F12),
+        action: Action::RenderShot,
+        name: "Render the shot",
+    },
     plain(Key::F12, Action::RenderStill, "Render the still"),
     plain(Key::Space, Action::PlayPause, "Play or pause"),
     plain(Key::ArrowLeft, Action::FrameBack, "Frame back"),
@@ -79,6 +85,7 @@ impl Studio {
             Action::Save => self.files.save(&mut self.session),
             Action::Open => self.files.ask_to_open(ctx, &mut self.session),
             Action::RenderStill => self.files.render_still(ctx, &mut self.session),
+            Action::RenderShot => self.files.render_shot(ctx, &mut self.session),
             Action::PlayPause => transport.set_playing(!transport.is_playing()),
             Action::FrameBack => transport.step(-1),
             Action::FrameOn => transport.step(1),

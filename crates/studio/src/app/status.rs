@@ -1,6 +1,6 @@
 //! One line that says what is shown and what goes on.
 
-use eframe::egui::Ui;
+use eframe::egui::{ProgressBar, Ui};
 
 use super::{
     files::Files,
@@ -9,7 +9,7 @@ use super::{
 };
 
 /// Shows the line.
-pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &Files) {
+pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &mut Files) {
     ui.horizontal(|ui| {
         if session.is_busy() {
             ui.spinner();
@@ -29,8 +29,8 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &Files) {
         if let Some(rate) = session.pictures_per_s() {
             ui.weak(format!("{rate:.0} pictures/s"));
         }
-        if let Some(text) = files.progress() {
-            ui.label(text);
+        if let Some([done, total]) = files.progress() {
+            rendering(ui, files, done, total);
         }
         if let Some(notice) = session.notice() {
             let notice = notice.to_owned();
@@ -40,6 +40,17 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &Files) {
             }
         }
     });
+}
+
+/// How far rendering has come, and a way to stop it.
+fn rendering(ui: &mut Ui, files: &mut Files, done: usize, total: usize) {
+    let text = if total == 0 { "rendering…".to_owned() } else { format!("rendering: {done} of {total}") };
+    ui.label(text);
+    let share = done as f32 / total.max(1) as f32;
+    ui.add(ProgressBar::new(share).desired_width(90.0).desired_height(8.0));
+    if icon::button(ui, Icon::Cross, "Stop rendering").clicked() {
+        files.stop_rendering();
+    }
 }
 
 const LIVE: &str = "What is simulated went on from where it was when the scene changed. \

@@ -22,11 +22,12 @@ impl TextPanel {
 
     /// Shows the text; what is typed is an edit like any other.
     pub(super) fn show(&mut self, ui: &mut Ui, session: &mut Session) {
-        ui.heading("Text");
+        let heading = ui.heading("Text").id;
         let mut text = session.document.text().to_string();
         egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
             let editor = TextEdit::multiline(&mut text).code_editor().desired_width(f32::INFINITY).desired_rows(30);
             let mut output = editor.show(ui);
+            *output.response = egui::Response::clone(&output.response).labelled_by(heading);
             if let Some(span) = self.jump.take() {
                 let marked = marked(&text, &span);
                 output.state.cursor.set_char_range(Some(marked));

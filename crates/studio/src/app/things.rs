@@ -23,11 +23,20 @@ pub(super) struct Thing {
     pub(super) name: String,
 }
 
-/// Kinds of phenomena that stand at a `position`, and the list of their parts that have a place of their own.
+/// Kinds of phenomena that stand at a `position`, and the list of their parts that have a place of their own. A list that is not stated
+/// stands for one part.
 const STANDING: [(&str, &str); 2] = [("flame_sheet", "instances"), ("flame_particles", "burners")];
 
-/// All that stands somewhere at the present time.
+/// All that hands can move at the present time: what stands somewhere, or while keyframes are recorded what can be keyed.
 pub(super) fn things(session: &Session) -> Vec<Thing> {
+    let mut things = standing(session);
+    if session.recording {
+        things.retain(|thing| keyed::animatable(&thing.place));
+    }
+    things
+}
+
+fn standing(session: &Session) -> Vec<Thing> {
     let Some(plan) = session.plan() else { return Vec::new() };
     let time = session.transport.time_s();
     let lights = plan.scene.lights.iter().enumerate().filter(|(_, light)| light.stands());
@@ -46,8 +55,13 @@ pub(super) fn things(session: &Session) -> Vec<Thing> {
         let own = listed.place().key("position");
         things.push(Thing { place: own, origin: DVec3::ZERO, point: origin, name: listed.name.clone() });
         let list = listed.place().key(parts);
-        let Some(Value::List(items)) = list.find(root).map(|node| &node.value) else { continue };
-        things.extend((0..items.len()).map(|index| Thing {
+        let count = match list.find(root).map(|node| &node.value) {
+            Some(Value::List(items)) => items.len(),
+            _ => 0,
+        };
+        // One that is not stated stands where the phenomenon does, and moves by itself only over time.
+        let unstated = usize::from(session.recording && count == 0);
+        things.extend((0..count + unstated).map(|index| Thing {
             place: list.index(index).key("position"),
             origin,
             point: origin + position(root, &list.index(index), time),

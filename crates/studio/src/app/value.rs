@@ -13,8 +13,8 @@ pub(super) struct Widget<'a> {
     pub(super) unit: &'a str,
     /// The label that names it, for screen readers.
     pub(super) label: Id,
-    /// What it usually is, where that is a number: sliders are finest around it.
-    pub(super) usual: Option<f64>,
+    /// What it usually is: sliders are finest around it.
+    pub(super) usual: Option<&'a Value>,
 }
 
 /// Beside a slider: a number with its unit, and the buttons after it, points of the screen.
@@ -30,7 +30,8 @@ impl Widget<'_> {
             Kind::Bool => self.checkbox(ui, value),
             Kind::Integer { min, max } => self.integer(ui, value, [*min, *max]),
             Kind::Number { min, max } => {
-                let number = self.number(ui, value.as_number()?, [*min, *max])?;
+                let usual = self.usual.and_then(Value::as_number);
+                let number = self.number(ui, value.as_number()?, [*min, *max], usual)?;
                 Some(Value::Number(number))
             }
             Kind::Vector { min, max, .. } => self.vector(ui, value, [*min, *max]),
@@ -55,14 +56,15 @@ impl Widget<'_> {
     fn integer(&self, ui: &mut Ui, value: &Value, [min, max]: [i64; 2]) -> Option<Value> {
         let mut number = value.as_number()? as i64;
         let bounds = [min as f64, max as f64];
-        let slid = self.slider(ui, number as f64, bounds).map(|slid| slid.round() as i64);
+        let usual = self.usual.and_then(Value::as_number);
+        let slid = self.slider(ui, number as f64, bounds, usual).map(|slid| slid.round() as i64);
         let drag = DragValue::new(&mut number).range(min..=max).suffix(self.suffix());
         let dragged = ui.add(drag).labelled_by(self.label).changed().then_some(number);
         slid.or(dragged).map(Value::Integer)
     }
 
-    fn number(&self, ui: &mut Ui, number: f64, bounds: [f64; 2]) -> Option<f64> {
-        let slid = self.slider(ui, number, bounds).map(decimal);
+    fn number(&self, ui: &mut Ui, number: f64, bounds: [f64; 2], usual: Option<f64>) -> Option<f64> {
+        let slid = self.slider(ui, number, bounds, usual).map(decimal);
         let dragged = self.drag(ui, number, bounds);
         slid.or(dragged)
     }
@@ -75,8 +77,8 @@ impl Widget<'_> {
     }
 
     /// Slides over what is allowed, by decades where it spans many; nothing where there are no bounds.
-    fn slider(&self, ui: &mut Ui, mut number: f64, bounds: [f64; 2]) -> Option<f64> {
-        let scale = Scale::over(bounds, self.usual)?;
+    fn slider(&self, ui: &mut Ui, mut number: f64, bounds: [f64; 2], usual: Option<f64>) -> Option<f64> {
+        let scale = Scale::over(bounds, usual)?;
         ui.spacing_mut().slider_width = (ui.available_size_before_wrap().x - BESIDE).max(NARROWEST);
         let slider = egui::Slider::new(&mut number, bounds[0]..=bounds[1]).show_value(false);
         let slider = match scale {
@@ -90,22 +92,37 @@ impl Widget<'_> {
         if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) }
     }
 
+    /// Numbers beside one another; where they have bounds, each below the other with a slider.
     fn vector(&self, ui: &mut Ui, value: &Value, bounds: [f64; 2]) -> Option<Value> {
         let Value::List(items) = value else { return None };
+        let usual = |index: usize| match self.usual {
+            Some(Value::List(items)) => items.get(index)?.value.as_number(),
+            _ => None,
+        };
         let whole = items.iter().all(|item| matches!(item.value, Value::Integer(_)));
-        let part = Self { unit: "", ..*self };
         let mut edited = items.clone();
         let mut changed = false;
-        ui.horizontal(|ui| {
-            for item in &mut edited {
-                let Some(number) = item.value.as_number() else { continue };
-                if let Some(number) = part.drag(ui, number, bounds) {
-                    changed = true;
-                    item.value = if whole { Value::Integer(number.round() as i64) } else { Value::Number(number) };
-                }
+        let slides = Scale::over(bounds, usual(0)).is_some();
+        let part = Self { unit: if slides { self.unit } else { "" }, ..*self };
+        let mut show = |ui: &mut Ui, index: usize, item: &mut Node| {
+            let Some(number) = item.value.as_number() else { return };
+            if let Some(number) = part.number(ui, number, bounds, usual(index)) {
+                changed = true;
+                item.value = if whole { Value::Integer(number.round() as i64) } else { Value::Number(number) };
             }
-            ui.weak(self.unit);
-        });
+        };
+        if slides {
+            ui.vertical(|ui| {
+                for (index, item) in edited.iter_mut().enumerate() {
+                    ui.horizontal(|ui| show(ui, index, item));
+                }
+            });
+        } else {
+            ui.horizontal(|ui| {
+                edited.iter_mut().enumerate().for_each(|(index, item)| show(ui, index, item));
+                ui.weak(self.unit);
+            });
+        }
         changed.then_some(Value::List(edited))
     }
 

@@ -18,9 +18,43 @@ use bansho::{
 /// # Errors
 /// Every fault of the text and of the assets it names.
 pub fn check(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<Arc<Plan>, SceneError> {
-    let scene = parse_scene(name, text, assets.as_ref())?;
-    let plan = Plan::new(scene, &PlanOptions::default(), assets.clone());
-    plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
+    Checker::default().check(name, text, assets)
+}
+
+/// Checks the states of a scene one after another: phenomena that are as they were in the last good one are not made again.
+#[derive(Default)]
+pub struct Checker {
+    /// That one, and what it was parsed with.
+    good: Option<(Arc<dyn Assets>, Scene)>,
+}
+
+impl Checker {
+    /// The plan of the scene `text`.
+    ///
+    /// # Errors
+    /// Every fault of the text and of the assets it names.
+    pub fn check(&mut self, name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<Arc<Plan>, SceneError> {
+        let good = self.good.as_ref().filter(|(own, _)| Arc::ptr_eq(own, assets)).map(|(_, scene)| scene);
+        let scene = Scene::parse_after(good, name, text, KINDS, assets.as_ref())?;
+        self.good = Some((assets.clone(), scene.clone()));
+        let plan = Plan::new(scene, &PlanOptions::default(), assets.clone());
+        plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
+    }
+
+    /// The plan of a draft of the scene `text`, which is simulated with fewer particles; `None` where no fewer would do.
+    ///
+    /// # Errors
+    /// As [`check`](Self::check); faults are those of the scene itself.
+    pub fn check_draft(
+        &mut self,
+        name: &str,
+        text: &str,
+        assets: &Arc<dyn Assets>,
+    ) -> Option<Result<Arc<Plan>, SceneError>> {
+        let fewer = fewer_particles(&values(text).ok()?);
+        let draft = operation::apply(text, &fewer).ok().filter(|_| !fewer.is_empty())?;
+        Some(self.check(name, text, assets).and_then(|plan| recheck(name, &draft, assets, Ok(plan.exposure_ev100))))
+    }
 }
 
 /// The plan of the scene `text` where another [`check`] found its exposure, or why it cannot be planned. Of a good scene no
@@ -44,16 +78,6 @@ pub fn recheck(
         // The faults with their places, where they have any.
         Err(reason) => Err(parse_scene(name, text, assets.as_ref()).err().unwrap_or_else(|| unplaced(reason))),
     }
-}
-
-/// The plan of a draft of the scene `text`, which is simulated with fewer particles; `None` where no fewer would do.
-///
-/// # Errors
-/// As [`check`]; faults are those of the scene itself.
-pub fn check_draft(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Option<Result<Arc<Plan>, SceneError>> {
-    let fewer = fewer_particles(&values(text).ok()?);
-    let draft = operation::apply(text, &fewer).ok().filter(|_| !fewer.is_empty())?;
-    Some(check(name, text, assets).and_then(|plan| recheck(name, &draft, assets, Ok(plan.exposure_ev100))))
 }
 
 /// What a draft makes do with: a kind of phenomenon, the key of its number of particles, and how many.
@@ -98,13 +122,23 @@ fn unplaced(name: &str, text: &str, reason: String) -> SceneError {
 
 #[cfg(test)]
 mod tests {
-    use bansho::MemoryAssets;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use bansho::{
+        MemoryAssets,
+        base::{
+            assets::{AssetError, Picture},
+            drawing::Drawing,
+            mesh::Mesh,
+        },
+    };
 
     use super::*;
+    use crate::examples::Bundle;
 
     fn draft(text: &str) -> Option<Result<Arc<Plan>, SceneError>> {
         let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
-        check_draft("scene", text, &assets)
+        Checker::default().check_draft("scene", text, &assets)
     }
 
     #[test]
@@ -115,6 +149,55 @@ mod tests {
         assert_eq!(places, ["aurora.0.particles.count", "flame_particles.0.particles"]);
         assert!(draft("bansho = 1\n[[flame_particles]]\n").is_some_and(|plan| plan.is_ok()));
         assert!(draft("bansho = 1\n[[rain]]\n[[flame_particles]]\nparticles = 900\n").is_none());
+    }
+
+    /// The files of the examples, and how often a mesh was read: each time a flame that burns on it is made.
+    #[derive(Default)]
+    struct Counting {
+        bundle: Bundle,
+        meshes: AtomicUsize,
+    }
+
+    impl Assets for Counting {
+        fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError> {
+            self.bundle.picture(path, frame)
+        }
+        fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
+            self.meshes.fetch_add(1, Ordering::Relaxed);
+            self.bundle.mesh(path)
+        }
+        fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
+            self.bundle.drawing(path)
+        }
+        fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
+            self.bundle.text(path)
+        }
+        fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
+            self.bundle.digest(path, frame)
+        }
+    }
+
+    #[test]
+    fn only_what_changed_is_made_again() {
+        let burner =
+            "[[flame_particles]]\nparticles = 99\nburners = [{ shape = \"mesh\", file = \"meshes/ring.glb\" }]\n";
+        let counting = Arc::new(Counting::default());
+        let assets: Arc<dyn Assets> = counting.clone();
+        let mut checker = Checker::default();
+        let mut made = |rest: &str| {
+            let before = counting.meshes.load(Ordering::Relaxed);
+            let text = format!("bansho = 1\n{burner}{rest}");
+            let plan = checker.check("scene", &text, &assets);
+            let alone = check("scene", &text, &(Arc::new(Bundle::default()) as Arc<dyn Assets>));
+            assert_eq!(plan.map(|plan| plan.exposure_ev100).ok(), alone.map(|plan| plan.exposure_ev100).ok());
+            counting.meshes.load(Ordering::Relaxed) - before
+        };
+        assert_eq!(made(""), 1);
+        assert_eq!(made("[wind]\nvelocity = [1.0, 0.0, 0.0]\n"), 0);
+        assert_eq!(made("look = { haze_gain = 2.0 }\n"), 1);
+        assert_eq!(made("no_such_key = 1\n"), 0);
+        assert_eq!(made("look = { haze_gain = 2.0 }\n[[rain]]\n"), 0);
+        assert_eq!(made("look = { haze_gain = 2.0 }\n[picture]\nseed = 4\n"), 1);
     }
 
     #[test]

@@ -25,7 +25,7 @@ use bansho::{
     },
 };
 
-pub use check::{check, check_draft, recheck};
+pub use check::{Checker, check, recheck};
 pub use phenomena::{Listed, operations};
 
 use history::History;

@@ -11,20 +11,30 @@ use bansho::{
 use web_time::Instant;
 
 use super::{Event, Picture, Wish, states::States};
-use crate::document::{Revision, check, check_draft, stages};
+use crate::document::{Checker, Revision, stages};
 
 /// What is kept from one wish to the next.
 #[derive(Default)]
 pub(super) struct Engine {
-    /// Which state was judged with which assets, and whether as a draft if it could be one.
-    judged: Option<(Revision, Arc<dyn Assets>, bool)>,
+    /// What was judged last.
+    judged: Option<Judged>,
+    checker: Checker,
     /// The last good plan, at the scene's own size, and whether it is a draft.
     plan: Option<(Arc<Plan>, bool)>,
     shot: Option<Opened>,
-    /// Of the finished picture that is under way.
+    /// Of finished pictures; each goes on from the one before.
     still: Option<(Arc<Plan>, Box<dyn Shot>)>,
     states: States,
     stages: StageShots,
+}
+
+/// A state of a document, with its assets, and whether it was judged as a draft if it could be one. Two documents may have states of one
+/// number, so the text counts, too.
+struct Judged {
+    revision: Revision,
+    text: Arc<str>,
+    assets: Arc<dyn Assets>,
+    draft: bool,
 }
 
 /// A shot, with the plan and the size that it was last planned for.
@@ -47,14 +57,16 @@ impl Engine {
     ) -> Result<(), RenderError> {
         let draft = wish.draft && !wish.exact && !wish.still;
         let Wish { name, text, assets, .. } = wish;
-        let same = |(revision, own, as_draft): &(Revision, Arc<dyn Assets>, bool)| {
-            (*revision, *as_draft) == (wish.revision, draft) && Arc::ptr_eq(own, assets)
+        let same = |last: &Judged| {
+            (last.revision, last.draft) == (wish.revision, draft)
+                && last.text == *text
+                && Arc::ptr_eq(&last.assets, assets)
         };
         if !self.judged.as_ref().is_some_and(same) {
-            let drafted = if draft { check_draft(name, text, assets) } else { None };
+            let drafted = if draft { self.checker.check_draft(name, text, assets) } else { None };
             let is_draft = drafted.is_some();
-            let outcome = drafted.unwrap_or_else(|| check(name, text, assets));
-            self.judged = Some((wish.revision, assets.clone(), draft));
+            let outcome = drafted.unwrap_or_else(|| self.checker.check(name, text, assets));
+            self.judged = Some(Judged { revision: wish.revision, text: text.clone(), assets: assets.clone(), draft });
             if let Ok(plan) = &outcome {
                 self.plan = Some((plan.clone(), is_draft));
             }
@@ -84,7 +96,7 @@ impl Engine {
         *self = Self { judged: self.judged.take(), plan: self.plan.take(), ..Self::default() };
     }
 
-    /// The file of the finished frame `number`. Where it was stopped it goes on.
+    /// The file of the finished frame `number`. Where it was stopped, or the last one ended, it goes on.
     fn finish(&mut self, plan: &Arc<Plan>, number: i64, observer: &dyn Observer) -> Result<Vec<u8>, RenderError> {
         let begun = self.still.take().filter(|(of, _)| Arc::ptr_eq(of, plan));
         let (_, shot) = self.still.insert(match begun {
@@ -92,8 +104,9 @@ impl Engine {
             None => (plan.clone(), CpuBackend.open(plan.clone())?),
         });
         let frame = bansho::draw(shot.as_mut(), number, observer)?;
-        self.still = None;
-        Ok(encoded(&frame))
+        let png = encoded(&frame);
+        shot.recycle(frame);
+        Ok(png)
     }
 
     fn draw(&mut self, plan: &Arc<Plan>, wish: &Wish, observer: &dyn Observer) -> Result<Picture, RenderError> {

@@ -13,7 +13,7 @@ mod slices;
 mod stages;
 mod states;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 #[cfg(not(target_arch = "wasm32"))]
 mod thread;
 mod transport;

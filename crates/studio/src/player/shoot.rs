@@ -51,7 +51,7 @@ impl Progress {
     }
 }
 
-/// The job that renders `text` as if it lay in `path`, into `out/` beside that: all frames, or only `number`.
+/// The job that renders `text` as if it lay in `path`, into `out/` beside that: all frames that are not there already, or only `number`.
 pub fn job(text: &str, path: &Path, number: Option<i64>) -> Job {
     let scene = SceneFile {
         name: path.display().to_string(),
@@ -61,7 +61,7 @@ pub fn job(text: &str, path: &Path, number: Option<i64>) -> Job {
         changes: Vec::new(),
     };
     let out = scene.folder.join("out").join(&scene.stem).join(format!("{}.####.png", scene.stem));
-    Job { frames: number.map(|number| vec![number]), out: Some(out), ..Job::new(scene) }
+    Job { resume: number.is_none(), frames: number.map(|number| vec![number]), out: Some(out), ..Job::new(scene) }
 }
 
 impl Shooting {
@@ -80,7 +80,10 @@ impl Shooting {
         let work = move || {
             let result = job.prepare().and_then(|prepared| prepared.run(watched.as_ref()));
             watched.wake();
-            result.map(|summary| summary.first_file).map_err(|error: JobError| error.to_string())
+            result.map(|summary| summary.first_file).map_err(|error| match error {
+                JobError::Cancelled => "stopped; whole frames stay, and rendering the shot goes on from there".into(),
+                error => error.to_string(),
+            })
         };
         let worker = std::thread::Builder::new().name("render".into()).spawn(work)?;
         Ok(Self { progress, worker: Some(worker) })

@@ -92,6 +92,16 @@ fn bumped(text: &str) -> crate::document::Revision {
 }
 
 #[test]
+fn another_document_is_judged_though_its_state_has_the_same_number() {
+    let mut engine = engine::Engine::default();
+    let judged = |events: Vec<Event>| events.iter().filter(|event| matches!(event, Event::Judged { .. })).count();
+    let first = wish(SCENE, 0);
+    let second = Wish { text: STEPPED.into(), ..first.clone() };
+    assert_eq!([&first, &first, &second].map(|wish| judged(fulfil(&mut engine, wish))), [1, 0, 1]);
+    assert!(picture(fulfil(&mut engine, &Wish { exact: true, ..second })).pixels == rendered(STEPPED, 0));
+}
+
+#[test]
 fn small_windows_get_small_pictures_of_the_same_proportions() {
     let drawn = picture(fulfil(&mut engine::Engine::default(), &Wish { within: [32, 400], ..wish(SCENE, 0) }));
     assert_eq!((drawn.size, drawn.scene_size, drawn.pixels.len()), ([32, 18], [64, 36], 32 * 18));
@@ -164,7 +174,7 @@ fn the_newest_wish_wins() {
 }
 
 /// Assets whose maker made a mistake.
-struct Broken;
+pub(crate) struct Broken;
 
 impl Assets for Broken {
     fn picture(&self, _: &str, _: i64) -> Result<Arc<Plate>, AssetError> {
@@ -258,4 +268,40 @@ fn a_still_is_the_file_that_render_writes() {
     assert!(matches!(&events[1..], [Event::Still { number: 5, png }] if *png == written));
     let codes = plate.colour.pixels().iter().map(|pixel| pixel.map(|value| (value * 255.0).round() as u8));
     assert!(codes.eq(rendered_with_alpha(SCENE, 5, false)));
+}
+
+#[test]
+fn finished_pictures_that_go_on_from_one_another_are_those_that_are_rendered() {
+    let finished = |engine: &mut engine::Engine, number: i64| {
+        let events = fulfil(engine, &Wish { still: true, ..wish(STEPPED, number) });
+        events.into_iter().find_map(|event| match event {
+            Event::Still { number: own, png } if own == number => Some(png),
+            _ => None,
+        })
+    };
+    let mut engine = engine::Engine::default();
+    for number in [3, 4, 9, 2] {
+        let alone = finished(&mut engine::Engine::default(), number);
+        assert!(alone.is_some() && finished(&mut engine, number) == alone, "frame {number}");
+    }
+}
+
+/// Mean difference of two pictures, in codes.
+fn difference(a: &Picture, b: &Picture) -> f64 {
+    let codes = |picture: &Picture| -> Vec<u8> { picture.pixels.as_flattened().to_vec() };
+    let sum: f64 = codes(a).iter().zip(codes(b)).map(|(a, b)| f64::from(a.abs_diff(b))).sum();
+    sum / a.pixels.len() as f64
+}
+
+#[test]
+fn rain_that_a_slider_changes_keeps_its_drops() {
+    let text =
+        |rain: &str| format!("bansho = 1\n[picture]\nsize = [160, 90]\n[sky]\nkind = \"overcast\"\n[[rain]]\n{rain}\n");
+    let mut engine = engine::Engine::default();
+    let mut drawn = |text: &str| picture(fulfil(&mut engine, &Wish { revision: bumped(text), ..wish(text, 7) }));
+    let steady = drawn(&text("rate_mm_per_h = 20.0"));
+    let other_drops = difference(&steady, &drawn(&text("rate_mm_per_h = 20.0").replace("size", "seed = 9\nsize")));
+    assert!(other_drops > 0.1, "{other_drops}");
+    let heavier = difference(&steady, &drawn(&text("rate_mm_per_h = 20.2")));
+    assert!(heavier > 0.0 && heavier < 0.1 * other_drops, "{heavier} of {other_drops}");
 }

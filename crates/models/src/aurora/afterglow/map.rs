@@ -11,6 +11,8 @@ const CELLS: usize = SIDE * SIDE;
 /// A tile without a cell above this power is dark, W.
 const DARK_W: f32 = 1e-3;
 const NO_TILE: u32 = u32::MAX;
+/// Particles that a task of the thread pool finds the cells of, at least.
+const TASK: usize = 4096;
 
 /// A lit cell of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -176,10 +178,11 @@ impl GlowMap {
     /// Adds that share of the particles' power, one after the other, so that sums do not depend on threads.
     fn feed(&mut self, particles: &AuroraParticles, share: f32) {
         let [xs, zs] = &particles.positions;
+        let places = xs.par_iter().zip(zs).with_min_len(TASK).map(|(x, z)| self.locate([*x, *z]));
+        let places: Vec<(u32, u32)> = places.map(|(place, cell)| (place as u32, cell as u32)).collect();
         let values = particles.powers_w.iter().zip(&particles.energies_ev);
-        for ((x, z), (power, energy)) in xs.iter().zip(zs).zip(values) {
-            let (place, cell) = self.locate([*x, *z]);
-            let tile = self.tile_mut(place);
+        for ((place, cell), (power, energy)) in places.into_iter().zip(values) {
+            let (tile, cell) = (self.tile_mut(place as usize), cell as usize);
             // No `mul_add`: outside a vector loop that is a call where the machine is not known to have it.
             tile.powers[cell] += power * share;
             tile.weighted[cell] += power * energy * share;

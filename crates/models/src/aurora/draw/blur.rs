@@ -1,7 +1,7 @@
 //! The thesis's blur (2.28): in the picture, by Gaussians whose radii in pixels depend on the line alone.
 //!
-//! A sum of equal Gaussians is one blur of the sum of points. So the whole picture is looked up on the charts, with a margin, and every emitter's light
-//! is blurred along rows and then along columns.
+//! A sum of equal Gaussians is one blur of the sum of points. So the whole picture is looked up on the charts, with a
+//! margin, and every emitter's light is blurred along rows and then along columns.
 
 use bansho_base::{camera::Camera, canvas::View, math};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};

@@ -1,11 +1,12 @@
-//! The chart that auroras are drawn on: the part of the sky that a picture shows, by longitude and colatitude about the magnetic zenith.
+//! The chart that auroras are drawn on: the part of the sky that a picture shows, by longitude and colatitude about the
+//! magnetic zenith.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use bansho_base::{
     camera::Camera,
     canvas::View,
-    math::{self, DVec2},
+    math::{self, DVec2, Fused},
 };
 
 use super::geometry::FieldLines;
@@ -135,10 +136,10 @@ impl Chart {
         units
     }
 
-    /// Cotangent and inverse sine of the colatitude of every row.
-    pub(super) fn row_tables(&self) -> [Vec<f32>; 2] {
+    /// Cotangent of the colatitude of every row and so many more, and inverse sine of that of every row.
+    pub(super) fn row_tables(&self, more: usize) -> [Vec<f32>; 2] {
         let trigonometry = |row| math::sin_cos(self.colatitude(row));
-        let cotangents = (0..self.rows).map(trigonometry).map(|(sin, cos)| (cos / sin.max(1e-9)) as f32);
+        let cotangents = (0..self.rows + more).map(trigonometry).map(|(sin, cos)| (cos / sin.max(1e-9)) as f32);
         let inverses = (0..self.rows).map(trigonometry).map(|(sin, _)| (1.0 / sin.max(1e-9)) as f32);
         [cotangents.collect(), inverses.collect()]
     }
@@ -177,7 +178,7 @@ impl Finder {
     pub(super) fn column(&self, longitude: f32) -> f32 {
         let turned = longitude - self.middle;
         let turned = turned - (turned * (1.0 / std::f32::consts::TAU)).round_ties_even() * std::f32::consts::TAU;
-        turned.mul_add(self.per_column, self.half)
+        turned.fused(self.per_column, self.half)
     }
 
     /// How many rows an angle in radians is.
@@ -189,6 +190,6 @@ impl Finder {
     /// The row of a colatitude in radians.
     #[inline(always)]
     pub(super) fn row(&self, colatitude: f32) -> f32 {
-        colatitude.mul_add(self.per_row, -self.first_row)
+        colatitude.fused(self.per_row, -self.first_row)
     }
 }

@@ -11,7 +11,8 @@ use crate::aurora::particles::{AuroraParticles, AuroraSimulation};
 /// Half of the time over which a velocity is taken, s.
 const MOMENT_S: f64 = 1e-3;
 
-/// Where the particles pass 100 km altitude, `later` seconds after their step: x east, y up, z south, as the camera has it.
+/// Where the particles pass 100 km altitude, `later` seconds after their step: x east, y up, z south, as the camera has
+/// it.
 pub(super) fn point_cloud(particles: &AuroraParticles, later: f64) -> PointCloud {
     let later = later.clamp(-AuroraSimulation::STEP_S, AuroraSimulation::STEP_S);
     let [us, ws] = &particles.velocities;

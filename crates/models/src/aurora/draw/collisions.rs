@@ -1,7 +1,7 @@
 //! The picture of single collisions, as in the thesis (2.4): every source sends random falls down its field line.
 //!
-//! Heights and places along the line of sight are random; to the side each point has the smooth edge of its source, so that rays are as
-//! sharp as those of the mean. That mean is [`Meridians`], but for the noise.
+//! Heights and places along the line of sight are random; to the side each point has the smooth edge of its source, so
+//! that rays are as sharp as those of the mean. That mean is [`Meridians`], but for the noise.
 
 use std::ops::Range;
 
@@ -45,8 +45,8 @@ const NOTHING: u16 = LEVELS as u16;
 const EMITTER: u16 = NOTHING + 1;
 /// Strips that a thread draws at once: the wider they are together, the fewer sources are placed twice.
 const GROUP: usize = 4;
-/// Nearer to the observer's own field line than so many reaches, points are placed anew for every column; and nearer than so many, each by
-/// its own root and divisions.
+/// Nearer to the observer's own field line than so many reaches, points are placed anew for every column; and nearer
+/// than so many, each by its own root and divisions.
 const NEAR: f32 = 4.0;
 const SINGLE: f32 = 16.0;
 
@@ -273,8 +273,8 @@ impl Trace {
     }
 }
 
-/// Rows of a batch of collisions, and the weights there and in the row below. Those outside have no weight and a row each below the chart, for sums
-/// in one row would wait for each other.
+/// Rows of a batch of collisions, and the weights there and in the row below. Those outside have no weight and a row
+/// each below the chart, for sums in one row would wait for each other.
 struct Points {
     rows: [u32; BATCH],
     upper: [f32; BATCH],
@@ -335,17 +335,19 @@ struct Columns<'a> {
     strip: LightStrip<'a>,
     meridians: [[f32; 3]; STRIP],
     units: [[f32; STRIP]; 2],
-    /// What is still to be drawn.
-    entries: &'a [Entry],
+    /// What is still to be drawn, from the end on.
+    entries: Vec<Entry>,
 }
 
 impl<'a> Columns<'a> {
     fn new(strip: LightStrip<'a>, drawing: &Drawing<'a>, field: &FieldLines) -> Self {
         let (chart, first) = (drawing.chart, strip.number * STRIP);
+        let mut entries: Vec<Entry> = drawing.footprint.entries(strip.number).flatten().copied().collect();
+        entries.reverse();
         Self {
             meridians: std::array::from_fn(|column| field.meridian(chart.unit(first + column)).single()),
             units: chart.single_units(strip.number),
-            entries: drawing.footprint.entries(strip.number),
+            entries,
             strip,
         }
     }
@@ -353,15 +355,13 @@ impl<'a> Columns<'a> {
     /// Number of the next source that shows.
     #[inline(always)]
     fn next_source(&self) -> Option<u32> {
-        self.entries.first().map(|entry| entry.source)
+        self.entries.last().map(|entry| entry.source)
     }
 
     /// The next source as the columns see it, and which of them; it is done then.
     #[inline(always)]
     fn take(&mut self, source: &Source, chart: &Chart) -> (Patch, Range<usize>) {
-        let (entry, others) =
-            self.entries.split_first().map_or((Entry::default(), self.entries), |(entry, others)| (*entry, others));
-        self.entries = others;
+        let entry = self.entries.pop().unwrap_or_default();
         (Patch::new(source, chart, &self.units), entry.columns())
     }
 }

@@ -56,17 +56,18 @@ impl<'a> LineOfFall<'a> {
         const RADIUS: f32 = EARTH_RADIUS_KM as f32;
         const DIAMETER: f32 = 2.0 * RADIUS;
         let [constant, outward, own] = *self.meridian;
-        let squared = altitude.mul_add(DIAMETER + altitude, -distance.mul_add(2.0 * outward + distance, constant));
-        let squared = own.mul_add(own, squared);
+        let squared = altitude.fused(DIAMETER + altitude, -distance.fused(2.0 * outward + distance, constant));
+        let squared = own.fused(own, squared);
         let upward = if squared > 1.0 { squared } else { 1.0 }.sqrt();
         let place = upward - own;
-        let far_squared = distance.mul_add(distance, place * place);
+        let far_squared = distance.fused(distance, place * place);
         let far = far_squared.sqrt();
-        // A source's power is that across the field; a collision stands for all of it, so the cosine to the vertical is taken out again.
+        // A source's power is that across the field; a collision stands for all of it, so the cosine to the vertical is
+        // taken out again.
         let slant = (RADIUS + altitude) / (upward * far);
         Seen {
             row: self.finder.row(lanes::atan2(distance, place)) - 0.5,
-            slope: self.finder.rows(distance.mul_add((outward + distance) / upward, place) / far_squared),
+            slope: self.finder.rows(distance.fused((outward + distance) / upward, place) / far_squared),
             light: if distance > 0.0 && far > 1.0 { slant } else { 0.0 },
         }
     }
@@ -141,7 +142,7 @@ impl Descent {
     #[inline(always)]
     pub(super) fn shows(&self, reach: f32, rows: usize) -> bool {
         // A row more for what lies beyond the outermost nodes.
-        let beyond = self.steepest.mul_add(2.0 * reach, 0.1 * (self.ends[1] - self.ends[0]).abs() + 1.0);
+        let beyond = self.steepest.fused(2.0 * reach, 0.1 * (self.ends[1] - self.ends[0]).abs() + 1.0);
         self.ends[1] + beyond > 0.0 && self.ends[0] - beyond < rows as f32
     }
 
@@ -180,7 +181,8 @@ fn node_place(node: usize) -> f64 {
     math::cos(PI * (node as f64 + 0.5) / NODES as f64)
 }
 
-/// What a value of 1 at a node and 0 at all others adds to the coefficients of the first `terms` Chebyshev polynomials, in powers of the place.
+/// What a value of 1 at a node and 0 at all others adds to the coefficients of the first `terms` Chebyshev polynomials,
+/// in powers of the place.
 fn coefficients(node: usize, terms: usize) -> [f32; NODES] {
     let mut powers = [0.0; NODES];
     let (mut last, mut polynomial) = ([0.0; NODES], [0.0; NODES]);

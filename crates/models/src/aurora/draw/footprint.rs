@@ -1,9 +1,10 @@
 //! Where the precipitation comes down, by longitude and distance from the observer's own field line.
 //!
-//! Every source is a small patch with a smooth edge, `(1 - r^2)^2` in each direction: broad enough for the chart's cells, so that none
-//! is ever seen alone. Sources are sorted into strips of columns, so that no two threads share a sum and every sum has one order.
+//! Every source is a small patch with a smooth edge, `(1 - r^2)^2` in each direction: broad enough for the chart's
+//! cells, so that none is ever seen alone. Sources are sorted into strips of columns, so that no two threads share a
+//! sum and every sum has one order.
 
-use std::ops::Range;
+use std::{f64::consts::LN_2, ops::Range};
 
 use bansho_base::math::{self, lanes};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
@@ -14,9 +15,12 @@ use crate::lanes::{FourLanes, Real};
 
 /// Sources that a task of the thread pool sorts.
 const TASK: usize = 4096;
-/// Altitude of the light whose rows are told apart, km: that of lower edges.
+/// Altitude of the light whose bins are told apart, km: that of lower edges, which are several km high.
 const SCALE_KM: f64 = 100.0;
-/// Bins within the reach of a patch, where so many take up 1 to [`MOST_ROWS`] rows of the chart each.
+/// By how much the altitude of a line of sight changes there from one far bin to the next, km; more only where a row is
+/// higher than that.
+const STEP_KM: f64 = 1.0;
+/// Near bins within the reach of a patch, where so many take up 1 to [`MOST_ROWS`] rows of the chart each.
 const BINS_PER_REACH: f64 = 2.5;
 const MOST_ROWS: f64 = 2.5;
 /// Distances beyond this lie behind the horizon, km.
@@ -44,24 +48,30 @@ impl Source {
     #[inline(always)]
     pub(super) fn distance(&self) -> f32 {
         let [x, y] = self.across;
-        x.mul_add(x, y * y).sqrt()
+        x.fused(x, y * y).sqrt()
     }
 }
 
 /// Reach of a patch for a standard deviation of 1.
 pub(super) const REACH: f32 = 2.645_751_3;
 
-/// What the bins of a footprint hold: power for green, red and prompt light in 1000 W per km of width, and the sum of all times the
-/// node of their energy.
+/// What the bins of a footprint hold: power for green, red and prompt light in 1000 W per km of width, and the sum of
+/// all times the node of their energy.
 pub(super) type Bin = [f32; 4];
 
 /// The sources of a picture, sorted by strips of the chart.
 pub(super) struct Footprint<'a> {
     sources: &'a [Source],
+    /// What each of the tasks has sorted, in the order of the sources.
+    parts: Vec<Sorted>,
+    bins: Bins,
+}
+
+/// Some of the sources, sorted by strips.
+struct Sorted {
     /// Index of the first entry of every strip, and of the end.
     starts: Vec<u32>,
     entries: Vec<Entry>,
-    bins: Bins,
 }
 
 /// A source that shows in a strip.
@@ -88,19 +98,21 @@ struct Span {
     count: i32,
 }
 
-/// Bins of distance: of one width as far as patches need it, even in the angle at which they are seen at [`SCALE_KM`] above from there on.
+/// Bins of distance: of one width about the observer's own field line, from there on in proportion to the distance, so
+/// that from each to the next the altitude of a line of sight changes alike.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bins {
     /// Width of near bins, km, and its inverse.
     width: f64,
     per_width: f64,
-    /// How far they go, km, at what angle that is, and how many there are to there.
-    near_to: f64,
-    near_angle: f64,
+    /// How far they go, km, and how many there are to there.
+    pub(super) near_to: f64,
     near: f64,
-    /// Angle of a far bin, radians, and its inverse.
-    step: f64,
-    per_step: f64,
+    /// Width of far bins for their distance, and how many there are from a distance to twice as far.
+    share: f64,
+    per_octave: f64,
+    /// Place at which far bins would be at 1 km.
+    far_zero: f64,
     /// How many there are.
     pub(super) count: usize,
 }
@@ -110,29 +122,25 @@ impl Bins {
     pub(super) fn new(spread_km: f64, step: f64) -> Self {
         let row = step * SCALE_KM;
         let width = (spread_km * f64::from(REACH) / BINS_PER_REACH).clamp(row, MOST_ROWS * row);
-        // From there on even angles are wider.
-        let near_to = (SCALE_KM * math::sqrt(width / row - 1.0)).min(FARTHEST_KM);
-        let (near, near_angle) = (near_to / width, math::atan(near_to / SCALE_KM));
-        let far = math::atan(FARTHEST_KM / SCALE_KM) - near_angle;
-        let count = (near + far / step).ceil();
-        let step = far.max(1e-9) / (count - near).max(1e-9);
-        let (per_width, per_step) = (1.0 / width, 1.0 / step);
-        Self { width, per_width, near_to, near_angle, near, step, per_step, count: count as usize }
+        let share = (STEP_KM / SCALE_KM).max(2.0 * step);
+        let near_to = (width / share).min(FARTHEST_KM);
+        let near = near_to / width;
+        let count = (near + math::ln(FARTHEST_KM / near_to) / share).ceil().max(1.0) as usize;
+        let per_octave = LN_2 / share;
+        let far_zero = near - per_octave * math::log2(near_to);
+        Self { width, per_width: 1.0 / width, near_to, near, share, per_octave, far_zero, count }
     }
 
     /// Width of a bin at a distance, km.
     #[inline(always)]
     fn width(&self, distance: f32) -> f32 {
-        const SCALE: f32 = SCALE_KM as f32;
-        (self.step as f32 * distance.mul_add(distance / SCALE, SCALE)).max(self.width as f32)
+        (self.share as f32 * distance).max(self.width as f32)
     }
 
     /// Place of a distance among the bins; 0 is the nearer edge of the first.
     #[inline(always)]
     fn place(&self, distance: f32) -> f32 {
-        const PER_SCALE: f32 = (1.0 / SCALE_KM) as f32;
-        let beyond = lanes::atan2(distance * PER_SCALE, 1.0) - self.near_angle as f32;
-        let far = beyond.mul_add(self.per_step as f32, self.near as f32);
+        let far = lanes::log2(distance).fused(self.per_octave as f32, self.far_zero as f32);
         if distance < self.near_to as f32 { distance * self.per_width as f32 } else { far }
     }
 
@@ -148,8 +156,8 @@ impl Bins {
         if place < self.near {
             return [place * self.width, self.width];
         }
-        let (sin, cos) = math::sin_cos((place - self.near).mul_add(self.step, self.near_angle));
-        [SCALE_KM * sin / cos, SCALE_KM * self.step / (cos * cos)]
+        let distance = self.near_to * math::exp((place - self.near) * self.share);
+        [distance, self.share * distance]
     }
 }
 
@@ -172,29 +180,14 @@ impl StripSums {
 impl<'a> Footprint<'a> {
     /// Sorts sources, of this standard deviation in km or more, by the strips of a chart.
     pub(super) fn new(sources: &'a [Source], chart: &Chart, spread_km: f64) -> Self {
-        let finder = chart.finder();
-        let level = Level::new();
-        let mut spans = vec![Span::default(); sources.len()];
-        spans.par_chunks_mut(TASK).zip(sources.par_chunks(TASK)).for_each(|(spans, sources)| {
-            dispatch!(level, _simd => find_spans(sources, chart, &finder, spans));
-        });
-        let strips = chart.columns / STRIP;
-        let mut starts = vec![0_u32; strips + 1];
-        for span in &spans {
-            pieces(*span, chart, |strip, _| starts[strip + 1] += 1);
-        }
-        for strip in 0..strips {
-            starts[strip + 1] += starts[strip];
-        }
-        let mut next = starts.clone();
-        let mut entries = vec![Entry::default(); starts[strips] as usize];
-        for (source, span) in spans.iter().enumerate() {
-            pieces(*span, chart, |strip, columns| {
-                entries[next[strip] as usize] = Entry { source: source as u32, columns };
-                next[strip] += 1;
-            });
-        }
-        Self { sources, starts, entries, bins: Bins::new(spread_km, chart.row_step) }
+        let (finder, level) = (chart.finder(), Level::new());
+        let sorted = |(task, sources): (usize, &[Source])| {
+            let mut spans = vec![Span::default(); sources.len()];
+            dispatch!(level, _simd => find_spans(sources, chart, &finder, &mut spans));
+            Sorted::new(&spans, task * TASK, chart)
+        };
+        let parts = sources.par_chunks(TASK).enumerate().map(sorted).collect();
+        Self { sources, parts, bins: Bins::new(spread_km, chart.row_step) }
     }
 
     /// Bins of distance.
@@ -202,10 +195,9 @@ impl<'a> Footprint<'a> {
         &self.bins
     }
 
-    /// What shows in a strip.
-    #[inline(always)]
-    pub(super) fn entries(&self, strip: usize) -> &[Entry] {
-        &self.entries[self.starts[strip] as usize..self.starts[strip + 1] as usize]
+    /// What shows in a strip, in the order of the sources, part by part.
+    pub(super) fn entries(&self, strip: usize) -> impl Iterator<Item = &[Entry]> {
+        self.parts.iter().map(move |part| &part.entries[part.starts[strip] as usize..part.starts[strip + 1] as usize])
     }
 
     /// A source by its number.
@@ -227,19 +219,44 @@ impl<'a> Footprint<'a> {
         sums.bins.clear();
         sums.bins.resize(STRIP * self.bins.count, [0.0; 4]);
         sums.filled = [[usize::MAX, 0]; STRIP];
-        for entry in self.entries(strip) {
-            let source = self.source(entry.source);
-            let patch = Patch::new(source, chart, units);
-            let span = patch.bins(source, &self.bins);
-            let [green, red, prompt] = source.power;
-            let weights = FourLanes::simd_from(simd, [green, red, prompt, (green + red + prompt) * source.node]);
-            for column in entry.columns() {
-                span.add(column, weights * patch.side[column], &self.bins, sums);
+        for entries in self.entries(strip) {
+            for entry in entries {
+                let source = self.source(entry.source);
+                let patch = Patch::new(source, chart, units);
+                let span = patch.bins(source, &self.bins);
+                let [green, red, prompt] = source.power;
+                let weights = FourLanes::simd_from(simd, [green, red, prompt, (green + red + prompt) * source.node]);
+                for column in entry.columns() {
+                    span.add(column, weights * patch.side[column], &self.bins, sums);
+                }
             }
         }
         for filled in &mut sums.filled {
             filled[0] = filled[0].min(filled[1]);
         }
+    }
+}
+
+impl Sorted {
+    /// Sources from number `first` on, which reach these columns.
+    fn new(spans: &[Span], first: usize, chart: &Chart) -> Self {
+        let strips = chart.columns / STRIP;
+        let mut starts = vec![0_u32; strips + 1];
+        for span in spans {
+            pieces(*span, chart, |strip, _| starts[strip + 1] += 1);
+        }
+        for strip in 0..strips {
+            starts[strip + 1] += starts[strip];
+        }
+        let mut next = starts.clone();
+        let mut entries = vec![Entry::default(); starts[strips] as usize];
+        for (span, source) in spans.iter().zip(first..) {
+            pieces(*span, chart, |strip, columns| {
+                entries[next[strip] as usize] = Entry { source: source as u32, columns };
+                next[strip] += 1;
+            });
+        }
+        Self { starts, entries }
     }
 }
 
@@ -256,7 +273,7 @@ impl Span {
     fn of(source: &Source, chart: &Chart, finder: &Finder) -> Self {
         let step = chart.column_step as f32;
         let [x, y] = source.across;
-        let distance = x.mul_add(x, y * y).sqrt();
+        let distance = x.fused(x, y * y).sqrt();
         let reach = source.reach.max(LEAST_CELLS * step * distance);
         if source.power == [0.0; 3] || distance > FARTHEST_KM as f32 {
             return Self::default();
@@ -307,10 +324,10 @@ impl Patch {
         let per_reach = 1.0 / source.reach.max(LEAST_CELLS * chart.column_step as f32 * source.distance());
         let (mut side, mut along) = ([0.0; STRIP], [0.0; STRIP]);
         for column in 0..STRIP {
-            let away = y.mul_add(cosines[column], -(x * sines[column])) * per_reach;
-            let shape = away.mul_add(-away, 1.0).max(0.0);
+            let away = y.fused(cosines[column], -(x * sines[column])) * per_reach;
+            let shape = away.fused(-away, 1.0).max(0.0);
             side[column] = shape * shape * (NORM * per_reach);
-            along[column] = x.mul_add(cosines[column], y * sines[column]);
+            along[column] = x.fused(cosines[column], y * sines[column]);
         }
         Self { side, along }
     }
@@ -350,7 +367,7 @@ impl BinSpans {
         *filled = [filled[0].min(first), filled[1].max(end)];
         let mut away = (first as f32 + 0.5 - middle) * per_reach;
         for bin in &mut sums.bins[column * bins.count..][first..end] {
-            let shape = away.mul_add(-away, 1.0);
+            let shape = away.fused(-away, 1.0);
             *bin = weights.like(shape * shape).fused(weights, FourLanes::simd_from(weights.simd, *bin)).into();
             away += per_reach;
         }

@@ -1,18 +1,21 @@
 //! Field lines over a round Earth, as an observer sees them.
 //!
-//! Lines of a uniform field are parallel, so that from one place each is seen on a meridian of the sky about the magnetic zenith, the
-//! point to which all of them converge: its longitude never changes along the line. Everything here rests on that.
+//! Lines of a uniform field are parallel, so that from one place each is seen on a meridian of the sky about the
+//! magnetic zenith, the point to which all of them converge: its longitude never changes along the line. Everything
+//! here rests on that.
 
-use bansho_base::math::{self, DVec2, DVec3, lanes};
+use bansho_base::math::{self, DVec2, DVec3, Fused, lanes};
 
 /// Radius of the Earth, km.
 pub(in crate::aurora) const EARTH_RADIUS_KM: f64 = 6371.0;
 /// Altitude of the plane on which feet are drawn, km.
 pub(in crate::aurora) const FOOT_KM: f64 = 100.0;
-/// Least dip that is drawn, degrees: nearer the magnetic equator there are no auroras, and field lines would not reach the ground.
+/// Least dip that is drawn, degrees: nearer the magnetic equator there are no auroras, and field lines would not reach
+/// the ground.
 const LEAST_DIP_DEG: f64 = 30.0;
 
-/// The magnetic field about an observer. Lengths are km; x east, y up, z south from the point on the ground below the drawn square's middle.
+/// The magnetic field about an observer. Lengths are km; x east, y up, z south from the point on the ground below the
+/// drawn square's middle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FieldLines {
     /// The observer, from the Earth's middle.
@@ -46,12 +49,13 @@ impl FieldLines {
         Self { observer, along, across: [first, along.cross(first)] }
     }
 
-    /// The field line whose foot is at a place of the drawn plane, km east and south: that far from the middle along the shell at 100 km.
+    /// The field line whose foot is at a place of the drawn plane, km east and south: that far from the middle along
+    /// the shell at 100 km.
     #[inline(always)]
     pub(super) fn foot(&self, east: f32, south: f32) -> Foot {
         const SHELL: f32 = (EARTH_RADIUS_KM + FOOT_KM) as f32;
         const TURNS: f32 = (1.0 / (std::f64::consts::TAU * (EARTH_RADIUS_KM + FOOT_KM))) as f32;
-        let distance = east.mul_add(east, south * south).sqrt();
+        let distance = east.fused(east, south * south).sqrt();
         let turns = distance * TURNS;
         let (sin, cos) = (lanes::sin_turns(turns), lanes::cos_turns(turns));
         let share = if distance > 0.0 { sin / distance } else { 0.0 };
@@ -59,7 +63,7 @@ impl FieldLines {
         let observer = self.observer.as_vec3().to_array();
         let mut place = [0.0; 3];
         for axis in 0..3 {
-            place[axis] = up[axis].mul_add(SHELL, -observer[axis]);
+            place[axis] = up[axis].fused(SHELL, -observer[axis]);
         }
         let [along, first, second] = self.single();
         Foot { across: [dot(first, place), dot(second, place)], upright: dot(along, up).max(0.05) }
@@ -128,8 +132,8 @@ impl Meridian {
         FieldLine { excess: self.squared + distance * (2.0 * self.outward + distance), along: self.along }
     }
 
-    /// In single precision: square of the observer's distance from the Earth's middle less that of the ground, and the parts of that
-    /// distance outward and along the field.
+    /// In single precision: square of the observer's distance from the Earth's middle less that of the ground, and the
+    /// parts of that distance outward and along the field.
     #[inline(always)]
     pub(super) fn single(&self) -> [f32; 3] {
         [self.squared, self.outward, self.along].map(|value| value as f32)
@@ -143,7 +147,8 @@ impl FieldLine {
         math::sqrt((self.along * self.along - self.excess + squared).max(0.0)) - self.along
     }
 
-    /// The coefficients of the square of the distance from the Earth's middle less that of the ground, `(c0 + s (c1 + s))`.
+    /// The coefficients of the square of the distance from the Earth's middle less that of the ground, `(c0 + s (c1 +
+    /// s))`.
     pub(super) fn square(&self) -> [f32; 2] {
         [self.excess as f32, (2.0 * self.along) as f32]
     }
@@ -152,7 +157,7 @@ impl FieldLine {
 /// Scalar product.
 #[inline(always)]
 pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
+    a[0].fused(b[0], a[1].fused(b[1], a[2] * b[2]))
 }
 
 /// Altitude from what [`FieldLine::square`] comes to, km; written so that little is lost to rounding.
@@ -198,7 +203,7 @@ mod tests {
             assert!((up * radius - from_lines).length() < 0.02, "{east} {south}");
             assert!((f64::from(foot.upright) - up.dot(field.along)).abs() < 1e-6);
             let [constant, linear] = line.square();
-            let found = altitude((place as f32).mul_add(place as f32 + linear, constant));
+            let found = altitude((place as f32).fused(place as f32 + linear, constant));
             assert!((found - 100.0).abs() < 0.01, "{found}");
         }
     }

@@ -17,7 +17,8 @@ const ALTITUDE_KM: f64 = 125.0;
 const W_PER_UNIT: f64 = 1e3;
 
 impl Aurora {
-    /// One light from where most of it comes, as bright as all of it on a plane that faces it; none where nothing shines.
+    /// One light from where most of it comes, as bright as all of it on a plane that faces it; none where nothing
+    /// shines.
     pub(super) fn lamp(&self, t: f64) -> Option<Light> {
         let (simulation, particles) = (&self.simulation, self.simulation.particles());
         let energy_ev = simulation.parameters().energy_ev.at(t);

@@ -1,5 +1,5 @@
-//! The cells that move the particles, as pictures (thesis, figures 2.10 to 2.12, 2.14, 3.14): what stands where lines of sight pass the
-//! plane that the shapes are drawn on.
+//! The cells that move the particles, as pictures (thesis, figures 2.10 to 2.12, 2.14, 3.14): what stands where lines
+//! of sight pass the plane that the shapes are drawn on.
 
 use bansho_base::{
     canvas::{AovDescriptor, AovRule},

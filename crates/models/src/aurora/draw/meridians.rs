@@ -1,7 +1,8 @@
 //! The picture of an aurora on its chart: along every meridian, the light of all field lines that are seen there.
 //!
-//! On a line of sight at colatitude a, the field line at distance r from the observer's own is passed at the place r cot a along the
-//! field. So brightness is the integral over r of precipitation times the volume emission at the altitude of that place, over sin a.
+//! On a line of sight at colatitude a, the field line at distance r from the observer's own is passed at the place r
+//! cot a along the field. So brightness is the integral over r of precipitation times the volume emission at the
+//! altitude of that place, over sin a.
 
 use std::ops::Range;
 
@@ -17,22 +18,28 @@ use super::{
 };
 use crate::{
     aurora::light::PerEmitter,
-    lanes::{FourLanes, Real},
+    lanes::{FourLanes, HalfLanes, Real},
 };
 
 /// Rows that are worked on at once.
 const ROWS: usize = 16;
-/// Steps of altitude from bin to bin above which smoothed tables are taken, km: near the magnetic zenith a line of sight runs along the field.
+/// Where light changes slowly upward, only every so many rows are worked on, and the others are straight between them.
+const KNOT_ROWS: usize = 4;
+/// From this altitude on light does so where knots are no farther apart than a share of the way from there, km.
+const SLOW_KM: f32 = 110.0;
+const KNOTS_ABOVE: f32 = 0.1;
+/// Steps of altitude from bin to bin above which smoothed tables are taken, km: near the magnetic zenith a line of
+/// sight runs along the field.
 const STEP_KM: f32 = 1.5;
 
-/// Nearer than so many widths of a bin, smoothed tables may be taken: 800 km / [`STEP_KM`].
-const NEAR_BINS: f64 = 533.0;
-/// Spacing of such tables in steps: at least 1 / [`STEP_KM`]. Steps as long as the light is high need 2, or linear interpolation lets the bins'
-/// own pattern through; shorter ones need less, since the light itself is smooth, and keep its lower edge.
+/// Spacing of such tables in steps: at least 1 / [`STEP_KM`]. Steps as long as the light is high need 2, or linear
+/// interpolation lets the bins' own pattern through; shorter ones need less, since the light itself is smooth, and keep
+/// its lower edge.
 const ENTRY_PER_STEP: [f32; 2] = [1.0 / STEP_KM, 2.0];
 /// Steps above which tables are more than a step apart, km.
 const SMOOTH_KM: f32 = 12.0;
-/// Widths of a bin that smoothing spreads light over at most: it reaches two entries far, each less than twice as wide as asked for.
+/// Widths of a bin that smoothing spreads light over at most: it reaches two entries far, each less than twice as wide
+/// as asked for.
 const BLURRED_BINS: f64 = 4.0 * ENTRY_PER_STEP[1] as f64;
 
 /// Brightness by emitter in kR, column after column, without what the air takes away.
@@ -51,8 +58,9 @@ struct Drawing<'a> {
     bins: &'a Bins,
     /// Distance and width of every bin, km.
     distances: &'a [[f64; 2]],
-    /// By row, and [`ROWS`] more.
+    /// By row and by knot, and [`ROWS`] more.
     cotangents: &'a [f32],
+    knots: &'a [f32],
     inverse_sines: &'a [f32],
 }
 
@@ -60,8 +68,8 @@ impl Meridians {
     /// Draws the footprint's sources.
     pub(super) fn new(chart: Chart, field: &FieldLines, profiles: &Profiles, footprint: &Footprint) -> Self {
         let level = Level::new();
-        let [mut cotangents, inverse_sines] = chart.row_tables();
-        cotangents.resize(chart.rows + ROWS, 0.0);
+        let [cotangents, inverse_sines] = chart.row_tables(ROWS * KNOT_ROWS);
+        let knots: Vec<f32> = cotangents.iter().copied().step_by(KNOT_ROWS).collect();
         let distances: Vec<_> = (0..footprint.bins().count).map(|bin| footprint.bins().distance(bin)).collect();
         let mut picture = Self::dark(chart);
         let (chart, strips) = picture.strips();
@@ -72,10 +80,11 @@ impl Meridians {
             bins: footprint.bins(),
             distances: &distances,
             cotangents: &cotangents,
+            knots: &knots,
             inverse_sines: &inverse_sines,
         };
-        strips.for_each_init(StripSums::default, |sums, strip| {
-            dispatch!(level, simd => drawing.strip(simd, strip, footprint, sums));
+        strips.for_each_init(Workspace::default, |workspace, strip| {
+            dispatch!(level, simd => drawing.strip(simd, strip, footprint, workspace));
         });
         picture
     }
@@ -161,17 +170,18 @@ impl Sampler<'_> {
     fn add_place<S: Simd>(&self, simd: S, column: f32, row: f32, light: &mut PerEmitter<f32>) {
         let Meridians { chart, light: all, lit } = self.meridians;
         let left = column.floor();
-        let (across, upper) = (column - left, row as usize);
+        let across = column - left;
+        let upper = (row as usize).min(chart.rows - 2);
         let part = row - upper as f32;
         let (left, right) = (self.held(left as i32), self.held(left as i32 + 1));
         let [first, end] = [lit[left][0].min(lit[right][0]), lit[left][1].max(lit[right][1])];
         if upper as u32 + 1 < first || upper as u32 >= end {
             return;
         }
-        let lower = (upper + 1).min(chart.rows - 1);
-        let (left, right) = (&all[left * chart.rows..][..chart.rows], &all[right * chart.rows..][..chart.rows]);
-        let above = mixed(simd, &left[upper], &right[upper], across);
-        let below = mixed(simd, &left[lower], &right[lower], across);
+        // The row and the one below lie side by side.
+        let both = |column: usize| HalfLanes::from_slice(simd, all[column * chart.rows + upper..][..2].as_flattened());
+        let (left, right) = (both(left), both(right));
+        let (above, below) = (left.like(across)).fused(right - left, left).split();
         *light = above.like(part).fused(below - above, above + FourLanes::simd_from(simd, *light)).into();
     }
 
@@ -189,20 +199,71 @@ impl Sampler<'_> {
     }
 }
 
+/// Light of one column that changes slowly upward: of every [`KNOT_ROWS`] rows, at the first of them and at the one
+/// after the last.
+#[derive(Default)]
+struct SlowLight {
+    light: Vec<[PerEmitter<f32>; 2]>,
+    /// The first that may hold some, and the one after the last.
+    lit: [usize; 2],
+}
+
+impl SlowLight {
+    /// Dark, for so many rows.
+    fn clear(&mut self, rows: usize) {
+        self.light.clear();
+        self.light.resize(rows.div_ceil(KNOT_ROWS), [[0.0; 4]; 2]);
+        self.lit = [usize::MAX, 0];
+    }
+
+    /// Adds light at knots from number `first` on.
+    #[inline(always)]
+    fn add<S: Simd>(&mut self, simd: S, first: usize, knots: &[PerEmitter<f32>]) {
+        self.lit = [self.lit[0].min(first), self.lit[1].max(first + knots.len() - 1)];
+        for (own, ends) in self.light[first..].iter_mut().zip(knots.windows(2)) {
+            let own = own.as_flattened_mut();
+            (HalfLanes::from_slice(simd, ends.as_flattened()) + HalfLanes::from_slice(simd, own)).store_slice(own);
+        }
+    }
+
+    /// Adds all of it to the rows of the column.
+    #[inline(always)]
+    fn add_to<S: Simd>(&self, simd: S, light: &mut [PerEmitter<f32>]) {
+        for knot in self.lit[0]..self.lit[1] {
+            let [low, high] = &self.light[knot];
+            let end = light.len().min((knot + 1) * KNOT_ROWS);
+            for (row, light) in light[knot * KNOT_ROWS..end].iter_mut().enumerate() {
+                let between = mixed(simd, low, high, row as f32 * (1.0 / KNOT_ROWS as f32));
+                *light = (between + FourLanes::simd_from(simd, *light)).into();
+            }
+        }
+    }
+}
+
+/// What a thread keeps from strip to strip.
+#[derive(Default)]
+struct Workspace {
+    sums: StripSums,
+    slow: SlowLight,
+}
+
 impl Drawing<'_> {
     #[inline(always)]
-    fn strip<S: Simd>(&self, simd: S, mut strip: LightStrip, footprint: &Footprint, sums: &mut StripSums) {
+    fn strip<S: Simd>(&self, simd: S, mut strip: LightStrip, footprint: &Footprint, workspace: &mut Workspace) {
+        let Workspace { sums, slow } = workspace;
         footprint.sum(simd, strip.number, self.chart, &self.chart.single_units(strip.number), sums);
         for column in 0..STRIP {
             let meridian = self.field.meridian(self.chart.unit(strip.number * STRIP + column));
             let (first, bins) = sums.column(column, self.bins);
+            slow.clear(self.chart.rows);
             for (number, bin) in bins.iter().enumerate() {
-                self.bin(simd, &meridian, (first + number, bin), &mut strip, column);
+                self.bin(simd, &meridian, (first + number, bin), (&mut strip, column), slow);
             }
             let [first, end] = strip.lit[column].map(|row| row as usize);
             let lit = first.min(end)..end;
-            let light = &mut strip.light[column * self.chart.rows..][lit.clone()];
-            for (light, inverse) in light.iter_mut().zip(&self.inverse_sines[lit]) {
+            let light = &mut strip.light[column * self.chart.rows..][..self.chart.rows];
+            slow.add_to(simd, light);
+            for (light, inverse) in light[lit.clone()].iter_mut().zip(&self.inverse_sines[lit]) {
                 for value in light {
                     *value *= inverse;
                 }
@@ -217,8 +278,8 @@ impl Drawing<'_> {
         simd: S,
         meridian: &Meridian,
         (number, bin): (usize, &Bin),
-        strip: &mut LightStrip,
-        column: usize,
+        (strip, column): (&mut LightStrip, usize),
+        slow: &mut SlowLight,
     ) {
         let [green, red, prompt, by_node] = *bin;
         let all = green + red + prompt;
@@ -229,27 +290,57 @@ impl Drawing<'_> {
         let [distance, width] = self.distances[number];
         let line = meridian.line(distance);
         // Where tables are smoothed, light reaches rows of neighbouring bins.
-        let blurred = if distance < NEAR_BINS * width { BLURRED_BINS * width } else { 0.0 };
+        let near = distance < self.bins.near_to;
+        let blurred = if near { BLURRED_BINS * width } else { 0.0 };
         let top = self.row(&line, distance, -blurred, profile.top_km);
-        let bottom = self.row(&line, distance, blurred, BOTTOM_KM);
+        let bottom = self.row(&line, distance, blurred, profile.bottom_km);
         let end = ((bottom.floor() + 1.0).max(0.0) as usize).min(self.chart.rows);
-        let rows = (top.ceil().max(0.0) as usize).min(end)..end;
-        let light = &mut strip.light_up(column, &rows, self.chart.rows)[rows.clone()];
+        let first = top.ceil().max(0.0) as usize;
+        if first >= end {
+            return;
+        }
         // The bin holds precipitation times its width already; what is left is per km of sight.
         let weights = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
-        let width = width as f32;
-        let stretch = Stretch { line: &line, profile: &profile, distance: distance as f32, width, weights };
-        self.rows(&stretch, rows.start, light);
-        if distance < blurred {
-            // Beyond the observer's own field line the sheet goes on: what smoothing spreads from there would be missed.
-            let line = meridian.line(-distance);
-            let beyond = Stretch { line: &line, profile: &profile, distance: -distance as f32, width, weights };
-            self.rows(&beyond, rows.start, light);
+        let (distance, width) = (distance as f32, width as f32);
+        let stretch = Stretch { line: &line, profile: &profile, distance, width, near, weights };
+        let light = strip.light_up(column, &(first / KNOT_ROWS * KNOT_ROWS..end), self.chart.rows);
+        let rest = if near { first } else { self.slow_rows(&stretch, first..end, slow) };
+        self.rows(&stretch, rest, &mut light[rest.min(end)..end]);
+        if near {
+            // Beyond the observer's own field line the sheet goes on: what smoothing spreads from there would be
+            // missed.
+            let line = meridian.line(-f64::from(distance));
+            let beyond = Stretch { line: &line, distance: -distance, ..stretch };
+            self.rows(&beyond, first, &mut light[first..end]);
         }
     }
 
-    /// The row in which a line of sight passes an altitude on the field line at a distance, moved down by what smoothing over bins of
-    /// distance spreads: where the line of sight sinks along the field, nearer bins are those that show farther down.
+    /// Adds those of the rows in which light changes slowly, the upper ones; gives the first one that is left.
+    #[inline(always)]
+    fn slow_rows<S: Simd>(&self, stretch: &Stretch<S>, rows: Range<usize>, slow: &mut SlowLight) -> usize {
+        let distance = stretch.distance;
+        // Altitude from knot to knot.
+        let knot_km = (KNOT_ROWS as f32 * self.chart.row_step as f32) * (SLOW_KM * SLOW_KM / distance + distance);
+        let end = self.row(stretch.line, f64::from(distance), 0.0, SLOW_KM + knot_km * (1.0 / KNOTS_ABOVE));
+        let end = (end.max(0.0) as usize).min(rows.end.next_multiple_of(KNOT_ROWS));
+        let (mut knot, last) = (rows.start / KNOT_ROWS, end / KNOT_ROWS);
+        if knot >= last {
+            return rows.start;
+        }
+        while knot < last {
+            let Some(cotangents) = self.knots[knot..].first_chunk() else { break };
+            let count = (last - knot + 1).min(ROWS);
+            let mut light = [[0.0; 4]; ROWS];
+            stretch.add(cotangents, &mut light[..count]);
+            slow.add(stretch.weights.simd, knot, &light[..count]);
+            knot += count - 1;
+        }
+        last * KNOT_ROWS
+    }
+
+    /// The row in which a line of sight passes an altitude on the field line at a distance, moved down by what
+    /// smoothing over bins of distance spreads: where the line of sight sinks along the field, nearer bins are those
+    /// that show farther down.
     #[inline(always)]
     fn row(&self, line: &FieldLine, distance: f64, blurred: f64, altitude_km: f32) -> f32 {
         let place = line.place(f64::from(altitude_km));
@@ -277,6 +368,8 @@ struct Stretch<'a, S: Simd> {
     profile: &'a Profile<'a>,
     distance: f32,
     width: f32,
+    /// Whether it is one of the near bins.
+    near: bool,
     weights: FourLanes<S>,
 }
 
@@ -287,21 +380,23 @@ impl<S: Simd> Stretch<'_, S> {
         let mut heights = [0.0; ROWS];
         for i in 0..ROWS {
             let place = self.distance * cotangents[i];
-            heights[i] = altitude(place.mul_add(place + linear, constant)) - BOTTOM_KM;
+            heights[i] = altitude(place.fused(place + linear, constant)) - BOTTOM_KM;
         }
-        // From bin to bin the altitude changes by this at the steepest of these rows, the first.
-        if self.width * cotangents[0].abs().max(cotangents[light.len() - 1].abs()) < STEP_KM {
+        // From bin to bin the altitude changes by this at the steepest of these rows; of far bins in proportion to
+        // itself, as light does.
+        if !self.near || self.width * cotangents[0].abs().max(cotangents[light.len() - 1].abs()) < STEP_KM {
             self.add_rows(self.profile.table(0), &heights, light);
             return;
         }
         let spacings = self.spacings(cotangents);
         for i in 0..light.len() {
-            let height = heights[i].mul_add(lanes::exp2(-spacings[i]), 1.0);
+            let height = heights[i].fused(lanes::exp2(-spacings[i]), 1.0);
             self.add_row(self.profile.table(spacings[i] as usize), height, &mut light[i]);
         }
     }
 
-    /// The tables that rows take, as powers of two: their entries are farther apart where the altitude changes more from bin to bin.
+    /// The tables that rows take, as powers of two: their entries are farther apart where the altitude changes more
+    /// from bin to bin.
     #[inline(always)]
     fn spacings(&self, cotangents: &[f32; ROWS]) -> [f32; ROWS] {
         const MOST: f32 = (SPACINGS - 1) as f32;

@@ -6,6 +6,7 @@ use bansho_base::{
     color,
     math::DVec3,
     observer::{Cancelled, Observer},
+    parameters::Parameter,
     phenomenon::{Phenomenon, Prepared, SnapshotError, Stepping},
     point_cloud::PointCloud,
     random::Key,
@@ -56,10 +57,8 @@ const LONGEST_DISSOLVE_S: f64 = 10.0;
 
 /// Makes what is keyed repeat after `turn` seconds, and room in the preroll for half the dissolve that it gives.
 fn close_loop(parameters: &mut AuroraParameters, turn: f64) -> Result<f64, ShapeFault> {
-    let closed = [("flux_mw_per_m2", &mut parameters.flux_mw_per_m2), ("energy_ev", &mut parameters.energy_ev)]
-        .map(|(key, value)| (key, value.close(turn)));
-    if let Some((key, _)) = closed.into_iter().find(|(_, closes)| !closes) {
-        return Err(ShapeFault { key: key.into(), kind: ShapeFaultKind::LoopJumps { seconds: turn } });
+    if let Some(key) = parameters.close_loop(turn) {
+        return Err(ShapeFault { key, kind: ShapeFaultKind::LoopJumps { seconds: turn } });
     }
     let dissolve = turn.min(LONGEST_DISSOLVE_S);
     parameters.preroll_s += 0.5 * dissolve;

@@ -6,7 +6,7 @@ use bansho_base::{
     camera::Camera,
     canvas::{DepthInterval, Strip, View},
     image::Rect,
-    math::{self, DVec2, DVec3, lanes},
+    math::{self, DVec2, DVec3, Fused, lanes},
     observer::{Cancelled, Observer, check},
     phenomenon::Prepared,
 };
@@ -21,7 +21,7 @@ use super::{
     maps::Maps,
     meridians::{Meridians, Sampler, mixed},
     phenomenon::MEASURED,
-    sources::Sources,
+    sources::{Moments, Sources},
 };
 use crate::{
     aurora::{
@@ -34,7 +34,8 @@ use crate::{
 
 /// Pixels that are worked on at once.
 pub(super) const BATCH: usize = 16;
-/// Pixels from one to the next at which soft light is looked up: a divisor of the distance from the first of a batch to the last.
+/// Pixels from one to the next at which soft light is looked up: a divisor of the distance from the first of a batch to
+/// the last.
 const KNOT_PIXELS: usize = 5;
 /// Altitude whose distance is an aurora's depth, km.
 const DEPTH_KM: f64 = 110.0;
@@ -43,8 +44,8 @@ const FAINTEST: f32 = 0.05;
 /// Motion of the picture while the shutter is open that one instant stands for, pixels, and the most instants.
 const PIXELS_PER_INSTANT: f64 = 1.0;
 const MOST_INSTANTS: f64 = 16.0;
-/// The same for particles, beside their own spread.
-const SPREADS_PER_INSTANT: f64 = 1.0;
+/// The same for particles, beside their own spread: what is left between two instants adds to that.
+const SPREADS_PER_INSTANT: f64 = 3.0;
 
 /// The depths at which auroras are drawn, m: behind the highest mountain, before the sky.
 pub(super) const DEPTHS: DepthInterval = DepthInterval { near: 2e4, far: 1e10 };
@@ -73,7 +74,7 @@ pub(super) struct PreparedAurora<'a> {
 impl<'a> PreparedAurora<'a> {
     pub(super) fn new(aurora: &'a Aurora, view: &'a View, observer: &dyn Observer) -> Result<Self, Cancelled> {
         let field = aurora.field_lines(view.camera.position);
-        let sources = Sources::new(&aurora.light(view), &field, &aurora.instants(view));
+        let sources = Sources::new(&aurora.light(view), &field, &aurora.moments(view));
         check(observer)?;
         let charts = Charts { aurora, field: &field, coverage: Coverage::of_view(view, &field) };
         let pixel = charts.coverage.pixel;
@@ -151,18 +152,22 @@ fn cameras(view: &View) -> Vec<Camera> {
 }
 
 impl Aurora {
-    /// Instants at which particles are drawn, s after their step: more where they get far while the shutter is open.
-    fn instants(&self, view: &View) -> Vec<f64> {
+    /// When particles are drawn: more often where they get far while the shutter is open.
+    fn moments(&self, view: &View) -> Moments {
         let particles = self.simulation.particles();
         let squares: f64 = particles.velocities.iter().flatten().map(|speed| f64::from(speed * speed)).sum();
-        let fast = 2.0 * math::sqrt(squares / particles.len().max(1) as f64);
+        let speed = math::sqrt(squares / particles.len().max(1) as f64);
         let spread = self.light(view).spread_km();
-        let ways = fast * view.shutter.duration() / (SPREADS_PER_INSTANT * spread);
-        let count = ways.ceil().clamp(1.0, MOST_INSTANTS) as usize;
+        let way = speed * view.shutter.duration();
+        let count = (2.0 * way / (SPREADS_PER_INSTANT * spread)).ceil().clamp(1.0, MOST_INSTANTS);
+        // Standard deviation of an even spread over the way of one instant, along each of the two directions.
+        let smear_km = way / count * math::sqrt(1.0 / 24.0);
+        let count = count as usize;
         let now = self.simulation.time();
         // A long exposure has its own afterglow: particles are never taken further than a step.
         let step = AuroraSimulation::STEP_S;
-        (0..count).map(|instant| (view.shutter.instant(instant, count) - now).clamp(-step, step)).collect()
+        let later = (0..count).map(|instant| (view.shutter.instant(instant, count) - now).clamp(-step, step)).collect();
+        Moments { later, smear_km }
     }
 }
 
@@ -191,7 +196,7 @@ impl Batch {
         for i in 0..BATCH {
             let direction = [xs[i], ys[i], zs[i]];
             let (x, y) = (dot(first, direction), dot(second, direction));
-            batch.colatitude[i] = lanes::atan2(x.mul_add(x, y * y).sqrt(), dot(along, direction));
+            batch.colatitude[i] = lanes::atan2(x.fused(x, y * y).sqrt(), dot(along, direction));
             batch.longitude[i] = lanes::atan2(y, x);
         }
         batch.sine = ys;
@@ -226,8 +231,8 @@ impl PreparedAurora<'_> {
     fn rows<S: Simd>(&self, simd: S, slice: &DepthInterval, strip: &mut Strip) {
         let samplers = [self.charts[0].sampler(), self.charts[1].sampler()];
         let rect = strip.rect;
-        // Batches lie on the picture's own grid, so that a crop changes no pixel; those of one column follow each other, since they look
-        // up the same part of the chart.
+        // Batches lie on the picture's own grid, so that a crop changes no pixel; those of one column follow each
+        // other, since they look up the same part of the chart.
         let mut x = rect.x / BATCH * BATCH;
         while x < rect.right() {
             for y in rect.y..rect.bottom() {
@@ -337,7 +342,7 @@ impl PreparedAurora<'_> {
     fn depth(&self, sine: f32) -> f32 {
         const SHELL: f32 = (EARTH_RADIUS_KM + DEPTH_KM) as f32;
         let along = self.from_middle * sine;
-        let squared = along.mul_add(along, (SHELL - self.from_middle) * (SHELL + self.from_middle));
+        let squared = along.fused(along, (SHELL - self.from_middle) * (SHELL + self.from_middle));
         1e3 * (squared.max(0.0).sqrt() - along).abs()
     }
 }

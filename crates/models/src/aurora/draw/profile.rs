@@ -6,20 +6,22 @@ use bansho_base::math;
 
 use crate::aurora::{
     atmosphere::{HIGHEST_KM, LEVELS, LOWEST_KM, level_altitude_km},
-    light::{Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter},
+    light::{EMITTERS, Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter},
     precipitation::energy::NODES,
 };
 
-/// Tables between two nodes of the grid of energies: the nearest is within 0.5 % of the energy, and the red column, which falls fastest, within 1 %.
+/// Tables between two nodes of the grid of energies: the nearest is within 0.5 % of the energy, and the red column,
+/// which falls fastest, within 1 %.
 const FINENESS: usize = 8;
 /// Tables of one energy, each of them smoothed to and sampled at twice the spacing of the one before, from 1 km on.
 pub(super) const SPACINGS: usize = 12;
 /// Where the table of each spacing begins among those of one energy, and the end of all.
 const STARTS: [usize; SPACINGS + 1] = starts();
-/// A column is drawn up to where this share of its light is left above.
-const LEFT_ABOVE: f64 = 3e-4;
+/// A column is drawn from where this share of its light is left below up to where it is left above.
+const LEFT: f64 = 3e-4;
 
-/// Entries of the table of one spacing: one below the levels, and dark ones above them, so that smoothing loses nothing.
+/// Entries of the table of one spacing: one below the levels, and dark ones above them, so that smoothing loses
+/// nothing.
 const fn entries(spacing: usize) -> usize {
     ((LEVELS - 1) >> spacing) + 4
 }
@@ -33,7 +35,8 @@ const fn starts() -> [usize; SPACINGS + 1] {
     starts
 }
 
-/// Light of precipitation by energy and altitude, in kR per km of sight and mW/m^2; tables are made when they are first asked for.
+/// Light of precipitation by energy and altitude, in kR per km of sight and mW/m^2; tables are made when they are first
+/// asked for.
 #[derive(Clone, Debug)]
 pub(super) struct Profiles {
     emission: Emission,
@@ -46,13 +49,16 @@ struct Table {
     light: Vec<PerEmitter<f32>>,
     /// Altitudes above which there is hardly any prompt, and any red light, km.
     tops_km: [f32; 2],
+    /// Altitude below which there is hardly any light, km.
+    bottom_km: f32,
 }
 
 /// Light by altitude of one energy.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Profile<'a> {
     light: &'a [PerEmitter<f32>],
-    /// Altitude above which there is hardly any light, km.
+    /// Altitudes between which nearly all light is, km.
+    pub(super) bottom_km: f32,
     pub(super) top_km: f32,
 }
 
@@ -67,8 +73,8 @@ impl Profiles {
     pub(super) fn at(&self, node: f32, red: bool) -> Profile<'_> {
         let last = self.tables.len() - 1;
         let fine = ((node * FINENESS as f32 + 0.5).max(0.0) as usize).min(last);
-        let Table { light, tops_km: [prompt_km, red_km] } = self.table(fine);
-        Profile { light, top_km: if red { red_km.max(*prompt_km) } else { *prompt_km } }
+        let Table { light, tops_km: [prompt_km, red_km], bottom_km } = self.table(fine);
+        Profile { light, bottom_km: *bottom_km, top_km: if red { red_km.max(*prompt_km) } else { *prompt_km } }
     }
 
     #[inline(never)]
@@ -88,7 +94,11 @@ impl Table {
             light.extend((0..entries(spacing)).map(|at| entry(at).map(|value| value as f32)));
             table = halved(&table);
         }
-        Self { light, tops_km: [Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| top_km(profile, emitter)) }
+        Self {
+            light,
+            tops_km: [Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| top_km(profile, emitter)),
+            bottom_km: EMITTERS.map(|emitter| bottom_km(profile, emitter)).into_iter().fold(f32::INFINITY, f32::min),
+        }
     }
 }
 
@@ -118,14 +128,24 @@ fn halved(table: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
 }
 
 fn top_km(profile: &[PerEmitter<f64>], emitter: Emitter) -> f32 {
+    let passed = passed((0..LEVELS).rev(), profile, emitter);
+    level_altitude_km(LEVELS - 1 - passed.min(LEVELS - 2)).min(HIGHEST_KM) as f32
+}
+
+fn bottom_km(profile: &[PerEmitter<f64>], emitter: Emitter) -> f32 {
+    level_altitude_km(passed(0..LEVELS, profile, emitter).saturating_sub(1)) as f32
+}
+
+/// How many of the levels, in that order, hold hardly any of the light together.
+fn passed(levels: impl Iterator<Item = usize>, profile: &[PerEmitter<f64>], emitter: Emitter) -> usize {
     let light = |level: usize| profile[level][emitter.index()];
     let whole: f64 = (0..LEVELS).map(light).sum();
-    let mut above = 0.0;
-    let passed = (0..LEVELS).rev().take_while(|level| {
-        above += light(*level);
-        above < LEFT_ABOVE * whole
-    });
-    level_altitude_km(LEVELS - 1 - passed.count().min(LEVELS - 2)).min(HIGHEST_KM) as f32
+    let mut sum = 0.0;
+    let hardly_any = |level: &usize| {
+        sum += light(*level);
+        sum < LEFT * whole
+    };
+    levels.take_while(hardly_any).count()
 }
 
 /// Altitude of the second entry of all tables, km.

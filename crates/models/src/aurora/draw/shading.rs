@@ -10,7 +10,8 @@ use crate::{
     lanes::{FourLanes, Real},
 };
 
-/// Steps from the horizon to the zenith, even in the root of the sine of the elevation: the air changes fast near the horizon.
+/// Steps from the horizon to the zenith, even in the root of the sine of the elevation: the air changes fast near the
+/// horizon.
 const STEPS: usize = 1024;
 /// Where the visible light of the first positive bands has its middle, nm.
 const BANDS_NM: f64 = 655.0;

@@ -1,7 +1,7 @@
 //! What shines: particles for light that leaves at once, the afterglow's cells for green and red.
 
 use bansho_base::{
-    math::{self, lanes},
+    math::{self, Fused, lanes},
     parameters::Auto,
 };
 use fearless_simd::{Level, dispatch};
@@ -10,13 +10,16 @@ use rayon::prelude::*;
 use super::{
     Blur, DrawingParameters,
     footprint::{REACH, Source},
-    geometry::FieldLines,
+    geometry::{FieldLines, Foot},
 };
-use crate::aurora::{
-    afterglow::{GlowCell, GlowMap},
-    light::{Emission, Emitter},
-    particles::AuroraParticles,
-    precipitation::energy::{LOWEST_EV, NODES, node_energy_ev},
+use crate::{
+    aurora::{
+        afterglow::{GlowCell, GlowMap},
+        light::{Emission, Emitter},
+        particles::AuroraParticles,
+        precipitation::energy::{LOWEST_EV, NODES, node_energy_ev},
+    },
+    lanes::LANES,
 };
 
 /// Sources that a task of the thread pool makes.
@@ -53,12 +56,11 @@ pub(super) struct Maker<'a> {
 
 impl Maker<'_> {
     #[inline(always)]
-    fn make(&self, [east, south]: [f32; 2], powers_w: [f32; 3], energy_ev: f32) -> Source {
-        let foot = self.field.foot(east, south);
+    fn make(&self, foot: Foot, powers_w: [f32; 3], node: f32) -> Source {
         let scale = self.share * PER_UNIT * foot.upright;
         let [green, red, prompt] = powers_w;
         let power = [green * scale, red * scale, prompt * scale];
-        Source { across: foot.across, reach: self.reach, node: node_of(energy_ev), power }
+        Source { across: foot.across, reach: self.reach, node, power }
     }
 
     /// A source for each of the cells, which gives these shares of its light.
@@ -74,8 +76,9 @@ impl Maker<'_> {
     #[inline(always)]
     fn fill_from_cells(&self, sources: &mut [Source], cells: &[GlowCell], shares: Shares) {
         for (source, cell) in sources.iter_mut().zip(cells) {
+            let [east, south] = cell.position_km;
             let powers = shares.map(|share| share * cell.power_w);
-            *source = self.make(cell.position_km, powers, cell.energy_ev);
+            *source = self.make(self.field.foot(east, south), powers, node_of(cell.energy_ev));
         }
     }
 
@@ -99,11 +102,27 @@ impl Maker<'_> {
         later: f32,
     ) {
         let ([xs, zs], [us, ws]) = (&particles.positions, &particles.velocities);
-        for (number, source) in sources.iter_mut().enumerate() {
-            let index = first + number;
-            let place = [us[index].mul_add(later, xs[index]), ws[index].mul_add(later, zs[index])];
-            let powers = [green_w[index], 0.0, particles.powers_w[index]];
-            *source = self.make(place, powers, particles.energies_ev[index]);
+        for (number, sources) in sources.chunks_mut(LANES).enumerate() {
+            let (first, count) = (first + number * LANES, sources.len());
+            let mut places = [[0.0; LANES]; 2];
+            let mut energies = [LOWEST_EV as f32; LANES];
+            for i in 0..count {
+                places[0][i] = us[first + i].fused(later, xs[first + i]);
+                places[1][i] = ws[first + i].fused(later, zs[first + i]);
+                energies[i] = particles.energies_ev[first + i];
+            }
+            let mut feet = [[0.0; LANES]; 3];
+            let mut nodes = [0.0; LANES];
+            for i in 0..LANES {
+                let Foot { across: [x, y], upright } = self.field.foot(places[0][i], places[1][i]);
+                (feet[0][i], feet[1][i], feet[2][i]) = (x, y, upright);
+                nodes[i] = node_of(energies[i]);
+            }
+            for (i, source) in sources.iter_mut().enumerate() {
+                let foot = Foot { across: [feet[0][i], feet[1][i]], upright: feet[2][i] };
+                let powers = [green_w[first + i], 0.0, particles.powers_w[first + i]];
+                *source = self.make(foot, powers, nodes[i]);
+            }
         }
     }
 }
@@ -116,12 +135,12 @@ pub(super) fn node_of(energy_ev: f32) -> f32 {
 }
 
 impl Sources {
-    /// What shines at the `instants`, seconds after the particles' step; each has an equal part of the power.
-    pub(super) fn new(light: &Light, field: &FieldLines, instants: &[f64]) -> Self {
+    /// What shines while the shutter is open.
+    pub(super) fn new(light: &Light, field: &FieldLines, moments: &Moments) -> Self {
         let (green_w, green) = light.glow[0].shared_out(light.particles, FAINTEST);
         let red: Vec<_> = light.glow[1].cells().collect();
         let column = light.emission.column(light.energy_ev);
-        let spread = light.spread_km();
+        let spread = math::hypot(light.spread_km(), moments.smear_km);
         let with = |emitter: Emitter, map: &GlowMap| {
             let diffusion = column.spread_km[emitter.index()];
             math::sqrt(spread * spread + diffusion * diffusion + map.cell_km() * map.cell_km() / 6.0)
@@ -129,13 +148,21 @@ impl Sources {
         let maker = |spread: f64, share| Maker { field, reach: spread as f32 * REACH, share };
         let red_spread = with(Emitter::OxygenRed, light.glow[1]);
         let mut sharp = maker(with(Emitter::OxygenGreen, light.glow[0]), 1.0).cells(&green, GREEN);
-        let moving = maker(spread, 1.0 / instants.len().max(1) as f32);
-        for later in instants {
+        let moving = maker(spread, 1.0 / moments.later.len().max(1) as f32);
+        for later in &moments.later {
             sharp.extend(moving.particles(light.particles, &green_w, *later as f32));
         }
         let soft = maker(red_spread, 1.0).cells(&red, RED);
         Self { sharp, soft, spread_km: [spread, red_spread] }
     }
+}
+
+/// When particles are drawn.
+pub(super) struct Moments {
+    /// Instants, s after their step; each has an equal part of the power.
+    pub(super) later: Vec<f64>,
+    /// How far they are spread by their motion from one to the next (standard deviation), km.
+    pub(super) smear_km: f64,
 }
 
 /// What an aurora's light is made from.
@@ -165,8 +192,8 @@ impl Light<'_> {
     }
 }
 
-/// Root mean square distance from the field line, along one direction, of the collisions of an electron whose altitudes in km these are
-/// (from the first on) and whose every collision turns it by a tangent of rms `wobble`.
+/// Root mean square distance from the field line, along one direction, of the collisions of an electron whose altitudes
+/// in km these are (from the first on) and whose every collision turns it by a tangent of rms `wobble`.
 pub(super) fn wander_km(altitudes_km: &[f64], wobble: f64) -> f64 {
     let mut variance = 0.0;
     let mut sum = 0.0;

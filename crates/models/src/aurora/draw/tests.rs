@@ -233,7 +233,8 @@ fn the_fall_of_the_thesis_can_be_drawn_and_lies_elsewhere() {
     assert!(violet[0].abs_diff(violet[1]) < 25, "{violet:?}");
 }
 
-/// Standard deviation in pixels, from left to right, of the violet light of a lone field line to the north where it is 110 km high, blurred in the picture.
+/// Standard deviation in pixels, from left to right, of the violet light of a lone field line to the north where it is
+/// 110 km high, blurred in the picture.
 fn blurred_width(north_km: f32, radii: &BlurParameters) -> f64 {
     let (profiles, view, field) =
         (Profiles::new(&emission()), view(Lens::Perspective, [0.0, 40.0, -60.0], [320, 240]), field(77.0));

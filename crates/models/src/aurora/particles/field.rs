@@ -4,7 +4,7 @@
 //! is natural here is the cell and the frame, as the constants say.
 
 use bansho_base::{
-    math::{self, DVec2},
+    math::{self, DVec2, Fused},
     noise::{Coordinate, Fractal, Noise},
     parameters::Auto,
     random::{Key, Purpose},
@@ -173,7 +173,7 @@ impl FieldMaker {
             let [x, z] = gradient.values()[inner];
             [noisy.values()[inner] as f32, -x as f32, -z as f32]
         };
-        (0..(columns + 2) * (rows + 2)).map(value).collect()
+        (0..(columns + 2) * (rows + 2)).into_par_iter().with_min_len(TASK).map(value).collect()
     }
 
     fn add_noise(&self, potential: &mut Grid2, time: f64) {
@@ -185,12 +185,13 @@ impl FieldMaker {
         let scale = potential.spacing() / field.noise_scale_km;
         let columns = potential.size()[0];
         let along: Vec<f32> = (0..columns).map(|column| (column as f64 * scale) as f32).collect();
-        let (level, mut values) = (Level::new(), vec![0.0_f32; columns]);
-        for (row, cells) in potential.values_mut().chunks_mut(columns).enumerate() {
+        let level = Level::new();
+        let rows = potential.values_mut().par_chunks_mut(columns).enumerate();
+        rows.for_each_with(vec![0.0_f32; columns], |values, (row, cells)| {
             let origin = [0.0, row as f64 * scale, time / field.noise_life_s].map(Coordinate::from_f64);
-            self.noise.row(level, origin, &along, &mut values);
-            cells.iter_mut().zip(&values).for_each(|(cell, noise)| *cell += field.noise * depth * f64::from(*noise));
-        }
+            self.noise.row(level, origin, &along, values);
+            cells.iter_mut().zip(values).for_each(|(cell, noise)| *cell += field.noise * depth * f64::from(*noise));
+        });
     }
 }
 
@@ -219,9 +220,9 @@ impl Field {
         let (lower, upper) = (&self.table[first..first + 2], &self.table[second..second + 2]);
         let mut sample = [0.0; 3];
         for k in 0..3 {
-            let lower = s.mul_add(lower[1][k] - lower[0][k], lower[0][k]);
-            let upper = s.mul_add(upper[1][k] - upper[0][k], upper[0][k]);
-            sample[k] = t.mul_add(upper - lower, lower);
+            let lower = s.fused(lower[1][k] - lower[0][k], lower[0][k]);
+            let upper = s.fused(upper[1][k] - upper[0][k], upper[0][k]);
+            sample[k] = t.fused(upper - lower, lower);
         }
         let [potential, east, south] = sample;
         FieldSample { potential, field: [east, south] }

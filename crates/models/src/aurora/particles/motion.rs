@@ -1,6 +1,6 @@
 //! Forces and the step (thesis, 2.3.1 to 2.3.3).
 
-use bansho_base::math;
+use bansho_base::math::{self, Fused};
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
@@ -71,7 +71,7 @@ impl Repulsion {
         self.cells.set_support_radius(support_km as f32);
         particles.sort(&mut self.cells);
         self.masses.clear();
-        self.masses.extend(particles.fades.iter().map(|fade| fade.mul_add(1.0 - LEAST_MASS, LEAST_MASS)));
+        self.masses.extend(particles.fades.iter().map(|fade| fade.fused(1.0 - LEAST_MASS, LEAST_MASS)));
         densities(&mut self.cells, self.density_kernel, &self.masses, &mut self.densities);
         // To itself a particle is all there: one that is just appearing would be next to weightless, and be flung away.
         let whole = self.density_kernel.at_centre::<2>(self.cells.support_radius());
@@ -148,13 +148,13 @@ impl Mover {
         const STEP: f32 = FRAME_S as f32;
         let here = field.sample(place[0], place[1]);
         let [cosine, sine] = self.turn;
-        let speed = [cosine.mul_add(speed[0], sine * speed[1]), cosine.mul_add(speed[1], -sine * speed[0])];
+        let speed = [cosine.fused(speed[0], sine * speed[1]), cosine.fused(speed[1], -sine * speed[0])];
         let (mut to, mut new) = ([0.0; 2], [0.0; 2]);
         for c in 0..2 {
-            let force = self.pull_weight.mul_add(here.field[c], self.repulsion_weight * push[c]);
-            let moved = (0.5 * STEP * STEP).mul_add(force, STEP.mul_add(speed[c], place[c]));
+            let force = self.pull_weight.fused(here.field[c], self.repulsion_weight * push[c]);
+            let moved = (0.5 * STEP * STEP).fused(force, STEP.fused(speed[c], place[c]));
             to[c] = if moved.is_finite() { moved.clamp(-self.half_km, self.half_km) } else { place[c] };
-            new[c] = self.kept_speed * STEP.mul_add(force, speed[c]);
+            new[c] = self.kept_speed * STEP.fused(force, speed[c]);
         }
         let fall = here.potential - field.sample(to[0], to[1]).potential;
         let factor = self.allowed(speed, new, fall);
@@ -164,8 +164,8 @@ impl Mover {
     /// The factor that holds kinetic plus potential energy; `fall` is by how much the potential has fallen.
     #[inline(always)]
     fn allowed(&self, before: [f32; 2], after: [f32; 2], fall: f32) -> f32 {
-        let square = |v: [f32; 2]| v[0].mul_add(v[0], v[1] * v[1]);
-        let energy = (2.0 * self.pull_weight).mul_add(fall, square(before)).max(0.0);
+        let square = |v: [f32; 2]| v[0].fused(v[0], v[1] * v[1]);
+        let energy = (2.0 * self.pull_weight).fused(fall, square(before)).max(0.0);
         let found = square(after);
         if !found.is_finite() {
             0.0

@@ -1,6 +1,7 @@
 //! The particles as arrays.
 
 use bansho_base::math::DVec2;
+use rayon::prelude::*;
 
 use crate::sph::{self, Cells};
 
@@ -92,7 +93,7 @@ impl AuroraParticles {
 
     /// Keeps those of which `keep` says so, in their order.
     pub(super) fn retain(&mut self, keep: &[bool]) {
-        self.numbers_mut().into_iter().for_each(|values| sph::retain(values, keep));
+        self.numbers_mut().into_par_iter().for_each(|values| sph::retain(values, keep));
         sph::retain(&mut self.ids, keep);
         sph::retain(&mut self.dying, keep);
         sph::retain(&mut self.sheets, keep);

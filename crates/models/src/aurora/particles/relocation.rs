@@ -4,6 +4,7 @@ use bansho_base::{
     math::DVec2,
     random::{Key, Purpose, uniform},
 };
+use rayon::prelude::*;
 
 use super::{
     AuroraParticles,
@@ -16,6 +17,8 @@ const BIRTH: Purpose = Purpose::named("aurora birth");
 const THINNING: Purpose = Purpose::named("aurora thinning");
 /// The counts of table 3.3 are taken as those of a near cell that holds this many particles on average.
 const TABLE_COUNT: f64 = 75.0;
+/// Particles that a task of the thread pool finds the cells of, at least.
+const TASK: usize = 4096;
 /// How much a cell counts beside each of those around it where it is found what it lacks.
 const OWN_WEIGHT: f64 = 12.0;
 
@@ -57,7 +60,8 @@ impl Relocation {
         let near = near_cells(field, &self.parameters);
         let shares = self.shares(field, &near);
         let scale = self.scale(&shares);
-        let homes: Vec<Option<usize>> = (0..particles.len()).map(|i| home(particles, field, i)).collect();
+        let homes = (0..particles.len()).into_par_iter().with_min_len(TASK);
+        let homes: Vec<Option<usize>> = homes.map(|i| home(particles, field, i)).collect();
         for (index, home) in homes.iter().enumerate() {
             particles.dying[index] |= !home.is_some_and(|cell| near[cell]);
         }

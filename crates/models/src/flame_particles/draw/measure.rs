@@ -66,6 +66,8 @@ const MOTION: [usize; 2] = [4, 5];
 pub(crate) struct Motion {
     grid: Grid,
     weights: Vec<[f32; 4]>,
+    /// Least and greatest motion of any gas, for each of the two.
+    bounds: [[f32; 2]; 2],
 }
 
 /// Glowing gas as sprites of its motion.
@@ -100,9 +102,12 @@ impl Kind for Glowing<'_> {
 impl Motion {
     pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View) -> Option<Self> {
         let sprites = seen(gas, view, &Glowing { gas, look });
+        let motions =
+            |axis: usize| sprites.iter().flatten().map(move |sprite| sprite.values[1 + axis] / sprite.values[0]);
+        let bounds = [0, 1].map(|axis| bounds(motions(axis)));
         let grid =
             splat(&Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, window: view.window }, &sprites)?;
-        Some(Self { weights: spline::weights(&grid.cells), grid })
+        Some(Self { weights: spline::weights(&grid.cells), grid, bounds })
     }
 
     /// Pixels to the right and down that the gas at a pixel moves until the next frame.
@@ -115,8 +120,17 @@ impl Motion {
         weigh(&mut four, rows, &self.weights[down]);
         let plane = |plane: usize| (0..4).map(|k| four[3 * k + plane] * self.weights[across][k]).sum::<f32>();
         let weight = plane(0);
-        if weight > 0.0 { [plane(1) / weight, plane(2) / weight] } else { [0.0; 2] }
+        let mean = |axis: usize| {
+            let [least, greatest] = self.bounds[axis];
+            (plane(1 + axis) / weight).max(least).min(greatest)
+        };
+        if weight > 0.0 { [mean(0), mean(1)] } else { [0.0; 2] }
     }
+}
+
+/// Least and greatest of some numbers.
+pub(crate) fn bounds(values: impl Iterator<Item = f32>) -> [f32; 2] {
+    values.fold([f32::INFINITY, f32::NEG_INFINITY], |[least, greatest], value| [least.min(value), greatest.max(value)])
 }
 
 impl Resolve<'_> {
@@ -146,7 +160,7 @@ impl Resolve<'_> {
                     }
                     strip.aovs[OPTICAL_DEPTH].add(index, tau, 1.0);
                     if glow > DARK {
-                        strip.aovs[TEMPERATURE].add(index, heat / glow, glow);
+                        strip.aovs[TEMPERATURE].add(index, self.temperature(heat, glow), glow);
                         let moved = motion.map_or([0.0; 2], |motion| motion.at(pixel, y));
                         (0..2).for_each(|axis| strip.aovs[MOTION[axis]].add(index, moved[axis], glow));
                     }

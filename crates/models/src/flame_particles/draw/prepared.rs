@@ -25,7 +25,7 @@ use super::{
     kernel::Profile,
     layers::Layers,
     look::{LookParameters, Sprite as Choice},
-    measure::Motion,
+    measure::{Motion, bounds},
     resolve::{BLUE, Extents, GLOW, HEAT, Layer, MATTER, PATH, PLANES, Resolve, TAU},
     splat::{COARSE, Sheet, Sprite, splat},
     spline,
@@ -67,6 +67,7 @@ struct Sums {
     detail: Option<Detail>,
     scattered: Vec<[f32; 3]>,
     motion: OnceLock<Option<Motion>>,
+    temperatures: [f32; 2],
 }
 
 /// The fire whose sparks fly.
@@ -144,6 +145,7 @@ impl<'a> PreparedGas<'a> {
             scattered: &sums.scattered,
             weights: &sums.weights,
             columns: &sums.columns,
+            temperatures: sums.temperatures,
         }
     }
 }
@@ -173,6 +175,7 @@ fn sums(gas: &Gas, look: &LookParameters, view: &View, survey: &Survey, surround
         detail,
         scattered: scattered.collect(),
         motion: OnceLock::new(),
+        temperatures: bounds(gas.particles.temperature.iter().copied()),
     })
 }
 

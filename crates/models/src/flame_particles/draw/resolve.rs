@@ -48,6 +48,8 @@ pub(crate) struct Resolve<'a> {
     pub(crate) weights: &'a [[f32; 4]],
     /// The first of the four columns around each pixel of the whole picture's rows, and the pixel's phase.
     pub(crate) columns: &'a [(usize, usize)],
+    /// Least and greatest temperature of the gas, K.
+    pub(crate) temperatures: [f32; 2],
 }
 
 /// One layer of the gas in a strip.
@@ -212,7 +214,7 @@ impl Resolve<'_> {
         }
         for lane in 0..LANES {
             if glow[lane] > 0.0 && tau[lane] > 0.0 {
-                let hue = table.radiance(heat[lane] / glow[lane] * heat_factor[lane]);
+                let hue = table.radiance(self.temperature(heat[lane], glow[lane]) * heat_factor[lane]);
                 // The sum's luminance is exact; its colour is that of its mean temperature, a little hotter where it burns most.
                 let factor = emitting[lane] * glow[lane] / (tau[lane] * color::luminance(hue).max(1e-20));
                 for c in 0..3 {
@@ -228,6 +230,15 @@ impl Resolve<'_> {
             }
         }
         Light { planes }
+    }
+}
+
+impl Resolve<'_> {
+    /// Mean temperature, K. Where hardly anything glows it is a ratio of rounding errors, so it is held to what is there.
+    #[inline(always)]
+    pub(crate) fn temperature(&self, heat: f32, glow: f32) -> f32 {
+        let [coldest, hottest] = self.temperatures;
+        (heat / glow).max(coldest).min(hottest)
     }
 }
 

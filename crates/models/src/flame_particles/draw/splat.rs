@@ -133,11 +133,11 @@ impl Whole {
 
     /// The pixels of the window that sprites touch.
     fn covered(&self, window: Rect) -> Option<Rect> {
-        let clip = |value: f32, from: usize, to: usize| (value.max(0.0) as usize).clamp(from, to);
-        let [x, y] = [(0, window.x, window.right()), (1, window.y, window.bottom())]
-            .map(|(axis, from, to)| clip(self.low[axis], from, to));
-        let [right, bottom] = [(0, window.x, window.right()), (1, window.y, window.bottom())]
-            .map(|(axis, from, to)| clip(self.high[axis] + 1.0, from, to));
+        let clip = |value: [f32; 2]| {
+            let [x, y] = value.map(|value| value.max(0.0) as usize);
+            [x.clamp(window.x, window.right()), y.clamp(window.y, window.bottom())]
+        };
+        let ([x, y], [right, bottom]) = (clip(self.low), clip(self.high.map(|value| value + 1.0)));
         (right > x && bottom > y).then(|| Rect { x, y, width: right - x, height: bottom - y })
     }
 }

@@ -336,15 +336,55 @@ fn aovs_measure_temperature_depth_and_motion() {
     let view = view(camera());
     let moving = Particle { velocity: [2.0, 1.0, 0.0], ..ball(0, [0.0; 3], 1640.0, 1e-7) };
     let strip = drawn(&cloud([moving]), &smooth(), &view, AOVS.len(), None);
-    let at = |name: &str| {
-        let plane = AOVS.iter().position(|aov| aov.name == name).unwrap();
-        f64::from(strip.aovs[plane].resolve(60 * SIZE[0] + 80, AOVS[plane].rule))
-    };
+    let at = |name: &str| aov(&strip, name, 80, 60);
     assert!((at("temperature_k") - 1640.0).abs() < 0.5);
     let depth = LINE_PEAK / 0.09 * 0.001 * soot_absorption(1e-7, &smooth());
     assert!((at("optical_depth") / depth - 1.0).abs() < 0.05, "{} for {depth}", at("optical_depth"));
     let pixels = 0.04 * view.camera.focal_pixels / DISTANCE;
     assert!((at("motion.X") - 2.0 * pixels).abs() < 1e-3 && (at("motion.Y") + pixels).abs() < 1e-3);
+}
+
+/// What an AOV says at a pixel.
+fn aov(strip: &Strip, name: &str, x: usize, y: usize) -> f64 {
+    let plane = AOVS.iter().position(|aov| aov.name == name).unwrap();
+    f64::from(strip.aovs[plane].resolve(y * SIZE[0] + x, AOVS[plane].rule))
+}
+
+#[test]
+fn temperature_is_weighted_by_light_and_stays_among_those_that_are_there() {
+    let view = view(camera());
+    let (cold, hot) = (ball(0, [0.0; 3], 1400.0, 1e-8), ball(1, [0.0, 0.0, -0.5], 1800.0, 1e-8));
+    let both = drawn(&cloud([cold, hot]), &smooth(), &view, AOVS.len(), None);
+    // Both are thin and as large, but the farther one is seen smaller by the ratio of distances.
+    let shares = [cold, hot].map(|ball| black(ball.temperature));
+    let expected = (1400.0 * shares[0] + 1800.0 * shares[1]) / (shares[0] + shares[1]);
+    let seen = aov(&both, "temperature_k", 80, 60);
+    assert!((seen - expected).abs() < 3.0, "{seen} for {expected}");
+    let crowd = drawn(&glowing_cloud(400), &smooth(), &view, AOVS.len(), None);
+    let glowing = (0..SIZE[0] * SIZE[1]).map(|i| aov(&crowd, "temperature_k", i % SIZE[0], i / SIZE[0]));
+    let glowing: Vec<f64> = glowing.filter(|temperature| *temperature > 0.0).collect();
+    assert!(glowing.len() > 1000, "{}", glowing.len());
+    assert!(glowing.iter().all(|temperature| (1550.0..=1850.0).contains(temperature)), "those of the cloud");
+}
+
+#[test]
+fn deflection_is_written_as_light_is_bent() {
+    let view = view(camera());
+    let particles = glowing_cloud(200);
+    let strip = drawn(&particles, &smooth(), &view, AOVS.len(), None);
+    let angles = prepared(&particles, &smooth(), &view, |prepared| {
+        let bend = prepared.deflection().unwrap();
+        (bend.rect, bend.angle.clone())
+    });
+    let (rect, angles) = angles;
+    assert!(rect.width > 20 && rect.height > 20);
+    for y in rect.y..rect.bottom() {
+        for x in rect.x..rect.right() {
+            let angle = angles.at(x - rect.x, y - rect.y).map(f64::from);
+            let written = ["deflection.X", "deflection.Y"].map(|name| aov(&strip, name, x, y));
+            assert!((angle[0] - written[0]).abs() < 1e-9 && (angle[1] - written[1]).abs() < 1e-9, "{x} {y}");
+        }
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What fires do: they are as high as Heskestad says, puff as Cetegen and Ahmed say, narrow upward, and lean with the wind.
 
-use bansho_base::{animation::Animated, math};
+use bansho_base::{animation::Animated, curve::Interpolation, math};
 
 use super::*;
 use crate::flame_particles::{heskestad, parameters::BurnerParameters};
@@ -97,4 +97,28 @@ fn wind_bends_the_flame_the_more_the_stronger_it_is() {
     };
     let [left, little, calm, right] = [-3.0, -1.0, 0.0, 3.0].map(lean);
     assert!(left < little - 0.05 && little < calm - 0.03 && right > calm + 0.08, "{left} {little} {calm} {right}");
+}
+
+#[test]
+fn gas_is_born_where_a_moving_burner_is_and_stays_behind_it() {
+    let across = vec![(0.0, [-1.0, 0.0, 0.0]), (0.5, [-1.0, 0.0, 0.0]), (1.0, [1.0, 0.0, 0.0])];
+    let mut moved = fire(60.0, 0.3);
+    moved.burners[0].position = Animated::keyed(across, Interpolation::Linear).unwrap();
+    let mut simulation = simulation(&moved);
+    let mut births = 0;
+    World::default().run(&mut simulation, 1.0, |simulation, t| {
+        let burner = (4.0 * t - 3.0).clamp(-1.0, 1.0) as f32;
+        let particles = &simulation.particles;
+        let newborn = (0..particles.len()).filter(|index| particles.age[*index] <= 2.01 * simulation.step_s() as f32);
+        for index in newborn {
+            births += 1;
+            let aside = (place(simulation, index).x - burner).abs();
+            assert!(aside < 0.3, "born {aside} m from the middle at {t}");
+        }
+    });
+    assert!(births > 1000);
+    let behind = lit(&simulation).iter().map(|index| place(&simulation, *index).x).fold(f32::INFINITY, f32::min);
+    assert!(behind < 0.5, "what it left burns on where it was left: {behind}");
+    let [low, high] = simulation.design.domain;
+    assert!(low.x < -2.0 && high.x > 2.0, "there is room at both ends of its way");
 }

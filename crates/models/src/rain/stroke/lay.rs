@@ -1,5 +1,7 @@
 //! Laying a streak into a patch: eight rows of a column at a time.
 
+use bansho_base::math::Fused;
+
 use super::{
     super::{
         bands::BAND,
@@ -14,8 +16,8 @@ use super::{
 fn disc_share(t: f32) -> f32 {
     let t = at_most(1.0, at_least(-1.0, t));
     let s = t * t;
-    let odd = t * (-0.022_935_f32).mul_add(s, -0.025).mul_add(s, -1.0 / 6.0).mul_add(s, 1.0);
-    odd.mul_add(std::f32::consts::FRAC_2_PI, 0.5)
+    let odd = t * (-0.022_935_f32).fused(s, -0.025).fused(s, -1.0 / 6.0).fused(s, 1.0);
+    odd.fused(std::f32::consts::FRAC_2_PI, 0.5)
 }
 
 /// 0, 1 and so on, of each row.

@@ -54,6 +54,15 @@ fn values_of_inner_tables_and_lists_change_where_they_stand() {
 }
 
 #[test]
+fn the_first_item_of_a_list_that_is_missing_is_made() {
+    let operations = [keyframe("flame_sheet.1.instances.0.rotation_y_deg", 0.5, 3.0)];
+    let text = apply(SCENE, &operations).unwrap();
+    let made = "instances = [{ rotation_y_deg = { keys = [[0.5, 3.0]] } }]";
+    assert_eq!(lines_that_differ(SCENE, &text), [made]);
+    assert!(apply(SCENE, &[set_to("flame_sheet.1.instances.1.position", Value::Number(0.0))]).is_err());
+}
+
+#[test]
 fn tables_that_are_missing_are_made() {
     let operations =
         [set_to("picture.frames", Value::Integer(9)), set_to("flame_sheet.1.smoke.optical_depth", Value::Number(0.4))];

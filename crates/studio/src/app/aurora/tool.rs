@@ -35,7 +35,10 @@ impl Tool {
             Self::Draw => ("Draw", "Drag on the right to draw the yellow sheet; click a sheet to draw that one next"),
             Self::Move => ("Move", "Drag points of the sheets on the right"),
             Self::Smooth => ("Smooth", "Brush over a sheet on the right to smooth it"),
-            Self::Erase => ("Erase", "Brush away points of the sheets on the right; a sheet goes with its last two"),
+            Self::Erase => (
+                "Erase",
+                "Brush away points of the sheets on the right; a sheet goes with its last two, from all shapes",
+            ),
             Self::Split => ("Split", "Click a sheet of the source where it shall split on the way"),
             Self::Merge => ("Merge", "Click two ends of the source that shall grow together on the way"),
             Self::Link => (

@@ -1,6 +1,10 @@
 //! Files by way of the browser: chosen by the user, and handed back as downloads.
 
-use std::{cell::RefCell, rc::Rc};
+use std::{
+    cell::RefCell,
+    io::{self, Write},
+    rc::Rc,
+};
 
 use eframe::egui::{Context, DroppedFileHandle};
 use wasm_bindgen::{JsCast, JsValue, closure::Closure};
@@ -43,12 +47,34 @@ pub(super) fn take_dropped(file: DroppedFileHandle, inbox: &Inbox, ctx: &Context
     });
 }
 
-/// Hands `bytes` to the user as a file called `name`.
+/// The bytes of a file, kept by the browser: the program's own memory is small.
+#[derive(Default)]
+pub(super) struct Parts(js_sys::Array);
+
+impl Parts {
+    /// A file that is made already.
+    pub(super) fn of(bytes: &[u8]) -> Self {
+        Self(js_sys::Array::of1(&js_sys::Uint8Array::from(bytes)))
+    }
+}
+
+impl Write for Parts {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.push(&js_sys::Uint8Array::from(bytes));
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Hands a file called `name` to the user.
 ///
 /// # Errors
 /// The page cannot make files.
-pub(super) fn download(name: &str, bytes: &[u8]) -> Result<(), JsValue> {
-    let blob = Blob::new_with_u8_array_sequence(&js_sys::Array::of1(&js_sys::Uint8Array::from(bytes)))?;
+pub(super) fn download(name: &str, parts: &Parts) -> Result<(), JsValue> {
+    let blob = Blob::new_with_u8_array_sequence(&parts.0)?;
     let url = Url::create_object_url_with_blob(&blob)?;
     let link: HtmlAnchorElement = element("a")?;
     link.set_href(&url);

@@ -106,16 +106,11 @@ impl Files {
             }
         });
         ui.separator();
-        if ui.button("Render still").clicked() {
+        if ui.button("Render still").on_hover_text("This frame, as bansho render makes it").clicked() {
             self.render(session, true);
         }
-        if ui.button("Render shot").clicked() {
+        if ui.button("Render shot").on_hover_text("All frames, into out/ beside the scene").clicked() {
             self.render(session, false);
-        }
-        if let Some(shooting) = &self.shelf.shooting
-            && ui.button("Stop rendering").clicked()
-        {
-            shooting.stop();
         }
         if ui.button("Reload plates and meshes").clicked() {
             session.reload_assets();
@@ -125,6 +120,11 @@ impl Files {
     /// Renders the present frame as `bansho render` does.
     pub(in crate::app) fn render_still(&mut self, _ctx: &Context, session: &mut Session) {
         self.render(session, true);
+    }
+
+    /// Renders all frames as `bansho render` does.
+    pub(in crate::app) fn render_shot(&mut self, _ctx: &Context, session: &mut Session) {
+        self.render(session, false);
     }
 
     /// Renders the present frame, or the whole shot, as `bansho render` does.
@@ -140,10 +140,14 @@ impl Files {
         }
     }
 
-    /// What goes on with a job, for the status line.
-    pub(in crate::app) fn progress(&self) -> Option<String> {
-        let [done, total] = self.shelf.shooting.as_ref()?.progress();
-        Some(if total == 0 { "rendering…".into() } else { format!("rendering: {done} of {total}") })
+    /// Frames that are rendered, and all; 0 until they are counted. `None` where nothing is.
+    pub(in crate::app) fn progress(&self) -> Option<[usize; 2]> {
+        self.shelf.shooting.as_ref().map(Shooting::progress)
+    }
+
+    /// Asks what is rendered to stop; whole frames stay.
+    pub(in crate::app) fn stop_rendering(&mut self) {
+        self.shelf.shooting.iter().for_each(Shooting::stop);
     }
 
     pub(super) fn tend_shelf(&mut self, ui: &Ui, session: &mut Session) {

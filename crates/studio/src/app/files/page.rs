@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use bansho::render::scene::Place;
+use bansho::{media::zip::Zip, render::scene::Place};
 use eframe::egui::{Context, Ui};
 
 use super::{
     Files,
-    browser::{self, Inbox},
+    browser::{self, Inbox, Parts},
 };
 use crate::{
     app::{session::Session, store::Store},
-    player::{Event, Player, WorkerPlayer},
+    player::{Event, Player, Wish, WorkerPlayer},
 };
 
 /// What the page knows of files.
@@ -20,13 +20,25 @@ pub(super) struct Shelf {
     inbox: Inbox,
     /// What shall name the next file that comes.
     relink: Option<Place>,
-    /// Makes a finished picture, in a worker of its own, so that the window's pictures go on meanwhile.
-    finishing: Option<WorkerPlayer>,
+    rendering: Option<Rendering>,
+}
+
+/// Finished pictures under way, in a worker of their own, so that the window's go on meanwhile.
+struct Rendering {
+    player: WorkerPlayer,
+    /// For the picture that is made now.
+    wish: Wish,
+    /// What the scene is called.
+    stem: String,
+    done: usize,
+    total: usize,
+    /// Where the pictures of a shot are gathered.
+    shot: Option<Zip<Parts>>,
 }
 
 impl Shelf {
     pub(super) fn new(_store: &Store) -> Self {
-        Self { inbox: Inbox::default(), relink: None, finishing: None }
+        Self { inbox: Inbox::default(), relink: None, rendering: None }
     }
 }
 
@@ -52,7 +64,7 @@ impl Files {
     /// Hands the scene to the browser, which saves it where it saves what it is given.
     pub(in crate::app) fn save(&mut self, session: &mut Session) {
         let text = session.document.text().clone();
-        match browser::download(&format!("{}.toml", stem(session)), text.as_bytes()) {
+        match browser::download(&format!("{}.toml", stem(session)), &Parts::of(text.as_bytes())) {
             Ok(()) => session.document.mark_saved(text),
             Err(_) => session.set_notice(Some("the browser cannot save files here".into())),
         }
@@ -64,49 +76,59 @@ impl Files {
         if ui.button("Render still").on_hover_text("The finished picture of this frame, as a PNG").clicked() {
             self.render_still(ui.ctx(), session);
         }
-        if self.shelf.finishing.is_some() && ui.button("Stop rendering").clicked() {
-            self.shelf.finishing = None;
+        if ui.button("Render shot").on_hover_text("The finished pictures of all frames, as PNGs in a ZIP").clicked() {
+            self.render_shot(ui.ctx(), session);
         }
     }
 
     /// Makes the present frame as `bansho render` does, to be saved once it is there.
     pub(in crate::app) fn render_still(&mut self, ctx: &Context, session: &mut Session) {
+        let number = session.transport.number();
+        self.render(ctx, session, number, 1, None);
+    }
+
+    /// Makes all frames as `bansho render` does, to be saved together once they are there.
+    pub(in crate::app) fn render_shot(&mut self, ctx: &Context, session: &mut Session) {
+        let frames = session.transport.frames();
+        let total = (frames.end() - frames.start() + 1) as usize;
+        self.render(ctx, session, *frames.start(), total, Some(Zip::new(Parts::default())));
+    }
+
+    /// Makes `total` frames from `first` on as `bansho render` does; those of a `shot` are saved together.
+    fn render(&mut self, ctx: &Context, session: &mut Session, first: i64, total: usize, shot: Option<Zip<Parts>>) {
         let ctx = ctx.clone();
         let Ok(mut player) = WorkerPlayer::start(move || ctx.request_repaint()) else {
             session.set_notice(Some("the browser gives no worker to render in".into()));
             return;
         };
         session.given().iter().for_each(|(name, bytes)| player.give(name, bytes));
-        player.wish(session.still());
-        self.shelf.finishing = Some(player);
+        let wish = session.finished(first);
+        player.wish(wish.clone());
+        self.shelf.rendering = Some(Rendering { player, wish, stem: stem(session).to_owned(), done: 0, total, shot });
     }
 
-    /// What goes on, for the status line.
-    pub(in crate::app) fn progress(&self) -> Option<String> {
-        self.shelf.finishing.as_ref().map(|_| "rendering the still…".into())
+    /// Frames that are rendered, and all; `None` where nothing is.
+    pub(in crate::app) fn progress(&self) -> Option<[usize; 2]> {
+        self.shelf.rendering.as_ref().map(|rendering| [rendering.done, rendering.total])
     }
 
-    /// Hands a finished picture to the browser.
-    fn take_still(&mut self, session: &mut Session) {
-        let Some(player) = &mut self.shelf.finishing else { return };
-        let notice = player.poll().into_iter().find_map(|event| match event {
-            Event::Still { number, png } => Some(match browser::download(&still_name(session, number), &png) {
-                Ok(()) => format!("rendered: {}", still_name(session, number)),
-                Err(_) => "the browser cannot save files here".into(),
-            }),
-            Event::Judged { outcome: Err(error), .. } => Some(format!("the scene has faults: {error}")),
-            Event::Failed { reason, .. } | Event::Panicked { message: reason, .. } => Some(reason),
-            Event::Judged { .. } | Event::Drawn(_) | Event::Stage(..) => None,
-        });
+    /// Stops what is rendered.
+    pub(in crate::app) fn stop_rendering(&mut self) {
+        self.shelf.rendering = None;
+    }
+
+    /// Takes in finished pictures, and tells how rendering ended.
+    fn tend_rendering(&mut self, session: &mut Session) {
+        let notice = self.shelf.rendering.as_mut().and_then(Rendering::tend);
         if notice.is_some() {
-            self.shelf.finishing = None;
+            self.shelf.rendering = None;
             session.set_notice(notice);
         }
     }
 
     /// Takes in what the browser gave: a scene is opened, anything else laid into the one that is open.
     pub(super) fn tend_shelf(&mut self, ui: &Ui, session: &mut Session) {
-        self.take_still(session);
+        self.tend_rendering(session);
         let dropped = ui.input(|input| input.raw.dropped_files.clone());
         dropped.into_iter().for_each(|file| browser::take_dropped(file, &self.shelf.inbox, ui.ctx()));
         let given = self.shelf.inbox.take();
@@ -133,7 +155,38 @@ fn stem(session: &Session) -> &str {
     name.strip_suffix(".toml").unwrap_or(name)
 }
 
-/// What `bansho render` calls the picture of frame `number`.
-fn still_name(session: &Session, number: i64) -> String {
-    format!("{}.{number:04}.png", stem(session))
+impl Rendering {
+    /// Takes in what was finished and asks for what comes next; how it ended, once it has.
+    fn tend(&mut self) -> Option<String> {
+        self.player.poll().into_iter().find_map(|event| match event {
+            Event::Still { number, png } => self.take(number, &png).unwrap_or_else(Some),
+            Event::Judged { outcome: Err(error), .. } => Some(format!("the scene has faults: {error}")),
+            Event::Failed { reason, .. } | Event::Panicked { message: reason, .. } => Some(reason),
+            Event::Judged { .. } | Event::Drawn(_) | Event::Stage(..) => None,
+        })
+    }
+
+    /// Takes in the picture of frame `number`; what was saved, once that was the last.
+    fn take(&mut self, number: i64, png: &[u8]) -> Result<Option<String>, String> {
+        // As `bansho render` calls it.
+        let name = format!("{}.{number:04}.png", self.stem);
+        self.done += 1;
+        let Some(shot) = &mut self.shot else { return save(&name, &Parts::of(png)).map(Some) };
+        shot.add(&name, png).map_err(|error| error.to_string())?;
+        if self.done < self.total {
+            self.wish.number = Some(number + 1);
+            self.player.wish(self.wish.clone());
+            return Ok(None);
+        }
+        let pictures = self.shot.take().map(Zip::finish).transpose().map_err(|error| error.to_string())?;
+        save(&format!("{}.zip", self.stem), &pictures.unwrap_or_default()).map(Some)
+    }
+}
+
+/// Hands a file to the browser; what the user is told.
+fn save(name: &str, parts: &Parts) -> Result<String, String> {
+    match browser::download(name, parts) {
+        Ok(()) => Ok(format!("rendered: {name}")),
+        Err(_) => Err("the browser cannot save files here".into()),
+    }
 }

@@ -8,21 +8,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bansho::{
-    Assets,
-    base::{
-        assets::{AssetError, Picture},
-        drawing::Drawing,
-        mesh::Mesh,
-    },
-};
-use eframe::egui::{DroppedFile, ViewportEvent, ViewportId};
+use eframe::egui::{DroppedFile, Key, Modifiers, Role, Theme, ViewportEvent, ViewportId, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
-use super::{super::Studio, PATIENCE, SCENE, Session, assets, drawn, sky, text, window};
+use super::{super::Studio, PATIENCE, SCENE, Session, assets, drag, drawn, sky, text, window};
 use crate::{
     document::{Document, recovery::Autosave},
-    player::{SlicePlayer, ThreadPlayer},
+    player::{SlicePlayer, ThreadPlayer, tests::Broken},
 };
 
 /// A window on a scene that lies in `folder`.
@@ -118,27 +110,6 @@ fn work_of_a_studio_that_crashed_is_offered() {
     assert!(harness.query_by_label("Recover").is_none());
 }
 
-/// Assets whose maker made a mistake.
-struct Broken;
-
-impl Assets for Broken {
-    fn picture(&self, _: &str, _: i64) -> Result<Arc<Picture>, AssetError> {
-        panic!("broken on purpose")
-    }
-    fn mesh(&self, _: &str) -> Result<Arc<Mesh>, AssetError> {
-        panic!("broken on purpose")
-    }
-    fn drawing(&self, _: &str) -> Result<Arc<Drawing>, AssetError> {
-        panic!("broken on purpose")
-    }
-    fn text(&self, _: &str) -> Result<Arc<str>, AssetError> {
-        panic!("broken on purpose")
-    }
-    fn digest(&self, _: &str, _: i64) -> Result<[u8; 32], AssetError> {
-        panic!("broken on purpose")
-    }
-}
-
 #[test]
 fn a_panic_is_told_and_the_scene_saved_beside_the_original() {
     let folder = tempfile::tempdir().unwrap();
@@ -216,4 +187,87 @@ fn a_shot_is_rendered_with_progress() {
     until(&mut harness, "the shot is written", |harness| harness.query_by_label_contains("written: ").is_some());
     let frames = fs::read_dir(folder.path().join("out/scene")).unwrap().count();
     assert_eq!(frames, 10);
+}
+
+#[test]
+fn a_shot_that_is_rendered_is_stopped_and_goes_on_later() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut harness, _) = window_on_file(folder.path(), &SCENE.replace("frames = 10", "frames = 100000"));
+    let render = |harness: &mut Harness<'_, Studio>| {
+        harness.get_by_label("File").click();
+        harness.run_steps(3);
+        harness.get_by_label("Render shot").click();
+        harness.step();
+    };
+    render(&mut harness);
+    until(&mut harness, "progress is told", |harness| {
+        let told = harness.query_by_label_contains("rendering: ").and_then(|told| told.value());
+        told.is_some_and(|told| told.ends_with("of 100000") && !told.contains(": 0 "))
+    });
+    harness.get_by_label("Stop rendering").click();
+    until(&mut harness, "it stops", |harness| harness.query_by_label("Stop rendering").is_none());
+    let out = folder.path().join("out/scene");
+    let frames = || fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path());
+    let stopped = frames().count();
+    assert!((1..100_000).contains(&stopped), "{stopped}");
+    for frame in frames() {
+        let bytes = fs::read(&frame).unwrap();
+        assert!(bytes.ends_with(b"IEND\xaeB\x60\x82"), "{} is whole", frame.display());
+    }
+    edit(&mut harness, "100000", &(stopped + 2).to_string());
+    let first = frames().min().unwrap();
+    let written = fs::metadata(&first).unwrap().modified().unwrap();
+    render(&mut harness);
+    until(&mut harness, "the rest is written", |harness| harness.query_by_label_contains("written: ").is_some());
+    assert_eq!(frames().count(), stopped + 2);
+    assert_eq!(fs::metadata(&first).unwrap().modified().unwrap(), written, "whole frames are kept");
+}
+
+/// A window that keeps what it must in `home`.
+fn window_at_home(home: &Path) -> Harness<'static, Studio> {
+    let session = Session::new(Document::new("fire.toml", SCENE), None, Box::<SlicePlayer>::default(), assets);
+    let studio = Studio::new(session, Some(home.to_path_buf()));
+    let builder = Harness::builder().with_size(vec2(1200.0, 800.0)).with_max_steps(64);
+    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.show(ui), studio);
+    drawn(&mut harness);
+    harness
+}
+
+#[test]
+fn layout_theme_and_recent_files_are_there_again() {
+    let (home, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let path = folder.path().join("kept.toml");
+    let width = |harness: &Harness<'_, Studio>| harness.get_by_label("Viewport").rect().width();
+    let wide = {
+        let mut harness = window_at_home(home.path());
+        harness.state_mut().session().path = Some(path.clone());
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::S);
+        harness.run_steps(3);
+        harness.get_by_label("View").click();
+        harness.run_steps(3);
+        harness.get_by_label("Light").click();
+        harness.run_steps(3);
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::T);
+        harness.run_steps(3);
+        // The border between the scene's panel and the picture.
+        let before = width(&harness);
+        let border = harness.get_by_label("Viewport").rect().left_center() - vec2(8.0, 0.0);
+        drag(&mut harness, border, vec2(60.0, 0.0));
+        let wide = width(&harness);
+        assert!(wide < before - 40.0, "{before} {wide}");
+        eframe::App::on_exit(harness.state_mut());
+        wide
+    };
+    let mut again = window_at_home(home.path());
+    assert_eq!(again.ctx.theme(), Theme::Light);
+    again.get_by_role(Role::MultilineTextInput);
+    assert!((width(&again) - wide).abs() < 3.0, "{} {wide}", width(&again));
+    again.get_by_label("File").click();
+    again.run_steps(3);
+    again.get_by_label("Recent").click();
+    again.run_steps(3);
+    again.get_by_label(&path.display().to_string()).click();
+    drawn(&mut again);
+    assert_eq!(again.state_mut().session().path.as_ref(), Some(&path));
+    assert_eq!(text(&mut again), SCENE);
 }

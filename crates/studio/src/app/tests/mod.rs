@@ -15,7 +15,7 @@ use bansho::{Assets, media::plates::FileAssets};
 use eframe::egui::{self, Key, Modifiers, Role, vec2};
 use egui_kittest::{Harness, HarnessBuilder, kittest::Queryable};
 
-use super::{Session, Studio};
+use super::{Session, Studio, shortcuts::SHORTCUTS};
 use crate::{document::Document, player::SlicePlayer};
 
 const SCENE: &str = "\
@@ -129,6 +129,64 @@ fn time_is_stepped_played_and_stopped() {
 }
 
 #[test]
+fn time_is_scrubbed_and_a_range_of_it_repeats() {
+    let mut harness = window(SCENE);
+    let bar = harness.get_by_label("Timeline").rect();
+    drag(&mut harness, bar.left_center() + vec2(8.0, 0.0), vec2(0.5 * bar.width() - 8.0, 0.0));
+    assert!((4..=5).contains(&harness.state_mut().session().transport.number()));
+    for (label, frame) in [("to", 4.0), ("Loop", 2.0)] {
+        harness.get_by_role_and_label(Role::SpinButton, label).set_value_accesskit(frame);
+        harness.run_steps(3);
+    }
+    assert_eq!(harness.state_mut().session().transport.range(), 2..=4);
+    harness.get_by_label("Play").click();
+    for _ in 0..40 {
+        harness.step();
+    }
+    assert!((2..=4).contains(&harness.state_mut().session().transport.number()));
+    harness.get_by_label_contains("pictures/s");
+}
+
+#[test]
+fn a_picture_that_the_window_cannot_hold_is_a_preview_and_says_so() {
+    let mut harness = window(&SCENE.replace("[64, 36]", "[1920, 1080]"));
+    let (picture, _) = harness.state_mut().session().picture().expect("a picture");
+    let [width, height] = picture.size;
+    assert!(width < 1000, "{width}");
+    harness.get_by_label(&format!("preview {width} × {height} of 1920 × 1080"));
+}
+
+#[test]
+fn exposure_is_set_by_hand_and_given_back() {
+    let mut harness = window(SCENE);
+    harness.get_by_role_and_label(Role::SpinButton, "Exposure").set_value_accesskit(7.5);
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("exposure_ev100 = 7.5"), "{}", text(&mut harness));
+    harness.get_by_label("Auto").click();
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("exposure_ev100 = \"auto\""), "{}", text(&mut harness));
+}
+
+#[test]
+fn phenomena_are_added_copied_and_removed() {
+    let mut harness = window(SCENE);
+    harness.get_by_label("Add").click();
+    harness.run_steps(3);
+    harness.get_by_label("rain").click();
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("\n[[rain]]\n"), "{}", text(&mut harness));
+    for choice in ["Duplicate", "Remove"] {
+        harness.get_by_role_and_label(Role::Button, "fire").click_secondary();
+        harness.run_steps(3);
+        harness.get_by_label(choice).click();
+        drawn(&mut harness);
+    }
+    let edited = text(&mut harness);
+    assert!(edited.contains("name = \"fire 2\"") && !edited.contains("name = \"fire\""), "{edited}");
+    assert!(harness.state_mut().session().document.error().is_none());
+}
+
+#[test]
 fn faults_are_told_with_their_lines_and_lead_to_the_text() {
     let mut harness = window(SCENE);
     let faulty = SCENE.replace("height", "heigth");
@@ -239,7 +297,9 @@ fn a_question_mark_lists_the_shortcuts() {
     assert!(harness.query_by_label("Play or pause").is_none());
     harness.key_press(Key::Questionmark);
     harness.run_steps(3);
-    harness.get_by_label("Play or pause");
+    for shortcut in &SHORTCUTS {
+        assert!(harness.query_all_by_label(shortcut.name).count() >= 1, "{}", shortcut.name);
+    }
 }
 
 fn press(harness: &mut Harness<'_, Studio>, at: egui::Pos2) {

@@ -1,6 +1,6 @@
 //! Values that hands change: sliders, keys, what is recorded, and the stages that show what they do.
 
-use eframe::egui::{Role, vec2};
+use eframe::egui::{Event, Modifiers, PointerButton, Role, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
 use super::{super::Studio, SCENE, drag, drawn, press, release, text, window};
@@ -83,6 +83,74 @@ fn a_lamp_that_is_dragged_while_recording_leaves_keyframes() {
     assert!(recorded.matches("], [").count() > 2, "{recorded}");
     harness.state_mut().session().document.undo();
     assert_eq!(text(&mut harness), SCENE, "a recording is one step");
+}
+
+#[test]
+fn a_burner_that_is_dragged_while_recording_leaves_keyframes() {
+    let scene = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 60\n[[flame_particles]]\nparticles = 50\n";
+    let mut harness = window(scene);
+    harness.get_by_label("Place").click();
+    harness.get_by_label("Record").click();
+    harness.run_steps(2);
+    let plan = harness.state_mut().session().plan().cloned().unwrap();
+    let seen = plan.scene.camera.at(0.0, plan.size).project(bansho::base::math::DVec3::ZERO).unwrap().pixel;
+    let viewport = harness.get_by_label("Viewport").rect();
+    let scale = (viewport.width() / 64.0).min(viewport.height() / 36.0);
+    let burner = viewport.center() + vec2(seen.x as f32 - 32.0, seen.y as f32 - 18.0) * scale;
+    press(&mut harness, burner);
+    for step in 1..30 {
+        harness.hover_at(burner + vec2(3.0 * step as f32, 0.0));
+        harness.step();
+    }
+    assert!(harness.state_mut().session().transport.is_playing(), "time passes");
+    release(&mut harness, burner + vec2(90.0, 0.0));
+    let recorded = text(&mut harness);
+    assert!(recorded.contains("burners = [{ position = { keys = [["), "{recorded}");
+    assert!(recorded.contains("]], ["), "at more than one time: {recorded}");
+    assert!(harness.state_mut().session().document.error().is_none());
+    harness.state_mut().session().document.undo();
+    assert_eq!(text(&mut harness), scene, "a recording is one step");
+}
+
+#[test]
+fn curves_are_edited_by_their_points() {
+    let mut harness = window(SCENE);
+    harness.get_all_by_label("texture").last().expect("the section").click();
+    harness.run_steps(12);
+    harness.get_by_role_and_label(Role::Canvas, "sharpen").scroll_to_me();
+    harness.run_steps(12);
+    let chart = harness.get_by_role_and_label(Role::Canvas, "sharpen").rect().shrink(4.0);
+    let at = |[x, y]: [f32; 2]| chart.left_bottom() + vec2(x * chart.width(), -y * chart.height());
+    drag(&mut harness, at([0.4, 0.82]), vec2(0.0, 0.4 * chart.height()));
+    let dragged = text(&mut harness);
+    let line = dragged.lines().find(|line| line.contains("sharpen = ")).unwrap_or_default().to_owned();
+    assert!(line.contains("[0.4, 0.4") && !line.contains("0.82"), "{dragged}");
+    harness.hover_at(at([0.7, 1.0]));
+    harness.step();
+    for pressed in [true, false] {
+        harness.event(Event::PointerButton {
+            pos: at([0.7, 1.0]),
+            button: PointerButton::Secondary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        });
+        harness.step();
+    }
+    drawn(&mut harness);
+    assert!(!text(&mut harness).contains("[0.7, 1.0]"), "{}", text(&mut harness));
+    assert!(harness.state_mut().session().document.error().is_none());
+}
+
+#[test]
+fn vectors_and_colours_with_bounds_have_sliders() {
+    let mut harness = window(SCENE);
+    harness.get_by_label("light 1").click();
+    harness.run_steps(3);
+    let sliders: Vec<_> = harness.get_all_by_role_and_label(Role::Slider, "colour").collect();
+    assert_eq!(sliders.len(), 3);
+    sliders[1].set_value_accesskit(0.25);
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("colour = [1.0, 0.25, 0.75]"), "{}", text(&mut harness));
 }
 
 #[test]

@@ -76,16 +76,6 @@ impl Drawing {
         self.write(shape, &sheets)
     }
 
-    /// Without sheet `sheet`.
-    pub fn remove_sheet(&self, shape: usize, sheet: usize) -> Vec<Operation> {
-        let mut sheets = self.sheets(shape);
-        if sheet >= sheets.len() {
-            return Vec::new();
-        }
-        sheets.remove(sheet);
-        self.write_all(shape, &[(sheets, Fate::Gone(sheet))], LinkParameters::clone)
-    }
-
     /// More or less of `factor` around the share `at` of sheet `sheet`.
     pub fn paint(&self, shape: usize, sheet: usize, factor: Factor, at: f64, by: f64) -> Vec<Operation> {
         const POINTS: usize = 16;
@@ -122,7 +112,7 @@ impl Drawing {
             let (sheets, cut) = self.cut_at(shape, *targets.first()?)?;
             Some((sheets, Fate::Cut(cut)))
         });
-        operations.extend(self.write_all(shape, &changed, part));
+        operations.extend(self.write_all(shape, &changed, part, |_| Vec::new()));
         operations
     }
 
@@ -144,7 +134,7 @@ impl Drawing {
                 &[first, second] => self.joined_at(shape, [first, second]),
                 _ => None,
             });
-            operations.extend(self.write_all(shape, &joined, LinkParameters::clone));
+            operations.extend(self.write_all(shape, &joined, LinkParameters::clone, |_| Vec::new()));
         }
         operations
     }
@@ -173,17 +163,19 @@ impl Drawing {
         changed
     }
 
-    /// The operations that make shapes from `first` on what they were changed to, and let everything follow that counts their sheets.
-    fn write_all(
+    /// The operations that make shapes from `first` on what they were changed to, and let everything follow that counts their sheets;
+    /// splits to a shape that are `needless` then go.
+    pub(super) fn write_all(
         &self,
         first: usize,
         changed: &[Changed],
         links: impl Fn(&LinkParameters) -> LinkParameters,
+        needless: impl Fn(usize) -> Vec<usize>,
     ) -> Vec<Operation> {
         let written = changed.iter().enumerate().flat_map(|(index, (sheets, _))| self.write(first + index, sheets));
         let mut operations: Vec<Operation> = written.collect();
-        let fates: Vec<Fate> = changed.iter().map(|(_, fate)| *fate).collect();
-        operations.extend(self.renumbered(first, &fates, links));
+        let fates: Vec<Fate> = changed.iter().map(|(_, fate)| fate.clone()).collect();
+        operations.extend(self.renumbered(first, &fates, links, needless));
         operations
     }
 

@@ -27,6 +27,12 @@ pub fn nearest(line: &[DVec2], to: DVec2) -> Option<OnLine> {
     line.windows(2).enumerate().map(on).min_by(|a, b| a.distance.total_cmp(&b.distance))
 }
 
+/// Which of some lines comes nearest to a point.
+pub fn nearest_of(all: &[Vec<DVec2>], to: DVec2) -> Option<usize> {
+    let off = |line: &Vec<DVec2>| nearest(line, to).map_or(f64::INFINITY, |on| on.distance);
+    (0..all.len()).min_by(|&a, &b| off(&all[a]).total_cmp(&off(&all[b])))
+}
+
 /// Length of `line`, km.
 pub fn length(line: &[DVec2]) -> f64 {
     line.windows(2).map(|ends| ends[0].distance(ends[1])).sum()

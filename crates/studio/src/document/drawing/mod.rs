@@ -4,6 +4,7 @@
 mod changes;
 pub mod lines;
 mod links;
+mod removal;
 mod renumber;
 mod sheets;
 #[cfg(test)]
@@ -123,9 +124,7 @@ impl Drawing {
         let all = self.lines(shape);
         let arrives = |ways: &&Vec<[DVec2; 2]>| {
             let Some([_, middle]) = ways.get(ways.len() / 2) else { return false };
-            let off = |line: &Vec<DVec2>| lines::nearest(line, *middle).map_or(f64::INFINITY, |on| on.distance);
-            let nearest = (0..all.len()).min_by(|&a, &b| off(&all[a]).total_cmp(&off(&all[b])));
-            nearest == Some(sheet)
+            lines::nearest_of(&all, *middle) == Some(sheet)
         };
         let strands = shape.checked_sub(1).map(|before| self.ways(before)).unwrap_or_default();
         strands.iter().filter(arrives).map(|ways| ways.iter().map(|way| way[0]).collect()).collect()

@@ -1,19 +1,21 @@
 //! Sheets are counted. When one goes, is cut or is joined, what counts them follows: links to the shape, and the links, splits and
 //! merges that lead away from it.
 
+use std::collections::BTreeSet;
+
 use bansho::{
     base::parameters::{Auto, Node, Table, Value},
-    models::aurora::shapes::{LinkParameters, MergeParameters, ShapeParameters, SplitParameters},
+    models::aurora::shapes::{LinkParameters, MergeParameters, SplitParameters},
     render::scene::operation::Operation,
 };
 
 use super::{Drawing, OnSheet, links::rounded};
 
 /// What becomes of places on the sheets of a shape.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Fate {
-    /// This sheet is gone.
-    Gone(usize),
+    /// These sheets are gone.
+    Gone(BTreeSet<usize>),
     /// This sheet is cut at a share of its length; its second part comes after it.
     Cut(OnSheet),
     /// Two sheets are one, at the place of the first in the list: each with whether it was turned round, and the share of the
@@ -23,10 +25,10 @@ pub(super) enum Fate {
 
 impl Fate {
     /// Where a place is now, if it is still there.
-    pub(super) fn of(self, (sheet, share): OnSheet) -> Option<OnSheet> {
-        Some(match self {
-            Self::Gone(gone) if sheet == gone => return None,
-            Self::Gone(gone) => (sheet - usize::from(sheet > gone), share),
+    pub(super) fn of(&self, (sheet, share): OnSheet) -> Option<OnSheet> {
+        Some(match *self {
+            Self::Gone(ref gone) if gone.contains(&sheet) => return None,
+            Self::Gone(ref gone) => (sheet - gone.range(..sheet).count(), share),
             Self::Cut((cut, at)) if sheet == cut && share <= at => (cut, share / at.max(f64::MIN_POSITIVE)),
             Self::Cut((cut, at)) if sheet == cut => (cut + 1, (share - at) / (1.0 - at)),
             Self::Cut((cut, _)) => (sheet + usize::from(sheet > cut), share),
@@ -45,29 +47,29 @@ impl Fate {
     }
 
     /// The same for a sheet counted from 1, and a place on it where one is told.
-    fn counted(self, sheet: i64, share: Option<f64>) -> Option<(i64, Option<f64>)> {
+    fn counted(&self, sheet: i64, share: Option<f64>) -> Option<(i64, Option<f64>)> {
         // Without a place the beginning is meant.
         let (sheet, at) = self.of((usize::try_from(sheet - 1).ok()?, share.unwrap_or(0.0)))?;
         Some((sheet as i64 + 1, share.map(|_| rounded(at))))
     }
 
-    fn of_arrival(self, link: &LinkParameters) -> Option<LinkParameters> {
+    fn of_arrival(&self, link: &LinkParameters) -> Option<LinkParameters> {
         let (to, arrives) = self.counted(link.to, link.arrives)?;
         Some(LinkParameters { to, arrives, ..link.clone() })
     }
 
-    fn of_departure(self, link: &LinkParameters) -> Option<LinkParameters> {
+    fn of_departure(&self, link: &LinkParameters) -> Option<LinkParameters> {
         let (from, at) = self.counted(link.from, link.at)?;
         Some(LinkParameters { from, at, ..link.clone() })
     }
 
-    fn of_split(self, split: &SplitParameters) -> Option<SplitParameters> {
+    fn of_split(&self, split: &SplitParameters) -> Option<SplitParameters> {
         let (sheet, at) = self.counted(split.sheet, split.at)?;
         Some(SplitParameters { sheet, at, ..split.clone() })
     }
 
     /// Ends that are ends no longer do not merge.
-    fn of_merge(self, merge: &MergeParameters) -> Option<MergeParameters> {
+    fn of_merge(&self, merge: &MergeParameters) -> Option<MergeParameters> {
         let ends = match merge.at {
             Auto::Auto => [None; 2],
             Auto::Set(ends) => ends.map(Some),
@@ -82,12 +84,13 @@ impl Fate {
 
 impl Drawing {
     /// Lets everything follow that counts sheets of the shapes from `first` on, of which `fates` tells what became of them; `begun`
-    /// changes the links from the shape before, which stays.
+    /// changes the links from the shape before, which stays, and splits to a shape that are `needless` go.
     pub(super) fn renumbered(
         &self,
         first: usize,
         fates: &[Fate],
         begun: impl Fn(&LinkParameters) -> LinkParameters,
+        needless: impl Fn(usize) -> Vec<usize>,
     ) -> Vec<Operation> {
         let mut operations = Vec::new();
         for shape in first..=first + fates.len() {
@@ -97,26 +100,27 @@ impl Drawing {
                 let link = leaves.map_or_else(|| Some(begun(link)), |fate| fate.of_departure(link))?;
                 arrives.map_or(Some(link.clone()), |fate| fate.of_arrival(&link))
             }));
-            if let Some(fate) = leaves {
-                operations.extend(self.rechanged(shape, *fate));
-            }
+            let needless = if arrives.is_some() { needless(shape) } else { Vec::new() };
+            operations.extend(self.resplit(shape, leaves, &needless));
+            operations.extend(leaves.and_then(|fate| self.remerged(shape, fate)));
         }
         operations
     }
 
-    /// The splits and merges to shape `shape` after `fate` of the one before.
-    fn rechanged(&self, shape: usize, fate: Fate) -> Vec<Operation> {
-        let Some(ShapeParameters { split, merge, .. }) = self.parameters.shapes.get(shape) else { return Vec::new() };
-        let mut operations = Vec::new();
-        let splits: Vec<Option<SplitParameters>> = split.iter().map(|split| fate.of_split(split)).collect();
-        if splits.iter().zip(split).any(|(new, old)| new.as_ref() != Some(old)) {
-            operations.push(self.set_list(shape, "split", splits.iter().flatten().map(split_table).collect()));
-        }
-        let merges: Vec<Option<MergeParameters>> = merge.iter().map(|merge| fate.of_merge(merge)).collect();
-        if merges.iter().zip(merge).any(|(new, old)| new.as_ref() != Some(old)) {
-            operations.push(self.set_list(shape, "merge", merges.iter().flatten().map(merge_table).collect()));
-        }
-        operations
+    /// The splits to shape `shape` after a fate of the one before, without those that are `needless`, by number.
+    fn resplit(&self, shape: usize, fate: Option<&Fate>, needless: &[usize]) -> Option<Operation> {
+        let old = &self.parameters.shapes.get(shape)?.split;
+        let kept = old.iter().enumerate().filter(|(number, _)| !needless.contains(number)).map(|(_, split)| split);
+        let new: Vec<SplitParameters> =
+            kept.filter_map(|split| fate.map_or(Some(split.clone()), |fate| fate.of_split(split))).collect();
+        (new != *old).then(|| self.set_list(shape, "split", new.iter().map(split_table).collect()))
+    }
+
+    /// The merges to shape `shape` after `fate` of the one before.
+    fn remerged(&self, shape: usize, fate: &Fate) -> Option<Operation> {
+        let old = &self.parameters.shapes.get(shape)?.merge;
+        let new: Vec<MergeParameters> = old.iter().filter_map(|merge| fate.of_merge(merge)).collect();
+        (new != *old).then(|| self.set_list(shape, "merge", new.iter().map(merge_table).collect()))
     }
 
     /// The links to shape `shape` after each was changed, or went.
@@ -163,7 +167,10 @@ mod tests {
 
     #[test]
     fn places_follow_their_sheets() {
-        assert_eq!([0, 1, 2].map(|sheet| Fate::Gone(1).of((sheet, 0.5))), [Some((0, 0.5)), None, Some((1, 0.5))]);
+        assert_eq!(
+            [0, 1, 2].map(|sheet| Fate::Gone([1].into()).of((sheet, 0.5))),
+            [Some((0, 0.5)), None, Some((1, 0.5))]
+        );
         let cut = Fate::Cut((1, 0.25));
         assert_eq!(
             [(0, 0.9), (1, 0.125), (1, 0.625), (2, 0.1)].map(|place| cut.of(place)),
@@ -181,8 +188,8 @@ mod tests {
     fn merges_of_what_are_ends_no_longer_go() {
         let merge = MergeParameters { sheets: [1, 3], at: Auto::Set([1.0, 0.0]) };
         let after = |fate: Fate| fate.of_merge(&merge);
-        assert_eq!(after(Fate::Gone(1)), Some(MergeParameters { sheets: [1, 2], ..merge.clone() }));
-        assert_eq!(after(Fate::Gone(2)), None);
+        assert_eq!(after(Fate::Gone([1].into())), Some(MergeParameters { sheets: [1, 2], ..merge.clone() }));
+        assert_eq!(after(Fate::Gone([2].into())), None);
         assert_eq!(after(Fate::Cut((0, 0.5))), Some(MergeParameters { sheets: [2, 4], ..merge.clone() }));
         assert_eq!(after(Fate::Joined([(0, false), (1, false)], 0.5)), None, "the seam is no end");
     }

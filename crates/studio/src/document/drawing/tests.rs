@@ -195,3 +195,41 @@ link = [{ from = 3, to = 4, at = 0.5, arrives = 0.25 }]
     let linked = after(&drawing.split(1, 1, 0.5));
     assert!(linked.contains("link = [{ from = 2, to = 3, at = 0.25 }, { from = 3, to = 2 }]"), "{linked}");
 }
+
+#[test]
+fn a_sheet_goes_with_all_that_only_it_becomes() {
+    let text = "\
+bansho = 1
+[[aurora]]
+extent_km = 800.0
+[[aurora.shapes]]
+sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
+[[aurora.shapes]] # in the middle
+sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
+link = [{ from = 2, to = 3 }, { from = 3, to = 2 }]
+[[aurora.shapes]]
+sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [-10, 80]] }, { points = [[10, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
+split = [{ sheet = 2, at = 0.5 }]
+[[aurora.shapes]]
+sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
+merge = [{ sheets = [2, 3], at = [1, 0] }]
+";
+    let counts_after = |shape: usize, sheet: usize| {
+        let (mut document, drawing) = open(text);
+        let drawing = change(&mut document, &drawing.remove_sheet(shape, sheet));
+        assert!(is_good(&mut document), "{}", document.text());
+        assert!(document.text().contains("# in the middle"));
+        ([0, 1, 2, 3].map(|shape| drawing.lines(shape).len()), document.text().to_string())
+    };
+    let (counts, first) = counts_after(1, 0);
+    assert_eq!(counts, [2, 2, 3, 2], "it goes from end to end: {first}");
+    assert!(first.contains("link = [{ from = 1, to = 2 }, { from = 2, to = 1 }]"), "{first}");
+    assert!(first.contains("split = [{ sheet = 1, at = 0.5 }]"), "{first}");
+    assert!(first.contains("merge = [{ sheets = [1, 2], at = [1, 0] }]"), "{first}");
+    let (counts, middle) = counts_after(1, 1);
+    assert_eq!(counts, [2, 2, 2, 2], "both of its parts go, and what they grow together to: {middle}");
+    assert!(!middle.contains("split") && !middle.contains("merge"), "{middle}");
+    let (counts, part) = counts_after(2, 2);
+    assert_eq!(counts, [3, 3, 3, 3], "a part goes alone: {part}");
+    assert!(!part.contains("split") && !part.contains("merge") && part.contains("link = "), "{part}");
+}

@@ -1,0 +1,124 @@
+//! Files in one, as a ZIP that stores them as they are: pictures are compressed already (APPNOTE 6.3, sections 4.3.7 to 4.3.16).
+
+use std::io::{self, Write};
+
+use crate::png::checksum::crc32;
+
+/// What follows the signature of a file's heads: version 1.0, UTF-8 names, stored, 1 January 1980. The same files make the same bytes.
+const SHARED: [u8; 10] = [10, 0, 0, 8, 0, 0, 0, 0, 0x21, 0];
+
+/// A ZIP under way.
+#[derive(Debug)]
+pub struct Zip<W> {
+    out: W,
+    /// Bytes written so far.
+    length: u64,
+    directory: Vec<u8>,
+    count: u16,
+}
+
+impl<W: Write> Zip<W> {
+    /// An empty one, written to `out`.
+    pub fn new(out: W) -> Self {
+        Self { out, length: 0, directory: Vec::new(), count: 0 }
+    }
+
+    /// Adds the file `name`; folders in it are divided by `/`.
+    ///
+    /// # Errors
+    /// `out` refuses, or the ZIP would have 65,536 files or 4 GiB, which this kind cannot hold.
+    pub fn add(&mut self, name: &str, bytes: &[u8]) -> io::Result<()> {
+        let start = small(self.length)?;
+        small(self.length + bytes.len() as u64)?;
+        let head = head(name, bytes)?;
+        let count = self.count.checked_add(1).ok_or_else(too_large)?;
+        self.put(&[b"PK\x03\x04", head.as_slice(), name.as_bytes(), bytes])?;
+        // Made by version 1.0 as well; no comment, first disk, no attributes.
+        let entry: [&[u8]; 6] = [b"PK\x01\x02", &[10, 0], &head, &[0; 10], &start.to_le_bytes(), name.as_bytes()];
+        self.directory.extend(entry.concat());
+        self.count = count;
+        Ok(())
+    }
+
+    /// Ends it; what it was written to.
+    ///
+    /// # Errors
+    /// `out` refuses, or the whole is larger than this kind can be.
+    pub fn finish(mut self) -> io::Result<W> {
+        let (start, size) = (small(self.length)?, small(self.directory.len() as u64)?);
+        let directory = std::mem::take(&mut self.directory);
+        let counts = [self.count.to_le_bytes(); 2].concat();
+        let end: [&[u8]; 6] = [b"PK\x05\x06", &[0; 4], &counts, &size.to_le_bytes(), &start.to_le_bytes(), &[0; 2]];
+        self.put(&[&directory, &end.concat()])?;
+        self.out.flush()?;
+        Ok(self.out)
+    }
+
+    fn put(&mut self, parts: &[&[u8]]) -> io::Result<()> {
+        for part in parts {
+            self.out.write_all(part)?;
+            self.length += part.len() as u64;
+        }
+        Ok(())
+    }
+}
+
+/// What the head of a file before its bytes and that in the directory share.
+fn head(name: &str, bytes: &[u8]) -> io::Result<Vec<u8>> {
+    let size = small(bytes.len() as u64)?.to_le_bytes();
+    let name = u16::try_from(name.len()).map_err(|_| too_large())?.to_le_bytes();
+    let parts: [&[u8]; 6] = [&SHARED, &crc32(&[bytes]).to_le_bytes(), &size, &size, &name, &[0; 2]];
+    Ok(parts.concat())
+}
+
+fn small(length: u64) -> io::Result<u32> {
+    u32::try_from(length).map_err(|_| too_large())
+}
+
+fn too_large() -> io::Error {
+    io::Error::new(io::ErrorKind::FileTooLarge, "a ZIP holds up to 65,535 files and 4 GiB")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_stored_with_its_heads() {
+        let mut zip = Zip::new(Vec::new());
+        zip.add("a.txt", b"123456789").unwrap();
+        let bytes = zip.finish().unwrap();
+        // The checksum of these nine bytes is the one that every description of CRC-32 gives.
+        let head = b"\x0a\0\0\x08\0\0\0\0\x21\0\x26\x39\xf4\xcb\x09\0\0\0\x09\0\0\0\x05\0\0\0";
+        let local = [b"PK\x03\x04".as_slice(), head, b"a.txt", b"123456789"].concat();
+        assert_eq!(bytes[..local.len()], local);
+        let entry = [b"PK\x01\x02\x0a\0".as_slice(), head, &[0; 14], b"a.txt"].concat();
+        assert_eq!(bytes[local.len()..][..entry.len()], entry);
+        let end = [b"PK\x05\x06\0\0\0\0\x01\0\x01\0".as_slice(), &[51, 0, 0, 0], &[44, 0, 0, 0], &[0; 2]].concat();
+        assert_eq!((entry.len(), local.len()), (51, 44));
+        assert_eq!(bytes[local.len() + entry.len()..], end);
+    }
+
+    #[test]
+    fn more_files_than_it_can_count_are_refused() {
+        let mut zip = Zip::new(io::sink());
+        (0..u16::MAX).for_each(|number| zip.add(&number.to_string(), b"").unwrap());
+        assert_eq!(zip.add("one more", b"").unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+        zip.finish().unwrap();
+    }
+
+    #[test]
+    #[ignore = "needs python3"]
+    fn other_programs_read_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frames.zip");
+        let mut zip = Zip::new(std::fs::File::create(&path).unwrap());
+        zip.add("feuer/0001.png", b"one").unwrap();
+        zip.add("fe\u{fc}er/0002.png", &[7; 70_000]).unwrap();
+        zip.finish().unwrap();
+        let script = "import sys, zipfile\nfile = zipfile.ZipFile(sys.argv[1])\nassert file.testzip() is None\n\
+            assert file.namelist() == ['feuer/0001.png', 'fe\u{fc}er/0002.png']\nassert file.read('feuer/0001.png') == b'one'";
+        let status = std::process::Command::new("python3").args(["-c", script]).arg(&path).status().unwrap();
+        assert!(status.success());
+    }
+}

@@ -1,0 +1,79 @@
+//! A sheet goes with what came of it: where each sheet comes from one and becomes one, all its shapes lose it.
+
+use std::collections::BTreeSet;
+
+use bansho::{models::aurora::shapes::LinkParameters, render::scene::operation::Operation};
+
+use super::{Drawing, lines, renumber::Fate};
+
+/// Strands on the way from a shape to the next: the sheet that each is part of before, and after.
+type Strands = Vec<(usize, usize)>;
+
+impl Drawing {
+    /// Without sheet `sheet` of shape `shape`, without sheets that only become what is gone, and without those that only come of it.
+    /// A sheet that split off goes by itself, and so does one that would have grown together with another.
+    pub fn remove_sheet(&self, shape: usize, sheet: usize) -> Vec<Operation> {
+        let mut gone: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); self.arrivals().len()];
+        gone[shape].insert(sheet);
+        let ways: Vec<Strands> = (1..gone.len()).map(|shape| self.strands(shape - 1)).collect();
+        for before in (0..shape).rev() {
+            let turned: Strands = ways[before].iter().map(|&(from, to)| (to, from)).collect();
+            gone[before] = only_of(&turned, &gone[before + 1]);
+        }
+        for before in shape..ways.len() {
+            gone[before + 1] = only_of(&ways[before], &gone[before]);
+        }
+        let first = gone.iter().position(|sheets| !sheets.is_empty()).unwrap_or(shape);
+        let changed: Vec<_> = (first..gone.len())
+            .take_while(|&shape| !gone[shape].is_empty())
+            .map(|shape| {
+                let kept = self.sheets(shape).into_iter().enumerate().filter(|(sheet, _)| !gone[shape].contains(sheet));
+                (kept.map(|(_, sheet)| sheet).collect(), Fate::Gone(gone[shape].clone()))
+            })
+            .collect();
+        let needless = |shape: usize| match shape.checked_sub(1) {
+            Some(before) => self.needless_splits(shape, &ways[before], [&gone[before], &gone[shape]]),
+            None => Vec::new(),
+        };
+        self.write_all(first, &changed, LinkParameters::clone, needless)
+    }
+
+    /// The strands from shape `before` to the next, in the order of its sheets and along each.
+    fn strands(&self, before: usize) -> Strands {
+        let [leaving, arriving] = [before, before + 1].map(|shape| self.lines(shape));
+        let ways = self.ways(before);
+        let ends = ways.iter().filter_map(|strand| {
+            let [from, to] = *strand.get(strand.len() / 2)?;
+            Some((lines::nearest_of(&leaving, from)?, lines::nearest_of(&arriving, to)?))
+        });
+        ends.collect()
+    }
+
+    /// The splits to shape `shape`, by number, that a sheet of the shape before no longer needs, as many as it has parts among what is gone.
+    fn needless_splits(&self, shape: usize, strands: &Strands, [before, after]: [&BTreeSet<usize>; 2]) -> Vec<usize> {
+        let Some(parameters) = self.parameters.shapes.get(shape) else { return Vec::new() };
+        let staying = strands.iter().map(|(from, _)| *from).filter(|from| !before.contains(from));
+        let of_sheet = |sheet: usize| {
+            let splits = parameters.split.iter().enumerate();
+            let mut cuts: Vec<usize> =
+                splits.filter(|(_, split)| split.sheet == sheet as i64 + 1).map(|(number, _)| number).collect();
+            let place = |number: usize| (parameters.split[number].segment, parameters.split[number].at.unwrap_or(0.5));
+            cuts.sort_by(|&a, &b| {
+                let (a, b) = (place(a), place(b));
+                a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+            });
+            let parts = strands.iter().filter(move |(from, _)| *from == sheet).map(|(_, to)| after.contains(to));
+            // Each part but the first begins at a cut.
+            let gone = parts.enumerate().filter(|(_, gone)| *gone).map(|(part, _)| part.saturating_sub(1));
+            let numbers: Vec<usize> = gone.filter_map(|cut| cuts.get(cut).copied()).collect();
+            numbers
+        };
+        staying.collect::<BTreeSet<_>>().into_iter().flat_map(of_sheet).collect()
+    }
+}
+
+/// The sheets that strands lead to from `gone` alone.
+fn only_of(strands: &Strands, gone: &BTreeSet<usize>) -> BTreeSet<usize> {
+    let stays = |sheet: usize| strands.iter().any(|(from, to)| *to == sheet && !gone.contains(from));
+    strands.iter().filter(|(from, to)| gone.contains(from) && !stays(*to)).map(|(_, to)| *to).collect()
+}
