@@ -61,7 +61,7 @@ impl<const D: usize> Simulation<D> {
     }
 
     fn densities(&mut self) {
-        densities(&mut self.cells, KernelShape::Poly6, &self.particles.masses, &mut self.densities);
+        densities(&self.cells, KernelShape::Poly6, &self.particles.masses, &mut self.densities);
     }
 
     fn forces(&mut self) {

@@ -20,6 +20,9 @@ pub trait Real: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Se
     /// Square root.
     #[must_use]
     fn root(self) -> Self;
+    /// `1 / sqrt(self)` to 1.5 ulp, for normal numbers above 0; many times faster than a root and a division.
+    #[must_use]
+    fn inverse_root(self) -> Self;
     /// Absolute value.
     #[must_use]
     fn size(self) -> Self;
@@ -55,6 +58,10 @@ impl Real for f32 {
         self.sqrt()
     }
     #[inline(always)]
+    fn inverse_root(self) -> Self {
+        refine_inverse_root(self, f32::from_bits(INVERSE_ROOT - (self.to_bits() >> 1)))
+    }
+    #[inline(always)]
     fn size(self) -> Self {
         self.abs()
     }
@@ -70,6 +77,21 @@ impl Real for f32 {
     fn choose(self, limit: Self, low: Self, high: Self) -> Self {
         if self < limit { low } else { high }
     }
+}
+
+/// Half of the bits of a number taken from these are those of about its inverse root: the exponent halved and turned (Lomont 2003).
+const INVERSE_ROOT: u32 = 0x5f34_0000;
+
+/// A guess at `1 / sqrt(value)`, times a polynomial of its error `e = 1 - value guess^2`, from -0.033 to 0.094: `1 / sqrt(1 - e)` to
+/// 2e-8, by least squares.
+#[inline(always)]
+fn refine_inverse_root<R: Real>(value: R, guess: R) -> R {
+    let like = |constant: f32| value.like(constant);
+    let error = (like(0.0) - value * guess).fused(guess, like(1.0));
+    let low = error.fused(like(0.500_001_4), like(1.0));
+    let high = error.fused(like(0.311_153_4), like(0.374_954_5));
+    let square = error * error;
+    guess * square.fused(square.fused(like(0.316_214_53), high), low)
 }
 
 /// A batch.
@@ -104,6 +126,11 @@ macro_rules! real_batch {
             #[inline(always)]
             fn root(self) -> Self {
                 self.sqrt()
+            }
+            #[inline(always)]
+            fn inverse_root(self) -> Self {
+                let guess = INVERSE_ROOT - (self.to_bits() >> 1);
+                refine_inverse_root(self, guess.bitcast())
             }
             #[inline(always)]
             fn size(self) -> Self {
@@ -278,6 +305,19 @@ mod tests {
             let difference = (value - place[i]).rem_euclid(8.0);
             assert!(difference.min(8.0 - difference) < 1e-3, "{} {} {}", place[i], whole[i], part[i]);
         }
+    }
+
+    #[test]
+    fn inverse_roots_are_right_to_three_halves_of_an_ulp_and_the_same_one_by_one() {
+        for i in 0..200_000_u32 {
+            let value = f32::from_bits(0x0090_0000 + i * 10_437);
+            let exact = 1.0 / f64::from(value).sqrt();
+            let error = f64::from(value.inverse_root()) / exact - 1.0;
+            assert!(error.abs() < 1.8e-7, "{value}: {error}");
+        }
+        let values: [f32; LANES] = std::array::from_fn(|lane| 1e-9 * 7.3_f32.powi(lane as i32));
+        let roots = plain!(simd => Lanes::from_slice(simd, &values).inverse_root().as_slice().to_vec());
+        assert_eq!(roots, values.map(Real::inverse_root));
     }
 
     #[test]

@@ -113,7 +113,7 @@ impl Simulation {
             return;
         }
         self.particles.sort(&mut self.cells);
-        densities(&mut self.cells, KernelShape::Poly6, &self.particles.mass, &mut self.particles.density);
+        densities(&self.cells, KernelShape::Poly6, &self.particles.mass, &mut self.particles.density);
         self.press(seconds);
         self.beside.look(&self.cells, &self.particles);
         let weather =

@@ -1,12 +1,12 @@
-//! Eight candidates at a time.
+//! Eight particles at a time.
 //!
 //! Arrays are walked by loops, not by `map`: its closures would not become vector code.
 
 use fearless_simd::{Simd, prelude::*};
 
-use crate::lanes::{HalfLanes, Lanes, Real};
+use crate::lanes::{HalfLanes, Real};
 
-/// Candidates looked at together.
+/// Particles looked at together.
 pub(super) const BATCH: usize = 8;
 
 /// Squared length of an offset.
@@ -29,12 +29,12 @@ pub(super) fn cut<const N: usize>(arrays: [&[f32]; N], length: usize) -> [&[f32]
     cut
 }
 
-/// The batch of each array that begins at a slot.
+/// The batch of each array that begins at an index.
 #[inline(always)]
-pub(super) fn load<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], slot: usize) -> [HalfLanes<S>; N] {
+pub(super) fn load<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], first: usize) -> [HalfLanes<S>; N] {
     let mut batches = [HalfLanes::splat(simd, 0.0); N];
     for k in 0..N {
-        batches[k] = HalfLanes::from_slice(simd, &arrays[k][slot..slot + BATCH]);
+        batches[k] = HalfLanes::from_slice(simd, &arrays[k][first..first + BATCH]);
     }
     batches
 }
@@ -67,14 +67,4 @@ pub(super) fn difference<R: Real, const D: usize>(one: &[R; D], other: &[R; D]) 
         result[c] = one[c] - other[c];
     }
     result
-}
-
-/// Two batches side by side.
-#[inline(always)]
-pub(super) fn pair<S: Simd, const N: usize>(first: &[HalfLanes<S>; N], second: &[HalfLanes<S>; N]) -> [Lanes<S>; N] {
-    let mut pairs = [first[0].combine(second[0]); N];
-    for k in 1..N {
-        pairs[k] = first[k].combine(second[k]);
-    }
-    pairs
 }

@@ -1,20 +1,24 @@
-//! Particles sorted into cells of the support radius, of which only those that hold some exist.
+//! Particles sorted into cells, of which only those that hold some exist.
 //!
-//! There is no grid: cells are a sorted list, so memory grows with the particles alone, however far they spread. Cells follow each
-//! other along x, so three neighbours in a row are one run of particles, and the neighbours of a cell are 3 runs in the plane and
-//! 9 in space.
+//! There is no grid: cells are a sorted list, so memory grows with the particles alone, however far they spread. A cell is as wide as the
+//! support radius, and a quarter as long along x. Cells follow each other along x, so that all in a row that are near are one run of
+//! particles, and the neighbours of a cell are 3 runs in the plane and 9 in space.
 
 use std::ops::Range;
 
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::{batch::BATCH, stretch::Stretch};
+use super::{batch::BATCH, group::Stretch};
 
-/// Cells further than this from the origin, in cells, are taken together; so a key of three axes fits 64 bits.
-const FARTHEST: i32 = 1 << 19;
-/// Cells are this much wider than the support radius, so that rounding never puts two neighbours two cells apart.
+/// Cells further than this from the origin, in support radii, are taken together; so a key of three axes fits 64 bits.
+const FARTHEST: i32 = 1 << 18;
+/// Cells are this much larger than the support radius asks, so that rounding never puts two neighbours further apart.
 const MARGIN: f32 = 1.001;
+/// Cells along x in a support radius: short ones keep the groups of a row short.
+const ALONG: i32 = 4;
+/// A group ends where it would be longer than this, in cells along x: what lies between would all be its candidates.
+const LONGEST_GROUP: u64 = 8 * ALONG as u64;
 /// Where particles are put that are farther away or nowhere; squares of such distances are still finite.
 pub(super) const BEYOND: f32 = 1e12;
 /// Particles that one task takes at least.
@@ -22,34 +26,45 @@ pub(super) const AT_ONCE: usize = 4096;
 /// Bits sorted by in one pass.
 const DIGIT_BITS: u32 = 11;
 
-/// Particles in cells of one support radius; the order they were given in does not matter.
+/// Particles in cells by one support radius; the order they were given in does not matter.
 #[derive(Clone, Debug)]
 pub struct Cells<const D: usize> {
     support_radius: f32,
     keys: Keys<D>,
-    /// For each sorted slot the index it was given at.
+    /// For each particle in sorted order the index it was given at.
     order: Vec<u32>,
     ids: Vec<u64>,
-    /// Positions by slot.
+    /// Positions in sorted order, and a batch that is nowhere.
     positions: [Vec<f32>; D],
     occupied: Vec<Cell>,
+    row_parts: Vec<RowPart>,
     stretches: Vec<Stretch>,
+    sorting: Sorting<D>,
 }
 
-/// Particles that follow each other in slots: those of up to three cells of a row.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Run {
-    pub(super) particles: Range<usize>,
-    /// Slot of the first.
-    pub(super) slot: usize,
+/// What sorting writes on the way, kept from step to step.
+#[derive(Clone, Debug)]
+struct Sorting<const D: usize> {
+    /// Cells along each axis.
+    coordinates: [Vec<i32>; D],
+    /// Keys and the indices that they belong to.
+    entries: Vec<(u64, u32)>,
+    spare: Vec<(u64, u32)>,
 }
 
-/// A cell that holds particles: its key, its first particle and the slot of that. The last of the list is a sentinel behind all.
+/// A cell that holds particles: its key and its first particle. The last of the list is a sentinel behind all.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
     key: u64,
     start: u32,
-    slot: usize,
+}
+
+/// Up to [`BATCH`] particles that follow each other in a row, and the keys of the first and the last one's cell.
+#[derive(Clone, Debug)]
+pub(super) struct RowPart {
+    pub(super) particles: Range<u32>,
+    first: u64,
+    last: u64,
 }
 
 /// How coordinates of cells become keys that sort by the last axis first and by x last.
@@ -61,15 +76,17 @@ struct Keys<const D: usize> {
 }
 
 impl<const D: usize> Keys<D> {
-    /// For cells from `lower` to `upper` and one more on each side.
-    fn new(lower: [i32; D], upper: [i32; D]) -> Self {
+    /// For cells from `lower` to `upper` and a support radius more on each side.
+    fn new(mut lower: [i32; D], upper: [i32; D]) -> Self {
         let mut shift = [0; D];
         let mut bits = 0;
         for c in 0..D {
+            let margin = if c == 0 { ALONG } else { 1 };
             shift[c] = bits;
-            bits += u32::BITS - ((upper[c] - lower[c]) as u32 + 2).leading_zeros();
+            bits += u32::BITS - ((upper[c] - lower[c] + 2 * margin) as u32).leading_zeros();
+            lower[c] -= margin;
         }
-        Self { lower: lower.map(|cell| cell - 1), shift, bits }
+        Self { lower, shift, bits }
     }
 
     fn key(&self, cell: [i32; D]) -> u64 {
@@ -104,8 +121,10 @@ impl<const D: usize> Cells<D> {
         const { assert!(D == 2 || D == 3, "particles live in two or three dimensions") };
         let none = || std::array::from_fn(|_| Vec::new());
         let keys = Keys::new([0; D], [0; D]);
-        let (order, ids, occupied, stretches) = Default::default();
-        Self { support_radius, keys, order, ids, positions: none(), occupied, stretches }
+        let (order, ids, occupied, row_parts, stretches) = Default::default();
+        let coordinates = std::array::from_fn(|_| Vec::new());
+        let sorting = Sorting { coordinates, entries: Vec::new(), spare: Vec::new() };
+        Self { support_radius, keys, order, ids, positions: none(), occupied, row_parts, stretches, sorting }
     }
 
     /// The distance from which on particles do not see each other.
@@ -134,40 +153,42 @@ impl<const D: usize> Cells<D> {
     /// Sorts particles by cell, then by birth id, and remembers where they are. [`Cells::reorder`] then brings arrays into that order.
     ///
     /// # Panics
-    /// If there are more than 2^28 of them, or positions and ids are not equally many.
+    /// If there are more than 2^27 of them, or positions and ids are not equally many.
     pub fn assign(&mut self, positions: [&[f32]; D], ids: &[u64]) {
-        assert!(ids.len() <= 1 << 28, "slots are counted in 32 bits");
+        assert!(ids.len() <= 1 << 27, "particles are counted in 32 bits");
         assert!(positions.iter().all(|component| component.len() == ids.len()), "one position an id");
         let scale = 1.0 / (self.support_radius * MARGIN);
-        let mut coordinates: [Vec<i32>; D] = std::array::from_fn(|_| Vec::new());
-        coordinates.par_iter_mut().zip(positions).for_each(|(cells, component)| {
-            dispatch!(Level::new(), _simd => cells_along(component, scale, cells));
+        self.sorting.coordinates.par_iter_mut().zip(positions).enumerate().for_each(|(c, (cells, component))| {
+            let along = if c == 0 { ALONG } else { 1 };
+            let (scale, farthest) = (scale * along as f32, (FARTHEST * along) as f32);
+            dispatch!(Level::new(), _simd => cells_along(component, scale, farthest, cells));
         });
-        if ids.is_empty() {
-            self.order.clear();
-            self.occupied.clear();
-        } else {
-            let bound =
-                |c: usize, pick: fn(i32, i32) -> i32| coordinates[c].iter().copied().fold(coordinates[c][0], pick);
-            self.keys =
-                Keys::new(std::array::from_fn(|c| bound(c, i32::min)), std::array::from_fn(|c| bound(c, i32::max)));
-            self.sort(&coordinates, ids);
+        self.order.clear();
+        self.occupied.clear();
+        if !ids.is_empty() {
+            self.sort(ids);
         }
         let within = |x: f32| if x.abs() < BEYOND { x } else { BEYOND };
-        let mut slots = std::mem::replace(&mut self.positions, std::array::from_fn(|_| Vec::new()));
-        slots.par_iter_mut().zip(positions).for_each(|(to, from)| {
-            self.fill_slots(to, -BEYOND, |particle| within(from[self.order[particle] as usize]));
+        let mut sorted = std::mem::replace(&mut self.positions, std::array::from_fn(|_| Vec::new()));
+        sorted.par_iter_mut().zip(positions).for_each(|(to, from)| {
+            to.clear();
+            to.extend(self.order.iter().map(|i| within(from[*i as usize])));
+            to.resize((ids.len() + BATCH).next_multiple_of(BATCH), -BEYOND);
         });
-        self.positions = slots;
+        self.positions = sorted;
         self.ids.clear();
         self.ids.par_extend(self.order.par_iter().with_min_len(AT_ONCE).map(|i| ids[*i as usize]));
-        let mut stretches = self.take_stretches();
-        self.find_stretches(&mut stretches);
-        self.put_stretches(stretches);
+        self.part_rows();
+        let mut stretches = std::mem::take(&mut self.stretches);
+        Stretch::find_all(&mut stretches, self, &self.row_parts);
+        self.stretches = stretches;
     }
 
     /// Sorts by key, then by id, and lists the cells.
-    fn sort(&mut self, coordinates: &[Vec<i32>; D], ids: &[u64]) {
+    fn sort(&mut self, ids: &[u64]) {
+        let Sorting { coordinates, entries, spare } = &mut self.sorting;
+        let bound = |c: usize, pick: fn(i32, i32) -> i32| coordinates[c].iter().copied().fold(coordinates[c][0], pick);
+        self.keys = Keys::new(std::array::from_fn(|c| bound(c, i32::min)), std::array::from_fn(|c| bound(c, i32::max)));
         let keys = self.keys;
         let entry = |i: usize| {
             let mut cell = [0; D];
@@ -176,32 +197,47 @@ impl<const D: usize> Cells<D> {
             }
             (keys.key(cell), i as u32)
         };
-        let mut sorted: Vec<(u64, u32)> = (0..ids.len()).into_par_iter().with_min_len(AT_ONCE).map(entry).collect();
-        let mut spare = sorted.clone();
+        (0..ids.len()).into_par_iter().with_min_len(AT_ONCE).map(entry).collect_into_vec(entries);
+        spare.resize(entries.len(), (0, 0));
         for shift in (0..keys.bits).step_by(DIGIT_BITS as usize) {
-            counting_pass(&sorted, &mut spare, shift);
-            std::mem::swap(&mut sorted, &mut spare);
+            counting_pass(entries, spare, shift);
+            std::mem::swap(entries, spare);
         }
         let by_id = |cell: &mut [(u64, u32)]| cell.sort_unstable_by_key(|entry| ids[entry.1 as usize]);
-        sorted.par_chunk_by_mut(|a, b| a.0 == b.0).for_each(by_id);
-        self.list(&sorted);
-        self.order.clear();
-        self.order.par_extend(sorted.par_iter().with_min_len(AT_ONCE).map(|entry| entry.1));
+        entries.par_chunk_by_mut(|a, b| a.0 == b.0).for_each(by_id);
+        self.order.par_extend(entries.par_iter().with_min_len(AT_ONCE).map(|entry| entry.1));
+        self.list_cells();
     }
 
-    /// Lists the cells of sorted keys.
-    fn list(&mut self, sorted: &[(u64, u32)]) {
-        self.occupied.clear();
-        let (mut start, mut slot, mut row) = (0, 0, self.keys.row(sorted[0].0));
-        for cell in sorted.chunk_by(|a, b| a.0 == b.0) {
-            let key = cell[0].0;
-            if self.keys.row(key) != row {
-                (slot, row) = (slot + BATCH, self.keys.row(key));
-            }
-            self.occupied.push(Cell { key, start, slot });
-            (start, slot) = (start + cell.len() as u32, slot + cell.len());
+    /// Lists the cells of the sorted entries.
+    fn list_cells(&mut self) {
+        let mut start = 0;
+        for cell in self.sorting.entries.chunk_by(|a, b| a.0 == b.0) {
+            self.occupied.push(Cell { key: cell[0].0, start });
+            start += cell.len() as u32;
         }
-        self.occupied.push(Cell { key: u64::MAX, start, slot: slot + BATCH });
+        self.occupied.push(Cell { key: u64::MAX, start });
+    }
+
+    /// Parts every row of cells into particles for groups.
+    fn part_rows(&mut self) {
+        self.row_parts.clear();
+        let mut row = u64::MAX;
+        for pair in self.occupied.windows(2) {
+            let (key, mut start) = (pair[0].key, pair[0].start);
+            let same_row = std::mem::replace(&mut row, self.keys.row(key)) == self.keys.row(key);
+            if let Some(part) = self.row_parts.last_mut().filter(|part| same_row && key - part.first <= LONGEST_GROUP) {
+                let end = pair[1].start.min(part.particles.start + BATCH as u32);
+                if end > start {
+                    (part.particles.end, part.last, start) = (end, key, end);
+                }
+            }
+            while start < pair[1].start {
+                let end = pair[1].start.min(start + BATCH as u32);
+                self.row_parts.push(RowPart { particles: start..end, first: key, last: key });
+                start = end;
+            }
+        }
     }
 
     /// Brings values, given in the order of [`Cells::assign`], into the sorted order.
@@ -218,80 +254,65 @@ impl<const D: usize> Cells<D> {
         &self.ids
     }
 
-    /// Positions by slot, one array a component.
+    /// Positions in sorted order, one array a component, and a batch that is nowhere.
     pub(super) fn positions(&self) -> [&[f32]; D] {
         self.positions.each_ref().map(Vec::as_slice)
     }
 
-    /// Puts the value of each particle into its slot and `empty` into the others.
-    pub(super) fn fill_slots(&self, slots: &mut Vec<f32>, empty: f32, value: impl Fn(usize) -> f32) {
-        slots.clear();
-        for pair in self.occupied.windows(2) {
-            slots.extend((pair[0].start as usize..pair[1].start as usize).map(&value));
-            slots.resize(pair[1].slot, empty);
-        }
-    }
-
-    /// All cells, in stretches.
+    /// All groups of particles, in stretches.
     pub(super) fn stretches(&self) -> &[Stretch] {
         &self.stretches
     }
 
-    /// The stretches, to be put back.
-    pub(super) fn take_stretches(&mut self) -> Vec<Stretch> {
-        std::mem::take(&mut self.stretches)
+    /// The runs of particles around parts of rows, from `first` on.
+    pub(super) fn runs_from(&self, first: &RowPart) -> Runs<'_> {
+        let start = |row: u64| self.occupied.partition_point(|cell| cell.key < first.lowest(row));
+        let rows: Vec<(u64, usize, usize)> = self.keys.rows().map(|row| (row, start(row), 0)).collect();
+        Runs { occupied: &self.occupied, runs: vec![0..0; rows.len()], rows }
+    }
+}
+
+impl RowPart {
+    /// The least key that may be near in the row that is so far away.
+    fn lowest(&self, row: u64) -> u64 {
+        self.first.wrapping_add(row) - ALONG as u64
     }
 
-    pub(super) fn put_stretches(&mut self, stretches: Vec<Stretch>) {
-        self.stretches = stretches;
+    /// The greatest.
+    fn highest(&self, row: u64) -> u64 {
+        self.last.wrapping_add(row) + ALONG as u64
     }
+}
 
-    /// The particle in a slot that is not empty.
-    pub(super) fn particle_in(&self, slot: usize) -> usize {
-        let cell = self.occupied[self.occupied.partition_point(|cell| cell.slot <= slot) - 1];
-        cell.start as usize + slot - cell.slot
-    }
+/// The runs of particles that may be near parts of rows, one after the other.
+pub(super) struct Runs<'a> {
+    occupied: &'a [Cell],
+    /// How far away each neighbouring row is, and which of its cells were near last: they move on with the parts, so all searching is one pass.
+    rows: Vec<(u64, usize, usize)>,
+    runs: Vec<Range<usize>>,
+}
 
-    /// Number of cells that hold particles.
-    pub(super) fn count(&self) -> usize {
-        self.occupied.len().saturating_sub(1)
-    }
-
-    /// Particles of a range of cells.
-    pub(super) fn particles(&self, cells: Range<usize>) -> Range<usize> {
-        self.occupied[cells.start].start as usize..self.occupied[cells.end].start as usize
-    }
-
-    /// For each of a range of cells in turn: its particles, and the runs of its candidates.
-    pub(super) fn visit(&self, cells: Range<usize>, mut visitor: impl FnMut(Run, &[Run])) {
-        let Some(first) = self.occupied.get(cells.start) else { return };
-        // Where each neighbouring row has got to; rows move on with the cells, so all searching is one pass.
-        let from = |row: u64| (row, self.occupied.partition_point(|cell| cell.key < first.key.wrapping_add(row) - 1));
-        let mut rows: Vec<(u64, usize)> = self.keys.rows().map(from).collect();
-        let mut runs = vec![Run::default(); rows.len()];
-        for index in cells {
-            let key = self.occupied[index].key;
-            for (run, (row, cursor)) in runs.iter_mut().zip(&mut rows) {
-                let centre = key.wrapping_add(*row);
-                while self.occupied[*cursor].key < centre - 1 {
-                    *cursor += 1;
-                }
-                let mut end = *cursor;
-                while self.occupied[end].key <= centre + 1 {
-                    end += 1;
-                }
-                *run = Run { particles: self.particles(*cursor..end), slot: self.occupied[*cursor].slot };
+impl Runs<'_> {
+    /// The runs of those that may be near a part, which comes after those asked for before.
+    pub(super) fn around(&mut self, part: &RowPart) -> &[Range<usize>] {
+        for (run, (row, start, end)) in self.runs.iter_mut().zip(&mut self.rows) {
+            let (lowest, highest) = (part.lowest(*row), part.highest(*row));
+            while self.occupied[*start].key < lowest {
+                *start += 1;
             }
-            let own = Run { particles: self.particles(index..index + 1), slot: self.occupied[index].slot };
-            visitor(own, &runs);
+            *end = (*end).max(*start);
+            while self.occupied[*end].key <= highest {
+                *end += 1;
+            }
+            *run = self.occupied[*start].start as usize..self.occupied[*end].start as usize;
         }
+        &self.runs
     }
 }
 
 /// The cells of coordinates, `scale` cells a unit. No `floor`: where the processor lacks it that is a call.
 #[inline(always)]
-fn cells_along(component: &[f32], scale: f32, cells: &mut Vec<i32>) {
-    let farthest = FARTHEST as f32;
+fn cells_along(component: &[f32], scale: f32, farthest: f32, cells: &mut Vec<i32>) {
     cells.resize(component.len(), 0);
     for (cell, value) in cells.iter_mut().zip(component) {
         let place = (value * scale).clamp(-farthest, farthest);

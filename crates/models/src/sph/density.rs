@@ -21,18 +21,14 @@ impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 1, 1> for DensityTerm<K>
 
 /// Densities `rho_i = sum_j m_j W(|x_i - x_j|)`, the particle itself included: Inagaki et al. (3), the aurora thesis (2.11).
 ///
-/// It notes who is near whom: the sums of a step that come after it are faster.
-///
 /// # Panics
 /// If `masses` are not one a particle.
-pub fn densities<const D: usize>(cells: &mut Cells<D>, kernel: KernelShape, masses: &[f32], densities: &mut Vec<f32>) {
+pub fn densities<const D: usize>(cells: &Cells<D>, kernel: KernelShape, masses: &[f32], densities: &mut Vec<f32>) {
     let support = cells.support_radius();
     match kernel {
-        KernelShape::Poly6 => cells.sum_and_note(&DensityTerm(Poly6::<D>::new(support)), [masses], [densities]),
-        KernelShape::Spiky => cells.sum_and_note(&DensityTerm(Spiky::<D>::new(support)), [masses], [densities]),
-        KernelShape::CubicSpline => {
-            cells.sum_and_note(&DensityTerm(CubicSpline::<D>::new(support)), [masses], [densities])
-        }
+        KernelShape::Poly6 => cells.sum(&DensityTerm(Poly6::<D>::new(support)), [masses], [densities]),
+        KernelShape::Spiky => cells.sum(&DensityTerm(Spiky::<D>::new(support)), [masses], [densities]),
+        KernelShape::CubicSpline => cells.sum(&DensityTerm(CubicSpline::<D>::new(support)), [masses], [densities]),
     }
 }
 

@@ -124,9 +124,10 @@ impl<const D: usize> SmoothingKernel<D> for Spiky<D> {
 
     #[inline(always)]
     fn gradient_factor<R: Real>(&self, distance_squared: R) -> R {
-        let q = (distance_squared * distance_squared.like(self.0.to_q_squared)).root();
-        let rest = q.like(1.0) - q;
-        rest * rest * q.like(self.0.gradient) / q
+        let q_squared = distance_squared * distance_squared.like(self.0.to_q_squared);
+        let inverse_q = q_squared.inverse_root();
+        let rest = q_squared.fused(q_squared.like(0.0) - inverse_q, q_squared.like(1.0));
+        (rest * rest) * (inverse_q * q_squared.like(self.0.gradient))
     }
 }
 

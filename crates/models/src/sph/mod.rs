@@ -13,7 +13,7 @@
 //! let (mut density, mut acceleration) = (Vec::new(), Default::default());
 //!
 //! particles.sort(&mut cells); // then `cells.reorder` for arrays of the model's own
-//! densities(&mut cells, KernelShape::Poly6, &particles.masses, &mut density);
+//! densities(&cells, KernelShape::Poly6, &particles.masses, &mut density);
 //! let pressure: Vec<f32> = density.iter().map(|density| state.pressure(10.0, *density)).collect();
 //! force.accelerations(&cells, &particles.masses, &density, &pressure, &mut acceleration);
 //! particles.advance(&acceleration, 1e-3);
@@ -24,12 +24,12 @@
 mod batch;
 mod cells;
 mod density;
+mod group;
 mod kernel;
 mod mixing;
 mod particles;
 mod pressure;
 mod step;
-mod stretch;
 mod sum;
 #[cfg(test)]
 mod tests;

@@ -1,8 +1,7 @@
 //! Sums over the neighbours of every particle: the one loop that density, forces and whatever a model adds run in.
 //!
-//! Each particle of a cell goes through the candidates of the cell eight at a time. The first sum notes the batches in which it has
-//! neighbours; later ones leave out the others, about half. There is no list of neighbours: rejecting candidates within a batch costs
-//! less than storing and fetching the others one by one. A sum depends on who is in the neighbouring cells alone, not on threads.
+//! Eight particles that lie beside each other go through their common candidates together, one candidate at a time: each has a lane of a
+//! vector to itself, so nothing waits and nothing is added up across lanes. A sum depends on who is near alone, not on threads.
 
 use bansho_base::{
     math,
@@ -12,11 +11,11 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
 use super::{
-    batch::{BATCH, cut, difference, load, pair, pick, spread, squared},
+    batch::{BATCH, cut, difference, load, pick, spread, squared},
     cells::Cells,
-    stretch::{Group, Stretch},
+    group::{Group, Stretch},
 };
-use crate::lanes::{HalfLanes, LANES, Lanes, Real};
+use crate::lanes::{HalfLanes, Real};
 
 /// Particles closer than this share of the support radius count as coincident.
 const COINCIDENT: f32 = 1e-6;
@@ -62,57 +61,16 @@ impl<const D: usize> Cells<D> {
     ) where
         T: PairTerm<D, IN, OUT>,
     {
-        let slots = self.slots(fields);
-        let (level, fields) = (Level::new(), slots.each_ref().map(Vec::as_slice));
-        let results = split(self.stretches(), self.sized(results));
-        self.stretches().par_iter().zip(results).for_each(|(stretch, mut results)| {
-            let Stretch { groups, starts, hits, crowded, .. } = stretch;
-            let around = Around { cells: self, groups, starts, positions: self.positions(), fields };
-            dispatch!(level, simd => sum_stretch(simd, term, &around, hits, &mut results));
-            if T::DIRECTED {
-                around.add_coincident(term, crowded.as_deref(), &mut results);
-            }
-        });
-    }
-
-    /// The same, which also notes who is near whom, so that every later sum is faster.
-    pub(super) fn sum_and_note<T, const IN: usize, const OUT: usize>(
-        &mut self,
-        term: &T,
-        fields: [&[f32]; IN],
-        results: [&mut Vec<f32>; OUT],
-    ) where
-        T: PairTerm<D, IN, OUT>,
-    {
-        let mut stretches = self.take_stretches();
-        let slots = self.slots(fields);
-        let (level, fields) = (Level::new(), slots.each_ref().map(Vec::as_slice));
-        let results = split(&stretches, self.sized(results));
-        stretches.par_iter_mut().zip(results).for_each(|(stretch, mut results)| {
-            let Stretch { groups, starts, hits, crowded } = stretch;
-            let around = Around { cells: self, groups, starts, positions: self.positions(), fields };
-            dispatch!(level, simd => note_stretch(simd, term, &around, [hits, crowded.insert(Vec::new())], &mut results));
-        });
-        self.put_stretches(stretches);
-    }
-
-    /// Fields by slot.
-    fn slots<const IN: usize>(&self, fields: [&[f32]; IN]) -> [Vec<f32>; IN] {
         assert!(fields.iter().all(|field| field.len() == self.len()), "one value a particle");
-        let mut slots: [Vec<f32>; IN] = std::array::from_fn(|_| Vec::new());
-        slots
-            .par_iter_mut()
-            .zip(fields)
-            .for_each(|(slots, field)| self.fill_slots(slots, 0.0, |particle| field[particle]));
-        slots
-    }
-
-    /// Results with room for every particle.
-    fn sized<'a, const OUT: usize>(&self, results: [&'a mut Vec<f32>; OUT]) -> [&'a mut [f32]; OUT] {
-        results.map(|values| {
+        let level = Level::new();
+        let results = results.map(|values| {
             values.resize(self.len(), 0.0);
             values.as_mut_slice()
-        })
+        });
+        let around = Around { cells: self, positions: self.positions(), fields };
+        self.stretches().par_iter().zip(split(self.stretches(), results)).for_each(|(stretch, mut results)| {
+            dispatch!(level, simd => sum_stretch(simd, term, &around, stretch, &mut results));
+        });
     }
 }
 
@@ -120,7 +78,7 @@ impl<const D: usize> Cells<D> {
 fn split<'a, const OUT: usize>(stretches: &[Stretch], mut arrays: [&'a mut [f32]; OUT]) -> Vec<[&'a mut [f32]; OUT]> {
     let mut part = |stretch: &Stretch| {
         arrays.each_mut().map(|values| {
-            let (head, tail) = std::mem::take(values).split_at_mut(stretch.len());
+            let (head, tail) = std::mem::take(values).split_at_mut(stretch.particles().len());
             *values = tail;
             head
         })
@@ -128,189 +86,92 @@ fn split<'a, const OUT: usize>(stretches: &[Stretch], mut arrays: [&'a mut [f32]
     stretches.iter().map(&mut part).collect()
 }
 
-/// What the sums of a stretch read: where its candidates are, and positions and fields by slot.
+/// What sums read: positions and fields in sorted order.
 struct Around<'a, const D: usize, const IN: usize> {
     cells: &'a Cells<D>,
-    groups: &'a [Group],
-    starts: &'a [u32],
     positions: [&'a [f32]; D],
     fields: [&'a [f32]; IN],
 }
 
-impl<const D: usize, const IN: usize> Around<'_, D, IN> {
-    /// Where a batch without particles begins: the last one.
-    fn empty(&self) -> usize {
-        self.positions[0].len().saturating_sub(BATCH)
-    }
-
-    /// Adds what particles give that coincide with those at the indices `crowded` of the stretch; `None` where nobody has looked.
-    fn add_coincident<T: PairTerm<D, IN, OUT>, const OUT: usize>(
-        &self,
-        term: &T,
-        crowded: Option<&[u64]>,
-        results: &mut [&mut [f32]; OUT],
-    ) {
-        let mut index = 0;
-        for group in self.groups {
-            for slot in group.slot..group.slot + group.particles.len() {
-                if crowded.is_none_or(|crowded| crowded.binary_search(&index).is_ok()) {
-                    let more = sum_coincident(term, self, group, slot);
-                    for k in 0..OUT {
-                        results[k][index as usize] += more[k];
-                    }
-                }
-                index += 1;
-            }
-        }
-    }
-}
-
-/// Sums for all particles of a stretch, over the batches that their hits name.
+/// Sums for all particles of a stretch.
 #[inline(always)]
 fn sum_stretch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
     around: &Around<'_, D, IN>,
-    hits: &[u64],
+    stretch: &Stretch,
     results: &mut [&mut [f32]; OUT],
 ) where
     T: PairTerm<D, IN, OUT>,
 {
-    let none = around.empty();
-    let mut index = 0;
-    for group in around.groups {
-        let starts = &around.starts[group.starts.clone()];
-        for slot in group.slot..group.slot + group.particles.len() {
-            let mut one = One::new(simd, around, slot);
-            let mut hit = Hits::new(hits[index], group.bit_shift, starts);
-            while let Some(start) = hit.next() {
-                one.add(simd, term, [start, hit.next().unwrap_or(none)]);
-            }
-            for k in 0..OUT {
-                results[k][index] = total(one.sums[k]);
-            }
-            index += 1;
+    let first = stretch.particles().start;
+    for group in &stretch.groups {
+        let candidates = &stretch.candidates[group.candidates.clone()];
+        let (sums, coincident) = sum_group(simd, term, around, group.particles.start, candidates);
+        let mut lanes = [[0.0; BATCH]; OUT];
+        for k in 0..OUT {
+            sums[k].store_slice(&mut lanes[k]);
+        }
+        if T::DIRECTED {
+            add_coincident(term, around, group, candidates, coincident, &mut lanes);
+        }
+        let place = group.particles.start - first..group.particles.end - first;
+        for k in 0..OUT {
+            results[k][place.clone()].copy_from_slice(&lanes[k][..group.particles.len()]);
         }
     }
 }
 
-/// The same over all batches; notes those that hold neighbours as hits, and particles that coincide with others as crowded.
+/// Sums for the eight particles from `first` on over all candidates; and how many of these coincide with each, itself included, if
+/// the term is directed.
 #[inline(always)]
-fn note_stretch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
+fn sum_group<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
     around: &Around<'_, D, IN>,
-    [hits, crowded]: [&mut Vec<u64>; 2],
-    results: &mut [&mut [f32]; OUT],
-) where
+    first: usize,
+    candidates: &[u32],
+) -> ([HalfLanes<S>; OUT], HalfLanes<S>)
+where
     T: PairTerm<D, IN, OUT>,
 {
-    let none = around.empty();
-    let one = Lanes::splat(simd, 1.0);
-    let nearest = one.like(nearest_squared(around.cells.support_radius()));
-    let mut index = 0;
-    for group in around.groups {
-        let starts = &around.starts[group.starts.clone()];
-        for slot in group.slot..group.slot + group.particles.len() {
-            let mut sum = One::new(simd, around, slot);
-            let (mut noted, mut coincident) = (0, one.like(0.0));
-            for (number, starts) in starts.chunks(2).enumerate() {
-                let start = starts[0] as usize;
-                let squared = sum.add(simd, term, [start, starts.get(1).map_or(none, |start| *start as usize)]);
-                coincident += squared.choose(nearest, one, one.like(0.0));
-                let (farthest, halves) = (HalfLanes::splat(simd, sum.farthest), squared.split());
-                noted |= u64::from(halves.0.simd_lt(farthest).any_true()) << ((2 * number) >> group.bit_shift);
-                noted |= u64::from(halves.1.simd_lt(farthest).any_true()) << ((2 * number + 1) >> group.bit_shift);
-            }
-            hits[index] = noted;
-            if total(coincident) > 1.5 {
-                crowded.push(index as u64);
-            }
-            for k in 0..OUT {
-                results[k][index] = total(sum.sums[k]);
-            }
-            index += 1;
-        }
-    }
-}
-
-/// The batches that may hold neighbours of a particle.
-struct Hits<'a> {
-    bits: u64,
-    bit_shift: u32,
-    starts: &'a [u32],
-    /// Batches of the present bit that are left.
-    rest: &'a [u32],
-}
-
-impl<'a> Hits<'a> {
-    #[inline(always)]
-    fn new(bits: u64, bit_shift: u32, starts: &'a [u32]) -> Self {
-        Self { bits, bit_shift, starts, rest: &[] }
-    }
-
-    /// Where the next one begins.
-    #[inline(always)]
-    fn next(&mut self) -> Option<usize> {
-        if self.rest.is_empty() {
-            if self.bits == 0 {
-                return None;
-            }
-            let first = (self.bits.trailing_zeros() as usize) << self.bit_shift;
-            self.bits &= self.bits - 1;
-            self.rest = &self.starts[first..(first + (1 << self.bit_shift)).min(self.starts.len())];
-        }
-        let (start, rest) = self.rest.split_first()?;
-        self.rest = rest;
-        Some(*start as usize)
-    }
-}
-
-/// The sums of one particle as they grow.
-struct One<'a, S: Simd, const D: usize, const IN: usize, const OUT: usize> {
-    positions: [&'a [f32]; D],
-    fields: [&'a [f32]; IN],
-    position: [HalfLanes<S>; D],
-    own: [HalfLanes<S>; IN],
-    /// Squares of the support radius, and of the distance below which particles coincide.
-    farthest: f32,
-    nearest: f32,
-    sums: [Lanes<S>; OUT],
-}
-
-impl<'a, S: Simd, const D: usize, const IN: usize, const OUT: usize> One<'a, S, D, IN, OUT> {
-    #[inline(always)]
-    fn new(simd: S, around: &Around<'a, D, IN>, slot: usize) -> Self {
-        let support = around.cells.support_radius();
-        let slots = around.positions[0].len();
-        let (positions, fields) = (cut(around.positions, slots), cut(around.fields, slots));
-        Self {
-            position: spread(simd, pick(&positions, slot)),
-            own: spread(simd, pick(&fields, slot)),
-            positions,
-            fields,
-            farthest: support * support,
-            nearest: nearest_squared(support),
-            sums: [Lanes::splat(simd, 0.0); OUT],
-        }
-    }
-
-    /// Adds the batches of candidates that begin at two slots, and gives their squared distances.
-    ///
-    /// Two at a time, since each step of one waits for the last: a processor's queue is too short to find the next batch by itself.
-    #[inline(always)]
-    fn add<T: PairTerm<D, IN, OUT>>(&mut self, simd: S, term: &T, [one, two]: [usize; 2]) -> Lanes<S> {
-        let positions = pair(&load(simd, &self.positions, one), &load(simd, &self.positions, two));
-        let others = pair(&load(simd, &self.fields, one), &load(simd, &self.fields, two));
-        let offset = difference(&pair(&self.position, &self.position), &positions);
+    let support = around.cells.support_radius();
+    let count = around.cells.len();
+    let (positions, fields) = (cut(around.positions, count), cut(around.fields, count));
+    let position = load(simd, &around.positions, first);
+    let own = load_held(simd, &fields, first);
+    let none = HalfLanes::splat(simd, 0.0);
+    let (farthest, nearest, one) = (none.like(support * support), none.like(nearest_squared(support)), none.like(1.0));
+    let (mut sums, mut coincident) = ([none; OUT], none);
+    for candidate in candidates {
+        let candidate = *candidate as usize;
+        let offset = difference(&position, &spread(simd, pick(&positions, candidate)));
         let squared = squared(&offset);
-        let mut distance_squared = squared.least(squared.like(self.farthest));
+        let mut distance_squared = squared.least(farthest);
         if T::DIRECTED {
-            distance_squared = distance_squared.greatest(squared.like(self.nearest));
+            coincident = coincident + squared.choose(nearest, one, none);
+            distance_squared = distance_squared.greatest(nearest);
         }
-        term.add(&Pair { offset, distance_squared }, &pair(&self.own, &self.own), &others, &mut self.sums);
-        squared
+        let other = spread(simd, pick(&fields, candidate));
+        term.add(&Pair { offset, distance_squared }, &own, &other, &mut sums);
     }
+    (sums, coincident)
+}
+
+/// The batch of each array that begins at an index; 0 behind their end.
+#[inline(always)]
+fn load_held<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], first: usize) -> [HalfLanes<S>; N] {
+    let length = arrays.first().map_or(0, |array| array.len());
+    if first + BATCH <= length {
+        return load(simd, arrays, first);
+    }
+    let mut batches = [HalfLanes::splat(simd, 0.0); N];
+    for k in 0..N {
+        let mut values = [0.0; BATCH];
+        values[..length - first].copy_from_slice(&arrays[k][first..]);
+        batches[k] = HalfLanes::from_slice(simd, &values);
+    }
+    batches
 }
 
 /// Squared distance below which particles coincide.
@@ -318,39 +179,48 @@ fn nearest_squared(support_radius: f32) -> f32 {
     (support_radius * COINCIDENT) * (support_radius * COINCIDENT)
 }
 
-/// Sum of all lanes, halves first, whatever the vector width.
+/// Adds what those particles of a group gain that coincide with more than themselves.
 #[inline(always)]
-fn total<S: Simd>(lanes: Lanes<S>) -> f32 {
-    let mut parts = [0.0; LANES];
-    lanes.store_slice(&mut parts);
-    for half in [8, 4, 2, 1] {
-        for lane in 0..half {
-            parts[lane] += parts[lane + half];
+fn add_coincident<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
+    term: &T,
+    around: &Around<'_, D, IN>,
+    group: &Group,
+    candidates: &[u32],
+    coincident: HalfLanes<S>,
+    sums: &mut [[f32; BATCH]; OUT],
+) where
+    T: PairTerm<D, IN, OUT>,
+{
+    if !coincident.simd_gt(coincident.like(1.5)).any_true() {
+        return;
+    }
+    for particle in group.particles.clone() {
+        let more = sum_coincident(term, around, candidates, particle);
+        for k in 0..OUT {
+            sums[k][particle - group.particles.start] += more[k];
         }
     }
-    parts[0]
 }
 
-/// What others at the place of the particle in a slot add, each pushed aside by a hair in a direction that both agree on.
+/// What others at the place of a particle add, each pushed aside by a hair in a direction that both agree on.
 #[inline(never)]
 fn sum_coincident<T, const D: usize, const IN: usize, const OUT: usize>(
     term: &T,
     around: &Around<'_, D, IN>,
-    group: &Group,
-    slot: usize,
+    candidates: &[u32],
+    particle: usize,
 ) -> [f32; OUT]
 where
     T: PairTerm<D, IN, OUT>,
 {
     let support = around.cells.support_radius();
-    let id = |slot: usize| around.cells.ids()[around.cells.particle_in(slot)];
-    let (position, values) = (pick(&around.positions, slot), pick(&around.fields, slot));
-    let starts = &around.starts[group.starts.clone()];
+    let ids = around.cells.ids();
+    let (position, values) = (pick(&around.positions, particle), pick(&around.fields, particle));
     let mut sums = [0.0; OUT];
-    for other in starts.iter().flat_map(|start| (*start as usize..).take(BATCH)).filter(|other| *other != slot) {
+    for other in candidates.iter().map(|other| *other as usize).filter(|other| *other != particle) {
         let between = difference(&position, &pick(&around.positions, other));
         if squared(&between) < nearest_squared(support) {
-            let offset = direction(id(slot), id(other)).map(|component: f32| component * support * COINCIDENT);
+            let offset = direction(ids[particle], ids[other]).map(|component: f32| component * support * COINCIDENT);
             let pair = Pair { offset, distance_squared: squared(&offset) };
             term.add(&pair, &values, &pick(&around.fields, other), &mut sums);
         }

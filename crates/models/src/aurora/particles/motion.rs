@@ -72,7 +72,7 @@ impl Repulsion {
         particles.sort(&mut self.cells);
         self.masses.clear();
         self.masses.extend(particles.fades.iter().map(|fade| fade.fused(1.0 - LEAST_MASS, LEAST_MASS)));
-        densities(&mut self.cells, self.density_kernel, &self.masses, &mut self.densities);
+        densities(&self.cells, self.density_kernel, &self.masses, &mut self.densities);
         // To itself a particle is all there: one that is just appearing would be next to weightless, and be flung away.
         let whole = self.density_kernel.at_centre::<2>(self.cells.support_radius());
         self.densities.iter_mut().zip(&self.masses).for_each(|(density, mass)| *density += (1.0 - mass) * whole);
