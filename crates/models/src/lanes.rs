@@ -20,7 +20,7 @@ pub trait Real: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Se
     /// Square root.
     #[must_use]
     fn root(self) -> Self;
-    /// `1 / sqrt(self)` to 1.5 ulp, for normal numbers above 0; many times faster than a root and a division.
+    /// `1 / sqrt(self)` to two ulps, for normal numbers above 0; many times faster than a root and a division.
     #[must_use]
     fn inverse_root(self) -> Self;
     /// Absolute value.
@@ -308,12 +308,12 @@ mod tests {
     }
 
     #[test]
-    fn inverse_roots_are_right_to_three_halves_of_an_ulp_and_the_same_one_by_one() {
+    fn inverse_roots_are_right_to_two_ulps_and_the_same_one_by_one() {
         for i in 0..200_000_u32 {
             let value = f32::from_bits(0x0090_0000 + i * 10_437);
             let exact = 1.0 / f64::from(value).sqrt();
             let error = f64::from(value.inverse_root()) / exact - 1.0;
-            assert!(error.abs() < 1.8e-7, "{value}: {error}");
+            assert!(error.abs() < 2e-7, "{value}: {error}");
         }
         let values: [f32; LANES] = std::array::from_fn(|lane| 1e-9 * 7.3_f32.powi(lane as i32));
         let roots = plain!(simd => Lanes::from_slice(simd, &values).inverse_root().as_slice().to_vec());
