@@ -53,7 +53,7 @@ impl Beside {
     /// Differences of the neighbours' velocities.
     #[inline(always)]
     pub(crate) fn velocity(&self, index: usize) -> [f32; 3] {
-        [1, 2, 3].map(|k| self.sums[k][index])
+        [self.sums[1][index], self.sums[2][index], self.sums[3][index]]
     }
 
     /// Differences of the neighbours' temperatures.
@@ -65,6 +65,6 @@ impl Beside {
     /// Ways to the neighbours.
     #[inline(always)]
     pub(crate) fn offset(&self, index: usize) -> [f32; 3] {
-        [5, 6, 7].map(|k| self.sums[k][index])
+        [self.sums[5][index], self.sums[6][index], self.sums[7][index]]
     }
 }

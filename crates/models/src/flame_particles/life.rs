@@ -20,7 +20,7 @@ const SOOT_FORMING: f32 = 0.17;
 const GREATEST_GROWTH: f32 = 3.0;
 
 /// What of a particle changes as it lives.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Being {
     /// Temperature, K.
     pub(crate) temperature: f32,

@@ -8,6 +8,7 @@ mod breeze;
 mod burner;
 mod collision;
 mod design;
+mod draught;
 pub mod draw;
 mod fault;
 mod flame;

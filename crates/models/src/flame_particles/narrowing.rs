@@ -4,9 +4,11 @@
 //! its entrainment allows, a share of the speed on the axis, and at the base about a fifth of `sqrt(g D)`. The axis is where the gas is: the mean place in each layer of height, so
 //! that it leans with the wind.
 
-use bansho_base::math::{self, DVec3, Vec3};
+use bansho_base::math::{self, DVec3};
+use fearless_simd::{Simd, prelude::*};
 
 use super::burner::{Burner, GRAVITY};
+use crate::lanes::{LANES, Lanes, Real, wrap_split};
 
 /// Layers of height.
 const LAYERS: usize = 24;
@@ -92,26 +94,57 @@ impl Axis {
 
     /// Velocity at which gas at `place` draws toward the axis, m/s.
     #[inline(always)]
-    pub(crate) fn velocity(&self, place: Vec3) -> Vec3 {
-        let height = (place.y - self.base).max(0.0);
-        let [x, z] = self.at(height);
-        let away = Vec3::new(place.x - x, 0.0, place.z - z);
-        let distance = away.length();
-        let speed = (self.speed_squared + 2.0 * self.acceleration * height).sqrt().max(1e-6);
+    pub(crate) fn velocity<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        let like = |value: f32| Lanes::splat(simd, value);
+        let height = (place[1] - like(self.base)).greatest(like(0.0));
+        let [x, z] = self.middle_at(simd, height);
+        let away = [place[0] - x, place[2] - z];
+        let distance = away[0].fused(away[0], away[1] * away[1]).root();
+        let speed_squared = height.fused(like(2.0 * self.acceleration), like(self.speed_squared));
+        let speed = speed_squared.root().greatest(like(1e-6));
         // The pull of one axis ends where a large burner has others of its own.
-        let near = (2.0 - distance / self.reach).clamp(0.0, 1.0);
-        let greatest = GREATEST_SHARE.mul_add(speed, self.inflow);
-        let inward = (0.5 * distance * self.acceleration / speed).min(greatest) * near * self.strength;
-        if distance > 0.0 { away * (-inward / distance) } else { Vec3::ZERO }
+        let near = (like(2.0) - distance * like(1.0 / self.reach)).held();
+        let greatest = speed.fused(like(GREATEST_SHARE), like(self.inflow));
+        let inward = (distance * like(0.5 * self.acceleration) / speed).least(greatest) * near * like(self.strength);
+        let pull = (like(0.0) - inward) / distance.greatest(like(f32::MIN_POSITIVE));
+        [away[0] * pull, like(0.0), away[1] * pull]
+    }
+
+    /// Where the axis is at heights above the burner: x and z, m.
+    #[inline(always)]
+    fn middle_at<S: Simd>(&self, simd: S, height: Lanes<S>) -> [Lanes<S>; 2] {
+        let place = (height * height.like(self.scale)).least(height.like(LAYERS as f32 - 1e-3));
+        let (layer, part) = wrap_split(place, 31);
+        let mut layers = [0; LANES];
+        layer.store_slice(&mut layers);
+        let mut middle = [part; 2];
+        for k in 0..2 {
+            let (mut below, mut above) = ([0.0; LANES], [0.0; LANES]);
+            for lane in 0..LANES {
+                let layer = (layers[lane] as usize).min(LAYERS - 1);
+                (below[lane], above[lane]) = (self.middle[layer][k], self.middle[layer + 1][k]);
+            }
+            let (below, above) = (Lanes::from_slice(simd, &below), Lanes::from_slice(simd, &above));
+            middle[k] = part.fused(above - below, below);
+        }
+        middle
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::assets::MemoryAssets;
+    use bansho_base::{assets::MemoryAssets, math::Vec3};
 
     use super::*;
     use crate::flame_particles::parameters::{BurnerParameters, FlameParticlesParameters};
+    use crate::lanes::plain;
+
+    fn velocity(axis: &Axis, place: Vec3) -> Vec3 {
+        plain!(simd => {
+            let velocity = axis.velocity(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
+            Vec3::from(velocity.map(|values| values.as_slice()[3]))
+        })
+    }
 
     fn axis(strength: f64) -> Axis {
         let parameters = BurnerParameters { height: bansho_base::parameters::Auto::Set(1.0), ..Default::default() };
@@ -125,14 +158,14 @@ mod tests {
     #[test]
     fn gas_draws_toward_the_axis_that_leans_with_it() {
         let axis = axis(1.0);
-        assert!(axis.velocity(Vec3::new(0.5, 0.8, 0.0)).x < -0.05);
-        assert!(axis.velocity(Vec3::new(0.3, 0.8, 0.0)).x > 0.05);
-        assert!(axis.velocity(Vec3::new(0.4, 0.8, 0.1)).z < -0.05);
-        assert_eq!(axis.velocity(Vec3::new(0.4, 0.8, 9.0)), Vec3::ZERO);
+        assert!(velocity(&axis, Vec3::new(0.5, 0.8, 0.0)).x < -0.05);
+        assert!(velocity(&axis, Vec3::new(0.3, 0.8, 0.0)).x > 0.05);
+        assert!(velocity(&axis, Vec3::new(0.4, 0.8, 0.1)).z < -0.05);
+        assert_eq!(velocity(&axis, Vec3::new(0.4, 0.8, 9.0)), Vec3::ZERO);
     }
 
     #[test]
     fn none_of_it_leaves_gas_alone() {
-        assert_eq!(axis(0.0).velocity(Vec3::new(0.5, 0.8, 0.0)).length(), 0.0);
+        assert_eq!(velocity(&axis(0.0), Vec3::new(0.5, 0.8, 0.0)).length(), 0.0);
     }
 }

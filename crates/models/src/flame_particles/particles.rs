@@ -112,13 +112,12 @@ impl Particles {
         })
     }
 
-    /// Removes all for which `keep` of their index is false; the others keep their order.
-    pub(crate) fn retain(&mut self, keep: impl Fn(usize) -> bool) {
-        let keep: Vec<bool> = (0..self.len()).map(keep).collect();
+    /// Removes all whose mask is not set; the others keep their order.
+    pub(crate) fn retain(&mut self, keep: &[bool]) {
         if keep.contains(&false) {
-            retain(&mut self.birth, &keep);
-            retain(&mut self.burner, &keep);
-            self.numbers_mut().into_iter().for_each(|values| retain(values, &keep));
+            retain(&mut self.birth, keep);
+            retain(&mut self.burner, keep);
+            self.numbers_mut().into_par_iter().for_each(|values| retain(values, keep));
         }
     }
 
@@ -256,7 +255,7 @@ mod tests {
     fn removal_keeps_order_and_rows_together() {
         let mut particles = Particles::new(DVec3::ZERO);
         (1..=5).for_each(|birth| particles.push(particle(birth)));
-        particles.retain(|index| index != 1 && index != 3);
+        particles.retain(&[true, false, true, false, true]);
         assert_eq!(particles.births(), [1, 3, 5]);
         assert_eq!((0..3).filter_map(|index| particles.get(index)).collect::<Vec<_>>(), [1, 3, 5].map(particle));
         assert_eq!(particles.get(3), None);

@@ -10,7 +10,10 @@ use bansho_base::{
     random::{Key, Purpose, uniform},
 };
 
+use fearless_simd::Simd;
+
 use super::{burner::Burner, narrowing::Axis, parameters::FlameParticlesParameters};
+use crate::lanes::{Lanes, Real, any_positive};
 
 /// Most rings that a burner sheds side by side.
 const MOST_STREAMS: f64 = 6.0;
@@ -39,21 +42,40 @@ pub(crate) struct Ring {
 }
 
 impl Ring {
-    /// Velocity of the air at `place`, m/s.
+    /// Adds the velocity of the air at `place`, m/s.
     #[inline(always)]
-    pub(crate) fn velocity(&self, place: Vec3) -> Vec3 {
-        let offset = (place - self.centre) * self.inverse_extent;
-        let beyond = 1.0 - offset.length_squared();
-        if beyond <= 0.0 {
-            return Vec3::ZERO;
+    pub(crate) fn add_velocity<S: Simd>(&self, place: &[Lanes<S>; 3], sum: &mut [Lanes<S>; 3]) {
+        let like = |value: f32| place[0].like(value);
+        let (centre, axis) = (self.centre.to_array(), self.axis.to_array());
+        let mut offset = *place;
+        for c in 0..3 {
+            offset[c] = (place[c] - like(centre[c])) * like(self.inverse_extent);
         }
-        let height = offset.dot(self.axis);
-        let radial = offset - self.axis * height;
+        let beyond = like(1.0) - dot(&offset, &offset);
+        if !any_positive(beyond) {
+            return;
+        }
+        let beyond = beyond.greatest(like(0.0));
+        let axis = [like(axis[0]), like(axis[1]), like(axis[2])];
+        let height = dot(&offset, &axis);
+        let mut radial = offset;
+        for c in 0..3 {
+            radial[c] = axis[c].fused(like(0.0) - height, offset[c]);
+        }
         // psi = C r^2 q^4 with q = 1 - s^2: u_h = (1/r) dpsi/dr = C (2 q^4 - 8 r^2 q^3), u_r = -(1/r) dpsi/dh = 8 C r h q^3.
-        let cubed = beyond * beyond * beyond;
-        let along = 2.0 * beyond * cubed - 8.0 * radial.length_squared() * cubed;
-        (self.axis * along + radial * (8.0 * height * cubed)) * self.strength
+        let cubed = beyond * beyond * beyond * like(self.strength);
+        let along = cubed * dot(&radial, &radial).fused(like(-8.0), beyond * like(2.0));
+        let outward = cubed * height * like(8.0);
+        for c in 0..3 {
+            sum[c] = radial[c].fused(outward, axis[c].fused(along, sum[c]));
+        }
     }
+}
+
+/// Product of two vectors.
+#[inline(always)]
+fn dot<R: Real>(one: &[R; 3], other: &[R; 3]) -> R {
+    one[0].fused(other[0], one[1].fused(other[1], one[2] * other[2]))
 }
 
 /// The rings of `burner`, number `number`, that are alive at time `t`, along the `axis` of its gas.
@@ -134,7 +156,18 @@ impl Shed<'_> {
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::prelude::*;
+
     use super::*;
+    use crate::lanes::plain;
+
+    fn velocity(ring: &Ring, place: Vec3) -> Vec3 {
+        plain!(simd => {
+            let mut sum = [Lanes::splat(simd, 0.0); 3];
+            ring.add_velocity(&place.to_array().map(|x| Lanes::splat(simd, x)), &mut sum);
+            Vec3::from(sum.map(|values| values.as_slice()[5]))
+        })
+    }
 
     fn ring() -> Ring {
         Ring { centre: Vec3::new(0.1, 0.5, 0.0), axis: Vec3::Y, inverse_extent: 2.5, strength: 1.5 }
@@ -145,8 +178,9 @@ mod tests {
         let ring = ring();
         for place in [Vec3::new(0.15, 0.6, 0.1), Vec3::new(0.3, 0.45, -0.1), Vec3::new(0.0, 0.3, 0.05)] {
             let h = 2e-3;
-            let slope =
-                |axis: Vec3| (ring.velocity(place + axis * h) - ring.velocity(place - axis * h)).dot(axis) / (2.0 * h);
+            let slope = |axis: Vec3| {
+                (velocity(&ring, place + axis * h) - velocity(&ring, place - axis * h)).dot(axis) / (2.0 * h)
+            };
             let divergence = slope(Vec3::X) + slope(Vec3::Y) + slope(Vec3::Z);
             assert!(divergence.abs() < 0.01 * slope(Vec3::Y).abs().max(1.0), "{divergence}");
         }
@@ -155,10 +189,10 @@ mod tests {
     #[test]
     fn a_ring_draws_in_below_and_pushes_out_above() {
         let ring = ring();
-        assert!((ring.velocity(ring.centre) - Vec3::Y * 3.0).length() < 1e-6);
-        assert!(ring.velocity(ring.centre + Vec3::new(0.15, -0.15, 0.0)).x < -0.1);
-        assert!(ring.velocity(ring.centre + Vec3::new(0.15, 0.15, 0.0)).x > 0.1);
-        assert!(ring.velocity(ring.centre + Vec3::new(0.3, 0.0, 0.0)).y < -0.05, "it rolls");
-        assert_eq!(ring.velocity(ring.centre + Vec3::X * 0.5), Vec3::ZERO);
+        assert!((velocity(&ring, ring.centre) - Vec3::Y * 3.0).length() < 1e-6);
+        assert!(velocity(&ring, ring.centre + Vec3::new(0.15, -0.15, 0.0)).x < -0.1);
+        assert!(velocity(&ring, ring.centre + Vec3::new(0.15, 0.15, 0.0)).x > 0.1);
+        assert!(velocity(&ring, ring.centre + Vec3::new(0.3, 0.0, 0.0)).y < -0.05, "it rolls");
+        assert_eq!(velocity(&ring, ring.centre + Vec3::X * 0.5), Vec3::ZERO);
     }
 }

@@ -1,6 +1,7 @@
 //! A step of the simulation, section 4.3, and what Bansho adds to it.
 
 use bansho_base::{math::Vec3, random::Key, surroundings::Surroundings};
+use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{
@@ -8,6 +9,7 @@ use super::{
     births::Births,
     collision::keep_out,
     design::Design,
+    draught::{Flow, flows},
     life::{Being, Exposure, Laws},
     parameters::{FlameParticlesParameters, ForceKernel, Tension, WindForce},
     particles::Particles,
@@ -47,9 +49,12 @@ pub(crate) struct Simulation {
     acceleration: [Vec<f32>; 3],
     pressure: Vec<f32>,
     beside: Beside,
+    flows: Vec<Flow>,
+    moved: Vec<Moved>,
 }
 
 /// A particle after a sub-step.
+#[derive(Clone, Copy, Debug, Default)]
 struct Moved {
     place: Vec3,
     velocity: Vec3,
@@ -73,6 +78,8 @@ impl Simulation {
             acceleration: Default::default(),
             pressure: Vec::new(),
             beside: Beside::default(),
+            flows: Vec::new(),
+            moved: Vec::new(),
             parameters: parameters.clone(),
             design,
             key,
@@ -100,9 +107,15 @@ impl Simulation {
 
     /// Sub-steps by the condition of Courant, Friedrichs and Lewy, for gas that moves with the gas beside it.
     fn sub_steps(&self, seconds: f32) -> u32 {
-        let squares = |index: usize| self.particles.velocity.iter().map(|v| v[index] * v[index]).sum::<f32>();
-        let speed = (0..self.particles.len()).map(squares).fold(0.0, f32::max).sqrt();
-        let hottest = self.particles.temperature.iter().copied().fold(0.0, f32::max);
+        let [u, v, w] = &self.particles.velocity;
+        let square = |index: usize| u[index] * u[index] + v[index] * v[index] + w[index] * w[index];
+        let greatest = |values: &(dyn Fn(usize) -> f32 + Sync)| {
+            let parts = (0..u.len()).into_par_iter().step_by(TASK);
+            let of_part = |first: usize| (first..(first + TASK).min(u.len())).map(values).fold(0.0, f32::max);
+            parts.map(of_part).reduce(|| 0.0, f32::max)
+        };
+        let speed = greatest(&square).sqrt();
+        let hottest = greatest(&|index| self.particles.temperature[index]);
         let stiffness = self.design.stiffness_per_kelvin * hottest;
         let longest = longest_step(self.design.support_radius, stiffness, RELATIVE_SPEED * speed, 0.0);
         sub_steps(seconds, longest, MOST_SUB_STEPS)
@@ -118,10 +131,16 @@ impl Simulation {
         self.beside.look(&self.cells, &self.particles);
         let weather =
             Weather::new(&self.parameters, &self.design, &self.turbulence, self.key, &self.particles, around, time);
-        let mover = Mover { simulation: self, weather: &weather, seconds, radius: self.cells.support_radius() };
-        let moved: Vec<Moved> =
-            (0..self.particles.len()).into_par_iter().with_min_len(TASK).map(|index| mover.moved(index)).collect();
+        flows(&weather.draughts, &self.particles, &mut self.flows);
+        let mut moved = std::mem::take(&mut self.moved);
+        moved.resize(self.particles.len(), Moved::default());
+        let mover = Mover { simulation: &*self, weather: &weather, seconds, radius: self.cells.support_radius() };
+        let level = Level::new();
+        moved.par_chunks_mut(TASK).enumerate().for_each(|(task, moved)| {
+            dispatch!(level, _simd => mover.move_all(task * TASK, moved));
+        });
         self.take_over(&moved, seconds);
+        self.moved = moved;
     }
 
     /// Pressure (11) and its force (12), with k held where sound does not outrun the sub-step.
@@ -133,34 +152,34 @@ impl Simulation {
         let most = fastest_sound * fastest_sound;
         let per_kelvin = self.design.stiffness_per_kelvin;
         let Particles { density, temperature, mass, .. } = &self.particles;
-        self.pressure.clear();
         let pressure =
             |(density, temperature): (&f32, &f32)| state.pressure((per_kelvin * temperature).min(most), *density);
-        self.pressure.extend(density.iter().zip(temperature).map(pressure));
+        density.par_iter().zip(temperature).with_min_len(TASK).map(pressure).collect_into_vec(&mut self.pressure);
         self.force.accelerations(&self.cells, mass, density, &self.pressure, &mut self.acceleration);
     }
 
+    /// Writes what the sub-step made of the particles into their arrays.
     fn take_over(&mut self, moved: &[Moved], seconds: f32) {
         let Particles { position, velocity, drift, temperature, fuel, soot, support_radius, life, age, .. } =
             &mut self.particles;
-        type Of = fn(&Moved) -> f32;
-        let place: [Of; 3] = [|moved| moved.place.x, |moved| moved.place.y, |moved| moved.place.z];
-        let speed: [Of; 3] = [|moved| moved.velocity.x, |moved| moved.velocity.y, |moved| moved.velocity.z];
-        let aside: [Of; 3] = [|moved| moved.drift.x, |moved| moved.drift.y, |moved| moved.drift.z];
-        let being: [(&mut Vec<f32>, Of); 5] = [
-            (temperature, |moved| moved.being.temperature),
-            (fuel, |moved| moved.being.fuel),
-            (soot, |moved| moved.being.soot),
-            (support_radius, |moved| moved.being.support_radius),
-            (life, |moved| moved.life),
-        ];
-        let vectors = [(position, place), (velocity, speed), (drift, aside)];
-        let mut columns: Vec<(&mut Vec<f32>, Of)> = being.into();
-        columns.extend(vectors.into_iter().flat_map(|(vector, of)| vector.iter_mut().zip(of)));
-        columns.into_par_iter().for_each(|(values, of)| {
-            values.iter_mut().zip(moved).for_each(|(value, moved)| *value = of(moved));
+        let ([x, y, z], [u, v, w], [d, e, f]) = (position, velocity, drift);
+        let arrays = [x, y, z, u, v, w, d, e, f, temperature, fuel, soot, support_radius, life, age];
+        let mut chunks = arrays.map(|values| values.chunks_mut(TASK));
+        let tasks = moved.chunks(TASK).map(|moved| (moved, chunks.each_mut().map(|chunks| chunks.next())));
+        let tasks: Vec<_> = tasks.collect();
+        tasks.into_par_iter().for_each(|(moved, columns)| {
+            let mut columns = columns.map(Option::unwrap_or_default);
+            for (row, moved) in moved.iter().enumerate() {
+                let Moved { place, velocity, drift, being, life } = *moved;
+                let Being { temperature, fuel, soot, support_radius } = being;
+                let ([x, y, z], [u, v, w], [d, e, f]) = (place.to_array(), velocity.to_array(), drift.to_array());
+                let age = columns[14][row] + seconds;
+                let values = [x, y, z, u, v, w, d, e, f, temperature, fuel, soot, support_radius, life, age];
+                for (column, value) in columns.iter_mut().zip(values) {
+                    column[row] = value;
+                }
+            }
         });
-        age.iter_mut().for_each(|age| *age += seconds);
     }
 
     /// Removes what has lived its time or left the domain, and whatever is not a number.
@@ -168,6 +187,8 @@ impl Simulation {
         let [min, max] = self.design.domain.map(|corner| corner.as_vec3());
         let Particles { position, velocity, temperature, age, life, .. } = &self.particles;
         let keep: Vec<bool> = (0..age.len())
+            .into_par_iter()
+            .with_min_len(TASK)
             .map(|index| {
                 let place = Vec3::from(position.each_ref().map(|values| values[index]));
                 let speed = Vec3::from(velocity.each_ref().map(|values| values[index])).length_squared();
@@ -175,7 +196,7 @@ impl Simulation {
                 inside && age[index] < life[index] && speed.is_finite() && temperature[index].is_finite()
             })
             .collect();
-        self.particles.retain(|index| keep[index]);
+        self.particles.retain(&keep);
     }
 }
 
@@ -188,10 +209,20 @@ struct Mover<'a> {
 }
 
 impl Mover<'_> {
+    #[inline(always)]
     fn vector(values: &[Vec<f32>], index: usize) -> Vec3 {
         Vec3::new(values[0][index], values[1][index], values[2][index])
     }
 
+    /// The particles from `first` on after the sub-step; inlined, so that it becomes code for the machine at hand.
+    #[inline(always)]
+    fn move_all(&self, first: usize, all: &mut [Moved]) {
+        for (along, moved) in all.iter_mut().enumerate() {
+            *moved = self.moved(first + along);
+        }
+    }
+
+    #[inline(always)]
     fn moved(&self, index: usize) -> Moved {
         let Self { simulation, weather, seconds, radius } = *self;
         let particles = &simulation.particles;
@@ -203,7 +234,7 @@ impl Mover<'_> {
         let to_air = self.to_air(index);
         let mixing = draught.entrainment * (before - wind).length() * (0.5 + to_air);
         let velocity = self.pushed(index, before - Self::vector(&particles.drift, index), wind, mixing);
-        let drift = draught.velocity(place, velocity.length(), particles.age[index]);
+        let drift = draught.velocity(&simulation.flows[index], velocity.length(), particles.age[index]);
         let total = (velocity + drift).clamp_length_max(GREATEST_SPEED);
         let clearance = CLEARANCE * radius;
         let (new_place, total) = keep_out(weather.occluders, weather.origin, clearance, place + total * seconds, total);
@@ -230,11 +261,13 @@ impl Mover<'_> {
     }
 
     /// What of the difference to the neighbours is evened out in this sub-step, for a share in [`EVENING_TIME`].
+    #[inline(always)]
     fn evening(&self, share: f64, index: usize) -> f32 {
         (share as f32 * self.seconds / EVENING_TIME).min(1.0) / self.simulation.particles.density[index].sqrt()
     }
 
     /// Own velocity after pressure, viscosity, buoyancy and wind.
+    #[inline(always)]
     fn pushed(&self, index: usize, own: Vec3, wind: Vec3, mixing: f32) -> Vec3 {
         let Self { simulation, weather, seconds, .. } = *self;
         let particles = &simulation.particles;
@@ -257,6 +290,7 @@ impl Mover<'_> {
     /// Velocity after the drag of air that blows across the fire: `C rho_air / (rho r) |w - u| (w - u)`, level and implicit.
     ///
     /// Gas is several times thinner than air, so that a wind it would hardly mix with still bends it.
+    #[inline(always)]
     fn dragged(&self, index: usize, own: Vec3, air: Vec3) -> Vec3 {
         let across = (air - own) * Vec3::new(1.0, 0.0, 1.0);
         let particles = &self.simulation.particles;
@@ -267,6 +301,7 @@ impl Mover<'_> {
     }
 
     /// How much of a particle lies at the edge of the gas: neighbours all on one side, or none.
+    #[inline(always)]
     fn to_air(&self, index: usize) -> f32 {
         let beside = &self.simulation.beside;
         let sum = beside.weight(index);

@@ -8,6 +8,9 @@ use bansho_base::{
     noise::{Coordinate, Fractal, Noise},
     random::{Key, Purpose},
 };
+use fearless_simd::{Simd, prelude::*, u32x16};
+
+use crate::lanes::{Lanes, Real, fetch, wrap_split};
 
 /// Grid points along each side of the tile.
 const SIDE: usize = 32;
@@ -21,15 +24,16 @@ const LAYER_SHARE: [f32; 2] = [0.86, 0.51];
 /// A periodic field of velocity, of standard deviation 1 a component.
 #[derive(Clone, Debug)]
 pub(crate) struct Turbulence {
-    tile: Vec<Vec3>,
+    /// Velocities on the grid; the fourth number is 0.
+    tile: Vec<[f32; 4]>,
 }
 
 /// Turbulence at one moment.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Eddies<'a> {
-    tile: &'a [Vec3],
+    tile: &'a [[f32; 4]],
     /// Grid points a metre, and the place of the flame's position on the grid, for each layer.
-    layers: [(f32, Vec3); 2],
+    layers: [(f32, [f32; 3]); 2],
 }
 
 impl Turbulence {
@@ -41,13 +45,13 @@ impl Turbulence {
         let deviation = bansho_base::math::sqrt(squares / (3 * tile.len()) as f64);
         let scale = if deviation > 0.0 { (1.0 / deviation) as f32 } else { 0.0 };
         tile.iter_mut().for_each(|velocity| *velocity *= scale);
-        Self { tile }
+        Self { tile: tile.into_iter().map(|velocity| velocity.extend(0.0).to_array()).collect() }
     }
 
     /// A number of mean 0 and standard deviation 1 that changes over a unit of `place`.
     pub(crate) fn patch(&self, place: DVec3) -> f32 {
         let place = (place * (SIDE as f64 / f64::from(EDDIES))).rem_euclid(DVec3::splat(SIDE as f64));
-        sample(&self.tile, place.as_vec3()).x
+        sample(&self.tile, place.as_vec3())[0]
     }
 
     /// The eddies at time `t`, the largest `eddy_size` m wide, rising in gas of `speed` and drifting with the wind's `drift` since time 0.
@@ -57,7 +61,7 @@ impl Turbulence {
             let moved = DVec3::Y * (speed * LAYER_SPEED[index] * t) + drift;
             // Shifted so that both layers do not share their zeros; reduced in f64, so that hours of time lose nothing.
             let origin = (-moved * scale + 11.3 * index as f64).rem_euclid(DVec3::splat(SIDE as f64));
-            (scale as f32, origin.as_vec3())
+            (scale as f32, origin.as_vec3().to_array())
         };
         Eddies { tile: &self.tile, layers: [layer(0), layer(1)] }
     }
@@ -66,24 +70,76 @@ impl Turbulence {
 impl Eddies<'_> {
     /// Velocity at `place`, m from the flame's position, of standard deviation 1 a component.
     #[inline(always)]
-    pub(crate) fn velocity(&self, place: Vec3) -> Vec3 {
-        let [first, second] = self.layers.map(|(scale, origin)| sample(self.tile, place * scale + origin));
-        first * LAYER_SHARE[0] + second * LAYER_SHARE[1]
+    pub(crate) fn velocity<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        let mut sum = [Lanes::splat(simd, 0.0); 3];
+        let Ok(tile) = <&[[f32; 4]; SIDE * SIDE * SIDE]>::try_from(self.tile) else { return sum };
+        for (layer, share) in LAYER_SHARE.into_iter().enumerate() {
+            let (scale, origin) = &self.layers[layer];
+            let mut on_grid = *place;
+            for c in 0..3 {
+                on_grid[c] = place[c].fused(place[c].like(*scale), place[c].like(origin[c]));
+            }
+            let velocity = sample_lanes(simd, tile, &on_grid);
+            for c in 0..3 {
+                sum[c] = velocity[c].fused(velocity[c].like(share), sum[c]);
+            }
+        }
+        sum
     }
 }
 
-/// A tile at a place in grid points, straight between them.
+/// A tile at places in grid points, straight between them.
 #[inline(always)]
-fn sample(tile: &[Vec3], place: Vec3) -> Vec3 {
+fn sample_lanes<S: Simd>(simd: S, tile: &[[f32; 4]; SIDE * SIDE * SIDE], place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    const MASK: u32 = SIDE as u32 - 1;
+    let ((x, across), (y, up), (z, along)) =
+        (wrap_split(place[0], MASK), wrap_split(place[1], MASK), wrap_split(place[2], MASK));
+    let (next_x, next_y, next_z) = ((x + 1) & MASK, (y + 1) & MASK, (z + 1) & MASK);
+    let row = Row { tile, x: [x, next_x], across };
+    let near = mixed(&row.at(simd, y, z), &row.at(simd, next_y, z), up);
+    let far = mixed(&row.at(simd, y, next_z), &row.at(simd, next_y, next_z), up);
+    let [x, y, z, _] = mixed(&near, &far, along);
+    [x, y, z]
+}
+
+/// Two neighbours in every row of the grid.
+struct Row<'a, S: Simd> {
+    tile: &'a [[f32; 4]; SIDE * SIDE * SIDE],
+    x: [u32x16<S>; 2],
+    /// Share of the way from one to the other.
+    across: Lanes<S>,
+}
+
+impl<S: Simd> Row<'_, S> {
+    /// Velocity between them in the row at `y` and `z`.
+    #[inline(always)]
+    fn at(&self, simd: S, y: u32x16<S>, z: u32x16<S>) -> [Lanes<S>; 4] {
+        let start = ((z << SIDE.ilog2()) + y) << SIDE.ilog2();
+        mixed(&fetch(simd, self.tile, start + self.x[0]), &fetch(simd, self.tile, start + self.x[1]), self.across)
+    }
+}
+
+/// Values at a share of the way from one to the other.
+#[inline(always)]
+fn mixed<R: Real>(one: &[R; 4], other: &[R; 4], share: R) -> [R; 4] {
+    let mut mixed = *one;
+    for c in 0..4 {
+        mixed[c] = share.fused(other[c] - one[c], one[c]);
+    }
+    mixed
+}
+
+/// A tile at a place in grid points, straight between them.
+fn sample(tile: &[[f32; 4]], place: Vec3) -> [f32; 4] {
     let floor = place.floor();
     let f = place - floor;
     let cell = floor.as_ivec3();
     let wrap = |coordinate: i32, step: i32| (coordinate.wrapping_add(step) & (SIDE as i32 - 1)) as usize;
     let row = |j: i32, k: i32| {
         let start = (wrap(cell.z, k) * SIDE + wrap(cell.y, j)) * SIDE;
-        tile[start + wrap(cell.x, 0)].lerp(tile[start + wrap(cell.x, 1)], f.x)
+        mixed(&tile[start + wrap(cell.x, 0)], &tile[start + wrap(cell.x, 1)], f.x)
     };
-    row(0, 0).lerp(row(1, 0), f.y).lerp(row(0, 1).lerp(row(1, 1), f.y), f.z)
+    mixed(&mixed(&row(0, 0), &row(1, 0), f.y), &mixed(&row(0, 1), &row(1, 1), f.y), f.z)
 }
 
 /// One potential on the grid.
@@ -114,11 +170,21 @@ fn curl(potentials: &[Vec<f32>; 3], index: usize) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::plain;
+
+    fn velocity(eddies: &Eddies, place: Vec3) -> Vec3 {
+        plain!(simd => {
+            let velocity = eddies.velocity(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
+            Vec3::from(velocity.map(|values| values.as_slice()[9]))
+        })
+    }
 
     #[test]
     fn the_tile_is_free_of_divergence_and_of_unit_strength() {
         let turbulence = Turbulence::new(Key::new(3, "turbulence"));
-        let at = |x: usize, y: usize, z: usize| turbulence.tile[((z % SIDE) * SIDE + y % SIDE) * SIDE + x % SIDE];
+        let at = |x: usize, y: usize, z: usize| {
+            Vec3::from_slice(&turbulence.tile[((z % SIDE) * SIDE + y % SIDE) * SIDE + x % SIDE])
+        };
         for index in (0..SIDE * SIDE * SIDE).step_by(37) {
             let [x, y, z] = [index % SIDE, index / SIDE % SIDE, index / (SIDE * SIDE)];
             let divergence = at(x + 1, y, z).x - at(x + SIDE - 1, y, z).x + at(x, y + 1, z).y
@@ -129,7 +195,7 @@ mod tests {
         }
         let eddies = turbulence.at(1.7, 0.3, 3.0, DVec3::ZERO);
         let places = (0..20_000).map(|i| Vec3::new(0.013, 0.017, 0.023) * i as f32);
-        let squares: f32 = places.map(|place| eddies.velocity(place).length_squared()).sum();
+        let squares: f32 = places.map(|place| velocity(&eddies, place).length_squared()).sum();
         let deviation = (squares / 60_000.0).sqrt();
         assert!((0.7..1.1).contains(&deviation), "standard deviation {deviation}");
     }
@@ -138,9 +204,9 @@ mod tests {
     fn eddies_rise_with_the_gas_and_drift_with_the_wind() {
         let turbulence = Turbulence::new(Key::new(3, "turbulence"));
         let place = Vec3::new(0.1, 0.2, 0.3);
-        let still = turbulence.at(0.0, 0.5, 2.0, DVec3::ZERO).velocity(place);
-        let drifted = turbulence.at(0.0, 0.5, 2.0, DVec3::X * 0.7).velocity(place + Vec3::X * 0.7);
+        let still = velocity(&turbulence.at(0.0, 0.5, 2.0, DVec3::ZERO), place);
+        let drifted = velocity(&turbulence.at(0.0, 0.5, 2.0, DVec3::X * 0.7), place + Vec3::X * 0.7);
         assert!((still - drifted).length() < 1e-3);
-        assert!((turbulence.at(0.5, 0.5, 2.0, DVec3::ZERO).velocity(place) - still).length() > 0.01);
+        assert!((velocity(&turbulence.at(0.5, 0.5, 2.0, DVec3::ZERO), place) - still).length() > 0.01);
     }
 }

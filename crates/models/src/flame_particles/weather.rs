@@ -11,11 +11,12 @@ use super::{
     breeze::Breeze,
     burner::GRAVITY,
     design::Design,
+    draught::Draught,
     narrowing::{Axis, axes},
     parameters::{FlameParticlesParameters, WindForce},
     particles::Particles,
-    puffing::{Ring, rings},
-    turbulence::{Eddies, Turbulence},
+    puffing::rings,
+    turbulence::Turbulence,
 };
 
 /// Where turbulence has grown to half its strength, as a share of the time that gas takes to the tip.
@@ -23,21 +24,6 @@ const TURBULENT_AGE: f32 = 0.1;
 
 /// Speed at which eddies drift beside the wind: the gas that holds them takes it up as it rises.
 const EDDY_DRIFT: f64 = 0.5;
-
-/// What acts on the gas of one burner.
-pub(crate) struct Draught<'a> {
-    rings: Vec<Ring>,
-    axis: Axis,
-    eddies: Eddies<'a>,
-    turbulence: f32,
-    turbulent_age: f32,
-    /// Entrainment coefficient over the radius of the fire, 1/m.
-    pub(crate) entrainment: f32,
-    /// Coefficient of the drag of air that blows across, over the radius of the fire, 1/m.
-    pub(crate) drag: f32,
-    /// Share of its fuel that gas burns in a metre of its way, and in a second.
-    pub(crate) burning: [f32; 2],
-}
 
 /// What acts on the gas at one moment.
 pub(crate) struct Weather<'a> {
@@ -115,20 +101,4 @@ fn bounds(particles: &Particles) -> [Vec3; 2] {
         return [Vec3::ZERO, Vec3::ONE];
     }
     [side(f32::min, f32::INFINITY), side(f32::max, f32::NEG_INFINITY)]
-}
-
-impl Draught<'_> {
-    /// Velocity with which the air's own motion carries gas of `speed` and `age` at `place`, m/s.
-    #[inline(always)]
-    pub(crate) fn velocity(&self, place: Vec3, speed: f32, age: f32) -> Vec3 {
-        let mut sum = self.axis.velocity(place);
-        for ring in &self.rings {
-            sum += ring.velocity(place);
-        }
-        if self.turbulence > 0.0 {
-            let grown = age / (age + self.turbulent_age);
-            sum += self.eddies.velocity(place) * (self.turbulence * speed * grown);
-        }
-        sum
-    }
 }

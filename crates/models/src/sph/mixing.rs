@@ -1,7 +1,9 @@
 //! Mixing: what particles carry drifts toward what their neighbours carry, and its total is kept.
 
+use rayon::prelude::*;
+
 use super::{
-    cells::Cells,
+    cells::{AT_ONCE, Cells},
     kernel::{CubicSpline, KernelShape, Poly6, SmoothingKernel, Spiky},
     particles::Particles,
     sum::{Pair, PairTerm},
@@ -46,8 +48,8 @@ pub fn mix<const D: usize, const N: usize>(
 
 /// Weights `m / sqrt(rho)`: for a pair they make the geometric mean of both densities.
 pub fn mixing_weights(masses: &[f32], densities: &[f32], weights: &mut Vec<f32>) {
-    weights.clear();
-    weights.extend(masses.iter().zip(densities).map(|(mass, density)| mass / density.sqrt()));
+    let weight = |(mass, density): (&f32, &f32)| mass / density.sqrt();
+    masses.par_iter().zip(densities).with_min_len(AT_ONCE).map(weight).collect_into_vec(weights);
 }
 
 /// Velocities that drift toward the neighbours' (XSPH, Monaghan 1989), with the geometric in place of the arithmetic mean of
