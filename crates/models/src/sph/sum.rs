@@ -149,7 +149,7 @@ where
         let squared = squared(&offset);
         let mut distance_squared = squared.least(farthest);
         if T::DIRECTED {
-            coincident = coincident + squared.choose(nearest, one, none);
+            coincident += squared.choose(nearest, one, none);
             distance_squared = distance_squared.greatest(nearest);
         }
         let other = spread(simd, pick(&fields, candidate));

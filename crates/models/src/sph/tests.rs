@@ -351,7 +351,7 @@ fn nothing_at_all_is_fine_too() {
     particles.sort(&mut cells);
     let mut none = Particles::<3>::default();
     none.sort(&mut cells);
-    let (density, acceleration) = evaluate(&none, &mut cells, [SHAPES[0], SHAPES[1]], FORMS[0]);
+    let (density, acceleration) = evaluate(&none, &cells, [SHAPES[0], SHAPES[1]], FORMS[0]);
     assert!(density.is_empty() && acceleration.iter().all(Vec::is_empty) && cells.is_empty());
 }
 
