@@ -126,7 +126,7 @@ impl Particles {
         cells.assign(self.positions(), &self.birth);
         cells.reorder(&mut self.birth);
         cells.reorder(&mut self.burner);
-        self.numbers_mut().into_par_iter().for_each(|values| cells.reorder(values));
+        cells.reorder_all(self.numbers_mut());
     }
 
     /// Numbers of birth, no two alike.

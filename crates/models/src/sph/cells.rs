@@ -23,7 +23,7 @@ const LONGEST_GROUP: u64 = 8 * ALONG as u64;
 pub(super) const BEYOND: f32 = 1e12;
 /// Particles that one task takes at least.
 pub(super) const AT_ONCE: usize = 4096;
-/// Bits sorted by in one pass.
+/// Most bits sorted by in one pass.
 const DIGIT_BITS: u32 = 11;
 
 /// Particles in cells by one support radius; the order they were given in does not matter.
@@ -50,6 +50,8 @@ struct Sorting<const D: usize> {
     /// Keys and the indices that they belong to.
     entries: Vec<(u64, u32)>,
     spare: Vec<(u64, u32)>,
+    /// Arrays that take the place of those brought into order, one a thread.
+    spares: Vec<Vec<f32>>,
 }
 
 /// A cell that holds particles: its key and its first particle. The last of the list is a sentinel behind all.
@@ -123,7 +125,7 @@ impl<const D: usize> Cells<D> {
         let keys = Keys::new([0; D], [0; D]);
         let (order, ids, occupied, row_parts, stretches) = Default::default();
         let coordinates = std::array::from_fn(|_| Vec::new());
-        let sorting = Sorting { coordinates, entries: Vec::new(), spare: Vec::new() };
+        let sorting = Sorting { coordinates, entries: Vec::new(), spare: Vec::new(), spares: Vec::new() };
         Self { support_radius, keys, order, ids, positions: none(), occupied, row_parts, stretches, sorting }
     }
 
@@ -150,7 +152,7 @@ impl<const D: usize> Cells<D> {
         self.order.is_empty()
     }
 
-    /// Sorts particles by cell, then by birth id, and remembers where they are. [`Cells::reorder`] then brings arrays into that order.
+    /// Sorts particles by cell, then by birth id, and remembers where they are. [`Cells::reorder`] and [`Cells::reorder_all`] then bring arrays into that order.
     ///
     /// # Panics
     /// If there are more than 2^27 of them, or positions and ids are not equally many.
@@ -186,7 +188,7 @@ impl<const D: usize> Cells<D> {
 
     /// Sorts by key, then by id, and lists the cells.
     fn sort(&mut self, ids: &[u64]) {
-        let Sorting { coordinates, entries, spare } = &mut self.sorting;
+        let Sorting { coordinates, entries, spare, .. } = &mut self.sorting;
         let bound = |c: usize, pick: fn(i32, i32) -> i32| coordinates[c].iter().copied().fold(coordinates[c][0], pick);
         self.keys = Keys::new(std::array::from_fn(|c| bound(c, i32::min)), std::array::from_fn(|c| bound(c, i32::max)));
         let keys = self.keys;
@@ -199,8 +201,10 @@ impl<const D: usize> Cells<D> {
         };
         (0..ids.len()).into_par_iter().with_min_len(AT_ONCE).map(entry).collect_into_vec(entries);
         spare.resize(entries.len(), (0, 0));
-        for shift in (0..keys.bits).step_by(DIGIT_BITS as usize) {
-            counting_pass(entries, spare, shift);
+        let passes = keys.bits.div_ceil(DIGIT_BITS);
+        for pass in 0..passes {
+            let [from, to] = [pass, pass + 1].map(|pass| keys.bits * pass / passes);
+            counting_pass(entries, spare, from..to);
             std::mem::swap(entries, spare);
         }
         let by_id = |cell: &mut [(u64, u32)]| cell.sort_unstable_by_key(|entry| ids[entry.1 as usize]);
@@ -247,6 +251,26 @@ impl<const D: usize> Cells<D> {
     pub fn reorder<T: Copy + Send + Sync>(&self, values: &mut Vec<T>) {
         assert_eq!(values.len(), self.order.len(), "one value a particle");
         *values = self.order.par_iter().with_min_len(AT_ONCE).map(|i| values[*i as usize]).collect();
+    }
+
+    /// Does so with many arrays of numbers, without asking the system for memory again and again.
+    ///
+    /// # Panics
+    /// If they are not one a particle.
+    pub fn reorder_all<'a>(&mut self, arrays: impl IntoIterator<Item = &'a mut Vec<f32>>) {
+        let mut arrays: Vec<&mut Vec<f32>> = arrays.into_iter().collect();
+        let threads = rayon::current_num_threads().clamp(1, arrays.len().max(1));
+        let Self { order, sorting, .. } = self;
+        sorting.spares.resize_with(threads, Vec::new);
+        let share = arrays.len().div_ceil(threads).max(1);
+        arrays.par_chunks_mut(share).zip(&mut sorting.spares).for_each(|(arrays, spare)| {
+            for values in arrays {
+                assert_eq!(values.len(), order.len(), "one value a particle");
+                spare.clear();
+                spare.extend(order.iter().map(|i| values[*i as usize]));
+                std::mem::swap(*values, spare);
+            }
+        });
     }
 
     /// Birth ids in sorted order.
@@ -321,14 +345,14 @@ fn cells_along(component: &[f32], scale: f32, farthest: f32, cells: &mut Vec<i32
     }
 }
 
-/// One stable pass of a radix sort, over the digit that begins at bit `shift`.
-fn counting_pass(from: &[(u64, u32)], to: &mut [(u64, u32)], shift: u32) {
-    const DIGITS: usize = 1 << DIGIT_BITS;
-    let digit = |key: u64| (key >> shift) as usize % DIGITS;
-    let mut places = [0_u32; DIGITS];
+/// One stable pass of a radix sort, over some bits of the keys.
+fn counting_pass(from: &[(u64, u32)], to: &mut [(u64, u32)], bits: Range<u32>) {
+    let mut places = [0_u32; 1 << DIGIT_BITS];
+    let mask = (1 << bits.len()) - 1;
+    let digit = |key: u64| (key >> bits.start) as usize & mask;
     from.iter().for_each(|entry| places[digit(entry.0)] += 1);
     let mut sum = 0;
-    for place in &mut places {
+    for place in &mut places[..=mask] {
         sum += std::mem::replace(place, sum);
     }
     for entry in from {

@@ -63,9 +63,7 @@ impl<const D: usize> Particles<D> {
     /// Afterwards bring arrays of your own into the same order with [`Cells::reorder`].
     pub fn sort(&mut self, cells: &mut Cells<D>) {
         cells.assign(self.positions.each_ref().map(Vec::as_slice), &self.ids);
-        let arrays = self.positions.iter_mut().chain(&mut self.velocities).chain([&mut self.masses]);
-        let arrays: Vec<&mut Vec<f32>> = arrays.collect();
-        arrays.into_par_iter().for_each(|values| cells.reorder(values));
+        cells.reorder_all(self.positions.iter_mut().chain(&mut self.velocities).chain([&mut self.masses]));
         self.ids.copy_from_slice(cells.ids());
     }
 

@@ -102,12 +102,7 @@ impl AuroraParticles {
     /// Sorts them into cells, by cell and then by id.
     pub(super) fn sort(&mut self, cells: &mut Cells<2>) {
         cells.assign(self.positions.each_ref().map(Vec::as_slice), &self.ids);
-        let cells = &*cells;
-        rayon::scope(|scope| {
-            for values in self.numbers_mut() {
-                scope.spawn(move |_| cells.reorder(values));
-            }
-        });
+        cells.reorder_all(self.numbers_mut());
         cells.reorder(&mut self.ids);
         cells.reorder(&mut self.dying);
         cells.reorder(&mut self.sheets);
