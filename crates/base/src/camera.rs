@@ -16,8 +16,12 @@ crate::choice! {
     }
 }
 
+/// Height of an observer's eye, m.
+const EYE_HEIGHT: f64 = 1.7;
+
 crate::parameters! {
-    /// Where the picture is taken from. A dome looks at `target` with the centre of its circle.
+    /// Where the picture is taken from. A dome looks at `target` with the centre of its circle. Without `position` and `target`, a scene of
+    /// auroras alone is seen from the ground, looking up to the north; a dome's middle is then the zenith.
     pub struct CameraParameters {
         /// Where the camera stands.
         position: Animated<[f64; 3]> = Animated::from([0.0, 1.2, 4.0]), unit("m");
@@ -46,7 +50,21 @@ crate::parameters! {
     }
 }
 
+/// Vertical field of view of a lens of 14 mm, with which auroras are photographed, degrees.
+pub const SKY_FOV_DEG: f64 = 81.0;
+
 impl CameraParameters {
+    /// Stands at the origin and looks up at the sky: to the north with a lens that has an up, to the zenith with a dome.
+    pub fn look_up(&mut self) {
+        let target = match self.lens {
+            // From the horizon nearly to the zenith.
+            Lens::Perspective => [0.0, 60.0, -60.0],
+            Lens::Fisheye => [0.0, 100.0, 0.0],
+            Lens::Panorama => [0.0, EYE_HEIGHT, -60.0],
+        };
+        (self.position, self.target) = (Animated::from([0.0, EYE_HEIGHT, 0.0]), Animated::from(target));
+    }
+
     /// The camera at time `t` for a picture of `size` pixels.
     pub fn at(&self, t: f64, size: [usize; 2]) -> Camera {
         let half_fov = match &self.focal_length_mm {

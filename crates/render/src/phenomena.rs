@@ -70,6 +70,7 @@ impl Describe for RainParameters {
 
 impl Describe for AuroraParameters {
     const KEY: &'static str = "aurora";
+    const IN_THE_SKY: bool = true;
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match Aurora::new(self.clone(), opening.name, opening.seed, opening.loop_s, opening.assets) {

@@ -1,16 +1,19 @@
 //! Auroral shapes in scene files: the thesis's five scenes move as it tells, and faults stand at their sheet and point.
 
+use std::sync::Arc;
+
 use bansho_base::{
     assets::MemoryAssets,
     drawing::{Drawing, Stroke},
     math::DVec2,
+    observer::Unobserved,
     parameters::{Parameters, Reader},
 };
 use bansho_models::aurora::{
     AuroraParameters,
     shapes::{FRAME_S, Neighbourhood, Sequence, Shape},
 };
-use bansho_render::{Scene, phenomena::KINDS};
+use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, Scene, phenomena::KINDS};
 
 fn assets() -> MemoryAssets {
     let stroke =
@@ -142,6 +145,14 @@ fn faults_stand_at_their_sheet_and_point() {
             "[[aurora.shapes]]\nsheets = [{ stroke = \"left\" }]\n",
             "sheets.0.stroke: names a path of an SVG file, but no file",
         ),
+        (
+            "[[aurora.shapes]]\nsheets = [{ points = [[-200, -290], [-100, -200], [0, -299], [100, -299], [200, -200]] }]\n",
+            "after point 3 the smooth line of sheet 1 passes",
+        ),
+        (
+            "[[aurora.shapes]]\nsheets = [{ form = \"arc\" }]\n[[aurora.shapes]]\nlink = [{ to = 5 }]\nsheets = [{ form = \"arc\" }]\n",
+            "shapes.1.link.0: there is no sheet 5 in this shape; allowed: 1 to 1",
+        ),
         ("[[aurora.shapes]]\nsheets = [{ path = \"gone.svg\" }]\n", "gone.svg: no such file"),
         (
             "[[aurora.shapes]]\nsheets = [{ path = \"shapes.svg\", form = \"arc\" }]\n",
@@ -165,6 +176,41 @@ fn three_lines_make_an_aurora() {
         // Half the side of the drawn square and more.
         let length = sequence.at(1.0).length();
         assert!(length > 300.0, "{length} km: {text}");
+        let lit = lit_share(text);
+        assert!(lit > 0.03, "{lit} of the picture is lit: {text}");
+    }
+}
+
+/// The share of a scene's first picture that shines as a twentieth of white or more.
+fn lit_share(text: &str) -> f64 {
+    let assets = Arc::new(assets());
+    let scene = Scene::parse("test.toml", text, KINDS, assets.as_ref()).unwrap_or_else(|error| panic!("{error}"));
+    let options = PlanOptions { size: Some([96, 54]), ..PlanOptions::default() };
+    let mut shot = CpuBackend.open(Arc::new(Plan::new(scene, &options, assets).unwrap())).unwrap();
+    shot.advance(0, &Unobserved).unwrap();
+    shot.draw(&Unobserved).unwrap();
+    let frame = shot.read().unwrap();
+    let light: Vec<f32> = frame.beauty.pixels().iter().map(|pixel| pixel[1]).collect();
+    light.iter().filter(|value| **value > 0.05).count() as f64 / light.len() as f64
+}
+
+#[test]
+fn a_camera_looks_up_where_all_is_in_the_sky_unless_it_is_told() {
+    let camera = |text: &str| {
+        let scene = Scene::parse("test.toml", text, KINDS, &assets()).unwrap_or_else(|error| panic!("{error}"));
+        let camera = scene.camera.at(0.0, [160, 90]);
+        (camera.position, -camera.orientation.z_axis)
+    };
+    let (place, up) = camera("bansho = 1\n[[aurora]]\n");
+    assert!(place.y == 1.7 && up.y > 0.65 && up.z < -0.65, "{place} {up}");
+    let (_, zenith) = camera("bansho = 1\n[camera]\nlens = \"fisheye\"\n[[aurora]]\n");
+    assert!(zenith.y > 0.999, "{zenith}");
+    for text in [
+        "bansho = 1\n[camera]\ntarget = [0.0, 0.9, 0.0]\n[[aurora]]\n",
+        "bansho = 1\n[[aurora]]\n[[flame_sheet]]\n",
+        "bansho = 1\n",
+    ] {
+        assert!(camera(text).0.y == 1.2, "{text}");
     }
 }
 

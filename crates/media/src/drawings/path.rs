@@ -16,6 +16,8 @@ pub(super) enum PathError {
     Numbers(char),
     #[error("`{0}` is no command of a path")]
     Command(char),
+    #[error("a path of a single point is no line; allowed: at least 2 points")]
+    OnePoint,
 }
 
 /// Where the pen is.
@@ -28,10 +30,10 @@ struct Pen {
     control: Option<(bool, DVec2)>,
 }
 
-/// The lines of a path, one for each move; those of one point are left out.
+/// The lines of a path, one for each move; moves that draw nothing are left out beside others.
 ///
 /// # Errors
-/// An unknown command or missing numbers.
+/// An unknown command, missing numbers, or moves alone.
 pub(super) fn subpaths(data: &str) -> Result<Vec<Vec<DVec2>>, PathError> {
     let mut numbers = Numbers::new(data);
     let mut pen = Pen::default();
@@ -54,8 +56,9 @@ pub(super) fn subpaths(data: &str) -> Result<Vec<Vec<DVec2>>, PathError> {
             other => Some(other),
         };
     }
+    let moves = !pen.subpaths.is_empty();
     pen.subpaths.retain(|points| points.len() > 1);
-    Ok(pen.subpaths)
+    if moves && pen.subpaths.is_empty() { Err(PathError::OnePoint) } else { Ok(pen.subpaths) }
 }
 
 impl Pen {

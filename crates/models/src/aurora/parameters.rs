@@ -184,13 +184,15 @@ bansho_base::parameters! {
         extent_km: f64 = 600.0, limits(Range::new(1.0, 20_000.0)), unit("km");
         /// Energy flux of the electrons within a sheet; 10 is a faint arc, 50 a bright one, 300 a storm.
         flux_mw_per_m2: Animated<f64> = Animated::from(50.0), limits(Range::new(0.0, 10_000.0)), unit("mW/m^2");
-        /// Energy of the electrons: 500 eV gives a high and red aurora, 5000 a green one, 20000 one with a low purple edge.
+        /// Energy of the electrons: 500 eV gives a high and red aurora, 5000 a green one, 30000 one with a low rosy edge. With the factor of a sheet
+        /// it is held to what the tables of the air know, 100 eV to 100 keV.
         energy_ev: Animated<f64> = Animated::from(5000.0), limits(Range::new(100.0, 100_000.0)), unit("eV");
         /// How their energies are spread.
         spectrum: SpectrumShape = SpectrumShape::Arc;
         /// Thickness of a sheet, twice L_thr; `"auto"` is two cells of the field.
         thickness_km: Auto<f64> = Auto::Auto, limits(Range::new(0.01, 1000.0)), unit("km");
-        /// Dip of the magnetic field: 90 is upright, rays lean to the south (north of the equator) by what is missing.
+        /// Dip of the magnetic field: 90 is upright, rays lean to the south (north of the equator) by what is missing. Field lines flatter than 30
+        /// degrees leave the drawn region and are drawn at 30.
         dip_deg: f64 = 77.0, limits(Range::new(-90.0, 90.0)), unit("degrees");
         /// Direction of magnetic north, east of true north.
         declination_deg: f64 = 0.0, limits(Range::new(-180.0, 180.0)), unit("degrees");

@@ -16,8 +16,9 @@ use std::sync::Arc;
 
 use bansho_base::{
     air::Air,
+    animation::Animated,
     assets::Assets,
-    camera::CameraParameters,
+    camera::{CameraParameters, SKY_FOV_DEG},
     parameters::{Parameters, Problem, ProblemKind, Reader, Table, TableDescriptor, Value},
     sky::SkyParameters,
     wind::WindParameters,
@@ -176,6 +177,24 @@ impl Scene {
             obstacles: read_many(root, "obstacle", reader),
             instances: read_instances(root, kinds, reader),
         }
+        .looking_up(root)
+    }
+
+    /// A camera that is not told where to look sees the sky where that is all there is.
+    fn looking_up(mut self, root: &Table) -> Self {
+        let told = |key: &str| match root.get("camera").map(|node| &node.value) {
+            Some(Value::Table(camera)) => camera.get(key).is_some(),
+            _ => false,
+        };
+        let all_in_the_sky =
+            !self.instances.is_empty() && self.instances.iter().all(|instance| instance.kind.in_the_sky);
+        if all_in_the_sky && self.obstacles.is_empty() && !self.has_plate() && !told("position") && !told("target") {
+            self.camera.look_up();
+            if !told("vertical_fov_deg") {
+                self.camera.vertical_fov_deg = Animated::from(SKY_FOV_DEG);
+            }
+        }
+        self
     }
 
     /// Whether phenomena lie over a plate.

@@ -52,6 +52,8 @@ pub struct PhenomenonKind {
     pub table: fn() -> &'static TableDescriptor,
     /// Reads its parameters; reports faults and falls back to defaults there.
     pub read: fn(&Table, &mut Reader) -> Box<dyn Source>,
+    /// Whether it is in the sky: where all is, a camera that is told nothing looks up.
+    pub in_the_sky: bool,
 }
 
 /// Keys that every phenomenon has beside its own.
@@ -61,6 +63,8 @@ pub const COMMON_KEYS: [&str; 2] = ["name", "enabled"];
 pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     /// The table's name in scene files.
     const KEY: &'static str;
+    /// See [`PhenomenonKind::in_the_sky`].
+    const IN_THE_SKY: bool = false;
 
     /// Makes the phenomenon.
     ///
@@ -69,8 +73,12 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault>;
 
     /// The kind that scene files call by [`KEY`](Self::KEY).
-    const KIND: PhenomenonKind =
-        PhenomenonKind { key: Self::KEY, table: <Self as Parameters>::table, read: read_described::<Self> };
+    const KIND: PhenomenonKind = PhenomenonKind {
+        key: Self::KEY,
+        table: <Self as Parameters>::table,
+        read: read_described::<Self>,
+        in_the_sky: Self::IN_THE_SKY,
+    };
 }
 
 fn read_described<P: Describe>(table: &Table, reader: &mut Reader) -> Box<dyn Source> {

@@ -219,6 +219,22 @@ mod tests {
         assert!(column.kilorayleigh.iter().chain(&column.lifetime).all(|value| *value > 0.0 && value.is_finite()));
     }
 
+    /// Red and blue beside green, linear on a screen, of the light from one altitude.
+    fn beside_green(energy_ev: f64, altitude_km: f64) -> [f64; 2] {
+        let emission = Emission::new(atmosphere(), ARC).at(energy_ev, altitude_km);
+        let [r, g, b] = bansho_base::color::SRGB_FROM_ACESCG.apply(colour_of(emission));
+        [r / g, b / g]
+    }
+
+    #[test]
+    fn the_lower_edge_of_a_hard_aurora_turns_rosy() {
+        // O(1S) is struck before it radiates down there, and little O is left to make it; N2 goes on shining.
+        let (edge, body) = (beside_green(30_000.0, 84.0), beside_green(30_000.0, 105.0));
+        assert!(edge[0] > 1.3 && edge[0] > 1.6 * body[0], "red {} and {}", edge[0], body[0]);
+        assert!(edge[1] > 0.7 && edge[1] > 1.6 * body[1], "blue {} and {}", edge[1], body[1]);
+        assert!(body[0] < 1.0 && body[1] < 0.6, "the body is green: {body:?}");
+    }
+
     #[test]
     fn an_aurora_is_green_seen_whole() {
         let [r, g, b] = Emission::new(atmosphere(), ARC).column_colour(5000.0);

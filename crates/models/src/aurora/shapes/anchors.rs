@@ -35,10 +35,12 @@ impl Anchors {
         let mut anchors = Self { wanted: vec![Wanted::default(); change.chains.len()], points: Vec::new() };
         for (number, link) in links.iter().enumerate() {
             let fault = |kind| ShapeFault { key: format!("shapes.{index}.link.{number}"), kind };
-            let [from, to] = [(link.from, sheets.len()), (link.to, change.chains.len())]
-                .map(|(sheet, count)| sheet_index(sheet, count).map_err(fault));
-            let track = nearest(&sheets[from?], link.at.unwrap_or(0.5), tracks, index - 1);
-            anchors.send(change, track, to?).map_err(fault)?;
+            let from = sheet_index(link.from, sheets.len()).map_err(fault)?;
+            let count = change.chains.len();
+            let no_target = |_| fault(ShapeFaultKind::NoSuchTarget { sheet: link.to, count });
+            let to = sheet_index(link.to, count).map_err(no_target)?;
+            let track = nearest(&sheets[from], link.at.unwrap_or(0.5), tracks, index - 1);
+            anchors.send(change, track, to).map_err(fault)?;
             match (link.at, link.arrives) {
                 (Some(_), Some(share)) => anchors.points.push((track, share.clamp(END, 1.0 - END))),
                 (_, None) => {}

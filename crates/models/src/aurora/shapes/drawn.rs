@@ -209,7 +209,12 @@ fn check_extent(sheets: &[DrawnSheet], place: Place) -> Result<(), ShapeFault> {
         let Some(at) = given.or_else(|| sheet.line.points().iter().position(outside)) else { continue };
         let point = sheet.line.points()[at];
         let number = sheet.origin(at) + 1;
-        let kind = ShapeFaultKind::Outside { sheet: index + 1, point: number, x: point.x, z: point.y, half };
+        let (x, z, sheet_number) = (point.x, point.y, index + 1);
+        let kind = if given.is_some() {
+            ShapeFaultKind::Outside { sheet: sheet_number, point: number, x, z, half }
+        } else {
+            ShapeFaultKind::BendsOutside { sheet: sheet_number, point: number, x, z, half }
+        };
         return Err(place.fault_at(sheet, at, kind));
     }
     Ok(())

@@ -39,6 +39,22 @@ pub enum ShapeFaultKind {
         /// Half the square's side, km.
         half: f64,
     },
+    /// A smooth line that leaves the square between points that lie in it.
+    #[error(
+        "after point {point} the smooth line of sheet {sheet} passes ({x:.1}, {z:.1}) km, outside the drawn square; allowed: -{half} to {half} km east and south (see `extent_km`), or `smooth = false`"
+    )]
+    BendsOutside {
+        /// The sheet.
+        sheet: usize,
+        /// The point before.
+        point: usize,
+        /// East, km.
+        x: f64,
+        /// South, km.
+        z: f64,
+        /// Half the square's side, km.
+        half: f64,
+    },
     /// A sheet that meets itself.
     #[error(
         "sheet {sheet} crosses itself: after point {point} it meets its part after point {earlier}; a sheet may bend back, but needs a gap"
@@ -67,7 +83,7 @@ pub enum ShapeFaultKind {
     },
     /// Sheets that come from nowhere or go nowhere.
     #[error(
-        "has {found} sheets, but {expected} come from the shape before; allowed: {expected} sheets, or `split` and `merge` that make up the difference"
+        "has {found} sheets, but {expected} come from the shape before; allowed: as many as come, or `split` and `merge` that make up the difference"
     )]
     Unmatched {
         /// Sheets drawn.
@@ -91,6 +107,14 @@ pub enum ShapeFaultKind {
     /// A sheet that is not there.
     #[error("there is no sheet {sheet} in the shape before; allowed: 1 to {count}")]
     NoSuchSheet {
+        /// The sheet asked for.
+        sheet: i64,
+        /// Sheets that there are.
+        count: usize,
+    },
+    /// A link to a sheet that is not there.
+    #[error("there is no sheet {sheet} in this shape; allowed: 1 to {count}")]
+    NoSuchTarget {
         /// The sheet asked for.
         sheet: i64,
         /// Sheets that there are.

@@ -48,7 +48,7 @@ impl Sequence {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
             return Err(ShapeFault { key: "loop".into(), kind: ShapeFaultKind::LoopLength { seconds } });
         }
-        let usual = super::usual::shapes();
+        let usual = super::usual::shapes(extent_km);
         let shapes = if shapes.is_empty() { &usual[..] } else { shapes };
         let timing = timing(shapes)?;
         let sequence = |evenness: f64| {
