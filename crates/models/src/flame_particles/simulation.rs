@@ -16,7 +16,8 @@ use super::{
 };
 use crate::sph::{Cells, KernelShape, PressureForce, PressureForm, StateEquation, densities, longest_step, sub_steps};
 
-/// Most sub-steps of a step.
+/// Most sub-steps of a step. Gas that would need more keeps its time and loses stiffness: `press` holds k where sound goes no further
+/// than a fifth of d in a sub-step, and `pushed` holds every force there.
 const MOST_SUB_STEPS: u32 = 3;
 /// Gas is never faster, m/s.
 pub(crate) const GREATEST_SPEED: f32 = 150.0;
@@ -31,7 +32,7 @@ const SURFACE_OFFSET: f32 = 0.2;
 /// Share of its own in a particle's density: from there on it counts as alone, fully after as much more.
 const ALONE_SHARE: [f32; 2] = [0.2, 0.5];
 /// Particles of a task.
-const TASK: usize = 512;
+const PARTICLES_OF_TASK: usize = 512;
 
 /// The gas and what it needs to move.
 #[derive(Clone, Debug)]
@@ -99,6 +100,9 @@ impl Simulation {
     }
 
     /// Sub-steps by the condition of Courant, Friedrichs and Lewy, for gas that moves with the gas beside it.
+    ///
+    /// No acceleration shortens them: buoyancy and wind move neighbours alike, pressure's is bounded by the sound that counts here, and
+    /// `pushed` holds what is left. The forces of the last step would also have to be part of every snapshot.
     fn sub_steps(&self, seconds: f32) -> u32 {
         let squares = |index: usize| self.particles.velocity.iter().map(|v| v[index] * v[index]).sum::<f32>();
         let speed = (0..self.particles.len()).map(squares).fold(0.0, f32::max).sqrt();
@@ -119,8 +123,11 @@ impl Simulation {
         let weather =
             Weather::new(&self.parameters, &self.design, &self.turbulence, self.key, &self.particles, around, time);
         let mover = Mover { simulation: self, weather: &weather, seconds, radius: self.cells.support_radius() };
-        let moved: Vec<Moved> =
-            (0..self.particles.len()).into_par_iter().with_min_len(TASK).map(|index| mover.moved(index)).collect();
+        let moved: Vec<Moved> = (0..self.particles.len())
+            .into_par_iter()
+            .with_min_len(PARTICLES_OF_TASK)
+            .map(|index| mover.moved(index))
+            .collect();
         self.take_over(&moved, seconds);
     }
 
