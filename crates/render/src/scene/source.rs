@@ -52,6 +52,8 @@ pub struct PhenomenonKind {
     pub table: fn() -> &'static TableDescriptor,
     /// Reads its parameters; reports faults and falls back to defaults there.
     pub read: fn(&Table, &mut Reader) -> Box<dyn Source>,
+    /// What a new scene of it states so that it is seen well, as a scene file says it.
+    pub setting: &'static str,
 }
 
 /// Keys that every phenomenon has beside its own.
@@ -61,6 +63,8 @@ pub const COMMON_KEYS: [&str; 2] = ["name", "enabled"];
 pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     /// The table's name in scene files.
     const KEY: &'static str;
+    /// What a new scene of it states so that it is seen well, as a scene file says it; nothing where all defaults do.
+    const SETTING: &'static str = "";
 
     /// Makes the phenomenon.
     ///
@@ -69,8 +73,12 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault>;
 
     /// The kind that scene files call by [`KEY`](Self::KEY).
-    const KIND: PhenomenonKind =
-        PhenomenonKind { key: Self::KEY, table: <Self as Parameters>::table, read: read_described::<Self> };
+    const KIND: PhenomenonKind = PhenomenonKind {
+        key: Self::KEY,
+        table: <Self as Parameters>::table,
+        read: read_described::<Self>,
+        setting: Self::SETTING,
+    };
 }
 
 fn read_described<P: Describe>(table: &Table, reader: &mut Reader) -> Box<dyn Source> {
