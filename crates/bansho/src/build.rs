@@ -3,15 +3,18 @@
 use std::fmt::Write;
 
 use bansho_base::{
+    air::Air,
     assets::Assets,
     camera::CameraParameters,
     parameters::{Parameters, Table, Value},
+    sky::SkyParameters,
     wind::WindParameters,
 };
+use bansho_models::ground::GroundParameters;
 use bansho_render::{
     Scene, SceneError,
     phenomena::KINDS,
-    scene::{Describe, FORMAT, LightParameters, PictureParameters, PlateParameters},
+    scene::{Describe, FORMAT, LightParameters, ObstacleParameters, PictureParameters, PlateParameters},
 };
 
 /// Gathers the tables of a scene. Values are checked when it is built, by the same rules as a scene file.
@@ -61,9 +64,29 @@ impl SceneBuilder {
         self.table("[wind]", None, parameters.to_table())
     }
 
+    /// The air that everything stands in. State it once.
+    pub fn air(self, parameters: &Air) -> Self {
+        self.table("[air]", None, parameters.to_table())
+    }
+
+    /// The sky, which a scene has only where it is stated. State it once.
+    pub fn sky(self, parameters: &SkyParameters) -> Self {
+        self.table("[sky]", None, parameters.to_table())
+    }
+
+    /// The ground, which a scene has only where it is stated. State it once.
+    pub fn ground(self, parameters: &GroundParameters) -> Self {
+        self.table("[ground]", None, parameters.to_table())
+    }
+
     /// One more light.
     pub fn light(self, parameters: &LightParameters) -> Self {
         self.table("[[light]]", None, parameters.to_table())
+    }
+
+    /// One more obstacle.
+    pub fn obstacle(self, parameters: &ObstacleParameters) -> Self {
+        self.table("[[obstacle]]", None, parameters.to_table())
     }
 
     /// One more phenomenon, such as a flame sheet. Names are unique in a scene.
@@ -100,15 +123,35 @@ impl SceneBuilder {
 mod tests {
     use super::*;
     use bansho_base::assets::MemoryAssets;
+    use bansho_render::scene::SHARED_TABLES;
 
     #[test]
     fn what_is_built_is_what_was_said() {
         let picture = PictureParameters { size: [320, 200], first_frame: -7, ..Default::default() };
         let camera = CameraParameters { vertical_fov_deg: 55.0.into(), ..Default::default() };
-        let builder = SceneBuilder::new().picture(&picture).camera(&camera).wind(&WindParameters::default());
-        let scene = builder.light(&LightParameters::default()).build(&MemoryAssets::default()).unwrap();
-        assert_eq!((scene.picture, scene.camera), (picture, camera));
-        assert_eq!((scene.wind, scene.lights.len()), (WindParameters::default(), 1));
+        let air = Air { temperature_k: 260.0, ..Default::default() };
+        let ground = GroundParameters::default();
+        let obstacle = ObstacleParameters { radius: 0.7, ..Default::default() };
+        let builder = SceneBuilder::new()
+            .picture(&picture)
+            .camera(&camera)
+            .plate(&PlateParameters::default())
+            .wind(&WindParameters::default())
+            .air(&air)
+            .sky(&SkyParameters::default())
+            .ground(&ground)
+            .light(&LightParameters::default())
+            .obstacle(&obstacle)
+            .obstacle(&ObstacleParameters::default());
+        for table in SHARED_TABLES {
+            assert!(builder.to_toml().contains(&format!("[{}]", table.key)), "nothing states [{}]", table.key);
+        }
+        let scene = builder.build(&MemoryAssets::default()).unwrap();
+        assert_eq!((scene.picture, scene.camera, scene.air), (picture, camera, air));
+        assert_eq!((scene.wind, scene.plate), (WindParameters::default(), PlateParameters::default()));
+        assert_eq!((scene.sky, scene.ground), (Some(SkyParameters::default()), Some(ground)));
+        assert_eq!(scene.lights, [LightParameters::default()]);
+        assert_eq!(scene.obstacles, [obstacle, ObstacleParameters::default()]);
     }
 
     #[test]

@@ -223,7 +223,8 @@ mod tests {
 
     #[test]
     fn monotone_has_hand_worked_values() {
-        // Equal gaps, secants 1 and 3: harmonic mean 2 * 1 * 3 / (1 + 3) = 1.5 in the middle; ends (3 * 1 - 3) / 2 = 0 and (3 * 3 - 1) / 2 = 4.
+        // Equal gaps, secants 1 and 3: harmonic mean 2 * 1 * 3 / (1 + 3) = 1.5 in the middle;
+        // ends (3 * 1 - 3) / 2 = 0 and (3 * 3 - 1) / 2 = 4.
         let rising = curve(&[[0.0, 0.0], [1.0, 1.0], [2.0, 4.0]], Interpolation::Monotone);
         assert_eq!([0.0, 1.0].map(|x| rising.derivative(x)), [0.0, 1.5]);
         // Hermite at 1/2: (y0 + y1) / 2 + h (d0 - d1) / 8.

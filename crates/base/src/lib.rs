@@ -11,6 +11,7 @@ pub mod color;
 pub mod curve;
 pub mod distance_field;
 pub mod drawing;
+pub mod gravity;
 pub mod image;
 pub mod math;
 pub mod mesh;

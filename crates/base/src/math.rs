@@ -152,7 +152,8 @@ pub fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// The fractional part of a phase in turns, in [0, 1): reduced in `f64`, so that hours of time lose nothing. NaN where `turns` is not finite.
+/// The fractional part of a phase in turns, in [0, 1): reduced in `f64`, so that hours of time lose nothing. NaN where `turns` is
+/// not finite.
 #[inline(always)]
 pub fn reduce_phase(turns: f64) -> ::core::primitive::f32 {
     let phase = (turns - turns.floor()) as ::core::primitive::f32;

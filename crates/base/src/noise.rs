@@ -1,7 +1,8 @@
 //! Gradient noise in 2, 3 and 4 dimensions, in octaves, repeating along an axis where that is wanted.
 //!
-//! A coordinate is a whole cell and a fraction ([`Coordinate`]), so that neither hours of time nor high octaves lose precision.
-//! One octave has mean 0 over the cells and the variance [`VARIANCE`]; it is 0 on every lattice point, so octaves are shifted against each other.
+//! A coordinate is a whole cell and a fraction ([`Coordinate`]), so that neither hours of time nor high octaves lose precision. One
+//! octave has mean 0 over the cells and the variance [`VARIANCE`]; it is 0 on every lattice point, so octaves are shifted against
+//! each other.
 
 mod gradient;
 
@@ -53,7 +54,8 @@ impl Coordinate {
 pub struct Fractal {
     /// How many octaves, from 1 to [`MAX_OCTAVES`].
     pub octaves: u32,
-    /// How many times finer each octave is than the one before, from 1 to 16; whole, so that all octaves repeat together and far coordinates stay exact.
+    /// How many times finer each octave is than the one before, from 1 to 16; whole, so that all octaves repeat together and far
+    /// coordinates stay exact.
     pub lacunarity: u32,
     /// How many times higher each octave is than the one before; not negative.
     pub gain: f32,
@@ -196,7 +198,11 @@ impl Coordinate {
         let whole = distance.floor();
         let fraction = self.fraction + (distance - whole);
         let carry = fraction.floor();
-        Self { cell: self.cell.wrapping_add(whole as i32).wrapping_add(carry as i32), fraction: fraction - carry }
+        // 2^16 cells and what is left of them: each is small enough for `small_whole`.
+        let far = (whole * (1.0 / 65_536.0)).floor();
+        let near = whole - far * 65_536.0;
+        let cells = (small_whole(far) << 16).wrapping_add(small_whole(near)).wrapping_add(small_whole(carry));
+        Self { cell: self.cell.wrapping_add(cells), fraction: fraction - carry }
     }
 }
 
@@ -211,7 +217,7 @@ where
         for axis in 0..N {
             let moved = fractions[axis] * self.ratio as f32 + self.shift[axis];
             let whole = moved.floor();
-            let cell = cells[axis].wrapping_mul(self.ratio).wrapping_add(whole as i32 as u32);
+            let cell = cells[axis].wrapping_mul(self.ratio).wrapping_add(small_whole(whole) as u32);
             // At most one period too far: the point was reduced before the first octave. Without a period nothing changes.
             let period = self.periods[axis];
             cells[axis] = cell.wrapping_sub(if cell >= period { period } else { 0 });
@@ -223,13 +229,22 @@ where
     }
 }
 
+/// A whole number up to 2^22 either way: the last bits of its sum with 1.5 * 2^23. (A cast would check each lane of a vector by itself.)
+#[inline(always)]
+fn small_whole(value: f32) -> i32 {
+    const SHIFT: f32 = 12_582_912.0;
+    ((value + SHIFT).to_bits() as i32).wrapping_sub(SHIFT.to_bits() as i32)
+}
+
 /// `cell` modulo `period`, not negative; 0 stands for the 2^32 of the lattice itself.
 #[inline(always)]
 fn reduce(cell: i32, period: u32) -> u32 {
+    if period == 0 {
+        return cell as u32;
+    }
     // f64 holds both exactly; a quotient that is not whole is far enough from the next whole number for one division.
-    let quotient = (cell as f64 / if period == 0 { 4_294_967_296.0 } else { period as f64 }).floor();
-    let multiple = if period == 0 { 0 } else { (quotient as i32 as u32).wrapping_mul(period) };
-    (cell as u32).wrapping_sub(multiple)
+    let quotient = (cell as f64 / period as f64).floor();
+    (cell as u32).wrapping_sub((quotient as i32 as u32).wrapping_mul(period))
 }
 
 fn check(fractal: &Fractal, periods: &[u32]) -> Result<(), NoiseError> {

@@ -19,6 +19,26 @@ pub struct Stepping {
     pub dissolve: f64,
 }
 
+impl Stepping {
+    /// Steps that make up the preroll.
+    #[must_use]
+    pub fn preroll_steps(&self) -> u64 {
+        (self.preroll.max(0.0) / self.step).round() as u64
+    }
+
+    /// Time of the state after `taken` steps, s.
+    #[must_use]
+    pub fn time_after(&self, taken: u64) -> f64 {
+        (taken as f64 - self.preroll_steps() as f64) * self.step
+    }
+
+    /// Steps after which the state is the last one not after time `t`. A millionth of a step forgives rounding.
+    #[must_use]
+    pub fn steps_until(&self, t: f64) -> u64 {
+        ((t / self.step + 1e-6).floor() + self.preroll_steps() as f64).max(0.0) as u64
+    }
+}
+
 /// Why a snapshot cannot be restored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SnapshotError {
@@ -144,4 +164,19 @@ pub struct Deflection<'a> {
     pub rect: Rect,
     /// Angle to the right and upward, radians.
     pub angle: &'a Image<2>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_count_from_the_beginning_of_the_preroll() {
+        let stepping = Stepping { step: 0.1, preroll: 0.98, dissolve: 0.0 };
+        assert_eq!(stepping.preroll_steps(), 10);
+        assert_eq!((stepping.time_after(0), stepping.time_after(13)), (-1.0, 3.0 * 0.1));
+        // 0.3 / 0.1 is a little less than 3 in floating point; before the preroll nothing has been stepped.
+        assert_eq!([-9.0, -0.25, 0.0, 0.3, 0.39].map(|t| stepping.steps_until(t)), [0, 7, 10, 13, 13]);
+        assert_eq!(Stepping { preroll: -5.0, ..stepping }.preroll_steps(), 0);
+    }
 }

@@ -7,7 +7,7 @@ use bansho::{
     job::{Cause, JobError},
 };
 
-use crate::{command::new::UnknownExample, interrupt, output::to_stderr};
+use crate::{command::new::Unknown, flags, interrupt, output::to_stderr};
 
 /// Failed on the way.
 const FAILED: u8 = 1;
@@ -31,7 +31,7 @@ pub(crate) fn code(error: &anyhow::Error) -> u8 {
         Some(Cause::Scene) => SCENE,
         Some(Cause::Gpu) => GPU,
         Some(Cause::Cancelled) => interrupt::exit_code(),
-        None if error.is::<UnknownExample>() => USAGE,
+        None if error.is::<Unknown>() => USAGE,
         Some(Cause::Work) | None => FAILED,
     }
 }
@@ -55,7 +55,7 @@ fn tell(error: &anyhow::Error) {
 pub(crate) fn tell_job(error: &JobError) {
     match error.scene() {
         Some(scene) => faults(scene).for_each(|fault| to_stderr(&format!("error: {fault}"))),
-        None => to_stderr(&format!("error: {error}")),
+        None => to_stderr(&format!("error: {}", flags::error(error))),
     }
 }
 

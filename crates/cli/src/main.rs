@@ -4,6 +4,7 @@ mod args;
 mod command;
 mod examples;
 mod exit;
+mod flags;
 mod interrupt;
 mod output;
 mod progress;

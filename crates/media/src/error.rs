@@ -12,7 +12,10 @@ pub enum MediaError {
     #[error(transparent)]
     Naming(#[from] NamingError),
     /// No room is left where the file should go.
-    #[error("{path}: the disk is full; nothing half-written was left there. Free some space or choose another folder", path = .path.display())]
+    #[error(
+        "{path}: the disk is full; nothing half-written was left there. Free some space or choose another folder",
+        path = .path.display()
+    )]
     DiskFull {
         /// The file that was to be written.
         path: PathBuf,
@@ -84,7 +87,10 @@ pub enum MediaError {
         wanted: crate::sequence::Wants,
     },
     /// A frame of a film came too early, twice, or beyond the end.
-    #[error("{path}: frame at position {index} does not fit: the next to be written is {next} and at most {window} may wait", path = .path.display())]
+    #[error(
+        "{path}: frame at position {index} does not fit: the next to be written is {next} and at most {window} may wait",
+        path = .path.display()
+    )]
     OutOfOrder {
         /// The film.
         path: PathBuf,

@@ -20,7 +20,7 @@ use bansho_base::{
 };
 use bansho_models::flame_particles::{
     Particles,
-    draw::{Gas, LookParameters, PreparedGas, line_gradient, line_integral, soot_absorption},
+    draw::{Gas, LookParameters, Memory, PreparedGas, line_gradient, line_integral, soot_absorption},
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use rayon::prelude::*;
@@ -41,7 +41,7 @@ fn view() -> View {
     View::new(camera, Shutter { open: TIME, close: TIME + 1.0 / 60.0 }, TIME + 1.0 / 30.0, SIZE, 0)
 }
 
-fn gas(particles: &Particles) -> Gas<'_> {
+fn gas<'a>(particles: &'a Particles, memory: &'a Memory) -> Gas<'a> {
     Gas {
         particles,
         time: TIME,
@@ -50,21 +50,30 @@ fn gas(particles: &Particles) -> Gas<'_> {
         base: DVec3::ZERO,
         size: DVec2::ONE,
         key: Key::new(1, "plume"),
+        memory,
     }
 }
 
+/// What is drawn, and with what memory.
+struct Subject {
+    particles: Particles,
+    view: View,
+    memory: Memory,
+}
+
 /// Prepares the gas and hands it to `each`.
-fn prepared(particles: &Particles, look: &LookParameters, view: &View, each: impl FnOnce(&PreparedGas)) {
+fn prepared(subject: &Subject, look: &LookParameters, each: impl FnOnce(&PreparedGas)) {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
-    if let Ok(prepared) = PreparedGas::new(gas(particles), look, view, &surroundings, &Unobserved) {
+    let gas = gas(&subject.particles, &subject.memory);
+    if let Ok(prepared) = PreparedGas::new(gas, look, &subject.view, &surroundings, &Unobserved) {
         each(&prepared);
     }
 }
 
 /// Draws the gas, and hands it to `before` before.
-fn draw(particles: &Particles, look: &LookParameters, view: &View, before: impl Fn(&PreparedGas)) {
-    prepared(particles, look, view, |prepared| {
+fn draw(subject: &Subject, look: &LookParameters, before: impl Fn(&PreparedGas) + Sync) {
+    prepared(subject, look, |prepared| {
         before(prepared);
         (0..SIZE[1].div_ceil(STRIP)).into_par_iter().for_each_init(Strip::default, |strip, index| {
             let y = index * STRIP;
@@ -96,21 +105,40 @@ fn naive<const WIDTH: usize>(particles: &Particles, view: &View, value: impl Fn(
     black_box(picture);
 }
 
+/// Two threads, each on a core of its own: unpinned they are often packed onto one.
+fn pinned_pool() -> rayon::ThreadPool {
+    let cores = core_affinity::get_core_ids().unwrap_or_default();
+    let pin = move |index: usize| {
+        if let Some(core) = cores.get(index) {
+            core_affinity::set_for_current(*core);
+        }
+    };
+    rayon::ThreadPoolBuilder::new().num_threads(2).start_handler(pin).build().expect("two threads")
+}
+
 fn gas_720p(criterion: &mut Criterion) {
-    let (particles, view) = (plume::plume(COUNT, HEIGHT, TIME), view());
+    let pool = pinned_pool();
+    let subject = Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), memory: Memory::default() };
+    let Subject { particles, view, .. } = &subject;
     let look = LookParameters::default();
     let volume = |index: usize| f64::from(particles.masses()[index] / particles.densities()[index]);
     let mut group = criterion.benchmark_group("flame gas 1280x720");
     group.sample_size(10);
-    group.bench_function("sums and detail", |bencher| bencher.iter(|| draw(&particles, &look, &view, |_| ())));
+    group.bench_function("sums and detail", |bencher| {
+        pool.install(|| bencher.iter(|| draw(&subject, &look, |_| ())));
+    });
     group.bench_function("sums, detail and haze", |bencher| {
-        bencher.iter(|| draw(&particles, &look, &view, |prepared| assert!(prepared.deflection().is_some())))
+        pool.install(|| {
+            bencher.iter(|| draw(&subject, &look, |prepared| assert!(prepared.deflection().is_some())));
+        });
     });
     let smooth = LookParameters { detail: 0.0, ..look.clone() };
-    group.bench_function("sums alone", |bencher| bencher.iter(|| draw(&particles, &smooth, &view, |_| ())));
+    group.bench_function("sums alone", |bencher| {
+        pool.install(|| bencher.iter(|| draw(&subject, &smooth, |_| ())));
+    });
     group.bench_function("naive sums", |bencher| {
         bencher.iter(|| {
-            naive(&particles, &view, |index, [u, v], radius| {
+            naive(particles, view, |index, [u, v], radius| {
                 let tau = line_integral(math::hypot(u, v), radius)
                     * volume(index)
                     * soot_absorption(f64::from(particles.soots()[index]), &look);
@@ -122,15 +150,17 @@ fn gas_720p(criterion: &mut Criterion) {
     // Of gas that neither shines nor hides only the haze is summed.
     let clear = LookParameters { soot_gain: 0.0, base_blue: 0.0, ..look.clone() };
     group.bench_function("haze of clear gas", |bencher| {
-        bencher.iter(|| {
-            prepared(&particles, &clear, &view, |prepared| {
-                black_box(prepared.deflection().map(|bend| bend.depth));
-            })
+        pool.install(|| {
+            bencher.iter(|| {
+                prepared(&subject, &clear, |prepared| {
+                    black_box(prepared.deflection().map(|bend| bend.depth));
+                });
+            });
         });
     });
     group.bench_function("naive haze", |bencher| {
         bencher.iter(|| {
-            naive(&particles, &view, |index, [u, v], radius| {
+            naive(particles, view, |index, [u, v], radius| {
                 let b = math::hypot(u, v).max(1e-9);
                 let slope = line_gradient(b, radius) * volume(index) / b;
                 [slope * u, slope * v]

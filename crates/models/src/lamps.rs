@@ -39,8 +39,8 @@ const STRAY: f64 = 0.02;
 
 /// Share of a lamp's light that a lens scatters around its image: that of a clean one.
 const GLARE: f64 = 0.0012;
-/// Angles between which that light falls with the cube of the angle, as close to a lamp in the eye (Vos 1984): it is even within the one, or
-/// within the lamp if that looks larger, and ends at the other, radians.
+/// Angles between which that light falls with the cube of the angle, as close to a lamp in the eye (Vos 1984): it is even within
+/// the one, or within the lamp if that looks larger, and ends at the other, radians.
 const GLARE_ANGLES: [f64; 2] = [0.002, 0.12];
 
 /// Radiance of the glare at an angle from a lamp for each lux that arrives from it: `k / (theta^2 + a^2)^(3/2)`, brought to 0 at its end.

@@ -39,13 +39,18 @@ impl Describe for PatchParameters {
     const KEY: &'static str = "patch";
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
-        Ok(Box::new(Patch { name: opening.name.to_owned(), parameters: self.clone() }))
+        let angles = || (0..PATCH.width * PATCH.height).map(|index| bent(index % PATCH.width, index / PATCH.width));
+        let image = || Image::from_pixels(PATCH.width, PATCH.height, angles().collect());
+        let angles = if self.bends { image() } else { None };
+        Ok(Box::new(Patch { name: opening.name.to_owned(), parameters: self.clone(), angles }))
     }
 }
 
 struct Patch {
     name: String,
     parameters: PatchParameters,
+    /// What it bends light by, if it does: made once, as the benchmark measures what is done with them.
+    angles: Option<Image<2>>,
 }
 
 /// Radiance at a place: a soft disc over the middle half of the picture.
@@ -78,12 +83,8 @@ impl Phenomenon for Patch {
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         let row = |y: usize| (0..SIZE[0]).map(|x| radiance(x, y)).collect();
         let rows: Vec<Vec<f32>> = (0..16).map(|y| row(y * 67)).collect();
-        let angles = || {
-            let angles = (0..PATCH.width * PATCH.height).map(|index| bent(index % PATCH.width, index / PATCH.width));
-            Image::from_pixels(PATCH.width, PATCH.height, angles.collect())
-        };
-        let angles = if self.parameters.bends { angles() } else { None };
-        Ok(Box::new(PreparedPatch { rows, absorbs: self.parameters.absorbs, depth: self.parameters.depth, angles }))
+        let Self { parameters: PatchParameters { absorbs, depth, .. }, angles, .. } = self;
+        Ok(Box::new(PreparedPatch { rows, absorbs: *absorbs, depth: *depth, angles: angles.as_ref() }))
     }
 }
 
@@ -95,19 +96,19 @@ fn bent(x: usize, y: usize) -> [f32; 2] {
     [(x % 64) as f32 * 1e-4 + 1e-5, (y % 64) as f32 * -1e-4]
 }
 
-struct PreparedPatch {
+struct PreparedPatch<'a> {
     rows: Vec<Vec<f32>>,
     absorbs: bool,
     depth: f64,
-    angles: Option<Image<2>>,
+    angles: Option<&'a Image<2>>,
 }
 
-impl Prepared for PreparedPatch {
+impl Prepared for PreparedPatch<'_> {
     fn bounds(&self, _slice: &DepthInterval) -> Rect {
         PATCH
     }
     fn deflection(&self) -> Option<Deflection<'_>> {
-        self.angles.as_ref().map(|angle| Deflection { depth: self.depth, rect: PATCH, angle })
+        self.angles.map(|angle| Deflection { depth: self.depth, rect: PATCH, angle })
     }
     fn draw(&self, _slice: &DepthInterval, strip: &mut Strip) {
         let width = strip.rect.width;

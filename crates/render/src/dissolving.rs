@@ -35,8 +35,7 @@ struct Run {
 
 impl Run {
     fn step(&mut self, stepping: Stepping, surroundings: &Surroundings) {
-        let time = (self.taken as f64 - preroll_steps(stepping)) * stepping.step;
-        self.phenomenon.step(time, surroundings);
+        self.phenomenon.step(stepping.time_after(self.taken), surroundings);
         self.taken += 1;
     }
 
@@ -54,10 +53,6 @@ impl Run {
     }
 }
 
-fn preroll_steps(stepping: Stepping) -> f64 {
-    (stepping.preroll / stepping.step).round()
-}
-
 impl Dissolving {
     /// A loop of `turn` seconds of a phenomenon that steps as said, of which two runs are given at their beginning.
     pub(crate) fn new(turn: f64, stepping: Stepping, runs: [Box<dyn Phenomenon>; 2]) -> Self {
@@ -65,19 +60,14 @@ impl Dissolving {
         Self { beginning: present.phenomenon.snapshot(), turn, stepping, present, passing, comes: false }
     }
 
-    /// Steps after which a run's state is the last one not after its time `t`. A millionth of a step forgives rounding.
-    fn steps_until(&self, t: f64) -> u64 {
-        ((t / self.stepping.step + 1e-6).floor() + preroll_steps(self.stepping)).max(0.0) as u64
-    }
-
     /// Steps after which runs begin to come in.
     fn begun(&self) -> u64 {
-        self.steps_until(-0.5 * self.stepping.dissolve)
+        self.stepping.steps_until(-0.5 * self.stepping.dissolve)
     }
 
     /// The run before the first turn: leaves its state where later ones begin, and where the first turn's does.
     fn run_up(&mut self, until: u64, surroundings: &Surroundings) -> Result<(), SnapshotError> {
-        let (begun, first) = (self.begun(), self.steps_until(0.0));
+        let (begun, first) = (self.begun(), self.stepping.steps_until(0.0));
         while self.passing.taken < until {
             self.passing.step(self.stepping, surroundings);
             if self.passing.taken == begun {
@@ -94,17 +84,17 @@ impl Dissolving {
     fn go_on(&mut self, t: f64, surroundings: &Surroundings) -> Result<(), SnapshotError> {
         let stepping = self.stepping;
         if t < 0.5 * stepping.step {
-            return self.run_up(self.steps_until(t + self.turn), surroundings);
+            return self.run_up(stepping.steps_until(t + self.turn), surroundings);
         }
-        self.present.advance(self.steps_until(t), stepping, surroundings);
+        self.present.advance(stepping.steps_until(t), stepping, surroundings);
         if t >= 0.5 * self.turn {
             if !self.comes {
                 self.passing.go_to(&self.beginning, self.begun())?;
                 self.comes = true;
             }
-            self.passing.advance(self.steps_until(t - self.turn), stepping, surroundings);
+            self.passing.advance(stepping.steps_until(t - self.turn), stepping, surroundings);
         } else if t <= 0.5 * stepping.dissolve {
-            self.passing.advance(self.steps_until(t + self.turn), stepping, surroundings);
+            self.passing.advance(stepping.steps_until(t + self.turn), stepping, surroundings);
         }
         Ok(())
     }

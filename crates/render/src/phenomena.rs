@@ -1,6 +1,8 @@
 //! The kinds of phenomena that scenes may hold: the one place where models meet the renderer.
 
-use bansho_base::{parameters::ProblemKind, phenomenon::Phenomenon, sky::SkyParameters};
+use std::error::Error;
+
+use bansho_base::{parameters::ModelFault, phenomenon::Phenomenon, sky::SkyParameters};
 use bansho_models::{
     aurora::{Aurora, AuroraParameters, shapes::ShapeFaultKind},
     flame_particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind},
@@ -25,8 +27,8 @@ pub const KINDS: &[PhenomenonKind] =
     &[FlameSheetParameters::KIND, FlameParticlesParameters::KIND, RainParameters::KIND, AuroraParameters::KIND];
 
 /// A model's own fault, placed at the parameter that it names.
-fn opening_fault(fault: &bansho_models::ParameterFault) -> OpeningFault {
-    OpeningFault { key: fault.key.to_owned(), kind: ProblemKind::Conflict(fault.kind.to_string()) }
+fn opening_fault(key: impl Into<String>, fault: impl Error + Send + Sync + 'static) -> OpeningFault {
+    OpeningFault { key: key.into(), kind: ModelFault::new(fault).into() }
 }
 
 impl Describe for FlameSheetParameters {
@@ -35,35 +37,42 @@ impl Describe for FlameSheetParameters {
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match FlameSheet::new(self.clone(), opening.name, opening.seed, opening.loop_s) {
             Ok(sheet) => Ok(Box::new(sheet)),
-            Err(fault) => Err(opening_fault(&fault)),
+            Err(fault) => Err(opening_fault(fault.key, fault.kind)),
         }
     }
 }
 
 impl Describe for FlameParticlesParameters {
     const KEY: &'static str = "flame_particles";
+    const SETTING: &'static str = "\
+        camera = { position = [0.0, 0.55, 4.0], target = [0.0, 0.55, 0.0], vertical_fov_deg = 24.0 }\n\
+        wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match FlameParticles::new(self.clone(), opening.name, opening.seed, opening.loop_s, opening.assets) {
             Ok(flame) => Ok(Box::new(flame)),
-            Err(fault) => {
-                let kind = match fault.kind {
-                    ParticleFaultKind::Asset(error) => ProblemKind::Asset(error),
-                    other => ProblemKind::Conflict(other.to_string()),
-                };
-                Err(OpeningFault { key: fault.key, kind })
-            }
+            Err(fault) => Err(match fault.kind {
+                ParticleFaultKind::Asset(error) => OpeningFault { key: fault.key, kind: error.into() },
+                other => opening_fault(fault.key, other),
+            }),
         }
     }
 }
 
 impl Describe for RainParameters {
     const KEY: &'static str = "rain";
+    // A lamp at dusk above wet ground: drops only show the light of others.
+    const SETTING: &'static str = "\
+        picture = { exposure_ev100 = 1.2 }\n\
+        camera = { position = [0.4, 1.5, 4.2], target = [0.0, 1.45, 0.0], vertical_fov_deg = 34.0 }\n\
+        sky = { luminance = 0.09, hills_deg = 2.5, trees_deg = 2.2 }\n\
+        ground = { wetness = 0.7 }\n\
+        light = [{ kind = \"point\", visible = true, position = [0.0, 2.1, 0.0], intensity = 80.0, radius = 0.04 }]\n";
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match Rain::new(self.clone(), opening.name, opening.seed, opening.loop_s) {
             Ok(rain) => Ok(Box::new(rain)),
-            Err(fault) => Err(opening_fault(&fault)),
+            Err(fault) => Err(opening_fault(fault.key, fault.kind)),
         }
     }
 }
@@ -71,17 +80,19 @@ impl Describe for RainParameters {
 impl Describe for AuroraParameters {
     const KEY: &'static str = "aurora";
     const IN_THE_SKY: bool = true;
+    // From the ground toward the northern sky of a clear night.
+    const SETTING: &'static str = "\
+        picture = { exposure_ev100 = -6.3 }\n\
+        camera = { position = [0.0, 1.7, 0.0], target = [0.0, 24.0, -60.0], vertical_fov_deg = 60.0 }\n\
+        sky = { kind = \"night\", hills_deg = 2.0, trees_deg = 1.1 }\n";
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match Aurora::new(self.clone(), opening.name, opening.seed, opening.loop_s, opening.assets) {
             Ok(aurora) => Ok(Box::new(aurora)),
-            Err(fault) => {
-                let kind = match fault.kind {
-                    ShapeFaultKind::Asset(error) => ProblemKind::Asset(error),
-                    other => ProblemKind::Conflict(other.to_string()),
-                };
-                Err(OpeningFault { key: fault.key, kind })
-            }
+            Err(fault) => Err(match fault.kind {
+                ShapeFaultKind::Asset(error) => OpeningFault { key: fault.key, kind: error.into() },
+                other => opening_fault(fault.key, other),
+            }),
         }
     }
 }

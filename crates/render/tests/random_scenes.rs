@@ -69,7 +69,8 @@ fn scene(seed: u64) -> String {
     for (index, kind) in KINDS.iter().enumerate() {
         let mut table = sample((kind.table)(), &mut uniform);
         keep_small(&mut table, kind.key);
-        // Most random shapes are refused: flames wider than their sheet, auroras that cross. Most scenes do without, so that they are drawn.
+        // Most random shapes are refused: flames wider than their sheet, auroras that cross. Most scenes do without, so that they
+        // are drawn.
         if !seed.is_multiple_of(4) {
             table.entries.retain(|entry| !["shape", "shapes"].contains(&entry.key.as_str()));
         }

@@ -26,31 +26,67 @@ fn fault(text: &str) -> String {
 #[test]
 fn faults_name_their_place_and_what_is_allowed() {
     for (text, expected) in [
-        ("bansho = 1\n[picture]\nexposre_ev100 = 3\n", "test.toml:3:1: picture: unknown key `exposre_ev100`, did you mean `exposure_ev100`?"),
+        (
+            "bansho = 1\n[picture]\nexposre_ev100 = 3\n",
+            "test.toml:3:1: picture: unknown key `exposre_ev100`, \
+          did you mean `exposure_ev100`?",
+        ),
         ("bansho = 1\n[pictre]\n", "test.toml:2:2: unknown key `pictre`, did you mean `picture`?"),
-        ("bansho = 1\n[picture]\nsize = \"big\"\n", "test.toml:3:8: picture.size: expected a list of 2 numbers from 1 to 16384, found a string"),
-        ("bansho = 1\n[picture]\nsize = [0, 100]\n", "test.toml:3:9: picture.size: 0 is out of range; allowed: 1 to 16384 pixels"),
+        (
+            "bansho = 1\n[picture]\nsize = \"big\"\n",
+            "test.toml:3:8: picture.size: expected a list of 2 numbers from 1 to 16384, \
+          found a string",
+        ),
+        (
+            "bansho = 1\n[picture]\nsize = [0, 100]\n",
+            "test.toml:3:9: picture.size: 0 is out of range; allowed: 1 to 16384 pixels",
+        ),
         ("bansho = 1\n[picture]\nsize = [100, 1000000000]\n", "1000000000 is out of range; allowed: 1 to 16384 pixels"),
         ("bansho = 1\n[picture]\nsize = [100]\n", "has 1 items; allowed: 2 to 2"),
         ("bansho = 1\n[picture]\nfps = \"24000/0\"\n", "inf is out of range; allowed: 0.1 to 1000"),
         ("bansho = 1\n[picture]\nfps = \"fast\"\n", "or a fraction such as \"24000/1001\", found a string"),
-        ("bansho = 1\n[picture]\nexposure_ev100 = \"bright\"\n", "expected \"auto\" or a number from -40 to 40, found a string"),
+        (
+            "bansho = 1\n[picture]\nexposure_ev100 = \"bright\"\n",
+            "expected \"auto\" or a number from -40 to 40, found a string",
+        ),
         ("bansho = 1\n[picture]\nframes = 1.5\n", "expected a whole number from 1 to 10000000, found a number"),
-        ("bansho = 1\n[camera]\nlens = \"fishey\"\n", "test.toml:3:8: camera.lens: `fishey` is not known, did you mean `fisheye`? allowed: perspective, fisheye, panorama".replace("? ", "?; ").as_str()),
-        ("bansho = 1\n[wind]\nvelocity = { keys = [[1, [0, 0, 0]], [1, [1, 0, 0]]] }\n", "wind.velocity: point 2 must lie after point 1"),
+        (
+            "bansho = 1\n[camera]\nlens = \"fishey\"\n",
+            "test.toml:3:8: camera.lens: `fishey` is not known, did you mean `fisheye`?; \
+          allowed: perspective, fisheye, panorama",
+        ),
+        (
+            "bansho = 1\n[wind]\nvelocity = { keys = [[1, [0, 0, 0]], [1, [1, 0, 0]]] }\n",
+            "wind.velocity: point 2 must lie after point 1",
+        ),
         ("bansho = 1\n[wind]\nvelocity = { kes = [] }\n", "unknown key `kes`, did you mean `keys`?"),
         ("bansho = 1\n[wind]\nvelocity = nan\n", "expected a list of 3 numbers"),
         ("bansho = 1\n[wind]\ngust = nan\n", "NaN is out of range; allowed: 0 to 2"),
         ("bansho = 1\n[emitter]\n", "expected tables [[emitter]], with double brackets"),
-        ("bansho = 1\n[[emitter]]\nradius = -1\n", "test.toml:3:10: emitter.0.radius: -1 is out of range; allowed: 0 to 100 m"),
-        ("bansho = 1\n[[emitter]]\nname = \"a\"\n[[absorber]]\nname = \"a\"\n", "test.toml:5:8: absorber.0: the name \"a\" is taken"),
+        (
+            "bansho = 1\n[[emitter]]\nradius = -1\n",
+            "test.toml:3:10: emitter.0.radius: -1 is out of range; allowed: 0 to 100 m",
+        ),
+        (
+            "bansho = 1\n[[emitter]]\nname = \"a\"\n[[absorber]]\nname = \"a\"\n",
+            "test.toml:5:8: absorber.0: the name \"a\" is taken",
+        ),
         ("bansho = 1\n[[emitter]]\nname = \"a.b\"\n", "expected a name of 1 to 100 characters without dots"),
         ("bansho = 1\n[[absorber]]\nnear = 2\nfar = 1\n", "test.toml:4:7: absorber.0.far: must lie behind `near`"),
         ("bansho = 1\n[plate]\nimage = \"gone.png\"\n", "test.toml:3:9: plate.image: gone.png: no such file"),
-        ("bansho = 1\n[air]\ntemperature_k = 0\n", "test.toml:3:17: air.temperature_k: 0 is out of range; allowed: 150 to 400 K"),
+        (
+            "bansho = 1\n[air]\ntemperature_k = 0\n",
+            "test.toml:3:17: air.temperature_k: 0 is out of range; allowed: 150 to 400 K",
+        ),
         ("bansho = 1\n[obstacle]\n", "expected tables [[obstacle]], with double brackets"),
-        ("bansho = 1\n[[obstacle]]\nradius = 1\n[[obstacle]]\nshape = \"mesh\"\n", "obstacle.1.file: an obstacle of shape \"mesh\" needs a `file`"),
-        ("bansho = 1\n[[obstacle]]\nshape = \"mesh\"\nfile = \"gone.glb\"\n", "test.toml:4:8: obstacle.0.file: gone.glb: no such file"),
+        (
+            "bansho = 1\n[[obstacle]]\nradius = 1\n[[obstacle]]\nshape = \"mesh\"\n",
+            "obstacle.1.file: an obstacle of shape \"mesh\" needs a `file`",
+        ),
+        (
+            "bansho = 1\n[[obstacle]]\nshape = \"mesh\"\nfile = \"gone.glb\"\n",
+            "test.toml:4:8: obstacle.0.file: gone.glb: no such file",
+        ),
         ("bansho = 2\n", "test.toml:1:10: bansho: format 2 is newer than this program knows; known: up to 1"),
         ("bansho = 0\n", "`bansho upgrade` rewrites the file"),
         ("[picture]\n", "the scene must begin with `bansho = 1`"),
@@ -205,6 +241,33 @@ fn a_commented_template_is_a_valid_scene_also_when_every_line_is_uncommented() {
             .collect();
         parse(&uncommented).unwrap_or_else(|error| panic!("{error}\n{uncommented}"));
     }
+}
+
+#[test]
+fn a_template_states_all_of_its_kinds_setting() {
+    for kind in bansho_render::phenomena::KINDS {
+        let parse = |text: &str| {
+            let kinds = bansho_render::phenomena::KINDS;
+            Scene::parse("new.toml", text, kinds, &MemoryAssets::default()).unwrap_or_else(|error| panic!("{error}"))
+        };
+        let stated = parse(&format!("bansho = 1\n{}\n[[{}]]\n", kind.setting, kind.key));
+        let new = parse(&template::commented(kind));
+        assert_eq!((&new.picture, &new.camera, &new.wind), (&stated.picture, &stated.camera, &stated.wind));
+        assert_eq!((&new.sky, &new.ground, &new.lights), (&stated.sky, &stated.ground, &stated.lights));
+        assert_eq!(new.instances.len(), 1);
+    }
+}
+
+#[test]
+fn a_models_fault_stays_what_it_is() {
+    use bansho_base::parameters::ProblemKind;
+    use bansho_models::flame_particles::ParticleFaultKind;
+    let text = "bansho = 1\n[[flame_particles]]\nparticles = 900000000\n";
+    let kinds = bansho_render::phenomena::KINDS;
+    let error = Scene::parse("new.toml", text, kinds, &MemoryAssets::default()).err().unwrap();
+    let ProblemKind::Model(fault) = &error.problems[0].kind else { panic!("{error}") };
+    let kind = fault.downcast::<ParticleFaultKind>();
+    assert!(matches!(kind, Some(ParticleFaultKind::TooManyParticles { count: 900_000_000, .. })), "{error}");
 }
 
 fn is_key(line: &str) -> bool {

@@ -9,7 +9,7 @@ use bansho_base::{
 use bansho_render::{
     Scene,
     phenomena::KINDS,
-    scene::{FORMAT, SHARED_TABLES},
+    scene::{FORMAT, Opening, SHARED_TABLES},
 };
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/reference/scene.md");
@@ -47,6 +47,25 @@ fn every_scene_in_readme_and_book_is_right() {
     assert!(scenes >= 5, "found only {scenes}");
 }
 
+#[test]
+fn the_guide_tells_of_every_aov() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/guide/output.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    for kind in KINDS {
+        let scene = format!("bansho = 1\n[[{}]]\n", kind.key);
+        let scene =
+            Scene::parse("aovs", &scene, KINDS, &MemoryAssets::default()).unwrap_or_else(|error| panic!("{error}"));
+        let opening = Opening { name: "any", seed: 0, loop_s: None, assets: &MemoryAssets::default() };
+        let phenomenon = scene.instances[0].source.open(&opening).unwrap_or_else(|fault| panic!("{fault:?}"));
+        for aov in phenomenon.aovs() {
+            assert!(page.contains(&format!("`{}`", aov.name)), "{}: {} is not told of", kind.key, aov.name);
+            let unit = if aov.unit == "1" { "" } else { aov.unit };
+            let row = page.lines().find(|line| line.contains(&format!("`{}`", aov.name))).unwrap_or_default();
+            assert!(row.split('|').nth(3).is_some_and(|cell| cell.trim() == unit), "{}: {row}", aov.name);
+        }
+    }
+}
+
 fn page() -> String {
     let mut page = format!(
         "# The scene file\n\n\
@@ -65,7 +84,8 @@ fn page() -> String {
 }
 
 /// What every phenomenon has beside its own parameters.
-const COMMON: &str = "| `name` | a string without dots | the kind, numbered from the second on | Unique name of this one; names its layers. |\n\
+const COMMON: &str = "| `name` | a string without dots | the kind, numbered from the second on | \
+    Unique name of this one; names its layers. |\n\
     | `enabled` | true or false | `true` | Whether it is drawn. |\n";
 
 fn section(page: &mut String, header: &str, common: &str, table: &TableDescriptor) {

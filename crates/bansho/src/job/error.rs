@@ -23,8 +23,8 @@ pub enum JobError {
     /// The scene is faulty.
     #[error(transparent)]
     Scene(Box<SceneError>),
-    /// An assignment (`--set`) cannot be made.
-    #[error("--set {assignment}: {source}")]
+    /// A change of the scene's text cannot be made.
+    #[error("{assignment}: {source}")]
     Edit {
         /// The assignment.
         assignment: String,
@@ -41,7 +41,7 @@ pub enum JobError {
     #[error(transparent)]
     Conflict(#[from] Conflict),
     /// A GPU was asked for.
-    #[error("there is no usable GPU: this build of Bansho draws on the processor only; allowed: --backend cpu, auto")]
+    #[error("there is no usable GPU: this build of Bansho draws on the processor only")]
     NoGpu,
     /// The name of the output cannot be used.
     #[error(transparent)]
@@ -62,8 +62,19 @@ pub enum JobError {
     #[error("stopped; whole textures stay, without an index")]
     StreaksCancelled,
     /// The observer asked to stop.
-    #[error("stopped; whole frames stay, and --resume goes on from there")]
+    #[error("stopped; whole frames stay")]
     Cancelled,
+}
+
+/// Channels beside the picture's own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Channels {
+    /// One picture of each phenomenon.
+    #[error("layers")]
+    Layers,
+    /// Temperature, motion and the like.
+    #[error("AOVs")]
+    Aovs,
 }
 
 /// Options that do not go together.
@@ -73,13 +84,16 @@ pub enum Conflict {
     /// Layers or AOVs in a format that has only one picture.
     #[error("{what} need a format that holds many channels, and {path} is not one; allowed: .exr", path = .path.display())]
     NoChannels {
-        /// `--layers` or `--aovs`.
-        what: &'static str,
+        /// Which of them.
+        what: Channels,
         /// The output.
         path: PathBuf,
     },
     /// Figures of a film or a sheet, which holds many frames.
-    #[error("--figures writes a file beside each frame's own picture, and {path} holds many frames; allowed: .png, .exr without --contact-sheet", path = .path.display())]
+    #[error(
+        "figures are written beside each frame's own picture, and {path} holds many frames; allowed: .png, .exr, one a frame",
+        path = .path.display()
+    )]
     NoFigures {
         /// The output.
         path: PathBuf,

@@ -1,4 +1,5 @@
-//! From a scene file to pictures on disk: what `bansho render`, `bansho flipbook`, `bansho simulate` and `bansho streaks` do, for any program.
+//! From a scene file to pictures on disk: what `bansho render`, `bansho flipbook`, `bansho simulate` and `bansho streaks` do,
+//! for any program.
 //!
 //! [`Job`] says what is wanted; [`Job::prepare`] checks all of it and writes nothing; [`PreparedJob::run`] draws each
 //! frame while those before are compressed and written by whichever thread of the caller's rayon pool is free. A few
@@ -28,7 +29,7 @@ use std::path::PathBuf;
 use bansho_base::{color::View, image::Rect};
 use bansho_render::display::BitDepth;
 
-pub use error::{Cause, Conflict, JobError};
+pub use error::{Cause, Channels, Conflict, JobError};
 pub use flipbook::{Flipbook, FlipbookSummary, PreparedFlipbook};
 pub use observer::{FrameDone, JobObserver, Note, Outline};
 pub use prepare::{PreparedJob, check_scene};

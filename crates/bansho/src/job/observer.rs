@@ -70,25 +70,25 @@ pub enum Note {
         last: i64,
     },
     /// 16 bits in a format that has other ideas.
-    #[error("--bits has no effect on .{}", .kind.extension())]
+    #[error("the number of bits has no effect on .{}", .kind.extension())]
     BitsUnused {
         /// The format.
         kind: OutputKind,
     },
     /// A view in a scene-linear format.
-    #[error("--view has no effect on .exr, which is scene-linear")]
+    #[error("a view has no effect on .exr, which is scene-linear")]
     ViewUnused,
     /// A film is made as a whole.
-    #[error("--resume has no effect on .{}, which is made as a whole", .kind.extension())]
+    #[error("resuming has no effect on .{}, which is made as a whole", .kind.extension())]
     ResumeUnused {
         /// The format.
         kind: OutputKind,
     },
     /// A contact sheet is made as a whole.
-    #[error("--resume has no effect on a sheet, which is made as a whole")]
+    #[error("resuming has no effect on a sheet, which is made as a whole")]
     ResumeSheet,
     /// Nothing in the scene has a state.
-    #[error("--snapshots has no effect: nothing in this scene is simulated in steps")]
+    #[error("snapshots have no effect: nothing in this scene is simulated in steps")]
     SnapshotsUnused,
     /// A snapshot that cannot be used.
     #[error("{path}: not used: {reason}; it is made anew", path = .path.display())]

@@ -15,7 +15,7 @@ use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth};
 
 use super::{
     BackendChoice, Job, contact,
-    error::{Conflict, JobError},
+    error::{Channels, Conflict, JobError},
     observer::Note,
     output::{self, Format},
     scene_file::SceneFile,
@@ -136,8 +136,8 @@ impl Job {
     /// Layers and AOVs need a file that holds them.
     fn check_channels(&self, kind: OutputKind) -> Result<(), Conflict> {
         let what = match (self.layers, self.aovs) {
-            (true, _) => "--layers",
-            (_, true) => "--aovs",
+            (true, _) => Channels::Layers,
+            (_, true) => Channels::Aovs,
             _ => return Ok(()),
         };
         if kind == OutputKind::Exr { Ok(()) } else { Err(Conflict::NoChannels { what, path: self.output_path() }) }

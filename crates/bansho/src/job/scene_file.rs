@@ -66,7 +66,7 @@ impl SceneFile {
         match Scene::parse(&self.name, &self.text, KINDS, assets) {
             Err(own) => Err(JobError::Scene(Box::new(own))),
             Ok(_) => {
-                let file = format!("{} with --set", self.name);
+                let file = format!("{} as changed", self.name);
                 Err(JobError::SetScene(Box::new(bansho_render::SceneError { file, ..*error })))
             }
         }

@@ -5,10 +5,12 @@
 #![cfg(feature = "files")]
 
 mod aurora;
+mod burners;
 mod flames;
 mod gas;
 mod looks;
 mod rain;
+mod templates;
 
 use looks::golden;
 
@@ -16,7 +18,7 @@ use looks::golden;
 const SMALL: [usize; 2] = [256, 144];
 
 /// Scenes with the frame that is compared: of an aurora an early one, since it has settled before the first.
-const GOLDENS: [(&str, [usize; 2], i64); 28] = [
+const GOLDENS: [(&str, [usize; 2], i64); 29] = [
     ("candle", SMALL, 40),
     ("torch", SMALL, 40),
     ("campfire", SMALL, 40),
@@ -30,6 +32,7 @@ const GOLDENS: [(&str, [usize; 2], i64); 28] = [
     ("inagaki_density", SMALL, 40),
     ("torch_in_gusts", SMALL, 40),
     ("burning_mesh", SMALL, 40),
+    ("bonfire", SMALL, 4),
     ("street_lamp", SMALL, 40),
     ("street_lamp_near", SMALL, 40),
     ("headlights", SMALL, 40),

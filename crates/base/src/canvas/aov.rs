@@ -42,7 +42,8 @@ impl AovPlane {
         self.weights[index] += weight;
     }
 
-    /// Keeps a sample of `value` at `depth` (m, above 0) if it is nearer than what pixel `index` of the strip has, for [`AovRule::Nearest`].
+    /// Keeps a sample of `value` at `depth` (m, above 0) if it is nearer than what pixel `index` of the strip has, for
+    /// [`AovRule::Nearest`].
     pub fn keep_nearest(&mut self, index: usize, value: f32, depth: f32) {
         self.keep(index, value, 1.0 / depth);
     }

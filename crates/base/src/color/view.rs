@@ -82,8 +82,8 @@ impl View {
     }
 
     /// The exposed ACEScg that this view shows as the linear sRGB `display` (clamped to 0..=1): the inverse of
-    /// [`to_display`](Self::to_display) to within 1e-5. Bright saturated colours come from outside sRGB. `raw` has no sRGB to invert; for it
-    /// the colour is only brought into ACEScg.
+    /// [`to_display`](Self::to_display) to within 1e-5. Bright saturated colours come from outside sRGB. `raw` has no sRGB to
+    /// invert; for it the colour is only brought into ACEScg.
     #[inline(always)]
     #[must_use]
     pub fn to_scene(&self, display: [f32; 3]) -> [f32; 3] {

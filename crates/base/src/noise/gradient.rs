@@ -7,9 +7,9 @@
 pub trait Dimension: Copy + private::Sealed {
     /// Factor that brings the noise of unit gradients into [-1, 1].
     ///
-    /// At a corner at distance d a unit gradient gives at most d, so the noise is at most `sum w d <= sqrt(sum w d^2)` (weights w sum to 1).
-    /// That sum falls apart into one term an axis, `(1 - s) f^2 + s (1 - f)^2` with s the fade of f. As s <= f for f <= 1/2, the
-    /// term is at most `f^2 + f (1 - 2 f) = f - f^2 <= 1/4`: in n dimensions the noise is at most sqrt(n) / 2.
+    /// At a corner at distance d a unit gradient gives at most d, so the noise is at most `sum w d <= sqrt(sum w d^2)` (weights w
+    /// sum to 1). That sum falls apart into one term an axis, `(1 - s) f^2 + s (1 - f)^2` with s the fade of f. As s <= f for f <=
+    /// 1/2, the term is at most `f^2 + f (1 - 2 f) = f - f^2 <= 1/4`: in n dimensions the noise is at most sqrt(n) / 2.
     const SCALE: f32;
 
     /// Noise in [-1, 1] at the fraction `self` of the cell that lies between the lattice coordinates `lower` and `upper`.

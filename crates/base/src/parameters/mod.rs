@@ -4,6 +4,7 @@
 //! documentation. Parser, located errors, schema, book, inspector and random scenes all read that one list.
 
 mod assets;
+mod fault;
 mod keyed;
 mod kind;
 mod macros;
@@ -13,6 +14,7 @@ mod sample;
 mod types;
 
 pub use assets::assets;
+pub use fault::ModelFault;
 pub use keyed::{CurveLimits, InterpolationName};
 pub use kind::{Choice, Descriptor, Kind, TableDescriptor};
 pub use node::{Entry, Node, Span, Table, Value};

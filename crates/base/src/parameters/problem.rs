@@ -1,6 +1,6 @@
 //! Faults in what a file says, each with its place, what is wrong and what is allowed.
 
-use super::{Choice, Kind, Node, Span};
+use super::{Choice, Kind, ModelFault, Node, Span};
 use crate::assets::AssetError;
 
 /// One fault.
@@ -105,6 +105,9 @@ pub enum ProblemKind {
     /// Two parameters that do not go together.
     #[error("{0}")]
     Conflict(String),
+    /// What a model says of parameters that are each within their own bounds.
+    #[error(transparent)]
+    Model(#[from] ModelFault),
     /// The file is of a newer format.
     #[error("format {found} is newer than this program knows; known: up to {known}")]
     NewerFormat {

@@ -30,14 +30,15 @@ crate::parameters! {
     }
 }
 
-/// Lines of the airglow: wavelength in nm, brightness overhead in kR, altitude of the layer in km (Roach & Gordon 1973; Leinert et al. 1998).
-/// The last stands for the hydroxyl bands that the eye sees.
+/// Lines of the airglow: wavelength in nm, brightness overhead in kR, altitude of the layer in km (Roach & Gordon 1973; Leinert et
+/// al. 1998). The last stands for the hydroxyl bands that the eye sees.
 const AIRGLOW: [(f64, f64, f64); 4] =
     [(557.7, 0.22, 97.0), (630.0, 0.08, 250.0), (589.3, 0.03, 92.0), (660.0, 0.2, 87.0)];
 /// Luminance of zodiacal light, faint stars and the airglow's continuum together, cd/m^2 (Leinert et al. 1998), and its colour, K.
 const BACKGROUND: f64 = 1.2e-4;
 const BACKGROUND_K: f32 = 9500.0;
-/// Logarithm (base 10) of the luminance overhead, cd/m^2, for every 3 degrees that the sun is lower, from the horizon on (Koomen et al. 1952).
+/// Logarithm (base 10) of the luminance overhead, cd/m^2, for every 3 degrees that the sun is lower, from the horizon on (Koomen et
+/// al. 1952).
 const TWILIGHT: [f64; 7] = [2.3, 1.2, -0.2, -1.7, -3.0, -4.1, -5.6];
 /// Height of the twilight arch, radians.
 const TWILIGHT_ARCH: f64 = 0.17;
@@ -85,7 +86,8 @@ pub struct Parallel {
 }
 
 impl Parallel {
-    /// What radiance is made of: all around, over the sun by the fourth power of how far a direction turns to it, and in proportion to that.
+    /// What radiance is made of: all around, over the sun by the fourth power of how far a direction turns to it, and in proportion
+    /// to that.
     #[must_use]
     pub fn terms(&self) -> [[f32; 3]; 3] {
         [self.even, self.glow, self.blue]

@@ -67,18 +67,22 @@ pub(crate) enum Command {
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  bansho new fire                    fire.toml with every setting at its default
+  bansho new fire                    fire.toml, a flame sheet with every setting explained
+  bansho new wet --phenomenon rain   wet.toml, rain around a lamp with every setting explained
   bansho new --list                  the examples that come with the program
   bansho new camp --from campfire    camp.toml, a copy of the campfire")]
 pub(crate) struct NewArgs {
     /// Name of the scene; `.toml` is added where it has no extension. A file that is there already stays as it is.
     #[arg(required_unless_present = "list")]
     pub(crate) name: Option<PathBuf>,
+    /// What the scene shows: flame_sheet (the default), flame_particles, rain or aurora.
+    #[arg(long, value_name = "KIND", conflicts_with = "from")]
+    pub(crate) phenomenon: Option<String>,
     /// Copy an example that comes with the program.
     #[arg(long, value_name = "EXAMPLE")]
     pub(crate) from: Option<String>,
     /// List the examples.
-    #[arg(long, conflicts_with_all = ["name", "from"])]
+    #[arg(long, conflicts_with_all = ["name", "from", "phenomenon"])]
     pub(crate) list: bool,
 }
 

@@ -65,7 +65,13 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "X,Y,W,H", value_parser = values::parse_crop, help_heading = "Picture")]
     crop: Option<Rect>,
     /// A seamless loop of about so many seconds, rounded to whole frames.
-    #[arg(long = "loop", value_name = "SECONDS", allow_hyphen_values = true, value_parser = values::parse_seconds, help_heading = "Picture")]
+    #[arg(
+        long = "loop",
+        value_name = "SECONDS",
+        allow_hyphen_values = true,
+        value_parser = values::parse_seconds,
+        help_heading = "Picture"
+    )]
     loop_s: Option<f64>,
     /// Another seed than the scene's.
     #[arg(long, value_name = "N", help_heading = "Picture")]

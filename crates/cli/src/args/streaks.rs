@@ -31,7 +31,13 @@ pub(crate) struct StreaksArgs {
     #[arg(long, value_name = "R,...", default_value = "1,5,10,20", allow_hyphen_values = true, value_parser = values::parse_numbers)]
     rates: Numbers,
     /// Drop diameters D, ascending, mm. Each stands for the drops up to half way to its neighbours.
-    #[arg(long, value_name = "D,...", default_value = "1,1.2,1.4,1.6,1.8,2", allow_hyphen_values = true, value_parser = values::parse_numbers)]
+    #[arg(
+        long,
+        value_name = "D,...",
+        default_value = "1,1.2,1.4,1.6,1.8,2",
+        allow_hyphen_values = true,
+        value_parser = values::parse_numbers
+    )]
     diameters: Numbers,
     /// How long the shutter is open: seconds, such as 0.02 or 1/30.
     #[arg(long, value_name = "SECONDS", default_value = "1/30", allow_hyphen_values = true, value_parser = values::parse_exposure)]

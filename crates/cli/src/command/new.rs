@@ -10,7 +10,7 @@ use anyhow::Context;
 use bansho::{
     KINDS,
     base::parameters::nearest,
-    render::scene::{FORMAT, template},
+    render::scene::{PhenomenonKind, template},
 };
 
 use crate::{
@@ -19,13 +19,27 @@ use crate::{
     output::to_stdout,
 };
 
-/// There is no example of that name.
+/// There is no example or phenomenon of that name.
 #[derive(Debug, thiserror::Error)]
-#[error("there is no example `{name}`{hint}; allowed: {allowed}")]
-pub(crate) struct UnknownExample {
+#[error("there is no {what} `{name}`{hint}; allowed: {allowed}")]
+pub(crate) struct Unknown {
+    what: &'static str,
     name: String,
     hint: String,
     allowed: String,
+}
+
+impl Unknown {
+    fn new(what: &'static str, name: &str, known: &[&str]) -> Self {
+        Self {
+            what,
+            name: name.to_owned(),
+            hint: nearest(name, known.iter().copied())
+                .map(|name| format!(", did you mean `{name}`?"))
+                .unwrap_or_default(),
+            allowed: known.join(", "),
+        }
+    }
 }
 
 /// Writes a scene, or lists those that can be copied.
@@ -33,7 +47,7 @@ pub(crate) fn run(args: &NewArgs) -> anyhow::Result<()> {
     let Some(name) = &args.name else { return Ok(to_stdout(&list())?) };
     let path = with_extension(name);
     match args.from.as_deref().map(find).transpose()? {
-        None => create(&path, commented().as_bytes())?,
+        None => create(&path, template::commented(kind(args.phenomenon.as_deref())?).as_bytes())?,
         Some(example) => {
             create(&path, example.text.as_bytes())?;
             copy_assets(example, path.parent().unwrap_or(Path::new("")))?;
@@ -46,20 +60,16 @@ fn list() -> String {
     EXAMPLES.iter().map(|example| format!("{:18} {}\n", example.name, example.about())).collect()
 }
 
-fn find(name: &str) -> Result<&'static Example, UnknownExample> {
-    EXAMPLES.iter().find(|example| example.name == name).ok_or_else(|| {
-        let names = || EXAMPLES.iter().map(|example| example.name);
-        UnknownExample {
-            name: name.to_owned(),
-            hint: nearest(name, names()).map(|name| format!(", did you mean `{name}`?")).unwrap_or_default(),
-            allowed: names().collect::<Vec<_>>().join(", "),
-        }
-    })
+fn find(name: &str) -> Result<&'static Example, Unknown> {
+    let names: Vec<&str> = EXAMPLES.iter().map(|example| example.name).collect();
+    EXAMPLES.iter().find(|example| example.name == name).ok_or_else(|| Unknown::new("example", name, &names))
 }
 
-/// The first kind of phenomenon with every setting explained; an empty scene where there is none.
-fn commented() -> String {
-    KINDS.first().map_or_else(|| format!("bansho = {FORMAT}\n"), template::commented)
+/// The kind of phenomenon of that name; the first one where none is named.
+fn kind(name: Option<&str>) -> Result<&'static PhenomenonKind, Unknown> {
+    let names: Vec<&str> = KINDS.iter().map(|kind| kind.key).collect();
+    let name = name.unwrap_or(names[0]);
+    KINDS.iter().find(|kind| kind.key == name).ok_or_else(|| Unknown::new("phenomenon", name, &names))
 }
 
 fn with_extension(name: &Path) -> PathBuf {

@@ -13,7 +13,7 @@ use bansho::{
 use self::{bar::Bar, json::Json};
 use crate::{
     exit::{self, Told},
-    interrupt,
+    flags, interrupt,
     output::to_stderr,
     stats::Stats,
 };
@@ -83,7 +83,7 @@ impl Watcher {
             bar.clear();
         }
         exit::tell_job(&error);
-        let message = error.to_string();
+        let message = flags::error(&error);
         let told = anyhow::Error::new(Told(error));
         if let Shown::Json(json) = &self.shown {
             json.failed(&message, exit::code(&told));
@@ -124,7 +124,7 @@ impl JobObserver for Watcher {
     }
 
     fn note(&self, note: &Note) {
-        let warn = || to_stderr(&format!("warning: {note}"));
+        let warn = || to_stderr(&format!("warning: {}", flags::note(note)));
         if let Shown::Bar(bar) = &self.shown { bar.beside(warn) } else { warn() }
     }
 }

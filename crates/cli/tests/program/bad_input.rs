@@ -163,7 +163,7 @@ fn options_that_do_not_go_together_are_refused() {
 fn assignments_at_fault_are_blamed_and_not_the_scene() {
     misused(&["--set", "picture.size"], &["picture.size", "key.path=value"]);
     misused(&["--set", "flame_sheet.7.height=2"], &["flame_sheet.7.height", "left log"]);
-    misused(&["--set", "picture.frames=0"], &["scene.toml with --set", "picture.frames", "out of range"]);
+    misused(&["--set", "picture.frames=0"], &["scene.toml as changed", "picture.frames", "out of range"]);
     misused(&["--set", "picture.framse=3"], &["did you mean `frames`?"]);
     // A fault of the scene itself is told as such, with its own line.
     let folder = Folder::with_scene(&FLAME.replace("frames = 6", "frames = 0"));

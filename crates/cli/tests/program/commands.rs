@@ -17,6 +17,24 @@ fn a_new_scene_passes_the_check_and_is_never_overwritten() {
 }
 
 #[test]
+fn a_new_scene_shows_any_phenomenon() {
+    let folder = Folder::new();
+    for kind in ["flame_sheet", "flame_particles", "rain", "aurora"] {
+        let file = format!("{kind}.toml");
+        folder.succeed(&["new", kind, "--phenomenon", kind]);
+        let text = String::from_utf8(folder.files("")[&file].clone()).unwrap();
+        assert!(text.contains(&format!("\n[[{kind}]]\n")), "{text}");
+        folder.succeed(&["check", &file]);
+    }
+    let unknown = folder.run(&["new", "storm", "--phenomenon", "rian"]);
+    assert_eq!((unknown.code, unknown.errors()), (Some(2), 1));
+    assert!(unknown.stderr.contains("no phenomenon `rian`, did you mean `rain`?"), "{}", unknown.stderr);
+    let both = folder.run(&["new", "storm", "--phenomenon", "rain", "--from", "drizzle"]);
+    assert_eq!((both.code, both.errors()), (Some(2), 1));
+    assert!(!folder.path("storm.toml").exists());
+}
+
+#[test]
 fn every_example_can_be_copied_and_passes_the_check() {
     let folder = Folder::new();
     let list = folder.succeed(&["new", "--list"]).stdout;

@@ -133,11 +133,11 @@ fn seed_size_and_settings_change_the_picture() {
 fn options_without_effect_are_warned_of() {
     let folder = Folder::with_scene(FLAME);
     for (arguments, warning) in [
-        (&["--out", "a.gif", "--bits", "16"][..], "--bits has no effect on .gif"),
-        (&["--out", "a.exr", "--frames", "1", "--view", "raw"], "--view has no effect on .exr"),
-        (&["--out", "a.gif", "--resume"], "--resume has no effect on .gif"),
-        (&["--contact-sheet", "2", "--resume"], "--resume has no effect on a sheet"),
-        (&["--out", "a.png", "--frames", "1", "--snapshots", "s"], "--snapshots has no effect"),
+        (&["--out", "a.gif", "--bits", "16"][..], "--bits: the number of bits has no effect on .gif"),
+        (&["--out", "a.exr", "--frames", "1", "--view", "raw"], "--view: a view has no effect on .exr"),
+        (&["--out", "a.gif", "--resume"], "--resume: resuming has no effect on .gif"),
+        (&["--contact-sheet", "2", "--resume"], "--resume: resuming has no effect on a sheet"),
+        (&["--out", "a.png", "--frames", "1", "--snapshots", "s"], "--snapshots: snapshots have no effect"),
     ] {
         let run = folder.succeed(&[&["render", "scene.toml"], arguments].concat());
         let warnings = run.stderr.lines().filter(|line| line.starts_with("warning: "));

@@ -2,22 +2,21 @@
 
 use std::{collections::BTreeMap, process::Command};
 
-/// Each crate with those of the workspace that it may depend on.
-const MAY_KNOW: [(&str, &[&str]); 8] = [
+/// Each crate with those of the workspace that it may depend on: the table of ARCHITECTURE.md.
+const MAY_KNOW: [(&str, &[&str]); 7] = [
     ("bansho-base", &[]),
     ("bansho-models", &["bansho-base"]),
     ("bansho-render", &["bansho-base", "bansho-models"]),
     ("bansho-media", &["bansho-base"]),
     // The job needs to draw and to write: the one edge from the face to files, behind the feature `files`.
     ("bansho", &["bansho-base", "bansho-models", "bansho-render", "bansho-media"]),
-    ("bansho-cli", &["bansho", "bansho-media", "bansho-base"]),
-    ("bansho-gpu", &["bansho", "bansho-base", "bansho-models", "bansho-render"]),
-    ("bansho-studio", &["bansho", "bansho-media", "bansho-base", "bansho-gpu"]),
+    ("bansho-cli", &["bansho"]),
+    ("bansho-studio", &["bansho"]),
 ];
 
 /// Dependencies with the only crates that may have them.
 const RESERVED: [(&str, &[&str]); 9] = [
-    ("wgpu", &["bansho-gpu", "bansho-studio"]),
+    ("wgpu", &["bansho-studio"]),
     ("egui", &["bansho-studio"]),
     ("eframe", &["bansho-studio"]),
     ("clap", &["bansho-cli"]),
@@ -77,6 +76,36 @@ fn crates_know_only_whom_they_may() {
     assert_eq!(breaches(&workspace), Vec::<String>::new());
     let media = workspace["bansho"].iter().find(|dependency| dependency.name == "bansho-media");
     assert!(media.is_some_and(|media| media.optional), "an embedder must be able to do without files");
+}
+
+/// The rooms of ARCHITECTURE.md with what each may use, in the order of its table.
+fn described(page: &str) -> Vec<(String, Vec<String>)> {
+    let package = |name: &str| if name == "bansho" { name.to_owned() } else { format!("bansho-{name}") };
+    let mut rooms: Vec<(String, Vec<String>)> = Vec::new();
+    for line in page.lines().filter(|line| line.starts_with("| `")) {
+        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+        let name = package(cells[1].trim_matches('`'));
+        let may_use = match cells[cells.len() - 2] {
+            "nothing" => Vec::new(),
+            "all above" => rooms.iter().map(|(above, _)| above.clone()).collect(),
+            some => some.split(", ").map(|name| package(name.trim_matches('`'))).collect(),
+        };
+        rooms.push((name, may_use));
+    }
+    rooms
+}
+
+#[test]
+fn the_architecture_describes_these_rooms() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../ARCHITECTURE.md");
+    let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<String>>();
+    let sorted = |mut rooms: Vec<(String, Vec<String>)>| {
+        rooms.iter_mut().for_each(|(_, names)| names.sort());
+        rooms.sort();
+        rooms
+    };
+    let held = MAY_KNOW.iter().map(|(name, known)| ((*name).to_owned(), owned(known))).collect();
+    assert_eq!(sorted(described(&std::fs::read_to_string(page).unwrap())), sorted(held));
 }
 
 #[test]

@@ -88,6 +88,7 @@ impl PoissonSolver {
 
     /// Solves `-phi_(j-1) + b phi_j - phi_(j+1) = scale * source_j` for every wave number.
     fn eliminate(&self, grid: &mut Grid2, scale: f64) {
+        let scale = if cfg!(feature = "broken-kernel") { -scale } else { scale };
         let columns = self.size[0];
         let mut stretches: Vec<Vec<&mut [f64]>> = Vec::new();
         stretches.resize_with(columns.div_ceil(TASK_COLUMNS), Vec::new);

@@ -8,9 +8,9 @@ use rustfft::{Fft, FftPlanner, num_complex::Complex};
 
 /// `F_k = sum_j f_j sin(pi j k / (n + 1))`, j and k from 1 to n; applied twice it is `(n + 1) / 2`.
 ///
-/// A row becomes one of n + 1 values of which an ordinary transform yields both parities (Press et al. 2007, 12.4.1), and two rows are the real and
-/// the imaginary part of one transform. `rustfft` chooses its code by the instructions of the machine; where there are AVX and FMA it is
-/// always the same.
+/// A row becomes one of n + 1 values of which an ordinary transform yields both parities (Press et al. 2007, 12.4.1), and two rows
+/// are the real and the imaginary part of one transform. `rustfft` chooses its code by the instructions of the machine; where there
+/// are AVX and FMA it is always the same.
 pub(super) struct SineTransform {
     fourier: Arc<dyn Fft<f64>>,
     /// `sin(pi j / (n + 1))`, j from 0 to n.
@@ -55,8 +55,8 @@ impl SineTransform {
         });
     }
 
-    /// `sin(pi j / N) (f_j + f_(N-j)) + (f_j - f_(N-j)) / 2`, whose cosine sums are `F_(2k+1) - F_(2k-1)` and whose sine sums are `F_2k`; of
-    /// the first row as the real part, of the second, if there is one, as the imaginary part.
+    /// `sin(pi j / N) (f_j + f_(N-j)) + (f_j - f_(N-j)) / 2`, whose cosine sums are `F_(2k+1) - F_(2k-1)` and whose sine sums are
+    /// `F_2k`; of the first row as the real part, of the second, if there is one, as the imaginary part.
     #[inline(always)]
     fn fold(&self, first: &[f64], second: &[f64], spectrum: &mut [Complex<f64>]) {
         spectrum.fill(Complex::default());

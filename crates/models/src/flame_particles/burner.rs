@@ -2,6 +2,7 @@
 
 use bansho_base::{
     assets::Assets,
+    gravity::STANDARD_GRAVITY,
     math::{self, DVec3},
     mesh::SurfaceSampler,
     parameters::Auto,
@@ -14,8 +15,6 @@ use super::{
     parameters::{BurnerParameters, BurnerShape, FlameParticlesParameters},
 };
 
-/// Gravity, m/s^2.
-pub(crate) const GRAVITY: f64 = 9.81;
 /// Acceleration along the axis of a fire, m/s^2: half the square of the 6.8 in McCaffrey's `u = 6.8 sqrt(z)` (1979).
 const AXIS_ACCELERATION: f64 = 23.0;
 /// Speed of gas where it leaves the burner, in `sqrt(g D)`.
@@ -76,7 +75,7 @@ impl Burner {
         };
         let speed = match parameters.speed {
             Auto::Set(speed) => speed.max(1e-3),
-            Auto::Auto => BASE_FROUDE * math::sqrt(GRAVITY * size.diameter),
+            Auto::Auto => BASE_FROUDE * math::sqrt(STANDARD_GRAVITY * size.diameter),
         };
         Ok(Self {
             parameters: parameters.clone(),

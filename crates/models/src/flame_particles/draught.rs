@@ -8,7 +8,7 @@ use super::{narrowing::Axis, particles::Particles, puffing::Ring, turbulence::Ed
 use crate::lanes::{LANES, Lanes, Real};
 
 /// Particles of a task.
-const TASK: usize = 512;
+const PARTICLES_OF_TASK: usize = 512;
 
 /// What acts on the gas of one burner.
 pub(crate) struct Draught<'a> {
@@ -59,8 +59,8 @@ impl Draught<'_> {
 pub(crate) fn flows(draughts: &[Draught], particles: &Particles, flows: &mut Vec<Flow>) {
     flows.resize(particles.len(), Flow::default());
     let level = Level::new();
-    flows.par_chunks_mut(TASK).enumerate().for_each(|(task, flows)| {
-        dispatch!(level, simd => flows_of(simd, draughts, particles, task * TASK, flows));
+    flows.par_chunks_mut(PARTICLES_OF_TASK).enumerate().for_each(|(task, flows)| {
+        dispatch!(level, simd => flows_of(simd, draughts, particles, task * PARTICLES_OF_TASK, flows));
     });
 }
 

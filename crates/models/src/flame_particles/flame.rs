@@ -16,7 +16,7 @@ use bansho_base::{
 use super::{
     burner::Burner,
     design::Design,
-    draw::{self, Gas, PreparedGas, Sprite},
+    draw::{self, Gas, Memory, PreparedGas, SpriteStyle},
     fault::{ParticleFault, ParticleFaultKind},
     parameters::{FlameParticlesParameters, TemperatureLaw},
     particles::Particles,
@@ -35,6 +35,8 @@ pub struct FlameParticles {
     time: f64,
     /// Temperature of the air at the last step, K.
     air_temperature_k: f64,
+    /// What it draws with.
+    memory: Memory,
 }
 
 impl FlameParticles {
@@ -61,6 +63,7 @@ impl FlameParticles {
             time: -steps * parameters.step_s,
             air_temperature_k: bansho_base::air::Air::default().temperature_k,
             simulation: Simulation::new(&parameters, design, key),
+            memory: Memory::default(),
             parameters,
         })
     }
@@ -85,6 +88,7 @@ impl FlameParticles {
             base: place,
             size: DVec2::new(tallest.diameter, tallest.height),
             key: self.key,
+            memory: &self.memory,
         }
     }
 
@@ -126,8 +130,8 @@ impl Phenomenon for FlameParticles {
         let black = f64::from(color::luminance(color::black_body().radiance(hottest as f32)));
         let absorption = draw::soot_absorption(self.parameters.life.soot_ppm * 1e-6, &self.parameters.look);
         let emissivity = match self.parameters.look.sprite {
-            Sprite::Integral => -math::exp_m1(-absorption * 0.5 * self.tallest().diameter),
-            Sprite::Poly6 | Sprite::Squares => 1.0,
+            SpriteStyle::Integral => -math::exp_m1(-absorption * 0.5 * self.tallest().diameter),
+            SpriteStyle::Poly6 | SpriteStyle::Squares => 1.0,
         };
         BRIGHT * black * emissivity
     }

@@ -7,7 +7,7 @@ const SPECIFIC_HEAT: f32 = 1200.0;
 /// Stefan-Boltzmann constant, W/(m^2 K^4).
 const STEFAN_BOLTZMANN: f32 = 5.670_374e-8;
 /// Planck-mean absorption of soot, 1/(m K), per volume fraction (Tien 1968): `kappa = 1862 f_v T`.
-const SOOT_ABSORPTION: f32 = 1862.0;
+const PLANCK_MEAN_SOOT_ABSORPTION: f32 = 1862.0;
 /// Temperature deep inside the flame, where gas waits for air, as a share of that at its front.
 const INNER_TEMPERATURE: f32 = 0.72;
 /// Times faster than burning gas, whose own heat makes up for it, burnt gas cools by mixing.
@@ -108,7 +108,7 @@ impl Laws {
         }
         // 4 sigma kappa (T^4 - T_air^4) / (rho c_p), as a rate toward the air's temperature.
         let [square, air_square] = [temperature * temperature, exposure.air_temperature * exposure.air_temperature];
-        let absorption = SOOT_ABSORPTION * being.soot * temperature;
+        let absorption = PLANCK_MEAN_SOOT_ABSORPTION * being.soot * temperature;
         let rate = self.radiation
             * 4.0
             * STEFAN_BOLTZMANN

@@ -1,13 +1,16 @@
 //! Why flames narrow upward: gas that rises ever faster must draw together, since its volume stays.
 //!
-//! Where gas on the axis gains speed at the rate `du/dh`, continuity moves the gas around at `-(r/2) du/dh`; air enters a fire no faster than
-//! its entrainment allows, a share of the speed on the axis, and at the base about a fifth of `sqrt(g D)`. The axis is where the gas is: the mean place in each layer of height, so
-//! that it leans with the wind.
+//! Where gas on the axis gains speed at the rate `du/dh`, continuity moves the gas around at `-(r/2) du/dh`; air enters a fire no
+//! faster than its entrainment allows, a share of the speed on the axis, and at the base about a fifth of `sqrt(g D)`. The axis is
+//! where the gas is: the mean place in each layer of height, so that it leans with the wind.
 
-use bansho_base::math::{self, DVec3};
+use bansho_base::{
+    gravity::STANDARD_GRAVITY,
+    math::{self, DVec3},
+};
 use fearless_simd::{Simd, prelude::*};
 
-use super::burner::{Burner, GRAVITY};
+use super::burner::Burner;
 use crate::lanes::{LANES, Lanes, Real, wrap_split};
 
 /// Layers of height.
@@ -62,7 +65,7 @@ impl Axis {
             middle: [[base.x as f32, base.z as f32]; LAYERS + 1],
             speed_squared: (burner.speed * burner.speed) as f32,
             acceleration: burner.acceleration as f32,
-            inflow: (INFLOW_FROUDE * math::sqrt(GRAVITY * burner.diameter)) as f32,
+            inflow: (INFLOW_FROUDE * math::sqrt(STANDARD_GRAVITY * burner.diameter)) as f32,
             strength: strength as f32,
             reach: burner.diameter as f32,
         };

@@ -106,7 +106,8 @@ bansho_base::parameters! {
         support: f64 = 2.3, limits(Range::new(1.2, 6.0)), unit("distances");
         /// Density of reference rho_0, eq. (11), as a share of the density at the burner.
         rest_density: f64 = 0.8, limits(Range::new(0.0, 10.0));
-        /// Speed of sound, `sqrt(k)` of eq. (11) at the burner's temperature, in speeds of the gas there: how hard it resists being pressed.
+        /// Speed of sound, `sqrt(k)` of eq. (11) at the burner's temperature, in speeds of the gas there: how hard it resists being
+        /// pressed.
         stiffness: f64 = 1.2, limits(Range::new(0.0, 20.0));
         /// Kernel of the pressure force, eq. (12).
         force_kernel: ForceKernel = ForceKernel::Spiky;
@@ -152,7 +153,8 @@ bansho_base::parameters! {
         flame_temperature_k: f64 = 1900.0, limits(KELVIN), unit("K");
         /// How long it takes to heat up.
         heating_s: f64 = 0.03, limits(Range::new(1e-3, 10.0)), unit("s");
-        /// How much of the fuel's burning waits for air: 0 burns all gas alike, 1 burns what lies outside first, so that flames narrow upward.
+        /// How much of the fuel's burning waits for air: 0 burns all gas alike, 1 burns what lies outside first, so that flames
+        /// narrow upward.
         air_hunger: f64 = 0.75, limits(SHARE);
         /// Volume fraction of soot that forms in burning gas, in parts per million.
         soot_ppm: f64 = 1.2, limits(Range::new(0.0, 100.0)), unit("1e-6");
@@ -172,7 +174,8 @@ bansho_base::parameters! {
         position: [f64; 3] = [0.0, 0.0, 0.0], unit("m");
         /// Burners; where the list is empty, one that is all default.
         burners: Vec<BurnerParameters> = Vec::new(), limits(Length { min: 0, max: 200, item: () });
-        /// About how many particles live at a time, all burners together. More than 20 million are refused with the memory that they would take.
+        /// About how many particles live at a time, all burners together. More than 20 million are refused with the memory that
+        /// they would take.
         particles: i64 = 12_000, limits(Range::new(1.0, 1e12));
         /// Pressure and viscosity.
         fluid: FluidParameters = FluidParameters::default();

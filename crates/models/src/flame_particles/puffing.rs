@@ -1,9 +1,10 @@
 //! How a fire breathes: vortex rings that roll up around its base and rise with it.
 //!
 //! Puffing is driven, not emergent: air is not simulated, so the instability that sheds the rings cannot appear by itself. Each
-//! burner sheds a ring at every beat of the frequency that Cetegen and Ahmed (1993) measured, a little early or late, strong or weak.
-//! A ring draws gas in below itself (the neck) and pushes it up and out above (the bulge), as the photographs of their fires show.
-//! Its flow has the stream function `C r^2 (1 - s^2/c^2)^4` within the distance c of its middle and none beyond, so it is free of divergence.
+//! burner sheds a ring at every beat of the frequency that Cetegen and Ahmed (1993) measured, a little early or late, strong or
+//! weak. A ring draws gas in below itself (the neck) and pushes it up and out above (the bulge), as the photographs of their fires
+//! show. Its flow has the stream function `C r^2 (1 - s^2/c^2)^4` within the distance c of its middle and none beyond, so it is
+//! free of divergence.
 
 use bansho_base::{
     math::{DVec3, Vec3, cbrt},

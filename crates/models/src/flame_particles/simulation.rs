@@ -18,7 +18,8 @@ use super::{
 };
 use crate::sph::{Cells, KernelShape, PressureForce, PressureForm, StateEquation, densities, longest_step, sub_steps};
 
-/// Most sub-steps of a step.
+/// Most sub-steps of a step. Gas that would need more keeps its time and loses stiffness: `press` holds k where sound goes no further
+/// than a fifth of d in a sub-step, and `pushed` holds every force there.
 const MOST_SUB_STEPS: u32 = 3;
 /// Gas is never faster, m/s.
 pub(crate) const GREATEST_SPEED: f32 = 150.0;
@@ -33,7 +34,7 @@ const SURFACE_OFFSET: f32 = 0.2;
 /// Share of its own in a particle's density: from there on it counts as alone, fully after as much more.
 const ALONE_SHARE: [f32; 2] = [0.2, 0.5];
 /// Particles of a task.
-const TASK: usize = 512;
+const PARTICLES_OF_TASK: usize = 512;
 
 /// The gas and what it needs to move.
 #[derive(Clone, Debug)]
@@ -106,12 +107,16 @@ impl Simulation {
     }
 
     /// Sub-steps by the condition of Courant, Friedrichs and Lewy, for gas that moves with the gas beside it.
+    ///
+    /// No acceleration shortens them: buoyancy and wind move neighbours alike, pressure's is bounded by the sound that counts here, and
+    /// `pushed` holds what is left. The forces of the last step would also have to be part of every snapshot.
     fn sub_steps(&self, seconds: f32) -> u32 {
         let [u, v, w] = &self.particles.velocity;
         let square = |index: usize| u[index] * u[index] + v[index] * v[index] + w[index] * w[index];
         let greatest = |values: &(dyn Fn(usize) -> f32 + Sync)| {
-            let parts = (0..u.len()).into_par_iter().step_by(TASK);
-            let of_part = |first: usize| (first..(first + TASK).min(u.len())).map(values).fold(0.0, f32::max);
+            let parts = (0..u.len()).into_par_iter().step_by(PARTICLES_OF_TASK);
+            let of_part =
+                |first: usize| (first..(first + PARTICLES_OF_TASK).min(u.len())).map(values).fold(0.0, f32::max);
             parts.map(of_part).reduce(|| 0.0, f32::max)
         };
         let speed = greatest(&square).sqrt();
@@ -136,8 +141,8 @@ impl Simulation {
         moved.resize(self.particles.len(), Moved::default());
         let mover = Mover { simulation: &*self, weather: &weather, seconds, radius: self.cells.support_radius() };
         let level = Level::new();
-        moved.par_chunks_mut(TASK).enumerate().for_each(|(task, moved)| {
-            dispatch!(level, _simd => mover.move_all(task * TASK, moved));
+        moved.par_chunks_mut(PARTICLES_OF_TASK).enumerate().for_each(|(task, moved)| {
+            dispatch!(level, _simd => mover.move_all(task * PARTICLES_OF_TASK, moved));
         });
         self.take_over(&moved, seconds);
         self.moved = moved;
@@ -154,7 +159,12 @@ impl Simulation {
         let Particles { density, temperature, mass, .. } = &self.particles;
         let pressure =
             |(density, temperature): (&f32, &f32)| state.pressure((per_kelvin * temperature).min(most), *density);
-        density.par_iter().zip(temperature).with_min_len(TASK).map(pressure).collect_into_vec(&mut self.pressure);
+        density
+            .par_iter()
+            .zip(temperature)
+            .with_min_len(PARTICLES_OF_TASK)
+            .map(pressure)
+            .collect_into_vec(&mut self.pressure);
         self.force.accelerations(&self.cells, mass, density, &self.pressure, &mut self.acceleration);
     }
 
@@ -164,8 +174,8 @@ impl Simulation {
             &mut self.particles;
         let ([x, y, z], [u, v, w], [d, e, f]) = (position, velocity, drift);
         let arrays = [x, y, z, u, v, w, d, e, f, temperature, fuel, soot, support_radius, life, age];
-        let mut chunks = arrays.map(|values| values.chunks_mut(TASK));
-        let tasks = moved.chunks(TASK).map(|moved| (moved, chunks.each_mut().map(|chunks| chunks.next())));
+        let mut chunks = arrays.map(|values| values.chunks_mut(PARTICLES_OF_TASK));
+        let tasks = moved.chunks(PARTICLES_OF_TASK).map(|moved| (moved, chunks.each_mut().map(|chunks| chunks.next())));
         let tasks: Vec<_> = tasks.collect();
         tasks.into_par_iter().for_each(|(moved, columns)| {
             let mut columns = columns.map(Option::unwrap_or_default);
@@ -188,7 +198,7 @@ impl Simulation {
         let Particles { position, velocity, temperature, age, life, .. } = &self.particles;
         let keep: Vec<bool> = (0..age.len())
             .into_par_iter()
-            .with_min_len(TASK)
+            .with_min_len(PARTICLES_OF_TASK)
             .map(|index| {
                 let place = Vec3::from(position.each_ref().map(|values| values[index]));
                 let speed = Vec3::from(velocity.each_ref().map(|values| values[index])).length_squared();

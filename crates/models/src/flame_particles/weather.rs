@@ -2,6 +2,7 @@
 
 use bansho_base::{
     air::Air,
+    gravity::STANDARD_GRAVITY,
     math::{DVec3, Vec3},
     random::Key,
     surroundings::{Occluder, Surroundings},
@@ -9,7 +10,6 @@ use bansho_base::{
 
 use super::{
     breeze::Breeze,
-    burner::GRAVITY,
     design::Design,
     draught::Draught,
     narrowing::{Axis, axes},
@@ -73,7 +73,7 @@ impl<'a> Weather<'a> {
             occluders: &others.occluders,
             breeze: Breeze::new(wind, particles.origin, bounds(particles), t),
             air_temperature: air.temperature_k as f32,
-            buoyancy: (GRAVITY * flame.motion.buoyancy) as f32,
+            buoyancy: (STANDARD_GRAVITY * flame.motion.buoyancy) as f32,
             wind: flame.motion.wind,
             wind_gain: flame.motion.wind_gain as f32,
             density_kelvin: density_kelvin(air),

@@ -70,7 +70,8 @@ bansho_base::parameters! {
         /// h, eq. (11): slowest speed, at the edge, as a share of the fastest, on the axis.
         edge_speed: f64 = 0.55, limits(Range::new(0.02, 1.0));
         /// A(w), eq. (11): half width of the core that rises evenly, over height; 1 is the edge of the sheet.
-        core_width: Curve = curve(&[[0.0, 0.26], [0.1, 0.44], [0.22, 0.54], [0.5, 0.38], [1.0, 0.12]]), limits(CurveLimits::unit_to(0.01, 1.0));
+        core_width: Curve = curve(&[[0.0, 0.26], [0.1, 0.44], [0.22, 0.54], [0.5, 0.38], [1.0, 0.12]]),
+            limits(CurveLimits::unit_to(0.01, 1.0));
         /// D(w), eq. (11): width of the fringe that flutters, over height; begins at (0, 0). A + D must stay within 1.
         fringe_width: Curve = curve(&[[0.0, 0.0], [0.3, 0.22], [0.6, 0.42], [1.0, 0.4]]), limits(CurveLimits::default());
         /// 1 - F, eq. (11): how the gas slows across the fringe, from 0 at its inner edge to 1 at its outer one.
@@ -104,11 +105,13 @@ bansho_base::parameters! {
         /// Contrast of the texture: 1 as it is, towards 0 an even gas, as in a still candle.
         contrast: f64 = 1.0, limits(SHARE);
         /// V(w), eq. (4): threshold over height.
-        threshold: Curve = curve(&[[0.0, 0.0], [0.25, 0.08], [0.6, 0.42], [0.85, 0.75], [1.0, 1.0]]), limits(CurveLimits::default().rising());
+        threshold: Curve = curve(&[[0.0, 0.0], [0.25, 0.08], [0.6, 0.42], [0.85, 0.75], [1.0, 1.0]]),
+            limits(CurveLimits::default().rising());
         /// H(u), eq. (4): threshold over the distance from the axis, 0 on the axis to 1 at both edges.
         threshold_across: Curve = curve(&[[0.0, 0.0], [0.5, 0.1], [0.82, 0.45], [1.0, 1.0]]), limits(CurveLimits::default().rising());
         /// C(s), eq. (6): begins at (0, 0), peaks below s = 1 and falls after, so that the core is not flat.
-        sharpen: Curve = curve(&[[0.0, 0.0], [0.06, 0.22], [0.16, 0.48], [0.4, 0.82], [0.7, 1.0], [1.0, 0.86]]), limits(CurveLimits::default());
+        sharpen: Curve = curve(&[[0.0, 0.0], [0.06, 0.22], [0.16, 0.48], [0.4, 0.82], [0.7, 1.0], [1.0, 0.86]]),
+            limits(CurveLimits::default());
     }
 }
 

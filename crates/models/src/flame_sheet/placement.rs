@@ -189,7 +189,8 @@ fn meet(camera: &Camera, stand: &Stand, px: f64, py: f64) -> Option<[f64; 3]> {
 }
 
 /// Rays are traced for three pixels of a batch; a parabola through them misses the others by less than a thousandth of a pixel
-/// wherever the sheet is small in the lens, and pixels are traced one by one where one of the three sees nothing or the parabola bends much.
+/// wherever the sheet is small in the lens, and pixels are traced one by one where one of the three sees nothing or the parabola
+/// bends much.
 fn ray_batch(camera: &Camera, stand: &Stand, column: usize, row: usize) -> Traced {
     let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
     let mut batch = Traced { x: [0.0; LANES], y: [NOWHERE; LANES], depth: [BEYOND; LANES] };

@@ -9,8 +9,8 @@ use bansho_base::{
 
 use super::surface::fresnel;
 
-/// How the facets of wet ground lie at a place. Their slopes scatter with longer tails than Gaussian ones (Burley 2012: GTR with exponent 3), so that
-/// what shines brightly fades without an edge.
+/// How the facets of wet ground lie at a place. Their slopes scatter with longer tails than Gaussian ones (Burley 2012: GTR with
+/// exponent 3), so that what shines brightly fades without an edge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Facets {
     /// Slope of the film that is large enough to be seen.
@@ -22,8 +22,8 @@ pub(super) struct Facets {
 }
 
 impl Facets {
-    /// Radiance toward `viewer` for one lux from `light` on a plane that faces it: `F D G / (4 cos_viewer)` (Cook & Torrance 1982). The facets of a light that is
-    /// `width` wide lie so much further apart.
+    /// Radiance toward `viewer` for one lux from `light` on a plane that faces it: `F D G / (4 cos_viewer)` (Cook & Torrance 1982).
+    /// The facets of a light that is `width` wide lie so much further apart.
     fn lobe(&self, light: DVec3, viewer: DVec3, width: f64) -> f64 {
         let Some(half) = (light + viewer).try_normalize() else { return 0.0 };
         if light.y <= 0.0 || viewer.y <= 0.0 {

@@ -20,7 +20,8 @@ const DEVIATION: f64 = 0.34;
 /// One octave at a time, so that each can fade where it is too small to be seen.
 const SINGLE: Fractal = Fractal { octaves: 1, lacunarity: 2, gain: 0.5 };
 
-/// Bumps of a film of water: size of the largest, m, octaves, each half as large as the one before, and their share of the film's mean square slope.
+/// Bumps of a film of water: size of the largest, m, octaves, each half as large as the one before, and their share of the film's
+/// mean square slope.
 const BUMP: f64 = 0.15;
 const BUMPS: usize = 3;
 const BUMP_SHARE: f64 = 0.4;

@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use bansho_base::{
+    gravity::STANDARD_GRAVITY,
     math::{self, DVec2},
     random::{Key, Purpose, uniform_f64},
 };
@@ -13,8 +14,6 @@ const COUNT: usize = 14;
 const RANGE: f64 = 40.0;
 /// How far waves turn from the wind's direction at most.
 const SPREAD: f64 = 0.42 * PI;
-/// Standard gravity, m/s^2.
-const GRAVITY: f64 = 9.80665;
 
 /// One wave: slope = amplitude * cos(k . x - omega t + phase) along k.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +51,7 @@ impl Waves {
             let along = heading.rotate(unit((2.0 * turn - 1.0) * SPREAD));
             let number = TAU / length;
             // Deep water: omega^2 = g k.
-            let turns = whole_turns(math::sqrt(GRAVITY * number) / TAU, loop_s) * t;
+            let turns = whole_turns(math::sqrt(STANDARD_GRAVITY * number) / TAU, loop_s) * t;
             let each = slope * math::sqrt(2.0 / COUNT as f64);
             Wave { vector: along * number, length, phase: TAU * (phase - turns.rem_euclid(1.0)), slope: along * each }
         };

@@ -28,7 +28,8 @@ impl DropSizes {
     /// The distribution of Marshall and Palmer (1948) at rain rate R, eq. (1): `n = 8000 exp(-4.1 R^-0.21 D)`. Without rain it is empty.
     pub fn marshall_palmer(rate_mm_per_h: f64) -> Self {
         let rate = rate_mm_per_h.max(0.0);
-        Self::Exponential { slope_per_mm: if rate > 0.0 { 4.1 * math::pow(rate, -0.21) } else { f64::INFINITY } }
+        let exponent = if cfg!(feature = "broken-kernel") { 0.21 } else { -0.21 };
+        Self::Exponential { slope_per_mm: if rate > 0.0 { 4.1 * math::pow(rate, exponent) } else { f64::INFINITY } }
     }
 
     /// n(D), per m^3 per mm.

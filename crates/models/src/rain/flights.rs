@@ -77,8 +77,8 @@ impl Flights {
     }
 }
 
-/// By how much a lens that is focused on a metre or beyond spreads what is nearer, m at its place: the drop hides as much of the picture, but
-/// more thinly.
+/// By how much a lens that is focused on a metre or beyond spreads what is nearer, m at its place: the drop hides as much of the
+/// picture, but more thinly.
 #[inline(always)]
 fn blur(depth: f32) -> f32 {
     /// m.

@@ -57,8 +57,8 @@ impl Gusts {
         origins
     }
 
-    /// Least and greatest displacement along each axis within a box: between nodes it is straight along every axis, so the ends lie at nodes and
-    /// on the box's corners.
+    /// Least and greatest displacement along each axis within a box: between nodes it is straight along every axis, so the ends lie
+    /// at nodes and on the box's corners.
     fn range(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
         let ends = |axis: usize| {
             let node = |index: usize| (self.first[axis] + index as i64) as f64 * self.spacing;

@@ -152,8 +152,8 @@ impl Beam {
         }
     }
 
-    /// Illuminance at sixteen places from the camera over its intensity, what rain leaves of it, and where in the table of [`Scattering`] the
-    /// deviation toward the camera is.
+    /// Illuminance at sixteen places from the camera over its intensity, what rain leaves of it, and where in the table of
+    /// [`Scattering`] the deviation toward the camera is.
     #[inline(always)]
     fn arriving(&self, [xs, ys, zs]: &Vectors, extinction: f32) -> (Row, Row) {
         let (mut factors, mut steps) = (NOTHING, NOTHING);

@@ -6,6 +6,7 @@
 use std::f64::consts::TAU;
 
 use bansho_base::{
+    gravity::STANDARD_GRAVITY,
     math::{self, DVec3},
     random::{self, Purpose, uniform},
 };
@@ -27,8 +28,6 @@ const SQUARE: f64 = 0.5;
 const SQUARES_OF_PART: usize = 32;
 /// Length of a turn, s; no splash lasts longer.
 const TURN: f64 = 0.25;
-/// Fall acceleration, m/s^2.
-const GRAVITY: f64 = 9.81;
 /// Droplets of a splash: a ring, and some that fly higher.
 const RING: usize = 6;
 const HIGH: usize = 2;
@@ -162,17 +161,17 @@ impl Splashes<'_> {
         let turns = if high { random[0] } else { (index as f64 + 0.6 * random[0]) / RING as f64 };
         let elevation = if high { 1.2 + 0.3 * random[1] } else { 0.85 + 0.3 * random[1] };
         let speed = (if high { 1.1 } else { 0.75 }) * (0.7 + 0.6 * random[2]) * math::sqrt(0.5 * impact.diameter_mm);
-        let speed = (speed * self.parameters.speed).min(0.5 * GRAVITY * TURN);
+        let speed = (speed * self.parameters.speed).min(0.5 * STANDARD_GRAVITY * TURN);
         let ((sin_turn, cos_turn), (sin_up, cos_up)) = (math::sin_cos(TAU * turns), math::sin_cos(elevation));
         let velocity = DVec3::new(cos_turn * cos_up, sin_up, sin_turn * cos_up) * speed;
         let half = 0.5 * sight.exposure;
-        let landing = 2.0 * velocity.y / GRAVITY;
+        let landing = 2.0 * velocity.y / STANDARD_GRAVITY;
         let (from, to) = ((impact.age - half).max(0.0), (impact.age + half).min(landing));
         if from >= to {
             return;
         }
         let place = impact.place - sight.middle().position;
-        let at = |age: f64| place + velocity * age - DVec3::Y * (0.5 * GRAVITY * age * age);
+        let at = |age: f64| place + velocity * age - DVec3::Y * (0.5 * STANDARD_GRAVITY * age * age);
         let share = if half > 0.0 { (to - from) / (2.0 * half) } else { 1.0 };
         for (vectors, point) in [(&mut flights.from, at(from)), (&mut flights.to, at(to))] {
             (0..3).for_each(|axis| vectors[axis][index] = point[axis] as f32);

@@ -136,8 +136,8 @@ pub(crate) struct Veil<'a> {
 }
 
 impl<'a> Veil<'a> {
-    /// The veil of drops with extinctions `[all, drawn as streaks]` up to the first of `ends` (m), and to the second where there is no plate; `None` where
-    /// there is none. `sky` is what drops show of it, and itself.
+    /// The veil of drops with extinctions `[all, drawn as streaks]` up to the first of `ends` (m), and to the second where there is
+    /// no plate; `None` where there is none. `sky` is what drops show of it, and itself.
     pub(crate) fn new(
         moment: &Moment,
         lighting: &Lighting,
@@ -209,7 +209,8 @@ impl<'a> Veil<'a> {
         let opacities = span.depths.map(|depth| 1.0 - math::lanes::exp(-depth));
         let lit = mix(span.lit(&self.scattered, index), span.lit(&self.scattered, below), down);
         let [once, endless] = [0, 1].map(|k| mix(self.sky[k][index], self.sky[k][below], down));
-        // Up to opacity o rain shows `o (1 - o)` of what it scatters once, and `o^2` of what it scatters ever again: endless rain is the sky.
+        // Up to opacity o rain shows `o (1 - o)` of what it scatters once, and `o^2` of what it scatters ever again: endless rain
+        // is the sky.
         let again = opacities[0] + opacities[1];
         let sky: [f32; 3] = std::array::from_fn(|c| (once[c] + (endless[c] - once[c]) * again).max(0.0));
         let light: [f32; 3] = std::array::from_fn(|c| lit[c] + sky[c] * (1.0 - through));

@@ -1,9 +1,7 @@
 //! How fast drops fall in still air.
 
-use bansho_base::math;
+use bansho_base::{gravity::STANDARD_GRAVITY, math};
 
-/// Acceleration of free fall g, m/s^2.
-const GRAVITY: f64 = 9.80665;
 /// Density of water rho_p, kg/m^3.
 const WATER_DENSITY: f64 = 998.2;
 
@@ -173,13 +171,13 @@ pub fn reynolds(speed: f64, diameter_mm: f64, air: &Air) -> f64 {
 
 /// Velocity at which weight and the drag C are in balance, eq. (2).
 fn balance(diameter_mm: f64, drag: f64, air: &Air) -> f64 {
-    math::sqrt(4.0 * GRAVITY * 1e-3 * diameter_mm * (WATER_DENSITY - air.density) / (3.0 * air.density * drag))
+    math::sqrt(4.0 * STANDARD_GRAVITY * 1e-3 * diameter_mm * (WATER_DENSITY - air.density) / (3.0 * air.density * drag))
 }
 
 /// Stokes' velocity: the solution for C = 24/Re.
 fn stokes(diameter_mm: f64, air: &Air) -> f64 {
     let diameter = 1e-3 * diameter_mm;
-    GRAVITY * diameter * diameter * (WATER_DENSITY - air.density) / (18.0 * air.viscosity)
+    STANDARD_GRAVITY * diameter * diameter * (WATER_DENSITY - air.density) / (18.0 * air.viscosity)
 }
 
 /// Terminal velocity by the paper's iteration of (2)-(4), converged to one part in 1e12, m/s; 0 for no drop.

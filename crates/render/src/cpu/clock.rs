@@ -18,22 +18,9 @@ pub(super) struct Clock {
     pub(super) taken: u64,
 }
 
-/// Steps that make up the preroll.
-fn preroll_steps(phenomenon: &dyn Phenomenon) -> u64 {
-    phenomenon.stepping().map_or(0, |stepping| (stepping.preroll.max(0.0) / stepping.step).round() as u64)
-}
-
-/// Time of the state after `taken` steps, s.
-fn time(phenomenon: &dyn Phenomenon, taken: u64) -> Option<f64> {
-    let stepping = phenomenon.stepping()?;
-    Some((taken as f64 - preroll_steps(phenomenon) as f64) * stepping.step)
-}
-
-/// Steps after which the state is the last one not after `t`. A millionth of a step forgives rounding.
+/// Steps after which a phenomenon's state is the last one not after `t`; none for closed forms.
 pub(super) fn steps_until(phenomenon: &dyn Phenomenon, t: f64) -> u64 {
-    let Some(stepping) = phenomenon.stepping() else { return 0 };
-    let steps = (t / stepping.step + 1e-6).floor() + preroll_steps(phenomenon) as f64;
-    steps.max(0.0) as u64
+    phenomenon.stepping().map_or(0, |stepping| stepping.steps_until(t))
 }
 
 /// What phenomenon `index` is among during `shutter`.
@@ -101,7 +88,7 @@ pub(super) fn advance(
     loop {
         let behind = (0..phenomena.len())
             .filter(|&index| clocks[index].taken < steps_until(phenomena[index].as_ref(), t))
-            .filter_map(|index| Some((index, time(phenomena[index].as_ref(), clocks[index].taken)?)))
+            .filter_map(|index| Some((index, phenomena[index].stepping()?.time_after(clocks[index].taken))))
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((index, now)) = behind else { return Ok(()) };
         observer::check(observer)?;

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::{
     accumulate::Accumulator,
-    behind::{Behind, Source},
+    behind::{Behind, Sources},
     plate::PlateFrame,
 };
 use crate::{plan::Plan, scene::check::PLATE_LAYER, slices::Slice};
@@ -59,8 +59,8 @@ pub(super) struct Composition<'a> {
 struct Worker {
     strip: Strip,
     accumulator: Accumulator,
-    /// Where the light behind the strip comes from, if any is bent, and a row of it.
-    sources: Vec<Source>,
+    /// Where the light behind the strip comes from, where it is bent, and a row of it.
+    sources: Sources,
     row: Vec<[f32; 4]>,
 }
 
@@ -229,7 +229,13 @@ fn finish_strip(
             }
         }
         if let Some(colours) = behind.colour_row(rect, row, sources, buffer) {
-            lay_over(accumulator, pixels.start, colours, out);
+            match accumulator.transmittance() {
+                None => dispatch!(level, _simd => lay_behind(colours, out)),
+                Some(planes) => {
+                    let through = planes.each_ref().map(|plane| &plane[pixels.clone()]);
+                    dispatch!(level, _simd => lay_behind_absorbed(through, colours, out));
+                }
+            }
         }
         if let Some(depths) = behind.depth_row(rect, row, composition.view.size[0]) {
             depth.iter_mut().zip(depths).for_each(|(depth, behind)| *depth = depth.min(*behind));
@@ -253,13 +259,25 @@ fn expose_absorbed_row(exposure: f32, colour: [&[f32]; 3], through: [&[f32]; 3],
     }
 }
 
-fn lay_over(accumulator: &Accumulator, start: usize, behind: &[[f32; 4]], out: &mut [[f32; 4]]) {
-    for (x, (out, behind)) in out.iter_mut().zip(behind).enumerate() {
-        let through = accumulator.transmittance_at(start + x);
-        for c in 0..3 {
-            out[c] = through[c].fused(behind[c], out[c]);
+/// Puts behind a row what is there, where nothing absorbs.
+#[inline(always)]
+fn lay_behind(behind: &[[f32; 4]], out: &mut [[f32; 4]]) {
+    for (out, behind) in out.iter_mut().zip(behind) {
+        let share = [1.0, 1.0, 1.0, 1.0 - out[3]];
+        for c in 0..4 {
+            out[c] = share[c].fused(behind[c], out[c]);
         }
-        out[3] = (1.0 - out[3]).fused(behind[3], out[3]);
+    }
+}
+
+/// The same where something absorbs.
+#[inline(always)]
+fn lay_behind_absorbed([red, green, blue]: [&[f32]; 3], behind: &[[f32; 4]], out: &mut [[f32; 4]]) {
+    for ((((out, behind), red), green), blue) in out.iter_mut().zip(behind).zip(red).zip(green).zip(blue) {
+        let share = [*red, *green, *blue, 1.0 - out[3]];
+        for c in 0..4 {
+            out[c] = share[c].fused(behind[c], out[c]);
+        }
     }
 }
 
@@ -271,7 +289,12 @@ fn channel_planes(composition: &Composition, worker: &mut Worker) -> Vec<Vec<f32
     let rules = composition.phenomena.iter().flat_map(|phenomenon| phenomenon.aovs()).map(|aov| aov.rule);
     let behind = composition.behind.channels.get(layers..).unwrap_or_default();
     for ((plane, behind), rule) in planes[layers..].iter_mut().zip(behind).zip(rules) {
-        let values = composition.behind.plane(&behind.values, worker.accumulator.rect, &[], composition.view.size[0]);
+        let values = composition.behind.plane(
+            &behind.values,
+            worker.accumulator.rect,
+            &Sources::default(),
+            composition.view.size[0],
+        );
         plane.iter_mut().zip(values).for_each(|(own, behind)| *own = nearest_aov(*own, behind, rule));
     }
     planes

@@ -1,6 +1,6 @@
 //! Changing a scene's text while its comments survive: `--set`, and `upgrade`.
 
-use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, TableLike, Value};
+use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 
 use super::{FORMAT, SHARED_TABLES};
 
@@ -46,8 +46,8 @@ pub enum EditError {
 
 /// The text with `assignment` carried out: `key.path=value`.
 ///
-/// The value is TOML; a bare word is a string. Of several phenomena of a kind, a number or a name picks one
-/// (`rain.0.rate_mm_per_h`, `flame_sheet.left log.height`); without it all are meant.
+/// The value is TOML; a bare word is a string. Of the tables of a list a number or a name picks one (`rain.0.rate_mm_per_h`,
+/// `flame_sheet.left log.height`, `flame_particles.0.burners.2.speed`); without it all are meant.
 ///
 /// # Errors
 /// The text is no TOML, the assignment is malformed, or the path leads nowhere.
@@ -58,18 +58,10 @@ pub fn set(text: &str, assignment: &str) -> Result<String, EditError> {
     let segments: Vec<&str> = path.split('.').map(str::trim).collect();
     let root = document.as_table_mut();
     ensure_shared_table(root, &segments);
-    let there = keys(root);
-    match root.get_mut(segments[0]) {
-        Some(Item::ArrayOfTables(tables)) if segments.len() > 1 => {
-            for (index, rest) in chosen(tables, &segments[1..], path)? {
-                if let Some(table) = tables.get_mut(index) {
-                    set_in(table, rest, &value, path)?;
-                }
-            }
-        }
-        None if segments.len() > 1 => return Err(nowhere(path, segments[0], &there)),
-        _ => set_in(root, &segments, &value, path)?,
+    if segments.len() > 1 && !root.contains_key(segments[0]) {
+        return Err(nowhere(path, segments[0], keys(root)));
     }
+    set_in(root, &segments, &value, path)?;
     let edited = document.to_string();
     // A value nested nearly as deep as readers go may lie too deep in the scene.
     match edited.parse::<DocumentMut>() {
@@ -108,48 +100,13 @@ fn ensure_shared_table(root: &mut Table, segments: &[&str]) {
     }
 }
 
-/// The tables of a list that the path means, each with what is left of the path.
-fn chosen<'a>(
-    tables: &ArrayOfTables,
-    segments: &'a [&'a str],
-    path: &str,
-) -> Result<Vec<(usize, &'a [&'a str])>, EditError> {
-    if segments.len() < 2 {
-        return Ok((0..tables.len()).map(|index| (index, segments)).collect());
-    }
-    let name = |table: &Table| table.get("name").and_then(Item::as_str).map(str::to_owned);
-    let by_name = tables.iter().position(|table| name(table).as_deref() == Some(segments[0]));
-    let by_number = segments[0].parse::<usize>().ok();
-    match by_name.or(by_number) {
-        Some(index) if index < tables.len() => Ok(vec![(index, &segments[1..])]),
-        None if tables.iter().any(|table| table.contains_key(segments[0])) => {
-            Ok((0..tables.len()).map(|index| (index, segments)).collect())
-        }
-        None if name_like(segments[0]) => Ok((0..tables.len()).map(|index| (index, segments)).collect()),
-        _ => {
-            let names: Vec<String> = tables.iter().filter_map(name).collect();
-            Err(nowhere(path, segments[0], &format!("0 to {} or {}", tables.len() - 1, names.join(", "))))
-        }
-    }
-}
-
-/// Whether a segment looks like a key of a sub-table rather than like a phenomenon's name or number.
-fn name_like(segment: &str) -> bool {
-    segment.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_')
-        && !segment.bytes().all(|byte| byte.is_ascii_digit())
-}
-
+/// Sets the value at what is left of a path within a table. Tables on the way are made; items of lists are not.
 fn set_in(table: &mut dyn TableLike, segments: &[&str], value: &Value, path: &str) -> Result<(), EditError> {
     match segments {
         [] => Err(EditError::NoAssignment(path.to_owned())),
         [key] => {
             match table.get_mut(key) {
-                // Keeps the comment behind the old value.
-                Some(Item::Value(old)) => {
-                    let decor = old.decor().clone();
-                    *old = value.clone();
-                    *old.decor_mut() = decor;
-                }
+                Some(Item::Value(old)) => replace(old, value),
                 _ => {
                     table.insert(key, Item::Value(value.clone()));
                 }
@@ -158,22 +115,96 @@ fn set_in(table: &mut dyn TableLike, segments: &[&str], value: &Value, path: &st
         }
         [key, rest @ ..] => {
             if !table.contains_key(key) {
+                if number(rest[0]).is_some() {
+                    return Err(nowhere(path, key, keys(table)));
+                }
                 table.insert(key, Item::Value(toml_edit::InlineTable::new().into()));
             }
-            match table.get_mut(key).and_then(Item::as_table_like_mut) {
-                Some(inner) => set_in(inner, rest, value, path),
-                None => Err(nowhere(path, rest[0], &format!("`{key}`, which is no table"))),
+            match table.get_mut(key) {
+                Some(Item::ArrayOfTables(tables)) => {
+                    let tables = tables.iter_mut().map(|table| table as &mut dyn TableLike).collect();
+                    set_in_list(tables, rest, value, path)
+                }
+                Some(Item::Value(Value::Array(items))) => set_in_items(items, rest, value, path),
+                Some(item) => match item.as_table_like_mut() {
+                    Some(inner) => set_in(inner, rest, value, path),
+                    None => Err(nowhere(path, rest[0], format!("`{key}`, which is no table"))),
+                },
+                None => Err(nowhere(path, key, String::new())),
             }
         }
     }
 }
 
-fn keys(table: &Table) -> String {
+/// The same within a list that stands in a line: of tables, or of plain values, of which a number picks one.
+fn set_in_items(items: &mut Array, segments: &[&str], value: &Value, path: &str) -> Result<(), EditError> {
+    if !items.is_empty() && items.iter().all(Value::is_inline_table) {
+        let tables = items.iter_mut().filter_map(Value::as_inline_table_mut);
+        return set_in_list(tables.map(|table| table as &mut dyn TableLike).collect(), segments, value, path);
+    }
+    let there = numbered(items.len(), "value");
+    match (number(segments[0]).and_then(|index| items.get_mut(index)), segments.len()) {
+        (Some(item), 1) => {
+            replace(item, value);
+            Ok(())
+        }
+        _ => Err(nowhere(path, segments[0], there)),
+    }
+}
+
+/// The same within one of a list of tables, or within all of them where the path picks none.
+fn set_in_list(tables: Vec<&mut dyn TableLike>, segments: &[&str], value: &Value, path: &str) -> Result<(), EditError> {
+    let names: Vec<Option<String>> = tables.iter().map(|table| name(&**table)).collect();
+    let first = segments[0];
+    let by_name = names.iter().position(|name| segments.len() > 1 && name.as_deref() == Some(first));
+    let (picked, rest) = match by_name.or_else(|| number(first)) {
+        Some(index) if index < tables.len() => (Some(index), &segments[1..]),
+        None if name_like(first) || tables.iter().any(|table| table.contains_key(first)) => (None, segments),
+        _ => {
+            let names = names.into_iter().flatten().map(|name| format!(" or {name}"));
+            return Err(nowhere(path, first, numbered(tables.len(), "table") + &names.collect::<String>()));
+        }
+    };
+    let mut meant = tables.into_iter().enumerate().filter(|(index, _)| picked.is_none_or(|picked| picked == *index));
+    meant.try_for_each(|(_, table)| set_in(table, rest, value, path))
+}
+
+/// Replaces a value; the space and the comment around it stay.
+fn replace(old: &mut Value, value: &Value) {
+    let decor = old.decor().clone();
+    *old = value.clone();
+    *old.decor_mut() = decor;
+}
+
+fn name(table: &dyn TableLike) -> Option<String> {
+    table.get("name").and_then(Item::as_str).map(str::to_owned)
+}
+
+fn number(segment: &str) -> Option<usize> {
+    segment.parse().ok()
+}
+
+/// Whether a segment looks like a key rather than like a phenomenon's name or number.
+fn name_like(segment: &str) -> bool {
+    let key_like = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_';
+    number(segment).is_none() && segment.bytes().all(key_like)
+}
+
+/// The items that a list has.
+fn numbered(count: usize, what: &str) -> String {
+    match count {
+        0 => format!("no {what} in it"),
+        1 => format!("{what} 0"),
+        _ => format!("{what} 0 to {}", count - 1),
+    }
+}
+
+fn keys(table: &dyn TableLike) -> String {
     table.iter().map(|(key, _)| key).collect::<Vec<_>>().join(", ")
 }
 
-fn nowhere(path: &str, segment: &str, there: &str) -> EditError {
-    EditError::NoSuchPlace { path: path.to_owned(), segment: segment.to_owned(), there: there.to_owned() }
+fn nowhere(path: &str, segment: &str, there: String) -> EditError {
+    EditError::NoSuchPlace { path: path.to_owned(), segment: segment.to_owned(), there }
 }
 
 /// The text in the newest format; `None` where it is that already.
@@ -236,6 +267,37 @@ mod tests {
         assert!(matches!(set(SCENE, &deep), Err(EditError::NoAssignment(_))));
         let nested = format!("picture.a.b.c.d={}{}", "[".repeat(78), "]".repeat(78));
         assert!(matches!(set(SCENE, &nested), Err(EditError::NoAssignment(_))));
+    }
+
+    #[test]
+    fn lists_of_tables_within_tables_are_reached_in_both_ways_of_writing_them() {
+        let headed = "bansho = 1\n[[flame_particles]]\n[[flame_particles.burners]]\nspeed = 1 # slow\n\
+                      [[flame_particles.burners]]\n";
+        let in_a_line = "bansho = 1\n[[flame_particles]]\nburners = [{ speed = 1 }, { }]\n";
+        for scene in [headed, in_a_line] {
+            let text = set(scene, "flame_particles.0.burners.0.speed=2.5").unwrap();
+            assert_eq!((text.matches("speed = 2.5").count(), text.matches("speed").count()), (1, 1), "{text}");
+            let text = set(scene, "flame_particles.burners.1.diameter=0.2").unwrap();
+            assert!(text.contains("speed = 1") && text.matches("diameter = 0.2").count() == 1, "{text}");
+            assert_eq!(set(scene, "flame_particles.burners.speed=3").unwrap().matches("speed = 3").count(), 2);
+            let beyond = set(scene, "flame_particles.0.burners.2.speed=1").unwrap_err().to_string();
+            assert!(beyond.contains("burners.2.speed`: 2 is not in the scene; there is: table 0 to 1"), "{beyond}");
+            let whole = set(scene, "flame_particles.0.burners.0=1");
+            assert!(matches!(whole, Err(EditError::NoAssignment(_))), "{whole:?}");
+        }
+        assert!(set(headed, "flame_particles.0.burners.0.speed=2").unwrap().contains("speed = 2 # slow"));
+        let none = set("bansho = 1\n[[flame_particles]]\nsmoke = 1\n", "flame_particles.0.burners.0.speed=1");
+        let none = none.unwrap_err().to_string();
+        assert!(none.contains("burners is not in the scene; there is: smoke"), "{none}");
+    }
+
+    #[test]
+    fn single_values_of_lists_are_reached_by_number() {
+        assert!(set(SCENE, "picture.size.1=9").unwrap().contains("size = [64, 9] # small"));
+        for path in ["picture.size.2", "picture.size.x", "picture.size.0.x"] {
+            let error = set(SCENE, &format!("{path}=1")).unwrap_err().to_string();
+            assert!(error.contains("there is: value 0 to 1"), "{error}");
+        }
     }
 
     #[test]

@@ -54,6 +54,8 @@ pub struct PhenomenonKind {
     pub read: fn(&Table, &mut Reader) -> Box<dyn Source>,
     /// Whether it is in the sky: where all is, a camera that is told nothing looks up.
     pub in_the_sky: bool,
+    /// What a new scene of it states so that it is seen well, as a scene file says it.
+    pub setting: &'static str,
 }
 
 /// Keys that every phenomenon has beside its own.
@@ -65,6 +67,8 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     const KEY: &'static str;
     /// See [`PhenomenonKind::in_the_sky`].
     const IN_THE_SKY: bool = false;
+    /// What a new scene of it states so that it is seen well, as a scene file says it; nothing where all defaults do.
+    const SETTING: &'static str = "";
 
     /// Makes the phenomenon.
     ///
@@ -78,6 +82,7 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
         table: <Self as Parameters>::table,
         read: read_described::<Self>,
         in_the_sky: Self::IN_THE_SKY,
+        setting: Self::SETTING,
     };
 }
 

@@ -1,42 +1,70 @@
-//! New scenes: every parameter with its default, its unit and what it is for, ready to be uncommented.
+//! New scenes: every parameter with its unit and what it is for, stated where the phenomenon is seen the better for it, and else a comment
+//! with its default, ready to be uncommented.
 
-use bansho_base::parameters::{Descriptor, Kind, TableDescriptor, Value};
+use bansho_base::parameters::{Descriptor, Kind, Table, TableDescriptor, Value};
 
-use super::{FORMAT, PhenomenonKind, SHARED_TABLES};
+use super::{FORMAT, PhenomenonKind, SHARED_TABLES, toml};
 
-/// A scene with one phenomenon of `kind`, all defaults, each parameter explained in a comment.
+/// Shared tables that a scene need not have, and has only where the phenomenon's setting does.
+const OPTIONAL: [&str; 5] = ["plate", "sky", "ground", "light", "obstacle"];
+
+/// A scene with one phenomenon of `kind` in its setting, each parameter explained in a comment.
 pub fn commented(kind: &PhenomenonKind) -> String {
+    // A test holds that settings can be read.
+    let setting = toml::parse(kind.setting).unwrap_or_default();
     let mut text = format!("bansho = {FORMAT}   # format version\n");
-    let optional = ["plate", "sky", "ground"];
-    for shared in SHARED_TABLES.iter().filter(|shared| !shared.many && !optional.contains(&shared.key)) {
-        table(&mut text, &format!("[{}]", shared.key), (shared.table)());
+    for shared in SHARED_TABLES {
+        let stated = tables(&setting, shared.key);
+        if stated.is_empty() && !OPTIONAL.contains(&shared.key) {
+            table(&mut text, &format!("[{}]", shared.key), (shared.table)(), &Table::default());
+        }
+        for stated in stated {
+            let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+            table(&mut text, &header, (shared.table)(), stated);
+        }
     }
-    table(&mut text, &format!("[[{}]]", kind.key), (kind.table)());
+    let stated = tables(&setting, kind.key).first().copied().cloned().unwrap_or_default();
+    table(&mut text, &format!("[[{}]]", kind.key), (kind.table)(), &stated);
     text
 }
 
-fn table(text: &mut String, header: &str, descriptor: &TableDescriptor) {
-    text.push('\n');
-    comment(text, "", &descriptor.doc);
-    text.push_str(header);
-    text.push('\n');
-    parameters(text, "", descriptor);
-}
-
-fn parameters(text: &mut String, prefix: &str, descriptor: &TableDescriptor) {
-    for parameter in &descriptor.parameters {
-        text.push('\n');
-        comment(text, "", &explanation(parameter));
-        match (&parameter.kind, &parameter.default) {
-            (Kind::Table(inner), _) => parameters(text, &format!("{prefix}{}.", parameter.key), inner()),
-            (_, Some(default)) => line(text, prefix, parameter.key, default),
-            (_, None) => text.push_str(&format!("# {prefix}{} =\n", parameter.key)),
+/// The table or tables that are stated under a key.
+fn tables<'a>(setting: &'a Table, key: &str) -> Vec<&'a Table> {
+    match setting.get(key).map(|node| &node.value) {
+        Some(Value::Table(table)) => vec![table],
+        Some(Value::List(items)) => {
+            let table = |value: &'a Value| if let Value::Table(table) = value { Some(table) } else { None };
+            items.iter().filter_map(|item| table(&item.value)).collect()
         }
+        _ => Vec::new(),
     }
 }
 
-fn line(text: &mut String, prefix: &str, key: &str, default: &Value) {
-    text.push_str(&format!("# {prefix}{key} = {default}\n"));
+fn table(text: &mut String, header: &str, descriptor: &TableDescriptor, stated: &Table) {
+    text.push('\n');
+    comment(text, &descriptor.doc);
+    text.push_str(header);
+    text.push('\n');
+    parameters(text, "", descriptor, stated);
+}
+
+fn parameters(text: &mut String, prefix: &str, descriptor: &TableDescriptor, stated: &Table) {
+    for parameter in &descriptor.parameters {
+        text.push('\n');
+        comment(text, &explanation(parameter));
+        let key = parameter.key;
+        let own = stated.get(key).map(|node| &node.value);
+        match (&parameter.kind, own, &parameter.default) {
+            (Kind::Table(inner), own, _) => {
+                let nothing = Table::default();
+                let own = if let Some(Value::Table(own)) = own { own } else { &nothing };
+                parameters(text, &format!("{prefix}{key}."), inner(), own);
+            }
+            (_, Some(value), _) => text.push_str(&format!("{prefix}{key} = {value}\n")),
+            (_, None, Some(default)) => text.push_str(&format!("# {prefix}{key} = {default}\n")),
+            (_, None, None) => text.push_str(&format!("# {prefix}{key} =\n")),
+        }
+    }
 }
 
 fn explanation(parameter: &Descriptor) -> String {
@@ -49,7 +77,7 @@ fn explanation(parameter: &Descriptor) -> String {
 }
 
 /// Comment lines, broken between words.
-fn comment(text: &mut String, indent: &str, words: &str) {
+fn comment(text: &mut String, words: &str) {
     const WIDTH: usize = 110;
     let mut length = WIDTH;
     for word in words.split_whitespace() {
@@ -57,7 +85,7 @@ fn comment(text: &mut String, indent: &str, words: &str) {
             if !text.ends_with('\n') {
                 text.push('\n');
             }
-            text.push_str(&format!("{indent}#"));
+            text.push('#');
             length = 1;
         }
         text.push(' ');

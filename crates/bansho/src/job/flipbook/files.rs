@@ -143,7 +143,12 @@ impl Files {
         };
         let colour = match self.is_linear() {
             true => {
-                json!({ "file": name(&self.sheet_path("colour")), "space": "ACEScg", "alpha": "premultiplied", "exposure_ev100": plan.exposure_ev100 })
+                json!({
+                    "file": name(&self.sheet_path("colour")),
+                    "space": "ACEScg",
+                    "alpha": "premultiplied",
+                    "exposure_ev100": plan.exposure_ev100,
+                })
             }
             false => json!({ "file": name(&self.sheet_path("colour")), "space": "sRGB", "alpha": "straight" }),
         };

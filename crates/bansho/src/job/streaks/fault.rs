@@ -11,10 +11,10 @@ use super::Streaks;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ListKind {
     /// Rain rates.
-    #[error("--rates")]
+    #[error("rain rates")]
     Rates,
     /// Drop diameters.
-    #[error("--diameters")]
+    #[error("drop diameters")]
     Diameters,
 }
 
@@ -65,23 +65,23 @@ pub enum StreaksFault {
         before: f64,
     },
     /// An exposure of no time, or a very long one.
-    #[error("--exposure: {0} s; allowed: 0.000001 to 10 s")]
+    #[error("an exposure of {0} s; allowed: 0.000001 to 10 s")]
     Exposure(f64),
     /// A texture too small or too large.
-    #[error("--size: {0} pixels; allowed: 8 to 4096")]
+    #[error("textures of {0} pixels a side; allowed: 8 to 4096")]
     Size(usize),
     /// A cube too small or too large.
-    #[error("--box: {0} m; allowed: 0.001 to 100 m")]
+    #[error("a box of {0} m; allowed: 0.001 to 100 m")]
     Edge(f64),
     /// No variant, or very many.
-    #[error("--variants: {0}; allowed: 1 to 1000")]
+    #[error("{0} variants; allowed: 1 to 1000")]
     Variants(u32),
     /// A light from nowhere.
-    #[error("--light: the vector toward the light must have a length")]
+    #[error("the vector toward the light must have a length")]
     Light,
     /// More drops than an index can list.
     #[error(
-        "a texture at {rate} mm/h and {diameter_mm} mm would hold {drops:.0} drops; allowed: up to {MOST_DROPS}, so choose a smaller --box"
+        "a texture at {rate} mm/h and {diameter_mm} mm would hold {drops:.0} drops; allowed: up to {MOST_DROPS}, so choose a smaller box"
     )]
     Drops {
         /// Rain rate, mm/h.
@@ -92,7 +92,7 @@ pub enum StreaksFault {
         drops: f64,
     },
     /// The paper's formula has no velocity for a diameter.
-    #[error("--velocity formula: {0}; `measured` knows all diameters")]
+    #[error("{0}; measured velocities know all diameters")]
     Velocity(NoTerminalVelocity),
 }
 

@@ -116,16 +116,24 @@ fn how_to_read(streaks: &Streaks, writer: &Writer) -> Value {
         "pixel": pixel,
         "opacity": "share of the pixel that drops hide, averaged over the exposure; laid over a picture: picture * (1 - opacity) + drops",
         "tiling": "the texture repeats in both directions: a streak that leaves at an edge enters at the opposite one",
-        "axes": "position_m is right, up, toward the viewer, from the lower left far corner; the drop's middle when the shutter opens, from where it falls straight down by length_m",
-        "drop": "a round, steady drop: opacity 2 sqrt(r^2 - b^2) / (v T) at distance b from the axis, `opacity` on it and `mean_opacity` across it; it hides (pi/4) D^2 whatever the exposure",
-        "rain": "Marshall and Palmer 1948: 8000 exp(-4.1 R^-0.21 D) drops per m^3 and mm; with these velocities it brings down 14 to 18 % more than R",
-        "extinction": "extinction_per_m counts what drops hide (Q = 1) over all diameters; visibility_m counts diffraction too (Q = 2), to 2 % of contrast",
+        "axes": "position_m is right, up, toward the viewer, from the lower left far corner; \
+                 the drop's middle when the shutter opens, from where it falls straight down by length_m",
+        "drop": "a round, steady drop: opacity 2 sqrt(r^2 - b^2) / (v T) at distance b from the axis, `opacity` on it and \
+                 `mean_opacity` across it; it hides (pi/4) D^2 whatever the exposure",
+        "rain": "Marshall and Palmer 1948: 8000 exp(-4.1 R^-0.21 D) drops per m^3 and mm; \
+                 with these velocities it brings down 14 to 18 % more than R",
+        "extinction": "extinction_per_m counts what drops hide (Q = 1) over all diameters; \
+                       visibility_m counts diffraction too (Q = 2), to 2 % of contrast",
     });
     if writer.light.is_some() {
         let lit = match streaks.format {
-            StreakFormat::Exr => "R, G, B: radiance for illuminance 1 on a plane that faces the light, premultiplied",
+            StreakFormat::Exr => {
+                "R, G, B: radiance for illuminance 1 on a plane \
+                 that faces the light, premultiplied"
+            }
             StreakFormat::Png => {
-                "lit.file: radiance = code / largest code * radiance_scale for illuminance 1 on a plane that faces the light, premultiplied, linear ACEScg"
+                "lit.file: radiance = code / largest code * radiance_scale for illuminance 1 on a plane \
+                 that faces the light, premultiplied, linear ACEScg"
             }
         };
         about["lit"] = json!(lit);

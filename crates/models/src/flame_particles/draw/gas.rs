@@ -6,7 +6,7 @@ use bansho_base::{
     random::Key,
 };
 
-use super::look::LookParameters;
+use super::{look::LookParameters, memory::Memory};
 use crate::flame_particles::Particles;
 
 /// The gas of one flame at one moment, with what the drawing needs to know of its surroundings.
@@ -26,10 +26,13 @@ pub struct Gas<'a> {
     pub size: DVec2,
     /// Key of the flame's random numbers.
     pub key: Key,
+    /// Memory to draw with, from frame to frame.
+    pub memory: &'a Memory,
 }
 
-/// Absorption of soot, 1/m, per volume fraction: about `4.9 / lambda` (Dalzell & Sarofim 1969), for green light.
-const SOOT_ABSORPTION: f64 = 4.9 / 550e-9;
+/// Absorption coefficient of soot for visible light, 1/m, per volume fraction: about `4.9 / lambda` (Dalzell & Sarofim 1969), for
+/// green light.
+const VISIBLE_SOOT_ABSORPTION: f64 = 4.9 / 550e-9;
 
 /// Luminance of a metre of freshly burning gas in the light of CH and C2, cd/m^2. The zone that shines is a film of a millimetre with
 /// some tens; particles spread it over centimetres.
@@ -41,7 +44,7 @@ const BEGUN: f64 = 0.06;
 /// Absorption coefficient of soot of a volume fraction, 1/m.
 #[inline(always)]
 pub fn soot_absorption(volume_fraction: f64, look: &LookParameters) -> f64 {
-    volume_fraction * SOOT_ABSORPTION * look.soot_gain
+    volume_fraction * VISIBLE_SOOT_ABSORPTION * look.soot_gain
 }
 
 impl Gas<'_> {

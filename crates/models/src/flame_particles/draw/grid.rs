@@ -3,15 +3,20 @@
 use bansho_base::image::Rect;
 use rayon::prelude::*;
 
-use super::spline;
+use super::{
+    memory::{Memory, Recycled},
+    spline,
+};
 
-/// Cells around what is covered that interpolation looks at.
+/// Cells around what is covered that interpolation and the filter before it look at: two and two.
 const MARGIN: i32 = 4;
+/// The same where coarser grids are added, each of which is looked at as far beyond the finer one.
+const NESTED_MARGIN: i32 = 7;
 
-/// Where the cells of a grid lie: cell (i, j) has its middle at `(i + 1/2) size` pixels of the whole picture, whatever part of it is
+/// Where cells lie over the picture: cell (i, j) has its middle at `(i + 1/2) size` pixels of the whole picture, whatever part of it is
 /// drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Cells {
+pub(crate) struct Raster {
     /// Side of a cell, pixels.
     pub(crate) size: usize,
     /// The first column and row of cells, counted from the picture's corner.
@@ -20,11 +25,12 @@ pub(crate) struct Cells {
     pub(crate) rows: usize,
 }
 
-impl Cells {
-    /// The cells of `size` pixels that hold `rect` with a margin.
-    pub(crate) fn around(rect: Rect, size: usize) -> Self {
-        let low = [rect.x, rect.y].map(|value| (value / size) as i32 - MARGIN);
-        let high = [rect.right(), rect.bottom()].map(|value| (value / size) as i32 + 1 + MARGIN);
+impl Raster {
+    /// The cells of `size` pixels that hold `rect` with a margin; a grid among coarser and finer ones is `nested`.
+    pub(crate) fn around(rect: Rect, size: usize, nested: bool) -> Self {
+        let margin = if nested { NESTED_MARGIN } else { MARGIN };
+        let low = [rect.x, rect.y].map(|value| (value / size) as i32 - margin);
+        let high = [rect.right(), rect.bottom()].map(|value| (value / size) as i32 + 1 + margin);
         Self { size, first: low, columns: (high[0] - low[0]) as usize, rows: (high[1] - low[1]) as usize }
     }
 
@@ -55,22 +61,33 @@ impl Cells {
 
 /// Values over cells: those of a cell lie side by side, so that one vector adds all of a sprite to it.
 #[derive(Debug)]
-pub(crate) struct Grid {
-    pub(crate) cells: Cells,
+pub(crate) struct Grid<'a> {
+    pub(crate) cells: Raster,
     /// Values of a cell.
     pub(crate) depth: usize,
-    values: Vec<f32>,
+    values: Recycled<'a, f32>,
     /// Where they begin: so that no cell of eight lies across two lines of the cache.
     start: usize,
 }
 
-impl Grid {
-    pub(crate) fn new(cells: Cells, depth: usize) -> Self {
+impl<'a> Grid<'a> {
+    /// A grid of any values: whoever asks for it fills all its rows.
+    pub(crate) fn new(cells: Raster, depth: usize, memory: &'a Memory) -> Self {
         /// A line of the cache, bytes.
         const LINE: usize = 64;
-        let values = vec![0.0; cells.columns * cells.rows * depth + LINE / size_of::<f32>()];
+        let count = cells.columns * cells.rows * depth + LINE / size_of::<f32>();
+        let mut values = memory.list(count);
+        if values.len() < count {
+            // Zeros of the system's that nobody touches before they are wanted.
+            *values = vec![0.0; values.capacity()];
+        }
         let start = values.as_ptr().align_offset(LINE).min(LINE / size_of::<f32>());
         Self { cells, depth, values, start }
+    }
+
+    /// Where it came from.
+    pub(crate) fn memory(&self) -> &'a Memory {
+        self.values.memory()
     }
 
     /// All values.
@@ -118,7 +135,7 @@ impl Grid {
 
     /// One value a cell: the sum over its layers of one of each layer's `planes` values.
     pub(crate) fn one_plane(&self, plane: usize, planes: usize) -> Self {
-        let mut one = Self::new(self.cells, 1);
+        let mut one = Self::new(self.cells, 1, self.memory());
         one.values_mut().par_chunks_mut(self.cells.columns).enumerate().for_each(|(row, out)| {
             for (sum, cell) in out.iter_mut().zip(self.row(row as i32).chunks_exact(self.depth)) {
                 *sum = cell[plane..].iter().step_by(planes).sum();
@@ -128,7 +145,7 @@ impl Grid {
     }
 
     /// Adds sharpened cells twice as large, interpolated.
-    pub(crate) fn add_coarser(&mut self, coarser: &Self) {
+    pub(crate) fn add_coarser(&mut self, coarser: &Grid) {
         let (cells, depth) = (self.cells, self.depth);
         // Middles of fine cells lie a quarter before and behind those of coarse ones.
         let quarters = [spline::value(0.75), spline::value(0.25)];

@@ -76,12 +76,12 @@ impl Haze {
     /// `None` where nothing bends.
     ///
     /// `summed` holds the paths of the gas that shows; only those of the rest are summed here.
-    pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View, summed: Option<&Grid>) -> Option<Self> {
+    pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View, summed: Option<&Grid<'_>>) -> Option<Self> {
         if look.haze_gain <= 0.0 {
             return None;
         }
         let sheet = Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, window: view.window };
-        let rest = splat(&sheet, &seen(gas, view, &Rest { gas, look, all: summed.is_none() }));
+        let rest = splat(&sheet, &seen(gas, view, &Rest { gas, look, all: summed.is_none() }), gas.memory);
         let paths: Vec<Paths> = [(summed, PATH, PLANES), (rest.as_ref(), 0, 1)]
             .into_iter()
             .filter_map(|(grid, plane, planes)| Some(Paths::new(grid?, plane, planes)))
@@ -120,14 +120,14 @@ impl Haze {
 }
 
 /// Summed paths, whose slopes are angles.
-struct Paths {
-    sums: Grid,
+struct Paths<'a> {
+    sums: Grid<'a>,
     weights: Vec<[f32; 4]>,
     slopes: Vec<[f32; 4]>,
 }
 
-impl Paths {
-    fn new(grid: &Grid, plane: usize, planes: usize) -> Self {
+impl<'a> Paths<'a> {
+    fn new(grid: &Grid<'a>, plane: usize, planes: usize) -> Self {
         Self {
             sums: grid.one_plane(plane, planes),
             weights: spline::weights(&grid.cells),

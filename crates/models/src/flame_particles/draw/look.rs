@@ -8,7 +8,7 @@ const SHARE: Range = Range::new(0.0, 1.0);
 
 bansho_base::choice! {
     /// What becomes of a particle in the picture.
-    pub enum Sprite {
+    pub enum SpriteStyle {
         /// What a ray sees of its ball: sums are the exact line integrals of the gas, so that light and opacity follow from its soot.
         Integral = "integral",
         /// The paper's: poly6 itself, times the colour of a black body, added; opacity from density.
@@ -22,7 +22,7 @@ bansho_base::parameters! {
     /// How the gas is drawn.
     pub struct LookParameters {
         /// What becomes of a particle: exact line integrals, the paper's sprites, or squares that show the density.
-        sprite: Sprite = Sprite::Integral;
+        sprite: SpriteStyle = SpriteStyle::Integral;
         /// How strongly soot absorbs, and so shines, beside what its volume fraction gives.
         soot_gain: f64 = 1.0, limits(Range::new(0.0, 1000.0));
         /// How unevenly gas finer than the particles burns: 0 is the smooth sum of the particles alone. The mean light stays.

@@ -63,8 +63,8 @@ pub(crate) const DEFLECTION: [usize; 2] = [2, 3];
 const MOTION: [usize; 2] = [4, 5];
 
 /// Summed motion of the glowing gas: luminance, and luminance times pixels to the right and down.
-pub(crate) struct Motion {
-    grid: Grid,
+pub(crate) struct Motion<'a> {
+    grid: Grid<'a>,
     weights: Vec<[f32; 4]>,
     /// Least and greatest motion of any gas, for each of the two.
     bounds: [[f32; 2]; 2],
@@ -99,14 +99,18 @@ impl Kind for Glowing<'_> {
     }
 }
 
-impl Motion {
-    pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View) -> Option<Self> {
+impl<'a> Motion<'a> {
+    pub(crate) fn new(gas: &Gas<'a>, look: &LookParameters, view: &View) -> Option<Self> {
         let sprites = seen(gas, view, &Glowing { gas, look });
-        let motions =
-            |axis: usize| sprites.iter().flatten().map(move |sprite| sprite.values[1 + axis] / sprite.values[0]);
+        let motions = |axis: usize| {
+            sprites.iter().flat_map(|task| task.iter()).map(move |sprite| sprite.values[1 + axis] / sprite.values[0])
+        };
         let bounds = [0, 1].map(|axis| bounds(motions(axis)));
-        let grid =
-            splat(&Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, window: view.window }, &sprites)?;
+        let grid = splat(
+            &Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, window: view.window },
+            &sprites,
+            gas.memory,
+        )?;
         Some(Self { weights: spline::weights(&grid.cells), grid, bounds })
     }
 
@@ -139,7 +143,7 @@ impl Resolve<'_> {
         &self,
         layer: &Layer,
         extents: &Extents,
-        motion: Option<&Motion>,
+        motion: Option<&Motion<'_>>,
         rect: Rect,
         row: &mut Row,
         strip: &mut Strip,

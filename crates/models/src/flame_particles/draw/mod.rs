@@ -14,6 +14,7 @@ mod layers;
 mod light;
 mod look;
 mod measure;
+mod memory;
 mod perspective;
 mod placed;
 mod prepared;
@@ -27,8 +28,9 @@ mod survey;
 pub use gas::{Gas, soot_absorption};
 pub use kernel::{line_gradient, line_integral};
 pub use light::luminous;
-pub use look::{GasLightParameters, LookParameters, Sprite};
+pub use look::{GasLightParameters, LookParameters, SpriteStyle};
 pub use measure::AOVS;
+pub use memory::Memory;
 pub use prepared::{PreparedGas, depth_intervals};
 
 #[cfg(test)]

@@ -11,8 +11,8 @@ use super::{
     kernel::{LINE_PEAK, VARIANCE},
     sprite::{Ellipse, FAR_OUT, FOOTPRINT, Kind, Seen},
 };
+use crate::lanes::LANES;
 
-const LANES: usize = 16;
 type Batch = [f32; LANES];
 
 /// A perspective camera now and at the next frame.

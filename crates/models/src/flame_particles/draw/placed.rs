@@ -5,13 +5,13 @@
 use std::ops::Range;
 
 use super::{
-    grid::Cells,
+    grid::Raster,
     kernel::Profile,
     splat::{Sheet, Sprite},
 };
 
 /// The weights of eight cells are found at a time: about a row of a sprite,
-pub(crate) const LANES: usize = 8;
+pub(crate) const COLUMNS: usize = 8;
 /// and chords of sixteen rows: about all of it.
 pub(crate) const ROWS: usize = 16;
 /// How far cells and rows lie beyond the one before the first. (Without a zero, of which compilers make a special case.)
@@ -40,7 +40,7 @@ pub(crate) struct Placed<const P: usize> {
 
 impl<const P: usize> Placed<P> {
     #[inline(always)]
-    pub(crate) fn new(sheet: &Sheet, sprite: &Sprite<P>, cells: &Cells) -> Self {
+    pub(crate) fn new(sheet: &Sheet, sprite: &Sprite<P>, cells: &Raster) -> Self {
         let ellipse = &sprite.ellipse;
         let cell = cells.size as f32;
         let growth = (sheet.least_radius * cell / ellipse.radius.max(1e-3)).max(1.0);
@@ -86,7 +86,7 @@ impl<const P: usize> Placed<P> {
 
     /// Adds to a run of a row's cells that begins at column `x` of the grid. (Beyond the sprite weights are zero.)
     #[inline(always)]
-    pub(crate) fn add(&self, row: &mut [[f32; P]], x: usize, layers: usize, weights: &[f32; LANES]) {
+    pub(crate) fn add(&self, row: &mut [[f32; P]], x: usize, layers: usize, weights: &[f32; COLUMNS]) {
         match (P == 1 && layers == 1, self.both) {
             (true, _) => self.add_lone(&mut row.as_flattened_mut()[x..], weights),
             (_, true) => self.add_run::<true>(&mut row[x * layers + self.layer..], layers, weights),
@@ -95,7 +95,7 @@ impl<const P: usize> Placed<P> {
     }
 
     #[inline(always)]
-    fn add_run<const BOTH: bool>(&self, run: &mut [[f32; P]], layers: usize, weights: &[f32; LANES]) {
+    fn add_run<const BOTH: bool>(&self, run: &mut [[f32; P]], layers: usize, weights: &[f32; COLUMNS]) {
         let mut rest = run;
         for weight in weights {
             let Some((own, next)) = rest.split_first_mut() else { return };
@@ -114,11 +114,11 @@ impl<const P: usize> Placed<P> {
 
     /// The same where a cell holds one value: the cells themselves fill the vector.
     #[inline(always)]
-    fn add_lone(&self, cells: &mut [f32], weights: &[f32; LANES]) {
+    fn add_lone(&self, cells: &mut [f32], weights: &[f32; COLUMNS]) {
         let value = self.own[0];
-        match cells.first_chunk_mut::<LANES>() {
+        match cells.first_chunk_mut::<COLUMNS>() {
             Some(cells) => {
-                for lane in 0..LANES {
+                for lane in 0..COLUMNS {
                     cells[lane] = value.mul_add(weights[lane], cells[lane]);
                 }
             }
@@ -144,10 +144,10 @@ pub(crate) struct Chords {
 impl Chords {
     /// Weights of the cells of a row from column `x` on, where `s` falls by `fall` for the square of each column's distance.
     #[inline(always)]
-    pub(crate) fn weights(&self, profile: Profile, fall: f32, row: usize, x: i32) -> [f32; LANES] {
+    pub(crate) fn weights(&self, profile: Profile, fall: f32, row: usize, x: i32) -> [f32; COLUMNS] {
         let (before, middle, most) = ((x - 1) as f32, self.middle[row], self.most[row]);
-        let mut weights = [0.0; LANES];
-        for lane in 0..LANES {
+        let mut weights = [0.0; COLUMNS];
+        for lane in 0..COLUMNS {
             let u = before + BEYOND[lane] - middle;
             let s = (-fall * u).mul_add(u, most);
             let s = if s > 0.0 { s } else { 0.0 };

@@ -24,7 +24,7 @@ use super::{
     haze::{self, Haze},
     kernel::Profile,
     layers::Layers,
-    look::{LookParameters, Sprite as Choice},
+    look::{LookParameters, SpriteStyle},
     measure::{Motion, bounds},
     resolve::{BLUE, Extents, GLOW, HEAT, Layer, MATTER, PATH, PLANES, Resolve, TAU},
     splat::{COARSE, Sheet, Sprite, splat},
@@ -41,32 +41,32 @@ pub struct PreparedGas<'a> {
     view: &'a View,
     level: Level,
     layers: Layers,
-    matter: Matter,
+    matter: Matter<'a>,
     sparks: Vec<Streak>,
     haze: OnceLock<Option<Haze>>,
 }
 
 /// Particles that one task takes.
-pub(crate) const AT_ONCE: usize = 2048;
+pub(crate) const PARTICLES_OF_TASK: usize = 2048;
 
 /// What is drawn of the particles.
-enum Matter {
+enum Matter<'a> {
     /// Nothing that the view could see.
     Nothing,
     /// Sums of sprites.
-    Sums(Box<Sums>),
+    Sums(Box<Sums<'a>>),
     /// Squares.
     Squares(Squares),
 }
 
-struct Sums {
-    grid: Grid,
+struct Sums<'a> {
+    grid: Grid<'a>,
     extents: Extents,
     weights: Vec<[f32; 4]>,
     columns: Vec<(usize, usize)>,
     detail: Option<Detail>,
     scattered: Vec<[f32; 3]>,
-    motion: OnceLock<Option<Motion>>,
+    motion: OnceLock<Option<Motion<'a>>>,
     temperatures: [f32; 2],
 }
 
@@ -115,7 +115,7 @@ impl<'a> PreparedGas<'a> {
         let survey = Survey::new(&gas, look, view);
         let layers = survey.layers(&gas);
         let matter = match look.sprite {
-            Choice::Squares => Matter::Squares(Squares::new(&gas, look, view)),
+            SpriteStyle::Squares => Matter::Squares(Squares::new(&gas, look, view)),
             _ => match sums(&gas, look, view, &survey, surroundings) {
                 Some(sums) => Matter::Sums(Box::new(sums)),
                 None => Matter::Nothing,
@@ -134,13 +134,13 @@ impl<'a> PreparedGas<'a> {
         (0..self.layers.count).map(layer).filter(|layer| slice.contains(layer.depth))
     }
 
-    fn resolve<'b>(&'b self, sums: &'b Sums) -> Resolve<'b> {
+    fn resolve<'b>(&'b self, sums: &'b Sums<'_>) -> Resolve<'b> {
         Resolve {
             grid: &sums.grid,
             camera: &self.view.camera,
             origin: self.gas.particles.origin,
             detail: sums.detail.as_ref(),
-            hides_itself: self.look.sprite == Choice::Integral,
+            hides_itself: self.look.sprite == SpriteStyle::Integral,
             blue: blue_flame::colour(),
             scattered: &sums.scattered,
             weights: &sums.weights,
@@ -151,7 +151,13 @@ impl<'a> PreparedGas<'a> {
 }
 
 /// Sums all sprites in their layers.
-fn sums(gas: &Gas, look: &LookParameters, view: &View, survey: &Survey, surroundings: &Surroundings) -> Option<Sums> {
+fn sums<'a>(
+    gas: &Gas<'a>,
+    look: &LookParameters,
+    view: &View,
+    survey: &Survey,
+    surroundings: &Surroundings,
+) -> Option<Sums<'a>> {
     let layers = survey.layers(gas);
     let detail = survey.scale(gas, view).and_then(|scale| Detail::new(gas, look, &scale));
     let shining = Shining {
@@ -163,8 +169,12 @@ fn sums(gas: &Gas, look: &LookParameters, view: &View, survey: &Survey, surround
         since: view.shutter.middle() - gas.time,
     };
     let sprites = seen(gas, view, &shining);
-    let profile = if look.sprite == Choice::Poly6 { Profile::POLY6 } else { Profile::LINE };
-    let grid = splat(&Sheet { profile, least_radius: COARSE, layers: layers.count, window: view.window }, &sprites)?;
+    let profile = if look.sprite == SpriteStyle::Poly6 { Profile::POLY6 } else { Profile::LINE };
+    let grid = splat(
+        &Sheet { profile, least_radius: COARSE, layers: layers.count, window: view.window },
+        &sprites,
+        gas.memory,
+    )?;
     let extents = Extents::new(&grid, layers.count);
     let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.centre(layer), surroundings));
     Some(Sums {
@@ -203,7 +213,7 @@ impl Kind for Shining<'_> {
     fn record(&self, seen: &Seen) -> Sprite<PLANES> {
         let (layer, split) = self.layers.place(seen.depth);
         let mut values = match self.look.sprite {
-            Choice::Poly6 => self.paper_values(seen.index),
+            SpriteStyle::Poly6 => self.paper_values(seen.index),
             _ => self.values(seen),
         };
         if let Some(detail) = self.detail {
@@ -316,7 +326,7 @@ impl Prepared for PreparedGas<'_> {
 impl PreparedGas<'_> {
     fn haze(&self) -> Option<&Haze> {
         let summed = match &self.matter {
-            Matter::Sums(sums) if self.look.sprite == Choice::Integral => Some(&sums.grid),
+            Matter::Sums(sums) if self.look.sprite == SpriteStyle::Integral => Some(&sums.grid),
             _ => None,
         };
         self.haze.get_or_init(|| Haze::new(&self.gas, self.look, self.view, summed)).as_ref()

@@ -12,6 +12,7 @@ use super::{
     detail::{Burning, Detail},
     grid::Grid,
 };
+use crate::lanes::LANES;
 
 /// Sums that a layer holds in each cell, as many as fill a vector.
 pub(crate) const PLANES: usize = 8;
@@ -28,12 +29,11 @@ pub(crate) const BLUE: usize = 6;
 /// Path lengths by which the gas is optically shorter than the air, in pixels, for `haze`.
 pub(crate) const PATH: usize = 7;
 
-const LANES: usize = 16;
 type Batch = [f32; LANES];
 
 /// How sums become light.
 pub(crate) struct Resolve<'a> {
-    pub(crate) grid: &'a Grid,
+    pub(crate) grid: &'a Grid<'a>,
     pub(crate) camera: &'a Camera,
     /// Where the places of detail count from, m.
     pub(crate) origin: DVec3,

@@ -11,12 +11,14 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{
-    grid::{Cells, Grid},
+    grid::{Grid, Raster},
     kernel::Profile,
-    placed::{LANES, Placed, ROWS},
+    memory::{Memory, Recycled},
+    placed::{COLUMNS, Placed, ROWS},
     spline,
     sprite::Ellipse,
 };
+use crate::lanes::LANES;
 
 /// Least radius of a sprite in cells, for which splines are exact to a few hundredths of a lone sprite's peak.
 pub(crate) const COARSE: f32 = 2.75;
@@ -46,17 +48,22 @@ pub(crate) struct Sheet {
 }
 
 /// The sums of all sprites, task by task, on the finest grid that any of them needs, sharpened for splines; `None` where none is seen.
-pub(crate) fn splat<const P: usize>(sheet: &Sheet, tasks: &[Vec<Sprite<P>>]) -> Option<Grid> {
+pub(crate) fn splat<'a, const P: usize>(
+    sheet: &Sheet,
+    tasks: &[Recycled<Sprite<P>>],
+    memory: &'a Memory,
+) -> Option<Grid<'a>> {
     let whole = Whole::new(sheet, tasks);
     let rect = whole.covered(sheet.window)?;
     let finest = whole.finest();
+    let nested = whole.counts.iter().skip(finest + 2).any(|count| *count > 0);
     let mut coarser: Option<Grid> = None;
     for fineness in (finest..COARSEST + 1).step_by(2).rev() {
         let any = whole.counts[fineness..].iter().take(2).any(|count| *count > 0);
         if !any && fineness != finest && coarser.is_none() {
             continue;
         }
-        let mut grid = Grid::new(Cells::around(rect, cell_size(fineness)), sheet.layers * P);
+        let mut grid = Grid::new(Raster::around(rect, cell_size(fineness), nested), sheet.layers * P, memory);
         let here = |radius: f32| sheet.fineness(radius).max(finest).wrapping_sub(fineness) < 2;
         add_sprites(sheet, tasks, here, &mut grid);
         if let Some(coarser) = coarser {
@@ -92,10 +99,10 @@ struct Whole {
 impl Whole {
     const NOTHING: Self = Self { low: [f32::MAX; 2], high: [f32::MIN; 2], counts: [0; COARSEST + 1] };
 
-    fn new<const P: usize>(sheet: &Sheet, tasks: &[Vec<Sprite<P>>]) -> Self {
-        let of_task = |task: &Vec<Sprite<P>>| {
+    fn new<const P: usize>(sheet: &Sheet, tasks: &[Recycled<Sprite<P>>]) -> Self {
+        let of_task = |task: &Recycled<Sprite<P>>| {
             let mut whole = Self::NOTHING;
-            for Sprite { ellipse, .. } in task {
+            for Sprite { ellipse, .. } in task.iter() {
                 for axis in 0..2 {
                     whole.low[axis] = whole.low[axis].min(ellipse.centre[axis] - ellipse.reach[axis]);
                     whole.high[axis] = whole.high[axis].max(ellipse.centre[axis] + ellipse.reach[axis]);
@@ -131,31 +138,34 @@ impl Whole {
         self.counts.iter().position(suits).unwrap_or(0)
     }
 
-    /// The pixels of the window that sprites touch.
+    /// The pixels of the window that sprites touch, and those beside it that are worked on with them: what sixteen pixels are worth is
+    /// asked of all of them together.
     fn covered(&self, window: Rect) -> Option<Rect> {
         let clip = |value: [f32; 2]| {
             let [x, y] = value.map(|value| value.max(0.0) as usize);
             [x.clamp(window.x, window.right()), y.clamp(window.y, window.bottom())]
         };
         let ([x, y], [right, bottom]) = (clip(self.low), clip(self.high.map(|value| value + 1.0)));
-        (right > x && bottom > y).then(|| Rect { x, y, width: right - x, height: bottom - y })
+        let (first, end) = (x / LANES * LANES, right.next_multiple_of(LANES));
+        (right > x && bottom > y).then(|| Rect { x: first, y, width: end - first, height: bottom - y })
     }
 }
 
 /// Adds the sprites whose radius belongs `here`, on this grid.
-fn add_sprites<const P: usize>(
+fn add_sprites<'a, const P: usize>(
     sheet: &Sheet,
-    tasks: &[Vec<Sprite<P>>],
+    tasks: &[Recycled<'a, Sprite<P>>],
     here: impl Fn(f32) -> bool + Sync,
     grid: &mut Grid,
 ) {
     let cells = grid.cells;
     let (row_length, level) = (grid.row_length(), Level::new());
-    let bin = |task: &Vec<Sprite<P>>| dispatch!(level, _simd => Binned::new(sheet, task, &cells, &here));
+    let bin = |task: &Recycled<'a, Sprite<P>>| dispatch!(level, _simd => Binned::new(sheet, task, &cells, &here));
     let binned: Vec<Binned<P>> = tasks.par_iter().map(bin).collect();
     grid.values_mut().par_chunks_mut(BAND * row_length).enumerate().for_each(|(index, values)| {
         let (first, end) = (cells.first[0], cells.first[0] + cells.columns as i32);
         let top = cells.first[1] + (index * BAND) as i32;
+        values.fill(0.0);
         let mut band = Band { first: top, columns: first..end, layers: sheet.layers, values };
         for task in &binned {
             dispatch!(level, _simd => band.add(sheet.profile, task, index));
@@ -186,7 +196,7 @@ impl Band<'_> {
                 for y in start..to.min(start + ROWS as i32) {
                     let row = &mut sums[(y - self.first) as usize * row_length..][..row_length];
                     let index = (y - start) as usize;
-                    for x in (chords.first[index]..chords.end[index]).step_by(LANES) {
+                    for x in (chords.first[index]..chords.end[index]).step_by(COLUMNS) {
                         let weights = chords.weights(profile, placed.fall, index, x);
                         placed.add(row, (x - self.columns.start) as usize, self.layers, &weights);
                     }
@@ -197,17 +207,18 @@ impl Band<'_> {
 }
 
 /// The sprites of a task on a grid, and which of them touch which band: a counting sort that keeps their order.
-struct Binned<const P: usize> {
-    placed: Vec<Placed<P>>,
+struct Binned<'a, const P: usize> {
+    placed: Recycled<'a, Placed<P>>,
     starts: Vec<u32>,
     members: Vec<u16>,
 }
 
-impl<const P: usize> Binned<P> {
+impl<'a, const P: usize> Binned<'a, P> {
     #[inline(always)]
-    fn new(sheet: &Sheet, task: &[Sprite<P>], cells: &Cells, here: impl Fn(f32) -> bool) -> Self {
-        let mut placed = Vec::with_capacity(task.len());
-        for sprite in task {
+    fn new(sheet: &Sheet, task: &Recycled<'a, Sprite<P>>, cells: &Raster, here: impl Fn(f32) -> bool) -> Self {
+        let mut placed = task.memory().list(task.len());
+        placed.clear();
+        for sprite in task.iter() {
             if here(sprite.ellipse.radius) {
                 placed.push(Placed::new(sheet, sprite, cells));
             }
@@ -218,7 +229,7 @@ impl<const P: usize> Binned<P> {
         };
         let bands = cells.rows.div_ceil(BAND);
         let mut starts = vec![0_u32; bands + 1];
-        for placed in &placed {
+        for placed in placed.iter() {
             for band in bands_of(placed) {
                 starts[band + 1] += 1;
             }

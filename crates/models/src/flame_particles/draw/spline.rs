@@ -6,26 +6,27 @@
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::grid::{Cells, Grid};
+use super::grid::{Grid, Raster};
 
 /// The filter: middle, neighbours, those after them. With the spline's own spectrum, sinc^4, it gives `1 + O(w^6)`.
 const SHARPEN: [f32; 3] = [181.0 / 120.0, -17.0 / 60.0, 7.0 / 240.0];
 
 /// The grid as [`weights`] and [`slopes`] want it: filtered down and across.
-pub(crate) fn sharpened(grid: &Grid) -> Grid {
+pub(crate) fn sharpened<'a>(grid: &Grid<'a>) -> Grid<'a> {
     let (length, depth) = (grid.row_length(), grid.depth);
-    let (mut sharp, level) = (Grid::new(grid.cells, depth), Level::new());
+    let (mut sharp, level) = (Grid::new(grid.cells, depth, grid.memory()), Level::new());
     sharp.values_mut().par_chunks_mut(length).enumerate().for_each_init(
         || vec![0.0; length],
         |down, (row, out)| {
-            let row = row as i32;
-            let [a, b, c, d, e] = [-2, -1, 0, 1, 2].map(|by| grid.row(row + by));
+            let rows = [-2, -1, 0, 1, 2].map(|by| grid.row(row as i32 + by));
             // Nothing lies in the margin, where there are no two cells on either side.
-            let inner = &mut out[2 * depth..length - 2 * depth];
+            let (margin, inner) = out.split_at_mut(2 * depth);
+            let (inner, other_margin) = inner.split_at_mut(length - 4 * depth);
+            margin.fill(0.0);
+            other_margin.fill(0.0);
             dispatch!(level, _simd => {
-                filter(down, [a, b, c, d, e]);
-                let [a, b, c, d, e] = [&down[..], &down[depth..], &down[2 * depth..], &down[3 * depth..], &down[4 * depth..]];
-                filter(inner, [a, b, c, d, e]);
+                filter(down, rows);
+                filter(inner, [0, 1, 2, 3, 4].map(|by| &down[by * depth..]));
             });
         },
     );
@@ -43,12 +44,12 @@ fn filter(out: &mut [f32], [a, b, c, d, e]: [&[f32]; 5]) {
 }
 
 /// Weights of the four cells around, for the pixels of every phase.
-pub(crate) fn weights(cells: &Cells) -> Vec<[f32; 4]> {
+pub(crate) fn weights(cells: &Raster) -> Vec<[f32; 4]> {
     cells.phases().map(value).collect()
 }
 
 /// The same for the slope, a pixel.
-pub(crate) fn slopes(cells: &Cells) -> Vec<[f32; 4]> {
+pub(crate) fn slopes(cells: &Raster) -> Vec<[f32; 4]> {
     cells.phases().map(|t| slope(t).map(|weight| weight / cells.size as f32)).collect()
 }
 
@@ -68,12 +69,13 @@ fn slope(t: f32) -> [f32; 4] {
 mod tests {
     use bansho_base::{image::Rect, math};
 
-    use super::*;
+    use super::{super::memory::Memory, *};
 
     /// How far values and slopes are off those of a wave of `length` cells, at pixels of every phase, beside their most.
     fn worst(length: f64) -> [f64; 2] {
-        let cells = Cells::around(Rect { x: 0, y: 0, width: 128, height: 8 }, 4);
-        let mut grid = Grid::new(cells, 1);
+        let cells = Raster::around(Rect { x: 0, y: 0, width: 128, height: 8 }, 4, false);
+        let memory = Memory::default();
+        let mut grid = Grid::new(cells, 1, &memory);
         let turn = std::f64::consts::TAU / length;
         for (index, value) in grid.values_mut().iter_mut().enumerate() {
             *value = math::sin(turn * (index % cells.columns) as f64) as f32;

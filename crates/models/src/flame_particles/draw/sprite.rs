@@ -11,8 +11,9 @@ use rayon::prelude::*;
 use super::{
     gas::Gas,
     kernel::{LINE_PEAK, VARIANCE},
+    memory::Recycled,
     perspective::Perspective,
-    prepared::AT_ONCE,
+    prepared::PARTICLES_OF_TASK,
 };
 
 /// An ellipse around a place in the picture: `q = a u^2 + 2 b u v + c v^2` is 1 on its edge.
@@ -50,19 +51,20 @@ pub(crate) const FOOTPRINT: f64 = 0.18;
 
 /// Which particles are drawn, and as what.
 pub(crate) trait Kind: Sync {
-    type Record: Send;
+    type Record: Send + 'static;
     fn wants(&self, index: usize) -> bool;
     fn record(&self, seen: &Seen) -> Self::Record;
 }
 
 /// The records of all particles that a view can see, in their own order, task by task.
-pub(crate) fn seen<K: Kind>(gas: &Gas, view: &View, kind: &K) -> Vec<Vec<K::Record>> {
+pub(crate) fn seen<'a, K: Kind>(gas: &Gas<'a>, view: &View, kind: &K) -> Vec<Recycled<'a, K::Record>> {
     let eye = Eye::new(view);
     let perspective = Perspective::new(gas, view, &eye.next, eye.open_share);
     let (count, level) = (gas.particles.len(), Level::new());
     let of_task = |task: usize| {
-        let range = task * AT_ONCE..((task + 1) * AT_ONCE).min(count);
-        let mut records = Vec::with_capacity(AT_ONCE);
+        let range = task * PARTICLES_OF_TASK..((task + 1) * PARTICLES_OF_TASK).min(count);
+        let mut records = gas.memory.list(PARTICLES_OF_TASK);
+        records.clear();
         match &perspective {
             Some(perspective) => {
                 dispatch!(level, _simd => perspective.see(gas, range.clone(), kind, &mut records));
@@ -75,7 +77,7 @@ pub(crate) fn seen<K: Kind>(gas: &Gas, view: &View, kind: &K) -> Vec<Vec<K::Reco
         }
         records
     };
-    (0..count.div_ceil(AT_ONCE)).into_par_iter().map(of_task).collect()
+    (0..count.div_ceil(PARTICLES_OF_TASK)).into_par_iter().map(of_task).collect()
 }
 
 /// The camera now and at the next frame.
@@ -203,7 +205,7 @@ mod tests {
         random::{Key, Purpose},
     };
 
-    use super::*;
+    use super::{super::memory::Memory, *};
     use crate::flame_particles::{Particle, Particles};
 
     struct Everything;
@@ -256,10 +258,12 @@ mod tests {
             base: DVec3::ZERO,
             size: DVec2::ONE,
             key: Key::new(1, "flame"),
+            memory: &Memory::default(),
         };
         let (eye, mut one_by_one) = (Eye::new(&view), Vec::new());
         (0..particles.len()).for_each(|index| eye.see(&gas, index, |seen| one_by_one.push(seen)));
-        let together = seen(&gas, &view, &Everything).concat();
+        let seen = seen(&gas, &view, &Everything);
+        let together: Vec<Seen> = seen.iter().flat_map(|task| task.iter().copied()).collect();
         assert!(one_by_one.len() > 40 && one_by_one.len() < 300, "{}", one_by_one.len());
         assert_eq!(together.len(), one_by_one.len());
         for (a, b) in together.iter().zip(&one_by_one) {

@@ -54,7 +54,8 @@ pub(crate) struct Squares(Vec<Square>);
 impl Squares {
     pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View) -> Self {
         let kind = Drawn { gas, side: look.square_size as f32, window: view.window, densest: usual_density(gas) };
-        let mut squares: Vec<Square> = seen(gas, view, &kind).into_iter().flatten().flatten().collect();
+        let mut squares: Vec<Square> =
+            seen(gas, view, &kind).iter_mut().flat_map(|task| task.drain(..)).flatten().collect();
         // A stable sort: at one depth the elder lies before the younger.
         squares.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         Self(squares)

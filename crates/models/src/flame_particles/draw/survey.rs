@@ -10,16 +10,16 @@ use super::{
     detail::Scale,
     gas::Gas,
     layers::{Layers, Spread},
-    look::{LookParameters, Sprite as Choice},
-    prepared::AT_ONCE,
+    look::{LookParameters, SpriteStyle},
+    prepared::PARTICLES_OF_TASK,
 };
 
 /// Whether a particle adds anything to the picture's light or shade.
 #[inline(always)]
 pub(crate) fn shows(gas: &Gas, look: &LookParameters, index: usize) -> bool {
     match look.sprite {
-        Choice::Integral => gas.absorption(index, look) > 0.0 || gas.is_blue(index, look),
-        Choice::Poly6 | Choice::Squares => true,
+        SpriteStyle::Integral => gas.absorption(index, look) > 0.0 || gas.is_blue(index, look),
+        SpriteStyle::Poly6 | SpriteStyle::Squares => true,
     }
 }
 
@@ -38,12 +38,12 @@ impl Survey {
         let (count, level) = (gas.particles.len(), Level::new());
         let of_task = |task: usize| {
             let mut survey = Self::default();
-            let range = task * AT_ONCE..((task + 1) * AT_ONCE).min(count);
+            let range = task * PARTICLES_OF_TASK..((task + 1) * PARTICLES_OF_TASK).min(count);
             dispatch!(level, _simd => survey.add_all(gas, look, view, range.clone()));
             survey
         };
         // Sums of whole tasks, added in order, are the same however many threads there are.
-        let of_tasks: Vec<Self> = (0..count.div_ceil(AT_ONCE)).into_par_iter().map(of_task).collect();
+        let of_tasks: Vec<Self> = (0..count.div_ceil(PARTICLES_OF_TASK)).into_par_iter().map(of_task).collect();
         of_tasks.iter().fold(Self::default(), Self::and)
     }
 
@@ -68,7 +68,7 @@ impl Survey {
         let volume = gas.volume(index);
         self.spread.add(depth, volume);
         let absorption = gas.absorption(index, look);
-        if absorption > 0.0 && look.sprite == Choice::Integral {
+        if absorption > 0.0 && look.sprite == SpriteStyle::Integral {
             let light = absorption * volume * gas.luminance(index);
             let scale = view.camera.focal_pixels / depth;
             for (sum, value) in self.light.iter_mut().zip([1.0, radius, absorption, scale]) {

@@ -11,7 +11,7 @@ use bansho_base::{
     observer::Unobserved,
     phenomenon::Prepared,
     random::{Key, Purpose},
-    surroundings::{Emitter, Surroundings},
+    surroundings::{Emitter, Light, Publication, Surroundings},
     wind::{Wind, WindParameters},
 };
 
@@ -65,7 +65,7 @@ fn glowing_cloud(count: u64) -> Particles {
     }))
 }
 
-fn gas(particles: &Particles) -> Gas<'_> {
+fn gas<'a>(particles: &'a Particles, memory: &'a Memory) -> Gas<'a> {
     Gas {
         particles,
         time: 1.0,
@@ -74,6 +74,7 @@ fn gas(particles: &Particles) -> Gas<'_> {
         base: DVec3::ZERO,
         size: DVec2::ONE,
         key: Key::new(1, "flame"),
+        memory,
     }
 }
 
@@ -85,7 +86,8 @@ fn smooth() -> LookParameters {
 fn prepared<T>(particles: &Particles, look: &LookParameters, view: &View, each: impl FnOnce(&PreparedGas) -> T) -> T {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
-    each(&PreparedGas::new(gas(particles), look, view, &surroundings, &Unobserved).unwrap())
+    let memory = Memory::default();
+    each(&PreparedGas::new(gas(particles, &memory), look, view, &surroundings, &Unobserved).unwrap())
 }
 
 /// The whole picture drawn as one strip, with AOVs where wanted and a plate at `plate` m.
@@ -234,7 +236,7 @@ fn lights_carry_the_light_of_the_picture() {
     let scale = view.camera.focal_pixels / DISTANCE;
     let strip = drawn(&thin, &smooth(), &view, 0, None);
     let seen: f64 = strip.radiance[0].iter().map(|value| f64::from(*value)).sum::<f64>() / (scale * scale);
-    let lights = luminous(&gas(&thin), &LookParameters::default(), 1.0);
+    let lights = luminous(&gas(&thin, &Memory::default()), &LookParameters::default(), 1.0);
     assert_eq!(lights.len(), 3);
     let sum: f64 = lights.iter().map(|light| f64::from(light.intensity[0])).sum();
     assert!((sum / seen - 1.0).abs() < 0.02, "{sum} {seen}");
@@ -254,7 +256,7 @@ fn no_lens_and_no_place_of_the_camera_is_too_much() {
     for lens in [Lens::Perspective, Lens::Fisheye, Lens::Panorama] {
         for position in [[0.0, 0.0, 0.0], [0.05, -0.2, 0.3], [0.0, 0.0, 3.0], [0.0, 5.0, 0.001]] {
             let camera = CameraParameters { lens, position: Animated::from(position), ..camera() };
-            for sprite in [Sprite::Integral, Sprite::Poly6, Sprite::Squares] {
+            for sprite in [SpriteStyle::Integral, SpriteStyle::Poly6, SpriteStyle::Squares] {
                 let look = LookParameters { sprite, ..LookParameters::default() };
                 let view = view(camera.clone());
                 let strip = drawn(&particles, &look, &view, AOVS.len(), None);
@@ -300,7 +302,10 @@ fn strips_crops_and_threads_change_no_bit() {
 
 #[test]
 fn a_part_of_the_picture_alone_is_the_same_to_the_bit() {
-    let particles = glowing_cloud(500);
+    // Large and small balls, so that there are grids of several finenesses.
+    let mut particles = glowing_cloud(500);
+    particles.support_radius.iter_mut().step_by(3).for_each(|radius| *radius *= 0.12);
+    particles.support_radius.iter_mut().step_by(7).for_each(|radius| *radius *= 3.0);
     let look = LookParameters::default();
     let whole_view = view(camera());
     let part = Rect { x: 67, y: 51, width: 31, height: 23 };
@@ -409,7 +414,7 @@ fn motion_smears_the_sprite_along_its_way_and_loses_no_light() {
 #[test]
 fn the_papers_sprites_add_up_and_fall_off_as_poly6() {
     let view = view(camera());
-    let look = LookParameters { sprite: Sprite::Poly6, opacity: 0.1, ..LookParameters::default() };
+    let look = LookParameters { sprite: SpriteStyle::Poly6, opacity: 0.1, ..LookParameters::default() };
     let one = drawn(&cloud([ball(0, [0.0; 3], 1800.0, 0.0)]), &look, &view, 0, None);
     let two = drawn(&cloud([ball(0, [0.0; 3], 1800.0, 0.0), ball(1, [0.0; 3], 1800.0, 0.0)]), &look, &view, 0, None);
     assert!((luminance(&two, 80, 60) / luminance(&one, 80, 60) - 2.0).abs() < 1e-4);
@@ -423,7 +428,7 @@ fn the_papers_sprites_add_up_and_fall_off_as_poly6() {
 #[test]
 fn squares_are_redder_where_gas_is_denser() {
     let view = view(camera());
-    let look = LookParameters { sprite: Sprite::Squares, ..LookParameters::default() };
+    let look = LookParameters { sprite: SpriteStyle::Squares, ..LookParameters::default() };
     let dense = Particle { density: 0.4, ..ball(1, [0.5, 0.0, 0.0], 1800.0, 0.0) };
     let strip = drawn(&cloud([ball(0, [-0.5, 0.0, 0.0], 1800.0, 0.0), dense]), &look, &view, 0, None);
     let scale = view.camera.focal_pixels / DISTANCE;
@@ -434,4 +439,60 @@ fn squares_are_redder_where_gas_is_denser() {
     let (thin, dense) = (at(-0.5), at(0.5));
     assert!(thin[0] / thin[2] < 1.5 && dense[0] / dense[2] > 4.0, "{thin:?} {dense:?}");
     assert_eq!(at(0.0), [0.0; 3]);
+}
+
+/// Light and opacity in the middle of a ball of gas among lights of so much illuminance.
+fn lit_ball(ball: Particle, look: &LookParameters, illuminance: f32) -> ([f64; 3], f64) {
+    let (view, memory, wind, air) =
+        (view(camera()), Memory::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
+    let sun = Light { emitter: Emitter::Directional { toward: DVec3::Y }, intensity: [illuminance; 3] };
+    let others = Publication { lights: vec![sun], ..Publication::default() };
+    let surroundings = Surroundings { air: &air, others, ..Surroundings::of_wind(&wind) };
+    let particles = cloud([ball]);
+    let prepared = PreparedGas::new(gas(&particles, &memory), look, &view, &surroundings, &Unobserved).unwrap();
+    let mut strip = Strip::default();
+    strip.reset(Rect::of_size(SIZE[0], SIZE[1]), None, 0);
+    prepared.draw(&DepthInterval::ALL, &mut strip);
+    let middle = 60 * SIZE[0] + 80;
+    ([0, 1, 2].map(|c| f64::from(strip.radiance[c][middle])), 1.0 - f64::from(strip.transmittance(middle)[0]))
+}
+
+#[test]
+fn cold_soot_is_smoke_that_hides_and_shows_the_light_of_others_alone() {
+    let smoke = ball(0, [0.0; 3], 320.0, 3e-5);
+    let (dark, opacity) = lit_ball(smoke, &smooth(), 0.0);
+    assert!(opacity > 0.5 && dark.iter().all(|value| *value < 1e-6), "{dark:?} {opacity}");
+    for albedo in [0.15, 0.3] {
+        let look = LookParameters { smoke_albedo: albedo, ..smooth() };
+        // Alike in all directions: albedo E / 4 pi where it hides everything.
+        let expected = albedo * 1000.0 / (4.0 * std::f64::consts::PI) * opacity;
+        let (lit, as_opaque) = lit_ball(smoke, &look, 1000.0);
+        assert!((as_opaque - opacity).abs() < 1e-6);
+        assert!(lit.iter().all(|value| (value / expected - 1.0).abs() < 1e-3), "{lit:?} for {expected}");
+    }
+}
+
+#[test]
+fn freshly_burning_gas_shines_blue_and_hides_nothing_until_soot_outshines_it() {
+    let begun = |fuel: f32, soot: f32| Particle { fuel, ..ball(0, [0.0; 3], 1900.0, soot) };
+    let once = LookParameters { base_blue: 1.0, ..smooth() };
+    let twice = LookParameters { base_blue: 2.0, ..smooth() };
+    let (blue, opacity) = lit_ball(begun(0.94, 0.0), &once, 0.0);
+    assert!(blue[2] > 2.0 * blue[0] && blue[2] > 0.0 && opacity == 0.0, "{blue:?} {opacity}");
+    let (brighter, _) = lit_ball(begun(0.94, 0.0), &twice, 0.0);
+    assert!((0..3).all(|c| (brighter[c] / blue[c] - 2.0).abs() < 1e-3), "{blue:?} {brighter:?}");
+    // Nothing burns yet, or not any more.
+    for fuel in [1.0, 0.1] {
+        assert_eq!(lit_ball(begun(fuel, 0.0), &once, 0.0).0, [0.0; 3]);
+    }
+    // Yellow flames are not blue: soot quenches CH and C2 and outshines what is left.
+    let (sooty, _) = lit_ball(begun(0.94, 1e-6), &once, 0.0);
+    assert!(sooty[0] > 2.0 * sooty[2], "{sooty:?}");
+    let share = gas_blue(begun(0.94, 1e-6)) / gas_blue(begun(0.94, 0.0));
+    assert!(share < 0.02, "{share}");
+}
+
+/// Luminance of a metre of a particle's gas in blue light.
+fn gas_blue(ball: Particle) -> f64 {
+    gas(&cloud([ball]), &Memory::default()).blue(0, &smooth())
 }

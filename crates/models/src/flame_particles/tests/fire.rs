@@ -1,9 +1,17 @@
 //! What fires do: they are as high as Heskestad says, puff as Cetegen and Ahmed say, narrow upward, and lean with the wind.
 
-use bansho_base::{animation::Animated, curve::Interpolation, math};
+use bansho_base::{
+    animation::Animated,
+    curve::Interpolation,
+    math::{self, DVec2, DVec3},
+};
 
 use super::*;
-use crate::flame_particles::{heskestad, parameters::BurnerParameters};
+use crate::flame_particles::{
+    draw::{Gas, LookParameters, Memory},
+    heskestad,
+    parameters::BurnerParameters,
+};
 
 fn fire(heat_release_kw: f64, diameter: f64) -> FlameParticlesParameters {
     FlameParticlesParameters {
@@ -121,4 +129,138 @@ fn gas_is_born_where_a_moving_burner_is_and_stays_behind_it() {
     assert!(behind < 0.5, "what it left burns on where it was left: {behind}");
     let [low, high] = simulation.design.domain;
     assert!(low.x < -2.0 && high.x > 2.0, "there is room at both ends of its way");
+}
+
+/// Light that gas of a kind sends, and that times its height.
+fn light_by_height(simulation: &Simulation, of: impl Fn(&Gas, usize) -> f64) -> [f64; 2] {
+    let memory = Memory::default();
+    let gas = Gas {
+        particles: &simulation.particles,
+        time: 0.0,
+        air_temperature_k: Air::default().temperature_k,
+        detail_speed: 1.0,
+        base: DVec3::ZERO,
+        size: DVec2::ONE,
+        key: Key::new(1, "flame"),
+        memory: &memory,
+    };
+    let mut sums = [0.0; 2];
+    for index in 0..gas.particles.len() {
+        let light = of(&gas, index) * gas.volume(index);
+        sums[0] += light;
+        sums[1] += light * f64::from(place(simulation, index).y);
+    }
+    sums
+}
+
+#[test]
+fn blue_light_stands_at_the_base_and_yellow_light_above_it() {
+    let (parameters, look) = (fire(60.0, 0.3), LookParameters::default());
+    let mut simulation = simulation(&parameters);
+    let (mut blue, mut yellow, mut high) = ([0.0; 2], [0.0; 2], 0.0);
+    World::default().run(&mut simulation, 1.0, |simulation, t| {
+        if t > 0.0 {
+            let blue_light = |gas: &Gas, index| gas.blue(index, &look);
+            let add = |sum: &mut [f64; 2], more: [f64; 2]| (0..2).for_each(|i| sum[i] += more[i]);
+            add(&mut blue, light_by_height(simulation, blue_light));
+            add(
+                &mut yellow,
+                light_by_height(simulation, |gas, index| gas.absorption(index, &look) * gas.luminance(index)),
+            );
+            let above = |gas: &Gas, index| if place(simulation, index).y > 0.4 { blue_light(gas, index) } else { 0.0 };
+            high += light_by_height(simulation, above)[0];
+        }
+    });
+    let [blue_height, yellow_height] = [blue, yellow].map(|[light, moment]| moment / light);
+    let height = heskestad(60.0, 0.3);
+    assert!(
+        blue_height < 0.15 * height && yellow_height > 0.25 * height,
+        "{blue_height} {yellow_height} of {height} m"
+    );
+    assert!(high < 0.01 * blue[0], "{high} of {} shines blue high up", blue[0]);
+    assert!(blue[0] < 0.2 * yellow[0], "the light of a sooty fire is yellow: {} {}", blue[0], yellow[0]);
+}
+
+#[test]
+fn smoke_is_the_soot_that_leaves_the_flame_and_cools_above_it() {
+    let smoke = |share: f64| {
+        let mut parameters = fire(60.0, 0.3);
+        parameters.life.smoke = share;
+        parameters.life.afterlife_s = 1.5;
+        let mut simulation = simulation(&parameters);
+        World::default().run(&mut simulation, 0.0, |_, _| {});
+        let particles = &simulation.particles;
+        let burnt: Vec<usize> = (0..particles.len()).filter(|index| particles.fuel[*index] == 0.0).collect();
+        let mean = |of: &dyn Fn(usize) -> f32| burnt.iter().map(|index| of(*index)).sum::<f32>() / burnt.len() as f32;
+        assert!(burnt.len() > 300, "{}", burnt.len());
+        let old = |index: &usize| particles.age[*index] > 1.2;
+        let coldest = burnt.iter().copied().filter(old).map(|index| particles.temperature[index]).fold(0.0, f32::max);
+        (mean(&|index| particles.soot[index]), mean(&|index| place(&simulation, index).y), coldest)
+    };
+    let ((none, ..), (some, height, hottest)) = (smoke(0.0), smoke(0.3));
+    assert_eq!(none, 0.0, "soot burns where none is to be left");
+    assert!((some / (0.3 * 1.2e-6) - 1.0).abs() < 1e-3, "three tenths of 1.2 parts in a million: {some}");
+    assert!(f64::from(height) > 0.8 * heskestad(60.0, 0.3), "smoke hangs at {height} m");
+    assert!(hottest < 800.0, "old smoke does not glow: {hottest} K");
+}
+
+/// Gas that the eye sees as one: groups of lit particles closer than the support radius, as lists of their places.
+fn bodies(simulation: &Simulation) -> Vec<Vec<Vec3>> {
+    let reach = simulation.design.support_radius;
+    let mut left: Vec<Vec3> = lit(simulation).into_iter().map(|index| place(simulation, index)).collect();
+    let mut bodies = Vec::new();
+    while let Some(first) = left.pop() {
+        let (mut body, mut edge) = (vec![first], vec![first]);
+        while let Some(place) = edge.pop() {
+            let (near, far): (Vec<Vec3>, Vec<Vec3>) = left.iter().partition(|other| other.distance(place) < reach);
+            left = far;
+            edge.extend(&near);
+            body.extend(near);
+        }
+        bodies.push(body);
+    }
+    bodies
+}
+
+/// How wide a body of gas is in each tenth of a height: standard deviation across; none where hardly anything is.
+fn widths(body: &[Vec3], height: f32) -> Vec<Option<f32>> {
+    let width = |slab: usize| {
+        let inside = |place: &&Vec3| (place.y / height * 10.0) as usize == slab;
+        let places: Vec<&Vec3> = body.iter().filter(inside).collect();
+        let count = places.len() as f32;
+        let middle = places.iter().copied().sum::<Vec3>() / count;
+        let square = |place: &&Vec3| (**place - middle).with_y(0.0).length_squared();
+        (places.len() >= 8).then(|| (places.iter().map(square).sum::<f32>() / count).sqrt())
+    };
+    (0..12).map(width).collect()
+}
+
+#[test]
+fn flames_neck_and_shed_pockets_that_burn_out_above_them() {
+    let mut simulation = simulation(&fire(60.0, 0.3));
+    let height = heskestad(60.0, 0.3) as f32;
+    let (mut frames, mut necked, mut shed, mut changes, mut had_pocket) = (0, 0, 0, 0, false);
+    World::default().run(&mut simulation, 4.0, |simulation, t| {
+        // Thirty pictures a second.
+        if t <= 0.0 || (t * 120.0).round() as i64 % 4 != 0 {
+            return;
+        }
+        let mut bodies = bodies(simulation);
+        bodies.sort_by_key(|body| std::cmp::Reverse(body.len()));
+        let lowest = |body: &[Vec3]| body.iter().map(|place| place.y).fold(f32::INFINITY, f32::min);
+        let pocket = bodies[1..].iter().any(|body| body.len() >= 8 && lowest(body) > 0.4 * height);
+        // A waist: gas above it is a quarter wider.
+        let widths: Vec<f32> = widths(&bodies[0], height).into_iter().flatten().collect();
+        let neck = (2..widths.len()).any(|above| widths[1..above].iter().any(|waist| widths[above] > 1.25 * waist));
+        frames += 1;
+        necked += i32::from(neck);
+        shed += i32::from(pocket);
+        changes += i32::from(pocket != had_pocket);
+        had_pocket = pocket;
+    });
+    let share = |count: i32| f64::from(count) / f64::from(frames);
+    // A steady cone does neither; a cloud of sparks always would.
+    assert!((0.2..0.9).contains(&share(necked)), "necked in {} of the pictures", share(necked));
+    assert!((0.15..0.85).contains(&share(shed)), "a pocket in {} of the pictures", share(shed));
+    assert!(changes >= 15, "pockets come and go: {changes} changes in {frames} pictures");
 }

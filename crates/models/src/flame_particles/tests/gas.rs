@@ -1,6 +1,6 @@
 //! Gas without a burner: momentum, rest, free fall, solids.
 
-use bansho_base::{animation::Animated, math::DVec3, parameters::Auto, random::uniform};
+use bansho_base::{animation::Animated, gravity::STANDARD_GRAVITY, math::DVec3, parameters::Auto, random::uniform};
 
 use super::*;
 use crate::flame_particles::{
@@ -105,7 +105,7 @@ fn a_lattice_at_rest_has_its_density_and_stays() {
 #[test]
 fn one_particle_falls_and_rises_as_buoyancy_says() {
     // At 0 K gas weighs all that it would in a vacuum; five times as hot as air it rises at 4 g.
-    for (share, acceleration) in [(0.0, -9.81), (5.0, 4.0 * 9.81)] {
+    for (share, acceleration) in [(0.0, -STANDARD_GRAVITY), (5.0, 4.0 * STANDARD_GRAVITY)] {
         let mut parameters = quiet();
         parameters.motion.buoyancy = 1.0;
         let mut simulation = simulation(&parameters);

@@ -164,8 +164,8 @@ struct Swept<'a, const UPRIGHT: bool> {
 }
 
 impl<const UPRIGHT: bool> Columns for Swept<'_, UPRIGHT> {
-    /// So far aside of the axis, the disc covers a place while its chord passes: for the overlap of chord and way. What it hides there in all
-    /// is the profile's share of that line.
+    /// So far aside of the axis, the disc covers a place while its chord passes: for the overlap of chord and way. What it hides
+    /// there in all is the profile's share of that line.
     #[inline(always)]
     fn next(&mut self, x: f32) -> Rows {
         let Stroke { half, lean, across, density, .. } = *self.stroke;

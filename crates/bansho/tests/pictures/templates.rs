@@ -1,0 +1,22 @@
+//! New scenes, as `bansho new` writes them, as pictures.
+
+use bansho::{KINDS, PlanOptions, render::scene::template};
+
+use crate::{
+    SMALL,
+    looks::{Film, luminance},
+};
+
+#[test]
+fn a_new_scene_of_any_kind_shows_something_well_exposed() {
+    for kind in KINDS {
+        let film = Film::of_text(&template::commented(kind), SMALL, &[4], &PlanOptions::default());
+        let share = |of: &dyn Fn(f64) -> bool| {
+            film.pixels().filter(|pixel| of(luminance(**pixel))).count() as f64 / film.len() as f64
+        };
+        let (visible, bright, clipped) = (share(&|l| l > 0.02), share(&|l| l > 0.25), share(&|l| l > 0.99));
+        println!("{}: visible {visible}, bright {bright}, clipped {clipped}", kind.key);
+        assert!(visible > 0.02 && bright > 0.0005, "{}: visible {visible}, bright {bright}", kind.key);
+        assert!(clipped < 0.02, "{}: {clipped} of the picture is clipped", kind.key);
+    }
+}

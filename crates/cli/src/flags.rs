@@ -1,0 +1,59 @@
+//! Which flags the library's errors and notes are about: it speaks of what was asked for, only the program knows by which flags.
+
+use bansho::job::{Channels, Conflict, JobError, ListKind, Note, StreaksFault};
+
+/// An error as the user of the program reads it.
+pub(crate) fn error(error: &JobError) -> String {
+    match error {
+        JobError::NoGpu => format!("{error}; allowed: --backend cpu, auto"),
+        JobError::Cancelled => format!("{error}, and --resume goes on from there"),
+        _ => after(of_error(error), &error.to_string()),
+    }
+}
+
+/// A note as the user of the program reads it.
+pub(crate) fn note(note: &Note) -> String {
+    after(of_note(note), &note.to_string())
+}
+
+/// `message`, headed by the flag that it is about.
+fn after(flag: Option<&str>, message: &str) -> String {
+    flag.map_or_else(|| message.to_owned(), |flag| format!("{flag}: {message}"))
+}
+
+fn of_error(error: &JobError) -> Option<&'static str> {
+    match error {
+        JobError::Edit { .. } => Some("--set"),
+        JobError::Conflict(Conflict::NoChannels { what: Channels::Layers, .. }) => Some("--layers"),
+        JobError::Conflict(Conflict::NoChannels { what: Channels::Aovs, .. }) => Some("--aovs"),
+        JobError::Conflict(Conflict::NoFigures { .. }) => Some("--figures"),
+        JobError::Streaks(fault) => of_streaks(fault),
+        _ => None,
+    }
+}
+
+fn of_streaks(fault: &StreaksFault) -> Option<&'static str> {
+    Some(match fault {
+        StreaksFault::Empty(list) | StreaksFault::Value { list, .. } | StreaksFault::Order { list, .. } => match list {
+            ListKind::Rates => "--rates",
+            ListKind::Diameters => "--diameters",
+        },
+        StreaksFault::Exposure(_) => "--exposure",
+        StreaksFault::Size(_) => "--size",
+        StreaksFault::Edge(_) | StreaksFault::Drops { .. } => "--box",
+        StreaksFault::Variants(_) => "--variants",
+        StreaksFault::Light => "--light",
+        StreaksFault::Velocity(_) => "--velocity",
+        _ => return None,
+    })
+}
+
+fn of_note(note: &Note) -> Option<&'static str> {
+    Some(match note {
+        Note::BitsUnused { .. } => "--bits",
+        Note::ViewUnused => "--view",
+        Note::ResumeUnused { .. } | Note::ResumeSheet => "--resume",
+        Note::SnapshotsUnused => "--snapshots",
+        _ => return None,
+    })
+}
