@@ -1,4 +1,7 @@
 //! Files in one, as a ZIP that stores them as they are: pictures are compressed already (APPNOTE 6.3, sections 4.3.7 to 4.3.16).
+//!
+//! Our own, since it is short and a page writes it piece by piece, without going back. The crate `zip` (9.4) then writes each checksum after
+//! its file, which readers that go piece by piece too cannot take of stored files, and brings random numbers and the system's calls.
 
 use std::io::{self, Write};
 

@@ -7,7 +7,7 @@ use bansho_base::{
     canvas::{Shutter, View},
     color,
     image::{FrameHeader, Rect},
-    parameters::{Auto, Parameter, path},
+    parameters::{Auto, path},
     phenomenon::{Phenomenon, Remark},
     surroundings::Occluder,
     wind::Wind,
@@ -15,7 +15,7 @@ use bansho_base::{
 
 use crate::{
     fingerprint, phenomena,
-    scene::{FrameRate, ObstacleParameters, OpeningFault, Scene},
+    scene::{FrameRate, ObstacleParameters, OpeningFault, SHARED_TABLES, Scene, SharedTable},
 };
 
 /// What a job may change of a scene.
@@ -283,15 +283,9 @@ impl Plan {
     /// Makes keyed values repeat, which must come back to where they began.
     fn close_loop(&mut self) -> Result<(), PlanError> {
         let Some(seconds) = self.loop_s else { return Ok(()) };
-        let Scene { wind, camera, sky, ground, lights, .. } = &mut self.scene;
-        let jumps = [
-            ("wind", wind.close_loop(seconds)),
-            ("camera", camera.close_loop(seconds)),
-            ("sky", sky.close_loop(seconds)),
-            ("ground", ground.close_loop(seconds)),
-            ("light", lights.close_loop(seconds)),
-        ];
-        match jumps.into_iter().find_map(|(table, rest)| rest.map(|rest| path(table, &rest))) {
+        let scene = &mut self.scene;
+        let jumps = |table: &SharedTable| (table.close_loop)(scene, seconds).map(|rest| path(table.key, &rest));
+        match SHARED_TABLES.iter().find_map(jumps) {
             Some(what) => Err(PlanError::LoopJumps { seconds, what }),
             None => Ok(()),
         }

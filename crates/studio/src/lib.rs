@@ -5,6 +5,7 @@
 //! [`player`] draws frames off the window's thread and keeps the time; [`app`] is the window.
 
 pub mod app;
+pub mod beginnings;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod bench;
 pub mod document;

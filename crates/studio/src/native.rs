@@ -10,6 +10,7 @@ use std::{
 use bansho::{Assets, media::plates::FileAssets};
 use bansho_studio::{
     app::{Session, Studio, window_size},
+    beginnings::FLAME_SHEET,
     bench,
     document::{Document, files},
     player::ThreadPlayer,
@@ -18,9 +19,6 @@ use eframe::egui;
 
 const USAGE: &str =
     "usage: bansho-studio [SCENE]\n       bansho-studio --bench [NAME]    pictures a second of each phenomenon here";
-
-/// What a studio without a scene begins with.
-const BEGINNING: &str = "bansho = 1\n\n[[flame_sheet]]\nname = \"fire\"\n";
 
 pub(super) fn main() -> ExitCode {
     let mut arguments = std::env::args_os().skip(1);
@@ -70,7 +68,7 @@ fn fail(message: &str) -> ExitCode {
 fn run(scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
     let document = match &scene {
         Some(path) => files::open(path)?,
-        None => Document::new("scene", BEGINNING),
+        None => Document::new("scene", FLAME_SHEET),
     };
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()

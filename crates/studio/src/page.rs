@@ -1,6 +1,6 @@
 //! The studio in a page: on the canvas `studio`, with the example that the address names after its `#`.
 
-use std::{path::Path, sync::Arc};
+use std::{cell::Cell, path::Path, rc::Rc, sync::Arc};
 
 use bansho::Assets;
 use bansho_studio::{
@@ -9,9 +9,9 @@ use bansho_studio::{
     examples::{Bundle, SCENES},
     player::{Player, SlicePlayer, WorkerPlayer},
 };
-use eframe::egui::Context;
-use wasm_bindgen::{JsCast, JsValue};
-use web_sys::HtmlCanvasElement;
+use eframe::egui::{self, Context};
+use wasm_bindgen::{JsCast, JsValue, closure::Closure};
+use web_sys::{Event, HtmlCanvasElement};
 
 /// What is shown where the address names nothing.
 const FIRST: &str = "campfire";
@@ -31,11 +31,55 @@ async fn start() -> Result<(), JsValue> {
     let build = move |creation: &eframe::CreationContext| {
         let ctx = creation.egui_ctx.clone();
         let session = Session::new(scene(&named), None, player(ctx), no_folder);
-        Ok(Box::new(Studio::new(session, None)) as Box<dyn eframe::App>)
+        let page = Page { studio: Studio::new(session, None), told: String::new(), unsaved: ask_before_leaving() };
+        Ok(Box::new(page) as Box<dyn eframe::App>)
     };
     eframe::WebRunner::new().start(canvas, eframe::WebOptions::default(), Box::new(build)).await?;
     say("");
     Ok(())
+}
+
+/// The studio, and what the page around its canvas must know of it.
+struct Page {
+    studio: Studio,
+    /// What the user was told last.
+    told: String,
+    unsaved: Rc<Cell<bool>>,
+}
+
+impl eframe::App for Page {
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        self.studio.ui(ui, frame);
+        let session = self.studio.session();
+        self.unsaved.set(session.document.is_dirty());
+        let notice = session.notice().unwrap_or_default();
+        if self.told != notice {
+            notice.clone_into(&mut self.told);
+            // Screen readers see no canvas.
+            write("notice", notice);
+        }
+    }
+
+    fn on_exit(&mut self) {
+        self.studio.on_exit();
+    }
+}
+
+/// Whether work would be lost where the page is left, to be kept up to date: the browser asks first then.
+fn ask_before_leaving() -> Rc<Cell<bool>> {
+    let unsaved = Rc::new(Cell::new(false));
+    let asked = unsaved.clone();
+    let ask = Closure::<dyn FnMut(Event)>::new(move |event: Event| {
+        if asked.get() {
+            event.prevent_default();
+        }
+    });
+    if let Some(window) = web_sys::window() {
+        window.set_onbeforeunload(Some(ask.as_ref().unchecked_ref()));
+    }
+    // It asks for as long as the page is open.
+    ask.forget();
+    unsaved
 }
 
 /// A worker, or slices of the page's own time where the browser gives none.
@@ -58,10 +102,15 @@ fn no_folder(_: &Path) -> Arc<dyn Assets> {
     Arc::new(Bundle::default())
 }
 
-/// Tells the user, in the element `status`.
+/// Tells the user, in the middle of the page.
 fn say(text: &str) {
+    write("status", text);
+}
+
+/// Writes `text` into the element `id`.
+fn write(id: &str, text: &str) {
     let document = web_sys::window().and_then(|window| window.document());
-    if let Some(status) = document.and_then(|document| document.get_element_by_id("status")) {
-        status.set_text_content(Some(text));
+    if let Some(element) = document.and_then(|document| document.get_element_by_id(id)) {
+        element.set_text_content(Some(text));
     }
 }

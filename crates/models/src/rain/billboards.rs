@@ -149,8 +149,7 @@ impl<'a> Billboards<'a> {
         let [across, up, choice, mirrored] = moment.key.uniforms(contents, 0, class.purpose(OFFSET));
         let [x, z, chance, _] = moment.key.uniforms(contents, 0, class.purpose(PLACE));
         // Anywhere within the cell's ground: no two stand in a row.
-        let place = DVec3::from(cell.0.map(|count| count as f64)) + DVec3::new(x.into(), 0.5, z.into());
-        let (middle, velocity) = moment.drop(class, place);
+        let (middle, velocity) = moment.drop(class, cell, DVec3::new(x.into(), 0.5, z.into()));
         let height = class.lattice.height();
         let base = middle - DVec3::Y * (0.5 * height);
         let right = right_facing(moment.sight.middle(), base);

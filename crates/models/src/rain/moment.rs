@@ -2,7 +2,7 @@
 
 use bansho_base::{
     canvas::View,
-    math::DVec3,
+    math::{DVec2, DVec3},
     random::{Key, Purpose},
     surroundings::{Occluder, Surroundings},
 };
@@ -21,9 +21,11 @@ use super::{
 const GUST_SLACK: f64 = 0.2;
 /// Part of the region's radius over which rain changes from streaks to veil, half of it on each side.
 const EDGE: f64 = 0.2;
+/// How far beyond that cells may be asked for, m: lamps at its border light some around them.
+const AROUND_REGION: f64 = 8.0;
 
 /// The drops of one diameter during an exposure.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct ClassNow {
     /// Which diameter, counted from the smallest.
     pub(crate) index: usize,
@@ -86,10 +88,12 @@ impl Moment {
         let (wind, response) = (surroundings.wind, parameters.wind_response);
         let radius = parameters.distance * (1.0 + EDGE) + 2.0 * CELL;
         let mean = wind.mean(t) * response;
+        let ground = ground(&surroundings.others.occluders).unwrap_or(parameters.ground_height);
+        let (eye, reach) = (sight.middle().position, parameters.distance * (1.0 + EDGE) + AROUND_REGION);
         Self {
             key: rain.key,
-            classes: rain.classes(t, wind),
-            ground: ground(&surroundings.others.occluders).unwrap_or(parameters.ground_height),
+            classes: rain.classes(t, wind, ground, eye.y - reach..=eye.y + reach),
+            ground,
             distance: parameters.distance,
             gain: parameters.opacity_gain,
             wind: DVec3::new(mean.x, 0.0, mean.z),
@@ -112,10 +116,9 @@ impl Moment {
     }
 
     /// The drops of a cell of a class.
-    pub(crate) fn cell(&self, class: &ClassNow, Cell(cell): Cell) -> CellNow {
+    pub(crate) fn cell(&self, class: &ClassNow, cell: Cell) -> CellNow {
         let eye = self.sight.middle().position;
-        let corner =
-            |step: [f64; 3]| class.lattice.world(DVec3::from(cell.map(|count| count as f64)) + DVec3::from(step));
+        let corner = |step: [f64; 3]| class.lattice.world(cell, DVec3::from(step));
         let origin = corner([0.0; 3]);
         let [base, right, up, back] = [
             origin - eye,
@@ -133,9 +136,9 @@ impl Moment {
         CellNow { base, axes: [right, up, back], velocity, blown }
     }
 
-    /// Where a place of a class's lattice is half way through the exposure, and its velocity, m/s.
-    pub(crate) fn drop(&self, class: &ClassNow, place: DVec3) -> (DVec3, DVec3) {
-        let steady = class.lattice.world(place);
+    /// Where a place within a cell of a class is half way through the exposure, in shares of its edges, and its velocity, m/s.
+    pub(crate) fn drop(&self, class: &ClassNow, cell: Cell, within: DVec3) -> (DVec3, DVec3) {
+        let steady = class.lattice.world(cell, within);
         let velocity = self.wind - DVec3::Y * class.speed;
         match &self.gusts {
             None => (steady, velocity),
@@ -156,20 +159,18 @@ impl Moment {
         let around = [centre - reach, centre + reach];
         let [low, high] = self.gusts.as_ref().map_or(around, |gusts| gusts.origins(around));
         let way = 0.5 * (class.speed + self.sight.velocity().length()) * self.sight.exposure + slack + LARGEST;
-        let row = |y: f64| class.lattice.place(DVec3::new(low.x, y, low.z)).y.floor() as i64;
-        let rows = [low.y.max(self.ground - CELL), high.y].map(row);
+        let rows = [low.y.max(self.ground - CELL), high.y].map(|y| class.lattice.row(y));
         let mut cells = Vec::new();
         for row in rows[0]..=rows[1] {
-            let height = class.lattice.world(DVec3::new(0.0, row as f64, 0.0)).y;
-            let [first, last] = [low, high].map(|corner| class.lattice.place(DVec3::new(corner.x, height, corner.z)));
-            for x in first.x.floor() as i64..=last.x.floor() as i64 {
-                for z in first.z.floor() as i64..=last.z.floor() as i64 {
-                    let place = DVec3::new(x as f64 + 0.5, row as f64 + 0.5, z as f64 + 0.5);
-                    let (point, velocity) = self.drop(class, place);
+            let [first, last] = [low, high].map(|corner| class.lattice.column(row, DVec2::new(corner.x, corner.z)));
+            for x in first[0]..=last[0] {
+                for z in first[1]..=last[1] {
+                    let cell = Cell([x, row, z]);
+                    let (point, velocity) = self.drop(class, cell, DVec3::splat(0.5));
                     let nearest = ((point - centre).abs() - half).max(DVec3::ZERO).length();
                     let blown = 0.5 * DVec3::new(velocity.x, 0.0, velocity.z).length() * self.sight.exposure;
                     if nearest < radius && self.sight.may_see(point, half, way + blown) {
-                        cells.push(((point - eye).length(), Cell([x, row, z])));
+                        cells.push(((point - eye).length(), cell));
                     }
                 }
             }

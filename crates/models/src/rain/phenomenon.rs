@@ -1,5 +1,7 @@
 //! Rain as a phenomenon of a scene.
 
+use std::ops::RangeInclusive;
+
 use bansho_base::{
     canvas::{AovDescriptor, DepthInterval, Shutter, View},
     observer::{Cancelled, Observer, check},
@@ -14,12 +16,13 @@ use super::{
     aovs::AOVS,
     distribution::{DropSizes, SizeBin},
     extinction::{Losses, extinction},
-    lattice::Lattice,
+    lattice::{Falling, Lattice},
     lens::DropLens,
     light::Scattering,
     moment::{ClassNow, ground},
     parameters::RainParameters,
     prepared::PreparedRain,
+    sky::SeenSkies,
     velocity::{Air, Fall},
 };
 use crate::fault::{FaultKind, ParameterFault};
@@ -35,6 +38,7 @@ pub struct Rain {
     pub(super) key: Key,
     pub(super) lens: DropLens,
     pub(super) scattering: Scattering,
+    pub(super) skies: SeenSkies,
     classes: Vec<Class>,
     pub(super) loop_s: Option<f64>,
 }
@@ -72,6 +76,7 @@ impl Rain {
             name: name.to_owned(),
             key: Key::new(seed, name),
             scattering: Scattering::new(&lens),
+            skies: SeenSkies::default(),
             lens,
             classes,
             loop_s,
@@ -89,16 +94,17 @@ impl Rain {
         self.parameters.rate_mm_per_h.at(self.loop_s.map_or(t, |seconds| t.rem_euclid(seconds)))
     }
 
-    /// The drops of each diameter at time `t`.
-    pub(super) fn classes(&self, t: f64, wind: &Wind) -> Vec<ClassNow> {
+    /// The drops of each diameter at time `t` between two `heights` (m) over the `ground`.
+    pub(super) fn classes(&self, t: f64, wind: &Wind, ground: f64, heights: RangeInclusive<f64>) -> Vec<ClassNow> {
         let sizes = DropSizes::marshall_palmer(self.rate(t));
+        let (response, loop_s) = (self.parameters.wind_response, self.loop_s);
         let now = |(index, class): (usize, &Class)| ClassNow {
             index,
             diameter_mm: class.bin.diameter_mm,
             speed: class.speed,
             most: class.most,
             share: if class.most > 0.0 { class.bin.count(&sizes) / class.most } else { 0.0 },
-            lattice: Lattice::new(class.speed, wind, self.parameters.wind_response, self.loop_s, t),
+            lattice: Lattice::new(&Falling { speed: class.speed, wind, response, ground, loop_s }, heights.clone(), t),
         };
         self.classes.iter().enumerate().map(now).collect()
     }

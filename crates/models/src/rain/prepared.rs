@@ -22,10 +22,9 @@ use super::{
     part::Part,
     patch::{Patch, STRETCH},
     singles::Singles,
-    sky::{endless_rain, sky_through_drops},
     splashes::Splashes,
     stroke::Record,
-    tiles::{COARSE, FINE, Tiles},
+    tiles::Tiles,
     veil::Veil,
 };
 
@@ -50,10 +49,10 @@ impl<'a> PreparedRain<'a> {
         let extinctions = rain.extinctions(view.shutter.middle());
         let lights = &surroundings.others.lights;
         let lighting = Lighting { scattering: &rain.scattering, lights, extinction: extinctions[0] };
-        let tiles = Tiles::new(view, COARSE);
-        let sky = sky_through_drops(&rain.lens, &tiles, &surroundings.sky);
+        let seen = rain.skies.of(&rain.lens, view, surroundings.sky);
+        let (tiles, sky) = &seen.coarse;
         let beams = lighting.beams(moment.sight.middle().position);
-        let frame = Frame { rain, moment: &moment, lighting: &lighting, beams: &beams, tiles: &tiles, sky: &sky, view };
+        let frame = Frame { rain, moment: &moment, lighting: &lighting, beams: &beams, tiles, sky, view };
         let region = moment.around_camera(1.1 * moment.distance);
         let mut billboards = 0;
         let mut parts = match rain.parameters.method {
@@ -71,10 +70,7 @@ impl<'a> PreparedRain<'a> {
         parts.extend(frame.splashes());
         let ends =
             [if rain.parameters.veil_distance > 0.0 { rain.near_reach() } else { 0.0 }, rain.reach(surroundings)];
-        let fine = Tiles::new(view, FINE);
-        let fine_sky =
-            [sky_through_drops(&rain.lens, &fine, &surroundings.sky), endless_rain(&fine, &surroundings.sky)];
-        let veil = Veil::new(&moment, &lighting, &fine, fine_sky, view, extinctions, ends);
+        let veil = Veil::new(&moment, &lighting, seen.clone(), view, extinctions, ends);
         let figures = frame.figures(parts.iter().map(Part::count).sum(), billboards);
         Self { view, level: Level::new(), parts, streaks_end: rain.streaks_end(), veil, figures }
     }

@@ -1,5 +1,7 @@
 //! Rain that is not seen drop by drop: it greys what lies behind it and glows around lamps.
 
+use std::sync::Arc;
+
 use bansho_base::{
     canvas::{DepthInterval, Strip, View},
     image::Rect,
@@ -13,6 +15,7 @@ use super::{
     bands::BAND,
     light::Lighting,
     moment::Moment,
+    sky::SeenSky,
     tiles::{FINE, FINEST, Tiles, geometric, mix},
 };
 
@@ -119,17 +122,16 @@ impl Span {
 pub(crate) struct Veil<'a> {
     level: Level,
     view: &'a View,
-    tiles: Tiles,
+    /// The sky as it is seen from the corners of its finer tiles, at which light is known.
+    seen: Arc<SeenSky>,
     /// Ascending from 0, m.
     distances: Vec<f64>,
     /// Optical depth up to each distance.
     depths: Vec<f32>,
-    /// Light of all lamps and fires scattered to the camera.
-    scattered: Scattered,
+    /// Light of all lamps and fires scattered to the camera, if there are any.
+    scattered: Option<Scattered>,
     /// Lamps in the picture.
     halos: Vec<Halo>,
-    /// Light of the sky that each drop sends to the camera, and that of the sky itself where rain is endless, by corner.
-    sky: [Vec<[f32; 3]>; 2],
     /// How far the light of lamps is known, and the veil before a plate reaches, m.
     end: f64,
     ground: f64,
@@ -137,12 +139,11 @@ pub(crate) struct Veil<'a> {
 
 impl<'a> Veil<'a> {
     /// The veil of drops with extinctions `[all, drawn as streaks]` up to the first of `ends` (m), and to the second where there is
-    /// no plate; `None` where there is none. `sky` is what drops show of it, and itself.
+    /// no plate; `None` where there is none.
     pub(crate) fn new(
         moment: &Moment,
         lighting: &Lighting,
-        tiles: &Tiles,
-        sky: [Vec<[f32; 3]>; 2],
+        seen: Arc<SeenSky>,
         view: &'a View,
         extinction: [f64; 2],
         [end, farthest]: [f64; 2],
@@ -165,23 +166,21 @@ impl<'a> Veil<'a> {
         }
         let eye = moment.sight.middle().position;
         let march = March { lighting, density, eye, distances: &distances, depths: &depths, end };
+        let tiles = &seen.fine.0;
         let (shown, others) = march.divide(view);
-        let lines = tiles.map(|_, line| march.line(line, &others));
-        let mut scattered = Scattered::new(&lines, distances.len());
         let halos: Vec<Halo> = shown.into_iter().map(|(light, pixel)| march.halo(&light, pixel, tiles, view)).collect();
-        halos.iter().for_each(|halo| scattered.add(&halo.scattered));
-        Some(Self {
-            level: Level::new(),
-            view,
-            tiles: tiles.clone(),
-            distances,
-            depths,
-            scattered,
-            halos,
-            sky,
-            end,
-            ground: moment.ground,
-        })
+        let scattered = (!lighting.lights.is_empty()).then(|| {
+            let lines = tiles.map(|_, line| march.line(line, &others));
+            let mut scattered = Scattered::new(&lines, distances.len());
+            halos.iter().for_each(|halo| scattered.add(&halo.scattered));
+            scattered
+        });
+        Some(Self { level: Level::new(), view, seen, distances, depths, scattered, halos, end, ground: moment.ground })
+    }
+
+    /// At whose corners light is known.
+    fn tiles(&self) -> &Tiles {
+        &self.seen.fine.0
     }
 
     /// Which distances a distance lies between, and how far from the first to the second.
@@ -202,13 +201,17 @@ impl<'a> Veil<'a> {
 
     /// Light and transmittance of a span at a corner column, `down` of the way from corner row `row` to the next.
     fn between(&self, column: usize, (row, down): (usize, f32), span: &Span) -> [f32; 4] {
-        let index = row * self.tiles.size[0] + column;
-        let below = index + self.tiles.size[0];
+        let (tiles, sky) = &self.seen.fine;
+        let index = row * tiles.size[0] + column;
+        let below = index + tiles.size[0];
         let [near, far] = span.depths;
         let through = math::lanes::exp(near - far);
         let opacities = span.depths.map(|depth| 1.0 - math::lanes::exp(-depth));
-        let lit = mix(span.lit(&self.scattered, index), span.lit(&self.scattered, below), down);
-        let [once, endless] = [0, 1].map(|k| mix(self.sky[k][index], self.sky[k][below], down));
+        let lit = match &self.scattered {
+            Some(scattered) => mix(span.lit(scattered, index), span.lit(scattered, below), down),
+            None => [0.0; 3],
+        };
+        let [once, endless] = [0, 1].map(|k| mix(sky[k][index], sky[k][below], down));
         // Up to opacity o rain shows `o (1 - o)` of what it scatters once, and `o^2` of what it scatters ever again: endless rain
         // is the sky.
         let again = opacities[0] + opacities[1];
@@ -231,7 +234,7 @@ impl<'a> Veil<'a> {
             let lit = span.lit(&halo.sharp, corner);
             (0..3).for_each(|c| correction[c] += lit[c] * factor);
         }
-        for (corner, share) in self.tiles.corners(place) {
+        for (corner, share) in self.tiles().corners(place) {
             let lit = span.lit(&halo.scattered, corner);
             (0..3).for_each(|c| correction[c] -= lit[c] * share);
         }
@@ -286,10 +289,10 @@ impl<'a> Veil<'a> {
     /// Nothing but the ground ends the veil: it is found at the corners of tiles.
     #[inline(always)]
     fn draw_open(&self, slice: &DepthInterval, band: usize, rows: Rect, strip: &mut Strip) {
-        let side = self.tiles.side;
+        let side = self.tiles().side;
         let columns = rows.x / side..rows.right().div_ceil(side) + 1;
         let edge = |y: f64| -> Vec<[f32; 4]> {
-            let place = self.tiles.row_at(y as f32);
+            let place = self.tiles().row_at(y as f32);
             let corner = |column: usize| {
                 let range = self.range(DVec2::new((column * side) as f64, y), slice, None);
                 range.map_or([0.0, 0.0, 0.0, 1.0], |range| self.between(column, place, &self.span(range)))
@@ -326,7 +329,7 @@ impl<'a> Veil<'a> {
     /// A plate may end the veil anywhere, so every pixel finds its own.
     fn draw_before_plate(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
         for y in rows.y..rows.bottom() {
-            let place = self.tiles.row_at(y as f32 + 0.5);
+            let place = self.tiles().row_at(y as f32 + 0.5);
             for x in rows.x..rows.right() {
                 let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
                 let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
@@ -334,7 +337,7 @@ impl<'a> Veil<'a> {
                 if range[1] <= range[0] {
                     continue;
                 }
-                let side = self.tiles.side;
+                let side = self.tiles().side;
                 let column = x / side;
                 let across = ((x % side) as f32 + 0.5) / side as f32;
                 let span = self.span(range);

@@ -19,7 +19,7 @@ use bansho_base::{
     animation::Animated,
     assets::Assets,
     camera::{CameraParameters, SKY_FOV_DEG},
-    parameters::{Parameters, Problem, ProblemKind, Reader, Table, TableDescriptor, Value},
+    parameters::{Parameter, Parameters, Problem, ProblemKind, Reader, Table, TableDescriptor, Value},
     sky::SkyParameters,
     wind::WindParameters,
 };
@@ -52,20 +52,31 @@ pub struct SharedTable {
     pub many: bool,
     /// Its parameters.
     pub table: fn() -> &'static TableDescriptor,
+    /// Makes those of a scene that are keyed repeat every so many seconds, which must come back to where they began; the first that do not.
+    pub(crate) close_loop: fn(&mut Scene, f64) -> Option<String>,
 }
 
 /// Shared tables, in the order in which a scene should state them.
 pub const SHARED_TABLES: [SharedTable; 9] = [
-    SharedTable { key: "picture", many: false, table: PictureParameters::table },
-    SharedTable { key: "camera", many: false, table: CameraParameters::table },
-    SharedTable { key: "plate", many: false, table: PlateParameters::table },
-    SharedTable { key: "wind", many: false, table: WindParameters::table },
-    SharedTable { key: "air", many: false, table: Air::table },
-    SharedTable { key: "sky", many: false, table: SkyParameters::table },
-    SharedTable { key: "ground", many: false, table: GroundParameters::table },
-    SharedTable { key: "light", many: true, table: LightParameters::table },
-    SharedTable { key: "obstacle", many: true, table: ObstacleParameters::table },
+    shared("picture", false, PictureParameters::table, |scene, seconds| scene.picture.close_loop(seconds)),
+    shared("camera", false, CameraParameters::table, |scene, seconds| scene.camera.close_loop(seconds)),
+    shared("plate", false, PlateParameters::table, |scene, seconds| scene.plate.close_loop(seconds)),
+    shared("wind", false, WindParameters::table, |scene, seconds| scene.wind.close_loop(seconds)),
+    shared("air", false, Air::table, |scene, seconds| scene.air.close_loop(seconds)),
+    shared("sky", false, SkyParameters::table, |scene, seconds| scene.sky.close_loop(seconds)),
+    shared("ground", false, GroundParameters::table, |scene, seconds| scene.ground.close_loop(seconds)),
+    shared("light", true, LightParameters::table, |scene, seconds| scene.lights.close_loop(seconds)),
+    shared("obstacle", true, ObstacleParameters::table, |scene, seconds| scene.obstacles.close_loop(seconds)),
 ];
+
+const fn shared(
+    key: &'static str,
+    many: bool,
+    table: fn() -> &'static TableDescriptor,
+    close_loop: fn(&mut Scene, f64) -> Option<String>,
+) -> SharedTable {
+    SharedTable { key, many, table, close_loop }
+}
 
 /// A phenomenon of the scene.
 #[derive(Clone)]
@@ -266,7 +277,6 @@ fn read_instances(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) -
 }
 
 fn read_instance(kind: PhenomenonKind, index: usize, table: &Table, reader: &mut Reader) -> Instance {
-    use bansho_base::parameters::Parameter;
     let name = table.get("name").and_then(|node| reader.within("name", |reader| check::name(node, reader)));
     let enabled = table.get("enabled").and_then(|node| reader.within("enabled", |r| bool::read(node, &(), "", r)));
     Instance {

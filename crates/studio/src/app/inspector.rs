@@ -4,7 +4,7 @@ use bansho::{
     base::parameters::{Descriptor, Kind, TableDescriptor, Value},
     render::scene::{Place, operation::Operation},
 };
-use eframe::egui::{Align, CollapsingHeader, Label, Layout, Response, RichText, Ui, vec2};
+use eframe::egui::{Align, CollapsingHeader, Label, Layout, Response, RichText, TextEdit, Ui, vec2};
 
 use super::{
     icon::{self, Icon},
@@ -14,63 +14,123 @@ use super::{
     value::{Widget, somewhere_in},
 };
 
-/// Shows the parameters of `subject`.
-pub(super) fn show(ui: &mut Ui, session: &mut Session, subject: &Subject) {
-    let Some(descriptor) = subject.descriptor() else { return };
-    let place = subject.place();
-    ui.heading(subject.title(&session.document));
-    ui.weak(&descriptor.doc);
-    ui.separator();
-    if subject.index.is_some() && subject.place().find(session.document.values()).is_none() {
-        ui.label("It is not in the scene any more.");
-        return;
-    }
-    table(ui, session, &place, descriptor);
+/// The panel, and what is looked for in it.
+#[derive(Default)]
+pub(super) struct Inspector {
+    wanted: String,
 }
 
-fn table(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &TableDescriptor) {
-    for parameter in &descriptor.parameters {
+impl Inspector {
+    /// Shows the parameters of `subject`: all, or those whose names or descriptions hold what is looked for.
+    pub(super) fn show(&mut self, ui: &mut Ui, session: &mut Session, subject: &Subject) {
+        let Some(descriptor) = subject.descriptor() else { return };
+        let place = subject.place();
+        ui.heading(subject.title(&session.document));
+        ui.weak(&descriptor.doc);
+        ui.horizontal(|ui| {
+            let label = ui.label("Find").id;
+            let field = TextEdit::singleline(&mut self.wanted).hint_text("a parameter").desired_width(f32::INFINITY);
+            ui.add(field).labelled_by(label);
+        });
+        ui.separator();
+        if subject.index.is_some() && subject.place().find(session.document.values()).is_none() {
+            ui.label("It is not in the scene any more.");
+            return;
+        }
+        let wanted = Wanted::new(&self.wanted);
+        if !wanted.is_in(descriptor) {
+            ui.weak("Nothing here is called so.");
+        }
+        table(ui, session, &place, descriptor, &wanted);
+    }
+}
+
+/// What is looked for; empty for everything.
+struct Wanted(String);
+
+impl Wanted {
+    fn new(text: &str) -> Self {
+        Self(text.trim().to_lowercase())
+    }
+
+    fn is_everything(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Whether a parameter, or any within it, is looked for.
+    fn is(&self, parameter: &Descriptor) -> bool {
+        let said = |text: &str| text.to_lowercase().contains(&self.0);
+        let within = match &parameter.kind {
+            Kind::Table(inner) => self.is_in(inner()),
+            Kind::List { item, .. } => matches!(&**item, Kind::Table(inner) if self.is_in(inner())),
+            _ => false,
+        };
+        within || said(&words(parameter.key)) || said(&parameter.doc)
+    }
+
+    fn is_in(&self, table: &TableDescriptor) -> bool {
+        table.parameters.iter().any(|parameter| self.is(parameter))
+    }
+}
+
+fn table(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &TableDescriptor, wanted: &Wanted) {
+    // Where a section itself is looked for, all of it is.
+    let all = Wanted(String::new());
+    let wanted = if wanted.is_in(descriptor) { wanted } else { &all };
+    for parameter in descriptor.parameters.iter().filter(|parameter| wanted.is(parameter)) {
         let own = place.key(parameter.key);
         match &parameter.kind {
-            Kind::Table(inner) => section(ui, session, &own, parameter.key, inner()),
-            Kind::List { item, .. } => list(ui, session, &own, parameter, item),
+            Kind::Table(inner) => section(ui, session, &own, parameter.key, inner(), wanted),
+            Kind::List { item, .. } => list(ui, session, &own, parameter, item, wanted),
             _ => row(ui, session, &own, parameter),
         }
     }
 }
 
-fn section(ui: &mut Ui, session: &mut Session, place: &Place, title: &str, descriptor: &TableDescriptor) {
-    let header = CollapsingHeader::new(words(title)).id_salt(place).show(ui, |ui| {
-        table(ui, session, place, descriptor);
+/// A part that opens by itself while something in it is looked for.
+fn header(title: &str, place: &Place, wanted: &Wanted) -> CollapsingHeader {
+    CollapsingHeader::new(words(title)).id_salt(place).open((!wanted.is_everything()).then_some(true))
+}
+
+fn section(
+    ui: &mut Ui,
+    session: &mut Session,
+    place: &Place,
+    title: &str,
+    descriptor: &TableDescriptor,
+    wanted: &Wanted,
+) {
+    let shown = header(title, place, wanted).show(ui, |ui| {
+        table(ui, session, place, descriptor, wanted);
     });
-    header.header_response.on_hover_text(&descriptor.doc);
+    shown.header_response.on_hover_text(&descriptor.doc);
 }
 
 /// The items of a list; tables among them are sections.
-fn list(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, item: &Kind) {
+fn list(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, item: &Kind, wanted: &Wanted) {
     let stated = place.find(session.document.values()).map(|node| node.value.clone());
     let items = match stated.or_else(|| parameter.default.clone()) {
         Some(Value::List(items)) => items,
         _ => Vec::new(),
     };
-    let header = CollapsingHeader::new(words(parameter.key)).id_salt(place).show(ui, |ui| {
+    let shown = header(parameter.key, place, wanted).show(ui, |ui| {
         for (index, node) in items.iter().enumerate() {
-            list_item(ui, session, &place.index(index), item, &node.value);
+            list_item(ui, session, &place.index(index), item, &node.value, wanted);
         }
         if ui.button(format!("Add to {}", words(parameter.key))).clicked() {
             session.edit("add", &[Operation::Append { place: place.clone(), value: somewhere_in(item) }]);
         }
     });
-    header.header_response.on_hover_text(&parameter.doc);
+    shown.header_response.on_hover_text(&parameter.doc);
 }
 
-fn list_item(ui: &mut Ui, session: &mut Session, place: &Place, kind: &Kind, value: &Value) {
+fn list_item(ui: &mut Ui, session: &mut Session, place: &Place, kind: &Kind, value: &Value, wanted: &Wanted) {
     ui.horizontal(|ui| {
         if icon::button(ui, Icon::Cross, &format!("Remove {place}")).clicked() {
             session.edit("remove", &[Operation::Remove { place: place.clone() }]);
         }
         match kind {
-            Kind::Table(inner) => section(ui, session, place, &place.to_string(), inner()),
+            Kind::Table(inner) => section(ui, session, place, &place.to_string(), inner(), wanted),
             kind => {
                 let label = ui.label(place.to_string()).id;
                 if let Some(value) = (Widget { kind, unit: "", label, usual: None }).show(ui, value) {
@@ -164,6 +224,6 @@ fn help(parameter: &Descriptor) -> String {
 }
 
 /// A key in words.
-fn words(key: &str) -> String {
+pub(super) fn words(key: &str) -> String {
     key.replace('_', " ")
 }

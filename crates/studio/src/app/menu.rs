@@ -6,6 +6,7 @@ use eframe::egui::{self, ThemePreference, Ui};
 
 use super::Studio;
 use crate::{
+    beginnings::BEGINNINGS,
     document::{Document, files, recovery::Recovered},
     examples,
 };
@@ -24,6 +25,13 @@ impl Studio {
     }
 
     fn file_menu(&mut self, ui: &mut Ui) {
+        ui.menu_button("New", |ui| {
+            for (name, text) in BEGINNINGS {
+                if ui.button(name).clicked() {
+                    self.files.open_bundled(&mut self.session, "scene", text);
+                }
+            }
+        });
         if ui.button("Open…").clicked() {
             self.files.ask_to_open(ui.ctx(), &mut self.session);
         }
@@ -39,7 +47,7 @@ impl Studio {
             for &(name, text) in examples::SCENES {
                 let words = name.trim_end_matches(".toml").replace('_', " ");
                 if ui.button(words).clicked() {
-                    self.files.open_example(&mut self.session, name, text);
+                    self.files.open_bundled(&mut self.session, name, text);
                 }
             }
         });
@@ -60,6 +68,7 @@ impl Studio {
 
     fn view_menu(&mut self, ui: &mut Ui) {
         ui.checkbox(&mut self.shows.text, "Text");
+        ui.checkbox(&mut self.shows.picture_alone, "Only the picture");
         ui.checkbox(&mut self.shows.shortcuts, "Shortcuts");
         ui.separator();
         let mut theme = ui.ctx().options(|options| options.theme_preference);

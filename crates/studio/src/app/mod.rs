@@ -2,6 +2,7 @@
 
 mod aurora;
 mod curve_editor;
+mod curves_view;
 mod files;
 mod gesture;
 mod hands;
@@ -33,7 +34,7 @@ use eframe::egui;
 
 pub use self::session::{AssetsOf, Session};
 use self::{
-    aurora::AuroraEditor, files::Files, layout::Layout, problems::Wanted, scene_panel::Subject,
+    aurora::AuroraEditor, files::Files, inspector::Inspector, layout::Layout, problems::Wanted, scene_panel::Subject,
     stages_view::StagesView, store::Store, text_panel::TextPanel, viewport::Viewport,
 };
 
@@ -50,6 +51,7 @@ pub struct Studio {
     viewport: Viewport,
     aurora: AuroraEditor,
     stages: StagesView,
+    inspector: Inspector,
     text: TextPanel,
     files: Files,
     shows: Shows,
@@ -68,6 +70,8 @@ pub fn window_size(home: Option<&std::path::Path>) -> [f32; 2] {
 struct Shows {
     text: bool,
     shortcuts: bool,
+    /// Nothing but the picture and its tools.
+    picture_alone: bool,
 }
 
 impl Studio {
@@ -82,9 +86,10 @@ impl Studio {
             viewport: Viewport::default(),
             aurora: AuroraEditor::default(),
             stages: StagesView::default(),
+            inspector: Inspector::default(),
             text: TextPanel::default(),
             files: Files::new(&store),
-            shows: Shows { text: layout.get("text shown", 0.0) > 0.0, shortcuts: false },
+            shows: Shows { text: layout.get("text shown", 0.0) > 0.0, ..Shows::default() },
             layout,
             opened: 0,
         }
@@ -106,13 +111,12 @@ impl Studio {
         egui::Panel::bottom("status").show(ui, |ui| status::show(ui, &mut self.session, &mut self.files));
         egui::Panel::bottom("timeline").show(ui, |ui| timeline::show(ui, &mut self.session));
         self.follow_opening();
-        self.side_panels(ui);
-        if let (KIND_WITH_SHAPES, Some(index)) = (self.subject.key, self.subject.index) {
-            let panel = egui::Panel::bottom("aurora").resizable(true);
-            let Self { aurora, session, layout, .. } = self;
-            layout.panel("aurora", panel, 420.0, ui, |ui| aurora.show(ui, session, index));
+        if self.shows.picture_alone {
+            self.session.stages = None;
+        } else {
+            self.panels(ui);
         }
-        egui::CentralPanel::default().show(ui, |ui| self.viewport.show(ui, &mut self.session));
+        egui::CentralPanel::default().show(ui, |ui| self.viewport.show(ui, &mut self.session, &self.subject));
         if self.shows.shortcuts {
             shortcuts::window(ui.ctx(), &mut self.shows.shortcuts);
         }
@@ -133,6 +137,15 @@ impl Studio {
         }
     }
 
+    fn panels(&mut self, ui: &mut egui::Ui) {
+        self.side_panels(ui);
+        if let (KIND_WITH_SHAPES, Some(index)) = (self.subject.key, self.subject.index) {
+            let panel = egui::Panel::bottom("aurora").resizable(true);
+            let Self { aurora, session, layout, .. } = self;
+            layout.panel("aurora", panel, 420.0, ui, |ui| aurora.show(ui, session, index));
+        }
+    }
+
     fn side_panels(&mut self, ui: &mut egui::Ui) {
         match problems::show(ui, &self.session) {
             Some(Wanted::Sight(span)) => {
@@ -142,7 +155,7 @@ impl Studio {
             Some(Wanted::File(place)) => self.files.ask_to_relink(ui.ctx(), &mut self.session, place),
             None => {}
         }
-        let Self { session, subject, text, stages, layout, shows, .. } = self;
+        let Self { session, subject, text, stages, inspector, layout, shows, .. } = self;
         layout.panel("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| scene_panel::show(ui, session, subject));
         });
@@ -154,7 +167,7 @@ impl Studio {
             if let (KIND_WITH_STAGES, Some(index)) = (subject.key, subject.index) {
                 stages.show(ui, session, index);
             }
-            egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| inspector::show(ui, session, subject));
+            egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| inspector.show(ui, session, subject));
         });
     }
 
@@ -187,10 +200,5 @@ impl eframe::App for Studio {
     fn on_exit(&mut self) {
         self.files.unsaved.end();
         self.layout.keep();
-    }
-
-    #[cfg(target_arch = "wasm32")]
-    fn as_any_mut(&mut self) -> Option<&mut dyn std::any::Any> {
-        Some(&mut *self)
     }
 }

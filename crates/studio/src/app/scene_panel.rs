@@ -140,6 +140,7 @@ fn phenomenon(ui: &mut Ui, session: &mut Session, subject: &mut Subject, listed:
 }
 
 fn context_menu(ui: &mut Ui, session: &mut Session, subject: &mut Subject, listed: &Listed) {
+    rename(ui, session, listed);
     if ui.button("Duplicate").clicked() {
         let copy = operations::duplicate(&session.document, listed);
         session.edit("duplicate", &copy);
@@ -150,4 +151,25 @@ fn context_menu(ui: &mut Ui, session: &mut Session, subject: &mut Subject, liste
         *subject = Subject::default();
         ui.close();
     }
+}
+
+/// A field for its name. Half a name may be another's, so that only a whole one is taken.
+fn rename(ui: &mut Ui, session: &mut Session, listed: &Listed) {
+    let kept = ui.scope_id().with("name");
+    let mut name = ui.data(|data| data.get_temp::<String>(kept)).unwrap_or_else(|| listed.name.clone());
+    ui.horizontal(|ui| {
+        let label = ui.label("Name").id;
+        let field = ui.add(egui::TextEdit::singleline(&mut name).desired_width(120.0)).labelled_by(label);
+        if field.changed() {
+            ui.data_mut(|data| data.insert_temp(kept, name.clone()));
+        }
+        if field.lost_focus() {
+            ui.data_mut(|data| data.remove::<String>(kept));
+            if !name.trim().is_empty() && name != listed.name {
+                let place = listed.place().key("name");
+                session.edit("rename", &[Operation::Set { place, value: Value::Text(name.trim().to_owned()) }]);
+                ui.close();
+            }
+        }
+    });
 }

@@ -40,6 +40,8 @@ pub struct Session {
     pub draft: bool,
     /// The flame sheet whose stages are seen.
     pub stages: Option<usize>,
+    /// Whether unsaved work must be kept at once.
+    pub keep_now: bool,
     player: Box<dyn Player>,
     assets_of: AssetsOf,
     bundle: Bundle,
@@ -82,6 +84,7 @@ impl Session {
             opened: 0,
             draft: true,
             stages: None,
+            keep_now: false,
             stage_pictures: Vec::new(),
             player,
             assets_of,
@@ -322,6 +325,7 @@ impl Session {
             Event::Panicked { revision, message } => {
                 self.broken = Some(revision);
                 self.transport.set_playing(false);
+                self.keep_now = true;
                 self.notice = Some(format!("a phenomenon panicked, which is a bug in it: {message}{}", self.rescue()));
             }
         }
@@ -337,9 +341,10 @@ impl Session {
         }
     }
 
+    /// The browser keeps the work at once, for a page writes no files by itself.
     #[cfg(target_arch = "wasm32")]
     fn rescue(&self) -> String {
-        String::new()
+        if self.document.is_dirty() { "; the browser keeps the scene".into() } else { String::new() }
     }
 
     fn judged(&mut self, revision: Revision, outcome: Result<Arc<Plan>, bansho::SceneError>) {

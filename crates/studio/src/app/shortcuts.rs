@@ -18,6 +18,7 @@ pub(super) enum Action {
     FrameOn,
     FirstFrame,
     Text,
+    PictureAlone,
     Shortcuts,
 }
 
@@ -37,7 +38,7 @@ const fn plain(key: Key, action: Action, name: &'static str) -> Shortcut {
 }
 
 /// All of them. Longer combinations come first, since a shorter one is part of them.
-pub(super) const SHORTCUTS: [Shortcut; 13] = [
+pub(super) const SHORTCUTS: [Shortcut; 14] = [
     Shortcut {
         keys: KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z),
         action: Action::Redo,
@@ -58,6 +59,7 @@ pub(super) const SHORTCUTS: [Shortcut; 13] = [
     plain(Key::ArrowLeft, Action::FrameBack, "Frame back"),
     plain(Key::ArrowRight, Action::FrameOn, "Frame on"),
     plain(Key::Home, Action::FirstFrame, "First frame"),
+    plain(Key::F, Action::PictureAlone, "Only the picture, or everything"),
     plain(Key::Questionmark, Action::Shortcuts, "These shortcuts"),
 ];
 
@@ -91,6 +93,7 @@ impl Studio {
             Action::FrameOn => transport.step(1),
             Action::FirstFrame => transport.go_to(*transport.range().start()),
             Action::Text => self.shows.text = !self.shows.text,
+            Action::PictureAlone => self.shows.picture_alone = !self.shows.picture_alone,
             Action::Shortcuts => self.shows.shortcuts = !self.shows.shortcuts,
         }
     }

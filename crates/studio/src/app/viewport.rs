@@ -14,8 +14,10 @@ use eframe::egui::{
 };
 
 use super::{
+    curves_view,
     gesture::Blowing,
     hands::{self, Stand, rounded},
+    scene_panel::Subject,
     session::Session,
     stages_view::image,
     things::{Thing, things},
@@ -44,6 +46,8 @@ pub(super) struct Viewport {
     pub(super) tool: Tool,
     blowing: Option<Blowing>,
     held: Option<Place>,
+    /// Whether curves lie on top of the picture.
+    curves: bool,
 }
 
 impl Viewport {
@@ -53,8 +57,8 @@ impl Viewport {
     }
 
     /// Shows the picture and takes in what hands do to it.
-    pub(super) fn show(&mut self, ui: &mut Ui, session: &mut Session) {
-        self.tools(ui, session);
+    pub(super) fn show(&mut self, ui: &mut Ui, session: &mut Session, subject: &Subject) {
+        self.tools(ui, session, subject);
         let (response, painter) = ui.allocate_painter(ui.available_size(), Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
         let scale = ui.ctx().pixels_per_point();
@@ -73,9 +77,12 @@ impl Viewport {
         }
         self.hands(ui, session, &response, frame);
         self.paint_things(session, &painter, frame);
+        if self.curves && curves_view::has_any(subject) {
+            curves_view::show(ui, session, subject, response.rect);
+        }
     }
 
-    fn tools(&mut self, ui: &mut Ui, session: &mut Session) {
+    fn tools(&mut self, ui: &mut Ui, session: &mut Session, subject: &Subject) {
         ui.horizontal_wrapped(|ui| {
             ui.selectable_value(&mut self.tool, Tool::Camera, "Camera")
                 .on_hover_text("Drag to orbit, with Shift or the middle button to pan, scroll to dolly");
@@ -85,6 +92,10 @@ impl Viewport {
                 .on_hover_text("What is dragged leaves keyframes; time passes while you blow or drag things");
             ui.toggle_value(&mut session.draft, "Draft")
                 .on_hover_text("Simulates with fewer particles, to follow your hands; rendering never does");
+            if curves_view::has_any(subject) {
+                ui.toggle_value(&mut self.curves, "Curves")
+                    .on_hover_text("The curves of what is chosen, on the picture");
+            }
             ui.separator();
             exposure(ui, session);
         });

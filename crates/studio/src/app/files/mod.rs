@@ -41,8 +41,8 @@ impl Files {
         Self { question: None, unsaved: Unsaved::new(store), closing: false, shelf: Shelf::new(store) }
     }
 
-    /// Opens one of the examples, after asking where that would lose work.
-    pub(super) fn open_example(&mut self, session: &mut Session, name: &str, text: &str) {
+    /// Opens a scene that the studio brings along, after asking where that would lose work.
+    pub(super) fn open_bundled(&mut self, session: &mut Session, name: &str, text: &str) {
         self.open_text(session, name, text.to_owned(), None);
     }
 

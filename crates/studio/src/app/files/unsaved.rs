@@ -47,7 +47,7 @@ impl Unsaved {
     /// Looks now and then whether there is something to keep.
     pub(super) fn tend(&mut self, ui: &Ui, session: &mut Session) {
         let now = ui.input(|input| input.time);
-        if now - self.last_kept < EVERY_S {
+        if now - self.last_kept < EVERY_S && !std::mem::take(&mut session.keep_now) {
             return;
         }
         self.last_kept = now;

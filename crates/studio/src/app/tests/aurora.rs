@@ -3,7 +3,7 @@
 use eframe::egui::{Key, Modifiers, Pos2, Rect, pos2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
-use super::{super::Studio, drawn, press, release, sky, text, window};
+use super::{super::Studio, drag, drawn, press, release, sky, text, window};
 use crate::document::{Document, drawing::Drawing, files};
 
 fn plane(harness: &Harness<'_, Studio>, name: &str) -> Rect {
@@ -169,14 +169,7 @@ fn sheets_and_points_are_linked_by_dragging() {
     choose(&mut harness, "Add shape");
     choose(&mut harness, "Link");
     let [source, target] = ["Aurora source", "Aurora target"].map(|name| plane(&harness, name));
-    let link = |harness: &mut Harness<'_, Studio>, from: Pos2, to: Pos2| {
-        press(harness, from);
-        for step in 1..=4 {
-            harness.hover_at(from.lerp(to, step as f32 / 4.0));
-            harness.step();
-        }
-        release(harness, to);
-    };
+    let link = |harness: &mut Harness<'_, Studio>, from: Pos2, to: Pos2| drag(harness, from, to - from);
     link(&mut harness, at(source, 0.5, 0.4), at(target, 0.5, 0.6));
     assert!(text(&mut harness).contains("link = [{ from = 1, to = 2 }]"), "{}", text(&mut harness));
     link(&mut harness, at(source, 0.5, 0.4), at(target, 0.5, 0.4));

@@ -2,7 +2,9 @@
 
 mod aurora;
 mod keeping;
+mod newcomer;
 mod pictures;
+mod reaching;
 mod values;
 
 use std::{
@@ -11,7 +13,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bansho::{Assets, media::plates::FileAssets};
+use bansho::{Assets, base::math::DVec3, media::plates::FileAssets};
 use eframe::egui::{self, Key, Modifiers, Role, vec2};
 use egui_kittest::{Harness, HarnessBuilder, kittest::Queryable};
 
@@ -227,12 +229,7 @@ fn blowing_is_wind_while_it_lasts_and_keyframes_when_recorded() {
 
     harness.get_by_label("Record").click();
     harness.run_steps(2);
-    press(&mut harness, middle);
-    for step in 1..30 {
-        harness.hover_at(middle + vec2(4.0 * step as f32, 0.0));
-        harness.step();
-    }
-    release(&mut harness, middle + vec2(116.0, 0.0));
+    drag_for_a_second(&mut harness, middle);
     let recorded = text(&mut harness);
     assert!(recorded.contains("velocity = { keys = [[0.0, [0.0, 0.0, 0.0]]"), "{recorded}");
     assert!(recorded.matches("], [").count() > 2, "{recorded}");
@@ -245,10 +242,7 @@ fn lamps_are_dragged() {
     let mut harness = window(SCENE);
     harness.get_by_label("Place").click();
     harness.run_steps(2);
-    // The camera looks at (0, 0.9, 0) from 4 m, so that the lamp stands a little above the middle.
-    let viewport = harness.get_by_label("Viewport").rect();
-    let height = viewport.width().min(viewport.height() * 64.0 / 36.0) * 36.0 / 64.0;
-    let lamp = viewport.center() - vec2(0.0, height * 0.1 / (2.0 * 4.01 * 0.286_7));
+    let lamp = seen_at(&mut harness, DVec3::Y);
     drag(&mut harness, lamp, vec2(80.0, 0.0));
     let edited = text(&mut harness);
     let line = edited.lines().find(|line| line.starts_with("position")).unwrap();
@@ -279,16 +273,21 @@ fn burners_are_dragged() {
     let mut harness = window(scene);
     harness.get_by_label("Place").click();
     harness.run_steps(2);
-    let plan = harness.state_mut().session().plan().cloned().unwrap();
-    let camera = plan.scene.camera.at(0.0, plan.size);
-    let seen = camera.project(bansho::base::math::DVec3::new(0.5, 0.5, 0.0)).unwrap().pixel;
-    let viewport = harness.get_by_label("Viewport").rect();
-    let scale = (viewport.width() / 64.0).min(viewport.height() / 36.0);
-    let burner = viewport.center() + vec2(seen.x as f32 - 32.0, seen.y as f32 - 18.0) * scale;
+    let burner = seen_at(&mut harness, DVec3::new(0.5, 0.5, 0.0));
     drag(&mut harness, burner, vec2(60.0, 0.0));
     let edited = text(&mut harness);
     assert!(edited.contains("# aside") && !edited.contains("[0.5, 0.0, 0.0]"), "{edited}");
     assert!(edited.contains("position = [0.0, 0.5, 0.0]"), "the flame itself stays: {edited}");
+}
+
+/// Where on the screen the first frame shows a point of the scene.
+fn seen_at(harness: &mut Harness<'_, Studio>, point: DVec3) -> egui::Pos2 {
+    let plan = harness.state_mut().session().plan().cloned().unwrap();
+    let [width, height] = plan.size.map(|side| side as f32);
+    let seen = plan.scene.camera.at(0.0, plan.size).project(point).unwrap().pixel;
+    let viewport = harness.get_by_label("Viewport").rect();
+    let scale = (viewport.width() / width).min(viewport.height() / height);
+    viewport.center() + vec2(seen.x as f32 - 0.5 * width, seen.y as f32 - 0.5 * height) * scale
 }
 
 #[test]
@@ -321,4 +320,16 @@ fn drag(harness: &mut Harness<'_, Studio>, from: egui::Pos2, by: egui::Vec2) {
         harness.step();
     }
     release(harness, from + by);
+}
+
+/// Drags to the right while thirty pictures are shown, in which time passes, and then does not.
+fn drag_for_a_second(harness: &mut Harness<'_, Studio>, from: egui::Pos2) {
+    press(harness, from);
+    for step in 1..30 {
+        harness.hover_at(from + vec2(3.0 * step as f32, 0.0));
+        harness.step();
+    }
+    assert!(harness.state_mut().session().transport.is_playing(), "time passes");
+    release(harness, from + vec2(90.0, 0.0));
+    assert!(!harness.state_mut().session().transport.is_playing());
 }

@@ -1,9 +1,10 @@
 //! Values that hands change: sliders, keys, what is recorded, and the stages that show what they do.
 
+use bansho::base::math::DVec3;
 use eframe::egui::{Event, Modifiers, PointerButton, Role, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
-use super::{super::Studio, SCENE, drag, drawn, press, release, text, window};
+use super::{super::Studio, SCENE, drag, drag_for_a_second, drawn, seen_at, text, window};
 
 fn slide(harness: &mut Harness<'_, Studio>, name: &str, to: f64) {
     harness.get_by_role_and_label(Role::Slider, name).set_value_accesskit(to);
@@ -67,17 +68,8 @@ fn a_lamp_that_is_dragged_while_recording_leaves_keyframes() {
     harness.get_by_label("Place").click();
     harness.get_by_label("Record").click();
     harness.run_steps(2);
-    let viewport = harness.get_by_label("Viewport").rect();
-    let height = viewport.width().min(viewport.height() * 64.0 / 36.0) * 36.0 / 64.0;
-    let lamp = viewport.center() - vec2(0.0, height * 0.1 / (2.0 * 4.01 * 0.286_7));
-    press(&mut harness, lamp);
-    for step in 1..30 {
-        harness.hover_at(lamp + vec2(3.0 * step as f32, 0.0));
-        harness.step();
-    }
-    assert!(harness.state_mut().session().transport.is_playing(), "time passes");
-    release(&mut harness, lamp + vec2(90.0, 0.0));
-    assert!(!harness.state_mut().session().transport.is_playing());
+    let lamp = seen_at(&mut harness, DVec3::Y);
+    drag_for_a_second(&mut harness, lamp);
     let recorded = text(&mut harness);
     assert!(recorded.contains("position = { keys = [["), "{recorded}");
     assert!(recorded.matches("], [").count() > 2, "{recorded}");
@@ -92,18 +84,8 @@ fn a_burner_that_is_dragged_while_recording_leaves_keyframes() {
     harness.get_by_label("Place").click();
     harness.get_by_label("Record").click();
     harness.run_steps(2);
-    let plan = harness.state_mut().session().plan().cloned().unwrap();
-    let seen = plan.scene.camera.at(0.0, plan.size).project(bansho::base::math::DVec3::ZERO).unwrap().pixel;
-    let viewport = harness.get_by_label("Viewport").rect();
-    let scale = (viewport.width() / 64.0).min(viewport.height() / 36.0);
-    let burner = viewport.center() + vec2(seen.x as f32 - 32.0, seen.y as f32 - 18.0) * scale;
-    press(&mut harness, burner);
-    for step in 1..30 {
-        harness.hover_at(burner + vec2(3.0 * step as f32, 0.0));
-        harness.step();
-    }
-    assert!(harness.state_mut().session().transport.is_playing(), "time passes");
-    release(&mut harness, burner + vec2(90.0, 0.0));
+    let burner = seen_at(&mut harness, DVec3::ZERO);
+    drag_for_a_second(&mut harness, burner);
     let recorded = text(&mut harness);
     assert!(recorded.contains("burners = [{ position = { keys = [["), "{recorded}");
     assert!(recorded.contains("]], ["), "at more than one time: {recorded}");

@@ -1,0 +1,106 @@
+//! A newcomer's minute: scene 2 of the thesis, an S that splits, from the flame that the studio begins with.
+
+use eframe::egui::{Pos2, pos2};
+use egui_kittest::{Harness, kittest::Queryable};
+
+use super::{super::Studio, text, window};
+use crate::{beginnings::FLAME_SHEET, document::drawing::Drawing};
+
+/// Times of the keystroke-level model, s (Card, Moran and Newell, "The keystroke-level model for user performance time with interactive
+/// systems", 1980): to think of the next step, to point at something, to press or let go a button, and to draw, for each line of a stroke
+/// and each centimetre of it.
+const THINK_S: f64 = 1.35;
+const POINT_S: f64 = 1.1;
+const BUTTON_S: f64 = 0.1;
+const LINE_S: f64 = 0.9;
+const CENTIMETRE_S: f64 = 0.16;
+/// Points of the screen in a centimetre, at 96 to the inch.
+const CENTIMETRE: f32 = 96.0 / 2.54;
+
+/// Hands that never were here before, and what they did.
+struct Newcomer {
+    harness: Harness<'static, Studio>,
+    actions: usize,
+    seconds: f64,
+}
+
+impl Newcomer {
+    fn act(&mut self, seconds: f64) {
+        self.actions += 1;
+        self.seconds += THINK_S + POINT_S + 2.0 * BUTTON_S + seconds;
+    }
+
+    fn press(&mut self, at: Pos2) {
+        self.harness.hover_at(at);
+        self.harness.step();
+        self.harness.drag_at(at);
+        self.harness.step();
+    }
+
+    fn release(&mut self, at: Pos2) {
+        self.harness.drop_at(at);
+        // Not until there is a picture: nobody waits for one.
+        self.harness.run_steps(4);
+    }
+
+    fn click(&mut self, button: &str) {
+        let at = self.harness.get_by_label(button).rect().center();
+        self.click_at(at);
+    }
+
+    fn click_at(&mut self, at: Pos2) {
+        self.press(at);
+        self.release(at);
+        self.act(0.0);
+    }
+
+    /// A place of a plane, as shares from its north-west corner.
+    fn place(&self, plane: &str, [x, y]: [f32; 2]) -> Pos2 {
+        let plane = self.harness.get_by_label(plane).rect();
+        pos2(plane.left() + x * plane.width(), plane.top() + y * plane.height())
+    }
+
+    fn stroke(&mut self, line: &[[f32; 2]]) {
+        let line: Vec<Pos2> = line.iter().map(|&share| self.place("Aurora target", share)).collect();
+        let mut seconds = 0.0;
+        self.press(line[0]);
+        for pair in line.windows(2) {
+            for step in 1..=4 {
+                self.harness.hover_at(pair[0].lerp(pair[1], step as f32 / 4.0));
+                self.harness.step();
+            }
+            seconds += LINE_S + CENTIMETRE_S * f64::from(pair[0].distance(pair[1]) / CENTIMETRE);
+        }
+        self.release(line[line.len() - 1]);
+        self.act(seconds);
+    }
+}
+
+#[test]
+fn a_newcomer_makes_an_s_that_splits_in_less_than_a_minute() {
+    let mut hand = Newcomer { harness: window(FLAME_SHEET), actions: 0, seconds: 0.0 };
+    hand.click("File");
+    hand.click("New");
+    hand.click("Aurora");
+    hand.stroke(&[[0.15, 0.45], [0.5, 0.4], [0.85, 0.45]]);
+    hand.click("Add shape");
+    hand.stroke(&[[0.2, 0.62], [0.7, 0.62], [0.75, 0.52], [0.3, 0.48], [0.25, 0.38], [0.8, 0.36]]);
+    hand.click("Add shape");
+    hand.click("Split");
+    let middle = hand.place("Aurora source", [0.52, 0.5]);
+    hand.click_at(middle);
+    hand.stroke(&[[0.1, 0.65], [0.6, 0.68], [0.72, 0.55]]);
+    hand.stroke(&[[0.3, 0.42], [0.4, 0.32], [0.9, 0.3]]);
+    hand.click("Play");
+
+    let session = hand.harness.state_mut().session();
+    assert!(session.transport.is_playing());
+    let assets = session.assets().clone();
+    session.document.check_now(&assets);
+    assert!(session.document.error().is_none());
+    let drawing = Drawing::read(session.document.values(), 0, &assets).unwrap();
+    assert_eq!([0, 1, 2].map(|shape| drawing.lines(shape).len()), [1, 1, 2], "{}", text(&mut hand.harness));
+    assert!(text(&mut hand.harness).contains("split = [{ sheet = 1, at = 0."), "{}", text(&mut hand.harness));
+    assert_eq!(hand.actions, 12);
+    assert!(hand.seconds < 60.0, "{} s", hand.seconds);
+}

@@ -1,0 +1,108 @@
+//! What a new scene begins with: one phenomenon, and what it needs to be seen.
+
+/// Each kind of beginning: what it is called, and its scene.
+pub const BEGINNINGS: [(&str, &str); 5] = [
+    ("Flame sheet", FLAME_SHEET),
+    ("Particle flame", PARTICLE_FLAME),
+    ("Rain", RAIN),
+    ("Aurora", AURORA),
+    ("Nothing", "bansho = 1\n"),
+];
+
+/// What a studio without a scene begins with.
+pub const FLAME_SHEET: &str = "\
+bansho = 1
+
+[[flame_sheet]]
+name = \"fire\"
+";
+
+const PARTICLE_FLAME: &str = "\
+bansho = 1
+
+[[flame_particles]]
+name = \"flame\"
+";
+
+/// Under a lamp at dusk, which is dragged to light other drops.
+const RAIN: &str = "\
+bansho = 1
+
+[picture]
+exposure_ev100 = 1.6
+
+[camera]
+position = [0.8, 1.5, 7.5]
+target = [0.2, 1.9, 0.0]
+
+[sky]
+luminance = 0.06
+hills_deg = 1.5
+trees_deg = 4.5
+temperature_k = 9000.0
+
+[ground]
+colour = [0.045, 0.046, 0.05]
+texture = 0.4
+wetness = 1.0
+puddles = 0.15
+roughness = 0.09
+
+[[light]]
+kind = \"spot\"
+visible = true
+position = [0.0, 3.7, 0.0]
+direction = [0.0, -1.0, 0.0]
+colour = [1.0, 0.82, 0.55]
+intensity = 2500.0
+inner_deg = 40.0
+outer_deg = 78.0
+
+[[rain]]
+name = \"rain\"
+rate_mm_per_h = 20.0
+distance = 10.0
+";
+
+/// To the north, where it stands before its shapes are drawn.
+const AURORA: &str = "\
+bansho = 1
+
+[camera]
+position = [0.0, 1.7, 0.0]
+target = [0.0, 36.0, -60.0]
+vertical_fov_deg = 66.0
+
+[sky]
+kind = \"night\"
+hills_deg = 2.0
+trees_deg = 1.0
+
+[[aurora]]
+name = \"aurora\"
+";
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use bansho::{Assets, Backend, CpuBackend, MemoryAssets, Plan, PlanOptions, Unobserved, base::color, parse_scene};
+
+    use super::*;
+
+    #[test]
+    fn every_beginning_but_nothing_is_a_scene_that_shows_something() {
+        for (name, text) in BEGINNINGS {
+            let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
+            let quick = text.replace("[[aurora]]", "[[aurora]]\nparticles = { count = 2000 }");
+            let scene = parse_scene(name, &quick, assets.as_ref()).unwrap();
+            let plan =
+                Plan::new(scene, &PlanOptions { size: Some([96, 54]), ..PlanOptions::default() }, assets).unwrap();
+            let mut shot = CpuBackend.open(Arc::new(plan)).unwrap();
+            let frame = bansho::draw(shot.as_mut(), 3, &Unobserved).unwrap();
+            let brightest = frame.beauty.pixels().iter().map(|[r, g, b, _]| color::luminance([*r, *g, *b]));
+            let brightest = brightest.fold(0.0, f32::max);
+            assert_eq!(brightest > 0.3, name != "Nothing", "{name}: {brightest}");
+        }
+    }
+}
