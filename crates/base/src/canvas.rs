@@ -85,6 +85,8 @@ pub struct View {
     pub mirror: Option<f64>,
     /// Luminance that a display will show as white, cd/m^2, where it is known: what is far below needs no drawing.
     pub white_luminance: Option<f64>,
+    /// Whether AOVs are asked for; strips then have planes for them.
+    pub measured: bool,
     /// In a loop: the same at the time of the turn before or after, whichever is nearer, for runs that pass from one turn to the next.
     pub other_turn: Option<Arc<Self>>,
 }
@@ -104,6 +106,7 @@ impl View {
             window: Rect::of_size(size[0], size[1]),
             mirror: None,
             white_luminance: None,
+            measured: false,
             other_turn: None,
         }
     }

@@ -235,6 +235,7 @@ impl Plan {
         let next = shutter.middle() + self.fps().frame_s();
         let mut view = View::new(self.scene.camera.clone(), shutter, next, self.size, overscan);
         view.white_luminance = Some(color::white_luminance(f64::from(self.exposure_ev100)));
+        view.measured = self.aovs;
         let view = view.through(self.window);
         match self.loop_s {
             Some(turn) => view.in_loop(turn),

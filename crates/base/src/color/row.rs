@@ -104,6 +104,29 @@ fn convert_block<C: DisplayCode, V: Show, const OPAQUE: bool, const RAW: bool>(
     out: &mut [[C; 4]; BLOCK],
 ) {
     let light = displayed(view, &planes(block));
+    // Where alpha is full, as before a sky, both give the same codes, and the one sooner.
+    let codes = if OPAQUE || is_covered(block) {
+        coded::<C, true, RAW>(&light, place)
+    } else {
+        coded::<C, false, RAW>(&light, place)
+    };
+    for (i, pixel) in out.iter_mut().enumerate() {
+        *pixel = C::from_wholes([codes[0][i], codes[1][i], codes[2][i], codes[3][i]]);
+    }
+}
+
+/// Whether every alpha is full.
+#[inline(always)]
+fn is_covered(block: &[[f32; 4]; BLOCK]) -> bool {
+    let mut covered = true;
+    for pixel in block {
+        covered &= pixel[3] >= 1.0;
+    }
+    covered
+}
+
+#[inline(always)]
+fn coded<C: DisplayCode, const OPAQUE: bool, const RAW: bool>(light: &Planes, place: Place) -> [[u32; BLOCK]; 4] {
     let mut codes = [[0; BLOCK]; 4];
     for i in 0..BLOCK {
         let phase = dither_phase(place.x.wrapping_add(i as u32), place.y);
@@ -112,9 +135,7 @@ fn convert_block<C: DisplayCode, V: Show, const OPAQUE: bool, const RAW: bool>(
             if OPAQUE { opaque_codes::<C, RAW>(rgb, phase) } else { straight_codes::<C, RAW>(rgb, light[3][i], phase) };
         (codes[0][i], codes[1][i], codes[2][i], codes[3][i]) = (pixel[0], pixel[1], pixel[2], pixel[3]);
     }
-    for (i, pixel) in out.iter_mut().enumerate() {
-        *pixel = C::from_wholes([codes[0][i], codes[1][i], codes[2][i], codes[3][i]]);
-    }
+    codes
 }
 
 #[inline(always)]

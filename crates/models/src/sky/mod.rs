@@ -4,9 +4,13 @@ mod night;
 mod skyline;
 mod stars;
 
-use std::f64::consts::TAU;
+use std::{
+    f64::consts::TAU,
+    sync::{Arc, Mutex, PoisonError},
+};
 
 use bansho_base::{
+    camera::Camera,
     canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
     color,
     image::Rect,
@@ -21,13 +25,26 @@ use fearless_simd::{Level, Simd, dispatch};
 use crate::{directions::Directions, lanes::LANES};
 use night::NightSky;
 use skyline::Skyline;
-use stars::{Spot, Stars};
+use stars::{MOST_PIXELS, Spot, Stars};
 
 /// The sky of a scene, infinitely far and opaque, with hills before it; at night with stars.
 pub struct SkyBackdrop {
     parameters: SkyParameters,
     stars: Option<Stars>,
     skyline: Option<Skyline>,
+    /// What the frame before showed, which the next one shows again if neither camera nor sky change.
+    still: Mutex<Option<Still>>,
+}
+
+/// What a night shows through a camera.
+#[derive(Clone)]
+struct Still {
+    camera: Camera,
+    size: [usize; 2],
+    sky: Sky,
+    night: Arc<NightSky>,
+    /// Stars, from the top down.
+    spots: Arc<Vec<Spot>>,
 }
 
 impl SkyBackdrop {
@@ -38,7 +55,28 @@ impl SkyBackdrop {
     pub fn new(parameters: SkyParameters, seed: u64) -> Self {
         let night = parameters.kind == SkyKind::Night;
         let stars = (night && parameters.night.stars > 0.0).then(|| Stars::new(seed));
-        Self { stars, skyline: Skyline::new(&parameters, seed), parameters }
+        Self { stars, skyline: Skyline::new(&parameters, seed), parameters, still: Mutex::default() }
+    }
+
+    /// The night that a sky shows in a view; none by day.
+    fn still(&self, sky: &Sky, view: &View) -> Option<Still> {
+        let night = sky.night()?;
+        let same = |still: &&Still| still.camera == view.camera && still.size == view.size && still.sky == *sky;
+        // The lock is never held while threads work together.
+        let kept = || self.still.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(still) = kept().as_ref().filter(same) {
+            return Some(still.clone());
+        }
+        let spots = self.stars.as_ref().map(|stars| stars.spots(view, night, self.parameters.night.stars));
+        let still = Still {
+            camera: view.camera,
+            size: view.size,
+            sky: *sky,
+            night: Arc::new(NightSky::new(sky, night, self.parameters.night.milky_way)),
+            spots: Arc::new(spots.unwrap_or_default()),
+        };
+        *kept() = Some(still.clone());
+        Some(still)
     }
 
     /// Where the hills stand.
@@ -81,9 +119,7 @@ impl Phenomenon for SkyBackdrop {
         _observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         let sky = surroundings.sky;
-        let shown = sky.night().zip(self.stars.as_ref());
-        let spots = shown.map(|(night, stars)| stars.spots(view, night, self.parameters.night.stars));
-        let night = sky.night().map(|night| NightSky::new(&sky, night, self.parameters.night.milky_way));
+        let (night, spots) = self.still(&sky, view).map(|still| (still.night, still.spots)).unzip();
         Ok(Box::new(PreparedSky {
             view,
             sky,
@@ -98,9 +134,9 @@ impl Phenomenon for SkyBackdrop {
 struct PreparedSky<'a> {
     view: &'a View,
     sky: Sky,
-    night: Option<NightSky>,
+    night: Option<Arc<NightSky>>,
     /// Stars, from the top down.
-    spots: Vec<Spot>,
+    spots: Arc<Vec<Spot>>,
     skyline: Option<&'a Skyline>,
     /// Where it stands.
     hills: DepthInterval,
@@ -153,17 +189,26 @@ impl PreparedSky<'_> {
     }
 
     /// Adds the stars of one row where the sky is seen.
+    #[inline(always)]
     fn add_stars(&self, rect: Rect, y: usize, planes: [&mut [f32]; 3], opacity: &[f32]) {
         let from = self.spots.partition_point(|spot| spot.pixel.y < y as f64 - 12.0);
-        let near = self.spots[from..].iter().take_while(|spot| spot.pixel.y < y as f64 + 12.0);
-        for spot in near.filter(|spot| (y as f64 + 0.5 - spot.pixel.y).abs() < spot.reach) {
+        for spot in &self.spots[from..] {
+            if spot.pixel.y >= y as f64 + 12.0 {
+                return;
+            }
+            if (y as f64 + 0.5 - spot.pixel.y).abs() >= spot.reach {
+                continue;
+            }
             let low = (spot.pixel.x - spot.reach).floor().max(rect.x as f64) as usize;
             let high = (spot.pixel.x + spot.reach).ceil().clamp(0.0, rect.right() as f64) as usize;
-            for x in low..high {
-                if let Some(light) = spot.at(x, y) {
-                    for c in 0..3 {
-                        planes[c][x - rect.x] = light[c].fused(opacity[x - rect.x], planes[c][x - rect.x]);
-                    }
+            if low >= high {
+                continue;
+            }
+            let shapes = spot.row(low, y);
+            for x in low..high.min(low + MOST_PIXELS) {
+                let (at, shape) = (x - rect.x, shapes[x - low] * opacity[x - rect.x]);
+                for c in 0..3 {
+                    planes[c][at] = spot.radiance[c].fused(shape, planes[c][at]);
                 }
             }
         }
@@ -174,37 +219,68 @@ impl PreparedSky<'_> {
     fn draw_hills(&self, skyline: &Skyline, strip: &mut Strip) {
         let rect = strip.rect;
         let shade = self.sky.radiance(DVec3::Y).map(|value| value * HILL_SHADE);
-        let sharpness = self.view.camera.focal_pixels as f32;
-        let highest = skyline.highest + 1.0 / sharpness;
+        let near = self.hills.near as f32;
+        let highest = skyline.highest + 1.0 / self.view.camera.focal_pixels as f32;
         let mut x = rect.x / LANES * LANES;
         while x < rect.right() {
             if self.is_above(rect, x, highest) {
                 x += LANES;
                 continue;
             }
+            let inside = rect.x.max(x) - x..rect.right().min(x + LANES) - x;
             for y in rect.y..rect.bottom() {
-                let mut directions = Directions::new(&self.view.camera, x, y);
-                directions.normalize();
-                let Directions { axes: [xs, sines, zs], seen } = directions;
-                for i in rect.x.max(x) - x..rect.right().min(x + LANES) - x {
-                    let index = (y - rect.y) * rect.width + x + i - rect.x;
-                    if sines[i] > highest || !seen[i] || !strip.visible(index, self.hills.near as f32) {
-                        continue;
-                    }
-                    let hidden = skyline.sine(f64::from(lanes::atan2(xs[i], -zs[i])) / TAU);
-                    let cover = ((hidden - sines[i]) * sharpness + 0.5).clamp(0.0, 1.0);
-                    if cover > 0.0 {
-                        strip.add_behind(
-                            index,
-                            shade.map(|value| value * cover),
-                            [1.0 - cover; 3],
-                            self.hills.near as f32,
-                        );
+                let mut covers = self.covers(skyline, x, y);
+                let first = (y - rect.y) * rect.width + x + inside.start - rect.x;
+                if strip.has_plate() {
+                    for i in inside.clone() {
+                        covers[i] = if strip.visible(first + i - inside.start, near) { covers[i] } else { 0.0 };
                     }
                 }
+                if covers == [0.0; LANES] {
+                    continue;
+                }
+                let (mut planes, mut depths) = ([[0.0; LANES]; 3], [f32::INFINITY; LANES]);
+                for i in 0..LANES {
+                    for c in 0..3 {
+                        planes[c][i] = shade[c] * covers[i];
+                    }
+                    depths[i] = if covers[i] > 0.0 { near } else { f32::INFINITY };
+                }
+                let [red, green, blue] = &planes;
+                let light = [&red[inside.clone()], &green[inside.clone()], &blue[inside.clone()]];
+                strip.add_row_behind(first, light, Some(&covers[inside.clone()]), &depths[inside.clone()]);
             }
             x += LANES;
         }
+    }
+
+    /// How much of the pixels from `x` on in row `y` the hills hide.
+    #[inline(always)]
+    fn covers(&self, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
+        let sharpness = self.view.camera.focal_pixels as f32;
+        let mut directions = Directions::new(&self.view.camera, x, y);
+        directions.normalize();
+        let Directions { axes: [xs, sines, zs], seen } = &directions;
+        let (mut above, mut below) = (true, true);
+        for i in 0..LANES {
+            above &= sines[i] > skyline.highest + 1.0 / sharpness;
+            below &= sines[i] < skyline.lowest - 1.0 / sharpness;
+        }
+        let (mut covers, mut turns) = ([0.0; LANES], [0.0; LANES]);
+        if above {
+            return covers;
+        }
+        if !below {
+            for i in 0..LANES {
+                turns[i] = lanes::atan2(xs[i], -zs[i]) * (1.0 / TAU) as f32;
+            }
+        }
+        for i in 0..LANES {
+            let hidden = if below { 1.0 } else { skyline.sine(turns[i]) };
+            let cover = (hidden - sines[i]).fused(sharpness, 0.5).clamp(0.0, 1.0);
+            covers[i] = if seen[i] { cover } else { 0.0 };
+        }
+        covers
     }
 
     /// Whether the pixels of a strip from `x` on surely look higher than at that sine of the elevation.

@@ -23,8 +23,9 @@ const TREE: Purpose = Purpose::named("skyline tree");
 #[derive(Clone, Debug)]
 pub(super) struct Skyline {
     sines: Vec<f32>,
-    /// The highest.
+    /// The highest and the lowest.
     pub(super) highest: f32,
+    pub(super) lowest: f32,
 }
 
 impl Skyline {
@@ -40,15 +41,18 @@ impl Skyline {
         }
         let sines: Vec<f32> = heights.iter().map(|height| math::sin(height.to_radians()) as f32).collect();
         let highest = sines.iter().copied().fold(0.0, f32::max);
-        Some(Self { sines, highest })
+        let lowest = sines.iter().copied().fold(highest, f32::min);
+        Some(Self { sines, highest, lowest })
     }
 
-    /// Sine of the elevation that is hidden in a direction, in turns from north over east.
-    pub(super) fn sine(&self, turns: f64) -> f32 {
-        let place = (turns - turns.floor()) * SAMPLES as f64 - 0.5;
-        let (first, part) = (place.floor(), (place - place.floor()) as f32);
-        let at = |index: i64| self.sines[index.rem_euclid(SAMPLES as i64) as usize];
-        let (low, high) = (at(first as i64), at(first as i64 + 1));
+    /// Sine of the elevation that is hidden in a direction, in turns from north over east within -1 to 1.
+    #[inline(always)]
+    pub(super) fn sine(&self, turns: f32) -> f32 {
+        const MASK: u32 = SAMPLES as u32 - 1;
+        let place = (turns + 1.0).fused(SAMPLES as f32, -0.5);
+        let first = place as u32;
+        let part = place - first as f32;
+        let (low, high) = (self.sines[(first & MASK) as usize], self.sines[((first + 1) & MASK) as usize]);
         part.fused(high - low, low)
     }
 }
@@ -100,7 +104,10 @@ mod tests {
         let skyline = Skyline::new(&parameters, 3).unwrap();
         let highest = math::asin(f64::from(skyline.highest)).to_degrees();
         assert!((1.5..4.1).contains(&highest), "{highest}");
-        assert!((skyline.sine(0.0) - skyline.sine(1.0)).abs() < 1e-6);
+        for turns in [0.0, 0.3] {
+            assert!((skyline.sine(turns) - skyline.sine(turns - 1.0)).abs() < 1e-4);
+        }
+        assert!((skyline.sine(0.5) - skyline.sine(-0.5)).abs() < 1e-6 && skyline.lowest < skyline.highest);
         assert!(Skyline::new(&SkyParameters::default(), 3).is_none());
     }
 }

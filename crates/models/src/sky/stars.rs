@@ -4,7 +4,7 @@ use bansho_base::{
     camera::Camera,
     canvas::View,
     color::{black_body, luminance},
-    math::{self, DVec2, DVec3},
+    math::{self, DVec2, DVec3, Fused},
     random::{Key, Purpose, direction, uniform},
     sky::Night,
 };
@@ -50,7 +50,7 @@ pub(super) struct Spot {
     pub(super) pixel: DVec2,
     pub(super) reach: f64,
     /// Radiance at the middle of its image, cd/m^2.
-    radiance: [f32; 3],
+    pub(super) radiance: [f32; 3],
 }
 
 /// Normal of the Milky Way's plane.
@@ -138,16 +138,26 @@ fn solid_angle(camera: &Camera, pixel: DVec2) -> Option<f64> {
     Some((4.0 * across.cross(along).length()).max(1e-18))
 }
 
+/// Most pixels of a star's image in a row.
+pub(super) const MOST_PIXELS: usize = 24;
+
 impl Spot {
-    /// Its radiance at the middle of a pixel.
-    #[inline]
-    pub(super) fn at(&self, x: usize, y: usize) -> Option<[f32; 3]> {
-        let squared = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - self.pixel).length_squared();
-        (squared < self.reach * self.reach).then(|| {
-            let base = 1.0 + squared / (CORE * CORE);
-            let shape = (1.0 / (base * base * base.sqrt())) as f32;
-            self.radiance.map(|value| value * shape)
-        })
+    /// The shape of its image at the pixels of row `y` from `x` on, 1 at its middle.
+    #[inline(always)]
+    pub(super) fn row(&self, x: usize, y: usize) -> [f32; MOST_PIXELS] {
+        const PER_CORE: f32 = (1.0 / (CORE * CORE)) as f32;
+        let down = (y as f64 + 0.5 - self.pixel.y) as f32;
+        let first = (x as f64 + 0.5 - self.pixel.x) as f32;
+        let reach = (self.reach * self.reach) as f32;
+        let mut shapes = [0.0; MOST_PIXELS];
+        for i in 0..MOST_PIXELS {
+            let across = first + i as f32;
+            let squared = across.fused(across, down * down);
+            let base = squared.fused(PER_CORE, 1.0);
+            let shape = 1.0 / (base * base * base.sqrt());
+            shapes[i] = if squared < reach { shape } else { 0.0 };
+        }
+        shapes
     }
 }
 
@@ -185,7 +195,7 @@ mod tests {
             let mut lux = 0.0;
             for (x, y) in (0..64).flat_map(|x| (0..48).map(move |y| (x, y))) {
                 let solid = solid_angle(&view.camera, DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap();
-                lux += spot.at(x, y).map_or(0.0, |value| f64::from(value[0]) * solid);
+                lux += f64::from(spot.row(x, y)[0] * spot.radiance[0]) * solid;
             }
             let expected = LUX_AT_0 * math::pow(10.0, -0.4) * night.transmittance(math::asin(direction.y));
             // The wings beyond the reach are left out.

@@ -194,7 +194,9 @@ impl GlowMap {
     fn locate(&self, place_km: [f32; 2]) -> (usize, usize) {
         let last = (self.side * SIDE) as f64 - 1.0;
         let per_km = 1.0 / self.cell_km;
-        let [column, row] = place_km.map(|km| ((f64::from(km) + self.half_km) * per_km).clamp(0.0, last) as usize);
+        let [x, z] = place_km;
+        let column = ((f64::from(x) + self.half_km) * per_km).clamp(0.0, last) as usize;
+        let row = ((f64::from(z) + self.half_km) * per_km).clamp(0.0, last) as usize;
         (row / SIDE * self.side + column / SIDE, row % SIDE * SIDE + column % SIDE)
     }
 

@@ -110,12 +110,12 @@ impl Chart {
     }
 
     /// Longitude of the middle of a column.
-    fn longitude(&self, column: usize) -> f64 {
+    pub(super) fn longitude(&self, column: usize) -> f64 {
         self.first_longitude + (column as f64 + 0.5) * self.column_step
     }
 
     /// Colatitude of the middle of a row.
-    fn colatitude(&self, row: usize) -> f64 {
+    pub(super) fn colatitude(&self, row: usize) -> f64 {
         self.first_colatitude + (row as f64 + 0.5) * self.row_step
     }
 
@@ -142,6 +142,18 @@ impl Chart {
         let cotangents = (0..self.rows + more).map(trigonometry).map(|(sin, cos)| (cos / sin.max(1e-9)) as f32);
         let inverses = (0..self.rows).map(trigonometry).map(|(sin, _)| (1.0 / sin.max(1e-9)) as f32);
         [cotangents.collect(), inverses.collect()]
+    }
+
+    /// The column that stands for one less than a column beside the chart.
+    #[inline(always)]
+    pub(super) fn held(&self, column: i32) -> usize {
+        let columns = self.columns as i32;
+        let turned = match (self.whole, column < 0, column >= columns) {
+            (true, true, _) => column + columns,
+            (true, _, true) => column - columns,
+            _ => column,
+        };
+        turned.clamp(0, columns - 1) as usize
     }
 
     /// How places on the chart are found.

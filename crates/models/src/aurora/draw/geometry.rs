@@ -99,7 +99,6 @@ impl FieldLines {
     }
 
     /// Cosine of the colatitude, and the two parts across the field, of a direction.
-    #[cfg(test)]
     pub(super) fn turned(&self, direction: DVec3) -> [f64; 3] {
         [direction.dot(self.along), direction.dot(self.across[0]), direction.dot(self.across[1])]
     }

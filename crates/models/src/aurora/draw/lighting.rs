@@ -7,7 +7,7 @@ use bansho_base::{
 
 use fearless_simd::{Level, dispatch};
 
-use super::Aurora;
+use super::{Aurora, shading::Shading};
 
 /// Particles that are asked for their light, about.
 const ASKED: usize = 2048;
@@ -34,9 +34,11 @@ impl Aurora {
             // A patch of 1 mW/m^2 over 1 km^2 at 1 km has 1 sr and the column's brightness.
             let share = f64::from(particles.powers_w[index]) / W_PER_UNIT * stride as f64 / squared;
             let elevation = direction.y as f32;
-            let colour = dispatch!(level, simd => self.shading.colour(simd, &column, elevation)).map(f64::from);
-            sum += DVec3::from(colour) * share;
-            way += direction * (share * colour[1].max(0.0));
+            let colour: [f32; 4] =
+                dispatch!(level, simd => self.shading.arriving(simd, &column, Shading::place(elevation)).into());
+            let [red, green, blue, _] = colour.map(f64::from);
+            sum += DVec3::new(red, green, blue) * share;
+            way += direction * (share * green.max(0.0));
         }
         let toward = way.try_normalize()?;
         Some(Light { emitter: Emitter::Directional { toward }, intensity: sum.to_array().map(|value| value as f32) })

@@ -43,6 +43,7 @@ const SMOOTH_KM: f32 = 12.0;
 const BLURRED_BINS: f64 = 4.0 * ENTRY_PER_STEP[1] as f64;
 
 /// Brightness by emitter in kR, column after column, without what the air takes away.
+#[derive(Clone)]
 pub(super) struct Meridians {
     pub(super) chart: Chart,
     pub(super) light: Vec<PerEmitter<f32>>,
@@ -99,6 +100,13 @@ impl Meridians {
         let light = self.light.par_chunks_mut(STRIP * self.chart.rows);
         let strips = light.zip(self.lit.par_chunks_mut(STRIP)).enumerate();
         (&self.chart, strips.map(|(number, (light, lit))| LightStrip { number, light, lit }))
+    }
+
+    /// First row that may hold light in any of two columns, and the one after the last.
+    #[inline(always)]
+    pub(super) fn lit_either(&self, [left, right]: [usize; 2]) -> [u32; 2] {
+        let (left, right) = (self.lit[left], self.lit[right]);
+        [left[0].min(right[0]), left[1].max(right[1])]
     }
 
     /// The picture with how to find places on it.
@@ -168,34 +176,38 @@ impl Sampler<'_> {
 
     #[inline(always)]
     fn add_place<S: Simd>(&self, simd: S, column: f32, row: f32, light: &mut PerEmitter<f32>) {
-        let Meridians { chart, light: all, lit } = self.meridians;
+        let Meridians { chart, light: all, .. } = self.meridians;
         let left = column.floor();
         let across = column - left;
         let upper = (row as usize).min(chart.rows - 2);
         let part = row - upper as f32;
-        let (left, right) = (self.held(left as i32), self.held(left as i32 + 1));
-        let [first, end] = [lit[left][0].min(lit[right][0]), lit[left][1].max(lit[right][1])];
+        let (left, right) = (chart.held(left as i32), chart.held(left as i32 + 1));
+        let [first, end] = self.meridians.lit_either([left, right]);
         if upper as u32 + 1 < first || upper as u32 >= end {
             return;
         }
         // The row and the one below lie side by side.
-        let both = |column: usize| HalfLanes::from_slice(simd, all[column * chart.rows + upper..][..2].as_flattened());
-        let (left, right) = (both(left), both(right));
+        let (left, right) = (left * chart.rows + upper, right * chart.rows + upper);
+        let left = HalfLanes::from_slice(simd, all[left..left + 2].as_flattened());
+        let right = HalfLanes::from_slice(simd, all[right..right + 2].as_flattened());
         let (above, below) = (left.like(across)).fused(right - left, left).split();
         *light = above.like(part).fused(below - above, above + FourLanes::simd_from(simd, *light)).into();
     }
 
-    /// The column of the chart that stands for one less than a column beside it.
-    #[inline(always)]
-    fn held(&self, column: i32) -> usize {
-        let chart = &self.meridians.chart;
-        let columns = chart.columns as i32;
-        let turned = match (chart.whole, column < 0, column >= columns) {
-            (true, true, _) => column + columns,
-            (true, _, true) => column - columns,
-            _ => column,
+    /// Whether all of a part of the sky is dark: between two longitudes, in radians, and two colatitudes.
+    pub(super) fn is_dark(&self, longitudes: [f32; 2], colatitudes: [f32; 2]) -> bool {
+        let Meridians { chart, lit, .. } = self.meridians;
+        let [left, right] = longitudes.map(|longitude| self.finder.column(longitude) as i32);
+        // Where a part reaches over the seam of a whole chart nothing is said.
+        if right < left || (right - left) as usize > chart.columns / 2 {
+            return false;
+        }
+        let [top, bottom] = colatitudes.map(|colatitude| (self.finder.row(colatitude).max(0.0)) as u32);
+        let dark = |column: i32| {
+            let [first, end] = lit[chart.held(column)];
+            bottom + 2 < first || top >= end + 2
         };
-        turned.clamp(0, columns - 1) as usize
+        (left - 2..=right + 2).all(dark)
     }
 }
 

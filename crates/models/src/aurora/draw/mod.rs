@@ -3,8 +3,8 @@
 //! Field lines are seen as meridians about the magnetic zenith (`geometry`), so that an aurora is drawn on a `chart` of
 //! the sky in longitude and colatitude about that point. Precipitation is summed up by longitude and distance
 //! (`footprint`); then the light of every field line runs along its meridian (`meridians`), its altitudes from tables
-//! (`profile`). What a pixel of any lens shows is looked up on the chart (`prepared`) and dimmed and coloured by the
-//! air below (`shading`). The cost grows with pixels and particles, not with shapes.
+//! (`profile`). The chart is dimmed and coloured by the air below (`shading`, `seen`), and what a pixel of any lens shows
+//! is looked up on it (`prepared`). The cost grows with pixels and particles, not with shapes.
 
 mod blur;
 mod chart;
@@ -20,6 +20,7 @@ mod parameters;
 mod phenomenon;
 mod prepared;
 mod profile;
+mod seen;
 mod shading;
 mod sources;
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! One frame of an aurora: from its chart to pixels.
 
-use std::sync::OnceLock;
+use std::{ops::Range, sync::OnceLock};
 
 use bansho_base::{
     camera::Camera,
@@ -10,7 +10,7 @@ use bansho_base::{
     observer::{Cancelled, Observer, check},
     phenomenon::Prepared,
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use fearless_simd::{Level, Simd, dispatch};
 
 use super::{
     Aurora, Blur,
@@ -19,8 +19,9 @@ use super::{
     footprint::Footprint,
     geometry::{EARTH_RADIUS_KM, FieldLines, dot},
     maps::Maps,
-    meridians::{Meridians, Sampler, mixed},
+    meridians::{Meridians, Sampler},
     phenomenon::MEASURED,
+    shading::Shading,
     sources::{Moments, Sources},
 };
 use crate::{
@@ -29,14 +30,10 @@ use crate::{
         particles::AuroraSimulation,
     },
     directions::Directions,
-    lanes::FourLanes,
 };
 
 /// Pixels that are worked on at once.
 pub(super) const BATCH: usize = 16;
-/// Pixels from one to the next at which soft light is looked up: a divisor of the distance from the first of a batch to
-/// the last.
-const KNOT_PIXELS: usize = 5;
 /// Altitude whose distance is an aurora's depth, km.
 const DEPTH_KM: f64 = 110.0;
 /// Fainter than this is no aurora to a depth, kR.
@@ -46,6 +43,8 @@ const PIXELS_PER_INSTANT: f64 = 1.0;
 const MOST_INSTANTS: f64 = 16.0;
 /// The same for particles, beside their own spread: what is left between two instants adds to that.
 const SPREADS_PER_INSTANT: f64 = 3.0;
+
+const TAU: f32 = std::f32::consts::TAU;
 
 /// The depths at which auroras are drawn, m: behind the highest mountain, before the sky.
 pub(super) const DEPTHS: DepthInterval = DepthInterval { near: 2e4, far: 1e10 };
@@ -61,14 +60,20 @@ pub(super) struct PreparedAurora<'a> {
     horizon: f32,
     /// Distance of the observer from the Earth's middle, km.
     from_middle: f32,
-    /// Chart of the sharp light, and a coarser one of what is soft.
-    charts: [Meridians; 2],
-    /// Whether the soft light is so coarse that not every pixel needs to look it up.
-    soft_is_coarse: bool,
-    /// The picture of both, where the blur is one of the picture.
-    blurred: Option<Blurred>,
+    /// What pixels look up.
+    shown: Shown,
+    /// Light by emitter on a sharp and a coarser chart, where it is measured.
+    measured: Option<[Meridians; 2]>,
     /// Made where they are asked for.
     maps: OnceLock<Maps<'a>>,
+}
+
+/// An aurora's light as pixels look it up.
+enum Shown {
+    /// A chart of colours.
+    Seen(Meridians),
+    /// Light by emitter, where the blur is one of the picture.
+    Blurred(Blurred),
 }
 
 impl<'a> PreparedAurora<'a> {
@@ -77,25 +82,28 @@ impl<'a> PreparedAurora<'a> {
         let sources = Sources::new(&aurora.light(view), &field, &aurora.moments(view));
         check(observer)?;
         let charts = Charts { aurora, field: &field, coverage: Coverage::of_view(view, &field) };
-        let pixel = charts.coverage.pixel;
-        let sharp = charts.sharp(&sources);
+        let (sharp, soft) = rayon::join(|| charts.sharp(&sources), || charts.soft(&sources));
         check(observer)?;
-        let soft = charts.soft(&sources);
         let drawing = &aurora.simulation.parameters().drawing;
-        let blurred = (drawing.blur == Blur::Pixels)
-            .then(|| Blurred::new(view, &field, &[sharp.sampler(), soft.sampler()], &drawing.blur_radii));
+        let measured = view.measured.then(|| [sharp.clone(), soft.clone()]);
+        let shown = if drawing.blur == Blur::Pixels {
+            let samplers = [sharp.sampler(), soft.sampler()];
+            Shown::Blurred(Blurred::new(view, &field, &samplers, &drawing.blur_radii))
+        } else {
+            Shown::Seen(sharp.seen(&soft, &field, &aurora.shading))
+        };
+        // What is blurred in the picture is blurred at one instant.
+        let cameras = if matches!(shown, Shown::Blurred(_)) { vec![view.camera] } else { cameras(view) };
         Ok(Self {
             aurora,
             view,
             level: Level::new(),
-            // What is blurred in the picture is blurred at one instant.
-            cameras: if blurred.is_some() { vec![view.camera] } else { cameras(view) },
-            blurred,
+            cameras,
             horizon: -math::sqrt(2.0 * field.observer_altitude_km().max(0.0) / EARTH_RADIUS_KM) as f32,
             from_middle: (EARTH_RADIUS_KM + field.observer_altitude_km()) as f32,
             field,
-            soft_is_coarse: soft.chart.column_step >= 2.0 * KNOT_PIXELS as f64 * pixel,
-            charts: [sharp, soft],
+            shown,
+            measured,
             maps: OnceLock::new(),
         })
     }
@@ -204,49 +212,69 @@ impl Batch {
     }
 }
 
-/// Adds the light at a few pixels of a batch, and straight between them.
-#[inline(always)]
-fn add_at_knots<S: Simd>(simd: S, sampler: &Sampler, batch: &Batch, light: &mut [PerEmitter<f32>; BATCH]) {
-    const KNOTS: usize = (BATCH - 1) / KNOT_PIXELS + 1;
-    let (mut longitude, mut colatitude) = ([0.0; KNOTS], [0.0; KNOTS]);
-    for knot in 0..KNOTS {
-        longitude[knot] = batch.longitude[knot * KNOT_PIXELS];
-        colatitude[knot] = batch.colatitude[knot * KNOT_PIXELS];
-    }
-    let mut knots = [[0.0; 4]; KNOTS];
-    sampler.add(simd, &longitude, &colatitude, &mut knots);
-    if knots == [[0.0; 4]; KNOTS] {
-        return;
-    }
-    for i in 0..BATCH {
-        let knot = (i / KNOT_PIXELS).min(KNOTS - 2);
-        let part = (i - knot * KNOT_PIXELS) as f32 * (1.0 / KNOT_PIXELS as f32);
-        let between = mixed(simd, &knots[knot], &knots[knot + 1], part);
-        light[i] = (between + FourLanes::simd_from(simd, light[i])).into();
-    }
-}
-
 impl PreparedAurora<'_> {
     #[inline(always)]
     fn rows<S: Simd>(&self, simd: S, slice: &DepthInterval, strip: &mut Strip) {
-        let samplers = [self.charts[0].sampler(), self.charts[1].sampler()];
+        let sampler = match &self.shown {
+            Shown::Seen(chart) => Some(chart.sampler()),
+            Shown::Blurred(_) => None,
+        };
         let rect = strip.rect;
         // Batches lie on the picture's own grid, so that a crop changes no pixel; those of one column follow each
         // other, since they look up the same part of the chart.
         let mut x = rect.x / BATCH * BATCH;
         while x < rect.right() {
-            for y in rect.y..rect.bottom() {
-                self.batch(simd, &samplers, slice, strip, [x, y]);
+            let measured = !strip.aovs.is_empty();
+            if measured || !sampler.as_ref().is_some_and(|sampler| self.is_dark(sampler, x, [rect.y, rect.bottom()])) {
+                for y in rect.y..rect.bottom() {
+                    self.batch(simd, sampler.as_ref(), slice, strip, [x, y]);
+                }
             }
             x += BATCH;
         }
+    }
+
+    /// Whether there is surely no light in the batches from `x` on between two rows, by the sky between their corners and as far again as that
+    /// may bend.
+    fn is_dark(&self, sampler: &Sampler, x: usize, rows: [usize; 2]) -> bool {
+        if self.cameras.len() > 1 {
+            return false;
+        }
+        let (mut longitudes, mut colatitudes) = ([f32::INFINITY, -f32::INFINITY], [f32::INFINITY, -f32::INFINITY]);
+        let mut middle = None;
+        for y in rows {
+            for x in [x, x + BATCH] {
+                let Some(direction) = self.view.camera.direction(DVec2::new(x as f64, y as f64)) else { return false };
+                let direction = direction.normalize();
+                let [along, first, second] = self.field.turned(direction);
+                let colatitude = math::atan2(math::hypot(first, second), along) as f32;
+                let longitude = math::atan2(second, first) as f32;
+                // About the first one's, so that no part is torn where longitudes begin anew.
+                let about = *middle.get_or_insert(longitude);
+                let turned = longitude - about;
+                let longitude = longitude - (turned * (1.0 / TAU)).round() * TAU;
+                longitudes = [longitudes[0].min(longitude), longitudes[1].max(longitude)];
+                colatitudes = [colatitudes[0].min(colatitude), colatitudes[1].max(colatitude)];
+            }
+        }
+        let size = ((longitudes[1] - longitudes[0]) * math::sin(f64::from(colatitudes[1])) as f32)
+            .max(colatitudes[1] - colatitudes[0]);
+        // Near the magnetic zenith corners say little.
+        if colatitudes[0] < 4.0 * size || longitudes[1] - longitudes[0] > 0.5 {
+            return false;
+        }
+        let bend = 0.5 * size * size / colatitudes[0];
+        sampler.is_dark(
+            [longitudes[0] - bend / colatitudes[0], longitudes[1] + bend / colatitudes[0]],
+            [colatitudes[0] - bend, colatitudes[1] + bend],
+        )
     }
 
     #[inline(always)]
     fn batch<S: Simd>(
         &self,
         simd: S,
-        samplers: &[Sampler; 2],
+        sampler: Option<&Sampler>,
         slice: &DepthInterval,
         strip: &mut Strip,
         [x, y]: [usize; 2],
@@ -257,57 +285,54 @@ impl PreparedAurora<'_> {
         let share = 1.0 / self.cameras.len() as f32;
         for camera in &self.cameras {
             let batch = Batch::new(camera, &self.field, x, y);
-            let (sky, mut depths) = self.sky(&batch, share);
+            let (mut sky, mut depths) = self.sky(&batch, share);
             if sky == [0.0; BATCH] {
                 continue;
             }
-            let mut light = match &self.blurred {
-                Some(blurred) => blurred.batch(x, y),
-                None => self.look_up(simd, samplers, &batch),
-            };
-            if strip.aovs.is_empty() && light == [[0.0; 4]; BATCH] {
+            let colours = self.look_up(simd, sampler, &batch, [x, y]);
+            if strip.aovs.is_empty() && colours == [[0.0; 4]; BATCH] {
                 continue;
             }
-            let mut colours = [[0.0; BATCH]; 3];
-            let mut shown = [false; BATCH];
-            for i in inside.clone() {
-                let (index, depth) = (first + i - inside.start, depths[i]);
-                shown[i] = sky[i] > 0.0 && slice.contains(f64::from(depth)) && strip.visible(index, depth);
-                let sky = if shown[i] { sky[i] } else { 0.0 };
-                let light = &mut light[i];
-                for emitter in 0..4 {
-                    light[emitter] *= sky;
-                }
-                let brightness = light[0] + light[1] + light[2];
-                depths[i] = if brightness > FAINTEST * share { depth } else { f32::INFINITY };
-                let colour = self.aurora.shading.colour(simd, light, batch.sine[i]);
-                for c in 0..3 {
-                    colours[c][i] = colour[c];
-                }
+            hide(&mut sky, &depths, slice, strip, (first, inside.clone()));
+            let mut planes = [[0.0; BATCH]; 3];
+            for i in 0..BATCH {
+                let [red, green, blue, brightness] = colours[i];
+                (planes[0][i], planes[1][i], planes[2][i]) = (sky[i] * red, sky[i] * green, sky[i] * blue);
+                depths[i] = if sky[i] * brightness > FAINTEST * share { depths[i] } else { f32::INFINITY };
             }
-            let [red, green, blue] = &colours;
+            let [red, green, blue] = &planes;
             let radiance = [&red[inside.clone()], &green[inside.clone()], &blue[inside.clone()]];
             strip.add_row_behind(first, radiance, None, &depths[inside.clone()]);
             if !strip.aovs.is_empty() {
-                for i in inside.clone().filter(|i| shown[*i]) {
-                    let direction = camera.direction(DVec2::new((x + i) as f64 + 0.5, y as f64 + 0.5));
-                    self.measure(strip, first + i - inside.start, &light[i], direction, share);
-                }
+                self.measure(simd, camera, &batch, (strip, first), ([x, y], &inside), (&sky, share));
             }
         }
     }
 
-    /// The light that the charts have for a batch.
+    /// Colours and brightness of a batch.
     #[inline(always)]
-    fn look_up<S: Simd>(&self, simd: S, samplers: &[Sampler; 2], batch: &Batch) -> [PerEmitter<f32>; BATCH] {
-        let mut light = [[0.0; 4]; BATCH];
-        samplers[0].add(simd, &batch.longitude, &batch.colatitude, &mut light);
-        if self.soft_is_coarse && batch.seen == [true; BATCH] {
-            add_at_knots(simd, &samplers[1], batch, &mut light);
-        } else {
-            samplers[1].add(simd, &batch.longitude, &batch.colatitude, &mut light);
+    fn look_up<S: Simd>(
+        &self,
+        simd: S,
+        sampler: Option<&Sampler>,
+        batch: &Batch,
+        [x, y]: [usize; 2],
+    ) -> [[f32; 4]; BATCH] {
+        let mut colours = [[0.0; 4]; BATCH];
+        match (&self.shown, sampler) {
+            (Shown::Blurred(blurred), _) => {
+                let light = blurred.batch(x, y);
+                for i in 0..BATCH {
+                    let place = Shading::place(batch.sine[i]);
+                    colours[i] = self.aurora.shading.arriving(simd, &light[i], place).into();
+                }
+            }
+            (Shown::Seen(_), Some(sampler)) => {
+                sampler.add(simd, &batch.longitude, &batch.colatitude, &mut colours);
+            }
+            (Shown::Seen(_), None) => {}
         }
-        light
+        colours
     }
 
     /// How much of each pixel is sky, times `share`, and the depth of an aurora there, m.
@@ -323,9 +348,43 @@ impl PreparedAurora<'_> {
         (sky, depths)
     }
 
+    /// Adds what the AOVs tell of a batch, of which the pixels `inside` stand in the strip from number `first` on.
+    #[inline(always)]
+    fn measure<S: Simd>(
+        &self,
+        simd: S,
+        camera: &Camera,
+        batch: &Batch,
+        (strip, first): (&mut Strip, usize),
+        ([x, y], inside): ([usize; 2], &Range<usize>),
+        (sky, share): (&[f32; BATCH], f32),
+    ) {
+        let mut light = [[0.0; 4]; BATCH];
+        match &self.shown {
+            Shown::Blurred(blurred) => light = blurred.batch(x, y),
+            Shown::Seen(_) => {
+                for chart in self.measured.iter().flatten() {
+                    chart.sampler().add(simd, &batch.longitude, &batch.colatitude, &mut light);
+                }
+            }
+        }
+        for i in inside.clone().filter(|i| sky[*i] > 0.0) {
+            let direction = camera.direction(DVec2::new((x + i) as f64 + 0.5, y as f64 + 0.5));
+            let seen = light[i].map(|value| sky[i] * value);
+            self.measure_pixel(strip, first + i - inside.start, &seen, direction, share);
+        }
+    }
+
     /// Adds what the AOVs tell of a pixel.
     #[inline(never)]
-    fn measure(&self, strip: &mut Strip, index: usize, light: &PerEmitter<f32>, direction: Option<DVec3>, share: f32) {
+    fn measure_pixel(
+        &self,
+        strip: &mut Strip,
+        index: usize,
+        light: &PerEmitter<f32>,
+        direction: Option<DVec3>,
+        share: f32,
+    ) {
         for (plane, line) in strip.aovs.iter_mut().zip(MEASURED) {
             let line = &LINES[line];
             plane.add(index, light[line.emitter.index()] * line.photons as f32, 1.0);
@@ -344,6 +403,27 @@ impl PreparedAurora<'_> {
         let along = self.from_middle * sine;
         let squared = along.fused(along, (SHELL - self.from_middle) * (SHELL + self.from_middle));
         1e3 * (squared.max(0.0).sqrt() - along).abs()
+    }
+}
+
+/// Leaves no sky where an aurora at those depths lies outside the slice or behind the plate; pixels `inside` stand in the strip from number
+/// `first` on.
+#[inline(always)]
+fn hide(
+    sky: &mut [f32; BATCH],
+    depths: &[f32; BATCH],
+    slice: &DepthInterval,
+    strip: &Strip,
+    (first, inside): (usize, Range<usize>),
+) {
+    for i in 0..BATCH {
+        let depth = f64::from(depths[i]);
+        sky[i] = if depth >= slice.near && depth < slice.far { sky[i] } else { 0.0 };
+    }
+    if strip.has_plate() {
+        for i in inside.clone() {
+            sky[i] = if strip.visible(first + i - inside.start, depths[i]) { sky[i] } else { 0.0 };
+        }
     }
 }
 

@@ -19,7 +19,7 @@ const BANDS_NM: f64 = 655.0;
 /// ACEScg of a kilorayleigh of each emitter by elevation; luminance in cd/m^2.
 #[derive(Clone, Debug)]
 pub(super) struct Shading {
-    /// Red, green, blue and nothing: four lanes.
+    /// Red, green, blue, and whether its brightness counts.
     colours: Vec<PerEmitter<[f32; 4]>>,
 }
 
@@ -31,22 +31,28 @@ impl Shading {
             let elevation = math::asin(root * root).min(FRAC_PI_2);
             EMITTERS.map(|emitter| {
                 let [red, green, blue] = seen(emitter, air, elevation).map(|value| value as f32);
-                [red, green, blue, 0.0]
+                [red, green, blue, if emitter == Emitter::Nitrogen { 0.0 } else { 1.0 }]
             })
         });
         Self { colours: colours.collect() }
     }
 
-    /// The colour of light by emitter in kR from an elevation of that sine; as at the horizon below it.
+    /// Where the elevation of that sine stands in the table; as the horizon below it.
     #[inline(always)]
-    pub(super) fn colour<S: Simd>(&self, simd: S, light: &PerEmitter<f32>, sine: f32) -> [f32; 3] {
-        let step = (sine.max(0.0).sqrt() * STEPS as f32 + 0.5) as usize;
+    pub(super) fn place(sine: f32) -> f32 {
+        let held = if sine > 0.0 { sine } else { 0.0 };
+        held.sqrt().fused(STEPS as f32, 0.5)
+    }
+
+    /// The colour in which light by emitter, in kR, arrives from a [`place`](Self::place), and after it its brightness in kR, but for that of
+    /// the dim first positive bands.
+    #[inline(always)]
+    pub(super) fn arriving<S: Simd>(&self, simd: S, light: &PerEmitter<f32>, place: f32) -> FourLanes<S> {
         let mut sum = FourLanes::splat(simd, 0.0);
-        for (light, colour) in light.iter().zip(&self.colours[step.min(STEPS)]) {
+        for (light, colour) in light.iter().zip(&self.colours[(place as usize).min(STEPS)]) {
             sum = sum.like(*light).fused(FourLanes::simd_from(simd, *colour), sum);
         }
-        let [red, green, blue, _] = sum.into();
-        [red, green, blue]
+        sum
     }
 }
 
@@ -77,7 +83,8 @@ mod tests {
         for emitter in EMITTERS {
             let mut light = [0.0; 4];
             light[emitter.index()] = 2.0;
-            let colour = dispatch!(Level::new(), simd => shading.colour(simd, &light, 0.3));
+            let colour: [f32; 4] =
+                dispatch!(Level::new(), simd => shading.arriving(simd, &light, Shading::place(0.3)).into());
             let expected = emitter.colour_per_kilorayleigh();
             assert!(
                 (0..3).all(|c| (f64::from(colour[c]) - 2.0 * expected[c]).abs() < 1e-4 * expected[1].abs().max(1e-6))
@@ -91,7 +98,8 @@ mod tests {
         let share = |emitter: Emitter| {
             let mut light = [0.0; 4];
             light[emitter.index()] = 1.0;
-            let blue = |sine: f32| dispatch!(Level::new(), simd => shading.colour(simd, &light, sine)[2]);
+            let blue =
+                |sine: f32| dispatch!(Level::new(), simd => shading.arriving(simd, &light, Shading::place(sine))[2]);
             blue(0.02) / blue(1.0)
         };
         assert!(share(Emitter::NitrogenIon) < 0.5 * share(Emitter::OxygenGreen).abs());

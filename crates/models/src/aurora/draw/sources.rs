@@ -137,8 +137,10 @@ pub(super) fn node_of(energy_ev: f32) -> f32 {
 impl Sources {
     /// What shines while the shutter is open.
     pub(super) fn new(light: &Light, field: &FieldLines, moments: &Moments) -> Self {
-        let (green_w, green) = light.glow[0].shared_out(light.particles, FAINTEST);
-        let red: Vec<_> = light.glow[1].cells().collect();
+        let ((green_w, green), red) = rayon::join(
+            || light.glow[0].shared_out(light.particles, FAINTEST),
+            || light.glow[1].cells().collect::<Vec<_>>(),
+        );
         let column = light.emission.column(light.energy_ev);
         let spread = math::hypot(light.spread_km(), moments.smear_km);
         let with = |emitter: Emitter, map: &GlowMap| {

@@ -7,14 +7,21 @@ use crate::field::Grid2;
 const CHANGE: [f64; 2] = [0.5, 2.0];
 const CHARGE: [f64; 2] = [0.1, 4.0];
 
+/// Most that charge is denser at one side of a sheet than in its middle, as a share of that.
+const MOST_TILT: f64 = 0.9;
+
 /// Charge of a scattered particle by its place along the sheets, linear between nodes, 1 on a long, straight, lone sheet.
 ///
 /// With the same charge everywhere the potential would rise by half toward the ends of sheets, and fall where they wind up or lie close
-/// together: all particles would gather there. Here it is the same along all sheets.
+/// together: all particles would gather there. Here it is the same along all sheets. And a sheet that bends, or has another on one side of it,
+/// pulls toward that side, so that particles would come to rest beside the drawn line: charge gathers on the other side until both are at one
+/// potential.
 #[derive(Clone, Debug)]
 pub(super) struct LineCharge {
     /// One sheet's after those of another; evenly spaced over its length, one at each end.
     nodes: Vec<f64>,
+    /// How much denser it is at the one side (left of the way along) than in the middle, as a share of that, at the same places.
+    tilts: Vec<f64>,
     /// Where each sheet's begin, and the end of all.
     starts: Vec<usize>,
 }
@@ -24,6 +31,17 @@ pub(super) struct LineCharge {
 pub(super) struct Place {
     node: u32,
     part: f32,
+    side: f32,
+}
+
+/// What charge shall come to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wanted {
+    /// Potential along the sheets, negative, km^2/s^2.
+    pub(super) potential: f64,
+    /// Charge density over eps of a lone sheet, 1/s^2, and half its thickness, km.
+    pub(super) density: f64,
+    pub(super) half_thickness: f64,
 }
 
 impl LineCharge {
@@ -34,7 +52,8 @@ impl LineCharge {
             let count = (length / spacing).ceil().max(1.0) as usize + 1;
             starts.push(starts[starts.len() - 1] + count);
         }
-        Self { nodes: vec![1.0; starts[starts.len() - 1]], starts }
+        let count = starts[starts.len() - 1];
+        Self { nodes: vec![1.0; count], tilts: vec![0.0; count], starts }
     }
 
     /// Where a particle is.
@@ -42,24 +61,39 @@ impl LineCharge {
         let sheet = particle.sheet as usize;
         let (first, end) = (self.starts[sheet], self.starts[sheet + 1]);
         let (node, part) = split(f64::from(particle.share), end - first);
-        Place { node: (first + node) as u32, part: part as f32 }
+        Place { node: (first + node) as u32, part: part as f32, side: particle.side }
     }
 
     /// Charge of a particle that is there.
+    #[inline]
     pub(super) fn at(&self, place: Place) -> f64 {
-        let [before, after] = [0, 1].map(|next| self.nodes[place.node as usize + next]);
-        before + f64::from(place.part) * (after - before)
+        let node = place.node as usize;
+        let (before, after) = (self.nodes[node], self.nodes[node + 1]);
+        let (tilt, next) = (self.tilts[node], self.tilts[node + 1]);
+        let (part, side) = (f64::from(place.part), f64::from(place.side));
+        (before + part * (after - before)) * (1.0 + (tilt + part * (next - tilt)) * side)
     }
 
-    /// Changes it where the potential that it makes is not the one that is wanted; negative both.
-    pub(super) fn adjust(&mut self, course: &Course, potential: &Grid2, wanted: f64) {
+    /// Changes it where the potential that it makes is not the one that is wanted, or not the same on both sides.
+    pub(super) fn adjust(&mut self, course: &Course, potential: &Grid2, wanted: Wanted) {
+        let Wanted { density, half_thickness, .. } = wanted;
         for (sheet, ends) in self.starts.windows(2).enumerate() {
-            let nodes = &mut self.nodes[ends[0]..ends[1]];
-            let last = (nodes.len() - 1) as f64;
-            for (number, charge) in nodes.iter_mut().enumerate() {
-                let found = potential.sample(course.place(sheet, number as f64 / last).to_array());
-                let change = if found < 0.0 { wanted / found } else { CHANGE[1] };
+            let range = ends[0]..ends[1];
+            let last = (range.len() - 1) as f64;
+            let nodes = self.nodes[range.clone()].iter_mut().zip(&mut self.tilts[range]);
+            for (number, (charge, tilt)) in nodes.enumerate() {
+                let share = number as f64 / last;
+                let place = course.place(sheet, share);
+                let found = potential.sample(place.to_array());
+                let change = if found < 0.0 { wanted.potential / found } else { CHANGE[1] };
                 *charge = (*charge * change.clamp(CHANGE[0], CHANGE[1])).clamp(CHARGE[0], CHARGE[1]);
+                let way = course.place(sheet, share + 0.5 / last) - course.place(sheet, share - 0.5 / last);
+                let across = way.perp().normalize_or_zero() * half_thickness;
+                let rise =
+                    potential.sample((place + across).to_array()) - potential.sample((place - across).to_array());
+                // Charge tilted by a makes the one edge lower than the other by 2/3 a density L^2.
+                let change = 1.5 * rise / (density * *charge * half_thickness * half_thickness);
+                *tilt = (*tilt + change).clamp(-MOST_TILT, MOST_TILT);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The in-between shape as the particles see it: smooth through its control points, with folds that travel along it.
 
 use bansho_base::{
-    math::{DVec2, lerp},
+    math::{self, DVec2, lerp},
     noise::{Coordinate, Fractal, Noise},
     random::Key,
 };
@@ -9,7 +9,7 @@ use bansho_base::{
 use super::along::Along;
 use crate::aurora::{
     AuroraParameters, FoldParameters,
-    shapes::{Neighbourhood, Segments, Shape, Sheet},
+    shapes::{Bridge, Neighbourhood, Segments, Shape, Sheet},
 };
 
 /// Pieces that a fold is made of, at least.
@@ -60,7 +60,20 @@ pub(super) struct Course {
     shares: Vec<Vec<f64>>,
     /// The sheet and point at which each segment begins, over all sheets in turn.
     starts: Vec<[u32; 2]>,
+    /// What there is along each segment, in the same order.
+    parts: Vec<Part>,
     near: Neighbourhood,
+}
+
+/// What there is at the start of a segment, and by how much it is more at its end.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    share: [f64; 2],
+    flux: [f64; 2],
+    energy: [f64; 2],
+    /// One over its length, 1/km; 0 where it has none.
+    per_length: f64,
+    sheet: u32,
 }
 
 /// The place of a sheet that is nearest to a particle.
@@ -75,22 +88,37 @@ pub(super) struct Foot {
 }
 
 impl Course {
-    /// The course of `shape` at a time; particles within `reach` km find it.
-    pub(super) fn new(shape: &Shape, along: &Along, folding: &Folding, time: f64, reach: f64) -> Self {
+    /// The course of `shape` and the bridges over its gaps at a time; particles within `reach` km find it.
+    pub(super) fn new(
+        (shape, bridges): (&Shape, &[Bridge]),
+        along: &Along,
+        folding: &Folding,
+        time: f64,
+        reach: f64,
+    ) -> Self {
         let piece = folding.piece_km.max(shape.length() / MOST_PIECES);
-        let (mut fine, mut alongs, mut shares, mut starts) = (Shape::default(), Vec::new(), Vec::new(), Vec::new());
+        let (mut fine, mut alongs) = (Shape::default(), Vec::new());
         for (index, sheet) in shape.sheets.iter().enumerate() {
             let (mut refined, coordinates) = refine(sheet, piece, |point, part| along.between(index, point, part));
             if folding.parameters.amplitude_km > 0.0 {
                 fold(&mut refined, &coordinates, folding, time);
             }
-            starts.extend((1..refined.points.len()).map(|point| [index as u32, point as u32 - 1]));
-            shares.push(length_shares(&refined.points));
             fine.sheets.push(refined);
             alongs.push(coordinates);
         }
+        for bridge in bridges {
+            let (refined, coordinates) = span(bridge, &fine, &alongs, piece);
+            fine.sheets.push(refined);
+            alongs.push(coordinates);
+        }
+        let (mut shares, mut starts) = (Vec::new(), Vec::new());
+        for (index, sheet) in fine.sheets.iter().enumerate() {
+            starts.extend((1..sheet.points.len()).map(|point| [index as u32, point as u32 - 1]));
+            shares.push(length_shares(&sheet.points));
+        }
+        let parts = starts.iter().map(|start| Part::new(&fine, &shares, *start)).collect();
         let near = Neighbourhood::new(&fine, reach);
-        Self { shape: fine, alongs, shares, starts, near }
+        Self { shape: fine, alongs, shares, starts, parts, near }
     }
 
     /// Its segments, to be sampled.
@@ -149,37 +177,44 @@ impl Course {
 
     /// `point`, or if it is farther than `most` km from the shape, the place on the way to it that is not; itself beyond the reach.
     pub(super) fn held(&self, point: DVec2, most: f64) -> DVec2 {
-        let Some((segment, distance)) = self.near.nearest(point).filter(|(_, distance)| *distance > most) else {
+        let Some(nearest) = self.near.nearest_place(point).filter(|nearest| nearest.square > most * most) else {
             return point;
         };
-        let (_, place) = self.on_segment(segment, point);
-        place + (point - place) * (most / distance)
-    }
-
-    /// The share of a segment before its place nearest to `point`, and that place.
-    fn on_segment(&self, segment: usize, point: DVec2) -> (f64, DVec2) {
-        let [sheet, index] = self.starts[segment].map(|number| number as usize);
+        let [sheet, index] = self.starts[nearest.segment].map(|number| number as usize);
         let points = &self.shape.sheets[sheet].points;
-        let way = points[index + 1] - points[index];
-        let part = ((point - points[index]).dot(way) / way.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (part, points[index] + way * part)
+        let place = points[index].lerp(points[index + 1], nearest.share);
+        place + (point - place) * (most / math::sqrt(nearest.square))
     }
 
     /// The place nearest to `point`; none beyond the reach.
+    #[inline]
     pub(super) fn foot(&self, point: DVec2) -> Option<Foot> {
-        let (segment, _) = self.near.nearest(point)?;
-        let (part, place) = self.on_segment(segment, point);
-        let [sheet, index] = self.starts[segment].map(|number| number as usize);
-        let on = &self.shape.sheets[sheet];
-        let way = on.points[index + 1] - on.points[index];
-        let between = |values: &[f64]| lerp(values[index], values[index + 1], part);
+        let nearest = self.near.nearest_place(point)?;
+        let part = &self.parts[nearest.segment];
+        let at = |[start, more]: [f64; 2]| start + nearest.share * more;
         Some(Foot {
-            sheet: sheet as u32,
-            share: between(&self.shares[sheet]),
-            flux: between(&on.flux),
-            energy: between(&on.energy),
-            side: (point - place).perp_dot(way.normalize_or_zero()),
+            sheet: part.sheet,
+            share: at(part.share),
+            flux: at(part.flux),
+            energy: at(part.energy),
+            side: nearest.side * part.per_length,
         })
+    }
+}
+
+impl Part {
+    fn new(shape: &Shape, shares: &[Vec<f64>], [sheet, index]: [u32; 2]) -> Self {
+        let (number, index) = (sheet as usize, index as usize);
+        let on = &shape.sheets[number];
+        let along = |values: &[f64]| [values[index], values[index + 1] - values[index]];
+        let length = on.points[index].distance(on.points[index + 1]);
+        Self {
+            share: along(&shares[number]),
+            flux: along(&on.flux),
+            energy: along(&on.energy),
+            per_length: if length > 0.0 { 1.0 / length } else { 0.0 },
+            sheet,
+        }
     }
 }
 
@@ -216,6 +251,25 @@ fn refine(sheet: &Sheet, piece_km: f64, along: impl Fn(usize, f64) -> f64) -> (S
         push(sheet.points[last + 1], last, 1.0);
     }
     (fine, coordinates)
+}
+
+/// The light over a gap as a sheet of its own, from the one end of a sheet to that of another, and the coordinate along it, which goes on from
+/// the first.
+fn span(bridge: &Bridge, fine: &Shape, alongs: &[Vec<f64>], piece_km: f64) -> (Sheet, Vec<f64>) {
+    let point = |(sheet, at_end): (usize, bool)| if at_end { fine.sheets[sheet].points.len() - 1 } else { 0 };
+    let [from, to] = bridge.ends.map(|end| fine.sheets[end.0].points[point(end)]);
+    let begin = alongs[bridge.ends[0].0][point(bridge.ends[0])];
+    let length = from.distance(to);
+    let pieces = (length / piece_km).ceil().max(1.0) as usize;
+    let (mut sheet, mut coordinates) = (Sheet::default(), Vec::new());
+    for number in 0..=pieces {
+        let part = number as f64 / pieces as f64;
+        sheet.points.push(from.lerp(to, part));
+        sheet.flux.push(bridge.flux);
+        sheet.energy.push(bridge.energy);
+        coordinates.push(begin + part * length);
+    }
+    (sheet, coordinates)
 }
 
 /// The direction of the sheet at each point: that of the circle through it and its neighbours.

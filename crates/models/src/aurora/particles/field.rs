@@ -13,7 +13,7 @@ use fearless_simd::Level;
 use rayon::prelude::*;
 
 use super::{
-    conductor::{LineCharge, Place},
+    conductor::{LineCharge, Place, Wanted},
     course::Course,
     scatter::Scattered,
 };
@@ -48,8 +48,12 @@ pub(super) struct Field {
     pub(super) counts: Grid2,
     /// phi(i, j) without noise, which relocation looks at.
     pub(super) potential: Grid2,
-    /// Potential with noise, and the field from it by (2.7) to (2.9), one a cell and one row and column of ghosts around.
-    table: Vec<[f32; 3]>,
+    /// Potential with noise, and the field from it by (2.7) to (2.9) and nothing, one a cell and one row and column of ghosts around.
+    table: Vec<[f32; 4]>,
+    /// Columns and rows, the lower corner in cells, and cells a km.
+    size: [f32; 2],
+    corner: [f32; 2],
+    per_km: f32,
 }
 
 /// Potential and field where a particle is.
@@ -99,7 +103,15 @@ impl FieldMaker {
             FieldSolver::GaussSeidel => self.relaxed(&source),
         };
         let table = self.table(&potential, time);
-        Field { counts, potential, table }
+        let per_km = 1.0 / counts.spacing();
+        Field {
+            size: counts.size().map(|cells| cells as f32),
+            corner: counts.origin().map(|corner| (corner * per_km) as f32),
+            per_km: per_km as f32,
+            counts,
+            potential,
+            table,
+        }
     }
 
     /// Sum of values at places over those in each cell.
@@ -121,7 +133,8 @@ impl FieldMaker {
         let unit = density / full_count(counts).max(1.0);
         // In the middle of a long, straight, lone sheet.
         let reach = self.reach_km();
-        let wanted = density * reach * reach * (math::exp(-half_thickness / reach) - 1.0);
+        let potential = density * reach * reach * (math::exp(-half_thickness / reach) - 1.0);
+        let wanted = Wanted { potential, density, half_thickness };
         let mut charge = LineCharge::even(course, self.parameters.cell_km());
         let places: Vec<(usize, Place)> = scattered
             .par_iter()
@@ -131,7 +144,9 @@ impl FieldMaker {
         let source = |charge: &LineCharge| {
             let mut source = self.grid();
             let cells = source.values_mut();
-            places.iter().for_each(|(cell, place)| cells[*cell] += unit * charge.at(*place));
+            for (cell, place) in &places {
+                cells[*cell] += unit * charge.at(*place);
+            }
             source
         };
         for _ in 0..ADJUSTMENTS {
@@ -161,7 +176,7 @@ impl FieldMaker {
     }
 
     /// Adds the noise of (x, z, t) and takes the gradient.
-    fn table(&self, potential: &Grid2, time: f64) -> Vec<[f32; 3]> {
+    fn table(&self, potential: &Grid2, time: f64) -> Vec<[f32; 4]> {
         let mut noisy = potential.clone();
         self.add_noise(&mut noisy, time);
         let gradient = noisy.gradient();
@@ -171,7 +186,7 @@ impl FieldMaker {
             let (column, row) = (index % (columns + 2), index / (columns + 2));
             let inner = held(row, rows) * columns + held(column, columns);
             let [x, z] = gradient.values()[inner];
-            [noisy.values()[inner] as f32, -x as f32, -z as f32]
+            [noisy.values()[inner] as f32, -x as f32, -z as f32, 0.0]
         };
         (0..(columns + 2) * (rows + 2)).into_par_iter().with_min_len(TASK).map(value).collect()
     }
@@ -206,25 +221,26 @@ impl Field {
     /// Bilinear between the middles of cells; as at the nearest middle beyond the outermost.
     #[inline(always)]
     pub(super) fn sample(&self, x: f32, z: f32) -> FieldSample {
-        let [columns, rows] = self.counts.size();
-        let [left, low] = self.counts.origin();
-        let to_cells = 1.0 / self.counts.spacing();
-        let place = |value: f32, origin: f64, count: usize| {
-            ((f64::from(value) - origin) * to_cells + 0.5).clamp(0.0, count as f64 + 0.999) as f32
-        };
-        let (x, z) = (place(x, left, columns), place(z, low, rows));
-        let (column, row) = (x as usize, z as usize);
-        let (s, t) = (x - column as f32, z - row as f32);
-        let first = row * (columns + 2) + column;
-        let second = first + columns + 2;
-        let (lower, upper) = (&self.table[first..first + 2], &self.table[second..second + 2]);
-        let mut sample = [0.0; 3];
-        for k in 0..3 {
-            let lower = s.fused(lower[1][k] - lower[0][k], lower[0][k]);
-            let upper = s.fused(upper[1][k] - upper[0][k], upper[0][k]);
-            sample[k] = t.fused(upper - lower, lower);
+        let places = [x, z];
+        let (mut cells, mut parts) = ([0; 2], [0.0; 2]);
+        for axis in 0..2 {
+            let place = places[axis].fused(self.per_km, 0.5 - self.corner[axis]);
+            let held = if place > 0.0 { place } else { 0.0 };
+            let most = self.size[axis] + 0.999;
+            let held = if held < most { held } else { most };
+            cells[axis] = held as usize;
+            parts[axis] = held - cells[axis] as f32;
         }
-        let [potential, east, south] = sample;
+        let columns = self.size[0] as usize + 2;
+        let first = cells[1] * columns + cells[0];
+        let (lower, upper) = (&self.table[first..first + 2], &self.table[first + columns..first + columns + 2]);
+        let mut sample = [0.0; 4];
+        for k in 0..4 {
+            let lower = parts[0].fused(lower[1][k] - lower[0][k], lower[0][k]);
+            let upper = parts[0].fused(upper[1][k] - upper[0][k], upper[0][k]);
+            sample[k] = parts[1].fused(upper - lower, lower);
+        }
+        let [potential, east, south, _] = sample;
         FieldSample { potential, field: [east, south] }
     }
 }

@@ -153,20 +153,22 @@ impl Mover {
         for c in 0..2 {
             let force = self.pull_weight.fused(here.field[c], self.repulsion_weight * push[c]);
             let moved = (0.5 * STEP * STEP).fused(force, STEP.fused(speed[c], place[c]));
-            to[c] = if moved.is_finite() { moved.clamp(-self.half_km, self.half_km) } else { place[c] };
+            let held = if moved > -self.half_km { moved } else { -self.half_km };
+            let held = if held < self.half_km { held } else { self.half_km };
+            to[c] = if moved.is_finite() { held } else { place[c] };
             new[c] = self.kept_speed * STEP.fused(force, speed[c]);
         }
         let fall = here.potential - field.sample(to[0], to[1]).potential;
         let factor = self.allowed(speed, new, fall);
-        (to, if factor > 0.0 { new.map(|value| value * factor) } else { [0.0; 2] })
+        (to, if factor > 0.0 { [new[0] * factor, new[1] * factor] } else { [0.0; 2] })
     }
 
     /// The factor that holds kinetic plus potential energy; `fall` is by how much the potential has fallen.
     #[inline(always)]
     fn allowed(&self, before: [f32; 2], after: [f32; 2], fall: f32) -> f32 {
-        let square = |v: [f32; 2]| v[0].fused(v[0], v[1] * v[1]);
-        let energy = (2.0 * self.pull_weight).fused(fall, square(before)).max(0.0);
-        let found = square(after);
+        let energy = (2.0 * self.pull_weight).fused(fall, before[0].fused(before[0], before[1] * before[1]));
+        let energy = if energy > 0.0 { energy } else { 0.0 };
+        let found = after[0].fused(after[0], after[1] * after[1]);
         if !found.is_finite() {
             0.0
         } else if self.limit_energy && found > energy {

@@ -66,16 +66,19 @@ impl Precipitation {
         wanted
     }
 
+    /// The pattern along the sheets at a time.
+    pub(super) fn rays(&self, course: &Course, time: f64) -> RayTable {
+        self.rays.table(&course.sheet_lengths(), |sheet, share| course.along(sheet, share), time)
+    }
+
     /// Gives every particle its share of the power.
     ///
     /// All together have the power of the sheets, and those along a stretch that of the stretch, however many they are: no
     /// birth, death, split or merge can make the aurora flicker, and the flux along it is the one that was drawn. What is finer than
     /// a stretch is the particles' own.
-    pub(super) fn share_out(&self, particles: &mut AuroraParticles, course: &Course, time: f64) {
+    pub(super) fn share_out(&self, particles: &mut AuroraParticles, (course, rays): (&Course, &RayTable), time: f64) {
         let sheets = course.shape.sheets.len();
-        let along = |sheet, share| course.along(sheet, share);
-        let rays = self.rays.table(&course.sheet_lengths(), along, time);
-        let weigh = |part| self.weigh(part, course, (&rays, time), Nodes::new(sheets));
+        let weigh = |part| self.weigh(part, course, (rays, time), Nodes::new(sheets));
         let weights: Vec<Nodes> = stretches(particles).into_par_iter().map(weigh).collect();
         let weights = weights.iter().fold(Nodes::new(sheets), |sum, part| sum.plus(part));
         let factors = self.wanted(course, time).shared_by(&weights);
@@ -88,12 +91,14 @@ impl Precipitation {
         let side_scale = 1.0 / self.parameters.half_thickness_km();
         for first in (0..part.fades.len()).step_by(LANES) {
             let count = LANES.min(part.fades.len() - first);
-            let foot = |lane: usize| if lane < count { part.foot(course, first + lane) } else { None };
-            let feet: [Option<Foot>; LANES] = std::array::from_fn(foot);
-            let places = Places {
-                noises: feet.map(|foot| foot.map_or([0.0; 4], |foot| rays.at(foot.sheet, foot.share))),
-                side: feet.map(|foot| foot.map_or(0.0, |foot| (foot.side * side_scale) as f32)),
-            };
+            let mut feet: [Option<Foot>; LANES] = [None; LANES];
+            let mut places = Places { noises: [[0.0; 4]; LANES], side: [0.0; LANES] };
+            for lane in 0..count {
+                let Some(foot) = part.foot(course, first + lane) else { continue };
+                places.noises[lane] = rays.at(foot.sheet, foot.share);
+                places.side[lane] = (foot.side * side_scale) as f32;
+                feet[lane] = Some(foot);
+            }
             let pattern = self.rays.at(level, &places, time);
             for (lane, foot) in feet.into_iter().enumerate().take(count) {
                 let index = first + lane;

@@ -164,8 +164,12 @@ impl RayTable {
     pub(super) fn at(&self, sheet: u32, share: f64) -> Noises {
         let nodes = &self.sheets[sheet as usize];
         let (node, part) = split(share, nodes.len());
-        let part = part as f32;
-        std::array::from_fn(|k| nodes[node][k] + part * (nodes[node + 1][k] - nodes[node][k]))
+        let (low, high, part) = (&nodes[node], &nodes[node + 1], part as f32);
+        let mut noises = [0.0; 4];
+        for k in 0..4 {
+            noises[k] = low[k] + part * (high[k] - low[k]);
+        }
+        noises
     }
 }
 

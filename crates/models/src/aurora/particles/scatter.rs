@@ -20,6 +20,8 @@ pub(super) struct Scattered {
     pub(super) sheet: u32,
     /// Share of that sheet's length before it.
     pub(super) share: f32,
+    /// How far it is to the side, from -1 to 1 within L_thr.
+    pub(super) side: f32,
 }
 
 /// Particles within `half_thickness` km of the shape, evenly over the area that it covers; the `renewal`th set of `count` trials.
@@ -30,9 +32,10 @@ pub(super) fn scatter(course: &Course, half_thickness: f64, count: usize, key: K
     let particle = |index: usize| {
         let [u, v, ..] = key.words(index as u64, renewal, SCATTER).map(|word| f64::from(uniform(word)));
         let sample = segments.sample((index as f64 + u) / count as f64)?;
-        let place = sample.point + sample.tangent.perp() * (half_thickness * (2.0 * v - 1.0));
+        let side = 2.0 * v - 1.0;
+        let place = sample.point + sample.tangent.perp() * (half_thickness * side);
         let own = [sample.segment.sheet, sample.segment.segment];
-        let scattered = Scattered { place, sheet: own[0] as u32, share: sample.share as f32 };
+        let scattered = Scattered { place, sheet: own[0] as u32, share: sample.share as f32, side: side as f32 };
         (course.nearest_segment(place) == Some(own)).then_some(scattered)
     };
     (0..count).into_par_iter().with_min_len(1024).filter_map(particle).collect()

@@ -80,7 +80,8 @@ impl Making {
     /// The course of the shape at a time, by the coordinate along it.
     fn course(&self, along: &Along, time: f64) -> Course {
         let reach = REACH * self.parameters.half_thickness_km();
-        Course::new(&self.sequence.at(time), along, &self.folding, time, reach)
+        let (shape, bridges) = (self.sequence.at(time), self.sequence.bridges(time));
+        Course::new((&shape, &bridges), along, &self.folding, time, reach)
     }
 
     /// The target that a state speaks of, and the particles that were scattered about it.
@@ -93,6 +94,21 @@ impl Making {
         let near = near.into_iter().filter(|near| *near).count().max(1) as f64;
         let cell = self.parameters.cell_km();
         (Target { course, field, rest_density: count as f64 / (near * cell * cell) }, scattered)
+    }
+}
+
+/// Forces and motion; particles appear and vanish, and those that have vanished are gone.
+fn advance(state: &mut State, target: &Target, (repulsion, mover): (&mut Repulsion, &Mover), fade_s: f64) {
+    state.support_km = repulsion.find(&mut state.particles, state.support_km, target.rest_density);
+    let particles = &mut state.particles;
+    mover.advance(particles, &target.field, &repulsion.accelerations);
+    let step = if fade_s > 0.0 { (FRAME_S / fade_s) as f32 } else { 1.0 };
+    for (fade, dying) in particles.fades.iter_mut().zip(&particles.dying) {
+        *fade = if *dying { *fade - step } else { (*fade + step).min(1.0) };
+    }
+    let keep: Vec<bool> = particles.fades.iter().map(|fade| *fade > 0.0).collect();
+    if keep.contains(&false) {
+        particles.retain(&keep);
     }
 }
 
@@ -127,7 +143,8 @@ impl AuroraSimulation {
         }
         state.next_id = scattered.len() as u64;
         state.support_km = repulsion.support_km(target.rest_density);
-        precipitation.share_out(&mut state.particles, &target.course, time);
+        let rays = precipitation.rays(&target.course, time);
+        precipitation.share_out(&mut state.particles, (&target.course, &rays), time);
         state.afterglow.settle(&state.particles);
         let parameters = &making.parameters;
         Self {
@@ -171,37 +188,24 @@ impl AuroraSimulation {
         if self.state.steps.is_multiple_of(frames) {
             self.renew(frames);
         }
-        self.advance();
-        self.fade();
-        self.state.steps += 1;
-        let time = self.time();
-        self.state.along = self.state.along.follow(&self.making.sequence.at(time));
-        self.state.along.relax(Self::STEP_S);
-        let course = self.making.course(&self.state.along, time);
-        let state = &mut self.state;
-        self.precipitation.share_out(&mut state.particles, &course, time);
-        state.afterglow.step(&state.particles, &self.emission, self.making.parameters.energy_ev.at(time), Self::STEP_S);
-    }
-
-    /// Forces and motion.
-    fn advance(&mut self) {
-        let (state, target) = (&mut self.state, &self.target);
-        state.support_km = self.repulsion.find(&mut state.particles, state.support_km, target.rest_density);
-        self.mover.advance(&mut state.particles, &target.field, &self.repulsion.accelerations);
-    }
-
-    /// Particles appear and vanish; those that have vanished are gone.
-    fn fade(&mut self) {
-        let particles = &mut self.state.particles;
-        let fade_s = self.making.parameters.particles.fade_s;
-        let step = if fade_s > 0.0 { (Self::STEP_S / fade_s) as f32 } else { 1.0 };
-        for (fade, dying) in particles.fades.iter_mut().zip(&particles.dying) {
-            *fade = if *dying { *fade - step } else { (*fade + step).min(1.0) };
-        }
-        let keep: Vec<bool> = particles.fades.iter().map(|fade| *fade > 0.0).collect();
-        if keep.contains(&false) {
-            particles.retain(&keep);
-        }
+        let time = (self.state.steps + 1) as f64 * Self::STEP_S - self.making.parameters.preroll_s;
+        let Self { making, repulsion, mover, state, target, precipitation, emission, .. } = self;
+        let before = state.along.clone();
+        // Where the sheets will be does not depend on the particles, and is found beside them.
+        let (_, (along, course, rays)) = rayon::join(
+            || advance(state, target, (repulsion, mover), making.parameters.particles.fade_s),
+            || {
+                let mut along = before.follow(&making.sequence.at(time));
+                along.relax(Self::STEP_S);
+                let course = making.course(&along, time);
+                let rays = precipitation.rays(&course, time);
+                (along, course, rays)
+            },
+        );
+        state.steps += 1;
+        state.along = along;
+        precipitation.share_out(&mut state.particles, (&course, &rays), time);
+        state.afterglow.step(&state.particles, emission, making.parameters.energy_ev.at(time), Self::STEP_S);
     }
 
     /// The state as bytes.

@@ -4,6 +4,7 @@ use bansho_base::{math::DVec2, parameters::Auto};
 
 use super::{
     MergeParameters, ShapeFault, ShapeFaultKind, ShapeParameters, SplitParameters,
+    gap::Gap,
     polyline::shares,
     track::{Parents, Track},
 };
@@ -117,6 +118,13 @@ impl Change {
                 strand.insert(longest + 1, born(parents, knot, tracks));
             }
         }
+    }
+
+    /// The gaps that open and close.
+    pub(super) fn gaps(&self) -> Vec<Gap> {
+        let gap = |pair: &Pair, opens: bool| Gap { ends: pair.new, opens };
+        let opening = self.splits.iter().map(|pair| gap(pair, true));
+        opening.chain(self.merges.iter().map(|pair| gap(pair, false))).collect()
     }
 
     /// The tracks of chain `chain`, along it.

@@ -7,6 +7,7 @@ use super::{
     anchors::Anchors,
     change::{Change, Link},
     drawn::{DrawnSheet, Place, drawn_sheets},
+    gap::Gap,
     matching::{Match, match_sheets},
     polyline::{Polyline, shares},
     track::{Knot, Track},
@@ -21,6 +22,8 @@ pub(super) struct Followed {
     pub(super) shapes: Vec<Vec<Vec<usize>>>,
     /// Strands from each shape to the next.
     pub(super) strands: Vec<Vec<Vec<usize>>>,
+    /// Gaps that open or close from each shape to the next.
+    pub(super) gaps: Vec<Vec<Gap>>,
     /// Whether the last shape is the first again.
     pub(super) returns: bool,
 }
@@ -61,6 +64,7 @@ pub(super) fn follow(
             let closes = followed.returns && index == shapes.len() - 1;
             followed.go_nearest(&change, &drawn[index], &anchors, closes, evenness);
         }
+        followed.gaps.push(change.gaps());
         followed.strands.push(change.strands);
     }
     Ok(followed)

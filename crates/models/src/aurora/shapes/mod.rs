@@ -14,6 +14,7 @@ mod drawn;
 mod fault;
 mod follow;
 mod form;
+mod gap;
 mod matching;
 mod neighbourhood;
 mod parameters;
@@ -28,6 +29,7 @@ mod warp;
 pub use crossing::{SegmentId, count_crossings, first_crossing};
 pub use fault::{ShapeFault, ShapeFaultKind};
 pub use form::Form;
+pub use gap::Bridge;
 pub use neighbourhood::Neighbourhood;
 pub use parameters::{
     Correspondence, FRAME_S, LinkParameters, MergeParameters, MotionParameters, ShapeParameters, SheetParameters,

@@ -19,6 +19,19 @@ pub struct Neighbourhood {
     lists: Vec<Segment>,
 }
 
+/// The place of a shape that is nearest to a point.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::aurora) struct Nearest {
+    /// Its segment, counted over all sheets in turn.
+    pub(in crate::aurora) segment: usize,
+    /// Share of the segment before it.
+    pub(in crate::aurora) share: f64,
+    /// Square of the distance, km^2.
+    pub(in crate::aurora) square: f64,
+    /// Signed distance from the line through the segment, negative on the left of the way along it, times the segment's length, km^2.
+    pub(in crate::aurora) side: f64,
+}
+
 /// A segment: its number, its start, the way to its end, and one over the square of its length (0 where it has none).
 #[derive(Clone, Copy, Debug)]
 struct Segment {
@@ -54,16 +67,28 @@ impl Neighbourhood {
 
     /// The segment nearest to `point`, counted over all sheets in turn, and the distance to it, km; the first of several that
     /// are as near. `None` beyond the reach.
+    #[inline]
     pub fn nearest(&self, point: DVec2) -> Option<(usize, f64)> {
+        let nearest = self.nearest_place(point)?;
+        Some((nearest.segment, nearest.square.sqrt()))
+    }
+
+    /// The place of the shape that is nearest to `point`; that on the first of several segments that are as near. `None` beyond the reach.
+    #[inline]
+    pub(in crate::aurora) fn nearest_place(&self, point: DVec2) -> Option<Nearest> {
         let cell = self.grid.cell_of(point);
-        let (mut nearest, mut least) = (0, f64::INFINITY);
+        let mut nearest = Nearest { segment: 0, share: 0.0, square: f64::INFINITY, side: 0.0 };
         for segment in &self.lists[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
-            let square = segment.distance_squared(point);
-            if square < least {
-                (nearest, least) = (segment.number, square);
+            let from_start = point - segment.start;
+            let share = (from_start.dot(segment.way) * segment.inverse_square).clamp(0.0, 1.0);
+            let square = from_start.distance_squared(segment.way * share);
+            if square < nearest.square {
+                // Times the length, the distance from the line through the segment.
+                let side = from_start.perp_dot(segment.way);
+                nearest = Nearest { segment: segment.number as usize, share, square, side };
             }
         }
-        (least <= self.reach * self.reach).then(|| (nearest as usize, least.sqrt()))
+        (nearest.square <= self.reach * self.reach).then_some(nearest)
     }
 }
 

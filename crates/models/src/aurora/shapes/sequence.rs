@@ -8,6 +8,7 @@ use bansho_base::{
 use super::{
     Correspondence, FRAME_S, MotionParameters, Shape, ShapeFault, ShapeFaultKind, ShapeParameters, Sheet,
     follow::{Followed, follow},
+    gap::{self, Bridge, Gap},
     parameters::TRANSITION_S,
     track::{Knot, Timing, find_velocities},
 };
@@ -28,6 +29,12 @@ pub struct Sequence {
     timing: Timing,
     half_km: f64,
     loop_s: Option<f64>,
+}
+
+/// A time among the shapes: at one of them, or at a share of the way from one to the next.
+enum Moment {
+    At(usize),
+    Between(usize, f64),
 }
 
 impl Sequence {
@@ -82,18 +89,68 @@ impl Sequence {
         self.timing.departures[self.timing.departures.len() - 1]
     }
 
-    /// The shape at time `t`, s. Before the first shape and after the last, these stay.
+    /// The shape at time `t`, s. Before the first shape and after the last, these stay. Toward gaps that open or close its flux fades.
     pub fn at(&self, t: f64) -> Shape {
+        let (index, share) = match self.moment(t) {
+            Moment::At(index) => {
+                return self.shape(&self.followed.shapes[index], |track| self.followed.tracks[track].knot(index));
+            }
+            Moment::Between(index, share) => (index, share),
+        };
+        let between = |track: usize| self.followed.tracks[track].between(index, share, &self.timing);
+        let mut shape = self.shape(&self.followed.strands[index], between);
+        for gap in &self.followed.gaps[index] {
+            let (state, _) = self.gap(gap, index, share);
+            for (sheet, at_end) in gap.ends.iter().filter_map(|end| self.end(*end, index)) {
+                gap::fade(&mut shape.sheets[sheet], at_end, state.ends);
+            }
+        }
+        shape
+    }
+
+    /// What passes over narrow gaps between the sheets of [`Self::at`] that time.
+    pub fn bridges(&self, t: f64) -> Vec<Bridge> {
+        let Moment::Between(index, share) = self.moment(t) else { return Vec::new() };
+        let bridge = |gap: &Gap| {
+            let (state, knots) = self.gap(gap, index, share);
+            let ends = [self.end(gap.ends[0], index)?, self.end(gap.ends[1], index)?];
+            let mean = |value: usize| 0.5 * (knots[0].values[value] + knots[1].values[value]);
+            let bridge = Bridge { ends, flux: mean(0) * state.across, energy: mean(1) };
+            (bridge.flux > 0.0).then_some(bridge)
+        };
+        self.followed.gaps[index].iter().filter_map(bridge).collect()
+    }
+
+    /// Where a time lies among the shapes.
+    fn moment(&self, t: f64) -> Moment {
         let t = self.phase(t);
         let next = self.timing.arrivals.partition_point(|&arrival| arrival <= t).max(1);
         let index = next - 1;
         let departure = self.timing.departures[index];
         if t <= departure || next == self.timing.arrivals.len() {
-            return self.shape(&self.followed.shapes[index], |track| self.followed.tracks[track].knot(index));
+            return Moment::At(index);
         }
-        let share = (t - departure) / (self.timing.arrivals[next] - departure);
-        let between = |track: usize| self.followed.tracks[track].between(index, share, &self.timing);
-        self.shape(&self.followed.strands[index], between)
+        Moment::Between(index, (t - departure) / (self.timing.arrivals[next] - departure))
+    }
+
+    /// A gap on the way from shape `index`, and its two ends.
+    fn gap(&self, gap: &Gap, index: usize, share: f64) -> (gap::State, [Knot; 2]) {
+        let tracks = gap.ends.map(|track| &self.followed.tracks[track]);
+        let width = |[a, b]: [Knot; 2]| a.position.distance(b.position);
+        let now = tracks.map(|track| track.between(index, share, &self.timing));
+        let widest = tracks.map(|track| track.knot(index + usize::from(gap.opens)));
+        let from_closed = if gap.opens { share } else { 1.0 - share };
+        (gap::State::new(width(now), width(widest), from_closed), now)
+    }
+
+    /// The strand on the way from shape `index` that a control point ends, and whether it does so at its end or at its start.
+    fn end(&self, track: usize, index: usize) -> Option<(usize, bool)> {
+        let strands = self.followed.strands[index].iter().enumerate();
+        let mut ends = strands.filter_map(|(number, strand)| {
+            let at_end = strand.last() == Some(&track);
+            (at_end || strand.first() == Some(&track)).then_some((number, at_end))
+        });
+        ends.next()
     }
 
     /// The ways of all control points from shape `index` to the next: where each leaves and where it arrives, km. They are listed

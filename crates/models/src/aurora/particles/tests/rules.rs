@@ -32,7 +32,7 @@ fn sheet(points: &[[f64; 2]]) -> Sheet {
 
 fn course(parameters: &AuroraParameters, sheets: &[&[[f64; 2]]], reach: f64) -> Course {
     let shape = Shape { sheets: sheets.iter().map(|points| sheet(points)).collect() };
-    Course::new(&shape, &Along::begin(&shape), &Folding::new(parameters, KEY), 0.0, reach)
+    Course::new((&shape, &[]), &Along::begin(&shape), &Folding::new(parameters, KEY), 0.0, reach)
 }
 
 #[test]

@@ -3,19 +3,35 @@
 use super::*;
 use crate::aurora::{RepulsionKernel, shapes::Neighbourhood};
 
-/// Steps to two and a half seconds after the second shape is reached.
-fn after_the_transition(shapes: Vec<ShapeParameters>, cells: i64) -> (AuroraSimulation, Shape) {
-    let mut parameters = AuroraParameters { shapes, ..small() };
-    parameters.field.cells = cells;
-    // Rays brighten and darken stretches on purpose.
-    parameters.rays.contrast = 0.0;
-    let sequence = sequence(&parameters);
-    let mut simulation = simulation(parameters);
-    let end = sequence.arrivals()[1] + 2.5;
-    while simulation.time() < end {
-        simulation.step();
+/// Seconds after a shape is reached from which on particles are where they shall be, how often that is looked at, and for how long.
+const SETTLED_S: f64 = 1.5;
+const MOMENT_STEPS: u64 = 15;
+const WATCHED_S: f64 = 3.5;
+
+/// What particles must do at one moment: how many lie within L_thr of the target, how many in the gaps, and what the least stretch holds of
+/// its share of the power and of the particles.
+struct Moment {
+    within: f64,
+    in_gaps: f64,
+    least: [f64; 2],
+}
+
+fn moment(simulation: &AuroraSimulation, target: &Shape) -> Moment {
+    let half = simulation.parameters().half_thickness_km();
+    let near = Neighbourhood::new(target, 2.0 * half);
+    let particles = live(simulation);
+    let distances: Vec<Option<f64>> = particles.iter().map(|(place, _)| near.distance(*place)).collect();
+    let share = |count: usize| count as f64 / particles.len() as f64;
+    let least = |sums: &[f64]| {
+        let mean = sums.iter().sum::<f64>() / sums.len() as f64;
+        sums.iter().copied().fold(f64::INFINITY, f64::min) / mean
+    };
+    let [powers, counts] = stretches(target, &particles);
+    Moment {
+        within: share(distances.iter().flatten().filter(|distance| **distance <= half).count()),
+        in_gaps: share(distances.iter().filter(|distance| distance.is_none()).count()),
+        least: [least(&powers), least(&counts)],
     }
-    (simulation, sequence.at(end))
 }
 
 #[test]
@@ -28,23 +44,29 @@ fn after_a_transition_particles_lie_on_the_target_and_everywhere_along_it() {
         ("merge", 127, merging()),
         ("spiral", 255, becoming(Form::Spiral)),
     ] {
-        let (simulation, target) = after_the_transition(shapes, cells);
-        let half = simulation.parameters().half_thickness_km();
-        let near = Neighbourhood::new(&target, 2.0 * half);
-        let particles = live(&simulation);
-        let distances: Vec<Option<f64>> = particles.iter().map(|(place, _)| near.distance(*place)).collect();
-        let within = distances.iter().flatten().filter(|distance| **distance <= half).count();
-        let share = within as f64 / particles.len() as f64;
-        let far = distances.iter().filter(|distance| distance.is_none()).count() as f64 / particles.len() as f64;
-        let [powers, counts] = stretches(&target, &particles);
-        let least = |sums: &[f64]| {
-            let mean = sums.iter().sum::<f64>() / sums.len() as f64;
-            sums.iter().copied().fold(f64::INFINITY, f64::min) / mean
-        };
-        assert!(share >= 0.95, "{name}: {share} within L_thr");
-        assert!(far < 1e-3, "{name}: {far} in the gaps");
-        assert!(least(&powers) >= 0.5, "{name}: a stretch has {} of its power", least(&powers));
-        assert!(least(&counts) >= 0.5, "{name}: a stretch has {} of its particles", least(&counts));
+        let mut parameters = AuroraParameters { shapes, ..small() };
+        parameters.field.cells = cells;
+        // Rays brighten and darken stretches on purpose.
+        parameters.rays.contrast = 0.0;
+        let sequence = sequence(&parameters);
+        let mut simulation = simulation(parameters);
+        let arrival = sequence.arrivals()[1];
+        let (mut moments, mut steps) = (0, 0_u64);
+        while simulation.time() < arrival + WATCHED_S {
+            simulation.step();
+            steps += 1;
+            let time = simulation.time();
+            if time < arrival + SETTLED_S || !steps.is_multiple_of(MOMENT_STEPS) {
+                continue;
+            }
+            moments += 1;
+            let Moment { within, in_gaps, least: [power, count] } = moment(&simulation, &sequence.at(time));
+            assert!(within >= 0.955, "{name}: {within} within L_thr, {time} s");
+            assert!(in_gaps < 1e-3, "{name}: {in_gaps} in the gaps, {time} s");
+            assert!(power >= 0.5, "{name}: a stretch has {power} of its power, {time} s");
+            assert!(count >= 0.5, "{name}: a stretch has {count} of its particles, {time} s");
+        }
+        assert!(moments >= 3, "{name}: {moments}");
     }
 }
 
@@ -128,4 +150,29 @@ fn unevenness(kernel: RepulsionKernel) -> f64 {
 fn the_spline_keeps_rays_and_poly6_with_spiky_blurs_them() {
     let [spline, blurred] = [RepulsionKernel::Spline, RepulsionKernel::Poly6Spiky].map(unevenness);
     assert!(spline > 1.15 * blurred, "{spline} {blurred}");
+}
+
+#[test]
+fn a_step_costs_what_its_particles_cost_not_what_the_drawn_shapes_are_long() {
+    const RENEWALS: u32 = 3;
+    let of = |rows: i32| {
+        let sheet = |row: i32| line([-200.0, f64::from(30 * row - 210)], [200.0, f64::from(30 * row - 210)]);
+        let mut parameters = AuroraParameters { shapes: vec![shape((0..rows).map(sheet).collect())], ..small() };
+        parameters.particles.count = 30_000;
+        parameters.motion.renew_frames = f64::from(RENEWALS);
+        simulation(parameters)
+    };
+    let mut simulations = [of(1), of(15)];
+    let mut least = [f64::INFINITY; 2];
+    for _ in 0..6 {
+        for (simulation, least) in simulations.iter_mut().zip(&mut least) {
+            let start = std::time::Instant::now();
+            (0..RENEWALS).for_each(|_| simulation.step());
+            *least = least.min(start.elapsed().as_secs_f64());
+        }
+    }
+    // Fifteen times the length; as many particles.
+    let [counts, times] = [simulations.map(|simulation| simulation.particles().len() as f64), least];
+    assert!((counts[1] / counts[0] - 1.0).abs() < 0.2, "{counts:?}");
+    assert!(times[1] < 4.0 * times[0], "{times:?} s");
 }
