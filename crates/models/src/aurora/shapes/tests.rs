@@ -289,7 +289,7 @@ fn impossible_links_are_refused() {
     let missing = refused(&[link(1, 3, None)]);
     assert_eq!(
         (missing.key.as_str(), missing.kind),
-        ("shapes.1.link.0", ShapeFaultKind::NoSuchSheet { sheet: 3, count: 2 })
+        ("shapes.1.link.0", ShapeFaultKind::NoSuchTarget { sheet: 3, count: 2 })
     );
     let twice = refused(&[link(1, 2, None), link(2, 2, None)]);
     assert_eq!((twice.key.as_str(), twice.kind), ("shapes.1.link.1", ShapeFaultKind::LinkedTwice { sheet: 2 }));
