@@ -83,7 +83,7 @@ impl Describe for AuroraParameters {
     // From the ground toward the northern sky of a clear night.
     const SETTING: &'static str = "\
         picture = { exposure_ev100 = -6.3 }\n\
-        camera = { position = [0.0, 1.7, 0.0], target = [0.0, 24.0, -60.0], vertical_fov_deg = 60.0 }\n\
+        camera = { position = [0.0, 1.7, 0.0], target = [0.0, 34.0, -60.0], vertical_fov_deg = 66.0 }\n\
         sky = { kind = \"night\", hills_deg = 2.0, trees_deg = 1.1 }\n";
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {

@@ -15,7 +15,6 @@ fn a_new_scene_of_any_kind_shows_something_well_exposed() {
             film.pixels().filter(|pixel| of(luminance(**pixel))).count() as f64 / film.len() as f64
         };
         let (visible, bright, clipped) = (share(&|l| l > 0.02), share(&|l| l > 0.25), share(&|l| l > 0.99));
-        println!("{}: visible {visible}, bright {bright}, clipped {clipped}", kind.key);
         assert!(visible > 0.02 && bright > 0.0005, "{}: visible {visible}, bright {bright}", kind.key);
         assert!(clipped < 0.02, "{}: {clipped} of the picture is clipped", kind.key);
     }

@@ -210,7 +210,7 @@ fn coordinates_split_and_advance_without_loss() {
     assert_eq!(Coordinate::from_f64(f64::INFINITY).fraction, 0.0);
     assert_eq!(Coordinate::from_f32(-1.5), Coordinate { cell: -2, fraction: 0.5 });
     assert_eq!(Coordinate::from_f32(2.75).advanced(-3.5), Coordinate { cell: -1, fraction: 0.25 });
-    for distance in [-1.0 * (1 << 30) as f32, -70_000.5, -65_536.0, 65_535.5, 123_456.75, 999_999_936.0] {
+    for distance in [-1_073_741_824.0_f32, -70_000.5, -65_536.0, 65_535.5, 123_456.75, 999_999_936.0] {
         let cell = 2 + distance.floor() as i32 + i32::from(0.75 + distance - distance.floor() >= 1.0);
         assert_eq!(Coordinate::from_f32(2.75).advanced(distance).cell, cell, "{distance}");
     }
