@@ -32,8 +32,8 @@ bansho = 1
 exposure_ev100 = 1.6
 
 [camera]
-position = [0.8, 1.5, 7.5]
-target = [0.2, 1.9, 0.0]
+position = [0.5, 1.5, 5.4]
+target = [0.2, 1.8, 0.0]
 
 [sky]
 luminance = 0.06
@@ -41,17 +41,10 @@ hills_deg = 1.5
 trees_deg = 4.5
 temperature_k = 9000.0
 
-[ground]
-colour = [0.045, 0.046, 0.05]
-texture = 0.4
-wetness = 1.0
-puddles = 0.15
-roughness = 0.09
-
 [[light]]
 kind = \"spot\"
 visible = true
-position = [0.0, 3.7, 0.0]
+position = [0.0, 2.9, 0.0]
 direction = [0.0, -1.0, 0.0]
 colour = [1.0, 0.82, 0.55]
 intensity = 2500.0
@@ -61,7 +54,7 @@ outer_deg = 78.0
 [[rain]]
 name = \"rain\"
 rate_mm_per_h = 20.0
-distance = 10.0
+distance = 6.0
 ";
 
 /// To the north, where it stands before its shapes are drawn.

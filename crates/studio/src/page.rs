@@ -48,8 +48,8 @@ struct Page {
 }
 
 impl eframe::App for Page {
-    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
-        self.studio.ui(ui, frame);
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        self.studio.show(ui);
         let session = self.studio.session();
         self.unsaved.set(session.document.is_dirty());
         let notice = session.notice().unwrap_or_default();
@@ -61,7 +61,7 @@ impl eframe::App for Page {
     }
 
     fn on_exit(&mut self) {
-        self.studio.on_exit();
+        eframe::App::on_exit(&mut self.studio);
     }
 }
 

@@ -14,8 +14,10 @@ const WIDTH: f32 = 150.0;
 const HEIGHT: f32 = 116.0;
 /// Between two of them.
 const GAP: f32 = 8.0;
-/// Behind them: so thin that the picture shows through.
-const VEIL: Color32 = Color32::from_black_alpha(110);
+/// Behind them, and once more behind each: so thin that the picture shows through.
+const VEIL: Color32 = Color32::from_black_alpha(70);
+/// Of the picture's height they take so much at most; the rest is scrolled to.
+const MOST: f32 = 0.5;
 
 /// Whether `subject` has any curves.
 pub(super) fn has_any(subject: &Subject) -> bool {
@@ -36,20 +38,23 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session, subject: &Subject, viewpo
     gather(&subject.place(), descriptor, &mut curves);
     let across = (((viewport.width() - GAP) / (WIDTH + GAP)) as usize).clamp(1, curves.len().max(1));
     let down = curves.len().div_ceil(across);
-    let size = vec2(across as f32 * (WIDTH + GAP) + GAP, down as f32 * (HEIGHT + GAP) + GAP);
-    let corner = egui::pos2(viewport.left(), viewport.bottom() - size.y.min(viewport.height()));
+    let height = (down as f32 * (HEIGHT + GAP) + GAP).min(MOST * viewport.height());
+    let corner = egui::pos2(viewport.left(), viewport.bottom() - height);
     let area = egui::Area::new(egui::Id::unique("curves")).order(egui::Order::Middle).fixed_pos(corner);
     area.constrain_to(viewport).show(ui.ctx(), |ui| {
         Frame::new().fill(VEIL).inner_margin(0.5 * GAP).show(ui, |ui| {
             // The picture is dark whatever the theme.
             ui.visuals_mut().override_text_color = Some(Color32::from_gray(225));
-            egui::Grid::new("curves").spacing(vec2(GAP, GAP)).show(ui, |ui| {
-                for (index, (place, parameter)) in curves.iter().enumerate() {
-                    curve(ui, session, place, parameter);
-                    if (index + 1) % across == 0 {
-                        ui.end_row();
+            ui.visuals_mut().extreme_bg_color = VEIL;
+            egui::ScrollArea::vertical().max_height(height - GAP).show(ui, |ui| {
+                egui::Grid::new("curves").spacing(vec2(GAP, GAP)).show(ui, |ui| {
+                    for (index, (place, parameter)) in curves.iter().enumerate() {
+                        curve(ui, session, place, parameter);
+                        if (index + 1) % across == 0 {
+                            ui.end_row();
+                        }
                     }
-                }
+                });
             });
         });
     });

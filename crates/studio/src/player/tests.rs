@@ -305,3 +305,18 @@ fn rain_that_a_slider_changes_keeps_its_drops() {
     let heavier = difference(&steady, &drawn(&text("rate_mm_per_h = 20.2")));
     assert!(heavier > 0.0 && heavier < 0.1 * other_drops, "{heavier} of {other_drops}");
 }
+
+#[test]
+fn rain_that_is_blown_late_keeps_its_drops_too() {
+    let text = |wind: &str| {
+        let sky = "[sky]\nkind = \"overcast\"\n[wind]\ngust = 0.0\nvelocity = ";
+        format!("bansho = 1\n[picture]\nsize = [160, 90]\nframes = 900\n{sky}[{wind}, 0.0, 0.0]\n[[rain]]\n")
+    };
+    let mut engine = engine::Engine::default();
+    let mut drawn = |text: &str| picture(fulfil(&mut engine, &Wish { revision: bumped(text), ..wish(text, 899) }));
+    let steady = drawn(&text("2.0"));
+    let other_drops = difference(&steady, &drawn(&text("2.0").replace("size", "seed = 9\nsize")));
+    // After 30 s, drops that were carried from time 0 would stand 15 cm elsewhere.
+    let blown = difference(&steady, &drawn(&text("2.005")));
+    assert!(blown > 0.0 && blown < 0.2 * other_drops, "{blown} of {other_drops}");
+}
