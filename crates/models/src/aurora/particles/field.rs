@@ -149,7 +149,9 @@ impl FieldMaker {
             }
             source
         };
-        for _ in 0..ADJUSTMENTS {
+        // Sheets that do not pull have no potential to be at.
+        let adjustments = if density > 0.0 { ADJUSTMENTS } else { 0 };
+        for _ in 0..adjustments {
             charge.adjust(course, &self.solved(source(&charge)), wanted);
         }
         source(&charge)

@@ -80,6 +80,19 @@ fn nothing(parameters: &AuroraParameters) -> crate::aurora::particles::field::Fi
 }
 
 #[test]
+fn sheets_that_do_not_pull_make_no_field() {
+    let mut parameters = small();
+    parameters.field.pull = 0.0;
+    let maker = FieldMaker::new(&parameters, KEY);
+    let course = course(&parameters, &[&[[-200.0, 0.0], [200.0, 0.0]]], 40.0);
+    let scattered = scatter(&course, parameters.half_thickness_km(), 2_000, KEY, 0);
+    let field = maker.make(&course, &scattered, 0.5);
+    assert!(field.potential.values().iter().all(|value| *value == 0.0));
+    let sample = field.sample(10.0, 5.0);
+    assert_eq!((sample.potential, sample.field), (0.0, [0.0; 2]));
+}
+
+#[test]
 fn a_free_particle_keeps_its_way_and_the_magnetic_field_turns_it() {
     let mut parameters = small();
     parameters.particles.friction_per_s = 0.0;
