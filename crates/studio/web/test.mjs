@@ -158,7 +158,13 @@ preroll_s = 0.2
 `;
 const own = await open("torch");
 await until(own, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
-const [chooser] = await Promise.all([own.waitForEvent("filechooser"), own.keyboard.press("Control+o")]);
+// Keys count once the canvas has them, which the first frame does not promise.
+async function chosen(tries) {
+  const chooser = own.waitForEvent("filechooser", { timeout: 5000 }).catch(() => null);
+  await own.keyboard.press("Control+o");
+  return (await chooser) ?? (tries > 1 ? chosen(tries - 1) : fail("no file chooser opens"));
+}
+const chooser = await chosen(4);
 await chooser.setFiles({ name: "small.toml", mimeType: "text/plain", buffer: Buffer.from(small) });
 await own.waitForTimeout(2000);
 async function rendered(keys) {
@@ -180,38 +186,6 @@ const zipped = spawnSync("python3", ["-c", look_into, shot.path, one.path], { en
 if (zipped.status !== 0) fail(`the shot: ${zipped.stderr || zipped.error}`);
 console.log("a scene was opened; its still and its shot were rendered");
 await own.close();
-
-// A panic of the worker is told, the scene kept at once, and another worker draws on. What panics is the program itself:
-// its work is begun within its own call that asks for it later, and there finds in use what it needs.
-const breakable = `const later = setTimeout;
-let broken = false;
-new BroadcastChannel("break").onmessage = () => { broken = true; };
-self.setTimeout = (work, ...rest) => (broken ? work() : later(work, ...rest));
-`;
-await context.route("**/worker.js", async (route) => {
-  const plain = await route.fetch();
-  await route.fulfill({ response: plain, body: breakable + (await plain.text()) });
-});
-const torch = await open("torch");
-await until(torch, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
-await context.unroute("**/worker.js");
-const kept = () => torch.evaluate(() => localStorage.getItem("bansho-studio unsaved") ?? "");
-await torch.evaluate(() => {
-  localStorage.removeItem("bansho-studio unsaved");
-  new BroadcastChannel("break").postMessage("now");
-});
-// Turning the camera is work that is not saved, and asks for a picture.
-await stroke(torch, [[635, 400], [700, 400]]);
-await torch.waitForFunction(() => /a phenomenon panicked.*already borrowed.*the browser keeps the scene/.test(document.getElementById("notice").textContent), null, { timeout: 20000 });
-if (!/position = \[/.test(await kept())) fail(`the browser keeps no scene after a panic: ${await kept()}`);
-await until(torch, picture, ({ mean }) => mean > 1.5, "the last good picture is gone");
-const turned = await look(torch, picture);
-await stroke(torch, [[635, 400], [760, 400]]);
-await until(torch, picture, ({ mean, middle }) => mean > 1.5 && Math.abs(middle - turned.middle) > 1e-4, "no picture after a panic");
-console.log("a panic of the worker is told, the scene kept, and another worker draws on");
-// What the browser says of a panic that was meant is no error of the page.
-errors.splice(0, errors.length, ...errors.filter((text) => !/already borrowed|unreachable/.test(text)));
-await torch.close({ runBeforeUnload: false });
 
 await browser.close();
 server.close();
