@@ -298,12 +298,37 @@ impl Drawing {
             shape.push("sheets", list_of(sheets));
             return vec![Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) }];
         };
-        if old.len() != sheets.len() {
-            return vec![Operation::Set { place, value: list_of(sheets) }];
-        }
-        let pairs = old.iter().zip(sheets).enumerate();
-        pairs.flat_map(|(sheet, (old, new))| differences(&place.index(sheet), old, new)).collect()
+        exchanged(&place, old, sheets).unwrap_or_else(|| vec![Operation::Set { place, value: list_of(sheets) }])
     }
+}
+
+/// What makes the list at `place` of `old` sheets one of `new` ones entry by entry, so that each keeps its comments; `None` where
+/// entries would come in between others.
+fn exchanged(place: &Place, old: &[SheetParameters], new: &[SheetParameters]) -> Option<Vec<Operation>> {
+    if old.is_empty() {
+        return None;
+    }
+    let mut rest = new.iter().peekable();
+    let gone: Vec<usize> = (0..old.len()).filter(|&index| rest.next_if(|own| **own == old[index]).is_none()).collect();
+    if rest.peek().is_none() {
+        // The last first, so that those before keep their numbers.
+        return Some(gone.iter().rev().map(|&index| Operation::Remove { place: place.index(index) }).collect());
+    }
+    let same = |(old, new): &(&SheetParameters, &SheetParameters)| old == new;
+    let behind = old.iter().rev().zip(new.iter().rev()).take_while(same).count();
+    let [kept, made] = [old.len(), new.len()].map(|count| count - behind);
+    if made > kept && behind > 0 {
+        return None;
+    }
+    let pairs = old.iter().zip(new).take(kept.min(made)).enumerate();
+    let mut operations: Vec<Operation> =
+        pairs.flat_map(|(sheet, (old, new))| differences(&place.index(sheet), old, new)).collect();
+    operations.extend((made..kept).rev().map(|sheet| Operation::Remove { place: place.index(sheet) }));
+    let added = new.get(kept..).filter(|_| made > kept).unwrap_or_default();
+    operations.extend(
+        added.iter().map(|sheet| Operation::Append { place: place.clone(), value: Value::Table(stated(sheet)) }),
+    );
+    Some(operations)
 }
 
 fn nearest_end(all: &[Vec<DVec2>], target: DVec2) -> Option<End> {
