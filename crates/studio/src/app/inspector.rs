@@ -145,7 +145,8 @@ fn list_item(ui: &mut Ui, session: &mut Session, place: &Place, kind: &Kind, val
 fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor) {
     let stated = place.find(session.document.values()).map(|node| node.value.clone());
     let time = session.transport.time_s();
-    let present = stated.as_ref().or(parameter.default.as_ref()).and_then(|value| keyed::at(value, time));
+    let unstated = session.unstated(place).or_else(|| parameter.default.clone());
+    let present = stated.as_ref().or(unstated.as_ref()).and_then(|value| keyed::at(value, time));
     let curve = matches!(parameter.kind, Kind::Curve { .. });
     let name = RichText::new(words(parameter.key));
     let name = if stated.is_some() { name.strong() } else { name };
@@ -209,11 +210,10 @@ fn key_button(ui: &mut Ui, session: &mut Session, place: &Place, stated: Option<
         None => (Icon::Keyed, "Keyed; key the value at this time"),
     };
     if icon::button(ui, sign, &format!("{doc}: {place}")).clicked() {
-        let operation = match here {
-            Some(time) => Operation::RemoveKeyframe { place: place.clone(), time },
-            None => session.keyframe(place, present),
-        };
-        session.edit("key", &[operation]);
+        match here {
+            Some(time) => session.edit("key", &[Operation::RemoveKeyframe { place: place.clone(), time }]),
+            None => session.key(place, present),
+        }
     }
 }
 

@@ -73,8 +73,5 @@ fn standing(session: &Session) -> Vec<Thing> {
 
 /// The `position` of the table at `place`; the origin where it states none.
 fn position(root: &Table, place: &Place, time: f64) -> DVec3 {
-    let stated = place.key("position").find(root).and_then(|node| keyed::at(&node.value, time));
-    let Some(Value::List(items)) = stated else { return DVec3::ZERO };
-    let axis = |index: usize| items.get(index).and_then(|item| item.value.as_number()).unwrap_or_default();
-    DVec3::new(axis(0), axis(1), axis(2))
+    keyed::vector(root, &place.key("position"), time).unwrap_or_default()
 }

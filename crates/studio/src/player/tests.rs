@@ -84,19 +84,15 @@ fn a_picture_of_the_scenes_size_is_the_one_that_is_rendered() {
 
 /// A revision of its own for each text.
 fn bumped(text: &str) -> crate::document::Revision {
-    let mut document = Document::new("", "");
-    for step in 0..text.len() {
-        document.replace("typing", &" ".repeat(step));
-    }
-    document.revision()
+    Document::new("", text).revision()
 }
 
 #[test]
-fn another_document_is_judged_though_its_state_has_the_same_number() {
+fn another_document_is_judged_and_the_same_one_only_once() {
     let mut engine = engine::Engine::default();
     let judged = |events: Vec<Event>| events.iter().filter(|event| matches!(event, Event::Judged { .. })).count();
     let first = wish(SCENE, 0);
-    let second = Wish { text: STEPPED.into(), ..first.clone() };
+    let second = wish(STEPPED, 0);
     assert_eq!([&first, &first, &second].map(|wish| judged(fulfil(&mut engine, wish))), [1, 0, 1]);
     assert!(picture(fulfil(&mut engine, &Wish { exact: true, ..second })).pixels == rendered(STEPPED, 0));
 }
@@ -229,6 +225,26 @@ fn frames_come_when_they_are_due_and_the_one_before_was_shown() {
 }
 
 #[test]
+fn a_recording_ends_where_the_shot_does() {
+    let mut transport = playing();
+    transport.go_to(17);
+    transport.play_to_the_end();
+    let now = |step: i32| 5.0 + 0.101 * f64::from(step);
+    let numbers: Vec<i64> = (0..6)
+        .map(|step| {
+            transport.tick(now(step), true);
+            transport.number()
+        })
+        .collect();
+    assert_eq!(numbers, [17, 18, 19, 19, 19, 19]);
+    assert!(!transport.is_playing());
+    transport.set_playing(true);
+    transport.tick(6.0, true);
+    transport.tick(6.11, true);
+    assert_eq!(transport.number(), 10, "playing begins again");
+}
+
+#[test]
 fn the_range_repeats_and_stays_within_the_shot() {
     let mut transport = playing();
     transport.set_range(Some(12..=13));
@@ -268,6 +284,20 @@ fn a_still_is_the_file_that_render_writes() {
     assert!(matches!(&events[1..], [Event::Still { number: 5, png }] if *png == written));
     let codes = plate.colour.pixels().iter().map(|pixel| pixel.map(|value| (value * 255.0).round() as u8));
     assert!(codes.eq(rendered_with_alpha(SCENE, 5, false)));
+}
+
+#[test]
+fn a_panic_while_rendering_is_told_in_its_own_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = shoot::job(SCENE, &folder.path().join("scene.toml"), Some(5));
+    let mut shooting = shoot::Shooting::start(job, || panic!("broken on purpose")).unwrap();
+    let ended = loop {
+        match shooting.finished() {
+            Some(ended) => break ended,
+            None => std::thread::sleep(Duration::from_millis(2)),
+        }
+    };
+    assert_eq!(ended, Err(shoot::Ended::Panicked("broken on purpose".into())));
 }
 
 #[test]

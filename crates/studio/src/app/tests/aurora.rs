@@ -1,10 +1,10 @@
 //! From an empty sky to a saved scene that splits, as a newcomer would go.
 
-use eframe::egui::{Key, Modifiers, Pos2, Rect, pos2, vec2};
+use eframe::egui::{Pos2, Rect, pos2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
-use super::{super::Studio, drag, drawn, press, release, sky, text, window};
-use crate::document::{Document, drawing::Drawing, files};
+use super::{super::Studio, choosing, drag, drawn, press, release, sky, text, window};
+use crate::document::drawing::Drawing;
 
 fn plane(harness: &Harness<'_, Studio>, name: &str) -> Rect {
     harness.get_by_label(name).rect()
@@ -75,15 +75,12 @@ fn an_s_is_drawn_split_played_saved_and_opened_again() {
     assert!(harness.state_mut().session().document.error().is_none());
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.toml");
-    harness.state_mut().session().path = Some(path.clone());
-    harness.key_press_modifiers(Modifiers::COMMAND, Key::S);
-    drawn(&mut harness);
+    choosing::save(&mut harness);
+    choosing::answer(&mut harness, &path, "Save");
     assert!(!harness.state_mut().session().document.is_dirty());
 
     let mut again = window("bansho = 1\n[[aurora]]\n");
-    let opened: Document = files::open(&path).unwrap();
-    again.state_mut().session().open(opened, Some(path));
-    drawn(&mut again);
+    choosing::open(&mut again, &path);
     assert_eq!(drawing(&mut again).lines(2).len(), 2);
     assert_eq!(text(&mut again), edited);
 }

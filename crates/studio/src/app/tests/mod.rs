@@ -1,6 +1,8 @@
 //! The window driven as a person with a screen reader would: by what widgets are called.
 
 mod aurora;
+mod choosing;
+mod gestures;
 mod keeping;
 mod newcomer;
 mod pictures;
@@ -227,14 +229,18 @@ fn blowing_is_wind_while_it_lasts_and_keyframes_when_recorded() {
     release(&mut harness, middle + vec2(100.0, 0.0));
     assert_eq!(text(&mut harness), SCENE, "as if it had never been");
 
-    harness.get_by_label("Record").click();
-    harness.run_steps(2);
+    let longer = SCENE.replace("frames = 10", "frames = 200");
+    let mut harness = window(&longer);
+    for choice in ["Blow", "Record"] {
+        harness.get_by_label(choice).click();
+        harness.run_steps(2);
+    }
     drag_for_a_second(&mut harness, middle);
     let recorded = text(&mut harness);
     assert!(recorded.contains("velocity = { keys = [[0.0, [0.0, 0.0, 0.0]]"), "{recorded}");
     assert!(recorded.matches("], [").count() > 2, "{recorded}");
     harness.state_mut().session().document.undo();
-    assert_eq!(text(&mut harness), SCENE, "a recording is one step");
+    assert_eq!(text(&mut harness), longer, "a recording is one step");
 }
 
 #[test]
@@ -256,14 +262,13 @@ fn a_plate_that_vanished_is_told_and_linked_anew() {
     std::fs::copy(plate, folder.path().join("board.png")).unwrap();
     let mut harness = window(&format!("{SCENE}[plate]\nimage = \"gone.png\" # the ground\n"));
     harness.get_by_label_contains("gone.png: no such file");
-    harness.state_mut().session().path = Some(folder.path().join("scene.toml"));
     harness.get_by_label("Relink").click();
     harness.run_steps(3);
-    harness.get_by_label("board.png").click();
-    harness.run_steps(3);
-    harness.get_all_by_label("Relink").last().expect("the answer").click();
-    drawn(&mut harness);
-    assert!(text(&mut harness).contains("image = \"board.png\" # the ground"));
+    let board = folder.path().join("board.png");
+    choosing::answer(&mut harness, &board, "Relink");
+    let named = format!("image = \"{}\" # the ground", board.display());
+    assert!(text(&mut harness).contains(&named), "{}", text(&mut harness));
+    assert!(harness.state_mut().session().document.error().is_none(), "a scene without a file finds it too");
 }
 
 #[test]

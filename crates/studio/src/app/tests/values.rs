@@ -64,7 +64,8 @@ fn values_are_keyed_at_two_times_and_unkeyed() {
 
 #[test]
 fn a_lamp_that_is_dragged_while_recording_leaves_keyframes() {
-    let mut harness = window(SCENE);
+    let longer = SCENE.replace("frames = 10", "frames = 200");
+    let mut harness = window(&longer);
     harness.get_by_label("Place").click();
     harness.get_by_label("Record").click();
     harness.run_steps(2);
@@ -74,12 +75,12 @@ fn a_lamp_that_is_dragged_while_recording_leaves_keyframes() {
     assert!(recorded.contains("position = { keys = [["), "{recorded}");
     assert!(recorded.matches("], [").count() > 2, "{recorded}");
     harness.state_mut().session().document.undo();
-    assert_eq!(text(&mut harness), SCENE, "a recording is one step");
+    assert_eq!(text(&mut harness), longer, "a recording is one step");
 }
 
 #[test]
 fn a_burner_that_is_dragged_while_recording_leaves_keyframes() {
-    let scene = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 60\n[[flame_particles]]\nparticles = 50\n";
+    let scene = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 200\n[[flame_particles]]\nparticles = 50\n";
     let mut harness = window(scene);
     harness.get_by_label("Place").click();
     harness.get_by_label("Record").click();
@@ -176,4 +177,17 @@ fn stages_of_the_flame_are_seen_live() {
     harness.run_steps(12);
     assert!(harness.query_by_label("Stage texture").is_none());
     assert_eq!(harness.state_mut().session().stages, None, "what is not seen is not drawn");
+}
+
+#[test]
+fn a_value_beyond_its_bounds_is_told_and_left_as_it_is() {
+    let faulty =
+        SCENE.replace("height = 0.9", "height = -5.0").replace("bansho = 1", "bansho = 1\n[camera]\nroll_deg = 9999.0");
+    let mut harness = window(&faulty);
+    harness.get_by_label_contains("-5 is out of range");
+    for subject in ["fire", "camera"] {
+        harness.get_by_role_and_label(Role::Button, subject).click();
+        drawn(&mut harness);
+        assert_eq!(text(&mut harness), faulty, "looking mends nothing");
+    }
 }
