@@ -187,7 +187,7 @@ pub(crate) fn wide_bands(text: &str, size: [usize; 2], frame: i64) -> f64 {
 /// Compares a frame with its golden picture, or writes that when asked to; says what differs.
 pub(crate) fn golden(scene: &str, size: [usize; 2], frame: i64) -> Option<String> {
     // A bonfire of 100,000 particles would take longer than all other pictures together.
-    let text = scene_text(scene).replace("particles = 100000", "particles = 8000");
+    let text = scene_text(scene).replace("particles = 125000", "particles = 8000");
     let image = &draw(&text, size, &[frame], &PlanOptions::default(), BitDepth::Eight)[0];
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("tests/golden/{scene}.png"));
     if std::env::var_os("BANSHO_BLESS").is_some() {

@@ -199,7 +199,9 @@ pub enum ShapeFaultKind {
         seconds: f64,
     },
     /// A keyed value that does not end as it begins.
-    #[error("the loop of {seconds} s jumps: its first and its last moment differ")]
+    #[error(
+        "the loop of {seconds} s jumps: its first and its last moment differ; allowed: the same value at 0 s and at {seconds} s"
+    )]
     LoopJumps {
         /// Length of the loop, s.
         seconds: f64,
