@@ -32,10 +32,13 @@ use std::time::Duration;
 
 use eframe::egui;
 
-pub use self::session::{AssetsOf, Session};
 use self::{
     aurora::AuroraEditor, files::Files, inspector::Inspector, layout::Layout, problems::Wanted, scene_panel::Subject,
     stages_view::StagesView, store::Store, text_panel::TextPanel, viewport::Viewport,
+};
+pub use self::{
+    session::{AssetsOf, Session},
+    stages_view::image as screen_image,
 };
 
 /// The kind of phenomenon whose shapes are drawn.
@@ -104,6 +107,11 @@ impl Studio {
     /// What it works on.
     pub fn session(&mut self) -> &mut Session {
         &mut self.session
+    }
+
+    /// Whether something would be lost if the window closed now: work, or pictures under way.
+    pub fn would_lose_something(&self) -> bool {
+        self.session.document.is_dirty() || self.files.progress().is_some()
     }
 
     /// Shows everything and takes in what hands do.

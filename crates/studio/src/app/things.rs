@@ -5,7 +5,7 @@ use bansho::{
         math::DVec3,
         parameters::{Table, Value},
     },
-    render::scene::Place,
+    render::scene::{Place, Segment},
 };
 
 use super::{keyed, session::Session};
@@ -26,6 +26,12 @@ pub(super) struct Thing {
 /// Kinds of phenomena that stand at a `position`, and the list of their parts that have a place of their own. A list that is not stated
 /// stands for one part.
 const STANDING: [(&str, &str); 2] = [("flame_sheet", "instances"), ("flame_particles", "burners")];
+
+/// Whether the list at `place` stands for one usual part where it is not stated.
+pub(super) fn stands_for_one(place: &Place) -> bool {
+    let [Segment::Key(kind), Segment::Index(_), Segment::Key(parts)] = place.segments() else { return false };
+    STANDING.contains(&(kind, parts))
+}
 
 /// All that hands can move at the present time: what stands somewhere, or while keyframes are recorded what can be keyed.
 pub(super) fn things(session: &Session) -> Vec<Thing> {

@@ -28,7 +28,7 @@ use bansho::{
     },
 };
 
-pub use check::{Checker, check, recheck};
+pub use check::{Checker, Found, check, recheck};
 pub use named_files::named_files;
 pub use phenomena::{Listed, operations};
 
@@ -187,6 +187,15 @@ impl Document {
         self.history.note(label, &self.text, &text);
         self.show(text.into());
         Ok(())
+    }
+
+    /// Goes on to `text`, which says `values`, as [`edit`](Self::edit) does.
+    fn go_on(&mut self, label: &str, text: String, values: Table) {
+        self.history.note(label, &self.text, &text);
+        if *text != *self.text {
+            (self.text, self.revision) = (text.into(), Revision::next());
+            (self.values, self.syntax) = (values, None);
+        }
     }
 
     /// Replaces the whole text, as typing does; typing is one step until [`seal`](Self::seal).

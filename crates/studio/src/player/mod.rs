@@ -5,12 +5,12 @@
 //! is wanted. All report [`Event`]s.
 
 mod engine;
+mod interruption;
 #[cfg(target_arch = "wasm32")]
 mod message;
 mod pace;
 pub mod shoot;
 mod slices;
-mod stages;
 mod states;
 #[cfg(test)]
 pub(crate) mod tests;

@@ -337,6 +337,25 @@ fn rain_that_a_slider_changes_keeps_its_drops() {
 }
 
 #[test]
+fn rain_whose_drops_or_shutter_a_slider_changes_does_not_pop() {
+    let text = |shutter: &str, first: &str| {
+        format!(
+            "bansho = 1\n[picture]\nsize = [160, 90]\n[camera]\nshutter_s = {shutter}\n[sky]\nkind = \"overcast\"\n\
+             [[rain]]\nrate_mm_per_h = 20.0\ndiameters_mm = [{first}, 2.0, 3.0]\n"
+        )
+    };
+    let mut engine = engine::Engine::default();
+    let mut drawn = |text: &str| picture(fulfil(&mut engine, &Wish { revision: bumped(text), ..wish(text, 7) }));
+    let steady = drawn(&text("0.02", "1.0"));
+    let other_drops = difference(&steady, &drawn(&text("0.02", "1.0").replace("size = [160", "seed = 9\nsize = [160")));
+    assert!(other_drops > 0.1, "{other_drops}");
+    for (what, changed) in [("shutter", text("0.0202", "1.0")), ("size", text("0.02", "1.005"))] {
+        let off = difference(&steady, &drawn(&changed));
+        assert!(off > 0.0 && off < 0.1 * other_drops, "{what}: {off} of {other_drops}");
+    }
+}
+
+#[test]
 fn rain_that_is_blown_late_keeps_its_drops_too() {
     let text = |wind: &str| {
         let sky = "[sky]\nkind = \"overcast\"\n[wind]\ngust = 0.0\nvelocity = ";

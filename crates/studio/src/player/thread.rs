@@ -12,7 +12,7 @@ use std::{
 
 use bansho::RenderError;
 
-use super::{Event, Player, Wish, engine::Engine, said, stages::Stages};
+use super::{Event, Player, Wish, engine::Engine, interruption::Interruption, said};
 
 /// Draws on a thread of its own, in a pool of as many threads as the machine has cores.
 pub struct ThreadPlayer {
@@ -102,7 +102,7 @@ fn work(desk: &Desk, emit: &mut dyn FnMut(Event)) {
     let mut engine = Engine::default();
     let mut must_draw = false;
     while let Some((wish, number)) = desk.take() {
-        let watch = Stages::new(|advancing| desk.has_moved_on(number, advancing || !must_draw));
+        let watch = Interruption::new(|advancing| desk.has_moved_on(number, advancing || !must_draw));
         let outcome = catch_unwind(AssertUnwindSafe(|| engine.fulfil(&wish, &watch, emit)));
         desk.done.store(number, Ordering::Relaxed);
         must_draw = matches!(outcome, Ok(Err(RenderError::Cancelled(_))));

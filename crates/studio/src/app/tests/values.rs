@@ -34,12 +34,47 @@ fn a_particle_flame_is_slid_hotter_and_lighter() {
     for (section, name, to, written) in [
         ("motion", "buoyancy", 2.0, "buoyancy = 2.0"),
         ("life", "flame temperature k", 2100.0, "flame_temperature_k = 2100.0"),
+        ("look", "haze gain", 2.5, "haze_gain = 2.5"),
     ] {
         harness.get_by_label(section).click_accesskit();
         harness.run_steps(12);
         slide(&mut harness, name, to);
         assert!(text(&mut harness).contains(written), "{}", text(&mut harness));
     }
+    // The usual burner's fuel, which the text need not state.
+    for section in ["burners", "flame particles.0.burners.0, as usual"] {
+        harness.get_by_label(section).click_accesskit();
+        harness.run_steps(12);
+    }
+    slide(&mut harness, "heat release kw", 90.0);
+    assert!(text(&mut harness).contains("burners = [{ heat_release_kw = 90.0 }]"), "{}", text(&mut harness));
+    assert!(harness.state_mut().session().document.error().is_none());
+}
+
+#[test]
+fn rain_is_slid_heavier_and_its_drops_and_streaks_changed() {
+    let mut harness = window("bansho = 1\n[picture]\nsize = [32, 18]\nframes = 2\n[sky]\n[[rain]]\n");
+    slide(&mut harness, "rate mm per h", 40.0);
+    assert!(text(&mut harness).contains("rate_mm_per_h = 40.0"), "{}", text(&mut harness));
+    harness.get_by_label("diameters mm").click_accesskit();
+    harness.run_steps(12);
+    let first = harness.get_all_by_role_and_label(Role::SpinButton, "rain.0.diameters_mm.0").next().expect("a size");
+    first.set_value_accesskit(0.8);
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("diameters_mm = [0.8, "), "{}", text(&mut harness));
+    harness.get_by_role_and_label(Role::Button, "camera").click();
+    harness.run_steps(3);
+    let shutter = "shutter s";
+    harness.get_by_role_and_label(Role::Button, shutter).click();
+    drawn(&mut harness);
+    slide(&mut harness, shutter, 0.02);
+    assert!(text(&mut harness).contains("shutter_s = 0.02"), "{}", text(&mut harness));
+    harness.get_by_role_and_label(Role::Button, "wind").click();
+    harness.run_steps(3);
+    let across = harness.get_all_by_role_and_label(Role::SpinButton, "velocity").next().expect("a number");
+    across.set_value_accesskit(1.5);
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("velocity = [1.5, 0.0, 0.0]"), "{}", text(&mut harness));
     assert!(harness.state_mut().session().document.error().is_none());
 }
 
@@ -164,7 +199,6 @@ fn stages_of_the_flame_are_seen_live() {
         assert!(pixels.iter().any(|pixel| pixel[0] > 100), "stage {index} is not black");
         assert!(before[..index].iter().all(|other| other != pixels), "stage {index} is none of those before");
     }
-    slide(&mut harness, "turn_deg".replace('_', " ").as_str(), 30.0);
     let edited = SCENE.replace("height = 0.9", "height = 0.9\ntexture = { contrast = 0.2 }");
     harness.state_mut().session().document.replace("typing", &edited);
     drawn(&mut harness);
