@@ -140,7 +140,7 @@ fn change(session: &mut Session, subject: &Subject, way: f64) -> Result<(), Benc
         return Ok(());
     };
     let (kind, keys) = keys.split_first().unwrap_or((&"", &[]));
-    let place = keys.iter().fold(Place::root().key(*kind).index(0), |place, key| place.key(*key));
+    let place = keys.iter().fold(Place::root().key(kind).index(0), |place, key| place.key(key));
     session.set("slider", &place, Value::Number(from + (to - from) * way));
     Ok(())
 }

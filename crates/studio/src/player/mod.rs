@@ -132,7 +132,6 @@ impl Event {
 }
 
 /// What a panic said.
-#[cfg(not(target_arch = "wasm32"))]
 fn said(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no reason given".into())

@@ -94,7 +94,7 @@ impl Files {
     fn save_to(&mut self, session: &mut Session, path: PathBuf, leaving: Option<Leaving>) {
         let moves = session.path.as_ref() != Some(&path);
         let saved = if moves { moving::follow(session, &path) } else { Ok(()) };
-        let saved = saved.and_then(|()| Ok(files::save(&mut session.document, &path)?));
+        let saved = saved.and_then(|()| files::save(&mut session.document, &path));
         if let Err(error) = saved {
             session.set_notice(Some(error.to_string()));
             return;

@@ -137,5 +137,5 @@ fn forget(recovered: &Recovered) {
 
 #[cfg(target_arch = "wasm32")]
 fn forget(recovered: &Recovered) {
-    Store::default().forget(&recovered.kept_as.to_string_lossy());
+    Store::default().forget(&recovered.kept_in.to_string_lossy());
 }
