@@ -79,7 +79,7 @@ impl NightParameters {
 pub struct Parallel {
     /// What is there all around: ACEScg, cd/m^2.
     even: [f32; 3],
-    /// What is added over the sun, by the square of how far a direction turns to it.
+    /// What is added over the sun, by the fourth power of how far a direction turns to it.
     glow: [f32; 3],
     /// What is added in proportion to that.
     blue: [f32; 3],

@@ -18,6 +18,7 @@ mod gap;
 mod matching;
 mod neighbourhood;
 mod parameters;
+mod passing;
 mod polyline;
 mod segments;
 mod sequence;
