@@ -10,7 +10,7 @@ use fearless_simd::{Level, dispatch};
 
 pub use gradient::Dimension;
 
-use crate::random::murmur3;
+use crate::{math::lanes, random::murmur3};
 
 /// Points that are worked on at once, at every vector width.
 pub const LANES: usize = 16;
@@ -198,10 +198,10 @@ impl Coordinate {
         let whole = distance.floor();
         let fraction = self.fraction + (distance - whole);
         let carry = fraction.floor();
-        // 2^16 cells and what is left of them: each is small enough for `small_whole`.
+        // 2^16 cells and what is left of them: each is small enough for [`lanes::whole`].
         let far = (whole * (1.0 / 65_536.0)).floor();
         let near = whole - far * 65_536.0;
-        let cells = (small_whole(far) << 16).wrapping_add(small_whole(near)).wrapping_add(small_whole(carry));
+        let cells = (lanes::whole(far) << 16).wrapping_add(lanes::whole(near)).wrapping_add(lanes::whole(carry));
         Self { cell: self.cell.wrapping_add(cells), fraction: fraction - carry }
     }
 }
@@ -217,7 +217,7 @@ where
         for axis in 0..N {
             let moved = fractions[axis] * self.ratio as f32 + self.shift[axis];
             let whole = moved.floor();
-            let cell = cells[axis].wrapping_mul(self.ratio).wrapping_add(small_whole(whole) as u32);
+            let cell = cells[axis].wrapping_mul(self.ratio).wrapping_add(lanes::whole(whole) as u32);
             // At most one period too far: the point was reduced before the first octave. Without a period nothing changes.
             let period = self.periods[axis];
             cells[axis] = cell.wrapping_sub(if cell >= period { period } else { 0 });
@@ -227,13 +227,6 @@ where
         }
         self.amplitude * fractions.gradient_noise(*cells, upper, self.seed)
     }
-}
-
-/// A whole number up to 2^22 either way: the last bits of its sum with 1.5 * 2^23. (A cast would check each lane of a vector by itself.)
-#[inline(always)]
-fn small_whole(value: f32) -> i32 {
-    const SHIFT: f32 = 12_582_912.0;
-    ((value + SHIFT).to_bits() as i32).wrapping_sub(SHIFT.to_bits() as i32)
 }
 
 /// `cell` modulo `period`, not negative; 0 stands for the 2^32 of the lattice itself.

@@ -4,6 +4,7 @@
 use std::arch::x86_64::{__m256, _mm256_shuffle_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps};
 use std::ops::{Add, Div, Mul, Sub};
 
+use bansho_base::math::lanes::ROUND;
 use fearless_simd::{Level, Simd, f32x4, f32x8, f32x16, prelude::*, u32x16};
 
 /// Numbers in a batch, whatever the width of the machine's vectors.
@@ -201,9 +202,6 @@ pub(crate) fn any_positive<S: Simd>(values: Lanes<S>) -> bool {
 pub(crate) fn between<S: Simd>(simd: S, first: f32, last: f32) -> Lanes<S> {
     ramp(simd, first, (last - first) * (1.0 / (LANES - 1) as f32))
 }
-
-/// 3 * 2^22: adding it to a number below 2^22 in size rounds that to a whole number, which then stands in the low bits of the sum.
-const ROUND: f32 = 12_582_912.0;
 
 /// Whole part, wrapped by `mask` (a power of two less 1), and fraction in [0, 1].
 ///

@@ -59,7 +59,9 @@ pub enum PlanError {
         min: f64,
     },
     /// Something keyed does not end as it begins.
-    #[error("the loop of {seconds} s jumps: {what} differs between its first and its last moment")]
+    #[error(
+        "the loop of {seconds} s jumps: {what} differs between its first and its last moment; allowed: the same at 0 s and at {seconds} s"
+    )]
     LoopJumps {
         /// Length of the loop.
         seconds: f64,

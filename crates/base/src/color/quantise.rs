@@ -1,7 +1,7 @@
 //! From display light to codes: alpha, encoding, dither and rounding, one pixel at a time and alike at every vector width.
 
 use super::encode::{clamp_unit, encode_srgb};
-use crate::math::Fused;
+use crate::math::{Fused, lanes};
 
 /// A number that stands for a display component.
 pub trait DisplayCode: Copy + Default + sealed::Sealed {
@@ -61,25 +61,17 @@ fn dither<C: DisplayCode>(phase: u32, channel: usize) -> f32 {
     (unit - 0.5) * C::DITHER
 }
 
-/// Rounds to the nearest whole number, ties to even; for values from -0.5 to 65535.5.
+/// The code of a number from -0.5 to 65535.5.
 #[inline(always)]
-fn rounded(x: f32) -> f32 {
-    // Adding 1.5 * 2^23 leaves no bits for a fraction.
-    const SHIFT: f32 = 12_582_912.0;
-    (x + SHIFT) - SHIFT
-}
-
-#[inline(always)]
-fn whole(x: f32) -> u32 {
-    const SHIFT: f32 = 12_582_912.0;
-    (x + SHIFT).to_bits() - SHIFT.to_bits()
+fn code_of(x: f32) -> u32 {
+    lanes::whole(x).cast_unsigned()
 }
 
 /// Encodes light (0..=1) unless `RAW`, and rounds it to a code.
 #[inline(always)]
 fn component_code<C: DisplayCode, const RAW: bool>(light: f32, phase: u32, channel: usize) -> u32 {
     let encoded = if RAW { clamp_unit(light) } else { encode_srgb(light) };
-    whole(encoded.fused(C::LARGEST, dither::<C>(phase, channel)))
+    code_of(encoded.fused(C::LARGEST, dither::<C>(phase, channel)))
 }
 
 /// Codes of an opaque pixel.
@@ -105,16 +97,16 @@ pub(super) fn straight_codes<C: DisplayCode, const RAW: bool>(light: [f32; 3], a
     let alpha = clamp_unit(alpha);
     let coverage = if alpha > brightest { alpha } else { brightest };
 
-    let needed = rounded(brightest.fused(C::LARGEST, 0.499));
+    let needed = lanes::rounded(brightest.fused(C::LARGEST, 0.499));
     // Half a code over black: 0.5 / 12.92 of one in the straight part of sRGB.
     let needed = if brightest >= 0.5 / 12.92 / C::LARGEST { needed } else { 0.0 };
-    let dithered = rounded(coverage.fused(C::LARGEST, dither::<C>(phase, 3)));
+    let dithered = lanes::rounded(coverage.fused(C::LARGEST, dither::<C>(phase, 3)));
     let code = if dithered > needed { dithered } else { needed };
 
     let quotient = C::LARGEST / code;
     let scale = if code > 0.0 { quotient } else { 0.0 };
     let [r, g, b, _] = opaque_codes::<C, RAW>([r * scale, g * scale, b * scale], phase);
-    [r, g, b, whole(code)]
+    [r, g, b, code_of(code)]
 }
 
 #[cfg(test)]

@@ -33,12 +33,6 @@ static MATCHING: LazyLock<[[f64; 3]; COUNT]> = LazyLock::new(|| {
     table
 });
 
-/// The colour-matching functions xbar, ybar, zbar from [`FIRST_NM`] to [`LAST_NM`], one entry per nm (CIE 018:2019).
-#[must_use]
-pub fn colour_matching() -> &'static [[f64; 3]] {
-    &*MATCHING
-}
-
 /// XYZ of a spectral radiance given per nm, `radiance_per_nm(wavelength_nm)` in W m^-2 sr^-1 nm^-1: the sum over 360-830 nm in steps
 /// of 1 nm (CIE 015:2018, section 7). The unit is W m^-2 sr^-1; luminance is [`LUMINOUS_EFFICACY_LM_PER_W`] times Y.
 #[must_use]

@@ -7,9 +7,21 @@
 
 use super::Fused;
 
-// 3 * 2^22: adding it to |x| < 2^22 rounds x to a whole number that then stands in the low bits of the sum.
-const ROUND: f32 = 12_582_912.0;
+/// 3 * 2^22: added to a number below 2^22 in size it rounds that to a whole number, which then stands in the low bits of the sum.
+pub const ROUND: f32 = 12_582_912.0;
 const SIGN: u32 = 0x8000_0000;
+
+/// The whole number nearest to `x`, ties to the even one; for `x` below 2^22 in size.
+#[inline(always)]
+pub fn rounded(x: f32) -> f32 {
+    (x + ROUND) - ROUND
+}
+
+/// The same as an integer. (A cast would check each lane of a vector by itself.)
+#[inline(always)]
+pub fn whole(x: f32) -> i32 {
+    (x + ROUND).to_bits().wrapping_sub(ROUND.to_bits()).cast_signed()
+}
 
 /// 2 to the power `x`; relative error below 1.4e-7. From 128 on infinite, below -126 zero (no subnormals); NaN stays NaN.
 #[inline(always)]

@@ -70,7 +70,9 @@ pub enum ProblemKind {
         allowed: Vec<String>,
     },
     /// A keyed value that does not end a seamless loop as it begins it.
-    #[error("the loop of {seconds} s jumps: its first and its last moment differ")]
+    #[error(
+        "the loop of {seconds} s jumps: its first and its last moment differ; allowed: the same value at 0 s and at {seconds} s"
+    )]
     LoopJumps {
         /// Length of the loop, s.
         seconds: f64,

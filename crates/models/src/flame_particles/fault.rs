@@ -60,7 +60,9 @@ pub enum ParticleFaultKind {
     #[error("{0}")]
     Asset(#[from] AssetError),
     /// A keyed value that does not end as it begins.
-    #[error("the loop of {seconds} s jumps: its first and its last moment differ")]
+    #[error(
+        "the loop of {seconds} s jumps: its first and its last moment differ; allowed: the same value at 0 s and at {seconds} s"
+    )]
     LoopJumps {
         /// Length of the loop.
         seconds: f64,

@@ -3,7 +3,7 @@
 use bansho_base::{
     canvas::View,
     image::{Channel, Frame, Image, Rect},
-    math::Fused,
+    math::{Fused, lanes},
     phenomenon::Deflection,
 };
 use fearless_simd::{Level, dispatch};
@@ -244,11 +244,9 @@ impl Bend<'_> {
 /// Whole part and fraction of a place held within so many pixels: so that there is a pixel after the whole part, if there are two.
 #[inline(always)]
 fn split(place: f32, side: usize) -> (u32, f32) {
-    /// The last bits of a sum with 2^23 are a whole number. (A cast would check each lane of a vector by itself.)
-    const SHIFT: f32 = 8_388_608.0;
     let place = place.max(0.0).min((side - 1) as f32);
     let whole = place.floor().min(side.saturating_sub(2) as f32);
-    ((whole + SHIFT).to_bits() - SHIFT.to_bits(), place - whole)
+    (lanes::whole(whole).cast_unsigned(), place - whole)
 }
 
 #[cfg(test)]

@@ -124,11 +124,27 @@ pub(super) struct LightStrip<'a> {
 
 impl LightStrip<'_> {
     /// One of its columns, of which these rows are lit.
+    ///
+    /// Rows that were not lit are written, though they are 0: memory that is new and first read is given to a thread twice, the
+    /// second time by stopping all others.
     #[inline(always)]
     pub(super) fn light_up(&mut self, column: usize, rows: &Range<usize>, of: usize) -> &mut [PerEmitter<f32>] {
-        let lit = &mut self.lit[column];
-        *lit = [lit[0].min(rows.start as u32), lit[1].max(rows.end as u32)];
-        &mut self.light[column * of..][..of]
+        let [first, end] = self.lit[column].map(|row| row as usize);
+        let light = &mut self.light[column * of..][..of];
+        if first > end {
+            light[rows.clone()].fill([0.0; 4]);
+            self.lit[column] = [rows.start as u32, rows.end as u32];
+            return light;
+        }
+        if rows.start < first {
+            light[rows.start..first].fill([0.0; 4]);
+            self.lit[column][0] = rows.start as u32;
+        }
+        if rows.end > end {
+            light[end..rows.end].fill([0.0; 4]);
+            self.lit[column][1] = rows.end as u32;
+        }
+        light
     }
 }
 

@@ -212,7 +212,7 @@ pub enum ShapeFaultKind {
     },
     /// A keyed value that does not end as it begins.
     #[error(
-        "the loop of {seconds} s jumps: its first and its last moment differ; allowed: a last key with the value of the first"
+        "the loop of {seconds} s jumps: its first and its last moment differ; allowed: the same value at 0 s and at {seconds} s"
     )]
     LoopJumps {
         /// Length of the loop, s.

@@ -1,6 +1,7 @@
 //! A grid of cells over a part of the picture, several values a cell.
 
 use bansho_base::image::Rect;
+use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{
@@ -146,26 +147,40 @@ impl<'a> Grid<'a> {
 
     /// Adds sharpened cells twice as large, interpolated.
     pub(crate) fn add_coarser(&mut self, coarser: &Grid) {
-        let (cells, depth) = (self.cells, self.depth);
+        let cells = self.cells;
         // Middles of fine cells lie a quarter before and behind those of coarse ones.
         let quarters = [spline::value(0.75), spline::value(0.25)];
-        let row_length = self.row_length();
-        self.values_mut().par_chunks_mut(row_length).enumerate().for_each(|(row, values)| {
-            let fine = cells.first[1] + row as i32;
-            let first = (fine - 1).div_euclid(2) - coarser.cells.first[1];
-            let rows = [-1, 0, 1, 2].map(|k| coarser.row(first + k));
-            let mut column = vec![0.0; coarser.row_length()];
-            weigh(&mut column, rows, &quarters[fine.rem_euclid(2) as usize]);
-            for (index, sums) in values.chunks_exact_mut(depth).enumerate() {
-                let cell = cells.first[0] + index as i32;
-                let first = coarser.first_of_four((cell - 1).div_euclid(2) - coarser.cells.first[0]);
-                let four = [0, 1, 2, 3].map(|k| &column[(first + k) * depth..][..depth]);
-                let weights = &quarters[cell.rem_euclid(2) as usize];
-                for (i, sum) in sums.iter_mut().enumerate() {
-                    *sum += (0..4).map(|k| weights[k] * four[k][i]).sum::<f32>();
-                }
+        let (row_length, level) = (self.row_length(), Level::new());
+        self.values_mut().par_chunks_mut(row_length).enumerate().for_each_init(
+            || vec![0.0; coarser.row_length()],
+            |column, (row, values)| {
+                let fine = cells.first[1] + row as i32;
+                let first = (fine - 1).div_euclid(2) - coarser.cells.first[1];
+                let rows = [-1, 0, 1, 2].map(|k| coarser.row(first + k));
+                let weights = &quarters[fine.rem_euclid(2) as usize];
+                dispatch!(level, _simd => {
+                    weigh(column, rows, weights);
+                    coarser.add_between(column, &quarters, cells.first[0], values);
+                });
+            },
+        );
+    }
+
+    /// Adds a row of these cells, interpolated, to one of cells half as large whose first is `first`.
+    #[inline(always)]
+    fn add_between(&self, row: &[f32], quarters: &[[f32; 4]; 2], first: i32, values: &mut [f32]) {
+        let depth = self.depth;
+        for (index, sums) in values.chunks_exact_mut(depth).enumerate() {
+            let cell = first + index as i32;
+            let [a, b, c, d] = quarters[cell.rem_euclid(2) as usize];
+            let four = self.first_of_four((cell - 1).div_euclid(2) - self.cells.first[0]) * depth;
+            let (before, rest) = row[four..][..4 * depth].split_at(depth);
+            let (near, rest) = rest.split_at(depth);
+            let (far, beyond) = rest.split_at(depth);
+            for i in 0..depth {
+                sums[i] += a * before[i] + b * near[i] + c * far[i] + d * beyond[i];
             }
-        });
+        }
     }
 }
 

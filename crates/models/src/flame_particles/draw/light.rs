@@ -1,12 +1,16 @@
 //! The light that the gas throws on others.
 
+use std::ops::Range;
+
 use bansho_base::{
     color,
     math::DVec3,
     surroundings::{Emitter, Light},
 };
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
 
-use super::{gas::Gas, look::LookParameters};
+use super::{gas::Gas, look::LookParameters, prepared::PARTICLES_OF_TASK};
 
 /// Heights into which the flame is cut to find where its light comes from.
 const SLABS: usize = 48;
@@ -26,6 +30,17 @@ struct Slab {
 impl Slab {
     fn luminous(&self) -> f64 {
         self.intensity.iter().sum::<f64>().max(0.0)
+    }
+
+    /// Adds a share of another.
+    #[inline(always)]
+    fn add(&mut self, other: &Self, share: f64) {
+        for c in 0..3 {
+            self.intensity[c] += share * other.intensity[c];
+        }
+        self.moment += other.moment * share;
+        self.spread += share * other.spread;
+        self.shade += share * other.shade;
     }
 }
 
@@ -51,12 +66,49 @@ pub fn luminous(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Light> {
 
 /// The gas cut by height; a particle is shared by the two slabs around it.
 fn slabs(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Slab> {
-    let heights = || (0..gas.particles.len()).map(|index| gas.place(index, t).y);
-    let (low, high) = heights().fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)));
+    let (low, high) = heights(gas, t);
     let step = ((high - low) / (SLABS - 1) as f64).max(1e-9);
+    let level = Level::new();
+    let of_task = |range: Range<usize>| {
+        let mut slabs = vec![Slab::default(); SLABS + 1];
+        dispatch!(level, _simd => add_to_slabs(gas, look, t, range.clone(), [low, step], &mut slabs));
+        slabs
+    };
+    // Sums of whole tasks, added in order, are the same however many threads there are.
+    let of_tasks: Vec<Vec<Slab>> = tasks(gas).into_par_iter().map(of_task).collect();
+    of_tasks.into_iter().fold(vec![Slab::default(); SLABS + 1], |mut sums, slabs| {
+        sums.iter_mut().zip(&slabs).for_each(|(sum, slab)| sum.add(slab, 1.0));
+        sums
+    })
+}
+
+/// The particles of each task.
+fn tasks(gas: &Gas) -> Vec<Range<usize>> {
+    let count = gas.particles.len();
+    (0..count).step_by(PARTICLES_OF_TASK).map(|first| first..(first + PARTICLES_OF_TASK).min(count)).collect()
+}
+
+/// Heights of the lowest and the highest particle, m.
+fn heights(gas: &Gas, t: f64) -> (f64, f64) {
+    let of_task = |range: Range<usize>| {
+        range.map(|index| gas.place(index, t).y).fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
+    };
+    let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+    tasks(gas).into_par_iter().map(of_task).reduce(|| (f64::MAX, f64::MIN), both)
+}
+
+/// Adds particles to slabs `step` apart from the height `low` on.
+#[inline(always)]
+fn add_to_slabs(
+    gas: &Gas,
+    look: &LookParameters,
+    t: f64,
+    range: Range<usize>,
+    [low, step]: [f64; 2],
+    slabs: &mut [Slab],
+) {
     let table = color::black_body();
-    let mut slabs = vec![Slab::default(); SLABS + 1];
-    for index in 0..gas.particles.len() {
+    for index in range {
         let shade = gas.absorption(index, look) * gas.volume(index);
         if shade <= 0.0 {
             continue;
@@ -65,17 +117,13 @@ fn slabs(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Slab> {
         let radiance = table.radiance(gas.particles.temperature[index]).map(f64::from);
         let at = ((place.y - low) / step).clamp(0.0, (SLABS - 1) as f64);
         let part = at - at.floor();
-        for (slab, share) in [(at as usize, 1.0 - part), (at as usize + 1, part)] {
-            let slab = &mut slabs[slab];
-            let intensity = radiance.map(|value| value * shade * share);
-            let power: f64 = intensity.iter().sum();
-            (0..3).for_each(|c| slab.intensity[c] += intensity[c]);
-            slab.moment += place * power;
-            slab.spread += (place.x * place.x + place.z * place.z) * power;
-            slab.shade += shade * share;
-        }
+        let intensity = radiance.map(|value| value * shade);
+        let power: f64 = intensity.iter().sum();
+        let spread = (place.x * place.x + place.z * place.z) * power;
+        let whole = Slab { intensity, moment: place * power, spread, shade };
+        slabs[at as usize].add(&whole, 1.0 - part);
+        slabs[at as usize + 1].add(&whole, part);
     }
-    slabs
 }
 
 /// The light of what lies between two sums of power, counted from below.
@@ -86,11 +134,7 @@ fn part_light(slabs: &[Slab], [from, to]: [f64; 2], look: &LookParameters) -> Op
         let above = below + slab.luminous();
         let taken = (above.min(to) - below.max(from)).max(0.0);
         if taken > 0.0 {
-            let share = taken / slab.luminous();
-            (0..3).for_each(|c| sum.intensity[c] += share * slab.intensity[c]);
-            sum.moment += slab.moment * share;
-            sum.spread += slab.spread * share;
-            sum.shade += slab.shade * share;
+            sum.add(slab, taken / slab.luminous());
         }
         below = above;
     }

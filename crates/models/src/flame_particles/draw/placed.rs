@@ -4,6 +4,8 @@
 
 use std::ops::Range;
 
+use bansho_base::math::lanes;
+
 use super::{
     grid::Raster,
     kernel::Profile,
@@ -157,10 +159,8 @@ impl Chords {
     }
 }
 
-/// A whole number, clamped from 0 to `most`: the last bits of its sum with 2^23. (A cast checks each lane of a vector by itself.)
+/// A whole number, clamped from 0 to `most`.
 #[inline(always)]
 fn whole(value: f32, most: i32) -> i32 {
-    const SHIFT: f32 = 8_388_608.0;
-    let clamped = value.max(0.0).min(most as f32);
-    (clamped + SHIFT).to_bits() as i32 - SHIFT.to_bits() as i32
+    lanes::whole(value.max(0.0).min(most as f32))
 }

@@ -1,5 +1,7 @@
 //! A streak as it is kept: rain in sight may be millions of them.
 
+use bansho_base::math::lanes;
+
 use super::{super::patch::Layer, Stroke};
 
 /// A [`Stroke`] in half a line of a core's cache. What it gives back is what it was given, but for the light, which is kept to
@@ -22,8 +24,6 @@ pub(crate) struct Record {
 const LEANS: f32 = 32_767.0;
 const UPRIGHT: u16 = 1 << 15;
 const PER_MM: f32 = 1000.0;
-/// Added to a number of up to 2^22 it leaves the nearest whole one in the low bits of the sum.
-const ROUND: f32 = 12_582_912.0;
 
 /// The upper half of a number, rounded.
 #[inline(always)]
@@ -46,13 +46,13 @@ pub(super) fn short(value: f32) -> f32 {
 /// The nearest number that a record keeps as a lean of up to 1.
 #[inline(always)]
 pub(super) fn lean(value: f32) -> f32 {
-    (value * LEANS + ROUND - ROUND) * (1.0 / LEANS)
+    lanes::rounded(value * LEANS) * (1.0 / LEANS)
 }
 
 /// The nearest whole number as an integer, modulo 2^16.
 #[inline(always)]
 fn count(value: f32) -> u16 {
-    (value + ROUND).to_bits() as u16
+    lanes::whole(value) as u16
 }
 
 impl Record {
