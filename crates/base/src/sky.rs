@@ -13,7 +13,7 @@ use crate::{
     parameters::Range,
 };
 
-pub use night::{Night, NightParameters, Parallel};
+pub use night::{EARTH_RADIUS_KM, Night, NightParameters, Parallel};
 
 /// Air masses along a line of sight `elevation` radians above the horizon: 1 overhead, 38 at the horizon (Kasten & Young 1989). What lies
 /// below the horizon has the horizon's.

@@ -28,7 +28,7 @@ use super::{
 };
 use crate::aurora::{
     AuroraParameters, energies,
-    light::Emission,
+    light::{Emission, LINES, Line},
     particles::AuroraSimulation,
     precipitation::energy::HIGHEST_EV,
     shapes::{Sequence, ShapeFault, ShapeFaultKind},
@@ -152,8 +152,13 @@ const fn brightness(name: &'static str, doc: &'static str) -> AovDescriptor {
     AovDescriptor { name, unit: "kR", doc, rule: AovRule::Sum }
 }
 
-/// Which of the [`LINES`](crate::aurora::light::LINES) the AOVs measure.
-pub(super) const MEASURED: [usize; 5] = [0, 1, 4, 3, 6];
+/// Wavelengths of the lines that the AOVs measure, nm.
+pub(super) const MEASURED: [f64; 5] = [557.7, 630.0, 427.8, 391.4, 670.5];
+
+/// The lines of [`MEASURED`].
+pub(super) fn measured_lines() -> impl Iterator<Item = &'static Line> {
+    MEASURED.iter().filter_map(|nm| LINES.iter().find(|line| (line.wavelength_nm - nm).abs() < 0.05))
+}
 
 /// What an aurora can write beside its light, in the order of [`MEASURED`] and then of [`MAPS`].
 const AOVS: &[AovDescriptor] = &[

@@ -20,13 +20,13 @@ use super::{
     geometry::{EARTH_RADIUS_KM, FieldLines, dot},
     maps::Maps,
     meridians::{Meridians, Sampler},
-    phenomenon::MEASURED,
+    phenomenon::{MEASURED, measured_lines},
     shading::Shading,
     sources::Sources,
 };
 use crate::{
     aurora::{
-        light::{LINES, PerEmitter},
+        light::{Line, PerEmitter},
         particles::AuroraSimulation,
     },
     directions::Directions,
@@ -59,6 +59,8 @@ pub(super) struct PreparedAurora<'a> {
     shown: Shown,
     /// Light by emitter on a sharp and a coarser chart, where it is measured.
     measured: Option<[Meridians; 2]>,
+    /// The lines that are measured.
+    lines: Vec<&'static Line>,
     /// Made where they are asked for.
     maps: OnceLock<Maps<'a>>,
 }
@@ -99,6 +101,7 @@ impl<'a> PreparedAurora<'a> {
             field,
             shown,
             measured,
+            lines: measured_lines().collect(),
             maps: OnceLock::new(),
         })
     }
@@ -343,8 +346,7 @@ impl PreparedAurora<'_> {
         direction: Option<DVec3>,
         share: f32,
     ) {
-        for (plane, line) in strip.aovs.iter_mut().zip(MEASURED) {
-            let line = &LINES[line];
+        for (plane, line) in strip.aovs.iter_mut().zip(&self.lines) {
             plane.add(index, light[line.emitter.index()] * line.photons as f32, 1.0);
         }
         let maps = self.maps.get_or_init(|| Maps::new(&self.aurora.simulation));

@@ -20,6 +20,7 @@ use super::{
     footprint::{Footprint, REACH, Source},
     geometry::{EARTH_RADIUS_KM, FieldLines},
     meridians::Meridians,
+    phenomenon::measured_lines,
     prepared::{Batch, Charts},
     profile::Profiles,
     sources::{Maker, Shares, Sources, nearest_node},
@@ -231,6 +232,17 @@ fn collisions_lose_no_light_on_hard_sheets() {
     cells.iter_mut().for_each(|cell| cell.energy_ev *= (0.2 * FACTOR) as f32);
     let (apart, _) = beside_profile(aurora.simulation().emission(), aurora.collisions.as_ref().unwrap(), &cells);
     assert!(apart < 0.03, "{apart}");
+}
+
+#[test]
+fn every_measured_line_is_there_and_named_by_its_wavelength() {
+    let names = measured_lines().map(|line| format!("kilorayleigh_{}", line.wavelength_nm as i64));
+    let parameters = AuroraParameters {
+        particles: ParticleParameters { count: 100, ..ParticleParameters::default() },
+        ..AuroraParameters::default()
+    };
+    let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
+    assert_eq!(names.collect::<Vec<_>>(), aurora.aovs().iter().take(5).map(|aov| aov.name).collect::<Vec<_>>());
 }
 
 #[test]

@@ -151,7 +151,6 @@ fn parting(kernel: RepulsionKernel) -> f64 {
 #[test]
 fn poly6_with_spiky_parts_particles_that_the_spline_lets_be() {
     let [spline, parted] = [RepulsionKernel::Spline, RepulsionKernel::Poly6Spiky].map(parting);
-    println!("{spline} {parted}");
     assert!(parted > 1.1 * spline, "{spline} {parted}");
 }
 
