@@ -20,7 +20,7 @@ use bansho_base::{
 };
 use bansho_models::flame_particles::{
     Particles,
-    draw::{Gas, LookParameters, Memory, PreparedGas, line_gradient, line_integral, soot_absorption},
+    draw::{Ending, Gas, LookParameters, Memory, PreparedGas, line_gradient, line_integral, soot_absorption},
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use rayon::prelude::*;
@@ -50,6 +50,7 @@ fn gas<'a>(particles: &'a Particles, memory: &'a Memory) -> Gas<'a> {
         base: DVec3::ZERO,
         size: DVec2::ONE,
         key: Key::new(1, "plume"),
+        ending: Ending::NEVER,
         memory,
     }
 }

@@ -6,9 +6,7 @@
 use std::{collections::HashMap, hint::black_box};
 
 use bansho_base::random::{Key, Purpose};
-use bansho_models::sph::{
-    Cells, Kernel, KernelShape, Particles, PressureForce, PressureForm, StateEquation, densities,
-};
+use bansho_models::sph::{Cells, Kernel, KernelShape, Particles, PressureForce, StateEquation, densities};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 
 const NEIGHBOURS: f64 = 35.0;
@@ -49,7 +47,7 @@ impl<const D: usize> Simulation<D> {
         Self {
             particles: cloud(count),
             cells: Cells::new(SUPPORT),
-            force: PressureForce::new(KernelShape::Spiky, PressureForm::Averaged),
+            force: PressureForce::new(KernelShape::Spiky),
             densities: Vec::new(),
             pressures: Vec::new(),
             accelerations: std::array::from_fn(|_| Vec::new()),

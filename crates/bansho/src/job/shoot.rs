@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     image::Frame,
-    observer::{Observer, Stage, StageGuard, check},
+    observer::{Observer, check},
 };
 use bansho_render::{Backend, Plan, Shot};
 
@@ -83,8 +83,7 @@ fn draw(
     observer: &dyn JobObserver,
 ) -> Result<Frame, JobError> {
     if let Some(last) = seek {
-        let _stage = StageGuard::begin(watch, Stage::Load);
-        snapshots.seek(shot, last, number, observer);
+        snapshots.warm_up(shot, last, number, watch, observer)?;
     }
     shot.advance(number, watch)?;
     snapshots.keep(shot, number, watch)?;

@@ -90,8 +90,7 @@ impl PreparedSimulation {
         for (index, &number) in self.frames.iter().enumerate() {
             check(observer).map_err(|_| JobError::Cancelled)?;
             if last.is_none_or(|last| number != last + 1) {
-                let _stage = StageGuard::begin(observer, Stage::Load);
-                self.snapshots.seek(shot.as_mut(), last, number, observer);
+                self.snapshots.warm_up(shot.as_mut(), last, number, observer, observer)?;
             }
             shot.advance(number, observer)?;
             self.snapshots.keep(shot.as_ref(), number, observer)?;

@@ -42,29 +42,69 @@ impl Snapshots {
         folder.join(format!("state.{number}.bansho"))
     }
 
-    /// Brings `shot` nearer to frame `number` by the latest snapshot that is of use: after frame `last`, where the shot
-    /// stands, and not after `number`. One that is damaged or foreign is noted and left for [`keep`](Self::keep).
-    pub(super) fn seek(&self, shot: &mut dyn Shot, last: Option<i64>, number: i64, observer: &dyn JobObserver) {
-        let Some(folder) = &self.folder else { return };
+    /// Brings `shot` nearer to frame `number`: by the latest snapshot that is of use, and then to every frame before `number`
+    /// of which a snapshot is due or was refused, which is kept anew. Frame `last` is where the shot stands.
+    ///
+    /// # Errors
+    /// The observer asked to stop, or a snapshot cannot be written.
+    pub(super) fn warm_up(
+        &self,
+        shot: &mut dyn Shot,
+        last: Option<i64>,
+        number: i64,
+        watch: &dyn Observer,
+        observer: &dyn JobObserver,
+    ) -> Result<(), JobError> {
+        if self.folder.is_none() {
+            return Ok(());
+        }
         let (last, number) = (last.map(|last| self.in_turn(last)), self.in_turn(number));
-        let past = last.filter(|&last| last <= number).unwrap_or(i64::MIN);
+        let past = last.filter(|&last| last <= number);
+        let found = {
+            let _stage = StageGuard::begin(watch, Stage::Load);
+            self.seek(shot, past, number, observer)
+        };
+        let earliest = found.refused.iter().copied().fold(self.first_frame, i64::min);
+        let first = found.restored.or(past).map_or(earliest, |stands| stands.saturating_add(1));
+        for stop in (first..number).filter(|stop| self.is_due(*stop) || found.refused.contains(stop)) {
+            shot.advance(stop, watch)?;
+            self.keep(shot, stop, watch)?;
+        }
+        Ok(())
+    }
+
+    /// Puts `shot` at the latest snapshot after frame `past` and not after `number` that is of use. Those that are damaged or
+    /// foreign are noted.
+    fn seek(&self, shot: &mut dyn Shot, past: Option<i64>, number: i64, observer: &dyn JobObserver) -> Found {
+        let mut found = Found::default();
+        let Some(folder) = &self.folder else { return found };
         let mut candidates = match numbers(folder) {
             Ok(numbers) => numbers,
             Err(error) => {
                 observer.note(&Note::SnapshotUnreadable { path: folder.clone(), reason: error.to_string() });
-                return;
+                return found;
             }
         };
-        candidates.retain(|&candidate| candidate > past && candidate <= number);
+        candidates.retain(|&candidate| past.is_none_or(|past| candidate > past) && candidate <= number);
         candidates.sort_unstable();
         for candidate in candidates.into_iter().rev() {
             let path = self.path(folder, candidate);
             match fs::read(&path).map(|bytes| shot.restore(&bytes)) {
-                Ok(Ok(())) => return,
+                Ok(Ok(())) => {
+                    found.restored = Some(candidate);
+                    return found;
+                }
                 Ok(Err(reason)) => observer.note(&Note::SnapshotRefused { path, reason }),
                 Err(error) => observer.note(&Note::SnapshotUnreadable { path, reason: error.to_string() }),
             }
+            found.refused.push(candidate);
         }
+        found
+    }
+
+    /// Whether a snapshot of frame `number` is wanted.
+    fn is_due(&self, number: i64) -> bool {
+        number.abs_diff(self.first_frame).is_multiple_of(self.every)
     }
 
     /// Writes the state at frame `number` where one is due, or lies there, and it is not the very same.
@@ -72,7 +112,7 @@ impl Snapshots {
         let Some(folder) = &self.folder else { return Ok(()) };
         let number = self.in_turn(number);
         let path = self.path(folder, number);
-        if !number.abs_diff(self.first_frame).is_multiple_of(self.every) && !path.exists() {
+        if !self.is_due(number) && !path.exists() {
             return Ok(());
         }
         let _stage = StageGuard::begin(observer, Stage::Write);
@@ -82,6 +122,15 @@ impl Snapshots {
         }
         Ok(atomic::write_bytes(&path, &state)?)
     }
+}
+
+/// What lay in the folder on the way to a frame.
+#[derive(Default)]
+struct Found {
+    /// The frame at which the shot stands now, by its snapshot.
+    restored: Option<i64>,
+    /// Later ones whose snapshots are of no use.
+    refused: Vec<i64>,
 }
 
 /// Whether any phenomenon of the plan has a state.
@@ -161,6 +210,33 @@ mod tests {
     }
 
     #[test]
+    fn what_was_refused_is_made_anew_though_its_frame_is_not_drawn() {
+        let folder = tempfile::tempdir().unwrap();
+        let snapshots = snapshots(&folder);
+        steps(&snapshots, &(-4..9).collect::<Vec<_>>(), &Witness::default());
+        // Also a state that was not due, as another job with another rhythm leaves it.
+        let states = snapshots.folder.as_deref().unwrap();
+        let paths = [5, 6].map(|number| snapshots.path(states, number));
+        paths.iter().for_each(|path| fs::write(path, b"").unwrap());
+        let witness = Witness::default();
+        assert_eq!(steps(&snapshots, &[8], &witness), 7, "from the state at 1");
+        assert_eq!(witness.notes.lock().unwrap().len(), 2);
+        assert_eq!(paths.map(|path| fs::read(path).unwrap()), [5_i64, 6].map(|number| number.to_le_bytes().to_vec()));
+        let again = Witness::default();
+        assert_eq!((steps(&snapshots, &[8], &again), again.notes.lock().unwrap().len()), (2, 0), "from the state at 6");
+    }
+
+    #[test]
+    fn warming_up_leaves_the_states_that_are_due_on_its_way() {
+        let folder = tempfile::tempdir().unwrap();
+        let snapshots = snapshots(&folder);
+        assert_eq!(steps(&snapshots, &[8, 13], &Witness::default()), 18);
+        let mut there = numbers(snapshots.folder.as_deref().unwrap()).unwrap();
+        there.sort_unstable();
+        assert_eq!(there, [-4, 1, 6, 11]);
+    }
+
+    #[test]
     fn other_files_in_the_folder_are_left_alone() {
         let folder = tempfile::tempdir().unwrap();
         for name in ["state..bansho", "state.x.bansho", "state.5", "notes.txt"] {
@@ -180,7 +256,11 @@ mod tests {
         let mut shot = counter.shot();
         snapshots.keep(&shot, 6, &Unobserved).unwrap();
         assert_eq!(numbers(snapshots.folder.as_deref().unwrap()).unwrap(), [-4]);
-        snapshots.seek(&mut shot, None, 7, &Witness::default());
+        let witness = Witness::default();
+        snapshots.warm_up(&mut shot, None, 7, &witness, &witness).unwrap();
         assert_eq!(shot.number, -5);
+        // The end of a turn lies after its beginning, and frames of the next turn are those of the first.
+        snapshots.warm_up(&mut shot, None, 15, &witness, &witness).unwrap();
+        assert_eq!(shot.number, 1);
     }
 }

@@ -2,7 +2,7 @@
 
 use bansho::PlanOptions;
 
-use crate::looks::{Film, hues, luminance, scene_text};
+use crate::looks::{Film, hues, luminance, mean_luminances, scene_text};
 
 /// A scene's flame in wind of `speed` m/s, twelve frames of it.
 fn gas_in_wind(scene: &str, speed: f64) -> Film {
@@ -27,6 +27,18 @@ fn the_papers_own_wind_bends_the_papers_own_gas() {
     let lean = |speed: f64| gas_in_wind("inagaki_paper", speed).centroid_of_upper_half()[0] - 80.0;
     let [left, still, right] = [-0.5, 0.0, 0.5].map(lean);
     assert!(still.abs() < 6.0 && left < still - 2.0 && right > still + 2.0, "{left} {still} {right}");
+}
+
+#[test]
+fn a_scene_begins_with_a_developed_flame() {
+    let text = scene_text("inagaki_still");
+    let frames: Vec<i64> = (0..8).map(|index| 15 * index).collect();
+    let light = mean_luminances(&text, [80, 45], &frames);
+    let usual = light[1..].iter().sum::<f64>() / (light.len() - 1) as f64;
+    assert!((0.5..1.7).contains(&(light[0] / usual)), "{} in the first frame, {usual} later", light[0]);
+    let cold = text.replace("particles = 3000", "particles = 3000\npreroll_s = 0.0");
+    let begins = mean_luminances(&cold, [80, 45], &[0])[0];
+    assert!(begins < 0.05 * usual, "without a preroll it begins with {begins} of {usual}");
 }
 
 #[test]

@@ -194,7 +194,7 @@ pub(crate) fn wide_bands(text: &str, size: [usize; 2], frame: i64) -> f64 {
 pub(crate) fn golden(scene: &str, size: [usize; 2], frame: i64) -> Option<String> {
     // A bonfire of 100,000 particles would take longer than all other pictures together, and so would an aurora's of 120,000 that has to be
     // stepped far.
-    let mut text = scene_text(scene).replace("particles = 100000", "particles = 8000");
+    let mut text = scene_text(scene).replace("particles = 125000", "particles = 8000");
     let mut name = scene.to_owned();
     if frame >= 100 {
         text = text.replace("count = 120_000", "count = 12_000");

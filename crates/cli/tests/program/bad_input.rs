@@ -199,8 +199,11 @@ fn refused_gas(lines: &str) -> String {
 fn a_burner_outside_the_domain_names_the_corner_that_it_lies_beyond() {
     let error = refused_gas("domain_max = [5, 5, 5]\n[[flame_particles.burners]]\nposition = [0, 90, 0]\n");
     says(&error, &["scene.toml:7:12: ", "burners.0.position", "[0.0, 90.0, 0.0] m", "`domain_max` [5.0, 5.0, 5.0] m"]);
-    let error = refused_gas("domain_min = [1, -1, -1]\n[[flame_particles.burners]]\nposition = [0, 0, 0]\n");
+    let error = refused_gas("domain_min = [1, -1, -1]\n[[flame_particles.burners]]\nposition = [0.5, 0, 0]\n");
     says(&error, &["scene.toml:7:12: ", "`domain_min` [1.0, -1.0, -1.0] m"]);
+    // Where no position is written, the corner is what can be at fault.
+    let error = refused_gas("particles = 500\ndomain_min = [1, -1, -1]\n");
+    says(&error, &["scene.toml:6:14: ", "domain_min", "[0.0, 0.0, 0.0] m"]);
 }
 
 #[test]
@@ -210,17 +213,22 @@ fn gas_that_cannot_be_says_what_can() {
     let coarse = refused_gas("particles = 1\ndomain_min = [-0.02, -0.02, -0.02]\ndomain_max = [0.02, 0.02, 0.02]\n");
     says(&coarse, &["scene.toml:5:13: ", "support radius d", "the domain's 0.0400 m", "more particles"]);
     let many = refused_gas("particles = 900000000\n");
-    says(&many, &["scene.toml:5:13: ", "900000000 particles would take 268 GiB", "allowed: up to 20000000"]);
+    says(&many, &["scene.toml:5:13: ", "900000000 particles would take 562 GiB", "allowed: up to 20000000"]);
     for temperature in ["0", "1e6"] {
         let error = refused_gas(&format!("[[flame_particles.burners]]\ntemperature_k = {temperature}\n"));
         says(&error, &["scene.toml:6:17: ", "temperature_k", "is out of range", " K"]);
     }
-    let empty = "o nothing\nv 0 0 0\n";
+    // A line of one metre: a mesh without a triangle.
+    let line = "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\
+        \"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"mode\":1}]}],\
+        \"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":2,\"type\":\"VEC3\",\"min\":[0,0,0],\"max\":[1,0,0]}],\
+        \"bufferViews\":[{\"buffer\":0,\"byteLength\":24}],\
+        \"buffers\":[{\"byteLength\":24,\"uri\":\"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAA\"}]}";
     let folder = Folder::with_scene(
         "bansho = 1\n[[flame_particles]]\n[[flame_particles.burners]]\nshape = \"mesh\"\nfile = \"mesh.gltf\"\n",
     );
-    folder.write("mesh.gltf", empty);
+    folder.write("mesh.gltf", line);
     let run = folder.run(&["check", "scene.toml"]);
     assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
-    says(&run.stderr, &["scene.toml:5:8: ", "mesh.gltf"]);
+    says(&run.stderr, &["scene.toml:5:8: ", "mesh.gltf", "no triangles with an area"]);
 }

@@ -112,15 +112,28 @@ fn frames_from_snapshots_or_alone_are_those_of_the_whole_run() {
 }
 
 #[test]
-fn a_damaged_snapshot_is_refused_and_made_anew() {
+fn a_snapshot_that_is_damaged_or_of_another_scene_is_refused_and_made_anew() {
     let folder = Folder::with_scene(GAS);
     let render = ["render", "scene.toml", "-o", "f.####.png", "--snapshots", "states", "--snapshot-every", "4"];
     folder.succeed(&render);
-    let (state, frame) = (folder.files("states")["state.4.bansho"].clone(), folder.files("")["f.0005.png"].clone());
+    let (state, frame) = (folder.files("states")["state.4.bansho"].clone(), folder.files("")["f.0006.png"].clone());
     let mut damaged = state.clone();
     damaged[200] ^= 1;
-    std::fs::write(folder.path("states/state.4.bansho"), damaged).unwrap();
-    let again = folder.succeed(&[&render[..], &["--frames", "4-5"]].concat());
-    assert!(again.stderr.contains("state.4.bansho: not used: the snapshot is damaged"), "{}", again.stderr);
-    assert!(folder.files("states")["state.4.bansho"] == state && folder.files("")["f.0005.png"] == frame);
+    folder.write("other.toml", &GAS.replace("particles = 250", "particles = 200"));
+    folder.succeed(&["render", "other.toml", "-o", "o.png", "--frames", "4", "--snapshots", "others"]);
+    let foreign = folder.files("others")["state.0.bansho"].clone();
+    let cases = [
+        (damaged, "the snapshot is damaged"),
+        (Vec::new(), "the snapshot is damaged"),
+        (foreign, "the snapshot belongs to another scene"),
+    ];
+    // Frame 4 itself is not drawn: it is made anew on the way.
+    let later = [&render[..], &["--frames", "5-6"]].concat();
+    for (bytes, reason) in cases {
+        std::fs::write(folder.path("states/state.4.bansho"), bytes).unwrap();
+        let again = folder.succeed(&later);
+        assert!(again.stderr.contains(&format!("state.4.bansho: not used: {reason}")), "{}", again.stderr);
+        assert!(folder.files("states")["state.4.bansho"] == state && folder.files("")["f.0006.png"] == frame);
+    }
+    assert!(!folder.succeed(&later).stderr.contains("not used"));
 }

@@ -70,7 +70,7 @@ impl Births<'_> {
         let profile = (SPEED_PROFILE[0] - SPEED_PROFILE[1] * outward) as f32;
         let speed = burner.speed as f32 * profile * (1.0 + SPEED_SPREAD * (chance - 0.5));
         let velocity = place.direction.as_vec3() * speed;
-        particles.push(Particle {
+        let particle = Particle {
             birth,
             position: (place.position + velocity.as_dvec3() * age).as_vec3().to_array(),
             velocity: velocity.to_array(),
@@ -82,11 +82,9 @@ impl Births<'_> {
             life: design.longest_life(number, self.afterlife_s) as f32,
             fuel: 1.0,
             soot: 0.0,
-        });
-        if let (Some(of), Some(hunger)) = (particles.burner.last_mut(), particles.hunger.last_mut()) {
-            *of = number as u32;
-            *hunger = self.hunger(burner, design.puffing_hz[number], &place, t) as f32;
-        }
+        };
+        let hunger = self.hunger(burner, design.puffing_hz[number], &place, t) as f32;
+        particles.push_from(number as u32, hunger, particle);
     }
 
     /// How fast gas burns beside the mean: faster from the rim, and in patches that come and go.

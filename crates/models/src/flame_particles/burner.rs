@@ -37,8 +37,10 @@ pub(crate) struct Burner {
     pub(crate) speed: f64,
     /// Acceleration of gas along the axis, m/s^2.
     pub(crate) acceleration: f64,
-    /// Radius of a ball around its middle that holds the burner, m.
+    /// Radius of a ball around its position that holds the burner, m.
     pub(crate) reach: f64,
+    /// The middle of its area beside its position, m: meshes may lie far from their own origin.
+    pub(crate) middle: DVec3,
 }
 
 #[derive(Clone, Debug)]
@@ -87,6 +89,7 @@ impl Burner {
             speed,
             acceleration: AXIS_ACCELERATION * flame.motion.buoyancy,
             reach: size.reach,
+            middle: turned.to_world(size.middle),
         })
     }
 
@@ -159,12 +162,14 @@ struct Size {
     diameter: f64,
     square_metres: f64,
     reach: f64,
+    /// In the burner's own coordinates.
+    middle: DVec3,
 }
 
 fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(Area, Size), ParticleFaultKind> {
     let BurnerParameters { diameter, length, size: [x, y, z], scale, .. } = *parameters;
     let round = 0.25 * std::f64::consts::PI * diameter * diameter;
-    let size = |diameter, square_metres, reach| Size { diameter, square_metres, reach };
+    let size = |diameter, square_metres, reach| Size { diameter, square_metres, reach, middle: DVec3::ZERO };
     Ok(match parameters.shape {
         BurnerShape::Disc => (Area::Disc, size(diameter, round, 0.5 * diameter)),
         BurnerShape::Point => (Area::Ball, size(diameter, round, 0.5 * diameter)),
@@ -181,7 +186,8 @@ fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(Area, Siz
             let sampler = mesh.sampler();
             let square_metres = sampler.area() * scale * scale;
             let across = sides.x.min(sides.z).max(0.2 * sides.max_element());
-            (Area::Surface(sampler), size(across, square_metres, min.abs().max(max.abs()).length() * scale))
+            let reach = min.abs().max(max.abs()).length() * scale;
+            (Area::Surface(sampler), Size { middle: 0.5 * (min + max), ..size(across, square_metres, reach) })
         }
     })
 }

@@ -2,6 +2,7 @@
 
 use bansho_base::{
     air::Air,
+    animation::Animated,
     assets::Assets,
     math::{self, DVec3},
     parameters::Auto,
@@ -15,8 +16,8 @@ use super::{
 
 /// Most particles.
 const MOST_PARTICLES: i64 = 20_000_000;
-/// Bytes that a particle takes, buffers of a step included.
-const PARTICLE_BYTES: f64 = 320.0;
+/// Bytes that a living particle takes, measured over a run: its state, the buffers of a step and of the drawing.
+const PARTICLE_BYTES: f64 = 670.0;
 /// Times until its tip that gas may take before it is removed, whatever holds it.
 const LONGEST_RISE: f64 = 3.0;
 /// How much the fuel that a fire draws from its burner rises and falls as it puffs, as a share.
@@ -66,30 +67,20 @@ impl Design {
         check_count(parameters.particles)?;
         let burners = burners(parameters, assets)?;
         let domain = domain(parameters, &burners)?;
-        let stay =
-            |burner: &Burner| (burner.rise_time() + parameters.life.afterlife_s).max(FEWEST_STEPS * parameters.step_s);
-        let flux = |burner: &Burner| burner.square_metres * burner.speed;
-        let count = parameters.particles as f64;
-        let volume = burners.iter().map(|burner| flux(burner) * stay(burner)).sum::<f64>() / count;
-        let support_radius = parameters.fluid.support * math::cbrt(volume);
-        let side = (domain[1] - domain[0]).min_element();
-        if support_radius > side {
-            let kind = ParticleFaultKind::SupportBeyondDomain { radius: support_radius, side };
-            return Err(ParticleFault { key: "particles".into(), kind });
-        }
+        let stays: Vec<f64> = burners.iter().map(|burner| stay(parameters, burner)).collect();
+        let fluxes: Vec<f64> = burners.iter().map(|burner| burner.square_metres * burner.speed).collect();
+        let living: f64 = fluxes.iter().zip(&stays).map(|(flux, stay)| flux * stay).sum();
+        let volume = living / parameters.particles as f64;
+        let support_radius = support_radius(parameters, volume, &domain)?;
         let coolest = burners.iter().map(|burner| burner.parameters.temperature_k).fold(f64::INFINITY, f64::min);
         let density = Air::default().density_at(coolest);
         let fastest = burners.iter().map(|burner| burner.speed).fold(0.0, f64::max);
         let sound = parameters.fluid.stiffness * fastest;
-        let longest = burners.iter().map(stay).fold(0.0, f64::max);
+        let longest = stays.into_iter().fold(0.0, f64::max);
         // By then all gas is other gas.
         let dissolve = loop_s.map_or(0.0, |turn| longest.min(turn));
-        let preroll = match parameters.preroll_s {
-            Auto::Set(seconds) => seconds,
-            Auto::Auto => (2.0 * longest).min(60.0),
-        };
         Ok(Self {
-            rates: burners.iter().map(|burner| flux(burner) / volume).collect(),
+            rates: fluxes.into_iter().map(|flux| flux / volume).collect(),
             puffing_hz: burners.iter().map(|burner| burner.puffing_hz(parameters)).collect(),
             pulse: (PULSE * parameters.motion.puffing).min(0.9),
             support_radius: support_radius as f32,
@@ -97,7 +88,7 @@ impl Design {
             rest_density: (parameters.fluid.rest_density * density) as f32,
             stiffness_per_kelvin: (sound * sound / coolest) as f32,
             domain,
-            preroll: preroll + 0.5 * dissolve,
+            preroll: preroll(parameters, longest) + 0.5 * dissolve,
             dissolve,
             most: 2 * parameters.particles as usize + 16,
             burners,
@@ -107,6 +98,32 @@ impl Design {
     /// Age at which a particle of burner `index` is removed even if it still burns, s.
     pub(crate) fn longest_life(&self, index: usize, afterlife_s: f64) -> f64 {
         LONGEST_RISE * self.burners[index].rise_time() + afterlife_s
+    }
+}
+
+/// How long gas of a burner stays, s: until the tip, and its afterlife.
+fn stay(parameters: &FlameParticlesParameters, burner: &Burner) -> f64 {
+    (burner.rise_time() + parameters.life.afterlife_s).max(FEWEST_STEPS * parameters.step_s)
+}
+
+/// The support radius d, m, of particles that stand for so much gas at birth.
+fn support_radius(
+    parameters: &FlameParticlesParameters,
+    volume: f64,
+    domain: &[DVec3; 2],
+) -> Result<f64, ParticleFault> {
+    let (radius, side) = (parameters.fluid.support * math::cbrt(volume), (domain[1] - domain[0]).min_element());
+    if radius <= side {
+        return Ok(radius);
+    }
+    Err(ParticleFault { key: "particles".into(), kind: ParticleFaultKind::SupportBeyondDomain { radius, side } })
+}
+
+/// How long it burns before the shot, s; by default twice as long as gas stays at the `longest`.
+fn preroll(parameters: &FlameParticlesParameters, longest: f64) -> f64 {
+    match parameters.preroll_s {
+        Auto::Set(seconds) => seconds,
+        Auto::Auto => (2.0 * longest).min(60.0),
     }
 }
 
@@ -138,8 +155,11 @@ fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[
     }
     for (index, burner) in burners.iter().enumerate() {
         for corner in burner.parameters.position.bounds() {
-            stands_within(parameters, DVec3::from(corner))
-                .map_err(|kind| ParticleFault { key: format!("burners.{index}.position"), kind })?;
+            stands_within(parameters, DVec3::from(corner) + burner.middle).map_err(|(corner, kind)| {
+                // What the user did not write cannot be at fault.
+                let moved = burner.parameters.position != Animated::from([0.0; 3]);
+                ParticleFault { key: if moved { format!("burners.{index}.position") } else { corner.into() }, kind }
+            })?;
         }
     }
     let room = |burner: &Burner| burner.reach + 3.0 * burner.height;
@@ -151,10 +171,10 @@ fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[
     Ok([given(parameters.domain_min, low), given(parameters.domain_max, high)])
 }
 
-/// Whether a corner of a burner's way lies within the corners of the domain that are given.
-fn stands_within(parameters: &FlameParticlesParameters, place: DVec3) -> Result<(), ParticleFaultKind> {
+/// Whether a place of a burner lies within the corners of the domain that are given; if not, beyond which of them.
+fn stands_within(parameters: &FlameParticlesParameters, place: DVec3) -> Result<(), (&'static str, ParticleFaultKind)> {
     let FlameParticlesParameters { domain_min, domain_max, .. } = parameters;
-    let beyond = |corner, limit| Err(ParticleFaultKind::OutsideDomain { place: place.into(), corner, limit });
+    let beyond = |corner, limit| Err((corner, ParticleFaultKind::OutsideDomain { place: place.into(), corner, limit }));
     match (domain_min, domain_max) {
         (Auto::Set(min), _) if place.cmplt(DVec3::from(*min)).any() => beyond("domain_min", *min),
         (_, Auto::Set(max)) if place.cmpgt(DVec3::from(*max)).any() => beyond("domain_max", *max),
@@ -164,9 +184,10 @@ fn stands_within(parameters: &FlameParticlesParameters, place: DVec3) -> Result<
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::assets::MemoryAssets;
+    use bansho_base::{assets::MemoryAssets, mesh::Mesh, parameters::AssetPath};
 
     use super::*;
+    use crate::flame_particles::parameters::BurnerShape;
 
     fn design(parameters: &FlameParticlesParameters) -> Result<Design, ParticleFault> {
         Design::new(parameters, None, &MemoryAssets::default())
@@ -188,6 +209,30 @@ mod tests {
         assert!((spacing * spacing * spacing * layer - 1.0).abs() < 1e-5);
     }
 
+    /// A flame on a triangle of half a square metre that lies `far` to the side of the mesh's origin, in a domain of two metres each way.
+    fn on_a_mesh_beside_its_origin(far: f32, rotation_deg: [f64; 3]) -> Result<Design, ParticleFault> {
+        let corners = vec![[far, 0.0, 0.0], [far, 0.0, 1.0], [far + 1.0, 0.0, 0.0]];
+        let mut assets = MemoryAssets::default();
+        assets.insert_mesh("far.gltf", Mesh::new(corners, vec![[0, 1, 2]]).unwrap());
+        let file = Some(AssetPath("far.gltf".into()));
+        let burner = BurnerParameters { shape: BurnerShape::Mesh, file, rotation_deg, ..Default::default() };
+        let [domain_min, domain_max] = [-2.0, 2.0].map(|corner| Auto::Set([corner; 3]));
+        let parameters =
+            FlameParticlesParameters { burners: vec![burner], domain_min, domain_max, ..Default::default() };
+        Design::new(&parameters, None, &assets)
+    }
+
+    #[test]
+    fn a_mesh_that_lies_outside_the_domain_is_a_burner_outside_it() {
+        assert!(on_a_mesh_beside_its_origin(0.5, [0.0; 3]).is_ok());
+        // Turned half about the upright axis it lies on the other side.
+        for (far, turn, key) in [(50.0, 0.0, "domain_max"), (50.0, 180.0, "domain_min")] {
+            let fault = on_a_mesh_beside_its_origin(far, [0.0, turn, 0.0]).unwrap_err();
+            assert_eq!(fault.key, key);
+            assert!(matches!(fault.kind, ParticleFaultKind::OutsideDomain { place, .. } if place[0].abs() > 50.0));
+        }
+    }
+
     #[test]
     fn parameters_that_do_not_go_together_are_named() {
         let default = FlameParticlesParameters::default;
@@ -199,6 +244,9 @@ mod tests {
             ..default()
         };
         assert_eq!(fault(outside).key, "burners.1.position");
+        // The corner is what the user wrote, if no position is.
+        let beyond_default = FlameParticlesParameters { domain_min: Auto::Set([1.0; 3]), ..default() };
+        assert_eq!(fault(beyond_default).key, "domain_min");
         let corners = [Auto::Set([-40.0; 3]), Auto::Set([-50.0; 3])];
         let empty = FlameParticlesParameters { domain_min: corners[0], domain_max: corners[1], ..default() };
         assert_eq!(fault(empty).key, "domain_max");
@@ -206,6 +254,6 @@ mod tests {
         let wide = FlameParticlesParameters { particles: 5, domain_min: thin[0], domain_max: thin[1], ..default() };
         assert!(matches!(fault(wide).kind, ParticleFaultKind::SupportBeyondDomain { .. }));
         let many = fault(FlameParticlesParameters { particles: 900_000_000, ..default() });
-        assert_eq!(many.to_string(), "particles: 900000000 particles would take 268 GiB; allowed: up to 20000000");
+        assert_eq!(many.to_string(), "particles: 900000000 particles would take 562 GiB; allowed: up to 20000000");
     }
 }

@@ -18,7 +18,7 @@ pub enum ParticleFaultKind {
     /// A burner whose middle lies outside the domain.
     #[error("the burner stands at {place:?} m, beyond `{corner}` {limit:?} m")]
     OutsideDomain {
-        /// Where its middle is.
+        /// Where the middle of its area is.
         place: [f64; 3],
         /// Which corner of the domain it lies beyond.
         corner: &'static str,
@@ -43,14 +43,14 @@ pub enum ParticleFaultKind {
         /// Shortest side of the domain, m.
         side: f64,
     },
-    /// More particles than fit in memory.
+    /// More particles than are taken: a fixed number, whatever memory the machine has, so that a scene is valid everywhere or nowhere.
     #[error("{count} particles would take {gib:.0} GiB; allowed: up to {most}")]
     TooManyParticles {
         /// How many are asked for.
         count: i64,
-        /// What they would take.
+        /// What so many would take when all live; bursts of up to twice as many are let live for a while.
         gib: f64,
-        /// How many fit.
+        /// How many are allowed.
         most: i64,
     },
     /// A burner of shape mesh without a file.

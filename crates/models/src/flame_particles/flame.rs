@@ -16,7 +16,7 @@ use bansho_base::{
 use super::{
     burner::Burner,
     design::Design,
-    draw::{self, Gas, Memory, PreparedGas, SpriteStyle},
+    draw::{self, Ending, Gas, Memory, PreparedGas, SpriteStyle},
     fault::{ParticleFault, ParticleFaultKind},
     parameters::{FlameParticlesParameters, TemperatureLaw},
     particles::Particles,
@@ -88,8 +88,16 @@ impl FlameParticles {
             base: place,
             size: DVec2::new(tallest.diameter, tallest.height),
             key: self.key,
+            ending: self.ending(),
             memory: &self.memory,
         }
+    }
+
+    fn ending(&self) -> Ending {
+        /// Share of the time that burnt gas stays.
+        const FADING: f64 = 0.2;
+        let seconds = (FADING * self.parameters.life.afterlife_s).max(self.parameters.step_s) as f32;
+        Ending { seconds, domain: self.simulation.design.domain.map(|corner| corner.as_vec3()) }
     }
 
     fn tallest(&self) -> &Burner {

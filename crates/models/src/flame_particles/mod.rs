@@ -28,7 +28,7 @@ pub use burner::heskestad;
 pub use fault::{ParticleFault, ParticleFaultKind};
 pub use flame::FlameParticles;
 pub use parameters::{
-    BurnerParameters, BurnerShape, FlameParticlesParameters, FluidParameters, ForceKernel, LifeParameters,
-    MotionParameters, TemperatureLaw, Tension, WindForce,
+    BurnerParameters, BurnerShape, FlameParticlesParameters, FluidParameters, LifeParameters, MotionParameters,
+    TemperatureLaw, Tension, WindForce,
 };
 pub use particles::{Particle, Particles};

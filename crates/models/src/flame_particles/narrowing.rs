@@ -168,6 +168,21 @@ mod tests {
     }
 
     #[test]
+    fn one_height_and_sixteen_find_the_same_middle() {
+        let axis = axis(1.0);
+        for start in 0..40 {
+            let heights: [f32; LANES] = std::array::from_fn(|lane| 0.003 * (start * LANES + lane) as f32);
+            let together = plain!(simd => {
+                axis.middle_at(simd, Lanes::from_slice(simd, &heights)).map(|values| values.as_slice().to_vec())
+            });
+            for (lane, height) in heights.into_iter().enumerate() {
+                let alone = axis.at(height);
+                assert!((0..2).all(|k| (together[k][lane] - alone[k]).abs() < 1e-6), "at {height}: {alone:?}");
+            }
+        }
+    }
+
+    #[test]
     fn none_of_it_leaves_gas_alone() {
         assert_eq!(velocity(&axis(0.0), Vec3::new(0.5, 0.8, 0.0)).length(), 0.0);
     }

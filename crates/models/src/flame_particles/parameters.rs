@@ -6,6 +6,7 @@ use bansho_base::{
 };
 
 use super::draw::LookParameters;
+use crate::sph::KernelShape;
 
 const SHARE: Range = Range::new(0.0, 1.0);
 const LENGTH: Range = Range::new(1e-3, 1e4);
@@ -24,16 +25,6 @@ bansho_base::choice! {
         Box = "box",
         /// The surface of the mesh in `file`, a glTF.
         Mesh = "mesh",
-    }
-}
-
-bansho_base::choice! {
-    /// Which kernel's gradient the pressure force uses.
-    pub enum ForceKernel {
-        /// Keeps particles apart.
-        Spiky = "spiky",
-        /// The paper's; its gradient vanishes at the centre, so that particles clump.
-        Poly6 = "poly6",
     }
 }
 
@@ -109,8 +100,8 @@ bansho_base::parameters! {
         /// Speed of sound, `sqrt(k)` of eq. (11) at the burner's temperature, in speeds of the gas there: how hard it resists being
         /// pressed.
         stiffness: f64 = 1.2, limits(Range::new(0.0, 20.0));
-        /// Kernel of the pressure force, eq. (12).
-        force_kernel: ForceKernel = ForceKernel::Spiky;
+        /// Kernel of the pressure force, eq. (12). The paper's is `"poly6"`, whose gradient vanishes at the centre, so that particles clump.
+        force_kernel: KernelShape = KernelShape::Spiky;
         /// Pressure of thin gas, eq. (11).
         tension: Tension = Tension::Clamped;
         /// How far neighbours even out their velocities in a hundredth of a second; 0 is the paper's Euler equation, eq. (1).
@@ -174,8 +165,9 @@ bansho_base::parameters! {
         position: [f64; 3] = [0.0, 0.0, 0.0], unit("m");
         /// Burners; where the list is empty, one that is all default.
         burners: Vec<BurnerParameters> = Vec::new(), limits(Length { min: 0, max: 200, item: () });
-        /// About how many particles live at a time, all burners together. More than 20 million are refused with the memory that
-        /// they would take.
+        /// About how many particles live at a time, all burners together: as many as the design has room for. Gas that burns out early
+        /// leaves up to a fifth of it free, and puffing lets the number swing. More than 20 million are refused with the memory that they
+        /// would take.
         particles: i64 = 12_000, limits(Range::new(1.0, 1e12));
         /// Pressure and viscosity.
         fluid: FluidParameters = FluidParameters::default();

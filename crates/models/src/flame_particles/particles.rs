@@ -78,9 +78,14 @@ impl Particles {
 
     /// Adds a particle of the first burner, born where it is; no other may have its birth number.
     pub fn push(&mut self, particle: Particle) {
+        self.push_from(0, 1.0, particle);
+    }
+
+    /// Adds a particle of a burner, which burns so much faster than the mean.
+    pub(crate) fn push_from(&mut self, burner: u32, hunger: f32, particle: Particle) {
         self.birth.push(particle.birth);
-        self.burner.push(0);
-        self.hunger.push(1.0);
+        self.burner.push(burner);
+        self.hunger.push(hunger);
         for axis in 0..3 {
             self.position[axis].push(particle.position[axis]);
             self.birthplace[axis].push(particle.position[axis]);

@@ -18,8 +18,10 @@ use crate::lanes::{Lanes, Real, any_positive};
 
 /// Most rings that a burner sheds side by side.
 const MOST_STREAMS: f64 = 6.0;
-/// Most rings of a stream that are alive, latest first.
-const MOST_ALIVE: i64 = 8;
+/// Most rings of a stream that are alive, latest first,
+const MOST_ALIVE: i64 = 9;
+/// and the age at which one is gone, whatever holds it, beats: before the last of those is as old, at its earliest.
+const GREATEST_AGE: f64 = MOST_ALIVE as f64 - 2.2;
 /// Speed of a ring beside the gas on the axis.
 const RING_SPEED: f64 = 0.7;
 /// Speed in a ring's middle beside the gas on the axis at its height.
@@ -97,7 +99,7 @@ pub(crate) fn rings(
     let latest = (t * hz).floor() as i64 + 1;
     let stream_rings = |stream: u32| {
         let shed = Shed { burner, key, purpose: Purpose(number * 64 + stream), streams, hz, t, axis };
-        (0..=MOST_ALIVE).filter_map(move |back| shed.ring(latest - back, flame.motion.puffing))
+        (0..MOST_ALIVE).filter_map(move |back| shed.ring(latest - back, flame.motion.puffing))
     };
     (0..streams).flat_map(stream_rings).collect()
 }
@@ -131,7 +133,7 @@ impl Shed<'_> {
             * cbrt(height / burner.diameter).clamp(0.6, 1.2);
         // It rolls up within a beat and fades as it leaves the flame.
         let rolled = beats / (beats + 0.35);
-        let fade = (1.6 - height / burner.height).clamp(0.0, 0.6) / 0.6;
+        let fade = (1.6 - height / burner.height).clamp(0.0, 0.6) / 0.6 * (GREATEST_AGE - beats).clamp(0.0, 1.0);
         let speed = burner.axis_speed(height) * RING_STRENGTH * (0.75 + 0.5 * strong) * rolled * fade * puffing;
         let [above, base] = [height, 0.0].map(|height| self.axis.at(height as f32).map(f64::from));
         let lean = DVec3::new(above[0] - base[0], height, above[1] - base[1]);
@@ -157,10 +159,14 @@ impl Shed<'_> {
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::assets::MemoryAssets;
     use fearless_simd::prelude::*;
 
     use super::*;
-    use crate::lanes::plain;
+    use crate::{
+        flame_particles::{narrowing::axes, parameters::BurnerParameters},
+        lanes::plain,
+    };
 
     fn velocity(ring: &Ring, place: Vec3) -> Vec3 {
         plain!(simd => {
@@ -185,6 +191,26 @@ mod tests {
             let divergence = slope(Vec3::X) + slope(Vec3::Y) + slope(Vec3::Z);
             assert!(divergence.abs() < 0.01 * slope(Vec3::Y).abs().max(1.0), "{divergence}");
         }
+    }
+
+    #[test]
+    fn rings_come_and_go_without_a_jump_however_many_there_are() {
+        // So many beats that rings go by their number, long before they are above the flame.
+        let mut flame = FlameParticlesParameters::default();
+        flame.motion.puffing_hz = bansho_base::parameters::Auto::Set(40.0);
+        let burner = Burner::new(&BurnerParameters::default(), &flame, &MemoryAssets::default()).unwrap();
+        let axis = axes(std::slice::from_ref(&burner), [&[]; 3], &[], 0.0, 0.0).remove(0);
+        let total = |t: f64| {
+            let rings = rings(&burner, &flame, Key::new(4, "rings"), 0, t, &axis);
+            (rings.iter().map(|ring| f64::from(ring.strength)).sum::<f64>(), rings.len())
+        };
+        let (mut before, mut most) = (total(1.0).0, 0);
+        for step in 1..4000 {
+            let (now, count) = total(1.0 + 1e-4 * f64::from(step));
+            assert!((now - before).abs() < 0.01 * before, "from {before} to {now}");
+            (before, most) = (now, most.max(count));
+        }
+        assert!(most as i64 >= MOST_ALIVE - 2, "{most} rings");
     }
 
     #[test]

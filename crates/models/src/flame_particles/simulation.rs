@@ -7,16 +7,16 @@ use rayon::prelude::*;
 use super::{
     beside::Beside,
     births::Births,
-    collision::keep_out,
+    collision::Solids,
     design::Design,
     draught::{Flow, flows},
     life::{Being, Exposure, Laws},
-    parameters::{FlameParticlesParameters, ForceKernel, Tension, WindForce},
+    parameters::{FlameParticlesParameters, Tension, WindForce},
     particles::Particles,
     turbulence::Turbulence,
     weather::Weather,
 };
-use crate::sph::{Cells, KernelShape, PressureForce, PressureForm, StateEquation, densities, longest_step, sub_steps};
+use crate::sph::{Cells, KernelShape, PressureForce, StateEquation, densities, longest_step, sub_steps};
 
 /// Most sub-steps of a step. Gas that would need more keeps its time and loses stiffness: `press` holds k where sound goes no further
 /// than a fifth of d in a sub-step, and `pushed` holds every force there.
@@ -66,16 +66,12 @@ struct Moved {
 
 impl Simulation {
     pub(crate) fn new(parameters: &FlameParticlesParameters, design: Design, key: Key) -> Self {
-        let kernel = match parameters.fluid.force_kernel {
-            ForceKernel::Spiky => KernelShape::Spiky,
-            ForceKernel::Poly6 => KernelShape::Poly6,
-        };
         Self {
             laws: Laws::from(&parameters.life),
             turbulence: Turbulence::new(key),
             particles: Particles::new(parameters.position.into()),
             cells: Cells::new(design.support_radius),
-            force: PressureForce::new(kernel, PressureForm::Averaged),
+            force: PressureForce::new(parameters.fluid.force_kernel),
             acceleration: Default::default(),
             pressure: Vec::new(),
             beside: Beside::default(),
@@ -122,7 +118,7 @@ impl Simulation {
         let speed = greatest(&square).sqrt();
         let hottest = greatest(&|index| self.particles.temperature[index]);
         let stiffness = self.design.stiffness_per_kelvin * hottest;
-        let longest = longest_step(self.design.support_radius, stiffness, RELATIVE_SPEED * speed, 0.0);
+        let longest = longest_step(self.design.support_radius, stiffness, RELATIVE_SPEED * speed);
         sub_steps(seconds, longest, MOST_SUB_STEPS)
     }
 
@@ -139,7 +135,9 @@ impl Simulation {
         flows(&weather.draughts, &self.particles, &mut self.flows);
         let mut moved = std::mem::take(&mut self.moved);
         moved.resize(self.particles.len(), Moved::default());
-        let mover = Mover { simulation: &*self, weather: &weather, seconds, radius: self.cells.support_radius() };
+        let radius = self.cells.support_radius();
+        let at_centre = KernelShape::Poly6.at_centre::<3>(radius);
+        let mover = Mover { simulation: &*self, weather: &weather, seconds, radius, at_centre };
         let level = Level::new();
         moved.par_chunks_mut(PARTICLES_OF_TASK).enumerate().for_each(|(task, moved)| {
             dispatch!(level, _simd => mover.move_all(task * PARTICLES_OF_TASK, moved));
@@ -216,6 +214,8 @@ struct Mover<'a> {
     weather: &'a Weather<'a>,
     seconds: f32,
     radius: f32,
+    /// Poly6, eq. (2), at its centre.
+    at_centre: f32,
 }
 
 impl Mover<'_> {
@@ -234,7 +234,7 @@ impl Mover<'_> {
 
     #[inline(always)]
     fn moved(&self, index: usize) -> Moved {
-        let Self { simulation, weather, seconds, radius } = *self;
+        let Self { simulation, weather, seconds, radius, .. } = *self;
         let particles = &simulation.particles;
         let draught = &weather.draughts[particles.burner[index] as usize];
         let place = Self::vector(&particles.position, index);
@@ -247,7 +247,8 @@ impl Mover<'_> {
         let drift = draught.velocity(&simulation.flows[index], velocity.length(), particles.age[index]);
         let total = (velocity + drift).clamp_length_max(GREATEST_SPEED);
         let clearance = CLEARANCE * radius;
-        let (new_place, total) = keep_out(weather.occluders, weather.origin, clearance, place + total * seconds, total);
+        let solids = Solids { occluders: weather.occluders, origin: weather.origin, clearance };
+        let (new_place, total) = solids.carry(place, total * seconds, total);
         let exposure = Exposure {
             to_air,
             mixing,
@@ -319,12 +320,8 @@ impl Mover<'_> {
             return 1.0;
         }
         let offset = Vec3::from(beside.offset(index)).length() / (sum * self.radius * SURFACE_OFFSET);
-        let cube = self.radius * self.radius * self.radius;
-        let own = beside.weights[index] * POLY6_CENTRE / (cube * sum);
+        let own = beside.weights[index] * self.at_centre / sum;
         let alone = (own - ALONE_SHARE[0]) / ALONE_SHARE[1];
         offset.max(alone).clamp(0.0, 1.0)
     }
 }
-
-/// Poly6, eq. (2), at its centre for d = 1: 315 / (64 pi).
-const POLY6_CENTRE: f32 = 1.566_681_5;

@@ -201,6 +201,21 @@ mod tests {
     }
 
     #[test]
+    fn one_place_and_sixteen_find_the_same_velocity() {
+        let turbulence = Turbulence::new(Key::new(3, "turbulence"));
+        let tile = <&[[f32; 4]; SIDE * SIDE * SIDE]>::try_from(turbulence.tile.as_slice()).unwrap();
+        for step in 0..200 {
+            let place = Vec3::new(0.37, 1.71, 0.83) * step as f32 - 40.0;
+            let together = plain!(simd => {
+                let lanes = place.to_array().map(|x| Lanes::splat(simd, x));
+                sample_lanes(simd, tile, &lanes).map(|values| values.as_slice()[7])
+            });
+            let alone = sample(&turbulence.tile, place);
+            assert!((0..3).all(|c| (together[c] - alone[c]).abs() < 1e-5), "at {place}: {together:?} {alone:?}");
+        }
+    }
+
+    #[test]
     fn eddies_rise_with_the_gas_and_drift_with_the_wind() {
         let turbulence = Turbulence::new(Key::new(3, "turbulence"));
         let place = Vec3::new(0.1, 0.2, 0.3);

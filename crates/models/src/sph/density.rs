@@ -2,7 +2,7 @@
 
 use super::{
     cells::Cells,
-    kernel::{CubicSpline, KernelShape, Poly6, SmoothingKernel, Spiky},
+    kernel::{KernelShape, SmoothingKernel, with_kernel},
     sum::{Pair, PairTerm},
 };
 use crate::lanes::Real;
@@ -24,12 +24,7 @@ impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 1, 1> for DensityTerm<K>
 /// # Panics
 /// If `masses` are not one a particle.
 pub fn densities<const D: usize>(cells: &Cells<D>, kernel: KernelShape, masses: &[f32], densities: &mut Vec<f32>) {
-    let support = cells.support_radius();
-    match kernel {
-        KernelShape::Poly6 => cells.sum(&DensityTerm(Poly6::<D>::new(support)), [masses], [densities]),
-        KernelShape::Spiky => cells.sum(&DensityTerm(Spiky::<D>::new(support)), [masses], [densities]),
-        KernelShape::CubicSpline => cells.sum(&DensityTerm(CubicSpline::<D>::new(support)), [masses], [densities]),
-    }
+    with_kernel!(kernel, cells.support_radius(), D, |kernel| cells.sum(&DensityTerm(kernel), [masses], [densities]))
 }
 
 /// How pressure follows from density: `p = k (rho - rho_0)`, Inagaki et al. (11), the aurora thesis (2.13).

@@ -1,14 +1,14 @@
-//! Smoothed-particle hydrodynamics in the plane and in space: kernels, cells, density, pressure, mixing, step length.
+//! Smoothed-particle hydrodynamics in the plane and in space: kernels, cells, density, pressure, step length.
 //!
 //! One code for both: everything takes the number of dimensions `D`, two or three. A step of a model is
 //! ```
-//! use bansho_models::sph::{Cells, KernelShape, Particles, PressureForce, PressureForm, StateEquation, densities};
+//! use bansho_models::sph::{Cells, KernelShape, Particles, PressureForce, StateEquation, densities};
 //!
 //! let mut particles = Particles::<3>::default();
 //! particles.push([0.0; 3], [0.0; 3], 1.0, 0);
 //! particles.push([0.1, 0.0, 0.0], [0.0; 3], 1.0, 1);
 //! let mut cells = Cells::new(0.3);
-//! let mut force = PressureForce::new(KernelShape::Spiky, PressureForm::Averaged);
+//! let mut force = PressureForce::new(KernelShape::Spiky);
 //! let state = StateEquation { rest_density: 0.0, tension: false };
 //! let (mut density, mut acceleration) = (Vec::new(), Default::default());
 //!
@@ -38,8 +38,8 @@ pub use crate::lanes::Real;
 pub use cells::Cells;
 pub use density::{StateEquation, densities};
 pub use kernel::{CubicSpline, Kernel, KernelShape, Poly6, SmoothingKernel, Spiky};
-pub use mixing::{VelocitySmoothing, mix, mixing_weights};
+pub use mixing::mixing_weights;
 pub use particles::{Particles, retain};
-pub use pressure::{PressureForce, PressureForm};
+pub use pressure::PressureForce;
 pub use step::{longest_step, sub_steps};
 pub use sum::{Pair, PairTerm};

@@ -67,27 +67,6 @@ impl<const D: usize> Particles<D> {
         self.ids.copy_from_slice(cells.ids());
     }
 
-    /// Greatest speed of all; 0 without particles.
-    #[must_use]
-    pub fn greatest_speed(&self) -> f32 {
-        let squared = |i: usize| self.velocities.iter().fold(0.0_f32, |sum, v| sum + v[i] * v[i]);
-        (0..self.len()).map(squared).fold(0.0, f32::max).sqrt()
-    }
-
-    /// Shortens every velocity above `limit` to it. What is not a number becomes rest.
-    pub fn bound_speed(&mut self, limit: f32) {
-        for i in 0..self.len() {
-            let squared = self.velocities.iter().fold(0.0_f32, |sum, v| sum + v[i] * v[i]);
-            if squared <= limit * limit {
-                continue;
-            }
-            let factor = if squared.is_finite() { limit / squared.sqrt() } else { 0.0 };
-            for component in &mut self.velocities {
-                component[i] = if factor > 0.0 { component[i] * factor } else { 0.0 };
-            }
-        }
-    }
-
     /// Velocity, then position (semi-implicit Euler): `v += a dt`, `x += v dt`.
     ///
     /// # Panics

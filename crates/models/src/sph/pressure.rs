@@ -4,22 +4,12 @@ use rayon::prelude::*;
 
 use super::{
     cells::{AT_ONCE, Cells},
-    kernel::{CubicSpline, KernelShape, Poly6, SmoothingKernel, Spiky},
+    kernel::{KernelShape, SmoothingKernel, with_kernel},
     sum::{Pair, PairTerm},
 };
 use crate::lanes::Real;
 
-bansho_base::choice! {
-    /// How the pressures of two particles make a force; both conserve momentum.
-    pub enum PressureForm {
-        /// `(p_i + p_j) / (2 rho_i rho_j)`: Inagaki et al. (12) with (8).
-        Averaged = "averaged",
-        /// `p_i / rho_i^2 + p_j / rho_j^2` (Monaghan 1992).
-        Balanced = "balanced",
-    }
-}
-
-/// `(a_i + a_j) b_j` times the gradient of W: one term for both forms.
+/// `(p_i + p_j) m_j / rho_j` times the gradient of W: Inagaki et al. (12) with (8), but for a factor of i's own.
 struct PressureTerm<K>(K);
 
 impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 2, D> for PressureTerm<K> {
@@ -39,20 +29,18 @@ impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 2, D> for PressureTerm<K
 pub struct PressureForce {
     /// Kernel whose gradient pushes; one that is pointed at the centre keeps particles apart.
     pub kernel: KernelShape,
-    /// Form of the sum.
-    pub form: PressureForm,
-    stress: Vec<f32>,
-    weight: Vec<f32>,
+    /// `m / rho`.
+    volume: Vec<f32>,
 }
 
 impl PressureForce {
-    /// The force by that kernel and form.
+    /// The force by that kernel.
     #[must_use]
-    pub fn new(kernel: KernelShape, form: PressureForm) -> Self {
-        Self { kernel, form, stress: Vec::new(), weight: Vec::new() }
+    pub fn new(kernel: KernelShape) -> Self {
+        Self { kernel, volume: Vec::new() }
     }
 
-    /// Accelerations `a_i = -sum_j m_j (p_i + p_j) / (2 rho_i rho_j) grad W`, or the other form's.
+    /// Accelerations `a_i = -sum_j m_j (p_i + p_j) / (2 rho_i rho_j) grad W`.
     ///
     /// Each pair is computed from both sides with the same operations on the same numbers, so that momentum is kept to rounding.
     ///
@@ -67,28 +55,16 @@ impl PressureForce {
         accelerations: &mut [Vec<f32>; D],
     ) {
         assert!(masses.len() == densities.len() && densities.len() == pressures.len(), "one value a particle");
-        let form = self.form;
-        let stress = |(pressure, density): (&f32, &f32)| match form {
-            PressureForm::Averaged => *pressure,
-            PressureForm::Balanced => pressure / (density * density),
-        };
-        let weight = |(mass, density): (&f32, &f32)| match form {
-            PressureForm::Averaged => mass / density,
-            PressureForm::Balanced => *mass,
-        };
-        pressures.par_iter().zip(densities).with_min_len(AT_ONCE).map(stress).collect_into_vec(&mut self.stress);
-        masses.par_iter().zip(densities).with_min_len(AT_ONCE).map(weight).collect_into_vec(&mut self.weight);
-        let fields = [self.stress.as_slice(), self.weight.as_slice()];
-        let (support, results) = (cells.support_radius(), accelerations.each_mut());
-        match self.kernel {
-            KernelShape::Poly6 => cells.sum(&PressureTerm(Poly6::<D>::new(support)), fields, results),
-            KernelShape::Spiky => cells.sum(&PressureTerm(Spiky::<D>::new(support)), fields, results),
-            KernelShape::CubicSpline => cells.sum(&PressureTerm(CubicSpline::<D>::new(support)), fields, results),
-        }
+        let volume = |(mass, density): (&f32, &f32)| mass / density;
+        masses.par_iter().zip(densities).with_min_len(AT_ONCE).map(volume).collect_into_vec(&mut self.volume);
+        let fields = [pressures, self.volume.as_slice()];
+        let results = accelerations.each_mut();
+        with_kernel!(self.kernel, cells.support_radius(), D, |kernel| {
+            cells.sum(&PressureTerm(kernel), fields, results);
+        });
         for component in accelerations {
-            component.par_iter_mut().zip(densities).with_min_len(AT_ONCE).for_each(|(value, density)| match form {
-                PressureForm::Averaged => *value *= -0.5 / density,
-                PressureForm::Balanced => *value = -*value,
+            component.par_iter_mut().zip(densities).with_min_len(AT_ONCE).for_each(|(value, density)| {
+                *value *= -0.5 / density;
             });
         }
     }

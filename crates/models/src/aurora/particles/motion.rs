@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{AuroraParticles, field::Field};
 use crate::{
     aurora::{AuroraParameters, RepulsionKernel, shapes::FRAME_S},
-    sph::{Cells, KernelShape, PressureForce, PressureForm, StateEquation, densities},
+    sph::{Cells, KernelShape, PressureForce, StateEquation, densities},
 };
 
 /// Gas constant k at a repulsion of 1, cells^2 per frame^2.
@@ -47,7 +47,7 @@ impl Repulsion {
         let cell = parameters.cell_km();
         Self {
             cells: Cells::new(cell as f32),
-            force: PressureForce::new(force_kernel, PressureForm::Averaged),
+            force: PressureForce::new(force_kernel),
             density_kernel,
             stiffness: (particles.repulsion * STIFFNESS * cell * cell / (FRAME_S * FRAME_S)) as f32,
             neighbours: particles.neighbours,

@@ -47,6 +47,8 @@ pub(crate) struct Detail {
     /// Exponent that keeps the mean in spite of that width.
     keep: f32,
     amount: f32,
+    /// Size of a cell of the noise, pixels.
+    pub(crate) cell_pixels: f32,
 }
 
 /// Burning gas at sixteen places.
@@ -104,6 +106,7 @@ impl Detail {
             sharpness: (1.0 / softness) as f32,
             keep: (1.0 / (1.0 + softness * softness).sqrt()) as f32,
             amount: look.detail as f32,
+            cell_pixels: (size * scale.pixels_per_metre) as f32,
         })
     }
 
@@ -133,9 +136,9 @@ impl Detail {
         most * self.per_depth < LITTLE
     }
 
-    /// What burns at sixteen places of the noise, where the smooth optical depth is `tau`.
+    /// What burns at sixteen places of the noise, where the smooth optical depth is `tau` and so much of the detail is `shown`.
     #[inline(always)]
-    pub(crate) fn burning(&self, places: &[[f32; LANES]; 3], tau: &[f32; LANES]) -> Burning {
+    pub(crate) fn burning(&self, places: &[[f32; LANES]; 3], tau: &[f32; LANES], shown: &[f32; LANES]) -> Burning {
         let mut limit = [0.0; LANES];
         let mut share = [0.0; LANES];
         for lane in 0..LANES {
@@ -157,9 +160,10 @@ impl Detail {
         let each = 1.0 / self.moments as f32;
         let mut burning = Burning { depth: [1.0; LANES], heat: [1.0; LANES] };
         for lane in 0..LANES {
-            burning.depth[lane] = (burns[lane] * each * share[lane] - 1.0).mul_add(self.amount, 1.0);
+            let amount = self.amount * shown[lane];
+            burning.depth[lane] = (burns[lane] * each * share[lane] - 1.0).mul_add(amount, 1.0);
             let warm = (mean[lane] * each * 0.5).clamp(-1.5, 1.5);
-            burning.heat[lane] = (HEAT * self.amount).mul_add(warm, 1.0);
+            burning.heat[lane] = (HEAT * amount).mul_add(warm, 1.0);
         }
         burning
     }

@@ -2,7 +2,7 @@
 
 use bansho_base::{
     color,
-    math::{self, DVec2, DVec3},
+    math::{self, DVec2, DVec3, Vec3},
     random::Key,
 };
 
@@ -26,8 +26,38 @@ pub struct Gas<'a> {
     pub size: DVec2,
     /// Key of the flame's random numbers.
     pub key: Key,
+    /// What becomes of particles that are soon removed.
+    pub ending: Ending,
     /// Memory to draw with, from frame to frame.
     pub memory: &'a Memory,
+}
+
+/// How particles leave the picture before they are removed: nothing pops.
+#[derive(Clone, Copy, Debug)]
+pub struct Ending {
+    /// For how long a particle fades, s.
+    pub seconds: f32,
+    /// Corners of the box that gas may fill, from the particles' origin, m.
+    pub domain: [Vec3; 2],
+}
+
+impl Ending {
+    /// Nothing ends.
+    pub const NEVER: Self = Self { seconds: f32::MIN_POSITIVE, domain: [Vec3::MIN, Vec3::MAX] };
+
+    /// How much of a particle is left at `place`, which moves at `velocity` and has `seconds` to live.
+    #[inline(always)]
+    pub(crate) fn share(&self, place: Vec3, velocity: Vec3, seconds: f32) -> f32 {
+        let [low, high] = self.domain;
+        let ahead = place + velocity * self.seconds;
+        if seconds >= self.seconds && ahead.cmpge(low).all() && ahead.cmple(high).all() {
+            return 1.0;
+        }
+        // The time until the first side toward which it moves.
+        let way = Vec3::select(velocity.cmplt(Vec3::ZERO), place - low, high - place).max(Vec3::ZERO);
+        let until = (way / velocity.abs().max(Vec3::splat(f32::MIN_POSITIVE))).min_element();
+        (until.min(seconds) / self.seconds).clamp(0.0, 1.0)
+    }
 }
 
 /// Absorption coefficient of soot for visible light, 1/m, per volume fraction: about `4.9 / lambda` (Dalzell & Sarofim 1969), for
@@ -58,11 +88,14 @@ impl Gas<'_> {
         self.particles.origin + DVec3::new(coordinate(0), coordinate(1), coordinate(2))
     }
 
-    /// The volume m/rho that a particle stands for, m^3.
+    /// The volume m/rho that a particle stands for, m^3; it fades before it is removed.
     #[inline(always)]
     pub(crate) fn volume(&self, index: usize) -> f64 {
-        let density = f64::from(self.particles.density[index]);
-        if density > 0.0 { f64::from(self.particles.mass[index]) / density } else { 0.0 }
+        let Particles { position, velocity, density, mass, life, age, .. } = self.particles;
+        let [place, velocity] = [position, velocity].map(|[x, y, z]| Vec3::new(x[index], y[index], z[index]));
+        let left = self.ending.share(place, velocity, life[index] - age[index]);
+        let density = f64::from(density[index]);
+        if density > 0.0 { f64::from(left * mass[index]) / density } else { 0.0 }
     }
 
     /// Absorption coefficient of a particle's soot, 1/m.

@@ -9,8 +9,8 @@ use super::{
     spline,
 };
 
-/// Cells around what is covered that interpolation and the filter before it look at: two and two.
-const MARGIN: i32 = 4;
+/// Cells around what is covered that are looked at: two by interpolation, one by differences, two by the filter before them.
+const MARGIN: i32 = 5;
 /// The same where coarser grids are added, each of which is looked at as far beyond the finer one.
 const NESTED_MARGIN: i32 = 7;
 

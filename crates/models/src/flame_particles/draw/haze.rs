@@ -156,3 +156,28 @@ impl<'a> Paths<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Refractive index of air at many temperatures (Ciddor 1996).
+    const REFERENCE: &str = include_str!("../data/air_index.csv");
+
+    #[test]
+    fn refractivity_is_that_of_air_at_every_temperature() {
+        let rows: Vec<Vec<f64>> = REFERENCE
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').map(|value| value.parse().unwrap()).collect())
+            .collect();
+        assert_eq!(rows.len(), 16);
+        for row in rows {
+            // The sodium line, and green light, of which eyes see most.
+            for (column, allowed) in [(2, 2e-3), (6, 5e-3)] {
+                let off = refractivity(row[0]) / row[column] - 1.0;
+                assert!(off.abs() < allowed, "{off} off at {} K", row[0]);
+            }
+        }
+    }
+}

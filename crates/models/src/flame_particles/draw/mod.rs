@@ -23,9 +23,10 @@ mod splat;
 mod spline;
 mod sprite;
 mod squares;
+mod strain;
 mod survey;
 
-pub use gas::{Gas, soot_absorption};
+pub use gas::{Ending, Gas, soot_absorption};
 pub use kernel::{line_gradient, line_integral};
 pub use light::luminous;
 pub use look::{GasLightParameters, LookParameters, SpriteStyle};

@@ -31,6 +31,7 @@ use super::{
     spline,
     sprite::{Kind, Seen, seen},
     squares::Squares,
+    strain::Strain,
     survey::{Survey, shows},
 };
 
@@ -64,7 +65,7 @@ struct Sums<'a> {
     extents: Extents,
     weights: Vec<[f32; 4]>,
     columns: Vec<(usize, usize)>,
-    detail: Option<Detail>,
+    detail: Option<(Detail, Strain)>,
     scattered: Vec<[f32; 3]>,
     motion: OnceLock<Option<Motion<'a>>>,
     temperatures: [f32; 2],
@@ -139,7 +140,7 @@ impl<'a> PreparedGas<'a> {
             grid: &sums.grid,
             camera: &self.view.camera,
             origin: self.gas.particles.origin,
-            detail: sums.detail.as_ref(),
+            detail: sums.detail.as_ref().map(|(detail, strain)| (detail, strain)),
             hides_itself: self.look.sprite == SpriteStyle::Integral,
             blue: blue_flame::colour(),
             scattered: &sums.scattered,
@@ -176,6 +177,11 @@ fn sums<'a>(
         gas.memory,
     )?;
     let extents = Extents::new(&grid, layers.count);
+    let strained = |detail: Detail| {
+        let strain = Strain::new(&grid, &extents, layers.count, detail.cell_pixels);
+        (detail, strain)
+    };
+    let detail = detail.map(strained);
     let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.centre(layer), surroundings));
     Some(Sums {
         extents,

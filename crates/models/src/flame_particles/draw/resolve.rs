@@ -10,7 +10,8 @@ use bansho_base::{
 
 use super::{
     detail::{Burning, Detail},
-    grid::Grid,
+    grid::{Grid, weigh},
+    strain::{self, Strain},
 };
 use crate::lanes::LANES;
 
@@ -37,7 +38,7 @@ pub(crate) struct Resolve<'a> {
     pub(crate) camera: &'a Camera,
     /// Where the places of detail count from, m.
     pub(crate) origin: DVec3,
-    pub(crate) detail: Option<&'a Detail>,
+    pub(crate) detail: Option<(&'a Detail, &'a Strain)>,
     /// Whether light is that of soot that hides itself, `B (1 - exp(-tau))`, or simply the sum (the paper).
     pub(crate) hides_itself: bool,
     /// ACEScg of luminance 1.
@@ -60,8 +61,13 @@ pub(crate) struct Layer {
     pub(crate) thickness: f64,
 }
 
-/// The sums of all layers along a row of pixels, still in cells.
-pub(crate) type Row = Vec<f32>;
+/// A row of pixels, still in cells.
+pub(crate) struct Row {
+    /// The sums of all layers.
+    sums: Vec<f32>,
+    /// The strain of the layer that was filled last.
+    strain: Vec<f32>,
+}
 
 /// The gas of one layer at sixteen pixels.
 pub(crate) struct Sums {
@@ -71,7 +77,7 @@ pub(crate) struct Sums {
 impl Resolve<'_> {
     /// Scratch for [`fill`](Self::fill).
     pub(crate) fn row(&self) -> Row {
-        vec![0.0; self.grid.row_length()]
+        Row { sums: vec![0.0; self.grid.row_length()], strain: vec![0.0; self.grid.cells.columns] }
     }
 
     /// The sums of a layer along row `y` of the picture, and the pixels that hold anything.
@@ -87,8 +93,12 @@ impl Resolve<'_> {
         let weights = &self.weights[phase];
         for column in from..to {
             let start = column * depth + layer * PLANES;
-            let Some(sums) = row[start..].first_chunk_mut::<PLANES>() else { continue };
+            let Some(sums) = row.sums[start..].first_chunk_mut::<PLANES>() else { continue };
             *sums = weighted(rows, [start; 4], weights);
+        }
+        if let Some((_, strain)) = self.detail {
+            let rows = [-1, 0, 1, 2].map(|by| &strain.row(cell + by, layer)[from..to]);
+            weigh(&mut row.strain[from..to], rows, weights);
         }
         let pixel = |column: i64| ((column + i64::from(cells.first[0])) * cells.size as i64).max(0) as usize;
         Some([pixel(i64::from(first) - 2), pixel(i64::from(last) + 3)])
@@ -96,13 +106,13 @@ impl Resolve<'_> {
 
     /// The gas at sixteen pixels; `None` where there is none.
     #[inline(always)]
-    pub(crate) fn sums(&self, row: &[f32], layer: usize, x: usize) -> Option<Sums> {
+    pub(crate) fn sums(&self, row: &Row, layer: usize, x: usize) -> Option<Sums> {
         let mut planes = [[0.0; LANES]; PLANES];
         for lane in 0..LANES {
             let (column, phase) = self.columns[(x + lane).min(self.columns.len() - 1)];
             let start = column * self.grid.depth + layer * PLANES;
             let starts = [0, 1, 2, 3].map(|k| start + k * self.grid.depth);
-            let sums = weighted([row; 4], starts, &self.weights[phase]);
+            let sums = weighted([&row.sums; 4], starts, &self.weights[phase]);
             for plane in 0..PLANES {
                 planes[plane][lane] = sums[plane];
             }
@@ -123,6 +133,22 @@ impl Resolve<'_> {
             }
         }
         Some(Sums { planes })
+    }
+
+    /// How much of its detail the gas at sixteen pixels shows.
+    #[inline(always)]
+    fn shown(&self, row: &Row, x: usize) -> Batch {
+        let mut strain = [0.0; LANES];
+        for lane in 0..LANES {
+            let (column, phase) = self.columns[(x + lane).min(self.columns.len() - 1)];
+            let weights = &self.weights[phase];
+            if let Some(four) = row.strain[column..].first_chunk::<4>() {
+                for k in 0..4 {
+                    strain[lane] = weights[k].mul_add(four[k], strain[lane]);
+                }
+            }
+        }
+        strain::shown(&strain)
     }
 
     /// Places in the detail of sixteen pixels.
@@ -155,14 +181,14 @@ impl Resolve<'_> {
             let from = first.max(rect.x) / LANES * LANES;
             for x in (from..last.min(rect.right())).step_by(LANES) {
                 if let Some(sums) = self.sums(row, layer.index, x) {
-                    self.draw_batch(&sums, layer, [x, y], rect, strip);
+                    self.draw_batch(&sums, row, layer, [x, y], rect, strip);
                 }
             }
         }
     }
 
     #[inline(always)]
-    fn draw_batch(&self, sums: &Sums, layer: &Layer, [x, y]: [usize; 2], rect: Rect, strip: &mut Strip) {
+    fn draw_batch(&self, sums: &Sums, row: &Row, layer: &Layer, [x, y]: [usize; 2], rect: Rect, strip: &mut Strip) {
         let from = x.max(rect.x);
         let to = (x + LANES).min(rect.right());
         if from >= to {
@@ -176,7 +202,7 @@ impl Resolve<'_> {
                 shown[pixel - x] = (ahead + 0.5).clamp(0.0, 1.0) as f32;
             }
         }
-        let mut light = self.light(sums, layer, x, y);
+        let mut light = self.light(sums, row, layer, x, y);
         for plane in &mut light.planes {
             for lane in 0..LANES {
                 plane[lane] *= shown[lane];
@@ -195,14 +221,14 @@ impl Resolve<'_> {
 
     /// Red, green, blue and opacity of sixteen pixels of a layer.
     #[inline(always)]
-    fn light(&self, sums: &Sums, layer: &Layer, x: usize, y: usize) -> Light {
+    fn light(&self, sums: &Sums, row: &Row, layer: &Layer, x: usize, y: usize) -> Light {
         let [tau, glow, heat, ..] = &sums.planes;
         let (mut depth_factor, mut heat_factor) = ([1.0; LANES], [1.0; LANES]);
-        if let Some(detail) = self.detail
+        if let Some((detail, _)) = self.detail
             && !detail.is_lost(tau)
             && let Some(places) = self.places(sums, detail, layer, x, y)
         {
-            Burning { depth: depth_factor, heat: heat_factor } = detail.burning(&places, tau);
+            Burning { depth: depth_factor, heat: heat_factor } = detail.burning(&places, tau, &self.shown(row, x));
         }
         let table = color::black_body();
         let mut planes = [[0.0; LANES]; 4];
@@ -281,6 +307,12 @@ impl Extents {
         };
         let rows = (0..grid.cells.rows * layers).into_par_iter().with_min_len(64).map(extent).collect();
         Self { layers, rows }
+    }
+
+    /// First and last column of a row of cells that hold anything.
+    pub(crate) fn of(&self, row: usize, layer: usize) -> Option<[u32; 2]> {
+        let [first, last] = self.rows[row * self.layers + layer];
+        (first <= last).then_some([first, last])
     }
 
     /// First and last column that interpolation in the rows around `cell` can see.

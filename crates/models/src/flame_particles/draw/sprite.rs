@@ -205,7 +205,10 @@ mod tests {
         random::{Key, Purpose},
     };
 
-    use super::{super::memory::Memory, *};
+    use super::{
+        super::{gas::Ending, memory::Memory},
+        *,
+    };
     use crate::flame_particles::{Particle, Particles};
 
     struct Everything;
@@ -258,6 +261,7 @@ mod tests {
             base: DVec3::ZERO,
             size: DVec2::ONE,
             key: Key::new(1, "flame"),
+            ending: Ending::NEVER,
             memory: &Memory::default(),
         };
         let (eye, mut one_by_one) = (Eye::new(&view), Vec::new());

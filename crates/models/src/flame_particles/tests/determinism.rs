@@ -1,9 +1,19 @@
 //! The same state whatever the threads, and from any snapshot.
 
-use bansho_base::phenomenon::SnapshotError;
+use bansho_base::{
+    animation::Animated,
+    camera::CameraParameters,
+    canvas::{DepthInterval, Shutter, Strip, View},
+    image::Rect,
+    observer::Unobserved,
+    phenomenon::{Prepared, SnapshotError},
+};
 
 use super::*;
-use crate::flame_particles::snapshot;
+use crate::flame_particles::{
+    draw::{LookParameters, Memory, PreparedGas},
+    snapshot,
+};
 
 fn small() -> FlameParticlesParameters {
     FlameParticlesParameters { particles: 900, ..Default::default() }
@@ -11,15 +21,33 @@ fn small() -> FlameParticlesParameters {
 
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
+    // So many that every part of a step, and of the drawing, is split into several tasks.
+    let parameters = FlameParticlesParameters { particles: 30_000, ..Default::default() };
+    let look = LookParameters::default();
+    let camera = CameraParameters { position: Animated::from([0.0, 0.4, 3.0]), ..CameraParameters::default() };
+    let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.04, [256, 192], 0);
+    let (wind, memory) = (Wind::new(WindParameters::default(), 1, None), Memory::default());
     let state = |threads| {
-        let mut simulation = simulation(&small());
+        let mut simulation = simulation(&parameters);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| World::default().run_steps(&mut simulation, -60, 0, |_, _| {}));
-        snapshot::write(&simulation.particles)
+        pool.install(|| {
+            World::default().run_steps(&mut simulation, -40, 0, |_, _| {});
+            let gas = gas(&simulation, &memory);
+            let around = Surroundings::of_wind(&wind);
+            let prepared = PreparedGas::new(gas, &look, &view, &around, &Unobserved).unwrap();
+            let mut strip = Strip::default();
+            strip.reset(Rect::of_size(256, 192), None, 0);
+            prepared.draw(&DepthInterval::ALL, &mut strip);
+            (simulation.particles.len(), snapshot::write(&simulation.particles), strip.radiance)
+        })
     };
     let one = state(1);
-    assert!(one.len() > 10_000);
-    assert!(one == state(2) && one == state(3));
+    assert!(one.0 > 10_000 && one.2[0].iter().any(|value| *value > 0.0), "{} particles", one.0);
+    for threads in [2, 3] {
+        let more = state(threads);
+        assert!(one.1 == more.1, "{threads} threads move it otherwise");
+        assert!(one.2 == more.2, "{threads} threads draw it otherwise");
+    }
 }
 
 #[test]

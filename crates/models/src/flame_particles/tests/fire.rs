@@ -1,17 +1,9 @@
 //! What fires do: they are as high as Heskestad says, puff as Cetegen and Ahmed say, narrow upward, and lean with the wind.
 
-use bansho_base::{
-    animation::Animated,
-    curve::Interpolation,
-    math::{self, DVec2, DVec3},
-};
+use bansho_base::{animation::Animated, curve::Interpolation, math};
 
 use super::*;
-use crate::flame_particles::{
-    draw::{Gas, LookParameters, Memory},
-    heskestad,
-    parameters::BurnerParameters,
-};
+use crate::flame_particles::{draw::LookParameters, heskestad, parameters::BurnerParameters};
 
 fn fire(heat_release_kw: f64, diameter: f64) -> FlameParticlesParameters {
     FlameParticlesParameters {
@@ -134,16 +126,7 @@ fn gas_is_born_where_a_moving_burner_is_and_stays_behind_it() {
 /// Light that gas of a kind sends, and that times its height.
 fn light_by_height(simulation: &Simulation, of: impl Fn(&Gas, usize) -> f64) -> [f64; 2] {
     let memory = Memory::default();
-    let gas = Gas {
-        particles: &simulation.particles,
-        time: 0.0,
-        air_temperature_k: Air::default().temperature_k,
-        detail_speed: 1.0,
-        base: DVec3::ZERO,
-        size: DVec2::ONE,
-        key: Key::new(1, "flame"),
-        memory: &memory,
-    };
+    let gas = gas(simulation, &memory);
     let mut sums = [0.0; 2];
     for index in 0..gas.particles.len() {
         let light = of(&gas, index) * gas.volume(index);

@@ -8,13 +8,18 @@ mod random;
 use bansho_base::{
     air::Air,
     assets::MemoryAssets,
-    math::Vec3,
+    math::{DVec2, DVec3, Vec3},
     random::Key,
     surroundings::{Occluder, Publication, Surroundings},
     wind::{Wind, WindParameters},
 };
 
-use super::{design::Design, parameters::FlameParticlesParameters, simulation::Simulation};
+use super::{
+    design::Design,
+    draw::{Ending, Gas, Memory},
+    parameters::FlameParticlesParameters,
+    simulation::Simulation,
+};
 
 fn simulation(parameters: &FlameParticlesParameters) -> Simulation {
     let design = Design::new(parameters, None, &MemoryAssets::default()).unwrap();
@@ -56,4 +61,19 @@ fn lit(simulation: &Simulation) -> Vec<usize> {
     let particles = &simulation.particles;
     let shines = |index: &usize| particles.soots()[*index] > 3e-7 && particles.temperatures()[*index] > 900.0;
     (0..particles.len()).filter(shines).collect()
+}
+
+/// The gas as the drawing sees it.
+fn gas<'a>(simulation: &'a Simulation, memory: &'a Memory) -> Gas<'a> {
+    Gas {
+        particles: &simulation.particles,
+        time: 0.0,
+        air_temperature_k: Air::default().temperature_k,
+        detail_speed: 1.0,
+        base: DVec3::ZERO,
+        size: DVec2::ONE,
+        key: Key::new(1, "flame"),
+        ending: Ending::NEVER,
+        memory,
+    }
 }

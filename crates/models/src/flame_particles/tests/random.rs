@@ -52,8 +52,6 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
     }
     let most_soot = parameters.life.soot_ppm as f32 * 1e-6;
     for index in 0..particles.len() {
-        let speed = Vec3::from(particles.velocities().map(|values| values[index])).length();
-        assert!(speed <= 1.001 * GREATEST_SPEED, "seed {seed}: {speed} m/s");
         let place = place(simulation, index);
         assert!(place.cmpge(low).all() && place.cmple(high).all(), "seed {seed}: {place} is outside the domain");
         let kelvin = f64::from(particles.temperature[index]);
@@ -77,6 +75,13 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
     (rise * (1.0 + motion.turbulence + motion.puffing) + blown * motion.wind_gain) as f32
 }
 
+/// Speed of the fastest particle, m/s.
+fn greatest_speed(simulation: &Simulation) -> f32 {
+    let particles = &simulation.particles;
+    let speed = |index: usize| Vec3::from(particles.velocities().map(|values| values[index])).length();
+    (0..particles.len()).map(speed).fold(0.0, f32::max)
+}
+
 /// Mean of the squared speeds, m^2/s^2.
 fn mean_square_speed(simulation: &Simulation) -> f32 {
     let particles = &simulation.particles;
@@ -96,8 +101,11 @@ fn no_valid_flame_blows_up() {
         world.run_steps(&mut simulation, first, first + STEPS, |simulation, _| {
             check(seed, simulation, &parameters);
             fastest = fastest.max(mean_square_speed(simulation).sqrt());
+            // Gas that had blown up would be held at the greatest speed, whatever drives it.
+            let greatest = greatest_speed(simulation);
+            let held = greatest > 0.99 * GREATEST_SPEED;
+            assert!(!held || 4.0 * driven > GREATEST_SPEED, "seed {seed}: {greatest} m/s, driven by {driven} m/s");
         });
-        // Gas that had blown up would be held at the greatest speed, whatever drives it.
         assert!(fastest < 1.6 * driven + 0.1, "seed {seed}: the gas moves at {fastest} m/s, driven by {driven} m/s");
     }
 }
