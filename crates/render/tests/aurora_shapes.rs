@@ -99,8 +99,8 @@ fn the_fold_of_scene_1_leaves_a_gap() {
     assert!(last.distance(DVec2::new(95.0, -213.0)).is_none_or(|distance| distance > 45.0));
 }
 
-/// A scene of the thesis with a twentieth of its particles, its last shape as it is after `frames`, and the share of the particles, and of their
-/// power, within so many km of places.
+/// Of a scene of the thesis, with a twentieth of its particles, after so many frames: the share of the particles, and of their power, within
+/// so many km of places.
 fn shares_within(scene: usize, frames: usize, places: &[([f64; 2], f64)]) -> Vec<[f64; 2]> {
     let text = SCENES[scene - 1];
     assert!(text.contains("count = 120_000"));

@@ -37,6 +37,12 @@ fn draw(text: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions, dep
     look_at(text, size, frames, options, |frame| bansho::display(frame, &View::DISPLAY, depth))
 }
 
+/// Mean luminance of the scene's light in each of those frames, before it is shown: 1.0 is display white.
+pub(crate) fn mean_luminances(text: &str, size: [usize; 2], frames: &[i64]) -> Vec<f64> {
+    let pixels = (size[0] * size[1]) as f64;
+    block_luminances(text, size, 1, frames).into_iter().map(|pictures| pictures.iter().sum::<f64>() / pixels).collect()
+}
+
 /// Mean luminance of the scene's light in blocks of `side` pixels, row by row, in each of those frames, before it is shown: 1.0 is display
 /// white.
 pub(crate) fn block_luminances(text: &str, size: [usize; 2], side: usize, frames: &[i64]) -> Vec<Vec<f64>> {

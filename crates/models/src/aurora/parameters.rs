@@ -62,7 +62,8 @@ bansho_base::choice! {
     pub enum RepulsionKernel {
         /// Cubic spline, eqs. (2.17) and (2.18): lets particles come close to each other, so that their own pattern stays.
         Spline = "spline",
-        /// Poly6 for the density, spiky for the force, eqs. (2.12) and (2.16): parts close particles, and evens their pattern out. As light is drawn, spread as far as neighbours are, both look nearly alike.
+        /// Poly6 for the density, spiky for the force, eqs. (2.12) and (2.16): parts close particles, and evens their pattern out. As
+        /// light is drawn, spread as far as neighbours are, both look nearly alike.
         Poly6Spiky = "poly6_spiky",
     }
 }

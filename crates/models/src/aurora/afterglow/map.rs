@@ -76,8 +76,8 @@ impl Tile {
 ///
 /// The power of a cell follows that of the particles in it, `dP/dt = (P_particles - P) / lifetime`: so a steady sheet shows its own
 /// power, and one that is gone fades. Excited atoms do not move here: how far they diffuse is a blur of the light
-/// ([`Column::spread_km`](crate::aurora::light::emission::Column)). The lifetime is that of the column of the energy at each place, by tiles of
-/// eight by eight cells: soft electrons shine high up, where it is long.
+/// ([`Column::spread_km`](crate::aurora::light::emission::Column)). The lifetime is that of the column of the energy at
+/// each place, by tiles of eight by eight cells: soft electrons shine high up, where it is long.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GlowMap {
     cell_km: f64,
@@ -228,8 +228,8 @@ impl GlowMap {
         fed
     }
 
-    /// Adds to each tile its share of the particles' power, one after the other, so that sums do not depend on threads. A new tile's is that of
-    /// the first particle in it.
+    /// Adds to each tile its share of the particles' power, one after the other, so that sums do not depend on threads. A new tile's is
+    /// that of the first particle in it.
     fn feed(&mut self, particles: &AuroraParticles, keeping: &Keeping, fed: &mut Vec<f32>) {
         let [xs, zs] = &particles.positions;
         let places = xs.par_iter().zip(zs).with_min_len(TASK).map(|(x, z)| self.locate([*x, *z]));

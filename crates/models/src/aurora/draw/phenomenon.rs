@@ -72,7 +72,8 @@ fn close_loop(parameters: &mut AuroraParameters, turn: f64) -> Result<f64, Shape
     Ok(dissolve)
 }
 
-/// Luminance of the brightest column among control points with these factors of flux and energy, cd/m^2: soft electrons at the greatest flux.
+/// Luminance of the brightest column among control points with these factors of flux and energy, cd/m^2: the softest electrons at the
+/// greatest flux.
 fn brightest(parameters: &AuroraParameters, emission: &Emission, factors: &[[f64; 2]]) -> f64 {
     let (flux, energy_ev) = (parameters.flux_mw_per_m2.bounds()[1], parameters.energy_ev.bounds()[0]);
     let luminance = |[flux_factor, energy_factor]: &[f64; 2]| {

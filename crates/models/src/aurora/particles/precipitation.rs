@@ -76,8 +76,8 @@ impl Precipitation {
     /// Gives every particle its share of the power.
     ///
     /// All together have the power of the sheets, and those along a stretch that of the stretch, however many they are: no
-    /// birth, death, split or merge can make the aurora flicker, and the flux along it is the one that was drawn. Within a stretch each stands
-    /// for as much of the sheet's length as there are few of them, and has the rays' pattern.
+    /// birth, death, split or merge can make the aurora flicker, and the flux along it is the one that was drawn. Within a stretch each
+    /// stands for the more of the sheet's length the fewer of them there are, and has the rays' pattern.
     pub(super) fn share_out(&self, particles: &mut AuroraParticles, (course, rays): (&Course, &RayTable), time: f64) {
         let sheets = course.shape.sheets.len();
         let weigh = |part| self.weigh(part, course, (rays, time));
