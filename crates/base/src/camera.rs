@@ -21,7 +21,7 @@ const EYE_HEIGHT: f64 = 1.7;
 
 crate::parameters! {
     /// Where the picture is taken from. A dome looks at `target` with the centre of its circle. Without `position` and `target`, a scene of
-    /// auroras alone is seen from the ground, looking up to the north; a dome's middle is then the zenith.
+    /// auroras alone, without obstacles and plate, is seen from the ground, looking up to the north; a dome's middle is then the zenith.
     pub struct CameraParameters {
         /// Where the camera stands.
         position: Animated<[f64; 3]> = Animated::from([0.0, 1.2, 4.0]), unit("m");

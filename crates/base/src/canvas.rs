@@ -5,11 +5,12 @@ mod aov;
 use std::sync::Arc;
 
 use fearless_simd::{Simd, f32x16, prelude::*};
+use glam::DVec2;
 
 use crate::{
     camera::{Camera, CameraParameters},
     image::Rect,
-    math::Fused,
+    math::{self, Fused},
 };
 
 pub use aov::{AovDescriptor, AovPlane, AovRule};
@@ -63,6 +64,10 @@ impl DepthInterval {
         self.near < other.far && other.near < self.far
     }
 }
+
+/// Motion of the picture while the shutter is open that one instant stands for, pixels, and the most instants.
+const PIXELS_PER_INSTANT: f64 = 1.0;
+const MOST_INSTANTS: f64 = 16.0;
 
 /// One exposure seen by one camera.
 #[derive(Clone, Debug)]
@@ -138,8 +143,47 @@ impl View {
         let mirrored = self.clone().and_other_turn(|view| {
             view.camera = view.camera.mirrored(height);
             view.mirror = Some(height);
+            view.measured = false;
         });
         mirrored.through(Rect::of_size(self.size[0], self.size[1]))
+    }
+
+    /// How far the sky moves in the picture while the shutter is open, at most, pixels.
+    pub fn motion_pixels(&self) -> f64 {
+        // In the corners and the middle, and where a dome's circle comes near the edges: its corners see nothing.
+        const PLACES: [[f64; 2]; 9] = [
+            [0.0, 0.0],
+            [1.0, 0.0],
+            [0.0, 1.0],
+            [1.0, 1.0],
+            [0.5, 0.5],
+            [0.5, 0.02],
+            [0.02, 0.5],
+            [0.98, 0.5],
+            [0.5, 0.98],
+        ];
+        let [open, close] = [self.shutter.open, self.shutter.close].map(|t| self.camera_at(t));
+        let moved = |[x, y]: [f64; 2]| {
+            let place = |camera: &Camera| camera.direction(DVec2::new(x * camera.size[0], y * camera.size[1]));
+            let pair = place(&open).zip(place(&close));
+            pair.map_or(0.0, |(a, b)| math::acos(a.normalize().dot(b.normalize()).clamp(-1.0, 1.0)) * open.focal_pixels)
+        };
+        PLACES.map(moved).into_iter().fold(0.0, f64::max)
+    }
+
+    /// Cameras at as many instants, each for an equal part of the exposure, as the motion of what is far away needs in the picture: one
+    /// where it stands still.
+    pub fn cameras(&self) -> Vec<Camera> {
+        self.cameras_at_most(MOST_INSTANTS)
+    }
+
+    /// The same for what is small and sharp, which needs more of them.
+    pub fn cameras_at_most(&self, most: f64) -> Vec<Camera> {
+        let count = (self.motion_pixels() / PIXELS_PER_INSTANT).ceil().clamp(1.0, most) as usize;
+        if count == 1 {
+            return vec![self.camera];
+        }
+        (0..count).map(|instant| self.camera_at(self.shutter.instant(instant, count))).collect()
     }
 
     /// The camera at time `t`.

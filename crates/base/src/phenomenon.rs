@@ -64,6 +64,15 @@ pub enum Remark {
     /// It only shows the light of others, and there is none.
     #[error("nothing lights it, so it is drawn black; a [[light]], a [sky] or a fire would")]
     Unlit,
+    /// Sheets of an aurora meet on their way from shape to shape.
+    #[error(
+        "its sheets pass through each other on the way to shape {shape} (counted from 1); another shape between, `link`, or sheets in \
+         another order would keep them apart"
+    )]
+    Crossing {
+        /// The shape on whose way they first do, counted from 1.
+        shape: usize,
+    },
 }
 
 /// One phenomenon of a scene, ready to be drawn at any time (closed form) or stepped there.
@@ -88,6 +97,12 @@ pub trait Phenomenon: Send + Sync {
     /// Steps from `time` to one step later. Closed forms do nothing.
     fn step(&mut self, _time: f64, _surroundings: &Surroundings) {}
 
+    /// Time of the state that an exposure is drawn from: it is stepped until then. What happens after that while the shutter is open,
+    /// it finds out itself.
+    fn drawn_from(&self, shutter: Shutter) -> f64 {
+        shutter.middle()
+    }
+
     /// Its state; empty for a closed form.
     fn snapshot(&self) -> Vec<u8> {
         Vec::new()
@@ -101,7 +116,7 @@ pub trait Phenomenon: Send + Sync {
         Err(SnapshotError::NoState)
     }
 
-    /// Its particles at time `t`, within a step of its state; `None` where it has none.
+    /// Its particles at time `t`, while the shutter is open; `None` where it has none.
     fn particles(&self, _t: f64) -> Option<PointCloud> {
         None
     }

@@ -41,6 +41,7 @@ fn run(command: &Command) -> anyhow::Result<()> {
         Command::Flipbook(args) => command::flipbook::run(args),
         Command::Streaks(args) => command::streaks::run(args),
         Command::Simulate(args) => command::simulate::run(args),
+        Command::Calibrate => command::calibrate::run(),
         Command::Studio(args) => command::studio::run(args),
         Command::Completions(args) => command::completions::run(args),
         Command::Man(args) => command::man::run(args),

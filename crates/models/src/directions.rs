@@ -1,11 +1,14 @@
 //! Directions of pixels that follow each other in a row.
 
 use bansho_base::{
-    camera::Camera,
+    camera::{Camera, Lens},
     math::{DVec2, Fused},
 };
 
 use crate::lanes::LANES;
+
+/// Angle, in radians, over which a row of a dome or panorama is taken for straight: its chord lies within an eighth of a pixel of it.
+const MOST_STRAIGHT: f64 = 0.1;
 
 /// What a row of sixteen pixels looks at.
 pub(crate) struct Directions {
@@ -21,8 +24,10 @@ impl Directions {
     pub(crate) fn new(camera: &Camera, x: usize, y: usize) -> Self {
         let at = |x: usize| camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
         let (mut axes, mut seen) = ([[0.0; LANES], [1.0; LANES], [0.0; LANES]], [true; LANES]);
-        if let (Some(first), Some(last)) = (at(x), at(x + LANES)) {
-            // Exact for a perspective lens; elsewhere within a few hundredths of a pixel.
+        let is_straight = camera.lens == Lens::Perspective || LANES as f64 / camera.focal_pixels < MOST_STRAIGHT;
+        let ends = if is_straight { at(x).zip(at(x + LANES)) } else { None };
+        if let Some((first, last)) = ends {
+            // Exact for a perspective lens; elsewhere within an eighth of a pixel, and within a fiftieth where pictures are large.
             let (first, step) = (first.as_vec3().to_array(), ((last - first) / LANES as f64).as_vec3().to_array());
             for axis in 0..3 {
                 for i in 0..LANES {
@@ -56,5 +61,36 @@ impl Directions {
             z[i] *= scale;
         }
         lengths
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{camera::CameraParameters, math::DVec3};
+
+    use super::*;
+
+    #[test]
+    fn every_lens_is_met_within_an_eighth_of_a_pixel() {
+        for lens in [Lens::Perspective, Lens::Fisheye, Lens::Panorama] {
+            for height in [32, 128, 509, 640, 2048] {
+                let size = [if lens == Lens::Panorama { 2 * height } else { height }, height];
+                let camera = CameraParameters { lens, target: [0.0, 60.0, 3.0].into(), ..CameraParameters::default() };
+                let camera = camera.at(0.0, size);
+                let mut worst = 0.0_f64;
+                for (row, column) in (0..40).flat_map(|row| (0..16).map(move |column| (row, column))) {
+                    let (x, y) = (column * size[0] / 16 / LANES * LANES, row * height / 40);
+                    let mut directions = Directions::new(&camera, x, y);
+                    directions.normalize();
+                    let [xs, ys, zs] = directions.axes;
+                    for i in (0..LANES).filter(|i| directions.seen[*i]) {
+                        let exact = camera.direction(DVec2::new((x + i) as f64 + 0.5, y as f64 + 0.5));
+                        let found = DVec3::new(f64::from(xs[i]), f64::from(ys[i]), f64::from(zs[i]));
+                        worst = worst.max(exact.map_or(f64::NAN, |exact| exact.normalize().distance(found)));
+                    }
+                }
+                assert!(worst * camera.focal_pixels < 0.13, "{lens:?} {height}: {}", worst * camera.focal_pixels);
+            }
+        }
     }
 }

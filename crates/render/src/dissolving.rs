@@ -4,7 +4,7 @@ use bansho_base::{
     canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
     image::{Figure, Image, Rect},
     observer::{Cancelled, Observer},
-    phenomenon::{Deflection, Phenomenon, Prepared, SnapshotError, Stepping},
+    phenomenon::{Deflection, Phenomenon, Prepared, Remark, SnapshotError, Stepping},
     point_cloud::PointCloud,
     surroundings::{Publication, Surroundings},
 };
@@ -168,6 +168,10 @@ impl Phenomenon for Dissolving {
         let mut both = shared(present, share);
         both.extend(&shared(self.passing.phenomenon.publish(other), 1.0 - share));
         both
+    }
+
+    fn remark(&self, surroundings: &Surroundings) -> Option<Remark> {
+        self.present.phenomenon.remark(surroundings)
     }
 
     fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval> {

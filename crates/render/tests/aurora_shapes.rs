@@ -8,9 +8,11 @@ use bansho_base::{
     math::DVec2,
     observer::Unobserved,
     parameters::{Parameters, Reader},
+    phenomenon::Remark,
 };
 use bansho_models::aurora::{
     AuroraParameters,
+    particles::AuroraSimulation,
     shapes::{FRAME_S, Neighbourhood, Sequence, Shape},
 };
 use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, Scene, phenomena::KINDS};
@@ -97,6 +99,48 @@ fn the_fold_of_scene_1_leaves_a_gap() {
     assert!(last.distance(DVec2::new(95.0, -213.0)).is_none_or(|distance| distance > 45.0));
 }
 
+/// Of a scene of the thesis, with a twentieth of its particles, after so many frames: the share of the particles, and of their power, within
+/// so many km of places.
+fn shares_within(scene: usize, frames: usize, places: &[([f64; 2], f64)]) -> Vec<[f64; 2]> {
+    let text = SCENES[scene - 1];
+    assert!(text.contains("count = 120_000"));
+    let text = text.replace("count = 120_000", "count = 6000");
+    let parsed = Scene::parse("test.toml", &text, KINDS, &assets()).unwrap_or_else(|error| panic!("{error}"));
+    let aurora = AuroraParameters::read_table(&parsed.instances[0].source.canonical(), &mut Reader::new(), &[]);
+    let mut simulation = AuroraSimulation::new(aurora, sequence_of(&text), "aurora", 1);
+    while simulation.time() < frames as f64 * FRAME_S {
+        simulation.step();
+    }
+    let particles = simulation.particles();
+    let (count, power) = (particles.len() as f64, particles.power_w());
+    let within = |(middle, radius): &([f64; 2], f64)| {
+        let inside = |index: &usize| particles.place(*index).distance(DVec2::from(*middle)) < *radius;
+        let inside: Vec<usize> = (0..particles.len()).filter(inside).collect();
+        let own: f64 = inside.iter().map(|index| f64::from(particles.powers_w[*index])).sum();
+        [inside.len() as f64 / count, own / power]
+    };
+    places.iter().map(within).collect()
+}
+
+/// The thesis shows a black circle within the fold of scene 1, and open bends in scene 2: nothing may be drawn across them.
+#[test]
+fn no_particle_is_in_the_black_circle_and_the_inner_bends() {
+    // Circles as wide as they fit between the limbs, but for L_thr and a cell of the field on each side.
+    for (scene, frames, places) in [
+        (1, 281, vec![([95.0, -213.0], 45.0)]),
+        (2, 140, vec![([52.0, -131.0], 6.5), ([-52.0, -169.0], 6.5)]),
+        (2, 281, vec![([58.0, -130.0], 8.0), ([-58.0, -170.0], 8.0)]),
+    ] {
+        let wide = places.iter().map(|(middle, radius)| (*middle, 2.0 * radius));
+        let shares = shares_within(scene, frames, &[&places[..], &wide.collect::<Vec<_>>()].concat());
+        let (within, around) = shares.split_at(places.len());
+        for ((place, within), around) in places.iter().zip(within).zip(around) {
+            assert!(within.iter().all(|share| *share < 1e-3), "scene {scene}, frame {frames}, {place:?}: {within:?}");
+            assert!(around.iter().all(|share| *share > 1e-2), "scene {scene}, frame {frames}, {place:?}: {around:?}");
+        }
+    }
+}
+
 #[test]
 fn faults_stand_at_their_sheet_and_point() {
     for (text, expected) in [
@@ -162,10 +206,33 @@ fn faults_stand_at_their_sheet_and_point() {
         ("[[aurora.shapes]]\nafter_s = 3\nafter_frames = 3\n", "says both `after_s` and `after_frames`"),
         ("energy_ev = 0\n", "test.toml:3:13: aurora.0.energy_ev: 0 is out of range; allowed: 100 to 100000 eV"),
         ("energy_ev = 1e6\n", "test.toml:3:13: aurora.0.energy_ev: 1000000 is out of range; allowed: 100 to 100000 eV"),
+        (
+            "energy_ev = 10000\n[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90], energy = [[0, 1], [0.5, 1], [1, 20]] }]\n",
+            "test.toml:5:68: aurora.0.shapes.0.sheets.1.energy.2: at 1 of its length sheet 2 has electrons of 200000 eV",
+        ),
+        (
+            "energy_ev = 500\n[[aurora.shapes]]\nsheets = [{ energy = 0.1 }]\n",
+            "sheet 1 has electrons of 50 eV, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV",
+        ),
     ] {
         let shown = fault(text);
         assert!(shown.contains(expected), "{text}\nexpected: {expected}\nshown: {shown}");
     }
+}
+
+#[test]
+fn sheets_that_would_pass_through_each_other_are_told() {
+    let remarks = |link: &str| {
+        let sheets = "sheets = [{ form = \"arc\" }, { form = \"arc\", position_km = [0, 90] }]\n";
+        let text = format!("bansho = 1\n[[aurora]]\n[[aurora.shapes]]\n{sheets}[[aurora.shapes]]\n{sheets}{link}");
+        let assets = Arc::new(assets());
+        let scene = Scene::parse("test.toml", &text, KINDS, assets.as_ref()).unwrap_or_else(|error| panic!("{error}"));
+        Plan::new(scene, &PlanOptions::default(), assets).unwrap().remarks().unwrap()
+    };
+    assert_eq!(remarks(""), []);
+    let told = remarks("link = [{ from = 1, to = 2 }]\n");
+    assert_eq!(told, [("aurora".to_owned(), Remark::Crossing { shape: 2 })]);
+    assert!(told[0].1.to_string().contains("on the way to shape 2 (counted from 1)"), "{}", told[0].1);
 }
 
 #[test]

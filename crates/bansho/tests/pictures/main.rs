@@ -18,7 +18,7 @@ use looks::golden;
 const SMALL: [usize; 2] = [256, 144];
 
 /// Scenes with the frame that is compared: of an aurora an early one, since it has settled before the first.
-const GOLDENS: [(&str, [usize; 2], i64); 29] = [
+const GOLDENS: [(&str, [usize; 2], i64); 33] = [
     ("candle", SMALL, 40),
     ("torch", SMALL, 40),
     ("campfire", SMALL, 40),
@@ -48,6 +48,11 @@ const GOLDENS: [(&str, [usize; 2], i64); 29] = [
     ("sekiguchi_2", SMALL, 4),
     ("sekiguchi_5", SMALL, 4),
     ("dome_night", [160, 160], 4),
+    // What the thesis's scenes are about: a fold, a split, a merge, two folds that have turned.
+    ("sekiguchi_1", SMALL, 240),
+    ("sekiguchi_2", SMALL, 170),
+    ("sekiguchi_3", SMALL, 230),
+    ("sekiguchi_4", SMALL, 300),
 ];
 
 #[test]

@@ -1,6 +1,7 @@
 //! Strips laid before and behind each other.
 
 use super::*;
+use crate::{animation::Animated, camera::Lens, curve::Interpolation};
 
 #[test]
 fn what_is_drawn_later_lies_behind() {
@@ -65,4 +66,31 @@ fn weighted_means_ignore_the_order_of_samples() {
     strip.aovs[0].add(0, 1000.0, 1.0);
     strip.aovs[0].add(0, 2000.0, 3.0);
     assert_eq!(strip.aovs[0].resolve(0, AovRule::WeightedMean), 1750.0);
+}
+
+#[test]
+fn a_dome_that_rolls_needs_several_instants() {
+    let path = |roll: f64| {
+        let keys = vec![(0.0, 0.0), (1.0, roll)];
+        CameraParameters {
+            lens: Lens::Fisheye,
+            position: Animated::from([0.0; 3]),
+            target: Animated::from([0.0, 1.0, 0.0]),
+            roll_deg: Animated::keyed(keys, Interpolation::Linear).unwrap(),
+            ..CameraParameters::default()
+        }
+    };
+    let view = |roll: f64| View::new(path(roll), Shutter { open: 0.0, close: 0.1 }, 0.0, [512, 512], 0);
+    // Half a degree on a circle of 256 pixels: 0.96 of the radius, 2.1 pixels by the angle in the sky.
+    let rolling = view(5.0);
+    assert!((rolling.motion_pixels() - 1.4).abs() < 0.1, "{}", rolling.motion_pixels());
+    assert_eq!((view(0.0).cameras().len(), rolling.cameras().len()), (1, 2));
+    assert_eq!(view(900.0).cameras().len(), 16);
+}
+
+#[test]
+fn a_picture_in_a_mirror_is_not_measured() {
+    let mut view = View::new(CameraParameters::default(), Shutter { open: 0.0, close: 0.0 }, 0.0, [8, 8], 0);
+    view.measured = true;
+    assert!(!view.mirrored(0.0).measured);
 }

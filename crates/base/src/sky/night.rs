@@ -42,7 +42,8 @@ const BACKGROUND_K: f32 = 9500.0;
 const TWILIGHT: [f64; 7] = [2.3, 1.2, -0.2, -1.7, -3.0, -4.1, -5.6];
 /// Height of the twilight arch, radians.
 const TWILIGHT_ARCH: f64 = 0.17;
-const EARTH_RADIUS_KM: f64 = 6371.0;
+/// Mean radius of the Earth, km.
+pub const EARTH_RADIUS_KM: f64 = 6371.0;
 /// h c / (4 pi) for a kilorayleigh, W m^-2 sr^-1 nm.
 const KILORAYLEIGH: f64 = 1e13 / (4.0 * std::f64::consts::PI) * 6.626_070_15e-34 * 299_792_458.0 * 1e9;
 
@@ -79,7 +80,7 @@ impl NightParameters {
 pub struct Parallel {
     /// What is there all around: ACEScg, cd/m^2.
     even: [f32; 3],
-    /// What is added over the sun, by the square of how far a direction turns to it.
+    /// What is added over the sun, by the fourth power of how far a direction turns to it.
     glow: [f32; 3],
     /// What is added in proportion to that.
     blue: [f32; 3],

@@ -55,6 +55,8 @@ pub(crate) enum Command {
     Streaks(StreaksArgs),
     /// Simulate a scene and write its particles, for other programs.
     Simulate(SimulateArgs),
+    /// Print what the light of an aurora comes to, by the energy of its electrons, and whether that is what is observed.
+    Calibrate,
     /// Open a scene in the studio, a program of its own: shape it with the mouse and see it at once.
     Studio(StudioArgs),
     /// Print a completion script for a shell.

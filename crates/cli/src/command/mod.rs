@@ -1,5 +1,6 @@
 //! What each command does.
 
+pub(crate) mod calibrate;
 pub(crate) mod check;
 pub(crate) mod completions;
 pub(crate) mod flipbook;

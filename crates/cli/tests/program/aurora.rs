@@ -1,5 +1,11 @@
 //! The aurora through the whole program.
 
+use bansho::models::aurora::{
+    SpectrumShape,
+    atmosphere::{LEVEL_SPACING, LEVELS, atmosphere, level_altitude_km},
+    light::{Emission, Emitter, PHOTONS_PER_KILORAYLEIGH},
+};
+
 use crate::support::{Folder, read_exr};
 
 /// A small aurora that settles soon.
@@ -67,4 +73,97 @@ fn kilorayleighs_and_the_field_come_as_aovs() {
     assert!(potential.iter().all(|value| *value <= 0.0) && potential[lowest] < 0.0 && scattered[lowest] > 0.0);
     let noise = values("potential_noise");
     assert!(noise.iter().any(|value| *value > 0.0) && noise.iter().any(|value| *value < 0.0));
+}
+
+/// The limits of what is observed, read from what the program prints.
+#[test]
+fn the_calibration_is_printed_and_within_what_is_observed() {
+    let run = Folder::new().succeed(&["calibrate"]);
+    let rows: Vec<Vec<f64>> = run
+        .stdout
+        .lines()
+        .skip(1)
+        .map_while(|line| line.split_whitespace().map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>())
+        .collect();
+    let at = |kev: f64| rows.iter().find(|row| row[0] == kev).unwrap_or_else(|| panic!("{}", run.stdout));
+    // keV, deposited km, peaks of 557.7, 630.0 and 427.8 km, R of 427.8 per mW/m^2, green and red beside that, red above 200 km.
+    for (kev, peak_km, blue) in
+        [(1.0, 158.35, 250.0), (3.0, 122.23, 294.0), (10.0, 104.68, 307.0), (30.0, 95.194, 304.0)]
+    {
+        assert!((at(kev)[1] - peak_km).abs() < 4.0, "{kev} keV: {} km", at(kev)[1]);
+        assert!((at(kev)[5] / blue - 1.0).abs() < 0.25, "{kev} keV: {} R", at(kev)[5]);
+    }
+    for kev in [3.0, 5.0, 10.0] {
+        assert!((100.0..=120.0).contains(&at(kev)[2]), "{kev} keV: green at {} km", at(kev)[2]);
+    }
+    let hard: Vec<&Vec<f64>> = rows.iter().filter(|row| row[0] >= 1.0).collect();
+    assert!(hard.len() >= 6 && hard.iter().all(|row| (2.5..=7.0).contains(&row[6])), "{}", run.stdout);
+    assert!(hard.windows(2).all(|pair| pair[1][6] < pair[0][6] && pair[1][7] < pair[0][7]), "{}", run.stdout);
+    assert!(at(1.0)[7] > 2.0 && at(10.0)[7] < 0.5 && rows.iter().all(|row| row[8] >= 0.5), "{}", run.stdout);
+    assert!(run.stdout.contains("I(391.4)/I(427.8)") && !run.stdout.contains("FAILS"), "{}", run.stdout);
+}
+
+/// A straight, even, thin sheet through the zenith, of upright field lines: how bright it is, all across, is known.
+const EVEN: &str = "\
+bansho = 1
+[picture]
+size = [64, 64]
+frames = 1
+[camera]
+position = [0.0, 0.0, 0.0]
+target = [0.0, 100.0, 0.0]
+vertical_fov_deg = 30.0
+[[aurora]]
+flux_mw_per_m2 = 40.0
+energy_ev = 5000.0
+thickness_km = 4.0
+dip_deg = 90.0
+particles = { count = 20_000 }
+rays = { contrast = 0.0, energy = 0.0 }
+folds = { amplitude_km = 0.0 }
+shapes = [{ sheets = [{ points = [[-290.0, 0.0], [290.0, 0.0]] }] }]
+";
+
+#[test]
+fn a_sheet_at_the_zenith_has_the_kilorayleighs_of_its_column() {
+    let folder = Folder::with_scene(EVEN);
+    folder.succeed(&["render", "scene.toml", "--aovs", "--out", "f.exr"]);
+    let picture = read_exr(&folder.path("f.exr"));
+    let emission = Emission::new(atmosphere(), SpectrumShape::Arc.spectrum());
+    // A height z gives flux x thickness x emission / z for all directions across the sheet together, by the tangent of their angle.
+    let tangents = (15.0_f64).to_radians().tan() / 32.0;
+    for (line, emitter, photons) in
+        [("557", Emitter::OxygenGreen, 1.0), ("427", Emitter::NitrogenIon, 1.0), ("391", Emitter::NitrogenIon, 3.28)]
+    {
+        let at = |level: usize| {
+            let altitude_km = level_altitude_km(level);
+            emission.at(5000.0, altitude_km)[emitter.index()] * photons / altitude_km
+        };
+        let expected = 40.0 * 4.0 * (0..LEVELS).map(at).sum::<f64>() * LEVEL_SPACING / PHOTONS_PER_KILORAYLEIGH;
+        let (_, values) =
+            picture.channels.iter().find(|(name, _)| name.ends_with(&format!("kilorayleigh_{line}"))).unwrap();
+        // The columns about the middle, where lines of sight are upright along the sheet.
+        let column = |x: usize| (0..64).map(|y| f64::from(values[64 * y + x])).sum::<f64>() * tangents;
+        let found = (24..40).map(column).sum::<f64>() / 16.0;
+        assert!((found / expected - 1.0).abs() < 0.06, "{line}: {found} kR, not {expected}");
+    }
+}
+
+#[test]
+fn a_loop_of_an_aurora_with_snapshots_gives_the_same_bytes() {
+    let folder = Folder::with_scene(&AURORA.replace("frames = 6", "frames = 40"));
+    let options = ["render", "scene.toml", "--loop", "1.0"];
+    folder.succeed(&[&options[..], &["--out", "all/f.####.png"]].concat());
+    let whole = folder.files("all");
+    assert_eq!(whole.len(), 30, "{:?}", whole.keys());
+    for range in ["0-11", "12-29"] {
+        let out = ["--frames", range, "--snapshots", "states", "--out", "parts/f.####.png"];
+        folder.succeed(&[&options[..], &out].concat());
+    }
+    let (parts, states) = (folder.files("parts"), folder.files("states"));
+    assert!(!states.is_empty());
+    for (name, bytes) in &whole {
+        assert!(parts[name] == *bytes, "{name}");
+    }
+    assert!(whole["f.0000.png"] != whole["f.0015.png"]);
 }

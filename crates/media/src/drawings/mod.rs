@@ -72,28 +72,36 @@ impl Reading {
     fn start(&mut self, tag: &Tag) -> Result<(), AssetProblem> {
         let outer = self.levels.last().copied().unwrap_or(Level { transform: Transform::IDENTITY, is_drawn: true });
         let own = Transform::parse(tag.get("transform").unwrap_or_default());
-        let own = own.ok_or_else(|| damaged("a transform cannot be read"))?;
+        let own = own.ok_or_else(|| damaged(format!("{}: its transform cannot be read", self.name(tag))))?;
         let is_hidden = UNDRAWN.contains(&tag.name) || tag.get("display") == Some("none") || hides(tag);
         let level = Level { transform: outer.transform.after(&own), is_drawn: outer.is_drawn && !is_hidden };
         if tag.name == "svg" && self.levels.is_empty() {
-            self.sheet = sheet(tag);
+            self.sheet = sheet(tag)?;
         }
         self.levels.push(level);
         if !level.is_drawn {
             return Ok(());
         }
-        for line in lines(tag).map_err(damaged)? {
+        for line in lines(tag).map_err(|reason| damaged(format!("{}: {reason}", self.name(tag))))? {
             self.points += line.len();
             if self.points > MOST_POINTS {
                 return Err(damaged(format!("it has more than {MOST_POINTS} points")));
             }
             let points: Vec<DVec2> = line.into_iter().map(|point| level.transform.apply(point)).collect();
             if !points.iter().all(|point| point.is_finite()) {
-                return Err(damaged("a point lies infinitely far away"));
+                return Err(damaged(format!("{}: a point lies infinitely far away", self.name(tag))));
             }
             self.strokes.push(Stroke { id: tag.get("id").map(str::to_owned), points });
         }
         Ok(())
+    }
+
+    /// What an element is called in faults: by its id, or else by the strokes before it.
+    fn name(&self, tag: &Tag) -> String {
+        match tag.get("id") {
+            Some(id) => format!("{} `{id}`", tag.name),
+            None => format!("{} after {} strokes", tag.name, self.strokes.len()),
+        }
     }
 
     fn finish(self) -> Result<Drawing, AssetProblem> {
@@ -115,17 +123,20 @@ fn hides(tag: &Tag) -> bool {
         .any(|(key, value)| (key.trim(), value.trim()) == ("display", "none"))
 }
 
-/// The view box, or else width and height.
-fn sheet(tag: &Tag) -> Option<[DVec2; 2]> {
-    let [x, y, width, height] = match tag.get("viewBox") {
-        Some(view) => Numbers::new(view).take_all()?,
-        None => {
-            let side = |name: &str| Numbers::new(tag.get(name)?).next();
-            [0.0, 0.0, side("width")?, side("height")?]
-        }
+/// The view box, or else width and height where both are given.
+fn sheet(tag: &Tag) -> Result<Option<[DVec2; 2]>, AssetProblem> {
+    let Some(view) = tag.get("viewBox") else {
+        let side = |name: &str| Numbers::new(tag.get(name)?).next().filter(|side| *side > 0.0);
+        return Ok(side("width").zip(side("height")).map(|(width, height)| [DVec2::ZERO, DVec2::new(width, height)]));
     };
-    let low = DVec2::new(x, y);
-    (width > 0.0 && height > 0.0).then_some([low, low + DVec2::new(width, height)])
+    let mut numbers = Numbers::new(view);
+    match (numbers.take_all::<4>(), numbers.next()) {
+        (Some([x, y, width, height]), None) if width > 0.0 && height > 0.0 => {
+            let low = DVec2::new(x, y);
+            Ok(Some([low, low + DVec2::new(width, height)]))
+        }
+        _ => Err(damaged(format!("its viewBox is `{view}` (allowed: x, y, and a width and height above 0)"))),
+    }
 }
 
 /// The lines of an element, none where it is of another kind.
@@ -186,6 +197,20 @@ mod tests {
         assert_eq!(drawing.high, DVec2::new(30.0, 20.0));
         let drawing = decode_drawing("<svg><path d='M1 2L5 4'/></svg>").unwrap();
         assert_eq!((drawing.low, drawing.high), (DVec2::new(1.0, 2.0), DVec2::new(5.0, 4.0)));
+    }
+
+    #[test]
+    fn faults_name_their_path() {
+        let fault = |text: &str| decode_drawing(text).unwrap_err().to_string();
+        assert!(fault("<svg><path id='arc' d='M0 0L1'/></svg>").contains("path `arc`: "));
+        assert!(fault("<svg><path d='M0 0L1 1'/><path d='M0 0L1'/></svg>").contains("path after 1 strokes: "));
+        assert!(
+            fault("<svg><g id='all' transform='turn(3)'/></svg>").contains("g `all`: its transform cannot be read")
+        );
+        for view in ["", "0 0 10", "0 0 10 0", "0 0 -3 4", "0 0 wide 3", "0 0 1 2 3"] {
+            let shown = fault(&format!("<svg viewBox='{view}'><path d='M0 0L1 1'/></svg>"));
+            assert!(shown.contains(&format!("its viewBox is `{view}`")), "{shown}");
+        }
     }
 
     #[test]

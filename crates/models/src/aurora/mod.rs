@@ -8,6 +8,7 @@
 pub mod afterglow;
 pub mod atmosphere;
 pub mod draw;
+mod energies;
 pub mod light;
 mod parameters;
 pub mod particles;
@@ -16,6 +17,6 @@ pub mod shapes;
 
 pub use draw::{Aurora, Blur, BlurParameters, DrawingParameters, FallModel, Sampling};
 pub use parameters::{
-    AuroraParameters, FieldParameters, FieldSolver, FoldParameters, ParticleParameters, PulsationParameters,
-    RayParameters, RelocationParameters, RepulsionKernel, SpectrumShape,
+    AuroraParameters, FieldCharge, FieldParameters, FieldSolver, FoldParameters, ParticleParameters,
+    PulsationParameters, RayParameters, RelocationParameters, RepulsionKernel, SpectrumShape,
 };

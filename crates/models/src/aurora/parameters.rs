@@ -48,11 +48,22 @@ bansho_base::choice! {
 }
 
 bansho_base::choice! {
+    /// How charge lies on the sheets.
+    pub enum FieldCharge {
+        /// As on conductors: all sheets are at one potential, and particles stay where they are along them.
+        Conductor = "conductor",
+        /// All scattered particles have the same, eq. (2.2): particles draw away from the ends of sheets and into spirals.
+        Even = "even",
+    }
+}
+
+bansho_base::choice! {
     /// Kernels of the repulsion.
     pub enum RepulsionKernel {
-        /// Cubic spline, eqs. (2.17) and (2.18): keeps rays sharp.
+        /// Cubic spline, eqs. (2.17) and (2.18): lets particles come close to each other, so that their own pattern stays.
         Spline = "spline",
-        /// Poly6 for the density, spiky for the force, eqs. (2.12) and (2.16): blurs rays.
+        /// Poly6 for the density, spiky for the force, eqs. (2.12) and (2.16): parts close particles, and evens their pattern out. As
+        /// light is drawn, spread as far as neighbours are, both look nearly alike.
         Poly6Spiky = "poly6_spiky",
     }
 }
@@ -64,6 +75,8 @@ bansho_base::parameters! {
         cells: i64 = 255, limits(Range::new(16.0, 511.0));
         /// How the potential is found.
         solver: FieldSolver = FieldSolver::SineTransform;
+        /// How charge lies on the sheets.
+        charge: FieldCharge = FieldCharge::Conductor;
         /// Most Gauss-Seidel sweeps.
         sweeps: i64 = 200, limits(Range::new(1.0, 2000.0));
         /// Greatest change at which Gauss-Seidel sweeps stop, as a share of the potential of a sheet.

@@ -16,7 +16,7 @@ use super::{
 
 /// Most particles.
 const MOST_PARTICLES: i64 = 20_000_000;
-/// Bytes that a living particle takes, measured over a run: its state, the buffers of a step and of the drawing.
+/// Bytes that a living particle takes, measured over a run: its state and the buffers of a step. (Drawing takes more for a while.)
 const PARTICLE_BYTES: f64 = 670.0;
 /// Times until its tip that gas may take before it is removed, whatever holds it.
 const LONGEST_RISE: f64 = 3.0;

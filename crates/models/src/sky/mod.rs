@@ -39,7 +39,7 @@ pub struct SkyBackdrop {
 /// What a night shows through a camera.
 #[derive(Clone)]
 struct Still {
-    camera: Camera,
+    cameras: Vec<Camera>,
     size: [usize; 2],
     sky: Sky,
     night: Arc<NightSky>,
@@ -59,9 +59,9 @@ impl SkyBackdrop {
     }
 
     /// The night that a sky shows in a view; none by day.
-    fn still(&self, sky: &Sky, view: &View) -> Option<Still> {
+    fn still(&self, sky: &Sky, view: &View, cameras: &[Camera]) -> Option<Still> {
         let night = sky.night()?;
-        let same = |still: &&Still| still.camera == view.camera && still.size == view.size && still.sky == *sky;
+        let same = |still: &&Still| still.cameras == cameras && still.size == view.size && still.sky == *sky;
         // The lock is never held while threads work together.
         let kept = || self.still.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(still) = kept().as_ref().filter(same) {
@@ -69,7 +69,7 @@ impl SkyBackdrop {
         }
         let spots = self.stars.as_ref().map(|stars| stars.spots(view, night, self.parameters.night.stars));
         let still = Still {
-            camera: view.camera,
+            cameras: cameras.to_vec(),
             size: view.size,
             sky: *sky,
             night: Arc::new(NightSky::new(sky, night, self.parameters.night.milky_way)),
@@ -119,9 +119,11 @@ impl Phenomenon for SkyBackdrop {
         _observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         let sky = surroundings.sky;
-        let (night, spots) = self.still(&sky, view).map(|still| (still.night, still.spots)).unzip();
+        let cameras = view.cameras();
+        let (night, spots) = self.still(&sky, view, &cameras).map(|still| (still.night, still.spots)).unzip();
         Ok(Box::new(PreparedSky {
             view,
+            cameras,
             sky,
             night,
             spots: spots.unwrap_or_default(),
@@ -133,6 +135,8 @@ impl Phenomenon for SkyBackdrop {
 
 struct PreparedSky<'a> {
     view: &'a View,
+    /// At as many instants as its motion needs, each for an equal part of the exposure.
+    cameras: Vec<Camera>,
     sky: Sky,
     night: Option<Arc<NightSky>>,
     /// Stars, from the top down.
@@ -148,19 +152,22 @@ impl PreparedSky<'_> {
         let rect = strip.rect;
         let far = vec![f32::INFINITY; rect.width];
         let mut row = SkyRow::default();
+        let share = 1.0 / self.cameras.len() as f32;
         for y in rect.y..rect.bottom() {
             let first = (y - rect.y) * rect.width;
             row.clear(rect.width);
             // Batches lie on the picture's own grid, so that a crop changes no pixel.
             let mut x = rect.x / LANES * LANES;
             while x < rect.right() {
-                let mut directions = Directions::new(&self.view.camera, x, y);
-                directions.normalize();
-                let colours = self.radiance(simd, &directions);
-                for i in rect.x.max(x) - x..rect.right().min(x + LANES) - x {
-                    let at = x + i - rect.x;
-                    if directions.seen[i] && strip.visible(first + at, FAR.near as f32) {
-                        row.set(at, colours[i]);
+                for camera in &self.cameras {
+                    let mut directions = Directions::new(camera, x, y);
+                    directions.normalize();
+                    let colours = self.radiance(simd, &directions);
+                    for i in rect.x.max(x) - x..rect.right().min(x + LANES) - x {
+                        let at = x + i - rect.x;
+                        if directions.seen[i] && strip.visible(first + at, FAR.near as f32) {
+                            row.add(at, colours[i], share);
+                        }
                     }
                 }
                 x += LANES;
@@ -254,33 +261,18 @@ impl PreparedSky<'_> {
         }
     }
 
-    /// How much of the pixels from `x` on in row `y` the hills hide.
+    /// How much of the pixels from `x` on in row `y` the hills hide, while the shutter is open.
     #[inline(always)]
     fn covers(&self, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
-        let sharpness = self.view.camera.focal_pixels as f32;
-        let mut directions = Directions::new(&self.view.camera, x, y);
-        directions.normalize();
-        let Directions { axes: [xs, sines, zs], seen } = &directions;
-        let (mut above, mut below) = (true, true);
-        for i in 0..LANES {
-            above &= sines[i] > skyline.highest + 1.0 / sharpness;
-            below &= sines[i] < skyline.lowest - 1.0 / sharpness;
-        }
-        let (mut covers, mut turns) = ([0.0; LANES], [0.0; LANES]);
-        if above {
-            return covers;
-        }
-        if !below {
+        let share = 1.0 / self.cameras.len() as f32;
+        let mut mean = [0.0; LANES];
+        for camera in &self.cameras {
+            let covers = covers_at(camera, skyline, x, y);
             for i in 0..LANES {
-                turns[i] = lanes::atan2(xs[i], -zs[i]) * (1.0 / TAU) as f32;
+                mean[i] = covers[i].fused(share, mean[i]);
             }
         }
-        for i in 0..LANES {
-            let hidden = if below { 1.0 } else { skyline.sine(turns[i]) };
-            let cover = (hidden - sines[i]).fused(sharpness, 0.5).clamp(0.0, 1.0);
-            covers[i] = if seen[i] { cover } else { 0.0 };
-        }
-        covers
+        mean
     }
 
     /// Whether the pixels of a strip from `x` on surely look higher than at that sine of the elevation.
@@ -290,10 +282,42 @@ impl PreparedSky<'_> {
         let least = f64::from(sine) + angle * angle;
         let rows = [rect.y, rect.bottom()].map(|y| y as f64);
         let corners = rows.into_iter().flat_map(|y| [x, x + LANES].map(|x| DVec2::new(x as f64, y)));
-        corners
-            .map(|corner| self.view.camera.direction(corner))
-            .all(|direction| direction.is_some_and(|direction| direction.y > least * direction.length()))
+        let is_above = |corner: DVec2| {
+            self.cameras
+                .iter()
+                .all(|camera| camera.direction(corner).is_some_and(|toward| toward.y > least * toward.length()))
+        };
+        corners.map(is_above).all(|above| above)
     }
+}
+
+/// How much of the pixels from `x` on in row `y` of a camera the hills hide.
+#[inline(always)]
+fn covers_at(camera: &Camera, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
+    let sharpness = camera.focal_pixels as f32;
+    let mut directions = Directions::new(camera, x, y);
+    directions.normalize();
+    let Directions { axes: [xs, sines, zs], seen } = &directions;
+    let (mut above, mut below) = (true, true);
+    for i in 0..LANES {
+        above &= sines[i] > skyline.highest + 1.0 / sharpness;
+        below &= sines[i] < skyline.lowest - 1.0 / sharpness;
+    }
+    let (mut covers, mut turns) = ([0.0; LANES], [0.0; LANES]);
+    if above {
+        return covers;
+    }
+    if !below {
+        for i in 0..LANES {
+            turns[i] = lanes::atan2(xs[i], -zs[i]) * (1.0 / TAU) as f32;
+        }
+    }
+    for i in 0..LANES {
+        let hidden = if below { 1.0 } else { skyline.sine(turns[i]) };
+        let cover = (hidden - sines[i]).fused(sharpness, 0.5).clamp(0.0, 1.0);
+        covers[i] = if seen[i] { cover } else { 0.0 };
+    }
+    covers
 }
 
 /// A row of sky.
@@ -311,10 +335,14 @@ impl SkyRow {
         }
     }
 
+    /// Adds the sky of a part of the exposure.
     #[inline(always)]
-    fn set(&mut self, x: usize, [red, green, blue, _]: [f32; 4]) {
+    fn add(&mut self, x: usize, [red, green, blue, _]: [f32; 4], share: f32) {
         let [reds, greens, blues] = &mut self.planes;
-        (reds[x], greens[x], blues[x], self.opacity[x]) = (red, green, blue, 1.0);
+        reds[x] = red.fused(share, reds[x]);
+        greens[x] = green.fused(share, greens[x]);
+        blues[x] = blue.fused(share, blues[x]);
+        self.opacity[x] = (self.opacity[x] + share).min(1.0);
     }
 }
 
@@ -342,10 +370,56 @@ impl Prepared for PreparedSky<'_> {
 #[cfg(test)]
 mod tests {
     use bansho_base::{
-        animation::Animated, camera::CameraParameters, observer::Unobserved, wind::Wind, wind::WindParameters,
+        animation::Animated, camera::CameraParameters, curve::Interpolation, math, observer::Unobserved, wind::Wind,
+        wind::WindParameters,
     };
 
     use super::*;
+
+    /// Light of a night as a camera sees it that turns by so many degrees while the shutter is open: green, row by row.
+    fn night_seen(turn_deg: f64, hills_deg: f64) -> Vec<f32> {
+        let parameters = SkyParameters { kind: SkyKind::Night, hills_deg, ..SkyParameters::default() };
+        let backdrop = SkyBackdrop::new(parameters.clone(), 3);
+        let [x, z] = [math::sin(turn_deg.to_radians()) * 60.0, math::cos(turn_deg.to_radians()) * -60.0];
+        let keys = vec![(0.0, [0.0, 30.0, -60.0]), (1.0, [x, 30.0, z])];
+        let camera = CameraParameters {
+            position: [0.0; 3].into(),
+            target: Animated::keyed(keys, Interpolation::Linear).unwrap(),
+            vertical_fov_deg: 60.0.into(),
+            ..CameraParameters::default()
+        };
+        let view = View::new(camera, Shutter { open: 0.0, close: 1.0 }, 0.0, [240, 160], 0);
+        let wind = Wind::new(WindParameters::default(), 1, None);
+        let surroundings = Surroundings { sky: parameters.at(0.5), ..Surroundings::of_wind(&wind) };
+        let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).unwrap();
+        let mut strip = Strip::default();
+        strip.reset(Rect::of_size(240, 160), None, 0);
+        prepared.draw(&DepthInterval::ALL, &mut strip);
+        assert!((0..strip.len()).all(|pixel| strip.transmittance(pixel)[1] < 1e-5), "the sky is opaque");
+        strip.radiance[1].clone()
+    }
+
+    #[test]
+    fn stars_draw_trails_where_the_camera_turns() {
+        let [still, turning] = [0.0, 6.0].map(|turn| night_seen(turn, 0.0));
+        let brightest = |light: &[f32]| light.iter().fold(0.0_f32, |most, value| most.max(*value));
+        let sum = |light: &[f32]| light.iter().map(|value| f64::from(*value)).sum::<f64>();
+        // 6 degrees are some 15 pixels; a star's light is spread over them, and none is lost.
+        assert!(brightest(&turning) < 0.3 * brightest(&still), "{} {}", brightest(&turning), brightest(&still));
+        assert!((sum(&turning) / sum(&still) - 1.0).abs() < 0.15, "{}", sum(&turning) / sum(&still));
+    }
+
+    #[test]
+    fn hills_are_soft_where_the_camera_turns() {
+        // Neighbours along a row differ most at the hills' edges.
+        let steepest = |light: Vec<f32>| {
+            let rows = light.chunks(240).skip(120);
+            let steps = rows.flat_map(|row| row.windows(2).map(|pair| (pair[0] - pair[1]).abs()).collect::<Vec<_>>());
+            steps.fold(0.0_f32, f32::max)
+        };
+        let [still, turning] = [0.0, 6.0].map(|turn| steepest(night_seen(turn, 12.0)));
+        assert!(turning < 0.5 * still, "{turning} {still}");
+    }
 
     #[test]
     fn it_fills_the_picture_behind_everything_and_hides_what_is_behind_it() {

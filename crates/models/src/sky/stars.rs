@@ -1,7 +1,7 @@
 //! A random starry sky with the magnitude counts and colours of the real one.
 
 use bansho_base::{
-    camera::Camera,
+    camera::{Camera, Lens},
     canvas::View,
     color::{black_body, luminance},
     math::{self, DVec2, DVec3, Fused},
@@ -26,6 +26,9 @@ const BRIGHT_REACH: f64 = 10.0;
 /// Shape of a star's image: (1 + (r / core)^2)^-beta (Moffat 1969), core in pixels and beta = 5/2.
 const CORE: f64 = 0.85;
 const BETA: f64 = 2.5;
+
+/// Most instants of a trail.
+const MOST_INSTANTS: f64 = 64.0;
 
 const STAR: Purpose = Purpose::named("star");
 
@@ -66,14 +69,26 @@ impl Stars {
         Self((0..count).map(|number| star(key, number, count)).collect())
     }
 
-    /// Those that a picture shows, by row of their middle.
+    /// Those that a picture shows, by row of their middle. Where the camera turns while the shutter is open, each draws a trail.
     pub(super) fn spots(&self, view: &View, night: &Night, brightness: f64) -> Vec<Spot> {
-        let norm = 1.0 / shape_sum();
-        let spot = |star: &Star| spot(star, &view.camera, view.size, night, brightness * norm);
-        let mut spots: Vec<Spot> = self.0.par_iter().filter_map(spot).collect();
+        let cameras = view.cameras_at_most(MOST_INSTANTS);
+        let scale = brightness / shape_sum() / cameras.len() as f64;
+        let mut spots = Vec::new();
+        for camera in &cameras {
+            let spot = |star: &Star| spot(star, camera, view.size, night, scale);
+            spots.par_extend(self.0.par_iter().filter_map(spot).flat_map_iter(|spot| images(spot, camera, view.size)));
+        }
         spots.sort_by(|a, b| a.pixel.y.total_cmp(&b.pixel.y));
         spots
     }
+}
+
+/// All places where a star's image reaches into the picture: a panorama begins anew where it ends.
+fn images(spot: Spot, camera: &Camera, size: [usize; 2]) -> impl Iterator<Item = Spot> {
+    let turn = std::f64::consts::TAU * camera.focal_pixels;
+    let turns: &[f64] = if camera.lens == Lens::Panorama { &[0.0, -1.0, 1.0] } else { &[0.0] };
+    let image = move |turns: &f64| Spot { pixel: spot.pixel + DVec2::new(turns * turn, 0.0), ..spot };
+    turns.iter().map(image).filter(move |spot| spot.is_inside(size))
 }
 
 /// Logarithm of the number of stars brighter than a magnitude.
@@ -120,14 +135,21 @@ fn spot(star: &Star, camera: &Camera, size: [usize; 2], night: &Night, brightnes
     }
     let pixel = camera.project(camera.position + star.direction * 1e9)?.pixel;
     let reach = if star.magnitude < 2.0 { BRIGHT_REACH } else { REACH };
-    let inside = |place: f64, side: usize| place > -reach && place < side as f64 + reach;
-    if !inside(pixel.x, size[0]) || !inside(pixel.y, size[1]) {
+    // What is beside a panorama may be within it a turn further.
+    let turned = camera.lens == Lens::Panorama && is_near(DVec2::new(0.0, pixel.y), reach, size);
+    if !turned && !is_near(pixel, reach, size) {
         return None;
     }
     let share = night.transmittance(math::asin(star.direction.y));
     let illuminance = star.illuminance * share * brightness;
     let radiance = (illuminance / solid_angle(camera, pixel)?) as f32;
     Some(Spot { pixel, reach, radiance: star.colour.map(|value| value * radiance) })
+}
+
+/// Whether a place is within `reach` pixels of a picture of `size` pixels.
+fn is_near(pixel: DVec2, reach: f64, size: [usize; 2]) -> bool {
+    let inside = |place: f64, side: usize| place > -reach && place < side as f64 + reach;
+    inside(pixel.x, size[0]) && inside(pixel.y, size[1])
 }
 
 /// Solid angle of a pixel.
@@ -142,6 +164,11 @@ fn solid_angle(camera: &Camera, pixel: DVec2) -> Option<f64> {
 pub(super) const MOST_PIXELS: usize = 24;
 
 impl Spot {
+    /// Whether its image reaches into a picture of `size` pixels.
+    fn is_inside(&self, size: [usize; 2]) -> bool {
+        is_near(self.pixel, self.reach, size)
+    }
+
     /// The shape of its image at the pixels of row `y` from `x` on, 1 at its middle.
     #[inline(always)]
     pub(super) fn row(&self, x: usize, y: usize) -> [f32; MOST_PIXELS] {
@@ -176,6 +203,37 @@ mod tests {
         }
         assert!(stars.0[0].magnitude < 0.0 && stars.0[0].magnitude > -2.5);
         assert!(stars.0.iter().all(|star| (star.direction.length() - 1.0).abs() < 1e-5));
+    }
+
+    #[test]
+    fn a_star_at_a_panoramas_seam_is_whole() {
+        let night = *SkyParameters { kind: bansho_base::sky::SkyKind::Night, ..SkyParameters::default() }
+            .at(0.0)
+            .night()
+            .unwrap();
+        let camera = CameraParameters {
+            lens: Lens::Panorama,
+            position: [0.0; 3].into(),
+            target: [0.0, 0.0, -60.0].into(),
+            ..CameraParameters::default()
+        };
+        let size = [128, 64];
+        let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, size, 0);
+        let light = |x: f64| {
+            let direction = view.camera.direction(DVec2::new(x, 20.0)).unwrap();
+            let star = Star { direction, magnitude: 1.0, illuminance: 1.0, colour: [1.0; 3] };
+            let spot = spot(&star, &view.camera, size, &night, 1.0).unwrap();
+            let all = images(spot, &view.camera, size).flat_map(|image| {
+                (0..size[1])
+                    .flat_map(move |y| (0..size[0]).step_by(16).flat_map(move |x| image.row(x, y)[..16].to_vec()))
+            });
+            all.map(f64::from).sum::<f64>()
+        };
+        for x in [0.0, 0.7, 127.4, 128.0] {
+            // As much as a star in the middle that lies alike between pixels.
+            let ratio = light(x) / light(64.0 + x.fract());
+            assert!((ratio - 1.0).abs() < 1e-3, "{x}: {ratio}");
+        }
     }
 
     #[test]

@@ -18,9 +18,9 @@ pub(super) struct Clock {
     pub(super) taken: u64,
 }
 
-/// Steps after which a phenomenon's state is the last one not after `t`; none for closed forms.
-pub(super) fn steps_until(phenomenon: &dyn Phenomenon, t: f64) -> u64 {
-    phenomenon.stepping().map_or(0, |stepping| stepping.steps_until(t))
+/// Steps after which a phenomenon's state is the last one not after that which an exposure is drawn from; none for closed forms.
+pub(super) fn steps_until(phenomenon: &dyn Phenomenon, shutter: Shutter) -> u64 {
+    phenomenon.stepping().map_or(0, |stepping| stepping.steps_until(phenomenon.drawn_from(shutter)))
 }
 
 /// What phenomenon `index` is among during `shutter`.
@@ -55,12 +55,11 @@ fn others(plan: &Plan, publications: &[Publication], index: usize, shutter: Shut
 
 /// What users should know of how phenomena will look, each with its phenomenon's name.
 ///
-/// Said only of what is so in the first, the middle and the last frame, and where nothing is simulated that may shine later.
+/// Said only of what is so in the first, the middle and the last frame; that nothing lights it, only where nothing is simulated that may
+/// shine later.
 pub(crate) fn remarks(plan: &Plan) -> Result<Vec<(String, Remark)>, PlanError> {
     let phenomena = plan.open()?;
-    if phenomena.iter().any(|phenomenon| phenomenon.stepping().is_some()) {
-        return Ok(Vec::new());
-    }
+    let may_shine_later = phenomena.iter().any(|phenomenon| phenomenon.stepping().is_some());
     let frames = plan.frames();
     let shutters = [frames.start, (frames.start + frames.end) / 2, frames.end - 1].map(|number| plan.shutter(number));
     let remark = |index: usize| {
@@ -71,23 +70,26 @@ pub(crate) fn remarks(plan: &Plan) -> Result<Vec<(String, Remark)>, PlanError> {
         };
         let [first, middle, last] = shutters.each_ref().map(at);
         let always = first.filter(|_| first == middle && middle == last)?;
+        if may_shine_later && always == Remark::Unlit {
+            return None;
+        }
         Some((phenomenon.name().to_owned(), always))
     };
     Ok((0..phenomena.len()).filter_map(remark).collect())
 }
 
-/// Steps everybody until no state lies more than a step before `t`, always the one that is furthest behind,
-/// so that the order of steps depends on nothing but the steps themselves.
+/// Steps everybody until no state lies more than a step before that which an exposure is drawn from, always the one that is furthest
+/// behind, so that the order of steps depends on nothing but the steps themselves.
 pub(super) fn advance(
     plan: &Plan,
     phenomena: &mut [Box<dyn Phenomenon>],
     clocks: &mut [Clock],
-    t: f64,
+    shutter: Shutter,
     observer: &dyn Observer,
 ) -> Result<(), Cancelled> {
     loop {
         let behind = (0..phenomena.len())
-            .filter(|&index| clocks[index].taken < steps_until(phenomena[index].as_ref(), t))
+            .filter(|&index| clocks[index].taken < steps_until(phenomena[index].as_ref(), shutter))
             .filter_map(|index| Some((index, phenomena[index].stepping()?.time_after(clocks[index].taken))))
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((index, now)) = behind else { return Ok(()) };

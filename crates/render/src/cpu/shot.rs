@@ -234,12 +234,12 @@ impl Shot for CpuShot {
     fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError> {
         let _stage = StageGuard::begin(observer, Stage::Advance);
         self.frame = None;
-        let t = self.plan.shutter(number).middle();
+        let shutter = self.plan.shutter(number);
         let mut pairs = self.phenomena.iter().zip(&self.clocks);
-        if pairs.any(|(phenomenon, clock)| clock.taken > clock::steps_until(phenomenon.as_ref(), t)) {
+        if pairs.any(|(phenomenon, clock)| clock.taken > clock::steps_until(phenomenon.as_ref(), shutter)) {
             self.begin_anew()?;
         }
-        clock::advance(&self.plan, &mut self.phenomena, &mut self.clocks, t, observer)?;
+        clock::advance(&self.plan, &mut self.phenomena, &mut self.clocks, shutter, observer)?;
         self.number = number;
         Ok(())
     }

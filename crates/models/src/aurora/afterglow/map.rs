@@ -3,13 +3,18 @@
 use bansho_base::math;
 use rayon::prelude::*;
 
-use crate::aurora::particles::AuroraParticles;
+use crate::aurora::{
+    particles::AuroraParticles,
+    precipitation::energy::{NODES, node_energy_ev, node_of},
+};
 
 /// Cells along a tile.
 const SIDE: usize = 8;
 const CELLS: usize = SIDE * SIDE;
-/// A tile without a cell above this power is dark, W.
-const DARK_W: f32 = 1e-3;
+/// A tile is dark where no cell has as much as this flux, mW/m^2, would bring it in a step: a tenth of a rayleigh.
+const DARK_MW_PER_M2: f64 = 2e-4;
+/// W for one mW/m^2 on one km^2.
+const W_PER_KM2: f64 = 1e3;
 const NO_TILE: u32 = u32::MAX;
 /// Particles that a task of the thread pool finds the cells of, at least.
 const TASK: usize = 4096;
@@ -33,11 +38,46 @@ struct Tile {
     weighted: [f32; CELLS],
 }
 
+/// What of a cell's power is kept in a step, by the energy of the electrons that brought it.
+#[derive(Clone, Debug)]
+pub(super) struct Keeping {
+    /// By node of the grid of energies.
+    nodes: Vec<f32>,
+}
+
+impl Keeping {
+    /// In steps of so many seconds, of light that lives `lifetime(energy_ev)` seconds.
+    pub(super) fn new(seconds: f64, lifetime: impl Fn(f64) -> f64) -> Self {
+        let kept = |node: usize| {
+            let lifetime = lifetime(node_energy_ev(node));
+            if lifetime > 0.0 { math::exp(-seconds / lifetime) as f32 } else { 0.0 }
+        };
+        Self { nodes: (0..NODES).map(kept).collect() }
+    }
+
+    fn of(&self, energy_ev: f32) -> f32 {
+        self.nodes[((node_of(energy_ev) + 0.5) as usize).min(NODES - 1)]
+    }
+}
+
+impl Tile {
+    fn new(place: u32) -> Self {
+        Self { place, powers: [0.0; CELLS], weighted: [0.0; CELLS] }
+    }
+
+    /// Mean energy of the electrons that brought its power, eV.
+    fn energy_ev(&self) -> f32 {
+        let sum = |values: &[f32; CELLS]| values.iter().sum::<f32>();
+        sum(&self.weighted) / sum(&self.powers).max(f32::MIN_POSITIVE)
+    }
+}
+
 /// Power on square cells of which only lit ones are stored.
 ///
 /// The power of a cell follows that of the particles in it, `dP/dt = (P_particles - P) / lifetime`: so a steady sheet shows its own
 /// power, and one that is gone fades. Excited atoms do not move here: how far they diffuse is a blur of the light
-/// ([`Column::spread_km`](crate::aurora::light::emission::Column)).
+/// ([`Column::spread_km`](crate::aurora::light::emission::Column)). The lifetime is that of the column of the energy at
+/// each place, by tiles of eight by eight cells: soft electrons shine high up, where it is long.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GlowMap {
     cell_km: f64,
@@ -65,6 +105,12 @@ impl GlowMap {
     /// All cells that are lit, in an order that does not depend on threads.
     pub fn cells(&self) -> impl Iterator<Item = GlowCell> + '_ {
         self.tiles.iter().flat_map(|tile| (0..CELLS).filter_map(|cell| self.cell(tile, cell)))
+    }
+
+    /// All cells that are not fainter than `faintest` of a typical one.
+    pub(in crate::aurora) fn bright_cells(&self, faintest: f32) -> Vec<GlowCell> {
+        let faintest = faintest * self.typical_w();
+        self.cells().filter(|cell| cell.power_w > faintest).collect()
     }
 
     /// The map's light as that of particles: each cell's power is shared out among those in it as they bring power. Gives the share of each
@@ -150,20 +196,26 @@ impl GlowMap {
         })
     }
 
-    /// Lets `seconds` pass at a lifetime in seconds.
-    pub(super) fn step(&mut self, particles: &AuroraParticles, seconds: f64, lifetime: f64) {
-        let kept = if lifetime > 0.0 { math::exp(-seconds / lifetime) } else { 0.0 };
-        self.fade(kept as f32);
-        self.feed(particles, (1.0 - kept) as f32);
+    /// Lets a step pass.
+    pub(super) fn step(&mut self, particles: &AuroraParticles, keeping: &Keeping) {
+        let dark_w = (DARK_MW_PER_M2 * W_PER_KM2 * self.cell_km * self.cell_km) as f32;
+        let mut fed = self.fade(keeping, dark_w);
+        self.feed(particles, keeping, &mut fed);
     }
 
-    fn fade(&mut self, kept: f32) {
+    /// Fades all cells and lets go of tiles that a flux which brings `dark_w` to a cell would not have lit in a step; what shall be fed of
+    /// the particles' power to each tile that is left.
+    fn fade(&mut self, keeping: &Keeping, dark_w: f32) -> Vec<f32> {
+        let mut fed: Vec<f32> = Vec::with_capacity(self.tiles.len());
         for tile in &mut self.tiles {
+            let kept = keeping.of(tile.energy_ev());
             tile.powers.iter_mut().chain(&mut tile.weighted).for_each(|value| *value *= kept);
+            fed.push(1.0 - kept);
         }
         let mut number = 0;
         while number < self.tiles.len() {
-            if self.tiles[number].powers.iter().all(|power| *power < DARK_W) {
+            if self.tiles[number].powers.iter().all(|power| *power < dark_w * fed[number]) {
+                fed.swap_remove(number);
                 self.numbers[self.tiles[number].place as usize] = NO_TILE;
                 self.tiles.swap_remove(number);
                 if let Some(moved) = self.tiles.get(number) {
@@ -173,16 +225,22 @@ impl GlowMap {
                 number += 1;
             }
         }
+        fed
     }
 
-    /// Adds that share of the particles' power, one after the other, so that sums do not depend on threads.
-    fn feed(&mut self, particles: &AuroraParticles, share: f32) {
+    /// Adds to each tile its share of the particles' power, one after the other, so that sums do not depend on threads. A new tile's is
+    /// that of the first particle in it.
+    fn feed(&mut self, particles: &AuroraParticles, keeping: &Keeping, fed: &mut Vec<f32>) {
         let [xs, zs] = &particles.positions;
         let places = xs.par_iter().zip(zs).with_min_len(TASK).map(|(x, z)| self.locate([*x, *z]));
         let places: Vec<(u32, u32)> = places.map(|(place, cell)| (place as u32, cell as u32)).collect();
         let values = particles.powers_w.iter().zip(&particles.energies_ev);
         for ((place, cell), (power, energy)) in places.into_iter().zip(values) {
-            let (tile, cell) = (self.tile_mut(place as usize), cell as usize);
+            let (number, cell) = (self.number(place as usize), cell as usize);
+            if number == fed.len() {
+                fed.push(1.0 - keeping.of(*energy));
+            }
+            let (tile, share) = (&mut self.tiles[number], fed[number]);
             // No `mul_add`: outside a vector loop that is a call where the machine is not known to have it.
             tile.powers[cell] += power * share;
             tile.weighted[cell] += power * energy * share;
@@ -200,18 +258,23 @@ impl GlowMap {
         (row / SIDE * self.side + column / SIDE, row % SIDE * SIDE + column % SIDE)
     }
 
-    fn tile_mut(&mut self, place: usize) -> &mut Tile {
+    /// Number of the tile at a place, which may be a new one.
+    fn number(&mut self, place: usize) -> usize {
         if self.numbers[place] == NO_TILE {
             self.numbers[place] = self.tiles.len() as u32;
-            self.tiles.push(Tile { place: place as u32, powers: [0.0; CELLS], weighted: [0.0; CELLS] });
+            self.tiles.push(Tile::new(place as u32));
         }
-        &mut self.tiles[self.numbers[place] as usize]
+        self.numbers[place] as usize
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn even(seconds: f64, lifetime: f64) -> Keeping {
+        Keeping::new(seconds, |_| lifetime)
+    }
 
     /// Particles of 3 W and 1 W at those places, of 1 and 5 keV.
     fn particles(places: [[f32; 2]; 2]) -> AuroraParticles {
@@ -228,25 +291,56 @@ mod tests {
         let mut map = GlowMap::new(100.0, 0.5);
         let fed = particles([[10.1, -20.1], [10.2, -20.2]]);
         // Half a lifetime: 1 - exp(-1/2) of 4 W.
-        map.step(&fed, 0.4, 0.8);
+        map.step(&fed, &even(0.4, 0.8));
         assert!((map.power_w() - 4.0 * 0.393_469).abs() < 1e-5);
-        (0..40).for_each(|_| map.step(&fed, 0.4, 0.8));
+        (0..40).for_each(|_| map.step(&fed, &even(0.4, 0.8)));
         let cells: Vec<GlowCell> = map.cells().collect();
         assert_eq!(cells.len(), 1);
         assert_eq!(cells[0].position_km, [10.25, -20.25]);
         assert!((cells[0].power_w - 4.0).abs() < 1e-4 && (cells[0].energy_ev - 2000.0).abs() < 0.1);
         let dark = AuroraParticles::default();
-        map.step(&dark, 0.8, 0.8);
+        map.step(&dark, &even(0.8, 0.8));
         assert!((map.power_w() - 4.0 / std::f64::consts::E).abs() < 1e-4);
-        (0..20).for_each(|_| map.step(&dark, 0.8, 0.8));
+        (0..20).for_each(|_| map.step(&dark, &even(0.8, 0.8)));
         assert_eq!(map.tiles.len(), 0, "dark tiles are let go");
+    }
+
+    #[test]
+    fn light_of_soft_electrons_lives_as_long_as_theirs() {
+        // Two places far apart, of 1 and 5 keV, of which one has light that lives ten times as long.
+        let fed = particles([[10.1, -20.1], [-30.2, 30.2]]);
+        let lifetime = |energy_ev: f64| if energy_ev < 2000.0 { 8.0 } else { 0.8 };
+        let mut map = GlowMap::new(100.0, 0.5);
+        map.step(&fed, &even(1.0, 0.0));
+        map.step(&AuroraParticles::default(), &Keeping::new(0.8, lifetime));
+        let powers: Vec<f64> = map.cells().map(|cell| f64::from(cell.power_w)).collect();
+        assert!((powers[0] - 3.0 * math::exp(-0.1)).abs() < 1e-5 && (powers[1] - math::exp(-1.0)).abs() < 1e-6);
+        // And fills up as slowly.
+        let mut map = GlowMap::new(100.0, 0.5);
+        map.step(&fed, &Keeping::new(0.8, lifetime));
+        let powers: Vec<f64> = map.cells().map(|cell| f64::from(cell.power_w)).collect();
+        assert!(
+            (powers[0] - 3.0 * (1.0 - math::exp(-0.1))).abs() < 1e-5
+                && (powers[1] - 1.0 + math::exp(-1.0)).abs() < 1e-6
+        );
+    }
+
+    #[test]
+    fn small_faint_cells_fill_up_whatever_the_lifetime() {
+        // Cells of 25 m2 on which 0.01 mW/m^2 fall: 2.5e-4 W each.
+        let faint = AuroraParticles { powers_w: vec![2e-4, 0.5e-4], ..particles([[1.001, 1.001], [1.002, 1.002]]) };
+        for lifetime in [0.8, 110.0] {
+            let mut map = GlowMap::new(10.0, 0.005);
+            (0..(8.0 * lifetime * 30.0) as usize).for_each(|_| map.step(&faint, &even(1.0 / 30.0, lifetime)));
+            assert!((map.power_w() / 2.5e-4 - 1.0).abs() < 0.01, "{lifetime} s: {} W", map.power_w());
+        }
     }
 
     #[test]
     fn a_map_is_shared_out_among_the_particles_in_its_cells() {
         let mut map = GlowMap::new(100.0, 0.5);
         let fed = particles([[10.1, -20.1], [10.2, -20.2]]);
-        map.step(&fed, 1.0, 0.0);
+        map.step(&fed, &even(1.0, 0.0));
         assert_eq!(map.shared_out(&fed, 0.01), (vec![3.0, 1.0], vec![]));
         // One has left its cell for a dark one, the other is still where all of the light is.
         let moved = particles([[-40.0, 40.0], [10.2, -20.2]]);
@@ -256,14 +350,15 @@ mod tests {
         let (shares, cells) = map.shared_out(&gone, 0.01);
         assert_eq!((shares, cells.len(), cells[0].power_w), (vec![0.0; 2], 1, 4.0));
         assert_eq!(map.shared_out(&gone, 1.5).1, []);
+        assert_eq!((map.bright_cells(0.01).len(), map.bright_cells(1.5)), (1, vec![]));
     }
 
     #[test]
     fn tiles_come_and_go_without_losing_their_place() {
         let mut map = GlowMap::new(100.0, 0.5);
-        map.step(&particles([[-49.9, -49.9], [49.9, 49.9]]), 1.0, 0.0);
+        map.step(&particles([[-49.9, -49.9], [49.9, 49.9]]), &even(1.0, 0.0));
         // The first tile goes, the second takes its number, a third comes.
-        map.step(&particles([[49.9, 49.9], [0.1, 0.1]]), 1.0, 0.0);
+        map.step(&particles([[49.9, 49.9], [0.1, 0.1]]), &even(1.0, 0.0));
         let mut cells: Vec<_> = map.cells().map(|cell| (cell.position_km[0], cell.power_w)).collect();
         cells.sort_by(|a, b| a.0.total_cmp(&b.0));
         assert_eq!(cells, [(0.25, 1.0), (49.75, 3.0)]);

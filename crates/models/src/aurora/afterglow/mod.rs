@@ -5,6 +5,7 @@
 
 mod map;
 
+use map::Keeping;
 pub use map::{GlowCell, GlowMap};
 
 use super::{
@@ -32,15 +33,19 @@ impl Afterglow {
     }
 
     /// Lets `seconds` pass while `particles` feed both maps. `emission` says how long light of electrons of an energy lives.
-    pub(crate) fn step(&mut self, particles: &AuroraParticles, emission: &Emission, energy_ev: f64, seconds: f64) {
-        let lifetime = emission.column(energy_ev).lifetime;
-        let [green, red] = [Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| lifetime[emitter as usize]);
-        rayon::join(|| self.green.step(particles, seconds, green), || self.red.step(particles, seconds, red));
+    pub(crate) fn step(&mut self, particles: &AuroraParticles, emission: &Emission, seconds: f64) {
+        let keeping =
+            |emitter: Emitter| Keeping::new(seconds, |energy_ev| emission.column(energy_ev).lifetime[emitter.index()]);
+        rayon::join(
+            || self.green.step(particles, &keeping(Emitter::OxygenGreen)),
+            || self.red.step(particles, &keeping(Emitter::OxygenRed)),
+        );
     }
 
     /// Fills the maps as if `particles` had been as they are for long.
     pub(crate) fn settle(&mut self, particles: &AuroraParticles) {
-        self.green.step(particles, 1.0, 0.0);
-        self.red.step(particles, 1.0, 0.0);
+        let at_once = Keeping::new(1.0, |_| 0.0);
+        self.green.step(particles, &at_once);
+        self.red.step(particles, &at_once);
     }
 }

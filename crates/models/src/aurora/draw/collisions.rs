@@ -103,9 +103,13 @@ impl FallTable {
         Self { starts, batches: by_node.concat() }
     }
 
-    /// One of the falls of a node, any number; the nearest node that there is.
+    /// The highest node that has falls.
+    fn highest(&self) -> usize {
+        self.starts.len() - 2
+    }
+
+    /// One of the falls of a node up to the highest, any number.
     fn fall(&self, node: usize, variant: u32) -> &[FallBatch] {
-        let node = node.min(self.starts.len() - 2);
         let (start, end) = (self.starts[node], self.starts[node + 1]);
         let count = (end - start) / VARIANTS as usize;
         &self.batches[start + (variant % VARIANTS) as usize * count..][..count]
@@ -171,7 +175,8 @@ impl Collisions {
         let [a, b, c, d] = self.key.words(u64::from(index), step, SOURCE);
         let below = (source.node as usize).min(NODES - 2);
         let about = below + usize::from(uniform(a) < source.node - below as f32);
-        let node = self.deposition.draw_node_about(about, uniform_f64(b, d));
+        // What is beyond the falls is drawn as the hardest of them: their number of collisions and the light of each belong together.
+        let node = self.deposition.draw_node_about(about, uniform_f64(b, d)).min(self.falls.highest());
         Fall { batches: self.falls.fall(node, c), pairs: self.pairs[node], first: (c >> 8) as usize / BATCH * BATCH }
     }
 }

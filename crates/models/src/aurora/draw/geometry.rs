@@ -6,8 +6,8 @@
 
 use bansho_base::math::{self, DVec2, DVec3, Fused, lanes};
 
-/// Radius of the Earth, km.
-pub(in crate::aurora) const EARTH_RADIUS_KM: f64 = 6371.0;
+pub(in crate::aurora) use bansho_base::sky::EARTH_RADIUS_KM;
+
 /// Altitude of the plane on which feet are drawn, km.
 pub(in crate::aurora) const FOOT_KM: f64 = 100.0;
 /// Least dip that is drawn, degrees: nearer the magnetic equator there are no auroras, and field lines would not reach

@@ -11,6 +11,7 @@ mod chart;
 mod cloud;
 mod collisions;
 mod descent;
+mod exposure;
 mod footprint;
 mod geometry;
 mod lighting;
@@ -25,6 +26,7 @@ mod shading;
 mod sources;
 #[cfg(test)]
 mod tests;
+mod wander;
 
 pub use parameters::{Blur, BlurParameters, DrawingParameters, FallModel, Sampling};
 pub use phenomenon::Aurora;

@@ -7,7 +7,7 @@ use bansho_base::{
     math::DVec3,
     observer::{Cancelled, Observer},
     parameters::Parameter,
-    phenomenon::{Phenomenon, Prepared, SnapshotError, Stepping},
+    phenomenon::{Phenomenon, Prepared, Remark, SnapshotError, Stepping},
     point_cloud::PointCloud,
     random::Key,
     surroundings::{Publication, Surroundings},
@@ -17,17 +17,20 @@ use super::{
     Sampling,
     cloud::point_cloud,
     collisions::Collisions,
+    exposure,
     geometry::FieldLines,
     maps::MAPS,
     prepared::{DEPTHS, PreparedAurora},
     profile::Profiles,
     shading::Shading,
-    sources::{Light, nearest_node, wander_km},
+    sources::{Light, nearest_node},
+    wander::Wander,
 };
 use crate::aurora::{
-    AuroraParameters,
+    AuroraParameters, energies,
+    light::{Emission, LINES, Line},
     particles::AuroraSimulation,
-    precipitation::fall::Falls,
+    precipitation::energy::HIGHEST_EV,
     shapes::{Sequence, ShapeFault, ShapeFaultKind},
 };
 
@@ -46,8 +49,12 @@ pub struct Aurora {
     pub(super) shading: Shading,
     /// What single collisions are drawn from, where they are asked for.
     pub(super) collisions: Option<Collisions>,
-    /// How far collisions wander from their field line, km.
-    wander_km: f64,
+    /// How far collisions wander from their field line.
+    wander: Wander,
+    /// Luminance of the brightest column of all shapes, cd/m^2.
+    brightest: f64,
+    /// The shape, counted from 0, on whose way sheets first pass through each other.
+    crossing: Option<usize>,
     /// In a loop: for how long one run passes into the next, s.
     dissolve: f64,
 }
@@ -65,6 +72,17 @@ fn close_loop(parameters: &mut AuroraParameters, turn: f64) -> Result<f64, Shape
     Ok(dissolve)
 }
 
+/// Luminance of the brightest column among control points with these factors of flux and energy, cd/m^2: the softest electrons at the
+/// greatest flux.
+fn brightest(parameters: &AuroraParameters, emission: &Emission, factors: &[[f64; 2]]) -> f64 {
+    let (flux, energy_ev) = (parameters.flux_mw_per_m2.bounds()[1], parameters.energy_ev.bounds()[0]);
+    let luminance = |[flux_factor, energy_factor]: &[f64; 2]| {
+        let column = emission.column_colour(energy_ev * energy_factor).map(|value| value as f32);
+        flux * flux_factor * f64::from(color::luminance(column))
+    };
+    factors.iter().map(luminance).fold(0.0, f64::max)
+}
+
 impl Aurora {
     /// The aurora `name` of a scene; drawings of its shapes come from `assets`.
     ///
@@ -79,13 +97,15 @@ impl Aurora {
     ) -> Result<Self, ShapeFault> {
         let sequence = Sequence::new(&parameters.shapes, &parameters.motion, parameters.extent_km, assets, loop_s)?;
         let dissolve = loop_s.map_or(Ok(0.0), |turn| close_loop(&mut parameters, turn))?;
+        energies::check(&parameters)?;
+        let crossing = sequence.crossing();
+        let factors: Vec<[f64; 2]> = sequence.factors().collect();
         let simulation = AuroraSimulation::new(parameters, sequence, name, seed);
         let parameters = simulation.parameters();
-        let falls = Falls::new(simulation.emission().deposition(), 0.0);
-        let node = nearest_node(parameters.energy_ev.at(0.0));
-        let fall = falls.fall(node, Key::new(seed, name), 0).map(|collision| f64::from(collision.altitude_km));
         let by_collisions = parameters.drawing.sampling == Sampling::Collisions;
-        let hardest = nearest_node(parameters.energy_ev.bounds()[1]) + SPECTRUM_NODES;
+        let hardest = factors.iter().fold(1.0, |most: f64, [_, energy]| most.max(*energy));
+        let hardest = (hardest * parameters.energy_ev.bounds()[1]).min(HIGHEST_EV);
+        let hardest = nearest_node(hardest) + SPECTRUM_NODES;
         let key = Key::new(seed, name);
         let collisions = || Collisions::new(simulation.emission(), &parameters.drawing, hardest, key);
         Ok(Self {
@@ -93,8 +113,10 @@ impl Aurora {
             collisions: by_collisions.then(collisions),
             profiles: Profiles::new(simulation.emission()),
             shading: Shading::new(&parameters.drawing.air),
-            wander_km: wander_km(&fall.collect::<Vec<_>>(), parameters.drawing.wobble),
+            wander: Wander::new(simulation.emission(), &parameters.drawing, key),
+            brightest: brightest(parameters, simulation.emission(), &factors),
             simulation,
+            crossing,
             dissolve,
         })
     }
@@ -111,18 +133,18 @@ impl Aurora {
         FieldLines::new(parameters.dip_deg, parameters.declination_deg, place)
     }
 
-    /// What its light is made from.
-    pub(super) fn light(&self, view: &View) -> Light<'_> {
-        let (simulation, parameters) = (&self.simulation, self.simulation.parameters());
-        let afterglow = simulation.afterglow();
+    /// What the light of a state of its simulation is made from at a time, s.
+    pub(super) fn light<'a>(&self, simulation: &'a AuroraSimulation, t: f64) -> Light<'a> {
+        let (parameters, afterglow) = (simulation.parameters(), simulation.afterglow());
+        let energy_ev = parameters.energy_ev.at(t);
         Light {
             particles: simulation.particles(),
             glow: [&afterglow.green, &afterglow.red],
             emission: simulation.emission(),
             parameters: &parameters.drawing,
             spacing_km: simulation.spacing_km(),
-            energy_ev: parameters.energy_ev.at(view.shutter.middle()),
-            wander_km: self.wander_km,
+            energy_ev,
+            wander_km: self.wander.at(energy_ev),
         }
     }
 }
@@ -131,8 +153,13 @@ const fn brightness(name: &'static str, doc: &'static str) -> AovDescriptor {
     AovDescriptor { name, unit: "kR", doc, rule: AovRule::Sum }
 }
 
-/// Which of the [`LINES`](crate::aurora::light::LINES) the AOVs measure.
-pub(super) const MEASURED: [usize; 5] = [0, 1, 4, 3, 6];
+/// Wavelengths of the lines that the AOVs measure, nm.
+pub(super) const MEASURED: [f64; 5] = [557.7, 630.0, 427.8, 391.4, 670.5];
+
+/// The lines of [`MEASURED`].
+pub(super) fn measured_lines() -> impl Iterator<Item = &'static Line> {
+    MEASURED.iter().filter_map(|nm| LINES.iter().find(|line| (line.wavelength_nm - nm).abs() < 0.05))
+}
 
 /// What an aurora can write beside its light, in the order of [`MEASURED`] and then of [`MAPS`].
 const AOVS: &[AovDescriptor] = &[
@@ -163,10 +190,7 @@ impl Phenomenon for Aurora {
     }
 
     fn luminance(&self) -> f64 {
-        let parameters = self.simulation.parameters();
-        let column = self.simulation.emission().column_colour(parameters.energy_ev.bounds()[0]);
-        let flux = parameters.flux_mw_per_m2.bounds()[1];
-        BRIGHT_PER_COLUMN * flux * f64::from(color::luminance(column.map(|value| value as f32)))
+        BRIGHT_PER_COLUMN * self.brightest
     }
 
     fn stepping(&self) -> Option<Stepping> {
@@ -178,6 +202,10 @@ impl Phenomenon for Aurora {
         self.simulation.step();
     }
 
+    fn drawn_from(&self, shutter: Shutter) -> f64 {
+        if exposure::is_long(shutter) { shutter.open } else { shutter.middle() }
+    }
+
     fn snapshot(&self) -> Vec<u8> {
         self.simulation.snapshot()
     }
@@ -187,11 +215,22 @@ impl Phenomenon for Aurora {
     }
 
     fn particles(&self, t: f64) -> Option<PointCloud> {
-        Some(point_cloud(self.simulation.particles(), t - self.simulation.time()))
+        let step = AuroraSimulation::STEP_S;
+        if t - self.simulation.time() <= step {
+            return Some(point_cloud(self.simulation.particles(), t - self.simulation.time()));
+        }
+        // In the midst of a long exposure.
+        let mut simulation = self.simulation.clone();
+        exposure::step_until(&mut simulation, t);
+        Some(point_cloud(simulation.particles(), t - simulation.time()))
     }
 
-    fn publish(&self, shutter: Shutter) -> Publication {
-        Publication { lights: self.lamp(shutter.middle()).into_iter().collect(), ..Publication::default() }
+    fn publish(&self, _shutter: Shutter) -> Publication {
+        Publication { lights: self.lamp().into_iter().collect(), ..Publication::default() }
+    }
+
+    fn remark(&self, _surroundings: &Surroundings) -> Option<Remark> {
+        self.crossing.map(|shape| Remark::Crossing { shape: shape + 1 })
     }
 
     fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {

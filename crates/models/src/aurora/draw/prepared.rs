@@ -20,13 +20,13 @@ use super::{
     geometry::{EARTH_RADIUS_KM, FieldLines, dot},
     maps::Maps,
     meridians::{Meridians, Sampler},
-    phenomenon::MEASURED,
+    phenomenon::{MEASURED, measured_lines},
     shading::Shading,
-    sources::{Moments, Sources},
+    sources::Sources,
 };
 use crate::{
     aurora::{
-        light::{LINES, PerEmitter},
+        light::{Line, PerEmitter},
         particles::AuroraSimulation,
     },
     directions::Directions,
@@ -38,11 +38,6 @@ pub(super) const BATCH: usize = 16;
 const DEPTH_KM: f64 = 110.0;
 /// Fainter than this is no aurora to a depth, kR.
 const FAINTEST: f32 = 0.05;
-/// Motion of the picture while the shutter is open that one instant stands for, pixels, and the most instants.
-const PIXELS_PER_INSTANT: f64 = 1.0;
-const MOST_INSTANTS: f64 = 16.0;
-/// The same for particles, beside their own spread: what is left between two instants adds to that.
-const SPREADS_PER_INSTANT: f64 = 3.0;
 
 const TAU: f32 = std::f32::consts::TAU;
 
@@ -64,6 +59,8 @@ pub(super) struct PreparedAurora<'a> {
     shown: Shown,
     /// Light by emitter on a sharp and a coarser chart, where it is measured.
     measured: Option<[Meridians; 2]>,
+    /// The lines that are measured.
+    lines: Vec<&'static Line>,
     /// Made where they are asked for.
     maps: OnceLock<Maps<'a>>,
 }
@@ -79,7 +76,7 @@ enum Shown {
 impl<'a> PreparedAurora<'a> {
     pub(super) fn new(aurora: &'a Aurora, view: &'a View, observer: &dyn Observer) -> Result<Self, Cancelled> {
         let field = aurora.field_lines(view.camera.position);
-        let sources = Sources::new(&aurora.light(view), &field, &aurora.moments(view));
+        let sources = aurora.sources(view, &field);
         check(observer)?;
         let charts = Charts { aurora, field: &field, coverage: Coverage::of_view(view, &field) };
         let (sharp, soft) = rayon::join(|| charts.sharp(&sources), || charts.soft(&sources));
@@ -93,7 +90,7 @@ impl<'a> PreparedAurora<'a> {
             Shown::Seen(sharp.seen(&soft, &field, &aurora.shading))
         };
         // What is blurred in the picture is blurred at one instant.
-        let cameras = if matches!(shown, Shown::Blurred(_)) { vec![view.camera] } else { cameras(view) };
+        let cameras = if matches!(shown, Shown::Blurred(_)) { vec![view.camera] } else { view.cameras() };
         Ok(Self {
             aurora,
             view,
@@ -104,6 +101,7 @@ impl<'a> PreparedAurora<'a> {
             field,
             shown,
             measured,
+            lines: measured_lines().collect(),
             maps: OnceLock::new(),
         })
     }
@@ -139,43 +137,6 @@ impl Charts<'_> {
         let footprint = Footprint::new(&sources.soft, &chart, spread_km);
         // Always by the mean fall: in a cell that shines for a minute thousands of falls have come together.
         Meridians::new(chart, self.field, &self.aurora.profiles, &footprint)
-    }
-}
-
-/// Cameras at as many instants as the picture's motion while the shutter is open needs.
-fn cameras(view: &View) -> Vec<Camera> {
-    let [open, close] = [view.shutter.open, view.shutter.close].map(|t| view.camera_at(t));
-    let moved = |x: f64, y: f64| {
-        let place = |camera: &Camera| camera.direction(DVec2::new(x * camera.size[0], y * camera.size[1]));
-        let pair = place(&open).zip(place(&close));
-        pair.map_or(0.0, |(a, b)| math::acos(a.normalize().dot(b.normalize()).clamp(-1.0, 1.0)) * open.focal_pixels)
-    };
-    let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.5, 0.5]].map(|[x, y]| moved(x, y));
-    let most = corners.into_iter().fold(0.0, f64::max);
-    let count = (most / PIXELS_PER_INSTANT).ceil().clamp(1.0, MOST_INSTANTS) as usize;
-    if count == 1 {
-        return vec![view.camera];
-    }
-    (0..count).map(|instant| view.camera_at(view.shutter.instant(instant, count))).collect()
-}
-
-impl Aurora {
-    /// When particles are drawn: more often where they get far while the shutter is open.
-    fn moments(&self, view: &View) -> Moments {
-        let particles = self.simulation.particles();
-        let squares: f64 = particles.velocities.iter().flatten().map(|speed| f64::from(speed * speed)).sum();
-        let speed = math::sqrt(squares / particles.len().max(1) as f64);
-        let spread = self.light(view).spread_km();
-        let way = speed * view.shutter.duration();
-        let count = (2.0 * way / (SPREADS_PER_INSTANT * spread)).ceil().clamp(1.0, MOST_INSTANTS);
-        // Standard deviation of an even spread over the way of one instant, along each of the two directions.
-        let smear_km = way / count * math::sqrt(1.0 / 24.0);
-        let count = count as usize;
-        let now = self.simulation.time();
-        // A long exposure has its own afterglow: particles are never taken further than a step.
-        let step = AuroraSimulation::STEP_S;
-        let later = (0..count).map(|instant| (view.shutter.instant(instant, count) - now).clamp(-step, step)).collect();
-        Moments { later, smear_km }
     }
 }
 
@@ -385,8 +346,7 @@ impl PreparedAurora<'_> {
         direction: Option<DVec3>,
         share: f32,
     ) {
-        for (plane, line) in strip.aovs.iter_mut().zip(MEASURED) {
-            let line = &LINES[line];
+        for (plane, line) in strip.aovs.iter_mut().zip(&self.lines) {
             plane.add(index, light[line.emitter.index()] * line.photons as f32, 1.0);
         }
         let maps = self.maps.get_or_init(|| Maps::new(&self.aurora.simulation));

@@ -1,7 +1,7 @@
 //! What shines: particles for light that leaves at once, the afterglow's cells for green and red.
 
 use bansho_base::{
-    math::{self, Fused, lanes},
+    math::{self, Fused},
     parameters::Auto,
 };
 use fearless_simd::{Level, dispatch};
@@ -17,7 +17,7 @@ use crate::{
         afterglow::{GlowCell, GlowMap},
         light::{Emission, Emitter},
         particles::AuroraParticles,
-        precipitation::energy::{LOWEST_EV, NODES, node_energy_ev},
+        precipitation::energy::{LOWEST_EV, NODES, node_energy_ev, node_of},
     },
     lanes::LANES,
 };
@@ -31,7 +31,8 @@ const FAINTEST: f32 = 2e-4;
 /// 1000 W, the power of one mW/m^2 on one km^2.
 const PER_UNIT: f32 = 1e-3;
 
-/// What an aurora shines with at a moment.
+/// What an aurora shines with at a moment, or on average.
+#[derive(Default)]
 pub(super) struct Sources {
     /// Light with fine detail: particles and the green map.
     pub(super) sharp: Vec<Source>,
@@ -127,19 +128,12 @@ impl Maker<'_> {
     }
 }
 
-/// Place of an energy among the nodes of the grid of energies.
-#[inline(always)]
-pub(super) fn node_of(energy_ev: f32) -> f32 {
-    const PER_OCTAVE: f32 = 32.0 * std::f32::consts::LOG10_2;
-    (PER_OCTAVE * lanes::log2(energy_ev * (1.0 / LOWEST_EV) as f32)).clamp(0.0, (NODES - 1) as f32)
-}
-
 impl Sources {
     /// What shines while the shutter is open.
     pub(super) fn new(light: &Light, field: &FieldLines, moments: &Moments) -> Self {
         let ((green_w, green), red) = rayon::join(
             || light.glow[0].shared_out(light.particles, FAINTEST),
-            || light.glow[1].cells().collect::<Vec<_>>(),
+            || light.glow[1].bright_cells(FAINTEST),
         );
         let column = light.emission.column(light.energy_ev);
         let spread = math::hypot(light.spread_km(), moments.smear_km);
@@ -156,6 +150,20 @@ impl Sources {
         }
         let soft = maker(red_spread, 1.0).cells(&red, RED);
         Self { sharp, soft, spread_km: [spread, red_spread] }
+    }
+}
+
+impl Sources {
+    /// Adds others with a share of their power.
+    pub(super) fn add(&mut self, others: &Self, share: f32) {
+        let first = self.sharp.is_empty() && self.soft.is_empty();
+        for (own, others) in [(&mut self.sharp, &others.sharp), (&mut self.soft, &others.soft)] {
+            let dimmed = |source: &Source| Source { power: source.power.map(|power| share * power), ..*source };
+            own.extend(others.iter().map(dimmed));
+        }
+        for (own, other) in self.spread_km.iter_mut().zip(others.spread_km) {
+            *own = if first { other } else { own.min(other) };
+        }
     }
 }
 
@@ -192,19 +200,6 @@ impl Light<'_> {
         };
         math::hypot(own, self.wander_km).max(1e-3)
     }
-}
-
-/// Root mean square distance from the field line, along one direction, of the collisions of an electron whose altitudes
-/// in km these are (from the first on) and whose every collision turns it by a tangent of rms `wobble`.
-pub(super) fn wander_km(altitudes_km: &[f64], wobble: f64) -> f64 {
-    let mut variance = 0.0;
-    let mut sum = 0.0;
-    for pair in altitudes_km.windows(2) {
-        let step = wobble * (pair[0] - pair[1]).max(0.0);
-        variance += step * step;
-        sum += variance;
-    }
-    math::sqrt(sum / altitudes_km.len().max(1) as f64)
 }
 
 /// The node of the grid that is nearest to an energy.

@@ -5,18 +5,22 @@ use bansho_base::{
     assets::MemoryAssets,
     camera::{CameraParameters, Lens},
     canvas::{Shutter, View},
+    color,
+    curve::{Curve, Interpolation},
     math::{self, DVec2, DVec3},
+    phenomenon::Phenomenon,
     random::Key,
 };
 
 use super::{
-    Aurora, BlurParameters, DrawingParameters, FallModel,
+    Aurora, BlurParameters, DrawingParameters, FallModel, Sampling,
     blur::Blurred,
     chart::{Chart, Coverage},
     collisions::Collisions,
     footprint::{Footprint, REACH, Source},
     geometry::{EARTH_RADIUS_KM, FieldLines},
     meridians::Meridians,
+    phenomenon::measured_lines,
     prepared::{Batch, Charts},
     profile::Profiles,
     sources::{Maker, Shares, Sources, nearest_node},
@@ -27,6 +31,7 @@ use crate::aurora::{
     atmosphere::atmosphere,
     light::{EMITTERS, Emission, Emitter, PerEmitter},
     precipitation::spectrum::ARC,
+    shapes::{ShapeParameters, SheetParameters},
 };
 
 const ENERGY_EV: f64 = 5000.0;
@@ -178,14 +183,19 @@ fn difference(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> f64 {
 
 /// How far the mean of 64 pictures of collisions is from the picture of the mean fall, and that one.
 fn collisions_beside_profile(emission: &Emission, drawing: &DrawingParameters) -> (f64, Meridians) {
+    let collisions = Collisions::new(emission, drawing, nearest_node(6.0 * ENERGY_EV), Key::new(5, "aurora"));
+    beside_profile(emission, &collisions, &arc(8000))
+}
+
+/// The same for an arc of cells.
+fn beside_profile(emission: &Emission, collisions: &Collisions, cells: &[GlowCell]) -> (f64, Meridians) {
     let (profiles, view, field) =
         (Profiles::new(emission), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
-    let sources = sources(&arc(8000), PROMPT_AND_GREEN, 1.5, &field);
+    let sources = sources(cells, PROMPT_AND_GREEN, 1.5, &field);
     // Low rows, since single points are spread over two of them.
     let chart = || Chart::new(&Coverage::of_view(&view, &field), STEP, 0.5 * STEP);
     let footprint = Footprint::new(&sources, &chart(), spread_of(&sources));
     let expected = Meridians::new(chart(), &field, &profiles, &footprint);
-    let collisions = Collisions::new(emission, drawing, nearest_node(6.0 * ENERGY_EV), Key::new(5, "aurora"));
     let mut mean = vec![[0.0; 4]; expected.light.len()];
     for step in 0..64 {
         let picture = collisions.draw(chart(), &field, &footprint, step);
@@ -200,6 +210,58 @@ fn collisions_beside_profile(emission: &Emission, drawing: &DrawingParameters) -
 fn the_mean_of_many_collision_pictures_is_the_profile() {
     let (apart, _) = collisions_beside_profile(&emission(), &DrawingParameters::default());
     assert!(apart < 0.03, "{apart}");
+}
+
+/// A sheet with the greatest energy factor that a scene may give, and the falls that its aurora has for it.
+#[test]
+fn collisions_lose_no_light_on_hard_sheets() {
+    const FACTOR: f64 = 20.0;
+    let sheet = SheetParameters {
+        energy: Curve::new(vec![[0.0, FACTOR]], Interpolation::Linear).unwrap(),
+        ..SheetParameters::default()
+    };
+    let parameters = AuroraParameters {
+        energy_ev: Animated::from(0.2 * ENERGY_EV),
+        particles: ParticleParameters { count: 100, ..ParticleParameters::default() },
+        shapes: vec![ShapeParameters { sheets: vec![sheet], ..ShapeParameters::default() }],
+        drawing: DrawingParameters { sampling: Sampling::Collisions, ..DrawingParameters::default() },
+        ..AuroraParameters::default()
+    };
+    let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
+    let mut cells = arc(3000);
+    cells.iter_mut().for_each(|cell| cell.energy_ev *= (0.2 * FACTOR) as f32);
+    let (apart, _) = beside_profile(aurora.simulation().emission(), aurora.collisions.as_ref().unwrap(), &cells);
+    assert!(apart < 0.03, "{apart}");
+}
+
+#[test]
+fn every_measured_line_is_there_and_named_by_its_wavelength() {
+    let names = measured_lines().map(|line| format!("kilorayleigh_{}", line.wavelength_nm as i64));
+    let parameters = AuroraParameters {
+        particles: ParticleParameters { count: 100, ..ParticleParameters::default() },
+        ..AuroraParameters::default()
+    };
+    let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
+    assert_eq!(names.collect::<Vec<_>>(), aurora.aovs().iter().take(5).map(|aov| aov.name).collect::<Vec<_>>());
+}
+
+#[test]
+fn auto_exposure_knows_the_flux_and_energy_of_sheets() {
+    let luminance = |flux: f64, energy: f64| {
+        let even = |value: f64| Curve::new(vec![[0.0, value]], Interpolation::Linear).unwrap();
+        let sheet = SheetParameters { flux: even(flux), energy: even(energy), ..SheetParameters::default() };
+        let parameters = AuroraParameters {
+            particles: ParticleParameters { count: 100, ..ParticleParameters::default() },
+            shapes: vec![ShapeParameters { sheets: vec![sheet], ..ShapeParameters::default() }],
+            ..AuroraParameters::default()
+        };
+        Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap().luminance()
+    };
+    let plain = luminance(1.0, 1.0);
+    assert!((luminance(8.0, 1.0) / plain - 8.0).abs() < 1e-9);
+    let emission = emission();
+    let column = |energy_ev| f64::from(color::luminance(emission.column_colour(energy_ev).map(|value| value as f32)));
+    assert!((luminance(1.0, 0.2) / plain / (column(1000.0) / column(5000.0)) - 1.0).abs() < 1e-6);
 }
 
 /// The row of a picture above which half of an emitter's light is, from the magnetic zenith on.

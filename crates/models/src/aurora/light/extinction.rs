@@ -44,12 +44,6 @@ impl Extinction {
     }
 }
 
-/// The thesis's dimming by depth, `exp(-(d z)^2)` (2.27), d in the inverse unit of z.
-#[must_use]
-pub fn square_exponential(d: f64, z: f64) -> f64 {
-    math::exp(-(d * z) * (d * z))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -75,11 +69,5 @@ mod tests {
         assert!(air.transmittance(557.7, 0.1) < air.transmittance(557.7, 1.0));
         let overhead = math::pow(10.0, -0.4 * green);
         assert!((air.transmittance(557.7, std::f64::consts::FRAC_PI_2) / overhead - 1.0).abs() < 1e-3);
-    }
-
-    #[test]
-    fn the_paper_dims_by_a_square_exponential() {
-        assert_eq!(square_exponential(0.5, 2.0), math::exp(-1.0));
-        assert_eq!(square_exponential(0.5, 0.0), 1.0);
     }
 }

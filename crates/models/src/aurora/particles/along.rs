@@ -2,7 +2,7 @@
 
 use bansho_base::math::DVec2;
 
-use crate::aurora::shapes::{Shape, Sheet};
+use crate::aurora::shapes::{Shape, Sheet, lengths};
 
 /// Distance in the coordinate from one sheet of the first shape to the next, km: no two show the same rays.
 const SHEET_KM: f64 = 40_000.0;
@@ -83,16 +83,6 @@ impl Along {
 
 fn points(shape: &Shape) -> Vec<Vec<DVec2>> {
     shape.sheets.iter().map(|sheet| sheet.points.clone()).collect()
-}
-
-/// Length up to each point.
-fn lengths(points: &[DVec2]) -> Vec<f64> {
-    let mut sum = 0.0;
-    let step = |index: usize| {
-        sum += if index > 0 { points[index].distance(points[index - 1]) } else { 0.0 };
-        sum
-    };
-    (0..points.len()).map(step).collect()
 }
 
 /// Whether a step of the coordinate over a segment of that length may be one sheet's.

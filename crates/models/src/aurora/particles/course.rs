@@ -9,7 +9,7 @@ use bansho_base::{
 use super::along::Along;
 use crate::aurora::{
     AuroraParameters, FoldParameters,
-    shapes::{Bridge, Neighbourhood, Segments, Shape, Sheet},
+    shapes::{Bridge, Neighbourhood, Segments, Shape, Sheet, lengths},
 };
 
 /// Pieces that a fold is made of, at least.
@@ -220,11 +220,8 @@ impl Part {
 
 /// Share of the length before each point; 0 everywhere where there is no length.
 fn length_shares(points: &[DVec2]) -> Vec<f64> {
-    let mut ends = vec![0.0];
-    for pair in points.windows(2) {
-        ends.push(ends[ends.len() - 1] + pair[0].distance(pair[1]));
-    }
-    let length = ends[ends.len() - 1].max(f64::MIN_POSITIVE);
+    let ends = lengths(points);
+    let length = ends.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
     ends.iter().map(|end| end / length).collect()
 }
 

@@ -18,7 +18,7 @@ use super::{
     scatter::Scattered,
 };
 use crate::{
-    aurora::{AuroraParameters, FieldSolver, shapes::FRAME_S},
+    aurora::{AuroraParameters, FieldCharge, FieldSolver, shapes::FRAME_S},
     field::{Grid2, PoissonSolver, relax},
 };
 
@@ -125,8 +125,8 @@ impl FieldMaker {
         sums
     }
 
-    /// Charge density over eps, eq. (2.2): such that all sheets pull alike, however many particles stand for them, and are at one
-    /// potential all along.
+    /// Charge density over eps, eq. (2.2): such that all sheets pull alike, however many particles stand for them, and unless it shall be
+    /// even are at one potential all along.
     pub(super) fn source(&self, course: &Course, scattered: &[Scattered], counts: &Grid2) -> Grid2 {
         let half_thickness = self.parameters.half_thickness_km();
         let density = self.edge_field() / half_thickness;
@@ -150,7 +150,8 @@ impl FieldMaker {
             source
         };
         // Sheets that do not pull have no potential to be at.
-        let adjustments = if density > 0.0 { ADJUSTMENTS } else { 0 };
+        let is_conductor = self.parameters.field.charge == FieldCharge::Conductor;
+        let adjustments = if density > 0.0 && is_conductor { ADJUSTMENTS } else { 0 };
         for _ in 0..adjustments {
             charge.adjust(course, &self.solved(source(&charge)), wanted);
         }

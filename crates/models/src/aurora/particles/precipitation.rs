@@ -19,8 +19,10 @@ use crate::aurora::{
 const TASK: usize = 4096;
 /// What a particle far from every sheet keeps of its power in a step.
 const STRAY: f32 = 0.85;
-/// Stretches of a sheet that have their drawn power each.
-const STRETCHES: usize = 32;
+/// Nodes along a sheet between which stretches lie that have their drawn power each.
+const COARSE: usize = 33;
+/// Nodes along a sheet between which the particles' own density is evened out: where a fold is born they lie in a heap for seconds.
+const FINE: usize = 257;
 /// Where particles are scarce, one gets at most this many times what it would have if all were evenly spread.
 const MOST_UNEVEN: f64 = 6.0;
 /// The power of a particle comes this share nearer in a step to what it shall be.
@@ -35,9 +37,9 @@ pub(super) struct Precipitation {
     rays: Rays,
 }
 
-/// Values at nodes along each sheet, evenly spaced; between two of them is a stretch.
+/// Values at `COUNT` nodes along each sheet, evenly spaced; between two of them is a stretch.
 #[derive(Clone, Debug)]
-struct Nodes(Vec<[f64; STRETCHES + 1]>);
+struct Nodes<const COUNT: usize>(Vec<[f64; COUNT]>);
 
 /// A part of the arrays that one task works on.
 struct Stretch<'a> {
@@ -56,7 +58,7 @@ impl Precipitation {
     }
 
     /// Power of the electrons on all sheets without pulsation and black rays, by sheet and node, W: flux times length times thickness.
-    fn wanted(&self, course: &Course, time: f64) -> Nodes {
+    fn wanted(&self, course: &Course, time: f64) -> Nodes<COARSE> {
         let width = 2.0 * self.parameters.half_thickness_km();
         let flux = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * width;
         let mut wanted = Nodes::new(course.shape.sheets.len());
@@ -74,19 +76,25 @@ impl Precipitation {
     /// Gives every particle its share of the power.
     ///
     /// All together have the power of the sheets, and those along a stretch that of the stretch, however many they are: no
-    /// birth, death, split or merge can make the aurora flicker, and the flux along it is the one that was drawn. What is finer than
-    /// a stretch is the particles' own.
+    /// birth, death, split or merge can make the aurora flicker, and the flux along it is the one that was drawn. Within a stretch each
+    /// stands for the more of the sheet's length the fewer of them there are, and has the rays' pattern.
     pub(super) fn share_out(&self, particles: &mut AuroraParticles, (course, rays): (&Course, &RayTable), time: f64) {
         let sheets = course.shape.sheets.len();
-        let weigh = |part| self.weigh(part, course, (rays, time), Nodes::new(sheets));
-        let weights: Vec<Nodes> = stretches(particles).into_par_iter().map(weigh).collect();
+        let weigh = |part| self.weigh(part, course, (rays, time));
+        let weighed: Vec<Weighed> = stretches(particles).into_par_iter().map(weigh).collect();
+        let counts = weighed.iter().fold(Nodes::new(sheets), |sum, part| sum.plus(&part.counts));
+        let lengths = lengths(course).shared_by(&counts);
+        let add_up = |(part, weighed): (Stretch, &Weighed)| part.add_up(&weighed.weights, &lengths);
+        let weights: Vec<_> = stretches(particles).into_par_iter().zip(&weighed).map(add_up).collect();
         let weights = weights.iter().fold(Nodes::new(sheets), |sum, part| sum.plus(part));
         let factors = self.wanted(course, time).shared_by(&weights);
-        stretches(particles).into_par_iter().for_each(|part| part.brighten(&factors));
+        stretches(particles).into_par_iter().for_each(|part| part.brighten(&lengths, &factors));
     }
 
-    /// Weighs a stretch of particles, as negative powers while they wait for their factor, and adds up the weights before black rays and pulsation.
-    fn weigh(&self, part: Stretch, course: &Course, (rays, time): (&RayTable, f64), mut weights: Nodes) -> Nodes {
+    /// Weighs a stretch of particles, as negative powers while they wait for their factors.
+    fn weigh(&self, part: Stretch, course: &Course, (rays, time): (&RayTable, f64)) -> Weighed {
+        let mut weighed =
+            Weighed { counts: Nodes::new(course.shape.sheets.len()), weights: vec![0.0; part.fades.len()] };
         let (level, energy) = (Level::new(), self.parameters.energy_ev.at(time));
         let side_scale = 1.0 / self.parameters.half_thickness_km();
         for first in (0..part.fades.len()).step_by(LANES) {
@@ -108,7 +116,8 @@ impl Precipitation {
                     continue;
                 };
                 let weight = foot.flux as f32 * pattern.brightness[lane];
-                weights.add(foot.sheet, foot.share as f32, f64::from(part.fades[index] * weight));
+                weighed.counts.add(foot.sheet, foot.share as f32, f64::from(part.fades[index]));
+                weighed.weights[index] = weight;
                 part.powers[index] = -weight * pattern.dimming[lane];
                 let own = energy * foot.energy * f64::from(pattern.hardness[lane]);
                 part.energies[index] = own.clamp(LOWEST_EV, HIGHEST_EV) as f32;
@@ -116,18 +125,37 @@ impl Precipitation {
                 part.sheets[index] = foot.sheet;
             }
         }
-        weights
+        weighed
     }
 }
 
-impl Nodes {
+/// Length of the sheets by sheet and node, km: half a stretch on each side of a node.
+fn lengths(course: &Course) -> Nodes<FINE> {
+    let of_sheet = |length: &f64| {
+        let stretch = length / (FINE - 1) as f64;
+        let mut nodes = [stretch; FINE];
+        (nodes[0], nodes[FINE - 1]) = (0.5 * stretch, 0.5 * stretch);
+        nodes
+    };
+    Nodes(course.sheet_lengths().iter().map(of_sheet).collect())
+}
+
+/// A stretch of particles, weighed.
+struct Weighed {
+    /// How many there are along the sheets.
+    counts: Nodes<FINE>,
+    /// The weight of each before black rays and pulsation; 0 for strays.
+    weights: Vec<f32>,
+}
+
+impl<const COUNT: usize> Nodes<COUNT> {
     fn new(sheets: usize) -> Self {
-        Self(vec![[0.0; STRETCHES + 1]; sheets])
+        Self(vec![[0.0; COUNT]; sheets])
     }
 
     /// Adds a value to the two nodes around a place.
     fn add(&mut self, sheet: u32, share: f32, value: f64) {
-        let (node, part) = split(f64::from(share), STRETCHES + 1);
+        let (node, part) = split(f64::from(share), COUNT);
         let nodes = &mut self.0[sheet as usize];
         nodes[node] += value * (1.0 - part);
         nodes[node + 1] += value * part;
@@ -135,7 +163,7 @@ impl Nodes {
 
     /// Value at a place, linear between nodes.
     fn at(&self, sheet: u32, share: f32) -> f64 {
-        let (node, part) = split(f64::from(share), STRETCHES + 1);
+        let (node, part) = split(f64::from(share), COUNT);
         let nodes = &self.0[sheet as usize];
         nodes[node] + part * (nodes[node + 1] - nodes[node])
     }
@@ -169,11 +197,22 @@ impl Stretch<'_> {
         course.foot([f64::from(self.positions[0][index]), f64::from(self.positions[1][index])].into())
     }
 
-    /// Gives particles that wait for it their factor. Their power follows what it shall be with a delay: where two parts of a sheet
+    /// Adds up the weights of particles that stand for so much of the sheets' length each.
+    fn add_up(self, weights: &[f32], lengths: &Nodes<FINE>) -> Nodes<COARSE> {
+        let mut sums = Nodes::new(lengths.0.len());
+        for (index, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+            let (sheet, share) = (self.sheets[index], self.shares[index]);
+            sums.add(sheet, share, f64::from(self.fades[index] * weight) * lengths.at(sheet, share));
+        }
+        sums
+    }
+
+    /// Gives particles that wait for them their factors. Their power follows what it shall be with a delay: where two parts of a sheet
     /// lie close together, a particle that passes from the one to the other does not flash.
-    fn brighten(self, factors: &Nodes) {
+    fn brighten(self, lengths: &Nodes<FINE>, factors: &Nodes<COARSE>) {
         for (index, power) in self.powers.iter_mut().enumerate().filter(|(_, power)| power.is_sign_negative()) {
-            let wanted = -*power * factors.at(self.sheets[index], self.shares[index]) as f32;
+            let (sheet, share) = (self.sheets[index], self.shares[index]);
+            let wanted = -*power * (lengths.at(sheet, share) * factors.at(sheet, share)) as f32;
             let full = &mut self.full_powers[index];
             *full = if *full > 0.0 { *full + FOLLOWING * (wanted - *full) } else { wanted };
             *power = self.fades[index] * *full;

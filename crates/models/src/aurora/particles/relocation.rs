@@ -131,7 +131,8 @@ impl Relocation {
             }
             let velocity = residents.mean_velocity(particles, cell, columns);
             let corner = DVec2::new((cell % columns) as f64, (cell / columns) as f64);
-            for _ in 0..deficit as u64 {
+            let room = MOST_PARTICLES * self.count - (particles.len() + births.len()) as f64;
+            for _ in 0..deficit.min(room.max(0.0)) as u64 {
                 let id = first_id + births.len() as u64;
                 let [u, v, ..] = self.key.words(id, renewal, BIRTH).map(|word| f64::from(uniform(word)));
                 let place = origin + (corner + DVec2::new(u, v)) * field.counts.spacing();
@@ -169,6 +170,9 @@ impl Relocation {
         }
     }
 }
+
+/// However many births the table asks for, there are never more particles than this many times their number.
+const MOST_PARTICLES: f64 = 4.0;
 
 /// Cells that are near the shape: their scatter count is high and their potential low enough, beside the means over all cells.
 pub(super) fn near_cells(field: &Field, table: &RelocationParameters) -> Vec<bool> {

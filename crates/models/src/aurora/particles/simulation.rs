@@ -205,7 +205,7 @@ impl AuroraSimulation {
         state.steps += 1;
         state.along = along;
         precipitation.share_out(&mut state.particles, (&course, &rays), time);
-        state.afterglow.step(&state.particles, emission, making.parameters.energy_ev.at(time), Self::STEP_S);
+        state.afterglow.step(&state.particles, emission, Self::STEP_S);
     }
 
     /// The state as bytes.

@@ -1,6 +1,6 @@
 //! The grid of electron energies on which tables stand: 32 to a decade, 100 eV to 100 keV.
 
-use bansho_base::math;
+use bansho_base::math::{self, lanes};
 
 /// Lowest energy, eV: below it the parametrisation of Fang et al. (2010) ends.
 pub const LOWEST_EV: f64 = 100.0;
@@ -24,6 +24,13 @@ pub fn locate(energy_ev: f64) -> (usize, f64) {
     (node, place - node as f64)
 }
 
+/// Place of an energy among the nodes, for the vector loops of pictures.
+#[inline(always)]
+pub(in crate::aurora) fn node_of(energy_ev: f32) -> f32 {
+    const PER_OCTAVE: f32 = PER_DECADE as f32 * std::f32::consts::LOG10_2;
+    (PER_OCTAVE * lanes::log2(energy_ev * (1.0 / LOWEST_EV) as f32)).clamp(0.0, (NODES - 1) as f32)
+}
+
 /// One of the two nodes around an energy, such that the mean over `uniform` in [0, 1) is what lies linearly between them.
 #[must_use]
 pub fn choose_node(energy_ev: f64, uniform: f64) -> usize {
@@ -43,6 +50,7 @@ mod tests {
         for node in 0..NODES {
             let (found, part) = locate(node_energy_ev(node));
             assert!((found as f64 + part - node as f64).abs() < 1e-9);
+            assert!((f64::from(node_of(node_energy_ev(node) as f32)) - node as f64).abs() < 1e-3);
         }
         assert_eq!((locate(0.0), locate(f64::NAN), locate(1e9)), ((0, 0.0), (0, 0.0), (NODES - 2, 1.0)));
     }

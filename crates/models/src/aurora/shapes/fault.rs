@@ -192,6 +192,18 @@ pub enum ShapeFaultKind {
     /// A time that is said in two ways.
     #[error("says both `after_s` and `after_frames`; allowed: one of them")]
     SecondsAndFrames,
+    /// Electrons of an energy that the tables of the air do not hold.
+    #[error(
+        "at {at} of its length sheet {sheet} has electrons of {energy_ev:.0} eV, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV"
+    )]
+    EnergyOutside {
+        /// The entry of the shape's list of sheets.
+        sheet: usize,
+        /// Share of its length.
+        at: f64,
+        /// The energy, eV.
+        energy_ev: f64,
+    },
     /// A loop that is no length of time.
     #[error("a loop of {seconds} s; allowed: more than 0")]
     LoopLength {

@@ -80,15 +80,26 @@ struct Goal<'a> {
     anchors: &'a Anchors,
 }
 
-/// Whether two drawn shapes are the same, sheet by sheet.
+/// Whether two drawn shapes are the same, sheet by sheet: where they lie, and their flux and energy along them.
 fn same(first: &[DrawnSheet], last: &[DrawnSheet], extent_km: f64) -> bool {
     const SAMPLES: usize = 64;
     let near = |a: &DVec2, b: &DVec2| a.distance(*b) < 1e-6 * extent_km;
     let same_sheet = |(a, b): (&DrawnSheet, &DrawnSheet)| {
-        let [a, b] = [a, b].map(|sheet| sheet.line.evenly(SAMPLES));
-        a.iter().zip(&b).all(|(a, b)| near(a, b))
+        let [first, last] = [a, b].map(|sheet| sheet.line.evenly(SAMPLES));
+        first.iter().zip(&last).all(|(a, b)| near(a, b)) && same_curves(&a.curves, &b.curves)
     };
     first.len() == last.len() && first.iter().zip(last).all(same_sheet)
+}
+
+/// Whether flux and energy are the same at every place where a control point may be.
+fn same_curves(first: &[Curve; 2], last: &[Curve; 2]) -> bool {
+    const SAMPLES: usize = 512;
+    let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+    let same_at = |share: f64| {
+        let [a, b] = [values(first, share), values(last, share)];
+        near(a[0], b[0]) && near(a[1], b[1])
+    };
+    first == last || (0..=SAMPLES).all(|sample| same_at(sample as f64 / SAMPLES as f64))
 }
 
 fn values(curves: &[Curve; 2], share: f64) -> [f64; 2] {

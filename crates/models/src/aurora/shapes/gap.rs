@@ -3,9 +3,9 @@
 //! A sheet does not break like a rod. Where it splits, precipitation first weakens over some way to both sides, then the two ends draw apart
 //! in the dark; where ends merge they stay faint until they are near, and brighten together.
 
-use bansho_base::math::{DVec2, smoothstep};
+use bansho_base::math::smoothstep;
 
-use super::Sheet;
+use super::{Sheet, polyline::lengths};
 
 /// Light passes over gaps narrower than this, km, and narrower than half of what they are when they are widest.
 const BRIDGED_KM: f64 = 40.0;
@@ -66,19 +66,10 @@ pub(super) fn fade(sheet: &mut Sheet, at_end: bool, share: f64) {
     }
 }
 
-/// Length up to each point, km.
-fn lengths(points: &[DVec2]) -> Vec<f64> {
-    let mut lengths = Vec::with_capacity(points.len());
-    let mut sum = 0.0;
-    for (index, point) in points.iter().enumerate() {
-        sum += if index > 0 { point.distance(points[index - 1]) } else { 0.0 };
-        lengths.push(sum);
-    }
-    lengths
-}
-
 #[cfg(test)]
 mod tests {
+    use bansho_base::math::DVec2;
+
     use super::*;
 
     #[test]

@@ -18,6 +18,7 @@ mod gap;
 mod matching;
 mod neighbourhood;
 mod parameters;
+mod passing;
 mod polyline;
 mod segments;
 mod sequence;
@@ -35,6 +36,7 @@ pub use parameters::{
     Correspondence, FRAME_S, LinkParameters, MergeParameters, MotionParameters, ShapeParameters, SheetParameters,
     Spacing, SplitParameters,
 };
+pub(in crate::aurora) use polyline::lengths;
 pub use segments::{Sample, Segments};
 pub use sequence::Sequence;
 pub use shape::{Shape, Sheet};

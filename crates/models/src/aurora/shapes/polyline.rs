@@ -51,15 +51,21 @@ impl Polyline {
     }
 }
 
+/// Length of a line up to each of its points.
+pub(in crate::aurora) fn lengths(points: &[DVec2]) -> Vec<f64> {
+    let mut lengths = Vec::with_capacity(points.len());
+    let mut sum = 0.0;
+    for (index, point) in points.iter().enumerate() {
+        sum += if index > 0 { point.distance(points[index - 1]) } else { 0.0 };
+        lengths.push(sum);
+    }
+    lengths
+}
+
 /// Share of the length at each point; evenly from 0 to 1 where the line has no length.
 pub(super) fn shares(points: &[DVec2]) -> Vec<f64> {
-    let mut sum = 0.0;
-    let mut shares: Vec<f64> = vec![0.0];
-    for pair in points.windows(2) {
-        sum += pair[0].distance(pair[1]);
-        shares.push(sum);
-    }
-    shares.truncate(points.len());
+    let mut shares = lengths(points);
+    let sum = shares.last().copied().unwrap_or(0.0);
     let last = points.len().saturating_sub(1).max(1) as f64;
     for (index, share) in shares.iter_mut().enumerate() {
         *share = if sum > 0.0 { *share / sum } else { index as f64 / last };

@@ -10,6 +10,7 @@ use super::{
     follow::{Followed, follow},
     gap::{self, Bridge, Gap},
     parameters::TRANSITION_S,
+    passing::passes,
     track::{Knot, Timing, find_velocities},
 };
 
@@ -28,6 +29,8 @@ pub struct Sequence {
     followed: Followed,
     timing: Timing,
     half_km: f64,
+    /// The shape on whose way sheets first pass through each other.
+    crossing: Option<usize>,
     loop_s: Option<f64>,
 }
 
@@ -62,7 +65,8 @@ impl Sequence {
             let mut followed = follow(shapes, motion, extent_km, assets, evenness)?;
             let closed = loop_s.is_some() && followed.returns;
             find_velocities(&mut followed.tracks, &timing, closed);
-            let sequence = Self { followed, timing: timing.clone(), half_km: extent_km / 2.0, loop_s: None };
+            let sequence =
+                Self { followed, timing: timing.clone(), half_km: extent_km / 2.0, crossing: None, loop_s: None };
             Ok((sequence.crossings(CHECKED_MOMENTS * shapes.len()), sequence))
         };
         let mut best = sequence(EVENNESS[0])?;
@@ -76,7 +80,8 @@ impl Sequence {
                 best = other;
             }
         }
-        Ok(Self { loop_s, ..best.1 })
+        let crossing = best.1.first_crossing(CHECKED_MOMENTS * shapes.len());
+        Ok(Self { loop_s, crossing, ..best.1 })
     }
 
     /// When each shape of the scene is reached, s, without a loop.
@@ -165,6 +170,32 @@ impl Sequence {
     pub fn crossings(&self, count: usize) -> usize {
         let step = self.duration() / count.max(1) as f64;
         (0..count).map(|index| self.at((index as f64 + 0.5) * step).crossings()).sum()
+    }
+
+    /// The shape of the scene, counted from 0, on whose way sheets first pass through each other or themselves, where they do.
+    pub fn crossing(&self) -> Option<usize> {
+        self.crossing
+    }
+
+    /// The same, at `count` evenly spaced times.
+    fn first_crossing(&self, count: usize) -> Option<usize> {
+        let step = self.duration() / count.max(1) as f64;
+        let mut before: Option<(usize, Shape)> = None;
+        for time in (0..count).map(|index| (index as f64 + 0.5) * step) {
+            let Moment::Between(index, _) = self.moment(time) else { continue };
+            let now = self.at(time);
+            let passes = before.as_ref().is_some_and(|(from, before)| *from == index && passes(before, &now));
+            if passes || now.crossings() > 0 {
+                return Some(index + 1);
+            }
+            before = Some((index, now));
+        }
+        None
+    }
+
+    /// Factors of flux and of energy of every control point at every shape of the scene; those of in-between shapes lie between them.
+    pub fn factors(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+        self.followed.tracks.iter().flat_map(|track| &track.knots).map(|knot| knot.values)
     }
 
     /// Time within the sequence.

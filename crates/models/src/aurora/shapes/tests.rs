@@ -249,6 +249,38 @@ fn long_strokes_are_checked() {
     assert!(matches!(fault.unwrap_err().kind, ShapeFaultKind::CrossesItself { sheet: 1, .. }));
 }
 
+/// A sheet that comes back to where it was, but with another flux there, is not the first again: that flux is reached, and in a loop
+/// it goes there and back without a jump.
+#[test]
+fn a_shape_that_returns_with_another_flux_is_another() {
+    let flux = |value: f64| Curve::new(vec![[0.0, value]], Interpolation::Linear).unwrap();
+    let bright = SheetParameters { flux: flux(3.0), energy: flux(2.0), ..straight(-200.0, 200.0, 0.0) };
+    let shapes = [straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 50.0), bright].map(|sheet| shape(vec![sheet]));
+    for motion in [in_order(9), MotionParameters::default()] {
+        let once = sequence(&shapes, &motion);
+        let last = &once.at(once.duration()).sheets[0];
+        assert!(last.flux.iter().all(|flux| *flux == 3.0) && last.energy.iter().all(|energy| *energy == 2.0));
+        let turn = Sequence::new(&shapes, &motion, EXTENT_KM, &MemoryAssets::default(), Some(9.0)).unwrap();
+        let [before, after] = [8.999, 9.001].map(|t| turn.at(t).sheets[0].flux[4]);
+        assert!((before - after).abs() < 0.01, "{before} {after}");
+    }
+    // Said in other words it is the same still.
+    let same = SheetParameters {
+        flux: Curve::new(vec![[0.0, 1.0], [1.0, 1.0]], Interpolation::Linear).unwrap(),
+        ..straight(-200.0, 200.0, 0.0)
+    };
+    let shapes = [shapes[0].clone(), shapes[1].clone(), shape(vec![same])];
+    let turn = Sequence::new(&shapes, &in_order(9), EXTENT_KM, &MemoryAssets::default(), Some(8.0)).unwrap();
+    assert!((turn.at(4.0).sheets[0].points[0].y - 50.0).abs() < 1e-6, "round, not there and back");
+}
+
+/// Sheets that are told to exchange places pass through each other on the way to the second shape; those that stay do not.
+#[test]
+fn sheets_that_exchange_places_are_known_to_cross() {
+    assert_eq!(linked(vec![]).unwrap().crossing(), None);
+    assert_eq!(linked(vec![link(1, 2, None)]).unwrap().crossing(), Some(1));
+}
+
 /// Two sheets that stay where they are, with links to the second shape.
 fn linked(link: Vec<LinkParameters>) -> Result<Sequence, ShapeFault> {
     let sheets = vec![straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 50.0)];

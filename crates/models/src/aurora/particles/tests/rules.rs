@@ -5,7 +5,7 @@ use bansho_base::random::Key;
 use super::*;
 use crate::{
     aurora::{
-        RelocationParameters,
+        FieldCharge, RelocationParameters,
         particles::{
             AuroraParticles,
             along::Along,
@@ -282,4 +282,44 @@ fn when_electrons_stop_each_map_fades_with_its_own_lifetime() {
         let (kept, expected) = (late[map] / early[map], math::exp(-2.0 / lifetimes[map]));
         assert!((kept / expected - 1.0).abs() < 0.01, "{map}: {kept} of the light is kept, not {expected}");
     }
+}
+
+/// Eq. (2.2) to the letter: the charge of a cell is its count.
+#[test]
+fn an_even_charge_is_the_count() {
+    let of = |charge: FieldCharge| {
+        let mut parameters = AuroraParameters { shapes: vec![shape(vec![form(Form::Spiral)])], ..small() };
+        (parameters.field.charge, parameters.field.noise) = (charge, 0.0);
+        let simulation = simulation(parameters);
+        let (counts, potential) = (simulation.scatter_counts(), simulation.potential());
+        // The charge again, from the potential by the five-point Laplacian and the screening length of three cells.
+        let [columns, rows] = counts.size();
+        let mut ratios = Vec::new();
+        for (column, row) in
+            (1..columns - 1).flat_map(|column| (1..rows - 1).map(move |row| (column as isize, row as isize)))
+        {
+            let at = |x: isize, y: isize| potential.at(column + x, row + y);
+            let laplacian = at(1, 0) + at(-1, 0) + at(0, 1) + at(0, -1) - 4.0 * at(0, 0);
+            if counts.at(column, row) > 0.0 {
+                ratios.push((laplacian - at(0, 0) / 9.0) / counts.at(column, row));
+            }
+        }
+        let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+        ratios.iter().map(|ratio| (ratio / mean - 1.0).abs()).fold(0.0, f64::max)
+    };
+    let (even, conductor) = (of(FieldCharge::Even), of(FieldCharge::Conductor));
+    assert!(even < 1e-6 && conductor > 0.1, "{even} {conductor}");
+}
+
+#[test]
+fn births_without_end_are_held() {
+    let mut parameters = AuroraParameters { shapes: vec![shape(vec![form(Form::Arc)])], ..small() };
+    parameters.particles.relocation =
+        RelocationParameters { births_below: 1e6, births_at_most: 1e6, ..parameters.particles.relocation };
+    let mut simulation = simulation(parameters);
+    for _ in 0..8 {
+        simulation.step();
+        assert!(simulation.particles().len() <= 4 * 12_000, "{}", simulation.particles().len());
+    }
+    assert!(simulation.particles().len() > 12_000);
 }
