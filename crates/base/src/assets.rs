@@ -49,6 +49,9 @@ pub enum AssetProblem {
     /// It is there but cannot be read.
     #[error("cannot be read: {0}")]
     Unreadable(String),
+    /// What another program said of it, which had tried.
+    #[error("{0}")]
+    Told(String),
     /// A drawing without strokes.
     #[error("holds no strokes (allowed: an SVG file with path, polyline or line elements)")]
     NoStrokes,

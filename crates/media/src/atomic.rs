@@ -18,10 +18,12 @@ use crate::error::MediaError;
 pub struct AtomicFile {
     temporary: NamedTempFile,
     path: PathBuf,
+    /// What `path` means, where it is a link.
+    target: PathBuf,
 }
 
 impl AtomicFile {
-    /// Makes the folders that lead to `path`, and a temporary file beside it.
+    /// Makes the folders that lead to `path`, and a temporary file beside it, or beside what it links to.
     ///
     /// # Errors
     /// The folder cannot be made or written, the disk is full, or `path` is a folder.
@@ -30,7 +32,12 @@ impl AtomicFile {
         if path.is_dir() {
             return Err(MediaError::IsFolder { path: path.to_path_buf() });
         }
-        let folder = match path.parent() {
+        let target = if path.is_symlink() {
+            fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf())
+        } else {
+            path.to_path_buf()
+        };
+        let folder = match target.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
         };
@@ -39,8 +46,8 @@ impl AtomicFile {
             io::ErrorKind::AlreadyExists => MediaError::NotAFolder { path: path.to_path_buf() },
             _ => fail(source),
         })?;
-        let temporary = temporary_in(folder, path).map_err(fail)?;
-        Ok(Self { temporary, path: path.to_path_buf() })
+        let temporary = temporary_in(folder, &target).map_err(fail)?;
+        Ok(Self { temporary, path: path.to_path_buf(), target })
     }
 
     /// The file to write to.
@@ -58,16 +65,17 @@ impl AtomicFile {
         &self.path
     }
 
-    /// Gives it its name, in place of any file that bore it.
+    /// Gives it its name, in place of any file that bore it, and who may read and write that one may do so with this.
     ///
     /// # Errors
     /// It cannot be renamed; the temporary file is then removed.
     pub fn finish(self) -> Result<(), MediaError> {
         let path = self.path;
-        match self.temporary.persist(&path) {
-            Ok(_) => Ok(()),
-            Err(error) => Err(MediaError::from_io(path, error.error)),
+        let fail = |source| MediaError::from_io(&path, source);
+        if let Ok(old) = fs::metadata(&self.target) {
+            self.temporary.as_file().set_permissions(old.permissions()).map_err(fail)?;
         }
+        self.temporary.persist(&self.target).map(drop).map_err(|error| fail(error.error))
     }
 }
 
@@ -164,6 +172,20 @@ mod tests {
         let path = folder.path().join(format!("{}.png", "火".repeat(80)));
         write_bytes(&path, b"x").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"x");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_permissions_stay() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("deep/a.toml"), folder.path().join("link.toml"));
+        write_bytes(&file, b"old").unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
+        symlink("deep/a.toml", &link).unwrap();
+        write_bytes(&link, b"new").unwrap();
+        assert!(link.is_symlink() && fs::read(&file).unwrap() == b"new");
+        assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600);
     }
 
     #[cfg(unix)]

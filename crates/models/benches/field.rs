@@ -1,9 +1,13 @@
 //! Poisson's equation on the aurora's grid of 256 x 256 cells, with relaxation beside it.
 
+mod support;
+
 use std::hint::black_box;
 
 use bansho_models::field::{Grid2, PoissonSolver, relax};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+
+use support::pinned_pool;
 
 const SIDE: usize = 256;
 
@@ -12,17 +16,6 @@ fn charges(side: usize) -> Grid2 {
     let mut grid = Grid2::new([side, side], 1.0, [0.0; 2]);
     grid.values_mut()[side * side / 2 - 3 * side..side * side / 2 + 3 * side].fill(1.0);
     grid
-}
-
-/// A pool whose threads each stay on a core of their own: unpinned they are often packed onto one.
-fn pinned_pool(threads: usize) -> rayon::ThreadPool {
-    let cores = core_affinity::get_core_ids().unwrap_or_default();
-    let pin = move |index: usize| {
-        if let Some(core) = cores.get(index) {
-            core_affinity::set_for_current(*core);
-        }
-    };
-    rayon::ThreadPoolBuilder::new().num_threads(threads).start_handler(pin).build().expect("a pool")
 }
 
 fn benches(criterion: &mut Criterion) {

@@ -1,6 +1,7 @@
 //! 100,000 particles drawn at 1280 x 720, and their haze, each with the naive way beside it: every sprite onto every pixel that it covers.
 
 mod plume;
+mod support;
 
 use std::hint::black_box;
 
@@ -24,6 +25,8 @@ use bansho_models::flame_particles::{
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use rayon::prelude::*;
+
+use support::pinned_pool;
 
 const SIZE: [usize; 2] = [1280, 720];
 const STRIP: usize = 8;
@@ -106,19 +109,8 @@ fn naive<const WIDTH: usize>(particles: &Particles, view: &View, value: impl Fn(
     black_box(picture);
 }
 
-/// Two threads, each on a core of its own: unpinned they are often packed onto one.
-fn pinned_pool() -> rayon::ThreadPool {
-    let cores = core_affinity::get_core_ids().unwrap_or_default();
-    let pin = move |index: usize| {
-        if let Some(core) = cores.get(index) {
-            core_affinity::set_for_current(*core);
-        }
-    };
-    rayon::ThreadPoolBuilder::new().num_threads(2).start_handler(pin).build().expect("two threads")
-}
-
 fn gas_720p(criterion: &mut Criterion) {
-    let pool = pinned_pool();
+    let pool = pinned_pool(2);
     let subject = Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), memory: Memory::default() };
     let Subject { particles, view, .. } = &subject;
     let look = LookParameters::default();

@@ -3,11 +3,15 @@
 //! Beside it are all pairs (3,000 particles only: 100,000 would take a thousand times as long) and the unsorted way: cells in a hash map,
 //! particles where they happen to lie, one neighbour at a time.
 
+mod support;
+
 use std::{collections::HashMap, hint::black_box};
 
 use bansho_base::random::{Key, Purpose};
 use bansho_models::sph::{Cells, Kernel, KernelShape, Particles, PressureForce, StateEquation, densities};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+
+use support::pinned_pool;
 
 const NEIGHBOURS: f64 = 35.0;
 const SUPPORT: f32 = 0.1;
@@ -130,17 +134,6 @@ fn unsorted_step(particles: &mut Particles<3>) {
             map.get(&key).into_iter().flatten().for_each(|j| visit_if_near(particles, i, *j, visitor));
         }
     });
-}
-
-/// A pool whose threads each stay on a core of their own: unpinned they are often packed onto one.
-fn pinned_pool(threads: usize) -> rayon::ThreadPool {
-    let cores = core_affinity::get_core_ids().unwrap_or_default();
-    let pin = move |index: usize| {
-        if let Some(core) = cores.get(index) {
-            core_affinity::set_for_current(*core);
-        }
-    };
-    rayon::ThreadPoolBuilder::new().num_threads(threads).start_handler(pin).build().expect("a pool")
 }
 
 fn benches(criterion: &mut Criterion) {

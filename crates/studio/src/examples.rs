@@ -89,10 +89,53 @@ impl Bundle {
         &self.given
     }
 
-    fn bytes(&self, name: &str) -> Result<&[u8], AssetError> {
+    /// The bytes of the file `name`, if it is one of these.
+    pub fn bytes(&self, name: &str) -> Option<&[u8]> {
         let given = self.given.iter().find(|(own, _)| own == name).map(|(_, bytes)| bytes.as_ref());
-        let bundled = || FILES.iter().find(|(own, _)| *own == name).map(|(_, bytes)| *bytes);
-        given.or_else(bundled).ok_or_else(|| error(name, AssetProblem::Missing))
+        given.or_else(|| FILES.iter().find(|(own, _)| *own == name).map(|(_, bytes)| *bytes))
+    }
+
+    fn found(&self, name: &str) -> Result<&[u8], AssetError> {
+        self.bytes(name).ok_or_else(|| error(name, AssetProblem::Missing))
+    }
+
+    /// These files, and all others where `files` finds them.
+    pub fn before(self, files: Arc<dyn Assets>) -> BundleBefore {
+        BundleBefore { bundle: self, files }
+    }
+}
+
+/// A [`Bundle`], and other assets for what it lacks.
+pub struct BundleBefore {
+    bundle: Bundle,
+    files: Arc<dyn Assets>,
+}
+
+impl BundleBefore {
+    fn of(&self, name: &str) -> &dyn Assets {
+        if self.bundle.bytes(name).is_some() { &self.bundle } else { self.files.as_ref() }
+    }
+}
+
+impl Assets for BundleBefore {
+    fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError> {
+        self.of(path).picture(path, frame)
+    }
+
+    fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
+        self.of(path).mesh(path)
+    }
+
+    fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
+        self.of(path).drawing(path)
+    }
+
+    fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
+        self.of(path).text(path)
+    }
+
+    fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
+        self.of(path).digest(path, frame)
     }
 }
 
@@ -106,13 +149,13 @@ fn extension(name: &str) -> &str {
 
 impl Assets for Bundle {
     fn picture(&self, path: &str, _frame: i64) -> Result<Arc<Picture>, AssetError> {
-        let picture = decode_picture(self.bytes(path)?, extension(path));
+        let picture = decode_picture(self.found(path)?, extension(path));
         picture.map(Arc::new).map_err(|problem| error(path, problem))
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
-        let beside = |name: &str| self.bytes(name).map(<[u8]>::to_vec).map_err(|error| error.problem);
-        let mesh = decode_mesh(self.bytes(path)?, extension(path), &beside);
+        let beside = |name: &str| self.found(name).map(<[u8]>::to_vec).map_err(|error| error.problem);
+        let mesh = decode_mesh(self.found(path)?, extension(path), &beside);
         mesh.map(Arc::new).map_err(|problem| error(path, problem))
     }
 
@@ -121,12 +164,12 @@ impl Assets for Bundle {
     }
 
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
-        let text = std::str::from_utf8(self.bytes(path)?);
+        let text = std::str::from_utf8(self.found(path)?);
         text.map(Arc::from).map_err(|_| error(path, AssetProblem::Damaged("it is not UTF-8".into())))
     }
 
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
-        self.bytes(path)?;
+        self.found(path)?;
         // Within one run a name stands for the same bytes until another is given, which makes other assets.
         let mut named = MemoryAssets::default();
         named.insert_text(path, "");

@@ -50,8 +50,8 @@ struct Page {
 impl eframe::App for Page {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         self.studio.show(ui);
+        self.unsaved.set(self.studio.would_lose_something());
         let session = self.studio.session();
-        self.unsaved.set(session.document.is_dirty());
         let notice = session.notice().unwrap_or_default();
         if self.told != notice {
             notice.clone_into(&mut self.told);

@@ -26,8 +26,9 @@ export async function serve(dist) {
   return { server, address: `http://127.0.0.1:${server.address().port}/` };
 }
 
-export function launch(executablePath) {
-  const webgpu = ["--enable-unsafe-webgpu", "--enable-features=Vulkan", "--use-vulkan=swiftshader", "--use-angle=swiftshader"];
+export const WEBGPU = ["--enable-unsafe-webgpu", "--enable-features=Vulkan", "--use-vulkan=swiftshader", "--use-angle=swiftshader"];
+
+export function launch(executablePath, graphics = WEBGPU) {
   const quiet = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
-  return chromium.launch({ executablePath, headless: true, args: [...quiet, ...webgpu] });
+  return chromium.launch({ executablePath, headless: true, args: [...quiet, ...graphics] });
 }

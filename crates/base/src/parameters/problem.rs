@@ -48,7 +48,7 @@ pub enum ProblemKind {
         found: &'static str,
     },
     /// A number beyond its bounds, or not finite.
-    #[error("{value} is out of range; allowed: {min} to {max}{}", unit_suffix(.unit))]
+    #[error("{} is out of range; allowed: {min} to {max}{}", short(*.value), unit_suffix(.unit))]
     OutOfRange {
         /// The number.
         value: f64,
@@ -135,6 +135,12 @@ fn did_you_mean(nearest: &Option<String>) -> String {
     nearest.as_ref().map(|name| format!(", did you mean `{name}`?")).unwrap_or_default()
 }
 
+/// A number as people write it: powers of ten where plain digits would fill lines.
+fn short(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-6..1e15).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
+}
+
 fn unit_suffix(unit: &str) -> String {
     if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
@@ -204,5 +210,18 @@ impl Reader {
     /// Takes all problems.
     pub fn into_problems(self) -> Vec<Problem> {
         self.problems
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_as_short_as_people_write_them() {
+        let shown = [0.0, -1.0, 2.5e-6, 1e6, 1e14, 1e300, -3.5e-9, f64::INFINITY].map(short);
+        assert_eq!(shown, ["0", "-1", "0.0000025", "1000000", "100000000000000", "1e300", "-3.5e-9", "inf"]);
+        let fault = ProblemKind::OutOfRange { value: 1e300, min: 0.0, max: 2.0, unit: "m" };
+        assert_eq!(fault.to_string(), "1e300 is out of range; allowed: 0 to 2 m");
     }
 }

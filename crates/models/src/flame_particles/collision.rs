@@ -8,7 +8,9 @@ use bansho_base::{
 /// Most solids that turn a particle's way in one step, and how often each may.
 const ROUNDS: usize = 3;
 /// Parts into which a way is cut at most to see whether it passes through a solid.
-const PARTS: f64 = 64.0;
+const PARTS: f64 = 128.0;
+/// Halvings of the part in which a way meets a solid: what is left is nothing beside the clearance.
+const HALVINGS: usize = 8;
 /// By how much a distance may be too large: that to a mesh is measured beyond its grid by way of the grid's edge.
 const OVERESTIMATE: f64 = 3.0;
 /// Change of a way's end, in clearances, that is none.
@@ -65,13 +67,19 @@ impl Solids<'_> {
     fn contact(&self, occluder: &Occluder, from: DVec3, to: DVec3) -> Option<Contact> {
         let clearance = f64::from(self.clearance);
         let (way, length) = (to - from, (to - from).length());
-        let mut gone = 0.0;
+        let at = |gone: f64| from + way * (gone / length.max(f64::MIN_POSITIVE)).min(1.0);
+        let (mut free, mut gone) = (0.0, 0.0);
         loop {
-            let place = from + way * (gone / length.max(f64::MIN_POSITIVE)).min(1.0);
-            let distance = occluder.signed_distance(place) - clearance;
+            let distance = occluder.signed_distance(at(gone)) - clearance;
             if distance < 0.0 {
-                return Some(Contact { place, normal: occluder.normal(place) });
+                for _ in 0..HALVINGS {
+                    let middle = 0.5 * (free + gone);
+                    let inside = occluder.signed_distance(at(middle)) < clearance;
+                    if inside { gone = middle } else { free = middle }
+                }
+                return Some(Contact { place: at(gone), normal: occluder.normal(at(gone)) });
             }
+            free = gone;
             if gone >= length || distance > OVERESTIMATE * (length - gone) {
                 return None;
             }

@@ -41,9 +41,9 @@ const PARTICLES_OF_TASK: usize = 512;
 pub(crate) struct Simulation {
     pub(crate) design: Design,
     laws: Laws,
-    parameters: FlameParticlesParameters,
-    turbulence: Turbulence,
-    key: Key,
+    pub(crate) parameters: FlameParticlesParameters,
+    pub(crate) turbulence: Turbulence,
+    pub(crate) key: Key,
     pub(crate) particles: Particles,
     cells: Cells<3>,
     force: PressureForce,
@@ -130,20 +130,19 @@ impl Simulation {
         densities(&self.cells, KernelShape::Poly6, &self.particles.mass, &mut self.particles.density);
         self.press(seconds);
         self.beside.look(&self.cells, &self.particles);
-        let weather =
-            Weather::new(&self.parameters, &self.design, &self.turbulence, self.key, &self.particles, around, time);
-        flows(&weather.draughts, &self.particles, &mut self.flows);
-        let mut moved = std::mem::take(&mut self.moved);
+        let (mut carried, mut moved) = (std::mem::take(&mut self.flows), std::mem::take(&mut self.moved));
+        let weather = Weather::new(self, around, time);
+        flows(&weather.draughts, &self.particles, &mut carried);
         moved.resize(self.particles.len(), Moved::default());
         let radius = self.cells.support_radius();
         let at_centre = KernelShape::Poly6.at_centre::<3>(radius);
-        let mover = Mover { simulation: &*self, weather: &weather, seconds, radius, at_centre };
+        let mover = Mover { simulation: &*self, weather: &weather, flows: &carried, seconds, radius, at_centre };
         let level = Level::new();
         moved.par_chunks_mut(PARTICLES_OF_TASK).enumerate().for_each(|(task, moved)| {
             dispatch!(level, _simd => mover.move_all(task * PARTICLES_OF_TASK, moved));
         });
         self.take_over(&moved, seconds);
-        self.moved = moved;
+        (self.flows, self.moved) = (carried, moved);
     }
 
     /// Pressure (11) and its force (12), with k held where sound does not outrun the sub-step.
@@ -212,6 +211,8 @@ impl Simulation {
 struct Mover<'a> {
     simulation: &'a Simulation,
     weather: &'a Weather<'a>,
+    /// The air's motion at each particle.
+    flows: &'a [Flow],
     seconds: f32,
     radius: f32,
     /// Poly6, eq. (2), at its centre.
@@ -240,11 +241,11 @@ impl Mover<'_> {
         let place = Self::vector(&particles.position, index);
         let before = Self::vector(&particles.velocity, index);
         let temperature = particles.temperature[index];
-        let wind = weather.breeze.at(place);
+        let wind = weather.breezes[particles.burner[index] as usize].at(place);
         let to_air = self.to_air(index);
         let mixing = draught.entrainment * (before - wind).length() * (0.5 + to_air);
         let velocity = self.pushed(index, before - Self::vector(&particles.drift, index), wind, mixing);
-        let drift = draught.velocity(&simulation.flows[index], velocity.length(), particles.age[index]);
+        let drift = draught.velocity(&self.flows[index], velocity.length(), particles.age[index]);
         let total = (velocity + drift).clamp_length_max(GREATEST_SPEED);
         let clearance = CLEARANCE * radius;
         let solids = Solids { occluders: weather.occluders, origin: weather.origin, clearance };

@@ -224,7 +224,7 @@ fn remove(root: &mut Table, place: &Place) -> Result<(), EditError> {
             true
         }
         (Slot::Value(Written::Array(items)), Segment::Index(index)) if *index < items.len() => {
-            items.remove(*index);
+            take_out(items, *index);
             true
         }
         _ => false,
@@ -245,10 +245,54 @@ fn append(root: &mut Table, place: &Place, value: &Value) -> Result<(), EditErro
     }
     match (table.get_mut(key), value) {
         (Some(Item::ArrayOfTables(tables)), Value::Table(values)) => tables.push(headed(values)?),
-        (Some(Item::Value(Written::Array(items))), value) => items.push(written(value)?),
+        (Some(Item::Value(Written::Array(items))), value) => put_last(items, written(value)?),
         _ => return Err(nowhere(place, last)),
     }
     Ok(())
+}
+
+/// What stands before an item or the end of a list: the rest of the line before it, whose comment is about the item before, and the lines
+/// of its own.
+fn before(items: &Array, index: usize) -> [String; 2] {
+    let all = match items.get(index) {
+        Some(item) => item.decor().prefix().and_then(|prefix| prefix.as_str()),
+        None => items.trailing().as_str(),
+    };
+    let all = all.unwrap_or_default();
+    let (rest, own) = all.split_at(all.find('\n').unwrap_or(0));
+    [rest.to_owned(), own.to_owned()]
+}
+
+/// Takes an item out of a list with the comment that stands after it on its line.
+fn take_out(items: &mut Array, index: usize) {
+    let [rest, _] = before(items, index);
+    let [_, own] = before(items, index + 1);
+    items.remove(index);
+    if own.is_empty() {
+        return;
+    }
+    let all = rest + &own;
+    match items.get_mut(index) {
+        Some(next) => next.decor_mut().set_prefix(all),
+        None => items.set_trailing(all),
+    }
+}
+
+/// Adds an item at the end of a list; in a list of lines it has a line of its own, after the comment of the one before.
+fn put_last(items: &mut Array, value: Written) {
+    let end = items.len();
+    let [rest, own] = before(items, end);
+    let [_, line] = before(items, end.saturating_sub(1));
+    items.push(value);
+    if own.is_empty() || !items.trailing_comma() {
+        return;
+    }
+    if let Some(item) = items.get_mut(end) {
+        // Without the comments that stand above the last one.
+        let line = line.rfind('\n').map_or(own.as_str(), |at| &line[at..]);
+        item.decor_mut().set_prefix(format!("{rest}{line}"));
+    }
+    items.set_trailing(own);
 }
 
 /// Whether a table has lists of tables in it.

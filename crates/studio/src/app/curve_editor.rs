@@ -13,11 +13,24 @@ const REACH: f32 = 9.0;
 /// Least distance between two points, as a share of the curve's width.
 const APART: f64 = 0.002;
 
+/// What a curve may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Allowed {
+    /// Least and greatest x.
+    pub(super) x: [f64; 2],
+    /// Least and greatest y.
+    pub(super) y: [f64; 2],
+    /// Whether it must not fall.
+    pub(super) rising: bool,
+}
+
 /// Where a curve's numbers lie on the screen.
 struct Chart {
     rect: Rect,
     x: [f64; 2],
     y: [f64; 2],
+    /// Whether no point may lie below the one before.
+    rising: bool,
 }
 
 impl Chart {
@@ -38,6 +51,14 @@ impl Chart {
         [value((at.x - rect.left()) / rect.width(), self.x), value((rect.bottom() - at.y) / rect.height(), self.y)]
     }
 
+    /// The height `y` for a point between two of the heights `before` and `after`: a rising curve stays one.
+    fn level(&self, y: f64, before: Option<f64>, after: Option<f64>) -> f64 {
+        if !self.rising {
+            return y;
+        }
+        y.min(after.unwrap_or(f64::INFINITY)).max(before.unwrap_or(f64::NEG_INFINITY))
+    }
+
     fn nearest(&self, points: &[[f64; 2]], at: Pos2) -> Option<usize> {
         let distance = |index: &usize| self.to_screen(points[*index]).distance(at);
         let nearest = (0..points.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
@@ -45,8 +66,9 @@ impl Chart {
     }
 }
 
-/// Shows the curve `value` between the bounds `[x, y]`; what it becomes where a hand changed it.
-pub(super) fn show(ui: &mut Ui, label: Id, value: &Value, [x, y]: [[f64; 2]; 2]) -> Option<Value> {
+/// Shows the curve `value`, which may be what is `allowed`; what it becomes where a hand changed it.
+pub(super) fn show(ui: &mut Ui, label: Id, value: &Value, allowed: Allowed) -> Option<Value> {
+    let Allowed { x, y, rising } = allowed;
     let (points, interpolation) = read(value)?;
     let curve = Curve::new(points.clone(), interpolation.into()).ok()?;
     let width = ui.available_width().clamp(120.0, 260.0);
@@ -56,11 +78,24 @@ pub(super) fn show(ui: &mut Ui, label: Id, value: &Value, [x, y]: [[f64; 2]; 2])
     let painter = ui.painter_at(rect);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "curve"));
     let response = response.labelled_by(label);
-    let top = y[1].min(highest(&points).max(y[0] + 1e-3) * 1.25);
-    let chart = Chart { rect: response.rect.shrink(4.0), x, y: [y[0], top.max(y[0] + 1e-3)] };
+    let top = y[1].min(highest(&points).max(y[0] + 1e-3) * 1.25).max(y[0] + 1e-3);
+    let chart = Chart { rect: response.rect.shrink(4.0), x, y: [y[0], held_still(ui, &response, top)], rising };
     paint(&painter, ui, &chart, &curve);
     let edited = edit(ui, &response, &chart, points)?;
     Some(write(edited, interpolation))
+}
+
+/// The chart's top, which stays while a hand is down on it: a chart that grew with the point that is dragged up in it would run away.
+fn held_still(ui: &Ui, response: &Response, top: f64) -> f64 {
+    let held = response.id.with("top");
+    ui.data_mut(|data| {
+        if response.is_pointer_button_down_on() || response.dragged() {
+            *data.get_temp_mut_or(held, top)
+        } else {
+            data.remove::<f64>(held);
+            top
+        }
+    })
 }
 
 fn highest(points: &[[f64; 2]]) -> f64 {
@@ -87,9 +122,11 @@ fn edit(ui: &Ui, response: &Response, chart: &Chart, mut points: Vec<[f64; 2]>) 
     let at = response.interact_pointer_pos()?;
     let held = response.id.with("held");
     if response.double_clicked() {
-        let added = chart.to_curve(at);
-        let place = points.partition_point(|point| point[0] < added[0]);
-        points.insert(place, added);
+        let [x, y] = chart.to_curve(at);
+        let place = points.partition_point(|point| point[0] < x);
+        let [before, after] =
+            [place.checked_sub(1).map(|index| points[index][1]), points.get(place).map(|point| point[1])];
+        points.insert(place, [x, chart.level(y, before, after)]);
         return ascending(&points, chart).then_some(points);
     }
     if response.secondary_clicked() {
@@ -118,7 +155,9 @@ fn between_neighbours(points: &[[f64; 2]], index: usize, wanted: [f64; 2], chart
     let apart = APART * (chart.x[1] - chart.x[0]);
     let low = index.checked_sub(1).map_or(chart.x[0], |before| points[before][0] + apart);
     let high = points.get(index + 1).map_or(chart.x[1], |after| after[0] - apart);
-    [if low <= high { wanted[0].clamp(low, high) } else { points[index][0] }, wanted[1]]
+    let [before, after] = [index.checked_sub(1), Some(index + 1)].map(|at| points.get(at?).map(|point| point[1]));
+    let x = if low <= high { wanted[0].clamp(low, high) } else { points[index][0] };
+    [x, chart.level(wanted[1], before, after)]
 }
 
 fn ascending(points: &[[f64; 2]], chart: &Chart) -> bool {

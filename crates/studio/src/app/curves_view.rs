@@ -6,7 +6,12 @@ use bansho::{
 };
 use eframe::egui::{self, Color32, Frame, Rect, Ui, vec2};
 
-use super::{curve_editor, inspector::words, scene_panel::Subject, session::Session};
+use super::{
+    curve_editor::{self, Allowed},
+    inspector::words,
+    scene_panel::Subject,
+    session::Session,
+};
 
 /// Width of one curve, points of the screen.
 const WIDTH: f32 = 150.0;
@@ -73,14 +78,14 @@ fn gather(place: &Place, table: &'static TableDescriptor, curves: &mut Vec<(Plac
 }
 
 fn curve(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor) {
-    let Kind::Curve { x, y, .. } = parameter.kind else { return };
+    let Kind::Curve { x, y, rising } = parameter.kind else { return };
     let stated = place.find(session.document.values()).map(|node| node.value.clone());
     let present: Option<Value> = stated.or_else(|| parameter.default.clone());
     ui.push_id(place, |ui| {
         ui.vertical(|ui| {
             ui.set_width(WIDTH);
             let label = ui.label(title(parameter)).on_hover_text(&parameter.doc).id;
-            let edited = present.and_then(|value| curve_editor::show(ui, label, &value, [x, y]));
+            let edited = present.and_then(|value| curve_editor::show(ui, label, &value, Allowed { x, y, rising }));
             if let Some(value) = edited {
                 session.set(parameter.key, place, value);
             }

@@ -26,13 +26,12 @@ fn place() -> Place {
 impl Blowing {
     /// Begins a drag. Where keyframes are recorded, time passes while it lasts.
     pub(super) fn begin(session: &mut Session) -> Self {
-        let stated = place().find(session.document.values());
-        let now = stated.and_then(|node| keyed::at(&node.value, session.transport.time_s()));
-        let calm = now.and_then(|value| three(&value)).unwrap_or_default();
+        let calm = keyed::vector(session.document.values(), &place(), session.transport.time_s()).unwrap_or_default();
+        let calm = calm.to_array();
         let blowing = Self { calm, recorded: session.recording, began: session.transport.time_s() };
         session.document.seal();
         if blowing.recorded {
-            session.transport.set_playing(true);
+            session.transport.play_to_the_end();
             blowing.key(session, calm);
         }
         blowing
@@ -42,8 +41,8 @@ impl Blowing {
     pub(super) fn blow(&self, session: &mut Session, wind: DVec3) {
         let velocity = rounded(DVec3::from(self.calm) + wind);
         if self.recorded {
-            // The key of the calm before the drag stays.
-            if session.transport.time_s() != self.began {
+            // The key of the calm before the drag stays, and so does what was recorded when the shot ends.
+            if session.transport.time_s() != self.began && session.transport.is_playing() {
                 self.key(session, velocity);
             }
         } else {
@@ -54,7 +53,9 @@ impl Blowing {
     /// The hand lets go: recorded wind calms down again, unrecorded wind never was.
     pub(super) fn end(self, session: &mut Session) {
         if self.recorded {
-            self.key(session, self.calm);
+            if session.transport.is_playing() {
+                self.key(session, self.calm);
+            }
             session.transport.set_playing(false);
             session.document.seal();
         } else {
@@ -66,10 +67,4 @@ impl Blowing {
         let key = session.keyframe(&place(), Value::numbers(velocity));
         session.edit(LABEL, &[key]);
     }
-}
-
-fn three(value: &Value) -> Option<[f64; 3]> {
-    let Value::List(items) = value else { return None };
-    let numbers: Vec<f64> = items.iter().map(|item| item.value.as_number()).collect::<Option<_>>()?;
-    numbers.try_into().ok()
 }

@@ -11,6 +11,7 @@ use super::{
     keyed,
     scene_panel::Subject,
     session::Session,
+    things::stands_for_one,
     value::{Widget, somewhere_in},
 };
 
@@ -37,7 +38,7 @@ impl Inspector {
             ui.label("It is not in the scene any more.");
             return;
         }
-        let wanted = Wanted::new(&self.wanted);
+        let wanted = Sought::new(&self.wanted);
         if !wanted.is_in(descriptor) {
             ui.weak("Nothing here is called so.");
         }
@@ -46,9 +47,9 @@ impl Inspector {
 }
 
 /// What is looked for; empty for everything.
-struct Wanted(String);
+struct Sought(String);
 
-impl Wanted {
+impl Sought {
     fn new(text: &str) -> Self {
         Self(text.trim().to_lowercase())
     }
@@ -73,9 +74,9 @@ impl Wanted {
     }
 }
 
-fn table(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &TableDescriptor, wanted: &Wanted) {
+fn table(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &TableDescriptor, wanted: &Sought) {
     // Where a section itself is looked for, all of it is.
-    let all = Wanted(String::new());
+    let all = Sought(String::new());
     let wanted = if wanted.is_in(descriptor) { wanted } else { &all };
     for parameter in descriptor.parameters.iter().filter(|parameter| wanted.is(parameter)) {
         let own = place.key(parameter.key);
@@ -88,7 +89,7 @@ fn table(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &TableDe
 }
 
 /// A part that opens by itself while something in it is looked for.
-fn header(title: &str, place: &Place, wanted: &Wanted) -> CollapsingHeader {
+fn header(title: &str, place: &Place, wanted: &Sought) -> CollapsingHeader {
     CollapsingHeader::new(words(title)).id_salt(place).open((!wanted.is_everything()).then_some(true))
 }
 
@@ -98,7 +99,7 @@ fn section(
     place: &Place,
     title: &str,
     descriptor: &TableDescriptor,
-    wanted: &Wanted,
+    wanted: &Sought,
 ) {
     let shown = header(title, place, wanted).show(ui, |ui| {
         table(ui, session, place, descriptor, wanted);
@@ -107,34 +108,56 @@ fn section(
 }
 
 /// The items of a list; tables among them are sections.
-fn list(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, item: &Kind, wanted: &Wanted) {
-    let stated = place.find(session.document.values()).map(|node| node.value.clone());
-    let items = match stated.or_else(|| parameter.default.clone()) {
-        Some(Value::List(items)) => items,
-        _ => Vec::new(),
-    };
+fn list(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, item: &Kind, wanted: &Sought) {
     let shown = header(parameter.key, place, wanted).show(ui, |ui| {
+        let stated = place.find(session.document.values()).map(|node| node.value.clone());
+        let is_stated = stated.is_some();
+        let items = match stated.or_else(|| parameter.default.clone()) {
+            Some(Value::List(items)) => items,
+            _ => Vec::new(),
+        };
+        // A part of the usual list can only be changed in a list that is stated.
+        let usual = Operation::Set { place: place.clone(), value: Value::List(items.clone()) };
+        let before = if is_stated || items.is_empty() { Vec::new() } else { vec![usual] };
+        if let (true, Kind::Table(inner)) = (items.is_empty() && stands_for_one(place), item) {
+            // Changing anything of the usual one states it.
+            let usual = place.index(0);
+            section(ui, session, &usual, &format!("{usual}, as usual"), inner(), wanted);
+        }
         for (index, node) in items.iter().enumerate() {
-            list_item(ui, session, &place.index(index), item, &node.value, wanted);
+            list_item(ui, session, &place.index(index), item, &node.value, wanted, &before);
         }
         if ui.button(format!("Add to {}", words(parameter.key))).clicked() {
-            session.edit("add", &[Operation::Append { place: place.clone(), value: somewhere_in(item) }]);
+            let append = Operation::Append { place: place.clone(), value: somewhere_in(item) };
+            session.edit("add", &[before.as_slice(), &[append]].concat());
         }
     });
     shown.header_response.on_hover_text(&parameter.doc);
 }
 
-fn list_item(ui: &mut Ui, session: &mut Session, place: &Place, kind: &Kind, value: &Value, wanted: &Wanted) {
+/// An item of a list, and what must be done `before` it can be changed.
+fn list_item(
+    ui: &mut Ui,
+    session: &mut Session,
+    place: &Place,
+    kind: &Kind,
+    value: &Value,
+    wanted: &Sought,
+    before: &[Operation],
+) {
     ui.horizontal(|ui| {
         if icon::button(ui, Icon::Cross, &format!("Remove {place}")).clicked() {
-            session.edit("remove", &[Operation::Remove { place: place.clone() }]);
+            session.edit("remove", &[before, &[Operation::Remove { place: place.clone() }]].concat());
         }
         match kind {
             Kind::Table(inner) => section(ui, session, place, &place.to_string(), inner(), wanted),
             kind => {
                 let label = ui.label(place.to_string()).id;
                 if let Some(value) = (Widget { kind, unit: "", label, usual: None }).show(ui, value) {
-                    session.set(&place.to_string(), place, value);
+                    session.edit(
+                        &place.to_string(),
+                        &[before, &[Operation::Set { place: place.clone(), value }]].concat(),
+                    );
                 }
             }
         }
@@ -145,7 +168,8 @@ fn list_item(ui: &mut Ui, session: &mut Session, place: &Place, kind: &Kind, val
 fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor) {
     let stated = place.find(session.document.values()).map(|node| node.value.clone());
     let time = session.transport.time_s();
-    let present = stated.as_ref().or(parameter.default.as_ref()).and_then(|value| keyed::at(value, time));
+    let unstated = session.unstated(place).or_else(|| parameter.default.clone());
+    let present = stated.as_ref().or(unstated.as_ref()).and_then(|value| keyed::at(value, time));
     let curve = matches!(parameter.kind, Kind::Curve { .. });
     let name = RichText::new(words(parameter.key));
     let name = if stated.is_some() { name.strong() } else { name };
@@ -209,11 +233,10 @@ fn key_button(ui: &mut Ui, session: &mut Session, place: &Place, stated: Option<
         None => (Icon::Keyed, "Keyed; key the value at this time"),
     };
     if icon::button(ui, sign, &format!("{doc}: {place}")).clicked() {
-        let operation = match here {
-            Some(time) => Operation::RemoveKeyframe { place: place.clone(), time },
-            None => session.keyframe(place, present),
-        };
-        session.edit("key", &[operation]);
+        match here {
+            Some(time) => session.edit("key", &[Operation::RemoveKeyframe { place: place.clone(), time }]),
+            None => session.key(place, present),
+        }
     }
 }
 

@@ -4,7 +4,8 @@ use bansho::{
     KINDS,
     base::{
         curve::{Curve, Interpolation},
-        parameters::{Descriptor, InterpolationName, Kind, Node, TableDescriptor, Value},
+        math::DVec3,
+        parameters::{Descriptor, InterpolationName, Kind, Node, Table, TableDescriptor, Value},
     },
     render::scene::{Place, SHARED_TABLES, Segment},
 };
@@ -77,6 +78,13 @@ pub(super) fn at(value: &Value, time: f64) -> Option<Value> {
         }
         _ => number(None).map(Value::Number),
     }
+}
+
+/// The three numbers at `place` of the scene `root` at `time`, if it states them.
+pub(super) fn vector(root: &Table, place: &Place, time: f64) -> Option<DVec3> {
+    let Value::List(items) = at(&place.find(root)?.value, time)? else { return None };
+    let numbers: Vec<f64> = items.iter().map(|item| item.value.as_number()).collect::<Option<_>>()?;
+    Some(DVec3::from(<[f64; 3]>::try_from(numbers).ok()?))
 }
 
 fn component(value: &Value, index: Option<usize>) -> Option<f64> {

@@ -1,15 +1,9 @@
 //! The menu at the top.
 
-use std::path::PathBuf;
-
 use eframe::egui::{self, ThemePreference, Ui};
 
 use super::Studio;
-use crate::{
-    beginnings::BEGINNINGS,
-    document::{Document, files, recovery::Recovered},
-    examples,
-};
+use crate::{beginnings::BEGINNINGS, document::recovery::Recovered, examples};
 
 impl Studio {
     /// The bar at the top.
@@ -64,6 +58,24 @@ impl Studio {
         if ui.add_enabled(document.redo_label().is_some(), egui::Button::new(redo)).clicked() {
             document.redo();
         }
+        ui.menu_button("Undo back to", |ui| self.undo_list(ui));
+    }
+
+    /// The last steps, the last first: a click takes back that one and all after it.
+    fn undo_list(&mut self, ui: &mut Ui) {
+        const LISTED: usize = 20;
+        let document = &mut self.session.document;
+        let labels: Vec<String> = document.undo_labels().take(LISTED).map(str::to_owned).collect();
+        if labels.is_empty() {
+            ui.weak("nothing was done");
+        }
+        for (number, label) in labels.iter().enumerate() {
+            if ui.button(format!("{}. {label}", number + 1)).clicked() {
+                for _ in 0..=number {
+                    document.undo();
+                }
+            }
+        }
     }
 
     fn view_menu(&mut self, ui: &mut Ui) {
@@ -87,28 +99,24 @@ impl Studio {
         if self.files.unsaved.recovered.is_empty() {
             return;
         }
+        let name = |recovered: &Recovered| match recovered.origin.as_str() {
+            "" => "a scene never saved".to_owned(),
+            origin => origin.to_owned(),
+        };
         ui.menu_button("Recover", |ui| {
             for recovered in self.files.unsaved.recovered.clone() {
-                let origin = if recovered.origin.is_empty() { "a scene never saved" } else { &recovered.origin };
-                if ui.button(origin).clicked() {
-                    self.recover(&recovered);
+                if ui.button(name(&recovered)).clicked() {
+                    self.files.recover(&mut self.session, recovered);
+                }
+            }
+            ui.separator();
+            for recovered in self.files.unsaved.recovered.clone() {
+                if ui.button(format!("Not wanted: {}", name(&recovered))).clicked() {
+                    self.files.unsaved.forget(&recovered);
                 }
             }
         })
         .response
         .on_hover_text("Unsaved work of a studio that did not end well");
-    }
-
-    fn recover(&mut self, recovered: &Recovered) {
-        let named = Some(&recovered.origin).filter(|origin| !origin.is_empty());
-        // A page knows names, but no files.
-        let path = named.filter(|_| !cfg!(target_arch = "wasm32")).map(PathBuf::from);
-        let saved = path.as_deref().and_then(|path| files::read(path).ok()).unwrap_or_default();
-        let name = named.map_or("scene", String::as_str);
-        let mut document = Document::new(name, saved);
-        document.replace("recover", &recovered.text);
-        document.seal();
-        self.session.open(document, path);
-        self.files.unsaved.forget(recovered);
     }
 }

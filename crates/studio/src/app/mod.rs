@@ -32,14 +32,20 @@ use std::time::Duration;
 
 use eframe::egui;
 
-pub use self::session::{AssetsOf, Session};
 use self::{
     aurora::AuroraEditor, files::Files, inspector::Inspector, layout::Layout, problems::Wanted, scene_panel::Subject,
     stages_view::StagesView, store::Store, text_panel::TextPanel, viewport::Viewport,
 };
+pub use self::{
+    session::{AssetsOf, Session},
+    stages_view::image as screen_image,
+};
 
 /// The kind of phenomenon whose shapes are drawn.
 const KIND_WITH_SHAPES: &str = "aurora";
+
+/// The kind of phenomenon that burns on burners.
+const KIND_WITH_BURNERS: &str = "flame_particles";
 
 /// The kind of phenomenon that comes to be in stages.
 const KIND_WITH_STAGES: &str = "flame_sheet";
@@ -58,6 +64,8 @@ pub struct Studio {
     layout: Layout,
     /// Which of the documents that were opened is shown.
     opened: u64,
+    /// What has the keys.
+    field: Option<egui::Id>,
 }
 
 /// How large the window was when it was closed last, or is at first, points of the screen.
@@ -92,6 +100,7 @@ impl Studio {
             shows: Shows { text: layout.get("text shown", 0.0) > 0.0, ..Shows::default() },
             layout,
             opened: 0,
+            field: None,
         }
     }
 
@@ -100,13 +109,19 @@ impl Studio {
         &mut self.session
     }
 
+    /// Whether something would be lost if the window closed now: work, or pictures under way.
+    pub fn would_lose_something(&self) -> bool {
+        self.session.document.is_dirty() || self.files.progress().is_some()
+    }
+
     /// Shows everything and takes in what hands do.
     pub fn show(&mut self, ui: &mut egui::Ui) {
         if ui.ctx().cumulative_pass_nr() == 0 {
             self.layout.apply_theme(ui.ctx());
         }
+        self.begin_gestures(ui.ctx());
         self.take_shortcuts(ui.ctx());
-        self.files.tend(ui, &mut self.session);
+        self.files.tend(ui, &mut self.session, &self.subject);
         egui::Panel::top("menu").show(ui, |ui| self.menu(ui));
         egui::Panel::bottom("status").show(ui, |ui| status::show(ui, &mut self.session, &mut self.files));
         egui::Panel::bottom("timeline").show(ui, |ui| timeline::show(ui, &mut self.session));
@@ -167,19 +182,39 @@ impl Studio {
             if let (KIND_WITH_STAGES, Some(index)) = (subject.key, subject.index) {
                 stages.show(ui, session, index);
             }
-            egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| inspector.show(ui, session, subject));
+            // A row that is too wide is scrolled to: it must not widen the panel, which would widen the rows.
+            egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| inspector.show(ui, session, subject));
         });
     }
 
-    /// When everything is let go, what was done is one step of the history.
-    fn end_gestures(&mut self, ui: &egui::Ui) {
-        let typing = ui.ctx().egui_wants_keyboard_input();
-        if !ui.input(|input| input.pointer.any_down()) && !typing {
+    /// What is done from one press to its letting go, in one field, or by one turn of the wheel is one step of the history.
+    fn begin_gestures(&mut self, ctx: &egui::Context) {
+        let field = ctx.memory(egui::Memory::focused);
+        let (pressed, held) = ctx.input(|input| (input.pointer.any_pressed(), input.pointer.any_down()));
+        if pressed || (self.field != field && !held) {
             self.session.document.seal();
-            // Pages end without being asked.
-            if cfg!(target_arch = "wasm32") {
-                self.layout.keep();
-            }
+        }
+        self.field = field;
+    }
+
+    /// When everything is let go, what was done is done.
+    fn end_gestures(&mut self, ui: &egui::Ui) {
+        /// Turns of the wheel that follow one another faster are one, s.
+        const TURN_S: f32 = 0.5;
+        let typing = ui.ctx().egui_wants_keyboard_input();
+        let (held, turned) = ui.input(|input| {
+            let turned = input.is_scrolling() || input.time_since_last_scroll() < TURN_S;
+            (input.pointer.any_down(), turned)
+        });
+        if held || typing {
+            return;
+        }
+        if !turned {
+            self.session.document.seal();
+        }
+        // Pages end without being asked.
+        if cfg!(target_arch = "wasm32") {
+            self.layout.keep();
         }
     }
 

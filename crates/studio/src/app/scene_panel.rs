@@ -32,6 +32,11 @@ impl Subject {
         first.map_or_else(Self::default, |listed| Self { key: listed.kind, index: Some(listed.index) })
     }
 
+    /// Which of `kind` it is, or the first where it is something else.
+    pub(super) fn index_of(&self, kind: &str) -> usize {
+        self.index.filter(|_| self.key == kind).unwrap_or_default()
+    }
+
     /// Where it stands.
     pub(super) fn place(&self) -> Place {
         let place = Place::root().key(self.key);

@@ -7,8 +7,11 @@ use std::{
 
 use bansho::{
     Assets, Plan,
-    base::parameters::Value,
-    render::scene::{Place, edit::EditError, operation::Operation},
+    base::{
+        camera::CameraParameters,
+        parameters::{Parameters, Value},
+    },
+    render::scene::{Place, Segment, edit::EditError, operation::Operation},
 };
 
 use super::{keyed, rate::Rate};
@@ -21,8 +24,11 @@ use crate::{
     player::{Event, Pace, Picture, Player, Took, Transport, Wish},
 };
 
-/// Makes the assets of a scene that lies in a folder. Without one it finds the files of the examples, and given ones.
+/// Makes the assets of a scene that lies in a folder. A scene without a file finds those of the examples first, and given ones.
 pub type AssetsOf = fn(&Path) -> Arc<dyn Assets>;
+
+/// The table of the camera.
+const CAMERA: &str = "camera";
 
 /// A document that is open, with its player.
 pub struct Session {
@@ -105,14 +111,15 @@ impl Session {
         (self.document, self.path) = (document, path);
         (self.picture, self.asked, self.broken, self.notice) = (None, None, None, None);
         (self.stages, self.stage_pictures, self.pace) = (None, Vec::new(), Pace::default());
-        self.transport = Transport::default();
+        (self.transport, self.seek, self.rate) = (Transport::default(), None, Rate::default());
         self.opened += 1;
     }
 
     /// Reads all assets anew, as after one was replaced.
     pub fn reload_assets(&mut self) {
         self.assets = assets(&self.bundle, self.path.as_deref(), self.assets_of);
-        self.asked = None;
+        // What was broken by a file may be whole with another.
+        (self.asked, self.broken) = (None, None);
     }
 
     /// Takes the bytes of a file that no folder holds.
@@ -215,7 +222,42 @@ impl Session {
             }
         };
         let operations: Vec<Operation> = values.into_iter().map(operation).collect();
-        self.edit(label, &operations);
+        self.edit_as_seen(label, operations);
+    }
+
+    /// Keys `value` at `place` now.
+    pub fn key(&mut self, place: &Place, value: Value) {
+        let key = self.keyframe(place, value);
+        self.edit_as_seen("key", vec![key]);
+    }
+
+    /// What stands at `place` of a good scene whether or not the text states it, where that is not simply the parameter's default: a
+    /// camera that is not told where to look may look up at the sky.
+    pub fn unstated(&self, place: &Place) -> Option<Value> {
+        let [Segment::Key(root), Segment::Key(key)] = place.segments() else { return None };
+        let camera = &self.plan().filter(|_| root == CAMERA)?.scene.camera;
+        camera.to_table().get(key).map(|node| node.value.clone())
+    }
+
+    /// Carries out `operations`, and states what they would change unseen: a camera that looks up by itself no longer does once it is
+    /// told where to stand or to look.
+    fn edit_as_seen(&mut self, label: &str, operations: Vec<Operation>) {
+        let camera = Place::root().key(CAMERA);
+        let [position, target, field] = ["position", "target", "vertical_fov_deg"].map(|key| camera.key(key));
+        let told = [&position, &target].map(|place| place.find(self.document.values()).is_some());
+        let tells = operations.iter().any(|operation| [&position, &target].contains(&operation.place()));
+        let usual = CameraParameters::default().to_table();
+        let mut all = Vec::new();
+        if tells && told == [false; 2] {
+            for (place, key) in [(position, "position"), (target, "target"), (field, "vertical_fov_deg")] {
+                let stated = place.find(self.document.values()).is_some();
+                let present =
+                    self.unstated(&place).filter(|value| usual.get(key).is_none_or(|node| node.value != *value));
+                all.extend(present.filter(|_| !stated).map(|value| Operation::Set { place, value }));
+            }
+        }
+        all.extend(operations);
+        self.edit(label, &all);
     }
 
     /// The operation that keys `place` now.
@@ -286,6 +328,11 @@ impl Session {
         Wish { still: true, ..self.wish_for(asked, true) }
     }
 
+    /// The bytes of a file that the studio brought along, or was given.
+    pub fn bundled(&self, name: &str) -> Option<&[u8]> {
+        self.bundle.bytes(name)
+    }
+
     /// Files that no folder holds, by name.
     pub fn given(&self) -> &[(String, Arc<[u8]>)] {
         self.bundle.given()
@@ -306,7 +353,11 @@ impl Session {
         }
     }
 
+    /// News of a document that was open before is none.
     fn take_in(&mut self, event: Event, now: f64, hands: bool) {
+        if event.revision().is_some_and(|revision| !self.document.has_been(revision)) {
+            return;
+        }
         match event {
             Event::Judged { revision, outcome } => self.judged(revision, outcome),
             Event::Drawn(picture) => self.show(picture, now, hands),
@@ -325,10 +376,15 @@ impl Session {
             Event::Panicked { revision, message } => {
                 self.broken = Some(revision);
                 self.transport.set_playing(false);
-                self.keep_now = true;
-                self.notice = Some(format!("a phenomenon panicked, which is a bug in it: {message}{}", self.rescue()));
+                self.notice = Some(self.told_of_panic(&message));
             }
         }
+    }
+
+    /// What the user is told where a phenomenon panicked and said `message`; the work is saved at once.
+    pub(super) fn told_of_panic(&mut self, message: &str) -> String {
+        self.keep_now = true;
+        format!("a phenomenon panicked, which is a bug in it: {message}{}", self.rescue())
     }
 
     /// Saves the work beside its file after a panic, and says so.
@@ -379,10 +435,8 @@ impl Session {
 
 /// What a scene in `path` finds.
 fn assets(bundle: &Bundle, path: Option<&Path>, assets_of: AssetsOf) -> Arc<dyn Assets> {
-    match path {
-        Some(_) => assets_of(folder(path)),
-        None => Arc::new(bundle.clone()),
-    }
+    let files = assets_of(folder(path));
+    if path.is_some() { files } else { Arc::new(bundle.clone().before(files)) }
 }
 
 /// The folder that paths in a scene are relative to.

@@ -64,7 +64,7 @@ pub(super) const SHORTCUTS: [Shortcut; 14] = [
 ];
 
 impl Studio {
-    /// Does what pressed keys say. Keys without Ctrl or Cmd belong to whatever is being typed in.
+    /// Does what pressed keys say. Keys without Ctrl or Cmd, but for F12, belong to whatever is being typed in.
     pub(super) fn take_shortcuts(&mut self, ctx: &Context) {
         let typing = ctx.egui_wants_keyboard_input();
         for shortcut in &SHORTCUTS {
@@ -76,6 +76,9 @@ impl Studio {
     }
 
     fn act(&mut self, ctx: &Context, action: Action) {
+        if matches!(action, Action::Save | Action::Open | Action::RenderStill | Action::RenderShot) {
+            self.viewport.let_go(&mut self.session);
+        }
         let transport = &mut self.session.transport;
         match action {
             Action::Undo => {

@@ -62,7 +62,7 @@ impl StagesView {
 }
 
 /// A picture for the screen.
-pub(super) fn image(picture: &Picture) -> ColorImage {
+pub fn image(picture: &Picture) -> ColorImage {
     let colours = picture.pixels.iter().map(|[r, g, b, _]| Color32::from_rgb(*r, *g, *b)).collect();
     ColorImage::new(picture.size, colours)
 }

@@ -56,6 +56,19 @@ impl Store {
         browser::storage().is_some_and(|storage| storage.set_item(&key(name), text).is_ok())
     }
 
+    /// The names of all texts that are kept as `beginning`, or as that and more words; the first kept first.
+    #[cfg(target_arch = "wasm32")]
+    pub(super) fn names(&self, beginning: &str) -> Vec<String> {
+        let Some(storage) = browser::storage() else { return Vec::new() };
+        let count = storage.length().unwrap_or_default();
+        let keys = (0..count).filter_map(|index| storage.key(index).ok()?);
+        let names = keys.filter_map(|own| Some(own.strip_prefix(&key(""))?.to_owned()));
+        let begins = |name: &String| name.split(' ').next() == Some(beginning);
+        let mut names: Vec<String> = names.filter(begins).collect();
+        names.sort();
+        names
+    }
+
     /// Keeps nothing as `name` any more.
     #[cfg(target_arch = "wasm32")]
     pub(super) fn forget(&self, name: &str) {

@@ -12,7 +12,12 @@ use super::session::Session;
 #[derive(Default)]
 pub(super) struct TextPanel {
     jump: Option<Span>,
+    /// When something was typed last, s, and in which line.
+    typed: Option<(f64, usize)>,
 }
+
+/// Typing that rests longer begins another step of the history, s.
+const REST_S: f64 = 1.0;
 
 impl TextPanel {
     /// Marks these bytes of the text when it is shown next.
@@ -37,6 +42,11 @@ impl TextPanel {
                 ui.scroll_to_rect(at, Some(egui::Align::Center));
             }
             if output.response.changed() {
+                let now = ui.input(|input| input.time);
+                let line = changed_line(session.document.text(), &text);
+                if self.typed.replace((now, line)).is_none_or(|(then, there)| now - then > REST_S || line != there) {
+                    session.document.seal();
+                }
                 session.document.replace("typing", &text);
             }
             if output.response.lost_focus() {
@@ -44,6 +54,11 @@ impl TextPanel {
             }
         });
     }
+}
+
+/// The first line in which two texts differ.
+fn changed_line(before: &str, after: &str) -> usize {
+    before.lines().zip(after.lines()).take_while(|(one, other)| one == other).count()
 }
 
 /// The characters that bytes of the text stand for.

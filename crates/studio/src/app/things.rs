@@ -5,7 +5,7 @@ use bansho::{
         math::DVec3,
         parameters::{Table, Value},
     },
-    render::scene::Place,
+    render::scene::{Place, Segment},
 };
 
 use super::{keyed, session::Session};
@@ -26,6 +26,12 @@ pub(super) struct Thing {
 /// Kinds of phenomena that stand at a `position`, and the list of their parts that have a place of their own. A list that is not stated
 /// stands for one part.
 const STANDING: [(&str, &str); 2] = [("flame_sheet", "instances"), ("flame_particles", "burners")];
+
+/// Whether the list at `place` stands for one usual part where it is not stated.
+pub(super) fn stands_for_one(place: &Place) -> bool {
+    let [Segment::Key(kind), Segment::Index(_), Segment::Key(parts)] = place.segments() else { return false };
+    STANDING.contains(&(kind, parts))
+}
 
 /// All that hands can move at the present time: what stands somewhere, or while keyframes are recorded what can be keyed.
 pub(super) fn things(session: &Session) -> Vec<Thing> {
@@ -73,8 +79,5 @@ fn standing(session: &Session) -> Vec<Thing> {
 
 /// The `position` of the table at `place`; the origin where it states none.
 fn position(root: &Table, place: &Place, time: f64) -> DVec3 {
-    let stated = place.key("position").find(root).and_then(|node| keyed::at(&node.value, time));
-    let Some(Value::List(items)) = stated else { return DVec3::ZERO };
-    let axis = |index: usize| items.get(index).and_then(|item| item.value.as_number()).unwrap_or_default();
-    DVec3::new(axis(0), axis(1), axis(2))
+    keyed::vector(root, &place.key("position"), time).unwrap_or_default()
 }

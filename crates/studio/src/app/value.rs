@@ -1,9 +1,9 @@
 //! Widgets for values, one for each kind of parameter. They know nothing of scenes.
 
 use bansho::base::parameters::{Choice, Kind, Node, Value};
-use eframe::egui::{self, DragValue, Id, Ui};
+use eframe::egui::{self, Color32, DragValue, Id, Ui};
 
-use super::curve_editor;
+use super::curve_editor::{self, Allowed};
 
 /// What a value is edited with.
 pub(super) struct Widget<'a> {
@@ -17,8 +17,8 @@ pub(super) struct Widget<'a> {
     pub(super) usual: Option<&'a Value>,
 }
 
-/// Beside a slider: a number with its unit, and the buttons after it, points of the screen.
-const BESIDE: f32 = 126.0;
+/// Beside a slider: a number without its unit, and the buttons after it, points of the screen.
+const BESIDE: f32 = 114.0;
 
 /// Sliders are so wide at least, points of the screen.
 const NARROWEST: f32 = 40.0;
@@ -37,7 +37,9 @@ impl Widget<'_> {
             Kind::Vector { min, max, .. } => self.vector(ui, value, [*min, *max]),
             Kind::Text | Kind::Asset | Kind::Rational { .. } => self.text(ui, value),
             Kind::Choice(choices) => self.choice(ui, value, choices),
-            Kind::Curve { x, y, .. } => curve_editor::show(ui, self.label, value, [*x, *y]),
+            Kind::Curve { x, y, rising } => {
+                curve_editor::show(ui, self.label, value, Allowed { x: *x, y: *y, rising: *rising })
+            }
             Kind::Animated(inner) | Kind::Optional(inner) => Widget { kind: inner, ..*self }.show(ui, value),
             Kind::Auto(inner) => self.auto(ui, value, inner),
             Kind::List { .. } | Kind::Table(_) => {
@@ -58,7 +60,7 @@ impl Widget<'_> {
         let bounds = [min as f64, max as f64];
         let usual = self.usual.and_then(Value::as_number);
         let slid = self.slider(ui, number as f64, bounds, usual).map(|slid| slid.round() as i64);
-        let drag = DragValue::new(&mut number).range(min..=max).suffix(self.suffix());
+        let drag = DragValue::new(&mut number).range(min..=max).clamp_existing_to_range(false).suffix(self.suffix());
         let dragged = ui.add(drag).labelled_by(self.label).changed().then_some(number);
         slid.or(dragged).map(Value::Integer)
     }
@@ -72,6 +74,8 @@ impl Widget<'_> {
     fn drag(&self, ui: &mut Ui, mut number: f64, [min, max]: [f64; 2]) -> Option<f64> {
         let speed = speed(number);
         let drag = DragValue::new(&mut number).range(min..=max).speed(speed).max_decimals(4);
+        // What a file says beyond its bounds is a fault to be told, not to be mended by being looked at.
+        let drag = drag.clamp_existing_to_range(false);
         let changed = ui.add(drag.suffix(self.suffix())).labelled_by(self.label).changed();
         changed.then(|| decimal(number))
     }
@@ -79,8 +83,12 @@ impl Widget<'_> {
     /// Slides over what is allowed, by decades where it spans many; nothing where there are no bounds.
     fn slider(&self, ui: &mut Ui, mut number: f64, bounds: [f64; 2], usual: Option<f64>) -> Option<f64> {
         let scale = Scale::over(bounds, usual)?;
-        ui.spacing_mut().slider_width = (ui.available_size_before_wrap().x - BESIDE).max(NARROWEST);
+        let unit =
+            ui.painter().layout_no_wrap(self.suffix(), egui::TextStyle::Button.resolve(ui.style()), Color32::WHITE);
+        let beside = BESIDE + unit.size().x;
+        ui.spacing_mut().slider_width = (ui.available_size_before_wrap().x - beside).max(NARROWEST);
         let slider = egui::Slider::new(&mut number, bounds[0]..=bounds[1]).show_value(false);
+        let slider = slider.clamping(egui::SliderClamping::Edits);
         let slider = match scale {
             Scale::Even => slider,
             Scale::Decades { least } => slider.logarithmic(true).smallest_positive(least),
@@ -89,7 +97,11 @@ impl Widget<'_> {
     }
 
     fn suffix(&self) -> String {
-        if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) }
+        match self.unit {
+            "" => String::new(),
+            "degrees" => "°".to_owned(),
+            unit => format!(" {unit}"),
+        }
     }
 
     /// Numbers beside one another; where they have bounds, each below the other with a slider.

@@ -121,7 +121,7 @@ impl Viewport {
         let Some(plan) = session.plan().cloned() else { return };
         let time = session.transport.time_s();
         let camera = plan.scene.camera.at(time, plan.size);
-        let stand = Stand::of(&plan, time);
+        let stand = Stand::of(&plan, session.document.values(), time);
         let heights = |drag: Vec2| DVec2::new(f64::from(drag.x), f64::from(drag.y)) / f64::from(frame.height());
         let drag = heights(response.drag_delta());
         let shift = ui.input(|input| input.modifiers.shift);
@@ -130,7 +130,7 @@ impl Viewport {
         if pans {
             move_camera(session, stand.panned(drag, &camera));
         } else if response.dragged_by(PointerButton::Primary) && self.tool == Tool::Camera && drag != DVec2::ZERO {
-            move_camera(session, stand.orbited(drag));
+            move_camera(session, stand.turned(drag, &camera));
         }
         self.dolly(ui, session, response, stand);
         self.blow(session, response, &camera, heights(response.total_drag_delta().unwrap_or_default()));
@@ -166,6 +166,13 @@ impl Viewport {
         }
     }
 
+    /// Takes the hand off the wind, as before the scene is saved: wind that is not recorded passes.
+    pub(super) fn let_go(&mut self, session: &mut Session) {
+        if let Some(blowing) = self.blowing.take() {
+            blowing.end(session);
+        }
+    }
+
     fn drag_thing(&mut self, ui: &Ui, session: &mut Session, response: &Response, camera: &Camera, frame: Rect) {
         /// Things nearer to the pointer than this are meant, points of the screen.
         const REACH: f32 = 14.0;
@@ -180,13 +187,15 @@ impl Viewport {
             let nearest = things.iter().filter_map(|thing| near(&thing)).min_by(|a, b| a.0.total_cmp(&b.0));
             self.held = nearest.filter(|(distance, _)| *distance < REACH).map(|(_, place)| place);
             if session.recording && self.held.is_some() {
-                session.transport.set_playing(true);
+                session.transport.play_to_the_end();
             }
         }
         if !response.dragged_by(PointerButton::Primary) && self.held.take().is_some() && session.recording {
             session.transport.set_playing(false);
         }
-        let held = things.iter().find(|thing| Some(&thing.place) == self.held.as_ref());
+        // Beyond the end of the shot nothing is recorded.
+        let ended = session.recording && !session.transport.is_playing();
+        let held = things.iter().find(|thing| Some(&thing.place) == self.held.as_ref()).filter(|_| !ended);
         if let (Some(thing), Some(at)) = (held, response.interact_pointer_pos())
             && let Some(moved) = hands::dragged(thing.point, to_picture(at, camera, frame), camera)
         {
@@ -219,7 +228,12 @@ fn exposure(ui: &mut Ui, session: &mut Session) {
     let Some(mut ev100) = session.plan().map(|plan| f64::from(plan.exposure_ev100)) else { return };
     let place = Place::root().key("picture").key("exposure_ev100");
     let label = ui.label("Exposure").on_hover_text("Exposure value at ISO 100; less is brighter").id;
-    let drag = egui::DragValue::new(&mut ev100).speed(0.02).range(-40.0..=40.0).max_decimals(2).suffix(" EV");
+    let drag = egui::DragValue::new(&mut ev100)
+        .clamp_existing_to_range(false)
+        .speed(0.02)
+        .range(-40.0..=40.0)
+        .max_decimals(2)
+        .suffix(" EV");
     if ui.add(drag).labelled_by(label).changed() {
         session.set("exposure", &place, Value::Number((ev100 * 100.0).round() / 100.0));
     }

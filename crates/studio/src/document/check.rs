@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use bansho::{
     Assets, KINDS, Plan, PlanOptions, SceneError,
-    base::parameters::{Problem, ProblemKind, Table, Value},
-    parse_scene,
+    base::{
+        assets::{AssetError, AssetProblem},
+        parameters::{Problem, ProblemKind, Span, Table, Value},
+    },
     render::scene::{
         Place, Scene,
         operation::{self, Operation},
@@ -57,26 +59,62 @@ impl Checker {
     }
 }
 
-/// The plan of the scene `text` where another [`check`] found its exposure, or why it cannot be planned. Of a good scene no
-/// phenomenon is made, so that it takes a moment.
+/// A fault that another [`check`] found, in words.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// The bytes of the text that it is about, if it lies anywhere.
+    pub span: Option<Span>,
+    /// The parameter.
+    pub path: String,
+    /// What is wrong.
+    pub reason: String,
+    /// The asset that cannot be had, if that is what is wrong.
+    pub asset: Option<String>,
+}
+
+impl From<&Problem> for Found {
+    fn from(problem: &Problem) -> Self {
+        let Problem { span, path, kind } = problem;
+        let (asset, reason) = match kind {
+            ProblemKind::Asset(error) => (Some(error.path.clone()), error.problem.to_string()),
+            kind => (None, kind.to_string()),
+        };
+        Self { span: span.clone(), path: path.clone(), reason, asset }
+    }
+}
+
+impl From<Found> for Problem {
+    fn from(found: Found) -> Self {
+        let Found { span, path, reason, asset } = found;
+        let kind = match asset {
+            Some(path) => ProblemKind::Asset(AssetError { path, problem: AssetProblem::Told(reason) }),
+            None => ProblemKind::Conflict(reason),
+        };
+        Self { span, path, kind }
+    }
+}
+
+/// The plan of the scene `text` where another [`check`] found its exposure, or its faults. No phenomenon is made, so that it takes a
+/// moment.
 ///
 /// # Errors
-/// Every fault of the text and of the assets it names, or what the other check found.
+/// Every fault of the text, or what the other check found.
 pub fn recheck(
     name: &str,
     text: &str,
     assets: &Arc<dyn Assets>,
-    exposure_ev100: Result<f32, String>,
+    found: Result<f32, Vec<Found>>,
 ) -> Result<Arc<Plan>, SceneError> {
-    let unplaced = |reason: String| unplaced(name, text, reason);
-    match exposure_ev100 {
+    let scene = Scene::reparse(name, text, KINDS)?;
+    match found {
         Ok(ev100) => {
-            let plan =
-                Plan::exposed(Scene::reparse(name, text, KINDS)?, &PlanOptions::default(), assets.clone(), ev100);
-            plan.map(Arc::new).map_err(|error| unplaced(error.to_string()))
+            let plan = Plan::exposed(scene, &PlanOptions::default(), assets.clone(), ev100);
+            plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
         }
-        // The faults with their places, where they have any.
-        Err(reason) => Err(parse_scene(name, text, assets.as_ref()).err().unwrap_or_else(|| unplaced(reason))),
+        Err(found) => {
+            let problems = found.into_iter().map(Problem::from).collect();
+            Err(SceneError { file: name.to_owned(), text: text.to_owned(), problems })
+        }
     }
 }
 
@@ -126,11 +164,7 @@ mod tests {
 
     use bansho::{
         MemoryAssets,
-        base::{
-            assets::{AssetError, Picture},
-            drawing::Drawing,
-            mesh::Mesh,
-        },
+        base::{assets::Picture, drawing::Drawing, mesh::Mesh},
     };
 
     use super::*;
@@ -215,9 +249,22 @@ mod tests {
         let first = check("scene", text, &assets).unwrap();
         let again = recheck("scene", text, &assets, Ok(first.exposure_ev100)).unwrap();
         assert_eq!((again.exposure_ev100, again.frames()), (first.exposure_ev100, 0..9));
-        let told = recheck("scene", text, &assets, Err("a burner lies in a wall".into())).err().unwrap();
-        assert!(told.to_string().contains("a burner lies in a wall"));
-        let faulty = recheck("scene", "bansho = 1\n[[flame_shet]]\n", &assets, Err("a fault".into())).err().unwrap();
+        let faulty = recheck("scene", "bansho = 1\n[[flame_shet]]\n", &assets, Err(Vec::new())).err().unwrap();
         assert!(faulty.to_string().contains("flame_shet"));
+    }
+
+    #[test]
+    fn faults_that_another_check_found_are_told_in_its_words_and_made_by_nobody_again() {
+        let text = "bansho = 1\n[plate]\nimage = \"gone.png\"\n[[flame_particles]]\nburners = [{ shape = \"mesh\", file = \"meshes/ring.glb\" }]\n";
+        let counting = Arc::new(Counting::default());
+        let assets: Arc<dyn Assets> = counting.clone();
+        let error = check("scene", text, &assets).err().unwrap();
+        let found: Vec<Found> = error.problems.iter().map(Found::from).collect();
+        let made = counting.meshes.load(Ordering::Relaxed);
+        let told = recheck("scene", text, &assets, Err(found)).err().unwrap();
+        assert_eq!(counting.meshes.load(Ordering::Relaxed), made);
+        assert_eq!(told.to_string(), error.to_string());
+        assert!(told.to_string().contains("gone.png: no such file"));
+        assert!(matches!(told.problems[0].kind, ProblemKind::Asset(_)), "it can be relinked");
     }
 }

@@ -48,6 +48,21 @@ pub fn save(document: &mut Document, path: &Path) -> Result<(), MediaError> {
     Ok(())
 }
 
+/// Whether `path` ends as scenes do.
+pub fn is_named_as_scene(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
+/// `path` with the ending of scenes.
+pub fn named_as_scene(path: PathBuf) -> PathBuf {
+    if is_named_as_scene(&path) {
+        return path;
+    }
+    let mut whole = path.into_os_string();
+    whole.push(".toml");
+    whole.into()
+}
+
 /// Writes a copy beside `path`, where it is found after a failure, and says where.
 ///
 /// # Errors
@@ -58,10 +73,24 @@ pub fn rescue(text: &str, path: &Path) -> Result<PathBuf, MediaError> {
     Ok(beside)
 }
 
-/// What another program made of the file since it was opened or saved here, if anything.
-pub fn changed_outside(document: &Document, path: &Path) -> Option<Arc<str>> {
-    let there = fs::read_to_string(path).ok()?;
-    (*there != *document.saved).then(|| there.into())
+/// What another program made of a file since it was opened or saved here.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Outside {
+    /// Nothing, as far as can be read.
+    Same,
+    /// Another text.
+    Changed(Arc<str>),
+    /// It took the file away.
+    Gone,
+}
+
+/// What another program made of the file of `document` in `path`.
+pub fn outside(document: &Document, path: &Path) -> Outside {
+    match fs::read_to_string(path) {
+        Ok(there) if *there != *document.saved => Outside::Changed(there.into()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Outside::Gone,
+        Ok(_) | Err(_) => Outside::Same,
+    }
 }
 
 /// Files that were open lately, the last first, kept as one path a line.

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use bansho::render::scene::Place;
-
 /// Most steps that are kept.
 const LONGEST: usize = 1000;
 
@@ -17,24 +15,22 @@ pub(super) struct History {
 
 struct Step {
     label: String,
-    /// What it changes; a step of the same subject continues it.
-    subject: Vec<Place>,
     before: Arc<str>,
     after: Arc<str>,
 }
 
 impl History {
-    /// Notes a step from `before` to `after`.
-    pub(super) fn note(&mut self, label: &str, subject: Vec<Place>, before: &Arc<str>, after: &str) {
+    /// Notes a step from `before` to `after`, which goes on with an open one of the same label.
+    pub(super) fn note(&mut self, label: &str, before: &Arc<str>, after: &str) {
         if **before == *after {
             return;
         }
         self.undone.clear();
         let open = self.open;
-        match self.done.last_mut().filter(|last| open && last.label == label && last.subject == subject) {
+        match self.done.last_mut().filter(|last| open && last.label == label) {
             Some(last) => last.after = after.into(),
             None => {
-                self.done.push(Step { label: label.to_owned(), subject, before: before.clone(), after: after.into() });
+                self.done.push(Step { label: label.to_owned(), before: before.clone(), after: after.into() });
                 self.done.drain(..self.done.len().saturating_sub(LONGEST));
             }
         }
@@ -54,6 +50,10 @@ impl History {
 
     pub(super) fn undo_label(&self) -> Option<&str> {
         self.done.last().map(|step| step.label.as_str())
+    }
+
+    pub(super) fn undo_labels(&self) -> impl Iterator<Item = &str> {
+        self.done.iter().rev().map(|step| step.label.as_str())
     }
 
     pub(super) fn redo_label(&self) -> Option<&str> {

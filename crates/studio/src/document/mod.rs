@@ -4,6 +4,7 @@ mod check;
 pub mod drawing;
 pub mod files;
 mod history;
+mod named_files;
 mod phenomena;
 pub mod recovery;
 pub mod stages;
@@ -12,33 +13,48 @@ mod tests;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod watch;
 
-use std::sync::Arc;
+use std::sync::{
+    Arc,
+    atomic::{AtomicU64, Ordering},
+};
 
 use bansho::{
     Assets, Plan, SceneError,
     base::parameters::{Problem, Table},
     render::scene::{
-        Place,
         edit::EditError,
         operation::{self, Operation},
         values,
     },
 };
 
-pub use check::{Checker, check, recheck};
+pub use check::{Checker, Found, check, recheck};
+pub use named_files::named_files;
 pub use phenomena::{Listed, operations};
 
 use history::History;
 
-/// Counts the states of a document, so that work on one can be told from work on another.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+/// Counts the states of all documents of this run, so that work on one can be told from work on any other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Revision(pub(crate) u64);
+
+impl Revision {
+    /// One that no state has had.
+    fn next() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+}
 
 /// A scene that is being edited.
 pub struct Document {
     name: String,
     text: Arc<str>,
     saved: Arc<str>,
+    /// Whether its file was taken away.
+    gone: bool,
+    /// Its first state.
+    first: Revision,
     revision: Revision,
     history: History,
     values: Table,
@@ -58,11 +74,14 @@ impl Document {
     /// A document with this text, unchanged so far; `name` is what errors call it.
     pub fn new(name: impl Into<String>, text: impl Into<Arc<str>>) -> Self {
         let text = text.into();
+        let first = Revision::next();
         let mut document = Self {
             name: name.into(),
             saved: text.clone(),
+            gone: false,
             text,
-            revision: Revision::default(),
+            first,
+            revision: first,
             history: History::default(),
             values: Table::default(),
             syntax: None,
@@ -92,19 +111,34 @@ impl Document {
         self.revision
     }
 
+    /// Whether `revision` is, or was, a state of this document rather than of another.
+    pub fn has_been(&self, revision: Revision) -> bool {
+        (self.first..=self.revision).contains(&revision)
+    }
+
     /// What the text says, or said when it was TOML last.
     pub fn values(&self) -> &Table {
         &self.values
     }
 
-    /// Whether it differs from what was saved.
+    /// Whether it differs from what lies in its file.
     pub fn is_dirty(&self) -> bool {
+        self.gone || self.differs()
+    }
+
+    /// Whether something was done here since it was saved or opened.
+    pub fn differs(&self) -> bool {
         self.text != self.saved
     }
 
     /// Notes that `text` is what lies in its file now.
     pub fn mark_saved(&mut self, text: Arc<str>) {
-        self.saved = text;
+        (self.saved, self.gone) = (text, false);
+    }
+
+    /// Notes whether its file was taken away.
+    pub fn mark_gone(&mut self, gone: bool) {
+        self.gone = gone;
     }
 
     /// The last plan that was good, if there ever was one.
@@ -143,22 +177,30 @@ impl Document {
         self.judge(self.revision, outcome);
     }
 
-    /// Carries out `operations` as one step of the history. Steps that only change the same value again, as a slider
-    /// does while it is dragged, are one until [`seal`](Self::seal).
+    /// Carries out `operations` as a step of the history. Steps of one label that follow one another, as those of a slider that is
+    /// dragged, are one until [`seal`](Self::seal).
     ///
     /// # Errors
     /// The text is no TOML, or an operation leads nowhere; nothing is changed then.
     pub fn edit(&mut self, label: &str, operations: &[Operation]) -> Result<(), EditError> {
         let text = operation::apply(&self.text, operations)?;
-        let subject: Vec<Place> = operations.iter().map(|operation| operation.place().clone()).collect();
-        self.history.note(label, subject, &self.text, &text);
+        self.history.note(label, &self.text, &text);
         self.show(text.into());
         Ok(())
     }
 
+    /// Goes on to `text`, which says `values`, as [`edit`](Self::edit) does.
+    fn go_on(&mut self, label: &str, text: String, values: Table) {
+        self.history.note(label, &self.text, &text);
+        if *text != *self.text {
+            (self.text, self.revision) = (text.into(), Revision::next());
+            (self.values, self.syntax) = (values, None);
+        }
+    }
+
     /// Replaces the whole text, as typing does; typing is one step until [`seal`](Self::seal).
     pub fn replace(&mut self, label: &str, text: &str) {
-        self.history.note(label, vec![Place::root()], &self.text, text);
+        self.history.note(label, &self.text, text);
         self.show(text.into());
     }
 
@@ -177,6 +219,11 @@ impl Document {
     /// What undoing would take back.
     pub fn undo_label(&self) -> Option<&str> {
         self.history.undo_label()
+    }
+
+    /// All that undoing would take back, the last step first.
+    pub fn undo_labels(&self) -> impl Iterator<Item = &str> {
+        self.history.undo_labels()
     }
 
     /// What redoing would do again.
@@ -201,7 +248,7 @@ impl Document {
             return;
         }
         self.text = text;
-        self.revision.0 += 1;
+        self.revision = Revision::next();
         self.read();
     }
 

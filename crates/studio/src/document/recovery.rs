@@ -27,7 +27,8 @@ pub struct Recovered {
     pub origin: String,
     /// The text.
     pub text: String,
-    file: PathBuf,
+    /// The file that it is kept in, or the browser's name for it.
+    pub(crate) kept_in: PathBuf,
 }
 
 /// Begins the first line of kept work; the origin follows.
@@ -93,7 +94,7 @@ fn is_held(kept: &Path) -> bool {
 
 fn read(file: PathBuf) -> Option<Recovered> {
     let recovered = Recovered::of(&fs::read_to_string(&file).ok()?)?;
-    Some(Recovered { file, ..recovered })
+    Some(Recovered { kept_in: file, ..recovered })
 }
 
 impl Recovered {
@@ -101,13 +102,13 @@ impl Recovered {
     pub fn of(kept: &str) -> Option<Self> {
         let (heading, text) = kept.split_once('\n')?;
         let origin = heading.strip_prefix(HEADING)?;
-        Some(Self { origin: origin.to_owned(), text: text.to_owned(), file: PathBuf::new() })
+        Some(Self { origin: origin.to_owned(), text: text.to_owned(), kept_in: PathBuf::new() })
     }
 
     /// Forgets it, once it is open again or not wanted.
     pub fn forget(&self) {
         // What cannot be removed is offered again, which does no harm.
-        let _ = fs::remove_file(&self.file);
-        let _ = fs::remove_file(self.file.with_extension("lock"));
+        let _ = fs::remove_file(&self.kept_in);
+        let _ = fs::remove_file(self.kept_in.with_extension("lock"));
     }
 }

@@ -7,7 +7,7 @@ use bansho::{
     base::{
         camera::CameraParameters,
         color::ev100_of_white_luminance,
-        parameters::{Auto, Parameters, Reader, Value},
+        parameters::{Auto, Parameters, Reader, Table, Value},
     },
     models::flame_sheet::{FlameSheetParameters, StageShown},
     render::scene::{
@@ -33,15 +33,21 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 
 /// Plans of the stages of flame sheet `index` of the scene `text`; `None` where it is faulty or has no such sheet.
 pub fn plans(name: &str, text: &str, assets: &Arc<dyn Assets>, index: usize) -> Option<Vec<Arc<Plan>>> {
-    names().map(|stage| plan(name, text, assets, index, stage)).collect()
+    let root = values(text).ok()?;
+    names().map(|stage| plan(name, [text, stage], &root, assets, index)).collect()
 }
 
-fn plan(name: &str, text: &str, assets: &Arc<dyn Assets>, index: usize, stage: &str) -> Option<Arc<Plan>> {
-    let root = values(text).ok()?;
+fn plan(
+    name: &str,
+    [text, stage]: [&str; 2],
+    root: &Table,
+    assets: &Arc<dyn Assets>,
+    index: usize,
+) -> Option<Arc<Plan>> {
     let place = Place::root().key(FlameSheetParameters::KEY).index(index);
-    let Value::Table(table) = &place.find(&root)?.value else { return None };
+    let Value::Table(table) = &place.find(root)?.value else { return None };
     let sheet = FlameSheetParameters::read_table(table, &mut Reader::new(), &[]);
-    let stated = |key: &str| place.key(key).find(&root).is_some();
+    let stated = |key: &str| place.key(key).find(root).is_some();
     let mut operations = vec![
         Operation::Set { place: place.key("stage"), value: Value::Text(stage.to_owned()) },
         Operation::Set { place: place.key("position"), value: Value::numbers([0.0; 3]) },

@@ -7,7 +7,7 @@ use bansho::{
 };
 
 use super::{
-    files::{self, Recent},
+    files::{self, Outside, Recent},
     operations,
     recovery::{self, Autosave},
     *,
@@ -179,9 +179,15 @@ fn saving_is_whole_and_outside_edits_are_seen() {
     files::save(&mut document, &path).unwrap();
     assert!(!document.is_dirty());
     assert_eq!(fs::read_to_string(&path).unwrap(), **document.text());
-    assert_eq!(files::changed_outside(&document, &path), None);
+    assert_eq!(files::outside(&document, &path), Outside::Same);
     fs::write(&path, "bansho = 1\n").unwrap();
-    assert_eq!(files::changed_outside(&document, &path).as_deref(), Some("bansho = 1\n"));
+    assert_eq!(files::outside(&document, &path), Outside::Changed("bansho = 1\n".into()));
+    fs::remove_file(&path).unwrap();
+    assert_eq!(files::outside(&document, &path), Outside::Gone);
+    document.mark_gone(true);
+    assert!(document.is_dirty() && !document.differs(), "what lies nowhere is not saved");
+    files::save(&mut document, &path).unwrap();
+    assert!(!document.is_dirty());
     assert!(files::open(&folder.path().join("none.toml")).is_err());
     assert_eq!(files::rescue("x", &path).unwrap(), path.with_file_name("fire.rescued.toml"));
 }

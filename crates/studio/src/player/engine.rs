@@ -28,11 +28,9 @@ pub(super) struct Engine {
     stages: StageShots,
 }
 
-/// A state of a document, with its assets, and whether it was judged as a draft if it could be one. Two documents may have states of one
-/// number, so the text counts, too.
+/// A state of a document, with its assets, and whether it was judged as a draft if it could be one.
 struct Judged {
     revision: Revision,
-    text: Arc<str>,
     assets: Arc<dyn Assets>,
     draft: bool,
 }
@@ -57,16 +55,13 @@ impl Engine {
     ) -> Result<(), RenderError> {
         let draft = wish.draft && !wish.exact && !wish.still;
         let Wish { name, text, assets, .. } = wish;
-        let same = |last: &Judged| {
-            (last.revision, last.draft) == (wish.revision, draft)
-                && last.text == *text
-                && Arc::ptr_eq(&last.assets, assets)
-        };
+        let same =
+            |last: &Judged| (last.revision, last.draft) == (wish.revision, draft) && Arc::ptr_eq(&last.assets, assets);
         if !self.judged.as_ref().is_some_and(same) {
             let drafted = if draft { self.checker.check_draft(name, text, assets) } else { None };
             let is_draft = drafted.is_some();
             let outcome = drafted.unwrap_or_else(|| self.checker.check(name, text, assets));
-            self.judged = Some(Judged { revision: wish.revision, text: text.clone(), assets: assets.clone(), draft });
+            self.judged = Some(Judged { revision: wish.revision, assets: assets.clone(), draft });
             if let Ok(plan) = &outcome {
                 self.plan = Some((plan.clone(), is_draft));
             }

@@ -7,7 +7,7 @@ use js_sys::{Array, Uint8Array};
 use wasm_bindgen::{JsCast, JsValue};
 
 use super::{Picture, Wish};
-use crate::document::Revision;
+use crate::document::{Found, Revision};
 
 /// What the page says.
 pub(super) enum Order {
@@ -21,8 +21,8 @@ pub(super) enum Order {
 pub(super) enum Reply {
     /// It listens.
     Ready,
-    /// The scene of wish `number` was checked: its exposure, or why it cannot be planned.
-    Judged { number: u64, exposure_ev100: Result<f32, String> },
+    /// The scene of wish `number` was checked: its exposure, or its faults.
+    Judged { number: u64, found: Result<f32, Vec<Found>> },
     /// The picture of wish `number`.
     Drawn { number: u64, picture: Picture },
     /// A small picture of a stage, for wish `number`.
@@ -82,9 +82,10 @@ impl Reply {
     pub(super) fn write(self) -> Array {
         match self {
             Self::Ready => array(["ready".into()]),
-            Self::Judged { number, exposure_ev100: Ok(ev100) } => array(["judged".into(), count(number), ev100.into()]),
-            Self::Judged { number, exposure_ev100: Err(reason) } => {
-                array(["judged".into(), count(number), reason.into()])
+            Self::Judged { number, found: Ok(ev100) } => array(["judged".into(), count(number), ev100.into()]),
+            Self::Judged { number, found: Err(faults) } => {
+                let faults: Array = faults.iter().map(fault).collect();
+                array(["judged".into(), count(number), faults.into()])
             }
             Self::Drawn { number, picture } => drawn("drawn", number, &picture).collect(),
             Self::Stage { number, stage, picture } => {
@@ -108,9 +109,10 @@ impl Reply {
         let number = fields.number()? as u64;
         Some(match kind.as_str() {
             "judged" => {
-                let found = fields.next()?;
-                let reason = || found.as_string().unwrap_or_default();
-                Self::Judged { number, exposure_ev100: found.as_f64().map(|ev100| ev100 as f32).ok_or_else(reason) }
+                let said = fields.next()?;
+                let faults =
+                    || said.dyn_ref::<Array>().into_iter().flat_map(Array::iter).filter_map(read_fault).collect();
+                Self::Judged { number, found: said.as_f64().map(|ev100| ev100 as f32).ok_or_else(faults) }
             }
             "drawn" => Self::Drawn { number, picture: fields.picture()? },
             "stage" => {
@@ -128,6 +130,21 @@ impl Reply {
 
 fn array<const N: usize>(fields: [JsValue; N]) -> Array {
     fields.into_iter().collect()
+}
+
+/// A fault as a message holds it: without a place, both of its ends are null.
+fn fault(found: &Found) -> Array {
+    let end = |at: Option<usize>| at.map_or(JsValue::NULL, |at| (at as f64).into());
+    let [start, stop] = [found.span.as_ref().map(|span| span.start), found.span.as_ref().map(|span| span.end)].map(end);
+    let asset = found.asset.as_deref().map_or(JsValue::NULL, JsValue::from);
+    array([start, stop, (&*found.path).into(), (&*found.reason).into(), asset])
+}
+
+fn read_fault(message: JsValue) -> Option<Found> {
+    let mut fields = Fields::of(&message)?;
+    let [start, stop] = [fields.next()?, fields.next()?].map(|end| end.as_f64().map(|at| at as usize));
+    let span = start.zip(stop).map(|(start, stop)| start..stop);
+    Some(Found { span, path: fields.text()?, reason: fields.text()?, asset: fields.next()?.as_string() })
 }
 
 /// Counts stay far below 2^53.

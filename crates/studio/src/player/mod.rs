@@ -5,12 +5,12 @@
 //! is wanted. All report [`Event`]s.
 
 mod engine;
+mod interruption;
 #[cfg(target_arch = "wasm32")]
 mod message;
 mod pace;
 pub mod shoot;
 mod slices;
-mod stages;
 mod states;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -118,12 +118,32 @@ pub enum Event {
     },
 }
 
+impl Event {
+    /// The state of the document that it is about.
+    pub fn revision(&self) -> Option<Revision> {
+        match self {
+            Self::Judged { revision, .. } | Self::Failed { revision, .. } | Self::Panicked { revision, .. } => {
+                Some(*revision)
+            }
+            Self::Drawn(picture) | Self::Stage(_, picture) => Some(picture.revision),
+            Self::Still { .. } => None,
+        }
+    }
+}
+
+/// What a panic said.
+fn said(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no reason given".into())
+}
+
 /// Fulfils wishes.
 pub trait Player {
     /// What is wanted now, in place of anything that was.
     fn wish(&mut self, wish: Wish);
 
-    /// What happened since the last time. A player without threads works here, for less than a tenth of a second.
+    /// What happened since the last time. A player without threads works here: it cuts simulations short, but neither a check nor a
+    /// drawing, which take as long as the scene makes them.
     fn poll(&mut self) -> Vec<Event>;
 
     /// Whether a wish is not fulfilled yet.

@@ -20,6 +20,15 @@ pub struct Shooting {
     worker: Option<JoinHandle<Result<PathBuf, String>>>,
 }
 
+/// Why a job ended without all its pictures.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// It could not go on, or was stopped.
+    Failed(String),
+    /// A phenomenon panicked, and said this.
+    Panicked(String),
+}
+
 struct Progress {
     total: AtomicUsize,
     done: AtomicUsize,
@@ -100,9 +109,12 @@ impl Shooting {
     }
 
     /// The first file, or why there is none, once it has ended.
-    pub fn finished(&mut self) -> Option<Result<PathBuf, String>> {
+    pub fn finished(&mut self) -> Option<Result<PathBuf, Ended>> {
         let worker = self.worker.take_if(|worker| worker.is_finished())?;
-        Some(worker.join().unwrap_or_else(|_| Err("a phenomenon panicked, which is a bug in it".into())))
+        Some(match worker.join() {
+            Ok(result) => result.map_err(Ended::Failed),
+            Err(panic) => Err(Ended::Panicked(super::said(panic.as_ref()))),
+        })
     }
 }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use bansho::RenderError;
 use web_time::Instant;
 
-use super::{Event, Player, Wish, engine::Engine, stages::Stages};
+use super::{Event, Player, Wish, engine::Engine, interruption::Interruption};
 
 /// Longest stretch of simulation between two looks at what else is wanted; drawing comes on top, and
 /// [`Pace`](super::Pace) keeps that as short.
@@ -26,7 +26,7 @@ impl Player for SlicePlayer {
     fn poll(&mut self) -> Vec<Event> {
         let Some(wish) = self.wish.take() else { return Vec::new() };
         let began = Instant::now();
-        let slice = Stages::new(|advancing| advancing && began.elapsed() > SLICE);
+        let slice = Interruption::new(|advancing| advancing && began.elapsed() > SLICE);
         let mut events = Vec::new();
         match self.engine.fulfil(&wish, &slice, &mut |event| events.push(event)) {
             Ok(()) => {}

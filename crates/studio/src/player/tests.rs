@@ -84,19 +84,15 @@ fn a_picture_of_the_scenes_size_is_the_one_that_is_rendered() {
 
 /// A revision of its own for each text.
 fn bumped(text: &str) -> crate::document::Revision {
-    let mut document = Document::new("", "");
-    for step in 0..text.len() {
-        document.replace("typing", &" ".repeat(step));
-    }
-    document.revision()
+    Document::new("", text).revision()
 }
 
 #[test]
-fn another_document_is_judged_though_its_state_has_the_same_number() {
+fn another_document_is_judged_and_the_same_one_only_once() {
     let mut engine = engine::Engine::default();
     let judged = |events: Vec<Event>| events.iter().filter(|event| matches!(event, Event::Judged { .. })).count();
     let first = wish(SCENE, 0);
-    let second = Wish { text: STEPPED.into(), ..first.clone() };
+    let second = wish(STEPPED, 0);
     assert_eq!([&first, &first, &second].map(|wish| judged(fulfil(&mut engine, wish))), [1, 0, 1]);
     assert!(picture(fulfil(&mut engine, &Wish { exact: true, ..second })).pixels == rendered(STEPPED, 0));
 }
@@ -229,6 +225,26 @@ fn frames_come_when_they_are_due_and_the_one_before_was_shown() {
 }
 
 #[test]
+fn a_recording_ends_where_the_shot_does() {
+    let mut transport = playing();
+    transport.go_to(17);
+    transport.play_to_the_end();
+    let now = |step: i32| 5.0 + 0.101 * f64::from(step);
+    let numbers: Vec<i64> = (0..6)
+        .map(|step| {
+            transport.tick(now(step), true);
+            transport.number()
+        })
+        .collect();
+    assert_eq!(numbers, [17, 18, 19, 19, 19, 19]);
+    assert!(!transport.is_playing());
+    transport.set_playing(true);
+    transport.tick(6.0, true);
+    transport.tick(6.11, true);
+    assert_eq!(transport.number(), 10, "playing begins again");
+}
+
+#[test]
 fn the_range_repeats_and_stays_within_the_shot() {
     let mut transport = playing();
     transport.set_range(Some(12..=13));
@@ -271,6 +287,20 @@ fn a_still_is_the_file_that_render_writes() {
 }
 
 #[test]
+fn a_panic_while_rendering_is_told_in_its_own_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = shoot::job(SCENE, &folder.path().join("scene.toml"), Some(5));
+    let mut shooting = shoot::Shooting::start(job, || panic!("broken on purpose")).unwrap();
+    let ended = loop {
+        match shooting.finished() {
+            Some(ended) => break ended,
+            None => std::thread::sleep(Duration::from_millis(2)),
+        }
+    };
+    assert_eq!(ended, Err(shoot::Ended::Panicked("broken on purpose".into())));
+}
+
+#[test]
 fn finished_pictures_that_go_on_from_one_another_are_those_that_are_rendered() {
     let finished = |engine: &mut engine::Engine, number: i64| {
         let events = fulfil(engine, &Wish { still: true, ..wish(STEPPED, number) });
@@ -304,6 +334,25 @@ fn rain_that_a_slider_changes_keeps_its_drops() {
     assert!(other_drops > 0.1, "{other_drops}");
     let heavier = difference(&steady, &drawn(&text("rate_mm_per_h = 20.2")));
     assert!(heavier > 0.0 && heavier < 0.1 * other_drops, "{heavier} of {other_drops}");
+}
+
+#[test]
+fn rain_whose_drops_or_shutter_a_slider_changes_does_not_pop() {
+    let text = |shutter: &str, first: &str| {
+        format!(
+            "bansho = 1\n[picture]\nsize = [160, 90]\n[camera]\nshutter_s = {shutter}\n[sky]\nkind = \"overcast\"\n\
+             [[rain]]\nrate_mm_per_h = 20.0\ndiameters_mm = [{first}, 2.0, 3.0]\n"
+        )
+    };
+    let mut engine = engine::Engine::default();
+    let mut drawn = |text: &str| picture(fulfil(&mut engine, &Wish { revision: bumped(text), ..wish(text, 7) }));
+    let steady = drawn(&text("0.02", "1.0"));
+    let other_drops = difference(&steady, &drawn(&text("0.02", "1.0").replace("size = [160", "seed = 9\nsize = [160")));
+    assert!(other_drops > 0.1, "{other_drops}");
+    for (what, changed) in [("shutter", text("0.0202", "1.0")), ("size", text("0.02", "1.005"))] {
+        let off = difference(&steady, &drawn(&changed));
+        assert!(off > 0.0 && off < 0.1 * other_drops, "{what}: {off} of {other_drops}");
+    }
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! Wishes fulfilled by a thread with a rayon pool of its own.
 
 use std::{
-    any::Any,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc, Condvar, Mutex, MutexGuard, PoisonError,
@@ -13,7 +12,7 @@ use std::{
 
 use bansho::RenderError;
 
-use super::{Event, Player, Wish, engine::Engine, stages::Stages};
+use super::{Event, Player, Wish, engine::Engine, interruption::Interruption, said};
 
 /// Draws on a thread of its own, in a pool of as many threads as the machine has cores.
 pub struct ThreadPlayer {
@@ -103,7 +102,7 @@ fn work(desk: &Desk, emit: &mut dyn FnMut(Event)) {
     let mut engine = Engine::default();
     let mut must_draw = false;
     while let Some((wish, number)) = desk.take() {
-        let watch = Stages::new(|advancing| desk.has_moved_on(number, advancing || !must_draw));
+        let watch = Interruption::new(|advancing| desk.has_moved_on(number, advancing || !must_draw));
         let outcome = catch_unwind(AssertUnwindSafe(|| engine.fulfil(&wish, &watch, emit)));
         desk.done.store(number, Ordering::Relaxed);
         must_draw = matches!(outcome, Ok(Err(RenderError::Cancelled(_))));
@@ -116,11 +115,6 @@ fn work(desk: &Desk, emit: &mut dyn FnMut(Event)) {
             }
         }
     }
-}
-
-fn said(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no reason given".into())
 }
 
 impl Player for ThreadPlayer {

@@ -10,13 +10,15 @@ pub struct Transport {
     fps: f64,
     number: i64,
     playing: bool,
+    /// Whether it stops at the end of the range rather than begins it again.
+    once: bool,
     /// When the present frame was due, s.
     due: Option<f64>,
 }
 
 impl Default for Transport {
     fn default() -> Self {
-        Self { frames: 0..=0, range: None, fps: 30.0, number: 0, playing: false, due: None }
+        Self { frames: 0..=0, range: None, fps: 30.0, number: 0, playing: false, once: false, due: None }
     }
 }
 
@@ -58,8 +60,12 @@ impl Transport {
 
     /// Lets time pass, or stops it.
     pub fn set_playing(&mut self, playing: bool) {
-        self.playing = playing;
-        self.due = None;
+        (self.playing, self.once, self.due) = (playing, false, None);
+    }
+
+    /// Lets time pass up to the end of the range and no further, as for a recording.
+    pub fn play_to_the_end(&mut self) {
+        (self.playing, self.once, self.due) = (true, true, None);
     }
 
     /// The range that is played; the whole shot unless one was set.
@@ -104,6 +110,11 @@ impl Transport {
         }
         let on = late.min(1 + MOST_LEFT_OUT);
         self.due = Some(if late > on { now } else { due + on as f64 / self.fps });
+        if self.once && self.number + on >= *self.range().end() {
+            self.go_to(*self.range().end());
+            self.set_playing(false);
+            return true;
+        }
         self.number = self.wrapped(self.number + on);
         true
     }

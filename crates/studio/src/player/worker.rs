@@ -12,7 +12,10 @@ use super::{
     Event, Player, SlicePlayer, Wish,
     message::{Order, Reply},
 };
-use crate::{document::recheck, examples::Bundle};
+use crate::{
+    document::{Found, recheck},
+    examples::Bundle,
+};
 
 /// The script that starts the program in a worker; the page's maker puts it beside the page.
 const SCRIPT: &str = "worker.js";
@@ -27,6 +30,8 @@ pub struct WorkerPlayer {
     wishes: VecDeque<(u64, Wish)>,
     newest: u64,
     done: u64,
+    /// Whether the worker ended before anything was wished for.
+    lost: bool,
 }
 
 /// A worker, and what it said.
@@ -101,15 +106,19 @@ impl WorkerPlayer {
     pub fn start(wake: impl Fn() + 'static) -> Result<Self, JsValue> {
         let wake: Rc<dyn Fn()> = Rc::new(wake);
         let link = Link::start(wake.clone())?;
-        Ok(Self { link, wake, files: Vec::new(), wishes: VecDeque::new(), newest: 0, done: 0 })
+        Ok(Self { link, wake, files: Vec::new(), wishes: VecDeque::new(), newest: 0, done: 0, lost: false })
     }
 
     fn take_in(&mut self, heard: Heard) -> Option<Event> {
         let reply = match heard {
             Heard::Said(reply) => reply,
             Heard::Ended => {
-                let message = "it ended without a word, as where memory runs out".into();
-                Reply::Panicked { number: self.wishes.front()?.0, message }
+                let message = "it ended without a word, as where memory runs out".to_owned();
+                let Some((number, _)) = self.wishes.front() else {
+                    self.lost = true;
+                    return None;
+                };
+                Reply::Panicked { number: *number, message }
             }
         };
         match reply {
@@ -117,9 +126,9 @@ impl WorkerPlayer {
                 self.link.flush();
                 None
             }
-            Reply::Judged { number, exposure_ev100 } => {
+            Reply::Judged { number, found } => {
                 let wish = self.wish_of(number)?;
-                let outcome = recheck(&wish.name, &wish.text, &wish.assets, exposure_ev100);
+                let outcome = recheck(&wish.name, &wish.text, &wish.assets, found);
                 Some(Event::Judged { revision: wish.revision, outcome })
             }
             Reply::Drawn { picture, .. } => Some(Event::Drawn(picture)),
@@ -161,6 +170,11 @@ impl Player for WorkerPlayer {
         self.newest += 1;
         self.link.say(Order::wish(self.newest, &wish));
         self.wishes.push_back((self.newest, wish));
+        if std::mem::take(&mut self.lost) {
+            // Now there is somebody to tell.
+            self.link.inbox.borrow_mut().push(Heard::Ended);
+            (self.wake)();
+        }
     }
 
     fn poll(&mut self) -> Vec<Event> {
@@ -274,7 +288,7 @@ impl Workshop {
 
 fn reply(number: u64, event: Event) -> Reply {
     match event {
-        Event::Judged { outcome, .. } => Reply::Judged { number, exposure_ev100: exposure(outcome) },
+        Event::Judged { outcome, .. } => Reply::Judged { number, found: found(outcome) },
         Event::Drawn(picture) => Reply::Drawn { number, picture },
         Event::Stage(stage, picture) => Reply::Stage { number, stage, picture },
         Event::Still { number: frame, png } => Reply::Still { number, frame, png },
@@ -284,7 +298,7 @@ fn reply(number: u64, event: Event) -> Reply {
 }
 
 /// What the page cannot find out by itself without making every phenomenon.
-fn exposure(outcome: Result<Arc<Plan>, SceneError>) -> Result<f32, String> {
-    let first = |error: SceneError| error.problems.first().map(ToString::to_string).unwrap_or_default();
-    outcome.map(|plan| plan.exposure_ev100).map_err(first)
+fn found(outcome: Result<Arc<Plan>, SceneError>) -> Result<f32, Vec<Found>> {
+    let faults = |error: SceneError| error.problems.iter().map(Found::from).collect();
+    outcome.map(|plan| plan.exposure_ev100).map_err(faults)
 }

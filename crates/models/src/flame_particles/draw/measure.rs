@@ -10,7 +10,7 @@ use super::{
     grid::{Grid, weigh},
     kernel::Profile,
     look::LookParameters,
-    resolve::{Extents, GLOW, HEAT, Layer, Resolve, Row, TAU},
+    resolve::{Extents, Layer, Resolve, Row},
     splat::{COARSE, Sheet, Sprite, splat},
     spline,
     sprite::{Kind, Seen, seen},
@@ -158,7 +158,7 @@ impl Resolve<'_> {
                 for pixel in x.max(rect.x)..(x + 16).min(rect.right()) {
                     let lane = pixel - x;
                     let index = (y - strip.rect.y) * strip.rect.width + pixel - strip.rect.x;
-                    let [tau, glow, heat] = [TAU, GLOW, HEAT].map(|plane| sums.planes[plane][lane]);
+                    let [tau, glow, heat] = [sums.tau[lane], sums.glow[lane], sums.heat[lane]];
                     if !strip.visible(index, layer.depth as f32) {
                         continue;
                     }

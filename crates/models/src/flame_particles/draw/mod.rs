@@ -2,9 +2,10 @@
 //!
 //! Each particle is a ball of gas whose line integral is known in closed form (`kernel`). `survey` finds how the gas is spread, `sprite`
 //! each ball's ellipse in the picture (`perspective` sixteen at a time), `splat` sums all of them (`placed` among its cells) on a grid as
-//! coarse as they are smooth, in a few layers of depth; `resolve` turns the sums into light at every pixel, by splines (`spline`) and
+//! coarse as they are smooth, in a few layers of depth; `resolve` turns the sums into light at every pixel, by splines (`spline`, `across`) and
 //! with the detail (`detail`) that sums lack. `haze` finds deflections, `light` what others are lit with.
 
+mod across;
 mod detail;
 mod gas;
 mod grid;

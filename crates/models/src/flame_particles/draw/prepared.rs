@@ -18,6 +18,7 @@ use crate::{
 };
 
 use super::{
+    across::Across,
     detail::Detail,
     gas::Gas,
     grid::Grid,
@@ -64,7 +65,7 @@ struct Sums<'a> {
     grid: Grid<'a>,
     extents: Extents,
     weights: Vec<[f32; 4]>,
-    columns: Vec<(usize, usize)>,
+    across: Across,
     detail: Option<(Detail, Strain)>,
     scattered: Vec<[f32; 3]>,
     motion: OnceLock<Option<Motion<'a>>>,
@@ -145,7 +146,7 @@ impl<'a> PreparedGas<'a> {
             blue: blue_flame::colour(),
             scattered: &sums.scattered,
             weights: &sums.weights,
-            columns: &sums.columns,
+            across: &sums.across,
             temperatures: sums.temperatures,
         }
     }
@@ -186,7 +187,7 @@ fn sums<'a>(
     Some(Sums {
         extents,
         weights: spline::weights(&grid.cells),
-        columns: grid.columns(0, view.size[0]),
+        across: Across::new(&grid, view.size[0], &spline::weights(&grid.cells)),
         grid,
         detail,
         scattered: scattered.collect(),

@@ -9,6 +9,7 @@ use bansho_base::{
 };
 
 use super::{
+    across::Across,
     detail::{Burning, Detail},
     grid::{Grid, weigh},
     strain::{self, Strain},
@@ -32,6 +33,9 @@ pub(crate) const PATH: usize = 7;
 
 type Batch = [f32; LANES];
 
+/// Sums below this are none.
+const FAINTEST: f32 = 1e-30;
+
 /// How sums become light.
 pub(crate) struct Resolve<'a> {
     pub(crate) grid: &'a Grid<'a>,
@@ -47,8 +51,8 @@ pub(crate) struct Resolve<'a> {
     pub(crate) scattered: &'a [[f32; 3]],
     /// Interpolation of each phase of a cell.
     pub(crate) weights: &'a [[f32; 4]],
-    /// The first of the four columns around each pixel of the whole picture's rows, and the pixel's phase.
-    pub(crate) columns: &'a [(usize, usize)],
+    /// Interpolation along a row.
+    pub(crate) across: &'a Across,
     /// Least and greatest temperature of the gas, K.
     pub(crate) temperatures: [f32; 2],
 }
@@ -71,7 +75,10 @@ pub(crate) struct Row {
 
 /// The gas of one layer at sixteen pixels.
 pub(crate) struct Sums {
-    pub(crate) planes: [Batch; PLANES],
+    pub(crate) tau: Batch,
+    pub(crate) glow: Batch,
+    pub(crate) heat: Batch,
+    blue: Batch,
 }
 
 impl Resolve<'_> {
@@ -107,65 +114,57 @@ impl Resolve<'_> {
     /// The gas at sixteen pixels; `None` where there is none.
     #[inline(always)]
     pub(crate) fn sums(&self, row: &Row, layer: usize, x: usize) -> Option<Sums> {
-        let mut planes = [[0.0; LANES]; PLANES];
-        for lane in 0..LANES {
-            let (column, phase) = self.columns[(x + lane).min(self.columns.len() - 1)];
-            let start = column * self.grid.depth + layer * PLANES;
-            let starts = [0, 1, 2, 3].map(|k| start + k * self.grid.depth);
-            let sums = weighted([&row.sums; 4], starts, &self.weights[phase]);
-            for plane in 0..PLANES {
-                planes[plane][lane] = sums[plane];
-            }
-        }
+        let mut planes = self.planes(row, layer, x, [TAU, GLOW, HEAT, BLUE]);
         // Less than this is seen neither in light nor in shade.
-        let (mut tau, mut blue) = (1e-6_f32, 1e-3_f32);
+        let (mut most_tau, mut most_blue) = (1e-6_f32, 1e-3_f32);
         for lane in 0..LANES {
-            tau = tau.max(planes[TAU][lane]);
-            blue = blue.max(planes[BLUE][lane]);
+            most_tau = most_tau.max(planes[0][lane]);
+            most_blue = most_blue.max(planes[3][lane]);
         }
-        if tau <= 1e-6 && blue <= 1e-3 {
+        if most_tau <= 1e-6 && most_blue <= 1e-3 {
             return None;
         }
-        for plane in [TAU, GLOW, HEAT, BLUE] {
+        for plane in &mut planes {
             for lane in 0..LANES {
                 // Cubics swing a little below nothing at the edges.
-                planes[plane][lane] = planes[plane][lane].max(0.0);
+                plane[lane] = plane[lane].max(0.0);
             }
         }
-        Some(Sums { planes })
+        let [tau, glow, heat, blue] = planes;
+        Some(Sums { tau, glow, heat, blue })
+    }
+
+    /// Planes of a layer at sixteen pixels.
+    #[inline(always)]
+    fn planes<const N: usize>(&self, row: &Row, layer: usize, x: usize, mut planes: [usize; N]) -> [Batch; N] {
+        for plane in &mut planes {
+            *plane += layer * PLANES;
+        }
+        self.across.at(&row.sums, self.grid.depth, x, planes)
     }
 
     /// How much of its detail the gas at sixteen pixels shows.
     #[inline(always)]
     fn shown(&self, row: &Row, x: usize) -> Batch {
-        let mut strain = [0.0; LANES];
-        for lane in 0..LANES {
-            let (column, phase) = self.columns[(x + lane).min(self.columns.len() - 1)];
-            let weights = &self.weights[phase];
-            if let Some(four) = row.strain[column..].first_chunk::<4>() {
-                for k in 0..4 {
-                    strain[lane] = weights[k].mul_add(four[k], strain[lane]);
-                }
-            }
-        }
+        let [strain] = self.across.at(&row.strain, 1, x, [0]);
         strain::shown(&strain)
     }
 
     /// Places in the detail of sixteen pixels.
     #[inline(always)]
-    fn places(&self, sums: &Sums, detail: &Detail, layer: &Layer, x: usize, y: usize) -> Option<[Batch; 3]> {
+    fn places(&self, sums: &Sums, row: &Row, detail: &Detail, layer: &Layer, [x, y]: [usize; 2]) -> Option<[Batch; 3]> {
         let at = |column: f64| {
             let direction = self.camera.direction(DVec2::new(column, y as f64 + 0.5))?;
             Some((self.camera.position + direction * layer.depth - self.origin).as_vec3().to_array())
         };
         let (first, last) = (at(x as f64 + 0.5), at((x + LANES) as f64 - 0.5));
         let (first, last) = (first.or(last)?, last.or(first)?);
-        let mut places = [[0.0; LANES]; 3];
+        let mut places = self.planes(row, layer.index, x, [MATTER, MATTER + 1, MATTER + 2]);
         for axis in 0..3 {
             let start = first[axis] * detail.cells_per_metre[axis];
             let step = (last[axis] - first[axis]) * detail.cells_per_metre[axis] * (1.0 / (LANES - 1) as f32);
             for lane in 0..LANES {
-                let matter = sums.planes[MATTER + axis][lane] / sums.planes[TAU][lane].max(1e-20);
+                let matter = places[axis][lane] / sums.tau[lane].max(1e-20);
                 places[axis][lane] = step.mul_add(lane as f32, start) + matter.clamp(-1e4, 1e4);
             }
         }
@@ -222,15 +221,14 @@ impl Resolve<'_> {
     /// Red, green, blue and opacity of sixteen pixels of a layer.
     #[inline(always)]
     fn light(&self, sums: &Sums, row: &Row, layer: &Layer, x: usize, y: usize) -> Light {
-        let [tau, glow, heat, ..] = &sums.planes;
+        let Sums { tau, glow, heat, .. } = sums;
         let (mut depth_factor, mut heat_factor) = ([1.0; LANES], [1.0; LANES]);
         if let Some((detail, _)) = self.detail
             && !detail.is_lost(tau)
-            && let Some(places) = self.places(sums, detail, layer, x, y)
+            && let Some(places) = self.places(sums, row, detail, layer, [x, y])
         {
             Burning { depth: depth_factor, heat: heat_factor } = detail.burning(&places, tau, &self.shown(row, x));
         }
-        let table = color::black_body();
         let mut planes = [[0.0; LANES]; 4];
         let mut emitting = [0.0; LANES];
         for lane in 0..LANES {
@@ -238,20 +236,31 @@ impl Resolve<'_> {
             planes[3][lane] = 1.0 - lanes::exp(-depth);
             emitting[lane] = if self.hides_itself { planes[3][lane] } else { depth };
         }
+        // Where nothing glows both are held to what there is, and luminance is 0: no lane asks for itself.
+        let (mut luminance, mut kelvin) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
-            if glow[lane] > 0.0 && tau[lane] > 0.0 {
-                let hue = table.radiance(self.temperature(heat[lane], glow[lane]) * heat_factor[lane]);
-                // The sum's luminance is exact; its colour is that of its mean temperature, a little hotter where it burns most.
-                let factor = emitting[lane] * glow[lane] / (tau[lane] * color::luminance(hue).max(1e-20));
-                for c in 0..3 {
-                    planes[c][lane] = hue[c] * factor;
-                }
+            luminance[lane] = emitting[lane] * glow[lane] / tau[lane].max(FAINTEST);
+            kelvin[lane] = self.temperature(heat[lane], glow[lane].max(FAINTEST)) * heat_factor[lane];
+        }
+        let table = color::black_body();
+        for lane in 0..LANES {
+            let hue = table.radiance(kelvin[lane]);
+            for c in 0..3 {
+                planes[c][lane] = hue[c];
+            }
+        }
+        for lane in 0..LANES {
+            // The sum's luminance is exact; its colour is that of its mean temperature, a little hotter where it burns most.
+            let own = color::luminance([planes[0][lane], planes[1][lane], planes[2][lane]]);
+            let factor = luminance[lane] / own.max(1e-20);
+            for c in 0..3 {
+                planes[c][lane] *= factor;
             }
         }
         let scattered = &self.scattered[layer.index];
         for c in 0..3 {
             for lane in 0..LANES {
-                let blue = self.blue[c] * sums.planes[BLUE][lane];
+                let blue = self.blue[c] * sums.blue[lane];
                 planes[c][lane] += scattered[c].mul_add(planes[3][lane], blue);
             }
         }

@@ -66,7 +66,7 @@ pub(crate) fn shown(strain: &[f32; LANES]) -> [f32; LANES] {
     let [begins, gone] = FADING;
     let mut shown = [0.0; LANES];
     for lane in 0..LANES {
-        let left = ((gone - strain[lane]) * (1.0 / (gone - begins))).max(0.0).min(1.0);
+        let left = ((gone - strain[lane]) * (1.0 / (gone - begins))).clamp(0.0, 1.0);
         shown[lane] = left * left * 2.0_f32.mul_add(-left, 3.0);
     }
     shown

@@ -150,3 +150,16 @@ fn places_find_values_as_the_reader_sees_them() {
     assert!(at("flame_sheet.2").find(&root).is_none() && Place::root().find(&root).is_none());
     assert_eq!(at("flame_sheet.0.sparks.rate").to_string(), "flame_sheet.0.sparks.rate");
 }
+
+#[test]
+fn comments_stay_with_the_items_of_a_list() {
+    let scene = "burners = [\n  # by the wall\n  1, # one\n  2, # two\n  3, # three\n]\n";
+    let without = |index: usize| apply(scene, &[Operation::Remove { place: at(&format!("burners.{index}")) }]).unwrap();
+    assert_eq!(without(0), "burners = [\n  2, # two\n  3, # three\n]\n");
+    assert_eq!(without(1), "burners = [\n  # by the wall\n  1, # one\n  3, # three\n]\n");
+    assert_eq!(without(2), "burners = [\n  # by the wall\n  1, # one\n  2, # two\n]\n");
+    let added = apply(scene, &[Operation::Append { place: at("burners"), value: Value::Integer(4) }]).unwrap();
+    assert_eq!(added, "burners = [\n  # by the wall\n  1, # one\n  2, # two\n  3, # three\n  4,\n]\n");
+    let line = apply("a = [1, 2]\n", &[Operation::Append { place: at("a"), value: Value::Integer(3) }]).unwrap();
+    assert_eq!(line, "a = [1, 2, 3]\n");
+}

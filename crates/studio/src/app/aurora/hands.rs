@@ -251,9 +251,7 @@ impl AuroraEditor {
 
 /// The place on one of `all` that is nearest to `point`, within `reach`, km.
 fn on_sheet(all: &[Vec<DVec2>], point: DVec2, reach: f64) -> Option<OnSheet> {
-    let on = |(sheet, line): (usize, &Vec<DVec2>)| Some((sheet, lines::nearest(line, point)?));
-    let nearest = all.iter().enumerate().filter_map(on).min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
-    let (sheet, on) = nearest.filter(|(_, on)| on.distance < reach)?;
+    let (sheet, on) = lines::nearest_among(all, point).filter(|(_, on)| on.distance < reach)?;
     Some((sheet, lines::share_of(&all[sheet], on)))
 }
 

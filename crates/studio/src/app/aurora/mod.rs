@@ -7,6 +7,8 @@ mod plane;
 mod targets;
 mod tool;
 
+use std::sync::Arc;
+
 use bansho::models::aurora::shapes::Form;
 use eframe::egui::{self, Color32, Id, Pos2, Sense, Ui, vec2};
 
@@ -34,7 +36,7 @@ pub(super) struct AuroraEditor {
     next: Option<usize>,
     gesture: Gesture,
     refusal: Option<(String, Pos2)>,
-    read: Option<(Revision, Result<Drawing, String>)>,
+    read: Option<(Revision, Result<Arc<Drawing>, String>)>,
 }
 
 impl AuroraEditor {
@@ -61,13 +63,13 @@ impl AuroraEditor {
     }
 
     /// The shapes as the scene states them now.
-    fn drawing(&mut self, session: &Session) -> Result<Drawing, String> {
+    fn drawing(&mut self, session: &Session) -> Result<Arc<Drawing>, String> {
         let revision = session.document.revision();
         if let Some((_, read)) = self.read.as_ref().filter(|(of, _)| *of == revision) {
             return read.clone();
         }
         let read = Drawing::read(session.document.values(), self.index, session.assets());
-        let read = read.map_err(|refusal| refusal.to_string());
+        let read = read.map(Arc::new).map_err(|refusal| refusal.to_string());
         self.read = Some((revision, read.clone()));
         read
     }
@@ -152,7 +154,7 @@ impl AuroraEditor {
         match session.reshape(label, operations, self.index) {
             Ok(drawing) => {
                 self.refusal = None;
-                self.read = Some((session.document.revision(), Ok(drawing)));
+                self.read = Some((session.document.revision(), Ok(Arc::new(drawing))));
                 true
             }
             Err(refusal) => {

@@ -142,8 +142,7 @@ impl AuroraEditor {
             (Tool::Split, _) => {
                 let Some(source) = self.target.checked_sub(1) else { return };
                 let all = drawing.lines(source);
-                let on = all.iter().filter_map(|line| lines::nearest(line, plane.to_plane(at)));
-                let nearest = on.min_by(|a, b| a.distance.total_cmp(&b.distance));
+                let nearest = lines::nearest_among(&all, plane.to_plane(at)).map(|(_, on)| on);
                 if let Some(on) = nearest.filter(|on| on.distance < plane.km(self.tool.reach())) {
                     let centre = plane.to_screen(on.point);
                     painter.circle_stroke(centre, 7.0, Stroke::new(2.0, MARK));
@@ -157,7 +156,7 @@ impl AuroraEditor {
 
 /// Where a place on a sheet lies.
 fn place_of(all: &[Vec<DVec2>], (sheet, share): OnSheet) -> Option<DVec2> {
-    lines::part(all.get(sheet)?, [share, 1.0]).first().copied()
+    lines::at(all.get(sheet)?, share)
 }
 
 fn ground(painter: &Painter, plane: &Plane) {

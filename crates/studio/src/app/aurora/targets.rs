@@ -43,6 +43,7 @@ fn buttons(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawin
         let label = ui.label("reached after").id;
         let mut after_s = drawing.after_s(editor.target);
         let drag = egui::DragValue::new(&mut after_s).range(0.1..=1e5).speed(0.05).max_decimals(2).suffix(" s");
+        let drag = drag.clamp_existing_to_range(false);
         if ui.add(drag).labelled_by(label).changed() {
             let change = drawing.retime(editor.target, after_s);
             editor.change(session, "time of shape", &change, ui.cursor().min);

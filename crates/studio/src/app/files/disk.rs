@@ -11,16 +11,19 @@ use eframe::egui::{Context, Ui};
 use super::{
     Files,
     chooser::Chooser,
-    question::{Answer, Question},
+    moving,
+    question::{Answer, Leaving, Question},
 };
 use crate::{
-    app::{session::Session, store::Store},
+    app::{scene_panel::Subject, session::Session, store::Store},
     document::{
-        files::{self, Recent},
+        files::{self, Outside, Recent},
         watch::Watch,
     },
-    player::shoot::{self, Shooting},
+    player::shoot::{self, Ended, Shooting},
 };
+
+const BUSY: &str = "pictures are being rendered already; wait for them, or stop that with the cross beside its bar";
 
 /// What the window knows of the disk.
 pub(super) struct Shelf {
@@ -54,32 +57,56 @@ impl Files {
 
     /// Saves, or asks where to.
     pub(in crate::app) fn save(&mut self, session: &mut Session) {
-        match session.path.clone() {
-            Some(path) => self.save_to(session, path),
-            None => self.ask_where_to_save(session),
+        self.save_and(session, None);
+    }
+
+    /// Saves, or asks where to, and goes to `leaving` once that is done.
+    pub(super) fn save_and(&mut self, session: &mut Session, leaving: Option<Leaving>) {
+        let Some(path) = session.path.clone() else { return self.ask_where_to_save(session, leaving) };
+        match files::outside(&session.document, &path) {
+            // What is there was never seen here.
+            Outside::Changed(text) if *text != **session.document.text() => {
+                self.question = Some(Question::ChangedOutside(leaving));
+            }
+            _ => self.save_to(session, path, leaving),
         }
     }
 
-    fn ask_where_to_save(&mut self, session: &Session) {
+    fn ask_where_to_save(&mut self, session: &Session, leaving: Option<Leaving>) {
         let name = match &session.path {
             Some(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             None if session.document.name().ends_with(".toml") => session.document.name().to_owned(),
             None => "scene.toml".to_owned(),
         };
-        self.question = Some(Question::SaveAs(Chooser::beside(session.path.as_deref()).naming(name)));
+        self.question = Some(Question::SaveAs(Chooser::beside(session.path.as_deref()).naming(name), leaving));
     }
 
-    fn save_to(&mut self, session: &mut Session, path: PathBuf) {
-        match files::save(&mut session.document, &path) {
-            Ok(()) => {
-                session.set_notice(None);
-                self.shelf.remember(&path);
-                if session.path.as_ref() != Some(&path) {
-                    session.path = Some(path);
-                    session.reload_assets();
-                }
-            }
-            Err(error) => session.set_notice(Some(error.to_string())),
+    /// Saves to `path`, whose name shall end as those of scenes do, unless another file would be lost.
+    fn save_as(&mut self, session: &mut Session, path: PathBuf, leaving: Option<Leaving>) {
+        let path = files::named_as_scene(path);
+        if path.exists() && session.path.as_ref() != Some(&path) {
+            self.question = Some(Question::Replace(path, leaving));
+        } else {
+            self.save_to(session, path, leaving);
+        }
+    }
+
+    fn save_to(&mut self, session: &mut Session, path: PathBuf, leaving: Option<Leaving>) {
+        let moves = session.path.as_ref() != Some(&path);
+        let saved = if moves { moving::follow(session, &path) } else { Ok(()) };
+        let saved = saved.and_then(|()| files::save(&mut session.document, &path));
+        if let Err(error) = saved {
+            session.set_notice(Some(error.to_string()));
+            return;
+        }
+        session.set_notice(None);
+        self.shelf.remember(&path);
+        if moves {
+            session.path = Some(path);
+            session.reload_assets();
+        }
+        if let Some(leaving) = leaving {
+            self.leave(session, leaving);
         }
     }
 
@@ -96,7 +123,7 @@ impl Files {
     /// What the menu has for files on the disk.
     pub(in crate::app) fn menu(&mut self, ui: &mut Ui, session: &mut Session) {
         if ui.button("Save as…").clicked() {
-            self.ask_where_to_save(session);
+            self.ask_where_to_save(session, None);
         }
         ui.menu_button("Recent", |ui| {
             for path in self.shelf.recent.paths().to_vec() {
@@ -133,6 +160,10 @@ impl Files {
             session.set_notice(Some("save the scene first; pictures are written beside its name, in out/".into()));
             return;
         };
+        if self.progress().is_some() {
+            session.set_notice(Some(BUSY.into()));
+            return;
+        }
         let number = still.then(|| session.transport.number());
         match Shooting::start(shoot::job(session.document.text(), &path, number), || {}) {
             Ok(shooting) => self.shelf.shooting = Some(shooting),
@@ -150,9 +181,9 @@ impl Files {
         self.shelf.shooting.iter().for_each(Shooting::stop);
     }
 
-    pub(super) fn tend_shelf(&mut self, ui: &Ui, session: &mut Session) {
+    pub(super) fn tend_shelf(&mut self, ui: &Ui, session: &mut Session, subject: &Subject) {
         self.watch_outside(ui, session);
-        self.take_dropped(ui, session);
+        self.take_dropped(ui, session, subject);
         self.finish_job(ui, session);
     }
 
@@ -167,21 +198,30 @@ impl Files {
         if !self.shelf.watch.as_ref().is_some_and(Watch::touched) {
             return;
         }
-        let Some(text) = files::changed_outside(&session.document, &path) else { return };
-        if session.document.is_dirty() {
-            self.question = Some(Question::ChangedOutside(text.to_string()));
-        } else {
-            take_outside(session, &text);
+        match files::outside(&session.document, &path) {
+            Outside::Same => session.document.mark_gone(!path.exists()),
+            Outside::Gone => {
+                session.document.mark_gone(true);
+                session.set_notice(Some(format!("{}: the file is gone; saving writes it anew", path.display())));
+            }
+            Outside::Changed(_) if session.document.differs() => self.question = Some(Question::ChangedOutside(None)),
+            Outside::Changed(text) => take_outside(session, &text),
         }
     }
 
-    fn take_dropped(&mut self, ui: &Ui, session: &mut Session) {
-        let dropped = ui.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_path_buf()));
-        let Some(path) = dropped else { return };
-        if path.extension().is_some_and(|extension| extension == "toml") {
-            self.open(session, path);
-        } else {
-            session.lay_over(&path);
+    /// A scene is opened, all else laid into the one that is open.
+    fn take_dropped(&mut self, ui: &Ui, session: &mut Session, subject: &Subject) {
+        let dropped: Vec<PathBuf> =
+            ui.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
+        let scene = dropped.iter().position(|path| files::is_named_as_scene(path));
+        match scene {
+            Some(scene) => {
+                self.open(session, dropped[scene].clone());
+                if dropped.len() > 1 {
+                    session.set_notice(Some("of the files that were dropped, only the scene was taken".into()));
+                }
+            }
+            None => dropped.iter().for_each(|path| session.lay_over(path, subject)),
         }
     }
 
@@ -190,10 +230,12 @@ impl Files {
         ui.ctx().request_repaint_after(Duration::from_millis(200));
         if let Some(result) = shooting.finished() {
             self.shelf.shooting = None;
-            session.set_notice(Some(match result {
+            let told = match result {
                 Ok(file) => format!("written: {}", file.display()),
-                Err(reason) => reason,
-            }));
+                Err(Ended::Failed(reason)) => reason,
+                Err(Ended::Panicked(message)) => session.told_of_panic(&message),
+            };
+            session.set_notice(Some(told));
         }
     }
 
@@ -201,10 +243,22 @@ impl Files {
         match (question, answer) {
             (Question::Open(chooser), _) => self.open(session, chooser.path()),
             (Question::Relink(place, chooser), _) => session.relink(&place, &chooser.path()),
-            (Question::SaveAs(chooser), _) => self.save_to(session, chooser.path()),
-            (Question::ChangedOutside(text), Answer::Do) => take_outside(session, &text),
-            (Question::ChangedOutside(_), Answer::Save) => self.save(session),
-            (Question::ChangedOutside(_), Answer::Cancel) | (Question::Leave(_), _) => {}
+            (Question::SaveAs(chooser, leaving), _) => self.save_as(session, chooser.path(), leaving),
+            (Question::Replace(path, leaving), Answer::Do) => self.save_to(session, path, leaving),
+            (Question::Replace(_, leaving), _) => self.ask_where_to_save(session, leaving),
+            (Question::ChangedOutside(_), Answer::Do) => {
+                let there = session.path.as_ref().map(|path| files::outside(&session.document, path));
+                // As it is now: the other program may have gone on writing.
+                if let Some(Outside::Changed(text)) = there {
+                    take_outside(session, &text);
+                }
+            }
+            (Question::ChangedOutside(leaving), Answer::Save) => {
+                if let Some(path) = session.path.clone() {
+                    self.save_to(session, path, leaving);
+                }
+            }
+            (Question::ChangedOutside(_), Answer::Cancel) | (Question::Leave(_) | Question::StopRendering, _) => {}
         }
     }
 }

@@ -7,9 +7,13 @@ pub(super) mod browser;
 mod chooser;
 #[cfg(not(target_arch = "wasm32"))]
 mod disk;
+#[cfg(not(target_arch = "wasm32"))]
+mod moving;
 #[cfg(target_arch = "wasm32")]
 mod page;
 mod question;
+#[cfg(target_arch = "wasm32")]
+mod tabs;
 mod unsaved;
 
 use std::path::PathBuf;
@@ -24,8 +28,8 @@ use self::{
     question::{Answer, Leaving, Question, answer},
     unsaved::Unsaved,
 };
-use super::{session::Session, store::Store};
-use crate::document::Document;
+use super::{scene_panel::Subject, session::Session, store::Store};
+use crate::document::{Document, files, recovery::Recovered};
 
 /// Files of the window: what lies where, and what waits to be asked.
 pub(super) struct Files {
@@ -48,30 +52,38 @@ impl Files {
 
     /// Opens a scene that was read, after asking where that would lose work.
     fn open_text(&mut self, session: &mut Session, name: &str, text: String, path: Option<PathBuf>) {
-        let document = Leaving::Open { name: name.to_owned(), text, path };
+        self.leave_after_asking(session, Leaving::Open { name: name.to_owned(), text, path });
+    }
+
+    /// Opens work of a studio that did not end well, after asking where that would lose work.
+    pub(super) fn recover(&mut self, session: &mut Session, recovered: Recovered) {
+        self.leave_after_asking(session, Leaving::Recover(recovered));
+    }
+
+    fn leave_after_asking(&mut self, session: &mut Session, leaving: Leaving) {
         if session.document.is_dirty() {
-            self.question = Some(Question::Leave(document));
+            self.question = Some(Question::Leave(leaving));
         } else {
-            self.leave(session, document);
+            self.leave(session, leaving);
         }
     }
 
-    /// What must be done now and then, and the question that waits.
-    pub(super) fn tend(&mut self, ui: &mut Ui, session: &mut Session) {
+    /// What must be done now and then, and the question that waits. `subject` is what is chosen.
+    pub(super) fn tend(&mut self, ui: &mut Ui, session: &mut Session, subject: &Subject) {
         self.unsaved.tend(ui, session);
-        self.tend_shelf(ui, session);
+        self.tend_shelf(ui, session, subject);
         self.hold_close(ui, session);
         self.ask(ui, session);
     }
 
-    /// Closing with unsaved work asks first.
-    fn hold_close(&mut self, ui: &Ui, session: &Session) {
+    /// Closing with unsaved work asks first, and so does closing while pictures are rendered.
+    fn hold_close(&mut self, ui: &Ui, session: &mut Session) {
         let wants = ui.input(|input| input.viewport().close_requested());
         if self.closing {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
-        } else if wants && session.document.is_dirty() {
+        } else if wants && (session.document.is_dirty() || self.progress().is_some()) {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::CancelClose);
-            self.question = Some(Question::Leave(Leaving::Close));
+            self.leave_after_asking(session, Leaving::Close);
         }
     }
 
@@ -93,11 +105,14 @@ impl Files {
         match question {
             Question::Leave(leaving) => {
                 if answer == Answer::Save {
-                    self.save(session);
-                }
-                if answer == Answer::Do || !session.document.is_dirty() {
+                    self.save_and(session, Some(leaving));
+                } else {
                     self.leave(session, leaving);
                 }
+            }
+            Question::StopRendering => {
+                self.stop_rendering();
+                self.closing = true;
             }
             #[cfg(not(target_arch = "wasm32"))]
             question => self.answered_about_disk(session, question, answer),
@@ -107,7 +122,25 @@ impl Files {
     fn leave(&mut self, session: &mut Session, leaving: Leaving) {
         match leaving {
             Leaving::Open { name, text, path } => session.open(Document::new(name, text), path),
+            Leaving::Recover(recovered) => {
+                let (document, path) = reopened(&recovered);
+                session.open(document, path);
+                self.unsaved.keep_in_stead(recovered, session);
+            }
+            Leaving::Close if self.progress().is_some() => self.question = Some(Question::StopRendering),
             Leaving::Close => self.closing = true,
         }
     }
+}
+
+/// What was `recovered`, as an edit of what lies in its file now.
+fn reopened(recovered: &Recovered) -> (Document, Option<PathBuf>) {
+    let named = Some(&recovered.origin).filter(|origin| !origin.is_empty());
+    // A page knows names, but no files.
+    let path = named.filter(|_| !cfg!(target_arch = "wasm32")).map(PathBuf::from);
+    let saved = path.as_deref().and_then(|path| files::read(path).ok()).unwrap_or_default();
+    let mut document = Document::new(named.map_or("scene", String::as_str), saved);
+    document.replace("recover", &recovered.text);
+    document.seal();
+    (document, path)
 }

@@ -8,9 +8,10 @@ use eframe::egui::{Context, Ui};
 use super::{
     Files,
     browser::{self, Inbox, Parts},
+    question::Leaving,
 };
 use crate::{
-    app::{session::Session, store::Store},
+    app::{scene_panel::Subject, session::Session, store::Store},
     player::{Event, Player, Wish, WorkerPlayer},
 };
 
@@ -63,9 +64,17 @@ impl Files {
 
     /// Hands the scene to the browser, which saves it where it saves what it is given.
     pub(in crate::app) fn save(&mut self, session: &mut Session) {
+        self.save_and(session, None);
+    }
+
+    /// Saves, and goes to `leaving` once that is done.
+    pub(super) fn save_and(&mut self, session: &mut Session, leaving: Option<Leaving>) {
         let text = session.document.text().clone();
         match browser::download(&format!("{}.toml", stem(session)), &Parts::of(text.as_bytes())) {
-            Ok(()) => session.document.mark_saved(text),
+            Ok(()) => {
+                session.document.mark_saved(text);
+                leaving.into_iter().for_each(|leaving| self.leave(session, leaving));
+            }
             Err(_) => session.set_notice(Some("the browser cannot save files here".into())),
         }
     }
@@ -96,6 +105,12 @@ impl Files {
 
     /// Makes `total` frames from `first` on as `bansho render` does; those of a `shot` are saved together.
     fn render(&mut self, ctx: &Context, session: &mut Session, first: i64, total: usize, shot: Option<Zip<Parts>>) {
+        if self.progress().is_some() {
+            session.set_notice(Some(
+                "pictures are being rendered already; wait, or stop that with the cross beside its bar".into(),
+            ));
+            return;
+        }
         let ctx = ctx.clone();
         let Ok(mut player) = WorkerPlayer::start(move || ctx.request_repaint()) else {
             session.set_notice(Some("the browser gives no worker to render in".into()));
@@ -127,7 +142,7 @@ impl Files {
     }
 
     /// Takes in what the browser gave: a scene is opened, anything else laid into the one that is open.
-    pub(super) fn tend_shelf(&mut self, ui: &Ui, session: &mut Session) {
+    pub(super) fn tend_shelf(&mut self, ui: &Ui, session: &mut Session, subject: &Subject) {
         self.tend_rendering(session);
         let dropped = ui.input(|input| input.raw.dropped_files.clone());
         dropped.into_iter().for_each(|file| browser::take_dropped(file, &self.shelf.inbox, ui.ctx()));
@@ -143,7 +158,7 @@ impl Files {
             session.give(&name, bytes);
             match self.shelf.relink.take() {
                 Some(place) => session.relink(&place, Path::new(&name)),
-                None => session.lay_over(Path::new(&name)),
+                None => session.lay_over(Path::new(&name), subject),
             }
         }
     }

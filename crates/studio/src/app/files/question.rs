@@ -8,6 +8,7 @@ use eframe::egui::Ui;
 
 #[cfg(not(target_arch = "wasm32"))]
 use super::chooser::Chooser;
+use crate::document::recovery::Recovered;
 
 /// A question that waits for an answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,14 +19,19 @@ pub(super) enum Question {
     /// Which file this place shall name.
     #[cfg(not(target_arch = "wasm32"))]
     Relink(Place, Chooser),
-    /// Which file to save to.
+    /// Which file to save to, and where to then.
     #[cfg(not(target_arch = "wasm32"))]
-    SaveAs(Chooser),
+    SaveAs(Chooser, Option<Leaving>),
+    /// Whether this file may be replaced by what is saved, and where to then.
+    #[cfg(not(target_arch = "wasm32"))]
+    Replace(PathBuf, Option<Leaving>),
     /// Whether unsaved work may be left, to open this or to close.
     Leave(Leaving),
-    /// Whether to take what another program wrote.
+    /// Whether what is rendered may be stopped, to close.
+    StopRendering,
+    /// Whether to take what another program wrote, and where to once this is saved over it.
     #[cfg(not(target_arch = "wasm32"))]
-    ChangedOutside(String),
+    ChangedOutside(Option<Leaving>),
 }
 
 /// Where to, once unsaved work may be left.
@@ -37,6 +43,8 @@ pub(super) enum Leaving {
         text: String,
         path: Option<PathBuf>,
     },
+    /// Work of a studio that did not end well.
+    Recover(Recovered),
     Close,
 }
 
@@ -66,9 +74,18 @@ pub(super) fn answer(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
             &[("Relink", Answer::Do), ("Cancel", Answer::Cancel)]
         }
         #[cfg(not(target_arch = "wasm32"))]
-        Question::SaveAs(chooser) => {
+        Question::SaveAs(chooser, _) => {
             chooser.show(ui, "Save as");
             &[("Save", Answer::Do), ("Cancel", Answer::Cancel)]
+        }
+        #[cfg(not(target_arch = "wasm32"))]
+        Question::Replace(path, _) => {
+            ui.label(format!("There is a file of that name: {}", path.display()));
+            &[("Replace it", Answer::Do), ("Another name", Answer::Save), ("Cancel", Answer::Cancel)]
+        }
+        Question::StopRendering => {
+            ui.label("Pictures are being rendered. Whole frames stay, and rendering the shot goes on from there.");
+            &[("Stop and close", Answer::Do), ("Cancel", Answer::Cancel)]
         }
         Question::Leave(_) => {
             ui.label("There is unsaved work.");

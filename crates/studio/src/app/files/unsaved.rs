@@ -1,29 +1,41 @@
-//! Unsaved work is kept every few seconds, and offered at the next start where the studio did not end well.
+//! Unsaved work is kept every few seconds while it changes, and offered at the next start where the studio did not end well.
 
 use std::time::Duration;
 
 use eframe::egui::Ui;
 
-use crate::app::{session::Session, store::Store};
+#[cfg(target_arch = "wasm32")]
+use super::tabs::Tabs;
 #[cfg(not(target_arch = "wasm32"))]
 use crate::document::recovery::Autosave;
-use crate::document::recovery::{self, Recovered};
+use crate::{
+    app::{session::Session, store::Store},
+    document::{
+        Revision,
+        recovery::{self, Recovered},
+    },
+};
 
-/// Seconds between two looks at unsaved work.
+/// Seconds between two keepings.
 const EVERY_S: f64 = 5.0;
 
-/// Under which it is kept: a folder, or a text in the browser.
+/// Under which it is kept: a folder, or what the names of texts in the browser begin with.
 const NAME: &str = "unsaved";
 
 /// Unsaved work, of now and of before.
 pub(in crate::app) struct Unsaved {
     /// Work of a studio that did not end well.
     pub(in crate::app) recovered: Vec<Recovered>,
+    /// Such work that is open again, to be forgotten once it is kept as this studio's own.
+    reopened: Vec<Recovered>,
+    /// When something was kept last, s.
     last_kept: f64,
+    /// What was kept last: a state of the document, and whether that was unsaved.
+    kept: Option<(Revision, bool)>,
     #[cfg(not(target_arch = "wasm32"))]
     autosave: Option<Autosave>,
     #[cfg(target_arch = "wasm32")]
-    store: Store,
+    tabs: Tabs,
 }
 
 impl Unsaved {
@@ -32,7 +44,9 @@ impl Unsaved {
         let folder = store.file(NAME);
         Self {
             recovered: folder.as_deref().map(recovery::recoverable).unwrap_or_default(),
+            reopened: Vec::new(),
             last_kept: 0.0,
+            kept: None,
             // Where nothing can be kept, the studio works without.
             autosave: folder.and_then(|folder| Autosave::begin(&folder, "studio").ok()),
         }
@@ -40,47 +54,66 @@ impl Unsaved {
 
     #[cfg(target_arch = "wasm32")]
     pub(super) fn new(store: &Store) -> Self {
-        let recovered = store.read(NAME).and_then(|kept| Recovered::of(&kept));
-        Self { recovered: recovered.into_iter().collect(), last_kept: 0.0, store: store.clone() }
+        let tabs = Tabs::begin(store.clone(), NAME);
+        Self { recovered: Vec::new(), reopened: Vec::new(), last_kept: 0.0, kept: None, tabs }
     }
 
-    /// Looks now and then whether there is something to keep.
+    /// Keeps what changed, now and then; where nothing did, nothing is done and the window may rest.
     pub(super) fn tend(&mut self, ui: &Ui, session: &mut Session) {
-        let now = ui.input(|input| input.time);
-        if now - self.last_kept < EVERY_S && !std::mem::take(&mut session.keep_now) {
+        #[cfg(target_arch = "wasm32")]
+        self.recovered.extend(self.tabs.found(ui.ctx()));
+        let at_once = std::mem::take(&mut session.keep_now);
+        let present = (session.document.revision(), session.document.is_dirty());
+        if self.kept == Some(present) && !at_once {
+            return;
+        }
+        let (now, held) = ui.input(|input| (input.time, input.pointer.any_down()));
+        let wait_s = self.last_kept + EVERY_S - now;
+        // What is under a hand may pass, as wind does that blows only while it is dragged.
+        if !at_once && present.1 && (held || wait_s > 0.0) {
+            ui.ctx().request_repaint_after(Duration::from_secs_f64(wait_s.max(0.1)));
             return;
         }
         self.last_kept = now;
-        self.keep(session);
-        if session.document.is_dirty() {
-            ui.ctx().request_repaint_after(Duration::from_secs_f64(EVERY_S));
+        if self.keep(session) {
+            self.reopened.drain(..).for_each(|reopened| forget(&reopened));
         }
+        // What cannot be kept is not tried again until it changes.
+        self.kept = Some(present);
     }
 
+    /// Whether what is unsaved is kept now.
     #[cfg(not(target_arch = "wasm32"))]
-    fn keep(&self, session: &mut Session) {
+    fn keep(&self, session: &mut Session) -> bool {
         let kept = self.autosave.as_ref().map(|kept| kept.keep(&session.document, session.path.as_deref()));
-        if let Some(Err(error)) = kept {
+        if let Some(Err(error)) = &kept {
             session.set_notice(Some(format!("unsaved work cannot be kept: {error}")));
         }
+        matches!(kept, Some(Ok(())))
     }
 
-    /// What a page that was closed left there stays until it is recovered or there is other work.
+    /// Whether what is unsaved is kept now.
     #[cfg(target_arch = "wasm32")]
-    fn keep(&mut self, session: &mut Session) {
+    fn keep(&self, session: &mut Session) -> bool {
         let document = &session.document;
-        if document.is_dirty() {
-            if !self.store.write(NAME, &recovery::kept(document.name(), document.text())) {
-                session.set_notice(Some("the browser keeps no unsaved work here; save it now and then".into()));
-            }
-        } else if self.recovered.is_empty() {
-            self.store.forget(NAME);
+        let work = document.is_dirty().then(|| recovery::kept(document.name(), document.text()));
+        let kept = self.tabs.keep(work.as_deref());
+        if !kept {
+            session.set_notice(Some("the browser keeps no unsaved work here; save it now and then".into()));
         }
+        kept
     }
 
-    /// Forgets work that is open again.
+    /// Keeps what was `recovered`, and is open again, as this studio's own work from now on.
+    pub(super) fn keep_in_stead(&mut self, recovered: Recovered, session: &mut Session) {
+        self.recovered.retain(|other| *other != recovered);
+        self.reopened.push(recovered);
+        session.keep_now = true;
+    }
+
+    /// Forgets work that is not wanted.
     pub(in crate::app) fn forget(&mut self, recovered: &Recovered) {
-        recovered.forget();
+        forget(recovered);
         self.recovered.retain(|other| other != recovered);
     }
 
@@ -95,4 +128,14 @@ impl Unsaved {
     /// Pages end without being asked.
     #[cfg(target_arch = "wasm32")]
     pub(in crate::app) fn end(&mut self) {}
+}
+
+#[cfg(not(target_arch = "wasm32"))]
+fn forget(recovered: &Recovered) {
+    recovered.forget();
+}
+
+#[cfg(target_arch = "wasm32")]
+fn forget(recovered: &Recovered) {
+    Store::default().forget(&recovered.kept_in.to_string_lossy());
 }

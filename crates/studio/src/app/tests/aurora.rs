@@ -1,10 +1,10 @@
 //! From an empty sky to a saved scene that splits, as a newcomer would go.
 
-use eframe::egui::{Key, Modifiers, Pos2, Rect, pos2, vec2};
+use eframe::egui::{Event, Modifiers, Pos2, Rect, Role, pos2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
-use super::{super::Studio, drag, drawn, press, release, sky, text, window};
-use crate::document::{Document, drawing::Drawing, files};
+use super::{super::Studio, choosing, drag, drawn, press, release, sky, text, window};
+use crate::document::drawing::{Drawing, Factor};
 
 fn plane(harness: &Harness<'_, Studio>, name: &str) -> Rect {
     harness.get_by_label(name).rect()
@@ -75,15 +75,12 @@ fn an_s_is_drawn_split_played_saved_and_opened_again() {
     assert!(harness.state_mut().session().document.error().is_none());
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.toml");
-    harness.state_mut().session().path = Some(path.clone());
-    harness.key_press_modifiers(Modifiers::COMMAND, Key::S);
-    drawn(&mut harness);
+    choosing::save(&mut harness);
+    choosing::answer(&mut harness, &path, "Save");
     assert!(!harness.state_mut().session().document.is_dirty());
 
     let mut again = window("bansho = 1\n[[aurora]]\n");
-    let opened: Document = files::open(&path).unwrap();
-    again.state_mut().session().open(opened, Some(path));
-    drawn(&mut again);
+    choosing::open(&mut again, &path);
     assert_eq!(drawing(&mut again).lines(2).len(), 2);
     assert_eq!(text(&mut again), edited);
 }
@@ -95,7 +92,10 @@ fn impossible_choices_are_refused_with_the_reason() {
     let before = text(&mut harness);
     stroke(&mut harness, &[[0.5, 0.2], [0.5, 0.8]]);
     assert_eq!(text(&mut harness), before);
-    harness.get_by_label_contains("sheet 2 meets sheet 1");
+    let told = harness.get_by_label_contains("sheet 2 meets sheet 1").rect();
+    let pointer = at(plane(&harness, "Aurora target"), 0.5, 0.8);
+    let off = told.distance_to_pos(pointer);
+    assert!(off < 60.0, "at the pointer: {off}");
     stroke(&mut harness, &[[0.3, 0.3], [0.6, 0.3]]);
     assert!(harness.query_by_label_contains("meets").is_none(), "gone with the next stroke");
     choose(&mut harness, "Split");
@@ -179,4 +179,43 @@ fn sheets_and_points_are_linked_by_dragging() {
     assert!(text(&mut harness).contains("to = 1, at = 0.2"), "{}", text(&mut harness));
     click(&mut harness, at(target, 0.5, 0.4));
     assert!(drawing(&mut harness).linked(1).is_empty(), "{}", text(&mut harness));
+}
+
+#[test]
+fn energy_is_painted_and_taken_away_with_shift() {
+    let mut harness = window(&sky(4, ""));
+    stroke(&mut harness, &[[0.1, 0.5], [0.9, 0.5]]);
+    choose(&mut harness, "Ray energy");
+    let from = at(plane(&harness, "Aurora target"), 0.5, 0.5);
+    let mut brushed = || {
+        press(&mut harness, from);
+        for step in 0..10 {
+            harness.hover_at(from + vec2(if step % 2 == 0 { 8.0 } else { 0.0 }, 0.0));
+            harness.step();
+        }
+        release(&mut harness, from);
+        harness.event(Event::ModifiersChanged(Modifiers::SHIFT));
+        let energy = drawing(&mut harness).factors(0, 0, Factor::Energy);
+        energy.into_iter().fold(0.0, f64::max)
+    };
+    let more = brushed();
+    assert!(more > 1.1, "{more}");
+    let less = brushed();
+    assert!(less < more - 0.05, "{more} {less}");
+}
+
+#[test]
+fn shapes_are_made_of_templates_retimed_and_removed() {
+    let mut harness = window(&sky(60, ""));
+    choose(&mut harness, "Template");
+    choose(&mut harness, "spiral");
+    assert!(text(&mut harness).contains("form = \"spiral\""), "{}", text(&mut harness));
+    choose(&mut harness, "Add shape");
+    harness.get_by_role_and_label(Role::SpinButton, "reached after").set_value_accesskit(3.5);
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("after_s = 3.5"), "{}", text(&mut harness));
+    assert_eq!(drawing(&mut harness).arrivals(), [0.0, 3.5]);
+    choose(&mut harness, "Remove shape");
+    assert_eq!(drawing(&mut harness).arrivals().len(), 1);
+    assert!(harness.state_mut().session().document.error().is_none());
 }

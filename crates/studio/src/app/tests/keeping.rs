@@ -8,10 +8,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use eframe::egui::{DroppedFile, Key, Modifiers, Role, Theme, ViewportEvent, ViewportId, vec2};
+use eframe::egui::{Key, Modifiers, Role, Theme, ViewportCommand, ViewportEvent, ViewportId, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
-use super::{super::Studio, PATIENCE, SCENE, Session, assets, drag, drawn, sky, text, window};
+use super::{super::Studio, PATIENCE, SCENE, Session, assets, choosing, drag, drawn, text, window};
 use crate::{
     document::{Document, recovery::Autosave},
     player::{SlicePlayer, ThreadPlayer, tests::Broken},
@@ -22,9 +22,7 @@ fn window_on_file(folder: &Path, scene: &str) -> (Harness<'static, Studio>, Path
     let path = folder.join("scene.toml");
     fs::write(&path, scene).unwrap();
     let mut harness = window("bansho = 1\n");
-    let document = Document::new(path.display().to_string(), scene);
-    harness.state_mut().session().open(document, Some(path.clone()));
-    drawn(&mut harness);
+    choosing::open(&mut harness, &path);
     (harness, path)
 }
 
@@ -44,17 +42,25 @@ fn until(harness: &mut Harness<'_, Studio>, what: &str, done: impl Fn(&mut Harne
     }
 }
 
+/// Asks the window to close, as the cross in its corner does.
+fn close(harness: &mut Harness<'_, Studio>) {
+    harness.input_mut().viewports.entry(ViewportId::ROOT).or_default().events.push(ViewportEvent::Close);
+    harness.step();
+    harness.input_mut().viewports.entry(ViewportId::ROOT).or_default().events.clear();
+    harness.run_steps(2);
+}
+
+/// Whether the window closes.
+fn closes(harness: &Harness<'_, Studio>) -> bool {
+    let commands = harness.output().viewport_output.get(&ViewportId::ROOT).map(|output| output.commands.clone());
+    commands.unwrap_or_default().contains(&ViewportCommand::Close)
+}
+
 #[test]
 fn closing_with_unsaved_work_asks() {
     let folder = tempfile::tempdir().unwrap();
     let (mut harness, path) = window_on_file(folder.path(), SCENE);
     edit(&mut harness, "height = 0.9", "height = 1.7");
-    let close = |harness: &mut Harness<'_, Studio>| {
-        harness.input_mut().viewports.entry(ViewportId::ROOT).or_default().events.push(ViewportEvent::Close);
-        harness.step();
-        harness.input_mut().viewports.entry(ViewportId::ROOT).or_default().events.clear();
-        harness.run_steps(2);
-    };
     close(&mut harness);
     harness.get_by_label("There is unsaved work.");
     harness.get_by_label("Cancel").click();
@@ -65,6 +71,50 @@ fn closing_with_unsaved_work_asks() {
     harness.get_all_by_label("Save").last().expect("the answer").click();
     harness.run_steps(3);
     assert!(fs::read_to_string(&path).unwrap().contains("height = 1.7"));
+    assert!(closes(&harness), "then it closes");
+}
+
+#[test]
+fn work_is_left_where_that_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut harness, path) = window_on_file(folder.path(), SCENE);
+    edit(&mut harness, "height = 0.9", "height = 1.7");
+    close(&mut harness);
+    assert!(!closes(&harness));
+    choosing::confirm(&mut harness, "Leave it");
+    assert!(closes(&harness));
+    assert_eq!(fs::read_to_string(&path).unwrap(), SCENE);
+}
+
+#[test]
+fn what_is_decided_later_is_not_decided_by_saving() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut harness, path) = window_on_file(folder.path(), SCENE);
+    thread::sleep(Duration::from_millis(300));
+    edit(&mut harness, "0.9", "1.5");
+    let theirs = SCENE.replace("height = 0.9", "height = 2.75");
+    fs::write(&path, &theirs).unwrap();
+    until(&mut harness, "a conflict is asked about", |harness| harness.query_by_label("Take theirs").is_some());
+    choosing::confirm(&mut harness, "Decide later");
+    assert!(text(&mut harness).contains("height = 1.5"));
+    choosing::save(&mut harness);
+    assert_eq!(fs::read_to_string(&path).unwrap(), theirs, "it asks again");
+    choosing::confirm(&mut harness, "Save mine");
+    assert!(fs::read_to_string(&path).unwrap().contains("height = 1.5"));
+    assert!(!harness.state_mut().session().document.is_dirty());
+}
+
+#[test]
+fn a_file_that_is_taken_away_counts_as_unsaved_until_it_is_written_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut harness, path) = window_on_file(folder.path(), SCENE);
+    thread::sleep(Duration::from_millis(300));
+    fs::remove_file(&path).unwrap();
+    until(&mut harness, "it is told", |harness| harness.query_by_label_contains("the file is gone").is_some());
+    assert!(harness.state_mut().session().document.is_dirty());
+    choosing::save(&mut harness);
+    assert_eq!(fs::read_to_string(&path).unwrap(), SCENE);
+    assert!(!harness.state_mut().session().document.is_dirty());
 }
 
 #[test]
@@ -80,23 +130,99 @@ fn what_other_programs_write_is_taken_or_asked_about() {
     fs::write(&path, SCENE.replace("height = 0.9", "height = 2.75")).unwrap();
     until(&mut harness, "a conflict is asked about", |harness| harness.query_by_label("Take theirs").is_some());
     assert!(text(&mut harness).contains("height = 1.5"));
-    harness.get_by_label("Take theirs").click();
-    drawn(&mut harness);
+    choosing::confirm(&mut harness, "Take theirs");
     assert!(text(&mut harness).contains("height = 2.75"));
     harness.state_mut().session().document.undo();
     assert!(text(&mut harness).contains("height = 1.5"), "and can be taken back");
 }
 
+/// A home in which a studio kept a fire of that height, and crashed.
+fn crashed(height: &str) -> tempfile::TempDir {
+    let home = tempfile::tempdir().unwrap();
+    let kept = Autosave::begin(&home.path().join("unsaved"), "studio").unwrap();
+    let mut document = Document::new("fire.toml", SCENE);
+    document.replace("typing", &SCENE.replace("height = 0.9", &format!("height = {height}")));
+    kept.keep(&document, None).unwrap();
+    // Dropped without its end.
+    home
+}
+
+/// All texts that studios keep in `home`.
+fn kept_in(home: &Path) -> String {
+    let entries = fs::read_dir(home.join("unsaved")).unwrap().map(|entry| entry.unwrap().path());
+    let scenes = entries.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    scenes.map(|path| fs::read_to_string(path).unwrap()).collect()
+}
+
+#[test]
+fn recovering_asks_before_it_loses_work_and_keeps_what_it_opens() {
+    let home = crashed("3.5");
+    let mut harness = window_at_home(home.path());
+    edit(&mut harness, "height = 0.9", "height = 1.25");
+    let recover = |harness: &mut Harness<'_, Studio>| {
+        for choice in ["Recover", "a scene never saved"] {
+            harness.get_by_label(choice).click();
+            harness.run_steps(3);
+        }
+    };
+    recover(&mut harness);
+    harness.get_by_label("There is unsaved work.");
+    assert!(text(&mut harness).contains("height = 1.25"));
+    choosing::confirm(&mut harness, "Cancel");
+    assert!(text(&mut harness).contains("height = 1.25") && kept_in(home.path()).contains("height = 3.5"));
+    recover(&mut harness);
+    choosing::confirm(&mut harness, "Leave it");
+    assert!(text(&mut harness).contains("height = 3.5"));
+    assert_eq!(kept_in(home.path()).matches("height = 3.5").count(), 1, "as this studio's own work, and only once");
+    assert!(harness.query_by_label("Recover").is_none());
+}
+
+#[test]
+fn recovered_work_that_is_not_wanted_is_forgotten() {
+    let home = crashed("3.5");
+    let mut harness = window_at_home(home.path());
+    harness.get_by_label("Recover").click();
+    harness.run_steps(3);
+    harness.get_by_label("Not wanted: a scene never saved").click();
+    drawn(&mut harness);
+    assert_eq!(text(&mut harness), SCENE);
+    assert!(harness.query_by_label("Recover").is_none() && !kept_in(home.path()).contains("height"));
+}
+
+#[test]
+fn a_window_with_unsaved_work_rests_once_that_is_kept() {
+    let home = tempfile::tempdir().unwrap();
+    let mut harness = window_at_home(home.path());
+    edit(&mut harness, "height = 0.9", "height = 1.25");
+    let rests = |harness: &Harness<'_, Studio>| {
+        let delay = harness.output().viewport_output.get(&ViewportId::ROOT).map(|output| output.repaint_delay);
+        delay == Some(Duration::MAX)
+    };
+    // It waits to keep the work, and then for nothing.
+    let mut repaints = 0;
+    while !rests(&harness) {
+        harness.step();
+        repaints += 1;
+        assert!(repaints < 10_000, "it never rests");
+    }
+    assert!(kept_in(home.path()).contains("height = 1.25"));
+    let kept: Vec<_> = fs::read_dir(home.path().join("unsaved")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    kept.iter().for_each(|path| fs::remove_file(path).unwrap());
+    // Ten seconds go by, in which something else moves.
+    for _ in 0..600 {
+        harness.step();
+    }
+    assert!(rests(&harness) && kept_in(home.path()).is_empty(), "what did not change is not written again");
+    edit(&mut harness, "height = 1.25", "height = 1.75");
+    for _ in 0..400 {
+        harness.step();
+    }
+    assert!(kept_in(home.path()).contains("height = 1.75"));
+}
+
 #[test]
 fn work_of_a_studio_that_crashed_is_offered() {
-    let home = tempfile::tempdir().unwrap();
-    {
-        let kept = Autosave::begin(&home.path().join("unsaved"), "studio").unwrap();
-        let mut document = Document::new("fire.toml", SCENE);
-        document.replace("typing", &SCENE.replace("height = 0.9", "height = 3.5"));
-        kept.keep(&document, None).unwrap();
-        // Dropped without its end, as in a crash.
-    }
+    let home = crashed("3.5");
     let session = Session::new(Document::new("scene", "bansho = 1\n"), None, Box::<SlicePlayer>::default(), assets);
     let studio = Studio::new(session, Some(home.path().to_path_buf()));
     let mut harness =
@@ -137,45 +263,6 @@ fn a_panic_is_told_and_the_scene_saved_beside_the_original() {
     until(&mut harness, "it goes on", |harness| number(harness) != last);
 }
 
-#[derive(Debug)]
-struct Dropped(PathBuf);
-
-impl DroppedFile for Dropped {
-    fn path(&self) -> &Path {
-        &self.0
-    }
-    fn bytes(&self) -> Result<Vec<u8>, String> {
-        fs::read(&self.0).map_err(|error| error.to_string())
-    }
-}
-
-fn drop_on(harness: &mut Harness<'_, Studio>, file: PathBuf) {
-    harness.input_mut().dropped_files.push(Arc::new(Dropped(file)));
-    harness.step();
-    harness.input_mut().dropped_files.clear();
-    drawn(harness);
-}
-
-#[test]
-fn scenes_plates_and_drawings_are_dropped_on_the_window() {
-    let folder = tempfile::tempdir().unwrap();
-    let (mut harness, _) = window_on_file(folder.path(), &sky(2, ""));
-    let plate = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/plates/checkerboard.png");
-    fs::copy(plate, folder.path().join("board.png")).unwrap();
-    drop_on(&mut harness, folder.path().join("board.png"));
-    assert!(text(&mut harness).contains("image = \"board.png\""), "{}", text(&mut harness));
-    let svg = "<svg viewBox=\"0 0 100 100\"><path d=\"M 10 50 L 90 50\" stroke=\"black\" fill=\"none\"/></svg>";
-    fs::write(folder.path().join("arc.svg"), svg).unwrap();
-    drop_on(&mut harness, folder.path().join("arc.svg"));
-    assert!(text(&mut harness).contains("sheets = [{ path = \"arc.svg\" }]"), "{}", text(&mut harness));
-    assert!(harness.state_mut().session().document.error().is_none());
-    let now = text(&mut harness);
-    harness.state_mut().session().document.mark_saved(now.into());
-    fs::write(folder.path().join("other.toml"), SCENE).unwrap();
-    drop_on(&mut harness, folder.path().join("other.toml"));
-    assert_eq!(text(&mut harness), SCENE);
-}
-
 #[test]
 fn a_shot_is_rendered_with_progress() {
     let folder = tempfile::tempdir().unwrap();
@@ -200,6 +287,13 @@ fn a_shot_that_is_rendered_is_stopped_and_goes_on_later() {
         harness.step();
     };
     render(&mut harness);
+    harness.key_press(Key::F12);
+    harness.run_steps(2);
+    harness.get_by_label_contains("pictures are being rendered already");
+    close(&mut harness);
+    assert!(!closes(&harness), "closing asks");
+    harness.get_by_label_contains("Pictures are being rendered.");
+    choosing::confirm(&mut harness, "Cancel");
     until(&mut harness, "progress is told", |harness| {
         let told = harness.query_by_label_contains("rendering: ").and_then(|told| told.value());
         told.is_some_and(|told| told.ends_with("of 100000") && !told.contains(": 0 "))
@@ -240,9 +334,8 @@ fn layout_theme_and_recent_files_are_there_again() {
     let width = |harness: &Harness<'_, Studio>| harness.get_by_label("Viewport").rect().width();
     let wide = {
         let mut harness = window_at_home(home.path());
-        harness.state_mut().session().path = Some(path.clone());
-        harness.key_press_modifiers(Modifiers::COMMAND, Key::S);
-        harness.run_steps(3);
+        choosing::save(&mut harness);
+        choosing::answer(&mut harness, &path, "Save");
         harness.get_by_label("View").click();
         harness.run_steps(3);
         harness.get_by_label("Light").click();

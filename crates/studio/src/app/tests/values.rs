@@ -34,12 +34,47 @@ fn a_particle_flame_is_slid_hotter_and_lighter() {
     for (section, name, to, written) in [
         ("motion", "buoyancy", 2.0, "buoyancy = 2.0"),
         ("life", "flame temperature k", 2100.0, "flame_temperature_k = 2100.0"),
+        ("look", "haze gain", 2.5, "haze_gain = 2.5"),
     ] {
         harness.get_by_label(section).click_accesskit();
         harness.run_steps(12);
         slide(&mut harness, name, to);
         assert!(text(&mut harness).contains(written), "{}", text(&mut harness));
     }
+    // The usual burner's fuel, which the text need not state.
+    for section in ["burners", "flame particles.0.burners.0, as usual"] {
+        harness.get_by_label(section).click_accesskit();
+        harness.run_steps(12);
+    }
+    slide(&mut harness, "heat release kw", 90.0);
+    assert!(text(&mut harness).contains("burners = [{ heat_release_kw = 90.0 }]"), "{}", text(&mut harness));
+    assert!(harness.state_mut().session().document.error().is_none());
+}
+
+#[test]
+fn rain_is_slid_heavier_and_its_drops_and_streaks_changed() {
+    let mut harness = window("bansho = 1\n[picture]\nsize = [32, 18]\nframes = 2\n[sky]\n[[rain]]\n");
+    slide(&mut harness, "rate mm per h", 40.0);
+    assert!(text(&mut harness).contains("rate_mm_per_h = 40.0"), "{}", text(&mut harness));
+    harness.get_by_label("diameters mm").click_accesskit();
+    harness.run_steps(12);
+    let first = harness.get_all_by_role_and_label(Role::SpinButton, "rain.0.diameters_mm.0").next().expect("a size");
+    first.set_value_accesskit(0.8);
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("diameters_mm = [0.8, "), "{}", text(&mut harness));
+    harness.get_by_role_and_label(Role::Button, "camera").click();
+    harness.run_steps(3);
+    let shutter = "shutter s";
+    harness.get_by_role_and_label(Role::Button, shutter).click();
+    drawn(&mut harness);
+    slide(&mut harness, shutter, 0.02);
+    assert!(text(&mut harness).contains("shutter_s = 0.02"), "{}", text(&mut harness));
+    harness.get_by_role_and_label(Role::Button, "wind").click();
+    harness.run_steps(3);
+    let across = harness.get_all_by_role_and_label(Role::SpinButton, "velocity").next().expect("a number");
+    across.set_value_accesskit(1.5);
+    drawn(&mut harness);
+    assert!(text(&mut harness).contains("velocity = [1.5, 0.0, 0.0]"), "{}", text(&mut harness));
     assert!(harness.state_mut().session().document.error().is_none());
 }
 
@@ -64,7 +99,8 @@ fn values_are_keyed_at_two_times_and_unkeyed() {
 
 #[test]
 fn a_lamp_that_is_dragged_while_recording_leaves_keyframes() {
-    let mut harness = window(SCENE);
+    let longer = SCENE.replace("frames = 10", "frames = 200");
+    let mut harness = window(&longer);
     harness.get_by_label("Place").click();
     harness.get_by_label("Record").click();
     harness.run_steps(2);
@@ -74,12 +110,12 @@ fn a_lamp_that_is_dragged_while_recording_leaves_keyframes() {
     assert!(recorded.contains("position = { keys = [["), "{recorded}");
     assert!(recorded.matches("], [").count() > 2, "{recorded}");
     harness.state_mut().session().document.undo();
-    assert_eq!(text(&mut harness), SCENE, "a recording is one step");
+    assert_eq!(text(&mut harness), longer, "a recording is one step");
 }
 
 #[test]
 fn a_burner_that_is_dragged_while_recording_leaves_keyframes() {
-    let scene = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 60\n[[flame_particles]]\nparticles = 50\n";
+    let scene = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 200\n[[flame_particles]]\nparticles = 50\n";
     let mut harness = window(scene);
     harness.get_by_label("Place").click();
     harness.get_by_label("Record").click();
@@ -163,7 +199,6 @@ fn stages_of_the_flame_are_seen_live() {
         assert!(pixels.iter().any(|pixel| pixel[0] > 100), "stage {index} is not black");
         assert!(before[..index].iter().all(|other| other != pixels), "stage {index} is none of those before");
     }
-    slide(&mut harness, "turn_deg".replace('_', " ").as_str(), 30.0);
     let edited = SCENE.replace("height = 0.9", "height = 0.9\ntexture = { contrast = 0.2 }");
     harness.state_mut().session().document.replace("typing", &edited);
     drawn(&mut harness);
@@ -176,4 +211,17 @@ fn stages_of_the_flame_are_seen_live() {
     harness.run_steps(12);
     assert!(harness.query_by_label("Stage texture").is_none());
     assert_eq!(harness.state_mut().session().stages, None, "what is not seen is not drawn");
+}
+
+#[test]
+fn a_value_beyond_its_bounds_is_told_and_left_as_it_is() {
+    let faulty =
+        SCENE.replace("height = 0.9", "height = -5.0").replace("bansho = 1", "bansho = 1\n[camera]\nroll_deg = 9999.0");
+    let mut harness = window(&faulty);
+    harness.get_by_label_contains("-5 is out of range");
+    for subject in ["fire", "camera"] {
+        harness.get_by_role_and_label(Role::Button, subject).click();
+        drawn(&mut harness);
+        assert_eq!(text(&mut harness), faulty, "looking mends nothing");
+    }
 }

@@ -85,7 +85,7 @@ impl Drawing {
         let even: Vec<[f64; 2]> =
             (0..=POINTS).map(|step| step as f64 / POINTS as f64).map(|at| [at, curve.eval(at)]).collect();
         let [low, high] = factor.bounds();
-        let value = |value: f64| (value.clamp(low, high) * 1000.0).round() / 1000.0;
+        let value = |value: f64| rounded(value.clamp(low, high));
         let points = lines::brushed(&even, at, by, REACH).into_iter().map(|[at, factor]| [at, value(factor)]).collect();
         if let Ok(painted) = Curve::new(points, curve.interpolation()) {
             *curve = painted;
@@ -95,7 +95,7 @@ impl Drawing {
 
     /// Splits sheet `sheet` of the shape before `shape` at the share `at` of its length; what it becomes from there on is cut too.
     pub fn split(&self, shape: usize, sheet: usize, at: f64) -> Vec<Operation> {
-        let at = (at * 1000.0).round() / 1000.0;
+        let at = rounded(at);
         let mut change = Table::default();
         change.push("sheet", Value::Integer(sheet as i64 + 1));
         change.push("at", Value::Number(at));
@@ -107,7 +107,7 @@ impl Drawing {
             _ => link.clone(),
         };
         let line = self.lines(shape - 1).into_iter().nth(sheet).unwrap_or_default();
-        let from = lines::part(&line, [at, 1.0]).first().copied();
+        let from = lines::at(&line, at);
         let changed = self.carried(shape, from.as_slice(), |shape, targets| {
             let (sheets, cut) = self.cut_at(shape, *targets.first()?)?;
             Some((sheets, Fate::Cut(cut)))
@@ -242,9 +242,7 @@ impl Drawing {
     fn cut_at(&self, shape: usize, target: DVec2) -> Option<(Vec<SheetParameters>, OnSheet)> {
         let mut sheets = self.sheets(shape);
         let all = self.lines(shape);
-        let on = |(sheet, line): (usize, &Vec<DVec2>)| Some((sheet, lines::nearest(line, target)?));
-        let nearest = all.iter().enumerate().filter_map(on).min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
-        let (sheet, on) = nearest?;
+        let (sheet, on) = lines::nearest_among(&all, target)?;
         let line = &all[sheet];
         let share = lines::share_of(line, on);
         // A short part keeps most of itself.
@@ -298,12 +296,37 @@ impl Drawing {
             shape.push("sheets", list_of(sheets));
             return vec![Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) }];
         };
-        if old.len() != sheets.len() {
-            return vec![Operation::Set { place, value: list_of(sheets) }];
-        }
-        let pairs = old.iter().zip(sheets).enumerate();
-        pairs.flat_map(|(sheet, (old, new))| differences(&place.index(sheet), old, new)).collect()
+        exchanged(&place, old, sheets).unwrap_or_else(|| vec![Operation::Set { place, value: list_of(sheets) }])
     }
+}
+
+/// What makes the list at `place` of `old` sheets one of `new` ones entry by entry, so that each keeps its comments; `None` where
+/// entries would come in between others.
+fn exchanged(place: &Place, old: &[SheetParameters], new: &[SheetParameters]) -> Option<Vec<Operation>> {
+    if old.is_empty() {
+        return None;
+    }
+    let mut rest = new.iter().peekable();
+    let gone: Vec<usize> = (0..old.len()).filter(|&index| rest.next_if(|own| **own == old[index]).is_none()).collect();
+    if rest.peek().is_none() {
+        // The last first, so that those before keep their numbers.
+        return Some(gone.iter().rev().map(|&index| Operation::Remove { place: place.index(index) }).collect());
+    }
+    let same = |(old, new): &(&SheetParameters, &SheetParameters)| old == new;
+    let behind = old.iter().rev().zip(new.iter().rev()).take_while(same).count();
+    let [kept, made] = [old.len(), new.len()].map(|count| count - behind);
+    if made > kept && behind > 0 {
+        return None;
+    }
+    let pairs = old.iter().zip(new).take(kept.min(made)).enumerate();
+    let mut operations: Vec<Operation> =
+        pairs.flat_map(|(sheet, (old, new))| differences(&place.index(sheet), old, new)).collect();
+    operations.extend((made..kept).rev().map(|sheet| Operation::Remove { place: place.index(sheet) }));
+    let added = new.get(kept..).filter(|_| made > kept).unwrap_or_default();
+    operations.extend(
+        added.iter().map(|sheet| Operation::Append { place: place.clone(), value: Value::Table(stated(sheet)) }),
+    );
+    Some(operations)
 }
 
 fn nearest_end(all: &[Vec<DVec2>], target: DVec2) -> Option<End> {

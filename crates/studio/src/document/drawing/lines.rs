@@ -27,10 +27,15 @@ pub fn nearest(line: &[DVec2], to: DVec2) -> Option<OnLine> {
     line.windows(2).enumerate().map(on).min_by(|a, b| a.distance.total_cmp(&b.distance))
 }
 
-/// Which of some lines comes nearest to a point.
-pub fn nearest_of(all: &[Vec<DVec2>], to: DVec2) -> Option<usize> {
-    let off = |line: &Vec<DVec2>| nearest(line, to).map_or(f64::INFINITY, |on| on.distance);
-    (0..all.len()).min_by(|&a, &b| off(&all[a]).total_cmp(&off(&all[b])))
+/// Which of some lines comes nearest to a point, and where on it that is.
+pub fn nearest_among(all: &[Vec<DVec2>], to: DVec2) -> Option<(usize, OnLine)> {
+    let on = |(number, line): (usize, &Vec<DVec2>)| Some((number, nearest(line, to)?));
+    all.iter().enumerate().filter_map(on).min_by(|a, b| a.1.distance.total_cmp(&b.1.distance))
+}
+
+/// The point of `line` at a share of its length.
+pub fn at(line: &[DVec2], share: f64) -> Option<DVec2> {
+    part(line, [share, 1.0]).first().copied()
 }
 
 /// Length of `line`, km.

@@ -52,9 +52,8 @@ impl Drawing {
     pub fn linked(&self, shape: usize) -> Vec<(usize, [DVec2; 2])> {
         let Some(before) = shape.checked_sub(1) else { return Vec::new() };
         let [leaving, arriving] = [before, shape].map(|shape| self.lines(shape));
-        let at = |all: &[Vec<DVec2>], sheet: i64, share: f64| {
-            lines::part(all.get(usize::try_from(sheet - 1).ok()?)?, [share, 1.0]).first().copied()
-        };
+        let at =
+            |all: &[Vec<DVec2>], sheet: i64, share: f64| lines::at(all.get(usize::try_from(sheet - 1).ok()?)?, share);
         let ends = |(number, link): (usize, &LinkParameters)| {
             Some((number, [at(&leaving, link.from, link.at?)?, at(&arriving, link.to, link.arrives?)?]))
         };

@@ -124,7 +124,7 @@ impl Drawing {
         let all = self.lines(shape);
         let arrives = |ways: &&Vec<[DVec2; 2]>| {
             let Some([_, middle]) = ways.get(ways.len() / 2) else { return false };
-            lines::nearest_of(&all, *middle) == Some(sheet)
+            lines::nearest_among(&all, *middle).is_some_and(|(own, _)| own == sheet)
         };
         let strands = shape.checked_sub(1).map(|before| self.ways(before)).unwrap_or_default();
         strands.iter().filter(arrives).map(|ways| ways.iter().map(|way| way[0]).collect()).collect()
@@ -151,7 +151,7 @@ impl Document {
         let text = operation::apply(self.text(), operations)?;
         let root = values(&text).map_err(|problem| Refusal::Faulty(problem.to_string()))?;
         let drawing = Drawing::read(&root, index, assets)?;
-        self.edit(label, operations)?;
+        self.go_on(label, text, root);
         Ok(drawing)
     }
 }

@@ -44,7 +44,7 @@ impl Drawing {
         let ways = self.ways(before);
         let ends = ways.iter().filter_map(|strand| {
             let [from, to] = *strand.get(strand.len() / 2)?;
-            Some((lines::nearest_of(&leaving, from)?, lines::nearest_of(&arriving, to)?))
+            Some((lines::nearest_among(&leaving, from)?.0, lines::nearest_among(&arriving, to)?.0))
         });
         ends.collect()
     }

@@ -9,7 +9,7 @@ use bansho::{
     models::aurora::shapes::SheetParameters,
 };
 
-use super::{Drawing, lines};
+use super::{Drawing, lines, links::rounded};
 
 /// What can be painted along a sheet, each a factor of the aurora's own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,15 +67,45 @@ impl Drawing {
         }
     }
 
-    /// One entry a sheet: what the file says where it says so sheet by sheet, else the lines that come of it.
+    /// One entry a sheet: what the file says where it says so sheet by sheet, else what comes of it, with all that lies along it.
     pub(super) fn sheets(&self, shape: usize) -> Vec<SheetParameters> {
         let stated = self.parameters.shapes.get(shape).map(|shape| shape.sheets.clone()).unwrap_or_default();
         let lines = self.lines(shape);
         if stated.len() == lines.len() {
             return stated;
         }
-        lines.iter().map(|line| with_points(&SheetParameters::default(), self.written(line))).collect()
+        let entry = |(sheet, line): (usize, &Vec<DVec2>)| {
+            let along = |factor| along(line, &self.factors(shape, sheet, factor));
+            let [flux, energy] = [Factor::Flux, Factor::Energy].map(along);
+            SheetParameters { flux, energy, ..with_points(&SheetParameters::default(), self.written(line)) }
+        };
+        lines.iter().enumerate().map(entry).collect()
     }
+}
+
+/// The curve of a factor along `line`, which is one of `values` at each of its points.
+fn along(line: &[DVec2], values: &[f64]) -> Curve {
+    /// A factor is kept within this.
+    const TOLERANCE: f64 = 0.01;
+    let usual = SheetParameters::default().flux;
+    let total = lines::length(line).max(f64::MIN_POSITIVE);
+    let mut way = 0.0;
+    let mut points = Vec::new();
+    for (index, value) in values.iter().enumerate().take(line.len()) {
+        way += index.checked_sub(1).map_or(0.0, |before| line[before].distance(line[index]));
+        points.push(DVec2::new(way / total, *value));
+    }
+    let first = values.first().copied().unwrap_or(1.0);
+    if values.iter().all(|value| (value - first).abs() < TOLERANCE) {
+        let even = vec![[0.0, rounded(first)]];
+        return if (first - 1.0).abs() < TOLERANCE {
+            usual
+        } else {
+            Curve::new(even, usual.interpolation()).unwrap_or(usual)
+        };
+    }
+    let kept = lines::simplified(&points, TOLERANCE).into_iter().map(|point| point.to_array().map(rounded)).collect();
+    Curve::new(kept, usual.interpolation()).unwrap_or(usual)
 }
 
 /// Whether the points of `sheet` are where they are said to be.

@@ -233,3 +233,58 @@ merge = [{ sheets = [2, 3], at = [1, 0] }]
     assert_eq!(counts, [3, 3, 3, 3], "a part goes alone: {part}");
     assert!(!part.contains("split") && !part.contains("merge") && part.contains("link = "), "{part}");
 }
+
+#[test]
+fn what_is_painted_along_sheets_outlives_an_edit_of_one_that_stands_for_many() {
+    let shapes = "\
+bansho = 1
+[[aurora]]
+extent_km = 800.0
+[[aurora.shapes]]
+sheets = [
+  { points = [[-200, 0], [200, 0]], copies = 2, spacing_km = 80.0, flux = [[0.0, 0.5], [1.0, 3.0]], energy = [[0.0, 2.0]] }, # a pair
+]
+";
+    let (mut document, drawing) = open(shapes);
+    let before = [0, 1].map(|sheet| [Factor::Flux, Factor::Energy].map(|factor| drawing.factors(0, sheet, factor)));
+    let moved = stroke(&[[-200.0, -60.0], [200.0, -40.0]]);
+    let drawing = change(&mut document, &drawing.set_points(0, 0, &moved));
+    assert_eq!(drawing.lines(0).len(), 2);
+    for (sheet, [flux, energy]) in before.iter().enumerate() {
+        for (factor, old) in [(Factor::Flux, flux), (Factor::Energy, energy)] {
+            let new = drawing.factors(0, sheet, factor);
+            let ends = |all: &[f64]| [all[0], all[all.len() / 2], all[all.len() - 1]];
+            let off = ends(old).iter().zip(ends(&new)).map(|(old, new)| (old - new).abs()).fold(0.0, f64::max);
+            assert!(off < 0.05, "{factor:?} of sheet {sheet}: {off}\n{}", document.text());
+        }
+    }
+    assert!(document.text().contains("# a pair"), "{}", document.text());
+    assert!(is_good(&mut document));
+}
+
+#[test]
+fn entries_of_a_list_keep_their_comments_when_others_come_and_go() {
+    let shapes = "\
+bansho = 1
+[[aurora]]
+extent_km = 800.0
+[[aurora.shapes]]
+sheets = [
+  { points = [[-200, 0], [200, 0]] }, # the first
+  { points = [[-200, 80], [200, 80]] }, # the second
+  { points = [[-200, 160], [200, 160]] }, # the third
+]
+";
+    let (mut document, drawing) = open(shapes);
+    let drawing = change(&mut document, &drawing.draw(0, None, &stroke(&[[-200.0, 240.0], [200.0, 240.0]])));
+    assert_eq!(drawing.lines(0).len(), 4);
+    let text = document.text().to_string();
+    assert!(["# the first", "# the second", "# the third"].iter().all(|comment| text.contains(comment)), "{text}");
+    change(&mut document, &drawing.remove_sheet(0, 1));
+    let line = |words: &str| document.text().lines().find(|line| line.contains(words)).unwrap_or_default().to_owned();
+    assert!(
+        line("# the first").contains("[200, 0]") && line("# the third").contains("[200, 160]"),
+        "{}",
+        document.text()
+    );
+}

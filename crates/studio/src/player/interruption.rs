@@ -5,12 +5,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use bansho::{Observer, Stage};
 
 /// Asks `stop` whether to stop, and tells it whether the shot is being advanced rather than drawn.
-pub(super) struct Stages<F> {
+pub(super) struct Interruption<F> {
     advancing: AtomicBool,
     stop: F,
 }
 
-impl<F: Fn(bool) -> bool + Send + Sync> Stages<F> {
+impl<F: Fn(bool) -> bool + Send + Sync> Interruption<F> {
     pub(super) fn new(stop: F) -> Self {
         Self { advancing: AtomicBool::new(false), stop }
     }
@@ -22,7 +22,7 @@ impl<F: Fn(bool) -> bool + Send + Sync> Stages<F> {
     }
 }
 
-impl<F: Fn(bool) -> bool + Send + Sync> Observer for Stages<F> {
+impl<F: Fn(bool) -> bool + Send + Sync> Observer for Interruption<F> {
     fn begin(&self, stage: Stage) {
         self.note(stage, true);
     }

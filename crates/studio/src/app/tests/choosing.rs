@@ -1,0 +1,232 @@
+//! Files as a person chooses them: by the questions of the window, and by dropping them on it.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use eframe::egui::{DroppedFile, Event, Key, Modifiers, Role};
+use egui_kittest::{Harness, kittest::Queryable};
+
+use super::{super::Studio, SCENE, drawn, sky, text, window};
+use crate::document::drawing::Drawing;
+
+/// Types `path` as the name that the window asks for, and answers with `button`.
+pub(super) fn answer(harness: &mut Harness<'_, Studio>, path: &Path, button: &str) {
+    harness.get_by_role_and_label(Role::TextInput, "Name").focus();
+    harness.run_steps(2);
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    harness.event(Event::Text(path.display().to_string()));
+    harness.run_steps(3);
+    confirm(harness, button);
+}
+
+/// Answers a question with `button`, which something else may be called too.
+pub(super) fn confirm(harness: &mut Harness<'_, Studio>, button: &str) {
+    // A question finds its place in the first frames.
+    harness.run_steps(3);
+    harness.get_all_by_label(button).last().expect("the answer").click();
+    drawn(harness);
+}
+
+/// Opens `path` as with Ctrl+O.
+pub(super) fn open(harness: &mut Harness<'_, Studio>, path: &Path) {
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::O);
+    harness.run_steps(3);
+    answer(harness, path, "Open");
+}
+
+pub(super) fn save(harness: &mut Harness<'_, Studio>) {
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::S);
+    harness.run_steps(3);
+}
+
+/// Chooses from the menus, one after the other.
+fn menu(harness: &mut Harness<'_, Studio>, choices: &[&str]) {
+    for choice in choices {
+        harness.get_by_label(choice).click();
+        harness.run_steps(3);
+    }
+    drawn(harness);
+}
+
+fn notice(harness: &mut Harness<'_, Studio>) -> String {
+    harness.state_mut().session().notice().unwrap_or_default().to_owned()
+}
+
+fn edited(harness: &mut Harness<'_, Studio>, to: &str) {
+    harness.state_mut().session().document.replace("typing", to);
+    drawn(harness);
+}
+
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        fs::read(&self.0).map_err(|error| error.to_string())
+    }
+}
+
+fn drop_on(harness: &mut Harness<'_, Studio>, files: &[PathBuf]) {
+    for file in files {
+        harness.input_mut().dropped_files.push(Arc::new(Dropped(file.clone())));
+    }
+    harness.step();
+    harness.input_mut().dropped_files.clear();
+    drawn(harness);
+}
+
+/// A plate, a mesh, drawings and scenes in a folder of their own.
+fn things() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    fs::copy(scenes.join("plates/checkerboard.png"), folder.path().join("board.png")).unwrap();
+    fs::copy(scenes.join("meshes/ring.glb"), folder.path().join("ring.glb")).unwrap();
+    let svg =
+        |path: &str| format!("<svg viewBox=\"0 0 100 100\"><path d=\"{path}\" stroke=\"black\" fill=\"none\"/></svg>");
+    fs::write(folder.path().join("arc.svg"), svg("M 10 50 L 90 50")).unwrap();
+    fs::write(folder.path().join("cross.svg"), svg("M 10 50 L 90 50 M 50 10 L 50 90")).unwrap();
+    fs::write(folder.path().join("other.toml"), SCENE).unwrap();
+    folder
+}
+
+#[test]
+fn files_dropped_on_a_scene_without_a_file_become_what_they_are() {
+    let things = things();
+    let file = |name: &str| things.path().join(name);
+    let mut harness =
+        window(&sky(2, "[[aurora]]\npreroll_s = 0.0\nparticles = { count = 300 }\nfield = { cells = 31 }\n"));
+    drop_on(&mut harness, &[file("board.png")]);
+    assert!(
+        text(&mut harness).contains(&format!("image = \"{}\"", file("board.png").display())),
+        "{}",
+        text(&mut harness)
+    );
+    assert!(harness.state_mut().session().document.error().is_none(), "it is found");
+
+    menu(&mut harness, &["aurora 2"]);
+    drop_on(&mut harness, &[file("arc.svg")]);
+    let session = harness.state_mut().session();
+    let stated = |index: usize| Drawing::read(session.document.values(), index, session.assets()).unwrap().is_stated();
+    assert_eq!([stated(0), stated(1)], [false, true], "the aurora that is chosen");
+
+    let before = text(&mut harness);
+    drop_on(&mut harness, &[file("cross.svg")]);
+    assert_eq!(text(&mut harness), before, "sheets that cross are refused");
+    assert!(notice(&mut harness).contains("meets"), "{}", notice(&mut harness));
+
+    drop_on(&mut harness, &[file("ring.glb")]);
+    assert_eq!(text(&mut harness), before);
+    assert!(notice(&mut harness).contains("particle flame"), "{}", notice(&mut harness));
+    fs::write(file("words.doc"), "").unwrap();
+    drop_on(&mut harness, &[file("words.doc")]);
+    assert!(notice(&mut harness).starts_with("words.doc: "), "{}", notice(&mut harness));
+}
+
+#[test]
+fn a_mesh_that_is_dropped_burns_and_of_several_files_none_is_forgotten() {
+    let things = things();
+    let file = |name: &str| things.path().join(name);
+    let mut harness =
+        window("bansho = 1\n[picture]\nsize = [32, 18]\nframes = 2\n[[flame_particles]]\nparticles = 50\n");
+    drop_on(&mut harness, &[file("ring.glb"), file("board.png")]);
+    let edited = text(&mut harness);
+    assert!(
+        edited.contains("shape = \"mesh\"") && edited.contains("ring.glb") && edited.contains("board.png"),
+        "{edited}"
+    );
+    assert!(!edited.contains("image = \"ring"), "{edited}");
+    assert!(harness.state_mut().session().document.error().is_none(), "{edited}");
+    drop_on(&mut harness, &[file("arc.svg"), file("other.toml")]);
+    confirm(&mut harness, "Leave it");
+    assert_eq!(text(&mut harness), SCENE, "a scene is opened, whatever lies with it");
+}
+
+#[test]
+fn a_scene_is_saved_under_a_whole_name_and_never_over_another_unasked() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut harness = window(SCENE);
+    save(&mut harness);
+    answer(&mut harness, &folder.path().join("fire.v2"), "Save");
+    assert_eq!(fs::read_to_string(folder.path().join("fire.v2.toml")).unwrap(), SCENE);
+
+    fs::write(folder.path().join("taken.toml"), "bansho = 1\n").unwrap();
+    menu(&mut harness, &["File", "Save as…"]);
+    answer(&mut harness, &folder.path().join("taken"), "Save");
+    harness.get_by_label_contains("There is a file of that name");
+    confirm(&mut harness, "Cancel");
+    assert_eq!(fs::read_to_string(folder.path().join("taken.toml")).unwrap(), "bansho = 1\n");
+    menu(&mut harness, &["File", "Save as…"]);
+    answer(&mut harness, &folder.path().join("taken.toml"), "Save");
+    confirm(&mut harness, "Replace it");
+    assert_eq!(fs::read_to_string(folder.path().join("taken.toml")).unwrap(), SCENE);
+    assert_eq!(harness.state_mut().session().path, Some(folder.path().join("taken.toml")));
+}
+
+#[test]
+fn what_a_question_led_to_comes_after_the_scene_was_saved_under_a_new_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = folder.path().join("other.toml");
+    fs::write(&other, "bansho = 1\n[[rain]]\n").unwrap();
+    let mut harness = window(SCENE);
+    edited(&mut harness, &SCENE.replace("0.9", "1.3"));
+    open(&mut harness, &other);
+    harness.get_by_label("There is unsaved work.");
+    confirm(&mut harness, "Save");
+    answer(&mut harness, &folder.path().join("mine.toml"), "Save");
+    assert!(fs::read_to_string(folder.path().join("mine.toml")).unwrap().contains("height = 1.3"));
+    assert_eq!(text(&mut harness), "bansho = 1\n[[rain]]\n", "then the other one is open");
+    assert_eq!(harness.state_mut().session().path, Some(other));
+}
+
+#[test]
+fn examples_that_are_saved_take_their_plates_with_them() {
+    for example in ["rain over plate", "burning mesh"] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut harness = window(SCENE);
+        menu(&mut harness, &["File", "Examples"]);
+        harness.get_by_label(example).click_accesskit();
+        drawn(&mut harness);
+        let before = text(&mut harness);
+        assert!(before.contains("plates/") || before.contains("meshes/"), "{before}");
+        save(&mut harness);
+        answer(&mut harness, &folder.path().join("mine.toml"), "Save");
+        assert_eq!(text(&mut harness), before, "the names stay");
+        assert!(harness.state_mut().session().document.error().is_none(), "{example}");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "the scene, and a folder of what it names");
+    }
+}
+
+#[test]
+fn a_scene_that_is_saved_in_another_folder_names_the_same_files() {
+    let things = things();
+    let scene = format!("{SCENE}[plate]\nimage = \"board.png\" # the ground\n");
+    fs::write(things.path().join("scene.toml"), &scene).unwrap();
+    let mut harness = window("bansho = 1\n");
+    open(&mut harness, &things.path().join("scene.toml"));
+    menu(&mut harness, &["File", "Save as…"]);
+    answer(&mut harness, &things.path().join("deep/er/scene.toml"), "Save");
+    let saved = fs::read_to_string(things.path().join("deep/er/scene.toml")).unwrap();
+    assert!(saved.contains("image = \"../../board.png\" # the ground"), "{saved}");
+    assert!(harness.state_mut().session().document.error().is_none());
+    assert_eq!(fs::read_to_string(things.path().join("scene.toml")).unwrap(), scene, "the first one stays");
+}
+
+#[test]
+fn a_scene_that_cannot_be_saved_says_so_and_stays_unsaved() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("file"), "").unwrap();
+    let mut harness = window(SCENE);
+    edited(&mut harness, &SCENE.replace("0.9", "1.3"));
+    open(&mut harness, &folder.path().join("none.toml"));
+    assert!(notice(&mut harness).contains("none.toml: cannot be opened"), "{}", notice(&mut harness));
+    save(&mut harness);
+    answer(&mut harness, &folder.path().join("file/scene.toml"), "Save");
+    assert!(notice(&mut harness).contains("scene.toml"), "{}", notice(&mut harness));
+    assert!(harness.state_mut().session().document.is_dirty() && harness.state_mut().session().path.is_none());
+}

@@ -1,0 +1,178 @@
+//! A machine too slow for the scene, in the shape of a player that says so: what is wished for, and what the window then shows.
+
+use std::{cell::RefCell, rc::Rc, sync::Arc};
+
+use bansho::{Assets, MemoryAssets};
+use eframe::egui::vec2;
+use egui_kittest::{Harness, kittest::Queryable};
+
+use super::{SCENE, Session, Studio, assets};
+use crate::{
+    document::{Document, check},
+    player::{Event, Picture, Player, Wish},
+};
+
+/// What was wished for, and what is reported next.
+#[derive(Default)]
+struct Desk {
+    wishes: Vec<Wish>,
+    events: Vec<Event>,
+}
+
+/// A player that only does what its desk says.
+#[derive(Clone, Default)]
+struct Fake(Rc<RefCell<Desk>>);
+
+impl Player for Fake {
+    fn wish(&mut self, wish: Wish) {
+        self.0.borrow_mut().wishes.push(wish);
+    }
+
+    fn poll(&mut self) -> Vec<Event> {
+        std::mem::take(&mut self.0.borrow_mut().events)
+    }
+
+    fn is_busy(&self) -> bool {
+        false
+    }
+
+    fn waits_for_poll(&self) -> bool {
+        false
+    }
+}
+
+impl Fake {
+    fn last(&self) -> Wish {
+        self.0.borrow().wishes.last().expect("a wish").clone()
+    }
+
+    fn wished(&self) -> usize {
+        self.0.borrow().wishes.len()
+    }
+
+    /// Fulfils the last wish: the scene is good, and its picture took so long, s.
+    fn fulfil(&self, draw_s: f64) {
+        let wish = self.last();
+        let nowhere: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
+        let outcome = check(&wish.name, &wish.text, &nowhere);
+        let scene_size = outcome.as_ref().map_or([64, 36], |plan| plan.size);
+        let size = wish.within.map(|side| side.min(640));
+        let picture = Picture {
+            revision: wish.revision,
+            number: wish.number.unwrap_or_default(),
+            size,
+            scene_size,
+            pixels: vec![[90, 60, 30, 255]; size[0] * size[1]],
+            exact: wish.exact,
+            draft: wish.draft,
+            draw_s,
+            advance_s: 0.0,
+        };
+        let judged = Event::Judged { revision: wish.revision, outcome };
+        self.0.borrow_mut().events.extend([judged, Event::Drawn(picture)]);
+    }
+}
+
+const WINDOW: [usize; 2] = [640, 360];
+
+fn session() -> (Session, Fake) {
+    let fake = Fake::default();
+    let session = Session::new(Document::new("fire.toml", SCENE), None, Box::new(fake.clone()), assets);
+    (session, fake)
+}
+
+#[test]
+fn previews_shrink_while_something_is_dragged_slowly_and_are_whole_again_after() {
+    let (mut session, fake) = session();
+    session.update(0.0, WINDOW, false);
+    assert_eq!((fake.last().within, fake.last().number), (WINDOW, None));
+    fake.fulfil(0.4);
+    session.update(0.4, WINDOW, false);
+    for step in 0..3 {
+        session.document.replace("typing", &SCENE.replace("0.9", &format!("1.{step}")));
+        session.update(1.0 + f64::from(step), WINDOW, true);
+        fake.fulfil(0.4 * fake.last().within[0] as f64 / 640.0);
+    }
+    session.update(5.0, WINDOW, true);
+    assert!(fake.last().within[0] <= 320, "{:?}", fake.last().within);
+    let wished = fake.wished();
+    session.update(5.1, WINDOW, false);
+    assert_eq!((fake.last().within, fake.wished()), (WINDOW, wished + 1), "whole once nothing is dragged");
+    session.update(5.2, WINDOW, false);
+    assert_eq!(fake.wished(), wished + 1, "nothing is wished for twice");
+}
+
+#[test]
+fn drafts_are_wished_for_unless_the_exact_frame_is() {
+    let (mut session, fake) = session();
+    session.update(0.0, WINDOW, false);
+    assert!(fake.last().draft && !fake.last().exact && !fake.last().still);
+    fake.fulfil(0.01);
+    session.update(0.1, WINDOW, false);
+    session.draw_exactly();
+    assert!(fake.last().exact && fake.last().revision == session.document.revision());
+    let finished = session.finished(3);
+    assert!(finished.still && finished.exact && !finished.draft && finished.number == Some(3));
+    session.draft = false;
+    session.update(0.2, WINDOW, false);
+    assert!(!fake.last().draft);
+}
+
+#[test]
+fn late_news_of_a_document_that_was_open_before_is_none() {
+    let (mut session, fake) = session();
+    session.update(0.0, WINDOW, false);
+    fake.fulfil(0.01);
+    session.open(Document::new("other.toml", SCENE.replace("frames = 10", "frames = 3")), None);
+    session.go_to_time(0.1);
+    session.open(Document::new("third.toml", SCENE.replace("frames = 10", "frames = 5")), None);
+    session.update(0.1, WINDOW, false);
+    assert!(session.picture().is_none() && session.plan().is_none());
+    let revision = session.document.revision();
+    fake.0
+        .borrow_mut()
+        .events
+        .push(Event::Panicked { revision: Document::new("", "").revision(), message: "late".into() });
+    session.update(0.2, WINDOW, false);
+    assert!(!session.is_broken() && session.notice().is_none());
+    fake.fulfil(0.01);
+    session.update(0.3, WINDOW, false);
+    assert_eq!(session.picture().map(|(picture, _)| picture.revision), Some(revision));
+    assert_eq!(
+        (session.transport.frames(), session.transport.number()),
+        (0..=4, 0),
+        "nobody went anywhere in this one"
+    );
+}
+
+#[test]
+fn what_was_broken_by_a_file_is_tried_again_with_another() {
+    let (mut session, fake) = session();
+    session.update(0.0, WINDOW, false);
+    let revision = session.document.revision();
+    fake.0.borrow_mut().events.push(Event::Panicked { revision, message: "broken".into() });
+    session.update(0.1, WINDOW, false);
+    assert!(session.is_broken());
+    let wished = fake.wished();
+    session.reload_assets();
+    session.update(0.2, WINDOW, false);
+    assert!(!session.is_broken() && fake.wished() == wished + 1);
+}
+
+#[test]
+fn the_window_says_what_is_a_draft_or_a_live_state_and_draws_it_exactly_when_asked() {
+    let (session, fake) = session();
+    let mut harness = Harness::builder()
+        .with_size(vec2(1200.0, 800.0))
+        .build_ui_state(|ui, studio: &mut Studio| studio.show(ui), Studio::new(session, None));
+    harness.run_steps(2);
+    fake.fulfil(0.01);
+    harness.run_steps(2);
+    harness.get_by_label("draft");
+    harness.get_by_label("live state").click();
+    harness.run_steps(2);
+    assert!(fake.last().exact);
+    fake.fulfil(0.01);
+    harness.run_steps(2);
+    assert!(harness.query_by_label("live state").is_none());
+}
