@@ -211,8 +211,8 @@ fn faults_stand_at_their_sheet_and_point() {
             "test.toml:5:68: aurora.0.shapes.0.sheets.1.energy.2: at 1 of its length sheet 2 has electrons of 200000 eV",
         ),
         (
-            "energy_ev = 500\n[[aurora.shapes]]\nsheets = [{ energy = 0.1 }]\n",
-            "sheet 1 has electrons of 50 eV, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV",
+            "energy_ev = 500\n[[aurora.shapes]]\nsheets = [{ energy = [[0.5, 0.1]] }]\n",
+            "at 0.5 of its length sheet 1 has electrons of 50 eV, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV",
         ),
     ] {
         let shown = fault(text);

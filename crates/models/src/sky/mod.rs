@@ -281,13 +281,13 @@ impl PreparedSky<'_> {
         let angle = LANES as f64 / self.view.camera.focal_pixels;
         let least = f64::from(sine) + angle * angle;
         let rows = [rect.y, rect.bottom()].map(|y| y as f64);
-        let corners = rows.into_iter().flat_map(|y| [x, x + LANES].map(|x| DVec2::new(x as f64, y)));
+        let mut corners = rows.into_iter().flat_map(|y| [x, x + LANES].map(|x| DVec2::new(x as f64, y)));
         let is_above = |corner: DVec2| {
             self.cameras
                 .iter()
                 .all(|camera| camera.direction(corner).is_some_and(|toward| toward.y > least * toward.length()))
         };
-        corners.map(is_above).all(|above| above)
+        corners.all(is_above)
     }
 }
 

@@ -103,8 +103,8 @@ mod tests {
             _ => f64::NAN,
         };
         // 125 km high and 800 km away along the shell: by the triangle with the Earth's middle.
-        let angle: f64 = 800.0 / 6471.0;
-        let expected = ((6496.0 * angle.cos() - 6371.0) / (6496.0 * angle.sin())).atan().to_degrees();
+        let (sin, cos) = math::sin_cos(800.0 / 6471.0);
+        let expected = math::atan((6496.0 * cos - 6371.0) / (6496.0 * sin)).to_degrees();
         let found = elevation(lamp(5000.0, 1.0, 800.0).unwrap());
         assert!((found - expected).abs() < 0.3, "{found} {expected}");
         assert_eq!(lamp(5000.0, 1.0, 1600.0), None, "below the horizon");

@@ -100,7 +100,8 @@ mod tests {
                 let node = locate(energy_ev).0;
                 let (mut sum, mut count) = (0.0, 0.0);
                 let mut add = |collision: Collision| {
-                    sum += f64::from(collision.offset_km[0]).powi(2);
+                    let offset_km = f64::from(collision.offset_km[0]);
+                    sum += offset_km * offset_km;
                     count += 1.0;
                 };
                 for particle in 100..800 {
