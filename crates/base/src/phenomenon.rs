@@ -37,6 +37,14 @@ impl Stepping {
     pub fn steps_until(&self, t: f64) -> u64 {
         ((t / self.step + 1e-6).floor() + self.preroll_steps() as f64).max(0.0) as u64
     }
+
+    /// Steps that lead to the time at which `other` is after `taken`; none where no step does, or a loop passes otherwise into its next
+    /// run.
+    #[must_use]
+    pub fn steps_for(&self, other: &Self, taken: u64) -> Option<u64> {
+        let alike = self.step == other.step && self.dissolve == other.dissolve;
+        (taken + self.preroll_steps()).checked_sub(other.preroll_steps()).filter(|_| alike)
+    }
 }
 
 /// Why a snapshot cannot be restored.

@@ -81,15 +81,19 @@ impl CpuShot {
         phenomena::parts(&plan.scene).iter().zip(made_from).map(make).collect()
     }
 
-    /// The clock of `phenomenon` after it took up the state that its namesake came to; at its beginning where it cannot.
+    /// The clock of `phenomenon` after it took up the state that its namesake came to, at the same time; at its beginning where it cannot.
     fn take_up(&self, phenomenon: &mut dyn Phenomenon) -> Clock {
         let beginning = Clock { taken: 0 };
-        let same = |old: &dyn Phenomenon| old.name() == phenomenon.name() && old.stepping() == phenomenon.stepping();
-        let Some(index) = self.phenomena.iter().position(|old| same(old.as_ref())) else { return beginning };
-        if phenomenon.stepping().is_none() || phenomenon.restore(&self.phenomena[index].snapshot()).is_err() {
+        let Some(stepping) = phenomenon.stepping() else { return beginning };
+        let Some(index) = self.phenomena.iter().position(|old| old.name() == phenomenon.name()) else {
             return beginning;
+        };
+        let old = &self.phenomena[index];
+        let taken = old.stepping().and_then(|own| stepping.steps_for(&own, self.clocks[index].taken));
+        match taken {
+            Some(taken) if phenomenon.restore(&old.snapshot()).is_ok() => Clock { taken },
+            _ => beginning,
         }
-        self.clocks[index]
     }
 
     /// Draws the view; `None` where only the whole picture gives its parts rightly, since bent light comes from beyond.
@@ -351,5 +355,28 @@ mod tests {
         shot.replan(plan("bansho = 1\n[[flame_sheet]]\nname = \"second\"\nheight = 2.0\n")).unwrap();
         assert_eq!(made(&shot), [second[1]]);
         assert_eq!(shot.clocks.len(), 1);
+    }
+
+    #[test]
+    fn gas_burns_on_when_its_flame_is_changed_also_where_it_would_burn_in_longer() {
+        let text = "bansho = 1\n[[flame_particles]]\nparticles = 60\n[[flame_particles.burners]]\nheight = 0.8\n";
+        let mut shot = CpuShot::open(plan(text)).unwrap();
+        shot.advance(3, &bansho_base::observer::Unobserved).unwrap();
+        let stands = |shot: &CpuShot| {
+            let stepping = shot.phenomena[0].stepping().unwrap();
+            (stepping.preroll_steps(), stepping.time_after(shot.clocks[0].taken), shot.particles())
+        };
+        let (preroll, time, gas) = stands(&shot);
+        shot.replan(plan(&text.replace("0.8", "1.2"))).unwrap();
+        let (longer, still, same) = stands(&shot);
+        assert!(longer > preroll, "{longer} {preroll}");
+        assert_eq!((still, same), (time, gas));
+        assert!(!shot.is_exact() && shot.particles().positions.len() > 30);
+        // Where steps are of another length its state is of no use.
+        shot.replan(plan(
+            &format!("{text}[flame_particles.look]\n").replace("particles = 60", "particles = 60\nstep_s = 0.01"),
+        ))
+        .unwrap();
+        assert_eq!(shot.clocks[0].taken, 0);
     }
 }
