@@ -24,7 +24,7 @@ use super::{
     profile::Profiles,
     shading::Shading,
     sources::{Light, nearest_node},
-    wander::Wander,
+    wander::wander_km,
 };
 use crate::aurora::{
     AuroraParameters, energies,
@@ -49,8 +49,6 @@ pub struct Aurora {
     pub(super) shading: Shading,
     /// What single collisions are drawn from, where they are asked for.
     pub(super) collisions: Option<Collisions>,
-    /// How far collisions wander from their field line.
-    wander: Wander,
     /// Luminance of the brightest column of all shapes, cd/m^2.
     brightest: f64,
     /// The shape, counted from 0, on whose way sheets first pass through each other.
@@ -113,7 +111,6 @@ impl Aurora {
             collisions: by_collisions.then(collisions),
             profiles: Profiles::new(simulation.emission()),
             shading: Shading::new(&parameters.drawing.air),
-            wander: Wander::new(simulation.emission(), &parameters.drawing, key),
             brightest: brightest(parameters, simulation.emission(), &factors),
             simulation,
             crossing,
@@ -144,7 +141,7 @@ impl Aurora {
             parameters: &parameters.drawing,
             spacing_km: simulation.spacing_km(),
             energy_ev,
-            wander_km: self.wander.at(energy_ev),
+            wander_km: wander_km(parameters.drawing.fall, parameters.drawing.wobble, energy_ev),
         }
     }
 }

@@ -1,63 +1,73 @@
 //! How far collisions wander from the field line of their electron.
 
-use bansho_base::{math, random::Key};
+use std::sync::LazyLock;
 
+use bansho_base::{math, random::Key};
 use rayon::prelude::*;
 
-use super::{DrawingParameters, FallModel};
+use super::FallModel;
 use crate::aurora::{
     atmosphere::atmosphere,
-    light::Emission,
     precipitation::{
+        Deposition,
         energy::{self, NODES, node_energy_ev},
         fall::{Collision, Falls, collision_count},
         hard_sphere::{DEFAULT_RADIUS, HardSphere},
+        spectrum::ARC,
     },
 };
 
 /// Collisions of each energy that are looked at, about, and the fewest falls: a few long ones have much of the wandering.
 const COLLISIONS: u32 = 2000;
-const FEWEST_FALLS: u32 = 24;
+const FEWEST_FALLS: u32 = 96;
+/// Falls are followed at every so many nodes of the grid of energies: from one to the next they differ little.
+const STRIDE: usize = 4;
+const _: () = assert!((NODES - 1).is_multiple_of(STRIDE));
 
-/// The wandering by the energy of the electrons, in the falls that an aurora is drawn with.
-#[derive(Clone, Debug)]
-pub(super) struct Wander {
-    /// Root mean square distance along one direction, km, by node of the grid of energies.
-    nodes_km: Vec<f64>,
-}
+/// The wandering of measured falls, and of those through hard spheres. Both go straight: what turns them adds to nothing but this.
+static FANG: LazyLock<ByEnergy> = LazyLock::new(|| {
+    // Falls are those of one energy each, whatever the spectrum.
+    let falls = Falls::new(&Deposition::new(atmosphere(), ARC), 0.0);
+    ByEnergy::new(|node, key, particle| altitudes_km(falls.fall(node, key, particle)))
+});
+static HARD_SPHERE: LazyLock<ByEnergy> = LazyLock::new(|| {
+    let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.0);
+    ByEnergy::new(|node, key, particle| altitudes_km(spheres.fall(node_energy_ev(node), key, particle)))
+});
 
-impl Wander {
-    /// That of the falls of a drawing.
-    pub(super) fn new(emission: &Emission, drawing: &DrawingParameters, key: Key) -> Self {
-        let nodes_km = match drawing.fall {
-            FallModel::Fang => {
-                let falls = Falls::new(emission.deposition(), 0.0);
-                by_node(drawing.wobble, |node, particle| altitudes_km(falls.fall(node, key, particle)))
-            }
-            FallModel::HardSphere => {
-                let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.0);
-                by_node(drawing.wobble, |node, particle| {
-                    altitudes_km(spheres.fall(node_energy_ev(node), key, particle))
-                })
-            }
-        };
-        Self { nodes_km }
+/// Root mean square distance of the collisions of electrons of an energy from their field line, along one direction, km, where every
+/// collision turns them by a tangent of rms `wobble`.
+pub(super) fn wander_km(fall: FallModel, wobble: f64, energy_ev: f64) -> f64 {
+    if wobble <= 0.0 {
+        return 0.0;
     }
-
-    /// Root mean square distance of the collisions of electrons of an energy from their field line, along one direction, km.
-    pub(super) fn at(&self, energy_ev: f64) -> f64 {
-        let (node, part) = energy::locate(energy_ev);
-        math::lerp(self.nodes_km[node], self.nodes_km[node + 1], part)
-    }
-}
-
-fn by_node(wobble: f64, fall: impl Fn(usize, u64) -> Vec<f64> + Sync) -> Vec<f64> {
-    let of_node = |node: usize| {
-        let falls = u64::from(COLLISIONS.div_ceil(collision_count(node)).max(FEWEST_FALLS));
-        let sum = (0..falls).map(|particle| variance_km2(&fall(node, particle), wobble)).sum::<f64>();
-        math::sqrt(sum / falls as f64)
+    let by_energy = match fall {
+        FallModel::Fang => &FANG,
+        FallModel::HardSphere => &HARD_SPHERE,
     };
-    (0..NODES).into_par_iter().map(of_node).collect()
+    wobble * by_energy.at(energy_ev)
+}
+
+/// Root mean square distances for a wobble of 1, km, at every [`STRIDE`]th node: they are in proportion to it.
+struct ByEnergy(Vec<f64>);
+
+impl ByEnergy {
+    fn new(fall: impl Fn(usize, Key, u64) -> Vec<f64> + Sync) -> Self {
+        let key = Key::new(0, "aurora wander");
+        let of_node = |node: usize| {
+            let falls = u64::from(COLLISIONS.div_ceil(collision_count(node)).max(FEWEST_FALLS));
+            let sum = (0..falls).map(|particle| variance_km2(&fall(node, key, particle))).sum::<f64>();
+            math::sqrt(sum / falls as f64)
+        };
+        Self((0..NODES).into_par_iter().step_by(STRIDE).map(of_node).collect())
+    }
+
+    fn at(&self, energy_ev: f64) -> f64 {
+        let (node, part) = energy::locate(energy_ev);
+        let place = (node as f64 + part) / STRIDE as f64;
+        let below = (place as usize).min(self.0.len() - 2);
+        math::lerp(self.0[below], self.0[below + 1], place - below as f64)
+    }
 }
 
 fn altitudes_km(fall: impl Iterator<Item = Collision>) -> Vec<f64> {
@@ -65,11 +75,11 @@ fn altitudes_km(fall: impl Iterator<Item = Collision>) -> Vec<f64> {
 }
 
 /// Mean square distance from the field line, along one direction, of collisions at those altitudes in km (from the first on), each of
-/// which turns the electron by a tangent of rms `wobble`.
-fn variance_km2(altitudes_km: &[f64], wobble: f64) -> f64 {
+/// which turns the electron by a tangent of rms 1.
+fn variance_km2(altitudes_km: &[f64]) -> f64 {
     let (mut variance, mut sum) = (0.0, 0.0);
     for pair in altitudes_km.windows(2) {
-        let step = wobble * (pair[0] - pair[1]).max(0.0);
+        let step = (pair[0] - pair[1]).max(0.0);
         variance += step * step;
         sum += variance;
     }
@@ -79,14 +89,14 @@ fn variance_km2(altitudes_km: &[f64], wobble: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::aurora::precipitation::{energy::locate, spectrum::ARC};
+    use crate::aurora::precipitation::energy::locate;
 
     #[test]
     fn steps_of_equal_length_wander_as_a_random_walk() {
-        // n steps of 1 km with a tangent of 0.1: the k-th collision has variance 0.01 k, their mean is 0.01 (n - 1) / 2.
+        // n steps of 1 km with a tangent of 1: the k-th collision has variance k, their mean is (n - 1) / 2.
         let altitudes: Vec<f64> = (0..11).map(|step| 200.0 - f64::from(step)).collect();
-        assert!((variance_km2(&altitudes, 0.1) - 0.05).abs() < 1e-12);
-        assert_eq!(variance_km2(&[], 0.1), 0.0);
+        assert!((variance_km2(&altitudes) - 5.0).abs() < 1e-12);
+        assert_eq!(variance_km2(&[]), 0.0);
     }
 
     #[test]
@@ -94,8 +104,6 @@ mod tests {
         let key = Key::new(4, "aurora");
         for fall in [FallModel::Fang, FallModel::HardSphere] {
             let emission = fall.emission(ARC);
-            let drawing = DrawingParameters { fall, wobble: 0.05, ..DrawingParameters::default() };
-            let wander = Wander::new(&emission, &drawing, key);
             for energy_ev in [600.0, 5000.0, 40_000.0] {
                 let node = locate(energy_ev).0;
                 let (mut sum, mut count) = (0.0, 0.0);
@@ -114,7 +122,7 @@ mod tests {
                             .for_each(&mut add),
                     }
                 }
-                let ratio = wander.at(node_energy_ev(node)) / math::sqrt(sum / count);
+                let ratio = wander_km(fall, 0.05, node_energy_ev(node)) / math::sqrt(sum / count);
                 assert!((0.75..1.35).contains(&ratio), "{fall:?} {energy_ev}: {ratio}");
             }
         }
