@@ -50,7 +50,7 @@ const SUBJECTS: [Subject; 4] = [
         name: "aurora of 30,000",
         text: "[camera]\nposition = [0.0, 1.7, 0.0]\ntarget = [0.0, 30.0, -60.0]\nvertical_fov_deg = 62.0\n\
                [[aurora]]\nparticles = { count = 30000 }\n\
-               [[aurora.shapes]]\nsheets = [{ points = [[-240.0, 0.0], [0.0, 30.0], [240.0, 0.0]] }]\n",
+               [[aurora.shapes]]\nsheets = [{ points = [[-240.0, -180.0], [0.0, -150.0], [240.0, -180.0]] }]\n",
         number: None,
     },
 ];
@@ -133,7 +133,8 @@ fn speed(subject: &Subject) -> Result<Speed, BenchError> {
 /// What a hand does that has come so far on its way.
 fn change(session: &mut Session, subject: &Subject, way: f64) -> Result<(), BenchError> {
     let Some((keys, [from, to])) = subject.number else {
-        let points = [[-240.0, 0.0], [0.0, 30.0 + 60.0 * way], [240.0, 0.0]].map(|point| Value::numbers(point).into());
+        let points =
+            [[-240.0, -180.0], [0.0, -150.0 - 60.0 * way], [240.0, -180.0]].map(|point| Value::numbers(point).into());
         let sheets = Place::root().key("aurora").index(0).key("shapes").index(0).key("sheets");
         let place = sheets.index(0).key("points");
         session.reshape("move point", &[Operation::Set { place, value: Value::List(points.into()) }], 0)?;
