@@ -1,9 +1,12 @@
 //! Whatever valid parameters say, gas stays finite, bounded in speed and in number.
 
-use bansho_base::parameters::{Parameters, Reader, sample};
+use bansho_base::{
+    gravity::STANDARD_GRAVITY,
+    parameters::{Parameters, Reader, sample},
+};
 
 use super::*;
-use crate::flame_particles::simulation::GREATEST_SPEED;
+use crate::flame_particles::moving::GREATEST_SPEED;
 
 /// How many parameter sets: [`FEW`], or what `BANSHO_RANDOM_FLAMES` says.
 fn count() -> u64 {
@@ -72,7 +75,20 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
     let motion = &parameters.motion;
     let corner = |corner: [f64; 3]| corner.map(f64::abs).into_iter().fold(0.0, f64::max);
     let blown = wind.velocity.bounds().map(corner).into_iter().fold(0.0, f64::max) * (1.0 + wind.gust);
-    (rise * (1.0 + motion.turbulence + motion.puffing) + blown * motion.wind_gain) as f32
+    let carried = rise * (1.0 + motion.turbulence + motion.puffing) + blown * motion.wind_gain;
+    carried.max(buoyant_speed(simulation, parameters)) as f32
+}
+
+/// The speed of gas that buoyancy alone drives for as long as it may live, or through the whole domain: flames may be far hotter than
+/// those of their height are.
+fn buoyant_speed(simulation: &Simulation, parameters: &FlameParticlesParameters) -> f64 {
+    let design = &simulation.design;
+    let born = design.burners.iter().map(|burner| burner.parameters.temperature_k);
+    let hottest = born.fold(parameters.life.flame_temperature_k, f64::max);
+    let rise = STANDARD_GRAVITY * parameters.motion.buoyancy * (hottest / Air::default().temperature_k - 1.0).max(0.0);
+    let lives = (0..design.burners.len()).map(|index| design.longest_life(index, parameters.life.afterlife_s));
+    let height = (design.domain[1] - design.domain[0]).y;
+    (rise * lives.fold(0.0, f64::max)).min((2.0 * rise * height).sqrt())
 }
 
 /// Speed of the fastest particle, m/s.
