@@ -19,6 +19,9 @@ use crate::{
 
 /// Time in which `viscosity` and `conduction` say how far neighbours even out, s.
 const EVENING_TIME: f32 = 0.01;
+/// Share of the difference to the neighbours that a step evens out at most: a particle among thinner gas has more than its share of them,
+/// and shall not come out beyond them all.
+const MOST_EVENED: f32 = 0.5;
 /// Mean distance of the neighbours from a particle on a flat surface of the gas, in support radii.
 const SURFACE_OFFSET: f32 = 0.2;
 /// Share of its own in a particle's density: from there on it counts as alone, fully after as much more.
@@ -137,7 +140,7 @@ impl Living<'_> {
     /// What of the difference to the neighbours is evened out in velocity and temperature.
     #[inline(always)]
     fn evened<R: Real>(&self, density: R) -> [R; 2] {
-        let share = |evening: f32| (evening * self.seconds / EVENING_TIME).min(1.0);
+        let share = |evening: f32| (evening * self.seconds / EVENING_TIME).min(MOST_EVENED);
         let per_weight = density.inverse_root();
         [per_weight * density.like(share(self.evening[0])), per_weight * density.like(share(self.evening[1]))]
     }

@@ -69,7 +69,7 @@ impl<'a> Weather<'a> {
         let axes = axes(&design.burners, particles.positions(), &particles.burner, flame.motion.narrowing, t);
         let bounds = bounds(particles, design.burners.len());
         let draughts = axes.into_iter().zip(bounds).enumerate().map(|(number, (axis, bounds))| {
-            let breeze = Breeze::new(&around.wind, particles.origin, bounds, t);
+            let breeze = Breeze::new(around.wind, particles.origin, bounds, t);
             setting.draught(number, axis, breeze, around, t)
         });
         Self {
