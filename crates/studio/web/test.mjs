@@ -5,6 +5,7 @@ import { spawnSync } from "node:child_process";
 import { mkdtempSync, readFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
+import { fileURLToPath } from "node:url";
 import { launch, serve, SIZE } from "./browser.mjs";
 
 const [dist, executablePath = "/usr/bin/chromium", bansho = "target/debug/bansho"] = process.argv.slice(2);
@@ -234,6 +235,17 @@ const zipped = spawnSync("python3", ["-c", look_into, shot.path, one.path], { en
 if (zipped.status !== 0) fail(`the shot: ${zipped.stderr || zipped.error}`);
 console.log("a scene was opened; its still and its shot were rendered");
 await own.close();
+
+// A picture of the user's own becomes the plate behind the flame; it is read and drawn by the worker.
+const plated = await open("torch");
+const dark = await until(plated, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
+await mustNotFreeze(plated, "a plate", 4, async () => {
+  const [asked] = await Promise.all([plated.waitForEvent("filechooser", { timeout: 20000 }), plated.keyboard.press("Control+o")]);
+  await asked.setFiles(fileURLToPath(new URL("../../../scenes/plates/grove.jpg", import.meta.url)));
+});
+const lit = await until(plated, picture, ({ mean }) => mean > 4 * dark.mean, "no plate behind the flame");
+console.log(`before a plate: mean ${lit.mean.toFixed(1)}, alone ${dark.mean.toFixed(1)}`);
+await plated.close();
 
 await browser.close();
 

@@ -8,7 +8,7 @@ use bansho::{
 };
 use clap::Args;
 
-use super::{render::WorkArgs, values};
+use super::{values, work::WorkArgs};
 
 /// The sheets that are wanted.
 #[derive(Args, Debug)]

@@ -5,16 +5,14 @@ mod render;
 mod simulate;
 mod streaks;
 mod values;
+mod work;
 
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
 pub(crate) use self::{
-    flipbook::FlipbookArgs,
-    render::{RenderArgs, WorkArgs},
-    simulate::SimulateArgs,
-    streaks::StreaksArgs,
+    flipbook::FlipbookArgs, render::RenderArgs, simulate::SimulateArgs, streaks::StreaksArgs, work::WorkArgs,
 };
 
 /// Flames, rain and aurora for pictures: image sequences with alpha to lay over a plate.

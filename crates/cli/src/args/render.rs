@@ -8,8 +8,10 @@ use bansho::{
 };
 use clap::Args;
 
-use super::values::{self, Frames};
-use crate::progress::ProgressKind;
+use super::{
+    values::{self, Frames},
+    work::{StateArgs, WorkArgs},
+};
 
 /// What to draw, how, and where it goes.
 #[derive(Args, Debug)]
@@ -84,31 +86,13 @@ pub(crate) struct RenderArgs {
     /// Keep frames that are there already, whole, and of this very scene; draw all others. Only for .png and .exr files.
     #[arg(long, help_heading = "Work")]
     resume: bool,
-    /// Keep the state of what is simulated in steps here, and begin from the nearest state.
-    #[arg(long, value_name = "DIR", help_heading = "Work")]
-    snapshots: Option<PathBuf>,
-    /// Frames between snapshots. [default: a second's worth]
-    #[arg(long, value_name = "N", requires = "snapshots", help_heading = "Work")]
-    snapshot_every: Option<u64>,
+    #[command(flatten)]
+    states: StateArgs,
     /// What draws. `gpu` fails in this version, which has none.
     #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
     backend: BackendChoice,
     #[command(flatten)]
     pub(crate) work: WorkArgs,
-}
-
-/// Options of everything that draws.
-#[derive(Args, Debug)]
-pub(crate) struct WorkArgs {
-    /// Threads that draw and write. The pictures are the same for any number. [default: one for each core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Work")]
-    pub(crate) threads: Option<u16>,
-    /// How progress is told.
-    #[arg(long, value_enum, default_value_t, help_heading = "Work")]
-    pub(crate) progress: ProgressKind,
-    /// Say at the end where the time went.
-    #[arg(long, help_heading = "Work")]
-    pub(crate) stats: bool,
 }
 
 impl RenderArgs {
@@ -131,8 +115,8 @@ impl RenderArgs {
             out: self.out.clone(),
             contact_sheet: self.contact_sheet,
             resume: self.resume,
-            snapshots: self.snapshots.clone(),
-            snapshot_every: self.snapshot_every,
+            snapshots: self.states.snapshots.clone(),
+            snapshot_every: self.states.snapshot_every,
             backend: self.backend,
         })
     }

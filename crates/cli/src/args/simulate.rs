@@ -6,8 +6,8 @@ use bansho::job::{BackendChoice, JobError, SceneFile, Simulate};
 use clap::Args;
 
 use super::{
-    render::WorkArgs,
     values::{self, Frames},
+    work::{StateArgs, WorkArgs},
 };
 
 /// What to simulate, and where its particles go.
@@ -35,12 +35,8 @@ pub(crate) struct SimulateArgs {
     /// Change a setting of the scene for this once; may be repeated.
     #[arg(long, value_name = "KEY.PATH=VALUE")]
     set: Vec<String>,
-    /// Keep the state of what is simulated in steps here, and begin from the nearest state.
-    #[arg(long, value_name = "DIR", help_heading = "Work")]
-    snapshots: Option<PathBuf>,
-    /// Frames between snapshots. [default: a second's worth]
-    #[arg(long, value_name = "N", requires = "snapshots", help_heading = "Work")]
-    snapshot_every: Option<u64>,
+    #[command(flatten)]
+    states: StateArgs,
     /// What simulates. `gpu` fails in this version, which has none.
     #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
     backend: BackendChoice,
@@ -56,8 +52,8 @@ impl SimulateArgs {
         Ok(Simulate {
             frames: self.frames.clone().map(|Frames(numbers)| numbers),
             seed: self.seed,
-            snapshots: self.snapshots.clone(),
-            snapshot_every: self.snapshot_every,
+            snapshots: self.states.snapshots.clone(),
+            snapshot_every: self.states.snapshot_every,
             backend: self.backend,
             ..Simulate::new(scene, self.particles.clone())
         })

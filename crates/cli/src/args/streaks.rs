@@ -10,8 +10,8 @@ use bansho::{
 use clap::Args;
 
 use super::{
-    render::WorkArgs,
     values::{self, Numbers},
+    work::WorkArgs,
 };
 
 /// The textures that are wanted; without options the 24 of Yoshida, Dobashi and Yamamoto.

@@ -35,6 +35,8 @@ pub(super) struct AuroraEditor {
     /// Its sheet that is drawn next; a new one where there is none.
     next: Option<usize>,
     gesture: Gesture,
+    /// Where a shape is held on the line of time.
+    grip: Option<targets::Grip>,
     refusal: Option<(String, Pos2)>,
     read: Option<(Revision, Result<Arc<Drawing>, String>)>,
 }

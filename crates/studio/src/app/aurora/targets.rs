@@ -4,10 +4,17 @@ use bansho::{
     base::parameters::Value,
     render::scene::{Place, operation::Operation},
 };
-use eframe::egui::{self, Align2, Color32, CornerRadius, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
+use eframe::egui::{self, Align2, Color32, CornerRadius, FontId, Pos2, Rect, Sense, Stroke, Ui, pos2, vec2};
 
 use super::{AuroraEditor, hands::Gesture};
 use crate::{app::session::Session, document::drawing::Drawing};
+
+/// A shape that is dragged on the line: the line keeps its end meanwhile, and the shape its distance from the pointer.
+#[derive(Clone, Copy)]
+pub(super) struct Grip {
+    end_s: f64,
+    offset: f32,
+}
 
 /// Shows the line and its buttons.
 pub(super) fn show(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &Drawing) {
@@ -89,7 +96,7 @@ fn line(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: 
     let visuals = ui.visuals().clone();
     painter.hline(rect.x_range(), rect.center().y, Stroke::new(2.0, visuals.widgets.inactive.bg_fill));
     let arrivals = drawing.arrivals();
-    let end = arrivals[arrivals.len() - 1].max(session.transport.frame_s());
+    let end = editor.grip.map_or_else(|| line_end_s(session, arrivals), |grip| grip.end_s);
     let x_of = |time: f64| rect.left() + (time / end).min(1.0) as f32 * rect.width();
     painter.vline(
         x_of(session.transport.time_s()),
@@ -110,10 +117,38 @@ fn line(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: 
         if response.clicked() || response.drag_started() {
             choose(editor, session, drawing, shape);
         }
-        if response.dragged() && shape > 0 && response.drag_delta().x != 0.0 {
-            let shift = f64::from(response.drag_delta().x / rect.width()) * end;
-            let change = drawing.retime(shape, drawing.after_s(shape) + shift);
-            editor.change(session, "time of shape", &change, handle.center());
+        if response.drag_started() {
+            let from = ui.input(|input| input.pointer.press_origin()).unwrap_or(handle.center());
+            editor.grip = Some(Grip { end_s: end, offset: from.x - handle.center().x });
         }
+        if let (Some(grip), Some(at), true) = (editor.grip, response.interact_pointer_pos(), response.dragged()) {
+            let wanted = f64::from((at.x - grip.offset - rect.left()) / rect.width()) * end;
+            move_in_time(editor, session, drawing, (shape, wanted - arrival), handle.center());
+        }
+        if response.drag_stopped() {
+            editor.grip = None;
+        }
+    }
+}
+
+/// Where the line ends, s: it holds the whole shot, and every shape.
+fn line_end_s(session: &Session, arrivals: &[f64]) -> f64 {
+    let frames = session.transport.frames();
+    let shot_s = (frames.end() - frames.start()).max(1) as f64 * session.transport.frame_s();
+    arrivals.iter().copied().fold(shot_s, f64::max)
+}
+
+/// Lets a shape come `later` by so many seconds. The first one is there from the beginning.
+fn move_in_time(
+    editor: &mut AuroraEditor,
+    session: &mut Session,
+    drawing: &Drawing,
+    (shape, later): (usize, f64),
+    at: Pos2,
+) {
+    let change = drawing.retime(shape, drawing.after_s(shape) + later);
+    // Less than what is written of a time is none.
+    if shape > 0 && later.abs() >= 0.005 {
+        editor.change(session, "time of shape", &change, at);
     }
 }

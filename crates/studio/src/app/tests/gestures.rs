@@ -3,7 +3,7 @@
 use eframe::egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, Role, TouchPhase, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
-use super::{super::Studio, SCENE, drag, drawn, press, release, sky, text, window};
+use super::{super::Studio, SCENE, blow, drag, drawn, press, release, sky, text, window};
 
 fn undo(harness: &mut Harness<'_, Studio>) {
     harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
@@ -183,13 +183,7 @@ fn saving_while_a_hand_blows_saves_no_passing_wind() {
     let mut harness = window(SCENE);
     super::choosing::save(&mut harness);
     super::choosing::answer(&mut harness, &path, "Save");
-    harness.get_by_label("Blow").click();
-    harness.run_steps(2);
-    let middle = harness.get_by_label("Viewport").rect().center();
-    press(&mut harness, middle);
-    harness.hover_at(middle + vec2(100.0, 0.0));
-    harness.run_steps(3);
-    assert!(text(&mut harness).contains("velocity = ["));
+    let middle = blow(&mut harness);
     super::choosing::save(&mut harness);
     assert_eq!(std::fs::read_to_string(&path).unwrap(), SCENE);
     release(&mut harness, middle + vec2(100.0, 0.0));
@@ -300,4 +294,36 @@ fn the_edit_menu_undoes_redoes_and_goes_back_several_steps() {
     assert!(text(&mut harness).contains("height = 3.0"));
     choose(&mut harness, &["Edit", "Undo back to", "3. one"]);
     assert_eq!(text(&mut harness), SCENE);
+}
+
+#[test]
+fn shapes_stay_under_the_hand_that_drags_them_in_time() {
+    let arc = "[[aurora.shapes]]\nsheets = [{ form = \"arc\" }]\n";
+    // The last of them comes after the shot, so that the line of time ends with it.
+    let mut harness = window(&sky(31, &format!("{arc}{arc}after_s = 0.4\n{arc}after_s = 3.6\n")));
+    let at = |harness: &Harness<'_, Studio>, shape: &str| harness.get_by_label(shape).rect().center().x;
+    let arrivals = |harness: &mut Harness<'_, Studio>| {
+        let session = harness.state_mut().session();
+        let drawing = crate::document::drawing::Drawing::read(session.document.values(), 0, session.assets()).unwrap();
+        drawing.arrivals().to_vec()
+    };
+    // Once chosen it has its time beside the line, which is shorter then.
+    harness.get_by_label("Shape 3").click();
+    drawn(&mut harness);
+    let (first, last) = (at(&harness, "Shape 1"), at(&harness, "Shape 3"));
+    let end_s = arrivals(&mut harness)[2];
+    // Held one and a half pixels away from its middle it goes to three quarters of the line, by less than a pixel at a time.
+    let handle = harness.get_by_label("Shape 3").rect().center();
+    let by = 0.25 * (first - last);
+    press(&mut harness, handle + vec2(1.5, 0.0));
+    for step in 1..=200 {
+        harness.hover_at(handle + vec2(1.5 + by * (step as f32 / 200.0), 0.0));
+        harness.step();
+    }
+    harness.step();
+    assert!((at(&harness, "Shape 3") - last - by).abs() < 1.5, "{} {last} {by}", at(&harness, "Shape 3"));
+    release(&mut harness, handle + vec2(1.5 + by, 0.0));
+    let times = arrivals(&mut harness);
+    assert!((times[2] - 0.75 * end_s).abs() < 0.02, "{times:?} of {end_s}");
+    assert_eq!(at(&harness, "Shape 3"), last, "the line ends with it again");
 }

@@ -220,16 +220,22 @@ fn dragging_the_picture_turns_the_camera() {
     assert_eq!(text(&mut harness), SCENE, "a drag is one step");
 }
 
-#[test]
-fn blowing_is_wind_while_it_lasts_and_keyframes_when_recorded() {
-    let mut harness = window(SCENE);
+/// A hand blows from the middle of the viewport, which is answered, and goes on.
+fn blow(harness: &mut Harness<'_, Studio>) -> egui::Pos2 {
     harness.get_by_label("Blow").click();
     harness.run_steps(2);
     let middle = harness.get_by_label("Viewport").rect().center();
-    press(&mut harness, middle);
+    press(harness, middle);
     harness.hover_at(middle + vec2(100.0, 0.0));
     harness.run_steps(3);
-    assert!(text(&mut harness).contains("velocity = ["));
+    assert!(text(harness).contains("velocity = ["));
+    middle
+}
+
+#[test]
+fn blowing_is_wind_while_it_lasts_and_keyframes_when_recorded() {
+    let mut harness = window(SCENE);
+    let middle = blow(&mut harness);
     release(&mut harness, middle + vec2(100.0, 0.0));
     assert_eq!(text(&mut harness), SCENE, "as if it had never been");
 

@@ -164,22 +164,33 @@ fn sheets_and_points_are_told_what_they_become() {
     assert!(is_good(&mut document));
 }
 
-#[test]
-fn what_counts_sheets_follows_them() {
-    let text = "\
+/// Three sheets from west to east.
+const THREE: &str = "sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [200, 80]] }, \
+                     { points = [[-200, 160], [200, 160]] }]";
+
+/// Three sheets of which the last two change places, then the middle one is split; `rest` follows.
+fn exchanged_then_split(rest: &str) -> String {
+    format!(
+        "\
 bansho = 1
 [[aurora]]
 extent_km = 800.0
 [[aurora.shapes]]
-sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
+{THREE}
+[[aurora.shapes]] # in the middle
+{THREE}
+link = [{{ from = 2, to = 3 }}, {{ from = 3, to = 2 }}]
 [[aurora.shapes]]
-sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
-link = [{ from = 2, to = 3 }, { from = 3, to = 2 }]
-[[aurora.shapes]]
-sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [-10, 80]] }, { points = [[10, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
-split = [{ sheet = 2, at = 0.5 }]
-link = [{ from = 3, to = 4, at = 0.5, arrives = 0.25 }]
-";
+sheets = [{{ points = [[-200, 0], [200, 0]] }}, {{ points = [[-200, 80], [-10, 80]] }}, {{ points = [[10, 80], [200, 80]] }}, \
+{{ points = [[-200, 160], [200, 160]] }}]
+split = [{{ sheet = 2, at = 0.5 }}]
+{rest}"
+    )
+}
+
+#[test]
+fn what_counts_sheets_follows_them() {
+    let text = &exchanged_then_split("link = [{ from = 3, to = 4, at = 0.5, arrives = 0.25 }]\n");
     let (document, drawing) = open(text);
     let after = |operations: &[bansho::render::scene::operation::Operation]| {
         let mut document = Document::new("aurora", document.text().clone());
@@ -198,22 +209,8 @@ link = [{ from = 3, to = 4, at = 0.5, arrives = 0.25 }]
 
 #[test]
 fn a_sheet_goes_with_all_that_only_it_becomes() {
-    let text = "\
-bansho = 1
-[[aurora]]
-extent_km = 800.0
-[[aurora.shapes]]
-sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
-[[aurora.shapes]] # in the middle
-sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
-link = [{ from = 2, to = 3 }, { from = 3, to = 2 }]
-[[aurora.shapes]]
-sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [-10, 80]] }, { points = [[10, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
-split = [{ sheet = 2, at = 0.5 }]
-[[aurora.shapes]]
-sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[-200, 80], [200, 80]] }, { points = [[-200, 160], [200, 160]] }]
-merge = [{ sheets = [2, 3], at = [1, 0] }]
-";
+    let text =
+        &exchanged_then_split(&format!("[[aurora.shapes]]\n{THREE}\nmerge = [{{ sheets = [2, 3], at = [1, 0] }}]\n"));
     let counts_after = |shape: usize, sheet: usize| {
         let (mut document, drawing) = open(text);
         let drawing = change(&mut document, &drawing.remove_sheet(shape, sheet));
