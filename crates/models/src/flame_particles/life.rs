@@ -10,7 +10,7 @@ const STEFAN_BOLTZMANN: f32 = 5.670_374e-8;
 /// Planck-mean absorption of soot, 1/(m K), per volume fraction (Tien 1968): `kappa = 1862 f_v T`.
 const PLANCK_MEAN_SOOT_ABSORPTION: f32 = 1862.0;
 /// Temperature deep inside the flame, where gas waits for air, as a share of that at its front.
-const INNER_TEMPERATURE: f32 = 0.72;
+pub(crate) const INNER_TEMPERATURE: f32 = 0.72;
 /// Times faster than burning gas, whose own heat makes up for it, burnt gas cools by mixing.
 const BURNT_MIXING: f32 = 2.5;
 /// Fuel below which burning soot off begins, and above which soot has not formed.

@@ -6,7 +6,7 @@ use bansho_base::{
 };
 
 use super::*;
-use crate::flame_particles::moving::GREATEST_SPEED;
+use crate::flame_particles::{life::INNER_TEMPERATURE, moving::GREATEST_SPEED};
 
 /// How many parameter sets: [`FEW`], or what `BANSHO_RANDOM_FLAMES` says.
 fn count() -> u64 {
@@ -47,9 +47,10 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
     let births = particles.births().iter().collect::<std::collections::BTreeSet<_>>().len();
     assert_eq!(births, particles.len(), "seed {seed}: one birth, two particles");
     let [low, high] = design.domain.map(|corner| corner.as_vec3());
-    // Gas is never colder than air or itself at birth, nor hotter than itself at birth or its flame.
+    // Gas is never colder than air, itself at birth or the inside of its flame, nor hotter than itself at birth or its flame.
     let born = design.burners.iter().map(|burner| burner.parameters.temperature_k);
-    let (mut coldest, mut hottest) = (Air::default().temperature_k, parameters.life.flame_temperature_k);
+    let flame = parameters.life.flame_temperature_k;
+    let (mut coldest, mut hottest) = (Air::default().temperature_k.min(f64::from(INNER_TEMPERATURE) * flame), flame);
     for kelvin in born {
         (coldest, hottest) = (coldest.min(kelvin), hottest.max(kelvin));
     }
