@@ -25,7 +25,8 @@ const DIRECT_RED: f64 = 1.5;
 /// of the light is so low that little O is left; with it the lower edge of hard auroras is pink, as it is seen. Yields of the laboratory
 /// (Piper 1982) would give three times as much, an old riddle of the green line.
 const TRANSFER_GREEN: f64 = 0.088;
-/// O(1S) and O(1D) from each O2+ that recombines: by the same fit, within Peverall et al. (2001), 0.05 +- 0.03 for ions at rest; 1.2 as in GLOW.
+/// O(1S) and O(1D) from each O2+ that recombines: by the same fit (a storage ring gave 0.05 for ions that do not vibrate: Kella et al. 1997);
+/// 1.2 as in GLOW.
 const RECOMBINATION_GREEN: f64 = 0.028;
 const RECOMBINATION_RED: f64 = 1.2;
 /// Share of O(1S) that radiate 557.7 nm, and of O(1D) that radiate 630.0 nm (Wiese et al. 1996).
