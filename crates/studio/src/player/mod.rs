@@ -9,6 +9,10 @@ mod interruption;
 #[cfg(target_arch = "wasm32")]
 mod message;
 mod pace;
+#[cfg(any(test, target_arch = "wasm32"))]
+mod pending;
+#[cfg(any(test, target_arch = "wasm32"))]
+mod reply;
 pub mod shoot;
 mod slices;
 mod states;
@@ -109,10 +113,12 @@ pub enum Event {
         /// Why.
         reason: String,
     },
-    /// A phenomenon panicked, which is a bug in it. The state is not drawn again.
+    /// A phenomenon panicked, which is a bug in it.
     Panicked {
         /// Of which state.
         revision: Revision,
+        /// At which frame; the scene's first where it is left out.
+        number: Option<i64>,
         /// What it said.
         message: String,
     },

@@ -21,7 +21,7 @@ const SCENE: &str = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 20\n[[flam
 const STEPPED: &str =
     "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 20\n[[flame_particles]]\nparticles = 200\npreroll_s = 0.1\n";
 
-fn wish(text: &str, number: i64) -> Wish {
+pub(super) fn wish(text: &str, number: i64) -> Wish {
     Wish {
         revision: Document::new("", "").revision(),
         name: "scene".into(),

@@ -10,8 +10,6 @@ use std::{
     thread::JoinHandle,
 };
 
-use bansho::RenderError;
-
 use super::{Event, Player, Wish, engine::Engine, interruption::Interruption, said};
 
 /// Draws on a thread of its own, in a pool of as many threads as the machine has cores.
@@ -105,13 +103,14 @@ fn work(desk: &Desk, emit: &mut dyn FnMut(Event)) {
         let watch = Interruption::new(|advancing| desk.has_moved_on(number, advancing || !must_draw));
         let outcome = catch_unwind(AssertUnwindSafe(|| engine.fulfil(&wish, &watch, emit)));
         desk.done.store(number, Ordering::Relaxed);
-        must_draw = matches!(outcome, Ok(Err(RenderError::Cancelled(_))));
+        must_draw = matches!(&outcome, Ok(Err(error)) if error.is_stop());
         match outcome {
-            Ok(Ok(()) | Err(RenderError::Cancelled(_))) => {}
+            Ok(Ok(())) => {}
+            Ok(Err(error)) if error.is_stop() => {}
             Ok(Err(error)) => emit(Event::Failed { revision: wish.revision, reason: error.to_string() }),
             Err(panic) => {
                 engine.forget();
-                emit(Event::Panicked { revision: wish.revision, message: said(panic.as_ref()) });
+                emit(Event::Panicked { revision: wish.revision, number: wish.number, message: said(panic.as_ref()) });
             }
         }
     }

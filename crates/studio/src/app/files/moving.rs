@@ -27,7 +27,9 @@ pub(super) enum MovingError {
     #[error(transparent)]
     Media(#[from] MediaError),
     /// Its paths lead elsewhere from there, and cannot be changed.
-    #[error("the scene names files, and their paths cannot be made right for another folder: {0}; mend the text, or undo first")]
+    #[error(
+        "the scene names files, and their paths cannot be made right for another folder: {0}; mend the text, or undo first"
+    )]
     Edit(#[from] EditError),
 }
 
