@@ -57,16 +57,15 @@ fn bench(wanted: &str) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// The same with a window large enough to show whole pictures beside all panels.
+/// The same with the window.
 fn bench_window(wanted: &str) -> ExitCode {
-    const WINDOW: [f32; 2] = [1600.0, 1200.0];
     let (sender, results) = mpsc::channel();
     let wanted = wanted.to_owned();
     let build = |creation: &eframe::CreationContext| {
         let session = session(creation, Document::new("scene", FLAME_SHEET), None)?;
         Ok(Box::new(bench::WindowBench::new(session, &wanted, sender)) as Box<dyn eframe::App>)
     };
-    if let Err(error) = eframe::run_native(TITLE, options(WINDOW), Box::new(build)) {
+    if let Err(error) = eframe::run_native(TITLE, options(window_size(None)), Box::new(build)) {
         return fail(&format!("error: {error}"));
     }
     for speed in results {

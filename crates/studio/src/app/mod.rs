@@ -136,7 +136,8 @@ impl Studio {
         } else {
             self.panels(ui);
         }
-        egui::CentralPanel::default().show(ui, |ui| self.viewport.show(ui, &mut self.session, &self.subject));
+        let bare = egui::Frame::central_panel(ui.style()).fill(egui::Color32::TRANSPARENT);
+        egui::CentralPanel::default().frame(bare).show(ui, |ui| self.viewport.show(ui, &mut self.session, &self.subject));
         if self.shows.shortcuts {
             shortcuts::window(ui.ctx(), &mut self.shows.shortcuts);
         }

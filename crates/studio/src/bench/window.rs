@@ -46,7 +46,7 @@ pub struct WindowBench {
 
 /// What is measured now.
 enum Step {
-    /// Nothing until the first picture is there.
+    /// Nothing until the window has its size and the first picture is there.
     Open,
     /// Pictures, since then; the last one that was seen.
     Play { since: Instant, pictures: usize, last: Option<(Revision, i64)> },
@@ -145,8 +145,23 @@ impl WindowBench {
     }
 }
 
+/// How large the window is that shows a whole picture of `subject` beside all panels, points of the screen.
+fn window_of(subject: &Subject) -> egui::Vec2 {
+    let editor = if subject.number.is_none() { 420.0 } else { 0.0 };
+    egui::vec2(1560.0, 780.0 + editor)
+}
+
+fn frame_size(ctx: &egui::Context) -> egui::Vec2 {
+    ctx.input(|input| input.content_rect().size())
+}
+
 impl eframe::App for WindowBench {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        if let (Step::Open, Some(subject)) = (&self.step, self.subject)
+            && frame_size(ui.ctx()) != window_of(subject)
+        {
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::InnerSize(window_of(subject)));
+        }
         if let (Step::Change { painting: true, .. }, Some(state)) = (&self.step, frame.wgpu_render_state()) {
             // The last frame is on its way to the screen; until it is there nobody has seen the picture.
             let _ = state.device.poll(PollType::wait_indefinitely());
