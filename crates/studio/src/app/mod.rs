@@ -137,7 +137,9 @@ impl Studio {
             self.panels(ui);
         }
         let bare = egui::Frame::central_panel(ui.style()).fill(egui::Color32::TRANSPARENT);
-        egui::CentralPanel::default().frame(bare).show(ui, |ui| self.viewport.show(ui, &mut self.session, &self.subject));
+        egui::CentralPanel::default()
+            .frame(bare)
+            .show(ui, |ui| self.viewport.show(ui, &mut self.session, &self.subject));
         if self.shows.shortcuts {
             shortcuts::window(ui.ctx(), &mut self.shows.shortcuts);
         }
@@ -229,6 +231,8 @@ impl Studio {
         if let Some(sleep_s) = self.session.follow(now, self.viewport.pixels(), hands) {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(sleep_s));
         }
+        self.session.wait(now, hands);
+        self.viewport.take_picture(ui, &self.session);
     }
 }
 

@@ -3,6 +3,7 @@
 use std::{
     path::{Path, PathBuf},
     sync::Arc,
+    time::Duration,
 };
 
 use bansho::{
@@ -13,6 +14,8 @@ use bansho::{
     },
     render::scene::{Place, Segment, edit::EditError, operation::Operation},
 };
+
+use web_time::Instant;
 
 use super::{broken::Broken, keyed, rate::Rate};
 use crate::{
@@ -26,6 +29,9 @@ use crate::{
 
 /// Makes the assets of a scene that lies in a folder. A scene without a file finds those of the examples first, and given ones.
 pub type AssetsOf = fn(&Path) -> Arc<dyn Assets>;
+
+/// What a hand does not notice that waits for a picture.
+const AT_ONCE: Duration = Duration::from_millis(40);
 
 /// The table of the camera.
 const CAMERA: &str = "camera";
@@ -296,6 +302,19 @@ impl Session {
             return Some(0.0);
         }
         self.transport.sleep_s(now).filter(|_| !self.is_busy())
+    }
+
+    /// Waits a moment for a picture that comes at once, as after a change of something quick, so that it is painted together with the
+    /// change and not a whole frame of the window later. While time passes nothing waits: pictures are drawn beside painting then.
+    pub fn wait(&mut self, now: f64, hands: bool) {
+        let began = Instant::now();
+        let quick =
+            self.picture.as_ref().is_some_and(|picture| picture.draw_s + picture.advance_s < AT_ONCE.as_secs_f64());
+        while quick && !self.transport.is_playing() && self.is_busy() {
+            let Some(left) = AT_ONCE.checked_sub(began.elapsed()) else { return };
+            self.player.wait(left);
+            self.listen(now, hands);
+        }
     }
 
     fn wish(&mut self, viewport: [usize; 2], hurry: bool) {

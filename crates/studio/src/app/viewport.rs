@@ -9,8 +9,8 @@ use bansho::{
     render::scene::Place,
 };
 use eframe::egui::{
-    self, Color32, PointerButton, Pos2, Rect, Response, Sense, Shape, Stroke, TextureHandle, TextureOptions, Ui, Vec2, pos2,
-    vec2,
+    self, Color32, PointerButton, Pos2, Rect, Response, Sense, Shape, Stroke, TextureHandle, TextureOptions, Ui, Vec2,
+    pos2, vec2,
 };
 
 use super::{
@@ -106,7 +106,7 @@ impl Viewport {
     }
 
     /// Brings a new picture to the screen; the size of the scene's picture, if there is one at all.
-    fn take_picture(&mut self, ui: &Ui, session: &Session) -> Option<[usize; 2]> {
+    pub(super) fn take_picture(&mut self, ui: &Ui, session: &Session) -> Option<[usize; 2]> {
         let (picture, drawn) = session.picture()?;
         if self.texture.as_ref().is_none_or(|(_, shown)| *shown != drawn) {
             let image = image(picture);

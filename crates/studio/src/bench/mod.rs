@@ -61,10 +61,9 @@ const SUBJECTS: [Subject; 4] = [
 ];
 
 impl Subject {
-    /// Its scene, with this more in the table of the picture.
-    fn scene(&self, more: &str) -> String {
+    fn scene(&self) -> String {
         let [width, height] = PICTURE;
-        format!("bansho = 1\n[picture]\nsize = [{width}, {height}]\nframes = 240\n{more}\n{}", self.text)
+        format!("bansho = 1\n[picture]\nsize = [{width}, {height}]\nframes = 240\n{}", self.text)
     }
 }
 
@@ -116,7 +115,7 @@ fn nothing(_: &Path) -> Arc<dyn Assets> {
 
 fn speed(subject: &Subject) -> Result<Speed, BenchError> {
     let player = ThreadPlayer::start(|| {})?;
-    let mut session = Session::new(Document::new(subject.name, subject.scene("")), None, Box::new(player), nothing);
+    let mut session = Session::new(Document::new(subject.name, subject.scene()), None, Box::new(player), nothing);
     // Drafts would have fewer particles than is promised.
     session.draft = false;
     // The first picture makes what is made once.

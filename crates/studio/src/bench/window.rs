@@ -16,15 +16,12 @@ use crate::{
 const WARM_UP: Duration = Duration::from_secs(2);
 const PLAYED: Duration = Duration::from_secs(6);
 
-/// Frames a second that are asked for: more than a window shows.
-const ASKED_PER_S: u32 = 120;
-
 /// How fast the window follows one scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WindowSpeed {
     /// The phenomenon.
     pub name: &'static str,
-    /// Pictures that the window showed a second.
+    /// Pictures that the window showed a second, of the 30 that the scene has.
     pub pictures_per_s: f64,
     /// The size of the last one, pixels.
     pub played_size: [usize; 2],
@@ -71,9 +68,8 @@ impl WindowBench {
         self.subject = self.subjects.next();
         self.step = Step::Open;
         if let Some(subject) = self.subject {
-            let text = subject.scene(&format!("fps = {ASKED_PER_S}"));
             let session = self.studio.session();
-            session.open(Document::new(subject.name, text), None);
+            session.open(Document::new(subject.name, subject.scene()), None);
             // Drafts would have fewer particles than is promised.
             session.draft = false;
             self.speed.name = subject.name;

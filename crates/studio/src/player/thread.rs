@@ -8,6 +8,7 @@ use std::{
         mpsc,
     },
     thread::JoinHandle,
+    time::Duration,
 };
 
 use super::{Event, Player, Wish, engine::Engine, interruption::Interruption, said};
@@ -16,6 +17,8 @@ use super::{Event, Player, Wish, engine::Engine, interruption::Interruption, sai
 pub struct ThreadPlayer {
     desk: Arc<Desk>,
     events: mpsc::Receiver<Event>,
+    /// What came while it was waited for.
+    waited: Vec<Event>,
     worker: Option<JoinHandle<()>>,
 }
 
@@ -79,7 +82,7 @@ impl ThreadPlayer {
             }
         };
         let worker = std::thread::Builder::new().name("player".into()).spawn(work)?;
-        Ok(Self { desk, events, worker: Some(worker) })
+        Ok(Self { desk, events, waited: Vec::new(), worker: Some(worker) })
     }
 }
 
@@ -127,7 +130,13 @@ impl Player for ThreadPlayer {
     }
 
     fn poll(&mut self) -> Vec<Event> {
-        self.events.try_iter().collect()
+        std::mem::take(&mut self.waited).into_iter().chain(self.events.try_iter()).collect()
+    }
+
+    fn wait(&mut self, at_most: Duration) {
+        if self.waited.is_empty() {
+            self.waited.extend(self.events.recv_timeout(at_most));
+        }
     }
 
     fn is_busy(&self) -> bool {
