@@ -18,6 +18,7 @@ pub mod mesh;
 pub mod noise;
 pub mod observer;
 pub mod occluder;
+pub mod once;
 pub mod parameters;
 pub mod phenomenon;
 pub mod placement;

@@ -13,3 +13,4 @@ mod rain;
 mod rooms;
 mod streaks;
 mod support;
+mod threads;

@@ -1,8 +1,8 @@
 //! How far collisions wander from the field line of their electron.
 
-use std::sync::LazyLock;
+use std::sync::OnceLock;
 
-use bansho_base::{math, random::Key};
+use bansho_base::{math, once::get_or_make, random::Key};
 use rayon::prelude::*;
 
 use super::FallModel;
@@ -25,27 +25,27 @@ const STRIDE: usize = 4;
 const _: () = assert!((NODES - 1).is_multiple_of(STRIDE));
 
 /// The wandering of measured falls, and of those through hard spheres. Both go straight: what turns them adds to nothing but this.
-static FANG: LazyLock<ByEnergy> = LazyLock::new(|| {
-    // Falls are those of one energy each, whatever the spectrum.
-    let falls = Falls::new(&Deposition::new(atmosphere(), ARC), 0.0);
-    ByEnergy::new(|node, key, particle| altitudes_km(falls.fall(node, key, particle)))
-});
-static HARD_SPHERE: LazyLock<ByEnergy> = LazyLock::new(|| {
-    let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.0);
-    ByEnergy::new(|node, key, particle| altitudes_km(spheres.fall(node_energy_ev(node), key, particle)))
-});
+static FANG: OnceLock<ByEnergy> = OnceLock::new();
+static HARD_SPHERE: OnceLock<ByEnergy> = OnceLock::new();
+
+fn by_energy(fall: FallModel) -> &'static ByEnergy {
+    match fall {
+        FallModel::Fang => get_or_make(&FANG, || {
+            // Falls are those of one energy each, whatever the spectrum.
+            let falls = Falls::new(&Deposition::new(atmosphere(), ARC), 0.0);
+            ByEnergy::new(|node, key, particle| altitudes_km(falls.fall(node, key, particle)))
+        }),
+        FallModel::HardSphere => get_or_make(&HARD_SPHERE, || {
+            let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.0);
+            ByEnergy::new(|node, key, particle| altitudes_km(spheres.fall(node_energy_ev(node), key, particle)))
+        }),
+    }
+}
 
 /// Root mean square distance of the collisions of electrons of an energy from their field line, along one direction, km, where every
 /// collision turns them by a tangent of rms `wobble`.
 pub(super) fn wander_km(fall: FallModel, wobble: f64, energy_ev: f64) -> f64 {
-    if wobble <= 0.0 {
-        return 0.0;
-    }
-    let by_energy = match fall {
-        FallModel::Fang => &FANG,
-        FallModel::HardSphere => &HARD_SPHERE,
-    };
-    wobble * by_energy.at(energy_ev)
+    if wobble <= 0.0 { 0.0 } else { wobble * by_energy(fall).at(energy_ev) }
 }
 
 /// Root mean square distances for a wobble of 1, km, at every [`STRIDE`]th node: they are in proportion to it.

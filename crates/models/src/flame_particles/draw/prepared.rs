@@ -7,6 +7,7 @@ use bansho_base::{
     image::Rect,
     math::DVec3,
     observer::{Cancelled, Observer, check},
+    once::get_or_make,
     phenomenon::{Deflection, Prepared},
     surroundings::Surroundings,
 };
@@ -45,6 +46,7 @@ pub struct PreparedGas<'a> {
     layers: Layers,
     matter: Matter<'a>,
     sparks: Vec<Streak>,
+    /// Made where it is measured or bends what lies behind.
     haze: OnceLock<Option<Haze>>,
 }
 
@@ -68,7 +70,8 @@ struct Sums<'a> {
     across: Across,
     detail: Option<(Detail, Strain)>,
     scattered: Vec<[f32; 3]>,
-    motion: OnceLock<Option<Motion<'a>>>,
+    /// Where it is measured, and anything glows.
+    motion: Option<Motion<'a>>,
     temperatures: [f32; 2],
 }
 
@@ -126,7 +129,11 @@ impl<'a> PreparedGas<'a> {
         check(observer)?;
         let mut sparks = fire(&gas, look, view).streaks(view, surroundings.wind);
         sparks.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-        Ok(Self { gas, look, view, level: Level::new(), layers, matter, sparks, haze: OnceLock::new() })
+        let prepared = Self { gas, look, view, level: Level::new(), layers, matter, sparks, haze: OnceLock::new() };
+        if view.measured {
+            prepared.haze();
+        }
+        Ok(prepared)
     }
 
     /// The layers that lie in a slice, nearest first.
@@ -191,7 +198,7 @@ fn sums<'a>(
         grid,
         detail,
         scattered: scattered.collect(),
-        motion: OnceLock::new(),
+        motion: if view.measured { Motion::new(gas, look, view) } else { None },
         temperatures: bounds(gas.particles.temperature.iter().copied()),
     })
 }
@@ -309,8 +316,7 @@ impl Prepared for PreparedGas<'_> {
                 }
                 dispatch!(self.level, _simd => resolve.draw_layer(&layer, &sums.extents, rect, &mut row, strip));
                 if !strip.aovs.is_empty() {
-                    let motion = sums.motion.get_or_init(|| Motion::new(&self.gas, self.look, self.view));
-                    resolve.measure_layer(&layer, &sums.extents, motion.as_ref(), rect, &mut row, strip);
+                    resolve.measure_layer(&layer, &sums.extents, sums.motion.as_ref(), rect, &mut row, strip);
                 }
             }
         }
@@ -331,17 +337,19 @@ impl Prepared for PreparedGas<'_> {
 }
 
 impl PreparedGas<'_> {
+    /// The haze, summed by all threads; where it is measured, strips find it made.
     fn haze(&self) -> Option<&Haze> {
         let summed = match &self.matter {
             Matter::Sums(sums) if self.look.sprite == SpriteStyle::Integral => Some(&sums.grid),
             _ => None,
         };
-        self.haze.get_or_init(|| Haze::new(&self.gas, self.look, self.view, summed)).as_ref()
+        get_or_make(&self.haze, || Haze::new(&self.gas, self.look, self.view, summed)).as_ref()
     }
 
     fn measure_deflection(&self, slice: &DepthInterval, strip: &mut Strip) {
         // Once, however many slices the layers fall into.
-        if let Some(haze) = self.haze().filter(|_| slice.contains(self.layers.centre(self.layers.count - 1))) {
+        let haze = self.haze.get().and_then(Option::as_ref);
+        if let Some(haze) = haze.filter(|_| slice.contains(self.layers.centre(self.layers.count - 1))) {
             haze.measure(strip);
         }
     }
