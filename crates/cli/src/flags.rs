@@ -27,6 +27,7 @@ fn of_error(error: &JobError) -> Option<&'static str> {
         JobError::Conflict(Conflict::NoChannels { what: Channels::Layers, .. }) => Some("--layers"),
         JobError::Conflict(Conflict::NoChannels { what: Channels::Aovs, .. }) => Some("--aovs"),
         JobError::Conflict(Conflict::NoFigures { .. }) => Some("--figures"),
+        JobError::Conflict(Conflict::FewFrames { .. }) => Some("--contact-sheet"),
         JobError::Streaks(fault) => of_streaks(fault),
         _ => None,
     }

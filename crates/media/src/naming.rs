@@ -185,6 +185,17 @@ fn printf_digits(text: &str) -> Option<(usize, usize)> {
     (digits <= MOST_DIGITS).then_some((digits, width.len() + 2))
 }
 
+/// What the pictures of a scene called `stem` are called unless another name is given.
+pub fn pictures(stem: &str) -> String {
+    format!("{stem}.####.png")
+}
+
+/// What the picture of frame `number` of a scene called `stem` is called unless another name is given.
+pub fn picture(stem: &str, number: i64) -> String {
+    let (before, after) = (format!("{stem}."), ".png".to_owned());
+    FrameTemplate { before, digits: Some(4), after }.name(number)
+}
+
 /// A path whose last part may hold the frame number.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NumberedPath {
@@ -306,6 +317,14 @@ fn kind_of(path: &Path, name: &str) -> Result<OutputKind, NamingError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_picture_is_called_as_the_pattern_of_all_says() {
+        let pattern = OutputPattern::parse(Path::new(&pictures("fire")), 2).unwrap();
+        for number in [-12_345, -5, 0, 7, 12_345] {
+            assert_eq!(pattern.path(number), Path::new(&picture("fire", number)));
+        }
+    }
 
     fn name(pattern: &str, frames: usize, number: i64) -> String {
         OutputPattern::parse(Path::new(pattern), frames).unwrap().path(number).display().to_string()

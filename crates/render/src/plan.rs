@@ -25,6 +25,8 @@ pub struct PlanOptions {
     pub size: Option<[usize; 2]>,
     /// Another seed.
     pub seed: Option<u64>,
+    /// Whether the scene's overscan is drawn, which only EXR has room for.
+    pub overscan: bool,
     /// Only this part of the picture.
     pub crop: Option<Rect>,
     /// A seamless loop of about so many seconds.
@@ -93,14 +95,12 @@ pub enum PlanError {
 /// A shot: the scene, and all that the frames have in common.
 #[derive(Clone)]
 pub struct Plan {
-    /// The scene.
-    pub scene: Scene,
-    /// Where its pictures come from.
+    /// Where the scene's pictures come from.
     pub assets: Arc<dyn Assets>,
-    /// Size of the picture without overscan, pixels.
-    pub size: [usize; 2],
-    /// The part to draw, within the picture with its overscan.
-    pub window: Rect,
+    // These three agree about the overscan.
+    pub(crate) scene: Scene,
+    pub(crate) size: [usize; 2],
+    pub(crate) window: Rect,
     /// Seed of everything random.
     pub seed: u64,
     /// Length of the seamless loop, s: a whole number of frames.
@@ -148,8 +148,11 @@ impl Plan {
         Ok(plan.begun_calmly())
     }
 
-    fn unexposed(scene: Scene, options: &PlanOptions, assets: Arc<dyn Assets>) -> Result<Self, PlanError> {
+    fn unexposed(mut scene: Scene, options: &PlanOptions, assets: Arc<dyn Assets>) -> Result<Self, PlanError> {
         let size = options.size.unwrap_or(scene.picture.size.map(|side| side as usize));
+        if !options.overscan {
+            scene.picture.overscan = 0;
+        }
         let overscan = scene.picture.overscan as usize;
         let loop_s = options.loop_s.map(|seconds| loop_length(seconds, scene.picture.fps)).transpose()?;
         let seed = options.seed.unwrap_or(scene.picture.seed as u64);
@@ -179,6 +182,29 @@ impl Plan {
     fn begun_calmly(self) -> Self {
         let loop_start = self.loop_s.and_then(|_| crate::cpu::calmest_start(&self).ok()).unwrap_or_default();
         Self { loop_start, ..self }
+    }
+
+    /// The same shot in another size, whole and without overscan.
+    #[must_use]
+    pub fn at_size(&self, size: [usize; 2]) -> Self {
+        let mut plan = Self { size, window: Rect::of_size(size[0], size[1]), ..self.clone() };
+        plan.scene.picture.overscan = 0;
+        plan
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Size of the picture without overscan, pixels.
+    pub fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// The part to draw, within the picture with its overscan.
+    pub fn window(&self) -> Rect {
+        self.window
     }
 
     /// Makes every enabled phenomenon, at its beginning; then the scene's own lamps, ground and sky.
@@ -320,6 +346,7 @@ fn auto_ev100(brightest: f64) -> f32 {
 fn loop_length(seconds: f64, fps: FrameRate) -> Result<f64, PlanError> {
     let min = 2.0 * fps.frame_s();
     if !(min * 0.999..=3600.0).contains(&seconds) {
+        let min = (1e3 * min).ceil() / 1e3;
         return Err(PlanError::LoopLength { seconds, min });
     }
     Ok((seconds / fps.frame_s()).round() * f64::from(fps.seconds) / f64::from(fps.frames))

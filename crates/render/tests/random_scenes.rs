@@ -35,7 +35,8 @@ fn draw(text: &str) -> bool {
     let Ok(mut scene) = Scene::parse("random.toml", text, KINDS, assets.as_ref()) else { return false };
     scene.picture.overscan = scene.picture.overscan.min(2);
     let number = scene.picture.first_frame + 1;
-    let options = PlanOptions { size: Some([17, 11]), layers: true, aovs: true, ..PlanOptions::default() };
+    let options =
+        PlanOptions { size: Some([17, 11]), overscan: true, layers: true, aovs: true, ..PlanOptions::default() };
     let plan = Plan::new(scene, &options, assets).unwrap_or_else(|error| panic!("{error}\n{text}"));
     let mut shot = CpuBackend.open(Arc::new(plan)).unwrap();
     shot.advance(number, &Unobserved).unwrap();

@@ -367,7 +367,11 @@ fn domes_and_panoramas_show_the_lamp_where_it_stands() {
 fn overscan_adds_pixels_around_the_same_picture() {
     let text = fogged(2.0);
     let plain = render(&text, &PlanOptions::default(), 0);
-    let wide = render(&text.replace("[picture]", "[picture]\noverscan = 10"), &PlanOptions::default(), 0);
+    let wide = render(
+        &text.replace("[picture]", "[picture]\noverscan = 10"),
+        &PlanOptions { overscan: true, ..PlanOptions::default() },
+        0,
+    );
     assert_eq!((wide.beauty.width(), wide.beauty.height()), (140, 110));
     assert_eq!(wide.header.data_origin, [-10, -10]);
     let inner = wide.beauty.crop(Rect { x: 10, y: 10, width: 120, height: 90 }).unwrap();

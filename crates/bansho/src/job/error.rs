@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use bansho_base::observer::Cancelled;
+use bansho_base::{assets::AssetError, observer::Cancelled};
 use bansho_media::{MediaError, flipbook::TileError, naming::NamingError};
 use bansho_render::{PlanError, RenderError, SceneError, scene::edit::EditError};
 
@@ -19,6 +19,24 @@ pub enum JobError {
         path: PathBuf,
         /// What the system said.
         source: std::io::Error,
+    },
+    /// The scene is not text.
+    #[error("{path}:{line}: the scene is not UTF-8 from this line on; allowed: text in UTF-8", path = .path.display())]
+    NotUtf8 {
+        /// The scene's file.
+        path: PathBuf,
+        /// The first line that is not, from 1 on.
+        line: usize,
+    },
+    /// A picture that the scene names cannot be had.
+    #[error("{file}: plate.{key}: {source}")]
+    Plate {
+        /// What errors call the scene.
+        file: String,
+        /// `image` or `depth`.
+        key: &'static str,
+        /// What is wrong with it.
+        source: AssetError,
     },
     /// The scene is faulty.
     #[error(transparent)]
@@ -114,6 +132,14 @@ pub enum Conflict {
         /// Most that are possible.
         most: usize,
     },
+    /// A sheet with more tiles than frames are listed.
+    #[error("a sheet of {tiles} tiles for {frames} frames; allowed: 1 to {frames}, or one frame from which on it goes")]
+    FewFrames {
+        /// How many tiles were asked for.
+        tiles: usize,
+        /// How many frames.
+        frames: usize,
+    },
     /// A sheet larger than pictures may be.
     #[error(
         "the sheet would have {width} x {height} pixels; allowed: up to {most} on a side, so choose smaller or fewer tiles"
@@ -130,7 +156,7 @@ pub enum Conflict {
     #[error("no frame is asked for")]
     NoFrames,
     /// A simulation of a scene in which nothing has particles.
-    #[error("nothing in this scene has particles to write")]
+    #[error("nothing in this scene has particles to write; allowed: a scene with flame_particles or aurora")]
     NoParticles,
     /// Snapshots of no frame.
     #[error("snapshots every {0} frames; allowed: 1 or more")]
@@ -169,7 +195,8 @@ impl JobError {
     /// Whose fault it is.
     pub fn cause(&self) -> Cause {
         match self {
-            Self::Unreadable { .. } | Self::Scene(_) | Self::Plan(PlanError::Opening { .. }) => Cause::Scene,
+            Self::Unreadable { .. } | Self::NotUtf8 { .. } | Self::Plate { .. } | Self::Scene(_) => Cause::Scene,
+            Self::Plan(PlanError::Opening { .. }) => Cause::Scene,
             Self::Edit { .. } | Self::SetScene(_) | Self::Plan(_) | Self::Conflict(_) | Self::Naming(_) => Cause::Usage,
             Self::Render(RenderError::Asset(_) | RenderError::DepthSize { .. }) => Cause::Scene,
             Self::Streaks(_) => Cause::Usage,

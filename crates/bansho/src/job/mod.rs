@@ -77,7 +77,7 @@ pub struct Job {
     pub bits: BitDepth,
     /// Where frames go, such as `shot/frame.####.exr` or `fire.mp4`; `out/STEM/STEM.####.png` when left out.
     pub out: Option<PathBuf>,
-    /// One picture of so many consecutive frames instead of all frames.
+    /// One picture of so many frames: the first of several `frames`, or consecutive ones from a single frame on.
     pub contact_sheet: Option<usize>,
     /// Whether whole frames of this very job that are there already stay.
     pub resume: bool,

@@ -55,7 +55,7 @@ impl Format {
     pub(super) fn open(&self, plan: &Plan, count: usize, size: [usize; 2], window: usize) -> Result<Sink, JobError> {
         let fps = plan.fps();
         let options = SinkOptions {
-            opaque: plan.scene.has_plate(),
+            opaque: plan.scene().has_plate(),
             sixteen_bits: self.bits == BitDepth::Sixteen,
             window,
             ..SinkOptions::new(size, [fps.frames, fps.seconds], count)

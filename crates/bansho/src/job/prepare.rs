@@ -8,7 +8,7 @@ use std::{
 use bansho_base::{assets::Assets, color::View};
 use bansho_media::{
     flipbook::Sheet,
-    naming::{OutputKind, OutputPattern},
+    naming::{self, OutputKind, OutputPattern},
     plates::FileAssets,
 };
 use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth};
@@ -69,7 +69,20 @@ pub(super) fn assets(scene: &SceneFile) -> Arc<dyn Assets> {
 /// What the scene would be refused for.
 pub fn check_scene(scene: &SceneFile) -> Result<Plan, JobError> {
     let assets = assets(scene);
-    Ok(Plan::new(scene.check(assets.as_ref())?, &PlanOptions::default(), assets)?)
+    let plan = Plan::new(scene.check(assets.as_ref())?, &PlanOptions::default(), assets)?;
+    check_plate(scene, &plan, plan.frames().start)?;
+    Ok(plan)
+}
+
+/// Reads the plate of frame `number`, so that a damaged one is told before the work begins, and by its place in the scene.
+fn check_plate(scene: &SceneFile, plan: &Plan, number: i64) -> Result<(), JobError> {
+    let plate = &plan.scene().plate;
+    for (key, path) in [("image", &plate.image), ("depth", &plate.depth)] {
+        let Some(path) = path else { continue };
+        let read = plan.assets.picture(&path.0, number);
+        read.map_err(|source| JobError::Plate { file: scene.name.clone(), key, source })?;
+    }
+    Ok(())
 }
 
 /// What draws.
@@ -88,20 +101,17 @@ impl Job {
     pub fn prepare(&self) -> Result<PreparedJob, JobError> {
         let backend = backend(self.backend)?;
         let assets = assets(&self.scene);
-        let mut scene = self.scene.check(assets.as_ref())?;
+        let scene = self.scene.check(assets.as_ref())?;
         let kind = self.output_kind()?;
         self.check_channels(kind)?;
         self.check_figures(kind)?;
-        if kind != OutputKind::Exr {
-            // Only EXR has room for what lies beyond the picture.
-            scene.picture.overscan = 0;
-        }
-        let plan = Arc::new(Plan::new(scene, &self.plan_options(), assets)?);
+        let plan = Arc::new(Plan::new(scene, &self.plan_options(kind), assets)?);
         let frames = self.chosen_frames(&plan)?;
+        check_plate(&self.scene, &plan, frames[0])?;
         let files = if self.contact_sheet.is_some() { 1 } else { frames.len() };
         let pattern = OutputPattern::parse(&self.output_path(), files)?;
         output::check_writable(&pattern.path(frames[0]))?;
-        let tile = [plan.window.width, plan.window.height];
+        let tile = [plan.window().width, plan.window().height];
         let sheet = self.contact_sheet.map(|tiles| sheet::holding(tiles, tile, contact::GUTTER)).transpose()?;
         let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan)?;
         let mut prepared = PreparedJob {
@@ -120,7 +130,7 @@ impl Job {
 
     fn output_path(&self) -> PathBuf {
         let stem = &self.scene.stem;
-        let name = if self.contact_sheet.is_some() { format!("{stem}.sheet.png") } else { format!("{stem}.####.png") };
+        let name = if self.contact_sheet.is_some() { format!("{stem}.sheet.png") } else { naming::pictures(stem) };
         self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem).join(name))
     }
 
@@ -151,9 +161,10 @@ impl Job {
         Ok(())
     }
 
-    fn plan_options(&self) -> PlanOptions {
+    fn plan_options(&self, kind: OutputKind) -> PlanOptions {
         PlanOptions {
             size: self.size,
+            overscan: kind == OutputKind::Exr,
             seed: self.seed,
             crop: self.crop,
             loop_s: self.loop_s,
@@ -170,8 +181,13 @@ impl Job {
             Some(tiles) if !(1..=MOST_TILES).contains(&tiles) => {
                 Err(Conflict::Tiles { tiles, most: MOST_TILES }.into())
             }
-            Some(tiles) => Ok((frames[0]..frames[0].saturating_add(tiles as i64)).collect()),
             None => Ok(frames),
+            // All of a shot, or from one frame on: one after the other, also beyond its end.
+            Some(tiles) if self.frames.is_none() || frames.len() == 1 => {
+                Ok((frames[0]..frames[0].saturating_add(tiles as i64)).collect())
+            }
+            Some(tiles) if frames.len() < tiles => Err(Conflict::FewFrames { tiles, frames: frames.len() }.into()),
+            Some(tiles) => Ok(frames[..tiles].to_vec()),
         }
     }
 
@@ -184,7 +200,7 @@ impl Job {
             notes.push(Note::BitsUnused { kind });
         }
         // With a plate the view matters to EXR too: the plate is taken back through it.
-        if kind == OutputKind::Exr && self.view != View::DISPLAY && !job.plan.scene.has_plate() {
+        if kind == OutputKind::Exr && self.view != View::DISPLAY && !job.plan.scene().has_plate() {
             notes.push(Note::ViewUnused);
         }
         if self.resume && !job.resume {

@@ -32,7 +32,7 @@ impl PreparedJob {
         self.notes.iter().for_each(|note| observer.note(note));
         let numbers = self.missing();
         let kept = self.frames.len() - numbers.len();
-        let size = [self.plan.window.width, self.plan.window.height];
+        let size = [self.plan.window().width, self.plan.window().height];
         observer.started(&Outline { total: self.frames.len(), kept, size });
         match &self.sheet {
             Some(sheet) => contact::run(self, sheet, observer)?,

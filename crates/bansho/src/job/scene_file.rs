@@ -35,8 +35,12 @@ impl SceneFile {
     /// # Errors
     /// There is no such file, it cannot be read, or it is not UTF-8.
     pub fn read(path: &Path) -> Result<Self, JobError> {
-        let text =
-            fs::read_to_string(path).map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source })?;
+        let bytes = fs::read(path).map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source })?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+            let line = 1 + good.iter().filter(|&&byte| byte == b'\n').count();
+            JobError::NotUtf8 { path: path.to_path_buf(), line }
+        })?;
         Ok(Self {
             name: path.display().to_string(),
             stem: path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),

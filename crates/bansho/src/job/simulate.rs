@@ -83,7 +83,7 @@ impl PreparedSimulation {
     /// The observer asked to stop, or the first file that cannot be written. Files that were finished stay, whole.
     pub fn run(&self, observer: &dyn JobObserver) -> Result<Summary, JobError> {
         self.notes.iter().for_each(|note| observer.note(note));
-        let size = [self.plan.window.width, self.plan.window.height];
+        let size = [self.plan.window().width, self.plan.window().height];
         observer.started(&Outline { total: self.frames.len(), kept: 0, size });
         let mut shot = self.backend.open(self.plan.clone())?;
         let mut last = None;

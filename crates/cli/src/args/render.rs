@@ -52,7 +52,8 @@ pub(crate) struct RenderArgs {
     /// Write a JSON file beside each picture with figures of its frame, such as the rain rate and the visibility (.png, .exr).
     #[arg(long, help_heading = "Output")]
     figures: bool,
-    /// One .png of N consecutive frames, from the first of --frames. [default out: out/SCENE/SCENE.sheet.png]
+    /// One .png of N frames: the first N of several --frames, or N consecutive ones from a single frame on. [default out:
+    /// out/SCENE/SCENE.sheet.png]
     #[arg(long, value_name = "N", help_heading = "Output")]
     contact_sheet: Option<usize>,
 

@@ -27,10 +27,10 @@ pub(crate) fn run(args: &CheckArgs) -> anyhow::Result<()> {
 
 fn describe(path: &Path) -> Result<String, JobError> {
     let plan = job::check_scene(&SceneFile::read(path)?)?;
-    let [width, height] = plan.size;
+    let [width, height] = plan.size();
     let (fps, frames) = (plan.fps(), plan.frames());
     let rate = f64::from(fps.frames) / f64::from(fps.seconds);
-    let drawn = plan.scene.instances.iter().filter(|instance| instance.enabled);
+    let drawn = plan.scene().instances.iter().filter(|instance| instance.enabled);
     let names: Vec<&str> = drawn.map(|instance| instance.name.as_str()).collect();
     let names = if names.is_empty() { "nothing in it".to_owned() } else { names.join(", ") };
     Ok(format!(

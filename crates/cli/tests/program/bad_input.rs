@@ -55,6 +55,21 @@ fn a_missing_plate_is_named() {
 }
 
 #[test]
+fn a_camera_that_looks_nowhere_is_refused() {
+    let error = refused(&FLAME.replace("target = [0.0, 0.8, 0.0]", "target = [0.0, 0.8, 3.0]"), 3);
+    says(&error, &["scene.toml:10:10: camera.target: ", "where the camera stands", "allowed: "]);
+}
+
+#[test]
+fn a_scene_that_is_no_text_is_told_with_its_line() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("scene.toml"), b"bansho = 1\n# caf\xe9\n").unwrap();
+    let run = folder.run(&["check", "scene.toml"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+    says(&run.stderr, &["scene.toml:2: ", "not UTF-8", "allowed: "]);
+}
+
+#[test]
 fn a_plate_that_is_no_picture_is_refused() {
     let scene = format!("{FLAME}[plate]\nimage = \"plate.png\"\n");
     for contents in [&b""[..], b"no picture", b"\x89PNG\r\n\x1a\n"] {
@@ -62,7 +77,8 @@ fn a_plate_that_is_no_picture_is_refused() {
         std::fs::write(folder.path("plate.png"), contents).unwrap();
         let run = folder.run(&["render", "scene.toml"]);
         assert_eq!((run.code, run.errors()), (Some(3), 1), "{contents:?}: {}", run.stderr);
-        says(&run.stderr, &["plate.png", "damaged"]);
+        says(&run.stderr, &["scene.toml: plate.image: ", "plate.png", "damaged"]);
+        assert_eq!(folder.run(&["check", "scene.toml"]).code, Some(3), "a check finds it too");
         assert_eq!(folder.names(), ["plate.png", "scene.toml"]);
     }
 }
@@ -154,6 +170,10 @@ fn options_that_do_not_go_together_are_refused() {
     misused(&["--aovs", "--out", "a.mp4"], &["--aovs", ".exr"]);
     misused(&["--contact-sheet", "4", "--out", "a.gif"], &["a.gif", ".png"]);
     misused(&["--contact-sheet", "0"], &["0 tiles", "allowed: 1 to"]);
+    misused(
+        &["--contact-sheet", "4", "--frames", "0-8x4"],
+        &["--contact-sheet: a sheet of 4 tiles for 3 frames", "allowed: 1 to 3"],
+    );
     misused(&["--contact-sheet", "99", "--size", "9000x9000"], &["16384"]);
     misused(&["--snapshot-every", "3"], &["--snapshots"]);
     misused(&["--snapshots", "s", "--snapshot-every", "0"], &["allowed: 1 or more"]);

@@ -80,6 +80,17 @@ fn a_contact_sheet_holds_the_very_frames() {
 }
 
 #[test]
+fn a_contact_sheet_holds_the_frames_that_are_listed() {
+    let folder = Folder::with_scene(FLAME);
+    folder.succeed(&["render", "scene.toml", "--out", "f/f.png"]);
+    folder.succeed(&["render", "scene.toml", "--contact-sheet", "2", "--frames", "1-5x2", "--out", "sheet.png"]);
+    let sheet = decode_png(&std::fs::read(folder.path("sheet.png")).unwrap());
+    for (x, frame) in [(0, "f.0001.png"), (50, "f.0003.png")] {
+        assert!(sheet.part([x, 0, 48, 64]) == decode_png(&folder.files("f")[frame]).bytes, "{frame}");
+    }
+}
+
+#[test]
 fn any_frame_alone_is_the_same_as_among_all() {
     let folder = Folder::with_scene(FLAME);
     folder.succeed(&["render", "scene.toml", "--out", "all/f.####.png"]);

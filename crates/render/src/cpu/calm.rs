@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use bansho_base::{
     color::View,
-    image::Rect,
     observer::{Cancelled, Unobserved},
 };
 
@@ -72,10 +71,7 @@ impl Change {
 fn small(plan: &Plan) -> Plan {
     let longest = plan.size[0].max(plan.size[1]);
     let size = plan.size.map(|side| (side * SIDE).div_ceil(longest));
-    let mut small = Plan { size, window: Rect::of_size(size[0], size[1]), ..plan.clone() };
-    (small.layers, small.aovs, small.figures) = (false, false, false);
-    small.scene.picture.overscan = 0;
-    small
+    Plan { layers: false, aovs: false, figures: false, ..plan.at_size(size) }
 }
 
 /// Display codes of a frame over black, from 0 to 1.

@@ -88,6 +88,7 @@ pub(super) fn assets_and_openings(
     assets: &dyn Assets,
     reader: &mut Reader,
 ) {
+    camera(scene, root, reader);
     plate(scene, root, assets, reader);
     for (index, obstacle) in scene.obstacles.iter().enumerate() {
         if let Err(fault) = obstacle.open(assets) {
@@ -125,6 +126,16 @@ fn report(fault: OpeningFault, path: String, root: &Table, reader: &mut Reader) 
     reader.within(path, |reader| {
         reader.within(fault.key, |reader| reader.report_at(place, fault.kind));
     });
+}
+
+/// A camera must look somewhere.
+fn camera(scene: &Scene, root: &Table, reader: &mut Reader) {
+    let [position, target] = [&scene.camera.position, &scene.camera.target].map(|place| place.at(0.0));
+    if position == target {
+        let kind = ProblemKind::Conflict("lies where the camera stands; allowed: any other place".into());
+        let place = place(root, "camera.target");
+        reader.within("camera", |r| r.within("target", |r| r.report_at(place, kind)));
+    }
 }
 
 fn plate(scene: &Scene, root: &Table, assets: &dyn Assets, reader: &mut Reader) {

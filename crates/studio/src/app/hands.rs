@@ -31,7 +31,7 @@ const POLE: f64 = 0.02;
 impl Stand {
     /// Where the camera stands at `time`: as the scene `root` states it, for hands are faster than plans, else as `plan` has it.
     pub(super) fn of(plan: &Plan, root: &Table, time: f64) -> Self {
-        let camera = &plan.scene.camera;
+        let camera = &plan.scene().camera;
         let stated = |key: &str| vector(root, &Place::root().key("camera").key(key), time);
         let or = |stated: Option<DVec3>, planned: [f64; 3]| stated.unwrap_or(DVec3::from(planned));
         Self {

@@ -246,7 +246,7 @@ impl Session {
     /// camera that is not told where to look may look up at the sky.
     pub fn unstated(&self, place: &Place) -> Option<Value> {
         let [Segment::Key(root), Segment::Key(key)] = place.segments() else { return None };
-        let camera = &self.plan().filter(|_| root == CAMERA)?.scene.camera;
+        let camera = &self.plan().filter(|_| root == CAMERA)?.scene().camera;
         camera.to_table().get(key).map(|node| node.value.clone())
     }
 

@@ -45,7 +45,7 @@ pub(super) fn things(session: &Session) -> Vec<Thing> {
 fn standing(session: &Session) -> Vec<Thing> {
     let Some(plan) = session.plan() else { return Vec::new() };
     let time = session.transport.time_s();
-    let lights = plan.scene.lights.iter().enumerate().filter(|(_, light)| light.stands());
+    let lights = plan.scene().lights.iter().enumerate().filter(|(_, light)| light.stands());
     let mut things: Vec<Thing> = lights
         .map(|(index, light)| Thing {
             place: Place::root().key("light").index(index).key("position"),

@@ -124,7 +124,7 @@ impl Viewport {
     fn hands(&mut self, ui: &Ui, session: &mut Session, response: &Response, frame: Rect) {
         let Some(plan) = session.plan().cloned() else { return };
         let time = session.transport.time_s();
-        let camera = plan.scene.camera.at(time, plan.size);
+        let camera = plan.scene().camera.at(time, plan.size());
         let stand = Stand::of(&plan, session.document.values(), time);
         let heights = |drag: Vec2| DVec2::new(f64::from(drag.x), f64::from(drag.y)) / f64::from(frame.height());
         let drag = heights(response.drag_delta());
@@ -209,7 +209,7 @@ impl Viewport {
 
     fn paint_things(&self, session: &Session, painter: &egui::Painter, frame: Rect) {
         let Some(plan) = session.plan().filter(|_| self.tool == Tool::Place) else { return };
-        let camera = plan.scene.camera.at(session.transport.time_s(), plan.size);
+        let camera = plan.scene().camera.at(session.transport.time_s(), plan.size());
         for thing in things(session) {
             let Some(seen) = camera.project(thing.point) else { continue };
             let at = to_screen(seen.pixel, &camera, frame);

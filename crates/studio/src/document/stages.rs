@@ -57,7 +57,6 @@ fn plan(
     let mut sheets = scene.instances.iter().filter(|instance| instance.kind.key == FlameSheetParameters::KEY);
     let alone = Instance { enabled: true, ..sheets.nth(index)?.clone() };
     let mut picture = scene.picture.clone();
-    picture.overscan = 0;
     // Grays are shares of the full luminance.
     let full = sheet.colour.luminance.bounds()[1].max(f64::MIN_POSITIVE);
     let coloured = stage == StageShown::Coloured.name();
@@ -104,9 +103,9 @@ mod tests {
         assert_eq!(names().collect::<Vec<_>>(), ["texture", "thresholded", "sharpened", "coloured"]);
         assert_eq!(plans.len(), 4);
         for plan in &plans {
-            let names: Vec<&str> = plan.scene.instances.iter().map(|instance| instance.name.as_str()).collect();
-            assert_eq!((names, plan.size), (vec!["second"], SIZE));
-            assert_eq!(plan.scene.camera.target.at(0.0), [0.0, 1.5, 0.0]);
+            let names: Vec<&str> = plan.scene().instances.iter().map(|instance| instance.name.as_str()).collect();
+            assert_eq!((names, plan.size()), (vec!["second"], SIZE));
+            assert_eq!(plan.scene().camera.target.at(0.0), [0.0, 1.5, 0.0]);
         }
         assert!(super::plans("scene", text, &assets, 2).is_none());
         assert!(super::plans("scene", "bansho = 1\n[[flame_shet]]\n", &assets, 0).is_none());

@@ -4,7 +4,7 @@ use std::{path::Path, sync::Arc};
 
 use bansho::{
     Assets, Backend, BitDepth, CpuBackend, DisplayImage, Observer, Plan, RenderError, Shot, View,
-    base::image::{DisplayPixels, Frame, Rect},
+    base::image::{DisplayPixels, Frame},
     display,
     media::{
         MediaError,
@@ -127,7 +127,7 @@ impl Engine {
 
     fn draw(&mut self, plan: &Arc<Plan>, wish: &Wish, observer: &dyn Observer) -> Result<Picture, RenderError> {
         let number = wish.number.unwrap_or(plan.frames().start);
-        let size = fitted(plan.size, wish.within);
+        let size = fitted(plan.size(), wish.within);
         let opened = open(&mut self.shot, plan, size, wish.exact)?;
         opened.draw(wish, number, &mut Some(&mut self.states), observer)
     }
@@ -156,7 +156,7 @@ impl Opened {
             revision: wish.revision,
             number,
             size: *size,
-            scene_size: of.size,
+            scene_size: of.size(),
             pixels,
             exact: shot.is_exact(),
             draft: false,
@@ -182,7 +182,7 @@ impl StageShots {
         // Of a text with faults there are none; the last pictures stay.
         let plans = stages::plans(&wish.name, &wish.text, &wish.assets, sheet).unwrap_or_default();
         let open = |plan: Arc<Plan>| -> Result<Opened, RenderError> {
-            Ok(Opened { shot: CpuBackend.open(plan.clone())?, size: plan.size, of: plan })
+            Ok(Opened { shot: CpuBackend.open(plan.clone())?, size: plan.size(), of: plan })
         };
         self.shots = plans.into_iter().map(open).collect::<Result<_, _>>()?;
         self.of = Some((plan.clone(), sheet));
@@ -199,23 +199,14 @@ fn open<'a>(
 ) -> Result<&'a mut Opened, RenderError> {
     let usable = slot.take().filter(|opened| !exact || (opened.shot.is_exact() && Arc::ptr_eq(&opened.of, plan)));
     let opened = match usable {
-        None => Opened { shot: CpuBackend.open(sized(plan, size))?, of: plan.clone(), size },
+        None => Opened { shot: CpuBackend.open(Arc::new(plan.at_size(size)))?, of: plan.clone(), size },
         Some(opened) if Arc::ptr_eq(&opened.of, plan) && opened.size == size => opened,
         Some(mut opened) => {
-            opened.shot.replan(sized(plan, size))?;
+            opened.shot.replan(Arc::new(plan.at_size(size)))?;
             Opened { of: plan.clone(), size, ..opened }
         }
     };
     Ok(slot.insert(opened))
-}
-
-/// The plan for a window: without what lies beyond the picture, and smaller where the window is.
-fn sized(plan: &Plan, size: [usize; 2]) -> Arc<Plan> {
-    let mut plan = plan.clone();
-    plan.scene.picture.overscan = 0;
-    plan.size = size;
-    plan.window = Rect::of_size(size[0], size[1]);
-    Arc::new(plan)
 }
 
 /// The largest size of `size`'s proportions that fits `within`; `size` itself where that does.

@@ -95,7 +95,6 @@ impl Flipbook {
         if let Some(seconds) = self.loop_s {
             scene.picture.fps = turn_rate(sheet.count, seconds)?;
         }
-        scene.picture.overscan = 0;
         let options = PlanOptions {
             size: Some(sheet.cell),
             seed: self.seed,

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use bansho::{media::zip::Zip, render::scene::Place};
+use bansho::{
+    media::{naming, zip::Zip},
+    render::scene::Place,
+};
 use eframe::egui::{Context, Ui};
 
 use super::{
@@ -186,8 +189,7 @@ impl Rendering {
 
     /// Takes in the picture of frame `number`; what was saved, once that was the last.
     fn take(&mut self, number: i64, png: &[u8]) -> Result<Option<String>, String> {
-        // As `bansho render` calls it.
-        let name = format!("{}.{number:04}.png", self.stem);
+        let name = naming::picture(&self.stem, number);
         self.done += 1;
         let Some(shot) = &mut self.shot else { return save(&name, &Parts::of(png)).map(Some) };
         shot.add(&name, png).map_err(|error| error.to_string())?;

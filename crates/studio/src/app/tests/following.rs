@@ -61,7 +61,7 @@ impl Fake {
         let wish = self.last();
         let nowhere: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
         let outcome = check(&wish.name, &wish.text, &nowhere);
-        let scene_size = outcome.as_ref().map_or([64, 36], |plan| plan.size);
+        let scene_size = outcome.as_ref().map_or([64, 36], |plan| plan.size());
         let size = wish.within.map(|side| side.min(640));
         let picture = Picture {
             revision: wish.revision,

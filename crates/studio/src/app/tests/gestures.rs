@@ -32,7 +32,7 @@ fn notch(harness: &mut Harness<'_, Studio>, lines: f32) {
 }
 
 fn position(harness: &mut Harness<'_, Studio>) -> [f64; 3] {
-    let camera = harness.state_mut().session().plan().unwrap().scene.camera.clone();
+    let camera = harness.state_mut().session().plan().unwrap().scene().camera.clone();
     camera.position.at(0.0)
 }
 
@@ -57,7 +57,7 @@ fn the_picture_is_panned_with_shift() {
     let middle = harness.get_by_label("Viewport").rect().center();
     harness.event(Event::ModifiersChanged(Modifiers::SHIFT));
     drag(&mut harness, middle, vec2(120.0, 0.0));
-    let camera = harness.state_mut().session().plan().unwrap().scene.camera.clone();
+    let camera = harness.state_mut().session().plan().unwrap().scene().camera.clone();
     let [position, target] = [camera.position.at(0.0), camera.target.at(0.0)];
     assert!(position[0] < -0.05 && (position[0] - target[0]).abs() < 2e-3, "{position:?} {target:?}");
 }
@@ -66,7 +66,7 @@ fn the_picture_is_panned_with_shift() {
 fn an_aurora_alone_is_seen_as_before_once_hands_turn_the_camera() {
     let mut harness = window(&sky(2, ""));
     let seen = |harness: &mut Harness<'_, Studio>| {
-        let camera = harness.state_mut().session().plan().unwrap().scene.camera.clone();
+        let camera = harness.state_mut().session().plan().unwrap().scene().camera.clone();
         (camera.position.at(0.0), camera.target.at(0.0), camera.vertical_fov_deg.at(0.0))
     };
     let (before, _, field) = seen(&mut harness);
@@ -97,7 +97,7 @@ fn an_aurora_alone_whose_camera_is_keyed_stays_in_sight() {
     harness.run_steps(3);
     harness.get_by_label("Key the value at this time: camera.target").click();
     drawn(&mut harness);
-    let camera = harness.state_mut().session().plan().unwrap().scene.camera.clone();
+    let camera = harness.state_mut().session().plan().unwrap().scene().camera.clone();
     assert_eq!((camera.target.at(0.0), camera.vertical_fov_deg.at(0.0)), ([0.0, 60.0, -60.0], 81.0));
 }
 

@@ -262,7 +262,7 @@ fn lamps_are_dragged() {
     drag(&mut harness, lamp, vec2(80.0, 0.0));
     let edited = text(&mut harness);
     let plan = harness.state_mut().session().plan().unwrap().clone();
-    let [x, y, z] = plan.scene.lights[0].position.at(0.0);
+    let [x, y, z] = plan.scene().lights[0].position.at(0.0);
     assert!(x > 0.1 && (y - 1.0).abs() < 0.02 && z.abs() < 0.02, "to the right, at its depth: {edited}");
 }
 
@@ -299,8 +299,8 @@ fn burners_are_dragged() {
 /// Where on the screen the first frame shows a point of the scene.
 fn seen_at(harness: &mut Harness<'_, Studio>, point: DVec3) -> egui::Pos2 {
     let plan = harness.state_mut().session().plan().cloned().unwrap();
-    let [width, height] = plan.size.map(|side| side as f32);
-    let seen = plan.scene.camera.at(0.0, plan.size).project(point).unwrap().pixel;
+    let [width, height] = plan.size().map(|side| side as f32);
+    let seen = plan.scene().camera.at(0.0, plan.size()).project(point).unwrap().pixel;
     let viewport = harness.get_by_label("Viewport").rect();
     let scale = (viewport.width() / width).min(viewport.height() / height);
     viewport.center() + vec2(seen.x as f32 - 0.5 * width, seen.y as f32 - 0.5 * height) * scale
