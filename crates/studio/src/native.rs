@@ -51,7 +51,8 @@ fn bench(wanted: &str) -> ExitCode {
         };
         let [advance, draw, answer] = [advance_s, draw_s, answer_s].map(|seconds| 1000.0 * seconds);
         say(&format!(
-            "{name:24} {pictures_per_s:6.1} pictures/s ({advance:5.1} ms simulated, {draw:5.1} ms drawn), 19 of 20 changes show within {answer:4.0} ms"
+            "{name:24} {pictures_per_s:6.1} pictures/s ({advance:5.1} ms simulated, {draw:5.1} ms drawn), \
+             19 of 20 changes show within {answer:4.0} ms"
         ));
     }
     ExitCode::SUCCESS
@@ -75,7 +76,8 @@ fn bench_window(wanted: &str) -> ExitCode {
         };
         let ([width, height], [whole_width, whole_height]) = (played_size, size);
         say(&format!(
-            "{name:24} {pictures_per_s:6.1} pictures/s of {width} x {height}, 19 of 20 changes painted at {whole_width} x {whole_height} within {:4.0} ms",
+            "{name:24} {pictures_per_s:6.1} pictures/s of {width} x {height}, \
+             19 of 20 changes painted at {whole_width} x {whole_height} within {:4.0} ms",
             1000.0 * answer_s
         ));
     }

@@ -36,8 +36,8 @@ pub fn open(path: &Path) -> Result<Document, OpenError> {
     Ok(Document::new(path.display().to_string(), read(path)?))
 }
 
-/// Saves `document` to `path`, whole or not at all, as `text`: its own, or one that says the same from there, which is a step of its history
-/// then.
+/// Saves `document` to `path`, whole or not at all, as `text`: its own, or one that says the same from there, which is then a
+/// step of its history.
 ///
 /// # Errors
 /// The file cannot be written; the one that was there stays, and so does the document.
