@@ -6,12 +6,16 @@
 
 use glam::{DVec3, UVec3, Vec3};
 
-use crate::mesh::Mesh;
+use crate::{math, mesh::Mesh};
 
 /// Cells along the longest side of the mesh.
 const CELLS: f64 = 64.0;
 /// Cells around the mesh on every side.
 const MARGIN: f64 = 3.0;
+/// Cells across a thin mesh, so that some lie within it,
+const CELLS_ACROSS: f64 = 2.5;
+/// and about as many cells in all at most for that.
+const MOST_CELLS: f64 = 7e5;
 
 /// Signed distance to a mesh, m.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,7 +31,7 @@ impl DistanceField {
     /// The distances to `mesh`.
     pub fn new(mesh: &Mesh) -> Self {
         let [min, max] = mesh.bounds();
-        let spacing = ((max - min).max_element() / CELLS).max(1e-9);
+        let spacing = spacing(mesh, (max - min).max_element());
         let size = ((max - min) / spacing + 2.0 * MARGIN).ceil().as_uvec3() + UVec3::ONE;
         let origin = min - MARGIN * spacing;
         let mut building = Building::new(mesh, origin, spacing, size.to_array().map(|side| side as usize));
@@ -63,6 +67,22 @@ impl DistanceField {
     fn index(&self, [x, y, z]: [usize; 3]) -> usize {
         (z * self.size[1] + y) * self.size[0] + x
     }
+}
+
+/// Distance between grid points for a mesh with such a longest side: small enough for its thickness, if that can be.
+fn spacing(mesh: &Mesh, longest: f64) -> f64 {
+    let [min, max] = mesh.bounds();
+    let (middle, mut volume, mut area) = (0.5 * (min + max), 0.0, 0.0);
+    for [a, b, c] in mesh.triangles().map(|corners| corners.map(|corner| corner - middle)) {
+        volume += a.dot(b.cross(c)) / 6.0;
+        area += 0.5 * (b - a).cross(c - a).length();
+    }
+    // A plate's sides are all its area, twice; what is nowhere as thin is thicker by that.
+    let thickness = 2.0 * volume.abs() / area.max(f64::MIN_POSITIVE);
+    let finest = math::cbrt((max - min + thickness).element_product() / MOST_CELLS);
+    // A sheet without thickness has no inside that a finer grid would find.
+    let across = if thickness > finest { (thickness / CELLS_ACROSS).max(finest) } else { f64::INFINITY };
+    across.min(longest / CELLS).max(1e-9)
 }
 
 /// The grid while it is filled; lengths in cells.
@@ -228,6 +248,20 @@ mod tests {
         assert!((field.at(DVec3::new(0.9, 0.5, 0.5)) + 0.1).abs() < 1e-4);
         assert!((field.at(DVec3::new(4.0, 0.5, 0.5)) - 3.0).abs() < 0.01, "beyond the grid");
         assert!((field.normal(DVec3::new(0.3, 1.02, 0.6)) - DVec3::Y).length() < 1e-3);
+    }
+
+    #[test]
+    fn a_thin_plate_that_leans_has_an_inside() {
+        let turned = glam::DQuat::from_rotation_z(0.6);
+        let plate = |corner: DVec3| (turned * (corner * DVec3::new(1.0, 0.02, 1.0))).as_vec3().to_array();
+        let corners: Vec<[f32; 3]> = mesh::cube().triangles().flatten().map(plate).collect();
+        let triangles = (0..12).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let field = DistanceField::new(&Mesh::new(corners, triangles).unwrap());
+        for step in 1..40 {
+            let along = 0.025 * f64::from(step);
+            let middle = turned * DVec3::new(along, 0.01, 0.98 * along);
+            assert!(field.at(middle) < -1e-3, "{} m at {middle}", field.at(middle));
+        }
     }
 
     #[test]

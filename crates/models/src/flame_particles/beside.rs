@@ -33,7 +33,8 @@ impl PairTerm<3, 5, 8> for BesideTerm {
 pub(crate) struct Beside {
     /// `m / sqrt(rho)`.
     pub(crate) weights: Vec<f32>,
-    sums: [Vec<f32>; 8],
+    /// Sum of weights, the particle's own included; differences of the neighbours' velocities and temperatures; ways to the neighbours.
+    pub(crate) sums: [Vec<f32>; 8],
 }
 
 impl Beside {
@@ -42,29 +43,5 @@ impl Beside {
         mixing_weights(mass, density, &mut self.weights);
         let fields = [&self.weights, u, v, w, temperature].map(Vec::as_slice);
         cells.sum(&BesideTerm(Poly6::new(cells.support_radius())), fields, self.sums.each_mut());
-    }
-
-    /// Sum of weights, the particle's own included.
-    #[inline(always)]
-    pub(crate) fn weight(&self, index: usize) -> f32 {
-        self.sums[0][index]
-    }
-
-    /// Differences of the neighbours' velocities.
-    #[inline(always)]
-    pub(crate) fn velocity(&self, index: usize) -> [f32; 3] {
-        [self.sums[1][index], self.sums[2][index], self.sums[3][index]]
-    }
-
-    /// Differences of the neighbours' temperatures.
-    #[inline(always)]
-    pub(crate) fn temperature(&self, index: usize) -> f32 {
-        self.sums[4][index]
-    }
-
-    /// Ways to the neighbours.
-    #[inline(always)]
-    pub(crate) fn offset(&self, index: usize) -> [f32; 3] {
-        [self.sums[5][index], self.sums[6][index], self.sums[7][index]]
     }
 }

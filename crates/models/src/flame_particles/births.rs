@@ -75,7 +75,7 @@ impl Births<'_> {
             position: (place.position + velocity.as_dvec3() * age).as_vec3().to_array(),
             velocity: velocity.to_array(),
             mass: design.mass,
-            density: design.rest_density.max(1e-6),
+            density: design.density,
             temperature: burner.parameters.temperature_k as f32,
             support_radius: design.support_radius,
             age: age as f32,

@@ -4,17 +4,25 @@ use bansho_base::{
     math::{DVec3, Vec3},
     wind::Wind,
 };
+use fearless_simd::{Simd, prelude::*};
+
+use super::turbulence::mixed;
+use crate::lanes::{Lanes, Real, fetch, wrap_split};
 
 /// Grid points along each side of the box around the gas.
 const POINTS: usize = 4;
 
+/// Grid points of the box.
+const ALL_POINTS: usize = POINTS * POINTS * POINTS;
+
 /// The wind at one moment within a box.
 #[derive(Clone, Debug)]
 pub(crate) struct Breeze {
-    low: Vec3,
+    low: [f32; 3],
     /// Cells a metre.
-    scale: Vec3,
-    velocity: Vec<Vec3>,
+    scale: [f32; 3],
+    /// Velocities on the grid; the fourth number is 0.
+    velocity: Box<[[f32; 4]; ALL_POINTS]>,
 }
 
 impl Breeze {
@@ -22,27 +30,39 @@ impl Breeze {
     pub(crate) fn new(wind: &Wind, origin: DVec3, [low, high]: [Vec3; 2], t: f64) -> Self {
         let size = (high - low).max(Vec3::splat(1e-3));
         let last = (POINTS - 1) as f32;
-        let at = |index: usize| {
+        let mut velocity = Box::new([[0.0; 4]; ALL_POINTS]);
+        for (index, velocity) in velocity.iter_mut().enumerate() {
             let place = [index % POINTS, index / POINTS % POINTS, index / (POINTS * POINTS)];
             let place = low + size * Vec3::from(place.map(|step| step as f32)) / last;
-            wind.at(origin + place.as_dvec3(), t).as_vec3()
-        };
-        Self { low, scale: last / size, velocity: (0..POINTS * POINTS * POINTS).map(at).collect() }
+            *velocity = wind.at(origin + place.as_dvec3(), t).as_vec3().extend(0.0).to_array();
+        }
+        Self { low: low.to_array(), scale: (last / size).to_array(), velocity }
     }
 
-    /// Velocity at `place`, m/s.
+    /// Velocity at sixteen places, m/s.
     #[inline(always)]
-    pub(crate) fn at(&self, place: Vec3) -> Vec3 {
-        let last = (POINTS - 1) as f32;
-        let place = ((place - self.low) * self.scale).clamp(Vec3::ZERO, Vec3::splat(last));
-        let cell = place.floor().min(Vec3::splat(last - 1.0));
-        let f = place - cell;
-        let [x, y, z] = cell.to_array().map(|step| step as usize);
-        let row = |j: usize, k: usize| {
-            let start = ((z + k) * POINTS + y + j) * POINTS + x;
-            self.velocity[start].lerp(self.velocity[start + 1], f.x)
-        };
-        row(0, 0).lerp(row(1, 0), f.y).lerp(row(0, 1).lerp(row(1, 1), f.y), f.z)
+    pub(crate) fn at<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        const MASK: u32 = POINTS as u32 - 1;
+        let like = |value: f32| Lanes::splat(simd, value);
+        let mut on_grid = *place;
+        for c in 0..3 {
+            // Never the last point itself, beside which there is none.
+            let last = like((POINTS - 1) as f32 - 1e-3);
+            on_grid[c] = ((place[c] - like(self.low[c])) * like(self.scale[c])).greatest(like(0.0)).least(last);
+        }
+        let ((x, across), (y, up), (z, along)) =
+            (wrap_split(on_grid[0], MASK), wrap_split(on_grid[1], MASK), wrap_split(on_grid[2], MASK));
+        let first = (((z << POINTS.ilog2()) + y) << POINTS.ilog2()) + x;
+        let [next_y, next_z] = [POINTS as u32, (POINTS * POINTS) as u32];
+        let starts = [first, first + next_y, first + next_z, first + (next_y + next_z)];
+        let mut rows = [[like(0.0); 4]; 4];
+        for k in 0..4 {
+            let [here, beside] = [fetch(simd, &self.velocity, starts[k]), fetch(simd, &self.velocity, starts[k] + 1)];
+            rows[k] = mixed(&here, &beside, across);
+        }
+        let (near, far) = (mixed(&rows[0], &rows[1], up), mixed(&rows[2], &rows[3], up));
+        let [x, y, z, _] = mixed(&near, &far, along);
+        [x, y, z]
     }
 }
 
@@ -51,6 +71,7 @@ mod tests {
     use bansho_base::{animation::Animated, wind::WindParameters};
 
     use super::*;
+    use crate::lanes::plain;
 
     #[test]
     fn it_is_the_wind_itself_within_a_few_percent() {
@@ -60,7 +81,11 @@ mod tests {
         let breeze = Breeze::new(&wind, origin, [Vec3::ZERO, Vec3::new(1.0, 2.0, 1.0)], 2.0);
         for place in [Vec3::splat(0.1), Vec3::new(0.9, 1.3, 0.4), Vec3::new(0.5, 2.0, 1.0)] {
             let exact = wind.at(origin + place.as_dvec3(), 2.0).as_vec3();
-            assert!((breeze.at(place) - exact).length() < 0.1, "{} {exact}", breeze.at(place));
+            let found = plain!(simd => {
+                let velocity = breeze.at(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
+                Vec3::from(velocity.map(|values| values.as_slice()[11]))
+            });
+            assert!((found - exact).length() < 0.1, "{found} {exact}");
         }
     }
 }

@@ -1,10 +1,12 @@
 //! Burners: where gas is born, and the scales that follow from how large and how strong a burner is.
 
+use std::sync::Arc;
+
 use bansho_base::{
     assets::Assets,
     gravity::STANDARD_GRAVITY,
     math::{self, DVec3},
-    mesh::SurfaceSampler,
+    mesh::{Mesh, SurfaceSampler},
     parameters::Auto,
     placement::Placement,
     random::{Key, Purpose, uniform, uniform_f64},
@@ -39,8 +41,9 @@ pub(crate) struct Burner {
     pub(crate) acceleration: f64,
     /// Radius of a ball around its position that holds the burner, m.
     pub(crate) reach: f64,
-    /// The middle of its area beside its position, m: meshes may lie far from their own origin.
-    pub(crate) middle: DVec3,
+    /// Corners of the box that its place counts for, beside its position, m: around a mesh, which may lie far from its own origin; the
+    /// middle of any other area.
+    pub(crate) extent: [DVec3; 2],
 }
 
 #[derive(Clone, Debug)]
@@ -89,7 +92,7 @@ impl Burner {
             speed,
             acceleration: AXIS_ACCELERATION * flame.motion.buoyancy,
             reach: size.reach,
-            middle: turned.to_world(size.middle),
+            extent: size.mesh.map_or([DVec3::ZERO; 2], |mesh| extent(&mesh, &turned)),
         })
     }
 
@@ -162,14 +165,20 @@ struct Size {
     diameter: f64,
     square_metres: f64,
     reach: f64,
-    /// In the burner's own coordinates.
-    middle: DVec3,
+    mesh: Option<Arc<Mesh>>,
+}
+
+/// Corners of the box around a mesh as it is turned.
+fn extent(mesh: &Mesh, turned: &Placement) -> [DVec3; 2] {
+    let corners = mesh.triangles().flatten().map(|corner| turned.to_world(corner));
+    let around = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
+    corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around)
 }
 
 fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(Area, Size), ParticleFaultKind> {
     let BurnerParameters { diameter, length, size: [x, y, z], scale, .. } = *parameters;
     let round = 0.25 * std::f64::consts::PI * diameter * diameter;
-    let size = |diameter, square_metres, reach| Size { diameter, square_metres, reach, middle: DVec3::ZERO };
+    let size = |diameter, square_metres, reach| Size { diameter, square_metres, reach, mesh: None };
     Ok(match parameters.shape {
         BurnerShape::Disc => (Area::Disc, size(diameter, round, 0.5 * diameter)),
         BurnerShape::Point => (Area::Ball, size(diameter, round, 0.5 * diameter)),
@@ -187,7 +196,7 @@ fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(Area, Siz
             let square_metres = sampler.area() * scale * scale;
             let across = sides.x.min(sides.z).max(0.2 * sides.max_element());
             let reach = min.abs().max(max.abs()).length() * scale;
-            (Area::Surface(sampler), Size { middle: 0.5 * (min + max), ..size(across, square_metres, reach) })
+            (Area::Surface(sampler), Size { mesh: Some(mesh), ..size(across, square_metres, reach) })
         }
     })
 }

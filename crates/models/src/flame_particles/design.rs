@@ -44,6 +44,8 @@ pub(crate) struct Design {
     pub(crate) support_radius: f32,
     /// Mass m, kg.
     pub(crate) mass: f32,
+    /// Density of gas at the burner, kg/m^3.
+    pub(crate) density: f32,
     /// Density of reference rho_0, kg/m^3.
     pub(crate) rest_density: f32,
     /// k of eq. (11) a kelvin, m^2/(s^2 K).
@@ -85,6 +87,7 @@ impl Design {
             pulse: (PULSE * parameters.motion.puffing).min(0.9),
             support_radius: support_radius as f32,
             mass: (density * volume) as f32,
+            density: density as f32,
             rest_density: (parameters.fluid.rest_density * density) as f32,
             stiffness_per_kelvin: (sound * sound / coolest) as f32,
             domain,
@@ -154,8 +157,9 @@ fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[
         return Err(ParticleFault { key: "domain_max".into(), kind: ParticleFaultKind::EmptyDomain { min, max } });
     }
     for (index, burner) in burners.iter().enumerate() {
-        for corner in burner.parameters.position.bounds() {
-            stands_within(parameters, DVec3::from(corner) + burner.middle).map_err(|(corner, kind)| {
+        let corners = burner.parameters.position.bounds().map(DVec3::from).into_iter().zip(burner.extent);
+        for (position, corner) in corners {
+            stands_within(parameters, position + corner).map_err(|(corner, kind)| {
                 // What the user did not write cannot be at fault.
                 let moved = burner.parameters.position != Animated::from([0.0; 3]);
                 ParticleFault { key: if moved { format!("burners.{index}.position") } else { corner.into() }, kind }
@@ -225,11 +229,13 @@ mod tests {
     #[test]
     fn a_mesh_that_lies_outside_the_domain_is_a_burner_outside_it() {
         assert!(on_a_mesh_beside_its_origin(0.5, [0.0; 3]).is_ok());
+        // A part of it is enough: what is born there would die at once.
+        assert_eq!(on_a_mesh_beside_its_origin(1.5, [0.0; 3]).unwrap_err().key, "domain_max");
         // Turned half about the upright axis it lies on the other side.
         for (far, turn, key) in [(50.0, 0.0, "domain_max"), (50.0, 180.0, "domain_min")] {
             let fault = on_a_mesh_beside_its_origin(far, [0.0, turn, 0.0]).unwrap_err();
             assert_eq!(fault.key, key);
-            assert!(matches!(fault.kind, ParticleFaultKind::OutsideDomain { place, .. } if place[0].abs() > 50.0));
+            assert!(matches!(fault.kind, ParticleFaultKind::OutsideDomain { place, .. } if place[0].abs() >= 50.0));
         }
     }
 

@@ -1,6 +1,7 @@
 //! What becomes of a particle: it heats where it burns, burns as fast as it finds air, cools by mixing and radiation, carries soot.
 
 use super::parameters::{LifeParameters, TemperatureLaw};
+use crate::lanes::Real;
 
 /// Specific heat of hot air at constant pressure, J/(kg K).
 const SPECIFIC_HEAT: f32 = 1200.0;
@@ -9,7 +10,7 @@ const STEFAN_BOLTZMANN: f32 = 5.670_374e-8;
 /// Planck-mean absorption of soot, 1/(m K), per volume fraction (Tien 1968): `kappa = 1862 f_v T`.
 const PLANCK_MEAN_SOOT_ABSORPTION: f32 = 1862.0;
 /// Temperature deep inside the flame, where gas waits for air, as a share of that at its front.
-const INNER_TEMPERATURE: f32 = 0.72;
+pub(crate) const INNER_TEMPERATURE: f32 = 0.72;
 /// Times faster than burning gas, whose own heat makes up for it, burnt gas cools by mixing.
 const BURNT_MIXING: f32 = 2.5;
 /// Fuel below which burning soot off begins, and above which soot has not formed.
@@ -21,28 +22,28 @@ const GREATEST_GROWTH: f32 = 3.0;
 
 /// What of a particle changes as it lives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Being {
+pub(crate) struct Being<R> {
     /// Temperature, K.
-    pub(crate) temperature: f32,
+    pub(crate) temperature: R,
     /// Share of fuel left.
-    pub(crate) fuel: f32,
+    pub(crate) fuel: R,
     /// Volume fraction of soot.
-    pub(crate) soot: f32,
+    pub(crate) soot: R,
     /// Support radius for drawing, m.
-    pub(crate) support_radius: f32,
+    pub(crate) support_radius: R,
 }
 
 /// What acts on a particle for a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Exposure {
+pub(crate) struct Exposure<R> {
     /// How much of it lies at the edge of the gas: 0 inside to 1 alone.
-    pub(crate) to_air: f32,
+    pub(crate) to_air: R,
     /// Share of its own mass that it takes up from the air, 1/s.
-    pub(crate) mixing: f32,
+    pub(crate) mixing: R,
     /// Share of a mean particle's fuel that burns, 1/s.
-    pub(crate) burning: f32,
+    pub(crate) burning: R,
     /// Density of air as hot as it is, kg/m^3.
-    pub(crate) density: f32,
+    pub(crate) density: R,
     /// Temperature of the air, K.
     pub(crate) air_temperature: f32,
     /// Support radius d at birth, m.
@@ -78,66 +79,70 @@ impl From<&LifeParameters> for Laws {
 impl Laws {
     /// The particle after `seconds`.
     #[inline(always)]
-    pub(crate) fn live(&self, being: Being, exposure: &Exposure, seconds: f32) -> Being {
+    pub(crate) fn live<R: Real>(&self, being: Being<R>, exposure: &Exposure<R>, seconds: f32) -> Being<R> {
+        let like = |value: f32| being.fuel.like(value);
         // Gas at the edge burns faster than the mean, gas inside slower; a mean exposure of a third burns as the mean.
-        let air = 1.0 + self.air_hunger * (2.4 * exposure.to_air - 0.8);
-        let fuel = (being.fuel - exposure.burning * air * seconds).max(0.0);
-        let growth = 1.0 + exposure.mixing * seconds * (1.0 / 3.0);
+        let air = exposure.to_air.fused(like(2.4 * self.air_hunger), like(1.0 - 0.8 * self.air_hunger));
+        let fuel = (being.fuel - exposure.burning * air * like(seconds)).greatest(like(0.0));
+        let growth = exposure.mixing.fused(like(seconds * (1.0 / 3.0)), like(1.0));
         Being {
             fuel,
             temperature: if self.living { self.temperature(being, exposure, seconds) } else { being.temperature },
-            soot: self.soot * self.soot_share(fuel),
-            support_radius: (being.support_radius * growth).min(GREATEST_GROWTH * exposure.smallest_radius),
+            soot: like(self.soot) * self.soot_share(fuel),
+            support_radius: (being.support_radius * growth).least(like(GREATEST_GROWTH * exposure.smallest_radius)),
         }
     }
 
     /// Heating, mixing and radiation, each implicit, so that no step is too long.
     #[inline(always)]
-    fn temperature(&self, being: Being, exposure: &Exposure, seconds: f32) -> f32 {
-        let relax = |value: f32, toward: f32, rate: f32| {
-            let rate = rate * seconds;
-            (value + rate * toward) / (1.0 + rate)
-        };
-        let burning = being.fuel > 0.0;
-        let front = INNER_TEMPERATURE + (1.0 - INNER_TEMPERATURE) * exposure.to_air.sqrt();
-        let mut temperature = being.temperature;
-        if burning {
-            temperature = relax(temperature, self.flame_temperature * front, 1.0 / self.heating_s);
-        } else {
-            temperature = relax(temperature, exposure.air_temperature, BURNT_MIXING * exposure.mixing);
-        }
+    fn temperature<R: Real>(&self, being: Being<R>, exposure: &Exposure<R>, seconds: f32) -> R {
+        let like = |value: f32| being.fuel.like(value);
+        let air = like(exposure.air_temperature);
+        let front = exposure.to_air.root().fused(like(1.0 - INNER_TEMPERATURE), like(INNER_TEMPERATURE));
+        let (flame, heating) = (front * like(self.flame_temperature), like(seconds / self.heating_s));
+        // Burning gas nears the flame's temperature, burnt gas the air's.
+        let toward = being.fuel.choose(like(f32::MIN_POSITIVE), air, flame);
+        let share = being.fuel.choose(like(f32::MIN_POSITIVE), exposure.mixing * like(BURNT_MIXING * seconds), heating);
+        let temperature = relaxed(being.temperature, toward, share);
         // 4 sigma kappa (T^4 - T_air^4) / (rho c_p), as a rate toward the air's temperature.
-        let [square, air_square] = [temperature * temperature, exposure.air_temperature * exposure.air_temperature];
-        let absorption = PLANCK_MEAN_SOOT_ABSORPTION * being.soot * temperature;
-        let rate = self.radiation
-            * 4.0
-            * STEFAN_BOLTZMANN
-            * absorption
-            * (square + air_square)
-            * (temperature + exposure.air_temperature)
-            / (exposure.density * SPECIFIC_HEAT);
-        relax(temperature, exposure.air_temperature, rate)
+        let absorption = being.soot * temperature * like(PLANCK_MEAN_SOOT_ABSORPTION);
+        let fourth = temperature.fused(temperature, air * air) * (temperature + air);
+        let power = absorption * fourth * like(self.radiation * 4.0 * STEFAN_BOLTZMANN * seconds / SPECIFIC_HEAT);
+        relaxed(temperature, air, power / exposure.density)
     }
 
     /// Soot beside the most that forms: none in fresh gas, most where it burns, what is left as smoke in burnt gas.
     #[inline(always)]
-    pub(crate) fn soot_share(&self, fuel: f32) -> f32 {
-        let smooth = |x: f32| {
-            let x = x.clamp(0.0, 1.0);
-            x * x * (3.0 - 2.0 * x)
-        };
-        let formed = smooth((SOOT_FUEL[1] - fuel) / SOOT_FORMING);
-        let unburnt = smooth(fuel / SOOT_FUEL[0]);
-        formed * (self.smoke + (1.0 - self.smoke) * unburnt)
+    pub(crate) fn soot_share<R: Real>(&self, fuel: R) -> R {
+        let like = |value: f32| fuel.like(value);
+        let formed = smooth((like(SOOT_FUEL[1]) - fuel) * like(1.0 / SOOT_FORMING));
+        let unburnt = smooth(fuel * like(1.0 / SOOT_FUEL[0]));
+        formed * unburnt.fused(like(1.0 - self.smoke), like(self.smoke))
     }
+}
+
+/// A value that nears another at such a rate, times the time, found implicitly.
+#[inline(always)]
+fn relaxed<R: Real>(value: R, toward: R, rate: R) -> R {
+    rate.fused(toward, value) / (rate + rate.like(1.0))
+}
+
+/// From 0 to 1, level at both ends.
+#[inline(always)]
+fn smooth<R: Real>(x: R) -> R {
+    let x = x.held();
+    x * x * x.fused(x.like(-2.0), x.like(3.0))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use fearless_simd::prelude::*;
 
-    const BEING: Being = Being { temperature: 1200.0, fuel: 0.6, soot: 0.0, support_radius: 0.02 };
-    const EXPOSURE: Exposure = Exposure {
+    use super::*;
+    use crate::lanes::{LANES, Lanes, plain};
+
+    const BEING: Being<f32> = Being { temperature: 1200.0, fuel: 0.6, soot: 0.0, support_radius: 0.02 };
+    const EXPOSURE: Exposure<f32> = Exposure {
         to_air: 1.0,
         mixing: 5.0,
         burning: 2.0,
@@ -150,7 +155,7 @@ mod tests {
         Laws::from(&LifeParameters::default())
     }
 
-    fn after(mut being: Being, exposure: Exposure, seconds: f32) -> Being {
+    fn after(mut being: Being<f32>, exposure: Exposure<f32>, seconds: f32) -> Being<f32> {
         for _ in 0..1000 {
             being = laws().live(being, &exposure, seconds / 1000.0);
         }
@@ -185,6 +190,33 @@ mod tests {
         let fourth = |kelvin: f64| kelvin * kelvin * kelvin * kelvin;
         let by_hand = 4.0 * 5.670_374e-8 * kappa * (fourth(1500.0) - fourth(293.0)) / (0.25 * 1200.0) * 1e-5;
         assert!((f64::from(1500.0 - cooled.temperature) / by_hand - 1.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn one_particle_and_sixteen_live_alike() {
+        let fuels: [f32; LANES] = std::array::from_fn(|lane| (lane as f32 - 2.0).max(0.0) * 0.07);
+        let together = plain!(simd => {
+            let fuel = Lanes::from_slice(simd, &fuels);
+            let like = |value: f32| Lanes::splat(simd, value);
+            let temperature = fuel.fused(like(1500.0), like(400.0));
+            let being = Being { temperature, fuel, soot: like(1e-6), support_radius: like(0.02) };
+            let exposure = Exposure {
+                to_air: fuel,
+                mixing: like(5.0),
+                burning: like(2.0),
+                density: like(0.25),
+                air_temperature: 293.0,
+                smallest_radius: 0.02,
+            };
+            let Being { temperature, fuel, soot, support_radius } = laws().live(being, &exposure, 0.02);
+            [temperature, fuel, soot, support_radius].map(|values| values.as_slice().to_vec())
+        });
+        for (lane, fuel) in fuels.into_iter().enumerate() {
+            let being = Being { temperature: fuel.fused(1500.0, 400.0), fuel, soot: 1e-6, ..BEING };
+            let alone = laws().live(being, &Exposure { to_air: fuel, ..EXPOSURE }, 0.02);
+            let alone = [alone.temperature, alone.fuel, alone.soot, alone.support_radius];
+            assert_eq!(together.each_ref().map(|values| values[lane]), alone, "with {fuel} of its fuel");
+        }
     }
 
     #[test]

@@ -12,16 +12,21 @@ mod draught;
 pub mod draw;
 mod fault;
 mod flame;
+mod fluid;
 mod life;
+mod living;
+mod moving;
 mod narrowing;
 mod parameters;
 pub mod particles;
 mod puffing;
+mod rows;
 mod simulation;
 mod snapshot;
 #[cfg(test)]
 mod tests;
 mod turbulence;
+mod vector;
 mod weather;
 
 pub use burner::heskestad;

@@ -108,6 +108,8 @@ bansho_base::parameters! {
         viscosity: f64 = 0.12, limits(SHARE);
         /// How far neighbours even out temperature in a hundredth of a second.
         conduction: f64 = 0.08, limits(SHARE);
+        /// Sub-steps that a step is cut into at most. Gas that would need more keeps its time and gives way more easily.
+        sub_steps: i64 = 3, limits(Range::new(1.0, 100.0));
     }
 }
 

@@ -7,6 +7,8 @@ use crate::sph::{Cells, retain};
 
 /// How many arrays of numbers there are.
 pub(crate) const NUMBERS: usize = 21;
+/// Which of them are densities.
+const DENSITY: usize = 14;
 
 /// One particle, for pushing into [`Particles`] and for tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,12 +128,14 @@ impl Particles {
         }
     }
 
-    /// Sorts them into cells; their numbers of birth order those of one cell.
-    pub(crate) fn sort(&mut self, cells: &mut Cells<3>) {
+    /// Sorts them into cells, and what else is known of each; their numbers of birth order those of one cell. Their densities are to be
+    /// found anew.
+    pub(crate) fn sort(&mut self, cells: &mut Cells<3>, more: &mut Vec<f32>) {
         cells.assign(self.positions(), &self.birth);
         cells.reorder(&mut self.birth);
         cells.reorder(&mut self.burner);
-        cells.reorder_all(self.numbers_mut());
+        let arrays = self.numbers_mut().into_iter().enumerate().filter(|(number, _)| *number != DENSITY);
+        cells.reorder_all(arrays.map(|(_, values)| values).chain([more]));
     }
 
     /// Numbers of birth, no two alike.

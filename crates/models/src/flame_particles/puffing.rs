@@ -13,7 +13,7 @@ use bansho_base::{
 
 use fearless_simd::Simd;
 
-use super::{burner::Burner, narrowing::Axis, parameters::FlameParticlesParameters};
+use super::{burner::Burner, narrowing::Axis, parameters::FlameParticlesParameters, vector::dot};
 use crate::lanes::{Lanes, Real, any_positive};
 
 /// Most rings that a burner sheds side by side.
@@ -73,12 +73,6 @@ impl Ring {
             sum[c] = radial[c].fused(outward, axis[c].fused(along, sum[c]));
         }
     }
-}
-
-/// Product of two vectors.
-#[inline(always)]
-fn dot<R: Real>(one: &[R; 3], other: &[R; 3]) -> R {
-    one[0].fused(other[0], one[1].fused(other[1], one[2] * other[2]))
 }
 
 /// The rings of `burner`, number `number`, that are alive at time `t`, along the `axis` of its gas.

@@ -4,7 +4,7 @@ use bansho_base::phenomenon::SnapshotError;
 
 use super::particles::{NUMBERS, Particles};
 
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Bytes of one particle: number of birth, burner, and all numbers.
 const PARTICLE: usize = 8 + 4 + 4 * NUMBERS;
 

@@ -121,7 +121,7 @@ impl<S: Simd> Row<'_, S> {
 
 /// Values at a share of the way from one to the other.
 #[inline(always)]
-fn mixed<R: Real>(one: &[R; 4], other: &[R; 4], share: R) -> [R; 4] {
+pub(crate) fn mixed<R: Real>(one: &[R; 4], other: &[R; 4], share: R) -> [R; 4] {
     let mut mixed = *one;
     for c in 0..4 {
         mixed[c] = share.fused(other[c] - one[c], one[c]);

@@ -1,21 +1,23 @@
-//! All that acts on the gas from outside during a step: wind, eddies, vortex rings, the draw toward the axis.
+//! All that acts on the gas from outside in a step: wind, eddies, vortex rings, the draw toward the axis.
 
 use bansho_base::{
     air::Air,
     gravity::STANDARD_GRAVITY,
     math::{DVec3, Vec3},
+    random::Key,
     surroundings::{Occluder, Surroundings},
 };
 use rayon::prelude::*;
 
 use super::{
     breeze::Breeze,
+    design::Design,
     draught::Draught,
     narrowing::{Axis, axes},
-    parameters::WindForce,
+    parameters::{FlameParticlesParameters, WindForce},
     particles::Particles,
-    puffing::rings,
-    simulation::Simulation,
+    puffing::{Ring, rings},
+    turbulence::{Eddies, Turbulence},
 };
 
 /// Where turbulence has grown to half its strength, as a share of the time that gas takes to the tip.
@@ -34,12 +36,21 @@ const TIME_SHARE: f64 = 0.25;
 /// Particles of a task.
 const PARTICLES_OF_TASK: usize = 8192;
 
-/// What acts on the gas at one moment.
+/// What of a fire stays while it burns.
+#[derive(Clone, Copy)]
+pub(crate) struct Setting<'a> {
+    pub(crate) parameters: &'a FlameParticlesParameters,
+    pub(crate) design: &'a Design,
+    pub(crate) turbulence: &'a Turbulence,
+    pub(crate) key: Key,
+}
+
+/// What acts on the gas in a step.
 pub(crate) struct Weather<'a> {
+    setting: Setting<'a>,
+    around: &'a Surroundings<'a>,
     pub(crate) origin: DVec3,
     pub(crate) occluders: &'a [Occluder],
-    /// The wind over the gas of each burner.
-    pub(crate) breezes: Vec<Breeze>,
     pub(crate) air_temperature: f32,
     /// Gravity against which gas rises, m/s^2.
     pub(crate) buoyancy: f32,
@@ -47,42 +58,67 @@ pub(crate) struct Weather<'a> {
     pub(crate) wind_gain: f32,
     /// Density of air at 1 K, kg K/m^3.
     pub(crate) density_kelvin: f32,
+    /// The air's motion over each burner.
     pub(crate) draughts: Vec<Draught<'a>>,
 }
 
 impl<'a> Weather<'a> {
-    pub(crate) fn new(simulation: &'a Simulation, around: &'a Surroundings, t: f64) -> Self {
-        let Simulation { parameters: flame, design, turbulence, key, particles, .. } = simulation;
-        let Surroundings { wind, air, others, .. } = around;
-        let drift = wind.travel(0.0, t) * (EDDY_DRIFT * flame.motion.wind_gain);
+    /// The weather of a step that begins at `t`.
+    pub(crate) fn new(setting: Setting<'a>, particles: &Particles, around: &'a Surroundings, t: f64) -> Self {
+        let Setting { parameters: flame, design, .. } = setting;
         let axes = axes(&design.burners, particles.positions(), &particles.burner, flame.motion.narrowing, t);
-        let draught = |(number, axis): (usize, Axis)| {
-            let burner = &design.burners[number];
-            let size = flame.motion.eddy_size * burner.diameter;
-            let speed = burner.axis_speed(0.5 * burner.height);
-            Draught {
-                rings: rings(burner, flame, *key, number as u32, t, &axis),
-                axis,
-                eddies: turbulence.at(t, size, speed, drift),
-                turbulence: flame.motion.turbulence as f32,
-                turbulent_age: TURBULENT_AGE * burner.rise_time() as f32,
-                entrainment: (flame.motion.entrainment / (0.5 * burner.diameter)) as f32,
-                drag: (CROSS_DRAG * flame.motion.wind_gain / (0.5 * burner.diameter)) as f32,
-                burning: [(WAY_SHARE / burner.height) as f32, (TIME_SHARE / burner.rise_time()) as f32],
-            }
-        };
-        let breeze = |box_around| Breeze::new(wind, particles.origin, box_around, t);
+        let bounds = bounds(particles, design.burners.len());
+        let draughts = axes.into_iter().zip(bounds).enumerate().map(|(number, (axis, bounds))| {
+            let breeze = Breeze::new(around.wind, particles.origin, bounds, t);
+            setting.draught(number, axis, breeze, around, t)
+        });
         Self {
+            draughts: draughts.collect(),
+            setting,
+            around,
             origin: particles.origin,
-            occluders: &others.occluders,
-            breezes: bounds(particles, design.burners.len()).into_iter().map(breeze).collect(),
-            air_temperature: air.temperature_k as f32,
+            occluders: &around.others.occluders,
+            air_temperature: around.air.temperature_k as f32,
             buoyancy: (STANDARD_GRAVITY * flame.motion.buoyancy) as f32,
             wind: flame.motion.wind,
             wind_gain: flame.motion.wind_gain as f32,
-            density_kelvin: density_kelvin(air),
-            draughts: axes.into_iter().enumerate().map(draught).collect(),
+            density_kelvin: density_kelvin(around.air),
         }
+    }
+
+    /// Lets rings and eddies go on to the moment `t`; axes and wind stay for the step.
+    pub(crate) fn pass(&mut self, t: f64) {
+        for (number, draught) in self.draughts.iter_mut().enumerate() {
+            draught.rings = self.setting.rings(number, &draught.axis, t);
+            draught.eddies = self.setting.eddies(number, self.around, t);
+        }
+    }
+}
+
+impl<'a> Setting<'a> {
+    fn draught(self, number: usize, axis: Axis, breeze: Breeze, around: &Surroundings, t: f64) -> Draught<'a> {
+        let (burner, motion) = (&self.design.burners[number], &self.parameters.motion);
+        Draught {
+            breeze,
+            rings: self.rings(number, &axis, t),
+            axis,
+            eddies: self.eddies(number, around, t),
+            turbulence: motion.turbulence as f32,
+            turbulent_age: TURBULENT_AGE * burner.rise_time() as f32,
+            entrainment: (motion.entrainment / (0.5 * burner.diameter)) as f32,
+            drag: (CROSS_DRAG * motion.wind_gain / (0.5 * burner.diameter)) as f32,
+            burning: [(WAY_SHARE / burner.height) as f32, (TIME_SHARE / burner.rise_time()) as f32],
+        }
+    }
+
+    fn rings(self, number: usize, axis: &Axis, t: f64) -> Vec<Ring> {
+        rings(&self.design.burners[number], self.parameters, self.key, number as u32, t, axis)
+    }
+
+    fn eddies(self, number: usize, around: &Surroundings, t: f64) -> Eddies<'a> {
+        let (burner, motion) = (&self.design.burners[number], &self.parameters.motion);
+        let drift = around.wind.travel(0.0, t) * (EDDY_DRIFT * motion.wind_gain);
+        self.turbulence.at(t, motion.eddy_size * burner.diameter, burner.axis_speed(0.5 * burner.height), drift)
     }
 }
 
@@ -124,10 +160,12 @@ mod tests {
         wind::{Wind, WindParameters},
     };
 
+    use fearless_simd::prelude::*;
+
     use super::*;
-    use crate::flame_particles::{
-        design::Design,
-        parameters::{BurnerParameters, FlameParticlesParameters},
+    use crate::{
+        flame_particles::{parameters::BurnerParameters, simulation::Simulation},
+        lanes::{Lanes, plain},
     };
 
     #[test]
@@ -144,14 +182,22 @@ mod tests {
         let (wind, air) = (Wind::new(gusty, 3, None), Air::default());
         let around = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
         (0..30).for_each(|step| simulation.step(f64::from(step) * simulation.step_s(), &around));
-        let weather = Weather::new(&simulation, &around, 0.25);
+        let Simulation { parameters, design, turbulence, key, .. } = &simulation;
+        let setting = Setting { parameters, design, turbulence, key: *key };
+        let weather = Weather::new(setting, &simulation.particles, &around, 0.25);
+        let at = |burner: usize, place: Vec3| {
+            plain!(simd => {
+                let lanes = place.to_array().map(|x| Lanes::splat(simd, x));
+                Vec3::from(weather.draughts[burner].breeze.at(simd, &lanes).map(|values| values.as_slice()[0]))
+            })
+        };
         let (particles, mut off, mut apart) = (&simulation.particles, 0.0_f32, 0.0_f32);
         for index in 0..particles.len() {
             let place = Vec3::from(particles.positions().map(|values| values[index]));
             let exact = wind.at(place.as_dvec3(), 0.25).as_vec3();
-            let [own, other] = [0, 1].map(|swap| &weather.breezes[particles.burner[index] as usize ^ swap]);
-            off = off.max((own.at(place) - exact).length());
-            apart = apart.max((other.at(place) - exact).length());
+            let [own, other] = [0, 1].map(|swap| at(particles.burner[index] as usize ^ swap, place));
+            off = off.max((own - exact).length());
+            apart = apart.max((other - exact).length());
         }
         assert!(off < 0.4 && apart > 4.0, "{off} m/s off the wind, that of the other burner {apart}");
     }

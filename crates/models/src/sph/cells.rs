@@ -23,6 +23,8 @@ const LONGEST_GROUP: u64 = 8 * ALONG as u64;
 pub(super) const BEYOND: f32 = 1e12;
 /// Particles that one task takes at least.
 pub(super) const AT_ONCE: usize = 4096;
+/// Cells looked at together when a search moves on: how far it goes is hard to foresee, for the processor too.
+const AHEAD: usize = 4;
 /// Most bits sorted by in one pass.
 const DIGIT_BITS: u32 = 11;
 
@@ -54,7 +56,7 @@ struct Sorting<const D: usize> {
     spares: Vec<Vec<f32>>,
 }
 
-/// A cell that holds particles: its key and its first particle. The last of the list is a sentinel behind all.
+/// A cell that holds particles: its key and its first particle. The last [`AHEAD`] of the list are sentinels behind all.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
     key: u64,
@@ -220,7 +222,7 @@ impl<const D: usize> Cells<D> {
             self.occupied.push(Cell { key: cell[0].0, start });
             start += cell.len() as u32;
         }
-        self.occupied.push(Cell { key: u64::MAX, start });
+        self.occupied.resize(self.occupied.len() + AHEAD, Cell { key: u64::MAX, start });
     }
 
     /// Parts every row of cells into particles for groups.
@@ -321,17 +323,25 @@ impl Runs<'_> {
     pub(super) fn around(&mut self, part: &RowPart) -> &[Range<usize>] {
         for (run, (row, start, end)) in self.runs.iter_mut().zip(&mut self.rows) {
             let (lowest, highest) = (part.lowest(*row), part.highest(*row));
-            while self.occupied[*start].key < lowest {
-                *start += 1;
-            }
-            *end = (*end).max(*start);
-            while self.occupied[*end].key <= highest {
-                *end += 1;
-            }
+            *start = first_from(self.occupied, *start, lowest);
+            *end = first_from(self.occupied, (*end).max(*start), highest + 1);
             *run = self.occupied[*start].start as usize..self.occupied[*end].start as usize;
         }
         &self.runs
     }
+}
+
+/// The first cell from `start` on whose key is not below `key`.
+#[inline(always)]
+fn first_from(cells: &[Cell], mut start: usize, key: u64) -> usize {
+    while let Some(ahead) = cells.get(start..start + AHEAD) {
+        let below = ahead.iter().map(|cell| usize::from(cell.key < key)).sum::<usize>();
+        start += below;
+        if below < AHEAD {
+            break;
+        }
+    }
+    start
 }
 
 /// The cells of coordinates, `scale` cells a unit. No `floor`: where the processor lacks it that is a call.

@@ -74,5 +74,5 @@ fn a_damaged_state_is_refused() {
     assert_eq!(read(&[], 1), Some(SnapshotError::Damaged));
     let mut newer = good;
     newer[0] = 99;
-    assert_eq!(read(&newer, 1), Some(SnapshotError::Version { found: 99, known: 1 }));
+    assert_eq!(read(&newer, 1), Some(SnapshotError::Version { found: 99, known: 2 }));
 }

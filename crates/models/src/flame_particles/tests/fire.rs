@@ -123,6 +123,19 @@ fn gas_is_born_where_a_moving_burner_is_and_stays_behind_it() {
     assert!(low.x < -2.0 && high.x > 2.0, "there is room at both ends of its way");
 }
 
+#[test]
+fn gas_stands_on_its_burner_after_a_step_of_any_length() {
+    for step_s in [1.0 / 120.0, 1.0 / 30.0] {
+        let mut simulation = simulation(&FlameParticlesParameters { step_s, ..fire(60.0, 0.3) });
+        World::default().run_steps(&mut simulation, -20, 0, |_, _| {});
+        let particles = &simulation.particles;
+        let youngest = particles.age.iter().copied().fold(f32::INFINITY, f32::min);
+        let lowest = (0..particles.len()).map(|index| place(&simulation, index).y).fold(f32::INFINITY, f32::min);
+        let step = step_s as f32;
+        assert!(youngest < 0.1 * step && lowest < 0.1 * step, "{youngest} s old, {lowest} m high, steps of {step} s");
+    }
+}
+
 /// Light that gas of a kind sends, and that times its height.
 fn light_by_height(simulation: &Simulation, of: impl Fn(&Gas, usize) -> f64) -> [f64; 2] {
     let memory = Memory::default();

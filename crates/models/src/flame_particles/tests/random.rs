@@ -1,9 +1,12 @@
 //! Whatever valid parameters say, gas stays finite, bounded in speed and in number.
 
-use bansho_base::parameters::{Parameters, Reader, sample};
+use bansho_base::{
+    gravity::STANDARD_GRAVITY,
+    parameters::{Parameters, Reader, sample},
+};
 
 use super::*;
-use crate::flame_particles::simulation::GREATEST_SPEED;
+use crate::flame_particles::{life::INNER_TEMPERATURE, moving::GREATEST_SPEED};
 
 /// How many parameter sets: [`FEW`], or what `BANSHO_RANDOM_FLAMES` says.
 fn count() -> u64 {
@@ -44,9 +47,10 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
     let births = particles.births().iter().collect::<std::collections::BTreeSet<_>>().len();
     assert_eq!(births, particles.len(), "seed {seed}: one birth, two particles");
     let [low, high] = design.domain.map(|corner| corner.as_vec3());
-    // Gas is never colder than air or itself at birth, nor hotter than itself at birth or its flame.
+    // Gas is never colder than air, itself at birth or the inside of its flame, nor hotter than itself at birth or its flame.
     let born = design.burners.iter().map(|burner| burner.parameters.temperature_k);
-    let (mut coldest, mut hottest) = (Air::default().temperature_k, parameters.life.flame_temperature_k);
+    let flame = parameters.life.flame_temperature_k;
+    let (mut coldest, mut hottest) = (Air::default().temperature_k.min(f64::from(INNER_TEMPERATURE) * flame), flame);
     for kelvin in born {
         (coldest, hottest) = (coldest.min(kelvin), hottest.max(kelvin));
     }
@@ -72,7 +76,20 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
     let motion = &parameters.motion;
     let corner = |corner: [f64; 3]| corner.map(f64::abs).into_iter().fold(0.0, f64::max);
     let blown = wind.velocity.bounds().map(corner).into_iter().fold(0.0, f64::max) * (1.0 + wind.gust);
-    (rise * (1.0 + motion.turbulence + motion.puffing) + blown * motion.wind_gain) as f32
+    let carried = rise * (1.0 + motion.turbulence + motion.puffing) + blown * motion.wind_gain;
+    carried.max(buoyant_speed(simulation, parameters)) as f32
+}
+
+/// The speed of gas that buoyancy alone drives for as long as it may live, or through the whole domain: flames may be far hotter than
+/// those of their height are.
+fn buoyant_speed(simulation: &Simulation, parameters: &FlameParticlesParameters) -> f64 {
+    let design = &simulation.design;
+    let born = design.burners.iter().map(|burner| burner.parameters.temperature_k);
+    let hottest = born.fold(parameters.life.flame_temperature_k, f64::max);
+    let rise = STANDARD_GRAVITY * parameters.motion.buoyancy * (hottest / Air::default().temperature_k - 1.0).max(0.0);
+    let lives = (0..design.burners.len()).map(|index| design.longest_life(index, parameters.life.afterlife_s));
+    let height = (design.domain[1] - design.domain[0]).y;
+    (rise * lives.fold(0.0, f64::max)).min((2.0 * rise * height).sqrt())
 }
 
 /// Speed of the fastest particle, m/s.

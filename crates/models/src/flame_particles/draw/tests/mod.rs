@@ -345,7 +345,7 @@ fn the_plate_hides_what_is_behind_it() {
 
 #[test]
 fn aovs_measure_temperature_depth_and_motion() {
-    let view = view(camera());
+    let view = View { measured: true, ..view(camera()) };
     let moving = Particle { velocity: [2.0, 1.0, 0.0], ..ball(0, [0.0; 3], 1640.0, 1e-7) };
     let strip = drawn(&cloud([moving]), &smooth(), &view, AOVS.len(), None);
     let at = |name: &str| aov(&strip, name, 80, 60);
@@ -381,7 +381,7 @@ fn temperature_is_weighted_by_light_and_stays_among_those_that_are_there() {
 
 #[test]
 fn deflection_is_written_as_light_is_bent() {
-    let view = view(camera());
+    let view = View { measured: true, ..view(camera()) };
     let particles = glowing_cloud(200);
     let strip = drawn(&particles, &smooth(), &view, AOVS.len(), None);
     let angles = prepared(&particles, &smooth(), &view, |prepared| {

@@ -1,0 +1,168 @@
+//! What a step makes of gas beside moving it: it evens out with its neighbours, mixes with air, burns and cools; sixteen particles at a time.
+
+use fearless_simd::{Level, Simd, dispatch};
+use rayon::prelude::*;
+
+use super::{
+    beside::Beside,
+    draught::Draught,
+    life::{Being, Exposure, Laws},
+    particles::Particles,
+    rows::{ByBurner, PARTICLES_OF_TASK, Rows, columns},
+    vector::{length, plus},
+    weather::Weather,
+};
+use crate::{
+    lanes::{LANES, Real},
+    sph::KernelShape,
+};
+
+/// Time in which `viscosity` and `conduction` say how far neighbours even out, s.
+const EVENING_TIME: f32 = 0.01;
+/// Share of the difference to the neighbours that a step evens out at most: a particle among thinner gas has more than its share of them,
+/// and shall not come out beyond them all.
+const MOST_EVENED: f32 = 0.5;
+/// Mean distance of the neighbours from a particle on a flat surface of the gas, in support radii.
+const SURFACE_OFFSET: f32 = 0.2;
+/// Share of its own in a particle's density: from there on it counts as alone, fully after as much more.
+const ALONE_SHARE: [f32; 2] = [0.2, 0.5];
+
+/// What acts on the gas for `seconds`.
+pub(crate) struct Living<'a> {
+    pub(crate) laws: &'a Laws,
+    pub(crate) weather: &'a Weather<'a>,
+    pub(crate) beside: &'a Beside,
+    /// How far neighbours even out velocity and temperature in [`EVENING_TIME`].
+    pub(crate) evening: [f32; 2],
+    /// How long burnt gas stays, s.
+    pub(crate) afterlife: f32,
+    /// Support radius d, m.
+    pub(crate) radius: f32,
+    pub(crate) seconds: f32,
+}
+
+/// What a task reads of its particles and does not change.
+#[derive(Clone, Copy)]
+struct Still<'a> {
+    burner: &'a [u32],
+    position: [&'a [f32]; 3],
+    age: &'a [f32],
+    hunger: &'a [f32],
+    density: &'a [f32],
+    /// The particle's own weight among its neighbours', and the sums over all.
+    weight: &'a [f32],
+    sums: [&'a [f32]; 8],
+}
+
+impl Living<'_> {
+    /// Lets the particles live, and writes down how much of each lies at the edge of the gas.
+    pub(crate) fn pass(&self, particles: &mut Particles, to_air: &mut Vec<f32>) {
+        to_air.resize(particles.len(), 0.0);
+        let Particles { velocity: [u, v, w], temperature, fuel, soot, support_radius, life, .. } = particles;
+        let living = columns([u, v, w, temperature, fuel, soot, support_radius, life, to_air]);
+        let (position, age, hunger) = (&particles.position, &particles.age, &particles.hunger);
+        let (density, burner) = (&particles.density, &particles.burner);
+        let level = Level::new();
+        living.into_par_iter().enumerate().for_each(|(task, mut living)| {
+            let first = task * PARTICLES_OF_TASK;
+            let range = first..first + living[0].len();
+            let still = Still {
+                burner: &burner[range.clone()],
+                position: position.each_ref().map(|values| &values[range.clone()]),
+                age: &age[range.clone()],
+                hunger: &hunger[range.clone()],
+                density: &density[range.clone()],
+                weight: &self.beside.weights[range.clone()],
+                sums: self.beside.sums.each_ref().map(|values| &values[range.clone()]),
+            };
+            let sorted = ByBurner::new(still.burner, self.weather.draughts.len());
+            dispatch!(level, simd => self.pass_task(simd, &sorted, still, &mut living));
+        });
+    }
+
+    /// Lets the particles of a task live, burner by burner.
+    #[inline(always)]
+    fn pass_task<S: Simd>(&self, simd: S, sorted: &ByBurner, still: Still, living: &mut [&mut [f32]; 9]) {
+        for (number, draught) in self.weather.draughts.iter().enumerate() {
+            for rows in sorted.of(number).chunks(LANES) {
+                self.pass_rows(simd, draught, Rows(rows), still, living);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn pass_rows<S: Simd>(
+        &self,
+        simd: S,
+        draught: &Draught,
+        rows: Rows,
+        still: Still,
+        [u, v, w, temperature, fuel, soot, support_radius, life, edge]: &mut [&mut [f32]; 9],
+    ) {
+        let sums = rows.load_all(simd, still.sums);
+        let to_air = self.to_air(rows.load(simd, still.weight), &sums);
+        let velocity = rows.load_all(simd, [u, v, w]);
+        let wind = draught.breeze.at(simd, &rows.load_all(simd, still.position));
+        let [viscosity, conduction] = self.evened(rows.load(simd, still.density));
+        let old = Being {
+            temperature: conduction.fused(sums[4], rows.load(simd, temperature)),
+            fuel: rows.load(simd, fuel),
+            soot: rows.load(simd, soot),
+            support_radius: rows.load(simd, support_radius),
+        };
+        let mixing = draught.mixing(&velocity, &wind, to_air);
+        let burning = rows.load(simd, still.hunger) * self.burning(draught, length(&velocity));
+        let being = self.laws.live(old, &self.exposure(to_air, mixing, burning, old.temperature), self.seconds);
+        let [age, end] = rows.load_all(simd, [still.age, life]);
+        rows.store(self.end(&old, &being, age, end), life);
+        rows.store(being.temperature, temperature);
+        rows.store(being.fuel, fuel);
+        rows.store(being.soot, soot);
+        rows.store(being.support_radius, support_radius);
+        rows.store(to_air, edge);
+        let velocity = plus(&velocity, &[sums[1], sums[2], sums[3]], viscosity);
+        for (batch, array) in velocity.into_iter().zip([u, v, w]) {
+            rows.store(batch, array);
+        }
+    }
+
+    /// How much of a particle lies at the edge of the gas: neighbours all on one side, or none.
+    #[inline(always)]
+    fn to_air<R: Real>(&self, weight: R, sums: &[R; 8]) -> R {
+        let like = |value: f32| weight.like(value);
+        let one_over_sum = like(1.0) / sums[0].greatest(like(f32::MIN_POSITIVE));
+        let offset = length(&[sums[5], sums[6], sums[7]]) * one_over_sum * like(1.0 / (self.radius * SURFACE_OFFSET));
+        let own = weight * one_over_sum * like(KernelShape::Poly6.at_centre::<3>(self.radius));
+        let alone = (own - like(ALONE_SHARE[0])) * like(1.0 / ALONE_SHARE[1]);
+        offset.greatest(alone).held()
+    }
+
+    /// What of the difference to the neighbours is evened out in velocity and temperature.
+    #[inline(always)]
+    fn evened<R: Real>(&self, density: R) -> [R; 2] {
+        let share = |evening: f32| (evening * self.seconds / EVENING_TIME).min(MOST_EVENED);
+        let per_weight = density.inverse_root();
+        [per_weight * density.like(share(self.evening[0])), per_weight * density.like(share(self.evening[1]))]
+    }
+
+    /// Share of a mean particle's fuel that burns at a speed, 1/s.
+    #[inline(always)]
+    fn burning<R: Real>(&self, draught: &Draught, speed: R) -> R {
+        speed.fused(speed.like(draught.burning[0]), speed.like(draught.burning[1]))
+    }
+
+    #[inline(always)]
+    fn exposure<R: Real>(&self, to_air: R, mixing: R, burning: R, temperature: R) -> Exposure<R> {
+        let density = to_air.like(self.weather.density_kelvin) / temperature.greatest(to_air.like(1.0));
+        let air_temperature = self.weather.air_temperature;
+        Exposure { to_air, mixing, burning, density, air_temperature, smallest_radius: self.radius }
+    }
+
+    /// Age at which a particle is removed: that which it had, or where it has just burnt out after its afterlife.
+    #[inline(always)]
+    fn end<R: Real>(&self, old: &Being<R>, new: &Being<R>, age: R, end: R) -> R {
+        let none = age.like(f32::MIN_POSITIVE);
+        let burnt_out = old.fuel.choose(none, end, age + age.like(self.afterlife));
+        new.fuel.choose(none, burnt_out, end)
+    }
+}
