@@ -222,6 +222,12 @@ impl Camera {
         Some(self.orientation * local)
     }
 
+    /// Angle from the axis as far as a fisheye lens sees, radians.
+    #[must_use]
+    pub fn half_angle(&self) -> f64 {
+        self.half_angle
+    }
+
     /// What EXR headers say of it.
     pub fn header(&self) -> CameraHeader {
         let rotation = self.orientation.transpose();

@@ -2,12 +2,12 @@
 
 use bansho_base::{
     camera::{Camera, Lens},
-    math::{DVec2, Fused},
+    math::{DVec2, Fused, lanes},
 };
 
 use crate::lanes::LANES;
 
-/// Angle, in radians, over which a row of a dome or panorama is taken for straight: its chord lies within an eighth of a pixel of it.
+/// Angle, in radians, over which a row of a panorama is taken for straight: its chord lies within an eighth of a pixel of it.
 const MOST_STRAIGHT: f64 = 0.1;
 
 /// What a row of sixteen pixels looks at.
@@ -22,6 +22,9 @@ impl Directions {
     /// Pixels from `x` on in row `y`.
     #[inline(always)]
     pub(crate) fn new(camera: &Camera, x: usize, y: usize) -> Self {
+        if camera.lens == Lens::Fisheye {
+            return Self::of_dome(camera, x, y);
+        }
         let at = |x: usize| camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
         let (mut axes, mut seen) = ([[0.0; LANES], [1.0; LANES], [0.0; LANES]], [true; LANES]);
         let is_straight = camera.lens == Lens::Perspective || LANES as f64 / camera.focal_pixels < MOST_STRAIGHT;
@@ -43,6 +46,36 @@ impl Directions {
                 for (axis, part) in direction.as_vec3().to_array().into_iter().enumerate() {
                     axes[axis][i] = part;
                 }
+            }
+        }
+        Self { axes, seen }
+    }
+
+    /// Those of a fisheye lens, each by itself: in single precision that is a thousandth of a pixel.
+    #[inline(always)]
+    fn of_dome(camera: &Camera, x: usize, y: usize) -> Self {
+        const TURNS: f32 = (1.0 / std::f64::consts::TAU) as f32;
+        let per_pixel = 1.0 / camera.focal_pixels;
+        let first = ((x as f64 + 0.5 - camera.centre.x) * per_pixel) as f32;
+        let up = ((camera.centre.y - y as f64 - 0.5) * per_pixel) as f32;
+        let [right, upward, back] = [camera.orientation.x_axis, camera.orientation.y_axis, camera.orientation.z_axis]
+            .map(|axis| axis.as_vec3().to_array());
+        let (step, most) = (per_pixel as f32, camera.half_angle() as f32);
+        let (mut axes, mut seen) = ([[0.0; LANES]; 3], [true; LANES]);
+        let (mut across, mut cosines) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            let side = step.fused(i as f32, first);
+            let angle = side.fused(side, up * up).sqrt();
+            let turns = angle * TURNS;
+            across[i] = if angle > 1e-6 { lanes::sin_turns(turns) / angle } else { 1.0 };
+            cosines[i] = lanes::cos_turns(turns);
+            seen[i] = angle <= most;
+        }
+        for axis in 0..3 {
+            for i in 0..LANES {
+                let side = step.fused(i as f32, first);
+                let level = side.fused(right[axis], up * upward[axis]);
+                axes[axis][i] = across[i].fused(level, -(cosines[i] * back[axis]));
             }
         }
         Self { axes, seen }

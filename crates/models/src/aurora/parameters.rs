@@ -209,6 +209,9 @@ bansho_base::parameters! {
         dip_deg: f64 = 77.0, limits(Range::new(-90.0, 90.0)), unit("degrees");
         /// Direction of magnetic north, east of true north.
         declination_deg: f64 = 0.0, limits(Range::new(-180.0, 180.0)), unit("degrees");
+        /// How many seconds of the aurora pass in one of the picture: so much sooner does light that lingers fade. At 1 the green light of a sheet
+        /// that crosses the sky in seconds stays behind, and its front is purple; most films of auroras are quickened, and theirs is green.
+        time_lapse: f64 = 1.0, limits(Range::new(0.01, 1e4));
         /// Time that it runs before the shot.
         preroll_s: f64 = 1.5, limits(Range::new(0.0, 60.0)), unit("s");
         /// The shapes that it takes one after the other; a moving band and an arc where the list is empty.

@@ -16,6 +16,22 @@ use super::{
 /// Cells of the green map along a cell of the field; the green is sharp.
 const GREEN_FINENESS: f64 = 8.0;
 
+/// What the maps of both slow emitters keep in a step.
+#[derive(Clone, Debug)]
+pub(crate) struct Fading {
+    green: Keeping,
+    red: Keeping,
+}
+
+impl Fading {
+    /// In steps of so many seconds of the aurora. `emission` says how long light of electrons of an energy lives.
+    pub(crate) fn new(emission: &Emission, seconds: f64) -> Self {
+        let keeping =
+            |emitter: Emitter| Keeping::new(seconds, |energy_ev| emission.column(energy_ev).lifetime[emitter.index()]);
+        Self { green: keeping(Emitter::OxygenGreen), red: keeping(Emitter::OxygenRed) }
+    }
+}
+
 /// The maps of both slow emitters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Afterglow {
@@ -32,14 +48,9 @@ impl Afterglow {
         Self { green: GlowMap::new(extent_km, cell_km / GREEN_FINENESS), red: GlowMap::new(extent_km, cell_km) }
     }
 
-    /// Lets `seconds` pass while `particles` feed both maps. `emission` says how long light of electrons of an energy lives.
-    pub(crate) fn step(&mut self, particles: &AuroraParticles, emission: &Emission, seconds: f64) {
-        let keeping =
-            |emitter: Emitter| Keeping::new(seconds, |energy_ev| emission.column(energy_ev).lifetime[emitter.index()]);
-        rayon::join(
-            || self.green.step(particles, &keeping(Emitter::OxygenGreen)),
-            || self.red.step(particles, &keeping(Emitter::OxygenRed)),
-        );
+    /// Lets a step pass while `particles` feed both maps.
+    pub(crate) fn step(&mut self, particles: &AuroraParticles, fading: &Fading) {
+        rayon::join(|| self.green.step(particles, &fading.green), || self.red.step(particles, &fading.red));
     }
 
     /// Fills the maps as if `particles` had been as they are for long.

@@ -42,43 +42,52 @@ impl<'a> LineOfFall<'a> {
     /// Rows of points at altitudes in km, so far from the line in km, and how bright they are seen.
     #[inline(always)]
     pub(super) fn points<S: Simd>(&self, altitudes_km: &[f32; LANES], offsets: Lanes<S>) -> [Lanes<S>; 2] {
-        let (simd, mut rows, mut shown) = (offsets.simd, [0.0; LANES], [0.0; LANES]);
-        for lane in 0..LANES {
-            let Seen { row, light, .. } = self.seen(altitudes_km[lane], self.distance + offsets[lane]);
-            (rows[lane], shown[lane]) = (row, light);
+        let mut distances: [f32; LANES] = offsets.into();
+        for distance in &mut distances {
+            *distance += self.distance;
         }
-        [Lanes::from_slice(simd, &rows), Lanes::from_slice(simd, &shown)]
+        let Seen { rows, lights, .. } = self.seen(altitudes_km, &distances);
+        [Lanes::from_slice(offsets.simd, &rows), Lanes::from_slice(offsets.simd, &lights)]
     }
 
-    /// A point of the meridian at an altitude and a distance, km.
+    /// Points of the meridian at altitudes and distances, km. One step a loop: each of them becomes vector code.
     #[inline(always)]
-    fn seen(&self, altitude: f32, distance: f32) -> Seen {
+    fn seen<const COUNT: usize>(&self, altitudes: &[f32; COUNT], distances: &[f32; COUNT]) -> Seen<COUNT> {
         const RADIUS: f32 = EARTH_RADIUS_KM as f32;
         const DIAMETER: f32 = 2.0 * RADIUS;
-        let [constant, outward, own] = *self.meridian;
-        let squared = altitude.fused(DIAMETER + altitude, -distance.fused(2.0 * outward + distance, constant));
-        let squared = own.fused(own, squared);
-        let upward = if squared > 1.0 { squared } else { 1.0 }.sqrt();
-        let place = upward - own;
-        let far_squared = distance.fused(distance, place * place);
-        let far = far_squared.sqrt();
-        // A source's power is that across the field; a collision stands for all of it, so the cosine to the vertical is
-        // taken out again.
-        let slant = (RADIUS + altitude) / (upward * far);
-        Seen {
-            row: self.finder.row(lanes::atan2(distance, place)) - 0.5,
-            slope: self.finder.rows(distance.fused((outward + distance) / upward, place) / far_squared),
-            light: if distance > 0.0 && far > 1.0 { slant } else { 0.0 },
+        let ([constant, outward, own], finder) = (*self.meridian, *self.finder);
+        let (mut upward, mut places, mut far_squared) = ([0.0; COUNT], [0.0; COUNT], [0.0; COUNT]);
+        for i in 0..COUNT {
+            let (altitude, distance) = (altitudes[i], distances[i]);
+            let squared = altitude.fused(DIAMETER + altitude, -distance.fused(2.0 * outward + distance, constant));
+            let squared = own.fused(own, squared);
+            upward[i] = if squared > 1.0 { squared } else { 1.0 }.sqrt();
+            places[i] = upward[i] - own;
+            far_squared[i] = distance.fused(distance, places[i] * places[i]);
         }
+        let mut seen = Seen { rows: [0.0; COUNT], slopes: [0.0; COUNT], lights: [0.0; COUNT] };
+        for i in 0..COUNT {
+            seen.rows[i] = finder.row(lanes::atan2(distances[i], places[i])) - 0.5;
+        }
+        for i in 0..COUNT {
+            let (distance, far) = (distances[i], far_squared[i].sqrt());
+            let slope = distance.fused((outward + distance) / upward[i], places[i]) / far_squared[i];
+            seen.slopes[i] = finder.rows(slope);
+            // A source's power is that across the field; a collision stands for all of it, so the cosine to the vertical is
+            // taken out again.
+            let slant = (RADIUS + altitudes[i]) / (upward[i] * far);
+            seen.lights[i] = if distance > 0.0 && far > 1.0 { slant } else { 0.0 };
+        }
+        seen
     }
 }
 
-/// How a point is seen.
-struct Seen {
-    row: f32,
+/// How points are seen.
+struct Seen<const COUNT: usize> {
+    rows: [f32; COUNT],
     /// Rows for each km of distance.
-    slope: f32,
-    light: f32,
+    slopes: [f32; COUNT],
+    lights: [f32; COUNT],
 }
 
 /// From nodes to polynomials.
@@ -118,11 +127,7 @@ impl Descents {
     /// How the points of a line are seen.
     #[inline(always)]
     pub(super) fn along<S: Simd>(&self, simd: S, line: &LineOfFall) -> Descent {
-        let (mut rows, mut slopes, mut lights) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
-        for node in 0..NODES {
-            let seen = line.seen(self.altitudes_km[node], line.distance);
-            (rows[node], slopes[node], lights[node]) = (seen.row, seen.slope, seen.light);
-        }
+        let Seen { rows, slopes, lights } = line.seen(&self.altitudes_km, &[line.distance; NODES]);
         let mut steepest = 0.0_f32;
         for slope in slopes {
             steepest = if slope.abs() > steepest { slope.abs() } else { steepest };

@@ -233,6 +233,9 @@ mod tests {
         assert!(edge[0] > 1.3 && edge[0] > 1.6 * body[0], "red {} and {}", edge[0], body[0]);
         assert!(edge[1] > 0.7 && edge[1] > 1.6 * body[1], "blue {} and {}", edge[1], body[1]);
         assert!(body[0] < 1.0 && body[1] < 0.6, "the body is green: {body:?}");
+        // Where there is still enough of it to be seen: 4 to 6 km below the peak.
+        let seen = beside_green(20_000.0, 92.0);
+        assert!(seen[0] > 1.1 && seen[1] > 0.8, "pink: {seen:?}");
     }
 
     #[test]

@@ -16,6 +16,8 @@ use crate::aurora::{
 const PIECES_PER_FOLD: f64 = 12.0;
 /// Pieces are not shorter than L_thr over this.
 const PIECES_PER_THICKNESS: f64 = 4.0;
+/// Points nearer than so many pieces may have changed places.
+const NEAR_PIECES: f64 = 2.0;
 /// About as many pieces as all sheets together have at most.
 const MOST_PIECES: f64 = 20_000.0;
 /// Gradient noise seldom leaves half of its bounds: this makes its swings those that are asked for.
@@ -227,7 +229,8 @@ fn length_shares(points: &[DVec2]) -> Vec<f64> {
 
 /// A smooth line through a sheet's points in pieces of about that length, and the coordinate along it at each of its points.
 fn refine(sheet: &Sheet, piece_km: f64, along: impl Fn(usize, f64) -> f64) -> (Sheet, Vec<f64>) {
-    let headings = headings(&sheet.points);
+    let points = in_order(&sheet.points, NEAR_PIECES * piece_km);
+    let headings = headings(&points);
     let (mut fine, mut coordinates) = (Sheet::default(), Vec::new());
     let mut push = |point: DVec2, index: usize, part: f64| {
         fine.points.push(point);
@@ -235,17 +238,18 @@ fn refine(sheet: &Sheet, piece_km: f64, along: impl Fn(usize, f64) -> f64) -> (S
         fine.energy.push(lerp(sheet.energy[index], sheet.energy[index + 1], part));
         coordinates.push(along(index, part));
     };
-    for (index, pair) in sheet.points.windows(2).enumerate() {
-        let length = pair[0].distance(pair[1]);
-        let tangents = [headings[index] * length, headings[index + 1] * length];
+    for (index, pair) in points.windows(2).enumerate() {
+        let way = pair[1] - pair[0];
+        let length = way.length();
+        let tangents = [headings[index], headings[index + 1]].map(|heading| not_back(heading, way) * length);
         let pieces = (length / piece_km).ceil().max(1.0) as usize;
         for number in 0..pieces {
             let part = number as f64 / pieces as f64;
             push(hermite([pair[0], pair[1]], tangents, part), index, part);
         }
     }
-    if let Some(last) = sheet.points.len().checked_sub(2) {
-        push(sheet.points[last + 1], last, 1.0);
+    if let Some(last) = points.len().checked_sub(2) {
+        push(points[last + 1], last, 1.0);
     }
     (fine, coordinates)
 }
@@ -269,6 +273,20 @@ fn span(bridge: &Bridge, fine: &Shape, alongs: &[Vec<f64>], piece_km: f64) -> (S
     (sheet, coordinates)
 }
 
+/// The points in the order in which the sheet passes them: two nearer than `near_km` that lie the wrong way round between their neighbours, as
+/// where a fold is born, change places. Else the sheet would pass there three times, as bright.
+fn in_order(points: &[DVec2], near_km: f64) -> Vec<DVec2> {
+    let mut points = points.to_vec();
+    for index in 1..points.len().saturating_sub(2) {
+        let [before, one, other, after] = [0, 1, 2, 3].map(|next| points[index - 1 + next]);
+        let way = other - one;
+        if way.length() < near_km && way.dot(one - before) < 0.0 && way.dot(after - other) < 0.0 {
+            points.swap(index, index + 1);
+        }
+    }
+    points
+}
+
 /// The direction of the sheet at each point: that of the circle through it and its neighbours.
 fn headings(points: &[DVec2]) -> Vec<DVec2> {
     let weighted = |from: usize| {
@@ -282,6 +300,12 @@ fn headings(points: &[DVec2]) -> Vec<DVec2> {
         (before + after).normalize_or_zero()
     };
     (0..points.len()).map(heading).collect()
+}
+
+/// A heading without what of it goes against the way: a curve that first went back would pass there three times, as bright.
+fn not_back(heading: DVec2, way: DVec2) -> DVec2 {
+    let back = (heading.dot(way) / way.length_squared().max(1e-12)).min(0.0);
+    heading - way * back
 }
 
 /// Cubic from one point to the other with those tangents.

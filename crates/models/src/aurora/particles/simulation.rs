@@ -16,7 +16,7 @@ use super::{
 use crate::{
     aurora::{
         AuroraParameters,
-        afterglow::Afterglow,
+        afterglow::{Afterglow, Fading},
         light::Emission,
         shapes::{FRAME_S, Sequence},
     },
@@ -30,6 +30,7 @@ const REACH: f64 = 3.0;
 #[derive(Clone, Debug)]
 pub struct AuroraSimulation {
     emission: Emission,
+    fading: Fading,
     making: Making,
     relocation: Relocation,
     repulsion: Repulsion,
@@ -147,8 +148,10 @@ impl AuroraSimulation {
         precipitation.share_out(&mut state.particles, (&target.course, &rays), time);
         state.afterglow.settle(&state.particles);
         let parameters = &making.parameters;
+        let emission = parameters.drawing.fall.emission(parameters.spectrum.spectrum());
         Self {
-            emission: parameters.drawing.fall.emission(parameters.spectrum.spectrum()),
+            fading: Fading::new(&emission, Self::STEP_S * parameters.time_lapse),
+            emission,
             relocation: Relocation::new(parameters, key),
             mover: Mover::new(parameters),
             repulsion,
@@ -189,7 +192,7 @@ impl AuroraSimulation {
             self.renew(frames);
         }
         let time = (self.state.steps + 1) as f64 * Self::STEP_S - self.making.parameters.preroll_s;
-        let Self { making, repulsion, mover, state, target, precipitation, emission, .. } = self;
+        let Self { making, repulsion, mover, state, target, precipitation, fading, .. } = self;
         let before = state.along.clone();
         // Where the sheets will be does not depend on the particles, and is found beside them.
         let (_, (along, course, rays)) = rayon::join(
@@ -205,7 +208,7 @@ impl AuroraSimulation {
         state.steps += 1;
         state.along = along;
         precipitation.share_out(&mut state.particles, (&course, &rays), time);
-        state.afterglow.step(&state.particles, emission, Self::STEP_S);
+        state.afterglow.step(&state.particles, fading);
     }
 
     /// The state as bytes.
