@@ -4,7 +4,7 @@ use std::{
     io::Write,
     path::{Path, PathBuf},
     process::ExitCode,
-    sync::Arc,
+    sync::{Arc, mpsc},
 };
 
 use bansho::{Assets, media::plates::FileAssets};
@@ -13,12 +13,15 @@ use bansho_studio::{
     beginnings::FLAME_SHEET,
     bench,
     document::{Document, files},
-    player::ThreadPlayer,
+    player::{StartError, ThreadPlayer},
 };
 use eframe::egui;
 
-const USAGE: &str =
-    "usage: bansho-studio [SCENE]\n       bansho-studio --bench [NAME]    pictures a second of each phenomenon here";
+const USAGE: &str = "usage: bansho-studio [SCENE]
+       bansho-studio --bench [NAME]           pictures a second of each phenomenon here
+       bansho-studio --bench-window [NAME]    the same with the window, which must not be covered";
+
+const TITLE: &str = "Bansho Studio";
 
 pub(super) fn main() -> ExitCode {
     let mut arguments = std::env::args_os().skip(1);
@@ -28,6 +31,7 @@ pub(super) fn main() -> ExitCode {
     match (words(&first).as_deref(), words(&second).as_deref()) {
         (Some("--help"), None) => return say(USAGE),
         (Some("--bench"), wanted) => return bench(wanted.unwrap_or_default()),
+        (Some("--bench-window"), wanted) => return bench_window(wanted.unwrap_or_default()),
         (_, Some(_)) => return fail(USAGE),
         _ => {}
     }
@@ -47,7 +51,34 @@ fn bench(wanted: &str) -> ExitCode {
         };
         let [advance, draw, answer] = [advance_s, draw_s, answer_s].map(|seconds| 1000.0 * seconds);
         say(&format!(
-            "{name:24} {pictures_per_s:6.1} pictures/s ({advance:5.1} ms simulated, {draw:5.1} ms drawn), 19 of 20 changes show within {answer:4.0} ms"
+            "{name:24} {pictures_per_s:6.1} pictures/s ({advance:5.1} ms simulated, {draw:5.1} ms drawn), \
+             19 of 20 changes show within {answer:4.0} ms"
+        ));
+    }
+    ExitCode::SUCCESS
+}
+
+/// The same with the window.
+fn bench_window(wanted: &str) -> ExitCode {
+    let (sender, results) = mpsc::channel();
+    let wanted = wanted.to_owned();
+    let build = |creation: &eframe::CreationContext| {
+        let session = session(creation, Document::new("scene", FLAME_SHEET), None)?;
+        Ok(Box::new(bench::WindowBench::new(session, &wanted, sender)) as Box<dyn eframe::App>)
+    };
+    if let Err(error) = eframe::run_native(TITLE, options(window_size(None)), Box::new(build)) {
+        return fail(&format!("error: {error}"));
+    }
+    for speed in results {
+        let bench::WindowSpeed { name, pictures_per_s, played_size, answer_s, size } = match speed {
+            Ok(speed) => speed,
+            Err(error) => return fail(&format!("error: {error}")),
+        };
+        let ([width, height], [whole_width, whole_height]) = (played_size, size);
+        say(&format!(
+            "{name:24} {pictures_per_s:6.1} pictures/s of {width} x {height}, \
+             19 of 20 changes painted at {whole_width} x {whole_height} within {:4.0} ms",
+            1000.0 * answer_s
         ));
     }
     ExitCode::SUCCESS
@@ -70,19 +101,27 @@ fn run(scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
         Some(path) => files::open(path)?,
         None => Document::new("scene", FLAME_SHEET),
     };
-    let options = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
-            .with_title("Bansho Studio")
-            .with_inner_size(window_size(home().as_deref())),
-        ..eframe::NativeOptions::default()
-    };
     let build = |creation: &eframe::CreationContext| {
-        let ctx = creation.egui_ctx.clone();
-        let player = ThreadPlayer::start(move || ctx.request_repaint())?;
-        let session = Session::new(document, scene, Box::new(player), assets);
+        let session = session(creation, document, scene)?;
         Ok(Box::new(Studio::new(session, home())) as Box<dyn eframe::App>)
     };
-    Ok(eframe::run_native("Bansho Studio", options, Box::new(build))?)
+    Ok(eframe::run_native(TITLE, options(window_size(home().as_deref())), Box::new(build))?)
+}
+
+fn options(size: [f32; 2]) -> eframe::NativeOptions {
+    let viewport = egui::ViewportBuilder::default().with_title(TITLE).with_inner_size(size);
+    eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() }
+}
+
+/// `document`, which lies in `scene`, with a player that wakes the window.
+fn session(
+    creation: &eframe::CreationContext,
+    document: Document,
+    scene: Option<PathBuf>,
+) -> Result<Session, StartError> {
+    let ctx = creation.egui_ctx.clone();
+    let player = ThreadPlayer::start(move || ctx.request_repaint())?;
+    Ok(Session::new(document, scene, Box::new(player), assets))
 }
 
 fn assets(folder: &Path) -> Arc<dyn Assets> {

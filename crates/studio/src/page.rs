@@ -4,14 +4,14 @@ use std::{cell::Cell, path::Path, rc::Rc, sync::Arc};
 
 use bansho::Assets;
 use bansho_studio::{
-    app::{Session, Studio},
+    app::{Session, Studio, function_keys},
     document::Document,
     examples::{Bundle, SCENES},
     player::{Player, SlicePlayer, WorkerPlayer},
 };
 use eframe::egui::{self, Context};
 use wasm_bindgen::{JsCast, JsValue, closure::Closure};
-use web_sys::{Event, HtmlCanvasElement};
+use web_sys::{Event, HtmlCanvasElement, KeyboardEvent, Window};
 
 /// What is shown where the address names nothing.
 const FIRST: &str = "campfire";
@@ -27,6 +27,7 @@ async fn start() -> Result<(), JsValue> {
     let document = window.document().ok_or("there is no page")?;
     let canvas = document.get_element_by_id("studio").ok_or("there is no canvas")?;
     let canvas: HtmlCanvasElement = canvas.dyn_into()?;
+    keep_keys_from_browser(&window)?;
     let named = window.location().hash()?.trim_start_matches('#').to_owned();
     let build = move |creation: &eframe::CreationContext| {
         let ctx = creation.egui_ctx.clone();
@@ -80,6 +81,20 @@ fn ask_before_leaving() -> Rc<Cell<bool>> {
     // It asks for as long as the page is open.
     ask.forget();
     unsaved
+}
+
+/// Keeps from the browser those function keys that do something here: F12 would open its tools besides.
+fn keep_keys_from_browser(window: &Window) -> Result<(), JsValue> {
+    let keep = Closure::<dyn FnMut(KeyboardEvent)>::new(|event: KeyboardEvent| {
+        let plain = !(event.ctrl_key() || event.alt_key() || event.meta_key());
+        if plain && function_keys().any(|key| key == event.key()) {
+            event.prevent_default();
+        }
+    });
+    window.add_event_listener_with_callback_and_bool("keydown", keep.as_ref().unchecked_ref(), true)?;
+    // It listens for as long as the page is open.
+    keep.forget();
+    Ok(())
 }
 
 /// A worker, or slices of the page's own time where the browser gives none.

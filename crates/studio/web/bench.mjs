@@ -15,7 +15,7 @@ await context.addInitScript(() => {
       super(...given);
       this.addEventListener("message", ({ data }) => {
         if (!Array.isArray(data) || data[0] !== "drawn") return;
-        const [width, height] = data.slice(4, 6);
+        const [width, height] = data.slice(3, 5);
         const [draw, advance] = data.slice(-2);
         window.drawn.push({ at: performance.now(), width, height, draw, advance });
       });

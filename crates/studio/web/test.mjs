@@ -24,8 +24,9 @@ const browser = await launch(executablePath);
 const context = await browser.newContext({ viewport: SIZE, acceptDownloads: true });
 const errors = [];
 
-async function open(example) {
+async function open(example, prepare = async () => {}) {
   const page = await context.newPage();
+  await prepare(page);
   page.on("console", (message) => message.type() === "error" && errors.push(message.text()));
   page.on("pageerror", (error) => errors.push(String(error)));
   const began = Date.now();
@@ -103,6 +104,13 @@ async function stroke(page, points) {
   await page.mouse.down();
   for (const point of points.slice(1)) await page.mouse.move(...point, { steps: 8 });
   await page.mouse.up();
+}
+
+// The file chooser that Ctrl+O opens. Keys count once the canvas has them, which the first frame does not promise.
+async function chooserOf(page, tries = 4) {
+  const chooser = page.waitForEvent("filechooser", { timeout: 5000 }).catch(() => null);
+  await page.keyboard.press("Control+o");
+  return (await chooser) ?? (tries > 1 ? chooserOf(page, tries - 1) : fail("no file chooser opens"));
 }
 
 // A flame bends with a dragged wind. The picture lies between the panels.
@@ -193,13 +201,7 @@ preroll_s = 0.2
 `;
 const own = await open("torch");
 await until(own, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
-// Keys count once the canvas has them, which the first frame does not promise.
-async function chosen(tries) {
-  const chooser = own.waitForEvent("filechooser", { timeout: 5000 }).catch(() => null);
-  await own.keyboard.press("Control+o");
-  return (await chooser) ?? (tries > 1 ? chosen(tries - 1) : fail("no file chooser opens"));
-}
-const chooser = await chosen(4);
+const chooser = await chooserOf(own);
 await chooser.setFiles({ name: "small.toml", mimeType: "text/plain", buffer: Buffer.from(small) });
 await own.waitForTimeout(2000);
 async function rendered(keys) {
@@ -210,19 +212,20 @@ async function rendered(keys) {
 }
 // Faults, as of a plate that is missing beside a flame of many particles, are told by the worker: nothing heavy is made here.
 const faulty = `bansho = 1\n[plate]\nimage = "gone.png"\n[[flame_particles]]\nparticles = 30000\n[[aurora]]\n`;
-const chooserAgain = () => own.waitForEvent("filechooser", { timeout: 20000 });
 for (const [what, name, scene] of [
   ["a faulty scene", "faulty.toml", faulty],
   ["a heavy scene", "heavy.toml", faulty.replace(/\[plate\]\nimage.*\n/, "")],
   ["a small scene again", "small.toml", small],
 ]) {
   await mustNotFreeze(own, what, 4, async () => {
-    const [asked] = await Promise.all([chooserAgain(), own.keyboard.press("Control+o")]);
+    const asked = await chooserOf(own);
     await asked.setFiles({ name, mimeType: "text/plain", buffer: Buffer.from(scene) });
   });
 }
 await own.waitForTimeout(2000);
+await own.evaluate(() => addEventListener("keydown", (event) => (window.lastKey = event), true));
 const one = await rendered("F12");
+if (!(await own.evaluate(() => window.lastKey.key === "F12" && window.lastKey.defaultPrevented))) fail("F12 opens the browser's tools too");
 if (one.name !== "small.0000.png") fail(`the still is called ${one.name}`);
 const shot = await rendered("Shift+F12");
 if (shot.name !== "small.zip") fail(`the shot is called ${shot.name}`);
@@ -240,12 +243,48 @@ await own.close();
 const plated = await open("torch");
 const dark = await until(plated, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
 await mustNotFreeze(plated, "a plate", 4, async () => {
-  const [asked] = await Promise.all([plated.waitForEvent("filechooser", { timeout: 20000 }), plated.keyboard.press("Control+o")]);
+  const asked = await chooserOf(plated);
   await asked.setFiles(fileURLToPath(new URL("../../../scenes/plates/grove.jpg", import.meta.url)));
 });
 const lit = await until(plated, picture, ({ mean }) => mean > 4 * dark.mean, "no plate behind the flame");
 console.log(`before a plate: mean ${lit.mean.toFixed(1)}, alone ${dark.mean.toFixed(1)}`);
 await plated.close();
+
+// A panic is told once, and another worker goes on. No scene panics, so the words are put into the worker's mouth: its last
+// ones, and then the trap.
+const panicking = await open("torch", (page) => page.addInitScript(() => {
+  window.drawn = [];
+  const Plain = window.Worker;
+  window.Worker = class extends Plain {
+    constructor(...given) {
+      super(...given);
+      const own = window.drawn.push(0) - 1;
+      this.addEventListener("message", ({ data }) => (window.drawn[own] += data[0] === "drawn" ? 1 : 0));
+    }
+    postMessage(message, ...rest) {
+      if (!window.breaks || message[0] !== "wish") return super.postMessage(message, ...rest);
+      window.breaks = false;
+      setTimeout(() => {
+        this.dispatchEvent(new MessageEvent("message", { data: ["panicked", message[1], "broken on purpose"] }));
+        this.dispatchEvent(new Event("error"));
+      });
+    }
+  };
+}));
+await until(panicking, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
+const workers = await panicking.evaluate(() => window.drawn.length);
+await panicking.mouse.click(635, 700);
+await panicking.evaluate(() => (window.breaks = true));
+await panicking.keyboard.press("ArrowRight");
+const told = () => panicking.evaluate(() => document.getElementById("notice").textContent);
+await panicking.waitForFunction(() => /panicked.*broken on purpose/.test(document.getElementById("notice").textContent), null, { timeout: 20000 });
+await panicking.keyboard.press("ArrowRight");
+await panicking.waitForFunction((workers) => window.drawn[workers] > 0, workers, { timeout: 30000 });
+await panicking.waitForTimeout(2000);
+if (!/broken on purpose/.test(await told())) fail(`after a panic the page says: ${await told()}`);
+if ((await panicking.evaluate(() => window.drawn.length)) !== workers + 1) fail("a healthy worker was replaced");
+console.log("a panic is told once, and another worker goes on");
+await panicking.close();
 
 await browser.close();
 

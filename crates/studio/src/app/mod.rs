@@ -1,6 +1,7 @@
 //! The window: panels over one [`Session`]. It holds no formulas of any phenomenon.
 
 mod aurora;
+mod broken;
 mod curve_editor;
 mod curves_view;
 mod files;
@@ -38,6 +39,7 @@ use self::{
 };
 pub use self::{
     session::{AssetsOf, Session},
+    shortcuts::function_keys,
     stages_view::image as screen_image,
 };
 
@@ -119,6 +121,9 @@ impl Studio {
         if ui.ctx().cumulative_pass_nr() == 0 {
             self.layout.apply_theme(ui.ctx());
         }
+        let (now, hands) = now_and_hands(ui);
+        // Before anything is shown, so that a picture is on the screen as soon as it is there.
+        self.session.listen(now, hands);
         self.begin_gestures(ui.ctx());
         self.take_shortcuts(ui.ctx());
         self.files.tend(ui, &mut self.session, &self.subject);
@@ -131,7 +136,10 @@ impl Studio {
         } else {
             self.panels(ui);
         }
-        egui::CentralPanel::default().show(ui, |ui| self.viewport.show(ui, &mut self.session, &self.subject));
+        let bare = egui::Frame::central_panel(ui.style()).fill(egui::Color32::TRANSPARENT);
+        egui::CentralPanel::default()
+            .frame(bare)
+            .show(ui, |ui| self.viewport.show(ui, &mut self.session, &self.subject));
         if self.shows.shortcuts {
             shortcuts::window(ui.ctx(), &mut self.shows.shortcuts);
         }
@@ -139,7 +147,7 @@ impl Studio {
         self.layout.note_theme(ui.ctx());
         self.layout.note("text shown", f32::from(u8::from(self.shows.text)));
         self.layout.note_window(ui.ctx());
-        self.update(ui);
+        self.follow(ui);
     }
 
     /// Begins with what a hand would reach for first in a scene that was just opened.
@@ -218,13 +226,20 @@ impl Studio {
         }
     }
 
-    fn update(&mut self, ui: &egui::Ui) {
-        let now = ui.input(|input| input.time);
-        let hands = ui.input(|input| input.pointer.any_down()) && ui.ctx().dragged_id().is_some();
-        if let Some(sleep_s) = self.session.update(now, self.viewport.pixels(), hands) {
+    fn follow(&mut self, ui: &egui::Ui) {
+        let (now, hands) = now_and_hands(ui);
+        if let Some(sleep_s) = self.session.follow(now, self.viewport.pixels(), hands) {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(sleep_s));
         }
+        self.session.wait(now, hands);
+        self.viewport.take_picture(ui, &self.session);
     }
+}
+
+/// What time it is, s, and whether something is being dragged.
+fn now_and_hands(ui: &egui::Ui) -> (f64, bool) {
+    let (now, held) = ui.input(|input| (input.time, input.pointer.any_down()));
+    (now, held && ui.ctx().dragged_id().is_some())
 }
 
 impl eframe::App for Studio {

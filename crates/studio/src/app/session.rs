@@ -3,6 +3,7 @@
 use std::{
     path::{Path, PathBuf},
     sync::Arc,
+    time::Duration,
 };
 
 use bansho::{
@@ -14,7 +15,9 @@ use bansho::{
     render::scene::{Place, Segment, edit::EditError, operation::Operation},
 };
 
-use super::{keyed, rate::Rate};
+use web_time::Instant;
+
+use super::{broken::Broken, keyed, rate::Rate};
 use crate::{
     document::{
         Document, Revision,
@@ -26,6 +29,9 @@ use crate::{
 
 /// Makes the assets of a scene that lies in a folder. A scene without a file finds those of the examples first, and given ones.
 pub type AssetsOf = fn(&Path) -> Arc<dyn Assets>;
+
+/// What a hand does not notice that waits for a picture.
+const AT_ONCE: Duration = Duration::from_millis(40);
 
 /// The table of the camera.
 const CAMERA: &str = "camera";
@@ -58,8 +64,8 @@ pub struct Session {
     /// Pictures of the stages, each with its number.
     stage_pictures: Vec<(Picture, u64)>,
     asked: Option<Asked>,
-    /// A state that panicked, which is not drawn again.
-    broken: Option<Revision>,
+    /// What panicked, which is not drawn again.
+    broken: Broken,
     notice: Option<String>,
     rate: Rate,
     /// A time that is gone to once the scene is checked, s.
@@ -98,7 +104,7 @@ impl Session {
             picture: None,
             drawn: 0,
             asked: None,
-            broken: None,
+            broken: Broken::default(),
             notice: None,
             rate: Rate::default(),
             seek: None,
@@ -109,7 +115,7 @@ impl Session {
     pub fn open(&mut self, document: Document, path: Option<PathBuf>) {
         self.assets = assets(&self.bundle, path.as_deref(), self.assets_of);
         (self.document, self.path) = (document, path);
-        (self.picture, self.asked, self.broken, self.notice) = (None, None, None, None);
+        (self.picture, self.asked, self.broken, self.notice) = (None, None, Broken::default(), None);
         (self.stages, self.stage_pictures, self.pace) = (None, Vec::new(), Pace::default());
         (self.transport, self.seek, self.rate) = (Transport::default(), None, Rate::default());
         self.opened += 1;
@@ -119,7 +125,12 @@ impl Session {
     pub fn reload_assets(&mut self) {
         self.assets = assets(&self.bundle, self.path.as_deref(), self.assets_of);
         // What was broken by a file may be whole with another.
-        (self.asked, self.broken) = (None, None);
+        self.retry();
+    }
+
+    /// Draws what panicked once more.
+    pub fn retry(&mut self) {
+        (self.asked, self.broken) = (None, Broken::default());
     }
 
     /// Takes the bytes of a file that no folder holds.
@@ -164,9 +175,9 @@ impl Session {
         self.notice = notice;
     }
 
-    /// Whether what is shown panicked.
+    /// Whether the present frame panicked.
     pub fn is_broken(&self) -> bool {
-        self.broken == Some(self.document.revision())
+        self.broken.holds(self.document.revision(), self.transport.number())
     }
 
     /// Carries out `operations`; what cannot be done is told.
@@ -265,16 +276,25 @@ impl Session {
         Operation::SetKeyframe { place: place.clone(), time: self.transport.time_s(), value }
     }
 
-    /// Takes in what the player did, lets time pass and says what is to be drawn for a viewport of `viewport` pixels.
-    /// `hands` tells that something is being dragged, so that speed matters more than size. How long the window may sleep, s.
+    /// What [`listen`](Self::listen) and then [`follow`](Self::follow) do.
     pub fn update(&mut self, now: f64, viewport: [usize; 2], hands: bool) -> Option<f64> {
-        let hurry = hands || self.transport.is_playing();
+        self.listen(now, hands);
+        self.follow(now, viewport, hands)
+    }
+
+    /// Takes in what the player did. `hands` tells that something is being dragged, so that speed matters more than size.
+    pub fn listen(&mut self, now: f64, hands: bool) {
         for event in self.player.poll() {
             self.take_in(event, now, hands);
         }
         if !self.transport.is_playing() {
             self.rate = Rate::default();
         }
+    }
+
+    /// Lets time pass and says what is to be drawn for a viewport of `viewport` pixels. How long the window may sleep, s.
+    pub fn follow(&mut self, now: f64, viewport: [usize; 2], hands: bool) -> Option<f64> {
+        let hurry = hands || self.transport.is_playing();
         let shown = self.picture.as_ref().is_some_and(|picture| picture.number == self.transport.number());
         self.transport.tick(now, shown || self.is_broken());
         self.wish(viewport, hurry);
@@ -282,6 +302,19 @@ impl Session {
             return Some(0.0);
         }
         self.transport.sleep_s(now).filter(|_| !self.is_busy())
+    }
+
+    /// Waits a moment for a picture that comes at once, as after a change of something quick, so that it is painted together with the
+    /// change and not a whole frame of the window later. While time passes nothing waits: pictures are drawn beside painting then.
+    pub fn wait(&mut self, now: f64, hands: bool) {
+        let began = Instant::now();
+        let quick =
+            self.picture.as_ref().is_some_and(|picture| picture.draw_s + picture.advance_s < AT_ONCE.as_secs_f64());
+        while quick && !self.transport.is_playing() && self.is_busy() {
+            let Some(left) = AT_ONCE.checked_sub(began.elapsed()) else { return };
+            self.player.wait(left);
+            self.listen(now, hands);
+        }
     }
 
     fn wish(&mut self, viewport: [usize; 2], hurry: bool) {
@@ -373,8 +406,13 @@ impl Session {
             Event::Failed { revision, reason } if revision == self.document.revision() => self.notice = Some(reason),
             // Finished pictures are asked of other players.
             Event::Failed { .. } | Event::Still { .. } => {}
-            Event::Panicked { revision, message } => {
-                self.broken = Some(revision);
+            Event::Panicked { revision, number, message } => {
+                if revision == self.document.revision() {
+                    // One that was checked breaks at some frames only.
+                    let checked = self.plan().filter(|_| self.document.is_checked());
+                    let frame = checked.map(|plan| number.unwrap_or(plan.frames().start));
+                    self.broken.note(revision, frame);
+                }
                 self.transport.set_playing(false);
                 self.notice = Some(self.told_of_panic(&message));
             }

@@ -48,7 +48,8 @@ pub(super) const SHORTCUTS: [Shortcut; 14] = [
     with_command(Key::Y, Action::Redo, "Redo"),
     with_command(Key::S, Action::Save, "Save"),
     with_command(Key::O, Action::Open, "Open"),
-    with_command(Key::T, Action::Text, "Show or hide the text"),
+    // Browsers keep Ctrl+T for themselves.
+    plain(Key::F2, Action::Text, "Show or hide the text"),
     Shortcut {
         keys: KeyboardShortcut::new(Modifiers::SHIFT, Key::F12),
         action: Action::RenderShot,
@@ -64,11 +65,11 @@ pub(super) const SHORTCUTS: [Shortcut; 14] = [
 ];
 
 impl Studio {
-    /// Does what pressed keys say. Keys without Ctrl or Cmd, but for F12, belong to whatever is being typed in.
+    /// Does what pressed keys say. Keys that write something belong to whatever is being typed in.
     pub(super) fn take_shortcuts(&mut self, ctx: &Context) {
         let typing = ctx.egui_wants_keyboard_input();
         for shortcut in &SHORTCUTS {
-            let mine = !typing || shortcut.keys.modifiers.command || shortcut.keys.logical_key == Key::F12;
+            let mine = !typing || shortcut.keys.modifiers.command || is_function(shortcut.keys.logical_key);
             if mine && ctx.input_mut(|input| pressed(input, shortcut)) {
                 self.act(ctx, shortcut.action);
             }
@@ -102,6 +103,15 @@ impl Studio {
     }
 }
 
+fn is_function(key: Key) -> bool {
+    (Key::F1..=Key::F35).contains(&key)
+}
+
+/// Function keys of the list, as browsers call them. A page must keep these from its browser, which opens its own tools by F12.
+pub fn function_keys() -> impl Iterator<Item = &'static str> {
+    SHORTCUTS.iter().map(|shortcut| shortcut.keys.logical_key).filter(|key| is_function(*key)).map(Key::name)
+}
+
 /// A question mark needs Shift on many keyboards and not on others.
 fn pressed(input: &mut egui::InputState, shortcut: &Shortcut) -> bool {
     let shifted = KeyboardShortcut::new(Modifiers::SHIFT, shortcut.keys.logical_key);
@@ -119,4 +129,23 @@ pub(super) fn window(ctx: &Context, open: &mut bool) {
             }
         });
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_key_is_one_that_browsers_give_to_no_page() {
+        // Chromium's and Firefox's, with or without Shift: another window, another tab, no tab.
+        let kept = [Key::N, Key::T, Key::W];
+        // Help, search, reload, the address, a cursor, the whole screen: pages are used to leave these to the browser.
+        let browsers_own = [Key::F1, Key::F3, Key::F5, Key::F6, Key::F7, Key::F11];
+        for Shortcut { keys, name, .. } in &SHORTCUTS {
+            let key = keys.logical_key;
+            assert!(!keys.modifiers.command || !kept.contains(&key), "{name}");
+            assert!(!browsers_own.contains(&key), "{name}");
+        }
+        assert_eq!(function_keys().collect::<Vec<_>>(), ["F2", "F12", "F12"]);
+    }
 }

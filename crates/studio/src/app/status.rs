@@ -32,6 +32,10 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &mut Files) {
         if let Some([done, total]) = files.progress() {
             rendering(ui, files, done, total);
         }
+        if session.is_broken() && ui.button("Retry").on_hover_text(RETRY).clicked() {
+            session.set_notice(None);
+            session.retry();
+        }
         if let Some(notice) = session.notice() {
             let notice = notice.to_owned();
             ui.colored_label(ui.visuals().warn_fg_color, &notice);
@@ -55,3 +59,6 @@ fn rendering(ui: &mut Ui, files: &mut Files, done: usize, total: usize) {
 
 const LIVE: &str = "What is simulated went on from where it was when the scene changed. \
     Click to see what the scene leads to from its beginning, as it will be rendered.";
+
+const RETRY: &str =
+    "This frame panicked, and is not drawn again by itself; other frames are. Click to draw it once more.";

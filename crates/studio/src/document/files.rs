@@ -36,13 +36,18 @@ pub fn open(path: &Path) -> Result<Document, OpenError> {
     Ok(Document::new(path.display().to_string(), read(path)?))
 }
 
-/// Saves `document` to `path`, whole or not at all.
+/// Saves `document` to `path`, whole or not at all, as `text`: its own, or one that says the same from there, which is then a
+/// step of its history.
 ///
 /// # Errors
-/// The file cannot be written; the one that was there stays.
-pub fn save(document: &mut Document, path: &Path) -> Result<(), MediaError> {
-    let text = document.text().clone();
+/// The file cannot be written; the one that was there stays, and so does the document.
+pub fn save(document: &mut Document, path: &Path, text: Arc<str>) -> Result<(), MediaError> {
     atomic::write_bytes(path, text.as_bytes())?;
+    if text != *document.text() {
+        document.seal();
+        document.replace("paths", &text);
+        document.seal();
+    }
     document.mark_saved(text);
     document.rename(path.display().to_string());
     Ok(())
@@ -63,23 +68,46 @@ pub fn named_as_scene(path: PathBuf) -> PathBuf {
     whole.into()
 }
 
-/// Writes a copy beside `path`, where it is found after a failure, and says where.
+/// Writes a copy beside `path`, where it is found after a failure, and says where. Earlier copies stay.
 ///
 /// # Errors
 /// The copy cannot be written.
 pub fn rescue(text: &str, path: &Path) -> Result<PathBuf, MediaError> {
-    let beside = path.with_extension("rescued.toml");
-    atomic::write_bytes(&beside, text.as_bytes())?;
-    Ok(beside)
+    write_beside(|which| path.with_extension(format!("rescued{which}.toml")), text.as_bytes())
+}
+
+/// Most files of one name that are told apart by numbers.
+const MOST_OF_A_NAME: usize = 1000;
+
+/// Writes `bytes` to the first file that is free, or that holds just them already; which one. `named` makes its path of what tells it
+/// from the first: nothing, ` 2`, ` 3` and so on.
+///
+/// # Errors
+/// The file cannot be written, or too many names are taken.
+pub fn write_beside(named: impl Fn(&str) -> PathBuf, bytes: &[u8]) -> Result<PathBuf, MediaError> {
+    let mut file = named("");
+    for number in 2..=MOST_OF_A_NAME {
+        if fs::symlink_metadata(&file).is_err() {
+            atomic::write_bytes(&file, bytes)?;
+            return Ok(file);
+        }
+        if fs::read(&file).is_ok_and(|there| there == bytes) {
+            return Ok(file);
+        }
+        file = named(&format!(" {number}"));
+    }
+    Err(MediaError::Io { path: file, source: io::ErrorKind::AlreadyExists.into() })
 }
 
 /// What another program made of a file since it was opened or saved here.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outside {
-    /// Nothing, as far as can be read.
+    /// Nothing.
     Same,
     /// Another text.
     Changed(Arc<str>),
+    /// Something that cannot be read as text, and why.
+    Unreadable(String),
     /// It took the file away.
     Gone,
 }
@@ -88,8 +116,9 @@ pub enum Outside {
 pub fn outside(document: &Document, path: &Path) -> Outside {
     match fs::read_to_string(path) {
         Ok(there) if *there != *document.saved => Outside::Changed(there.into()),
+        Ok(_) => Outside::Same,
         Err(error) if error.kind() == io::ErrorKind::NotFound => Outside::Gone,
-        Ok(_) | Err(_) => Outside::Same,
+        Err(error) => Outside::Unreadable(error.to_string()),
     }
 }
 

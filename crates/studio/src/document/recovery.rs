@@ -3,7 +3,7 @@
 //! Each running studio holds a lock on a file of its own, so that a living one's work is not mistaken for a dead one's.
 
 use std::{
-    fs::{self, File},
+    fs::{self, File, TryLockError},
     io,
     path::{Path, PathBuf},
 };
@@ -31,6 +31,9 @@ pub struct Recovered {
     pub(crate) kept_in: PathBuf,
 }
 
+/// Most names that studios take in one folder.
+const MOST_NAMES: usize = 100;
+
 /// Begins the first line of kept work; the origin follows.
 const HEADING: &str = "# unsaved work of the studio on: ";
 
@@ -38,18 +41,38 @@ impl Autosave {
     /// Keeps work in `folder`, under a name that begins with `session` and that no other running studio has.
     ///
     /// # Errors
-    /// The folder cannot be made or written.
+    /// The folder cannot be made or written, it knows no locks, or too many studios hold some.
     pub fn begin(folder: &Path, session: &str) -> io::Result<Self> {
+        Self::begin_with(folder, session, File::try_lock)
+    }
+
+    /// The same with another way to lock a file.
+    fn begin_with(
+        folder: &Path,
+        session: &str,
+        try_lock: impl Fn(&File) -> Result<(), TryLockError>,
+    ) -> io::Result<Self> {
         fs::create_dir_all(folder)?;
-        let mut number = 0;
-        loop {
+        for number in 0..MOST_NAMES {
             let lock = folder.join(format!("{session}-{number}.lock"));
+            let was_there = lock.exists();
             let held = File::create(&lock)?;
-            if held.try_lock().is_ok() && !lock.with_extension("toml").exists() {
-                return Ok(Self { kept: lock.with_extension("toml"), lock, _held: held });
+            match try_lock(&held) {
+                Ok(()) if !lock.with_extension("toml").exists() => {
+                    return Ok(Self { kept: lock.with_extension("toml"), lock, _held: held });
+                }
+                // Another studio's, or work that waits to be recovered.
+                Ok(()) | Err(TryLockError::WouldBlock) => {}
+                Err(TryLockError::Error(error)) => {
+                    if !was_there {
+                        // One that stays does no harm.
+                        let _ = fs::remove_file(&lock);
+                    }
+                    return Err(error);
+                }
             }
-            number += 1;
         }
+        Err(io::Error::other(format!("{MOST_NAMES} studios run, or left work that was never recovered")))
     }
 
     /// Keeps what is unsaved, or nothing where nothing is.
@@ -88,8 +111,10 @@ pub fn recoverable(folder: &Path) -> Vec<Recovered> {
     files.into_iter().filter_map(read).collect()
 }
 
+/// Where a folder knows no locks, no studio keeps work in it.
 fn is_held(kept: &Path) -> bool {
-    File::open(kept.with_extension("lock")).is_ok_and(|lock| lock.try_lock().is_err())
+    let lock = File::open(kept.with_extension("lock"));
+    lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
 }
 
 fn read(file: PathBuf) -> Option<Recovered> {
@@ -110,5 +135,33 @@ impl Recovered {
         // What cannot be removed is offered again, which does no harm.
         let _ = fs::remove_file(&self.kept_in);
         let _ = fs::remove_file(self.kept_in.with_extension("lock"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn files_in(folder: &Path) -> usize {
+        fs::read_dir(folder).unwrap().count()
+    }
+
+    #[test]
+    fn a_folder_without_locks_is_told_of_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let without = |_: &File| Err(TryLockError::Error(io::ErrorKind::Unsupported.into()));
+        let error = Autosave::begin_with(folder.path(), "studio", without).unwrap_err();
+        assert_eq!((error.kind(), files_in(folder.path())), (io::ErrorKind::Unsupported, 0));
+    }
+
+    #[test]
+    fn names_that_others_hold_are_passed_over_and_there_is_an_end_to_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = Autosave::begin(folder.path(), "studio").unwrap();
+        let second = Autosave::begin(folder.path(), "studio").unwrap();
+        assert_ne!(first.kept, second.kept);
+        let held = |_: &File| Err(TryLockError::WouldBlock);
+        Autosave::begin_with(folder.path(), "studio", held).unwrap_err();
+        assert_eq!(files_in(folder.path()), MOST_NAMES);
     }
 }

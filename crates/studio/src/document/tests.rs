@@ -176,7 +176,8 @@ fn saving_is_whole_and_outside_edits_are_seen() {
     let path = folder.path().join("deep").join("fire.toml");
     let mut document = scene();
     document.edit("height", &[height(1.0)]).unwrap();
-    files::save(&mut document, &path).unwrap();
+    let text = document.text().clone();
+    files::save(&mut document, &path, text).unwrap();
     assert!(!document.is_dirty());
     assert_eq!(fs::read_to_string(&path).unwrap(), **document.text());
     assert_eq!(files::outside(&document, &path), Outside::Same);
@@ -186,10 +187,21 @@ fn saving_is_whole_and_outside_edits_are_seen() {
     assert_eq!(files::outside(&document, &path), Outside::Gone);
     document.mark_gone(true);
     assert!(document.is_dirty() && !document.differs(), "what lies nowhere is not saved");
-    files::save(&mut document, &path).unwrap();
+    let text = document.text().clone();
+    files::save(&mut document, &path, text).unwrap();
     assert!(!document.is_dirty());
     assert!(files::open(&folder.path().join("none.toml")).is_err());
-    assert_eq!(files::rescue("x", &path).unwrap(), path.with_file_name("fire.rescued.toml"));
+    fs::write(&path, b"\xff\xfe").unwrap();
+    assert!(matches!(files::outside(&document, &path), Outside::Unreadable(_)), "no UTF-8");
+}
+
+#[test]
+fn what_is_rescued_spoils_nothing_that_was_rescued_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let rescued = |text: &str| files::rescue(text, &folder.path().join("fire.toml")).unwrap();
+    let names = ["x", "y", "x"].map(rescued).map(|path| path.file_name().unwrap().to_owned());
+    assert_eq!(names, ["fire.rescued.toml", "fire.rescued 2.toml", "fire.rescued.toml"]);
+    assert_eq!(fs::read_to_string(folder.path().join("fire.rescued.toml")).unwrap(), "x");
 }
 
 #[test]

@@ -6,12 +6,33 @@ use bansho::{
     Assets, Backend, BitDepth, CpuBackend, DisplayImage, Observer, Plan, RenderError, Shot, View,
     base::image::{DisplayPixels, Frame},
     display,
-    media::png::{self, PngEffort},
+    media::{
+        MediaError,
+        png::{self, PngEffort},
+    },
 };
 use web_time::Instant;
 
 use super::{Event, Picture, Wish, states::States};
 use crate::document::{Checker, Revision, stages};
+
+/// Why a wish is not fulfilled.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Unfulfilled {
+    /// No picture can be drawn, or it was stopped.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// The picture fits no file.
+    #[error(transparent)]
+    Media(#[from] MediaError),
+}
+
+impl Unfulfilled {
+    /// Whether the observer asked to stop.
+    pub(super) fn is_stop(&self) -> bool {
+        matches!(self, Self::Render(RenderError::Cancelled(_)))
+    }
+}
 
 /// What is kept from one wish to the next.
 #[derive(Default)]
@@ -46,13 +67,13 @@ impl Engine {
     /// Fulfils `wish` and tells `emit` what came of it. Stops when `observer` says so; another call then goes on.
     ///
     /// # Errors
-    /// No picture can be drawn, or the observer asked to stop.
+    /// No picture can be drawn or made a file, or the observer asked to stop.
     pub(super) fn fulfil(
         &mut self,
         wish: &Wish,
         observer: &dyn Observer,
         emit: &mut dyn FnMut(Event),
-    ) -> Result<(), RenderError> {
+    ) -> Result<(), Unfulfilled> {
         let draft = wish.draft && !wish.exact && !wish.still;
         let Wish { name, text, assets, .. } = wish;
         let same =
@@ -92,7 +113,7 @@ impl Engine {
     }
 
     /// The file of the finished frame `number`. Where it was stopped, or the last one ended, it goes on.
-    fn finish(&mut self, plan: &Arc<Plan>, number: i64, observer: &dyn Observer) -> Result<Vec<u8>, RenderError> {
+    fn finish(&mut self, plan: &Arc<Plan>, number: i64, observer: &dyn Observer) -> Result<Vec<u8>, Unfulfilled> {
         let begun = self.still.take().filter(|(of, _)| Arc::ptr_eq(of, plan));
         let (_, shot) = self.still.insert(match begun {
             Some(begun) => begun,
@@ -101,7 +122,7 @@ impl Engine {
         let frame = bansho::draw(shot.as_mut(), number, observer)?;
         let png = encoded(&frame);
         shot.recycle(frame);
-        Ok(png)
+        Ok(png?)
     }
 
     fn draw(&mut self, plan: &Arc<Plan>, wish: &Wish, observer: &dyn Observer) -> Result<Picture, RenderError> {
@@ -207,9 +228,25 @@ fn shown(frame: &mut Frame) -> Vec<[u8; 4]> {
 }
 
 /// The frame as `bansho render` writes it unless it is told otherwise.
-fn encoded(frame: &Frame) -> Vec<u8> {
+fn encoded(frame: &Frame) -> Result<Vec<u8>, MediaError> {
     let shown = display(frame, &View::DISPLAY, BitDepth::Eight);
-    let png = png::encode(&shown, &frame.header.fingerprint, PngEffort::default(), Path::new("still.png"));
-    // A frame has a size that PNG allows, and all its pixels.
-    png.unwrap_or_default()
+    png::encode(&shown, &frame.header.fingerprint, PngEffort::default(), Path::new("still.png"))
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho::base::image::Image;
+
+    use super::*;
+
+    #[test]
+    fn a_picture_that_fits_no_file_is_told_of() {
+        let assets: Arc<dyn Assets> = Arc::new(bansho::MemoryAssets::default());
+        let plan = crate::document::check("scene", "bansho = 1\n[picture]\nsize = [8, 4]\n", &assets).unwrap();
+        let mut shot = CpuBackend.open(plan).unwrap();
+        let mut frame = bansho::draw(shot.as_mut(), 0, &bansho::Unobserved).unwrap();
+        assert!(encoded(&frame).unwrap().starts_with(b"\x89PNG"));
+        frame.beauty = Image::filled(png::SIDE_LIMIT + 1, 1, [0.0; 4]);
+        assert!(matches!(encoded(&frame), Err(MediaError::Size { .. })));
+    }
 }

@@ -6,7 +6,7 @@ use bansho::Assets;
 use js_sys::{Array, Uint8Array};
 use wasm_bindgen::{JsCast, JsValue};
 
-use super::{Picture, Wish};
+use super::{Picture, Wish, reply::Reply};
 use crate::document::{Found, Revision};
 
 /// What the page says.
@@ -15,26 +15,6 @@ pub(super) enum Order {
     File(String, Vec<u8>),
     /// A wish, with its number.
     Wish(u64, Wish),
-}
-
-/// What the worker says.
-pub(super) enum Reply {
-    /// It listens.
-    Ready,
-    /// The scene of wish `number` was checked: its exposure, or its faults.
-    Judged { number: u64, found: Result<f32, Vec<Found>> },
-    /// The picture of wish `number`.
-    Drawn { number: u64, picture: Picture },
-    /// A small picture of a stage, for wish `number`.
-    Stage { number: u64, stage: usize, picture: Picture },
-    /// The finished picture of wish `number`: its frame, and the file.
-    Still { number: u64, frame: i64, png: Vec<u8> },
-    /// Why wish `number` has none.
-    Failed { number: u64, reason: String },
-    /// What a phenomenon said when it panicked over wish `number`. The worker is gone.
-    Panicked { number: u64, message: String },
-    /// Nothing more comes of wish `number`.
-    Done { number: u64 },
 }
 
 impl Order {
@@ -58,9 +38,9 @@ impl Order {
         Some(match fields.text()?.as_str() {
             "file" => Self::File(fields.text()?, fields.bytes()?),
             "wish" => {
-                let number = fields.number()? as u64;
+                let number = fields.count()?;
                 let wish = Wish {
-                    revision: Revision(fields.number()? as u64),
+                    revision: Revision(fields.count()?),
                     name: fields.text()?,
                     text: fields.text()?.into(),
                     assets: assets.clone(),
@@ -87,12 +67,10 @@ impl Reply {
                 let faults: Array = faults.iter().map(fault).collect();
                 array(["judged".into(), count(number), faults.into()])
             }
-            Self::Drawn { number, picture } => drawn("drawn", number, &picture).collect(),
-            Self::Stage { number, stage, picture } => {
-                drawn("stage", number, &picture).chain([JsValue::from(stage as f64)]).collect()
-            }
-            Self::Still { number, frame, png } => {
-                array(["still".into(), count(number), (frame as f64).into(), Uint8Array::from(png.as_slice()).into()])
+            Self::Drawn { picture } => drawn("drawn", &picture).collect(),
+            Self::Stage { stage, picture } => drawn("stage", &picture).chain([JsValue::from(stage as f64)]).collect(),
+            Self::Still { frame, png } => {
+                array(["still".into(), (frame as f64).into(), Uint8Array::from(png.as_slice()).into()])
             }
             Self::Failed { number, reason } => array(["failed".into(), count(number), reason.into()]),
             Self::Panicked { number, message } => array(["panicked".into(), count(number), message.into()]),
@@ -102,27 +80,24 @@ impl Reply {
 
     pub(super) fn read(message: &JsValue) -> Option<Self> {
         let mut fields = Fields::of(message)?;
-        let kind = fields.text()?;
-        if kind == "ready" {
-            return Some(Self::Ready);
-        }
-        let number = fields.number()? as u64;
-        Some(match kind.as_str() {
+        Some(match fields.text()?.as_str() {
+            "ready" => Self::Ready,
             "judged" => {
+                let number = fields.count()?;
                 let said = fields.next()?;
                 let faults =
                     || said.dyn_ref::<Array>().into_iter().flat_map(Array::iter).filter_map(read_fault).collect();
                 Self::Judged { number, found: said.as_f64().map(|ev100| ev100 as f32).ok_or_else(faults) }
             }
-            "drawn" => Self::Drawn { number, picture: fields.picture()? },
+            "drawn" => Self::Drawn { picture: fields.picture()? },
             "stage" => {
                 let picture = fields.picture()?;
-                Self::Stage { number, stage: fields.number()? as usize, picture }
+                Self::Stage { stage: fields.number()? as usize, picture }
             }
-            "still" => Self::Still { number, frame: fields.number()? as i64, png: fields.bytes()? },
-            "failed" => Self::Failed { number, reason: fields.text()? },
-            "panicked" => Self::Panicked { number, message: fields.text()? },
-            "done" => Self::Done { number },
+            "still" => Self::Still { frame: fields.number()? as i64, png: fields.bytes()? },
+            "failed" => Self::Failed { number: fields.count()?, reason: fields.text()? },
+            "panicked" => Self::Panicked { number: fields.count()?, message: fields.text()? },
+            "done" => Self::Done { number: fields.count()? },
             _ => return None,
         })
     }
@@ -152,9 +127,9 @@ fn count(number: u64) -> JsValue {
     (number as f64).into()
 }
 
-fn drawn(kind: &str, number: u64, picture: &Picture) -> impl Iterator<Item = JsValue> {
+fn drawn(kind: &str, picture: &Picture) -> impl Iterator<Item = JsValue> {
     let Picture { revision, number: frame, size, scene_size, pixels, exact, draft, draw_s, advance_s } = picture;
-    let head = [JsValue::from(kind), count(number), count(revision.0), (*frame as f64).into()];
+    let head = [JsValue::from(kind), count(revision.0), (*frame as f64).into()];
     let sizes = [*size, *scene_size].concat().into_iter().map(|side| JsValue::from(side as f64));
     let pixels = Uint8Array::from(pixels.as_flattened());
     let tail = [pixels.into(), (*exact).into(), (*draft).into(), (*draw_s).into(), (*advance_s).into()];
@@ -181,6 +156,10 @@ impl Fields {
         self.next()?.as_f64()
     }
 
+    fn count(&mut self) -> Option<u64> {
+        self.number().map(|number| number as u64)
+    }
+
     fn flag(&mut self) -> Option<bool> {
         self.next()?.as_bool()
     }
@@ -194,7 +173,7 @@ impl Fields {
     }
 
     fn picture(&mut self) -> Option<Picture> {
-        let (revision, number) = (Revision(self.number()? as u64), self.number()? as i64);
+        let (revision, number) = (Revision(self.count()?), self.number()? as i64);
         let (size, scene_size, bytes) = (self.size()?, self.size()?, self.bytes()?);
         let (pixels, _) = bytes.as_chunks();
         Some(Picture {

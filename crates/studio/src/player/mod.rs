@@ -9,6 +9,10 @@ mod interruption;
 #[cfg(target_arch = "wasm32")]
 mod message;
 mod pace;
+#[cfg(any(test, target_arch = "wasm32"))]
+mod pending;
+#[cfg(any(test, target_arch = "wasm32"))]
+mod reply;
 pub mod shoot;
 mod slices;
 mod states;
@@ -20,7 +24,7 @@ mod transport;
 #[cfg(target_arch = "wasm32")]
 mod worker;
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use bansho::{Assets, Plan, SceneError};
 
@@ -109,10 +113,12 @@ pub enum Event {
         /// Why.
         reason: String,
     },
-    /// A phenomenon panicked, which is a bug in it. The state is not drawn again.
+    /// A phenomenon panicked, which is a bug in it.
     Panicked {
         /// Of which state.
         revision: Revision,
+        /// At which frame; the scene's first where it is left out.
+        number: Option<i64>,
         /// What it said.
         message: String,
     },
@@ -145,6 +151,9 @@ pub trait Player {
     /// What happened since the last time. A player without threads works here: it cuts simulations short, but neither a check nor a
     /// drawing, which take as long as the scene makes them.
     fn poll(&mut self) -> Vec<Event>;
+
+    /// Waits until there is something to [`poll`](Self::poll), for `at_most` so long. Players of pages never wait.
+    fn wait(&mut self, _at_most: Duration) {}
 
     /// Whether a wish is not fulfilled yet.
     fn is_busy(&self) -> bool;

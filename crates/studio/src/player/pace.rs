@@ -17,11 +17,12 @@ const ROOM: f64 = 0.7;
 pub struct Pace {
     step: usize,
     /// What is known of drawing, once a picture came.
-    known: Option<Drawing>,
+    known: Option<CostModel>,
 }
 
+/// What drawing a picture costs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Drawing {
+struct CostModel {
     /// s.
     fixed: f64,
     /// s a pixel.
@@ -41,7 +42,7 @@ pub struct Took {
     pub advance_s: f64,
 }
 
-impl Drawing {
+impl CostModel {
     /// What is known after a picture of `pixels` that took `draw_s`.
     fn after(known: Option<Self>, pixels: f64, draw_s: f64) -> Self {
         let last = [pixels, draw_s];
@@ -71,12 +72,12 @@ impl Pace {
     /// Learns how long a preview of the present share took where `target_s` is wanted, s.
     pub fn learn(&mut self, took: Took, target_s: f64) {
         let pixels = took.pixels.max(1) as f64;
-        let drawing = Drawing::after(self.known, pixels, took.draw_s);
-        self.known = Some(drawing);
+        let cost = CostModel::after(self.known, pixels, took.draw_s);
+        self.known = Some(cost);
         let present = self.share();
         let seconds = |step: usize| {
             let ratio = SHARES[step] / present;
-            took.advance_s + drawing.seconds(pixels * ratio * ratio)
+            took.advance_s + cost.seconds(pixels * ratio * ratio)
         };
         let worthwhile = |step: usize, room: f64| {
             let smallest = seconds(SHARES.len() - 1);

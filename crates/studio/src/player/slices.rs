@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use bansho::RenderError;
 use web_time::Instant;
 
 use super::{Event, Player, Wish, engine::Engine, interruption::Interruption};
@@ -30,7 +29,7 @@ impl Player for SlicePlayer {
         let mut events = Vec::new();
         match self.engine.fulfil(&wish, &slice, &mut |event| events.push(event)) {
             Ok(()) => {}
-            Err(RenderError::Cancelled(_)) => self.wish = Some(wish),
+            Err(error) if error.is_stop() => self.wish = Some(wish),
             Err(error) => events.push(Event::Failed { revision: wish.revision, reason: error.to_string() }),
         }
         events

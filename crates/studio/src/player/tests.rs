@@ -21,7 +21,7 @@ const SCENE: &str = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 20\n[[flam
 const STEPPED: &str =
     "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 20\n[[flame_particles]]\nparticles = 200\npreroll_s = 0.1\n";
 
-fn wish(text: &str, number: i64) -> Wish {
+pub(super) fn wish(text: &str, number: i64) -> Wish {
     Wish {
         revision: Document::new("", "").revision(),
         name: "scene".into(),
@@ -261,29 +261,39 @@ fn the_range_repeats_and_stays_within_the_shot() {
     assert!((transport.time_s() - 0.16).abs() < 1e-12);
 }
 
+/// The file that the job writes of frame `number`.
+fn file_of(text: &str, folder: &std::path::Path, number: i64) -> std::path::PathBuf {
+    let job = shoot::job(text, &folder.join("scene.toml"), Some(number));
+    let mut shooting = shoot::Shooting::start(job, || {}).unwrap();
+    loop {
+        match shooting.finished() {
+            Some(result) => {
+                assert_eq!(shooting.progress(), [1, 1]);
+                break result.unwrap();
+            }
+            None => std::thread::sleep(Duration::from_millis(2)),
+        }
+    }
+}
+
 #[test]
 fn a_still_is_the_file_that_render_writes() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("still.png");
-    let mut job = shoot::job(SCENE, &folder.path().join("scene.toml"), Some(5));
-    job.out = Some(out.clone());
-    let mut shooting = shoot::Shooting::start(job, || {}).unwrap();
-    let file = loop {
-        match shooting.finished() {
-            Some(result) => break result.unwrap(),
-            None => std::thread::sleep(Duration::from_millis(2)),
-        }
-    };
-    assert_eq!((file.as_path(), shooting.progress()), (out.as_path(), [1, 1]));
-    let decoded = bansho::media::plates::FileAssets::new(folder.path());
-    let plate = decoded.picture("still.png", 0).unwrap();
-    let mut events = Vec::new();
-    let still = Wish { still: true, ..wish(SCENE, 5) };
-    engine::Engine::default().fulfil(&still, &Unobserved, &mut |event| events.push(event)).unwrap();
-    let written = std::fs::read(&out).unwrap();
-    assert!(matches!(&events[1..], [Event::Still { number: 5, png }] if *png == written));
-    let codes = plate.colour.pixels().iter().map(|pixel| pixel.map(|value| (value * 255.0).round() as u8));
-    assert!(codes.eq(rendered_with_alpha(SCENE, 5, false)));
+    let before = SCENE.replace("frames = 20", "frames = 20\nfirst_frame = -9\noverscan = 6");
+    for (text, number, name) in [(SCENE, 5, "scene.0005.png"), (&before, -5, "scene.-0005.png")] {
+        let file = file_of(text, folder.path(), number);
+        assert_eq!(file, folder.path().join("out/scene").join(name));
+        let still = Wish { still: true, revision: bumped(text), ..wish(text, number) };
+        let events = fulfil(&mut engine::Engine::default(), &still);
+        let written = std::fs::read(&file).unwrap();
+        let same =
+            |event: &Event| matches!(event, Event::Still { number: own, png } if *own == number && *png == written);
+        assert!(same(&events[1]), "{name}");
+        let decoded = bansho::media::plates::FileAssets::new(folder.path());
+        let plate = decoded.picture(&format!("out/scene/{name}"), 0).unwrap();
+        let codes = plate.colour.pixels().iter().map(|pixel| pixel.map(|value| (value * 255.0).round() as u8));
+        assert!(codes.eq(rendered_with_alpha(&text.replace("overscan = 6", ""), number, false)), "{name}");
+    }
 }
 
 #[test]

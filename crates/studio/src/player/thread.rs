@@ -8,9 +8,8 @@ use std::{
         mpsc,
     },
     thread::JoinHandle,
+    time::Duration,
 };
-
-use bansho::RenderError;
 
 use super::{Event, Player, Wish, engine::Engine, interruption::Interruption, said};
 
@@ -18,6 +17,8 @@ use super::{Event, Player, Wish, engine::Engine, interruption::Interruption, sai
 pub struct ThreadPlayer {
     desk: Arc<Desk>,
     events: mpsc::Receiver<Event>,
+    /// What came while it was waited for.
+    waited: Vec<Event>,
     worker: Option<JoinHandle<()>>,
 }
 
@@ -81,7 +82,7 @@ impl ThreadPlayer {
             }
         };
         let worker = std::thread::Builder::new().name("player".into()).spawn(work)?;
-        Ok(Self { desk, events, worker: Some(worker) })
+        Ok(Self { desk, events, waited: Vec::new(), worker: Some(worker) })
     }
 }
 
@@ -105,13 +106,14 @@ fn work(desk: &Desk, emit: &mut dyn FnMut(Event)) {
         let watch = Interruption::new(|advancing| desk.has_moved_on(number, advancing || !must_draw));
         let outcome = catch_unwind(AssertUnwindSafe(|| engine.fulfil(&wish, &watch, emit)));
         desk.done.store(number, Ordering::Relaxed);
-        must_draw = matches!(outcome, Ok(Err(RenderError::Cancelled(_))));
+        must_draw = matches!(&outcome, Ok(Err(error)) if error.is_stop());
         match outcome {
-            Ok(Ok(()) | Err(RenderError::Cancelled(_))) => {}
+            Ok(Ok(())) => {}
+            Ok(Err(error)) if error.is_stop() => {}
             Ok(Err(error)) => emit(Event::Failed { revision: wish.revision, reason: error.to_string() }),
             Err(panic) => {
                 engine.forget();
-                emit(Event::Panicked { revision: wish.revision, message: said(panic.as_ref()) });
+                emit(Event::Panicked { revision: wish.revision, number: wish.number, message: said(panic.as_ref()) });
             }
         }
     }
@@ -128,7 +130,13 @@ impl Player for ThreadPlayer {
     }
 
     fn poll(&mut self) -> Vec<Event> {
-        self.events.try_iter().collect()
+        std::mem::take(&mut self.waited).into_iter().chain(self.events.try_iter()).collect()
+    }
+
+    fn wait(&mut self, at_most: Duration) {
+        if self.waited.is_empty() {
+            self.waited.extend(self.events.recv_timeout(at_most));
+        }
     }
 
     fn is_busy(&self) -> bool {

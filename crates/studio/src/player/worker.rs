@@ -1,7 +1,7 @@
 //! Wishes fulfilled by a worker of the page, which runs this same program in a thread of its own: however long a picture
 //! takes, the page answers. Nothing is shared; both sides hear messages only.
 
-use std::{cell::RefCell, collections::VecDeque, rc::Rc, sync::Arc};
+use std::{cell::RefCell, rc::Rc, sync::Arc};
 
 use bansho::{Assets, Plan, SceneError};
 use js_sys::Array;
@@ -10,12 +10,11 @@ use web_sys::{DedicatedWorkerGlobalScope, MessageEvent, Worker, WorkerOptions, W
 
 use super::{
     Event, Player, SlicePlayer, Wish,
-    message::{Order, Reply},
+    message::Order,
+    pending::{News, Pending},
+    reply::{Heard, Reply},
 };
-use crate::{
-    document::{Found, recheck},
-    examples::Bundle,
-};
+use crate::{document::Found, examples::Bundle};
 
 /// The script that starts the program in a worker; the page's maker puts it beside the page.
 const SCRIPT: &str = "worker.js";
@@ -26,12 +25,7 @@ pub struct WorkerPlayer {
     wake: Rc<dyn Fn()>,
     /// What a worker must know that takes the place of one that panicked.
     files: Vec<(String, Vec<u8>)>,
-    /// Wishes that something may still come of, with their numbers.
-    wishes: VecDeque<(u64, Wish)>,
-    newest: u64,
-    done: u64,
-    /// Whether the worker ended before anything was wished for.
-    lost: bool,
+    pending: Pending,
 }
 
 /// A worker, and what it said.
@@ -42,13 +36,6 @@ struct Link {
     outbox: Option<Vec<Array>>,
     _listen: Closure<dyn FnMut(MessageEvent)>,
     _mourn: Closure<dyn FnMut()>,
-}
-
-/// What comes from a worker.
-enum Heard {
-    Said(Reply),
-    /// It ended without a word, as where memory runs out.
-    Ended,
 }
 
 impl Link {
@@ -106,84 +93,48 @@ impl WorkerPlayer {
     pub fn start(wake: impl Fn() + 'static) -> Result<Self, JsValue> {
         let wake: Rc<dyn Fn()> = Rc::new(wake);
         let link = Link::start(wake.clone())?;
-        Ok(Self { link, wake, files: Vec::new(), wishes: VecDeque::new(), newest: 0, done: 0, lost: false })
+        Ok(Self { link, wake, files: Vec::new(), pending: Pending::default() })
     }
 
-    fn take_in(&mut self, heard: Heard) -> Option<Event> {
-        let reply = match heard {
-            Heard::Said(reply) => reply,
-            Heard::Ended => {
-                let message = "it ended without a word, as where memory runs out".to_owned();
-                let Some((number, _)) = self.wishes.front() else {
-                    self.lost = true;
-                    return None;
-                };
-                Reply::Panicked { number: *number, message }
-            }
-        };
-        match reply {
-            Reply::Ready => {
-                self.link.flush();
-                None
-            }
-            Reply::Judged { number, found } => {
-                let wish = self.wish_of(number)?;
-                let outcome = recheck(&wish.name, &wish.text, &wish.assets, found);
-                Some(Event::Judged { revision: wish.revision, outcome })
-            }
-            Reply::Drawn { picture, .. } => Some(Event::Drawn(picture)),
-            Reply::Stage { stage, picture, .. } => Some(Event::Stage(stage, picture)),
-            Reply::Still { frame, png, .. } => Some(Event::Still { number: frame, png }),
-            Reply::Failed { number, reason } => {
-                Some(Event::Failed { revision: self.wish_of(number)?.revision, reason })
-            }
-            Reply::Panicked { number, message } => {
-                let revision = self.wish_of(number)?.revision;
-                self.restart();
-                Some(Event::Panicked { revision, message })
-            }
-            Reply::Done { number } => {
-                self.done = number;
-                self.wishes.retain(|(own, _)| *own > number);
-                None
-            }
-        }
-    }
-
-    fn wish_of(&self, number: u64) -> Option<&Wish> {
-        self.wishes.iter().find(|(own, _)| *own == number).map(|(_, wish)| wish)
-    }
-
-    /// Another worker in place of one that is gone. Where none can be had, nothing more is drawn, as the panic told.
+    /// Another worker in place of one that is gone, and the newest wish for it. Where none can be had, nothing more is drawn, as the panic
+    /// told.
     fn restart(&mut self) {
-        self.wishes.clear();
-        self.done = self.newest;
-        if let Ok(link) = Link::start(self.wake.clone()) {
-            self.link = link;
-            self.files.iter().for_each(|(name, bytes)| self.link.say(Order::file(name, bytes)));
+        let Ok(link) = Link::start(self.wake.clone()) else { return self.pending.give_up() };
+        // What the old one may still say goes with it.
+        self.link = link;
+        self.files.iter().for_each(|(name, bytes)| self.link.say(Order::file(name, bytes)));
+        self.tell_newest();
+    }
+
+    fn tell_newest(&mut self) {
+        if let Some((number, wish)) = self.pending.newest() {
+            self.link.say(Order::wish(number, wish));
         }
     }
 }
 
 impl Player for WorkerPlayer {
     fn wish(&mut self, wish: Wish) {
-        self.newest += 1;
-        self.link.say(Order::wish(self.newest, &wish));
-        self.wishes.push_back((self.newest, wish));
-        if std::mem::take(&mut self.lost) {
-            // Now there is somebody to tell.
-            self.link.inbox.borrow_mut().push(Heard::Ended);
-            (self.wake)();
+        if self.pending.note(wish) {
+            self.tell_newest();
+        } else {
+            self.restart();
         }
     }
 
     fn poll(&mut self) -> Vec<Event> {
-        let heard = self.link.inbox.take();
-        heard.into_iter().filter_map(|heard| self.take_in(heard)).collect()
+        let News { events, listens, gone } = self.pending.take_in(self.link.inbox.take());
+        if listens {
+            self.link.flush();
+        }
+        if gone {
+            self.restart();
+        }
+        events
     }
 
     fn is_busy(&self) -> bool {
-        self.done != self.newest
+        self.pending.is_busy()
     }
 
     fn waits_for_poll(&self) -> bool {
@@ -289,9 +240,9 @@ impl Workshop {
 fn reply(number: u64, event: Event) -> Reply {
     match event {
         Event::Judged { outcome, .. } => Reply::Judged { number, found: found(outcome) },
-        Event::Drawn(picture) => Reply::Drawn { number, picture },
-        Event::Stage(stage, picture) => Reply::Stage { number, stage, picture },
-        Event::Still { number: frame, png } => Reply::Still { number, frame, png },
+        Event::Drawn(picture) => Reply::Drawn { picture },
+        Event::Stage(stage, picture) => Reply::Stage { stage, picture },
+        Event::Still { number: frame, png } => Reply::Still { frame, png },
         Event::Failed { reason, .. } => Reply::Failed { number, reason },
         Event::Panicked { message, .. } => Reply::Panicked { number, message },
     }

@@ -54,8 +54,16 @@ impl AuroraEditor {
         }
     }
 
+    /// From the farthest layer to the nearest.
     fn paint_target(&self, painter: &Painter, drawing: &Drawing, plane: &Plane) {
         title(painter, plane, &format!("shape {}", self.target + 1));
+        self.paint_ways(painter, drawing, plane);
+        self.paint_sheets(painter, drawing, plane);
+        self.paint_gesture(painter, drawing, plane);
+    }
+
+    /// The shape before, and the ways from there.
+    fn paint_ways(&self, painter: &Painter, drawing: &Drawing, plane: &Plane) {
         if let Some(source) = self.target.checked_sub(1) {
             for sheet in drawing.lines(source) {
                 painter.line(plane.line(&sheet), Stroke::new(3.0, FAINT));
@@ -69,24 +77,29 @@ impl AuroraEditor {
             painter.line_segment([from, to], Stroke::new(1.5, MARK));
             painter.circle_filled(to, 3.5, MARK);
         }
+    }
+
+    fn paint_sheets(&self, painter: &Painter, drawing: &Drawing, plane: &Plane) {
         let next = self.slot(drawing);
-        let usual = !drawing.is_stated();
+        let shows_points = drawing.is_stated() && matches!(self.tool, Tool::Move | Tool::Smooth | Tool::Erase);
         for (number, sheet) in drawing.lines(self.target).iter().enumerate() {
-            let colour = if usual {
-                FAINT
-            } else if next == Some(number) {
-                NEXT
-            } else {
-                SHEET
+            let colour = match next {
+                _ if !drawing.is_stated() => FAINT,
+                Some(next) if next == number => NEXT,
+                _ => SHEET,
             };
             self.paint_sheet(painter, drawing, plane, number, sheet, colour);
             numbered(painter, plane, sheet, number, colour);
-            if matches!(self.tool, Tool::Move | Tool::Smooth | Tool::Erase) && !usual {
+            if shows_points {
                 for point in drawing.points(self.target, number) {
                     painter.circle(plane.to_screen(point), 3.0, GROUND, Stroke::new(1.2, colour));
                 }
             }
         }
+    }
+
+    /// What a hand is doing.
+    fn paint_gesture(&self, painter: &Painter, drawing: &Drawing, plane: &Plane) {
         match &self.gesture {
             Gesture::Stroke(stroke) => {
                 painter.line(plane.line(stroke), Stroke::new(2.5, NEXT));

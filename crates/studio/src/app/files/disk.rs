@@ -13,6 +13,7 @@ use super::{
     chooser::Chooser,
     moving,
     question::{Answer, Leaving, Question},
+    tell_end,
 };
 use crate::{
     app::{scene_panel::Subject, session::Session, store::Store},
@@ -20,7 +21,7 @@ use crate::{
         files::{self, Outside, Recent},
         watch::Watch,
     },
-    player::shoot::{self, Ended, Shooting},
+    player::shoot::{self, Shooting},
 };
 
 const BUSY: &str = "pictures are being rendered already; wait for them, or stop that with the cross beside its bar";
@@ -68,6 +69,10 @@ impl Files {
             Outside::Changed(text) if *text != **session.document.text() => {
                 self.question = Some(Question::ChangedOutside(leaving));
             }
+            Outside::Unreadable(reason) => {
+                let what = format!("What lies in {} cannot be read: {reason}", path.display());
+                self.question = Some(Question::Replace(path, what, leaving));
+            }
             _ => self.save_to(session, path, leaving),
         }
     }
@@ -85,7 +90,8 @@ impl Files {
     fn save_as(&mut self, session: &mut Session, path: PathBuf, leaving: Option<Leaving>) {
         let path = files::named_as_scene(path);
         if path.exists() && session.path.as_ref() != Some(&path) {
-            self.question = Some(Question::Replace(path, leaving));
+            let what = format!("There is a file of that name: {}", path.display());
+            self.question = Some(Question::Replace(path, what, leaving));
         } else {
             self.save_to(session, path, leaving);
         }
@@ -93,10 +99,8 @@ impl Files {
 
     fn save_to(&mut self, session: &mut Session, path: PathBuf, leaving: Option<Leaving>) {
         let moves = session.path.as_ref() != Some(&path);
-        let saved = if moves { moving::follow(session, &path) } else { Ok(()) };
-        let saved = saved.and_then(|()| files::save(&mut session.document, &path));
-        if let Err(error) = saved {
-            session.set_notice(Some(error.to_string()));
+        if let Err(reason) = write(session, &path, moves) {
+            session.set_notice(Some(reason));
             return;
         }
         session.set_notice(None);
@@ -204,6 +208,10 @@ impl Files {
                 session.document.mark_gone(true);
                 session.set_notice(Some(format!("{}: the file is gone; saving writes it anew", path.display())));
             }
+            Outside::Unreadable(reason) => {
+                let notice = format!("{}: another program wrote what cannot be read: {reason}", path.display());
+                session.set_notice(Some(notice));
+            }
             Outside::Changed(_) if session.document.differs() => self.question = Some(Question::ChangedOutside(None)),
             Outside::Changed(text) => take_outside(session, &text),
         }
@@ -230,12 +238,7 @@ impl Files {
         ui.ctx().request_repaint_after(Duration::from_millis(200));
         if let Some(result) = shooting.finished() {
             self.shelf.shooting = None;
-            let told = match result {
-                Ok(file) => format!("written: {}", file.display()),
-                Err(Ended::Failed(reason)) => reason,
-                Err(Ended::Panicked(message)) => session.told_of_panic(&message),
-            };
-            session.set_notice(Some(told));
+            tell_end(session, result.map(|file| format!("written: {}", file.display())));
         }
     }
 
@@ -244,13 +247,15 @@ impl Files {
             (Question::Open(chooser), _) => self.open(session, chooser.path()),
             (Question::Relink(place, chooser), _) => session.relink(&place, &chooser.path()),
             (Question::SaveAs(chooser, leaving), _) => self.save_as(session, chooser.path(), leaving),
-            (Question::Replace(path, leaving), Answer::Do) => self.save_to(session, path, leaving),
-            (Question::Replace(_, leaving), _) => self.ask_where_to_save(session, leaving),
+            (Question::Replace(path, _, leaving), Answer::Do) => self.save_to(session, path, leaving),
+            (Question::Replace(_, _, leaving), _) => self.ask_where_to_save(session, leaving),
             (Question::ChangedOutside(_), Answer::Do) => {
                 let there = session.path.as_ref().map(|path| files::outside(&session.document, path));
                 // As it is now: the other program may have gone on writing.
-                if let Some(Outside::Changed(text)) = there {
-                    take_outside(session, &text);
+                match there {
+                    Some(Outside::Changed(text)) => take_outside(session, &text),
+                    Some(Outside::Unreadable(reason)) => session.set_notice(Some(reason)),
+                    Some(Outside::Same | Outside::Gone) | None => {}
                 }
             }
             (Question::ChangedOutside(leaving), Answer::Save) => {
@@ -261,6 +266,16 @@ impl Files {
             (Question::ChangedOutside(_), Answer::Cancel) | (Question::Leave(_) | Question::StopRendering, _) => {}
         }
     }
+}
+
+/// Writes the scene to `path`; one that `moves` there, with its paths made right.
+///
+/// # Errors
+/// Why it cannot be saved there; it stays as it was.
+fn write(session: &mut Session, path: &Path, moves: bool) -> Result<(), String> {
+    let text = if moves { moving::follow(session, path) } else { Ok(session.document.text().clone()) };
+    let text = text.map_err(|error| error.to_string())?;
+    files::save(&mut session.document, path, text).map_err(|error| error.to_string())
 }
 
 /// Takes what another program wrote as an edit that can be undone.

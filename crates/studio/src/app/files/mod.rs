@@ -29,7 +29,10 @@ use self::{
     unsaved::Unsaved,
 };
 use super::{scene_panel::Subject, session::Session, store::Store};
-use crate::document::{Document, files, recovery::Recovered};
+use crate::{
+    document::{Document, files, recovery::Recovered},
+    player::shoot::Ended,
+};
 
 /// Files of the window: what lies where, and what waits to be asked.
 pub(super) struct Files {
@@ -133,6 +136,15 @@ impl Files {
     }
 }
 
+/// Tells the user how rendering ended: with this, or why not. After a panic the work is kept at once.
+fn tell_end(session: &mut Session, ended: Result<String, Ended>) {
+    let told = match ended {
+        Ok(told) | Err(Ended::Failed(told)) => told,
+        Err(Ended::Panicked(message)) => session.told_of_panic(&message),
+    };
+    session.set_notice(Some(told));
+}
+
 /// What was `recovered`, as an edit of what lies in its file now.
 fn reopened(recovered: &Recovered) -> (Document, Option<PathBuf>) {
     let named = Some(&recovered.origin).filter(|origin| !origin.is_empty());
@@ -143,4 +155,23 @@ fn reopened(recovered: &Recovered) -> (Document, Option<PathBuf>) {
     document.replace("recover", &recovered.text);
     document.seal();
     (document, path)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{examples::Bundle, player::SlicePlayer};
+
+    #[test]
+    fn a_panic_while_rendering_is_told_and_the_work_kept_at_once() {
+        let document = Document::new("scene", "bansho = 1\n");
+        let mut session = Session::new(document, None, Box::<SlicePlayer>::default(), |_| Arc::new(Bundle::default()));
+        tell_end(&mut session, Err(Ended::Failed("the disk is full".into())));
+        assert_eq!((session.notice(), session.keep_now), (Some("the disk is full"), false));
+        tell_end(&mut session, Err(Ended::Panicked("broken on purpose".into())));
+        assert!(session.notice().is_some_and(|notice| notice.contains("panicked") && notice.contains("on purpose")));
+        assert!(session.keep_now);
+    }
 }

@@ -2,26 +2,42 @@
 //! along for an example is laid beside it.
 
 use std::{
-    fs,
     path::{Component, Path, PathBuf},
+    sync::Arc,
 };
 
 use bansho::{
     base::parameters::Value,
-    media::{MediaError, atomic},
-    render::scene::operation::Operation,
+    media::MediaError,
+    render::scene::{
+        edit::EditError,
+        operation::{self, Operation},
+    },
 };
 
 use crate::{
     app::session::{Session, folder},
-    document::named_files,
+    document::{files, named_files},
 };
 
-/// Makes all paths of the scene right for the file `to`, as one step of the history.
+/// Why a scene cannot go elsewhere.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum MovingError {
+    /// A file that must lie beside the scene cannot be written.
+    #[error(transparent)]
+    Media(#[from] MediaError),
+    /// Its paths lead elsewhere from there, and cannot be changed.
+    #[error(
+        "the scene names files, and their paths cannot be made right for another folder: {0}; mend the text, or undo first"
+    )]
+    Edit(#[from] EditError),
+}
+
+/// The scene's text as it must be in the file `to`, where all paths of it lead to the same files. The scene itself stays as it is.
 ///
 /// # Errors
-/// A file that must lie beside the scene cannot be written.
-pub(super) fn follow(session: &mut Session, to: &Path) -> Result<(), MediaError> {
+/// A file that must lie beside the scene cannot be written, or a path must be changed in a text that is no TOML.
+pub(super) fn follow(session: &Session, to: &Path) -> Result<Arc<str>, MovingError> {
     let before = folder(session.path.as_deref()).to_path_buf();
     let after = folder(Some(to)).to_path_buf();
     let mut operations = Vec::new();
@@ -38,33 +54,16 @@ pub(super) fn follow(session: &mut Session, to: &Path) -> Result<(), MediaError>
             operations.push(Operation::Set { place, value: Value::Text(new) });
         }
     }
-    if !operations.is_empty() {
-        session.document.seal();
-        session.edit("paths", &operations);
-        session.document.seal();
-    }
-    Ok(())
+    let text = session.document.text();
+    Ok(if operations.is_empty() { text.clone() } else { operation::apply(text, &operations)?.into() })
 }
 
 /// Writes `bytes` as `name` into `folder`, or under a free name where another file has that; what it is called there.
 fn laid_beside(name: &str, bytes: &[u8], folder: &Path) -> Result<String, MediaError> {
-    let (stem, ending) = name.rsplit_once('.').unwrap_or((name, ""));
-    let mut own = name.to_owned();
-    let mut number = 1;
-    loop {
-        let file = folder.join(&own);
-        match fs::read(&file) {
-            Ok(there) if there == bytes => return Ok(own),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                atomic::write_bytes(&file, bytes)?;
-                return Ok(own);
-            }
-            Ok(_) | Err(_) => {
-                number += 1;
-                own = format!("{stem} {number}.{ending}");
-            }
-        }
-    }
+    let (stem, ending) = name.split_at(name.rfind('.').unwrap_or(name.len()));
+    let file = files::write_beside(|which| folder.join(format!("{stem}{which}{ending}")), bytes)?;
+    let own = file.strip_prefix(folder).unwrap_or(&file);
+    Ok(own.to_string_lossy().replace('\\', "/"))
 }
 
 /// What a scene in `after` calls the file that one in `before` calls `name`; the same where there is no such file.
@@ -98,6 +97,8 @@ fn relative(file: &Path, folder: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]
@@ -114,6 +115,8 @@ mod tests {
         let lay = |bytes: &[u8]| laid_beside("plates/a.png", bytes, folder.path()).unwrap();
         assert_eq!([lay(b"one"), lay(b"one"), lay(b"two")], ["plates/a.png", "plates/a.png", "plates/a 2.png"]);
         assert_eq!(fs::read(folder.path().join("plates/a.png")).unwrap(), b"one");
+        fs::write(folder.path().join("file"), "").unwrap();
+        laid_beside("a.png", b"one", &folder.path().join("file")).unwrap_err();
     }
 
     #[test]

@@ -12,10 +12,11 @@ use super::{
     Files,
     browser::{self, Inbox, Parts},
     question::Leaving,
+    tell_end,
 };
 use crate::{
     app::{scene_panel::Subject, session::Session, store::Store},
-    player::{Event, Player, Wish, WorkerPlayer},
+    player::{Event, Player, Wish, WorkerPlayer, shoot::Ended},
 };
 
 /// What the page knows of files.
@@ -137,10 +138,9 @@ impl Files {
 
     /// Takes in finished pictures, and tells how rendering ended.
     fn tend_rendering(&mut self, session: &mut Session) {
-        let notice = self.shelf.rendering.as_mut().and_then(Rendering::tend);
-        if notice.is_some() {
+        if let Some(ended) = self.shelf.rendering.as_mut().and_then(Rendering::tend) {
             self.shelf.rendering = None;
-            session.set_notice(notice);
+            tell_end(session, ended);
         }
     }
 
@@ -175,11 +175,14 @@ fn stem(session: &Session) -> &str {
 
 impl Rendering {
     /// Takes in what was finished and asks for what comes next; how it ended, once it has.
-    fn tend(&mut self) -> Option<String> {
+    fn tend(&mut self) -> Option<Result<String, Ended>> {
         self.player.poll().into_iter().find_map(|event| match event {
-            Event::Still { number, png } => self.take(number, &png).unwrap_or_else(Some),
-            Event::Judged { outcome: Err(error), .. } => Some(format!("the scene has faults: {error}")),
-            Event::Failed { reason, .. } | Event::Panicked { message: reason, .. } => Some(reason),
+            Event::Still { number, png } => self.take(number, &png).map_err(Ended::Failed).transpose(),
+            Event::Judged { outcome: Err(error), .. } => {
+                Some(Err(Ended::Failed(format!("the scene has faults: {error}"))))
+            }
+            Event::Failed { reason, .. } => Some(Err(Ended::Failed(reason))),
+            Event::Panicked { message, .. } => Some(Err(Ended::Panicked(message))),
             Event::Judged { .. } | Event::Drawn(_) | Event::Stage(..) => None,
         })
     }

@@ -22,9 +22,9 @@ pub(super) enum Question {
     /// Which file to save to, and where to then.
     #[cfg(not(target_arch = "wasm32"))]
     SaveAs(Chooser, Option<Leaving>),
-    /// Whether this file may be replaced by what is saved, and where to then.
+    /// Whether this file may be replaced by what is saved, what is said of it, and where to then.
     #[cfg(not(target_arch = "wasm32"))]
-    Replace(PathBuf, Option<Leaving>),
+    Replace(PathBuf, String, Option<Leaving>),
     /// Whether unsaved work may be left, to open this or to close.
     Leave(Leaving),
     /// Whether what is rendered may be stopped, to close.
@@ -58,52 +58,60 @@ pub(super) enum Answer {
 
 /// Asks; what was answered, once it was.
 pub(super) fn answer(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
-    let choices: &[(&str, Answer)] = match question {
-        #[cfg(not(target_arch = "wasm32"))]
-        Question::Open(chooser) => {
-            if chooser.show(ui, "Open which scene?") {
-                return Some(Answer::Do);
-            }
-            &[("Open", Answer::Do), ("Cancel", Answer::Cancel)]
-        }
-        #[cfg(not(target_arch = "wasm32"))]
-        Question::Relink(_, chooser) => {
-            if chooser.show(ui, "Which file in its stead?") {
-                return Some(Answer::Do);
-            }
-            &[("Relink", Answer::Do), ("Cancel", Answer::Cancel)]
-        }
-        #[cfg(not(target_arch = "wasm32"))]
-        Question::SaveAs(chooser, _) => {
-            chooser.show(ui, "Save as");
-            &[("Save", Answer::Do), ("Cancel", Answer::Cancel)]
-        }
-        #[cfg(not(target_arch = "wasm32"))]
-        Question::Replace(path, _) => {
-            ui.label(format!("There is a file of that name: {}", path.display()));
-            &[("Replace it", Answer::Do), ("Another name", Answer::Save), ("Cancel", Answer::Cancel)]
-        }
-        Question::StopRendering => {
-            ui.label("Pictures are being rendered. Whole frames stay, and rendering the shot goes on from there.");
-            &[("Stop and close", Answer::Do), ("Cancel", Answer::Cancel)]
-        }
-        Question::Leave(_) => {
-            ui.label("There is unsaved work.");
-            &[("Save", Answer::Save), ("Leave it", Answer::Do), ("Cancel", Answer::Cancel)]
-        }
-        #[cfg(not(target_arch = "wasm32"))]
-        Question::ChangedOutside(_) => {
-            ui.label("Another program changed the file, and there is unsaved work here.");
-            &[("Take theirs", Answer::Do), ("Save mine", Answer::Save), ("Decide later", Answer::Cancel)]
-        }
-    };
-    let mut chosen = None;
+    let mut chosen = question.body(ui).then_some(Answer::Do);
     ui.horizontal(|ui| {
-        for (text, answer) in choices {
+        for (text, answer) in question.choices() {
             if ui.button(*text).clicked() {
                 chosen = Some(*answer);
             }
         }
     });
     chosen
+}
+
+impl Question {
+    /// What is asked; whether it is answered thereby, as by a double-click on a file.
+    fn body(&mut self, ui: &mut Ui) -> bool {
+        let said = match self {
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Open(chooser) => return chooser.show(ui, "Open which scene?"),
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Relink(_, chooser) => return chooser.show(ui, "Which file in its stead?"),
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::SaveAs(chooser, _) => {
+                // A double-click chooses a name, to be saved over only after a question.
+                chooser.show(ui, "Save as");
+                return false;
+            }
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Replace(_, said, _) => said.as_str(),
+            Self::Leave(_) => "There is unsaved work.",
+            Self::StopRendering => {
+                "Pictures are being rendered. Whole frames stay, and rendering the shot goes on from there."
+            }
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::ChangedOutside(_) => "Another program changed the file, and there is unsaved work here.",
+        };
+        ui.label(said);
+        false
+    }
+
+    /// Its answers, as its buttons say them.
+    fn choices(&self) -> &'static [(&'static str, Answer)] {
+        use Answer::{Cancel, Do, Save};
+        match self {
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Open(_) => &[("Open", Do), ("Cancel", Cancel)],
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Relink(..) => &[("Relink", Do), ("Cancel", Cancel)],
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::SaveAs(..) => &[("Save", Do), ("Cancel", Cancel)],
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Replace(..) => &[("Replace it", Do), ("Another name", Save), ("Cancel", Cancel)],
+            Self::Leave(_) => &[("Save", Save), ("Leave it", Do), ("Cancel", Cancel)],
+            Self::StopRendering => &[("Stop and close", Do), ("Cancel", Cancel)],
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::ChangedOutside(_) => &[("Take theirs", Do), ("Save mine", Save), ("Decide later", Cancel)],
+        }
+    }
 }

@@ -34,6 +34,9 @@ pub(in crate::app) struct Unsaved {
     kept: Option<(Revision, bool)>,
     #[cfg(not(target_arch = "wasm32"))]
     autosave: Option<Autosave>,
+    /// Why nothing can be kept here, until the user was told.
+    #[cfg(not(target_arch = "wasm32"))]
+    untold: Option<String>,
     #[cfg(target_arch = "wasm32")]
     tabs: Tabs,
 }
@@ -42,13 +45,19 @@ impl Unsaved {
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn new(store: &Store) -> Self {
         let folder = store.file(NAME);
+        let begun = folder.as_deref().map(|folder| Autosave::begin(folder, "studio")).transpose();
+        // Where nothing can be kept, the studio works without, and says so once there is something to keep.
+        let (autosave, untold) = match begun {
+            Ok(autosave) => (autosave, None),
+            Err(error) => (None, Some(error.to_string())),
+        };
         Self {
             recovered: folder.as_deref().map(recovery::recoverable).unwrap_or_default(),
             reopened: Vec::new(),
             last_kept: 0.0,
             kept: None,
-            // Where nothing can be kept, the studio works without.
-            autosave: folder.and_then(|folder| Autosave::begin(&folder, "studio").ok()),
+            autosave,
+            untold,
         }
     }
 
@@ -84,7 +93,12 @@ impl Unsaved {
 
     /// Whether what is unsaved is kept now.
     #[cfg(not(target_arch = "wasm32"))]
-    fn keep(&self, session: &mut Session) -> bool {
+    fn keep(&mut self, session: &mut Session) -> bool {
+        if session.document.is_dirty()
+            && let Some(reason) = self.untold.take()
+        {
+            session.set_notice(Some(format!("unsaved work is not kept here, so save it now and then: {reason}")));
+        }
         let kept = self.autosave.as_ref().map(|kept| kept.keep(&session.document, session.path.as_deref()));
         if let Some(Err(error)) = &kept {
             session.set_notice(Some(format!("unsaved work cannot be kept: {error}")));
@@ -94,7 +108,7 @@ impl Unsaved {
 
     /// Whether what is unsaved is kept now.
     #[cfg(target_arch = "wasm32")]
-    fn keep(&self, session: &mut Session) -> bool {
+    fn keep(&mut self, session: &mut Session) -> bool {
         let document = &session.document;
         let work = document.is_dirty().then(|| recovery::kept(document.name(), document.text()));
         let kept = self.tabs.keep(work.as_deref());

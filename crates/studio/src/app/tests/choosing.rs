@@ -230,3 +230,45 @@ fn a_scene_that_cannot_be_saved_says_so_and_stays_unsaved() {
     assert!(notice(&mut harness).contains("scene.toml"), "{}", notice(&mut harness));
     assert!(harness.state_mut().session().document.is_dirty() && harness.state_mut().session().path.is_none());
 }
+
+#[test]
+fn a_scene_that_cannot_be_saved_elsewhere_keeps_its_paths() {
+    let things = things();
+    let file = |name: &str| things.path().join(name);
+    let scene = format!("{SCENE}[plate]\nimage = \"board.png\"\n");
+    fs::write(file("scene.toml"), &scene).unwrap();
+    let mut harness = window("bansho = 1\n");
+    open(&mut harness, &file("scene.toml"));
+    let refused = |harness: &mut Harness<'_, Studio>, to: &str, reason: &str, unchanged: &str| {
+        menu(harness, &["File", "Save as…"]);
+        answer(harness, &file(to), "Save");
+        assert!(notice(harness).contains(reason), "{}", notice(harness));
+        assert_eq!(text(harness), unchanged);
+        assert_eq!(harness.state_mut().session().path, Some(file("scene.toml")));
+    };
+    refused(&mut harness, "board.png/deep/scene.toml", "not a folder", &scene);
+    let faulty = format!("{scene}[light\n");
+    edited(&mut harness, &faulty);
+    refused(&mut harness, "deep/scene.toml", "not TOML", &faulty);
+    assert!(!file("deep/scene.toml").exists() && harness.state_mut().session().document.is_dirty());
+    save(&mut harness);
+    assert_eq!(fs::read_to_string(file("scene.toml")).unwrap(), faulty, "where it lies its paths are right");
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_not_written_over_unasked() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    fs::write(&path, SCENE).unwrap();
+    let mut harness = window("bansho = 1\n");
+    open(&mut harness, &path);
+    edited(&mut harness, &SCENE.replace("0.9", "1.3"));
+    fs::write(&path, b"\xff\xfe").unwrap();
+    save(&mut harness);
+    harness.get_by_label_contains("cannot be read");
+    confirm(&mut harness, "Cancel");
+    assert_eq!(fs::read(&path).unwrap(), b"\xff\xfe");
+    save(&mut harness);
+    confirm(&mut harness, "Replace it");
+    assert!(fs::read_to_string(&path).unwrap().contains("height = 1.3"));
+}

@@ -8,7 +8,7 @@ use egui_kittest::{Harness, kittest::Queryable};
 
 use super::{SCENE, Session, Studio, assets};
 use crate::{
-    document::{Document, check},
+    document::{Document, Revision, check},
     player::{Event, Picture, Player, Wish},
 };
 
@@ -48,6 +48,12 @@ impl Fake {
 
     fn wished(&self) -> usize {
         self.0.borrow().wishes.len()
+    }
+
+    /// A phenomenon panics at frame `number` of `revision`.
+    fn panic(&self, revision: Revision, number: i64) {
+        let event = Event::Panicked { revision, number: Some(number), message: "broken on purpose".into() };
+        self.0.borrow_mut().events.push(event);
     }
 
     /// Fulfils the last wish: the scene is good, and its picture took so long, s.
@@ -129,10 +135,11 @@ fn late_news_of_a_document_that_was_open_before_is_none() {
     session.update(0.1, WINDOW, false);
     assert!(session.picture().is_none() && session.plan().is_none());
     let revision = session.document.revision();
-    fake.0
-        .borrow_mut()
-        .events
-        .push(Event::Panicked { revision: Document::new("", "").revision(), message: "late".into() });
+    fake.0.borrow_mut().events.push(Event::Panicked {
+        revision: Document::new("", "").revision(),
+        number: None,
+        message: "late".into(),
+    });
     session.update(0.2, WINDOW, false);
     assert!(!session.is_broken() && session.notice().is_none());
     fake.fulfil(0.01);
@@ -150,13 +157,77 @@ fn what_was_broken_by_a_file_is_tried_again_with_another() {
     let (mut session, fake) = session();
     session.update(0.0, WINDOW, false);
     let revision = session.document.revision();
-    fake.0.borrow_mut().events.push(Event::Panicked { revision, message: "broken".into() });
+    fake.panic(revision, 0);
     session.update(0.1, WINDOW, false);
     assert!(session.is_broken());
     let wished = fake.wished();
     session.reload_assets();
     session.update(0.2, WINDOW, false);
     assert!(!session.is_broken() && fake.wished() == wished + 1);
+}
+
+#[test]
+fn a_frame_that_panicked_is_not_drawn_again_unless_asked_for_and_others_are() {
+    let (mut session, fake) = session();
+    session.update(0.0, WINDOW, false);
+    fake.fulfil(0.01);
+    session.update(0.1, WINDOW, false);
+    let revision = session.document.revision();
+    let mut at = |number: i64| {
+        session.transport.go_to(number);
+        session.update(0.2, WINDOW, false);
+        let wished = fake.last().number == Some(number);
+        if number == 3 {
+            fake.panic(revision, number);
+        } else {
+            fake.fulfil(0.01);
+        }
+        session.update(0.3, WINDOW, false);
+        (wished, session.is_broken())
+    };
+    assert_eq!([at(3), at(4)], [(true, true), (true, false)], "of one state");
+    let wished = fake.wished();
+    session.transport.go_to(3);
+    session.update(0.4, WINDOW, false);
+    assert!(session.is_broken() && fake.wished() == wished);
+    session.retry();
+    session.update(0.5, WINDOW, false);
+    assert!(!session.is_broken() && fake.last().number == Some(3));
+}
+
+#[test]
+fn a_scene_that_panics_while_it_is_checked_is_broken_at_every_frame() {
+    let (mut session, fake) = session();
+    session.update(0.0, WINDOW, false);
+    fake.fulfil(0.01);
+    session.update(0.1, WINDOW, false);
+    session.document.replace("typing", "bansho = 1\n[[rain]]\n");
+    session.update(0.2, WINDOW, false);
+    fake.panic(session.document.revision(), 0);
+    session.update(0.3, WINDOW, false);
+    let wished = fake.wished();
+    session.transport.go_to(4);
+    session.update(0.4, WINDOW, false);
+    assert!(session.is_broken() && fake.wished() == wished);
+}
+
+#[test]
+fn the_window_offers_to_draw_a_frame_once_more_that_panicked() {
+    let (session, fake) = session();
+    let revision = session.document.revision();
+    let mut harness = Harness::builder()
+        .with_size(vec2(1200.0, 800.0))
+        .build_ui_state(|ui, studio: &mut Studio| studio.show(ui), Studio::new(session, None));
+    harness.run_steps(2);
+    assert!(harness.query_by_label("Retry").is_none());
+    fake.panic(revision, 0);
+    harness.run_steps(2);
+    harness.get_by_label_contains("a phenomenon panicked");
+    let wished = fake.wished();
+    harness.get_by_label("Retry").click();
+    harness.run_steps(2);
+    assert_eq!(fake.wished(), wished + 1);
+    assert!(harness.query_by_label("Retry").is_none());
 }
 
 #[test]

@@ -243,7 +243,7 @@ fn retiming_a_shape_that_counts_frames_is_one_step() {
 #[test]
 fn typing_is_taken_back_line_by_line_and_after_a_rest() {
     let mut harness = window(SCENE);
-    harness.key_press_modifiers(Modifiers::COMMAND, Key::T);
+    harness.key_press(Key::F2);
     harness.run_steps(3);
     harness.get_by_role(Role::MultilineTextInput).focus();
     harness.run_steps(2);

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use eframe::egui::{Key, Modifiers, Role, Theme, ViewportCommand, ViewportEvent, ViewportId, vec2};
+use eframe::egui::{Key, Role, Theme, ViewportCommand, ViewportEvent, ViewportId, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
 use super::{super::Studio, PATIENCE, SCENE, Session, assets, choosing, drag, drawn, text, window};
@@ -221,6 +221,25 @@ fn a_window_with_unsaved_work_rests_once_that_is_kept() {
 }
 
 #[test]
+fn a_studio_that_can_keep_nothing_says_so_once() {
+    let home = tempfile::tempdir().unwrap();
+    // Where the folder for unsaved work should be.
+    fs::write(home.path().join("unsaved"), "").unwrap();
+    let mut harness = window_at_home(home.path());
+    let told =
+        |harness: &Harness<'_, Studio>| harness.query_by_label_contains("unsaved work is not kept here").is_some();
+    assert!(!told(&harness), "there is none yet");
+    edit(&mut harness, "height = 0.9", "height = 1.25");
+    until(&mut harness, "it is told", |harness| told(harness));
+    harness.get_by_label("Dismiss").click();
+    edit(&mut harness, "height = 1.25", "height = 1.75");
+    for _ in 0..600 {
+        harness.step();
+    }
+    assert!(!told(&harness));
+}
+
+#[test]
 fn work_of_a_studio_that_crashed_is_offered() {
     let home = crashed("3.5");
     let session = Session::new(Document::new("scene", "bansho = 1\n"), None, Box::<SlicePlayer>::default(), assets);
@@ -340,7 +359,7 @@ fn layout_theme_and_recent_files_are_there_again() {
         harness.run_steps(3);
         harness.get_by_label("Light").click();
         harness.run_steps(3);
-        harness.key_press_modifiers(Modifiers::COMMAND, Key::T);
+        harness.key_press(Key::F2);
         harness.run_steps(3);
         // The border between the scene's panel and the picture.
         let before = width(&harness);

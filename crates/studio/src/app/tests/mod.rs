@@ -5,8 +5,8 @@ mod choosing;
 mod following;
 mod gestures;
 mod keeping;
-mod newcomer;
 mod pictures;
+mod practised;
 mod reaching;
 mod values;
 
