@@ -156,14 +156,19 @@ impl Course {
         (after - 1, ((share - before) / (end - before).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0))
     }
 
-    /// Each piece of the sheets in turn: its sheet, the share of the sheet's length before its middle, the flux factor there, its length in km.
-    pub(super) fn pieces(&self) -> impl Iterator<Item = (usize, f64, f64, f64)> + '_ {
-        self.starts.iter().map(|start| {
+    /// Each piece of the sheets in turn, in parts of at most the share `most` of a sheet's length: its sheet, the share of the sheet's length
+    /// before its middle, the flux factor there, its length in km.
+    pub(super) fn pieces(&self, most: f64) -> impl Iterator<Item = (usize, f64, f64, f64)> + '_ {
+        self.starts.iter().flat_map(move |start| {
             let [number, index] = start.map(|part| part as usize);
             let (sheet, shares) = (&self.shape.sheets[number], &self.shares[number]);
-            let middle = |values: &[f64]| 0.5 * (values[index] + values[index + 1]);
             let length = sheet.points[index].distance(sheet.points[index + 1]);
-            (number, middle(shares), middle(&sheet.flux), length)
+            let count = ((shares[index + 1] - shares[index]) / most).ceil().max(1.0);
+            (0..count as usize).map(move |part| {
+                let middle = (part as f64 + 0.5) / count;
+                let at = |values: &[f64]| lerp(values[index], values[index + 1], middle);
+                (number, at(shares), at(&sheet.flux), length / count)
+            })
         })
     }
 

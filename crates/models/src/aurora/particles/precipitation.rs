@@ -62,8 +62,9 @@ impl Precipitation {
         let width = 2.0 * self.parameters.half_thickness_km();
         let flux = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * width;
         let mut wanted = Nodes::new(course.shape.sheets.len());
+        // Parts as long as half of a stretch: sheets that bridge a gap have fewer pieces than nodes.
         course
-            .pieces()
+            .pieces(0.5 / (COARSE - 1) as f64)
             .for_each(|(sheet, share, factor, length)| wanted.add(sheet as u32, share as f32, flux * factor * length));
         wanted
     }
@@ -236,4 +237,35 @@ fn stretches(particles: &mut AuroraParticles) -> Vec<Stretch<'_>> {
         sheets,
     };
     reads.zip(light.zip(places)).map(stretch).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math::DVec2;
+
+    use super::{
+        super::{along::Along, course::Folding},
+        *,
+    };
+    use crate::aurora::shapes::{Shape, Sheet};
+
+    #[test]
+    fn a_sheet_of_a_few_pieces_is_as_bright_everywhere() {
+        let (parameters, key) = (AuroraParameters::default(), Key::new(2, "precipitation"));
+        // As long as a bridge over a gap.
+        let points = vec![DVec2::ZERO, DVec2::new(17.0, 0.0)];
+        let sheet = Sheet { points, flux: vec![1.0; 2], energy: vec![1.0; 2] };
+        let shape = Shape { sheets: vec![sheet] };
+        let course = Course::new((&shape, &[]), &Along::begin(&shape), &Folding::new(&parameters, key), 0.0, 20.0);
+        assert!(course.pieces(1.0).count() < COARSE / 2, "{} pieces", course.pieces(1.0).count());
+        let precipitation = Precipitation::new(&parameters, key);
+        let wanted = precipitation.wanted(&course, 0.0);
+        let length = course.sheet_lengths()[0];
+        let flux = parameters.flux_mw_per_m2.at(0.0) * W_PER_KM2 * 2.0 * parameters.half_thickness_km();
+        assert!((wanted.sum() / (flux * length) - 1.0).abs() < 1e-9);
+        let even = flux * length / (COARSE - 1) as f64;
+        for node in &wanted.0[0][1..COARSE - 1] {
+            assert!((node / even - 1.0).abs() < 0.3, "{node} W for {even} W");
+        }
+    }
 }
