@@ -123,6 +123,7 @@ fn no_valid_flame_blows_up() {
             let held = greatest > 0.99 * GREATEST_SPEED;
             assert!(!held || 4.0 * driven > GREATEST_SPEED, "seed {seed}: {greatest} m/s, driven by {driven} m/s");
         });
-        assert!(fastest < 1.6 * driven + 0.1, "seed {seed}: the gas moves at {fastest} m/s, driven by {driven} m/s");
+        // Gas under pressure outruns what drives it, but never by as much again.
+        assert!(fastest < 2.0 * driven + 0.1, "seed {seed}: the gas moves at {fastest} m/s, driven by {driven} m/s");
     }
 }
