@@ -75,7 +75,8 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
     let rise = burners.iter().map(|burner| burner.axis_speed(3.0 * burner.height)).fold(0.0, f64::max);
     let motion = &parameters.motion;
     let corner = |corner: [f64; 3]| corner.map(f64::abs).into_iter().fold(0.0, f64::max);
-    let blown = wind.velocity.bounds().map(corner).into_iter().fold(0.0, f64::max) * (1.0 + wind.gust) * motion.wind_gain;
+    let blown =
+        wind.velocity.bounds().map(corner).into_iter().fold(0.0, f64::max) * (1.0 + wind.gust) * motion.wind_gain;
     let room = simulation.design.domain[1] - simulation.design.domain[0];
     let blown = match motion.wind {
         WindForce::Mixing => blown,
@@ -93,12 +94,7 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
 }
 
 /// The speed of gas that `acceleration`, m/s^2, drives for as long as it may live, or as `far` as the domain goes.
-fn driven_speed(
-    simulation: &Simulation,
-    parameters: &FlameParticlesParameters,
-    acceleration: f64,
-    far: f64,
-) -> f64 {
+fn driven_speed(simulation: &Simulation, parameters: &FlameParticlesParameters, acceleration: f64, far: f64) -> f64 {
     let design = &simulation.design;
     let lives = (0..design.burners.len()).map(|index| design.longest_life(index, parameters.life.afterlife_s));
     (acceleration * lives.fold(0.0, f64::max)).min((2.0 * acceleration * far).sqrt())
