@@ -81,6 +81,15 @@ pub enum Remark {
         /// The shape on whose way they first do, counted from 1.
         shape: usize,
     },
+    /// A burner that lies within an obstacle.
+    #[error("its burner {burner} (counted from 1) lies within an obstacle, from which its gas cannot come out")]
+    Buried {
+        /// Which of its burners, counted from 1.
+        burner: usize,
+    },
+    /// Nothing is ever given off.
+    #[error("none of its burners gives gas; a `flow` above 0 would")]
+    Unfed,
 }
 
 /// One phenomenon of a scene, ready to be drawn at any time (closed form) or stepped there.

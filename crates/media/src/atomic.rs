@@ -26,11 +26,14 @@ impl AtomicFile {
     /// Makes the folders that lead to `path`, and a temporary file beside it, or beside what it links to.
     ///
     /// # Errors
-    /// The folder cannot be made or written, the disk is full, or `path` is a folder.
+    /// The folder cannot be made or written, the disk is full, or `path` is a folder, a device or a pipe.
     pub fn create(path: &Path) -> Result<Self, MediaError> {
         let fail = |source| MediaError::from_io(path, source);
-        if path.is_dir() {
-            return Err(MediaError::IsFolder { path: path.to_path_buf() });
+        match fs::metadata(path) {
+            Ok(there) if there.is_dir() => return Err(MediaError::IsFolder { path: path.to_path_buf() }),
+            // A rename would put a file in its place.
+            Ok(there) if !there.is_file() => return Err(MediaError::NotAFile { path: path.to_path_buf() }),
+            _ => {}
         }
         let target = if path.is_symlink() {
             fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf())
@@ -63,6 +66,18 @@ impl AtomicFile {
     /// The name it will bear.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Gives it its name, which no file may bear.
+    ///
+    /// # Errors
+    /// A file bears it, or it cannot be renamed; the temporary file is then removed.
+    pub fn finish_new(self) -> Result<(), MediaError> {
+        let path = self.path;
+        self.temporary.persist_noclobber(&self.target).map(drop).map_err(|error| match error.error.kind() {
+            io::ErrorKind::AlreadyExists => MediaError::IsThere { path },
+            _ => MediaError::from_io(&path, error.error),
+        })
     }
 
     /// Gives it its name, in place of any file that bore it, and who may read and write that one may do so with this.
@@ -113,9 +128,44 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), MediaError> {
     atomic.finish()
 }
 
+/// Writes `bytes` as a whole new file, or none; one that is there already stays.
+///
+/// # Errors
+/// As [`write_bytes`], or a file is there.
+pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), MediaError> {
+    if path.exists() {
+        return Err(MediaError::IsThere { path: path.to_path_buf() });
+    }
+    let mut atomic = AtomicFile::create(path)?;
+    atomic.file().write_all(bytes).map_err(|source| MediaError::from_io(path, source))?;
+    atomic.finish_new()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_new_file_never_takes_the_place_of_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        write_new(&path, b"first").unwrap();
+        assert!(matches!(write_new(&path, b"second"), Err(MediaError::IsThere { .. })));
+        // Also where it came in the meantime.
+        let late = AtomicFile::create(&path).unwrap();
+        assert!(matches!(late.finish_new(), Err(MediaError::IsThere { .. })));
+        assert_eq!(fs::read(&path).unwrap(), b"first");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_stays_a_device() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("0001.png");
+        std::os::unix::fs::symlink("/dev/null", &link).unwrap();
+        assert!(matches!(write_bytes(&link, b"x"), Err(MediaError::NotAFile { .. })));
+    }
 
     fn names(folder: &Path) -> Vec<String> {
         fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()

@@ -32,6 +32,18 @@ pub enum MediaError {
         /// The folder.
         path: PathBuf,
     },
+    /// What bears the name is a device or a pipe.
+    #[error("{path}: is no ordinary file; give another name", path = .path.display())]
+    NotAFile {
+        /// What was to be written.
+        path: PathBuf,
+    },
+    /// A file that may hold somebody's work.
+    #[error("{path}: is there already; choose another name", path = .path.display())]
+    IsThere {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file stands where a folder should be made.
     #[error("{path}: a part of this path is a file, not a folder", path = .path.display())]
     NotAFolder {

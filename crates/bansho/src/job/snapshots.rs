@@ -89,7 +89,7 @@ impl Snapshots {
         candidates.sort_unstable();
         for candidate in candidates.into_iter().rev() {
             let path = self.path(folder, candidate);
-            match fs::read(&path).map(|bytes| shot.restore(&bytes)) {
+            match read(&path).map(|bytes| shot.restore(&bytes)) {
                 Ok(Ok(())) => {
                     found.restored = Some(candidate);
                     return found;
@@ -117,11 +117,19 @@ impl Snapshots {
         }
         let _stage = StageGuard::begin(observer, Stage::Write);
         let state = shot.snapshot();
-        if fs::read(&path).is_ok_and(|there| there == state) {
+        if read(&path).is_ok_and(|there| there == state) {
             return Ok(());
         }
         Ok(atomic::write_bytes(&path, &state)?)
     }
+}
+
+/// What an ordinary file holds: a pipe would be waited for, a device has no end.
+fn read(path: &Path) -> io::Result<Vec<u8>> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "is no ordinary file"));
+    }
+    fs::read(path)
 }
 
 /// What lay in the folder on the way to a frame.

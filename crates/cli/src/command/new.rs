@@ -1,15 +1,11 @@
 //! `bansho new`
 
-use std::{
-    fs::OpenOptions,
-    io::{self, Write},
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use bansho::{
     KINDS,
     base::parameters::nearest,
+    media::atomic,
     render::scene::{PhenomenonKind, template},
 };
 
@@ -47,9 +43,9 @@ pub(crate) fn run(args: &NewArgs) -> anyhow::Result<()> {
     let Some(name) = &args.name else { return Ok(to_stdout(&list())?) };
     let path = with_extension(name);
     match args.from.as_deref().map(find).transpose()? {
-        None => create(&path, template::commented(kind(args.phenomenon.as_deref())?).as_bytes())?,
+        None => atomic::write_new(&path, template::commented(kind(args.phenomenon.as_deref())?).as_bytes())?,
         Some(example) => {
-            create(&path, example.text.as_bytes())?;
+            atomic::write_new(&path, example.text.as_bytes())?;
             copy_assets(example, path.parent().unwrap_or(Path::new("")))?;
         }
     }
@@ -76,23 +72,12 @@ fn with_extension(name: &Path) -> PathBuf {
     if name.extension().is_some() { name.to_path_buf() } else { name.with_extension("toml") }
 }
 
-/// Writes a new file; one that is there already may hold someone's work.
-fn create(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    let shown = path.display();
-    let opened = OpenOptions::new().write(true).create_new(true).open(path);
-    let mut file = opened.map_err(|error| match error.kind() {
-        io::ErrorKind::AlreadyExists => anyhow::anyhow!("{shown}: is there already; choose another name"),
-        _ => anyhow::Error::new(error).context(format!("{shown}: cannot be written")),
-    })?;
-    file.write_all(bytes).with_context(|| format!("{shown}: cannot be written"))
-}
-
 /// Writes the pictures that an example names; those that are there already stay as they are.
 fn copy_assets(example: &Example, folder: &Path) -> anyhow::Result<()> {
     for asset in example.assets {
         let path = folder.join(asset.path);
         if !path.exists() {
-            bansho::media::atomic::write_bytes(&path, asset.bytes)?;
+            atomic::write_bytes(&path, asset.bytes)?;
         }
     }
     Ok(())

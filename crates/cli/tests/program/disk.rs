@@ -97,6 +97,9 @@ fn a_full_disk_is_an_error_and_leaves_only_whole_frames() {
         assert!(name.ends_with(".png"), "{name}");
         assert_eq!(decode_png(bytes).width, 96, "{name}");
     }
+    let new = folder.run(&["new", "disk/fire"]);
+    assert_eq!((new.code, new.errors()), (Some(1), 1), "{}", new.stderr);
+    assert!(!folder.path("disk/fire.toml").exists(), "half a scene would be in the way of the next");
     let film = folder.run(&["render", "scene.toml", "--out", "disk/film.apng"]);
     assert_eq!((film.code, film.errors()), (Some(1), 1), "{}", film.stderr);
     assert!(!folder.path("disk/film.apng").exists());

@@ -1,6 +1,8 @@
 //! What is simulated in steps: particles as files, and frames from snapshots.
 
-use crate::support::Folder;
+use std::process::Command;
+
+use crate::support::{Folder, Run};
 
 /// A small particle flame that is soon developed.
 const GAS: &str = "\
@@ -136,4 +138,38 @@ fn a_snapshot_that_is_damaged_or_of_another_scene_is_refused_and_made_anew() {
         assert!(folder.files("states")["state.4.bansho"] == state && folder.files("")["f.0006.png"] == frame);
     }
     assert!(!folder.succeed(&later).stderr.contains("not used"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn more_particles_than_there_is_memory_for_are_refused_with_the_number_that_would_fit() {
+    let folder = Folder::with_scene(&GAS.replace("particles = 250", "particles = 16000000"));
+    assert_eq!(folder.run(&["check", "scene.toml"]).code, Some(0), "this test needs 12 GiB, which are not filled");
+    let program = env!("CARGO_BIN_EXE_bansho");
+    let limited = format!("ulimit -v 5000000; exec {program} render scene.toml --frames 0");
+    let run = Command::new("sh").args(["-c", &limited]).current_dir(folder.path("")).output().unwrap();
+    let run = Run::of(run);
+    assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+    assert!(run.stderr.contains(
+        "scene.toml:9:13: flame_particles.0.particles: 16000000 particles would take 10 GiB; allowed: up to "
+    ));
+    let most: i64 = run.stderr.split("up to ").nth(1).unwrap().split_whitespace().next().unwrap().parse().unwrap();
+    assert!((1_000_000..8_000_000).contains(&most), "{most} of 5 GB");
+}
+
+#[test]
+fn a_flame_that_cannot_be_seen_is_told() {
+    let burner = "[[flame_particles.burners]]\n";
+    let ball = "[[obstacle]]\nshape = \"sphere\"\nradius = 0.5\n";
+    for (more, expected) in [
+        (format!("{burner}flow = 0.0\n"), "flame_particles: none of its burners gives gas"),
+        (format!("{burner}{ball}"), "flame_particles: its burner 1 (counted from 1) lies within an obstacle"),
+    ] {
+        let folder = Folder::with_scene(&format!("{GAS}{more}"));
+        let run = folder.succeed(&["render", "scene.toml", "--frames", "0"]);
+        assert!(run.stderr.contains(expected), "{}", run.stderr);
+    }
+    let folder = Folder::with_scene(&format!("{GAS}{burner}"));
+    let run = folder.succeed(&["render", "scene.toml", "--frames", "0"]);
+    assert!(!run.stderr.contains("warning"), "{}", run.stderr);
 }

@@ -41,8 +41,7 @@ pub(crate) struct Burner {
     pub(crate) acceleration: f64,
     /// Radius of a ball around its position that holds the burner, m.
     pub(crate) reach: f64,
-    /// Corners of the box that its place counts for, beside its position, m: around a mesh, which may lie far from its own origin; the
-    /// middle of any other area.
+    /// Corners of the box around it as it is turned, beside its position, m.
     pub(crate) extent: [DVec3; 2],
 }
 
@@ -92,7 +91,10 @@ impl Burner {
             speed,
             acceleration: AXIS_ACCELERATION * flame.motion.buoyancy,
             reach: size.reach,
-            extent: size.mesh.map_or([DVec3::ZERO; 2], |mesh| extent(&mesh, &turned)),
+            extent: match &size.mesh {
+                Some(mesh) => extent(mesh, &turned),
+                None => around(parameters, &turned, size.reach),
+            },
         })
     }
 
@@ -173,6 +175,29 @@ fn extent(mesh: &Mesh, turned: &Placement) -> [DVec3; 2] {
     let corners = mesh.triangles().flatten().map(|corner| turned.to_world(corner));
     let around = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
     corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around)
+}
+
+/// The same of any other area.
+fn around(parameters: &BurnerParameters, turned: &Placement, reach: f64) -> [DVec3; 2] {
+    // Turning rounds, and what stands on the edge of the domain is not beyond it.
+    const SLACK: f64 = 1e-6;
+    let BurnerParameters { diameter, length, size, .. } = *parameters;
+    let radius = 0.5 * diameter;
+    let axis = |unit: DVec3, half: f64| turned.turn(unit) * half;
+    let half = match parameters.shape {
+        BurnerShape::Point | BurnerShape::Mesh => DVec3::splat(radius),
+        BurnerShape::Disc => {
+            let [x, z] = [axis(DVec3::X, radius), axis(DVec3::Z, radius)];
+            DVec3::from([0, 1, 2].map(|c| math::sqrt(x[c] * x[c] + z[c] * z[c])))
+        }
+        BurnerShape::Line => axis(DVec3::X, 0.5 * length).abs() + axis(DVec3::Z, radius).abs(),
+        BurnerShape::Box => {
+            let [x, y, z] = size.map(|side| 0.5 * side);
+            axis(DVec3::X, x).abs() + axis(DVec3::Y, y).abs() + axis(DVec3::Z, z).abs()
+        }
+    };
+    let half = (half - SLACK * reach).max(DVec3::ZERO);
+    [-half, half]
 }
 
 fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(Area, Size), ParticleFaultKind> {
@@ -269,6 +294,24 @@ mod tests {
                 (place.position.dot(place.direction) - if place.direction.x.abs() > 0.5 { 1.0 } else { 0.5 }).abs()
                     < 1e-9
             );
+        }
+    }
+
+    #[test]
+    fn all_places_lie_within_the_extent_and_fill_it() {
+        for (number, shape) in
+            [BurnerShape::Point, BurnerShape::Disc, BurnerShape::Line, BurnerShape::Box].into_iter().enumerate()
+        {
+            let rotation_deg = [20.0 * number as f64, 65.0, -40.0];
+            let parameters = BurnerParameters { shape, diameter: 0.3, length: 2.0, rotation_deg, ..Default::default() };
+            let burner = burner(parameters);
+            let [low, high] = burner.extent;
+            let around = |[low, high]: [DVec3; 2], place: DVec3| [low.min(place), high.max(place)];
+            let all = places(&burner).map(|place| place.position);
+            let [least, most] = all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around);
+            assert!((least - low).cmpgt(DVec3::splat(-1e-5)).all() && (high - most).cmpgt(DVec3::splat(-1e-5)).all());
+            let empty = (least - low).max(high - most).max_element();
+            assert!(empty < 0.06 * burner.reach, "{shape:?}: {empty} m are empty");
         }
     }
 

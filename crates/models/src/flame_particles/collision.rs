@@ -34,13 +34,8 @@ struct Contact {
 }
 
 impl Solids<'_> {
-    /// Where a particle at `place` comes by `way`, and what becomes of its velocity: of both only what points into a solid is taken.
-    #[inline(always)]
-    pub(crate) fn carry(&self, place: Vec3, way: Vec3, velocity: Vec3) -> (Vec3, Vec3) {
-        if self.occluders.is_empty() { (place + way, velocity) } else { self.turned(place, way, velocity) }
-    }
-
-    fn turned(&self, place: Vec3, way: Vec3, mut velocity: Vec3) -> (Vec3, Vec3) {
+    /// Where a particle at `place` comes by `way`, and what becomes of its velocities: of all only what points into a solid is taken.
+    pub(crate) fn carry<const N: usize>(&self, place: Vec3, way: Vec3, mut velocities: [Vec3; N]) -> (Vec3, [Vec3; N]) {
         let from = self.origin + place.as_dvec3();
         let unturned = from + way.as_dvec3();
         let mut to = unturned;
@@ -51,16 +46,18 @@ impl Solids<'_> {
                     let left = to - place;
                     to = self.put_out(occluder, place + left - normal * left.dot(normal).min(0.0));
                     let normal = normal.as_vec3();
-                    velocity -= normal * velocity.dot(normal).min(0.0);
+                    for velocity in &mut velocities {
+                        *velocity -= normal * velocity.dot(normal).min(0.0);
+                    }
                 }
             }
             if (to - before).length() < SETTLED * f64::from(self.clearance) {
                 let end = if to == unturned { place + way } else { (to - self.origin).as_vec3() };
-                return (end, velocity);
+                return (end, velocities);
             }
         }
         // Wedged between solids.
-        (place, Vec3::ZERO)
+        (place, [Vec3::ZERO; N])
     }
 
     /// Where the way first lies within the clearance of a solid; none where it only leads out of it.
@@ -129,13 +126,13 @@ mod tests {
         let ground = [Occluder::HalfSpace { point: DVec3::Y, normal: DVec3::Y }];
         let solids = Solids { origin: DVec3::new(5.0, 1.0, 0.0), clearance: 0.1, ..solids(&ground) };
         let velocity = Vec3::new(2.0, -3.0, 0.0);
-        let (place, left) = solids.carry(Vec3::new(0.0, 0.2, 0.0), velocity * 0.1, velocity);
+        let (place, [left]) = solids.carry(Vec3::new(0.0, 0.2, 0.0), velocity * 0.1, [velocity]);
         assert!((place - Vec3::new(0.2, 0.1, 0.0)).length() < 1e-6, "{place}");
         assert_eq!(left, Vec3::new(2.0, 0.0, 0.0));
         // From within the ground it comes out at once, and what leads away is free.
-        assert!((solids.carry(Vec3::Y * -0.3, Vec3::ZERO, Vec3::ZERO).0 - Vec3::Y * 0.1).length() < 1e-6);
+        assert!((solids.carry(Vec3::Y * -0.3, Vec3::ZERO, [Vec3::ZERO]).0 - Vec3::Y * 0.1).length() < 1e-6);
         let rising = (Vec3::Y * 0.1, Vec3::Y * 0.05);
-        assert_eq!(solids.carry(rising.0, rising.1, rising.1), (Vec3::Y * 0.15, rising.1));
+        assert_eq!(solids.carry(rising.0, rising.1, [rising.1]), (Vec3::Y * 0.15, [rising.1]));
     }
 
     #[test]
@@ -145,7 +142,7 @@ mod tests {
             for (start, speed) in (0..400).map(|i| (0.3 + 0.0007 * i as f32, 0.01 + 0.003 * i as f32)) {
                 let below = (0.59 - 0.1 * f32::from(matches!(plate[0], Occluder::Mesh { .. }))).min(start);
                 let way = Vec3::new(0.3 * speed, speed, -0.1 * speed);
-                let (place, velocity) = solids(&plate).carry(Vec3::Y * below, way, way);
+                let (place, [velocity]) = solids(&plate).carry(Vec3::Y * below, way, [way]);
                 assert!(place.y < 0.6, "{:?}: from {below} by {way} to {place}", plate[0]);
                 assert!(place.y == below + way.y || velocity.y < 0.01 * speed, "{velocity} behind the plate");
                 assert!((place.x - way.x).abs() < 0.02 + 0.1 * speed, "it slides: {place} by {way}");
@@ -157,7 +154,7 @@ mod tests {
     fn gas_that_one_solid_turns_into_another_keeps_out_of_both() {
         let wall = Occluder::HalfSpace { point: DVec3::X * 0.2, normal: DVec3::NEG_X };
         let solids_of = [plate(0.1), wall];
-        let (place, velocity) = solids(&solids_of).carry(Vec3::Y * 0.4, Vec3::new(0.5, 0.5, 0.1), Vec3::ONE);
+        let (place, [velocity]) = solids(&solids_of).carry(Vec3::Y * 0.4, Vec3::new(0.5, 0.5, 0.1), [Vec3::ONE]);
         assert!((place - Vec3::new(0.19, 0.54, 0.1)).length() < 1e-5 && velocity.max_element() <= 1.0, "{place}");
         assert_eq!([velocity.x, velocity.y], [0.0; 2]);
     }

@@ -22,6 +22,10 @@ const PARTICLE_BYTES: f64 = 670.0;
 const LONGEST_RISE: f64 = 3.0;
 /// How much the fuel that a fire draws from its burner rises and falls as it puffs, as a share.
 const PULSE: f64 = 0.6;
+/// Fewer bytes are not asked for in advance.
+const FEW_BYTES: f64 = (1 << 30) as f64;
+/// What a picture takes beside its particles, at the least, bytes.
+const PICTURE_BYTES: f64 = (256 << 20) as f64;
 /// Fewest steps that gas lives, so that births in one step stay bounded.
 const FEWEST_STEPS: f64 = 4.0;
 
@@ -130,15 +134,24 @@ fn preroll(parameters: &FlameParticlesParameters, longest: f64) -> f64 {
     }
 }
 
+/// Whether the system would give so many particles their memory.
+fn have_memory(count: i64) -> bool {
+    let bytes = count as f64 * PARTICLE_BYTES;
+    bytes < FEW_BYTES || Vec::<u8>::new().try_reserve_exact((bytes + PICTURE_BYTES) as usize).is_ok()
+}
+
 /// Whether `count` particles may live beside the `others` of all other flames.
 ///
 /// # Errors
-/// More than are taken, with the number that would be.
+/// More than are taken or than there is memory for, with the number that would be.
 pub fn check_count(count: i64, others: i64) -> Result<(), ParticleFault> {
-    let most = (MOST_PARTICLES - others).max(0);
-    if count <= most {
+    let taken = (MOST_PARTICLES - others).max(0);
+    if count <= taken && have_memory(count + others) {
         return Ok(());
     }
+    let twentieth = |parts: &i64| taken.min(count) / 20 * parts;
+    let most = (0..=20).rev().map(|parts| twentieth(&parts)).find(|most| have_memory(most + others)).unwrap_or(0);
+    let most = if count > taken && have_memory(taken + others) { taken } else { most };
     let gib = (count as f64 + others as f64) * PARTICLE_BYTES / f64::from(1 << 30);
     let kind = ParticleFaultKind::TooManyParticles { count, others, gib, most };
     Err(ParticleFault { key: "particles".into(), kind })
@@ -255,6 +268,9 @@ mod tests {
             ..default()
         };
         assert_eq!(fault(outside).key, "burners.1.position");
+        let long = BurnerParameters { shape: BurnerShape::Line, length: 3.0, ..Default::default() };
+        let partly = FlameParticlesParameters { burners: vec![long], domain_max: Auto::Set([1.0; 3]), ..default() };
+        assert_eq!(fault(partly).key, "domain_max");
         // The corner is what the user wrote, if no position is.
         let beyond_default = FlameParticlesParameters { domain_min: Auto::Set([1.0; 3]), ..default() };
         assert_eq!(fault(beyond_default).key, "domain_min");
@@ -262,7 +278,9 @@ mod tests {
         let empty = FlameParticlesParameters { domain_min: corners[0], domain_max: corners[1], ..default() };
         assert_eq!(fault(empty).key, "domain_max");
         let thin = [Auto::Set([-0.01; 3]), Auto::Set([0.01; 3])];
-        let wide = FlameParticlesParameters { particles: 5, domain_min: thin[0], domain_max: thin[1], ..default() };
+        let narrow = vec![BurnerParameters { diameter: 0.015, ..Default::default() }];
+        let [domain_min, domain_max] = thin;
+        let wide = FlameParticlesParameters { particles: 5, burners: narrow, domain_min, domain_max, ..default() };
         assert!(matches!(fault(wide).kind, ParticleFaultKind::SupportBeyondDomain { .. }));
         let many = fault(FlameParticlesParameters { particles: 900_000_000, ..default() });
         assert_eq!(many.to_string(), "particles: 900000000 particles would take 562 GiB; allowed: up to 20000000");

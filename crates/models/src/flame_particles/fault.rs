@@ -43,7 +43,7 @@ pub enum ParticleFaultKind {
         /// Shortest side of the domain, m.
         side: f64,
     },
-    /// More particles than are taken: a fixed number, whatever memory the machine has, so that a scene is valid everywhere or nowhere.
+    /// More particles than are taken, or than the machine has memory for.
     #[error("{count} particles{} would take {gib:.0} GiB; allowed: up to {most}", beside(*.others))]
     TooManyParticles {
         /// How many are asked for.

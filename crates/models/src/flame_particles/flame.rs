@@ -7,7 +7,7 @@ use bansho_base::{
     math::{self, DVec2, DVec3},
     observer::{Cancelled, Observer},
     parameters::{Auto, Parameter},
-    phenomenon::{Phenomenon, Prepared, SnapshotError, Stepping},
+    phenomenon::{Phenomenon, Prepared, Remark, SnapshotError, Stepping},
     point_cloud::{PointCloud, Quantity},
     random::Key,
     surroundings::{Publication, Surroundings},
@@ -126,6 +126,24 @@ impl Phenomenon for FlameParticles {
 
     fn aovs(&self) -> &'static [AovDescriptor] {
         draw::AOVS
+    }
+
+    fn remark(&self, surroundings: &Surroundings) -> Option<Remark> {
+        let burners = &self.simulation.design.burners;
+        let gives = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
+        if !burners.iter().any(gives) {
+            return Some(Remark::Unfed);
+        }
+        let origin = DVec3::from(self.parameters.position);
+        let is_buried = |burner: &Burner| {
+            let within = |birth: u64| {
+                let place = origin + burner.birthplace(self.simulation.key, birth, 0.0).position;
+                surroundings.others.occluders.iter().any(|occluder| occluder.signed_distance(place) < 0.0)
+            };
+            // As many births as show it.
+            gives(burner) && (0..32).all(within)
+        };
+        burners.iter().position(is_buried).map(|index| Remark::Buried { burner: index + 1 })
     }
 
     fn luminance(&self) -> f64 {

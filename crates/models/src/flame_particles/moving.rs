@@ -92,8 +92,7 @@ impl<'a> Work<Unmoved<'a>, 10> for Motion<'_> {
         let old = rows.load(simd, age);
         let drift = draught.velocity(&draught.flow(simd, &place), length(&own), old);
         let velocity = held_to(&plus(&own, &drift, old.like(1.0)), GREATEST_SPEED);
-        let (place, velocity) = self.carried(simd, place, velocity, rows.0.len());
-        let after = [place, velocity, drift];
+        let after = self.carried(simd, place, [velocity, drift], rows.0.len());
         for (values, arrays) in after.into_iter().zip([[x, y, z], [u, v, w], [d, e, f]]) {
             for (batch, array) in values.into_iter().zip(arrays) {
                 rows.store(batch, array);
@@ -156,43 +155,48 @@ impl Motion<'_> {
         plus(own, &across, rate / (rate + rate.like(1.0)))
     }
 
-    /// Where particles come with a velocity, and what solids leave of it; the first `count` lanes count.
+    /// Where particles come with a velocity, of which a part is the air's, and what solids leave of both; the first `count` lanes count.
     #[inline(always)]
     fn carried<S: Simd>(
         &self,
         simd: S,
         place: [Lanes<S>; 3],
-        velocity: [Lanes<S>; 3],
+        [velocity, drift]: [[Lanes<S>; 3]; 2],
         count: usize,
-    ) -> ([Lanes<S>; 3], [Lanes<S>; 3]) {
+    ) -> [[Lanes<S>; 3]; 3] {
         if self.weather.occluders.is_empty() {
-            return (plus(&place, &velocity, place[0].like(self.seconds)), velocity);
+            return [plus(&place, &velocity, place[0].like(self.seconds)), velocity, drift];
         }
-        let mut lanes = [[[0.0; LANES]; 3]; 2];
-        for (batches, lanes) in [place, velocity].iter().zip(&mut lanes) {
+        let mut carried = [place, velocity, drift];
+        let mut lanes = [[[0.0; LANES]; 3]; 3];
+        for (batches, lanes) in carried.iter().zip(&mut lanes) {
             for c in 0..3 {
                 batches[c].store_slice(&mut lanes[c]);
             }
         }
         self.carry_one_by_one(&mut lanes, count);
-        let (mut place, mut velocity) = (place, velocity);
-        for c in 0..3 {
-            place[c] = Lanes::from_slice(simd, &lanes[0][c]);
-            velocity[c] = Lanes::from_slice(simd, &lanes[1][c]);
+        for (batches, lanes) in carried.iter_mut().zip(&lanes) {
+            for c in 0..3 {
+                batches[c] = Lanes::from_slice(simd, &lanes[c]);
+            }
         }
-        (place, velocity)
+        carried
     }
 
-    /// Carries the first `count` of places and velocities around solids.
+    /// Carries the first `count` of places, velocities and the air's part of them around solids.
     #[inline(never)]
-    fn carry_one_by_one(&self, [places, velocities]: &mut [[[f32; LANES]; 3]; 2], count: usize) {
+    fn carry_one_by_one(&self, carried: &mut [[[f32; LANES]; 3]; 3], count: usize) {
         let Weather { occluders, origin, .. } = *self.weather;
         let solids = Solids { occluders, origin, clearance: CLEARANCE * self.radius };
         for lane in 0..count {
-            let [place, velocity] = [&*places, velocities].map(|all| Vec3::from(all.map(|values| values[lane])));
-            let (place, velocity) = solids.carry(place, velocity * self.seconds, velocity);
-            for c in 0..3 {
-                (places[c][lane], velocities[c][lane]) = (place[c], velocity[c]);
+            let [place, velocity, drift] = carried.map(|all| Vec3::from(all.map(|values| values[lane])));
+            let (place, [left, own]) = solids.carry(place, velocity * self.seconds, [velocity, velocity - drift]);
+            // What the gas has of its own does not grow where a solid takes the air's part: eddies are a share of it.
+            let drift = if left == velocity { drift } else { left - own };
+            for (all, vector) in carried.iter_mut().zip([place, left, drift]) {
+                for c in 0..3 {
+                    all[c][lane] = vector[c];
+                }
             }
         }
     }

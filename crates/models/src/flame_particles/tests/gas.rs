@@ -5,7 +5,7 @@ use bansho_base::{animation::Animated, gravity::STANDARD_GRAVITY, math::DVec3, p
 use super::*;
 use crate::flame_particles::{
     Particle,
-    parameters::{BurnerParameters, LifeParameters, MotionParameters, TemperatureLaw},
+    parameters::{BurnerParameters, LifeParameters, MotionParameters, TemperatureLaw, WindForce},
 };
 
 /// Nothing but pressure and viscosity, and no births.
@@ -77,6 +77,47 @@ fn a_free_cloud_keeps_its_momentum_and_its_centre_goes_straight() {
     });
     let drift = (momentum(&simulation).0 - before).length() / size;
     assert!(drift < 1e-6, "momentum drifts by {drift}");
+}
+
+#[test]
+fn a_lattice_at_rest_stays_at_rest() {
+    let mut parameters = quiet();
+    parameters.fluid.support = 2.6;
+    parameters.fluid.rest_density = 1.0;
+    let mut simulation = simulation(&parameters);
+    let spacing = simulation.design.support_radius / 2.6;
+    let start = |birth: u64| [birth % 9, birth / 9 % 9, birth / 81].map(|step| step as f32 * spacing);
+    for birth in 0..729 {
+        simulation.particles.push(particle(&simulation.design, birth, start(birth), [0.0; 3]));
+    }
+    World::default().run_steps(&mut simulation, 0, 1000, |_, _| {});
+    for index in 0..729 {
+        let moved = (place(&simulation, index) - Vec3::from(start(simulation.particles.births()[index]))).length();
+        assert!(moved < 1e-3 * spacing, "moved by {} spacings", moved / spacing);
+    }
+}
+
+#[test]
+fn eddies_at_a_wall_give_the_gas_no_speed_of_its_own() {
+    let mut parameters = quiet();
+    parameters.motion = MotionParameters { turbulence: 2.0, wind: WindForce::PerVolume, ..parameters.motion };
+    let mut simulation = simulation(&parameters);
+    let d = simulation.design.support_radius;
+    for birth in 0..100 {
+        // Too far from each other to meet.
+        let position = [3.0 * d * (birth % 10) as f32, 0.5 * d, 3.0 * d * (birth / 10) as f32];
+        simulation.particles.push(particle(&simulation.design, birth, position, [0.3, -1.0, 0.2]));
+    }
+    let floor = Occluder::HalfSpace { point: DVec3::ZERO, normal: DVec3::Y };
+    World { occluders: vec![floor], ..World::default() }.run_steps(&mut simulation, 0, 300, |simulation, _| {
+        let particles = &simulation.particles;
+        for index in 0..particles.len() {
+            let [velocity, drift] = [&particles.velocity, &particles.drift]
+                .map(|all| Vec3::from(all.each_ref().map(|values| values[index])));
+            let own = (velocity - drift).length();
+            assert!(own < 1.1, "{own} m/s, with which it came at 1.06");
+        }
+    });
 }
 
 #[test]

@@ -2,11 +2,13 @@
 
 use bansho_base::{
     gravity::STANDARD_GRAVITY,
+    math::DQuat,
     parameters::{Parameters, Reader, sample},
 };
+use rayon::prelude::*;
 
 use super::*;
-use crate::flame_particles::{life::INNER_TEMPERATURE, moving::GREATEST_SPEED, parameters::WindForce};
+use crate::flame_particles::{burner::Burner, life::INNER_TEMPERATURE, parameters::WindForce};
 
 /// How many parameter sets: [`FEW`], or what `BANSHO_RANDOM_FLAMES` says.
 fn count() -> u64 {
@@ -69,28 +71,32 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
     }
 }
 
-/// The speed that parameters and wind could give the gas, m/s: on the axis three flames high, with its eddies and rings, and the wind's.
+/// The speed that parameters and wind could give the gas, m/s.
 fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters, wind: &WindParameters) -> f32 {
-    let burners = &simulation.design.burners;
-    let rise = burners.iter().map(|burner| burner.axis_speed(3.0 * burner.height)).fold(0.0, f64::max);
-    let motion = &parameters.motion;
+    let (design, motion) = (&simulation.design, &parameters.motion);
+    let greatest = |speed: &dyn Fn(&Burner) -> f64| design.burners.iter().map(speed).fold(0.0, f64::max);
+    // On the axis at the top of the domain that a flame has by itself, with its eddies and rings.
+    let rise = greatest(&|burner| burner.axis_speed(burner.reach + 3.0 * burner.height));
+    // Air flows in at a share of that, and at the base of a wide fire faster than anything rises.
+    let inflow = greatest(&|burner| 0.2 * (STANDARD_GRAVITY * burner.diameter).sqrt());
+    let room = design.domain[1] - design.domain[0];
     let corner = |corner: [f64; 3]| corner.map(f64::abs).into_iter().fold(0.0, f64::max);
     let blown =
         wind.velocity.bounds().map(corner).into_iter().fold(0.0, f64::max) * (1.0 + wind.gust) * motion.wind_gain;
-    let room = simulation.design.domain[1] - simulation.design.domain[0];
     let blown = match motion.wind {
         WindForce::Mixing => blown,
         // Nothing holds gas back that a force drives, m/s^2 on gas as dense as at the burner.
         WindForce::PerVolume => {
-            driven_speed(simulation, parameters, blown / f64::from(simulation.design.density), room.max_element())
+            driven_speed(simulation, parameters, blown / f64::from(design.density), room.max_element())
         }
     };
-    let hottest = burners.iter().map(|burner| burner.parameters.temperature_k);
+    let hottest = design.burners.iter().map(|burner| burner.parameters.temperature_k);
     let hottest = hottest.fold(parameters.life.flame_temperature_k, f64::max);
     // Flames may be far hotter than those of their height are.
     let buoyancy = STANDARD_GRAVITY * motion.buoyancy * (hottest / Air::default().temperature_k - 1.0).max(0.0);
-    let carried = rise * (1.0 + motion.turbulence + motion.puffing) + blown;
-    carried.max(driven_speed(simulation, parameters, buoyancy, room.y)) as f32
+    let upward = rise * (1.0 + motion.turbulence + motion.puffing);
+    let inward = motion.narrowing * (inflow + 0.2 * rise);
+    (upward.hypot(inward) + blown).max(driven_speed(simulation, parameters, buoyancy, room.y)) as f32
 }
 
 /// The speed of gas that `acceleration`, m/s^2, drives for as long as it may live, or as `far` as the domain goes.
@@ -114,24 +120,47 @@ fn mean_square_speed(simulation: &Simulation) -> f32 {
     (0..particles.len()).map(square).sum::<f32>() / particles.len().max(1) as f32
 }
 
+/// What stands in the way of every second flame: a ball, a turned box or a slope, near it or where it burns.
+fn obstacle(seed: u64, simulation: &Simulation) -> Option<Occluder> {
+    let words = Key::new(seed, "obstacles").uniforms(0, 0, bansho_base::random::Purpose(0)).map(f64::from);
+    let burner = &simulation.design.burners[0];
+    let size = burner.reach + burner.height;
+    let centre = burner.position(0.0) + size * DVec3::new(words[0] - 0.5, words[1], words[2] - 0.5);
+    match (seed % 2, (3.0 * words[3]) as u32) {
+        (0, _) => None,
+        (_, 0) => Some(Occluder::Sphere { centre, radius: 0.3 * size * words[0] }),
+        (_, 1) => Some(Occluder::Cuboid {
+            centre,
+            half_extents: 0.5 * size * DVec3::new(words[1], 0.1 * words[2], words[0]),
+            rotation: DQuat::from_rotation_z(words[3]),
+        }),
+        _ => {
+            let normal = DVec3::new(words[0] - 0.5, 1.0, words[2] - 0.5).normalize();
+            Some(Occluder::HalfSpace { point: burner.position(0.0) - 0.2 * size * words[1] * normal, normal })
+        }
+    }
+}
+
+/// Steps the flame of this seed, and checks it after every step.
+fn burn(seed: u64, parameters: &FlameParticlesParameters, wind: WindParameters) {
+    let mut simulation = simulation(parameters);
+    let driven = driving_speed(&simulation, parameters, &wind);
+    let world = World { wind, occluders: obstacle(seed, &simulation).into_iter().collect() };
+    let first = -(simulation.design.preroll / simulation.step_s()).round().min(200.0) as i64;
+    let (mut mean, mut greatest) = (0.0_f32, 0.0_f32);
+    world.run_steps(&mut simulation, first, first + STEPS, |simulation, _| {
+        check(seed, simulation, parameters);
+        mean = mean.max(mean_square_speed(simulation).sqrt());
+        greatest = greatest.max(greatest_speed(simulation));
+    });
+    // Gas under pressure outruns what drives it, a particle that is pressed out of a crowd most.
+    assert!(mean < 1.6 * driven + 0.1, "seed {seed}: the gas moves at {mean} m/s, driven by {driven} m/s");
+    assert!(greatest < 3.0 * driven + 0.1, "seed {seed}: a particle moves at {greatest} m/s, driven by {driven} m/s");
+}
+
 #[test]
 fn no_valid_flame_blows_up() {
     let drawn = (0..).filter_map(|seed| draw(seed).map(|drawn| (seed, drawn)));
-    for (seed, (parameters, wind)) in drawn.take(count() as usize) {
-        let mut simulation = simulation(&parameters);
-        let driven = driving_speed(&simulation, &parameters, &wind);
-        let world = World { wind, ..World::default() };
-        let first = -(simulation.design.preroll / simulation.step_s()).round().min(200.0) as i64;
-        let mut fastest = 0.0_f32;
-        world.run_steps(&mut simulation, first, first + STEPS, |simulation, _| {
-            check(seed, simulation, &parameters);
-            fastest = fastest.max(mean_square_speed(simulation).sqrt());
-            // Gas that had blown up would be held at the greatest speed, whatever drives it.
-            let greatest = greatest_speed(simulation);
-            let held = greatest > 0.99 * GREATEST_SPEED;
-            assert!(!held || 4.0 * driven > GREATEST_SPEED, "seed {seed}: {greatest} m/s, driven by {driven} m/s");
-        });
-        // Gas under pressure outruns what drives it.
-        assert!(fastest < 1.6 * driven + 0.1, "seed {seed}: the gas moves at {fastest} m/s, driven by {driven} m/s");
-    }
+    let flames: Vec<_> = drawn.take(count() as usize).collect();
+    flames.into_par_iter().for_each(|(seed, (parameters, wind))| burn(seed, &parameters, wind));
 }
