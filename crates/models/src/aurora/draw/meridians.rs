@@ -35,12 +35,9 @@ const STEP_KM: f32 = 1.5;
 /// Spacing of such tables in steps: at least 1 / [`STEP_KM`]. Steps as long as the light is high need 2, or linear
 /// interpolation lets the bins' own pattern through; shorter ones need less, since the light itself is smooth, and keep
 /// its lower edge.
-const ENTRY_PER_STEP: [f32; 2] = [1.0 / STEP_KM, 2.0];
+pub(super) const ENTRY_PER_STEP: [f32; 2] = [1.0 / STEP_KM, 2.0];
 /// Steps above which tables are more than a step apart, km.
 const SMOOTH_KM: f32 = 12.0;
-/// Widths of a bin that smoothing spreads light over at most: it reaches two entries far, each less than twice as wide
-/// as asked for.
-const BLURRED_BINS: f64 = 4.0 * ENTRY_PER_STEP[1] as f64;
 
 /// Brightness by emitter in kR, column after column, without what the air takes away.
 #[derive(Clone)]
@@ -73,7 +70,7 @@ impl Meridians {
         let knots: Vec<f32> = cotangents.iter().copied().step_by(KNOT_ROWS).collect();
         let distances: Vec<_> = (0..footprint.bins().count).map(|bin| footprint.bins().distance(bin)).collect();
         let mut picture = Self::dark(chart);
-        let (chart, strips) = picture.strips();
+        let (chart, strips) = picture.strips(STRIP);
         let drawing = Drawing {
             chart,
             field,
@@ -95,10 +92,10 @@ impl Meridians {
         Self { light: vec![[0.0; 4]; chart.columns * chart.rows], lit: vec![[u32::MAX, 0]; chart.columns], chart }
     }
 
-    /// Its strips, each to be drawn by one thread.
-    pub(super) fn strips(&mut self) -> (&Chart, impl IndexedParallelIterator<Item = LightStrip<'_>>) {
-        let light = self.light.par_chunks_mut(STRIP * self.chart.rows);
-        let strips = light.zip(self.lit.par_chunks_mut(STRIP)).enumerate();
+    /// Its strips of so many columns, each to be drawn by one thread.
+    pub(super) fn strips(&mut self, columns: usize) -> (&Chart, impl IndexedParallelIterator<Item = LightStrip<'_>>) {
+        let light = self.light.par_chunks_mut(columns * self.chart.rows);
+        let strips = light.zip(self.lit.par_chunks_mut(columns)).enumerate();
         (&self.chart, strips.map(|(number, (light, lit))| LightStrip { number, light, lit }))
     }
 
@@ -115,7 +112,7 @@ impl Meridians {
     }
 }
 
-/// [`STRIP`] columns of a picture.
+/// Some columns of a picture beside each other.
 pub(super) struct LightStrip<'a> {
     pub(super) number: usize,
     pub(super) light: &'a mut [PerEmitter<f32>],
@@ -319,7 +316,7 @@ impl Drawing<'_> {
         let line = meridian.line(distance);
         // Where tables are smoothed, light reaches rows of neighbouring bins.
         let near = distance < self.bins.near_to;
-        let blurred = if near { BLURRED_BINS * width } else { 0.0 };
+        let blurred = f64::from(self.bins.blurred_km(distance as f32));
         let top = self.row(&line, distance, -blurred, profile.top_km);
         let bottom = self.row(&line, distance, blurred, profile.bottom_km);
         let end = ((bottom.floor() + 1.0).max(0.0) as usize).min(self.chart.rows);

@@ -28,6 +28,8 @@ const TASK: usize = 4096;
 const SPREAD_PER_SPACING: f64 = 1.2;
 /// Afterglow without particles that is fainter than this share of a typical cell is not seen.
 const FAINTEST: f32 = 2e-4;
+/// Keys of a particle's falls are so far apart from instant to instant.
+const PER_INSTANT: u32 = 0x9e37_79b9;
 /// 1000 W, the power of one mW/m^2 on one km^2.
 const PER_UNIT: f32 = 1e-3;
 
@@ -53,15 +55,23 @@ pub(super) struct Maker<'a> {
     pub(super) reach: f32,
     /// Part of the power that each of several instants has.
     pub(super) share: f32,
+    /// Which of them it is, so that a particle has falls of its own at each.
+    pub(super) instant: u32,
 }
 
 impl Maker<'_> {
     #[inline(always)]
-    fn make(&self, foot: Foot, powers_w: [f32; 3], node: f32) -> Source {
+    fn make(&self, foot: Foot, powers_w: [f32; 3], node: f32, key: u32) -> Source {
         let scale = self.share * PER_UNIT * foot.upright;
         let [green, red, prompt] = powers_w;
         let power = [green * scale, red * scale, prompt * scale];
-        Source { across: foot.across, reach: self.reach, node, power }
+        Source { across: foot.across, reach: self.reach, node, power, key }
+    }
+
+    /// What the falls of a particle or cell of that number go by.
+    #[inline(always)]
+    fn key(&self, number: u32) -> u32 {
+        number.wrapping_add(self.instant.wrapping_mul(PER_INSTANT))
     }
 
     /// A source for each of the cells, which gives these shares of its light.
@@ -79,7 +89,8 @@ impl Maker<'_> {
         for (source, cell) in sources.iter_mut().zip(cells) {
             let [east, south] = cell.position_km;
             let powers = shares.map(|share| share * cell.power_w);
-            *source = self.make(self.field.foot(east, south), powers, node_of(cell.energy_ev));
+            let key = self.key(east.to_bits().rotate_left(16) ^ south.to_bits());
+            *source = self.make(self.field.foot(east, south), powers, node_of(cell.energy_ev), key);
         }
     }
 
@@ -122,7 +133,8 @@ impl Maker<'_> {
             for (i, source) in sources.iter_mut().enumerate() {
                 let foot = Foot { across: [feet[0][i], feet[1][i]], upright: feet[2][i] };
                 let powers = [green_w[first + i], 0.0, particles.powers_w[first + i]];
-                *source = self.make(foot, powers, nodes[i]);
+                let key = self.key(particles.ids[first + i] as u32);
+                *source = self.make(foot, powers, nodes[i], key);
             }
         }
     }
@@ -141,14 +153,14 @@ impl Sources {
             let diffusion = column.spread_km[emitter.index()];
             math::sqrt(spread * spread + diffusion * diffusion + map.cell_km() * map.cell_km() / 6.0)
         };
-        let maker = |spread: f64, share| Maker { field, reach: spread as f32 * REACH, share };
+        let maker = |spread: f64, share, instant| Maker { field, reach: spread as f32 * REACH, share, instant };
         let red_spread = with(Emitter::OxygenRed, light.glow[1]);
-        let mut sharp = maker(with(Emitter::OxygenGreen, light.glow[0]), 1.0).cells(&green, GREEN);
-        let moving = maker(spread, 1.0 / moments.later.len().max(1) as f32);
-        for later in &moments.later {
-            sharp.extend(moving.particles(light.particles, &green_w, *later as f32));
+        let mut sharp = maker(with(Emitter::OxygenGreen, light.glow[0]), 1.0, moments.first).cells(&green, GREEN);
+        let share = 1.0 / moments.later.len().max(1) as f32;
+        for (later, instant) in moments.later.iter().zip(moments.first..) {
+            sharp.extend(maker(spread, share, instant).particles(light.particles, &green_w, *later as f32));
         }
-        let soft = maker(red_spread, 1.0).cells(&red, RED);
+        let soft = maker(red_spread, 1.0, moments.first).cells(&red, RED);
         Self { sharp, soft, spread_km: [spread, red_spread] }
     }
 }
@@ -171,6 +183,8 @@ impl Sources {
 pub(super) struct Moments {
     /// Instants, s after their step; each has an equal part of the power.
     pub(super) later: Vec<f64>,
+    /// Number of the first of them.
+    pub(super) first: u32,
     /// How far they are spread by their motion from one to the next (standard deviation), km.
     pub(super) smear_km: f64,
 }

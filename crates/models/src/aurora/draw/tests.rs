@@ -15,10 +15,11 @@ use bansho_base::{
 use super::{
     Aurora, BlurParameters, DrawingParameters, FallModel, Sampling,
     blur::Blurred,
-    chart::{Chart, Coverage},
+    chart::{Chart, Coverage, STRIP},
     collisions::Collisions,
     footprint::{Footprint, REACH, Source},
     geometry::{EARTH_RADIUS_KM, FieldLines},
+    group::GROUP,
     meridians::Meridians,
     phenomenon::measured_lines,
     prepared::{Batch, Charts},
@@ -61,7 +62,7 @@ fn field(dip_deg: f64) -> FieldLines {
 }
 
 fn sources(cells: &[GlowCell], shares: Shares, spread_km: f64, field: &FieldLines) -> Vec<Source> {
-    Maker { field, reach: spread_km as f32 * REACH, share: 1.0 }.cells(cells, shares)
+    Maker { field, reach: spread_km as f32 * REACH, share: 1.0, instant: 0 }.cells(cells, shares)
 }
 
 /// Least standard deviation of sources, km.
@@ -71,7 +72,7 @@ fn spread_of(sources: &[Source]) -> f64 {
 
 fn draw(sources: &[Source], view: &View, field: &FieldLines, profiles: &Profiles, step: f64) -> Meridians {
     let chart = Chart::new(&Coverage::of_view(view, field), step, step);
-    let footprint = Footprint::new(sources, &chart, spread_of(sources));
+    let footprint = Footprint::new(sources, (&chart, STRIP), field, spread_of(sources));
     Meridians::new(chart, field, profiles, &footprint)
 }
 
@@ -194,8 +195,9 @@ fn beside_profile(emission: &Emission, collisions: &Collisions, cells: &[GlowCel
     let sources = sources(cells, PROMPT_AND_GREEN, 1.5, &field);
     // Low rows, since single points are spread over two of them.
     let chart = || Chart::new(&Coverage::of_view(&view, &field), STEP, 0.5 * STEP);
-    let footprint = Footprint::new(&sources, &chart(), spread_of(&sources));
-    let expected = Meridians::new(chart(), &field, &profiles, &footprint);
+    let sorted = |strip| Footprint::new(&sources, (&chart(), strip), &field, spread_of(&sources));
+    let expected = Meridians::new(chart(), &field, &profiles, &sorted(STRIP));
+    let footprint = sorted(GROUP);
     let mut mean = vec![[0.0; 4]; expected.light.len()];
     for step in 0..64 {
         let picture = collisions.draw(chart(), &field, &footprint, step);
