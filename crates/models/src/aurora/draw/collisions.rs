@@ -3,6 +3,8 @@
 //! Heights and places along the line of sight are random; to the side each point has the smooth edge of its source, so
 //! that rays are as sharp as those of the mean. That mean is [`Meridians`], but for the noise.
 
+use std::ops::Range;
+
 use bansho_base::random::{Key, Purpose, uniform, uniform_f64};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
@@ -10,8 +12,8 @@ use rayon::prelude::*;
 use super::{
     DrawingParameters, FallModel,
     chart::{Chart, Finder, STRIP},
-    descent::{Descents, LineOfFall},
-    footprint::{Entry, Footprint, Patch, Source},
+    descent::{Descent, Descents, LineOfFall, altitudes_km},
+    footprint::{Footprint, Patch, Source},
     geometry::FieldLines,
     group::{GROUP, Group},
     meridians::{LightStrip, Meridians},
@@ -41,6 +43,10 @@ const DEVIATIONS: usize = 4096;
 /// What shines after a collision: the mean of a level, or nothing, or a single emitter.
 const NOTHING: u16 = LEVELS as u16;
 const EMITTER: u16 = NOTHING + 1;
+/// Lanes from one collision of a full batch to the next below; odd, so that all are filled.
+const APART: usize = 5;
+/// Sources whose falls are looked up together: what is far away in memory is then waited for once.
+const AHEAD: usize = 32;
 /// Nearer to the observer's own field line than so many reaches, points are placed anew for every column; and nearer
 /// than so many, each by its own root and divisions.
 const NEAR: f32 = 4.0;
@@ -62,8 +68,6 @@ pub(super) struct Collisions {
 }
 
 /// Falls of a library, their collisions in batches.
-///
-/// Neighbours in a batch lie far apart in altitude: sums in neighbouring rows would wait for each other.
 #[derive(Clone, Debug)]
 struct FallTable {
     /// Where the falls of each node begin, and the end of all, in batches.
@@ -71,15 +75,16 @@ struct FallTable {
     batches: Vec<FallBatch>,
 }
 
-/// [`BATCH`] collisions of a fall.
+/// [`BATCH`] collisions of a fall, or fewer in the last of them.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 struct FallBatch {
     /// Places among the altitudes, [`Descents::place`].
     places: [f32; BATCH],
-    altitudes_km: [f32; BATCH],
     offsets_km: [f32; BATCH],
     /// Places among the photons.
     lights: [u16; BATCH],
+    count: u32,
 }
 
 impl FallTable {
@@ -87,8 +92,7 @@ impl FallTable {
     fn new(nodes: usize, fall: impl Fn(usize, u32) -> Vec<(Collision, u16)> + Sync) -> Self {
         let of_node = |node: usize| -> Vec<FallBatch> {
             let count = (collision_count(node) as usize).div_ceil(BATCH);
-            let batches = |fall: Vec<_>| (0..count).map(move |first| FallBatch::new(&fall, first, count));
-            (0..VARIANTS).flat_map(|variant| batches(fall(node, variant))).collect()
+            (0..VARIANTS).flat_map(|variant| batches(&fall(node, variant), count)).collect()
         };
         let by_node: Vec<_> = (0..nodes).into_par_iter().map(of_node).collect();
         let mut starts = vec![0];
@@ -112,18 +116,47 @@ impl FallTable {
     }
 }
 
-impl FallBatch {
-    /// Every `stride`th collision of a fall from `first` on.
-    fn new(fall: &[(Collision, u16)], first: usize, stride: usize) -> Self {
-        let (altitudes_km, lights) = ([100.0; BATCH], [NOTHING; BATCH]);
-        let mut batch = Self { places: [0.0; BATCH], altitudes_km, offsets_km: [0.0; BATCH], lights };
-        for (lane, (collision, light)) in fall.iter().skip(first).step_by(stride).enumerate() {
-            batch.places[lane] = Descents::place(collision.altitude_km);
-            batch.altitudes_km[lane] = collision.altitude_km;
-            batch.offsets_km[lane] = collision.offset_km[0];
-            batch.lights[lane] = *light;
+/// The collisions of a fall in so many batches, all but the last of them full.
+///
+/// What the last one has and what each of the others has are evenly spread over the fall; in full ones, collisions of neighbouring lanes are far
+/// apart, since sums in neighbouring rows would wait for each other.
+fn batches(fall: &[(Collision, u16)], count: usize) -> Vec<FallBatch> {
+    let full = count.saturating_sub(1);
+    let last = fall.len().min(BATCH * count).saturating_sub(BATCH * full);
+    let mut batches = vec![FallBatch::EMPTY; count];
+    let mut others = 0_usize;
+    for (number, collision) in fall.iter().take(BATCH * count).enumerate() {
+        let is_last = (number + 1) * last / fall.len() > number * last / fall.len();
+        if is_last || full == 0 {
+            let lane = batches[full].count as usize;
+            batches[full].put(lane, collision);
+        } else {
+            batches[others % full].put(others / full * APART % BATCH, collision);
+            others += 1;
         }
-        batch
+    }
+    // A fall that ends early goes on in the dark where it ended.
+    for (collision, _) in fall.last().into_iter().cycle().take((BATCH * full).saturating_sub(others)) {
+        batches[others % full].put(others / full * APART % BATCH, &(*collision, NOTHING));
+        others += 1;
+    }
+    // Lanes that have none lie where the first does, so that no row is lit for them.
+    for batch in &mut batches[full..] {
+        for lane in batch.count as usize..BATCH {
+            (batch.places[lane], batch.offsets_km[lane]) = (batch.places[0], batch.offsets_km[0]);
+        }
+    }
+    batches
+}
+
+impl FallBatch {
+    const EMPTY: Self = Self { places: [0.0; BATCH], offsets_km: [0.0; BATCH], lights: [NOTHING; BATCH], count: 0 };
+
+    fn put(&mut self, lane: usize, (collision, light): &(Collision, u16)) {
+        self.places[lane] = Descents::place(collision.altitude_km);
+        self.offsets_km[lane] = collision.offset_km[0];
+        self.lights[lane] = *light;
+        self.count += 1;
     }
 }
 
@@ -167,13 +200,15 @@ impl Collisions {
     }
 
     /// The fall of a source.
-    fn fall(&self, source: &Source, step: u32) -> Fall<'_> {
+    #[inline(always)]
+    fn fall(&self, source: Source, step: u32) -> Fall<'_> {
         let [a, b, c, d] = self.key.words(u64::from(source.key), step, SOURCE);
         let below = (source.node as usize).min(NODES - 2);
         let about = below + usize::from(uniform(a) < source.node - below as f32);
         // What is beyond the falls is drawn as the hardest of them: their number of collisions and the light of each belong together.
         let node = self.deposition.draw_node_about(about, uniform_f64(b, d)).min(self.falls.highest());
-        Fall { batches: self.falls.fall(node, c), pairs: self.pairs[node], first: (c >> 8) as usize / BATCH * BATCH }
+        let batches = self.falls.fall(node, c);
+        Fall { source, batches, pairs: self.pairs[node], first: (c >> 8) as usize / BATCH * BATCH }
     }
 }
 
@@ -208,11 +243,29 @@ fn single_photons(emitter: Emitter) -> PerEmitter<f64> {
 
 /// The random fall of a source.
 struct Fall<'a> {
+    source: Source,
     batches: &'a [FallBatch],
     /// kR of ion pairs that a collision stands for, per mW/m^2.
     pairs: f32,
     /// Where its deviations begin.
     first: usize,
+}
+
+/// A field line as it is seen.
+enum SeenLine<'a> {
+    ByPolynomials(&'a Descent),
+    Exactly(LineOfFall<'a>),
+}
+
+impl SeenLine<'_> {
+    /// Rows of collisions so far from the line in km, and how bright they are seen.
+    #[inline(always)]
+    fn points<S: Simd>(&self, batch: &FallBatch, offsets: Lanes<S>) -> [Lanes<S>; 2] {
+        match self {
+            Self::ByPolynomials(descent) => descent.points(Lanes::from_slice(offsets.simd, &batch.places), offsets),
+            Self::Exactly(line) => line.points(&altitudes_km(&batch.places), offsets),
+        }
+    }
 }
 
 /// What the points of a strip have in common.
@@ -229,25 +282,30 @@ impl Drawing<'_> {
     #[inline(always)]
     fn group<S: Simd>(&self, simd: S, strip: LightStrip, field: &FieldLines, (group, trace): &mut (Group, Trace)) {
         let entries = group.begin(strip.number, self.chart, self.footprint, field);
-        for entry in &entries {
-            self.source(simd, entry, group, trace);
+        let mut falls = Vec::with_capacity(AHEAD);
+        for entries in entries.chunks(AHEAD) {
+            falls.clear();
+            for entry in entries {
+                falls.push(self.collisions.fall(*self.footprint.source(entry.source), self.step));
+            }
+            for (entry, fall) in entries.iter().zip(&falls) {
+                self.source(simd, entry.columns(), fall, group, trace);
+            }
         }
         group.write(strip, self.chart.rows);
         group.end(entries);
     }
 
     #[inline(always)]
-    fn source<S: Simd>(&self, simd: S, entry: &Entry, group: &mut Group, trace: &mut Trace) {
-        let source = self.footprint.source(entry.source);
-        let fall = self.collisions.fall(source, self.step);
+    fn source<S: Simd>(&self, simd: S, columns: Range<usize>, fall: &Fall, group: &mut Group, trace: &mut Trace) {
+        let source = &fall.source;
         let [green, red, prompt] = source.power;
         let powers = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
         let weights = powers * (fall.pairs / self.chart.row_step as f32);
-        let columns = entry.columns();
         // Seen from afar its meridian is that of all columns.
         let shared = source.distance() >= NEAR * source.reach;
         if shared {
-            self.place(simd, &fall, source, group.seen_by((columns.start + columns.end) / 2, source), trace);
+            self.place(simd, fall, (columns.start + columns.end) / 2, group, trace);
         }
         for from in columns.clone().step_by(STRIP) {
             let patch = Patch::new(source, self.chart, &group.units(from));
@@ -257,44 +315,77 @@ impl Drawing<'_> {
                     continue;
                 }
                 if !shared {
-                    self.place(simd, &fall, source, group.seen_by(column, source), trace);
+                    self.place(simd, fall, column, group, trace);
                 }
                 group.add(column, trace, weights * share);
             }
         }
     }
 
-    /// Places the collisions of a fall down a line.
+    /// Places the collisions of a fall down a line, as a column sees it.
     #[inline(always)]
-    fn place<S: Simd>(
-        &self,
-        simd: S,
-        fall: &Fall,
-        source: &Source,
-        (meridian, along): (&[f32; 3], f32),
-        trace: &mut Trace,
-    ) {
+    fn place<S: Simd>(&self, simd: S, fall: &Fall, column: usize, group: &mut Group, trace: &mut Trace) {
         trace.clear();
-        let line = &LineOfFall::new(meridian, along, &self.finder);
-        let reach = source.reach.max(self.footprint.bins().least_reach(line.distance));
-        let descent = (line.distance >= SINGLE * reach).then(|| self.collisions.descents.along(simd, line));
-        if descent.as_ref().is_some_and(|descent| !descent.shows(reach, self.chart.rows)) {
+        let (meridian, distance) = group.seen_by(column, &fall.source);
+        let line = LineOfFall::new(meridian, distance, &self.finder);
+        let reach = fall.source.reach.max(self.footprint.bins().least_reach(distance));
+        if distance < SINGLE * reach {
+            self.add(simd, fall, (reach, 0.0), &SeenLine::Exactly(line), trace);
             return;
         }
+        let seen = group.descent(simd, column, distance, (&self.collisions.descents, &self.finder));
+        let (descent, beyond) = (&seen.descent, distance - seen.distance);
+        if descent.shows(reach + beyond.abs(), self.chart.rows) {
+            self.add(simd, fall, (reach, beyond), &SeenLine::ByPolynomials(descent), trace);
+        }
+    }
+
+    /// Adds the collisions of a fall that reaches so far to both sides of its field line, which lies so far beyond the line that is given, km.
+    #[inline(always)]
+    fn add<S: Simd>(&self, simd: S, fall: &Fall, (reach, beyond): (f32, f32), line: &SeenLine, trace: &mut Trace) {
         let last = (self.chart.rows - 1) as f32;
         let mut lit = Lit::new(simd);
         for (number, batch) in fall.batches.iter().enumerate() {
             let from = (fall.first + number * BATCH) % DEVIATIONS;
             let Some(deviations) = self.collisions.deviations.get(from..from + BATCH) else { continue };
-            let offsets = Lanes::from_slice(simd, deviations)
-                .fused(Lanes::splat(simd, reach), Lanes::from_slice(simd, &batch.offsets_km));
-            let [rows, shown] = match &descent {
-                Some(descent) => descent.points(Lanes::from_slice(simd, &batch.places), offsets),
-                None => line.points(&batch.altitudes_km, offsets),
-            };
+            let offsets = Lanes::from_slice(simd, &batch.offsets_km) + Lanes::splat(simd, beyond);
+            let offsets = Lanes::from_slice(simd, deviations).fused(Lanes::splat(simd, reach), offsets);
+            let [rows, shown] = line.points(batch, offsets);
             let points = Points::new(rows, shown, last, &mut lit);
-            trace.add(simd, &points, &batch.lights, &self.collisions.photons);
+            trace.add(simd, &points, (&batch.lights, batch.count as usize), &self.collisions.photons);
         }
         trace.finish(&lit);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_collision_of_a_fall_is_in_a_batch() {
+        for (collisions, count) in [(1, 1), (16, 1), (17, 2), (50, 4), (100, 7), (20, 4)] {
+            let collision = |number: usize| {
+                let altitude_km = 300.0 - 2.0 * number as f32;
+                (Collision { level: 0, altitude_km, offset_km: [number as f32, 0.0] }, number as u16)
+            };
+            let fall: Vec<_> = (0..collisions).map(collision).collect();
+            let batches = batches(&fall, count);
+            assert!(batches.iter().rev().skip(1).all(|batch| batch.count as usize == BATCH));
+            let lanes = batches.iter().flat_map(|batch| (0..batch.count as usize).map(move |lane| (batch, lane)));
+            let mut found: Vec<u16> = lanes
+                .filter(|(batch, lane)| batch.lights[*lane] != NOTHING)
+                .inspect(|(batch, lane)| {
+                    let number = f32::from(batch.lights[*lane]);
+                    assert_eq!(
+                        (batch.offsets_km[*lane], batch.places[*lane]),
+                        (number, Descents::place(300.0 - 2.0 * number))
+                    );
+                })
+                .map(|(batch, lane)| batch.lights[lane])
+                .collect();
+            found.sort_unstable();
+            assert!(found.into_iter().eq(0..collisions as u16), "{collisions} in {count}");
+        }
     }
 }

@@ -25,9 +25,10 @@ const SCALE_KM: f64 = 100.0;
 /// By how much the altitude of a line of sight changes there from one far bin to the next, km; more only where a row is
 /// higher than that.
 const STEP_KM: f64 = 1.0;
-/// Near bins within the reach of a patch, where so many take up 1 to [`MOST_ROWS`] rows of the chart each.
-const BINS_PER_REACH: f64 = 2.5;
-const MOST_ROWS: f64 = 2.5;
+/// Near bins within the reach of a patch, where each takes up as many rows of the chart as these are. Wider ones would blur the sides of thin
+/// sheets near the magnetic zenith.
+const BINS_PER_REACH: f64 = 5.0;
+const ROWS_PER_BIN: [f64; 2] = [0.5, 1.25];
 /// Distances beyond this lie behind the horizon, km.
 const FARTHEST_KM: f64 = 3000.0;
 /// Least reach of a patch in cells, so that its sum does not depend on where between the cells it lies.
@@ -131,7 +132,7 @@ impl Bins {
     /// Bins for patches of a standard deviation in km or more, on a chart with rows of `step` radians.
     pub(super) fn new(spread_km: f64, step: f64) -> Self {
         let row = step * SCALE_KM;
-        let width = (spread_km * f64::from(REACH) / BINS_PER_REACH).clamp(row, MOST_ROWS * row);
+        let width = (spread_km * f64::from(REACH) / BINS_PER_REACH).clamp(ROWS_PER_BIN[0] * row, ROWS_PER_BIN[1] * row);
         let share = (STEP_KM / SCALE_KM).max(2.0 * step);
         let near_to = (width / share).min(FARTHEST_KM);
         let near = near_to / width;

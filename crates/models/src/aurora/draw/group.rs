@@ -2,11 +2,12 @@
 //!
 //! They are worked on in a buffer that stays in the cache, and are then written to the picture at once.
 
-use bansho_base::math::Fused;
+use bansho_base::math::{self, Fused, lanes};
 use fearless_simd::Simd;
 
 use super::{
-    chart::{Chart, STRIP},
+    chart::{Chart, Finder, STRIP},
+    descent::{Descent, Descents, LineOfFall},
     footprint::{Entry, Footprint, Source},
     geometry::FieldLines,
     meridians::LightStrip,
@@ -16,6 +17,22 @@ use crate::lanes::FourLanes;
 
 /// Columns that a thread draws at once: the more, the fewer sources are placed twice.
 pub(super) const GROUP: usize = 4 * STRIP;
+
+/// Ranges of distance from one to twice as far, in each of which lines are seen alike but for a shift: a hundredth.
+const RANGES_PER_OCTAVE: f32 = 70.0;
+/// Ranges from 1 km on, to beyond the horizon.
+const RANGES: usize = 12 * 70;
+/// No column.
+const NONE: u32 = u32::MAX;
+
+/// How the lines of a column in a range of distance are seen, by the line in its middle.
+#[derive(Clone, Copy)]
+pub(super) struct Seen {
+    column: u32,
+    /// Distance of that line, km.
+    pub(super) distance: f32,
+    pub(super) descent: Descent,
+}
 
 /// What a thread keeps from group to group.
 pub(super) struct Group {
@@ -29,6 +46,8 @@ pub(super) struct Group {
     /// Cosines and sines of the columns' longitudes, and as many more.
     units: [[f32; GROUP + STRIP]; 2],
     meridians: [[f32; 3]; GROUP],
+    /// How lines were last seen in each range of distance, by an even and by an odd column.
+    seen: Vec<Seen>,
 }
 
 impl Group {
@@ -42,6 +61,7 @@ impl Group {
             entries: Vec::new(),
             units: [[0.0; GROUP + STRIP]; 2],
             meridians: [[0.0; 3]; GROUP],
+            seen: (0..2 * RANGES).map(|slot| Seen::none(slot / 2)).collect(),
         }
     }
 
@@ -54,6 +74,9 @@ impl Group {
         field: &FieldLines,
     ) -> Vec<Entry> {
         self.lit = [[usize::MAX, 0]; GROUP];
+        for seen in &mut self.seen {
+            seen.column = NONE;
+        }
         for column in 0..GROUP {
             let unit = chart.unit(number * GROUP + column);
             self.meridians[column] = field.meridian(unit).single();
@@ -105,6 +128,24 @@ impl Group {
         (&self.meridians[column], x.fused(self.units[0][column], y * self.units[1][column]))
     }
 
+    /// How a column sees lines about that distance, km.
+    #[inline(always)]
+    pub(super) fn descent<S: Simd>(
+        &mut self,
+        simd: S,
+        column: usize,
+        distance: f32,
+        (descents, finder): (&Descents, &Finder),
+    ) -> &Seen {
+        let range = ((lanes::log2(distance) * RANGES_PER_OCTAVE).max(0.0) as usize).min(RANGES - 1);
+        let seen = &mut self.seen[2 * range + column % 2];
+        if seen.column != column as u32 {
+            let line = LineOfFall::new(&self.meridians[column], seen.distance, finder);
+            (seen.column, seen.descent) = (column as u32, descents.along(simd, &line));
+        }
+        seen
+    }
+
     /// Adds a fall with weights to a column.
     #[inline(always)]
     pub(super) fn add<S: Simd>(&mut self, column: usize, trace: &Trace, weights: FourLanes<S>) {
@@ -129,6 +170,13 @@ impl Group {
             }
             *rows_lit = [(first * QUAD) as u32, last as u32];
         }
+    }
+}
+
+impl Seen {
+    fn none(range: usize) -> Self {
+        let distance = math::exp2((range as f64 + 0.5) / f64::from(RANGES_PER_OCTAVE)) as f32;
+        Self { column: NONE, distance, descent: Descent::default() }
     }
 }
 

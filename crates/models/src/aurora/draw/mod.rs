@@ -22,6 +22,7 @@ mod parameters;
 mod phenomenon;
 mod prepared;
 mod profile;
+mod sampler;
 mod seen;
 mod shading;
 mod shown_rows;

@@ -20,8 +20,9 @@ use super::{
     geometry::{EARTH_RADIUS_KM, FieldLines, dot},
     group::GROUP,
     maps::Maps,
-    meridians::{Meridians, Sampler},
+    meridians::Meridians,
     phenomenon::{MEASURED, measured_lines},
+    sampler::Sampler,
     shading::Shading,
     sources::Sources,
 };
@@ -141,7 +142,9 @@ impl Charts<'_> {
         let chart = Chart::new(&self.coverage, column, (0.25 * column).max(pixel));
         let footprint = Footprint::new(&sources.soft, (&chart, STRIP), self.field, spread_km);
         // Always by the mean fall: in a cell that shines for a minute thousands of falls have come together.
-        Meridians::new(chart, self.field, &self.aurora.profiles, &footprint)
+        let mut picture = Meridians::new(chart, self.field, &self.aurora.red_profiles, &footprint);
+        picture.add_up_heights();
+        picture
     }
 }
 

@@ -23,8 +23,8 @@ pub(super) struct Quad(pub(super) [f32; 4 * QUAD]);
 /// Photons of the collisions of one fall by row of the chart, and beyond them rows for points that are outside.
 pub(super) struct Trace {
     light: Vec<PerEmitter<f32>>,
-    /// Whether any of each four rows may have some: 0 or 1.
-    touched: Vec<u8>,
+    /// Whether each row and the one below may have some: 0 or 1.
+    touched: Vec<[u8; QUAD]>,
     /// The fours of rows that have some, and how many they are.
     quads: Vec<u32>,
     count: usize,
@@ -34,7 +34,7 @@ impl Trace {
     pub(super) fn new(rows: usize) -> Self {
         let rows = (rows + 2 * BATCH).next_multiple_of(QUAD) + QUAD;
         let quads = rows / QUAD;
-        Self { light: vec![[0.0; 4]; rows], touched: vec![0; quads], quads: vec![0; quads + 1], count: 0 }
+        Self { light: vec![[0.0; 4]; rows], touched: vec![[0; QUAD]; quads], quads: vec![0; quads + 1], count: 0 }
     }
 
     /// The fours of rows that have light, from the uppermost on.
@@ -52,29 +52,36 @@ impl Trace {
         self.count = 0;
     }
 
-    /// Adds the light of points.
+    /// Adds the light of the first `count` points.
     #[inline(always)]
     pub(super) fn add<S: Simd>(
         &mut self,
         simd: S,
         points: &Points,
-        lights: &[u16; BATCH],
+        (lights, count): (&[u16; BATCH], usize),
         photons: &[PerEmitter<f32>],
     ) {
-        let (trace, touched) = (self.light.as_mut_slice(), self.touched.as_mut_slice());
-        for lane in 0..BATCH {
-            let (row, light) = (points.rows[lane] as usize, lights[lane] as usize);
-            let (Some(both), Some(photons)) = (trace.get_mut(row..row + 2), photons.get(light)) else { continue };
-            let (both, photons) = (both.as_flattened_mut(), FourLanes::simd_from(simd, *photons));
-            let weights =
-                FourLanes::splat(simd, points.upper[lane]).combine(FourLanes::splat(simd, points.lower[lane]));
-            photons.combine(photons).fused(weights, HalfLanes::from_slice(simd, both)).store_slice(both);
-            for row in [row, row + 1] {
-                if let Some(touched) = touched.get_mut(row / QUAD) {
-                    *touched = 1;
-                }
+        if count == BATCH {
+            for lane in 0..BATCH {
+                self.add_point(simd, points, lane, photons.get(lights[lane] as usize));
+            }
+        } else {
+            for lane in 0..count.min(BATCH) {
+                self.add_point(simd, points, lane, photons.get(lights[lane] as usize));
             }
         }
+    }
+
+    #[inline(always)]
+    fn add_point<S: Simd>(&mut self, simd: S, points: &Points, lane: usize, photons: Option<&PerEmitter<f32>>) {
+        let row = points.rows[lane] as usize;
+        let touched = self.touched.as_flattened_mut().get_mut(row);
+        let both = self.light.get_mut(row..row + 2);
+        let (Some(both), Some(touched), Some(photons)) = (both, touched, photons) else { return };
+        *touched = 1;
+        let (both, photons) = (both.as_flattened_mut(), FourLanes::simd_from(simd, *photons));
+        let weights = FourLanes::splat(simd, points.upper[lane]).combine(FourLanes::splat(simd, points.lower[lane]));
+        photons.combine(photons).fused(weights, HalfLanes::from_slice(simd, both)).store_slice(both);
     }
 
     /// Finds what rows have light, within those that may have some.
@@ -83,11 +90,14 @@ impl Trace {
         let [first, end] = lit.rows().map(|row| row.div_ceil(QUAD));
         let first = first.saturating_sub(1).min(end);
         let mut count = 0;
+        // The last row before reaches into the first here.
+        let mut before = 0;
         // Without a branch, which nobody could foresee.
         for (quad, touched) in (first as u32..).zip(&mut self.touched[first..end]) {
             self.quads[count] = quad;
-            count += usize::from(*touched);
-            *touched = 0;
+            count += usize::from(u32::from_le_bytes(*touched) | before != 0);
+            before = u32::from(touched[QUAD - 1]);
+            *touched = [0; QUAD];
         }
         self.count = count;
     }
