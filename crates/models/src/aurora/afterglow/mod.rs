@@ -1,7 +1,8 @@
 //! Light that lingers where electrons have been: the green and the red line, on maps of the plane at 100 km altitude.
 //!
 //! Blue and purple light leaves at once, where the electrons are. Oxygen keeps its green for 0.8 s and its red for up to two
-//! minutes, less where the air quenches it, so that red light fades by height; so the green follows a moving sheet softly and the red stays behind.
+//! minutes, less where the air quenches it, so that red light fades by height. So the green
+//! follows a moving sheet softly and the red stays behind.
 
 mod map;
 

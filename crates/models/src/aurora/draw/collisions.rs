@@ -118,8 +118,8 @@ impl FallTable {
 
 /// The collisions of a fall in so many batches, all but the last of them full.
 ///
-/// What the last one has and what each of the others has are evenly spread over the fall; in full ones, collisions of neighbouring lanes are far
-/// apart, since sums in neighbouring rows would wait for each other.
+/// What the last one has and what each of the others has are evenly spread over the fall; in full ones, collisions of neighbouring lanes are
+/// far apart, since sums in neighbouring rows would wait for each other.
 fn batches(fall: &[(Collision, u16)], count: usize) -> Vec<FallBatch> {
     let full = count.saturating_sub(1);
     let last = fall.len().min(BATCH * count).saturating_sub(BATCH * full);
@@ -340,7 +340,8 @@ impl Drawing<'_> {
         }
     }
 
-    /// Adds the collisions of a fall that reaches so far to both sides of its field line, which lies so far beyond the line that is given, km.
+    /// Adds the collisions of a fall that reaches so far to both sides of its field line, which lies so far beyond the line that is
+    /// given, km.
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, fall: &Fall, (reach, beyond): (f32, f32), line: &SeenLine, trace: &mut Trace) {
         let last = (self.chart.rows - 1) as f32;

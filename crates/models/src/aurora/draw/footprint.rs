@@ -25,8 +25,8 @@ const SCALE_KM: f64 = 100.0;
 /// By how much the altitude of a line of sight changes there from one far bin to the next, km; more only where a row is
 /// higher than that.
 const STEP_KM: f64 = 1.0;
-/// Near bins within the reach of a patch, where each takes up as many rows of the chart as these are. Wider ones would blur the sides of thin
-/// sheets near the magnetic zenith.
+/// Near bins within the reach of a patch, where each takes up as many rows of the chart as these are. Wider ones would blur the sides of
+/// thin sheets near the magnetic zenith.
 const BINS_PER_REACH: f64 = 5.0;
 const ROWS_PER_BIN: [f64; 2] = [0.5, 1.25];
 /// Distances beyond this lie behind the horizon, km.

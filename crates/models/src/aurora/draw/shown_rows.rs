@@ -46,8 +46,8 @@ impl ShownRows {
         }
     }
 
-    /// Whether light within `margin_km` of a field line, across the field, may show: the line's place across the field and its distance from
-    /// the observer's own, km.
+    /// Whether light within `margin_km` of a field line, across the field, may show: the line's place across the field and its distance
+    /// from the observer's own, km.
     #[inline(always)]
     pub(super) fn may_hold(&self, [x, y]: [f32; 2], distance: f32, margin_km: f32) -> bool {
         let outward = x.fused(self.across[0], y * self.across[1]);
@@ -108,7 +108,7 @@ mod tests {
             for east in -40..=40 {
                 for south in -40..=40 {
                     let across = [12.0 * east as f32 + 1.0, 12.0 * south as f32 + 1.0];
-                    let distance = across[0].hypot(across[1]);
+                    let distance = math::hypot(f64::from(across[0]), f64::from(across[1])) as f32;
                     let (is_seen, is_kept) = (is_seen(&chart, &field, across), shown.may_hold(across, distance, 3.0));
                     assert!(is_kept || !is_seen, "dip {dip_deg}: {across:?}");
                     (seen, kept, all) = (seen + usize::from(is_seen), kept + usize::from(is_kept), all + 1);

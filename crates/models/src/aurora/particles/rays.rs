@@ -16,8 +16,8 @@ const RAYS: Fractal = Fractal { octaves: 3, lacunarity: 2, gain: 0.7 };
 const NODES_PER_CELL: f64 = 12.0;
 /// Most nodes of a sheet; finer rays on a longer one are finer than its particles.
 const MOST_NODES: f64 = 50_000.0;
-/// Where the coordinate runs so many times as fast as the sheet is long, rays are only as strong as the second number: they would be so much
-/// narrower, or stand beside others where it jumps.
+/// Where the coordinate runs so many times as fast as the sheet is long, rays begin to fade, and so many times they are gone: they would be so
+/// much narrower, or stand beside others where it jumps.
 const FAST: f64 = 1.5;
 const GONE: f64 = 3.0;
 /// Width of a black ray beside the distance between two.
@@ -166,8 +166,8 @@ impl Rays {
     }
 }
 
-/// Fades the rays of nodes of a sheet, `spacing` km apart, about those between which the coordinate runs fast or jumps: over `scale` km to both
-/// sides.
+/// Fades the rays of nodes of a sheet, `spacing` km apart, about those between which the coordinate runs fast or jumps: over `scale` km to
+/// both sides.
 fn fade(nodes: &mut [Noises], places: &[f64], spacing: f64, scale: f64) {
     let mut strengths = vec![1.0_f64; nodes.len()];
     for (node, pair) in places.windows(2).enumerate() {
