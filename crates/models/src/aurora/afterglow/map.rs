@@ -21,75 +21,79 @@ const TASK: usize = 4096;
 
 /// A lit cell of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GlowCell {
+pub struct GlowCell<const HEIGHTS: usize> {
     /// Its middle, km: x east, z south.
     pub position_km: [f32; 2],
-    /// Power that electrons would have to bring now for the light that it gives, W: a steady aurora's own.
-    pub power_w: f32,
+    /// Power that electrons would have to bring now for the light that it gives at each height, W: a steady aurora's own.
+    pub powers_w: [f32; HEIGHTS],
     /// Central energy of those electrons, eV.
     pub energy_ev: f32,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-struct Tile {
+struct Tile<const HEIGHTS: usize> {
     place: u32,
-    powers: [f32; CELLS],
+    powers: [[f32; HEIGHTS]; CELLS],
     /// Power times energy, W eV.
-    weighted: [f32; CELLS],
+    weighted: [[f32; HEIGHTS]; CELLS],
 }
 
 /// What of a cell's power is kept in a step, by the energy of the electrons that brought it.
 #[derive(Clone, Debug)]
-pub(super) struct Keeping {
+pub(super) struct Keeping<const HEIGHTS: usize> {
     /// By node of the grid of energies.
-    nodes: Vec<f32>,
+    nodes: Vec<[f32; HEIGHTS]>,
 }
 
-impl Keeping {
-    /// In steps of so many seconds, of light that lives `lifetime(energy_ev)` seconds.
-    pub(super) fn new(seconds: f64, lifetime: impl Fn(f64) -> f64) -> Self {
-        let kept = |node: usize| {
-            let lifetime = lifetime(node_energy_ev(node));
-            if lifetime > 0.0 { math::exp(-seconds / lifetime) as f32 } else { 0.0 }
-        };
-        Self { nodes: (0..NODES).map(kept).collect() }
+impl<const HEIGHTS: usize> Keeping<HEIGHTS> {
+    /// In steps of so many seconds, of light that lives `lifetimes(energy_ev)` seconds at each height.
+    pub(super) fn new(seconds: f64, lifetimes: impl Fn(f64) -> [f64; HEIGHTS]) -> Self {
+        let kept = |lifetime: f64| if lifetime > 0.0 { math::exp(-seconds / lifetime) as f32 } else { 0.0 };
+        Self { nodes: (0..NODES).map(|node| lifetimes(node_energy_ev(node)).map(kept)).collect() }
     }
 
-    fn of(&self, energy_ev: f32) -> f32 {
+    /// Nothing of what was before: light that follows power at once.
+    pub(super) fn at_once() -> Self {
+        Self { nodes: vec![[0.0; HEIGHTS]; NODES] }
+    }
+
+    fn of(&self, energy_ev: f32) -> [f32; HEIGHTS] {
         self.nodes[((node_of(energy_ev) + 0.5) as usize).min(NODES - 1)]
     }
 }
 
-impl Tile {
+impl<const HEIGHTS: usize> Tile<HEIGHTS> {
+    const CELL: [f32; HEIGHTS] = [0.0; HEIGHTS];
+
     fn new(place: u32) -> Self {
-        Self { place, powers: [0.0; CELLS], weighted: [0.0; CELLS] }
+        Self { place, powers: [Self::CELL; CELLS], weighted: [Self::CELL; CELLS] }
     }
 
     /// Mean energy of the electrons that brought its power, eV.
     fn energy_ev(&self) -> f32 {
-        let sum = |values: &[f32; CELLS]| values.iter().sum::<f32>();
+        let sum = |values: &[[f32; HEIGHTS]; CELLS]| values.as_flattened().iter().sum::<f32>();
         sum(&self.weighted) / sum(&self.powers).max(f32::MIN_POSITIVE)
     }
 }
 
-/// Power on square cells of which only lit ones are stored.
+/// Power on square cells of which only lit ones are stored, once for each of some heights whose light lives differently long.
 ///
 /// The power of a cell follows that of the particles in it, `dP/dt = (P_particles - P) / lifetime`: so a steady sheet shows its own
 /// power, and one that is gone fades. Excited atoms do not move here: how far they diffuse is a blur of the light
 /// ([`Column::spread_km`](crate::aurora::light::emission::Column)). The lifetime is that of the column of the energy at
 /// each place, by tiles of eight by eight cells: soft electrons shine high up, where it is long.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GlowMap {
+pub struct GlowMap<const HEIGHTS: usize> {
     cell_km: f64,
     half_km: f64,
     /// Tiles along each side.
     side: usize,
     /// For each place of a tile its number, or [`NO_TILE`].
     numbers: Vec<u32>,
-    tiles: Vec<Tile>,
+    tiles: Vec<Tile<HEIGHTS>>,
 }
 
-impl GlowMap {
+impl<const HEIGHTS: usize> GlowMap<HEIGHTS> {
     /// A dark map.
     pub(super) fn new(extent_km: f64, cell_km: f64) -> Self {
         let side = (extent_km / (cell_km * SIDE as f64)).ceil().max(1.0) as usize;
@@ -103,40 +107,14 @@ impl GlowMap {
     }
 
     /// All cells that are lit, in an order that does not depend on threads.
-    pub fn cells(&self) -> impl Iterator<Item = GlowCell> + '_ {
+    pub fn cells(&self) -> impl Iterator<Item = GlowCell<HEIGHTS>> + '_ {
         self.tiles.iter().flat_map(|tile| (0..CELLS).filter_map(|cell| self.cell(tile, cell)))
     }
 
     /// All cells that are not fainter than `faintest` of a typical one.
-    pub(in crate::aurora) fn bright_cells(&self, faintest: f32) -> Vec<GlowCell> {
+    pub(in crate::aurora) fn bright_cells(&self, faintest: f32) -> Vec<GlowCell<HEIGHTS>> {
         let faintest = faintest * self.typical_w();
-        self.cells().filter(|cell| cell.power_w > faintest).collect()
-    }
-
-    /// The map's light as that of particles: each cell's power is shared out among those in it as they bring power. Gives the share of each
-    /// particle, W, and the lit cells that hold none; cells fainter than `faintest` of a typical one are left out.
-    pub(in crate::aurora) fn shared_out(
-        &self,
-        particles: &AuroraParticles,
-        faintest: f32,
-    ) -> (Vec<f32>, Vec<GlowCell>) {
-        let cells = self.cells_of(particles);
-        let mut sums = vec![0.0_f32; self.tiles.len() * CELLS];
-        for (cell, power) in cells.iter().zip(&particles.powers_w) {
-            if let Some(sum) = sums.get_mut(*cell as usize) {
-                *sum += power;
-            }
-        }
-        let own = |(cell, power): (&u32, &f32)| {
-            let cell = *cell as usize;
-            let sum = sums.get(cell).copied().unwrap_or_default();
-            if sum > 0.0 { self.tiles[cell / CELLS].powers[cell % CELLS] * (power / sum) } else { 0.0 }
-        };
-        let shares = cells.par_iter().zip(&particles.powers_w).map(own).collect();
-        let faintest = faintest * self.typical_w();
-        let left = (0..sums.len()).filter(|cell| sums[*cell] <= 0.0);
-        let lit = left.filter_map(|cell| self.cell(&self.tiles[cell / CELLS], cell % CELLS));
-        (shares, lit.filter(|cell| cell.power_w > faintest).collect())
+        self.cells().filter(|cell| cell.powers_w.iter().any(|power| *power > faintest)).collect()
     }
 
     /// Number of the cell that each particle is in, tile after tile; one that does not exist where the map is dark.
@@ -151,27 +129,31 @@ impl GlowMap {
 
     /// Power of a cell, weighted by power, W: faint cells, however many, do not count.
     fn typical_w(&self) -> f32 {
-        let powers = || self.tiles.iter().flat_map(|tile| &tile.powers).map(|power| f64::from(*power));
+        let powers = || self.tiles.iter().flat_map(|tile| tile.powers.as_flattened()).map(|power| f64::from(*power));
         let (sum, squares) = powers().fold((0.0, 0.0), |(sum, squares), power| (sum + power, squares + power * power));
         (squares / f64::max(sum, f64::MIN_POSITIVE)) as f32
     }
 
-    /// Power of the whole map, W.
+    /// Power of the whole map at each height, W.
     #[must_use]
-    pub fn power_w(&self) -> f64 {
-        self.cells().map(|cell| f64::from(cell.power_w)).sum()
+    pub fn powers_w(&self) -> [f64; HEIGHTS] {
+        self.cells().fold([0.0; HEIGHTS], |sum, cell| {
+            std::array::from_fn(|height| sum[height] + f64::from(cell.powers_w[height]))
+        })
     }
 
     /// Its lit tiles: the place of each, and the powers and then the powers times energy of its cells.
     pub(in crate::aurora) fn to_lists(&self) -> (Vec<u32>, Vec<f32>) {
         let places = self.tiles.iter().map(|tile| tile.place).collect();
-        (places, self.tiles.iter().flat_map(|tile| tile.powers.into_iter().chain(tile.weighted)).collect())
+        let values = |tile: &Tile<HEIGHTS>| tile.powers.into_iter().chain(tile.weighted).flatten();
+        (places, self.tiles.iter().flat_map(values).collect())
     }
 
     /// A map laid out as this one that holds what [`Self::to_lists`] gave; none if the lists are no such map.
     pub(in crate::aurora) fn with_lists(&self, places: &[u32], values: &[f32]) -> Option<Self> {
-        let (tiles, rest) = values.as_chunks::<{ 2 * CELLS }>();
-        if tiles.len() != places.len() || !rest.is_empty() {
+        let cells = values.as_chunks::<HEIGHTS>().0;
+        let (tiles, rest) = cells.as_chunks::<{ 2 * CELLS }>();
+        if tiles.len() != places.len() || !rest.is_empty() || cells.len() * HEIGHTS != values.len() {
             return None;
         }
         let mut map = Self { numbers: vec![NO_TILE; self.numbers.len()], tiles: Vec::new(), ..*self };
@@ -184,20 +166,21 @@ impl GlowMap {
         Some(map)
     }
 
-    fn cell(&self, tile: &Tile, cell: usize) -> Option<GlowCell> {
-        let power_w = tile.powers[cell];
+    fn cell(&self, tile: &Tile<HEIGHTS>, cell: usize) -> Option<GlowCell<HEIGHTS>> {
+        let powers_w = tile.powers[cell];
+        let whole: f32 = powers_w.iter().sum();
         let place = tile.place as usize;
         let middle =
             |tiles: usize, cells: usize| (((tiles * SIDE + cells) as f64 + 0.5) * self.cell_km - self.half_km) as f32;
-        (power_w > 0.0).then(|| GlowCell {
+        (whole > 0.0).then(|| GlowCell {
             position_km: [middle(place % self.side, cell % SIDE), middle(place / self.side, cell / SIDE)],
-            power_w,
-            energy_ev: tile.weighted[cell] / power_w,
+            powers_w,
+            energy_ev: tile.weighted[cell].iter().sum::<f32>() / whole,
         })
     }
 
     /// Lets a step pass.
-    pub(super) fn step(&mut self, particles: &AuroraParticles, keeping: &Keeping) {
+    pub(super) fn step(&mut self, particles: &AuroraParticles, keeping: &Keeping<HEIGHTS>) {
         let dark_w = (DARK_MW_PER_M2 * W_PER_KM2 * self.cell_km * self.cell_km) as f32;
         let mut fed = self.fade(keeping, dark_w);
         self.feed(particles, keeping, &mut fed);
@@ -205,16 +188,19 @@ impl GlowMap {
 
     /// Fades all cells and lets go of tiles that a flux which brings `dark_w` to a cell would not have lit in a step; what shall be fed of
     /// the particles' power to each tile that is left.
-    fn fade(&mut self, keeping: &Keeping, dark_w: f32) -> Vec<f32> {
-        let mut fed: Vec<f32> = Vec::with_capacity(self.tiles.len());
+    fn fade(&mut self, keeping: &Keeping<HEIGHTS>, dark_w: f32) -> Vec<[f32; HEIGHTS]> {
+        let mut fed: Vec<[f32; HEIGHTS]> = Vec::with_capacity(self.tiles.len());
         for tile in &mut self.tiles {
             let kept = keeping.of(tile.energy_ev());
-            tile.powers.iter_mut().chain(&mut tile.weighted).for_each(|value| *value *= kept);
-            fed.push(1.0 - kept);
+            for values in tile.powers.iter_mut().chain(&mut tile.weighted) {
+                values.iter_mut().zip(kept).for_each(|(value, kept)| *value *= kept);
+            }
+            fed.push(kept.map(|kept| 1.0 - kept));
         }
         let mut number = 0;
         while number < self.tiles.len() {
-            if self.tiles[number].powers.iter().all(|power| *power < dark_w * fed[number]) {
+            let is_dark = |powers: &[f32; HEIGHTS]| (0..HEIGHTS).all(|i| powers[i] < dark_w * fed[number][i]);
+            if self.tiles[number].powers.iter().all(is_dark) {
                 fed.swap_remove(number);
                 self.numbers[self.tiles[number].place as usize] = NO_TILE;
                 self.tiles.swap_remove(number);
@@ -230,7 +216,7 @@ impl GlowMap {
 
     /// Adds to each tile its share of the particles' power, one after the other, so that sums do not depend on threads. A new tile's is
     /// that of the first particle in it.
-    fn feed(&mut self, particles: &AuroraParticles, keeping: &Keeping, fed: &mut Vec<f32>) {
+    fn feed(&mut self, particles: &AuroraParticles, keeping: &Keeping<HEIGHTS>, fed: &mut Vec<[f32; HEIGHTS]>) {
         let [xs, zs] = &particles.positions;
         let places = xs.par_iter().zip(zs).with_min_len(TASK).map(|(x, z)| self.locate([*x, *z]));
         let places: Vec<(u32, u32)> = places.map(|(place, cell)| (place as u32, cell as u32)).collect();
@@ -238,12 +224,15 @@ impl GlowMap {
         for ((place, cell), (power, energy)) in places.into_iter().zip(values) {
             let (number, cell) = (self.number(place as usize), cell as usize);
             if number == fed.len() {
-                fed.push(1.0 - keeping.of(*energy));
+                fed.push(keeping.of(*energy).map(|kept| 1.0 - kept));
             }
-            let (tile, share) = (&mut self.tiles[number], fed[number]);
+            let (tile, shares) = (&mut self.tiles[number], fed[number]);
+            let (powers, weighted) = (&mut tile.powers[cell], &mut tile.weighted[cell]);
             // No `mul_add`: outside a vector loop that is a call where the machine is not known to have it.
-            tile.powers[cell] += power * share;
-            tile.weighted[cell] += power * energy * share;
+            for i in 0..HEIGHTS {
+                powers[i] += power * shares[i];
+                weighted[i] += power * energy * shares[i];
+            }
         }
     }
 
@@ -268,12 +257,40 @@ impl GlowMap {
     }
 }
 
+impl GlowMap<1> {
+    /// The map's light as that of particles: each cell's power is shared out among those in it as they bring power. Gives the share of each
+    /// particle, W, and the lit cells that hold none; cells fainter than `faintest` of a typical one are left out.
+    pub(in crate::aurora) fn shared_out(
+        &self,
+        particles: &AuroraParticles,
+        faintest: f32,
+    ) -> (Vec<f32>, Vec<GlowCell<1>>) {
+        let cells = self.cells_of(particles);
+        let mut sums = vec![0.0_f32; self.tiles.len() * CELLS];
+        for (cell, power) in cells.iter().zip(&particles.powers_w) {
+            if let Some(sum) = sums.get_mut(*cell as usize) {
+                *sum += power;
+            }
+        }
+        let own = |(cell, power): (&u32, &f32)| {
+            let cell = *cell as usize;
+            let sum = sums.get(cell).copied().unwrap_or_default();
+            if sum > 0.0 { self.tiles[cell / CELLS].powers[cell % CELLS][0] * (power / sum) } else { 0.0 }
+        };
+        let shares = cells.par_iter().zip(&particles.powers_w).map(own).collect();
+        let faintest = faintest * self.typical_w();
+        let left = (0..sums.len()).filter(|cell| sums[*cell] <= 0.0);
+        let lit = left.filter_map(|cell| self.cell(&self.tiles[cell / CELLS], cell % CELLS));
+        (shares, lit.filter(|cell| cell.powers_w[0] > faintest).collect())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn even(seconds: f64, lifetime: f64) -> Keeping {
-        Keeping::new(seconds, |_| lifetime)
+    fn even(seconds: f64, lifetime: f64) -> Keeping<1> {
+        Keeping::new(seconds, |_| [lifetime])
     }
 
     /// Particles of 3 W and 1 W at those places, of 1 and 5 keV.
@@ -292,15 +309,15 @@ mod tests {
         let fed = particles([[10.1, -20.1], [10.2, -20.2]]);
         // Half a lifetime: 1 - exp(-1/2) of 4 W.
         map.step(&fed, &even(0.4, 0.8));
-        assert!((map.power_w() - 4.0 * 0.393_469).abs() < 1e-5);
+        assert!((map.powers_w()[0] - 4.0 * 0.393_469).abs() < 1e-5);
         (0..40).for_each(|_| map.step(&fed, &even(0.4, 0.8)));
-        let cells: Vec<GlowCell> = map.cells().collect();
+        let cells: Vec<GlowCell<1>> = map.cells().collect();
         assert_eq!(cells.len(), 1);
         assert_eq!(cells[0].position_km, [10.25, -20.25]);
-        assert!((cells[0].power_w - 4.0).abs() < 1e-4 && (cells[0].energy_ev - 2000.0).abs() < 0.1);
+        assert!((cells[0].powers_w[0] - 4.0).abs() < 1e-4 && (cells[0].energy_ev - 2000.0).abs() < 0.1);
         let dark = AuroraParticles::default();
         map.step(&dark, &even(0.8, 0.8));
-        assert!((map.power_w() - 4.0 / std::f64::consts::E).abs() < 1e-4);
+        assert!((map.powers_w()[0] - 4.0 / std::f64::consts::E).abs() < 1e-4);
         (0..20).for_each(|_| map.step(&dark, &even(0.8, 0.8)));
         assert_eq!(map.tiles.len(), 0, "dark tiles are let go");
     }
@@ -312,17 +329,31 @@ mod tests {
         let lifetime = |energy_ev: f64| if energy_ev < 2000.0 { 8.0 } else { 0.8 };
         let mut map = GlowMap::new(100.0, 0.5);
         map.step(&fed, &even(1.0, 0.0));
-        map.step(&AuroraParticles::default(), &Keeping::new(0.8, lifetime));
-        let powers: Vec<f64> = map.cells().map(|cell| f64::from(cell.power_w)).collect();
+        map.step(&AuroraParticles::default(), &Keeping::new(0.8, |energy_ev| [lifetime(energy_ev)]));
+        let powers: Vec<f64> = map.cells().map(|cell| f64::from(cell.powers_w[0])).collect();
         assert!((powers[0] - 3.0 * math::exp(-0.1)).abs() < 1e-5 && (powers[1] - math::exp(-1.0)).abs() < 1e-6);
         // And fills up as slowly.
         let mut map = GlowMap::new(100.0, 0.5);
-        map.step(&fed, &Keeping::new(0.8, lifetime));
-        let powers: Vec<f64> = map.cells().map(|cell| f64::from(cell.power_w)).collect();
+        map.step(&fed, &Keeping::new(0.8, |energy_ev| [lifetime(energy_ev)]));
+        let powers: Vec<f64> = map.cells().map(|cell| f64::from(cell.powers_w[0])).collect();
         assert!(
             (powers[0] - 3.0 * (1.0 - math::exp(-0.1))).abs() < 1e-5
                 && (powers[1] - 1.0 + math::exp(-1.0)).abs() < 1e-6
         );
+    }
+
+    #[test]
+    fn every_height_fades_by_its_own_lifetime() {
+        let keeping = Keeping::new(1.0, |_| [0.5, 10.0, 100.0]);
+        let mut map = GlowMap::<3>::new(100.0, 0.5);
+        map.step(&particles([[10.1, -20.1], [10.2, -20.2]]), &Keeping::at_once());
+        (0..20).for_each(|_| map.step(&AuroraParticles::default(), &keeping));
+        for (power, lifetime) in map.powers_w().into_iter().zip([0.5, 10.0, 100.0]) {
+            assert!((power - 4.0 * math::exp(-20.0 / lifetime)).abs() < 1e-5, "{lifetime} s: {power}");
+        }
+        let (places, values) = map.to_lists();
+        assert_eq!(map.with_lists(&places, &values), Some(map.clone()));
+        assert_eq!(map.with_lists(&places, &values[1..]), None);
     }
 
     #[test]
@@ -332,7 +363,7 @@ mod tests {
         for lifetime in [0.8, 110.0] {
             let mut map = GlowMap::new(10.0, 0.005);
             (0..(8.0 * lifetime * 30.0) as usize).for_each(|_| map.step(&faint, &even(1.0 / 30.0, lifetime)));
-            assert!((map.power_w() / 2.5e-4 - 1.0).abs() < 0.01, "{lifetime} s: {} W", map.power_w());
+            assert!((map.powers_w()[0] / 2.5e-4 - 1.0).abs() < 0.01, "{lifetime} s: {} W", map.powers_w()[0]);
         }
     }
 
@@ -348,7 +379,7 @@ mod tests {
         // Both have left: the cell itself shines, unless that is too faint.
         let gone = particles([[-40.0, 40.0], [-40.0, 40.0]]);
         let (shares, cells) = map.shared_out(&gone, 0.01);
-        assert_eq!((shares, cells.len(), cells[0].power_w), (vec![0.0; 2], 1, 4.0));
+        assert_eq!((shares, cells.len(), cells[0].powers_w[0]), (vec![0.0; 2], 1, 4.0));
         assert_eq!(map.shared_out(&gone, 1.5).1, []);
         assert_eq!((map.bright_cells(0.01).len(), map.bright_cells(1.5)), (1, vec![]));
     }
@@ -359,7 +390,7 @@ mod tests {
         map.step(&particles([[-49.9, -49.9], [49.9, 49.9]]), &even(1.0, 0.0));
         // The first tile goes, the second takes its number, a third comes.
         map.step(&particles([[49.9, 49.9], [0.1, 0.1]]), &even(1.0, 0.0));
-        let mut cells: Vec<_> = map.cells().map(|cell| (cell.position_km[0], cell.power_w)).collect();
+        let mut cells: Vec<_> = map.cells().map(|cell| (cell.position_km[0], cell.powers_w[0])).collect();
         cells.sort_by(|a, b| a.0.total_cmp(&b.0));
         assert_eq!(cells, [(0.25, 1.0), (49.75, 3.0)]);
         let (places, values) = map.to_lists();

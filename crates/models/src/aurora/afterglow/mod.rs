@@ -1,7 +1,8 @@
 //! Light that lingers where electrons have been: the green and the red line, on maps of the plane at 100 km altitude.
 //!
 //! Blue and purple light leaves at once, where the electrons are. Oxygen keeps its green for 0.8 s and its red for up to two
-//! minutes, less where the air quenches it; so the green follows a moving sheet softly and the red stays behind.
+//! minutes, less where the air quenches it, so that red light fades by height. So the green
+//! follows a moving sheet softly and the red stays behind.
 
 mod map;
 
@@ -9,7 +10,7 @@ use map::Keeping;
 pub use map::{GlowCell, GlowMap};
 
 use super::{
-    light::{Emission, Emitter},
+    light::{Emission, Emitter, heights::RED_HEIGHTS},
     particles::AuroraParticles,
 };
 
@@ -19,16 +20,16 @@ const GREEN_FINENESS: f64 = 8.0;
 /// What the maps of both slow emitters keep in a step.
 #[derive(Clone, Debug)]
 pub(crate) struct Fading {
-    green: Keeping,
-    red: Keeping,
+    green: Keeping<1>,
+    red: Keeping<RED_HEIGHTS>,
 }
 
 impl Fading {
     /// In steps of so many seconds of the aurora. `emission` says how long light of electrons of an energy lives.
     pub(crate) fn new(emission: &Emission, seconds: f64) -> Self {
-        let keeping =
-            |emitter: Emitter| Keeping::new(seconds, |energy_ev| emission.column(energy_ev).lifetime[emitter.index()]);
-        Self { green: keeping(Emitter::OxygenGreen), red: keeping(Emitter::OxygenRed) }
+        let green = |energy_ev| [emission.column(energy_ev).lifetime[Emitter::OxygenGreen.index()]];
+        let red = |energy_ev| emission.red_lifetimes(energy_ev);
+        Self { green: Keeping::new(seconds, green), red: Keeping::new(seconds, red) }
     }
 }
 
@@ -36,9 +37,9 @@ impl Fading {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Afterglow {
     /// O(1S), 557.7 nm: cells an eighth as wide as the field's.
-    pub green: GlowMap,
-    /// O(1D), 630.0 and 636.4 nm: cells as wide as the field's.
-    pub red: GlowMap,
+    pub green: GlowMap<1>,
+    /// O(1D), 630.0 and 636.4 nm, by its heights: cells as wide as the field's.
+    pub red: GlowMap<RED_HEIGHTS>,
 }
 
 impl Afterglow {
@@ -55,8 +56,7 @@ impl Afterglow {
 
     /// Fills the maps as if `particles` had been as they are for long.
     pub(crate) fn settle(&mut self, particles: &AuroraParticles) {
-        let at_once = Keeping::new(1.0, |_| 0.0);
-        self.green.step(particles, &at_once);
-        self.red.step(particles, &at_once);
+        self.green.step(particles, &Keeping::at_once());
+        self.red.step(particles, &Keeping::at_once());
     }
 }

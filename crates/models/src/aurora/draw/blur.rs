@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::{
     geometry::FieldLines,
-    meridians::Sampler,
     parameters::BlurParameters,
     prepared::{BATCH, Batch},
+    sampler::Sampler,
 };
 use crate::{
     aurora::light::{EMITTERS, Emitter, PerEmitter},

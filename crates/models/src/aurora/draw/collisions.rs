@@ -12,10 +12,12 @@ use rayon::prelude::*;
 use super::{
     DrawingParameters, FallModel,
     chart::{Chart, Finder, STRIP},
-    descent::{Descents, LineOfFall},
-    footprint::{Entry, Footprint, Patch, Source},
+    descent::{Descent, Descents, LineOfFall, altitudes_km},
+    footprint::{Footprint, Patch, Source},
     geometry::FieldLines,
+    group::{GROUP, Group},
     meridians::{LightStrip, Meridians},
+    trace::{BATCH, Lit, Points, Trace},
 };
 use crate::{
     aurora::{
@@ -31,20 +33,20 @@ use crate::{
             hard_sphere::{DEFAULT_RADIUS, HardSphere},
         },
     },
-    lanes::{FourLanes, HalfLanes, LANES, Lanes, Real, nearest_whole, ramp},
+    lanes::{FourLanes, Lanes, Real},
 };
 
 const SOURCE: Purpose = Purpose::named("aurora collisions");
 const EMITTER_DRAW: Purpose = Purpose::named("aurora collision emitter");
 /// Random deviations, a multiple of [`BATCH`].
 const DEVIATIONS: usize = 4096;
-/// Collisions that are worked on at once.
-const BATCH: usize = LANES;
 /// What shines after a collision: the mean of a level, or nothing, or a single emitter.
 const NOTHING: u16 = LEVELS as u16;
 const EMITTER: u16 = NOTHING + 1;
-/// Strips that a thread draws at once: the wider they are together, the fewer sources are placed twice.
-const GROUP: usize = 4;
+/// Lanes from one collision of a full batch to the next below; odd, so that all are filled.
+const APART: usize = 5;
+/// Sources whose falls are looked up together: what is far away in memory is then waited for once.
+const AHEAD: usize = 32;
 /// Nearer to the observer's own field line than so many reaches, points are placed anew for every column; and nearer
 /// than so many, each by its own root and divisions.
 const NEAR: f32 = 4.0;
@@ -66,8 +68,6 @@ pub(super) struct Collisions {
 }
 
 /// Falls of a library, their collisions in batches.
-///
-/// Neighbours in a batch lie far apart in altitude: sums in neighbouring rows would wait for each other.
 #[derive(Clone, Debug)]
 struct FallTable {
     /// Where the falls of each node begin, and the end of all, in batches.
@@ -75,15 +75,16 @@ struct FallTable {
     batches: Vec<FallBatch>,
 }
 
-/// [`BATCH`] collisions of a fall.
+/// [`BATCH`] collisions of a fall, or fewer in the last of them.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 struct FallBatch {
     /// Places among the altitudes, [`Descents::place`].
     places: [f32; BATCH],
-    altitudes_km: [f32; BATCH],
     offsets_km: [f32; BATCH],
     /// Places among the photons.
     lights: [u16; BATCH],
+    count: u32,
 }
 
 impl FallTable {
@@ -91,8 +92,7 @@ impl FallTable {
     fn new(nodes: usize, fall: impl Fn(usize, u32) -> Vec<(Collision, u16)> + Sync) -> Self {
         let of_node = |node: usize| -> Vec<FallBatch> {
             let count = (collision_count(node) as usize).div_ceil(BATCH);
-            let batches = |fall: Vec<_>| (0..count).map(move |first| FallBatch::new(&fall, first, count));
-            (0..VARIANTS).flat_map(|variant| batches(fall(node, variant))).collect()
+            (0..VARIANTS).flat_map(|variant| batches(&fall(node, variant), count)).collect()
         };
         let by_node: Vec<_> = (0..nodes).into_par_iter().map(of_node).collect();
         let mut starts = vec![0];
@@ -116,18 +116,47 @@ impl FallTable {
     }
 }
 
-impl FallBatch {
-    /// Every `stride`th collision of a fall from `first` on.
-    fn new(fall: &[(Collision, u16)], first: usize, stride: usize) -> Self {
-        let (altitudes_km, lights) = ([100.0; BATCH], [NOTHING; BATCH]);
-        let mut batch = Self { places: [0.0; BATCH], altitudes_km, offsets_km: [0.0; BATCH], lights };
-        for (lane, (collision, light)) in fall.iter().skip(first).step_by(stride).enumerate() {
-            batch.places[lane] = Descents::place(collision.altitude_km);
-            batch.altitudes_km[lane] = collision.altitude_km;
-            batch.offsets_km[lane] = collision.offset_km[0];
-            batch.lights[lane] = *light;
+/// The collisions of a fall in so many batches, all but the last of them full.
+///
+/// What the last one has and what each of the others has are evenly spread over the fall; in full ones, collisions of neighbouring lanes are
+/// far apart, since sums in neighbouring rows would wait for each other.
+fn batches(fall: &[(Collision, u16)], count: usize) -> Vec<FallBatch> {
+    let full = count.saturating_sub(1);
+    let last = fall.len().min(BATCH * count).saturating_sub(BATCH * full);
+    let mut batches = vec![FallBatch::EMPTY; count];
+    let mut others = 0_usize;
+    for (number, collision) in fall.iter().take(BATCH * count).enumerate() {
+        let is_last = (number + 1) * last / fall.len() > number * last / fall.len();
+        if is_last || full == 0 {
+            let lane = batches[full].count as usize;
+            batches[full].put(lane, collision);
+        } else {
+            batches[others % full].put(others / full * APART % BATCH, collision);
+            others += 1;
         }
-        batch
+    }
+    // A fall that ends early goes on in the dark where it ended.
+    for (collision, _) in fall.last().into_iter().cycle().take((BATCH * full).saturating_sub(others)) {
+        batches[others % full].put(others / full * APART % BATCH, &(*collision, NOTHING));
+        others += 1;
+    }
+    // Lanes that have none lie where the first does, so that no row is lit for them.
+    for batch in &mut batches[full..] {
+        for lane in batch.count as usize..BATCH {
+            (batch.places[lane], batch.offsets_km[lane]) = (batch.places[0], batch.offsets_km[0]);
+        }
+    }
+    batches
+}
+
+impl FallBatch {
+    const EMPTY: Self = Self { places: [0.0; BATCH], offsets_km: [0.0; BATCH], lights: [NOTHING; BATCH], count: 0 };
+
+    fn put(&mut self, lane: usize, (collision, light): &(Collision, u16)) {
+        self.places[lane] = Descents::place(collision.altitude_km);
+        self.offsets_km[lane] = collision.offset_km[0];
+        self.lights[lane] = *light;
+        self.count += 1;
     }
 }
 
@@ -157,27 +186,29 @@ impl Collisions {
         }
     }
 
-    /// The sources' picture at a step of the simulation: other steps have other falls.
+    /// The picture of sources that are sorted by [`GROUP`]s of columns, at a step of the simulation: other steps have other falls.
     pub(super) fn draw(&self, chart: Chart, field: &FieldLines, footprint: &Footprint, step: u32) -> Meridians {
         let level = Level::new();
         let mut picture = Meridians::dark(chart);
-        let (chart, strips) = picture.strips();
+        let (chart, groups) = picture.strips(GROUP);
         let drawing = Drawing { collisions: self, chart, finder: chart.finder(), footprint, step };
-        strips.chunks(GROUP).for_each_init(
-            || Trace::new(chart.rows),
-            |trace, strips| dispatch!(level, simd => drawing.strips(simd, strips, field, trace)),
+        groups.for_each_init(
+            || (Group::new(chart), Trace::new(chart.rows)),
+            |own, group| dispatch!(level, simd => drawing.group(simd, group, field, own)),
         );
         picture
     }
 
     /// The fall of a source.
-    fn fall(&self, index: u32, source: &Source, step: u32) -> Fall<'_> {
-        let [a, b, c, d] = self.key.words(u64::from(index), step, SOURCE);
+    #[inline(always)]
+    fn fall(&self, source: Source, step: u32) -> Fall<'_> {
+        let [a, b, c, d] = self.key.words(u64::from(source.key), step, SOURCE);
         let below = (source.node as usize).min(NODES - 2);
         let about = below + usize::from(uniform(a) < source.node - below as f32);
         // What is beyond the falls is drawn as the hardest of them: their number of collisions and the light of each belong together.
         let node = self.deposition.draw_node_about(about, uniform_f64(b, d)).min(self.falls.highest());
-        Fall { batches: self.falls.fall(node, c), pairs: self.pairs[node], first: (c >> 8) as usize / BATCH * BATCH }
+        let batches = self.falls.fall(node, c);
+        Fall { source, batches, pairs: self.pairs[node], first: (c >> 8) as usize / BATCH * BATCH }
     }
 }
 
@@ -212,11 +243,29 @@ fn single_photons(emitter: Emitter) -> PerEmitter<f64> {
 
 /// The random fall of a source.
 struct Fall<'a> {
+    source: Source,
     batches: &'a [FallBatch],
     /// kR of ion pairs that a collision stands for, per mW/m^2.
     pairs: f32,
     /// Where its deviations begin.
     first: usize,
+}
+
+/// A field line as it is seen.
+enum SeenLine<'a> {
+    ByPolynomials(&'a Descent),
+    Exactly(LineOfFall<'a>),
+}
+
+impl SeenLine<'_> {
+    /// Rows of collisions so far from the line in km, and how bright they are seen.
+    #[inline(always)]
+    fn points<S: Simd>(&self, batch: &FallBatch, offsets: Lanes<S>) -> [Lanes<S>; 2] {
+        match self {
+            Self::ByPolynomials(descent) => descent.points(Lanes::from_slice(offsets.simd, &batch.places), offsets),
+            Self::Exactly(line) => line.points(&altitudes_km(&batch.places), offsets),
+        }
+    }
 }
 
 /// What the points of a strip have in common.
@@ -228,206 +277,116 @@ struct Drawing<'a> {
     step: u32,
 }
 
-/// Photons of the collisions of one fall by row of the chart, and beyond them rows for points that are outside.
-struct Trace {
-    light: Vec<PerEmitter<f32>>,
-    /// Rows that may hold some.
-    lit: Range<usize>,
-}
-
-impl Trace {
-    fn new(rows: usize) -> Self {
-        Self { light: vec![[0.0; 4]; rows + 2 * BATCH], lit: 0..0 }
-    }
-
-    #[inline(always)]
-    fn clear(&mut self) {
-        self.light[self.lit.clone()].fill([0.0; 4]);
-        self.lit = 0..0;
-    }
-
-    /// Adds the light of points.
-    #[inline(always)]
-    fn add<S: Simd>(&mut self, simd: S, points: &Points, lights: &[u16; BATCH], photons: &[PerEmitter<f32>]) {
-        let trace = self.light.as_mut_slice();
-        for lane in 0..BATCH {
-            let (row, light) = (points.rows[lane] as usize, lights[lane] as usize);
-            let (Some(both), Some(photons)) = (trace.get_mut(row..row + 2), photons.get(light)) else { continue };
-            let (both, photons) = (both.as_flattened_mut(), FourLanes::simd_from(simd, *photons));
-            let weights =
-                FourLanes::splat(simd, points.upper[lane]).combine(FourLanes::splat(simd, points.lower[lane]));
-            photons.combine(photons).fused(weights, HalfLanes::from_slice(simd, both)).store_slice(both);
-        }
-    }
-
-    /// Adds it with weights to a column.
-    #[inline(always)]
-    fn add_to<S: Simd>(&self, light: &mut [PerEmitter<f32>], weights: FourLanes<S>) {
-        let simd = weights.simd;
-        let (light, light_rest) = light[self.lit.clone()].as_chunks_mut::<4>();
-        let (own, own_rest) = self.light[self.lit.clone()].as_chunks::<4>();
-        let two = weights.combine(weights);
-        let four = two.combine(two);
-        for (light, own) in light.iter_mut().zip(own) {
-            let (light, own) = (light.as_flattened_mut(), own.as_flattened());
-            Lanes::from_slice(simd, own).fused(four, Lanes::from_slice(simd, light)).store_slice(light);
-        }
-        for (light, own) in light_rest.iter_mut().zip(own_rest) {
-            *light = FourLanes::simd_from(simd, *own).fused(weights, FourLanes::simd_from(simd, *light)).into();
-        }
-    }
-}
-
-/// Rows of a batch of collisions, and the weights there and in the row below. Those outside have no weight and a row
-/// each below the chart, for sums in one row would wait for each other.
-struct Points {
-    rows: [u32; BATCH],
-    upper: [f32; BATCH],
-    lower: [f32; BATCH],
-}
-
-/// The least and the greatest row of each lane.
-struct Lit<S: Simd> {
-    least: Lanes<S>,
-    greatest: Lanes<S>,
-}
-
-impl<S: Simd> Lit<S> {
-    #[inline(always)]
-    fn new(simd: S) -> Self {
-        Self { least: Lanes::splat(simd, f32::INFINITY), greatest: Lanes::splat(simd, -1.0) }
-    }
-
-    /// All rows that hold something.
-    #[inline(always)]
-    fn rows(&self) -> Range<usize> {
-        let (mut least, mut greatest) = (f32::INFINITY, -1.0_f32);
-        for lane in 0..BATCH {
-            least = least.min(self.least[lane]);
-            greatest = greatest.max(self.greatest[lane]);
-        }
-        if greatest < least { 0..0 } else { least as usize..greatest as usize + 2 }
-    }
-}
-
-impl Points {
-    /// Points at rows above `last`, or outside.
-    #[inline(always)]
-    fn new<S: Simd>(rows: Lanes<S>, shown: Lanes<S>, last: f32, lit: &mut Lit<S>) -> Self {
-        let (zero, end, outside) = (rows.like(0.0), rows.like(last), ramp(rows.simd, last + 1.0, 2.0));
-        let whole = rows.floor();
-        let (least, greatest) = (rows.like(f32::INFINITY), rows.like(-1.0));
-        lit.least = lit.least.least(inside(rows, end, [whole, least]));
-        lit.greatest = lit.greatest.greatest(inside(rows, end, [whole, greatest]));
-        let weights = inside(rows, end, [shown, zero]);
-        let lower = weights * (rows - whole);
-        let mut points = Self { rows: [0; BATCH], upper: [0.0; BATCH], lower: [0.0; BATCH] };
-        nearest_whole(inside(rows, end, [whole, outside])).store_slice(&mut points.rows);
-        (weights - lower).store_slice(&mut points.upper);
-        lower.store_slice(&mut points.lower);
-        points
-    }
-}
-
-/// The first where rows lie from 0 to `end`, the second elsewhere.
-#[inline(always)]
-fn inside<S: Simd>(rows: Lanes<S>, end: Lanes<S>, [within, without]: [Lanes<S>; 2]) -> Lanes<S> {
-    rows.choose(rows.like(0.0), without, rows.choose(end, within, without))
-}
-
-/// A strip that is being drawn.
-struct Columns<'a> {
-    strip: LightStrip<'a>,
-    meridians: [[f32; 3]; STRIP],
-    units: [[f32; STRIP]; 2],
-    /// What is still to be drawn, from the end on.
-    entries: Vec<Entry>,
-}
-
-impl<'a> Columns<'a> {
-    fn new(strip: LightStrip<'a>, drawing: &Drawing<'a>, field: &FieldLines) -> Self {
-        let (chart, first) = (drawing.chart, strip.number * STRIP);
-        let mut entries: Vec<Entry> = drawing.footprint.entries(strip.number).flatten().copied().collect();
-        entries.reverse();
-        Self {
-            meridians: std::array::from_fn(|column| field.meridian(chart.unit(first + column)).single()),
-            units: chart.single_units(strip.number),
-            entries,
-            strip,
-        }
-    }
-
-    /// Number of the next source that shows.
-    #[inline(always)]
-    fn next_source(&self) -> Option<u32> {
-        self.entries.last().map(|entry| entry.source)
-    }
-
-    /// The next source as the columns see it, and which of them; it is done then.
-    #[inline(always)]
-    fn take(&mut self, source: &Source, chart: &Chart) -> (Patch, Range<usize>) {
-        let entry = self.entries.pop().unwrap_or_default();
-        (Patch::new(source, chart, &self.units), entry.columns())
-    }
-}
-
 impl Drawing<'_> {
-    /// Draws strips beside each other, every source once for all of them.
+    /// Draws columns beside each other, every source once for all of them.
     #[inline(always)]
-    fn strips<S: Simd>(&self, simd: S, strips: Vec<LightStrip>, field: &FieldLines, trace: &mut Trace) {
-        let mut strips: Vec<_> = strips.into_iter().map(|strip| Columns::new(strip, self, field)).collect();
-        // Entries of every strip are sorted by source.
-        while let Some(number) = strips.iter().filter_map(Columns::next_source).min() {
-            let source = self.footprint.source(number);
-            let fall = self.collisions.fall(number, source, self.step);
-            let [green, red, prompt] = source.power;
-            let powers = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
-            let weights = powers * (fall.pairs / self.chart.row_step as f32);
-            // Seen from afar its meridian is that of all columns.
-            let shared = source.distance() >= NEAR * source.reach;
-            let mut placed = false;
-            for strip in strips.iter_mut().filter(|strip| strip.next_source() == Some(number)) {
-                let (patch, columns) = strip.take(source, self.chart);
-                let middle = (columns.start + columns.end) / 2;
-                for column in columns {
-                    if !(shared && placed) {
-                        let seen_by = if shared { middle } else { column };
-                        trace.clear();
-                        let line = LineOfFall::new(&strip.meridians[seen_by], patch.along[seen_by], &self.finder);
-                        self.place(simd, &fall, source, &line, trace);
-                        placed = true;
-                    }
-                    if patch.side[column] > 0.0 && !trace.lit.is_empty() {
-                        let light = strip.strip.light_up(column, &trace.lit, self.chart.rows);
-                        trace.add_to(light, weights * patch.side[column]);
-                    }
+    fn group<S: Simd>(&self, simd: S, strip: LightStrip, field: &FieldLines, (group, trace): &mut (Group, Trace)) {
+        let entries = group.begin(strip.number, self.chart, self.footprint, field);
+        let mut falls = Vec::with_capacity(AHEAD);
+        for entries in entries.chunks(AHEAD) {
+            falls.clear();
+            for entry in entries {
+                falls.push(self.collisions.fall(*self.footprint.source(entry.source), self.step));
+            }
+            for (entry, fall) in entries.iter().zip(&falls) {
+                self.source(simd, entry.columns(), fall, group, trace);
+            }
+        }
+        group.write(strip, self.chart.rows);
+        group.end(entries);
+    }
+
+    #[inline(always)]
+    fn source<S: Simd>(&self, simd: S, columns: Range<usize>, fall: &Fall, group: &mut Group, trace: &mut Trace) {
+        let source = &fall.source;
+        let [green, red, prompt] = source.power;
+        let powers = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
+        let weights = powers * (fall.pairs / self.chart.row_step as f32);
+        // Seen from afar its meridian is that of all columns.
+        let shared = source.distance() >= NEAR * source.reach;
+        if shared {
+            self.place(simd, fall, (columns.start + columns.end) / 2, group, trace);
+        }
+        for from in columns.clone().step_by(STRIP) {
+            let patch = Patch::new(source, self.chart, &group.units(from));
+            for column in from..columns.end.min(from + STRIP) {
+                let share = patch.side[column - from];
+                if share <= 0.0 {
+                    continue;
                 }
+                if !shared {
+                    self.place(simd, fall, column, group, trace);
+                }
+                group.add(column, trace, weights * share);
             }
         }
     }
 
-    /// Places the collisions of a fall down a line.
+    /// Places the collisions of a fall down a line, as a column sees it.
     #[inline(always)]
-    fn place<S: Simd>(&self, simd: S, fall: &Fall, source: &Source, line: &LineOfFall, trace: &mut Trace) {
-        let reach = source.reach.max(self.footprint.bins().least_reach(line.distance));
-        let descent = (line.distance >= SINGLE * reach).then(|| self.collisions.descents.along(simd, line));
-        if descent.as_ref().is_some_and(|descent| !descent.shows(reach, self.chart.rows)) {
+    fn place<S: Simd>(&self, simd: S, fall: &Fall, column: usize, group: &mut Group, trace: &mut Trace) {
+        trace.clear();
+        let (meridian, distance) = group.seen_by(column, &fall.source);
+        let line = LineOfFall::new(meridian, distance, &self.finder);
+        let reach = fall.source.reach.max(self.footprint.bins().least_reach(distance));
+        if distance < SINGLE * reach {
+            self.add(simd, fall, (reach, 0.0), &SeenLine::Exactly(line), trace);
             return;
         }
+        let seen = group.descent(simd, column, distance, (&self.collisions.descents, &self.finder));
+        let (descent, beyond) = (&seen.descent, distance - seen.distance);
+        if descent.shows(reach + beyond.abs(), self.chart.rows) {
+            self.add(simd, fall, (reach, beyond), &SeenLine::ByPolynomials(descent), trace);
+        }
+    }
+
+    /// Adds the collisions of a fall that reaches so far to both sides of its field line, which lies so far beyond the line that is
+    /// given, km.
+    #[inline(always)]
+    fn add<S: Simd>(&self, simd: S, fall: &Fall, (reach, beyond): (f32, f32), line: &SeenLine, trace: &mut Trace) {
         let last = (self.chart.rows - 1) as f32;
         let mut lit = Lit::new(simd);
         for (number, batch) in fall.batches.iter().enumerate() {
             let from = (fall.first + number * BATCH) % DEVIATIONS;
             let Some(deviations) = self.collisions.deviations.get(from..from + BATCH) else { continue };
-            let offsets = Lanes::from_slice(simd, deviations)
-                .fused(Lanes::splat(simd, reach), Lanes::from_slice(simd, &batch.offsets_km));
-            let [rows, shown] = match &descent {
-                Some(descent) => descent.points(Lanes::from_slice(simd, &batch.places), offsets),
-                None => line.points(&batch.altitudes_km, offsets),
-            };
+            let offsets = Lanes::from_slice(simd, &batch.offsets_km) + Lanes::splat(simd, beyond);
+            let offsets = Lanes::from_slice(simd, deviations).fused(Lanes::splat(simd, reach), offsets);
+            let [rows, shown] = line.points(batch, offsets);
             let points = Points::new(rows, shown, last, &mut lit);
-            trace.add(simd, &points, &batch.lights, &self.collisions.photons);
+            trace.add(simd, &points, (&batch.lights, batch.count as usize), &self.collisions.photons);
         }
-        trace.lit = lit.rows();
+        trace.finish(&lit);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_collision_of_a_fall_is_in_a_batch() {
+        for (collisions, count) in [(1, 1), (16, 1), (17, 2), (50, 4), (100, 7), (20, 4)] {
+            let collision = |number: usize| {
+                let altitude_km = 300.0 - 2.0 * number as f32;
+                (Collision { level: 0, altitude_km, offset_km: [number as f32, 0.0] }, number as u16)
+            };
+            let fall: Vec<_> = (0..collisions).map(collision).collect();
+            let batches = batches(&fall, count);
+            assert!(batches.iter().rev().skip(1).all(|batch| batch.count as usize == BATCH));
+            let lanes = batches.iter().flat_map(|batch| (0..batch.count as usize).map(move |lane| (batch, lane)));
+            let mut found: Vec<u16> = lanes
+                .filter(|(batch, lane)| batch.lights[*lane] != NOTHING)
+                .inspect(|(batch, lane)| {
+                    let number = f32::from(batch.lights[*lane]);
+                    assert_eq!(
+                        (batch.offsets_km[*lane], batch.places[*lane]),
+                        (number, Descents::place(300.0 - 2.0 * number))
+                    );
+                })
+                .map(|(batch, lane)| batch.lights[lane])
+                .collect();
+            found.sort_unstable();
+            assert!(found.into_iter().eq(0..collisions as u16), "{collisions} in {count}");
+        }
     }
 }

@@ -56,13 +56,14 @@ impl<'a> LineOfFall<'a> {
         const RADIUS: f32 = EARTH_RADIUS_KM as f32;
         const DIAMETER: f32 = 2.0 * RADIUS;
         let ([constant, outward, own], finder) = (*self.meridian, *self.finder);
-        let (mut upward, mut places, mut far_squared) = ([0.0; COUNT], [0.0; COUNT], [0.0; COUNT]);
+        let (mut per_upward, mut places, mut far_squared) = ([0.0; COUNT], [0.0; COUNT], [0.0; COUNT]);
         for i in 0..COUNT {
             let (altitude, distance) = (altitudes[i], distances[i]);
             let squared = altitude.fused(DIAMETER + altitude, -distance.fused(2.0 * outward + distance, constant));
             let squared = own.fused(own, squared);
-            upward[i] = if squared > 1.0 { squared } else { 1.0 }.sqrt();
-            places[i] = upward[i] - own;
+            let squared = if squared > 1.0 { squared } else { 1.0 };
+            per_upward[i] = squared.inverse_root();
+            places[i] = squared * per_upward[i] - own;
             far_squared[i] = distance.fused(distance, places[i] * places[i]);
         }
         let mut seen = Seen { rows: [0.0; COUNT], slopes: [0.0; COUNT], lights: [0.0; COUNT] };
@@ -70,13 +71,15 @@ impl<'a> LineOfFall<'a> {
             seen.rows[i] = finder.row(lanes::atan2(distances[i], places[i])) - 0.5;
         }
         for i in 0..COUNT {
-            let (distance, far) = (distances[i], far_squared[i].sqrt());
-            let slope = distance.fused((outward + distance) / upward[i], places[i]) / far_squared[i];
+            let distance = distances[i];
+            let far_squared = if far_squared[i] > 1e-12 { far_squared[i] } else { 1e-12 };
+            let per_far = far_squared.inverse_root();
+            let slope = distance.fused((outward + distance) * per_upward[i], places[i]) * (per_far * per_far);
             seen.slopes[i] = finder.rows(slope);
             // A source's power is that across the field; a collision stands for all of it, so the cosine to the vertical is
             // taken out again.
-            let slant = (RADIUS + altitudes[i]) / (upward[i] * far);
-            seen.lights[i] = if distance > 0.0 && far > 1.0 { slant } else { 0.0 };
+            let slant = (RADIUS + altitudes[i]) * per_upward[i] * per_far;
+            seen.lights[i] = if distance > 0.0 && far_squared > 1.0 { slant } else { 0.0 };
         }
         seen
     }
@@ -90,6 +93,16 @@ struct Seen<const COUNT: usize> {
     lights: [f32; COUNT],
 }
 
+/// Altitudes of [`Descents::place`]s, km.
+#[inline(always)]
+pub(super) fn altitudes_km(places: &[f32; LANES]) -> [f32; LANES] {
+    let mut altitudes = [0.0; LANES];
+    for (altitude, place) in altitudes.iter_mut().zip(places) {
+        *altitude = 1.0 / place.fused(HALF as f32, MIDDLE as f32) - PIVOT_KM as f32;
+    }
+    altitudes
+}
+
 /// From nodes to polynomials.
 #[derive(Clone, Debug)]
 pub(super) struct Descents {
@@ -100,6 +113,7 @@ pub(super) struct Descents {
 }
 
 /// Rows, slopes and brightness by place among the altitudes.
+#[derive(Clone, Copy, Default)]
 pub(super) struct Descent {
     rows: [f32; NODES],
     slopes: [f32; NODES],

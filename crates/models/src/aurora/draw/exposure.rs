@@ -45,7 +45,7 @@ impl Aurora {
         let count = (2.0 * way / (SPREADS_PER_INSTANT * light.spread_km())).ceil().clamp(1.0, MOST_INSTANTS) as usize;
         let now = self.simulation.time();
         let later = (0..count).map(|instant| view.shutter.instant(instant, count) - now).collect();
-        Sources::new(&light, field, &Moments { later, smear_km: smear_km(way / count as f64) })
+        Sources::new(&light, field, &Moments { later, first: 0, smear_km: smear_km(way / count as f64) })
     }
 
     /// The mean of the states that come while the shutter is open.
@@ -61,7 +61,8 @@ impl Aurora {
             let t = begin - shutter.open + shutter.instant(instant, LONG_INSTANTS);
             step_until(&mut simulation, t);
             let way = rms_speed(&simulation) * shutter.duration() / LONG_INSTANTS as f64;
-            let moments = Moments { later: vec![t - simulation.time()], smear_km: smear_km(way) };
+            let first = instant as u32;
+            let moments = Moments { later: vec![t - simulation.time()], first, smear_km: smear_km(way) };
             mean.add(&Sources::new(&self.light(&simulation, t), field, &moments), 1.0 / LONG_INSTANTS as f32);
         }
         mean

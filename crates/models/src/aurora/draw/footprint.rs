@@ -10,7 +10,12 @@ use bansho_base::math::{self, lanes};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-use super::chart::{Chart, Finder, STRIP};
+use super::{
+    chart::{Chart, Finder, STRIP},
+    geometry::FieldLines,
+    meridians::ENTRY_PER_STEP,
+    shown_rows::ShownRows,
+};
 use crate::lanes::{FourLanes, Real};
 
 /// Sources that a task of the thread pool sorts.
@@ -20,13 +25,17 @@ const SCALE_KM: f64 = 100.0;
 /// By how much the altitude of a line of sight changes there from one far bin to the next, km; more only where a row is
 /// higher than that.
 const STEP_KM: f64 = 1.0;
-/// Near bins within the reach of a patch, where so many take up 1 to [`MOST_ROWS`] rows of the chart each.
-const BINS_PER_REACH: f64 = 2.5;
-const MOST_ROWS: f64 = 2.5;
+/// Near bins within the reach of a patch, where each takes up as many rows of the chart as these are. Wider ones would blur the sides of
+/// thin sheets near the magnetic zenith.
+const BINS_PER_REACH: f64 = 5.0;
+const ROWS_PER_BIN: [f64; 2] = [0.5, 1.25];
 /// Distances beyond this lie behind the horizon, km.
 const FARTHEST_KM: f64 = 3000.0;
 /// Least reach of a patch in cells, so that its sum does not depend on where between the cells it lies.
 const LEAST_CELLS: f32 = 1.6;
+/// Widths of a near bin that smoothed tables spread its light over at most: they reach two entries far, each less than twice as wide as
+/// asked for.
+const BLURRED_BINS: f32 = 4.0 * ENTRY_PER_STEP[1];
 /// `(1 - r^2)^2` has this integral over (-1, 1), inverted.
 const NORM: f32 = 15.0 / 16.0;
 
@@ -41,6 +50,8 @@ pub(super) struct Source {
     pub(super) node: f32,
     /// Power times the cosine to the vertical, 1000 W: for green, red and prompt light.
     pub(super) power: [f32; 3],
+    /// What its random falls go by: the particle's birth or the cell's place, whatever else shines.
+    pub(super) key: u32,
 }
 
 impl Source {
@@ -59,7 +70,7 @@ pub(super) const REACH: f32 = 2.645_751_3;
 /// all times the node of their energy.
 pub(super) type Bin = [f32; 4];
 
-/// The sources of a picture, sorted by strips of the chart.
+/// The sources of a picture, sorted by strips of so many columns of the chart.
 pub(super) struct Footprint<'a> {
     sources: &'a [Source],
     /// What each of the tasks has sorted, in the order of the sources.
@@ -121,7 +132,7 @@ impl Bins {
     /// Bins for patches of a standard deviation in km or more, on a chart with rows of `step` radians.
     pub(super) fn new(spread_km: f64, step: f64) -> Self {
         let row = step * SCALE_KM;
-        let width = (spread_km * f64::from(REACH) / BINS_PER_REACH).clamp(row, MOST_ROWS * row);
+        let width = (spread_km * f64::from(REACH) / BINS_PER_REACH).clamp(ROWS_PER_BIN[0] * row, ROWS_PER_BIN[1] * row);
         let share = (STEP_KM / SCALE_KM).max(2.0 * step);
         let near_to = (width / share).min(FARTHEST_KM);
         let near = near_to / width;
@@ -148,6 +159,12 @@ impl Bins {
     #[inline(always)]
     pub(super) fn least_reach(&self, distance: f32) -> f32 {
         LEAST_CELLS * self.width(distance)
+    }
+
+    /// How far smoothed tables spread the light of a bin at a distance along its meridian, km.
+    #[inline(always)]
+    pub(super) fn blurred_km(&self, distance: f32) -> f32 {
+        if distance < self.near_to as f32 { BLURRED_BINS * self.width as f32 } else { 0.0 }
     }
 
     /// Distance of a bin's middle, and its width, km.
@@ -178,16 +195,24 @@ impl StripSums {
 }
 
 impl<'a> Footprint<'a> {
-    /// Sorts sources, of this standard deviation in km or more, by the strips of a chart.
-    pub(super) fn new(sources: &'a [Source], chart: &Chart, spread_km: f64) -> Self {
+    /// Sorts sources, of this standard deviation in km or more, by strips of so many columns of a chart. What lies above or below all of
+    /// its rows is left out.
+    pub(super) fn new(
+        sources: &'a [Source],
+        (chart, strip): (&Chart, usize),
+        field: &FieldLines,
+        spread_km: f64,
+    ) -> Self {
         let (finder, level) = (chart.finder(), Level::new());
+        let bins = Bins::new(spread_km, chart.row_step);
+        let shown = ShownRows::new(chart, field);
         let sorted = |(task, sources): (usize, &[Source])| {
             let mut spans = vec![Span::default(); sources.len()];
-            dispatch!(level, _simd => find_spans(sources, chart, &finder, &mut spans));
-            Sorted::new(&spans, task * TASK, chart)
+            dispatch!(level, _simd => find_spans(sources, chart, &finder, (&shown, &bins), &mut spans));
+            Sorted::new(&spans, task * TASK, chart, strip)
         };
         let parts = sources.par_chunks(TASK).enumerate().map(sorted).collect();
-        Self { sources, parts, bins: Bins::new(spread_km, chart.row_step) }
+        Self { sources, parts, bins }
     }
 
     /// Bins of distance.
@@ -238,12 +263,12 @@ impl<'a> Footprint<'a> {
 }
 
 impl Sorted {
-    /// Sources from number `first` on, which reach these columns.
-    fn new(spans: &[Span], first: usize, chart: &Chart) -> Self {
-        let strips = chart.columns / STRIP;
+    /// Sources from number `first` on, which reach these columns, by strips of so many.
+    fn new(spans: &[Span], first: usize, chart: &Chart, width: usize) -> Self {
+        let strips = chart.columns.div_ceil(width);
         let mut starts = vec![0_u32; strips + 1];
         for span in spans {
-            pieces(*span, chart, |strip, _| starts[strip + 1] += 1);
+            pieces(*span, chart, width, |strip, _| starts[strip + 1] += 1);
         }
         for strip in 0..strips {
             starts[strip + 1] += starts[strip];
@@ -251,7 +276,7 @@ impl Sorted {
         let mut next = starts.clone();
         let mut entries = vec![Entry::default(); starts[strips] as usize];
         for (span, source) in spans.iter().zip(first..) {
-            pieces(*span, chart, |strip, columns| {
+            pieces(*span, chart, width, |strip, columns| {
                 entries[next[strip] as usize] = Entry { source: source as u32, columns };
                 next[strip] += 1;
             });
@@ -262,9 +287,21 @@ impl Sorted {
 
 /// The columns that every source reaches.
 #[inline(always)]
-fn find_spans(sources: &[Source], chart: &Chart, finder: &Finder, spans: &mut [Span]) {
+fn find_spans(
+    sources: &[Source],
+    chart: &Chart,
+    finder: &Finder,
+    (shown, bins): (&ShownRows, &Bins),
+    spans: &mut [Span],
+) {
     for (source, span) in sources.iter().zip(spans) {
-        *span = Span::of(source, chart, finder);
+        let distance = source.distance();
+        let margin_km = 2.0 * source.reach.max(LEAST_CELLS * chart.column_step as f32 * distance)
+            + bins.least_reach(distance)
+            + bins.blurred_km(distance);
+        if shown.may_hold(source.across, distance, margin_km) {
+            *span = Span::of(source, chart, finder);
+        }
     }
 }
 
@@ -290,9 +327,9 @@ impl Span {
     }
 }
 
-/// Calls `each` with every strip that a span touches and the columns there.
+/// Calls `each` with every strip of so many columns that a span touches, and the columns there.
 #[inline]
-fn pieces(span: Span, chart: &Chart, mut each: impl FnMut(usize, [u16; 2])) {
+fn pieces(span: Span, chart: &Chart, width: usize, mut each: impl FnMut(usize, [u16; 2])) {
     let columns = chart.columns as i32;
     // A span that passes the seam of a whole chart shows on its other side too.
     let turns = if chart.whole { &[0, columns, -columns][..] } else { &[0] };
@@ -300,9 +337,9 @@ fn pieces(span: Span, chart: &Chart, mut each: impl FnMut(usize, [u16; 2])) {
         let mut first = (span.first + turn).max(0) as usize;
         let end = (span.first + turn + span.count).clamp(0, columns) as usize;
         while first < end {
-            let strip = first / STRIP;
-            let from = first % STRIP;
-            let to = STRIP.min(from + end - first);
+            let strip = first / width;
+            let from = first % width;
+            let to = width.min(from + end - first);
             each(strip, [from as u16, to as u16]);
             first += to - from;
         }

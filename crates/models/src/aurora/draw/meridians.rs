@@ -11,7 +11,7 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
 use super::{
-    chart::{Chart, Finder, STRIP},
+    chart::{Chart, STRIP},
     footprint::{Bin, Bins, Footprint, StripSums},
     geometry::{FieldLine, FieldLines, Meridian, altitude},
     profile::{BOTTOM_KM, Profile, Profiles, SPACINGS},
@@ -35,12 +35,9 @@ const STEP_KM: f32 = 1.5;
 /// Spacing of such tables in steps: at least 1 / [`STEP_KM`]. Steps as long as the light is high need 2, or linear
 /// interpolation lets the bins' own pattern through; shorter ones need less, since the light itself is smooth, and keep
 /// its lower edge.
-const ENTRY_PER_STEP: [f32; 2] = [1.0 / STEP_KM, 2.0];
+pub(super) const ENTRY_PER_STEP: [f32; 2] = [1.0 / STEP_KM, 2.0];
 /// Steps above which tables are more than a step apart, km.
 const SMOOTH_KM: f32 = 12.0;
-/// Widths of a bin that smoothing spreads light over at most: it reaches two entries far, each less than twice as wide
-/// as asked for.
-const BLURRED_BINS: f64 = 4.0 * ENTRY_PER_STEP[1] as f64;
 
 /// Brightness by emitter in kR, column after column, without what the air takes away.
 #[derive(Clone)]
@@ -73,7 +70,7 @@ impl Meridians {
         let knots: Vec<f32> = cotangents.iter().copied().step_by(KNOT_ROWS).collect();
         let distances: Vec<_> = (0..footprint.bins().count).map(|bin| footprint.bins().distance(bin)).collect();
         let mut picture = Self::dark(chart);
-        let (chart, strips) = picture.strips();
+        let (chart, strips) = picture.strips(STRIP);
         let drawing = Drawing {
             chart,
             field,
@@ -95,10 +92,20 @@ impl Meridians {
         Self { light: vec![[0.0; 4]; chart.columns * chart.rows], lit: vec![[u32::MAX, 0]; chart.columns], chart }
     }
 
-    /// Its strips, each to be drawn by one thread.
-    pub(super) fn strips(&mut self) -> (&Chart, impl IndexedParallelIterator<Item = LightStrip<'_>>) {
-        let light = self.light.par_chunks_mut(STRIP * self.chart.rows);
-        let strips = light.zip(self.lit.par_chunks_mut(STRIP)).enumerate();
+    /// Red light of all heights as that of its emitter.
+    pub(super) fn add_up_heights(&mut self) {
+        for (column, [first, end]) in self.light.chunks_mut(self.chart.rows).zip(&self.lit) {
+            for light in &mut column[(*first).min(*end) as usize..*end as usize] {
+                let [low, middle, high, _] = *light;
+                *light = [0.0, low + middle + high, 0.0, 0.0];
+            }
+        }
+    }
+
+    /// Its strips of so many columns, each to be drawn by one thread.
+    pub(super) fn strips(&mut self, columns: usize) -> (&Chart, impl IndexedParallelIterator<Item = LightStrip<'_>>) {
+        let light = self.light.par_chunks_mut(columns * self.chart.rows);
+        let strips = light.zip(self.lit.par_chunks_mut(columns)).enumerate();
         (&self.chart, strips.map(|(number, (light, lit))| LightStrip { number, light, lit }))
     }
 
@@ -108,14 +115,9 @@ impl Meridians {
         let (left, right) = (self.lit[left], self.lit[right]);
         [left[0].min(right[0]), left[1].max(right[1])]
     }
-
-    /// The picture with how to find places on it.
-    pub(super) fn sampler(&self) -> Sampler<'_> {
-        Sampler { meridians: self, finder: self.chart.finder() }
-    }
 }
 
-/// [`STRIP`] columns of a picture.
+/// Some columns of a picture beside each other.
 pub(super) struct LightStrip<'a> {
     pub(super) number: usize,
     pub(super) light: &'a mut [PerEmitter<f32>],
@@ -153,78 +155,6 @@ impl LightStrip<'_> {
 pub(super) fn mixed<S: Simd>(simd: S, low: &PerEmitter<f32>, high: &PerEmitter<f32>, part: f32) -> FourLanes<S> {
     let (low, high) = (FourLanes::simd_from(simd, *low), FourLanes::simd_from(simd, *high));
     low.like(part).fused(high - low, low)
-}
-
-/// A chart with how to find places on it.
-pub(super) struct Sampler<'a> {
-    meridians: &'a Meridians,
-    finder: Finder,
-}
-
-impl Sampler<'_> {
-    /// Adds the light at directions, linear between the cells of the chart.
-    #[inline(always)]
-    pub(super) fn add<S: Simd, const COUNT: usize>(
-        &self,
-        simd: S,
-        longitude: &[f32; COUNT],
-        colatitude: &[f32; COUNT],
-        light: &mut [PerEmitter<f32>; COUNT],
-    ) {
-        let last = (self.meridians.chart.rows - 1) as f32;
-        let (mut columns, mut rows) = ([0.0; COUNT], [0.0; COUNT]);
-        for i in 0..COUNT {
-            columns[i] = self.finder.column(longitude[i]) - 0.5;
-            rows[i] = (self.finder.row(colatitude[i]) - 0.5).clamp(0.0, last);
-        }
-        for i in 0..COUNT {
-            self.add_place(simd, columns[i], rows[i], &mut light[i]);
-        }
-    }
-
-    /// The light at one direction.
-    #[cfg(test)]
-    pub(super) fn light(&self, longitude: f32, colatitude: f32) -> PerEmitter<f32> {
-        let mut light = [[0.0; 4]];
-        dispatch!(Level::new(), simd => self.add(simd, &[longitude], &[colatitude], &mut light));
-        light[0]
-    }
-
-    #[inline(always)]
-    fn add_place<S: Simd>(&self, simd: S, column: f32, row: f32, light: &mut PerEmitter<f32>) {
-        let Meridians { chart, light: all, .. } = self.meridians;
-        let left = column.floor();
-        let across = column - left;
-        let upper = (row as usize).min(chart.rows - 2);
-        let part = row - upper as f32;
-        let (left, right) = (chart.held(left as i32), chart.held(left as i32 + 1));
-        let [first, end] = self.meridians.lit_either([left, right]);
-        if upper as u32 + 1 < first || upper as u32 >= end {
-            return;
-        }
-        // The row and the one below lie side by side.
-        let (left, right) = (left * chart.rows + upper, right * chart.rows + upper);
-        let left = HalfLanes::from_slice(simd, all[left..left + 2].as_flattened());
-        let right = HalfLanes::from_slice(simd, all[right..right + 2].as_flattened());
-        let (above, below) = (left.like(across)).fused(right - left, left).split();
-        *light = above.like(part).fused(below - above, above + FourLanes::simd_from(simd, *light)).into();
-    }
-
-    /// Whether all of a part of the sky is dark: between two longitudes, in radians, and two colatitudes.
-    pub(super) fn is_dark(&self, longitudes: [f32; 2], colatitudes: [f32; 2]) -> bool {
-        let Meridians { chart, lit, .. } = self.meridians;
-        let [left, right] = longitudes.map(|longitude| self.finder.column(longitude) as i32);
-        // Where a part reaches over the seam of a whole chart nothing is said.
-        if right < left || (right - left) as usize > chart.columns / 2 {
-            return false;
-        }
-        let [top, bottom] = colatitudes.map(|colatitude| (self.finder.row(colatitude).max(0.0)) as u32);
-        let dark = |column: i32| {
-            let [first, end] = lit[chart.held(column)];
-            bottom + 2 < first || top >= end + 2
-        };
-        (left - 2..=right + 2).all(dark)
-    }
 }
 
 /// Light of one column that changes slowly upward: of every [`KNOT_ROWS`] rows, at the first of them and at the one
@@ -319,7 +249,7 @@ impl Drawing<'_> {
         let line = meridian.line(distance);
         // Where tables are smoothed, light reaches rows of neighbouring bins.
         let near = distance < self.bins.near_to;
-        let blurred = if near { BLURRED_BINS * width } else { 0.0 };
+        let blurred = f64::from(self.bins.blurred_km(distance as f32));
         let top = self.row(&line, distance, -blurred, profile.top_km);
         let bottom = self.row(&line, distance, blurred, profile.bottom_km);
         let end = ((bottom.floor() + 1.0).max(0.0) as usize).min(self.chart.rows);

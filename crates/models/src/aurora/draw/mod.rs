@@ -14,6 +14,7 @@ mod descent;
 mod exposure;
 mod footprint;
 mod geometry;
+mod group;
 mod lighting;
 mod maps;
 mod meridians;
@@ -21,11 +22,14 @@ mod parameters;
 mod phenomenon;
 mod prepared;
 mod profile;
+mod sampler;
 mod seen;
 mod shading;
+mod shown_rows;
 mod sources;
 #[cfg(test)]
 mod tests;
+mod trace;
 mod wander;
 
 pub use parameters::{Blur, BlurParameters, DrawingParameters, FallModel, Sampling};

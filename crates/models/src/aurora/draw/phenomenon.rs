@@ -46,6 +46,8 @@ pub struct Aurora {
     name: String,
     pub(super) simulation: AuroraSimulation,
     pub(super) profiles: Profiles,
+    /// Red light alone, by its heights in place of the emitters.
+    pub(super) red_profiles: Profiles,
     pub(super) shading: Shading,
     /// What single collisions are drawn from, where they are asked for.
     pub(super) collisions: Option<Collisions>,
@@ -110,6 +112,7 @@ impl Aurora {
             name: name.to_owned(),
             collisions: by_collisions.then(collisions),
             profiles: Profiles::new(simulation.emission()),
+            red_profiles: Profiles::of_red_by_height(simulation.emission()),
             shading: Shading::new(&parameters.drawing.air),
             brightest: brightest(parameters, simulation.emission(), &factors),
             simulation,
@@ -132,11 +135,11 @@ impl Aurora {
 
     /// What the light of a state of its simulation is made from at a time, s.
     pub(super) fn light<'a>(&self, simulation: &'a AuroraSimulation, t: f64) -> Light<'a> {
-        let (parameters, afterglow) = (simulation.parameters(), simulation.afterglow());
+        let parameters = simulation.parameters();
         let energy_ev = parameters.energy_ev.at(t);
         Light {
             particles: simulation.particles(),
-            glow: [&afterglow.green, &afterglow.red],
+            glow: simulation.afterglow(),
             emission: simulation.emission(),
             parameters: &parameters.drawing,
             spacing_km: simulation.spacing_km(),

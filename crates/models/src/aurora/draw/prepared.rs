@@ -15,12 +15,14 @@ use fearless_simd::{Level, Simd, dispatch};
 use super::{
     Aurora, Blur,
     blur::Blurred,
-    chart::{Chart, Coverage},
+    chart::{Chart, Coverage, STRIP},
     footprint::Footprint,
     geometry::{EARTH_RADIUS_KM, FieldLines, dot},
+    group::GROUP,
     maps::Maps,
-    meridians::{Meridians, Sampler},
+    meridians::Meridians,
     phenomenon::{MEASURED, measured_lines},
+    sampler::Sampler,
     shading::Shading,
     sources::Sources,
 };
@@ -121,9 +123,13 @@ impl Charts<'_> {
         // The angle at which the spread is seen from the nearest place where such light is.
         let row = (spread_km / 130.0).clamp(pixel, 2.0 * pixel);
         let chart = Chart::new(&self.coverage, pixel, row);
-        let footprint = Footprint::new(&sources.sharp, &chart, spread_km);
         let Aurora { simulation, profiles, collisions, .. } = self.aurora;
-        let Some(collisions) = collisions else { return Meridians::new(chart, self.field, profiles, &footprint) };
+        let sorted = |strip| Footprint::new(&sources.sharp, (&chart, strip), self.field, spread_km);
+        let Some(collisions) = collisions else {
+            let footprint = sorted(STRIP);
+            return Meridians::new(chart, self.field, profiles, &footprint);
+        };
+        let footprint = sorted(GROUP);
         let step = (simulation.time() / AuroraSimulation::STEP_S).round() as i64 as u32;
         collisions.draw(chart, self.field, &footprint, step)
     }
@@ -134,9 +140,11 @@ impl Charts<'_> {
         let column = (spread_km / 500.0).clamp(pixel, 16.0 * pixel);
         // To the side it is as smooth as its sources, but upward it changes with the air.
         let chart = Chart::new(&self.coverage, column, (0.25 * column).max(pixel));
-        let footprint = Footprint::new(&sources.soft, &chart, spread_km);
+        let footprint = Footprint::new(&sources.soft, (&chart, STRIP), self.field, spread_km);
         // Always by the mean fall: in a cell that shines for a minute thousands of falls have come together.
-        Meridians::new(chart, self.field, &self.aurora.profiles, &footprint)
+        let mut picture = Meridians::new(chart, self.field, &self.aurora.red_profiles, &footprint);
+        picture.add_up_heights();
+        picture
     }
 }
 

@@ -6,7 +6,10 @@ use bansho_base::math;
 
 use crate::aurora::{
     atmosphere::{HIGHEST_KM, LEVELS, LOWEST_KM, level_altitude_km},
-    light::{EMITTERS, Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter},
+    light::{
+        EMITTERS, Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter,
+        heights::{RED_HEIGHTS, red_by_height},
+    },
     precipitation::energy::NODES,
 };
 
@@ -40,6 +43,8 @@ const fn starts() -> [usize; SPACINGS + 1] {
 #[derive(Clone, Debug)]
 pub(super) struct Profiles {
     emission: Emission,
+    /// Whether it is red light alone, its heights in place of the emitters.
+    red_by_height: bool,
     tables: Vec<OnceLock<Table>>,
 }
 
@@ -65,7 +70,13 @@ pub(super) struct Profile<'a> {
 impl Profiles {
     /// The tables for a spectrum.
     pub(super) fn new(emission: &Emission) -> Self {
-        Self { emission: emission.clone(), tables: vec![OnceLock::new(); (NODES - 1) * FINENESS + 1] }
+        let tables = vec![OnceLock::new(); (NODES - 1) * FINENESS + 1];
+        Self { emission: emission.clone(), red_by_height: false, tables }
+    }
+
+    /// The tables of red light alone, its heights in place of the emitters.
+    pub(super) fn of_red_by_height(emission: &Emission) -> Self {
+        Self { red_by_height: true, ..Self::new(emission) }
     }
 
     /// The light of an energy, given as its place among the nodes of the grid; `red` includes the red line's height.
@@ -79,27 +90,42 @@ impl Profiles {
 
     #[inline(never)]
     fn table(&self, fine: usize) -> &Table {
-        self.tables[fine].get_or_init(|| Table::new(&self.emission.profile(fine_energy_ev(fine))))
+        self.tables[fine].get_or_init(|| {
+            let profile = self.emission.profile(fine_energy_ev(fine));
+            if self.red_by_height { Table::of_heights(&red_by_height(&profile)) } else { Table::new(&profile) }
+        })
     }
 }
 
 impl Table {
     /// From the volume emission at each level.
     fn new(profile: &[PerEmitter<f64>]) -> Self {
-        let mut light = Vec::with_capacity(STARTS[SPACINGS]);
-        let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
-        let mut table: Vec<PerEmitter<f64>> = std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect();
-        for spacing in 0..SPACINGS {
-            let entry = |at: usize| table.get(at).copied().unwrap_or_default();
-            light.extend((0..entries(spacing)).map(|at| entry(at).map(|value| value as f32)));
-            table = halved(&table);
-        }
         Self {
-            light,
-            tops_km: [Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| top_km(profile, emitter)),
-            bottom_km: EMITTERS.map(|emitter| bottom_km(profile, emitter)).into_iter().fold(f32::INFINITY, f32::min),
+            light: smoothed(profile),
+            tops_km: [Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| top_km(profile, emitter.index())),
+            bottom_km: bottom_km(profile, &EMITTERS.map(Emitter::index)),
         }
     }
+
+    /// From that of red light at each level, by its heights in place of the emitters.
+    fn of_heights(profile: &[PerEmitter<f64>]) -> Self {
+        let top_km = top_km(profile, RED_HEIGHTS - 1);
+        let heights: [usize; RED_HEIGHTS] = std::array::from_fn(|height| height);
+        Self { light: smoothed(profile), tops_km: [top_km; 2], bottom_km: bottom_km(profile, &heights) }
+    }
+}
+
+/// The tables of all spacings one after the other, from the volume emission at each level.
+fn smoothed(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f32>> {
+    let mut light = Vec::with_capacity(STARTS[SPACINGS]);
+    let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
+    let mut table: Vec<PerEmitter<f64>> = std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect();
+    for spacing in 0..SPACINGS {
+        let entry = |at: usize| table.get(at).copied().unwrap_or_default();
+        light.extend((0..entries(spacing)).map(|at| entry(at).map(|value| value as f32)));
+        table = halved(&table);
+    }
+    light
 }
 
 impl<'a> Profile<'a> {
@@ -127,18 +153,19 @@ fn halved(table: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
     (0..table.len() / 2 + 2).map(smoothed).collect()
 }
 
-fn top_km(profile: &[PerEmitter<f64>], emitter: Emitter) -> f32 {
+fn top_km(profile: &[PerEmitter<f64>], emitter: usize) -> f32 {
     let passed = passed((0..LEVELS).rev(), profile, emitter);
     level_altitude_km(LEVELS - 1 - passed.min(LEVELS - 2)).min(HIGHEST_KM) as f32
 }
 
-fn bottom_km(profile: &[PerEmitter<f64>], emitter: Emitter) -> f32 {
-    level_altitude_km(passed(0..LEVELS, profile, emitter).saturating_sub(1)) as f32
+fn bottom_km(profile: &[PerEmitter<f64>], emitters: &[usize]) -> f32 {
+    let bottom = |emitter: &usize| level_altitude_km(passed(0..LEVELS, profile, *emitter).saturating_sub(1)) as f32;
+    emitters.iter().map(bottom).fold(f32::INFINITY, f32::min)
 }
 
 /// How many of the levels, in that order, hold hardly any of the light together.
-fn passed(levels: impl Iterator<Item = usize>, profile: &[PerEmitter<f64>], emitter: Emitter) -> usize {
-    let light = |level: usize| profile[level][emitter.index()];
+fn passed(levels: impl Iterator<Item = usize>, profile: &[PerEmitter<f64>], emitter: usize) -> usize {
+    let light = |level: usize| profile[level][emitter];
     let whole: f64 = (0..LEVELS).map(light).sum();
     let mut sum = 0.0;
     let hardly_any = |level: &usize| {

@@ -36,7 +36,7 @@ impl Meridians {
     /// brightness in kR of what is bright enough to be seen as an aurora.
     pub(super) fn seen(mut self, soft: &Self, field: &FieldLines, shading: &Shading) -> Self {
         let level = Level::new();
-        let (chart, strips) = self.strips();
+        let (chart, strips) = self.strips(STRIP);
         let soft_finder = soft.chart.finder();
         let (mut cosines, mut sines, mut soft_rows) = (Vec::new(), Vec::new(), Vec::new());
         for row in 0..chart.rows + ROWS {

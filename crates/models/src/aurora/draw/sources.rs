@@ -8,14 +8,14 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{
-    Blur, DrawingParameters,
+    Blur, DrawingParameters, Sampling,
     footprint::{REACH, Source},
     geometry::{FieldLines, Foot},
 };
 use crate::{
     aurora::{
-        afterglow::{GlowCell, GlowMap},
-        light::{Emission, Emitter},
+        afterglow::{Afterglow, GlowCell},
+        light::{Emission, Emitter, heights::RED_HEIGHTS},
         particles::AuroraParticles,
         precipitation::energy::{LOWEST_EV, NODES, node_energy_ev, node_of},
     },
@@ -28,6 +28,10 @@ const TASK: usize = 4096;
 const SPREAD_PER_SPACING: f64 = 1.2;
 /// Afterglow without particles that is fainter than this share of a typical cell is not seen.
 const FAINTEST: f32 = 2e-4;
+/// The same beside single collisions, whose noise hides more: what is left out is a hundredth of what stays behind.
+const FAINTEST_FALLING: f32 = 1e-2;
+/// Keys of a particle's falls are so far apart from instant to instant.
+const PER_INSTANT: u32 = 0x9e37_79b9;
 /// 1000 W, the power of one mW/m^2 on one km^2.
 const PER_UNIT: f32 = 1e-3;
 
@@ -36,16 +40,16 @@ const PER_UNIT: f32 = 1e-3;
 pub(super) struct Sources {
     /// Light with fine detail: particles and the green map.
     pub(super) sharp: Vec<Source>,
-    /// The red map.
+    /// The red map, by height in place of emitters.
     pub(super) soft: Vec<Source>,
     /// Standard deviations of both, km.
     pub(super) spread_km: [f64; 2],
 }
 
-/// Shares of green, red and prompt light.
+/// Shares of green, red and prompt light; on the soft chart, of red light of three heights.
 pub(super) type Shares = [f32; 3];
-const GREEN: Shares = [1.0, 0.0, 0.0];
-const RED: Shares = [0.0, 1.0, 0.0];
+const GREEN: [Shares; 1] = [[1.0, 0.0, 0.0]];
+const RED: [Shares; RED_HEIGHTS] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// How electrons become sources.
 pub(super) struct Maker<'a> {
@@ -53,19 +57,31 @@ pub(super) struct Maker<'a> {
     pub(super) reach: f32,
     /// Part of the power that each of several instants has.
     pub(super) share: f32,
+    /// Which of them it is, so that a particle has falls of its own at each.
+    pub(super) instant: u32,
 }
 
 impl Maker<'_> {
     #[inline(always)]
-    fn make(&self, foot: Foot, powers_w: [f32; 3], node: f32) -> Source {
+    fn make(&self, foot: Foot, powers_w: [f32; 3], node: f32, key: u32) -> Source {
         let scale = self.share * PER_UNIT * foot.upright;
         let [green, red, prompt] = powers_w;
         let power = [green * scale, red * scale, prompt * scale];
-        Source { across: foot.across, reach: self.reach, node, power }
+        Source { across: foot.across, reach: self.reach, node, power, key }
     }
 
-    /// A source for each of the cells, which gives these shares of its light.
-    pub(super) fn cells(&self, cells: &[GlowCell], shares: Shares) -> Vec<Source> {
+    /// What the falls of a particle or cell of that number go by.
+    #[inline(always)]
+    fn key(&self, number: u32) -> u32 {
+        number.wrapping_add(self.instant.wrapping_mul(PER_INSTANT))
+    }
+
+    /// A source for each of the cells, which gives these shares of the light of each height.
+    pub(super) fn cells<const HEIGHTS: usize>(
+        &self,
+        cells: &[GlowCell<HEIGHTS>],
+        shares: [Shares; HEIGHTS],
+    ) -> Vec<Source> {
         let level = Level::new();
         let mut sources = vec![Source::default(); cells.len()];
         sources.par_chunks_mut(TASK).zip(cells.par_chunks(TASK)).for_each(|(sources, cells)| {
@@ -75,11 +91,22 @@ impl Maker<'_> {
     }
 
     #[inline(always)]
-    fn fill_from_cells(&self, sources: &mut [Source], cells: &[GlowCell], shares: Shares) {
+    fn fill_from_cells<const HEIGHTS: usize>(
+        &self,
+        sources: &mut [Source],
+        cells: &[GlowCell<HEIGHTS>],
+        shares: [Shares; HEIGHTS],
+    ) {
         for (source, cell) in sources.iter_mut().zip(cells) {
             let [east, south] = cell.position_km;
-            let powers = shares.map(|share| share * cell.power_w);
-            *source = self.make(self.field.foot(east, south), powers, node_of(cell.energy_ev));
+            let mut powers = [0.0; 3];
+            for (shares, power) in shares.iter().zip(cell.powers_w) {
+                for (sum, share) in powers.iter_mut().zip(shares) {
+                    *sum += share * power;
+                }
+            }
+            let key = self.key(east.to_bits().rotate_left(16) ^ south.to_bits());
+            *source = self.make(self.field.foot(east, south), powers, node_of(cell.energy_ev), key);
         }
     }
 
@@ -122,7 +149,8 @@ impl Maker<'_> {
             for (i, source) in sources.iter_mut().enumerate() {
                 let foot = Foot { across: [feet[0][i], feet[1][i]], upright: feet[2][i] };
                 let powers = [green_w[first + i], 0.0, particles.powers_w[first + i]];
-                *source = self.make(foot, powers, nodes[i]);
+                let key = self.key(particles.ids[first + i] as u32);
+                *source = self.make(foot, powers, nodes[i], key);
             }
         }
     }
@@ -131,24 +159,27 @@ impl Maker<'_> {
 impl Sources {
     /// What shines while the shutter is open.
     pub(super) fn new(light: &Light, field: &FieldLines, moments: &Moments) -> Self {
+        let falling = light.parameters.sampling == Sampling::Collisions;
+        let faintest = if falling { FAINTEST_FALLING } else { FAINTEST };
         let ((green_w, green), red) = rayon::join(
-            || light.glow[0].shared_out(light.particles, FAINTEST),
-            || light.glow[1].bright_cells(FAINTEST),
+            || light.glow.green.shared_out(light.particles, faintest),
+            || light.glow.red.bright_cells(FAINTEST),
         );
         let column = light.emission.column(light.energy_ev);
         let spread = math::hypot(light.spread_km(), moments.smear_km);
-        let with = |emitter: Emitter, map: &GlowMap| {
+        let with = |emitter: Emitter, cell_km: f64| {
             let diffusion = column.spread_km[emitter.index()];
-            math::sqrt(spread * spread + diffusion * diffusion + map.cell_km() * map.cell_km() / 6.0)
+            math::sqrt(spread * spread + diffusion * diffusion + cell_km * cell_km / 6.0)
         };
-        let maker = |spread: f64, share| Maker { field, reach: spread as f32 * REACH, share };
-        let red_spread = with(Emitter::OxygenRed, light.glow[1]);
-        let mut sharp = maker(with(Emitter::OxygenGreen, light.glow[0]), 1.0).cells(&green, GREEN);
-        let moving = maker(spread, 1.0 / moments.later.len().max(1) as f32);
-        for later in &moments.later {
-            sharp.extend(moving.particles(light.particles, &green_w, *later as f32));
+        let maker = |spread: f64, share, instant| Maker { field, reach: spread as f32 * REACH, share, instant };
+        let red_spread = with(Emitter::OxygenRed, light.glow.red.cell_km());
+        let mut sharp =
+            maker(with(Emitter::OxygenGreen, light.glow.green.cell_km()), 1.0, moments.first).cells(&green, GREEN);
+        let share = 1.0 / moments.later.len().max(1) as f32;
+        for (later, instant) in moments.later.iter().zip(moments.first..) {
+            sharp.extend(maker(spread, share, instant).particles(light.particles, &green_w, *later as f32));
         }
-        let soft = maker(red_spread, 1.0).cells(&red, RED);
+        let soft = maker(red_spread, 1.0, moments.first).cells(&red, RED);
         Self { sharp, soft, spread_km: [spread, red_spread] }
     }
 }
@@ -171,6 +202,8 @@ impl Sources {
 pub(super) struct Moments {
     /// Instants, s after their step; each has an equal part of the power.
     pub(super) later: Vec<f64>,
+    /// Number of the first of them.
+    pub(super) first: u32,
     /// How far they are spread by their motion from one to the next (standard deviation), km.
     pub(super) smear_km: f64,
 }
@@ -179,7 +212,7 @@ pub(super) struct Moments {
 pub(super) struct Light<'a> {
     pub(super) particles: &'a AuroraParticles,
     /// The green and the red map.
-    pub(super) glow: [&'a GlowMap; 2],
+    pub(super) glow: &'a Afterglow,
     pub(super) emission: &'a Emission,
     pub(super) parameters: &'a DrawingParameters,
     /// Mean distance of neighbouring particles, km.

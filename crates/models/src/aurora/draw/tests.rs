@@ -15,10 +15,11 @@ use bansho_base::{
 use super::{
     Aurora, BlurParameters, DrawingParameters, FallModel, Sampling,
     blur::Blurred,
-    chart::{Chart, Coverage},
+    chart::{Chart, Coverage, STRIP},
     collisions::Collisions,
     footprint::{Footprint, REACH, Source},
     geometry::{EARTH_RADIUS_KM, FieldLines},
+    group::GROUP,
     meridians::Meridians,
     phenomenon::measured_lines,
     prepared::{Batch, Charts},
@@ -29,7 +30,7 @@ use crate::aurora::{
     AuroraParameters, ParticleParameters, SpectrumShape,
     afterglow::GlowCell,
     atmosphere::atmosphere,
-    light::{EMITTERS, Emission, Emitter, PerEmitter},
+    light::{EMITTERS, Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter},
     precipitation::spectrum::ARC,
     shapes::{ShapeParameters, SheetParameters},
 };
@@ -38,6 +39,8 @@ const ENERGY_EV: f64 = 5000.0;
 const STEP: f64 = 0.01;
 const GREEN: Shares = [1.0, 0.0, 0.0];
 const RED: Shares = [0.0, 1.0, 0.0];
+/// All heights of red light on the soft chart.
+const SOFT: Shares = [1.0; 3];
 const PROMPT: Shares = [0.0, 0.0, 1.0];
 const PROMPT_AND_GREEN: Shares = [1.0, 0.0, 1.0];
 
@@ -60,8 +63,8 @@ fn field(dip_deg: f64) -> FieldLines {
     FieldLines::new(dip_deg, 0.0, DVec3::ZERO)
 }
 
-fn sources(cells: &[GlowCell], shares: Shares, spread_km: f64, field: &FieldLines) -> Vec<Source> {
-    Maker { field, reach: spread_km as f32 * REACH, share: 1.0 }.cells(cells, shares)
+fn sources(cells: &[GlowCell<1>], shares: Shares, spread_km: f64, field: &FieldLines) -> Vec<Source> {
+    Maker { field, reach: spread_km as f32 * REACH, share: 1.0, instant: 0 }.cells(cells, [shares])
 }
 
 /// Least standard deviation of sources, km.
@@ -71,30 +74,30 @@ fn spread_of(sources: &[Source]) -> f64 {
 
 fn draw(sources: &[Source], view: &View, field: &FieldLines, profiles: &Profiles, step: f64) -> Meridians {
     let chart = Chart::new(&Coverage::of_view(view, field), step, step);
-    let footprint = Footprint::new(sources, &chart, spread_of(sources));
+    let footprint = Footprint::new(sources, (&chart, STRIP), field, spread_of(sources));
     Meridians::new(chart, field, profiles, &footprint)
 }
 
 /// Cells of one mW/m^2 over a wide square.
-fn slab() -> Vec<GlowCell> {
+fn slab() -> Vec<GlowCell<1>> {
     const SIDE: i32 = 200;
     const KM: f32 = 5.0;
     let place = |index: i32| (index as f32 - 0.5 * SIDE as f32) * KM;
     let cell = |index: i32| GlowCell {
         position_km: [place(index % SIDE), place(index / SIDE)],
-        power_w: 1e3 * KM * KM,
+        powers_w: [1e3 * KM * KM],
         energy_ev: ENERGY_EV as f32,
     };
     (0..SIDE * SIDE).map(cell).collect()
 }
 
 /// A waving arc to the north.
-fn arc(count: usize) -> Vec<GlowCell> {
+fn arc(count: usize) -> Vec<GlowCell<1>> {
     let cell = |index: usize| {
         let share = index as f64 / count as f64;
         let south = -150.0 + 25.0 * math::sin(9.0 * share) + 3.0 * math::sin(index as f64 * 1.7);
         let energy_ev = (ENERGY_EV * (1.0 + 0.2 * math::sin(30.0 * share))) as f32;
-        GlowCell { position_km: [(share * 300.0 - 150.0) as f32, south as f32], power_w: 1e5, energy_ev }
+        GlowCell { position_km: [(share * 300.0 - 150.0) as f32, south as f32], powers_w: [1e5], energy_ev }
     };
     (0..count).map(cell).collect()
 }
@@ -134,7 +137,7 @@ fn an_even_sheet_overhead_shows_its_column() {
 fn a_ray_is_seen_where_every_lens_puts_it() {
     let profiles = Profiles::new(&emission());
     let field = field(77.0);
-    let cell = GlowCell { position_km: [40.0, -90.0], power_w: 1e6, energy_ev: ENERGY_EV as f32 };
+    let cell = GlowCell { position_km: [40.0, -90.0], powers_w: [1e6], energy_ev: ENERGY_EV as f32 };
     let sources = sources(&[cell], PROMPT, 0.4, &field);
     let [x, y] = sources[0].across.map(f64::from);
     let line = field.meridian([x, y].map(|value| value / math::hypot(x, y))).line(math::hypot(x, y));
@@ -188,14 +191,15 @@ fn collisions_beside_profile(emission: &Emission, drawing: &DrawingParameters) -
 }
 
 /// The same for an arc of cells.
-fn beside_profile(emission: &Emission, collisions: &Collisions, cells: &[GlowCell]) -> (f64, Meridians) {
+fn beside_profile(emission: &Emission, collisions: &Collisions, cells: &[GlowCell<1>]) -> (f64, Meridians) {
     let (profiles, view, field) =
         (Profiles::new(emission), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
     let sources = sources(cells, PROMPT_AND_GREEN, 1.5, &field);
     // Low rows, since single points are spread over two of them.
     let chart = || Chart::new(&Coverage::of_view(&view, &field), STEP, 0.5 * STEP);
-    let footprint = Footprint::new(&sources, &chart(), spread_of(&sources));
-    let expected = Meridians::new(chart(), &field, &profiles, &footprint);
+    let sorted = |strip| Footprint::new(&sources, (&chart(), strip), &field, spread_of(&sources));
+    let expected = Meridians::new(chart(), &field, &profiles, &sorted(STRIP));
+    let footprint = sorted(GROUP);
     let mut mean = vec![[0.0; 4]; expected.light.len()];
     for step in 0..64 {
         let picture = collisions.draw(chart(), &field, &footprint, step);
@@ -300,7 +304,7 @@ fn the_fall_of_the_thesis_can_be_drawn_and_lies_elsewhere() {
 fn blurred_width(north_km: f32, radii: &BlurParameters) -> f64 {
     let (profiles, view, field) =
         (Profiles::new(&emission()), view(Lens::Perspective, [0.0, 40.0, -60.0], [320, 240]), field(77.0));
-    let cell = GlowCell { position_km: [0.0, -north_km], power_w: 1e6, energy_ev: ENERGY_EV as f32 };
+    let cell = GlowCell { position_km: [0.0, -north_km], powers_w: [1e6], energy_ev: ENERGY_EV as f32 };
     let sources = sources(&[cell], PROMPT, 0.01, &field);
     let pixel = 1.0 / view.camera.focal_pixels;
     let picture = draw(&sources, &view, &field, &profiles, pixel);
@@ -326,9 +330,9 @@ fn the_blur_of_the_thesis_is_as_wide_near_and_far() {
 }
 
 /// A straight, even arc from west to east, so far to the north.
-fn even_arc(north_km: f64, energy_ev: f32) -> Vec<GlowCell> {
+fn even_arc(north_km: f64, energy_ev: f32) -> Vec<GlowCell<1>> {
     let place = |index: i32| [(4.0 * f64::from(index)) as f32, -north_km as f32];
-    (-100..=100).map(|index| GlowCell { position_km: place(index), power_w: 1e6, energy_ev }).collect()
+    (-100..=100).map(|index| GlowCell { position_km: place(index), powers_w: [1e6], energy_ev }).collect()
 }
 
 #[test]
@@ -349,7 +353,7 @@ fn far_and_near_arcs_are_smooth_up_and_down() {
             let spread_km = [6.0, 15.0];
             let of = |shares, spread_km| sources(&cells, shares, spread_km, &field);
             let sharp = [of(GREEN, 6.0), of(PROMPT, 6.0)].concat();
-            let sources = Sources { sharp, soft: of(RED, 15.0), spread_km };
+            let sources = Sources { sharp, soft: of(SOFT, 15.0), spread_km };
             let charts = Charts { aurora: &aurora, field: &field, coverage: Coverage::of_view(&view, &field) };
             let charts = [charts.sharp(&sources), charts.soft(&sources)];
             let column: Vec<PerEmitter<f32>> = (0..600)
@@ -395,9 +399,99 @@ fn few_particles_are_as_smooth_and_as_bright_as_many() {
         (Profiles::new(&emission()), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
     let picture = |count: usize| {
         let mut cells = arc(count);
-        cells.iter_mut().for_each(|cell| cell.power_w *= 16_000.0 / count as f32);
+        cells.iter_mut().for_each(|cell| cell.powers_w[0] *= 16_000.0 / count as f32);
         draw(&sources(&cells, GREEN, 1.5, &field), &view, &field, &profiles, STEP).light
     };
     let apart = difference(&picture(2000), &picture(16_000));
     assert!(apart < 0.1, "{apart}");
+}
+
+/// Half the thickness of a thin sheet, km, and the spread of its sources.
+const THIN_KM: f64 = 1.5;
+const THIN_SPREAD_KM: f64 = 0.35;
+/// Distance of its sources, km.
+const THIN_CELL_KM: f64 = 0.15;
+
+/// Places across a thin sheet at which its sources lie, km.
+fn across_thin() -> impl Iterator<Item = f64> {
+    let count = (THIN_KM / THIN_CELL_KM) as i32;
+    (-count..=count).map(|index| THIN_CELL_KM * f64::from(index))
+}
+
+/// An even, thin sheet of 1 mW/m^2 from west to east through the magnetic zenith, straight up.
+fn thin_sheet() -> Vec<GlowCell<1>> {
+    let power_w = (1e3 * THIN_CELL_KM * THIN_CELL_KM) as f32;
+    let cell = |east: f64, south: f64| GlowCell {
+        position_km: [east as f32, south as f32],
+        powers_w: [power_w],
+        energy_ev: ENERGY_EV as f32,
+    };
+    (-300..=300)
+        .flat_map(|index| across_thin().map(move |south| cell(THIN_CELL_KM * f64::from(index), south)))
+        .collect()
+}
+
+/// What of an emitter is seen of it along a line of sight, kR: the integral over the way.
+fn thin_light(emission: &Emission, emitter: usize, [colatitude, longitude]: [f64; 2]) -> f64 {
+    const STEP_KM: f64 = 0.25;
+    let reach = THIN_SPREAD_KM * f64::from(REACH);
+    let flux = |south: f64| -> f64 {
+        let patch = |place: f64| {
+            let away = (south - place) / reach;
+            let shape = (1.0 - away * away).max(0.0);
+            15.0 / 16.0 / reach * shape * shape * THIN_CELL_KM
+        };
+        across_thin().map(patch).sum()
+    };
+    let (sin, cos) = math::sin_cos(colatitude);
+    (320..1600)
+        .map(|step| {
+            let way = STEP_KM * (f64::from(step) + 0.5);
+            let light = emission.at(ENERGY_EV, way * cos)[emitter] * 1e3 / PHOTONS_PER_KILORAYLEIGH;
+            flux(way * sin * math::sin(longitude)) * light * STEP_KM
+        })
+        .sum()
+}
+
+#[test]
+fn a_thin_sheet_is_as_bright_about_the_magnetic_zenith_as_its_light_comes_to() {
+    let (emission, field, view) = (emission(), field(90.0), view(Lens::Perspective, [0.0, 1.0, 1e-3], [320, 320]));
+    let profiles = Profiles::new(&emission);
+    for (shares, emitter) in [(GREEN, 0), (PROMPT, 2)] {
+        let sources = sources(&thin_sheet(), shares, THIN_SPREAD_KM, &field);
+        // Rows of a pixel of an ordinary picture.
+        let picture = draw(&sources, &view, &field, &profiles, 1.67e-3);
+        let brightest = thin_light(&emission, emitter, [4e-3, 0.0]);
+        for longitude_deg in [0.0, 15.0, 45.0, 90.0] {
+            for quarter in 1..=16 {
+                let place = [0.25 * f64::from(quarter), longitude_deg].map(f64::to_radians);
+                let expected = thin_light(&emission, emitter, place);
+                let found = f64::from(picture.sampler().light(place[1] as f32, place[0] as f32)[emitter]);
+                // On its sides, where it is dim, it is a little wider.
+                let bound = (0.1 * expected).max(0.025 * brightest);
+                assert!(
+                    (found - expected).abs() < bound,
+                    "{emitter} {longitude_deg} {quarter}: {found} for {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn single_collisions_do_not_depend_on_the_number_of_threads() {
+    let (view, field) = (view(Lens::Perspective, [0.0, 60.0, -110.0], [320, 180]), field(77.0));
+    let drawing = DrawingParameters::default();
+    let collisions = Collisions::new(&emission(), &drawing, nearest_node(6.0 * ENERGY_EV), Key::new(5, "aurora"));
+    let sources = sources(&arc(3000), PROMPT_AND_GREEN, 0.5, &field);
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let chart = Chart::new(&Coverage::of_view(&view, &field), 0.25 * STEP, 0.25 * STEP);
+            let footprint = Footprint::new(&sources, (&chart, GROUP), &field, spread_of(&sources));
+            collisions.draw(chart, &field, &footprint, 3).light
+        })
+    };
+    let one = with(1);
+    assert!(one.iter().flatten().any(|light| *light > 0.0) && one == with(3));
 }

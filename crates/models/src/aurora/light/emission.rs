@@ -7,6 +7,7 @@ use super::{
     collisions::mean_hard_sphere_photons,
     emitter::{EMITTERS, Emitter, PerEmitter},
     excitation::photons_per_ion_pair,
+    heights::{RED_HEIGHTS, mean_lifetimes},
     persistence::Persistence,
 };
 use crate::aurora::{
@@ -25,6 +26,8 @@ pub struct Emission {
     /// Counting photons of each emitter for each ion pair, by level.
     photons: Vec<PerEmitter<f64>>,
     columns: Vec<Column>,
+    /// Mean lifetime of the red light of each of its heights by node, s.
+    red_lifetimes: Vec<[f64; RED_HEIGHTS]>,
 }
 
 /// What a whole column shows, by emitter.
@@ -60,7 +63,13 @@ impl Emission {
         let columns = (0..NODES)
             .map(|node| column(&photons, &persistence, deposition.mixed(node), node_energy_ev(node)))
             .collect();
-        Self { deposition, photons, columns }
+        let red = Emitter::OxygenRed.index();
+        let red_lifetimes = |node: usize| {
+            let light = photons.iter().zip(deposition.mixed(node)).map(|(photons, pairs)| photons[red] * pairs);
+            mean_lifetimes(light.zip(persistence.iter().map(|persistence| persistence[red].lifetime)))
+        };
+        let red_lifetimes = (0..NODES).map(red_lifetimes).collect();
+        Self { deposition, photons, columns, red_lifetimes }
     }
 
     /// The deposition beneath it.
@@ -116,6 +125,14 @@ impl Emission {
             lifetime: between(low.lifetime, high.lifetime),
             spread_km: between(low.spread_km, high.spread_km),
         }
+    }
+
+    /// Mean lifetime of the red light of each of its [heights](super::heights), s, weighted by emission.
+    #[must_use]
+    pub fn red_lifetimes(&self, energy_ev: f64) -> [f64; RED_HEIGHTS] {
+        let (node, mixing) = energy::locate(energy_ev);
+        let (low, high) = (self.red_lifetimes[node], self.red_lifetimes[node + 1]);
+        std::array::from_fn(|height| lerp(low[height], high[height], mixing))
     }
 
     /// Luminance in cd/m^2 of the column per mW m^-2: what a sheet seen end-on shows.

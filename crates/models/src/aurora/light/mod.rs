@@ -1,7 +1,8 @@
 //! What struck atoms and molecules give back: how much light, for how long, how far from where they were struck, and in which colour.
 //!
 //! [`emitter`] lists the excited states and their lines; [`quenching`] says how many of them radiate, [`excitation`] how many are made.
-//! [`emission`] is the table of photons by energy and altitude, [`persistence`] how light lingers and spreads. [`collisions`] turns single
+//! [`emission`] is the table of photons by energy and altitude, [`persistence`] how light lingers and spreads, [`heights`]
+//! how red light does by height. [`collisions`] turns single
 //! collisions into photons, with the rules of the thesis beside. [`extinction`] is what the air below takes away. [`calibration`] holds the
 //! whole against what is observed.
 
@@ -11,6 +12,7 @@ pub mod emission;
 pub mod emitter;
 pub mod excitation;
 pub mod extinction;
+pub mod heights;
 pub mod persistence;
 pub mod quenching;
 

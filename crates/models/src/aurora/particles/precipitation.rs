@@ -265,7 +265,7 @@ mod tests {
         assert!((wanted.sum() / (flux * length) - 1.0).abs() < 1e-9);
         let even = flux * length / (COARSE - 1) as f64;
         for node in &wanted.0[0][1..COARSE - 1] {
-            assert!((node / even - 1.0).abs() < 0.3, "{node} W for {even} W");
+            assert!((node / even - 1.0).abs() < 0.05, "{node} W for {even} W");
         }
     }
 }

@@ -16,6 +16,10 @@ const RAYS: Fractal = Fractal { octaves: 3, lacunarity: 2, gain: 0.7 };
 const NODES_PER_CELL: f64 = 12.0;
 /// Most nodes of a sheet; finer rays on a longer one are finer than its particles.
 const MOST_NODES: f64 = 50_000.0;
+/// Where the coordinate runs so many times as fast as the sheet is long, rays begin to fade, and so many times they are gone: they would be so
+/// much narrower, or stand beside others where it jumps.
+const FAST: f64 = 1.5;
+const GONE: f64 = 3.0;
 /// Width of a black ray beside the distance between two.
 const BLACK_WIDTH: f32 = 0.12;
 
@@ -85,7 +89,11 @@ impl Rays {
                 let noises = self.noises(level, &places, time);
                 (0..LANES).map(move |lane| noises.map(|values| values[lane]))
             };
-            (0..=last as usize).step_by(LANES).flat_map(batch).take(last as usize + 1).collect()
+            let mut nodes: Vec<Noises> =
+                (0..=last as usize).step_by(LANES).flat_map(batch).take(last as usize + 1).collect();
+            let places = (0..=last as usize).map(|node| along(sheet, node as f64 / last)).collect::<Vec<_>>();
+            fade(&mut nodes, &places, length / last, self.rays.scale_km);
+            nodes
         };
         RayTable { sheets: lengths.iter().enumerate().map(sheet).collect() }
     }
@@ -155,6 +163,30 @@ impl Rays {
         let turns = (turns - turns.floor()) as f32;
         let dark = 0.5 - 0.5 * lanes::cos_turns(turns + 2.0 * noise);
         1.0 - self.pulsation.depth as f32 * dark
+    }
+}
+
+/// Fades the rays of nodes of a sheet, `spacing` km apart, about those between which the coordinate runs fast or jumps: over `scale` km to
+/// both sides.
+fn fade(nodes: &mut [Noises], places: &[f64], spacing: f64, scale: f64) {
+    let mut strengths = vec![1.0_f64; nodes.len()];
+    for (node, pair) in places.windows(2).enumerate() {
+        let speed = (pair[1] - pair[0]).abs() / spacing.max(f64::MIN_POSITIVE);
+        let strength = ((GONE - speed) / (GONE - FAST)).clamp(0.0, 1.0);
+        for end in [node, node + 1] {
+            strengths[end] = strengths[end].min(strength);
+        }
+    }
+    let rise = spacing / scale;
+    for node in 1..strengths.len() {
+        strengths[node] = strengths[node].min(strengths[node - 1] + rise);
+    }
+    for node in (1..strengths.len()).rev() {
+        strengths[node - 1] = strengths[node - 1].min(strengths[node] + rise);
+    }
+    for ([left, right, ..], strength) in nodes.iter_mut().zip(strengths) {
+        *left *= strength as f32;
+        *right *= strength as f32;
     }
 }
 
@@ -239,6 +271,22 @@ mod tests {
                 assert!((table.at(0, along[lane] / 300.0)[0] - left[lane]).abs() < 0.01 * rays.deviation * 4.0);
             }
         }
+    }
+
+    #[test]
+    fn rays_fade_where_the_coordinate_jumps() {
+        let parameters = AuroraParameters::default();
+        let rays = Rays::new(&parameters, KEY);
+        // 50 km beyond the middle of the sheet all else.
+        let jump = |_: usize, share: f64| 300.0 * share + if share > 0.5 { 50.0 } else { 0.0 };
+        let (even, torn) = (rays.table(&[300.0], |_, share| 300.0 * share, 2.0), rays.table(&[300.0], jump, 2.0));
+        let step = |table: &RayTable, share: f64| (table.at(0, share + 2e-4)[0] - table.at(0, share - 2e-4)[0]).abs();
+        assert!(step(&torn, 0.5) < 0.1 * f64::from(rays.deviation) as f32, "{}", step(&torn, 0.5));
+        // A ray away it is as it was.
+        let away = 0.5 - 1.1 * parameters.rays.scale_km / 300.0;
+        assert_eq!(torn.at(0, away), even.at(0, away));
+        let ten = (1..60).map(|place| torn.at(0, f64::from(place) / 60.0)[0].abs()).fold(0.0, f32::max);
+        assert!(ten > rays.deviation, "elsewhere there are rays");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use bansho_base::{math::DVec2, phenomenon::SnapshotError};
 use super::{AuroraParticles, along::Along, population::NUMBERS, simulation::State};
 use crate::aurora::afterglow::{Afterglow, GlowMap};
 
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Numbers that stand in a snapshot.
 trait Item: Copy {
@@ -66,8 +66,7 @@ pub(super) fn write(state: &State) -> Vec<u8> {
     write_along(&mut bytes, &state.along);
     write_along(&mut bytes, &state.target_along);
     write_particles(&mut bytes, &state.particles);
-    for map in [&state.afterglow.green, &state.afterglow.red] {
-        let (places, values) = map.to_lists();
+    for (places, values) in [state.afterglow.green.to_lists(), state.afterglow.red.to_lists()] {
         put_list(&mut bytes, &places);
         put_list(&mut bytes, &values);
     }
@@ -144,7 +143,10 @@ fn read_particles(source: &mut Source) -> Result<AuroraParticles, SnapshotError>
     if whole { Ok(particles) } else { Err(SnapshotError::Damaged) }
 }
 
-fn read_map(source: &mut Source, like: &GlowMap) -> Result<GlowMap, SnapshotError> {
+fn read_map<const HEIGHTS: usize>(
+    source: &mut Source,
+    like: &GlowMap<HEIGHTS>,
+) -> Result<GlowMap<HEIGHTS>, SnapshotError> {
     let (places, values) = (source.list::<u32>()?, source.list::<f32>()?);
     like.with_lists(&places, &values).ok_or(SnapshotError::Damaged)
 }

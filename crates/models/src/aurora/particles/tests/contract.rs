@@ -55,7 +55,7 @@ fn what_is_no_snapshot_is_refused_and_changes_nothing() {
     let longer: Vec<u8> = bytes.iter().copied().chain([0]).collect();
     assert_eq!(refused(&mut simulation, &longer), SnapshotError::Damaged);
     let other = [&[9, 0, 0, 0], &bytes[4..]].concat();
-    assert_eq!(refused(&mut simulation, &other), SnapshotError::Version { found: 9, known: 1 });
+    assert_eq!(refused(&mut simulation, &other), SnapshotError::Version { found: 9, known: 2 });
     let mut elsewhere = super::simulation(AuroraParameters { shapes: becoming(Form::Peel), ..small() });
     assert_eq!(refused(&mut elsewhere, &bytes), SnapshotError::Damaged, "the usual shapes have two sheets");
     assert!(simulation.snapshot() == bytes);
@@ -95,7 +95,7 @@ fn all_valid_parameters_give_numbers() {
         assert!(particles.positions.iter().flatten().all(|place| place.abs() <= half), "trial {trial}");
         assert!(particles.fades.iter().all(|fade| (0.0..=1.0).contains(fade)), "trial {trial}");
         assert!(particles.energies_ev.iter().all(|energy| (0.0..=1e5).contains(energy)), "trial {trial}");
-        assert!(simulation.afterglow().red.power_w().is_finite(), "trial {trial}");
+        assert!(simulation.afterglow().red.powers_w().iter().all(|power| power.is_finite()), "trial {trial}");
     }
     assert!(tried > 40, "only {tried} of the random shapes are an aurora's");
 }
