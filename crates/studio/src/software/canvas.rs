@@ -73,6 +73,8 @@ struct Tile {
     painted: Option<u64>,
     /// What is to be painted.
     wanted: u64,
+    /// Texels that it shows changed since it was painted.
+    stale: bool,
     /// Numbers of the pieces that touch it.
     pieces: Vec<u32>,
 }
@@ -92,7 +94,7 @@ impl Canvas {
         self.sort(pieces, textures);
         let mut changed: Vec<&mut Tile> = Vec::new();
         for tile in &mut self.tiles {
-            if tile.painted != Some(tile.wanted) {
+            if tile.stale || tile.painted != Some(tile.wanted) {
                 changed.push(tile);
             }
         }
@@ -115,7 +117,7 @@ impl Canvas {
                 let (right, bottom) = ((left + ACROSS as i32).min(width), (top + DOWN as i32).min(height));
                 let pixels = vec![0; ACROSS * DOWN];
                 let area = Area { left, top, right, bottom };
-                self.tiles.push(Tile { area, pixels, painted: None, wanted: 0, pieces: Vec::new() });
+                self.tiles.push(Tile { area, pixels, painted: None, wanted: 0, stale: false, pieces: Vec::new() });
             }
         }
         self.across = (width as usize).div_ceil(ACROSS);
@@ -130,7 +132,8 @@ impl Canvas {
         for (number, piece) in pieces.iter().enumerate() {
             for tile in self.touched(piece.area) {
                 let tile = &mut self.tiles[tile];
-                tile.wanted = hashed(tile.wanted, [piece.hash, version(piece, tile.area, textures)]);
+                tile.wanted = hashed(tile.wanted, [piece.hash]);
+                tile.stale = tile.stale || has_changed(piece, tile.area, textures);
                 tile.pieces.push(number as u32);
             }
         }
@@ -177,27 +180,32 @@ impl Tile {
         for number in &self.pieces[hidden.unwrap_or(0)..] {
             pixels.paint(piece(number), textures);
         }
-        self.painted = Some(self.wanted);
+        (self.painted, self.stale) = (Some(self.wanted), false);
     }
 }
 
-/// When the texels changed last that `piece` shows in `area`.
-fn version(piece: &Piece, area: Area, textures: &Textures) -> u64 {
+/// Whether texels changed that `piece` shows in `area`.
+fn has_changed(piece: &Piece, area: Area, textures: &Textures) -> bool {
+    let (Shape::Texels { texture, .. } | Shape::Picture { texture, .. } | Shape::Triangle { texture, .. }) =
+        piece.shape
+    else {
+        return false;
+    };
+    let Some(texture) = textures.get(texture) else { return false };
     let part = piece.area.within(area);
     let ends = [[part.left, part.top], [part.right - 1, part.bottom - 1]];
-    // What is mixed has a part of its neighbours.
-    let around = if let Shape::Texels { .. } = piece.shape { 0.0 } else { 1.0 };
-    let of = |id, ends| textures.get(id).map_or(0, |texture| texture.version_of(ends, around));
     match piece.shape {
-        Shape::Fill(_) => 0,
-        Shape::Texels { texture, origin, .. } => {
-            of(texture, ends.map(|end| [0, 1].map(|axis| (i64::from(end[axis]) + origin[axis]) as f32)))
+        Shape::Fill(_) => false,
+        Shape::Texels { origin, .. } => {
+            let texel = |end: [i32; 2], axis: usize| (i64::from(end[axis]) + origin[axis]) as f32;
+            texture.has_changed(ends.map(|end| [0, 1].map(|axis| texel(end, axis))), 0.0)
         }
-        Shape::Picture { texture, from, step, .. } => {
+        // What is mixed has a part of its neighbours.
+        Shape::Picture { from, step, .. } => {
             let place = |end: [i32; 2], axis: usize| (from[axis] + f64::from(end[axis]) * step[axis]) as f32;
-            of(texture, ends.map(|end| [0, 1].map(|axis| place(end, axis))))
+            texture.has_changed(ends.map(|end| [0, 1].map(|axis| place(end, axis))), 1.0)
         }
-        Shape::Triangle { texture, triangle } => of(texture, triangle.texels),
+        Shape::Triangle { triangle, .. } => texture.has_changed(triangle.texels, 1.0),
     }
 }
 

@@ -66,7 +66,9 @@ impl Painter {
             }
         }
         let Self { textures, canvas, pieces, pool } = self;
-        canvas.paint(target.size, pieces, textures, pool.as_ref())
+        let changed = canvas.paint(target.size, pieces, textures, pool.as_ref());
+        textures.settle();
+        changed
     }
 
     /// Forgets what was painted.

@@ -25,17 +25,17 @@ pub(super) struct Piece {
     pub(super) hash: u64,
 }
 
-/// How a piece fills its area.
+/// How a piece fills its area; textures by their slots.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Shape {
     /// With one colour.
     Fill(Rgba),
     /// With texels, one a pixel; the texel of pixel (0, 0).
-    Texels { texture: TextureId, origin: [i64; 2], tint: Rgba },
+    Texels { texture: usize, origin: [i64; 2], tint: Rgba },
     /// With a picture of another size: the place in it, texels, of the middle of pixel (0, 0), and how much farther each pixel is.
-    Picture { texture: TextureId, from: [f64; 2], step: [f64; 2], tint: Rgba },
+    Picture { texture: usize, from: [f64; 2], step: [f64; 2], tint: Rgba },
     /// What of it lies within a triangle.
-    Triangle { texture: TextureId, triangle: Triangle },
+    Triangle { texture: usize, triangle: Triangle },
 }
 
 /// What is painted on.
@@ -50,8 +50,10 @@ impl Target {
     /// Adds what `mesh` shows within `clip`.
     pub(super) fn add(&self, mesh: &Mesh, clip: Rect, textures: &Textures, pieces: &mut Vec<Piece>) {
         let clip = self.clip(clip);
-        let Some(texture) = textures.get(mesh.texture_id).filter(|_| !clip.is_empty()) else { return };
-        let add = Adding { clip, id: mesh.texture_id, texture };
+        let Some(slot) = textures.slot(mesh.texture_id).filter(|_| !clip.is_empty()) else { return };
+        let Some(texture) = textures.get(slot) else { return };
+        // Nearly all that is no letter shows this texel, which is white.
+        let add = Adding { clip, id: mesh.texture_id, slot, texture, first_texel: texture.rounded_at([0.0; 2]) };
         let mut indices = mesh.indices.as_slice();
         while let [a, b, c, rest @ ..] = indices {
             indices = rest;
@@ -145,7 +147,10 @@ fn rectangle(first: &[Corner; 3], second: &[Corner; 3]) -> Option<[Corner; 2]> {
 struct Adding<'a> {
     clip: Area,
     id: TextureId,
+    slot: usize,
     texture: &'a Texture,
+    /// The colour at (0, 0).
+    first_texel: Rgba,
 }
 
 impl Adding<'_> {
@@ -157,7 +162,7 @@ impl Adding<'_> {
         }
         let tint = low.colour;
         let shape = if low.texel == high.texel {
-            let colour = times(self.texture.rounded_at(low.texel), tint);
+            let colour = times(self.texel(low), tint);
             if colour == [0; 4] {
                 return None;
             }
@@ -170,6 +175,10 @@ impl Adding<'_> {
             _ => hash_of(self.id, [low, high]),
         };
         Some(Piece { area, shape, hash: hashed(hash, area.words()) })
+    }
+
+    fn texel(&self, corner: &Corner) -> Rgba {
+        if corner.texel == [0.0; 2] { self.first_texel } else { self.texture.rounded_at(corner.texel) }
     }
 
     fn picture(&self, low: &Corner, high: &Corner, tint: Rgba) -> Shape {
@@ -185,18 +194,18 @@ impl Adding<'_> {
             origin[axis] = nearest as i64;
         }
         if exact {
-            Shape::Texels { texture: self.id, origin, tint }
+            Shape::Texels { texture: self.slot, origin, tint }
         } else {
-            Shape::Picture { texture: self.id, from, step, tint }
+            Shape::Picture { texture: self.slot, from, step, tint }
         }
     }
 
     /// `None` where nothing of it is seen.
     fn triangle(&self, corners: [Corner; 3]) -> Option<Piece> {
-        let triangle = Triangle::new(corners, self.texture)?;
+        let triangle = Triangle::new(corners, |corner| self.texel(corner))?;
         let area = triangle.bounds().within(self.clip);
         let hash = hashed(hash_of(self.id, &corners), area.words());
-        (!area.is_empty()).then_some(Piece { area, shape: Shape::Triangle { texture: self.id, triangle }, hash })
+        (!area.is_empty()).then_some(Piece { area, shape: Shape::Triangle { texture: self.slot, triangle }, hash })
     }
 }
 

@@ -15,51 +15,74 @@ const BLOCK: [usize; 2] = [64, 32];
 /// All that is shown.
 #[derive(Default)]
 pub(super) struct Textures {
-    textures: HashMap<TextureId, Texture>,
-    /// Counts changes.
-    version: u64,
+    /// Where each one is.
+    slots: HashMap<TextureId, usize>,
+    textures: Vec<Option<Texture>>,
 }
 
 /// One of them.
 pub(super) struct Texture {
     image: Arc<ColorImage>,
     options: TextureOptions,
-    /// When each block changed last.
-    versions: Vec<u64>,
+    /// Which blocks changed since the last frame, and whether any did.
+    changed: Vec<bool>,
+    any_changed: bool,
     opaque: bool,
 }
 
 impl Textures {
-    pub(super) fn get(&self, id: TextureId) -> Option<&Texture> {
-        self.textures.get(&id)
+    /// Where texture `id` is, until it is given up.
+    pub(super) fn slot(&self, id: TextureId) -> Option<usize> {
+        self.slots.get(&id).copied()
+    }
+
+    pub(super) fn get(&self, slot: usize) -> Option<&Texture> {
+        self.textures.get(slot)?.as_ref()
     }
 
     /// Takes in a whole texture, or a part of one that is there.
     pub(super) fn set(&mut self, id: TextureId, delta: &ImageDelta) {
-        self.version += 1;
         let ImageData::Color(image) = &delta.image;
         if image.pixels.len() != image.size[0] * image.size[1] || image.pixels.is_empty() {
             return;
         }
-        let present = self.textures.get_mut(&id);
-        match (delta.pos, present) {
-            (Some(at), Some(texture)) => texture.set_part(at, image, delta.options, self.version),
-            (Some(_), None) => {}
-            (None, Some(texture)) if (texture.image.size, texture.options) == (image.size, delta.options) => {
-                texture.replace(image, self.version);
+        let slot = *self.slots.entry(id).or_insert_with(|| {
+            let free = self.textures.iter().position(Option::is_none);
+            free.unwrap_or_else(|| {
+                self.textures.push(None);
+                self.textures.len() - 1
+            })
+        });
+        let place = &mut self.textures[slot];
+        match (delta.pos, place) {
+            (Some(at), Some(texture)) => texture.set_part(at, image, delta.options),
+            (Some(_), None) => {
+                self.slots.remove(&id);
             }
-            (None, _) => {
+            (None, Some(texture)) if (texture.image.size, texture.options) == (image.size, delta.options) => {
+                texture.replace(image);
+            }
+            (None, place) => {
                 let blocks = blocks(image.size);
-                let versions = vec![self.version; blocks[0] * blocks[1]];
-                let texture =
-                    Texture { opaque: is_opaque(image), image: image.clone(), options: delta.options, versions };
-                self.textures.insert(id, texture);
+                let changed = vec![true; blocks[0] * blocks[1]];
+                let (image, opaque) = (image.clone(), is_opaque(image));
+                *place = Some(Texture { image, options: delta.options, changed, any_changed: true, opaque });
             }
         }
     }
 
     pub(super) fn free(&mut self, id: TextureId) {
-        self.textures.remove(&id);
+        if let Some(slot) = self.slots.remove(&id) {
+            self.textures[slot] = None;
+        }
+    }
+
+    /// A frame is painted: nothing changed since.
+    pub(super) fn settle(&mut self) {
+        for texture in self.textures.iter_mut().flatten().filter(|texture| texture.any_changed) {
+            texture.changed.fill(false);
+            texture.any_changed = false;
+        }
     }
 }
 
@@ -92,9 +115,12 @@ impl Texture {
         &self.image.pixels[row * width..][..width]
     }
 
-    /// When anything changed last of texels `from` to `to` and so many `around` them.
-    pub(super) fn version_of(&self, [from, to]: [[f32; 2]; 2], around: f32) -> u64 {
-        let blocks = blocks(self.image.size);
+    /// Whether anything changed, since the last frame, of texels `from` to `to` and so many `around` them.
+    pub(super) fn has_changed(&self, [from, to]: [[f32; 2]; 2], around: f32) -> bool {
+        if !self.any_changed {
+            return false;
+        }
+        let across = blocks(self.image.size)[0];
         let mut ranges = [[0, 0]; 2];
         for axis in 0..2 {
             let last = self.image.size[axis] as f32 - 1.0;
@@ -106,35 +132,29 @@ impl Texture {
             };
             ranges[axis] = [low as usize / BLOCK[axis], high as usize / BLOCK[axis]];
         }
-        let mut newest = 0;
-        for y in ranges[1][0]..=ranges[1][1] {
-            for version in &self.versions[y * blocks[0]..][ranges[0][0]..=ranges[0][1]] {
-                newest = newest.max(*version);
-            }
-        }
-        newest
+        let [columns, rows] = ranges.map(|[first, last]| first..=last);
+        rows.into_iter().any(|row| self.changed[row * across..][columns.clone()].contains(&true))
     }
 
     /// Puts `image`, of the same size, in the place of what is there.
-    fn replace(&mut self, image: &Arc<ColorImage>, version: u64) {
+    fn replace(&mut self, image: &Arc<ColorImage>) {
         let before = std::mem::replace(&mut self.image, image.clone());
         let [width, height] = image.size;
         let across = blocks(image.size)[0];
         for y in 0..height {
             let rows = [&before, image].map(|image| &image.pixels[y * width..][..width]);
-            let versions = &mut self.versions[y / BLOCK[1] * across..][..across];
-            for (block, block_version) in versions.iter_mut().enumerate() {
+            let changed = &mut self.changed[y / BLOCK[1] * across..][..across];
+            for (block, changed) in changed.iter_mut().enumerate() {
                 let range = block * BLOCK[0]..((block + 1) * BLOCK[0]).min(width);
-                if *block_version != version && rows[0][range.clone()] != rows[1][range] {
-                    *block_version = version;
-                }
+                *changed = *changed || rows[0][range.clone()] != rows[1][range];
             }
         }
+        self.any_changed |= self.changed.contains(&true);
         self.opaque = is_opaque(image);
     }
 
     /// Lays `image` over what is there, as far as it lies within.
-    fn set_part(&mut self, at: [usize; 2], image: &ColorImage, options: TextureOptions, version: u64) {
+    fn set_part(&mut self, at: [usize; 2], image: &ColorImage, options: TextureOptions) {
         let size = self.image.size;
         if at[0] >= size[0] || at[1] >= size[1] {
             return;
@@ -145,14 +165,15 @@ impl Texture {
             let row = &mut whole.pixels[(at[1] + y) * size[0] + at[0]..][..within[0]];
             row.copy_from_slice(&image.pixels[y * image.size[0]..][..within[0]]);
         }
+        self.any_changed = true;
         if self.options != options {
             self.options = options;
-            self.versions.fill(version);
+            self.changed.fill(true);
         }
         let across = blocks(size)[0];
         for y in at[1] / BLOCK[1]..=(at[1] + within[1] - 1) / BLOCK[1] {
             let columns = at[0] / BLOCK[0]..=(at[0] + within[0] - 1) / BLOCK[0];
-            self.versions[y * across..][columns].fill(version);
+            self.changed[y * across..][columns].fill(true);
         }
         self.opaque &= is_opaque(image);
     }

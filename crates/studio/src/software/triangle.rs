@@ -4,7 +4,6 @@
 use super::{
     blend::{Rgba, times},
     canvas::Area,
-    textures::Texture,
 };
 
 /// Positions are whole numbers of these a pixel.
@@ -26,7 +25,11 @@ pub(super) struct Corner {
 impl Corner {
     /// At `pixels`, which are numbers.
     pub(super) fn at(pixels: [f32; 2], texel: [f32; 2], colour: Rgba) -> Self {
-        let snapped = |at: f32| (at.clamp(-FARTHEST, FARTHEST) * SUBPIXELS as f32).round_ties_even() as i32;
+        // By a cast, since rounding is a routine on processors that are not asked for what they can.
+        let snapped = |at: f32| {
+            let subpixels = at.clamp(-FARTHEST, FARTHEST) * SUBPIXELS as f32;
+            (subpixels + 0.5_f32.copysign(subpixels)) as i32
+        };
         Self { at: pixels.map(snapped), texel, colour }
     }
 }
@@ -59,18 +62,23 @@ struct Edge {
 }
 
 impl Triangle {
-    /// `None` where it covers nothing or cannot be seen.
-    pub(super) fn new(mut corners: [Corner; 3], texture: &Texture) -> Option<Self> {
+    /// `None` where it covers nothing or cannot be seen. Where all corners show one texel, that is asked for.
+    pub(super) fn new(mut corners: [Corner; 3], texel: impl Fn(&Corner) -> Rgba) -> Option<Self> {
         match doubled_area(&corners) {
             0 => return None,
             ..0 => corners.swap(1, 2),
             _ => {}
         }
         let [a, b, c] = corners;
-        let texels = [f32::min as fn(f32, f32) -> f32, f32::max]
-            .map(|end| [0, 1].map(|axis| end(end(a.texel[axis], b.texel[axis]), c.texel[axis])));
+        let mut texels = [a.texel; 2];
+        for corner in [b, c] {
+            for axis in 0..2 {
+                texels[0][axis] = texels[0][axis].min(corner.texel[axis]);
+                texels[1][axis] = texels[1][axis].max(corner.texel[axis]);
+            }
+        }
         let colour = if texels[0] == texels[1] {
-            let texel = texture.rounded_at(a.texel);
+            let texel = texel(&a);
             if a.colour == b.colour && b.colour == c.colour {
                 Colour::Plain(times(texel, a.colour))
             } else {
