@@ -1,6 +1,6 @@
 //! Which flags the library's errors and notes are about: it speaks of what was asked for, only the program knows by which flags.
 
-use bansho::job::{Channels, Conflict, JobError, ListKind, Note, StreaksFault};
+use bansho::job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksFault};
 
 /// An error as the user of the program reads it.
 pub(crate) fn error(error: &JobError) -> String {
@@ -28,6 +28,10 @@ fn of_error(error: &JobError) -> Option<&'static str> {
         JobError::Conflict(Conflict::NoChannels { what: Channels::Aovs, .. }) => Some("--aovs"),
         JobError::Conflict(Conflict::NoFigures { .. }) => Some("--figures"),
         JobError::Conflict(Conflict::FewFrames { .. }) => Some("--contact-sheet"),
+        JobError::Conflict(Conflict::Tiles { of, .. } | Conflict::SheetSize { of, .. }) => Some(match of {
+            SheetKind::Contact => "--contact-sheet",
+            SheetKind::Flipbook => "--grid",
+        }),
         JobError::Streaks(fault) => of_streaks(fault),
         _ => None,
     }

@@ -1,14 +1,24 @@
 //! A step of smoothed particles, about 35 neighbours each: cells, density, pressure, integration.
 //!
 //! Beside it are all pairs (3,000 particles only: 100,000 would take a thousand times as long) and the unsorted way: cells in a hash map,
-//! particles where they happen to lie, one neighbour at a time.
+//! particles where they happen to lie, one neighbour at a time. And a step of burning gas, all in: the same and its wind, eddies, mixing,
+//! burning, births and deaths.
 
 mod support;
 
 use std::{collections::HashMap, hint::black_box};
 
-use bansho_base::random::{Key, Purpose};
-use bansho_models::sph::{Cells, Kernel, KernelShape, Particles, PressureForce, StateEquation, densities};
+use bansho_base::{
+    assets::MemoryAssets,
+    phenomenon::Phenomenon,
+    random::{Key, Purpose},
+    surroundings::Surroundings,
+    wind::{Wind, WindParameters},
+};
+use bansho_models::{
+    flame_particles::{FlameParticles, FlameParticlesParameters},
+    sph::{Cells, Kernel, KernelShape, Particles, PressureForce, StateEquation, densities},
+};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 
 use support::pinned_pool;
@@ -136,6 +146,32 @@ fn unsorted_step(particles: &mut Particles<3>) {
     });
 }
 
+/// A flame of a step that is not divided, which has burned long enough to be whole.
+struct Burning {
+    flame: FlameParticles,
+    wind: Wind,
+    steps: u64,
+}
+
+impl Burning {
+    fn new(particles: i64) -> Option<Self> {
+        let mut parameters = FlameParticlesParameters { particles, ..Default::default() };
+        parameters.fluid.sub_steps = 1;
+        let flame = FlameParticles::new(parameters, "bench", 1, None, &MemoryAssets::default()).ok()?;
+        let wind = Wind::new(WindParameters { velocity: [0.5, 0.0, 0.0].into(), ..Default::default() }, 1, None);
+        let mut burning = Self { flame, wind, steps: 0 };
+        let preroll = burning.flame.stepping()?.preroll_steps();
+        (0..preroll).for_each(|_| burning.step());
+        Some(burning)
+    }
+
+    fn step(&mut self) {
+        let Some(stepping) = self.flame.stepping() else { return };
+        self.flame.step(stepping.time_after(self.steps), &Surroundings::of_wind(&self.wind));
+        self.steps += 1;
+    }
+}
+
 fn benches(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("sph");
     group.sample_size(20);
@@ -164,6 +200,14 @@ fn benches(criterion: &mut Criterion) {
     group.bench_function("cells", |bencher| pool.install(|| bencher.iter(|| simulation.sort())));
     group.bench_function("density", |bencher| pool.install(|| bencher.iter(|| simulation.densities())));
     group.bench_function("pressure", |bencher| pool.install(|| bencher.iter(|| simulation.forces())));
+    group.finish();
+
+    let mut group = criterion.benchmark_group("burning gas, 1 thread");
+    group.sample_size(20);
+    if let Some(mut burning) = Burning::new(30_000) {
+        let pool = pinned_pool(1);
+        group.bench_function("step of 30000", |bencher| pool.install(|| bencher.iter(|| burning.step())));
+    }
     group.finish();
 
     let mut group = criterion.benchmark_group("sph naive, 1 thread");

@@ -5,7 +5,7 @@ use std::error::Error;
 use bansho_base::{parameters::ModelFault, phenomenon::Phenomenon, sky::SkyParameters};
 use bansho_models::{
     aurora::{Aurora, AuroraParameters, shapes::ShapeFaultKind},
-    flame_particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind},
+    flame_particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind, check_count},
     flame_sheet::{FlameSheet, FlameSheetParameters},
     ground::{Ground, GroundParameters},
     lamps::{Lamp, Lamps},
@@ -47,6 +47,11 @@ impl Describe for FlameParticlesParameters {
     const SETTING: &'static str = "\
         camera = { position = [0.0, 0.55, 4.0], target = [0.0, 0.55, 0.0], vertical_fov_deg = 24.0 }\n\
         wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";
+
+    fn crowd(&self, others: i64) -> Result<i64, OpeningFault> {
+        check_count(self.particles, others).map_err(|fault| opening_fault(fault.key, fault.kind))?;
+        Ok(self.particles + others)
+    }
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match FlameParticles::new(self.clone(), opening.name, opening.seed, opening.loop_s, opening.assets) {

@@ -270,6 +270,21 @@ fn a_models_fault_stays_what_it_is() {
     assert!(matches!(kind, Some(ParticleFaultKind::TooManyParticles { count: 900_000_000, .. })), "{error}");
 }
 
+#[test]
+fn flames_together_may_not_have_more_particles_than_fit() {
+    let flame = |count: i64, enabled: bool| format!("[[flame_particles]]\nparticles = {count}\nenabled = {enabled}\n");
+    let check = |flames: [String; 3]| {
+        let text = format!("bansho = 1\n{}", flames.concat());
+        let kinds = bansho_render::phenomena::KINDS;
+        Scene::parse("new.toml", &text, kinds, &MemoryAssets::default()).err().map(|error| error.to_string())
+    };
+    let error = check([flame(12_000_000, true), flame(9_000_000, true), flame(8_000_000, true)]).unwrap();
+    let expected = "9000000 particles beside 12000000 of other flames would take 13 GiB; allowed: up to 8000000";
+    assert!(error.contains("new.toml:6") && error.contains(expected), "{error}");
+    // One that is off takes nothing.
+    assert_eq!(check([flame(12_000_000, true), flame(12_000_000, false), flame(8_000_000, true)]), None);
+}
+
 fn is_key(line: &str) -> bool {
     let key = line.split(" = ").next().unwrap_or_default();
     key.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || b"_.".contains(&byte))

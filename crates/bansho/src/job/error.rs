@@ -95,6 +95,15 @@ pub enum Channels {
     Aovs,
 }
 
+/// Sheets of many frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SheetKind {
+    /// Thumbnails in order.
+    Contact,
+    /// A flipbook's tiles.
+    Flipbook,
+}
+
 /// Options that do not go together.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -127,6 +136,8 @@ pub enum Conflict {
     /// A sheet without tiles or with too many.
     #[error("a sheet of {tiles} tiles; allowed: 1 to {most}")]
     Tiles {
+        /// Which sheet.
+        of: SheetKind,
         /// How many were asked for.
         tiles: usize,
         /// Most that are possible.
@@ -145,6 +156,8 @@ pub enum Conflict {
         "the sheet would have {width} x {height} pixels; allowed: up to {most} on a side, so choose smaller or fewer tiles"
     )]
     SheetSize {
+        /// Which sheet.
+        of: SheetKind,
         /// Its width.
         width: usize,
         /// Its height.

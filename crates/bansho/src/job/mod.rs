@@ -29,7 +29,7 @@ use std::path::PathBuf;
 use bansho_base::{color::View, image::Rect};
 use bansho_render::display::BitDepth;
 
-pub use error::{Cause, Channels, Conflict, JobError};
+pub use error::{Cause, Channels, Conflict, JobError, SheetKind};
 pub use flipbook::{Flipbook, FlipbookSummary, PreparedFlipbook};
 pub use observer::{FrameDone, JobObserver, Note, Outline};
 pub use prepare::{PreparedJob, check_scene};

@@ -15,7 +15,7 @@ use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth};
 
 use super::{
     BackendChoice, Job, contact,
-    error::{Channels, Conflict, JobError},
+    error::{Channels, Conflict, JobError, SheetKind},
     observer::Note,
     output::{self, Format},
     scene_file::SceneFile,
@@ -179,7 +179,7 @@ impl Job {
         let frames = chosen_frames(self.frames.as_deref(), plan)?;
         match self.contact_sheet {
             Some(tiles) if !(1..=MOST_TILES).contains(&tiles) => {
-                Err(Conflict::Tiles { tiles, most: MOST_TILES }.into())
+                Err(Conflict::Tiles { of: SheetKind::Contact, tiles, most: MOST_TILES }.into())
             }
             None => Ok(frames),
             // All of a shot, or from one frame on: one after the other, also beyond its end.

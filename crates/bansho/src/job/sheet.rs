@@ -6,7 +6,7 @@ use bansho_base::{image::Frame, observer::Observer};
 use bansho_media::flipbook::Sheet;
 
 use super::{
-    error::{Conflict, JobError},
+    error::{Conflict, JobError, SheetKind},
     observer::{FrameDone, JobObserver},
     shoot::Finish,
 };
@@ -17,17 +17,17 @@ pub(super) const MOST_TILES: usize = 4096;
 /// The sheet nearest to a square of tiles that holds `count` of them.
 pub(super) fn holding(count: usize, cell: [usize; 2], gutter: usize) -> Result<Sheet, Conflict> {
     let columns = (1..=count).find(|columns| columns * columns >= count).unwrap_or(1);
-    checked(Sheet { count, columns, cell, gutter })
+    checked(Sheet { count, columns, cell, gutter }, SheetKind::Contact)
 }
 
 /// A sheet holds some tiles, and may be as large as a picture.
-pub(super) fn checked(sheet: Sheet) -> Result<Sheet, Conflict> {
+pub(super) fn checked(sheet: Sheet, of: SheetKind) -> Result<Sheet, Conflict> {
     let most = bansho_render::scene::picture::LARGEST_SIDE as usize;
     if !(1..=MOST_TILES).contains(&sheet.count) {
-        return Err(Conflict::Tiles { tiles: sheet.count, most: MOST_TILES });
+        return Err(Conflict::Tiles { of, tiles: sheet.count, most: MOST_TILES });
     }
     let [width, height] = sheet.size();
-    if width <= most && height <= most { Ok(sheet) } else { Err(Conflict::SheetSize { width, height, most }) }
+    if width <= most && height <= most { Ok(sheet) } else { Err(Conflict::SheetSize { of, width, height, most }) }
 }
 
 /// Gathers a tile from each frame.

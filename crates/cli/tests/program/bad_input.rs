@@ -169,7 +169,7 @@ fn options_that_do_not_go_together_are_refused() {
     misused(&["--layers"], &["--layers", ".exr"]);
     misused(&["--aovs", "--out", "a.mp4"], &["--aovs", ".exr"]);
     misused(&["--contact-sheet", "4", "--out", "a.gif"], &["a.gif", ".png"]);
-    misused(&["--contact-sheet", "0"], &["0 tiles", "allowed: 1 to"]);
+    misused(&["--contact-sheet", "0"], &["--contact-sheet: a sheet of 0 tiles; allowed: 1 to 4096"]);
     misused(
         &["--contact-sheet", "4", "--frames", "0-8x4"],
         &["--contact-sheet: a sheet of 4 tiles for 3 frames", "allowed: 1 to 3"],

@@ -28,12 +28,32 @@ impl PairTerm<3, 5, 8> for BesideTerm {
     }
 }
 
+/// What the sum says of one particle, or of several in the lanes of a vector.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Neighbourhood<R> {
+    /// Sum of weights, the particle's own included.
+    pub(crate) weight: R,
+    /// Differences of the neighbours' velocities.
+    pub(crate) velocity: [R; 3],
+    /// Differences of their temperatures.
+    pub(crate) temperature: R,
+    /// Ways to them.
+    pub(crate) way: [R; 3],
+}
+
+impl<R> From<[R; 8]> for Neighbourhood<R> {
+    #[inline(always)]
+    fn from([weight, u, v, w, temperature, x, y, z]: [R; 8]) -> Self {
+        Self { weight, velocity: [u, v, w], temperature, way: [x, y, z] }
+    }
+}
+
 /// Sums over the neighbours of every particle, in sorted order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Beside {
     /// `m / sqrt(rho)`.
     pub(crate) weights: Vec<f32>,
-    /// Sum of weights, the particle's own included; differences of the neighbours' velocities and temperatures; ways to the neighbours.
+    /// The numbers of each particle's [`Neighbourhood`].
     pub(crate) sums: [Vec<f32>; 8],
 }
 

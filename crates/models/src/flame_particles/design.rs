@@ -14,7 +14,7 @@ use super::{
     parameters::{BurnerParameters, FlameParticlesParameters},
 };
 
-/// Most particles.
+/// Most particles of all flames of a scene.
 const MOST_PARTICLES: i64 = 20_000_000;
 /// Bytes that a living particle takes, measured over a run: its state and the buffers of a step. (Drawing takes more for a while.)
 const PARTICLE_BYTES: f64 = 670.0;
@@ -66,7 +66,7 @@ impl Design {
         loop_s: Option<f64>,
         assets: &dyn Assets,
     ) -> Result<Self, ParticleFault> {
-        check_count(parameters.particles)?;
+        check_count(parameters.particles, 0)?;
         let burners = burners(parameters, assets)?;
         let domain = domain(parameters, &burners)?;
         let stays: Vec<f64> = burners.iter().map(|burner| stay(parameters, burner)).collect();
@@ -130,12 +130,17 @@ fn preroll(parameters: &FlameParticlesParameters, longest: f64) -> f64 {
     }
 }
 
-fn check_count(count: i64) -> Result<(), ParticleFault> {
-    if count <= MOST_PARTICLES {
+/// Whether `count` particles may live beside the `others` of all other flames.
+///
+/// # Errors
+/// More than are taken, with the number that would be.
+pub fn check_count(count: i64, others: i64) -> Result<(), ParticleFault> {
+    let most = (MOST_PARTICLES - others).max(0);
+    if count <= most {
         return Ok(());
     }
-    let gib = count as f64 * PARTICLE_BYTES / f64::from(1 << 30);
-    let kind = ParticleFaultKind::TooManyParticles { count, gib, most: MOST_PARTICLES };
+    let gib = (count as f64 + others as f64) * PARTICLE_BYTES / f64::from(1 << 30);
+    let kind = ParticleFaultKind::TooManyParticles { count, others, gib, most };
     Err(ParticleFault { key: "particles".into(), kind })
 }
 

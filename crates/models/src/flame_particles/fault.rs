@@ -44,11 +44,13 @@ pub enum ParticleFaultKind {
         side: f64,
     },
     /// More particles than are taken: a fixed number, whatever memory the machine has, so that a scene is valid everywhere or nowhere.
-    #[error("{count} particles would take {gib:.0} GiB; allowed: up to {most}")]
+    #[error("{count} particles{} would take {gib:.0} GiB; allowed: up to {most}", beside(*.others))]
     TooManyParticles {
         /// How many are asked for.
         count: i64,
-        /// What so many would take when all live; bursts of up to twice as many are let live for a while.
+        /// How many other flames of the scene have.
+        others: i64,
+        /// What all would take when all live; bursts of up to twice as many are let live for a while.
         gib: f64,
         /// How many are allowed.
         most: i64,
@@ -67,4 +69,9 @@ pub enum ParticleFaultKind {
         /// Length of the loop.
         seconds: f64,
     },
+}
+
+/// What a fault says of the particles of other flames.
+fn beside(others: i64) -> String {
+    if others == 0 { String::new() } else { format!(" beside {others} of other flames") }
 }

@@ -1,21 +1,19 @@
 //! What a step makes of gas beside moving it: it evens out with its neighbours, mixes with air, burns and cools; sixteen particles at a time.
 
-use fearless_simd::{Level, Simd, dispatch};
-use rayon::prelude::*;
+use std::ops::Range;
+
+use fearless_simd::Simd;
 
 use super::{
-    beside::Beside,
+    beside::{Beside, Neighbourhood},
     draught::Draught,
     life::{Being, Exposure, Laws},
     particles::Particles,
-    rows::{ByBurner, PARTICLES_OF_TASK, Rows, columns},
+    rows::{Rows, Still, Work, burner_by_burner},
     vector::{length, plus},
     weather::Weather,
 };
-use crate::{
-    lanes::{LANES, Real},
-    sph::KernelShape,
-};
+use crate::{lanes::Real, sph::KernelShape};
 
 /// Time in which `viscosity` and `conduction` say how far neighbours even out, s.
 const EVENING_TIME: f32 = 0.01;
@@ -41,10 +39,9 @@ pub(crate) struct Living<'a> {
     pub(crate) seconds: f32,
 }
 
-/// What a task reads of its particles and does not change.
+/// What living reads of particles and does not change.
 #[derive(Clone, Copy)]
-struct Still<'a> {
-    burner: &'a [u32],
+struct Unlived<'a> {
     position: [&'a [f32]; 3],
     age: &'a [f32],
     hunger: &'a [f32],
@@ -54,58 +51,36 @@ struct Still<'a> {
     sums: [&'a [f32]; 8],
 }
 
-impl Living<'_> {
-    /// Lets the particles live, and writes down how much of each lies at the edge of the gas.
-    pub(crate) fn pass(&self, particles: &mut Particles, to_air: &mut Vec<f32>) {
-        to_air.resize(particles.len(), 0.0);
-        let Particles { velocity: [u, v, w], temperature, fuel, soot, support_radius, life, .. } = particles;
-        let living = columns([u, v, w, temperature, fuel, soot, support_radius, life, to_air]);
-        let (position, age, hunger) = (&particles.position, &particles.age, &particles.hunger);
-        let (density, burner) = (&particles.density, &particles.burner);
-        let level = Level::new();
-        living.into_par_iter().enumerate().for_each(|(task, mut living)| {
-            let first = task * PARTICLES_OF_TASK;
-            let range = first..first + living[0].len();
-            let still = Still {
-                burner: &burner[range.clone()],
-                position: position.each_ref().map(|values| &values[range.clone()]),
-                age: &age[range.clone()],
-                hunger: &hunger[range.clone()],
-                density: &density[range.clone()],
-                weight: &self.beside.weights[range.clone()],
-                sums: self.beside.sums.each_ref().map(|values| &values[range.clone()]),
-            };
-            let sorted = ByBurner::new(still.burner, self.weather.draughts.len());
-            dispatch!(level, simd => self.pass_task(simd, &sorted, still, &mut living));
-        });
-    }
-
-    /// Lets the particles of a task live, burner by burner.
-    #[inline(always)]
-    fn pass_task<S: Simd>(&self, simd: S, sorted: &ByBurner, still: Still, living: &mut [&mut [f32]; 9]) {
-        for (number, draught) in self.weather.draughts.iter().enumerate() {
-            for rows in sorted.of(number).chunks(LANES) {
-                self.pass_rows(simd, draught, Rows(rows), still, living);
-            }
+impl Still for Unlived<'_> {
+    fn part(self, range: Range<usize>) -> Self {
+        Self {
+            position: self.position.map(|values| &values[range.clone()]),
+            age: &self.age[range.clone()],
+            hunger: &self.hunger[range.clone()],
+            density: &self.density[range.clone()],
+            weight: &self.weight[range.clone()],
+            sums: self.sums.map(|values| &values[range.clone()]),
         }
     }
+}
 
+impl<'a> Work<Unlived<'a>, 9> for Living<'_> {
     #[inline(always)]
-    fn pass_rows<S: Simd>(
+    fn rows<S: Simd>(
         &self,
         simd: S,
         draught: &Draught,
         rows: Rows,
-        still: Still,
+        still: Unlived<'a>,
         [u, v, w, temperature, fuel, soot, support_radius, life, edge]: &mut [&mut [f32]; 9],
     ) {
-        let sums = rows.load_all(simd, still.sums);
-        let to_air = self.to_air(rows.load(simd, still.weight), &sums);
+        let beside = Neighbourhood::from(rows.load_all(simd, still.sums));
+        let to_air = self.to_air(rows.load(simd, still.weight), &beside);
         let velocity = rows.load_all(simd, [u, v, w]);
         let wind = draught.breeze.at(simd, &rows.load_all(simd, still.position));
         let [viscosity, conduction] = self.evened(rows.load(simd, still.density));
         let old = Being {
-            temperature: conduction.fused(sums[4], rows.load(simd, temperature)),
+            temperature: conduction.fused(beside.temperature, rows.load(simd, temperature)),
             fuel: rows.load(simd, fuel),
             soot: rows.load(simd, soot),
             support_radius: rows.load(simd, support_radius),
@@ -120,18 +95,36 @@ impl Living<'_> {
         rows.store(being.soot, soot);
         rows.store(being.support_radius, support_radius);
         rows.store(to_air, edge);
-        let velocity = plus(&velocity, &[sums[1], sums[2], sums[3]], viscosity);
+        let velocity = plus(&velocity, &beside.velocity, viscosity);
         for (batch, array) in velocity.into_iter().zip([u, v, w]) {
             rows.store(batch, array);
         }
     }
+}
+
+impl Living<'_> {
+    /// Lets the particles live, and writes down how much of each lies at the edge of the gas.
+    pub(crate) fn pass(&self, particles: &mut Particles, to_air: &mut Vec<f32>) {
+        to_air.resize(particles.len(), 0.0);
+        let Particles { velocity: [u, v, w], temperature, fuel, soot, support_radius, life, .. } = particles;
+        let still = Unlived {
+            position: particles.position.each_ref().map(Vec::as_slice),
+            age: &particles.age,
+            hunger: &particles.hunger,
+            density: &particles.density,
+            weight: &self.beside.weights,
+            sums: self.beside.sums.each_ref().map(Vec::as_slice),
+        };
+        let living = [u, v, w, temperature, fuel, soot, support_radius, life, to_air];
+        burner_by_burner(self, &self.weather.draughts, &particles.burner, still, living);
+    }
 
     /// How much of a particle lies at the edge of the gas: neighbours all on one side, or none.
     #[inline(always)]
-    fn to_air<R: Real>(&self, weight: R, sums: &[R; 8]) -> R {
+    fn to_air<R: Real>(&self, weight: R, beside: &Neighbourhood<R>) -> R {
         let like = |value: f32| weight.like(value);
-        let one_over_sum = like(1.0) / sums[0].greatest(like(f32::MIN_POSITIVE));
-        let offset = length(&[sums[5], sums[6], sums[7]]) * one_over_sum * like(1.0 / (self.radius * SURFACE_OFFSET));
+        let one_over_sum = like(1.0) / beside.weight.greatest(like(f32::MIN_POSITIVE));
+        let offset = length(&beside.way) * one_over_sum * like(1.0 / (self.radius * SURFACE_OFFSET));
         let own = weight * one_over_sum * like(KernelShape::Poly6.at_centre::<3>(self.radius));
         let alone = (own - like(ALONE_SHARE[0])) * like(1.0 / ALONE_SHARE[1]);
         offset.greatest(alone).held()

@@ -30,6 +30,7 @@ mod vector;
 mod weather;
 
 pub use burner::heskestad;
+pub use design::check_count;
 pub use fault::{ParticleFault, ParticleFaultKind};
 pub use flame::FlameParticles;
 pub use parameters::{

@@ -1,15 +1,16 @@
 //! How gas moves in a sub-step: pressure, buoyancy, wind and the air's own motion; sixteen particles at a time.
 
 use bansho_base::math::Vec3;
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
+use std::ops::Range;
+
+use fearless_simd::{Simd, prelude::*};
 
 use super::{
     collision::Solids,
     draught::Draught,
     parameters::WindForce,
     particles::Particles,
-    rows::{ByBurner, PARTICLES_OF_TASK, Rows, columns},
+    rows::{Rows, Still, Work, burner_by_burner},
     vector::{held_to, length, less, plus},
     weather::Weather,
 };
@@ -46,55 +47,34 @@ struct Pushed<R> {
     to_air: R,
 }
 
-/// What a task reads of its particles and does not change.
+/// What moving reads of particles and does not change.
 #[derive(Clone, Copy)]
-struct Still<'a> {
-    burner: &'a [u32],
+struct Unmoved<'a> {
     acceleration: [&'a [f32]; 3],
     temperature: &'a [f32],
     density: &'a [f32],
     to_air: &'a [f32],
 }
 
-impl Motion<'_> {
-    /// Moves the particles, and they age.
-    pub(crate) fn advance(&self, particles: &mut Particles) {
-        let Particles { position: [x, y, z], velocity: [u, v, w], drift: [d, e, f], age, .. } = particles;
-        let moving = columns([x, y, z, u, v, w, d, e, f, age]);
-        let (temperature, density, burner) = (&particles.temperature, &particles.density, &particles.burner);
-        let level = Level::new();
-        moving.into_par_iter().enumerate().for_each(|(task, mut moving)| {
-            let first = task * PARTICLES_OF_TASK;
-            let range = first..first + moving[0].len();
-            let still = Still {
-                burner: &burner[range.clone()],
-                acceleration: self.acceleration.map(|values| &values[range.clone()]),
-                temperature: &temperature[range.clone()],
-                density: &density[range.clone()],
-                to_air: &self.to_air[range],
-            };
-            let sorted = ByBurner::new(still.burner, self.weather.draughts.len());
-            dispatch!(level, simd => self.advance_task(simd, &sorted, still, &mut moving));
-        });
-    }
-
-    /// Moves the particles of a task, burner by burner.
-    #[inline(always)]
-    fn advance_task<S: Simd>(&self, simd: S, sorted: &ByBurner, still: Still, moving: &mut [&mut [f32]; 10]) {
-        for (number, draught) in self.weather.draughts.iter().enumerate() {
-            for rows in sorted.of(number).chunks(LANES) {
-                self.advance_rows(simd, draught, Rows(rows), still, moving);
-            }
+impl Still for Unmoved<'_> {
+    fn part(self, range: Range<usize>) -> Self {
+        Self {
+            acceleration: self.acceleration.map(|values| &values[range.clone()]),
+            temperature: &self.temperature[range.clone()],
+            density: &self.density[range.clone()],
+            to_air: &self.to_air[range],
         }
     }
+}
 
+impl<'a> Work<Unmoved<'a>, 10> for Motion<'_> {
     #[inline(always)]
-    fn advance_rows<S: Simd>(
+    fn rows<S: Simd>(
         &self,
         simd: S,
         draught: &Draught,
         rows: Rows,
-        still: Still,
+        still: Unmoved<'a>,
         [x, y, z, u, v, w, d, e, f, age]: &mut [&mut [f32]; 10],
     ) {
         let place = rows.load_all(simd, [x, y, z]);
@@ -120,6 +100,21 @@ impl Motion<'_> {
             }
         }
         rows.store(old + old.like(self.seconds), age);
+    }
+}
+
+impl Motion<'_> {
+    /// Moves the particles, and they age.
+    pub(crate) fn advance(&self, particles: &mut Particles) {
+        let Particles { position: [x, y, z], velocity: [u, v, w], drift: [d, e, f], age, .. } = particles;
+        let still = Unmoved {
+            acceleration: self.acceleration,
+            temperature: &particles.temperature,
+            density: &particles.density,
+            to_air: self.to_air,
+        };
+        let moving = [x, y, z, u, v, w, d, e, f, age];
+        burner_by_burner(self, &self.weather.draughts, &particles.burner, still, moving);
     }
 
     /// Own velocity after pressure, buoyancy and wind.

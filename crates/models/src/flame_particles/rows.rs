@@ -1,14 +1,64 @@
 //! Particles sixteen at a time, all of one burner: rows of a task's arrays.
 
-use fearless_simd::{Simd, prelude::*};
+use std::ops::Range;
 
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use rayon::prelude::*;
+
+use super::draught::Draught;
 use crate::lanes::{LANES, Lanes};
 
 /// Particles of a task.
 pub(crate) const PARTICLES_OF_TASK: usize = 512;
 
+/// What a task reads of its particles and does not change.
+pub(crate) trait Still: Copy + Sync {
+    /// What belongs to these particles.
+    fn part(self, range: Range<usize>) -> Self;
+}
+
+/// Work on `N` numbers of each particle, for sixteen of one burner at a time.
+pub(crate) trait Work<S: Still, const N: usize>: Sync {
+    /// Works on rows of a task.
+    fn rows<V: Simd>(&self, simd: V, draught: &Draught, rows: Rows, still: S, moving: &mut [&mut [f32]; N]);
+}
+
+/// Works on all particles, burner by burner within each task.
+pub(crate) fn burner_by_burner<S: Still, const N: usize>(
+    work: &impl Work<S, N>,
+    draughts: &[Draught],
+    burners: &[u32],
+    still: S,
+    moving: [&mut Vec<f32>; N],
+) {
+    let level = Level::new();
+    columns(moving).into_par_iter().enumerate().for_each(|(task, mut moving)| {
+        let first = task * PARTICLES_OF_TASK;
+        let range = first..first + moving[0].len();
+        let sorted = ByBurner::new(&burners[range.clone()], draughts.len());
+        let still = still.part(range);
+        dispatch!(level, simd => work_task(simd, work, draughts, &sorted, still, &mut moving));
+    });
+}
+
+#[inline(always)]
+fn work_task<V: Simd, S: Still, const N: usize>(
+    simd: V,
+    work: &impl Work<S, N>,
+    draughts: &[Draught],
+    sorted: &ByBurner,
+    still: S,
+    moving: &mut [&mut [f32]; N],
+) {
+    for (number, draught) in draughts.iter().enumerate() {
+        for rows in sorted.of(number).chunks(LANES) {
+            work.rows(simd, draught, Rows(rows), still, moving);
+        }
+    }
+}
+
 /// The part of each array that belongs to each task.
-pub(crate) fn columns<const N: usize>(arrays: [&mut Vec<f32>; N]) -> Vec<[&mut [f32]; N]> {
+fn columns<const N: usize>(arrays: [&mut Vec<f32>; N]) -> Vec<[&mut [f32]; N]> {
     let tasks = arrays.first().map_or(0, |values| values.len().div_ceil(PARTICLES_OF_TASK));
     let mut parts = arrays.map(|values| values.chunks_mut(PARTICLES_OF_TASK));
     (0..tasks).map(|_| parts.each_mut().map(|parts| parts.next().unwrap_or_default())).collect()
@@ -16,7 +66,7 @@ pub(crate) fn columns<const N: usize>(arrays: [&mut Vec<f32>; N]) -> Vec<[&mut [
 
 /// The rows of a task's arrays, burner by burner.
 #[derive(Debug)]
-pub(crate) struct ByBurner {
+struct ByBurner {
     rows: Vec<u32>,
     /// Where the rows of each burner end.
     ends: Vec<usize>,
@@ -24,7 +74,7 @@ pub(crate) struct ByBurner {
 
 impl ByBurner {
     /// Sorts the rows of a task whose particles came from these burners, of `count` that there are.
-    pub(crate) fn new(burners: &[u32], count: usize) -> Self {
+    fn new(burners: &[u32], count: usize) -> Self {
         let mut sorted = Self { rows: vec![0; burners.len()], ends: vec![0; count] };
         for burner in burners {
             sorted.ends[*burner as usize] += 1;
@@ -42,7 +92,7 @@ impl ByBurner {
     }
 
     /// The rows of a burner, upward.
-    pub(crate) fn of(&self, burner: usize) -> &[u32] {
+    fn of(&self, burner: usize) -> &[u32] {
         let start = if burner == 0 { 0 } else { self.ends[burner - 1] };
         &self.rows[start..self.ends[burner]]
     }

@@ -95,13 +95,22 @@ pub(super) fn assets_and_openings(
             report(fault, format!("obstacle.{index}"), root, reader);
         }
     }
-    let mut seen = std::collections::BTreeMap::new();
+    let (mut seen, mut crowd) = (std::collections::BTreeMap::new(), 0);
     let seed = scene.picture.seed as u64;
     let good = good.filter(|good| good.picture.seed == scene.picture.seed);
     for instance in &mut scene.instances {
         let index: &mut usize = seen.entry(instance.kind.key).or_default();
         let path = format!("{}.{index}", instance.kind.key);
         *index += 1;
+        if instance.enabled {
+            match instance.source.crowd(crowd) {
+                Ok(together) => crowd = together,
+                Err(fault) => {
+                    report(fault, path, root, reader);
+                    continue;
+                }
+            }
+        }
         instance.luminance = good.and_then(|good| known_luminance(good, instance));
         if instance.luminance.is_some() {
             continue;

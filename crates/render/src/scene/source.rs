@@ -36,6 +36,9 @@ pub trait Source: Send + Sync {
     /// Paths of the assets it reads, for fingerprints.
     fn assets(&self) -> Vec<String>;
 
+    /// See [`Describe::crowd`].
+    fn crowd(&self, others: i64) -> Result<i64, OpeningFault>;
+
     /// Makes the phenomenon.
     ///
     /// # Errors
@@ -70,6 +73,14 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     /// What a new scene of it states so that it is seen well, as a scene file says it; nothing where all defaults do.
     const SETTING: &'static str = "";
 
+    /// How many particles live in memory with the `others` of the scene, of which all phenomena together may have so many.
+    ///
+    /// # Errors
+    /// More than fit.
+    fn crowd(&self, others: i64) -> Result<i64, OpeningFault> {
+        Ok(others)
+    }
+
     /// Makes the phenomenon.
     ///
     /// # Errors
@@ -99,6 +110,10 @@ impl<P: Describe> Source for Described<P> {
 
     fn assets(&self) -> Vec<String> {
         bansho_base::parameters::assets(&self.0.to_table(), P::table())
+    }
+
+    fn crowd(&self, others: i64) -> Result<i64, OpeningFault> {
+        self.0.crowd(others)
     }
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {

@@ -16,7 +16,7 @@ use bansho_render::{Backend, Plan, PlanOptions, Scene, display::BitDepth, scene:
 use self::{files::Files, motion::Tile};
 use super::{
     BackendChoice,
-    error::{Conflict, JobError},
+    error::{Conflict, JobError, SheetKind},
     observer::{JobObserver, Note, Outline},
     output, prepare,
     scene_file::SceneFile,
@@ -91,7 +91,7 @@ impl Flipbook {
         let mut scene = self.scene.check(assets.as_ref())?;
         let [columns, rows] = self.grid;
         let sheet = Sheet { count: columns.saturating_mul(rows), columns, cell: self.cell(&scene), gutter: 0 };
-        let sheet = sheet::checked(sheet)?;
+        let sheet = sheet::checked(sheet, SheetKind::Flipbook)?;
         if let Some(seconds) = self.loop_s {
             scene.picture.fps = turn_rate(sheet.count, seconds)?;
         }

@@ -6,7 +6,7 @@ use bansho_base::{
 };
 
 use super::*;
-use crate::flame_particles::{life::INNER_TEMPERATURE, moving::GREATEST_SPEED};
+use crate::flame_particles::{life::INNER_TEMPERATURE, moving::GREATEST_SPEED, parameters::WindForce};
 
 /// How many parameter sets: [`FEW`], or what `BANSHO_RANDOM_FLAMES` says.
 fn count() -> u64 {
@@ -75,21 +75,29 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
     let rise = burners.iter().map(|burner| burner.axis_speed(3.0 * burner.height)).fold(0.0, f64::max);
     let motion = &parameters.motion;
     let corner = |corner: [f64; 3]| corner.map(f64::abs).into_iter().fold(0.0, f64::max);
-    let blown = wind.velocity.bounds().map(corner).into_iter().fold(0.0, f64::max) * (1.0 + wind.gust);
-    let carried = rise * (1.0 + motion.turbulence + motion.puffing) + blown * motion.wind_gain;
-    carried.max(buoyant_speed(simulation, parameters)) as f32
+    let blown =
+        wind.velocity.bounds().map(corner).into_iter().fold(0.0, f64::max) * (1.0 + wind.gust) * motion.wind_gain;
+    let room = simulation.design.domain[1] - simulation.design.domain[0];
+    let blown = match motion.wind {
+        WindForce::Mixing => blown,
+        // Nothing holds gas back that a force drives, m/s^2 on gas as dense as at the burner.
+        WindForce::PerVolume => {
+            driven_speed(simulation, parameters, blown / f64::from(simulation.design.density), room.max_element())
+        }
+    };
+    let hottest = burners.iter().map(|burner| burner.parameters.temperature_k);
+    let hottest = hottest.fold(parameters.life.flame_temperature_k, f64::max);
+    // Flames may be far hotter than those of their height are.
+    let buoyancy = STANDARD_GRAVITY * motion.buoyancy * (hottest / Air::default().temperature_k - 1.0).max(0.0);
+    let carried = rise * (1.0 + motion.turbulence + motion.puffing) + blown;
+    carried.max(driven_speed(simulation, parameters, buoyancy, room.y)) as f32
 }
 
-/// The speed of gas that buoyancy alone drives for as long as it may live, or through the whole domain: flames may be far hotter than
-/// those of their height are.
-fn buoyant_speed(simulation: &Simulation, parameters: &FlameParticlesParameters) -> f64 {
+/// The speed of gas that `acceleration`, m/s^2, drives for as long as it may live, or as `far` as the domain goes.
+fn driven_speed(simulation: &Simulation, parameters: &FlameParticlesParameters, acceleration: f64, far: f64) -> f64 {
     let design = &simulation.design;
-    let born = design.burners.iter().map(|burner| burner.parameters.temperature_k);
-    let hottest = born.fold(parameters.life.flame_temperature_k, f64::max);
-    let rise = STANDARD_GRAVITY * parameters.motion.buoyancy * (hottest / Air::default().temperature_k - 1.0).max(0.0);
     let lives = (0..design.burners.len()).map(|index| design.longest_life(index, parameters.life.afterlife_s));
-    let height = (design.domain[1] - design.domain[0]).y;
-    (rise * lives.fold(0.0, f64::max)).min((2.0 * rise * height).sqrt())
+    (acceleration * lives.fold(0.0, f64::max)).min((2.0 * acceleration * far).sqrt())
 }
 
 /// Speed of the fastest particle, m/s.
@@ -123,7 +131,7 @@ fn no_valid_flame_blows_up() {
             let held = greatest > 0.99 * GREATEST_SPEED;
             assert!(!held || 4.0 * driven > GREATEST_SPEED, "seed {seed}: {greatest} m/s, driven by {driven} m/s");
         });
-        // Gas under pressure outruns what drives it, but never by as much again.
-        assert!(fastest < 2.0 * driven + 0.1, "seed {seed}: the gas moves at {fastest} m/s, driven by {driven} m/s");
+        // Gas under pressure outruns what drives it.
+        assert!(fastest < 1.6 * driven + 0.1, "seed {seed}: the gas moves at {fastest} m/s, driven by {driven} m/s");
     }
 }
