@@ -37,7 +37,8 @@ impl Painting {
     /// There is no window, or nothing to show.
     pub(super) fn show(self, viewport: ViewportBuilder, build: Build) -> Result<(), Box<dyn std::error::Error>> {
         match self {
-            Self::Auto if has_gpu() => by_gpu(viewport, build),
+            // Only eframe's window tells readers of the screen what it shows.
+            Self::Auto if cfg!(feature = "accessibility") || has_gpu() => by_gpu(viewport, build),
             Self::Gpu => by_gpu(viewport, build),
             Self::Auto | Self::Software => Ok(window::run(viewport, build)?),
         }

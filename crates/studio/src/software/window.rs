@@ -55,34 +55,16 @@ pub fn run(viewport: egui::ViewportBuilder, build: Build) -> Result<(), WindowEr
     ctx.set_embed_viewports(false);
     ctx.options_mut(|options| options.max_passes = std::num::NonZeroUsize::MIN.saturating_add(1));
     wake_by(&ctx, events.create_proxy());
-    let mut runner = Runner {
-        ctx,
-        viewport,
-        build: Some(build),
-        wakes: events.create_proxy(),
-        shown: None,
-        due: None,
-        failed: None,
-    };
+    let mut runner = Runner { ctx, viewport, build: Some(build), shown: None, due: None, failed: None };
     events.run_app(&mut runner)?;
     runner.failed.map_or(Ok(()), Err)
 }
 
-/// What wakes the window besides its own events.
+/// A frame is wanted at a time, as somebody asked who had seen so many.
 #[derive(Debug)]
-enum Wake {
-    /// A frame is wanted at a time, as somebody said who had seen so many.
-    Frame { at: Instant, seen: u64 },
-    /// Somebody reads the screen.
-    #[cfg(feature = "accessibility")]
-    Reader(egui_winit::accesskit_winit::Event),
-}
-
-#[cfg(feature = "accessibility")]
-impl From<egui_winit::accesskit_winit::Event> for Wake {
-    fn from(event: egui_winit::accesskit_winit::Event) -> Self {
-        Self::Reader(event)
-    }
+struct Wake {
+    at: Instant,
+    seen: u64,
 }
 
 fn wake_by(ctx: &egui::Context, proxy: EventLoopProxy<Wake>) {
@@ -93,7 +75,7 @@ fn wake_by(ctx: &egui::Context, proxy: EventLoopProxy<Wake>) {
         {
             let at = Instant::now().checked_add(info.delay);
             // Nobody listens any more when the window is closed; what is asked for in centuries is not.
-            let _ = at.map(|at| proxy.send_event(Wake::Frame { at, seen: info.current_cumulative_pass_nr }));
+            let _ = at.map(|at| proxy.send_event(Wake { at, seen: info.current_cumulative_pass_nr }));
         }
     });
 }
@@ -103,8 +85,6 @@ struct Runner {
     ctx: egui::Context,
     viewport: egui::ViewportBuilder,
     build: Option<Build>,
-    #[cfg_attr(not(feature = "accessibility"), expect(dead_code, reason = "readers of the screen wake it"))]
-    wakes: EventLoopProxy<Wake>,
     shown: Option<Shown>,
     /// When the next frame is wanted.
     due: Option<Instant>,
@@ -138,11 +118,8 @@ impl Runner {
         let window = Arc::new(egui_winit::create_window(&self.ctx, events, &viewport)?);
         let screen = Screen::new(events.owned_display_handle(), window.clone())?;
         let scale = Some(window.scale_factor() as f32);
-        #[cfg_attr(not(feature = "accessibility"), expect(unused_mut, reason = "readers of the screen change it"))]
-        let mut state =
+        let state =
             State::new(self.ctx.clone(), ViewportId::ROOT, events, scale, events.system_theme(), Some(LARGEST_TEXTURE));
-        #[cfg(feature = "accessibility")]
-        state.init_accesskit(events, &window, self.wakes.clone());
         let mut info = ViewportInfo::default();
         egui_winit::update_viewport_info(&mut info, &self.ctx, &window, true);
         let program = build(&self.ctx)?;
@@ -288,17 +265,11 @@ impl ApplicationHandler<Wake> for Runner {
         self.follow(events);
     }
 
-    fn user_event(&mut self, _events: &ActiveEventLoop, wake: Wake) {
-        match wake {
-            Wake::Frame { at, seen } => {
-                // One that was asked for before the last frames has been painted by now.
-                let shown = self.ctx.cumulative_pass_nr_for(ViewportId::ROOT);
-                if shown == seen || shown == seen + 1 {
-                    self.want(at);
-                }
-            }
-            #[cfg(feature = "accessibility")]
-            Wake::Reader(event) => self.read(event.window_event),
+    fn user_event(&mut self, _events: &ActiveEventLoop, Wake { at, seen }: Wake) {
+        // One that was asked for before the last frames has been painted by now.
+        let shown = self.ctx.cumulative_pass_nr_for(ViewportId::ROOT);
+        if shown == seen || shown == seen + 1 {
+            self.want(at);
         }
     }
 
@@ -335,20 +306,5 @@ impl ApplicationHandler<Wake> for Runner {
     fn exiting(&mut self, events: &ActiveEventLoop) {
         // Some systems end programs without closing their windows first.
         self.close(events);
-    }
-}
-
-#[cfg(feature = "accessibility")]
-impl Runner {
-    /// What somebody does who reads the screen.
-    fn read(&mut self, event: egui_winit::accesskit_winit::WindowEvent) {
-        use egui_winit::accesskit_winit::WindowEvent as Reading;
-        let Some(shown) = &mut self.shown else { return };
-        match event {
-            Reading::InitialTreeRequested => self.ctx.enable_accesskit(),
-            Reading::ActionRequested(request) => shown.state.on_accesskit_action_request(request),
-            Reading::AccessibilityDeactivated => self.ctx.disable_accesskit(),
-        }
-        self.want(Instant::now());
     }
 }
