@@ -62,7 +62,7 @@ impl eframe::App for Page {
     }
 
     fn on_exit(&mut self) {
-        eframe::App::on_exit(&mut self.studio);
+        self.studio.end();
     }
 }
 

@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
 # The studio under real mouse events: two strokes are drawn, one is split, a still is rendered. The still must be what
 # `bansho render` makes of the saved file, byte for byte, and then the window must rest.
-#   crates/studio/tests/native.sh [STUDIO] [BANSHO]
-# It needs Xvfb, xdotool and a Vulkan driver (Mesa's lavapipe will do).
+#   crates/studio/tests/native.sh [STUDIO] [BANSHO] [PAINTER]
+# It needs Xvfb and xdotool, and for the painter `gpu` a Vulkan driver (Mesa's lavapipe will do).
 set -eu
 studio="$(realpath "${1:-target/debug/bansho-studio}")"
 bansho="$(realpath "${2:-target/debug/bansho}")"
+painter="${3:-auto}"
 folder="$(mktemp -d)"
 export XDG_DATA_HOME="$folder/home" XDG_RUNTIME_DIR="$folder"
 
@@ -76,7 +77,7 @@ within 60 "no X server" test -s "$folder/display"
 DISPLAY=":$(cat "$folder/display")"
 export DISPLAY
 cd "$folder"
-"$studio" sky.toml >"$folder/studio.log" 2>&1 &
+"$studio" --painter "$painter" sky.toml >"$folder/studio.log" 2>&1 &
 window=$!
 within 120 "no window" xdotool search --onlyvisible --name "Bansho Studio"
 sleep "${STUDIO_WAIT:-8}"
@@ -113,5 +114,5 @@ before="$(spent_s)"
 sleep 10
 idle="$(awk -v before="$before" -v after="$(spent_s)" 'BEGIN { printf "%.1f", 10 * (after - before) }')"
 awk -v idle="$idle" 'BEGIN { exit !(idle < 2) }' || fail "an idle window takes $idle % of a core"
-echo "an idle window takes $idle % of a core"
+echo "an idle window ($painter) takes $idle % of a core"
 echo "the still of frame $number is what bansho render makes of the saved file, byte for byte"

@@ -116,6 +116,12 @@ impl Studio {
         self.session.document.is_dirty() || self.files.progress().is_some()
     }
 
+    /// The window closes: what is kept for the next time is written.
+    pub fn end(&mut self) {
+        self.files.unsaved.end();
+        self.layout.keep();
+    }
+
     /// Shows everything and takes in what hands do.
     pub fn show(&mut self, ui: &mut egui::Ui) {
         if ui.ctx().cumulative_pass_nr() == 0 {
@@ -242,13 +248,13 @@ fn now_and_hands(ui: &egui::Ui) -> (f64, bool) {
     (now, held && ui.ctx().dragged_id().is_some())
 }
 
-impl eframe::App for Studio {
-    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
-        self.show(ui);
+#[cfg(not(target_arch = "wasm32"))]
+impl crate::program::Program for Studio {
+    fn show(&mut self, ui: &mut egui::Ui, _settle: &mut dyn FnMut()) {
+        Self::show(self, ui);
     }
 
-    fn on_exit(&mut self) {
-        self.files.unsaved.end();
-        self.layout.keep();
+    fn end(&mut self) {
+        Self::end(self);
     }
 }

@@ -73,7 +73,8 @@ impl Viewport {
             painter.text(response.rect.center(), egui::Align2::CENTER_CENTER, text, font, Color32::GRAY);
             return;
         };
-        let frame = fit(size, response.rect);
+        let drawn = session.picture().map_or(size, |(picture, _)| picture.size);
+        let frame = on_pixels(fit(size, response.rect), drawn, scale);
         painter.add(around(response.rect, frame, SURROUND));
         if let Some((texture, _)) = &self.texture {
             let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
@@ -253,6 +254,16 @@ fn fit([width, height]: [usize; 2], within: Rect) -> Rect {
     Rect::from_center_size(within.center(), size * scale)
 }
 
+/// `frame` moved onto the screen's pixels, of which a point has `scale`; where a picture of `drawn` pixels is as large but for a part
+/// of one, exactly as large, so that each of its pixels is one of the screen's and none is mixed from several.
+fn on_pixels(frame: Rect, drawn: [usize; 2], scale: f32) -> Rect {
+    let (place, size) = (frame.min.to_vec2() * scale, frame.size() * scale);
+    let drawn = vec2(drawn[0] as f32, drawn[1] as f32);
+    let alike = (size - drawn).abs().max_elem() < 1.5;
+    let size = if alike { drawn } else { size.round() };
+    Rect::from_min_size((place.round() / scale).to_pos2(), size / scale)
+}
+
 /// What `whole` has around `hole`, filled. Where nothing is painted twice, a machine that paints without a GPU paints faster.
 fn around(whole: Rect, hole: Rect, fill: Color32) -> Shape {
     let hole = hole.intersect(whole);
@@ -274,4 +285,20 @@ fn to_screen(pixel: DVec2, camera: &Camera, frame: Rect) -> Pos2 {
 fn to_picture(at: Pos2, camera: &Camera, frame: Rect) -> DVec2 {
     let share = (at - frame.min) / frame.size();
     DVec2::new(f64::from(share.x) * camera.size[0], f64::from(share.y) * camera.size[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_of_the_viewports_size_lies_pixel_on_pixel() {
+        let within = Rect::from_min_size(pos2(210.0, 60.4), vec2(853.6, 601.0));
+        let frame = fit([1280, 720], within);
+        assert_eq!(on_pixels(frame, [853, 480], 1.0), Rect::from_min_size(pos2(210.0, 121.0), vec2(853.0, 480.0)));
+        // Of two pixels a point.
+        assert_eq!(on_pixels(frame, [1707, 960], 2.0), Rect::from_min_size(pos2(210.0, 121.0), vec2(853.5, 480.0)));
+        // A preview fills the same frame, from pixel to pixel.
+        assert_eq!(on_pixels(frame, [427, 240], 1.0), Rect::from_min_size(pos2(210.0, 121.0), vec2(854.0, 480.0)));
+    }
 }

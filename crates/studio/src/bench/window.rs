@@ -3,13 +3,14 @@
 
 use std::{sync::mpsc, time::Duration};
 
-use eframe::{egui, wgpu::PollType};
+use eframe::egui;
 use web_time::Instant;
 
 use super::{BenchError, CHANGES, SUBJECTS, Subject, change, nineteenth};
 use crate::{
     app::{Session, Studio},
     document::{Document, Revision},
+    program::Program,
 };
 
 /// How long a scene plays before it counts, while previews find their size, and how long it counts.
@@ -151,16 +152,16 @@ fn frame_size(ctx: &egui::Context) -> egui::Vec2 {
     ctx.input(|input| input.content_rect().size())
 }
 
-impl eframe::App for WindowBench {
-    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+impl Program for WindowBench {
+    fn show(&mut self, ui: &mut egui::Ui, settle: &mut dyn FnMut()) {
         if let (Step::Open, Some(subject)) = (&self.step, self.subject)
             && frame_size(ui.ctx()) != window_of(subject)
         {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::InnerSize(window_of(subject)));
         }
-        if let (Step::Change { painting: true, .. }, Some(state)) = (&self.step, frame.wgpu_render_state()) {
+        if let Step::Change { painting: true, .. } = self.step {
             // The last frame is on its way to the screen; until it is there nobody has seen the picture.
-            let _ = state.device.poll(PollType::wait_indefinitely());
+            settle();
         }
         if let Err(error) = self.frame(ui) {
             let _ = self.results.send(Err(error));
@@ -173,4 +174,6 @@ impl eframe::App for WindowBench {
             ui.ctx().request_repaint();
         }
     }
+
+    fn end(&mut self) {}
 }

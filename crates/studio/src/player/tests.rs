@@ -379,3 +379,21 @@ fn rain_that_is_blown_late_keeps_its_drops_too() {
     let blown = difference(&steady, &drawn(&text("2.005")));
     assert!(blown > 0.0 && blown < 0.2 * other_drops, "{blown} of {other_drops}");
 }
+
+#[test]
+fn waiting_ends_with_what_is_waited_for() {
+    let mut player = ThreadPlayer::start(|| {}).unwrap();
+    for number in 0..20 {
+        let began = std::time::Instant::now();
+        player.wish(wish(SCENE, number));
+        let mut pictures = 0;
+        while player.is_busy() {
+            // The picture comes a moment before the player rests, which no wait must miss.
+            player.wait(Duration::from_secs(20));
+            pictures += player.poll().iter().filter(|event| matches!(event, Event::Drawn(_))).count();
+        }
+        pictures += player.poll().iter().filter(|event| matches!(event, Event::Drawn(_))).count();
+        assert_eq!(pictures, 1);
+        assert!(began.elapsed() < Duration::from_secs(20), "a wait for nothing");
+    }
+}

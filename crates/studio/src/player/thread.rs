@@ -16,7 +16,8 @@ use super::{Event, Player, Wish, engine::Engine, interruption::Interruption, sai
 /// Draws on a thread of its own, in a pool of as many threads as the machine has cores.
 pub struct ThreadPlayer {
     desk: Arc<Desk>,
-    events: mpsc::Receiver<Event>,
+    /// What comes of wishes; nothing, once, where a wish was dealt with.
+    events: mpsc::Receiver<Option<Event>>,
     /// What came while it was waited for.
     waited: Vec<Event>,
     worker: Option<JoinHandle<()>>,
@@ -74,9 +75,12 @@ impl ThreadPlayer {
             move || {
                 pool.install(move || {
                     work(&desk, &mut |event| {
+                        let wakes = event.is_some();
                         // Nobody listens any more when the window is closing.
                         let _ = sender.send(event);
-                        wake();
+                        if wakes {
+                            wake();
+                        }
                     });
                 });
             }
@@ -99,23 +103,26 @@ pub enum StartError {
 /// Fulfils wishes until the player closes. Work that nobody wants any more is stopped: a simulation at once, for it goes
 /// on where it stands; a drawing only where the one before it was not stopped too, so that hands that never rest still
 /// see pictures.
-fn work(desk: &Desk, emit: &mut dyn FnMut(Event)) {
+fn work(desk: &Desk, tell: &mut dyn FnMut(Option<Event>)) {
     let mut engine = Engine::default();
     let mut must_draw = false;
     while let Some((wish, number)) = desk.take() {
         let watch = Interruption::new(|advancing| desk.has_moved_on(number, advancing || !must_draw));
-        let outcome = catch_unwind(AssertUnwindSafe(|| engine.fulfil(&wish, &watch, emit)));
+        let outcome = catch_unwind(AssertUnwindSafe(|| engine.fulfil(&wish, &watch, &mut |event| tell(Some(event)))));
         desk.done.store(number, Ordering::Relaxed);
         must_draw = matches!(&outcome, Ok(Err(error)) if error.is_stop());
         match outcome {
             Ok(Ok(())) => {}
             Ok(Err(error)) if error.is_stop() => {}
-            Ok(Err(error)) => emit(Event::Failed { revision: wish.revision, reason: error.to_string() }),
+            Ok(Err(error)) => tell(Some(Event::Failed { revision: wish.revision, reason: error.to_string() })),
             Err(panic) => {
                 engine.forget();
-                emit(Event::Panicked { revision: wish.revision, number: wish.number, message: said(panic.as_ref()) });
+                let message = said(panic.as_ref());
+                tell(Some(Event::Panicked { revision: wish.revision, number: wish.number, message }));
             }
         }
+        // Who waits for more need not: nothing more comes of it.
+        tell(None);
     }
 }
 
@@ -130,12 +137,12 @@ impl Player for ThreadPlayer {
     }
 
     fn poll(&mut self) -> Vec<Event> {
-        std::mem::take(&mut self.waited).into_iter().chain(self.events.try_iter()).collect()
+        std::mem::take(&mut self.waited).into_iter().chain(self.events.try_iter().flatten()).collect()
     }
 
     fn wait(&mut self, at_most: Duration) {
         if self.waited.is_empty() {
-            self.waited.extend(self.events.recv_timeout(at_most));
+            self.waited.extend(self.events.recv_timeout(at_most).ok().flatten());
         }
     }
 

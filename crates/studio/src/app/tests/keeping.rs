@@ -367,7 +367,7 @@ fn layout_theme_and_recent_files_are_there_again() {
         drag(&mut harness, border, vec2(60.0, 0.0));
         let wide = width(&harness);
         assert!(wide < before - 40.0, "{before} {wide}");
-        eframe::App::on_exit(harness.state_mut());
+        harness.state_mut().end();
         wide
     };
     let mut again = window_at_home(home.path());

@@ -1,66 +1,28 @@
-//! How the window looks, against pictures that were looked at (UPDATE_SNAPSHOTS=1 takes new ones). They need a Vulkan
-//! device; Mesa's lavapipe is one.
+//! How the window looks, against pictures that were looked at (UPDATE_SNAPSHOTS=1 takes new ones). A GPU's need a Vulkan
+//! device; Mesa's lavapipe is one. What paints without a GPU must paint the same.
+
+use std::{cell::Cell, rc::Rc};
 
 use eframe::{
-    egui::{Theme, vec2},
+    egui::{self, Key, Role, TexturesDelta, Theme, vec2},
     egui_wgpu::WgpuSetup,
 };
 use egui_kittest::{
-    Harness, SnapshotOptions, image_snapshot_options,
+    Harness, HarnessBuilder, SnapshotOptions, TestRenderer, image_snapshot_options,
     kittest::Queryable,
     wgpu::{WgpuTestRenderer, default_wgpu_setup},
 };
+use image::{Rgba, RgbaImage};
 
 use super::{super::Studio, SCENE, drawn, sky, window_by};
+use crate::software::{Area, Painter};
 
 /// Small, for they are kept with the code.
 const SIZE: [f32; 2] = [960.0, 620.0];
 
-fn painted(text: &str) -> Harness<'static, Studio> {
-    let mut setup = default_wgpu_setup();
-    if let WgpuSetup::CreateNew(new) = &mut setup {
-        // Without one the test must fail rather than go another way.
-        new.instance_descriptor.backends = wgpu::Backends::VULKAN;
-    }
-    let builder = Harness::builder().with_size(vec2(SIZE[0], SIZE[1])).renderer(WgpuTestRenderer::from_setup(setup));
-    window_by(builder, text)
-}
+const SNAPSHOTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/snapshots");
 
-/// Compares what the window shows, but for the line at the bottom that tells how long drawing took.
-fn looks(harness: &mut Harness<'_, Studio>, name: &str) {
-    let status = harness.get_by_label_contains("of 64 × 36").rect().top();
-    let mut picture = harness.render().unwrap();
-    picture.rows_mut().skip(status as usize - 4).flatten().for_each(|pixel| pixel.0 = [0, 0, 0, 255]);
-    let options = SnapshotOptions::new().output_path(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/snapshots"));
-    image_snapshot_options(&picture, name, &options);
-}
-
-#[test]
-#[ignore = "needs a Vulkan device"]
-fn the_window_looks_as_it_did_dark_and_light() {
-    let mut harness = painted(SCENE);
-    looks(&mut harness, "window_dark");
-    harness.ctx.set_theme(Theme::Light);
-    harness.run_steps(3);
-    looks(&mut harness, "window_light");
-}
-
-#[test]
-#[ignore = "needs a Vulkan device"]
-fn curves_look_as_they_did() {
-    let mut harness = painted(SCENE);
-    // The stage above is called so too.
-    harness.get_all_by_label("texture").last().expect("the section").click();
-    harness.run_steps(12);
-    harness.get_by_label("threshold").scroll_to_me();
-    harness.run_steps(12);
-    looks(&mut harness, "curves");
-}
-
-#[test]
-#[ignore = "needs a Vulkan device"]
-fn the_aurora_editor_looks_as_it_did() {
-    let shapes = "\
+const SHAPES: &str = "\
 extent_km = 800.0
 [[aurora.shapes]]
 sheets = [{ points = [[-300, 0], [0, 60], [300, 0]] }, { points = [[-200, -150], [200, -120]] }]
@@ -73,8 +35,180 @@ sheets = [
 split = [{ sheet = 1, at = 0.5 }]
 link = [{ from = 2, to = 3, at = 0.3, arrives = 0.5 }]
 ";
-    let mut harness = painted(&sky(150, shapes));
+
+/// A window of `text`, painted by what the builder is given.
+type Paints = fn(HarnessBuilder<Studio>, &str) -> Harness<'static, Studio>;
+
+/// Looks at a window that is called so.
+type Looks = fn(&mut Harness<'_, Studio>, &str);
+
+fn by_gpu(builder: HarnessBuilder<Studio>, text: &str) -> Harness<'static, Studio> {
+    let mut setup = default_wgpu_setup();
+    if let WgpuSetup::CreateNew(new) = &mut setup {
+        // Without one the test must fail rather than go another way.
+        new.instance_descriptor.backends = wgpu::Backends::VULKAN;
+    }
+    window_by(builder.renderer(WgpuTestRenderer::from_setup(setup)), text)
+}
+
+fn by_software(builder: HarnessBuilder<Studio>, text: &str) -> Harness<'static, Studio> {
+    window_by(builder.renderer(Software::default()), text)
+}
+
+fn painted(paints: Paints, text: &str) -> Harness<'static, Studio> {
+    paints(Harness::builder().with_size(vec2(SIZE[0], SIZE[1])), text)
+}
+
+/// Paints as the studio does where there is no GPU, and holds what it paints in places against all painted anew.
+#[derive(Default)]
+struct Software {
+    painter: Painter,
+    /// What the system was given, pixels.
+    screen: Vec<u32>,
+    /// Frames of which all was painted.
+    whole: Rc<Cell<usize>>,
+}
+
+impl TestRenderer for Software {
+    fn handle_delta(&mut self, delta: &mut TexturesDelta) {
+        self.painter.set_textures(delta);
+        self.painter.free_textures(delta);
+    }
+
+    fn render(&mut self, ctx: &egui::Context, output: &egui::FullOutput) -> Result<RgbaImage, String> {
+        let scale = output.pixels_per_point;
+        let size = ctx.content_rect().size() * scale;
+        let size = [size.x.round() as u32, size.y.round() as u32];
+        let primitives = ctx.tessellate(output.shapes.clone(), scale);
+        self.screen.resize((size[0] * size[1]) as usize, 0);
+        let mut show = |painter: &mut Painter| {
+            let changed = painter.paint(&primitives, scale, size);
+            for area in &changed {
+                painter.copy(*area, &mut self.screen, size[0] as usize);
+            }
+            (self.screen.clone(), changed)
+        };
+        let (pixels, changed) = show(&mut self.painter);
+        let same = show(&mut self.painter).1;
+        self.painter.forget();
+        let (anew, all) = show(&mut self.painter);
+        let whole = Area { left: 0, top: 0, right: size[0] as i32, bottom: size[1] as i32 };
+        if !same.is_empty() || all != [whole] || pixels != anew {
+            return Err(format!("in places, {changed:?}, it is not painted as all at once"));
+        }
+        self.whole.update(|frames| frames + usize::from(changed == [whole]));
+        Ok(RgbaImage::from_fn(size[0], size[1], |x, y| {
+            let [_, red, green, blue] = pixels[(y * size[0] + x) as usize].to_be_bytes();
+            Rgba([red, green, blue, 255])
+        }))
+    }
+}
+
+/// What the window shows, but for the line at the bottom that tells how long drawing took.
+fn seen(harness: &mut Harness<'_, Studio>) -> RgbaImage {
+    let status = harness.get_by_label_contains("of 64 × 36").rect().top();
+    let mut picture = harness.render().unwrap();
+    picture.rows_mut().skip(status as usize - 4).flatten().for_each(|pixel| pixel.0 = [0, 0, 0, 255]);
+    picture
+}
+
+/// Compares it.
+fn as_it_did(harness: &mut Harness<'_, Studio>, name: &str) {
+    let options = SnapshotOptions::new().output_path(SNAPSHOTS);
+    image_snapshot_options(&seen(harness), name, &options);
+}
+
+/// Compares what was painted without a GPU with what one painted.
+fn as_a_gpu_does(harness: &mut Harness<'_, Studio>, name: &str) {
+    let picture = seen(harness);
+    let expected = image::open(format!("{SNAPSHOTS}/{name}.png")).unwrap().into_rgba8();
+    assert_eq!(picture.dimensions(), expected.dimensions());
+    // Where nothing is painted the one is clear and the other black.
+    let apart = |(a, b): (&Rgba<u8>, &Rgba<u8>)| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);
+    let differences: Vec<f64> = picture.pixels().zip(expected.pixels()).map(apart).map(f64::from).collect();
+    let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+    let worst = differences.iter().copied().fold(0.0, f64::max);
+    assert!(worst <= 6.0 && mean < 0.02, "{name}: {worst} of 255 at worst, {mean} in the mean");
+}
+
+fn dark_and_light(paints: Paints, looks: Looks) {
+    let mut harness = painted(paints, SCENE);
+    looks(&mut harness, "window_dark");
+    harness.ctx.set_theme(Theme::Light);
+    harness.run_steps(3);
+    looks(&mut harness, "window_light");
+}
+
+fn curves(paints: Paints, looks: Looks) {
+    let mut harness = painted(paints, SCENE);
+    // The stage above is called so too.
+    harness.get_all_by_label("texture").last().expect("the section").click();
+    harness.run_steps(12);
+    harness.get_by_label("threshold").scroll_to_me();
+    harness.run_steps(12);
+    looks(&mut harness, "curves");
+}
+
+fn aurora_editor(paints: Paints, looks: Looks) {
+    let mut harness = painted(paints, &sky(150, SHAPES));
     harness.get_by_label("Shape 2").click();
     drawn(&mut harness);
     looks(&mut harness, "aurora_editor");
+}
+
+#[test]
+#[ignore = "needs a Vulkan device"]
+fn the_window_looks_as_it_did_dark_and_light() {
+    dark_and_light(by_gpu, as_it_did);
+}
+
+#[test]
+#[ignore = "needs a Vulkan device"]
+fn curves_look_as_they_did() {
+    curves(by_gpu, as_it_did);
+}
+
+#[test]
+#[ignore = "needs a Vulkan device"]
+fn the_aurora_editor_looks_as_it_did() {
+    aurora_editor(by_gpu, as_it_did);
+}
+
+#[test]
+fn without_a_gpu_the_window_looks_as_with_one() {
+    dark_and_light(by_software, as_a_gpu_does);
+    curves(by_software, as_a_gpu_does);
+    aurora_editor(by_software, as_a_gpu_does);
+}
+
+#[test]
+fn frames_that_are_painted_in_places_are_those_painted_anew() {
+    let software = Software::default();
+    let whole = software.whole.clone();
+    let mut harness = window_by(Harness::builder().with_size(vec2(SIZE[0], SIZE[1])).renderer(software), SCENE);
+    let frames = |harness: &mut Harness<'_, Studio>, count: usize| {
+        for _ in 0..count {
+            harness.step();
+            // Which holds the two against each other.
+            harness.render().unwrap();
+        }
+    };
+    frames(&mut harness, 2);
+    harness.state_mut().session().transport.set_playing(true);
+    frames(&mut harness, 6);
+    harness.state_mut().session().transport.set_playing(false);
+    // A menu opens over everything, a field takes the keys, a section unfolds, and letters come that were never seen.
+    harness.get_by_label("File").click();
+    frames(&mut harness, 4);
+    harness.key_press(Key::Escape);
+    frames(&mut harness, 2);
+    harness.get_by_role_and_label(Role::TextInput, "Find").focus();
+    frames(&mut harness, 2);
+    harness.get_all_by_label("texture").last().expect("the section").click();
+    frames(&mut harness, 8);
+    harness.state_mut().session().set_notice(Some("Þßøð ¿".into()));
+    frames(&mut harness, 2);
+    harness.hover_at(egui::pos2(500.0, 300.0));
+    frames(&mut harness, 2);
+    assert_eq!(whole.get(), 1, "only the first is painted whole");
 }

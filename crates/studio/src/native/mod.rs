@@ -14,31 +14,40 @@ use bansho_studio::{
     bench,
     document::{Document, files},
     player::{StartError, ThreadPlayer},
+    software::window::Build,
 };
 use eframe::egui;
 
-const USAGE: &str = "usage: bansho-studio [SCENE]
+use self::{
+    arguments::{Asked, Work},
+    painting::Painting,
+};
+
+mod arguments;
+mod painting;
+
+const USAGE: &str = "usage: bansho-studio [--painter auto|gpu|software] [SCENE]
        bansho-studio --bench [NAME]           pictures a second of each phenomenon here
-       bansho-studio --bench-window [NAME]    the same with the window, which must not be covered";
+       bansho-studio --bench-window [NAME]    the same with the window, which must not be covered
+
+--painter: what paints the window. `auto`, which is usual, takes a GPU where there is one.";
 
 const TITLE: &str = "Bansho Studio";
 
 pub(super) fn main() -> ExitCode {
-    let mut arguments = std::env::args_os().skip(1);
-    let first = arguments.next();
-    let second = arguments.next();
-    let words = |word: &Option<std::ffi::OsString>| word.as_ref().map(|word| word.to_string_lossy().into_owned());
-    match (words(&first).as_deref(), words(&second).as_deref()) {
-        (Some("--help"), None) => return say(USAGE),
-        (Some("--bench"), wanted) => return bench(wanted.unwrap_or_default()),
-        (Some("--bench-window"), wanted) => return bench_window(wanted.unwrap_or_default()),
-        (_, Some(_)) => return fail(USAGE),
-        _ => {}
-    }
-    let scene = first.map(PathBuf::from);
-    match run(scene) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => fail(&format!("error: {error}")),
+    let asked = match Asked::of(std::env::args_os().skip(1)) {
+        Ok(asked) => asked,
+        Err(message) => return fail(&message),
+    };
+    let painter = asked.painter;
+    match asked.work {
+        Work::Help => say(USAGE),
+        Work::Bench(wanted) => bench(&wanted),
+        Work::BenchWindow(wanted) => bench_window(painter, wanted),
+        Work::Scene(scene) => match run(painter, scene) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => fail(&format!("error: {error}")),
+        },
     }
 }
 
@@ -59,14 +68,13 @@ fn bench(wanted: &str) -> ExitCode {
 }
 
 /// The same with the window.
-fn bench_window(wanted: &str) -> ExitCode {
+fn bench_window(painter: Painting, wanted: String) -> ExitCode {
     let (sender, results) = mpsc::channel();
-    let wanted = wanted.to_owned();
-    let build = |creation: &eframe::CreationContext| {
-        let session = session(creation, Document::new("scene", FLAME_SHEET), None)?;
-        Ok(Box::new(bench::WindowBench::new(session, &wanted, sender)) as Box<dyn eframe::App>)
-    };
-    if let Err(error) = eframe::run_native(TITLE, options(window_size(None)), Box::new(build)) {
+    let build: Build = Box::new(move |ctx| {
+        let session = session(ctx, Document::new("scene", FLAME_SHEET), None)?;
+        Ok(Box::new(bench::WindowBench::new(session, &wanted, sender)))
+    });
+    if let Err(error) = painter.show(viewport(window_size(None)), build) {
         return fail(&format!("error: {error}"));
     }
     for speed in results {
@@ -96,30 +104,25 @@ fn fail(message: &str) -> ExitCode {
     ExitCode::FAILURE
 }
 
-fn run(scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
+fn run(painter: Painting, scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
     let document = match &scene {
         Some(path) => files::open(path)?,
         None => Document::new("scene", FLAME_SHEET),
     };
-    let build = |creation: &eframe::CreationContext| {
-        let session = session(creation, document, scene)?;
-        Ok(Box::new(Studio::new(session, home())) as Box<dyn eframe::App>)
-    };
-    Ok(eframe::run_native(TITLE, options(window_size(home().as_deref())), Box::new(build))?)
+    let build: Build = Box::new(move |ctx| {
+        let session = session(ctx, document, scene)?;
+        Ok(Box::new(Studio::new(session, home())))
+    });
+    painter.show(viewport(window_size(home().as_deref())), build)
 }
 
-fn options(size: [f32; 2]) -> eframe::NativeOptions {
-    let viewport = egui::ViewportBuilder::default().with_title(TITLE).with_inner_size(size);
-    eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() }
+fn viewport(size: [f32; 2]) -> egui::ViewportBuilder {
+    egui::ViewportBuilder::default().with_title(TITLE).with_inner_size(size)
 }
 
 /// `document`, which lies in `scene`, with a player that wakes the window.
-fn session(
-    creation: &eframe::CreationContext,
-    document: Document,
-    scene: Option<PathBuf>,
-) -> Result<Session, StartError> {
-    let ctx = creation.egui_ctx.clone();
+fn session(ctx: &egui::Context, document: Document, scene: Option<PathBuf>) -> Result<Session, StartError> {
+    let ctx = ctx.clone();
     let player = ThreadPlayer::start(move || ctx.request_repaint())?;
     Ok(Session::new(document, scene, Box::new(player), assets))
 }

@@ -1,0 +1,91 @@
+//! What the program is asked to do.
+
+use std::{ffi::OsString, path::PathBuf};
+
+use super::{USAGE, painting::Painting};
+
+/// All of it.
+#[derive(Debug, PartialEq)]
+pub(super) struct Asked {
+    pub(super) painter: Painting,
+    pub(super) work: Work,
+}
+
+/// What is to be done.
+#[derive(Debug, PartialEq)]
+pub(super) enum Work {
+    Help,
+    /// Of phenomena whose name contains this.
+    Bench(String),
+    BenchWindow(String),
+    Scene(Option<PathBuf>),
+}
+
+impl Asked {
+    /// Reads the program's arguments.
+    ///
+    /// # Errors
+    /// What is to be told where they make no sense.
+    pub(super) fn of(arguments: impl IntoIterator<Item = OsString>) -> Result<Self, String> {
+        let mut painter = Painting::default();
+        let mut rest = Vec::new();
+        let mut arguments = arguments.into_iter();
+        while let Some(argument) = arguments.next() {
+            let text = argument.to_string_lossy();
+            match text.strip_prefix("--painter") {
+                Some("") => {
+                    let name =
+                        arguments.next().ok_or_else(|| format!("error: --painter needs one of {}", Painting::NAMES))?;
+                    painter = Painting::named(&name.to_string_lossy())?;
+                }
+                Some(value) if value.starts_with('=') => painter = Painting::named(&value[1..])?,
+                _ => rest.push(argument),
+            }
+        }
+        let text = |argument: &OsString| argument.to_string_lossy().into_owned();
+        let work = match rest.as_slice() {
+            [] => Work::Scene(None),
+            [option, name @ ..] if name.len() < 2 && text(option).starts_with("--") => {
+                let wanted = name.first().map(text).unwrap_or_default();
+                match text(option).as_str() {
+                    "--help" if name.is_empty() => Work::Help,
+                    "--bench" => Work::Bench(wanted),
+                    "--bench-window" => Work::BenchWindow(wanted),
+                    other => return Err(format!("error: {other} means nothing here\n{USAGE}")),
+                }
+            }
+            [scene] => Work::Scene(Some(scene.into())),
+            _ => return Err(USAGE.to_owned()),
+        };
+        Ok(Self { painter, work })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn asked(arguments: &[&str]) -> Result<Asked, String> {
+        Asked::of(arguments.iter().map(OsString::from))
+    }
+
+    #[test]
+    fn the_painter_is_named_anywhere() {
+        let scene = Work::Scene(Some("a.toml".into()));
+        assert_eq!(asked(&["a.toml"]), Ok(Asked { painter: Painting::Auto, work: scene }));
+        for arguments in [["--painter", "software", "a.toml"], ["a.toml", "--painter", "software"]] {
+            assert_eq!(asked(&arguments).unwrap().painter, Painting::Software);
+        }
+        let bench = asked(&["--bench-window", "rain", "--painter=gpu"]).unwrap();
+        assert_eq!(bench, Asked { painter: Painting::Gpu, work: Work::BenchWindow("rain".into()) });
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_told_in_one_error() {
+        let expected = "error: --painter is one of auto, gpu, software, not `pencil`";
+        assert_eq!(asked(&["--painter", "pencil"]).unwrap_err(), expected);
+        assert_eq!(asked(&["--painter"]).unwrap_err(), "error: --painter needs one of auto, gpu, software");
+        assert!(asked(&["--pencil"]).unwrap_err().starts_with("error: --pencil means nothing here\n"));
+        assert_eq!(asked(&["a.toml", "b.toml"]).unwrap_err(), USAGE);
+    }
+}
