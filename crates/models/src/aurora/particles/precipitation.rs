@@ -221,7 +221,9 @@ impl Stretch<'_> {
             let (sheet, share) = (self.sheets[index], self.shares[index]);
             let wanted = -*power * (lengths.at(sheet, share) * factors.at(sheet, share)) as f32;
             let full = &mut self.full_powers[index];
-            *full = if *full > 0.0 { *full + FOLLOWING * (wanted - *full) } else { wanted };
+            // Those that are just appearing begin with nothing: as fast as they rise, those around them give up their share.
+            let follows = *full > 0.0 || self.fades[index] < 1.0;
+            *full = if follows { *full + FOLLOWING * (wanted - *full) } else { wanted };
             *power = self.fades[index] * *full;
             sums[0] += f64::from(self.fades[index] * wanted);
             sums[1] += f64::from(*power);
