@@ -147,7 +147,6 @@ fn no_particle_is_in_the_black_circle_and_the_inner_bends() {
             step_to(&mut simulation, f64::from(frame));
             let shares = shares_within(&simulation, &places);
             let (within, around) = shares.split_at(places.len() / 2);
-            println!("scene {scene}, frame {frame}: {within:?} within, {around:?} around");
             assert!(within.iter().flatten().all(|share| *share == 0.0), "scene {scene}, frame {frame}: {within:?}");
             assert!(around.iter().flatten().all(|share| *share > 1e-2), "scene {scene}, frame {frame}: {around:?}");
         }
@@ -187,7 +186,6 @@ fn every_stretch_of_the_thesis_scenes_holds_its_share_on_arrival() {
         for &arrival in &sequence.arrivals()[1..] {
             step_to(&mut simulation, arrival / FRAME_S);
             let least = least_stretch(&simulation, &sequence.at(simulation.time()));
-            println!("scene {scene}, {arrival:.2} s: {least:.2}");
             assert!(least >= 0.5, "scene {scene}, {arrival} s: a stretch holds {least} of its share");
         }
     }

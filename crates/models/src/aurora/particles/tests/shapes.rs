@@ -141,7 +141,6 @@ fn every_stretch_holds_its_share_from_the_arrival_on() {
                 told.push(least);
             }
         }
-        println!("{name}: {told:.2?}");
         assert!(moments >= 5, "{name}: {moments}");
         assert!(told.iter().all(|least| *least >= 0.5), "{name}: {told:?}");
     }
@@ -272,9 +271,6 @@ fn rays_have_more_contrast_with_the_spline_while_particles_are_few() {
         [RepulsionKernel::Spline, RepulsionKernel::Poly6Spiky].map(|kernel| contrast_along(kernel, particles))
     };
     let (few, many) = (of(12_000), of(60_000));
-    println!(
-        "contrast along the sheet, spline and poly6 with spiky: {few:.3?} of 12,000 particles, {many:.3?} of 60,000"
-    );
     assert!(few[0] > 1.07 * few[1], "{few:?}");
     assert!((many[0] / many[1] - 1.0).abs() < 0.07, "{many:?}: then the book is wrong");
 }
@@ -298,7 +294,6 @@ fn a_step_costs_what_its_particles_cost_not_what_the_drawn_shapes_are_long() {
         }
     }
     let counts = simulations.map(|simulation| simulation.particles().len() as f64);
-    println!("a step of {counts:?} particles: {:.1?} ms", least.map(|time| 1e3 * time / f64::from(RENEWALS)));
     assert!((counts[1] / counts[0] - 1.0).abs() < 0.2, "{counts:?}");
     // 1.6 times: rays are tabulated along the sheets, and the sheets' folds and charge are found all along them.
     assert!(least[1] < 2.5 * least[0], "{least:?} s");
