@@ -40,6 +40,10 @@ pub struct AssetError {
     pub problem: AssetProblem,
 }
 
+fn only(instead: &[&str]) -> String {
+    if instead.is_empty() { String::new() } else { format!(", only {}", instead.join(", ")) }
+}
+
 /// What can be wrong with an asset.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AssetProblem {
@@ -53,8 +57,11 @@ pub enum AssetProblem {
     #[error("{0}")]
     Told(String),
     /// A drawing without strokes.
-    #[error("holds no strokes (allowed: an SVG file with path, polyline or line elements)")]
-    NoStrokes,
+    #[error("holds no strokes{} (allowed: an SVG file with path, polyline, polygon or line elements)", only(.instead))]
+    NoStrokes {
+        /// Names of the elements that it draws instead.
+        instead: Vec<&'static str>,
+    },
     /// A drawing was asked for a stroke that it lacks.
     #[error("has no stroke of the id `{0}`")]
     NoStroke(String),

@@ -92,6 +92,18 @@ pub enum Remark {
     Unfed,
 }
 
+impl Remark {
+    /// The parameter of the phenomenon's own table that it speaks of, as in `shapes.1` (counting from 0); none where it is all of it.
+    #[must_use]
+    pub fn key(&self) -> Option<String> {
+        match self {
+            Self::Unlit | Self::Unfed => None,
+            Self::Buried { burner } => Some(format!("burners.{}", burner.saturating_sub(1))),
+            Self::Crossing { shape } => Some(format!("shapes.{}", shape.saturating_sub(1))),
+        }
+    }
+}
+
 /// One phenomenon of a scene, ready to be drawn at any time (closed form) or stepped there.
 ///
 /// Everything is a function of the parameters, the seed, the name and the time: never of the threads, of the frames

@@ -1,10 +1,13 @@
 //! The kinds of phenomena that scenes may hold: the one place where models meet the renderer.
 
-use std::error::Error;
+use std::{error::Error, sync::Arc};
 
 use bansho_base::{parameters::ModelFault, phenomenon::Phenomenon, sky::SkyParameters};
 use bansho_models::{
-    aurora::{Aurora, AuroraParameters, shapes::ShapeFaultKind},
+    aurora::{
+        Aurora, AuroraParameters,
+        shapes::{Sequence, ShapeFaultKind},
+    },
     flame_particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind, check_count},
     flame_sheet::{FlameSheet, FlameSheetParameters},
     ground::{Ground, GroundParameters},
@@ -18,7 +21,7 @@ use crate::{
     plan::{Plan, PlanError, opening_error},
     scene::{
         Instance, LightParameters, Scene,
-        source::{Describe, Opening, OpeningFault, PhenomenonKind},
+        source::{Describe, Memo, Opening, OpeningFault, PhenomenonKind},
     },
 };
 
@@ -92,7 +95,20 @@ impl Describe for AuroraParameters {
         sky = { kind = \"night\", hills_deg = 2.0, trees_deg = 1.1 }\n";
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
-        match Aurora::new(self.clone(), opening.name, opening.seed, opening.loop_s, opening.assets) {
+        self.open_again(opening, &Memo::default())
+    }
+
+    fn open_again(&self, opening: &Opening, memo: &Memo) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        // Drawings may have changed since.
+        let is_stated = self.shapes.iter().flat_map(|shape| &shape.sheets).all(|sheet| sheet.path.is_none());
+        let known = memo.get::<Sequence>(opening.loop_s).filter(|_| is_stated);
+        let make = || Sequence::new(&self.shapes, &self.motion, self.extent_km, opening.assets, opening.loop_s);
+        let aurora = known.map_or_else(|| make().map(Arc::new), Ok).and_then(|sequence| {
+            memo.keep(opening.loop_s, sequence.clone());
+            let sequence = Sequence::clone(&sequence);
+            Aurora::moving(self.clone(), sequence, opening.name, opening.seed, opening.loop_s)
+        });
+        match aurora {
             Ok(aurora) => Ok(Box::new(aurora)),
             Err(fault) => Err(match fault.kind {
                 ShapeFaultKind::Asset(error) => OpeningFault { key: fault.key, kind: error.into() },

@@ -99,18 +99,24 @@ fn the_fold_of_scene_1_leaves_a_gap() {
     assert!(last.distance(DVec2::new(95.0, -213.0)).is_none_or(|distance| distance > 45.0));
 }
 
-/// Of a scene of the thesis, with a twentieth of its particles, after so many frames: the share of the particles, and of their power, within
-/// so many km of places.
-fn shares_within(scene: usize, frames: usize, places: &[([f64; 2], f64)]) -> Vec<[f64; 2]> {
+/// The simulation of a scene of the thesis with a tenth of its particles.
+fn simulation(scene: usize) -> AuroraSimulation {
     let text = SCENES[scene - 1];
     assert!(text.contains("count = 120_000"));
-    let text = text.replace("count = 120_000", "count = 6000");
+    let text = text.replace("count = 120_000", "count = 12_000");
     let parsed = Scene::parse("test.toml", &text, KINDS, &assets()).unwrap_or_else(|error| panic!("{error}"));
     let aurora = AuroraParameters::read_table(&parsed.instances[0].source.canonical(), &mut Reader::new(), &[]);
-    let mut simulation = AuroraSimulation::new(aurora, sequence_of(&text), "aurora", 1);
-    while simulation.time() < frames as f64 * FRAME_S {
+    AuroraSimulation::new(aurora, sequence_of(&text), "aurora", 1)
+}
+
+fn step_to(simulation: &mut AuroraSimulation, frame: f64) {
+    while simulation.time() < (frame - 0.5) * FRAME_S {
         simulation.step();
     }
+}
+
+/// The share of the particles, and of their power, within so many km of places.
+fn shares_within(simulation: &AuroraSimulation, places: &[([f64; 2], f64)]) -> Vec<[f64; 2]> {
     let particles = simulation.particles();
     let (count, power) = (particles.len() as f64, particles.power_w());
     let within = |(middle, radius): &([f64; 2], f64)| {
@@ -126,17 +132,61 @@ fn shares_within(scene: usize, frames: usize, places: &[([f64; 2], f64)]) -> Vec
 #[test]
 fn no_particle_is_in_the_black_circle_and_the_inner_bends() {
     // Circles as wide as they fit between the limbs, but for L_thr and a cell of the field on each side.
-    for (scene, frames, places) in [
-        (1, 281, vec![([95.0, -213.0], 45.0)]),
+    for (scene, first, places) in [
+        (1, 280, vec![([95.0, -213.0], 45.0)]),
         (2, 140, vec![([52.0, -131.0], 6.5), ([-52.0, -169.0], 6.5)]),
-        (2, 281, vec![([58.0, -130.0], 8.0), ([-58.0, -170.0], 8.0)]),
+        (2, 280, vec![([58.0, -130.0], 8.0), ([-58.0, -170.0], 8.0)]),
     ] {
         let wide = places.iter().map(|(middle, radius)| (*middle, 2.0 * radius));
-        let shares = shares_within(scene, frames, &[&places[..], &wide.collect::<Vec<_>>()].concat());
-        let (within, around) = shares.split_at(places.len());
-        for ((place, within), around) in places.iter().zip(within).zip(around) {
-            assert!(within.iter().all(|share| *share < 1e-3), "scene {scene}, frame {frames}, {place:?}: {within:?}");
-            assert!(around.iter().all(|share| *share > 1e-2), "scene {scene}, frame {frames}, {place:?}: {around:?}");
+        let places = [&places[..], &wide.collect::<Vec<_>>()].concat();
+        let mut simulation = simulation(scene);
+        // From the arrival on, as long as the shape stays; the S moves on at once.
+        let moments = if first == 140 { 1 } else { 6 };
+        for moment in 0..moments {
+            let frame = first + 9 * moment;
+            step_to(&mut simulation, f64::from(frame));
+            let shares = shares_within(&simulation, &places);
+            let (within, around) = shares.split_at(places.len() / 2);
+            assert!(within.iter().flatten().all(|share| *share == 0.0), "scene {scene}, frame {frame}: {within:?}");
+            assert!(around.iter().flatten().all(|share| *share > 1e-2), "scene {scene}, frame {frame}: {around:?}");
+        }
+    }
+}
+
+/// Of all stretches of the sheets as long as a fiftieth of them all: the least share that one holds of the particles that are due to it.
+fn least_stretch(simulation: &AuroraSimulation, shape: &Shape) -> f64 {
+    /// Bins of such a stretch, by which one is moved on to the next.
+    const BINS: usize = 4;
+    let lengths: Vec<f64> =
+        shape.sheets.iter().map(|sheet| sheet.points.windows(2).map(|pair| pair[0].distance(pair[1])).sum()).collect();
+    let total: f64 = lengths.iter().sum();
+    let bins = |length: &f64| ((50 * BINS) as f64 * length / total).round() as usize;
+    let mut counts: Vec<Vec<f64>> = lengths.iter().map(|length| vec![0.0; bins(length)]).collect();
+    let particles = simulation.particles();
+    let mut living = 0.0;
+    for index in (0..particles.len()).filter(|index| !particles.dying[*index]) {
+        living += 1.0;
+        // What bridges a gap is a sheet of its own, after those of the shape.
+        let Some(bins) = counts.get_mut(particles.sheets[index] as usize) else { continue };
+        let last = bins.len() - 1;
+        bins[((f64::from(particles.shares[index]) * (last + 1) as f64) as usize).min(last)] += 1.0;
+    }
+    let stretches = counts.iter().zip(&lengths).flat_map(|(counts, length)| {
+        let due = living * BINS as f64 * length / (total * counts.len() as f64);
+        counts.windows(BINS).map(move |stretch| stretch.iter().sum::<f64>() / due)
+    });
+    stretches.fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn every_stretch_of_the_thesis_scenes_holds_its_share_on_arrival() {
+    for scene in 1..=5 {
+        let sequence = sequence(scene);
+        let mut simulation = simulation(scene);
+        for &arrival in &sequence.arrivals()[1..] {
+            step_to(&mut simulation, arrival / FRAME_S);
+            let least = least_stretch(&simulation, &sequence.at(simulation.time()));
+            assert!(least >= 0.5, "scene {scene}, {arrival} s: a stretch holds {least} of its share");
         }
     }
 }
@@ -198,6 +248,18 @@ fn faults_stand_at_their_sheet_and_point() {
             "shapes.1.link.0: there is no sheet 5 in this shape; allowed: 1 to 1",
         ),
         ("[[aurora.shapes]]\nsheets = [{ path = \"gone.svg\" }]\n", "gone.svg: no such file"),
+        (
+            "[[aurora.shapes]]\nafter_s = 3\n[[aurora.shapes]]\n",
+            "test.toml:4:11: aurora.0.shapes.0.after_s: the first shape is there at the beginning",
+        ),
+        (
+            "[[aurora.shapes]]\n[[aurora.shapes]]\nlink = [{ at = 0.5 }]\n",
+            "test.toml:5:9: aurora.0.shapes.1.link.0: says `at`, but not where that point arrives",
+        ),
+        (
+            "[[aurora.shapes]]\n[[aurora.shapes]]\nmerge = [{ sheets = [1, 2.5] }]\n",
+            "test.toml:5:25: aurora.0.shapes.1.merge.0.sheets: expected a whole number from 1 to 1000, found a number",
+        ),
         (
             "[[aurora.shapes]]\nsheets = [{ path = \"shapes.svg\", form = \"arc\" }]\n",
             "says more than one of `points`, `path` and `form`",

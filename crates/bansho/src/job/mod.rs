@@ -31,8 +31,8 @@ use bansho_render::display::BitDepth;
 
 pub use error::{Cause, Channels, Conflict, JobError, SheetKind};
 pub use flipbook::{Flipbook, FlipbookSummary, PreparedFlipbook};
-pub use observer::{FrameDone, JobObserver, Note, Outline};
-pub use prepare::{PreparedJob, check_scene};
+pub use observer::{FrameDone, JobObserver, Note, Outline, Spot};
+pub use prepare::{PreparedJob, check_scene, remarks};
 pub use run::Summary;
 pub use scene_file::SceneFile;
 pub use simulate::{PreparedSimulation, Simulate};

@@ -45,6 +45,20 @@ pub struct FrameDone {
     pub drawn: usize,
 }
 
+/// A place in a scene file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Spot {
+    /// What errors call the file.
+    pub file: String,
+    /// One-based line and column (in characters).
+    pub position: (usize, usize),
+}
+
+fn at(place: &Option<Spot>) -> String {
+    let shown = |spot: &Spot| format!("{}:{}:{}: ", spot.file, spot.position.0, spot.position.1);
+    place.as_ref().map(shown).unwrap_or_default()
+}
+
 /// Something that the user should know and that stops nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -107,8 +121,10 @@ pub enum Note {
         reason: String,
     },
     /// A phenomenon will look other than one may expect.
-    #[error("{name}: {remark}")]
+    #[error("{}{name}: {remark}", at(.place))]
     Remark {
+        /// Where the scene says it.
+        place: Option<Spot>,
         /// Its name in the scene.
         name: String,
         /// What is to be said.

@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
 };
 
-use bansho_base::{assets::Assets, color::View};
+use bansho_base::{assets::Assets, color::View, phenomenon::Remark};
 use bansho_media::{
     flipbook::Sheet,
     naming::{self, OutputKind, OutputPattern},
@@ -16,7 +16,7 @@ use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth};
 use super::{
     BackendChoice, Job, contact,
     error::{Channels, Conflict, JobError, SheetKind},
-    observer::Note,
+    observer::{Note, Spot},
     output::{self, Format},
     scene_file::SceneFile,
     sheet::{self, MOST_TILES},
@@ -72,6 +72,19 @@ pub fn check_scene(scene: &SceneFile) -> Result<Plan, JobError> {
     let plan = Plan::new(scene.check(assets.as_ref())?, &PlanOptions::default(), assets)?;
     check_plate(scene, &plan, plan.frames().start)?;
     Ok(plan)
+}
+
+/// What users should know of how the phenomena of a scene will look, each at its place in the file.
+///
+/// # Errors
+/// A phenomenon cannot be made.
+pub fn remarks(scene: &SceneFile, plan: &Plan) -> Result<Vec<Note>, JobError> {
+    let note = |(name, remark): (String, Remark)| {
+        let position = plan.scene().position(&scene.text, &name, remark.key().as_deref());
+        let place = position.map(|position| Spot { file: scene.name.clone(), position });
+        Note::Remark { place, name, remark }
+    };
+    Ok(plan.remarks()?.into_iter().map(note).collect())
 }
 
 /// Reads the plate of frame `number`, so that a damaged one is told before the work begins, and by its place in the scene.
@@ -194,7 +207,7 @@ impl Job {
     fn notes(&self, job: &PreparedJob) -> Result<Vec<Note>, JobError> {
         let kind = job.format.pattern.kind();
         let mut notes: Vec<Note> = outside(&job.plan, &job.frames).into_iter().collect();
-        notes.extend(job.plan.remarks()?.into_iter().map(|(name, remark)| Note::Remark { name, remark }));
+        notes.extend(remarks(&self.scene, &job.plan)?);
         let wide = matches!(kind, OutputKind::Png | OutputKind::Apng | OutputKind::Mov | OutputKind::Webm);
         if self.bits == BitDepth::Sixteen && !wide {
             notes.push(Note::BitsUnused { kind });

@@ -230,12 +230,25 @@ impl<const N: usize> Parameter for [i64; N] {
     }
 
     fn read(node: &Node, limits: &Range, unit: &'static str, reader: &mut Reader) -> Option<Self> {
-        let values = <[f64; N]>::read(node, limits, unit, reader)?;
-        if values.iter().any(|value| value.fract() != 0.0) {
-            reader.wrong_type(node, &Kind::Integer { min: limits.min as i64, max: limits.max as i64 });
+        let Value::List(items) = &node.value else {
+            reader.wrong_type(node, &Self::kind(limits));
+            return None;
+        };
+        if items.len() != N {
+            reader.report(node, ProblemKind::ListLength { found: items.len(), min: N, max: N });
             return None;
         }
-        Some(values.map(|value| value as i64))
+        let whole = i64::kind(limits);
+        let mut values = [0; N];
+        for (value, item) in values.iter_mut().zip(items) {
+            let number = read_number(item, limits, unit, &whole, reader)?;
+            if number.fract() != 0.0 {
+                reader.wrong_type(item, &whole);
+                return None;
+            }
+            *value = number as i64;
+        }
+        Some(values)
     }
 
     fn to_value(&self) -> Option<Value> {

@@ -7,10 +7,10 @@ use bansho::job::{self, JobError, SceneFile};
 use crate::{
     args::CheckArgs,
     exit::{self, Told},
-    output::to_stdout,
+    output::{to_stderr, to_stdout},
 };
 
-/// Checks every scene and tells all faults of all of them.
+/// Checks every scene and tells all faults of all of them, and what stops nothing but will look other than one may expect.
 pub(crate) fn run(args: &CheckArgs) -> anyhow::Result<()> {
     let mut last_fault = None;
     for path in &args.scenes {
@@ -26,7 +26,11 @@ pub(crate) fn run(args: &CheckArgs) -> anyhow::Result<()> {
 }
 
 fn describe(path: &Path) -> Result<String, JobError> {
-    let plan = job::check_scene(&SceneFile::read(path)?)?;
+    let scene = SceneFile::read(path)?;
+    let plan = job::check_scene(&scene)?;
+    for remark in job::remarks(&scene, &plan)? {
+        to_stderr(&format!("warning: {remark}"));
+    }
     let [width, height] = plan.size();
     let (fps, frames) = (plan.fps(), plan.frames());
     let rate = f64::from(fps.frames) / f64::from(fps.seconds);

@@ -27,14 +27,36 @@ fn a_drawing_without_strokes_or_that_is_none_is_a_located_error() {
     let folder = Folder::new();
     folder.write("empty.svg", "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 10 10\"></svg>");
     folder.write("words.svg", "no drawing");
-    for (file, expected) in
-        [("empty.svg", "holds no strokes"), ("words.svg", "it is no SVG"), ("gone.svg", "no such file")]
-    {
+    folder
+        .write("text.svg", "<svg><defs><path id=\"a\" d=\"M0 0L1 1\"/></defs><use href=\"#a\"/><text>arc</text></svg>");
+    for (file, expected) in [
+        ("empty.svg", "holds no strokes (allowed"),
+        ("text.svg", "holds no strokes, only use, text (allowed"),
+        ("words.svg", "it is no SVG"),
+        ("gone.svg", "no such file"),
+    ] {
         folder.write("scene.toml", &format!("{AURORA}[[aurora.shapes]]\nsheets = [{{ path = \"{file}\" }}]\n"));
         let run = folder.run(&["check", "scene.toml"]);
         assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
         assert!(run.stderr.contains("scene.toml:12:20: aurora.0.shapes.0.sheets.0.path"), "{}", run.stderr);
         assert!(run.stderr.contains(expected), "{}", run.stderr);
+    }
+}
+
+#[test]
+fn check_and_render_tell_where_sheets_pass_through_each_other() {
+    let folder = Folder::new();
+    let sheets = "sheets = [{ form = \"arc\" }, { form = \"arc\", position_km = [0, 90] }]\n";
+    let shapes = format!("[[aurora.shapes]]\n{sheets}[[aurora.shapes]]\n{sheets}");
+    folder.write("apart.toml", &format!("{AURORA}{shapes}"));
+    folder.write("scene.toml", &format!("{AURORA}{shapes}link = [{{ from = 1, to = 2 }}]\n"));
+    let apart = folder.run(&["check", "apart.toml"]);
+    assert_eq!((apart.code, apart.stderr.as_str()), (Some(0), ""));
+    let told = "warning: scene.toml:13:1: aurora: its sheets pass through each other on the way to shape 2";
+    for arguments in [&["check", "scene.toml"][..], &["render", "scene.toml", "--frames", "0", "--out", "f.####.png"]] {
+        let run = folder.run(arguments);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        assert!(run.stderr.lines().any(|line| line.starts_with(told)), "{arguments:?}: {}", run.stderr);
     }
 }
 

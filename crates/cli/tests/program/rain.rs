@@ -88,7 +88,7 @@ fn twice_the_fire_is_twice_the_light_on_the_rain_beside_it() {
 fn rain_that_nothing_lights_is_drawn_with_a_warning() {
     let folder = scene("[[rain]]\nname = \"night\"\n");
     let run = folder.succeed(&["render", "scene.toml", "--frames", "0", "--out", "f.png"]);
-    assert!(run.stderr.contains("night: nothing lights it, so it is drawn black"), "{}", run.stderr);
+    assert!(run.stderr.contains(": night: nothing lights it, so it is drawn black"), "{}", run.stderr);
     assert!(decode_png(&folder.files("")["f.png"]).bytes.chunks_exact(4).all(|pixel| pixel[..3] == [0; 3]));
     let lit = scene(&format!("{LAMP}[[rain]]\n")).succeed(&["render", "scene.toml", "--frames", "0", "--out", "f.png"]);
     assert!(!lit.stderr.contains("nothing lights it"), "{}", lit.stderr);

@@ -24,6 +24,9 @@ const MOST_POINTS: usize = 1_000_000;
 /// Elements whose contents are not drawn where they stand.
 const UNDRAWN: [&str; 8] = ["defs", "symbol", "clipPath", "mask", "marker", "pattern", "metadata", "style"];
 
+/// Elements that are drawn but are no strokes.
+const NO_STROKES: [&str; 7] = ["use", "text", "rect", "circle", "ellipse", "image", "foreignObject"];
+
 fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
 }
@@ -64,6 +67,8 @@ struct Reading {
     levels: Vec<Level>,
     strokes: Vec<Stroke>,
     points: usize,
+    /// What else is drawn.
+    others: Vec<&'static str>,
     /// The sheet that was drawn on, as the outermost element says it.
     sheet: Option<[DVec2; 2]>,
 }
@@ -82,6 +87,8 @@ impl Reading {
         if !level.is_drawn {
             return Ok(());
         }
+        let other = NO_STROKES.into_iter().find(|name| *name == tag.name);
+        self.others.extend(other.filter(|name| !self.others.contains(name)));
         for line in lines(tag).map_err(|reason| damaged(format!("{}: {reason}", self.name(tag))))? {
             self.points += line.len();
             if self.points > MOST_POINTS {
@@ -106,7 +113,7 @@ impl Reading {
 
     fn finish(self) -> Result<Drawing, AssetProblem> {
         if self.strokes.is_empty() {
-            return Err(AssetProblem::NoStrokes);
+            return Err(AssetProblem::NoStrokes { instead: self.others });
         }
         let points = || self.strokes.iter().flat_map(|stroke| stroke.points.iter().copied());
         let bounds = || [points().fold(DVec2::INFINITY, DVec2::min), points().fold(DVec2::NEG_INFINITY, DVec2::max)];
@@ -215,8 +222,18 @@ mod tests {
 
     #[test]
     fn what_holds_no_strokes_is_refused() {
-        assert_eq!(decode_drawing("<svg><circle r='1'/></svg>"), Err(AssetProblem::NoStrokes));
-        assert_eq!(decode_drawing("<svg><path/></svg>"), Err(AssetProblem::NoStrokes));
+        for (text, instead) in [
+            ("<svg><path/></svg>", vec![]),
+            ("<svg><circle r='1'/></svg>", vec!["circle"]),
+            (
+                "<svg><defs><path id='a' d='M0 0L1 1'/><rect/></defs><use href='#a'/><text>A</text><use/></svg>",
+                vec!["use", "text"],
+            ),
+        ] {
+            assert_eq!(decode_drawing(text), Err(AssetProblem::NoStrokes { instead }), "{text}");
+        }
+        let shown = decode_drawing("<svg><use/><text>A</text></svg>").unwrap_err().to_string();
+        assert!(shown.starts_with("holds no strokes, only use, text (allowed: an SVG file with path"), "{shown}");
         for broken in ["", "<html/>", "<svg", "<svg><path d='M1'/></svg>", "<svg transform='x'/>", "</svg></svg>"] {
             assert!(matches!(decode_drawing(broken), Err(AssetProblem::Damaged(_))), "{broken}");
         }

@@ -111,7 +111,7 @@ bansho_base::parameters! {
         deaths_above: f64 = 500.0, limits(Range::new(1.0, 1e6));
         /// At most this many at a time.
         deaths_at_most: f64 = 100.0, limits(Range::new(0.0, 1e6));
-        /// Takes the four counts as those of a near cell that holds 75 particles on average, and scales them to as many as there are, so that the look does not depend on `count` of the particles; if not, they are taken as they are.
+        /// Takes the four counts as those of a near cell that holds 75 particles on average, and scales them to as many as there are, so that the look does not depend on `count` of the particles; births then go by stretches of the sheets, to those that lack most, and deaths to those that hold too many. If not, they are taken as they are, cell by cell.
         scaled: bool = true;
     }
 }

@@ -164,7 +164,7 @@ fn plate(scene: &Scene, root: &Table, assets: &dyn Assets, reader: &mut Reader) 
 }
 
 /// Where the value at a dotted path stands, or the nearest part of it that the file states.
-fn place(root: &Table, path: &str) -> Option<Span> {
+pub(super) fn place(root: &Table, path: &str) -> Option<Span> {
     let mut value = None;
     let mut span = None;
     for segment in path.split('.') {

@@ -30,7 +30,7 @@ pub use self::{
     picture::{DepthKind, FrameRate, LightParameters, PictureParameters, PlateParameters},
     place::{Place, Segment},
     report::SceneError,
-    source::{Describe, Opening, OpeningFault, PhenomenonKind, Source},
+    source::{Describe, Memo, Opening, OpeningFault, PhenomenonKind, Source},
 };
 
 /// The scene format that this version reads and writes.
@@ -206,6 +206,17 @@ impl Scene {
             }
         }
         self
+    }
+
+    /// Where the text of a scene states a parameter of the phenomenon `name`, or the nearest part of it: one-based line and column. None
+    /// where it states no such phenomenon.
+    pub fn position(&self, text: &str, name: &str, key: Option<&str>) -> Option<(usize, usize)> {
+        let place = self.instances.iter().position(|instance| instance.name == name)?;
+        let kind = self.instances[place].kind.key;
+        let index = self.instances[..place].iter().filter(|instance| instance.kind.key == kind).count();
+        let rest = key.map_or_else(String::new, |key| format!(".{key}"));
+        let span = check::place(&toml::parse(text).ok()?, &format!("{kind}.{index}{rest}"))?;
+        Some(report::position(text, span.start))
     }
 
     /// Whether phenomena lie over a plate.

@@ -36,9 +36,7 @@ impl fmt::Display for SceneError {
 impl SceneError {
     /// One-based line and column (in characters) of a byte of the text.
     pub fn position(&self, byte: usize) -> (usize, usize) {
-        let before = &self.text[..floor_char_boundary(&self.text, byte)];
-        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+        position(&self.text, byte)
     }
 
     fn show(&self, f: &mut fmt::Formatter<'_>, problem: &Problem) -> fmt::Result {
@@ -58,6 +56,13 @@ impl SceneError {
             "^".repeat(carets)
         )
     }
+}
+
+/// One-based line and column (in characters) of a byte of a text.
+pub(super) fn position(text: &str, byte: usize) -> (usize, usize) {
+    let before = &text[..floor_char_boundary(text, byte)];
+    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
 }
 
 fn floor_char_boundary(text: &str, byte: usize) -> usize {

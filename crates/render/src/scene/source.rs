@@ -1,5 +1,10 @@
 //! The kinds of phenomena that a scene may hold, and how each is made from its table.
 
+use std::{
+    any::Any,
+    sync::{Arc, Mutex, PoisonError},
+};
+
 use bansho_base::{
     assets::Assets,
     parameters::{Parameter, Parameters, ProblemKind, Reader, Table, TableDescriptor},
@@ -17,6 +22,32 @@ pub struct Opening<'a> {
     pub loop_s: Option<f64>,
     /// Where pictures and texts come from.
     pub assets: &'a dyn Assets,
+}
+
+/// What making a phenomenon has found from its parameters alone, so that it need not be found again when the phenomenon is made for the next
+/// purpose: to check it, to remark on it, to draw it.
+#[derive(Default)]
+pub struct Memo(Mutex<Vec<Known>>);
+
+/// What is known for a length of the loop, as its bits.
+type Known = (Option<u64>, Arc<dyn Any + Send + Sync>);
+
+impl Memo {
+    /// What is known for a loop of that length, s.
+    #[must_use]
+    pub fn get<T: Send + Sync + 'static>(&self, loop_s: Option<f64>) -> Option<Arc<T>> {
+        let known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let own = known.iter().find(|(length, _)| *length == loop_s.map(f64::to_bits))?;
+        own.1.clone().downcast().ok()
+    }
+
+    /// Keeps what is known for a loop of that length, s, instead of what was.
+    pub fn keep<T: Send + Sync + 'static>(&self, loop_s: Option<f64>, value: Arc<T>) {
+        let length = loop_s.map(f64::to_bits);
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        known.retain(|(other, _)| *other != length);
+        known.push((length, value));
+    }
 }
 
 /// A fault that only making the phenomenon shows.
@@ -87,6 +118,14 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     /// Parameters that do not go together, or an asset that cannot be had.
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault>;
 
+    /// Makes the phenomenon where the same parameters may have been opened before, with what `memo` knows from then.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open).
+    fn open_again(&self, opening: &Opening, _memo: &Memo) -> Result<Box<dyn Phenomenon>, OpeningFault> {
+        self.open(opening)
+    }
+
     /// The kind that scene files call by [`KEY`](Self::KEY).
     const KIND: PhenomenonKind = PhenomenonKind {
         key: Self::KEY,
@@ -98,10 +137,10 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
 }
 
 fn read_described<P: Describe>(table: &Table, reader: &mut Reader) -> Box<dyn Source> {
-    Box::new(Described(P::read_table(table, reader, &COMMON_KEYS)))
+    Box::new(Described(P::read_table(table, reader, &COMMON_KEYS), Memo::default()))
 }
 
-struct Described<P>(P);
+struct Described<P>(P, Memo);
 
 impl<P: Describe> Source for Described<P> {
     fn canonical(&self) -> Table {
@@ -117,11 +156,11 @@ impl<P: Describe> Source for Described<P> {
     }
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
-        let Some(seconds) = opening.loop_s else { return self.0.open(opening) };
+        let Some(seconds) = opening.loop_s else { return self.0.open_again(opening, &self.1) };
         let mut repeating = self.0.clone();
         match repeating.close_loop(seconds) {
             Some(key) => Err(OpeningFault { key, kind: ProblemKind::LoopJumps { seconds } }),
-            None => repeating.open(opening),
+            None => repeating.open_again(opening, &self.1),
         }
     }
 }

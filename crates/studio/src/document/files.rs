@@ -6,26 +6,24 @@ use std::{
     sync::Arc,
 };
 
-use bansho::media::{MediaError, atomic};
+use bansho::{
+    job::{JobError, SceneFile},
+    media::{MediaError, atomic},
+};
 
 use super::Document;
 
 /// Why a document cannot be opened.
 #[derive(Debug, thiserror::Error)]
-#[error("{path}: cannot be opened: {source}", path = .path.display())]
-pub struct OpenError {
-    /// Its file.
-    pub path: PathBuf,
-    /// What the system said.
-    pub source: io::Error,
-}
+#[error(transparent)]
+pub struct OpenError(Box<JobError>);
 
 /// The text in `path`.
 ///
 /// # Errors
 /// There is no such file, it cannot be read, or it is not UTF-8.
 pub fn read(path: &Path) -> Result<String, OpenError> {
-    fs::read_to_string(path).map_err(|source| OpenError { path: path.to_path_buf(), source })
+    SceneFile::read(path).map(|file| file.text).map_err(|error| OpenError(Box::new(error)))
 }
 
 /// Opens the scene in `path`.

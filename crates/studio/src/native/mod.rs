@@ -105,12 +105,16 @@ fn fail(message: &str) -> ExitCode {
 }
 
 fn run(painter: Painting, scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
-    let document = match &scene {
-        Some(path) => files::open(path)?,
-        None => Document::new("scene", FLAME_SHEET),
+    let (opened, fault) = match scene.as_deref().map(files::open).transpose() {
+        Ok(opened) => (opened, None),
+        Err(error) => (None, Some(error.to_string())),
     };
     let build: Build = Box::new(move |ctx| {
-        let session = session(ctx, document, scene)?;
+        // Where there is no such scene, the window says so and has another.
+        let scene = scene.filter(|_| opened.is_some());
+        let document = opened.unwrap_or_else(|| Document::new("scene", FLAME_SHEET));
+        let mut session = session(ctx, document, scene)?;
+        session.set_notice(fault);
         Ok(Box::new(Studio::new(session, home())))
     });
     painter.show(viewport(window_size(home().as_deref())), build)

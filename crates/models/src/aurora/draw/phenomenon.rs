@@ -89,13 +89,27 @@ impl Aurora {
     /// # Errors
     /// Shapes that are no aurora's, flux or energy that do not end a loop as they begin it.
     pub fn new(
-        mut parameters: AuroraParameters,
+        parameters: AuroraParameters,
         name: &str,
         seed: u64,
         loop_s: Option<f64>,
         assets: &dyn Assets,
     ) -> Result<Self, ShapeFault> {
         let sequence = Sequence::new(&parameters.shapes, &parameters.motion, parameters.extent_km, assets, loop_s)?;
+        Self::moving(parameters, sequence, name, seed, loop_s)
+    }
+
+    /// The same, of the sequence that its shapes and that loop make.
+    ///
+    /// # Errors
+    /// Flux or energy that do not end a loop as they begin it, energies beyond the tables.
+    pub fn moving(
+        mut parameters: AuroraParameters,
+        sequence: Sequence,
+        name: &str,
+        seed: u64,
+        loop_s: Option<f64>,
+    ) -> Result<Self, ShapeFault> {
         let dissolve = loop_s.map_or(Ok(0.0), |turn| close_loop(&mut parameters, turn))?;
         energies::check(&parameters)?;
         let crossing = sequence.crossing();

@@ -16,6 +16,7 @@ mod relocation;
 mod scatter;
 mod simulation;
 mod snapshot;
+mod stretches;
 #[cfg(test)]
 mod tests;
 

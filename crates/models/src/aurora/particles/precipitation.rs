@@ -27,6 +27,8 @@ const FINE: usize = 257;
 const MOST_UNEVEN: f64 = 6.0;
 /// The power of a particle comes this share nearer in a step to what it shall be.
 const FOLLOWING: f32 = 0.2;
+/// Least and most that all powers are changed by to make up for that delay: a flux that is keyed to jump is followed in some steps still.
+const BALANCE: [f64; 2] = [0.9, 1.1];
 /// W for one mW/m^2 on one km^2.
 const W_PER_KM2: f64 = 1e3;
 
@@ -89,7 +91,9 @@ impl Precipitation {
         let weights: Vec<_> = stretches(particles).into_par_iter().zip(&weighed).map(add_up).collect();
         let weights = weights.iter().fold(Nodes::new(sheets), |sum, part| sum.plus(part));
         let factors = self.wanted(course, time).shared_by(&weights);
-        stretches(particles).into_par_iter().for_each(|part| part.brighten(&lengths, &factors));
+        let given: Vec<[f64; 2]> =
+            stretches(particles).into_par_iter().map(|part| part.brighten(&lengths, &factors)).collect();
+        balance(particles, &given);
     }
 
     /// Weighs a stretch of particles, as negative powers while they wait for their factors.
@@ -209,15 +213,32 @@ impl Stretch<'_> {
     }
 
     /// Gives particles that wait for them their factors. Their power follows what it shall be with a delay: where two parts of a sheet
-    /// lie close together, a particle that passes from the one to the other does not flash.
-    fn brighten(self, lengths: &Nodes<FINE>, factors: &Nodes<COARSE>) {
+    /// lie close together, a particle that passes from the one to the other does not flash. Gives the power that they shall have together, and
+    /// the one that they have, W.
+    fn brighten(self, lengths: &Nodes<FINE>, factors: &Nodes<COARSE>) -> [f64; 2] {
+        let mut sums = [0.0; 2];
         for (index, power) in self.powers.iter_mut().enumerate().filter(|(_, power)| power.is_sign_negative()) {
             let (sheet, share) = (self.sheets[index], self.shares[index]);
             let wanted = -*power * (lengths.at(sheet, share) * factors.at(sheet, share)) as f32;
             let full = &mut self.full_powers[index];
-            *full = if *full > 0.0 { *full + FOLLOWING * (wanted - *full) } else { wanted };
+            // Those that are just appearing begin with nothing: as fast as they rise, those around them give up their share.
+            let follows = *full > 0.0 || self.fades[index] < 1.0;
+            *full = if follows { *full + FOLLOWING * (wanted - *full) } else { wanted };
             *power = self.fades[index] * *full;
+            sums[0] += f64::from(self.fades[index] * wanted);
+            sums[1] += f64::from(*power);
         }
+        sums
+    }
+}
+
+/// Makes up for the delay with which powers follow, from the powers that parts of the particles shall have and those that they have: else all
+/// would be too bright while many are being born, for those that were there give up their share late.
+fn balance(particles: &mut AuroraParticles, given: &[[f64; 2]]) {
+    let [wanted, found] = given.iter().fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+    if found > 0.0 {
+        let factor = (wanted / found).clamp(BALANCE[0], BALANCE[1]) as f32;
+        particles.powers_w.par_chunks_mut(TASK).for_each(|powers| powers.iter_mut().for_each(|power| *power *= factor));
     }
 }
 

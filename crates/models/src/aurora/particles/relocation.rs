@@ -10,6 +10,8 @@ use super::{
     AuroraParticles,
     course::Course,
     field::{Field, full_count},
+    scatter::Scattered,
+    stretches::{Stretch, Stretches},
 };
 use crate::aurora::{AuroraParameters, RelocationParameters};
 
@@ -19,8 +21,11 @@ const THINNING: Purpose = Purpose::named("aurora thinning");
 const TABLE_COUNT: f64 = 75.0;
 /// Particles that a task of the thread pool finds the cells of, at least.
 const TASK: usize = 4096;
-/// How much a cell counts beside each of those around it where it is found what it lacks.
-const OWN_WEIGHT: f64 = 12.0;
+/// By so much more is a stretch filled than the table says: until the next renewal it stretches by up to a half, and its particles move on.
+const AHEAD: f64 = 1.35;
+
+/// Place and velocity of a particle that is born, km and km/s.
+type Birth = (DVec2, [f32; 2]);
 
 /// Table 3.3 for a number of particles, and the random numbers of births.
 #[derive(Clone, Debug)]
@@ -48,18 +53,16 @@ impl Relocation {
         }
     }
 
-    /// Lets strays and the surplus die and fills what is thin, by the shape and field from before the renewal.
+    /// Lets strays and the surplus die and fills what is thin, by the shape, its scattered particles and the field from before the renewal.
     pub(super) fn relocate(
         &self,
         particles: &mut AuroraParticles,
-        field: &Field,
-        course: &Course,
+        (field, course, scattered): (&Field, &Course, &[Scattered]),
         renewal: u32,
         next_id: &mut u64,
     ) {
         let near = near_cells(field, &self.parameters);
-        let shares = self.shares(field, &near);
-        let scale = self.scale(&shares);
+        let scale = self.scale(&self.shares(field, &near));
         let homes = (0..particles.len()).into_par_iter().with_min_len(TASK);
         let homes: Vec<Option<usize>> = homes.map(|i| home(particles, field, i)).collect();
         for (index, home) in homes.iter().enumerate() {
@@ -67,13 +70,19 @@ impl Relocation {
         }
         let residents = Residents::new(particles, &homes, near.len());
         self.cull(particles, &residents, course, scale);
-        for (place, velocity) in
-            self.births(particles, &residents, (field, course), (&shares, scale), *next_id, renewal)
-        {
+        let births = if self.parameters.scaled {
+            let mut stretches = Stretches::new(course, scattered, self.count);
+            stretches.fill(particles);
+            let births = self.births_along(&mut stretches, scattered, particles.len(), renewal);
+            self.thin(particles, &mut stretches, renewal);
+            births
+        } else {
+            self.births_by_cell(particles, &residents, (field, course), &near, *next_id, renewal)
+        };
+        for (place, velocity) in births {
             particles.push(*next_id, place, velocity, 0.0);
             *next_id += 1;
         }
-        self.thin(particles, renewal);
     }
 
     /// How much of a whole cell the sheets cover of each near cell, from 0 to 1; 0 in others. All near cells count as whole where the table
@@ -110,29 +119,29 @@ impl Relocation {
         }
     }
 
-    /// In every near cell with too few, the deficit appears at random, with the mean velocity of the cells around: places and velocities.
-    fn births(
+    /// In every near cell with too few, the deficit appears at random, with the mean velocity of the cells around: places and velocities, by
+    /// the letter of the table.
+    fn births_by_cell(
         &self,
         particles: &AuroraParticles,
         residents: &Residents,
         (field, course): (&Field, &Course),
-        (shares, scale): (&[f64], f64),
+        near: &[bool],
         first_id: u64,
         renewal: u32,
-    ) -> Vec<(DVec2, [f32; 2])> {
+    ) -> Vec<Birth> {
         let columns = field.counts.size()[0];
         let origin = DVec2::from(field.counts.origin());
         let mut births = Vec::new();
-        for cell in (0..shares.len()).filter(|cell| shares[*cell] > 0.0) {
-            let lack = self.lack(residents, (shares, scale), cell, columns);
-            let deficit = lack.min(self.parameters.births_at_most * scale).round();
+        for cell in (0..near.len()).filter(|cell| near[*cell]) {
+            let lack = self.parameters.births_below - residents.of(cell).len() as f64;
+            let deficit = lack.min(self.parameters.births_at_most).round();
             if deficit < 1.0 {
                 continue;
             }
             let velocity = residents.mean_velocity(particles, cell, columns);
             let corner = DVec2::new((cell % columns) as f64, (cell / columns) as f64);
-            let room = MOST_PARTICLES * self.count - (particles.len() + births.len()) as f64;
-            for _ in 0..deficit.min(room.max(0.0)) as u64 {
+            for _ in 0..deficit.min(self.room(particles.len() + births.len())) as u64 {
                 let id = first_id + births.len() as u64;
                 let [u, v, ..] = self.key.words(id, renewal, BIRTH).map(|word| f64::from(uniform(word)));
                 let place = origin + (corner + DVec2::new(u, v)) * field.counts.spacing();
@@ -142,31 +151,62 @@ impl Relocation {
         births
     }
 
-    /// How many a near cell lacks. Where the table is not taken to the letter, the cells around count too: particles that have swung to the
-    /// one side of a sheet leave little to fill up on the other.
-    fn lack(&self, residents: &Residents, (shares, scale): (&[f64], f64), cell: usize, columns: usize) -> f64 {
-        let least = self.parameters.births_below * scale;
-        if !self.parameters.scaled {
-            return least * shares[cell] - residents.of(cell).len() as f64;
+    /// Where a stretch of the sheets holds too few, the deficit appears among the places of its scattered particles, with the mean velocity
+    /// there. All together are as many as the table gives to all near cells at most; where they are born is where they lack. Cells would not
+    /// see that: where sheets bend, a full limb passes through the cells of an empty one.
+    fn births_along(
+        &self,
+        stretches: &mut Stretches,
+        scattered: &[Scattered],
+        living: usize,
+        renewal: u32,
+    ) -> Vec<Birth> {
+        let [below, most] =
+            [self.parameters.births_below, self.parameters.births_at_most].map(|count| count / TABLE_COUNT);
+        let lack = |stretch: &Stretch| (AHEAD * below * stretch.due - stretch.found).max(0.0);
+        let lacks: Vec<f64> = stretches.all().iter().map(lack).collect();
+        let lacking: f64 = lacks.iter().sum();
+        if lacking <= 0.0 {
+            return Vec::new();
         }
-        let (mut wanted, mut found) = (0.0, 0.0);
-        for other in cells_around(cell, columns, shares.len()) {
-            let weight = if other == cell { OWN_WEIGHT } else { 1.0 };
-            wanted += weight * shares[other];
-            found += weight * residents.of(other).len() as f64;
+        let given = (most * self.count).min(self.room(living)).min(lacking) / lacking;
+        let chance = |(lack, stretch): (&f64, &mut Stretch)| given * lack / stretch.scattered.max(1.0);
+        let chances: Vec<f64> = lacks.iter().zip(stretches.all()).map(chance).collect();
+        let velocities: Vec<[f32; 2]> = (0..chances.len()).map(|index| stretches.velocity(index)).collect();
+        let mut births = Vec::new();
+        for (number, particle) in scattered.iter().enumerate() {
+            let Some(index) = stretches.index(particle.sheet, particle.share).filter(|index| chances[*index] > 0.0)
+            else {
+                continue;
+            };
+            if f64::from(self.key.uniforms(number as u64, renewal, BIRTH)[0]) < chances[index] {
+                births.push((particle.place, velocities[index]));
+                stretches.all()[index].found += 1.0;
+            }
         }
-        // The cell's own part of what all of them lack.
-        (least * wanted - found) * shares[cell] / wanted
+        births
     }
 
-    /// Lets the surplus over the wanted count die, evenly.
-    fn thin(&self, particles: &mut AuroraParticles, renewal: u32) {
-        let live = particles.dying.iter().filter(|dying| !**dying).count() as f64;
-        let share = ((live - self.count) / live.max(1.0)) as f32;
-        if self.parameters.scaled && share > 0.0 {
-            for (dying, id) in particles.dying.iter_mut().zip(&particles.ids) {
-                *dying |= self.key.uniforms(*id, renewal, THINNING)[0] < share;
-            }
+    /// How many more particles may be born among so many.
+    fn room(&self, living: usize) -> f64 {
+        (MOST_PARTICLES * self.count - living as f64).max(0.0)
+    }
+
+    /// Lets the surplus over the wanted count die, in the stretches that hold more than their share.
+    fn thin(&self, particles: &mut AuroraParticles, stretches: &mut Stretches, renewal: u32) {
+        let living: f64 = stretches.all().iter().map(|stretch| stretch.found).sum();
+        let excess = |stretch: &Stretch| (stretch.found - stretch.due).max(0.0);
+        let excesses: Vec<f64> = stretches.all().iter().map(excess).collect();
+        let share = (living - self.count) / excesses.iter().sum::<f64>().max(1.0);
+        if share <= 0.0 {
+            return;
+        }
+        let chance = |(excess, stretch): (&f64, &mut Stretch)| (share * excess / stretch.found.max(1.0)) as f32;
+        let chances: Vec<f32> = excesses.iter().zip(stretches.all()).map(chance).collect();
+        for (index, dying) in particles.dying.iter_mut().enumerate().filter(|(_, dying)| !**dying) {
+            let Some(stretch) = stretches.index(particles.sheets[index], particles.shares[index]) else { continue };
+            let chance = chances[stretch];
+            *dying = chance > 0.0 && self.key.uniforms(particles.ids[index], renewal, THINNING)[0] < chance;
         }
     }
 }

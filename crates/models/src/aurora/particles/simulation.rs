@@ -72,6 +72,8 @@ pub(super) struct State {
 #[derive(Clone, Debug)]
 struct Target {
     course: Course,
+    /// The particles that were scattered about it.
+    scattered: Vec<Scattered>,
     field: Field,
     /// delta_0, particles per km^2.
     rest_density: f64,
@@ -85,8 +87,8 @@ impl Making {
         Course::new((&shape, &bridges), along, &self.folding, time, reach)
     }
 
-    /// The target that a state speaks of, and the particles that were scattered about it.
-    fn target(&self, state: &State) -> (Target, Vec<Scattered>) {
+    /// The target that a state speaks of.
+    fn target(&self, state: &State) -> Target {
         let course = self.course(&state.target_along, state.target_time);
         let count = self.parameters.particles.count as usize;
         let scattered = scatter(&course, self.parameters.half_thickness_km(), count, self.key, state.renewals);
@@ -94,7 +96,7 @@ impl Making {
         let near = near_cells(&field, &self.parameters.particles.relocation);
         let near = near.into_iter().filter(|near| *near).count().max(1) as f64;
         let cell = self.parameters.cell_km();
-        (Target { course, field, rest_density: count as f64 / (near * cell * cell) }, scattered)
+        Target { course, scattered, field, rest_density: count as f64 / (near * cell * cell) }
     }
 }
 
@@ -138,11 +140,11 @@ impl AuroraSimulation {
         };
         let (folding, fields) = (Folding::new(&parameters, key), FieldMaker::new(&parameters, key));
         let making = Making { key, parameters, sequence, folding, fields };
-        let (target, scattered) = making.target(&state);
-        for (id, particle) in scattered.iter().enumerate() {
+        let target = making.target(&state);
+        for (id, particle) in target.scattered.iter().enumerate() {
             state.particles.push(id as u64, particle.place, [0.0; 2], 1.0);
         }
-        state.next_id = scattered.len() as u64;
+        state.next_id = target.scattered.len() as u64;
         state.support_km = repulsion.support_km(target.rest_density);
         let rays = precipitation.rays(&target.course, time);
         precipitation.share_out(&mut state.particles, (&target.course, &rays), time);
@@ -168,15 +170,14 @@ impl AuroraSimulation {
         let (state, target) = (&mut self.state, &self.target);
         self.relocation.relocate(
             &mut state.particles,
-            &target.field,
-            &target.course,
+            (&target.field, &target.course, &target.scattered),
             state.renewals,
             &mut state.next_id,
         );
         state.renewals += 1;
         state.target_time = (state.steps + frames) as f64 * Self::STEP_S - self.making.parameters.preroll_s;
         state.target_along = state.along.follow(&self.making.sequence.at(state.target_time));
-        self.target = self.making.target(&self.state).0;
+        self.target = self.making.target(&self.state);
     }
 
     /// Time of the state, s.
@@ -231,8 +232,14 @@ impl AuroraSimulation {
             return Err(SnapshotError::Damaged);
         }
         self.state = state;
-        self.target = self.making.target(&self.state).0;
+        self.target = self.making.target(&self.state);
         Ok(())
+    }
+
+    /// The sheets as they are now, with their folds.
+    #[cfg(test)]
+    pub(super) fn course(&self) -> Course {
+        self.making.course(&self.state.along, self.time())
     }
 
     /// Its parameters.

@@ -24,7 +24,7 @@ impl Anchors {
     /// What `links` to shape `index` ask for, which has `count` sheets and comes of `sheets` by `change`.
     ///
     /// # Errors
-    /// A sheet that is not there, a sheet that is linked to two, points that would pass each other.
+    /// A sheet that is not there, a sheet that is linked to two, points that would pass each other or arrive nowhere.
     pub(super) fn new(
         links: &[LinkParameters],
         index: usize,
@@ -43,6 +43,9 @@ impl Anchors {
             anchors.send(change, track, to).map_err(fault)?;
             match (link.at, link.arrives) {
                 (Some(_), Some(share)) => anchors.points.push((track, share.clamp(END, 1.0 - END))),
+                (Some(_), None) if !splits(&sheets[from], change) => {
+                    return Err(fault(ShapeFaultKind::NowhereToArrive));
+                }
                 (_, None) => {}
                 (None, Some(_)) => return Err(fault(ShapeFaultKind::HalfALink)),
             }
@@ -90,6 +93,13 @@ impl Anchors {
         };
         strand.iter().enumerate().filter_map(arrives).collect()
     }
+}
+
+/// Whether a sheet parts on the way.
+fn splits(sheet: &[usize], change: &Change) -> bool {
+    let whole =
+        |strand: &Vec<usize>| [sheet.first(), sheet.last()].into_iter().flatten().all(|end| strand.contains(end));
+    !change.strands.iter().any(whole)
 }
 
 /// The control point within `sheet` that is nearest to the share `at` of its length.

@@ -188,7 +188,8 @@ fn strokes(file: &str, id: Option<&str>, extent_km: f64, assets: &dyn Assets) ->
     let wanted = drawing.strokes.iter().filter(|stroke| id.is_none() || stroke.id.as_deref() == id);
     let strokes: Vec<Vec<DVec2>> = wanted.map(|stroke| fitted(&stroke.points, &drawing, extent_km)).collect();
     if strokes.is_empty() {
-        let problem = id.map_or(AssetProblem::NoStrokes, |id| AssetProblem::NoStroke(id.to_owned()));
+        let problem =
+            id.map_or(AssetProblem::NoStrokes { instead: Vec::new() }, |id| AssetProblem::NoStroke(id.to_owned()));
         return Err(AssetError { path: file.to_owned(), problem });
     }
     Ok(strokes)

@@ -174,6 +174,11 @@ pub enum ShapeFaultKind {
     /// A link that says where a point arrives and not where it leaves.
     #[error("says `arrives`, but not which point does; allowed: together with `at`")]
     HalfALink,
+    /// A link that says where a point leaves and not where it arrives, of a sheet that is all one.
+    #[error(
+        "says `at`, but not where that point arrives; allowed: together with `arrives`, or alone where the sheet splits"
+    )]
+    NowhereToArrive,
     /// Linked points that change their order.
     #[error("two linked points of a sheet would pass each other; allowed: points in the order of the sheet")]
     LinksCross,
@@ -192,6 +197,11 @@ pub enum ShapeFaultKind {
     /// A time that is said in two ways.
     #[error("says both `after_s` and `after_frames`; allowed: one of them")]
     SecondsAndFrames,
+    /// A time before the first shape.
+    #[error(
+        "the first shape is there at the beginning; allowed: at the shapes after it, and `hold_s` here says how long it stays"
+    )]
+    FirstShapeIsThere,
     /// Electrons of an energy that the tables of the air do not hold.
     #[error(
         "at {at} of its length sheet {sheet} has electrons of {energy_ev:.0} eV, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV"

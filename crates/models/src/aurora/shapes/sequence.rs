@@ -4,6 +4,7 @@ use bansho_base::{
     assets::Assets,
     math::{self, DVec2},
 };
+use rayon::prelude::*;
 
 use super::{
     Correspondence, FRAME_S, MotionParameters, Shape, ShapeFault, ShapeFaultKind, ShapeParameters, Sheet,
@@ -169,7 +170,7 @@ impl Sequence {
     /// How many segments cross in the in-between shapes at `count` evenly spaced times, all added up.
     pub fn crossings(&self, count: usize) -> usize {
         let step = self.duration() / count.max(1) as f64;
-        (0..count).map(|index| self.at((index as f64 + 0.5) * step).crossings()).sum()
+        (0..count).into_par_iter().map(|index| self.at((index as f64 + 0.5) * step).crossings()).sum()
     }
 
     /// The shape of the scene, counted from 0, on whose way sheets first pass through each other or themselves, where they do.
@@ -236,6 +237,10 @@ fn timing(shapes: &[ShapeParameters]) -> Result<Timing, ShapeFault> {
             (None, Some(frames)) => frames * FRAME_S,
             (None, None) => TRANSITION_S,
         };
+        let timed = [("after_s", shape.after_s.is_none()), ("after_frames", shape.after_frames.is_none())];
+        if let Some((key, _)) = timed.into_iter().find(|(_, none)| index == 0 && !none) {
+            return Err(fault(key, ShapeFaultKind::FirstShapeIsThere));
+        }
         let changes =
             [("split", shape.split.is_empty()), ("merge", shape.merge.is_empty()), ("link", shape.link.is_empty())];
         if let Some((key, _)) = changes.into_iter().find(|(_, none)| index == 0 && !none) {

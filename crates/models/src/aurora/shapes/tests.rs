@@ -20,6 +20,13 @@ fn shape(sheets: Vec<SheetParameters>) -> ShapeParameters {
     ShapeParameters { after_s: Some(4.0), sheets, ..ShapeParameters::default() }
 }
 
+/// The first of the shapes is there at the beginning.
+fn begun(shapes: &[ShapeParameters]) -> Vec<ShapeParameters> {
+    let mut shapes = shapes.to_vec();
+    shapes[0].after_s = None;
+    shapes
+}
+
 fn straight(from: f64, to: f64, z: f64) -> SheetParameters {
     sheet(&[[from, z], [to, z]])
 }
@@ -33,7 +40,7 @@ fn in_order(control_points: i64) -> MotionParameters {
 }
 
 fn sequence(shapes: &[ShapeParameters], motion: &MotionParameters) -> Sequence {
-    Sequence::new(shapes, motion, EXTENT_KM, &MemoryAssets::default(), None).unwrap()
+    Sequence::new(&begun(shapes), motion, EXTENT_KM, &MemoryAssets::default(), None).unwrap()
 }
 
 fn points(shape: &Shape) -> Vec<Vec<[f64; 2]>> {
@@ -149,7 +156,8 @@ fn loops_close_whether_the_sequence_returns_or_not() {
     let shapes = [straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 80.0), straight(-150.0, 250.0, 20.0)];
     let mut shapes: Vec<ShapeParameters> = shapes.map(|sheet| shape(vec![sheet])).to_vec();
     let looped = |shapes: &[ShapeParameters]| {
-        Sequence::new(shapes, &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), Some(6.0)).unwrap()
+        Sequence::new(&begun(shapes), &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), Some(6.0))
+            .unwrap()
     };
     let there_and_back = looped(&shapes);
     shapes.push(shapes[0].clone());
@@ -167,7 +175,8 @@ fn loops_close_whether_the_sequence_returns_or_not() {
     // Half way round it is at the middle shape or at the last one.
     assert!((there_and_back.at(3.0).sheets[0].points[0].y - 20.0).abs() < 1e-9);
     assert!((round.at(2.0).sheets[0].points[0].y - 80.0).abs() < 1e-9);
-    let fault = Sequence::new(&shapes, &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), Some(0.0));
+    let fault =
+        Sequence::new(&begun(&shapes), &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), Some(0.0));
     assert_eq!(fault.unwrap_err().to_string(), "loop: a loop of 0 s; allowed: more than 0");
 }
 
@@ -203,7 +212,7 @@ fn random_sequences_stay_finite_and_inside() {
         let motion =
             MotionParameters { control_points: Auto::Set(8 + (case % 40) as i64), ..MotionParameters::default() };
         let loop_s = (case % 3 == 0).then_some(7.0);
-        let Ok(sequence) = Sequence::new(&shapes, &motion, EXTENT_KM, &MemoryAssets::default(), loop_s) else {
+        let Ok(sequence) = Sequence::new(&begun(&shapes), &motion, EXTENT_KM, &MemoryAssets::default(), loop_s) else {
             continue;
         };
         made += 1;
@@ -240,7 +249,7 @@ fn long_strokes_are_checked() {
     let crossed: Vec<[f64; 2]> =
         (0..10_000).map(|index| turn(index, 300.0 - (index as f64 - 5000.0).abs() * 0.04)).collect();
     let fault = Sequence::new(
-        &[shape(vec![sheet(&crossed)])],
+        &begun(&[shape(vec![sheet(&crossed)])]),
         &MotionParameters::default(),
         EXTENT_KM,
         &MemoryAssets::default(),
@@ -260,7 +269,7 @@ fn a_shape_that_returns_with_another_flux_is_another() {
         let once = sequence(&shapes, &motion);
         let last = &once.at(once.duration()).sheets[0];
         assert!(last.flux.iter().all(|flux| *flux == 3.0) && last.energy.iter().all(|energy| *energy == 2.0));
-        let turn = Sequence::new(&shapes, &motion, EXTENT_KM, &MemoryAssets::default(), Some(9.0)).unwrap();
+        let turn = Sequence::new(&begun(&shapes), &motion, EXTENT_KM, &MemoryAssets::default(), Some(9.0)).unwrap();
         let [before, after] = [8.999, 9.001].map(|t| turn.at(t).sheets[0].flux[4]);
         assert!((before - after).abs() < 0.01, "{before} {after}");
     }
@@ -270,7 +279,7 @@ fn a_shape_that_returns_with_another_flux_is_another() {
         ..straight(-200.0, 200.0, 0.0)
     };
     let shapes = [shapes[0].clone(), shapes[1].clone(), shape(vec![same])];
-    let turn = Sequence::new(&shapes, &in_order(9), EXTENT_KM, &MemoryAssets::default(), Some(8.0)).unwrap();
+    let turn = Sequence::new(&begun(&shapes), &in_order(9), EXTENT_KM, &MemoryAssets::default(), Some(8.0)).unwrap();
     assert!((turn.at(4.0).sheets[0].points[0].y - 50.0).abs() < 1e-6, "round, not there and back");
 }
 
@@ -286,7 +295,7 @@ fn linked(link: Vec<LinkParameters>) -> Result<Sequence, ShapeFault> {
     let sheets = vec![straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 50.0)];
     let shapes = [shape(sheets.clone()), ShapeParameters { link, ..shape(sheets) }];
     let motion = MotionParameters { control_points: Auto::Set(11), ..MotionParameters::default() };
-    Sequence::new(&shapes, &motion, EXTENT_KM, &MemoryAssets::default(), None)
+    Sequence::new(&begun(&shapes), &motion, EXTENT_KM, &MemoryAssets::default(), None)
 }
 
 fn link(from: i64, to: i64, point: Option<[f64; 2]>) -> LinkParameters {
@@ -327,10 +336,26 @@ fn impossible_links_are_refused() {
     assert_eq!((twice.key.as_str(), twice.kind), ("shapes.1.link.1", ShapeFaultKind::LinkedTwice { sheet: 2 }));
     let half = LinkParameters { arrives: Some(0.5), ..LinkParameters::default() };
     assert_eq!(refused(&[half]).kind, ShapeFaultKind::HalfALink);
+    let nowhere = refused(&[link(1, 1, None), LinkParameters { at: Some(0.5), ..link(2, 2, None) }]);
+    assert_eq!((nowhere.key.as_str(), nowhere.kind), ("shapes.1.link.1", ShapeFaultKind::NowhereToArrive));
     let passing = [[0.2, 0.3], [0.5, 0.8], [0.8, 0.6]].map(|point| link(1, 1, Some(point)));
     assert_eq!(refused(&passing).kind, ShapeFaultKind::LinksCross);
-    let first = [ShapeParameters { link: vec![link(1, 1, None)], ..shape(vec![straight(0.0, 9.0, 0.0)]) }];
+    let first =
+        [ShapeParameters { link: vec![link(1, 1, None)], after_s: None, ..shape(vec![straight(0.0, 9.0, 0.0)]) }];
     let fault =
         Sequence::new(&first, &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), None).unwrap_err();
     assert_eq!(fault.kind, ShapeFaultKind::NothingBefore);
+}
+
+#[test]
+fn the_first_shape_takes_no_time_to_come() {
+    for (key, first) in [
+        ("shapes.0.after_s", ShapeParameters { after_s: Some(2.0), ..ShapeParameters::default() }),
+        ("shapes.0.after_frames", ShapeParameters { after_frames: Some(2.0), ..ShapeParameters::default() }),
+    ] {
+        let shapes = [first, ShapeParameters::default()];
+        let fault = Sequence::new(&shapes, &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), None);
+        let fault = fault.unwrap_err();
+        assert_eq!((fault.key.as_str(), fault.kind), (key, ShapeFaultKind::FirstShapeIsThere));
+    }
 }

@@ -18,5 +18,5 @@ pub(super) fn shapes(extent_km: f64) -> Vec<ShapeParameters> {
         |sheets: Vec<SheetParameters>| ShapeParameters { after_s: Some(20.0), sheets, ..ShapeParameters::default() };
     let first = shape(vec![band(38.0, 3, 20.0 / 600.0), arc(-140.0 / 600.0)]);
     let second = shape(vec![band(62.0, 3, 0.0), arc(-165.0 / 600.0)]);
-    vec![first.clone(), second, first]
+    vec![ShapeParameters { after_s: None, ..first.clone() }, second, first]
 }

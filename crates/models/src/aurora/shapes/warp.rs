@@ -27,25 +27,33 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
             evenness * stretch * stretch
         })
         .collect();
-    let mut costs = vec![f64::INFINITY; places + 1];
+    let (mut costs, mut next) = (vec![f64::INFINITY; places + 1], vec![f64::INFINITY; places + 1]);
     costs[0] = 0.0;
+    let mut best = vec![0.0_f64; places + 1];
     let mut steps = vec![0u8; (places + 1) * points.len()];
     for point in 1..=last {
-        let mut next = vec![f64::INFINITY; places + 1];
+        next.fill(f64::INFINITY);
+        best.fill(0.0);
         // Places from which the rest can still be reached, and that can be reached from the start.
         let low = (point * STEPS[0]).max(places.saturating_sub((last - point) * STEPS[1]));
         let high = (point * STEPS[1]).min(places - (last - point) * STEPS[0]);
-        for place in low..=high {
-            for step in STEPS[0]..=STEPS[1].min(place) {
-                let cost = costs[place - step] + step_costs[step];
-                if cost < next[place] {
-                    next[place] = cost;
-                    steps[point * (places + 1) + place] = step as u8;
-                }
+        // Step by step over all places: compilers make vector code of that.
+        for step in STEPS[0]..=STEPS[1].min(high) {
+            let first = low.max(step);
+            let from = &costs[first - step..=high - step];
+            let (step_cost, number) = (step_costs[step], step as f64);
+            for ((cost, best), from) in next[first..=high].iter_mut().zip(&mut best[first..=high]).zip(from) {
+                let found = from + step_cost;
+                *best = if found < *cost { number } else { *best };
+                *cost = if found < *cost { found } else { *cost };
             }
+        }
+        let row = &mut steps[point * (places + 1)..][..=places];
+        for place in low..=high {
+            row[place] = best[place] as u8;
             next[place] += nearness(point, place);
         }
-        costs = next;
+        std::mem::swap(&mut costs, &mut next);
     }
     let mut shares = vec![range[1]; points.len()];
     let mut place = places;

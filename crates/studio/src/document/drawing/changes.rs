@@ -199,7 +199,20 @@ impl Drawing {
 
     /// Without shape `shape`.
     pub fn remove_shape(&self, shape: usize) -> Vec<Operation> {
-        vec![Operation::Remove { place: self.shape(shape) }]
+        let next = self.parameters.shapes.get(1).filter(|_| shape == 0);
+        // What comes first is there from the beginning, and comes from nothing.
+        let stated = next.map_or(Vec::new(), |next| {
+            let keys = [
+                ("after_s", next.after_s.is_some()),
+                ("after_frames", next.after_frames.is_some()),
+                ("split", !next.split.is_empty()),
+                ("merge", !next.merge.is_empty()),
+                ("link", !next.link.is_empty()),
+            ];
+            keys.into_iter().filter(|(_, stated)| *stated).map(|(key, _)| key).collect()
+        });
+        let of_next = stated.into_iter().map(|key| Operation::Remove { place: self.shape(1).key(key) });
+        of_next.chain([Operation::Remove { place: self.shape(shape) }]).collect()
     }
 
     /// Reaches shape `shape` so long after the one before was left, s.

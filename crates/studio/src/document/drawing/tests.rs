@@ -128,6 +128,13 @@ fn shapes_are_added_timed_and_removed() {
     let drawing = change(&mut document, &drawing.remove_shape(1));
     assert_eq!(drawing.arrivals().len(), 1);
     assert!(is_good(&mut document));
+    // What comes first then is there from the beginning, in one piece or two.
+    let drawing = change(&mut document, &drawing.add_shape());
+    let drawing = change(&mut document, &drawing.retime(1, 2.5));
+    let drawing = change(&mut document, &drawing.split(1, 0, 0.4));
+    let drawing = change(&mut document, &drawing.remove_shape(0));
+    assert_eq!(drawing.arrivals(), [0.0]);
+    assert!(is_good(&mut document) && !document.text().contains("after_s"), "{}", document.text());
 }
 
 #[test]

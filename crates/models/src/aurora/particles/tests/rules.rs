@@ -172,14 +172,15 @@ fn relocated(count: usize, place: impl Fn(f64, f64) -> DVec2, table: RelocationP
     parameters.particles.relocation = table;
     let course = course(&parameters, &[&[[-200.0, 5.0], [200.0, 5.0]]], 60.0);
     let maker = FieldMaker::new(&parameters, KEY);
-    let field = maker.make(&course, &scatter(&course, 5.0, 20_000, KEY, 0), 0.0);
+    let scattered = scatter(&course, 5.0, 20_000, KEY, 0);
+    let field = maker.make(&course, &scattered, 0.0);
     let mut particles = AuroraParticles::default();
     for id in 0..count as u64 {
         let [u, v, ..] = KEY.uniforms(id, 0, bansho_base::random::Purpose(7)).map(f64::from);
         particles.push(id, place(u, v), [2.0, -1.0], 1.0);
     }
     let mut next = count as u64;
-    Relocation::new(&parameters, KEY).relocate(&mut particles, &field, &course, 0, &mut next);
+    Relocation::new(&parameters, KEY).relocate(&mut particles, (&field, &course, &scattered), 0, &mut next);
     (particles, next)
 }
 

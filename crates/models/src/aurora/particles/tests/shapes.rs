@@ -70,6 +70,82 @@ fn after_a_transition_particles_lie_on_the_target_and_everywhere_along_it() {
     }
 }
 
+/// A sheet through these points, taken to as they are.
+fn through(points: Vec<[f64; 2]>) -> SheetParameters {
+    SheetParameters { points: Some(points), smooth: false, ..SheetParameters::default() }
+}
+
+/// An S of three long limbs whose bends have a radius of 4 km, less than two cells.
+fn narrow_s() -> SheetParameters {
+    const RADIUS: f64 = 4.0;
+    let bend = |east: f64, south: f64, step: usize| {
+        let (sin, cos) = bansho_base::math::sin_cos(std::f64::consts::PI * step as f64 / 16.0);
+        [100.0 * east + east * RADIUS * sin, south - RADIUS * cos]
+    };
+    let mut points = vec![[-180.0, -2.0 * RADIUS]];
+    points.extend((0..=16).map(|step| bend(1.0, -RADIUS, step)));
+    points.extend((0..=16).map(|step| bend(-1.0, RADIUS, step)));
+    points.push([180.0, 2.0 * RADIUS]);
+    through(points)
+}
+
+/// Of all stretches of the sheets, folded as they are, that are as long as a fiftieth of them all: the least share that one holds of the
+/// particles that are due to it.
+fn least_stretch(simulation: &AuroraSimulation) -> f64 {
+    /// Bins of such a stretch, by which one is moved on to the next.
+    const BINS: usize = 4;
+    let course = simulation.course();
+    let lengths = course.sheet_lengths();
+    let (total, particles) = (lengths.iter().sum::<f64>(), simulation.particles());
+    let bins = |length: &f64| ((50 * BINS) as f64 * length / total).round() as usize;
+    let mut counts: Vec<Vec<f64>> = lengths.iter().map(|length| vec![0.0; bins(length)]).collect();
+    let mut living = 0.0;
+    for index in (0..particles.len()).filter(|index| !particles.dying[*index]) {
+        living += 1.0;
+        let Some(foot) = course.foot(particles.place(index)) else { continue };
+        let counts = &mut counts[foot.sheet as usize];
+        let last = counts.len().saturating_sub(1);
+        if let Some(bin) = counts.get_mut(((foot.share * (last + 1) as f64) as usize).min(last)) {
+            *bin += 1.0;
+        }
+    }
+    let stretches = counts.iter().zip(&lengths).flat_map(|(counts, length)| {
+        let due = living * BINS as f64 * length / (total * counts.len() as f64);
+        counts.windows(BINS).map(move |stretch| stretch.iter().sum::<f64>() / due)
+    });
+    stretches.fold(f64::INFINITY, f64::min)
+}
+
+/// With the particles, cells and folds of a scene that says nothing of them, on arrival and ever after.
+#[test]
+fn every_stretch_holds_its_share_from_the_arrival_on() {
+    for (name, sheet) in
+        [("an S with bends of 4 km", narrow_s()), ("fold", form(Form::Fold)), ("peel", form(Form::Peel))]
+    {
+        let shapes =
+            vec![ShapeParameters { sheets: vec![form(Form::Arc)], ..ShapeParameters::default() }, shape(vec![sheet])];
+        let parameters = AuroraParameters { shapes, ..AuroraParameters::default() };
+        let arrival = sequence(&parameters).arrivals()[1];
+        let mut simulation = simulation(parameters);
+        let (mut moments, mut told) = (0, Vec::new());
+        for step in 0.. {
+            simulation.step();
+            let since = simulation.time() - arrival;
+            if since > 2.0 {
+                break;
+            }
+            // From the arrival on every tenth step.
+            if since > -0.01 && step % 10 == 4 {
+                moments += 1;
+                let least = least_stretch(&simulation);
+                told.push(least);
+            }
+        }
+        assert!(moments >= 5, "{name}: {moments}");
+        assert!(told.iter().all(|least| *least >= 0.5), "{name}: {told:?}");
+    }
+}
+
 #[test]
 fn there_are_about_as_many_particles_as_are_asked_for() {
     let mut simulation = simulation(AuroraParameters { shapes: becoming(Form::Peel), ..small() });
@@ -154,27 +230,71 @@ fn poly6_with_spiky_parts_particles_that_the_spline_lets_be() {
     assert!(parted > 1.1 * spline, "{spline} {parted}");
 }
 
+/// Contrast of the particles along a straight sheet at rest: the coefficient of variation of their counts in bins as wide as a ray, half of
+/// the way from ray to ray, beside that of as many strewn at random; the mean over moments and seeds.
+fn contrast_along(kernel: RepulsionKernel, particles: i64) -> f64 {
+    const SEEDS: u64 = 2;
+    const MOMENTS: u64 = 3;
+    let mut sum = 0.0;
+    for seed in 0..SEEDS {
+        let mut parameters =
+            AuroraParameters { shapes: vec![shape(vec![line([-200.0, 0.0], [200.0, 0.0])])], ..small() };
+        parameters.field.cells = 255;
+        parameters.particles.count = particles;
+        parameters.particles.kernel = kernel;
+        let width = 0.5 * parameters.rays.scale_km;
+        let sequence = sequence(&parameters);
+        let mut simulation = AuroraSimulation::new(parameters, sequence, "aurora", seed);
+        (0..90).for_each(|_| simulation.step());
+        for _ in 0..MOMENTS {
+            (0..15).for_each(|_| simulation.step());
+            // Away from the ends.
+            let mut bins = vec![0.0_f64; (200.0 / width) as usize];
+            for (place, _) in live(&simulation).into_iter().filter(|(place, _)| place.x >= -100.0) {
+                if let Some(bin) = bins.get_mut(((place.x + 100.0) / width) as usize) {
+                    *bin += 1.0;
+                }
+            }
+            let mean = bins.iter().sum::<f64>() / bins.len() as f64;
+            let variance = bins.iter().map(|count| (count - mean) * (count - mean)).sum::<f64>() / bins.len() as f64;
+            sum += (variance / mean).sqrt();
+        }
+    }
+    sum / (SEEDS * MOMENTS) as f64
+}
+
+/// The thesis's reason to choose a kernel. It holds while particles are few; with as many as scenes have the field's noise, which is the same
+/// for both, makes the pattern of that width.
+#[test]
+fn rays_have_more_contrast_with_the_spline_while_particles_are_few() {
+    let of = |particles: i64| {
+        [RepulsionKernel::Spline, RepulsionKernel::Poly6Spiky].map(|kernel| contrast_along(kernel, particles))
+    };
+    let (few, many) = (of(12_000), of(60_000));
+    assert!(few[0] > 1.07 * few[1], "{few:?}");
+    assert!((many[0] / many[1] - 1.0).abs() < 0.07, "{many:?}: then the book is wrong");
+}
+
+/// Fifteen times the length, as many particles.
 #[test]
 fn a_step_costs_what_its_particles_cost_not_what_the_drawn_shapes_are_long() {
-    const RENEWALS: u32 = 3;
+    const RENEWALS: u32 = 6;
     let of = |rows: i32| {
         let sheet = |row: i32| line([-200.0, f64::from(30 * row - 210)], [200.0, f64::from(30 * row - 210)]);
-        let mut parameters = AuroraParameters { shapes: vec![shape((0..rows).map(sheet).collect())], ..small() };
-        parameters.particles.count = 30_000;
-        parameters.motion.renew_frames = f64::from(RENEWALS);
-        simulation(parameters)
+        let shapes = vec![shape((0..rows).map(sheet).collect())];
+        simulation(AuroraParameters { shapes, ..AuroraParameters::default() })
     };
     let mut simulations = [of(1), of(15)];
     let mut least = [f64::INFINITY; 2];
-    for _ in 0..6 {
+    for _ in 0..7 {
         for (simulation, least) in simulations.iter_mut().zip(&mut least) {
             let start = std::time::Instant::now();
             (0..RENEWALS).for_each(|_| simulation.step());
             *least = least.min(start.elapsed().as_secs_f64());
         }
     }
-    // Fifteen times the length; as many particles.
-    let [counts, times] = [simulations.map(|simulation| simulation.particles().len() as f64), least];
+    let counts = simulations.map(|simulation| simulation.particles().len() as f64);
     assert!((counts[1] / counts[0] - 1.0).abs() < 0.2, "{counts:?}");
-    assert!(times[1] < 4.0 * times[0], "{times:?} s");
+    // 1.6 times: rays are tabulated along the sheets, and the sheets' folds and charge are found all along them.
+    assert!(least[1] < 2.5 * least[0], "{least:?} s");
 }
