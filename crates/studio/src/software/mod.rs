@@ -1,7 +1,7 @@
 //! A window that needs no GPU: egui's triangles painted by the processor's own cores, and only where something changed.
 //!
 //! [`window`] runs a [`Program`](crate::program::Program) in a window of the system; [`Painter`] turns what egui wants painted
-//! into pixels; [`Screen`](screen) brings those that changed to the window. No library does this for this version of egui, and
+//! into pixels; `Screen` brings those that changed to the window. No library does this for this version of egui, and
 //! painters that pretend to be a GPU paint the whole window for every frame.
 
 mod blend;

@@ -96,7 +96,8 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
     let buoyancy = STANDARD_GRAVITY * motion.buoyancy * (hottest / Air::default().temperature_k - 1.0).max(0.0);
     let upward = rise * (1.0 + motion.turbulence + motion.puffing);
     let inward = motion.narrowing * (inflow + 0.2 * rise);
-    (upward.hypot(inward) + blown).max(driven_speed(simulation, parameters, buoyancy, room.y)) as f32
+    ((upward * upward + inward * inward).sqrt() + blown).max(driven_speed(simulation, parameters, buoyancy, room.y))
+        as f32
 }
 
 /// The speed of gas that `acceleration`, m/s^2, drives for as long as it may live, or as `far` as the domain goes.
