@@ -93,7 +93,7 @@ impl Burner {
             reach: size.reach,
             extent: match &size.mesh {
                 Some(mesh) => extent(mesh, &turned),
-                None => around(parameters, &turned, size.reach),
+                None => around(parameters, &turned),
             },
         })
     }
@@ -178,9 +178,7 @@ fn extent(mesh: &Mesh, turned: &Placement) -> [DVec3; 2] {
 }
 
 /// The same of any other area.
-fn around(parameters: &BurnerParameters, turned: &Placement, reach: f64) -> [DVec3; 2] {
-    // Turning rounds, and what stands on the edge of the domain is not beyond it.
-    const SLACK: f64 = 1e-6;
+fn around(parameters: &BurnerParameters, turned: &Placement) -> [DVec3; 2] {
     let BurnerParameters { diameter, length, size, .. } = *parameters;
     let radius = 0.5 * diameter;
     let axis = |unit: DVec3, half: f64| turned.turn(unit) * half;
@@ -196,7 +194,6 @@ fn around(parameters: &BurnerParameters, turned: &Placement, reach: f64) -> [DVe
             axis(DVec3::X, x).abs() + axis(DVec3::Y, y).abs() + axis(DVec3::Z, z).abs()
         }
     };
-    let half = (half - SLACK * reach).max(DVec3::ZERO);
     [-half, half]
 }
 
