@@ -224,7 +224,7 @@ fn a_scene_that_cannot_be_saved_says_so_and_stays_unsaved() {
     let mut harness = window(SCENE);
     edited(&mut harness, &SCENE.replace("0.9", "1.3"));
     open(&mut harness, &folder.path().join("none.toml"));
-    assert!(notice(&mut harness).contains("none.toml: cannot be opened"), "{}", notice(&mut harness));
+    assert!(notice(&mut harness).contains("none.toml: the scene cannot be read"), "{}", notice(&mut harness));
     save(&mut harness);
     answer(&mut harness, &folder.path().join("file/scene.toml"), "Save");
     assert!(notice(&mut harness).contains("scene.toml"), "{}", notice(&mut harness));
