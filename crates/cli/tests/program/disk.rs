@@ -2,6 +2,7 @@
 
 use std::{
     fs,
+    io::Write,
     path::{Path, PathBuf},
     process::Command,
 };
@@ -97,9 +98,16 @@ fn a_full_disk_is_an_error_and_leaves_only_whole_frames() {
         assert!(name.ends_with(".png"), "{name}");
         assert_eq!(decode_png(bytes).width, 96, "{name}");
     }
+    // What is left of the disk is filled to the last block.
+    let filler = folder.path("disk/filler");
+    for size in [4096, 1] {
+        let mut file = fs::OpenOptions::new().create(true).append(true).open(&filler).unwrap();
+        while file.write_all(&vec![0; size]).is_ok() {}
+    }
     let new = folder.run(&["new", "disk/fire"]);
     assert_eq!((new.code, new.errors()), (Some(1), 1), "{}", new.stderr);
     assert!(!folder.path("disk/fire.toml").exists(), "half a scene would be in the way of the next");
+    fs::remove_file(filler).unwrap();
     let film = folder.run(&["render", "scene.toml", "--out", "disk/film.apng"]);
     assert_eq!((film.code, film.errors()), (Some(1), 1), "{}", film.stderr);
     assert!(!folder.path("disk/film.apng").exists());
