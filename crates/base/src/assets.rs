@@ -130,6 +130,14 @@ pub trait Assets: Send + Sync {
     /// The asset is missing or not UTF-8.
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError>;
 
+    /// Whether there is something at `path` for frame `frame`, which is not read.
+    ///
+    /// # Errors
+    /// There is nothing, or nothing that can be read.
+    fn find(&self, path: &str, frame: i64) -> Result<(), AssetError> {
+        self.digest(path, frame).map(drop)
+    }
+
     /// A digest of the bytes behind `path` for frame `frame`: two assets with one digest are the same.
     ///
     /// # Errors

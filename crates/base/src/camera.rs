@@ -241,18 +241,18 @@ impl Camera {
         }
         world_to_camera[3][3] = 1.0;
         let single = |matrix: [[f64; 4]; 4]| matrix.map(|row| row.map(|value| value as f32));
+        let (straight, round) = (self.lens == Lens::Perspective, self.lens == Lens::Fisheye);
         CameraHeader {
             world_to_camera: single(world_to_camera),
-            world_to_ndc: single(self.world_to_ndc(&world_to_camera)),
-            vertical_fov_deg: (2.0 * self.half_fov).to_degrees() as f32,
+            world_to_ndc: straight.then(|| single(self.world_to_ndc(&world_to_camera))),
+            vertical_fov_deg: straight.then_some((2.0 * self.half_fov).to_degrees() as f32),
+            lens: Some(self.lens),
+            fisheye_fov_deg: round.then_some((2.0 * self.half_angle).to_degrees() as f32),
         }
     }
 
-    /// Row-vector matrix to the screen window [-1, 1]; the camera matrix alone where the lens is not linear.
+    /// Row-vector matrix to the screen window [-1, 1] of a perspective lens.
     fn world_to_ndc(&self, world_to_camera: &[[f64; 4]; 4]) -> [[f64; 4]; 4] {
-        if self.lens != Lens::Perspective {
-            return *world_to_camera;
-        }
         let [width, height] = self.size;
         let (shift_x, shift_y) = (2.0 * self.centre.x / width - 1.0, 1.0 - 2.0 * self.centre.y / height);
         let projection = [
@@ -357,10 +357,24 @@ mod tests {
         let header = camera.header();
         let point = [0.3_f32, 1.1, -0.5, 1.0];
         let clip: Vec<f32> =
-            (0..4).map(|column| (0..4).map(|k| point[k] * header.world_to_ndc[k][column]).sum()).collect();
+            (0..4).map(|column| (0..4).map(|k| point[k] * header.world_to_ndc.unwrap()[k][column]).sum()).collect();
         let seen = camera.project(DVec3::new(0.3, 1.1, -0.5)).unwrap().pixel;
         let expected = DVec2::new(2.0 * seen.x / 400.0 - 1.0, 1.0 - 2.0 * seen.y / 300.0);
         assert!((f64::from(clip[0] / clip[3]) - expected.x).abs() < 1e-5);
         assert!((f64::from(clip[1] / clip[3]) - expected.y).abs() < 1e-5);
+    }
+
+    #[test]
+    fn headers_say_of_each_lens_what_is_true_of_it() {
+        let header =
+            |lens| CameraParameters { lens, fisheye_fov_deg: 200.0, ..Default::default() }.at(0.0, [8, 8]).header();
+        let straight = header(Lens::Perspective);
+        assert_eq!((straight.lens, straight.fisheye_fov_deg), (Some(Lens::Perspective), None));
+        assert!((straight.vertical_fov_deg.unwrap() - 32.0).abs() < 1e-4 && straight.world_to_ndc.is_some());
+        let dome = header(Lens::Fisheye);
+        assert_eq!((dome.lens, dome.vertical_fov_deg, dome.world_to_ndc), (Some(Lens::Fisheye), None, None));
+        assert!((dome.fisheye_fov_deg.unwrap() - 200.0).abs() < 1e-4);
+        let around = header(Lens::Panorama);
+        assert_eq!((around.vertical_fov_deg, around.world_to_ndc, around.fisheye_fov_deg), (None, None, None));
     }
 }

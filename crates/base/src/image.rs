@@ -1,5 +1,9 @@
 //! Pictures in memory: floating-point images, finished frames with their layers, and display pixels.
 
+use glam::DVec2;
+
+use crate::camera::Lens;
+
 /// A picture of `N` floats a pixel, rows from the top, pixels from the left.
 ///
 /// What the floats mean is the holder's business; in a [`Frame`] they are scene-linear ACEScg.
@@ -54,6 +58,21 @@ impl<const N: usize> Image<N> {
     /// The pixel at column `x`, row `y`.
     pub fn at(&self, x: usize, y: usize) -> [f32; N] {
         self.row(y)[x]
+    }
+
+    /// The value at a place in pixels from the left and top edges, bilinear between the middles of pixels; beyond the outermost middles as at
+    /// the nearest.
+    pub fn between(&self, place: DVec2) -> [f32; N] {
+        if self.pixels.is_empty() {
+            return [0.0; N];
+        }
+        let last = DVec2::new(self.width as f64 - 1.0, self.height as f64 - 1.0);
+        let place = (place - 0.5).clamp(DVec2::ZERO, last);
+        let (x, y) = (place.x as usize, place.y as usize);
+        let (right, below) = ((x + 1).min(self.width - 1), (y + 1).min(self.height - 1));
+        let (u, v) = (place.x.fract() as f32, place.y.fract() as f32);
+        let [a, b, c, d] = [self.at(x, y), self.at(right, y), self.at(x, below), self.at(right, below)];
+        std::array::from_fn(|i| (1.0 - v) * ((1.0 - u) * a[i] + u * b[i]) + v * ((1.0 - u) * c[i] + u * d[i]))
     }
 
     /// The part `rect` of this picture; `None` where it reaches outside.
@@ -146,10 +165,14 @@ pub struct Channel {
 pub struct CameraHeader {
     /// World to camera (row vectors, as OpenEXR's `worldToCamera`), metres.
     pub world_to_camera: [[f32; 4]; 4],
-    /// World to the screen window from -1 to 1, as OpenEXR's `worldToNDC`; the identity for domes and panoramas.
-    pub world_to_ndc: [[f32; 4]; 4],
-    /// Vertical field of view, degrees.
-    pub vertical_fov_deg: f32,
+    /// World to the screen window from -1 to 1, as OpenEXR's `worldToNDC`; no matrix says it of domes and panoramas.
+    pub world_to_ndc: Option<[[f32; 4]; 4]>,
+    /// Vertical field of view of a perspective lens, degrees.
+    pub vertical_fov_deg: Option<f32>,
+    /// How directions become places in the picture; `None` for what no lens saw.
+    pub lens: Option<Lens>,
+    /// Whole angle of a fisheye's circle, degrees.
+    pub fisheye_fov_deg: Option<f32>,
 }
 
 /// What a frame says about itself. Nothing here depends on the machine or the hour.
@@ -159,6 +182,8 @@ pub struct FrameHeader {
     pub number: i64,
     /// Exposure value at ISO 100 that the pixels are scaled by.
     pub exposure_ev100: f32,
+    /// Temperature of the black body whose light is white to the camera, K; D65 is without. The pixels are not changed by it.
+    pub white_balance_k: Option<f32>,
     /// Frames a second as a fraction.
     pub fps: [u32; 2],
     /// Time the shutter is open, seconds.

@@ -14,6 +14,7 @@ pub mod drawing;
 pub mod gravity;
 pub mod image;
 pub mod math;
+pub mod memory;
 pub mod mesh;
 pub mod noise;
 pub mod observer;

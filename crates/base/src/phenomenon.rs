@@ -104,6 +104,23 @@ impl Remark {
     }
 }
 
+/// A level mirror, as wet ground and lakes are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevelMirror {
+    /// Its height, m.
+    pub height: f64,
+    /// How far above or below that height what a plate shows still is the mirror itself, m.
+    pub plate_tolerance: f64,
+}
+
+impl LevelMirror {
+    /// That tolerance at a depth in m where a pixel tells no less: one of `focal_pixels` to the unit of depth looks along the mirror.
+    #[must_use]
+    pub fn tolerance_at(&self, depth: f64, focal_pixels: f64) -> f64 {
+        self.plate_tolerance.max(depth / focal_pixels)
+    }
+}
+
 /// One phenomenon of a scene, ready to be drawn at any time (closed form) or stepped there.
 ///
 /// Everything is a function of the parameters, the seed, the name and the time: never of the threads, of the frames
@@ -158,8 +175,8 @@ pub trait Phenomenon: Send + Sync {
         None
     }
 
-    /// Height of the level mirror that it is, m. It then gets a picture of everything else seen in that mirror.
-    fn mirror(&self) -> Option<f64> {
+    /// The level mirror that it is. It then gets a picture of everything else seen in that mirror.
+    fn mirror(&self) -> Option<LevelMirror> {
         None
     }
 

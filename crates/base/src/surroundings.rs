@@ -123,6 +123,8 @@ pub struct Surroundings<'a> {
     /// What is seen in the phenomenon's own [mirror](crate::phenomenon::Phenomenon::mirror): radiance (ACEScg, cd/m^2) and alpha of
     /// the whole picture.
     pub reflection: Option<&'a Image<4>>,
+    /// Where there is a plate: what stands behind all phenomena in that mirror, plate and sky, as radiance in fewer pixels.
+    pub backdrop: Option<&'a Image<4>>,
     /// Everybody else's lights, extinction and occluders, and the scene's own.
     pub others: Publication,
 }
@@ -133,7 +135,14 @@ static STANDARD_AIR: LazyLock<Air> = LazyLock::new(Air::default);
 impl<'a> Surroundings<'a> {
     /// Nothing but a wind in ordinary air.
     pub fn of_wind(wind: &'a Wind) -> Self {
-        Self { wind, air: &STANDARD_AIR, sky: Sky::DARK, reflection: None, others: Publication::default() }
+        Self {
+            wind,
+            air: &STANDARD_AIR,
+            sky: Sky::DARK,
+            reflection: None,
+            backdrop: None,
+            others: Publication::default(),
+        }
     }
 }
 

@@ -17,9 +17,13 @@ pub(crate) struct Asset {
 include!(concat!(env!("OUT_DIR"), "/examples.rs"));
 
 impl Example {
-    /// What it says about itself: its first comment.
-    pub(crate) fn about(&self) -> &'static str {
-        let comment = self.text.lines().find_map(|line| line.strip_prefix('#'));
-        comment.unwrap_or_default().trim()
+    /// What it says about itself: the first sentence of the comment that it begins with.
+    pub(crate) fn about(&self) -> String {
+        let lines = self.text.lines().map_while(|line| line.strip_prefix('#'));
+        let comment = lines.map(str::trim).collect::<Vec<_>>().join(" ");
+        match comment.split_once(". ") {
+            Some((first, _)) => format!("{first}."),
+            None => comment,
+        }
     }
 }

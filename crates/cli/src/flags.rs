@@ -7,6 +7,7 @@ pub(crate) fn error(error: &JobError) -> String {
     match error {
         JobError::NoGpu => format!("{error}; allowed: --backend cpu, auto"),
         JobError::Cancelled => format!("{error}, and --resume goes on from there"),
+        JobError::ParticlesCancelled => format!("{error}, and --frames asks for the others"),
         _ => after(of_error(error), &error.to_string()),
     }
 }
@@ -32,6 +33,7 @@ fn of_error(error: &JobError) -> Option<&'static str> {
             SheetKind::Contact => "--contact-sheet",
             SheetKind::Flipbook => "--grid",
         }),
+        JobError::Conflict(Conflict::Memory { channels: 0, .. }) => Some("--size"),
         JobError::Streaks(fault) => of_streaks(fault),
         _ => None,
     }

@@ -43,10 +43,17 @@ fn display() -> DisplayImage {
 
 fn frame() -> Frame {
     let identity = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
-    let camera = CameraHeader { world_to_camera: identity, world_to_ndc: identity, vertical_fov_deg: 40.0 };
+    let camera = CameraHeader {
+        world_to_camera: identity,
+        world_to_ndc: Some(identity),
+        vertical_fov_deg: Some(40.0),
+        lens: None,
+        fisheye_fov_deg: None,
+    };
     let header = FrameHeader {
         number: 1,
         exposure_ev100: 7.0,
+        white_balance_k: None,
         fps: [24, 1],
         exposure_time_s: 0.02,
         camera,

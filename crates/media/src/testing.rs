@@ -28,9 +28,16 @@ fn header(width: usize, height: usize) -> FrameHeader {
     FrameHeader {
         number: 1001,
         exposure_ev100: 7.5,
+        white_balance_k: None,
         fps: [24000, 1001],
         exposure_time_s: 0.02,
-        camera: CameraHeader { world_to_camera: matrix(0.0), world_to_ndc: matrix(100.0), vertical_fov_deg: 40.0 },
+        camera: CameraHeader {
+            world_to_camera: matrix(0.0),
+            world_to_ndc: Some(matrix(100.0)),
+            vertical_fov_deg: Some(40.0),
+            lens: None,
+            fisheye_fov_deg: None,
+        },
         fingerprint: [9; 32],
         display_size: [width, height],
         data_origin: [0, 0],

@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path, process::Command};
 
+use bansho_base::camera::Lens;
 use bansho_base::image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision, Rect};
 use bansho_media::{atomic, exr};
 use half::f16;
@@ -16,9 +17,16 @@ fn frame() -> Frame {
     let header = FrameHeader {
         number: -3,
         exposure_ev100: 7.25,
+        white_balance_k: None,
         fps: [24000, 1001],
         exposure_time_s: 0.02,
-        camera: CameraHeader { world_to_camera: matrix(0.0), world_to_ndc: matrix(50.0), vertical_fov_deg: 40.0 },
+        camera: CameraHeader {
+            world_to_camera: matrix(0.0),
+            world_to_ndc: Some(matrix(50.0)),
+            vertical_fov_deg: Some(40.0),
+            lens: Some(Lens::Perspective),
+            fisheye_fov_deg: Some(180.0),
+        },
         fingerprint: [0xAB; 32],
         display_size: [40, 30],
         data_origin: [-2, 1],
@@ -110,6 +118,8 @@ fn check_header(header: &BTreeMap<String, String>) {
     has("chromaticities", "0.32168");
     has("worldToCamera", "15.0");
     has("worldToNDC", "65.0");
+    has("bansho:lens", "perspective");
+    has("bansho:fisheyeFovDeg", "180.0");
     has("compression", "ZIP_COMPRESSION");
     has("lineOrder", "INCREASING_Y");
     has("dataWindow", "-2");

@@ -21,10 +21,17 @@ fn frame(width: usize, height: usize) -> Frame {
     let count = width * height;
     let pixels = (0..count).map(|i| [i as f32 * 0.5, 0.25, -0.5, 0.5]).collect();
     let identity = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
-    let camera = CameraHeader { world_to_camera: identity, world_to_ndc: identity, vertical_fov_deg: 40.0 };
+    let camera = CameraHeader {
+        world_to_camera: identity,
+        world_to_ndc: Some(identity),
+        vertical_fov_deg: Some(40.0),
+        lens: None,
+        fisheye_fov_deg: None,
+    };
     let header = FrameHeader {
         number: 1,
         exposure_ev100: 0.0,
+        white_balance_k: None,
         fps: [24, 1],
         exposure_time_s: 0.02,
         camera,

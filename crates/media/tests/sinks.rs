@@ -143,6 +143,23 @@ fn what_the_program_says_last_stands_in_the_error() {
     assert_eq!(names(folder.path()), ["ffmpeg"]);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_program_that_complains_has_failed_though_its_status_is_good() {
+    use std::os::unix::fs::PermissionsExt;
+    for (complaint, is_full) in [("t.part: No space left on device", true), ("Error closing file", false)] {
+        let folder = tempfile::tempdir().unwrap();
+        let program = folder.path().join("ffmpeg");
+        fs::write(&program, format!("#!/bin/sh\ncat >/dev/null\necho '{complaint}' >&2\nexit 0\n")).unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        let sink = open(folder.path(), "a.mp4", 1, |options| options.video.program = program).unwrap();
+        let error = write(&sink, 0).and_then(|()| sink.finish()).unwrap_err();
+        assert_eq!(matches!(error, MediaError::DiskFull { .. }), is_full, "{error}");
+        assert!(is_full || error.to_string().contains(complaint), "{error}");
+        assert_eq!(names(folder.path()), ["ffmpeg"]);
+    }
+}
+
 /// What ffprobe says of the first stream.
 fn probe(path: &Path) -> String {
     let entries = "stream=codec_name,width,height,pix_fmt,color_range,color_space,color_transfer,color_primaries,\

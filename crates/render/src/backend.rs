@@ -3,14 +3,16 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    assets::AssetError,
     image::Frame,
     observer::{Cancelled, Observer},
     phenomenon::SnapshotError,
     point_cloud::PointCloud,
 };
 
-use crate::plan::{Plan, PlanError};
+use crate::{
+    plan::{Plan, PlanError},
+    scene::OpeningFault,
+};
 
 /// Why a frame cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -21,19 +23,9 @@ pub enum RenderError {
     /// The plan cannot be carried out.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// A picture that the scene names cannot be had.
-    #[error(transparent)]
-    Asset(#[from] AssetError),
-    /// The plate's depth is of another size than the plate.
-    #[error("{depth}: the depth has {depth_size:?} pixels, its plate {plate_size:?}; they must be of one size")]
-    DepthSize {
-        /// The depth's path.
-        depth: String,
-        /// Its size.
-        depth_size: [usize; 2],
-        /// The plate's size.
-        plate_size: [usize; 2],
-    },
+    /// The plate of a frame cannot be had: its picture or its depth, which the fault names.
+    #[error("plate.{}: {}", .0.key, .0.kind)]
+    Plate(Box<OpeningFault>),
     /// A snapshot does not fit.
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),

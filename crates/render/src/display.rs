@@ -20,7 +20,7 @@ bansho_base::choice! {
 /// Rows that one task turns to display pixels.
 const TASK_ROWS: usize = 16;
 
-/// The frame's beauty as display pixels: view, alpha by the largest of alpha and light, sRGB encoding, dither.
+/// The frame's beauty as display pixels: the camera's white balance, view, alpha by the largest of alpha and light, sRGB encoding, dither.
 pub fn display(frame: &Frame, view: &View, depth: BitDepth) -> DisplayImage {
     let pixels = match depth {
         BitDepth::Eight => DisplayPixels::Eight(codes(frame, view)),
@@ -31,7 +31,7 @@ pub fn display(frame: &Frame, view: &View, depth: BitDepth) -> DisplayImage {
 
 /// Pixels as display codes, row after row. Dither goes by the place in the whole picture, so that a crop shows the same pixels.
 pub(crate) fn codes<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View) -> Vec<[C; 4]> {
-    let level = Level::new();
+    let (level, view) = (Level::new(), view.balanced(frame.header.white_balance_k.map(f64::from)));
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     let [x0, y0] = frame.header.data_origin;
     // An empty pixel is code 0, unless it is opaque black.

@@ -20,6 +20,9 @@ pub fn of_frame(plan: &Plan, number: i64) -> [u8; 32] {
     text("exposure", &plan.exposure_ev100);
     text("outputs", &format_args!("{} {}", plan.layers, plan.aovs));
     text("view", &plan.display.name());
+    if let Some(kelvin) = plan.scene.picture.white_balance_k {
+        text("white balance", &kelvin);
+    }
     text("fps", &format_args!("{:?}", plan.fps()));
     text("camera", &Value::Table(plan.scene.camera.to_table()));
     text("plate", &Value::Table(plan.scene.plate.to_table()));

@@ -278,6 +278,7 @@ impl Plan {
         FrameHeader {
             number,
             exposure_ev100: self.exposure_ev100,
+            white_balance_k: self.scene.picture.white_balance_k.map(|kelvin| kelvin as f32),
             fps: [self.fps().frames, self.fps().seconds],
             exposure_time_s: view.shutter.duration() as f32,
             camera: self.scene.camera.at(view.shutter.middle(), self.size).header(),
@@ -290,6 +291,11 @@ impl Plan {
     /// What absolute radiance is multiplied by, so that 1.0 is display white.
     pub fn exposure_scale(&self) -> f32 {
         color::exposure_scale(f64::from(self.exposure_ev100)) as f32
+    }
+
+    /// How display formats show the picture, with the camera's white balance.
+    pub fn shown(&self) -> color::View {
+        self.display.balanced(self.scene.picture.white_balance_k)
     }
 
     fn exposure(&self) -> Result<f32, PlanError> {

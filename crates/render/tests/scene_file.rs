@@ -3,8 +3,6 @@
 #[allow(dead_code, reason = "each test file uses a part of it")]
 mod support;
 
-use std::sync::Arc;
-
 use bansho_base::{
     assets::MemoryAssets,
     parameters::{self, Kind, Value},
@@ -71,7 +69,20 @@ fn faults_name_their_place_and_what_is_allowed() {
             "bansho = 1\n[[emitter]]\nname = \"a\"\n[[absorber]]\nname = \"a\"\n",
             "test.toml:5:8: absorber.0: the name \"a\" is taken",
         ),
-        ("bansho = 1\n[[emitter]]\nname = \"a.b\"\n", "expected a name of 1 to 100 characters without dots"),
+        ("bansho = 1\n[[emitter]]\nname = 3\n", "name: expected a name of 1 to 100 characters without dots"),
+        ("bansho = 1\n[picture]\nfps = nan\n", "test.toml:3:7: picture.fps: NaN is out of range; allowed: 0.1 to 1000"),
+        (
+            "bansho = 1\n[[light]]\nkind = \"spot\"\ndirection = [0, 0, 0]\n",
+            "test.toml:4:13: light.0.direction: is no direction; allowed: ",
+        ),
+        (
+            "bansho = 1\n[[light]]\nkind = \"spot\"\ninner_deg = 80\nouter_deg = 10\n",
+            "test.toml:4:13: light.0.inner_deg: a spot that is full up to 80 degrees cannot be dark beyond 10; allowed: ",
+        ),
+        (
+            "bansho = 1\n[[emitter]]\nname = \"a.b\"\n",
+            "cannot be a name, which begins the names of EXR channels; allowed: 1 to 100 characters without dots",
+        ),
         ("bansho = 1\n[[absorber]]\nnear = 2\nfar = 1\n", "test.toml:4:7: absorber.0.far: must lie behind `near`"),
         ("bansho = 1\n[plate]\nimage = \"gone.png\"\n", "test.toml:3:9: plate.image: gone.png: no such file"),
         (
@@ -152,8 +163,9 @@ fn random_scene(seed: u64) -> String {
     for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate" && shared.key != "picture") {
         let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
         let mut table = parameters::sample((shared.table)(), &mut uniform);
-        // Random tables name no files, so no obstacle can be a mesh.
-        table.entries.retain(|entry| shared.key != "obstacle" || entry.key != "shape");
+        // Random tables name no files, so no obstacle can be a mesh; a spot may not be full beyond its end.
+        let left_out = [("obstacle", "shape"), ("light", "inner_deg")];
+        table.entries.retain(|entry| !left_out.contains(&(shared.key, &entry.key)));
         text += &table_text(&header, &table);
     }
     for kind in kinds() {
@@ -305,15 +317,15 @@ fn a_plate_of_another_depth_size_is_refused() {
     use bansho_base::{
         assets::{Encoding, Picture},
         image::Image,
-        observer::Unobserved,
     };
     let mut assets = checkerboard(16, 12, None);
     let colour = Image::filled(8, 6, [1.0; 4]);
     assets.insert_picture("depth.exr", Picture { colour, depth: Some(vec![1.0; 48]), encoding: Encoding::LinearSrgb });
     let text = format!("{CAMERA}[plate]\nimage = \"plate.png\"\ndepth = \"depth.exr\"\n");
-    let plan = plan_with(&text, &PlanOptions::default(), Arc::new(assets));
-    let mut shot = open(&plan);
-    shot.advance(0, &Unobserved).unwrap();
-    let error = shot.draw(&Unobserved).unwrap_err();
-    assert!(error.to_string().contains("depth.exr: the depth has [8, 6] pixels, its plate [16, 12]"), "{error}");
+    let error = Scene::parse("scene.toml", &text, &kinds(), &assets).err().unwrap().to_string();
+    assert!(error.contains("plate.depth: depth.exr: has 8 x 6 pixels; allowed: 16 x 12"), "{error}");
+    assert!(error.starts_with("scene.toml:"), "{error}");
+    let flat = text.replace("depth.exr", "plate.png");
+    let error = Scene::parse("scene.toml", &flat, &kinds(), &assets).err().unwrap().to_string();
+    assert!(error.contains("plate.depth: plate.png: has no channel `Z`"), "{error}");
 }

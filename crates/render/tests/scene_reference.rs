@@ -29,8 +29,9 @@ fn the_books_page_on_the_scene_file_is_up_to_date() {
 #[test]
 fn every_scene_in_readme_and_book_is_right() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let guide = std::fs::read_dir(root.join("docs/src/guide")).unwrap().map(|entry| entry.unwrap().path());
-    let pages: Vec<PathBuf> = guide.chain([root.join("README.md")]).collect();
+    let inside = |folder| std::fs::read_dir(root.join(folder)).unwrap().map(|entry| entry.unwrap().path());
+    let (guide, methods) = (inside("docs/src/guide"), inside("docs/src/methods"));
+    let pages: Vec<PathBuf> = guide.chain(methods).chain([root.join("README.md")]).collect();
     let mut scenes = 0;
     for page in pages {
         let text = std::fs::read_to_string(&page).unwrap();
@@ -84,7 +85,7 @@ fn page() -> String {
 }
 
 /// What every phenomenon has beside its own parameters.
-const COMMON: &str = "| `name` | a string without dots | the kind, numbered from the second on | \
+const COMMON: &str = "| `name` | a string of 1 to 100 characters without dots, none of `plate`, `sky`, `ground`, `lamps` | the kind, numbered from the second on | \
     Unique name of this one; names its layers. |\n\
     | `enabled` | true or false | `true` | Whether it is drawn. |\n";
 

@@ -61,6 +61,9 @@ distance = 6.0
 const AURORA: &str = "\
 bansho = 1
 
+[picture]
+white_balance_k = 4000.0
+
 [camera]
 position = [0.0, 1.7, 0.0]
 target = [0.0, 36.0, -60.0]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use bansho_base::{assets::AssetError, observer::Cancelled};
+use bansho_base::observer::Cancelled;
 use bansho_media::{MediaError, flipbook::TileError, naming::NamingError};
 use bansho_render::{PlanError, RenderError, SceneError, scene::edit::EditError};
 
@@ -27,16 +27,6 @@ pub enum JobError {
         path: PathBuf,
         /// The first line that is not, from 1 on.
         line: usize,
-    },
-    /// A picture that the scene names cannot be had.
-    #[error("{file}: plate.{key}: {source}")]
-    Plate {
-        /// What errors call the scene.
-        file: String,
-        /// `image` or `depth`.
-        key: &'static str,
-        /// What is wrong with it.
-        source: AssetError,
     },
     /// The scene is faulty.
     #[error(transparent)]
@@ -79,6 +69,15 @@ pub enum JobError {
     /// The observer asked to stop while streak textures were made.
     #[error("stopped; whole textures stay, without an index")]
     StreaksCancelled,
+    /// The observer asked to stop before a film or a sheet, which holds all frames, was whole.
+    #[error("stopped; nothing stays, since {what} is written only when all its frames are drawn")]
+    WholeCancelled {
+        /// What it is.
+        what: &'static str,
+    },
+    /// The observer asked to stop while particles were simulated.
+    #[error("stopped; whole files of particles stay")]
+    ParticlesCancelled,
     /// The observer asked to stop.
     #[error("stopped; whole frames stay")]
     Cancelled,
@@ -122,6 +121,27 @@ pub enum Conflict {
         path = .path.display()
     )]
     NoFigures {
+        /// The output.
+        path: PathBuf,
+    },
+    /// Pictures larger than there is memory for.
+    #[error(
+        "{} x {} pixels{} {would}; allowed: up to {} x {}",
+        .size[0], .size[1], with_channels(*.channels), .most[0], .most[1]
+    )]
+    Memory {
+        /// Width and height of what is drawn.
+        size: [usize; 2],
+        /// Channels of layers and AOVs beside the picture.
+        channels: usize,
+        /// How much it would take.
+        would: String,
+        /// Width and height that there is memory for, in the same proportions.
+        most: [usize; 2],
+    },
+    /// An output that the scene is read from.
+    #[error("{path}: is a file that the scene is read from; allowed: any other name", path = .path.display())]
+    OverInput {
         /// The output.
         path: PathBuf,
     },
@@ -179,6 +199,10 @@ pub enum Conflict {
     LoopLength(f64),
 }
 
+fn with_channels(channels: usize) -> String {
+    if channels == 0 { String::new() } else { format!(" with {channels} more channels") }
+}
+
 impl From<RenderError> for JobError {
     fn from(error: RenderError) -> Self {
         match error {
@@ -205,16 +229,22 @@ pub enum Cause {
 }
 
 impl JobError {
+    /// What a wish to stop means where nothing is written before `what` is whole; any other error as it is.
+    pub(super) fn of_whole(self, what: &'static str) -> Self {
+        if matches!(self, Self::Cancelled) { Self::WholeCancelled { what } } else { self }
+    }
+
     /// Whose fault it is.
     pub fn cause(&self) -> Cause {
         match self {
-            Self::Unreadable { .. } | Self::NotUtf8 { .. } | Self::Plate { .. } | Self::Scene(_) => Cause::Scene,
+            Self::Unreadable { .. } | Self::NotUtf8 { .. } | Self::Scene(_) => Cause::Scene,
             Self::Plan(PlanError::Opening { .. }) => Cause::Scene,
             Self::Edit { .. } | Self::SetScene(_) | Self::Plan(_) | Self::Conflict(_) | Self::Naming(_) => Cause::Usage,
-            Self::Render(RenderError::Asset(_) | RenderError::DepthSize { .. }) => Cause::Scene,
+            Self::Render(RenderError::Plate(_)) => Cause::Scene,
             Self::Streaks(_) => Cause::Usage,
             Self::NoGpu => Cause::Gpu,
-            Self::Cancelled | Self::StreaksCancelled => Cause::Cancelled,
+            Self::Cancelled | Self::WholeCancelled { .. } => Cause::Cancelled,
+            Self::ParticlesCancelled | Self::StreaksCancelled => Cause::Cancelled,
             Self::Media(MediaError::Naming(_)) => Cause::Usage,
             Self::Render(_) | Self::Media(_) | Self::Tiles(_) => Cause::Work,
         }

@@ -45,6 +45,7 @@ fn describe(frame: &Frame, picture: &Path) -> Value {
         "fps": f64::from(frames) / f64::from(seconds.max(1)),
         "exposure_s": header.exposure_time_s,
         "exposure_ev100": header.exposure_ev100,
+        "white_balance_k": header.white_balance_k,
         FINGERPRINT: hex(header.fingerprint),
         "phenomena": frame.figures.iter().map(describe_set).collect::<Map<_, _>>(),
     })

@@ -16,8 +16,11 @@ use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth};
 use super::{
     BackendChoice, Job, contact,
     error::{Channels, Conflict, JobError, SheetKind},
+    figures, inputs,
+    memory::{self, Wanted},
     observer::{Note, Spot},
     output::{self, Format},
+    plates,
     scene_file::SceneFile,
     sheet::{self, MOST_TILES},
     snapshots::{self, Snapshots},
@@ -25,6 +28,7 @@ use super::{
 
 /// A job that can be carried out, as far as can be known without doing so.
 pub struct PreparedJob {
+    pub(super) scene: SceneFile,
     pub(super) plan: Arc<Plan>,
     pub(super) backend: Box<dyn Backend>,
     pub(super) frames: Vec<i64>,
@@ -69,8 +73,14 @@ pub(super) fn assets(scene: &SceneFile) -> Arc<dyn Assets> {
 /// What the scene would be refused for.
 pub fn check_scene(scene: &SceneFile) -> Result<Plan, JobError> {
     let assets = assets(scene);
-    let plan = Plan::new(scene.check(assets.as_ref())?, &PlanOptions::default(), assets)?;
-    check_plate(scene, &plan, plan.frames().start)?;
+    let checked = scene.check(assets.as_ref())?;
+    // With its overscan, as EXR is drawn.
+    let widest = PlanOptions { overscan: true, ..PlanOptions::default() };
+    let plan = Plan::new(checked.clone(), &widest, assets.clone())?;
+    let frames = (plan.frames().end - plan.frames().start) as usize;
+    memory::check(scene, &plan, Wanted { frames, tiles: 0, display: Some(BitDepth::Eight), own_size: false })?;
+    let plan = Plan::new(checked, &PlanOptions::default(), assets)?;
+    plates::check(scene, &plan, &plan.frames().collect::<Vec<_>>())?;
     Ok(plan)
 }
 
@@ -85,17 +95,6 @@ pub fn remarks(scene: &SceneFile, plan: &Plan) -> Result<Vec<Note>, JobError> {
         Note::Remark { place, name, remark }
     };
     Ok(plan.remarks()?.into_iter().map(note).collect())
-}
-
-/// Reads the plate of frame `number`, so that a damaged one is told before the work begins, and by its place in the scene.
-fn check_plate(scene: &SceneFile, plan: &Plan, number: i64) -> Result<(), JobError> {
-    let plate = &plan.scene().plate;
-    for (key, path) in [("image", &plate.image), ("depth", &plate.depth)] {
-        let Some(path) = path else { continue };
-        let read = plan.assets.picture(&path.0, number);
-        read.map_err(|source| JobError::Plate { file: scene.name.clone(), key, source })?;
-    }
-    Ok(())
 }
 
 /// What draws.
@@ -120,14 +119,17 @@ impl Job {
         self.check_figures(kind)?;
         let plan = Arc::new(Plan::new(scene, &self.plan_options(kind), assets)?);
         let frames = self.chosen_frames(&plan)?;
-        check_plate(&self.scene, &plan, frames[0])?;
+        plates::check(&self.scene, &plan, &frames)?;
         let files = if self.contact_sheet.is_some() { 1 } else { frames.len() };
         let pattern = OutputPattern::parse(&self.output_path(), files)?;
         output::check_writable(&pattern.path(frames[0]))?;
+        inputs::check_kept(&self.scene, &plan, &frames, self.outputs(&pattern, &frames))?;
         let tile = [plan.window().width, plan.window().height];
         let sheet = self.contact_sheet.map(|tiles| sheet::holding(tiles, tile, contact::GUTTER)).transpose()?;
+        memory::check(&self.scene, &plan, self.wanted(kind, frames.len()))?;
         let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan)?;
         let mut prepared = PreparedJob {
+            scene: self.scene.clone(),
             format: Format { pattern, view: self.view, bits: self.bits, figures: self.figures },
             resume: self.resume && kind.is_sequence() && sheet.is_none(),
             notes: Vec::new(),
@@ -145,6 +147,21 @@ impl Job {
         let stem = &self.scene.stem;
         let name = if self.contact_sheet.is_some() { format!("{stem}.sheet.png") } else { naming::pictures(stem) };
         self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem).join(name))
+    }
+
+    fn wanted(&self, kind: OutputKind, frames: usize) -> Wanted {
+        let display = (!kind.is_scene_linear()).then_some(self.bits);
+        Wanted { frames, tiles: self.contact_sheet.unwrap_or(0), display, own_size: self.size.is_some() }
+    }
+
+    /// Every file that will be written.
+    fn outputs(&self, pattern: &OutputPattern, frames: &[i64]) -> Vec<PathBuf> {
+        let single = self.contact_sheet.is_some() || !pattern.kind().is_sequence();
+        let frames = if single { &frames[..1] } else { frames };
+        let pictures: Vec<PathBuf> = frames.iter().map(|&number| pattern.path(number)).collect();
+        let figures = pictures.iter().filter(|_| self.figures).map(|picture| figures::path(picture));
+        let figures: Vec<PathBuf> = figures.collect();
+        pictures.into_iter().chain(figures).collect()
     }
 
     fn output_kind(&self) -> Result<OutputKind, JobError> {

@@ -7,6 +7,7 @@ use super::{
     error::JobError,
     observer::{JobObserver, Outline},
     output::ToFiles,
+    plates,
     prepare::PreparedJob,
     shoot::shoot,
 };
@@ -34,11 +35,17 @@ impl PreparedJob {
         let kept = self.frames.len() - numbers.len();
         let size = [self.plan.window().width, self.plan.window().height];
         observer.started(&Outline { total: self.frames.len(), kept, size });
-        match &self.sheet {
-            Some(sheet) => contact::run(self, sheet, observer)?,
-            None if numbers.is_empty() => {}
-            None => self.run_files(&numbers, size, observer)?,
-        }
+        let done = match &self.sheet {
+            Some(sheet) => contact::run(self, sheet, observer),
+            None if numbers.is_empty() => Ok(()),
+            None => self.run_files(&numbers, size, observer),
+        };
+        let kind = self.format.pattern.kind();
+        done.map_err(|error| match plates::located(&self.scene, error) {
+            error if self.sheet.is_some() => error.of_whole("a sheet"),
+            error if !kind.is_sequence() => error.of_whole("a film"),
+            error => error,
+        })?;
         Ok(Summary { drawn: numbers.len(), kept, first_file: self.format.pattern.path(self.frames[0]) })
     }
 

@@ -5,9 +5,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bansho_base::assets::Assets;
+use bansho_base::{assets::Assets, parameters::ProblemKind};
 use bansho_render::{
-    Scene,
+    Scene, SceneError,
     phenomena::KINDS,
     scene::edit::{self, EditError},
 };
@@ -71,8 +71,21 @@ impl SceneFile {
             Err(own) => Err(JobError::Scene(Box::new(own))),
             Ok(_) => {
                 let file = format!("{} as changed", self.name);
-                Err(JobError::SetScene(Box::new(bansho_render::SceneError { file, ..*error })))
+                Err(JobError::SetScene(Box::new(SceneError { file, ..*error })))
             }
+        }
+    }
+
+    /// A fault of what stands at the dotted `path`, which only showed when the scene was looked at from outside its text.
+    pub(super) fn fault(&self, path: &str, kind: ProblemKind) -> JobError {
+        let own = SceneError::at(&self.name, &self.text, path, kind.clone());
+        let changed = self.changed().unwrap_or_else(|_| self.text.clone());
+        let as_changed = SceneError::at(&format!("{} as changed", self.name), &changed, path, kind);
+        // Whose fault it is: the file's, if it says the same.
+        if stated(&own) == stated(&as_changed) {
+            JobError::Scene(Box::new(own))
+        } else {
+            JobError::SetScene(Box::new(as_changed))
         }
     }
 
@@ -81,4 +94,9 @@ impl SceneFile {
             edit::set(&text, assignment).map_err(|source| JobError::Edit { assignment: assignment.clone(), source })
         })
     }
+}
+
+/// The part of the text that the first fault of a scene marks.
+fn stated(error: &SceneError) -> Option<&str> {
+    error.text.get(error.problems.first()?.span.clone()?)
 }

@@ -9,6 +9,7 @@ use bansho_render::{Backend, Plan, PlanOptions, RenderError};
 use super::{
     BackendChoice,
     error::{Conflict, JobError},
+    inputs,
     observer::{FrameDone, JobObserver, Note, Outline},
     output,
     prepare::{assets, backend, chosen_frames, outside, snapshots},
@@ -70,6 +71,7 @@ impl Simulate {
         let frames = chosen_frames(self.frames.as_deref(), &plan)?;
         let pattern = NumberedPath::parse(&self.particles, "ply", frames.len())?;
         output::check_writable(&pattern.path(frames[0]))?;
+        inputs::check_kept(&self.scene, &plan, &frames, frames.iter().map(|&number| pattern.path(number)))?;
         let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan)?;
         let notes = outside(&plan, &frames).into_iter().collect();
         Ok(PreparedSimulation { plan, backend, frames, pattern, snapshots, notes })
@@ -82,6 +84,13 @@ impl PreparedSimulation {
     /// # Errors
     /// The observer asked to stop, or the first file that cannot be written. Files that were finished stay, whole.
     pub fn run(&self, observer: &dyn JobObserver) -> Result<Summary, JobError> {
+        self.simulate(observer).map_err(|error| match error {
+            JobError::Cancelled => JobError::ParticlesCancelled,
+            other => other,
+        })
+    }
+
+    fn simulate(&self, observer: &dyn JobObserver) -> Result<Summary, JobError> {
         self.notes.iter().for_each(|note| observer.note(note));
         let size = [self.plan.window().width, self.plan.window().height];
         observer.started(&Outline { total: self.frames.len(), kept: 0, size });

@@ -4,7 +4,7 @@
 //! 2. [`space`]: XYZ (D65) and linear sRGB enter the working space, ACEScg, by Bradford adaptation D65 -> D60, and leave it
 //!    by the inverse. Emitted light is absolute: [`luminance`] is in cd/m^2. Negative components are colours outside AP1; keep them.
 //! 3. [`exposure`]: `exposed = luminance * exposure_scale(ev100)`, so that 1.0 is display white.
-//! 4. [`View`]: exposed ACEScg to display pixels. The tone curve ([`tone`]) acts on the largest component, highlights take a
+//! 4. [`View`]: exposed ACEScg to display pixels, first by the camera's [`WhiteBalance`] if it has one. The tone curve ([`tone`]) acts on the largest component, highlights take a
 //!    path to white and colours outside sRGB lose saturation ([`gamut`]), then sRGB encoding ([`encode`]), alpha and dither ([`quantise`]).
 //!    The view can be inverted on the whole sRGB cube ([`View::to_scene`]), so a plate through an empty scene is unchanged.
 
@@ -18,6 +18,7 @@ pub mod space;
 pub mod spectrum;
 pub mod tone;
 pub mod view;
+pub mod white_balance;
 
 pub use blackbody::{BlackBody, black_body};
 pub use encode::{decode_srgb, decode_srgb8, encode_srgb};
@@ -29,3 +30,4 @@ pub use space::{
 };
 pub use spectrum::{LUMINOUS_EFFICACY_LM_PER_W, line_xyz, planck_radiance_per_nm, xyz_of_spectrum};
 pub use view::{UnknownView, View};
+pub use white_balance::WhiteBalance;

@@ -85,7 +85,7 @@ const fn xyz_from_rgb(primaries: [[f64; 2]; 3], white: [f64; 2]) -> Matrix3 {
 /// Bradford cone responses from XYZ (Lam 1985; ICC.1:2022 annex E).
 const BRADFORD: Matrix3 = Matrix3([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]);
 
-const fn adaptation(from: [f64; 2], to: [f64; 2]) -> Matrix3 {
+pub(super) const fn adaptation(from: [f64; 2], to: [f64; 2]) -> Matrix3 {
     let [f, t] = [BRADFORD.apply(xyz_of_chromaticity(from)), BRADFORD.apply(xyz_of_chromaticity(to))];
     let gains = diagonal([t[0] / f[0], t[1] / f[1], t[2] / f[2]]);
     BRADFORD.inverse().times(&gains.times(&BRADFORD))

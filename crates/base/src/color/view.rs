@@ -9,12 +9,15 @@ use super::{
     row,
     space::{acescg_from_srgb, srgb_from_acescg},
     tone::ToneCurve,
+    white_balance::WhiteBalance,
 };
 
 /// Scene brightness up to which the default view changes nothing.
 const KNEE: f32 = 0.6;
 /// Scene brightness that the default view shows as full display light.
 const WHITE: f32 = 16.0;
+/// Pixels that are balanced at once.
+const BALANCED: usize = 256;
 
 /// How exposed scene light is shown.
 ///
@@ -26,6 +29,8 @@ const WHITE: f32 = 16.0;
 pub struct View {
     /// `None` for `raw`.
     tone: Option<ToneCurve>,
+    /// What is done to light first, unless it is shown `raw`.
+    balance: Option<WhiteBalance>,
     name: &'static str,
 }
 
@@ -45,11 +50,12 @@ impl Default for View {
 
 impl View {
     /// The default: tone curve, highlights to white, gamut map, sRGB.
-    pub const DISPLAY: Self = Self { tone: Some(ToneCurve::with_shoulder(KNEE, WHITE)), name: "display" };
+    pub const DISPLAY: Self =
+        Self { tone: Some(ToneCurve::with_shoulder(KNEE, WHITE)), balance: None, name: "display" };
     /// No tone curve: gamut map and sRGB.
-    pub const STANDARD: Self = Self { tone: Some(ToneCurve::clip()), name: "standard" };
+    pub const STANDARD: Self = Self { tone: Some(ToneCurve::clip()), balance: None, name: "standard" };
     /// Linear ACEScg, clamped.
-    pub const RAW: Self = Self { tone: None, name: "raw" };
+    pub const RAW: Self = Self { tone: None, balance: None, name: "raw" };
 
     /// The names of all views, default first.
     pub const NAMES: [&'static str; 3] = [Self::DISPLAY.name, Self::STANDARD.name, Self::RAW.name];
@@ -65,6 +71,14 @@ impl View {
             .ok_or_else(|| UnknownView { name: name.to_owned() })
     }
 
+    /// The same view of a camera whose white balance is set to the light of a black body of that temperature, K; of one that takes D65 for
+    /// white without. `raw` shows light as it is.
+    #[must_use]
+    pub fn balanced(mut self, temperature_k: Option<f64>) -> Self {
+        self.balance = temperature_k.filter(|_| self.tone.is_some()).map(WhiteBalance::of_black_body);
+        self
+    }
+
     /// The view's name.
     #[must_use]
     pub const fn name(&self) -> &'static str {
@@ -75,9 +89,10 @@ impl View {
     #[inline(always)]
     #[must_use]
     pub fn to_display(&self, acescg: [f32; 3]) -> [f32; 3] {
-        match &self.tone {
-            Some(tone) => shown(tone, acescg),
-            None => clamped(acescg),
+        match (&self.tone, &self.balance) {
+            (Some(tone), Some(balance)) => shown(tone, balance.apply(acescg)),
+            (Some(tone), None) => shown(tone, acescg),
+            (None, _) => clamped(acescg),
         }
     }
 
@@ -87,9 +102,10 @@ impl View {
     #[inline(always)]
     #[must_use]
     pub fn to_scene(&self, display: [f32; 3]) -> [f32; 3] {
-        match &self.tone {
-            Some(tone) => unshown(tone, display),
-            None => acescg_from_srgb(clamped(display)),
+        match (&self.tone, &self.balance) {
+            (Some(tone), Some(balance)) => balance.invert(unshown(tone, display)),
+            (Some(tone), None) => unshown(tone, display),
+            (None, _) => acescg_from_srgb(clamped(display)),
         }
     }
 
@@ -102,6 +118,11 @@ impl View {
             return;
         };
         dispatch!(level, _simd => row::to_scene(tone, pixels));
+        if let Some(balance) = &self.balance {
+            for pixel in pixels {
+                [pixel[0], pixel[1], pixel[2]] = balance.invert([pixel[0], pixel[1], pixel[2]]);
+            }
+        }
     }
 
     /// One row of display codes of premultiplied, exposed ACEScg.
@@ -116,6 +137,27 @@ impl View {
         pixels: &[[f32; 4]],
         y: i64,
         x0: i64,
+        opaque: bool,
+        out: &mut [[C; 4]],
+    ) {
+        let Some(balance) = &self.balance else { return self.row(level, pixels, [x0, y], opaque, out) };
+        let mut buffer = [[0.0; 4]; BALANCED];
+        for ((part, out), first) in pixels.chunks(BALANCED).zip(out.chunks_mut(BALANCED)).zip((0..).step_by(BALANCED)) {
+            let shown = &mut buffer[..part.len()];
+            for (shown, [r, g, b, alpha]) in shown.iter_mut().zip(part) {
+                let [r, g, b] = balance.apply([*r, *g, *b]);
+                *shown = [r, g, b, *alpha];
+            }
+            self.row(level, shown, [x0.wrapping_add(first), y], opaque, out);
+        }
+    }
+
+    /// One row of light that has been balanced.
+    fn row<C: DisplayCode>(
+        &self,
+        level: Level,
+        pixels: &[[f32; 4]],
+        [x0, y]: [i64; 2],
         opaque: bool,
         out: &mut [[C; 4]],
     ) {
@@ -177,7 +219,7 @@ mod tests {
 
     #[test]
     fn cube_survives_the_way_to_the_scene_and_back() {
-        for view in [View::DISPLAY, View::STANDARD] {
+        for view in [View::DISPLAY, View::STANDARD, View::DISPLAY.balanced(Some(4000.0))] {
             for index in 0..17 * 17 * 17 {
                 let c = [index % 17, index / 17 % 17, index / 289].map(|i| i as f32 / 16.0);
                 let back = view.to_display(view.to_scene(c));
@@ -216,7 +258,7 @@ mod tests {
     #[test]
     fn every_level_gives_the_same_bytes() {
         let pixels = wild_pixels(4099);
-        for view in [View::DISPLAY, View::STANDARD, View::RAW] {
+        for view in [View::DISPLAY, View::STANDARD, View::RAW, View::DISPLAY.balanced(Some(4000.0))] {
             for opaque in [false, true] {
                 let (mut wide, mut narrow) = (vec![[0_u8; 4]; 4099], vec![[9_u8; 4]; 4099]);
                 view.display_row(Level::new(), &pixels, 5, 11, opaque, &mut wide);
@@ -238,14 +280,16 @@ mod tests {
     #[test]
     fn rows_agree_with_the_scalar_view() {
         let pixels = wild_pixels(1000);
-        let mut out = vec![[0_u16; 4]; pixels.len()];
-        View::DISPLAY.display_row(Level::new(), &pixels, 0, 0, true, &mut out);
-        for (pixel, codes) in pixels.iter().zip(&out) {
-            let shown = View::DISPLAY.to_display([pixel[0], pixel[1], pixel[2]]);
-            assert!(shown.iter().all(|v| (0.0..=1.0).contains(v)), "{pixel:?} {shown:?}");
-            for (light, code) in shown.iter().zip(codes) {
-                let expected = crate::color::encode_srgb(*light) * 65_535.0;
-                assert!((expected - f32::from(*code)).abs() <= 0.51, "{pixel:?}");
+        for view in [View::DISPLAY, View::DISPLAY.balanced(Some(4000.0))] {
+            let mut out = vec![[0_u16; 4]; pixels.len()];
+            view.display_row(Level::new(), &pixels, 0, 0, true, &mut out);
+            for (pixel, codes) in pixels.iter().zip(&out) {
+                let shown = view.to_display([pixel[0], pixel[1], pixel[2]]);
+                assert!(shown.iter().all(|v| (0.0..=1.0).contains(v)), "{pixel:?} {shown:?}");
+                for (light, code) in shown.iter().zip(codes) {
+                    let expected = crate::color::encode_srgb(*light) * 65_535.0;
+                    assert!((expected - f32::from(*code)).abs() <= 0.51, "{pixel:?}");
+                }
             }
         }
     }

@@ -40,7 +40,7 @@ pub(crate) struct FlipbookArgs {
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
     first_frame: Option<i32>,
     /// Another seed than the scene's.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = values::parse_seed)]
     seed: Option<u64>,
     /// Change a setting of the scene for this once; may be repeated.
     #[arg(long, value_name = "KEY.PATH=VALUE")]

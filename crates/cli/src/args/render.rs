@@ -77,7 +77,7 @@ pub(crate) struct RenderArgs {
     )]
     loop_s: Option<f64>,
     /// Another seed than the scene's.
-    #[arg(long, value_name = "N", help_heading = "Picture")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = values::parse_seed, help_heading = "Picture")]
     seed: Option<u64>,
     /// Change a setting of the scene for this once; may be repeated. A name or number picks one phenomenon of many:
     /// `flame_sheet.0.height=2`.

@@ -18,8 +18,8 @@ Examples:
   bansho simulate torch.toml --particles gas.ply --frames 60        one
   bansho simulate torch.toml --particles gas.####.ply --frames 0-239x10 --snapshots states
 
-Each file is a binary PLY with x y z (m, y up), vx vy vz (m/s), temperature (K) and density (kg/m^3) of every particle at the middle of
-the frame's exposure; Blender, MeshLab and Open3D read it.")]
+Each file is a binary PLY with x y z (m, y up) and vx vy vz (m/s) of every particle at the middle of the frame's exposure: of a particle flame
+with temperature (K) and density (kg/m^3), of an aurora with energy (eV) and power (W). Blender, MeshLab and Open3D read it.")]
 pub(crate) struct SimulateArgs {
     /// The scene file.
     pub(crate) scene: PathBuf,
@@ -30,7 +30,7 @@ pub(crate) struct SimulateArgs {
     #[arg(long, value_name = "SPEC", allow_hyphen_values = true, value_parser = values::parse_frames)]
     frames: Option<Frames>,
     /// Another seed than the scene's.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = values::parse_seed)]
     seed: Option<u64>,
     /// Change a setting of the scene for this once; may be repeated.
     #[arg(long, value_name = "KEY.PATH=VALUE")]

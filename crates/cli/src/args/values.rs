@@ -28,6 +28,8 @@ pub(super) enum ValueError {
     Grid,
     #[error("allowed: x,y,width,height in whole pixels from the top left corner, such as 640,0,320,180")]
     Crop,
+    #[error("allowed: a whole number from 0 to {}", u64::MAX)]
+    Seed,
     #[error("allowed: a number of seconds, such as 4 or 2.5")]
     Seconds,
     #[error("allowed: numbers with commas between, such as 1,5,10")]
@@ -51,6 +53,10 @@ fn pair(text: &str, most: usize) -> Option<[usize; 2]> {
 
 pub(super) fn parse_size(text: &str) -> Result<[usize; 2], ValueError> {
     pair(text, LARGEST_SIDE as usize).ok_or(ValueError::Size)
+}
+
+pub(super) fn parse_seed(text: &str) -> Result<u64, ValueError> {
+    text.parse().map_err(|_| ValueError::Seed)
 }
 
 pub(super) fn parse_grid(text: &str) -> Result<[usize; 2], ValueError> {

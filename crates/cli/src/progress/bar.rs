@@ -1,9 +1,16 @@
 //! A bar on the terminal.
 
-use std::{fmt::Write, time::Duration};
+use std::{
+    fmt::Write,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
+};
 
 use bansho::job::Outline;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::Result;
 use crate::output::to_stderr;
@@ -11,27 +18,41 @@ use crate::output::to_stderr;
 /// Draws itself only where stderr is a terminal.
 pub(super) struct Bar {
     bar: ProgressBar,
+    /// Frames that were there before.
+    kept: Arc<AtomicU64>,
 }
 
-const TEMPLATE: &str = "{wide_bar} {pos}/{len}  {rate} frames/s  {eta} left";
+/// How fast `drawn` frames came, and how long the others will take: nobody knows before the first is there, which a long preroll comes before.
+fn pace(drawn: u64, per_second: f64, left: Duration) -> String {
+    match drawn {
+        0 => "before the first frame".to_owned(),
+        _ => format!("{per_second:.1} frames/s  {} left", HumanDuration(left)),
+    }
+}
+
+const TEMPLATE: &str = "{wide_bar} {pos}/{len}  {pace}";
 
 impl Bar {
     pub(super) fn new() -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-        let rate = |state: &ProgressState, text: &mut dyn Write| {
-            // A rate that cannot be drawn is simply not drawn.
-            let _ = write!(text, "{:.1}", state.per_sec());
+        let kept = Arc::new(AtomicU64::new(0));
+        let known = kept.clone();
+        let write_pace = move |state: &ProgressState, text: &mut dyn Write| {
+            let drawn = state.pos().saturating_sub(known.load(Ordering::Relaxed));
+            // A pace that cannot be drawn is simply not drawn.
+            let _ = text.write_str(&pace(drawn, state.per_sec(), state.eta()));
         };
         if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
-            bar.set_style(style.with_key("rate", rate));
+            bar.set_style(style.with_key("pace", write_pace));
         }
-        Self { bar }
+        Self { bar, kept }
     }
 
     /// Frames that are there already move the bar but do not count for the rate.
     pub(super) fn started(&self, outline: &Outline) {
         self.bar.set_length(outline.total as u64);
         self.bar.set_position(outline.kept as u64);
+        self.kept.store(outline.kept as u64, Ordering::Relaxed);
         self.bar.reset_eta();
         self.bar.enable_steady_tick(Duration::from_millis(200));
     }
@@ -56,5 +77,17 @@ impl Bar {
         let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
         let rate = *drawn as f64 / seconds.max(1e-9);
         to_stderr(&format!("{drawn} {what} in {seconds:.2} s, {rate:.1} a second{kept}: {}", files.join(", ")));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nobody_knows_the_time_that_is_left_before_the_first_frame() {
+        assert_eq!(pace(0, 0.0, Duration::ZERO), "before the first frame");
+        let told = pace(3, 1.5, Duration::from_secs(8));
+        assert!(told.starts_with("1.5 frames/s  8") && told.ends_with(" left"), "{told}");
     }
 }

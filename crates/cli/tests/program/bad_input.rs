@@ -77,7 +77,7 @@ fn a_plate_that_is_no_picture_is_refused() {
         std::fs::write(folder.path("plate.png"), contents).unwrap();
         let run = folder.run(&["render", "scene.toml"]);
         assert_eq!((run.code, run.errors()), (Some(3), 1), "{contents:?}: {}", run.stderr);
-        says(&run.stderr, &["scene.toml: plate.image: ", "plate.png", "damaged"]);
+        says(&run.stderr, &["scene.toml:15:9: plate.image: ", "plate.png", "damaged"]);
         assert_eq!(folder.run(&["check", "scene.toml"]).code, Some(3), "a check finds it too");
         assert_eq!(folder.names(), ["plate.png", "scene.toml"]);
     }
@@ -162,6 +162,12 @@ fn names_that_cannot_be_written_are_refused() {
     misused(&["--out", "a.tiff"], &["a.tiff", ".png, .exr, .apng, .gif, .mp4"]);
     misused(&["--out", "a.##.##.png"], &["more than one place"]);
     misused(&["--out", "frame"], &["no extension"]);
+}
+
+#[test]
+fn a_seed_below_zero_is_told_what_may_be() {
+    misused(&["--seed", "-1"], &["--seed", "allowed: a whole number from 0 to 18446744073709551615"]);
+    misused(&["--seed", "soon"], &["--seed", "allowed: a whole number from 0 to"]);
 }
 
 #[test]
@@ -253,4 +259,71 @@ fn gas_that_cannot_be_says_what_can() {
     let run = folder.run(&["check", "scene.toml"]);
     assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
     says(&run.stderr, &["scene.toml:5:8: ", "mesh.gltf", "no triangles with an area"]);
+}
+
+/// Plates `plate.0000.png` and so on, drawn from the scene itself.
+fn with_plates(frames: &str) -> Folder {
+    let folder = Folder::with_scene(FLAME);
+    folder.succeed(&["render", "scene.toml", "--frames", frames, "--out", "plate.####.png"]);
+    folder.write("laid.toml", &format!("{FLAME}[plate]\nimage = \"plate.####.png\"\n"));
+    folder
+}
+
+#[test]
+fn a_frame_without_its_plate_is_told_before_anything_is_drawn() {
+    let folder = with_plates("0-5");
+    folder.succeed(&["check", "laid.toml"]);
+    std::fs::remove_file(folder.path("plate.0003.png")).unwrap();
+    for arguments in
+        [&["check", "laid.toml"][..], &["render", "laid.toml"], &["flipbook", "laid.toml", "--grid", "2x3"]]
+    {
+        let run = folder.run(arguments);
+        assert_eq!((run.code, run.errors()), (Some(3), 1), "{arguments:?}: {}", run.stderr);
+        says(&run.stderr, &["laid.toml:15:9: plate.image: ", "plate.0003.png: no such file", "plate of frame 3"]);
+        assert!(!folder.path("out").exists());
+    }
+    folder.succeed(&["render", "laid.toml", "--frames", "0-2", "--out", "f.png"]);
+    std::fs::remove_file(folder.path("plate.0004.png")).unwrap();
+    says(&folder.run(&["check", "laid.toml"]).stderr, &["plate of frame 3, and 2 of the 6 frames have none"]);
+}
+
+#[test]
+fn a_plate_that_is_damaged_on_the_way_is_told_with_its_line() {
+    let folder = with_plates("0-5");
+    std::fs::write(folder.path("plate.0002.png"), "no picture").unwrap();
+    let run = folder.run(&["render", "laid.toml", "--out", "f.png"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+    says(&run.stderr, &["laid.toml:15:9: plate.image: ", "plate.0002.png: is damaged"]);
+}
+
+#[test]
+fn what_the_scene_is_read_from_is_never_written_over() {
+    let folder = with_plates("0-1");
+    let before = folder.files("");
+    let refused = |arguments: &[&str], named: &str| {
+        let run = folder.run(arguments);
+        assert_eq!((run.code, run.errors()), (Some(2), 1), "{arguments:?}: {}", run.stderr);
+        says(&run.stderr, &[named, "is a file that the scene is read from; allowed: "]);
+        assert!(folder.files("").iter().filter(|(name, _)| before.contains_key(*name)).all(|(n, b)| before[n] == *b));
+    };
+    refused(&["render", "laid.toml", "--out", "plate.####.png", "--frames", "0-1"], "plate.0000.png");
+    // Also where only a frame that is not drawn would lose its plate.
+    folder.write("one.toml", &format!("{FLAME}[plate]\nimage = \"plate.0001.png\"\n"));
+    refused(&["render", "one.toml", "--out", "plate.png", "--frames", "0-1"], "plate.0001.png");
+    refused(&["render", "one.toml", "--out", "plate.0001.png", "--frames", "0"], "plate.0001.png");
+    refused(&["render", "one.toml", "--out", "plate.0001.png", "--contact-sheet", "2"], "plate.0001.png");
+    #[cfg(unix)]
+    {
+        let link =
+            |target: &str, name: &str| std::os::unix::fs::symlink(folder.path(target), folder.path(name)).unwrap();
+        link("plate.0000.png", "linked.png");
+        refused(&["render", "laid.toml", "--out", "linked.png", "--frames", "0"], "linked.png");
+        link("laid.toml", "film.gif");
+        refused(&["render", "laid.toml", "--out", "film.gif", "--frames", "0-1"], "film.gif");
+        link("plate.0001.png", "book_colour.png");
+        refused(&["flipbook", "laid.toml", "--grid", "2x1", "--out", "book.png"], "book_colour.png");
+    }
+    std::fs::create_dir(folder.path("sub")).unwrap();
+    refused(&["render", "laid.toml", "--out", "sub/../plate.####.png", "--frames", "0-1"], "plate.0000.png");
+    folder.succeed(&["render", "laid.toml", "--out", "other.####.png", "--frames", "0-1"]);
 }

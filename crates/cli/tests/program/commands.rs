@@ -38,6 +38,7 @@ fn a_new_scene_shows_any_phenomenon() {
 fn every_example_can_be_copied_and_passes_the_check() {
     let folder = Folder::new();
     let list = folder.succeed(&["new", "--list"]).stdout;
+    assert!(list.lines().all(|line| line.ends_with('.')), "{list}");
     for example in list.lines().filter_map(|line| line.split_whitespace().next()) {
         let file = format!("{example} copy.toml");
         folder.succeed(&["new", &file, "--from", example]);

@@ -68,9 +68,9 @@ fn a_folder_that_may_not_be_written_is_an_error_before_anything_is_drawn() {
 struct SmallDisk(PathBuf);
 
 impl SmallDisk {
-    fn mount(at: &Path) -> Self {
-        fs::create_dir(at).unwrap();
-        let arguments = ["-t", "tmpfs", "-o", "size=64k", "tmpfs"];
+    fn mount(at: &Path, kibibytes: usize) -> Self {
+        fs::create_dir_all(at).unwrap();
+        let arguments = ["-t", "tmpfs", "-o", &format!("size={kibibytes}k"), "tmpfs"];
         let mounted = Command::new("mount").args(arguments).arg(at).status().unwrap();
         assert!(mounted.success(), "a small disk could not be mounted");
         Self(at.to_path_buf())
@@ -88,7 +88,7 @@ impl Drop for SmallDisk {
 #[ignore = "needs root, to mount a small disk"]
 fn a_full_disk_is_an_error_and_leaves_only_whole_frames() {
     let folder = Folder::with_scene(&FLAME.replace("48, 64", "96, 128").replace("frames = 6", "frames = 100"));
-    let _disk = SmallDisk::mount(&folder.path("disk"));
+    let _disk = SmallDisk::mount(&folder.path("disk"), 64);
     let run = folder.run(&["render", "scene.toml", "--out", "disk/f.png", "--bits", "16"]);
     assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
     assert!(run.stderr.contains("the disk is full"), "{}", run.stderr);
@@ -111,4 +111,41 @@ fn a_full_disk_is_an_error_and_leaves_only_whole_frames() {
     let film = folder.run(&["render", "scene.toml", "--out", "disk/film.apng"]);
     assert_eq!((film.code, film.errors()), (Some(1), 1), "{}", film.stderr);
     assert!(!folder.path("disk/film.apng").exists());
+}
+
+/// How many frames of a film can be read, as ffprobe counts them.
+fn playable_frames(film: &Path) -> usize {
+    let arguments = ["-v", "error", "-count_frames", "-show_entries", "stream=nb_read_frames", "-of", "csv=p=0"];
+    let output = Command::new("ffprobe").args(arguments).arg(film).output().unwrap();
+    String::from_utf8(output.stdout).unwrap().trim().trim_end_matches(',').parse().unwrap_or(0)
+}
+
+#[test]
+#[ignore = "needs root, to mount small disks, and ffmpeg"]
+fn a_film_on_a_disk_that_fills_is_whole_or_an_error() {
+    const FRAMES: usize = 24;
+    let folder = Folder::with_scene(&FLAME.replace("48, 64", "96, 128").replace("frames = 6", "frames = 24"));
+    for extension in ["mp4", "mov", "webm"] {
+        let spacious = format!("spacious.{extension}");
+        folder.succeed(&["render", "scene.toml", "--out", &spacious]);
+        let needed = fs::metadata(folder.path(&spacious)).unwrap().len() as usize / 1024;
+        // Around the size of the film, where only its end does not fit, and far below it.
+        let mut outcomes = [0; 2];
+        for kibibytes in
+            [needed / 4, needed / 2, needed - 8, needed - 4, needed, needed + 4, needed + 8, 2 * needed + 64]
+        {
+            let disk = folder.path("disk");
+            let _mounted = SmallDisk::mount(&disk, kibibytes.next_multiple_of(4).max(4));
+            let name = format!("disk/film.{extension}");
+            let run = folder.run(&["render", "scene.toml", "--out", &name]);
+            let film = folder.path(&name);
+            let is_whole = film.exists() && playable_frames(&film) == FRAMES;
+            let context = format!("{extension}, {kibibytes} of {needed} KiB: {}", run.stderr);
+            assert_eq!(run.code, Some(if is_whole { 0 } else { 1 }), "{context}");
+            assert!(is_whole || run.stderr.contains("the disk is full"), "{context}");
+            assert_eq!(film.exists(), is_whole, "{context}");
+            outcomes[usize::from(is_whole)] += 1;
+        }
+        assert!(outcomes[0] >= 3 && outcomes[1] >= 1, "{extension}: {outcomes:?}");
+    }
 }

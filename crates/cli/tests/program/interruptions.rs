@@ -2,6 +2,7 @@
 
 use std::{
     fs,
+    io::{BufRead, BufReader},
     process::{Child, Command, Stdio},
     time::{Duration, Instant},
 };
@@ -127,8 +128,44 @@ fn an_interrupted_film_leaves_nothing() {
         let child = start(&folder, &["render", "scene.toml", "--out", &format!("film.{extension}")]);
         wait_until("the film to begin", || folder.names().iter().any(|name| name.ends_with(".part")));
         signal(&child, "TERM");
-        assert_eq!(Run::of(child.wait_with_output().unwrap()).code, Some(143));
+        let run = Run::of(child.wait_with_output().unwrap());
+        assert_eq!(run.code, Some(143));
+        assert!(run.stderr.contains("stopped; nothing stays, since a film is written only when"), "{}", run.stderr);
         assert_eq!(folder.names(), ["scene.toml"], "{extension}");
+    }
+}
+
+/// What an interrupted program says, once its `start` event was seen.
+fn interrupted(folder: &Folder, arguments: &[&str]) -> String {
+    let mut child = start(folder, &[arguments, &["--progress", "json"]].concat());
+    let mut told = BufReader::new(child.stdout.take().unwrap());
+    let mut first = String::new();
+    told.read_line(&mut first).unwrap();
+    assert!(first.contains("start"), "{first}");
+    signal(&child, "INT");
+    let run = Run::of(child.wait_with_output().unwrap());
+    assert_eq!((run.code, run.errors()), (Some(130), 1), "{}", run.stderr);
+    run.stderr
+}
+
+#[test]
+fn what_stays_after_an_interruption_is_told_as_it_is() {
+    let folder = long_scene();
+    let sheet = interrupted(&folder, &["render", "scene.toml", "--contact-sheet", "1024"]);
+    assert!(sheet.contains("nothing stays, since a sheet is written only when"), "{sheet}");
+    let book =
+        interrupted(&folder, &["flipbook", "scene.toml", "--grid", "64x64", "--size", "200x200", "--out", "book.png"]);
+    assert!(book.contains("nothing stays, since a flipbook is written only when"), "{book}");
+    assert_eq!(folder.names(), ["scene.toml"]);
+    let gas = "bansho = 1\n[picture]\nframes = 1000000\n[[flame_particles]]\nparticles = 300\n";
+    folder.write("gas.toml", gas);
+    let particles = interrupted(&folder, &["simulate", "gas.toml", "--particles", "p/gas.ply"]);
+    assert!(
+        particles.contains("stopped; whole files of particles stay, and --frames asks for the others"),
+        "{particles}"
+    );
+    for said in [sheet, book, particles] {
+        assert!(!said.contains("--resume"), "{said}");
     }
 }
 

@@ -7,6 +7,8 @@ mod disk;
 mod figures;
 mod flipbook;
 mod interruptions;
+#[cfg(target_os = "linux")]
+mod memory;
 mod particles;
 mod pictures;
 mod rain;

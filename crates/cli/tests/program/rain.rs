@@ -132,6 +132,8 @@ fn a_depth_of_another_size_than_its_plate_is_refused() {
     );
     let run = folder.run(&["render", "laid.toml", "--frames", "0", "--out", "f.png"]);
     assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
-    assert!(run.stderr.contains("[96, 54] pixels, its plate [64, 36]; they must be of one size"), "{}", run.stderr);
+    assert!(run.stderr.contains("laid.toml:"), "{}", run.stderr);
+    assert!(run.stderr.contains("plate.depth: depth.exr: has 96 x 54 pixels; allowed: 64 x 36"), "{}", run.stderr);
+    assert_eq!(folder.run(&["check", "laid.toml"]).code, Some(3), "a check finds it too");
     assert!(!folder.path("f.png").exists());
 }

@@ -1,8 +1,11 @@
 //! The attributes of an OpenEXR header, as bytes ("OpenEXR File Layout": name, type, size, value; little-endian).
 
-use super::{KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_VERSION, plane::Plane};
+use super::{KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_FISHEYE_FOV, KEY_LENS, KEY_VERSION, plane::Plane};
 use crate::stamp;
-use bansho_base::image::{FrameHeader, Precision};
+use bansho_base::{
+    color::white_balance::chromaticity,
+    image::{CameraHeader, FrameHeader, Precision},
+};
 
 /// CIE xy of the ACEScg (AP1) red, green and blue and of its white, D60 (SMPTE ST 2065-4, S-2014-004).
 pub(crate) const AP1: [[f32; 2]; 4] = [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]];
@@ -38,7 +41,8 @@ pub(crate) fn header(frame: &FrameHeader, planes: &[Plane<'_>], data: Window, di
     bytes.floats("screenWindowCenter", "v2f", &[0.0; 2]);
     bytes.floats("screenWindowWidth", "float", &[1.0]);
     bytes.floats("chromaticities", "chromaticities", AP1.as_flattened());
-    bytes.floats("adoptedNeutral", "v2f", &AP1[3]);
+    let white = frame.white_balance_k.map(|kelvin| chromaticity(f64::from(kelvin)).map(|value| value as f32));
+    bytes.floats("adoptedNeutral", "v2f", &white.unwrap_or(AP1[3]));
     let [frames, seconds] = frame.fps;
     let rational = [frames.min(i32::MAX as u32), seconds].map(u32::to_le_bytes);
     bytes.attribute("framesPerSecond", "rational", rational.as_flattened());
@@ -47,8 +51,7 @@ pub(crate) fn header(frame: &FrameHeader, planes: &[Plane<'_>], data: Window, di
     bytes.floats("expTime", "float", &[frame.exposure_time_s]);
     bytes.floats(KEY_EXPOSURE, "float", &[frame.exposure_ev100]);
     bytes.floats("worldToCamera", "m44f", frame.camera.world_to_camera.as_flattened());
-    bytes.floats("worldToNDC", "m44f", frame.camera.world_to_ndc.as_flattened());
-    bytes.floats("verticalFovDeg", "float", &[frame.camera.vertical_fov_deg]);
+    lens(&frame.camera, &mut bytes);
     bytes.attribute("software", "string", format!("Bansho {}", stamp::VERSION).as_bytes());
     bytes.attribute(KEY_VERSION, "string", stamp::VERSION.as_bytes());
     bytes.attribute(KEY_FINGERPRINT, "string", stamp::to_hex(&frame.fingerprint).as_bytes());
@@ -57,6 +60,22 @@ pub(crate) fn header(frame: &FrameHeader, planes: &[Plane<'_>], data: Window, di
     let digest_at = bytes.len() - 64;
     bytes.push(0);
     (bytes, digest_at)
+}
+
+/// What is known of the lens: a matrix and an angle of view say nothing true of a dome or a panorama.
+fn lens(camera: &CameraHeader, bytes: &mut HeaderBytes) {
+    if let Some(matrix) = &camera.world_to_ndc {
+        bytes.floats("worldToNDC", "m44f", matrix.as_flattened());
+    }
+    if let Some(angle) = camera.vertical_fov_deg {
+        bytes.floats("verticalFovDeg", "float", &[angle]);
+    }
+    if let Some(lens) = camera.lens {
+        bytes.attribute(KEY_LENS, "string", lens.name().as_bytes());
+    }
+    if let Some(angle) = camera.fisheye_fov_deg {
+        bytes.floats(KEY_FISHEYE_FOV, "float", &[angle]);
+    }
 }
 
 impl HeaderBytes {

@@ -16,5 +16,9 @@ pub const KEY_FINGERPRINT: &str = "bansho:fingerprint";
 pub const KEY_VERSION: &str = "bansho:version";
 /// Header attribute (string): BLAKE3 of the whole file, taken while its 64 digits were zeros.
 pub const KEY_DIGEST: &str = "bansho:digest";
+/// Header attribute (string): `perspective`, `fisheye` or `panorama`.
+pub const KEY_LENS: &str = "bansho:lens";
+/// Header attribute (float): whole angle of a fisheye's circle, degrees.
+pub const KEY_FISHEYE_FOV: &str = "bansho:fisheyeFovDeg";
 /// Header attribute (float): exposure value at ISO 100 that the pixels are scaled by.
 pub const KEY_EXPOSURE: &str = "exposure_ev100";

@@ -6,7 +6,7 @@ pub mod limits;
 
 use std::{
     collections::HashMap,
-    fs::File,
+    fs::{self, File, Metadata},
     io::{self, Read},
     path::{Path, PathBuf},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -81,19 +81,25 @@ impl FileAssets {
     }
 }
 
-/// The whole file, if it is not beyond [`limits::FILE_BYTES`].
-fn read(path: &Path) -> Result<Vec<u8>, AssetProblem> {
-    let problem = |error: io::Error| match error.kind() {
+/// What the system says of a file.
+fn system(error: io::Error) -> AssetProblem {
+    match error.kind() {
         io::ErrorKind::NotFound => AssetProblem::Missing,
         _ => AssetProblem::Unreadable(error.to_string()),
-    };
-    let file = File::open(path).map_err(problem)?;
-    // A folder opens like a file; a pipe or a device might never end.
-    if !file.metadata().map_err(problem)?.is_file() {
-        return Err(AssetProblem::Unreadable("it is not a file".to_owned()));
     }
+}
+
+/// A folder opens like a file; a pipe or a device might never end.
+fn only_files(found: Metadata) -> Result<(), AssetProblem> {
+    if found.is_file() { Ok(()) } else { Err(AssetProblem::Unreadable("it is not a file".to_owned())) }
+}
+
+/// The whole file, if it is not beyond [`limits::FILE_BYTES`].
+fn read(path: &Path) -> Result<Vec<u8>, AssetProblem> {
+    let file = File::open(path).map_err(system)?;
+    file.metadata().map_err(system).and_then(only_files)?;
     let mut bytes = Vec::new();
-    file.take(limits::FILE_BYTES + 1).read_to_end(&mut bytes).map_err(problem)?;
+    file.take(limits::FILE_BYTES + 1).read_to_end(&mut bytes).map_err(system)?;
     if bytes.len() as u64 > limits::FILE_BYTES {
         return Err(AssetProblem::Unreadable(format!("it has more than {} bytes", limits::FILE_BYTES)));
     }
@@ -150,6 +156,11 @@ impl Assets for FileAssets {
         let text =
             String::from_utf8(bytes).map_err(|_| error(&path, AssetProblem::Damaged("it is not UTF-8".to_owned())))?;
         Ok(text.into())
+    }
+
+    fn find(&self, path: &str, frame: i64) -> Result<(), AssetError> {
+        let path = self.resolve(path, frame)?;
+        fs::metadata(&path).map_err(system).and_then(only_files).map_err(|problem| error(&path, problem))
     }
 
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {

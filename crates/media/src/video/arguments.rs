@@ -28,7 +28,7 @@ pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
         ["-flags:v", "+bitexact"],
         ["-map_metadata", "-1"],
     ];
-    let start = ["-y", "-nostdin", "-hide_banner", "-nostats", "-loglevel", "error"];
+    let start = ["-y", "-nostdin", "-hide_banner", "-nostats", "-loglevel", "error", "-xerror"];
     let words = start.into_iter().chain(input).chain(["-an", "-vf", &filter]).chain(codec(format).iter().copied());
     let words = words.chain(tags.into_iter().flatten()).chain(["-f", container(format.kind)]);
     words.map(OsString::from).chain([output.as_os_str().to_owned()]).collect()

@@ -36,6 +36,8 @@ impl VideoFilm {
         let mut command = Command::new(&format.options.program);
         command.args(arguments(format, file.temporary_path()));
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        // SVT-AV1 does not heed `-loglevel`; this is its own way to be told to speak of errors alone.
+        command.env("SVT_LOG", "1");
         // In a group of its own, so that Ctrl-C reaches Bansho alone and the film ends in order.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
@@ -62,15 +64,16 @@ fn tail(mut stream: impl Read) -> Vec<u8> {
 }
 
 impl Running {
-    /// Waits for the end; `Ok` if it was a good one.
+    /// Waits for the end; `Ok` if it was a good one. The status alone does not say so: `ffmpeg` (5.1 at least) ends with 0 where only
+    /// the trailer or the closing of the file failed. It is told to speak of errors alone, so a good end is a silent one.
     fn end(&mut self, path: &Path) -> Result<(), MediaError> {
         drop(self.frames.take());
         let status = self.child.wait().map_err(|source| MediaError::from_io(path, source))?;
-        if status.success() {
-            return Ok(());
-        }
         let said = self.said.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
         let tail = String::from_utf8_lossy(&said).trim().to_owned();
+        if status.success() && tail.is_empty() {
+            return Ok(());
+        }
         if tail.contains("No space left on device") {
             return Err(MediaError::DiskFull { path: path.to_path_buf() });
         }

@@ -154,7 +154,7 @@ bansho_base::parameters! {
         /// How long a ray lives.
         life_s: f64 = 3.0, limits(Range::new(0.01, 1e5)), unit("s");
         /// How much the energy of the electrons varies with the rays: bright ones reach lower. The standard deviation of its logarithm.
-        energy: f64 = 0.15, limits(Range::new(0.0, 2.0));
+        energy: f64 = 0.05, limits(Range::new(0.0, 2.0));
         /// Depth of black rays: thin gaps that run along the sheet.
         black_rays: f64 = 0.0, limits(SHARE);
         /// Distance from one black ray to the next.

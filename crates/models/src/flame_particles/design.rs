@@ -5,6 +5,7 @@ use bansho_base::{
     animation::Animated,
     assets::Assets,
     math::{self, DVec3},
+    memory,
     parameters::Auto,
 };
 
@@ -22,10 +23,6 @@ const PARTICLE_BYTES: f64 = 670.0;
 const LONGEST_RISE: f64 = 3.0;
 /// How much the fuel that a fire draws from its burner rises and falls as it puffs, as a share.
 const PULSE: f64 = 0.6;
-/// Fewer bytes are not asked for in advance.
-const FEW_BYTES: f64 = (1 << 30) as f64;
-/// What a picture takes beside its particles, at the least, bytes.
-const PICTURE_BYTES: f64 = (256 << 20) as f64;
 /// How far a burner may reach beyond the domain, of its own size: turning rounds.
 const SLACK: f64 = 1e-6;
 /// Fewest steps that gas lives, so that births in one step stay bounded.
@@ -138,8 +135,7 @@ fn preroll(parameters: &FlameParticlesParameters, longest: f64) -> f64 {
 
 /// Whether the system would give so many particles their memory.
 fn have_memory(count: i64) -> bool {
-    let bytes = count as f64 * PARTICLE_BYTES;
-    bytes < FEW_BYTES || Vec::<u8>::new().try_reserve_exact((bytes + PICTURE_BYTES) as usize).is_ok()
+    memory::is_granted(count as f64 * PARTICLE_BYTES)
 }
 
 /// Whether `count` particles may live beside the `others` of all other flames.
@@ -151,8 +147,7 @@ pub fn check_count(count: i64, others: i64) -> Result<(), ParticleFault> {
     if count <= taken && have_memory(count + others) {
         return Ok(());
     }
-    let twentieth = |parts: &i64| taken.min(count) / 20 * parts;
-    let most = (0..=20).rev().map(|parts| twentieth(&parts)).find(|most| have_memory(most + others)).unwrap_or(0);
+    let most = memory::most(taken.min(count), |most| have_memory(most + others));
     let most = if count > taken && have_memory(taken + others) { taken } else { most };
     let gib = (count as f64 + others as f64) * PARTICLE_BYTES / f64::from(1 << 30);
     let kind = ParticleFaultKind::TooManyParticles { count, others, gib, most };

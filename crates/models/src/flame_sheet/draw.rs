@@ -1,7 +1,8 @@
 //! Sheets drawn into strips, sixteen pixels at a time.
 //!
 //! Where a pixel lies on the flame, its threshold and its glow change slowly from row to row of a large picture. They are found exactly on
-//! every second, fourth or sixteenth row and taken as straight between; texture and colour are looked up for every pixel.
+//! every second, fourth or sixteenth row and taken as straight between; texture and colour are looked up for every pixel. Where the mapping
+//! squeezes the texture, at the flame's foot and in its fringe, a pixel spans many texels: there it is the mean of several exact places.
 
 use std::ops::Range;
 
@@ -26,7 +27,17 @@ pub(crate) struct Paint<'a> {
     pub(crate) absorbs: bool,
     /// Rows from one exact row to the next, a power of two.
     pub(crate) band: usize,
+    /// Texels from one pixel to the next beyond which a pixel is drawn from several places, [`SQUEEZED`].
+    pub(crate) squeezed: f32,
 }
+
+/// Texels from one pixel to the next that look-ups at their middles still show without dots and steps.
+pub(crate) const SQUEEZED: f32 = 4.0;
+
+/// Places within a squeezed pixel from its middle, pixels across and up: no two in one column or row.
+const WITHIN: [[f32; 2]; 4] = [[-0.375, 0.125], [-0.125, -0.375], [0.125, 0.375], [0.375, -0.125]];
+/// The same of a pixel that spans less than twice as many texels as show well.
+const WITHIN_LITTLE: [[f32; 2]; 2] = [[-0.25, 0.25], [0.25, -0.25]];
 
 /// Rows from one exact row to the next for a sheet of this height: 1 up to 255 pixels, 16 from 1024 on.
 pub(crate) fn band_of(height_pixels: f64) -> usize {
@@ -76,6 +87,8 @@ fn draw_each_row<S: Simd>(simd: S, paint: &Paint, columns: Range<usize>, rect: R
 struct Spot<S: Simd> {
     place: Place<S>,
     depth: Lanes<S>,
+    /// The most texels that a pixel spans, in those that show well with one look-up.
+    squeezed: f32,
 }
 
 /// What is known of the rows of a band, batch after batch and in each all samples.
@@ -115,7 +128,12 @@ impl<S: Simd> Band<S> {
         if paint.band > 1 {
             add_spots(simd, paint, columns, row + paint.band, &mut self.next);
             for (first, next) in self.first.iter().zip(&self.next) {
-                self.change.push(Spot { place: next.place.less(&first.place), depth: next.depth - first.depth });
+                let squeezed = first.squeezed.max(next.squeezed);
+                self.change.push(Spot {
+                    place: next.place.less(&first.place),
+                    depth: next.depth - first.depth,
+                    squeezed,
+                });
             }
         }
     }
@@ -144,8 +162,9 @@ fn draw_bands<S: Simd>(
             for batch in 0..batches {
                 let share = batch * paint.samples.len()..(batch + 1) * paint.samples.len();
                 let change = band.change.get(share.clone()).unwrap_or(&[]);
-                let sums = expose(simd, paint, &band.first[share], change, part);
-                sums.compose(columns.start + batch * LANES, row, rect, paint.absorbs, strip);
+                let column = columns.start + batch * LANES;
+                let sums = expose(simd, paint, &band.first[share], change, part, [column, row]);
+                sums.compose(column, row, rect, paint.absorbs, strip);
             }
         }
     }
@@ -157,14 +176,23 @@ fn add_spots<S: Simd>(simd: S, paint: &Paint, columns: &Range<usize>, row: usize
     for column in columns.clone().step_by(LANES) {
         for sample in paint.samples {
             let batch = sample.mapping.batch(simd, column, row);
-            spots.push(Spot { place: place(paint.shape, &sample.state, &batch), depth: batch.depth });
+            let place = place(paint.shape, &sample.state, &batch);
+            let squeezed = place.span(sample.state.texels()) / paint.squeezed;
+            spots.push(Spot { place, depth: batch.depth, squeezed });
         }
     }
 }
 
-/// Averages all samples of sixteen pixels `part` of the way between two exact rows.
+/// Averages all samples of the sixteen pixels from `pixel` on, `part` of the way between two exact rows.
 #[inline(always)]
-fn expose<S: Simd>(simd: S, paint: &Paint, spots: &[Spot<S>], changes: &[Spot<S>], part: f32) -> Sums<S> {
+fn expose<S: Simd>(
+    simd: S,
+    paint: &Paint,
+    spots: &[Spot<S>],
+    changes: &[Spot<S>],
+    part: f32,
+    pixel: [usize; 2],
+) -> Sums<S> {
     let mut sums = Sums::new(simd);
     for (index, (sample, spot)) in paint.samples.iter().zip(spots).enumerate() {
         let (place, depth) = match changes.get(index) {
@@ -173,11 +201,44 @@ fn expose<S: Simd>(simd: S, paint: &Paint, spots: &[Spot<S>], changes: &[Spot<S>
             }
             None => (spot.place, spot.depth),
         };
-        if let Some(shade) = shade_place(paint.shape, paint.ramp, &sample.state, &place) {
+        let Some(shade) = shade_place(paint.shape, paint.ramp, &sample.state, &place) else { continue };
+        let squeezed = changes.get(index).map_or(spot.squeezed, |change| change.squeezed);
+        if squeezed > 1.0 {
+            let within: &[_] = if squeezed > 2.0 { &WITHIN } else { &WITHIN_LITTLE };
+            add_squeezed(simd, paint, sample, pixel, within, &mut sums);
+        } else {
             sums.add(&shade, depth, sample.luminance, paint.samples.len());
         }
     }
     sums
+}
+
+/// Adds a sample of sixteen pixels as the mean over several places in each.
+fn add_squeezed<S: Simd>(
+    simd: S,
+    paint: &Paint,
+    sample: &Sample,
+    pixel: [usize; 2],
+    within: &[[f32; 2]],
+    sums: &mut Sums<S>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let batch = sample.mapping.batch(simd, pixel[0], pixel[1]);
+            let share = 1.0 / within.len() as f32;
+            for &[across, up] in within {
+                let near = batch.moved(0.5 * across * sample.state.pixel[0], up * sample.state.pixel[1]);
+                let place = place(paint.shape, &sample.state, &near);
+                if let Some(mut shade) = shade_place(paint.shape, paint.ramp, &sample.state, &place) {
+                    for plane in &mut shade.light {
+                        *plane *= share;
+                    }
+                    sums.add(&shade, batch.depth, sample.luminance, paint.samples.len());
+                }
+            }
+        },
+    );
 }
 
 /// Whether no flame can be in some columns between two rows.

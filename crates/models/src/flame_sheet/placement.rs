@@ -57,6 +57,14 @@ pub(crate) struct Batch<S: Simd> {
     pub(crate) depth: Lanes<S>,
 }
 
+impl<S: Simd> Batch<S> {
+    /// The same pixels at other places on the sheet.
+    #[inline(always)]
+    pub(crate) fn moved(&self, across: f32, up: f32) -> Self {
+        Self { x: self.x + self.x.like(across), y: self.y + self.y.like(up), depth: self.depth }
+    }
+}
+
 /// The depth of what is not seen; finite, so that it can be interpolated.
 const BEYOND: f32 = 1e30;
 /// A y that lies outside every flame.

@@ -23,6 +23,16 @@ pub(crate) struct State {
     pub(crate) pixel: [f32; 2],
 }
 
+impl State {
+    /// Texels to a unit of u and of w, of the finer layer; a texture that was filtered for small pixels has as many as pixels.
+    #[inline(always)]
+    pub(crate) fn texels(&self) -> [f32; 2] {
+        let [across, up] = self.texture.texels();
+        let kept = (1.0 / (self.pixel[1] * up)).min(1.0);
+        [across * kept, up * kept]
+    }
+}
+
 /// A sheet at one moment of the exposure, as one camera sees it.
 pub(crate) struct Sample {
     /// From pixels to the sheet.

@@ -2,11 +2,11 @@
 
 use bansho_base::{curve::Curve, math, random::Key};
 
-use fearless_simd::Simd;
+use fearless_simd::{Simd, prelude::*};
 
 use super::{
     chain,
-    lanes::{Lanes, Real, any_positive},
+    lanes::{LANES, Lanes, Real, any_positive},
     parameters::{ColourParameters, Colouring, ShapeParameters, TextureParameters},
     tables::{CurvePair, locate_near},
 };
@@ -98,6 +98,23 @@ impl<S: Simd> Place<S> {
         let (half, one) = (self.w.like(0.5), self.w.like(1.0));
         let top = (one - self.w).fused(one.like(1.0 / pixel[1]), half).held();
         (self.side + half).held() * (self.above + half).held() * top
+    }
+
+    /// The most texels from one of sixteen pixels of a row to the next where there may be flame; there are so many to a unit of u and of w.
+    #[inline(always)]
+    pub(crate) fn span(&self, texels: [f32; 2]) -> f32 {
+        let step = |values: Lanes<S>| {
+            let mut row = [values[LANES - 1]; LANES + 1];
+            values.store_slice(&mut row[..LANES]);
+            (Lanes::from_slice(values.simd, &row[1..]) - values).size()
+        };
+        let (one, zero) = (self.w.like(1.0), self.w.like(0.0));
+        let inside = (self.side + one).least(self.above + one).least(one - self.w).least(one - self.threshold);
+        let across = step(self.u) * self.u.like(texels[0]);
+        let span = zero.choose(inside, step(self.w).fused(self.u.like(texels[1]), across), zero);
+        let mut each = [0.0; LANES];
+        span.store_slice(&mut each);
+        each.into_iter().fold(0.0, f32::max)
     }
 
     /// Moved by `part` of a change.

@@ -16,7 +16,7 @@ use bansho_base::{
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 
 use super::{
-    draw::{Paint, draw_rows},
+    draw::{Paint, SQUEEZED, draw_rows},
     lanes::{LANES, Lanes, ramp},
     moment::{Moment, Push},
     shade::{Drawn, State},
@@ -281,7 +281,15 @@ fn red_in_bands(sheet: &FlameSheet, view: &View, rows: usize) -> Vec<f32> {
         let flame = &sheet.flames[0];
         let (samples, _) = sheet.samples(flame, &flame.source.filtered(1e4), view, surroundings.wind, 1);
         let (shape, ramp) = (&sheet.shape, &sheet.ramp);
-        let paint = Paint { shape, ramp, samples: &samples, drawn: Drawn::Flame, absorbs: true, band: rows };
+        let paint = Paint {
+            shape,
+            ramp,
+            samples: &samples,
+            drawn: Drawn::Flame,
+            absorbs: true,
+            band: rows,
+            squeezed: f32::INFINITY,
+        };
         let rect = Rect::of_size(320, 480);
         let mut strip = Strip::default();
         strip.reset(rect, None, 0);
@@ -305,4 +313,51 @@ fn rows_between_exact_rows_are_as_good_as_exact_ones() {
         let worst = apart.into_iter().fold(0.0, f32::max) / most;
         assert!(most > 0.0 && mean < most_apart && worst < 0.08, "{rows} rows: {mean} {worst}");
     }
+}
+
+/// Red light of the front of the campfire, `finer` times as large as in its scene; pixels that span many texels as `squeezed` says.
+fn red_of_campfire(finer: usize, squeezed: f32) -> Vec<f32> {
+    let parameters = FlameSheetParameters {
+        width: 0.62,
+        height: 0.6,
+        speed: Animated::from(1.8),
+        variation: 3,
+        time_samples: Auto::Set(1),
+        ..FlameSheetParameters::default()
+    };
+    let sheet = sheet(parameters, None);
+    let size = [320, 304].map(|side| side * finer);
+    let camera = CameraParameters {
+        position: Animated::from([0.0, 0.3, 3.4]),
+        target: Animated::from([0.0, 0.3, 0.0]),
+        vertical_fov_deg: Animated::from(11.6),
+        ..CameraParameters::default()
+    };
+    let view = View::new(camera, Shutter { open: 4.0, close: 4.0 }, 4.04, size, 0);
+    with_wind([0.25, 0.0, 0.0], |surroundings| {
+        let flame = &sheet.flames[0];
+        let (samples, _) = sheet.samples(flame, &flame.source.filtered(270.0), &view, surroundings.wind, 1);
+        let (shape, ramp) = (&sheet.shape, &sheet.ramp);
+        let paint = Paint { shape, ramp, samples: &samples, drawn: Drawn::Flame, absorbs: true, band: 2, squeezed };
+        let rect = Rect::of_size(size[0], size[1]);
+        let mut strip = Strip::default();
+        strip.reset(rect, None, 0);
+        dispatch!(Level::new(), simd => draw_rows(simd, &paint, rect, &mut strip));
+        strip.radiance[0].clone()
+    })
+}
+
+#[test]
+fn a_squeezed_texture_looks_as_if_supersampled() {
+    let fine = red_of_campfire(4, f32::INFINITY);
+    let mean_of_16 = |index: usize| -> f32 {
+        let (x, y) = (index % 320 * 4, index / 320 * 4);
+        (0..16).map(|k| fine[(y + k / 4) * 1280 + x + k % 4]).sum::<f32>() / 16.0
+    };
+    let wanted: Vec<f32> = (0..320 * 304).map(mean_of_16).collect();
+    let (plain, filtered) = (red_of_campfire(1, f32::INFINITY), red_of_campfire(1, SQUEEZED));
+    let squeezed: Vec<usize> = (0..plain.len()).filter(|&index| plain[index] != filtered[index]).collect();
+    let wrong = |drawn: &[f32]| squeezed.iter().map(|&index| (drawn[index] - wanted[index]).abs()).sum::<f32>();
+    let (before, after) = (wrong(&plain), wrong(&filtered));
+    assert!(squeezed.len() > 100 && after < 0.7 * before, "{} pixels: {before} {after}", squeezed.len());
 }

@@ -9,14 +9,16 @@ use rayon::prelude::*;
 
 type Pixel = [f32; 4];
 
-/// The reflection seen in facets whose slopes are Gaussian with an r.m.s. of `slope`, right for what is far away. Alpha is of no use here.
+/// The reflection seen in facets whose slopes are Gaussian with an r.m.s. of `slope`, right for what is far away. Alpha is of no use here;
+/// the reflection may have fewer pixels than the view.
 ///
 /// A facet turned toward the viewer by s moves what it shows by 2 s in elevation, one turned sideways by 2 s times the sine of the
 /// viewing elevation. So the blur along columns is the same everywhere, the one along rows vanishes at the horizon.
 pub(super) fn rough(reflection: &Image<4>, view: &View, slope: f64) -> Image<4> {
     let (width, height) = (reflection.width(), reflection.height());
-    let spread = 2.0 * slope * view.camera.focal_pixels;
-    let sines: Vec<f64> = (0..height).map(|y| sine_of_elevation(view, y)).collect();
+    let scale = width as f64 / view.size[0] as f64;
+    let spread = 2.0 * slope * view.camera.focal_pixels * scale;
+    let sines: Vec<f64> = (0..height).map(|y| sine_of_elevation(view, (y as f64 + 0.5) / scale)).collect();
     let columns: Vec<Vec<Pixel>> = (0..width)
         .into_par_iter()
         .map(|x| {
@@ -39,9 +41,9 @@ fn masked([red, green, blue, _]: Pixel, seen: bool) -> Pixel {
     if seen { [red, green, blue, 1.0] } else { [0.0; 4] }
 }
 
-/// Sine of the angle at which the middle of row `y` looks down on level ground; 0 above the horizon.
-fn sine_of_elevation(view: &View, y: usize) -> f64 {
-    let direction = view.camera.direction(DVec2::new(0.5 * view.size[0] as f64, y as f64 + 0.5));
+/// Sine of the angle at which the picture's middle, `y` pixels from its top, looks down on level ground; 0 above the horizon.
+fn sine_of_elevation(view: &View, y: f64) -> f64 {
+    let direction = view.camera.direction(DVec2::new(0.5 * view.size[0] as f64, y));
     direction.map_or(0.0, |direction| (-direction.y / direction.length()).clamp(0.0, 1.0))
 }
 

@@ -54,12 +54,19 @@ fn facing(square: f64, slope: f64, light: f64, viewer: f64) -> f64 {
     2.0 / (PI * width * tail * tail * tail * (1.0 + hidden(light) + hidden(viewer)))
 }
 
-/// Radiance from a film of water on level ground at `point`, seen from the unit vector `viewer`.
-pub(super) fn gloss(surroundings: &Surroundings, point: DVec3, viewer: DVec3, facets: &Facets) -> [f32; 3] {
+/// Radiance from a film of water on level ground at `point`, seen from the unit vector `viewer`; before a `backdrop`, if not the sky.
+pub(super) fn gloss(
+    surroundings: &Surroundings,
+    backdrop: Option<[f32; 3]>,
+    point: DVec3,
+    viewer: DVec3,
+    facets: &Facets,
+) -> [f32; 3] {
     // What looks along rough ground sees the facets that lean toward it: they mirror less, and what stands higher.
     let rise = math::hypot(viewer.y, facets.mean());
     let mirrored = DVec3::new(-viewer.x, rise, -viewer.z).normalize();
-    let mut radiance = surroundings.sky.radiance(mirrored).map(|value| value * fresnel(rise) as f32);
+    let behind = backdrop.unwrap_or_else(|| surroundings.sky.radiance(mirrored));
+    let mut radiance = behind.map(|value| value * fresnel(rise) as f32);
     for light in &surroundings.others.lights {
         let (illuminance, toward) = light.illuminance(point);
         let width = match light.emitter {

@@ -15,7 +15,7 @@ use bansho_base::{
     image::Image,
     math::DVec2,
     observer::{Cancelled, Observer, check},
-    phenomenon::{Phenomenon, Prepared},
+    phenomenon::{LevelMirror, Phenomenon, Prepared},
     random::Key,
     surroundings::{Occluder, Publication, Surroundings},
 };
@@ -80,9 +80,9 @@ impl Phenomenon for Ground {
         Publication { occluders: vec![solid], ..Publication::default() }
     }
 
-    fn mirror(&self) -> Option<f64> {
+    fn mirror(&self) -> Option<LevelMirror> {
         let dry = self.parameters.wetness.constant() == Some(0.0) && self.parameters.kind != GroundKind::Water;
-        (!dry).then_some(self.parameters.height)
+        (!dry).then(|| self.parameters.level())
     }
 
     fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
@@ -107,6 +107,7 @@ impl Phenomenon for Ground {
             surroundings,
             wetness,
             lake: self.lake(view, surroundings),
+            backdrop: surroundings.backdrop.map(|sharp| blur::rough(sharp, view, self.surface.mean_slope())),
         }))
     }
 }

@@ -1,6 +1,6 @@
 //! What a scene may say of its ground.
 
-use bansho_base::{animation::Animated, parameters::Range};
+use bansho_base::{animation::Animated, parameters::Range, phenomenon::LevelMirror};
 
 bansho_base::choice! {
     /// What the ground is.
@@ -33,9 +33,19 @@ bansho_base::parameters! {
         puddles: f64 = 0.25, limits(Range::new(0.0, 1.0));
         /// R.m.s. slope of the film of water between puddles: it draws lamps out into streaks.
         roughness: f64 = 0.06, limits(Range::new(0.0, 0.5));
+        /// How far above or below the ground, by its depth, what a plate shows still is ground; for `kind = "plate"`. More for a plate whose
+        /// depth is only a guess.
+        plate_tolerance: f64 = 0.02, limits(Range::new(0.0, 10.0)), unit("m");
         /// R.m.s. slope of the waves of a lake.
         waves: f64 = 0.02, limits(Range::new(0.0, 0.3));
         /// Longest waves of a lake.
         wave_length: f64 = 4.0, limits(Range::new(0.05, 200.0)), unit("m");
+    }
+}
+
+impl GroundParameters {
+    /// It as a mirror.
+    pub(super) fn level(&self) -> LevelMirror {
+        LevelMirror { height: self.height, plate_tolerance: self.plate_tolerance }
     }
 }

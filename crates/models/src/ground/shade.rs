@@ -22,8 +22,6 @@ use super::{
 pub(super) const HORIZON: f64 = 1e6;
 /// Share of its light that soaked ground loses, since water keeps light in (Lekner & Dorf 1988).
 const WET_DARKENING: f64 = 0.55;
-/// Share by which the depth of a plate's ground may differ from the plane's.
-const PLATE_TOLERANCE: f64 = 0.1;
 /// Albedo of deep water.
 const WATER_ALBEDO: f32 = 0.02;
 
@@ -35,6 +33,8 @@ pub(super) struct PreparedGround<'a> {
     pub(super) surroundings: &'a Surroundings<'a>,
     pub(super) wetness: f64,
     pub(super) lake: Option<Lake>,
+    /// What stands behind all, as a film too rough for more mirrors it: the plate and its sky.
+    pub(super) backdrop: Option<Image<4>>,
 }
 
 /// Where a pixel meets the ground.
@@ -107,17 +107,21 @@ impl PreparedGround<'_> {
         let viewer = -(hit.point - self.view.camera.position).normalize_or_zero();
         let place = DVec2::new(hit.point.x, hit.point.z);
         let facets = self.surface.facets(place, hit.footprint, patch.film);
-        let rough = gloss(self.surroundings, hit.point, viewer, &facets);
-        let still = self.surroundings.reflection.map_or([0.0; 4], |image| bilinear(image, hit.pixel));
+        let backdrop = self.backdrop.as_ref().map(|image| {
+            let scale = image.width() as f64 / self.view.size[0] as f64;
+            let [red, green, blue, _] = image.between(hit.pixel * scale);
+            [red, green, blue]
+        });
+        let rough = gloss(self.surroundings, backdrop, hit.point, viewer, &facets);
+        let still = self.surroundings.reflection.map_or([0.0; 4], |image| image.between(hit.pixel));
         let (puddle, fresnel, wetness) = (patch.puddle as f32, fresnel(hit.cos) as f32, self.wetness as f32);
         [0, 1, 2].map(|c| wetness * (puddle * fresnel).fused(still[c], (1.0 - puddle) * rough[c]))
     }
 
     fn seen_in_lake(&self, hit: &Hit, lake: &Lake) -> [f32; 3] {
         let slope = lake.waves.slope(DVec2::new(hit.point.x, hit.point.z), hit.footprint);
-        let still =
-            self.surroundings.reflection.map_or([0.0; 4], |image| bilinear(image, self.seen_in_wave(hit, slope)));
-        let rough = bilinear(&lake.rough, hit.pixel);
+        let still = self.surroundings.reflection.map_or([0.0; 4], |image| image.between(self.seen_in_wave(hit, slope)));
+        let rough = lake.rough.between(hit.pixel);
         let (lost, fresnel) = (slope.unresolved as f32, fresnel(hit.cos) as f32);
         [0, 1, 2].map(|c| fresnel * lost.fused(rough[c], (1.0 - lost) * still[c]))
     }
@@ -138,26 +142,22 @@ impl PreparedGround<'_> {
         [0, 1, 2].map(|c| hit.coverage as f32 * (diffuse[c] + mirrored[c]))
     }
 
+    /// Whether what the plate shows at a pixel, at this depth, is ground: no higher than the tolerance, nor than a pixel that looks along it
+    /// can tell.
+    fn is_ground(&self, hit: &Hit, plate: f64) -> bool {
+        let drop = self.view.camera.position.y - self.parameters.height;
+        let above = drop * (1.0 - plate / hit.depth);
+        above.abs() < self.parameters.level().tolerance_at(plate, self.view.camera.focal_pixels)
+    }
+
     /// Whether the sample is to be drawn, and what it lets through.
     fn through(&self, hit: &Hit, strip: &Strip, index: usize) -> Option<f32> {
         if self.parameters.kind == GroundKind::Plate {
-            let plate = f64::from(strip.plate_depth(index));
-            let here = !strip.has_plate() || (plate / hit.depth - 1.0).abs() < PLATE_TOLERANCE;
+            let here = !strip.has_plate() || self.is_ground(hit, f64::from(strip.plate_depth(index)));
             return here.then_some(self.darkening());
         }
         strip.visible(index, hit.depth as f32).then_some(1.0 - hit.coverage as f32)
     }
-}
-
-/// The picture between the middles of its pixels.
-fn bilinear(image: &Image<4>, place: DVec2) -> [f32; 4] {
-    let last = DVec2::new(image.width() as f64 - 1.0, image.height() as f64 - 1.0);
-    let place = (place - 0.5).clamp(DVec2::ZERO, last);
-    let (x, y) = (place.x as usize, place.y as usize);
-    let (right, below) = ((x + 1).min(image.width() - 1), (y + 1).min(image.height() - 1));
-    let (u, v) = (place.x.fract() as f32, place.y.fract() as f32);
-    let [a, b, c, d] = [image.at(x, y), image.at(right, y), image.at(x, below), image.at(right, below)];
-    std::array::from_fn(|i| (1.0 - v) * ((1.0 - u) * a[i] + u * b[i]) + v * ((1.0 - u) * c[i] + u * d[i]))
 }
 
 impl Prepared for PreparedGround<'_> {

@@ -113,6 +113,11 @@ impl Surface {
         Facets { tilt, slopes: [math::sqrt(rest), grain], film: FILM_SHARE * film }
     }
 
+    /// Mean slope of wet ground, films and grains together.
+    pub(super) fn mean_slope(&self) -> f64 {
+        math::lerp(GRAIN, 1.0, 0.5 * FILM_SHARE) * self.roughness
+    }
+
     /// Water stands where the ground lies low.
     fn puddle(&self, relief: f64) -> f64 {
         // The quantile at a share p of what is roughly normal is near the logistic's.

@@ -92,8 +92,34 @@ fn a_plates_ground_is_darkened_but_not_covered() {
 
 #[test]
 fn only_dry_land_is_no_mirror() {
-    let mirror = |parameters| Ground::new(parameters, 1, None).mirror();
+    let mirror = |parameters| Ground::new(parameters, 1, None).mirror().map(|mirror| mirror.height);
     assert_eq!(mirror(plain()), None);
     assert_eq!(mirror(GroundParameters { wetness: 0.1.into(), height: 0.5, ..plain() }), Some(0.5));
     assert_eq!(mirror(GroundParameters { kind: GroundKind::Water, ..plain() }), Some(0.0));
+}
+
+#[test]
+fn a_wall_stays_dry_three_centimetres_above_the_ground() {
+    let size = [640, 480];
+    let camera = CameraParameters { position: [0.0, 1.6, 6.0].into(), ..CameraParameters::default() };
+    let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, size, 0);
+    let wind = Wind::new(WindParameters::default(), 1, None);
+    let surroundings = Surroundings::of_wind(&wind);
+    // What the ground lets through of a plate that stands everywhere this high above the ground, in a row 6 m away.
+    let through = |above: f64, plate_tolerance: f64| {
+        let wet =
+            GroundParameters { kind: GroundKind::Plate, wetness: 1.0.into(), puddles: 0.0, plate_tolerance, ..plain() };
+        let row = view.camera.project(DVec3::ZERO).unwrap().pixel.y as usize;
+        let direction = view.camera.direction(bansho_base::math::DVec2::new(320.5, row as f64 + 0.5)).unwrap();
+        let depth = vec![((1.6 - above) / -direction.y) as f32; size[0]];
+        let mut strip = Strip::default();
+        strip.reset(Rect { x: 0, y: row, width: size[0], height: 1 }, Some(&|_| &depth), 0);
+        let ground = Ground::new(wet, 1, None);
+        ground.prepare(&view, &surroundings, &Unobserved).unwrap().draw(&DepthInterval::ALL, &mut strip);
+        strip.transmittance(320)[0]
+    };
+    assert_eq!(through(0.03, 0.02), 1.0);
+    assert_eq!(through(-0.03, 0.02), 1.0);
+    assert!((through(0.0, 0.02) - 0.45).abs() < 1e-6 && (through(0.01, 0.02) - 0.45).abs() < 1e-6);
+    assert!((through(0.03, 0.05) - 0.45).abs() < 1e-6, "depth that is only a guess");
 }

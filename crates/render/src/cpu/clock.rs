@@ -2,13 +2,13 @@
 
 use bansho_base::{
     canvas::Shutter,
-    image::Image,
     observer::{self, Cancelled, Observer},
     phenomenon::{Phenomenon, Remark},
     sky::Sky,
     surroundings::{Publication, Surroundings},
 };
 
+use super::mirror::Mirror;
 use crate::plan::{Plan, PlanError};
 
 /// How many steps a phenomenon has taken; 0 at its beginning, before the preroll.
@@ -29,14 +29,15 @@ pub(super) fn surroundings<'a>(
     publications: &[Publication],
     index: usize,
     shutter: Shutter,
-    reflection: Option<&'a Image<4>>,
+    mirror: Option<&'a Mirror>,
 ) -> Surroundings<'a> {
     let sky = plan.scene.sky.as_ref().map_or(Sky::DARK, |sky| sky.at(shutter.middle()));
     Surroundings {
         wind: &plan.wind,
         air: &plan.scene.air,
         sky,
-        reflection,
+        reflection: mirror.map(|mirror| &mirror.seen),
+        backdrop: mirror.and_then(|mirror| mirror.backdrop.as_ref()),
         others: others(plan, publications, index, shutter),
     }
 }

@@ -6,6 +6,7 @@ mod calm;
 mod clock;
 mod compose;
 mod haze;
+mod mirror;
 mod plate;
 mod shot;
 mod snapshot;

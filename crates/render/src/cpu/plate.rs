@@ -3,15 +3,21 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    assets::{AssetError, AssetProblem, Encoding, Picture},
+    assets::{Encoding, Picture},
     camera::{Camera, Lens},
     color,
     image::Image,
     math::DVec2,
+    phenomenon::LevelMirror,
 };
 use rayon::prelude::*;
 
-use crate::{backend::RenderError, plan::Plan, scene::DepthKind};
+use super::mirror;
+use crate::{
+    backend::RenderError,
+    plan::Plan,
+    scene::{DepthKind, OpeningFault, plate::PlatePictures},
+};
 
 /// A plate, as large as the picture with its overscan.
 #[derive(Clone, Debug, Default)]
@@ -26,7 +32,11 @@ pub(super) struct PlateFrame {
 #[derive(Default)]
 pub(super) struct PlateCache {
     last: Option<(PlateKey, Arc<PlateFrame>)>,
+    mirrored: Option<(MirrorKey, Arc<PlateFrame>)>,
 }
+
+/// What a mirrored plate depends on beside the plan: the plate, and the mirror.
+type MirrorKey = (PlateKey, LevelMirror);
 
 /// What a plate frame depends on beside the plan: digests of picture and depth, and the camera that measures depth.
 type PlateKey = ([Option<[u8; 32]>; 2], Camera);
@@ -38,8 +48,10 @@ impl PlateCache {
             return Ok(Arc::default());
         }
         let mut digests = [None; 2];
-        for (digest, path) in digests.iter_mut().zip([&plate.image, &plate.depth]) {
-            *digest = path.as_ref().map(|path| plan.assets.digest(&path.0, number)).transpose()?;
+        for (digest, (key, path)) in digests.iter_mut().zip([("image", &plate.image), ("depth", &plate.depth)]) {
+            let Some(path) = path else { continue };
+            let found = plan.assets.digest(&path.0, number);
+            *digest = Some(found.map_err(|error| plate_error(OpeningFault { key: key.into(), kind: error.into() }))?);
         }
         let key = (digests, plan.view(number).camera);
         if let Some((known, frame)) = &self.last
@@ -51,36 +63,34 @@ impl PlateCache {
         self.last = Some((key, frame.clone()));
         Ok(frame)
     }
+
+    /// The last plate as it is seen in a level mirror.
+    pub(super) fn mirrored(&mut self, plan: &Plan, mirror: LevelMirror) -> Arc<PlateFrame> {
+        let Some((key, plate)) = &self.last else { return Arc::default() };
+        let key = (*key, mirror);
+        if let Some((known, frame)) = &self.mirrored
+            && *known == key
+        {
+            return frame.clone();
+        }
+        let frame = Arc::new(mirror::mirrored(plate, &key.0.1, mirror, plan.exposure_scale()));
+        self.mirrored = Some((key, frame.clone()));
+        frame
+    }
+}
+
+fn plate_error(fault: OpeningFault) -> RenderError {
+    RenderError::Plate(Box::new(fault))
 }
 
 fn load(plan: &Plan, number: i64, camera: &Camera) -> Result<PlateFrame, RenderError> {
-    let plate = &plan.scene.plate;
-    let Some(path) = &plate.image else { return Ok(PlateFrame::default()) };
-    let picture = plan.assets.picture(&path.0, number)?;
-    let size = |picture: &Picture| [picture.colour.width(), picture.colour.height()];
-    let depth_picture = match &plate.depth {
-        Some(path) => Some(plan.assets.picture(&path.0, number)?),
-        None => picture.depth.is_some().then(|| picture.clone()),
-    };
-    if let (Some(depth), Some(path)) = (&depth_picture, &plate.depth)
-        && size(depth) != size(&picture)
-    {
-        let error =
-            RenderError::DepthSize { depth: path.0.clone(), depth_size: size(depth), plate_size: size(&picture) };
-        return Err(error);
-    }
-    let fit = Fit::new(plan, size(&picture));
-    let depth = match &depth_picture {
-        None => None,
-        Some(depth) => {
-            let missing = || AssetError {
-                path: plate.depth.as_ref().map_or(path.0.clone(), |path| path.0.clone()),
-                problem: AssetProblem::NoChannel("Z".into()),
-            };
-            Some(fit_depth(plan, camera, depth.depth.as_ref().ok_or_else(missing)?, size(depth)[0], &fit))
-        }
-    };
-    Ok(PlateFrame { colour: Some(fit_colour(plan, &picture, &fit)), depth })
+    let pictures = plan.scene.plate.read_frame(plan.assets.as_ref(), number).map_err(plate_error)?;
+    let Some(PlatePictures { image, depth }) = pictures else { return Ok(PlateFrame::default()) };
+    let width = image.colour.width();
+    let fit = Fit::new(plan, [width, image.colour.height()]);
+    let depths = depth.as_ref().and_then(|picture| picture.depth.as_ref());
+    let depth = depths.map(|depths| fit_depth(plan, camera, depths, width, &fit));
+    Ok(PlateFrame { colour: Some(fit_colour(plan, &image, &fit)), depth })
 }
 
 /// How the picture's pixels fall on the plate's: the plate fills the picture, centred, its longer side cut.
@@ -130,6 +140,7 @@ fn taps(fit: &Fit, axis: usize, pixel: usize) -> Vec<(usize, f32)> {
 
 fn fit_colour(plan: &Plan, picture: &Picture, fit: &Fit) -> Image<4> {
     let columns: Vec<_> = (0..fit.picture[0]).map(|x| taps(fit, 0, x)).collect();
+    let view = plan.shown();
     let mut image = Image::filled(fit.picture[0], fit.picture[1], [0.0; 4]);
     image.pixels_mut().par_chunks_mut(fit.picture[0]).enumerate().for_each(|(y, row)| {
         let rows = taps(fit, 1, y);
@@ -146,7 +157,7 @@ fn fit_colour(plan: &Plan, picture: &Picture, fit: &Fit) -> Image<4> {
                     }
                 }
             }
-            let [red, green, blue] = to_scene(plan, picture.encoding, sum);
+            let [red, green, blue] = to_scene(&view, picture.encoding, sum);
             *pixel = [red, green, blue, 1.0];
         }
     });
@@ -154,9 +165,9 @@ fn fit_colour(plan: &Plan, picture: &Picture, fit: &Fit) -> Image<4> {
 }
 
 /// A plate's numbers as exposed ACEScg: what the view transform takes back to the very same numbers.
-fn to_scene(plan: &Plan, encoding: Encoding, colour: [f32; 3]) -> [f32; 3] {
+fn to_scene(view: &color::View, encoding: Encoding, colour: [f32; 3]) -> [f32; 3] {
     match encoding {
-        Encoding::DisplaySrgb => plan.display.to_scene(colour.map(color::decode_srgb)),
+        Encoding::DisplaySrgb => view.to_scene(colour.map(color::decode_srgb)),
         Encoding::LinearSrgb => color::acescg_from_srgb(colour),
         Encoding::LinearAcescg => colour,
     }

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use bansho_base::{
     canvas::View,
-    image::{Channel, FigureSet, Frame, Image, Rect},
+    image::{Channel, FigureSet, Frame, Rect},
     observer::{self, Cancelled, Observer, Stage, StageGuard},
-    phenomenon::{Phenomenon, Prepared},
+    phenomenon::{LevelMirror, Phenomenon, Prepared},
     point_cloud::PointCloud,
+    sky::Sky,
     surroundings::{Publication, Surroundings},
 };
 
@@ -18,6 +19,7 @@ use super::{
     clock::{self, Clock},
     compose::{self, Composition, Outputs},
     haze,
+    mirror::{self, Mirror},
     plate::{PlateCache, PlateFrame},
     snapshot,
 };
@@ -101,13 +103,14 @@ impl CpuShot {
         &self,
         view: &View,
         plate: &PlateFrame,
+        mirrored: &PlateFrame,
         spent: Option<Frame>,
         observer: &dyn Observer,
     ) -> Result<Option<Frame>, RenderError> {
         let preparing = StageGuard::begin(observer, Stage::Prepare);
         let publications: Vec<Publication> =
             self.phenomena.par_iter().map(|phenomenon| phenomenon.publish(view.shutter)).collect();
-        let reflection = self.reflection(view, &publications, observer)?;
+        let reflection = self.reflection(view, mirrored, &publications, observer)?;
         let surroundings = self.surroundings(view, &publications, reflection.as_ref());
         let all: Vec<usize> = (0..self.phenomena.len()).collect();
         let (slices, prepared) = self.prepare(&all, view, &surroundings, observer)?;
@@ -150,32 +153,41 @@ impl CpuShot {
             .collect()
     }
 
-    /// Everything but the first mirror, as it is seen in that mirror: radiance and alpha of the whole picture.
+    /// The first mirror, and the number of the phenomenon that it is.
+    fn mirror(&self) -> Option<(usize, LevelMirror)> {
+        let mirrors = self.phenomena.iter().enumerate();
+        mirrors.filter_map(|(index, each)| Some((index, each.mirror()?))).next()
+    }
+
+    /// Everything but the first mirror, as it is seen in that mirror, before the `mirrored` plate.
     fn reflection(
         &self,
         view: &View,
+        mirrored: &PlateFrame,
         publications: &[Publication],
         observer: &dyn Observer,
-    ) -> Result<Option<Image<4>>, RenderError> {
-        let mirrors = self.phenomena.iter().enumerate();
-        let Some((mirror, height)) = mirrors.filter_map(|(i, each)| Some((i, each.mirror()?))).next() else {
-            return Ok(None);
-        };
-        let view = view.mirrored(height);
+    ) -> Result<Option<Mirror>, RenderError> {
+        let Some((number, mirror)) = self.mirror() else { return Ok(None) };
+        let view = view.mirrored(mirror.height);
         let surroundings = self.surroundings(&view, publications, None);
-        let seen: Vec<usize> = (0..self.phenomena.len()).filter(|&index| index != mirror).collect();
+        let seen: Vec<usize> = (0..self.phenomena.len()).filter(|&index| index != number).collect();
         let (slices, prepared) = self.prepare(&seen, &view, &surroundings, observer)?;
-        let plate = PlateFrame::default();
         let composition = Composition {
             outputs: Outputs::RADIANCE,
             view: &view,
             phenomena: &self.phenomena,
             prepared: &prepared,
             slices: &slices,
-            plate: &plate,
-            behind: Behind::plate(&plate),
+            plate: mirrored,
+            behind: Behind::plate(mirrored),
         };
-        Ok(Some(compose::frame(&composition, self.plan.header(self.number), None, observer)?.beauty))
+        let mut seen = compose::frame(&composition, self.plan.header(self.number), None, observer)?.beauty;
+        let sky = self.plan.scene.sky.as_ref().map(|sky| sky.at(view.shutter.middle()));
+        if let (Some(sky), true) = (&sky, mirrored.colour.is_some()) {
+            mirror::lay_sky(&mut seen, &view, sky, 1);
+        }
+        let backdrop = mirror::backdrop(mirrored, &view, &sky.unwrap_or(Sky::DARK));
+        Ok(Some(Mirror { seen, backdrop }))
     }
 
     /// Slices of the phenomena `which`, and those phenomena ready to draw; a slice's members count within `which`.
@@ -197,9 +209,9 @@ impl CpuShot {
         &'a self,
         view: &View,
         publications: &[Publication],
-        reflection: Option<&'a Image<4>>,
+        mirror: Option<&'a Mirror>,
     ) -> Vec<Surroundings<'a>> {
-        let seen_by = |index| clock::surroundings(&self.plan, publications, index, view.shutter, reflection);
+        let seen_by = |index| clock::surroundings(&self.plan, publications, index, view.shutter, mirror);
         (0..self.phenomena.len()).map(seen_by).collect()
     }
 }
@@ -253,14 +265,18 @@ impl Shot for CpuShot {
             let _stage = StageGuard::begin(observer, Stage::Load);
             self.plates.frame(&self.plan, self.number)?
         };
+        let mirrored = match self.mirror() {
+            Some((_, mirror)) => self.plates.mirrored(&self.plan, mirror),
+            None => Arc::default(),
+        };
         let mut view = self.plan.view(self.number);
         let spent = self.spent.take();
-        let frame = match self.compose(&view, &plate, spent, observer)? {
+        let frame = match self.compose(&view, &plate, &mirrored, spent, observer)? {
             Some(frame) => frame,
             None => {
                 let all = Rect::of_size(view.size[0], view.size[1]);
                 view = view.through(all);
-                let whole = self.compose(&view, &plate, None, observer)?;
+                let whole = self.compose(&view, &plate, &mirrored, None, observer)?;
                 whole.and_then(|whole| crop(whole, self.plan.window)).ok_or(Cancelled)?
             }
         };

@@ -6,7 +6,7 @@ use bansho_base::{
 };
 use bansho_models::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
-use super::{FORMAT, Instance, Opening, OpeningFault, PhenomenonKind, SHARED_TABLES, Scene};
+use super::{FORMAT, Instance, Opening, OpeningFault, PhenomenonKind, Place, SHARED_TABLES, Scene, picture::LightKind};
 
 /// The format number must be one that this program reads.
 pub(super) fn format(root: &Table, reader: &mut Reader) {
@@ -58,14 +58,16 @@ const LONGEST_NAME: usize = 100;
 /// A name becomes the prefix of EXR layers, so it may hold no dot and no control characters.
 pub(super) fn name(node: &Node, reader: &mut Reader) -> Option<String> {
     let reserved = RESERVED_NAMES.join(", ");
-    let expected = format!("a name of 1 to {LONGEST_NAME} characters without dots, none of {reserved}");
+    let allowed = format!("1 to {LONGEST_NAME} characters without dots and control characters, and none of {reserved}");
     match &node.value {
         Value::Text(name) if is_name(name) => Some(name.clone()),
         Value::Text(_) => {
-            reader.report(node, ProblemKind::WrongType { expected, found: "another string" });
+            let told = format!("cannot be a name, which begins the names of EXR channels; allowed: {allowed}");
+            reader.report(node, ProblemKind::Conflict(told));
             None
         }
         value => {
+            let expected = format!("a name of {allowed}");
             reader.report(node, ProblemKind::WrongType { expected, found: value.type_name() });
             None
         }
@@ -89,7 +91,8 @@ pub(super) fn assets_and_openings(
     reader: &mut Reader,
 ) {
     camera(scene, root, reader);
-    plate(scene, root, assets, reader);
+    lights(scene, root, reader);
+    plate(scene, good, root, assets, reader);
     for (index, obstacle) in scene.obstacles.iter().enumerate() {
         if let Err(fault) = obstacle.open(assets) {
             report(fault, format!("obstacle.{index}"), root, reader);
@@ -147,14 +150,33 @@ fn camera(scene: &Scene, root: &Table, reader: &mut Reader) {
     }
 }
 
-fn plate(scene: &Scene, root: &Table, assets: &dyn Assets, reader: &mut Reader) {
-    let frame = scene.picture.first_frame;
-    for (key, path) in [("image", &scene.plate.image), ("depth", &scene.plate.depth)] {
-        let Some(path) = path else { continue };
-        if let Err(error) = assets.digest(&path.0, frame) {
-            let place = place(root, &format!("plate.{key}"));
-            reader.within("plate", |r| r.within(key, |r| r.report_at(place, ProblemKind::Asset(error))));
+/// A lamp that shines somewhere must say where to, and a spot be full within the angle at which it ends. A fullness that the file does not
+/// state ends with the spot.
+fn lights(scene: &Scene, root: &Table, reader: &mut Reader) {
+    for (index, light) in scene.lights.iter().enumerate() {
+        let path = format!("light.{index}");
+        let fault = |key: &str, text| OpeningFault { key: key.into(), kind: ProblemKind::Conflict(text) };
+        if light.is_directed() && !light.has_direction() {
+            let told = "is no direction; allowed: any three numbers that are not all 0".to_owned();
+            report(fault("direction", told), path.clone(), root, reader);
         }
+        let stated = Place::root().key("light").index(index).key("inner_deg").find(root).is_some();
+        if light.kind == LightKind::Spot && stated && light.inner_deg > light.outer_deg {
+            let told = format!(
+                "a spot that is full up to {} degrees cannot be dark beyond {}; allowed: up to `outer_deg`",
+                light.inner_deg, light.outer_deg
+            );
+            report(fault("inner_deg", told), path, root, reader);
+        }
+    }
+}
+
+/// The plate of the first frame must be whole and its depth fit it, unless it is as it was in a `good` scene.
+fn plate(scene: &Scene, good: Option<&Scene>, root: &Table, assets: &dyn Assets, reader: &mut Reader) {
+    let frame = scene.picture.first_frame;
+    let known = good.is_some_and(|good| good.plate == scene.plate && good.picture.first_frame == frame);
+    if !known && let Err(fault) = scene.plate.read_frame(assets, frame) {
+        report(fault, "plate".into(), root, reader);
     }
     if scene.plate.image.is_none() && scene.plate.depth.is_some() {
         let place = place(root, "plate.depth");

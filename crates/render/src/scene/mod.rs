@@ -6,6 +6,7 @@ pub mod obstacle;
 pub mod operation;
 pub mod picture;
 mod place;
+pub(crate) mod plate;
 pub mod report;
 pub mod schema;
 pub mod source;
@@ -217,6 +218,14 @@ impl Scene {
         let rest = key.map_or_else(String::new, |key| format!(".{key}"));
         let span = check::place(&toml::parse(text).ok()?, &format!("{kind}.{index}{rest}"))?;
         Some(report::position(text, span.start))
+    }
+
+    /// Paths of all files that the scene names, as it names them.
+    pub fn asset_paths(&self) -> Vec<String> {
+        let plate = [&self.plate.image, &self.plate.depth].into_iter().flatten();
+        let solids = self.obstacles.iter().filter_map(|obstacle| obstacle.file.as_ref());
+        let own = plate.chain(solids).map(|path| path.0.clone());
+        own.chain(self.instances.iter().flat_map(|instance| instance.source.assets())).collect()
     }
 
     /// Whether phenomena lie over a plate.

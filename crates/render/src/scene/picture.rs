@@ -51,7 +51,14 @@ impl Parameter for FrameRate {
     fn read(node: &Node, limits: &(), unit: &'static str, reader: &mut Reader) -> Option<Self> {
         let rate = match &node.value {
             Value::Text(text) => parse_fraction(text),
-            value => value.as_number().filter(|number| (0.0..=1e6).contains(number)).map(decimal),
+            value => match value.as_number() {
+                Some(number) if (0.0..=1e6).contains(&number) => Some(decimal(number)),
+                Some(value) => {
+                    reader.report(node, ProblemKind::OutOfRange { value, min: 0.1, max: 1000.0, unit });
+                    return None;
+                }
+                None => None,
+            },
         };
         let Some(rate) = rate else {
             reader.wrong_type(node, &Self::kind(limits));
@@ -87,6 +94,9 @@ bansho_base::parameters! {
         fps: FrameRate = FrameRate { frames: 30, seconds: 1 }, unit("1/s");
         /// Exposure value at ISO 100, or "auto": chosen once a shot from what the scene holds.
         exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-40.0, 40.0)), unit("EV");
+        /// Temperature of the black body whose light is shown as white, as a camera is set: 4000 for a night sky. It changes what is made to
+        /// be looked at; EXR files keep the light and name that white. Without it white is that of the display, D65.
+        white_balance_k: Option<f64> = None, limits(Range::new(1500.0, 25_000.0)), unit("K");
         /// Seed of everything random.
         seed: i64 = 1, limits(Range::new(0.0, 9.0e15));
         /// Pixels drawn beyond every edge; EXR files keep them outside the display window.
@@ -149,7 +159,7 @@ bansho_base::parameters! {
         radius: f64 = 0.05, limits(Range::new(1e-4, 100.0)), unit("m");
         /// Whether the ball itself is seen.
         visible: bool = false;
-        /// Angle from the axis up to which a spot is full.
+        /// Angle from the axis up to which a spot is full; at most `outer_deg`.
         inner_deg: f64 = 15.0, limits(Range::new(0.0, 89.0)), unit("degrees");
         /// Angle from the axis beyond which a spot is dark.
         outer_deg: f64 = 30.0, limits(Range::new(0.1, 90.0)), unit("degrees");
@@ -157,6 +167,16 @@ bansho_base::parameters! {
 }
 
 impl LightParameters {
+    /// Whether it shines one way.
+    pub(crate) fn is_directed(&self) -> bool {
+        self.kind != LightKind::Point
+    }
+
+    /// Whether its direction is one.
+    pub(crate) fn has_direction(&self) -> bool {
+        DVec3::from(self.direction).try_normalize().is_some()
+    }
+
     /// Whether it stands somewhere, so that its position matters.
     pub fn stands(&self) -> bool {
         self.kind != LightKind::Directional

@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use bansho_base::parameters::Problem;
+use bansho_base::parameters::{Problem, ProblemKind};
+
+use super::{check, toml};
 
 /// A scene that cannot be used, with every reason why.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -34,6 +36,13 @@ impl fmt::Display for SceneError {
 }
 
 impl SceneError {
+    /// One fault of what stands at the dotted `path` of a text, or of the nearest part of it that the text states.
+    pub fn at(file: &str, text: &str, path: &str, kind: ProblemKind) -> Self {
+        let span = toml::parse(text).ok().and_then(|root| check::place(&root, path));
+        let problem = Problem { span, path: path.to_owned(), kind };
+        Self { file: file.to_owned(), text: text.to_owned(), problems: vec![problem] }
+    }
+
     /// One-based line and column (in characters) of a byte of the text.
     pub fn position(&self, byte: usize) -> (usize, usize) {
         position(&self.text, byte)
@@ -76,7 +85,6 @@ fn floor_char_boundary(text: &str, byte: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bansho_base::parameters::ProblemKind;
 
     #[test]
     fn a_problem_shows_its_line_and_marks_it() {

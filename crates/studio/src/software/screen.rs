@@ -12,6 +12,8 @@ pub(super) struct Screen {
     surface: Surface<OwnedDisplayHandle, Arc<Window>>,
     /// Pixels, once there are any.
     size: [u32; 2],
+    /// What was changed the last time: a system that shows two pictures in turn lacks it in the one that comes next.
+    before: Vec<Area>,
 }
 
 impl Screen {
@@ -19,7 +21,7 @@ impl Screen {
     /// The system takes no pixels for this window.
     pub(super) fn new(display: OwnedDisplayHandle, window: Arc<Window>) -> Result<Self, SoftBufferError> {
         let surface = Surface::new(&Context::new(display)?, window)?;
-        Ok(Self { surface, size: [0; 2] })
+        Ok(Self { surface, size: [0; 2], before: Vec::new() })
     }
 
     /// Shows what `painter` has of `changed` in a window of `size` pixels; all of it where the system does not have the rest any more.
@@ -35,11 +37,19 @@ impl Screen {
         }
         let mut buffer = self.surface.buffer_mut()?;
         let whole = [Area { left: 0, top: 0, right: width.get() as i32, bottom: height.get() as i32 }];
-        let changed = if resized || buffer.age() != 1 { &whole } else { changed };
-        for area in changed {
+        let age = if resized { 0 } else { buffer.age() };
+        let (damaged, missed) = match age {
+            1 => (changed, &[][..]),
+            2 => (changed, &self.before[..]),
+            _ => (&whole[..], &[][..]),
+        };
+        for area in missed.iter().chain(damaged) {
             painter.copy(*area, &mut buffer, width.get() as usize);
         }
-        buffer.present_with_damage(&changed.iter().filter_map(damage).collect::<Vec<_>>())
+        let damaged = damaged.to_vec();
+        buffer.present_with_damage(&damaged.iter().filter_map(damage).collect::<Vec<_>>())?;
+        self.before = damaged;
+        Ok(())
     }
 
     /// The system has lost what it was given.
@@ -49,8 +59,10 @@ impl Screen {
 
     /// Waits until the system has shown what it was given.
     pub(super) fn settle(&mut self) {
-        // What fails here fails where something is shown next, which tells it.
-        let _ = self.surface.buffer_mut();
+        // Before a size is known there is nothing to wait for. What fails here fails where something is shown next, which tells it.
+        if self.size != [0; 2] {
+            let _ = self.surface.buffer_mut();
+        }
     }
 }
 

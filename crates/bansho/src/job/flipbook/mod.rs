@@ -17,8 +17,10 @@ use self::{files::Files, motion::Tile};
 use super::{
     BackendChoice,
     error::{Conflict, JobError, SheetKind},
+    inputs,
+    memory::{self, Wanted},
     observer::{JobObserver, Note, Outline},
-    output, prepare,
+    output, plates, prepare,
     scene_file::SceneFile,
     sheet::{self, Gather},
     shoot::shoot,
@@ -106,8 +108,14 @@ impl Flipbook {
         };
         let plan = Arc::new(Plan::new(scene, &options, assets)?);
         let first = self.first_frame.unwrap_or(plan.frames().start);
-        let numbers = (first..first.saturating_add(sheet.count as i64)).collect();
-        Ok(PreparedFlipbook { backend, plan, sheet, numbers, files: self.files()? })
+        let numbers: Vec<i64> = (first..first.saturating_add(sheet.count as i64)).collect();
+        plates::check(&self.scene, &plan, &numbers)?;
+        let frames = numbers.len();
+        let wanted = Wanted { frames, tiles: frames, display: Some(self.bits), own_size: true };
+        memory::check(&self.scene, &plan, wanted)?;
+        let files = self.files()?;
+        inputs::check_kept(&self.scene, &plan, &numbers, files.paths())?;
+        Ok(PreparedFlipbook { scene: self.scene.clone(), backend, plan, sheet, numbers, files })
     }
 
     /// Size of a frame: as asked for, or the scene's made small enough for a sheet of the usual side.
@@ -135,6 +143,7 @@ impl Flipbook {
 
 /// A flipbook that can be made, as far as can be known without doing so.
 pub struct PreparedFlipbook {
+    scene: SceneFile,
     backend: Box<dyn Backend>,
     plan: Arc<Plan>,
     sheet: Sheet,
@@ -153,15 +162,16 @@ impl PreparedFlipbook {
     /// # Errors
     /// The observer asked to stop, or a sheet cannot be written.
     pub fn run(&self, observer: &dyn JobObserver) -> Result<FlipbookSummary, JobError> {
-        let Self { backend, plan, sheet, numbers, files } = self;
+        let Self { scene, backend, plan, sheet, numbers, files } = self;
         observer.started(&Outline { total: numbers.len(), kept: 0, size: sheet.cell });
         let gather = Gather::new(sheet.count, observer, |frame, observer| Tile::of(frame, files, observer));
-        shoot(plan, backend.as_ref(), numbers, &Snapshots::default(), &gather, observer)?;
+        let drawn = shoot(plan, backend.as_ref(), numbers, &Snapshots::default(), &gather, observer);
+        drawn.map_err(|error| plates::located(scene, error).of_whole("a flipbook"))?;
         let tiles = gather.into_tiles();
         if !tiles.iter().any(|tile| tile.has_motion) {
             observer.note(&Note::NoMotion);
         }
-        files.write(plan, sheet, numbers, &tiles, observer)
+        files.write(plan, sheet, numbers, &tiles, observer).map_err(|error| error.of_whole("a flipbook"))
     }
 }
 

@@ -127,9 +127,16 @@ impl Writer {
             number: 0,
             // Numbers are as they are: 1.0 is 1.0.
             exposure_ev100: ev100_of_white_luminance(1.0) as f32,
+            white_balance_k: None,
             fps: [30, 1],
             exposure_time_s: self.streaks.cube.exposure as f32,
-            camera: CameraHeader { world_to_camera: unit, world_to_ndc: unit, vertical_fov_deg: 0.0 },
+            camera: CameraHeader {
+                world_to_camera: unit,
+                world_to_ndc: None,
+                vertical_fov_deg: None,
+                lens: None,
+                fisheye_fov_deg: None,
+            },
             fingerprint: self.fingerprint(file),
             display_size: [image.width(), image.height()],
             data_origin: [0, 0],

@@ -16,13 +16,19 @@ const DARK_MW_PER_M2: f64 = 2e-4;
 /// W for one mW/m^2 on one km^2.
 const W_PER_KM2: f64 = 1e3;
 const NO_TILE: u32 = u32::MAX;
+/// Blocks of cells are so wide at most beside the spread of their light.
+const BLOCK_PER_SPREAD: f64 = 1.1;
 /// Particles that a task of the thread pool finds the cells of, at least.
 const TASK: usize = 4096;
+/// Tiles that a task goes through, at least.
+const TILES: usize = 256;
 
-/// A lit cell of a map.
+/// A lit cell of a map, or a block of some.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GlowCell<const HEIGHTS: usize> {
-    /// Its middle, km: x east, z south.
+    /// Number of its place on the map, row by row, for a block that of its first cell.
+    pub number: u32,
+    /// Its middle, for a block that of its light, km: x east, z south.
     pub position_km: [f32; 2],
     /// Power that electrons would have to bring now for the light that it gives at each height, W: a steady aurora's own.
     pub powers_w: [f32; HEIGHTS],
@@ -111,10 +117,42 @@ impl<const HEIGHTS: usize> GlowMap<HEIGHTS> {
         self.tiles.iter().flat_map(|tile| (0..CELLS).filter_map(|cell| self.cell(tile, cell)))
     }
 
-    /// All cells that are not fainter than `faintest` of a typical one.
-    pub(in crate::aurora) fn bright_cells(&self, faintest: f32) -> Vec<GlowCell<HEIGHTS>> {
+    /// All cells that are not fainter than `faintest` of a typical one, as blocks of `block` by `block`.
+    pub(in crate::aurora) fn bright_blocks(&self, faintest: f32, block: usize) -> Vec<GlowCell<HEIGHTS>> {
         let faintest = faintest * self.typical_w();
-        self.cells().filter(|cell| cell.powers_w.iter().any(|power| *power > faintest)).collect()
+        self.blocks(block, |tile, cell| self.tiles[tile].powers[cell].iter().any(|power| *power > faintest))
+    }
+
+    /// Side of the widest blocks, in cells, whose light a spread (standard deviation, km) makes even.
+    pub(in crate::aurora) fn block(&self, spread_km: f64) -> usize {
+        [8, 4, 2].into_iter().find(|block| *block as f64 * self.cell_km <= BLOCK_PER_SPREAD * spread_km).unwrap_or(1)
+    }
+
+    /// Blocks of `block` by `block` cells, a divisor of [`SIDE`], with the light of those of their cells, by tile and cell, that `wanted` lets
+    /// through.
+    fn blocks(&self, block: usize, wanted: impl Fn(usize, usize) -> bool + Sync) -> Vec<GlowCell<HEIGHTS>> {
+        let of_tiles = |(task, tiles): (usize, &[Tile<HEIGHTS>])| {
+            let mut blocks = Vec::new();
+            for (tile, number) in tiles.iter().zip(task * TILES..) {
+                // The number that each block has got.
+                let mut numbers = [usize::MAX; CELLS];
+                for cell in (0..CELLS).filter(|cell| wanted(number, *cell)) {
+                    let Some(mut lit) = self.cell(tile, cell) else { continue };
+                    let [column, row] = self.column_and_row(tile, cell).map(|place| place / block * block);
+                    lit.number = self.number_of([column, row]);
+                    let block_number = &mut numbers[cell / SIDE / block * SIDE + cell % SIDE / block];
+                    if *block_number == usize::MAX {
+                        *block_number = blocks.len();
+                        blocks.push(lit);
+                    } else {
+                        blocks[*block_number] = GlowCell::and(blocks[*block_number], lit);
+                    }
+                }
+            }
+            blocks
+        };
+        let parts: Vec<Vec<GlowCell<HEIGHTS>>> = self.tiles.par_chunks(TILES).enumerate().map(of_tiles).collect();
+        parts.concat()
     }
 
     /// Number of the cell that each particle is in, tile after tile; one that does not exist where the map is dark.
@@ -129,8 +167,13 @@ impl<const HEIGHTS: usize> GlowMap<HEIGHTS> {
 
     /// Power of a cell, weighted by power, W: faint cells, however many, do not count.
     fn typical_w(&self) -> f32 {
-        let powers = || self.tiles.iter().flat_map(|tile| tile.powers.as_flattened()).map(|power| f64::from(*power));
-        let (sum, squares) = powers().fold((0.0, 0.0), |(sum, squares), power| (sum + power, squares + power * power));
+        let of_tiles = |tiles: &[Tile<HEIGHTS>]| {
+            let powers = tiles.iter().flat_map(|tile| tile.powers.as_flattened()).map(|power| f64::from(*power));
+            powers.fold([0.0; 2], |[sum, squares], power| [sum + power, squares + power * power])
+        };
+        // Tasks of the same tiles, whatever the threads.
+        let parts: Vec<[f64; 2]> = self.tiles.par_chunks(TILES).map(of_tiles).collect();
+        let [sum, squares] = parts.iter().fold([0.0; 2], |sums, part| [sums[0] + part[0], sums[1] + part[1]]);
         (squares / f64::max(sum, f64::MIN_POSITIVE)) as f32
     }
 
@@ -166,14 +209,24 @@ impl<const HEIGHTS: usize> GlowMap<HEIGHTS> {
         Some(map)
     }
 
+    /// Column and row of a cell on the map.
+    fn column_and_row(&self, tile: &Tile<HEIGHTS>, cell: usize) -> [usize; 2] {
+        let place = tile.place as usize;
+        [place % self.side * SIDE + cell % SIDE, place / self.side * SIDE + cell / SIDE]
+    }
+
+    fn number_of(&self, [column, row]: [usize; 2]) -> u32 {
+        (row * self.side * SIDE + column) as u32
+    }
+
     fn cell(&self, tile: &Tile<HEIGHTS>, cell: usize) -> Option<GlowCell<HEIGHTS>> {
         let powers_w = tile.powers[cell];
         let whole: f32 = powers_w.iter().sum();
-        let place = tile.place as usize;
-        let middle =
-            |tiles: usize, cells: usize| (((tiles * SIDE + cells) as f64 + 0.5) * self.cell_km - self.half_km) as f32;
+        let [column, row] = self.column_and_row(tile, cell);
+        let middle = |cells: usize| ((cells as f64 + 0.5) * self.cell_km - self.half_km) as f32;
         (whole > 0.0).then(|| GlowCell {
-            position_km: [middle(place % self.side, cell % SIDE), middle(place / self.side, cell / SIDE)],
+            number: self.number_of([column, row]),
+            position_km: [middle(column), middle(row)],
             powers_w,
             energy_ev: tile.weighted[cell].iter().sum::<f32>() / whole,
         })
@@ -189,19 +242,21 @@ impl<const HEIGHTS: usize> GlowMap<HEIGHTS> {
     /// Fades all cells and lets go of tiles that a flux which brings `dark_w` to a cell would not have lit in a step; what shall be fed of
     /// the particles' power to each tile that is left.
     fn fade(&mut self, keeping: &Keeping<HEIGHTS>, dark_w: f32) -> Vec<[f32; HEIGHTS]> {
-        let mut fed: Vec<[f32; HEIGHTS]> = Vec::with_capacity(self.tiles.len());
-        for tile in &mut self.tiles {
+        let fade = |tile: &mut Tile<HEIGHTS>| {
             let kept = keeping.of(tile.energy_ev());
             for values in tile.powers.iter_mut().chain(&mut tile.weighted) {
                 values.iter_mut().zip(kept).for_each(|(value, kept)| *value *= kept);
             }
-            fed.push(kept.map(|kept| 1.0 - kept));
-        }
+            let fed = kept.map(|kept| 1.0 - kept);
+            let is_dark = |powers: &[f32; HEIGHTS]| (0..HEIGHTS).all(|i| powers[i] < dark_w * fed[i]);
+            (fed, tile.powers.iter().all(is_dark))
+        };
+        let (mut fed, mut dark): (Vec<_>, Vec<_>) = self.tiles.par_iter_mut().with_min_len(TILES).map(fade).unzip();
         let mut number = 0;
         while number < self.tiles.len() {
-            let is_dark = |powers: &[f32; HEIGHTS]| (0..HEIGHTS).all(|i| powers[i] < dark_w * fed[number][i]);
-            if self.tiles[number].powers.iter().all(is_dark) {
+            if dark[number] {
                 fed.swap_remove(number);
+                dark.swap_remove(number);
                 self.numbers[self.tiles[number].place as usize] = NO_TILE;
                 self.tiles.swap_remove(number);
                 if let Some(moved) = self.tiles.get(number) {
@@ -257,13 +312,30 @@ impl<const HEIGHTS: usize> GlowMap<HEIGHTS> {
     }
 }
 
+impl<const HEIGHTS: usize> GlowCell<HEIGHTS> {
+    /// The light of both, where its middle is, under the number of the first.
+    fn and(self, other: Self) -> Self {
+        let whole = [self, other].map(|cell| cell.powers_w.iter().sum::<f32>());
+        let share = whole[1] / (whole[0] + whole[1]);
+        let mean = |own: f32, other: f32| own + share * (other - own);
+        Self {
+            number: self.number,
+            position_km: [0, 1].map(|axis| mean(self.position_km[axis], other.position_km[axis])),
+            powers_w: std::array::from_fn(|height| self.powers_w[height] + other.powers_w[height]),
+            energy_ev: mean(self.energy_ev, other.energy_ev),
+        }
+    }
+}
+
 impl GlowMap<1> {
     /// The map's light as that of particles: each cell's power is shared out among those in it as they bring power. Gives the share of each
-    /// particle, W, and the lit cells that hold none; cells fainter than `faintest` of a typical one are left out.
+    /// particle, W, and the lit cells that hold none, as blocks of `block` by `block`; cells fainter than `faintest` of a typical one are left
+    /// out.
     pub(in crate::aurora) fn shared_out(
         &self,
         particles: &AuroraParticles,
         faintest: f32,
+        block: usize,
     ) -> (Vec<f32>, Vec<GlowCell<1>>) {
         let cells = self.cells_of(particles);
         let mut sums = vec![0.0_f32; self.tiles.len() * CELLS];
@@ -279,9 +351,9 @@ impl GlowMap<1> {
         };
         let shares = cells.par_iter().zip(&particles.powers_w).map(own).collect();
         let faintest = faintest * self.typical_w();
-        let left = (0..sums.len()).filter(|cell| sums[*cell] <= 0.0);
-        let lit = left.filter_map(|cell| self.cell(&self.tiles[cell / CELLS], cell % CELLS));
-        (shares, lit.filter(|cell| cell.powers_w[0] > faintest).collect())
+        let left = |tile: usize, cell: usize| sums[tile * CELLS + cell] <= 0.0;
+        let lit = |tile: usize, cell: usize| left(tile, cell) && self.tiles[tile].powers[cell][0] > faintest;
+        (shares, self.blocks(block, lit))
     }
 }
 
@@ -372,16 +444,38 @@ mod tests {
         let mut map = GlowMap::new(100.0, 0.5);
         let fed = particles([[10.1, -20.1], [10.2, -20.2]]);
         map.step(&fed, &even(1.0, 0.0));
-        assert_eq!(map.shared_out(&fed, 0.01), (vec![3.0, 1.0], vec![]));
+        assert_eq!(map.shared_out(&fed, 0.01, 1), (vec![3.0, 1.0], vec![]));
         // One has left its cell for a dark one, the other is still where all of the light is.
         let moved = particles([[-40.0, 40.0], [10.2, -20.2]]);
-        assert_eq!(map.shared_out(&moved, 0.01), (vec![0.0, 4.0], vec![]));
+        assert_eq!(map.shared_out(&moved, 0.01, 1), (vec![0.0, 4.0], vec![]));
         // Both have left: the cell itself shines, unless that is too faint.
         let gone = particles([[-40.0, 40.0], [-40.0, 40.0]]);
-        let (shares, cells) = map.shared_out(&gone, 0.01);
+        let (shares, cells) = map.shared_out(&gone, 0.01, 1);
         assert_eq!((shares, cells.len(), cells[0].powers_w[0]), (vec![0.0; 2], 1, 4.0));
-        assert_eq!(map.shared_out(&gone, 1.5).1, []);
-        assert_eq!((map.bright_cells(0.01).len(), map.bright_cells(1.5)), (1, vec![]));
+        assert_eq!(map.shared_out(&gone, 1.5, 1).1, []);
+        assert_eq!((map.bright_blocks(0.01, 1).len(), map.bright_blocks(1.5, 1)), (1, vec![]));
+    }
+
+    #[test]
+    fn a_block_has_the_light_of_its_cells_where_its_middle_is() {
+        let mut map = GlowMap::new(100.0, 0.5);
+        // Two cells apart from west to east, the wanted one of 3 W and another of 1 W.
+        let fed = particles([[10.1, -20.1], [11.1, -20.1]]);
+        map.step(&fed, &even(1.0, 0.0));
+        let [apart, together] = [2, 4].map(|block| map.bright_blocks(0.01, block));
+        assert_eq!(apart.iter().map(|cell| cell.powers_w[0]).collect::<Vec<_>>(), [3.0, 1.0]);
+        assert_eq!(together.len(), 1);
+        let GlowCell { number, position_km, powers_w, energy_ev } = together[0];
+        assert_eq!((position_km, powers_w, energy_ev), ([10.5, -20.25], [4.0], 2000.0));
+        // Row 56, column 120 of 200, whichever of its cells are lit.
+        assert_eq!(number, 56 * 200 + 120);
+        map.step(&particles([[10.6, -20.1], [11.1, -20.1]]), &even(1.0, 0.0));
+        assert_eq!(map.bright_blocks(0.01, 4)[0].number, number);
+        map.step(&fed, &even(1.0, 0.0));
+        let cells: f32 = map.cells().map(|cell| cell.powers_w[0]).sum();
+        assert_eq!(cells, 4.0);
+        // Blocks are wide where the light is spread far.
+        assert_eq!([0.1, 1.0, 2.0, 1e3].map(|spread| map.block(spread)), [1, 2, 4, 8]);
     }
 
     #[test]

@@ -17,6 +17,9 @@ pub(super) const STRIP: usize = 16;
 const SAMPLES: usize = 24;
 /// Most columns and rows.
 const MOST: f64 = 16_384.0;
+/// Most cells of a chart for each of the picture's pixels: more are seen only where a camera zooms or turns far while its shutter is open,
+/// which blurs them.
+const MOST_PER_PIXEL: f64 = 16.0;
 /// Lower than this below the horizon nothing is drawn: sine of the elevation.
 const LOWEST: f64 = -0.35;
 
@@ -27,7 +30,7 @@ pub(super) struct Coverage {
     longitude: [f64; 2],
     /// Least and greatest colatitude.
     colatitude: [f64; 2],
-    /// Angle of a pixel.
+    /// Angle of a pixel, or more where the chart would have far more cells than the picture has pixels.
     pub(super) pixel: f64,
 }
 
@@ -68,11 +71,29 @@ impl Coverage {
         let margin = 1.5 * camera.size[0].max(camera.size[1]) / (SAMPLES - 1) as f64 * pixel;
         let around = least < margin || reach > 0.8 * PI;
         let sine = math::sin(least.min(FRAC_PI_2)).max(1e-3);
-        Self {
+        let mut coverage = Self {
             longitude: [middle, if around { PI } else { (reach + margin / sine).min(PI) }],
             colatitude: [if around { 0.0 } else { least - margin }.max(0.0), (greatest + margin).min(PI)],
             pixel,
+        };
+        let most = MOST_PER_PIXEL * camera.size[0] * camera.size[1];
+        coverage.pixel = pixel.max(math::sqrt(coverage.area() / most));
+        coverage
+    }
+
+    /// Sine of the colatitude where meridians lie farthest apart.
+    fn widest(&self) -> f64 {
+        let [least, greatest] = self.colatitude;
+        if least < FRAC_PI_2 && greatest > FRAC_PI_2 {
+            return 1.0;
         }
+        math::sin(least).max(math::sin(greatest)).max(1e-3)
+    }
+
+    /// What a chart over it takes up, columns as wide everywhere as where they are widest, square radians.
+    fn area(&self) -> f64 {
+        let [least, greatest] = self.colatitude;
+        2.0 * self.longitude[1] * self.widest() * (greatest - least)
     }
 }
 
@@ -89,12 +110,7 @@ fn directions<'a>(camera: &'a Camera, field: &'a FieldLines) -> impl Iterator<It
 impl Chart {
     /// A chart over `coverage` whose cells are `column` by `row` radians where they are widest, or somewhat less.
     pub(super) fn new(coverage: &Coverage, column: f64, row: f64) -> Self {
-        let [least, greatest] = coverage.colatitude;
-        let widest = if least < FRAC_PI_2 && greatest > FRAC_PI_2 {
-            1.0
-        } else {
-            math::sin(least).max(math::sin(greatest)).max(1e-3)
-        };
+        let ([least, greatest], widest) = (coverage.colatitude, coverage.widest());
         let [middle, reach] = coverage.longitude;
         let whole = reach >= PI;
         let range = 2.0 * reach;
@@ -203,5 +219,38 @@ impl Finder {
     #[inline(always)]
     pub(super) fn row(&self, colatitude: f32) -> f32 {
         colatitude.fused(self.per_row, -self.first_row)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{animation::Animated, camera::CameraParameters, canvas::Shutter, curve::Interpolation};
+
+    use super::*;
+
+    const SIZE: [usize; 2] = [64, 48];
+
+    /// Cells beside pixels, and the angle of a cell beside that of a pixel in the shutter's middle, with these fields of view when it opens
+    /// and closes.
+    fn cells(fov_deg: [f64; 2]) -> [f64; 2] {
+        let mut camera = CameraParameters::default();
+        camera.look_up();
+        camera.vertical_fov_deg =
+            Animated::keyed(vec![(0.0, fov_deg[0]), (1.0, fov_deg[1])], Interpolation::Linear).unwrap();
+        let view = View::new(camera, Shutter { open: 0.0, close: 1.0 }, 0.0, SIZE, 0);
+        let coverage = Coverage::of_view(&view, &FieldLines::new(77.0, 0.0, view.camera.position));
+        let chart = Chart::new(&coverage, coverage.pixel, coverage.pixel);
+        let pixels = (SIZE[0] * SIZE[1]) as f64;
+        [(chart.columns * chart.rows) as f64 / pixels, coverage.pixel * view.camera.focal_pixels]
+    }
+
+    #[test]
+    fn a_zoom_while_the_shutter_is_open_makes_no_chart_finer_than_the_picture() {
+        let [still, angle] = cells([50.0, 50.0]);
+        assert!((1.0..4.0).contains(&still) && angle == 1.0, "{still} {angle}");
+        let [zoomed, angle] = cells([170.0, 0.1]);
+        assert!(zoomed < 1.3 * MOST_PER_PIXEL && angle == 1.0, "{zoomed} {angle}");
+        let [narrow, angle] = cells([0.2, 170.0]);
+        assert!(narrow < 1.3 * MOST_PER_PIXEL, "{narrow} {angle}");
     }
 }

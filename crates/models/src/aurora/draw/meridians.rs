@@ -220,7 +220,8 @@ impl Drawing<'_> {
             let [first, end] = strip.lit[column].map(|row| row as usize);
             let lit = first.min(end)..end;
             let light = &mut strip.light[column * self.chart.rows..][..self.chart.rows];
-            slow.add_to(simd, light);
+            // The last knots may reach beyond the rows that are lit.
+            slow.add_to(simd, &mut light[..end]);
             for (light, inverse) in light[lit.clone()].iter_mut().zip(&self.inverse_sines[lit]) {
                 for value in light {
                     *value *= inverse;

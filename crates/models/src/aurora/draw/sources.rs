@@ -105,8 +105,7 @@ impl Maker<'_> {
                     *sum += share * power;
                 }
             }
-            let key = self.key(east.to_bits().rotate_left(16) ^ south.to_bits());
-            *source = self.make(self.field.foot(east, south), powers, node_of(cell.energy_ev), key);
+            *source = self.make(self.field.foot(east, south), powers, node_of(cell.energy_ev), self.key(!cell.number));
         }
     }
 
@@ -161,20 +160,27 @@ impl Sources {
     pub(super) fn new(light: &Light, field: &FieldLines, moments: &Moments) -> Self {
         let falling = light.parameters.sampling == Sampling::Collisions;
         let faintest = if falling { FAINTEST_FALLING } else { FAINTEST };
-        let ((green_w, green), red) = rayon::join(
-            || light.glow.green.shared_out(light.particles, faintest),
-            || light.glow.red.bright_cells(FAINTEST),
-        );
+        let glow = light.glow;
         let column = light.emission.column(light.energy_ev);
         let spread = math::hypot(light.spread_km(), moments.smear_km);
         let with = |emitter: Emitter, cell_km: f64| {
             let diffusion = column.spread_km[emitter.index()];
             math::sqrt(spread * spread + diffusion * diffusion + cell_km * cell_km / 6.0)
         };
+        let own = [with(Emitter::OxygenGreen, glow.green.cell_km()), with(Emitter::OxygenRed, glow.red.cell_km())];
+        let blocks = [glow.green.block(own[0]), glow.red.block(own[1])];
+        let ((green_w, green), red) = rayon::join(
+            || glow.green.shared_out(light.particles, faintest, blocks[0]),
+            || glow.red.bright_blocks(FAINTEST, blocks[1]),
+        );
+        // What is drawn from the middle of a block is spread as its cells would be.
+        let of_block = |own: f64, cell_km: f64, block: usize| {
+            math::sqrt(own * own + ((block * block - 1) as f64) * cell_km * cell_km / 12.0)
+        };
+        let green_spread = of_block(own[0], glow.green.cell_km(), blocks[0]);
+        let red_spread = of_block(own[1], glow.red.cell_km(), blocks[1]);
         let maker = |spread: f64, share, instant| Maker { field, reach: spread as f32 * REACH, share, instant };
-        let red_spread = with(Emitter::OxygenRed, light.glow.red.cell_km());
-        let mut sharp =
-            maker(with(Emitter::OxygenGreen, light.glow.green.cell_km()), 1.0, moments.first).cells(&green, GREEN);
+        let mut sharp = maker(green_spread, 1.0, moments.first).cells(&green, GREEN);
         let share = 1.0 / moments.later.len().max(1) as f32;
         for (later, instant) in moments.later.iter().zip(moments.first..) {
             sharp.extend(maker(spread, share, instant).particles(light.particles, &green_w, *later as f32));

@@ -1,5 +1,7 @@
 //! Charge that lies on the sheets as on conductors.
 
+use rayon::prelude::*;
+
 use super::{course::Course, nodes::split, scatter::Scattered};
 use crate::field::Grid2;
 
@@ -7,6 +9,10 @@ use crate::field::Grid2;
 const CHANGE: [f64; 2] = [0.5, 2.0];
 const CHARGE: [f64; 2] = [0.1, 4.0];
 
+/// Most nodes of all sheets together for each particle.
+const NODES_PER_PARTICLE: f64 = 0.05;
+/// Nodes that a task of the thread pool changes, at least.
+const TASK: usize = 256;
 /// Most that charge is denser at one side of a sheet than in its middle, as a share of that.
 const MOST_TILT: f64 = 0.9;
 
@@ -45,15 +51,23 @@ pub(super) struct Wanted {
 }
 
 impl LineCharge {
-    /// The same charge everywhere, at nodes about `spacing` km apart.
-    pub(super) fn even(course: &Course, spacing: f64) -> Self {
+    /// The same charge everywhere, at nodes about `spacing` km apart, or more where so many particles do not show as much.
+    pub(super) fn even(course: &Course, spacing: f64, particles: f64) -> Self {
+        let lengths = course.sheet_lengths();
+        let spacing = spacing.max(lengths.iter().sum::<f64>() / (NODES_PER_PARTICLE * particles));
         let mut starts = vec![0];
-        for length in course.sheet_lengths() {
+        for length in lengths {
             let count = (length / spacing).ceil().max(1.0) as usize + 1;
             starts.push(starts[starts.len() - 1] + count);
         }
         let count = starts[starts.len() - 1];
         Self { nodes: vec![1.0; count], tilts: vec![0.0; count], starts }
+    }
+
+    /// How many nodes there are.
+    #[cfg(test)]
+    pub(super) fn count(&self) -> usize {
+        self.nodes.len()
     }
 
     /// Where a particle is.
@@ -77,24 +91,22 @@ impl LineCharge {
     /// Changes it where the potential that it makes is not the one that is wanted, or not the same on both sides.
     pub(super) fn adjust(&mut self, course: &Course, potential: &Grid2, wanted: Wanted) {
         let Wanted { density, half_thickness, .. } = wanted;
-        for (sheet, ends) in self.starts.windows(2).enumerate() {
-            let range = ends[0]..ends[1];
-            let last = (range.len() - 1) as f64;
-            let nodes = self.nodes[range.clone()].iter_mut().zip(&mut self.tilts[range]);
-            for (number, (charge, tilt)) in nodes.enumerate() {
-                let share = number as f64 / last;
-                let place = course.place(sheet, share);
-                let found = potential.sample(place.to_array());
-                let change = if found < 0.0 { wanted.potential / found } else { CHANGE[1] };
-                *charge = (*charge * change.clamp(CHANGE[0], CHANGE[1])).clamp(CHARGE[0], CHARGE[1]);
-                let way = course.place(sheet, share + 0.5 / last) - course.place(sheet, share - 0.5 / last);
-                let across = way.perp().normalize_or_zero() * half_thickness;
-                let rise =
-                    potential.sample((place + across).to_array()) - potential.sample((place - across).to_array());
-                // Charge tilted by a makes the one edge lower than the other by 2/3 a density L^2.
-                let change = 1.5 * rise / (density * *charge * half_thickness * half_thickness);
-                *tilt = (*tilt + change).clamp(-MOST_TILT, MOST_TILT);
-            }
-        }
+        let starts = &self.starts;
+        let adjust = |(index, (charge, tilt)): (usize, (&mut f64, &mut f64))| {
+            let sheet = starts.partition_point(|start| *start <= index) - 1;
+            let last = (starts[sheet + 1] - starts[sheet] - 1) as f64;
+            let share = (index - starts[sheet]) as f64 / last;
+            let place = course.place(sheet, share);
+            let found = potential.sample(place.to_array());
+            let change = if found < 0.0 { wanted.potential / found } else { CHANGE[1] };
+            *charge = (*charge * change.clamp(CHANGE[0], CHANGE[1])).clamp(CHARGE[0], CHARGE[1]);
+            let way = course.place(sheet, share + 0.5 / last) - course.place(sheet, share - 0.5 / last);
+            let across = way.perp().normalize_or_zero() * half_thickness;
+            let rise = potential.sample((place + across).to_array()) - potential.sample((place - across).to_array());
+            // Charge tilted by a makes the one edge lower than the other by 2/3 a density L^2.
+            let change = 1.5 * rise / (density * *charge * half_thickness * half_thickness);
+            *tilt = (*tilt + change).clamp(-MOST_TILT, MOST_TILT);
+        };
+        self.nodes.par_iter_mut().zip(&mut self.tilts).with_min_len(TASK).enumerate().for_each(adjust);
     }
 }

@@ -6,20 +6,22 @@ use bansho_base::{
     random::Key,
 };
 
-use super::along::Along;
+use super::along::{Along, Mark};
 use crate::aurora::{
     AuroraParameters, FoldParameters,
     shapes::{Bridge, Neighbourhood, Segments, Shape, Sheet, lengths},
 };
 
-/// Pieces that a fold is made of, at least.
+/// Pieces that a fold is made of, unless all sheets together would have too many.
 const PIECES_PER_FOLD: f64 = 12.0;
 /// Pieces are not shorter than L_thr over this.
 const PIECES_PER_THICKNESS: f64 = 4.0;
 /// Points nearer than so many pieces may have changed places.
 const NEAR_PIECES: f64 = 2.0;
-/// About as many pieces as all sheets together have at most.
+/// Most pieces of all sheets together, and for each particle, but not fewer than so many, nor than there are segments between control points.
 const MOST_PIECES: f64 = 20_000.0;
+const PIECES_PER_PARTICLE: f64 = 0.05;
+const FEW_PIECES: f64 = 2_000.0;
 /// Gradient noise seldom leaves half of its bounds: this makes its swings those that are asked for.
 const SWING: f64 = 2.0;
 
@@ -29,6 +31,7 @@ pub(super) struct Folding {
     parameters: FoldParameters,
     noise: Noise<2>,
     piece_km: f64,
+    most_pieces: f64,
     half_km: f64,
 }
 
@@ -41,7 +44,8 @@ impl Folding {
         let fold = if parameters.amplitude_km > 0.0 { parameters.scale_km / PIECES_PER_FOLD } else { f64::INFINITY };
         // Nothing finer than a part of its thickness can be seen of a sheet.
         let piece_km = fold.min(aurora.cell_km()).max(aurora.half_thickness_km() / PIECES_PER_THICKNESS);
-        Self { noise, piece_km, half_km: aurora.extent_km / 2.0, parameters }
+        let most_pieces = (PIECES_PER_PARTICLE * aurora.particles.count as f64).clamp(FEW_PIECES, MOST_PIECES);
+        Self { noise, piece_km, most_pieces, half_km: aurora.extent_km / 2.0, parameters }
     }
 
     /// How far the sheet swings at a coordinate along it and a time, km.
@@ -73,7 +77,7 @@ struct Part {
     share: [f64; 2],
     flux: [f64; 2],
     energy: [f64; 2],
-    /// One over its length, 1/km; 0 where it has none.
+    /// One over its length, 1/km, negative where the sheet is listed against the way of its coordinate; 0 where it has no length.
     per_length: f64,
     sheet: u32,
 }
@@ -85,7 +89,7 @@ pub(super) struct Foot {
     pub(super) share: f64,
     pub(super) flux: f64,
     pub(super) energy: f64,
-    /// Distance, km, negative on the left of the way along the sheet.
+    /// Distance, km, negative on the left of the way along which the sheet's coordinate has grown.
     pub(super) side: f64,
 }
 
@@ -98,27 +102,30 @@ impl Course {
         time: f64,
         reach: f64,
     ) -> Self {
-        let piece = folding.piece_km.max(shape.length() / MOST_PIECES);
-        let (mut fine, mut alongs) = (Shape::default(), Vec::new());
+        // Each segment between control points is made of whole pieces, up to one more than fit.
+        let segments: usize = shape.sheets.iter().map(|sheet| sheet.points.len().saturating_sub(1)).sum();
+        let piece = folding.piece_km.max(shape.length() / (folding.most_pieces - segments as f64).max(1.0));
+        let (mut fine, mut marks) = (Shape::default(), Vec::new());
         for (index, sheet) in shape.sheets.iter().enumerate() {
-            let (mut refined, coordinates) = refine(sheet, piece, |point, part| along.between(index, point, part));
+            let (mut refined, own) = refine(sheet, piece, |point, part| along.between(index, point, part));
             if folding.parameters.amplitude_km > 0.0 {
-                fold(&mut refined, &coordinates, folding, time);
+                fold(&mut refined, &own, folding, time);
             }
             fine.sheets.push(refined);
-            alongs.push(coordinates);
+            marks.push(own);
         }
         for bridge in bridges {
-            let (refined, coordinates) = span(bridge, &fine, &alongs, piece);
+            let (refined, own) = span(bridge, &fine, &marks, piece);
             fine.sheets.push(refined);
-            alongs.push(coordinates);
+            marks.push(own);
         }
         let (mut shares, mut starts) = (Vec::new(), Vec::new());
         for (index, sheet) in fine.sheets.iter().enumerate() {
             starts.extend((1..sheet.points.len()).map(|point| [index as u32, point as u32 - 1]));
             shares.push(length_shares(&sheet.points));
         }
-        let parts = starts.iter().map(|start| Part::new(&fine, &shares, *start)).collect();
+        let parts = starts.iter().map(|start| Part::new(&fine, &marks, &shares, *start)).collect();
+        let alongs = marks.iter().map(|marks| marks.iter().map(|mark| mark.along).collect()).collect();
         let near = Neighbourhood::new(&fine, reach);
         Self { shape: fine, alongs, shares, starts, parts, near }
     }
@@ -141,29 +148,35 @@ impl Course {
         points[point].lerp(points[point + 1], part)
     }
 
-    /// The coordinate at a share of a sheet's length, km.
-    pub(super) fn along(&self, sheet: usize, share: f64) -> f64 {
-        let (point, part) = self.split(sheet, share);
-        let alongs = &self.alongs[sheet];
-        lerp(alongs[point], alongs[point + 1], part)
+    /// The coordinate after every `last`th part of a sheet's length, from its beginning to its end, km.
+    pub(super) fn alongs(&self, sheet: usize, last: usize) -> Vec<f64> {
+        let (alongs, shares) = (&self.alongs[sheet], &self.shares[sheet]);
+        let mut after = 1;
+        let at = |node: usize| {
+            let share = node as f64 / last as f64;
+            while after + 1 < shares.len() && shares[after] <= share {
+                after += 1;
+            }
+            lerp(alongs[after - 1], alongs[after], part_between([shares[after - 1], shares[after]], share))
+        };
+        (0..=last).map(at).collect()
     }
 
     /// The point before a share of a sheet's length, and how far it is on the way to the next.
     fn split(&self, sheet: usize, share: f64) -> (usize, f64) {
         let shares = &self.shares[sheet];
         let after = shares.partition_point(|end| *end <= share).clamp(1, shares.len() - 1);
-        let [before, end] = [shares[after - 1], shares[after]];
-        (after - 1, ((share - before) / (end - before).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0))
+        (after - 1, part_between([shares[after - 1], shares[after]], share))
     }
 
-    /// Each piece of the sheets in turn, in parts of at most the share `most` of a sheet's length: its sheet, the share of the sheet's length
+    /// Each piece of the sheets in turn, in parts of at most the share `most` of its sheet's length: its sheet, the share of the sheet's length
     /// before its middle, the flux factor there, its length in km.
-    pub(super) fn pieces(&self, most: f64) -> impl Iterator<Item = (usize, f64, f64, f64)> + '_ {
+    pub(super) fn pieces(&self, most: impl Fn(usize) -> f64) -> impl Iterator<Item = (usize, f64, f64, f64)> {
         self.starts.iter().flat_map(move |start| {
             let [number, index] = start.map(|part| part as usize);
             let (sheet, shares) = (&self.shape.sheets[number], &self.shares[number]);
             let length = sheet.points[index].distance(sheet.points[index + 1]);
-            let count = ((shares[index + 1] - shares[index]) / most).ceil().max(1.0);
+            let count = ((shares[index + 1] - shares[index]) / most(number)).ceil().max(1.0);
             (0..count as usize).map(move |part| {
                 let middle = (part as f64 + 0.5) / count;
                 let at = |values: &[f64]| lerp(values[index], values[index + 1], middle);
@@ -210,7 +223,7 @@ impl Course {
 }
 
 impl Part {
-    fn new(shape: &Shape, shares: &[Vec<f64>], [sheet, index]: [u32; 2]) -> Self {
+    fn new(shape: &Shape, marks: &[Vec<Mark>], shares: &[Vec<f64>], [sheet, index]: [u32; 2]) -> Self {
         let (number, index) = (sheet as usize, index as usize);
         let on = &shape.sheets[number];
         let along = |values: &[f64]| [values[index], values[index + 1] - values[index]];
@@ -219,10 +232,15 @@ impl Part {
             share: along(&shares[number]),
             flux: along(&on.flux),
             energy: along(&on.energy),
-            per_length: if length > 0.0 { 1.0 / length } else { 0.0 },
+            per_length: if length > 0.0 { marks[number][index].direction / length } else { 0.0 },
             sheet,
         }
     }
+}
+
+/// How far a share of the length is from the one to the other.
+fn part_between([before, end]: [f64; 2], share: f64) -> f64 {
+    ((share - before) / (end - before).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
 }
 
 /// Share of the length before each point; 0 everywhere where there is no length.
@@ -233,15 +251,15 @@ fn length_shares(points: &[DVec2]) -> Vec<f64> {
 }
 
 /// A smooth line through a sheet's points in pieces of about that length, and the coordinate along it at each of its points.
-fn refine(sheet: &Sheet, piece_km: f64, along: impl Fn(usize, f64) -> f64) -> (Sheet, Vec<f64>) {
+fn refine(sheet: &Sheet, piece_km: f64, along: impl Fn(usize, f64) -> Mark) -> (Sheet, Vec<Mark>) {
     let points = in_order(&sheet.points, NEAR_PIECES * piece_km);
     let headings = headings(&points);
-    let (mut fine, mut coordinates) = (Sheet::default(), Vec::new());
+    let (mut fine, mut marks) = (Sheet::default(), Vec::new());
     let mut push = |point: DVec2, index: usize, part: f64| {
         fine.points.push(point);
         fine.flux.push(lerp(sheet.flux[index], sheet.flux[index + 1], part));
         fine.energy.push(lerp(sheet.energy[index], sheet.energy[index + 1], part));
-        coordinates.push(along(index, part));
+        marks.push(along(index, part));
     };
     for (index, pair) in points.windows(2).enumerate() {
         let way = pair[1] - pair[0];
@@ -256,26 +274,27 @@ fn refine(sheet: &Sheet, piece_km: f64, along: impl Fn(usize, f64) -> f64) -> (S
     if let Some(last) = points.len().checked_sub(2) {
         push(points[last + 1], last, 1.0);
     }
-    (fine, coordinates)
+    (fine, marks)
 }
 
 /// The light over a gap as a sheet of its own, from the one end of a sheet to that of another, and the coordinate along it, which goes on from
 /// the first.
-fn span(bridge: &Bridge, fine: &Shape, alongs: &[Vec<f64>], piece_km: f64) -> (Sheet, Vec<f64>) {
+fn span(bridge: &Bridge, fine: &Shape, marks: &[Vec<Mark>], piece_km: f64) -> (Sheet, Vec<Mark>) {
     let point = |(sheet, at_end): (usize, bool)| if at_end { fine.sheets[sheet].points.len() - 1 } else { 0 };
     let [from, to] = bridge.ends.map(|end| fine.sheets[end.0].points[point(end)]);
-    let begin = alongs[bridge.ends[0].0][point(bridge.ends[0])];
+    let begin = marks[bridge.ends[0].0][point(bridge.ends[0])];
+    let direction = if bridge.ends[0].1 { begin.direction } else { -begin.direction };
     let length = from.distance(to);
     let pieces = (length / piece_km).ceil().max(1.0) as usize;
-    let (mut sheet, mut coordinates) = (Sheet::default(), Vec::new());
+    let (mut sheet, mut own) = (Sheet::default(), Vec::new());
     for number in 0..=pieces {
         let part = number as f64 / pieces as f64;
         sheet.points.push(from.lerp(to, part));
         sheet.flux.push(bridge.flux);
         sheet.energy.push(bridge.energy);
-        coordinates.push(begin + part * length);
+        own.push(Mark { along: begin.along + direction * part * length, direction });
     }
-    (sheet, coordinates)
+    (sheet, own)
 }
 
 /// The points in the order in which the sheet passes them: two nearer than `near_km` that lie the wrong way round between their neighbours, as
@@ -321,12 +340,12 @@ fn hermite([a, b]: [DVec2; 2], [at_a, at_b]: [DVec2; 2], t: f64) -> DVec2 {
         - at_b * (square * rest)
 }
 
-/// Swings every point of the sheet to its side, and along it so that crests lean over.
-fn fold(sheet: &mut Sheet, alongs: &[f64], folding: &Folding, time: f64) {
+/// Swings every point of the sheet to its side, and along it so that crests lean over: by the way of the coordinate.
+fn fold(sheet: &mut Sheet, marks: &[Mark], folding: &Folding, time: f64) {
     let headings = headings(&sheet.points);
     let half = DVec2::splat(folding.half_km);
-    for ((point, heading), along) in sheet.points.iter_mut().zip(headings).zip(alongs) {
-        let swing = folding.swing(*along, time);
+    for ((point, heading), mark) in sheet.points.iter_mut().zip(headings).zip(marks) {
+        let swing = mark.direction * folding.swing(mark.along, time);
         *point = (*point + swing * (heading.perp() + folding.parameters.curl * heading)).clamp(-half, half);
     }
 }

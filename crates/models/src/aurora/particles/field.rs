@@ -135,7 +135,7 @@ impl FieldMaker {
         let reach = self.reach_km();
         let potential = density * reach * reach * (math::exp(-half_thickness / reach) - 1.0);
         let wanted = Wanted { potential, density, half_thickness };
-        let mut charge = LineCharge::even(course, self.parameters.cell_km());
+        let mut charge = LineCharge::even(course, self.parameters.cell_km(), self.parameters.particles.count as f64);
         let places: Vec<(usize, Place)> = scattered
             .par_iter()
             .with_min_len(TASK)

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{
     AuroraParticles,
     course::{Course, Foot},
-    nodes::split,
+    nodes::{Layout, Nodes},
     rays::{Places, RayTable, Rays},
 };
 use crate::aurora::{
@@ -19,10 +19,13 @@ use crate::aurora::{
 const TASK: usize = 4096;
 /// What a particle far from every sheet keeps of its power in a step.
 const STRAY: f32 = 0.85;
-/// Nodes along a sheet between which stretches lie that have their drawn power each.
-const COARSE: usize = 33;
-/// Nodes along a sheet between which the particles' own density is evened out: where a fold is born they lie in a heap for seconds.
-const FINE: usize = 257;
+/// Stretches of a sheet that have their drawn power each, at least and at most, and how many particles each has at least where there may be
+/// more.
+const COARSE: [f64; 2] = [16.0, 32.0];
+const PER_COARSE: f64 = 128.0;
+/// The same of those along which the particles' own density is evened out: where a fold is born they lie in a heap for seconds.
+const FINE: [f64; 2] = [32.0, 256.0];
+const PER_FINE: f64 = 64.0;
 /// Where particles are scarce, one gets at most this many times what it would have if all were evenly spread.
 const MOST_UNEVEN: f64 = 6.0;
 /// The power of a particle comes this share nearer in a step to what it shall be.
@@ -38,10 +41,6 @@ pub(super) struct Precipitation {
     parameters: AuroraParameters,
     rays: Rays,
 }
-
-/// Values at `COUNT` nodes along each sheet, evenly spaced; between two of them is a stretch.
-#[derive(Clone, Debug)]
-struct Nodes<const COUNT: usize>(Vec<[f64; COUNT]>);
 
 /// A part of the arrays that one task works on.
 struct Stretch<'a> {
@@ -59,21 +58,27 @@ impl Precipitation {
         Self { parameters: parameters.clone(), rays: Rays::new(parameters, key) }
     }
 
+    /// The coarse and the fine stretches of sheets of those lengths.
+    fn layouts(&self, lengths: &[f64]) -> [Layout; 2] {
+        let count = self.parameters.particles.count as f64;
+        [(PER_COARSE, COARSE), (PER_FINE, FINE)].map(|(per, bounds)| Layout::new(lengths, count / per, bounds))
+    }
+
     /// Power of the electrons on all sheets without pulsation and black rays, by sheet and node, W: flux times length times thickness.
-    fn wanted(&self, course: &Course, time: f64) -> Nodes<COARSE> {
+    fn wanted<'a>(&self, course: &Course, layout: &'a Layout, time: f64) -> Nodes<'a> {
         let width = 2.0 * self.parameters.half_thickness_km();
         let flux = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * width;
-        let mut wanted = Nodes::new(course.shape.sheets.len());
+        let mut wanted = Nodes::new(layout);
         // Parts as long as half of a stretch: sheets that bridge a gap have fewer pieces than nodes.
         course
-            .pieces(0.5 / (COARSE - 1) as f64)
+            .pieces(|sheet| 0.5 / (layout.count(sheet) - 1) as f64)
             .for_each(|(sheet, share, factor, length)| wanted.add(sheet as u32, share as f32, flux * factor * length));
         wanted
     }
 
     /// The pattern along the sheets at a time.
     pub(super) fn rays(&self, course: &Course, time: f64) -> RayTable {
-        self.rays.table(&course.sheet_lengths(), |sheet, share| course.along(sheet, share), time)
+        self.rays.table(&course.sheet_lengths(), |sheet, last| course.alongs(sheet, last), time)
     }
 
     /// Gives every particle its share of the power.
@@ -82,24 +87,29 @@ impl Precipitation {
     /// birth, death, split or merge can make the aurora flicker, and the flux along it is the one that was drawn. Within a stretch each
     /// stands for the more of the sheet's length the fewer of them there are, and has the rays' pattern.
     pub(super) fn share_out(&self, particles: &mut AuroraParticles, (course, rays): (&Course, &RayTable), time: f64) {
-        let sheets = course.shape.sheets.len();
-        let weigh = |part| self.weigh(part, course, (rays, time));
+        let lengths = course.sheet_lengths();
+        let [coarse, fine] = self.layouts(&lengths);
+        let weigh = |part| self.weigh(part, (course, &fine), (rays, time));
         let weighed: Vec<Weighed> = stretches(particles).into_par_iter().map(weigh).collect();
-        let counts = weighed.iter().fold(Nodes::new(sheets), |sum, part| sum.plus(&part.counts));
-        let lengths = lengths(course).shared_by(&counts);
-        let add_up = |(part, weighed): (Stretch, &Weighed)| part.add_up(&weighed.weights, &lengths);
+        let counts = weighed.iter().fold(Nodes::new(&fine), |sum, part| sum.plus(&part.counts));
+        let lengths = Nodes::of_lengths(&fine, &lengths).shared_by(&counts, MOST_UNEVEN);
+        let add_up = |(part, weighed): (Stretch, &Weighed)| part.add_up(&weighed.weights, &lengths, &coarse);
         let weights: Vec<_> = stretches(particles).into_par_iter().zip(&weighed).map(add_up).collect();
-        let weights = weights.iter().fold(Nodes::new(sheets), |sum, part| sum.plus(part));
-        let factors = self.wanted(course, time).shared_by(&weights);
+        let weights = weights.iter().fold(Nodes::new(&coarse), |sum, part| sum.plus(part));
+        let factors = self.wanted(course, &coarse, time).shared_by(&weights, MOST_UNEVEN);
         let given: Vec<[f64; 2]> =
             stretches(particles).into_par_iter().map(|part| part.brighten(&lengths, &factors)).collect();
         balance(particles, &given);
     }
 
     /// Weighs a stretch of particles, as negative powers while they wait for their factors.
-    fn weigh(&self, part: Stretch, course: &Course, (rays, time): (&RayTable, f64)) -> Weighed {
-        let mut weighed =
-            Weighed { counts: Nodes::new(course.shape.sheets.len()), weights: vec![0.0; part.fades.len()] };
+    fn weigh<'a>(
+        &self,
+        part: Stretch,
+        (course, layout): (&Course, &'a Layout),
+        (rays, time): (&RayTable, f64),
+    ) -> Weighed<'a> {
+        let mut weighed = Weighed { counts: Nodes::new(layout), weights: vec![0.0; part.fades.len()] };
         let (level, energy) = (Level::new(), self.parameters.energy_ev.at(time));
         let side_scale = 1.0 / self.parameters.half_thickness_km();
         for first in (0..part.fades.len()).step_by(LANES) {
@@ -134,67 +144,12 @@ impl Precipitation {
     }
 }
 
-/// Length of the sheets by sheet and node, km: half a stretch on each side of a node.
-fn lengths(course: &Course) -> Nodes<FINE> {
-    let of_sheet = |length: &f64| {
-        let stretch = length / (FINE - 1) as f64;
-        let mut nodes = [stretch; FINE];
-        (nodes[0], nodes[FINE - 1]) = (0.5 * stretch, 0.5 * stretch);
-        nodes
-    };
-    Nodes(course.sheet_lengths().iter().map(of_sheet).collect())
-}
-
 /// A stretch of particles, weighed.
-struct Weighed {
+struct Weighed<'a> {
     /// How many there are along the sheets.
-    counts: Nodes<FINE>,
+    counts: Nodes<'a>,
     /// The weight of each before black rays and pulsation; 0 for strays.
     weights: Vec<f32>,
-}
-
-impl<const COUNT: usize> Nodes<COUNT> {
-    fn new(sheets: usize) -> Self {
-        Self(vec![[0.0; COUNT]; sheets])
-    }
-
-    /// Adds a value to the two nodes around a place.
-    fn add(&mut self, sheet: u32, share: f32, value: f64) {
-        let (node, part) = split(f64::from(share), COUNT);
-        let nodes = &mut self.0[sheet as usize];
-        nodes[node] += value * (1.0 - part);
-        nodes[node + 1] += value * part;
-    }
-
-    /// Value at a place, linear between nodes.
-    fn at(&self, sheet: u32, share: f32) -> f64 {
-        let (node, part) = split(f64::from(share), COUNT);
-        let nodes = &self.0[sheet as usize];
-        nodes[node] + part * (nodes[node + 1] - nodes[node])
-    }
-
-    fn plus(mut self, other: &Self) -> Self {
-        self.0.iter_mut().flatten().zip(other.0.iter().flatten()).for_each(|(sum, value)| *sum += value);
-        self
-    }
-
-    fn sum(&self) -> f64 {
-        self.0.iter().flatten().sum()
-    }
-
-    /// What a unit of weight gets of these powers, by sheet and node, so that all is given out. Where there is next to no weight, not
-    /// everything can be given out there.
-    fn shared_by(mut self, weights: &Self) -> Self {
-        let (whole, even) = (self.sum(), self.sum() / weights.sum().max(f64::MIN_POSITIVE));
-        let mut given = 0.0;
-        for (power, weight) in self.0.iter_mut().flatten().zip(weights.0.iter().flatten()) {
-            *power = (*power / weight.max(f64::MIN_POSITIVE)).min(MOST_UNEVEN * even);
-            given += *power * weight;
-        }
-        let rest = if given > 0.0 { whole / given } else { 0.0 };
-        self.0.iter_mut().flatten().for_each(|factor| *factor *= rest);
-        self
-    }
 }
 
 impl Stretch<'_> {
@@ -203,8 +158,8 @@ impl Stretch<'_> {
     }
 
     /// Adds up the weights of particles that stand for so much of the sheets' length each.
-    fn add_up(self, weights: &[f32], lengths: &Nodes<FINE>) -> Nodes<COARSE> {
-        let mut sums = Nodes::new(lengths.0.len());
+    fn add_up<'a>(self, weights: &[f32], lengths: &Nodes, layout: &'a Layout) -> Nodes<'a> {
+        let mut sums = Nodes::new(layout);
         for (index, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
             let (sheet, share) = (self.sheets[index], self.shares[index]);
             sums.add(sheet, share, f64::from(self.fades[index] * weight) * lengths.at(sheet, share));
@@ -215,7 +170,7 @@ impl Stretch<'_> {
     /// Gives particles that wait for them their factors. Their power follows what it shall be with a delay: where two parts of a sheet
     /// lie close together, a particle that passes from the one to the other does not flash. Gives the power that they shall have together, and
     /// the one that they have, W.
-    fn brighten(self, lengths: &Nodes<FINE>, factors: &Nodes<COARSE>) -> [f64; 2] {
+    fn brighten(self, lengths: &Nodes, factors: &Nodes) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (index, power) in self.powers.iter_mut().enumerate().filter(|(_, power)| power.is_sign_negative()) {
             let (sheet, share) = (self.sheets[index], self.shares[index]);
@@ -277,15 +232,18 @@ mod tests {
         let points = vec![DVec2::ZERO, DVec2::new(17.0, 0.0)];
         let sheet = Sheet { points, flux: vec![1.0; 2], energy: vec![1.0; 2] };
         let shape = Shape { sheets: vec![sheet] };
-        let course = Course::new((&shape, &[]), &Along::begin(&shape), &Folding::new(&parameters, key), 0.0, 20.0);
-        assert!(course.pieces(1.0).count() < COARSE / 2, "{} pieces", course.pieces(1.0).count());
+        let course = Course::new((&shape, &[]), &Along::alone(&shape), &Folding::new(&parameters, key), 0.0, 20.0);
         let precipitation = Precipitation::new(&parameters, key);
-        let wanted = precipitation.wanted(&course, 0.0);
+        let [layout, _] = precipitation.layouts(&course.sheet_lengths());
+        let stretches = layout.count(0) - 1;
+        let pieces = course.pieces(|_| 1.0).count();
+        assert!(pieces < stretches / 2, "{pieces} pieces");
+        let wanted = precipitation.wanted(&course, &layout, 0.0);
         let length = course.sheet_lengths()[0];
         let flux = parameters.flux_mw_per_m2.at(0.0) * W_PER_KM2 * 2.0 * parameters.half_thickness_km();
         assert!((wanted.sum() / (flux * length) - 1.0).abs() < 1e-9);
-        let even = flux * length / (COARSE - 1) as f64;
-        for node in &wanted.0[0][1..COARSE - 1] {
+        let even = flux * length / stretches as f64;
+        for node in &wanted.of_sheet(0)[1..stretches] {
             assert!((node / even - 1.0).abs() < 0.05, "{node} W for {even} W");
         }
     }

@@ -14,8 +14,8 @@ use crate::aurora::{AuroraParameters, PulsationParameters, RayParameters};
 const RAYS: Fractal = Fractal { octaves: 3, lacunarity: 2, gain: 0.7 };
 /// Nodes of the table for the length of the finest cell of noise: with straight lines between them within a hundredth of it.
 const NODES_PER_CELL: f64 = 12.0;
-/// Most nodes of a sheet; finer rays on a longer one are finer than its particles.
-const MOST_NODES: f64 = 50_000.0;
+/// Most nodes of all sheets together for each particle: finer rays are finer than what particles show.
+const NODES_PER_PARTICLE: f64 = 0.5;
 /// Where the coordinate runs so many times as fast as the sheet is long, rays begin to fade, and so many times they are gone: they would be so
 /// much narrower, or stand beside others where it jumps.
 const FAST: f64 = 1.5;
@@ -33,6 +33,7 @@ pub(super) struct Rays {
     patches: Noise<2>,
     /// What noise is divided by so that its variance is 1.
     deviation: f32,
+    most_nodes: f64,
 }
 
 /// The noises of rays on both sides, of black rays and of patches.
@@ -76,22 +77,23 @@ impl Rays {
             black: noise(c, Fractal::SINGLE),
             patches: noise(d, Fractal::SINGLE),
             deviation: ((VARIANCE[0] * squares).sqrt() / sum) as f32,
+            most_nodes: NODES_PER_PARTICLE * parameters.particles.count as f64,
         }
     }
 
-    /// The noises at a time along a sheet whose coordinate after each share of its length is `along`, for sheets of those lengths in km.
-    pub(super) fn table(&self, lengths: &[f64], along: impl Fn(usize, f64) -> f64, time: f64) -> RayTable {
-        let (level, node) = (Level::new(), self.node_km());
+    /// The noises at a time along sheets of those lengths in km; `alongs` gives the coordinate after every so many equal parts of a sheet.
+    pub(super) fn table(&self, lengths: &[f64], alongs: impl Fn(usize, usize) -> Vec<f64>, time: f64) -> RayTable {
+        let level = Level::new();
+        let node = self.node_km().max(lengths.iter().sum::<f64>() / self.most_nodes);
         let sheet = |(sheet, length): (usize, &f64)| {
-            let last = (length / node).clamp(1.0, MOST_NODES).ceil();
-            let batch = |first: usize| {
-                let places = std::array::from_fn(|lane| along(sheet, ((first + lane) as f64 / last).min(1.0)));
-                let noises = self.noises(level, &places, time);
-                (0..LANES).map(move |lane| noises.map(|values| values[lane]))
-            };
-            let mut nodes: Vec<Noises> =
-                (0..=last as usize).step_by(LANES).flat_map(batch).take(last as usize + 1).collect();
-            let places = (0..=last as usize).map(|node| along(sheet, node as f64 / last)).collect::<Vec<_>>();
+            let last = (length / node).max(1.0).ceil();
+            let places = alongs(sheet, last as usize);
+            let mut nodes = Vec::with_capacity(places.len().next_multiple_of(LANES));
+            for places in places.chunks(LANES) {
+                let batch = std::array::from_fn(|lane| places[lane.min(places.len() - 1)]);
+                let noises = self.noises(level, &batch, time);
+                nodes.extend((0..places.len()).map(|lane| noises.map(|values| values[lane])));
+            }
             fade(&mut nodes, &places, length / last, self.rays.scale_km);
             nodes
         };
@@ -224,12 +226,17 @@ mod tests {
 
     const KEY: Key = Key::new(4, "rays");
 
+    /// Coordinates after every `last`th part of a sheet of that length.
+    fn evenly(length: f64, last: usize) -> Vec<f64> {
+        (0..=last).map(|node| length * node as f64 / last as f64).collect()
+    }
+
     /// Brightness, dimming and hardness every 50 m along the left side of a sheet.
     fn along(parameters: &AuroraParameters, time: f64) -> [Vec<f64>; 3] {
         let rays = Rays::new(parameters, KEY);
         let mut all: [Vec<f64>; 3] = Default::default();
         // A sheet of 800 km whose coordinate is its length.
-        let table = rays.table(&[800.0], |_, share| 800.0 * share, time);
+        let table = rays.table(&[800.0], |_, last| evenly(800.0, last), time);
         for first in 0..1000 {
             let place = |lane: usize| table.at(0, (first * LANES + lane) as f64 / 16_000.0);
             let places = Places { noises: std::array::from_fn(place), side: [-1.0; LANES] };
@@ -263,7 +270,7 @@ mod tests {
     #[test]
     fn the_table_holds_the_finest_noise() {
         let rays = Rays::new(&AuroraParameters::default(), KEY);
-        let table = rays.table(&[300.0], |_, share| 300.0 * share, 2.0);
+        let table = rays.table(&[300.0], |_, last| evenly(300.0, last), 2.0);
         for first in 0..500 {
             let along = std::array::from_fn(|lane| 0.0371 * (first * LANES + lane) as f64);
             let [left, ..] = rays.noises(Level::new(), &along, 2.0);
@@ -274,12 +281,27 @@ mod tests {
     }
 
     #[test]
+    fn there_are_no_more_nodes_than_particles_show() {
+        let nodes = |particles: i64| {
+            let mut parameters = AuroraParameters::default();
+            (parameters.particles.count, parameters.rays.scale_km) = (particles, 0.05);
+            let table = Rays::new(&parameters, KEY).table(&[2000.0, 500.0], |_, last| evenly(1.0, last), 1.0);
+            table.sheets.iter().map(Vec::len).collect::<Vec<_>>()
+        };
+        assert_eq!(nodes(500), [201, 51]);
+        // A twelfth of 50 m apart.
+        assert_eq!(nodes(5_000_000), [480_001, 120_001]);
+    }
+
+    #[test]
     fn rays_fade_where_the_coordinate_jumps() {
         let parameters = AuroraParameters::default();
         let rays = Rays::new(&parameters, KEY);
         // 50 km beyond the middle of the sheet all else.
-        let jump = |_: usize, share: f64| 300.0 * share + if share > 0.5 { 50.0 } else { 0.0 };
-        let (even, torn) = (rays.table(&[300.0], |_, share| 300.0 * share, 2.0), rays.table(&[300.0], jump, 2.0));
+        let jump = |_, last| {
+            evenly(300.0, last).into_iter().map(|along| along + if along > 150.0 { 50.0 } else { 0.0 }).collect()
+        };
+        let (even, torn) = (rays.table(&[300.0], |_, last| evenly(300.0, last), 2.0), rays.table(&[300.0], jump, 2.0));
         let step = |table: &RayTable, share: f64| (table.at(0, share + 2e-4)[0] - table.at(0, share - 2e-4)[0]).abs();
         assert!(step(&torn, 0.5) < 0.1 * f64::from(rays.deviation) as f32, "{}", step(&torn, 0.5));
         // A ray away it is as it was.

@@ -87,6 +87,11 @@ impl Making {
         Course::new((&shape, &bridges), along, &self.folding, time, reach)
     }
 
+    /// The coordinate along the sheets at a time that `before` have become.
+    fn follow(&self, before: &Along, time: f64) -> Along {
+        before.follow(&self.sequence.at(time), &self.sequence.listing(time))
+    }
+
     /// The target that a state speaks of.
     fn target(&self, state: &State) -> Target {
         let course = self.course(&state.target_along, state.target_time);
@@ -124,7 +129,7 @@ impl AuroraSimulation {
     pub fn new(parameters: AuroraParameters, sequence: Sequence, name: &str, seed: u64) -> Self {
         let key = Key::new(seed, name);
         let time = -parameters.preroll_s;
-        let along = Along::begin(&sequence.at(time));
+        let along = Along::begin(&sequence.at(time), &sequence.listing(time));
         let repulsion = Repulsion::new(&parameters);
         let precipitation = Precipitation::new(&parameters, key);
         let mut state = State {
@@ -176,7 +181,7 @@ impl AuroraSimulation {
         );
         state.renewals += 1;
         state.target_time = (state.steps + frames) as f64 * Self::STEP_S - self.making.parameters.preroll_s;
-        state.target_along = state.along.follow(&self.making.sequence.at(state.target_time));
+        state.target_along = self.making.follow(&state.along, state.target_time);
         self.target = self.making.target(&self.state);
     }
 
@@ -199,7 +204,7 @@ impl AuroraSimulation {
         let (_, (along, course, rays)) = rayon::join(
             || advance(state, target, (repulsion, mover), making.parameters.particles.fade_s),
             || {
-                let mut along = before.follow(&making.sequence.at(time));
+                let mut along = making.follow(&before, time);
                 along.relax(Self::STEP_S);
                 let course = making.course(&along, time);
                 let rays = precipitation.rays(&course, time);
@@ -223,12 +228,10 @@ impl AuroraSimulation {
     /// # Errors
     /// The bytes are not such a state; nothing is changed then.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
-        let state = snapshot::read(bytes, &self.state)?;
-        let points =
-            |time: f64| self.making.sequence.at(time).sheets.iter().map(|sheet| sheet.points.len()).collect::<Vec<_>>();
-        let counts = |along: &Along| along.points.iter().map(Vec::len).collect::<Vec<_>>();
+        let mut state = snapshot::read(bytes, &self.state)?;
         let time = state.steps as f64 * Self::STEP_S - self.making.parameters.preroll_s;
-        if counts(&state.target_along) != points(state.target_time) || counts(&state.along) != points(time) {
+        let (now, then) = (self.making.sequence.listing(time), self.making.sequence.listing(state.target_time));
+        if !state.along.take_listing(&now) || !state.target_along.take_listing(&then) {
             return Err(SnapshotError::Damaged);
         }
         self.state = state;

@@ -5,7 +5,9 @@ use bansho_base::{math::DVec2, phenomenon::SnapshotError};
 use super::{AuroraParticles, along::Along, population::NUMBERS, simulation::State};
 use crate::aurora::afterglow::{Afterglow, GlowMap};
 
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
+/// Counts below this are exact as times.
+const COUNTED: u64 = 1 << 53;
 
 /// Numbers that stand in a snapshot.
 trait Item: Copy {
@@ -94,13 +96,32 @@ pub(super) fn read(bytes: &[u8], like: &State) -> Result<State, SnapshotError> {
             red: read_map(&mut source, &like.afterglow.red)?,
         },
     };
-    if source.0.is_empty() && state.support_km > 0.0 { Ok(state) } else { Err(SnapshotError::Damaged) }
+    if source.0.is_empty() && is_possible(&state) { Ok(state) } else { Err(SnapshotError::Damaged) }
+}
+
+/// Whether a state has only numbers, and counts that can go on.
+fn is_possible(state: &State) -> bool {
+    let finite = |along: &Along| {
+        along.sheets.iter().flatten().all(|coordinate| coordinate.is_finite())
+            && along.points.iter().flatten().all(|point| point.is_finite())
+    };
+    let numbers = state.particles.numbers();
+    [state.steps, state.next_id].iter().all(|count| *count < COUNTED)
+        && u64::from(state.renewals) <= state.steps
+        && state.renewals < u32::MAX
+        && state.support_km.is_finite()
+        && state.support_km > 0.0
+        && state.target_time.is_finite()
+        && finite(&state.along)
+        && finite(&state.target_along)
+        && numbers.iter().all(|values| values.iter().all(|value| value.is_finite()))
 }
 
 fn write_along(bytes: &mut Vec<u8>, along: &Along) {
     (along.sheets.len() as u64).put(bytes);
-    for (coordinates, points) in along.sheets.iter().zip(&along.points) {
+    for ((coordinates, turned), points) in along.sheets.iter().zip(&along.turned).zip(&along.points) {
         put_list(bytes, coordinates);
+        put_list(bytes, &turned.iter().map(|turned| u8::from(*turned)).collect::<Vec<_>>());
         let flat: Vec<f64> = points.iter().flat_map(|point| point.to_array()).collect();
         put_list(bytes, &flat);
     }
@@ -109,10 +130,12 @@ fn write_along(bytes: &mut Vec<u8>, along: &Along) {
 fn read_along(source: &mut Source) -> Result<Along, SnapshotError> {
     let mut along = Along::default();
     for _ in 0..source.item::<u64>()? {
-        let (coordinates, flat) = (source.list::<f64>()?, source.list::<f64>()?);
-        if flat.len() != 2 * coordinates.len() {
+        let (coordinates, turned) = (source.list::<f64>()?, source.list::<u8>()?);
+        let flat = source.list::<f64>()?;
+        if flat.len() != 2 * coordinates.len() || turned.len() != coordinates.len() {
             return Err(SnapshotError::Damaged);
         }
+        along.turned.push(turned.iter().map(|turned| *turned != 0).collect());
         along.points.push(flat.chunks_exact(2).map(DVec2::from_slice).collect());
         along.sheets.push(coordinates);
     }

@@ -1,5 +1,7 @@
 //! Square cells over a part of the plane, and which of them a segment passes.
 
+use std::ops::Range;
+
 use bansho_base::math::DVec2;
 
 /// Cells in rows, from north-west.
@@ -34,6 +36,11 @@ impl CellGrid {
         self.low + DVec2::new(column, row) * self.cell
     }
 
+    /// Side of a cell.
+    pub(super) fn side(&self) -> f64 {
+        self.cell
+    }
+
     /// From the middle of a cell to its corners.
     pub(super) fn half_diagonal(&self) -> f64 {
         self.cell * std::f64::consts::FRAC_1_SQRT_2
@@ -45,23 +52,29 @@ impl CellGrid {
         (((coordinate - self.low[axis]) / self.cell) as usize).min(self.size[axis] - 1)
     }
 
-    /// Visits every cell that the segment from `a` to `b` passes within `margin`, and few others. Both ends must lie within the cells.
-    pub(super) fn for_each_passed(&self, a: DVec2, b: DVec2, margin: f64, mut visit: impl FnMut(usize)) {
-        let (left, right) = if a.x <= b.x { (a, b) } else { (b, a) };
-        let height_at = |x: f64| {
-            let share = ((x - left.x) / (right.x - left.x)).clamp(0.0, 1.0);
-            left.y + (right.y - left.y) * share
+    /// Visits every cell that the segment from `a` to `b` passes, and few others. Both ends must lie within the cells.
+    pub(super) fn for_each_passed(&self, a: DVec2, b: DVec2, mut visit: impl FnMut(usize)) {
+        self.for_each_run(a, b, 0.0, |run| run.for_each(&mut visit));
+    }
+
+    /// Visits the runs of cells, row by row, that the segment from `a` to `b` passes within `margin`, and few others. Both ends must lie within
+    /// the cells.
+    pub(super) fn for_each_run(&self, a: DVec2, b: DVec2, margin: f64, mut visit: impl FnMut(Range<usize>)) {
+        let (top, bottom) = if a.y <= b.y { (a, b) } else { (b, a) };
+        let place_at = |height: f64| {
+            let share = ((height - top.y) / (bottom.y - top.y)).clamp(0.0, 1.0);
+            top.x + (bottom.x - top.x) * share
         };
-        for column in self.line(0, left.x - margin)..=self.line(0, right.x + margin) {
-            let slab = self.low.x + column as f64 * self.cell;
-            let ends = if right.x > left.x {
-                [height_at(slab - margin), height_at(slab + self.cell + margin)]
+        for row in self.line(1, top.y - margin)..=self.line(1, bottom.y + margin) {
+            let slab = self.low.y + row as f64 * self.cell;
+            let ends = if bottom.y > top.y {
+                [place_at(slab - margin), place_at(slab + self.cell + margin)]
             } else {
-                [left.y, right.y]
+                [top.x, bottom.x]
             };
-            let top = self.line(1, ends[0].min(ends[1]) - margin);
-            let bottom = self.line(1, ends[0].max(ends[1]) + margin);
-            (top..=bottom).for_each(|row| visit(row * self.size[0] + column));
+            let left = self.line(0, ends[0].min(ends[1]) - margin);
+            let right = self.line(0, ends[0].max(ends[1]) + margin);
+            visit(row * self.size[0] + left..row * self.size[0] + right + 1);
         }
     }
 }
@@ -73,7 +86,7 @@ mod tests {
     fn passed(a: [f64; 2], b: [f64; 2], margin: f64) -> Vec<usize> {
         let grid = CellGrid::new(DVec2::ZERO, DVec2::splat(3.9), 1.0, 100);
         let mut cells = Vec::new();
-        grid.for_each_passed(a.into(), b.into(), margin, |cell| cells.push(cell));
+        grid.for_each_run(a.into(), b.into(), margin, |run| cells.extend(run));
         cells.sort_unstable();
         cells
     }

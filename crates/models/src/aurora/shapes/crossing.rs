@@ -1,5 +1,7 @@
 //! Where sheets cross: themselves or one another. Sheets of an aurora never do (thesis, 2.2.1).
 
+use std::collections::BTreeSet;
+
 use bansho_base::math::DVec2;
 
 use super::cells::CellGrid;
@@ -52,6 +54,16 @@ pub fn count_crossings<S: AsRef<[DVec2]>>(sheets: &[S]) -> usize {
     count
 }
 
+/// The sheets of which a segment passes through one of another or of its own.
+pub(super) fn crossing_sheets<S: AsRef<[DVec2]>>(sheets: &[S]) -> BTreeSet<usize> {
+    let mut found = BTreeSet::new();
+    for_each_meeting(sheets, Meeting::Proper, |pair| {
+        found.extend(pair.map(|segment| segment.sheet));
+        true
+    });
+    found
+}
+
 /// All segments that have a length, in order.
 fn segments<S: AsRef<[DVec2]>>(sheets: &[S]) -> Vec<Segment> {
     let mut list = Vec::new();
@@ -89,7 +101,7 @@ fn for_each_meeting<S: AsRef<[DVec2]>>(sheets: &[S], meeting: Meeting, mut visit
     let mut compared_with = vec![NONE; segments.len()];
     let mut met: Vec<u32> = Vec::new();
     for (index, segment) in segments.iter().enumerate() {
-        grid.for_each_passed(segment.ends[0], segment.ends[1], 0.0, |cell| {
+        grid.for_each_passed(segment.ends[0], segment.ends[1], |cell| {
             let mut link = heads[cell];
             while link != NONE {
                 let (other, next) = links[link as usize];

@@ -99,6 +99,16 @@ pub enum ShapeFaultKind {
         /// Most allowed.
         most: usize,
     },
+    /// More control points than can be followed.
+    #[error(
+        "all shapes up to this one have {found} control points together; allowed: up to {most} (fewer shapes or sheets, or a lower `control_points`)"
+    )]
+    TooManyPoints {
+        /// Control points of all shapes so far.
+        found: usize,
+        /// Most allowed.
+        most: usize,
+    },
     /// The first shape comes from nothing.
     #[error(
         "the first shape has none before it; `split`, `merge` and `link` stand at the shape that the change leads to"

@@ -14,6 +14,12 @@ use super::{
     warp::warp_through,
 };
 
+/// Control points nearer than this lie at one place, km.
+const SAME_KM: f64 = 1e-3;
+
+/// Control points of all shapes together that are followed at most: some 200 MB.
+const MOST_POINTS: usize = 4_000_000;
+
 /// Tracks, and which of them make up the sheets.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Followed {
@@ -26,27 +32,50 @@ pub(super) struct Followed {
     pub(super) gaps: Vec<Vec<Gap>>,
     /// Whether the last shape is the first again.
     pub(super) returns: bool,
+    /// Each track of the last shape that then lies where one of the first does, and that one, in order.
+    pub(super) again: Vec<[usize; 2]>,
 }
 
-/// Follows the control points through all shapes; `evenness` weighs even spacing against nearness where they are matched by place.
+/// The sheets of all shapes as they are drawn.
 ///
 /// # Errors
-/// A shape that cannot be drawn, or does not come from the one before.
-pub(super) fn follow(
+/// A shape that cannot be drawn.
+pub(super) fn drawn_shapes(
     shapes: &[ShapeParameters],
-    motion: &MotionParameters,
     extent_km: f64,
     assets: &dyn Assets,
+) -> Result<Vec<Vec<DrawnSheet>>, ShapeFault> {
+    let draw = |(shape, parameters)| drawn_sheets(parameters, Place { shape, extent_km }, assets);
+    shapes.iter().enumerate().map(draw).collect()
+}
+
+/// Follows the control points through all shapes, with what is drawn of them; `evenness` weighs even spacing against nearness where
+/// they are matched by place.
+///
+/// # Errors
+/// A shape that does not come from the one before; more control points than can be followed.
+pub(super) fn follow(
+    (shapes, drawn): (&[ShapeParameters], &[Vec<DrawnSheet>]),
+    motion: &MotionParameters,
+    extent_km: f64,
     evenness: f64,
 ) -> Result<Followed, ShapeFault> {
-    let draw = |(shape, parameters)| drawn_sheets(parameters, Place { shape, extent_km }, assets);
-    let drawn: Vec<Vec<DrawnSheet>> = shapes.iter().enumerate().map(draw).collect::<Result<_, _>>()?;
+    let mut count = 0;
+    for (index, sheets) in drawn.iter().enumerate() {
+        count += sheets.len() * motion.point_count();
+        check_count(count, index)?;
+    }
+    let in_order = motion.correspondence == Correspondence::DrawingOrder;
     let mut followed = Followed::default();
     followed.begin(&drawn[0], motion);
+    let mut count = followed.point_count(0);
     followed.returns = drawn.len() > 1 && same(&drawn[0], &drawn[drawn.len() - 1], extent_km);
+    if let Some(last) = shapes.last().filter(|_| in_order) {
+        // There the drawing shows the sheets before they part or join.
+        followed.returns &= last.split.is_empty() && last.merge.is_empty();
+    }
     for (index, parameters) in shapes.iter().enumerate().skip(1) {
         let mut change = Change::new(parameters, index, &followed.shapes[index - 1], &mut followed.tracks)?;
-        let in_order = motion.correspondence == Correspondence::DrawingOrder;
         let expected = if in_order { followed.shapes[index - 1].len() } else { change.chains.len() };
         if drawn[index].len() != expected {
             let kind = ShapeFaultKind::Unmatched { found: drawn[index].len(), expected };
@@ -66,8 +95,21 @@ pub(super) fn follow(
         }
         followed.gaps.push(change.gaps());
         followed.strands.push(change.strands);
+        // Sheets that have grown together keep all of their points.
+        count += followed.point_count(index);
+        check_count(count, index)?;
+    }
+    if followed.returns {
+        followed.again = followed.meeting_again();
     }
     Ok(followed)
+}
+
+/// Refuses more control points of all shapes up to shape `index` than can be held.
+fn check_count(found: usize, index: usize) -> Result<(), ShapeFault> {
+    let kind = ShapeFaultKind::TooManyPoints { found, most: MOST_POINTS };
+    let fault = || ShapeFault { key: format!("shapes.{index}.sheets"), kind };
+    if found > MOST_POINTS { Err(fault()) } else { Ok(()) }
 }
 
 /// Where a chain of strands goes.
@@ -115,6 +157,26 @@ fn control_knots(sheet: &DrawnSheet, count: usize, motion: &MotionParameters) ->
 }
 
 impl Followed {
+    /// Control points of a shape.
+    fn point_count(&self, shape: usize) -> usize {
+        self.shapes[shape].iter().map(Vec::len).sum()
+    }
+
+    /// Each track of the last shape that lies where one of the first does, point by point of the sheets as they are drawn.
+    fn meeting_again(&self) -> Vec<[usize; 2]> {
+        let last = self.shapes.len() - 1;
+        let same_count = |(first, last): &(&Vec<usize>, &Vec<usize>)| first.len() == last.len();
+        let sheets = self.shapes[0].iter().zip(&self.shapes[last]).filter(same_count);
+        let pairs = sheets.flat_map(|(firsts, lasts)| lasts.iter().zip(firsts).map(|(&last, &first)| [last, first]));
+        let meets = |pair: &[usize; 2]| {
+            let [there, here] = [self.tracks[pair[0]].knot(last), self.tracks[pair[1]].knot(0)];
+            there.position.distance(here.position) < SAME_KM
+        };
+        let mut pairs: Vec<[usize; 2]> = pairs.filter(meets).collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
     /// The first shape.
     fn begin(&mut self, drawn: &[DrawnSheet], motion: &MotionParameters) {
         let mut sheets = Vec::new();

@@ -1,14 +1,25 @@
 //! Which sheet becomes which, found from where they lie (thesis, chapter 4, asks for it).
 
+use std::collections::BTreeSet;
+
 use bansho_base::math::DVec2;
 
-use super::{assignment::assign, crossing::count_crossings, polyline::Polyline};
+use super::{
+    assignment::assign,
+    crossing::{count_crossings, crossing_sheets},
+    polyline::Polyline,
+};
 
 /// Points by which sheets are compared.
 const SAMPLES: usize = 32;
 
 /// Moments of the way at which sheets should not cross.
 const MOMENTS: [f64; 3] = [0.25, 0.5, 0.75];
+
+/// Sheets that are looked at for crossings in all tries of turns and exchanges together, for about a second. Of few sheets all are tried.
+const MOST_LOOKS: usize = 60_000;
+/// Share of the tries in which one change is looked for.
+const PER_CHANGE: usize = 8;
 
 /// The target of a sheet, and whether it was drawn the other way round.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,7 +69,7 @@ pub(super) fn match_sheets(sources: &[Polyline], targets: &[&Polyline], wanted: 
     });
     let matched = |(source, target): (usize, usize)| Match { target, reversed: best[source * count + target].1 };
     let found = columns.into_iter().enumerate().map(matched).collect();
-    comparison.untangled(found)
+    comparison.untangled(found).0
 }
 
 impl Comparison<'_> {
@@ -83,55 +94,84 @@ impl Comparison<'_> {
         if turned < straight { (turned, true) } else { (straight, false) }
     }
 
-    fn crossings(&self, matches: &[Match]) -> usize {
-        let at = |share: f64| {
-            let sheet = |(source, of): (&Vec<DVec2>, &Match)| -> Vec<DVec2> {
-                source.iter().zip(self.target(*of)).map(|(from, to)| from.lerp(to, share)).collect()
-            };
-            let sheets: Vec<Vec<DVec2>> = self.sources.iter().zip(matches).map(sheet).collect();
-            count_crossings(&sheets)
+    /// The sheets at a share of the way.
+    fn on_the_way(&self, matches: &[Match], share: f64) -> Vec<Vec<DVec2>> {
+        let sheet = |(source, of): (&Vec<DVec2>, &Match)| -> Vec<DVec2> {
+            source.iter().zip(self.target(*of)).map(|(from, to)| from.lerp(to, share)).collect()
         };
-        MOMENTS.into_iter().map(at).sum()
+        self.sources.iter().zip(matches).map(sheet).collect()
+    }
+
+    fn crossings(&self, matches: &[Match]) -> usize {
+        MOMENTS.into_iter().map(|share| count_crossings(&self.on_the_way(matches, share))).sum()
+    }
+
+    /// The sheets that cross others or themselves.
+    fn crossed(&self, matches: &[Match]) -> BTreeSet<usize> {
+        MOMENTS.into_iter().flat_map(|share| crossing_sheets(&self.on_the_way(matches, share))).collect()
     }
 
     fn cost(&self, matches: &[Match]) -> (usize, f64) {
-        let motion = matches.iter().enumerate().map(|(source, of)| self.motion(source, *of)).sum();
-        (self.crossings(matches), motion)
+        (self.crossings(matches), self.all_motion(matches))
     }
 
-    /// Turns one or exchanges two as long as fewer cross, or as many with less motion.
-    fn untangled(&self, mut matches: Vec<Match>) -> Vec<Match> {
+    fn all_motion(&self, matches: &[Match]) -> f64 {
+        matches.iter().enumerate().map(|(source, of)| self.motion(source, *of)).sum()
+    }
+
+    /// Turns one or exchanges two as long as fewer cross, or as many with less motion; and how many such changes were tried.
+    fn untangled(&self, mut matches: Vec<Match>) -> (Vec<Match>, usize) {
         let less = |a: (usize, f64), b: (usize, f64)| a.0 < b.0 || (a.0 == b.0 && a.1 < b.1 * (1.0 - 1e-12));
-        let mut cost = self.cost(&matches);
-        while cost.0 > 0 {
-            let allowed = |other: &Vec<Match>| other.iter().zip(self.wanted).all(|(of, wanted)| wanted.allows(*of));
-            let candidates = self.neighbours(&matches).into_iter().filter(allowed);
-            let candidates = candidates.map(|other| (self.cost(&other), other));
+        let most = MOST_LOOKS / matches.len().max(1);
+        let (mut cost, mut tries) = (self.cost(&matches), 0);
+        while cost.0 > 0 && tries < most {
+            let candidates = self.nearest_neighbours(&matches, (most / PER_CHANGE).min(most - tries));
+            tries += candidates.len();
+            let candidates = candidates.into_iter().map(|other| (self.cost(&other), other));
             let best = candidates.reduce(|a, b| if less(b.0, a.0) { b } else { a });
             match best {
                 Some((better, other)) if less(better, cost) => (cost, matches) = (better, other),
                 _ => break,
             }
         }
-        matches
+        (matches, tries)
     }
 
-    /// All matches with one sheet turned or two exchanged.
-    fn neighbours(&self, matches: &[Match]) -> Vec<Vec<Match>> {
-        let mut neighbours = Vec::new();
+    /// Up to `most` matches with a sheet that crosses turned, or exchanged with another, that are allowed: those that move least.
+    /// Two that cross nothing take no crossing away.
+    fn nearest_neighbours(&self, matches: &[Match], most: usize) -> Vec<Vec<Match>> {
+        let crossed = self.crossed(matches);
+        let mut changes = Vec::new();
         for one in 0..matches.len() {
-            let mut turned = matches.to_vec();
-            turned[one].reversed = !turned[one].reversed;
-            neighbours.push(turned);
-            for other in 0..one {
-                let mut exchanged = matches.to_vec();
-                for (source, target) in [(one, matches[other].target), (other, matches[one].target)] {
-                    exchanged[source] = Match { target, reversed: self.best(source, target).1 };
-                }
-                neighbours.push(exchanged);
-            }
+            let pairs = (0..=one).filter(|other| crossed.contains(&one) || crossed.contains(other));
+            let allowed = pairs
+                .map(|other| self.change(matches, [one, other]))
+                .filter(|change| change.iter().all(|(source, of)| self.wanted[*source].allows(*of)));
+            changes.extend(allowed);
         }
-        neighbours
+        let more = |change: &[(usize, Match); 2]| -> f64 {
+            change.iter().map(|(source, of)| self.motion(*source, *of) - self.motion(*source, matches[*source])).sum()
+        };
+        if changes.len() > most {
+            changes.sort_by(|a, b| more(a).total_cmp(&more(b)));
+            changes.truncate(most);
+        }
+        let changed = |change: [(usize, Match); 2]| {
+            let mut all = matches.to_vec();
+            change.into_iter().for_each(|(source, of)| all[source] = of);
+            all
+        };
+        changes.into_iter().map(changed).collect()
+    }
+
+    /// What two sheets become where they exchange their targets, or a sheet where it is turned.
+    fn change(&self, matches: &[Match], [one, other]: [usize; 2]) -> [(usize, Match); 2] {
+        if one == other {
+            let of = matches[one];
+            return [(one, Match { reversed: !of.reversed, ..of }); 2];
+        }
+        [(one, matches[other].target), (other, matches[one].target)]
+            .map(|(source, target)| (source, Match { target, reversed: self.best(source, target).1 }))
     }
 }
 
@@ -177,24 +217,43 @@ mod tests {
         assert_eq!(matches(&sources, &targets), [(0, false), (1, false)]);
     }
 
-    /// A sheet that turns a quarter while another passes its end: the two ways round move equally far, but one sweeps through.
+    /// A sheet turns a quarter about one of its ends or the other: the first moves it less, but through another.
     #[test]
     fn sheets_that_would_cross_midway_are_turned() {
-        let sources = [line([0.0, 0.0], [10.0, 0.0]), line([-1.0, 4.0], [-1.0, 9.0])];
-        let targets = [line([0.0, 10.1], [0.0, 0.0]), line([-1.0, 4.0], [-1.0, 9.0])];
-        let lines: Vec<&Polyline> = targets.iter().collect();
+        let sources = [line([0.0, 0.0], [10.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])];
+        let targets = [line([1.0, 10.0], [0.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])];
         let wanted = [Wanted::default(); 2];
-        let found = match_sheets(&sources, &lines, &wanted);
-        let comparison = |matches: &[Match]| {
-            let sampled = |line: &Polyline| line.evenly(SAMPLES);
-            Comparison {
-                wanted: &wanted,
-                sources: sources.iter().map(sampled).collect(),
-                targets: targets.iter().map(sampled).collect(),
-                lengths: [vec![1.0; 2], vec![1.0; 2]],
-            }
-            .crossings(matches)
-        };
-        assert_eq!(comparison(&found), 0);
+        let found = match_sheets(&sources, &targets.iter().collect::<Vec<_>>(), &wanted);
+        let comparison = comparison(&sources, &targets, &wanted);
+        let through = [Match { target: 0, reversed: true }, Match { target: 1, reversed: false }];
+        assert!(comparison.best(0, 0).1 && comparison.crossings(&through) > 0);
+        assert_eq!(comparison.crossings(&found), 0);
+    }
+
+    fn comparison<'a>(sources: &[Polyline], targets: &[Polyline], wanted: &'a [Wanted]) -> Comparison<'a> {
+        let sampled = |line: &Polyline| line.evenly(SAMPLES);
+        Comparison {
+            wanted,
+            sources: sources.iter().map(sampled).collect(),
+            targets: targets.iter().map(sampled).collect(),
+            lengths: [vec![1.0; sources.len()], vec![1.0; targets.len()]],
+        }
+    }
+
+    /// The same beside very many sheets that stay: only what the two could become is looked at.
+    #[test]
+    fn a_crossing_among_many_sheets_takes_few_tries() {
+        const MANY: usize = 200;
+        let rows = || (0..MANY).map(|row| line([30.0, row as f64], [40.0, row as f64]));
+        let with_rows = |two: [Polyline; 2]| two.into_iter().chain(rows()).collect::<Vec<_>>();
+        let sources = with_rows([line([0.0, 0.0], [10.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])]);
+        let targets = with_rows([line([1.0, 10.0], [0.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])]);
+        let wanted = vec![Wanted::default(); MANY + 2];
+        let comparison = comparison(&sources, &targets, &wanted);
+        let through: Vec<Match> = (0..MANY + 2).map(|target| Match { target, reversed: target == 0 }).collect();
+        assert!(comparison.crossings(&through) > 0);
+        let (found, tries) = comparison.untangled(through);
+        assert_eq!(comparison.crossings(&found), 0);
+        assert!(tries > 0 && tries <= MOST_LOOKS / (MANY + 2) / PER_CHANGE, "{tries} tries");
     }
 }

@@ -38,6 +38,7 @@ pub use parameters::{
 };
 pub(in crate::aurora) use polyline::lengths;
 pub use segments::{Sample, Segments};
+pub(in crate::aurora) use sequence::Listing;
 pub use sequence::Sequence;
 pub use shape::{Shape, Sheet};
 

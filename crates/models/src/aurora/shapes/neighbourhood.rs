@@ -8,6 +8,8 @@ use super::{Shape, cells::CellGrid};
 const CELLS_PER_REACH: f64 = 4.0;
 /// Most cells along a side.
 const MOST_CELLS: usize = 512;
+/// About as many cells as lie within the reach at most, so that long shapes cost no more than their segments do.
+const MOST_WITHIN: f64 = 40_000.0;
 
 /// Segments of a shape by the cells to whose places they can be nearest.
 #[derive(Clone, Debug)]
@@ -53,10 +55,11 @@ impl Neighbourhood {
         let grid = if segments.is_empty() {
             CellGrid::new(DVec2::ZERO, DVec2::ZERO, 1.0, 1)
         } else {
-            CellGrid::new(low - reach, high + reach, reach / CELLS_PER_REACH, MOST_CELLS)
+            let area = 2.0 * reach * (shape.length() + reach);
+            let cell = (reach / CELLS_PER_REACH).max((area / MOST_WITHIN).sqrt());
+            CellGrid::new(low - reach, high + reach, cell, MOST_CELLS)
         };
-        let (starts, lists) = within(&grid, &segments, reach);
-        let (starts, lists) = nearest_ones(&grid, &starts, &lists);
+        let (starts, lists) = nearest_ones(&grid, &segments, reach);
         Self { reach, grid, starts, lists }
     }
 
@@ -92,44 +95,56 @@ impl Neighbourhood {
     }
 }
 
-/// The segments within `reach` of each cell, one cell's after those of another, and where each cell's begin.
-fn within(grid: &CellGrid, segments: &[Segment], reach: f64) -> (Vec<u32>, Vec<Segment>) {
-    let mut starts = vec![0_u32; grid.count() + 1];
-    let for_each = |segment: &Segment, visit: &mut dyn FnMut(usize)| {
-        grid.for_each_passed(segment.start, segment.start + segment.way, reach, visit);
+/// A run of cells that a segment passes near by.
+struct Run {
+    segment: u32,
+    /// Its first cell, and the place of its distance in the list of all.
+    cell: u32,
+    first: u32,
+}
+
+/// The segments that can be nearest to a place within `reach` in each cell, one cell's after those of another, and where each cell's begin:
+/// those no farther from its middle than the nearest one by more than twice the way from there to its corners.
+fn nearest_ones(grid: &CellGrid, segments: &[Segment], reach: f64) -> (Vec<u32>, Vec<Segment>) {
+    let (mut runs, mut squares) = (Vec::new(), Vec::new());
+    let mut least = vec![f32::INFINITY; grid.count()];
+    for (number, segment) in segments.iter().enumerate() {
+        grid.for_each_run(segment.start, segment.start + segment.way, reach, |cells| {
+            let (cell, first) = (cells.start, squares.len());
+            runs.push(Run { segment: number as u32, cell: cell as u32, first: first as u32 });
+            squares.resize(first + cells.len(), 0.0);
+            segment.fill_squares(grid.middle(cell), grid.side(), &mut squares[first..]);
+            for (least, square) in least[cells].iter_mut().zip(&squares[first..]) {
+                *least = if *square < *least { *square } else { *least };
+            }
+        });
+    }
+    // A little more, so that rounding loses nothing.
+    let slack = (2.0 * 1.001 * grid.half_diagonal()) as f32;
+    let most: Vec<f32> = least.iter().map(|least| (least.sqrt() + slack) * (least.sqrt() + slack)).collect();
+    let ends = runs.iter().skip(1).map(|run| run.first as usize).chain([squares.len()]);
+    let for_each_kept = |visit: &mut dyn FnMut(usize, u32)| {
+        for (run, end) in runs.iter().zip(ends.clone()) {
+            let distances = &squares[run.first as usize..end];
+            for (cell, square) in (run.cell as usize..).zip(distances) {
+                if *square <= most[cell] {
+                    visit(cell, run.segment);
+                }
+            }
+        }
     };
-    segments.iter().for_each(|segment| for_each(segment, &mut |cell| starts[cell + 1] += 1));
+    let mut starts = vec![0_u32; grid.count() + 1];
+    for_each_kept(&mut |cell, _| starts[cell + 1] += 1);
     for cell in 0..grid.count() {
         starts[cell + 1] += starts[cell];
     }
-    let mut ends = starts.clone();
+    let mut next = starts.clone();
     let mut lists = vec![Segment::new(0, DVec2::ZERO, DVec2::ZERO); starts[grid.count()] as usize];
-    for segment in segments {
-        for_each(segment, &mut |cell| {
-            lists[ends[cell] as usize] = *segment;
-            ends[cell] += 1;
-        });
-    }
+    for_each_kept(&mut |cell, segment| {
+        lists[next[cell] as usize] = segments[segment as usize];
+        next[cell] += 1;
+    });
     (starts, lists)
-}
-
-/// Those of each cell that can be nearest to a place in it: no farther from its middle than the nearest one by more than twice the way from
-/// there to its corners.
-fn nearest_ones(grid: &CellGrid, starts: &[u32], lists: &[Segment]) -> (Vec<u32>, Vec<Segment>) {
-    // A little more, so that rounding loses nothing.
-    let slack = 2.0 * 1.001 * grid.half_diagonal();
-    let (mut kept_starts, mut kept) = (vec![0], Vec::new());
-    for (cell, ends) in starts.windows(2).enumerate() {
-        let list = &lists[ends[0] as usize..ends[1] as usize];
-        if !list.is_empty() {
-            let middle = grid.middle(cell);
-            let distance = |segment: &Segment| segment.distance_squared(middle).sqrt();
-            let most = list.iter().map(distance).fold(f64::INFINITY, f64::min) + slack;
-            kept.extend(list.iter().filter(|segment| distance(segment) <= most));
-        }
-        kept_starts.push(kept.len() as u32);
-    }
-    (kept_starts, kept)
 }
 
 impl Segment {
@@ -139,8 +154,21 @@ impl Segment {
         Self { number, start, way: end - start, inverse_square }
     }
 
+    /// Squares of the distances from places in a row, so far from each other, of which the first is given.
+    fn fill_squares(&self, first: DVec2, apart: f64, squares: &mut [f32]) {
+        let from_start = first - self.start;
+        let ([x, y], [u, v]) = ([from_start.x as f32, from_start.y as f32], [self.way.x as f32, self.way.y as f32]);
+        let (apart, per_square) = (apart as f32, self.inverse_square.min(f64::from(f32::MAX)) as f32);
+        for (place, square) in squares.iter_mut().enumerate() {
+            let x = x + apart * place as f32;
+            let share = ((x * u + y * v) * per_square).clamp(0.0, 1.0);
+            let (beside, below) = (x - share * u, y - share * v);
+            *square = beside * beside + below * below;
+        }
+    }
+
     /// Square of the distance from a point.
-    #[inline]
+    #[cfg(test)]
     fn distance_squared(&self, point: DVec2) -> f64 {
         let from_start = point - self.start;
         let share = (from_start.dot(self.way) * self.inverse_square).clamp(0.0, 1.0);

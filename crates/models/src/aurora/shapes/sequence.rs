@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::{
     Correspondence, FRAME_S, MotionParameters, Shape, ShapeFault, ShapeFaultKind, ShapeParameters, Sheet,
-    follow::{Followed, follow},
+    follow::{Followed, drawn_shapes, follow},
     gap::{self, Bridge, Gap},
     parameters::TRANSITION_S,
     passing::passes,
@@ -33,6 +33,31 @@ pub struct Sequence {
     /// The shape on whose way sheets first pass through each other.
     crossing: Option<usize>,
     loop_s: Option<f64>,
+}
+
+/// The control points of the shape at a time: one that goes on keeps its number, whichever sheet it is listed in and where.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::aurora) struct Listing<'a> {
+    /// Their numbers, sheet by sheet.
+    pub(in crate::aurora) sheets: &'a [Vec<usize>],
+    /// How many turns of a loop are over in which all shapes are passed; then those of the last shape are those of the first again.
+    pub(in crate::aurora) turn: i64,
+    /// Each of the last shape that lies where one of the first does, and that one, in order.
+    again: &'a [[usize; 2]],
+}
+
+impl<'a> Listing<'a> {
+    /// Control points without a sequence.
+    #[cfg(test)]
+    pub(in crate::aurora) fn alone(sheets: &'a [Vec<usize>]) -> Self {
+        Self { sheets, turn: 0, again: &[] }
+    }
+
+    /// What a control point becomes when a turn of the loop is over.
+    pub(in crate::aurora) fn after_turn(&self, track: usize) -> Option<usize> {
+        let index = self.again.binary_search_by_key(&track, |pair| pair[0]).ok()?;
+        Some(self.again[index][1])
+    }
 }
 
 /// A time among the shapes: at one of them, or at a share of the way from one to the next.
@@ -62,13 +87,14 @@ impl Sequence {
         let usual = super::usual::shapes(extent_km);
         let shapes = if shapes.is_empty() { &usual[..] } else { shapes };
         let timing = timing(shapes)?;
+        let drawn = drawn_shapes(shapes, extent_km, assets)?;
         let sequence = |evenness: f64| {
-            let mut followed = follow(shapes, motion, extent_km, assets, evenness)?;
+            let mut followed = follow((shapes, &drawn), motion, extent_km, evenness)?;
             let closed = loop_s.is_some() && followed.returns;
             find_velocities(&mut followed.tracks, &timing, closed);
             let sequence =
                 Self { followed, timing: timing.clone(), half_km: extent_km / 2.0, crossing: None, loop_s: None };
-            Ok((sequence.crossings(CHECKED_MOMENTS * shapes.len()), sequence))
+            Ok((sequence.crossings(), sequence))
         };
         let mut best = sequence(EVENNESS[0])?;
         let by_place = motion.correspondence == Correspondence::Automatic;
@@ -81,7 +107,7 @@ impl Sequence {
                 best = other;
             }
         }
-        let crossing = best.1.first_crossing(CHECKED_MOMENTS * shapes.len());
+        let crossing = best.1.first_crossing();
         Ok(Self { loop_s, crossing, ..best.1 })
     }
 
@@ -112,6 +138,16 @@ impl Sequence {
             }
         }
         shape
+    }
+
+    /// Who the control points of [`Self::at`] are that time.
+    pub(in crate::aurora) fn listing(&self, t: f64) -> Listing<'_> {
+        let sheets = match self.moment(t) {
+            Moment::At(index) => &self.followed.shapes[index],
+            Moment::Between(index, _) => &self.followed.strands[index],
+        };
+        let turns = self.loop_s.filter(|_| self.followed.returns).map_or(0.0, |loop_s| (t / loop_s).floor());
+        Listing { sheets, turn: turns as i64, again: &self.followed.again }
     }
 
     /// What passes over narrow gaps between the sheets of [`Self::at`] that time.
@@ -167,10 +203,20 @@ impl Sequence {
         strands.map(|strand| strand.iter().map(way).collect()).collect()
     }
 
-    /// How many segments cross in the in-between shapes at `count` evenly spaced times, all added up.
-    pub fn crossings(&self, count: usize) -> usize {
-        let step = self.duration() / count.max(1) as f64;
-        (0..count).into_par_iter().map(|index| self.at((index as f64 + 0.5) * step).crossings()).sum()
+    /// The times at which sheets are looked at on their way from each shape to the next, s, and the shape from which that leads.
+    fn checked_times(&self) -> Vec<(usize, f64)> {
+        let Timing { arrivals, departures } = &self.timing;
+        let of_way = |index: usize| {
+            let span = arrivals[index + 1] - departures[index];
+            let share = |moment: usize| (moment as f64 + 0.5) / CHECKED_MOMENTS as f64;
+            (0..CHECKED_MOMENTS).map(move |moment| (index, departures[index] + share(moment) * span))
+        };
+        (0..arrivals.len() - 1).flat_map(of_way).collect()
+    }
+
+    /// How many segments cross in the in-between shapes at those times, all added up.
+    fn crossings(&self) -> usize {
+        self.checked_times().into_par_iter().map(|(_, time)| self.at(time).crossings()).sum()
     }
 
     /// The shape of the scene, counted from 0, on whose way sheets first pass through each other or themselves, where they do.
@@ -178,12 +224,10 @@ impl Sequence {
         self.crossing
     }
 
-    /// The same, at `count` evenly spaced times.
-    fn first_crossing(&self, count: usize) -> Option<usize> {
-        let step = self.duration() / count.max(1) as f64;
+    /// The same, as it is found.
+    fn first_crossing(&self) -> Option<usize> {
         let mut before: Option<(usize, Shape)> = None;
-        for time in (0..count).map(|index| (index as f64 + 0.5) * step) {
-            let Moment::Between(index, _) = self.moment(time) else { continue };
+        for (index, time) in self.checked_times() {
             let now = self.at(time);
             let passes = before.as_ref().is_some_and(|(from, before)| *from == index && passes(before, &now));
             if passes || now.crossings() > 0 {

@@ -130,7 +130,12 @@ fn sheets_have_the_order_in_which_they_were_drawn() {
     let last = points(&sequence.at(4.0));
     assert_eq!((last[0][0], last[1][0]), ([200.0, 110.0], [-200.0, 10.0]));
     let half = sequence.at(2.0);
-    assert!(half.sheets.iter().all(|sheet| sheet.points.iter().all(|point| (point.y - 5.0) % 100.0 < 1e-9)));
+    // Each on its own half of the way: at 5 or at 105 km.
+    let off = |point: &DVec2| {
+        let rest = (point.y - 5.0).rem_euclid(100.0);
+        rest.min(100.0 - rest)
+    };
+    assert!(half.sheets.iter().all(|sheet| sheet.points.iter().all(|point| off(point) < 1e-9)));
 }
 
 #[test]
@@ -288,6 +293,54 @@ fn a_shape_that_returns_with_another_flux_is_another() {
 fn sheets_that_exchange_places_are_known_to_cross() {
     assert_eq!(linked(vec![]).unwrap().crossing(), None);
     assert_eq!(linked(vec![link(1, 2, None)]).unwrap().crossing(), Some(1));
+}
+
+/// Crossings are looked for on the way, however long shapes are held.
+#[test]
+fn sheets_that_cross_are_known_to_however_long_shapes_stay() {
+    let sheets = vec![straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 50.0)];
+    for hold_s in [300.0, 600.0, 1e5] {
+        let first = ShapeParameters { hold_s, ..shape(sheets.clone()) };
+        let second = ShapeParameters { link: vec![link(1, 2, None)], hold_s, ..shape(sheets.clone()) };
+        let stays = [first.clone(), ShapeParameters { link: vec![], ..second.clone() }];
+        let motion = MotionParameters { control_points: Auto::Set(11), ..MotionParameters::default() };
+        assert_eq!(sequence(&[first, second], &motion).crossing(), Some(1), "held {hold_s} s");
+        assert_eq!(sequence(&stays, &motion).crossing(), None);
+    }
+}
+
+/// In drawing order the last drawing is that before the split: what it becomes is not the first shape.
+#[test]
+fn a_loop_in_drawing_order_does_not_end_where_a_sheet_has_split() {
+    let [one, other] = [0.0, 80.0].map(|z| shape(vec![straight(0.0, 90.0, z)]));
+    let mut split = one.clone();
+    split.split = vec![SplitParameters { segment: Some(2), ..SplitParameters::default() }];
+    let [merged, parted] = [0.0, 80.0].map(|z| shape(vec![straight(0.0, 30.0, z), straight(60.0, 90.0, z)]));
+    let mut merge = merged.clone();
+    merge.merge = vec![MergeParameters::default()];
+    for shapes in [vec![one.clone(), other.clone(), split], vec![merged, parted, merge]] {
+        let looped =
+            Sequence::new(&begun(&shapes), &in_order(4), EXTENT_KM, &MemoryAssets::default(), Some(9.0)).unwrap();
+        for time in [9.0, 4.5] {
+            assert!(apart(&looped.at(time - 1e-6), &looped.at(time + 1e-6)) < 1e-3, "at {time} s");
+        }
+        assert!(apart(&looped.at(0.0), &looped.at(9.0)) < 1e-3);
+    }
+    // Without it the loop goes round: at half of its time it is at the other shape.
+    let round = [one.clone(), other, one];
+    let looped = Sequence::new(&begun(&round), &in_order(4), EXTENT_KM, &MemoryAssets::default(), Some(8.0)).unwrap();
+    assert!((looped.at(4.0).sheets[0].points[0].y - 80.0).abs() < 1e-6);
+}
+
+#[test]
+fn more_control_points_than_can_be_held_are_refused() {
+    let row =
+        |index: usize| SheetParameters { copies: 32, spacing_km: 1.0, ..straight(-200.0, 200.0, 33.0 * index as f64) };
+    let full = shape((0..8).map(row).collect());
+    let motion = MotionParameters { control_points: Auto::Set(512), ..MotionParameters::default() };
+    let fault = Sequence::new(&begun(&vec![full; 32]), &motion, EXTENT_KM, &MemoryAssets::default(), None).unwrap_err();
+    assert_eq!(fault.key, "shapes.30.sheets");
+    assert_eq!(fault.kind, ShapeFaultKind::TooManyPoints { found: 31 * 256 * 512, most: 4_000_000 });
 }
 
 /// Two sheets that stay where they are, with links to the second shape.

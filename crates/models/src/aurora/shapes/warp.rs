@@ -1,9 +1,11 @@
 //! Points along two lines that belong together: by length along them, and by nearness (thesis, chapter 4, asks for it).
 
-use bansho_base::math::DVec2;
+use bansho_base::math::{DVec2, lerp};
 
-use super::polyline::Polyline;
+use super::polyline::{Polyline, shares};
 
+/// Points that are looked at one by one: those of two sheets of the most control points that have grown together.
+const MOST_POINTS: usize = 1024;
 /// Places on the target between two control points where they lie evenly.
 const FINE: usize = 8;
 /// Fewest and most such places from one control point to the next.
@@ -65,6 +67,24 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
     shares
 }
 
+/// As [`warp`], whose cost grows with the square of the points, through no more than [`MOST_POINTS`] of them, evenly chosen; those
+/// between keep their share of the way from one of these to the next.
+fn warp_thinned(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: f64) -> Vec<f64> {
+    let last = points.len() - 1;
+    if points.len() <= MOST_POINTS {
+        return warp(points, target, range, evenness);
+    }
+    let chosen: Vec<usize> = (0..MOST_POINTS).map(|index| index * last / (MOST_POINTS - 1)).collect();
+    let few: Vec<DVec2> = chosen.iter().map(|&point| points[point]).collect();
+    let found = warp(&few, target, range, evenness);
+    let mut all = vec![found[0]];
+    for (ends, shares_at) in chosen.windows(2).zip(found.windows(2)) {
+        let between = shares(&points[ends[0]..=ends[1]]);
+        all.extend(between[1..].iter().map(|&share| lerp(shares_at[0], shares_at[1], share)));
+    }
+    all
+}
+
 /// As [`warp`], but each of `anchors`, a point and its share, arrives there; both are in order along the points.
 pub(super) fn warp_through(
     points: &[DVec2],
@@ -77,7 +97,7 @@ pub(super) fn warp_through(
     let mut start = 0;
     for (end, share) in anchors.iter().copied().chain([(points.len() - 1, range[1])]) {
         let part = [shares[start], share];
-        shares.extend(&warp(&points[start..=end], target, part, evenness)[1..]);
+        shares.extend(&warp_thinned(&points[start..=end], target, part, evenness)[1..]);
         start = end;
     }
     shares
@@ -122,6 +142,20 @@ mod tests {
         assert_eq!((shares.len(), shares[0], shares[3], shares[8], shares[10]), (11, 0.0, 0.5, 0.75, 1.0));
         assert!(shares.windows(2).all(|pair| pair[1] > pair[0]), "{shares:?}");
         assert_eq!(warp_through(&points, &target, [0.0, 1.0], &[], 0.01), warp(&points, &target, [0.0, 1.0], 0.01));
+    }
+
+    /// Sheets that have grown together again and again: all points at once would take 80 GB.
+    #[test]
+    fn very_many_points_go_by_some_of_them() {
+        let mut points = straight(0.0, 310.0, 100_000);
+        let target = Polyline::new(straight(0.0, 310.0, 32)).unwrap();
+        let whole = warp_through(&points, &target, [0.0, 1.0], &[], 0.01);
+        assert!(whole.iter().enumerate().all(|(i, share)| (share - i as f64 / 99_999.0).abs() < 2e-4));
+        // Those between go along: nothing is passed by.
+        points.iter_mut().for_each(|point| point.x *= (point.x / 310.0) * (point.x / 310.0));
+        let uneven = warp_through(&points, &target, [0.25, 0.75], &[(40_000, 0.5)], 0.01);
+        assert_eq!((uneven.len(), uneven[0], uneven[40_000], uneven[99_999]), (100_000, 0.25, 0.5, 0.75));
+        assert!(uneven.windows(2).all(|pair| pair[1] >= pair[0]));
     }
 
     #[test]

@@ -156,6 +156,13 @@ pub(crate) enum Texture {
 }
 
 impl Texture {
+    /// Texels to a unit of u and of w, of the finer layer.
+    #[inline(always)]
+    pub(crate) fn texels(&self) -> [f32; 2] {
+        let (Self::Single(_, fine) | Self::Mixed(_, [_, fine])) = self;
+        [fine.columns[0].abs(), fine.rows[0].abs()]
+    }
+
     /// T0 at sixteen places; in [0, 1].
     #[inline(always)]
     pub(crate) fn sample<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {

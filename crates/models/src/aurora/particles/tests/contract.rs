@@ -55,10 +55,51 @@ fn what_is_no_snapshot_is_refused_and_changes_nothing() {
     let longer: Vec<u8> = bytes.iter().copied().chain([0]).collect();
     assert_eq!(refused(&mut simulation, &longer), SnapshotError::Damaged);
     let other = [&[9, 0, 0, 0], &bytes[4..]].concat();
-    assert_eq!(refused(&mut simulation, &other), SnapshotError::Version { found: 9, known: 2 });
+    assert_eq!(refused(&mut simulation, &other), SnapshotError::Version { found: 9, known: 3 });
     let mut elsewhere = super::simulation(AuroraParameters { shapes: becoming(Form::Peel), ..small() });
     assert_eq!(refused(&mut elsewhere, &bytes), SnapshotError::Damaged, "the usual shapes have two sheets");
     assert!(simulation.snapshot() == bytes);
+}
+
+#[test]
+fn a_snapshot_holds_numbers_only() {
+    let mut simulation = simulation(small());
+    simulation.step();
+    let bytes = simulation.snapshot();
+    let count = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()) as usize;
+    // Behind version, steps, next number, support, time and renewals: the two courses of the coordinate, each with coordinates, ways and
+    // places of every sheet.
+    let (mut at, mut starts) = (40, Vec::new());
+    for _ in 0..2 {
+        let sheets = count(at);
+        at += 8;
+        for _ in 0..sheets {
+            for size in [8, 1, 8] {
+                starts.push(at + 8);
+                at += 8 + size * count(at);
+            }
+        }
+    }
+    for size in [8, 1, 4] {
+        at += 8 + size * count(at);
+    }
+    let mut refused = |at: usize, value: &[u8]| {
+        let mut other = bytes.clone();
+        other[at..at + value.len()].copy_from_slice(value);
+        assert_eq!(simulation.restore(&other), Err(SnapshotError::Damaged), "at {at}");
+    };
+    for number in [f64::INFINITY, f64::NAN] {
+        for at in [20, 28, starts[0], starts[2], starts[starts.len() - 1]] {
+            refused(at, &number.to_le_bytes());
+        }
+        refused(at + 8, &(number as f32).to_le_bytes());
+    }
+    for counter in [4, 12] {
+        refused(counter, &u64::MAX.to_le_bytes());
+        refused(counter, &(1_u64 << 53).to_le_bytes());
+    }
+    refused(36, &u32::MAX.to_le_bytes());
+    assert_eq!(simulation.restore(&bytes), Ok(()));
 }
 
 /// Random valid parameters at a bearable cost.

@@ -1,5 +1,6 @@
 //! What the aurora's particles must show.
 
+mod arrivals;
 mod contract;
 mod rules;
 mod shapes;

@@ -15,7 +15,7 @@ use crate::{
             relocation::Relocation,
             scatter::scatter,
         },
-        shapes::{FRAME_S, Sheet},
+        shapes::{FRAME_S, Listing, Sheet},
     },
     field::residual,
 };
@@ -32,7 +32,7 @@ fn sheet(points: &[[f64; 2]]) -> Sheet {
 
 fn course(parameters: &AuroraParameters, sheets: &[&[[f64; 2]]], reach: f64) -> Course {
     let shape = Shape { sheets: sheets.iter().map(|points| sheet(points)).collect() };
-    Course::new((&shape, &[]), &Along::begin(&shape), &Folding::new(parameters, KEY), 0.0, reach)
+    Course::new((&shape, &[]), &Along::alone(&shape), &Folding::new(parameters, KEY), 0.0, reach)
 }
 
 #[test]
@@ -45,6 +45,22 @@ fn scatter_is_even_where_segments_overlap() {
     let rows = |from: f64, to: f64| places.iter().filter(|c| (from..to).contains(&c.place.y)).count() as f64;
     assert!((rows(0.0, 20.0) / rows(-20.0, 0.0) - 1.0).abs() < 0.03);
     assert!(places.iter().all(|c| course.distance(c.place).is_some_and(|distance| distance <= 20.0 + 1e-9)));
+}
+
+#[test]
+fn the_coordinate_runs_evenly_along_points_that_lie_unevenly() {
+    let parameters =
+        AuroraParameters { folds: crate::aurora::FoldParameters { amplitude_km: 0.0, ..small().folds }, ..small() };
+    let points = [[-50.0, 0.0], [-48.0, 0.0], [10.0, 0.0], [10.0, 0.0], [20.0, 0.0]];
+    let course = course(&parameters, &[&points], 20.0);
+    for last in [1, 7, 64] {
+        let alongs = course.alongs(0, last);
+        assert_eq!(alongs.len(), last + 1);
+        for (node, along) in alongs.iter().enumerate() {
+            let even = 70.0 * node as f64 / last as f64;
+            assert!((along - even).abs() < 0.3, "{along} km for {even} at {node} of {last}");
+        }
+    }
 }
 
 #[test]
@@ -222,23 +238,24 @@ fn strays_die() {
 #[test]
 fn the_coordinate_stays_with_the_sheet_when_it_splits() {
     let whole = Shape { sheets: vec![sheet(&[[0.0, 0.0], [10.0, 0.0], [20.0, 0.0], [30.0, 0.0]])] };
-    let along = Along::begin(&whole);
+    let along = Along::alone(&whole);
     assert_eq!(along.sheets, [[0.0, 10.0, 20.0, 30.0]]);
     let parts = Shape {
         sheets: vec![sheet(&[[0.0, 0.0], [10.0, 0.0], [14.0, 0.0]]), sheet(&[[16.0, 0.0], [20.0, 0.0], [30.0, 0.0]])],
     };
-    let mut split = along.follow(&parts);
+    let numbers = [vec![0, 1, 4], vec![5, 2, 3]];
+    let mut split = along.follow(&parts, &Listing::alone(&numbers));
     assert_eq!(split.sheets, [[0.0, 10.0, 14.0], [16.0, 20.0, 30.0]]);
     // The second part runs away and shrinks to half; its coordinate comes with it and then follows its length.
     let far = Shape { sheets: vec![parts.sheets[0].clone(), sheet(&[[90.0, 9.0], [92.0, 9.0], [97.0, 9.0]])] };
-    split = split.follow(&far);
+    split = split.follow(&far, &Listing::alone(&numbers));
     assert_eq!(split.sheets[1], [16.0, 20.0, 30.0]);
     (0..1000).for_each(|_| split.relax(0.1));
     let length = split.sheets[1][2] - split.sheets[1][0];
     assert!((length - 7.0).abs() < 1e-6 && (split.sheets[1].iter().sum::<f64>() - 66.0).abs() < 1e-6);
     // Joined again, the break stays where it was, and neither part is squeezed into it.
     let joined = Shape { sheets: vec![sheet(&[[0.0, 0.0], [10.0, 0.0], [90.0, 9.0], [97.0, 9.0]])] };
-    let mut again = split.follow(&joined);
+    let mut again = split.follow(&joined, &Listing::alone(&[vec![0, 1, 5, 3]]));
     (0..100).for_each(|_| again.relax(0.1));
     assert!((again.sheets[0][1] - again.sheets[0][0] - 10.0).abs() < 1e-6);
     assert!((again.sheets[0][3] - again.sheets[0][2] - 7.0).abs() < 1e-3);

@@ -1,6 +1,6 @@
 //! Particles go where the shapes are.
 
-use super::*;
+use super::{super::conductor::LineCharge, *};
 use crate::aurora::{RepulsionKernel, shapes::Neighbourhood};
 
 /// Seconds after a shape is reached from which on particles are where they shall be, how often that is looked at, and for how long.
@@ -275,26 +275,28 @@ fn rays_have_more_contrast_with_the_spline_while_particles_are_few() {
     assert!((many[0] / many[1] - 1.0).abs() < 0.07, "{many:?}: then the book is wrong");
 }
 
-/// Fifteen times the length, as many particles.
+/// How many pieces, and nodes of charge, the sheets of a course are followed by; a benchmark tells what a step of them costs.
 #[test]
-fn a_step_costs_what_its_particles_cost_not_what_the_drawn_shapes_are_long() {
-    const RENEWALS: u32 = 6;
-    let of = |rows: i32| {
-        let sheet = |row: i32| line([-200.0, f64::from(30 * row - 210)], [200.0, f64::from(30 * row - 210)]);
-        let shapes = vec![shape((0..rows).map(sheet).collect())];
-        simulation(AuroraParameters { shapes, ..AuroraParameters::default() })
+fn what_is_found_along_the_sheets_is_bounded_by_the_particles_not_by_the_drawn_shapes() {
+    let of = |rows: i32, particles: i64| {
+        let sheet = |row: i32| {
+            let south = 7.5 * f64::from(row) - 210.0;
+            line([-200.0, south], [200.0, south])
+        };
+        let mut parameters =
+            AuroraParameters { shapes: vec![shape((0..rows).map(sheet).collect())], ..AuroraParameters::default() };
+        parameters.particles.count = particles;
+        let course = simulation(parameters).course();
+        let lengths = course.sheet_lengths().iter().sum::<f64>();
+        let spacing = AuroraParameters::default().cell_km();
+        let charge = LineCharge::even(&course, spacing, particles as f64).count();
+        (lengths, course.pieces(|_| 1.0).count(), charge)
     };
-    let mut simulations = [of(1), of(15)];
-    let mut least = [f64::INFINITY; 2];
-    for _ in 0..7 {
-        for (simulation, least) in simulations.iter_mut().zip(&mut least) {
-            let start = std::time::Instant::now();
-            (0..RENEWALS).for_each(|_| simulation.step());
-            *least = least.min(start.elapsed().as_secs_f64());
-        }
-    }
-    let counts = simulations.map(|simulation| simulation.particles().len() as f64);
-    assert!((counts[1] / counts[0] - 1.0).abs() < 0.2, "{counts:?}");
-    // 1.6 times: rays are tabulated along the sheets, and the sheets' folds and charge are found all along them.
-    assert!(least[1] < 2.5 * least[0], "{least:?} s");
+    let (short, pieces, charge) = of(1, 120_000);
+    assert!((short / 400.0 - 1.0).abs() < 0.05 && pieces > 150 && charge > 150, "{short} km, {pieces}, {charge}");
+    let (long, pieces, charge) = of(57, 120_000);
+    assert!(long > 56.0 * short && pieces < 6_000 && charge < 6_200, "{long} km, {pieces}, {charge}");
+    // Never fewer pieces than the points that are drawn.
+    let (_, pieces, charge) = of(57, 20_000);
+    assert!(pieces <= 57 * 96 && charge < 1_200, "{pieces}, {charge}");
 }
