@@ -111,6 +111,15 @@ impl Publication {
     }
 }
 
+/// Radiance (ACEScg, cd/m^2) and alpha of a whole picture in fewer pixels.
+#[derive(Clone, Debug)]
+pub struct Backdrop {
+    /// The pixels, from the picture's upper left corner on; the last ones may reach over its edges.
+    pub image: Image<4>,
+    /// Pixels of the picture in one of these, along each side.
+    pub side: usize,
+}
+
 /// What a phenomenon is drawn among: wind and sky, and what all others published.
 #[derive(Clone, Debug)]
 pub struct Surroundings<'a> {
@@ -123,8 +132,8 @@ pub struct Surroundings<'a> {
     /// What is seen in the phenomenon's own [mirror](crate::phenomenon::Phenomenon::mirror): radiance (ACEScg, cd/m^2) and alpha of
     /// the whole picture.
     pub reflection: Option<&'a Image<4>>,
-    /// Where there is a plate: what stands behind all phenomena in that mirror, plate and sky, as radiance in fewer pixels.
-    pub backdrop: Option<&'a Image<4>>,
+    /// Where there is a plate: what stands behind all phenomena in that mirror, plate and sky.
+    pub backdrop: Option<&'a Backdrop>,
     /// Everybody else's lights, extinction and occluders, and the scene's own.
     pub others: Publication,
 }

@@ -10,7 +10,7 @@ use bansho_models::aurora::{
         FallLibrary, Falls,
         energy::{self, node_energy_ev},
         fall::VARIANTS,
-        fang::{Layer, Monoenergetic},
+        fang::{AirLayer, Monoenergetic},
         spectrum::ARC,
     },
 };
@@ -24,7 +24,7 @@ fn column_by_formula(energy_ev: f64) -> [f64; 3] {
     let shares = ARC.shares(node);
     let mut kilorayleigh = [0.0; 4];
     for air in atmosphere().levels() {
-        let layer = Layer::new(air);
+        let layer = AirLayer::new(air);
         let spectrum = shares.iter().enumerate().filter(|(_, share)| **share > 1e-12);
         let pairs: f64 =
             spectrum.map(|(node, share)| share * Monoenergetic::new(node_energy_ev(node)).ionisation(&layer)).sum();

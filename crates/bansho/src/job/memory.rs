@@ -52,7 +52,8 @@ impl Need {
         let (drawn, encoded) = (wanted.frames.min(3) as f64, wanted.frames.min(2).max(wanted.tiles) as f64);
         let drawn = drawn * frame + encoded * written;
         let plate = if scene.has_plate() { FRAME_BYTES } else { 0.0 };
-        let mirror = if phenomena.iter().any(|each| each.mirror().is_some()) { FRAME_BYTES } else { 0.0 };
+        // What a mirror shows, what of it is blurred, and the plate in it.
+        let mirror = if phenomena.iter().any(|each| each.mirror().is_some()) { 2.0 * FRAME_BYTES + plate } else { 0.0 };
         Ok((Self { drawn, whole: plate + mirror }, channels))
     }
 

@@ -155,13 +155,15 @@ impl Job {
     }
 
     /// Every file that will be written.
-    fn outputs(&self, pattern: &OutputPattern, frames: &[i64]) -> Vec<PathBuf> {
+    fn outputs<'a>(&self, pattern: &'a OutputPattern, frames: &'a [i64]) -> impl Iterator<Item = PathBuf> + use<'a> {
         let single = self.contact_sheet.is_some() || !pattern.kind().is_sequence();
         let frames = if single { &frames[..1] } else { frames };
-        let pictures: Vec<PathBuf> = frames.iter().map(|&number| pattern.path(number)).collect();
-        let figures = pictures.iter().filter(|_| self.figures).map(|picture| figures::path(picture));
-        let figures: Vec<PathBuf> = figures.collect();
-        pictures.into_iter().chain(figures).collect()
+        let with_figures = self.figures;
+        frames.iter().flat_map(move |&number| {
+            let picture = pattern.path(number);
+            let figures = with_figures.then(|| figures::path(&picture));
+            [Some(picture), figures].into_iter().flatten()
+        })
     }
 
     fn output_kind(&self) -> Result<OutputKind, JobError> {

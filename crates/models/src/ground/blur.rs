@@ -10,15 +10,15 @@ use rayon::prelude::*;
 type Pixel = [f32; 4];
 
 /// The reflection seen in facets whose slopes are Gaussian with an r.m.s. of `slope`, right for what is far away. Alpha is of no use here;
-/// the reflection may have fewer pixels than the view.
+/// the reflection has pixels of `side` times as many of the view's.
 ///
 /// A facet turned toward the viewer by s moves what it shows by 2 s in elevation, one turned sideways by 2 s times the sine of the
 /// viewing elevation. So the blur along columns is the same everywhere, the one along rows vanishes at the horizon.
-pub(super) fn rough(reflection: &Image<4>, view: &View, slope: f64) -> Image<4> {
+pub(super) fn rough(reflection: &Image<4>, side: usize, view: &View, slope: f64) -> Image<4> {
     let (width, height) = (reflection.width(), reflection.height());
-    let scale = width as f64 / view.size[0] as f64;
-    let spread = 2.0 * slope * view.camera.focal_pixels * scale;
-    let sines: Vec<f64> = (0..height).map(|y| sine_of_elevation(view, (y as f64 + 0.5) / scale)).collect();
+    let side = side as f64;
+    let spread = 2.0 * slope * view.camera.focal_pixels / side;
+    let sines: Vec<f64> = (0..height).map(|y| sine_of_elevation(view, (y as f64 + 0.5) * side)).collect();
     let columns: Vec<Vec<Pixel>> = (0..width)
         .into_par_iter()
         .map(|x| {

@@ -17,7 +17,7 @@ use bansho_base::{
     observer::{Cancelled, Observer, check},
     phenomenon::{LevelMirror, Phenomenon, Prepared},
     random::Key,
-    surroundings::{Occluder, Publication, Surroundings},
+    surroundings::{Backdrop, Occluder, Publication, Surroundings},
 };
 
 use self::{shade::PreparedGround, surface::Surface, waves::Waves};
@@ -49,7 +49,7 @@ impl Ground {
         let wind = surroundings.wind.mean(t);
         let heading = DVec2::new(wind.x, wind.z).try_normalize().unwrap_or(DVec2::X);
         let waves = Waves::new(self.key, parameters.waves, parameters.wave_length, heading, t, self.loop_s);
-        Some(Lake { waves, rough: blur::rough(sharp, view, parameters.waves) })
+        Some(Lake { waves, rough: blur::rough(sharp, 1, view, parameters.waves) })
     }
 }
 
@@ -107,7 +107,10 @@ impl Phenomenon for Ground {
             surroundings,
             wetness,
             lake: self.lake(view, surroundings),
-            backdrop: surroundings.backdrop.map(|sharp| blur::rough(sharp, view, self.surface.mean_slope())),
+            backdrop: surroundings.backdrop.map(|sharp| Backdrop {
+                image: blur::rough(&sharp.image, sharp.side, view, self.surface.mean_slope()),
+                side: sharp.side,
+            }),
         }))
     }
 }

@@ -4,10 +4,10 @@ use std::f32::consts::PI;
 
 use bansho_base::{
     canvas::{DepthInterval, Strip, View},
-    image::{Image, Rect},
+    image::Rect,
     math::{self, DVec2, DVec3, Fused},
     phenomenon::Prepared,
-    surroundings::Surroundings,
+    surroundings::{Backdrop, Surroundings},
 };
 
 use super::{
@@ -34,7 +34,7 @@ pub(super) struct PreparedGround<'a> {
     pub(super) wetness: f64,
     pub(super) lake: Option<Lake>,
     /// What stands behind all, as a film too rough for more mirrors it: the plate and its sky.
-    pub(super) backdrop: Option<Image<4>>,
+    pub(super) backdrop: Option<Backdrop>,
 }
 
 /// Where a pixel meets the ground.
@@ -107,9 +107,8 @@ impl PreparedGround<'_> {
         let viewer = -(hit.point - self.view.camera.position).normalize_or_zero();
         let place = DVec2::new(hit.point.x, hit.point.z);
         let facets = self.surface.facets(place, hit.footprint, patch.film);
-        let backdrop = self.backdrop.as_ref().map(|image| {
-            let scale = image.width() as f64 / self.view.size[0] as f64;
-            let [red, green, blue, _] = image.between(hit.pixel * scale);
+        let backdrop = self.backdrop.as_ref().map(|Backdrop { image, side }| {
+            let [red, green, blue, _] = image.between(hit.pixel / *side as f64);
             [red, green, blue]
         });
         let rough = gloss(self.surroundings, backdrop, hit.point, viewer, &facets);

@@ -9,15 +9,17 @@ use bansho_base::{
     canvas::View,
     image::Image,
     math::{DVec2, DVec3},
+    observer::{self, Cancelled, Observer},
     phenomenon::LevelMirror,
     sky::Sky,
+    surroundings::Backdrop,
 };
 use rayon::prelude::*;
 
 use super::plate::PlateFrame;
 
 /// Pixels of the picture from one place on a line of sight to the next.
-const STRIDE: f64 = 2.0;
+const STRIDE: f64 = 1.0;
 /// Fewest and most places on a line of sight.
 const PLACES: [f64; 2] = [16.0, 4096.0];
 /// Share of its depth by which a surface may come nearer from one place to the next; what comes nearer by more stands before the line of
@@ -33,27 +35,38 @@ pub(super) struct Mirror {
     /// Radiance and alpha of the whole picture.
     pub(super) seen: Image<4>,
     /// Plate and sky without the phenomena, small; only where there is a plate.
-    pub(super) backdrop: Option<Image<4>>,
+    pub(super) backdrop: Option<Backdrop>,
 }
 
 /// The plate seen in a level mirror by `camera`: absolute radiance with coverage, and depth as the camera behind the mirror
 /// measures it. Nothing where there is no plate or the mirror shows what the plate does not.
-pub(super) fn mirrored(plate: &PlateFrame, camera: &Camera, mirror: LevelMirror, exposure: f32) -> PlateFrame {
-    let Some(colour) = &plate.colour else { return PlateFrame::default() };
+///
+/// # Errors
+/// The observer asked to stop.
+pub(super) fn mirrored(
+    plate: &PlateFrame,
+    camera: &Camera,
+    mirror: LevelMirror,
+    exposure: f32,
+    observer: &dyn Observer,
+) -> Result<PlateFrame, Cancelled> {
+    let Some(colour) = &plate.colour else { return Ok(PlateFrame::default()) };
     let march = March { colour, depth: plate.depth.as_ref(), camera, mirror, exposure };
     let (width, rows) = (colour.width(), colour.height());
     let mut seen = Image::filled(width, rows, [0.0; 4]);
     let mut depth = Image::filled(width, rows, [f32::INFINITY]);
     let lines = seen.pixels_mut().par_chunks_mut(width.max(1)).zip(depth.pixels_mut().par_chunks_mut(width.max(1)));
-    lines.enumerate().for_each(|(y, (seen, depth))| {
+    lines.enumerate().try_for_each(|(y, (seen, depth))| {
+        observer::check(observer)?;
         for (x, (seen, depth)) in seen.iter_mut().zip(depth).enumerate() {
             let pixel = DVec2::new(x as f64, y as f64) + 0.5;
             if let Some((colour, far)) = march.seen(pixel) {
                 (*seen, depth[0]) = (colour, far);
             }
         }
-    });
-    PlateFrame { colour: Some(seen), depth: plate.depth.is_some().then_some(depth) }
+        Ok(())
+    })?;
+    Ok(PlateFrame { colour: Some(seen), depth: plate.depth.is_some().then_some(depth) })
 }
 
 /// Puts the sky, which a plate stands for in the picture itself, behind what is seen by the camera of a mirrored `view`; `scale` is the
@@ -74,7 +87,7 @@ pub(super) fn lay_sky(image: &mut Image<4>, view: &View, sky: &Sky, scale: usize
 }
 
 /// Plate and sky in the mirror, small: for what mirrors too roughly to show more.
-pub(super) fn backdrop(mirrored: &PlateFrame, view: &View, sky: &Sky) -> Option<Image<4>> {
+pub(super) fn backdrop(mirrored: &PlateFrame, view: &View, sky: &Sky) -> Option<Backdrop> {
     let fine = mirrored.colour.as_ref()?;
     let size = [fine.width(), fine.height()].map(|side| side.div_ceil(COARSE));
     let mut coarse = Image::filled(size[0], size[1], [0.0; 4]);
@@ -90,7 +103,7 @@ pub(super) fn backdrop(mirrored: &PlateFrame, view: &View, sky: &Sky) -> Option<
         }
     });
     lay_sky(&mut coarse, view, sky, COARSE);
-    Some(coarse)
+    Some(Backdrop { image: coarse, side: COARSE })
 }
 
 /// Fine pixels in a coarse one.
@@ -113,6 +126,14 @@ struct Sight {
     from: DVec3,
     toward: DVec3,
     scale: f64,
+    trace: Option<Trace>,
+}
+
+/// A line of sight in the picture of a perspective camera: straight, and as deep as at its start divided by what is left of the parameter.
+struct Trace {
+    from: DVec2,
+    along: DVec2,
+    depth: f64,
 }
 
 impl Sight {
@@ -151,24 +172,36 @@ impl March<'_> {
             return self.radiance(pixel).map(|colour| (colour, standing as f32));
         }
         let toward = DVec3::new(down.x, -down.y, down.z);
-        let sight = Sight { from: self.camera.position + down * ground, toward, scale: self.scale(ground, toward) };
+        let sight = self.sight(self.camera.position + down * ground, ground, toward);
         match self.first_met(pixel, &sight) {
             Some((place, way)) => Some((self.radiance(place)?, (ground + way) as f32)),
             None => self.beyond(&sight).map(|colour| (colour, f32::INFINITY)),
         }
     }
 
-    /// The scale of a line of sight from `depth` on that makes it even in the picture.
-    fn scale(&self, depth: f64, toward: DVec3) -> f64 {
+    /// The line of sight that leaves the mirror at `from`, `depth` away.
+    fn sight(&self, from: DVec3, depth: f64, toward: DVec3) -> Sight {
         let along = -(self.camera.orientation.transpose() * toward).z;
-        if self.camera.lens == Lens::Perspective && along > 1e-3 { depth / along } else { depth }
+        if self.camera.lens != Lens::Perspective || along <= 1e-3 {
+            return Sight { from, toward, scale: depth, trace: None };
+        }
+        let mut sight = Sight { from, toward, scale: depth / along, trace: None };
+        let places = [0.0, 0.5].map(|t| self.camera.project(sight.at(t)));
+        if let [Some(start), Some(middle)] = places {
+            sight.trace =
+                Some(Trace { from: start.pixel, along: 2.0 * (middle.pixel - start.pixel), depth: start.depth });
+        }
+        sight
     }
 
     /// Where a line of sight from the mirror at `start` first meets what stands in the plate: its pixel, and the way there.
     fn first_met(&self, start: DVec2, sight: &Sight) -> Option<(DVec2, f64)> {
         self.depth?;
-        let end = self.camera.project(sight.from + sight.toward * FAR);
-        let length = end.map_or(PLACES[1] * 0.25, |end| (end.pixel - start).length());
+        let end = || self.camera.project(sight.from + sight.toward * FAR);
+        let length = match &sight.trace {
+            Some(trace) => trace.along.length(),
+            None => end().map_or(PLACES[1] * 0.25, |end| (end.pixel - start).length()),
+        };
         let count = (length / STRIDE).ceil().clamp(PLACES[0], PLACES[1]);
         let mut before = self.stop(sight, 0.0)?;
         // Where it was last seen before it went behind what stands nearer.
@@ -176,7 +209,8 @@ impl March<'_> {
         for step in 1..count as usize {
             let Some(stop) = self.stop(sight, step as f64 / count) else { break };
             if stop.depth > stop.plate && self.stands(stop.pixel, stop.plate) {
-                if lost.is_none() && stop.plate > before.depth * (1.0 - JUMP) {
+                // The mirror itself may stand a little before or behind the plate's own depth of it.
+                if lost.is_none() && stop.plate > before.depth.min(before.plate) * (1.0 - JUMP) {
                     return Some(self.crossing(sight, &before, &stop));
                 }
                 // It met what is farther while it was behind what is nearer.
@@ -195,19 +229,27 @@ impl March<'_> {
 
     /// The place on a line of sight at `t`; none outside the picture.
     fn stop(&self, sight: &Sight, t: f64) -> Option<Stop> {
-        let place = self.camera.project(sight.at(t))?;
-        let inside = place.pixel.x >= 0.0
-            && place.pixel.y >= 0.0
-            && place.pixel.x < self.colour.width() as f64
-            && place.pixel.y < self.colour.height() as f64;
-        inside.then(|| Stop { t, pixel: place.pixel, depth: place.depth, plate: self.plate_depth(place.pixel) })
+        let (pixel, depth) = match &sight.trace {
+            Some(trace) => (trace.from + trace.along * t, trace.depth / (1.0 - t)),
+            None => {
+                let place = self.camera.project(sight.at(t))?;
+                (place.pixel, place.depth)
+            }
+        };
+        self.is_inside(pixel).then(|| Stop { t, pixel, depth, plate: self.plate_depth(pixel) })
+    }
+
+    fn is_inside(&self, pixel: DVec2) -> bool {
+        let (width, height) = (self.colour.width() as f64, self.colour.height() as f64);
+        pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < width && pixel.y < height
     }
 
     /// Between two places, where the line of sight is as deep as the plate.
     fn crossing(&self, sight: &Sight, before: &Stop, after: &Stop) -> (DVec2, f64) {
         let [ahead, past] = [before, after].map(|stop| stop.plate - stop.depth);
         let even = ahead.is_finite() && ahead > 0.0 && ahead - past > 0.0;
-        let part = if even { ahead / (ahead - past) } else { 1.0 };
+        // Where it leaves the mirror the plate is the mirror itself, and what lies between them is rounding.
+        let part = if even && before.t > 0.0 { ahead / (ahead - past) } else { 1.0 };
         let t = before.t + part * (after.t - before.t);
         (before.pixel + (after.pixel - before.pixel) * part, sight.way(t))
     }
@@ -215,9 +257,7 @@ impl March<'_> {
     /// The plate's colour infinitely far along a line of sight that met nothing.
     fn beyond(&self, sight: &Sight) -> Option<[f32; 4]> {
         let end = self.camera.project(sight.from + sight.toward * FAR)?.pixel;
-        let inside =
-            end.x >= 0.0 && end.y >= 0.0 && end.x < self.colour.width() as f64 && end.y < self.colour.height() as f64;
-        (inside && !self.plate_depth(end).is_finite()).then(|| self.radiance(end))?
+        (self.is_inside(end) && !self.plate_depth(end).is_finite()).then(|| self.radiance(end))?
     }
 
     /// Whether what the plate shows at a pixel, at this depth, stands above the mirror.
@@ -247,6 +287,7 @@ mod tests {
     use bansho_base::{
         camera::CameraParameters,
         canvas::Shutter,
+        observer::Unobserved,
         sky::{SkyKind, SkyParameters},
     };
 
@@ -302,10 +343,13 @@ mod tests {
 
     #[test]
     fn a_wall_and_a_pillar_are_mirrored_at_the_right_place() {
-        for roll in [0.0, 4.0] {
-            let view = view(roll, 32.0);
+        // Wrong are outlines of the pillar, and in wide views the wall's top, where pixels of the plate are of both.
+        for (roll, vertical_fov_deg, most) in
+            [(0.0, 32.0, 0.005), (4.0, 32.0, 0.01), (0.0, 60.0, 0.03), (4.0, 60.0, 0.035), (0.0, 90.0, 0.05)]
+        {
+            let view = view(roll, vertical_fov_deg);
             let camera = &view.camera;
-            let seen = mirrored(&plate(&view), camera, WET, EXPOSURE);
+            let seen = mirrored(&plate(&view), camera, WET, EXPOSURE, &Unobserved).unwrap();
             let (colour, depth) = (seen.colour.unwrap(), seen.depth.unwrap());
             let behind = camera.mirrored(0.0);
             let (mut right, mut wrong) = (0, 0);
@@ -326,8 +370,9 @@ mod tests {
                 let near = error < 0.15 && (f64::from(depth[0]) - behind.depth(place)).abs() < 0.15;
                 if near { right += 1 } else { wrong += 1 }
             }
-            // The pillar's outlines, where pixels of the plate are of both.
-            assert!(right > 10_000 && wrong < right / 50, "roll {roll}: {right} right, {wrong} wrong");
+            assert!(right > 7_000, "{right}");
+            let share = f64::from(wrong) / f64::from(right);
+            assert!(share < most, "{vertical_fov_deg} degrees, roll {roll}: {share}");
         }
     }
 
@@ -335,16 +380,41 @@ mod tests {
     fn the_sky_is_mirrored_above_the_wall_and_where_the_plate_ends() {
         let view = view(0.0, 60.0);
         let plate = plate(&view);
-        let mut seen = mirrored(&plate, &view.camera, WET, EXPOSURE).colour.unwrap();
+        let mirrored = mirrored(&plate, &view.camera, WET, EXPOSURE, &Unobserved).unwrap();
+        let mut seen = mirrored.colour.clone().unwrap();
         let parameters = SkyParameters { kind: SkyKind::Uniform, luminance: 300.0.into(), ..SkyParameters::default() };
         let sky = parameters.at(0.0);
         lay_sky(&mut seen, &view.mirrored(0.0), &sky, 1);
         // The lowest row looks 31 degrees down, and by the mirror over the wall and out of the picture.
         let lowest = seen.at(SIZE[0] / 2, SIZE[1] - 1);
         assert_eq!(lowest[..3], sky.radiance(DVec3::Y));
-        let backdrop = backdrop(&mirrored(&plate, &view.camera, WET, EXPOSURE), &view.mirrored(0.0), &sky).unwrap();
+        let backdrop = backdrop(&mirrored, &view.mirrored(0.0), &sky).unwrap().image;
         assert_eq!([backdrop.width(), backdrop.height()], [40, 23]);
         assert!(backdrop.pixels().iter().all(|pixel| (pixel[3] - 1.0).abs() < 1e-5));
+    }
+
+    /// South of what each row of the mirrored plate shows at a column beside the pillar, for rows of the ground from the wall's foot down.
+    fn souths(plate: &PlateFrame, camera: &Camera, mirror: LevelMirror, rows: usize) -> Vec<f64> {
+        let column = 0.3 * SIZE[0] as f64 + 0.5;
+        let is_ground = |row: &usize| {
+            let direction = camera.direction(DVec2::new(column, *row as f64 + 0.5)).unwrap();
+            matches!(met(camera.position, direction), Some((_, false)))
+        };
+        let foot = (0..SIZE[1]).find(is_ground).unwrap();
+        let seen = mirrored(plate, camera, mirror, EXPOSURE, &Unobserved).unwrap().colour.unwrap();
+        (foot..foot + rows).map(|row| f64::from(seen.at(column as usize, row)[2])).collect()
+    }
+
+    #[test]
+    fn the_foot_of_a_wall_mirrors_the_wall() {
+        for (fov, tolerance, rows) in
+            [(32.0, 0.02, 12), (32.0, 0.1, 12), (60.0, 0.02, 8), (90.0, 0.02, 6), (90.0, 0.1, 6)]
+        {
+            let view = view(0.0, fov);
+            let wet = LevelMirror { plate_tolerance: tolerance, ..WET };
+            let souths = souths(&plate(&view), &view.camera, wet, rows);
+            assert!(souths.iter().all(|south| (south - WALL).abs() < 0.02), "{fov} degrees, {tolerance} m: {souths:?}");
+        }
     }
 
     /// A floor whose depth is a guess, 6 cm too near in height, mirrors the wall where that is tolerated.
@@ -363,7 +433,7 @@ mod tests {
         }
         let seen = |plate_tolerance: f64| {
             let wet = LevelMirror { plate_tolerance, ..WET };
-            f64::from(mirrored(&plate, camera, wet, EXPOSURE).colour.unwrap().at(x, y)[2])
+            f64::from(mirrored(&plate, camera, wet, EXPOSURE, &Unobserved).unwrap().colour.unwrap().at(x, y)[2])
         };
         assert!((seen(0.1) - WALL).abs() < 0.2, "{} m south is not the wall", seen(0.1));
         assert!(seen(0.02) > WALL + 1.0, "{} m south is the wall", seen(0.02));
@@ -371,7 +441,7 @@ mod tests {
 
     #[test]
     fn without_a_plate_nothing_is_mirrored() {
-        let seen = mirrored(&PlateFrame::default(), &view(0.0, 60.0).camera, WET, EXPOSURE);
+        let seen = mirrored(&PlateFrame::default(), &view(0.0, 60.0).camera, WET, EXPOSURE, &Unobserved).unwrap();
         assert!(seen.colour.is_none() && seen.depth.is_none());
     }
 }

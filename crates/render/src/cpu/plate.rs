@@ -8,6 +8,7 @@ use bansho_base::{
     color,
     image::Image,
     math::DVec2,
+    observer::{Cancelled, Observer},
     phenomenon::LevelMirror,
 };
 use rayon::prelude::*;
@@ -35,11 +36,12 @@ pub(super) struct PlateCache {
     mirrored: Option<(MirrorKey, Arc<PlateFrame>)>,
 }
 
-/// What a mirrored plate depends on beside the plan: the plate, and the mirror.
-type MirrorKey = (PlateKey, LevelMirror);
+/// What a mirrored plate depends on beside the plan: the plate, the mirror, and the exposure.
+type MirrorKey = (PlateKey, LevelMirror, f32);
 
-/// What a plate frame depends on beside the plan: digests of picture and depth, and the camera that measures depth.
-type PlateKey = ([Option<[u8; 32]>; 2], Camera);
+/// What a plate frame depends on beside what the scene says of the plate: digests of picture and depth, the camera that measures depth, and how
+/// the picture is shown.
+type PlateKey = ([Option<[u8; 32]>; 2], Camera, color::View);
 
 impl PlateCache {
     pub(super) fn frame(&mut self, plan: &Plan, number: i64) -> Result<Arc<PlateFrame>, RenderError> {
@@ -53,7 +55,7 @@ impl PlateCache {
             let found = plan.assets.digest(&path.0, number);
             *digest = Some(found.map_err(|error| plate_error(OpeningFault { key: key.into(), kind: error.into() }))?);
         }
-        let key = (digests, plan.view(number).camera);
+        let key = (digests, plan.view(number).camera, plan.shown());
         if let Some((known, frame)) = &self.last
             && *known == key
         {
@@ -65,17 +67,25 @@ impl PlateCache {
     }
 
     /// The last plate as it is seen in a level mirror.
-    pub(super) fn mirrored(&mut self, plan: &Plan, mirror: LevelMirror) -> Arc<PlateFrame> {
-        let Some((key, plate)) = &self.last else { return Arc::default() };
-        let key = (*key, mirror);
+    ///
+    /// # Errors
+    /// The observer asked to stop.
+    pub(super) fn mirrored(
+        &mut self,
+        plan: &Plan,
+        mirror: LevelMirror,
+        observer: &dyn Observer,
+    ) -> Result<Arc<PlateFrame>, Cancelled> {
+        let Some((key, plate)) = &self.last else { return Ok(Arc::default()) };
+        let key = (*key, mirror, plan.exposure_scale());
         if let Some((known, frame)) = &self.mirrored
             && *known == key
         {
-            return frame.clone();
+            return Ok(frame.clone());
         }
-        let frame = Arc::new(mirror::mirrored(plate, &key.0.1, mirror, plan.exposure_scale()));
+        let frame = Arc::new(mirror::mirrored(plate, &key.0.1, mirror, key.2, observer)?);
         self.mirrored = Some((key, frame.clone()));
-        frame
+        Ok(frame)
     }
 }
 

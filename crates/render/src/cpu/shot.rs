@@ -183,7 +183,9 @@ impl CpuShot {
         };
         let mut seen = compose::frame(&composition, self.plan.header(self.number), None, observer)?.beauty;
         let sky = self.plan.scene.sky.as_ref().map(|sky| sky.at(view.shutter.middle()));
-        if let (Some(sky), true) = (&sky, mirrored.colour.is_some()) {
+        // A sky that is not to be seen lights the ground, and stands in no still water.
+        let seen_sky = self.plan.scene.sky.as_ref().is_some_and(|sky| sky.visible) && mirrored.colour.is_some();
+        if let (Some(sky), true) = (&sky, seen_sky) {
             mirror::lay_sky(&mut seen, &view, sky, 1);
         }
         let backdrop = mirror::backdrop(mirrored, &view, &sky.unwrap_or(Sky::DARK));
@@ -266,7 +268,7 @@ impl Shot for CpuShot {
             self.plates.frame(&self.plan, self.number)?
         };
         let mirrored = match self.mirror() {
-            Some((_, mirror)) => self.plates.mirrored(&self.plan, mirror),
+            Some((_, mirror)) => self.plates.mirrored(&self.plan, mirror, observer)?,
             None => Arc::default(),
         };
         let mut view = self.plan.view(self.number);

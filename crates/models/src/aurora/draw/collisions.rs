@@ -191,10 +191,10 @@ impl Collisions {
         let level = Level::new();
         let mut picture = Meridians::dark(chart);
         let (chart, groups) = picture.strips(GROUP);
-        let drawing = Drawing { collisions: self, chart, finder: chart.finder(), footprint, step };
+        let pass = CollisionPass { collisions: self, chart, finder: chart.finder(), footprint, step };
         groups.for_each_init(
             || (Group::new(chart), Trace::new(chart.rows)),
-            |own, group| dispatch!(level, simd => drawing.group(simd, group, field, own)),
+            |own, group| dispatch!(level, simd => pass.group(simd, group, field, own)),
         );
         picture
     }
@@ -269,7 +269,7 @@ impl SeenLine<'_> {
 }
 
 /// What the points of a strip have in common.
-struct Drawing<'a> {
+struct CollisionPass<'a> {
     collisions: &'a Collisions,
     chart: &'a Chart,
     finder: Finder,
@@ -277,7 +277,7 @@ struct Drawing<'a> {
     step: u32,
 }
 
-impl Drawing<'_> {
+impl CollisionPass<'_> {
     /// Draws columns beside each other, every source once for all of them.
     #[inline(always)]
     fn group<S: Simd>(&self, simd: S, strip: LightStrip, field: &FieldLines, (group, trace): &mut (Group, Trace)) {

@@ -46,13 +46,13 @@ impl<'a> LineOfFall<'a> {
         for distance in &mut distances {
             *distance += self.distance;
         }
-        let Seen { rows, lights, .. } = self.seen(altitudes_km, &distances);
+        let ProjectedPoints { rows, lights, .. } = self.seen(altitudes_km, &distances);
         [Lanes::from_slice(offsets.simd, &rows), Lanes::from_slice(offsets.simd, &lights)]
     }
 
     /// Points of the meridian at altitudes and distances, km. One step a loop: each of them becomes vector code.
     #[inline(always)]
-    fn seen<const COUNT: usize>(&self, altitudes: &[f32; COUNT], distances: &[f32; COUNT]) -> Seen<COUNT> {
+    fn seen<const COUNT: usize>(&self, altitudes: &[f32; COUNT], distances: &[f32; COUNT]) -> ProjectedPoints<COUNT> {
         const RADIUS: f32 = EARTH_RADIUS_KM as f32;
         const DIAMETER: f32 = 2.0 * RADIUS;
         let ([constant, outward, own], finder) = (*self.meridian, *self.finder);
@@ -66,7 +66,7 @@ impl<'a> LineOfFall<'a> {
             places[i] = squared * per_upward[i] - own;
             far_squared[i] = distance.fused(distance, places[i] * places[i]);
         }
-        let mut seen = Seen { rows: [0.0; COUNT], slopes: [0.0; COUNT], lights: [0.0; COUNT] };
+        let mut seen = ProjectedPoints { rows: [0.0; COUNT], slopes: [0.0; COUNT], lights: [0.0; COUNT] };
         for i in 0..COUNT {
             seen.rows[i] = finder.row(lanes::atan2(distances[i], places[i])) - 0.5;
         }
@@ -86,7 +86,7 @@ impl<'a> LineOfFall<'a> {
 }
 
 /// How points are seen.
-struct Seen<const COUNT: usize> {
+struct ProjectedPoints<const COUNT: usize> {
     rows: [f32; COUNT],
     /// Rows for each km of distance.
     slopes: [f32; COUNT],
@@ -141,7 +141,7 @@ impl Descents {
     /// How the points of a line are seen.
     #[inline(always)]
     pub(super) fn along<S: Simd>(&self, simd: S, line: &LineOfFall) -> Descent {
-        let Seen { rows, slopes, lights } = line.seen(&self.altitudes_km, &[line.distance; NODES]);
+        let ProjectedPoints { rows, slopes, lights } = line.seen(&self.altitudes_km, &[line.distance; NODES]);
         let mut steepest = 0.0_f32;
         for slope in slopes {
             steepest = if slope.abs() > steepest { slope.abs() } else { steepest };

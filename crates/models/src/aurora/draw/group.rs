@@ -27,7 +27,7 @@ const NONE: u32 = u32::MAX;
 
 /// How the lines of a column in a range of distance are seen, by the line in its middle.
 #[derive(Clone, Copy)]
-pub(super) struct Seen {
+pub(super) struct CachedDescent {
     column: u32,
     /// Distance of that line, km.
     pub(super) distance: f32,
@@ -47,7 +47,7 @@ pub(super) struct Group {
     units: [[f32; GROUP + STRIP]; 2],
     meridians: [[f32; 3]; GROUP],
     /// How lines were last seen in each range of distance, by an even and by an odd column.
-    seen: Vec<Seen>,
+    seen: Vec<CachedDescent>,
 }
 
 impl Group {
@@ -61,7 +61,7 @@ impl Group {
             entries: Vec::new(),
             units: [[0.0; GROUP + STRIP]; 2],
             meridians: [[0.0; 3]; GROUP],
-            seen: (0..2 * RANGES).map(|slot| Seen::none(slot / 2)).collect(),
+            seen: (0..2 * RANGES).map(|slot| CachedDescent::none(slot / 2)).collect(),
         }
     }
 
@@ -136,7 +136,7 @@ impl Group {
         column: usize,
         distance: f32,
         (descents, finder): (&Descents, &Finder),
-    ) -> &Seen {
+    ) -> &CachedDescent {
         let range = ((lanes::log2(distance) * RANGES_PER_OCTAVE).max(0.0) as usize).min(RANGES - 1);
         let seen = &mut self.seen[2 * range + column % 2];
         if seen.column != column as u32 {
@@ -173,7 +173,7 @@ impl Group {
     }
 }
 
-impl Seen {
+impl CachedDescent {
     fn none(range: usize) -> Self {
         let distance = math::exp2((range as f64 + 0.5) / f64::from(RANGES_PER_OCTAVE)) as f32;
         Self { column: NONE, distance, descent: Descent::default() }

@@ -73,6 +73,7 @@ mod tests {
         let sheet = SheetParameters {
             points: Some(vec![[-90.0, -north_km], [90.0, -north_km]]),
             energy: Curve::new(vec![[0.0, factor]], Interpolation::Linear).unwrap(),
+            fade: 0.0,
             ..SheetParameters::default()
         };
         let parameters = AuroraParameters {

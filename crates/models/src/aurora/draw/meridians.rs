@@ -49,7 +49,7 @@ pub(super) struct Meridians {
 }
 
 /// What all columns share.
-struct Drawing<'a> {
+struct ProfilePass<'a> {
     chart: &'a Chart,
     field: &'a FieldLines,
     profiles: &'a Profiles,
@@ -71,7 +71,7 @@ impl Meridians {
         let distances: Vec<_> = (0..footprint.bins().count).map(|bin| footprint.bins().distance(bin)).collect();
         let mut picture = Self::dark(chart);
         let (chart, strips) = picture.strips(STRIP);
-        let drawing = Drawing {
+        let pass = ProfilePass {
             chart,
             field,
             profiles,
@@ -82,7 +82,7 @@ impl Meridians {
             inverse_sines: &inverse_sines,
         };
         strips.for_each_init(Workspace::default, |workspace, strip| {
-            dispatch!(level, simd => drawing.strip(simd, strip, footprint, workspace));
+            dispatch!(level, simd => pass.strip(simd, strip, footprint, workspace));
         });
         picture
     }
@@ -205,7 +205,7 @@ struct Workspace {
     slow: SlowLight,
 }
 
-impl Drawing<'_> {
+impl ProfilePass<'_> {
     #[inline(always)]
     fn strip<S: Simd>(&self, simd: S, mut strip: LightStrip, footprint: &Footprint, workspace: &mut Workspace) {
         let Workspace { sums, slow } = workspace;
@@ -261,26 +261,26 @@ impl Drawing<'_> {
         // The bin holds precipitation times its width already; what is left is per km of sight.
         let weights = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
         let (distance, width) = (distance as f32, width as f32);
-        let stretch = Stretch { line: &line, profile: &profile, distance, width, near, weights };
+        let bin_rows = BinRows { line: &line, profile: &profile, distance, width, near, weights };
         let light = strip.light_up(column, &(first / KNOT_ROWS * KNOT_ROWS..end), self.chart.rows);
-        let rest = if near { first } else { self.slow_rows(&stretch, first..end, slow) };
-        self.rows(&stretch, rest, &mut light[rest.min(end)..end]);
+        let rest = if near { first } else { self.slow_rows(&bin_rows, first..end, slow) };
+        self.rows(&bin_rows, rest, &mut light[rest.min(end)..end]);
         if near {
             // Beyond the observer's own field line the sheet goes on: what smoothing spreads from there would be
             // missed.
             let line = meridian.line(-f64::from(distance));
-            let beyond = Stretch { line: &line, distance: -distance, ..stretch };
+            let beyond = BinRows { line: &line, distance: -distance, ..bin_rows };
             self.rows(&beyond, first, &mut light[first..end]);
         }
     }
 
     /// Adds those of the rows in which light changes slowly, the upper ones; gives the first one that is left.
     #[inline(always)]
-    fn slow_rows<S: Simd>(&self, stretch: &Stretch<S>, rows: Range<usize>, slow: &mut SlowLight) -> usize {
-        let distance = stretch.distance;
+    fn slow_rows<S: Simd>(&self, bin_rows: &BinRows<S>, rows: Range<usize>, slow: &mut SlowLight) -> usize {
+        let distance = bin_rows.distance;
         // Altitude from knot to knot.
         let knot_km = (KNOT_ROWS as f32 * self.chart.row_step as f32) * (SLOW_KM * SLOW_KM / distance + distance);
-        let end = self.row(stretch.line, f64::from(distance), 0.0, SLOW_KM + knot_km * (1.0 / KNOTS_ABOVE));
+        let end = self.row(bin_rows.line, f64::from(distance), 0.0, SLOW_KM + knot_km * (1.0 / KNOTS_ABOVE));
         let end = (end.max(0.0) as usize).min(rows.end.next_multiple_of(KNOT_ROWS));
         let (mut knot, last) = (rows.start / KNOT_ROWS, end / KNOT_ROWS);
         if knot >= last {
@@ -290,8 +290,8 @@ impl Drawing<'_> {
             let Some(cotangents) = self.knots[knot..].first_chunk() else { break };
             let count = (last - knot + 1).min(ROWS);
             let mut light = [[0.0; 4]; ROWS];
-            stretch.add(cotangents, &mut light[..count]);
-            slow.add(stretch.weights.simd, knot, &light[..count]);
+            bin_rows.add(cotangents, &mut light[..count]);
+            slow.add(bin_rows.weights.simd, knot, &light[..count]);
             knot += count - 1;
         }
         last * KNOT_ROWS
@@ -308,21 +308,21 @@ impl Drawing<'_> {
         self.chart.finder().row(colatitude) - 0.5
     }
 
-    /// Adds the light of a stretch to rows from `first` on.
+    /// Adds the light of a bin to rows from `first` on.
     #[inline(always)]
-    fn rows<S: Simd>(&self, stretch: &Stretch<S>, first: usize, light: &mut [PerEmitter<f32>]) {
+    fn rows<S: Simd>(&self, bin_rows: &BinRows<S>, first: usize, light: &mut [PerEmitter<f32>]) {
         let mut from = 0;
         while from < light.len() {
             let Some(cotangents) = self.cotangents[first + from..].first_chunk() else { return };
             let to = (from + ROWS).min(light.len());
-            stretch.add(cotangents, &mut light[from..to]);
+            bin_rows.add(cotangents, &mut light[from..to]);
             from = to;
         }
     }
 }
 
 /// Some rows of one bin.
-struct Stretch<'a, S: Simd> {
+struct BinRows<'a, S: Simd> {
     line: &'a FieldLine,
     profile: &'a Profile<'a>,
     distance: f32,
@@ -332,7 +332,7 @@ struct Stretch<'a, S: Simd> {
     weights: FourLanes<S>,
 }
 
-impl<S: Simd> Stretch<'_, S> {
+impl<S: Simd> BinRows<'_, S> {
     #[inline(always)]
     fn add(&self, cotangents: &[f32; ROWS], light: &mut [PerEmitter<f32>]) {
         let [constant, linear] = self.line.square();

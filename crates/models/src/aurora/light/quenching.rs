@@ -26,7 +26,7 @@ impl Rate {
 
 /// Lifetime of a state left alone, and the rates at which N2, O2 and O quench it.
 #[derive(Clone, Copy, Debug)]
-struct State {
+struct ExcitedState {
     lifetime: f64,
     n2: Rate,
     o2: Rate,
@@ -34,20 +34,20 @@ struct State {
 }
 
 /// By emitter.
-const STATES: PerEmitter<State> = [
+const STATES: PerEmitter<ExcitedState> = [
     // Wiese et al. 1996; Slanger et al. 1972, Slanger & Black 1981 as in the GLOW model.
-    State { lifetime: 0.748_704, n2: Rate::NONE, o2: Rate { a: 4e-18, b: -865.0 }, o: Rate::constant(2e-20) },
+    ExcitedState { lifetime: 0.748_704, n2: Rate::NONE, o2: Rate { a: 4e-18, b: -865.0 }, o: Rate::constant(2e-20) },
     // Wiese et al. 1996; JPL 2011; O as in GLOW (Abreu et al. 1986), in dispute between 0 and 2.2e-17.
-    State {
+    ExcitedState {
         lifetime: 133.782,
         n2: Rate { a: 2.15e-17, b: 110.0 },
         o2: Rate { a: 3.3e-17, b: 55.0 },
         o: Rate::constant(3e-18),
     },
     // Vallance Jones 1974; Pancheshnyi et al. 1998. It matters below 65 km only.
-    State { lifetime: 65.9975e-9, n2: Rate::constant(2.1e-16), o2: Rate::constant(5.1e-16), o: Rate::NONE },
+    ExcitedState { lifetime: 65.9975e-9, n2: Rate::constant(2.1e-16), o2: Rate::constant(5.1e-16), o: Rate::NONE },
     // Vallance Jones 1974; Pintassilgo & Guerra, Kossyi et al. 1992. It matters below 90 km only.
-    State { lifetime: 5.818_92e-6, n2: Rate::constant(3e-17), o2: Rate::constant(3e-16), o: Rate::NONE },
+    ExcitedState { lifetime: 5.818_92e-6, n2: Rate::constant(3e-17), o2: Rate::constant(3e-16), o: Rate::NONE },
 ];
 
 /// Lifetime of a state that nothing strikes, s.
@@ -59,7 +59,7 @@ pub fn natural_lifetime(emitter: Emitter) -> f64 {
 /// The share of excited states that radiate, `1 / (1 + tau sum k_q n_q)`.
 #[must_use]
 pub fn radiated_share(emitter: Emitter, air: &Air) -> f64 {
-    let State { lifetime, n2, o2, o } = STATES[emitter.index()];
+    let ExcitedState { lifetime, n2, o2, o } = STATES[emitter.index()];
     let t = air.temperature;
     1.0 / (1.0 + lifetime * (n2.at(t) * air.n2 + o2.at(t) * air.o2 + o.at(t) * air.o))
 }

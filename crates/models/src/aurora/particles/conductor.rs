@@ -34,7 +34,7 @@ pub(super) struct LineCharge {
 
 /// Where a particle is among the nodes: the one before it, and the part of the way to the next.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct SheetCoordinate {
     node: u32,
     part: f32,
     side: f32,
@@ -42,7 +42,7 @@ pub(super) struct Place {
 
 /// What charge shall come to.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Wanted {
+pub(super) struct WantedCharge {
     /// Potential along the sheets, negative, km^2/s^2.
     pub(super) potential: f64,
     /// Charge density over eps of a lone sheet, 1/s^2, and half its thickness, km.
@@ -71,16 +71,16 @@ impl LineCharge {
     }
 
     /// Where a particle is.
-    pub(super) fn place(&self, particle: &Scattered) -> Place {
+    pub(super) fn place(&self, particle: &Scattered) -> SheetCoordinate {
         let sheet = particle.sheet as usize;
         let (first, end) = (self.starts[sheet], self.starts[sheet + 1]);
         let (node, part) = split(f64::from(particle.share), end - first);
-        Place { node: (first + node) as u32, part: part as f32, side: particle.side }
+        SheetCoordinate { node: (first + node) as u32, part: part as f32, side: particle.side }
     }
 
     /// Charge of a particle that is there.
     #[inline]
-    pub(super) fn at(&self, place: Place) -> f64 {
+    pub(super) fn at(&self, place: SheetCoordinate) -> f64 {
         let node = place.node as usize;
         let (before, after) = (self.nodes[node], self.nodes[node + 1]);
         let (tilt, next) = (self.tilts[node], self.tilts[node + 1]);
@@ -89,8 +89,8 @@ impl LineCharge {
     }
 
     /// Changes it where the potential that it makes is not the one that is wanted, or not the same on both sides.
-    pub(super) fn adjust(&mut self, course: &Course, potential: &Grid2, wanted: Wanted) {
-        let Wanted { density, half_thickness, .. } = wanted;
+    pub(super) fn adjust(&mut self, course: &Course, potential: &Grid2, wanted: WantedCharge) {
+        let WantedCharge { density, half_thickness, .. } = wanted;
         let starts = &self.starts;
         let adjust = |(index, (charge, tilt)): (usize, (&mut f64, &mut f64))| {
             let sheet = starts.partition_point(|start| *start <= index) - 1;

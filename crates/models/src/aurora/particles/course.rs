@@ -84,7 +84,7 @@ struct Part {
 
 /// The place of a sheet that is nearest to a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Foot {
+pub(super) struct Projection {
     pub(super) sheet: u32,
     pub(super) share: f64,
     pub(super) flux: f64,
@@ -208,11 +208,11 @@ impl Course {
 
     /// The place nearest to `point`; none beyond the reach.
     #[inline]
-    pub(super) fn foot(&self, point: DVec2) -> Option<Foot> {
+    pub(super) fn foot(&self, point: DVec2) -> Option<Projection> {
         let nearest = self.near.nearest_place(point)?;
         let part = &self.parts[nearest.segment];
         let at = |[start, more]: [f64; 2]| start + nearest.share * more;
-        Some(Foot {
+        Some(Projection {
             sheet: part.sheet,
             share: at(part.share),
             flux: at(part.flux),

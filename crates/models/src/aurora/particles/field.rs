@@ -13,7 +13,7 @@ use fearless_simd::Level;
 use rayon::prelude::*;
 
 use super::{
-    conductor::{LineCharge, Place, Wanted},
+    conductor::{LineCharge, SheetCoordinate, WantedCharge},
     course::Course,
     scatter::Scattered,
 };
@@ -134,9 +134,9 @@ impl FieldMaker {
         // In the middle of a long, straight, lone sheet.
         let reach = self.reach_km();
         let potential = density * reach * reach * (math::exp(-half_thickness / reach) - 1.0);
-        let wanted = Wanted { potential, density, half_thickness };
+        let wanted = WantedCharge { potential, density, half_thickness };
         let mut charge = LineCharge::even(course, self.parameters.cell_km(), self.parameters.particles.count as f64);
-        let places: Vec<(usize, Place)> = scattered
+        let places: Vec<(usize, SheetCoordinate)> = scattered
             .par_iter()
             .with_min_len(TASK)
             .filter_map(|particle| Some((counts.index(particle.place.to_array())?, charge.place(particle))))

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{
     AuroraParticles,
-    course::{Course, Foot},
+    course::{Course, Projection},
     nodes::{Layout, Nodes},
     rays::{Places, RayTable, Rays},
 };
@@ -43,7 +43,7 @@ pub(super) struct Precipitation {
 }
 
 /// A part of the arrays that one task works on.
-struct Stretch<'a> {
+struct ParticleChunk<'a> {
     positions: [&'a [f32]; 2],
     fades: &'a [f32],
     energies: &'a mut [f32],
@@ -90,22 +90,22 @@ impl Precipitation {
         let lengths = course.sheet_lengths();
         let [coarse, fine] = self.layouts(&lengths);
         let weigh = |part| self.weigh(part, (course, &fine), (rays, time));
-        let weighed: Vec<Weighed> = stretches(particles).into_par_iter().map(weigh).collect();
+        let weighed: Vec<Weighed> = chunks(particles).into_par_iter().map(weigh).collect();
         let counts = weighed.iter().fold(Nodes::new(&fine), |sum, part| sum.plus(&part.counts));
         let lengths = Nodes::of_lengths(&fine, &lengths).shared_by(&counts, MOST_UNEVEN);
-        let add_up = |(part, weighed): (Stretch, &Weighed)| part.add_up(&weighed.weights, &lengths, &coarse);
-        let weights: Vec<_> = stretches(particles).into_par_iter().zip(&weighed).map(add_up).collect();
+        let add_up = |(part, weighed): (ParticleChunk, &Weighed)| part.add_up(&weighed.weights, &lengths, &coarse);
+        let weights: Vec<_> = chunks(particles).into_par_iter().zip(&weighed).map(add_up).collect();
         let weights = weights.iter().fold(Nodes::new(&coarse), |sum, part| sum.plus(part));
         let factors = self.wanted(course, &coarse, time).shared_by(&weights, MOST_UNEVEN);
         let given: Vec<[f64; 2]> =
-            stretches(particles).into_par_iter().map(|part| part.brighten(&lengths, &factors)).collect();
+            chunks(particles).into_par_iter().map(|part| part.brighten(&lengths, &factors)).collect();
         balance(particles, &given);
     }
 
-    /// Weighs a stretch of particles, as negative powers while they wait for their factors.
+    /// Weighs a chunk of particles, as negative powers while they wait for their factors.
     fn weigh<'a>(
         &self,
-        part: Stretch,
+        part: ParticleChunk,
         (course, layout): (&Course, &'a Layout),
         (rays, time): (&RayTable, f64),
     ) -> Weighed<'a> {
@@ -114,7 +114,7 @@ impl Precipitation {
         let side_scale = 1.0 / self.parameters.half_thickness_km();
         for first in (0..part.fades.len()).step_by(LANES) {
             let count = LANES.min(part.fades.len() - first);
-            let mut feet: [Option<Foot>; LANES] = [None; LANES];
+            let mut feet: [Option<Projection>; LANES] = [None; LANES];
             let mut places = Places { noises: [[0.0; 4]; LANES], side: [0.0; LANES] };
             for lane in 0..count {
                 let Some(foot) = part.foot(course, first + lane) else { continue };
@@ -144,7 +144,7 @@ impl Precipitation {
     }
 }
 
-/// A stretch of particles, weighed.
+/// A chunk of particles, weighed.
 struct Weighed<'a> {
     /// How many there are along the sheets.
     counts: Nodes<'a>,
@@ -152,8 +152,8 @@ struct Weighed<'a> {
     weights: Vec<f32>,
 }
 
-impl Stretch<'_> {
-    fn foot(&self, course: &Course, index: usize) -> Option<Foot> {
+impl ParticleChunk<'_> {
+    fn foot(&self, course: &Course, index: usize) -> Option<Projection> {
         course.foot([f64::from(self.positions[0][index]), f64::from(self.positions[1][index])].into())
     }
 
@@ -197,13 +197,13 @@ fn balance(particles: &mut AuroraParticles, given: &[[f64; 2]]) {
     }
 }
 
-fn stretches(particles: &mut AuroraParticles) -> Vec<Stretch<'_>> {
+fn chunks(particles: &mut AuroraParticles) -> Vec<ParticleChunk<'_>> {
     let [xs, zs] = &particles.positions;
     let reads = xs.chunks(TASK).zip(zs.chunks(TASK)).zip(particles.fades.chunks(TASK));
     let powers = particles.powers_w.chunks_mut(TASK).zip(particles.full_powers_w.chunks_mut(TASK));
     let light = particles.energies_ev.chunks_mut(TASK).zip(powers);
     let places = particles.shares.chunks_mut(TASK).zip(particles.sheets.chunks_mut(TASK));
-    let stretch = |(((xs, zs), fades), ((energies, (powers, full_powers)), (shares, sheets)))| Stretch {
+    let chunk = |(((xs, zs), fades), ((energies, (powers, full_powers)), (shares, sheets)))| ParticleChunk {
         positions: [xs, zs],
         fades,
         energies,
@@ -212,7 +212,7 @@ fn stretches(particles: &mut AuroraParticles) -> Vec<Stretch<'_>> {
         shares,
         sheets,
     };
-    reads.zip(light.zip(places)).map(stretch).collect()
+    reads.zip(light.zip(places)).map(chunk).collect()
 }
 
 #[cfg(test)]

@@ -36,7 +36,7 @@ pub struct AuroraSimulation {
     repulsion: Repulsion,
     mover: Mover,
     precipitation: Precipitation,
-    state: State,
+    state: SimulationState,
     /// The in-between shape that the particles are drawn to, and what follows from it alone.
     target: Target,
 }
@@ -53,7 +53,7 @@ struct Making {
 
 /// What a step changes.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct State {
+pub(super) struct SimulationState {
     pub(super) steps: u64,
     pub(super) next_id: u64,
     /// Support radius h of the repulsion, km.
@@ -93,7 +93,7 @@ impl Making {
     }
 
     /// The target that a state speaks of.
-    fn target(&self, state: &State) -> Target {
+    fn target(&self, state: &SimulationState) -> Target {
         let course = self.course(&state.target_along, state.target_time);
         let count = self.parameters.particles.count as usize;
         let scattered = scatter(&course, self.parameters.half_thickness_km(), count, self.key, state.renewals);
@@ -106,7 +106,7 @@ impl Making {
 }
 
 /// Forces and motion; particles appear and vanish, and those that have vanished are gone.
-fn advance(state: &mut State, target: &Target, (repulsion, mover): (&mut Repulsion, &Mover), fade_s: f64) {
+fn advance(state: &mut SimulationState, target: &Target, (repulsion, mover): (&mut Repulsion, &Mover), fade_s: f64) {
     state.support_km = repulsion.find(&mut state.particles, state.support_km, target.rest_density);
     let particles = &mut state.particles;
     mover.advance(particles, &target.field, &repulsion.accelerations);
@@ -132,7 +132,7 @@ impl AuroraSimulation {
         let along = Along::begin(&sequence.at(time), &sequence.listing(time));
         let repulsion = Repulsion::new(&parameters);
         let precipitation = Precipitation::new(&parameters, key);
-        let mut state = State {
+        let mut state = SimulationState {
             steps: 0,
             next_id: 0,
             support_km: parameters.cell_km(),

@@ -2,7 +2,7 @@
 
 use bansho_base::{math::DVec2, phenomenon::SnapshotError};
 
-use super::{AuroraParticles, along::Along, population::NUMBERS, simulation::State};
+use super::{AuroraParticles, along::Along, population::NUMBERS, simulation::SimulationState};
 use crate::aurora::afterglow::{Afterglow, GlowMap};
 
 const VERSION: u32 = 3;
@@ -57,7 +57,7 @@ impl Source<'_> {
     }
 }
 
-pub(super) fn write(state: &State) -> Vec<u8> {
+pub(super) fn write(state: &SimulationState) -> Vec<u8> {
     let mut bytes = Vec::new();
     VERSION.put(&mut bytes);
     state.steps.put(&mut bytes);
@@ -76,13 +76,13 @@ pub(super) fn write(state: &State) -> Vec<u8> {
 }
 
 /// The state in `bytes`, whose afterglow has the layout of `like`.
-pub(super) fn read(bytes: &[u8], like: &State) -> Result<State, SnapshotError> {
+pub(super) fn read(bytes: &[u8], like: &SimulationState) -> Result<SimulationState, SnapshotError> {
     let mut source = Source(bytes);
     let found = source.item::<u32>()?;
     if found != VERSION {
         return Err(SnapshotError::Version { found, known: VERSION });
     }
-    let state = State {
+    let state = SimulationState {
         steps: source.item()?,
         next_id: source.item()?,
         support_km: source.item()?,
@@ -100,7 +100,7 @@ pub(super) fn read(bytes: &[u8], like: &State) -> Result<State, SnapshotError> {
 }
 
 /// Whether a state has only numbers, and counts that can go on.
-fn is_possible(state: &State) -> bool {
+fn is_possible(state: &SimulationState) -> bool {
     let finite = |along: &Along| {
         along.sheets.iter().flatten().all(|coordinate| coordinate.is_finite())
             && along.points.iter().flatten().all(|point| point.is_finite())

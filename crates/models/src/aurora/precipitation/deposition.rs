@@ -2,7 +2,7 @@
 
 use super::{
     energy::{self, NODES, node_energy_ev},
-    fang::{Layer, Monoenergetic},
+    fang::{AirLayer, Monoenergetic},
     hard_sphere::{DEFAULT_RADIUS, HardSphere},
     spectrum::Spectrum,
 };
@@ -32,7 +32,7 @@ impl Deposition {
     /// The table for a spectrum. A few milliseconds.
     #[must_use]
     pub fn new(air: &Atmosphere, spectrum: Spectrum) -> Self {
-        let layers: Vec<Layer> = air.levels().iter().map(Layer::new).collect();
+        let layers: Vec<AirLayer> = air.levels().iter().map(AirLayer::new).collect();
         let monoenergetic: Vec<Profile> = (0..NODES)
             .into_par_iter()
             .map(|node| {
@@ -179,7 +179,7 @@ mod tests {
             let beam = Monoenergetic::new(energy_ev);
             let (mut difference, mut sum) = (0.0, 0.0);
             for (level, air) in atmosphere().levels().iter().enumerate() {
-                let expected = beam.ionisation(&Layer::new(air));
+                let expected = beam.ionisation(&AirLayer::new(air));
                 difference += (table.ionisation(energy_ev, level_altitude_km(level)) - expected).abs();
                 sum += expected;
             }

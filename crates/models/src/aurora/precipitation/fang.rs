@@ -24,14 +24,14 @@ const COLUMN_SCALE: f64 = 6e-5;
 
 /// What the deposition at an altitude takes from the air, whatever the energy.
 #[derive(Clone, Copy, Debug)]
-pub struct Layer {
+pub struct AirLayer {
     /// ln (rho H / 6e-6 g cm^-2)^0.7, of equation (1): y = 2/E times that power, E in keV.
     ln_column: f64,
     /// Ion pairs, m^-3 s^-1 per mW m^-2, where the whole energy is spent over a scale height.
     pairs_per_share: f64,
 }
 
-impl Layer {
+impl AirLayer {
     /// For this air.
     #[must_use]
     pub fn new(air: &Air) -> Self {
@@ -68,7 +68,7 @@ impl Monoenergetic {
 
     /// Ion pairs made each second, m^-3 s^-1 per mW m^-2 of incident energy flux (2).
     #[must_use]
-    pub fn ionisation(&self, layer: &Layer) -> f64 {
+    pub fn ionisation(&self, layer: &AirLayer) -> f64 {
         let ln_y = std::f64::consts::LN_2 - self.ln_energy + layer.ln_column;
         self.share(ln_y) * layer.pairs_per_share
     }
@@ -92,7 +92,7 @@ mod tests {
             for row in rows(include_str!("data/fang2010_profiles.csv")) {
                 // Below this the wing is 1e-6 of the peak and less.
                 if row[column] > 1e4 {
-                    let q = beam.ionisation(&Layer::new(&atmosphere().at(row[0])));
+                    let q = beam.ionisation(&AirLayer::new(&atmosphere().at(row[0])));
                     assert!((q / row[column] - 1.0).abs() < 1e-3, "{energy_ev} eV, {} km: {q}", row[0]);
                     compared += 1;
                 }
@@ -105,7 +105,8 @@ mod tests {
     fn peaks_and_columns_are_those_of_the_reference() {
         for row in rows(include_str!("data/fang2010_peaks.csv")) {
             let beam = Monoenergetic::new(row[0] * 1e3);
-            let profile: Vec<f64> = atmosphere().levels().iter().map(|air| beam.ionisation(&Layer::new(air))).collect();
+            let profile: Vec<f64> =
+                atmosphere().levels().iter().map(|air| beam.ionisation(&AirLayer::new(air))).collect();
             let peak = (0..LEVELS).max_by(|a, b| profile[*a].total_cmp(&profile[*b])).unwrap();
             assert!((level_altitude_km(peak) - row[1]).abs() < 0.6, "{} keV: {peak}", row[0]);
             assert!((profile[peak] / row[2] - 1.0).abs() < 0.01);

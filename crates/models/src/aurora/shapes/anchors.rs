@@ -3,7 +3,7 @@
 use super::{
     LinkParameters, ShapeFault, ShapeFaultKind,
     change::{Change, sheet_index},
-    matching::Wanted,
+    matching::WantedMatch,
     polyline::shares,
     track::Track,
 };
@@ -15,7 +15,7 @@ const END: f64 = 1e-3;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Anchors {
     /// What each chain of strands must become.
-    pub(super) wanted: Vec<Wanted>,
+    pub(super) wanted: Vec<WantedMatch>,
     /// Tracks, and the share of their new sheet's length at which they must arrive.
     points: Vec<(usize, f64)>,
 }
@@ -32,7 +32,7 @@ impl Anchors {
         change: &Change,
         tracks: &[Track],
     ) -> Result<Self, ShapeFault> {
-        let mut anchors = Self { wanted: vec![Wanted::default(); change.chains.len()], points: Vec::new() };
+        let mut anchors = Self { wanted: vec![WantedMatch::default(); change.chains.len()], points: Vec::new() };
         for (number, link) in links.iter().enumerate() {
             let fault = |kind| ShapeFault { key: format!("shapes.{index}.link.{number}"), kind };
             let from = sheet_index(link.from, sheets.len()).map_err(fault)?;

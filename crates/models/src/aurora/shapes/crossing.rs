@@ -16,7 +16,7 @@ pub struct SegmentId {
 }
 
 #[derive(Clone, Copy)]
-struct Segment {
+struct SheetSegment {
     id: SegmentId,
     ends: [DVec2; 2],
     /// Whether it goes on from the one before it in the list.
@@ -65,12 +65,12 @@ pub(super) fn crossing_sheets<S: AsRef<[DVec2]>>(sheets: &[S]) -> BTreeSet<usize
 }
 
 /// All segments that have a length, in order.
-fn segments<S: AsRef<[DVec2]>>(sheets: &[S]) -> Vec<Segment> {
+fn segments<S: AsRef<[DVec2]>>(sheets: &[S]) -> Vec<SheetSegment> {
     let mut list = Vec::new();
     for (sheet, points) in sheets.iter().enumerate() {
         let mut continues = false;
         for (segment, pair) in points.as_ref().windows(2).enumerate().filter(|(_, pair)| pair[0] != pair[1]) {
-            list.push(Segment { id: SegmentId { sheet, segment }, ends: [pair[0], pair[1]], continues });
+            list.push(SheetSegment { id: SegmentId { sheet, segment }, ends: [pair[0], pair[1]], continues });
             continues = true;
         }
     }
@@ -78,7 +78,7 @@ fn segments<S: AsRef<[DVec2]>>(sheets: &[S]) -> Vec<Segment> {
 }
 
 /// Cells about as long as a segment, and not many more than there are segments, since all of them are cleared.
-fn grid(segments: &[Segment]) -> CellGrid {
+fn grid(segments: &[SheetSegment]) -> CellGrid {
     let ends = || segments.iter().flat_map(|segment| segment.ends);
     let low = ends().fold(DVec2::INFINITY, DVec2::min);
     let high = ends().fold(DVec2::NEG_INFINITY, DVec2::max);
@@ -129,7 +129,7 @@ fn side(a: DVec2, b: DVec2, point: DVec2) -> f64 {
     (b - a).perp_dot(point - a)
 }
 
-fn meets(first: &Segment, second: &Segment, follows: bool, meeting: Meeting) -> bool {
+fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Meeting) -> bool {
     let [[a, b], [c, d]] = [first.ends, second.ends];
     if follows {
         // They share a point; they meet elsewhere only if the second runs back over the first.

@@ -1,10 +1,7 @@
 //! From parameters to drawn sheets, checked one by one and against each other.
 
-use std::sync::Arc;
-
 use bansho_base::{
     assets::{AssetError, AssetProblem, Assets},
-    curve::Curve,
     drawing::Drawing,
     math::{self, DVec2},
     parameters::Auto,
@@ -13,6 +10,7 @@ use bansho_base::{
 use super::{
     SegmentId, ShapeFault, ShapeFaultKind, ShapeParameters, SheetParameters, Spacing,
     crossing::first_crossing,
+    factors::Factors,
     polyline::{Polyline, by_recorded_points, smoothed},
 };
 
@@ -35,8 +33,7 @@ pub(super) struct DrawnSheet {
     origins: Vec<usize>,
     /// Pieces of the line between two recorded points.
     pieces: usize,
-    /// Flux and energy along it.
-    pub(super) curves: Arc<[Curve; 2]>,
+    pub(super) factors: Factors,
     /// The parameter that it comes from, below `sheets`, and whether that lists points.
     entry: usize,
     lists_points: bool,
@@ -59,12 +56,12 @@ impl DrawnSheet {
 
 /// Where a shape stands in the parameters, and the square that it must lie in.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct ShapeContext {
     pub(super) shape: usize,
     pub(super) extent_km: f64,
 }
 
-impl Place {
+impl ShapeContext {
     fn fault(self, key: &str, kind: ShapeFaultKind) -> ShapeFault {
         ShapeFault { key: format!("shapes.{}{key}", self.shape), kind }
     }
@@ -82,7 +79,7 @@ impl Place {
 /// The first sheet that is no line, leaves the square, or meets itself or another.
 pub(super) fn drawn_sheets(
     parameters: &ShapeParameters,
-    place: Place,
+    place: ShapeContext,
     assets: &dyn Assets,
 ) -> Result<Vec<DrawnSheet>, ShapeFault> {
     let arc = [SheetParameters::default()];
@@ -104,7 +101,7 @@ pub(super) fn drawn_sheets(
 fn draw_entry(
     parameters: &SheetParameters,
     entry: usize,
-    place: Place,
+    place: ShapeContext,
     assets: &dyn Assets,
     sheets: &mut Vec<DrawnSheet>,
 ) -> Result<(), ShapeFault> {
@@ -126,12 +123,12 @@ fn draw_entry(
         (None, None, _) => vec![form_line(parameters, place.extent_km)],
         _ => return Err(fault("", ShapeFaultKind::SeveralSources { sheet: sheets.len() + 1 })),
     };
-    let curves = Arc::new([parameters.flux.clone(), parameters.energy.clone()]);
+    let factors = Factors::new(parameters);
     for copy in 0..parameters.copies {
         let offset = (copy as f64 - (parameters.copies - 1) as f64 / 2.0) * parameters.spacing_km;
         for stroke in &strokes {
             let placed = stroke.iter().map(|&point| placed(point, offset, parameters)).collect();
-            let sheet = sheet(placed, parameters, entry, curves.clone()).map_err(|found| {
+            let sheet = sheet(placed, parameters, entry, factors.clone()).map_err(|found| {
                 let key = if parameters.points.is_some() { ".points" } else { "" };
                 fault(key, ShapeFaultKind::TooFewPoints { sheet: sheets.len() + 1, found })
             })?;
@@ -149,7 +146,7 @@ fn sheet(
     points: Vec<DVec2>,
     parameters: &SheetParameters,
     entry: usize,
-    curves: Arc<[Curve; 2]>,
+    factors: Factors,
 ) -> Result<DrawnSheet, usize> {
     let mut recorded: Vec<DVec2> = Vec::with_capacity(points.len());
     let mut origins = Vec::with_capacity(points.len());
@@ -161,7 +158,7 @@ fn sheet(
     }
     let (line, pieces) = if parameters.smooth { smoothed(recorded.clone()) } else { (recorded.clone(), 1) };
     let line = Polyline::new(line).filter(|_| recorded.len() > 1).ok_or(recorded.len())?;
-    Ok(DrawnSheet { line, recorded, origins, pieces, curves, entry, lists_points: parameters.points.is_some() })
+    Ok(DrawnSheet { line, recorded, origins, pieces, factors, entry, lists_points: parameters.points.is_some() })
 }
 
 fn form_line(parameters: &SheetParameters, extent_km: f64) -> Vec<DVec2> {
@@ -202,7 +199,7 @@ fn fitted(points: &[DVec2], drawing: &Drawing, extent_km: f64) -> Vec<DVec2> {
 }
 
 /// The points that were given come first, so that a fault names one of them; then the smooth line between them.
-fn check_extent(sheets: &[DrawnSheet], place: Place) -> Result<(), ShapeFault> {
+fn check_extent(sheets: &[DrawnSheet], place: ShapeContext) -> Result<(), ShapeFault> {
     let half = place.extent_km / 2.0;
     let outside = |point: &DVec2| point.abs().max_element() > half;
     for (index, sheet) in sheets.iter().enumerate() {
@@ -221,7 +218,7 @@ fn check_extent(sheets: &[DrawnSheet], place: Place) -> Result<(), ShapeFault> {
     Ok(())
 }
 
-fn check_crossings(sheets: &[DrawnSheet], place: Place) -> Result<(), ShapeFault> {
+fn check_crossings(sheets: &[DrawnSheet], place: ShapeContext) -> Result<(), ShapeFault> {
     let lines: Vec<&[DVec2]> = sheets.iter().map(|sheet| sheet.line.points()).collect();
     let Some([earlier, later]) = first_crossing(&lines) else { return Ok(()) };
     let point = |at: SegmentId| sheets[at.sheet].origin(at.segment) + 1;

@@ -1,12 +1,12 @@
 //! From drawn shapes to control points that are followed from shape to shape.
 
-use bansho_base::{assets::Assets, curve::Curve, math::DVec2};
+use bansho_base::{assets::Assets, math::DVec2};
 
 use super::{
     Correspondence, MotionParameters, ShapeFault, ShapeFaultKind, ShapeParameters,
     anchors::Anchors,
     change::{Change, Link},
-    drawn::{DrawnSheet, Place, drawn_sheets},
+    drawn::{DrawnSheet, ShapeContext, drawn_sheets},
     gap::Gap,
     matching::{Match, match_sheets},
     polyline::{Polyline, shares},
@@ -45,7 +45,7 @@ pub(super) fn drawn_shapes(
     extent_km: f64,
     assets: &dyn Assets,
 ) -> Result<Vec<Vec<DrawnSheet>>, ShapeFault> {
-    let draw = |(shape, parameters)| drawn_sheets(parameters, Place { shape, extent_km }, assets);
+    let draw = |(shape, parameters)| drawn_sheets(parameters, ShapeContext { shape, extent_km }, assets);
     shapes.iter().enumerate().map(draw).collect()
 }
 
@@ -128,31 +128,16 @@ fn same(first: &[DrawnSheet], last: &[DrawnSheet], extent_km: f64) -> bool {
     let near = |a: &DVec2, b: &DVec2| a.distance(*b) < 1e-6 * extent_km;
     let same_sheet = |(a, b): (&DrawnSheet, &DrawnSheet)| {
         let [first, last] = [a, b].map(|sheet| sheet.line.evenly(SAMPLES));
-        first.iter().zip(&last).all(|(a, b)| near(a, b)) && same_curves(&a.curves, &b.curves)
+        first.iter().zip(&last).all(|(a, b)| near(a, b)) && a.factors.are_those_of(&b.factors)
     };
     first.len() == last.len() && first.iter().zip(last).all(same_sheet)
-}
-
-/// Whether flux and energy are the same at every place where a control point may be.
-fn same_curves(first: &[Curve; 2], last: &[Curve; 2]) -> bool {
-    const SAMPLES: usize = 512;
-    let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
-    let same_at = |share: f64| {
-        let [a, b] = [values(first, share), values(last, share)];
-        near(a[0], b[0]) && near(a[1], b[1])
-    };
-    first == last || (0..=SAMPLES).all(|sample| same_at(sample as f64 / SAMPLES as f64))
-}
-
-fn values(curves: &[Curve; 2], share: f64) -> [f64; 2] {
-    [0, 1].map(|index| curves[index].eval(share))
 }
 
 /// Control points of a sheet with flux and energy there.
 fn control_knots(sheet: &DrawnSheet, count: usize, motion: &MotionParameters) -> Vec<Knot> {
     let points = sheet.control_points(count, motion.spacing);
     let shares = shares(&points);
-    let knot = |(position, share): (DVec2, f64)| Knot { position, values: values(&sheet.curves, share) };
+    let knot = |(position, share): (DVec2, f64)| Knot { position, values: sheet.factors.at(share) };
     points.into_iter().zip(shares).map(knot).collect()
 }
 
@@ -265,8 +250,7 @@ impl Followed {
             let knots: Vec<Knot> = match again {
                 Some(first) => first.iter().map(|&track| self.tracks[track].knot(0)).collect(),
                 None => {
-                    let knot =
-                        |share: f64| Knot { position: drawn.line.at(share), values: values(&drawn.curves, share) };
+                    let knot = |share: f64| Knot { position: drawn.line.at(share), values: drawn.factors.at(share) };
                     warp_through(points, &drawn.line, range, &linked, *evenness).into_iter().map(knot).collect()
                 }
             };

@@ -25,7 +25,7 @@ pub(super) struct Gap {
 
 /// A gap at a moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct State {
+pub(super) struct GapFlux {
     /// Factor of the flux at both ends.
     pub(super) ends: f64,
     /// Factor of the flux across the gap.
@@ -43,7 +43,7 @@ pub struct Bridge {
     pub energy: f64,
 }
 
-impl State {
+impl GapFlux {
     /// A gap of `width` km that is `widest` km when it is widest, at a share of the time from where it is closed to there.
     pub(super) fn new(width: f64, widest: f64, share: f64) -> Self {
         let limit = BRIDGED_KM.min(0.5 * widest);
@@ -74,14 +74,14 @@ mod tests {
 
     #[test]
     fn light_passes_over_narrow_gaps_only_and_ends_are_as_drawn_at_the_wide_side() {
-        assert_eq!(State::new(0.0, 100.0, 0.0), State { ends: 1.0, across: 1.0 });
-        assert_eq!(State::new(41.0, 100.0, 0.5), State { ends: 0.0, across: 0.0 });
-        assert_eq!(State::new(100.0, 100.0, 1.0), State { ends: 1.0, across: 0.0 });
-        let half = State::new(20.0, 100.0, 0.3);
+        assert_eq!(GapFlux::new(0.0, 100.0, 0.0), GapFlux { ends: 1.0, across: 1.0 });
+        assert_eq!(GapFlux::new(41.0, 100.0, 0.5), GapFlux { ends: 0.0, across: 0.0 });
+        assert_eq!(GapFlux::new(100.0, 100.0, 1.0), GapFlux { ends: 1.0, across: 0.0 });
+        let half = GapFlux::new(20.0, 100.0, 0.3);
         assert!((half.ends - 0.5).abs() < 1e-12 && half.across == half.ends);
         // A gap that never gets wide is dark by half of its width.
-        assert_eq!(State::new(4.0, 8.0, 0.5).across, 0.0);
-        assert_eq!(State::new(0.0, 0.0, 0.5).across, 1.0);
+        assert_eq!(GapFlux::new(4.0, 8.0, 0.5).across, 0.0);
+        assert_eq!(GapFlux::new(0.0, 0.0, 0.5).across, 1.0);
     }
 
     #[test]

@@ -30,12 +30,12 @@ pub(super) struct Match {
 
 /// What a person asks of a sheet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Wanted {
+pub(super) struct WantedMatch {
     pub(super) target: Option<usize>,
     pub(super) reversed: Option<bool>,
 }
 
-impl Wanted {
+impl WantedMatch {
     fn allows(&self, of: Match) -> bool {
         self.target.is_none_or(|target| target == of.target) && self.reversed.is_none_or(|turned| turned == of.reversed)
     }
@@ -43,7 +43,7 @@ impl Wanted {
 
 /// Sheets and targets as evenly spaced points, as many of one as of the other.
 struct Comparison<'a> {
-    wanted: &'a [Wanted],
+    wanted: &'a [WantedMatch],
     sources: Vec<Vec<DVec2>>,
     targets: Vec<Vec<DVec2>>,
     /// Mean length of a sheet and its target weighs their motion.
@@ -52,7 +52,7 @@ struct Comparison<'a> {
 
 /// The target of each source such that all together move least, and no two cross on the way where that can be had by
 /// exchanging two targets or turning one round. What is `wanted` of a source comes first.
-pub(super) fn match_sheets(sources: &[Polyline], targets: &[&Polyline], wanted: &[Wanted]) -> Vec<Match> {
+pub(super) fn match_sheets(sources: &[Polyline], targets: &[&Polyline], wanted: &[WantedMatch]) -> Vec<Match> {
     let comparison = Comparison {
         wanted,
         sources: sources.iter().map(|line| line.evenly(SAMPLES)).collect(),
@@ -150,7 +150,9 @@ impl Comparison<'_> {
             changes.extend(allowed);
         }
         let more = |change: &[(usize, Match); 2]| -> f64 {
-            change.iter().map(|(source, of)| self.motion(*source, *of) - self.motion(*source, matches[*source])).sum()
+            // A sheet that turns stands here twice.
+            let changed = if change[0].0 == change[1].0 { &change[..1] } else { change };
+            changed.iter().map(|(source, of)| self.motion(*source, *of) - self.motion(*source, matches[*source])).sum()
         };
         if changes.len() > most {
             changes.sort_by(|a, b| more(a).total_cmp(&more(b)));
@@ -184,10 +186,10 @@ mod tests {
     }
 
     fn matches(sources: &[Polyline], targets: &[Polyline]) -> Vec<(usize, bool)> {
-        wanted_matches(sources, targets, &vec![Wanted::default(); sources.len()])
+        wanted_matches(sources, targets, &vec![WantedMatch::default(); sources.len()])
     }
 
-    fn wanted_matches(sources: &[Polyline], targets: &[Polyline], wanted: &[Wanted]) -> Vec<(usize, bool)> {
+    fn wanted_matches(sources: &[Polyline], targets: &[Polyline], wanted: &[WantedMatch]) -> Vec<(usize, bool)> {
         let found = match_sheets(sources, &targets.iter().collect::<Vec<_>>(), wanted);
         found.into_iter().map(|of| (of.target, of.reversed)).collect()
     }
@@ -203,7 +205,7 @@ mod tests {
     fn what_a_person_wants_comes_before_what_is_near() {
         let sources = [line([0.0, 0.0], [10.0, 0.0]), line([0.0, 5.0], [10.0, 5.0])];
         let targets = [line([10.0, 6.0], [0.0, 6.0]), line([0.0, 1.0], [10.0, 1.0])];
-        let mut wanted = [Wanted::default(), Wanted { target: Some(1), reversed: None }];
+        let mut wanted = [WantedMatch::default(), WantedMatch { target: Some(1), reversed: None }];
         assert_eq!(wanted_matches(&sources, &targets, &wanted), [(0, true), (1, false)]);
         wanted[1].reversed = Some(true);
         assert_eq!(wanted_matches(&sources, &targets, &wanted), [(0, true), (1, true)]);
@@ -222,7 +224,7 @@ mod tests {
     fn sheets_that_would_cross_midway_are_turned() {
         let sources = [line([0.0, 0.0], [10.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])];
         let targets = [line([1.0, 10.0], [0.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])];
-        let wanted = [Wanted::default(); 2];
+        let wanted = [WantedMatch::default(); 2];
         let found = match_sheets(&sources, &targets.iter().collect::<Vec<_>>(), &wanted);
         let comparison = comparison(&sources, &targets, &wanted);
         let through = [Match { target: 0, reversed: true }, Match { target: 1, reversed: false }];
@@ -230,7 +232,7 @@ mod tests {
         assert_eq!(comparison.crossings(&found), 0);
     }
 
-    fn comparison<'a>(sources: &[Polyline], targets: &[Polyline], wanted: &'a [Wanted]) -> Comparison<'a> {
+    fn comparison<'a>(sources: &[Polyline], targets: &[Polyline], wanted: &'a [WantedMatch]) -> Comparison<'a> {
         let sampled = |line: &Polyline| line.evenly(SAMPLES);
         Comparison {
             wanted,
@@ -248,7 +250,7 @@ mod tests {
         let with_rows = |two: [Polyline; 2]| two.into_iter().chain(rows()).collect::<Vec<_>>();
         let sources = with_rows([line([0.0, 0.0], [10.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])]);
         let targets = with_rows([line([1.0, 10.0], [0.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])]);
-        let wanted = vec![Wanted::default(); MANY + 2];
+        let wanted = vec![WantedMatch::default(); MANY + 2];
         let comparison = comparison(&sources, &targets, &wanted);
         let through: Vec<Match> = (0..MANY + 2).map(|target| Match { target, reversed: target == 0 }).collect();
         assert!(comparison.crossings(&through) > 0);

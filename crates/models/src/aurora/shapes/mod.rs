@@ -11,6 +11,7 @@ mod cells;
 mod change;
 mod crossing;
 mod drawn;
+mod factors;
 mod fault;
 mod follow;
 mod form;

@@ -18,7 +18,7 @@ pub struct Neighbourhood {
     grid: CellGrid,
     /// Where the list of each cell begins in `lists`, and where the last one ends.
     starts: Vec<u32>,
-    lists: Vec<Segment>,
+    lists: Vec<ListedSegment>,
 }
 
 /// The place of a shape that is nearest to a point.
@@ -36,7 +36,7 @@ pub(in crate::aurora) struct Nearest {
 
 /// A segment: its number, its start, the way to its end, and one over the square of its length (0 where it has none).
 #[derive(Clone, Copy, Debug)]
-struct Segment {
+struct ListedSegment {
     number: u32,
     start: DVec2,
     way: DVec2,
@@ -47,8 +47,8 @@ impl Neighbourhood {
     /// What lies within `reach` km of `shape`.
     pub fn new(shape: &Shape, reach: f64) -> Self {
         let pairs = shape.sheets.iter().flat_map(|sheet| sheet.points.windows(2));
-        let segments: Vec<Segment> =
-            pairs.zip(0..).map(|(pair, number)| Segment::new(number, pair[0], pair[1])).collect();
+        let segments: Vec<ListedSegment> =
+            pairs.zip(0..).map(|(pair, number)| ListedSegment::new(number, pair[0], pair[1])).collect();
         let ends = || segments.iter().flat_map(|segment| [segment.start, segment.start + segment.way]);
         let low = ends().fold(DVec2::INFINITY, DVec2::min);
         let high = ends().fold(DVec2::NEG_INFINITY, DVec2::max);
@@ -105,7 +105,7 @@ struct Run {
 
 /// The segments that can be nearest to a place within `reach` in each cell, one cell's after those of another, and where each cell's begin:
 /// those no farther from its middle than the nearest one by more than twice the way from there to its corners.
-fn nearest_ones(grid: &CellGrid, segments: &[Segment], reach: f64) -> (Vec<u32>, Vec<Segment>) {
+fn nearest_ones(grid: &CellGrid, segments: &[ListedSegment], reach: f64) -> (Vec<u32>, Vec<ListedSegment>) {
     let (mut runs, mut squares) = (Vec::new(), Vec::new());
     let mut least = vec![f32::INFINITY; grid.count()];
     for (number, segment) in segments.iter().enumerate() {
@@ -139,7 +139,7 @@ fn nearest_ones(grid: &CellGrid, segments: &[Segment], reach: f64) -> (Vec<u32>,
         starts[cell + 1] += starts[cell];
     }
     let mut next = starts.clone();
-    let mut lists = vec![Segment::new(0, DVec2::ZERO, DVec2::ZERO); starts[grid.count()] as usize];
+    let mut lists = vec![ListedSegment::new(0, DVec2::ZERO, DVec2::ZERO); starts[grid.count()] as usize];
     for_each_kept(&mut |cell, segment| {
         lists[next[cell] as usize] = segments[segment as usize];
         next[cell] += 1;
@@ -147,7 +147,7 @@ fn nearest_ones(grid: &CellGrid, segments: &[Segment], reach: f64) -> (Vec<u32>,
     (starts, lists)
 }
 
-impl Segment {
+impl ListedSegment {
     fn new(number: u32, start: DVec2, end: DVec2) -> Self {
         let square = start.distance_squared(end);
         let inverse_square = if square > 0.0 { 1.0 / square } else { 0.0 };
@@ -209,8 +209,8 @@ mod tests {
         let shape = Shape { sheets };
         let near = Neighbourhood::new(&shape, 7.0);
         let pairs = shape.sheets.iter().flat_map(|sheet| sheet.points.windows(2));
-        let segments: Vec<Segment> =
-            pairs.zip(0..).map(|(pair, number)| Segment::new(number, pair[0], pair[1])).collect();
+        let segments: Vec<ListedSegment> =
+            pairs.zip(0..).map(|(pair, number)| ListedSegment::new(number, pair[0], pair[1])).collect();
         let mut within = 0;
         for probe in 0..5_000 {
             let point = random(1000 + probe) * 1.2;

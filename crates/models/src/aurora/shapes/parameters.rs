@@ -77,6 +77,8 @@ bansho_base::parameters! {
         smooth: bool = true;
         /// Flux along the sheet as a factor of the aurora's, over the share of its length.
         flux: Curve = even(), limits(CurveLimits::unit_to(0.0, 100.0));
+        /// Share of the sheet's length over which its flux rises from nothing, at both ends; 0 lets it begin at once, as in the thesis.
+        fade: f64 = 0.3, limits(Range::new(0.0, 0.5));
         /// Energy along the sheet as a factor of the aurora's, over the share of its length.
         energy: Curve = even(), limits(CurveLimits::unit_to(0.05, 20.0));
     }

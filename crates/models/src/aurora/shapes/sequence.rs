@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::{
     Correspondence, FRAME_S, MotionParameters, Shape, ShapeFault, ShapeFaultKind, ShapeParameters, Sheet,
     follow::{Followed, drawn_shapes, follow},
-    gap::{self, Bridge, Gap},
+    gap::{self, Bridge, Gap, GapFlux},
     parameters::TRANSITION_S,
     passing::passes,
     track::{Knot, Timing, find_velocities},
@@ -176,13 +176,13 @@ impl Sequence {
     }
 
     /// A gap on the way from shape `index`, and its two ends.
-    fn gap(&self, gap: &Gap, index: usize, share: f64) -> (gap::State, [Knot; 2]) {
+    fn gap(&self, gap: &Gap, index: usize, share: f64) -> (GapFlux, [Knot; 2]) {
         let tracks = gap.ends.map(|track| &self.followed.tracks[track]);
         let width = |[a, b]: [Knot; 2]| a.position.distance(b.position);
         let now = tracks.map(|track| track.between(index, share, &self.timing));
         let widest = tracks.map(|track| track.knot(index + usize::from(gap.opens)));
         let from_closed = if gap.opens { share } else { 1.0 - share };
-        (gap::State::new(width(now), width(widest), from_closed), now)
+        (GapFlux::new(width(now), width(widest), from_closed), now)
     }
 
     /// The strand on the way from shape `index` that a control point ends, and whether it does so at its end or at its start.

@@ -13,7 +13,7 @@ use super::*;
 const EXTENT_KM: f64 = 1000.0;
 
 fn sheet(points: &[[f64; 2]]) -> SheetParameters {
-    SheetParameters { points: Some(points.to_vec()), smooth: false, ..SheetParameters::default() }
+    SheetParameters { points: Some(points.to_vec()), smooth: false, fade: 0.0, ..SheetParameters::default() }
 }
 
 fn shape(sheets: Vec<SheetParameters>) -> ShapeParameters {

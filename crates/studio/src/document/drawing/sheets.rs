@@ -77,7 +77,8 @@ impl Drawing {
         let entry = |(sheet, line): (usize, &Vec<DVec2>)| {
             let along = |factor| along(line, &self.factors(shape, sheet, factor));
             let [flux, energy] = [Factor::Flux, Factor::Energy].map(along);
-            SheetParameters { flux, energy, ..with_points(&SheetParameters::default(), self.written(line)) }
+            // Their fading ends are in the factors.
+            SheetParameters { flux, energy, fade: 0.0, ..with_points(&SheetParameters::default(), self.written(line)) }
         };
         lines.iter().enumerate().map(entry).collect()
     }
@@ -120,6 +121,7 @@ pub(super) fn with_points(sheet: &SheetParameters, points: Vec<[f64; 2]>) -> She
         points: Some(points),
         smooth: sheet.smooth,
         flux: sheet.flux.clone(),
+        fade: sheet.fade,
         energy: sheet.energy.clone(),
         ..SheetParameters::default()
     }

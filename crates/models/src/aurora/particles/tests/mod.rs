@@ -36,12 +36,13 @@ fn shape(sheets: Vec<SheetParameters>) -> ShapeParameters {
     ShapeParameters { sheets, hold_s: 3.0, ..ShapeParameters::default() }
 }
 
+/// A form whose flux is even.
 fn form(form: Form) -> SheetParameters {
-    SheetParameters { form: Some(form), ..SheetParameters::default() }
+    SheetParameters { form: Some(form), fade: 0.0, ..SheetParameters::default() }
 }
 
 fn line(from: [f64; 2], to: [f64; 2]) -> SheetParameters {
-    SheetParameters { points: Some(vec![from, to]), ..SheetParameters::default() }
+    SheetParameters { points: Some(vec![from, to]), fade: 0.0, ..SheetParameters::default() }
 }
 
 /// From an arc to a form.

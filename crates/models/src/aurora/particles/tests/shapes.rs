@@ -72,7 +72,7 @@ fn after_a_transition_particles_lie_on_the_target_and_everywhere_along_it() {
 
 /// A sheet through these points, taken to as they are.
 fn through(points: Vec<[f64; 2]>) -> SheetParameters {
-    SheetParameters { points: Some(points), smooth: false, ..SheetParameters::default() }
+    SheetParameters { points: Some(points), smooth: false, fade: 0.0, ..SheetParameters::default() }
 }
 
 /// An S of three long limbs whose bends have a radius of 4 km, less than two cells.
