@@ -90,7 +90,7 @@ impl Describe for AuroraParameters {
     const IN_THE_SKY: bool = true;
     // From the ground toward the northern sky of a clear night.
     const SETTING: &'static str = "\
-        picture = { exposure_ev100 = -6.3, white_balance_k = 4000.0 }\n\
+        picture = { exposure_ev100 = -6.8, white_balance_k = 4000.0 }\n\
         camera = { position = [0.0, 1.7, 0.0], target = [0.0, 34.0, -60.0], vertical_fov_deg = 66.0 }\n\
         sky = { kind = \"night\", hills_deg = 2.0, trees_deg = 1.1 }\n";
 

@@ -115,8 +115,9 @@ fn seam_is_calm(scene: &str, text: &str) {
 #[test]
 fn gradients_show_no_bands() {
     let text = scene_text("campfire");
+    // Without dither it would be 0.009.
     let bands = wide_bands(&text, [1280, 720], 60);
-    assert!(bands < 0.01, "{bands} of the gradient's length lies in bands wider than 8 pixels");
+    assert!(bands < 0.002, "{bands} of the gradient's length lies in bands wider than 8 pixels");
 }
 
 #[test]

@@ -171,29 +171,40 @@ pub(crate) fn hues(film: &Film) -> [f64; 3] {
     counts.map(|count| count / all)
 }
 
-/// Share of the length of gradients that lies in bands: more than 8 pixels of one 8-bit code where 16 bits move by a
+/// Share of the length of gradients, along rows and columns, that lies in bands: more than 8 pixels of one 8-bit code where 16 bits move by a
 /// quarter of a code.
 pub(crate) fn wide_bands(text: &str, size: [usize; 2], frame: i64) -> f64 {
     let codes = |depth| encoded(&draw(text, size, &[frame], &PlanOptions::default(), depth)[0]);
     let (coarse, fine) = (codes(BitDepth::Eight), codes(BitDepth::Sixteen));
-    let (mut banded, mut gradient) = (0, 0);
-    for row in 0..size[1] {
-        let range = row * size[0]..(row + 1) * size[0];
-        let (coarse, fine) = (&coarse[range.clone()], &fine[range]);
-        let mut start = 0;
-        for x in 1..=size[0] {
-            if x < size[0] && coarse[x][0] == coarse[start][0] {
-                continue;
-            }
-            let change = (fine[x - 1][0] - fine[start][0]).abs() * 255.0;
-            if coarse[start][0] > 0.0 && coarse[start][0] < 1.0 {
-                gradient += x - start;
-                banded += if x - start > 8 && change > 0.25 { x - start } else { 0 };
-            }
-            start = x;
+    let row = |y: usize| (0..size[0]).map(move |x| y * size[0] + x).collect();
+    let column = |x: usize| (0..size[1]).map(move |y| y * size[0] + x).collect();
+    let lines = (0..size[1]).map(row).chain((0..size[0]).map(column));
+    let lengths = lines.flat_map(|line: Vec<usize>| {
+        [0, 1, 2].map(|channel| {
+            let [coarse, fine] =
+                [&coarse, &fine].map(|codes| line.iter().map(|at| codes[*at][channel]).collect::<Vec<f32>>());
+            bands_of_line(&coarse, &fine)
+        })
+    });
+    let [banded, gradient] = lengths.fold([0, 0], |sum, line| [sum[0] + line[0], sum[1] + line[1]]);
+    banded as f64 / gradient.max(1) as f64
+}
+
+/// Pixels of a line that lie in bands, and those of all its gradients.
+fn bands_of_line(coarse: &[f32], fine: &[f32]) -> [usize; 2] {
+    let (mut banded, mut gradient, mut start) = (0, 0, 0);
+    for at in 1..=coarse.len() {
+        if at < coarse.len() && coarse[at] == coarse[start] {
+            continue;
         }
+        let change = (fine[at - 1] - fine[start]).abs() * 255.0;
+        if coarse[start] > 0.0 && coarse[start] < 1.0 {
+            gradient += at - start;
+            banded += if at - start > 8 && change > 0.25 { at - start } else { 0 };
+        }
+        start = at;
     }
-    f64::from(banded as u32) / f64::from((gradient as u32).max(1))
+    [banded, gradient]
 }
 
 /// Compares a frame with its golden picture, or writes that when asked to; says what differs.

@@ -99,7 +99,7 @@ impl Default for CurveLimits {
 }
 
 fn read_points(items: &[Node], limits: &CurveLimits, expected: &Kind, reader: &mut Reader) -> Option<Vec<[f64; 2]>> {
-    let read_point = |item: &Node| match &item.value {
+    let read_point = |item: &Node, reader: &mut Reader| match &item.value {
         Value::List(pair) if pair.len() == 2 => Some([
             read_number(&pair[0], &limits.x, "", expected, reader)?,
             read_number(&pair[1], &limits.y, "", expected, reader)?,
@@ -109,7 +109,8 @@ fn read_points(items: &[Node], limits: &CurveLimits, expected: &Kind, reader: &m
             None
         }
     };
-    items.iter().map(read_point).collect()
+    let within = |(index, item): (usize, &Node)| reader.within(index.to_string(), |reader| read_point(item, reader));
+    items.iter().enumerate().map(within).collect()
 }
 
 impl Parameter for Curve {
@@ -129,7 +130,10 @@ impl Parameter for Curve {
                 return None;
             }
         };
-        let points = read_points(items, limits, &expected, reader)?;
+        let points = match &node.value {
+            Value::Table(_) => reader.within("points", |reader| read_points(items, limits, &expected, reader)),
+            _ => read_points(items, limits, &expected, reader),
+        }?;
         if limits.rising
             && let Some(pair) = points.windows(2).find(|pair| pair[1][1] < pair[0][1])
         {
@@ -172,7 +176,7 @@ impl<T: Parameter + Animate> Parameter for Animated<T> {
         };
         let expected = Self::kind(limits);
         let (items, interpolation) = keyed_table(table, "keys", node, &expected, reader)?;
-        let read_key = |item: &Node| match &item.value {
+        let read_key = |item: &Node, reader: &mut Reader| match &item.value {
             Value::List(pair) if pair.len() == 2 => {
                 let time = read_number(&pair[0], &Range::default(), "s", &expected, reader)?;
                 Some((time, T::read(&pair[1], limits, unit, reader)?))
@@ -182,7 +186,9 @@ impl<T: Parameter + Animate> Parameter for Animated<T> {
                 None
             }
         };
-        let keys: Vec<(f64, T)> = items.iter().map(read_key).collect::<Option<_>>()?;
+        let within =
+            |(index, item): (usize, &Node)| reader.within(format!("keys.{index}"), |reader| read_key(item, reader));
+        let keys: Vec<(f64, T)> = items.iter().enumerate().map(within).collect::<Option<_>>()?;
         match Self::keyed(keys, interpolation) {
             Ok(animated) => Some(animated),
             Err(error) => {

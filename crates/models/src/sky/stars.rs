@@ -16,6 +16,10 @@ const COUNTS: [f64; 11] = [0.15, 0.6, 1.15, 1.7, 2.25, 2.75, 3.21, 3.69, 4.16, 4
 const BRIGHTEST: f64 = -1.0;
 /// Magnitude of the faintest stars that are drawn one by one.
 const FAINTEST: f64 = 8.5;
+/// Share of the naked-eye stars below the upper end of each spectral class, M to B, and the temperature there, K: about as many of each class as
+/// the Bright Star Catalogue has (Hoffleit & Warren 1991). The colours of the hottest are those of 10,000 K.
+const CLASSES: [[f64; 2]; 7] =
+    [[0.0, 2800.0], [0.06, 3900.0], [0.32, 5200.0], [0.46, 6000.0], [0.61, 7400.0], [0.82, 10_000.0], [1.0, 10_000.0]];
 /// Illuminance of a star of magnitude 0, lux.
 const LUX_AT_0: f64 = 2.54e-6;
 /// Stars whose place follows the band of the Milky Way, in part, from this magnitude on.
@@ -104,6 +108,13 @@ fn magnitude_of_rank(rank: f64) -> f64 {
     BRIGHTEST + above as f64 - 1.0 + (log - COUNTS[above - 1]) / (COUNTS[above] - COUNTS[above - 1])
 }
 
+/// The temperature, K, that this share of the stars stays below.
+fn temperature_of_quantile(share: f64) -> f64 {
+    let above = CLASSES.partition_point(|class| class[0] < share).clamp(1, CLASSES.len() - 1);
+    let [from, to] = [CLASSES[above - 1], CLASSES[above]];
+    math::lerp(from[1], to[1], (share - from[0]) / (to[0] - from[0]))
+}
+
 fn star(key: Key, number: u64, count: u64) -> Star {
     let words = key.words(number, 0, STAR);
     let magnitude = magnitude_of_rank((number as f64 + f64::from(uniform(words[0]))).min(count as f64));
@@ -115,10 +126,7 @@ fn star(key: Key, number: u64, count: u64) -> Star {
         let height = toward.dot(pole);
         toward = (toward - pole * (height * 0.85)).normalize();
     }
-    // Temperatures of naked-eye stars: most from 4000 to 12000 K.
-    let spread = f64::from(uniform(words[3])) + f64::from(uniform(more[1])) - 1.0;
-    let temperature = 6300.0 * math::exp2(1.1 * spread + 0.25 * (f64::from(uniform(more[2])) - 0.5));
-    let colour = black_body().radiance(temperature.clamp(2600.0, 10_000.0) as f32);
+    let colour = black_body().radiance(temperature_of_quantile(f64::from(uniform(words[3]))) as f32);
     let scale = 1.0 / luminance(colour);
     let illuminance = LUX_AT_0 * math::pow(10.0, -0.4 * magnitude);
     Star { direction: toward, magnitude, illuminance, colour: colour.map(|value| value * scale) }
@@ -203,6 +211,21 @@ mod tests {
         }
         assert!(stars.0[0].magnitude < 0.0 && stars.0[0].magnitude > -2.5);
         assert!(stars.0.iter().all(|star| (star.direction.length() - 1.0).abs() < 1e-5));
+    }
+
+    /// A third of those of the naked eye is orange or red, two in five are white or bluish.
+    #[test]
+    fn there_are_as_many_red_and_blue_stars_as_in_the_real_sky() {
+        let stars = Stars::new(7);
+        let redness = |colour: [f32; 3]| colour[0] / colour[2];
+        let redder = |than: f32| {
+            let limit = redness(black_body().radiance(than));
+            stars.0.iter().filter(|star| redness(star.colour) > limit).count() as f64 / stars.0.len() as f64
+        };
+        let [reddish, bluish] = [redder(5200.0), 1.0 - redder(7400.0)];
+        assert!((reddish - 0.32).abs() < 0.01, "{reddish} are of the classes K and M");
+        assert!((bluish - 0.39).abs() < 0.01, "{bluish} are of the classes A and B");
+        assert!(redness(black_body().radiance(2800.0)) > 4.0 && redness(black_body().radiance(10_000.0)) < 0.7);
     }
 
     #[test]

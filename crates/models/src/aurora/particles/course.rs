@@ -349,3 +349,49 @@ fn fold(sheet: &mut Sheet, marks: &[Mark], folding: &Folding, time: f64) {
         *point = (*point + swing * (heading.perp() + folding.parameters.curl * heading)).clamp(-half, half);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aurora::shapes::lengths as ways;
+
+    fn folding(folds: FoldParameters) -> Folding {
+        Folding::new(&AuroraParameters { folds, ..AuroraParameters::default() }, Key::new(3, "folds"))
+    }
+
+    #[test]
+    fn crests_travel_along_the_sheet_as_fast_as_told() {
+        for speed_km_per_s in [-3.0, 0.0, 5.0] {
+            let folding = folding(FoldParameters { speed_km_per_s, life_s: 1e4, ..FoldParameters::default() });
+            let (mut apart, mut all) = (0.0, 0.0);
+            for place in 0..200 {
+                let along = f64::from(place);
+                let swing = folding.swing(along, 1.0);
+                apart += (folding.swing(along + 4.0 * speed_km_per_s, 5.0) - swing).powi(2);
+                all += swing.powi(2);
+            }
+            assert!(apart < 1e-3 * all && all > 100.0, "{speed_km_per_s} km/s: {apart} of {all}");
+        }
+    }
+
+    /// How far crests lean: the mean of what points are moved along the sheet beside how far they are moved to its side.
+    fn leaning(curl: f64) -> f64 {
+        let folding = folding(FoldParameters { curl, ..FoldParameters::default() });
+        let points: Vec<DVec2> = (0..400).map(|east| DVec2::new(f64::from(east) - 200.0, 0.0)).collect();
+        let marks: Vec<Mark> = ways(&points).into_iter().map(|along| Mark { along, direction: 1.0 }).collect();
+        let mut sheet = Sheet { flux: vec![1.0; 400], energy: vec![1.0; 400], points: points.clone() };
+        fold(&mut sheet, &marks, &folding, 2.0);
+        let moved = || sheet.points.iter().zip(&points).map(|(now, was)| *now - *was);
+        let [product, square] =
+            [moved().map(|way| way.x * way.y).sum::<f64>(), moved().map(|way| way.y * way.y).sum::<f64>()];
+        assert!(square > 100.0);
+        product / square
+    }
+
+    #[test]
+    fn crests_lean_over_as_far_as_told() {
+        for curl in [0.0, 0.3, 1.0] {
+            assert!((leaning(curl) - curl).abs() < 1e-9, "{curl}: {}", leaning(curl));
+        }
+    }
+}

@@ -13,7 +13,7 @@ const BRIDGED_KM: f64 = 40.0;
 const FADE_KM: f64 = 60.0;
 const FADE_SHARE: f64 = 0.35;
 /// Share of the transition, at the side where the gap is widest, in which ends change between what is drawn and dark.
-const DARKENING: f64 = 0.35;
+const DARKENING: f64 = 0.15;
 
 /// Two control points that are one where the gap is closed.
 #[derive(Clone, Copy, Debug)]
