@@ -270,7 +270,7 @@ fn faults_stand_at_their_sheet_and_point() {
         ("energy_ev = 1e6\n", "test.toml:3:13: aurora.0.energy_ev: 1000000 is out of range; allowed: 100 to 100000 eV"),
         (
             "[[aurora.shapes]]\nsheets = [{ form = \"arc\", energy = [[0, 1], [1, 0]] }]\n",
-            "test.toml:4:51: aurora.0.shapes.0.sheets.0.energy.1: 0 is out of range; allowed: 0.05 to 20",
+            "test.toml:4:49: aurora.0.shapes.0.sheets.0.energy.1: 0 is out of range; allowed: 0.05 to 20",
         ),
         (
             "energy_ev = 10000\n[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90], energy = [[0, 1], [0.5, 1], [1, 20]] }]\n",
