@@ -105,8 +105,15 @@ fn along(line: &[DVec2], values: &[f64]) -> Curve {
             Curve::new(even, usual.interpolation()).unwrap_or(usual)
         };
     }
-    let kept = lines::simplified(&points, TOLERANCE).into_iter().map(|point| point.to_array().map(rounded)).collect();
-    Curve::new(kept, usual.interpolation()).unwrap_or(usual)
+    // Between few points a curve may swing away from the lines that would do.
+    let with = |tolerance: f64| {
+        let kept = lines::simplified(&points, tolerance).into_iter().map(|point| point.to_array().map(rounded));
+        Curve::new(kept.collect(), usual.interpolation()).ok()
+    };
+    let is_near = |curve: &Curve| points.iter().all(|point| (curve.eval(point.x) - point.y).abs() < 2.0 * TOLERANCE);
+    let curves = [TOLERANCE, 0.3 * TOLERANCE, 0.1 * TOLERANCE, 0.0].into_iter().filter_map(with);
+    let found = curves.reduce(|best, finer| if is_near(&best) { best } else { finer });
+    found.unwrap_or(usual)
 }
 
 /// Whether the points of `sheet` are where they are said to be.
