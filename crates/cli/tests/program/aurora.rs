@@ -122,6 +122,11 @@ fn the_calibration_is_printed_and_within_what_is_observed() {
     assert!(hard.len() >= 6 && hard.iter().all(|row| (2.5..=7.0).contains(&row[6])), "{}", run.stdout);
     assert!(hard.windows(2).all(|pair| pair[1][6] < pair[0][6] && pair[1][7] < pair[0][7]), "{}", run.stdout);
     assert!(at(1.0)[7] > 2.0 && at(10.0)[7] < 0.5 && rows.iter().all(|row| row[8] >= 0.5), "{}", run.stdout);
+    let claimed = |spectrum: &str| {
+        run.stdout.contains(&format!("\"{spectrum}\"\n"))
+            && run.stdout.contains(&format!("holds  {spectrum}: I(557.7)/I(427.8) at 10 keV"))
+    };
+    assert!(["arc", "single", "maxwellian"].into_iter().all(claimed), "{}", run.stdout);
     assert!(run.stdout.contains("I(391.4)/I(427.8)") && !run.stdout.contains("FAILS"), "{}", run.stdout);
 }
 
