@@ -24,7 +24,7 @@ use super::{
     geometry::{EARTH_RADIUS_KM, FieldLines},
     group::GROUP,
     meridians::Meridians,
-    phenomenon::measured_lines,
+    phenomenon::{brightnesses, measured_lines},
     prepared::{Batch, Charts},
     profile::Profiles,
     sources::{Maker, Shares, Sources, nearest_node},
@@ -191,13 +191,20 @@ fn difference(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> f64 {
 
 #[test]
 fn every_measured_line_is_there_and_named_by_its_wavelength() {
-    let names = measured_lines().map(|line| format!("kilorayleigh_{}", line.wavelength_nm as i64));
+    let lines = measured_lines().map(|line| line.wavelength_nm.floor().to_string());
+    let names = lines.chain(["first_positive".to_owned()]).map(|line| format!("kilorayleigh_{line}"));
     let parameters = AuroraParameters {
         particles: ParticleParameters { count: 100, ..ParticleParameters::default() },
         ..AuroraParameters::default()
     };
     let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
-    assert_eq!(names.collect::<Vec<_>>(), aurora.aovs().iter().take(5).map(|aov| aov.name).collect::<Vec<_>>());
+    let measured: Vec<_> = aurora.aovs().iter().map(|aov| aov.name).filter(|name| name.starts_with("kilo")).collect();
+    assert_eq!(names.collect::<Vec<_>>(), measured);
+    assert_eq!(measured.len(), brightnesses().count());
+    let [green, red, fainter_red, _, _, band, all_bands] = brightnesses().collect::<Vec<_>>()[..] else { panic!() };
+    assert_eq!((green, red, fainter_red.0), ((Emitter::OxygenGreen, 1.0), (Emitter::OxygenRed, 1.0), red.0));
+    assert!((fainter_red.1 * 2.997 - 1.0).abs() < 1e-12, "{fainter_red:?}");
+    assert_eq!((all_bands, band.0), ((Emitter::Nitrogen, 1.0), Emitter::Nitrogen));
 }
 
 #[test]
