@@ -86,6 +86,9 @@ fn kilorayleighs_and_the_field_come_as_aovs() {
     assert!(green > 1.0 && green > 2.0 * blue && blue > 0.0, "{green} kR green, {blue} kR blue");
     assert!(red > 0.0 && red < green && deep_red > 0.0, "{red} kR and {deep_red} kR red");
     assert!((violet / blue - 3.28).abs() < 0.01, "{violet} kR violet, {blue} kR blue");
+    let [fainter_red, first_positive] = ["636", "first_positive"].map(|line| greatest(&format!("kilorayleigh_{line}")));
+    assert!((red / fainter_red - 2.997).abs() < 0.01, "{red} kR at 630.0 nm, {fainter_red} kR at 636.4 nm");
+    assert!((deep_red / first_positive - 0.021_44).abs() < 1e-4, "{deep_red} kR of {first_positive} kR");
     // Counts are whole; what is scattered makes the potential, which is negative and lowest where they are.
     for count in ["scatter_count", "particle_count"] {
         assert!(greatest(count) >= 1.0 && values(count).iter().all(|count| count.fract() == 0.0), "{count}");
@@ -122,6 +125,11 @@ fn the_calibration_is_printed_and_within_what_is_observed() {
     assert!(hard.len() >= 6 && hard.iter().all(|row| (2.5..=7.0).contains(&row[6])), "{}", run.stdout);
     assert!(hard.windows(2).all(|pair| pair[1][6] < pair[0][6] && pair[1][7] < pair[0][7]), "{}", run.stdout);
     assert!(at(1.0)[7] > 2.0 && at(10.0)[7] < 0.5 && rows.iter().all(|row| row[8] >= 0.5), "{}", run.stdout);
+    let claimed = |spectrum: &str| {
+        run.stdout.contains(&format!("\"{spectrum}\"\n"))
+            && run.stdout.contains(&format!("holds  {spectrum}: I(557.7)/I(427.8) at 10 keV"))
+    };
+    assert!(["arc", "single", "maxwellian"].into_iter().all(claimed), "{}", run.stdout);
     assert!(run.stdout.contains("I(391.4)/I(427.8)") && !run.stdout.contains("FAILS"), "{}", run.stdout);
 }
 

@@ -13,22 +13,21 @@ use super::{
     DrawingParameters, FallModel,
     chart::{Chart, Finder, STRIP},
     descent::{Descent, Descents, LineOfFall, altitudes_km},
-    footprint::{Footprint, Patch, Source},
+    footprint::{Footprint, Patch, REACH, Source},
     geometry::FieldLines,
     group::{GROUP, Group},
     meridians::{LightStrip, Meridians},
     trace::{BATCH, Lit, Points, Trace},
+    wander::wander_km,
 };
 use crate::{
     aurora::{
         atmosphere::{LEVELS, atmosphere},
-        light::{
-            EMITTERS, Emission, Emitter, PerEmitter,
-            collisions::{draw_hard_sphere_emitter, hard_sphere_photons},
-        },
+        light::{Emission, PerEmitter},
         precipitation::{
             Deposition,
             energy::{NODES, node_energy_ev},
+            evened::EvenedFalls,
             fall::{Collision, FallLibrary, Falls, VARIANTS, collision_count},
             hard_sphere::{DEFAULT_RADIUS, HardSphere},
         },
@@ -37,12 +36,10 @@ use crate::{
 };
 
 const SOURCE: Purpose = Purpose::named("aurora collisions");
-const EMITTER_DRAW: Purpose = Purpose::named("aurora collision emitter");
 /// Random deviations, a multiple of [`BATCH`].
 const DEVIATIONS: usize = 4096;
-/// What shines after a collision: the mean of a level, or nothing, or a single emitter.
+/// What shines after a collision: the mean of a level, or nothing.
 const NOTHING: u16 = LEVELS as u16;
-const EMITTER: u16 = NOTHING + 1;
 /// Lanes from one collision of a full batch to the next below; odd, so that all are filled.
 const APART: usize = 5;
 /// Sources whose falls are looked up together: what is far away in memory is then waited for once.
@@ -63,6 +60,8 @@ pub(super) struct Collisions {
     descents: Descents,
     /// kR of ion pairs that a collision of a node's fall stands for, per mW/m^2.
     pairs: Vec<f32>,
+    /// Squared reach by which the collisions of a node's falls wander, km^2.
+    wander_squared: Vec<f32>,
     /// Deviations with the density of a source's edge, in reaches.
     deviations: Vec<f32>,
 }
@@ -170,18 +169,26 @@ impl Collisions {
         };
         let highest = highest.min(NODES - 1);
         let levels = emission.photons_per_ion_pair().iter().copied();
-        let photons = levels.chain([[0.0; 4]]).chain(EMITTERS.map(single_photons));
+        let photons = levels.chain([[0.0; 4]]);
+        let (deposition, wobble) = (emission.deposition(), drawing.wobble);
+        let mut pairs: Vec<_> = (0..NODES).map(|node| emission.ion_pairs_per_collision(node) as f32).collect();
         let falls = match drawing.fall {
-            FallModel::Fang => measured_falls(&Falls::new(emission.deposition(), drawing.wobble), highest, key),
-            FallModel::HardSphere => hard_sphere_falls(drawing.wobble, highest, key),
+            FallModel::Fang => measured_falls(&Falls::new(deposition, wobble), highest, key),
+            FallModel::HardSphere => {
+                let falls = hard_sphere_falls(deposition, wobble, highest, key);
+                pairs.iter_mut().zip(&falls).for_each(|(pairs, falls)| *pairs *= falls.share);
+                FallTable::new(highest + 1, |node, variant| falls[node].fall(variant).iter().map(with_light).collect())
+            }
         };
+        let wander = |node| REACH * wander_km(drawing.fall, wobble, node_energy_ev(node)) as f32;
         Self {
             key,
             falls,
             deposition: emission.deposition().clone(),
             photons: photons.map(|photons| photons.map(|value| value as f32)).collect(),
             descents: Descents::new(),
-            pairs: (0..NODES).map(|node| emission.ion_pairs_per_collision(node) as f32).collect(),
+            pairs,
+            wander_squared: (0..NODES).map(|node| wander(node) * wander(node)).collect(),
             deviations: (0..DEVIATIONS).map(deviation).collect(),
         }
     }
@@ -208,37 +215,32 @@ impl Collisions {
         // What is beyond the falls is drawn as the hardest of them: their number of collisions and the light of each belong together.
         let node = self.deposition.draw_node_about(about, uniform_f64(b, d)).min(self.falls.highest());
         let batches = self.falls.fall(node, c);
-        Fall { source, batches, pairs: self.pairs[node], first: (c >> 8) as usize / BATCH * BATCH }
+        Fall {
+            source,
+            batches,
+            pairs: self.pairs[node],
+            wander_squared: self.wander_squared[node],
+            first: (c >> 8) as usize / BATCH * BATCH,
+        }
     }
 }
 
-/// Falls whose mean is the deposition; each collision gives the mean light of its level.
+/// Falls after Fang et al. up to those of the highest node.
 fn measured_falls(falls: &Falls, highest: usize, key: Key) -> FallTable {
     let library = FallLibrary::new(falls, 0..=highest, key);
-    let light = |collision: &Collision| (*collision, collision.level as u16);
-    FallTable::new(highest + 1, |node, variant| library.fall(node, variant).iter().map(light).collect())
+    FallTable::new(highest + 1, |node, variant| library.fall(node, variant).iter().map(with_light).collect())
 }
 
-/// Falls through hard spheres; each collision gives the light of one emitter, or none.
-fn hard_sphere_falls(wobble: f64, highest: usize, key: Key) -> FallTable {
-    let air = atmosphere();
-    let spheres = HardSphere::new(air, DEFAULT_RADIUS, wobble);
-    FallTable::new(highest + 1, |node, variant| {
-        let particle = (node as u64) << 32 | u64::from(variant);
-        let light = |(number, collision): (usize, Collision)| {
-            let [a, b, c, _] = key.uniforms(particle, number as u32, EMITTER_DRAW).map(f64::from);
-            let emitter = draw_hard_sphere_emitter(&air.levels()[collision.level as usize], [a, b, c]);
-            (collision, emitter.map_or(NOTHING, |emitter| EMITTER + emitter.index() as u16))
-        };
-        spheres.fall(node_energy_ev(node), key, particle).enumerate().map(light).collect()
-    })
+/// Falls through hard spheres for each node up to the highest.
+fn hard_sphere_falls(deposition: &Deposition, wobble: f64, highest: usize, key: Key) -> Vec<EvenedFalls> {
+    let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, wobble);
+    let heights = Falls::new(deposition, 0.0);
+    (0..=highest).into_par_iter().map(|node| EvenedFalls::new(&spheres, &heights, node, key)).collect()
 }
 
-/// The light of one emitter alone.
-fn single_photons(emitter: Emitter) -> PerEmitter<f64> {
-    let mut photons = [0.0; 4];
-    photons[emitter.index()] = hard_sphere_photons(emitter);
-    photons
+/// A collision and the mean light of its level.
+fn with_light(collision: &Collision) -> (Collision, u16) {
+    (*collision, collision.level as u16)
 }
 
 /// The random fall of a source.
@@ -247,6 +249,8 @@ struct Fall<'a> {
     batches: &'a [FallBatch],
     /// kR of ion pairs that a collision stands for, per mW/m^2.
     pairs: f32,
+    /// Squared reach by which its collisions wander, km^2.
+    wander_squared: f32,
     /// Where its deviations begin.
     first: usize,
 }
@@ -345,12 +349,14 @@ impl CollisionPass<'_> {
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, fall: &Fall, (reach, beyond): (f32, f32), line: &SeenLine, trace: &mut Trace) {
         let last = (self.chart.rows - 1) as f32;
+        // A source reaches as far as its collisions wander too, and those do so by themselves.
+        let own_reach = reach.fused(reach, -fall.wander_squared).max(0.0).sqrt();
         let mut lit = Lit::new(simd);
         for (number, batch) in fall.batches.iter().enumerate() {
             let from = (fall.first + number * BATCH) % DEVIATIONS;
             let Some(deviations) = self.collisions.deviations.get(from..from + BATCH) else { continue };
             let offsets = Lanes::from_slice(simd, &batch.offsets_km) + Lanes::splat(simd, beyond);
-            let offsets = Lanes::from_slice(simd, deviations).fused(Lanes::splat(simd, reach), offsets);
+            let offsets = Lanes::from_slice(simd, deviations).fused(Lanes::splat(simd, own_reach), offsets);
             let [rows, shown] = line.points(batch, offsets);
             let points = Points::new(rows, shown, last, &mut lit);
             trace.add(simd, &points, (&batch.lights, batch.count as usize), &self.collisions.photons);

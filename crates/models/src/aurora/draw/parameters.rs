@@ -63,6 +63,10 @@ bansho_base::parameters! {
     }
 }
 
+/// Most that a collision may turn an electron. Collisions are spread about their line by a few far steps from high up, the mean light by a patch
+/// that is as wide; where either is wider than a few km, pictures of both are no longer alike.
+pub(super) const MOST_WOBBLE: f64 = 0.05;
+
 bansho_base::parameters! {
     /// How the light of an aurora is drawn.
     pub struct DrawingParameters {
@@ -77,7 +81,7 @@ bansho_base::parameters! {
         /// How far the light of a particle spreads across the field (standard deviation); `"auto"` is as far as its neighbours are, and rays stay sharp.
         spread_km: Auto<f64> = Auto::Auto, limits(Range::new(0.005, 100.0)), unit("km");
         /// How far a collision turns an electron from the field: rms tangent of the angle, the vector omega of (2.21) and (2.24).
-        wobble: f64 = 0.002, limits(Range::new(0.0, 0.5));
+        wobble: f64 = 0.002, limits(Range::new(0.0, MOST_WOBBLE));
         /// The air below, which dims what is low in the sky.
         air: Extinction = Extinction::default();
     }

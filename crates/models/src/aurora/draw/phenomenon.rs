@@ -28,7 +28,7 @@ use super::{
 };
 use crate::aurora::{
     AuroraParameters, energies,
-    light::{Emission, LINES, Line},
+    light::{Emission, Emitter, LINES, Line},
     particles::AuroraSimulation,
     precipitation::energy::HIGHEST_EV,
     shapes::{Sequence, ShapeFault, ShapeFaultKind},
@@ -168,14 +168,22 @@ const fn brightness(name: &'static str, doc: &'static str) -> AovDescriptor {
 }
 
 /// Wavelengths of the lines that the AOVs measure, nm.
-pub(super) const MEASURED: [f64; 5] = [557.7, 630.0, 427.8, 391.4, 670.5];
+pub(super) const MEASURED: [f64; 6] = [557.7, 630.0, 636.4, 427.8, 391.4, 670.5];
+/// How many brightnesses the AOVs measure: those lines, and all the light of N2.
+pub(super) const BRIGHTNESSES: usize = MEASURED.len() + 1;
 
 /// The lines of [`MEASURED`].
 pub(super) fn measured_lines() -> impl Iterator<Item = &'static Line> {
     MEASURED.iter().filter_map(|nm| LINES.iter().find(|line| (line.wavelength_nm - nm).abs() < 0.05))
 }
 
-/// What an aurora can write beside its light, in the order of [`MEASURED`] and then of [`MAPS`].
+/// What radiates each of the [`BRIGHTNESSES`], and how many of its photons for each that it is counted in.
+pub(super) fn brightnesses() -> impl Iterator<Item = (Emitter, f64)> {
+    let lines = measured_lines().map(|line| (line.emitter, line.photons));
+    lines.chain([(Emitter::Nitrogen, 1.0)])
+}
+
+/// What an aurora can write beside its light, in the order of [`brightnesses`] and then of [`MAPS`].
 const AOVS: &[AovDescriptor] = &[
     brightness(
         "kilorayleigh_557",
@@ -185,9 +193,17 @@ const AOVS: &[AovDescriptor] = &[
         "kilorayleigh_630",
         "Brightness of the red line of oxygen, 630.0 nm, above the air; 0 where there is none.",
     ),
+    brightness(
+        "kilorayleigh_636",
+        "Brightness of the fainter red line of oxygen, 636.4 nm, above the air; 0 where there is none.",
+    ),
     brightness("kilorayleigh_427", "Brightness of the band of N2+ at 427.8 nm, above the air; 0 where there is none."),
     brightness("kilorayleigh_391", "Brightness of the band of N2+ at 391.4 nm, above the air; 0 where there is none."),
     brightness("kilorayleigh_670", "Brightness of the band of N2 at 670.5 nm, above the air; 0 where there is none."),
+    brightness(
+        "kilorayleigh_first_positive",
+        "Brightness of all first positive bands of N2, most of them infrared, above the air; 0 where there is none.",
+    ),
     MAPS[0],
     MAPS[1],
     MAPS[2],

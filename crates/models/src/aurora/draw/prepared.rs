@@ -21,14 +21,14 @@ use super::{
     group::GROUP,
     maps::Maps,
     meridians::Meridians,
-    phenomenon::{MEASURED, measured_lines},
+    phenomenon::{BRIGHTNESSES, brightnesses},
     sampler::Sampler,
     shading::Shading,
     sources::Sources,
 };
 use crate::{
     aurora::{
-        light::{Line, PerEmitter},
+        light::{Emitter, PerEmitter},
         particles::AuroraSimulation,
     },
     directions::Directions,
@@ -61,8 +61,8 @@ pub(super) struct PreparedAurora<'a> {
     shown: Shown,
     /// Light by emitter on a sharp and a coarser chart, where it is measured.
     measured: Option<[Meridians; 2]>,
-    /// The lines that are measured.
-    lines: Vec<&'static Line>,
+    /// What radiates each brightness that is measured, and its photons for each counted one.
+    brightnesses: Vec<(Emitter, f64)>,
     /// Made where they are asked for.
     maps: OnceLock<Maps<'a>>,
 }
@@ -103,7 +103,7 @@ impl<'a> PreparedAurora<'a> {
             field,
             shown,
             measured,
-            lines: measured_lines().collect(),
+            brightnesses: brightnesses().collect(),
             maps: OnceLock::new(),
         })
     }
@@ -354,12 +354,12 @@ impl PreparedAurora<'_> {
         direction: Option<DVec3>,
         share: f32,
     ) {
-        for (plane, line) in strip.aovs.iter_mut().zip(&self.lines) {
-            plane.add(index, light[line.emitter.index()] * line.photons as f32, 1.0);
+        for (plane, (emitter, photons)) in strip.aovs.iter_mut().zip(&self.brightnesses) {
+            plane.add(index, light[emitter.index()] * *photons as f32, 1.0);
         }
         let maps = self.maps.get_or_init(|| Maps::new(&self.aurora.simulation));
         let Some(place) = direction.and_then(|direction| self.field.drawn(direction)) else { return };
-        for (plane, value) in strip.aovs.iter_mut().skip(MEASURED.len()).zip(maps.at(place)) {
+        for (plane, value) in strip.aovs.iter_mut().skip(BRIGHTNESSES).zip(maps.at(place)) {
             plane.add(index, value, share);
         }
     }

@@ -1,5 +1,6 @@
 //! What the drawing must get right: brightness, place, and the same for every way of drawing.
 
+mod agreement;
 mod threads;
 
 use bansho_base::{
@@ -23,7 +24,7 @@ use super::{
     geometry::{EARTH_RADIUS_KM, FieldLines},
     group::GROUP,
     meridians::Meridians,
-    phenomenon::measured_lines,
+    phenomenon::{brightnesses, measured_lines},
     prepared::{Batch, Charts},
     profile::Profiles,
     sources::{Maker, Shares, Sources, nearest_node},
@@ -188,69 +189,22 @@ fn difference(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> f64 {
     apart / sum(&mut b.as_flattened().iter().map(|value| f64::from(*value)))
 }
 
-/// How far the mean of 64 pictures of collisions is from the picture of the mean fall, and that one.
-fn collisions_beside_profile(emission: &Emission, drawing: &DrawingParameters) -> (f64, Meridians) {
-    let collisions = Collisions::new(emission, drawing, nearest_node(6.0 * ENERGY_EV), Key::new(5, "aurora"));
-    beside_profile(emission, &collisions, &arc(8000))
-}
-
-/// The same for an arc of cells.
-fn beside_profile(emission: &Emission, collisions: &Collisions, cells: &[GlowCell<1>]) -> (f64, Meridians) {
-    let (profiles, view, field) =
-        (Profiles::new(emission), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
-    let sources = sources(cells, PROMPT_AND_GREEN, 1.5, &field);
-    // Low rows, since single points are spread over two of them.
-    let chart = || Chart::new(&Coverage::of_view(&view, &field), STEP, 0.5 * STEP);
-    let sorted = |strip| Footprint::new(&sources, (&chart(), strip), &field, spread_of(&sources));
-    let expected = Meridians::new(chart(), &field, &profiles, &sorted(STRIP));
-    let footprint = sorted(GROUP);
-    let mut mean = vec![[0.0; 4]; expected.light.len()];
-    for step in 0..64 {
-        let picture = collisions.draw(chart(), &field, &footprint, step);
-        for (sum, light) in mean.iter_mut().zip(&picture.light) {
-            *sum = std::array::from_fn(|i| light[i].mul_add(1.0 / 64.0, sum[i]));
-        }
-    }
-    (difference(&mean, &expected.light), expected)
-}
-
-#[test]
-fn the_mean_of_many_collision_pictures_is_the_profile() {
-    let (apart, _) = collisions_beside_profile(&emission(), &DrawingParameters::default());
-    assert!(apart < 0.03, "{apart}");
-}
-
-/// A sheet with the greatest energy factor that a scene may give, and the falls that its aurora has for it.
-#[test]
-fn collisions_lose_no_light_on_hard_sheets() {
-    const FACTOR: f64 = 20.0;
-    let sheet = SheetParameters {
-        energy: Curve::new(vec![[0.0, FACTOR]], Interpolation::Linear).unwrap(),
-        ..SheetParameters::default()
-    };
-    let parameters = AuroraParameters {
-        energy_ev: Animated::from(0.2 * ENERGY_EV),
-        particles: ParticleParameters { count: 100, ..ParticleParameters::default() },
-        shapes: vec![ShapeParameters { sheets: vec![sheet], ..ShapeParameters::default() }],
-        drawing: DrawingParameters { sampling: Sampling::Collisions, ..DrawingParameters::default() },
-        ..AuroraParameters::default()
-    };
-    let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
-    let mut cells = arc(3000);
-    cells.iter_mut().for_each(|cell| cell.energy_ev *= (0.2 * FACTOR) as f32);
-    let (apart, _) = beside_profile(aurora.simulation().emission(), aurora.collisions.as_ref().unwrap(), &cells);
-    assert!(apart < 0.03, "{apart}");
-}
-
 #[test]
 fn every_measured_line_is_there_and_named_by_its_wavelength() {
-    let names = measured_lines().map(|line| format!("kilorayleigh_{}", line.wavelength_nm as i64));
+    let lines = measured_lines().map(|line| line.wavelength_nm.floor().to_string());
+    let names = lines.chain(["first_positive".to_owned()]).map(|line| format!("kilorayleigh_{line}"));
     let parameters = AuroraParameters {
         particles: ParticleParameters { count: 100, ..ParticleParameters::default() },
         ..AuroraParameters::default()
     };
     let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
-    assert_eq!(names.collect::<Vec<_>>(), aurora.aovs().iter().take(5).map(|aov| aov.name).collect::<Vec<_>>());
+    let measured: Vec<_> = aurora.aovs().iter().map(|aov| aov.name).filter(|name| name.starts_with("kilo")).collect();
+    assert_eq!(names.collect::<Vec<_>>(), measured);
+    assert_eq!(measured.len(), brightnesses().count());
+    let [green, red, fainter_red, _, _, band, all_bands] = brightnesses().collect::<Vec<_>>()[..] else { panic!() };
+    assert_eq!((green, red, fainter_red.0), ((Emitter::OxygenGreen, 1.0), (Emitter::OxygenRed, 1.0), red.0));
+    assert!((fainter_red.1 * 2.997 - 1.0).abs() < 1e-12, "{fainter_red:?}");
+    assert_eq!((all_bands, band.0), ((Emitter::Nitrogen, 1.0), Emitter::Nitrogen));
 }
 
 #[test]
@@ -270,37 +224,6 @@ fn auto_exposure_knows_the_flux_and_energy_of_sheets() {
     let emission = emission();
     let column = |energy_ev| f64::from(color::luminance(emission.column_colour(energy_ev).map(|value| value as f32)));
     assert!((luminance(1.0, 0.2) / plain / (column(1000.0) / column(5000.0)) - 1.0).abs() < 1e-6);
-}
-
-/// The row of a picture above which half of an emitter's light is, from the magnetic zenith on.
-fn middle_row(picture: &Meridians, emitter: Emitter) -> usize {
-    let mut rows = vec![0.0; picture.chart.rows];
-    for (at, light) in picture.light.iter().enumerate() {
-        rows[at % picture.chart.rows] += f64::from(light[emitter.index()]);
-    }
-    let whole: f64 = rows.iter().sum();
-    let mut above = 0.0;
-    rows.iter()
-        .take_while(|row| {
-            above += **row;
-            above < 0.5 * whole
-        })
-        .count()
-}
-
-#[test]
-fn the_fall_of_the_thesis_can_be_drawn_and_lies_elsewhere() {
-    let drawing = DrawingParameters { fall: FallModel::HardSphere, ..DrawingParameters::default() };
-    let spheres = FallModel::HardSphere.emission(ARC);
-    let (apart, thesis) = collisions_beside_profile(&spheres, &drawing);
-    // One emitter a collision, and falls that have not been evened out: more noise.
-    assert!(apart < 0.1, "{apart}");
-    let (_, measured) = collisions_beside_profile(&emission(), &DrawingParameters::default());
-    // Rows of 5 mrad: green light only above 190 km, the rest hardly elsewhere at this energy.
-    let [green, violet] = [Emitter::OxygenGreen, Emitter::NitrogenIon]
-        .map(|emitter| [&measured, &thesis].map(|picture| middle_row(picture, emitter)));
-    assert!(green[1] + 20 < green[0], "{green:?}");
-    assert!(violet[0].abs_diff(violet[1]) < 25, "{violet:?}");
 }
 
 /// Standard deviation in pixels, from left to right, of the violet light of a lone field line to the north where it is

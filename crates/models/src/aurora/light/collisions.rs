@@ -1,4 +1,4 @@
-//! Photons of single collisions: for Fang's falls such that their mean is the emission table, and by the rules of the thesis.
+//! Photons of single collisions: for Fang's falls such that their mean is the emission table, and the mean of the thesis's rules.
 
 use bansho_base::math;
 
@@ -30,28 +30,6 @@ impl Emission {
         let pairs = column(self.deposition().monoenergetic(node));
         pairs / collision_count(node) as f64 / PHOTONS_PER_KILORAYLEIGH
     }
-
-    /// The light of a collision at a level by itself, as in the thesis: one emitter, drawn by production rate, with all the photons of
-    /// an ion pair. Its mean over `uniform` in [0, 1) is [`photons_per_ion_pair`](Self::photons_per_ion_pair).
-    ///
-    /// # Panics
-    /// For a level that is not of the atmosphere.
-    #[must_use]
-    pub fn draw_emitter(&self, level: usize, uniform: f64) -> (Emitter, f64) {
-        let photons = self.photons_per_ion_pair()[level];
-        let whole: f64 = photons.iter().sum();
-        (choose(photons, uniform * whole), whole)
-    }
-}
-
-/// The emitter in whose part of the running sum a place lies.
-fn choose(weights: PerEmitter<f64>, place: f64) -> Emitter {
-    let mut sum = 0.0;
-    let passed = weights.iter().filter(|weight| {
-        sum += **weight;
-        sum <= place
-    });
-    EMITTERS[passed.count().min(EMITTERS.len() - 1)]
 }
 
 /// Mean thermal speed of molecules of a mass in atomic units, m/s (2.26).
@@ -73,34 +51,8 @@ pub fn hard_sphere_quenching(emitter: Emitter, air: &Air) -> f64 {
     -math::exp_m1(-rate * natural_lifetime(emitter))
 }
 
-/// What shines after a collision by the rules of the thesis (2.4.2): an atom or a molecule is struck by number density, then emits by
-/// production rate unless it is quenched (2.25). O2 gives nothing.
-#[must_use]
-pub fn draw_hard_sphere_emitter(air: &Air, uniforms: [f64; 3]) -> Option<Emitter> {
-    let [oxygen_green, oxygen_red, nitrogen_ion, nitrogen] = DIRECT_PHOTONS;
-    let place = uniforms[0] * air.number_density();
-    let rates = if place < air.o {
-        [oxygen_green, oxygen_red, 0.0, 0.0]
-    } else if place < air.o + air.n2 {
-        [0.0, 0.0, nitrogen_ion, nitrogen]
-    } else {
-        return None;
-    };
-    let emitter = choose(rates, uniforms[1] * rates.iter().sum::<f64>());
-    (uniforms[2] >= hard_sphere_quenching(emitter, air)).then_some(emitter)
-}
-
-/// Counting photons of an emitter so drawn, for each ion pair that its collision makes: all that its species has.
-#[must_use]
-pub fn hard_sphere_photons(emitter: Emitter) -> f64 {
-    let [oxygen_green, oxygen_red, nitrogen_ion, nitrogen] = DIRECT_PHOTONS;
-    match emitter {
-        Emitter::OxygenGreen | Emitter::OxygenRed => oxygen_green + oxygen_red,
-        Emitter::NitrogenIon | Emitter::Nitrogen => nitrogen_ion + nitrogen,
-    }
-}
-
-/// Counting photons of each emitter for each ion pair made in this air: the mean over all draws.
+/// Counting photons of each emitter for each ion pair made in this air by the rules of the thesis (2.4.2): an atom or a molecule is struck
+/// by number density, then emits one line by production rate unless it is quenched (2.25). O2 gives nothing. The mean over all draws.
 #[must_use]
 pub fn mean_hard_sphere_photons(air: &Air) -> PerEmitter<f64> {
     EMITTERS.map(|emitter| {
@@ -121,26 +73,20 @@ mod tests {
         light::PHOTONS_PER_KILORAYLEIGH,
         precipitation::{fall::Falls, spectrum::ARC},
     };
-    use bansho_base::random::{Key, Purpose, uniform};
+    use bansho_base::random::{Key, Purpose};
 
-    /// Light by level and emitter, kR per mW m^-2, of `sets` sets of falls of a spectrum; `single` draws one emitter for a collision.
-    fn light(table: &Emission, falls: &Falls, energy_ev: f64, particles: u64, single: bool) -> Vec<PerEmitter<f64>> {
+    /// Light by level and emitter, kR per mW m^-2, of so many falls of a spectrum.
+    fn light(table: &Emission, falls: &Falls, energy_ev: f64, particles: u64) -> Vec<PerEmitter<f64>> {
         let key = Key::new(11, "aurora");
         let mut sum = vec![[0.0; 4]; LEVELS];
         for particle in 0..particles {
             let uniforms = key.uniforms(particle, 0, Purpose::named("energy")).map(f64::from);
             let node = table.deposition().draw_node(energy_ev, [uniforms[0], uniforms[1]]);
             let pairs = table.ion_pairs_per_collision(node) / particles as f64;
-            for (number, collision) in falls.fall(node, key, particle).enumerate() {
-                let mut photons = table.photons_per_ion_pair()[collision.level as usize];
-                if single {
-                    let word = key.words(particle, number as u32, Purpose::named("emitter"))[0];
-                    let (emitter, all) = table.draw_emitter(collision.level as usize, uniform(word) as f64);
-                    photons = [0.0; 4];
-                    photons[emitter.index()] = all;
-                }
-                sum[collision.level as usize] =
-                    std::array::from_fn(|i| sum[collision.level as usize][i] + photons[i] * pairs);
+            for collision in falls.fall(node, key, particle) {
+                let level = collision.level as usize;
+                let photons = table.photons_per_ion_pair()[level];
+                sum[level] = std::array::from_fn(|i| sum[level][i] + photons[i] * pairs);
             }
         }
         sum
@@ -166,11 +112,8 @@ mod tests {
         let table = Emission::new(atmosphere(), ARC);
         let falls = Falls::new(table.deposition(), 0.02);
         // 64 sets of 500 particles; a picture of 120,000 has a fifteenth of this noise.
-        let all = difference(&table, 4000.0, &light(&table, &falls, 4000.0, 32_000, false));
+        let all = difference(&table, 4000.0, &light(&table, &falls, 4000.0, 32_000));
         assert!(all.iter().all(|difference| *difference < 0.03), "{all:?}");
-        let [green, red, _, nitrogen] = difference(&table, 4000.0, &light(&table, &falls, 4000.0, 32_000, true));
-
-        assert!(green < 0.05 && red < 0.08 && nitrogen < 0.015, "{green} {red} {nitrogen}");
     }
 
     #[test]
@@ -186,26 +129,31 @@ mod tests {
         assert!(hard_sphere_quenching(Emitter::NitrogenIon, &atmosphere().at(110.0)) < 1e-3);
     }
 
-    #[test]
-    fn the_rules_of_the_thesis_by_hand() {
-        let air = atmosphere().at(300.0);
-        // O is the first 74 % of the air there; of its photons green are 0.236 of 1.370.
-        assert_eq!(draw_hard_sphere_emitter(&air, [0.1, 0.1, 0.9999]), Some(Emitter::OxygenGreen));
-        assert_eq!(draw_hard_sphere_emitter(&air, [0.1, 0.9, 0.99999]), None);
-        assert_eq!(draw_hard_sphere_emitter(&air, [0.9, 0.99, 0.5]), Some(Emitter::Nitrogen));
-        assert_eq!(draw_hard_sphere_emitter(&air, [0.999_999, 0.5, 0.5]), None);
-        let below = atmosphere().at(100.0);
-        assert_eq!(draw_hard_sphere_emitter(&below, [0.0, 0.0, 0.5]), None);
+    /// What shines after a collision, drawn by the rules of the thesis.
+    fn drawn(air: &Air, uniforms: [f64; 3]) -> Option<Emitter> {
+        use Emitter::{Nitrogen, NitrogenIon, OxygenGreen, OxygenRed};
+        let place = uniforms[0] * air.number_density();
+        let struck = match place {
+            place if place < air.o => [OxygenGreen, OxygenRed],
+            place if place < air.o + air.n2 => [NitrogenIon, Nitrogen],
+            _ => return None,
+        };
+        let rates = struck.map(|emitter| DIRECT_PHOTONS[emitter.index()]);
+        let emitter = struck[usize::from(uniforms[1] * (rates[0] + rates[1]) >= rates[0])];
+        (uniforms[2] >= hard_sphere_quenching(emitter, air)).then_some(emitter)
     }
 
     #[test]
     fn the_mean_of_the_rules_is_what_they_draw() {
         let air = atmosphere().at(220.0);
+        let [green, red, violet, deep_red] = DIRECT_PHOTONS;
+        // All photons that a species has.
+        let photons = [green + red, green + red, violet + deep_red, violet + deep_red];
         let (mut sum, draws) = ([0.0; 4], 100_000_u64);
         for draw in 0..draws {
             let [a, b, c, _] = Key::new(1, "rules").uniforms(draw, 0, Purpose::named("draw")).map(f64::from);
-            if let Some(emitter) = draw_hard_sphere_emitter(&air, [a, b, c]) {
-                sum[emitter.index()] += hard_sphere_photons(emitter) / draws as f64;
+            if let Some(emitter) = drawn(&air, [a, b, c]) {
+                sum[emitter.index()] += photons[emitter.index()] / draws as f64;
             }
         }
         let mean = mean_hard_sphere_photons(&air);

@@ -1,6 +1,9 @@
 //! Single collisions of falling electrons, drawn such that the deposition of Fang et al. (2010) is their mean.
 
-use bansho_base::random::{Key, Purpose, normal_pair, uniform, uniform_f64};
+use bansho_base::{
+    math,
+    random::{Key, Purpose, normal_pair, uniform, uniform_f64},
+};
 use rayon::prelude::*;
 
 use super::{
@@ -12,6 +15,8 @@ use crate::aurora::atmosphere::{LEVELS, level_altitude_km};
 
 const COLLISION: Purpose = Purpose::named("aurora collision");
 const VARIANT: Purpose = Purpose::named("aurora fall variant");
+/// The golden ratio: however many of its multiples there are, their fractions lie evenly in 1.
+const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// A collision of an electron with an atom or a molecule.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,9 +78,7 @@ impl Falls {
         (0..count).map(move |number| {
             let words = key.words(particle, number, COLLISION);
             let spent = (number as f64 + place(number, uniform_f64(words[0], 0))) / count as f64;
-            while from_top < LEVELS - 1 && cumulative[from_top] <= spent {
-                from_top += 1;
-            }
+            from_top = level_from_top(cumulative, from_top, spent);
             let level = LEVELS - 1 - from_top;
             let turn = normal_pair([words[2], words[3]]).map(|deviation| deviation as f64 * self.wobble);
             path.descend(level_altitude_km(level) + triangular(words[1]), turn);
@@ -85,6 +88,24 @@ impl Falls {
 }
 
 impl Falls {
+    /// Where so many collisions of a node lie, from the highest to the lowest, if each has an equal part of the energy.
+    ///
+    /// It is at the same place in all parts, and at another for another node: high up, those of all energies are as far apart.
+    pub(super) fn evenly(&self, node: usize, count: usize) -> impl Iterator<Item = Collision> {
+        let cumulative = &self.cumulative[node];
+        let place = (node as f64 * GOLDEN) % 1.0;
+        let mut from_top = 0;
+        (0..count).map(move |number| {
+            let spent = (number as f64 + place) / count as f64;
+            from_top = level_from_top(cumulative, from_top, spent);
+            let before = from_top.checked_sub(1).map_or(0.0, |above| cumulative[above]);
+            let part = (spent - before) / (cumulative[from_top] - before).max(f64::MIN_POSITIVE);
+            let level = LEVELS - 1 - from_top;
+            let altitude_km = (level_altitude_km(level) + down_a_triangle(part)) as f32;
+            Collision { level: level as u32, altitude_km, offset_km: [0.0; 2] }
+        })
+    }
+
     /// One of the [`VARIANTS`] falls of a node: each takes another part of each share, in an order that changes with the collision.
     fn variant(&self, node: usize, variant: u32, key: Key) -> impl Iterator<Item = Collision> {
         let place = move |number: u32, uniform: f64| {
@@ -141,9 +162,21 @@ impl FallLibrary {
     }
 }
 
+/// How many levels, the number `above` or more, lie above the one at which so much of the energy has been spent.
+fn level_from_top(cumulative: &Profile, above: usize, spent: f64) -> usize {
+    let passed = cumulative[above..LEVELS - 1].iter().take_while(|sum| **sum <= spent);
+    above + passed.count()
+}
+
 /// A number in (-1, 1) with triangular density from the two halves of a word.
 fn triangular(word: u32) -> f64 {
     uniform(word) as f64 + uniform(word << 16) as f64 - 1.0
+}
+
+/// Where in (-1, 1) a triangular density has such a part above.
+fn down_a_triangle(part: f64) -> f64 {
+    let part = part.clamp(0.0, 1.0);
+    if part < 0.5 { 1.0 - math::sqrt(2.0 * part) } else { math::sqrt(2.0 * (1.0 - part)) - 1.0 }
 }
 
 /// Running sums of a profile from the highest level down, as shares of the whole.

@@ -2,10 +2,11 @@
 //!
 //! [`fang`] is the calibrated answer, a profile over altitude for each energy; [`energy`] the grid of energies on which tables stand;
 //! [`spectrum`] mixes energies; [`deposition`] is the table of profiles; [`fall`] draws single collisions whose mean it is.
-//! [`hard_sphere`] is the fall of Sekiguchi's thesis.
+//! [`hard_sphere`] is the fall of Sekiguchi's thesis, [`evened`] a few such falls that have the mean of all.
 
 pub mod deposition;
 pub mod energy;
+pub mod evened;
 pub mod fall;
 pub mod fang;
 pub mod hard_sphere;
