@@ -1,4 +1,4 @@
-//! A random starry sky with the magnitude counts and colours of the real one.
+//! A random starry sky with the magnitude counts of the real one, and about its colours.
 
 use bansho_base::{
     camera::{Camera, Lens},
@@ -16,8 +16,8 @@ const COUNTS: [f64; 11] = [0.15, 0.6, 1.15, 1.7, 2.25, 2.75, 3.21, 3.69, 4.16, 4
 const BRIGHTEST: f64 = -1.0;
 /// Magnitude of the faintest stars that are drawn one by one.
 const FAINTEST: f64 = 8.5;
-/// Share of the naked-eye stars below the upper end of each spectral class, M to B, and the temperature there, K: about as many of each class as
-/// the Bright Star Catalogue has (Hoffleit & Warren 1991). The colours of the hottest are those of 10,000 K.
+/// Share of the naked-eye stars below the upper end of each spectral class, M to B, and the temperature there, K. The shares are estimates in
+/// round numbers, not counted in a catalogue. The colours of the hottest are those of 10,000 K.
 const CLASSES: [[f64; 2]; 7] =
     [[0.0, 2800.0], [0.06, 3900.0], [0.32, 5200.0], [0.46, 6000.0], [0.61, 7400.0], [0.82, 10_000.0], [1.0, 10_000.0]];
 /// Illuminance of a star of magnitude 0, lux.
@@ -213,9 +213,8 @@ mod tests {
         assert!(stars.0.iter().all(|star| (star.direction.length() - 1.0).abs() < 1e-5));
     }
 
-    /// A third of those of the naked eye is orange or red, two in five are white or bluish.
     #[test]
-    fn there_are_as_many_red_and_blue_stars_as_in_the_real_sky() {
+    fn there_are_as_many_stars_of_each_colour_as_of_its_classes() {
         let stars = Stars::new(7);
         let redness = |colour: [f32; 3]| colour[0] / colour[2];
         let redder = |than: f32| {

@@ -79,21 +79,21 @@ impl ShapeContext {
 /// The first sheet that is no line, leaves the square, or meets itself or another.
 pub(super) fn drawn_sheets(
     parameters: &ShapeParameters,
-    place: ShapeContext,
+    context: ShapeContext,
     assets: &dyn Assets,
 ) -> Result<Vec<DrawnSheet>, ShapeFault> {
     let arc = [SheetParameters::default()];
     let entries = if parameters.sheets.is_empty() { &arc[..] } else { &parameters.sheets[..] };
     let mut sheets = Vec::new();
     for (entry, parameters) in entries.iter().enumerate() {
-        draw_entry(parameters, entry, place, assets, &mut sheets)?;
+        draw_entry(parameters, entry, context, assets, &mut sheets)?;
         if sheets.len() > MOST_SHEETS {
             let kind = ShapeFaultKind::TooManySheets { found: sheets.len(), most: MOST_SHEETS };
-            return Err(place.fault(".sheets", kind));
+            return Err(context.fault(".sheets", kind));
         }
     }
-    check_extent(&sheets, place)?;
-    check_crossings(&sheets, place)?;
+    check_extent(&sheets, context)?;
+    check_crossings(&sheets, context)?;
     Ok(sheets)
 }
 
@@ -101,11 +101,11 @@ pub(super) fn drawn_sheets(
 fn draw_entry(
     parameters: &SheetParameters,
     entry: usize,
-    place: ShapeContext,
+    context: ShapeContext,
     assets: &dyn Assets,
     sheets: &mut Vec<DrawnSheet>,
 ) -> Result<(), ShapeFault> {
-    let fault = |key: &str, kind| place.fault(&format!(".sheets.{entry}{key}"), kind);
+    let fault = |key: &str, kind| context.fault(&format!(".sheets.{entry}{key}"), kind);
     if parameters.stroke.is_some() && parameters.path.is_none() {
         return Err(fault(".stroke", ShapeFaultKind::StrokeOfNoFile));
     }
@@ -113,14 +113,14 @@ fn draw_entry(
         (Some(points), None, None) => vec![points.iter().map(|&point| DVec2::from(point)).collect()],
         (None, Some(path), None) => {
             let id = parameters.stroke.as_deref();
-            strokes(&path.0, id, place.extent_km, assets).map_err(|error| {
+            strokes(&path.0, id, context.extent_km, assets).map_err(|error| {
                 fault(
                     if matches!(error.problem, AssetProblem::NoStroke(_)) { ".stroke" } else { ".path" },
                     error.into(),
                 )
             })?
         }
-        (None, None, _) => vec![form_line(parameters, place.extent_km)],
+        (None, None, _) => vec![form_line(parameters, context.extent_km)],
         _ => return Err(fault("", ShapeFaultKind::SeveralSources { sheet: sheets.len() + 1 })),
     };
     let factors = Factors::new(parameters);
@@ -199,8 +199,8 @@ fn fitted(points: &[DVec2], drawing: &Drawing, extent_km: f64) -> Vec<DVec2> {
 }
 
 /// The points that were given come first, so that a fault names one of them; then the smooth line between them.
-fn check_extent(sheets: &[DrawnSheet], place: ShapeContext) -> Result<(), ShapeFault> {
-    let half = place.extent_km / 2.0;
+fn check_extent(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeFault> {
+    let half = context.extent_km / 2.0;
     let outside = |point: &DVec2| point.abs().max_element() > half;
     for (index, sheet) in sheets.iter().enumerate() {
         let given = sheet.recorded.iter().position(outside).map(|at| at * sheet.pieces);
@@ -213,12 +213,12 @@ fn check_extent(sheets: &[DrawnSheet], place: ShapeContext) -> Result<(), ShapeF
         } else {
             ShapeFaultKind::BendsOutside { sheet: sheet_number, point: number, x, z, half }
         };
-        return Err(place.fault_at(sheet, at, kind));
+        return Err(context.fault_at(sheet, at, kind));
     }
     Ok(())
 }
 
-fn check_crossings(sheets: &[DrawnSheet], place: ShapeContext) -> Result<(), ShapeFault> {
+fn check_crossings(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeFault> {
     let lines: Vec<&[DVec2]> = sheets.iter().map(|sheet| sheet.line.points()).collect();
     let Some([earlier, later]) = first_crossing(&lines) else { return Ok(()) };
     let point = |at: SegmentId| sheets[at.sheet].origin(at.segment) + 1;
@@ -232,5 +232,5 @@ fn check_crossings(sheets: &[DrawnSheet], place: ShapeContext) -> Result<(), Sha
             other_point: point(earlier),
         }
     };
-    Err(place.fault_at(&sheets[later.sheet], later.segment, kind))
+    Err(context.fault_at(&sheets[later.sheet], later.segment, kind))
 }
