@@ -3,9 +3,11 @@
 mod night;
 mod skyline;
 mod stars;
+mod still;
 
 use std::{
     f64::consts::TAU,
+    ops::Range,
     sync::{Arc, Mutex, PoisonError},
 };
 
@@ -25,7 +27,8 @@ use fearless_simd::{Level, Simd, dispatch};
 use crate::{directions::Directions, lanes::LANES};
 use night::NightSky;
 use skyline::Skyline;
-use stars::{MOST_PIXELS, Spot, Stars};
+use stars::{MOST_PIXELS, Stars};
+use still::{SkyRow, Still};
 
 /// The sky of a scene, infinitely far and opaque, with hills before it; at night with stars.
 pub struct SkyBackdrop {
@@ -34,17 +37,6 @@ pub struct SkyBackdrop {
     skyline: Option<Skyline>,
     /// What the frame before showed, which the next one shows again if neither camera nor sky change.
     still: Mutex<Option<Still>>,
-}
-
-/// What a night shows through a camera.
-#[derive(Clone)]
-struct Still {
-    cameras: Vec<Camera>,
-    size: [usize; 2],
-    sky: Sky,
-    night: Arc<NightSky>,
-    /// Stars, from the top down.
-    spots: Arc<Vec<Spot>>,
 }
 
 impl SkyBackdrop {
@@ -61,10 +53,10 @@ impl SkyBackdrop {
     /// The night that a sky shows in a view; none by day.
     fn still(&self, sky: &Sky, view: &View, cameras: &[Camera]) -> Option<Still> {
         let night = sky.night()?;
-        let same = |still: &&Still| still.cameras == cameras && still.size == view.size && still.sky == *sky;
         // The lock is never held while threads work together.
         let kept = || self.still.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(still) = kept().as_ref().filter(same) {
+        if let Some(still) = kept().as_mut().filter(|still| still.is_of(cameras, view.size, sky)) {
+            still.keep_rows();
             return Some(still.clone());
         }
         let spots = self.stars.as_ref().map(|stars| stars.spots(view, night, self.parameters.night.stars));
@@ -74,6 +66,7 @@ impl SkyBackdrop {
             sky: *sky,
             night: Arc::new(NightSky::new(sky, night, self.parameters.night.milky_way)),
             spots: Arc::new(spots.unwrap_or_default()),
+            rows: None,
         };
         *kept() = Some(still.clone());
         Some(still)
@@ -120,16 +113,8 @@ impl Phenomenon for SkyBackdrop {
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         let sky = surroundings.sky;
         let cameras = view.cameras();
-        let (night, spots) = self.still(&sky, view, &cameras).map(|still| (still.night, still.spots)).unzip();
-        Ok(Box::new(PreparedSky {
-            view,
-            cameras,
-            sky,
-            night,
-            spots: spots.unwrap_or_default(),
-            skyline: self.skyline.as_ref(),
-            hills: self.hills(),
-        }))
+        let still = self.still(&sky, view, &cameras);
+        Ok(Box::new(PreparedSky { view, cameras, sky, still, skyline: self.skyline.as_ref(), hills: self.hills() }))
     }
 }
 
@@ -138,9 +123,8 @@ struct PreparedSky<'a> {
     /// At as many instants as its motion needs, each for an equal part of the exposure.
     cameras: Vec<Camera>,
     sky: Sky,
-    night: Option<Arc<NightSky>>,
-    /// Stars, from the top down.
-    spots: Arc<Vec<Spot>>,
+    /// The night; none by day.
+    still: Option<Still>,
     skyline: Option<&'a Skyline>,
     /// Where it stands.
     hills: DepthInterval,
@@ -151,38 +135,69 @@ impl PreparedSky<'_> {
     fn draw_sky<S: Simd>(&self, simd: S, strip: &mut Strip) {
         let rect = strip.rect;
         let far = vec![f32::INFINITY; rect.width];
-        let mut row = SkyRow::default();
-        let share = 1.0 / self.cameras.len() as f32;
+        let mut own = SkyRow::default();
         for y in rect.y..rect.bottom() {
             let first = (y - rect.y) * rect.width;
-            row.clear(rect.width);
-            // Batches lie on the picture's own grid, so that a crop changes no pixel.
-            let mut x = rect.x / LANES * LANES;
-            while x < rect.right() {
-                for camera in &self.cameras {
-                    let mut directions = Directions::new(camera, x, y);
-                    directions.normalize();
-                    let colours = self.radiance(simd, &directions);
-                    for i in rect.x.max(x) - x..rect.right().min(x + LANES) - x {
-                        let at = x + i - rect.x;
-                        if directions.seen[i] && strip.visible(first + at, FAR.near as f32) {
-                            row.add(at, colours[i], share);
-                        }
+            let kept = if rect.width == self.view.size[0] { self.kept_row(simd, y) } else { None };
+            let row = match kept {
+                Some(row) if !strip.has_plate() => row,
+                Some(row) => {
+                    own.clone_from(row);
+                    own.hide_behind(strip, first);
+                    &own
+                }
+                None => {
+                    self.fill_row(simd, &mut own, y, rect.x..rect.right());
+                    own.hide_behind(strip, first);
+                    &own
+                }
+            };
+            let [red, green, blue] = &row.planes;
+            strip.add_row_behind(first, [red, green, blue], Some(&row.opacity), &far);
+        }
+    }
+
+    /// A whole row of the picture, if such are kept.
+    #[inline(always)]
+    fn kept_row<S: Simd>(&self, simd: S, y: usize) -> Option<&SkyRow> {
+        let row = self.still.as_ref()?.rows.as_ref()?.get(y)?;
+        if row.get().is_none() {
+            // Not within a closure, which would be compiled without the machine's vectors.
+            let mut drawn = SkyRow::default();
+            self.fill_row(simd, &mut drawn, y, 0..self.view.size[0]);
+            return Some(row.get_or_init(|| drawn));
+        }
+        row.get()
+    }
+
+    /// Draws pixels of row `y`, whatever is before them.
+    #[inline(always)]
+    fn fill_row<S: Simd>(&self, simd: S, row: &mut SkyRow, y: usize, pixels: Range<usize>) {
+        let share = 1.0 / self.cameras.len() as f32;
+        row.clear(pixels.len());
+        // Batches lie on the picture's own grid, so that a crop changes no pixel.
+        let mut x = pixels.start / LANES * LANES;
+        while x < pixels.end {
+            for camera in &self.cameras {
+                let mut directions = Directions::new(camera, x, y);
+                directions.normalize();
+                let colours = self.radiance(simd, &directions);
+                for i in pixels.start.max(x) - x..pixels.end.min(x + LANES) - x {
+                    if directions.seen[i] {
+                        row.add(x + i - pixels.start, colours[i], share);
                     }
                 }
-                x += LANES;
             }
-            let SkyRow { planes: [red, green, blue], opacity } = &mut row;
-            self.add_stars(rect, y, [red, green, blue], opacity);
-            strip.add_row_behind(first, [red, green, blue], Some(opacity), &far);
+            x += LANES;
         }
+        self.add_stars(row, y, pixels);
     }
 
     /// Radiance from directions, red, green, blue and nothing.
     #[inline(always)]
     fn radiance<S: Simd>(&self, simd: S, directions: &Directions) -> [[f32; 4]; LANES] {
-        if let Some(night) = &self.night {
-            return night.radiance(simd, directions);
+        if let Some(still) = &self.still {
+            return still.night.radiance(simd, directions);
         }
         let mut colours = [[0.0; 4]; LANES];
         if let Some(planes) = self.sky.radiance_at_elevations(&directions.axes[1]) {
@@ -197,25 +212,27 @@ impl PreparedSky<'_> {
 
     /// Adds the stars of one row where the sky is seen.
     #[inline(always)]
-    fn add_stars(&self, rect: Rect, y: usize, planes: [&mut [f32]; 3], opacity: &[f32]) {
-        let from = self.spots.partition_point(|spot| spot.pixel.y < y as f64 - 12.0);
-        for spot in &self.spots[from..] {
+    fn add_stars(&self, row: &mut SkyRow, y: usize, pixels: Range<usize>) {
+        let spots = self.still.as_ref().map_or(&[][..], |still| &still.spots);
+        let from = spots.partition_point(|spot| spot.pixel.y < y as f64 - 12.0);
+        for spot in &spots[from..] {
             if spot.pixel.y >= y as f64 + 12.0 {
                 return;
             }
             if (y as f64 + 0.5 - spot.pixel.y).abs() >= spot.reach {
                 continue;
             }
-            let low = (spot.pixel.x - spot.reach).floor().max(rect.x as f64) as usize;
-            let high = (spot.pixel.x + spot.reach).ceil().clamp(0.0, rect.right() as f64) as usize;
+            let low = (spot.pixel.x - spot.reach).floor().max(pixels.start as f64) as usize;
+            let high = (spot.pixel.x + spot.reach).ceil().clamp(0.0, pixels.end as f64) as usize;
             if low >= high {
                 continue;
             }
             let shapes = spot.row(low, y);
             for x in low..high.min(low + MOST_PIXELS) {
-                let (at, shape) = (x - rect.x, shapes[x - low] * opacity[x - rect.x]);
+                let at = x - pixels.start;
+                let shape = shapes[x - low] * row.opacity[at];
                 for c in 0..3 {
-                    planes[c][at] = spot.radiance[c].fused(shape, planes[c][at]);
+                    row.planes[c][at] = spot.radiance[c].fused(shape, row.planes[c][at]);
                 }
             }
         }
@@ -320,32 +337,6 @@ fn covers_at(camera: &Camera, skyline: &Skyline, x: usize, y: usize) -> [f32; LA
     covers
 }
 
-/// A row of sky.
-#[derive(Default)]
-struct SkyRow {
-    planes: [Vec<f32>; 3],
-    opacity: Vec<f32>,
-}
-
-impl SkyRow {
-    fn clear(&mut self, width: usize) {
-        for plane in self.planes.iter_mut().chain([&mut self.opacity]) {
-            plane.clear();
-            plane.resize(width, 0.0);
-        }
-    }
-
-    /// Adds the sky of a part of the exposure.
-    #[inline(always)]
-    fn add(&mut self, x: usize, [red, green, blue, _]: [f32; 4], share: f32) {
-        let [reds, greens, blues] = &mut self.planes;
-        reds[x] = red.fused(share, reds[x]);
-        greens[x] = green.fused(share, greens[x]);
-        blues[x] = blue.fused(share, blues[x]);
-        self.opacity[x] = (self.opacity[x] + share).min(1.0);
-    }
-}
-
 impl Prepared for PreparedSky<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
         let hills = self.skyline.is_some() && slice.overlaps(&self.hills);
@@ -419,6 +410,47 @@ mod tests {
         };
         let [still, turning] = [0.0, 6.0].map(|turn| steepest(night_seen(turn, 12.0)));
         assert!(turning < 0.5 * still, "{turning} {still}");
+    }
+
+    /// Light of a night in a part of a picture, of which the plate hides every third pixel.
+    fn night_in(backdrop: &SkyBackdrop, rect: Rect, has_plate: bool) -> [Vec<f32>; 3] {
+        let camera = CameraParameters {
+            position: [0.0; 3].into(),
+            target: [0.0, 30.0, -60.0].into(),
+            vertical_fov_deg: 60.0.into(),
+            ..CameraParameters::default()
+        };
+        let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [150, 90], 0);
+        let wind = Wind::new(WindParameters::default(), 1, None);
+        let surroundings = Surroundings { sky: backdrop.parameters.at(0.0), ..Surroundings::of_wind(&wind) };
+        let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).unwrap();
+        let depths: Vec<f32> = (0..150 * 90).map(|pixel| if pixel % 3 == 0 { 5.0 } else { f32::INFINITY }).collect();
+        let mut strip = Strip::default();
+        let rows = |y: usize| &depths[150 * y..150 * (y + 1)];
+        strip.reset(rect, has_plate.then_some(&rows), 0);
+        prepared.draw(&DepthInterval::ALL, &mut strip);
+        strip.radiance
+    }
+
+    #[test]
+    fn a_sky_that_is_shown_again_is_the_same() {
+        let parameters = SkyParameters { kind: SkyKind::Night, ..SkyParameters::default() };
+        let shown = SkyBackdrop::new(parameters.clone(), 3);
+        let whole = Rect::of_size(150, 90);
+        for (rect, has_plate) in [
+            (whole, false),
+            (whole, false),
+            (Rect { x: 37, y: 11, width: 50, height: 30 }, false),
+            (whole, true),
+            (Rect { y: 40, height: 8, ..whole }, false),
+        ] {
+            let first = night_in(&SkyBackdrop::new(parameters.clone(), 3), rect, has_plate);
+            assert!(night_in(&shown, rect, has_plate) == first, "{rect:?}, plate: {has_plate}");
+            assert_eq!(first[1].contains(&0.0), has_plate);
+        }
+        let kept = shown.still.lock().unwrap_or_else(PoisonError::into_inner);
+        let rows = kept.as_ref().and_then(|still| still.rows.clone()).expect("it was shown again");
+        assert!(rows.iter().all(|row| row.get().is_some()));
     }
 
     #[test]

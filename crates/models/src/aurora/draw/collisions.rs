@@ -13,22 +13,24 @@ use super::{
     DrawingParameters, FallModel,
     chart::{Chart, Finder, STRIP},
     descent::{Descent, Descents, LineOfFall, altitudes_km},
+    fall_table::{FallBatch, FallTable},
     footprint::{Footprint, Patch, REACH, Source},
     geometry::FieldLines,
     group::{GROUP, Group},
     meridians::{LightStrip, Meridians},
-    trace::{BATCH, Lit, Points, Trace},
+    points::{BATCH, LitRows, Points},
+    trace::Trace,
     wander::wander_km,
 };
 use crate::{
     aurora::{
-        atmosphere::{LEVELS, atmosphere},
+        atmosphere::atmosphere,
         light::{Emission, PerEmitter},
         precipitation::{
             Deposition,
             energy::{NODES, node_energy_ev},
             evened::EvenedFalls,
-            fall::{Collision, FallLibrary, Falls, VARIANTS, collision_count},
+            fall::{Collision, FallLibrary, Falls},
             hard_sphere::{DEFAULT_RADIUS, HardSphere},
         },
     },
@@ -36,14 +38,12 @@ use crate::{
 };
 
 const SOURCE: Purpose = Purpose::named("aurora collisions");
-/// Random deviations, a multiple of [`BATCH`].
-const DEVIATIONS: usize = 4096;
-/// What shines after a collision: the mean of a level, or nothing.
-const NOTHING: u16 = LEVELS as u16;
-/// Lanes from one collision of a full batch to the next below; odd, so that all are filled.
-const APART: usize = 5;
+/// Batches of random deviations.
+const DEVIATIONS: usize = 256;
 /// Sources whose falls are looked up together: what is far away in memory is then waited for once.
 const AHEAD: usize = 32;
+/// Batches of a fall that are placed before any of them is added, for the processor finds no other work while sums wait.
+const AT_ONCE: usize = 8;
 /// Nearer to the observer's own field line than so many reaches, points are placed anew for every column; and nearer
 /// than so many, each by its own root and divisions.
 const NEAR: f32 = 4.0;
@@ -63,100 +63,7 @@ pub(super) struct Collisions {
     /// Squared reach by which the collisions of a node's falls wander, km^2.
     wander_squared: Vec<f32>,
     /// Deviations with the density of a source's edge, in reaches.
-    deviations: Vec<f32>,
-}
-
-/// Falls of a library, their collisions in batches.
-#[derive(Clone, Debug)]
-struct FallTable {
-    /// Where the falls of each node begin, and the end of all, in batches.
-    starts: Vec<usize>,
-    batches: Vec<FallBatch>,
-}
-
-/// [`BATCH`] collisions of a fall, or fewer in the last of them.
-#[derive(Clone, Debug)]
-#[repr(align(64))]
-struct FallBatch {
-    /// Places among the altitudes, [`Descents::place`].
-    places: [f32; BATCH],
-    offsets_km: [f32; BATCH],
-    /// Places among the photons.
-    lights: [u16; BATCH],
-    count: u32,
-}
-
-impl FallTable {
-    /// Falls of so many nodes of the grid of energies, and where the light of each collision stands among the photons.
-    fn new(nodes: usize, fall: impl Fn(usize, u32) -> Vec<(Collision, u16)> + Sync) -> Self {
-        let of_node = |node: usize| -> Vec<FallBatch> {
-            let count = (collision_count(node) as usize).div_ceil(BATCH);
-            (0..VARIANTS).flat_map(|variant| batches(&fall(node, variant), count)).collect()
-        };
-        let by_node: Vec<_> = (0..nodes).into_par_iter().map(of_node).collect();
-        let mut starts = vec![0];
-        starts.extend(by_node.iter().scan(0, |end, batches| {
-            *end += batches.len();
-            Some(*end)
-        }));
-        Self { starts, batches: by_node.concat() }
-    }
-
-    /// The highest node that has falls.
-    fn highest(&self) -> usize {
-        self.starts.len() - 2
-    }
-
-    /// One of the falls of a node up to the highest, any number.
-    fn fall(&self, node: usize, variant: u32) -> &[FallBatch] {
-        let (start, end) = (self.starts[node], self.starts[node + 1]);
-        let count = (end - start) / VARIANTS as usize;
-        &self.batches[start + (variant % VARIANTS) as usize * count..][..count]
-    }
-}
-
-/// The collisions of a fall in so many batches, all but the last of them full.
-///
-/// What the last one has and what each of the others has are evenly spread over the fall; in full ones, collisions of neighbouring lanes are
-/// far apart, since sums in neighbouring rows would wait for each other.
-fn batches(fall: &[(Collision, u16)], count: usize) -> Vec<FallBatch> {
-    let full = count.saturating_sub(1);
-    let last = fall.len().min(BATCH * count).saturating_sub(BATCH * full);
-    let mut batches = vec![FallBatch::EMPTY; count];
-    let mut others = 0_usize;
-    for (number, collision) in fall.iter().take(BATCH * count).enumerate() {
-        let is_last = (number + 1) * last / fall.len() > number * last / fall.len();
-        if is_last || full == 0 {
-            let lane = batches[full].count as usize;
-            batches[full].put(lane, collision);
-        } else {
-            batches[others % full].put(others / full * APART % BATCH, collision);
-            others += 1;
-        }
-    }
-    // A fall that ends early goes on in the dark where it ended.
-    for (collision, _) in fall.last().into_iter().cycle().take((BATCH * full).saturating_sub(others)) {
-        batches[others % full].put(others / full * APART % BATCH, &(*collision, NOTHING));
-        others += 1;
-    }
-    // Lanes that have none lie where the first does, so that no row is lit for them.
-    for batch in &mut batches[full..] {
-        for lane in batch.count as usize..BATCH {
-            (batch.places[lane], batch.offsets_km[lane]) = (batch.places[0], batch.offsets_km[0]);
-        }
-    }
-    batches
-}
-
-impl FallBatch {
-    const EMPTY: Self = Self { places: [0.0; BATCH], offsets_km: [0.0; BATCH], lights: [NOTHING; BATCH], count: 0 };
-
-    fn put(&mut self, lane: usize, (collision, light): &(Collision, u16)) {
-        self.places[lane] = Descents::place(collision.altitude_km);
-        self.offsets_km[lane] = collision.offset_km[0];
-        self.lights[lane] = *light;
-        self.count += 1;
-    }
+    deviations: Vec<[f32; BATCH]>,
 }
 
 impl Collisions {
@@ -167,6 +74,7 @@ impl Collisions {
             let [a, b, c, _] = key.uniforms(index as u64, 1, SOURCE);
             (a + b + c - 1.5) * (4.0_f32 / 7.0).sqrt()
         };
+        let deviations = |batch: usize| std::array::from_fn(|lane| deviation(batch * BATCH + lane));
         let highest = highest.min(NODES - 1);
         let levels = emission.photons_per_ion_pair().iter().copied();
         let photons = levels.chain([[0.0; 4]]);
@@ -189,7 +97,7 @@ impl Collisions {
             descents: Descents::new(),
             pairs,
             wander_squared: (0..NODES).map(|node| wander(node) * wander(node)).collect(),
-            deviations: (0..DEVIATIONS).map(deviation).collect(),
+            deviations: (0..DEVIATIONS).map(deviations).collect(),
         }
     }
 
@@ -200,7 +108,7 @@ impl Collisions {
         let (chart, groups) = picture.strips(GROUP);
         let pass = CollisionPass { collisions: self, chart, finder: chart.finder(), footprint, step };
         groups.for_each_init(
-            || (Group::new(chart), Trace::new(chart.rows)),
+            || Workspace::new(chart),
             |own, group| dispatch!(level, simd => pass.group(simd, group, field, own)),
         );
         picture
@@ -220,7 +128,7 @@ impl Collisions {
             batches,
             pairs: self.pairs[node],
             wander_squared: self.wander_squared[node],
-            first: (c >> 8) as usize / BATCH * BATCH,
+            first: (c >> 8) as usize / BATCH,
         }
     }
 }
@@ -251,8 +159,21 @@ struct Fall<'a> {
     pairs: f32,
     /// Squared reach by which its collisions wander, km^2.
     wander_squared: f32,
-    /// Where its deviations begin.
+    /// Number of its first batch of deviations, any.
     first: usize,
+}
+
+/// What a thread keeps from source to source.
+struct Workspace {
+    group: Group,
+    trace: Trace,
+    points: [Points; AT_ONCE],
+}
+
+impl Workspace {
+    fn new(chart: &Chart) -> Self {
+        Self { group: Group::new(chart), trace: Trace::new(chart.rows), points: [Points::NONE; AT_ONCE] }
+    }
 }
 
 /// A field line as it is seen.
@@ -284,8 +205,8 @@ struct CollisionPass<'a> {
 impl CollisionPass<'_> {
     /// Draws columns beside each other, every source once for all of them.
     #[inline(always)]
-    fn group<S: Simd>(&self, simd: S, strip: LightStrip, field: &FieldLines, (group, trace): &mut (Group, Trace)) {
-        let entries = group.begin(strip.number, self.chart, self.footprint, field);
+    fn group<S: Simd>(&self, simd: S, strip: LightStrip, field: &FieldLines, own: &mut Workspace) {
+        let entries = own.group.begin(strip.number, self.chart, self.footprint, field);
         let mut falls = Vec::with_capacity(AHEAD);
         for entries in entries.chunks(AHEAD) {
             falls.clear();
@@ -293,15 +214,15 @@ impl CollisionPass<'_> {
                 falls.push(self.collisions.fall(*self.footprint.source(entry.source), self.step));
             }
             for (entry, fall) in entries.iter().zip(&falls) {
-                self.source(simd, entry.columns(), fall, group, trace);
+                self.source(simd, entry.columns(), fall, own);
             }
         }
-        group.write(strip, self.chart.rows);
-        group.end(entries);
+        own.group.write(strip, self.chart.rows);
+        own.group.end(entries);
     }
 
     #[inline(always)]
-    fn source<S: Simd>(&self, simd: S, columns: Range<usize>, fall: &Fall, group: &mut Group, trace: &mut Trace) {
+    fn source<S: Simd>(&self, simd: S, columns: Range<usize>, fall: &Fall, own: &mut Workspace) {
         let source = &fall.source;
         let [green, red, prompt] = source.power;
         let powers = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
@@ -309,90 +230,70 @@ impl CollisionPass<'_> {
         // Seen from afar its meridian is that of all columns.
         let shared = source.distance() >= NEAR * source.reach;
         if shared {
-            self.place(simd, fall, (columns.start + columns.end) / 2, group, trace);
+            self.place(simd, fall, (columns.start + columns.end) / 2, own);
         }
         for from in columns.clone().step_by(STRIP) {
-            let patch = Patch::new(source, self.chart, &group.units(from));
+            let patch = Patch::new(source, self.chart, &own.group.units(from));
             for column in from..columns.end.min(from + STRIP) {
                 let share = patch.side[column - from];
                 if share <= 0.0 {
                     continue;
                 }
                 if !shared {
-                    self.place(simd, fall, column, group, trace);
+                    self.place(simd, fall, column, own);
                 }
-                group.add(column, trace, weights * share);
+                own.group.add(column, &own.trace, weights * share);
             }
         }
     }
 
     /// Places the collisions of a fall down a line, as a column sees it.
     #[inline(always)]
-    fn place<S: Simd>(&self, simd: S, fall: &Fall, column: usize, group: &mut Group, trace: &mut Trace) {
+    fn place<S: Simd>(&self, simd: S, fall: &Fall, column: usize, own: &mut Workspace) {
+        let Workspace { group, trace, points } = own;
         trace.clear();
         let (meridian, distance) = group.seen_by(column, &fall.source);
         let line = LineOfFall::new(meridian, distance, &self.finder);
         let reach = fall.source.reach.max(self.footprint.bins().least_reach(distance));
         if distance < SINGLE * reach {
-            self.add(simd, fall, (reach, 0.0), &SeenLine::Exactly(line), trace);
+            self.add(simd, fall, (reach, 0.0), &SeenLine::Exactly(line), (trace, points));
             return;
         }
         let seen = group.descent(simd, column, distance, (&self.collisions.descents, &self.finder));
         let (descent, beyond) = (&seen.descent, distance - seen.distance);
         if descent.shows(reach + beyond.abs(), self.chart.rows) {
-            self.add(simd, fall, (reach, beyond), &SeenLine::ByPolynomials(descent), trace);
+            self.add(simd, fall, (reach, beyond), &SeenLine::ByPolynomials(descent), (trace, points));
         }
     }
 
     /// Adds the collisions of a fall that reaches so far to both sides of its field line, which lies so far beyond the line that is
     /// given, km.
     #[inline(always)]
-    fn add<S: Simd>(&self, simd: S, fall: &Fall, (reach, beyond): (f32, f32), line: &SeenLine, trace: &mut Trace) {
+    fn add<S: Simd>(
+        &self,
+        simd: S,
+        fall: &Fall,
+        (reach, beyond): (f32, f32),
+        line: &SeenLine,
+        (trace, points): (&mut Trace, &mut [Points; AT_ONCE]),
+    ) {
         let last = (self.chart.rows - 1) as f32;
         // A source reaches as far as its collisions wander too, and those do so by themselves.
         let own_reach = reach.fused(reach, -fall.wander_squared).max(0.0).sqrt();
-        let mut lit = Lit::new(simd);
-        for (number, batch) in fall.batches.iter().enumerate() {
-            let from = (fall.first + number * BATCH) % DEVIATIONS;
-            let Some(deviations) = self.collisions.deviations.get(from..from + BATCH) else { continue };
-            let offsets = Lanes::from_slice(simd, &batch.offsets_km) + Lanes::splat(simd, beyond);
-            let offsets = Lanes::from_slice(simd, deviations).fused(Lanes::splat(simd, own_reach), offsets);
-            let [rows, shown] = line.points(batch, offsets);
-            let points = Points::new(rows, shown, last, &mut lit);
-            trace.add(simd, &points, (&batch.lights, batch.count as usize), &self.collisions.photons);
+        let mut lit = LitRows::new(simd);
+        let mut deviations = fall.first;
+        for batches in fall.batches.chunks(AT_ONCE) {
+            for (batch, points) in batches.iter().zip(&mut *points) {
+                let deviation = Lanes::from_slice(simd, &self.collisions.deviations[deviations % DEVIATIONS]);
+                deviations += 1;
+                let offsets = Lanes::from_slice(simd, &batch.offsets_km) + Lanes::splat(simd, beyond);
+                let offsets = deviation.fused(Lanes::splat(simd, own_reach), offsets);
+                points.place(line.points(batch, offsets), last, trace.odd_pairs(), &mut lit);
+            }
+            for (batch, points) in batches.iter().zip(&*points) {
+                trace.add(simd, points, (&batch.lights, batch.count as usize), &self.collisions.photons);
+            }
         }
-        trace.finish(&lit);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_collision_of_a_fall_is_in_a_batch() {
-        for (collisions, count) in [(1, 1), (16, 1), (17, 2), (50, 4), (100, 7), (20, 4)] {
-            let collision = |number: usize| {
-                let altitude_km = 300.0 - 2.0 * number as f32;
-                (Collision { level: 0, altitude_km, offset_km: [number as f32, 0.0] }, number as u16)
-            };
-            let fall: Vec<_> = (0..collisions).map(collision).collect();
-            let batches = batches(&fall, count);
-            assert!(batches.iter().rev().skip(1).all(|batch| batch.count as usize == BATCH));
-            let lanes = batches.iter().flat_map(|batch| (0..batch.count as usize).map(move |lane| (batch, lane)));
-            let mut found: Vec<u16> = lanes
-                .filter(|(batch, lane)| batch.lights[*lane] != NOTHING)
-                .inspect(|(batch, lane)| {
-                    let number = f32::from(batch.lights[*lane]);
-                    assert_eq!(
-                        (batch.offsets_km[*lane], batch.places[*lane]),
-                        (number, Descents::place(300.0 - 2.0 * number))
-                    );
-                })
-                .map(|(batch, lane)| batch.lights[lane])
-                .collect();
-            found.sort_unstable();
-            assert!(found.into_iter().eq(0..collisions as u16), "{collisions} in {count}");
-        }
+        trace.finish(simd, &lit);
     }
 }

@@ -55,7 +55,7 @@ impl Group {
         // Odd, so that the same row of many columns does not fall to one place of the cache.
         let stride = chart.rows.div_ceil(QUAD) | 1;
         Self {
-            light: vec![Quad([0.0; 4 * QUAD]); stride * GROUP],
+            light: vec![Quad::DARK; stride * GROUP],
             lit: [[usize::MAX, 0]; GROUP],
             stride,
             entries: Vec::new(),
@@ -183,18 +183,17 @@ impl CachedDescent {
 /// Makes more of a column valid: what has been lit stays, what is new is dark.
 #[inline(always)]
 fn light_up(light: &mut [Quad], lit: &mut [usize; 2], [start, end]: [usize; 2]) {
-    const DARK: Quad = Quad([0.0; 4 * QUAD]);
     let end = end.min(light.len());
     if lit[0] > lit[1] {
-        light[start..end].fill(DARK);
+        light[start..end].fill(Quad::DARK);
         *lit = [start, end];
     }
     if start < lit[0] {
-        light[start..lit[0]].fill(DARK);
+        light[start..lit[0]].fill(Quad::DARK);
         lit[0] = start;
     }
     if end > lit[1] {
-        light[lit[1]..end].fill(DARK);
+        light[lit[1]..end].fill(Quad::DARK);
         lit[1] = end;
     }
 }

@@ -1,54 +1,88 @@
 //! The light of one fall along its meridian, row by row, and how it is added to columns.
 //!
-//! A fall has some fifty collisions on some hundreds of rows. So it is kept which rows have any: only those are added to columns, and only
-//! those are cleared.
+//! A fall has a hundred collisions on as many rows, out of hundreds. So it is kept which rows have any: only those are added to columns, and
+//! only those are cleared.
 
-use fearless_simd::{Simd, prelude::*};
+use fearless_simd::{Simd, prelude::*, u8x32, u16x16, u64x4};
 
+use super::points::{BATCH, LitRows, Points};
 use crate::{
     aurora::light::PerEmitter,
-    lanes::{FourLanes, HalfLanes, LANES, Lanes, Real, nearest_whole, ramp},
+    lanes::{FourLanes, HalfLanes, Lanes, Real},
 };
 
-/// Collisions that are worked on at once.
-pub(super) const BATCH: usize = LANES;
-/// Rows that are added to a column at once.
+/// Rows that are added to a column at once, two pairs.
 pub(super) const QUAD: usize = 4;
+/// Points in a row of code without a jump.
+const UNROLLED: usize = 4;
+/// Numbers for each pair of rows, and for each four.
+const PAIR_LIGHT: usize = 8;
+const QUAD_LIGHT: usize = 16;
+/// Bytes of the first of two numbers for the four emitters of the upper row, those of the second for the lower one.
+const SPREAD: [u8; 32] =
+    [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 4, 5, 6, 7, 4, 5, 6, 7, 4, 5, 6, 7, 4, 5, 6, 7];
+const FIRST_QUADS: [u16; BATCH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
 /// Light of [`QUAD`] rows, in one line of the cache.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-pub(super) struct Quad(pub(super) [f32; 4 * QUAD]);
+pub(super) struct Quad(pub(super) [f32; QUAD_LIGHT]);
+
+impl Quad {
+    pub(super) const DARK: Self = Self([0.0; QUAD_LIGHT]);
+}
 
 /// Photons of the collisions of one fall by row of the chart, and beyond them rows for points that are outside.
+///
+/// A point adds to a pair of rows, one vector. Pairs whose upper row is even are kept apart from those where it is odd: any two are then the
+/// same place in memory or have none in common, and no sum waits for two others that hold a half of it each.
 pub(super) struct Trace {
-    light: Vec<PerEmitter<f32>>,
-    /// Whether each row and the one below may have some: 0 or 1.
-    touched: Vec<[u8; QUAD]>,
-    /// The fours of rows that have some, and how many they are.
-    quads: Vec<u32>,
+    /// Even pairs, rows from 0 on; after them odd ones, rows from -1 on.
+    light: Vec<f32>,
+    /// Where they begin: at a line of the cache.
+    start: usize,
+    /// Whether each pair may have some: 0 or 1.
+    touched: Vec<u8>,
+    /// Fours of rows.
+    height: usize,
+    /// The fours of rows that have light, and how many they are.
+    lit: Vec<u16>,
     count: usize,
+    /// Their light, one after the other.
+    joined: Vec<Quad>,
 }
 
 impl Trace {
     pub(super) fn new(rows: usize) -> Self {
-        let rows = (rows + 2 * BATCH).next_multiple_of(QUAD) + QUAD;
-        let quads = rows / QUAD;
-        Self { light: vec![[0.0; 4]; rows], touched: vec![[0; QUAD]; quads], quads: vec![0; quads + 1], count: 0 }
+        let height = rows.div_ceil(QUAD) + 1 + BATCH;
+        let quads = 2 * height + 1;
+        let light = vec![0.0; QUAD_LIGHT * (quads + 1)];
+        Self {
+            start: light.as_ptr().align_offset(align_of::<Quad>()).min(QUAD_LIGHT),
+            light,
+            touched: vec![0; 2 * (quads + BATCH)],
+            height,
+            lit: vec![0; height + BATCH],
+            count: 0,
+            joined: vec![Quad::DARK; height],
+        }
+    }
+
+    /// Number of the first odd pair.
+    #[inline(always)]
+    pub(super) fn odd_pairs(&self) -> u32 {
+        2 * self.height as u32
     }
 
     /// The fours of rows that have light, from the uppermost on.
     #[inline(always)]
-    pub(super) fn quads(&self) -> &[u32] {
-        &self.quads[..self.count]
+    pub(super) fn quads(&self) -> &[u16] {
+        &self.lit[..self.count]
     }
 
+    /// Forgets the fall before.
     #[inline(always)]
     pub(super) fn clear(&mut self) {
-        let rows = self.light.as_chunks_mut::<QUAD>().0;
-        for quad in &self.quads[..self.count] {
-            rows[*quad as usize] = [[0.0; 4]; QUAD];
-        }
         self.count = 0;
     }
 
@@ -61,116 +95,155 @@ impl Trace {
         (lights, count): (&[u16; BATCH], usize),
         photons: &[PerEmitter<f32>],
     ) {
-        if count == BATCH {
-            for lane in 0..BATCH {
-                self.add_point(simd, points, lane, photons.get(lights[lane] as usize));
+        let light = self.light[self.start..].as_chunks_mut().0;
+        let pairs = light.len().min(self.touched.len());
+        // As locals they stay in registers: what is written might else be taken for where they are.
+        let mut sums = Sums { light: &mut light[..pairs], touched: &mut self.touched[..pairs], photons };
+        if count < BATCH {
+            for lane in 0..count {
+                sums.add(simd, points, lane, lights[lane]);
             }
-        } else {
-            for lane in 0..count.min(BATCH) {
-                self.add_point(simd, points, lane, photons.get(lights[lane] as usize));
+            return;
+        }
+        for first in (0..BATCH).step_by(UNROLLED) {
+            for lane in first..first + UNROLLED {
+                sums.add(simd, points, lane, lights[lane]);
             }
         }
     }
 
+    /// Finds what rows have light, within those that may have some, and readies all else for the next fall.
     #[inline(always)]
-    fn add_point<S: Simd>(&mut self, simd: S, points: &Points, lane: usize, photons: Option<&PerEmitter<f32>>) {
-        let row = points.rows[lane] as usize;
-        let touched = self.touched.as_flattened_mut().get_mut(row);
-        let both = self.light.get_mut(row..row + 2);
-        let (Some(both), Some(touched), Some(photons)) = (both, touched, photons) else { return };
-        *touched = 1;
-        let (both, photons) = (both.as_flattened_mut(), FourLanes::simd_from(simd, *photons));
-        let weights = FourLanes::splat(simd, points.upper[lane]).combine(FourLanes::splat(simd, points.lower[lane]));
-        photons.combine(photons).fused(weights, HalfLanes::from_slice(simd, both)).store_slice(both);
+    pub(super) fn finish<S: Simd>(&mut self, simd: S, rows: &LitRows<S>) {
+        self.find(simd, rows);
+        self.join(simd);
     }
 
-    /// Finds what rows have light, within those that may have some.
+    /// Fours of rows any of whose five pairs is touched.
     #[inline(always)]
-    pub(super) fn finish<S: Simd>(&mut self, lit: &Lit<S>) {
-        let [first, end] = lit.rows().map(|row| row.div_ceil(QUAD));
-        let first = first.saturating_sub(1).min(end);
-        let mut count = 0;
-        // The last row before reaches into the first here.
-        let mut before = 0;
-        // Without a branch, which nobody could foresee.
-        for (quad, touched) in (first as u32..).zip(&mut self.touched[first..end]) {
-            self.quads[count] = quad;
-            count += usize::from(u32::from_le_bytes(*touched) | before != 0);
-            before = u32::from(touched[QUAD - 1]);
-            *touched = [0; QUAD];
+    fn find<S: Simd>(&mut self, simd: S, rows: &LitRows<S>) {
+        let [first, end] = rows.range();
+        let (first, end) = (first / QUAD, end.div_ceil(QUAD));
+        let (even, odd) = self.touched.split_at_mut(2 * self.height);
+        let (quads, none) = (u16x16::from_slice(simd, &FIRST_QUADS), u8x32::splat(simd, 0));
+        self.count = 0;
+        for from in (first..end).step_by(BATCH) {
+            let even = &mut even[2 * from..][..2 * BATCH];
+            let odd = &mut odd[2 * from..][..2 * BATCH + 1];
+            // The second and third odd pair of a four are seen from one byte further on.
+            let [own, odd_own, odd_next] =
+                [&*even, &odd[..2 * BATCH], &odd[1..]].map(|bytes| u8x32::from_slice(simd, bytes));
+            let touched: u16x16<S> = (own | odd_own | odd_next).bitcast();
+            none.store_slice(even);
+            none.store_slice(&mut odd[..2 * BATCH]);
+            let quads = quads + from as u16;
+            let lit = touched.simd_gt(0) & quads.simd_lt(end as u16);
+            quads.compress(lit).store_slice(&mut self.lit[self.count..][..BATCH]);
+            self.count += lit.to_bitmask().count_ones() as usize;
         }
-        self.count = count;
+    }
+
+    /// Joins the even and odd pairs of rows that have light, and clears them.
+    #[inline(always)]
+    fn join<S: Simd>(&mut self, simd: S) {
+        let (even, odd) = self.light[self.start..].split_at_mut(QUAD_LIGHT * self.height);
+        let (even, none) = (even.as_chunks_mut::<QUAD_LIGHT>().0, Lanes::splat(simd, 0.0));
+        for (quad, joined) in self.lit[..self.count].iter().zip(&mut self.joined) {
+            let quad = *quad as usize;
+            // Odd pairs begin a row higher.
+            let odd = odd.get_mut(QUAD_LIGHT * quad..QUAD_LIGHT * (quad + 1) + PAIR_LIGHT / 2);
+            let (Some(even), Some(odd)) = (even.get_mut(quad), odd) else { continue };
+            let sum = Lanes::from_slice(simd, even) + Lanes::from_slice(simd, &odd[PAIR_LIGHT / 2..]);
+            sum.store_slice(&mut joined.0);
+            none.store_slice(even);
+            // The row that is left belongs to the four below too, which is lit then.
+            none.store_slice(&mut odd[..QUAD_LIGHT]);
+        }
     }
 
     /// Adds it with weights to a column.
     #[inline(always)]
     pub(super) fn add_to<S: Simd>(&self, column: &mut [Quad], weights: FourLanes<S>) {
-        let simd = weights.simd;
-        let rows = self.light.as_chunks::<QUAD>().0;
         let two = weights.combine(weights);
         let four = two.combine(two);
-        for quad in self.quads() {
-            let quad = *quad as usize;
-            let (Some(own), Some(light)) = (rows.get(quad), column.get_mut(quad)) else { continue };
-            let own = Lanes::from_slice(simd, own.as_flattened());
-            own.fused(four, Lanes::from_slice(simd, &light.0)).store_slice(&mut light.0);
+        for (quad, joined) in self.quads().iter().zip(&self.joined) {
+            let Some(light) = column.get_mut(*quad as usize) else { continue };
+            let [own, all] = [&joined.0, &light.0].map(|light| Lanes::from_slice(four.simd, light));
+            own.fused(four, all).store_slice(&mut light.0);
         }
     }
 }
 
-/// Rows of a batch of collisions, and the weights there and in the row below. Those outside have no weight and a row
-/// each below the chart, for sums in one row would wait for each other.
-pub(super) struct Points {
-    rows: [u32; BATCH],
-    upper: [f32; BATCH],
-    lower: [f32; BATCH],
+/// Where points are added up, and what shines there.
+struct Sums<'a> {
+    light: &'a mut [[f32; PAIR_LIGHT]],
+    touched: &'a mut [u8],
+    photons: &'a [PerEmitter<f32>],
 }
 
-/// The least and the greatest row of each lane.
-pub(super) struct Lit<S: Simd> {
-    least: Lanes<S>,
-    greatest: Lanes<S>,
-}
-
-impl<S: Simd> Lit<S> {
+impl Sums<'_> {
     #[inline(always)]
-    pub(super) fn new(simd: S) -> Self {
-        Self { least: Lanes::splat(simd, f32::INFINITY), greatest: Lanes::splat(simd, -1.0) }
+    fn add<S: Simd>(&mut self, simd: S, points: &Points, lane: usize, light: u16) {
+        let pair = points.pairs[lane] as usize;
+        let photons = self.photons.get(light as usize);
+        let (Some(photons), Some(both), Some(touched)) =
+            (photons, self.light.get_mut(pair), self.touched.get_mut(pair))
+        else {
+            return;
+        };
+        *touched = 1;
+        let weights: HalfLanes<S> = u64x4::splat(simd, points.weights[lane]).bitcast();
+        let weights = weights.swizzle_dyn_within_blocks(u8x32::from_slice(simd, &SPREAD));
+        let photons = FourLanes::simd_from(simd, *photons);
+        photons.combine(photons).fused(weights, HalfLanes::from_slice(simd, both)).store_slice(both);
     }
+}
 
-    /// The first row that may hold something, and the one after the last.
-    #[inline(always)]
-    fn rows(&self) -> [usize; 2] {
-        let (mut least, mut greatest) = (f32::INFINITY, -1.0_f32);
-        for lane in 0..BATCH {
-            least = least.min(self.least[lane]);
-            greatest = greatest.max(self.greatest[lane]);
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{Level, dispatch};
+
+    use super::*;
+
+    /// Rows and brightness of some points, some outside: the same light as one sum after the other, and none left for the next fall.
+    #[test]
+    fn points_light_the_two_rows_that_they_lie_between() {
+        const ROWS: usize = 150;
+        let photons = [[1.0, 2.0, 3.0, 4.0], [0.5, 0.0, 0.25, 8.0]];
+        let mut trace = Trace::new(ROWS);
+        for fall in 0..20_u16 {
+            let spread = 1.0 + 9.0 * f32::from(fall % 5);
+            let row = |lane: usize| 3.0 + 2.37 * f32::from(fall) + spread * (lane * 7 % BATCH) as f32 - 8.0;
+            let rows: [f32; BATCH] = std::array::from_fn(row);
+            let shown: [f32; BATCH] = std::array::from_fn(|lane| 0.5 + lane as f32);
+            let lights: [u16; BATCH] = std::array::from_fn(|lane| (lane % 2) as u16);
+            let count = BATCH - (fall % 4) as usize;
+            let mut column = vec![Quad::DARK; ROWS.div_ceil(QUAD)];
+            dispatch!(Level::new(), simd => {
+                let (mut points, mut lit) = (Points::NONE, LitRows::new(simd));
+                let [rows, shown] = [&rows, &shown].map(|values| Lanes::from_slice(simd, values));
+                points.place([rows, shown], (ROWS - 1) as f32, trace.odd_pairs(), &mut lit);
+                trace.clear();
+                trace.add(simd, &points, (&lights, count), &photons);
+                trace.finish(simd, &lit);
+                trace.add_to(&mut column, FourLanes::splat(simd, 2.0));
+            });
+            let mut expected = [[0.0_f32; 4]; ROWS + 1];
+            for lane in 0..count {
+                let (row, lower) = (rows[lane].floor(), rows[lane] - rows[lane].floor());
+                if (0.0..(ROWS - 1) as f32).contains(&rows[lane]) {
+                    for (emitter, photons) in photons[lane % 2].iter().enumerate() {
+                        let light = 2.0 * photons * shown[lane];
+                        expected[row as usize][emitter] += light * (1.0 - lower);
+                        expected[row as usize + 1][emitter] += light * lower;
+                    }
+                }
+            }
+            let found = column.iter().flat_map(|quad| quad.0);
+            for (number, (found, expected)) in found.zip(expected.as_flattened()).enumerate() {
+                let what = || format!("fall {fall}, row {}, emitter {}", number / 4, number % 4);
+                assert!((found - expected).abs() <= 1e-4 * expected.abs(), "{}: {found} for {expected}", what());
+            }
         }
-        if greatest < least { [0; 2] } else { [least as usize, greatest as usize + 2] }
     }
-}
-
-impl Points {
-    /// Points at rows above `last`, or outside.
-    #[inline(always)]
-    pub(super) fn new<S: Simd>(rows: Lanes<S>, shown: Lanes<S>, last: f32, lit: &mut Lit<S>) -> Self {
-        let (zero, end, outside) = (rows.like(0.0), rows.like(last), ramp(rows.simd, last + 1.0, 2.0));
-        let whole = rows.floor();
-        let (least, greatest) = (rows.like(f32::INFINITY), rows.like(-1.0));
-        lit.least = lit.least.least(inside(rows, end, [whole, least]));
-        lit.greatest = lit.greatest.greatest(inside(rows, end, [whole, greatest]));
-        let weights = inside(rows, end, [shown, zero]);
-        let lower = weights * (rows - whole);
-        let mut points = Self { rows: [0; BATCH], upper: [0.0; BATCH], lower: [0.0; BATCH] };
-        nearest_whole(inside(rows, end, [whole, outside])).store_slice(&mut points.rows);
-        (weights - lower).store_slice(&mut points.upper);
-        lower.store_slice(&mut points.lower);
-        points
-    }
-}
-
-/// The first where rows lie from 0 to `end`, the second elsewhere.
-#[inline(always)]
-fn inside<S: Simd>(rows: Lanes<S>, end: Lanes<S>, [within, without]: [Lanes<S>; 2]) -> Lanes<S> {
-    rows.choose(rows.like(0.0), without, rows.choose(end, within, without))
 }
