@@ -9,7 +9,11 @@ use std::ops::Range;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::{batch::BATCH, group::Stretch};
+use super::{
+    batch::BATCH,
+    group::Stretch,
+    sorting::{AT_ONCE, Cell, Sorting},
+};
 
 /// Cells further than this from the origin, in support radii, are taken together; so a key of three axes fits 64 bits.
 const FARTHEST: i32 = 1 << 18;
@@ -21,12 +25,8 @@ const ALONG: i32 = 4;
 const LONGEST_GROUP: u64 = 8 * ALONG as u64;
 /// Where particles are put that are farther away or nowhere; squares of such distances are still finite.
 pub(super) const BEYOND: f32 = 1e12;
-/// Particles that one task takes at least.
-pub(super) const AT_ONCE: usize = 4096;
 /// Cells looked at together when a search moves on: how far it goes is hard to foresee, for the processor too.
 const AHEAD: usize = 4;
-/// Most bits sorted by in one pass.
-const DIGIT_BITS: u32 = 11;
 
 /// Particles in cells by one support radius; the order they were given in does not matter.
 #[derive(Clone, Debug)]
@@ -38,29 +38,15 @@ pub struct Cells<const D: usize> {
     ids: Vec<u64>,
     /// Positions in sorted order, and a batch that is nowhere.
     positions: [Vec<f32>; D],
+    /// The cells that hold particles; the last [`AHEAD`] are sentinels behind all.
     occupied: Vec<Cell>,
     row_parts: Vec<RowPart>,
     stretches: Vec<Stretch>,
-    sorting: Sorting<D>,
-}
-
-/// What sorting writes on the way, kept from step to step.
-#[derive(Clone, Debug)]
-struct Sorting<const D: usize> {
     /// Cells along each axis.
     coordinates: [Vec<i32>; D],
-    /// Keys and the indices that they belong to.
-    entries: Vec<(u64, u32)>,
-    spare: Vec<(u64, u32)>,
+    sorting: Sorting,
     /// Arrays that take the place of those brought into order, one a thread.
     spares: Vec<Vec<f32>>,
-}
-
-/// A cell that holds particles: its key and its first particle. The last [`AHEAD`] of the list are sentinels behind all.
-#[derive(Clone, Copy, Debug)]
-struct Cell {
-    key: u64,
-    start: u32,
 }
 
 /// Up to [`BATCH`] particles that follow each other in a row, and the keys of the first and the last one's cell.
@@ -127,8 +113,19 @@ impl<const D: usize> Cells<D> {
         let keys = Keys::new([0; D], [0; D]);
         let (order, ids, occupied, row_parts, stretches) = Default::default();
         let coordinates = std::array::from_fn(|_| Vec::new());
-        let sorting = Sorting { coordinates, entries: Vec::new(), spare: Vec::new(), spares: Vec::new() };
-        Self { support_radius, keys, order, ids, positions: none(), occupied, row_parts, stretches, sorting }
+        Self {
+            support_radius,
+            keys,
+            order,
+            ids,
+            positions: none(),
+            occupied,
+            row_parts,
+            stretches,
+            coordinates,
+            sorting: Sorting::default(),
+            spares: Vec::new(),
+        }
     }
 
     /// The distance from which on particles do not see each other.
@@ -162,15 +159,17 @@ impl<const D: usize> Cells<D> {
         assert!(ids.len() <= 1 << 27, "particles are counted in 32 bits");
         assert!(positions.iter().all(|component| component.len() == ids.len()), "one position an id");
         let scale = 1.0 / (self.support_radius * MARGIN);
-        self.sorting.coordinates.par_iter_mut().zip(positions).enumerate().for_each(|(c, (cells, component))| {
+        let mut bounds = [[0; 2]; D];
+        let axes = self.coordinates.par_iter_mut().zip(positions).zip(&mut bounds);
+        axes.enumerate().for_each(|(c, ((cells, component), bounds))| {
             let along = if c == 0 { ALONG } else { 1 };
             let (scale, farthest) = (scale * along as f32, (FARTHEST * along) as f32);
-            dispatch!(Level::new(), _simd => cells_along(component, scale, farthest, cells));
+            dispatch!(Level::new(), _simd => *bounds = cells_along(component, scale, farthest, cells));
         });
         self.order.clear();
         self.occupied.clear();
         if !ids.is_empty() {
-            self.sort(ids);
+            self.sort(ids, &bounds);
         }
         let within = |x: f32| if x.abs() < BEYOND { x } else { BEYOND };
         let mut sorted = std::mem::replace(&mut self.positions, std::array::from_fn(|_| Vec::new()));
@@ -188,41 +187,20 @@ impl<const D: usize> Cells<D> {
         self.stretches = stretches;
     }
 
-    /// Sorts by key, then by id, and lists the cells.
-    fn sort(&mut self, ids: &[u64]) {
-        let Sorting { coordinates, entries, spare, .. } = &mut self.sorting;
-        let bound = |c: usize, pick: fn(i32, i32) -> i32| coordinates[c].iter().copied().fold(coordinates[c][0], pick);
-        self.keys = Keys::new(std::array::from_fn(|c| bound(c, i32::min)), std::array::from_fn(|c| bound(c, i32::max)));
-        let keys = self.keys;
-        let entry = |i: usize| {
+    /// Sorts by key, then by id, and lists the cells, of which the first and the last along each axis are given.
+    fn sort(&mut self, ids: &[u64], bounds: &[[i32; 2]; D]) {
+        let Self { coordinates, sorting, order, occupied, .. } = self;
+        let keys = Keys::new(bounds.map(|[first, _]| first), bounds.map(|[_, last]| last));
+        let key = |index: usize| {
             let mut cell = [0; D];
             for c in 0..D {
-                cell[c] = coordinates[c][i];
+                cell[c] = coordinates[c][index];
             }
-            (keys.key(cell), i as u32)
+            keys.key(cell)
         };
-        (0..ids.len()).into_par_iter().with_min_len(AT_ONCE).map(entry).collect_into_vec(entries);
-        spare.resize(entries.len(), (0, 0));
-        let passes = keys.bits.div_ceil(DIGIT_BITS);
-        for pass in 0..passes {
-            let [from, to] = [pass, pass + 1].map(|pass| keys.bits * pass / passes);
-            counting_pass(entries, spare, from..to);
-            std::mem::swap(entries, spare);
-        }
-        let by_id = |cell: &mut [(u64, u32)]| cell.sort_unstable_by_key(|entry| ids[entry.1 as usize]);
-        entries.par_chunk_by_mut(|a, b| a.0 == b.0).for_each(by_id);
-        self.order.par_extend(entries.par_iter().with_min_len(AT_ONCE).map(|entry| entry.1));
-        self.list_cells();
-    }
-
-    /// Lists the cells of the sorted entries.
-    fn list_cells(&mut self) {
-        let mut start = 0;
-        for cell in self.sorting.entries.chunk_by(|a, b| a.0 == b.0) {
-            self.occupied.push(Cell { key: cell[0].0, start });
-            start += cell.len() as u32;
-        }
-        self.occupied.resize(self.occupied.len() + AHEAD, Cell { key: u64::MAX, start });
+        sorting.sort(key, keys.bits, ids, (order, occupied));
+        occupied.resize(occupied.len() + AHEAD, Cell { key: u64::MAX, start: ids.len() as u32 });
+        self.keys = keys;
     }
 
     /// Parts every row of cells into particles for groups.
@@ -262,10 +240,10 @@ impl<const D: usize> Cells<D> {
     pub fn reorder_all<'a>(&mut self, arrays: impl IntoIterator<Item = &'a mut Vec<f32>>) {
         let mut arrays: Vec<&mut Vec<f32>> = arrays.into_iter().collect();
         let threads = rayon::current_num_threads().clamp(1, arrays.len().max(1));
-        let Self { order, sorting, .. } = self;
-        sorting.spares.resize_with(threads, Vec::new);
+        let Self { order, spares, .. } = self;
+        spares.resize_with(threads, Vec::new);
         let share = arrays.len().div_ceil(threads).max(1);
-        arrays.par_chunks_mut(share).zip(&mut sorting.spares).for_each(|(arrays, spare)| {
+        arrays.par_chunks_mut(share).zip(spares).for_each(|(arrays, spare)| {
             for values in arrays {
                 assert_eq!(values.len(), order.len(), "one value a particle");
                 spare.clear();
@@ -344,30 +322,16 @@ fn first_from(cells: &[Cell], mut start: usize, key: u64) -> usize {
     start
 }
 
-/// The cells of coordinates, `scale` cells a unit. No `floor`: where the processor lacks it that is a call.
+/// The cells of coordinates, `scale` cells a unit; gives the first and the last. No `floor`: where the processor lacks it that is a call.
 #[inline(always)]
-fn cells_along(component: &[f32], scale: f32, farthest: f32, cells: &mut Vec<i32>) {
+fn cells_along(component: &[f32], scale: f32, farthest: f32, cells: &mut Vec<i32>) -> [i32; 2] {
     cells.resize(component.len(), 0);
+    let (mut first, mut last) = (i32::MAX, i32::MIN);
     for (cell, value) in cells.iter_mut().zip(component) {
         let place = (value * scale).clamp(-farthest, farthest);
         let whole = place as i32;
         *cell = whole - i32::from(whole as f32 > place);
+        (first, last) = (first.min(*cell), last.max(*cell));
     }
-}
-
-/// One stable pass of a radix sort, over some bits of the keys.
-fn counting_pass(from: &[(u64, u32)], to: &mut [(u64, u32)], bits: Range<u32>) {
-    let mut places = [0_u32; 1 << DIGIT_BITS];
-    let mask = (1 << bits.len()) - 1;
-    let digit = |key: u64| (key >> bits.start) as usize & mask;
-    from.iter().for_each(|entry| places[digit(entry.0)] += 1);
-    let mut sum = 0;
-    for place in &mut places[..=mask] {
-        sum += std::mem::replace(place, sum);
-    }
-    for entry in from {
-        let place = &mut places[digit(entry.0)];
-        to[*place as usize] = *entry;
-        *place += 1;
-    }
+    [first, last]
 }

@@ -39,6 +39,7 @@ pub struct StateEquation {
 impl StateEquation {
     /// Pressure at a density; `stiffness` is k, which grows with temperature.
     #[must_use]
+    #[inline]
     pub fn pressure(&self, stiffness: f32, density: f32) -> f32 {
         let pressure = stiffness * (density - self.rest_density);
         if self.tension { pressure } else { pressure.max(0.0) }

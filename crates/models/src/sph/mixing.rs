@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::cells::AT_ONCE;
+use super::sorting::AT_ONCE;
 
 /// Weights `w = m / sqrt(rho)`: for a pair they make the geometric mean of both densities.
 ///

@@ -29,6 +29,7 @@ mod kernel;
 mod mixing;
 mod particles;
 mod pressure;
+mod sorting;
 mod step;
 mod sum;
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::cells::{AT_ONCE, Cells};
+use super::{cells::Cells, sorting::AT_ONCE};
 
 /// Particles in `D` dimensions as arrays, one entry a particle.
 ///

@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 
 use super::{
-    cells::{AT_ONCE, Cells},
+    cells::Cells,
     kernel::{KernelShape, SmoothingKernel, with_kernel},
+    sorting::AT_ONCE,
     sum::{Pair, PairTerm},
 };
 use crate::lanes::Real;

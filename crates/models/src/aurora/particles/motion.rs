@@ -70,21 +70,38 @@ impl Repulsion {
     pub(super) fn find(&mut self, particles: &mut AuroraParticles, support_km: f64, rest_density: f64) -> f64 {
         self.cells.set_support_radius(support_km as f32);
         particles.sort(&mut self.cells);
-        self.masses.clear();
-        self.masses.extend(particles.fades.iter().map(|fade| fade.fused(1.0 - LEAST_MASS, LEAST_MASS)));
+        let level = Level::new();
+        dispatch!(level, _simd => masses_of(&particles.fades, &mut self.masses));
         densities(&self.cells, self.density_kernel, &self.masses, &mut self.densities);
         // To itself a particle is all there: one that is just appearing would be next to weightless, and be flung away.
         let whole = self.density_kernel.at_centre::<2>(self.cells.support_radius());
-        self.densities.iter_mut().zip(&self.masses).for_each(|(density, mass)| *density += (1.0 - mass) * whole);
         let state = StateEquation { rest_density: rest_density as f32, tension: true };
-        let stiffness = self.stiffness;
-        self.pressures.clear();
-        self.pressures.extend(self.densities.iter().map(|density| state.pressure(stiffness, *density)));
+        let Self { masses, densities, pressures, stiffness, .. } = self;
+        dispatch!(level, _simd => complete(densities, masses, whole));
+        pressures.clear();
+        pressures.extend(densities.iter().map(|density| state.pressure(*stiffness, *density)));
         let (cells, masses) = (&self.cells, &self.masses);
         self.force.accelerations(cells, masses, &self.densities, &self.pressures, &mut self.accelerations);
         let count = self.densities.len().max(1) as f64;
         let mean = self.densities.iter().map(|density| f64::from(*density)).sum::<f64>() / count;
         support_km + FOLLOWING * (self.support_km(mean) - support_km)
+    }
+}
+
+/// Masses of particles that are there so far.
+#[inline(always)]
+fn masses_of(fades: &[f32], masses: &mut Vec<f32>) {
+    masses.resize(fades.len(), 0.0);
+    for (mass, fade) in masses.iter_mut().zip(fades) {
+        *mass = fade.fused(1.0 - LEAST_MASS, LEAST_MASS);
+    }
+}
+
+/// Adds to densities what particles lack themselves; `whole` is what one that is all there has.
+#[inline(always)]
+fn complete(densities: &mut [f32], masses: &[f32], whole: f32) {
+    for (density, mass) in densities.iter_mut().zip(masses) {
+        *density += (1.0 - mass) * whole;
     }
 }
 

@@ -97,8 +97,7 @@ impl Precipitation {
         let weights: Vec<_> = chunks(particles).into_par_iter().zip(&weighed).map(add_up).collect();
         let weights = weights.iter().fold(Nodes::new(&coarse), |sum, part| sum.plus(part));
         let factors = self.wanted(course, &coarse, time).shared_by(&weights, MOST_UNEVEN);
-        let given: Vec<[f64; 2]> =
-            chunks(particles).into_par_iter().map(|part| part.brighten(&lengths, &factors)).collect();
+        let given: Vec<[f64; 2]> = chunks(particles).into_par_iter().map(|part| part.brighten(&factors)).collect();
         balance(particles, &given);
     }
 
@@ -157,12 +156,14 @@ impl ParticleChunk<'_> {
         course.foot([f64::from(self.positions[0][index]), f64::from(self.positions[1][index])].into())
     }
 
-    /// Adds up the weights of particles that stand for so much of the sheets' length each.
+    /// Adds up the weights of particles that stand for so much of the sheets' length each, and gives it to their negative powers.
     fn add_up<'a>(self, weights: &[f32], lengths: &Nodes, layout: &'a Layout) -> Nodes<'a> {
         let mut sums = Nodes::new(layout);
         for (index, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
             let (sheet, share) = (self.sheets[index], self.shares[index]);
-            sums.add(sheet, share, f64::from(self.fades[index] * weight) * lengths.at(sheet, share));
+            let length = lengths.at(sheet, share);
+            self.powers[index] *= length as f32;
+            sums.add(sheet, share, f64::from(self.fades[index] * weight) * length);
         }
         sums
     }
@@ -170,11 +171,11 @@ impl ParticleChunk<'_> {
     /// Gives particles that wait for them their factors. Their power follows what it shall be with a delay: where two parts of a sheet
     /// lie close together, a particle that passes from the one to the other does not flash. Gives the power that they shall have together, and
     /// the one that they have, W.
-    fn brighten(self, lengths: &Nodes, factors: &Nodes) -> [f64; 2] {
+    fn brighten(self, factors: &Nodes) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (index, power) in self.powers.iter_mut().enumerate().filter(|(_, power)| power.is_sign_negative()) {
             let (sheet, share) = (self.sheets[index], self.shares[index]);
-            let wanted = -*power * (lengths.at(sheet, share) * factors.at(sheet, share)) as f32;
+            let wanted = -*power * factors.at(sheet, share) as f32;
             let full = &mut self.full_powers[index];
             // Those that are just appearing begin with nothing: as fast as they rise, those around them give up their share.
             let follows = *full > 0.0 || self.fades[index] < 1.0;
