@@ -26,5 +26,6 @@ pub mod placement;
 pub mod point_cloud;
 pub mod random;
 pub mod sky;
+pub mod spares;
 pub mod surroundings;
 pub mod wind;

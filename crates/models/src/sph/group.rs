@@ -118,7 +118,7 @@ impl Stretch {
     pub(super) fn find_all<const D: usize>(stretches: &mut Vec<Self>, cells: &Cells<D>, parts: &[RowPart]) {
         let level = Level::new();
         stretches.resize_with(parts.len().div_ceil(GROUPS), Self::default);
-        stretches.par_iter_mut().zip(parts.par_chunks(GROUPS)).for_each(|(stretch, parts)| {
+        stretches.par_iter_mut().with_max_len(1).zip(parts.par_chunks(GROUPS)).for_each(|(stretch, parts)| {
             dispatch!(level, simd => stretch.find(simd, cells, parts));
         });
     }

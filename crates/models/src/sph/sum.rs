@@ -68,7 +68,8 @@ impl<const D: usize> Cells<D> {
             values.as_mut_slice()
         });
         let around = Around { cells: self, positions: self.positions(), fields };
-        self.stretches().par_iter().zip(split(self.stretches(), results)).for_each(|(stretch, mut results)| {
+        let stretches = self.stretches().par_iter().with_max_len(1);
+        stretches.zip(split(self.stretches(), results)).for_each(|(stretch, mut results)| {
             dispatch!(level, simd => sum_stretch(simd, term, &around, stretch, &mut results));
         });
     }

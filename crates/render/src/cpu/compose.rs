@@ -6,6 +6,7 @@ use bansho_base::{
     math::Fused,
     observer::{self, Cancelled, Observer},
     phenomenon::{Phenomenon, Prepared},
+    spares::Spares,
 };
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -171,12 +172,14 @@ pub(super) fn frame(
     let level = Level::new();
     let Canvas { mut beauty, mut depth, stale } = Canvas::new(window, spent);
     let strip_pixels = STRIP_ROWS * window.width;
+    let workers = Spares::new(Worker::default);
     let planes: Vec<Vec<Vec<f32>>> = beauty
         .pixels_mut()
         .par_chunks_mut(strip_pixels)
         .zip(depth.par_chunks_mut(strip_pixels))
         .enumerate()
-        .map_init(Worker::default, |worker, (index, (beauty, depth))| {
+        .with_max_len(1)
+        .map(|(index, (beauty, depth))| {
             observer::check(observer)?;
             clear(stale, index * STRIP_ROWS, window.width, beauty, depth);
             let strip = composition.strip_rect(index);
@@ -184,10 +187,12 @@ pub(super) fn frame(
             if rect.is_empty() {
                 return Ok(Vec::new());
             }
-            composition.accumulate(level, rect, worker);
-            composition.behind.trace(rect, &mut worker.sources);
-            finish_strip(composition, level, worker, strip, beauty, depth);
-            Ok(channel_planes(composition, worker))
+            workers.lend(|worker| {
+                composition.accumulate(level, rect, worker);
+                composition.behind.trace(rect, &mut worker.sources);
+                finish_strip(composition, level, worker, strip, beauty, depth);
+                Ok(channel_planes(composition, worker))
+            })
         })
         .collect::<Result<_, Cancelled>>()?;
     let opaque = composition.plate.colour.is_some() && composition.view.overscan == 0;

@@ -5,7 +5,10 @@
 
 use std::ops::Range;
 
-use bansho_base::random::{Key, Purpose, uniform, uniform_f64};
+use bansho_base::{
+    random::{Key, Purpose, uniform, uniform_f64},
+    spares::Spares,
+};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
@@ -107,10 +110,10 @@ impl Collisions {
         let mut picture = Meridians::dark(chart);
         let (chart, groups) = picture.strips(GROUP);
         let pass = CollisionPass { collisions: self, chart, finder: chart.finder(), footprint, step };
-        groups.for_each_init(
-            || Workspace::new(chart),
-            |own, group| dispatch!(level, simd => pass.group(simd, group, field, own)),
-        );
+        let spares = Spares::new(|| Workspace::new(chart));
+        groups.with_max_len(1).for_each(|group| {
+            spares.lend(|own| dispatch!(level, simd => pass.group(simd, group, field, own)));
+        });
         picture
     }
 

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use bansho_base::math::lanes;
+use bansho_base::{math::lanes, spares::Spares};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
@@ -81,8 +81,9 @@ impl Meridians {
             knots: &knots,
             inverse_sines: &inverse_sines,
         };
-        strips.for_each_init(Workspace::default, |workspace, strip| {
-            dispatch!(level, simd => pass.strip(simd, strip, footprint, workspace));
+        let spares = Spares::new(Workspace::default);
+        strips.with_max_len(1).for_each(|strip| {
+            spares.lend(|workspace| dispatch!(level, simd => pass.strip(simd, strip, footprint, workspace)));
         });
         picture
     }

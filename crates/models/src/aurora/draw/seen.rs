@@ -1,6 +1,6 @@
 //! The charts as they are seen: sharp and soft light together, dimmed and coloured by the air below, so that a pixel looks up one colour.
 
-use bansho_base::math;
+use bansho_base::{math, spares::Spares};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
@@ -47,8 +47,9 @@ impl Meridians {
             soft_rows.push(soft_finder.row(colatitude as f32) - 0.5);
         }
         let colouring = Colouring { chart, soft, soft_finder, shading, field, cosines, sines, soft_rows };
-        strips.for_each_init(Vec::new, |column, strip| {
-            dispatch!(level, simd => colouring.strip(simd, strip, column));
+        let spares = Spares::new(Vec::new);
+        strips.with_max_len(1).for_each(|strip| {
+            spares.lend(|column| dispatch!(level, simd => colouring.strip(simd, strip, column)));
         });
         self
     }

@@ -139,7 +139,7 @@ impl Mover {
         let speeds = us.par_chunks_mut(TASK).zip(ws.par_chunks_mut(TASK));
         let pushes = pushes[0].par_chunks(TASK).zip(pushes[1].par_chunks(TASK));
         let level = Level::new();
-        places.zip(speeds).zip(pushes).for_each(|((places, speeds), pushes)| {
+        places.zip(speeds).zip(pushes).with_max_len(1).for_each(|((places, speeds), pushes)| {
             dispatch!(level, _simd => self.advance_part(places, speeds, pushes, field));
         });
     }

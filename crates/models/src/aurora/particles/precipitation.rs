@@ -90,14 +90,15 @@ impl Precipitation {
         let lengths = course.sheet_lengths();
         let [coarse, fine] = self.layouts(&lengths);
         let weigh = |part| self.weigh(part, (course, &fine), (rays, time));
-        let weighed: Vec<Weighed> = chunks(particles).into_par_iter().map(weigh).collect();
+        let weighed: Vec<Weighed> = chunks(particles).into_par_iter().with_max_len(1).map(weigh).collect();
         let counts = weighed.iter().fold(Nodes::new(&fine), |sum, part| sum.plus(&part.counts));
         let lengths = Nodes::of_lengths(&fine, &lengths).shared_by(&counts, MOST_UNEVEN);
         let add_up = |(part, weighed): (ParticleChunk, &Weighed)| part.add_up(&weighed.weights, &lengths, &coarse);
-        let weights: Vec<_> = chunks(particles).into_par_iter().zip(&weighed).map(add_up).collect();
+        let weights: Vec<_> = chunks(particles).into_par_iter().with_max_len(1).zip(&weighed).map(add_up).collect();
         let weights = weights.iter().fold(Nodes::new(&coarse), |sum, part| sum.plus(part));
         let factors = self.wanted(course, &coarse, time).shared_by(&weights, MOST_UNEVEN);
-        let given: Vec<[f64; 2]> = chunks(particles).into_par_iter().map(|part| part.brighten(&factors)).collect();
+        let given: Vec<[f64; 2]> =
+            chunks(particles).into_par_iter().with_max_len(1).map(|part| part.brighten(&factors)).collect();
         balance(particles, &given);
     }
 
