@@ -147,7 +147,8 @@ mod tests {
         for most in [1 << 20, 50, 1] {
             let words: Vec<_> = (0..50_000).map(|index| random.words(index, 0, Purpose::named("key"))).collect();
             let key = |index: usize| u64::from(words[index][0]) % most;
-            let ids: Vec<u64> = words.iter().map(|words| u64::from(words[1])).collect();
+            // No two are the same.
+            let ids: Vec<u64> = (0..).zip(&words).map(|(index, words)| u64::from(words[1]) << 32 | index).collect();
             let mut expected: Vec<u32> = (0..50_000).collect();
             expected.sort_by_key(|index| (key(*index as usize), ids[*index as usize]));
             for threads in [1, 2, 7] {
