@@ -3,12 +3,12 @@
 //! Heights and places along the line of sight are random; to the side each point has the smooth edge of its source, so
 //! that rays are as sharp as those of the mean. That mean is [`Meridians`], but for the noise.
 
-use std::ops::Range;
-
-use bansho_base::{
-    random::{Key, Purpose, uniform, uniform_f64},
-    spares::Spares,
+use std::{
+    ops::Range,
+    sync::{Mutex, PoisonError},
 };
+
+use bansho_base::random::{Key, Purpose, uniform, uniform_f64};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
@@ -110,9 +110,17 @@ impl Collisions {
         let mut picture = Meridians::dark(chart);
         let (chart, groups) = picture.strips(GROUP);
         let pass = CollisionPass { collisions: self, chart, finder: chart.finder(), footprint, step };
-        let spares = Spares::new(|| Workspace::new(chart));
-        groups.with_max_len(1).for_each(|group| {
-            spares.lend(|own| dispatch!(level, simd => pass.group(simd, group, field, own)));
+        // The fullest first, whichever thread is free: the last ones, for which others wait, are soon drawn.
+        let mut groups: Vec<_> = groups.map(|group| (footprint.count(group.number), group)).collect();
+        groups.sort_by_key(|(count, _)| *count);
+        let groups = Mutex::new(groups);
+        let next = || groups.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        (0..rayon::current_num_threads()).into_par_iter().with_max_len(1).for_each(|_| {
+            let mut own = None;
+            while let Some((_, group)) = next() {
+                let own = own.get_or_insert_with(|| Workspace::new(chart));
+                dispatch!(level, simd => pass.group(simd, group, field, own));
+            }
         });
         picture
     }
@@ -210,11 +218,15 @@ impl CollisionPass<'_> {
     #[inline(always)]
     fn group<S: Simd>(&self, simd: S, strip: LightStrip, field: &FieldLines, own: &mut Workspace) {
         let entries = own.group.begin(strip.number, self.chart, self.footprint, field);
-        let mut falls = Vec::with_capacity(AHEAD);
+        let (mut sources, mut falls) = (Vec::with_capacity(AHEAD), Vec::with_capacity(AHEAD));
         for entries in entries.chunks(AHEAD) {
-            falls.clear();
+            sources.clear();
             for entry in entries {
-                falls.push(self.collisions.fall(*self.footprint.source(entry.source), self.step));
+                sources.push(*self.footprint.source(entry.source));
+            }
+            falls.clear();
+            for source in &sources {
+                falls.push(self.collisions.fall(*source, self.step));
             }
             for (entry, fall) in entries.iter().zip(&falls) {
                 self.source(simd, entry.columns(), fall, own);

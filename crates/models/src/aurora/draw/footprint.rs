@@ -225,6 +225,11 @@ impl<'a> Footprint<'a> {
         self.parts.iter().map(move |part| &part.entries[part.starts[strip] as usize..part.starts[strip + 1] as usize])
     }
 
+    /// How many sources show in a strip.
+    pub(super) fn count(&self, strip: usize) -> usize {
+        self.entries(strip).map(<[Entry]>::len).sum()
+    }
+
     /// A source by its number.
     #[inline(always)]
     pub(super) fn source(&self, number: u32) -> &Source {
