@@ -141,13 +141,11 @@ impl PreparedSky<'_> {
             let kept = if rect.width == self.view.size[0] { self.kept_row(simd, y) } else { None };
             let row = match kept {
                 Some(row) if !strip.has_plate() => row,
-                Some(row) => {
-                    own.clone_from(row);
-                    own.hide_behind(strip, first);
-                    &own
-                }
-                None => {
-                    self.fill_row(simd, &mut own, y, rect.x..rect.right());
+                _ => {
+                    match kept {
+                        Some(row) => own.clone_from(row),
+                        None => self.fill_row(simd, &mut own, y, rect.x..rect.right()),
+                    }
                     own.hide_behind(strip, first);
                     &own
                 }
@@ -423,7 +421,7 @@ mod tests {
         let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [150, 90], 0);
         let wind = Wind::new(WindParameters::default(), 1, None);
         let surroundings = Surroundings { sky: backdrop.parameters.at(0.0), ..Surroundings::of_wind(&wind) };
-        let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).unwrap();
+        let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).expect("nobody asks to stop");
         let depths: Vec<f32> = (0..150 * 90).map(|pixel| if pixel % 3 == 0 { 5.0 } else { f32::INFINITY }).collect();
         let mut strip = Strip::default();
         let rows = |y: usize| &depths[150 * y..150 * (y + 1)];

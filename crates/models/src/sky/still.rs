@@ -64,6 +64,9 @@ impl SkyRow {
 
     /// Leaves out what is behind the plate of a strip, in which the row begins at pixel `first`.
     pub(super) fn hide_behind(&mut self, strip: &Strip, first: usize) {
+        if !strip.has_plate() {
+            return;
+        }
         for x in 0..self.opacity.len() {
             if !strip.visible(first + x, FAR.near as f32) {
                 self.planes.iter_mut().chain([&mut self.opacity]).for_each(|plane| plane[x] = 0.0);

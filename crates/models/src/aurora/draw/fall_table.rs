@@ -66,7 +66,7 @@ impl FallTable {
 /// The collisions of a fall in so many batches, all but the last of them full.
 ///
 /// What the last one has and what each of the others has are evenly spread over the fall; in full ones, collisions of neighbouring lanes are
-/// far apart, since sums in neighbouring rows would wait for each other.
+/// far apart, since sums in one pair of rows would wait for each other.
 fn batches(fall: &[(Collision, u16)], count: usize) -> Vec<FallBatch> {
     let full = count.saturating_sub(1);
     let last = fall.len().min(BATCH * count).saturating_sub(BATCH * full);

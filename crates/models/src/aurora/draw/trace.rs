@@ -16,11 +16,12 @@ pub(super) const QUAD: usize = 4;
 /// Points in a row of code without a jump.
 const UNROLLED: usize = 4;
 /// Numbers for each pair of rows, and for each four.
-const PAIR_LIGHT: usize = 8;
-const QUAD_LIGHT: usize = 16;
+const PAIR_LIGHT: usize = 2 * 4;
+const QUAD_LIGHT: usize = QUAD * 4;
 /// Bytes of the first of two numbers for the four emitters of the upper row, those of the second for the lower one.
 const SPREAD: [u8; 32] =
     [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 4, 5, 6, 7, 4, 5, 6, 7, 4, 5, 6, 7, 4, 5, 6, 7];
+/// Numbers of the first fours of rows, one a lane.
 const FIRST_QUADS: [u16; BATCH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
 /// Light of [`QUAD`] rows, in one line of the cache.
@@ -204,11 +205,29 @@ mod tests {
     use fearless_simd::{Level, dispatch};
 
     use super::*;
+    use crate::lanes::plain;
+
+    const ROWS: usize = 150;
+
+    type Batch<'a> = (&'a [f32; BATCH], &'a [f32; BATCH], (&'a [u16; BATCH], usize), &'a [PerEmitter<f32>]);
+
+    /// A column with the light of points at rows, so bright, twice.
+    #[inline(always)]
+    fn column_of<S: Simd>(simd: S, trace: &mut Trace, (rows, shown, lights, photons): Batch) -> Vec<Quad> {
+        let (mut points, mut lit) = (Points::NONE, LitRows::new(simd));
+        let (rows, shown) = (Lanes::from_slice(simd, rows), Lanes::from_slice(simd, shown));
+        points.place([rows, shown], (ROWS - 1) as f32, trace.odd_pairs(), &mut lit);
+        trace.clear();
+        trace.add(simd, &points, lights, photons);
+        trace.finish(simd, &lit);
+        let mut column = vec![Quad::DARK; ROWS.div_ceil(QUAD)];
+        trace.add_to(&mut column, FourLanes::splat(simd, 2.0));
+        column
+    }
 
     /// Rows and brightness of some points, some outside: the same light as one sum after the other, and none left for the next fall.
     #[test]
     fn points_light_the_two_rows_that_they_lie_between() {
-        const ROWS: usize = 150;
         let photons = [[1.0, 2.0, 3.0, 4.0], [0.5, 0.0, 0.25, 8.0]];
         let mut trace = Trace::new(ROWS);
         for fall in 0..20_u16 {
@@ -218,16 +237,10 @@ mod tests {
             let shown: [f32; BATCH] = std::array::from_fn(|lane| 0.5 + lane as f32);
             let lights: [u16; BATCH] = std::array::from_fn(|lane| (lane % 2) as u16);
             let count = BATCH - (fall % 4) as usize;
-            let mut column = vec![Quad::DARK; ROWS.div_ceil(QUAD)];
-            dispatch!(Level::new(), simd => {
-                let (mut points, mut lit) = (Points::NONE, LitRows::new(simd));
-                let [rows, shown] = [&rows, &shown].map(|values| Lanes::from_slice(simd, values));
-                points.place([rows, shown], (ROWS - 1) as f32, trace.odd_pairs(), &mut lit);
-                trace.clear();
-                trace.add(simd, &points, (&lights, count), &photons);
-                trace.finish(simd, &lit);
-                trace.add_to(&mut column, FourLanes::splat(simd, 2.0));
-            });
+            let points = (&rows, &shown, (&lights, count), &photons[..]);
+            let column = dispatch!(Level::new(), simd => column_of(simd, &mut trace, points));
+            let plainest = plain!(simd => column_of(simd, &mut trace, points));
+            assert!(column.iter().zip(&plainest).all(|(wide, plain)| wide.0 == plain.0), "the same on all machines");
             let mut expected = [[0.0_f32; 4]; ROWS + 1];
             for lane in 0..count {
                 let (row, lower) = (rows[lane].floor(), rows[lane] - rows[lane].floor());
