@@ -7,6 +7,7 @@ use std::{
 };
 
 use bansho_base::{
+    color::AlphaConvention,
     assets::{MemoryAssets, Picture},
     image::Frame,
     observer::Observer,
@@ -81,8 +82,8 @@ fn check(frame: &Frame) {
     if let Some(depth) = &frame.depth {
         assert!(depth.iter().all(|depth| *depth >= 0.0), "the depth is NaN or negative");
     }
-    display(frame, &Default::default(), BitDepth::Eight);
-    display(frame, &Default::default(), BitDepth::Sixteen);
+    display(frame, &Default::default(), BitDepth::Eight, AlphaConvention::Encoded);
+    display(frame, &Default::default(), BitDepth::Sixteen, AlphaConvention::Encoded);
 }
 
 /// Lets a panic be caught where the project catches those of a decoder, and tells of one that is not.

@@ -9,7 +9,7 @@ use std::{
 };
 
 use bansho::{
-    Backend, BitDepth, CpuBackend, MemoryAssets, Plan, PlanOptions, SceneBuilder, Unobserved, View,
+    AlphaConvention, Backend, BitDepth, CpuBackend, MemoryAssets, Plan, PlanOptions, SceneBuilder, Unobserved, View,
     base::image::DisplayPixels, models::flame_sheet::FlameSheetParameters, render::scene::PictureParameters,
 };
 
@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut shot = CpuBackend.open(Arc::new(plan))?;
     let frame = bansho::draw(shot.as_mut(), 30, &Unobserved)?;
 
-    let shown = bansho::display(&frame, &View::DISPLAY, BitDepth::Eight);
+    let shown = bansho::display(&frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
     let DisplayPixels::Eight(pixels) = &shown.pixels else { return Ok(()) };
     let mut text = String::new();
     for row in pixels.chunks(shown.width) {

@@ -31,7 +31,7 @@ pub use bansho_render as render;
 
 pub use bansho_base::{
     assets::{Assets, MemoryAssets},
-    color::View,
+    color::{AlphaConvention, View},
     image::{DisplayImage, Frame, Image, Rect},
     observer::{Cancelled, Observer, Stage, Unobserved},
 };

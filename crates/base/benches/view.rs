@@ -4,7 +4,8 @@
 use std::hint::black_box;
 
 use bansho_base::color::{
-    ACESCG_FROM_XYZ, SRGB_FROM_ACESCG, View, black_body, luminance, planck_radiance_per_nm, xyz_of_spectrum,
+    ACESCG_FROM_XYZ, AlphaConvention, SRGB_FROM_ACESCG, View, black_body, luminance, planck_radiance_per_nm,
+    xyz_of_spectrum,
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use fearless_simd::Level;
@@ -26,9 +27,9 @@ fn picture(lit: f32) -> Vec<[f32; 4]> {
     (0..WIDTH * HEIGHT).map(pixel).collect()
 }
 
-fn by_rows(view: &View, level: Level, pixels: &[[f32; 4]], opaque: bool, out: &mut [[u8; 4]]) {
+fn by_rows(view: &View, level: Level, pixels: &[[f32; 4]], alpha: Option<AlphaConvention>, out: &mut [[u8; 4]]) {
     for (y, (row, out)) in pixels.chunks(WIDTH).zip(out.chunks_mut(WIDTH)).enumerate() {
-        view.display_row(level, row, y as i64, 0, opaque, out);
+        view.display_row(level, row, y as i64, 0, alpha, out);
     }
 }
 
@@ -77,10 +78,16 @@ fn view(criterion: &mut Criterion) {
     for (name, lit) in [("flame_30_percent", 0.3), ("full", 1.0)] {
         let pixels = picture(lit);
         group.bench_function(format!("{name}/simd"), |bencher| {
-            bencher.iter(|| by_rows(&View::DISPLAY, level, black_box(&pixels), false, &mut out));
+            bencher
+                .iter(|| by_rows(&View::DISPLAY, level, black_box(&pixels), Some(AlphaConvention::Linear), &mut out));
+        });
+        group.bench_function(format!("{name}/simd_encoded_alpha"), |bencher| {
+            bencher.iter(|| {
+                by_rows(&View::DISPLAY, level, black_box(&pixels), Some(AlphaConvention::Encoded), &mut out);
+            });
         });
         group.bench_function(format!("{name}/simd_opaque"), |bencher| {
-            bencher.iter(|| by_rows(&View::DISPLAY, level, black_box(&pixels), true, &mut out));
+            bencher.iter(|| by_rows(&View::DISPLAY, level, black_box(&pixels), None, &mut out));
         });
         group.bench_function(format!("{name}/naive"), |bencher| {
             bencher.iter(|| naively(black_box(&pixels), &mut out));

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use crate::camera::Lens;
+use crate::{camera::Lens, color::AlphaConvention};
 
 /// A picture of `N` floats a pixel, rows from the top, pixels from the left.
 ///
@@ -255,6 +255,8 @@ pub struct DisplayImage {
     pub height: usize,
     /// Whether every pixel is opaque, so that alpha may be left out.
     pub opaque: bool,
+    /// What its straight alpha is made for, where it is not opaque.
+    pub alpha: AlphaConvention,
     /// Pixels, row after row from the top.
     pub pixels: DisplayPixels,
 }

@@ -28,6 +28,7 @@ fn of_error(error: &JobError) -> Option<&'static str> {
         JobError::Conflict(Conflict::NoChannels { what: Channels::Layers, .. }) => Some("--layers"),
         JobError::Conflict(Conflict::NoChannels { what: Channels::Aovs, .. }) => Some("--aovs"),
         JobError::Conflict(Conflict::NoFigures { .. }) => Some("--figures"),
+        JobError::Conflict(Conflict::RawAlpha) => Some("--alpha"),
         JobError::Conflict(Conflict::FewFrames { .. }) => Some("--contact-sheet"),
         JobError::Conflict(Conflict::Tiles { of, .. } | Conflict::SheetSize { of, .. }) => Some(match of {
             SheetKind::Contact => "--contact-sheet",
@@ -58,6 +59,7 @@ fn of_streaks(fault: &StreaksFault) -> Option<&'static str> {
 fn of_note(note: &Note) -> Option<&'static str> {
     Some(match note {
         Note::BitsUnused { .. } => "--bits",
+        Note::AlphaUnused => "--alpha",
         Note::ViewUnused => "--view",
         Note::ResumeUnused { .. } | Note::ResumeSheet => "--resume",
         Note::SnapshotsUnused => "--snapshots",

@@ -2,7 +2,10 @@
 
 use std::{hint::black_box, path::Path};
 
-use bansho_base::image::{CameraHeader, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Rect};
+use bansho_base::{
+    color::AlphaConvention,
+    image::{CameraHeader, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Rect},
+};
 use bansho_media::{
     exr,
     naming::OutputPattern,
@@ -38,7 +41,7 @@ fn dithered(i: usize) -> [u8; 4] {
 
 fn display() -> DisplayImage {
     let pixels = DisplayPixels::Eight((0..WIDTH * HEIGHT).map(dithered).collect());
-    DisplayImage { width: WIDTH, height: HEIGHT, opaque: false, pixels }
+    DisplayImage { width: WIDTH, height: HEIGHT, opaque: false, alpha: AlphaConvention::Linear, pixels }
 }
 
 fn frame() -> Frame {

@@ -1,21 +1,42 @@
 //! Pictures with alpha over black, for formats that have none.
 
 use bansho_base::{
-    color::{decode_srgb, decode_srgb8, encode_srgb},
+    color::{AlphaConvention, decode_srgb, decode_srgb8, encode_srgb},
     image::{DisplayImage, DisplayPixels},
 };
 
-/// `picture` over black, composited in linear light, so that straight colour times alpha is the light that was there.
+/// `picture` over black, blended as its [`AlphaConvention`] says, so that what is seen is the light that was there.
 ///
 /// An opaque picture is given back as it is. Formats without alpha look a little better where the view transform itself
 /// draws over black, since this begins from rounded values.
 pub fn over_black(picture: &DisplayImage) -> DisplayImage {
-    let pixels = match &picture.pixels {
-        same if picture.opaque => same.clone(),
-        DisplayPixels::Eight(pixels) => DisplayPixels::Eight(pixels.iter().map(eight).collect()),
-        DisplayPixels::Sixteen(pixels) => DisplayPixels::Sixteen(pixels.iter().map(sixteen).collect()),
+    let pixels = match (&picture.pixels, picture.alpha) {
+        (same, _) if picture.opaque => same.clone(),
+        (DisplayPixels::Eight(pixels), AlphaConvention::Linear) => {
+            DisplayPixels::Eight(pixels.iter().map(eight).collect())
+        }
+        (DisplayPixels::Sixteen(pixels), AlphaConvention::Linear) => {
+            DisplayPixels::Sixteen(pixels.iter().map(sixteen).collect())
+        }
+        (DisplayPixels::Eight(pixels), AlphaConvention::Encoded) => {
+            DisplayPixels::Eight(pixels.iter().map(|&[rgb @ .., a]| encoded_eight(rgb, a)).collect())
+        }
+        (DisplayPixels::Sixteen(pixels), AlphaConvention::Encoded) => {
+            DisplayPixels::Sixteen(pixels.iter().map(|&[rgb @ .., a]| encoded_sixteen(rgb, a)).collect())
+        }
     };
-    DisplayImage { width: picture.width, height: picture.height, opaque: true, pixels }
+    DisplayImage { width: picture.width, height: picture.height, opaque: true, alpha: picture.alpha, pixels }
+}
+
+/// Codes times alpha, rounded: what a blend of encoded values leaves over black.
+fn encoded_eight(rgb: [u8; 3], alpha: u8) -> [u8; 4] {
+    let [r, g, b] = rgb.map(|code| ((u32::from(code) * u32::from(alpha) + 127) / 255) as u8);
+    [r, g, b, u8::MAX]
+}
+
+fn encoded_sixteen(rgb: [u16; 3], alpha: u16) -> [u16; 4] {
+    let [r, g, b] = rgb.map(|code| ((u64::from(code) * u64::from(alpha) + 32_767) / 65_535) as u16);
+    [r, g, b, u16::MAX]
 }
 
 fn eight(&[r, g, b, alpha]: &[u8; 4]) -> [u8; 4] {
@@ -60,16 +81,34 @@ mod tests {
     #[test]
     fn light_is_multiplied_not_codes() {
         let pixels = DisplayPixels::Eight(vec![[255, 188, 0, 128], [9, 8, 7, 255], [9, 8, 7, 0]]);
-        let flat = over_black(&DisplayImage { width: 3, height: 1, opaque: false, pixels });
+        let flat =
+            over_black(&DisplayImage { width: 3, height: 1, opaque: false, alpha: AlphaConvention::Linear, pixels });
         // 128/255 of full light, 0.502, is code 188; code 188 is 0.503, of which 128/255 is 0.2524: code 137.6.
         assert_eq!(flat.pixels, DisplayPixels::Eight(vec![[188, 138, 0, 255], [9, 8, 7, 255], [0, 0, 0, 255]]));
         assert!(flat.opaque);
     }
 
     #[test]
+    fn codes_are_multiplied_where_they_are_what_is_blended() {
+        let alpha = AlphaConvention::Encoded;
+        let pixels = DisplayPixels::Eight(vec![[255, 188, 0, 128], [9, 8, 7, 255], [9, 8, 7, 0]]);
+        let flat = over_black(&DisplayImage { width: 3, height: 1, opaque: false, alpha, pixels });
+        assert_eq!(flat.pixels, DisplayPixels::Eight(vec![[128, 94, 0, 255], [9, 8, 7, 255], [0, 0, 0, 255]]));
+        let pixels = DisplayPixels::Sixteen(vec![[65_535, 48_316, 0, 32_896]]);
+        let flat = over_black(&DisplayImage { width: 1, height: 1, opaque: false, alpha, pixels });
+        assert_eq!(flat.pixels, DisplayPixels::Sixteen(vec![[32_896, 24_253, 0, 65_535]]));
+    }
+
+    #[test]
     fn sixteen_bits_agree_with_eight() {
         let wide = DisplayPixels::Sixteen(vec![[65535, 48316, 0, 32896], [1, 2, 3, 65535], [1, 2, 3, 0]]);
-        let flat = over_black(&DisplayImage { width: 3, height: 1, opaque: false, pixels: wide });
+        let flat = over_black(&DisplayImage {
+            width: 3,
+            height: 1,
+            opaque: false,
+            alpha: AlphaConvention::Linear,
+            pixels: wide,
+        });
         let DisplayPixels::Sixteen(pixels) = &flat.pixels else { unreachable!() };
         assert_eq!(pixels[1..], [[1, 2, 3, 65535], [0, 0, 0, 65535]]);
         assert_eq!(to_eight_bits(&flat.pixels)[0], [188, 138, 0, 255]);

@@ -136,11 +136,13 @@ pub fn tile_display(
     };
     let is_full = gutter == 0 && sheet.count == sheet.columns * sheet.rows();
     let opaque = images.iter().all(|image| image.opaque) && (is_full || fill[3] == u8::MAX);
-    Ok(DisplayImage { width, height, opaque, pixels })
+    Ok(DisplayImage { width, height, opaque, alpha: images[0].alpha, pixels })
 }
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::color::AlphaConvention;
+
     use super::*;
 
     #[test]
@@ -168,7 +170,7 @@ mod tests {
     fn a_sheet_is_opaque_only_if_all_of_it_is() {
         let image = |code: u8| {
             let pixels = DisplayPixels::Eight(vec![[code, 0, 0, 255]; 2]);
-            DisplayImage { width: 1, height: 2, opaque: true, pixels }
+            DisplayImage { width: 1, height: 2, opaque: true, alpha: AlphaConvention::Linear, pixels }
         };
         let images = [image(1), image(2), image(3)];
         let opaque = |columns, gutter, alpha| tile_display(&images, columns, gutter, [0, 0, 0, alpha]).unwrap().opaque;
@@ -182,7 +184,8 @@ mod tests {
         assert_eq!(tile(&[image(1)], 0, 0, [0.0]), Err(TileError::NoColumns));
         assert_eq!(tile::<1>(&[], 1, 0, [0.0]), Err(TileError::Nothing));
         assert_eq!(tile(&[image(1), image(2)], 1, 0, [0.0]), Err(TileError::Sizes { index: 1, width: 2, height: 1 }));
-        let eight = DisplayImage { width: 1, height: 1, opaque: true, pixels: DisplayPixels::Eight(vec![[0; 4]]) };
+        let pixels = DisplayPixels::Eight(vec![[0; 4]]);
+        let eight = DisplayImage { width: 1, height: 1, opaque: true, alpha: AlphaConvention::Linear, pixels };
         let sixteen = DisplayImage { pixels: DisplayPixels::Sixteen(vec![[0; 4]]), ..eight.clone() };
         assert_eq!(tile_display(&[eight, sixteen], 1, 0, [0; 4]), Err(TileError::Depths { index: 1 }));
     }

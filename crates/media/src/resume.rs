@@ -48,7 +48,10 @@ fn of_exr(file: &[u8]) -> Option<[u8; 32]> {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::image::{DisplayImage, DisplayPixels};
+    use bansho_base::{
+        color::AlphaConvention,
+        image::{DisplayImage, DisplayPixels},
+    };
 
     use super::*;
     use crate::testing;
@@ -57,7 +60,8 @@ mod tests {
 
     fn a_png() -> Vec<u8> {
         let pixels = (0..35).map(|i| [i * 7, i, 255 - i, 200]).collect();
-        let picture = DisplayImage { width: 7, height: 5, opaque: false, pixels: DisplayPixels::Eight(pixels) };
+        let pixels = DisplayPixels::Eight(pixels);
+        let picture = DisplayImage { width: 7, height: 5, opaque: false, alpha: AlphaConvention::Encoded, pixels };
         png::encode(&picture, &FINGERPRINT, png::PngEffort::Fast, Path::new("a.png")).unwrap()
     }
 

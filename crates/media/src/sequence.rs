@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use bansho_base::image::{DisplayImage, DisplayPixels, Frame};
+use bansho_base::{
+    color::AlphaConvention,
+    image::{DisplayImage, DisplayPixels, Frame},
+};
 
 use crate::{
     animation::{
@@ -44,6 +47,8 @@ pub struct SinkOptions {
     pub frame_count: usize,
     /// Whether a plate fills the picture, so that films are made without alpha.
     pub opaque: bool,
+    /// What straight alpha is made for, which films with alpha name.
+    pub alpha: AlphaConvention,
     /// Whether display pixels have 16 bits, for films that keep more than 8.
     pub sixteen_bits: bool,
     /// How small PNG files are made.
@@ -64,6 +69,7 @@ impl SinkOptions {
             fps,
             frame_count,
             opaque: false,
+            alpha: AlphaConvention::default(),
             sixteen_bits: false,
             png_effort: PngEffort::default(),
             gif_transparent: false,
@@ -263,6 +269,6 @@ fn gif_format(path: &Path, options: &SinkOptions) -> Result<GifFormat, MediaErro
 }
 
 fn video_format(kind: OutputKind, options: &SinkOptions) -> VideoFormat {
-    let SinkOptions { size, fps, opaque, sixteen_bits, .. } = *options;
-    VideoFormat { kind, size, fps, opaque, sixteen_bits, options: options.video.clone() }
+    let SinkOptions { size, fps, opaque, alpha, sixteen_bits, .. } = *options;
+    VideoFormat { kind, size, fps, opaque, alpha, sixteen_bits, options: options.video.clone() }
 }

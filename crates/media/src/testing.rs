@@ -1,7 +1,8 @@
 //! Pictures for this crate's tests.
 
-use bansho_base::image::{
-    CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect,
+use bansho_base::{
+    color::AlphaConvention,
+    image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
 };
 
 /// A small frame in which every value is different, with depth, a layer and an AOV.
@@ -48,5 +49,5 @@ fn header(width: usize, height: usize) -> FrameHeader {
 pub(crate) fn display(width: usize, height: usize, frame: usize) -> DisplayImage {
     let pixel = |i: usize| [(i * 7 + frame * 40) as u8, (i * 3) as u8, (200 - i % 200) as u8, (i * 11 + frame) as u8];
     let pixels = DisplayPixels::Eight((0..width * height).map(pixel).collect());
-    DisplayImage { width, height, opaque: false, pixels }
+    DisplayImage { width, height, opaque: false, alpha: AlphaConvention::Linear, pixels }
 }

@@ -4,6 +4,7 @@ use std::{fs, path::Path};
 
 use bansho_base::{
     assets::{AssetProblem, Assets, Encoding},
+    color::AlphaConvention,
     image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
 };
 use bansho_media::{
@@ -14,7 +15,7 @@ use bansho_media::{
 
 fn display(width: usize, height: usize) -> DisplayImage {
     let pixels = (0..width * height).map(|i| [(i * 5) as u8, (i * 3) as u8, 200, 255 - (i % 7) as u8]).collect();
-    DisplayImage { width, height, opaque: false, pixels: DisplayPixels::Eight(pixels) }
+    DisplayImage { width, height, opaque: false, alpha: AlphaConvention::Linear, pixels: DisplayPixels::Eight(pixels) }
 }
 
 fn frame(width: usize, height: usize) -> Frame {

@@ -6,7 +6,10 @@ use std::{
     process::Command,
 };
 
-use bansho_base::image::{DisplayImage, DisplayPixels};
+use bansho_base::{
+    color::AlphaConvention,
+    image::{DisplayImage, DisplayPixels},
+};
 use bansho_media::{
     MediaError,
     naming::OutputPattern,
@@ -22,7 +25,7 @@ fn picture(width: usize, height: usize, frame: usize) -> DisplayImage {
         [(255 * x / width) as u8, (200 * y / height) as u8, (40 + frame * 10) as u8, (255 - 200 * y / height) as u8]
     };
     let pixels = DisplayPixels::Eight((0..width * height).map(pixel).collect());
-    DisplayImage { width, height, opaque: false, pixels }
+    DisplayImage { width, height, opaque: false, alpha: AlphaConvention::Linear, pixels }
 }
 
 fn open(folder: &Path, name: &str, frames: usize, options: impl FnOnce(&mut SinkOptions)) -> Result<Sink, MediaError> {
@@ -253,7 +256,7 @@ fn a_full_disk_is_said_and_leaves_whole_frames_only() {
     let noise =
         |i: usize| ((i as u32).wrapping_mul(0x9E37_79B9) ^ (i as u32 >> 3).wrapping_mul(0x85EB_CA6B)).to_le_bytes();
     let pixels = DisplayPixels::Eight((0..65 * 67).map(noise).collect());
-    let image = DisplayImage { width: 65, height: 67, opaque: false, pixels };
+    let image = DisplayImage { width: 65, height: 67, opaque: false, alpha: AlphaConvention::Linear, pixels };
     for name in ["f.png", "f.apng", "f.gif"] {
         let sink = open(disk.0.path(), name, 40, |_| {}).unwrap();
         let write = |index| sink.write(Slot { index, number: index as i64 }, Picture::Display(&image, &[1; 32]));

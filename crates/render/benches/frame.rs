@@ -232,19 +232,27 @@ fn benches(criterion: &mut Criterion) {
     group.bench_function("composite_one_and_view", |bencher| {
         pool.install(|| {
             bencher.iter(|| {
-                frame_used(lone.as_mut(), |frame| black_box(display(frame, &color::View::DISPLAY, BitDepth::Eight)))
+                frame_used(lone.as_mut(), |frame| {
+                    black_box(display(frame, &color::View::DISPLAY, BitDepth::Eight, color::AlphaConvention::Encoded))
+                })
             });
         });
     });
     let mut shot = CpuBackend.open(two.clone()).expect("a valid plan");
     let drawn = frame(shot.as_mut());
     group.bench_function("view", |bencher| {
-        pool.install(|| bencher.iter(|| black_box(display(&drawn, &color::View::DISPLAY, BitDepth::Eight))));
+        pool.install(|| {
+            bencher.iter(|| {
+                black_box(display(&drawn, &color::View::DISPLAY, BitDepth::Eight, color::AlphaConvention::Encoded))
+            })
+        });
     });
     group.bench_function("composite_two_and_view", |bencher| {
         pool.install(|| {
             bencher.iter(|| {
-                frame_used(shot.as_mut(), |frame| black_box(display(frame, &color::View::DISPLAY, BitDepth::Eight)))
+                frame_used(shot.as_mut(), |frame| {
+                    black_box(display(frame, &color::View::DISPLAY, BitDepth::Eight, color::AlphaConvention::Encoded))
+                })
             });
         });
     });

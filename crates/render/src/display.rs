@@ -1,7 +1,7 @@
 //! The view transform of whole frames, for formats that are made to be looked at.
 
 use bansho_base::{
-    color::{DisplayCode, View},
+    color::{AlphaConvention, DisplayCode, View},
     image::{DisplayImage, DisplayPixels, Frame, Rect},
 };
 use fearless_simd::Level;
@@ -20,17 +20,20 @@ bansho_base::choice! {
 /// Rows that one task turns to display pixels.
 const TASK_ROWS: usize = 16;
 
-/// The frame's beauty as display pixels: the camera's white balance, view, alpha by the largest of alpha and light, sRGB encoding, dither.
-pub fn display(frame: &Frame, view: &View, depth: BitDepth) -> DisplayImage {
+/// The frame's beauty as display pixels: the camera's white balance, view, straight alpha of the given convention, sRGB encoding, dither.
+/// The view `raw` encodes nothing: its alpha is linear.
+pub fn display(frame: &Frame, view: &View, depth: BitDepth, alpha: AlphaConvention) -> DisplayImage {
+    let alpha = if *view == View::RAW { AlphaConvention::Linear } else { alpha };
     let pixels = match depth {
-        BitDepth::Eight => DisplayPixels::Eight(codes(frame, view)),
-        BitDepth::Sixteen => DisplayPixels::Sixteen(codes(frame, view)),
+        BitDepth::Eight => DisplayPixels::Eight(codes(frame, view, alpha)),
+        BitDepth::Sixteen => DisplayPixels::Sixteen(codes(frame, view, alpha)),
     };
-    DisplayImage { width: frame.beauty.width(), height: frame.beauty.height(), opaque: frame.opaque, pixels }
+    DisplayImage { width: frame.beauty.width(), height: frame.beauty.height(), opaque: frame.opaque, alpha, pixels }
 }
 
 /// Pixels as display codes, row after row. Dither goes by the place in the whole picture, so that a crop shows the same pixels.
-pub(crate) fn codes<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View) -> Vec<[C; 4]> {
+pub(crate) fn codes<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View, alpha: AlphaConvention) -> Vec<[C; 4]> {
+    let alpha = (!frame.opaque).then_some(alpha);
     let (level, view) = (Level::new(), view.balanced(frame.header.white_balance_k.map(f64::from)));
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     let [x0, y0] = frame.header.data_origin;
@@ -43,7 +46,7 @@ pub(crate) fn codes<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View) ->
             if (shown.y..shown.bottom()).contains(&y) {
                 let columns = shown.x..shown.right();
                 let (light, out) = (&frame.beauty.row(y)[columns.clone()], &mut out[columns]);
-                view.display_row(level, light, y0 + y as i64, x0 + shown.x as i64, frame.opaque, out);
+                view.display_row(level, light, y0 + y as i64, x0 + shown.x as i64, alpha, out);
             }
         }
     });

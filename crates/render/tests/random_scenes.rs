@@ -46,7 +46,7 @@ fn draw(text: &str) -> bool {
     let mut values = frame.beauty.pixels().iter().flatten().chain(channels);
     assert!(values.all(|value| value.is_finite()), "{text}");
     assert!(frame.depth.iter().flatten().all(|depth| *depth >= 0.0), "{text}");
-    display(&frame, &color::View::DISPLAY, BitDepth::Eight);
+    display(&frame, &color::View::DISPLAY, BitDepth::Eight, color::AlphaConvention::Encoded);
     true
 }
 

@@ -9,7 +9,7 @@ use std::sync::{
 };
 
 use bansho_base::{
-    color::View,
+    color::{AlphaConvention, View},
     image::{DisplayPixels, Frame, Rect},
     math,
     observer::{Observer, Unobserved},
@@ -102,7 +102,10 @@ fn a_plate_through_an_empty_scene_is_unchanged_to_the_byte() {
     let plan = plan_with(&text, &PlanOptions::default(), Arc::new(assets));
     let frame = draw(open(&plan).as_mut(), 0);
     assert!(frame.opaque);
-    let DisplayPixels::Eight(shown) = display(&frame, &View::DISPLAY, BitDepth::Eight).pixels else { panic!() };
+    let DisplayPixels::Eight(shown) = display(&frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded).pixels
+    else {
+        panic!()
+    };
     assert!(shown == codes, "a plate's codes changed");
 }
 
@@ -235,10 +238,11 @@ fn a_crop_is_the_same_part_of_the_whole_with_and_without_bent_light() {
         assert_eq!(part.beauty, whole.beauty.crop(crop).unwrap(), "{bend}");
         let row = |frame: &Frame, y: usize, x: usize| channel(frame, "fog.optical_depth")[y * frame.beauty.width() + x];
         assert_eq!(row(&part, 3, 5), row(&whole, 24, 42));
-        let pixels = |frame: &Frame| match display(frame, &View::DISPLAY, BitDepth::Eight).pixels {
-            DisplayPixels::Eight(pixels) => pixels,
-            DisplayPixels::Sixteen(_) => panic!("8 bits were asked for"),
-        };
+        let pixels =
+            |frame: &Frame| match display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded).pixels {
+                DisplayPixels::Eight(pixels) => pixels,
+                DisplayPixels::Sixteen(_) => panic!("8 bits were asked for"),
+            };
         assert_eq!(pixels(&part)[0], pixels(&whole)[21 * 120 + 37], "dither goes by the whole picture");
     }
 }

@@ -185,6 +185,9 @@ pub enum Conflict {
         /// Largest side.
         most: usize,
     },
+    /// Encoded alpha of pixels that are not encoded.
+    #[error("the view `raw` encodes nothing, so that its alpha is linear; allowed: linear, or another view")]
+    RawAlpha,
     /// No frame is left to draw.
     #[error("no frame is asked for")]
     NoFrames,

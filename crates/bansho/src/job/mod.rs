@@ -29,7 +29,10 @@ mod testing;
 
 use std::path::PathBuf;
 
-use bansho_base::{color::View, image::Rect};
+use bansho_base::{
+    color::{AlphaConvention, View},
+    image::Rect,
+};
 use bansho_render::display::BitDepth;
 
 pub use error::{Cause, Channels, Conflict, JobError, SheetKind};
@@ -78,6 +81,8 @@ pub struct Job {
     pub view: View,
     /// Bits of each channel, where the format has a choice.
     pub bits: BitDepth,
+    /// What straight alpha is made for; left out it is [`AlphaConvention::Encoded`], but linear for the view `raw`, which encodes nothing.
+    pub alpha: Option<AlphaConvention>,
     /// Where frames go, such as `shot/frame.####.exr` or `fire.mp4`; `out/STEM/STEM.####.png` when left out.
     pub out: Option<PathBuf>,
     /// One picture of so many frames: the first of several `frames`, or consecutive ones from a single frame on.
@@ -107,6 +112,7 @@ impl Job {
             figures: false,
             view: View::DISPLAY,
             bits: BitDepth::Eight,
+            alpha: None,
             out: None,
             contact_sheet: None,
             resume: false,

@@ -89,6 +89,9 @@ pub enum Note {
         /// The format.
         kind: OutputKind,
     },
+    /// A convention of alpha where there is none.
+    #[error("the alpha convention has no effect: the pictures have no straight alpha")]
+    AlphaUnused,
     /// A view in a scene-linear format.
     #[error("a view has no effect on .exr, which is scene-linear")]
     ViewUnused,

@@ -7,7 +7,7 @@ use std::{
 };
 
 use bansho_base::{
-    color::View,
+    color::{AlphaConvention, View},
     image::{DisplayImage, Frame},
     observer::{Observer, Stage, StageGuard},
 };
@@ -34,6 +34,8 @@ pub(super) struct Format {
     pub(super) pattern: OutputPattern,
     pub(super) view: View,
     pub(super) bits: BitDepth,
+    /// What straight alpha is made for.
+    pub(super) alpha: AlphaConvention,
     /// Whether figures are written beside each picture.
     pub(super) figures: bool,
 }
@@ -41,14 +43,14 @@ pub(super) struct Format {
 impl Format {
     /// What a file's fingerprint must be: that of the frame's pixels, and of how they are stored where that may differ.
     pub(super) fn fingerprint(&self, frame: [u8; 32]) -> [u8; 32] {
-        match (self.pattern.kind(), self.bits) {
-            (OutputKind::Png, BitDepth::Sixteen) => {
-                let mut hasher = blake3::Hasher::new();
-                hasher.update(&frame).update(b"16 bits");
-                *hasher.finalize().as_bytes()
-            }
-            _ => frame,
+        if self.pattern.kind() != OutputKind::Png {
+            return frame;
         }
+        let stored = |fingerprint: [u8; 32], how: &[u8]| {
+            *blake3::Hasher::new().update(&fingerprint).update(how).finalize().as_bytes()
+        };
+        let frame = if self.bits == BitDepth::Sixteen { stored(frame, b"16 bits") } else { frame };
+        if self.alpha == AlphaConvention::Encoded { stored(frame, b"encoded alpha") } else { frame }
     }
 
     /// Opens the files for `count` frames of `size` pixels; `window` of them may be under way at once.
@@ -56,6 +58,7 @@ impl Format {
         let fps = plan.fps();
         let options = SinkOptions {
             opaque: plan.scene().has_plate(),
+            alpha: self.alpha,
             sixteen_bits: self.bits == BitDepth::Sixteen,
             window,
             ..SinkOptions::new(size, [fps.frames, fps.seconds], count)
@@ -97,7 +100,7 @@ impl Format {
     /// The view transform.
     pub(super) fn show(&self, frame: &Frame, observer: &dyn Observer) -> DisplayImage {
         let _stage = StageGuard::begin(observer, Stage::View);
-        display(frame, &self.view, self.bits)
+        display(frame, &self.view, self.bits, self.alpha)
     }
 }
 

@@ -5,7 +5,11 @@ use std::{
     sync::Arc,
 };
 
-use bansho_base::{assets::Assets, color::View, phenomenon::Remark};
+use bansho_base::{
+    assets::Assets,
+    color::{AlphaConvention, View},
+    phenomenon::Remark,
+};
 use bansho_media::{
     flipbook::Sheet,
     naming::{self, OutputKind, OutputPattern},
@@ -117,6 +121,7 @@ impl Job {
         let kind = self.output_kind()?;
         self.check_channels(kind)?;
         self.check_figures(kind)?;
+        let alpha = alpha_convention(self.alpha, self.view, AlphaConvention::Encoded)?;
         let plan = Arc::new(Plan::new(scene, &self.plan_options(kind), assets)?);
         let frames = self.chosen_frames(&plan)?;
         plates::check(&self.scene, &plan, &frames)?;
@@ -130,7 +135,7 @@ impl Job {
         let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan)?;
         let mut prepared = PreparedJob {
             scene: self.scene.clone(),
-            format: Format { pattern, view: self.view, bits: self.bits, figures: self.figures },
+            format: Format { pattern, view: self.view, bits: self.bits, alpha, figures: self.figures },
             resume: self.resume && kind.is_sequence() && sheet.is_none(),
             notes: Vec::new(),
             plan,
@@ -231,6 +236,10 @@ impl Job {
         if self.bits == BitDepth::Sixteen && !wide {
             notes.push(Note::BitsUnused { kind });
         }
+        let has_alpha = wide && !job.plan.scene().has_plate() && job.sheet.is_none();
+        if self.alpha.is_some() && !has_alpha {
+            notes.push(Note::AlphaUnused);
+        }
         // With a plate the view matters to EXR too: the plate is taken back through it.
         if kind == OutputKind::Exr && self.view != View::DISPLAY && !job.plan.scene().has_plate() {
             notes.push(Note::ViewUnused);
@@ -242,6 +251,22 @@ impl Job {
             notes.push(Note::SnapshotsUnused);
         }
         Ok(notes)
+    }
+}
+
+/// What straight alpha is made for: as asked for, else as `usual`; linear where the view encodes nothing.
+///
+/// # Errors
+/// Encoded alpha of a view that encodes nothing.
+pub(super) fn alpha_convention(
+    asked: Option<AlphaConvention>,
+    view: View,
+    usual: AlphaConvention,
+) -> Result<AlphaConvention, Conflict> {
+    match asked {
+        Some(AlphaConvention::Encoded) if view == View::RAW => Err(Conflict::RawAlpha),
+        None if view == View::RAW => Ok(AlphaConvention::Linear),
+        asked => Ok(asked.unwrap_or(usual)),
     }
 }
 

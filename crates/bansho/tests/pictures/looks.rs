@@ -34,7 +34,9 @@ fn look_at<T>(
 }
 
 fn draw(text: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions, depth: BitDepth) -> Vec<DisplayImage> {
-    look_at(text, size, frames, options, |frame| bansho::display(frame, &View::DISPLAY, depth))
+    look_at(text, size, frames, options, |frame| {
+        bansho::display(frame, &View::DISPLAY, depth, bansho::AlphaConvention::Linear)
+    })
 }
 
 /// Mean luminance of the scene's light in each of those frames, before it is shown: 1.0 is display white.

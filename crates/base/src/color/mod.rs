@@ -5,9 +5,10 @@
 //!    by the inverse. Emitted light is absolute: [`luminance`] is in cd/m^2. Negative components are colours outside AP1; keep them.
 //! 3. [`exposure`]: `exposed = luminance * exposure_scale(ev100)`, so that 1.0 is display white.
 //! 4. [`View`]: exposed ACEScg to display pixels, first by the camera's [`WhiteBalance`] if it has one. The tone curve ([`tone`]) acts on the largest component, highlights take a
-//!    path to white and colours outside sRGB lose saturation ([`gamut`]), then sRGB encoding ([`encode`]), alpha and dither ([`quantise`]).
+//!    path to white and colours outside sRGB lose saturation ([`gamut`]), then sRGB encoding ([`encode`]), [`alpha`] and dither ([`quantise`]).
 //!    The view can be inverted on the whole sRGB cube ([`View::to_scene`]), so a plate through an empty scene is unchanged.
 
+pub mod alpha;
 pub mod blackbody;
 pub mod encode;
 pub mod exposure;
@@ -20,6 +21,7 @@ pub mod tone;
 pub mod view;
 pub mod white_balance;
 
+pub use alpha::AlphaConvention;
 pub use blackbody::{BlackBody, black_body};
 pub use encode::{decode_srgb, decode_srgb8, encode_srgb};
 pub use exposure::{ev100_of_white_luminance, exposure_scale, white_luminance};

@@ -85,12 +85,13 @@ pub(super) fn opaque_codes<C: DisplayCode, const RAW: bool>([r, g, b]: [f32; 3],
     ]
 }
 
-/// Codes of a pixel without a plate behind it: `A = max(alpha, r, g, b)` in linear light, colour `rgb / A`, encoded.
+/// Codes of a pixel without a plate behind it, for programs that blend linear light: `A = max(alpha, r, g, b)` in linear light, color
+/// `rgb / A`, encoded.
 ///
-/// Alpha is rounded first and the colour divided by the rounded alpha, so that colour times alpha is exact over black even where alpha
+/// Alpha is rounded first and the color divided by the rounded alpha, so that color times alpha is exact over black even where alpha
 /// has few codes. Where light can be seen alpha is therefore rounded up, elsewhere it is dithered.
 #[inline(always)]
-pub(super) fn straight_codes<C: DisplayCode, const RAW: bool>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
+pub(super) fn linear_alpha_codes<C: DisplayCode, const RAW: bool>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
     let [r, g, b] = light;
     let green_or_blue = if g > b { g } else { b };
     let brightest = if r > green_or_blue { r } else { green_or_blue };
@@ -98,6 +99,8 @@ pub(super) fn straight_codes<C: DisplayCode, const RAW: bool>(light: [f32; 3], a
     let coverage = if alpha > brightest { alpha } else { brightest };
 
     let needed = lanes::rounded(brightest.fused(C::LARGEST, 0.499));
+    // In 16 bits 65535 + 0.499 is 65535.5 in single precision, and rounds to a code that there is not.
+    let needed = if needed < C::LARGEST { needed } else { C::LARGEST };
     // Half a code over black: 0.5 / 12.92 of one in the straight part of sRGB.
     let needed = if brightest >= 0.5 / 12.92 / C::LARGEST { needed } else { 0.0 };
     let dithered = lanes::rounded(coverage.fused(C::LARGEST, dither::<C>(phase, 3)));
@@ -107,6 +110,36 @@ pub(super) fn straight_codes<C: DisplayCode, const RAW: bool>(light: [f32; 3], a
     let scale = if code > 0.0 { quotient } else { 0.0 };
     let [r, g, b, _] = opaque_codes::<C, RAW>([r * scale, g * scale, b * scale], phase);
     [r, g, b, code_of(code)]
+}
+
+/// The background before which [`encoded_alpha_codes`] are nearest to the truth: mid-gray, half of the encoded range.
+const MID_GRAY_ENCODED: f32 = 0.5;
+/// Its linear light.
+const MID_GRAY: f32 = 0.214_041_14;
+
+/// Codes of a pixel without a plate behind it, for programs that blend sRGB-encoded values, `out = A color + (1 - A) background`.
+///
+/// With `E = encode(rgb)` the codes that are seen over black, the color is `E / A`, so that the blend over black is `E` whatever `A` is.
+/// `A` is the least-squares solution over a mid-gray background `G`: the truth there is `encode(rgb + (1 - alpha) G)`, hence
+/// `1 - A = mean over r, g, b of (encode(rgb + (1 - alpha) G) - E) / encode(G)`; at least the largest `E`, which a color can carry.
+#[inline(always)]
+pub(super) fn encoded_alpha_codes<C: DisplayCode>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
+    let over_black = opaque_codes::<C, false>(light, phase);
+    let transmitted = (1.0 - clamp_unit(alpha)) * MID_GRAY;
+    let mut gained = 0.0;
+    for component in light {
+        gained += encode_srgb(clamp_unit(component) + transmitted) - encode_srgb(component);
+    }
+    let coverage = clamp_unit(gained.fused(-1.0 / (3.0 * MID_GRAY_ENCODED), 1.0));
+
+    let dithered = code_of(coverage.fused(C::LARGEST, dither::<C>(phase, 3)));
+    let [r, g, b, _] = over_black;
+    let code = dithered.max(r).max(g).max(b);
+    let quotient = C::LARGEST / code as f32;
+    let scale = if code > 0 { quotient } else { 0.0 };
+    // At most the largest code, since `code` is at least as large as each.
+    let color = |component: u32| code_of(component as f32 * scale);
+    [color(r), color(g), color(b), code]
 }
 
 #[cfg(test)]
@@ -143,7 +176,7 @@ mod tests {
         for step in 0..2000 {
             let light = [1.0, 0.4, 0.1].map(|v| v * libm::powf(step as f32 / 2000.0, 3.0));
             for phase in phases().step_by(997) {
-                let codes = straight_codes::<u8, false>(light, 0.0, phase);
+                let codes = linear_alpha_codes::<u8, false>(light, 0.0, phase);
                 for (code, expected) in codes.iter().zip(light) {
                     let shown = decode_srgb8(*code as u8) * codes[3] as f32 / 255.0;
                     let error = (encode_srgb(shown) - encode_srgb(expected)) * 255.0;
@@ -153,15 +186,106 @@ mod tests {
         }
     }
 
+    /// Numbers at and beyond the ends of the range, and what is not a number.
+    const EXTREMES: [f32; 12] =
+        [0.0, -0.0, 1e-40, 1e-6, 0.003_130_8, 0.5, 0.999_999_94, 1.0, 1.000_000_1, 7.0, f32::INFINITY, f32::NAN];
+
+    /// Every combination of extremes in two components of light and in alpha; the third component is one of them too.
+    fn extreme_pixels() -> impl Iterator<Item = ([f32; 3], f32)> {
+        let all = || EXTREMES.into_iter().chain([-1.0, f32::NEG_INFINITY]);
+        all().flat_map(move |r| all().flat_map(move |g| all().map(move |alpha| ([r, g, 0.25], alpha))))
+    }
+
+    fn seen(light: f32) -> f32 {
+        if light.is_nan() { 0.0 } else { light.clamp(0.0, 1.0) }
+    }
+
+    #[test]
+    fn saturated_pixels_keep_their_alpha_in_every_depth() {
+        fn hold<C: DisplayCode>() {
+            let largest = C::LARGEST as u32;
+            for (light, alpha) in extreme_pixels() {
+                for phase in phases().step_by(211) {
+                    let linear = linear_alpha_codes::<C, false>(light.map(seen), alpha, phase);
+                    let raw = linear_alpha_codes::<C, true>(light.map(seen), alpha, phase);
+                    let encoded = encoded_alpha_codes::<C>(light, alpha, phase);
+                    let opaque = opaque_codes::<C, false>(light, phase);
+                    for codes in [linear, raw, encoded, opaque] {
+                        assert!(codes.iter().all(|code| *code <= largest), "{light:?} {alpha}: {codes:?}");
+                        let brightest = light.map(seen).into_iter().fold(seen(alpha), f32::max);
+                        if brightest == 1.0 {
+                            assert_eq!(codes[3], largest, "{light:?} {alpha}: {codes:?}");
+                        }
+                    }
+                }
+            }
+        }
+        hold::<u8>();
+        hold::<u16>();
+    }
+
+    /// Light of many colors and brightnesses with much and little coverage.
+    fn pixels() -> impl Iterator<Item = ([f32; 3], f32)> {
+        let colors = [[1.0, 0.4, 0.1], [0.1, 1.0, 0.3], [1.0, 1.0, 1.0], [0.0, 0.0, 1.0]];
+        let brightness = (0..60).map(|step| libm::powf(step as f32 / 59.0, 3.0));
+        brightness.flat_map(move |v| {
+            colors.into_iter().flat_map(move |color| [0.0, 0.1, 0.7, 1.0].map(|alpha| (color.map(|c| c * v), alpha)))
+        })
+    }
+
+    #[test]
+    fn an_encoded_blend_over_black_is_exact_to_a_code() {
+        for (light, alpha) in pixels() {
+            for phase in phases().step_by(61) {
+                let [r, g, b, a] = encoded_alpha_codes::<u8>(light, alpha, phase);
+                let expected = opaque_codes::<u8, false>(light, phase);
+                for (color, expected) in [r, g, b].into_iter().zip(expected) {
+                    assert_eq!((color * a + 127) / 255, expected, "{light:?} {alpha}");
+                }
+                let [r, g, b, a] = encoded_alpha_codes::<u16>(light, alpha, phase).map(u64::from);
+                let expected = opaque_codes::<u16, false>(light, phase);
+                for (color, expected) in [r, g, b].into_iter().zip(expected) {
+                    let over_black = (color * a + 32_767) / 65_535;
+                    assert!(over_black.abs_diff(u64::from(expected)) <= 1, "{light:?} {alpha}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_other_alpha_is_nearer_to_the_truth_over_mid_gray() {
+        for (light, coverage) in pixels() {
+            let truth = light.map(|v| encode_srgb(v + (1.0 - coverage) * MID_GRAY) * 65_535.0);
+            let over_black = opaque_codes::<u16, false>(light, 0).map(|code| code as f32);
+            let error = |alpha: f32| {
+                let gray = (1.0 - alpha / 65_535.0) * MID_GRAY_ENCODED * 65_535.0;
+                (0..3).map(|c| (over_black[c] + gray - truth[c]).powi(2)).sum::<f32>()
+            };
+            let alpha = encoded_alpha_codes::<u16>(light, coverage, 0)[3] as f32;
+            let least = over_black[0].max(over_black[1]).max(over_black[2]);
+            for other in [alpha - 400.0, alpha + 400.0, least, 65_535.0] {
+                if (least..=65_535.0).contains(&other) {
+                    assert!(error(alpha) <= error(other) * 1.001 + 10.0, "{light:?} {coverage}: {alpha} {other}");
+                }
+            }
+        }
+        let quiet = dither_phase(0, 0);
+        assert_eq!(encoded_alpha_codes::<u8>([0.0; 3], 0.0, quiet), [0; 4]);
+        assert_eq!(encoded_alpha_codes::<u8>([0.0; 3], 1.0, quiet), [0, 0, 0, 255]);
+        assert_eq!(encoded_alpha_codes::<u8>([1.0; 3], 0.0, quiet), [255; 4]);
+        // Half of the light behind passes: code 128 times (1 - A) is to be encode(0.107) = 0.3608, hence A = 0.2785.
+        assert_eq!(encoded_alpha_codes::<u16>([0.0; 3], 0.5, quiet)[3], 18_248);
+    }
+
     #[test]
     fn alpha_is_the_larger_of_coverage_and_light() {
         let quiet = dither_phase(0, 0);
-        assert_eq!(straight_codes::<u8, false>([0.0; 3], 0.0, quiet), [0; 4]);
-        assert_eq!(straight_codes::<u8, false>([0.0; 3], 1.0, quiet), [0, 0, 0, 255]);
-        assert_eq!(straight_codes::<u16, false>([0.0; 3], 0.25, quiet)[3], 16_384);
-        assert_eq!(straight_codes::<u8, false>([1.0; 3], 0.0, quiet), [255; 4]);
+        assert_eq!(linear_alpha_codes::<u8, false>([0.0; 3], 0.0, quiet), [0; 4]);
+        assert_eq!(linear_alpha_codes::<u8, false>([0.0; 3], 1.0, quiet), [0, 0, 0, 255]);
+        assert_eq!(linear_alpha_codes::<u16, false>([0.0; 3], 0.25, quiet)[3], 16_384);
+        assert_eq!(linear_alpha_codes::<u8, false>([1.0; 3], 0.0, quiet), [255; 4]);
         // Light 0.2 under alpha 0.4 = 102/255: straight 0.5 encodes to 0.7354 * 255 = 187.5.
-        let codes = straight_codes::<u8, false>([0.2, 0.2, 0.0], 0.4, quiet);
+        let codes = linear_alpha_codes::<u8, false>([0.2, 0.2, 0.0], 0.4, quiet);
         assert!((187..=188).contains(&codes[0]) && codes[2] == 0 && codes[3] == 102, "{codes:?}");
     }
 }

@@ -2,7 +2,8 @@
 //! loops, and as no operation crosses lanes each vector width gives the same bits.
 
 use super::{
-    quantise::{DisplayCode, dither_phase, opaque_codes, straight_codes},
+    alpha::AlphaConvention,
+    quantise::{DisplayCode, dither_phase, encoded_alpha_codes, linear_alpha_codes, opaque_codes},
     tone::ToneCurve,
     view::{clamped, shown, unshown},
 };
@@ -42,28 +43,81 @@ impl Show for Clamped {
     }
 }
 
+/// How a pixel of display light becomes codes. A trait, as [`Show`] is.
+trait Coding {
+    /// What gives the same codes sooner where alpha is full.
+    type Covered: Coding;
+    /// Whether pixels without light are opaque black.
+    const OPAQUE: bool;
+    fn codes<C: DisplayCode>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4];
+}
+
+struct Opaque<const RAW: bool>;
+
+impl<const RAW: bool> Coding for Opaque<RAW> {
+    type Covered = Self;
+    const OPAQUE: bool = true;
+    #[inline(always)]
+    fn codes<C: DisplayCode>(light: [f32; 3], _alpha: f32, phase: u32) -> [u32; 4] {
+        opaque_codes::<C, RAW>(light, phase)
+    }
+}
+
+struct LinearAlpha<const RAW: bool>;
+
+impl<const RAW: bool> Coding for LinearAlpha<RAW> {
+    type Covered = Opaque<RAW>;
+    const OPAQUE: bool = false;
+    #[inline(always)]
+    fn codes<C: DisplayCode>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
+        linear_alpha_codes::<C, RAW>(light, alpha, phase)
+    }
+}
+
+struct EncodedAlpha;
+
+impl Coding for EncodedAlpha {
+    type Covered = Opaque<false>;
+    const OPAQUE: bool = false;
+    #[inline(always)]
+    fn codes<C: DisplayCode>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
+        encoded_alpha_codes::<C>(light, alpha, phase)
+    }
+}
+
+/// Rows through a tone curve, sRGB-encoded.
 #[inline(always)]
-pub(super) fn encoded<C: DisplayCode, const OPAQUE: bool>(
+pub(super) fn encoded<C: DisplayCode>(
     tone: &ToneCurve,
     pixels: &[[f32; 4]],
     place: Place,
+    alpha: Option<AlphaConvention>,
     out: &mut [[C; 4]],
 ) {
-    convert::<C, Toned<'_>, OPAQUE, false>(&Toned(tone), pixels, place, out);
+    let view = Toned(tone);
+    match alpha {
+        None => convert::<C, Toned<'_>, Opaque<false>>(&view, pixels, place, out),
+        Some(AlphaConvention::Linear) => convert::<C, Toned<'_>, LinearAlpha<false>>(&view, pixels, place, out),
+        Some(AlphaConvention::Encoded) => convert::<C, Toned<'_>, EncodedAlpha>(&view, pixels, place, out),
+    }
 }
 
+/// Rows of the numbers themselves, which have no encoding for alpha to be blended in.
 #[inline(always)]
-pub(super) fn raw<C: DisplayCode, const OPAQUE: bool>(pixels: &[[f32; 4]], place: Place, out: &mut [[C; 4]]) {
-    convert::<C, Clamped, OPAQUE, true>(&Clamped, pixels, place, out);
-}
-
-#[inline(always)]
-fn convert<C: DisplayCode, V: Show, const OPAQUE: bool, const RAW: bool>(
-    view: &V,
+pub(super) fn raw<C: DisplayCode>(
     pixels: &[[f32; 4]],
-    mut place: Place,
+    place: Place,
+    alpha: Option<AlphaConvention>,
     out: &mut [[C; 4]],
 ) {
+    match alpha {
+        None => convert::<C, Clamped, Opaque<true>>(&Clamped, pixels, place, out),
+        Some(_) => convert::<C, Clamped, LinearAlpha<true>>(&Clamped, pixels, place, out),
+    }
+}
+
+#[inline(always)]
+fn convert<C: DisplayCode, V: Show, K: Coding>(view: &V, pixels: &[[f32; 4]], mut place: Place, out: &mut [[C; 4]]) {
     let count = pixels.len().min(out.len());
     let mut padded = [[0.0; 4]; BLOCK];
     for (input, output) in pixels[..count].chunks(BLOCK).zip(out[..count].chunks_mut(BLOCK)) {
@@ -75,11 +129,11 @@ fn convert<C: DisplayCode, V: Show, const OPAQUE: bool, const RAW: bool>(
         };
         let mut codes = [[C::default(); 4]; BLOCK];
         if is_empty(block) {
-            if OPAQUE {
+            if K::OPAQUE {
                 codes = [C::from_wholes([0, 0, 0, C::LARGEST as u32]); BLOCK];
             }
         } else {
-            convert_block::<C, V, OPAQUE, RAW>(view, block, place, &mut codes);
+            convert_block::<C, V, K>(view, block, place, &mut codes);
         }
         output.copy_from_slice(&codes[..output.len()]);
         place.x = place.x.wrapping_add(BLOCK as u32);
@@ -97,7 +151,7 @@ fn is_empty(block: &[[f32; 4]; BLOCK]) -> bool {
 }
 
 #[inline(always)]
-fn convert_block<C: DisplayCode, V: Show, const OPAQUE: bool, const RAW: bool>(
+fn convert_block<C: DisplayCode, V: Show, K: Coding>(
     view: &V,
     block: &[[f32; 4]; BLOCK],
     place: Place,
@@ -105,11 +159,7 @@ fn convert_block<C: DisplayCode, V: Show, const OPAQUE: bool, const RAW: bool>(
 ) {
     let light = displayed(view, &planes(block));
     // Where alpha is full, as before a sky, both give the same codes, and the one sooner.
-    let codes = if OPAQUE || is_covered(block) {
-        coded::<C, true, RAW>(&light, place)
-    } else {
-        coded::<C, false, RAW>(&light, place)
-    };
+    let codes = if is_covered(block) { coded::<C, K::Covered>(&light, place) } else { coded::<C, K>(&light, place) };
     for (i, pixel) in out.iter_mut().enumerate() {
         *pixel = C::from_wholes([codes[0][i], codes[1][i], codes[2][i], codes[3][i]]);
     }
@@ -126,13 +176,11 @@ fn is_covered(block: &[[f32; 4]; BLOCK]) -> bool {
 }
 
 #[inline(always)]
-fn coded<C: DisplayCode, const OPAQUE: bool, const RAW: bool>(light: &Planes, place: Place) -> [[u32; BLOCK]; 4] {
+fn coded<C: DisplayCode, K: Coding>(light: &Planes, place: Place) -> [[u32; BLOCK]; 4] {
     let mut codes = [[0; BLOCK]; 4];
     for i in 0..BLOCK {
         let phase = dither_phase(place.x.wrapping_add(i as u32), place.y);
-        let rgb = [light[0][i], light[1][i], light[2][i]];
-        let pixel =
-            if OPAQUE { opaque_codes::<C, RAW>(rgb, phase) } else { straight_codes::<C, RAW>(rgb, light[3][i], phase) };
+        let pixel = K::codes::<C>([light[0][i], light[1][i], light[2][i]], light[3][i], phase);
         (codes[0][i], codes[1][i], codes[2][i], codes[3][i]) = (pixel[0], pixel[1], pixel[2], pixel[3]);
     }
     codes

@@ -3,6 +3,7 @@
 use fearless_simd::{Level, dispatch};
 
 use super::{
+    alpha::AlphaConvention,
     encode::clamp_unit,
     gamut::{from_cube, sanitised, to_cube},
     quantise::DisplayCode,
@@ -127,8 +128,10 @@ impl View {
 
     /// One row of display codes of premultiplied, exposed ACEScg.
     ///
-    /// `y` and `x0` are the picture coordinates of the row and its first pixel, so that a crop is dithered like the whole. With `opaque`
-    /// (there is a plate) alpha is full; else `A = max(alpha, r, g, b)` in linear display light and the colour is `rgb / A`, encoded.
+    /// `y` and `x0` are the picture coordinates of the row and its first pixel, so that a crop is dithered like the whole. Without a
+    /// convention of `alpha` (there is a plate) pixels are opaque. With [`AlphaConvention::Linear`] `A = max(alpha, r, g, b)` in linear
+    /// display light and the color is `rgb / A`, encoded; with [`AlphaConvention::Encoded`] a blend of encoded values over black gives
+    /// the opaque codes, and one over mid-gray is nearest to the truth. `raw` encodes nothing and is always linear.
     /// Black is code 0 and display white the largest code; 8 bits are dithered, except that values which are 8-bit codes stay so.
     /// The shorter of `pixels` and `out` decides how many are written. Same bytes at every `level`.
     pub fn display_row<C: DisplayCode>(
@@ -137,10 +140,10 @@ impl View {
         pixels: &[[f32; 4]],
         y: i64,
         x0: i64,
-        opaque: bool,
+        alpha: Option<AlphaConvention>,
         out: &mut [[C; 4]],
     ) {
-        let Some(balance) = &self.balance else { return self.row(level, pixels, [x0, y], opaque, out) };
+        let Some(balance) = &self.balance else { return self.row(level, pixels, [x0, y], alpha, out) };
         let mut buffer = [[0.0; 4]; BALANCED];
         for ((part, out), first) in pixels.chunks(BALANCED).zip(out.chunks_mut(BALANCED)).zip((0..).step_by(BALANCED)) {
             let shown = &mut buffer[..part.len()];
@@ -148,7 +151,7 @@ impl View {
                 let [r, g, b] = balance.apply([*r, *g, *b]);
                 *shown = [r, g, b, *alpha];
             }
-            self.row(level, shown, [x0.wrapping_add(first), y], opaque, out);
+            self.row(level, shown, [x0.wrapping_add(first), y], alpha, out);
         }
     }
 
@@ -158,16 +161,14 @@ impl View {
         level: Level,
         pixels: &[[f32; 4]],
         [x0, y]: [i64; 2],
-        opaque: bool,
+        alpha: Option<AlphaConvention>,
         out: &mut [[C; 4]],
     ) {
         // Coordinates only feed the dither, which repeats after 2^32.
         let place = row::Place { x: x0 as u32, y: y as u32 };
-        match (&self.tone, opaque) {
-            (Some(tone), true) => dispatch!(level, _simd => row::encoded::<C, true>(tone, pixels, place, out)),
-            (Some(tone), false) => dispatch!(level, _simd => row::encoded::<C, false>(tone, pixels, place, out)),
-            (None, true) => dispatch!(level, _simd => row::raw::<C, true>(pixels, place, out)),
-            (None, false) => dispatch!(level, _simd => row::raw::<C, false>(pixels, place, out)),
+        match &self.tone {
+            Some(tone) => dispatch!(level, _simd => row::encoded::<C>(tone, pixels, place, alpha, out)),
+            None => dispatch!(level, _simd => row::raw::<C>(pixels, place, alpha, out)),
         }
     }
 }
@@ -243,8 +244,8 @@ mod tests {
             view.to_scene_row(level, &mut scene);
             let mut eight = vec![[0_u8; 4]; scene.len()];
             let mut sixteen = vec![[0_u16; 4]; scene.len()];
-            view.display_row(level, &scene, 7, -3, true, &mut eight);
-            view.display_row(level, &scene, 7, -3, true, &mut sixteen);
+            view.display_row(level, &scene, 7, -3, None, &mut eight);
+            view.display_row(level, &scene, 7, -3, None, &mut sixteen);
             for ((plate, eight), sixteen) in plate.iter().zip(&eight).zip(&sixteen) {
                 let [r, g, b] = *plate;
                 assert_eq!(*eight, [r, g, b, 255], "{}", view.name());
@@ -259,14 +260,14 @@ mod tests {
     fn every_level_gives_the_same_bytes() {
         let pixels = wild_pixels(4099);
         for view in [View::DISPLAY, View::STANDARD, View::RAW, View::DISPLAY.balanced(Some(4000.0))] {
-            for opaque in [false, true] {
+            for alpha in [None, Some(AlphaConvention::Linear), Some(AlphaConvention::Encoded)] {
                 let (mut wide, mut narrow) = (vec![[0_u8; 4]; 4099], vec![[9_u8; 4]; 4099]);
-                view.display_row(Level::new(), &pixels, 5, 11, opaque, &mut wide);
-                view.display_row(Level::baseline(), &pixels, 5, 11, opaque, &mut narrow);
+                view.display_row(Level::new(), &pixels, 5, 11, alpha, &mut wide);
+                view.display_row(Level::baseline(), &pixels, 5, 11, alpha, &mut narrow);
                 assert_eq!(wide, narrow);
                 let (mut wide, mut narrow) = (vec![[0_u16; 4]; 4099], vec![[9_u16; 4]; 4099]);
-                view.display_row(Level::new(), &pixels, 5, 11, opaque, &mut wide);
-                view.display_row(Level::baseline(), &pixels, 5, 11, opaque, &mut narrow);
+                view.display_row(Level::new(), &pixels, 5, 11, alpha, &mut wide);
+                view.display_row(Level::baseline(), &pixels, 5, 11, alpha, &mut narrow);
                 assert_eq!(wide, narrow);
             }
             let (mut wide, mut narrow) = (pixels.clone(), pixels.clone());
@@ -282,7 +283,7 @@ mod tests {
         let pixels = wild_pixels(1000);
         for view in [View::DISPLAY, View::DISPLAY.balanced(Some(4000.0))] {
             let mut out = vec![[0_u16; 4]; pixels.len()];
-            view.display_row(Level::new(), &pixels, 0, 0, true, &mut out);
+            view.display_row(Level::new(), &pixels, 0, 0, None, &mut out);
             for (pixel, codes) in pixels.iter().zip(&out) {
                 let shown = view.to_display([pixel[0], pixel[1], pixel[2]]);
                 assert!(shown.iter().all(|v| (0.0..=1.0).contains(v)), "{pixel:?} {shown:?}");
@@ -297,12 +298,14 @@ mod tests {
     #[test]
     fn a_crop_is_part_of_the_whole() {
         let pixels = wild_pixels(300);
-        let mut whole = vec![[0_u8; 4]; 300];
-        View::DISPLAY.display_row(Level::new(), &pixels, 40, -20, false, &mut whole);
-        for (start, end) in [(0, 1), (7, 100), (33, 290), (299, 300)] {
-            let mut part = vec![[0_u8; 4]; end - start];
-            View::DISPLAY.display_row(Level::new(), &pixels[start..end], 40, start as i64 - 20, false, &mut part);
-            assert_eq!(part, whole[start..end]);
+        for alpha in [None, Some(AlphaConvention::Linear), Some(AlphaConvention::Encoded)] {
+            let mut whole = vec![[0_u8; 4]; 300];
+            View::DISPLAY.display_row(Level::new(), &pixels, 40, -20, alpha, &mut whole);
+            for (start, end) in [(0, 1), (7, 100), (33, 290), (299, 300)] {
+                let mut part = vec![[0_u8; 4]; end - start];
+                View::DISPLAY.display_row(Level::new(), &pixels[start..end], 40, start as i64 - 20, alpha, &mut part);
+                assert_eq!(part, whole[start..end]);
+            }
         }
     }
 
@@ -312,11 +315,16 @@ mod tests {
         for view in [View::DISPLAY, View::STANDARD, View::RAW] {
             for y in 0..50 {
                 let mut out = [[7_u8; 4]; 4];
-                view.display_row(Level::new(), &row, y, 13 * y, false, &mut out);
-                assert_eq!(out, [[0; 4], [0, 0, 0, 255], [255; 4], [255; 4]]);
-                view.display_row(Level::new(), &row, y, 13 * y, true, &mut out);
+                for alpha in [AlphaConvention::Linear, AlphaConvention::Encoded] {
+                    view.display_row(Level::new(), &row, y, 13 * y, Some(alpha), &mut out);
+                    assert_eq!(out, [[0; 4], [0, 0, 0, 255], [255; 4], [255; 4]]);
+                    let mut wide = [[7_u16; 4]; 4];
+                    view.display_row(Level::new(), &row, y, 13 * y, Some(alpha), &mut wide);
+                    assert_eq!(wide, [[0; 4], [0, 0, 0, 65_535], [65_535; 4], [65_535; 4]]);
+                }
+                view.display_row(Level::new(), &row, y, 13 * y, None, &mut out);
                 assert_eq!(out[0], [0, 0, 0, 255]);
-                view.display_row(Level::new(), &row[..1], y, 13 * y, true, &mut out[3..]);
+                view.display_row(Level::new(), &row[..1], y, 13 * y, None, &mut out[3..]);
                 assert_eq!(out[3], [0, 0, 0, 255]);
             }
         }
@@ -328,7 +336,7 @@ mod tests {
         let shown = View::STANDARD.to_display(acescg_from_srgb([0.9, 0.7, 0.1]));
         assert!(shown.iter().zip([0.9, 0.7, 0.1]).all(|(a, b)| (a - b).abs() < 1e-6), "{shown:?}");
         let mut out = [[0_u16; 4]];
-        View::RAW.display_row(Level::new(), &[[0.5, 0.25, 0.0, 1.0]], 0, 0, true, &mut out);
+        View::RAW.display_row(Level::new(), &[[0.5, 0.25, 0.0, 1.0]], 0, 0, None, &mut out);
         assert_eq!(out, [[32_768, 16_384, 0, 65_535]]);
     }
 

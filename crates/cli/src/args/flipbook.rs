@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bansho::{
-    BitDepth, View,
+    AlphaConvention, BitDepth, View,
     job::{BackendChoice, Flipbook, JobError, SceneFile},
 };
 use clap::Args;
@@ -48,6 +48,10 @@ pub(crate) struct FlipbookArgs {
     /// Bits of each channel of the colour and alpha sheets.
     #[arg(long, default_value = "8", value_parser = values::bits_parser())]
     bits: BitDepth,
+    /// What straight alpha in .png is made for: engines that blend linear light (Unity, Unreal, Godot and three.js as usually set up), or
+    /// `encoded` values (most user interfaces). [default: linear]
+    #[arg(long, value_name = "CONVENTION", value_parser = values::alpha_parser())]
+    alpha: Option<AlphaConvention>,
     /// How the light is shown in .png.
     #[arg(long, default_value = "display", value_parser = values::view_parser())]
     view: View,
@@ -70,6 +74,7 @@ impl FlipbookArgs {
             loop_s: self.loop_s,
             view: self.view,
             bits: self.bits,
+            alpha: self.alpha,
             out: self.out.clone(),
             backend: self.backend,
             ..Flipbook::new(scene, self.grid)

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bansho::{
-    BitDepth, Rect, View,
+    AlphaConvention, BitDepth, Rect, View,
     job::{BackendChoice, Job, JobError, SceneFile},
 };
 use clap::Args;
@@ -27,7 +27,7 @@ Examples:
   bansho render fire.toml --set flame_sheet.height=1.2 --set wind.gust=0.5
   bansho render fire.toml --resume                      go on after an interruption
 
-A PNG is exact over black; an EXR is exact over anything.
+A PNG is exact over black in programs that blend as --alpha says; an EXR is exact over anything.
 Interrupt at any time: whole frames stay, and nothing half-written bears a final name.")]
 pub(crate) struct RenderArgs {
     /// The scene file.
@@ -43,6 +43,11 @@ pub(crate) struct RenderArgs {
     /// How the light is shown in formats that are made to be looked at; `raw` writes the numbers, clamped to 0 to 1.
     #[arg(long, default_value = "display", value_parser = values::view_parser(), help_heading = "Output")]
     view: View,
+    /// What straight alpha is made for (.png .apng .mov .webm): `encoded` for programs that blend encoded values, as browsers, 8-bit image
+    /// editors and video players do; `linear` for those that blend linear light, as compositors do. [default: encoded; linear for
+    /// `--view raw`]
+    #[arg(long, value_name = "CONVENTION", value_parser = values::alpha_parser(), help_heading = "Output")]
+    alpha: Option<AlphaConvention>,
     /// Give each phenomenon a layer of its own (.exr).
     #[arg(long, help_heading = "Output")]
     layers: bool,
@@ -113,6 +118,7 @@ impl RenderArgs {
             figures: self.figures,
             view: self.view,
             bits: self.bits,
+            alpha: self.alpha,
             out: self.out.clone(),
             contact_sheet: self.contact_sheet,
             resume: self.resume,

@@ -1,7 +1,7 @@
 //! Values of options that are more than a word or a number.
 
 use bansho::{
-    BitDepth, Rect, View,
+    AlphaConvention, BitDepth, Rect, View,
     job::{BackendChoice, StreakFormat},
     models::rain::velocity::VelocityLaw,
     render::{
@@ -120,6 +120,11 @@ pub(super) fn backend_parser() -> impl TypedValueParser<Value = BackendChoice> {
 pub(super) fn bits_parser() -> impl TypedValueParser<Value = BitDepth> {
     let names = BitDepth::CHOICES.iter().map(|choice| choice.name);
     PossibleValuesParser::new(names).map(|name| BitDepth::from_name(&name).unwrap_or_default())
+}
+
+pub(super) fn alpha_parser() -> impl TypedValueParser<Value = AlphaConvention> {
+    let names = AlphaConvention::CHOICES.iter().map(|choice| choice.name);
+    PossibleValuesParser::new(names).map(|name| AlphaConvention::from_name(&name).unwrap_or_default())
 }
 
 #[cfg(test)]

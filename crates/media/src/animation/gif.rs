@@ -101,6 +101,7 @@ pub(crate) fn prepare(
         width: picture.width,
         height: picture.height,
         opaque: !format.transparent,
+        alpha: picture.alpha,
         pixels: DisplayPixels::Eight(pixels),
     };
     Ok(GifPiece(Some((png::encode_frame(&picture, path)?, histogram))))
@@ -218,12 +219,14 @@ fn decoded(bytes: &[u8]) -> Option<(Vec<u8>, usize)> {
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::color::AlphaConvention;
+
     use super::*;
 
     fn ramp(index: usize) -> DisplayImage {
         let pixel = |i: usize| [(i * 4) as u8, (i * 2 + index * 8) as u8, 0, if i % 8 < 3 { 40 } else { 220 }];
         let pixels = DisplayPixels::Eight((0..64).map(pixel).collect());
-        DisplayImage { width: 16, height: 4, opaque: false, pixels }
+        DisplayImage { width: 16, height: 4, opaque: false, alpha: AlphaConvention::Linear, pixels }
     }
 
     fn film(frames: usize, fps: [u32; 2], transparent: bool) -> Vec<u8> {

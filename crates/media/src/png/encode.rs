@@ -8,7 +8,7 @@ use ::png::{
 };
 use bansho_base::image::{DisplayImage, DisplayPixels};
 
-use super::{KEY_FINGERPRINT, KEY_VERSION};
+use super::{KEY_ALPHA, KEY_FINGERPRINT, KEY_VERSION};
 use crate::{
     error::{MediaError, SizeRule},
     stamp,
@@ -25,7 +25,7 @@ pub enum PngEffort {
 }
 
 /// The bytes of a PNG of `picture`: 8 or 16 bits as it is, without alpha where it is opaque, marked sRGB, with the
-/// fingerprint as text. The same picture gives the same bytes.
+/// fingerprint and the convention of its alpha as text. The same picture gives the same bytes.
 ///
 /// # Errors
 /// A side of 0 or above [`SIDE_LIMIT`], or a number of pixels other than width times height. `path` is only named in errors.
@@ -87,6 +87,9 @@ fn compress(
     if let Some(fingerprint) = fingerprint {
         encoder.add_text_chunk(KEY_FINGERPRINT.to_owned(), stamp::to_hex(fingerprint))?;
     }
+    if !picture.opaque {
+        encoder.add_text_chunk(KEY_ALPHA.to_owned(), picture.alpha.name().to_owned())?;
+    }
     set_effort(&mut encoder, effort);
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&samples(picture))?;
@@ -137,6 +140,8 @@ fn samples(picture: &DisplayImage) -> Cow<'_, [u8]> {
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::color::AlphaConvention;
+
     use super::*;
     use crate::testing;
 
@@ -168,7 +173,7 @@ mod tests {
         let pixels: Vec<[u16; 4]> = (0..6).map(|i| [i, 257 * i, 65535 - i, 40000]).collect();
         for opaque in [false, true] {
             let pixels = DisplayPixels::Sixteen(pixels.clone());
-            let picture = DisplayImage { width: 3, height: 2, opaque, pixels };
+            let picture = DisplayImage { width: 3, height: 2, opaque, alpha: AlphaConvention::Linear, pixels };
             let (info, bytes) = read_back(&encode(&picture, &[1; 32], PngEffort::Fast, Path::new("a.png")).unwrap());
             assert_eq!(info.bit_depth, BitDepth::Sixteen);
             let values: Vec<u16> = bytes.as_chunks().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
@@ -181,9 +186,18 @@ mod tests {
     fn the_file_says_that_it_is_srgb_and_nothing_of_time_or_place() {
         let file = encode(&testing::display(9, 4, 0), &[1; 32], PngEffort::Fast, Path::new("secret/a.png")).unwrap();
         let kinds: Vec<_> = super::super::chunk::chunks(&file).unwrap().map(|chunk| chunk.unwrap().kind).collect();
-        let expected: [&[u8; 4]; 9] = [b"IHDR", b"sRGB", b"gAMA", b"cHRM", b"tEXt", b"tEXt", b"tEXt", b"IDAT", b"IEND"];
-        assert!(expected.into_iter().eq(kinds.iter()), "{kinds:?}");
+        let text = [b"tEXt"; 4];
+        let expected = [b"IHDR", b"sRGB", b"gAMA", b"cHRM"].into_iter().chain(text).chain([b"IDAT", b"IEND"]);
+        assert!(expected.eq(kinds.iter()), "{kinds:?}");
         assert!(!file.windows(6).any(|window| window == b"secret"));
+        for alpha in [AlphaConvention::Encoded, AlphaConvention::Linear] {
+            for opaque in [false, true] {
+                let picture = DisplayImage { alpha, opaque, ..testing::display(9, 4, 0) };
+                let file = encode(&picture, &[1; 32], PngEffort::Fast, Path::new("a.png")).unwrap();
+                let words = [b"bansho:alpha\0", alpha.name().as_bytes()].concat();
+                assert_eq!(file.windows(words.len()).any(|window| window == words), !opaque, "{alpha:?}");
+            }
+        }
     }
 
     #[test]

@@ -13,5 +13,7 @@ pub use measured::{MeasuredImage, Samples, encode_measured};
 pub const KEY_FINGERPRINT: &str = "bansho:fingerprint";
 /// Key of the text chunk that holds Bansho's version.
 pub const KEY_VERSION: &str = "bansho:version";
+/// Key of the text chunk that names the convention of straight alpha: `encoded` or `linear`.
+pub const KEY_ALPHA: &str = "bansho:alpha";
 /// Key of the text chunk that holds the number which the largest code of a measured picture stands for.
 pub const KEY_SCALE: &str = "bansho:scale";

@@ -3,7 +3,7 @@
 use std::{ffi::OsString, path::Path};
 
 use super::{VideoFormat, WebmCodec};
-use crate::naming::OutputKind;
+use crate::{naming::OutputKind, png::KEY_ALPHA};
 
 /// All arguments for a film at `output`, which is there already and empty.
 pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
@@ -28,9 +28,11 @@ pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
         ["-flags:v", "+bitexact"],
         ["-map_metadata", "-1"],
     ];
+    let convention = format!("{KEY_ALPHA}={}", format.alpha.name());
+    let alpha = ["-metadata", &convention].into_iter().filter(|_| !format.is_flat());
     let start = ["-y", "-nostdin", "-hide_banner", "-nostats", "-loglevel", "error", "-xerror"];
     let words = start.into_iter().chain(input).chain(["-an", "-vf", &filter]).chain(codec(format).iter().copied());
-    let words = words.chain(tags.into_iter().flatten()).chain(["-f", container(format.kind)]);
+    let words = words.chain(tags.into_iter().flatten()).chain(alpha).chain(["-f", container(format.kind)]);
     words.map(OsString::from).chain([output.as_os_str().to_owned()]).collect()
 }
 
@@ -57,7 +59,7 @@ fn codec(format: &VideoFormat) -> &'static [&'static str] {
             "-vendor",
             "apl0",
             "-movflags",
-            "+write_colr",
+            "+write_colr+use_metadata_tags",
         ],
         (OutputKind::Webm, WebmCodec::Av1) => &["-c:v", "libsvtav1", "-preset", "8", "-crf", "24", "-g", "120"],
         // Alternate reference frames cannot be had with alpha.
@@ -79,12 +81,15 @@ fn container(kind: OutputKind) -> &'static str {
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::color::AlphaConvention;
+
     use super::*;
     use crate::video::VideoOptions;
 
     fn words(kind: OutputKind, opaque: bool, webm: WebmCodec) -> String {
         let options = VideoOptions { webm, ..VideoOptions::default() };
-        let format = VideoFormat { kind, size: [65, 48], fps: [24000, 1001], opaque, sixteen_bits: false, options };
+        let (size, fps, alpha) = ([65, 48], [24000, 1001], AlphaConvention::Encoded);
+        let format = VideoFormat { kind, size, fps, opaque, alpha, sixteen_bits: false, options };
         let words: Vec<_> =
             of(&format, Path::new("t.part")).into_iter().map(|word| word.into_string().unwrap()).collect();
         words.join(" ")
@@ -110,6 +115,12 @@ mod tests {
         assert!(words(OutputKind::Webm, false, WebmCodec::Vp9).contains("format=yuva420p,"));
         assert!(words(OutputKind::Webm, false, WebmCodec::Av1).contains("format=yuv420p10le"));
         assert!(words(OutputKind::Mp4, false, WebmCodec::Vp9).contains("format=yuv420p,"));
+        let names_its_alpha = |kind, opaque, webm| words(kind, opaque, webm).contains("-metadata bansho:alpha=encoded");
+        for kind in [OutputKind::Mov, OutputKind::Webm] {
+            assert!(names_its_alpha(kind, false, WebmCodec::Vp9) && !names_its_alpha(kind, true, WebmCodec::Vp9));
+        }
+        assert!(!names_its_alpha(OutputKind::Webm, false, WebmCodec::Av1));
+        assert!(!names_its_alpha(OutputKind::Mp4, false, WebmCodec::Vp9));
     }
 
     #[test]

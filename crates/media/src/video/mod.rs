@@ -9,7 +9,10 @@ mod process;
 
 use std::path::{Path, PathBuf};
 
-use bansho_base::image::{DisplayImage, DisplayPixels};
+use bansho_base::{
+    color::AlphaConvention,
+    image::{DisplayImage, DisplayPixels},
+};
 
 pub(crate) use self::process::VideoFilm;
 use crate::{flatten, naming::OutputKind};
@@ -46,6 +49,7 @@ pub(crate) struct VideoFormat {
     pub(crate) size: [usize; 2],
     pub(crate) fps: [u32; 2],
     pub(crate) opaque: bool,
+    pub(crate) alpha: AlphaConvention,
     pub(crate) sixteen_bits: bool,
     pub(crate) options: VideoOptions,
 }

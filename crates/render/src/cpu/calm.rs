@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    color::View,
+    color::{AlphaConvention, View},
     observer::{Cancelled, Unobserved},
 };
 
@@ -79,7 +79,7 @@ fn picture(shot: &mut CpuShot, number: i64) -> Result<Vec<f64>, RenderError> {
     shot.advance(number, &Unobserved)?;
     shot.draw(&Unobserved)?;
     let frame = shot.read().ok_or(Cancelled)?;
-    let codes = display::codes::<u16>(&frame, &View::DISPLAY).into_iter();
+    let codes = display::codes::<u16>(&frame, &View::DISPLAY, AlphaConvention::Linear).into_iter();
     Ok(codes
         .flat_map(|[r, g, b, alpha]| [r, g, b].map(|code| f64::from(code) * f64::from(alpha) * CODE * CODE))
         .collect())

@@ -3,7 +3,7 @@
 use std::{path::Path, sync::Arc};
 
 use bansho::{
-    Assets, Backend, BitDepth, CpuBackend, DisplayImage, Observer, Plan, RenderError, Shot, View,
+    AlphaConvention, Assets, Backend, BitDepth, CpuBackend, DisplayImage, Observer, Plan, RenderError, Shot, View,
     base::image::{DisplayPixels, Frame},
     display,
     media::{
@@ -219,7 +219,7 @@ fn fitted(size: [usize; 2], within: [usize; 2]) -> [usize; 2] {
 /// The frame over black: premultiplied light over black is the light itself.
 fn shown(frame: &mut Frame) -> Vec<[u8; 4]> {
     let opaque = std::mem::replace(&mut frame.opaque, true);
-    let DisplayImage { pixels, .. } = display(frame, &View::DISPLAY, BitDepth::Eight);
+    let DisplayImage { pixels, .. } = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
     frame.opaque = opaque;
     match pixels {
         DisplayPixels::Eight(pixels) => pixels,
@@ -229,7 +229,7 @@ fn shown(frame: &mut Frame) -> Vec<[u8; 4]> {
 
 /// The frame as `bansho render` writes it unless it is told otherwise.
 fn encoded(frame: &Frame) -> Result<Vec<u8>, MediaError> {
-    let shown = display(frame, &View::DISPLAY, BitDepth::Eight);
+    let shown = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
     png::encode(&shown, &frame.header.fingerprint, PngEffort::default(), Path::new("still.png"))
 }
 

@@ -4,7 +4,7 @@ use std::{
 };
 
 use bansho::{
-    Assets, Backend, BitDepth, CpuBackend, MemoryAssets, Plan, PlanOptions, Unobserved, View,
+    AlphaConvention, Assets, Backend, BitDepth, CpuBackend, MemoryAssets, Plan, PlanOptions, Unobserved, View,
     base::{
         assets::{AssetError, Picture as Plate},
         drawing::Drawing,
@@ -62,7 +62,7 @@ fn rendered_with_alpha(text: &str, number: i64, opaque: bool) -> Vec<[u8; 4]> {
     let mut shot = CpuBackend.open(Arc::new(plan)).unwrap();
     let mut frame = bansho::draw(shot.as_mut(), number, &Unobserved).unwrap();
     frame.opaque = opaque;
-    match display(&frame, &View::DISPLAY, BitDepth::Eight).pixels {
+    match display(&frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded).pixels {
         DisplayPixels::Eight(pixels) => pixels,
         DisplayPixels::Sixteen(_) => unreachable!("eight bits were asked for"),
     }

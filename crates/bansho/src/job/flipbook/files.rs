@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bansho_base::{
-    color::View,
+    color::{AlphaConvention, View},
     image::{DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Rect},
     observer::{Observer, Stage, StageGuard, check},
 };
@@ -32,6 +32,8 @@ pub(super) struct Files {
     pub(super) kind: OutputKind,
     pub(super) view: View,
     pub(super) bits: BitDepth,
+    /// What the straight alpha of PNG sheets is made for.
+    pub(super) alpha: AlphaConvention,
 }
 
 impl Files {
@@ -61,7 +63,7 @@ impl Files {
             return Colour::Linear(frame.beauty.clone());
         }
         let _stage = StageGuard::begin(observer, Stage::View);
-        Colour::Shown(display(frame, &self.view, self.bits))
+        Colour::Shown(display(frame, &self.view, self.bits, self.alpha))
     }
 
     /// Lays out the tiles and writes every file.
@@ -121,6 +123,7 @@ impl Files {
             width: tile.motion.width(),
             height: tile.motion.height(),
             opaque: true,
+            alpha: self.alpha,
             pixels: DisplayPixels::Sixteen(
                 tile.motion.pixels().iter().map(|&motion| motion::coded(motion, scale)).collect(),
             ),
@@ -147,10 +150,16 @@ impl Files {
                     "file": name(&self.sheet_path("colour")),
                     "space": "ACEScg",
                     "alpha": "premultiplied",
+                    "alpha_convention": "linear",
                     "exposure_ev100": plan.exposure_ev100,
                 })
             }
-            false => json!({ "file": name(&self.sheet_path("colour")), "space": "sRGB", "alpha": "straight" }),
+            false => json!({
+                "file": name(&self.sheet_path("colour")),
+                "space": "sRGB",
+                "alpha": "straight",
+                "alpha_convention": self.alpha.name(),
+            }),
         };
         let mut description = json!({
             "format": 1,
@@ -166,9 +175,41 @@ impl Files {
         if !self.is_linear() {
             description["alpha"] = json!({ "file": name(&self.sheet_path("alpha")), "space": "linear" });
         }
+        description["blend"] = self.blend();
         description["motion"] = self.motion(scale);
         description["frames"] = numbers.iter().enumerate().map(frame).collect();
         description
+    }
+
+    /// How an engine draws the color sheet: covering what is behind, or adding light to it.
+    fn blend(&self) -> Value {
+        if self.is_linear() {
+            return json!({
+                "blended_values": "linear",
+                "mode": "premultiplied alpha",
+                "factors": ["one", "one_minus_source_alpha"],
+                "additive": { "mode": "additive", "factors": ["one", "one"] },
+            });
+        }
+        let (values, sampled) = match self.alpha {
+            AlphaConvention::Linear => {
+                ("linear", "sRGB texture, decoded when it is sampled; the target is linear or an sRGB render target")
+            }
+            AlphaConvention::Encoded => {
+                ("sRGB-encoded", "texture without sRGB decoding; the target is not decoded either")
+            }
+        };
+        json!({
+            "blended_values": values,
+            "sampling": sampled,
+            "mode": "straight alpha",
+            "factors": ["source_alpha", "one_minus_source_alpha"],
+            "additive": {
+                "mode": "additive, color times alpha",
+                "factors": ["source_alpha", "one"],
+                "meaning": "adds the light and hides nothing: right for flames and auroras without smoke",
+            },
+        })
     }
 
     fn motion(&self, scale: f32) -> Value {

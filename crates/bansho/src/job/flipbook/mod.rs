@@ -6,7 +6,7 @@ mod motion;
 
 use std::{path::PathBuf, sync::Arc};
 
-use bansho_base::color::View;
+use bansho_base::color::{AlphaConvention, View};
 use bansho_media::{
     flipbook::Sheet,
     naming::{OutputKind, OutputPattern},
@@ -29,7 +29,7 @@ use super::{
 
 /// A flipbook that is wanted. Begin with [`Flipbook::new`].
 ///
-/// PNG: colour in sRGB with straight alpha; alpha again, as grey, for engines that want it apart; motion in pixels to
+/// PNG: color in sRGB with straight alpha; alpha again, as grey, for engines that want it apart; motion in pixels to
 /// the next frame, in 16 bits around a middle that means none. EXR: colour scene-linear with premultiplied alpha; motion in
 /// pixels as it is.
 #[derive(Clone, Debug)]
@@ -50,6 +50,9 @@ pub struct Flipbook {
     pub view: View,
     /// Bits of each channel of PNG sheets, but for motion.
     pub bits: BitDepth,
+    /// What the straight alpha of PNG sheets is made for; left out it is [`AlphaConvention::Linear`], since engines blend sprites in linear
+    /// light.
+    pub alpha: Option<AlphaConvention>,
     /// Where it goes: `DIR/NAME.png` stands for `NAME_colour.png` and so on; `out/STEM/STEM.png` when left out.
     pub out: Option<PathBuf>,
     /// What draws.
@@ -78,6 +81,7 @@ impl Flipbook {
             loop_s: None,
             view: View::DISPLAY,
             bits: BitDepth::Eight,
+            alpha: None,
             out: None,
             backend: BackendChoice::Auto,
         }
@@ -135,7 +139,9 @@ impl Flipbook {
         if !matches!(pattern.kind(), OutputKind::Png | OutputKind::Exr) || pattern.is_numbered() {
             return Err(Conflict::Sheet { path, allowed: "NAME.png or NAME.exr" }.into());
         }
-        let files = Files { base: path.with_extension(""), kind: pattern.kind(), view: self.view, bits: self.bits };
+        let alpha = prepare::alpha_convention(self.alpha, self.view, AlphaConvention::Linear)?;
+        let base = path.with_extension("");
+        let files = Files { base, kind: pattern.kind(), view: self.view, bits: self.bits, alpha };
         files.paths().iter().try_for_each(|path| output::check_writable(path))?;
         Ok(files)
     }
