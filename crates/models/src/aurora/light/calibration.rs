@@ -291,7 +291,7 @@ mod tests {
     #[test]
     fn the_page_prints_what_comes_of_it() {
         let table = Emission::new(atmosphere(), ARC);
-        let rows = table_of_page("### What comes of it");
+        let rows = table_of_page("### Heights, brightness and ratios by energy");
         assert_eq!(rows.len(), 5);
         for row in &rows {
             let energy_kev = row[0].trim_end_matches(" keV").parse().unwrap();
