@@ -36,7 +36,9 @@ crate::choice! {
 }
 
 crate::parameters! {
-    /// The sky behind everything. It lights the scene; where there is a plate, the plate is seen in its place.
+    /// The sky behind everything. It lights the scene; where there is a plate, the plate is seen in its place. A scene that states neither a
+    /// sky nor a light has one all the same where all its phenomena are of one kind that needs it: auroras stand in a night, rain falls at dusk. Such
+    /// a sky is seen too, unless the picture shall be transparent; one that is stated is always opaque.
     pub struct SkyParameters {
         /// How its luminance is spread.
         kind: SkyKind = SkyKind::Overcast;

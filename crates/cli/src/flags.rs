@@ -59,6 +59,7 @@ fn of_streaks(fault: &StreaksFault) -> Option<&'static str> {
 fn of_note(note: &Note) -> Option<&'static str> {
     Some(match note {
         Note::BitsUnused { .. } => "--bits",
+        Note::TransparentUnused => "--transparent",
         Note::AlphaUnused => "--alpha",
         Note::ViewUnused => "--view",
         Note::ResumeUnused { .. } | Note::ResumeSheet => "--resume",

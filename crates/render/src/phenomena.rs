@@ -36,6 +36,8 @@ fn opening_fault(key: impl Into<String>, fault: impl Error + Send + Sync + 'stat
 
 impl Describe for FlameSheetParameters {
     const KEY: &'static str = "flame_sheet";
+    // From where the flame nearly fills the height of the picture.
+    const SETTING: &'static str = "camera = { position = [0.0, 0.76, 2.75], target = [0.0, 0.76, 0.0] }\n";
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match FlameSheet::new(self.clone(), opening.name, opening.seed, opening.loop_s) {
@@ -48,7 +50,7 @@ impl Describe for FlameSheetParameters {
 impl Describe for FlameParticlesParameters {
     const KEY: &'static str = "flame_particles";
     const SETTING: &'static str = "\
-        camera = { position = [0.0, 0.55, 4.0], target = [0.0, 0.55, 0.0], vertical_fov_deg = 24.0 }\n\
+        camera = { position = [0.0, 0.82, 3.5], target = [0.0, 0.82, 0.0] }\n\
         wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";
 
     fn crowd(&self, others: i64) -> Result<i64, OpeningFault> {

@@ -25,6 +25,8 @@ pub struct PlanOptions {
     pub size: Option<[usize; 2]>,
     /// Another seed.
     pub seed: Option<u64>,
+    /// Whether sky, ground and lamps that the scene's text does not state are seen; they light the scene either way.
+    pub implied_backdrop: bool,
     /// Whether the scene's overscan is drawn, which only EXR has room for.
     pub overscan: bool,
     /// Only this part of the picture.
@@ -152,6 +154,9 @@ impl Plan {
         let size = options.size.unwrap_or(scene.picture.size.map(|side| side as usize));
         if !options.overscan {
             scene.picture.overscan = 0;
+        }
+        if !options.implied_backdrop {
+            scene.hide_implied_backdrop();
         }
         let overscan = scene.picture.overscan as usize;
         let loop_s = options.loop_s.map(|seconds| loop_length(seconds, scene.picture.fps)).transpose()?;

@@ -71,6 +71,8 @@ pub struct Job {
     pub seed: Option<u64>,
     /// A seamless loop of about so many seconds.
     pub loop_s: Option<f64>,
+    /// Whether sky, ground and lamps that the scene does not state are left out of the picture, so that it keeps its alpha.
+    pub transparent: bool,
     /// Whether each phenomenon gets a layer of its own (EXR).
     pub layers: bool,
     /// Whether phenomena write temperature, motion and the like (EXR).
@@ -107,6 +109,7 @@ impl Job {
             crop: None,
             seed: None,
             loop_s: None,
+            transparent: false,
             layers: false,
             aovs: false,
             figures: false,

@@ -89,6 +89,11 @@ pub enum Note {
         /// The format.
         kind: OutputKind,
     },
+    /// A picture that cannot be transparent.
+    #[error(
+        "the picture is not transparent: the scene states what is behind its phenomena, a plate, a sky or a ground"
+    )]
+    TransparentUnused,
     /// A convention of alpha where there is none.
     #[error("the alpha convention has no effect: the pictures have no straight alpha")]
     AlphaUnused,

@@ -79,11 +79,12 @@ pub fn check_scene(scene: &SceneFile) -> Result<Plan, JobError> {
     let assets = assets(scene);
     let checked = scene.check(assets.as_ref())?;
     // With its overscan, as EXR is drawn.
-    let widest = PlanOptions { overscan: true, ..PlanOptions::default() };
+    let usual = PlanOptions { implied_backdrop: true, ..PlanOptions::default() };
+    let widest = PlanOptions { overscan: true, ..usual };
     let plan = Plan::new(checked.clone(), &widest, assets.clone())?;
     let frames = (plan.frames().end - plan.frames().start) as usize;
     memory::check(scene, &plan, Wanted { frames, tiles: 0, display: Some(BitDepth::Eight), own_size: false })?;
-    let plan = Plan::new(checked, &PlanOptions::default(), assets)?;
+    let plan = Plan::new(checked, &usual, assets)?;
     plates::check(scene, &plan, &plan.frames().collect::<Vec<_>>())?;
     Ok(plan)
 }
@@ -201,6 +202,7 @@ impl Job {
     fn plan_options(&self, kind: OutputKind) -> PlanOptions {
         PlanOptions {
             size: self.size,
+            implied_backdrop: !self.transparent,
             overscan: kind == OutputKind::Exr,
             seed: self.seed,
             crop: self.crop,
@@ -235,6 +237,10 @@ impl Job {
         let wide = matches!(kind, OutputKind::Png | OutputKind::Apng | OutputKind::Mov | OutputKind::Webm);
         if self.bits == BitDepth::Sixteen && !wide {
             notes.push(Note::BitsUnused { kind });
+        }
+        let scene = job.plan.scene();
+        if self.transparent && (scene.has_plate() || scene.shows_stated_backdrop()) {
+            notes.push(Note::TransparentUnused);
         }
         let has_alpha = wide && !job.plan.scene().has_plate() && job.sheet.is_none();
         if self.alpha.is_some() && !has_alpha {

@@ -48,8 +48,9 @@ pub(crate) struct FlipbookArgs {
     /// Bits of each channel of the colour and alpha sheets.
     #[arg(long, default_value = "8", value_parser = values::bits_parser())]
     bits: BitDepth,
-    /// What straight alpha in .png is made for: engines that blend linear light (Unity, Unreal, Godot and three.js as usually set up), or
-    /// `encoded` values (most user interfaces). [default: linear]
+    /// What straight alpha in .png is made for: engines that blend linear light (Unity, Unreal and Godot in 3-D, as usually
+    /// set up), or
+    /// `encoded` values (most user interfaces, three.js straight to the canvas). [default: linear]
     #[arg(long, value_name = "CONVENTION", value_parser = values::alpha_parser())]
     alpha: Option<AlphaConvention>,
     /// How the light is shown in .png.

@@ -48,6 +48,9 @@ pub(crate) struct RenderArgs {
     /// `--view raw`]
     #[arg(long, value_name = "CONVENTION", value_parser = values::alpha_parser(), help_heading = "Output")]
     alpha: Option<AlphaConvention>,
+    /// Leave sky, ground and lamps out that the scene does not state, so that the picture keeps its alpha; they light it all the same.
+    #[arg(long, help_heading = "Output")]
+    transparent: bool,
     /// Give each phenomenon a layer of its own (.exr).
     #[arg(long, help_heading = "Output")]
     layers: bool,
@@ -113,6 +116,7 @@ impl RenderArgs {
             crop: self.crop,
             seed: self.seed,
             loop_s: self.loop_s,
+            transparent: self.transparent,
             layers: self.layers,
             aovs: self.aovs,
             figures: self.figures,

@@ -1,6 +1,7 @@
 //! The scene file: what it may say, and a checked scene that cannot be invalid.
 
 pub(crate) mod check;
+pub mod defaults;
 pub mod edit;
 pub mod obstacle;
 pub mod operation;
@@ -17,9 +18,8 @@ use std::sync::Arc;
 
 use bansho_base::{
     air::Air,
-    animation::Animated,
     assets::Assets,
-    camera::{CameraParameters, SKY_FOV_DEG},
+    camera::{CameraParameters, Lens},
     parameters::{Parameter, Parameters, Problem, ProblemKind, Reader, Table, TableDescriptor, Value},
     sky::SkyParameters,
     wind::WindParameters,
@@ -27,6 +27,7 @@ use bansho_base::{
 use bansho_models::ground::GroundParameters;
 
 pub use self::{
+    defaults::ImpliedBackdrop,
     obstacle::{ObstacleParameters, ObstacleShape},
     picture::{DepthKind, FrameRate, LightParameters, PictureParameters, PlateParameters},
     place::{Place, Segment},
@@ -117,6 +118,8 @@ pub struct Scene {
     pub obstacles: Vec<ObstacleParameters>,
     /// Phenomena in the order of the file.
     pub instances: Vec<Instance>,
+    /// Which of sky, ground and lights the text does not state.
+    pub implied: ImpliedBackdrop,
 }
 
 impl Scene {
@@ -177,6 +180,12 @@ impl Scene {
     fn read(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) -> Self {
         check::format(root, reader);
         check::root_keys(root, kinds, reader);
+        let (completed, implied) = defaults::complete(root, kinds);
+        Self::read_completed(&completed, kinds, implied, reader).looking_up(root)
+    }
+
+    /// Reads a scene whose defaults that depend on other values are in `root`.
+    fn read_completed(root: &Table, kinds: &[PhenomenonKind], implied: ImpliedBackdrop, reader: &mut Reader) -> Self {
         Self {
             picture: read_shared(root, "picture", reader),
             camera: read_shared(root, "camera", reader),
@@ -188,23 +197,22 @@ impl Scene {
             lights: read_many(root, "light", reader),
             obstacles: read_many(root, "obstacle", reader),
             instances: read_instances(root, kinds, reader),
+            implied,
         }
-        .looking_up(root)
     }
 
-    /// A camera that is not told where to look sees the sky where that is all there is.
+    /// A dome or panorama that is not told where to look sees the sky where that is all there is.
     fn looking_up(mut self, root: &Table) -> Self {
         let told = |key: &str| match root.get("camera").map(|node| &node.value) {
             Some(Value::Table(camera)) => camera.get(key).is_some(),
             _ => false,
         };
-        let all_in_the_sky =
-            !self.instances.is_empty() && self.instances.iter().all(|instance| instance.kind.in_the_sky);
+        let is_perspective = self.camera.lens == Lens::Perspective;
+        let all_in_the_sky = !is_perspective
+            && !self.instances.is_empty()
+            && self.instances.iter().all(|instance| instance.kind.in_the_sky);
         if all_in_the_sky && self.obstacles.is_empty() && !self.has_plate() && !told("position") && !told("target") {
             self.camera.look_up();
-            if !told("vertical_fov_deg") {
-                self.camera.vertical_fov_deg = Animated::from(SKY_FOV_DEG);
-            }
         }
         self
     }
@@ -226,6 +234,25 @@ impl Scene {
         let solids = self.obstacles.iter().filter_map(|obstacle| obstacle.file.as_ref());
         let own = plate.chain(solids).map(|path| path.0.clone());
         own.chain(self.instances.iter().flat_map(|instance| instance.source.assets())).collect()
+    }
+
+    /// Leaves sky, ground and lamps that the text does not state out of the picture; sky and lamps go on to light it.
+    pub(crate) fn hide_implied_backdrop(&mut self) {
+        if let Some(sky) = self.sky.as_mut().filter(|_| self.implied.sky) {
+            sky.visible = false;
+        }
+        if self.implied.ground {
+            self.ground = None;
+        }
+        if self.implied.lights {
+            self.lights.iter_mut().for_each(|light| light.visible = false);
+        }
+    }
+
+    /// Whether a sky or a ground that the text states is seen.
+    pub fn shows_stated_backdrop(&self) -> bool {
+        let sky = self.sky.as_ref().is_some_and(|sky| sky.visible) && !self.implied.sky;
+        sky || self.ground.is_some() && !self.implied.ground
     }
 
     /// Whether phenomena lie over a plate.

@@ -95,7 +95,7 @@ bansho_base::parameters! {
         /// Exposure value at ISO 100, or "auto": chosen once a shot from what the scene holds.
         exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-40.0, 40.0)), unit("EV");
         /// Temperature of the black body whose light is shown as white, as a camera is set: 4000 for a night sky. It changes what is made to
-        /// be looked at; EXR files keep the light and name that white. Without it white is that of the display, D65.
+        /// be looked at; EXR files keep the light and name that white. Left out it is 4000 where the sky is a night's, and else the display's, D65.
         white_balance_k: Option<f64> = None, limits(Range::new(1500.0, 25_000.0)), unit("K");
         /// Seed of everything random.
         seed: i64 = 1, limits(Range::new(0.0, 9.0e15));

@@ -15,6 +15,11 @@ use bansho::{
     },
 };
 
+/// The picture as `bansho render` draws it unless it is told otherwise.
+fn options() -> PlanOptions {
+    PlanOptions { implied_backdrop: true, ..PlanOptions::default() }
+}
+
 /// The plan of the scene `text`. Makes every phenomenon once, which may take a while.
 ///
 /// # Errors
@@ -39,7 +44,7 @@ impl Checker {
         let good = self.good.as_ref().filter(|(own, _)| Arc::ptr_eq(own, assets)).map(|(_, scene)| scene);
         let scene = Scene::parse_after(good, name, text, KINDS, assets.as_ref())?;
         self.good = Some((assets.clone(), scene.clone()));
-        let plan = Plan::new(scene, &PlanOptions::default(), assets.clone());
+        let plan = Plan::new(scene, &options(), assets.clone());
         plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
     }
 
@@ -108,7 +113,7 @@ pub fn recheck(
     let scene = Scene::reparse(name, text, KINDS)?;
     match found {
         Ok(ev100) => {
-            let plan = Plan::exposed(scene, &PlanOptions::default(), assets.clone(), ev100);
+            let plan = Plan::exposed(scene, &options(), assets.clone(), ev100);
             plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
         }
         Err(found) => {
