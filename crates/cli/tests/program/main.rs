@@ -1,5 +1,6 @@
 //! The real program: good and bad input, exit codes, interruptions, files.
 
+mod alpha;
 mod aurora;
 mod bad_input;
 mod commands;
