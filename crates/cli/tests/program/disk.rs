@@ -7,7 +7,9 @@ use std::{
     process::Command,
 };
 
-use crate::support::{FLAME, Folder, Run, decode_png};
+#[cfg(unix)]
+use crate::support::Run;
+use crate::support::{FLAME, Folder, decode_png};
 
 #[test]
 fn a_file_in_the_way_of_a_folder_is_an_error() {
@@ -27,6 +29,7 @@ fn a_folder_in_the_way_of_a_file_is_an_error() {
     assert!(run.stderr.contains("film.gif: is a folder"), "{}", run.stderr);
 }
 
+#[cfg(unix)]
 fn is_root() -> bool {
     let id = Command::new("id").arg("-u").output().unwrap();
     id.stdout == b"0\n"

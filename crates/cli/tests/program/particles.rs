@@ -1,8 +1,6 @@
 //! What is simulated in steps: particles as files, and frames from snapshots.
 
-use std::process::Command;
-
-use crate::support::{Folder, Run};
+use crate::support::Folder;
 
 /// A small particle flame that is soon developed.
 const GAS: &str = "\
@@ -144,6 +142,9 @@ fn a_snapshot_that_is_damaged_or_of_another_scene_is_refused_and_made_anew() {
 #[cfg(target_os = "linux")]
 #[test]
 fn more_particles_than_there_is_memory_for_are_refused_with_the_number_that_would_fit() {
+    use std::process::Command;
+
+    use crate::support::Run;
     let folder = Folder::with_scene(&GAS.replace("particles = 250", "particles = 4000000"));
     assert_eq!(folder.run(&["check", "scene.toml"]).code, Some(0), "3 GiB, which are not filled");
     let program = env!("CARGO_BIN_EXE_bansho");

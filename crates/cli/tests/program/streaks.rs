@@ -1,14 +1,10 @@
 //! Streak textures by themselves: pictures that measure what their index says.
 
-use std::{
-    f64::consts::PI,
-    fs,
-    process::{Command, Stdio},
-};
+use std::{f64::consts::PI, fs};
 
 use serde_json::Value;
 
-use crate::support::{Folder, Run, decode_png, read_exr, wait_until};
+use crate::support::{Folder, Run, decode_png, read_exr};
 
 fn index(folder: &Folder, path: &str) -> Value {
     serde_json::from_slice(&fs::read(folder.path(path)).unwrap()).unwrap()
@@ -172,8 +168,12 @@ fn a_place_that_cannot_be_written_is_an_error() {
     assert_eq!(folder.names(), ["scene.toml"]);
 }
 
+#[cfg(unix)]
 #[test]
 fn a_run_that_is_stopped_leaves_whole_textures_and_no_index_that_lies() {
+    use std::process::{Command, Stdio};
+
+    use crate::support::wait_until;
     let folder = Folder::new();
     folder.succeed(&["streaks", "--rates", "1", "--diameters", "1", "--size", "32"]);
     assert!(folder.path("out/streaks/streaks.json").exists());

@@ -13,6 +13,10 @@ use crate::{atomic::AtomicFile, error::MediaError, ordered::Film};
 /// How much of what `ffmpeg` says is kept.
 const TAIL_BYTES: usize = 4096;
 
+/// Windows' flag of `CreateProcess` for a program that Ctrl-C in the console does not reach.
+#[cfg(windows)]
+const CREATE_NEW_PROCESS_GROUP: u32 = 0x200;
+
 /// A film being made. Dropped before it is finished, `ffmpeg` is stopped and nothing stays behind.
 pub(crate) struct VideoFilm {
     // Fields are dropped in this order: the program must have ended before its file is removed.
@@ -41,6 +45,8 @@ impl VideoFilm {
         // In a group of its own, so that Ctrl-C reaches Bansho alone and the film ends in order.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        #[cfg(windows)]
+        std::os::windows::process::CommandExt::creation_flags(&mut command, CREATE_NEW_PROCESS_GROUP);
         let mut child = command.spawn().map_err(|source| match source.kind() {
             io::ErrorKind::NotFound => {
                 MediaError::NoFfmpeg { path: path.to_path_buf(), program: format.options.program.clone() }
