@@ -62,17 +62,19 @@ const AURORA: &str = "\
 bansho = 1
 
 [picture]
+exposure_ev100 = -6.9
 white_balance_k = 4000.0
 
 [camera]
 position = [0.0, 1.7, 0.0]
-target = [0.0, 36.0, -60.0]
-vertical_fov_deg = 66.0
+target = [0.0, 32.0, -57.0]
+vertical_fov_deg = 62.0
 
 [sky]
 kind = \"night\"
 hills_deg = 2.0
-trees_deg = 1.0
+trees_deg = 1.1
+night = { airglow = 0.3, stars = 0.6, milky_way = 0.5 }
 
 [[aurora]]
 name = \"aurora\"

@@ -214,7 +214,7 @@ bansho_base::parameters! {
         time_lapse: f64 = 1.0, limits(Range::new(0.01, 1e4));
         /// Time that it runs before the shot.
         preroll_s: f64 = 1.5, limits(Range::new(0.0, 60.0)), unit("s");
-        /// The shapes that it takes one after the other; a moving band and an arc where the list is empty.
+        /// The shapes that it takes one after the other; two curtains that wave where the list is empty.
         shapes: Vec<ShapeParameters> = Vec::new(), limits(Length { min: 0, max: 1000, item: () });
         /// How one shape becomes the next.
         motion: MotionParameters = MotionParameters::default();

@@ -5,7 +5,8 @@
 //!
 //! - its camera, where the text states neither `camera.position` nor `camera.target`;
 //! - its sky, where the text states neither a sky nor a light;
-//! - its ground and lights, and the exposure for them, where the text states neither sky, ground nor light.
+//! - its ground and lights where the text states neither sky, ground nor light;
+//! - its exposure where all of its sky, ground and lights are the default.
 //!
 //! None of it holds with a plate or an obstacle, which say themselves where the camera stands and what is behind. Whatever the phenomena,
 //! a night is balanced as a camera is set at night.
@@ -60,17 +61,19 @@ fn imply_setting(completed: &mut Table, root: &Table, kind: &PhenomenonKind) -> 
     let setting = toml::parse(kind.setting).unwrap_or_default();
     let states = |key: &str| root.get(key).is_some();
     let sky = !states("sky") && !states("light");
+    let has = |key: &str| setting.get(key).is_some();
+    let whole = ImpliedBackdrop { sky: has("sky"), ground: has("ground"), lights: has("light") };
     let implied = ImpliedBackdrop {
-        sky: sky && setting.get("sky").is_some(),
-        ground: sky && !states("ground") && setting.get("ground").is_some(),
-        lights: sky && !states("ground") && setting.get("light").is_some(),
+        sky: sky && whole.sky,
+        ground: sky && !states("ground") && whole.ground,
+        lights: sky && !states("ground") && whole.lights,
     };
     for (key, is_implied) in [("sky", implied.sky), ("ground", implied.ground), ("light", implied.lights)] {
         if let Some(Node { value, .. }) = setting.get(key).filter(|_| is_implied) {
             completed.push(key, value.clone());
         }
     }
-    if let Some(exposure) = value_in(&setting, "picture", "exposure_ev100").filter(|_| implied.lights) {
+    if let Some(exposure) = value_in(&setting, "picture", "exposure_ev100").filter(|_| implied == whole) {
         imply(completed, "picture", "exposure_ev100", exposure.clone());
     }
     imply_camera(completed, root, &setting);

@@ -67,7 +67,7 @@ enum Moment {
 }
 
 impl Sequence {
-    /// The sequence of `shapes` on a drawn square of side `extent_km`; a moving band before a quiet arc where there is no shape.
+    /// The sequence of `shapes` on a drawn square of side `extent_km`; two curtains that wave where there is no shape.
     ///
     /// With `loop_s` it repeats after that time, in which all of it passes: round and round if the last shape is the first
     /// again, there and back if not.

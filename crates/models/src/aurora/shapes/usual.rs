@@ -1,22 +1,68 @@
-//! The aurora of a scene that says nothing: a band whose waves deepen and come back.
+//! The aurora of a scene that says nothing: two curtains that wave slowly and come back.
 
-use bansho_base::parameters::Auto;
+use super::{ShapeParameters, SheetParameters};
 
-use super::{Form, ShapeParameters, SheetParameters};
+/// Side of the square on which the curtains below are drawn, km.
+const DRAWN_EXTENT_KM: f64 = 600.0;
 
-/// A band in slow motion, and behind it a quiet arc, on a square of that side.
+/// Strokes from west to east, [east, south] in km: the far curtain, low over the northern horizon, and the near one above it.
+const FIRST: [[[f64; 2]; 8]; 2] = [
+    [
+        [-290., -250.],
+        [-180., -215.],
+        [-90., -190.],
+        [-20., -200.],
+        [40., -225.],
+        [110., -215.],
+        [190., -180.],
+        [290., -190.],
+    ],
+    [
+        [-200., -120.],
+        [-130., -95.],
+        [-60., -88.],
+        [-10., -105.],
+        [50., -120.],
+        [110., -105.],
+        [160., -80.],
+        [215., -85.],
+    ],
+];
+/// The same curtains, their waves farther on and deeper.
+const SECOND: [[[f64; 2]; 8]; 2] = [
+    [
+        [-290., -225.],
+        [-190., -190.],
+        [-110., -205.],
+        [-40., -240.],
+        [30., -225.],
+        [100., -185.],
+        [190., -200.],
+        [290., -220.],
+    ],
+    [
+        [-215., -95.],
+        [-140., -85.],
+        [-75., -110.],
+        [-20., -125.],
+        [45., -100.],
+        [100., -80.],
+        [155., -100.],
+        [210., -115.],
+    ],
+];
+
+/// Two curtains in slow motion on a square of that side.
 pub(super) fn shapes(extent_km: f64) -> Vec<ShapeParameters> {
-    let band = |bend: f64, waves: i64, south: f64| SheetParameters {
-        form: Some(Form::Band),
-        bend_deg: Auto::Set(bend),
-        count: Auto::Set(waves),
-        position_km: [0.0, south * extent_km],
+    let scale = extent_km / DRAWN_EXTENT_KM;
+    let curtain = |stroke: &[[f64; 2]; 8]| SheetParameters {
+        points: Some(stroke.iter().map(|point| point.map(|km| km * scale)).collect()),
         ..SheetParameters::default()
     };
-    let arc = |south: f64| SheetParameters { position_km: [0.0, south * extent_km], ..SheetParameters::default() };
-    let shape =
-        |sheets: Vec<SheetParameters>| ShapeParameters { after_s: Some(20.0), sheets, ..ShapeParameters::default() };
-    let first = shape(vec![band(38.0, 3, 20.0 / 600.0), arc(-140.0 / 600.0)]);
-    let second = shape(vec![band(62.0, 3, 0.0), arc(-165.0 / 600.0)]);
-    vec![ShapeParameters { after_s: None, ..first.clone() }, second, first]
+    let shape = |strokes: &[[[f64; 2]; 8]; 2]| ShapeParameters {
+        after_s: Some(20.0),
+        sheets: strokes.iter().map(curtain).collect(),
+        ..ShapeParameters::default()
+    };
+    vec![ShapeParameters { after_s: None, ..shape(&FIRST) }, shape(&SECOND), shape(&FIRST)]
 }
