@@ -152,7 +152,7 @@ pub enum Precision {
 /// One named plane of floats beside the beauty, as large as the frame's data window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// Name as it stands in an EXR file, such as `torch.temperature_k` or `plate.R`.
+    /// Name with that of its layer, such as `torch.temperature_k` or `plate.R`. An EXR file has `.V` behind one that ends in no component.
     pub name: String,
     /// How it is stored.
     pub precision: Precision,

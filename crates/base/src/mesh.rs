@@ -5,6 +5,9 @@ use glam::DVec3;
 /// Most triangles of a mesh.
 pub const MOST_TRIANGLES: usize = 4_000_000;
 
+/// Most corners of a mesh: as many as that many triangles have which share none.
+pub const MOST_CORNERS: usize = 3 * MOST_TRIANGLES;
+
 /// A surface of triangles, right-handed, y up, m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
@@ -21,6 +24,12 @@ pub enum MeshError {
     /// More than are read.
     #[error("it has {found} triangles; at most {MOST_TRIANGLES} are read")]
     TooManyTriangles {
+        /// How many it has.
+        found: usize,
+    },
+    /// More than are read.
+    #[error("it has {found} corners; at most {MOST_CORNERS} are read")]
+    TooManyCorners {
         /// How many it has.
         found: usize,
     },
@@ -50,6 +59,9 @@ impl Mesh {
     pub fn new(corners: Vec<[f32; 3]>, mut triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         if triangles.len() > MOST_TRIANGLES {
             return Err(MeshError::TooManyTriangles { found: triangles.len() });
+        }
+        if corners.len() > MOST_CORNERS {
+            return Err(MeshError::TooManyCorners { found: corners.len() });
         }
         let near = |corner: &[f32; 3]| corner.iter().all(|value| value.abs() <= 1e6);
         if let Some(corner) = corners.iter().position(|corner| !near(corner)) {

@@ -83,7 +83,7 @@ pub enum MediaError {
         expected: usize,
     },
     /// Two channels of one name, or a name that EXR cannot hold.
-    #[error("{path}: channel name `{name}` is empty, longer than 255 bytes or used twice", path = .path.display())]
+    #[error("{path}: channel name `{name}` has an empty part, is longer than 255 bytes or used twice", path = .path.display())]
     ChannelName {
         /// The file that was to be written.
         path: PathBuf,

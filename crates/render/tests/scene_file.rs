@@ -69,7 +69,7 @@ fn faults_name_their_place_and_what_is_allowed() {
             "bansho = 1\n[[emitter]]\nname = \"a\"\n[[absorber]]\nname = \"a\"\n",
             "test.toml:5:8: absorber.0: the name \"a\" is taken",
         ),
-        ("bansho = 1\n[[emitter]]\nname = 3\n", "name: expected a name of 1 to 100 characters without dots"),
+        ("bansho = 1\n[[emitter]]\nname = 3\n", "name: expected a name of 1 to 63 bytes of text without dots"),
         ("bansho = 1\n[picture]\nfps = nan\n", "test.toml:3:7: picture.fps: NaN is out of range; allowed: 0.1 to 1000"),
         (
             "bansho = 1\n[[light]]\nkind = \"spot\"\ndirection = [0, 0, 0]\n",
@@ -81,7 +81,16 @@ fn faults_name_their_place_and_what_is_allowed() {
         ),
         (
             "bansho = 1\n[[emitter]]\nname = \"a.b\"\n",
-            "cannot be a name, which begins the names of EXR channels; allowed: 1 to 100 characters without dots",
+            "cannot be a name, which begins the names of EXR channels; allowed: 1 to 63 bytes of text without dots",
+        ),
+        (
+            "bansho = 1\n[[emitter]]\nname = \"z\"\n",
+            "test.toml:3:8: emitter.0.name: cannot be a name, since programs that read EXR files take such a layer for the picture itself; \
+             allowed: any but R, G, B, ",
+        ),
+        (
+            "bansho = 1\n[[emitter]]\nname = \"ein Nordlicht über dem Fjord, gesehen vom Ufer gegenüber im Mai\"\n",
+            "is a name of 65 bytes, which programs that read EXR files would cut; allowed: 1 to 63 bytes",
         ),
         ("bansho = 1\n[[absorber]]\nnear = 2\nfar = 1\n", "test.toml:4:7: absorber.0.far: must lie behind `near`"),
         ("bansho = 1\n[plate]\nimage = \"gone.png\"\n", "test.toml:3:9: plate.image: gone.png: no such file"),

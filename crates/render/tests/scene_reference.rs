@@ -85,7 +85,7 @@ fn page() -> String {
 }
 
 /// What every phenomenon has beside its own parameters.
-const COMMON: &str = "| `name` | a string of 1 to 100 characters without dots, none of `plate`, `sky`, `ground`, `lamps` | the kind, numbered from the second on | \
+const COMMON: &str = "| `name` | a string of 1 to 63 bytes without dots, none of `plate`, `sky`, `ground`, `lamps` and of names that EXR readers use themselves, such as `R`, `Z`, `depth` | the kind, numbered from the second on | \
     Unique name of this one; names its layers. |\n\
     | `enabled` | true or false | `true` | Whether it is drawn. |\n";
 

@@ -75,7 +75,7 @@ fn kilorayleighs_and_the_field_come_as_aovs() {
     folder.succeed(&["render", "scene.toml", "--frames", "2", "--aovs", "--out", "f.exr"]);
     let picture = read_exr(&folder.path("f.exr"));
     let values = |ending: &str| {
-        let channel = picture.channels.iter().find(|(name, _)| name.ends_with(ending));
+        let channel = picture.channels.iter().find(|(name, _)| name.ends_with(&format!("{ending}.V")));
         let (_, values) = channel.unwrap_or_else(|| panic!("{ending} is missing"));
         assert!(values.iter().all(|value| value.is_finite()), "{ending}");
         values
@@ -171,7 +171,7 @@ fn a_sheet_at_the_zenith_has_the_kilorayleighs_of_its_column() {
         };
         let expected = 40.0 * 4.0 * (0..LEVELS).map(at).sum::<f64>() * LEVEL_SPACING / PHOTONS_PER_KILORAYLEIGH;
         let (_, values) =
-            picture.channels.iter().find(|(name, _)| name.ends_with(&format!("kilorayleigh_{line}"))).unwrap();
+            picture.channels.iter().find(|(name, _)| name.ends_with(&format!("kilorayleigh_{line}.V"))).unwrap();
         let column = |x: usize| (0..64).map(|y| f64::from(values[64 * y + x])).sum::<f64>() * tangents / expected;
         let mean = |columns: std::ops::Range<usize>| columns.clone().map(column).sum::<f64>() / columns.len() as f64;
         for side in [8..24, 40..56] {

@@ -85,7 +85,7 @@ fn light_makes_radiance_in_proportion_to_opacity() {
     // Light from behind goes straight on: brighter than a white diffuser would be.
     assert!(number(&radiance[1]) > 1.0 / PI, "{radiance}");
     let exr = read_exr(&folder.path("exr/streak_20_1.exr"));
-    let opacity = &exr.channels["opacity"];
+    let opacity = &exr.channels["opacity.V"];
     for (c, name) in ["R", "G", "B"].iter().enumerate() {
         for (value, opacity) in exr.channels[*name].iter().zip(opacity) {
             let expected = number(&radiance[c]) * f64::from(*opacity);

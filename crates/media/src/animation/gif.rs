@@ -15,7 +15,7 @@ use bansho_base::image::{DisplayImage, DisplayPixels};
 use rayon::prelude::*;
 
 use super::{
-    palette::{Ditherer, Histogram, palette},
+    palette::{Ditherer, FrameHistogram, Histogram, palette},
     timing::GifTiming,
 };
 use crate::{
@@ -44,7 +44,7 @@ pub(crate) struct GifFormat {
 }
 
 /// A frame, compressed, and the colours it holds; `None` for one that a fast film leaves out.
-pub(crate) struct GifPiece(Option<(Vec<u8>, Box<Histogram>)>);
+pub(crate) struct GifPiece(Option<(Vec<u8>, FrameHistogram)>);
 
 pub(crate) struct GifFilm {
     file: AtomicFile,
@@ -95,7 +95,7 @@ pub(crate) fn prepare(
     } else {
         flatten::to_eight_bits(&flatten::over_black(picture).pixels)
     };
-    let mut histogram = Box::new(Histogram::new());
+    let mut histogram = FrameHistogram::new();
     pixels.iter().filter(|pixel| pixel[3] == 255).for_each(|&[r, g, b, _]| histogram.count([r, g, b]));
     let picture = DisplayImage {
         width: picture.width,
@@ -114,7 +114,7 @@ impl Film for GifFilm {
         if let Some((bytes, histogram)) = piece {
             self.spool.write_all(&bytes).map_err(|source| MediaError::from_io(self.file.path(), source))?;
             self.spooled.push(Spooled { index: self.received, length: bytes.len() });
-            self.histogram.merge(&histogram);
+            self.histogram.add(&histogram);
         }
         self.received += 1;
         Ok(())

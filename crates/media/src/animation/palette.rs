@@ -10,34 +10,74 @@ use rayon::prelude::*;
 const BITS: usize = 6;
 /// Bins of the histogram.
 const BINS: usize = 1 << (3 * BITS);
+/// Codes of a channel that fall into a bin.
+const BIN_WIDTH: u8 = 1 << (8 - BITS);
 /// Rounds of moving colours to the means of their neighbourhoods.
 const ROUNDS: usize = 3;
 /// How much the eye minds an error in red, green and blue.
 const WEIGHTS: [f32; 3] = [3.0, 4.0, 2.0];
 
-/// How often each colour occurs.
+/// How many colors fall into a bin, and sums of what their channels have beyond the bin's least codes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Bin<N> {
+    count: N,
+    beyond: [N; 3],
+}
+
+impl Bin<u64> {
+    /// The mean of its colors, of which it has one at least, if it is the bin with this index. The middle of the bin would not do: night
+    /// skies have colors of few bins, and would all become darker or brighter.
+    fn mean(&self, index: usize) -> [f32; 3] {
+        std::array::from_fn(|axis| {
+            (f64::from(least_code(index, axis)) + self.beyond[axis] as f64 / self.count as f64) as f32
+        })
+    }
+}
+
+/// How often each color occurs in a frame.
 #[derive(Clone, Debug)]
-pub(crate) struct Histogram(Vec<u64>);
+pub(crate) struct FrameHistogram(Vec<Bin<u32>>);
+
+impl FrameHistogram {
+    pub(crate) fn new() -> Self {
+        Self(vec![Bin::default(); BINS])
+    }
+
+    /// Counts a color.
+    pub(crate) fn count(&mut self, color: [u8; 3]) {
+        let bin = &mut self.0[bin(color)];
+        bin.count = bin.count.saturating_add(1);
+        for (sum, code) in bin.beyond.iter_mut().zip(color) {
+            *sum = sum.saturating_add(u32::from(code % BIN_WIDTH));
+        }
+    }
+}
+
+/// How often each color occurs in a film.
+#[derive(Clone, Debug)]
+pub(crate) struct Histogram(Vec<Bin<u64>>);
 
 impl Histogram {
     pub(crate) fn new() -> Self {
-        Self(vec![0; BINS])
+        Self(vec![Bin::default(); BINS])
     }
 
-    /// Counts a colour.
-    pub(crate) fn count(&mut self, colour: [u8; 3]) {
-        self.0[bin(colour)] += 1;
-    }
-
-    /// Adds the counts of another histogram.
-    pub(crate) fn merge(&mut self, other: &Self) {
-        self.0.iter_mut().zip(&other.0).for_each(|(sum, count)| *sum += count);
+    /// Adds the colors of a frame.
+    pub(crate) fn add(&mut self, frame: &FrameHistogram) {
+        for (sum, bin) in self.0.iter_mut().zip(&frame.0).filter(|(_, bin)| bin.count > 0) {
+            sum.count += u64::from(bin.count);
+            (0..3).for_each(|axis| sum.beyond[axis] += u64::from(bin.beyond[axis]));
+        }
     }
 
     fn colours(&self) -> Vec<Weighted> {
-        let occupied = self.0.iter().enumerate().filter(|(_, count)| **count > 0);
+        let occupied = self.0.iter().enumerate().filter(|(_, bin)| bin.count > 0);
         // By the root of their number: a bright core of few pixels must not lose to the many of the glow around it.
-        occupied.map(|(bin, &count)| Weighted { colour: centre(bin), weight: (count as f64).sqrt() as f32 }).collect()
+        let weighted = |(index, bin): (usize, &Bin<u64>)| Weighted {
+            colour: bin.mean(index),
+            weight: (bin.count as f64).sqrt() as f32,
+        };
+        occupied.map(weighted).collect()
     }
 }
 
@@ -46,12 +86,9 @@ fn bin([r, g, b]: [u8; 3]) -> usize {
     (part(r) << (2 * BITS)) | (part(g) << BITS) | part(b)
 }
 
-/// The colour in the middle of a bin; black and full are kept exactly.
-fn centre(bin: usize) -> [f32; 3] {
-    [2, 1, 0].map(|channel| {
-        let level = (bin >> (channel * BITS)) & ((1 << BITS) - 1);
-        level as f32 * (255.0 / ((1 << BITS) - 1) as f32)
-    })
+/// The least code of a channel in the bin with this index.
+fn least_code(index: usize, axis: usize) -> u8 {
+    (((index >> ((2 - axis) * BITS)) & ((1 << BITS) - 1)) << (8 - BITS)) as u8
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -153,19 +190,40 @@ struct Pair {
 /// Turns colours into palette entries, dithered by an ordered pattern that stands still from frame to frame.
 pub(crate) struct Ditherer {
     entries: Vec<[f32; 3]>,
-    pairs: Vec<Pair>,
+    /// For the eight octants of each bin: a pair for a whole bin would show the bins of dark skies as bands.
+    pairs: Vec<[Pair; 8]>,
+}
+
+/// Which of its bin's halves a color lies in along each axis.
+fn octant(color: [u8; 3]) -> usize {
+    color.into_iter().fold(0, |octant, code| (octant << 1) | usize::from(code % BIN_WIDTH >= BIN_WIDTH / 2))
+}
+
+/// The color in the middle of an octant of the bin with this index.
+fn middle(index: usize, octant: usize) -> [f32; 3] {
+    let half = BIN_WIDTH / 2;
+    std::array::from_fn(|axis| {
+        let upper = (octant >> (2 - axis)) as u8 & 1;
+        f32::from(least_code(index, axis) + upper * half) + 0.5 * f32::from(half - 1)
+    })
 }
 
 /// How much a pair of unlike colours is worse than one of like colours with the same mean: dots must not stand out.
 const DOT_PENALTY: f32 = 0.15;
+/// How far colors of an octant lie from its middle, as the root of [`distance`] measures it.
+const OCTANT_RADIUS: f32 = 1.5;
 
 impl Ditherer {
     /// Finds for every colour that was counted the pair to mix it from. `palette` has 1 to 256 entries.
     pub(crate) fn new(palette: &[[u8; 3]], histogram: &Histogram) -> Self {
         let entries: Vec<[f32; 3]> = palette.iter().take(256).map(|colour| colour.map(f32::from)).collect();
         let counts = histogram.0.par_iter().enumerate().with_min_len(1024);
-        let pair_of =
-            |(bin, &count): (usize, &u64)| if count > 0 { pair(centre(bin), &entries) } else { Pair::default() };
+        let pair_of = |(index, bin): (usize, &Bin<u64>)| {
+            if bin.count == 0 {
+                return [Pair::default(); 8];
+            }
+            std::array::from_fn(|octant| pair(middle(index, octant), &entries))
+        };
         let pairs = counts.map(pair_of).collect();
         Self { entries, pairs }
     }
@@ -173,7 +231,7 @@ impl Ditherer {
     /// The entry for `colour` at column `x`, row `y`.
     #[inline]
     pub(crate) fn index(&self, colour: [u8; 3], x: usize, y: usize) -> u8 {
-        let Pair { near, far } = self.pairs[bin(colour)];
+        let Pair { near, far } = self.pairs[bin(colour)][octant(colour)];
         let share = share(colour.map(f32::from), self.entries[usize::from(near)], self.entries[usize::from(far)]);
         if share > BAYER[y & 7][x & 7] { far } else { near }
     }
@@ -190,13 +248,18 @@ fn share(colour: [f32; 3], near: [f32; 3], far: [f32; 3]) -> f32 {
     if length > 0.0 { (along / length).clamp(0.0, 1.0) } else { 0.0 }
 }
 
+/// The pair for the colors of an octant, of which `colour` is the middle.
 fn pair(colour: [f32; 3], entries: &[[f32; 3]]) -> Pair {
     let near = nearest(colour, entries);
     let (start, mut best) = (entries[near], (near, f32::INFINITY));
     for (far, &end) in entries.iter().enumerate().filter(|(far, _)| *far != near) {
         let t = share(colour, start, end);
         let mixed = std::array::from_fn(|axis| (end[axis] - start[axis]).mul_add(t, start[axis]));
-        let error = distance(colour, mixed) + DOT_PENALTY * t * (1.0 - t) * distance(start, end);
+        let length = distance(start, end);
+        // Were the middle itself an entry, any other would do beside it, also the brightest; but other colors of the octant lie beside the
+        // middle, and would get dots of that.
+        let dots = (t + OCTANT_RADIUS / length.sqrt().max(1.0)).min(0.5);
+        let error = distance(colour, mixed) + DOT_PENALTY * dots * (1.0 - dots) * length;
         if error < best.1 {
             best = (far, error);
         }
@@ -229,11 +292,60 @@ mod tests {
     use super::*;
 
     fn counted(colours: &[([u8; 3], usize)]) -> Histogram {
-        let mut histogram = Histogram::new();
+        let (mut frame, mut histogram) = (FrameHistogram::new(), Histogram::new());
         for (colour, times) in colours {
-            (0..*times).for_each(|_| histogram.count(*colour));
+            (0..*times).for_each(|_| frame.count(*colour));
         }
+        histogram.add(&frame);
         histogram
+    }
+
+    /// A number from 0 to 1 that looks like chance (H. Mueller's integer hash).
+    fn noise(number: usize) -> f32 {
+        let mut bits = number as u32;
+        for _ in 0..2 {
+            bits = (bits ^ (bits >> 16)).wrapping_mul(0x045d_9f3b);
+        }
+        (bits ^ (bits >> 16)) as f32 / 4_294_967_296.0
+    }
+
+    /// A night sky, dithered to 8 bits, with a faint glow, a bright band and stars.
+    fn night_sky([width, height]: [usize; 2]) -> Vec<[u8; 3]> {
+        let bell = |x: f32| 1.0 / ((1.0 + x * x) * (1.0 + x * x));
+        let pixel = |index: usize| {
+            let (u, v) = ((index % width) as f32 / width as f32, (index / width) as f32 / height as f32);
+            let faint = 26.0 * bell((u - 0.3) / 0.4) * bell((v - 0.55) / 0.4);
+            let band = 225.0 * bell((v - 0.35) / 0.06) * bell((u - 0.72) / 0.2);
+            let star = if noise(index + 1_000_000) > 0.9997 { 180.0 * noise(index + 2_000_000) } else { 0.0 };
+            let sky = [2.0 + 6.0 * v, 4.0 + 9.0 * v, 10.0 + 18.0 * v];
+            let light = [0.25 * (faint + band), faint + band, 0.5 * (faint + band)];
+            std::array::from_fn(|axis| (sky[axis] + light[axis] + star + noise(index + 1)) as u8)
+        };
+        (0..width * height).map(pixel).collect()
+    }
+
+    #[test]
+    fn dark_skies_are_dithered_without_bright_specks() {
+        let size = [320, 180];
+        let sky = night_sky(size);
+        let histogram = counted(&sky.iter().map(|&color| (color, 1)).collect::<Vec<_>>());
+        let entries = palette(&histogram, 256);
+        let ditherer = Ditherer::new(&entries, &histogram);
+        let luminance = |color: [u8; 3]| {
+            let [r, g, b] = color.map(f32::from);
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        let (mut worst, mut dark) = (0.0_f32, 0);
+        // Mean errors of squares of 8 by 8 pixels, in which every threshold comes once.
+        let mut squares = vec![0.0_f32; (size[0] / 8) * size[1].div_ceil(8)];
+        for (index, &color) in sky.iter().enumerate().filter(|(_, color)| luminance(**color) < 60.0) {
+            let (x, y) = (index % size[0], index / size[0]);
+            let error = luminance(entries[usize::from(ditherer.index(color, x, y))]) - luminance(color);
+            squares[(y / 8) * (size[0] / 8) + x / 8] += error / 64.0;
+            (worst, dark) = (worst.max(error.abs()), dark + 1);
+        }
+        let mean = squares.iter().map(|error| error.abs()).sum::<f32>() / squares.len() as f32;
+        assert!(dark > 40_000 && worst < 5.0 && mean < 0.3, "off by up to {worst}, {mean} in a square's mean");
     }
 
     #[test]

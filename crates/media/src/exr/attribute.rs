@@ -1,6 +1,8 @@
 //! The attributes of an OpenEXR header, as bytes ("OpenEXR File Layout": name, type, size, value; little-endian).
 
-use super::{KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_FISHEYE_FOV, KEY_LENS, KEY_VERSION, plane::Plane};
+use super::{
+    KEY_COLOR_SPACE, KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_FISHEYE_FOV, KEY_LENS, KEY_VERSION, plane::Plane,
+};
 use crate::stamp;
 use bansho_base::{
     color::white_balance::chromaticity,
@@ -9,6 +11,9 @@ use bansho_base::{
 
 /// CIE xy of the ACEScg (AP1) red, green and blue and of its white, D60 (SMPTE ST 2065-4, S-2014-004).
 pub(crate) const AP1: [[f32; 2]; 4] = [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]];
+
+/// ACEScg as the Color Interop Forum calls it, for readers that look at no chromaticities, such as Blender.
+const COLOR_SPACE: &str = "lin_ap1_scene";
 
 /// First bytes of every file.
 pub(crate) const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
@@ -41,6 +46,7 @@ pub(crate) fn header(frame: &FrameHeader, planes: &[Plane<'_>], data: Window, di
     bytes.floats("screenWindowCenter", "v2f", &[0.0; 2]);
     bytes.floats("screenWindowWidth", "float", &[1.0]);
     bytes.floats("chromaticities", "chromaticities", AP1.as_flattened());
+    bytes.attribute(KEY_COLOR_SPACE, "string", COLOR_SPACE.as_bytes());
     let white = frame.white_balance_k.map(|kelvin| chromaticity(f64::from(kelvin)).map(|value| value as f32));
     bytes.floats("adoptedNeutral", "v2f", &white.unwrap_or(AP1[3]));
     let [frames, seconds] = frame.fps;

@@ -32,7 +32,8 @@ const LINES_PER_BLOCK: usize = 16;
 const SIDE_LIMIT: usize = 1 << 20;
 
 /// The bytes of an OpenEXR file of `frame`: beauty as half `R,G,B,A`, depth as float `Z`, and every layer and AOV under
-/// its own name. Colours are ACEScg, premultiplied. Compressed in parallel in the caller's thread pool; the same frame
+/// its own name; a name that ends in no component (`torch.temperature_k`) gets `.V`, without which readers lose the channel.
+/// Colours are ACEScg, premultiplied. Compressed in parallel in the caller's thread pool; the same frame
 /// gives the same bytes whatever the number of threads. Colours beyond the range of half are written as 65504.
 ///
 /// # Errors
@@ -64,9 +65,9 @@ pub fn encode(frame: &Frame, path: &Path) -> Result<Vec<u8>, MediaError> {
 fn check_planes(frame: &Frame, planes: &[Plane<'_>], path: &Path) -> Result<(), MediaError> {
     let expected = frame.beauty.width() * frame.beauty.height();
     for (index, plane) in planes.iter().enumerate() {
-        let name = plane.name;
+        let name = &*plane.name;
         let twice = index > 0 && planes[index - 1].name == name;
-        if name.is_empty() || name.len() > 255 || name.contains('\0') || twice {
+        if name.split('.').any(str::is_empty) || name.len() > 255 || name.contains('\0') || twice {
             return Err(MediaError::ChannelName { path: path.to_path_buf(), name: name.to_owned() });
         }
         if plane.len() != expected {
@@ -138,7 +139,7 @@ fn crate_header(planes: &[Plane<'_>], width: usize, height: usize) -> Header {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::camera::Lens;
+    use bansho_base::{camera::Lens, image::Channel};
 
     use super::*;
     use crate::testing;
@@ -162,10 +163,21 @@ mod tests {
             frame.channels[0].name = name.to_owned();
             encode(&frame, path)
         };
-        for name in ["", "R", "torch.R", "a\0b", &"x".repeat(256)] {
+        for name in [
+            "",
+            ".",
+            "torch.",
+            ".V",
+            "a..V",
+            "R",
+            "torch.R",
+            "a\0b",
+            &"x".repeat(254),
+            &format!("{}.R", "x".repeat(254)),
+        ] {
             assert!(matches!(named(name), Err(MediaError::ChannelName { .. })), "{name}");
         }
-        assert!(named(&"x".repeat(255)).is_ok());
+        assert!(named(&"x".repeat(253)).is_ok() && named(&format!("{}.R", "x".repeat(253))).is_ok());
         let mut frame = testing::frame(4, 4);
         frame.channels[1].values.pop();
         assert!(matches!(encode(&frame, path), Err(MediaError::PlaneLength { got: 15, expected: 16, .. })));
@@ -175,6 +187,21 @@ mod tests {
         frame.header.data_origin = [0, 0];
         frame.header.display_size = [0, 4];
         assert!(matches!(encode(&frame, path), Err(MediaError::Size { .. })));
+    }
+
+    #[test]
+    fn a_quantity_is_the_component_that_readers_look_for() {
+        let mut frame = testing::frame(4, 4);
+        let (quantity, direction) = (frame.channels[0].clone(), "torch.motion.X".to_owned());
+        frame
+            .channels
+            .extend([Channel { name: direction, ..quantity.clone() }, Channel { name: "opacity".into(), ..quantity }]);
+        let names: Vec<_> = planes(&frame).into_iter().map(|plane| plane.name.into_owned()).collect();
+        let layers = ["opacity.V", "torch.R", "torch.motion.X", "torch.temperature_k.V"];
+        assert_eq!(names, [&["A", "B", "G", "R", "Z"][..], &layers].concat());
+        // What is the same in the file is double, however it was called.
+        frame.channels[2].name = "torch.temperature_k.V".into();
+        assert!(matches!(encode(&frame, Path::new("a.exr")), Err(MediaError::ChannelName { .. })));
     }
 
     #[test]

@@ -10,6 +10,8 @@ mod primaries;
 pub(crate) use decode::decode;
 pub use encode::encode;
 
+/// Header attribute (string): the name of the color space ("Color Space Encodings", Color Interop Forum, 2024).
+pub const KEY_COLOR_SPACE: &str = "colorInteropID";
 /// Header attribute (string): fingerprint in hexadecimal digits.
 pub const KEY_FINGERPRINT: &str = "bansho:fingerprint";
 /// Header attribute (string): Bansho's version.

@@ -1,6 +1,6 @@
 //! The planes of a frame in the order in which a file holds them.
 
-use std::ops::Range;
+use std::{borrow::Cow, ops::Range};
 
 use bansho_base::image::{Frame, Precision};
 use half::slice::HalfFloatSliceExt;
@@ -8,9 +8,12 @@ use half::slice::HalfFloatSliceExt;
 /// Greatest finite half: brighter pixels are written as this, since an infinity spoils every later blur.
 const HALF_MAX: f32 = 65504.0;
 
+/// Last parts of channel names that readers know as components of a layer. Blender drops channels that end in anything else.
+const COMPONENTS: [&str; 10] = ["R", "G", "B", "A", "X", "Y", "Z", "U", "V", "W"];
+
 /// One channel of the file.
 pub(crate) struct Plane<'a> {
-    pub(crate) name: &'a str,
+    pub(crate) name: Cow<'a, str>,
     pub(crate) precision: Precision,
     source: Source<'a>,
 }
@@ -24,23 +27,29 @@ enum Source<'a> {
 /// Every plane of `frame`, sorted by name as the format demands.
 pub(crate) fn planes(frame: &Frame) -> Vec<Plane<'_>> {
     let beauty = ["R", "G", "B", "A"].into_iter().enumerate().map(|(component, name)| Plane {
-        name,
+        name: name.into(),
         precision: Precision::Half,
         source: Source::Beauty(frame.beauty.pixels(), component),
     });
     let depth = frame.depth.iter().map(|values| Plane {
-        name: "Z",
+        name: "Z".into(),
         precision: Precision::Single,
         source: Source::Values(values),
     });
     let channels = frame.channels.iter().map(|channel| Plane {
-        name: &channel.name,
+        name: in_file(&channel.name),
         precision: channel.precision,
         source: Source::Values(&channel.values),
     });
     let mut planes: Vec<_> = beauty.chain(depth).chain(channels).collect();
     planes.sort_by(|a, b| a.name.as_bytes().cmp(b.name.as_bytes()));
     planes
+}
+
+/// The name that a channel gets in the file: a plain quantity, `torch.temperature_k`, is the only component, `V`, of its layer.
+fn in_file(name: &str) -> Cow<'_, str> {
+    let is_component = name.rsplit('.').next().is_some_and(|last| COMPONENTS.contains(&last));
+    if is_component { name.into() } else { format!("{name}.V").into() }
 }
 
 impl Plane<'_> {

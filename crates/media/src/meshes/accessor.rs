@@ -1,55 +1,120 @@
 //! Numbers in glTF buffers, every place checked against the bytes that are there.
 
 use bansho_base::assets::AssetProblem;
-use gltf::{
-    Accessor,
-    accessor::{DataType, Dimensions},
-};
 
-use super::damaged;
+use super::{buffers::Buffers, json::Object};
 
-/// The elements of an accessor, each of `N` bytes.
-fn elements<'a, const N: usize>(
-    accessor: &Accessor,
-    buffers: &'a [Vec<u8>],
-) -> Result<impl Iterator<Item = [u8; N]> + use<'a, N>, AssetProblem> {
-    if accessor.sparse().is_some() {
-        return Err(damaged("it has a sparse accessor, which is not read"));
-    }
-    let view = accessor.view().ok_or_else(|| damaged("an accessor has no buffer, perhaps because it is compressed"))?;
-    let buffer = buffers.get(view.buffer().index()).map_or(&[][..], Vec::as_slice);
-    let stride = view.stride().unwrap_or(N).max(1);
-    let start = view.offset().checked_add(accessor.offset());
-    let length = (accessor.count().max(1) - 1).checked_mul(stride).and_then(|length| length.checked_add(N));
-    let bytes = start
-        .zip(length)
-        .and_then(|(start, length)| buffer.get(start..start.checked_add(length)?))
-        .ok_or_else(|| damaged("an accessor reaches beyond its buffer"))?;
-    let element = move |at: usize| bytes.get(at..)?.first_chunk::<N>().copied();
-    Ok((0..accessor.count()).filter_map(move |index| element(index * stride)))
+/// What the elements of an accessor are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Element {
+    /// Three floats of 32 bits.
+    Vector,
+    Whole8,
+    Whole16,
+    Whole32,
 }
 
-/// Vectors of three floats.
-pub(super) fn vectors(accessor: &Accessor, buffers: &[Vec<u8>]) -> Result<Vec<[f32; 3]>, AssetProblem> {
-    if (accessor.data_type(), accessor.dimensions()) != (DataType::F32, Dimensions::Vec3) {
-        return Err(damaged("its positions are not vectors of three floats"));
-    }
-    let vector = |bytes: [u8; 12]| {
-        std::array::from_fn(|axis| {
-            f32::from_le_bytes([bytes[4 * axis], bytes[4 * axis + 1], bytes[4 * axis + 2], bytes[4 * axis + 3]])
+impl Element {
+    fn of(accessor: &Object) -> Result<Option<Self>, AssetProblem> {
+        Ok(match (accessor.needed("componentType")?, accessor.text("type")?) {
+            (5126, Some("VEC3")) => Some(Self::Vector),
+            (5121, Some("SCALAR")) => Some(Self::Whole8),
+            (5123, Some("SCALAR")) => Some(Self::Whole16),
+            (5125, Some("SCALAR")) => Some(Self::Whole32),
+            _ => None,
         })
-    };
-    Ok(elements::<12>(accessor, buffers)?.map(vector).collect())
+    }
+
+    fn bytes(self) -> usize {
+        match self {
+            Self::Vector => 12,
+            Self::Whole8 => 1,
+            Self::Whole16 => 2,
+            Self::Whole32 => 4,
+        }
+    }
 }
 
-/// Whole numbers of 8, 16 or 32 bits.
-pub(super) fn indices(accessor: &Accessor, buffers: &[Vec<u8>]) -> Result<Vec<u32>, AssetProblem> {
-    match (accessor.data_type(), accessor.dimensions()) {
-        (DataType::U8, Dimensions::Scalar) => Ok(elements(accessor, buffers)?.map(|[byte]| u32::from(byte)).collect()),
-        (DataType::U16, Dimensions::Scalar) => {
-            Ok(elements(accessor, buffers)?.map(|bytes| u32::from(u16::from_le_bytes(bytes))).collect())
+/// Elements that lie in a buffer.
+#[derive(Clone, Copy)]
+pub(super) struct Accessor<'b> {
+    /// From the first byte of the first to the last byte of the last.
+    bytes: &'b [u8],
+    stride: usize,
+    pub(super) count: usize,
+    element: Element,
+}
+
+impl<'b> Accessor<'b> {
+    /// The positions that `accessors[index]` says: vectors of three floats.
+    pub(super) fn positions(root: &Object, index: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
+        let accessor = root.item("accessors", index)?;
+        match Element::of(&accessor)? {
+            Some(Element::Vector) => Self::located(root, &accessor, Element::Vector, buffers),
+            _ => Err(accessor.fault("type", "is not that of positions; allowed: VEC3 of componentType 5126, floats")),
         }
-        (DataType::U32, Dimensions::Scalar) => Ok(elements(accessor, buffers)?.map(u32::from_le_bytes).collect()),
-        _ => Err(damaged("its indices are not whole numbers")),
+    }
+
+    /// The indices that `accessors[index]` says: whole numbers of 8, 16 or 32 bits.
+    pub(super) fn indices(root: &Object, index: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
+        let accessor = root.item("accessors", index)?;
+        match Element::of(&accessor)? {
+            Some(element) if element != Element::Vector => Self::located(root, &accessor, element, buffers),
+            _ => {
+                Err(accessor
+                    .fault("type", "is not that of indices; allowed: SCALAR of componentType 5121, 5123 or 5125"))
+            }
+        }
+    }
+
+    fn located(root: &Object, accessor: &Object, element: Element, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
+        if accessor.object("sparse")?.is_some() {
+            return Err(accessor.fault("sparse", "is not read; allowed: accessors without it"));
+        }
+        let view = accessor.index("bufferView", root.list("bufferViews")?.len())?;
+        let view =
+            view.ok_or_else(|| accessor.fault("bufferView", "is missing, perhaps because the mesh is compressed"))?;
+        let view = root.item("bufferViews", view)?;
+        let buffer = view.index("buffer", buffers.len())?.ok_or_else(|| view.fault("buffer", "is missing"))?;
+        let buffer = buffers.get(buffer);
+        let (offset, length) = (view.whole("byteOffset")?.unwrap_or(0), view.needed("byteLength")?);
+        let of_view = offset.checked_add(length).and_then(|end| buffer.get(offset..end));
+        let of_view = of_view.ok_or_else(|| {
+            view.fault("byteLength", format!("reaches beyond its buffer, which has {} bytes", buffer.len()))
+        })?;
+        let stride = view.whole("byteStride")?.unwrap_or(element.bytes()).max(1);
+        let (start, count) = (accessor.whole("byteOffset")?.unwrap_or(0), accessor.needed("count")?);
+        let bytes = (count.max(1) - 1).checked_mul(stride).and_then(|length| length.checked_add(element.bytes()));
+        let end = bytes.and_then(|bytes| start.checked_add(bytes));
+        let bytes = end.and_then(|end| of_view.get(start..end));
+        let bytes = bytes.ok_or_else(|| {
+            accessor.fault("count", format!("reaches beyond its buffer view, which has {} bytes", of_view.len()))
+        })?;
+        Ok(Self { bytes, stride, count, element })
+    }
+
+    fn elements<const N: usize>(self) -> impl Iterator<Item = [u8; N]> + use<'b, N> {
+        let element = move |index: usize| self.bytes.get(index * self.stride..)?.first_chunk::<N>().copied();
+        (0..self.count).filter_map(element)
+    }
+
+    /// Its elements as vectors; none where they are whole numbers.
+    pub(super) fn vectors(self) -> impl Iterator<Item = [f32; 3]> + use<'b> {
+        let vector = |bytes: [u8; 12]| {
+            std::array::from_fn(|axis| {
+                f32::from_le_bytes([bytes[4 * axis], bytes[4 * axis + 1], bytes[4 * axis + 2], bytes[4 * axis + 3]])
+            })
+        };
+        self.elements::<12>().map(vector)
+    }
+
+    /// Its elements as whole numbers; none where they are vectors.
+    pub(super) fn wholes(self) -> Vec<u32> {
+        match self.element {
+            Element::Vector => Vec::new(),
+            Element::Whole8 => self.elements().map(|[byte]| u32::from(byte)).collect(),
+            Element::Whole16 => self.elements().map(|bytes| u32::from(u16::from_le_bytes(bytes))).collect(),
+            Element::Whole32 => self.elements().map(u32::from_le_bytes).collect(),
+        }
     }
 }

@@ -1,151 +1,209 @@
-//! Meshes from glTF files, as `.glb` or as `.gltf` with its buffers inside or beside it.
+//! Meshes from glTF 2.0 files, as `.glb` or as `.gltf` with its buffers inside or beside it.
+//!
+//! [`glb`] takes a binary file apart, [`json`] reads values and says where they stand, [`buffers`] reads each file once, [`nodes`] says which
+//! meshes are shown where. What all of them together would take is counted before the first corner is read.
 
 mod accessor;
 mod base64;
+mod buffers;
+mod glb;
+mod json;
+mod nodes;
+
+use std::collections::BTreeMap;
 
 use bansho_base::{
     assets::AssetProblem,
-    math::{DMat4, DVec3, Mat4},
-    mesh::{MOST_TRIANGLES, Mesh, MeshError},
+    math::{DMat4, DVec3},
+    mesh::{MOST_CORNERS, MOST_TRIANGLES, Mesh, MeshError},
 };
-use gltf::{Document, Gltf, Node, buffer::Source, mesh::Mode};
 
-/// Most nodes that are visited; a file whose nodes contain each other has no end.
-const MOST_NODES: usize = 100_000;
+use self::{accessor::Accessor, buffers::Buffers, glb::Glb, json::Object, nodes::Shown};
 
 fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
 }
 
-/// Reads all triangles of the default scene (of all nodes, where none is the default), each where its node stands.
+/// Reads all triangles of the default scene (of the first, where none is the default; of all nodes, where there is none), each where its
+/// node stands.
 ///
 /// `file` are the bytes of a file whose name ends in `extension`; `beside` gives the bytes of files that it names.
-/// Morph targets, skins and sparse or compressed accessors are not read.
+/// Morph targets, skins, required extensions and sparse or compressed accessors are not read.
 ///
 /// # Errors
-/// Another extension, damage, or no triangles. Never panics.
+/// Another extension, damage, more than is read, or no triangles. Never panics.
 pub fn decode_mesh(
     file: &[u8],
     extension: &str,
     beside: &dyn Fn(&str) -> Result<Vec<u8>, AssetProblem>,
 ) -> Result<Mesh, AssetProblem> {
-    let (json, binary) = match extension.to_ascii_lowercase().as_str() {
-        "glb" => split_glb(file).ok_or_else(|| damaged("it is no binary glTF of version 2"))?,
-        "gltf" => (file, None),
+    let Glb { json, binary } = match extension.to_ascii_lowercase().as_str() {
+        "glb" => glb::split(file)?,
+        "gltf" => Glb { json: file, binary: None },
         _ => return Err(AssetProblem::UnknownMeshKind),
     };
-    let document = parse(json)?;
-    let mut gathering = Gathering { buffers: buffers(&document, binary, beside)?, ..Gathering::default() };
-    let nodes: Vec<Node> = match document.default_scene().or_else(|| document.scenes().next()) {
-        Some(scene) => scene.nodes().collect(),
-        None => document.nodes().collect(),
-    };
-    gathering.walk(nodes)?;
+    let value = json::parse(json)?;
+    let root = Object::root(&value)?;
+    check_demands(&root)?;
+    let shown = nodes::shown(&root)?;
+    let buffers = Buffers::read(&root, binary, beside)?;
+    let mut shapes = BTreeMap::new();
+    for &Shown { mesh, .. } in &shown {
+        if let std::collections::btree_map::Entry::Vacant(entry) = shapes.entry(mesh) {
+            entry.insert(Shape::read(&root, mesh, &buffers)?);
+        }
+    }
+    check_totals(shown.iter().map(|shown| &shapes[&shown.mesh]))?;
+    let mut gathering = Gathering::default();
+    for Shown { mesh, world_from_mesh } in &shown {
+        shapes[mesh].parts.iter().try_for_each(|part| gathering.add(part, world_from_mesh))?;
+    }
     Ok(Mesh::new(gathering.corners, gathering.triangles)?)
 }
 
-/// The document, checked.
-fn parse(json: &[u8]) -> Result<Document, AssetProblem> {
-    let root = Gltf::from_slice_without_validation(json).map_err(damaged)?.document.into_json();
-    // The checks of gltf 1.4.1 themselves panic where an attribute names an accessor that is not there.
-    let mut attributes = root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|part| part.attributes.values());
-    if attributes.any(|index| index.value() >= root.accessors.len()) {
-        return Err(damaged("a primitive names an accessor that is not there"));
+/// What the file says of itself must be what is read here.
+fn check_demands(root: &Object) -> Result<(), AssetProblem> {
+    let asset =
+        root.object("asset")?.ok_or_else(|| root.fault("asset", "is missing; allowed: { \"version\": \"2.0\" }"))?;
+    let version = asset.text("version")?.unwrap_or_default();
+    if !version.starts_with("2.") {
+        return Err(asset.fault("version", format!("is {version:?}; allowed: \"2.0\"")));
     }
-    Document::from_json(root).map_err(damaged)
+    match root.list("extensionsRequired")? {
+        [] => Ok(()),
+        [first, ..] => {
+            Err(root.fault("extensionsRequired", format!("demands {first}; allowed: files that demand no extensions")))
+        }
+    }
 }
 
-/// The JSON of a binary glTF, and its buffer if it has one.
-fn split_glb(file: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
-    let rest = file.strip_prefix(b"glTF\x02\0\0\0")?.get(4..)?;
-    let (json, rest) = chunk(rest, b"JSON")?;
-    Some((json, chunk(rest, b"BIN\0").map(|(binary, _)| binary)))
+/// Refuses more than a mesh may have, before any of it is read.
+fn check_totals<'s>(shapes: impl Iterator<Item = &'s Shape<'s>>) -> Result<(), MeshError> {
+    let (mut triangles, mut corners) = (0_usize, 0_usize);
+    for shape in shapes {
+        triangles = triangles.saturating_add(shape.triangles);
+        corners = corners.saturating_add(shape.corners);
+    }
+    if triangles > MOST_TRIANGLES {
+        return Err(MeshError::TooManyTriangles { found: triangles });
+    }
+    if corners > MOST_CORNERS { Err(MeshError::TooManyCorners { found: corners }) } else { Ok(()) }
 }
 
-fn chunk<'a>(bytes: &'a [u8], kind: &[u8; 4]) -> Option<(&'a [u8], &'a [u8])> {
-    let (length, rest) = bytes.split_first_chunk::<4>()?;
-    rest.strip_prefix(kind)?.split_at_checked(u32::from_le_bytes(*length) as usize)
+/// What a mesh of the file shows.
+struct Shape<'b> {
+    parts: Vec<Part<'b>>,
+    triangles: usize,
+    corners: usize,
 }
 
-fn buffers(
-    document: &Document,
-    binary: Option<&[u8]>,
-    beside: &dyn Fn(&str) -> Result<Vec<u8>, AssetProblem>,
-) -> Result<Vec<Vec<u8>>, AssetProblem> {
-    let read = |buffer: gltf::Buffer| match buffer.source() {
-        Source::Bin => binary.map(<[u8]>::to_vec).ok_or_else(|| damaged("its binary buffer is missing")),
-        Source::Uri(uri) => match uri.strip_prefix("data:") {
-            Some(data) => data
-                .split_once(";base64,")
-                .and_then(|(_, text)| base64::decode(text))
-                .ok_or_else(|| damaged("a buffer inside it is not base64")),
-            None => beside(uri),
-        },
-    };
-    document.buffers().map(read).collect()
+/// A primitive that makes triangles.
+struct Part<'b> {
+    positions: Accessor<'b>,
+    indices: Option<Accessor<'b>>,
+    mode: Mode,
+}
+
+/// How corners follow each other to make triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Triangles,
+    Strip,
+    Fan,
+}
+
+impl Mode {
+    /// That of a primitive; `None` for points and lines.
+    fn of(primitive: &Object) -> Result<Option<Self>, AssetProblem> {
+        match primitive.whole("mode")? {
+            None | Some(4) => Ok(Some(Self::Triangles)),
+            Some(5) => Ok(Some(Self::Strip)),
+            Some(6) => Ok(Some(Self::Fan)),
+            Some(0..=3) => Ok(None),
+            Some(mode) => Err(primitive.fault("mode", format!("is {mode}; allowed: 0 to 6"))),
+        }
+    }
+
+    /// How many triangles so many corners make.
+    fn triangles(self, corners: usize) -> usize {
+        match self {
+            Self::Triangles => corners / 3,
+            Self::Strip | Self::Fan => corners.saturating_sub(2),
+        }
+    }
+}
+
+impl<'b> Shape<'b> {
+    fn read(root: &Object, mesh: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
+        let mut shape = Self { parts: Vec::new(), triangles: 0, corners: 0 };
+        for primitive in root.item("meshes", mesh)?.items("primitives")? {
+            let Some(part) = Part::read(root, &primitive?, buffers)? else { continue };
+            let triangles = part.mode.triangles(part.indices.unwrap_or(part.positions).count);
+            if triangles > 0 {
+                shape.triangles = shape.triangles.saturating_add(triangles);
+                shape.corners = shape.corners.saturating_add(part.positions.count);
+                shape.parts.push(part);
+            }
+        }
+        Ok(shape)
+    }
+}
+
+impl<'b> Part<'b> {
+    /// `None` for points, lines and primitives without positions.
+    fn read(root: &Object, primitive: &Object, buffers: &'b Buffers) -> Result<Option<Self>, AssetProblem> {
+        let accessors = root.list("accessors")?.len();
+        let attributes = primitive.object("attributes")?;
+        let positions = attributes.map(|attributes| attributes.index("POSITION", accessors)).transpose()?.flatten();
+        let (Some(mode), Some(positions)) = (Mode::of(primitive)?, positions) else { return Ok(None) };
+        let positions = Accessor::positions(root, positions, buffers)?;
+        let indices = primitive.index("indices", accessors)?;
+        let indices = indices.map(|indices| Accessor::indices(root, indices, buffers)).transpose()?;
+        Ok(Some(Self { positions, indices, mode }))
+    }
 }
 
 #[derive(Default)]
 struct Gathering {
-    buffers: Vec<Vec<u8>>,
     corners: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
 }
 
 impl Gathering {
-    fn walk(&mut self, roots: Vec<Node>) -> Result<(), AssetProblem> {
-        let mut open: Vec<(Node, DMat4)> = roots.into_iter().map(|node| (node, DMat4::IDENTITY)).collect();
-        let mut visited = 0;
-        while let Some((node, parent)) = open.pop() {
-            visited += 1;
-            if visited > MOST_NODES {
-                return Err(damaged(format!("it has more than {MOST_NODES} nodes, or nodes that contain each other")));
-            }
-            let placed = parent * Mat4::from_cols_array_2d(&node.transform().matrix()).as_dmat4();
-            for primitive in node.mesh().into_iter().flat_map(|mesh| mesh.primitives()) {
-                self.primitive(&primitive, &placed)?;
-            }
-            open.extend(node.children().map(|child| (child, placed)));
-        }
-        Ok(())
-    }
-
-    fn primitive(&mut self, primitive: &gltf::Primitive, placed: &DMat4) -> Result<(), AssetProblem> {
-        let Some(positions) = primitive.get(&gltf::Semantic::Positions) else { return Ok(()) };
-        let positions = accessor::vectors(&positions, &self.buffers)?;
-        let order = match primitive.indices() {
-            Some(indices) => accessor::indices(&indices, &self.buffers)?,
-            None => (0..positions.len() as u32).collect(),
+    /// Adds what a part shows at a place. Its own corners alone may be named.
+    fn add(&mut self, part: &Part, world_from_mesh: &DMat4) -> Result<(), MeshError> {
+        let (first, corners) = (self.corners.len() as u32, part.positions.count);
+        let place = |corner: [f32; 3]| {
+            world_from_mesh.transform_point3(DVec3::from(corner.map(f64::from))).as_vec3().to_array()
         };
-        let triangles = triangles(primitive.mode(), &order);
-        if self.triangles.len() + triangles.len() > MOST_TRIANGLES {
-            return Err(MeshError::TooManyTriangles { found: self.triangles.len() + triangles.len() }.into());
+        self.corners.extend(part.positions.vectors().map(place));
+        let order = part.indices.map_or_else(|| (0..corners as u32).collect(), Accessor::wholes);
+        let triangles = triangles(part.mode, &order);
+        for (triangle, named) in triangles.iter().enumerate() {
+            if let Some(&corner) = named.iter().find(|&&corner| corner as usize >= corners) {
+                return Err(MeshError::NoSuchCorner { triangle, corner, corners });
+            }
         }
-        let corners = self.corners.len() as u32;
-        let place = |corner: [f32; 3]| placed.transform_point3(DVec3::from(corner.map(f64::from))).as_vec3().to_array();
-        self.corners.extend(positions.into_iter().map(place));
-        let moved = |named: [u32; 3]| named.map(|corner| corner.saturating_add(corners));
-        self.triangles.extend(triangles.into_iter().map(moved));
+        self.triangles.extend(triangles.into_iter().map(|named| named.map(|corner| first + corner)));
         Ok(())
     }
 }
 
-/// The triangles that corners in this order make; none for points and lines.
+/// The triangles that corners in this order make.
 fn triangles(mode: Mode, order: &[u32]) -> Vec<[u32; 3]> {
     match mode {
         Mode::Triangles => order.as_chunks::<3>().0.to_vec(),
-        Mode::TriangleStrip => {
+        Mode::Strip => {
             let turn = |(index, corners): (usize, &[u32])| match index % 2 {
                 0 => [corners[0], corners[1], corners[2]],
                 _ => [corners[1], corners[0], corners[2]],
             };
             order.windows(3).enumerate().map(turn).collect()
         }
-        Mode::TriangleFan => {
+        Mode::Fan => {
             let (Some(&hub), rim) = (order.first(), order.get(1..).unwrap_or_default()) else { return Vec::new() };
             rim.windows(2).map(|pair| [hub, pair[0], pair[1]]).collect()
         }
-        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => Vec::new(),
     }
 }
 

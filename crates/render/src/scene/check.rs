@@ -52,34 +52,54 @@ pub(crate) const PLATE_LAYER: &str = "plate";
 /// Names of layers that the scene itself has, which no phenomenon may take.
 const RESERVED_NAMES: [&str; 4] = [PLATE_LAYER, SkyBackdrop::NAME, Ground::NAME, Lamps::NAME];
 
-/// Longest name of a phenomenon; EXR channel names have 255 characters at most.
-const LONGEST_NAME: usize = 100;
+/// Names, in either case, that programs give the channels of the picture itself and layers of their own. A layer `Z` or `RGBA` makes OpenEXR's
+/// Python refuse a file, `Depth` and `Combined` hide the picture's own in Blender, `rgba`, `alpha` and `depth` are the picture's own in Nuke.
+const NAMES_OF_READERS: [&str; 21] = [
+    "R", "G", "B", "A", "X", "Y", "Z", "U", "V", "W", "RY", "BY", "RGB", "RGBA", "XYZ", "Red", "Green", "Blue",
+    "Alpha", "Depth", "Combined",
+];
 
-/// A name becomes the prefix of EXR layers, so it may hold no dot and no control characters.
+/// Longest name of a phenomenon, bytes: Blender cuts the names of layers after as many, without what follows the dot.
+const LONGEST_NAME: usize = 63;
+
+/// A name becomes the name of EXR layers, so it may hold no dot and no control characters, and must be one that readers keep.
 pub(super) fn name(node: &Node, reader: &mut Reader) -> Option<String> {
-    let reserved = RESERVED_NAMES.join(", ");
-    let allowed = format!("1 to {LONGEST_NAME} characters without dots and control characters, and none of {reserved}");
-    match &node.value {
-        Value::Text(name) if is_name(name) => Some(name.clone()),
-        Value::Text(_) => {
-            let told = format!("cannot be a name, which begins the names of EXR channels; allowed: {allowed}");
+    let Value::Text(name) = &node.value else {
+        let expected = format!("a name of {}", allowed_names());
+        reader.report(node, ProblemKind::WrongType { expected, found: node.value.type_name() });
+        return None;
+    };
+    match name_fault(name) {
+        None => Some(name.clone()),
+        Some(told) => {
             reader.report(node, ProblemKind::Conflict(told));
-            None
-        }
-        value => {
-            let expected = format!("a name of {allowed}");
-            reader.report(node, ProblemKind::WrongType { expected, found: value.type_name() });
             None
         }
     }
 }
 
-fn is_name(name: &str) -> bool {
-    !name.trim().is_empty()
-        && !RESERVED_NAMES.contains(&name)
-        && name.chars().count() <= LONGEST_NAME
-        && !name.contains('.')
-        && !name.chars().any(char::is_control)
+fn allowed_names() -> String {
+    let reserved = RESERVED_NAMES.join(", ");
+    format!("1 to {LONGEST_NAME} bytes of text without dots and control characters, and none of {reserved}")
+}
+
+/// Why a phenomenon cannot be called so.
+fn name_fault(name: &str) -> Option<String> {
+    let is_control_or_dot = |character: char| character == '.' || character.is_control();
+    if NAMES_OF_READERS.iter().any(|other| other.eq_ignore_ascii_case(name)) {
+        let others = NAMES_OF_READERS.join(", ");
+        let fault = "cannot be a name, since programs that read EXR files take such a layer for the picture itself";
+        return Some(format!("{fault}; allowed: any but {others}"));
+    }
+    if name.len() > LONGEST_NAME {
+        let fault = format!("is a name of {} bytes, which programs that read EXR files would cut", name.len());
+        return Some(format!("{fault}; allowed: {}", allowed_names()));
+    }
+    if name.trim().is_empty() || RESERVED_NAMES.contains(&name) || name.contains(is_control_or_dot) {
+        let fault = "cannot be a name, which begins the names of EXR channels";
+        return Some(format!("{fault}; allowed: {}", allowed_names()));
+    }
+    None
 }
 
 /// Every asset must be there, and every phenomenon must come to be, unless it is as it was in a `good` scene.

@@ -106,7 +106,7 @@ pub(super) fn describe(
 /// What pixels and numbers mean.
 fn how_to_read(streaks: &Streaks, writer: &Writer) -> Value {
     let pixel = match (streaks.format, streaks.bits) {
-        (StreakFormat::Exr, _) => "opacity = channel `opacity`, and A in half precision".to_owned(),
+        (StreakFormat::Exr, _) => "opacity = channel `opacity.V`, and A in half precision".to_owned(),
         (StreakFormat::Png, bits) => {
             let largest = if bits == BitDepth::Sixteen { 65_535 } else { 255 };
             format!("opacity = code / {largest} * opacity_scale, linear: no gamma")

@@ -1,0 +1,113 @@
+//! The tree of nodes: which meshes a scene shows, and where.
+
+use bansho_base::{
+    assets::AssetProblem,
+    math::{DMat4, DQuat, DVec3},
+};
+
+use super::{damaged, json::Object};
+
+/// Most nodes that are read.
+const MOST_NODES: usize = 100_000;
+
+/// A mesh that a node shows.
+pub(super) struct Shown {
+    pub(super) mesh: usize,
+    pub(super) world_from_mesh: DMat4,
+}
+
+struct Node {
+    mesh: Option<usize>,
+    parent_from_node: DMat4,
+    children: Vec<usize>,
+    parent: Option<usize>,
+}
+
+/// The meshes of the default scene; of the first, where none is the default; of all nodes, where there is none.
+pub(super) fn shown(root: &Object) -> Result<Vec<Shown>, AssetProblem> {
+    let nodes = tree(root)?;
+    let mut shown = Vec::new();
+    let mut open: Vec<(usize, DMat4)> =
+        beginnings(root, &nodes)?.into_iter().map(|node| (node, DMat4::IDENTITY)).collect();
+    // Every node has one parent at most, so that none comes twice.
+    while let Some((index, world_from_parent)) = open.pop() {
+        let node = &nodes[index];
+        let world_from_node = world_from_parent * node.parent_from_node;
+        shown.extend(node.mesh.map(|mesh| Shown { mesh, world_from_mesh: world_from_node }));
+        open.extend(node.children.iter().map(|&child| (child, world_from_node)));
+    }
+    Ok(shown)
+}
+
+/// All nodes, which must make trees: no node is a child twice or lies within itself.
+fn tree(root: &Object) -> Result<Vec<Node>, AssetProblem> {
+    let count = root.list("nodes")?.len();
+    if count > MOST_NODES {
+        return Err(root.fault("nodes", format!("has {count} elements; allowed: up to {MOST_NODES}")));
+    }
+    let meshes = root.list("meshes")?.len();
+    let mut nodes: Vec<Node> =
+        root.items("nodes")?.map(|node| read(&node?, count, meshes)).collect::<Result<_, _>>()?;
+    for index in 0..count {
+        for child in std::mem::take(&mut nodes[index].children) {
+            if let Some(other) = nodes[child].parent.replace(index) {
+                let told =
+                    format!("node {child} is a child of node {other} and again of node {index}; allowed: one parent");
+                return Err(damaged(told));
+            }
+            nodes[index].children.push(child);
+        }
+    }
+    let mut reached: Vec<usize> = (0..count).filter(|&index| nodes[index].parent.is_none()).collect();
+    let mut next = 0;
+    while let Some(&index) = reached.get(next) {
+        reached.extend(&nodes[index].children);
+        next += 1;
+    }
+    if reached.len() < count {
+        return Err(damaged("it has nodes that contain each other; allowed: trees of nodes"));
+    }
+    Ok(nodes)
+}
+
+fn read(node: &Object, nodes: usize, meshes: usize) -> Result<Node, AssetProblem> {
+    let vector = |key, otherwise: f32| {
+        let numbers: Option<[f32; 3]> = node.numbers(key)?;
+        Ok::<_, AssetProblem>(DVec3::from(numbers.unwrap_or([otherwise; 3]).map(f64::from)))
+    };
+    let parent_from_node = match node.numbers::<16>("matrix")? {
+        Some(columns) => DMat4::from_cols_array(&columns.map(f64::from)),
+        None => {
+            let rotation = node.numbers("rotation")?.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+            let rotation = DQuat::from_array(rotation.map(f64::from));
+            DMat4::from_scale_rotation_translation(vector("scale", 1.0)?, rotation, vector("translation", 0.0)?)
+        }
+    };
+    Ok(Node {
+        mesh: node.index("mesh", meshes)?,
+        parent_from_node,
+        children: node.indices("children", nodes)?,
+        parent: None,
+    })
+}
+
+/// The nodes that the scene begins with.
+fn beginnings(root: &Object, nodes: &[Node]) -> Result<Vec<usize>, AssetProblem> {
+    let scenes = root.list("scenes")?.len();
+    let Some(scene) = root.index("scene", scenes)?.or((scenes > 0).then_some(0)) else {
+        return Ok((0..nodes.len()).filter(|&index| nodes[index].parent.is_none()).collect());
+    };
+    let scene = root.item("scenes", scene)?;
+    let beginnings = scene.indices("nodes", nodes.len())?;
+    let mut named = vec![false; nodes.len()];
+    for &index in &beginnings {
+        if let Some(parent) = nodes[index].parent {
+            let told = format!("names {index}, which is a child of node {parent}; allowed: nodes without a parent");
+            return Err(scene.fault("nodes", told));
+        }
+        if std::mem::replace(&mut named[index], true) {
+            return Err(scene.fault("nodes", format!("names {index} twice; allowed: every node once")));
+        }
+    }
+    Ok(beginnings)
+}
