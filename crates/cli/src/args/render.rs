@@ -27,8 +27,7 @@ Examples:
   bansho render fire.toml --set flame_sheet.height=1.2 --set wind.gust=0.5
   bansho render fire.toml --resume                      go on after an interruption
 
-A PNG is exact over black; an EXR is exact over anything.
-Interrupt at any time: whole frames stay, and nothing half-written bears a final name.")]
+A PNG is exact over black; an EXR is exact over anything. Interrupt at any time: whole frames stay, and nothing half-written bears a final name.")]
 pub(crate) struct RenderArgs {
     /// The scene file.
     pub(crate) scene: PathBuf,
