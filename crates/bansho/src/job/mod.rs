@@ -32,6 +32,7 @@ use std::path::PathBuf;
 use bansho_base::{color::View, image::Rect};
 use bansho_render::display::BitDepth;
 
+pub use contact::ContactBackground;
 pub use error::{Cause, Channels, Conflict, JobError, SheetKind};
 pub use flipbook::{Flipbook, FlipbookSummary, PreparedFlipbook};
 pub use observer::{FrameDone, JobObserver, Note, Outline, Spot};
@@ -82,6 +83,8 @@ pub struct Job {
     pub out: Option<PathBuf>,
     /// One picture of so many frames: the first of several `frames`, or consecutive ones from a single frame on.
     pub contact_sheet: Option<usize>,
+    /// What the frames of that picture are laid over.
+    pub contact_background: ContactBackground,
     /// Whether whole frames of this very job that are there already stay.
     pub resume: bool,
     /// Folder of snapshots of what is simulated in steps.
@@ -109,6 +112,7 @@ impl Job {
             bits: BitDepth::Eight,
             out: None,
             contact_sheet: None,
+            contact_background: ContactBackground::Black,
             resume: false,
             snapshots: None,
             snapshot_every: None,

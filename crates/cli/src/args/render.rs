@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bansho::{
     BitDepth, Rect, View,
-    job::{BackendChoice, Job, JobError, SceneFile},
+    job::{BackendChoice, ContactBackground, Job, JobError, SceneFile},
 };
 use clap::Args;
 
@@ -55,6 +55,15 @@ pub(crate) struct RenderArgs {
     /// out/SCENE/SCENE.sheet.png]
     #[arg(long, value_name = "N", help_heading = "Output")]
     contact_sheet: Option<usize>,
+    /// What the frames of a contact sheet are laid over.
+    #[arg(
+        long,
+        default_value = "black",
+        requires = "contact_sheet",
+        value_parser = values::contact_background_parser(),
+        help_heading = "Output"
+    )]
+    contact_background: ContactBackground,
 
     /// Frames: 0-239, 0-239x10 or 0-239:10 (every tenth), 17, -3-5, 1-5,9. Beyond the scene's own frames it goes on as
     /// if it were longer; beyond those of a --loop it repeats. [default: all]
@@ -114,6 +123,7 @@ impl RenderArgs {
             bits: self.bits,
             out: self.out.clone(),
             contact_sheet: self.contact_sheet,
+            contact_background: self.contact_background,
             resume: self.resume,
             snapshots: self.states.snapshots.clone(),
             snapshot_every: self.states.snapshot_every,
