@@ -24,7 +24,7 @@ libfuzzer_sys::fuzz_target!(|text: &str| {
 /// The first line is an assignment to what follows it; what an edit gives is TOML again.
 fn edit(text: &str) {
     if let Some((assignment, scene)) = text.split_once('\n')
-        && let Ok(edited) = edit::set(scene, assignment)
+        && let Ok(edited) = edit::set(scene, assignment, KINDS)
     {
         let again = edit::upgrade(&edited);
         assert!(!matches!(again, Err(EditError::Syntax(_))), "an edit broke the scene's syntax");

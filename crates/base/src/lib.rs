@@ -23,6 +23,7 @@ pub mod once;
 pub mod parameters;
 pub mod phenomenon;
 pub mod placement;
+pub mod plural;
 pub mod point_cloud;
 pub mod random;
 pub mod sky;

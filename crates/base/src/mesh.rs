@@ -34,19 +34,19 @@ pub enum MeshError {
         found: usize,
     },
     /// A triangle names a corner that is not there.
-    #[error("triangle {triangle} names corner {corner} of {corners}")]
+    #[error("triangle {} names corner {}, and there are {corners}", triangle + 1, u64::from(*corner) + 1)]
     NoSuchCorner {
-        /// Which triangle.
+        /// Which triangle, from 0.
         triangle: usize,
-        /// Which corner it names.
+        /// Which corner it names, from 0.
         corner: u32,
         /// How many there are.
         corners: usize,
     },
     /// A coordinate that is not finite or beyond 1e6 m.
-    #[error("corner {corner} lies beyond 1e6 m or nowhere")]
+    #[error("corner {} lies beyond 1e6 m or nowhere", corner + 1)]
     FarCorner {
-        /// Which corner.
+        /// Which corner, from 0.
         corner: usize,
     },
 }

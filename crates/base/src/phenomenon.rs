@@ -74,7 +74,7 @@ pub enum Remark {
     Unlit,
     /// Sheets of an aurora meet on their way from shape to shape.
     #[error(
-        "its sheets pass through each other on the way to shape {shape} (counted from 1); another shape between, `link`, or sheets in \
+        "its sheets pass through each other on the way to shape {shape}; another shape between, `link`, or sheets in \
          another order would keep them apart"
     )]
     Crossing {
@@ -82,7 +82,7 @@ pub enum Remark {
         shape: usize,
     },
     /// A burner that lies within an obstacle.
-    #[error("its burner {burner} (counted from 1) lies within an obstacle, from which its gas cannot come out")]
+    #[error("its burner {burner} lies within an obstacle, from which its gas cannot come out")]
     Buried {
         /// Which of its burners, counted from 1.
         burner: usize,

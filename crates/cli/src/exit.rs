@@ -7,7 +7,11 @@ use bansho::{
     job::{Cause, JobError},
 };
 
-use crate::{command::new::Unknown, flags, interrupt, output::to_stderr};
+use crate::{
+    command::{new::Unknown, studio::SaidWhy},
+    flags, interrupt,
+    output::to_stderr,
+};
 
 /// Failed on the way.
 const FAILED: u8 = 1;
@@ -38,7 +42,7 @@ pub(crate) fn code(error: &anyhow::Error) -> u8 {
 
 /// Tells what went wrong, one `error:` for each fault, and gives the exit code.
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
-    if error.downcast_ref::<Told>().is_none() {
+    if !error.is::<Told>() && !error.is::<SaidWhy>() {
         tell(error);
     }
     ExitCode::from(code(error))

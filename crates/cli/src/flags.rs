@@ -1,11 +1,16 @@
 //! Which flags the library's errors and notes are about: it speaks of what was asked for, only the program knows by which flags.
 
+use std::io;
+
 use bansho::job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksFault};
 
 /// An error as the user of the program reads it.
 pub(crate) fn error(error: &JobError) -> String {
     match error {
         JobError::NoGpu => format!("{error}; allowed: --backend cpu, auto"),
+        JobError::Unreadable { path, source, near: None } if source.kind() == io::ErrorKind::NotFound => {
+            format!("{error}; `bansho new {}` writes a new scene", path.display())
+        }
         JobError::Cancelled => format!("{error}, and --resume goes on from there"),
         JobError::ParticlesCancelled => format!("{error}, and --frames asks for the others"),
         _ => after(of_error(error), &error.to_string()),

@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bansho::Stage;
+use bansho::{Stage, base::plural::counted};
 
 /// Adds up the time of each stage. A stage that begins inside another on the same thread stops the other's clock, so
 /// that nothing is counted twice.
@@ -67,7 +67,13 @@ impl Stats {
             let _ = writeln!(table, "{:8} {seconds:8.3} {:12.2}", stage.name(), 1e3 * seconds / frames.max(1) as f64);
         }
         let _ = writeln!(table, "{:8} {wall:8.3} {:12.2}", "elapsed", 1e3 * wall / frames.max(1) as f64);
-        let _ = write!(table, "{frames} frames, {:.1} a second, {threads} threads", frames as f64 / wall);
+        let _ = write!(
+            table,
+            "{}, {:.1} a second, {}",
+            counted(frames, "frame"),
+            frames as f64 / wall,
+            counted(threads, "thread")
+        );
         if let Some(seconds) = processor_seconds() {
             let _ = write!(table, ", {:.0} % busy", 100.0 * seconds / (wall * threads.max(1) as f64));
         }
@@ -119,5 +125,7 @@ mod tests {
         let table = Stats::new().table(3, 2);
         assert!(Stage::ALL.iter().all(|stage| table.contains(stage.name())), "{table}");
         assert!(table.contains("3 frames") && table.contains("2 threads"), "{table}");
+        let table = Stats::new().table(1, 1);
+        assert!(table.contains("1 frame,") && table.contains("1 thread") && !table.contains("1 threads"), "{table}");
     }
 }

@@ -2,6 +2,8 @@
 
 use std::{io, path::PathBuf};
 
+use bansho_base::plural::counted;
+
 use crate::naming::NamingError;
 
 /// Why a picture or a film could not be written.
@@ -71,7 +73,7 @@ pub enum MediaError {
         allowed: SizeRule,
     },
     /// The number of pixels is not width times height, or a channel is longer or shorter than the picture.
-    #[error("{path}: `{plane}` has {got} values where the picture has {expected} pixels", path = .path.display())]
+    #[error("{path}: `{plane}` has {} where the picture has {}", counted(*.got, "value"), counted(*.expected, "pixel"), path = .path.display())]
     PlaneLength {
         /// The file that was to be written.
         path: PathBuf,
@@ -114,7 +116,7 @@ pub enum MediaError {
         window: usize,
     },
     /// A film was closed before all its frames had come.
-    #[error("{path}: {got} of {expected} frames came; the film was not written", path = .path.display())]
+    #[error("{path}: {got} of {} came; the film was not written", counted(*.expected, "frame"), path = .path.display())]
     FramesMissing {
         /// The film.
         path: PathBuf,

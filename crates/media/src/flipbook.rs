@@ -12,9 +12,9 @@ pub enum TileError {
     #[error("a sheet needs at least one column")]
     NoColumns,
     /// Pictures of several sizes.
-    #[error("picture {index} is {width} x {height}; all on a sheet must be as large as the first")]
+    #[error("picture {} is {width} x {height}; all on a sheet must be as large as the first", index + 1)]
     Sizes {
-        /// The first picture that differs.
+        /// The first picture that differs, from 0.
         index: usize,
         /// Its width, pixels.
         width: usize,
@@ -22,9 +22,9 @@ pub enum TileError {
         height: usize,
     },
     /// 8-bit and 16-bit pictures together.
-    #[error("picture {index} has another number of bits than the first")]
+    #[error("picture {} has another number of bits than the first", index + 1)]
     Depths {
-        /// The first picture that differs.
+        /// The first picture that differs, from 0.
         index: usize,
     },
 }

@@ -15,6 +15,7 @@ mod error;
 pub mod exr;
 pub mod flatten;
 pub mod flipbook;
+pub mod label;
 pub mod meshes;
 pub mod naming;
 mod ordered;

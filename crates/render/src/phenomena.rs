@@ -38,6 +38,18 @@ impl Describe for FlameSheetParameters {
     const KEY: &'static str = "flame_sheet";
     // From where the flame nearly fills the height of the picture.
     const SETTING: &'static str = "camera = { position = [0.0, 0.76, 2.75], target = [0.0, 0.76, 0.0] }\n";
+    const FIRST_KEYS: &'static [&'static str] = &[
+        "position",
+        "width",
+        "height",
+        "speed",
+        "variation",
+        "texture.contrast",
+        "colour.luminance",
+        "colour.core_temperature_k",
+        "sparks.rate",
+        "smoke.optical_depth",
+    ];
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match FlameSheet::new(self.clone(), opening.name, opening.seed, opening.loop_s) {
@@ -49,6 +61,15 @@ impl Describe for FlameSheetParameters {
 
 impl Describe for FlameParticlesParameters {
     const KEY: &'static str = "flame_particles";
+    const FIRST_KEYS: &'static [&'static str] = &[
+        "position",
+        "particles",
+        "motion.turbulence",
+        "life.soot_ppm",
+        "life.smoke",
+        "burners.diameter",
+        "burners.heat_release_kw",
+    ];
     const SETTING: &'static str = "\
         camera = { position = [0.0, 0.82, 3.5], target = [0.0, 0.82, 0.0] }\n\
         wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";
@@ -71,6 +92,7 @@ impl Describe for FlameParticlesParameters {
 
 impl Describe for RainParameters {
     const KEY: &'static str = "rain";
+    const FIRST_KEYS: &'static [&'static str] = &["rate_mm_per_h", "distance", "veil_distance", "splashes.amount"];
     // A lamp at dusk above wet ground: drops only show the light of others.
     const SETTING: &'static str = "\
         picture = { exposure_ev100 = 1.2 }\n\
@@ -89,6 +111,15 @@ impl Describe for RainParameters {
 
 impl Describe for AuroraParameters {
     const KEY: &'static str = "aurora";
+    const FIRST_KEYS: &'static [&'static str] = &[
+        "flux_mw_per_m2",
+        "energy_ev",
+        "dip_deg",
+        "time_lapse",
+        "particles.count",
+        "rays.contrast",
+        "folds.amplitude_km",
+    ];
     const IN_THE_SKY: bool = true;
     // From the ground toward the northern sky of a clear night. With the airglow of a quiet night the sky stays darker than the curtains.
     const SETTING: &'static str = "\

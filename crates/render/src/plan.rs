@@ -339,7 +339,7 @@ pub(crate) fn opening_error(name: String, fault: OpeningFault) -> PlanError {
 /// The scene's obstacles.
 fn occluders(scene: &Scene, assets: &dyn Assets) -> Result<Vec<Occluder>, PlanError> {
     let open = |(index, obstacle): (usize, &ObstacleParameters)| {
-        obstacle.open(assets).map_err(|fault| opening_error(format!("obstacle {index}"), fault))
+        obstacle.open(assets).map_err(|fault| opening_error(format!("obstacle {}", index + 1), fault))
     };
     scene.obstacles.iter().enumerate().map(open).collect()
 }

@@ -196,23 +196,20 @@ fn faults_stand_at_their_sheet_and_point() {
     for (text, expected) in [
         (
             "[[aurora.shapes]]\nsheets = [{ points = [[0, 0]] }]\n",
-            "test.toml:4:22: aurora.0.shapes.0.sheets.0.points: sheet 1 has 1 of the points",
+            "test.toml:4:22: aurora.0.shapes.0.sheets.0.points (shape 1, sheet 1): sheet 1 has 1 point; allowed",
         ),
-        (
-            "[[aurora.shapes]]\nsheets = [{ points = [] }]\n",
-            "sheet 1 has 0 of the points that a sheet needs; allowed: at least 2",
-        ),
+        ("[[aurora.shapes]]\nsheets = [{ points = [] }]\n", "sheet 1 has 0 points; allowed: at least 2"),
         (
             "[[aurora.shapes]]\nsheets = [{ points = [[0, 0], [100, 0], [500, 0]] }]\n",
-            "test.toml:4:41: aurora.0.shapes.0.sheets.0.points.2: sheet 1, point 3 lies at (500.0, 0.0) km",
+            "test.toml:4:41: aurora.0.shapes.0.sheets.0.points.2 (shape 1, sheet 1, point 3): sheet 1, point 3 lies at (500.0, 0.0) km",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ smooth = false, points = [[0, 0], [100, 0], [100, 50], [50, 50], [50, -50]] }]\n",
-            "points.3: sheet 1 crosses itself: after point 4 it meets its part after point 1",
+            "points.3 (shape 1, sheet 1, point 4): sheet 1 crosses itself: after point 4 it meets its part after point 1",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ points = [[0, 0], [9, 0]] }, { points = [[5, -5], [5, 5]] }]\n",
-            "sheets.1.points.0: sheet 2 meets sheet 1: after point 1 and after point 1",
+            "sheets.1.points.0 (shape 1, sheet 2, point 1): sheet 2 meets sheet 1: after point 1 and after point 1",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ points = [[0, 0], [9, 0]] }, { points = [[9, 0], [9, 5]] }]\n",
@@ -220,24 +217,24 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90] }]\n",
-            "test.toml:5:10: aurora.0.shapes.1.sheets: has 2 sheets, but 1 come from the shape before",
+            "test.toml:5:10: aurora.0.shapes.1.sheets (shape 2): has 2 sheets, but 1 comes from the shape before",
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nsplit = [{ segment = 99 }]\n",
-            "aurora.0.shapes.1.split.0: sheet 1 has no segment 99; allowed: 1 to 95",
+            "aurora.0.shapes.1.split.0 (shape 2, split 1): sheet 1 has no segment 99; allowed: 1 to 95",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90] }]\n[[aurora.shapes]]\nmerge = [{ at = [0.5, 0] }]\n",
             "the point at 0.5 of sheet 1 is not an end",
         ),
-        ("[[aurora.shapes]]\nsplit = [{}]\n", "aurora.0.shapes.0.split: the first shape has none before it"),
+        ("[[aurora.shapes]]\nsplit = [{}]\n", "aurora.0.shapes.0.split (shape 1): the first shape has none before it"),
         (
             "[[aurora.shapes]]\nsheets = [{ path = \"shapes.svg\", stroke = \"middle\" }]\n",
-            "test.toml:4:43: aurora.0.shapes.0.sheets.0.stroke: shapes.svg: has no stroke of the id `middle`",
+            "test.toml:4:43: aurora.0.shapes.0.sheets.0.stroke (shape 1, sheet 1): shapes.svg: has no stroke of the id `middle`",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ stroke = \"left\" }]\n",
-            "sheets.0.stroke: names a path of an SVG file, but no file",
+            "sheets.0.stroke (shape 1, sheet 1): names a path of an SVG file, but no file",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ points = [[-200, -290], [-100, -200], [0, -299], [100, -299], [200, -200]] }]\n",
@@ -245,20 +242,20 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ form = \"arc\" }]\n[[aurora.shapes]]\nlink = [{ to = 5 }]\nsheets = [{ form = \"arc\" }]\n",
-            "shapes.1.link.0: there is no sheet 5 in this shape; allowed: 1 to 1",
+            "shapes.1.link.0 (shape 2, link 1): there is no sheet 5 in this shape; allowed: 1 to 1",
         ),
         ("[[aurora.shapes]]\nsheets = [{ path = \"gone.svg\" }]\n", "gone.svg: no such file"),
         (
             "[[aurora.shapes]]\nafter_s = 3\n[[aurora.shapes]]\n",
-            "test.toml:4:11: aurora.0.shapes.0.after_s: the first shape is there at the beginning",
+            "test.toml:4:11: aurora.0.shapes.0.after_s (shape 1): the first shape is there at the beginning",
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nlink = [{ at = 0.5 }]\n",
-            "test.toml:5:9: aurora.0.shapes.1.link.0: says `at`, but not where that point arrives",
+            "test.toml:5:9: aurora.0.shapes.1.link.0 (shape 2, link 1): says `at`, but not where that point arrives",
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nmerge = [{ sheets = [1, 2.5] }]\n",
-            "test.toml:5:25: aurora.0.shapes.1.merge.0.sheets: expected a whole number from 1 to 1000, found a number",
+            "test.toml:5:25: aurora.0.shapes.1.merge.0.sheets (shape 2, merge 1): expected a whole number from 1 to 1000, found a number",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ path = \"shapes.svg\", form = \"arc\" }]\n",
@@ -270,11 +267,11 @@ fn faults_stand_at_their_sheet_and_point() {
         ("energy_ev = 1e6\n", "test.toml:3:13: aurora.0.energy_ev: 1000000 is out of range; allowed: 100 to 100000 eV"),
         (
             "[[aurora.shapes]]\nsheets = [{ form = \"arc\", energy = [[0, 1], [1, 0]] }]\n",
-            "test.toml:4:49: aurora.0.shapes.0.sheets.0.energy.1: 0 is out of range; allowed: 0.05 to 20",
+            "test.toml:4:49: aurora.0.shapes.0.sheets.0.energy.1 (shape 1, sheet 1, energy 2): 0 is out of range; allowed: 0.05 to 20",
         ),
         (
             "energy_ev = 10000\n[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90], energy = [[0, 1], [0.5, 1], [1, 20]] }]\n",
-            "test.toml:5:68: aurora.0.shapes.0.sheets.1.energy.2: at 1 of its length sheet 2 has electrons of 200000 eV",
+            "test.toml:5:68: aurora.0.shapes.0.sheets.1.energy.2 (shape 1, sheet 2, energy 3): at 1 of its length sheet 2 has electrons of 200000 eV",
         ),
         (
             "energy_ev = 500\n[[aurora.shapes]]\nsheets = [{ energy = [[0.5, 0.1]] }]\n",
@@ -298,7 +295,7 @@ fn sheets_that_would_pass_through_each_other_are_told() {
     assert_eq!(remarks(""), []);
     let told = remarks("link = [{ from = 1, to = 2 }]\n");
     assert_eq!(told, [("aurora".to_owned(), Remark::Crossing { shape: 2 })]);
-    assert!(told[0].1.to_string().contains("on the way to shape 2 (counted from 1)"), "{}", told[0].1);
+    assert!(told[0].1.to_string().contains("on the way to shape 2; another"), "{}", told[0].1);
 }
 
 #[test]

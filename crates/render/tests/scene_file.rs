@@ -40,7 +40,7 @@ fn faults_name_their_place_and_what_is_allowed() {
             "test.toml:3:9: picture.size: 0 is out of range; allowed: 1 to 16384 pixels",
         ),
         ("bansho = 1\n[picture]\nsize = [100, 1000000000]\n", "1000000000 is out of range; allowed: 1 to 16384 pixels"),
-        ("bansho = 1\n[picture]\nsize = [100]\n", "has 1 items; allowed: 2 to 2"),
+        ("bansho = 1\n[picture]\nsize = [100]\n", "has 1 item; allowed: exactly 2 items"),
         ("bansho = 1\n[picture]\nfps = \"24000/0\"\n", "inf is out of range; allowed: 0.1 to 1000"),
         ("bansho = 1\n[picture]\nfps = \"fast\"\n", "or a fraction such as \"24000/1001\", found a string"),
         (
@@ -101,7 +101,7 @@ fn faults_name_their_place_and_what_is_allowed() {
         ("bansho = 1\n[obstacle]\n", "expected tables [[obstacle]], with double brackets"),
         (
             "bansho = 1\n[[obstacle]]\nradius = 1\n[[obstacle]]\nshape = \"mesh\"\n",
-            "obstacle.1.file: an obstacle of shape \"mesh\" needs a `file`",
+            "obstacle.1.file (obstacle 2): an obstacle of shape \"mesh\" needs a `file`",
         ),
         (
             "bansho = 1\n[[obstacle]]\nshape = \"mesh\"\nfile = \"gone.glb\"\n",
@@ -131,12 +131,12 @@ fn faults_of_a_particle_flame_are_located() {
         ("life = { flame_temperature_k = 1e6 }\n", "1000000 is out of range"),
         (
             "burners = [{}, { position = [0, 99, 0] }]\ndomain_max = [5, 5, 5]\n",
-            "test.toml:3:29: flame_particles.0.burners.1.position: the burner stands at",
+            "test.toml:3:29: flame_particles.0.burners.1.position (burner 2): the burner stands at",
         ),
-        ("burners = [{ shape = \"mesh\" }]\n", "burners.0.file: a burner of shape \"mesh\" needs a `file`"),
+        ("burners = [{ shape = \"mesh\" }]\n", "burners.0.file (burner 1): a burner of shape \"mesh\" needs a `file`"),
         (
             "burners = [{ shape = \"mesh\", file = \"gone.glb\" }]\n",
-            "test.toml:3:37: flame_particles.0.burners.0.file: gone.glb: no such file",
+            "test.toml:3:37: flame_particles.0.burners.0.file (burner 1): gone.glb: no such file",
         ),
         (
             "particles = 3\nburners = [{ diameter = 0.015 }]\ndomain_min = [-0.01, -0.01, -0.01]\ndomain_max = [0.01, 0.01, 0.01]\n",
@@ -276,6 +276,33 @@ fn a_template_states_all_of_its_kinds_setting() {
         assert_eq!((&new.picture, &new.camera, &new.wind), (&stated.picture, &stated.camera, &stated.wind));
         assert_eq!((&new.sky, &new.ground, &new.lights), (&stated.sky, &stated.ground, &stated.lights));
         assert_eq!(new.instances.len(), 1);
+    }
+}
+
+#[test]
+fn a_short_template_says_what_one_changes_first_and_is_the_same_scene() {
+    let kinds = bansho_render::phenomena::KINDS;
+    for kind in kinds {
+        let parse = |text: &str| {
+            Scene::parse("new.toml", text, kinds, &MemoryAssets::default())
+                .unwrap_or_else(|error| panic!("{error}\n{text}"))
+        };
+        let text = template::short(kind);
+        let (short, long) = (parse(&text), parse(&template::commented(kind)));
+        assert_eq!((&short.picture, &short.camera, &short.wind), (&long.picture, &long.camera, &long.wind));
+        assert_eq!((&short.sky, &short.ground, &short.lights), (&long.sky, &long.ground, &long.lights));
+        assert_eq!((&short.air, &short.plate), (&long.air, &long.plate));
+        let count = text.lines().count();
+        assert!((15..=48).contains(&count), "{count} lines:\n{text}");
+        for key in ["size = ", "fps = ", "frames = ", "position = ", "target = ", "velocity = "] {
+            assert!(text.contains(&format!("\n{key}")), "{key} is missing:\n{text}");
+        }
+        for key in kind.first_keys {
+            let last = key.rsplit('.').next().unwrap();
+            assert!(text.contains(&format!("{last} = ")), "{key} is missing:\n{text}");
+        }
+        assert!(text.lines().filter(|line| line.contains(" = ")).all(|line| line.contains("   # ")), "{text}");
+        assert!(text.lines().all(|line| line.len() <= 140), "{text}");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use bansho_base::observer::Cancelled;
+use bansho_base::{observer::Cancelled, plural::counted};
 use bansho_media::{MediaError, flipbook::TileError, naming::NamingError};
 use bansho_render::{PlanError, RenderError, SceneError, scene::edit::EditError};
 
@@ -13,12 +13,14 @@ use super::streaks::StreaksFault;
 #[non_exhaustive]
 pub enum JobError {
     /// The scene cannot be read.
-    #[error("{path}: the scene cannot be read: {source}", path = .path.display())]
+    #[error("{path}: the scene cannot be read: {source}{}", did_you_mean(.near), path = .path.display())]
     Unreadable {
         /// The scene's file.
         path: PathBuf,
         /// What the system said.
         source: std::io::Error,
+        /// The scene in that folder whose name is most like it, where there is no such file.
+        near: Option<PathBuf>,
     },
     /// The scene is not text.
     #[error("{path}:{line}: the scene is not UTF-8 from this line on; allowed: text in UTF-8", path = .path.display())]
@@ -202,8 +204,12 @@ pub enum Conflict {
     LoopLength(f64),
 }
 
+fn did_you_mean(near: &Option<PathBuf>) -> String {
+    near.as_ref().map(|path| format!(", did you mean `{}`?", path.display())).unwrap_or_default()
+}
+
 fn with_channels(channels: usize) -> String {
-    if channels == 0 { String::new() } else { format!(" with {channels} more channels") }
+    if channels == 0 { String::new() } else { format!(" with {}", counted(channels, "more channel")) }
 }
 
 impl From<RenderError> for JobError {

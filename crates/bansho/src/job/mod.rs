@@ -35,6 +35,7 @@ use bansho_base::{
 };
 use bansho_render::display::BitDepth;
 
+pub use contact::ContactBackground;
 pub use error::{Cause, Channels, Conflict, JobError, SheetKind};
 pub use flipbook::{Flipbook, FlipbookSummary, PreparedFlipbook};
 pub use observer::{FrameDone, JobObserver, Note, Outline, Spot};
@@ -89,6 +90,8 @@ pub struct Job {
     pub out: Option<PathBuf>,
     /// One picture of so many frames: the first of several `frames`, or consecutive ones from a single frame on.
     pub contact_sheet: Option<usize>,
+    /// What the frames of that picture are laid over.
+    pub contact_background: ContactBackground,
     /// Whether whole frames of this very job that are there already stay.
     pub resume: bool,
     /// Folder of snapshots of what is simulated in steps.
@@ -118,6 +121,7 @@ impl Job {
             alpha: None,
             out: None,
             contact_sheet: None,
+            contact_background: ContactBackground::Black,
             resume: false,
             snapshots: None,
             snapshot_every: None,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use bansho_base::{
     observer::{Observer, Unobserved},
     phenomenon::Remark,
+    plural::counted,
 };
 use bansho_media::naming::OutputKind;
 use bansho_render::RenderError;
@@ -59,12 +60,17 @@ fn at(place: &Option<Spot>) -> String {
     place.as_ref().map(shown).unwrap_or_default()
 }
 
+/// So many frames lie somewhere.
+fn lie(count: usize) -> String {
+    format!("{} {}", counted(count, "frame"), if count == 1 { "lies" } else { "lie" })
+}
+
 /// Something that the user should know and that stops nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Note {
     /// Frames beyond those of the scene.
-    #[error("{count} of the frames lie outside the scene's own, {first} to {last}; they are drawn as if it went on")]
+    #[error("{} outside the scene's own, {first} to {last}; drawn as if the scene went on", lie(*.count))]
     OutsideScene {
         /// How many.
         count: usize,
@@ -74,7 +80,7 @@ pub enum Note {
         last: i64,
     },
     /// Frames beyond one turn of a loop.
-    #[error("{count} of the frames lie outside the loop's own, {first} to {last}; they repeat it")]
+    #[error("{} outside the loop's own, {first} to {last}; the loop is repeated", lie(*.count))]
     OutsideLoop {
         /// How many.
         count: usize,

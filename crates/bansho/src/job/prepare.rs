@@ -18,7 +18,8 @@ use bansho_media::{
 use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth};
 
 use super::{
-    BackendChoice, Job, contact,
+    BackendChoice, Job,
+    contact::{self, ContactBackground},
     error::{Channels, Conflict, JobError, SheetKind},
     figures, inputs,
     memory::{self, Wanted},
@@ -39,6 +40,7 @@ pub struct PreparedJob {
     pub(super) format: Format,
     /// Where all frames go into one picture.
     pub(super) sheet: Option<Sheet>,
+    pub(super) contact_background: ContactBackground,
     pub(super) resume: bool,
     pub(super) snapshots: Snapshots,
     pub(super) notes: Vec<Note>,
@@ -143,6 +145,7 @@ impl Job {
             backend,
             frames,
             sheet,
+            contact_background: self.contact_background,
             snapshots,
         };
         prepared.notes = self.notes(&prepared)?;

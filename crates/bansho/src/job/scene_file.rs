@@ -1,11 +1,14 @@
 //! The text of a scene, where it lies, and changes made to it for one job.
 
 use std::{
-    fs,
+    fs, io,
     path::{Path, PathBuf},
 };
 
-use bansho_base::{assets::Assets, parameters::ProblemKind};
+use bansho_base::{
+    assets::Assets,
+    parameters::{ProblemKind, nearest},
+};
 use bansho_render::{
     Scene, SceneError,
     phenomena::KINDS,
@@ -35,7 +38,10 @@ impl SceneFile {
     /// # Errors
     /// There is no such file, it cannot be read, or it is not UTF-8.
     pub fn read(path: &Path) -> Result<Self, JobError> {
-        let bytes = fs::read(path).map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source })?;
+        let bytes = fs::read(path).map_err(|source| {
+            let near = if source.kind() == io::ErrorKind::NotFound { near(path) } else { None };
+            JobError::Unreadable { path: path.to_path_buf(), source, near }
+        })?;
         let text = String::from_utf8(bytes).map_err(|error| {
             let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
             let line = 1 + good.iter().filter(|&&byte| byte == b'\n').count();
@@ -91,9 +97,23 @@ impl SceneFile {
 
     fn changed(&self) -> Result<String, JobError> {
         self.changes.iter().try_fold(self.text.clone(), |text, assignment| {
-            edit::set(&text, assignment).map_err(|source| JobError::Edit { assignment: assignment.clone(), source })
+            let refused = |source| JobError::Edit { assignment: assignment.clone(), source };
+            edit::set(&text, assignment, KINDS).map_err(refused)
         })
     }
+}
+
+/// The scene file beside `path`, which is not there, whose name is most like its.
+fn near(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent()?;
+    let listed = fs::read_dir(if folder.as_os_str().is_empty() { Path::new(".") } else { folder }).ok()?;
+    let scenes =
+        listed.filter_map(|entry| Some(entry.ok()?.file_name().into_string().ok()?.strip_suffix(".toml")?.to_owned()));
+    let mut scenes: Vec<String> = scenes.collect();
+    scenes.sort_unstable();
+    let name = path.file_name()?.to_str()?;
+    let meant = nearest(name.strip_suffix(".toml").unwrap_or(name), scenes.iter().map(String::as_str))?;
+    Some(folder.join(format!("{meant}.toml")))
 }
 
 /// The part of the text that the first fault of a scene marks.

@@ -37,7 +37,7 @@ pub(super) struct Gather<'a, T, M> {
     tiles: Mutex<Vec<Option<T>>>,
 }
 
-impl<'a, T, M: Fn(&Frame, &dyn Observer) -> T> Gather<'a, T, M> {
+impl<'a, T, M: Fn(&mut Frame, &dyn Observer) -> T> Gather<'a, T, M> {
     /// Will hold `count` tiles, each made from a frame by `make`.
     pub(super) fn new(count: usize, observer: &'a dyn JobObserver, make: M) -> Self {
         Self { make, observer, tiles: Mutex::new((0..count).map(|_| None).collect()) }
@@ -49,7 +49,7 @@ impl<'a, T, M: Fn(&Frame, &dyn Observer) -> T> Gather<'a, T, M> {
     }
 }
 
-impl<T: Send, M: Fn(&Frame, &dyn Observer) -> T + Sync> Finish for Gather<'_, T, M> {
+impl<T: Send, M: Fn(&mut Frame, &dyn Observer) -> T + Sync> Finish for Gather<'_, T, M> {
     fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError> {
         let number = frame.header.number;
         let tile = (self.make)(frame, observer);

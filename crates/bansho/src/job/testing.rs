@@ -108,7 +108,7 @@ pub(super) fn frame(number: i64) -> Frame {
     blank(&plan(), number)
 }
 
-fn blank(plan: &Plan, number: i64) -> Frame {
+pub(super) fn blank(plan: &Plan, number: i64) -> Frame {
     let beauty = Image::filled(1, 1, [number as f32; 4]);
     let header = plan.header(number);
     let content = Rect::of_size(1, 1);

@@ -11,6 +11,8 @@ use crate::{
 fn a_new_scene_of_any_kind_shows_something_well_exposed() {
     for kind in KINDS {
         let film = Film::of_text(&template::commented(kind), SMALL, &[4], &PlanOptions::default());
+        let short = Film::of_text(&template::short(kind), SMALL, &[4], &PlanOptions::default());
+        assert!(film.pixels().eq(short.pixels()), "{}: a short scene shows the same", kind.key);
         let share = |of: &dyn Fn(f64) -> bool| {
             film.pixels().filter(|pixel| of(luminance(**pixel))).count() as f64 / film.len() as f64
         };

@@ -1,14 +1,17 @@
 //! Faults in what a file says, each with its place, what is wrong and what is allowed.
 
 use super::{Choice, Kind, ModelFault, Node, Span};
-use crate::assets::AssetError;
+use crate::{
+    assets::AssetError,
+    plural::{between, counted},
+};
 
 /// One fault.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
     /// Where in the source; `None` where the fault is not in the text.
     pub span: Option<Span>,
-    /// The parameter, such as `flame_sheet.speed`.
+    /// The parameter as an edit of a scene calls it, such as `flame_sheet.0.speed`; items of lists count from 0.
     pub path: String,
     /// What is wrong.
     pub kind: ProblemKind,
@@ -17,7 +20,7 @@ pub struct Problem {
 impl std::fmt::Display for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if !self.path.is_empty() {
-            write!(f, "{}: ", self.path)?;
+            write!(f, "{}{}: ", self.path, items(&self.path))?;
         }
         self.kind.fmt(f)
     }
@@ -78,7 +81,7 @@ pub enum ProblemKind {
         seconds: f64,
     },
     /// A list too short or too long.
-    #[error("has {found} items; allowed: {min} to {max}")]
+    #[error("has {}; allowed: {}", counted(*.found, "item"), between(*.min, *.max, "item"))]
     ListLength {
         /// How many it has.
         found: usize,
@@ -129,6 +132,17 @@ pub enum ProblemKind {
     /// Something the scene refers to cannot be had.
     #[error("{0}")]
     Asset(#[from] AssetError),
+}
+
+/// The items of lists on a path as people count them, from 1 on: ` (shape 2, sheet 1)`. The first table of its kind needs no number.
+fn items(path: &str) -> String {
+    let segments: Vec<&str> = path.split('.').collect();
+    let item = |(at, pair): (usize, &[&str])| {
+        let index: usize = pair[1].parse().ok().filter(|index| at > 0 || *index > 0)?;
+        Some(format!("{} {}", pair[0].strip_suffix('s').unwrap_or(pair[0]), index + 1))
+    };
+    let items: Vec<String> = segments.windows(2).enumerate().filter_map(item).collect();
+    if items.is_empty() { String::new() } else { format!(" ({})", items.join(", ")) }
 }
 
 fn did_you_mean(nearest: &Option<String>) -> String {
@@ -223,5 +237,23 @@ mod tests {
         assert_eq!(shown, ["0", "-1", "0.0000025", "1000000", "100000000000000", "1e300", "-3.5e-9", "inf"]);
         let fault = ProblemKind::OutOfRange { value: 1e300, min: 0.0, max: 2.0, unit: "m" };
         assert_eq!(fault.to_string(), "1e300 is out of range; allowed: 0 to 2 m");
+    }
+
+    #[test]
+    fn lists_say_how_many_items_in_the_right_number() {
+        let told = |found, min, max| ProblemKind::ListLength { found, min, max }.to_string();
+        assert_eq!(told(1, 2, 2), "has 1 item; allowed: exactly 2 items");
+        assert_eq!(told(0, 1, 1), "has 0 items; allowed: exactly 1 item");
+        assert_eq!(told(13, 1, 12), "has 13 items; allowed: 1 to 12 items");
+    }
+
+    #[test]
+    fn paths_are_what_one_types_and_their_items_count_from_one_beside_them() {
+        let told =
+            |path: &str| Problem { span: None, path: path.into(), kind: ProblemKind::Syntax("x".into()) }.to_string();
+        assert_eq!(told("picture.size"), "picture.size: x");
+        assert_eq!(told("rain.0.rate_mm_per_h"), "rain.0.rate_mm_per_h: x");
+        assert_eq!(told("rain.1.rate_mm_per_h"), "rain.1.rate_mm_per_h (rain 2): x");
+        assert_eq!(told("aurora.0.shapes.1.sheets.0"), "aurora.0.shapes.1.sheets.0 (shape 2, sheet 1): x");
     }
 }

@@ -22,7 +22,7 @@ pub(crate) use self::{
     version,
     after_help = "\
 Examples:
-  bansho new fire                      write fire.toml, a scene with every setting explained
+  bansho new fire                      write fire.toml, a short scene to change
   bansho render fire.toml              240 PNG files with alpha in out/fire/
   bansho render fire.toml -o fire.mp4  a film
   bansho render --help                 all that `render` can do
@@ -37,7 +37,7 @@ pub(crate) struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Write a new scene file, every setting explained in a comment.
+    /// Write a new scene file: what one changes first, or every setting, each explained.
     New(NewArgs),
     /// Say whether scene files are right, and where they are not.
     Check(CheckArgs),
@@ -67,8 +67,9 @@ pub(crate) enum Command {
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  bansho new fire                    fire.toml, a flame sheet with every setting explained
-  bansho new wet --phenomenon rain   wet.toml, rain around a lamp with every setting explained
+  bansho new fire                    fire.toml, a short scene of a flame sheet
+  bansho new fire --all              the same with every setting explained
+  bansho new wet --phenomenon rain   wet.toml, rain around a lamp
   bansho new --list                  the examples that come with the program
   bansho new camp --from campfire    camp.toml, a copy of the campfire")]
 pub(crate) struct NewArgs {
@@ -78,6 +79,9 @@ pub(crate) struct NewArgs {
     /// What the scene shows: flame_sheet (the default), flame_particles, rain or aurora.
     #[arg(long, value_name = "KIND", conflicts_with = "from")]
     pub(crate) phenomenon: Option<String>,
+    /// Write every setting with what it is for and what is allowed, not only those that one changes first.
+    #[arg(long, conflicts_with_all = ["from", "list"])]
+    pub(crate) all: bool,
     /// Copy an example that comes with the program.
     #[arg(long, value_name = "EXAMPLE")]
     pub(crate) from: Option<String>,
@@ -123,4 +127,25 @@ pub(crate) struct CompletionsArgs {
 pub(crate) struct ManArgs {
     /// Folder to write the pages of all commands to; without it the main page is printed.
     pub(crate) dir: Option<PathBuf>,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn examples_fit_a_terminal_and_paragraphs_wrap_at_its_width() {
+        let cli = Cli::command();
+        for command in cli.get_subcommands().chain([&cli]) {
+            let Some(help) = command.get_after_help() else { continue };
+            let (name, help) = (command.get_name(), help.to_string());
+            assert!(help.lines().filter(|line| line.starts_with("  ")).all(|line| line.len() < 80), "{name}: {help}");
+            // Neighbors that are no examples would be one paragraph, broken by hand.
+            let is_text = |line: &str| !line.is_empty() && !line.starts_with("  ");
+            let lines: Vec<&str> = help.lines().collect();
+            assert!(!lines.windows(2).any(|pair| is_text(pair[0]) && is_text(pair[1])), "{name}: {help}");
+        }
+    }
 }

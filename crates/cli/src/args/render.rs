@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bansho::{
     AlphaConvention, BitDepth, Rect, View,
-    job::{BackendChoice, Job, JobError, SceneFile},
+    job::{BackendChoice, ContactBackground, Job, JobError, SceneFile},
 };
 use clap::Args;
 
@@ -27,8 +27,7 @@ Examples:
   bansho render fire.toml --set flame_sheet.height=1.2 --set wind.gust=0.5
   bansho render fire.toml --resume                      go on after an interruption
 
-A PNG is exact over black in programs that blend as --alpha says; an EXR is exact over anything.
-Interrupt at any time: whole frames stay, and nothing half-written bears a final name.")]
+A PNG is exact over black in programs that blend as --alpha says; an EXR is exact over anything. Interrupt at any time: whole frames stay, and nothing half-written bears a final name.")]
 pub(crate) struct RenderArgs {
     /// The scene file.
     pub(crate) scene: PathBuf,
@@ -64,6 +63,15 @@ pub(crate) struct RenderArgs {
     /// out/SCENE/SCENE.sheet.png]
     #[arg(long, value_name = "N", help_heading = "Output")]
     contact_sheet: Option<usize>,
+    /// What the frames of a contact sheet are laid over.
+    #[arg(
+        long,
+        default_value = "black",
+        requires = "contact_sheet",
+        value_parser = values::contact_background_parser(),
+        help_heading = "Output"
+    )]
+    contact_background: ContactBackground,
 
     /// Frames: 0-239, 0-239x10 or 0-239:10 (every tenth), 17, -3-5, 1-5,9. Beyond the scene's own frames it goes on as
     /// if it were longer; beyond those of a --loop it repeats. [default: all]
@@ -125,6 +133,7 @@ impl RenderArgs {
             alpha: self.alpha,
             out: self.out.clone(),
             contact_sheet: self.contact_sheet,
+            contact_background: self.contact_background,
             resume: self.resume,
             snapshots: self.states.snapshots.clone(),
             snapshot_every: self.states.snapshot_every,

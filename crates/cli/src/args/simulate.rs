@@ -14,12 +14,12 @@ use super::{
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  bansho simulate torch.toml --particles gas.####.ply               all frames
-  bansho simulate torch.toml --particles gas.ply --frames 60        one
-  bansho simulate torch.toml --particles gas.####.ply --frames 0-239x10 --snapshots states
+  bansho simulate torch.toml --particles gas.####.ply          all frames
+  bansho simulate torch.toml --particles gas.ply --frames 60   one
+  bansho simulate torch.toml --particles g.####.ply --frames 0-99x9 --snapshots s
 
-Each file is a binary PLY with x y z (m, y up) and vx vy vz (m/s) of every particle at the middle of the frame's exposure: of a particle flame
-with temperature (K) and density (kg/m^3), of an aurora with energy (eV) and power (W). Blender, MeshLab and Open3D read it.")]
+Each file is a binary PLY with x y z (m, y up) and vx vy vz (m/s) of every particle at the middle of the frame's exposure: of a \
+particle flame with temperature (K) and density (kg/m^3), of an aurora with energy (eV) and power (W). Blender, MeshLab and Open3D read it.")]
 pub(crate) struct SimulateArgs {
     /// The scene file.
     pub(crate) scene: PathBuf,

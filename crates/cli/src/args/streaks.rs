@@ -17,9 +17,9 @@ use super::{
 /// The textures that are wanted; without options the 24 of Yoshida, Dobashi and Yamamoto.
 #[derive(Args, Debug)]
 #[command(after_help = "\
-Each texture shows all drops of one diameter in a cube of air, from the side, as they fall through one exposure. A pixel is
-the share of it that they hide (opacity); a streak that leaves at an edge enters at the opposite one. Numbers are linear; streaks.json
-says how to read them, and lists every drop with its diameter, velocity, opacity and place.
+Each texture shows all drops of one diameter in a cube of air, from the side, as they fall through one exposure. A pixel is \
+the share of it that they hide (opacity); a streak that leaves at an edge enters at the opposite one. Numbers are linear; \
+streaks.json says how to read them, and lists every drop with its diameter, velocity, opacity and place.
 
 Examples:
   bansho streaks                                        4 rates x 6 diameters in out/streaks/

@@ -2,7 +2,7 @@
 
 use bansho::{
     AlphaConvention, BitDepth, Rect, View,
-    job::{BackendChoice, StreakFormat},
+    job::{BackendChoice, ContactBackground, StreakFormat},
     models::rain::velocity::VelocityLaw,
     render::{
         frames::{self, FrameSpecError},
@@ -115,6 +115,11 @@ pub(super) fn view_parser() -> impl TypedValueParser<Value = View> {
 pub(super) fn backend_parser() -> impl TypedValueParser<Value = BackendChoice> {
     let names = BackendChoice::CHOICES.iter().map(|choice| choice.name);
     PossibleValuesParser::new(names).map(|name| BackendChoice::from_name(&name).unwrap_or_default())
+}
+
+pub(super) fn contact_background_parser() -> impl TypedValueParser<Value = ContactBackground> {
+    let names = ContactBackground::CHOICES.iter().map(|choice| choice.name);
+    PossibleValuesParser::new(names).map(|name| ContactBackground::from_name(&name).unwrap_or_default())
 }
 
 pub(super) fn bits_parser() -> impl TypedValueParser<Value = BitDepth> {

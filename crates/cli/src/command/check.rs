@@ -34,14 +34,16 @@ fn describe(path: &Path) -> Result<String, JobError> {
     let [width, height] = plan.size();
     let (fps, frames) = (plan.fps(), plan.frames());
     let rate = f64::from(fps.frames) / f64::from(fps.seconds);
+    let numbers = match (frames.start, frames.end - 1) {
+        (first, last) if first == last => format!("frame {first}"),
+        (first, last) => format!("frames {first} to {last}"),
+    };
     let drawn = plan.scene().instances.iter().filter(|instance| instance.enabled);
     let names: Vec<&str> = drawn.map(|instance| instance.name.as_str()).collect();
     let names = if names.is_empty() { "nothing in it".to_owned() } else { names.join(", ") };
     Ok(format!(
-        "{}: right. {width} x {height}, frames {} to {} at {rate} a second, EV100 {:.1}: {names}\n",
+        "{}: right. {width} x {height}, {numbers} at {rate} a second, EV100 {:.1}: {names}\n",
         path.display(),
-        frames.start,
-        frames.end - 1,
         plan.exposure_ev100
     ))
 }

@@ -8,6 +8,6 @@ pub(crate) fn run(args: &FlipbookArgs) -> anyhow::Result<()> {
         let flipbook = args.flipbook()?.prepare()?;
         let frames = flipbook.frame_count();
         let summary = flipbook.run(watcher)?;
-        Ok(progress::Result { what: "frames", drawn: frames, kept: 0, files: summary.files })
+        Ok(progress::Result { what: "frame", drawn: frames, kept: 0, files: summary.files })
     })
 }

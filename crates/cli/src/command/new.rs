@@ -43,13 +43,25 @@ pub(crate) fn run(args: &NewArgs) -> anyhow::Result<()> {
     let Some(name) = &args.name else { return Ok(to_stdout(&list())?) };
     let path = with_extension(name);
     match args.from.as_deref().map(find).transpose()? {
-        None => atomic::write_new(&path, template::commented(kind(args.phenomenon.as_deref())?).as_bytes())?,
+        None => atomic::write_new(&path, text(kind(args.phenomenon.as_deref())?, args.all).as_bytes())?,
         Some(example) => {
             atomic::write_new(&path, example.text.as_bytes())?;
             copy_assets(example, path.parent().unwrap_or(Path::new("")))?;
         }
     }
     Ok(to_stdout(&format!("{0}: written. Draw it: bansho render {0}\n", path.display()))?)
+}
+
+/// A new scene of a kind: all of its settings, or a short one that says how to get them.
+fn text(kind: &PhenomenonKind, all: bool) -> String {
+    if all {
+        return template::commented(kind);
+    }
+    let more = format!(
+        "\n# What one changes first; `bansho new NAME --phenomenon {} --all` writes every setting.\n",
+        kind.key
+    );
+    template::short(kind).replacen('\n', &more, 1)
 }
 
 fn list() -> String {

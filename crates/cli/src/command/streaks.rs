@@ -7,6 +7,6 @@ pub(crate) fn run(args: &StreaksArgs) -> anyhow::Result<()> {
     super::watched(&args.work, |watcher| {
         let streaks = args.streaks().prepare()?;
         let index = streaks.run(watcher)?;
-        Ok(progress::Result { what: "textures", drawn: streaks.texture_count(), kept: 0, files: vec![index] })
+        Ok(progress::Result { what: "texture", drawn: streaks.texture_count(), kept: 0, files: vec![index] })
     })
 }

@@ -23,19 +23,44 @@ enum StudioError {
     /// It cannot be started.
     #[error("{PROGRAM} cannot be started: {0}")]
     Start(io::Error),
-    /// It failed, and said why.
+    /// There is nothing that a window could be seen on.
+    #[error(
+        "there is no display for the studio's window: neither DISPLAY nor WAYLAND_DISPLAY is set; start it from a desktop session or \
+         by `ssh -X`, or draw without a window: bansho render SCENE"
+    )]
+    NoDisplay,
+    /// It was ended from outside.
     #[error("{PROGRAM} failed: {0}")]
     Failed(ExitStatus),
 }
 
+/// The studio failed, and has said why.
+#[derive(Debug, thiserror::Error)]
+#[error("{PROGRAM} failed")]
+pub(crate) struct SaidWhy;
+
 /// Starts the studio and waits until its window is closed.
 pub(crate) fn run(args: &StudioArgs) -> anyhow::Result<()> {
+    if !has_display() {
+        return Err(StudioError::NoDisplay.into());
+    }
     let program = beside().unwrap_or_else(|| PathBuf::from(PROGRAM));
     let status = Command::new(program).args(&args.scene).status().map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => StudioError::Missing,
         _ => StudioError::Start(error),
     })?;
-    if status.success() { Ok(()) } else { Err(StudioError::Failed(status).into()) }
+    match status.code() {
+        Some(0) => Ok(()),
+        Some(1) => Err(SaidWhy.into()),
+        _ => Err(StudioError::Failed(status).into()),
+    }
+}
+
+/// Whether there is something to open a window on, as far as the environment says; where windows need no such variable, always.
+fn has_display() -> bool {
+    let needed = cfg!(all(unix, not(any(target_os = "macos", target_os = "ios", target_os = "android"))));
+    let is_set = |name| env::var_os(name).is_some_and(|value| !value.is_empty());
+    !needed || ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"].into_iter().any(is_set)
 }
 
 /// The studio that lies beside this program.

@@ -9,7 +9,7 @@ use std::{
     time::Duration,
 };
 
-use bansho::job::Outline;
+use bansho::{base::plural::counted, job::Outline};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::Result;
@@ -73,10 +73,18 @@ impl Bar {
     pub(super) fn done(&self, result: &Result, seconds: f64) {
         self.clear();
         let Result { what, drawn, kept, files } = result;
-        let kept = if *kept > 0 { format!(", {kept} were there already") } else { String::new() };
+        let kept = if *kept > 0 {
+            format!(", {kept} {} there already", if *kept == 1 { "was" } else { "were" })
+        } else {
+            String::new()
+        };
         let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
         let rate = *drawn as f64 / seconds.max(1e-9);
-        to_stderr(&format!("{drawn} {what} in {seconds:.2} s, {rate:.1} a second{kept}: {}", files.join(", ")));
+        to_stderr(&format!(
+            "{} in {seconds:.2} s, {rate:.1} a second{kept}: {}",
+            counted(*drawn, what),
+            files.join(", ")
+        ));
     }
 }
 

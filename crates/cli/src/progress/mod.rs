@@ -46,7 +46,7 @@ pub(crate) struct Watcher {
 
 /// What a job came to, for the last line.
 pub(crate) struct Result {
-    /// What was drawn, in the plural.
+    /// What one thing that was drawn is called.
     pub(crate) what: &'static str,
     pub(crate) drawn: usize,
     pub(crate) kept: usize,

@@ -118,7 +118,16 @@ fn a_scene_that_is_not_there_is_named() {
     let folder = Folder::new();
     let run = folder.run(&["render", "gone.toml"]);
     assert_eq!((run.code, run.errors()), (Some(3), 1));
-    says(&run.stderr, &["error: gone.toml: the scene cannot be read"]);
+    says(&run.stderr, &["error: gone.toml: the scene cannot be read", "`bansho new gone.toml` writes a new scene"]);
+    folder.write("scenes/fire.toml", FLAME);
+    folder.write("scenes/water.toml", FLAME);
+    for typed in ["scenes/fre.toml", "scenes/fire", "scenes/Fire.toml"] {
+        let run = folder.run(&["check", typed]);
+        assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+        says(&run.stderr, &[&format!("error: {typed}: "), "did you mean `scenes/fire.toml`?"]);
+    }
+    let far = folder.run(&["check", "scenes/zzz.toml"]).stderr;
+    assert!(!far.contains("did you mean") && far.contains("bansho new scenes/zzz.toml"), "{far}");
 }
 
 #[test]
@@ -191,6 +200,7 @@ fn assignments_at_fault_are_blamed_and_not_the_scene() {
     misused(&["--set", "flame_sheet.7.height=2"], &["flame_sheet.7.height", "left log"]);
     misused(&["--set", "picture.frames=0"], &["scene.toml as changed", "picture.frames", "out of range"]);
     misused(&["--set", "picture.framse=3"], &["did you mean `frames`?"]);
+    misused(&["--set", "height=2"], &["--set: height=2: ", "did you mean `flame_sheet.height`?"]);
     // A fault of the scene itself is told as such, with its own line.
     let folder = Folder::with_scene(&FLAME.replace("frames = 6", "frames = 0"));
     let run = folder.run(&["render", "scene.toml", "--set", "wind.gust=0.5"]);

@@ -24,7 +24,15 @@ fn a_new_scene_shows_any_phenomenon() {
         folder.succeed(&["new", kind, "--phenomenon", kind]);
         let text = String::from_utf8(folder.files("")[&file].clone()).unwrap();
         assert!(text.contains(&format!("\n[[{kind}]]\n")), "{text}");
-        folder.succeed(&["check", &file]);
+        assert!((15..=50).contains(&text.lines().count()) && text.contains("--all"), "{text}");
+        let short = folder.succeed(&["check", &file]);
+        std::fs::remove_file(folder.path(&file)).unwrap();
+        folder.succeed(&["new", kind, "--phenomenon", kind, "--all"]);
+        assert!(folder.files("")[&file].len() > 4 * text.len());
+        assert_eq!(folder.succeed(&["check", &file]).stdout, short.stdout);
+    }
+    for other in [&["--from", "drizzle"][..], &["--list"]] {
+        assert_eq!(folder.run(&[&["new", "storm", "--all"], other].concat()).code, Some(2), "{other:?}");
     }
     let unknown = folder.run(&["new", "storm", "--phenomenon", "rian"]);
     assert_eq!((unknown.code, unknown.errors()), (Some(2), 1));
@@ -154,7 +162,9 @@ fn the_studio_is_the_program_beside_this_one_and_where_there_is_none_it_says_how
     fs::copy(env!("CARGO_BIN_EXE_bansho"), &program).unwrap();
     let run = || {
         let path = folder.path("");
-        Command::new(&program).args(["studio", "fire.toml"]).current_dir(&path).env("PATH", &path).output().unwrap()
+        let mut command = Command::new(&program);
+        command.args(["studio", "fire.toml"]).current_dir(&path).env("PATH", &path).env("DISPLAY", ":0");
+        command.output().unwrap()
     };
     let missing = run();
     let told = String::from_utf8(missing.stderr).unwrap();
@@ -166,4 +176,23 @@ fn the_studio_is_the_program_beside_this_one_and_where_there_is_none_it_says_how
     fs::set_permissions(&studio, fs::Permissions::from_mode(0o755)).unwrap();
     assert!(run().status.success());
     assert_eq!(folder.files("")["opened"], b"fire.toml\n");
+
+    // What the studio itself said is not said again.
+    fs::write(&studio, "#!/bin/sh\necho 'error: no window' >&2\nexit 1\n").unwrap();
+    let failed = run();
+    assert_eq!((failed.status.code(), failed.stderr), (Some(1), b"error: no window\n".to_vec()));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn without_a_display_the_studio_says_in_a_line_what_to_do() {
+    let folder = Folder::new();
+    let mut command = folder.command(&["studio", "fire.toml"]);
+    ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"].into_iter().for_each(|name| {
+        command.env_remove(name);
+    });
+    let output = command.output().unwrap();
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), told.lines().count()), (Some(1), 1), "{told}");
+    assert!(told.contains("no display") && told.contains("bansho render"), "{told}");
 }

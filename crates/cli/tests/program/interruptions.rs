@@ -92,7 +92,7 @@ fn resume_draws_broken_and_foreign_frames_and_no_others() {
         let untouched = fs::metadata(name(0)).unwrap().modified().unwrap();
         let resumed = folder.succeed(&["render", "scene.toml", "--resume", "--out", &out]);
         assert!(
-            resumed.stderr.starts_with("5 frames in ") && resumed.stderr.contains("1 were there already"),
+            resumed.stderr.starts_with("5 frames in ") && resumed.stderr.contains("1 was there already"),
             "{}",
             resumed.stderr
         );

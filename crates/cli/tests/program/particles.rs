@@ -167,7 +167,7 @@ fn a_flame_that_cannot_be_seen_is_told() {
     let ball = "[[obstacle]]\nshape = \"sphere\"\nradius = 0.5\n";
     for (more, expected) in [
         (format!("{burner}flow = 0.0\n"), "flame_particles: none of its burners gives gas"),
-        (format!("{burner}{ball}"), "flame_particles: its burner 1 (counted from 1) lies within an obstacle"),
+        (format!("{burner}{ball}"), "flame_particles: its burner 1 lies within an obstacle"),
     ] {
         let folder = Folder::with_scene(&format!("{GAS}{more}"));
         let run = folder.succeed(&["render", "scene.toml", "--frames", "0"]);

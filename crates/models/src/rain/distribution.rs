@@ -137,7 +137,7 @@ pub enum SizeTableError {
     #[error("a table of drop sizes needs at least two points")]
     TooShort,
     /// Diameters are negative, infinite, or do not rise.
-    #[error("diameters must rise from 0 mm on; point {index} has {diameter_mm} mm")]
+    #[error("diameters must rise from 0 mm on; point {} has {diameter_mm} mm", index + 1)]
     Diameter {
         /// Which point, from 0.
         index: usize,

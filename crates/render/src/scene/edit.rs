@@ -2,7 +2,7 @@
 
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 
-use super::{FORMAT, SHARED_TABLES};
+use super::{FORMAT, PhenomenonKind, SHARED_TABLES, suggest};
 
 /// Why an edit cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -16,7 +16,7 @@ pub enum EditError {
     )]
     NoAssignment(String),
     /// The path leads nowhere.
-    #[error("`{path}`: {segment} is not in the scene; there is: {there}")]
+    #[error("`{path}`: {segment} is not in the scene{}; there is: {there}", did_you_mean(.meant))]
     NoSuchPlace {
         /// The whole path.
         path: String,
@@ -24,6 +24,8 @@ pub enum EditError {
         segment: String,
         /// What is there instead.
         there: String,
+        /// Paths that may have been meant.
+        meant: Vec<String>,
     },
     /// The value is nothing that TOML can say.
     #[error("`{0}` cannot stand in a scene")]
@@ -47,19 +49,21 @@ pub enum EditError {
 /// The text with `assignment` carried out: `key.path=value`.
 ///
 /// The value is TOML; a bare word is a string. Of the tables of a list a number or a name picks one (`rain.0.rate_mm_per_h`,
-/// `flame_sheet.left log.height`, `flame_particles.0.burners.2.speed`); without it all are meant.
+/// `flame_sheet.left log.height`, `flame_particles.0.burners.2.speed`); without it all are meant. `kinds` are the phenomena that a scene may hold.
 ///
 /// # Errors
 /// The text is no TOML, the assignment is malformed, or the path leads nowhere.
-pub fn set(text: &str, assignment: &str) -> Result<String, EditError> {
+pub fn set(text: &str, assignment: &str, kinds: &[PhenomenonKind]) -> Result<String, EditError> {
     let mut document: DocumentMut = text.parse().map_err(syntax)?;
     let (path, value) = split(assignment)?;
     let value = parse_value(value);
     let segments: Vec<&str> = path.split('.').map(str::trim).collect();
     let root = document.as_table_mut();
     ensure_shared_table(root, &segments);
-    if segments.len() > 1 && !root.contains_key(segments[0]) {
-        return Err(nowhere(path, segments[0], keys(root)));
+    let is_known = if segments.len() > 1 { root.contains_key(segments[0]) } else { is_root_key(segments[0], kinds) };
+    if !is_known {
+        let (path, segment, there) = (path.to_owned(), segments[0].to_owned(), keys(root));
+        return Err(EditError::NoSuchPlace { meant: suggest::paths(text, &segments, kinds), path, segment, there });
     }
     set_in(root, &segments, &value, path)?;
     let edited = document.to_string();
@@ -91,6 +95,11 @@ fn is_path(path: &str) -> bool {
 
 fn parse_value(text: &str) -> Value {
     text.parse().unwrap_or_else(|_| Value::from(text))
+}
+
+/// Whether anything of that name may stand at the root of a scene.
+fn is_root_key(key: &str, kinds: &[PhenomenonKind]) -> bool {
+    key == "bansho" || SHARED_TABLES.iter().any(|table| table.key == key) || kinds.iter().any(|kind| kind.key == key)
 }
 
 fn ensure_shared_table(root: &mut Table, segments: &[&str]) {
@@ -195,7 +204,7 @@ fn numbered(count: usize, what: &str) -> String {
     match count {
         0 => format!("no {what} in it"),
         1 => format!("{what} 0"),
-        _ => format!("{what} 0 to {}", count - 1),
+        _ => format!("{what}s 0 to {}", count - 1),
     }
 }
 
@@ -204,7 +213,12 @@ fn keys(table: &dyn TableLike) -> String {
 }
 
 fn nowhere(path: &str, segment: &str, there: String) -> EditError {
-    EditError::NoSuchPlace { path: path.to_owned(), segment: segment.to_owned(), there }
+    EditError::NoSuchPlace { path: path.to_owned(), segment: segment.to_owned(), there, meant: Vec::new() }
+}
+
+fn did_you_mean(meant: &[String]) -> String {
+    let meant: Vec<String> = meant.iter().map(|path| format!("`{path}`")).collect();
+    if meant.is_empty() { String::new() } else { format!(", did you mean {}?", meant.join(" or ")) }
 }
 
 /// The text in the newest format; `None` where it is that already.
@@ -229,6 +243,11 @@ pub fn upgrade(text: &str) -> Result<Option<String>, EditError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::phenomena::KINDS;
+
+    fn set(text: &str, assignment: &str) -> Result<String, EditError> {
+        super::set(text, assignment, KINDS)
+    }
 
     const SCENE: &str =
         "bansho = 1\n[picture]\nsize = [64, 36] # small\n[[flame_sheet]]\nname = \"left log\"\n[[flame_sheet]]\n";
@@ -281,7 +300,7 @@ mod tests {
             assert!(text.contains("speed = 1") && text.matches("diameter = 0.2").count() == 1, "{text}");
             assert_eq!(set(scene, "flame_particles.burners.speed=3").unwrap().matches("speed = 3").count(), 2);
             let beyond = set(scene, "flame_particles.0.burners.2.speed=1").unwrap_err().to_string();
-            assert!(beyond.contains("burners.2.speed`: 2 is not in the scene; there is: table 0 to 1"), "{beyond}");
+            assert!(beyond.contains("burners.2.speed`: 2 is not in the scene; there is: tables 0 to 1"), "{beyond}");
             let whole = set(scene, "flame_particles.0.burners.0=1");
             assert!(matches!(whole, Err(EditError::NoAssignment(_))), "{whole:?}");
         }
@@ -296,8 +315,34 @@ mod tests {
         assert!(set(SCENE, "picture.size.1=9").unwrap().contains("size = [64, 9] # small"));
         for path in ["picture.size.2", "picture.size.x", "picture.size.0.x"] {
             let error = set(SCENE, &format!("{path}=1")).unwrap_err().to_string();
-            assert!(error.contains("there is: value 0 to 1"), "{error}");
+            assert!(error.contains("there is: values 0 to 1"), "{error}");
         }
+    }
+
+    #[test]
+    fn a_path_without_its_table_gets_the_tables_that_have_such_a_parameter() {
+        let told = |scene: &str, assignment: &str| set(scene, assignment).unwrap_err().to_string();
+        let height = told(SCENE, "height=2");
+        assert_eq!(
+            height,
+            "`height`: height is not in the scene, did you mean `flame_sheet.height`?; there is: bansho, picture, flame_sheet"
+        );
+        let both = "bansho = 1\n[[rain]]\n[[flame_particles]]\nburners = [{}]\n";
+        for (scene, assignment, expected) in [
+            (SCENE, "gust=1", "did you mean `wind.gust`?"),
+            (SCENE, "flame_sheat.height=2", "did you mean `flame_sheet.height`?"),
+            (SCENE, "flame_sheat.1.height=2", "did you mean `flame_sheet.1.height`?"),
+            (SCENE, "hieght=2", "did you mean `flame_sheet.height`?"),
+            (SCENE, "fire.height=2", "did you mean `flame_sheet.height`?"),
+            (both, "rate_mm_per_h=2", "did you mean `rain.rate_mm_per_h`?"),
+            (both, "burners.diameter=2", "did you mean `flame_particles.burners.diameter`?"),
+        ] {
+            let told = told(scene, assignment);
+            assert!(told.contains(expected), "{assignment}: {told}");
+        }
+        assert!(!told(SCENE, "rate_mm_per_h=2").contains("rain"), "there is no rain in that scene");
+        assert!(!told(SCENE, "zzzzqqq=2").contains("did you mean"));
+        assert!(set(SCENE, "bansho=1").is_ok() && set(SCENE, "wind={ gust = 1 }").is_ok());
     }
 
     #[test]

@@ -11,6 +11,7 @@ pub(crate) mod plate;
 pub mod report;
 pub mod schema;
 pub mod source;
+mod suggest;
 pub mod template;
 mod toml;
 

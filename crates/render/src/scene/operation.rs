@@ -154,7 +154,8 @@ fn nowhere(place: &Place, segment: &Segment) -> EditError {
         Segment::Key(key) => key.clone(),
         Segment::Index(index) => index.to_string(),
     };
-    EditError::NoSuchPlace { path: place.to_string(), segment, there: "nothing of that name or number".to_owned() }
+    let there = "nothing of that name or number".to_owned();
+    EditError::NoSuchPlace { path: place.to_string(), segment, there, meant: Vec::new() }
 }
 
 /// What holds the value at `place`, and the last step to that; tables on the way, and first items of lists, are made where `make` says so.

@@ -90,6 +90,8 @@ pub struct PhenomenonKind {
     pub in_the_sky: bool,
     /// What a new scene of it states so that it is seen well, as a scene file says it.
     pub setting: &'static str,
+    /// Keys that one changes first, in tables and lists of tables within it with dots.
+    pub first_keys: &'static [&'static str],
 }
 
 /// Keys that every phenomenon has beside its own.
@@ -103,6 +105,8 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     const IN_THE_SKY: bool = false;
     /// What a new scene of it states so that it is seen well, as a scene file says it; nothing where all defaults do.
     const SETTING: &'static str = "";
+    /// Keys that one changes first, with which a short new scene begins; dots lead into tables and lists of tables (`burners.diameter`).
+    const FIRST_KEYS: &'static [&'static str] = &[];
 
     /// How many particles live in memory with the `others` of the scene, of which all phenomena together may have so many.
     ///
@@ -133,6 +137,7 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
         read: read_described::<Self>,
         in_the_sky: Self::IN_THE_SKY,
         setting: Self::SETTING,
+        first_keys: Self::FIRST_KEYS,
     };
 }
 

@@ -1,5 +1,5 @@
-//! New scenes: every parameter with its unit and what it is for, stated where the phenomenon is seen the better for it, and else a comment
-//! with its default, ready to be uncommented.
+//! New scenes: short ones, of what is changed first, and ones of every parameter with its unit and what it is for, stated where the
+//! phenomenon is seen the better for it, and else a comment with its default, ready to be uncommented. Both draw the same picture.
 
 use bansho_base::parameters::{Descriptor, Kind, Table, TableDescriptor, Value};
 
@@ -7,6 +7,92 @@ use super::{FORMAT, PhenomenonKind, SHARED_TABLES, toml};
 
 /// Shared tables that a scene need not have, and has only where the phenomenon's setting does.
 const OPTIONAL: [&str; 5] = ["plate", "sky", "ground", "light", "obstacle"];
+
+/// What is changed first in shared tables, beside what a setting states.
+const FIRST_SHARED: [(&str, &[&str]); 3] = [
+    ("picture", &["size", "frames", "fps"]),
+    ("camera", &["position", "target", "vertical_fov_deg"]),
+    ("wind", &["velocity", "gust"]),
+];
+
+/// A short scene with one phenomenon of `kind` in its setting: what one changes first, each with a brief comment.
+pub fn short(kind: &PhenomenonKind) -> String {
+    // A test holds that settings can be read.
+    let setting = toml::parse(kind.setting).unwrap_or_default();
+    let mut text = format!("bansho = {FORMAT}   # format version\n");
+    for shared in SHARED_TABLES {
+        let first = FIRST_SHARED.iter().find(|(key, _)| *key == shared.key).map_or(&[][..], |(_, keys)| keys);
+        let stated = tables(&setting, shared.key);
+        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        let nothing = Table::default();
+        let usual = (stated.is_empty() && !first.is_empty()).then_some(&nothing);
+        for stated in stated.into_iter().chain(usual) {
+            brief_table(&mut text, &header, (shared.table)(), stated, first);
+        }
+    }
+    let stated = tables(&setting, kind.key).first().copied().cloned().unwrap_or_default();
+    brief_table(&mut text, &format!("[[{}]]", kind.key), (kind.table)(), &stated, kind.first_keys);
+    text
+}
+
+/// A line of a short scene.
+struct Line {
+    /// `key = value`
+    assignment: String,
+    comment: String,
+}
+
+/// A table with what it states and the `first` keys of it, then those of its lists that have first keys with one item each.
+fn brief_table(text: &mut String, header: &str, descriptor: &TableDescriptor, stated: &Table, first: &[&str]) {
+    /// Longest assignment whose comment stands in the others' column.
+    const COLUMN: usize = 44;
+    let lines = lines("", descriptor, stated, first);
+    let width = lines.iter().map(|line| line.assignment.len()).filter(|&length| length <= COLUMN).max().unwrap_or(0);
+    text.push_str(&format!("\n{header}\n"));
+    lines.iter().for_each(|line| text.push_str(&format!("{:width$}   # {}\n", line.assignment, line.comment)));
+    for parameter in descriptor.parameters.iter().filter(|parameter| stated.get(parameter.key).is_none()) {
+        let Kind::List { item, .. } = &parameter.kind else { continue };
+        let Kind::Table(inner) = **item else { continue };
+        let first: Vec<&str> =
+            first.iter().filter_map(|path| path.strip_prefix(parameter.key)?.strip_prefix('.')).collect();
+        if !first.is_empty() {
+            let header = format!("[[{}.{}]]", header.trim_matches(['[', ']']), parameter.key);
+            brief_table(text, &header, inner(), &Table::default(), &first);
+        }
+    }
+}
+
+/// What is stated in a table, and the `first` keys of it, tables within it too.
+fn lines(prefix: &str, descriptor: &TableDescriptor, stated: &Table, first: &[&str]) -> Vec<Line> {
+    let mut all = Vec::new();
+    for parameter in &descriptor.parameters {
+        let path = format!("{prefix}{}", parameter.key);
+        let own = stated.get(parameter.key).map(|node| &node.value);
+        if let Kind::Table(inner) = &parameter.kind {
+            let nothing = Table::default();
+            let own = if let Some(Value::Table(own)) = own { own } else { &nothing };
+            all.extend(lines(&format!("{path}."), inner(), own, first));
+        } else if let Some(value) = own.or(parameter.default.as_ref().filter(|_| first.contains(&path.as_str()))) {
+            let assignment = format!("{path} = {value}");
+            all.push(Line { comment: brief(parameter, assignment.len()), assignment });
+        }
+    }
+    all
+}
+
+/// The first sentence of what is said of a parameter, or its beginning where that would make a long line after so many characters, and the unit.
+fn brief(parameter: &Descriptor, after: usize) -> String {
+    const WIDTH: usize = 110;
+    let doc = parameter.doc.split_whitespace().collect::<Vec<_>>().join(" ");
+    let is_end = |at: usize| doc[at + 2..].starts_with(|next: char| next.is_uppercase());
+    let end = doc.match_indices(". ").map(|(at, _)| at).find(|&at| is_end(at)).unwrap_or(doc.len());
+    let mut sentence = doc[..end].trim_end_matches('.');
+    if after + sentence.len() > WIDTH {
+        sentence = sentence.split([';', ':']).next().unwrap_or(sentence);
+    }
+    let unit = if parameter.unit.is_empty() { String::new() } else { format!(" [{}]", parameter.unit) };
+    format!("{sentence}{unit}")
+}
 
 /// A scene with one phenomenon of `kind` in its setting, each parameter explained in a comment.
 pub fn commented(kind: &PhenomenonKind) -> String {

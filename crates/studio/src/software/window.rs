@@ -32,7 +32,7 @@ pub type Build = Box<dyn FnOnce(&egui::Context) -> Result<Box<dyn Program>, Box<
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
     /// The system has no screen for it.
-    #[error("no window: {0}")]
+    #[error("no window: {0}; start the studio from a desktop session, or draw without a window: bansho render SCENE")]
     Events(#[from] EventLoopError),
     /// The system does not open it.
     #[error("no window: {0}")]

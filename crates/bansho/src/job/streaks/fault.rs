@@ -1,5 +1,6 @@
 //! What cannot be drawn as streak textures.
 
+use bansho_base::plural::counted;
 use bansho_models::rain::{
     distribution::{DropSizes, SizeBin},
     velocity::NoTerminalVelocity,
@@ -68,7 +69,7 @@ pub enum StreaksFault {
     #[error("an exposure of {0} s; allowed: 0.000001 to 10 s")]
     Exposure(f64),
     /// A texture too small or too large.
-    #[error("textures of {0} pixels a side; allowed: 8 to 4096")]
+    #[error("textures of {} a side; allowed: 8 to 4096", counted(*.0, "pixel"))]
     Size(usize),
     /// A cube too small or too large.
     #[error("a box of {0} m; allowed: 0.001 to 100 m")]

@@ -1,6 +1,6 @@
 //! Faults of drawn shapes, each at its sheet and point.
 
-use bansho_base::assets::AssetError;
+use bansho_base::{assets::AssetError, plural::counted};
 
 /// Shapes from which no aurora can be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -16,7 +16,7 @@ pub struct ShapeFault {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeFaultKind {
     /// Nothing that could be a line.
-    #[error("sheet {sheet} has {found} of the points that a sheet needs; allowed: at least 2, at different places")]
+    #[error("sheet {sheet} has {}; allowed: at least 2, at different places", counted(*.found, "point"))]
     TooFewPoints {
         /// The sheet.
         sheet: usize,
@@ -83,7 +83,8 @@ pub enum ShapeFaultKind {
     },
     /// Sheets that come from nowhere or go nowhere.
     #[error(
-        "has {found} sheets, but {expected} come from the shape before; allowed: as many as come, or `split` and `merge` that make up the difference"
+        "has {}, but {expected} from the shape before; allowed: as many as come, or `split` and `merge` that make up the difference",
+        counted(*.found, "sheet"), expected = come(*.expected)
     )]
     Unmatched {
         /// Sheets drawn.
@@ -92,7 +93,7 @@ pub enum ShapeFaultKind {
         expected: usize,
     },
     /// More sheets than can be followed.
-    #[error("has {found} sheets; allowed: up to {most}")]
+    #[error("has {}; allowed: up to {most}", counted(*.found, "sheet"))]
     TooManySheets {
         /// Sheets drawn.
         found: usize,
@@ -241,4 +242,9 @@ pub enum ShapeFaultKind {
     /// A drawing that cannot be had.
     #[error("{0}")]
     Asset(#[from] AssetError),
+}
+
+/// How many sheets come from the shape before.
+fn come(count: usize) -> String {
+    if count == 1 { "1 comes".to_owned() } else { format!("{count} come") }
 }
