@@ -103,13 +103,12 @@ pub enum Remark {
     },
     /// Something that changes the plate hardly.
     #[error(
-        "it changes the picture by {percent:.1} %, which is hardly seen; {advice}, a [[light]] of more candela, or a lower `exposure_ev100` \
-         in [plate] would show it"
+        "it changes the picture by {percent:.1} %, which is hardly seen; to show it, {advice}, or lower `exposure_ev100` in [plate]"
     )]
     Faint {
         /// Mean change of the picture, beside its mean.
         percent: f64,
-        /// What of its own would make it stronger.
+        /// What else would show it.
         advice: &'static str,
     },
 }
@@ -197,9 +196,9 @@ pub trait Phenomenon: Send + Sync {
         None
     }
 
-    /// What of its own parameters would make it stronger, as a remark says it.
+    /// What to do to make it stronger, as a remark says it.
     fn strengthened_by(&self) -> &'static str {
-        "more of it"
+        "make it larger or brighter"
     }
 
     /// The level mirror that it is. It then gets a picture of everything else seen in that mirror.

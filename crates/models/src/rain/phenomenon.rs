@@ -160,7 +160,7 @@ impl Phenomenon for Rain {
     }
 
     fn strengthened_by(&self) -> &'static str {
-        "a greater `rate_mm_per_h` or `opacity_gain`"
+        "raise `rate_mm_per_h` or `opacity_gain`, add a [[light]] of more candela"
     }
 
     /// Rain fills all depths; it is cut where lights stand, so that a fire has streaks before, within and behind it.

@@ -14,7 +14,7 @@ use crate::{backend::RenderError, plan::Plan};
 const FAINT: f64 = 0.02;
 /// Change of display values that is seen also where it is small in extent, and the share of the picture that must change so much.
 const SEEN: f64 = 0.1;
-const SEEN_SHARE: f64 = 0.01;
+const SEEN_SHARE: f64 = 0.001;
 
 /// Remarks on those of a plan's `phenomena` that change its plate so little that they are hardly seen; on none of them without a plate.
 ///
@@ -97,7 +97,7 @@ mod tests {
         };
         assert!((changed(1000, 0.004).mean - 0.016).abs() < 1e-12);
         assert!(changed(1000, 0.004).is_faint() && !changed(1000, 0.006).is_faint());
-        assert!(!changed(11, 0.3).is_faint() && changed(2, 0.3).is_faint());
+        assert!(!changed(2, 0.3).is_faint() && changed(0, 0.3).is_faint() && changed(900, 0.001).is_faint());
         assert!(!Change::between(&[0.1; 4], &[0.0; 4]).is_faint());
     }
 }
