@@ -28,6 +28,8 @@ pub struct Picture {
     pub depth: Option<Vec<f32>>,
     /// What the colours mean.
     pub encoding: Encoding,
+    /// Exposure value at ISO 100 with which it was taken, as far as the file records it.
+    pub exposure_ev100: Option<f64>,
 }
 
 /// Why an asset cannot be had.

@@ -67,7 +67,7 @@ pub enum SnapshotError {
 }
 
 /// What a user should know of how a phenomenon will look, and that stops nothing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Remark {
     /// It only shows the light of others, and there is none.
     #[error("nothing lights it, so it is drawn black; a [[light]], a [sky] or a fire would")]
@@ -90,6 +90,27 @@ pub enum Remark {
     /// Nothing is ever given off.
     #[error("none of its burners gives gas; a `flow` above 0 would")]
     Unfed,
+    /// A plate that does not say with which exposure it was taken.
+    #[error(
+        "with which exposure it was taken is not known; EV {ev100:.1} (at ISO 100) is assumed, so that its white is {white:.0} cd/m^2; \
+         `exposure_ev100` in [plate] states it"
+    )]
+    PlateExposureAssumed {
+        /// What is assumed.
+        ev100: f64,
+        /// Luminance of display white at it, cd/m^2.
+        white: f64,
+    },
+    /// Something that changes the plate hardly.
+    #[error(
+        "it changes the picture by {percent:.1} %, which is hardly seen; to show it, {advice}, or lower `exposure_ev100` in [plate]"
+    )]
+    Faint {
+        /// Mean change of the picture, beside its mean.
+        percent: f64,
+        /// What else would show it.
+        advice: &'static str,
+    },
 }
 
 impl Remark {
@@ -97,7 +118,7 @@ impl Remark {
     #[must_use]
     pub fn key(&self) -> Option<String> {
         match self {
-            Self::Unlit | Self::Unfed => None,
+            Self::Unlit | Self::Unfed | Self::PlateExposureAssumed { .. } | Self::Faint { .. } => None,
             Self::Buried { burner } => Some(format!("burners.{}", burner.saturating_sub(1))),
             Self::Crossing { shape } => Some(format!("shapes.{}", shape.saturating_sub(1))),
         }
@@ -173,6 +194,11 @@ pub trait Phenomenon: Send + Sync {
     /// What a user should know of how it will look among others.
     fn remark(&self, _surroundings: &Surroundings) -> Option<Remark> {
         None
+    }
+
+    /// What to do to make it stronger, as a remark says it.
+    fn strengthened_by(&self) -> &'static str {
+        "make it larger or brighter"
     }
 
     /// The level mirror that it is. It then gets a picture of everything else seen in that mirror.

@@ -1,5 +1,6 @@
 //! The sky as a light: what it shines from each direction.
 
+mod elevations;
 mod night;
 
 use std::f64::consts::PI;
@@ -13,6 +14,7 @@ use crate::{
     parameters::Range,
 };
 
+pub use elevations::{ElevationProfile, ElevationSample};
 pub use night::{EARTH_RADIUS_KM, Night, NightParameters, Parallel};
 
 /// Air masses along a line of sight `elevation` radians above the horizon: 1 overhead, 38 at the horizon (Kasten & Young 1989). What lies
@@ -67,7 +69,7 @@ impl SkyParameters {
         }
         let colour = black_body().radiance(self.temperature_k as f32);
         let scale = self.luminance.at(t) / f64::from(luminance(colour)).max(f64::MIN_POSITIVE);
-        Sky { kind: self.kind, zenith: colour.map(|value| (f64::from(value) * scale) as f32), night: None }
+        Sky { kind: self.kind, zenith: colour.map(|value| (f64::from(value) * scale) as f32), ..Sky::DARK }
     }
 }
 
@@ -80,18 +82,29 @@ pub struct Sky {
     kind: SkyKind,
     zenith: [f32; 3],
     night: Option<Night>,
+    measured: Option<ElevationProfile>,
 }
 
 impl Sky {
     /// No light from anywhere.
-    pub const DARK: Self = Self { kind: SkyKind::Uniform, zenith: [0.0; 3], night: None };
+    pub const DARK: Self = Self { kind: SkyKind::Uniform, zenith: [0.0; 3], night: None, measured: None };
 
-    fn of_night(night: Night) -> Self {
-        Self { kind: SkyKind::Night, zenith: night.radiance(DVec3::Y), night: Some(night) }
+    /// Light that was measured, from above and from below (ACEScg, cd/m^2).
+    #[must_use]
+    pub fn measured(profile: ElevationProfile) -> Self {
+        Self { zenith: profile.radiance(1.0), measured: Some(profile), ..Self::DARK }
     }
 
-    /// Radiance from a direction, a unit vector (ACEScg, cd/m^2). From below the horizon comes what a dull ground throws back.
+    fn of_night(night: Night) -> Self {
+        Self { kind: SkyKind::Night, zenith: night.radiance(DVec3::Y), night: Some(night), measured: None }
+    }
+
+    /// Radiance from a direction, a unit vector (ACEScg, cd/m^2). From below the horizon comes what a dull ground throws back, unless it
+    /// was measured.
     pub fn radiance(&self, direction: DVec3) -> [f32; 3] {
+        if let Some(measured) = &self.measured {
+            return measured.radiance(direction.y);
+        }
         if direction.y < 0.0 {
             return self.horizontal_illuminance().map(|value| value * (GROUND_ALBEDO / PI) as f32);
         }
@@ -112,6 +125,10 @@ impl Sky {
         if self.night.is_some() {
             return None;
         }
+        if let Some(measured) = &self.measured {
+            let each = sines.map(|sine| measured.radiance(f64::from(sine)));
+            return Some(std::array::from_fn(|c| each.map(|radiance| radiance[c])));
+        }
         let ground = self.radiance(-DVec3::Y);
         let mut shares = [1.0; N];
         if self.kind == SkyKind::Overcast {
@@ -130,6 +147,9 @@ impl Sky {
 
     /// Illuminance of open, level ground (ACEScg, lux).
     pub fn horizontal_illuminance(&self) -> [f32; 3] {
+        if let Some(measured) = &self.measured {
+            return measured.horizontal_illuminance();
+        }
         let hemisphere = match self.kind {
             SkyKind::Overcast => 7.0 / 9.0 * PI,
             // Nearly even: what the horizon has more of airglow the air takes.
@@ -145,7 +165,7 @@ impl Sky {
 
     /// Whether it gives no light.
     pub fn is_dark(&self) -> bool {
-        self.zenith == [0.0; 3]
+        self.measured.map_or(self.zenith == [0.0; 3], |measured| measured.is_dark())
     }
 }
 
@@ -183,6 +203,11 @@ mod tests {
             }
         }
         assert_eq!(sky(SkyKind::Night).radiance_at_elevations(&sines), None);
+        let samples = [(-0.5, 1.0), (0.5, 9.0)];
+        let sample = |(sine, value)| ElevationSample { sine, weight: 1.0, radiance: [value; 3] };
+        let measured = Sky::measured(ElevationProfile::of_samples(samples.map(sample)).unwrap());
+        let planes = measured.radiance_at_elevations(&sines).unwrap();
+        assert_eq!(planes[1].map(|value| value), sines.map(|sine| measured.radiance(DVec3::Y * f64::from(sine))[1]));
     }
 
     #[test]

@@ -29,6 +29,8 @@ pub fn of_frame(plan: &Plan, number: i64) -> [u8; 32] {
     for path in [&plan.scene.plate.image, &plan.scene.plate.depth].into_iter().flatten() {
         asset(plan, &path.0, number, &mut hasher);
     }
+    // The first one's light falls on all frames.
+    plan.scene.plate.image.iter().for_each(|path| shared_asset(plan, &path.0, &mut hasher));
     *hasher.finalize().as_bytes()
 }
 

@@ -4,6 +4,7 @@ pub mod backend;
 mod cpu;
 pub mod display;
 mod dissolving;
+mod exposure;
 pub mod fingerprint;
 pub mod frames;
 pub mod phenomena;

@@ -1,20 +1,22 @@
 //! The plan of a shot: everything fixed before the first frame.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
     assets::Assets,
     canvas::{Shutter, View},
     color,
     image::{FrameHeader, Rect},
+    once::get_or_make,
     parameters::{Auto, path},
     phenomenon::{Phenomenon, Remark},
+    sky::{ElevationProfile, Sky},
     surroundings::Occluder,
     wind::Wind,
 };
 
 use crate::{
-    fingerprint, phenomena,
+    cpu, exposure, fingerprint, phenomena,
     scene::{FrameRate, ObstacleParameters, OpeningFault, SHARED_TABLES, Scene, SharedTable},
 };
 
@@ -123,6 +125,8 @@ pub struct Plan {
     pub wind: Wind,
     /// The scene's obstacles.
     pub occluders: Vec<Occluder>,
+    /// The light that the plate shows, beside its display white; found when it is first asked for.
+    pub(crate) plate_light: Arc<OnceLock<Option<ElevationProfile>>>,
 }
 
 impl Plan {
@@ -176,6 +180,7 @@ impl Plan {
             display: options.display,
             wind,
             occluders,
+            plate_light: Arc::default(),
             assets,
             scene,
         };
@@ -185,14 +190,15 @@ impl Plan {
 
     /// The shot, its loop begun at a calm moment. What cannot be drawn to find that will say so when it is drawn.
     fn begun_calmly(self) -> Self {
-        let loop_start = self.loop_s.and_then(|_| crate::cpu::calmest_start(&self).ok()).unwrap_or_default();
+        let loop_start = self.loop_s.and_then(|_| cpu::calmest_start(&self).ok()).unwrap_or_default();
         Self { loop_start, ..self }
     }
 
     /// The same shot in another size, whole and without overscan.
     #[must_use]
     pub fn at_size(&self, size: [usize; 2]) -> Self {
-        let mut plan = Self { size, window: Rect::of_size(size[0], size[1]), ..self.clone() };
+        let window = Rect::of_size(size[0], size[1]);
+        let mut plan = Self { size, window, plate_light: Arc::default(), ..self.clone() };
         plan.scene.picture.overscan = 0;
         plan
     }
@@ -225,7 +231,7 @@ impl Plan {
     /// # Errors
     /// A phenomenon cannot be made.
     pub fn remarks(&self) -> Result<Vec<(String, Remark)>, PlanError> {
-        crate::cpu::remarks(self)
+        cpu::remarks(self)
     }
 
     /// Frames a second.
@@ -298,6 +304,22 @@ impl Plan {
         color::exposure_scale(f64::from(self.exposure_ev100)) as f32
     }
 
+    /// The light of the sky at time `t`: the scene's own, or where there is a plate in its place what that plate shows, which is as bright
+    /// as the plate looks at the shot's exposure.
+    pub fn sky(&self, t: f64) -> Sky {
+        if let Some(sky) = &self.scene.sky {
+            return sky.at(t);
+        }
+        let light = get_or_make(&self.plate_light, || cpu::plate_light(self));
+        light.map_or(Sky::DARK, |light| Sky::measured(light.scaled(1.0 / self.exposure_scale())))
+    }
+
+    /// The exposure value of a plate that neither the scene nor the picture states, and the shot therefore assumes.
+    pub(crate) fn assumed_plate_ev100(&self) -> Option<f64> {
+        let is_open = self.scene.has_plate() && self.scene.picture.exposure_ev100 == Auto::Auto;
+        (is_open && exposure::of_plate(self).is_none()).then(|| f64::from(self.exposure_ev100))
+    }
+
     /// How display formats show the picture, with the camera's white balance.
     pub fn shown(&self) -> color::View {
         self.display.balanced(self.scene.picture.white_balance_k)
@@ -316,7 +338,7 @@ impl Plan {
         }
         Ok(match self.scene.picture.exposure_ev100 {
             Auto::Set(ev100) => ev100 as f32,
-            Auto::Auto => auto_ev100(brightest),
+            Auto::Auto => exposure::of_plate(self).unwrap_or_else(|| exposure::automatic(self, brightest)) as f32,
         })
     }
 
@@ -342,15 +364,6 @@ fn occluders(scene: &Scene, assets: &dyn Assets) -> Result<Vec<Occluder>, PlanEr
         obstacle.open(assets).map_err(|fault| opening_error(format!("obstacle {}", index + 1), fault))
     };
     scene.obstacles.iter().enumerate().map(open).collect()
-}
-
-/// How many times display white the bright parts of a phenomenon are with an automatic exposure: enough for a core
-/// that nears white while its edges keep their colour.
-const HEADROOM: f64 = 1.7;
-
-/// The exposure value for bright parts of this luminance, cd/m^2; that of a sunlit day where nothing shines.
-fn auto_ev100(brightest: f64) -> f32 {
-    if brightest > 0.0 { color::ev100_of_white_luminance(brightest / HEADROOM) as f32 } else { 15.0 }
 }
 
 /// The nearest whole number of frames.

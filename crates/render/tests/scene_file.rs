@@ -356,7 +356,10 @@ fn a_plate_of_another_depth_size_is_refused() {
     };
     let mut assets = checkerboard(16, 12, None);
     let colour = Image::filled(8, 6, [1.0; 4]);
-    assets.insert_picture("depth.exr", Picture { colour, depth: Some(vec![1.0; 48]), encoding: Encoding::LinearSrgb });
+    assets.insert_picture(
+        "depth.exr",
+        Picture { colour, depth: Some(vec![1.0; 48]), encoding: Encoding::LinearSrgb, exposure_ev100: None },
+    );
     let text = format!("{CAMERA}[plate]\nimage = \"plate.png\"\ndepth = \"depth.exr\"\n");
     let error = Scene::parse("scene.toml", &text, &kinds(), &assets).err().unwrap().to_string();
     assert!(error.contains("plate.depth: depth.exr: has 8 x 6 pixels; allowed: 16 x 12"), "{error}");

@@ -22,9 +22,33 @@ pub fn ev100_of_white_luminance(luminance: f64) -> f64 {
     libm::log2(luminance / WHITE_AT_EV_0)
 }
 
+/// The EV100 of a picture taken with an f-number, an exposure time in seconds and a sensitivity (ISO): `log2(N^2 / t) - log2(S / 100)`
+/// (ISO 2720). `None` where one of them is not above 0, or the result lies beyond what any picture is taken with.
+#[must_use]
+pub fn ev100_of_camera(f_number: f64, exposure_time_s: f64, iso: f64) -> Option<f64> {
+    let ev100 = libm::log2(f_number * f_number / exposure_time_s) - libm::log2(iso / 100.0);
+    let is_given = [f_number, exposure_time_s, iso].iter().all(|value| *value > 0.0);
+    (is_given && (-LARGEST_EV100..=LARGEST_EV100).contains(&ev100)).then_some(ev100)
+}
+
+/// Farthest from 0 that an exposure value at ISO 100 may lie.
+pub const LARGEST_EV100: f64 = 40.0;
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cameras_settings_give_its_exposure_value() {
+        // Sunny 16: f/16, 1/100 s, ISO 100.
+        assert!((ev100_of_camera(16.0, 0.01, 100.0).unwrap() - 14.644).abs() < 1e-3);
+        // Two stops more sensitive, two stops darker.
+        assert!((ev100_of_camera(2.0, 0.5, 400.0).unwrap() - 1.0).abs() < 1e-12);
+        for [f_number, time, iso] in [[0.0, 1.0, 100.0], [2.8, 0.0, 100.0], [2.8, 1.0, 0.0], [f64::NAN, 1.0, 100.0]] {
+            assert_eq!(ev100_of_camera(f_number, time, iso), None);
+        }
+        assert_eq!(ev100_of_camera(1e9, 1e-9, 100.0), None);
+    }
 
     #[test]
     fn hand_worked_values() {

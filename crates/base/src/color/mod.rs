@@ -24,7 +24,7 @@ pub mod white_balance;
 pub use alpha::AlphaConvention;
 pub use blackbody::{BlackBody, black_body};
 pub use encode::{decode_srgb, decode_srgb8, encode_srgb};
-pub use exposure::{ev100_of_white_luminance, exposure_scale, white_luminance};
+pub use exposure::{LARGEST_EV100, ev100_of_camera, ev100_of_white_luminance, exposure_scale, white_luminance};
 pub use quantise::DisplayCode;
 pub use space::{
     ACESCG_FROM_SRGB, ACESCG_FROM_XYZ, LUMINANCE_WEIGHTS, Matrix3, SRGB_FROM_ACESCG, SRGB_FROM_XYZ, XYZ_FROM_ACESCG,

@@ -17,11 +17,13 @@ use ::exr::{
 };
 use bansho_base::{
     assets::{AssetProblem, Picture},
+    color::{LARGEST_EV100, ev100_of_camera},
     image::Image,
 };
 use rayon::prelude::*;
 
 use super::{
+    KEY_EXPOSURE,
     parse::{self, Outline, Part},
     primaries,
 };
@@ -286,7 +288,14 @@ fn finish(outline: &Outline, wanted: &Wanted, planes: Planes) -> Result<Picture,
         depth
     });
     let colour = Image::from_pixels(width, height, colour).ok_or_else(|| damaged("its pixels do not fill it"))?;
-    Ok(Picture { colour, depth, encoding: conversion.encoding })
+    let exposure_ev100 = exposure(&outline.parts[wanted.part]);
+    Ok(Picture { colour, depth, encoding: conversion.encoding, exposure_ev100 })
+}
+
+/// Exposure value at ISO 100 by Bansho's own attribute, or by those of OpenEXR for a camera's settings.
+fn exposure(part: &Part) -> Option<f64> {
+    let own = part.float(KEY_EXPOSURE).filter(|ev100| ev100.abs() <= LARGEST_EV100);
+    own.or_else(|| ev100_of_camera(part.float("aperture")?, part.float("expTime")?, part.float("isoSpeed")?))
 }
 
 /// Greatest value that is kept: that of half floats, so that an infinity does not spread.

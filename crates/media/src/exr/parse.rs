@@ -14,6 +14,7 @@ pub(crate) struct Part {
     pub(crate) tile: Option<[u32; 2]>,
     pub(crate) chromaticities: Option<[[f32; 2]; 4]>,
     pub(crate) strings: Vec<(String, Range<usize>)>,
+    pub(crate) floats: Vec<(String, f32)>,
 }
 
 /// A channel and how many pixels share a sample.
@@ -48,6 +49,11 @@ const FLAG_DEEP: u32 = 0x800;
 const FLAG_PARTS: u32 = 0x1000;
 
 impl Part {
+    /// The float attribute `name`.
+    pub(crate) fn float(&self, name: &str) -> Option<f64> {
+        self.floats.iter().find(|(key, _)| key == name).map(|(_, value)| f64::from(*value))
+    }
+
     /// The place of the string attribute `name` in the file.
     pub(crate) fn string(&self, name: &str) -> Option<Range<usize>> {
         self.strings.iter().find(|(key, _)| key == name).map(|(_, place)| place.clone())
@@ -165,6 +171,7 @@ impl Part {
             ("chromaticities", b"chromaticities") => {
                 self.chromaticities = Some([value.pair()?, value.pair()?, value.pair()?, value.pair()?]);
             }
+            (_, b"float") => self.floats.push((name.to_owned(), value.float()?)),
             (_, b"string") => self.strings.push((name.to_owned(), value.at..value.file.len())),
             _ => {}
         }

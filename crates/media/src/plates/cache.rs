@@ -48,8 +48,14 @@ mod tests {
 
     #[test]
     fn the_least_used_pictures_make_room() {
-        let picture =
-            || Arc::new(Picture { colour: Image::filled(4, 4, [0.0; 4]), depth: None, encoding: Encoding::LinearSrgb });
+        let picture = || {
+            Arc::new(Picture {
+                colour: Image::filled(4, 4, [0.0; 4]),
+                depth: None,
+                encoding: Encoding::LinearSrgb,
+                exposure_ev100: None,
+            })
+        };
         let (mut cache, budget) = (Cache::default(), 2 * 4 * 4 * 16);
         let path = |name: &str| PathBuf::from(name);
         cache.insert(path("a"), picture(), budget);

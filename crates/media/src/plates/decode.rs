@@ -12,7 +12,7 @@ use zune_jpeg::{
     zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
 };
 
-use super::limits;
+use super::{exposure::exif_ev100, limits};
 
 fn damaged(reason: impl ToString) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
@@ -32,6 +32,7 @@ pub(crate) fn png(file: &[u8]) -> Result<Picture, AssetProblem> {
     limits::check_expansion([width, height], claimed_bytes, file, limits::DEFLATE_RATIO)?;
     let is_linear = info.srgb.is_none() && info.gamma().is_some_and(|gamma| gamma.into_scaled() == 100_000);
     let encoding = if is_linear { Encoding::LinearSrgb } else { Encoding::DisplaySrgb };
+    let exposure_ev100 = info.exif_metadata.as_deref().and_then(exif_ev100);
     let length = reader.output_buffer_size().ok_or_else(|| damaged("its pixels do not fit in memory"))?;
     let mut bytes = vec![0; length];
     let output = reader.next_frame(&mut bytes).map_err(damaged)?;
@@ -42,7 +43,7 @@ pub(crate) fn png(file: &[u8]) -> Result<Picture, AssetProblem> {
         }
         _ => to_rgba(bytes.iter().map(|code| f32::from(*code) / 255.0).collect(), output.color_type),
     };
-    picture(width, height, pixels, encoding)
+    Ok(Picture { exposure_ev100, ..picture(width, height, pixels, encoding)? })
 }
 
 fn to_rgba(values: Vec<f32>, kind: ColorType) -> Vec<[f32; 4]> {
@@ -68,12 +69,13 @@ pub(crate) fn jpeg(file: &[u8]) -> Result<Picture, AssetProblem> {
     let [width, height] = limits::check_size([width as u64, height as u64])?;
     // A block of 8 x 8 pixels takes at least 2 bits, but in a progressive file one code may stand for 2^15 empty ones.
     limits::check_expansion([width, height], width * height, file, 1 << 20)?;
+    let exposure_ev100 = decoder.exif().and_then(|block| exif_ev100(block));
     let bytes = decoder.decode().map_err(damaged)?;
     let pixels = match decoder.output_colorspace() {
         Some(ColorSpace::Luma) => bytes.iter().map(|&code| grey(code)).collect(),
         _ => bytes.as_chunks::<3>().0.iter().map(|&rgb| coloured(rgb)).collect(),
     };
-    picture(width, height, pixels, Encoding::DisplaySrgb)
+    Ok(Picture { exposure_ev100, ..picture(width, height, pixels, Encoding::DisplaySrgb)? })
 }
 
 fn grey(code: u8) -> [f32; 4] {
@@ -88,5 +90,5 @@ fn coloured(codes: [u8; 3]) -> [f32; 4] {
 fn picture(width: u64, height: u64, pixels: Vec<[f32; 4]>, encoding: Encoding) -> Result<Picture, AssetProblem> {
     let colour = Image::from_pixels(width as usize, height as usize, pixels);
     let colour = colour.ok_or_else(|| damaged("its pixels do not fill it"))?;
-    Ok(Picture { colour, depth: None, encoding })
+    Ok(Picture { colour, depth: None, encoding, exposure_ev100: None })
 }

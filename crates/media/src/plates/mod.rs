@@ -2,6 +2,7 @@
 
 mod cache;
 mod decode;
+mod exposure;
 pub mod limits;
 
 use std::{

@@ -1,6 +1,13 @@
 //! What a scene may say of its ground.
 
-use bansho_base::{animation::Animated, parameters::Range, phenomenon::LevelMirror};
+use bansho_base::{
+    animation::Animated,
+    color::{acescg_from_srgb, luminance},
+    parameters::Range,
+    phenomenon::LevelMirror,
+};
+
+use super::shade::{WATER_ALBEDO, darkening};
 
 bansho_base::choice! {
     /// What the ground is.
@@ -44,6 +51,18 @@ bansho_base::parameters! {
 }
 
 impl GroundParameters {
+    /// Share of light that it throws back to all sides, as wet as it is at time `t`.
+    #[must_use]
+    pub fn reflectance(&self, t: f64) -> f64 {
+        match self.kind {
+            GroundKind::Water => f64::from(WATER_ALBEDO),
+            GroundKind::Land | GroundKind::Plate => {
+                let dry = luminance(acescg_from_srgb(self.colour.map(|value| value as f32)));
+                f64::from(dry) * darkening(self.wetness.at(t))
+            }
+        }
+    }
+
     /// It as a mirror.
     pub(super) fn level(&self) -> LevelMirror {
         LevelMirror { height: self.height, plate_tolerance: self.plate_tolerance }

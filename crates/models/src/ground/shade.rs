@@ -22,8 +22,15 @@ use super::{
 pub(super) const HORIZON: f64 = 1e6;
 /// Share of its light that soaked ground loses, since water keeps light in (Lekner & Dorf 1988).
 const WET_DARKENING: f64 = 0.55;
+/// Share of its light that soaked ground loses beyond that where water stands on it, which is deeper and often turbid.
+const PUDDLE_DARKENING: f64 = 0.45;
 /// Albedo of deep water.
-const WATER_ALBEDO: f32 = 0.02;
+pub(super) const WATER_ALBEDO: f32 = 0.02;
+
+/// Share of its dry light that ground of this wetness keeps.
+pub(super) fn darkening(wetness: f64) -> f64 {
+    1.0 - WET_DARKENING * wetness
+}
 
 /// One frame of the ground.
 pub(super) struct PreparedGround<'a> {
@@ -81,14 +88,18 @@ impl PreparedGround<'_> {
         }
         let albedo = match self.parameters.kind {
             GroundKind::Water => [WATER_ALBEDO; 3],
-            GroundKind::Land | GroundKind::Plate => patch.albedo.map(|value| value * self.darkening()),
+            GroundKind::Plate => patch.albedo.map(|value| value * self.darkening()),
+            GroundKind::Land => {
+                let standing = 1.0 - PUDDLE_DARKENING * self.wetness * patch.puddle;
+                patch.albedo.map(|value| value * self.darkening() * standing as f32)
+            }
         };
         [0, 1, 2].map(|c| illuminance[c] * albedo[c] / PI)
     }
 
     /// Share of its dry light that the wet ground keeps.
     fn darkening(&self) -> f32 {
-        (1.0 - WET_DARKENING * self.wetness) as f32
+        darkening(self.wetness) as f32
     }
 
     /// Light that the water on the ground mirrors.

@@ -11,8 +11,10 @@ use super::{gloss::Facets, parameters::GroundParameters};
 
 /// Octaves of the ground's texture, each half as large and as strong as the one before.
 const OCTAVES: usize = 8;
-/// Strength of an octave over that of the one before. Soil and asphalt have most of their contrast in their grain.
-const GAIN: f64 = 1.05;
+/// Strength of the largest octave, and of each over that of the one before. Soil and asphalt have most of their contrast in their grain:
+/// were it as strong in their large patches, bright ground would look like clouds.
+const STRENGTH: f64 = 0.16;
+const GAIN: f64 = 1.3;
 /// Height of an octave over that of the one before.
 const RELIEF_GAIN: f64 = 0.6;
 /// Standard deviation of the relief, which is roughly normal.
@@ -69,7 +71,7 @@ impl Surface {
     /// The ground at a `place` (x, z), of which a pixel covers `footprint` m.
     pub(super) fn at(&self, place: DVec2, footprint: f64) -> Patch {
         let (mut grain, mut relief) = (0.0, 0.0);
-        let (mut size, mut strength, mut height) = (self.size, 0.45_f64, 1.0_f64);
+        let (mut size, mut strength, mut height) = (self.size, STRENGTH, 1.0_f64);
         for octave in &self.octaves {
             let seen = math::smoothstep(1.0, 3.0, size / footprint.max(1e-9));
             if seen <= 0.0 {

@@ -7,7 +7,6 @@ use bansho_base::{
     observer::{Cancelled, Observer, check},
     phenomenon::{Phenomenon, Prepared, Remark},
     random::Key,
-    sky::Sky,
     surroundings::{Emitter, Light, Publication, Surroundings},
     wind::Wind,
 };
@@ -156,8 +155,12 @@ impl Phenomenon for Rain {
 
     fn remark(&self, surroundings: &Surroundings) -> Option<Remark> {
         let dark = |light: &Light| light.intensity.iter().all(|value| *value <= 0.0);
-        let unlit = surroundings.others.lights.iter().all(dark) && surroundings.sky == Sky::DARK;
+        let unlit = surroundings.others.lights.iter().all(dark) && surroundings.sky.is_dark();
         unlit.then_some(Remark::Unlit)
+    }
+
+    fn strengthened_by(&self) -> &'static str {
+        "raise `rate_mm_per_h` or `opacity_gain`, add a [[light]] of more candela"
     }
 
     /// Rain fills all depths; it is cut where lights stand, so that a fire has streaks before, within and behind it.

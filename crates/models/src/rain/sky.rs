@@ -57,7 +57,7 @@ impl SeenSkies {
 
 /// What the sky shines through drops toward the camera from each corner of the tiles.
 fn through_drops(lens: &DropLens, tiles: &Tiles, sky: &Sky) -> Vec<[f32; 3]> {
-    if *sky == Sky::DARK {
+    if sky.is_dark() {
         return vec![[0.0; 3]; tiles.lines.len()];
     }
     tiles.map(|_, line| lens.gather(line, |direction| sky.radiance(direction)))

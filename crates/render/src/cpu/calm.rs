@@ -68,14 +68,14 @@ impl Change {
 }
 
 /// The same shot in small.
-fn small(plan: &Plan) -> Plan {
+pub(super) fn small(plan: &Plan) -> Plan {
     let longest = plan.size[0].max(plan.size[1]);
     let size = plan.size.map(|side| (side * SIDE).div_ceil(longest));
     Plan { layers: false, aovs: false, figures: false, ..plan.at_size(size) }
 }
 
 /// Display codes of a frame over black, from 0 to 1.
-fn picture(shot: &mut CpuShot, number: i64) -> Result<Vec<f64>, RenderError> {
+pub(super) fn picture(shot: &mut CpuShot, number: i64) -> Result<Vec<f64>, RenderError> {
     shot.advance(number, &Unobserved)?;
     shot.draw(&Unobserved)?;
     let frame = shot.read().ok_or(Cancelled)?;

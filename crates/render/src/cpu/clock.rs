@@ -2,14 +2,17 @@
 
 use bansho_base::{
     canvas::Shutter,
+    color,
     observer::{self, Cancelled, Observer},
     phenomenon::{Phenomenon, Remark},
-    sky::Sky,
     surroundings::{Publication, Surroundings},
 };
 
-use super::mirror::Mirror;
-use crate::plan::{Plan, PlanError};
+use super::{faint::faint, mirror::Mirror};
+use crate::{
+    plan::{Plan, PlanError},
+    scene::check::PLATE_LAYER,
+};
 
 /// How many steps a phenomenon has taken; 0 at its beginning, before the preroll.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,11 +34,10 @@ pub(super) fn surroundings<'a>(
     shutter: Shutter,
     mirror: Option<&'a Mirror>,
 ) -> Surroundings<'a> {
-    let sky = plan.scene.sky.as_ref().map_or(Sky::DARK, |sky| sky.at(shutter.middle()));
     Surroundings {
         wind: &plan.wind,
         air: &plan.scene.air,
-        sky,
+        sky: plan.sky(shutter.middle()),
         reflection: mirror.map(|mirror| &mirror.seen),
         backdrop: mirror.and_then(|mirror| mirror.backdrop.as_ref()),
         others: others(plan, publications, index, shutter),
@@ -76,7 +78,12 @@ pub(crate) fn remarks(plan: &Plan) -> Result<Vec<(String, Remark)>, PlanError> {
         }
         Some((phenomenon.name().to_owned(), always))
     };
-    Ok((0..phenomena.len()).filter_map(remark).collect())
+    let plate = plan.assumed_plate_ev100().map(|ev100| {
+        let white = color::white_luminance(ev100);
+        (PLATE_LAYER.to_owned(), Remark::PlateExposureAssumed { ev100, white })
+    });
+    let looks = (0..phenomena.len()).filter_map(remark);
+    Ok(plate.into_iter().chain(looks).chain(faint(plan, &phenomena)).collect())
 }
 
 /// Steps everybody until no state lies more than a step before that which an exposure is drawn from, always the one that is furthest

@@ -5,9 +5,11 @@ mod behind;
 mod calm;
 mod clock;
 mod compose;
+mod faint;
 mod haze;
 mod mirror;
 mod plate;
+mod plate_light;
 mod shot;
 mod snapshot;
 
@@ -20,6 +22,7 @@ use crate::{
 
 pub(crate) use calm::calmest_start;
 pub(crate) use clock::remarks;
+pub(crate) use plate_light::plate_light;
 
 /// Draws on the processor, in the rayon pool of the caller. Same plan, same bytes, whatever the threads.
 #[derive(Clone, Copy, Debug, Default)]

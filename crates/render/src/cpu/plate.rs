@@ -104,7 +104,7 @@ fn load(plan: &Plan, number: i64, camera: &Camera) -> Result<PlateFrame, RenderE
 }
 
 /// How the picture's pixels fall on the plate's: the plate fills the picture, centred, its longer side cut.
-struct Fit {
+pub(super) struct Fit {
     picture: [usize; 2],
     plate: [usize; 2],
     overscan: usize,
@@ -114,7 +114,7 @@ struct Fit {
 }
 
 impl Fit {
-    fn new(plan: &Plan, plate: [usize; 2]) -> Self {
+    pub(super) fn new(plan: &Plan, plate: [usize; 2]) -> Self {
         let overscan = plan.scene.picture.overscan as usize;
         let [across, down] = [0, 1].map(|axis| plate[axis] as f64 / plan.size[axis] as f64);
         let scale = across.min(down);
@@ -125,6 +125,11 @@ impl Fit {
     /// Place on the plate, in its pixels, of the middle of a picture pixel.
     fn place(&self, axis: usize, pixel: usize) -> f64 {
         (pixel as f64 + 0.5 - self.overscan as f64) * self.scale + self.offset[axis]
+    }
+
+    /// Place in the picture, in its pixels without overscan, of the middle of a plate pixel.
+    pub(super) fn in_picture(&self, axis: usize, pixel: usize) -> f64 {
+        (pixel as f64 + 0.5 - self.offset[axis]) / self.scale
     }
 
     fn covers(&self, axis: usize, pixel: usize) -> bool {
@@ -175,7 +180,7 @@ fn fit_colour(plan: &Plan, picture: &Picture, fit: &Fit) -> Image<4> {
 }
 
 /// A plate's numbers as exposed ACEScg: what the view transform takes back to the very same numbers.
-fn to_scene(view: &color::View, encoding: Encoding, colour: [f32; 3]) -> [f32; 3] {
+pub(super) fn to_scene(view: &color::View, encoding: Encoding, colour: [f32; 3]) -> [f32; 3] {
     match encoding {
         Encoding::DisplaySrgb => view.to_scene(colour.map(color::decode_srgb)),
         Encoding::LinearSrgb => color::acescg_from_srgb(colour),

@@ -8,7 +8,6 @@ use bansho_base::{
     observer::{self, Cancelled, Observer, Stage, StageGuard},
     phenomenon::{LevelMirror, Phenomenon, Prepared},
     point_cloud::PointCloud,
-    sky::Sky,
     surroundings::{Publication, Surroundings},
 };
 
@@ -182,13 +181,13 @@ impl CpuShot {
             behind: Behind::plate(mirrored),
         };
         let mut seen = compose::frame(&composition, self.plan.header(self.number), None, observer)?.beauty;
-        let sky = self.plan.scene.sky.as_ref().map(|sky| sky.at(view.shutter.middle()));
+        let sky = self.plan.sky(view.shutter.middle());
         // A sky that is not to be seen lights the ground, and stands in no still water.
-        let seen_sky = self.plan.scene.sky.as_ref().is_some_and(|sky| sky.visible) && mirrored.colour.is_some();
-        if let (Some(sky), true) = (&sky, seen_sky) {
-            mirror::lay_sky(&mut seen, &view, sky, 1);
+        let is_seen = self.plan.scene.sky.as_ref().is_none_or(|sky| sky.visible);
+        if is_seen && mirrored.colour.is_some() {
+            mirror::lay_sky(&mut seen, &view, &sky, 1);
         }
-        let backdrop = mirror::backdrop(mirrored, &view, &sky.unwrap_or(Sky::DARK));
+        let backdrop = mirror::backdrop(mirrored, &view, &sky);
         Ok(Some(Mirror { seen, backdrop }))
     }
 

@@ -2,7 +2,7 @@
 
 use bansho_base::{
     assets::Assets,
-    parameters::{Node, ProblemKind, Reader, Span, Table, Value, nearest},
+    parameters::{Auto, Node, ProblemKind, Reader, Span, Table, Value, nearest},
 };
 use bansho_models::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
@@ -202,6 +202,15 @@ fn plate(scene: &Scene, good: Option<&Scene>, root: &Table, assets: &dyn Assets,
         let place = place(root, "plate.depth");
         let kind = ProblemKind::Conflict("a depth needs an `image` that it belongs to".into());
         reader.within("plate", |r| r.within("depth", |r| r.report_at(place, kind)));
+    }
+    if scene.plate.image.is_none() && scene.plate.exposure_ev100 != Auto::Auto {
+        let told = "an exposure needs an `image` that was taken with it".to_owned();
+        report(
+            OpeningFault { key: "exposure_ev100".into(), kind: ProblemKind::Conflict(told) },
+            "plate".into(),
+            root,
+            reader,
+        );
     }
 }
 

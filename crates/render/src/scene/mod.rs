@@ -218,9 +218,13 @@ impl Scene {
         self
     }
 
-    /// Where the text of a scene states a parameter of the phenomenon `name`, or the nearest part of it: one-based line and column. None
-    /// where it states no such phenomenon.
+    /// Where the text of a scene states a parameter of the phenomenon `name`, or the nearest part of it: one-based line and column; of its
+    /// plate where that is the name. None where it states no such phenomenon.
     pub fn position(&self, text: &str, name: &str, key: Option<&str>) -> Option<(usize, usize)> {
+        if name == check::PLATE_LAYER {
+            let span = check::place(&toml::parse(text).ok()?, name)?;
+            return Some(report::position(text, span.start));
+        }
         let place = self.instances.iter().position(|instance| instance.name == name)?;
         let kind = self.instances[place].kind.key;
         let index = self.instances[..place].iter().filter(|instance| instance.kind.key == kind).count();

@@ -2,6 +2,7 @@
 
 use bansho_base::{
     animation::Animated,
+    color::LARGEST_EV100,
     math::{self, DVec3},
     parameters::{AssetPath, Auto, Kind, Node, Parameter, ProblemKind, Range, Reader, Value},
     surroundings::{Emitter, Light},
@@ -92,7 +93,7 @@ bansho_base::parameters! {
         first_frame: i64 = 0, limits(Range::new(-1_000_000.0, 10_000_000.0));
         /// Frames a second, as a number or as a fraction such as "24000/1001".
         fps: FrameRate = FrameRate { frames: 30, seconds: 1 }, unit("1/s");
-        /// Exposure value at ISO 100, or "auto": chosen once a shot from what the scene holds.
+        /// Exposure value at ISO 100, or "auto": that of the plate; without one chosen once a shot from what the scene holds.
         exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-40.0, 40.0)), unit("EV");
         /// Temperature of the black body whose light is shown as white, as a camera is set: 4000 for a night sky. It changes what is made to
         /// be looked at; EXR files keep the light and name that white. Left out it is 4000 where the sky is a night's, and else the display's, D65.
@@ -127,6 +128,9 @@ bansho_base::parameters! {
         depth_kind: DepthKind = DepthKind::Axis;
         /// Metres for each unit of the depth channel.
         depth_scale: f64 = 1.0, limits(Range::new(1e-6, 1e6)), unit("m");
+        /// Exposure value at ISO 100 with which it was taken, so that its white is 1.2 * 2^EV cd/m^2: 15 in sunshine, 12 under heavy clouds, 4 in
+        /// a lit street at night. "auto": as the file records it (Exif, EXR), else assumed.
+        exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-LARGEST_EV100, LARGEST_EV100)), unit("EV");
     }
 }
 
