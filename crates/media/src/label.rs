@@ -78,11 +78,14 @@ fn fill<T: Copy + Default>(
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::color::AlphaConvention;
+
     use super::*;
 
     fn labelled(size: [usize; 2], shown: i64) -> DisplayImage {
         let pixels = DisplayPixels::Eight(vec![[9, 9, 9, 255]; size[0] * size[1]]);
-        let mut picture = DisplayImage { width: size[0], height: size[1], opaque: true, pixels };
+        let mut picture =
+            DisplayImage { width: size[0], height: size[1], opaque: true, alpha: AlphaConvention::Linear, pixels };
         number(&mut picture, shown);
         picture
     }

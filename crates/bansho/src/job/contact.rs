@@ -84,7 +84,10 @@ fn own_fingerprint(job: &PreparedJob) -> [u8; 32] {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::image::{DisplayPixels, Image, Rect};
+    use bansho_base::{
+        color::AlphaConvention,
+        image::{DisplayPixels, Image, Rect},
+    };
     use bansho_render::display::{BitDepth, display};
 
     use super::*;
@@ -105,7 +108,7 @@ mod tests {
         frame.content = Rect::of_size(0, 0);
         frame.opaque = opaque;
         lay_over(&mut frame, background, view);
-        let picture = display(&frame, view, BitDepth::Sixteen);
+        let picture = display(&frame, view, BitDepth::Sixteen, AlphaConvention::Linear);
         assert!(picture.opaque);
         let DisplayPixels::Sixteen(pixels) = picture.pixels else { panic!("16 bits") };
         pixels
