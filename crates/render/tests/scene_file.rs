@@ -84,7 +84,7 @@ fn faults_name_their_place_and_what_is_allowed() {
             "cannot be a name, which begins the names of EXR channels; allowed: 1 to 63 bytes of text without dots",
         ),
         (
-            "bansho = 1\n[[emitter]]\nname = \"z\"\n",
+            "bansho = 1\n[[emitter]]\nname = \"Z\"\n",
             "test.toml:3:8: emitter.0.name: cannot be a name, since programs that read EXR files take such a layer for the picture itself; \
              allowed: any but R, G, B, ",
         ),

@@ -52,11 +52,11 @@ pub(crate) const PLATE_LAYER: &str = "plate";
 /// Names of layers that the scene itself has, which no phenomenon may take.
 const RESERVED_NAMES: [&str; 4] = [PLATE_LAYER, SkyBackdrop::NAME, Ground::NAME, Lamps::NAME];
 
-/// Names, in either case, that programs give the channels of the picture itself and layers of their own. A layer `Z` or `RGBA` makes OpenEXR's
-/// Python refuse a file, `Depth` and `Combined` hide the picture's own in Blender, `rgba`, `alpha` and `depth` are the picture's own in Nuke.
-const NAMES_OF_READERS: [&str; 21] = [
-    "R", "G", "B", "A", "X", "Y", "Z", "U", "V", "W", "RY", "BY", "RGB", "RGBA", "XYZ", "Red", "Green", "Blue",
-    "Alpha", "Depth", "Combined",
+/// Names that programs give the channels and layers of the picture itself. A layer `Z` or `RGBA` makes OpenEXR's Python refuse a file;
+/// `Combined`, `Alpha` and `Depth` take the place of the picture's own in Blender, `rgba`, `alpha` and `depth` are what Nuke calls them.
+const NAMES_OF_READERS: [&str; 18] = [
+    "R", "G", "B", "A", "X", "Y", "Z", "U", "V", "W", "RGB", "RGBA", "rgba", "Alpha", "alpha", "Depth", "depth",
+    "Combined",
 ];
 
 /// Longest name of a phenomenon, bytes: Blender cuts the names of layers after as many, without what follows the dot.
@@ -86,7 +86,7 @@ fn allowed_names() -> String {
 /// Why a phenomenon cannot be called so.
 fn name_fault(name: &str) -> Option<String> {
     let is_control_or_dot = |character: char| character == '.' || character.is_control();
-    if NAMES_OF_READERS.iter().any(|other| other.eq_ignore_ascii_case(name)) {
+    if NAMES_OF_READERS.contains(&name) {
         let others = NAMES_OF_READERS.join(", ");
         let fault = "cannot be a name, since programs that read EXR files take such a layer for the picture itself";
         return Some(format!("{fault}; allowed: any but {others}"));
