@@ -48,7 +48,7 @@ fn dots(glyphs: &[usize]) -> [usize; 2] {
 fn scale([columns, rows]: [usize; 2], [width, height]: [usize; 2]) -> Option<usize> {
     let most = (height / (8 * rows)).min(width / columns);
     let usual = (height + 8 * rows) / (16 * rows);
-    (most > 0).then_some(usual.clamp(1, most))
+    (most > 0).then(|| usual.clamp(1, most))
 }
 
 /// Whether a dot belongs to a glyph.

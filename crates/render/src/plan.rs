@@ -203,6 +203,14 @@ impl Plan {
         plan
     }
 
+    /// The same shot in another size and without overscan, of which only `crop` is drawn.
+    ///
+    /// # Errors
+    /// A size that no picture has, or a crop that reaches outside it.
+    pub fn cropped(&self, size: [usize; 2], crop: Rect) -> Result<Self, PlanError> {
+        Ok(Self { window: window(size, 0, Some(crop))?, ..self.at_size(size) })
+    }
+
     /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene

@@ -37,7 +37,7 @@ use bansho_render::display::BitDepth;
 
 pub use contact::ContactBackground;
 pub use error::{Cause, Channels, Conflict, JobError, SheetKind};
-pub use flipbook::{Flipbook, FlipbookSummary, PreparedFlipbook};
+pub use flipbook::{Flipbook, FlipbookCrop, FlipbookSummary, PreparedFlipbook};
 pub use observer::{FrameDone, JobObserver, Note, Outline, Spot};
 pub use prepare::{PreparedJob, check_scene, remarks};
 pub use run::Summary;

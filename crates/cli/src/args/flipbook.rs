@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bansho::{
     AlphaConvention, BitDepth, View,
-    job::{BackendChoice, Flipbook, JobError, SceneFile},
+    job::{BackendChoice, Flipbook, FlipbookCrop, JobError, SceneFile},
 };
 use clap::Args;
 
@@ -26,9 +26,12 @@ pub(crate) struct FlipbookArgs {
     /// Columns and rows of the sheet; as many frames are drawn.
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = values::parse_grid)]
     grid: [usize; 2],
-    /// Size of one frame. [default: the scene's, made small enough for a sheet of 2048 pixels]
+    /// Size of one frame; with `--crop auto` of the whole picture. [default: such that the sheet has up to 2048 pixels]
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = values::parse_size)]
     size: Option<[usize; 2]>,
+    /// What of the picture frames show: what is lit in any of them, or all. [default: auto; none with --size]
+    #[arg(long, value_name = "CROP", value_parser = values::flipbook_crop_parser())]
+    crop: Option<FlipbookCrop>,
     /// Where it goes: NAME.png or NAME.exr. [default: out/SCENE/SCENE.png]
     #[arg(short, long, value_name = "PATH")]
     out: Option<PathBuf>,
@@ -70,6 +73,7 @@ impl FlipbookArgs {
         scene.changes.clone_from(&self.set);
         Ok(Flipbook {
             tile: self.size,
+            crop: self.crop.unwrap_or(if self.size.is_some() { FlipbookCrop::None } else { FlipbookCrop::Auto }),
             first_frame: self.first_frame.map(i64::from),
             seed: self.seed,
             loop_s: self.loop_s,

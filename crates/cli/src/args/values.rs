@@ -2,7 +2,7 @@
 
 use bansho::{
     AlphaConvention, BitDepth, Rect, View,
-    job::{BackendChoice, ContactBackground, StreakFormat},
+    job::{BackendChoice, ContactBackground, FlipbookCrop, StreakFormat},
     models::rain::velocity::VelocityLaw,
     render::{
         frames::{self, FrameSpecError},
@@ -120,6 +120,11 @@ pub(super) fn backend_parser() -> impl TypedValueParser<Value = BackendChoice> {
 pub(super) fn contact_background_parser() -> impl TypedValueParser<Value = ContactBackground> {
     let names = ContactBackground::CHOICES.iter().map(|choice| choice.name);
     PossibleValuesParser::new(names).map(|name| ContactBackground::from_name(&name).unwrap_or_default())
+}
+
+pub(super) fn flipbook_crop_parser() -> impl TypedValueParser<Value = FlipbookCrop> {
+    let names = FlipbookCrop::CHOICES.iter().map(|choice| choice.name);
+    PossibleValuesParser::new(names).map(|name| FlipbookCrop::from_name(&name).unwrap_or_default())
 }
 
 pub(super) fn bits_parser() -> impl TypedValueParser<Value = BitDepth> {

@@ -30,6 +30,60 @@ fn a_flipbook_holds_the_very_frames_and_says_where() {
 }
 
 #[test]
+fn frames_are_cropped_to_what_is_lit_and_fill_the_sheet() {
+    // A small flame to the left of the middle of a wide picture.
+    let small = FLAME
+        .replace("[48, 64]", "[320, 180]")
+        .replace("[[flame_sheet]]", "[[flame_sheet]]\nwidth = 0.2\nheight = 0.5\nposition = [-0.6, 0.6, 0.0]");
+    let folder = Folder::with_scene(&small);
+    folder.succeed(&["flipbook", "scene.toml", "--grid", "3x2", "--out", "fire.png"]);
+    let about = description(&folder, "fire.json");
+    let numbers = |of: &serde_json::Value, keys: &[&str]| -> Vec<usize> {
+        keys.iter().map(|key| of[key].as_u64().unwrap() as usize).collect()
+    };
+    let picture: Vec<usize> =
+        about["picture"].as_array().unwrap().iter().map(|side| side.as_u64().unwrap() as usize).collect();
+    let crop = numbers(&about["crop"], &["x", "y", "width", "height"]);
+    let [x, y, width, height] = crop[..] else { panic!("{about}") };
+    assert_eq!(about["tile"], serde_json::json!([width, height]));
+    assert_eq!(picture, [640, 360], "twice the scene's size at most");
+    assert!(width % 2 == 0 && height % 2 == 0 && 4 * width < picture[0] && x + width < picture[0] / 2, "{about}");
+    let padding = numbers(&about["padding"], &["left", "top", "right", "bottom"]);
+    assert_eq!(padding, [x, y, picture[0] - x - width, picture[1] - y - height]);
+    // Each tile is that very part of the picture, and outside it there is nothing.
+    folder.succeed(&["render", "scene.toml", "--size", "640x360", "--out", "f/f.png"]);
+    let sheet = decode_png(&std::fs::read(folder.path("fire_colour.png")).unwrap());
+    for (index, frame) in about["frames"].as_array().unwrap().iter().enumerate() {
+        let place: Vec<usize> = numbers(frame, &["x", "y", "width", "height"]);
+        let drawn = decode_png(&folder.files("f")[&format!("f.{index:04}.png")]);
+        assert!(sheet.part([place[0], place[1], width, height]) == drawn.part([x, y, width, height]), "frame {index}");
+        let lit = |part: Vec<u8>| part.chunks(4).filter(|pixel| pixel[3] > 0).count();
+        assert_eq!(lit(drawn.part([x, y, width, height])), lit(drawn.bytes.clone()), "frame {index}");
+    }
+    // Without a crop tiles show all of the picture.
+    folder.succeed(&["flipbook", "scene.toml", "--grid", "3x2", "--crop", "none", "--out", "all.png"]);
+    let all = description(&folder, "all.json");
+    assert_eq!((&all["tile"], &all["picture"]), (&serde_json::json!([320, 180]), &serde_json::json!([320, 180])));
+    assert_eq!(numbers(&all["padding"], &["left", "top", "right", "bottom"]), [0; 4]);
+    // A size of one's own is the whole picture's where it is cropped.
+    folder.succeed(&[
+        "flipbook",
+        "scene.toml",
+        "--grid",
+        "3x2",
+        "--size",
+        "320x180",
+        "--crop",
+        "auto",
+        "--out",
+        "own.png",
+    ]);
+    let own = description(&folder, "own.json");
+    assert_eq!(own["picture"], serde_json::json!([320, 180]));
+    assert!(own["tile"][0].as_u64().unwrap() < 100, "{own}");
+}
+
+#[test]
 fn motion_is_told_in_pixels_around_a_middle() {
     let folder = Folder::with_scene(FLAME);
     folder.succeed(&["flipbook", "scene.toml", "--grid", "2x1", "--size", "48x64"]);
@@ -48,7 +102,18 @@ fn motion_is_told_in_pixels_around_a_middle() {
 #[test]
 fn a_loop_fills_the_sheet_with_one_turn() {
     let folder = Folder::with_scene(FLAME);
-    folder.succeed(&["flipbook", "scene.toml", "--grid", "4x2", "--loop", "1.5", "--out", "fire.exr"]);
+    folder.succeed(&[
+        "flipbook",
+        "scene.toml",
+        "--grid",
+        "4x2",
+        "--loop",
+        "1.5",
+        "--crop",
+        "none",
+        "--out",
+        "fire.exr",
+    ]);
     let about = description(&folder, "fire.json");
     assert_eq!((about["frame_count"].as_u64(), about["loop"].as_bool()), (Some(8), Some(true)));
     assert!((about["fps"].as_f64().unwrap() - 8.0 / 1.5).abs() < 1e-9);

@@ -22,8 +22,10 @@ pub(super) fn paths(text: &str, segments: &[&str], kinds: &[PhenomenonKind]) -> 
         return vec![format!("{table}.{}", rest.join("."))];
     }
     let ending = |wanted: &[&str]| -> Vec<String> {
-        let named = known.iter().filter(|path| path.ends_with(wanted));
-        named.take(MOST).map(|path| path.join(".")).collect()
+        let named = || known.iter().filter(|path| path.ends_with(wanted));
+        // A parameter of a table itself rather than one of a table within it.
+        let shortest = named().map(Vec::len).min();
+        named().filter(|path| Some(path.len()) == shortest).take(MOST).map(|path| path.join(".")).collect()
     };
     let last = [segments[segments.len() - 1]];
     let mut meant = ending(segments);

@@ -41,6 +41,11 @@ impl Files {
         self.kind.is_scene_linear()
     }
 
+    /// Whether sheets hold light that 8 bits do not.
+    pub(super) fn is_exact(&self) -> bool {
+        self.is_linear() || self.bits == BitDepth::Sixteen
+    }
+
     fn path(&self, ending: &str) -> PathBuf {
         let mut name = self.base.clone().into_os_string();
         name.push(ending);
@@ -161,11 +166,17 @@ impl Files {
                 "alpha_convention": self.alpha.name(),
             }),
         };
+        let ([width, height], part) = (plan.size(), plan.window());
         let mut description = json!({
             "format": 1,
             "size": sheet.size(),
             "grid": [sheet.columns, sheet.rows()],
             "tile": sheet.cell,
+            "picture": [width, height],
+            "crop": { "x": part.x, "y": part.y, "width": part.width, "height": part.height },
+            "padding": {
+                "left": part.x, "top": part.y, "right": width - part.right(), "bottom": height - part.bottom(),
+            },
             "frame_count": sheet.count,
             "fps": f64::from(fps.frames) / f64::from(fps.seconds),
             "duration_s": sheet.count as f64 * fps.frame_s(),

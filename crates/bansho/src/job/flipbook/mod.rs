@@ -1,18 +1,23 @@
 //! Flipbooks for game engines: all frames in one sheet, their alpha and motion in sheets beside it, and a JSON that says
 //! how to read them.
 
+mod crop;
 mod files;
 mod motion;
 
 use std::{path::PathBuf, sync::Arc};
 
-use bansho_base::color::{AlphaConvention, View};
+use bansho_base::{
+    color::{AlphaConvention, View},
+    image::Rect,
+};
 use bansho_media::{
     flipbook::Sheet,
     naming::{OutputKind, OutputPattern},
 };
 use bansho_render::{Backend, Plan, PlanOptions, Scene, display::BitDepth, scene::FrameRate};
 
+pub use self::crop::FlipbookCrop;
 use self::{files::Files, motion::Tile};
 use super::{
     BackendChoice,
@@ -40,6 +45,9 @@ pub struct Flipbook {
     pub grid: [usize; 2],
     /// Size of one frame, pixels; in the scene's proportions so that the sheet is up to 2048 wide or high when left out.
     pub tile: Option<[usize; 2]>,
+    /// What of the picture tiles show. With a part of it, `tile` is the size of the whole picture; left out, it is such that the part fills
+    /// the tiles of a sheet of up to 2048 pixels, but at most twice the scene's.
+    pub crop: FlipbookCrop,
     /// The first frame; the scene's first when left out.
     pub first_frame: Option<i64>,
     /// Another seed than the scene's.
@@ -76,6 +84,7 @@ impl Flipbook {
             scene,
             grid,
             tile: None,
+            crop: FlipbookCrop::Auto,
             first_frame: None,
             seed: None,
             loop_s: None,
@@ -119,7 +128,8 @@ impl Flipbook {
         memory::check(&self.scene, &plan, wanted)?;
         let files = self.files()?;
         inputs::check_kept(&self.scene, &plan, &numbers, files.paths())?;
-        Ok(PreparedFlipbook { scene: self.scene.clone(), backend, plan, sheet, numbers, files })
+        let (scene, own_size, crop) = (self.scene.clone(), self.tile.is_some(), self.crop);
+        Ok(PreparedFlipbook { scene, backend, plan, sheet, own_size, crop, numbers, files })
     }
 
     /// Size of a frame: as asked for, or the scene's made small enough for a sheet of the usual side.
@@ -153,6 +163,8 @@ pub struct PreparedFlipbook {
     backend: Box<dyn Backend>,
     plan: Arc<Plan>,
     sheet: Sheet,
+    own_size: bool,
+    crop: FlipbookCrop,
     numbers: Vec<i64>,
     files: Files,
 }
@@ -168,16 +180,44 @@ impl PreparedFlipbook {
     /// # Errors
     /// The observer asked to stop, or a sheet cannot be written.
     pub fn run(&self, observer: &dyn JobObserver) -> Result<FlipbookSummary, JobError> {
-        let Self { scene, backend, plan, sheet, numbers, files } = self;
-        observer.started(&Outline { total: numbers.len(), kept: 0, size: sheet.cell });
+        let Self { scene, backend, numbers, files, .. } = self;
+        observer.started(&Outline { total: numbers.len(), kept: 0, size: self.sheet.cell });
+        let told = |error| plates::located(scene, error).of_whole("a flipbook");
+        let (plan, sheet) = &self.cropped(observer).map_err(told)?;
         let gather = Gather::new(sheet.count, observer, |frame, observer| Tile::of(frame, files, observer));
-        let drawn = shoot(plan, backend.as_ref(), numbers, &Snapshots::default(), &gather, observer);
-        drawn.map_err(|error| plates::located(scene, error).of_whole("a flipbook"))?;
+        shoot(plan, backend.as_ref(), numbers, &Snapshots::default(), &gather, observer).map_err(told)?;
         let tiles = gather.into_tiles();
         if !tiles.iter().any(|tile| tile.has_motion) {
             observer.note(&Note::NoMotion);
         }
         files.write(plan, sheet, numbers, &tiles, observer).map_err(|error| error.of_whole("a flipbook"))
+    }
+}
+
+impl PreparedFlipbook {
+    /// The plan and the sheet of what tiles show: first it must be known what is lit.
+    fn cropped(&self, observer: &dyn JobObserver) -> Result<(Arc<Plan>, Sheet), JobError> {
+        let all = || Ok((self.plan.clone(), self.sheet));
+        if self.crop == FlipbookCrop::None {
+            return all();
+        }
+        let exact = self.files.is_exact();
+        let region = crop::lit(&self.plan, self.backend.as_ref(), &self.numbers, exact, observer)?;
+        let most = [self.sheet.columns, self.sheet.rows()].map(|tiles| USUAL_SIDE / tiles);
+        let whole = self.plan.scene().picture.size.map(|side| side as usize);
+        let fitting = |region: crop::Region| {
+            let size = if self.own_size { self.plan.size() } else { region.picture(whole, most)? };
+            let part = region.within(size);
+            // All of it is drawn as it is without a crop.
+            (part != Rect::of_size(size[0], size[1])).then_some((size, part))
+        };
+        let Some((size, part)) = region.and_then(fitting) else { return all() };
+        let plan = Arc::new(self.plan.cropped(size, part)?);
+        let sheet = sheet::checked(Sheet { cell: [part.width, part.height], ..self.sheet }, SheetKind::Flipbook)?;
+        let frames = self.numbers.len();
+        let wanted = Wanted { frames, tiles: frames, display: Some(self.files.bits), own_size: true };
+        memory::check(&self.scene, &plan, wanted)?;
+        Ok((plan, sheet))
     }
 }
 
