@@ -312,3 +312,44 @@ fn what_is_wrong_with_a_file_is_said_with_its_path() {
     assert!(matches!(error("d.png").problem, AssetProblem::Unreadable(_)));
     assert!(matches!(error("#.#.png").problem, AssetProblem::Unreadable(_)));
 }
+
+/// An Exif block that says 1/250 s, f/4 and ISO 400.
+fn exif_block() -> Vec<u8> {
+    use ::exif::{Field, In, Rational, Tag, Value, experimental::Writer};
+    let rational = |num, denom| Value::Rational(vec![Rational { num, denom }]);
+    let fields = [
+        (Tag::ExposureTime, rational(1, 250)),
+        (Tag::FNumber, rational(4, 1)),
+        (Tag::PhotographicSensitivity, Value::Short(vec![400])),
+    ]
+    .map(|(tag, value)| Field { tag, ifd_num: In::PRIMARY, value });
+    let mut writer = Writer::new();
+    fields.iter().for_each(|field| writer.push_field(field));
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    writer.write(&mut bytes, false).unwrap();
+    bytes.into_inner()
+}
+
+#[test]
+fn plates_of_every_kind_say_with_which_exposure_they_were_taken() {
+    // log2(16 * 250) - 2.
+    let is_known = |ev100: Option<f64>| ev100.is_some_and(|ev100| (ev100 - 9.9658).abs() < 1e-3);
+    let jpeg = fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/plates/court.jpg")).unwrap();
+    assert_eq!(decode_picture(&jpeg, "jpg").unwrap().exposure_ev100, None);
+    let block = [b"Exif\0\0".as_slice(), &exif_block()].concat();
+    let length = (block.len() as u16 + 2).to_be_bytes();
+    let marked = [&jpeg[..2], &[0xff, 0xe1], &length, &block, &jpeg[2..]].concat();
+    assert!(is_known(decode_picture(&marked, "jpg").unwrap().exposure_ev100));
+
+    let mut png = Vec::new();
+    let mut info = ::png::Info::with_size(1, 1);
+    info.exif_metadata = Some(exif_block().into());
+    let mut writer = ::png::Encoder::with_info(&mut png, info).unwrap().write_header().unwrap();
+    writer.write_image_data(&[7]).unwrap();
+    writer.finish().unwrap();
+    assert!(is_known(decode_picture(&png, "png").unwrap().exposure_ev100));
+
+    let mut frame = frame(4, 2);
+    frame.header.exposure_ev100 = 9.5;
+    assert_eq!(decode_picture(&exr_bytes(&frame), "exr").unwrap().exposure_ev100, Some(9.5));
+}
