@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     assets::{Encoding, MemoryAssets, Picture},
-    color::{self, View},
+    color::{self, AlphaConvention, View},
     image::{DisplayPixels, Frame, Image, Rect},
     observer::Unobserved,
     phenomenon::Remark,
@@ -137,7 +137,7 @@ fn ground_under_a_bright_lamp_is_neither_burnt_out_nor_black() {
     let ev100 = |intensity: f64| plan(&scene(intensity), Arc::default()).exposure_ev100;
     assert!((ev100(12_000.0) - night.exposure_ev100 - 2.0).abs() < 0.1);
     assert!((ev100(0.01) - -1.03).abs() < 0.02, "{}", ev100(0.01));
-    let picture = display(&frame(night), &View::DISPLAY, BitDepth::Eight);
+    let picture = display(&frame(night), &View::DISPLAY, BitDepth::Eight, AlphaConvention::Linear);
     let DisplayPixels::Eight(pixels) = picture.pixels else { panic!("8 bits were asked for") };
     let clipped = pixels.iter().filter(|pixel| pixel[..3].iter().all(|code| *code >= 254)).count();
     let mean = pixels.iter().map(|[r, g, b, _]| f64::from(*r) + f64::from(*g) + f64::from(*b)).sum::<f64>()

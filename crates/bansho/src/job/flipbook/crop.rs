@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bansho_base::{
-    color::View,
+    color::{AlphaConvention, View},
     image::{DisplayPixels, Frame, Rect},
     observer::Observer,
 };
@@ -144,7 +144,9 @@ fn bounds(frame: &Frame, view: &View, least: u16) -> Rect {
     if frame.opaque {
         return Rect::of_size(width, height);
     }
-    let DisplayPixels::Sixteen(pixels) = display(frame, view, BitDepth::Sixteen).pixels else { return Rect::default() };
+    let DisplayPixels::Sixteen(pixels) = display(frame, view, BitDepth::Sixteen, AlphaConvention::Linear).pixels else {
+        return Rect::default();
+    };
     let mut lit = Rect::default();
     for (y, row) in pixels.chunks_exact(width.max(1)).enumerate() {
         let is_lit = |pixel: &[u16; 4]| pixel[3] >= least;
