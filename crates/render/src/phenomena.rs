@@ -96,12 +96,12 @@ impl Describe for RainParameters {
     // Lamps at dusk along a wet street: drops only show the light of others.
     const SETTING: &'static str = "\
         camera = { position = [0.4, 1.3, 4.2], target = [0.0, 1.25, 0.0], vertical_fov_deg = 34.0 }\n\
-        sky = { luminance = 0.12, temperature_k = 10000.0, hills_deg = 2.5, trees_deg = 2.2 }\n\
+        sky = { luminance = 0.12, temperature_k = 10000.0 }\n\
         ground = { wetness = 0.9, puddles = 0.4 }\n\
         light = [\
-        { visible = true, position = [-1.3, 2.3, -1.5], intensity = 120.0, colour = [1.0, 0.68, 0.36], radius = 0.04 }, \
-        { visible = true, position = [2.4, 2.3, -9.0], intensity = 120.0, colour = [1.0, 0.68, 0.36], radius = 0.04 }, \
-        { visible = true, position = [-4.6, 2.3, -17.0], intensity = 120.0, colour = [1.0, 0.68, 0.36], radius = 0.04 }]\n";
+        { visible = true, position = [-1.3, 2.3, -1.5], intensity = 120.0, colour = [1.0, 0.68, 0.36] }, \
+        { visible = true, position = [2.4, 2.3, -9.0], intensity = 120.0, colour = [1.0, 0.68, 0.36] }, \
+        { visible = true, position = [-4.6, 2.3, -17.0], intensity = 120.0, colour = [1.0, 0.68, 0.36] }]\n";
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match Rain::new(self.clone(), opening.name, opening.seed, opening.loop_s) {

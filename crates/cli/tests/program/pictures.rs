@@ -79,7 +79,7 @@ fn is_over_black(shown: &[u8], frame: &[u8]) -> bool {
 #[test]
 fn a_contact_sheet_holds_the_very_frames() {
     let folder = Folder::with_scene(FLAME);
-    folder.succeed(&["render", "scene.toml", "--out", "f/f.png"]);
+    folder.succeed(&["render", "scene.toml", "--alpha", "linear", "--out", "f/f.png"]);
     folder.succeed(&["render", "scene.toml", "--contact-sheet", "3", "--frames", "2-4"]);
     assert_eq!(folder.files("out/scene").keys().collect::<Vec<_>>(), ["scene.sheet.png"]);
     let sheet = decode_png(&folder.files("out/scene")["scene.sheet.png"]);
@@ -95,7 +95,7 @@ fn a_contact_sheet_holds_the_very_frames() {
 #[test]
 fn a_contact_sheet_holds_the_frames_that_are_listed() {
     let folder = Folder::with_scene(FLAME);
-    folder.succeed(&["render", "scene.toml", "--out", "f/f.png"]);
+    folder.succeed(&["render", "scene.toml", "--alpha", "linear", "--out", "f/f.png"]);
     folder.succeed(&["render", "scene.toml", "--contact-sheet", "2", "--frames", "1-5x2", "--out", "sheet.png"]);
     let sheet = decode_png(&std::fs::read(folder.path("sheet.png")).unwrap());
     for (x, frame) in [(0, "f.0001.png"), (50, "f.0003.png")] {
