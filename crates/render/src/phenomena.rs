@@ -71,7 +71,7 @@ impl Describe for FlameParticlesParameters {
         "burners.heat_release_kw",
     ];
     const SETTING: &'static str = "\
-        camera = { position = [0.0, 0.82, 3.5], target = [0.0, 0.82, 0.0] }\n\
+        camera = { position = [0.0, 0.9, 3.8], target = [0.0, 0.9, 0.0] }\n\
         wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";
 
     fn crowd(&self, others: i64) -> Result<i64, OpeningFault> {
