@@ -259,7 +259,7 @@ mod tests {
             let over_black = opaque_codes::<u16, false>(light, 0).map(|code| code as f32);
             let error = |alpha: f32| {
                 let gray = (1.0 - alpha / 65_535.0) * MID_GRAY_ENCODED * 65_535.0;
-                (0..3).map(|c| (over_black[c] + gray - truth[c]).powi(2)).sum::<f32>()
+                (0..3).map(|c| over_black[c] + gray - truth[c]).map(|difference| difference * difference).sum::<f32>()
             };
             let alpha = encoded_alpha_codes::<u16>(light, coverage, 0)[3] as f32;
             let least = over_black[0].max(over_black[1]).max(over_black[2]);

@@ -1,6 +1,6 @@
 //! Meshes from glTF 2.0 files, as `.glb` or as `.gltf` with its buffers inside or beside it.
 //!
-//! [`glb`] takes a binary file apart, [`json`] reads values and says where they stand, [`buffers`] reads each file once, [`nodes`] says which
+//! `glb` takes a binary file apart, `json` reads values and says where they stand, `buffers` reads each file once, `nodes` says which
 //! meshes are shown where. What all of them together would take is counted before the first corner is read.
 
 mod accessor;

@@ -202,24 +202,34 @@ impl Files {
                 "additive": { "mode": "additive", "factors": ["one", "one"] },
             });
         }
-        let (values, sampled) = match self.alpha {
-            AlphaConvention::Linear => {
-                ("linear", "sRGB texture, decoded when it is sampled; the target is linear or an sRGB render target")
-            }
-            AlphaConvention::Encoded => {
-                ("sRGB-encoded", "texture without sRGB decoding; the target is not decoded either")
-            }
+        let meaning = "adds the light and hides nothing: right for flames and auroras without smoke";
+        let (values, sampled, additive) = match self.alpha {
+            AlphaConvention::Linear => (
+                "linear",
+                "sRGB texture, decoded when it is sampled; the target is linear or an sRGB render target",
+                json!({
+                    "mode": "additive, color times alpha",
+                    "factors": ["source_alpha", "one"],
+                    "meaning": meaning,
+                }),
+            ),
+            // Encoded values do not add up as light does; `screen` is far nearer, and never leaves the range.
+            AlphaConvention::Encoded => (
+                "sRGB-encoded",
+                "texture without sRGB decoding; the target is not decoded either",
+                json!({
+                    "mode": "screen, color premultiplied by alpha",
+                    "factors": ["one", "one_minus_source_color"],
+                    "meaning": meaning,
+                }),
+            ),
         };
         json!({
             "blended_values": values,
             "sampling": sampled,
             "mode": "straight alpha",
             "factors": ["source_alpha", "one_minus_source_alpha"],
-            "additive": {
-                "mode": "additive, color times alpha",
-                "factors": ["source_alpha", "one"],
-                "meaning": "adds the light and hides nothing: right for flames and auroras without smoke",
-            },
+            "additive": additive,
         })
     }
 
