@@ -11,8 +11,8 @@ import { launch, serve } from "../crates/studio/web/browser.mjs";
 
 const [bansho, executablePath, out] = process.argv.slice(2);
 const GUIDE = "docs/src/guide/games.md";
-// The sheet is drawn for frames in different rows and columns of a 4 x 4 grid.
-const [GRID, SIZE, FRAMES] = ["4x4", "64x128", [2, 7, 12]];
+// Frames in different rows and columns of the sheet, and a picture so wide that it is cropped to the flame.
+const [GRID, SIZE, FRAMES] = ["4x4", "192x128", [2, 7, 12]];
 // Codes of the backgrounds, and most codes by which a pixel may differ from what it must be.
 const [BLACK, GRAY, ALLOWED] = [0, 128, 2];
 // Both conventions show the same flame over black but for rounding of color, alpha and dither in both sheets.
@@ -149,9 +149,10 @@ function difference(pixels, codes) {
 }
 
 function makeSheet(alpha) {
-  const options = ["--grid", GRID, "--size", SIZE, "--alpha", alpha, "--progress", "none", "-o", join(out, `${alpha}.png`)];
+  const options = ["--grid", GRID, "--size", SIZE, "--crop", "auto", "--alpha", alpha, "--progress", "none", "-o", join(out, `${alpha}.png`)];
   execFileSync(bansho, ["flipbook", "scenes/torch.toml", ...options], { stdio: "inherit" });
   const info = JSON.parse(readFileSync(join(out, `${alpha}.json`), "utf8"));
+  if (info.crop.width >= info.picture[0]) throw new Error(`the sheet is not cropped: ${JSON.stringify(info.crop)}`);
   return { info, png: readPng(join(out, info.colour.file)) };
 }
 
