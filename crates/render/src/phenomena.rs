@@ -71,7 +71,7 @@ impl Describe for FlameParticlesParameters {
         "burners.heat_release_kw",
     ];
     const SETTING: &'static str = "\
-        camera = { position = [0.0, 0.82, 3.5], target = [0.0, 0.82, 0.0] }\n\
+        camera = { position = [0.0, 0.9, 3.8], target = [0.0, 0.9, 0.0] }\n\
         wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";
 
     fn crowd(&self, others: i64) -> Result<i64, OpeningFault> {
@@ -93,13 +93,15 @@ impl Describe for FlameParticlesParameters {
 impl Describe for RainParameters {
     const KEY: &'static str = "rain";
     const FIRST_KEYS: &'static [&'static str] = &["rate_mm_per_h", "distance", "veil_distance", "splashes.amount"];
-    // A lamp at dusk above wet ground: drops only show the light of others.
+    // Lamps at dusk along a wet street: drops only show the light of others.
     const SETTING: &'static str = "\
-        picture = { exposure_ev100 = 1.2 }\n\
-        camera = { position = [0.4, 1.5, 4.2], target = [0.0, 1.45, 0.0], vertical_fov_deg = 34.0 }\n\
-        sky = { luminance = 0.09, hills_deg = 2.5, trees_deg = 2.2 }\n\
-        ground = { wetness = 0.7 }\n\
-        light = [{ kind = \"point\", visible = true, position = [0.0, 2.1, 0.0], intensity = 80.0, radius = 0.04 }]\n";
+        camera = { position = [0.4, 1.3, 4.2], target = [0.0, 1.25, 0.0], vertical_fov_deg = 34.0 }\n\
+        sky = { luminance = 0.12, temperature_k = 10000.0 }\n\
+        ground = { wetness = 0.9, puddles = 0.4 }\n\
+        light = [\
+        { visible = true, position = [-1.3, 2.3, -1.5], intensity = 120.0, colour = [1.0, 0.68, 0.36] }, \
+        { visible = true, position = [2.4, 2.3, -9.0], intensity = 120.0, colour = [1.0, 0.68, 0.36] }, \
+        { visible = true, position = [-4.6, 2.3, -17.0], intensity = 120.0, colour = [1.0, 0.68, 0.36] }]\n";
 
     fn open(&self, opening: &Opening) -> Result<Box<dyn Phenomenon>, OpeningFault> {
         match Rain::new(self.clone(), opening.name, opening.seed, opening.loop_s) {

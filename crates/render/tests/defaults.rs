@@ -91,8 +91,8 @@ fn a_backdrop_that_nobody_wrote_is_seen_only_where_the_plan_shows_it() {
         let sky = scene.sky.as_ref().unwrap();
         (sky.visible, scene.ground.is_some(), scene.lights.iter().any(|light| light.visible), scene.lights.len())
     };
-    assert_eq!(shown("[[rain]]", true), (true, true, true, 1));
-    assert_eq!(shown("[[rain]]", false), (false, false, false, 1), "it lights all the same");
+    assert_eq!(shown("[[rain]]", true), (true, true, true, 3));
+    assert_eq!(shown("[[rain]]", false), (false, false, false, 3), "it lights all the same");
     for implied_backdrop in [false, true] {
         assert!(shown("[sky]\n[[rain]]", implied_backdrop).0, "a sky that is stated is seen");
     }

@@ -85,7 +85,7 @@ fn own_fingerprint(job: &PreparedJob) -> [u8; 32] {
 #[cfg(test)]
 mod tests {
     use bansho_base::{
-        color::AlphaConvention,
+        color::{self, AlphaConvention},
         image::{DisplayPixels, Image, Rect},
     };
     use bansho_render::display::{BitDepth, display};
@@ -115,8 +115,7 @@ mod tests {
     }
 
     fn code(light: f32) -> u16 {
-        let srgb = if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
-        (srgb * 65_535.0).round() as u16
+        (color::encode_srgb(light) * 65_535.0).round() as u16
     }
 
     fn is_near(codes: [u16; 4], light: [f32; 3]) {

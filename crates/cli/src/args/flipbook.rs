@@ -18,7 +18,7 @@ each pixel moves to the next frame) and NAME.json (grid, frame rate, rectangles,
 scene-linear with premultiplied alpha, motion is in pixels, and there is no alpha sheet.
 
 Examples:
-  bansho flipbook torch.toml --grid 8x8 --loop 2        64 frames, one turn of a 2-second loop
+  bansho flipbook torch.toml --grid 8x8 --loop 2   64 frames, one turn of 2 s
   bansho flipbook torch.toml --grid 4x4 --size 128x256 -o game/torch.png")]
 pub(crate) struct FlipbookArgs {
     /// The scene file.

@@ -17,15 +17,15 @@ use super::{
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  bansho render fire.toml                               PNG files in out/fire/
+  bansho render fire.toml                          PNG files in out/fire/
   bansho render fire.toml -o shot/fire.####.exr --layers --aovs
-  bansho render fire.toml -o fire.mov                   ProRes 4444 with alpha, by ffmpeg
+  bansho render fire.toml -o fire.mov              ProRes 4444 with alpha
   bansho render fire.toml -o fire.gif --loop 4 --size 320x180
-  bansho render fire.toml --frames 0-239x10             every tenth frame
-  bansho render fire.toml --contact-sheet 16            16 frames in one picture
-  bansho render fire.toml --crop 600,200,128,128        a part, identical to that of the whole
+  bansho render fire.toml --frames 0-239x10        every tenth frame
+  bansho render fire.toml --contact-sheet 16       16 frames in one picture
+  bansho render fire.toml --crop 600,200,128,128   the same part of the whole
   bansho render fire.toml --set flame_sheet.height=1.2 --set wind.gust=0.5
-  bansho render fire.toml --resume                      go on after an interruption
+  bansho render fire.toml --resume                 go on after an interruption
 
 A PNG is exact over black in programs that blend as --alpha says; an EXR is exact over anything. Interrupt at any time: whole frames stay, and nothing half-written bears a final name.")]
 pub(crate) struct RenderArgs {

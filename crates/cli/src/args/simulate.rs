@@ -16,7 +16,7 @@ use super::{
 Examples:
   bansho simulate torch.toml --particles gas.####.ply          all frames
   bansho simulate torch.toml --particles gas.ply --frames 60   one
-  bansho simulate torch.toml --particles g.####.ply --frames 0-99x9 --snapshots s
+  bansho simulate torch.toml --particles gas.####.ply --snapshots states
 
 Each file is a binary PLY with x y z (m, y up) and vx vy vz (m/s) of every particle at the middle of the frame's exposure: of a \
 particle flame with temperature (K) and density (kg/m^3), of an aurora with energy (eV) and power (W). Blender, MeshLab and Open3D read it.")]

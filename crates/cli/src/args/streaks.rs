@@ -22,10 +22,10 @@ the share of it that they hide (opacity); a streak that leaves at an edge enters
 streaks.json says how to read them, and lists every drop with its diameter, velocity, opacity and place.
 
 Examples:
-  bansho streaks                                        4 rates x 6 diameters in out/streaks/
+  bansho streaks                                   24 textures in out/streaks/
   bansho streaks --rates 50 --diameters 0.5,1,2,3,4 --exposure 1/60 -o heavy
-  bansho streaks --format exr --light 0,0.3,-1          lit from behind: radiance for illuminance 1
-  bansho streaks --box 0.25 --size 2048 --variants 8    eight close views of each")]
+  bansho streaks --format exr --light 0,0.3,-1     radiance, lit from behind
+  bansho streaks --box 0.25 --size 2048 --variants 8")]
 pub(crate) struct StreaksArgs {
     /// Rain rates R, ascending, mm/h.
     #[arg(long, value_name = "R,...", default_value = "1,5,10,20", allow_hyphen_values = true, value_parser = values::parse_numbers)]

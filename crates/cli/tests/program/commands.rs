@@ -24,7 +24,7 @@ fn a_new_scene_shows_any_phenomenon() {
         folder.succeed(&["new", kind, "--phenomenon", kind]);
         let text = String::from_utf8(folder.files("")[&file].clone()).unwrap();
         assert!(text.contains(&format!("\n[[{kind}]]\n")), "{text}");
-        assert!((15..=50).contains(&text.lines().count()) && text.contains("--all"), "{text}");
+        assert!((15..=42).contains(&text.lines().count()) && text.contains("--all"), "{text}");
         let short = folder.succeed(&["check", &file]);
         std::fs::remove_file(folder.path(&file)).unwrap();
         folder.succeed(&["new", kind, "--phenomenon", kind, "--all"]);

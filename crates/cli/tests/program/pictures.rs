@@ -1,5 +1,7 @@
 //! What is drawn does not depend on how it is drawn.
 
+use bansho::base::color::decode_srgb8;
+
 use crate::support::{FLAME, Folder, decode_png, read_exr};
 
 #[test]
@@ -65,17 +67,11 @@ fn a_crop_of_layers_and_measures_is_the_same_part_too() {
     }
 }
 
-/// Light of a code of sRGB.
-fn light(code: u8) -> f32 {
-    let srgb = f32::from(code) / 255.0;
-    if srgb <= 0.040_45 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
-}
-
 /// Whether the opaque pixels `shown` are the pixels `frame` with straight alpha over black, as near as 8 bits hold both.
 fn is_over_black(shown: &[u8], frame: &[u8]) -> bool {
     let over = |(shown, frame): (&[u8], &[u8])| {
         let alpha = f32::from(frame[3]) / 255.0;
-        (0..3).all(|channel| (light(shown[channel]) - alpha * light(frame[channel])).abs() < 0.012)
+        (0..3).all(|channel| (decode_srgb8(shown[channel]) - alpha * decode_srgb8(frame[channel])).abs() < 0.012)
     };
     shown.len() / 3 == frame.len() / 4 && shown.chunks(3).zip(frame.chunks(4)).all(over)
 }
@@ -83,7 +79,7 @@ fn is_over_black(shown: &[u8], frame: &[u8]) -> bool {
 #[test]
 fn a_contact_sheet_holds_the_very_frames() {
     let folder = Folder::with_scene(FLAME);
-    folder.succeed(&["render", "scene.toml", "--out", "f/f.png"]);
+    folder.succeed(&["render", "scene.toml", "--alpha", "linear", "--out", "f/f.png"]);
     folder.succeed(&["render", "scene.toml", "--contact-sheet", "3", "--frames", "2-4"]);
     assert_eq!(folder.files("out/scene").keys().collect::<Vec<_>>(), ["scene.sheet.png"]);
     let sheet = decode_png(&folder.files("out/scene")["scene.sheet.png"]);
@@ -99,7 +95,7 @@ fn a_contact_sheet_holds_the_very_frames() {
 #[test]
 fn a_contact_sheet_holds_the_frames_that_are_listed() {
     let folder = Folder::with_scene(FLAME);
-    folder.succeed(&["render", "scene.toml", "--out", "f/f.png"]);
+    folder.succeed(&["render", "scene.toml", "--alpha", "linear", "--out", "f/f.png"]);
     folder.succeed(&["render", "scene.toml", "--contact-sheet", "2", "--frames", "1-5x2", "--out", "sheet.png"]);
     let sheet = decode_png(&std::fs::read(folder.path("sheet.png")).unwrap());
     for (x, frame) in [(0, "f.0001.png"), (50, "f.0003.png")] {

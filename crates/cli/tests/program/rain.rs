@@ -86,7 +86,8 @@ fn twice_the_fire_is_twice_the_light_on_the_rain_beside_it() {
 
 #[test]
 fn rain_that_nothing_lights_is_drawn_with_a_warning() {
-    let folder = scene("[[rain]]\nname = \"night\"\n");
+    // A sky that is stated, so that there is no other.
+    let folder = scene("[sky]\nluminance = 0\nvisible = false\n[[rain]]\nname = \"night\"\n");
     let run = folder.succeed(&["render", "scene.toml", "--frames", "0", "--out", "f.png"]);
     assert!(run.stderr.contains(": night: nothing lights it, so it is drawn black"), "{}", run.stderr);
     assert!(decode_png(&folder.files("")["f.png"]).bytes.chunks_exact(4).all(|pixel| pixel[..3] == [0; 3]));

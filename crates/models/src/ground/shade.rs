@@ -23,7 +23,7 @@ pub(super) const HORIZON: f64 = 1e6;
 /// Share of its light that soaked ground loses, since water keeps light in (Lekner & Dorf 1988).
 const WET_DARKENING: f64 = 0.55;
 /// Share of its light that soaked ground loses beyond that where water stands on it, which is deeper and often turbid.
-const PUDDLE_DARKENING: f64 = 0.45;
+const PUDDLE_DARKENING: f64 = 0.4;
 /// Albedo of deep water.
 pub(super) const WATER_ALBEDO: f32 = 0.02;
 

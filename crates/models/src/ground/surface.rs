@@ -13,8 +13,8 @@ use super::{gloss::Facets, parameters::GroundParameters};
 const OCTAVES: usize = 8;
 /// Strength of the largest octave, and of each over that of the one before. Soil and asphalt have most of their contrast in their grain:
 /// were it as strong in their large patches, bright ground would look like clouds.
-const STRENGTH: f64 = 0.16;
-const GAIN: f64 = 1.3;
+const STRENGTH: f64 = 0.2;
+const GAIN: f64 = 1.24;
 /// Height of an octave over that of the one before.
 const RELIEF_GAIN: f64 = 0.6;
 /// Standard deviation of the relief, which is roughly normal.
@@ -158,6 +158,29 @@ mod tests {
             assert!((film - 0.5).abs() < 0.07, "{film}");
             assert!((surface.at(DVec2::ZERO, 1e3).puddle - share).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn ground_has_its_contrast_in_its_grain_not_in_clouds() {
+        let surface = Surface::new(&GroundParameters::default(), Key::new(5, "ground"));
+        let shade = |x: f64, z: f64| math::ln(f64::from(surface.at(DVec2::new(x, z), 1e-3).albedo[1]));
+        // Squares of 0.4 m, each seen at 64 places.
+        let (squares, side) = (900, 0.4);
+        let (mut coarse, mut all) = (Vec::new(), Vec::new());
+        for square in 0..squares {
+            let corner = [square % 30, square / 30].map(|step| 1.7 * f64::from(step));
+            let within = (0..64)
+                .map(|i| shade(corner[0] + side / 8.0 * f64::from(i % 8), corner[1] + side / 8.0 * f64::from(i / 8)));
+            let within: Vec<f64> = within.collect();
+            coarse.push(within.iter().sum::<f64>() / 64.0);
+            all.extend(within);
+        }
+        let variance = |values: &[f64]| {
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / values.len() as f64
+        };
+        let share = variance(&coarse) / variance(&all);
+        assert!(share < 0.15, "{share}");
     }
 
     #[test]

@@ -57,6 +57,17 @@ fn dry_ground_under_a_lamp_has_lamberts_luminance() {
 }
 
 #[test]
+fn standing_water_is_darker_than_a_film_where_it_mirrors_nothing() {
+    let ground = |puddles: f64| {
+        let parameters = GroundParameters { puddles, wetness: 1.0.into(), roughness: 0.02, ..plain() };
+        // Straight above, so that nothing is mirrored toward the camera.
+        at(&drawn(parameters, vec![lamp(40.0)], None), DVec3::ZERO)
+    };
+    let [film, puddle] = [0.0, 1.0].map(ground);
+    assert!((0.5..0.75).contains(&(puddle / film)), "{puddle} {film}");
+}
+
+#[test]
 fn nothing_is_drawn_above_the_horizon_or_from_below() {
     let camera = CameraParameters { position: [0.0, -1.0, 6.0].into(), ..CameraParameters::default() };
     let ground = Ground::new(plain(), 1, None);
@@ -75,8 +86,8 @@ fn a_wet_ground_is_darker_and_mirrors_what_fresnel_says() {
     let wet = GroundParameters { wetness: 1.0.into(), puddles: 1.0, ..plain() };
     let dry = at(&drawn(plain(), vec![lamp(2.0)], None), DVec3::ZERO);
     let soaked = at(&drawn(wet.clone(), vec![lamp(2.0)], None), DVec3::ZERO);
-    // Without a picture of its surroundings a puddle shows none of them.
-    assert!((soaked / dry - 0.45).abs() < 1e-3, "{}", soaked / dry);
+    // Without a picture of its surroundings a puddle shows none of them: soaked ground keeps 0.45, under standing water 0.6 of that.
+    assert!((soaked / dry - 0.27).abs() < 1e-3, "{}", soaked / dry);
     let mirrored = at(&drawn(wet, Vec::new(), Some(&mirror)), DVec3::ZERO);
     // Seen from (0, 2, 6): the cosine to the normal is 2 / sqrt(40).
     let cos = 2.0 / bansho_base::math::sqrt(40.0);

@@ -25,9 +25,9 @@ pub(super) fn faint(plan: &Plan, phenomena: &[Box<dyn Phenomenon>]) -> Vec<(Stri
     }
     let stepped: Vec<&str> =
         phenomena.iter().filter(|each| each.stepping().is_some()).map(|each| each.name()).collect();
-    let closed = phenomena.iter().filter(|each| each.stepping().is_none());
+    let closed = phenomena.iter().map(AsRef::as_ref).filter(|each| each.stepping().is_none());
     let is_of_scene = |name: &str| plan.scene.instances.iter().any(|own| own.enabled && own.name == name);
-    let remark = |each: &Box<dyn Phenomenon>| {
+    let remark = |each: &dyn Phenomenon| {
         // What cannot be drawn will say so when it is.
         let change = greatest_change(plan, &stepped, each.name()).ok()?;
         let advice = each.strengthened_by();

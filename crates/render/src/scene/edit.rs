@@ -16,7 +16,7 @@ pub enum EditError {
     )]
     NoAssignment(String),
     /// The path leads nowhere.
-    #[error("`{path}`: {segment} is not in the scene{}; there is: {there}", did_you_mean(.meant))]
+    #[error("{} is not in the scene{}; there is: {there}", part(.path, .segment), did_you_mean(.meant))]
     NoSuchPlace {
         /// The whole path.
         path: String,
@@ -216,6 +216,11 @@ fn nowhere(path: &str, segment: &str, there: String) -> EditError {
     EditError::NoSuchPlace { path: path.to_owned(), segment: segment.to_owned(), there, meant: Vec::new() }
 }
 
+/// The part of a path that leads nowhere.
+fn part(path: &str, segment: &str) -> String {
+    if path == segment { format!("`{path}`") } else { format!("`{path}`: {segment}") }
+}
+
 fn did_you_mean(meant: &[String]) -> String {
     let meant: Vec<String> = meant.iter().map(|path| format!("`{path}`")).collect();
     if meant.is_empty() { String::new() } else { format!(", did you mean {}?", meant.join(" or ")) }
@@ -325,7 +330,7 @@ mod tests {
         let height = told(SCENE, "height=2");
         assert_eq!(
             height,
-            "`height`: height is not in the scene, did you mean `flame_sheet.height`?; there is: bansho, picture, flame_sheet"
+            "`height` is not in the scene, did you mean `flame_sheet.height`?; there is: bansho, picture, flame_sheet"
         );
         let both = "bansho = 1\n[[rain]]\n[[flame_particles]]\nburners = [{}]\n";
         for (scene, assignment, expected) in [

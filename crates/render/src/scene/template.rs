@@ -3,7 +3,7 @@
 
 use bansho_base::parameters::{Descriptor, Kind, Table, TableDescriptor, Value};
 
-use super::{FORMAT, PhenomenonKind, SHARED_TABLES, toml};
+use super::{FORMAT, PhenomenonKind, SHARED_TABLES, SharedTable, toml};
 
 /// Shared tables that a scene need not have, and has only where the phenomenon's setting does.
 const OPTIONAL: [&str; 5] = ["plate", "sky", "ground", "light", "obstacle"];
@@ -20,7 +20,11 @@ pub fn short(kind: &PhenomenonKind) -> String {
     // A test holds that settings can be read.
     let setting = toml::parse(kind.setting).unwrap_or_default();
     let mut text = format!("bansho = {FORMAT}   # format version\n");
-    for shared in SHARED_TABLES {
+    let (several, others): (Vec<&SharedTable>, Vec<&SharedTable>) =
+        SHARED_TABLES.iter().partition(|shared| tables(&setting, shared.key).len() > 1);
+    // A list of inline tables belongs to the root, before the first table.
+    several.iter().for_each(|shared| brief_list(&mut text, shared, &tables(&setting, shared.key)));
+    for shared in others {
         let first = FIRST_SHARED.iter().find(|(key, _)| *key == shared.key).map_or(&[][..], |(_, keys)| keys);
         let stated = tables(&setting, shared.key);
         let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
@@ -33,6 +37,15 @@ pub fn short(kind: &PhenomenonKind) -> String {
     let stated = tables(&setting, kind.key).first().copied().cloned().unwrap_or_default();
     brief_table(&mut text, &format!("[[{}]]", kind.key), (kind.table)(), &stated, kind.first_keys);
     text
+}
+
+/// Several tables of one kind, each on a line.
+fn brief_list(text: &mut String, shared: &SharedTable, tables: &[&Table]) {
+    text.push('\n');
+    comment(text, &format!("{} More of them can be added here.", (shared.table)().doc));
+    text.push_str(&format!("{} = [\n", shared.key));
+    tables.iter().for_each(|table| text.push_str(&format!("    {},\n", Value::Table((*table).clone()))));
+    text.push_str("]\n");
 }
 
 /// A line of a short scene.
