@@ -31,6 +31,7 @@ pub const SCENES: &[(&str, &str)] = files!(
     "dome_night.toml",
     "downpour_day.toml",
     "drizzle.toml",
+    "fire_in_court.toml",
     "headlights.toml",
     "headlights_ahead.toml",
     "hearth.toml",
