@@ -21,8 +21,8 @@ const EYE_HEIGHT: f64 = 1.7;
 
 crate::parameters! {
     /// Where the picture is taken from. A dome looks at `target` with the center of its circle. Without `position` and `target`, a scene whose
-    /// phenomena are all of one kind, without obstacles and plate, is seen from where such a phenomenon is seen well: a flame from near, rain
-    /// around its lamp, auroras from the ground, looking up to the north; a dome's middle is then the zenith.
+    /// phenomena are all of one kind and as they are by default in place and size, without obstacles and plate, is seen from where such a phenomenon is
+    /// seen well: a flame from near, rain along its lamps. Auroras are seen from the ground, looking up to the north; a dome's middle is then the zenith.
     pub struct CameraParameters {
         /// Where the camera stands.
         position: Animated<[f64; 3]> = Animated::from([0.0, 1.2, 4.0]), unit("m");
@@ -50,6 +50,9 @@ crate::parameters! {
         shutter_offset_s: f64 = 0.0, limits(Range::new(-10.0, 10.0)), unit("s");
     }
 }
+
+/// Vertical field of view of a lens of 14 mm, with which auroras are photographed, degrees.
+pub const SKY_FOV_DEG: f64 = 81.0;
 
 impl CameraParameters {
     /// Stands at the origin and looks up at the sky: to the north with a lens that has an up, to the zenith with a dome.

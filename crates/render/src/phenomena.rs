@@ -36,6 +36,7 @@ fn opening_fault(key: impl Into<String>, fault: impl Error + Send + Sync + 'stat
 
 impl Describe for FlameSheetParameters {
     const KEY: &'static str = "flame_sheet";
+    const PLACEMENT_KEYS: &'static [&'static str] = &["position", "width", "height"];
     // From where the flame nearly fills the height of the picture.
     const SETTING: &'static str = "camera = { position = [0.0, 0.76, 2.75], target = [0.0, 0.76, 0.0] }\n";
     const FIRST_KEYS: &'static [&'static str] = &[
@@ -61,6 +62,7 @@ impl Describe for FlameSheetParameters {
 
 impl Describe for FlameParticlesParameters {
     const KEY: &'static str = "flame_particles";
+    const PLACEMENT_KEYS: &'static [&'static str] = &["position", "burners", "domain_min", "domain_max"];
     const FIRST_KEYS: &'static [&'static str] = &[
         "position",
         "particles",
@@ -113,6 +115,7 @@ impl Describe for RainParameters {
 
 impl Describe for AuroraParameters {
     const KEY: &'static str = "aurora";
+    const PLACEMENT_KEYS: &'static [&'static str] = &["shapes", "extent_km"];
     const FIRST_KEYS: &'static [&'static str] = &[
         "flux_mw_per_m2",
         "energy_ev",

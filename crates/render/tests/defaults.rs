@@ -75,6 +75,10 @@ fn a_camera_that_is_told_where_to_stand_or_look_is_left_alone() {
     {
         assert_eq!(position(text), usual.position.at(0.0), "{text}");
     }
+    // What is placed by the scene is framed by the scene.
+    assert_eq!(position("[[flame_sheet]]\nposition = [5, 0, 0]"), usual.position.at(0.0));
+    let overhead = read("[[aurora]]\nshapes = [{ sheets = [{ form = \"fold\" }] }]").camera;
+    assert!(overhead.target.at(0.0)[1] > 50.0 && overhead.vertical_fov_deg.at(0.0) > 80.0);
     let wide = read("[camera]\nvertical_fov_deg = 70\n[[flame_sheet]]").camera;
     assert_eq!(wide.vertical_fov_deg.at(0.0), 70.0);
     assert_eq!(wide.position, read("[[flame_sheet]]").camera.position);

@@ -152,5 +152,6 @@ fn lamps_alone_set_the_exposure_for_the_rain_they_light() {
     let ev100 = plan(text, Arc::default()).exposure_ev100;
     assert!((1.0..8.0).contains(&ev100), "EV {ev100}");
     // Where nothing shines at all: a sunlit day.
-    assert_eq!(plan("[[rain]]\n", Arc::default()).exposure_ev100, 15.0);
+    let dark = "[sky]\nluminance = 0.0\n[[rain]]\n";
+    assert_eq!(plan(dark, Arc::default()).exposure_ev100, 15.0);
 }

@@ -22,7 +22,8 @@ bansho_base::choice! {
 }
 
 bansho_base::parameters! {
-    /// A level ground to the horizon, lit by lamps, fires and sky; wet, it darkens and mirrors them.
+    /// A level ground to the horizon, lit by lamps, fires and sky; wet, it darkens and mirrors them. A scene of rain alone that states neither sky,
+    /// ground nor light has a wet one.
     pub struct GroundParameters {
         /// What the ground is.
         kind: GroundKind = GroundKind::Land;

@@ -3,7 +3,7 @@
 //! [`PhenomenonKind::setting`] says how a new scene of a kind shows it. Where all phenomena of a scene are of one kind, and nothing that the
 //! text states contradicts it, that is the default:
 //!
-//! - its camera, where the text states neither `camera.position` nor `camera.target`;
+//! - its camera, where the text states neither `camera.position` nor `camera.target`, nor where the phenomena are or how large;
 //! - its sky, where the text states neither a sky nor a light;
 //! - its ground and lights where the text states neither sky, ground nor light;
 //! - its exposure where all of its sky, ground and lights are the default.
@@ -76,8 +76,20 @@ fn imply_setting(completed: &mut Table, root: &Table, kind: &PhenomenonKind) -> 
     if let Some(exposure) = value_in(&setting, "picture", "exposure_ev100").filter(|_| implied == whole) {
         imply(completed, "picture", "exposure_ev100", exposure.clone());
     }
-    imply_camera(completed, root, &setting);
+    if !is_placed(root, kind) {
+        imply_camera(completed, root, &setting);
+    }
     implied
+}
+
+/// Whether the text states where a phenomenon is or how large.
+fn is_placed(root: &Table, kind: &PhenomenonKind) -> bool {
+    let Some(Value::List(items)) = root.get(kind.key).map(|node| &node.value) else { return false };
+    let states = |item: &Node| match &item.value {
+        Value::Table(table) => kind.placement_keys.iter().any(|key| table.get(key).is_some()),
+        _ => false,
+    };
+    items.iter().any(states)
 }
 
 /// A perspective camera that is not told where it is stands where the phenomena are seen well.

@@ -19,8 +19,9 @@ use std::sync::Arc;
 
 use bansho_base::{
     air::Air,
+    animation::Animated,
     assets::Assets,
-    camera::{CameraParameters, Lens},
+    camera::{CameraParameters, SKY_FOV_DEG},
     parameters::{Parameter, Parameters, Problem, ProblemKind, Reader, Table, TableDescriptor, Value},
     sky::SkyParameters,
     wind::WindParameters,
@@ -182,7 +183,7 @@ impl Scene {
         check::format(root, reader);
         check::root_keys(root, kinds, reader);
         let (completed, implied) = defaults::complete(root, kinds);
-        Self::read_completed(&completed, kinds, implied, reader).looking_up(root)
+        Self::read_completed(&completed, kinds, implied, reader).looking_up(&completed)
     }
 
     /// Reads a scene whose defaults that depend on other values are in `root`.
@@ -202,18 +203,19 @@ impl Scene {
         }
     }
 
-    /// A dome or panorama that is not told where to look sees the sky where that is all there is.
+    /// A camera that is not told where to look, nor stands in the setting of its phenomena, sees the sky where that is all there is.
     fn looking_up(mut self, root: &Table) -> Self {
         let told = |key: &str| match root.get("camera").map(|node| &node.value) {
             Some(Value::Table(camera)) => camera.get(key).is_some(),
             _ => false,
         };
-        let is_perspective = self.camera.lens == Lens::Perspective;
-        let all_in_the_sky = !is_perspective
-            && !self.instances.is_empty()
-            && self.instances.iter().all(|instance| instance.kind.in_the_sky);
+        let all_in_the_sky =
+            !self.instances.is_empty() && self.instances.iter().all(|instance| instance.kind.in_the_sky);
         if all_in_the_sky && self.obstacles.is_empty() && !self.has_plate() && !told("position") && !told("target") {
             self.camera.look_up();
+            if !told("vertical_fov_deg") {
+                self.camera.vertical_fov_deg = Animated::from(SKY_FOV_DEG);
+            }
         }
         self
     }

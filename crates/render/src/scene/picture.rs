@@ -147,7 +147,7 @@ bansho_base::choice! {
 }
 
 bansho_base::parameters! {
-    /// A lamp, the moon or the sun.
+    /// A lamp, the moon or the sun. A scene of rain alone that states neither sky, ground nor light is lit by three street lamps.
     pub struct LightParameters {
         /// How it shines.
         kind: LightKind = LightKind::Point;

@@ -88,8 +88,10 @@ pub struct PhenomenonKind {
     pub read: fn(&Table, &mut Reader) -> Box<dyn Source>,
     /// Whether it is in the sky: where all is, a camera that is told nothing looks up.
     pub in_the_sky: bool,
-    /// What a new scene of it states so that it is seen well, as a scene file says it.
+    /// What a new scene of it states so that it is seen well, as a scene file says it; the default of a scene of it alone.
     pub setting: &'static str,
+    /// Its own keys that say where it is or how large, so that the setting's camera may not fit.
+    pub placement_keys: &'static [&'static str],
     /// Keys that one changes first, in tables and lists of tables within it with dots.
     pub first_keys: &'static [&'static str],
 }
@@ -105,6 +107,8 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     const IN_THE_SKY: bool = false;
     /// What a new scene of it states so that it is seen well, as a scene file says it; nothing where all defaults do.
     const SETTING: &'static str = "";
+    /// See [`PhenomenonKind::placement_keys`].
+    const PLACEMENT_KEYS: &'static [&'static str] = &[];
     /// Keys that one changes first, with which a short new scene begins; dots lead into tables and lists of tables (`burners.diameter`).
     const FIRST_KEYS: &'static [&'static str] = &[];
 
@@ -137,6 +141,7 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
         read: read_described::<Self>,
         in_the_sky: Self::IN_THE_SKY,
         setting: Self::SETTING,
+        placement_keys: Self::PLACEMENT_KEYS,
         first_keys: Self::FIRST_KEYS,
     };
 }
