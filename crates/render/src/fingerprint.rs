@@ -1,8 +1,11 @@
 //! Fingerprints of what pixels and states depend on: equal fingerprints, equal bytes.
 
-use bansho_base::parameters::{Parameters, Table, Value};
+use bansho_base::{
+    color::AlphaConvention,
+    parameters::{Parameters, Table, Value},
+};
 
-use crate::{phenomena::Part, plan::Plan, scene::Instance};
+use crate::{display::BitDepth, phenomena::Part, plan::Plan, scene::Instance};
 
 /// The version whose pictures these are; another version's frames are drawn anew.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -32,6 +35,15 @@ pub fn of_frame(plan: &Plan, number: i64) -> [u8; 32] {
     // The first one's light falls on all frames.
     plan.scene.plate.image.iter().for_each(|path| shared_asset(plan, &path.0, &mut hasher));
     *hasher.finalize().as_bytes()
+}
+
+/// The fingerprint of a PNG of a frame: that of the frame's pixels, and of how they are stored where that may differ.
+pub fn of_png(frame: [u8; 32], bits: BitDepth, alpha: AlphaConvention) -> [u8; 32] {
+    let stored = |fingerprint: [u8; 32], how: &[u8]| {
+        *blake3::Hasher::new().update(&fingerprint).update(how).finalize().as_bytes()
+    };
+    let frame = if bits == BitDepth::Sixteen { stored(frame, b"16 bits") } else { frame };
+    if alpha == AlphaConvention::Encoded { stored(frame, b"encoded alpha") } else { frame }
 }
 
 /// A fingerprint of all that the state of stepped phenomena depends on: not the camera, the size or the exposure.

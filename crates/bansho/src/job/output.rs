@@ -19,6 +19,7 @@ use bansho_media::{
 use bansho_render::{
     Plan,
     display::{BitDepth, display},
+    fingerprint,
 };
 
 use super::{
@@ -43,14 +44,10 @@ pub(super) struct Format {
 impl Format {
     /// What a file's fingerprint must be: that of the frame's pixels, and of how they are stored where that may differ.
     pub(super) fn fingerprint(&self, frame: [u8; 32]) -> [u8; 32] {
-        if self.pattern.kind() != OutputKind::Png {
-            return frame;
+        match self.pattern.kind() {
+            OutputKind::Png => fingerprint::of_png(frame, self.bits, self.alpha),
+            _ => frame,
         }
-        let stored = |fingerprint: [u8; 32], how: &[u8]| {
-            *blake3::Hasher::new().update(&fingerprint).update(how).finalize().as_bytes()
-        };
-        let frame = if self.bits == BitDepth::Sixteen { stored(frame, b"16 bits") } else { frame };
-        if self.alpha == AlphaConvention::Encoded { stored(frame, b"encoded alpha") } else { frame }
     }
 
     /// Opens the files for `count` frames of `size` pixels; `window` of them may be under way at once.

@@ -10,6 +10,7 @@ use bansho::{
         MediaError,
         png::{self, PngEffort},
     },
+    render::fingerprint,
 };
 use web_time::Instant;
 
@@ -230,7 +231,8 @@ fn shown(frame: &mut Frame) -> Vec<[u8; 4]> {
 /// The frame as `bansho render` writes it unless it is told otherwise.
 fn encoded(frame: &Frame) -> Result<Vec<u8>, MediaError> {
     let shown = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
-    png::encode(&shown, &frame.header.fingerprint, PngEffort::default(), Path::new("still.png"))
+    let fingerprint = fingerprint::of_png(frame.header.fingerprint, BitDepth::Eight, AlphaConvention::Encoded);
+    png::encode(&shown, &fingerprint, PngEffort::default(), Path::new("still.png"))
 }
 
 #[cfg(test)]

@@ -350,7 +350,8 @@ fn rain_that_a_slider_changes_keeps_its_drops() {
 fn rain_whose_drops_or_shutter_a_slider_changes_does_not_pop() {
     let text = |shutter: &str, first: &str| {
         format!(
-            "bansho = 1\n[picture]\nsize = [160, 90]\n[camera]\nshutter_s = {shutter}\n[sky]\nkind = \"overcast\"\n\
+            "bansho = 1\n[picture]\nsize = [160, 90]\n[camera]\nposition = [0.0, 1.2, 4.0]\n\
+             target = [0.0, 0.9, 0.0]\nshutter_s = {shutter}\n[sky]\nkind = \"overcast\"\n\
              [[rain]]\nrate_mm_per_h = 20.0\ndiameters_mm = [{first}, 2.0, 3.0]\n"
         )
     };

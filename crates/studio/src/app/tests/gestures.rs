@@ -73,7 +73,7 @@ fn an_aurora_alone_is_seen_as_before_once_hands_turn_the_camera() {
     harness.get_by_role_and_label(Role::Button, "camera").click();
     harness.run_steps(3);
     let value = harness.get_by_role_and_label(Role::SpinButton, "vertical fov deg").value();
-    assert_eq!(value.as_deref(), Some("81.0°"), "the inspector says what is seen");
+    assert_eq!(value.as_deref(), Some("62.0°"), "the inspector says what is seen");
     let viewport = harness.get_by_label("Viewport").rect();
     harness.run_steps(20);
     assert_eq!(harness.get_by_label("Viewport").rect(), viewport, "the inspector is as wide as it was");
@@ -98,7 +98,7 @@ fn an_aurora_alone_whose_camera_is_keyed_stays_in_sight() {
     harness.get_by_label("Key the value at this time: camera.target").click();
     drawn(&mut harness);
     let camera = harness.state_mut().session().plan().unwrap().scene().camera.clone();
-    assert_eq!((camera.target.at(0.0), camera.vertical_fov_deg.at(0.0)), ([0.0, 60.0, -60.0], 81.0));
+    assert_eq!((camera.target.at(0.0), camera.vertical_fov_deg.at(0.0)), ([0.0, 32.0, -57.0], 62.0));
 }
 
 #[test]
