@@ -37,7 +37,8 @@ async function open(example, prepare = async () => {}) {
   return page;
 }
 
-// What a part of the window shows: its mean luminance, and the share of the width where the middle of its light lies.
+// What a part of the window shows: its mean luminance, the share of the width where the middle of its light lies, and how far any
+// pixel is from gray.
 async function look(page, clip) {
   const png = (await page.screenshot({ clip })).toString("base64");
   return page.evaluate(async (png) => {
@@ -47,15 +48,20 @@ async function look(page, clip) {
     const drawing = canvas.getContext("2d");
     drawing.drawImage(image, 0, 0);
     const { data } = drawing.getImageData(0, 0, image.width, image.height);
-    let [sum, moment] = [0, 0];
+    let [sum, moment, color] = [0, 0, 0];
     for (let pixel = 0; pixel < data.length / 4; pixel += 1) {
       const light = 0.2126 * data[4 * pixel] + 0.7152 * data[4 * pixel + 1] + 0.0722 * data[4 * pixel + 2];
       sum += light;
       moment += light * (pixel % image.width);
+      const channels = data.subarray(4 * pixel, 4 * pixel + 3);
+      color = Math.max(color, Math.max(...channels) - Math.min(...channels));
     }
-    return { mean: sum / (data.length / 4), middle: moment / Math.max(sum, 1) / image.width };
+    return { mean: sum / (data.length / 4), middle: moment / Math.max(sum, 1) / image.width, color };
   }, png);
 }
+
+// Whether a flame or an aurora is seen: the panel that waits for the first picture is gray.
+const isDrawn = ({ mean, color }) => mean > 1.5 && color > 40;
 
 async function until(page, clip, wanted, what, seconds = 60) {
   const end = Date.now() + 1000 * seconds;
@@ -116,7 +122,7 @@ async function chooserOf(page, tries = 4) {
 // A flame bends with a dragged wind. The picture lies between the panels.
 const picture = { x: 215, y: 60, width: 840, height: 660 };
 const flame = await open("torch");
-const still = await until(flame, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
+const still = await until(flame, picture, isDrawn, "no picture of a flame");
 console.log(`a flame: mean ${still.mean.toFixed(1)}, middle ${still.middle.toFixed(3)}`);
 await flame.mouse.click(298, 44);
 await mustNotFreeze(flame, "blowing", 3, async (tried) => {
@@ -138,7 +144,7 @@ await flame.close();
 // A stroke makes an aurora. The editor's squares lie below the picture.
 const sky = await open("quiet_arc");
 const above = { x: 370, y: 60, width: 530, height: 220 };
-const alone = await until(sky, above, ({ mean }) => mean > 1.5, "no aurora", 120);
+const alone = await until(sky, above, isDrawn, "no aurora", 120);
 const square = { x: 584, y: 417, side: 365 };
 const at = (x, y) => [square.x + x * square.side, square.y + y * square.side];
 await mustNotFreeze(sky, "drawing", 6, (tried) => {
@@ -154,7 +160,7 @@ await sky.waitForFunction(keeps, null, { timeout: 20000 });
 console.log("the browser keeps it while it is unsaved");
 // Another page has nothing to keep, and leaves it there.
 const other = await open("torch");
-await until(other, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
+await until(other, picture, isDrawn, "no picture of a flame");
 await other.waitForTimeout(8000);
 if (!(await other.evaluate(keeps))) fail("another page forgot what this one keeps");
 await other.close();
@@ -178,7 +184,7 @@ await stroke(sky, [at(0.1, 0.9), at(0.5, 0.86), at(0.9, 0.9)]);
 await sky.waitForFunction(keeps, null, { timeout: 20000 });
 await sky.close();
 const heir = await open("torch");
-await until(heir, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
+await until(heir, picture, isDrawn, "no picture of a flame");
 await heir.mouse.click(RECOVER.x, RECOVER.y);
 await heir.waitForTimeout(500);
 await heir.mouse.click(RECOVER.x + 20, RECOVER.y + 28);
@@ -200,7 +206,7 @@ particles = 200
 preroll_s = 0.2
 `;
 const own = await open("torch");
-await until(own, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
+await until(own, picture, isDrawn, "no picture of a flame");
 const chooser = await chooserOf(own);
 await chooser.setFiles({ name: "small.toml", mimeType: "text/plain", buffer: Buffer.from(small) });
 await own.waitForTimeout(2000);
@@ -241,7 +247,7 @@ await own.close();
 
 // A picture of the user's own becomes the plate behind the flame; it is read and drawn by the worker.
 const plated = await open("torch");
-const dark = await until(plated, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
+const dark = await until(plated, picture, isDrawn, "no picture of a flame");
 await mustNotFreeze(plated, "a plate", 4, async () => {
   const asked = await chooserOf(plated);
   await asked.setFiles(fileURLToPath(new URL("../../../scenes/plates/grove.jpg", import.meta.url)));
@@ -271,7 +277,7 @@ const panicking = await open("torch", (page) => page.addInitScript(() => {
     }
   };
 }));
-await until(panicking, picture, ({ mean }) => mean > 1.5, "no picture of a flame");
+await until(panicking, picture, isDrawn, "no picture of a flame");
 const workers = await panicking.evaluate(() => window.drawn.length);
 await panicking.mouse.click(635, 700);
 await panicking.evaluate(() => (window.breaks = true));
@@ -300,7 +306,7 @@ async function elsewhere(graphics, wanted, what) {
 await elsewhere(["--disable-features=WebGPU", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"], async (page) => {
   if (await page.evaluate(async () => Boolean(await navigator.gpu?.requestAdapter()))) fail("this browser has WebGPU after all");
   await page.waitForFunction(() => document.getElementById("status").textContent === "", null, { timeout: 30000 });
-  await until(page, picture, ({ mean }) => mean > 1.5, "no picture by WebGL");
+  await until(page, picture, isDrawn, "no picture by WebGL");
 }, "without WebGPU it works by WebGL");
 await elsewhere(["--disable-features=WebGPU", "--disable-gpu", "--disable-3d-apis"], async (page) => {
   await page.waitForFunction(() => /needs WebGPU or WebGL 2/.test(document.getElementById("status").textContent), null, { timeout: 30000 });
