@@ -301,7 +301,10 @@ fn a_short_template_says_what_one_changes_first_and_is_the_same_scene() {
             let last = key.rsplit('.').next().unwrap();
             assert!(text.contains(&format!("{last} = ")), "{key} is missing:\n{text}");
         }
-        assert!(text.lines().filter(|line| line.contains(" = ")).all(|line| line.contains("   # ")), "{text}");
+        // A list of several tables is explained above it.
+        let is_listed = |line: &str| line.starts_with("    {") || line.ends_with(" = [");
+        let mut stated = text.lines().filter(|line| line.contains(" = ") && !is_listed(line));
+        assert!(stated.all(|line| line.contains("   # ")), "{text}");
         assert!(text.lines().all(|line| line.len() <= 140), "{text}");
     }
 }
