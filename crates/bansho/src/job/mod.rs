@@ -72,7 +72,7 @@ pub struct Job {
     pub seed: Option<u64>,
     /// A seamless loop of about so many seconds.
     pub loop_s: Option<f64>,
-    /// Whether sky, ground and lamps that the scene does not state are left out of the picture, so that it keeps its alpha.
+    /// Whether the sky, ground and lamps that the scene does not state are left out of the picture, so that it keeps its alpha.
     pub transparent: bool,
     /// Whether each phenomenon gets a layer of its own (EXR).
     pub layers: bool,

@@ -47,7 +47,7 @@ pub(crate) struct RenderArgs {
     /// `--view raw`]
     #[arg(long, value_name = "CONVENTION", value_parser = values::alpha_parser(), help_heading = "Output")]
     alpha: Option<AlphaConvention>,
-    /// Leave sky, ground and lamps out that the scene does not state, so that the picture keeps its alpha; they light it all the same.
+    /// Leave out the sky, ground and lamps that the scene does not state, so that the picture keeps its alpha. Sky and lamps still light it.
     #[arg(long, help_heading = "Output")]
     transparent: bool,
     /// Give each phenomenon a layer of its own (.exr).
