@@ -107,7 +107,7 @@ fn telling_panics<T>(work: impl FnOnce() -> T) -> T {
 pub fn read_plate(bytes: &[u8], extension: &str) {
     one_thread();
     telling_panics(|| {
-        if let Ok(picture) = decode_picture(bytes, extension) {
+        if let Ok(picture) = decode_picture(bytes, extension, limits::MemoryLimit::default()) {
             check_plate(picture);
         }
     });

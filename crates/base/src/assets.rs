@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use crate::{
     drawing::Drawing,
     image::Image,
+    memory,
     mesh::{Mesh, MeshError},
 };
 
@@ -42,6 +43,10 @@ pub struct AssetError {
     pub problem: AssetProblem,
 }
 
+fn of_all(others: u64) -> String {
+    if others == 0 { String::new() } else { format!(", since other inputs take {}", memory::shown(others)) }
+}
+
 fn only(instead: &[&str]) -> String {
     if instead.is_empty() { String::new() } else { format!(", only {}", instead.join(", ")) }
 }
@@ -55,6 +60,42 @@ pub enum AssetProblem {
     /// It is there but cannot be read.
     #[error("cannot be read: {0}")]
     Unreadable(String),
+    /// What bears its name holds no bytes with an end: a folder, a pipe, a device.
+    #[error("is {found}; allowed: an ordinary file")]
+    NotAFile {
+        /// What it is, such as `a pipe`.
+        found: &'static str,
+    },
+    /// It has more bytes than are read.
+    #[error("has {bytes} bytes; allowed: up to {limit}")]
+    FileSize {
+        /// How many it has.
+        bytes: u64,
+        /// Most that are read.
+        limit: u64,
+    },
+    /// It would take more memory than the inputs of a scene may.
+    #[error("takes {} of memory once it is read; allowed: up to {}{}", memory::shown(*.bytes), memory::shown(*.limit), of_all(*.others))]
+    Memory {
+        /// Bytes that it would take while it is read, at the most.
+        bytes: u64,
+        /// Bytes that it may take.
+        limit: u64,
+        /// Bytes that other inputs of the scene take already, for which the limit is lower.
+        others: u64,
+    },
+    /// It would take more memory than the system has.
+    #[error("takes {} of memory once it is read, more than there is", memory::shown(*.bytes))]
+    NoMemory {
+        /// Bytes that it would take while it is read, at the most.
+        bytes: u64,
+    },
+    /// It lies outside the folder that a scene is confined to.
+    #[error("lies outside {root}, the folder that this scene is confined to; allowed: files within it")]
+    Outside {
+        /// The folder.
+        root: String,
+    },
     /// What another program said of it, which had tried.
     #[error("{0}")]
     Told(String),

@@ -21,3 +21,10 @@ pub struct Drawing {
     /// The corner with the greatest.
     pub high: DVec2,
 }
+
+impl Drawing {
+    /// Bytes that its points take in memory.
+    pub fn memory_bytes(&self) -> u64 {
+        self.strokes.iter().map(|stroke| size_of_val(&stroke.points[..]) as u64).sum()
+    }
+}

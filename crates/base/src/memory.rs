@@ -11,6 +11,15 @@ pub fn is_granted(bytes: f64) -> bool {
     bytes < FEW_BYTES || (!cfg!(fuzzing) && granted())
 }
 
+/// A number of bytes as people read it: in GiB, MiB or KiB with one decimal, or in bytes.
+pub fn shown(bytes: u64) -> String {
+    let units = [(1_u64 << 30, "GiB"), (1 << 20, "MiB"), (1 << 10, "KiB")];
+    match units.into_iter().find(|&(unit, _)| bytes >= unit) {
+        Some((unit, name)) => format!("{:.1} {name}", bytes as f64 / unit as f64),
+        None => format!("{bytes} bytes"),
+    }
+}
+
 /// The largest of the twentieths of `count` that `fits`; 0 where none does.
 pub fn most(count: i64, fits: impl Fn(i64) -> bool) -> i64 {
     (1..=20).rev().map(|parts| count / 20 * parts).find(|&part| fits(part)).unwrap_or(0)
@@ -24,6 +33,12 @@ mod tests {
     fn nothing_is_granted_and_more_than_there_can_be_is_not() {
         assert!(is_granted(0.0) && is_granted(1e6));
         assert!(!is_granted(1e30) && !is_granted(f64::INFINITY));
+    }
+
+    #[test]
+    fn bytes_are_shown_in_the_unit_that_suits() {
+        assert_eq!([0, 1023, 1024, 5 << 20].map(shown), ["0 bytes", "1023 bytes", "1.0 KiB", "5.0 MiB"]);
+        assert_eq!([3 << 29, u64::MAX].map(shown), ["1.5 GiB", "17179869184.0 GiB"]);
     }
 
     #[test]

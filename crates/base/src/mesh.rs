@@ -81,6 +81,11 @@ impl Mesh {
         self.triangles.len()
     }
 
+    /// Bytes that it takes in memory.
+    pub fn memory_bytes(&self) -> u64 {
+        (size_of_val(&self.corners[..]) + size_of_val(&self.triangles[..])) as u64
+    }
+
     /// Never: a mesh has a triangle.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()

@@ -3,12 +3,15 @@
 use std::io;
 
 use bansho::job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksFault};
+use bansho::media::input::InputError;
 
 /// An error as the user of the program reads it.
 pub(crate) fn error(error: &JobError) -> String {
     match error {
         JobError::NoGpu => format!("{error}; allowed: --backend cpu, auto"),
-        JobError::Unreadable { path, source, near: None } if source.kind() == io::ErrorKind::NotFound => {
+        JobError::Unreadable { path, source: InputError::Io(source), near: None }
+            if source.kind() == io::ErrorKind::NotFound =>
+        {
             format!("{error}; `bansho new {}` writes a new scene", path.display())
         }
         JobError::Cancelled => format!("{error}, and --resume goes on from there"),

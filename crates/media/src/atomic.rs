@@ -11,12 +11,17 @@ use std::{
 
 use tempfile::NamedTempFile;
 
-use crate::error::MediaError;
+use crate::{
+    error::MediaError,
+    unfinished::{self, Listed},
+};
 
 /// A file that bears its name only once it is finished. Dropped before, it vanishes.
 #[derive(Debug)]
 pub struct AtomicFile {
     temporary: NamedTempFile,
+    /// Dropped after the file, which is then gone or finished.
+    _listed: Listed,
     path: PathBuf,
     /// What `path` means, where it is a link.
     target: PathBuf,
@@ -49,8 +54,8 @@ impl AtomicFile {
             io::ErrorKind::AlreadyExists => MediaError::NotAFolder { path: path.to_path_buf() },
             _ => fail(source),
         })?;
-        let temporary = temporary_in(folder, &target).map_err(fail)?;
-        Ok(Self { temporary, path: path.to_path_buf(), target })
+        let (temporary, listed) = unfinished::list(|| temporary_in(folder, &target)).map_err(fail)?;
+        Ok(Self { temporary, _listed: listed, path: path.to_path_buf(), target })
     }
 
     /// The file to write to.

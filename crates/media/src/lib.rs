@@ -3,7 +3,8 @@
 //! - Out: [`naming`] says where frames go and as what, [`sequence::Sink`] takes them from any thread, [`atomic`] sees to it
 //!   that a file is whole or not there, [`resume`] finds those that need not be made again. [`png`], [`exr`] and [`video`]
 //!   are the formats, [`flatten`] and [`flipbook`] prepare pictures for them.
-//! - In: [`plates::FileAssets`] gives a scene its plates, meshes and drawings, with limits that no hostile file can pass.
+//! - In: [`plates::FileAssets`] gives a scene its plates, meshes and drawings, with limits that no hostile file can pass;
+//!   [`input`] reads the bytes of ordinary files alone.
 //!
 //! PNG, EXR, APNG and GIF files are the same bytes for the same frames on every machine and with any number of threads:
 //! nothing here reads the clock, the environment or the host. Work runs in the caller's rayon pool.
@@ -15,6 +16,7 @@ mod error;
 pub mod exr;
 pub mod flatten;
 pub mod flipbook;
+pub mod input;
 pub mod label;
 pub mod meshes;
 pub mod naming;
@@ -27,6 +29,7 @@ pub mod sequence;
 mod stamp;
 #[cfg(test)]
 mod testing;
+pub mod unfinished;
 pub mod video;
 pub mod zip;
 

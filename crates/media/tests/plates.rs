@@ -3,15 +3,19 @@
 use std::{fs, path::Path};
 
 use bansho_base::{
-    assets::{AssetProblem, Assets, Encoding},
+    assets::{AssetProblem, Assets, Encoding, Picture},
     color::AlphaConvention,
     image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
 };
 use bansho_media::{
     exr,
-    plates::{FileAssets, decode_picture},
+    plates::{self, FileAssets, InputLimits, limits::MemoryLimit},
     png::{self, PngEffort},
 };
+
+fn decode_picture(bytes: &[u8], extension: &str) -> Result<Picture, AssetProblem> {
+    plates::decode_picture(bytes, extension, MemoryLimit::default())
+}
 
 fn display(width: usize, height: usize) -> DisplayImage {
     let pixels = (0..width * height).map(|i| [(i * 5) as u8, (i * 3) as u8, 200, 255 - (i % 7) as u8]).collect();
@@ -309,7 +313,7 @@ fn what_is_wrong_with_a_file_is_said_with_its_path() {
     assert!(error("p.##.png").path.ends_with("p.03.png"));
     assert_eq!(error("a.tiff").problem, AssetProblem::UnknownKind);
     assert!(matches!(error("a.png").problem, AssetProblem::Damaged(_)));
-    assert!(matches!(error("d.png").problem, AssetProblem::Unreadable(_)));
+    assert_eq!(error("d.png").problem, AssetProblem::NotAFile { found: "a folder" });
     assert!(matches!(error("#.#.png").problem, AssetProblem::Unreadable(_)));
 }
 
@@ -352,4 +356,78 @@ fn plates_of_every_kind_say_with_which_exposure_they_were_taken() {
     let mut frame = frame(4, 2);
     frame.header.exposure_ev100 = 9.5;
     assert_eq!(decode_picture(&exr_bytes(&frame), "exr").unwrap().exposure_ev100, Some(9.5));
+}
+
+/// The least memory with which `bytes` are read, and what is said of one byte less.
+fn least_memory(bytes: &[u8], extension: &str) -> u64 {
+    let read = |total| plates::decode_picture(bytes, extension, MemoryLimit { total, used: 0 });
+    let AssetProblem::Memory { bytes: least, limit: 0, others: 0 } = read(0).unwrap_err() else {
+        panic!("{extension}")
+    };
+    assert!(read(least).is_ok(), "{extension}");
+    assert_eq!(read(least - 1).unwrap_err(), AssetProblem::Memory { bytes: least, limit: least - 1, others: 0 });
+    least
+}
+
+#[test]
+fn pictures_that_would_take_too_much_memory_are_refused_before_they_are_read() {
+    let (width, height) = (600, 400);
+    let pixels = width * height * 16;
+    let png = png_bytes(&display(width as usize, height as usize));
+    let exr = exr_bytes(&frame(width as usize, height as usize));
+    for (bytes, extension, most) in [(&png, "png", 1.05), (&exr, "exr", 6.0)] {
+        let least = least_memory(bytes, extension) - bytes.len() as u64;
+        assert!(least >= pixels && (least as f64) < most * pixels as f64, "{extension}: {least} for {pixels}");
+    }
+}
+
+#[test]
+fn pictures_that_are_only_kept_make_room_and_meshes_that_are_used_do_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let png = png_bytes(&display(64, 64));
+    for name in ["a.png", "b.png"] {
+        fs::write(folder.path().join(name), &png).unwrap();
+    }
+    let one = least_memory(&png, "png");
+    let limits = InputLimits { memory_bytes: one + one / 2, root: None };
+    let assets = FileAssets::with_limits(folder.path(), limits);
+    assets.picture("a.png", 0).unwrap();
+    assets.picture("b.png", 0).unwrap();
+    let small = InputLimits { memory_bytes: one - 1, root: None };
+    let told = FileAssets::with_limits(folder.path(), small).picture("a.png", 0).unwrap_err().to_string();
+    assert!(told.contains("a.png: takes ") && told.contains(" of memory once it is read; allowed: up to "), "{told}");
+}
+
+#[cfg(unix)]
+#[test]
+fn what_lies_outside_the_root_is_refused_whatever_its_name() {
+    use std::os::unix::fs::symlink;
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::create_dir_all(path("job/plates")).unwrap();
+    for name in ["secret.png", "job/plates/a.png"] {
+        fs::write(path(name), png_bytes(&display(2, 2))).unwrap();
+    }
+    symlink(path("secret.png"), path("job/link.png")).unwrap();
+    symlink(path(""), path("job/out")).unwrap();
+    symlink("plates/a.png", path("job/inner.png")).unwrap();
+    let limits = InputLimits { root: Some(path("job")), ..InputLimits::default() };
+    let assets = FileAssets::with_limits(path("job"), limits);
+    for name in ["plates/a.png", "inner.png", "plates/../plates/a.png", path("job/plates/a.png").to_str().unwrap()] {
+        assets.picture(name, 0).unwrap();
+        assets.digest(name, 0).unwrap();
+        assets.find(name, 0).unwrap();
+    }
+    let absolute = path("secret.png");
+    let outside = ["../secret.png", "link.png", "out/secret.png", "../gone.png", "out/gone.png", "gone/../../gone.png"];
+    for name in outside.into_iter().chain([absolute.to_str().unwrap(), "/etc/passwd"]) {
+        let refused = |problem| matches!(problem, AssetProblem::Outside { .. }) || name.starts_with("gone");
+        assert!(refused(assets.picture(name, 0).unwrap_err().problem), "{name}");
+        assert!(refused(assets.text(name).unwrap_err().problem), "{name}");
+        assert!(refused(assets.digest(name, 0).unwrap_err().problem), "{name}");
+        assert!(refused(assets.find(name, 0).unwrap_err().problem), "{name}");
+    }
+    assert_eq!(assets.picture("gone.png", 0).unwrap_err().problem, AssetProblem::Missing);
+    // Without a root a scene may name what it likes.
+    FileAssets::new(path("job")).picture("../secret.png", 0).unwrap();
 }

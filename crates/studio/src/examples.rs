@@ -9,7 +9,11 @@ use bansho::{
         drawing::Drawing,
         mesh::Mesh,
     },
-    media::{drawings::decode_drawing, meshes::decode_mesh, plates::decode_picture},
+    media::{
+        drawings::decode_drawing,
+        meshes::decode_mesh,
+        plates::{decode_picture, limits::MemoryLimit},
+    },
 };
 
 macro_rules! files {
@@ -150,13 +154,13 @@ fn extension(name: &str) -> &str {
 
 impl Assets for Bundle {
     fn picture(&self, path: &str, _frame: i64) -> Result<Arc<Picture>, AssetError> {
-        let picture = decode_picture(self.found(path)?, extension(path));
+        let picture = decode_picture(self.found(path)?, extension(path), MemoryLimit::default());
         picture.map(Arc::new).map_err(|problem| error(path, problem))
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
-        let beside = |name: &str| self.found(name).map(<[u8]>::to_vec).map_err(|error| error.problem);
-        let mesh = decode_mesh(self.found(path)?, extension(path), &beside);
+        let beside = |name: &str, _: u64| self.found(name).map(<[u8]>::to_vec).map_err(|error| error.problem);
+        let mesh = decode_mesh(self.found(path)?, extension(path), &beside, MemoryLimit::default());
         mesh.map(Arc::new).map_err(|problem| error(path, problem))
     }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bansho_base::{observer::Cancelled, plural::counted};
-use bansho_media::{MediaError, flipbook::TileError, naming::NamingError};
+use bansho_media::{MediaError, flipbook::TileError, input::InputError, naming::NamingError};
 use bansho_render::{PlanError, RenderError, SceneError, scene::edit::EditError};
 
 use super::streaks::StreaksFault;
@@ -17,8 +17,8 @@ pub enum JobError {
     Unreadable {
         /// The scene's file.
         path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
+        /// Why.
+        source: InputError,
         /// The scene in that folder whose name is most like it, where there is no such file.
         near: Option<PathBuf>,
     },

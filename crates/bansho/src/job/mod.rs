@@ -41,7 +41,7 @@ pub use flipbook::{Flipbook, FlipbookCrop, FlipbookSummary, PreparedFlipbook};
 pub use observer::{FrameDone, JobObserver, Note, Outline, Spot};
 pub use prepare::{PreparedJob, check_scene, remarks};
 pub use run::Summary;
-pub use scene_file::SceneFile;
+pub use scene_file::{SCENE_BYTES, SceneFile};
 pub use simulate::{PreparedSimulation, Simulate};
 pub use streaks::{ListKind, PreparedStreaks, StreakFormat, Streaks, StreaksFault};
 

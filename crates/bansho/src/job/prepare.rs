@@ -68,9 +68,9 @@ impl PreparedJob {
     }
 }
 
-/// Reads the pictures that a scene names from the folder it lies in.
+/// Reads the files that a scene names from the folder it lies in, within its limits.
 pub(super) fn assets(scene: &SceneFile) -> Arc<dyn Assets> {
-    Arc::new(FileAssets::new(&scene.folder))
+    Arc::new(FileAssets::with_limits(&scene.folder, scene.inputs.clone()))
 }
 
 /// Checks a scene and all it names, and plans it as it is.

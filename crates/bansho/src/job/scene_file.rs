@@ -1,13 +1,18 @@
 //! The text of a scene, where it lies, and changes made to it for one job.
 
 use std::{
-    fs, io,
+    fs,
+    io::{self, Read},
     path::{Path, PathBuf},
 };
 
 use bansho_base::{
     assets::Assets,
     parameters::{ProblemKind, nearest},
+};
+use bansho_media::{
+    input::{self, InputError},
+    plates::InputLimits,
 };
 use bansho_render::{
     Scene, SceneError,
@@ -16,6 +21,9 @@ use bansho_render::{
 };
 
 use super::error::JobError;
+
+/// Most bytes of a scene's text.
+pub const SCENE_BYTES: u64 = 16 << 20;
 
 /// A scene that was read, not yet checked.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,29 +38,45 @@ pub struct SceneFile {
     pub text: String,
     /// Changes for this job, each `key.path=value`.
     pub changes: Vec<String>,
+    /// What the files that it names may take, and where they may lie.
+    pub inputs: InputLimits,
 }
 
 impl SceneFile {
     /// Reads the scene at `path`.
     ///
     /// # Errors
-    /// There is no such file, it cannot be read, or it is not UTF-8.
+    /// There is no such file, it is no ordinary one, it has more than [`SCENE_BYTES`], it cannot be read, or it is not UTF-8.
     pub fn read(path: &Path) -> Result<Self, JobError> {
-        let bytes = fs::read(path).map_err(|source| {
-            let near = if source.kind() == io::ErrorKind::NotFound { near(path) } else { None };
+        let bytes = input::read(path, SCENE_BYTES).map_err(|source| {
+            let near = if is_missing(&source) { near(path) } else { None };
             JobError::Unreadable { path: path.to_path_buf(), source, near }
-        })?;
-        let text = String::from_utf8(bytes).map_err(|error| {
-            let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-            let line = 1 + good.iter().filter(|&&byte| byte == b'\n').count();
-            JobError::NotUtf8 { path: path.to_path_buf(), line }
         })?;
         Ok(Self {
             name: path.display().to_string(),
             stem: path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
             folder: path.parent().map(Path::to_path_buf).unwrap_or_default(),
-            text,
+            text: text(path, bytes)?,
             changes: Vec::new(),
+            inputs: InputLimits::default(),
+        })
+    }
+
+    /// Reads a scene from a `stream`, which errors and outputs call `name`; paths in it are relative to the current folder.
+    ///
+    /// # Errors
+    /// It has more than [`SCENE_BYTES`], it cannot be read, or it is not UTF-8.
+    pub fn read_stream(name: &str, stream: impl Read) -> Result<Self, JobError> {
+        let path = Path::new(name);
+        let bytes = input::read_stream(stream, SCENE_BYTES);
+        let bytes = bytes.map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source, near: None })?;
+        Ok(Self {
+            name: name.to_owned(),
+            stem: name.to_owned(),
+            folder: PathBuf::new(),
+            text: text(path, bytes)?,
+            changes: Vec::new(),
+            inputs: InputLimits::default(),
         })
     }
 
@@ -101,6 +125,19 @@ impl SceneFile {
             edit::set(&text, assignment, KINDS).map_err(refused)
         })
     }
+}
+
+fn is_missing(error: &InputError) -> bool {
+    matches!(error, InputError::Io(error) if error.kind() == io::ErrorKind::NotFound)
+}
+
+/// The bytes of a scene as text.
+fn text(path: &Path, bytes: Vec<u8>) -> Result<String, JobError> {
+    String::from_utf8(bytes).map_err(|error| {
+        let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + good.iter().filter(|&&byte| byte == b'\n').count();
+        JobError::NotUtf8 { path: path.to_path_buf(), line }
+    })
 }
 
 /// The scene file beside `path`, which is not there, whose name is most like its.

@@ -9,7 +9,7 @@ use bansho::{
         surroundings::Surroundings,
         wind::{Wind, WindParameters},
     },
-    media::meshes::decode_mesh,
+    media::{meshes::decode_mesh, plates::limits::MemoryLimit},
     models::flame_particles::{BurnerParameters, BurnerShape, FlameParticles, FlameParticlesParameters},
 };
 
@@ -41,7 +41,9 @@ fn glb() -> Vec<u8> {
 #[test]
 fn gas_comes_evenly_from_the_whole_surface_of_a_gltf_mesh() {
     let mut assets = MemoryAssets::default();
-    let mesh = decode_mesh(&glb(), "glb", &|_| Err(bansho::base::assets::AssetProblem::Missing)).unwrap();
+    let mesh =
+        decode_mesh(&glb(), "glb", &|_, _| Err(bansho::base::assets::AssetProblem::Missing), MemoryLimit::default())
+            .unwrap();
     assets.insert_mesh("mesh.glb", mesh);
     let burner = BurnerParameters {
         shape: BurnerShape::Mesh,

@@ -5,7 +5,7 @@ use std::{ops::Range, path::PathBuf, sync::Arc};
 use bansho::{
     Backend, BitDepth, CpuBackend, DisplayImage, Plan, PlanOptions, Unobserved, View,
     base::image::{DisplayPixels, Frame},
-    media::plates::{FileAssets, decode_picture},
+    media::plates::{FileAssets, decode_picture, limits::MemoryLimit},
 };
 
 fn scenes() -> PathBuf {
@@ -226,7 +226,7 @@ pub(crate) fn golden(scene: &str, size: [usize; 2], frame: i64) -> Option<String
         return None;
     }
     let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    let known = decode_picture(&bytes, "png").unwrap();
+    let known = decode_picture(&bytes, "png", MemoryLimit::default()).unwrap();
     let known: Vec<[f32; 3]> = known.colour.pixels().iter().map(|pixel| over_black(*pixel)).collect();
     let drawn = encoded(image);
     let (mean, worst) = blurred_difference(&known, &drawn, size);

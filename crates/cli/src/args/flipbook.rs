@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use bansho::{
     AlphaConvention, BitDepth, View,
-    job::{BackendChoice, Flipbook, FlipbookCrop, JobError, SceneFile},
+    job::{BackendChoice, Flipbook, FlipbookCrop, JobError},
 };
 use clap::Args;
 
-use super::{values, work::WorkArgs};
+use super::{input::InputArgs, values, work::WorkArgs};
 
 /// The sheets that are wanted.
 #[derive(Args, Debug)]
@@ -21,7 +21,7 @@ Examples:
   bansho flipbook torch.toml --grid 8x8 --loop 2   64 frames, one turn of 2 s
   bansho flipbook torch.toml --grid 4x4 --size 128x256 -o game/torch.png")]
 pub(crate) struct FlipbookArgs {
-    /// The scene file.
+    /// The scene file; `-` reads it from standard input.
     pub(crate) scene: PathBuf,
     /// Columns and rows of the sheet; as many frames are drawn.
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = values::parse_grid)]
@@ -63,14 +63,15 @@ pub(crate) struct FlipbookArgs {
     #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
     backend: BackendChoice,
     #[command(flatten)]
+    inputs: InputArgs,
+    #[command(flatten)]
     pub(crate) work: WorkArgs,
 }
 
 impl FlipbookArgs {
     /// The flipbook that is asked for.
     pub(crate) fn flipbook(&self) -> Result<Flipbook, JobError> {
-        let mut scene = SceneFile::read(&self.scene)?;
-        scene.changes.clone_from(&self.set);
+        let scene = self.inputs.read(&self.scene, &self.set)?;
         Ok(Flipbook {
             tile: self.size,
             crop: self.crop.unwrap_or(if self.size.is_some() { FlipbookCrop::None } else { FlipbookCrop::Auto }),

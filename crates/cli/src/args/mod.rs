@@ -1,6 +1,7 @@
 //! The command line.
 
 mod flipbook;
+mod input;
 mod render;
 mod simulate;
 mod streaks;
@@ -12,7 +13,8 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 pub(crate) use self::{
-    flipbook::FlipbookArgs, render::RenderArgs, simulate::SimulateArgs, streaks::StreaksArgs, work::WorkArgs,
+    flipbook::FlipbookArgs, input::InputArgs, render::RenderArgs, simulate::SimulateArgs, streaks::StreaksArgs,
+    work::WorkArgs,
 };
 
 /// Flames, rain and aurora for pictures: image sequences with alpha to lay over a plate.
@@ -93,9 +95,11 @@ pub(crate) struct NewArgs {
 /// `bansho check`
 #[derive(Args, Debug)]
 pub(crate) struct CheckArgs {
-    /// Scene files.
+    /// Scene files; `-` reads one from standard input.
     #[arg(required = true, value_name = "SCENE")]
     pub(crate) scenes: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) inputs: InputArgs,
 }
 
 /// `bansho upgrade`

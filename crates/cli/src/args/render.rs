@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use bansho::{
     AlphaConvention, BitDepth, Rect, View,
-    job::{BackendChoice, ContactBackground, Job, JobError, SceneFile},
+    job::{BackendChoice, ContactBackground, Job, JobError},
 };
 use clap::Args;
 
 use super::{
+    input::InputArgs,
     values::{self, Frames},
     work::{StateArgs, WorkArgs},
 };
@@ -29,7 +30,7 @@ Examples:
 
 A PNG is exact over black in programs that blend as --alpha says; an EXR is exact over anything. Interrupt at any time: whole frames stay, and nothing half-written bears a final name.")]
 pub(crate) struct RenderArgs {
-    /// The scene file.
+    /// The scene file; `-` reads it from standard input.
     pub(crate) scene: PathBuf,
 
     /// Where frames go; the extension says what they are: .png .exr .apng .gif, and by ffmpeg .mp4 .mov .webm.
@@ -109,14 +110,15 @@ pub(crate) struct RenderArgs {
     #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
     backend: BackendChoice,
     #[command(flatten)]
+    inputs: InputArgs,
+    #[command(flatten)]
     pub(crate) work: WorkArgs,
 }
 
 impl RenderArgs {
     /// The job that is asked for.
     pub(crate) fn job(&self) -> Result<Job, JobError> {
-        let mut scene = SceneFile::read(&self.scene)?;
-        scene.changes.clone_from(&self.set);
+        let scene = self.inputs.read(&self.scene, &self.set)?;
         Ok(Job {
             scene,
             frames: self.frames.clone().map(|Frames(numbers)| numbers),

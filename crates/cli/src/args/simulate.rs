@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use bansho::job::{BackendChoice, JobError, SceneFile, Simulate};
+use bansho::job::{BackendChoice, JobError, Simulate};
 use clap::Args;
 
 use super::{
+    input::InputArgs,
     values::{self, Frames},
     work::{StateArgs, WorkArgs},
 };
@@ -21,7 +22,7 @@ Examples:
 Each file is a binary PLY with x y z (m, y up) and vx vy vz (m/s) of every particle at the middle of the frame's exposure: of a \
 particle flame with temperature (K) and density (kg/m^3), of an aurora with energy (eV) and power (W). Blender, MeshLab and Open3D read it.")]
 pub(crate) struct SimulateArgs {
-    /// The scene file.
+    /// The scene file; `-` reads it from standard input.
     pub(crate) scene: PathBuf,
     /// Where particles go, one .ply a frame; `####` or `%04d` stands for the frame number.
     #[arg(long, value_name = "PATH")]
@@ -41,14 +42,15 @@ pub(crate) struct SimulateArgs {
     #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
     backend: BackendChoice,
     #[command(flatten)]
+    inputs: InputArgs,
+    #[command(flatten)]
     pub(crate) work: WorkArgs,
 }
 
 impl SimulateArgs {
     /// The simulation that is asked for.
     pub(crate) fn simulation(&self) -> Result<Simulate, JobError> {
-        let mut scene = SceneFile::read(&self.scene)?;
-        scene.changes.clone_from(&self.set);
+        let scene = self.inputs.read(&self.scene, &self.set)?;
         Ok(Simulate {
             frames: self.frames.clone().map(|Frames(numbers)| numbers),
             seed: self.seed,

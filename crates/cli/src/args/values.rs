@@ -1,5 +1,7 @@
 //! Values of options that are more than a word or a number.
 
+use std::path::PathBuf;
+
 use bansho::{
     AlphaConvention, BitDepth, Rect, View,
     job::{BackendChoice, ContactBackground, FlipbookCrop, StreakFormat},
@@ -38,6 +40,10 @@ pub(super) enum ValueError {
     Exposure,
     #[error("allowed: three numbers with commas between, such as 0,1,-0.5")]
     Vector,
+    #[error("allowed: a number of bytes with a unit, such as 512MiB, 8GiB or 500MB")]
+    Bytes,
+    #[error("there is no such folder; allowed: a folder that is there")]
+    Folder,
 }
 
 /// Numbers with commas between.
@@ -98,6 +104,29 @@ pub(super) fn parse_exposure(text: &str) -> Result<f64, ValueError> {
     seconds.filter(|seconds| seconds.is_finite()).ok_or(ValueError::Exposure)
 }
 
+/// A number of bytes: decimal units (kB, MB, GB, TB) or binary ones (KiB, MiB, GiB, TiB).
+pub(super) fn parse_bytes(text: &str) -> Result<u64, ValueError> {
+    const UNITS: [(&str, u64); 9] = [
+        ("KiB", 1 << 10),
+        ("MiB", 1 << 20),
+        ("GiB", 1 << 30),
+        ("TiB", 1 << 40),
+        ("kB", 1_000),
+        ("MB", 1_000_000),
+        ("GB", 1_000_000_000),
+        ("TB", 1_000_000_000_000),
+        ("B", 1),
+    ];
+    let number = |(unit, bytes): (&str, u64)| Some((text.strip_suffix(unit)?.trim_end().parse::<u64>().ok()?, bytes));
+    let (count, bytes) = UNITS.into_iter().find_map(number).ok_or(ValueError::Bytes)?;
+    count.checked_mul(bytes).ok_or(ValueError::Bytes)
+}
+
+pub(super) fn parse_folder(text: &str) -> Result<PathBuf, ValueError> {
+    let path = PathBuf::from(text);
+    if path.is_dir() { Ok(path) } else { Err(ValueError::Folder) }
+}
+
 pub(super) fn velocity_parser() -> impl TypedValueParser<Value = VelocityLaw> {
     let names = VelocityLaw::CHOICES.iter().map(|choice| choice.name);
     PossibleValuesParser::new(names).map(|name| VelocityLaw::from_name(&name).unwrap_or_default())
@@ -146,6 +175,17 @@ mod tests {
         assert_eq!(parse_size("1920x1080").unwrap(), [1920, 1080]);
         for bad in ["0x5", "5x0", "1000000000x1", "5", "5x", "x5", "-1x5", "5x5x5", "5.5x4", ""] {
             assert!(parse_size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn bytes_have_a_unit_and_do_not_overflow() {
+        assert_eq!(
+            ["2GiB", "512 MiB", "500MB", "7B"].map(|text| parse_bytes(text).unwrap()),
+            [2 << 30, 512 << 20, 500_000_000, 7]
+        );
+        for bad in ["", "2", "GiB", "-1GiB", "1.5GiB", "2gib", "99999999TiB", "2 GiB 3"] {
+            assert!(parse_bytes(bad).is_err(), "{bad}");
         }
     }
 

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use bansho::job::{self, JobError, SceneFile};
+use bansho::job::{self, JobError};
 
 use crate::{
-    args::CheckArgs,
+    args::{CheckArgs, InputArgs},
     exit::{self, Told},
     output::{to_stderr, to_stdout},
 };
@@ -14,7 +14,7 @@ use crate::{
 pub(crate) fn run(args: &CheckArgs) -> anyhow::Result<()> {
     let mut last_fault = None;
     for path in &args.scenes {
-        match describe(path) {
+        match describe(path, &args.inputs) {
             Ok(line) => to_stdout(&line)?,
             Err(error) => {
                 exit::tell_job(&error);
@@ -25,8 +25,8 @@ pub(crate) fn run(args: &CheckArgs) -> anyhow::Result<()> {
     last_fault.map_or(Ok(()), |error| Err(Told(error).into()))
 }
 
-fn describe(path: &Path) -> Result<String, JobError> {
-    let scene = SceneFile::read(path)?;
+fn describe(path: &Path, inputs: &InputArgs) -> Result<String, JobError> {
+    let scene = inputs.read(path, &[])?;
     let plan = job::check_scene(&scene)?;
     for remark in job::remarks(&scene, &plan)? {
         to_stderr(&format!("warning: {remark}"));
@@ -43,7 +43,6 @@ fn describe(path: &Path) -> Result<String, JobError> {
     let names = if names.is_empty() { "nothing in it".to_owned() } else { names.join(", ") };
     Ok(format!(
         "{}: right. {width} x {height}, {numbers} at {rate} a second, EV100 {:.1}: {names}\n",
-        path.display(),
-        plan.exposure_ev100
+        scene.name, plan.exposure_ev100
     ))
 }

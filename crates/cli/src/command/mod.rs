@@ -26,8 +26,8 @@ fn watched(
     args: &WorkArgs,
     work: impl FnOnce(&Watcher) -> Result<progress::Result, JobError> + Send,
 ) -> anyhow::Result<()> {
-    interrupt::listen()?;
     let watcher = Watcher::new(args.progress, args.stats);
+    interrupt::be_patient(watcher.telling_the_end());
     // 0 stands for one thread for each core.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.map_or(0, usize::from)).build()?;
     let result = pool.install(|| work(&watcher));

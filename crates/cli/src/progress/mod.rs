@@ -3,7 +3,7 @@
 mod bar;
 mod json;
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 use bansho::{
     Observer, Stage,
@@ -39,7 +39,7 @@ enum Shown {
 
 /// Watches a job for the user: progress, warnings, signals, times.
 pub(crate) struct Watcher {
-    shown: Shown,
+    shown: Arc<Shown>,
     stats: Option<Stats>,
     since: Instant,
 }
@@ -60,14 +60,14 @@ impl Watcher {
             ProgressKind::Json => Shown::Json(Json),
             ProgressKind::None => Shown::Nothing,
         };
-        Self { shown, stats: stats.then(Stats::new), since: Instant::now() }
+        Self { shown: Arc::new(shown), stats: stats.then(Stats::new), since: Instant::now() }
     }
 
     /// Tells how it ended, statistics last. `threads` drew.
     pub(crate) fn finish(&self, result: std::result::Result<Result, JobError>, threads: usize) -> anyhow::Result<()> {
         let seconds = self.since.elapsed().as_secs_f64();
         let result = result.map_err(|error| self.fail(error))?;
-        match &self.shown {
+        match &*self.shown {
             Shown::Bar(bar) => bar.done(&result, seconds),
             Shown::Json(json) => json.done(&result, seconds),
             Shown::Nothing => {}
@@ -78,14 +78,29 @@ impl Watcher {
         Ok(())
     }
 
+    /// What tells the user that a signal ended the program because the work did not stop by itself.
+    pub(crate) fn telling_the_end(&self) -> impl Fn() + Send + 'static {
+        const MESSAGE: &str = "stopped; whole files stay";
+        let shown = self.shown.clone();
+        move || {
+            if let Shown::Bar(bar) = &*shown {
+                bar.clear();
+            }
+            to_stderr(&format!("error: {MESSAGE}"));
+            if let Shown::Json(json) = &*shown {
+                json.failed(MESSAGE, interrupt::exit_code());
+            }
+        }
+    }
+
     fn fail(&self, error: JobError) -> anyhow::Error {
-        if let Shown::Bar(bar) = &self.shown {
+        if let Shown::Bar(bar) = &*self.shown {
             bar.clear();
         }
         exit::tell_job(&error);
         let message = flags::error(&error);
         let told = anyhow::Error::new(Told(error));
-        if let Shown::Json(json) = &self.shown {
+        if let Shown::Json(json) = &*self.shown {
             json.failed(&message, exit::code(&told));
         }
         told
@@ -108,7 +123,7 @@ impl Observer for Watcher {
 
 impl JobObserver for Watcher {
     fn started(&self, outline: &Outline) {
-        match &self.shown {
+        match &*self.shown {
             Shown::Bar(bar) => bar.started(outline),
             Shown::Json(json) => json.started(outline),
             Shown::Nothing => {}
@@ -116,7 +131,7 @@ impl JobObserver for Watcher {
     }
 
     fn frame_done(&self, frame: &FrameDone) {
-        match &self.shown {
+        match &*self.shown {
             Shown::Bar(bar) => bar.frame_done(),
             Shown::Json(json) => json.frame_done(frame, self.since.elapsed().as_secs_f64()),
             Shown::Nothing => {}
@@ -125,6 +140,6 @@ impl JobObserver for Watcher {
 
     fn note(&self, note: &Note) {
         let warn = || to_stderr(&format!("warning: {}", flags::note(note)));
-        if let Shown::Bar(bar) = &self.shown { bar.beside(warn) } else { warn() }
+        if let Shown::Bar(bar) = &*self.shown { bar.beside(warn) } else { warn() }
     }
 }

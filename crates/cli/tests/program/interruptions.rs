@@ -191,3 +191,49 @@ fn an_interruption_is_told_in_json_too() {
     let last: serde_json::Value = serde_json::from_str(run.stdout.lines().last().unwrap()).unwrap();
     assert_eq!((last["event"].as_str(), last["code"].as_u64()), (Some("error"), Some(130)));
 }
+
+/// Work that never looks whether it shall stop is ended all the same, whatever it waits for.
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_what_cannot_stop_by_itself_within_a_second() {
+    use std::{
+        os::unix::fs::PermissionsExt,
+        time::{Duration, Instant},
+    };
+    let ended = |mut child: Child, folder: &Folder| {
+        signal(&child, "TERM");
+        let since = Instant::now();
+        let stdin = child.stdin.take();
+        let run = Run::of(child.wait_with_output().unwrap());
+        drop(stdin);
+        assert!(since.elapsed() < Duration::from_secs(1), "{:?}", since.elapsed());
+        assert_eq!(run.code, Some(143), "{}", run.stderr);
+        assert!(!folder.names().iter().any(|name| name.ends_with(".part")), "{:?}", folder.names());
+        run
+    };
+    let folder = long_scene();
+    let piped = |arguments: &[&str]| {
+        let mut command = folder.command(arguments);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    };
+    // A scene that nobody finishes writing.
+    for arguments in [&["check", "-"][..], &["render", "-", "--out", "a.png"]] {
+        let child = piped(arguments);
+        std::thread::sleep(Duration::from_millis(300));
+        ended(child, &folder);
+    }
+    // A program that takes no frames.
+    let program = folder.path("bin/ffmpeg");
+    folder.write("bin/ffmpeg", "#!/bin/sh\nexec sleep 3\n");
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    let path = std::env::join_paths(
+        [folder.path("bin")].into_iter().chain(std::env::split_paths(&std::env::var_os("PATH").unwrap())),
+    );
+    let mut command = folder.command(&["render", "scene.toml", "--size", "640x480", "--out", "film/film.mp4"]);
+    command.env("PATH", path.unwrap()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let child = command.spawn().unwrap();
+    wait_until("the film to begin", || folder.names().iter().any(|name| name.ends_with(".part")));
+    std::thread::sleep(Duration::from_millis(500));
+    let run = ended(child, &folder);
+    assert_eq!(run.errors(), 1, "{}", run.stderr);
+}

@@ -150,10 +150,11 @@ fn sheet(tag: &Tag) -> Result<Option<[DVec2; 2]>, AssetProblem> {
 fn lines(tag: &Tag) -> Result<Vec<Vec<DVec2>>, PathError> {
     let number = |name: &str| tag.get(name).and_then(|value| Numbers::new(value).next()).unwrap_or(0.0);
     Ok(match tag.name {
-        "path" => path::subpaths(tag.get("d").unwrap_or_default())?,
+        "path" => path::subpaths(tag.get("d").unwrap_or_default(), MOST_POINTS)?,
         "polyline" | "polygon" => {
             let mut numbers = Numbers::new(tag.get("points").unwrap_or_default());
-            let mut line: Vec<DVec2> = std::iter::from_fn(|| numbers.take_all::<2>()).map(DVec2::from).collect();
+            let mut line: Vec<DVec2> =
+                std::iter::from_fn(|| numbers.take_all::<2>()).map(DVec2::from).take(MOST_POINTS + 1).collect();
             if tag.name == "polygon" {
                 line.extend(line.first().copied());
             }

@@ -18,12 +18,15 @@ pub(super) enum PathError {
     Command(char),
     #[error("a path of a single point is no line; allowed: at least 2 points")]
     OnePoint,
+    #[error("a path has more than {0} points")]
+    ManyPoints(usize),
 }
 
 /// Where the pen is.
 #[derive(Default)]
 struct Pen {
     subpaths: Vec<Vec<DVec2>>,
+    points: usize,
     at: DVec2,
     start: DVec2,
     /// The last control point of a cubic (`true`) or quadratic curve, which smooth ones mirror.
@@ -33,8 +36,8 @@ struct Pen {
 /// The lines of a path, one for each move; moves that draw nothing are left out beside others.
 ///
 /// # Errors
-/// An unknown command, missing numbers, or moves alone.
-pub(super) fn subpaths(data: &str) -> Result<Vec<Vec<DVec2>>, PathError> {
+/// An unknown command, missing numbers, moves alone, or more than `most` points.
+pub(super) fn subpaths(data: &str, most: usize) -> Result<Vec<Vec<DVec2>>, PathError> {
     let mut numbers = Numbers::new(data);
     let mut pen = Pen::default();
     let mut command = None;
@@ -48,6 +51,9 @@ pub(super) fn subpaths(data: &str) -> Result<Vec<Vec<DVec2>>, PathError> {
             return Err(PathError::NoMove);
         }
         pen.draw(letter, &mut numbers)?;
+        if pen.points > most {
+            return Err(PathError::ManyPoints(most));
+        }
         // Further pairs after a move are lines; nothing may follow a closing but a command.
         command = match letter {
             'M' => Some('L'),
@@ -90,6 +96,7 @@ impl Pen {
 
     fn move_to(&mut self, point: DVec2) {
         self.subpaths.push(vec![point]);
+        self.points += 1;
         (self.at, self.start, self.control) = (point, point, None);
     }
 
@@ -97,6 +104,7 @@ impl Pen {
         if let Some(points) = self.subpaths.last_mut() {
             points.push(point);
         }
+        self.points += 1;
         self.at = point;
     }
 
@@ -182,7 +190,7 @@ mod tests {
     use super::*;
 
     fn lines(data: &str) -> Vec<Vec<[f64; 2]>> {
-        let lines = subpaths(data).unwrap();
+        let lines = subpaths(data, 1000).unwrap();
         lines.into_iter().map(|line| line.into_iter().map(|point| point.to_array()).collect()).collect()
     }
 
@@ -213,25 +221,27 @@ mod tests {
             ("M1 0A1 1 0 1 1 0 1", [1.0, 1.0], 48),
             ("M1 0A1 1 0 0 0 0 1", [1.0, 1.0], 16),
         ] {
-            let line = subpaths(data).unwrap().remove(0);
+            let line = subpaths(data, 1000).unwrap().remove(0);
             assert!(line.iter().all(|point| (point.distance(centre.into()) - 1.0).abs() < 1e-12), "{data}");
             assert!(line.len().abs_diff(pieces + 1) <= 1, "{data}: {}", line.len());
         }
         // Too small a radius grows to half of the way; a turned ellipse keeps its ends.
-        let grown = subpaths("M0 0A1 1 0 0 1 4 0").unwrap().remove(0);
+        let grown = subpaths("M0 0A1 1 0 0 1 4 0", 1000).unwrap().remove(0);
         assert!(grown.iter().all(|point| (point.distance(DVec2::new(2.0, 0.0)) - 2.0).abs() < 1e-12));
-        let turned = subpaths("M0 0A3 1 30 0 1 4 1").unwrap().remove(0);
+        let turned = subpaths("M0 0A3 1 30 0 1 4 1", 1000).unwrap().remove(0);
         assert_eq!((turned[0], turned[turned.len() - 1]), (DVec2::ZERO, DVec2::new(4.0, 1.0)));
         assert_eq!(lines("M0 0A0 1 0 0 1 4 1"), [[[0.0, 0.0], [4.0, 1.0]]]);
     }
 
     #[test]
     fn broken_paths_are_errors() {
-        assert_eq!(subpaths("L1 1"), Err(PathError::NoMove));
-        assert_eq!(subpaths("1 1"), Err(PathError::NoMove));
-        assert_eq!(subpaths("M1"), Err(PathError::Numbers('M')));
-        assert_eq!(subpaths("M1 1 B2 2"), Err(PathError::Command('B')));
-        assert_eq!(subpaths("M1 1 L2 2 z 3"), Err(PathError::NoMove));
-        assert_eq!(subpaths("M0 0 A1 1 0 2 0 1 1"), Err(PathError::Numbers('A')));
+        assert_eq!(subpaths("L1 1", 1000), Err(PathError::NoMove));
+        assert_eq!(subpaths("1 1", 1000), Err(PathError::NoMove));
+        assert_eq!(subpaths("M1", 1000), Err(PathError::Numbers('M')));
+        assert_eq!(subpaths("M1 1 B2 2", 1000), Err(PathError::Command('B')));
+        assert_eq!(subpaths("M1 1 L2 2 z 3", 1000), Err(PathError::NoMove));
+        assert_eq!(subpaths("M0 0 A1 1 0 2 0 1 1", 1000), Err(PathError::Numbers('A')));
+        // Closings alone make points too, and no more are made than may be.
+        assert_eq!(subpaths(&format!("M0 0{}", "z".repeat(1000)), 1000), Err(PathError::ManyPoints(1000)));
     }
 }

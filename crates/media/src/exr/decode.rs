@@ -27,15 +27,19 @@ use super::{
     parse::{self, Outline, Part},
     primaries,
 };
-use crate::plates::limits;
+use crate::plates::limits::{self, MemoryLimit};
 
-/// Chunks that are decompressed at a time.
-const BATCH: usize = 32;
+/// Most chunks that are decompressed at a time.
+const MOST_CHUNKS: u64 = 32;
+/// Bytes of pixels that a few chunks at a time may hold; a single one may hold more.
+const BATCH_BYTES: u64 = 64 << 20;
+/// How many times the bytes of its pixels a chunk takes while it is decompressed: in the file, between two steps, and as pixels.
+const CHUNK_COPIES: u64 = 4;
 
 /// Reads a plate: the part and layer with `R`, `G` and `B` (or a lone grey `Y`), with `A` where there is one, and depth
 /// from `Z`, `depth.Z`, or the only channel of a file that has just one. Pixels cover the display window; where the file
 /// has none they are transparent and infinitely far. Colours are given straight, those that are no numbers as 0.
-pub(crate) fn decode(file: &[u8]) -> Result<Picture, AssetProblem> {
+pub(crate) fn decode(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     let outline = parse::outline(file).map_err(damaged)?;
     check(&outline, file)?;
     let wanted = Wanted::choose(&outline)
@@ -43,8 +47,10 @@ pub(crate) fn decode(file: &[u8]) -> Result<Picture, AssetProblem> {
     let display = outline.parts[0].display.ok_or_else(|| damaged("it has no display window"))?;
     let size = limits::window_size(display);
     let (width, height) = (size[0] as usize, size[1] as usize);
+    let batch = Batch::new(&outline, &wanted);
+    limit.check(file.len() as u64 + wanted.bytes(size[0] * size[1]) + batch.bytes)?;
     let mut planes = Planes { width, height, display_min: display.min, values: wanted.planes(width * height) };
-    read_chunks(file, &wanted, &mut planes)?;
+    read_chunks(file, &wanted, batch.chunks, &mut planes)?;
     finish(&outline, &wanted, planes)
 }
 
@@ -74,8 +80,7 @@ fn check(outline: &Outline, file: &[u8]) -> Result<(), AssetProblem> {
         if part.channels.is_empty() || part.channels.iter().any(|channel| channel.sampling != [1, 1]) {
             return Err(damaged("channels of fewer samples than pixels are not read"));
         }
-        let bytes_per_pixel: u64 = part.channels.iter().map(|channel| channel.bytes_per_sample).sum();
-        limits::check_expansion([width, height], width * height * bytes_per_pixel, file, greatest_ratio(part))?;
+        limits::check_expansion([width, height], part_bytes(part), file, greatest_ratio(part))?;
     }
     Ok(())
 }
@@ -129,6 +134,12 @@ impl Wanted {
         Values { colour, depth: self.depth.map(|_| vec![f32::INFINITY; pixels]) }
     }
 
+    /// Bytes of what [`planes`](Self::planes) and `finish` make for so many pixels.
+    fn bytes(&self, pixels: u64) -> u64 {
+        let depth = if self.depth.is_some() { size_of::<f32>() } else { 0 };
+        pixels * (size_of::<[f32; 4]>() + depth) as u64
+    }
+
     fn wants_part(&self, part: usize) -> bool {
         (self.colour[0].is_some() && part == self.part) || self.depth.is_some_and(|(depth, _)| depth == part)
     }
@@ -152,7 +163,46 @@ struct Planes {
     values: Values,
 }
 
-fn read_chunks(file: &[u8], wanted: &Wanted, planes: &mut Planes) -> Result<(), AssetProblem> {
+/// How many chunks are decompressed at a time, and the bytes that this takes.
+struct Batch {
+    chunks: usize,
+    bytes: u64,
+}
+
+impl Batch {
+    fn new(outline: &Outline, wanted: &Wanted) -> Self {
+        let parts = || outline.parts.iter().enumerate().filter(|(index, _)| wanted.wants_part(*index));
+        let largest = parts().map(|(_, part)| chunk_bytes(part)).max().unwrap_or(0).max(1);
+        let all: u64 = parts().map(|(_, part)| part_bytes(part)).sum();
+        let chunks = (BATCH_BYTES / largest).clamp(1, MOST_CHUNKS);
+        Self { chunks: chunks as usize, bytes: (chunks * largest).min(all) * CHUNK_COPIES }
+    }
+}
+
+/// Bytes of a part's pixels.
+fn part_bytes(part: &Part) -> u64 {
+    let [width, height] = part.data.map_or([0, 0], limits::window_size);
+    width * height * pixel_bytes(part)
+}
+
+fn pixel_bytes(part: &Part) -> u64 {
+    part.channels.iter().map(|channel| channel.bytes_per_sample).sum()
+}
+
+/// Bytes of the pixels of a part's chunk.
+fn chunk_bytes(part: &Part) -> u64 {
+    let [width, height] = part.data.map_or([0, 0], limits::window_size);
+    let rows = match part.compression {
+        Some(0..=2) => 1,
+        Some(3 | 5) => 16,
+        Some(4 | 6..=8) => 32,
+        _ => 256,
+    };
+    let [columns, rows] = part.tile.map_or([width, rows], |tile| tile.map(u64::from));
+    columns.min(width) * rows.min(height) * pixel_bytes(part)
+}
+
+fn read_chunks(file: &[u8], wanted: &Wanted, at_a_time: usize, planes: &mut Planes) -> Result<(), AssetProblem> {
     let reader = ::exr::block::read(Cursor::new(file), false).map_err(damaged)?;
     let full_size = |_: &MetaData, tile: ::exr::block::chunk::TileCoordinates, block: ::exr::block::BlockIndex| {
         tile.is_largest_resolution_level() && wanted.wants_part(block.layer)
@@ -160,7 +210,7 @@ fn read_chunks(file: &[u8], wanted: &Wanted, planes: &mut Planes) -> Result<(), 
     let mut chunks = reader.filter_chunks(false, full_size).map_err(damaged)?;
     let meta = chunks.meta_data().clone();
     loop {
-        let batch: Vec<Chunk> = chunks.by_ref().take(BATCH).collect::<Result<_, _>>().map_err(damaged)?;
+        let batch: Vec<Chunk> = chunks.by_ref().take(at_a_time).collect::<Result<_, _>>().map_err(damaged)?;
         if batch.is_empty() {
             return Ok(());
         }

@@ -5,12 +5,10 @@ use std::{borrow::Cow, collections::BTreeMap};
 use bansho_base::assets::AssetProblem;
 
 use super::{base64, json::Object};
+use crate::plates::limits::MemoryLimit;
 
-/// Most bytes of all buffers together.
-const MOST_BYTES: usize = 1 << 30;
-
-/// Gives the bytes of a file that a glTF names.
-pub(super) type Beside<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, AssetProblem>;
+/// Gives the bytes of a file that a glTF names, if they are at most so many.
+pub(super) type Beside<'a> = &'a dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>;
 
 /// All buffers. What several of them name is held once.
 pub(super) struct Buffers<'a> {
@@ -20,34 +18,42 @@ pub(super) struct Buffers<'a> {
 }
 
 impl<'a> Buffers<'a> {
-    /// Reads them from `binary`, from the JSON itself, and from `beside`.
-    pub(super) fn read(root: &Object<'a>, binary: Option<&'a [u8]>, beside: Beside) -> Result<Self, AssetProblem> {
-        let (mut contents, mut content_of): (Vec<Cow<[u8]>>, _) = (Vec::new(), Vec::new());
-        let (mut known, mut bytes) = (BTreeMap::new(), 0_usize);
+    /// Reads them from `binary`, from the JSON itself, and from `beside`, within `limit` together.
+    pub(super) fn read(
+        root: &Object<'a>,
+        binary: Option<&'a [u8]>,
+        beside: Beside,
+        limit: MemoryLimit,
+    ) -> Result<Self, AssetProblem> {
+        let mut buffers = Self { contents: Vec::new(), content_of: Vec::new() };
+        let mut known = BTreeMap::new();
         for buffer in root.items("buffers")? {
             let buffer = buffer?;
             let uri = buffer.text("uri")?;
             let slot = match known.get(&uri) {
                 Some(&slot) => slot,
                 None => {
-                    let content = content(&buffer, uri, binary, beside)?;
-                    bytes = bytes.saturating_add(content.len());
-                    if bytes > MOST_BYTES {
-                        let told = format!("have {bytes} bytes or more together; allowed: up to {MOST_BYTES}");
-                        return Err(root.fault("buffers", told));
-                    }
-                    known.insert(uri, contents.len());
-                    contents.push(content);
-                    contents.len() - 1
+                    let left = limit.available().saturating_sub(buffers.memory_bytes());
+                    let content = content(&buffer, uri, binary, &|uri| beside(uri, left))?;
+                    known.insert(uri, buffers.contents.len());
+                    buffers.contents.push(content);
+                    limit.check(buffers.memory_bytes())?;
+                    buffers.contents.len() - 1
                 }
             };
-            let (claimed, there) = (buffer.needed("byteLength")?, contents[slot].len());
+            let (claimed, there) = (buffer.needed("byteLength")?, buffers.contents[slot].len());
             if claimed > there {
                 return Err(buffer.fault("byteLength", format!("says {claimed} bytes, but {there} are there")));
             }
-            content_of.push(slot);
+            buffers.content_of.push(slot);
         }
-        Ok(Self { contents, content_of })
+        Ok(buffers)
+    }
+
+    /// Bytes of all that are not parts of the file itself.
+    pub(super) fn memory_bytes(&self) -> u64 {
+        let own = self.contents.iter().filter(|content| matches!(content, Cow::Owned(_)));
+        own.map(|content| content.len() as u64).sum()
     }
 
     /// How many there are.
@@ -65,7 +71,7 @@ fn content<'a>(
     buffer: &Object,
     uri: Option<&'a str>,
     binary: Option<&'a [u8]>,
-    beside: Beside,
+    beside: &dyn Fn(&str) -> Result<Vec<u8>, AssetProblem>,
 ) -> Result<Cow<'a, [u8]>, AssetProblem> {
     let Some(uri) = uri else {
         let missing = || buffer.fault("uri", "is missing, and there is no binary buffer in the file");

@@ -10,10 +10,22 @@ use super::damaged;
 /// Most values that are read; each takes up to two hundred bytes of memory.
 const MOST_VALUES: usize = 2_000_000;
 
+/// Bytes that a value takes in memory when it is read: those of an object with one field, the largest there is.
+const VALUE_BYTES: u64 = 400;
+
+/// Before every value but the first stands one of these.
+fn count_values(json: &[u8]) -> usize {
+    json.iter().filter(|byte| matches!(byte, b'[' | b'{' | b',')).count()
+}
+
+/// Bytes that the values of `json` take when they are read: its texts are kept once more.
+pub(super) fn memory_bytes(json: &[u8]) -> u64 {
+    json.len() as u64 + VALUE_BYTES * count_values(json).min(MOST_VALUES) as u64
+}
+
 /// The JSON, parsed.
 pub(super) fn parse(json: &[u8]) -> Result<Value, AssetProblem> {
-    // Before every value but the first stands one of these.
-    let values = json.iter().filter(|byte| matches!(byte, b'[' | b'{' | b',')).count();
+    let values = count_values(json);
     if values > MOST_VALUES {
         return Err(damaged(format!("its JSON has about {values} values; allowed: up to {MOST_VALUES}")));
     }

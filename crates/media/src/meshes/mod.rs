@@ -19,6 +19,12 @@ use bansho_base::{
 };
 
 use self::{accessor::Accessor, buffers::Buffers, glb::Glb, json::Object, nodes::Shown};
+use crate::plates::limits::MemoryLimit;
+
+/// Bytes that a corner and a triangle take while meshes are gathered: where lists of them grow, twice those of the mesh itself, and for a
+/// triangle the order of its corners.
+const CORNER_BYTES: usize = 2 * size_of::<[f32; 3]>();
+const TRIANGLE_BYTES: usize = 2 * size_of::<[u32; 3]>() + 2 * size_of::<[u32; 3]>();
 
 fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
@@ -27,33 +33,38 @@ fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
 /// Reads all triangles of the default scene (of the first, where none is the default; of all nodes, where there is none), each where its
 /// node stands.
 ///
-/// `file` are the bytes of a file whose name ends in `extension`; `beside` gives the bytes of files that it names.
+/// `file` are the bytes of a file whose name ends in `extension`; `beside` gives the bytes of files that it names, of at most so many bytes.
 /// Morph targets, skins, required extensions and sparse or compressed accessors are not read.
 ///
 /// # Errors
-/// Another extension, damage, more than is read, or no triangles. Never panics.
+/// Another extension, damage, more than is read, more memory than `limit`, or no triangles. Never panics.
 pub fn decode_mesh(
     file: &[u8],
     extension: &str,
-    beside: &dyn Fn(&str) -> Result<Vec<u8>, AssetProblem>,
+    beside: &dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>,
+    limit: MemoryLimit,
 ) -> Result<Mesh, AssetProblem> {
     let Glb { json, binary } = match extension.to_ascii_lowercase().as_str() {
         "glb" => glb::split(file)?,
         "gltf" => Glb { json: file, binary: None },
         _ => return Err(AssetProblem::UnknownMeshKind),
     };
+    let read_bytes = file.len() as u64 + json::memory_bytes(json);
+    limit.check(read_bytes)?;
     let value = json::parse(json)?;
     let root = Object::root(&value)?;
     check_demands(&root)?;
     let shown = nodes::shown(&root)?;
-    let buffers = Buffers::read(&root, binary, beside)?;
+    let limit = MemoryLimit { used: limit.used.saturating_add(read_bytes), ..limit };
+    let buffers = Buffers::read(&root, binary, beside, limit)?;
     let mut shapes = BTreeMap::new();
     for &Shown { mesh, .. } in &shown {
         if let std::collections::btree_map::Entry::Vacant(entry) = shapes.entry(mesh) {
             entry.insert(Shape::read(&root, mesh, &buffers)?);
         }
     }
-    check_totals(shown.iter().map(|shown| &shapes[&shown.mesh]))?;
+    let gathered_bytes = check_totals(shown.iter().map(|shown| &shapes[&shown.mesh]))?;
+    limit.check(buffers.memory_bytes().saturating_add(gathered_bytes))?;
     let mut gathering = Gathering::default();
     for Shown { mesh, world_from_mesh } in &shown {
         shapes[mesh].parts.iter().try_for_each(|part| gathering.add(part, world_from_mesh))?;
@@ -77,8 +88,8 @@ fn check_demands(root: &Object) -> Result<(), AssetProblem> {
     }
 }
 
-/// Refuses more than a mesh may have, before any of it is read.
-fn check_totals<'s>(shapes: impl Iterator<Item = &'s Shape<'s>>) -> Result<(), MeshError> {
+/// Refuses more than a mesh may have, before any of it is read; the bytes that gathering it takes.
+fn check_totals<'s>(shapes: impl Iterator<Item = &'s Shape<'s>>) -> Result<u64, MeshError> {
     let (mut triangles, mut corners) = (0_usize, 0_usize);
     for shape in shapes {
         triangles = triangles.saturating_add(shape.triangles);
@@ -87,7 +98,10 @@ fn check_totals<'s>(shapes: impl Iterator<Item = &'s Shape<'s>>) -> Result<(), M
     if triangles > MOST_TRIANGLES {
         return Err(MeshError::TooManyTriangles { found: triangles });
     }
-    if corners > MOST_CORNERS { Err(MeshError::TooManyCorners { found: corners }) } else { Ok(()) }
+    if corners > MOST_CORNERS {
+        return Err(MeshError::TooManyCorners { found: corners });
+    }
+    Ok((corners * CORNER_BYTES + triangles * TRIANGLE_BYTES) as u64)
 }
 
 /// What a mesh of the file shows.

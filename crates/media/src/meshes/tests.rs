@@ -1,5 +1,7 @@
 use super::*;
 
+const LIMIT: MemoryLimit = MemoryLimit { total: 2 << 30, used: 0 };
+
 /// A right triangle of 3 positions and 3 indices of 16 bits, in `bytes()`.
 fn document(buffer: &str, count: usize, extra: &str) -> String {
     format!(
@@ -33,17 +35,17 @@ fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
     file
 }
 
-fn nothing_beside(_: &str) -> Result<Vec<u8>, AssetProblem> {
+fn nothing_beside(_: &str, _: u64) -> Result<Vec<u8>, AssetProblem> {
     Err(AssetProblem::Missing)
 }
 
 fn reason(file: &[u8], extension: &str) -> String {
-    decode_mesh(file, extension, &nothing_beside).unwrap_err().to_string()
+    decode_mesh(file, extension, &nothing_beside, LIMIT).unwrap_err().to_string()
 }
 
 #[test]
 fn triangles_stand_where_their_node_does() {
-    let mesh = decode_mesh(&glb(&document("", 3, ""), &bytes()), "glb", &nothing_beside).unwrap();
+    let mesh = decode_mesh(&glb(&document("", 3, ""), &bytes()), "glb", &nothing_beside, LIMIT).unwrap();
     let triangles: Vec<_> = mesh.triangles().collect();
     let corner = DVec3::new;
     assert_eq!(triangles, [[corner(0.0, 5.0, 0.0), corner(2.0, 5.0, 0.0), corner(0.0, 7.0, 0.0)]]);
@@ -52,15 +54,20 @@ fn triangles_stand_where_their_node_does() {
 #[test]
 fn buffers_may_lie_beside_or_inside_the_text() {
     let beside = document(r#","uri":"flame.bin""#, 3, "");
-    let found = decode_mesh(beside.as_bytes(), "gltf", &|name| {
-        assert_eq!(name, "flame.bin");
-        Ok(bytes())
-    });
+    let found = decode_mesh(
+        beside.as_bytes(),
+        "gltf",
+        &|name, _| {
+            assert_eq!(name, "flame.bin");
+            Ok(bytes())
+        },
+        LIMIT,
+    );
     assert_eq!(found.unwrap().len(), 1);
     assert_eq!(reason(beside.as_bytes(), "gltf"), "no such file");
     let text = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIA";
     let inside = document(&format!(r#","uri":"data:application/octet-stream;base64,{text}""#), 3, "");
-    assert_eq!(decode_mesh(inside.as_bytes(), "gltf", &nothing_beside).unwrap().len(), 1);
+    assert_eq!(decode_mesh(inside.as_bytes(), "gltf", &nothing_beside, LIMIT).unwrap().len(), 1);
 }
 
 #[test]
@@ -77,7 +84,7 @@ fn strips_and_fans_make_triangles_that_face_the_same_way() {
 fn hostile_files_are_refused_with_a_reason() {
     let good = glb(&document("", 3, ""), &bytes());
     for end in 0..good.len() {
-        assert!(decode_mesh(&good[..end], "glb", &nothing_beside).is_err(), "{end} bytes of it");
+        assert!(decode_mesh(&good[..end], "glb", &nothing_beside, LIMIT).is_err(), "{end} bytes of it");
     }
     let shorter = reason(&good[..good.len() - 1], "glb");
     assert!(
@@ -163,7 +170,7 @@ fn nodes_make_trees() {
     let family = changed(r#""scene":0,"scenes":[{"nodes":[0]}],"#, "");
     let family = String::from_utf8_lossy(&family[20..]).replace(r#""scale":[2,2,2]}"#, r#""children":[1]},{"mesh":0}"#);
     let json = &family[..family.rfind('}').unwrap() + 1];
-    let mesh = decode_mesh(&glb(json, &bytes()), "glb", &nothing_beside).unwrap();
+    let mesh = decode_mesh(&glb(json, &bytes()), "glb", &nothing_beside, LIMIT).unwrap();
     assert!(mesh.len() == 2 && mesh.bounds() == [DVec3::new(0.0, 5.0, 0.0), DVec3::new(1.0, 6.0, 0.0)]);
 }
 
@@ -172,7 +179,7 @@ fn a_turned_and_nested_mesh_stands_where_the_format_says() {
     let turned = r#""rotation":[0,0,0.7071067811865476,0.7071067811865476],"translation":[1,0,0],"children":[1]},
         {"mesh":0,"matrix":[3,0,0,0, 0,3,0,0, 0,0,3,0, 0,2,0,1]}"#;
     let json = document("", 3, "").replace(r#""mesh":0,"translation":[0,5,0],"scale":[2,2,2]}"#, turned);
-    let mesh = decode_mesh(&glb(&json, &bytes()), "glb", &nothing_beside).unwrap();
+    let mesh = decode_mesh(&glb(&json, &bytes()), "glb", &nothing_beside, LIMIT).unwrap();
     let corners = mesh.triangles().next().unwrap();
     for (found, wanted) in corners.iter().zip([[-1.0, 0.0, 0.0], [-1.0, 3.0, 0.0], [-4.0, 0.0, 0.0]]) {
         assert!((*found - DVec3::from(wanted)).length() < 1e-6, "{corners:?}");
@@ -219,14 +226,42 @@ fn a_file_that_many_buffers_name_is_read_once() {
     let many = format!(r#""buffers":[{}{{"#, r#"{"byteLength":12000000,"uri":"flame.bin"},"#.repeat(2000));
     let json = beside.replace(r#""buffers":[{"#, &many);
     let times = std::cell::Cell::new(0);
-    let flame = |_: &str| {
+    let flame = |_: &str, _: u64| {
         times.set(times.get() + 1);
         let mut file = bytes();
         file.resize(12_000_000, 0);
         Ok(file)
     };
-    assert_eq!(decode_mesh(json.as_bytes(), "gltf", &flame).unwrap().len(), 1);
+    assert_eq!(decode_mesh(json.as_bytes(), "gltf", &flame, LIMIT).unwrap().len(), 1);
     assert_eq!(times.get(), 1);
+}
+
+#[test]
+fn what_would_take_too_much_memory_is_refused_before_it_is_read() {
+    let beside = document(r#","uri":"flame.bin""#, 3, "");
+    let decode = |total, beside_bytes: &dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>| {
+        decode_mesh(beside.as_bytes(), "gltf", beside_bytes, MemoryLimit { total, used: 1000 })
+    };
+    let given = |_: &str, _: u64| Ok(bytes());
+    let fits = (0..100_000).find(|&total| decode(total, &given).is_ok()).unwrap();
+    assert!((10_000..50_000).contains(&fits), "{fits}");
+    // A buffer is told how much is left, and asked for no more.
+    let asked = std::cell::Cell::new(None);
+    let refused = |_: &str, left: u64| {
+        asked.set(Some(left));
+        Err(AssetProblem::FileSize { bytes: left + 1, limit: left })
+    };
+    assert!(matches!(decode(fits, &refused), Err(AssetProblem::FileSize { .. })));
+    assert!(asked.get().is_some_and(|left| (42..1000).contains(&left)), "{asked:?}");
+    let told = decode(fits - 1, &given).unwrap_err();
+    assert!(matches!(told, AssetProblem::Memory { others, .. } if others > 1000), "{told}");
+    // Text that would be costly to parse is not parsed.
+    let many = format!("[{}0]", "{},".repeat(1_000_000));
+    let told = decode_mesh(many.as_bytes(), "gltf", &given, MemoryLimit { total: 100 << 20, used: 0 }).unwrap_err();
+    assert_eq!(
+        told,
+        AssetProblem::Memory { bytes: 2 * many.len() as u64 + 400 * 2_000_000, limit: 100 << 20, others: 0 }
+    );
 }
 
 #[test]
@@ -237,7 +272,7 @@ fn every_single_damaged_byte_is_survived() {
             let mut bad = good.clone();
             bad[place] = value;
             // Whatever it makes of it, it must come back.
-            drop(decode_mesh(&bad, "glb", &nothing_beside));
+            drop(decode_mesh(&bad, "glb", &nothing_beside, LIMIT));
         }
     }
 }

@@ -28,11 +28,16 @@ impl Cache {
     pub(crate) fn insert(&mut self, path: PathBuf, picture: Arc<Picture>, budget: usize) {
         self.pictures.retain(|(key, _)| *key != path);
         self.pictures.push((path, picture));
-        let mut total: usize = self.pictures.iter().map(|(_, picture)| bytes(picture)).sum();
+        let mut total = self.bytes();
         while total > budget && self.pictures.len() > 1 {
             let (_, oldest) = self.pictures.remove(0);
             total -= bytes(&oldest);
         }
+    }
+
+    /// Bytes that the kept pictures take.
+    pub(crate) fn bytes(&self) -> usize {
+        self.pictures.iter().map(|(_, picture)| bytes(picture)).sum()
     }
 
     pub(crate) fn clear(&mut self) {

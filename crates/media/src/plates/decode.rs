@@ -12,7 +12,13 @@ use zune_jpeg::{
     zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
 };
 
-use super::{exposure::exif_ev100, limits};
+use super::{
+    exposure::exif_ev100,
+    limits::{self, MemoryLimit},
+};
+
+/// Bytes of a pixel of a picture that was read.
+const PIXEL_BYTES: u64 = size_of::<[f32; 4]>() as u64;
 
 fn damaged(reason: impl ToString) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
@@ -20,7 +26,7 @@ fn damaged(reason: impl ToString) -> AssetProblem {
 
 /// Reads a PNG of any kind: 1 to 16 bits, grey, palette, with alpha or without. Taken as sRGB, unless it says that its
 /// values are linear (a gAMA of 1 and no sRGB chunk); colour profiles are not looked at.
-pub(crate) fn png(file: &[u8]) -> Result<Picture, AssetProblem> {
+pub(crate) fn png(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     // For everything but pixels: text and profiles.
     let metadata = Limits { bytes: 64 << 20 };
     let mut decoder = Decoder::new_with_limits(Cursor::new(file), metadata);
@@ -33,31 +39,54 @@ pub(crate) fn png(file: &[u8]) -> Result<Picture, AssetProblem> {
     let is_linear = info.srgb.is_none() && info.gamma().is_some_and(|gamma| gamma.into_scaled() == 100_000);
     let encoding = if is_linear { Encoding::LinearSrgb } else { Encoding::DisplaySrgb };
     let exposure_ev100 = info.exif_metadata.as_deref().and_then(exif_ev100);
-    let length = reader.output_buffer_size().ok_or_else(|| damaged("its pixels do not fit in memory"))?;
-    let mut bytes = vec![0; length];
-    let output = reader.next_frame(&mut bytes).map_err(damaged)?;
-    let pixels = match output.bit_depth {
-        BitDepth::Sixteen => {
-            let values = bytes.as_chunks().0.iter().map(|pair| f32::from(u16::from_be_bytes(*pair)) / 65535.0);
-            to_rgba(values.collect(), output.color_type)
+    let (color_type, bit_depth) = reader.output_color_type();
+    let row_bytes = reader.output_line_size(width as u32).ok_or_else(|| damaged("its rows do not fit in memory"))?;
+    let is_interlaced = reader.info().interlaced;
+    // Interlaced rows come seven times in part, so that all bytes are kept until the last of them.
+    let kept_rows = if is_interlaced { height } else { 1 };
+    limit.check(file.len() as u64 + width * height * PIXEL_BYTES + kept_rows * row_bytes as u64)?;
+    let mut pixels = Vec::with_capacity((width * height) as usize);
+    let decode = |row: &[u8], pixels: &mut Vec<[f32; 4]>| extend(pixels, row, color_type, bit_depth);
+    if is_interlaced {
+        let mut bytes = vec![0; height as usize * row_bytes];
+        reader.next_frame(&mut bytes).map_err(damaged)?;
+        decode(&bytes, &mut pixels);
+    } else {
+        while let Some(row) = reader.next_row().map_err(damaged)? {
+            decode(row.data(), &mut pixels);
         }
-        _ => to_rgba(bytes.iter().map(|code| f32::from(*code) / 255.0).collect(), output.color_type),
-    };
+    }
     Ok(Picture { exposure_ev100, ..picture(width, height, pixels, encoding)? })
 }
 
-fn to_rgba(values: Vec<f32>, kind: ColorType) -> Vec<[f32; 4]> {
-    match kind {
-        ColorType::Grayscale => values.iter().map(|&y| [y, y, y, 1.0]).collect(),
-        ColorType::GrayscaleAlpha => values.as_chunks().0.iter().map(|&[y, a]| [y, y, y, a]).collect(),
-        ColorType::Rgba => values.as_chunks().0.to_vec(),
+/// Appends the pixels of whole rows.
+fn extend(pixels: &mut Vec<[f32; 4]>, bytes: &[u8], color_type: ColorType, bit_depth: BitDepth) {
+    match bit_depth {
+        BitDepth::Sixteen => {
+            let value = |pair: &[u8; 2]| f32::from(u16::from_be_bytes(*pair)) / 65535.0;
+            extend_by(pixels, bytes.as_chunks().0.iter().map(value), color_type);
+        }
+        _ => extend_by(pixels, bytes.iter().map(|code| f32::from(*code) / 255.0), color_type),
+    }
+}
+
+fn extend_by(pixels: &mut Vec<[f32; 4]>, mut values: impl Iterator<Item = f32>, color_type: ColorType) {
+    let mut next = || values.next();
+    match color_type {
+        ColorType::Grayscale => pixels.extend(std::iter::from_fn(|| next().map(|y| [y, y, y, 1.0]))),
+        ColorType::GrayscaleAlpha => {
+            pixels.extend(std::iter::from_fn(|| next().zip(next()).map(|(y, a)| [y, y, y, a])));
+        }
+        ColorType::Rgba => pixels.extend(std::iter::from_fn(|| Some([next()?, next()?, next()?, next()?]))),
         // Palettes have been expanded.
-        ColorType::Rgb | ColorType::Indexed => values.as_chunks().0.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect(),
+        ColorType::Rgb | ColorType::Indexed => {
+            pixels.extend(std::iter::from_fn(|| Some([next()?, next()?, next()?, 1.0])));
+        }
     }
 }
 
 /// Reads a JPEG, grey or coloured, taken as sRGB.
-pub(crate) fn jpeg(file: &[u8]) -> Result<Picture, AssetProblem> {
+pub(crate) fn jpeg(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     let options = DecoderOptions::default()
         .set_max_width(usize::from(u16::MAX))
         .set_max_height(usize::from(u16::MAX))
@@ -69,6 +98,9 @@ pub(crate) fn jpeg(file: &[u8]) -> Result<Picture, AssetProblem> {
     let [width, height] = limits::check_size([width as u64, height as u64])?;
     // A block of 8 x 8 pixels takes at least 2 bits, but in a progressive file one code may stand for 2^15 empty ones.
     limits::check_expansion([width, height], width * height, file, 1 << 20)?;
+    // Three bytes of color, and in a progressive file two of each coefficient, also of those beyond the picture's edge.
+    let decoding_bytes = (width + 64) * (height + 64) * (3 + 3 * 2);
+    limit.check(file.len() as u64 + decoding_bytes + width * height * PIXEL_BYTES)?;
     let exposure_ev100 = decoder.exif().and_then(|block| exif_ev100(block));
     let bytes = decoder.decode().map_err(damaged)?;
     let pixels = match decoder.output_colorspace() {

@@ -1,6 +1,6 @@
 //! What a plate may claim, checked before any memory is taken for it.
 
-use bansho_base::assets::AssetProblem;
+use bansho_base::{assets::AssetProblem, memory};
 
 use crate::exr::attribute::Window;
 
@@ -8,10 +8,45 @@ use crate::exr::attribute::Window;
 pub const SIDE: u64 = 16384;
 /// Most pixels in all: half of the greatest square, which as floats is 2 GiB.
 pub const PIXELS: u64 = SIDE * SIDE / 2;
-/// Most bytes of a file that is read.
-pub const FILE_BYTES: u64 = 4 << 30;
+/// Bytes that the inputs of a scene may take together unless told otherwise.
+pub const MEMORY_BYTES: u64 = 2 << 30;
+/// Most bytes of a text: a drawing, or another that a scene names.
+pub const TEXT_BYTES: u64 = 64 << 20;
 /// How many bytes one byte of DEFLATE can stand for: 258 in two bits, and a little for headers.
 pub(crate) const DEFLATE_RATIO: u64 = 1040;
+
+/// How much memory an input may take while it is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MemoryLimit {
+    /// Bytes that all inputs together may take.
+    pub total: u64,
+    /// Bytes that others take already.
+    pub used: u64,
+}
+
+impl Default for MemoryLimit {
+    fn default() -> Self {
+        Self { total: MEMORY_BYTES, used: 0 }
+    }
+}
+
+impl MemoryLimit {
+    /// Bytes that are left.
+    pub fn available(self) -> u64 {
+        self.total.saturating_sub(self.used)
+    }
+
+    /// Whether an input may take so many `bytes`, those of its file included, and the system would give them.
+    ///
+    /// # Errors
+    /// It may not, or the system has no more.
+    pub fn check(self, bytes: u64) -> Result<(), AssetProblem> {
+        if bytes > self.available() {
+            return Err(AssetProblem::Memory { bytes, limit: self.available(), others: self.used });
+        }
+        if memory::is_granted(bytes as f64) { Ok(()) } else { Err(AssetProblem::NoMemory { bytes }) }
+    }
+}
 
 /// Refuses empty pictures and those beyond [`SIDE`] or [`PIXELS`].
 pub(crate) fn check_size([width, height]: [u64; 2]) -> Result<[u64; 2], AssetProblem> {

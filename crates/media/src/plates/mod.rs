@@ -7,10 +7,9 @@ pub mod limits;
 
 use std::{
     collections::HashMap,
-    fs::{self, File, Metadata},
-    io::{self, Read},
+    fs,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
 };
 
 use bansho_base::{
@@ -19,20 +18,46 @@ use bansho_base::{
     mesh::Mesh,
 };
 
-use self::cache::Cache;
-use crate::{drawings::decode_drawing, exr, meshes::decode_mesh, naming::FrameTemplate};
+use self::{
+    cache::Cache,
+    limits::{MEMORY_BYTES, MemoryLimit, TEXT_BYTES},
+};
+use crate::{
+    drawings::decode_drawing,
+    exr,
+    input::{self, InputError},
+    meshes::decode_mesh,
+    naming::FrameTemplate,
+};
 
-/// Bytes of pictures that are kept for the next frame unless told otherwise.
+/// Most bytes of pictures that are kept for the next frame unless told otherwise.
 pub const CACHE_BYTES: usize = 512 << 20;
+
+/// What the files that a scene names may take, and where they may lie.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InputLimits {
+    /// Bytes of memory that they may take together while they are read and used.
+    pub memory_bytes: u64,
+    /// The folder that they must lie in when symbolic links are followed; without it they may lie anywhere.
+    pub root: Option<PathBuf>,
+}
+
+impl Default for InputLimits {
+    fn default() -> Self {
+        Self { memory_bytes: MEMORY_BYTES, root: None }
+    }
+}
 
 /// Pictures, meshes, drawings and texts in files. Paths are relative to a folder; a run of `#` in a file's name stands for the frame
 /// number. What was read is remembered, so a file that changes is seen after [`FileAssets::forget`].
 ///
-/// A file is refused, before memory is taken for it, when it claims more than [`limits::SIDE`] pixels on a side or more
-/// than its bytes could hold.
+/// A file is refused before memory is taken for it when it is no ordinary file, lies outside [`InputLimits::root`], claims more than
+/// [`limits::SIDE`] pixels on a side or more than its bytes could hold, or would take more than [`InputLimits::memory_bytes`] together
+/// with those that are in use.
 #[derive(Debug)]
 pub struct FileAssets {
-    root: PathBuf,
+    folder: PathBuf,
+    limits: InputLimits,
     cache_bytes: usize,
     memory: Mutex<Memory>,
 }
@@ -40,25 +65,40 @@ pub struct FileAssets {
 #[derive(Debug, Default)]
 struct Memory {
     pictures: Cache,
+    /// Those that somebody uses.
+    meshes: HashMap<PathBuf, Weak<Mesh>>,
+    drawings: HashMap<PathBuf, Weak<Drawing>>,
     digests: HashMap<PathBuf, [u8; 32]>,
 }
 
+impl Memory {
+    /// Bytes of what is in use or kept.
+    fn used(&self) -> u64 {
+        let meshes = self.meshes.values().filter_map(Weak::upgrade).map(|mesh| mesh.memory_bytes());
+        let drawings = self.drawings.values().filter_map(Weak::upgrade).map(|drawing| drawing.memory_bytes());
+        self.pictures.bytes() as u64 + meshes.chain(drawings).sum::<u64>()
+    }
+}
+
 impl FileAssets {
-    /// Assets in `root` and below, or wherever an absolute path points.
-    pub fn new(root: impl Into<PathBuf>) -> Self {
-        Self::with_cache(root, CACHE_BYTES)
+    /// Assets in `folder` and below, or wherever a path points, within the default limits.
+    pub fn new(folder: impl Into<PathBuf>) -> Self {
+        Self::with_limits(folder, InputLimits::default())
+    }
+
+    /// As [`FileAssets::new`], within `limits`.
+    pub fn with_limits(folder: impl Into<PathBuf>, limits: InputLimits) -> Self {
+        Self { folder: folder.into(), limits, cache_bytes: CACHE_BYTES, memory: Mutex::new(Memory::default()) }
     }
 
     /// As [`FileAssets::new`], keeping at most `cache_bytes` of pictures, but always the last one.
-    pub fn with_cache(root: impl Into<PathBuf>, cache_bytes: usize) -> Self {
-        Self { root: root.into(), cache_bytes, memory: Mutex::new(Memory::default()) }
+    pub fn with_cache(folder: impl Into<PathBuf>, cache_bytes: usize) -> Self {
+        Self { cache_bytes, ..Self::new(folder) }
     }
 
     /// Forgets everything that was read, because files may have changed.
     pub fn forget(&self) {
-        let mut memory = self.memory();
-        memory.pictures.clear();
-        memory.digests.clear();
+        *self.memory() = Memory::default();
     }
 
     /// The file that `path` means for frame `frame`.
@@ -73,56 +113,101 @@ impl FileAssets {
         })?;
         // An absolute path begins with an empty folder.
         let folder = if path.starts_with('/') && folder.is_empty() { "/" } else { folder };
-        Ok(self.root.join(folder).join(template.name(frame)))
+        Ok(self.folder.join(folder).join(template.name(frame)))
     }
 
     fn memory(&self) -> MutexGuard<'_, Memory> {
         // The memory is only ever replaced whole, so a panic elsewhere leaves it usable.
         self.memory.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
 
-/// What the system says of a file.
-fn system(error: io::Error) -> AssetProblem {
-    match error.kind() {
-        io::ErrorKind::NotFound => AssetProblem::Missing,
-        _ => AssetProblem::Unreadable(error.to_string()),
+    fn limit(&self) -> MemoryLimit {
+        MemoryLimit { total: self.limits.memory_bytes, used: self.memory().used() }
+    }
+
+    /// Reads something within the memory that is left, and again without the pictures that are only kept where it is too little.
+    fn within_limit<T>(&self, read: impl Fn(MemoryLimit) -> Result<T, AssetProblem>) -> Result<T, AssetProblem> {
+        match read(self.limit()) {
+            Err(AssetProblem::Memory { .. } | AssetProblem::FileSize { .. } | AssetProblem::NoMemory { .. }) => {
+                self.memory().pictures.clear();
+                read(self.limit())
+            }
+            result => result,
+        }
+    }
+
+    /// The file at `path` as it may be opened: where all must lie in one folder, with links followed, if it does.
+    fn allowed(&self, path: &Path) -> Result<PathBuf, AssetProblem> {
+        let Some(root) = &self.limits.root else { return Ok(path.to_path_buf()) };
+        let outside = || AssetProblem::Outside { root: root.display().to_string() };
+        let within = fs::canonicalize(root).map_err(|error| AssetProblem::Unreadable(error.to_string()))?;
+        // Of what is not there, as much as is: nobody is told what there is elsewhere.
+        let found = path.ancestors().find_map(|part| {
+            let part = if part.as_os_str().is_empty() { Path::new(".") } else { part };
+            fs::canonicalize(part).ok()
+        });
+        let found = found.filter(|found| found.starts_with(&within)).ok_or_else(outside)?;
+        Ok(fs::canonicalize(path).map_or_else(|_| path.to_path_buf(), |_| found))
+    }
+
+    /// The whole file, if it has at most `limit` bytes.
+    fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>, AssetProblem> {
+        Ok(input::read(&self.allowed(path)?, limit)?)
+    }
+
+    fn read_mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetProblem> {
+        if let Some(mesh) = self.memory().meshes.get(path).and_then(Weak::upgrade) {
+            return Ok(mesh);
+        }
+        let beside = |name: &str, left: u64| self.read(&path.with_file_name(name), left);
+        let mesh = self.within_limit(|limit| {
+            let file = self.read(path, limit.available())?;
+            decode_mesh(&file, extension(path), &beside, limit)
+        });
+        let mesh = Arc::new(mesh?);
+        self.memory().meshes.insert(path.to_path_buf(), Arc::downgrade(&mesh));
+        Ok(mesh)
+    }
+
+    fn read_text(&self, path: &Path) -> Result<String, AssetProblem> {
+        let bytes = self.read(path, TEXT_BYTES)?;
+        String::from_utf8(bytes).map_err(|_| AssetProblem::Damaged("it is not UTF-8".to_owned()))
+    }
+
+    fn read_drawing(&self, path: &Path) -> Result<Arc<Drawing>, AssetProblem> {
+        if let Some(drawing) = self.memory().drawings.get(path).and_then(Weak::upgrade) {
+            return Ok(drawing);
+        }
+        let drawing = Arc::new(decode_drawing(&self.read_text(path)?)?);
+        self.memory().drawings.insert(path.to_path_buf(), Arc::downgrade(&drawing));
+        self.limit().check(0)?;
+        Ok(drawing)
+    }
+
+    fn hash(&self, path: &Path) -> Result<[u8; 32], AssetProblem> {
+        let (file, _) = input::open(&self.allowed(path)?, self.limits.memory_bytes)?;
+        let mut hasher = blake3::Hasher::new();
+        hasher.update_reader(file).map_err(InputError::from)?;
+        Ok(*hasher.finalize().as_bytes())
     }
 }
 
-/// A folder opens like a file; a pipe or a device might never end.
-fn only_files(found: Metadata) -> Result<(), AssetProblem> {
-    if found.is_file() { Ok(()) } else { Err(AssetProblem::Unreadable("it is not a file".to_owned())) }
-}
-
-/// The whole file, if it is not beyond [`limits::FILE_BYTES`].
-fn read(path: &Path) -> Result<Vec<u8>, AssetProblem> {
-    let file = File::open(path).map_err(system)?;
-    file.metadata().map_err(system).and_then(only_files)?;
-    let mut bytes = Vec::new();
-    file.take(limits::FILE_BYTES + 1).read_to_end(&mut bytes).map_err(system)?;
-    if bytes.len() as u64 > limits::FILE_BYTES {
-        return Err(AssetProblem::Unreadable(format!("it has more than {} bytes", limits::FILE_BYTES)));
-    }
-    Ok(bytes)
+fn extension(path: &Path) -> &str {
+    path.extension().and_then(|extension| extension.to_str()).unwrap_or_default()
 }
 
 /// Reads a picture from the bytes of a file whose name ends in `extension` (without the dot): `png`, `jpg`, `jpeg`, `exr`.
 ///
 /// # Errors
-/// Another extension, a claim beyond the [`limits`], or damage. Never panics and never takes memory that the bytes could
+/// Another extension, a claim beyond the [`limits`] or beyond `limit`, or damage. Never panics and never takes memory that the bytes could
 /// not fill.
-pub fn decode_picture(bytes: &[u8], extension: &str) -> Result<Picture, AssetProblem> {
+pub fn decode_picture(bytes: &[u8], extension: &str, limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     match extension.to_ascii_lowercase().as_str() {
-        "png" => decode::png(bytes),
-        "jpg" | "jpeg" => decode::jpeg(bytes),
-        "exr" => exr::decode(bytes),
+        "png" => decode::png(bytes, limit),
+        "jpg" | "jpeg" => decode::jpeg(bytes, limit),
+        "exr" => exr::decode(bytes, limit),
         _ => Err(AssetProblem::UnknownKind),
     }
-}
-
-fn error(path: &Path, problem: AssetProblem) -> AssetError {
-    AssetError { path: path.display().to_string(), problem }
 }
 
 impl Assets for FileAssets {
@@ -131,37 +216,34 @@ impl Assets for FileAssets {
         if let Some(picture) = self.memory().pictures.get(&path) {
             return Ok(picture);
         }
-        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-        let read = || decode_picture(&read(&path)?, extension);
-        let picture = Arc::new(read().map_err(|problem| error(&path, problem))?);
+        let picture = self.within_limit(|limit| {
+            let file = self.read(&path, limit.available())?;
+            decode_picture(&file, extension(&path), limit)
+        });
+        let picture = Arc::new(picture.map_err(|problem| error(&path, problem))?);
         self.memory().pictures.insert(path, picture.clone(), self.cache_bytes);
         Ok(picture)
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
-        let path = self.root.join(path);
-        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-        let beside = |name: &str| read(&path.with_file_name(name));
-        let mesh = read(&path).and_then(|file| decode_mesh(&file, extension, &beside));
-        Ok(Arc::new(mesh.map_err(|problem| error(&path, problem))?))
+        let path = self.folder.join(path);
+        self.read_mesh(&path).map_err(|problem| error(&path, problem))
     }
 
     fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
-        let drawing = decode_drawing(&self.text(path)?);
-        Ok(Arc::new(drawing.map_err(|problem| error(&self.root.join(path), problem))?))
+        let path = self.folder.join(path);
+        self.read_drawing(&path).map_err(|problem| error(&path, problem))
     }
 
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
-        let path = self.root.join(path);
-        let bytes = read(&path).map_err(|problem| error(&path, problem))?;
-        let text =
-            String::from_utf8(bytes).map_err(|_| error(&path, AssetProblem::Damaged("it is not UTF-8".to_owned())))?;
-        Ok(text.into())
+        let path = self.folder.join(path);
+        self.read_text(&path).map(Arc::from).map_err(|problem| error(&path, problem))
     }
 
     fn find(&self, path: &str, frame: i64) -> Result<(), AssetError> {
         let path = self.resolve(path, frame)?;
-        fs::metadata(&path).map_err(system).and_then(only_files).map_err(|problem| error(&path, problem))
+        let found = self.allowed(&path).and_then(|path| Ok(input::find(&path)?));
+        found.map_err(|problem| error(&path, problem))
     }
 
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
@@ -169,9 +251,12 @@ impl Assets for FileAssets {
         if let Some(digest) = self.memory().digests.get(&path) {
             return Ok(*digest);
         }
-        let bytes = read(&path).map_err(|problem| error(&path, problem))?;
-        let digest = *blake3::hash(&bytes).as_bytes();
+        let digest = self.hash(&path).map_err(|problem| error(&path, problem))?;
         self.memory().digests.insert(path, digest);
         Ok(digest)
     }
+}
+
+fn error(path: &Path, problem: AssetProblem) -> AssetError {
+    AssetError { path: path.display().to_string(), problem }
 }

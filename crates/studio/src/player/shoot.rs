@@ -12,6 +12,7 @@ use std::{
 use bansho::{
     Observer,
     job::{FrameDone, Job, JobError, JobObserver, Outline, SceneFile},
+    media::plates::InputLimits,
 };
 
 /// A job under way.
@@ -68,6 +69,7 @@ pub fn job(text: &str, path: &Path, number: Option<i64>) -> Job {
         folder: path.parent().map(Path::to_path_buf).unwrap_or_default(),
         text: text.to_owned(),
         changes: Vec::new(),
+        inputs: InputLimits::default(),
     };
     let out = scene.folder.join("out").join(&scene.stem).join(format!("{}.####.png", scene.stem));
     Job { resume: number.is_none(), frames: number.map(|number| vec![number]), out: Some(out), ..Job::new(scene) }

@@ -1,0 +1,49 @@
+//! The temporary files that this process is writing, so that a program that must end at once can remove them first.
+
+use std::{
+    collections::BTreeSet,
+    fs, io, mem,
+    path::{Path, PathBuf},
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use tempfile::NamedTempFile;
+
+/// Temporary files that have not got their final name.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    // A set of paths is whole at any time.
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A temporary file's place in the list, which it leaves when this is dropped.
+#[derive(Debug)]
+pub(crate) struct Listed(PathBuf);
+
+impl Drop for Listed {
+    fn drop(&mut self) {
+        unfinished().remove(&self.0);
+    }
+}
+
+/// Makes a temporary file that is in the list as long as it is there.
+pub(crate) fn list(make: impl FnOnce() -> io::Result<NamedTempFile>) -> io::Result<(NamedTempFile, Listed)> {
+    // Locked while the file is made, so that no file is ever missing from the list.
+    let mut unfinished = unfinished();
+    let file = make()?;
+    let path: &Path = file.path();
+    unfinished.insert(path.to_path_buf());
+    let listed = Listed(path.to_path_buf());
+    Ok((file, listed))
+}
+
+/// Removes every file that is being written but does not bear its final name yet, and lets no other be begun: whoever tries waits for ever.
+///
+/// For a program that ends right after, without waiting for what its other threads do. Files that bear their names stay, whole.
+pub fn abandon_all() {
+    let unfinished = unfinished();
+    // One that just got its name is not there any more, which is as well.
+    unfinished.iter().for_each(|path| drop(fs::remove_file(path)));
+    mem::forget(unfinished);
+}
