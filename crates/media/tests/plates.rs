@@ -431,3 +431,27 @@ fn what_lies_outside_the_root_is_refused_whatever_its_name() {
     // Without a root a scene may name what it likes.
     FileAssets::new(path("job")).picture("../secret.png", 0).unwrap();
 }
+
+#[test]
+fn the_digest_of_a_mesh_is_that_of_its_buffers_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let gltf = r#"{"asset":{"version":"2.0"},"buffers":[{"uri":"a.bin","byteLength":1},{"uri":"data:;base64,AA=="}]}"#;
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("a.gltf", gltf);
+    write("a.bin", "one");
+    let assets = FileAssets::new(folder.path());
+    let digest = || {
+        assets.forget();
+        assets.digest("a.gltf", 0)
+    };
+    let before = digest().unwrap();
+    assert_eq!(digest().unwrap(), before);
+    write("a.bin", "two");
+    assert_ne!(digest().unwrap(), before);
+    assert_eq!(assets.files("a.gltf", 0).unwrap(), ["a.gltf", "a.bin"].map(|name| folder.path().join(name)));
+    fs::remove_file(folder.path().join("a.bin")).unwrap();
+    assert!(digest().is_err());
+    // What is damaged names nothing.
+    write("a.gltf", "{");
+    assert_eq!(assets.files("a.gltf", 0).unwrap().len(), 1);
+}

@@ -1,14 +1,14 @@
 //! The bytes that a glTF's numbers lie in.
 
-use std::{borrow::Cow, collections::BTreeMap};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, BTreeSet},
+};
 
 use bansho_base::assets::AssetProblem;
 
-use super::{base64, json::Object};
+use super::{Beside, base64, json::Object};
 use crate::plates::limits::MemoryLimit;
-
-/// Gives the bytes of a file that a glTF names, if they are at most so many.
-pub(super) type Beside<'a> = &'a dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>;
 
 /// All buffers. What several of them name is held once.
 pub(super) struct Buffers<'a> {
@@ -65,6 +65,13 @@ impl<'a> Buffers<'a> {
     pub(super) fn get(&self, index: usize) -> &[u8] {
         &self.contents[self.content_of[index]]
     }
+}
+
+/// Files that the buffers of a glTF lie in, as it names them, each once; as many as can be found in one that is damaged.
+pub(super) fn files<'a>(root: &Object<'a>) -> BTreeSet<&'a str> {
+    let buffers = root.items("buffers").into_iter().flatten().filter_map(Result::ok);
+    let names = buffers.filter_map(|buffer| buffer.text("uri").ok().flatten());
+    names.filter(|name| !name.starts_with("data:")).collect()
 }
 
 fn content<'a>(

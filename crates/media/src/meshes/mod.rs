@@ -21,6 +21,9 @@ use bansho_base::{
 use self::{accessor::Accessor, buffers::Buffers, glb::Glb, json::Object, nodes::Shown};
 use crate::plates::limits::MemoryLimit;
 
+/// Gives the bytes of a file that a glTF names, if they are at most so many.
+pub type Beside<'a> = &'a dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>;
+
 /// Bytes that a corner and a triangle take while meshes are gathered: where lists of them grow, twice those of the mesh itself, and for a
 /// triangle the order of its corners.
 const CORNER_BYTES: usize = 2 * size_of::<[f32; 3]>();
@@ -38,12 +41,7 @@ fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
 ///
 /// # Errors
 /// Another extension, damage, more than is read, more memory than `limit`, or no triangles. Never panics.
-pub fn decode_mesh(
-    file: &[u8],
-    extension: &str,
-    beside: &dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>,
-    limit: MemoryLimit,
-) -> Result<Mesh, AssetProblem> {
+pub fn decode_mesh(file: &[u8], extension: &str, beside: Beside, limit: MemoryLimit) -> Result<Mesh, AssetProblem> {
     let Glb { json, binary } = match extension.to_ascii_lowercase().as_str() {
         "glb" => glb::split(file)?,
         "gltf" => Glb { json: file, binary: None },
@@ -70,6 +68,18 @@ pub fn decode_mesh(
         shapes[mesh].parts.iter().try_for_each(|part| gathering.add(part, world_from_mesh))?;
     }
     Ok(Mesh::new(gathering.corners, gathering.triangles)?)
+}
+
+/// Names of the files beside it that a glTF's numbers lie in, each once, as many as can be found; `file` and `extension` as in [`decode_mesh`].
+pub fn files_beside(file: &[u8], extension: &str) -> Vec<String> {
+    let json = match extension.to_ascii_lowercase().as_str() {
+        "glb" => glb::split(file).map(|glb| glb.json).unwrap_or_default(),
+        "gltf" => file,
+        _ => return Vec::new(),
+    };
+    let Ok(value) = json::parse(json) else { return Vec::new() };
+    let root = Object::root(&value);
+    root.map(|root| buffers::files(&root).into_iter().map(str::to_owned).collect()).unwrap_or_default()
 }
 
 /// What the file says of itself must be what is read here.

@@ -239,7 +239,7 @@ fn a_file_that_many_buffers_name_is_read_once() {
 #[test]
 fn what_would_take_too_much_memory_is_refused_before_it_is_read() {
     let beside = document(r#","uri":"flame.bin""#, 3, "");
-    let decode = |total, beside_bytes: &dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>| {
+    let decode = |total, beside_bytes: Beside| {
         decode_mesh(beside.as_bytes(), "gltf", beside_bytes, MemoryLimit { total, used: 1000 })
     };
     let given = |_: &str, _: u64| Ok(bytes());

@@ -26,7 +26,7 @@ use crate::{
     drawings::decode_drawing,
     exr,
     input::{self, InputError},
-    meshes::decode_mesh,
+    meshes::{decode_mesh, files_beside},
     naming::FrameTemplate,
 };
 
@@ -184,7 +184,41 @@ impl FileAssets {
         Ok(drawing)
     }
 
+    /// All files that `path` leads to in frame `frame`: itself, and where it is a glTF those that its numbers lie in.
+    ///
+    /// # Errors
+    /// As [`resolve`](Self::resolve). A file that cannot be read leads to no other.
+    pub fn files(&self, path: &str, frame: i64) -> Result<Vec<PathBuf>, AssetError> {
+        let path = self.resolve(path, frame)?;
+        let beside = self.files_beside(&path);
+        Ok([vec![path], beside].concat())
+    }
+
+    fn files_beside(&self, path: &Path) -> Vec<PathBuf> {
+        if !["gltf", "glb"].iter().any(|mesh| extension(path).eq_ignore_ascii_case(mesh)) {
+            return Vec::new();
+        }
+        let file = self.read(path, self.limits.memory_bytes).unwrap_or_default();
+        let names = files_beside(&file, extension(path));
+        names.into_iter().map(|name| path.with_file_name(name)).collect()
+    }
+
+    /// A digest of a file and of those that it names.
     fn hash(&self, path: &Path) -> Result<[u8; 32], AssetProblem> {
+        let own = self.hash_file(path)?;
+        let beside = self.files_beside(path);
+        if beside.is_empty() {
+            return Ok(own);
+        }
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&own);
+        for path in beside {
+            hasher.update(&self.hash_file(&path)?);
+        }
+        Ok(*hasher.finalize().as_bytes())
+    }
+
+    fn hash_file(&self, path: &Path) -> Result<[u8; 32], AssetProblem> {
         let (file, _) = input::open(&self.allowed(path)?, self.limits.memory_bytes)?;
         let mut hasher = blake3::Hasher::new();
         hasher.update_reader(file).map_err(InputError::from)?;
