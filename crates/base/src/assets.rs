@@ -57,6 +57,9 @@ pub enum AssetProblem {
     /// There is nothing of that name.
     #[error("no such file")]
     Missing,
+    /// Its name has more than one place for the frame number, or one of too many digits.
+    #[error("has no one place for the frame number; allowed: one run of up to 20 `#` in the file's name")]
+    FrameNumber,
     /// It is there but cannot be read.
     #[error("cannot be read: {0}")]
     Unreadable(String),

@@ -98,6 +98,14 @@ pub enum NamingError {
         /// The name.
         path: PathBuf,
     },
+    /// A frame number of more digits than numbers have.
+    #[error("{path}: a frame number of {digits} digits; allowed: up to {MOST_DIGITS}", path = .path.display())]
+    ManyDigits {
+        /// The name.
+        path: PathBuf,
+        /// How many digits it asks for.
+        digits: usize,
+    },
     /// A frame number in a file that holds all frames.
     #[error("{path}: a .{extension} file holds all frames, so its name has no place for a frame number", path = .path.display())]
     NumberedFilm {
@@ -131,6 +139,7 @@ pub(crate) struct FrameTemplate {
 pub(crate) enum TemplateError {
     TwoPlaceholders,
     BadPercent,
+    ManyDigits(usize),
 }
 
 impl FrameTemplate {
@@ -142,6 +151,9 @@ impl FrameTemplate {
             let (placeholder, length) = match first {
                 '#' => {
                     let run = rest.len() - rest.trim_start_matches('#').len();
+                    if run > MOST_DIGITS {
+                        return Err(TemplateError::ManyDigits(run));
+                    }
                     (Some(run), run)
                 }
                 '%' if printf && rest.starts_with("%%") => {
@@ -228,6 +240,7 @@ impl NumberedPath {
         let template = FrameTemplate::parse(name, true).map_err(|error| match error {
             TemplateError::TwoPlaceholders => NamingError::TwoPlaceholders { path: owned() },
             TemplateError::BadPercent => NamingError::BadPercent { path: owned() },
+            TemplateError::ManyDigits(digits) => NamingError::ManyDigits { path: owned(), digits },
         })?;
         Ok(Self { folder: path.parent().map(Path::to_path_buf).unwrap_or_default(), template })
     }
@@ -386,6 +399,10 @@ mod tests {
         assert!(matches!(error("a.%s.png"), NamingError::BadPercent { .. }));
         assert!(matches!(error("a.%099d.png"), NamingError::BadPercent { .. }));
         assert!(matches!(error("a.%-4d.png"), NamingError::BadPercent { .. }));
+        assert!(matches!(error(&format!("{}.png", "#".repeat(21))), NamingError::ManyDigits { digits: 21, .. }));
+        // As many as the standard library could not write.
+        assert!(matches!(error(&format!("{}.png", "#".repeat(100_000))), NamingError::ManyDigits { .. }));
+        assert_eq!(name(&format!("{}.png", "#".repeat(20)), 2, 1), "00000000000000000001.png");
         assert!(matches!(error("film.####.mp4"), NamingError::NumberedFilm { .. }));
         for bare in ["frame", ".png", "frame.", "..", "/", ""] {
             assert!(matches!(error(bare), NamingError::NoExtension { .. }), "{bare}");

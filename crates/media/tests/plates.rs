@@ -314,7 +314,9 @@ fn what_is_wrong_with_a_file_is_said_with_its_path() {
     assert_eq!(error("a.tiff").problem, AssetProblem::UnknownKind);
     assert!(matches!(error("a.png").problem, AssetProblem::Damaged(_)));
     assert_eq!(error("d.png").problem, AssetProblem::NotAFile { found: "a folder" });
-    assert!(matches!(error("#.#.png").problem, AssetProblem::Unreadable(_)));
+    for name in ["#.#.png".to_owned(), format!("{}.png", "#".repeat(21))] {
+        assert_eq!(error(&name).problem, AssetProblem::FrameNumber);
+    }
 }
 
 /// An Exif block that says 1/250 s, f/4 and ISO 400.

@@ -6,7 +6,7 @@ import { createRequire } from "node:module";
 
 // NODE_PATH says where it is; `import` does not look there.
 const { chromium } = createRequire(import.meta.url)("playwright-core");
-const TYPES = { ".html": "text/html", ".js": "text/javascript", ".wasm": "application/wasm" };
+const TYPES = { ".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".wasm": "application/wasm" };
 
 // The window's size, points of the screen.
 export const SIZE = { width: 1400, height: 860 };

@@ -104,13 +104,11 @@ impl FileAssets {
     /// The file that `path` means for frame `frame`.
     ///
     /// # Errors
-    /// More than one run of `#` in the name.
+    /// More than one run of `#` in the name, or one of more than 20.
     pub fn resolve(&self, path: &str, frame: i64) -> Result<PathBuf, AssetError> {
         let (folder, name) = path.rsplit_once('/').map_or(("", path), |(folder, name)| (folder, name));
-        let template = FrameTemplate::parse(name, false).map_err(|_| AssetError {
-            path: path.to_owned(),
-            problem: AssetProblem::Unreadable("more than one place for the frame number".to_owned()),
-        })?;
+        let template = FrameTemplate::parse(name, false)
+            .map_err(|_| AssetError { path: path.to_owned(), problem: AssetProblem::FrameNumber })?;
         // An absolute path begins with an empty folder.
         let folder = if path.starts_with('/') && folder.is_empty() { "/" } else { folder };
         Ok(self.folder.join(folder).join(template.name(frame)))
