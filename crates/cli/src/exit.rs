@@ -58,7 +58,10 @@ fn tell(error: &anyhow::Error) {
 /// Tells what went wrong with a job.
 pub(crate) fn tell_job(error: &JobError) {
     match error.scene() {
-        Some(scene) => faults(scene).for_each(|fault| to_stderr(&format!("error: {fault}"))),
+        Some(scene) => {
+            faults(scene).for_each(|fault| to_stderr(&format!("error: {fault}")));
+            flags::for_scene(scene).iter().for_each(|flag| to_stderr(&format!("hint: {flag}")));
+        }
         None => to_stderr(&format!("error: {}", flags::error(error))),
     }
 }

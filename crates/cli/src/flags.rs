@@ -1,9 +1,16 @@
 //! Which flags the library's errors and notes are about: it speaks of what was asked for, only the program knows by which flags.
 
-use std::io;
+use std::{error::Error, io};
 
 use bansho::job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksFault};
-use bansho::media::input::InputError;
+use bansho::{
+    SceneError,
+    base::{
+        assets::{AssetError, AssetProblem},
+        parameters::{Problem, ProblemKind},
+    },
+    media::{input::InputError, plates::limits::TEXT_BYTES},
+};
 
 /// An error as the user of the program reads it.
 pub(crate) fn error(error: &JobError) -> String {
@@ -18,6 +25,30 @@ pub(crate) fn error(error: &JobError) -> String {
         JobError::ParticlesCancelled => format!("{error}, and --frames asks for the others"),
         _ => after(of_error(error), &error.to_string()),
     }
+}
+
+/// What a flag could do about the faults of a scene.
+pub(crate) fn for_scene(error: &SceneError) -> Option<&'static str> {
+    let needs_memory = |problem: &Problem| match asset_problem(&problem.kind) {
+        Some(AssetProblem::Memory { .. }) => true,
+        // Texts have a limit of their own.
+        Some(AssetProblem::FileSize { limit, .. }) => *limit > TEXT_BYTES,
+        _ => false,
+    };
+    let hint = "--input-memory allows the files of a scene to take more";
+    error.problems.iter().any(needs_memory).then_some(hint)
+}
+
+/// What is wrong with a file, where that is the fault.
+fn asset_problem(kind: &ProblemKind) -> Option<&AssetProblem> {
+    let mut error: Option<&(dyn Error + 'static)> = Some(kind);
+    while let Some(found) = error {
+        if let Some(AssetError { problem, .. }) = found.downcast_ref() {
+            return Some(problem);
+        }
+        error = found.source();
+    }
+    None
 }
 
 /// A note as the user of the program reads it.

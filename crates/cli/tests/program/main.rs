@@ -7,6 +7,7 @@ mod commands;
 mod disk;
 mod figures;
 mod flipbook;
+mod inputs;
 mod interruptions;
 #[cfg(target_os = "linux")]
 mod memory;
