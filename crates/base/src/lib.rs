@@ -25,6 +25,7 @@ pub mod phenomenon;
 pub mod placement;
 pub mod plural;
 pub mod point_cloud;
+pub mod printable;
 pub mod random;
 pub mod sky;
 pub mod spares;

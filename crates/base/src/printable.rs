@@ -1,0 +1,51 @@
+//! Text that others wrote, as it may be shown on a terminal.
+
+use std::{borrow::Cow, fmt::Write};
+
+/// `text` in one line, with every character that would steer a terminal or turn the direction of reading as its escape, such as `\u{1b}`:
+/// names of files and values of scenes may hold any.
+///
+/// ```
+/// use bansho_base::printable::printable;
+/// assert_eq!(printable("a\x1b[2J.png"), "a\\u{1b}[2J.png");
+/// assert_eq!(printable("火.png"), "火.png");
+/// ```
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if !text.chars().any(steers) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len());
+    for character in text.chars() {
+        // Writing to a string does not fail.
+        let _ = if steers(character) {
+            write!(shown, "{}", character.escape_default())
+        } else {
+            shown.write_char(character)
+        };
+    }
+    Cow::Owned(shown)
+}
+
+/// Controls, line and paragraph separators, and the marks of the Unicode bidirectional algorithm (UAX #9) that let text look like other text.
+fn steers(character: char) -> bool {
+    character.is_control()
+        || matches!(character, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_steers_a_terminal_is_shown_as_its_escape() {
+        for (text, shown) in [
+            ("a\nerror: b", "a\\nerror: b"),
+            ("\u{9b}2J\u{7f}\0", "\\u{9b}2J\\u{7f}\\u{0}"),
+            ("ab\u{202e}gnp.exe", "ab\\u{202e}gnp.exe"),
+            ("tab\there", "tab\\there"),
+        ] {
+            assert_eq!(printable(text), shown);
+        }
+        assert!(matches!(printable("Größe 3×4 火"), Cow::Borrowed(_)));
+    }
+}
