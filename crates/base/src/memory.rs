@@ -8,7 +8,8 @@ const OTHER_BYTES: f64 = (256 << 20) as f64;
 /// Whether the system would give so many bytes. They are asked for and given back untouched. A fuzzer takes asking for using, and is not asked.
 pub fn is_granted(bytes: f64) -> bool {
     let granted = || Vec::<u8>::new().try_reserve_exact((bytes + OTHER_BYTES) as usize).is_ok();
-    bytes < FEW_BYTES || (!cfg!(fuzzing) && granted())
+    // No number at all would become 0 bytes.
+    bytes < FEW_BYTES || (!cfg!(fuzzing) && !bytes.is_nan() && granted())
 }
 
 /// A number of bytes as people read it: in GiB, MiB or KiB with one decimal, or in bytes.
@@ -22,7 +23,9 @@ pub fn shown(bytes: u64) -> String {
 
 /// The largest of the twentieths of `count` that `fits`; 0 where none does.
 pub fn most(count: i64, fits: impl Fn(i64) -> bool) -> i64 {
-    (1..=20).rev().map(|parts| count / 20 * parts).find(|&part| fits(part)).unwrap_or(0)
+    // Without overflow, and without losing what a division would leave of small counts.
+    let share = |parts: i64| count / 20 * parts + count % 20 * parts / 20;
+    (1..=20).rev().map(share).find(|&part| fits(part)).unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -32,7 +35,7 @@ mod tests {
     #[test]
     fn nothing_is_granted_and_more_than_there_can_be_is_not() {
         assert!(is_granted(0.0) && is_granted(1e6));
-        assert!(!is_granted(1e30) && !is_granted(f64::INFINITY));
+        assert!(!is_granted(1e30) && !is_granted(f64::INFINITY) && !is_granted(f64::NAN));
     }
 
     #[test]
@@ -46,5 +49,7 @@ mod tests {
         assert_eq!(most(1000, |count| count <= 640), 600);
         assert_eq!(most(1000, |_| true), 1000);
         assert_eq!(most(1000, |_| false), 0);
+        assert_eq!([most(19, |_| true), most(19, |count| count <= 10), most(3, |count| count <= 2)], [19, 10, 2]);
+        assert_eq!(most(i64::MAX, |_| true), i64::MAX);
     }
 }

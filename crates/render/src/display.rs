@@ -21,7 +21,8 @@ bansho_base::choice! {
 const TASK_ROWS: usize = 16;
 
 /// The frame's beauty as display pixels: the camera's white balance, view, straight alpha of the given convention, sRGB encoding, dither.
-/// The view `raw` encodes nothing: its alpha is linear.
+/// The view `raw` encodes nothing: its alpha is linear. What is below 0 or not a number counts as 0, in alpha too; what is infinite, as the
+/// brightest light.
 pub fn display(frame: &Frame, view: &View, depth: BitDepth, alpha: AlphaConvention) -> DisplayImage {
     let alpha = if *view == View::RAW { AlphaConvention::Linear } else { alpha };
     let pixels = match depth {

@@ -1,6 +1,9 @@
 //! What a scene has that its text does not state.
 
-use bansho_base::{assets::MemoryAssets, parameters::Value};
+use bansho_base::{
+    assets::MemoryAssets,
+    parameters::{Auto, Value},
+};
 use bansho_render::{
     Plan, PlanOptions, Scene,
     phenomena::KINDS,
@@ -84,6 +87,18 @@ fn a_camera_that_is_told_where_to_stand_or_look_is_left_alone() {
     assert_eq!(wide.position, read("[[flame_sheet]]").camera.position);
     let dome = read("[camera]\nlens = \"fisheye\"\n[[aurora]]").camera;
     assert!(dome.target.at(0.0)[1] > 50.0, "a dome looks to the zenith");
+}
+
+/// What is drawn elsewhere may be fainter or brighter than what the setting is exposed for.
+#[test]
+fn what_the_scene_places_is_exposed_for_itself() {
+    let exposure = |text: &str| read(text).picture.exposure_ev100;
+    assert_eq!(exposure("[[aurora]]"), Auto::Set(-6.9));
+    assert_eq!(exposure("[[aurora]]\nflux_mw_per_m2 = 3"), Auto::Set(-6.9));
+    for text in ["[[aurora]]\nshapes = [{ sheets = [{ form = \"fold\" }] }]", "[[aurora]]\n[[aurora]]\nextent_km = 200"]
+    {
+        assert_eq!((exposure(text), read(text).implied), (Auto::Auto, NIGHT), "{text}");
+    }
 }
 
 #[test]

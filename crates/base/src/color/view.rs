@@ -91,7 +91,7 @@ impl View {
     #[must_use]
     pub fn to_display(&self, acescg: [f32; 3]) -> [f32; 3] {
         match (&self.tone, &self.balance) {
-            (Some(tone), Some(balance)) => shown(tone, balance.apply(acescg)),
+            (Some(tone), Some(balance)) => shown(tone, balanced(balance, acescg)),
             (Some(tone), None) => shown(tone, acescg),
             (None, _) => clamped(acescg),
         }
@@ -133,6 +133,7 @@ impl View {
     /// display light and the color is `rgb / A`, encoded; with [`AlphaConvention::Encoded`] a blend of encoded values over black gives
     /// the opaque codes, and one over mid-gray is nearest to the truth. `raw` encodes nothing and is always linear.
     /// Black is code 0 and display white the largest code; 8 bits are dithered, except that values which are 8-bit codes stay so.
+    /// What is below 0 or not a number counts as 0, in alpha too; what is infinite, as the brightest light.
     /// The shorter of `pixels` and `out` decides how many are written. Same bytes at every `level`.
     pub fn display_row<C: DisplayCode>(
         &self,
@@ -148,7 +149,7 @@ impl View {
         for ((part, out), first) in pixels.chunks(BALANCED).zip(out.chunks_mut(BALANCED)).zip((0..).step_by(BALANCED)) {
             let shown = &mut buffer[..part.len()];
             for (shown, [r, g, b, alpha]) in shown.iter_mut().zip(part) {
-                let [r, g, b] = balance.apply([*r, *g, *b]);
+                let [r, g, b] = balanced(balance, [*r, *g, *b]);
                 *shown = [r, g, b, *alpha];
             }
             self.row(level, shown, [x0.wrapping_add(first), y], alpha, out);
@@ -171,6 +172,13 @@ impl View {
             None => dispatch!(level, _simd => row::raw::<C>(pixels, place, alpha, out)),
         }
     }
+}
+
+/// Light under a white balance. What the matrix would turn into no number at all, such as infinite light in all three components, is brought
+/// within bounds before.
+#[inline(always)]
+fn balanced(balance: &WhiteBalance, [r, g, b]: [f32; 3]) -> [f32; 3] {
+    balance.apply([sanitised(r), sanitised(g), sanitised(b)])
 }
 
 /// Exposed ACEScg to linear display sRGB under a tone curve.
@@ -338,6 +346,28 @@ mod tests {
         let mut out = [[0_u16; 4]];
         View::RAW.display_row(Level::new(), &[[0.5, 0.25, 0.0, 1.0]], 0, 0, None, &mut out);
         assert_eq!(out, [[32_768, 16_384, 0, 65_535]]);
+    }
+
+    #[test]
+    fn infinite_light_is_white_and_what_is_no_number_is_nothing_under_any_white_balance() {
+        let huge = [f32::INFINITY, f32::MAX, 1e38, 1e9];
+        let row: Vec<[f32; 4]> = huge.iter().map(|&light| [light, light, light, 1.0]).collect();
+        for kelvin in [None, Some(1500.0), Some(4000.0), Some(6504.0), Some(20_000.0)] {
+            for view in [View::DISPLAY, View::STANDARD].map(|view| view.balanced(kelvin)) {
+                let name = view.name();
+                for light in huge {
+                    let shown = view.to_display([light; 3]);
+                    assert!(shown.iter().all(|value| *value > 0.999_99), "{name} {kelvin:?} {light}: {shown:?}");
+                }
+                let mut codes = vec![[0_u16; 4]; row.len()];
+                view.display_row(Level::new(), &row, 0, 0, Some(AlphaConvention::Linear), &mut codes);
+                assert_eq!(codes, vec![[u16::MAX; 4]; row.len()], "{name} {kelvin:?}");
+                assert_eq!(view.to_display([f32::NAN; 3]), [0.0; 3], "{name} {kelvin:?}");
+                // A component that is no number is missing, and no more than that.
+                let green = view.to_display([f32::NAN, 0.5, f32::NAN]);
+                assert_eq!(green, view.to_display([0.0, 0.5, 0.0]), "{name} {kelvin:?}");
+            }
+        }
     }
 
     #[test]

@@ -11,13 +11,29 @@ pub(crate) fn reduced([frames, seconds]: [u32; 2]) -> Option<[u32; 2]> {
     (frames > 0 && seconds > 0).then(|| [frames / common, seconds / common])
 }
 
-/// Length of a frame for APNG, seconds as a fraction of 16-bit numbers. Rates whose fraction is longer lose their last
-/// bits, less than 1 part in 30,000.
+/// The rate nearest to `fps` among the convergents of its continued fraction whose numbers are `most` at the most: `fps` itself in lowest terms
+/// where they are, else less than 1 part in `most` away. `None` for a rate that is zero, without end, or beyond what such numbers hold.
+pub(crate) fn within(fps: [u32; 2], most: u32) -> Option<[u32; 2]> {
+    let [mut rest, mut divisor] = reduced(fps)?.map(u64::from);
+    let (mut before, mut found) = ([0_u64, 1], [1_u64, 0]);
+    while divisor > 0 {
+        let whole = rest / divisor;
+        let next = [0, 1].map(|part| whole * found[part] + before[part]);
+        if next.iter().any(|part| *part > u64::from(most)) {
+            break;
+        }
+        (before, found) = (found, next);
+        (rest, divisor) = (divisor, rest % divisor);
+    }
+    let [frames, seconds] = found.map(|part| u32::try_from(part).unwrap_or(most));
+    (frames > 0 && seconds > 0).then_some([frames, seconds])
+}
+
+/// Length of a frame for APNG, seconds as a fraction of 16-bit numbers. Rates whose fraction is longer become the nearest that fits, less than
+/// 1 part in 65,535 away.
 pub(crate) fn apng_delay(fps: [u32; 2]) -> Option<[u16; 2]> {
-    let [frames, seconds] = reduced(fps)?;
-    let excess = (32 - frames.max(seconds).leading_zeros()).saturating_sub(16);
-    let [frames, seconds] = [frames >> excess, seconds >> excess].map(|part| part as u16);
-    (frames > 0 && seconds > 0).then_some([seconds, frames])
+    let [frames, seconds] = within(fps, u32::from(u16::MAX))?;
+    Some([u16::try_from(seconds).ok()?, u16::try_from(frames).ok()?])
 }
 
 /// Shortest length of a GIF frame that programs show as it is, in hundredths of a second; shorter ones they slow down.
@@ -103,10 +119,28 @@ mod tests {
         assert_eq!(apng_delay([24000, 1001]), Some([1001, 24000]));
         assert_eq!(apng_delay([60000, 2000]), Some([1, 30]));
         let [seconds, frames] = apng_delay([2_997_003, 100_000]).unwrap().map(f64::from);
-        assert!((frames / seconds / 29.97003 - 1.0).abs() < 1e-3);
+        assert!((frames / seconds / 29.97003 - 1.0).abs() < 1.0 / 65_535.0);
         assert_eq!(apng_delay([0, 1]), None);
         assert_eq!(apng_delay([1, 0]), None);
         assert_eq!(apng_delay([1, 100_000]), None);
+    }
+
+    #[test]
+    fn rates_whose_fraction_does_not_fit_become_the_nearest_that_does() {
+        let rates = [[999_999, 1000], [700_001, 1000], [333_333, 1000], [100_001, 1_000_000], [u32::MAX, 4_294_968]];
+        let more = (1..4000_u32).map(|i| [i.wrapping_mul(0x9E37_79B9) % 1_000_000 + 1000, 1000 + i * 77]);
+        for fps in rates.into_iter().chain(more) {
+            let exact = f64::from(fps[0]) / f64::from(fps[1]);
+            let rate = |[frames, seconds]: [u32; 2]| f64::from(frames) / f64::from(seconds);
+            let [seconds, frames] = apng_delay(fps).unwrap().map(u32::from);
+            let error = (rate([frames, seconds]) / exact - 1.0).abs();
+            assert!(error < 1.0 / 65_535.0, "{fps:?}: {frames}/{seconds}, wrong by {error}");
+            let signed = within(fps, i32::MAX as u32).unwrap();
+            assert!((rate(signed) / exact - 1.0).abs() < 1.0 / 2_147_483_647.0, "{fps:?}: {signed:?}");
+        }
+        assert_eq!(within([60_000, 2000], u32::MAX), Some([30, 1]));
+        assert_eq!(within([u32::MAX, u32::MAX - 1], u32::MAX), Some([u32::MAX, u32::MAX - 1]));
+        assert_eq!((within([1, 100_000], 65_535), within([100_000, 1], 65_535)), (None, None));
     }
 
     #[test]

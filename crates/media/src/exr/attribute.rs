@@ -3,7 +3,7 @@
 use super::{
     KEY_COLOR_SPACE, KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_FISHEYE_FOV, KEY_LENS, KEY_VERSION, plane::Plane,
 };
-use crate::stamp;
+use crate::{animation::timing, stamp};
 use bansho_base::{
     color::white_balance::chromaticity,
     image::{CameraHeader, FrameHeader, Precision},
@@ -32,6 +32,12 @@ pub(crate) struct Window {
 /// A header being written.
 pub(crate) struct HeaderBytes(Vec<u8>);
 
+/// A frame rate as the format holds it: its numerator has a sign.
+fn rational(fps: [u32; 2]) -> [u32; 2] {
+    const MOST: u32 = i32::MAX.cast_unsigned();
+    if fps[0] <= MOST { fps } else { timing::within(fps, MOST).unwrap_or(fps) }
+}
+
 /// The header of a frame and where in it the 64 digits of the digest go, which are zeros here.
 ///
 /// No attribute depends on time, host or path, and their order is fixed.
@@ -49,8 +55,7 @@ pub(crate) fn header(frame: &FrameHeader, planes: &[Plane<'_>], data: Window, di
     bytes.attribute(KEY_COLOR_SPACE, "string", COLOR_SPACE.as_bytes());
     let white = frame.white_balance_k.map(|kelvin| chromaticity(f64::from(kelvin)).map(|value| value as f32));
     bytes.floats("adoptedNeutral", "v2f", &white.unwrap_or(AP1[3]));
-    let [frames, seconds] = frame.fps;
-    let rational = [frames.min(i32::MAX as u32), seconds].map(u32::to_le_bytes);
+    let rational = rational(frame.fps).map(u32::to_le_bytes);
     bytes.attribute("framesPerSecond", "rational", rational.as_flattened());
     let number = frame.number.clamp(i32::MIN.into(), i32::MAX.into()) as i32;
     bytes.attribute("imageCounter", "int", &number.to_le_bytes());
@@ -126,4 +131,21 @@ fn channel_list(planes: &[Plane<'_>]) -> Vec<u8> {
     }
     list.push(0);
     list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_beyond_a_signed_number_keep_their_value() {
+        for fps in [[30, 1], [29_970, 1000], [i32::MAX.cast_unsigned(), 7]] {
+            assert_eq!(rational(fps), fps);
+        }
+        for fps in [[u32::MAX, 4_294_968], [4_000_000_000, 3_999_999_999], [3_000_000_001, 100_000_000]] {
+            let rate = |[frames, seconds]: [u32; 2]| f64::from(frames) / f64::from(seconds);
+            let kept = rational(fps);
+            assert!(i32::try_from(kept[0]).is_ok() && (rate(kept) / rate(fps) - 1.0).abs() < 1e-9, "{fps:?}: {kept:?}");
+        }
+    }
 }

@@ -5,7 +5,7 @@ use std::{borrow::Cow, ops::Range};
 use bansho_base::image::{Frame, Precision};
 use half::slice::HalfFloatSliceExt;
 
-/// Greatest finite half: brighter pixels are written as this, since an infinity spoils every later blur.
+/// Greatest finite half: brighter pixels are written as this, since an infinity spoils every later blur, as does what is not a number.
 const HALF_MAX: f32 = 65504.0;
 
 /// Last parts of channel names that readers know as components of a layer. Blender drops channels that end in anything else.
@@ -79,13 +79,19 @@ impl Plane<'_> {
         match self.precision {
             Precision::Single => bytes.extend_from_slice(bytemuck::cast_slice(&row.floats)),
             Precision::Half => {
-                row.floats.iter_mut().for_each(|value| *value = value.clamp(-HALF_MAX, HALF_MAX));
+                row.floats.iter_mut().for_each(|value| *value = finite_half(*value));
                 row.halves.resize(row.floats.len(), half::f16::ZERO);
                 row.halves.convert_from_f32_slice(&row.floats);
                 bytes.extend(row.halves.iter().flat_map(|half| half.to_ne_bytes()));
             }
         }
     }
+}
+
+/// A color that half can hold, and that spoils nothing it is mixed with.
+#[inline(always)]
+fn finite_half(value: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value.clamp(-HALF_MAX, HALF_MAX) }
 }
 
 /// Room for one row while it is converted.

@@ -6,7 +6,8 @@
 //! - its camera, where the text states neither `camera.position` nor `camera.target`, nor where the phenomena are or how large;
 //! - its sky, where the text states neither a sky nor a light;
 //! - its ground and lights where the text states neither sky, ground nor light;
-//! - its exposure where all of its sky, ground and lights are the default.
+//! - its exposure where all of its sky, ground and lights are the default, and the text states neither where the phenomena are nor how large:
+//!   what is drawn elsewhere may be fainter or brighter than what the setting is exposed for.
 //!
 //! None of it holds with a plate or an obstacle, which say themselves where the camera stands and what is behind. Whatever the phenomena,
 //! a night is balanced as a camera is set at night.
@@ -73,10 +74,10 @@ fn imply_setting(completed: &mut Table, root: &Table, kind: &PhenomenonKind) -> 
             completed.push(key, value.clone());
         }
     }
-    if let Some(exposure) = value_in(&setting, "picture", "exposure_ev100").filter(|_| implied == whole) {
-        imply(completed, "picture", "exposure_ev100", exposure.clone());
-    }
     if !is_placed(root, kind) {
+        if let Some(exposure) = value_in(&setting, "picture", "exposure_ev100").filter(|_| implied == whole) {
+            imply(completed, "picture", "exposure_ev100", exposure.clone());
+        }
         imply_camera(completed, root, &setting);
     }
     implied
