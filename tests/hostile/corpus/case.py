@@ -30,7 +30,7 @@ class Case:
     # A regular expression that the first line of every error must match.
     says: str = ""
     files: Mapping[str, Content] = field(default_factory=dict)
-    # How many errors there must be where the exit code is not 0; from 101 faults on 100 are spelled out, and the others counted.
+    # How many errors there must be where the exit code is not 0: any number where it is below 0; from 101 on 100, and how many more.
     errors: int = 1
     # Further regular expressions, each of which must match somewhere in stderr.
     places: Sequence[str] = ()
