@@ -1,0 +1,13 @@
+//! Drawings as SVG: any text is refused, or is strokes whose every point is finite.
+#![no_main]
+
+use bansho_media::drawings::decode_drawing;
+
+libfuzzer_sys::fuzz_target!(|text: &str| {
+    if let Ok(drawing) = decode_drawing(text) {
+        assert!(!drawing.strokes.is_empty());
+        assert!(drawing.low.is_finite() && drawing.high.is_finite());
+        let points = || drawing.strokes.iter().flat_map(|stroke| &stroke.points);
+        assert!(points().all(|point| point.is_finite()) && points().count() <= 1_000_000);
+    }
+});

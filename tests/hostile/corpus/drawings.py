@@ -1,0 +1,90 @@
+"""Drawings: SVG files that are broken, huge or clever."""
+
+from .case import Case, Content, lines, parts
+
+SCENE = 'bansho = 1\n[picture]\nsize = [32, 24]\nframes = 2\n[[aurora]]\n[[aurora.shapes]]\n[[aurora.shapes.sheets]]\npath = "drawing.svg"\n'
+MEGA = 1_000_000
+LINE = '<path d="M1 5L9 5"/>'
+
+
+def _drawing(name: str, content: Content, code: int | tuple[int, ...] = 3, words: str = "", **more) -> Case:
+    # What only shows once the strokes are laid out is told at the sheet, or at the list of them.
+    says = rf"^error: scene\.toml:(8:8: aurora\.0\.shapes\.0\.sheets\.0\.path .*drawing\.svg.*({words})|7:\d+: aurora\.0\.shapes\.0\.sheets.*allowed|7:\d+: aurora\.0\.shapes\.0\.sheets.*crosses itself)"
+    return Case("svg", name, ["check", "scene.toml"], code, says, {"scene.toml": SCENE, "drawing.svg": content}, **more)
+
+
+def _svg(inner: str) -> str:
+    return f'<svg viewBox="0 0 10 10">{inner}</svg>'
+
+
+def _path(name: str, path: str, code: int | tuple[int, ...] = 3, words: str = "", **more) -> Case:
+    return _drawing(name, _svg(f'<path id="a" d="{path}"/>'), code, words, **more)
+
+
+def _laughs() -> str:
+    """A billion laughs: ten entities, each ten of the one before."""
+    entities = '<!ENTITY l0 "M1 5L9 5">' + "".join(f'<!ENTITY l{level} "{f"&l{level - 1};" * 10}">' for level in range(1, 10))
+    return f'<?xml version="1.0"?><!DOCTYPE svg [{entities}]>' + _svg('<path d="&l9;"/>')
+
+
+def cases() -> list[Case]:
+    head, tail = _svg("|").split("|")
+    external = '<!DOCTYPE svg [<!ENTITY x SYSTEM "file:///etc/passwd">]>'
+    return [
+        _drawing("whole", _svg(LINE), 0),
+        _drawing("empty", "", words="no SVG"),
+        _drawing("text", "no drawing", words="no SVG"),
+        _drawing("HTML", "<html><body/></html>", words="no SVG"),
+        _drawing("no strokes", _svg(""), words="no strokes"),
+        _drawing("only what is no stroke", _svg('<rect/><use href="#a"/><text>a</text>'), words="only rect, use, text"),
+        _drawing("no UTF-8", b"<svg>\xff\xfe</svg>", words="UTF-8"),
+        _drawing("UTF-16", _svg(LINE).encode("utf-16"), words="UTF-8"),
+        _drawing("NUL", _svg(LINE).replace("svg", "s\0vg"), words=""),
+        _drawing("a billion laughs", _laughs(), words="path|laughs|numbers"),
+        _drawing("an external entity", external + _svg('<path d="&x;"/>'), words="path"),
+        _drawing("an external entity beside a stroke", external + _svg("<text>&x;</text>" + LINE), 0),
+        _drawing("an external style sheet", '<?xml-stylesheet href="file:///dev/zero"?>' + _svg(f'<image href="/dev/zero"/>{LINE}'), 0),
+        _drawing("an unclosed tag", "<svg><path d='M0 0L1 1'", words="does not end"),
+        _drawing("an unclosed comment", "<svg><!-- ", words="does not end"),
+        _drawing("an unclosed declaration", "<!DOCTYPE svg [ <!ENTITY", words="does not end"),
+        _drawing("an unclosed attribute", "<svg><path d='M0 0", words="does not end"),
+        _drawing("an attribute without quotes", "<svg a=1/>", words="quotes"),
+        _drawing("tags that close what is not open", "</svg>" * 1000 + _svg(LINE), (0, 3)),
+        _drawing("1,000,000 tags that close nothing", parts(("</svg>", MEGA), (_svg(LINE), 1)), (0, 3), signalled=True, large=True),
+        _drawing("groups 100,000 deep", parts((head, 1), ("<g>", 100_000), (LINE, 1), ("</g>", 100_000), (tail, 1)), (0, 3), signalled=True),
+        _drawing("transforms 100,000 deep", parts((head, 1), ('<g transform="rotate(1) scale(1)">', 100_000), (LINE, 1), ("</g>", 100_000), (tail, 1)), (0, 3), signalled=True),
+        _drawing("transforms that grow without end", parts((head, 1), ('<g transform="scale(10)">', 1000), (LINE, 1), ("</g>", 1000), (tail, 1)), words="infinitely far|transform"),
+        _drawing("transforms that shrink to nothing", parts((head, 1), ('<g transform="scale(0.1)">', 1000), (LINE, 1), ("</g>", 1000), (tail, 1)), (0, 3)),
+        _drawing("a transform of 100,000 parts", _svg(f'<path transform="{"rotate(1) " * 100_000}" d="M1 5L9 5"/>'), (0, 3)),
+        _drawing("a transform of nothing known", _svg('<g transform="turn(3)"/>'), words="transform"),
+        _drawing("a transform that does not end", _svg('<g transform="scale(3"/>'), words="transform"),
+        _drawing("a view box of nothing", f'<svg viewBox="0 0 0 0">{LINE}</svg>', words="viewBox"),
+        _drawing("a view box of huge numbers", f'<svg viewBox="-1e308 -1e308 1e308 1e308">{LINE}</svg>', (0, 3)),
+        _drawing("a view box of denormal numbers", f'<svg viewBox="0 0 5e-324 5e-324">{LINE}</svg>', (0, 3)),
+        _path("no path", "hello world", words="path"),
+        _path("a path that begins with a line", "L9 5", words="path"),
+        _path("a path that lacks numbers", "M1 5L9", words="lacks numbers"),
+        _path("a path of huge numbers", "M1e308 1e308L-1e308 -1e308", (0, 3)),
+        _path("a path of infinite numbers", "M1e999 0L1 1", words="path"),
+        _path("a path of not-a-numbers", "MNaN NaN L1 1", words="path"),
+        _path("a path of denormal numbers", "M5e-324 5e-324L-5e-324 0", (0, 3)),
+        _path("a path of one place", "M5 5L5 5L5 5", (0, 3)),
+        _path("relative lines that go ever farther", "M0 0" + "l1e307 0" * 50, (0, 3), "infinitely far"),
+        _path("an arc without a radius", "M1 5A0 0 0 0 1 9 5", (0, 3)),
+        _path("an arc of huge radius", "M1 5A1e308 1e308 0 1 1 9 5", (0, 3)),
+        _path("flags that are none", "M1 5A1 1 0 7 7 9 5", words="path"),
+        _path("a number of 100,000 digits", "M1 5L" + "9" * 100_000 + " 5", words="path"),
+        _path("100,000 spaces", "M1 5L9" + " " * 100_000 + "5", 0),
+        _path("100,000 closes", "M1 5L9 5" + "Z" * 100_000, (0, 3)),
+        _drawing("1,000,000 segments", lines(MEGA // 2, lambda index: f"L{index % 97} {index % 89}", head + '<path d="M1 5', '"/>' + tail), (0, 3), "points", signalled=True, large=True),
+        _drawing("3,000,000 segments", parts((head + '<path d="M1 5', 1), ("l1 0", 3 * MEGA), ('"/>' + tail, 1)), 3, "points", signalled=True, large=True),
+        _drawing("1,000,000 curves", parts((head + '<path d="M1 5', 1), ("c1 1 2 2 3 0", MEGA), ('"/>' + tail, 1)), 3, "points", signalled=True, large=True),
+        _drawing("100,000 strokes", parts((head, 1), (LINE, 100_000), (tail, 1)), (0, 3), signalled=True),
+        _drawing("100,000 attributes", parts((head + "<path ", 1), ("a='1' ", 100_000), ("d='M1 5L9 5'/>" + tail, 1)), 0),
+        _drawing("10,000 bracketed declarations", parts(("<!DOCTYPE svg [ ] >", 10_000), (_svg(LINE), 1)), (0, 3)),
+        _drawing("1,000,000 declarations without brackets", parts(("<!a>", MEGA), (_svg(LINE), 1)), (0, 3), signalled=True, large=True),
+        _drawing("15 MB of text", parts((head, 1), ("a" * 1000, 15_000), (LINE + tail, 1)), 0, signalled=True, large=True),
+        _drawing("an id of a megabyte", _svg(f'<path id="{"a" * MEGA}" d="L"/>'), words="path"),
+        Case("svg", "an id that is not there", ["check", "scene.toml"], 3, r"^error: scene\.toml:9:10: aurora\.0\.shapes\.0\.sheets\.0\.stroke .*no stroke of the id `gone`",
+             {"scene.toml": SCENE + 'stroke = "gone"\n', "drawing.svg": _svg(LINE)}),
+    ]
