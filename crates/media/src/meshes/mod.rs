@@ -5,6 +5,7 @@
 
 mod accessor;
 mod base64;
+mod beside;
 mod buffers;
 mod glb;
 mod json;
@@ -18,6 +19,7 @@ use bansho_base::{
     mesh::{MOST_CORNERS, MOST_TRIANGLES, Mesh, MeshError},
 };
 
+pub use self::beside::files_beside;
 use self::{accessor::Accessor, buffers::Buffers, glb::Glb, json::Object, nodes::Shown};
 
 fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
