@@ -2,7 +2,10 @@
 
 use std::io;
 
-use bansho::job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksFault};
+use bansho::{
+    job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksFault},
+    media::MediaError,
+};
 
 /// An error as the user of the program reads it.
 pub(crate) fn error(error: &JobError) -> String {
@@ -11,6 +14,10 @@ pub(crate) fn error(error: &JobError) -> String {
         JobError::Unreadable { path, source, near: None } if source.kind() == io::ErrorKind::NotFound => {
             format!("{error}; `bansho new {}` writes a new scene", path.display())
         }
+        JobError::Conflict(Conflict::Unmarked { .. }) | JobError::Media(MediaError::Unmarked { .. }) => {
+            format!("{error}, or --overwrite to replace what is there")
+        }
+        JobError::FramesLost { .. } => format!("{error}; --frames asks for them again"),
         JobError::Cancelled => format!("{error}, and --resume goes on from there"),
         JobError::ParticlesCancelled => format!("{error}, and --frames asks for the others"),
         _ => after(of_error(error), &error.to_string()),

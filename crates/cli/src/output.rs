@@ -5,7 +5,12 @@ use std::io::{self, Write};
 /// Writes `text` to stdout. A reader that has seen enough (`bansho schema | head`) is no error.
 pub(crate) fn to_stdout(text: &str) -> io::Result<()> {
     let mut stdout = io::stdout().lock();
-    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+    heard(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
+}
+
+/// What writing to stdout came to: nobody is missed who stopped to read.
+pub(crate) fn heard(written: io::Result<()>) -> io::Result<()> {
+    match written {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         Err(error) => Err(io::Error::new(error.kind(), format!("standard output: {error}"))),
         Ok(()) => Ok(()),

@@ -8,7 +8,10 @@ use bansho::{
 };
 use clap::Args;
 
-use super::{values, work::WorkArgs};
+use super::{
+    values,
+    work::{OverwriteArgs, WorkArgs},
+};
 
 /// The sheets that are wanted.
 #[derive(Args, Debug)]
@@ -63,6 +66,8 @@ pub(crate) struct FlipbookArgs {
     #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
     backend: BackendChoice,
     #[command(flatten)]
+    output: OverwriteArgs,
+    #[command(flatten)]
     pub(crate) work: WorkArgs,
 }
 
@@ -81,6 +86,7 @@ impl FlipbookArgs {
             bits: self.bits,
             alpha: self.alpha,
             out: self.out.clone(),
+            overwrite: self.output.overwrite,
             backend: self.backend,
             ..Flipbook::new(scene, self.grid)
         })

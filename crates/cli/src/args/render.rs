@@ -10,7 +10,7 @@ use clap::Args;
 
 use super::{
     values::{self, Frames},
-    work::{StateArgs, WorkArgs},
+    work::{OverwriteArgs, StateArgs, WorkArgs},
 };
 
 /// What to draw, how, and where it goes.
@@ -109,6 +109,8 @@ pub(crate) struct RenderArgs {
     #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
     backend: BackendChoice,
     #[command(flatten)]
+    output: OverwriteArgs,
+    #[command(flatten)]
     pub(crate) work: WorkArgs,
 }
 
@@ -135,6 +137,7 @@ impl RenderArgs {
             contact_sheet: self.contact_sheet,
             contact_background: self.contact_background,
             resume: self.resume,
+            overwrite: self.output.overwrite,
             snapshots: self.states.snapshots.clone(),
             snapshot_every: self.states.snapshot_every,
             backend: self.backend,

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::{
     values::{self, Frames},
-    work::{StateArgs, WorkArgs},
+    work::{OverwriteArgs, StateArgs, WorkArgs},
 };
 
 /// What to simulate, and where its particles go.
@@ -41,6 +41,8 @@ pub(crate) struct SimulateArgs {
     #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
     backend: BackendChoice,
     #[command(flatten)]
+    output: OverwriteArgs,
+    #[command(flatten)]
     pub(crate) work: WorkArgs,
 }
 
@@ -54,6 +56,7 @@ impl SimulateArgs {
             seed: self.seed,
             snapshots: self.states.snapshots.clone(),
             snapshot_every: self.states.snapshot_every,
+            overwrite: self.output.overwrite,
             backend: self.backend,
             ..Simulate::new(scene, self.particles.clone())
         })

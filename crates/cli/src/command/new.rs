@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use bansho::{
     KINDS,
     base::parameters::nearest,
-    media::atomic,
+    media::{MediaError, atomic},
     render::scene::{PhenomenonKind, template},
 };
 
@@ -87,9 +87,9 @@ fn with_extension(name: &Path) -> PathBuf {
 /// Writes the pictures that an example names; those that are there already stay as they are.
 fn copy_assets(example: &Example, folder: &Path) -> anyhow::Result<()> {
     for asset in example.assets {
-        let path = folder.join(asset.path);
-        if !path.exists() {
-            atomic::write_bytes(&path, asset.bytes)?;
+        match atomic::write_new(&folder.join(asset.path), asset.bytes) {
+            Err(MediaError::IsThere { .. }) => {}
+            written => written?,
         }
     }
     Ok(())

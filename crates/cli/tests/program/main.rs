@@ -4,12 +4,14 @@ mod alpha;
 mod aurora;
 mod bad_input;
 mod commands;
+mod completeness;
 mod disk;
 mod figures;
 mod flipbook;
 mod interruptions;
 #[cfg(target_os = "linux")]
 mod memory;
+mod overwriting;
 mod particles;
 mod pictures;
 mod rain;
