@@ -10,7 +10,7 @@ use bansho::{
 use crate::{
     command::{new::Unknown, studio::SaidWhy},
     flags, interrupt,
-    output::to_stderr,
+    output::{self, to_stderr},
 };
 
 /// Failed on the way.
@@ -51,7 +51,7 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
 fn tell(error: &anyhow::Error) {
     match error.downcast_ref::<JobError>() {
         Some(job) => tell_job(job),
-        None => to_stderr(&format!("error: {error:#}")),
+        None => output::tell("error", &format!("{error:#}")),
     }
 }
 
@@ -60,9 +60,9 @@ pub(crate) fn tell_job(error: &JobError) {
     match error.scene() {
         Some(scene) => {
             faults(scene).for_each(|fault| to_stderr(&format!("error: {fault}")));
-            flags::for_scene(scene).iter().for_each(|flag| to_stderr(&format!("hint: {flag}")));
+            flags::for_scene(scene).iter().for_each(|flag| output::tell("hint", flag));
         }
-        None => to_stderr(&format!("error: {}", flags::error(error))),
+        None => output::tell("error", &flags::error(error)),
     }
 }
 

@@ -2,14 +2,14 @@
 
 use std::{error::Error, io};
 
-use bansho::job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksFault};
 use bansho::{
     SceneError,
     base::{
         assets::{AssetError, AssetProblem},
         parameters::{Problem, ProblemKind},
     },
-    media::{input::InputError, plates::limits::TEXT_BYTES},
+    job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksFault},
+    media::{MediaError, input::InputError, plates::limits::TEXT_BYTES},
 };
 
 /// An error as the user of the program reads it.
@@ -21,6 +21,10 @@ pub(crate) fn error(error: &JobError) -> String {
         {
             format!("{error}; `bansho new {}` writes a new scene", path.display())
         }
+        JobError::Conflict(Conflict::Unmarked { .. }) | JobError::Media(MediaError::Unmarked { .. }) => {
+            format!("{error}, or --overwrite to replace what is there")
+        }
+        JobError::FramesLost { .. } => format!("{error}; --frames asks for them again"),
         JobError::Cancelled => format!("{error}, and --resume goes on from there"),
         JobError::ParticlesCancelled => format!("{error}, and --frames asks for the others"),
         _ => after(of_error(error), &error.to_string()),

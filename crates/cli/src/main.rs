@@ -10,7 +10,10 @@ mod output;
 mod progress;
 mod stats;
 
-use std::process::ExitCode;
+use std::{
+    io::{self, Write},
+    process::ExitCode,
+};
 
 use clap::Parser;
 
@@ -20,9 +23,13 @@ fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            // Help and version are no errors, and go to stdout. Nobody is left to be told that this failed.
-            let _ = error.print();
-            return ExitCode::from(error.exit_code().clamp(0, 255) as u8);
+            // Help and version are no errors, and go to stdout.
+            let told = output::heard(error.print().and_then(|()| io::stdout().flush()));
+            return match told {
+                Err(failed) if error.exit_code() == 0 => exit::report(&failed.into()),
+                // An error that cannot be written to stderr is told by the exit code alone.
+                _ => ExitCode::from(error.exit_code().clamp(0, 255) as u8),
+            };
         }
     };
     match interrupt::listen().map_err(anyhow::Error::from).and_then(|()| run(&cli.command)) {

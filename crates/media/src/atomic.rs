@@ -13,6 +13,7 @@ use tempfile::NamedTempFile;
 
 use crate::{
     error::MediaError,
+    overwriting::{Kept, OverwritePolicy},
     unfinished::{self, Listed},
 };
 
@@ -25,6 +26,7 @@ pub struct AtomicFile {
     path: PathBuf,
     /// What `path` means, where it is a link.
     target: PathBuf,
+    policy: OverwritePolicy,
 }
 
 impl AtomicFile {
@@ -33,7 +35,21 @@ impl AtomicFile {
     /// # Errors
     /// The folder cannot be made or written, the disk is full, or `path` is a folder, a device or a pipe.
     pub fn create(path: &Path) -> Result<Self, MediaError> {
+        Self::create_with(path, &OverwritePolicy::any())
+    }
+
+    /// As [`AtomicFile::create`], for a file that takes no other's place than `policy` allows, now and when it is finished.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::create`], or `path` leads to a file that must stay.
+    pub fn create_with(path: &Path, policy: &OverwritePolicy) -> Result<Self, MediaError> {
         let fail = |source| MediaError::from_io(path, source);
+        // First, since only then it is certain where a path such as `missing/../a.png` leads.
+        fs::create_dir_all(folder_of(path)).map_err(|source| match source.kind() {
+            // `create_dir_all` says so when a file stands where a folder should be made.
+            io::ErrorKind::AlreadyExists => MediaError::NotAFolder { path: path.to_path_buf() },
+            _ => fail(source),
+        })?;
         match fs::metadata(path) {
             Ok(there) if there.is_dir() => return Err(MediaError::IsFolder { path: path.to_path_buf() }),
             // A rename would put a file in its place.
@@ -45,17 +61,9 @@ impl AtomicFile {
         } else {
             path.to_path_buf()
         };
-        let folder = match target.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        fs::create_dir_all(folder).map_err(|source| match source.kind() {
-            // `create_dir_all` says so when a file stands where a folder should be made.
-            io::ErrorKind::AlreadyExists => MediaError::NotAFolder { path: path.to_path_buf() },
-            _ => fail(source),
-        })?;
-        let (temporary, listed) = unfinished::list(|| temporary_in(folder, &target)).map_err(fail)?;
-        Ok(Self { temporary, _listed: listed, path: path.to_path_buf(), target })
+        allow(policy, &target, path)?;
+        let (temporary, listed) = unfinished::list(|| temporary_in(folder_of(&target), &target)).map_err(fail)?;
+        Ok(Self { temporary, _listed: listed, path: path.to_path_buf(), target, policy: policy.clone() })
     }
 
     /// The file to write to.
@@ -88,15 +96,29 @@ impl AtomicFile {
     /// Gives it its name, in place of any file that bore it, and who may read and write that one may do so with this.
     ///
     /// # Errors
-    /// It cannot be renamed; the temporary file is then removed.
+    /// It cannot be renamed, or a file that must stay came to bear the name; the temporary file is then removed.
     pub fn finish(self) -> Result<(), MediaError> {
         let path = self.path;
+        allow(&self.policy, &self.target, &path)?;
         let fail = |source| MediaError::from_io(&path, source);
         if let Ok(old) = fs::metadata(&self.target) {
             self.temporary.as_file().set_permissions(old.permissions()).map_err(fail)?;
         }
         self.temporary.persist(&self.target).map(drop).map_err(|error| fail(error.error))
     }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Whether `target`, which is called `path`, may be written over.
+fn allow(policy: &OverwritePolicy, target: &Path, path: &Path) -> Result<(), MediaError> {
+    let path = path.to_path_buf();
+    policy.check(target).map_err(|kept| match kept {
+        Kept::Input => MediaError::OverInput { path },
+        Kept::Unmarked => MediaError::Unmarked { path },
+    })
 }
 
 /// A new, empty, hidden file in `folder`. It is as readable as any other file of the user, since it becomes the picture.
@@ -128,7 +150,15 @@ pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Re
 /// # Errors
 /// As [`AtomicFile::create`], or the bytes cannot be written.
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), MediaError> {
-    let mut atomic = AtomicFile::create(path)?;
+    write_bytes_with(path, bytes, &OverwritePolicy::any())
+}
+
+/// As [`write_bytes`], in place of no other file than `policy` allows.
+///
+/// # Errors
+/// As [`AtomicFile::create_with`], or the bytes cannot be written.
+pub fn write_bytes_with(path: &Path, bytes: &[u8], policy: &OverwritePolicy) -> Result<(), MediaError> {
+    let mut atomic = AtomicFile::create_with(path, policy)?;
     atomic.file().write_all(bytes).map_err(|source| MediaError::from_io(path, source))?;
     atomic.finish()
 }
@@ -161,6 +191,51 @@ mod tests {
         assert!(matches!(late.finish_new(), Err(MediaError::IsThere { .. })));
         assert_eq!(fs::read(&path).unwrap(), b"first");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn no_link_that_is_made_on_the_way_leads_to_an_input() {
+        use std::os::unix::fs::symlink;
+
+        use crate::overwriting::InputFiles;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("plate.png"), "plate").unwrap();
+        let mut inputs = InputFiles::default();
+        inputs.insert(&at("plate.png"));
+        let policy = OverwritePolicy::new(inputs, true);
+        // Whether the folder that the path passes through is missing or there.
+        for _ in 0..2 {
+            let made = write_bytes_with(&at("x/../plate.png"), b"new", &policy);
+            assert!(matches!(made, Err(MediaError::OverInput { .. })));
+        }
+        symlink("plate.png", at("soft.png")).unwrap();
+        fs::hard_link(at("plate.png"), at("hard.png")).unwrap();
+        for name in ["soft.png", "hard.png"] {
+            let error = AtomicFile::create_with(&at(name), &policy).unwrap_err();
+            assert!(matches!(&error, MediaError::OverInput { path } if *path == at(name)), "{error}");
+        }
+        // The folder becomes a link while the file is written.
+        fs::create_dir(at("out")).unwrap();
+        let late = AtomicFile::create_with(&at("out/plate.png"), &policy).unwrap();
+        let temporary = late.temporary_path().to_path_buf();
+        fs::rename(&temporary, folder.path().join(temporary.file_name().unwrap())).unwrap();
+        fs::remove_dir(at("out")).unwrap();
+        symlink(".", at("out")).unwrap();
+        assert!(matches!(late.finish(), Err(MediaError::OverInput { .. })));
+        assert_eq!(fs::read(at("plate.png")).unwrap(), b"plate");
+    }
+
+    #[test]
+    fn a_file_without_our_mark_that_comes_on_the_way_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let late = AtomicFile::create_with(&path, &OverwritePolicy::default()).unwrap();
+        fs::write(&path, "a photograph").unwrap();
+        assert!(matches!(late.finish(), Err(MediaError::Unmarked { .. })));
+        assert!(matches!(write_bytes_with(&path, b"", &OverwritePolicy::default()), Err(MediaError::Unmarked { .. })));
+        assert_eq!((fs::read(&path).unwrap(), names(folder.path())), (b"a photograph".to_vec(), vec!["a.png".into()]));
     }
 
     #[cfg(unix)]

@@ -46,6 +46,18 @@ pub enum MediaError {
         /// The file.
         path: PathBuf,
     },
+    /// The work is made from the file that bears the name.
+    #[error("{path}: is a file that the scene is read from; allowed: any other name", path = .path.display())]
+    OverInput {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file that Bansho did not make bears the name.
+    #[error("{path}: is there and bears no mark of Bansho; allowed: another name", path = .path.display())]
+    Unmarked {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file stands where a folder should be made.
     #[error("{path}: a part of this path is a file, not a folder", path = .path.display())]
     NotAFolder {
@@ -162,7 +174,7 @@ pub enum MediaError {
         program: PathBuf,
     },
     /// `ffmpeg` gave up.
-    #[error("{path}: ffmpeg failed ({status}):\n{tail}", path = .path.display())]
+    #[error("{path}: ffmpeg failed ({status}): {}", .tail.replace('\n', "; "), path = .path.display())]
     FfmpegFailed {
         /// The film.
         path: PathBuf,

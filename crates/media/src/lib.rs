@@ -1,8 +1,8 @@
 //! Bansho's pictures in and out.
 //!
 //! - Out: [`naming`] says where frames go and as what, [`sequence::Sink`] takes them from any thread, [`atomic`] sees to it
-//!   that a file is whole or not there, [`resume`] finds those that need not be made again. [`png`], [`exr`] and [`video`]
-//!   are the formats, [`flatten`] and [`flipbook`] prepare pictures for them.
+//!   that a file is whole or not there, [`overwriting`] that it takes no other's place, [`resume`] finds those that need not be made
+//!   again. [`png`], [`exr`] and [`video`] are the formats, [`mark`] is what they all bear, [`flatten`] and [`flipbook`] prepare pictures for them.
 //! - In: [`plates::FileAssets`] gives a scene its plates, meshes and drawings, with limits that no hostile file can pass;
 //!   [`input`] reads the bytes of ordinary files alone.
 //!
@@ -16,11 +16,14 @@ mod error;
 pub mod exr;
 pub mod flatten;
 pub mod flipbook;
+pub mod identity;
 pub mod input;
 pub mod label;
+pub mod mark;
 pub mod meshes;
 pub mod naming;
 mod ordered;
+pub mod overwriting;
 pub mod plates;
 pub mod ply;
 pub mod png;

@@ -261,6 +261,12 @@ impl NumberedPath {
         self.template.digits.is_some()
     }
 
+    /// The name of all files, with a `#` for each digit of the frame number.
+    pub fn of_all(&self) -> PathBuf {
+        let FrameTemplate { before, digits, after } = &self.template;
+        self.folder.join(format!("{before}{}{after}", "#".repeat(digits.unwrap_or(0))))
+    }
+
     /// The file for frame `number`.
     pub fn path(&self, number: i64) -> PathBuf {
         self.folder.join(self.template.name(number))
@@ -301,6 +307,11 @@ impl OutputPattern {
     /// Whether the frame number stands in the name.
     pub fn is_numbered(&self) -> bool {
         self.numbered.is_numbered()
+    }
+
+    /// The name of all files, with a `#` for each digit of the frame number.
+    pub fn of_all(&self) -> PathBuf {
+        self.numbered.of_all()
     }
 
     /// The file for frame `number`; for a film the same file whatever the number.
@@ -366,6 +377,16 @@ mod tests {
         assert_eq!(name("#.png", 9, 12), "12.png");
         assert_eq!(name("f%d.png", 9, 5), "f5.png");
         assert_eq!(name("f.######.PNG", 1, 5), "f.000005.PNG");
+    }
+
+    #[test]
+    fn all_files_have_a_name_too() {
+        let all = |pattern: &str, frames| OutputPattern::parse(Path::new(pattern), frames).unwrap().of_all();
+        for (pattern, frames, expected) in
+            [("a/f.%03d.png", 9, "a/f.###.png"), ("f.exr", 2, "f.####.exr"), ("f.exr", 1, "f.exr")]
+        {
+            assert_eq!(all(pattern, frames), Path::new(expected));
+        }
     }
 
     #[test]

@@ -18,6 +18,7 @@ use crate::{
     exr,
     naming::{OutputKind, OutputPattern},
     ordered::Ordered,
+    overwriting::OverwritePolicy,
     png::{self, PngEffort},
     video::{self, VideoFilm, VideoFormat, VideoOptions},
 };
@@ -59,6 +60,8 @@ pub struct SinkOptions {
     pub video: VideoOptions,
     /// How many frames of a film may wait for an earlier one; at least 1.
     pub window: usize,
+    /// Which files that are there may be written over.
+    pub overwrite: OverwritePolicy,
 }
 
 impl SinkOptions {
@@ -75,6 +78,7 @@ impl SinkOptions {
             gif_transparent: false,
             video: VideoOptions::default(),
             window: 16,
+            overwrite: OverwritePolicy::default(),
         }
     }
 
@@ -132,7 +136,8 @@ impl Sink {
     /// Makes the folder, tries whether it can be written, and for a film begins it.
     ///
     /// # Errors
-    /// The place cannot be written, the disk is full, a size or frame rate the format cannot hold, no `ffmpeg`.
+    /// The place cannot be written, the disk is full, a film would take the place of a file that must stay, a size or frame rate the format
+    /// cannot hold, no `ffmpeg`.
     pub fn open(pattern: OutputPattern, options: SinkOptions) -> Result<Self, MediaError> {
         let path = pattern.path(0);
         let kind = pattern.kind();
@@ -140,20 +145,23 @@ impl Sink {
             check_film(&path, &options)?;
         }
         let ordered_end = (path.clone(), options.frame_count, options.window);
+        let overwrite = &options.overwrite;
         let target = match kind {
             OutputKind::Png | OutputKind::Exr => {
                 // Better to fail now than after the first frame has been rendered.
                 drop(AtomicFile::create(&path)?);
                 if kind == OutputKind::Png { Target::Png } else { Target::Exr }
             }
-            OutputKind::Apng => Target::Apng(ordered(ApngFilm::create(&path, apng_format(&options))?, ordered_end)),
+            OutputKind::Apng => {
+                Target::Apng(ordered(ApngFilm::create(&path, apng_format(&options), overwrite)?, ordered_end))
+            }
             OutputKind::Gif => {
                 let format = gif_format(&path, &options)?;
-                Target::Gif(ordered(GifFilm::create(&path, format.clone())?, ordered_end), format)
+                Target::Gif(ordered(GifFilm::create(&path, format.clone(), overwrite)?, ordered_end), format)
             }
             OutputKind::Mp4 | OutputKind::Mov | OutputKind::Webm => {
                 let format = video_format(kind, &options);
-                Target::Video(ordered(VideoFilm::create(&path, &format)?, ordered_end), format)
+                Target::Video(ordered(VideoFilm::create(&path, &format, overwrite)?, ordered_end), format)
             }
         };
         Ok(Self { pattern, options, target })
@@ -177,13 +185,17 @@ impl Sink {
     /// Takes a frame. A picture with alpha is laid over black where the format has none.
     ///
     /// # Errors
-    /// The frame cannot be written, is not of the kind or size that is wanted, or comes out of turn.
+    /// The frame cannot be written or would take the place of a file that must stay, is not of the kind or size that is wanted, or comes out
+    /// of turn.
     pub fn write(&self, slot: Slot, picture: Picture<'_>) -> Result<(), MediaError> {
         let path = self.path(slot.number);
         match (&self.target, picture) {
-            (Target::Exr, Picture::Linear(frame)) => atomic::write_bytes(&path, &exr::encode(frame, &path)?),
+            (Target::Exr, Picture::Linear(frame)) => {
+                atomic::write_bytes_with(&path, &exr::encode(frame, &path)?, &self.options.overwrite)
+            }
             (Target::Png, Picture::Display(image, fingerprint)) => {
-                atomic::write_bytes(&path, &png::encode(image, fingerprint, self.options.png_effort, &path)?)
+                let bytes = png::encode(image, fingerprint, self.options.png_effort, &path)?;
+                atomic::write_bytes_with(&path, &bytes, &self.options.overwrite)
             }
             (Target::Apng(film), Picture::Display(image, _)) => {
                 self.check_frame(image, &path)?;

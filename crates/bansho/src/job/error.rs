@@ -6,7 +6,7 @@ use bansho_base::{observer::Cancelled, plural::counted};
 use bansho_media::{MediaError, flipbook::TileError, input::InputError, naming::NamingError};
 use bansho_render::{PlanError, RenderError, SceneError, scene::edit::EditError};
 
-use super::streaks::StreaksFault;
+use super::{ranges::ranges, streaks::StreaksFault};
 
 /// Why a job cannot be done.
 #[derive(Debug, thiserror::Error)]
@@ -62,6 +62,24 @@ pub enum JobError {
     /// Writing failed.
     #[error(transparent)]
     Media(#[from] MediaError),
+    /// Frames that were finished, and were removed or changed before all were.
+    #[error(
+        "{files}: {} missing, or not as written; something removed or changed {} while the others were made",
+        is_or_are(frames), if frames.len() == 1 { "it" } else { "them" }, files = .files.display()
+    )]
+    FramesLost {
+        /// Their numbers, ascending.
+        frames: Vec<i64>,
+        /// Their name, with `#` for the number.
+        files: PathBuf,
+    },
+    /// Files that were finished, and were removed or changed before all were.
+    #[error("{}: missing, or not as written; something removed or changed {} while the others were made",
+        listed(files), if files.len() == 1 { "it" } else { "them" })]
+    FilesLost {
+        /// The files.
+        files: Vec<PathBuf>,
+    },
     /// Tiles that make no sheet.
     #[error(transparent)]
     Tiles(#[from] TileError),
@@ -147,6 +165,17 @@ pub enum Conflict {
         /// The output.
         path: PathBuf,
     },
+    /// An output that is there and that Bansho did not make.
+    #[error(
+        "{path}{} there already and without the mark of files that Bansho made; allowed: another name",
+        and_others(*.others), path = .path.display()
+    )]
+    Unmarked {
+        /// The first of them.
+        path: PathBuf,
+        /// How many others there are.
+        others: usize,
+    },
     /// A sheet of tiles in a format that is not for it.
     #[error("{path}: a sheet is one picture; allowed: {allowed}", path = .path.display())]
     Sheet {
@@ -204,6 +233,31 @@ pub enum Conflict {
     LoopLength(f64),
 }
 
+/// So many file names are listed, and the rest counted.
+const LISTED_FILES: usize = 8;
+
+fn listed(files: &[PathBuf]) -> String {
+    let names: Vec<String> = files.iter().take(LISTED_FILES).map(|file| file.display().to_string()).collect();
+    match files.len().saturating_sub(LISTED_FILES) {
+        0 => names.join(", "),
+        others => format!("{} and {}", names.join(", "), counted(others, "other")),
+    }
+}
+
+fn is_or_are(frames: &[i64]) -> String {
+    match frames {
+        [frame] => format!("frame {frame} is"),
+        _ => format!("frames {} are", ranges(frames)),
+    }
+}
+
+fn and_others(others: usize) -> String {
+    match others {
+        0 => ": is".to_owned(),
+        _ => format!(" and {}: are", counted(others, "other file")),
+    }
+}
+
 fn did_you_mean(near: &Option<PathBuf>) -> String {
     near.as_ref().map(|path| format!(", did you mean `{}`?", path.display())).unwrap_or_default()
 }
@@ -256,6 +310,7 @@ impl JobError {
             Self::ParticlesCancelled | Self::StreaksCancelled => Cause::Cancelled,
             Self::Media(MediaError::Naming(_)) => Cause::Usage,
             Self::Render(_) | Self::Media(_) | Self::Tiles(_) => Cause::Work,
+            Self::FramesLost { .. } | Self::FilesLost { .. } => Cause::Work,
         }
     }
 

@@ -6,7 +6,7 @@ use std::{
 };
 
 use bansho_base::image::{Figure, FigureSet, Frame};
-use bansho_media::{MediaError, atomic};
+use bansho_media::{MediaError, atomic, mark, overwriting::OverwritePolicy};
 use serde_json::{Map, Value, json};
 
 /// Key of the fingerprint of the picture that figures belong to.
@@ -20,9 +20,9 @@ pub(super) fn path(picture: &Path) -> PathBuf {
 /// Writes the figures of a frame beside `picture`, the whole file or none.
 ///
 /// # Errors
-/// The file cannot be written.
-pub(super) fn write(frame: &Frame, picture: &Path) -> Result<(), MediaError> {
-    atomic::write_bytes(&path(picture), format!("{:#}\n", describe(frame, picture)).as_bytes())
+/// The file cannot be written, or would take the place of one that must stay.
+pub(super) fn write(frame: &Frame, picture: &Path, overwrite: &OverwritePolicy) -> Result<(), MediaError> {
+    atomic::write_bytes_with(&path(picture), format!("{:#}\n", describe(frame, picture)).as_bytes(), overwrite)
 }
 
 /// Whether the figures of a picture of that fingerprint are there, whole.
@@ -40,6 +40,7 @@ fn describe(frame: &Frame, picture: &Path) -> Value {
     let [frames, seconds] = header.fps;
     json!({
         "format": 1,
+        "program": mark::PROGRAM,
         "picture": picture.file_name().unwrap_or_default().to_string_lossy(),
         "frame": header.number,
         "fps": f64::from(frames) / f64::from(seconds.max(1)),
@@ -74,7 +75,8 @@ mod tests {
         frame.figures = vec![FigureSet { phenomenon: "shower".to_owned(), figures }];
         let fingerprint = frame.header.fingerprint;
         assert!(!are_there(&picture, fingerprint));
-        write(&frame, &picture).unwrap();
+        write(&frame, &picture, &OverwritePolicy::default()).unwrap();
+        assert!(mark::is_marked(&path(&picture)));
         let value: Value = serde_json::from_slice(&fs::read(folder.path().join("rain.0007.json")).unwrap()).unwrap();
         assert_eq!(value["phenomena"]["shower"]["rate"], json!({ "value": 20.0, "unit": "mm/h" }));
         assert_eq!(value["phenomena"]["shower"]["visibility"]["value"], Value::Null);

@@ -8,14 +8,17 @@
 mod contact;
 mod error;
 mod figures;
+mod finished;
 mod flight;
 mod flipbook;
 mod inputs;
 mod memory;
 mod observer;
 mod output;
+mod overwriting;
 mod plates;
 mod prepare;
+mod ranges;
 mod resume;
 mod run;
 mod scene_file;
@@ -94,6 +97,8 @@ pub struct Job {
     pub contact_background: ContactBackground,
     /// Whether whole frames of this very job that are there already stay.
     pub resume: bool,
+    /// Whether files that Bansho did not make may be written over. What the scene is read from never is.
+    pub overwrite: bool,
     /// Folder of snapshots of what is simulated in steps.
     pub snapshots: Option<PathBuf>,
     /// Frames between snapshots; a second's worth when left out.
@@ -123,6 +128,7 @@ impl Job {
             contact_sheet: None,
             contact_background: ContactBackground::Black,
             resume: false,
+            overwrite: false,
             snapshots: None,
             snapshot_every: None,
             backend: BackendChoice::Auto,

@@ -2,7 +2,7 @@
 
 use std::{
     fs,
-    path::Path,
+    path::{Path, PathBuf},
     sync::atomic::{AtomicUsize, Ordering},
 };
 
@@ -14,6 +14,7 @@ use bansho_base::{
 use bansho_media::{
     MediaError,
     naming::{OutputKind, OutputPattern},
+    overwriting::OverwritePolicy,
     sequence::{Picture, Sink, SinkOptions, Slot, Wants},
 };
 use bansho_render::{
@@ -25,6 +26,7 @@ use bansho_render::{
 use super::{
     error::JobError,
     figures,
+    finished::Finished,
     observer::{FrameDone, JobObserver},
     shoot::Finish,
 };
@@ -39,6 +41,8 @@ pub(super) struct Format {
     pub(super) alpha: AlphaConvention,
     /// Whether figures are written beside each picture.
     pub(super) figures: bool,
+    /// Which files that are there may be written over.
+    pub(super) overwrite: OverwritePolicy,
 }
 
 impl Format {
@@ -50,6 +54,12 @@ impl Format {
         }
     }
 
+    /// A picture, and the figures beside it.
+    pub(super) fn files(&self, picture: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+        let figures = self.figures.then(|| figures::path(picture));
+        [Some(picture.to_path_buf()), figures].into_iter().flatten()
+    }
+
     /// Opens the files for `count` frames of `size` pixels; `window` of them may be under way at once.
     pub(super) fn open(&self, plan: &Plan, count: usize, size: [usize; 2], window: usize) -> Result<Sink, JobError> {
         let fps = plan.fps();
@@ -58,6 +68,7 @@ impl Format {
             alpha: self.alpha,
             sixteen_bits: self.bits == BitDepth::Sixteen,
             window,
+            overwrite: self.overwrite.clone(),
             ..SinkOptions::new(size, [fps.frames, fps.seconds], count)
         };
         Ok(Sink::open(self.pattern.clone(), options)?)
@@ -74,7 +85,7 @@ impl Format {
         frame.header.fingerprint = self.fingerprint(frame.header.fingerprint);
         if self.figures {
             // Before the picture, so that a picture that is there has its figures.
-            figures::write(frame, &sink.path(frame.header.number))?;
+            figures::write(frame, &sink.path(frame.header.number), &self.overwrite)?;
         }
         let slot = Slot { index, number: frame.header.number };
         let shown = match sink.wants() {
@@ -108,6 +119,7 @@ pub(super) struct ToFiles<'a> {
     pub(super) window: usize,
     pub(super) observer: &'a dyn JobObserver,
     pub(super) drawn: AtomicUsize,
+    pub(super) finished: &'a Finished,
 }
 
 impl Finish for ToFiles<'_> {
@@ -116,6 +128,7 @@ impl Finish for ToFiles<'_> {
         self.format.write(&self.sink, index, frame, observer)?;
         let drawn = self.drawn.fetch_add(1, Ordering::Relaxed) + 1;
         let path = self.sink.kind().is_sequence().then(|| self.sink.path(number));
+        path.iter().flat_map(|path| self.format.files(path)).for_each(|file| self.finished.note(file));
         self.observer.frame_done(&FrameDone { number, path, drawn });
         Ok(())
     }

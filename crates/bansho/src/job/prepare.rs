@@ -13,6 +13,7 @@ use bansho_base::{
 use bansho_media::{
     flipbook::Sheet,
     naming::{self, OutputKind, OutputPattern},
+    overwriting::OverwritePolicy,
     plates::FileAssets,
 };
 use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth};
@@ -25,7 +26,7 @@ use super::{
     memory::{self, Wanted},
     observer::{Note, Spot},
     output::{self, Format},
-    plates,
+    overwriting, plates,
     scene_file::SceneFile,
     sheet::{self, MOST_TILES},
     snapshots::{self, Snapshots},
@@ -131,14 +132,15 @@ impl Job {
         let files = if self.contact_sheet.is_some() { 1 } else { frames.len() };
         let pattern = OutputPattern::parse(&self.output_path(), files)?;
         output::check_writable(&pattern.path(frames[0]))?;
-        inputs::check_kept(&self.scene, &plan, &frames, self.outputs(&pattern, &frames))?;
+        let overwrite = OverwritePolicy::new(inputs::inputs(&self.scene, &plan, &frames), self.overwrite);
+        overwriting::check(&overwrite, self.outputs(&pattern, &frames))?;
         let tile = [plan.window().width, plan.window().height];
         let sheet = self.contact_sheet.map(|tiles| sheet::holding(tiles, tile, contact::GUTTER)).transpose()?;
         memory::check(&self.scene, &plan, self.wanted(kind, frames.len()))?;
-        let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan)?;
+        let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan, &overwrite)?;
         let mut prepared = PreparedJob {
             scene: self.scene.clone(),
-            format: Format { pattern, view: self.view, bits: self.bits, alpha, figures: self.figures },
+            format: Format { pattern, view: self.view, bits: self.bits, alpha, figures: self.figures, overwrite },
             resume: self.resume && kind.is_sequence() && sheet.is_none(),
             notes: Vec::new(),
             plan,
@@ -288,12 +290,24 @@ pub(super) fn chosen_frames(asked: Option<&[i64]>, plan: &Plan) -> Result<Vec<i6
 }
 
 /// Snapshots in `folder`, `every` so many frames; none where nothing in the plan has a state.
-pub(super) fn snapshots(folder: Option<&Path>, every: Option<u64>, plan: &Plan) -> Result<Snapshots, JobError> {
+///
+/// # Errors
+/// No frame between snapshots, or a file in the folder that must stay.
+pub(super) fn snapshots(
+    folder: Option<&Path>,
+    every: Option<u64>,
+    plan: &Plan,
+    overwrite: &OverwritePolicy,
+) -> Result<Snapshots, JobError> {
     let second = (1.0 / plan.fps().frame_s()).round().max(1.0) as u64;
     let every = every.unwrap_or(second);
     match folder {
         _ if every == 0 => Err(Conflict::SnapshotStep(every).into()),
-        Some(folder) if snapshots::has_state(plan)? => Ok(Snapshots::new(folder.to_path_buf(), plan, every)),
+        Some(folder) if snapshots::has_state(plan)? => {
+            let snapshots = Snapshots::new(folder.to_path_buf(), plan, every, overwrite.clone());
+            snapshots.check()?;
+            Ok(snapshots)
+        }
         _ => Ok(Snapshots::default()),
     }
 }

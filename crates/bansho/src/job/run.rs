@@ -5,6 +5,7 @@ use std::{path::PathBuf, sync::atomic::AtomicUsize};
 use super::{
     contact,
     error::JobError,
+    finished::Finished,
     observer::{JobObserver, Outline},
     output::ToFiles,
     plates,
@@ -28,17 +29,18 @@ impl PreparedJob {
     ///
     /// # Errors
     /// The observer asked to stop, or the first failure of a frame. Frames that were finished by then stay, whole;
-    /// nothing else does.
+    /// nothing else does. Frames that were finished and are there no longer, or not whole, when all are.
     pub fn run(&self, observer: &dyn JobObserver) -> Result<Summary, JobError> {
         self.notes.iter().for_each(|note| observer.note(note));
-        let numbers = self.missing();
+        let finished = Finished::default();
+        let numbers = self.missing(&finished);
         let kept = self.frames.len() - numbers.len();
         let size = [self.plan.window().width, self.plan.window().height];
         observer.started(&Outline { total: self.frames.len(), kept, size });
         let done = match &self.sheet {
             Some(sheet) => contact::run(self, sheet, observer),
             None if numbers.is_empty() => Ok(()),
-            None => self.run_files(&numbers, size, observer),
+            None => self.run_files(&numbers, size, &finished, observer),
         };
         let kind = self.format.pattern.kind();
         done.map_err(|error| match plates::located(&self.scene, error) {
@@ -46,13 +48,22 @@ impl PreparedJob {
             error if !kind.is_sequence() => error.of_whole("a film"),
             error => error,
         })?;
+        if self.sheet.is_none() && kind.is_sequence() {
+            self.check_all_there(&finished)?;
+        }
         Ok(Summary { drawn: numbers.len(), kept, first_file: self.format.pattern.path(self.frames[0]) })
     }
 
-    fn run_files(&self, numbers: &[i64], size: [usize; 2], observer: &dyn JobObserver) -> Result<(), JobError> {
+    fn run_files(
+        &self,
+        numbers: &[i64],
+        size: [usize; 2],
+        finished: &Finished,
+        observer: &dyn JobObserver,
+    ) -> Result<(), JobError> {
         let window = rayon::current_num_threads() + 1;
         let sink = self.format.open(&self.plan, numbers.len(), size, window)?;
-        let files = ToFiles { format: &self.format, sink, window, observer, drawn: AtomicUsize::new(0) };
+        let files = ToFiles { format: &self.format, sink, window, observer, drawn: AtomicUsize::new(0), finished };
         shoot(&self.plan, self.backend.as_ref(), numbers, &self.snapshots, &files, observer)?;
         Ok(files.sink.finish()?)
     }

@@ -3,15 +3,16 @@
 use std::{path::PathBuf, sync::Arc};
 
 use bansho_base::observer::{Stage, StageGuard, check};
-use bansho_media::{atomic, naming::NumberedPath, ply};
+use bansho_media::{atomic, naming::NumberedPath, overwriting::OverwritePolicy, ply};
 use bansho_render::{Backend, Plan, PlanOptions, RenderError};
 
 use super::{
     BackendChoice,
     error::{Conflict, JobError},
+    finished::Finished,
     inputs,
     observer::{FrameDone, JobObserver, Note, Outline},
-    output,
+    output, overwriting,
     prepare::{assets, backend, chosen_frames, outside, snapshots},
     run::Summary,
     scene_file::SceneFile,
@@ -33,6 +34,8 @@ pub struct Simulate {
     pub snapshots: Option<PathBuf>,
     /// Frames between snapshots; a second's worth when left out.
     pub snapshot_every: Option<u64>,
+    /// Whether files that Bansho did not make may be written over. What the scene is read from never is.
+    pub overwrite: bool,
     /// What simulates.
     pub backend: BackendChoice,
 }
@@ -44,14 +47,23 @@ pub struct PreparedSimulation {
     frames: Vec<i64>,
     pattern: NumberedPath,
     snapshots: Snapshots,
+    overwrite: OverwritePolicy,
     notes: Vec<Note>,
 }
 
 impl Simulate {
     /// All frames of `scene` to `particles`.
     pub fn new(scene: SceneFile, particles: PathBuf) -> Self {
-        let backend = BackendChoice::Auto;
-        Self { scene, particles, frames: None, seed: None, snapshots: None, snapshot_every: None, backend }
+        Self {
+            scene,
+            particles,
+            frames: None,
+            seed: None,
+            snapshots: None,
+            snapshot_every: None,
+            overwrite: false,
+            backend: BackendChoice::Auto,
+        }
     }
 
     /// Checks everything and writes nothing.
@@ -71,10 +83,11 @@ impl Simulate {
         let frames = chosen_frames(self.frames.as_deref(), &plan)?;
         let pattern = NumberedPath::parse(&self.particles, "ply", frames.len())?;
         output::check_writable(&pattern.path(frames[0]))?;
-        inputs::check_kept(&self.scene, &plan, &frames, frames.iter().map(|&number| pattern.path(number)))?;
-        let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan)?;
+        let overwrite = OverwritePolicy::new(inputs::inputs(&self.scene, &plan, &frames), self.overwrite);
+        overwriting::check(&overwrite, frames.iter().map(|&number| pattern.path(number)))?;
+        let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan, &overwrite)?;
         let notes = outside(&plan, &frames).into_iter().collect();
-        Ok(PreparedSimulation { plan, backend, frames, pattern, snapshots, notes })
+        Ok(PreparedSimulation { plan, backend, frames, pattern, snapshots, overwrite, notes })
     }
 }
 
@@ -82,7 +95,8 @@ impl PreparedSimulation {
     /// Simulates and writes everything, in the caller's rayon pool.
     ///
     /// # Errors
-    /// The observer asked to stop, or the first file that cannot be written. Files that were finished stay, whole.
+    /// The observer asked to stop, or the first file that cannot be written. Files that were finished stay, whole. Files that were finished
+    /// and are there no longer when all are.
     pub fn run(&self, observer: &dyn JobObserver) -> Result<Summary, JobError> {
         self.simulate(observer).map_err(|error| match error {
             JobError::Cancelled => JobError::ParticlesCancelled,
@@ -95,7 +109,7 @@ impl PreparedSimulation {
         let size = [self.plan.window().width, self.plan.window().height];
         observer.started(&Outline { total: self.frames.len(), kept: 0, size });
         let mut shot = self.backend.open(self.plan.clone())?;
-        let mut last = None;
+        let (mut last, finished) = (None, Finished::default());
         for (index, &number) in self.frames.iter().enumerate() {
             check(observer).map_err(|_| JobError::Cancelled)?;
             if last.is_none_or(|last| number != last + 1) {
@@ -106,8 +120,14 @@ impl PreparedSimulation {
             last = Some(number);
             let _stage = StageGuard::begin(observer, Stage::Write);
             let path = self.pattern.path(number);
-            atomic::write_bytes(&path, &ply::encode(&shot.particles()))?;
+            atomic::write_bytes_with(&path, &ply::encode(&shot.particles()), &self.overwrite)?;
+            finished.note(path.clone());
             observer.frame_done(&FrameDone { number, path: Some(path), drawn: index + 1 });
+        }
+        let lost = |&&number: &&i64| !finished.is_there(&self.pattern.path(number));
+        let frames: Vec<i64> = self.frames.iter().filter(lost).copied().collect();
+        if !frames.is_empty() {
+            return Err(JobError::FramesLost { frames, files: self.pattern.of_all() });
         }
         Ok(Summary { drawn: self.frames.len(), kept: 0, first_file: self.pattern.path(self.frames[0]) })
     }

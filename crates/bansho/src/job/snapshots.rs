@@ -6,12 +6,13 @@ use std::{
 };
 
 use bansho_base::observer::{Observer, Stage, StageGuard};
-use bansho_media::atomic;
+use bansho_media::{atomic, identity::resolved, overwriting::OverwritePolicy};
 use bansho_render::{Plan, RenderError, Shot};
 
 use super::{
     error::JobError,
     observer::{JobObserver, Note},
+    overwriting,
 };
 
 /// Where snapshots lie and how many frames lie between them. Files are called `state.<frame>.bansho`.
@@ -23,14 +24,28 @@ pub(super) struct Snapshots {
     every: u64,
     /// Frames of one turn where the shot is a loop.
     turn: Option<i64>,
+    /// Which files that are there may be written over.
+    overwrite: OverwritePolicy,
 }
 
 impl Snapshots {
     /// Snapshots in `folder`, `every` so many frames from the scene's first.
-    pub(super) fn new(folder: PathBuf, plan: &Plan, every: u64) -> Self {
+    pub(super) fn new(folder: PathBuf, plan: &Plan, every: u64, overwrite: OverwritePolicy) -> Self {
         let frames = plan.frames();
         let turn = plan.loop_s.map(|_| frames.end - frames.start);
-        Self { folder: Some(folder), first_frame: frames.start, every, turn }
+        Self { folder: Some(folder), first_frame: frames.start, every, turn, overwrite }
+    }
+
+    /// Whether everything in the folder that is called like a snapshot may be written over: any of it that is of no use is made anew.
+    ///
+    /// # Errors
+    /// Something is not a snapshot of Bansho, or the scene is read from it.
+    pub(super) fn check(&self) -> Result<(), JobError> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        // A folder that cannot be read is told when it is used.
+        let mut numbers = numbers(&resolved(folder)).unwrap_or_default();
+        numbers.sort_unstable();
+        overwriting::check(&self.overwrite, numbers.into_iter().map(|number| self.path(folder, number)))
     }
 
     /// The frame of the first turn that shows what frame `number` shows.
@@ -120,7 +135,7 @@ impl Snapshots {
         if read(&path).is_ok_and(|there| there == state) {
             return Ok(());
         }
-        Ok(atomic::write_bytes(&path, &state)?)
+        Ok(atomic::write_bytes_with(&path, &state, &self.overwrite)?)
     }
 }
 
@@ -167,16 +182,19 @@ fn numbers(folder: &Path) -> io::Result<Vec<i64>> {
 mod tests {
     use std::sync::{Arc, atomic::Ordering};
 
-    use bansho_base::{observer::Unobserved, phenomenon::SnapshotError};
+    use bansho_base::{assets::MemoryAssets, observer::Unobserved, phenomenon::SnapshotError};
+    use bansho_media::mark;
+    use bansho_render::{Backend, CpuBackend, PlanOptions};
 
     use super::*;
     use crate::job::{
+        error::Conflict,
         shoot::shoot,
-        testing::{Counter, Finisher, Witness, plan},
+        testing::{self, Counter, Finisher, Witness, plan},
     };
 
     fn snapshots(folder: &tempfile::TempDir) -> Snapshots {
-        Snapshots::new(folder.path().join("states"), &plan(), 5)
+        Snapshots::new(folder.path().join("states"), &plan(), 5, OverwritePolicy::default())
     }
 
     /// Draws the frames and says how many steps that took.
@@ -209,7 +227,7 @@ mod tests {
         steps(&snapshots, &(-4..9).collect::<Vec<_>>(), &Witness::default());
         let path = snapshots.path(snapshots.folder.as_deref().unwrap(), 6);
         let whole = fs::read(&path).unwrap();
-        fs::write(&path, b"cut").unwrap();
+        fs::write(&path, b"BANSHOSScut").unwrap();
         let witness = Witness::default();
         assert_eq!(steps(&snapshots, &[6, 7], &witness), 6, "from the state at 1");
         let reason = RenderError::Snapshot(SnapshotError::Damaged);
@@ -229,7 +247,7 @@ mod tests {
         let witness = Witness::default();
         assert_eq!(steps(&snapshots, &[8], &witness), 7, "from the state at 1");
         assert_eq!(witness.notes.lock().unwrap().len(), 2);
-        assert_eq!(paths.map(|path| fs::read(path).unwrap()), [5_i64, 6].map(|number| number.to_le_bytes().to_vec()));
+        assert_eq!(paths.map(|path| fs::read(path).unwrap()), [5, 6].map(testing::state));
         let again = Witness::default();
         assert_eq!((steps(&snapshots, &[8], &again), again.notes.lock().unwrap().len()), (2, 0), "from the state at 6");
     }
@@ -252,6 +270,35 @@ mod tests {
         }
         assert_eq!(numbers(folder.path()).unwrap(), Vec::<i64>::new());
         assert_eq!(numbers(&folder.path().join("gone")).unwrap(), Vec::<i64>::new());
+    }
+
+    #[test]
+    fn states_of_the_renderer_bear_the_mark() {
+        let assets = Arc::new(MemoryAssets::default());
+        let text = "bansho = 1\n[[flame_particles]]\nparticles = 60\n";
+        let scene = crate::parse_scene("test", text, assets.as_ref()).unwrap();
+        let plan = Plan::new(scene, &PlanOptions::default(), assets).unwrap();
+        let shot = CpuBackend.open(Arc::new(plan)).unwrap();
+        assert!(shot.snapshot().starts_with(&mark::SNAPSHOT));
+    }
+
+    #[test]
+    fn what_is_called_like_a_snapshot_and_is_none_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut snapshots = snapshots(&folder);
+        let path = snapshots.path(snapshots.folder.as_deref().unwrap(), 6);
+        snapshots.check().unwrap();
+        steps(&snapshots, &(-4..9).collect::<Vec<_>>(), &Witness::default());
+        snapshots.check().unwrap();
+        fs::write(&path, "somebody's work").unwrap();
+        let refused = snapshots.check();
+        assert!(
+            matches!(&refused, Err(JobError::Conflict(Conflict::Unmarked { path: file, others: 0 })) if *file == path)
+        );
+        snapshots.overwrite = OverwritePolicy::any();
+        snapshots.check().unwrap();
+        steps(&snapshots, &[8], &Witness::default());
+        assert_eq!(fs::read(&path).unwrap(), testing::state(6));
     }
 
     #[test]

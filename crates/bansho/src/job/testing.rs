@@ -12,6 +12,7 @@ use bansho_base::{
     phenomenon::SnapshotError,
     point_cloud::PointCloud,
 };
+use bansho_media::mark;
 use bansho_render::{Backend, Plan, PlanOptions, RenderError, Shot};
 
 use super::{
@@ -93,14 +94,20 @@ impl Shot for CounterShot {
     }
 
     fn snapshot(&self) -> Vec<u8> {
-        self.number.to_le_bytes().to_vec()
+        state(self.number)
     }
 
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError> {
-        let bytes = snapshot.try_into().map_err(|_| SnapshotError::Damaged)?;
+        let bytes = snapshot.strip_prefix(&mark::SNAPSHOT).and_then(|state| state.try_into().ok());
+        let bytes = bytes.ok_or(SnapshotError::Damaged)?;
         self.number = i64::from_le_bytes(bytes);
         Ok(())
     }
+}
+
+/// The snapshot at a frame.
+pub(super) fn state(number: i64) -> Vec<u8> {
+    [mark::SNAPSHOT, number.to_le_bytes()].concat()
 }
 
 /// A frame of one pixel.

@@ -8,7 +8,11 @@ use bansho::{
 };
 use clap::Args;
 
-use super::{input::InputArgs, values, work::WorkArgs};
+use super::{
+    input::InputArgs,
+    values,
+    work::{OverwriteArgs, WorkArgs},
+};
 
 /// The sheets that are wanted.
 #[derive(Args, Debug)]
@@ -65,6 +69,8 @@ pub(crate) struct FlipbookArgs {
     #[command(flatten)]
     inputs: InputArgs,
     #[command(flatten)]
+    output: OverwriteArgs,
+    #[command(flatten)]
     pub(crate) work: WorkArgs,
 }
 
@@ -82,6 +88,7 @@ impl FlipbookArgs {
             bits: self.bits,
             alpha: self.alpha,
             out: self.out.clone(),
+            overwrite: self.output.overwrite,
             backend: self.backend,
             ..Flipbook::new(scene, self.grid)
         })

@@ -11,7 +11,7 @@ use clap::Args;
 use super::{
     input::InputArgs,
     values::{self, Frames},
-    work::{StateArgs, WorkArgs},
+    work::{OverwriteArgs, StateArgs, WorkArgs},
 };
 
 /// What to draw, how, and where it goes.
@@ -112,6 +112,8 @@ pub(crate) struct RenderArgs {
     #[command(flatten)]
     inputs: InputArgs,
     #[command(flatten)]
+    output: OverwriteArgs,
+    #[command(flatten)]
     pub(crate) work: WorkArgs,
 }
 
@@ -137,6 +139,7 @@ impl RenderArgs {
             contact_sheet: self.contact_sheet,
             contact_background: self.contact_background,
             resume: self.resume,
+            overwrite: self.output.overwrite,
             snapshots: self.states.snapshots.clone(),
             snapshot_every: self.states.snapshot_every,
             backend: self.backend,

@@ -8,7 +8,7 @@ use clap::Args;
 use super::{
     input::InputArgs,
     values::{self, Frames},
-    work::{StateArgs, WorkArgs},
+    work::{OverwriteArgs, StateArgs, WorkArgs},
 };
 
 /// What to simulate, and where its particles go.
@@ -44,6 +44,8 @@ pub(crate) struct SimulateArgs {
     #[command(flatten)]
     inputs: InputArgs,
     #[command(flatten)]
+    output: OverwriteArgs,
+    #[command(flatten)]
     pub(crate) work: WorkArgs,
 }
 
@@ -56,6 +58,7 @@ impl SimulateArgs {
             seed: self.seed,
             snapshots: self.states.snapshots.clone(),
             snapshot_every: self.states.snapshot_every,
+            overwrite: self.output.overwrite,
             backend: self.backend,
             ..Simulate::new(scene, self.particles.clone())
         })

@@ -11,7 +11,7 @@ use clap::Args;
 
 use super::{
     values::{self, Numbers},
-    work::WorkArgs,
+    work::{OverwriteArgs, WorkArgs},
 };
 
 /// The textures that are wanted; without options the 24 of Yoshida, Dobashi and Yamamoto.
@@ -74,6 +74,8 @@ pub(crate) struct StreaksArgs {
     #[arg(long, default_value = "16", value_parser = values::bits_parser(), help_heading = "Output")]
     bits: BitDepth,
     #[command(flatten)]
+    output: OverwriteArgs,
+    #[command(flatten)]
     pub(crate) work: WorkArgs,
 }
 
@@ -100,6 +102,7 @@ impl StreaksArgs {
             format: self.format,
             bits: self.bits,
             out: self.out.clone(),
+            overwrite: self.output.overwrite,
         }
     }
 }

@@ -20,6 +20,14 @@ pub(crate) struct WorkArgs {
     pub(crate) stats: bool,
 }
 
+/// What may be written over.
+#[derive(Args, Debug)]
+pub(crate) struct OverwriteArgs {
+    /// Write also over files that Bansho did not make. Files that it made are replaced without this; what the scene is read from never is.
+    #[arg(long, help_heading = "Output")]
+    pub(crate) overwrite: bool,
+}
+
 /// Where what is simulated in steps is kept.
 #[derive(Args, Debug)]
 pub(crate) struct StateArgs {

@@ -2,12 +2,15 @@
 
 use std::path::Path;
 
-use bansho::job::{self, JobError};
+use bansho::{
+    base::printable::printable,
+    job::{self, JobError},
+};
 
 use crate::{
     args::{CheckArgs, InputArgs},
     exit::{self, Told},
-    output::{to_stderr, to_stdout},
+    output::{self, to_stdout},
 };
 
 /// Checks every scene and tells all faults of all of them, and what stops nothing but will look other than one may expect.
@@ -29,7 +32,7 @@ fn describe(path: &Path, inputs: &InputArgs) -> Result<String, JobError> {
     let scene = inputs.read(path, &[])?;
     let plan = job::check_scene(&scene)?;
     for remark in job::remarks(&scene, &plan)? {
-        to_stderr(&format!("warning: {remark}"));
+        output::tell("warning", &remark.to_string());
     }
     let [width, height] = plan.size();
     let (fps, frames) = (plan.fps(), plan.frames());
@@ -43,6 +46,7 @@ fn describe(path: &Path, inputs: &InputArgs) -> Result<String, JobError> {
     let names = if names.is_empty() { "nothing in it".to_owned() } else { names.join(", ") };
     Ok(format!(
         "{}: right. {width} x {height}, {numbers} at {rate} a second, EV100 {:.1}: {names}\n",
-        scene.name, plan.exposure_ev100
+        printable(&scene.name),
+        plan.exposure_ev100
     ))
 }

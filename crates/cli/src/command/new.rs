@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use bansho::{
     KINDS,
-    base::parameters::nearest,
-    media::atomic,
+    base::{parameters::nearest, printable::printable},
+    media::{MediaError, atomic},
     render::scene::{PhenomenonKind, template},
 };
 
@@ -49,7 +49,7 @@ pub(crate) fn run(args: &NewArgs) -> anyhow::Result<()> {
             copy_assets(example, path.parent().unwrap_or(Path::new("")))?;
         }
     }
-    Ok(to_stdout(&format!("{0}: written. Draw it: bansho render {0}\n", path.display()))?)
+    Ok(to_stdout(&format!("{0}: written. Draw it: bansho render {0}\n", printable(&path.display().to_string())))?)
 }
 
 /// A new scene of a kind: all of its settings, or a short one that says how to get them.
@@ -87,9 +87,9 @@ fn with_extension(name: &Path) -> PathBuf {
 /// Writes the pictures that an example names; those that are there already stay as they are.
 fn copy_assets(example: &Example, folder: &Path) -> anyhow::Result<()> {
     for asset in example.assets {
-        let path = folder.join(asset.path);
-        if !path.exists() {
-            atomic::write_bytes(&path, asset.bytes)?;
+        match atomic::write_new(&folder.join(asset.path), asset.bytes) {
+            Err(MediaError::IsThere { .. }) => {}
+            written => written?,
         }
     }
     Ok(())

@@ -2,6 +2,7 @@
 
 use bansho::{
     MemoryAssets,
+    base::printable::printable,
     job::SceneFile,
     media::atomic,
     render::scene::{FORMAT, edit},
@@ -20,7 +21,8 @@ pub(crate) fn run(args: &UpgradeArgs) -> anyhow::Result<()> {
             return Err(error.into());
         }
     };
-    let name = args.scene.display();
+    let name = args.scene.display().to_string();
+    let name = printable(&name);
     match upgraded {
         None => Ok(to_stdout(&format!("{name}: is of format {FORMAT} already; unchanged\n"))?),
         Some(text) => {

@@ -9,7 +9,10 @@ use std::{
     time::Duration,
 };
 
-use bansho::{base::plural::counted, job::Outline};
+use bansho::{
+    base::{plural::counted, printable::printable},
+    job::Outline,
+};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::Result;
@@ -78,7 +81,7 @@ impl Bar {
         } else {
             String::new()
         };
-        let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        let files: Vec<String> = files.iter().map(|file| printable(&file.display().to_string()).into_owned()).collect();
         let rate = *drawn as f64 / seconds.max(1e-9);
         to_stderr(&format!(
             "{} in {seconds:.2} s, {rate:.1} a second{kept}: {}",

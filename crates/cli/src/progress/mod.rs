@@ -14,7 +14,7 @@ use self::{bar::Bar, json::Json};
 use crate::{
     exit::{self, Told},
     flags, interrupt,
-    output::to_stderr,
+    output::{self, to_stderr},
     stats::Stats,
 };
 
@@ -44,6 +44,11 @@ pub(crate) struct Watcher {
     since: Instant,
 }
 
+/// All work was done, but not all of its progress could be told.
+#[derive(Debug, thiserror::Error)]
+#[error("progress was lost: {0}; all files are written")]
+struct Unwritten(std::io::Error);
+
 /// What a job came to, for the last line.
 pub(crate) struct Result {
     /// What one thing that was drawn is called.
@@ -57,13 +62,16 @@ impl Watcher {
     pub(crate) fn new(kind: ProgressKind, stats: bool) -> Self {
         let shown = match kind {
             ProgressKind::Bar => Shown::Bar(Bar::new()),
-            ProgressKind::Json => Shown::Json(Json),
+            ProgressKind::Json => Shown::Json(Json::default()),
             ProgressKind::None => Shown::Nothing,
         };
         Self { shown: Arc::new(shown), stats: stats.then(Stats::new), since: Instant::now() }
     }
 
     /// Tells how it ended, statistics last. `threads` drew.
+    ///
+    /// # Errors
+    /// Why the job failed, or progress could not be written.
     pub(crate) fn finish(&self, result: std::result::Result<Result, JobError>, threads: usize) -> anyhow::Result<()> {
         let seconds = self.since.elapsed().as_secs_f64();
         let result = result.map_err(|error| self.fail(error))?;
@@ -75,7 +83,10 @@ impl Watcher {
         if let Some(stats) = &self.stats {
             to_stderr(&stats.table(result.drawn, threads));
         }
-        Ok(())
+        match &*self.shown {
+            Shown::Json(json) => json.take_fault().map_or(Ok(()), |error| Err(Unwritten(error).into())),
+            Shown::Bar(_) | Shown::Nothing => Ok(()),
+        }
     }
 
     /// What tells the user that a signal ended the program because the work did not stop by itself.
@@ -86,7 +97,7 @@ impl Watcher {
             if let Shown::Bar(bar) = &*shown {
                 bar.clear();
             }
-            to_stderr(&format!("error: {MESSAGE}"));
+            output::tell("error", MESSAGE);
             if let Shown::Json(json) = &*shown {
                 json.failed(MESSAGE, interrupt::exit_code());
             }
@@ -139,7 +150,7 @@ impl JobObserver for Watcher {
     }
 
     fn note(&self, note: &Note) {
-        let warn = || to_stderr(&format!("warning: {}", flags::note(note)));
+        let warn = || output::tell("warning", &flags::note(note));
         if let Shown::Bar(bar) = &*self.shown { bar.beside(warn) } else { warn() }
     }
 }

@@ -4,6 +4,7 @@ mod alpha;
 mod aurora;
 mod bad_input;
 mod commands;
+mod completeness;
 mod disk;
 mod figures;
 mod flipbook;
@@ -11,6 +12,7 @@ mod inputs;
 mod interruptions;
 #[cfg(target_os = "linux")]
 mod memory;
+mod overwriting;
 mod particles;
 mod pictures;
 mod rain;

@@ -12,6 +12,7 @@ use crate::{
     error::MediaError,
     flatten,
     ordered::Film,
+    overwriting::OverwritePolicy,
     png::{self, chunk},
 };
 
@@ -32,14 +33,14 @@ pub(crate) struct ApngFilm {
 }
 
 impl ApngFilm {
-    pub(crate) fn create(path: &Path, format: ApngFormat) -> Result<Self, MediaError> {
+    pub(crate) fn create(path: &Path, format: ApngFormat, overwrite: &OverwritePolicy) -> Result<Self, MediaError> {
         let [numerator, denominator] = format.fps;
         let delay = timing::apng_delay(format.fps).ok_or_else(|| MediaError::FrameRate {
             path: path.to_path_buf(),
             numerator,
             denominator,
         })?;
-        Ok(Self { file: AtomicFile::create(path)?, format, delay, sequence: 0 })
+        Ok(Self { file: AtomicFile::create_with(path, overwrite)?, format, delay, sequence: 0 })
     }
 
     fn next_sequence(&mut self) -> [u8; 4] {
@@ -124,7 +125,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.apng");
         let format = ApngFormat { frame_count: 3, size: [6, 5], fps: [24000, 1001] };
-        let mut film = ApngFilm::create(&path, format).unwrap();
+        let mut film = ApngFilm::create(&path, format, &OverwritePolicy::default()).unwrap();
         for index in 0..3 {
             film.append(prepare(&testing::display(6, 5, index), false, &path).unwrap()).unwrap();
         }

@@ -10,7 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use ::gif::{DisposalMethod, Encoder, Repeat};
+use ::gif::{DisposalMethod, Encoder, Extension, Repeat};
 use bansho_base::image::{DisplayImage, DisplayPixels};
 use rayon::prelude::*;
 
@@ -21,8 +21,9 @@ use super::{
 use crate::{
     atomic::AtomicFile,
     error::{MediaError, SizeRule},
-    flatten,
+    flatten, mark,
     ordered::Film,
+    overwriting::OverwritePolicy,
     png,
 };
 
@@ -63,13 +64,13 @@ struct Spooled {
 }
 
 impl GifFilm {
-    pub(crate) fn create(path: &Path, format: GifFormat) -> Result<Self, MediaError> {
+    pub(crate) fn create(path: &Path, format: GifFormat, overwrite: &OverwritePolicy) -> Result<Self, MediaError> {
         let [width, height] = format.size;
         if width.max(height) > SIDE_LIMIT {
             let allowed = SizeRule::UpTo(SIDE_LIMIT);
             return Err(MediaError::Size { path: path.to_path_buf(), width, height, allowed });
         }
-        let file = AtomicFile::create(path)?;
+        let file = AtomicFile::create_with(path, overwrite)?;
         let folder = file.temporary_path().parent().unwrap_or(Path::new("."));
         let spool = tempfile::tempfile_in(folder).map_err(|source| MediaError::from_io(path, source))?;
         Ok(Self { file, spool, spooled: Vec::new(), histogram: Histogram::new(), format, received: 0 })
@@ -156,6 +157,8 @@ impl Writer<'_> {
         let [width, height] = self.format.size.map(|side| side as u16);
         let mut encoder = Encoder::new(&mut out, width, height, colours).map_err(|error| self.encoding(error))?;
         encoder.set_repeat(Repeat::Infinite).map_err(|error| self.encoding(error))?;
+        let comment = encoder.write_raw_extension(Extension::Comment.into(), &[mark::TAG.as_bytes()]);
+        comment.map_err(|error| self.encoding(error))?;
         for batch in spooled.chunks(BATCH) {
             let read = |spooled: &Spooled| {
                 let mut bytes = vec![0; spooled.length];
@@ -234,7 +237,7 @@ mod tests {
         let path = folder.path().join("a.gif");
         let timing = GifTiming::new(fps).unwrap();
         let format = GifFormat { frame_count: frames, size: [16, 4], timing, transparent };
-        let mut film = GifFilm::create(&path, format.clone()).unwrap();
+        let mut film = GifFilm::create(&path, format.clone(), &OverwritePolicy::default()).unwrap();
         for index in 0..frames {
             film.append(prepare(&ramp(index), index, &format, &path).unwrap()).unwrap();
         }

@@ -3,7 +3,7 @@
 use std::{ffi::OsString, path::Path};
 
 use super::{VideoFormat, WebmCodec};
-use crate::{naming::OutputKind, png::KEY_ALPHA};
+use crate::{mark, naming::OutputKind, png::KEY_ALPHA};
 
 /// All arguments for a film at `output`, which is there already and empty.
 pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
@@ -28,12 +28,18 @@ pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
         ["-flags:v", "+bitexact"],
         ["-map_metadata", "-1"],
     ];
-    let convention = format!("{KEY_ALPHA}={}", format.alpha.name());
+    let (convention, mark) = (format!("{KEY_ALPHA}={}", format.alpha.name()), mark_in(format.kind));
     let alpha = ["-metadata", &convention].into_iter().filter(|_| !format.is_flat());
     let start = ["-y", "-nostdin", "-hide_banner", "-nostats", "-loglevel", "error", "-xerror"];
     let words = start.into_iter().chain(input).chain(["-an", "-vf", &filter]).chain(codec(format).iter().copied());
-    let words = words.chain(tags.into_iter().flatten()).chain(alpha).chain(["-f", container(format.kind)]);
+    let words = words.chain(tags.into_iter().flatten()).chain(alpha).chain(["-metadata", &mark]);
+    let words = words.chain(["-f", container(format.kind)]);
     words.map(OsString::from).chain([output.as_os_str().to_owned()]).collect()
+}
+
+/// The tag by which a film says that Bansho made it. MP4 has no tags of one's own, so there it is the comment.
+fn mark_in(kind: OutputKind) -> String {
+    if kind == OutputKind::Mp4 { format!("comment={}", mark::TAG) } else { mark::TAG.to_owned() }
 }
 
 fn pixel_format(format: &VideoFormat) -> &'static str {

@@ -8,7 +8,7 @@ use std::{
 };
 
 use super::{VideoFormat, arguments};
-use crate::{atomic::AtomicFile, error::MediaError, ordered::Film};
+use crate::{atomic::AtomicFile, error::MediaError, ordered::Film, overwriting::OverwritePolicy};
 
 /// How much of what `ffmpeg` says is kept.
 const TAIL_BYTES: usize = 4096;
@@ -31,12 +31,12 @@ struct Running {
 }
 
 impl VideoFilm {
-    pub(crate) fn create(path: &Path, format: &VideoFormat) -> Result<Self, MediaError> {
+    pub(crate) fn create(path: &Path, format: &VideoFormat, overwrite: &OverwritePolicy) -> Result<Self, MediaError> {
         let [numerator, denominator] = format.fps;
         if numerator == 0 || denominator == 0 {
             return Err(MediaError::FrameRate { path: path.to_path_buf(), numerator, denominator });
         }
-        let file = AtomicFile::create(path)?;
+        let file = AtomicFile::create_with(path, overwrite)?;
         let mut command = Command::new(&format.options.program);
         command.args(arguments(format, file.temporary_path()));
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());

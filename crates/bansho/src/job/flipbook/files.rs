@@ -10,7 +10,9 @@ use bansho_base::{
 use bansho_media::{
     atomic, exr,
     flipbook::{Sheet, tile, tile_display},
+    mark,
     naming::OutputKind,
+    overwriting::OverwritePolicy,
     png::{self, PngEffort},
 };
 use bansho_render::{
@@ -23,7 +25,7 @@ use super::{
     FlipbookSummary,
     motion::{self, Colour, Tile},
 };
-use crate::job::error::JobError;
+use crate::job::{error::JobError, finished::Finished};
 
 /// Where a flipbook goes and what its sheets are.
 pub(super) struct Files {
@@ -34,6 +36,8 @@ pub(super) struct Files {
     pub(super) bits: BitDepth,
     /// What the straight alpha of PNG sheets is made for.
     pub(super) alpha: AlphaConvention,
+    /// Which files that are there may be written over.
+    pub(super) overwrite: OverwritePolicy,
 }
 
 impl Files {
@@ -81,19 +85,30 @@ impl Files {
         observer: &dyn Observer,
     ) -> Result<FlipbookSummary, JobError> {
         let _stage = StageGuard::begin(observer, Stage::Write);
+        let finished = Finished::default();
         let scale = if self.is_linear() { 1.0 } else { motion::scale(tiles) };
         check(observer).map_err(|_| JobError::Cancelled)?;
         if self.is_linear() {
-            self.write_linear(sheet, tiles)?;
+            self.write_linear(sheet, tiles, &finished)?;
         } else {
-            self.write_shown(sheet, tiles, scale)?;
+            self.write_shown(sheet, tiles, scale, &finished)?;
         }
         let text = format!("{:#}\n", self.description(plan, sheet, numbers, scale));
-        atomic::write_bytes(&self.path(".json"), text.as_bytes())?;
-        Ok(FlipbookSummary { files: self.paths() })
+        self.keep(self.path(".json"), text.as_bytes(), &finished)?;
+        match finished.lost() {
+            files if files.is_empty() => Ok(FlipbookSummary { files: self.paths() }),
+            files => Err(JobError::FilesLost { files }),
+        }
     }
 
-    fn write_linear(&self, sheet: &Sheet, tiles: &[Tile]) -> Result<(), JobError> {
+    /// Writes one of the files.
+    fn keep(&self, path: PathBuf, bytes: &[u8], finished: &Finished) -> Result<(), JobError> {
+        atomic::write_bytes_with(&path, bytes, &self.overwrite)?;
+        finished.note(path);
+        Ok(())
+    }
+
+    fn write_linear(&self, sheet: &Sheet, tiles: &[Tile], finished: &Finished) -> Result<(), JobError> {
         let header = FrameHeader { display_size: sheet.size(), data_origin: [0, 0], ..tiles[0].header.clone() };
         let colours: Vec<Image<4>> = tiles.iter().filter_map(|tile| tile.linear().cloned()).collect();
         let motion: Vec<Image<2>> = tiles.iter().map(|tile| tile.motion.clone()).collect();
@@ -115,12 +130,13 @@ impl Files {
                 content,
                 figures: Vec::new(),
             };
-            atomic::write_bytes(&path, &exr::encode(&frame, &path)?)?;
+            let bytes = exr::encode(&frame, &path)?;
+            self.keep(path, &bytes, finished)?;
         }
         Ok(())
     }
 
-    fn write_shown(&self, sheet: &Sheet, tiles: &[Tile], scale: f32) -> Result<(), JobError> {
+    fn write_shown(&self, sheet: &Sheet, tiles: &[Tile], scale: f32, finished: &Finished) -> Result<(), JobError> {
         let shown: Vec<DisplayImage> = tiles.iter().filter_map(|tile| tile.shown().cloned()).collect();
         let colour = tile_display(&shown, sheet.columns, 0, [0; 4])?;
         let alpha = DisplayImage { opaque: true, pixels: alpha(&colour.pixels), ..colour };
@@ -137,7 +153,7 @@ impl Files {
         for (what, picture) in [("colour", &colour), ("alpha", &alpha), ("motion", &motion)] {
             let path = self.sheet_path(what);
             let bytes = png::encode(picture, &fingerprint(tiles, what), PngEffort::Fast, &path)?;
-            atomic::write_bytes(&path, &bytes)?;
+            self.keep(path, &bytes, finished)?;
         }
         Ok(())
     }
@@ -169,6 +185,7 @@ impl Files {
         let ([width, height], part) = (plan.size(), plan.window());
         let mut description = json!({
             "format": 1,
+            "program": mark::PROGRAM,
             "size": sheet.size(),
             "grid": [sheet.columns, sheet.rows()],
             "tile": sheet.cell,

@@ -14,6 +14,7 @@ use bansho_base::{
 use bansho_media::{
     flipbook::Sheet,
     naming::{OutputKind, OutputPattern},
+    overwriting::OverwritePolicy,
 };
 use bansho_render::{Backend, Plan, PlanOptions, Scene, display::BitDepth, scene::FrameRate};
 
@@ -25,7 +26,7 @@ use super::{
     inputs,
     memory::{self, Wanted},
     observer::{JobObserver, Note, Outline},
-    output, plates, prepare,
+    output, overwriting, plates, prepare,
     scene_file::SceneFile,
     sheet::{self, Gather},
     shoot::shoot,
@@ -63,6 +64,8 @@ pub struct Flipbook {
     pub alpha: Option<AlphaConvention>,
     /// Where it goes: `DIR/NAME.png` stands for `NAME_colour.png` and so on; `out/STEM/STEM.png` when left out.
     pub out: Option<PathBuf>,
+    /// Whether files that Bansho did not make may be written over. What the scene is read from never is.
+    pub overwrite: bool,
     /// What draws.
     pub backend: BackendChoice,
 }
@@ -92,6 +95,7 @@ impl Flipbook {
             bits: BitDepth::Eight,
             alpha: None,
             out: None,
+            overwrite: false,
             backend: BackendChoice::Auto,
         }
     }
@@ -126,8 +130,9 @@ impl Flipbook {
         let frames = numbers.len();
         let wanted = Wanted { frames, tiles: frames, display: Some(self.bits), own_size: true };
         memory::check(&self.scene, &plan, wanted)?;
-        let files = self.files()?;
-        inputs::check_kept(&self.scene, &plan, &numbers, files.paths())?;
+        let overwrite = OverwritePolicy::new(inputs::inputs(&self.scene, &plan, &numbers), self.overwrite);
+        let files = self.files(overwrite)?;
+        overwriting::check(&files.overwrite, files.paths())?;
         let (scene, own_size, crop) = (self.scene.clone(), self.tile.is_some(), self.crop);
         Ok(PreparedFlipbook { scene, backend, plan, sheet, own_size, crop, numbers, files })
     }
@@ -142,7 +147,7 @@ impl Flipbook {
         })
     }
 
-    fn files(&self) -> Result<Files, JobError> {
+    fn files(&self, overwrite: OverwritePolicy) -> Result<Files, JobError> {
         let stem = &self.scene.stem;
         let path = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem).join(format!("{stem}.png")));
         let pattern = OutputPattern::parse(&path, 1)?;
@@ -151,7 +156,7 @@ impl Flipbook {
         }
         let alpha = prepare::alpha_convention(self.alpha, self.view, AlphaConvention::Linear)?;
         let base = path.with_extension("");
-        let files = Files { base, kind: pattern.kind(), view: self.view, bits: self.bits, alpha };
+        let files = Files { base, kind: pattern.kind(), view: self.view, bits: self.bits, alpha, overwrite };
         files.paths().iter().try_for_each(|path| output::check_writable(path))?;
         Ok(files)
     }

@@ -1,6 +1,9 @@
 //! The pictures of streak textures.
 
-use std::{f64::consts::PI, path::PathBuf};
+use std::{
+    f64::consts::PI,
+    path::{Path, PathBuf},
+};
 
 use bansho_base::{
     color::ev100_of_white_luminance,
@@ -9,6 +12,7 @@ use bansho_base::{
 };
 use bansho_media::{
     atomic, exr,
+    overwriting::OverwritePolicy,
     png::{self, MeasuredImage, PngEffort},
 };
 use bansho_models::rain::lens::DropLens;
@@ -44,6 +48,8 @@ pub(super) struct Writer {
     pub(super) format: StreakFormat,
     pub(super) bits: BitDepth,
     pub(super) light: Option<Lit>,
+    /// Which files that are there may be written over.
+    pub(super) overwrite: OverwritePolicy,
     pub(super) streaks: Streaks,
 }
 
@@ -68,6 +74,23 @@ impl Writer {
         format!("streak_{}_{}{variant}.{extension}", texture.rate, texture.bin.diameter_mm)
     }
 
+    /// The name of the lit picture beside the PNG `file`.
+    fn lit_name(&self, file: &str) -> Option<String> {
+        (self.light.is_some() && self.format == StreakFormat::Png).then(|| file.replace(".png", "_lit.png"))
+    }
+
+    /// The files that the texture `file` becomes.
+    pub(super) fn files(&self, file: &str) -> impl Iterator<Item = PathBuf> + use<> {
+        let names = [Some(file.to_owned()), self.lit_name(file)];
+        let folder = self.folder.clone();
+        names.into_iter().flatten().map(move |name| folder.join(name))
+    }
+
+    /// Writes a file, whole or not at all.
+    pub(super) fn keep(&self, path: &Path, bytes: &[u8]) -> Result<(), JobError> {
+        Ok(atomic::write_bytes_with(path, bytes, &self.overwrite)?)
+    }
+
     /// Writes what a texture becomes.
     pub(super) fn write(&self, file: &str, opacity: &Image<1>) -> Result<Written, JobError> {
         match self.format {
@@ -78,8 +101,7 @@ impl Writer {
 
     fn write_png(&self, file: &str, opacity: &Image<1>) -> Result<Written, JobError> {
         let scale = self.write_measured(file, 1, opacity, opacity.pixels().as_flattened())?;
-        let lit = self.light.map(|light| {
-            let name = file.replace(".png", "_lit.png");
+        let lit = self.light.zip(self.lit_name(file)).map(|(light, name)| {
             let radiance: Vec<f32> = self.radiance(&light, opacity).into_flattened();
             let scale = self.write_measured(&name, 3, opacity, &radiance)?;
             Ok::<_, JobError>((name, scale))
@@ -92,7 +114,7 @@ impl Writer {
         let picture = MeasuredImage::of_values(size, channels, values, self.bits == BitDepth::Sixteen);
         let path = self.folder.join(file);
         let bytes = png::encode_measured(&picture, &self.fingerprint(file), PngEffort::Fast, &path)?;
-        atomic::write_bytes(&path, &bytes)?;
+        self.keep(&path, &bytes)?;
         Ok(picture.scale)
     }
 
@@ -113,7 +135,7 @@ impl Writer {
         let (header, content) = (self.header(file, opacity), Rect::of_size(width, height));
         let frame = Frame { header, beauty, depth: None, channels, opaque: false, figures: Vec::new(), content };
         let path = self.folder.join(file);
-        atomic::write_bytes(&path, &exr::encode(&frame, &path)?)?;
+        self.keep(&path, &exr::encode(&frame, &path)?)?;
         Ok(Written { scale: None, lit: None })
     }
 

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use bansho_base::image::Image;
+use bansho_media::mark;
 use bansho_models::rain::{
     distribution::{DropSizes, SizeBin},
     extinction::{Losses, extinction, visibility},
@@ -79,7 +80,7 @@ pub(super) fn describe(
     let rain = |(&rate, sizes): (&f64, &DropSizes)| describe_rain(rate, sizes, &bins, cube);
     let mut index = json!({
         "format": 1,
-        "program": concat!("Bansho ", env!("CARGO_PKG_VERSION")),
+        "program": mark::PROGRAM,
         "size_pixels": cube.size,
         "box_m": cube.edge,
         "pixel_m": cube.pixel(),

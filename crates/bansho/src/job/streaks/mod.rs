@@ -6,12 +6,15 @@ mod index;
 
 use std::{
     fs, io,
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::atomic::{AtomicUsize, Ordering},
 };
 
 use bansho_base::observer::check;
-use bansho_media::{MediaError, atomic};
+use bansho_media::{
+    MediaError,
+    overwriting::{InputFiles, OverwritePolicy},
+};
 use bansho_models::rain::{
     distribution::{DropSizes, SizeBin},
     lens::DropLens,
@@ -27,8 +30,9 @@ use self::{
 };
 use super::{
     error::JobError,
+    finished::Finished,
     observer::{FrameDone, JobObserver, Outline},
-    output,
+    output, overwriting,
 };
 
 pub use fault::{ListKind, StreaksFault};
@@ -66,6 +70,8 @@ pub struct Streaks {
     pub bits: BitDepth,
     /// The folder; `out/streaks` when left out.
     pub out: Option<PathBuf>,
+    /// Whether files that Bansho did not make may be written over.
+    pub overwrite: bool,
 }
 
 impl Default for Streaks {
@@ -81,6 +87,7 @@ impl Default for Streaks {
             format: StreakFormat::default(),
             bits: BitDepth::Sixteen,
             out: None,
+            overwrite: false,
         }
     }
 }
@@ -112,9 +119,12 @@ impl Streaks {
         let cube = StreakCube { fall: Fall { law: self.law, air }, ..self.cube };
         let light = self.light.map(|toward| Lit::new(toward, &DropLens::new()));
         let folder = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join("streaks"));
-        let writer = Writer { folder, format: self.format, bits: self.bits, light, streaks: self.clone() };
+        let overwrite = OverwritePolicy::new(InputFiles::default(), self.overwrite);
+        let writer = Writer { folder, format: self.format, bits: self.bits, light, overwrite, streaks: self.clone() };
         output::check_writable(&writer.index_path())?;
-        Ok(PreparedStreaks { streaks: self.clone(), cube, writer })
+        let prepared = PreparedStreaks { streaks: self.clone(), cube, writer };
+        overwriting::check(&prepared.writer.overwrite, prepared.files())?;
+        Ok(prepared)
     }
 }
 
@@ -134,29 +144,39 @@ impl PreparedStreaks {
         self.streaks.rates.len() * self.streaks.diameters.len() * self.streaks.variants as usize
     }
 
+    /// Every file that will be written.
+    fn files(&self) -> Vec<PathBuf> {
+        let rains: Vec<DropSizes> = self.rains();
+        let textures = self.textures(&rains);
+        let pictures = textures.iter().flat_map(|texture| self.writer.files(&self.writer.name(texture)));
+        pictures.chain([self.writer.index_path()]).collect()
+    }
+
+    fn rains(&self) -> Vec<DropSizes> {
+        self.streaks.rates.iter().map(|&rate| DropSizes::marshall_palmer(rate)).collect()
+    }
+
     /// Draws and writes all textures in the caller's rayon pool, the index last. Gives the path of the index.
     ///
     /// An index that is there from before is removed first, so that whatever index there is describes the files beside it.
     ///
     /// # Errors
-    /// The observer asked to stop, or a file cannot be written. Textures that were finished stay, whole.
+    /// The observer asked to stop, or a file cannot be written. Textures that were finished stay, whole. Textures that were finished and are
+    /// there no longer when all are.
     pub fn run(&self, observer: &dyn JobObserver) -> Result<PathBuf, JobError> {
         let index = self.writer.index_path();
         observer.started(&Outline { total: self.texture_count(), kept: 0, size: [self.cube.size; 2] });
-        match fs::remove_file(&index) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                return Err(MediaError::from_io(&index, error).into());
-            }
-            _ => {}
-        }
-        let rains: Vec<DropSizes> = self.streaks.rates.iter().map(|&rate| DropSizes::marshall_palmer(rate)).collect();
+        self.remove(&index)?;
+        let rains = self.rains();
         let done = AtomicUsize::new(0);
+        let finished = Finished::default();
         let entries: Vec<Entry> = self
             .textures(&rains)
             .par_iter()
             .enumerate()
             .map(|(number, texture)| {
                 let entry = self.make(texture, observer)?;
+                self.writer.files(&entry.file).for_each(|file| finished.note(file));
                 let drawn = done.fetch_add(1, Ordering::Relaxed) + 1;
                 let path = Some(self.writer.folder.join(&entry.file));
                 observer.frame_done(&FrameDone { number: number as i64, path, drawn });
@@ -165,8 +185,23 @@ impl PreparedStreaks {
             .collect::<Result<_, JobError>>()?;
         check(observer).map_err(|_| JobError::StreaksCancelled)?;
         let text = format!("{:#}\n", index::describe(&self.streaks, &self.cube, &self.writer, &rains, &entries));
-        atomic::write_bytes(&index, text.as_bytes())?;
-        Ok(index)
+        self.writer.keep(&index, text.as_bytes())?;
+        finished.note(index.clone());
+        match finished.lost() {
+            files if files.is_empty() => Ok(index),
+            files => Err(JobError::FilesLost { files }),
+        }
+    }
+
+    /// Removes the index of another run, which a run that is stopped would make wrong.
+    fn remove(&self, index: &Path) -> Result<(), JobError> {
+        if self.writer.overwrite.check(index).is_err() {
+            return Err(MediaError::Unmarked { path: index.to_path_buf() }.into());
+        }
+        match fs::remove_file(index) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(MediaError::from_io(index, error).into()),
+            _ => Ok(()),
+        }
     }
 
     fn textures<'a>(&self, rains: &'a [DropSizes]) -> Vec<Texture<'a>> {
