@@ -1,14 +1,17 @@
 //! Which frames are already there and whole.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
-use crate::{exr, png, stamp};
+use crate::{exr, input, png, stamp};
+
+/// Most bytes of a frame: a file with more is none of ours, and is not read.
+const FRAME_BYTES: u64 = 8 << 30;
 
 /// The fingerprint of the PNG or OpenEXR file at `path` if it is one that Bansho wrote and is whole to the last byte:
 /// every checksum of a PNG is right up to its end, an OpenEXR file has the digest that its header names.
-/// `None` for a file that is missing, cut off, damaged or someone else's.
+/// `None` for a file that is missing, cut off, damaged or someone else's, and for what is no ordinary file.
 pub fn existing_fingerprint(path: &Path) -> Option<[u8; 32]> {
-    fingerprint(&fs::read(path).ok()?)
+    fingerprint(&input::read(path, FRAME_BYTES).ok()?)
 }
 
 /// As [`existing_fingerprint`], of the bytes of a file.
@@ -103,5 +106,8 @@ mod tests {
             assert_eq!(fingerprint(&[&file[..], b"x"].concat()), None);
         }
         assert_eq!(existing_fingerprint(Path::new("no such folder/a.png")), None);
+        // A device without end.
+        #[cfg(unix)]
+        assert_eq!(existing_fingerprint(Path::new("/dev/zero")), None);
     }
 }

@@ -9,7 +9,7 @@ use std::{
     collections::HashMap,
     fs,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
 use bansho_base::{
@@ -65,18 +65,24 @@ pub struct FileAssets {
 #[derive(Debug, Default)]
 struct Memory {
     pictures: Cache,
-    /// Those that somebody uses.
-    meshes: HashMap<PathBuf, Weak<Mesh>>,
-    drawings: HashMap<PathBuf, Weak<Drawing>>,
+    meshes: HashMap<PathBuf, Arc<Mesh>>,
+    drawings: HashMap<PathBuf, Arc<Drawing>>,
     digests: HashMap<PathBuf, [u8; 32]>,
 }
 
 impl Memory {
     /// Bytes of what is in use or kept.
     fn used(&self) -> u64 {
-        let meshes = self.meshes.values().filter_map(Weak::upgrade).map(|mesh| mesh.memory_bytes());
-        let drawings = self.drawings.values().filter_map(Weak::upgrade).map(|drawing| drawing.memory_bytes());
+        let meshes = self.meshes.values().map(|mesh| mesh.memory_bytes());
+        let drawings = self.drawings.values().map(|drawing| drawing.memory_bytes());
         self.pictures.bytes() as u64 + meshes.chain(drawings).sum::<u64>()
+    }
+
+    /// Forgets pictures, and meshes and drawings that nobody uses.
+    fn make_room(&mut self) {
+        self.pictures.clear();
+        self.meshes.retain(|_, mesh| Arc::strong_count(mesh) > 1);
+        self.drawings.retain(|_, drawing| Arc::strong_count(drawing) > 1);
     }
 }
 
@@ -123,11 +129,11 @@ impl FileAssets {
         MemoryLimit { total: self.limits.memory_bytes, used: self.memory().used() }
     }
 
-    /// Reads something within the memory that is left, and again without the pictures that are only kept where it is too little.
+    /// Reads something within the memory that is left, and where it is too little again without what is only kept.
     fn within_limit<T>(&self, read: impl Fn(MemoryLimit) -> Result<T, AssetProblem>) -> Result<T, AssetProblem> {
         match read(self.limit()) {
             Err(AssetProblem::Memory { .. } | AssetProblem::FileSize { .. } | AssetProblem::NoMemory { .. }) => {
-                self.memory().pictures.clear();
+                self.memory().make_room();
                 read(self.limit())
             }
             result => result,
@@ -154,8 +160,8 @@ impl FileAssets {
     }
 
     fn read_mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetProblem> {
-        if let Some(mesh) = self.memory().meshes.get(path).and_then(Weak::upgrade) {
-            return Ok(mesh);
+        if let Some(mesh) = self.memory().meshes.get(path) {
+            return Ok(mesh.clone());
         }
         let beside = |name: &str, left: u64| self.read(&path.with_file_name(name), left);
         let mesh = self.within_limit(|limit| {
@@ -163,7 +169,7 @@ impl FileAssets {
             decode_mesh(&file, extension(path), &beside, limit)
         });
         let mesh = Arc::new(mesh?);
-        self.memory().meshes.insert(path.to_path_buf(), Arc::downgrade(&mesh));
+        self.memory().meshes.insert(path.to_path_buf(), mesh.clone());
         Ok(mesh)
     }
 
@@ -173,12 +179,15 @@ impl FileAssets {
     }
 
     fn read_drawing(&self, path: &Path) -> Result<Arc<Drawing>, AssetProblem> {
-        if let Some(drawing) = self.memory().drawings.get(path).and_then(Weak::upgrade) {
-            return Ok(drawing);
+        if let Some(drawing) = self.memory().drawings.get(path) {
+            return Ok(drawing.clone());
         }
-        let drawing = Arc::new(decode_drawing(&self.read_text(path)?)?);
-        self.memory().drawings.insert(path.to_path_buf(), Arc::downgrade(&drawing));
-        self.limit().check(0)?;
+        let drawing = self.within_limit(|limit| {
+            let drawing = decode_drawing(&self.read_text(path)?)?;
+            limit.check(drawing.memory_bytes()).map(|()| drawing)
+        });
+        let drawing = Arc::new(drawing?);
+        self.memory().drawings.insert(path.to_path_buf(), drawing.clone());
         Ok(drawing)
     }
 
