@@ -84,6 +84,17 @@ def make(files: Mapping[str, Content], folder: str) -> None:
                 file.write(content.encode() if isinstance(content, str) else content)
 
 
+def with_mode(text: str, mode: int) -> Callable[[str], None]:
+    """A file with rights of its own."""
+
+    def write(path: str) -> None:
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.chmod(path, mode)
+
+    return write
+
+
 def built(contents: Callable[[], bytes]) -> Callable[[str], None]:
     """A file whose contents are made only when it is."""
 

@@ -1,7 +1,7 @@
 """Outputs that cannot be, that are somebody's, or that are inputs by another name."""
 
 from . import plates, png
-from .case import Case, Content, folder, hard_link, link, pipe
+from .case import Case, Content, folder, hard_link, link, pipe, with_mode
 from .scene_text import FLAME
 
 ONE = ["--frames", "0", "--threads", "2"]
@@ -59,25 +59,14 @@ def _places() -> list[Case]:
         _out("a file of the kernel", "/proc/self/a/a.png", (1, 2), r"^error: /proc/self/a/a\.png: "),
         Case("output", "a folder that is full", ["render", "scene.toml", "-o", "/dev/stdin/a.png", *ONE], (1, 2), r"^error: /dev/stdin/a\.png: ", {"scene.toml": FLAME}),
         Case("output", "a film without ffmpeg", ["render", "scene.toml", "-o", "a.mp4", *ONE], 1, r"^error: a\.mp4: needs the program `ffmpeg`", {"scene.toml": FLAME}, environment={"PATH": "/nowhere"}),
-        Case("output", "a film by an ffmpeg that fails", ["render", "scene.toml", "-o", "a.mp4", *ONE], 1, r"^error: a\.mp4: ffmpeg failed", {"scene.toml": FLAME, "bin/ffmpeg": _script("#!/bin/sh\nexit 3\n")}, environment={"PATH": "bin:/nowhere"}),
-        Case("output", "a film by an ffmpeg that reads nothing", ["render", "scene.toml", "-o", "a.mp4", "--threads", "2"], (0, 1), r"^error: a\.mp4: ", {"scene.toml": FLAME, "bin/ffmpeg": _script("#!/bin/sh\nexit 0\n")}, environment={"PATH": "bin:/nowhere"}),
-        Case("output", "a film by an ffmpeg that never ends", ["render", "scene.toml", "-o", "a.mp4", "--threads", "2"], 143, "", {"scene.toml": FLAME, "bin/ffmpeg": _script("#!/bin/sh\nexec sleep 30\n")},
+        Case("output", "a film by an ffmpeg that fails", ["render", "scene.toml", "-o", "a.mp4", *ONE], 1, r"^error: a\.mp4: ffmpeg failed", {"scene.toml": FLAME, "bin/ffmpeg": with_mode("#!/bin/sh\nexit 3\n", 0o755)}, environment={"PATH": "bin:/nowhere"}),
+        Case("output", "a film by an ffmpeg that reads nothing", ["render", "scene.toml", "-o", "a.mp4", "--threads", "2"], (0, 1), r"^error: a\.mp4: ", {"scene.toml": FLAME, "bin/ffmpeg": with_mode("#!/bin/sh\nexit 0\n", 0o755)}, environment={"PATH": "bin:/nowhere"}),
+        Case("output", "a film by an ffmpeg that never ends", ["render", "scene.toml", "-o", "a.mp4", "--threads", "2"], 143, "", {"scene.toml": FLAME, "bin/ffmpeg": with_mode("#!/bin/sh\nexec sleep 30\n", 0o755)},
              environment={"PATH": "bin:/usr/bin:/bin"}, signalled=True, endless=True),
         Case("output", "no home", ["render", "scene.toml", "-o", "a.png", *ONE], 0, "", {"scene.toml": FLAME}, environment={"HOME": None, "XDG_CONFIG_HOME": None, "TMPDIR": "/nowhere"}),
         Case("output", "an empty environment", ["render", "scene.toml", "-o", "a.png", *ONE], 0, "", {"scene.toml": FLAME}, environment={"PATH": None, "HOME": None, "LANG": None, "TERM": None}),
         Case("output", "a locale that is not there", ["check", "scene.toml"], 0, "", {"scene.toml": FLAME}, environment={"LANG": "xx_XX.nothing", "LC_ALL": "xx"}),
     ]
-
-
-def _script(text: str):
-    def write(path: str) -> None:
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(text)
-        import os
-
-        os.chmod(path, 0o755)
-
-    return write
 
 
 def _inputs() -> list[Case]:
@@ -89,8 +78,6 @@ def _inputs() -> list[Case]:
         line = command or ["render", "scene.toml", "-o", path, *ONE]
         return [Case("over an input", name + suffix, [*line, *flags], 2, "^error: .*" + INPUT, {**scene, **(extra or {})}) for suffix, flags in (("", []), (", --overwrite", ["--overwrite"]))]
 
-    gas: dict[str, Content] = {"scene.toml": GAS + '[[flame_particles.burners]]\nshape = "mesh"\nfile = "gas.0000.ply.gltf"\n'}
-    del gas
     return [
         *over("by its name", "plate.png"),
         *over("by a dot", "./././plate.png"),

@@ -1,7 +1,9 @@
 """Pipes, devices, folders and endless files wherever a scene or what it names is read."""
 
+import os
+
 from . import drawings, exr, gltf, meshes, plates, png
-from .case import CLOSED, OPEN_PIPE, Case, Content, folder, link, parts, pipe, sparse, unix_socket
+from .case import CLOSED, OPEN_PIPE, Case, Content, folder, link, parts, pipe, sparse, unix_socket, with_mode
 from .scene_text import FLAME
 
 # Kinds of what is no ordinary file. A name for each, how it is made at the place of the file, and whether it could be waited for.
@@ -38,6 +40,9 @@ def _scenes() -> list[Case]:
     for command in (["render", "scene.toml", "-o", "out/a.png"], ["flipbook", "scene.toml", "--grid", "2x2"], ["simulate", "scene.toml", "--particles", "a.ply"], ["upgrade", "scene.toml"]):
         for name, content in (("a pipe", pipe), ("an endless device", link("/dev/zero"))):
             made.append(Case("scene file", f"{command[0]}: {name}", command, 3, r"^error: scene\.toml: ", {"scene.toml": content}, signalled=True))
+    if os.geteuid() != 0:
+        # Whoever is root may read everything.
+        made.append(Case("scene file", "unreadable", ["check", "scene.toml"], 3, r"^error: scene\.toml: the scene cannot be read", {"scene.toml": with_mode(FLAME, 0)}))
     return [
         *made,
         Case("scene file", "missing", ["check", "gone.toml"], 3, r"^error: gone\.toml: the scene cannot be read"),
