@@ -26,6 +26,31 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
+/// Characters of a text that are shown at its start, and at its end, where not all are.
+const SHOWN: [usize; 2] = [2000, 1000];
+
+/// As [`printable`], without the middle of a text of more than 3,000 characters: what is wrong stands in front, what is allowed at the end,
+/// and between them a value of any length.
+///
+/// ```
+/// use bansho_base::printable::message;
+/// let shown = message(&format!("`{}` is not known; allowed: fire", "a".repeat(1_000_000))).into_owned();
+/// assert!(shown.starts_with("`aaa") && shown.contains("aaa [...] aaa") && shown.ends_with("allowed: fire") && shown.len() < 3100);
+/// ```
+pub fn message(text: &str) -> Cow<'_, str> {
+    let [first, last] = SHOWN;
+    let cut = |(start, _): (usize, char)| start;
+    let (Some(end), Some(start)) =
+        (text.char_indices().nth(first).map(cut), text.char_indices().rev().nth(last - 1).map(cut))
+    else {
+        return printable(text);
+    };
+    if end >= start {
+        return printable(text);
+    }
+    Cow::Owned(format!("{} [...] {}", printable(&text[..end]), printable(&text[start..])))
+}
+
 /// Controls, line and paragraph separators, and the marks of the Unicode bidirectional algorithm (UAX #9) that let text look like other text.
 fn steers(character: char) -> bool {
     character.is_control()

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use bansho::base::printable::printable;
+use bansho::base::printable;
 
 /// Writes `text` to stdout. A reader that has seen enough (`bansho schema | head`) is no error.
 pub(crate) fn to_stdout(text: &str) -> io::Result<()> {
@@ -21,7 +21,7 @@ pub(crate) fn heard(written: io::Result<()>) -> io::Result<()> {
 
 /// Tells the user one thing in one line, as `error: ...` or `warning: ...`: names of files and values of scenes in it may hold anything.
 pub(crate) fn tell(what: &str, message: &str) {
-    to_stderr(&format!("{what}: {}", printable(message)));
+    to_stderr(&format!("{what}: {}", printable::message(message)));
 }
 
 /// Writes lines to stderr; where that fails, nobody is left to be told.

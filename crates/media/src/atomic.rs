@@ -56,10 +56,11 @@ impl AtomicFile {
             Ok(there) if !there.is_file() => return Err(MediaError::NotAFile { path: path.to_path_buf() }),
             _ => {}
         }
-        let target = if path.is_symlink() {
-            fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf())
-        } else {
-            path.to_path_buf()
+        let target = match fs::canonicalize(path) {
+            Ok(target) if path.is_symlink() => target,
+            // A link that leads nowhere is replaced, one that leads back to itself is somebody's mistake.
+            Err(source) if path.is_symlink() && source.kind() != io::ErrorKind::NotFound => return Err(fail(source)),
+            _ => path.to_path_buf(),
         };
         allow(policy, &target, path)?;
         let (temporary, listed) = unfinished::list(|| temporary_in(folder_of(&target), &target)).map_err(fail)?;
@@ -245,6 +246,16 @@ mod tests {
         let link = folder.path().join("0001.png");
         std::os::unix::fs::symlink("/dev/null", &link).unwrap();
         assert!(matches!(write_bytes(&link, b"x"), Err(MediaError::NotAFile { .. })));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_itself_is_an_error_and_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("a.png");
+        std::os::unix::fs::symlink("a.png", &link).unwrap();
+        assert!(matches!(write_bytes(&link, b"x"), Err(MediaError::Io { .. })));
+        assert!(link.is_symlink());
     }
 
     fn names(folder: &Path) -> Vec<String> {
