@@ -18,7 +18,8 @@ libfuzzer_sys::fuzz_target!(|text: &str| {
     let Ok(table) = values(&format!("value = {value}")) else { return };
     let Some(node) = table.get("value") else { return };
     let times: Vec<f64> = times.split(' ').filter_map(|time| time.parse().ok()).take(8).collect();
-    for limits in [CurveLimits { y: Range::new(LOW, HIGH), ..CurveLimits::default() }, CurveLimits::default().rising()] {
+    for limits in [CurveLimits { y: Range::new(LOW, HIGH), ..CurveLimits::default() }, CurveLimits::default().rising()]
+    {
         if let Some(curve) = read::<Curve>(node, &limits) {
             check_curve(&curve, &limits, &times);
         }
