@@ -1,7 +1,8 @@
 //! Snapshots: any bytes are refused, or put a shot into a state from which it goes on to finite particles.
 //!
-//! The first byte says which shot, and whether the others are a whole file or only what stands between header and checksum, which
-//! are then made right: a checksum would keep nearly every change from being looked at.
+//! The first byte says of which scene, and how: the others are the state of its phenomenon; or, where that is to go on, such a state with
+//! a header and a checksum that are right, since a checksum would keep nearly every change from being looked at; or, after a zero, a whole
+//! file. Shots make all of their scene anew to restore it, which takes a hundred times longer than the state itself.
 #![no_main]
 
 use std::{
@@ -9,7 +10,7 @@ use std::{
     sync::{Arc, LazyLock},
 };
 
-use bansho_base::{assets::MemoryAssets, observer::Unobserved};
+use bansho_base::{assets::MemoryAssets, observer::Unobserved, phenomenon::Phenomenon, point_cloud::PointCloud};
 use bansho_fuzz::one_thread;
 use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, Scene, Shot, phenomena::KINDS};
 
@@ -18,7 +19,12 @@ const AURORA: &str = "bansho = 1\n[picture]\nsize = [8, 6]\n[[aurora]]\npreroll_
 
 /// Bytes before the state of the first phenomenon: magic, version, key, number of phenomena.
 const HEADER: usize = 8 + 4 + 32 + 8;
-const CHECKSUM: usize = 32;
+/// Bytes before a phenomenon's own state: steps taken, length.
+const CLOCK: usize = 8 + 8;
+
+/// Bits of the first byte.
+const IS_AURORA: u8 = 1;
+const GOES_ON: u8 = 4 | 8;
 
 fn plan(scene: &str) -> Arc<Plan> {
     let assets = MemoryAssets::default();
@@ -26,20 +32,22 @@ fn plan(scene: &str) -> Arc<Plan> {
     Arc::new(Plan::new(scene, &PlanOptions::default(), Arc::new(assets)).expect("the scene can be planned"))
 }
 
-/// A shot of each scene, with the header of its snapshots.
-fn open(plan: &Arc<Plan>) -> Box<dyn Shot> {
-    CpuBackend.open(plan.clone()).expect("the shot opens")
+fn open(plan: &Arc<Plan>) -> Restored {
+    let shot = CpuBackend.open(plan.clone()).expect("the shot opens");
+    let header = shot.snapshot()[..HEADER].to_vec();
+    let phenomenon = plan.open().expect("its phenomena can be made").remove(0);
+    Restored { shot, header, phenomenon }
+}
+
+/// A scene's shot, the header of its snapshots, and its phenomenon by itself.
+struct Restored {
+    shot: Box<dyn Shot>,
+    header: Vec<u8>,
+    phenomenon: Box<dyn Phenomenon>,
 }
 
 thread_local! {
-    static SHOTS: RefCell<Vec<(Box<dyn Shot>, Vec<u8>)>> = RefCell::new({
-        let headed = |plan| {
-            let shot = open(plan);
-            let header = shot.snapshot()[..HEADER].to_vec();
-            (shot, header)
-        };
-        PLANS.iter().map(headed).collect()
-    });
+    static SCENES: RefCell<Vec<Restored>> = RefCell::new(PLANS.iter().map(open).collect());
 }
 
 static PLANS: LazyLock<[Arc<Plan>; 2]> = LazyLock::new(|| {
@@ -49,12 +57,21 @@ static PLANS: LazyLock<[Arc<Plan>; 2]> = LazyLock::new(|| {
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let Some((&first, rest)) = bytes.split_first() else { return };
-    SHOTS.with_borrow_mut(|shots| {
-        let (shot, header) = &mut shots[usize::from(first & 1)];
-        let whole = if first & 2 == 0 { rest.to_vec() } else { sealed(header, rest) };
-        if shot.restore(&whole).is_ok() {
-            assert!(shot.snapshot().len() < whole.len() + HEADER + CHECKSUM, "a snapshot grows by being read");
-            check(shot.as_mut());
+    SCENES.with_borrow_mut(|scenes| {
+        let Restored { shot, header, phenomenon } = &mut scenes[usize::from(first & IS_AURORA)];
+        if first == 0 {
+            if shot.restore(rest).is_ok() {
+                check(&shot.particles());
+            }
+        } else if first & GOES_ON == GOES_ON {
+            if shot.restore(&sealed(header, rest)).is_ok() {
+                check(&shot.particles());
+                check_next(shot.as_mut());
+            }
+        } else if rest.len() > CLOCK && phenomenon.restore(&rest[CLOCK..]).is_ok() {
+            phenomenon.particles(0.0).iter().for_each(check);
+            let again = phenomenon.snapshot();
+            phenomenon.restore(&again).expect("what was restored is written as something that can be restored");
         }
     });
 });
@@ -66,11 +83,14 @@ fn sealed(header: &[u8], state: &[u8]) -> Vec<u8> {
     [&contents[..], &checksum].concat()
 }
 
-fn check(shot: &mut dyn Shot) {
-    let points = shot.particles();
+fn check(points: &PointCloud) {
     let values = points.positions.iter().chain(&points.velocities).flatten();
     assert!(values.chain(points.quantities.values().flatten()).all(|value| value.is_finite()));
+}
+
+fn check_next(shot: &mut dyn Shot) {
     if shot.advance(1, &Unobserved).is_ok() && shot.draw(&Unobserved).is_ok() {
+        check(&shot.particles());
         let frame = shot.read().expect("what was drawn can be read");
         assert!(frame.beauty.pixels().iter().flatten().all(|value| value.is_finite()), "the picture is not finite");
     }

@@ -7,8 +7,8 @@ use std::{
 };
 
 use bansho_base::{
-    color::AlphaConvention,
     assets::{MemoryAssets, Picture},
+    color::AlphaConvention,
     image::Frame,
     observer::Observer,
 };

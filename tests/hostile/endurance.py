@@ -157,15 +157,23 @@ def _again(trial: Trial, folder: str, tally: Tally) -> None:
 
 
 def kill(trial: Trial, folder: str, chance: random.Random, tally: Tally) -> None:
-    """SIGKILL at a random moment, then another run."""
+    """SIGKILL at a random moment before the end, then another run."""
     tally.runs += 1
-    process = trial.start(folder)
-    try:
-        process.wait(chance.uniform(0, trial.seconds))
-    except subprocess.TimeoutExpired:
-        process.kill()
-        tally.disturbed += 1
-    process.communicate()
+    for _ in range(20):
+        started = time.monotonic()
+        process = trial.start(folder)
+        try:
+            process.wait(chance.uniform(0, trial.seconds))
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+            tally.disturbed += 1
+            break
+        # It ended before, so it is faster than it was when it was undisturbed.
+        process.communicate()
+        trial.seconds = min(trial.seconds, time.monotonic() - started)
+        shutil.rmtree(folder)
+        os.makedirs(folder)
     broken = trial.broken(folder)
     tally.broken += len(broken)
     tally.notes += [f"not whole after SIGKILL: {name}" for name in broken[:3]]

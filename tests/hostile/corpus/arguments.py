@@ -146,7 +146,7 @@ def _others() -> list[Case]:
 
 
 def _standard_output() -> list[Case]:
-    full = r"^error: standard output: "
+    full = r"^error: .*standard output: "
     lines = {
         "check": ["check", "scene.toml"],
         "schema": ["schema"],

@@ -122,7 +122,6 @@ def _others() -> list[Case]:
         *[case for extension in ("png", "exr", "apng", "gif") for case in other(f"a .{extension}", render(f"a.{extension}"), f"a.{extension}")],
         *other("a picture of somebody", render("a.png"), "a.png", png.flat(32, 24)),
         *other("one frame of two", ["render", "scene.toml", "-o", "a.png", "--threads", "2"], "a.0001.png"),
-        *other("an empty file", render("a.png"), "a.png", ""),
         *other("figures", render("a.png", "--figures"), "a.json"),
         *other("a contact sheet", ["render", "scene.toml", "--contact-sheet", "2", "-o", "a.png", "--threads", "2"], "a.png"),
         *other("a flipbook's JSON", ["flipbook", "scene.toml", "--grid", "1x2", "--size", "8x8", "-o", "a.png"], "a.json"),
@@ -130,6 +129,8 @@ def _others() -> list[Case]:
         *other("particles", ["simulate", "scene.toml", "--particles", "a.ply", "--frames", "0"], "a.ply", THERE, GAS),
         *other("an index of streaks", ["streaks", "--rates", "5", "--diameters", "2", "--size", "8", "--box", "0.1", "-o", "s"], "s/streaks.json"),
         *other("with --resume", render("a.png", "--resume"), "a.png"),
+        # Nobody's work is in it: it may be replaced or kept.
+        Case("somebody's file", "an empty file", render("a.png"), (0, 2), r"^error: .*a\.png", {"scene.toml": FLAME, "a.png": ""}, changes=["a.png"]),
         Case("somebody's file", "a second time over one's own", render("a.png"), 0, "", {"scene.toml": FLAME}, setup=[render("a.png")], changes=["a.png"]),
         Case("somebody's file", "a second film over one's own", render("a.gif"), 0, "", {"scene.toml": FLAME}, setup=[render("a.gif")], changes=["a.gif"]),
         Case("somebody's file", "one's own cut off", render("a.png"), (0, 2), r"^error: .*a\.png", {"scene.toml": FLAME}, setup=[render("a.png")], damage={"a.png": png.SIGNATURE}, changes=["a.png"]),

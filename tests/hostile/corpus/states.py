@@ -36,7 +36,7 @@ def _snapshots() -> list[Case]:
         _state("a sparse file of 3.9 GB", sparse(3_900_000_000), signalled=True),
         _state("magic and 3.9 GB", sparse(3_900_000_000, MAGIC), signalled=True),
         _kept("empty since", {"states/state.1.bansho": b"", "states/state.0.bansho": b""}),
-        _kept("of another frame's name", {"states/state.99999999999999999999.bansho": b"x", "states/state.-1.bansho": b"x", "states/state..bansho": b"x"}),
+        _kept("of another frame's name", {"states/state.99999999999999999999.bansho": b"x", "states/state.-1.bansho": b"x", "states/state..bansho": b"x"}, (0, 2)),
         _kept("of frames far ahead", {"states/state.9223372036854775807.bansho": MAGIC, "states/state.-9223372036854775808.bansho": MAGIC}, (0, 1, 2)),
         _kept("10,000 files of other names", {f"states/other.{index}": b"" for index in range(10_000)}),
         Case("snapshot", "a folder that is a file", [*RENDER[:5], "scene.toml", *RENDER[6:]], (1, 2), r"^error: .*scene\.toml", {"scene.toml": GAS}, leaves=["out/*"]),

@@ -181,9 +181,13 @@ impl Phenomenon for FlameParticles {
     fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError> {
         let (time, rest) = state.split_first_chunk::<8>().ok_or(SnapshotError::Damaged)?;
         let (air, rest) = rest.split_first_chunk::<8>().ok_or(SnapshotError::Damaged)?;
+        let (time, air) = (f64::from_le_bytes(*time), f64::from_le_bytes(*air));
+        if !time.is_finite() || !air.is_finite() {
+            return Err(SnapshotError::Damaged);
+        }
         let burners = self.simulation.design.burners.len();
         self.simulation.particles = snapshot::read(&self.simulation.particles, rest, burners)?;
-        (self.time, self.air_temperature_k) = (f64::from_le_bytes(*time), f64::from_le_bytes(*air));
+        (self.time, self.air_temperature_k) = (time, air);
         Ok(())
     }
 

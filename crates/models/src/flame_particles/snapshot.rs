@@ -5,6 +5,8 @@ use bansho_base::phenomenon::SnapshotError;
 use super::particles::{NUMBERS, Particles};
 
 const VERSION: u32 = 2;
+/// Larger than any place, speed, temperature or other number of a simulated particle, and small enough to be reckoned with.
+const LARGEST: f32 = 1e12;
 /// Bytes of one particle: number of birth, burner, and all numbers.
 const PARTICLE: usize = 8 + 4 + 4 * NUMBERS;
 
@@ -43,8 +45,8 @@ pub(crate) fn read(particles: &Particles, bytes: &[u8], burners: usize) -> Resul
         *values = head.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
         rest = tail;
     }
-    if read.burner.iter().any(|burner| *burner as usize >= burners) {
-        return Err(SnapshotError::Damaged);
-    }
-    Ok(read)
+    let known = read.burner.iter().all(|burner| (*burner as usize) < burners);
+    // Of what is not a number the comparison is false.
+    let possible = read.numbers().iter().all(|values| values.iter().all(|value| value.abs() <= LARGEST));
+    if known && possible { Ok(read) } else { Err(SnapshotError::Damaged) }
 }

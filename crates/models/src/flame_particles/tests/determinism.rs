@@ -72,6 +72,12 @@ fn a_damaged_state_is_refused() {
     assert_eq!(read(&good, 0), Some(SnapshotError::Damaged), "a burner that is not there");
     assert_eq!(read(&good[..good.len() - 1], 1), Some(SnapshotError::Damaged));
     assert_eq!(read(&[], 1), Some(SnapshotError::Damaged));
+    for impossible in [f32::NAN, f32::INFINITY, -1e13] {
+        let mut far = good.clone();
+        let end = far.len() - 4;
+        far[end..].copy_from_slice(&impossible.to_le_bytes());
+        assert_eq!(read(&far, 1), Some(SnapshotError::Damaged), "{impossible}");
+    }
     let mut newer = good;
     newer[0] = 99;
     assert_eq!(read(&newer, 1), Some(SnapshotError::Version { found: 99, known: 2 }));
