@@ -33,7 +33,7 @@ crate::parameters! {
         /// What the lens does: straight lines, a dome, or all around.
         lens: Lens = Lens::Perspective;
         /// Vertical field of view of a perspective lens, unless `focal_length_mm` is given.
-        vertical_fov_deg: Animated<f64> = Animated::from(32.0), limits(Range::new(0.1, 170.0)), unit("degrees");
+        vertical_fov_deg: Animated<f64> = Animated::from(32.0), limits(VERTICAL_FOV_DEG), unit("degrees");
         /// Focal length; with `sensor_height_mm` it gives the field of view.
         focal_length_mm: Option<Animated<f64>> = None, limits(Range::new(0.1, 10_000.0)), unit("mm");
         /// Height of the sensor that `focal_length_mm` refers to.
@@ -51,6 +51,9 @@ crate::parameters! {
     }
 }
 
+/// Least and greatest vertical field of view of a perspective lens, whether it is stated or follows from focal length and sensor, degrees.
+pub const VERTICAL_FOV_DEG: Range = Range::new(0.1, 170.0);
+
 /// Vertical field of view of a lens of 14 mm, with which auroras are photographed, degrees.
 pub const SKY_FOV_DEG: f64 = 81.0;
 
@@ -66,10 +69,18 @@ impl CameraParameters {
         (self.position, self.target) = (Animated::from([0.0, EYE_HEIGHT, 0.0]), Animated::from(target));
     }
 
+    /// Least and greatest vertical field of view of the lens over all time, degrees, where it follows from the focal length.
+    #[must_use]
+    pub fn fov_of_focal_length(&self) -> Option<[f64; 2]> {
+        // Keyed lengths stay between their keys.
+        let [shortest, longest] = self.focal_length_mm.as_ref()?.bounds();
+        Some([longest, shortest].map(|focal| (2.0 * half_fov(self.sensor_height_mm, focal)).to_degrees()))
+    }
+
     /// The camera at time `t` for a picture of `size` pixels.
     pub fn at(&self, t: f64, size: [usize; 2]) -> Camera {
         let half_fov = match &self.focal_length_mm {
-            Some(focal) => math::atan(0.5 * self.sensor_height_mm / focal.at(t)),
+            Some(focal) => half_fov(self.sensor_height_mm, focal.at(t)),
             None => 0.5 * self.vertical_fov_deg.at(t).to_radians(),
         };
         let orientation =
@@ -91,6 +102,11 @@ impl CameraParameters {
             half_fov,
         }
     }
+}
+
+/// Half the field of view across a sensor of some size, radians.
+fn half_fov(sensor_mm: f64, focal_mm: f64) -> f64 {
+    math::atan(0.5 * sensor_mm / focal_mm)
 }
 
 /// Columns: right, up, backward. Looking straight up keeps north (-z) at the top, so that east lies left, as on star

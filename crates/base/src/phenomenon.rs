@@ -5,7 +5,7 @@ use crate::{
     image::{Figure, Image, Rect},
     observer::{Cancelled, Observer},
     point_cloud::PointCloud,
-    surroundings::{Publication, Surroundings},
+    surroundings::{Neighbours, Publication, Surroundings},
 };
 
 /// How a stepped phenomenon moves: in steps that are fixed in seconds, whatever the frame rate, size or shutter.
@@ -192,7 +192,7 @@ pub trait Phenomenon: Send + Sync {
     fn publish(&self, shutter: Shutter) -> Publication;
 
     /// What a user should know of how it will look among others.
-    fn remark(&self, _surroundings: &Surroundings) -> Option<Remark> {
+    fn remark(&self, _neighbours: &Neighbours) -> Option<Remark> {
         None
     }
 
@@ -234,6 +234,11 @@ pub trait Prepared: Send + Sync {
     /// Numbers that this frame is known by, each name once.
     fn figures(&self) -> Vec<Figure> {
         Vec::new()
+    }
+
+    /// Whether it may bend light anywhere in the picture, also where the window that it was prepared for does not show it.
+    fn may_bend(&self) -> bool {
+        self.deflection().is_some()
     }
 
     /// How it bends the light of what lies behind it.

@@ -26,6 +26,23 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
+/// As [`printable`], with one character for each, so that a mark below it stands where it should: a space for a tab, the picture of a control
+/// (U+2400 and after), and a replacement character for what turns the direction of reading.
+///
+/// ```
+/// assert_eq!(bansho_base::printable::pictured("a\t=\x1b[2J\u{202e}"), "a =\u{241b}[2J\u{fffd}");
+/// ```
+pub fn pictured(text: &str) -> String {
+    let picture = |character: char| match character {
+        '\t' => ' ',
+        '\0'..='\x1f' => char::from_u32(0x2400 + u32::from(character)).unwrap_or(char::REPLACEMENT_CHARACTER),
+        '\x7f' => '\u{2421}',
+        other if steers(other) => char::REPLACEMENT_CHARACTER,
+        other => other,
+    };
+    text.chars().map(picture).collect()
+}
+
 /// Characters of a text that are shown at its start, and at its end, where not all are.
 const SHOWN: [usize; 2] = [2000, 1000];
 

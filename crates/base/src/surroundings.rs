@@ -111,6 +111,40 @@ impl Publication {
     }
 }
 
+/// What one phenomenon of a scene is among, to look at before anything is drawn: nothing is copied, so that of many phenomena each can be
+/// asked.
+#[derive(Clone, Copy)]
+pub struct Neighbours<'a> {
+    /// The scene's own lights and obstacles.
+    pub scene: &'a Publication,
+    /// How many phenomena there are.
+    pub count: usize,
+    /// What the phenomenon of a number publishes; only asked for where it matters.
+    pub published: &'a dyn Fn(usize) -> &'a Publication,
+    /// Its own number.
+    pub own: usize,
+    /// The light of the sky.
+    pub sky: &'a Sky,
+}
+
+impl<'a> Neighbours<'a> {
+    /// All lights but its own.
+    pub fn lights(&self) -> impl Iterator<Item = &'a Light> + use<'a> {
+        self.others().flat_map(|publication| &publication.lights)
+    }
+
+    /// All solids but its own.
+    pub fn occluders(&self) -> impl Iterator<Item = &'a Occluder> + use<'a> {
+        self.others().flat_map(|publication| &publication.occluders)
+    }
+
+    fn others(&self) -> impl Iterator<Item = &'a Publication> + use<'a> {
+        let (own, published) = (self.own, self.published);
+        let others = (0..self.count).filter(move |index| *index != own);
+        std::iter::once(self.scene).chain(others.map(published))
+    }
+}
+
 /// Radiance (ACEScg, cd/m^2) and alpha of a whole picture in fewer pixels.
 #[derive(Clone, Debug)]
 pub struct Backdrop {
@@ -165,6 +199,19 @@ mod tests {
             Light { emitter: Emitter::Point { position: DVec3::ZERO, radius: 0.5 }, intensity: [8.0, 4.0, 2.0] };
         assert_eq!(light.illuminance(DVec3::new(2.0, 0.0, 0.0)).0, [2.0, 1.0, 0.5]);
         assert_eq!(light.illuminance(DVec3::new(0.1, 0.0, 0.0)).0, light.illuminance(DVec3::new(0.5, 0.0, 0.0)).0);
+    }
+
+    #[test]
+    fn neighbours_are_all_but_oneself() {
+        let shining = |intensity: f32| {
+            let emitter = Emitter::Directional { toward: DVec3::Y };
+            Publication { lights: vec![Light { emitter, intensity: [intensity; 3] }], ..Publication::default() }
+        };
+        let (scene, published) = (shining(1.0), [shining(2.0), shining(3.0), shining(4.0)]);
+        let published = |index: usize| &published[index];
+        let neighbours = Neighbours { scene: &scene, count: 3, published: &published, own: 1, sky: &Sky::DARK };
+        let intensities: Vec<f32> = neighbours.lights().map(|light| light.intensity[0]).collect();
+        assert_eq!((intensities, neighbours.occluders().count()), (vec![1.0, 2.0, 4.0], 0));
     }
 
     #[test]

@@ -2,10 +2,7 @@
 
 use std::process::ExitCode;
 
-use bansho::{
-    SceneError,
-    job::{Cause, JobError},
-};
+use bansho::job::{Cause, JobError};
 
 use crate::{
     command::{new::Unknown, studio::SaidWhy},
@@ -59,18 +56,9 @@ fn tell(error: &anyhow::Error) {
 pub(crate) fn tell_job(error: &JobError) {
     match error.scene() {
         Some(scene) => {
-            faults(scene).for_each(|fault| to_stderr(&format!("error: {fault}")));
+            scene.faults().for_each(|fault| to_stderr(&format!("error: {fault}")));
             flags::for_scene(scene).iter().for_each(|flag| output::tell("hint", flag));
         }
         None => output::tell("error", &flags::error(error)),
     }
-}
-
-/// The faults of a scene, each by itself.
-fn faults(error: &SceneError) -> impl Iterator<Item = SceneError> + '_ {
-    error.problems.iter().map(|problem| SceneError {
-        file: error.file.clone(),
-        text: error.text.clone(),
-        problems: vec![problem.clone()],
-    })
 }

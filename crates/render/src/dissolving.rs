@@ -6,7 +6,7 @@ use bansho_base::{
     observer::{Cancelled, Observer},
     phenomenon::{Deflection, Phenomenon, Prepared, Remark, SnapshotError, Stepping},
     point_cloud::PointCloud,
-    surroundings::{Publication, Surroundings},
+    surroundings::{Neighbours, Publication, Surroundings},
 };
 
 /// A stepped phenomenon in a loop: two runs of it, mixed about the moment where the loop closes.
@@ -170,8 +170,8 @@ impl Phenomenon for Dissolving {
         both
     }
 
-    fn remark(&self, surroundings: &Surroundings) -> Option<Remark> {
-        self.present.phenomenon.remark(surroundings)
+    fn remark(&self, neighbours: &Neighbours) -> Option<Remark> {
+        self.present.phenomenon.remark(neighbours)
     }
 
     fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval> {

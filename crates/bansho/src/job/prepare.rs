@@ -16,7 +16,7 @@ use bansho_media::{
     overwriting::OverwritePolicy,
     plates::FileAssets,
 };
-use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth};
+use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth, scene::Positions};
 
 use super::{
     BackendChoice, Job,
@@ -97,12 +97,17 @@ pub fn check_scene(scene: &SceneFile) -> Result<Plan, JobError> {
 /// # Errors
 /// A phenomenon cannot be made.
 pub fn remarks(scene: &SceneFile, plan: &Plan) -> Result<Vec<Note>, JobError> {
+    let remarks = plan.remarks()?;
+    if remarks.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut positions = Positions::new(plan.scene(), &scene.text);
     let note = |(name, remark): (String, Remark)| {
-        let position = plan.scene().position(&scene.text, &name, remark.key().as_deref());
+        let position = positions.of(&name, remark.key().as_deref());
         let place = position.map(|position| Spot { file: scene.name.clone(), position });
         Note::Remark { place, name, remark }
     };
-    Ok(plan.remarks()?.into_iter().map(note).collect())
+    Ok(remarks.into_iter().map(note).collect())
 }
 
 /// What draws.

@@ -36,6 +36,18 @@ fn interpolation_name(interpolation: Interpolation) -> InterpolationName {
     }
 }
 
+/// Most control points of a curve or keys of a value: those of half an hour of frames, each keyed. Every copy of a curve holds them all.
+pub const MOST_POINTS: usize = 100_000;
+
+/// Whether there are not too many control points or keys.
+fn has_room(items: &[Node], node: &Node, reader: &mut Reader) -> bool {
+    let fits = items.len() <= MOST_POINTS;
+    if !fits {
+        reader.report(node, ProblemKind::ListLength { found: items.len(), min: 1, max: MOST_POINTS });
+    }
+    fits
+}
+
 /// Splits `{ <list_key> = [...], interpolation = "..." }` into its list and its interpolation.
 fn keyed_table<'a>(
     table: &'a Table,
@@ -130,6 +142,9 @@ impl Parameter for Curve {
                 return None;
             }
         };
+        if !has_room(items, node, reader) {
+            return None;
+        }
         let points = match &node.value {
             Value::Table(_) => reader.within("points", |reader| read_points(items, limits, &expected, reader)),
             _ => read_points(items, limits, &expected, reader),
@@ -176,6 +191,9 @@ impl<T: Parameter + Animate> Parameter for Animated<T> {
         };
         let expected = Self::kind(limits);
         let (items, interpolation) = keyed_table(table, "keys", node, &expected, reader)?;
+        if !has_room(items, node, reader) {
+            return None;
+        }
         let read_key = |item: &Node, reader: &mut Reader| match &item.value {
             Value::List(pair) if pair.len() == 2 => {
                 let time = read_number(&pair[0], &Range::default(), "s", &expected, reader)?;
@@ -213,5 +231,37 @@ impl<T: Parameter + Animate> Parameter for Animated<T> {
 
     fn close_loop(&mut self, period: f64) -> Option<String> {
         (!self.close(period)).then(String::new)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(count: usize) -> Value {
+        Value::List((0..count).map(|index| Value::numbers([index as f64, 0.5]).into()).collect())
+    }
+
+    fn fault<P: Parameter<Limits = L>, L>(value: Value, limits: &L) -> Option<ProblemKind> {
+        let mut reader = Reader::new();
+        let read = P::read(&Node { value, span: 3..4 }, limits, "", &mut reader);
+        let fault = reader.into_problems().listed.pop();
+        assert_eq!(read.is_none(), fault.is_some());
+        fault.map(|problem| problem.kind)
+    }
+
+    #[test]
+    fn too_many_keys_and_control_points_are_refused() {
+        let keyed = |count| {
+            let mut table = Table::default();
+            table.push("keys", points(count));
+            Value::Table(table)
+        };
+        let told = ProblemKind::ListLength { found: MOST_POINTS + 1, min: 1, max: MOST_POINTS };
+        assert_eq!(fault::<Animated<f64>, _>(keyed(MOST_POINTS), &Range::default()), None);
+        assert_eq!(fault::<Animated<f64>, _>(keyed(MOST_POINTS + 1), &Range::default()), Some(told.clone()));
+        let limits = CurveLimits { x: Range::default(), ..CurveLimits::default() };
+        assert_eq!(fault::<Curve, _>(points(MOST_POINTS), &limits), None);
+        assert_eq!(fault::<Curve, _>(points(MOST_POINTS + 1), &limits), Some(told));
     }
 }

@@ -10,14 +10,16 @@ mod kind;
 mod macros;
 mod node;
 mod problem;
+mod reader;
 mod sample;
 mod types;
 
 pub use assets::assets;
 pub use fault::ModelFault;
-pub use keyed::{CurveLimits, InterpolationName};
+pub use keyed::{CurveLimits, InterpolationName, MOST_POINTS};
 pub use kind::{Choice, Descriptor, Kind, TableDescriptor};
 pub use node::{Entry, Node, Span, Table, Value};
-pub use problem::{Problem, ProblemKind, Reader, nearest};
+pub use problem::{Problem, ProblemKind, nearest};
+pub use reader::{MOST_PROBLEMS, Problems, Reader};
 pub use sample::sample;
 pub use types::{AssetPath, Auto, Length, Parameter, Parameters, Range, path};

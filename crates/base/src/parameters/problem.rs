@@ -1,6 +1,6 @@
 //! Faults in what a file says, each with its place, what is wrong and what is allowed.
 
-use super::{Choice, Kind, ModelFault, Node, Span};
+use super::{ModelFault, Span};
 use crate::{
     assets::AssetError,
     plural::{between, counted},
@@ -32,8 +32,16 @@ pub enum ProblemKind {
     /// The text is not TOML.
     #[error("{0}")]
     Syntax(String),
+    /// The text says more than is read: what it comes to in memory is a hundred times its own length.
+    #[error(
+        "the text holds more than {most} values and tables (by its commas, brackets, braces and equals signs); allowed: up to {most}"
+    )]
+    TooManyValues {
+        /// Most that are read.
+        most: usize,
+    },
     /// The key means nothing here.
-    #[error("unknown key `{key}`{}; allowed: {}", did_you_mean(.nearest), .allowed.join(", "))]
+    #[error("unknown key `{}`{}; allowed: {}", excerpt(.key), did_you_mean(.nearest), .allowed.join(", "))]
     UnknownKey {
         /// The key.
         key: String,
@@ -63,7 +71,7 @@ pub enum ProblemKind {
         unit: &'static str,
     },
     /// A name that is none of those allowed.
-    #[error("`{value}` is not known{}; allowed: {}", did_you_mean(.nearest), .allowed.join(", "))]
+    #[error("`{}` is not known{}; allowed: {}", excerpt(.value), did_you_mean(.nearest), .allowed.join(", "))]
     NotOneOf {
         /// The name.
         value: String,
@@ -155,76 +163,33 @@ fn short(value: f64) -> String {
     if plain { value.to_string() } else { format!("{value:e}") }
 }
 
+/// Text that a file states as a message repeats it: its beginning, where it is long.
+fn excerpt(text: &str) -> std::borrow::Cow<'_, str> {
+    /// Characters; no name that a scene may state is as long.
+    const LONGEST: usize = 80;
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}...", &text[..end]).into(),
+        None => text.into(),
+    }
+}
+
 fn unit_suffix(unit: &str) -> String {
     if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
 /// The candidate most like `word`, if one is alike enough to be a slip of the hand.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    /// Bytes. Longer words are no slip of the hand, and comparing them takes the square of their length.
+    const LONGEST: usize = 100;
+    if word.len() > LONGEST {
+        return None;
+    }
     candidates
         .into_iter()
         .map(|candidate| (strsim::jaro_winkler(word, candidate), candidate))
         .filter(|(likeness, _)| *likeness > 0.8)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, candidate)| candidate)
-}
-
-/// Gathers problems while values are read; knows the path that is being read.
-#[derive(Debug, Default)]
-pub struct Reader {
-    path: Vec<String>,
-    problems: Vec<Problem>,
-}
-
-impl Reader {
-    /// A reader of a file's root.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Runs `read` with `segment` added to the path.
-    pub fn within<T>(&mut self, segment: impl Into<String>, read: impl FnOnce(&mut Self) -> T) -> T {
-        self.path.push(segment.into());
-        let result = read(self);
-        self.path.pop();
-        result
-    }
-
-    /// Notes a problem at `node`.
-    pub fn report(&mut self, node: &Node, kind: ProblemKind) {
-        self.report_at(Some(node.span.clone()), kind);
-    }
-
-    /// Notes a problem at `span`.
-    pub fn report_at(&mut self, span: Option<Span>, kind: ProblemKind) {
-        self.problems.push(Problem { span, path: self.path.join("."), kind });
-    }
-
-    /// Notes that `node` is not of the wanted kind.
-    pub fn wrong_type(&mut self, node: &Node, expected: &Kind) {
-        let kind = ProblemKind::WrongType { expected: expected.expectation(), found: node.value.type_name() };
-        self.report(node, kind);
-    }
-
-    /// Notes that `name` is none of `choices`.
-    pub fn not_one_of(&mut self, node: &Node, name: &str, choices: &[Choice]) {
-        let kind = ProblemKind::NotOneOf {
-            value: name.to_owned(),
-            nearest: nearest(name, choices.iter().map(|choice| choice.name)).map(str::to_owned),
-            allowed: choices.iter().map(|choice| choice.name.to_owned()).collect(),
-        };
-        self.report(node, kind);
-    }
-
-    /// All problems so far, in the order in which they were met.
-    pub fn problems(&self) -> &[Problem] {
-        &self.problems
-    }
-
-    /// Takes all problems.
-    pub fn into_problems(self) -> Vec<Problem> {
-        self.problems
-    }
 }
 
 #[cfg(test)]
@@ -245,6 +210,17 @@ mod tests {
         assert_eq!(told(1, 2, 2), "has 1 item; allowed: exactly 2 items");
         assert_eq!(told(0, 1, 1), "has 0 items; allowed: exactly 1 item");
         assert_eq!(told(13, 1, 12), "has 13 items; allowed: 1 to 12 items");
+    }
+
+    #[test]
+    fn of_long_words_the_beginning_is_told() {
+        let key = "\u{e9}".repeat(1_000_000);
+        let nearest = nearest(&key, ["speed"]).map(str::to_owned);
+        let told = ProblemKind::UnknownKey { key, nearest, allowed: vec!["speed".into()] }.to_string();
+        assert_eq!(told, format!("unknown key `{}...`; allowed: speed", "\u{e9}".repeat(80)));
+        let value = "x".repeat(81);
+        let told = ProblemKind::NotOneOf { value, nearest: None, allowed: vec!["a".into()] }.to_string();
+        assert!(told.len() < 120, "{told}");
     }
 
     #[test]

@@ -39,12 +39,11 @@ pub trait Parameters: Sized + Default {
         let known = || Self::table().parameters.iter().map(|parameter| parameter.key).chain(ignored.iter().copied());
         for entry in &table.entries {
             if !known().any(|key| key == entry.key) {
-                let kind = ProblemKind::UnknownKey {
+                reader.report_made(Some(entry.key_span.clone()), || ProblemKind::UnknownKey {
                     key: entry.key.clone(),
                     nearest: nearest(&entry.key, known()).map(str::to_owned),
                     allowed: known().map(str::to_owned).collect(),
-                };
-                reader.report_at(Some(entry.key_span.clone()), kind);
+                });
             }
         }
     }

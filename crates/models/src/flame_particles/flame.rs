@@ -10,7 +10,7 @@ use bansho_base::{
     phenomenon::{Phenomenon, Prepared, Remark, SnapshotError, Stepping},
     point_cloud::{PointCloud, Quantity},
     random::Key,
-    surroundings::{Publication, Surroundings},
+    surroundings::{Neighbours, Publication, Surroundings},
 };
 
 use super::{
@@ -128,7 +128,7 @@ impl Phenomenon for FlameParticles {
         draw::AOVS
     }
 
-    fn remark(&self, surroundings: &Surroundings) -> Option<Remark> {
+    fn remark(&self, neighbours: &Neighbours) -> Option<Remark> {
         let burners = &self.simulation.design.burners;
         let gives = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
         if !burners.iter().any(gives) {
@@ -138,7 +138,7 @@ impl Phenomenon for FlameParticles {
         let is_buried = |burner: &Burner| {
             let within = |birth: u64| {
                 let place = origin + burner.birthplace(self.simulation.key, birth, 0.0).position;
-                surroundings.others.occluders.iter().any(|occluder| occluder.signed_distance(place) < 0.0)
+                neighbours.occluders().any(|occluder| occluder.signed_distance(place) < 0.0)
             };
             // As many births as show it.
             gives(burner) && (0..32).all(within)

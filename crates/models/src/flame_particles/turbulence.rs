@@ -3,9 +3,12 @@
 //! The velocity is the curl of three noise potentials (Bridson, Hourihan and Nordenstam 2007), taken by central differences on a
 //! periodic grid. Two layers, one half as large, scroll at different speeds, so that eddies change while they rise.
 
+use std::sync::OnceLock;
+
 use bansho_base::{
     math::{DVec3, Vec3},
     noise::{Coordinate, Fractal, Noise},
+    once::get_or_make,
     random::{Key, Purpose},
 };
 use fearless_simd::{Simd, prelude::*, u32x16};
@@ -24,8 +27,9 @@ const LAYER_SHARE: [f32; 2] = [0.86, 0.51];
 /// A periodic field of velocity, of standard deviation 1 a component.
 #[derive(Clone, Debug)]
 pub(crate) struct Turbulence {
+    key: Key,
     /// Velocities on the grid; the fourth number is 0.
-    tile: Vec<[f32; 4]>,
+    tile: OnceLock<Vec<[f32; 4]>>,
 }
 
 /// Turbulence at one moment.
@@ -38,20 +42,18 @@ pub(crate) struct Eddies<'a> {
 
 impl Turbulence {
     pub(crate) fn new(key: Key) -> Self {
-        let words = key.words(0, 0, Purpose::named("turbulence"));
-        let potentials = [0, 1, 2].map(|axis| potential(words[axis]));
-        let mut tile: Vec<Vec3> = (0..SIDE * SIDE * SIDE).map(|index| curl(&potentials, index)).collect();
-        let squares: f64 = tile.iter().map(|velocity| f64::from(velocity.length_squared())).sum();
-        let deviation = bansho_base::math::sqrt(squares / (3 * tile.len()) as f64);
-        let scale = if deviation > 0.0 { (1.0 / deviation) as f32 } else { 0.0 };
-        tile.iter_mut().for_each(|velocity| *velocity *= scale);
-        Self { tile: tile.into_iter().map(|velocity| velocity.extend(0.0).to_array()).collect() }
+        Self { key, tile: OnceLock::new() }
+    }
+
+    /// The tile, made when a step first asks for it: a flame that is only checked does without.
+    fn tile(&self) -> &[[f32; 4]] {
+        get_or_make(&self.tile, || tile(self.key)).as_slice()
     }
 
     /// A number of mean 0 and standard deviation 1 that changes over a unit of `place`.
     pub(crate) fn patch(&self, place: DVec3) -> f32 {
         let place = (place * (SIDE as f64 / f64::from(EDDIES))).rem_euclid(DVec3::splat(SIDE as f64));
-        sample(&self.tile, place.as_vec3())[0]
+        sample(self.tile(), place.as_vec3())[0]
     }
 
     /// The eddies at time `t`, the largest `eddy_size` m wide, rising in gas of `speed` and drifting with the wind's `drift` since time 0.
@@ -63,8 +65,19 @@ impl Turbulence {
             let origin = (-moved * scale + 11.3 * index as f64).rem_euclid(DVec3::splat(SIDE as f64));
             (scale as f32, origin.as_vec3().to_array())
         };
-        Eddies { tile: &self.tile, layers: [layer(0), layer(1)] }
+        Eddies { tile: self.tile(), layers: [layer(0), layer(1)] }
     }
+}
+
+fn tile(key: Key) -> Vec<[f32; 4]> {
+    let words = key.words(0, 0, Purpose::named("turbulence"));
+    let potentials = [0, 1, 2].map(|axis| potential(words[axis]));
+    let mut tile: Vec<Vec3> = (0..SIDE * SIDE * SIDE).map(|index| curl(&potentials, index)).collect();
+    let squares: f64 = tile.iter().map(|velocity| f64::from(velocity.length_squared())).sum();
+    let deviation = bansho_base::math::sqrt(squares / (3 * tile.len()) as f64);
+    let scale = if deviation > 0.0 { (1.0 / deviation) as f32 } else { 0.0 };
+    tile.iter_mut().for_each(|velocity| *velocity *= scale);
+    tile.into_iter().map(|velocity| velocity.extend(0.0).to_array()).collect()
 }
 
 impl Eddies<'_> {
@@ -183,7 +196,7 @@ mod tests {
     fn the_tile_is_free_of_divergence_and_of_unit_strength() {
         let turbulence = Turbulence::new(Key::new(3, "turbulence"));
         let at = |x: usize, y: usize, z: usize| {
-            Vec3::from_slice(&turbulence.tile[((z % SIDE) * SIDE + y % SIDE) * SIDE + x % SIDE])
+            Vec3::from_slice(&turbulence.tile()[((z % SIDE) * SIDE + y % SIDE) * SIDE + x % SIDE])
         };
         for index in (0..SIDE * SIDE * SIDE).step_by(37) {
             let [x, y, z] = [index % SIDE, index / SIDE % SIDE, index / (SIDE * SIDE)];
@@ -203,14 +216,14 @@ mod tests {
     #[test]
     fn one_place_and_sixteen_find_the_same_velocity() {
         let turbulence = Turbulence::new(Key::new(3, "turbulence"));
-        let tile = <&[[f32; 4]; SIDE * SIDE * SIDE]>::try_from(turbulence.tile.as_slice()).unwrap();
+        let tile = <&[[f32; 4]; SIDE * SIDE * SIDE]>::try_from(turbulence.tile()).unwrap();
         for step in 0..200 {
             let place = Vec3::new(0.37, 1.71, 0.83) * step as f32 - 40.0;
             let together = plain!(simd => {
                 let lanes = place.to_array().map(|x| Lanes::splat(simd, x));
                 sample_lanes(simd, tile, &lanes).map(|values| values.as_slice()[7])
             });
-            let alone = sample(&turbulence.tile, place);
+            let alone = sample(turbulence.tile(), place);
             assert!((0..3).all(|c| (together[c] - alone[c]).abs() < 1e-5), "at {place}: {together:?} {alone:?}");
         }
     }

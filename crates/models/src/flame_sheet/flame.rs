@@ -133,7 +133,7 @@ impl FlameSheet {
         let push = Push::new(wind, middle, t, right, self.rise_speed(flame, t), self.parameters.wind_response);
         let stand = Stand::new(base, right, size, push.toward);
         let time = self.flame_time(flame, t);
-        (stand, Moment::new(&self.parameters, &self.shape, &flame.motion, &self.clock, time, push))
+        (stand, Moment::new(&self.parameters, self.shape(), &flame.motion, &self.clock, time, push))
     }
 
     /// Moments that stand for the exposure: enough that the gas scrolls a few pixels from one to the next.

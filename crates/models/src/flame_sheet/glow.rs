@@ -30,7 +30,7 @@ impl FlameSheet {
     pub(crate) fn row_intensities(&self, flame: &Flame, t: f64) -> RowIntensities {
         let still = Push { across: 0.0, toward: 0.0 };
         let time = self.flame_time(flame, t);
-        let moment = Moment::new(&self.parameters, &self.shape, &flame.motion, &self.clock, time, still);
+        let moment = Moment::new(&self.parameters, self.shape(), &flame.motion, &self.clock, time, still);
         let texture = flame.source.texture(moment.scroll);
         let state = State { moment, texture, pixel: [2.0 / LANES as f32, 1.0 / ROWS as f32] };
         let size = self.sheet_size(flame);
@@ -65,7 +65,7 @@ fn rows<S: Simd>(simd: S, sheet: &FlameSheet, state: &State, scale: f32) -> RowI
     for (index, row) in rows.iter_mut().enumerate() {
         let y = Lanes::splat(simd, (index as f32 + 0.5) / ROWS as f32);
         let batch = Batch { x, y, depth: y.like(1.0) };
-        if let Some(shade) = shade(&sheet.shape, &sheet.ramp, state, &batch) {
+        if let Some(shade) = shade(sheet.shape(), sheet.ramp(), state, &batch) {
             for k in 0..3 {
                 row[k] = shade.light[k].as_slice().iter().sum::<f32>() * scale;
             }

@@ -53,7 +53,7 @@ fn measure_batch<S: Simd>(
 ) {
     let batch = sample.mapping.batch(simd, pixel[0], pixel[1]);
     let sheet = measured.sheet;
-    let Some(shade) = shade_as(&sheet.shape, &sheet.ramp, sample, measured.drawn, &batch) else { return };
+    let Some(shade) = shade_as(sheet.shape(), sheet.ramp(), sample, measured.drawn, &batch) else { return };
     for lane in 0..LANES {
         let x = pixel[0] + lane;
         if !(rect.x..rect.right()).contains(&x) {
@@ -68,7 +68,7 @@ fn measure_batch<S: Simd>(
         strip.aovs[OPTICAL_DEPTH].add(index, depth, 1.0);
         let weight = color::luminance([0, 1, 2].map(|k| shade.light[k][lane])) * sample.luminance;
         if weight > 0.0 && measured.drawn == Drawn::Flame {
-            strip.aovs[TEMPERATURE].add(index, sheet.ramp.temperature.at(shade.t1[lane])[0], weight);
+            strip.aovs[TEMPERATURE].add(index, sheet.ramp().temperature.at(shade.t1[lane])[0], weight);
             let motion = measured.motion(sample, f64::from(batch.x[lane]), f64::from(batch.y[lane]));
             for (plane, value) in MOTION.into_iter().zip(motion) {
                 strip.aovs[plane].add(index, value, weight);
@@ -102,7 +102,7 @@ impl FlameSheet {
         const STEP: f32 = 0.01;
         let distance = super::chain::axis_distance(x as f32);
         let y = (y as f32).clamp(0.02, 0.98);
-        let slope = (self.shape.slowed_rise_at(distance, y + STEP) - self.shape.slowed_rise_at(distance, y - STEP))
+        let slope = (self.shape().slowed_rise_at(distance, y + STEP) - self.shape().slowed_rise_at(distance, y - STEP))
             / (2.0 * STEP);
         // Where the outline folds the mapping over, its slope is no speed of gas.
         self.clock.speed(self.flame_time(flame, t)) / f64::from(slope.max(LEAST_SLOPE))

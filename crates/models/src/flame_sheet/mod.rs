@@ -24,11 +24,12 @@ mod smoke;
 mod tables;
 mod texture;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
     canvas::{AovDescriptor, AovRule, DepthInterval, Shutter, View},
     observer::{Cancelled, Observer, check},
+    once::get_or_make,
     phenomenon::{Phenomenon, Prepared},
     surroundings::{Publication, Surroundings},
 };
@@ -59,8 +60,8 @@ pub struct FlameSheet {
     name: String,
     parameters: FlameSheetParameters,
     clock: Clock,
-    shape: Shape,
-    ramp: Ramp,
+    /// Made when it is first seen: there may be thousands of sheets, each of which is made to be checked.
+    tables: OnceLock<Tables>,
     flames: Vec<Flame>,
 }
 
@@ -79,16 +80,42 @@ impl FlameSheet {
             return Err(ParameterFault { key: "loop", kind: FaultKind::LoopLength { seconds } });
         }
         let clock = Clock::new(parameters.speed.clone(), loop_s);
-        let shape = Shape::new(&parameters.shape, &parameters.texture, &parameters.colour)?;
-        let ramp = Ramp::new(&parameters.texture, &parameters.colour, parameters.stage)?;
+        Shape::check(&parameters.shape)?;
+        Ramp::check(&parameters.texture)?;
         let flames = flames(&parameters, name, seed, &clock);
-        Ok(Self { name: name.to_owned(), parameters, clock, shape, ramp, flames })
+        Ok(Self { name: name.to_owned(), parameters, clock, tables: OnceLock::new(), flames })
     }
 
     /// Its parameters.
     pub fn parameters(&self) -> &FlameSheetParameters {
         &self.parameters
     }
+
+    fn tables(&self) -> &Tables {
+        let FlameSheetParameters { shape, texture, colour, stage, .. } = &self.parameters;
+        let make = || Tables {
+            shape: Box::new(Shape::new(shape, texture, colour)),
+            ramp: Box::new(Ramp::new(texture, colour, *stage)),
+        };
+        get_or_make(&self.tables, make)
+    }
+
+    /// What of the chain does not change with time.
+    pub(crate) fn shape(&self) -> &Shape {
+        &self.tables().shape
+    }
+
+    /// From gas to light.
+    pub(crate) fn ramp(&self) -> &Ramp {
+        &self.tables().ramp
+    }
+}
+
+/// What a sheet is drawn with, and depends on its parameters alone.
+#[derive(Clone, Debug)]
+struct Tables {
+    shape: Box<Shape>,
+    ramp: Box<Ramp>,
 }
 
 fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Clock) -> Vec<Flame> {

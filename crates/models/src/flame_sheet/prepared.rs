@@ -135,9 +135,10 @@ impl Prepared for PreparedSheet<'_> {
 
 impl PreparedSheet<'_> {
     fn draw_sheet(&self, part: &Part, drawn: Drawn, samples: &[Sample], rect: Rect, strip: &mut Strip) {
-        let (sheet, absorbs) = (self.sheet, self.sheet.ramp.absorbs || drawn == Drawn::Smoke);
+        let (sheet, absorbs) = (self.sheet, self.sheet.ramp().absorbs || drawn == Drawn::Smoke);
         let band = samples.first().map_or(1, |sample| band_of(1.0 / f64::from(sample.state.pixel[1])));
-        let paint = Paint { shape: &sheet.shape, ramp: &sheet.ramp, samples, drawn, absorbs, band, squeezed: SQUEEZED };
+        let paint =
+            Paint { shape: sheet.shape(), ramp: sheet.ramp(), samples, drawn, absorbs, band, squeezed: SQUEEZED };
         fearless_simd::dispatch!(self.level, simd => draw_rows(simd, &paint, rect, strip));
         if !strip.aovs.is_empty() {
             let measured = Measured { sheet, flame: part.flame, view: self.view, samples, drawn };

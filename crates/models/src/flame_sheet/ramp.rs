@@ -60,16 +60,17 @@ fn gray(stage: StageShown, t1: f64, t2: f64) -> f64 {
 }
 
 impl Ramp {
-    /// The table for these parameters.
+    /// Whether there is a table for these parameters.
     ///
     /// # Errors
     /// The sharpening curve does not begin at the origin.
-    pub(crate) fn new(
-        texture: &TextureParameters,
-        colour: &ColourParameters,
-        stage: StageShown,
-    ) -> Result<Self, ParameterFault> {
-        let sharpen = from_origin(&texture.sharpen, "texture.sharpen")?;
+    pub(crate) fn check(texture: &TextureParameters) -> Result<(), ParameterFault> {
+        from_origin(&texture.sharpen, "texture.sharpen").map(drop)
+    }
+
+    /// The table for these parameters, which were [checked](Self::check).
+    pub(crate) fn new(texture: &TextureParameters, colour: &ColourParameters, stage: StageShown) -> Self {
+        let sharpen = from_origin(&texture.sharpen, "texture.sharpen").unwrap_or_else(|_| texture.sharpen.clone());
         let luminance = |rgb: [f64; 3]| f64::from(color::luminance(rgb.map(|value| value as f32)));
         let brightest = (0..=256).map(|i| luminance(hue(colour, f64::from(i) / 256.0))).fold(0.0, f64::max);
         let scale = if brightest > 0.0 { 1.0 / brightest } else { 0.0 };
@@ -87,12 +88,12 @@ impl Ramp {
                 _ => [gray(stage, t1, t2), gray(stage, t1, t2), gray(stage, t1, t2), 1.0],
             }
         };
-        Ok(Self {
+        Self {
             light: levels(light),
             temperature: CurvePair::new(|t1| [temperature(colour, sharpen.eval(t1)), 0.0]),
             absorbs: colour.soot_optical_depth > 0.0 || stage != StageShown::Flame,
             base_blue: blue_flame::colour().map(|value| value * colour.base_blue as f32),
-        })
+        }
     }
 }
 

@@ -144,18 +144,20 @@ impl<S: Simd> Place<S> {
 }
 
 impl Shape {
-    /// Tables for these curves.
+    /// Whether there are tables for these curves.
     ///
     /// # Errors
     /// A curve that must begin at the origin does not, or core and fringe together are wider than the sheet.
-    pub(crate) fn new(
-        shape: &ShapeParameters,
-        texture: &TextureParameters,
-        colour: &ColourParameters,
-    ) -> Result<Self, ParameterFault> {
+    pub(crate) fn check(shape: &ShapeParameters) -> Result<(), ParameterFault> {
         let fringe = from_origin(&shape.fringe_width, "shape.fringe_width")?;
+        check_widths(&samples(&shape.core_width, &fringe))
+    }
+
+    /// Tables for these curves, which were [checked](Self::check).
+    pub(crate) fn new(shape: &ShapeParameters, texture: &TextureParameters, colour: &ColourParameters) -> Self {
+        let fringe = from_origin(&shape.fringe_width, "shape.fringe_width");
+        let fringe = fringe.unwrap_or_else(|_| shape.fringe_width.clone());
         let width_samples = samples(&shape.core_width, &fringe);
-        check_widths(&width_samples)?;
         let mut result = Self {
             initial_speed: shape.initial_speed as f32,
             edge_speed: shape.edge_speed as f32,
@@ -169,7 +171,7 @@ impl Shape {
             reach: Box::new([1.0; REACH_BINS]),
         };
         result.reach = result.find_reach();
-        Ok(result)
+        result
     }
 
     /// The fluttering edges left and right, over w, eq. (15).

@@ -104,7 +104,7 @@ impl FlameSheet {
         let stand = Stand::new(start, right, plume, push.toward);
         let across = Push { across: push.across * plume.y / plume.x * size.x / size.y, ..push };
         let time = self.flame_time(flame, t);
-        let moment = Moment::new(&self.parameters, &self.shape, &motion, &self.clock, time, across);
+        let moment = Moment::new(&self.parameters, self.shape(), &motion, &self.clock, time, across);
         let mapping = Mapping::new(&view.camera, &stand)?;
         let scale = pixels_per_metre(&view.camera, &stand);
         let source = FilteredSource::fractal(layers, scale * plume.y);

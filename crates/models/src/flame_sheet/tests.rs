@@ -91,7 +91,7 @@ fn random_parameters(number: u64) -> FlameSheetParameters {
     let table = sample(FlameSheetParameters::table(), &mut next);
     let mut reader = Reader::new();
     let parameters = FlameSheetParameters::read_table(&table, &mut reader, &[]);
-    assert!(reader.problems().is_empty(), "{:?}", reader.problems());
+    assert!(reader.is_clean(), "{:?}", reader.into_problems());
     parameters
 }
 
@@ -99,15 +99,15 @@ fn random_parameters(number: u64) -> FlameSheetParameters {
 fn field<S: Simd>(simd: S, sheet: &FlameSheet, t: f64) -> Vec<[f32; 4]> {
     let flame = &sheet.flames[0];
     let push = Push { across: 0.4, toward: 0.0 };
-    let moment = Moment::new(&sheet.parameters, &sheet.shape, &flame.motion, &sheet.clock, t, push);
+    let moment = Moment::new(&sheet.parameters, sheet.shape(), &flame.motion, &sheet.clock, t, push);
     let state = State { texture: flame.source.texture(moment.scroll), moment, pixel: [0.05, 0.05] };
     let mut values = Vec::new();
     for row in 0..24 {
         let (x, y) = (ramp(simd, 0.01, 0.065), Lanes::splat(simd, row as f32 / 23.0));
         let (x, y) = state.moment.straighten(x, y);
-        let place = sheet.shape.place(x, y, &state.moment.edges, state.pixel);
+        let place = sheet.shape().place(x, y, &state.moment.edges, state.pixel);
         let coverage = place.coverage(state.pixel);
-        let texture = sheet.shape.gas(state.texture.sample(place.u, place.w));
+        let texture = sheet.shape().gas(state.texture.sample(place.u, place.w));
         let cut = chain::above_threshold(texture, place.threshold);
         for lane in 0..LANES {
             values.push([texture[lane], cut[lane], place.threshold[lane], coverage[lane]]);
@@ -280,7 +280,7 @@ fn red_in_bands(sheet: &FlameSheet, view: &View, rows: usize) -> Vec<f32> {
     with_wind([0.5, 0.0, 0.0], |surroundings| {
         let flame = &sheet.flames[0];
         let (samples, _) = sheet.samples(flame, &flame.source.filtered(1e4), view, surroundings.wind, 1);
-        let (shape, ramp) = (&sheet.shape, &sheet.ramp);
+        let (shape, ramp) = (sheet.shape(), sheet.ramp());
         let paint = Paint {
             shape,
             ramp,
@@ -337,7 +337,7 @@ fn red_of_campfire(finer: usize, squeezed: f32) -> Vec<f32> {
     with_wind([0.25, 0.0, 0.0], |surroundings| {
         let flame = &sheet.flames[0];
         let (samples, _) = sheet.samples(flame, &flame.source.filtered(270.0), &view, surroundings.wind, 1);
-        let (shape, ramp) = (&sheet.shape, &sheet.ramp);
+        let (shape, ramp) = (sheet.shape(), sheet.ramp());
         let paint = Paint { shape, ramp, samples: &samples, drawn: Drawn::Flame, absorbs: true, band: 2, squeezed };
         let rect = Rect::of_size(size[0], size[1]);
         let mut strip = Strip::default();

@@ -7,7 +7,7 @@ use bansho_base::{
     observer::{Cancelled, Observer, check},
     phenomenon::{Phenomenon, Prepared, Remark},
     random::Key,
-    surroundings::{Emitter, Light, Publication, Surroundings},
+    surroundings::{Emitter, Light, Neighbours, Publication, Surroundings},
     wind::Wind,
 };
 
@@ -153,9 +153,9 @@ impl Phenomenon for Rain {
         Publication { extinction: self.extinctions(shutter.middle())[0], ..Publication::default() }
     }
 
-    fn remark(&self, surroundings: &Surroundings) -> Option<Remark> {
+    fn remark(&self, neighbours: &Neighbours) -> Option<Remark> {
         let dark = |light: &Light| light.intensity.iter().all(|value| *value <= 0.0);
-        let unlit = surroundings.others.lights.iter().all(dark) && surroundings.sky.is_dark();
+        let unlit = neighbours.sky.is_dark() && neighbours.lights().all(dark);
         unlit.then_some(Remark::Unlit)
     }
 

@@ -26,6 +26,8 @@ const RATIO: f64 = 1.25;
 const FAR_RATIO: f64 = 2.0;
 /// Angle, seen from a lamp, that one sample stands for.
 const ANGLE: f64 = 0.15;
+/// Optical depth behind which no light of lamps is seen: a part in 10^17 of it comes through.
+const OPAQUE: f32 = 40.0;
 /// A veil has no depth of its own, m.
 const NOWHERE: [f32; FINE] = [f32::INFINITY; FINE];
 /// Lamps are at least so large for the air around them, m.
@@ -102,7 +104,7 @@ struct Span {
     brackets: [(usize, f32); 2],
     /// Optical depths up to its ends.
     depths: [f32; 2],
-    /// How many times brighter its light is where it begins than at the camera; 0 beyond the light of lamps.
+    /// How many times brighter its light is where it begins than at the camera; 0 beyond the light of lamps, and where none comes through.
     gain: f32,
 }
 
@@ -195,7 +197,9 @@ impl<'a> Veil<'a> {
     fn span(&self, [near, far]: [f64; 2]) -> Span {
         let brackets = [near, far.max(near)].map(|distance| self.bracket(distance));
         let depths = brackets.map(|(k, share)| self.depths[k] + (self.depths[k + 1] - self.depths[k]) * share);
-        let gain = if near < self.end { math::lanes::exp(depths[0]) } else { 0.0 };
+        // What lies behind so much rain is not seen, and its gain would soon be infinite.
+        let is_lit = near < self.end && depths[0] < OPAQUE;
+        let gain = if is_lit { math::lanes::exp(depths[0]) } else { 0.0 };
         Span { brackets, depths, gain }
     }
 

@@ -1,11 +1,15 @@
 //! Time of stepped phenomena: fixed steps in one order, whatever the frames.
 
+use std::sync::OnceLock;
+
 use bansho_base::{
     canvas::Shutter,
     color,
     observer::{self, Cancelled, Observer},
+    once::get_or_make,
     phenomenon::{Phenomenon, Remark},
-    surroundings::{Publication, Surroundings},
+    sky::Sky,
+    surroundings::{Neighbours, Publication, Surroundings},
 };
 
 use super::{faint::faint, mirror::Mirror};
@@ -46,14 +50,49 @@ pub(super) fn surroundings<'a>(
 
 /// What everybody but `index` publishes during `shutter`, and the scene's own lights and obstacles.
 fn others(plan: &Plan, publications: &[Publication], index: usize, shutter: Shutter) -> Publication {
-    let lights = plan.scene.lights.iter().map(|light| light.at(shutter.middle())).collect();
-    let mut others = Publication { lights, occluders: plan.occluders.clone(), ..Publication::default() };
+    let mut others = of_scene(plan, shutter);
     for (other, publication) in publications.iter().enumerate() {
         if other != index {
             others.extend(publication);
         }
     }
     others
+}
+
+/// The scene's own lights and obstacles.
+fn of_scene(plan: &Plan, shutter: Shutter) -> Publication {
+    let lights = plan.scene.lights.iter().map(|light| light.at(shutter.middle())).collect();
+    Publication { lights, occluders: plan.occluders.clone(), ..Publication::default() }
+}
+
+/// What there is in a scene at one moment.
+struct Moment<'a> {
+    shutter: Shutter,
+    phenomena: &'a [Box<dyn Phenomenon>],
+    scene: Publication,
+    /// What phenomena publish, as far as anybody has asked.
+    published: Vec<OnceLock<Publication>>,
+    sky: Sky,
+}
+
+impl<'a> Moment<'a> {
+    fn new(plan: &Plan, phenomena: &'a [Box<dyn Phenomenon>], shutter: Shutter) -> Self {
+        Self {
+            shutter,
+            phenomena,
+            scene: of_scene(plan, shutter),
+            published: phenomena.iter().map(|_| OnceLock::new()).collect(),
+            sky: plan.sky(shutter.middle()),
+        }
+    }
+
+    fn remark(&self, index: usize) -> Option<Remark> {
+        let published =
+            |other: usize| get_or_make(&self.published[other], || self.phenomena[other].publish(self.shutter));
+        let count = self.phenomena.len();
+        let neighbours = Neighbours { scene: &self.scene, count, published: &published, own: index, sky: &self.sky };
+        self.phenomena[index].remark(&neighbours)
+    }
 }
 
 /// What users should know of how phenomena will look, each with its phenomenon's name.
@@ -65,18 +104,14 @@ pub(crate) fn remarks(plan: &Plan) -> Result<Vec<(String, Remark)>, PlanError> {
     let may_shine_later = phenomena.iter().any(|phenomenon| phenomenon.stepping().is_some());
     let frames = plan.frames();
     let shutters = [frames.start, (frames.start + frames.end) / 2, frames.end - 1].map(|number| plan.shutter(number));
+    let moments = shutters.map(|shutter| Moment::new(plan, &phenomena, shutter));
     let remark = |index: usize| {
-        let phenomenon = &phenomena[index];
-        let at = |shutter: &Shutter| {
-            let publications: Vec<Publication> = phenomena.iter().map(|each| each.publish(*shutter)).collect();
-            phenomenon.remark(&surroundings(plan, &publications, index, *shutter, None))
-        };
-        let [first, middle, last] = shutters.each_ref().map(at);
+        let [first, middle, last] = moments.each_ref().map(|moment| moment.remark(index));
         let always = first.filter(|_| first == middle && middle == last)?;
         if may_shine_later && always == Remark::Unlit {
             return None;
         }
-        Some((phenomenon.name().to_owned(), always))
+        Some((phenomena[index].name().to_owned(), always))
     };
     let plate = plan.assumed_plate_ev100().map(|ev100| {
         let white = color::white_luminance(ev100);

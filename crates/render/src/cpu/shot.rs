@@ -118,10 +118,12 @@ impl CpuShot {
         observer::check(observer)?;
         // Where nothing lies behind, nothing is bent.
         let behind = plate.colour.is_some() || self.phenomena.len() > 1;
-        let bends = behind && prepared.iter().any(|prepared| prepared.deflection().is_some());
-        if bends && view.window != Rect::of_size(view.size[0], view.size[1]) {
+        let is_whole = view.window == Rect::of_size(view.size[0], view.size[1]);
+        // Also where the window itself sees nothing bent: a picture before which light is bent is rounded otherwise everywhere.
+        if !is_whole && behind && prepared.iter().any(|prepared| prepared.may_bend()) {
             return Ok(None);
         }
+        let bends = behind && prepared.iter().any(|prepared| prepared.deflection().is_some());
         let composition = Composition {
             outputs: Outputs::of_plan(&self.plan),
             view,

@@ -1,8 +1,12 @@
 //! What a scene must fulfil beyond the ranges of single parameters.
 
+use std::collections::HashMap;
+
 use bansho_base::{
     assets::Assets,
-    parameters::{Auto, Node, ProblemKind, Reader, Span, Table, Value, nearest},
+    camera::{Lens, VERTICAL_FOV_DEG},
+    math,
+    parameters::{Auto, Node, ProblemKind, Range, Reader, Span, Table, Value, nearest},
 };
 use bansho_models::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
@@ -36,12 +40,11 @@ pub(super) fn root_keys(root: &Table, kinds: &[PhenomenonKind], reader: &mut Rea
         .collect();
     for entry in &root.entries {
         if !known.contains(&entry.key.as_str()) {
-            let kind = ProblemKind::UnknownKey {
+            reader.report_made(Some(entry.key_span.clone()), || ProblemKind::UnknownKey {
                 key: entry.key.clone(),
                 nearest: nearest(&entry.key, known.iter().copied()).map(str::to_owned),
                 allowed: known.iter().map(|&key| key.to_owned()).collect(),
-            };
-            reader.report_at(Some(entry.key_span.clone()), kind);
+            });
         }
     }
 }
@@ -121,6 +124,8 @@ pub(super) fn assets_and_openings(
     let (mut seen, mut crowd) = (std::collections::BTreeMap::new(), 0);
     let seed = scene.picture.seed as u64;
     let good = good.filter(|good| good.picture.seed == scene.picture.seed);
+    let known: HashMap<&str, &Instance> =
+        good.iter().flat_map(|good| &good.instances).map(|instance| (instance.name.as_str(), instance)).collect();
     for instance in &mut scene.instances {
         let index: &mut usize = seen.entry(instance.kind.key).or_default();
         let path = format!("{}.{index}", instance.kind.key);
@@ -134,7 +139,7 @@ pub(super) fn assets_and_openings(
                 }
             }
         }
-        instance.luminance = good.and_then(|good| known_luminance(good, instance));
+        instance.luminance = known.get(instance.name.as_str()).and_then(|old| known_luminance(old, instance));
         if instance.luminance.is_some() {
             continue;
         }
@@ -145,11 +150,10 @@ pub(super) fn assets_and_openings(
     }
 }
 
-/// The luminance of a phenomenon that is as it was in a scene that was good.
-fn known_luminance(good: &Scene, instance: &Instance) -> Option<f64> {
-    let canonical = instance.source.canonical();
-    let same = |old: &&Instance| old.name == instance.name && old.kind.key == instance.kind.key;
-    good.instances.iter().find(same).filter(|old| old.source.canonical() == canonical)?.luminance
+/// The luminance of a phenomenon if it is as its namesake was in a scene that was good.
+fn known_luminance(old: &Instance, instance: &Instance) -> Option<f64> {
+    let same = old.kind.key == instance.kind.key && old.source.canonical() == instance.source.canonical();
+    old.luminance.filter(|_| same)
 }
 
 /// Notes a fault of what stands at `path`.
@@ -168,6 +172,32 @@ fn camera(scene: &Scene, root: &Table, reader: &mut Reader) {
         let place = place(root, "camera.target");
         reader.within("camera", |r| r.within("target", |r| r.report_at(place, kind)));
     }
+    field_of_view(scene, root, reader);
+}
+
+/// The field of view that follows from focal length and sensor is within the same limits as one that is stated.
+fn field_of_view(scene: &Scene, root: &Table, reader: &mut Reader) {
+    let (camera, Range { min, max }) = (&scene.camera, VERTICAL_FOV_DEG);
+    if camera.lens != Lens::Perspective {
+        return;
+    }
+    let Some([narrowest, widest]) = camera.fov_of_focal_length() else { return };
+    // The limits themselves are met but for rounding.
+    let is_allowed = |fov: f64| (min * (1.0 - 1e-9)..=max * (1.0 + 1e-9)).contains(&fov);
+    let Some(fov) = [widest, narrowest].into_iter().find(|fov| !is_allowed(*fov)) else { return };
+    let sensor = camera.sensor_height_mm;
+    let focal = |fov: f64| 0.5 * sensor / math::tan(0.5 * fov.to_radians());
+    let told = format!(
+        "gives a field of view of {fov:.3} degrees with a sensor of {sensor} mm; allowed: {min} to {max} degrees, here {:.3} to {:.0} mm",
+        focal(max),
+        focal(min)
+    );
+    report(
+        OpeningFault { key: "focal_length_mm".into(), kind: ProblemKind::Conflict(told) },
+        "camera".into(),
+        root,
+        reader,
+    );
 }
 
 /// A lamp that shines somewhere must say where to, and a spot be full within the angle at which it ends. A fullness that the file does not

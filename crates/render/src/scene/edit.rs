@@ -2,7 +2,7 @@
 
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 
-use super::{FORMAT, PhenomenonKind, SHARED_TABLES, suggest};
+use super::{FORMAT, PhenomenonKind, SHARED_TABLES, suggest, toml};
 
 /// Why an edit cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -54,7 +54,7 @@ pub enum EditError {
 /// # Errors
 /// The text is no TOML, the assignment is malformed, or the path leads nowhere.
 pub fn set(text: &str, assignment: &str, kinds: &[PhenomenonKind]) -> Result<String, EditError> {
-    let mut document: DocumentMut = text.parse().map_err(syntax)?;
+    let mut document = document(text)?;
     let (path, value) = split(assignment)?;
     let value = parse_value(value);
     let segments: Vec<&str> = path.split('.').map(str::trim).collect();
@@ -67,14 +67,29 @@ pub fn set(text: &str, assignment: &str, kinds: &[PhenomenonKind]) -> Result<Str
     }
     set_in(root, &segments, &value, path)?;
     let edited = document.to_string();
+    drop(document);
     // A value nested nearly as deep as readers go may lie too deep in the scene.
-    match edited.parse::<DocumentMut>() {
-        Ok(_) => Ok(edited),
-        Err(_) => Err(EditError::NoAssignment(assignment.to_owned())),
-    }
+    check(&edited).map_err(|_| EditError::NoAssignment(assignment.to_owned()))?;
+    Ok(edited)
 }
 
-pub(super) fn syntax(error: toml_edit::TomlError) -> EditError {
+/// A text as it can be edited.
+pub(super) fn document(text: &str) -> Result<DocumentMut, EditError> {
+    check_extent(text)?;
+    text.parse().map_err(syntax)
+}
+
+/// Whether an edited text can be read again.
+pub(super) fn check(text: &str) -> Result<(), EditError> {
+    check_extent(text)?;
+    toml_edit::Document::parse(text).map(drop).map_err(syntax)
+}
+
+fn check_extent(text: &str) -> Result<(), EditError> {
+    toml::check_extent(text).map_err(|problem| EditError::Syntax(problem.kind.to_string()))
+}
+
+fn syntax(error: toml_edit::TomlError) -> EditError {
     EditError::Syntax(error.message().to_owned())
 }
 
@@ -233,7 +248,7 @@ fn did_you_mean(meant: &[String]) -> String {
 /// # Errors
 /// The text is no TOML, or of a newer format.
 pub fn upgrade(text: &str) -> Result<Option<String>, EditError> {
-    let document: DocumentMut = text.parse().map_err(syntax)?;
+    let document = document(text)?;
     match document.get("bansho").and_then(Item::as_integer) {
         Some(FORMAT) => Ok(None),
         Some(found) if found > FORMAT => Err(EditError::NewerFormat { found }),

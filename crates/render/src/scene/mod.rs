@@ -3,11 +3,13 @@
 pub(crate) mod check;
 pub mod defaults;
 pub mod edit;
+mod lines;
 pub mod obstacle;
 pub mod operation;
 pub mod picture;
 mod place;
 pub(crate) mod plate;
+mod positions;
 pub mod report;
 pub mod schema;
 pub mod source;
@@ -15,14 +17,14 @@ mod suggest;
 pub mod template;
 mod toml;
 
-use std::sync::Arc;
+use std::{collections::HashSet, sync::Arc};
 
 use bansho_base::{
     air::Air,
     animation::Animated,
     assets::Assets,
     camera::{CameraParameters, SKY_FOV_DEG},
-    parameters::{Parameter, Parameters, Problem, ProblemKind, Reader, Table, TableDescriptor, Value},
+    parameters::{Parameter, Parameters, Problem, ProblemKind, Problems, Reader, Table, TableDescriptor, Value},
     sky::SkyParameters,
     wind::WindParameters,
 };
@@ -33,6 +35,7 @@ pub use self::{
     obstacle::{ObstacleParameters, ObstacleShape},
     picture::{DepthKind, FrameRate, LightParameters, PictureParameters, PlateParameters},
     place::{Place, Segment},
+    positions::Positions,
     report::SceneError,
     source::{Describe, Memo, Opening, OpeningFault, PhenomenonKind, Source},
 };
@@ -164,19 +167,19 @@ impl Scene {
         kinds: &[PhenomenonKind],
         check: impl FnOnce(&mut Self, &Table, &mut Reader),
     ) -> Result<Self, SceneError> {
-        let fail = |problems| SceneError { file: file.to_owned(), text: text.to_owned(), problems };
-        let root = toml::parse(text).map_err(|problem| fail(vec![problem]))?;
+        let fail = |Problems { listed, omitted }| SceneError {
+            file: file.to_owned(),
+            text: text.to_owned(),
+            problems: listed,
+            omitted,
+        };
+        let root = toml::parse(text).map_err(|problem| fail(Problems { listed: vec![problem], omitted: 0 }))?;
         let mut reader = Reader::new();
         let mut scene = Self::read(&root, kinds, &mut reader);
-        if reader.problems().is_empty() {
+        if reader.is_clean() {
             check(&mut scene, &root, &mut reader);
         }
-        let mut problems: Vec<Problem> = reader.into_problems();
-        if problems.is_empty() {
-            return Ok(scene);
-        }
-        problems.sort_by_key(|problem| problem.span.as_ref().map_or(usize::MAX, |span| span.start));
-        Err(fail(problems))
+        if reader.is_clean() { Ok(scene) } else { Err(fail(reader.into_problems())) }
     }
 
     fn read(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) -> Self {
@@ -223,16 +226,7 @@ impl Scene {
     /// Where the text of a scene states a parameter of the phenomenon `name`, or the nearest part of it: one-based line and column; of its
     /// plate where that is the name. None where it states no such phenomenon.
     pub fn position(&self, text: &str, name: &str, key: Option<&str>) -> Option<(usize, usize)> {
-        if name == check::PLATE_LAYER {
-            let span = check::place(&toml::parse(text).ok()?, name)?;
-            return Some(report::position(text, span.start));
-        }
-        let place = self.instances.iter().position(|instance| instance.name == name)?;
-        let kind = self.instances[place].kind.key;
-        let index = self.instances[..place].iter().filter(|instance| instance.kind.key == kind).count();
-        let rest = key.map_or_else(String::new, |key| format!(".{key}"));
-        let span = check::place(&toml::parse(text).ok()?, &format!("{kind}.{index}{rest}"))?;
-        Some(report::position(text, span.start))
+        Positions::new(self, text).of(name, key)
     }
 
     /// Paths of all files that the scene names, as it names them.
@@ -313,12 +307,13 @@ fn read_many<P: Parameters>(root: &Table, key: &'static str, reader: &mut Reader
 
 fn read_instances(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) -> Vec<Instance> {
     let mut instances: Vec<Instance> = Vec::new();
+    let mut names = HashSet::new();
     for entry in &root.entries {
         let Some(kind) = kinds.iter().find(|kind| kind.key == entry.key) else { continue };
         for (index, table) in tables(root, kind.key, reader).into_iter().enumerate() {
             let instance = reader.within(format!("{}.{index}", kind.key), |reader| {
                 let instance = read_instance(*kind, index, table, reader);
-                if instances.iter().any(|other| other.name == instance.name) {
+                if !names.insert(instance.name.clone()) {
                     let span = table.get("name").map_or(entry.key_span.clone(), |node| node.span.clone());
                     reader.report_at(Some(span), ProblemKind::DuplicateName { name: instance.name.clone() });
                 }

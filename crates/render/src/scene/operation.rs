@@ -4,7 +4,7 @@ use bansho_base::parameters::{Node, Table as Values, Value};
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, Value as Written};
 
 use super::{
-    edit::{EditError, syntax},
+    edit::{self, EditError},
     place::{Place, Segment},
 };
 
@@ -69,15 +69,13 @@ const SAME_TIME_S: f64 = 1e-6;
 /// # Errors
 /// The text is no TOML, an operation's place is not there, or its value cannot stand in a scene. No operation is then made.
 pub fn apply(text: &str, operations: &[Operation]) -> Result<String, EditError> {
-    let mut document: DocumentMut = text.parse().map_err(syntax)?;
+    let mut document = edit::document(text)?;
     for operation in operations {
         document.carry_out(operation)?;
     }
     let edited = document.to_string();
-    match edited.parse::<DocumentMut>() {
-        Ok(_) => Ok(edited),
-        Err(error) => Err(syntax(error)),
-    }
+    drop(document);
+    edit::check(&edited).map(|()| edited)
 }
 
 trait CarryOut {

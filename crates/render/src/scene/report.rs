@@ -2,9 +2,17 @@
 
 use std::fmt;
 
-use bansho_base::parameters::{Problem, ProblemKind};
+use bansho_base::{
+    parameters::{Problem, ProblemKind},
+    plural::counted,
+    printable::{message, pictured, printable},
+};
 
-use super::{check, toml};
+use super::{
+    check,
+    lines::{Excerpt, Lines},
+    toml,
+};
 
 /// A scene that cannot be used, with every reason why.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -15,21 +23,14 @@ pub struct SceneError {
     pub text: String,
     /// What is wrong, in the order of the file; never empty.
     pub problems: Vec<Problem>,
+    /// How many problems there are beyond those: the first [`MOST_PROBLEMS`](bansho_base::parameters::MOST_PROBLEMS) are kept.
+    pub omitted: usize,
 }
-
-/// Most problems that are spelled out at once.
-const SHOWN: usize = 12;
 
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, problem) in self.problems.iter().take(SHOWN).enumerate() {
-            if index > 0 {
-                f.write_str("\n\n")?;
-            }
-            self.show(f, problem)?;
-        }
-        if self.problems.len() > SHOWN {
-            write!(f, "\n\nand {} more", self.problems.len() - SHOWN)?;
+        for (index, told) in self.faults().enumerate() {
+            write!(f, "{}{told}", if index > 0 { "\n\n" } else { "" })?;
         }
         Ok(())
     }
@@ -40,46 +41,35 @@ impl SceneError {
     pub fn at(file: &str, text: &str, path: &str, kind: ProblemKind) -> Self {
         let span = toml::parse(text).ok().and_then(|root| check::place(&root, path));
         let problem = Problem { span, path: path.to_owned(), kind };
-        Self { file: file.to_owned(), text: text.to_owned(), problems: vec![problem] }
+        Self { file: file.to_owned(), text: text.to_owned(), problems: vec![problem], omitted: 0 }
+    }
+
+    /// Each fault as a person reads it, then how many more there are.
+    pub fn faults(&self) -> impl Iterator<Item = String> + '_ {
+        let mut lines = Lines::new(&self.text);
+        let each = self.problems.iter().map(move |problem| self.told(problem, &mut lines));
+        let more = format!("{}: and {}", printable(&self.file), counted(self.omitted, "more fault"));
+        each.chain((self.omitted > 0).then_some(more))
     }
 
     /// One-based line and column (in characters) of a byte of the text.
     pub fn position(&self, byte: usize) -> (usize, usize) {
-        position(&self.text, byte)
+        Lines::new(&self.text).position(byte)
     }
 
-    fn show(&self, f: &mut fmt::Formatter<'_>, problem: &Problem) -> fmt::Result {
+    fn told(&self, problem: &Problem, lines: &mut Lines) -> String {
+        let (file, told) = (printable(&self.file), problem.to_string());
+        let told = message(&told);
         let Some(span) = &problem.span else {
-            return write!(f, "{}: {problem}", self.file);
+            return format!("{file}: {told}");
         };
-        let (line, column) = self.position(span.start);
-        let source = self.text.lines().nth(line - 1).unwrap_or_default();
-        let end = span.end.min(span.start + source.len().saturating_sub(column - 1));
-        let carets = self.text.get(span.start..end).map_or(1, |marked| marked.chars().count().max(1));
+        let (line, column) = lines.position(span.start);
+        let Excerpt { shown, before, marked } = lines.excerpt(span.clone());
         let gutter = " ".repeat(line.to_string().len());
-        write!(
-            f,
-            "{}:{line}:{column}: {problem}\n{gutter} |\n{line} | {source}\n{gutter} | {}{}",
-            self.file,
-            " ".repeat(column - 1),
-            "^".repeat(carets)
-        )
+        let (before, marked) = (" ".repeat(before), "^".repeat(marked));
+        let shown = pictured(&shown);
+        format!("{file}:{line}:{column}: {told}\n{gutter} |\n{line} | {shown}\n{gutter} | {before}{marked}")
     }
-}
-
-/// One-based line and column (in characters) of a byte of a text.
-pub(super) fn position(text: &str, byte: usize) -> (usize, usize) {
-    let before = &text[..floor_char_boundary(text, byte)];
-    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
-}
-
-fn floor_char_boundary(text: &str, byte: usize) -> usize {
-    let mut byte = byte.min(text.len());
-    while !text.is_char_boundary(byte) {
-        byte -= 1;
-    }
-    byte
 }
 
 #[cfg(test)]
@@ -100,6 +90,7 @@ mod tests {
                     allowed: vec!["size".into()],
                 },
             }],
+            omitted: 0,
         };
         let shown = error.to_string();
         assert!(
@@ -112,7 +103,28 @@ mod tests {
     #[test]
     fn spans_beyond_the_text_do_not_panic() {
         let problem = Problem { span: Some(90..99), path: String::new(), kind: ProblemKind::Syntax("oops".into()) };
-        let error = SceneError { file: "x".into(), text: "é".into(), problems: vec![problem] };
+        let error = SceneError { file: "x".into(), text: "é".into(), problems: vec![problem], omitted: 0 };
         assert!(error.to_string().contains("oops"));
+    }
+
+    #[test]
+    fn nothing_in_a_scene_steers_a_terminal_or_looks_like_another_error() {
+        let problem = Problem {
+            span: Some(4..9),
+            path: String::new(),
+            kind: ProblemKind::Syntax("bad \x1b[2J\nerror: x".into()),
+        };
+        let error =
+            SceneError { file: "a\nb".into(), text: "a = \x1b\"\tb\"".into(), problems: vec![problem], omitted: 0 };
+        let shown = error.to_string();
+        assert_eq!(shown, "a\\nb:1:5: bad \\u{1b}[2J\\nerror: x\n  |\n1 | a = \u{241b}\" b\"\n  |     ^^^^^");
+    }
+
+    #[test]
+    fn what_is_not_listed_is_counted() {
+        let problem = Problem { span: None, path: "a".into(), kind: ProblemKind::Syntax("oops".into()) };
+        let error = SceneError { file: "x".into(), text: String::new(), problems: vec![problem], omitted: 3 };
+        assert_eq!(error.to_string(), "x: a: oops\n\nx: and 3 more faults");
+        assert_eq!(error.faults().count(), 2);
     }
 }

@@ -8,12 +8,45 @@ use toml_edit::{Document, Item, TableLike};
 /// # Errors
 /// The text is not TOML; one problem says where and why.
 pub(super) fn parse(text: &str) -> Result<Table, Problem> {
+    check_extent(text)?;
     let document = Document::parse(text).map_err(|error| Problem {
-        span: error.span(),
+        span: error.span().or_else(|| deepest(text)),
         path: String::new(),
         kind: ProblemKind::Syntax(error.message().to_owned()),
     })?;
     Ok(table(document.as_table()))
+}
+
+/// Most values and tables of a text: in memory the parser takes up to 400 bytes for each sign that begins or ends one, 1.6 GB for so many.
+pub(super) const MOST_VALUES: usize = 4_000_000;
+
+/// Whether a text says no more than can be read, which is found out before it is parsed.
+///
+/// # Errors
+/// It does; the problem says where it becomes too much.
+pub(super) fn check_extent(text: &str) -> Result<(), Problem> {
+    let signs = text.bytes().enumerate().filter(|(_, byte)| matches!(byte, b',' | b'[' | b'{' | b'='));
+    match signs.map(|(at, _)| at).nth(MOST_VALUES) {
+        None => Ok(()),
+        Some(at) => {
+            let kind = ProblemKind::TooManyValues { most: MOST_VALUES };
+            Err(Problem { span: Some(at..at + 1), path: String::new(), kind })
+        }
+    }
+}
+
+/// The first line whose keys are nested deeper than the parser goes, which it does not say itself.
+fn deepest(text: &str) -> Option<Span> {
+    /// Parts of a dotted key that the parser allows.
+    const DEEPEST: usize = 80;
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        if line.bytes().filter(|byte| *byte == b'.').count() >= DEEPEST {
+            return Some(start..start + line.trim_end().len());
+        }
+        start += line.len();
+    }
+    None
 }
 
 fn table(source: &dyn TableLike) -> Table {
@@ -72,6 +105,30 @@ mod tests {
         assert_eq!(&text[b.entries[0].key_span.clone()], "c");
         let Value::List(tables) = &root.get("d").unwrap().value else { panic!("d is a list") };
         assert_eq!(tables.len(), 2);
+    }
+
+    #[test]
+    fn what_says_too_much_is_refused_before_it_is_parsed() {
+        let text = |count: usize| format!("# no TOML at all\n{}", ",".repeat(count));
+        assert_eq!(check_extent(&text(MOST_VALUES)), Ok(()));
+        let problem = parse(&text(MOST_VALUES + 1)).unwrap_err();
+        let last = text(MOST_VALUES).len();
+        assert_eq!(
+            (problem.kind, problem.span),
+            (ProblemKind::TooManyValues { most: MOST_VALUES }, Some(last..last + 1))
+        );
+    }
+
+    #[test]
+    fn nothing_is_too_deep_for_an_answer() {
+        let deep = |open: &str, close: &str| format!("x = 1\na = {}1{}\n", open.repeat(100_000), close.repeat(100_000));
+        let dotted = ["a"; 100_000].join(".");
+        let texts =
+            [deep("[", "]"), deep("{a=", "}"), format!("x = 1\n{dotted} = 1\n"), format!("x = 1\n[{dotted}]\n")];
+        for text in texts {
+            let problem = parse(&text).unwrap_err();
+            assert!(problem.span.is_some_and(|span| span.start >= 6), "{:?}", problem.kind);
+        }
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub(super) fn show(ui: &mut Ui, session: &Session) -> Option<Wanted> {
     let error = session.document.error()?.clone();
     let mut wanted = None;
     egui::Panel::bottom("problems").resizable(true).show(ui, |ui| {
-        let count = error.problems.len();
+        let count = error.problems.len() + error.omitted;
         let faults = if count == 1 { "1 fault".to_owned() } else { format!("{count} faults") };
         ui.strong(format!("{faults}; the last good picture stays"));
         egui::ScrollArea::vertical().max_height(120.0).show(ui, |ui| {

@@ -118,7 +118,7 @@ pub fn recheck(
         }
         Err(found) => {
             let problems = found.into_iter().map(Problem::from).collect();
-            Err(SceneError { file: name.to_owned(), text: text.to_owned(), problems })
+            Err(SceneError { file: name.to_owned(), text: text.to_owned(), problems, omitted: 0 })
         }
     }
 }
@@ -160,7 +160,7 @@ fn usual(kind: &str, keys: &[&str]) -> Option<f64> {
 /// A fault that only planning shows, which lies in no one line.
 fn unplaced(name: &str, text: &str, reason: String) -> SceneError {
     let problem = Problem { span: None, path: String::new(), kind: ProblemKind::Conflict(reason) };
-    SceneError { file: name.to_owned(), text: text.to_owned(), problems: vec![problem] }
+    SceneError { file: name.to_owned(), text: text.to_owned(), problems: vec![problem], omitted: 0 }
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use bansho_base::{
     phenomenon::{Phenomenon, Prepared, Remark, SnapshotError, Stepping},
     point_cloud::PointCloud,
     random::Key,
-    surroundings::{Publication, Surroundings},
+    surroundings::{Neighbours, Publication, Surroundings},
 };
 
 use super::{
@@ -259,7 +259,7 @@ impl Phenomenon for Aurora {
         Publication { lights: self.lamp().into_iter().collect(), ..Publication::default() }
     }
 
-    fn remark(&self, _surroundings: &Surroundings) -> Option<Remark> {
+    fn remark(&self, _neighbours: &Neighbours) -> Option<Remark> {
         self.crossing.map(|shape| Remark::Crossing { shape: shape + 1 })
     }
 

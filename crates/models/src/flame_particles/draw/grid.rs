@@ -35,6 +35,26 @@ impl Raster {
         Self { size, first: low, columns: (high[0] - low[0]) as usize, rows: (high[1] - low[1]) as usize }
     }
 
+    /// Those of its cells that are `other`'s too.
+    pub(crate) fn within(self, other: &Self) -> Self {
+        let ends = |cells: &Self| [cells.first[0] + cells.columns as i32, cells.first[1] + cells.rows as i32];
+        let first = [0, 1].map(|axis| self.first[axis].max(other.first[axis]));
+        let [right, bottom] = [0, 1].map(|axis| ends(&self)[axis].min(ends(other)[axis]));
+        let count = |first: i32, end: i32| (end - first).max(0) as usize;
+        Self { first, columns: count(first[0], right), rows: count(first[1], bottom), ..self }
+    }
+
+    /// The pixels of the picture that the cells cover.
+    pub(crate) fn covered(&self) -> Rect {
+        let side = |axis: usize, count: usize| {
+            let pixel = |cell: i64| cell.max(0) as usize * self.size;
+            let first = i64::from(self.first[axis]);
+            (pixel(first), pixel(first + count as i64))
+        };
+        let ((x, right), (y, bottom)) = (side(0, self.columns), side(1, self.rows));
+        Rect { x, y, width: right - x, height: bottom - y }
+    }
+
     /// A place of the picture in cells: whole numbers are their middles.
     #[inline(always)]
     pub(crate) fn place(&self, pixel: [f32; 2]) -> [f32; 2] {
@@ -104,13 +124,7 @@ impl<'a> Grid<'a> {
 
     /// The pixels of the picture that the cells cover.
     pub(crate) fn covered(&self) -> Rect {
-        let side = |axis: usize, count: usize| {
-            let pixel = |cell: i64| cell.max(0) as usize * self.cells.size;
-            let first = i64::from(self.cells.first[axis]);
-            (pixel(first), pixel(first + count as i64))
-        };
-        let ((x, right), (y, bottom)) = (side(0, self.cells.columns), side(1, self.cells.rows));
-        Rect { x, y, width: right - x, height: bottom - y }
+        self.cells.covered()
     }
 
     /// A row of cells; rows beyond the grid are those at its edge, which hold nothing.

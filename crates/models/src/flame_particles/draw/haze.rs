@@ -75,13 +75,21 @@ impl Kind for Rest<'_> {
 impl Haze {
     /// `None` where nothing bends.
     ///
-    /// `summed` holds the paths of the gas that shows; only those of the rest are summed here.
-    pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View, summed: Option<&Grid<'_>>) -> Option<Self> {
+    /// `summed` holds the paths of the gas that shows, as far as the window sees it; only those of the rest are summed here, and `all` where
+    /// the whole picture shows none.
+    pub(crate) fn new(
+        gas: &Gas,
+        look: &LookParameters,
+        view: &View,
+        summed: Option<&Grid<'_>>,
+        all: bool,
+    ) -> Option<Self> {
         if look.haze_gain <= 0.0 {
             return None;
         }
-        let sheet = Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, window: view.window };
-        let rest = splat(&sheet, &seen(gas, view, &Rest { gas, look, all: summed.is_none() }), gas.memory);
+        let sheet =
+            Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, picture: view.size, window: view.window };
+        let rest = splat(&sheet, &seen(gas, view, &Rest { gas, look, all }), gas.memory).sums();
         let paths: Vec<Paths> = [(summed, PATH, PLANES), (rest.as_ref(), 0, 1)]
             .into_iter()
             .filter_map(|(grid, plane, planes)| Some(Paths::new(grid?, plane, planes)))
@@ -95,10 +103,17 @@ impl Haze {
         let rect = covered.reduce(|all, own| all.union(&own))?;
         let mut angle = Image::filled(rect.width, rect.height, [0.0; 2]);
         let level = Level::new();
-        let columns: Vec<_> = paths.iter().map(|paths| paths.sums.columns(rect.x, rect.width)).collect();
+        // Beyond its own cells a grid holds nothing.
+        let parts = paths.iter().map(|paths| {
+            let own = paths.sums.covered().intersection(&rect);
+            (paths, own, paths.sums.columns(own.x, own.width))
+        });
+        let parts: Vec<_> = parts.collect();
         angle.pixels_mut().par_chunks_mut(rect.width.max(1)).enumerate().for_each(|(row, out)| {
-            for (paths, columns) in paths.iter().zip(&columns) {
-                dispatch!(level, _simd => paths.add_gradient(columns, rect.y + row, out));
+            let y = rect.y + row;
+            for (paths, own, columns) in parts.iter().filter(|(_, own, _)| (own.y..own.bottom()).contains(&y)) {
+                let out = &mut out[own.x - rect.x..][..own.width];
+                dispatch!(level, _simd => paths.add_gradient(columns, y, out));
             }
         });
         Some(Self { rect, angle })

@@ -107,10 +107,11 @@ impl<'a> Motion<'a> {
         };
         let bounds = [0, 1].map(|axis| bounds(motions(axis)));
         let grid = splat(
-            &Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, window: view.window },
+            &Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, picture: view.size, window: view.window },
             &sprites,
             gas.memory,
-        )?;
+        );
+        let grid = grid.sums()?;
         Some(Self { weights: spline::weights(&grid.cells), grid, bounds })
     }
 

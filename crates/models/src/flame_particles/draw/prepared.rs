@@ -29,7 +29,7 @@ use super::{
     look::{LookParameters, SpriteStyle},
     measure::{Motion, bounds},
     resolve::{BLUE, Extents, GLOW, HEAT, Layer, MATTER, PATH, PLANES, Resolve, TAU},
-    splat::{COARSE, Sheet, Sprite, splat},
+    splat::{COARSE, Sheet, Splat, Sprite, splat},
     spline,
     sprite::{Kind, Seen, seen},
     squares::Squares,
@@ -57,6 +57,8 @@ pub(crate) const PARTICLES_OF_TASK: usize = 2048;
 enum Matter<'a> {
     /// Nothing that the view could see.
     Nothing,
+    /// Gas that other parts of the picture show.
+    Elsewhere,
     /// Sums of sprites.
     Sums(Box<Sums<'a>>),
     /// Squares.
@@ -121,10 +123,7 @@ impl<'a> PreparedGas<'a> {
         let layers = survey.layers(&gas);
         let matter = match look.sprite {
             SpriteStyle::Squares => Matter::Squares(Squares::new(&gas, look, view)),
-            _ => match sums(&gas, look, view, &survey, surroundings) {
-                Some(sums) => Matter::Sums(Box::new(sums)),
-                None => Matter::Nothing,
-            },
+            _ => sums(&gas, look, view, &survey, surroundings),
         };
         check(observer)?;
         let mut sparks = fire(&gas, look, view).streaks(view, surroundings.wind);
@@ -166,7 +165,7 @@ fn sums<'a>(
     view: &View,
     survey: &Survey,
     surroundings: &Surroundings,
-) -> Option<Sums<'a>> {
+) -> Matter<'a> {
     let layers = survey.layers(gas);
     let detail = survey.scale(gas, view).and_then(|scale| Detail::new(gas, look, &scale));
     let shining = Shining {
@@ -179,11 +178,15 @@ fn sums<'a>(
     };
     let sprites = seen(gas, view, &shining);
     let profile = if look.sprite == SpriteStyle::Poly6 { Profile::POLY6 } else { Profile::LINE };
-    let grid = splat(
-        &Sheet { profile, least_radius: COARSE, layers: layers.count, window: view.window },
+    let grid = match splat(
+        &Sheet { profile, least_radius: COARSE, layers: layers.count, picture: view.size, window: view.window },
         &sprites,
         gas.memory,
-    )?;
+    ) {
+        Splat::Sums(grid) => grid,
+        Splat::Elsewhere => return Matter::Elsewhere,
+        Splat::Nothing => return Matter::Nothing,
+    };
     let extents = Extents::new(&grid, layers.count);
     let strained = |detail: Detail| {
         let strain = Strain::new(&grid, &extents, layers.count, detail.cell_pixels);
@@ -191,7 +194,7 @@ fn sums<'a>(
     };
     let detail = detail.map(strained);
     let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.centre(layer), surroundings));
-    Some(Sums {
+    Matter::Sums(Box::new(Sums {
         extents,
         weights: spline::weights(&grid.cells),
         across: Across::new(&grid, view.size[0], &spline::weights(&grid.cells)),
@@ -200,7 +203,7 @@ fn sums<'a>(
         scattered: scattered.collect(),
         motion: if view.measured { Motion::new(gas, look, view) } else { None },
         temperatures: bounds(gas.particles.temperature.iter().copied()),
-    })
+    }))
 }
 
 /// The gas that shows, as sprites of its light and shade.
@@ -329,6 +332,10 @@ impl Prepared for PreparedGas<'_> {
         sparks.for_each(|spark| spark.draw(self.view.size, strip));
     }
 
+    fn may_bend(&self) -> bool {
+        self.look.haze_gain > 0.0 && !self.gas.particles.is_empty()
+    }
+
     fn deflection(&self) -> Option<Deflection<'_>> {
         let haze = self.haze()?;
         let depth = self.layers.centre(self.layers.count - 1) + 0.5 * self.layers.thickness;
@@ -339,11 +346,12 @@ impl Prepared for PreparedGas<'_> {
 impl PreparedGas<'_> {
     /// The haze, summed by all threads; where it is measured, strips find it made.
     fn haze(&self) -> Option<&Haze> {
-        let summed = match &self.matter {
-            Matter::Sums(sums) if self.look.sprite == SpriteStyle::Integral => Some(&sums.grid),
-            _ => None,
+        let (summed, all) = match &self.matter {
+            Matter::Sums(sums) if self.look.sprite == SpriteStyle::Integral => (Some(&sums.grid), false),
+            Matter::Elsewhere if self.look.sprite == SpriteStyle::Integral => (None, false),
+            _ => (None, true),
         };
-        get_or_make(&self.haze, || Haze::new(&self.gas, self.look, self.view, summed)).as_ref()
+        get_or_make(&self.haze, || Haze::new(&self.gas, self.look, self.view, summed, all)).as_ref()
     }
 
     fn measure_deflection(&self, slice: &DepthInterval, strip: &mut Strip) {

@@ -43,27 +43,52 @@ pub(crate) struct Sheet {
     /// Least radius of a sprite in cells; smaller sprites are widened to it on the finest grid.
     pub(crate) least_radius: f32,
     pub(crate) layers: usize,
-    /// The part of the picture that is drawn.
+    /// Size of the whole picture, pixels.
+    pub(crate) picture: [usize; 2],
+    /// The part of it that is drawn.
     pub(crate) window: Rect,
 }
 
-/// The sums of all sprites, task by task, on the finest grid that any of them needs, sharpened for splines; `None` where none is seen.
-pub(crate) fn splat<'a, const P: usize>(
-    sheet: &Sheet,
-    tasks: &[Recycled<Sprite<P>>],
-    memory: &'a Memory,
-) -> Option<Grid<'a>> {
+/// What a part of the picture shows of sprites.
+#[derive(Debug)]
+pub(crate) enum Splat<'a> {
+    /// No sprite is seen in the whole picture.
+    Nothing,
+    /// Sprites are seen in other parts of it.
+    Elsewhere,
+    /// Their sums.
+    Sums(Grid<'a>),
+}
+
+impl<'a> Splat<'a> {
+    /// The sums, where there are any.
+    pub(crate) fn sums(self) -> Option<Grid<'a>> {
+        if let Self::Sums(grid) = self { Some(grid) } else { None }
+    }
+}
+
+/// The sums of all sprites, task by task, on the finest grid that any of them needs, sharpened for splines.
+///
+/// Cells end where those of the whole picture do, so that a part of it shows the same of sprites that hardly reach it.
+pub(crate) fn splat<'a, const P: usize>(sheet: &Sheet, tasks: &[Recycled<Sprite<P>>], memory: &'a Memory) -> Splat<'a> {
     let whole = Whole::new(sheet, tasks);
-    let rect = whole.covered(sheet.window)?;
+    let Some(rect) = whole.covered(sheet.picture) else { return Splat::Nothing };
     let finest = whole.finest();
     let nested = whole.counts.iter().skip(finest + 2).any(|count| *count > 0);
+    let cells_of_whole = |fineness| Raster::around(rect, cell_size(fineness), nested);
+    let shown = cells_of_whole(finest).covered().intersection(&sheet.window);
+    if shown.is_empty() {
+        return Splat::Elsewhere;
+    }
+    let shown = widened(shown);
+    let cells = |fineness| Raster::around(shown, cell_size(fineness), nested).within(&cells_of_whole(fineness));
     let mut coarser: Option<Grid> = None;
     for fineness in (finest..COARSEST + 1).step_by(2).rev() {
         let any = whole.counts[fineness..].iter().take(2).any(|count| *count > 0);
         if !any && fineness != finest && coarser.is_none() {
             continue;
         }
-        let mut grid = Grid::new(Raster::around(rect, cell_size(fineness), nested), sheet.layers * P, memory);
+        let mut grid = Grid::new(cells(fineness), sheet.layers * P, memory);
         let here = |radius: f32| sheet.fineness(radius).max(finest).wrapping_sub(fineness) < 2;
         add_sprites(sheet, tasks, here, &mut grid);
         if let Some(coarser) = coarser {
@@ -71,7 +96,13 @@ pub(crate) fn splat<'a, const P: usize>(
         }
         coarser = Some(spline::sharpened(&grid));
     }
-    coarser
+    coarser.map_or(Splat::Nothing, Splat::Sums)
+}
+
+/// A part of the picture with what lies beside it within sixteen pixels: what those are worth is asked of all of them together.
+fn widened(rect: Rect) -> Rect {
+    let (x, end) = (rect.x / LANES * LANES, rect.right().next_multiple_of(LANES));
+    Rect { x, width: end - x, ..rect }
 }
 
 /// Side of the cells of a fineness, pixels: two to an octave, 1, 2, 3, 4, 6, 8, 12... (There is none of 1.5.)
@@ -138,16 +169,14 @@ impl Whole {
         self.counts.iter().position(suits).unwrap_or(0)
     }
 
-    /// The pixels of the window that sprites touch, and those beside it that are worked on with them: what sixteen pixels are worth is
-    /// asked of all of them together.
-    fn covered(&self, window: Rect) -> Option<Rect> {
+    /// The pixels of the picture that sprites touch, and those beside them that are worked on with them.
+    fn covered(&self, picture: [usize; 2]) -> Option<Rect> {
         let clip = |value: [f32; 2]| {
             let [x, y] = value.map(|value| value.max(0.0) as usize);
-            [x.clamp(window.x, window.right()), y.clamp(window.y, window.bottom())]
+            [x.min(picture[0]), y.min(picture[1])]
         };
         let ([x, y], [right, bottom]) = (clip(self.low), clip(self.high.map(|value| value + 1.0)));
-        let (first, end) = (x / LANES * LANES, right.next_multiple_of(LANES));
-        (right > x && bottom > y).then(|| Rect { x: first, y, width: end - first, height: bottom - y })
+        (right > x && bottom > y).then(|| widened(Rect { x, y, width: right - x, height: bottom - y }))
     }
 }
 
@@ -259,7 +288,8 @@ mod tests {
 
     #[test]
     fn cells_are_the_coarsest_that_are_fine_enough() {
-        let sheet = Sheet { profile: Profile::LINE, least_radius: 2.75, layers: 1, window: Rect::default() };
+        let sheet =
+            Sheet { profile: Profile::LINE, least_radius: 2.75, layers: 1, picture: [0; 2], window: Rect::default() };
         let sizes: Vec<usize> = (2..10).map(cell_size).collect();
         assert_eq!((cell_size(0), sizes), (1, vec![2, 3, 4, 6, 8, 12, 16, 24]));
         for step in 0..4000 {

@@ -34,7 +34,7 @@ fn draw(seed: u64) -> Option<(FlameParticlesParameters, WindParameters)> {
     let mut parameters = FlameParticlesParameters::read_table(&table, &mut reader, &[]);
     let wind = sample(WindParameters::table(), &mut uniform);
     let wind = WindParameters::read_table(&wind, &mut reader, &[]);
-    assert!(reader.problems().is_empty(), "{:?}", reader.problems());
+    assert!(reader.is_clean(), "{:?}", reader.into_problems());
     parameters.particles = 1 + (uniform() * 250.0) as i64;
     Design::new(&parameters, None, &MemoryAssets::default()).ok().map(|_| (parameters, wind))
 }

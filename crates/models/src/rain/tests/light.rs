@@ -1,13 +1,14 @@
 //! Rain in the light of lamps.
 
-use super::{METHODS, Method, draw, lamp, rain, streaks, view_at, wind};
+use super::{METHODS, Method, draw, draw_part, lamp, rain, streaks, view_at, wind};
 use crate::rain::{
     RainParameters,
     lens::DropLens,
     light::{Lighting, Scattering},
 };
 use bansho_base::{
-    canvas::Strip,
+    canvas::{DepthInterval, Strip},
+    image::Rect,
     math::{self, DVec3},
     surroundings::{Emitter, Light, Publication, Surroundings},
 };
@@ -76,6 +77,25 @@ fn culling_changes_no_pixel_by_a_255th() {
         assert_eq!(culled.transmittance(index), all.transmittance(index));
     }
     assert!(differ > 0, "nothing was culled");
+}
+
+#[test]
+fn the_thickest_veil_around_lamps_stays_finite() {
+    let light = lamp([0.2, 1.0, -3.0], 1e6);
+    let thick = RainParameters {
+        rate_mm_per_h: 300.0.into(),
+        veil_distance: 5000.0,
+        opacity_gain: 20.0,
+        ..streaks(Method::Drops, 300.0)
+    };
+    let (view, calm) = (view_at(1.0, 1.0 / 60.0, [48, 27]), wind([0.0; 3], 0.0));
+    let others = Publication { lights: vec![light], ..Publication::default() };
+    let surroundings = Surroundings { others, ..Surroundings::of_wind(&calm) };
+    for slice in [[0.0, 1e5], [800.0, 1600.0], [4000.0, 1e5]] {
+        let slice = DepthInterval { near: slice[0], far: slice[1] };
+        let strip = draw_part(&rain(thick.clone(), 1), &view, &surroundings, Rect::of_size(48, 27), &slice);
+        assert!(strip.radiance.iter().flatten().all(|value| value.is_finite()), "{slice:?}");
+    }
 }
 
 #[test]

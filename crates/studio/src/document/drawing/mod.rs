@@ -79,7 +79,7 @@ impl Drawing {
         let parameters = AuroraParameters::read_table(table, &mut reader, &[]);
         // Keys that every phenomenon has are not the aurora's own.
         let own = |kind: &ProblemKind| !matches!(kind, ProblemKind::UnknownKey { .. });
-        if let Some(problem) = reader.into_problems().into_iter().find(|problem| own(&problem.kind)) {
+        if let Some(problem) = reader.into_problems().listed.into_iter().find(|problem| own(&problem.kind)) {
             return Err(Refusal::Faulty(problem.to_string()));
         }
         let AuroraParameters { shapes, motion, extent_km, .. } = &parameters;

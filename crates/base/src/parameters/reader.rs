@@ -1,0 +1,151 @@
+//! What reads a file's values: it knows where it is, and gathers what is wrong.
+
+use super::{Choice, Kind, Node, Problem, ProblemKind, Span, nearest};
+
+/// Most problems of a file that are kept: the first ones. Nobody reads more of them, and a file can hold a million.
+pub const MOST_PROBLEMS: usize = 100;
+
+/// What is wrong with a file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Problems {
+    /// The first of them in the order of the file, [`MOST_PROBLEMS`] at most; those without a place come last.
+    pub listed: Vec<Problem>,
+    /// How many there are beyond those.
+    pub omitted: usize,
+}
+
+/// Gathers problems while values are read; knows the path that is being read.
+#[derive(Debug, Default)]
+pub struct Reader {
+    path: Vec<String>,
+    problems: Vec<Problem>,
+    omitted: usize,
+    /// The last place that is still listed, once there are more problems than are kept.
+    last_listed: Option<usize>,
+}
+
+impl Reader {
+    /// A reader of a file's root.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Runs `read` with `segment` added to the path.
+    pub fn within<T>(&mut self, segment: impl Into<String>, read: impl FnOnce(&mut Self) -> T) -> T {
+        self.path.push(segment.into());
+        let result = read(self);
+        self.path.pop();
+        result
+    }
+
+    /// Notes a problem at `node`.
+    pub fn report(&mut self, node: &Node, kind: ProblemKind) {
+        self.report_at(Some(node.span.clone()), kind);
+    }
+
+    /// Notes a problem at `span`.
+    pub fn report_at(&mut self, span: Option<Span>, kind: ProblemKind) {
+        self.report_made(span, || kind);
+    }
+
+    /// Notes a problem at `span`; what it says is only made where it is to be listed.
+    pub fn report_made(&mut self, span: Option<Span>, kind: impl FnOnce() -> ProblemKind) {
+        if self.last_listed.is_some_and(|last| start(span.as_ref()) >= last) {
+            self.omitted += 1;
+            return;
+        }
+        self.problems.push(Problem { span, path: self.path.join("."), kind: kind() });
+        // Sorting as many again each time keeps the cost of a problem the same however many there are.
+        if self.problems.len() >= 2 * MOST_PROBLEMS {
+            self.keep_first();
+        }
+    }
+
+    /// Sorts the problems and leaves out those after the most that are kept.
+    fn keep_first(&mut self) {
+        self.problems.sort_by_key(|problem| start(problem.span.as_ref()));
+        if self.problems.len() > MOST_PROBLEMS {
+            self.omitted += self.problems.len() - MOST_PROBLEMS;
+            self.problems.truncate(MOST_PROBLEMS);
+            self.last_listed = self.problems.last().map(|last| start(last.span.as_ref()));
+        }
+    }
+
+    /// Notes that `node` is not of the wanted kind.
+    pub fn wrong_type(&mut self, node: &Node, expected: &Kind) {
+        let kind = ProblemKind::WrongType { expected: expected.expectation(), found: node.value.type_name() };
+        self.report(node, kind);
+    }
+
+    /// Notes that `name` is none of `choices`.
+    pub fn not_one_of(&mut self, node: &Node, name: &str, choices: &[Choice]) {
+        let kind = ProblemKind::NotOneOf {
+            value: name.to_owned(),
+            nearest: nearest(name, choices.iter().map(|choice| choice.name)).map(str::to_owned),
+            allowed: choices.iter().map(|choice| choice.name.to_owned()).collect(),
+        };
+        self.report(node, kind);
+    }
+
+    /// Whether no problem was met so far.
+    pub fn is_clean(&self) -> bool {
+        self.problems.is_empty()
+    }
+
+    /// Takes all problems, in the order of the file.
+    pub fn into_problems(mut self) -> Problems {
+        self.keep_first();
+        Problems { listed: self.problems, omitted: self.omitted }
+    }
+}
+
+/// Where a problem stands in the order of the file.
+fn start(span: Option<&Span>) -> usize {
+    span.map_or(usize::MAX, |span| span.start)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn problem(at: usize) -> ProblemKind {
+        ProblemKind::Syntax(at.to_string())
+    }
+
+    #[test]
+    fn the_first_problems_are_listed_and_the_others_counted_in_whatever_order_they_are_met() {
+        const COUNT: usize = 1000;
+        let forward: Vec<usize> = (0..COUNT).collect();
+        let backward: Vec<usize> = (0..COUNT).rev().collect();
+        let mixed: Vec<usize> = (0..COUNT).map(|index| index * 7 % COUNT).collect();
+        for order in [forward, backward, mixed] {
+            let mut reader = Reader::new();
+            order.iter().for_each(|&at| reader.report_at(Some(at..at + 1), problem(at)));
+            let problems = reader.into_problems();
+            let found: Vec<usize> = problems.listed.iter().map(|problem| start(problem.span.as_ref())).collect();
+            assert_eq!((found, problems.omitted), ((0..MOST_PROBLEMS).collect(), COUNT - MOST_PROBLEMS));
+        }
+    }
+
+    #[test]
+    fn as_many_as_are_kept_are_all_listed() {
+        let mut reader = Reader::new();
+        reader.report_at(None, problem(0));
+        (1..MOST_PROBLEMS).for_each(|at| reader.report_at(Some(at..at), problem(at)));
+        let problems = reader.into_problems();
+        assert_eq!((problems.listed.len(), problems.omitted), (MOST_PROBLEMS, 0));
+        assert_eq!(problems.listed[MOST_PROBLEMS - 1].span, None, "what has no place comes last");
+    }
+
+    #[test]
+    fn what_is_not_listed_is_not_made() {
+        let (mut reader, mut made) = (Reader::new(), 0);
+        for at in 0..10_000 {
+            reader.report_made(Some(at..at), || {
+                made += 1;
+                problem(at)
+            });
+        }
+        assert_eq!(made, 2 * MOST_PROBLEMS);
+    }
+}
