@@ -8,6 +8,7 @@ mod disk;
 mod figures;
 mod flipbook;
 mod interruptions;
+mod large_scenes;
 #[cfg(target_os = "linux")]
 mod memory;
 mod particles;

@@ -71,6 +71,8 @@ impl<'t> Lines<'t> {
         };
         let cut = if first > self.start { LEFT_OUT } else { "" };
         let shown = format!("{cut}{}{after}{}", &text[first..self.byte], if end.is_some() { LEFT_OUT } else { "" });
+        // Tabs would move the mark, and terminals obey other control characters.
+        let shown = shown.replace(char::is_control, " ");
         let marked = floor_char_boundary(after, span.end.saturating_sub(self.byte));
         Excerpt { shown, before: cut.len() + characters, marked: after[..marked].chars().count().max(1) }
     }

@@ -1,6 +1,6 @@
 //! Problems as a person reads them: file, line, the line itself, what is wrong, what is allowed.
 
-use std::fmt;
+use std::{borrow::Cow, fmt};
 
 use bansho_base::{
     parameters::{Problem, ProblemKind},
@@ -57,15 +57,33 @@ impl SceneError {
     }
 
     fn told(&self, problem: &Problem, lines: &mut Lines) -> String {
+        let is_syntax = matches!(problem.kind, ProblemKind::Syntax(_));
+        let problem_told = visible(&problem.to_string(), is_syntax);
         let Some(span) = &problem.span else {
-            return format!("{}: {problem}", self.file);
+            return format!("{}: {problem_told}", self.file);
         };
         let (line, column) = lines.position(span.start);
         let Excerpt { shown, before, marked } = lines.excerpt(span.clone());
         let gutter = " ".repeat(line.to_string().len());
         let (before, marked) = (" ".repeat(before), "^".repeat(marked));
-        format!("{}:{line}:{column}: {problem}\n{gutter} |\n{line} | {shown}\n{gutter} | {before}{marked}", self.file)
+        format!(
+            "{}:{line}:{column}: {problem_told}\n{gutter} |\n{line} | {shown}\n{gutter} | {before}{marked}",
+            self.file
+        )
     }
+}
+
+/// What a text states, without characters that a terminal would obey; lines end where the parser ends them.
+fn visible(text: &str, has_lines: bool) -> Cow<'_, str> {
+    let is_hidden = |character: char| character.is_control() && !(has_lines && character == '\n');
+    if !text.contains(is_hidden) {
+        return text.into();
+    }
+    let mut shown = String::with_capacity(text.len());
+    for character in text.chars() {
+        if is_hidden(character) { shown.extend(character.escape_default()) } else { shown.push(character) }
+    }
+    shown.into()
 }
 
 #[cfg(test)]
@@ -101,6 +119,17 @@ mod tests {
         let problem = Problem { span: Some(90..99), path: String::new(), kind: ProblemKind::Syntax("oops".into()) };
         let error = SceneError { file: "x".into(), text: "é".into(), problems: vec![problem], omitted: 0 };
         assert!(error.to_string().contains("oops"));
+    }
+
+    #[test]
+    fn terminals_get_nothing_to_obey() {
+        let text = "a\u{1b}[31m\tb\u{0} = 1\n";
+        let kind = ProblemKind::DuplicateName { name: "x\u{1b}[2J\nerror: all".into() };
+        let problem = Problem { span: Some(0..9), path: "a".into(), kind };
+        let error = SceneError { file: "x".into(), text: text.into(), problems: vec![problem], omitted: 0 };
+        let shown = error.to_string();
+        assert!(shown.lines().count() == 4 && !shown.contains(|c: char| c.is_control() && c != '\n'), "{shown:?}");
+        assert!(shown.contains("x\\u{1b}[2J\\nerror: all"), "{shown}");
     }
 
     #[test]
