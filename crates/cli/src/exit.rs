@@ -57,6 +57,7 @@ pub(crate) fn tell_job(error: &JobError) {
     match error.scene() {
         Some(scene) => {
             scene.faults().for_each(|fault| to_stderr(&format!("error: {fault}")));
+            scene.more().iter().for_each(|more| to_stderr(more));
             flags::for_scene(scene).iter().for_each(|flag| output::tell("hint", flag));
         }
         None => output::tell("error", &flags::error(error)),

@@ -10,6 +10,7 @@ mod figures;
 mod flipbook;
 mod inputs;
 mod interruptions;
+mod large_scenes;
 #[cfg(target_os = "linux")]
 mod memory;
 mod overwriting;

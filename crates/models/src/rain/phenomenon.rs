@@ -1,6 +1,6 @@
 //! Rain as a phenomenon of a scene.
 
-use std::ops::RangeInclusive;
+use std::{ops::RangeInclusive, sync::LazyLock};
 
 use bansho_base::{
     canvas::{AovDescriptor, DepthInterval, Shutter, View},
@@ -35,12 +35,23 @@ pub struct Rain {
     name: String,
     pub(super) parameters: RainParameters,
     pub(super) key: Key,
-    pub(super) lens: DropLens,
-    pub(super) scattering: Scattering,
+    pub(super) optics: &'static Optics,
     pub(super) skies: SeenSkies,
     classes: Vec<Class>,
     pub(super) loop_s: Option<f64>,
 }
+
+/// How a drop sends light on: the same for all rain.
+#[derive(Debug)]
+pub(super) struct Optics {
+    pub(super) lens: DropLens,
+    pub(super) scattering: Scattering,
+}
+
+static OPTICS: LazyLock<Optics> = LazyLock::new(|| {
+    let lens = DropLens::new();
+    Optics { scattering: Scattering::new(&lens), lens }
+});
 
 /// The drops that one diameter stands for.
 #[derive(Clone, Copy, Debug)]
@@ -70,13 +81,11 @@ impl Rain {
         let sizes = DropSizes::marshall_palmer(heaviest);
         let class = |bin: SizeBin| Class { bin, speed: fall.speed(bin.diameter_mm), most: bin.count(&sizes) };
         let classes = SizeBin::around(&parameters.diameters_mm).into_iter().map(class).collect();
-        let lens = DropLens::new();
         Ok(Self {
             name: name.to_owned(),
             key: Key::new(seed, name),
-            scattering: Scattering::new(&lens),
+            optics: &OPTICS,
             skies: SeenSkies::default(),
-            lens,
             classes,
             loop_s,
             parameters,

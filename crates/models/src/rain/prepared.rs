@@ -48,8 +48,8 @@ impl<'a> PreparedRain<'a> {
         let moment = Moment::new(rain, view, surroundings);
         let extinctions = rain.extinctions(view.shutter.middle());
         let lights = &surroundings.others.lights;
-        let lighting = Lighting { scattering: &rain.scattering, lights, extinction: extinctions[0] };
-        let seen = rain.skies.of(&rain.lens, view, surroundings.sky);
+        let lighting = Lighting { scattering: &rain.optics.scattering, lights, extinction: extinctions[0] };
+        let seen = rain.skies.of(&rain.optics.lens, view, surroundings.sky);
         let (tiles, sky) = &seen.coarse;
         let beams = lighting.beams(moment.sight.middle().position);
         let frame = Frame { rain, moment: &moment, lighting: &lighting, beams: &beams, tiles, sky, view };

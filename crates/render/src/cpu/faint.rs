@@ -1,6 +1,6 @@
 //! Whether a phenomenon is seen before its plate at all.
 
-use std::sync::Arc;
+use std::{collections::HashSet, sync::Arc};
 
 use bansho_base::phenomenon::{Phenomenon, Remark};
 
@@ -16,9 +16,13 @@ const FAINT: f64 = 0.02;
 const SEEN: f64 = 0.1;
 const SEEN_SHARE: f64 = 0.001;
 
+/// Most phenomena of which each is looked at: a picture without it is drawn for every one, which holds all others.
+const MOST: usize = 16;
+
 /// Remarks on those of a plan's `phenomena` that change its plate so little that they are hardly seen; on none of them without a plate.
 ///
-/// Measured in small pictures of one frame, and of two more where it shows none; what is simulated in steps is left out of it.
+/// Measured in small pictures of one frame, and of two more where it shows none; what is simulated in steps is left out of it. Nothing is
+/// measured of more phenomena than are looked at one by one.
 pub(super) fn faint(plan: &Plan, phenomena: &[Box<dyn Phenomenon>]) -> Vec<(String, Remark)> {
     if !plan.scene.has_plate() {
         return Vec::new();
@@ -26,14 +30,17 @@ pub(super) fn faint(plan: &Plan, phenomena: &[Box<dyn Phenomenon>]) -> Vec<(Stri
     let stepped: Vec<&str> =
         phenomena.iter().filter(|each| each.stepping().is_some()).map(|each| each.name()).collect();
     let closed = phenomena.iter().map(AsRef::as_ref).filter(|each| each.stepping().is_none());
-    let is_of_scene = |name: &str| plan.scene.instances.iter().any(|own| own.enabled && own.name == name);
+    let own: HashSet<&str> =
+        plan.scene.instances.iter().filter(|own| own.enabled).map(|own| own.name.as_str()).collect();
+    let is_of_scene = |name: &str| own.contains(name);
     let remark = |each: &dyn Phenomenon| {
         // What cannot be drawn will say so when it is.
         let change = greatest_change(plan, &stepped, each.name()).ok()?;
         let advice = each.strengthened_by();
         change.is_faint().then(|| (each.name().to_owned(), Remark::Faint { percent: 100.0 * change.mean, advice }))
     };
-    closed.filter(|each| is_of_scene(each.name())).filter_map(remark).collect()
+    let looked_at: Vec<&dyn Phenomenon> = closed.filter(|each| is_of_scene(each.name())).collect();
+    if looked_at.len() > MOST { Vec::new() } else { looked_at.into_iter().filter_map(remark).collect() }
 }
 
 /// How much a picture differs from the one without a phenomenon.

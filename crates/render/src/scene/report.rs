@@ -29,7 +29,7 @@ pub struct SceneError {
 
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, told) in self.faults().enumerate() {
+        for (index, told) in self.faults().chain(self.more()).enumerate() {
             write!(f, "{}{told}", if index > 0 { "\n\n" } else { "" })?;
         }
         Ok(())
@@ -44,12 +44,15 @@ impl SceneError {
         Self { file: file.to_owned(), text: text.to_owned(), problems: vec![problem], omitted: 0 }
     }
 
-    /// Each fault as a person reads it, then how many more there are.
+    /// Each fault that is listed, as a person reads it.
     pub fn faults(&self) -> impl Iterator<Item = String> + '_ {
         let mut lines = Lines::new(&self.text);
-        let each = self.problems.iter().map(move |problem| self.told(problem, &mut lines));
-        let more = format!("{}: and {}", printable(&self.file), counted(self.omitted, "more fault"));
-        each.chain((self.omitted > 0).then_some(more))
+        self.problems.iter().map(move |problem| self.told(problem, &mut lines))
+    }
+
+    /// How many more faults there are than those that are listed, if there are more.
+    pub fn more(&self) -> Option<String> {
+        (self.omitted > 0).then(|| format!("{}: and {}", printable(&self.file), counted(self.omitted, "more fault")))
     }
 
     /// One-based line and column (in characters) of a byte of the text.
@@ -125,6 +128,6 @@ mod tests {
         let problem = Problem { span: None, path: "a".into(), kind: ProblemKind::Syntax("oops".into()) };
         let error = SceneError { file: "x".into(), text: String::new(), problems: vec![problem], omitted: 3 };
         assert_eq!(error.to_string(), "x: a: oops\n\nx: and 3 more faults");
-        assert_eq!(error.faults().count(), 2);
+        assert_eq!((error.faults().count(), error.more().as_deref()), (1, Some("x: and 3 more faults")));
     }
 }

@@ -12,7 +12,7 @@ pub(super) fn parse(text: &str) -> Result<Table, Problem> {
     let document = Document::parse(text).map_err(|error| Problem {
         span: error.span().or_else(|| deepest(text)),
         path: String::new(),
-        kind: ProblemKind::Syntax(error.message().to_owned()),
+        kind: ProblemKind::Syntax(error.message().replace('\n', "; ")),
     })?;
     Ok(table(document.as_table()))
 }

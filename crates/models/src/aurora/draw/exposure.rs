@@ -40,10 +40,10 @@ impl Aurora {
 
     /// The state's particles wherever they get while the shutter is open, and its afterglow.
     fn short_exposure(&self, view: &View, field: &FieldLines) -> Sources {
-        let light = self.light(&self.simulation, view.shutter.middle());
-        let way = rms_speed(&self.simulation) * view.shutter.duration();
+        let light = self.light(self.simulation(), view.shutter.middle());
+        let way = rms_speed(self.simulation()) * view.shutter.duration();
         let count = (2.0 * way / (SPREADS_PER_INSTANT * light.spread_km())).ceil().clamp(1.0, MOST_INSTANTS) as usize;
-        let now = self.simulation.time();
+        let now = self.simulation().time();
         let later = (0..count).map(|instant| view.shutter.instant(instant, count) - now).collect();
         Sources::new(&light, field, &Moments { later, first: 0, smear_km: smear_km(way / count as f64) })
     }
@@ -53,7 +53,7 @@ impl Aurora {
     /// They begin with that of [`Phenomenon::drawn_from`](bansho_base::phenomenon::Phenomenon::drawn_from); in a loop, where two runs
     /// are drawn at the time of the shutter's middle, with that one.
     fn long_exposure(&self, view: &View, field: &FieldLines) -> Sources {
-        let mut simulation = self.simulation.clone();
+        let mut simulation = self.simulation().clone();
         let (shutter, now) = (view.shutter, simulation.time());
         let begin = if now < shutter.middle() - AuroraSimulation::STEP_S { shutter.open } else { shutter.middle() };
         let mut mean = Sources::default();
@@ -116,7 +116,7 @@ mod tests {
         let wind = Wind::new(WindParameters::default(), 1, None);
         let surroundings = Surroundings::of_wind(&wind);
         let from = aurora.drawn_from(shutter);
-        step_until(&mut aurora.simulation, from);
+        step_until(aurora.simulation_mut().unwrap(), from);
         let view = View::new(camera, shutter, 0.0, SIZE, 0);
         let prepared = aurora.prepare(&view, &surroundings, &Unobserved).unwrap();
         let mut strip = Strip::default();
@@ -148,9 +148,9 @@ mod tests {
     #[test]
     fn particles_are_those_of_the_middle_of_an_exposure() {
         let mut aurora = aurora();
-        step_until(&mut aurora.simulation, 0.0);
+        step_until(aurora.simulation_mut().unwrap(), 0.0);
         let early = aurora.clone();
-        step_until(&mut aurora.simulation, 1.0);
+        step_until(aurora.simulation_mut().unwrap(), 1.0);
         assert_eq!(early.particles(1.0), aurora.particles(1.0));
         assert_ne!(early.particles(0.0), aurora.particles(1.0));
     }

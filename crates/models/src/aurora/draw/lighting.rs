@@ -32,7 +32,7 @@ impl Aurora {
     /// drawn square's middle; none where nothing shines. Each place has the colour of its own electrons, and what lies below the horizon
     /// lights nothing.
     pub(super) fn lamp(&self) -> Option<Light> {
-        let (emission, particles) = (self.simulation.emission(), self.simulation.particles());
+        let (emission, particles) = (self.simulation().emission(), self.simulation().particles());
         let level = Level::new();
         let stride = particles.len().div_ceil(ASKED).max(1);
         let (mut way, mut sum) = (DVec3::ZERO, DVec3::ZERO);
@@ -49,7 +49,7 @@ impl Aurora {
             // A patch of 1 mW/m^2 over 1 km^2 at 1 km has 1 sr and the column's brightness.
             let share = f64::from(particles.powers_w[index]) / W_PER_UNIT * stride as f64 / squared;
             let colour: [f32; 4] =
-                dispatch!(level, simd => self.shading.arriving(simd, &column, Shading::place(elevation)).into());
+                dispatch!(level, simd => self.shading().arriving(simd, &column, Shading::place(elevation)).into());
             let [red, green, blue, _] = colour.map(f64::from);
             sum += DVec3::new(red, green, blue) * share;
             way += direction * (share * green.max(0.0));

@@ -1,8 +1,14 @@
 //! What a scene says of how an aurora is drawn.
 
-use bansho_base::parameters::{Auto, Range};
+use std::sync::OnceLock;
+
+use bansho_base::{
+    once::get_or_make,
+    parameters::{Auto, Range},
+};
 
 use crate::aurora::{
+    SpectrumShape,
     atmosphere::atmosphere,
     light::{Emission, extinction::Extinction},
     precipitation::Spectrum,
@@ -36,6 +42,14 @@ impl FallModel {
             Self::Fang => Emission::new(atmosphere(), spectrum),
             Self::HardSphere => Emission::of_hard_spheres(atmosphere(), spectrum),
         }
+    }
+
+    /// The same for a spectrum that a scene may state, made once for all auroras.
+    pub(in crate::aurora) fn shared_emission(self, shape: SpectrumShape) -> &'static Emission {
+        static KNOWN: [OnceLock<Emission>; FallModel::CHOICES.len() * SpectrumShape::CHOICES.len()] =
+            [const { OnceLock::new() }; FallModel::CHOICES.len() * SpectrumShape::CHOICES.len()];
+        let index = self as usize * SpectrumShape::CHOICES.len() + shape as usize;
+        get_or_make(&KNOWN[index], || self.emission(shape.spectrum()))
     }
 }
 

@@ -1,11 +1,14 @@
 //! The aurora as the renderer knows it.
 
+use std::sync::OnceLock;
+
 use bansho_base::{
     assets::Assets,
     canvas::{AovDescriptor, AovRule, DepthInterval, Shutter, View},
     color,
     math::DVec3,
     observer::{Cancelled, Observer},
+    once::get_or_make,
     parameters::Parameter,
     phenomenon::{Phenomenon, Prepared, Remark, SnapshotError, Stepping},
     point_cloud::PointCloud,
@@ -44,19 +47,27 @@ const SPECTRUM_NODES: usize = 25;
 #[derive(Clone, Debug)]
 pub struct Aurora {
     name: String,
-    pub(super) simulation: AuroraSimulation,
-    pub(super) profiles: Profiles,
-    /// Red light alone, by its heights in place of the emitters.
-    pub(super) red_profiles: Profiles,
-    pub(super) shading: Shading,
-    /// What single collisions are drawn from, where they are asked for.
-    pub(super) collisions: Option<Collisions>,
+    seed: u64,
+    parameters: AuroraParameters,
+    sequence: Sequence,
+    /// Made when it is first stepped or drawn: there may be hundreds of auroras, each of which is made to be checked.
+    working: OnceLock<Working>,
     /// Luminance of the brightest column of all shapes, cd/m^2.
     brightest: f64,
     /// The shape, counted from 0, on whose way sheets first pass through each other.
     crossing: Option<usize>,
     /// In a loop: for how long one run passes into the next, s.
     dissolve: f64,
+}
+
+/// An aurora at work: its state, and what it is drawn with.
+#[derive(Clone, Debug)]
+struct Working {
+    simulation: AuroraSimulation,
+    profiles: Profiles,
+    red_profiles: Profiles,
+    shading: Shading,
+    collisions: Option<Collisions>,
 }
 
 /// Longest dissolve in a loop, s: by then particles have gone a long way along their sheets.
@@ -114,37 +125,74 @@ impl Aurora {
         energies::check(&parameters)?;
         let crossing = sequence.crossing();
         let factors: Vec<[f64; 2]> = sequence.factors().collect();
-        let simulation = AuroraSimulation::new(parameters, sequence, name, seed);
-        let parameters = simulation.parameters();
-        let by_collisions = parameters.drawing.sampling == Sampling::Collisions;
-        let hardest = factors.iter().fold(1.0, |most: f64, [_, energy]| most.max(*energy));
-        let hardest = (hardest * parameters.energy_ev.bounds()[1]).min(HIGHEST_EV);
-        let hardest = nearest_node(hardest) + SPECTRUM_NODES;
-        let key = Key::new(seed, name);
-        let collisions = || Collisions::new(simulation.emission(), &parameters.drawing, hardest, key);
+        let emission = parameters.drawing.fall.shared_emission(parameters.spectrum);
         Ok(Self {
             name: name.to_owned(),
-            collisions: by_collisions.then(collisions),
-            profiles: Profiles::new(simulation.emission()),
-            red_profiles: Profiles::of_red_by_height(simulation.emission()),
-            shading: Shading::new(&parameters.drawing.air),
-            brightest: brightest(parameters, simulation.emission(), &factors),
-            simulation,
+            seed,
+            brightest: brightest(&parameters, emission, &factors),
+            working: OnceLock::new(),
+            parameters,
+            sequence,
             crossing,
             dissolve,
         })
     }
 
+    fn working(&self) -> &Working {
+        get_or_make(&self.working, || self.set_to_work())
+    }
+
+    fn set_to_work(&self) -> Working {
+        let simulation = AuroraSimulation::new(self.parameters.clone(), self.sequence.clone(), &self.name, self.seed);
+        let (parameters, emission) = (simulation.parameters(), simulation.emission());
+        let by_collisions = parameters.drawing.sampling == Sampling::Collisions;
+        let hardest = self.sequence.factors().fold(1.0, |most: f64, [_, energy]| most.max(energy));
+        let hardest = (hardest * parameters.energy_ev.bounds()[1]).min(HIGHEST_EV);
+        let hardest = nearest_node(hardest) + SPECTRUM_NODES;
+        let key = Key::new(self.seed, &self.name);
+        let collisions = || Collisions::new(emission, &parameters.drawing, hardest, key);
+        Working {
+            collisions: by_collisions.then(collisions),
+            profiles: Profiles::new(emission),
+            red_profiles: Profiles::of_red_by_height(emission),
+            shading: Shading::new(&parameters.drawing.air),
+            simulation,
+        }
+    }
+
     /// Its particles, field and afterglow.
     #[must_use]
     pub fn simulation(&self) -> &AuroraSimulation {
-        &self.simulation
+        &self.working().simulation
+    }
+
+    /// The same, to step it or to set its state.
+    pub(super) fn simulation_mut(&mut self) -> Option<&mut AuroraSimulation> {
+        self.working();
+        self.working.get_mut().map(|working| &mut working.simulation)
+    }
+
+    pub(super) fn profiles(&self) -> &Profiles {
+        &self.working().profiles
+    }
+
+    /// Red light alone, by its heights in place of the emitters.
+    pub(super) fn red_profiles(&self) -> &Profiles {
+        &self.working().red_profiles
+    }
+
+    pub(super) fn shading(&self) -> &Shading {
+        &self.working().shading
+    }
+
+    /// What single collisions are drawn from, where they are asked for.
+    pub(super) fn collisions(&self) -> Option<&Collisions> {
+        self.working().collisions.as_ref()
     }
 
     /// The magnetic field about an observer at a place in m.
     pub(super) fn field_lines(&self, place: DVec3) -> FieldLines {
-        let parameters = self.simulation.parameters();
-        FieldLines::new(parameters.dip_deg, parameters.declination_deg, place)
+        FieldLines::new(self.parameters.dip_deg, self.parameters.declination_deg, place)
     }
 
     /// What the light of a state of its simulation is made from at a time, s.
@@ -224,12 +272,14 @@ impl Phenomenon for Aurora {
     }
 
     fn stepping(&self) -> Option<Stepping> {
-        let preroll = self.simulation.parameters().preroll_s;
+        let preroll = self.parameters.preroll_s;
         Some(Stepping { step: AuroraSimulation::STEP_S, preroll, dissolve: self.dissolve })
     }
 
     fn step(&mut self, _time: f64, _surroundings: &Surroundings) {
-        self.simulation.step();
+        if let Some(simulation) = self.simulation_mut() {
+            simulation.step();
+        }
     }
 
     fn drawn_from(&self, shutter: Shutter) -> f64 {
@@ -237,20 +287,20 @@ impl Phenomenon for Aurora {
     }
 
     fn snapshot(&self) -> Vec<u8> {
-        self.simulation.snapshot()
+        self.simulation().snapshot()
     }
 
     fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError> {
-        self.simulation.restore(state)
+        self.simulation_mut().map_or(Err(SnapshotError::NoState), |simulation| simulation.restore(state))
     }
 
     fn particles(&self, t: f64) -> Option<PointCloud> {
         let step = AuroraSimulation::STEP_S;
-        if t - self.simulation.time() <= step {
-            return Some(point_cloud(self.simulation.particles(), t - self.simulation.time()));
+        if t - self.simulation().time() <= step {
+            return Some(point_cloud(self.simulation().particles(), t - self.simulation().time()));
         }
         // In the midst of a long exposure.
-        let mut simulation = self.simulation.clone();
+        let mut simulation = self.simulation().clone();
         exposure::step_until(&mut simulation, t);
         Some(point_cloud(simulation.particles(), t - simulation.time()))
     }

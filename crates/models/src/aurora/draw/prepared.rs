@@ -83,13 +83,13 @@ impl<'a> PreparedAurora<'a> {
         let charts = Charts { aurora, field: &field, coverage: Coverage::of_view(view, &field) };
         let (sharp, soft) = rayon::join(|| charts.sharp(&sources), || charts.soft(&sources));
         check(observer)?;
-        let drawing = &aurora.simulation.parameters().drawing;
+        let drawing = &aurora.simulation().parameters().drawing;
         let measured = view.measured.then(|| [sharp.clone(), soft.clone()]);
         let shown = if drawing.blur == Blur::Pixels {
             let samplers = [sharp.sampler(), soft.sampler()];
             Shown::Blurred(Blurred::new(view, &field, &samplers, &drawing.blur_radii))
         } else {
-            Shown::Seen(sharp.seen(&soft, &field, &aurora.shading))
+            Shown::Seen(sharp.seen(&soft, &field, aurora.shading()))
         };
         // What is blurred in the picture is blurred at one instant.
         let cameras = if matches!(shown, Shown::Blurred(_)) { vec![view.camera] } else { view.cameras() };
@@ -123,14 +123,13 @@ impl Charts<'_> {
         // The angle at which the spread is seen from the nearest place where such light is.
         let row = (spread_km / 130.0).clamp(pixel, 2.0 * pixel);
         let chart = Chart::new(&self.coverage, pixel, row);
-        let Aurora { simulation, profiles, collisions, .. } = self.aurora;
         let sorted = |strip| Footprint::new(&sources.sharp, (&chart, strip), self.field, spread_km);
-        let Some(collisions) = collisions else {
+        let Some(collisions) = self.aurora.collisions() else {
             let footprint = sorted(STRIP);
-            return Meridians::new(chart, self.field, profiles, &footprint);
+            return Meridians::new(chart, self.field, self.aurora.profiles(), &footprint);
         };
         let footprint = sorted(GROUP);
-        let step = (simulation.time() / AuroraSimulation::STEP_S).round() as i64 as u32;
+        let step = (self.aurora.simulation().time() / AuroraSimulation::STEP_S).round() as i64 as u32;
         collisions.draw(chart, self.field, &footprint, step)
     }
 
@@ -142,7 +141,7 @@ impl Charts<'_> {
         let chart = Chart::new(&self.coverage, column, (0.25 * column).max(pixel));
         let footprint = Footprint::new(&sources.soft, (&chart, STRIP), self.field, spread_km);
         // Always by the mean fall: in a cell that shines for a minute thousands of falls have come together.
-        let mut picture = Meridians::new(chart, self.field, &self.aurora.red_profiles, &footprint);
+        let mut picture = Meridians::new(chart, self.field, self.aurora.red_profiles(), &footprint);
         picture.add_up_heights();
         picture
     }
@@ -293,7 +292,7 @@ impl PreparedAurora<'_> {
                 let light = blurred.batch(x, y);
                 for i in 0..BATCH {
                     let place = Shading::place(batch.sine[i]);
-                    colours[i] = self.aurora.shading.arriving(simd, &light[i], place).into();
+                    colours[i] = self.aurora.shading().arriving(simd, &light[i], place).into();
                 }
             }
             (Shown::Seen(_), Some(sampler)) => {
@@ -357,7 +356,7 @@ impl PreparedAurora<'_> {
         for (plane, (emitter, photons)) in strip.aovs.iter_mut().zip(&self.brightnesses) {
             plane.add(index, light[emitter.index()] * *photons as f32, 1.0);
         }
-        let maps = self.maps.get_or_init(|| Maps::new(&self.aurora.simulation));
+        let maps = self.maps.get_or_init(|| Maps::new(self.aurora.simulation()));
         let Some(place) = direction.and_then(|direction| self.field.drawn(direction)) else { return };
         for (plane, value) in strip.aovs.iter_mut().skip(BRIGHTNESSES).zip(maps.at(place)) {
             plane.add(index, value, share);

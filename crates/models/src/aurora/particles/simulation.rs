@@ -155,10 +155,10 @@ impl AuroraSimulation {
         precipitation.share_out(&mut state.particles, (&target.course, &rays), time);
         state.afterglow.settle(&state.particles);
         let parameters = &making.parameters;
-        let emission = parameters.drawing.fall.emission(parameters.spectrum.spectrum());
+        let emission = parameters.drawing.fall.shared_emission(parameters.spectrum);
         Self {
-            fading: Fading::new(&emission, Self::STEP_S * parameters.time_lapse),
-            emission,
+            fading: Fading::new(emission, Self::STEP_S * parameters.time_lapse),
+            emission: emission.clone(),
             relocation: Relocation::new(parameters, key),
             mover: Mover::new(parameters),
             repulsion,

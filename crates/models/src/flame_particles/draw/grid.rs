@@ -44,6 +44,11 @@ impl Raster {
         Self { first, columns: count(first[0], right), rows: count(first[1], bottom), ..self }
     }
 
+    /// Its columns, counted from the picture's corner.
+    pub(crate) fn columns_of_picture(&self) -> std::ops::Range<i32> {
+        self.first[0]..self.first[0] + self.columns as i32
+    }
+
     /// The pixels of the picture that the cells cover.
     pub(crate) fn covered(&self) -> Rect {
         let side = |axis: usize, count: usize| {

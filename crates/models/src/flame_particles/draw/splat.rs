@@ -82,6 +82,7 @@ pub(crate) fn splat<'a, const P: usize>(sheet: &Sheet, tasks: &[Recycled<Sprite<
     }
     let shown = widened(shown);
     let cells = |fineness| Raster::around(shown, cell_size(fineness), nested).within(&cells_of_whole(fineness));
+    let columns_of_whole = |fineness| cells_of_whole(fineness).columns_of_picture();
     let mut coarser: Option<Grid> = None;
     for fineness in (finest..COARSEST + 1).step_by(2).rev() {
         let any = whole.counts[fineness..].iter().take(2).any(|count| *count > 0);
@@ -90,7 +91,7 @@ pub(crate) fn splat<'a, const P: usize>(sheet: &Sheet, tasks: &[Recycled<Sprite<
         }
         let mut grid = Grid::new(cells(fineness), sheet.layers * P, memory);
         let here = |radius: f32| sheet.fineness(radius).max(finest).wrapping_sub(fineness) < 2;
-        add_sprites(sheet, tasks, here, &mut grid);
+        add_sprites(sheet, tasks, here, columns_of_whole(fineness), &mut grid);
         if let Some(coarser) = coarser {
             grid.add_coarser(&coarser);
         }
@@ -185,6 +186,7 @@ fn add_sprites<'a, const P: usize>(
     sheet: &Sheet,
     tasks: &[Recycled<'a, Sprite<P>>],
     here: impl Fn(f32) -> bool + Sync,
+    columns_of_whole: Range<i32>,
     grid: &mut Grid,
 ) {
     let cells = grid.cells;
@@ -192,10 +194,10 @@ fn add_sprites<'a, const P: usize>(
     let bin = |task: &Recycled<'a, Sprite<P>>| dispatch!(level, _simd => Binned::new(sheet, task, &cells, &here));
     let binned: Vec<Binned<P>> = tasks.par_iter().map(bin).collect();
     grid.values_mut().par_chunks_mut(BAND * row_length).enumerate().for_each(|(index, values)| {
-        let (first, end) = (cells.first[0], cells.first[0] + cells.columns as i32);
+        let (columns, columns_of_whole) = (cells.columns_of_picture(), columns_of_whole.clone());
         let top = cells.first[1] + (index * BAND) as i32;
         values.fill(0.0);
-        let mut band = Band { first: top, columns: first..end, layers: sheet.layers, values };
+        let mut band = Band { first: top, columns, columns_of_whole, layers: sheet.layers, values };
         for task in &binned {
             dispatch!(level, _simd => band.add(sheet.profile, task, index));
         }
@@ -207,6 +209,8 @@ struct Band<'a> {
     /// The first row, and the columns, of the whole picture's cells.
     first: i32,
     columns: Range<i32>,
+    /// The columns that a grid of the whole picture has.
+    columns_of_whole: Range<i32>,
     layers: usize,
     values: &'a mut [f32],
 }
@@ -221,18 +225,32 @@ impl Band<'_> {
             let placed = &task.placed[usize::from(member)];
             let (from, to) = (placed.rows[0].max(self.first), placed.rows[1].min(end));
             for start in (from..to).step_by(ROWS) {
-                let chords = placed.chords(start, &self.columns);
+                let chords = placed.chords(start, &self.columns_of_whole);
                 for y in start..to.min(start + ROWS as i32) {
                     let row = &mut sums[(y - self.first) as usize * row_length..][..row_length];
                     let index = (y - start) as usize;
-                    for x in (chords.first[index]..chords.end[index]).step_by(COLUMNS) {
+                    // Runs begin where they do in the whole picture: the last one of a row reaches beyond the sprite's end.
+                    let cut = (self.columns.start - chords.first[index]).max(0) / COLUMNS as i32 * COLUMNS as i32;
+                    let end = chords.end[index].min(self.columns.end);
+                    for x in (chords.first[index] + cut..end).step_by(COLUMNS) {
                         let weights = chords.weights(profile, placed.fall, index, x);
-                        placed.add(row, (x - self.columns.start) as usize, self.layers, &weights);
+                        match usize::try_from(x - self.columns.start) {
+                            Ok(column) => placed.add(row, column, self.layers, &weights),
+                            Err(_) => {
+                                let before = (self.columns.start - x) as usize;
+                                placed.add(row, 0, self.layers, &without_first(&weights, before));
+                            }
+                        }
                     }
                 }
             }
         }
     }
+}
+
+/// Weights without the first `count`.
+fn without_first(weights: &[f32; COLUMNS], count: usize) -> [f32; COLUMNS] {
+    std::array::from_fn(|lane| weights.get(lane + count).copied().unwrap_or(0.0))
 }
 
 /// The sprites of a task on a grid, and which of them touch which band: a counting sort that keeps their order.

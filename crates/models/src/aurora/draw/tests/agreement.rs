@@ -87,7 +87,7 @@ fn collisions_lose_no_light_on_hard_sheets() {
     let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
     let mut cells = arc(3000);
     cells.iter_mut().for_each(|cell| cell.energy_ev *= (0.2 * FACTOR) as f32);
-    let (emission, collisions) = (aurora.simulation().emission(), aurora.collisions.as_ref().unwrap());
+    let (emission, collisions) = (aurora.simulation().emission(), aurora.collisions().unwrap());
     let (apart, _) = beside_profile(emission, collisions, &cells, OWN_SPREAD_KM);
     assert!(apart.iter().all(|apart| *apart < 0.03), "{apart:?}");
 }
