@@ -30,7 +30,7 @@ def _names() -> list[Case]:
         _out("printf with a number to write to", "a.%n.png", 2, r"^error: a\.%n\.png: `%`"),
         _out("100,000 digits", "a." + "#" * 100_000 + ".png", (1, 2), r"^error: "),
         _out("a name of 300 bytes", "a" * 300 + ".png", (1, 2), r"^error: a+\.png: "),
-        _out("a path of 5,000 bytes", "a/" * 2500 + "a.png", (1, 2), r"^error: (a/)+\S*: "),
+        _out("a path of 5,000 bytes", "a/" * 2500 + "a.png", (1, 2), r"^error: (a/)+.*: "),
         _out("a name that is no UTF-8", b"\xff\xfe.png".decode("utf-8", "surrogateescape"), 2, r"^error: .*not a Unicode name"),
         _out("a newline", "a\nb.png", 0, ""),
         _out("a newline and an unknown extension", "a\nerror: b.tiff", 2, r"^error: "),

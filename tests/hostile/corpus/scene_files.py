@@ -47,7 +47,7 @@ def _scenes() -> list[Case]:
         *made,
         Case("scene file", "missing", ["check", "gone.toml"], 3, r"^error: gone\.toml: the scene cannot be read"),
         Case("scene file", "in a folder that is a file", ["check", "scene.toml/scene.toml"], 3, r"^error: scene\.toml/scene\.toml: the scene cannot be read", {"scene.toml": FLAME}),
-        Case("scene file", "name of 5,000 bytes", ["check", "a" * 5000 + ".toml"], 3, r"^error: a+\S*: the scene cannot be read"),
+        Case("scene file", "name of 5,000 bytes", ["check", "a" * 5000 + ".toml"], 3, r"^error: a+.*: the scene cannot be read"),
         Case("scene file", "empty name", ["check", ""], (2, 3), r"^error: "),
         Case("scene file", "name with a newline", ["check", "a\nerror: b.toml"], 3, r"^error: "),
         Case("scene file", "name with an escape sequence", ["check", "\x1b[2Ja.toml"], 3, r"^error: "),
