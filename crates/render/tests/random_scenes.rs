@@ -38,7 +38,6 @@ fn random_valid_scenes_draw_finite_pictures() {
     let (asked, first) = (number("BANSHO_RANDOM_SCENES").unwrap_or(SCENES), number("BANSHO_RANDOM_SEED").unwrap_or(0));
     // Some parameters do not go together, such as core and fringe wider than the sheet, and are refused: fewer than one scene in four.
     let tried = asked + asked.div_ceil(3);
-    println!("{asked} scenes from the seeds {first} to {}", first + tried - 1);
     let outcomes: Vec<Outcome> = (first..first + tried).into_par_iter().map(outcome).collect();
     assert_finite(&outcomes);
     let drawn = outcomes.iter().filter(|outcome| matches!(outcome, Outcome::Drawn)).count() as u64;

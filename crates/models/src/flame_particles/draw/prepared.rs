@@ -300,8 +300,10 @@ impl Prepared for PreparedGas<'_> {
             Matter::Squares(squares) => squares.bounds(slice),
             _ => Rect::default(),
         };
+        // Gas that bends light reaches further than what shines of it.
+        let all = self.measured_haze(slice).map_or(gas, |haze| gas.union(&haze.rect));
         let sparks = self.sparks.iter().filter(|spark| slice.contains(spark.depth));
-        sparks.fold(gas, |all, spark| all.union(&spark.bounds(self.view.size)))
+        sparks.fold(all, |all, spark| all.union(&spark.bounds(self.view.size)))
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
@@ -354,10 +356,14 @@ impl PreparedGas<'_> {
         get_or_make(&self.haze, || Haze::new(&self.gas, self.look, self.view, summed, all)).as_ref()
     }
 
+    /// The haze where it is measured in a slice: in one alone, however many the layers fall into.
+    fn measured_haze(&self, slice: &DepthInterval) -> Option<&Haze> {
+        let is_here = self.view.measured && slice.contains(self.layers.centre(self.layers.count - 1));
+        self.haze.get().and_then(Option::as_ref).filter(|_| is_here)
+    }
+
     fn measure_deflection(&self, slice: &DepthInterval, strip: &mut Strip) {
-        // Once, however many slices the layers fall into.
-        let haze = self.haze.get().and_then(Option::as_ref);
-        if let Some(haze) = haze.filter(|_| slice.contains(self.layers.centre(self.layers.count - 1))) {
+        if let Some(haze) = self.measured_haze(slice) {
             haze.measure(strip);
         }
     }
