@@ -34,7 +34,7 @@ pub enum ProblemKind {
     Syntax(String),
     /// The text says more than is read: what it comes to in memory is a hundred times its own length.
     #[error(
-        "the text holds more than {most} values and tables (by its commas, brackets, braces and equals signs); allowed: up to {most}"
+        "the text holds more than {most} values and tables (by its commas, dots, brackets, braces and equals signs); allowed: up to {most}"
     )]
     TooManyValues {
         /// Most that are read.
