@@ -5,13 +5,13 @@ use bansho_base::{
     assets::AssetProblem,
     mesh::{MOST_TRIANGLES, Mesh},
 };
-use bansho_media::meshes::decode_mesh;
+use bansho_media::{meshes::decode_mesh, plates::limits::MemoryLimit};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     // A file beside it is itself, or is missing.
-    let beside = |name: &str| if name.len() < 8 { Ok(bytes.to_vec()) } else { Err(AssetProblem::Missing) };
+    let beside = |name: &str, _: u64| if name.len() < 8 { Ok(bytes.to_vec()) } else { Err(AssetProblem::Missing) };
     for extension in ["gltf", "glb"] {
-        if let Ok(mesh) = decode_mesh(bytes, extension, &beside) {
+        if let Ok(mesh) = decode_mesh(bytes, extension, &beside, MemoryLimit::default()) {
             check(&mesh);
         }
     }
