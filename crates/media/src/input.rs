@@ -33,7 +33,7 @@ pub enum InputError {
 }
 
 fn size(bytes: &Option<u64>) -> String {
-    bytes.map_or_else(|| "more bytes than that".to_owned(), memory::shown)
+    bytes.map_or_else(|| "more bytes than are read".to_owned(), memory::shown)
 }
 
 impl From<InputError> for AssetProblem {

@@ -58,7 +58,7 @@ fn more_than_a_scene_may_have_is_not_read() {
     assert!(told.contains("scene.toml: the scene cannot be read: has 16.0 MiB; allowed: up to 16.0 MiB"), "{told}");
     let run = piped(&folder, &["check", "-"], &large);
     assert_eq!(run.code, Some(3), "{}", run.stderr);
-    assert!(run.stderr.contains("stdin: the scene cannot be read: has more bytes than that"), "{}", run.stderr);
+    assert!(run.stderr.contains("stdin: the scene cannot be read: has more bytes than are read"), "{}", run.stderr);
 }
 
 #[cfg(unix)]
