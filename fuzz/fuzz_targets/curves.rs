@@ -3,11 +3,7 @@
 //! The first line are numbers, at which the value on the lines after it is looked at.
 #![no_main]
 
-use bansho_base::{
-    animation::Animated,
-    curve::Curve,
-    parameters::{CurveLimits, Node, Parameter, Range, Reader},
-};
+use bansho_base::{parameters::{animated::Animated, CurveLimits, Node, Parameter, Range, Reader}, math::curve::Curve};
 use bansho_render::scene::values;
 
 const LOW: f64 = -3.0;

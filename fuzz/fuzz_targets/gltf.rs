@@ -1,10 +1,7 @@
 //! Meshes as glTF, text and binary: any bytes are refused, or are triangles within the bounds that a mesh promises.
 #![no_main]
 
-use bansho_base::{
-    assets::AssetProblem,
-    mesh::{MOST_TRIANGLES, Mesh},
-};
+use bansho_base::{host::assets::AssetProblem, geometry::mesh::{MOST_TRIANGLES, Mesh}};
 use bansho_media::{meshes::decode_mesh, plates::limits::MemoryLimit};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {

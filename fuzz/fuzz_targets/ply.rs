@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use bansho_base::point_cloud::{PointCloud, Quantity};
+use bansho_base::geometry::point_cloud::{PointCloud, Quantity};
 use bansho_media::ply;
 
 const QUANTITIES: [Quantity; 4] = [Quantity::Temperature, Quantity::Density, Quantity::Energy, Quantity::Power];

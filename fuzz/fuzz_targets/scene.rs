@@ -1,13 +1,9 @@
 //! Scene files: any text is refused with located errors or draws a finite picture.
 #![no_main]
 
-use bansho_base::assets::MemoryAssets;
+use bansho_base::host::assets::MemoryAssets;
+use bansho_render::{Scene, phenomena::KINDS, scene::edit::{self, EditError}};
 use bansho_fuzz::{draw_small, one_thread};
-use bansho_render::{
-    Scene,
-    phenomena::KINDS,
-    scene::edit::{self, EditError},
-};
 
 libfuzzer_sys::fuzz_target!(|text: &str| {
     one_thread();

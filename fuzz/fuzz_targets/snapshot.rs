@@ -10,9 +10,9 @@ use std::{
     sync::{Arc, LazyLock},
 };
 
-use bansho_base::{assets::MemoryAssets, observer::Unobserved, phenomenon::Phenomenon, point_cloud::PointCloud};
-use bansho_fuzz::one_thread;
+use bansho_base::{host::{assets::MemoryAssets, observer::Unobserved}, phenomenon::Phenomenon, geometry::point_cloud::PointCloud};
 use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, Scene, Shot, phenomena::KINDS};
+use bansho_fuzz::one_thread;
 
 const GAS: &str = "bansho = 1\n[picture]\nsize = [8, 6]\n[[flame_particles]]\nparticles = 60\npreroll_s = 0.0\n";
 const AURORA: &str = "bansho = 1\n[picture]\nsize = [8, 6]\n[[aurora]]\npreroll_s = 0.0\nparticles = { count = 100 }\nfield = { cells = 16 }\n";

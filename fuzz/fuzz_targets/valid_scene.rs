@@ -1,12 +1,9 @@
 //! Valid scenes whose every value the fuzzer chooses: all draw finite pictures.
 #![no_main]
 
-use bansho_base::{
-    assets::MemoryAssets,
-    parameters::{self, Table},
-};
-use bansho_fuzz::{draw_small, one_thread};
+use bansho_base::{host::assets::MemoryAssets, parameters::{self, Table}};
 use bansho_render::{Scene, phenomena::KINDS, scene::SHARED_TABLES};
+use bansho_fuzz::{draw_small, one_thread};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     one_thread();

@@ -7,10 +7,12 @@ use std::{
 };
 
 use bansho_base::{
-    assets::{MemoryAssets, Picture},
     color::AlphaConvention,
+    host::{
+        assets::{MemoryAssets, Picture},
+        observer::Observer,
+    },
     image::Frame,
-    observer::Observer,
 };
 use bansho_media::plates::{decode_picture, limits};
 use bansho_render::{

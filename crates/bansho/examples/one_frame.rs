@@ -10,7 +10,7 @@ use std::{
 
 use bansho::{
     AlphaConvention, Backend, BitDepth, CpuBackend, MemoryAssets, Plan, PlanOptions, SceneBuilder, Unobserved, View,
-    base::image::DisplayPixels, models::flame_sheet::FlameSheetParameters, render::scene::PictureParameters,
+    base::image::DisplayPixels, fire::sheet::FlameSheetParameters, render::scene::PictureParameters,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -3,19 +3,18 @@
 use std::fmt::Write;
 
 use bansho_base::{
-    air::Air,
-    assets::Assets,
     camera::CameraParameters,
+    host::assets::Assets,
     parameters::{Parameters, Table, Value},
-    sky::SkyParameters,
-    wind::WindParameters,
+    world::{air::Air, sky::SkyParameters, wind::WindParameters},
 };
-use bansho_models::ground::GroundParameters;
 use bansho_render::{
     Scene, SceneError,
     phenomena::KINDS,
     scene::{Describe, FORMAT, LightParameters, ObstacleParameters, PictureParameters, PlateParameters},
 };
+
+use bansho_environment::ground::GroundParameters;
 
 /// Gathers the tables of a scene. Values are checked when it is built, by the same rules as a scene file.
 ///
@@ -121,9 +120,10 @@ impl SceneBuilder {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use bansho_base::assets::MemoryAssets;
+    use bansho_base::host::assets::MemoryAssets;
     use bansho_render::scene::SHARED_TABLES;
+
+    use super::*;
 
     #[test]
     fn what_is_built_is_what_was_said() {

@@ -23,17 +23,23 @@ mod build;
 #[cfg(feature = "files")]
 pub mod job;
 
+pub use bansho_aurora as aurora;
 pub use bansho_base as base;
+pub use bansho_environment as environment;
+pub use bansho_fire as fire;
 #[cfg(feature = "files")]
 pub use bansho_media as media;
-pub use bansho_models as models;
+pub use bansho_rain as rain;
 pub use bansho_render as render;
+pub use bansho_sph as sph;
 
 pub use bansho_base::{
-    assets::{Assets, MemoryAssets},
     color::{AlphaConvention, View},
+    host::{
+        assets::{Assets, MemoryAssets},
+        observer::{Cancelled, Observer, Stage, Unobserved},
+    },
     image::{DisplayImage, Frame, Image, Rect},
-    observer::{Cancelled, Observer, Stage, Unobserved},
 };
 pub use bansho_render::{
     Backend, CpuBackend, Plan, PlanError, PlanOptions, RenderError, Scene, SceneError, Shot,

@@ -5,8 +5,8 @@ use std::{hint::black_box, time::Duration};
 
 use bansho_base::{
     math,
+    math::random::{Key, Purpose},
     noise::{Coordinate, Dimension, Fractal, LANES, Noise},
-    random::{Key, Purpose},
 };
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use fearless_simd::{Level, dispatch};
@@ -125,7 +125,7 @@ fn exponentials(criterion: &mut Criterion) {
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(1));
     group.bench_function("lanes", |bencher| {
-        bencher.iter(|| dispatch!(level, _simd => apply(math::lanes::exp, black_box(&x), &mut out)))
+        bencher.iter(|| dispatch!(level, _simd => apply(math::approximations::exp, black_box(&x), &mut out)))
     });
     group.bench_function("naive: libm", |bencher| bencher.iter(|| apply(math::f32::exp, black_box(&x), &mut out)));
     group.finish();

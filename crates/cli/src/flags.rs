@@ -5,7 +5,7 @@ use std::{error::Error, io};
 use bansho::{
     SceneError,
     base::{
-        assets::{AssetError, AssetProblem},
+        host::assets::{AssetError, AssetProblem},
         parameters::{Problem, ProblemKind},
     },
     job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksFault},

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use bansho::base::printable;
+use bansho::base::host::printable;
 
 /// Writes `text` to stdout. A reader that has seen enough (`bansho schema | head`) is no error.
 pub(crate) fn to_stdout(text: &str) -> io::Result<()> {

@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bansho::{Stage, base::plural::counted};
+use bansho::{Stage, base::host::plural::counted};
 
 /// Adds up the time of each stage. A stage that begins inside another on the same thread stops the other's clock, so
 /// that nothing is counted twice.

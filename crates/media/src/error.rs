@@ -2,7 +2,7 @@
 
 use std::{io, path::PathBuf};
 
-use bansho_base::plural::counted;
+use bansho_base::host::plural::counted;
 
 use crate::naming::NamingError;
 

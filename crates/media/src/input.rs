@@ -8,7 +8,7 @@ use std::{
     path::Path,
 };
 
-use bansho_base::{assets::AssetProblem, memory};
+use bansho_base::host::{assets::AssetProblem, memory};
 
 /// Why the bytes of a file cannot be had.
 #[derive(Debug, thiserror::Error)]

@@ -179,7 +179,7 @@ fn in_json(head: &[u8]) -> bool {
 mod tests {
     use std::path::PathBuf;
 
-    use bansho_base::point_cloud::PointCloud;
+    use bansho_base::geometry::point_cloud::PointCloud;
 
     use super::*;
     use crate::{

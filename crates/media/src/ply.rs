@@ -1,6 +1,6 @@
 //! Particles as binary little-endian PLY (Turk 1994), which Blender, MeshLab and Open3D read.
 
-use bansho_base::point_cloud::PointCloud;
+use bansho_base::geometry::point_cloud::PointCloud;
 
 /// Properties that every particle has, in order: m, m/s.
 const PROPERTIES: [&str; 6] = ["x", "y", "z", "vx", "vy", "vz"];
@@ -8,7 +8,7 @@ const PROPERTIES: [&str; 6] = ["x", "y", "z", "vx", "vy", "vz"];
 /// A whole file: places, velocities, then the cloud's quantities. The same particles give the same bytes.
 ///
 /// ```
-/// let file = bansho_media::ply::encode(&bansho_base::point_cloud::PointCloud::default());
+/// let file = self::encode(&bansho_base::geometry::point_cloud::PointCloud::default());
 /// assert!(file.starts_with(b"ply\nformat binary_little_endian 1.0\n") && file.ends_with(b"end_header\n"));
 /// ```
 #[must_use]
@@ -32,7 +32,7 @@ pub fn encode(points: &PointCloud) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::point_cloud::Quantity;
+    use bansho_base::geometry::point_cloud::Quantity;
 
     use super::*;
 

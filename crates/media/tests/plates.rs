@@ -3,8 +3,8 @@
 use std::{fs, path::Path};
 
 use bansho_base::{
-    assets::{AssetProblem, Assets, Encoding, Picture},
     color::AlphaConvention,
+    host::assets::{AssetProblem, Assets, Encoding, Picture},
     image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
 };
 use bansho_media::{

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, process::Command};
 
-use bansho_base::point_cloud::{PointCloud, Quantity};
+use bansho_base::geometry::point_cloud::{PointCloud, Quantity};
 use bansho_media::{atomic, ply};
 
 #[test]

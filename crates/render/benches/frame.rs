@@ -6,13 +6,17 @@
 use std::{hint::black_box, sync::Arc};
 
 use bansho_base::{
-    assets::{Encoding, MemoryAssets, Picture},
-    canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
     color::{self, encode_srgb},
+    host::{
+        assets::{Encoding, MemoryAssets, Picture},
+        observer::{Cancelled, Observer, Unobserved},
+    },
     image::{Frame, Image, Rect},
-    observer::{Cancelled, Observer, Unobserved},
-    phenomenon::{Deflection, Phenomenon, Prepared},
-    surroundings::{Publication, Surroundings},
+    phenomenon::{
+        Deflection, Phenomenon, Prepared,
+        strip::{AovDescriptor, DepthInterval, Shutter, Strip, View},
+        surroundings::{Publication, Surroundings},
+    },
 };
 use bansho_render::{
     Backend, CpuBackend, Plan, PlanOptions, Scene,

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use bansho_base::{
+    geometry::point_cloud::PointCloud,
+    host::observer::{Cancelled, Observer},
     image::Frame,
-    observer::{Cancelled, Observer},
     phenomenon::SnapshotError,
-    point_cloud::PointCloud,
 };
 
 use crate::{

@@ -1,12 +1,14 @@
 //! Seamless loops of what is stepped: the end of one run dissolves into the beginning of the next.
 
 use bansho_base::{
-    canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
+    geometry::point_cloud::PointCloud,
+    host::observer::{Cancelled, Observer},
     image::{Figure, Image, Rect},
-    observer::{Cancelled, Observer},
-    phenomenon::{Deflection, Phenomenon, Prepared, Remark, SnapshotError, Stepping},
-    point_cloud::PointCloud,
-    surroundings::{Neighbours, Publication, Surroundings},
+    phenomenon::{
+        Deflection, Phenomenon, Prepared, Remark, SnapshotError, Stepping,
+        strip::{AovDescriptor, DepthInterval, Shutter, Strip, View},
+        surroundings::{Neighbours, Publication, Surroundings},
+    },
 };
 
 /// A stepped phenomenon in a loop: two runs of it, mixed about the moment where the loop closes.

@@ -4,14 +4,14 @@ use bansho_base::{
     color::{ev100_of_white_luminance, luminance},
     math::{DVec2, DVec3},
     parameters::Auto,
-    surroundings::Light,
+    phenomenon::surroundings::Light,
 };
-use bansho_models::ground::GroundParameters;
 
 use crate::{
     plan::Plan,
     scene::{LightParameters, Scene},
 };
+use bansho_environment::ground::GroundParameters;
 
 /// How many times display white the bright parts of a phenomenon are with an automatic exposure: enough for a core
 /// that nears white while its edges keep their colour.

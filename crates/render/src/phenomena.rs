@@ -2,19 +2,7 @@
 
 use std::{error::Error, sync::Arc};
 
-use bansho_base::{parameters::ModelFault, phenomenon::Phenomenon, sky::SkyParameters};
-use bansho_models::{
-    aurora::{
-        Aurora, AuroraParameters,
-        shapes::{Sequence, ShapeFaultKind},
-    },
-    flame_particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind, check_count},
-    flame_sheet::{FlameSheet, FlameSheetParameters},
-    ground::{Ground, GroundParameters},
-    lamps::{Lamp, Lamps},
-    rain::{Rain, RainParameters},
-    sky::SkyBackdrop,
-};
+use bansho_base::{parameters::ModelFault, phenomenon::Phenomenon, world::sky::SkyParameters};
 
 use crate::{
     dissolving::Dissolving,
@@ -24,6 +12,20 @@ use crate::{
         source::{Describe, Memo, Opening, OpeningFault, PhenomenonKind},
     },
 };
+use bansho_aurora::{
+    Aurora, AuroraParameters,
+    shapes::{Sequence, ShapeFaultKind},
+};
+use bansho_environment::{
+    ground::{Ground, GroundParameters},
+    lamps::{Lamp, Lamps},
+    sky::SkyBackdrop,
+};
+use bansho_fire::{
+    particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind, check_count},
+    sheet::{FlameSheet, FlameSheetParameters},
+};
+use bansho_rain::{Rain, RainParameters};
 
 /// Every kind, in the order in which schema and book list them.
 pub const KINDS: &[PhenomenonKind] =

@@ -3,16 +3,19 @@
 use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
-    assets::Assets,
-    canvas::{Shutter, View},
     color,
+    host::{assets::Assets, once::get_or_make},
     image::{FrameHeader, Rect},
-    once::get_or_make,
     parameters::{Auto, path},
-    phenomenon::{Phenomenon, Remark},
-    sky::{ElevationProfile, Sky},
-    surroundings::Occluder,
-    wind::Wind,
+    phenomenon::{
+        Phenomenon, Remark,
+        strip::{Shutter, View},
+        surroundings::Occluder,
+    },
+    world::{
+        sky::{ElevationProfile, Sky},
+        wind::Wind,
+    },
 };
 
 use crate::{

@@ -1,6 +1,6 @@
 //! Cutting the depth of a picture so that phenomena lie rightly before and behind each other.
 
-use bansho_base::canvas::DepthInterval;
+use bansho_base::phenomenon::strip::DepthInterval;
 
 /// A stretch of depth and the phenomena that fill some of it.
 #[derive(Clone, Debug, PartialEq)]

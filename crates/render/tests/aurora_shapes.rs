@@ -3,19 +3,19 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    assets::MemoryAssets,
-    drawing::{Drawing, Stroke},
+    geometry::strokes::{Drawing, Stroke},
+    host::{assets::MemoryAssets, observer::Unobserved},
     math::DVec2,
-    observer::Unobserved,
     parameters::{Parameters, Reader},
     phenomenon::Remark,
 };
-use bansho_models::aurora::{
-    AuroraParameters,
-    particles::AuroraSimulation,
-    shapes::{FRAME_S, Neighbourhood, Sequence, Shape},
-};
 use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, Scene, phenomena::KINDS};
+
+use bansho_aurora::{
+    AuroraParameters,
+    shapes::{FRAME_S, Neighbourhood, Sequence, Shape},
+    simulate::AuroraSimulation,
+};
 
 fn assets() -> MemoryAssets {
     let stroke =

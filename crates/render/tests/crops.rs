@@ -3,9 +3,8 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    assets::MemoryAssets,
+    host::{assets::MemoryAssets, observer::Unobserved},
     image::{Frame, Rect},
-    observer::Unobserved,
 };
 use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, Scene, phenomena::KINDS};
 

@@ -1,7 +1,7 @@
 //! What a scene has that its text does not state.
 
 use bansho_base::{
-    assets::MemoryAssets,
+    host::assets::MemoryAssets,
     parameters::{Auto, Value},
 };
 use bansho_render::{

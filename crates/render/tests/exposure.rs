@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    assets::{Encoding, MemoryAssets, Picture},
     color::{self, AlphaConvention, View},
+    host::{
+        assets::{Encoding, MemoryAssets, Picture},
+        observer::Unobserved,
+    },
     image::{DisplayPixels, Frame, Image, Rect},
-    observer::Unobserved,
     phenomenon::Remark,
 };
 use bansho_render::{

@@ -6,9 +6,8 @@ mod support;
 use std::sync::Arc;
 
 use bansho_base::{
-    assets::MemoryAssets,
+    host::{assets::MemoryAssets, observer::Unobserved},
     image::Frame,
-    observer::Unobserved,
     parameters::{Kind, TableDescriptor, Value},
 };
 use bansho_render::{
@@ -16,6 +15,7 @@ use bansho_render::{
     phenomena::KINDS,
     scene::{SHARED_TABLES, SharedTable},
 };
+
 use support::*;
 
 /// A shaken lamp that travels while a turn of one second, 24 frames, passes; all of it is dissolve.

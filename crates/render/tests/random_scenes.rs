@@ -6,12 +6,11 @@
 use std::{panic, sync::Arc};
 
 use bansho_base::{
-    assets::MemoryAssets,
     camera::CameraParameters,
     color,
-    observer::Unobserved,
+    host::{assets::MemoryAssets, observer::Unobserved},
+    math::random::{Key, Purpose, uniform},
     parameters::{Parameters, Reader, Table, Value, sample},
-    random::{Key, Purpose, uniform},
 };
 use bansho_render::{
     Backend, CpuBackend, Plan, PlanOptions, Scene,

@@ -4,14 +4,15 @@
 mod support;
 
 use bansho_base::{
-    assets::MemoryAssets,
+    host::assets::MemoryAssets,
+    math::random::{Key, Purpose, uniform},
     parameters::{self, Kind, Value},
-    random::{Key, Purpose, uniform},
 };
 use bansho_render::{
     PlanOptions, Scene,
     scene::{SHARED_TABLES, schema, template},
 };
+
 use support::*;
 
 /// The one problem of a scene, as a person reads it.
@@ -347,7 +348,7 @@ fn a_short_template_says_what_one_changes_first_and_is_the_same_scene() {
 #[test]
 fn a_models_fault_stays_what_it_is() {
     use bansho_base::parameters::ProblemKind;
-    use bansho_models::flame_particles::ParticleFaultKind;
+    use bansho_fire::particles::ParticleFaultKind;
     let text = "bansho = 1\n[[flame_particles]]\nparticles = 900000000\n";
     let kinds = bansho_render::phenomena::KINDS;
     let error = Scene::parse("new.toml", text, kinds, &MemoryAssets::default()).err().unwrap();
@@ -389,7 +390,7 @@ fn the_schema_knows_every_parameter() {
 #[test]
 fn a_plate_of_another_depth_size_is_refused() {
     use bansho_base::{
-        assets::{Encoding, Picture},
+        host::assets::{Encoding, Picture},
         image::Image,
     };
     let mut assets = checkerboard(16, 12, None);

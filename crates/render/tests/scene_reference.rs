@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bansho_base::{
-    assets::MemoryAssets,
+    host::assets::MemoryAssets,
     parameters::{Descriptor, Kind, ProblemKind, TableDescriptor, Value},
 };
 use bansho_render::{

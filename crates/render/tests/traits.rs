@@ -10,14 +10,15 @@ use std::sync::{
 
 use bansho_base::{
     color::{AlphaConvention, View},
+    host::observer::{Observer, Unobserved},
     image::{DisplayPixels, Frame, Rect},
     math,
-    observer::{Observer, Unobserved},
 };
 use bansho_render::{
     PlanOptions, RenderError,
     display::{BitDepth, display},
 };
+
 use support::*;
 
 const MIDDLE: (usize, usize) = (60, 45);
@@ -94,7 +95,7 @@ fn the_scenes_own_lights_reach_phenomena_too() {
 fn a_plate_through_an_empty_scene_is_unchanged_to_the_byte() {
     let assets = checkerboard(120, 90, None);
     let codes: Vec<[u8; 4]> = {
-        use bansho_base::assets::Assets;
+        use bansho_base::host::assets::Assets;
         let picture = assets.picture("plate.png", 0).unwrap();
         picture.colour.pixels().iter().map(|p| p.map(|value| (value * 255.0).round() as u8)).collect()
     };

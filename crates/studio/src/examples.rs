@@ -5,9 +5,8 @@ use std::{path::Path, sync::Arc};
 use bansho::{
     Assets, MemoryAssets,
     base::{
-        assets::{AssetError, AssetProblem, Picture},
-        drawing::Drawing,
-        mesh::Mesh,
+        geometry::{mesh::Mesh, strokes::Drawing},
+        host::assets::{AssetError, AssetProblem, Picture},
     },
     media::{
         drawings::decode_drawing,

@@ -3,8 +3,8 @@
 
 use bansho_base::{
     color::View,
+    host::observer::{Observer, Stage, StageGuard},
     image::{DisplayImage, Frame},
-    observer::{Observer, Stage, StageGuard},
 };
 use bansho_media::{
     flipbook::{Sheet, tile_display},

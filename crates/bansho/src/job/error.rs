@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use bansho_base::{observer::Cancelled, plural::counted};
+use bansho_base::host::{observer::Cancelled, plural::counted};
 use bansho_media::{MediaError, flipbook::TileError, input::InputError, naming::NamingError};
 use bansho_render::{PlanError, RenderError, SceneError, scene::edit::EditError};
 

@@ -10,8 +10,8 @@ use std::{
 };
 
 use bansho_base::{
+    host::observer::{Observer, Stage},
     image::Frame,
-    observer::{Observer, Stage},
 };
 
 use super::{error::JobError, observer::JobObserver};

@@ -1,6 +1,6 @@
 //! Whether there is memory for the pictures of a job, found out before anything is drawn.
 
-use bansho_base::{memory, parameters::ProblemKind};
+use bansho_base::{host::memory, parameters::ProblemKind};
 use bansho_render::{Plan, RenderError, display::BitDepth};
 
 use super::{

@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use bansho_base::{
-    observer::{Observer, Unobserved},
+    host::{
+        observer::{Observer, Unobserved},
+        plural::counted,
+    },
     phenomenon::Remark,
-    plural::counted,
 };
 use bansho_media::naming::OutputKind;
 use bansho_render::RenderError;

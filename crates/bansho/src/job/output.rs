@@ -8,8 +8,8 @@ use std::{
 
 use bansho_base::{
     color::{AlphaConvention, View},
+    host::observer::{Observer, Stage, StageGuard},
     image::{DisplayImage, Frame},
-    observer::{Observer, Stage, StageGuard},
 };
 use bansho_media::{
     MediaError,

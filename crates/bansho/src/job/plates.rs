@@ -1,6 +1,6 @@
 //! Whether the plate of every frame is there, found out before anything is drawn.
 
-use bansho_base::{assets::AssetError, parameters::ProblemKind};
+use bansho_base::{host::assets::AssetError, parameters::ProblemKind};
 use bansho_render::{Plan, RenderError};
 
 use super::{error::JobError, scene_file::SceneFile};

@@ -6,8 +6,8 @@ use std::{
 };
 
 use bansho_base::{
-    assets::Assets,
     color::{AlphaConvention, View},
+    host::assets::Assets,
     phenomenon::Remark,
 };
 use bansho_media::{

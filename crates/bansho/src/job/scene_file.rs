@@ -7,7 +7,7 @@ use std::{
 };
 
 use bansho_base::{
-    assets::Assets,
+    host::assets::Assets,
     parameters::{ProblemKind, nearest},
 };
 use bansho_media::{

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use bansho_base::{image::Frame, observer::Observer};
+use bansho_base::{host::observer::Observer, image::Frame};
 use bansho_media::flipbook::Sheet;
 
 use super::{

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use bansho_base::{
+    host::observer::{Observer, check},
     image::Frame,
-    observer::{Observer, check},
 };
 use bansho_render::{Backend, Plan, Shot};
 

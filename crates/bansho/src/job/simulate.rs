@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use bansho_base::observer::{Stage, StageGuard, check};
+use bansho_base::host::observer::{Stage, StageGuard, check};
 use bansho_media::{atomic, naming::NumberedPath, overwriting::OverwritePolicy, ply};
 use bansho_render::{Backend, Plan, PlanOptions, RenderError};
 

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bansho_base::observer::{Observer, Stage, StageGuard};
+use bansho_base::host::observer::{Observer, Stage, StageGuard};
 use bansho_media::{atomic, identity::resolved, overwriting::OverwritePolicy};
 use bansho_render::{Plan, RenderError, Shot};
 
@@ -182,7 +182,10 @@ fn numbers(folder: &Path) -> io::Result<Vec<i64>> {
 mod tests {
     use std::sync::{Arc, atomic::Ordering};
 
-    use bansho_base::{assets::MemoryAssets, observer::Unobserved, phenomenon::SnapshotError};
+    use bansho_base::{
+        host::{assets::MemoryAssets, observer::Unobserved},
+        phenomenon::SnapshotError,
+    };
     use bansho_media::mark;
     use bansho_render::{Backend, CpuBackend, PlanOptions};
 

@@ -6,11 +6,13 @@ use std::sync::{
 };
 
 use bansho_base::{
-    assets::MemoryAssets,
+    geometry::point_cloud::PointCloud,
+    host::{
+        assets::MemoryAssets,
+        observer::{Observer, Stage, check},
+    },
     image::{Frame, Image, Rect},
-    observer::{Observer, Stage, check},
     phenomenon::SnapshotError,
-    point_cloud::PointCloud,
 };
 use bansho_media::mark;
 use bansho_render::{Backend, Plan, PlanOptions, RenderError, Shot};

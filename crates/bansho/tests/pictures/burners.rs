@@ -2,15 +2,16 @@
 
 use bansho::{
     base::{
-        air::Air,
-        assets::MemoryAssets,
+        host::assets::MemoryAssets,
         parameters::{AssetPath, Auto},
-        phenomenon::Phenomenon,
-        surroundings::Surroundings,
-        wind::{Wind, WindParameters},
+        phenomenon::{Phenomenon, surroundings::Surroundings},
+        world::{
+            air::Air,
+            wind::{Wind, WindParameters},
+        },
     },
+    fire::particles::{BurnerParameters, BurnerShape, FlameParticles, FlameParticlesParameters},
     media::{meshes::decode_mesh, plates::limits::MemoryLimit},
-    models::flame_particles::{BurnerParameters, BurnerShape, FlameParticles, FlameParticlesParameters},
 };
 
 /// Middles of three right triangles on the ground, 10 m apart, and their legs: areas of 4.5, 0.5 and 0.125 m^2.
@@ -41,9 +42,13 @@ fn glb() -> Vec<u8> {
 #[test]
 fn gas_comes_evenly_from_the_whole_surface_of_a_gltf_mesh() {
     let mut assets = MemoryAssets::default();
-    let mesh =
-        decode_mesh(&glb(), "glb", &|_, _| Err(bansho::base::assets::AssetProblem::Missing), MemoryLimit::default())
-            .unwrap();
+    let mesh = decode_mesh(
+        &glb(),
+        "glb",
+        &|_, _| Err(bansho::base::host::assets::AssetProblem::Missing),
+        MemoryLimit::default(),
+    )
+    .unwrap();
     assets.insert_mesh("mesh.glb", mesh);
     let burner = BurnerParameters {
         shape: BurnerShape::Mesh,

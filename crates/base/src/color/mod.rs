@@ -4,32 +4,28 @@
 //! 2. [`space`]: XYZ (D65) and linear sRGB enter the working space, ACEScg, by Bradford adaptation D65 -> D60, and leave it
 //!    by the inverse. Emitted light is absolute: [`luminance`] is in cd/m^2. Negative components are colours outside AP1; keep them.
 //! 3. [`exposure`]: `exposed = luminance * exposure_scale(ev100)`, so that 1.0 is display white.
-//! 4. [`View`]: exposed ACEScg to display pixels, first by the camera's [`WhiteBalance`] if it has one. The tone curve ([`tone`]) acts on the largest component, highlights take a
-//!    path to white and colours outside sRGB lose saturation ([`gamut`]), then sRGB encoding ([`encode`]), [`alpha`] and dither ([`quantise`]).
+//! 4. [`View`]: exposed ACEScg to display pixels, first by the camera's [`WhiteBalance`] if it has one. The tone curve ([`display::tone`]) acts on the largest component, highlights take a
+//!    path to white and colours outside sRGB lose saturation ([`display::gamut`]), then sRGB encoding ([`display::transfer`]), [`display::alpha`] and dither ([`display::quantize`]).
 //!    The view can be inverted on the whole sRGB cube ([`View::to_scene`]), so a plate through an empty scene is unchanged.
 
-pub mod alpha;
 pub mod blackbody;
-pub mod encode;
+pub mod display;
 pub mod exposure;
-pub mod gamut;
-pub mod quantise;
-mod row;
 pub mod space;
 pub mod spectrum;
-pub mod tone;
-pub mod view;
 pub mod white_balance;
 
-pub use alpha::AlphaConvention;
 pub use blackbody::{BlackBody, black_body};
-pub use encode::{decode_srgb, decode_srgb8, encode_srgb};
+pub use display::{
+    alpha::AlphaConvention,
+    quantize::DisplayCode,
+    transfer::{decode_srgb, decode_srgb8, encode_srgb},
+    view::{UnknownView, View},
+};
 pub use exposure::{LARGEST_EV100, ev100_of_camera, ev100_of_white_luminance, exposure_scale, white_luminance};
-pub use quantise::DisplayCode;
 pub use space::{
     ACESCG_FROM_SRGB, ACESCG_FROM_XYZ, LUMINANCE_WEIGHTS, Matrix3, SRGB_FROM_ACESCG, SRGB_FROM_XYZ, XYZ_FROM_ACESCG,
     XYZ_FROM_SRGB, acescg_from_srgb, acescg_from_xyz, luminance, srgb_from_acescg, xyz_from_acescg,
 };
 pub use spectrum::{LUMINOUS_EFFICACY_LM_PER_W, line_xyz, planck_radiance_per_nm, xyz_of_spectrum};
-pub use view::{UnknownView, View};
 pub use white_balance::WhiteBalance;

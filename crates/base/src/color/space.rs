@@ -3,7 +3,7 @@
 //! XYZ here is always relative to D65, as for sRGB. Working values are ACEScg (AP1 primaries, D60 white); Bradford adaptation
 //! D65 -> D60 lies in every matrix that leads into the working space, its inverse in every matrix that leads out.
 
-use crate::math::Fused;
+use crate::math::MulAdd;
 
 /// A 3 x 3 matrix, row by row, acting on column vectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,7 +130,7 @@ pub fn luminance(acescg: [f32; 3]) -> f32 {
 
 #[inline(always)]
 fn dot_single([a, b, c]: [f32; 3], [x, y, z]: [f32; 3]) -> f32 {
-    x.fused(a, y.fused(b, z * c))
+    x.fma(a, y.fma(b, z * c))
 }
 
 #[inline(always)]

@@ -1,5 +1,5 @@
 use super::*;
-use crate::random::{Key, Purpose};
+use crate::math::random::{Key, Purpose};
 
 const DETAILED: Fractal = Fractal { octaves: 6, lacunarity: 2, gain: 0.6 };
 

@@ -39,7 +39,7 @@ impl Error for ModelFault {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::CurveError;
+    use crate::math::curve::CurveError;
 
     #[test]
     fn a_fault_stays_what_it_is() {

@@ -1,10 +1,12 @@
 //! Parameters made of points: curves, and values keyed over time.
 
-use super::{Kind, Node, Parameter, ProblemKind, Range, Reader, Table, Value, nearest, types::read_number};
-use crate::{
-    animation::{Animate, Animated},
-    curve::{Curve, CurveError, Interpolation},
+use super::{
+    Kind, Node, Parameter, ProblemKind, Range, Reader, Table, Value,
+    animated::{Animate, Animated},
+    nearest,
+    types::read_number,
 };
+use crate::math::curve::{Curve, CurveError, Interpolation};
 
 crate::choice! {
     /// How values between points are found.

@@ -1,7 +1,7 @@
 //! Faults in what a file says, each with its place, what is wrong and what is allowed.
 
 use super::{ModelFault, Span};
-use crate::{
+use crate::host::{
     assets::AssetError,
     plural::{between, counted},
 };
@@ -100,7 +100,7 @@ pub enum ProblemKind {
     },
     /// Control points or keys that make no curve.
     #[error("{0}")]
-    Curve(#[from] crate::curve::CurveError),
+    Curve(#[from] crate::math::curve::CurveError),
     /// A curve that falls where it must rise.
     #[error("falls between x = {from} and x = {to}; it must rise or stay level from point to point")]
     NotRising {

@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use bansho::{
     BitDepth,
     job::{StreakFormat, Streaks},
-    models::rain::{texture::StreakCube, velocity::VelocityLaw},
+    rain::{billboards::texture::StreakCube, drops::terminal_velocity::VelocityLaw},
 };
-use clap::Args;
 
 use super::{
     values::{self, Numbers},
     work::{OverwriteArgs, WorkArgs},
 };
+use clap::Args;
 
 /// The textures that are wanted; without options the 24 of Yoshida, Dobashi and Yamamoto.
 #[derive(Args, Debug)]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use bansho::{
     AlphaConvention, BitDepth, Rect, View,
     job::{BackendChoice, ContactBackground, FlipbookCrop, StreakFormat},
-    models::rain::velocity::VelocityLaw,
+    rain::drops::terminal_velocity::VelocityLaw,
     render::{
         frames::{self, FrameSpecError},
         scene::picture::LARGEST_SIDE,

@@ -1,9 +1,9 @@
 //! `bansho calibrate`
 
 use anyhow::ensure;
-use bansho::models::aurora::{
+use bansho::aurora::physics::{
     atmosphere::atmosphere,
-    light::calibration::{Check, calibrate},
+    calibration::{Check, calibrate},
 };
 
 use crate::output::to_stdout;

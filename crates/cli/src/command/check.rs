@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bansho::{
-    base::printable::printable,
+    base::host::printable::printable,
     job::{self, JobError},
 };
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bansho::{
     KINDS,
-    base::{parameters::nearest, printable::printable},
+    base::{host::printable::printable, parameters::nearest},
     media::{MediaError, atomic},
     render::scene::{PhenomenonKind, template},
 };

@@ -2,7 +2,7 @@
 
 use bansho::{
     MemoryAssets,
-    base::printable::printable,
+    base::host::printable::printable,
     job::SceneFile,
     media::atomic,
     render::scene::{FORMAT, edit},

@@ -10,13 +10,13 @@ use std::{
 };
 
 use bansho::{
-    base::{plural::counted, printable::printable},
+    base::host::{plural::counted, printable::printable},
     job::Outline,
 };
-use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::Result;
 use crate::output::to_stderr;
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 /// Draws itself only where stderr is a terminal.
 pub(super) struct Bar {

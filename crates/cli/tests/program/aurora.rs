@@ -1,9 +1,11 @@
 //! The aurora through the whole program.
 
-use bansho::models::aurora::{
+use bansho::aurora::{
     SpectrumShape,
-    atmosphere::{LEVEL_SPACING, LEVELS, atmosphere, level_altitude_km},
-    light::{Emission, Emitter, PHOTONS_PER_KILORAYLEIGH},
+    physics::{
+        atmosphere::{LEVEL_SPACING, LEVELS, atmosphere, level_altitude_km},
+        emission::{Emission, Emitter, PHOTONS_PER_KILORAYLEIGH},
+    },
 };
 
 use crate::support::{Folder, read_exr};

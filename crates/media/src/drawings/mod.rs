@@ -6,8 +6,8 @@ mod transform;
 mod xml;
 
 use bansho_base::{
-    assets::AssetProblem,
-    drawing::{Drawing, Stroke},
+    geometry::strokes::{Drawing, Stroke},
+    host::assets::AssetProblem,
     math::DVec2,
 };
 

@@ -16,11 +16,10 @@ use ::exr::{
     meta::{MetaData, attribute::SampleType, header::Header},
 };
 use bansho_base::{
-    assets::{AssetProblem, Picture},
     color::{LARGEST_EV100, ev100_of_camera},
+    host::assets::{AssetProblem, Picture},
     image::Image,
 };
-use rayon::prelude::*;
 
 use super::{
     KEY_EXPOSURE,
@@ -28,6 +27,7 @@ use super::{
     primaries,
 };
 use crate::plates::limits::{self, MemoryLimit};
+use rayon::prelude::*;
 
 /// Most chunks that are decompressed at a time.
 const MOST_CHUNKS: u64 = 32;

@@ -1,6 +1,6 @@
 //! From a file's chromaticities to colours that Bansho knows.
 
-use bansho_base::assets::Encoding;
+use bansho_base::host::assets::Encoding;
 
 use super::attribute::AP1;
 

@@ -1,6 +1,6 @@
 //! Numbers in glTF buffers, every place checked against the bytes that are there.
 
-use bansho_base::assets::AssetProblem;
+use bansho_base::host::assets::AssetProblem;
 
 use super::{buffers::Buffers, json::Object};
 

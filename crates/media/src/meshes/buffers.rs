@@ -5,7 +5,7 @@ use std::{
     collections::{BTreeMap, BTreeSet},
 };
 
-use bansho_base::assets::AssetProblem;
+use bansho_base::host::assets::AssetProblem;
 
 use super::{Beside, base64, json::Object};
 use crate::plates::limits::MemoryLimit;

@@ -1,6 +1,6 @@
 //! The container of a binary glTF (glTF 2.0, "GLB File Format"): a header and chunks, little-endian.
 
-use bansho_base::assets::AssetProblem;
+use bansho_base::host::assets::AssetProblem;
 
 use super::damaged;
 

@@ -2,10 +2,10 @@
 
 use std::fmt::Display;
 
-use bansho_base::assets::AssetProblem;
-use serde_json::{Map, Value};
+use bansho_base::host::assets::AssetProblem;
 
 use super::damaged;
+use serde_json::{Map, Value};
 
 /// Most values that are read; each takes up to two hundred bytes of memory.
 const MOST_VALUES: usize = 2_000_000;

@@ -13,9 +13,9 @@ mod nodes;
 use std::collections::BTreeMap;
 
 use bansho_base::{
-    assets::AssetProblem,
+    geometry::mesh::{MOST_CORNERS, MOST_TRIANGLES, Mesh, MeshError},
+    host::assets::AssetProblem,
     math::{DMat4, DVec3},
-    mesh::{MOST_CORNERS, MOST_TRIANGLES, Mesh, MeshError},
 };
 
 use self::{accessor::Accessor, buffers::Buffers, glb::Glb, json::Object, nodes::Shown};

@@ -1,7 +1,7 @@
 //! The tree of nodes: which meshes a scene shows, and where.
 
 use bansho_base::{
-    assets::AssetProblem,
+    host::assets::AssetProblem,
     math::{DMat4, DQuat, DVec3},
 };
 

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use bansho_base::assets::Picture;
+use bansho_base::host::assets::Picture;
 
 /// Pictures in the order of their last use, the latest last.
 #[derive(Debug, Default)]
@@ -47,7 +47,7 @@ impl Cache {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::{assets::Encoding, image::Image};
+    use bansho_base::{host::assets::Encoding, image::Image};
 
     use super::*;
 

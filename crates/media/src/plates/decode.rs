@@ -4,17 +4,17 @@ use std::io::Cursor;
 
 use ::png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 use bansho_base::{
-    assets::{AssetProblem, Encoding, Picture},
+    host::assets::{AssetProblem, Encoding, Picture},
     image::Image,
-};
-use zune_jpeg::{
-    JpegDecoder,
-    zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
 };
 
 use super::{
     exposure::exif_ev100,
     limits::{self, MemoryLimit},
+};
+use zune_jpeg::{
+    JpegDecoder,
+    zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
 };
 
 /// Bytes of a pixel of a picture that was read.

@@ -1,6 +1,6 @@
 //! What a plate may claim, checked before any memory is taken for it.
 
-use bansho_base::{assets::AssetProblem, memory};
+use bansho_base::host::{assets::AssetProblem, memory};
 
 use crate::exr::attribute::Window;
 

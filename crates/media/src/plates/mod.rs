@@ -13,9 +13,8 @@ use std::{
 };
 
 use bansho_base::{
-    assets::{AssetError, AssetProblem, Assets, Picture},
-    drawing::Drawing,
-    mesh::Mesh,
+    geometry::{mesh::Mesh, strokes::Drawing},
+    host::assets::{AssetError, AssetProblem, Assets, Picture},
 };
 
 use self::{

@@ -1,9 +1,9 @@
 //! Compositing front to back: `C += Tacc L; Tacc *= T` (the hot loop of a frame that holds little).
 
 use bansho_base::{
-    canvas::{AovDescriptor, AovPlane, Strip},
     image::Rect,
-    math::Fused,
+    math::MulAdd,
+    phenomenon::strip::{AovDescriptor, AovPlane, Strip},
 };
 use fearless_simd::{Level, dispatch};
 
@@ -113,7 +113,7 @@ impl Accumulator {
             let layer = &mut self.layers[phenomenon];
             let mut alpha = 0.0;
             for c in 0..3 {
-                layer[c][to + x] = reaches[c].fused(strip.radiance[c][from + x], layer[c][to + x]);
+                layer[c][to + x] = reaches[c].fma(strip.radiance[c][from + x], layer[c][to + x]);
                 alpha += reaches[c] * (1.0 - taken[c]);
             }
             layer[3][to + x] += alpha / 3.0;
@@ -134,7 +134,7 @@ fn nearest_row(nearest: &mut [f32], depth: &[f32]) {
 #[inline(always)]
 fn emit_row(colour: &mut [f32], transmittance: &[f32], radiance: &[f32]) {
     for ((colour, transmittance), radiance) in colour.iter_mut().zip(transmittance).zip(radiance) {
-        *colour = transmittance.fused(*radiance, *colour);
+        *colour = transmittance.fma(*radiance, *colour);
     }
 }
 
@@ -143,7 +143,7 @@ fn absorb_row(colour: &mut [f32], transmittance: &mut [f32], radiance: &[f32], a
     for (((colour, transmittance), radiance), absorbed) in
         colour.iter_mut().zip(transmittance).zip(radiance).zip(absorbed)
     {
-        *colour = transmittance.fused(*radiance, *colour);
+        *colour = transmittance.fma(*radiance, *colour);
         *transmittance *= absorbed;
     }
 }

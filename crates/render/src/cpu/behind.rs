@@ -1,14 +1,13 @@
 //! What lies behind the slices that are being drawn: the plate, or all that is farther, perhaps seen through air that bends light.
 
 use bansho_base::{
-    canvas::View,
     image::{Channel, Frame, Image, Rect},
-    math::{Fused, lanes},
-    phenomenon::Deflection,
+    math::{MulAdd, approximations},
+    phenomenon::{Deflection, strip::View},
 };
-use fearless_simd::{Level, dispatch};
 
 use super::plate::PlateFrame;
+use fearless_simd::{Level, dispatch};
 
 /// The background of some slices, as large as the whole picture.
 #[derive(Clone, Copy)]
@@ -145,7 +144,7 @@ trait Blend: Copy {
 impl Blend for f32 {
     #[inline(always)]
     fn blend(self, other: Self, share: f32) -> Self {
-        share.fused(other - self, self)
+        share.fma(other - self, self)
     }
 }
 
@@ -220,8 +219,8 @@ impl Bend<'_> {
     /// Where the light of a pixel comes from that is bent by `angle`, `reach` pixels before what is behind.
     #[inline(always)]
     fn source(&self, x: usize, y: usize, [right, up]: [f32; 2], reach: f32, [width, height]: [usize; 2]) -> Source {
-        let (column, across) = split(reach.fused(right, x as f32), width);
-        let (row, down) = split((-reach).fused(up, y as f32), height);
+        let (column, across) = split(reach.fma(right, x as f32), width);
+        let (row, down) = split((-reach).fma(up, y as f32), height);
         // A picture of one column or row has nothing beside it.
         let beside = if width < 2 { 0b1010 } else { 0 } | if height < 2 { 0b1100 } else { 0 };
         let hidden = if right == 0.0 && up == 0.0 { ALL_HIDDEN } else { beside };
@@ -246,7 +245,7 @@ impl Bend<'_> {
 fn split(place: f32, side: usize) -> (u32, f32) {
     let place = place.max(0.0).min((side - 1) as f32);
     let whole = place.floor().min(side.saturating_sub(2) as f32);
-    (lanes::whole(whole).cast_unsigned(), place - whole)
+    (approximations::whole(whole).cast_unsigned(), place - whole)
 }
 
 #[cfg(test)]

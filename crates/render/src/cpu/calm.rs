@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     color::{AlphaConvention, View},
-    observer::{Cancelled, Unobserved},
+    host::observer::{Cancelled, Unobserved},
 };
 
 use super::shot::CpuShot;

@@ -3,13 +3,17 @@
 use std::sync::OnceLock;
 
 use bansho_base::{
-    canvas::Shutter,
     color,
-    observer::{self, Cancelled, Observer},
-    once::get_or_make,
-    phenomenon::{Phenomenon, Remark},
-    sky::Sky,
-    surroundings::{Neighbours, Publication, Surroundings},
+    host::{
+        observer::{self, Cancelled, Observer},
+        once::get_or_make,
+    },
+    phenomenon::{
+        Phenomenon, Remark,
+        strip::Shutter,
+        surroundings::{Neighbours, Publication, Surroundings},
+    },
+    world::sky::Sky,
 };
 
 use super::{faint::faint, mirror::Mirror};

@@ -1,15 +1,17 @@
 //! From prepared phenomena to a frame: strip by strip, slice by slice, nearest first, the plate behind all.
 
 use bansho_base::{
-    canvas::{AovRule, Strip, View},
+    host::{
+        observer::{self, Cancelled, Observer},
+        scratch_pool::Spares,
+    },
     image::{Channel, Frame, FrameHeader, Image, Precision, Rect},
-    math::Fused,
-    observer::{self, Cancelled, Observer},
-    phenomenon::{Phenomenon, Prepared},
-    spares::Spares,
+    math::MulAdd,
+    phenomenon::{
+        Phenomenon, Prepared,
+        strip::{AovRule, Strip, View},
+    },
 };
-use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::{
     accumulate::Accumulator,
@@ -17,6 +19,8 @@ use super::{
     plate::PlateFrame,
 };
 use crate::{plan::Plan, scene::check::PLATE_LAYER, slices::Slice};
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
 
 /// Rows of a strip: the planes of a 1920-pixel strip stay within a core's second-level cache.
 pub(super) const STRIP_ROWS: usize = 8;
@@ -270,7 +274,7 @@ fn lay_behind(behind: &[[f32; 4]], out: &mut [[f32; 4]]) {
     for (out, behind) in out.iter_mut().zip(behind) {
         let share = [1.0, 1.0, 1.0, 1.0 - out[3]];
         for c in 0..4 {
-            out[c] = share[c].fused(behind[c], out[c]);
+            out[c] = share[c].fma(behind[c], out[c]);
         }
     }
 }
@@ -281,7 +285,7 @@ fn lay_behind_absorbed([red, green, blue]: [&[f32]; 3], behind: &[[f32; 4]], out
     for ((((out, behind), red), green), blue) in out.iter_mut().zip(behind).zip(red).zip(green).zip(blue) {
         let share = [*red, *green, *blue, 1.0 - out[3]];
         for c in 0..4 {
-            out[c] = share[c].fused(behind[c], out[c]);
+            out[c] = share[c].fma(behind[c], out[c]);
         }
     }
 }
@@ -335,7 +339,7 @@ fn layer_planes(composition: &Composition, worker: &mut Worker) -> Vec<Vec<f32>>
         for (index, (own, value)) in plane.iter_mut().zip(values).enumerate() {
             let through = accumulator.transmittance_at(index);
             let share = through.get(number % 4).copied().unwrap_or((through[0] + through[1] + through[2]) / 3.0);
-            *own = share.fused(value, *own);
+            *own = share.fma(value, *own);
         }
     }
     planes
@@ -393,7 +397,7 @@ fn channel_names(composition: &Composition) -> Vec<Channel> {
     }
     if composition.outputs.aovs {
         for phenomenon in composition.phenomena {
-            let aov = |aov: &bansho_base::canvas::AovDescriptor| {
+            let aov = |aov: &bansho_base::phenomenon::strip::AovDescriptor| {
                 channel(format!("{}.{}", phenomenon.name(), aov.name), Precision::Single)
             };
             channels.extend(phenomenon.aovs().iter().map(aov));

@@ -4,8 +4,8 @@
 //! through the layer between. AOVs are not bent.
 
 use bansho_base::{
+    host::observer::{Cancelled, Observer},
     image::{Frame, FrameHeader},
-    observer::{Cancelled, Observer},
     phenomenon::Deflection,
 };
 

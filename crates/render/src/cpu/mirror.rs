@@ -6,17 +6,15 @@
 
 use bansho_base::{
     camera::{Camera, Lens},
-    canvas::View,
+    host::observer::{self, Cancelled, Observer},
     image::Image,
     math::{DVec2, DVec3},
-    observer::{self, Cancelled, Observer},
-    phenomenon::LevelMirror,
-    sky::Sky,
-    surroundings::Backdrop,
+    phenomenon::{LevelMirror, strip::View, surroundings::Backdrop},
+    world::sky::Sky,
 };
-use rayon::prelude::*;
 
 use super::plate::PlateFrame;
+use rayon::prelude::*;
 
 /// Pixels of the picture from one place on a line of sight to the next.
 const STRIDE: f64 = 1.0;
@@ -286,9 +284,9 @@ impl March<'_> {
 mod tests {
     use bansho_base::{
         camera::CameraParameters,
-        canvas::Shutter,
-        observer::Unobserved,
-        sky::{SkyKind, SkyParameters},
+        host::observer::Unobserved,
+        phenomenon::strip::Shutter,
+        world::sky::{SkyKind, SkyParameters},
     };
 
     use super::*;

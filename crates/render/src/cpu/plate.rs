@@ -3,15 +3,16 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    assets::{Encoding, Picture},
     camera::{Camera, Lens},
     color,
+    host::{
+        assets::{Encoding, Picture},
+        observer::{Cancelled, Observer},
+    },
     image::Image,
     math::DVec2,
-    observer::{Cancelled, Observer},
     phenomenon::LevelMirror,
 };
-use rayon::prelude::*;
 
 use super::mirror;
 use crate::{
@@ -19,6 +20,7 @@ use crate::{
     plan::Plan,
     scene::{DepthKind, OpeningFault, plate::PlatePictures},
 };
+use rayon::prelude::*;
 
 /// A plate, as large as the picture with its overscan.
 #[derive(Clone, Debug, Default)]

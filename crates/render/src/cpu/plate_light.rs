@@ -1,11 +1,11 @@
 //! The light that a plate was taken in, as far as it shows it: what drops before it refract.
 
 use bansho_base::{
-    assets::Encoding,
     camera::{Camera, Lens},
     color,
+    host::assets::Encoding,
     math::{self, DVec2},
-    sky::{ElevationProfile, ElevationSample},
+    world::sky::{ElevationProfile, ElevationSample},
 };
 
 use super::plate::{Fit, to_scene};
@@ -119,7 +119,8 @@ mod tests {
         assert!((zenith[2] / zenith[0] - 2.0).abs() < 1e-5);
         let profile = ElevationProfile::of_samples(samples.iter().copied().chain(sky)).unwrap();
         // What is seen stays as it is: at its top the mean of pillars and sky.
-        let seen = bansho_base::sky::Sky::measured(profile).radiance(bansho_base::math::DVec3::new(0.0, 0.29, 0.0));
+        let seen =
+            bansho_base::world::sky::Sky::measured(profile).radiance(bansho_base::math::DVec3::new(0.0, 0.29, 0.0));
         assert!(seen[0] < 0.45, "{seen:?}");
         assert_eq!(open_sky(&[]), []);
     }

@@ -3,15 +3,15 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    canvas::View,
+    geometry::point_cloud::PointCloud,
+    host::observer::{self, Cancelled, Observer, Stage, StageGuard},
     image::{Channel, FigureSet, Frame, Rect},
-    observer::{self, Cancelled, Observer, Stage, StageGuard},
-    phenomenon::{LevelMirror, Phenomenon, Prepared},
-    point_cloud::PointCloud,
-    surroundings::{Publication, Surroundings},
+    phenomenon::{
+        LevelMirror, Phenomenon, Prepared,
+        strip::View,
+        surroundings::{Publication, Surroundings},
+    },
 };
-
-use rayon::prelude::*;
 
 use super::{
     behind::Behind,
@@ -29,6 +29,8 @@ use crate::{
     plan::Plan,
     slices::{self, Slice},
 };
+
+use rayon::prelude::*;
 
 pub(super) struct CpuShot {
     plan: Arc<Plan>,
@@ -346,7 +348,7 @@ impl Shot for CpuShot {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::assets::MemoryAssets;
+    use bansho_base::host::assets::MemoryAssets;
 
     use super::*;
     use crate::{phenomena::KINDS, plan::PlanOptions, scene::Scene};
@@ -380,7 +382,7 @@ mod tests {
     fn gas_burns_on_when_its_flame_is_changed_also_where_it_would_burn_in_longer() {
         let text = "bansho = 1\n[[flame_particles]]\nparticles = 60\n[[flame_particles.burners]]\nheight = 0.8\n";
         let mut shot = CpuShot::open(plan(text)).unwrap();
-        shot.advance(3, &bansho_base::observer::Unobserved).unwrap();
+        shot.advance(3, &bansho_base::host::observer::Unobserved).unwrap();
         let stands = |shot: &CpuShot| {
             let stepping = shot.phenomena[0].stepping().unwrap();
             (stepping.preroll_steps(), stepping.time_after(shot.clocks[0].taken), shot.particles())

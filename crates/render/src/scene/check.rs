@@ -3,14 +3,14 @@
 use std::collections::HashMap;
 
 use bansho_base::{
-    assets::Assets,
     camera::{Lens, VERTICAL_FOV_DEG},
+    host::assets::Assets,
     math,
     parameters::{Auto, Node, ProblemKind, Range, Reader, Span, Table, Value, nearest},
 };
-use bansho_models::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
 use super::{FORMAT, Instance, Opening, OpeningFault, PhenomenonKind, Place, SHARED_TABLES, Scene, picture::LightKind};
+use bansho_environment::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
 /// The format number must be one that this program reads.
 pub(super) fn format(root: &Table, reader: &mut Reader) {

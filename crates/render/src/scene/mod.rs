@@ -20,15 +20,16 @@ mod toml;
 use std::{collections::HashSet, sync::Arc};
 
 use bansho_base::{
-    air::Air,
-    animation::Animated,
-    assets::Assets,
     camera::{CameraParameters, SKY_FOV_DEG},
-    parameters::{Parameter, Parameters, Problem, ProblemKind, Problems, Reader, Table, TableDescriptor, Value},
-    sky::SkyParameters,
-    wind::WindParameters,
+    host::assets::Assets,
+    parameters::{
+        Parameter, Parameters, Problem, ProblemKind, Problems, Reader, Table, TableDescriptor, Value,
+        animated::Animated,
+    },
+    world::{air::Air, sky::SkyParameters, wind::WindParameters},
 };
-use bansho_models::ground::GroundParameters;
+
+use bansho_environment::ground::GroundParameters;
 
 pub use self::{
     defaults::ImpliedBackdrop,

@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    assets::Assets,
-    distance_field::DistanceField,
+    geometry::{distance_field::DistanceField, transform::Placement},
+    host::assets::Assets,
     math::DVec3,
     parameters::{AssetPath, ProblemKind, Range},
-    placement::Placement,
-    surroundings::Occluder,
+    phenomenon::surroundings::Occluder,
 };
 
 use super::OpeningFault;

@@ -1,11 +1,10 @@
 //! What a scene says of its picture, its plate and its lights.
 
 use bansho_base::{
-    animation::Animated,
     color::LARGEST_EV100,
     math::{self, DVec3},
-    parameters::{AssetPath, Auto, Kind, Node, Parameter, ProblemKind, Range, Reader, Value},
-    surroundings::{Emitter, Light},
+    parameters::{AssetPath, Auto, Kind, Node, Parameter, ProblemKind, Range, Reader, Value, animated::Animated},
+    phenomenon::surroundings::{Emitter, Light},
 };
 
 /// Largest side of a picture, pixels.

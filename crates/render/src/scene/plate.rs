@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    assets::{AssetError, AssetProblem, Assets, Picture},
+    host::assets::{AssetError, AssetProblem, Assets, Picture},
     parameters::ProblemKind,
 };
 

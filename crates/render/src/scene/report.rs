@@ -3,9 +3,11 @@
 use std::fmt;
 
 use bansho_base::{
+    host::{
+        plural::counted,
+        printable::{message, pictured, printable},
+    },
     parameters::{Problem, ProblemKind},
-    plural::counted,
-    printable::{message, pictured, printable},
 };
 
 use super::{

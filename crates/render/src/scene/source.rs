@@ -6,7 +6,7 @@ use std::{
 };
 
 use bansho_base::{
-    assets::Assets,
+    host::assets::Assets,
     parameters::{Parameter, Parameters, ProblemKind, Reader, Table, TableDescriptor},
     phenomenon::Phenomenon,
 };

@@ -1,13 +1,15 @@
 //! A slab of fog before the camera: Beer's law, and light scattered toward the camera.
 
 use bansho_base::{
-    canvas::{AovDescriptor, AovRule, DepthInterval, Shutter, Strip, View},
+    host::observer::{Cancelled, Observer},
     image::Rect,
     math::{self, DVec2},
-    observer::{Cancelled, Observer},
     parameters::Range,
-    phenomenon::{Phenomenon, Prepared},
-    surroundings::{Publication, Surroundings},
+    phenomenon::{
+        Phenomenon, Prepared,
+        strip::{AovDescriptor, AovRule, DepthInterval, Shutter, Strip, View},
+        surroundings::{Publication, Surroundings},
+    },
 };
 use bansho_render::scene::{Describe, Opening, OpeningFault};
 

@@ -1,14 +1,18 @@
 //! A luminous disc that moves in steps: it falls, shines on others, and can bend light.
 
 use bansho_base::{
-    canvas::{AovDescriptor, DepthInterval, Shutter, Strip, View},
+    host::observer::{Cancelled, Observer},
     image::{Figure, Image, Rect},
-    math::DVec3,
-    observer::{Cancelled, Observer},
+    math::{
+        DVec3,
+        random::{Key, Purpose, uniform},
+    },
     parameters::Range,
-    phenomenon::{Deflection, Phenomenon, Prepared, SnapshotError, Stepping},
-    random::{Key, Purpose, uniform},
-    surroundings::{Emitter as LightEmitter, Light, Publication, Surroundings},
+    phenomenon::{
+        Deflection, Phenomenon, Prepared, SnapshotError, Stepping,
+        strip::{AovDescriptor, DepthInterval, Shutter, Strip, View},
+        surroundings::{Emitter as LightEmitter, Light, Publication, Surroundings},
+    },
 };
 use bansho_render::scene::{Describe, Opening, OpeningFault};
 

@@ -6,9 +6,11 @@ mod emitter;
 use std::sync::Arc;
 
 use bansho_base::{
-    assets::{Assets, Encoding, MemoryAssets, Picture},
+    host::{
+        assets::{Assets, Encoding, MemoryAssets, Picture},
+        observer::Unobserved,
+    },
     image::{Frame, Image},
-    observer::Unobserved,
 };
 use bansho_render::{
     Backend, CpuBackend, Plan, PlanOptions, Scene, SceneError, Shot,

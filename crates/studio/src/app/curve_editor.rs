@@ -1,7 +1,7 @@
 //! Curves by their points: drag them, double-click to add one, right-click to take one out.
 
 use bansho::base::{
-    curve::{Curve, Interpolation},
+    math::curve::{Curve, Interpolation},
     parameters::{InterpolationName, Node, Table, Value},
 };
 use eframe::egui::{

@@ -3,8 +3,10 @@
 use bansho::{
     KINDS,
     base::{
-        curve::{Curve, Interpolation},
-        math::DVec3,
+        math::{
+            DVec3,
+            curve::{Curve, Interpolation},
+        },
         parameters::{Descriptor, InterpolationName, Kind, Node, Table, TableDescriptor, Value},
     },
     render::scene::{Place, SHARED_TABLES, Segment},

@@ -5,10 +5,10 @@ use bansho::{
     base::parameters::{Table, TableDescriptor, Value},
     render::scene::{Place, SHARED_TABLES, operation::Operation},
 };
-use eframe::egui::{self, Ui};
 
 use super::session::Session;
-use crate::document::{Document, Listed, operations};
+use crate::document::{Document, Listed, phenomena::operations};
+use eframe::egui::{self, Ui};
 
 /// What the inspector shows: a table of the scene.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bansho::{
     Assets, KINDS, Plan, PlanOptions, SceneError,
     base::{
-        assets::{AssetError, AssetProblem},
+        host::assets::{AssetError, AssetProblem},
         parameters::{Problem, ProblemKind, Span, Table, Value},
     },
     render::scene::{
@@ -169,7 +169,10 @@ mod tests {
 
     use bansho::{
         MemoryAssets,
-        base::{assets::Picture, drawing::Drawing, mesh::Mesh},
+        base::{
+            geometry::{mesh::Mesh, strokes::Drawing},
+            host::assets::Picture,
+        },
     };
 
     use super::*;

@@ -5,7 +5,7 @@ pub mod drawing;
 pub mod files;
 mod history;
 mod named_files;
-mod phenomena;
+pub(crate) mod phenomena;
 pub mod recovery;
 pub mod stages;
 #[cfg(test)]

@@ -9,7 +9,7 @@ use bansho::{
         color::ev100_of_white_luminance,
         parameters::{Auto, Parameters, Reader, Table, Value},
     },
-    models::flame_sheet::{FlameSheetParameters, StageShown},
+    fire::sheet::{FlameSheetParameters, StageShown},
     render::scene::{
         Describe, Instance, Place, PlateParameters, Scene,
         operation::{self, Operation},

@@ -8,10 +8,10 @@ use bansho::{
 
 use super::{
     files::{self, Outside, Recent},
-    operations,
     recovery::{self, Autosave},
     *,
 };
+use crate::document::phenomena::operations;
 
 const SCENE: &str = "\
 # A fire in the rain.

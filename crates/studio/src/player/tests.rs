@@ -6,10 +6,9 @@ use std::{
 use bansho::{
     AlphaConvention, Assets, Backend, BitDepth, CpuBackend, MemoryAssets, Plan, PlanOptions, Unobserved, View,
     base::{
-        assets::{AssetError, Picture as Plate},
-        drawing::Drawing,
+        geometry::{mesh::Mesh, strokes::Drawing},
+        host::assets::{AssetError, Picture as Plate},
         image::DisplayPixels,
-        mesh::Mesh,
     },
     display, parse_scene,
 };

@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use bansho_base::{
     color::{AlphaConvention, View},
+    host::observer::Observer,
     image::{DisplayPixels, Frame, Rect},
-    observer::Observer,
 };
 use bansho_render::{
     Backend, Plan,

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use bansho_base::{
     color::{AlphaConvention, View},
+    host::observer::{Observer, Stage, StageGuard, check},
     image::{DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Rect},
-    observer::{Observer, Stage, StageGuard, check},
 };
 use bansho_media::{
     atomic, exr,
@@ -19,13 +19,13 @@ use bansho_render::{
     Plan,
     display::{BitDepth, display},
 };
-use serde_json::{Value, json};
 
 use super::{
     FlipbookSummary,
     motion::{self, Colour, Tile},
 };
 use crate::job::{error::JobError, finished::Finished};
+use serde_json::{Value, json};
 
 /// Where a flipbook goes and what its sheets are.
 pub(super) struct Files {

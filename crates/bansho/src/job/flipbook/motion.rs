@@ -2,8 +2,8 @@
 
 use bansho_base::{
     color,
+    host::observer::Observer,
     image::{DisplayImage, Frame, FrameHeader, Image},
-    observer::Observer,
 };
 
 use super::files::Files;

@@ -1,12 +1,12 @@
 //! What cannot be drawn as streak textures.
 
-use bansho_base::plural::counted;
-use bansho_models::rain::{
-    distribution::{DropSizes, SizeBin},
-    velocity::NoTerminalVelocity,
-};
+use bansho_base::host::plural::counted;
 
 use super::Streaks;
+use bansho_rain::drops::{
+    size_distribution::{DropSizes, SizeBin},
+    terminal_velocity::NoTerminalVelocity,
+};
 
 /// Which list a fault is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

@@ -15,11 +15,11 @@ use bansho_media::{
     overwriting::OverwritePolicy,
     png::{self, MeasuredImage, PngEffort},
 };
-use bansho_models::rain::lens::DropLens;
 use bansho_render::display::BitDepth;
 
 use super::{StreakFormat, Streaks, Texture};
 use crate::job::error::JobError;
+use bansho_rain::lighting::drop_phase_function::DropLens;
 
 /// Version of the program, on which files depend.
 const VERSION: &str = env!("CARGO_PKG_VERSION");

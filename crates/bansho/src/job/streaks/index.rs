@@ -4,18 +4,18 @@ use std::f64::consts::PI;
 
 use bansho_base::image::Image;
 use bansho_media::mark;
-use bansho_models::rain::{
-    distribution::{DropSizes, SizeBin},
-    extinction::{Losses, extinction, visibility},
-    texture::{FallingDrop, StreakCube},
-};
 use bansho_render::display::BitDepth;
-use serde_json::{Value, json};
 
 use super::{
     StreakFormat, Streaks, Texture,
     files::{Writer, Written},
 };
+use bansho_rain::{
+    billboards::texture::{FallingDrop, StreakCube},
+    drops::size_distribution::{DropSizes, SizeBin},
+    lighting::extinction::{Losses, extinction, visibility},
+};
+use serde_json::{Value, json};
 
 /// One texture as the index tells it.
 pub(super) struct Entry {

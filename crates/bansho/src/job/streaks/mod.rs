@@ -10,19 +10,12 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering},
 };
 
-use bansho_base::observer::check;
+use bansho_base::host::observer::check;
 use bansho_media::{
     MediaError,
     overwriting::{InputFiles, OverwritePolicy},
 };
-use bansho_models::rain::{
-    distribution::{DropSizes, SizeBin},
-    lens::DropLens,
-    texture::StreakCube,
-    velocity::{Air, Fall, VelocityLaw, fixed_point},
-};
 use bansho_render::display::BitDepth;
-use rayon::prelude::*;
 
 use self::{
     files::{Lit, Writer},
@@ -34,6 +27,15 @@ use super::{
     observer::{FrameDone, JobObserver, Outline},
     output, overwriting,
 };
+use bansho_rain::{
+    billboards::texture::StreakCube,
+    drops::{
+        size_distribution::{DropSizes, SizeBin},
+        terminal_velocity::{Air, Fall, VelocityLaw, fixed_point},
+    },
+    lighting::drop_phase_function::DropLens,
+};
+use rayon::prelude::*;
 
 pub use fault::{ListKind, StreaksFault};
 

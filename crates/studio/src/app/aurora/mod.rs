@@ -9,8 +9,7 @@ mod tool;
 
 use std::sync::Arc;
 
-use bansho::models::aurora::shapes::Form;
-use eframe::egui::{self, Color32, Id, Pos2, Sense, Ui, vec2};
+use bansho::{aurora::shapes::Form, render::scene::operation::Operation};
 
 use self::{
     hands::Gesture,
@@ -22,7 +21,7 @@ use crate::document::{
     Revision,
     drawing::{Drawing, Refusal},
 };
-use bansho::render::scene::operation::Operation;
+use eframe::egui::{self, Color32, Id, Pos2, Sense, Ui, vec2};
 
 /// The editor of one aurora's shapes.
 #[derive(Default)]

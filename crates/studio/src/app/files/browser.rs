@@ -84,7 +84,7 @@ pub(super) fn download(name: &str, parts: &Parts) -> Result<(), JsValue> {
 }
 
 /// What the browser keeps for this page's server, where it does.
-pub(in crate::app) fn storage() -> Option<Storage> {
+pub(crate) fn storage() -> Option<Storage> {
     web_sys::window()?.local_storage().ok()?
 }
 

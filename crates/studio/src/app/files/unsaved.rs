@@ -23,9 +23,9 @@ const EVERY_S: f64 = 5.0;
 const NAME: &str = "unsaved";
 
 /// Unsaved work, of now and of before.
-pub(in crate::app) struct Unsaved {
+pub(crate) struct Unsaved {
     /// Work of a studio that did not end well.
-    pub(in crate::app) recovered: Vec<Recovered>,
+    pub(crate) recovered: Vec<Recovered>,
     /// Such work that is open again, to be forgotten once it is kept as this studio's own.
     reopened: Vec<Recovered>,
     /// When something was kept last, s.
@@ -126,14 +126,14 @@ impl Unsaved {
     }
 
     /// Forgets work that is not wanted.
-    pub(in crate::app) fn forget(&mut self, recovered: &Recovered) {
+    pub(crate) fn forget(&mut self, recovered: &Recovered) {
         forget(recovered);
         self.recovered.retain(|other| other != recovered);
     }
 
     /// The window closed well.
     #[cfg(not(target_arch = "wasm32"))]
-    pub(in crate::app) fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         if let Some(autosave) = self.autosave.take() {
             autosave.end();
         }
@@ -141,7 +141,7 @@ impl Unsaved {
 
     /// Pages end without being asked.
     #[cfg(target_arch = "wasm32")]
-    pub(in crate::app) fn end(&mut self) {}
+    pub(crate) fn end(&mut self) {}
 }
 
 #[cfg(not(target_arch = "wasm32"))]

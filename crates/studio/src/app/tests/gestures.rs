@@ -127,7 +127,7 @@ fn a_curve_that_is_held_still_stays_as_it_is() {
 /// The highest point of the flame's blue.
 fn highest(harness: &mut Harness<'_, Studio>) -> (f32, f32) {
     use bansho::base::parameters::{Parameters, Reader, Value};
-    use bansho::models::flame_sheet::FlameSheetParameters;
+    use bansho::fire::sheet::FlameSheetParameters;
     let document = &harness.state_mut().session().document;
     let Some(Value::List(sheets)) = document.values().get("flame_sheet").map(|node| &node.value) else {
         panic!("a sheet")

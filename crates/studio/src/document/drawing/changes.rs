@@ -1,12 +1,11 @@
 //! What hands do to shapes, as operations on the scene.
 
 use bansho::{
+    aurora::shapes::{Correspondence, Form, LinkParameters, SheetParameters},
     base::{
-        curve::Curve,
-        math::DVec2,
+        math::{DVec2, curve::Curve},
         parameters::{Node, Parameters, Table, Value},
     },
-    models::aurora::shapes::{Correspondence, Form, LinkParameters, SheetParameters},
     render::scene::{Place, operation::Operation},
 };
 

@@ -1,11 +1,11 @@
 //! Sheets and points that a hand sends elsewhere than by place: links of one transition.
 
 use bansho::{
+    aurora::shapes::LinkParameters,
     base::{
         math::DVec2,
         parameters::{Table, Value},
     },
-    models::aurora::shapes::LinkParameters,
     render::scene::operation::Operation,
 };
 

@@ -14,13 +14,13 @@ use std::sync::Arc;
 
 use bansho::{
     Assets,
+    aurora::{
+        AuroraParameters,
+        shapes::{Sequence, ShapeFault},
+    },
     base::{
         math::DVec2,
         parameters::{Parameters, ProblemKind, Reader, Table, Value},
-    },
-    models::aurora::{
-        AuroraParameters,
-        shapes::{Sequence, ShapeFault},
     },
     render::scene::{
         Place,

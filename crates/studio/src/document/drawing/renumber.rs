@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 
 use bansho::{
+    aurora::shapes::{LinkParameters, MergeParameters, SplitParameters},
     base::parameters::{Auto, Node, Table, Value},
-    models::aurora::shapes::{LinkParameters, MergeParameters, SplitParameters},
     render::scene::operation::Operation,
 };
 

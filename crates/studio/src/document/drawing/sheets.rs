@@ -1,12 +1,11 @@
 //! Sheets as the scene states them, changed by hands.
 
 use bansho::{
+    aurora::shapes::SheetParameters,
     base::{
-        curve::Curve,
-        math::{DVec2, lerp},
+        math::{DVec2, curve::Curve, lerp},
         parameters::{Auto, Parameters, Table},
     },
-    models::aurora::shapes::SheetParameters,
 };
 
 use super::{Drawing, lines, links::rounded};
@@ -135,7 +134,7 @@ pub(super) fn with_points(sheet: &SheetParameters, points: Vec<[f64; 2]>) -> She
 }
 
 /// `sheet` as a named form of the usual size, where it was.
-pub(super) fn with_form(sheet: &SheetParameters, form: bansho::models::aurora::shapes::Form) -> SheetParameters {
+pub(super) fn with_form(sheet: &SheetParameters, form: bansho::aurora::shapes::Form) -> SheetParameters {
     SheetParameters {
         points: None,
         path: None,

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use bansho::{Assets, MemoryAssets, base::math::DVec2, models::aurora::shapes::Form};
+use bansho::{Assets, MemoryAssets, aurora::shapes::Form, base::math::DVec2};
 
 use super::{Drawing, Factor, Refusal};
 use crate::document::Document;

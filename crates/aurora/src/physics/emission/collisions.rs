@@ -1,0 +1,166 @@
+//! Photons of single collisions: for Fang's falls such that their mean is the emission table, and the mean of the thesis's rules.
+
+use bansho_base::math;
+
+use super::{
+    Emission, PHOTONS_PER_KILORAYLEIGH,
+    emitter::{EMITTERS, Emitter, PerEmitter},
+    excitation::DIRECT_PHOTONS,
+    quenching::natural_lifetime,
+};
+use crate::physics::{
+    atmosphere::Air,
+    precipitation::{deposition::column, electron_track::collision_count},
+};
+
+/// k_b, J/K, and the atomic mass unit, kg.
+const BOLTZMANN: f64 = 1.380_649e-23;
+const ATOMIC_MASS: f64 = 1.660_539e-27;
+/// Radius of the molecules that quench in (2.25), m: half the distance at which N2 collides with N2.
+const MOLECULAR_RADIUS: f64 = 1.85e-10;
+
+impl Emission {
+    /// Brightness that each collision of a fall adds to the column it stands for, in kR of ion pairs per mW m^-2: times
+    /// [`photons_per_ion_pair`](Self::photons_per_ion_pair) of the collision's level it is the light of each emitter.
+    ///
+    /// # Panics
+    /// For a node that is not of the grid of energies.
+    #[must_use]
+    pub fn ion_pairs_per_collision(&self, node: usize) -> f64 {
+        let pairs = column(self.deposition().monoenergetic(node));
+        pairs / collision_count(node) as f64 / PHOTONS_PER_KILORAYLEIGH
+    }
+}
+
+/// Mean thermal speed of molecules of a mass in atomic units, m/s (2.26).
+#[must_use]
+pub fn thermal_speed(temperature: f64, mass_u: f64) -> f64 {
+    math::sqrt(8.0 * BOLTZMANN * temperature / (std::f64::consts::PI * mass_u * ATOMIC_MASS))
+}
+
+/// Probability that a state is struck by a molecule before its mean lifetime is over (2.25). It quenches green light below 190 km, which
+/// nature does not: a molecule's touch seldom takes the energy.
+#[must_use]
+pub fn hard_sphere_quenching(emitter: Emitter, air: &Air) -> f64 {
+    let mass_u = match emitter {
+        Emitter::OxygenGreen | Emitter::OxygenRed => 15.999,
+        Emitter::NitrogenIon | Emitter::Nitrogen => 28.014,
+    };
+    let cross_section = std::f64::consts::PI * MOLECULAR_RADIUS * MOLECULAR_RADIUS;
+    let rate = std::f64::consts::SQRT_2 * air.number_density() * cross_section * thermal_speed(air.temperature, mass_u);
+    -math::exp_m1(-rate * natural_lifetime(emitter))
+}
+
+/// Counting photons of each emitter for each ion pair made in this air by the rules of the thesis (2.4.2): an atom or a molecule is struck
+/// by number density, then emits one line by production rate unless it is quenched (2.25). O2 gives nothing. The mean over all draws.
+#[must_use]
+pub fn mean_hard_sphere_photons(air: &Air) -> PerEmitter<f64> {
+    EMITTERS.map(|emitter| {
+        let struck = match emitter {
+            Emitter::OxygenGreen | Emitter::OxygenRed => air.o,
+            Emitter::NitrogenIon | Emitter::Nitrogen => air.n2,
+        };
+        let radiated = 1.0 - hard_sphere_quenching(emitter, air);
+        struck / air.number_density() * DIRECT_PHOTONS[emitter.index()] * radiated
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math::random::{Key, Purpose};
+
+    use super::{super::PHOTONS_PER_KILORAYLEIGH, *};
+    use crate::physics::{
+        atmosphere::{LEVELS, atmosphere},
+        precipitation::{electron_track::Falls, spectrum::ARC},
+    };
+
+    /// Light by level and emitter, kR per mW m^-2, of so many falls of a spectrum.
+    fn light(table: &Emission, falls: &Falls, energy_ev: f64, particles: u64) -> Vec<PerEmitter<f64>> {
+        let key = Key::new(11, "aurora");
+        let mut sum = vec![[0.0; 4]; LEVELS];
+        for particle in 0..particles {
+            let uniforms = key.uniforms(particle, 0, Purpose::named("energy")).map(f64::from);
+            let node = table.deposition().draw_node(energy_ev, [uniforms[0], uniforms[1]]);
+            let pairs = table.ion_pairs_per_collision(node) / particles as f64;
+            for collision in falls.fall(node, key, particle) {
+                let level = collision.level as usize;
+                let photons = table.photons_per_ion_pair()[level];
+                sum[level] = std::array::from_fn(|i| sum[level][i] + photons[i] * pairs);
+            }
+        }
+        sum
+    }
+
+    /// Sum of absolute differences from the profile over its sum, levels taken together by tens for the red line, which few collisions
+    /// high up make.
+    fn difference(table: &Emission, energy_ev: f64, found: &[PerEmitter<f64>]) -> PerEmitter<f64> {
+        let profile = table.profile(energy_ev);
+        std::array::from_fn(|i| {
+            let together = if i == Emitter::OxygenRed.index() { 20 } else { 1 };
+            let sums = |levels: &[PerEmitter<f64>]| -> Vec<f64> {
+                levels.chunks(together).map(|chunk| chunk.iter().map(|photons| photons[i]).sum()).collect()
+            };
+            let expected: Vec<f64> = sums(&profile).iter().map(|sum| sum * 1e3 / PHOTONS_PER_KILORAYLEIGH).collect();
+            let apart: f64 = sums(found).iter().zip(&expected).map(|(found, expected)| (found - expected).abs()).sum();
+            apart / expected.iter().sum::<f64>()
+        })
+    }
+
+    #[test]
+    fn the_mean_of_collisions_is_the_profile() {
+        let table = Emission::new(atmosphere(), ARC);
+        let falls = Falls::new(table.deposition(), 0.02);
+        // 64 sets of 500 particles; a picture of 120,000 has a fifteenth of this noise.
+        let all = difference(&table, 4000.0, &light(&table, &falls, 4000.0, 32_000));
+        assert!(all.iter().all(|difference| *difference < 0.03), "{all:?}");
+    }
+
+    #[test]
+    fn thermal_speed_by_hand() {
+        // sqrt(8 x 1.380649e-23 x 300 / (pi x 28.014 x 1.660539e-27)) = 476.2 m/s.
+        assert!((thermal_speed(300.0, 28.014) - 476.2).abs() < 0.1);
+    }
+
+    #[test]
+    fn hard_spheres_kill_green_low_down() {
+        let quenched = |altitude_km| hard_sphere_quenching(Emitter::OxygenGreen, &atmosphere().at(altitude_km));
+        assert!(quenched(110.0) > 0.999 && quenched(150.0) > 0.9 && quenched(250.0) < 0.5);
+        assert!(hard_sphere_quenching(Emitter::NitrogenIon, &atmosphere().at(110.0)) < 1e-3);
+    }
+
+    /// What shines after a collision, drawn by the rules of the thesis.
+    fn drawn(air: &Air, uniforms: [f64; 3]) -> Option<Emitter> {
+        use Emitter::{Nitrogen, NitrogenIon, OxygenGreen, OxygenRed};
+        let place = uniforms[0] * air.number_density();
+        let struck = match place {
+            place if place < air.o => [OxygenGreen, OxygenRed],
+            place if place < air.o + air.n2 => [NitrogenIon, Nitrogen],
+            _ => return None,
+        };
+        let rates = struck.map(|emitter| DIRECT_PHOTONS[emitter.index()]);
+        let emitter = struck[usize::from(uniforms[1] * (rates[0] + rates[1]) >= rates[0])];
+        (uniforms[2] >= hard_sphere_quenching(emitter, air)).then_some(emitter)
+    }
+
+    #[test]
+    fn the_mean_of_the_rules_is_what_they_draw() {
+        let air = atmosphere().at(220.0);
+        let [green, red, violet, deep_red] = DIRECT_PHOTONS;
+        // All photons that a species has.
+        let photons = [green + red, green + red, violet + deep_red, violet + deep_red];
+        let (mut sum, draws) = ([0.0; 4], 100_000_u64);
+        for draw in 0..draws {
+            let [a, b, c, _] = Key::new(1, "rules").uniforms(draw, 0, Purpose::named("draw")).map(f64::from);
+            if let Some(emitter) = drawn(&air, [a, b, c]) {
+                sum[emitter.index()] += photons[emitter.index()] / draws as f64;
+            }
+        }
+        let mean = mean_hard_sphere_photons(&air);
+        // Hardly any red is left, and 1,700 photons of the violet: 2.4 %.
+        for i in [0, 2, 3] {
+            assert!((sum[i] / mean[i] - 1.0).abs() < 0.08, "{i}: {sum:?} {mean:?}");
+        }
+        assert!(mean[1] < 1e-3 && sum[1] < 1e-3, "{sum:?} {mean:?}");
+    }
+}

@@ -1,0 +1,98 @@
+//! Red light by height: it lives for a second at 150 km and for two minutes at 400 km.
+//!
+//! How fast it fades is kept for three heights. Between two of them light is a mixture of both, so that what is left of it
+//! has no steps.
+
+use super::{Emitter, PerEmitter};
+use crate::physics::atmosphere::level_altitude_km;
+
+/// How many heights there are.
+pub const RED_HEIGHTS: usize = 3;
+/// The heights, km: the best three round ones for electrons of 1 to 10 keV.
+const HEIGHTS_KM: [f64; RED_HEIGHTS] = [150.0, 220.0, 300.0];
+
+/// How much of the light at an altitude counts to each of the heights; 1 together.
+#[must_use]
+pub fn red_shares(altitude_km: f64) -> [f64; RED_HEIGHTS] {
+    let mut shares = [0.0; RED_HEIGHTS];
+    let above = HEIGHTS_KM.partition_point(|height| *height <= altitude_km).clamp(1, RED_HEIGHTS - 1);
+    let [low, high] = [HEIGHTS_KM[above - 1], HEIGHTS_KM[above]];
+    let part = ((altitude_km - low) / (high - low)).clamp(0.0, 1.0);
+    (shares[above - 1], shares[above]) = (1.0 - part, part);
+    shares
+}
+
+/// Red light of each level, divided among the heights in place of the emitters; the last has none.
+#[must_use]
+pub fn red_by_height(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
+    let divided = |(level, light): (usize, &PerEmitter<f64>)| {
+        let [low, middle, high] =
+            red_shares(level_altitude_km(level)).map(|share| share * light[Emitter::OxygenRed.index()]);
+        [low, middle, high, 0.0]
+    };
+    profile.iter().enumerate().map(divided).collect()
+}
+
+/// The mean over the levels of a lifetime in s, weighted by what of the light there counts to each of the heights.
+pub(super) fn mean_lifetimes(levels: impl Iterator<Item = (f64, f64)>) -> [f64; RED_HEIGHTS] {
+    let (mut light, mut lifetimes) = ([0.0; RED_HEIGHTS], [0.0; RED_HEIGHTS]);
+    for (level, (own, lifetime)) in levels.enumerate() {
+        for (height, share) in red_shares(level_altitude_km(level)).into_iter().enumerate() {
+            light[height] += share * own;
+            lifetimes[height] += share * own * lifetime;
+        }
+    }
+    std::array::from_fn(|height| lifetimes[height] / light[height].max(f64::MIN_POSITIVE))
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math;
+
+    use super::{super::Emission, *};
+    use crate::physics::{
+        atmosphere::{LEVELS, atmosphere},
+        emission::quenching::lifetime,
+        precipitation::spectrum::ARC,
+    };
+
+    #[test]
+    fn every_altitude_counts_once() {
+        for altitude_km in [80.0, 150.0, 185.0, 220.0, 299.0, 300.0, 800.0] {
+            assert!((red_shares(altitude_km).iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        }
+        assert_eq!((red_shares(90.0), red_shares(500.0)), ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]));
+        assert_eq!(red_shares(185.0), [0.5, 0.5, 0.0]);
+    }
+
+    /// The share of the red light that is left at most too long, or too short, after electrons of an energy have gone: by the heights, and
+    /// by one lifetime for the whole column.
+    fn errors(energy_ev: f64) -> [f64; 2] {
+        let emission = Emission::new(atmosphere(), ARC);
+        let (profile, air) = (emission.profile(energy_ev), atmosphere().levels());
+        let light: Vec<f64> = profile.iter().map(|light| light[Emitter::OxygenRed.index()]).collect();
+        let whole: f64 = light.iter().sum();
+        let by_height = red_by_height(&profile);
+        let sums: [f64; RED_HEIGHTS] = std::array::from_fn(|height| by_height.iter().map(|light| light[height]).sum());
+        let lifetimes = emission.red_lifetimes(energy_ev);
+        let column = emission.column(energy_ev).lifetime[Emitter::OxygenRed.index()];
+        let mut errors = [0.0_f64; 2];
+        for second in 0..300 {
+            let left = |lifetime: f64| math::exp(-f64::from(second) / lifetime);
+            let exact: f64 =
+                (0..LEVELS).map(|level| light[level] * left(lifetime(Emitter::OxygenRed, &air[level]))).sum();
+            let found: f64 = (0..RED_HEIGHTS).map(|height| sums[height] * left(lifetimes[height])).sum();
+            errors[0] = errors[0].max((found - exact).abs() / whole);
+            errors[1] = errors[1].max((whole * left(column) - exact).abs() / whole);
+        }
+        errors
+    }
+
+    #[test]
+    fn red_light_fades_as_by_the_lifetime_at_each_height() {
+        for (energy_ev, bound) in [(1e3, 0.05), (3e3, 0.05), (1e4, 0.08)] {
+            let [by_height, by_column] = errors(energy_ev);
+            assert!(by_height < bound && by_column > 2.5 * by_height, "{energy_ev}: {by_height} {by_column}");
+        }
+    }
+}

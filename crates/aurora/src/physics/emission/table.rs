@@ -1,0 +1,263 @@
+//! The table of light: photons of each emitter by electron energy and altitude for a spectrum.
+
+use bansho_base::math::lerp;
+
+use super::{
+    PHOTONS_PER_KILORAYLEIGH,
+    collisions::mean_hard_sphere_photons,
+    emitter::{EMITTERS, Emitter, PerEmitter},
+    excitation::photons_per_ion_pair,
+    lifetime::Persistence,
+    red_line_levels::{RED_HEIGHTS, mean_lifetimes},
+};
+use crate::physics::{
+    atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, covers, locate_level},
+    precipitation::{
+        Deposition, Spectrum,
+        deposition::Profile,
+        energy_grid::{self, NODES, node_energy_ev},
+    },
+};
+
+/// Light by altitude and energy, per unit of energy flux; all of it scales with the flux.
+#[derive(Clone, Debug)]
+pub struct Emission {
+    deposition: Deposition,
+    /// Counting photons of each emitter for each ion pair, by level.
+    photons: Vec<PerEmitter<f64>>,
+    columns: Vec<Column>,
+    /// Mean lifetime of the red light of each of its heights by node, s.
+    red_lifetimes: Vec<[f64; RED_HEIGHTS]>,
+}
+
+/// What a whole column shows, by emitter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Column {
+    /// Brightness seen along the column, kR per mW m^-2, in counting photons.
+    pub kilorayleigh: PerEmitter<f64>,
+    /// Mean lifetime of the light, s, weighted by emission.
+    pub lifetime: PerEmitter<f64>,
+    /// How far the light spreads across the field: standard deviation along each direction, km, at the altitude that halves the emission
+    /// (it grows with altitude, so this is the median).
+    pub spread_km: PerEmitter<f64>,
+}
+
+impl Emission {
+    /// The table for a spectrum. A few milliseconds.
+    #[must_use]
+    pub fn new(air: &Atmosphere, spectrum: Spectrum) -> Self {
+        let photons = air.levels().iter().map(photons_per_ion_pair).collect();
+        Self::of(air, Deposition::new(air, spectrum), photons)
+    }
+
+    /// The table of the thesis's fall through hard spheres, and of its rules for what shines after a collision.
+    #[must_use]
+    pub fn of_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
+        let photons = air.levels().iter().map(mean_hard_sphere_photons).collect();
+        Self::of(air, Deposition::of_hard_spheres(air, spectrum), photons)
+    }
+
+    fn of(air: &Atmosphere, deposition: Deposition, photons: Vec<PerEmitter<f64>>) -> Self {
+        let persistence: Vec<_> =
+            air.levels().iter().map(|air| EMITTERS.map(|emitter| Persistence::new(emitter, air))).collect();
+        let columns = (0..NODES)
+            .map(|node| column(&photons, &persistence, deposition.mixed(node), node_energy_ev(node)))
+            .collect();
+        let red = Emitter::OxygenRed.index();
+        let red_lifetimes = |node: usize| {
+            let light = photons.iter().zip(deposition.mixed(node)).map(|(photons, pairs)| photons[red] * pairs);
+            mean_lifetimes(light.zip(persistence.iter().map(|persistence| persistence[red].lifetime)))
+        };
+        let red_lifetimes = (0..NODES).map(red_lifetimes).collect();
+        Self { deposition, photons, columns, red_lifetimes }
+    }
+
+    /// The deposition beneath it.
+    #[must_use]
+    pub const fn deposition(&self) -> &Deposition {
+        &self.deposition
+    }
+
+    /// Counting photons of each emitter for each ion pair, by level of the atmosphere.
+    #[must_use]
+    pub fn photons_per_ion_pair(&self) -> &[PerEmitter<f64>] {
+        &self.photons
+    }
+
+    /// Volume emission of each emitter, photons m^-3 s^-1 per mW m^-2, at each of the [`LEVELS`] levels, for the spectrum about an
+    /// energy; linear between levels.
+    #[must_use]
+    pub fn profile(&self, energy_ev: f64) -> Vec<PerEmitter<f64>> {
+        let (node, mixing) = energy_grid::locate(energy_ev);
+        let (low, high) = (self.deposition.mixed(node), self.deposition.mixed(node + 1));
+        let emission = |level: usize| {
+            let pairs = lerp(low[level], high[level], mixing);
+            self.photons[level].map(|photons| photons * pairs)
+        };
+        (0..LEVELS).map(emission).collect()
+    }
+
+    /// Volume emission of each emitter, photons m^-3 s^-1 per mW m^-2, for the spectrum about an energy at one altitude. Nothing
+    /// outside 80-800 km.
+    #[must_use]
+    pub fn at(&self, energy_ev: f64, altitude_km: f64) -> PerEmitter<f64> {
+        if !covers(altitude_km) {
+            return [0.0; 4];
+        }
+        let (level, part) = locate_level(altitude_km);
+        let (node, mixing) = energy_grid::locate(energy_ev);
+        let pairs =
+            |level: usize| lerp(self.deposition.mixed(node)[level], self.deposition.mixed(node + 1)[level], mixing);
+        let (below, above) = (pairs(level), pairs(level + 1));
+        std::array::from_fn(|i| lerp(below * self.photons[level][i], above * self.photons[level + 1][i], part))
+    }
+
+    /// What the whole column shows for the spectrum about an energy: brightness linear between nodes, lifetime and spread too.
+    #[must_use]
+    pub fn column(&self, energy_ev: f64) -> Column {
+        let (node, mixing) = energy_grid::locate(energy_ev);
+        let (low, high) = (&self.columns[node], &self.columns[node + 1]);
+        let between = |low: PerEmitter<f64>, high: PerEmitter<f64>| -> PerEmitter<f64> {
+            std::array::from_fn(|i| lerp(low[i], high[i], mixing))
+        };
+        Column {
+            kilorayleigh: between(low.kilorayleigh, high.kilorayleigh),
+            lifetime: between(low.lifetime, high.lifetime),
+            spread_km: between(low.spread_km, high.spread_km),
+        }
+    }
+
+    /// Mean lifetime of the red light of each of its [heights](super::red_line_levels), s, weighted by emission.
+    #[must_use]
+    pub fn red_lifetimes(&self, energy_ev: f64) -> [f64; RED_HEIGHTS] {
+        let (node, mixing) = energy_grid::locate(energy_ev);
+        let (low, high) = (self.red_lifetimes[node], self.red_lifetimes[node + 1]);
+        std::array::from_fn(|height| lerp(low[height], high[height], mixing))
+    }
+
+    /// Luminance in cd/m^2 of the column per mW m^-2: what a sheet seen end-on shows.
+    #[must_use]
+    pub fn column_colour(&self, energy_ev: f64) -> [f64; 3] {
+        colour_of(self.column(energy_ev).kilorayleigh)
+    }
+}
+
+/// Absolute ACEScg of kilorayleighs by emitter, luminance in cd/m^2.
+#[must_use]
+pub fn colour_of(kilorayleigh: PerEmitter<f64>) -> [f64; 3] {
+    EMITTERS.into_iter().zip(kilorayleigh).fold([0.0; 3], |sum: [f64; 3], (emitter, kilorayleigh)| {
+        let colour = emitter.colour_per_kilorayleigh();
+        std::array::from_fn(|i| sum[i] + kilorayleigh * colour[i])
+    })
+}
+
+fn column(
+    photons: &[PerEmitter<f64>],
+    persistence: &[PerEmitter<Persistence>],
+    pairs: &Profile,
+    energy_ev: f64,
+) -> Column {
+    let of = |emitter: Emitter| {
+        let light = |level: usize| photons[level][emitter.index()] * pairs[level];
+        let whole: f64 = (0..LEVELS).map(light).sum();
+        let mut below = 0.0;
+        let half = (0..LEVELS).take_while(|level| {
+            below += light(*level);
+            below < 0.5 * whole
+        });
+        let at_half = &persistence[half.count().min(LEVELS - 1)][emitter.index()];
+        let lifetimes: f64 = (0..LEVELS).map(|level| light(level) * persistence[level][emitter.index()].lifetime).sum();
+        let kilorayleigh = whole * LEVEL_SPACING / PHOTONS_PER_KILORAYLEIGH;
+        [kilorayleigh, lifetimes / whole, at_half.spread(energy_ev) * 1e-3]
+    };
+    let columns = EMITTERS.map(of);
+    Column {
+        kilorayleigh: columns.map(|[kilorayleigh, ..]| kilorayleigh),
+        lifetime: columns.map(|[_, lifetime, _]| lifetime),
+        spread_km: columns.map(|[.., spread]| spread),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::{
+        atmosphere::{atmosphere, level_altitude_km},
+        precipitation::spectrum::ARC,
+    };
+
+    #[test]
+    fn profile_point_and_column_are_one_table() {
+        let table = Emission::new(atmosphere(), ARC);
+        for energy_ev in [500.0, 4321.0, 1e4] {
+            let profile = table.profile(energy_ev);
+            let mut sums = [0.0; 4];
+            for (level, emission) in profile.iter().enumerate() {
+                let point = table.at(energy_ev, level_altitude_km(level));
+                assert!((0..4).all(|i| (point[i] - emission[i]).abs() <= 1e-12 * emission[i]));
+                sums = std::array::from_fn(|i| sums[i] + emission[i] * LEVEL_SPACING / PHOTONS_PER_KILORAYLEIGH);
+            }
+            let kilorayleigh = table.column(energy_ev).kilorayleigh;
+            assert!((0..4).all(|i| (kilorayleigh[i] / sums[i] - 1.0).abs() < 1e-9), "{kilorayleigh:?} {sums:?}");
+        }
+        assert_eq!(table.at(1e4, 900.0), [0.0; 4]);
+    }
+
+    #[test]
+    fn light_between_levels_is_linear() {
+        let table = Emission::new(atmosphere(), ARC);
+        let [low, middle, high] = [105.0, 105.5, 106.0].map(|altitude_km| table.at(5000.0, altitude_km));
+        assert!((0..4).all(|i| (middle[i] / (0.5 * (low[i] + high[i])) - 1.0).abs() < 1e-12));
+    }
+
+    #[test]
+    fn red_lingers_and_spreads_where_green_does_not() {
+        let column = Emission::new(atmosphere(), ARC).column(3000.0);
+        let [green, red, ion, nitrogen] = column.lifetime;
+        assert!((0.6..0.75).contains(&green) && (20.0..110.0).contains(&red) && ion < 1e-6 && nitrogen < 1e-5);
+        let [green, red, ion, _] = column.spread_km;
+        assert!((3.0..30.0).contains(&red) && green < 1.0 && ion < 0.05, "{:?}", column.spread_km);
+    }
+
+    #[test]
+    fn hard_spheres_shine_where_nature_does_not() {
+        let (measured, spheres) = (Emission::new(atmosphere(), ARC), Emission::of_hard_spheres(atmosphere(), ARC));
+        let peak_km = |table: &Emission, energy_ev: f64, emitter: Emitter| {
+            let profile = table.profile(energy_ev);
+            let light = |level: &usize| profile[*level][emitter.index()];
+            level_altitude_km((0..LEVELS).max_by(|a, b| light(a).total_cmp(&light(b))).unwrap_or(0))
+        };
+        // (2.25) leaves no green light below 190 km; electrons of 1 keV come far too low, as violet light shows.
+        let green = [&measured, &spheres].map(|table| peak_km(table, 5000.0, Emitter::OxygenGreen));
+        assert!(green[0] < 115.0 && green[1] > 180.0, "{green:?}");
+        let violet = [&measured, &spheres].map(|table| peak_km(table, 1000.0, Emitter::NitrogenIon));
+        assert!(violet[0] > 148.0 && violet[1] < 140.0, "{violet:?}");
+        let column = spheres.column(5000.0);
+        assert!(column.kilorayleigh.iter().chain(&column.lifetime).all(|value| *value > 0.0 && value.is_finite()));
+    }
+
+    /// Red and blue beside green, linear on a screen, of the light from one altitude.
+    fn beside_green(energy_ev: f64, altitude_km: f64) -> [f64; 2] {
+        let emission = Emission::new(atmosphere(), ARC).at(energy_ev, altitude_km);
+        let [r, g, b] = bansho_base::color::SRGB_FROM_ACESCG.apply(colour_of(emission));
+        [r / g, b / g]
+    }
+
+    #[test]
+    fn the_lower_edge_of_a_hard_aurora_turns_rosy() {
+        // O(1S) is struck before it radiates down there, and little O is left to make it; N2 goes on shining.
+        let (edge, body) = (beside_green(30_000.0, 84.0), beside_green(30_000.0, 105.0));
+        assert!(edge[0] > 1.3 && edge[0] > 1.6 * body[0], "red {} and {}", edge[0], body[0]);
+        assert!(edge[1] > 0.7 && edge[1] > 1.6 * body[1], "blue {} and {}", edge[1], body[1]);
+        assert!(body[0] < 1.0 && body[1] < 0.6, "the body is green: {body:?}");
+        // Where there is still enough of it to be seen: 4 to 6 km below the peak.
+        let seen = beside_green(20_000.0, 92.0);
+        assert!(seen[0] > 1.1 && seen[1] > 0.8, "pink: {seen:?}");
+    }
+
+    #[test]
+    fn an_aurora_is_green_seen_whole() {
+        let [r, g, b] = Emission::new(atmosphere(), ARC).column_colour(5000.0);
+        assert!(g > r.max(b) && g > 1e-4, "{r} {g} {b}");
+    }
+}

@@ -1,0 +1,127 @@
+//! How far collisions wander from the field line of their electron.
+
+use std::sync::OnceLock;
+
+use bansho_base::{host::once::get_or_make, math, math::random::Key};
+
+use super::{
+    Deposition,
+    electron_track::{Collision, Falls, collision_count},
+    energy_grid::{self, NODES, node_energy_ev},
+    hard_sphere::{DEFAULT_RADIUS, HardSphere},
+    spectrum::ARC,
+};
+use crate::{physics::atmosphere::atmosphere, render::FallModel};
+use rayon::prelude::*;
+
+/// Collisions of each energy that are looked at, about, and the fewest falls: a few long ones have much of the wandering.
+const COLLISIONS: u32 = 2000;
+const FEWEST_FALLS: u32 = 96;
+/// Falls are followed at every so many nodes of the grid of energies: from one to the next they differ little.
+const STRIDE: usize = 4;
+const _: () = assert!((NODES - 1).is_multiple_of(STRIDE));
+
+/// The wandering of measured falls, and of those through hard spheres. Both go straight: what turns them adds to nothing but this.
+static FANG: OnceLock<ByEnergy> = OnceLock::new();
+static HARD_SPHERE: OnceLock<ByEnergy> = OnceLock::new();
+
+fn by_energy(fall: FallModel) -> &'static ByEnergy {
+    match fall {
+        FallModel::Fang => get_or_make(&FANG, || {
+            // Falls are those of one energy each, whatever the spectrum.
+            let falls = Falls::new(&Deposition::new(atmosphere(), ARC), 0.0);
+            ByEnergy::new(|node, key, particle| altitudes_km(falls.fall(node, key, particle)))
+        }),
+        FallModel::HardSphere => get_or_make(&HARD_SPHERE, || {
+            let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.0);
+            ByEnergy::new(|node, key, particle| altitudes_km(spheres.fall(node_energy_ev(node), key, particle)))
+        }),
+    }
+}
+
+/// Root mean square distance of the collisions of electrons of an energy from their field line, along one direction, km, where every
+/// collision turns them by a tangent of rms `wobble`.
+pub(crate) fn wander_km(fall: FallModel, wobble: f64, energy_ev: f64) -> f64 {
+    if wobble <= 0.0 { 0.0 } else { wobble * by_energy(fall).at(energy_ev) }
+}
+
+/// Root mean square distances for a wobble of 1, km, at every [`STRIDE`]th node: they are in proportion to it.
+struct ByEnergy(Vec<f64>);
+
+impl ByEnergy {
+    fn new(fall: impl Fn(usize, Key, u64) -> Vec<f64> + Sync) -> Self {
+        let key = Key::new(0, "aurora wander");
+        let of_node = |node: usize| {
+            let falls = u64::from(COLLISIONS.div_ceil(collision_count(node)).max(FEWEST_FALLS));
+            let sum = (0..falls).map(|particle| variance_km2(&fall(node, key, particle))).sum::<f64>();
+            math::sqrt(sum / falls as f64)
+        };
+        Self((0..NODES).into_par_iter().step_by(STRIDE).map(of_node).collect())
+    }
+
+    fn at(&self, energy_ev: f64) -> f64 {
+        let (node, part) = energy_grid::locate(energy_ev);
+        let place = (node as f64 + part) / STRIDE as f64;
+        let below = (place as usize).min(self.0.len() - 2);
+        math::lerp(self.0[below], self.0[below + 1], place - below as f64)
+    }
+}
+
+fn altitudes_km(fall: impl Iterator<Item = Collision>) -> Vec<f64> {
+    fall.map(|collision| f64::from(collision.altitude_km)).collect()
+}
+
+/// Mean square distance from the field line, along one direction, of collisions at those altitudes in km (from the first on), each of
+/// which turns the electron by a tangent of rms 1.
+fn variance_km2(altitudes_km: &[f64]) -> f64 {
+    let (mut variance, mut sum) = (0.0, 0.0);
+    for pair in altitudes_km.windows(2) {
+        let step = (pair[0] - pair[1]).max(0.0);
+        variance += step * step;
+        sum += variance;
+    }
+    sum / altitudes_km.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::precipitation::energy_grid::locate;
+
+    #[test]
+    fn steps_of_equal_length_wander_as_a_random_walk() {
+        // n steps of 1 km with a tangent of 1: the k-th collision has variance k, their mean is (n - 1) / 2.
+        let altitudes: Vec<f64> = (0..11).map(|step| 200.0 - f64::from(step)).collect();
+        assert!((variance_km2(&altitudes) - 5.0).abs() < 1e-12);
+        assert_eq!(variance_km2(&[]), 0.0);
+    }
+
+    #[test]
+    fn it_is_that_of_the_falls_that_are_drawn_at_every_energy() {
+        let key = Key::new(4, "aurora");
+        for fall in [FallModel::Fang, FallModel::HardSphere] {
+            let emission = fall.emission(ARC);
+            for energy_ev in [600.0, 5000.0, 40_000.0] {
+                let node = locate(energy_ev).0;
+                let (mut sum, mut count) = (0.0, 0.0);
+                let mut add = |collision: Collision| {
+                    let offset_km = f64::from(collision.offset_km[0]);
+                    sum += offset_km * offset_km;
+                    count += 1.0;
+                };
+                for particle in 100..800 {
+                    match fall {
+                        FallModel::Fang => {
+                            Falls::new(emission.deposition(), 0.05).fall(node, key, particle).for_each(&mut add);
+                        }
+                        FallModel::HardSphere => HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.05)
+                            .fall(node_energy_ev(node), key, particle)
+                            .for_each(&mut add),
+                    }
+                }
+                let ratio = wander_km(fall, 0.05, node_energy_ev(node)) / math::sqrt(sum / count);
+                assert!((0.75..1.35).contains(&ratio), "{fall:?} {energy_ev}: {ratio}");
+            }
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The aurora as a light: what it shines on ground and rain.
+
+use bansho_base::{
+    math::{self, DVec2, DVec3},
+    phenomenon::surroundings::{Emitter, Light},
+};
+
+use super::Aurora;
+use crate::render::{
+    project::field_lines::{EARTH_RADIUS_KM, FOOT_KM},
+    shade::attenuation::Shading,
+};
+
+use fearless_simd::{Level, dispatch};
+
+/// Particles that are asked for their light, about.
+const ASKED: usize = 2048;
+/// Altitude from which the light of all heights seems to come, km.
+const ALTITUDE_KM: f64 = 125.0;
+/// Power of one mW/m^2 on one km^2, W.
+const W_PER_UNIT: f64 = 1e3;
+
+/// Where the light above a place of the drawn plane seems to come from, km: over a round Earth, that far along the shell at 100 km.
+fn toward_km(place: DVec2) -> DVec3 {
+    let (sin, cos) = math::sin_cos(place.length() / (EARTH_RADIUS_KM + FOOT_KM));
+    let level = place.normalize_or_zero() * sin;
+    DVec3::new(level.x, cos, level.y) * (EARTH_RADIUS_KM + ALTITUDE_KM) - DVec3::Y * EARTH_RADIUS_KM
+}
+
+impl Aurora {
+    /// One light from where most of it comes, as bright as all of it on a plane that faces it, for what stands on the ground below the
+    /// drawn square's middle; none where nothing shines. Each place has the colour of its own electrons, and what lies below the horizon
+    /// lights nothing.
+    pub(crate) fn lamp(&self) -> Option<Light> {
+        let (emission, particles) = (self.simulation().emission(), self.simulation().particles());
+        let level = Level::new();
+        let stride = particles.len().div_ceil(ASKED).max(1);
+        let (mut way, mut sum) = (DVec3::ZERO, DVec3::ZERO);
+        for index in (0..particles.len()).step_by(stride) {
+            let toward = toward_km(particles.place(index));
+            let squared = toward.length_squared();
+            let direction = toward / math::sqrt(squared);
+            let elevation = direction.y as f32;
+            if elevation <= 0.0 {
+                continue;
+            }
+            let column =
+                emission.column(f64::from(particles.energies_ev[index])).kilorayleigh.map(|value| value as f32);
+            // A patch of 1 mW/m^2 over 1 km^2 at 1 km has 1 sr and the column's brightness.
+            let share = f64::from(particles.powers_w[index]) / W_PER_UNIT * stride as f64 / squared;
+            let colour: [f32; 4] =
+                dispatch!(level, simd => self.shading().arriving(simd, &column, Shading::place(elevation)).into());
+            let [red, green, blue, _] = colour.map(f64::from);
+            sum += DVec3::new(red, green, blue) * share;
+            way += direction * (share * green.max(0.0));
+        }
+        let toward = way.try_normalize()?;
+        Some(Light { emitter: Emitter::Directional { toward }, intensity: sum.to_array().map(|value| value as f32) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{
+        host::assets::MemoryAssets,
+        math::curve::{Curve, Interpolation},
+        parameters::animated::Animated,
+    };
+
+    use super::*;
+    use crate::{
+        AuroraParameters, ParticleParameters,
+        shapes::{ShapeParameters, SheetParameters},
+    };
+
+    fn lamp(energy_ev: f64, factor: f64, north_km: f64) -> Option<Light> {
+        let sheet = SheetParameters {
+            points: Some(vec![[-90.0, -north_km], [90.0, -north_km]]),
+            energy: Curve::new(vec![[0.0, factor]], Interpolation::Linear).unwrap(),
+            fade: 0.0,
+            ..SheetParameters::default()
+        };
+        let parameters = AuroraParameters {
+            extent_km: 4000.0,
+            energy_ev: Animated::from(energy_ev),
+            particles: ParticleParameters { count: 500, ..ParticleParameters::default() },
+            shapes: vec![ShapeParameters { sheets: vec![sheet], ..ShapeParameters::default() }],
+            ..AuroraParameters::default()
+        };
+        Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap().lamp()
+    }
+
+    #[test]
+    fn sheets_with_their_own_energy_shine_in_their_own_colour() {
+        let colour = |energy_ev, factor| {
+            let [red, green, blue] = lamp(energy_ev, factor, 50.0).unwrap().intensity;
+            [red / green, blue / green]
+        };
+        let (soft, same) = (colour(500.0, 1.0), colour(5000.0, 0.1));
+        assert!((0..2).all(|i| (soft[i] / same[i] - 1.0).abs() < 0.02), "{soft:?} {same:?}");
+        assert!(colour(5000.0, 1.0)[0] < 0.8 * same[0], "soft electrons give more red");
+    }
+
+    #[test]
+    fn the_earth_is_round_under_it() {
+        let elevation = |light: Light| match light.emitter {
+            Emitter::Directional { toward } => math::asin(toward.y).to_degrees(),
+            _ => f64::NAN,
+        };
+        // 125 km high and 800 km away along the shell: by the triangle with the Earth's middle.
+        let (sin, cos) = math::sin_cos(800.0 / 6471.0);
+        let expected = math::atan((6496.0 * cos - 6371.0) / (6496.0 * sin)).to_degrees();
+        let found = elevation(lamp(5000.0, 1.0, 800.0).unwrap());
+        assert!((found - expected).abs() < 0.3, "{found} {expected}");
+        assert_eq!(lamp(5000.0, 1.0, 1600.0), None, "below the horizon");
+    }
+}

@@ -1,0 +1,73 @@
+//! What the air between an observer and the sky takes away: light of auroras, and of stars.
+
+use bansho_base::{math, parameters::Range};
+
+pub use bansho_base::world::sky::air_mass;
+
+/// Magnitudes of a transmittance of 1/e.
+const MAGNITUDES_PER_OPTICAL_DEPTH: f64 = 1.085_736_204_758_13;
+
+/// Magnitudes lost overhead; they may be many in haze.
+const MAGNITUDES: Range = Range::new(0.0, 5.0);
+
+bansho_base::parameters! {
+    /// The air above an observer. The default is a clear night near sea level: 0.22 magnitudes in the middle of the spectrum (Hayes & Latham
+    /// 1975; ozone of 300 Dobson units).
+    pub struct Extinction {
+        /// Rayleigh scattering at 550 nm, overhead.
+        rayleigh: f64 = 0.106, limits(MAGNITUDES), unit("mag");
+        /// Aerosols at 550 nm, overhead; 0.3 is haze.
+        aerosol: f64 = 0.09, limits(MAGNITUDES), unit("mag");
+        /// Angstrom's exponent of the aerosols: how much more they take from shorter waves.
+        angstrom: f64 = 1.3, limits(Range::new(0.0, 4.0));
+        /// Ozone at its visible maximum near 600 nm, overhead.
+        ozone: f64 = 0.04, limits(MAGNITUDES), unit("mag");
+    }
+}
+
+impl Extinction {
+    /// Magnitudes lost overhead at a wavelength.
+    #[must_use]
+    pub fn magnitudes(&self, wavelength_nm: f64) -> f64 {
+        let ratio = 550.0 / wavelength_nm;
+        // The exponent 4.08 contains the dispersion of air in the visible.
+        let scattered = self.rayleigh * math::pow(ratio, 4.08) + self.aerosol * math::pow(ratio, self.angstrom);
+        // The Chappuis band, nearly a Gaussian about 595 nm.
+        let from_centre = (wavelength_nm - 595.0) / 50.0;
+        scattered + self.ozone * math::exp(-0.5 * from_centre * from_centre)
+    }
+
+    /// The share of light that arrives from `elevation` radians above the horizon.
+    #[must_use]
+    pub fn transmittance(&self, wavelength_nm: f64, elevation: f64) -> f64 {
+        math::exp(-self.magnitudes(wavelength_nm) * air_mass(elevation) / MAGNITUDES_PER_OPTICAL_DEPTH)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn air_masses_are_the_published_ones() {
+        // Kasten & Young (1989), table II.
+        for (degrees, expected) in [(90.0, 1.0), (30.0, 1.9939), (10.0, 5.5841), (5.0, 10.3164), (0.0, 37.9196)] {
+            let found = air_mass(f64::to_radians(degrees));
+            assert!((found / expected - 1.0).abs() < 2e-3, "{degrees}: {found}");
+        }
+        assert_eq!(air_mass(-0.3), air_mass(0.0));
+    }
+
+    #[test]
+    fn blue_is_lost_more_than_red_and_low_more_than_high() {
+        let air = Extinction::default();
+        let [violet, blue, green, red] = [391.4, 427.8, 557.7, 630.0].map(|nm| air.magnitudes(nm));
+        assert!(violet > blue && blue > green && green > red);
+        // Bright-star catalogues use 0.2 to 0.25 in V and about twice that in B.
+        assert!((0.18..0.26).contains(&green), "{green}");
+        assert!((0.36..0.50).contains(&blue), "{blue}");
+        assert!(air.transmittance(557.7, 0.1) < air.transmittance(557.7, 1.0));
+        let overhead = math::pow(10.0, -0.4 * green);
+        assert!((air.transmittance(557.7, std::f64::consts::FRAC_PI_2) / overhead - 1.0).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,211 @@
+//! Light by altitude for every energy, as single precision tables that the drawing walks.
+
+use std::sync::OnceLock;
+
+use bansho_base::math;
+
+use crate::physics::{
+    atmosphere::{HIGHEST_KM, LEVELS, LOWEST_KM, level_altitude_km},
+    emission::{
+        EMITTERS, Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter,
+        red_line_levels::{RED_HEIGHTS, red_by_height},
+    },
+    precipitation::energy_grid::NODES,
+};
+
+/// Tables between two nodes of the grid of energies: the nearest is within 0.5 % of the energy, and the red column,
+/// which falls fastest, within 1 %.
+const FINENESS: usize = 8;
+/// Tables of one energy, each of them smoothed to and sampled at twice the spacing of the one before, from 1 km on.
+pub(super) const SPACINGS: usize = 12;
+/// Where the table of each spacing begins among those of one energy, and the end of all.
+const STARTS: [usize; SPACINGS + 1] = starts();
+/// A column is drawn from where this share of its light is left below up to where it is left above.
+const LEFT: f64 = 3e-4;
+
+/// Entries of the table of one spacing: one below the levels, and dark ones above them, so that smoothing loses
+/// nothing.
+const fn entries(spacing: usize) -> usize {
+    ((LEVELS - 1) >> spacing) + 4
+}
+
+const fn starts() -> [usize; SPACINGS + 1] {
+    let (mut starts, mut spacing) = ([0; SPACINGS + 1], 0);
+    while spacing < SPACINGS {
+        starts[spacing + 1] = starts[spacing] + entries(spacing);
+        spacing += 1;
+    }
+    starts
+}
+
+/// Light of precipitation by energy and altitude, in kR per km of sight and mW/m^2; tables are made when they are first
+/// asked for.
+#[derive(Clone, Debug)]
+pub(crate) struct Profiles {
+    emission: Emission,
+    /// Whether it is red light alone, its heights in place of the emitters.
+    red_by_height: bool,
+    tables: Vec<OnceLock<Table>>,
+}
+
+/// The tables of one energy, one after the other.
+#[derive(Clone, Debug)]
+struct Table {
+    light: Vec<PerEmitter<f32>>,
+    /// Altitudes above which there is hardly any prompt, and any red light, km.
+    tops_km: [f32; 2],
+    /// Altitude below which there is hardly any light, km.
+    bottom_km: f32,
+}
+
+/// Light by altitude of one energy.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Profile<'a> {
+    light: &'a [PerEmitter<f32>],
+    /// Altitudes between which nearly all light is, km.
+    pub(super) bottom_km: f32,
+    pub(super) top_km: f32,
+}
+
+impl Profiles {
+    /// The tables for a spectrum.
+    pub(crate) fn new(emission: &Emission) -> Self {
+        let tables = vec![OnceLock::new(); (NODES - 1) * FINENESS + 1];
+        Self { emission: emission.clone(), red_by_height: false, tables }
+    }
+
+    /// The tables of red light alone, its heights in place of the emitters.
+    pub(crate) fn of_red_by_height(emission: &Emission) -> Self {
+        Self { red_by_height: true, ..Self::new(emission) }
+    }
+
+    /// The light of an energy, given as its place among the nodes of the grid; `red` includes the red line's height.
+    #[inline(always)]
+    pub(super) fn at(&self, node: f32, red: bool) -> Profile<'_> {
+        let last = self.tables.len() - 1;
+        let fine = ((node * FINENESS as f32 + 0.5).max(0.0) as usize).min(last);
+        let Table { light, tops_km: [prompt_km, red_km], bottom_km } = self.table(fine);
+        Profile { light, bottom_km: *bottom_km, top_km: if red { red_km.max(*prompt_km) } else { *prompt_km } }
+    }
+
+    #[inline(never)]
+    fn table(&self, fine: usize) -> &Table {
+        self.tables[fine].get_or_init(|| {
+            let profile = self.emission.profile(fine_energy_ev(fine));
+            if self.red_by_height { Table::of_heights(&red_by_height(&profile)) } else { Table::new(&profile) }
+        })
+    }
+}
+
+impl Table {
+    /// From the volume emission at each level.
+    fn new(profile: &[PerEmitter<f64>]) -> Self {
+        Self {
+            light: smoothed(profile),
+            tops_km: [Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| top_km(profile, emitter.index())),
+            bottom_km: bottom_km(profile, &EMITTERS.map(Emitter::index)),
+        }
+    }
+
+    /// From that of red light at each level, by its heights in place of the emitters.
+    fn of_heights(profile: &[PerEmitter<f64>]) -> Self {
+        let top_km = top_km(profile, RED_HEIGHTS - 1);
+        let heights: [usize; RED_HEIGHTS] = std::array::from_fn(|height| height);
+        Self { light: smoothed(profile), tops_km: [top_km; 2], bottom_km: bottom_km(profile, &heights) }
+    }
+}
+
+/// The tables of all spacings one after the other, from the volume emission at each level.
+fn smoothed(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f32>> {
+    let mut light = Vec::with_capacity(STARTS[SPACINGS]);
+    let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
+    let mut table: Vec<PerEmitter<f64>> = std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect();
+    for spacing in 0..SPACINGS {
+        let entry = |at: usize| table.get(at).copied().unwrap_or_default();
+        light.extend((0..entries(spacing)).map(|at| entry(at).map(|value| value as f32)));
+        table = halved(&table);
+    }
+    light
+}
+
+impl<'a> Profile<'a> {
+    /// The table smoothed over 2^`spacing` km. Entries lie so far apart, the second at 80 km; the last is dark.
+    #[inline(always)]
+    pub(super) fn table(&self, spacing: usize) -> &'a [PerEmitter<f32>] {
+        &self.light[STARTS[spacing]..STARTS[spacing + 1]]
+    }
+}
+
+/// Energy of a table, eV.
+fn fine_energy_ev(fine: usize) -> f64 {
+    use crate::physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV};
+    let share = fine as f64 / ((NODES - 1) * FINENESS) as f64;
+    LOWEST_EV * math::pow(HIGHEST_EV / LOWEST_EV, share)
+}
+
+/// Every other entry from the second on, and one before, smoothed so that none of the light is lost.
+fn halved(table: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
+    let entry = |at: Option<usize>| at.and_then(|at| table.get(at)).copied().unwrap_or_default();
+    let smoothed = |number: usize| -> PerEmitter<f64> {
+        let near = [2, 1, 0].map(|before| entry((2 * number).checked_sub(before)));
+        std::array::from_fn(|i| 0.25 * near[0][i] + 0.5 * near[1][i] + 0.25 * near[2][i])
+    };
+    (0..table.len() / 2 + 2).map(smoothed).collect()
+}
+
+fn top_km(profile: &[PerEmitter<f64>], emitter: usize) -> f32 {
+    let passed = passed((0..LEVELS).rev(), profile, emitter);
+    level_altitude_km(LEVELS - 1 - passed.min(LEVELS - 2)).min(HIGHEST_KM) as f32
+}
+
+fn bottom_km(profile: &[PerEmitter<f64>], emitters: &[usize]) -> f32 {
+    let bottom = |emitter: &usize| level_altitude_km(passed(0..LEVELS, profile, *emitter).saturating_sub(1)) as f32;
+    emitters.iter().map(bottom).fold(f32::INFINITY, f32::min)
+}
+
+/// How many of the levels, in that order, hold hardly any of the light together.
+fn passed(levels: impl Iterator<Item = usize>, profile: &[PerEmitter<f64>], emitter: usize) -> usize {
+    let light = |level: usize| profile[level][emitter];
+    let whole: f64 = (0..LEVELS).map(light).sum();
+    let mut sum = 0.0;
+    let hardly_any = |level: &usize| {
+        sum += light(*level);
+        sum < LEFT * whole
+    };
+    levels.take_while(hardly_any).count()
+}
+
+/// Altitude of the second entry of all tables, km.
+pub(super) const BOTTOM_KM: f32 = LOWEST_KM as f32;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::{atmosphere::atmosphere, emission::table, precipitation::spectrum::ARC};
+
+    #[test]
+    fn every_table_of_an_energy_holds_the_same_column() {
+        let table = table::Emission::new(atmosphere(), ARC);
+        let profiles = Profiles::new(&table);
+        for node in [20.0, 48.0, 60.25] {
+            let profile = profiles.at(node, true);
+            let energy = fine_energy_ev((node * FINENESS as f32) as usize);
+            let expected = table.column(energy).kilorayleigh;
+            for spacing in 0..SPACINGS {
+                let sum = profile.table(spacing).iter().fold([0.0; 4], |sum: [f64; 4], light| {
+                    std::array::from_fn(|i| sum[i] + f64::from(light[i]) * f64::from(1 << spacing))
+                });
+                for i in 0..4 {
+                    assert!((sum[i] / expected[i] - 1.0).abs() < 2e-3, "{node} {spacing} {i}: {sum:?} {expected:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn hard_electrons_stop_lower() {
+        let profiles = Profiles::new(&table::Emission::new(atmosphere(), ARC));
+        assert!(profiles.at(64.0, false).top_km < profiles.at(32.0, false).top_km);
+        assert!(profiles.at(48.0, true).top_km > 300.0);
+    }
+}

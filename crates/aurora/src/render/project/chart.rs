@@ -1,0 +1,259 @@
+//! The chart that auroras are drawn on: the part of the sky that a picture shows, by longitude and colatitude about the
+//! magnetic zenith.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use bansho_base::{
+    camera::Camera,
+    math::{self, DVec2, MulAdd},
+    phenomenon::strip::View,
+};
+
+use super::field_lines::FieldLines;
+
+/// Columns of a strip, which one thread draws.
+pub(crate) const STRIP: usize = 16;
+/// Places along each side of the picture at which its directions are sampled.
+const SAMPLES: usize = 24;
+/// Most columns and rows.
+const MOST: f64 = 16_384.0;
+/// Most cells of a chart for each of the picture's pixels: more are seen only where a camera zooms or turns far while its shutter is open,
+/// which blurs them.
+const MOST_PER_PIXEL: f64 = 16.0;
+/// Lower than this below the horizon nothing is drawn: sine of the elevation.
+const LOWEST: f64 = -0.35;
+
+/// What a chart covers, radians.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Coverage {
+    /// Longitude of the middle and how far it reaches to both sides; all around from pi on.
+    longitude: [f64; 2],
+    /// Least and greatest colatitude.
+    colatitude: [f64; 2],
+    /// Angle of a pixel, or more where the chart would have far more cells than the picture has pixels.
+    pub(crate) pixel: f64,
+}
+
+/// A grid of directions; columns are meridians, rows parallels.
+#[derive(Clone, Debug)]
+pub(crate) struct Chart {
+    /// Number of columns, a multiple of [`STRIP`].
+    pub(crate) columns: usize,
+    /// Number of rows, at least 2.
+    pub(crate) rows: usize,
+    /// Width of a column, radians.
+    pub(crate) column_step: f64,
+    /// Height of a row, radians.
+    pub(crate) row_step: f64,
+    first_longitude: f64,
+    first_colatitude: f64,
+    /// Whether it goes all around.
+    pub(crate) whole: bool,
+}
+
+impl Coverage {
+    /// What the whole picture shows while the shutter is open.
+    pub(crate) fn of_view(view: &View, field: &FieldLines) -> Self {
+        let cameras = [view.shutter.open, view.shutter.middle(), view.shutter.close].map(|t| view.camera_at(t));
+        let directions: Vec<[f64; 3]> = cameras.iter().flat_map(|camera| directions(camera, field)).collect();
+        // The longitude of the middle of what is seen.
+        let sum = directions.iter().fold([0.0; 2], |sum, [_, x, y]| [sum[0] + x, sum[1] + y]);
+        let middle = math::atan2(sum[1], sum[0]);
+        let (mut reach, mut least, mut greatest) = (0.0_f64, PI, 0.0_f64);
+        for [along, x, y] in &directions {
+            let colatitude = math::atan2(math::hypot(*x, *y), *along);
+            let turned = math::atan2(*y, *x) - middle;
+            reach = reach.max((turned - TAU * (turned / TAU).round()).abs());
+            (least, greatest) = (least.min(colatitude), greatest.max(colatitude));
+        }
+        let camera = &view.camera;
+        let pixel = 1.0 / camera.focal_pixels;
+        let margin = 1.5 * camera.size[0].max(camera.size[1]) / (SAMPLES - 1) as f64 * pixel;
+        let around = least < margin || reach > 0.8 * PI;
+        let sine = math::sin(least.min(FRAC_PI_2)).max(1e-3);
+        let mut coverage = Self {
+            longitude: [middle, if around { PI } else { (reach + margin / sine).min(PI) }],
+            colatitude: [if around { 0.0 } else { least - margin }.max(0.0), (greatest + margin).min(PI)],
+            pixel,
+        };
+        let most = MOST_PER_PIXEL * camera.size[0] * camera.size[1];
+        coverage.pixel = pixel.max(math::sqrt(coverage.area() / most));
+        coverage
+    }
+
+    /// Sine of the colatitude where meridians lie farthest apart.
+    fn widest(&self) -> f64 {
+        let [least, greatest] = self.colatitude;
+        if least < FRAC_PI_2 && greatest > FRAC_PI_2 {
+            return 1.0;
+        }
+        math::sin(least).max(math::sin(greatest)).max(1e-3)
+    }
+
+    /// What a chart over it takes up, columns as wide everywhere as where they are widest, square radians.
+    fn area(&self) -> f64 {
+        let [least, greatest] = self.colatitude;
+        2.0 * self.longitude[1] * self.widest() * (greatest - least)
+    }
+}
+
+/// Parts along and across the field of directions all over the picture, without those far below the horizon.
+fn directions<'a>(camera: &'a Camera, field: &'a FieldLines) -> impl Iterator<Item = [f64; 3]> + 'a {
+    (0..SAMPLES * SAMPLES).filter_map(move |index| {
+        let share = |at: usize| at as f64 / (SAMPLES - 1) as f64;
+        let pixel = DVec2::new(share(index % SAMPLES) * camera.size[0], share(index / SAMPLES) * camera.size[1]);
+        let direction = camera.direction(pixel)?.normalize();
+        (direction.y > LOWEST).then(|| [field.along, field.across[0], field.across[1]].map(|axis| direction.dot(axis)))
+    })
+}
+
+impl Chart {
+    /// A chart over `coverage` whose cells are `column` by `row` radians where they are widest, or somewhat less.
+    pub(crate) fn new(coverage: &Coverage, column: f64, row: f64) -> Self {
+        let ([least, greatest], widest) = (coverage.colatitude, coverage.widest());
+        let [middle, reach] = coverage.longitude;
+        let whole = reach >= PI;
+        let range = 2.0 * reach;
+        let columns = (range * widest / column).min(MOST).ceil() as usize;
+        let columns = columns.max(1).next_multiple_of(STRIP);
+        let column_step = if whole { range / columns as f64 } else { (column / widest).max(range / columns as f64) };
+        // On multiples of the step, so that a chart does not crawl over the sky as the camera turns.
+        let first_longitude = if whole { -PI } else { ((middle - reach) / column_step).floor() * column_step };
+        let row = row.max((greatest - least) / MOST);
+        let first_row = (least / row).floor();
+        let rows = ((greatest / row).ceil() - first_row).max(2.0) as usize;
+        Self { columns, rows, column_step, row_step: row, first_longitude, first_colatitude: first_row * row, whole }
+    }
+
+    /// Longitude of the middle of a column.
+    pub(crate) fn longitude(&self, column: usize) -> f64 {
+        self.first_longitude + (column as f64 + 0.5) * self.column_step
+    }
+
+    /// Colatitude of the middle of a row.
+    pub(crate) fn colatitude(&self, row: usize) -> f64 {
+        self.first_colatitude + (row as f64 + 0.5) * self.row_step
+    }
+
+    /// Cosine and sine of the longitude of a column.
+    pub(crate) fn unit(&self, column: usize) -> [f64; 2] {
+        let (sin, cos) = math::sin_cos(self.longitude(column));
+        [cos, sin]
+    }
+
+    /// Cosines and sines of the longitudes of a strip's columns.
+    pub(crate) fn single_units(&self, strip: usize) -> [[f32; STRIP]; 2] {
+        let mut units = [[0.0; STRIP]; 2];
+        for column in 0..STRIP {
+            for (values, value) in units.iter_mut().zip(self.unit(strip * STRIP + column)) {
+                values[column] = value as f32;
+            }
+        }
+        units
+    }
+
+    /// Cotangent of the colatitude of every row and so many more, and inverse sine of that of every row.
+    pub(crate) fn row_tables(&self, more: usize) -> [Vec<f32>; 2] {
+        let trigonometry = |row| math::sin_cos(self.colatitude(row));
+        let cotangents = (0..self.rows + more).map(trigonometry).map(|(sin, cos)| (cos / sin.max(1e-9)) as f32);
+        let inverses = (0..self.rows).map(trigonometry).map(|(sin, _)| (1.0 / sin.max(1e-9)) as f32);
+        [cotangents.collect(), inverses.collect()]
+    }
+
+    /// The column that stands for one less than a column beside the chart.
+    #[inline(always)]
+    pub(crate) fn held(&self, column: i32) -> usize {
+        let columns = self.columns as i32;
+        let turned = match (self.whole, column < 0, column >= columns) {
+            (true, true, _) => column + columns,
+            (true, _, true) => column - columns,
+            _ => column,
+        };
+        turned.clamp(0, columns - 1) as usize
+    }
+
+    /// How places on the chart are found.
+    pub(crate) fn finder(&self) -> Finder {
+        Finder {
+            per_column: (1.0 / self.column_step) as f32,
+            per_row: (1.0 / self.row_step) as f32,
+            middle: (self.first_longitude + 0.5 * self.columns as f64 * self.column_step) as f32,
+            half: 0.5 * self.columns as f32,
+            first_row: (self.first_colatitude / self.row_step) as f32,
+        }
+    }
+}
+
+/// Places on a chart in cells: 0 is the chart's edge, 0.5 the middle of its first column or row.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Finder {
+    per_column: f32,
+    per_row: f32,
+    middle: f32,
+    half: f32,
+    first_row: f32,
+}
+
+impl Finder {
+    /// One for rows of so many radians from the magnetic zenith on.
+    #[cfg(test)]
+    pub(super) fn of_rows(step: f32) -> Self {
+        Self { per_column: 1.0 / step, per_row: 1.0 / step, middle: 0.0, half: 0.0, first_row: 0.0 }
+    }
+
+    /// The column of a longitude in radians, within half a turn of the chart's middle.
+    #[inline(always)]
+    pub(crate) fn column(&self, longitude: f32) -> f32 {
+        let turned = longitude - self.middle;
+        let turned = turned - (turned * (1.0 / std::f32::consts::TAU)).round_ties_even() * std::f32::consts::TAU;
+        turned.fma(self.per_column, self.half)
+    }
+
+    /// How many rows an angle in radians is.
+    #[inline(always)]
+    pub(super) fn rows(&self, angle: f32) -> f32 {
+        angle * self.per_row
+    }
+
+    /// The row of a colatitude in radians.
+    #[inline(always)]
+    pub(crate) fn row(&self, colatitude: f32) -> f32 {
+        colatitude.fma(self.per_row, -self.first_row)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{
+        camera::CameraParameters, math::curve::Interpolation, parameters::animated::Animated,
+        phenomenon::strip::Shutter,
+    };
+
+    use super::*;
+
+    const SIZE: [usize; 2] = [64, 48];
+
+    /// Cells beside pixels, and the angle of a cell beside that of a pixel in the shutter's middle, with these fields of view when it opens
+    /// and closes.
+    fn cells(fov_deg: [f64; 2]) -> [f64; 2] {
+        let mut camera = CameraParameters::default();
+        camera.look_up();
+        camera.vertical_fov_deg =
+            Animated::keyed(vec![(0.0, fov_deg[0]), (1.0, fov_deg[1])], Interpolation::Linear).unwrap();
+        let view = View::new(camera, Shutter { open: 0.0, close: 1.0 }, 0.0, SIZE, 0);
+        let coverage = Coverage::of_view(&view, &FieldLines::new(77.0, 0.0, view.camera.position));
+        let chart = Chart::new(&coverage, coverage.pixel, coverage.pixel);
+        let pixels = (SIZE[0] * SIZE[1]) as f64;
+        [(chart.columns * chart.rows) as f64 / pixels, coverage.pixel * view.camera.focal_pixels]
+    }
+
+    #[test]
+    fn a_zoom_while_the_shutter_is_open_makes_no_chart_finer_than_the_picture() {
+        let [still, angle] = cells([50.0, 50.0]);
+        assert!((1.0..4.0).contains(&still) && angle == 1.0, "{still} {angle}");
+        let [zoomed, angle] = cells([170.0, 0.1]);
+        assert!(zoomed < 1.3 * MOST_PER_PIXEL && angle == 1.0, "{zoomed} {angle}");
+        let [narrow, angle] = cells([0.2, 170.0]);
+        assert!(narrow < 1.3 * MOST_PER_PIXEL, "{narrow} {angle}");
+    }
+}

@@ -1,0 +1,160 @@
+//! What shines while the shutter is open: one state of the simulation that is drawn out, or in a long exposure the mean of many.
+
+use bansho_base::{
+    math,
+    phenomenon::strip::{Shutter, View},
+};
+
+use super::Aurora;
+use crate::{
+    render::{
+        bin::sources::{Moments, Sources},
+        project::field_lines::FieldLines,
+    },
+    simulate::AuroraSimulation,
+};
+
+/// Motion of particles while the shutter is open that one instant stands for, beside their own spread, and the most instants: what is left
+/// between two instants adds to that spread.
+const SPREADS_PER_INSTANT: f64 = 3.0;
+const MOST_INSTANTS: f64 = 16.0;
+/// Instants of a long exposure, each with its own particles and afterglow.
+const LONG_INSTANTS: usize = 16;
+
+/// Whether an exposure is so long that particles do not merely go straight on in it: more than a step on each side of a state.
+pub(crate) fn is_long(shutter: Shutter) -> bool {
+    shutter.duration() > 2.0 * AuroraSimulation::STEP_S
+}
+
+/// Steps until the state is the last one not after a time, s.
+pub(crate) fn step_until(simulation: &mut AuroraSimulation, t: f64) {
+    // A millionth of a step forgives rounding.
+    while simulation.time() + (1.0 - 1e-6) * AuroraSimulation::STEP_S <= t {
+        simulation.step();
+    }
+}
+
+impl Aurora {
+    /// What shines while the shutter of a view is open.
+    pub(super) fn sources(&self, view: &View, field: &FieldLines) -> Sources {
+        if is_long(view.shutter) { self.long_exposure(view, field) } else { self.short_exposure(view, field) }
+    }
+
+    /// The state's particles wherever they get while the shutter is open, and its afterglow.
+    fn short_exposure(&self, view: &View, field: &FieldLines) -> Sources {
+        let light = self.light(self.simulation(), view.shutter.middle());
+        let way = rms_speed(self.simulation()) * view.shutter.duration();
+        let count = (2.0 * way / (SPREADS_PER_INSTANT * light.spread_km())).ceil().clamp(1.0, MOST_INSTANTS) as usize;
+        let now = self.simulation().time();
+        let later = (0..count).map(|instant| view.shutter.instant(instant, count) - now).collect();
+        Sources::new(&light, field, &Moments { later, first: 0, smear_km: smear_km(way / count as f64) })
+    }
+
+    /// The mean of the states that come while the shutter is open.
+    ///
+    /// They begin with that of [`Phenomenon::drawn_from`](bansho_base::phenomenon::Phenomenon::drawn_from); in a loop, where two runs
+    /// are drawn at the time of the shutter's middle, with that one.
+    fn long_exposure(&self, view: &View, field: &FieldLines) -> Sources {
+        let mut simulation = self.simulation().clone();
+        let (shutter, now) = (view.shutter, simulation.time());
+        let begin = if now < shutter.middle() - AuroraSimulation::STEP_S { shutter.open } else { shutter.middle() };
+        let mut mean = Sources::default();
+        for instant in 0..LONG_INSTANTS {
+            let t = begin - shutter.open + shutter.instant(instant, LONG_INSTANTS);
+            step_until(&mut simulation, t);
+            let way = rms_speed(&simulation) * shutter.duration() / LONG_INSTANTS as f64;
+            let first = instant as u32;
+            let moments = Moments { later: vec![t - simulation.time()], first, smear_km: smear_km(way) };
+            mean.add(&Sources::new(&self.light(&simulation, t), field, &moments), 1.0 / LONG_INSTANTS as f32);
+        }
+        mean
+    }
+}
+
+/// Root mean square speed of the particles, km/s.
+fn rms_speed(simulation: &AuroraSimulation) -> f64 {
+    let particles = simulation.particles();
+    let squares: f64 = particles.velocities.iter().flatten().map(|speed| f64::from(speed * speed)).sum();
+    math::sqrt(squares / particles.len().max(1) as f64)
+}
+
+/// Standard deviation of an even spread over a way, along each of the two directions.
+fn smear_km(way: f64) -> f64 {
+    way * math::sqrt(1.0 / 24.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{
+        camera::CameraParameters,
+        host::{assets::MemoryAssets, observer::Unobserved},
+        image::Rect,
+        phenomenon::{
+            Phenomenon,
+            strip::{DepthInterval, Strip},
+            surroundings::Surroundings,
+        },
+        world::wind::{Wind, WindParameters},
+    };
+
+    use super::*;
+    use crate::{AuroraParameters, FoldParameters, ParticleParameters};
+
+    const SIZE: [usize; 2] = [96, 64];
+
+    fn aurora() -> Aurora {
+        let parameters = AuroraParameters {
+            particles: ParticleParameters { count: 4000, ..ParticleParameters::default() },
+            folds: FoldParameters { amplitude_km: 12.0, speed_km_per_s: 12.0, ..FoldParameters::default() },
+            preroll_s: 0.5,
+            ..AuroraParameters::default()
+        };
+        Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap()
+    }
+
+    /// The green light of an exposure, after the steps that a shot takes for it.
+    fn exposed(aurora: &mut Aurora, shutter: Shutter) -> Vec<f64> {
+        let mut camera = CameraParameters::default();
+        camera.look_up();
+        let wind = Wind::new(WindParameters::default(), 1, None);
+        let surroundings = Surroundings::of_wind(&wind);
+        let from = aurora.drawn_from(shutter);
+        step_until(aurora.simulation_mut().unwrap(), from);
+        let view = View::new(camera, shutter, 0.0, SIZE, 0);
+        let prepared = aurora.prepare(&view, &surroundings, &Unobserved).unwrap();
+        let mut strip = Strip::default();
+        strip.reset(Rect::of_size(SIZE[0], SIZE[1]), None, 0);
+        prepared.draw(&DepthInterval::ALL, &mut strip);
+        strip.radiance[1].iter().map(|value| f64::from(*value)).collect()
+    }
+
+    fn apart(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f64>() / b.iter().sum::<f64>()
+    }
+
+    #[test]
+    fn a_long_exposure_is_the_mean_of_short_ones() {
+        let long = Shutter { open: 0.0, close: 2.0 };
+        let picture = exposed(&mut aurora(), long);
+        let mut moving = aurora();
+        let mut mean = vec![0.0; picture.len()];
+        for instant in 0..LONG_INSTANTS {
+            let t = long.instant(instant, LONG_INSTANTS);
+            let short = exposed(&mut moving, Shutter { open: t, close: t });
+            mean.iter_mut().zip(short).for_each(|(sum, light)| *sum += light / LONG_INSTANTS as f64);
+        }
+        let instant = exposed(&mut aurora(), Shutter { open: 1.0, close: 1.0 });
+        let (from_mean, from_instant) = (apart(&picture, &mean), apart(&picture, &instant));
+        assert!(from_mean < 0.05 && from_instant > 3.0 * from_mean, "{from_mean} {from_instant}");
+    }
+
+    #[test]
+    fn particles_are_those_of_the_middle_of_an_exposure() {
+        let mut aurora = aurora();
+        step_until(aurora.simulation_mut().unwrap(), 0.0);
+        let early = aurora.clone();
+        step_until(aurora.simulation_mut().unwrap(), 1.0);
+        assert_eq!(early.particles(1.0), aurora.particles(1.0));
+        assert_ne!(early.particles(0.0), aurora.particles(1.0));
+    }
+}

@@ -1,0 +1,261 @@
+//! Which sheet becomes which, found from where they lie (thesis, chapter 4, asks for it).
+
+use std::collections::BTreeSet;
+
+use bansho_base::math::DVec2;
+
+use super::hungarian::assign;
+use crate::shapes::{
+    geometry::polyline::Polyline,
+    strokes::intersection::{count_crossings, crossing_sheets},
+};
+
+/// Points by which sheets are compared.
+const SAMPLES: usize = 32;
+
+/// Moments of the way at which sheets should not cross.
+const MOMENTS: [f64; 3] = [0.25, 0.5, 0.75];
+
+/// Sheets that are looked at for crossings in all tries of turns and exchanges together, for about a second. Of few sheets all are tried.
+const MOST_LOOKS: usize = 60_000;
+/// Share of the tries in which one change is looked for.
+const PER_CHANGE: usize = 8;
+
+/// The target of a sheet, and whether it was drawn the other way round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Match {
+    pub(crate) target: usize,
+    pub(crate) reversed: bool,
+}
+
+/// What a person asks of a sheet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct WantedMatch {
+    pub(super) target: Option<usize>,
+    pub(super) reversed: Option<bool>,
+}
+
+impl WantedMatch {
+    fn allows(&self, of: Match) -> bool {
+        self.target.is_none_or(|target| target == of.target) && self.reversed.is_none_or(|turned| turned == of.reversed)
+    }
+}
+
+/// Sheets and targets as evenly spaced points, as many of one as of the other.
+struct Comparison<'a> {
+    wanted: &'a [WantedMatch],
+    sources: Vec<Vec<DVec2>>,
+    targets: Vec<Vec<DVec2>>,
+    /// Mean length of a sheet and its target weighs their motion.
+    lengths: [Vec<f64>; 2],
+}
+
+/// The target of each source such that all together move least, and no two cross on the way where that can be had by
+/// exchanging two targets or turning one round. What is `wanted` of a source comes first.
+pub(crate) fn match_sheets(sources: &[Polyline], targets: &[&Polyline], wanted: &[WantedMatch]) -> Vec<Match> {
+    let comparison = Comparison {
+        wanted,
+        sources: sources.iter().map(|line| line.evenly(SAMPLES)).collect(),
+        targets: targets.iter().map(|line| line.evenly(SAMPLES)).collect(),
+        lengths: [sources.iter().map(Polyline::length).collect(), targets.iter().map(|line| line.length()).collect()],
+    };
+    let count = sources.len();
+    let best: Vec<(f64, bool)> = (0..count * count).map(|pair| comparison.best(pair / count, pair % count)).collect();
+    // More than all sheets could move together.
+    let forbidden = 1.0 + best.iter().map(|(motion, _)| motion).sum::<f64>();
+    let columns = assign(count, |source, target| {
+        let elsewhere = wanted[source].target.is_some_and(|own| own != target);
+        best[source * count + target].0 + if elsewhere { forbidden } else { 0.0 }
+    });
+    let matched = |(source, target): (usize, usize)| Match { target, reversed: best[source * count + target].1 };
+    let found = columns.into_iter().enumerate().map(matched).collect();
+    comparison.untangled(found).0
+}
+
+impl Comparison<'_> {
+    fn target(&self, of: Match) -> impl Iterator<Item = DVec2> {
+        let points = &self.targets[of.target];
+        (0..SAMPLES).map(move |index| points[if of.reversed { SAMPLES - 1 - index } else { index }])
+    }
+
+    /// Mean square of the way of each point, times the length of the sheet.
+    fn motion(&self, source: usize, of: Match) -> f64 {
+        let squares = self.sources[source].iter().zip(self.target(of)).map(|(from, to)| from.distance_squared(to));
+        let length = (self.lengths[0][source] + self.lengths[1][of.target]) / 2.0;
+        squares.sum::<f64>() / SAMPLES as f64 * length
+    }
+
+    /// The lesser motion of the two ways round, and whether it is the reverse one.
+    fn best(&self, source: usize, target: usize) -> (f64, bool) {
+        let [straight, turned] = [false, true].map(|reversed| self.motion(source, Match { target, reversed }));
+        if let Some(reversed) = self.wanted[source].reversed {
+            return (if reversed { turned } else { straight }, reversed);
+        }
+        if turned < straight { (turned, true) } else { (straight, false) }
+    }
+
+    /// The sheets at a share of the way.
+    fn on_the_way(&self, matches: &[Match], share: f64) -> Vec<Vec<DVec2>> {
+        let sheet = |(source, of): (&Vec<DVec2>, &Match)| -> Vec<DVec2> {
+            source.iter().zip(self.target(*of)).map(|(from, to)| from.lerp(to, share)).collect()
+        };
+        self.sources.iter().zip(matches).map(sheet).collect()
+    }
+
+    fn crossings(&self, matches: &[Match]) -> usize {
+        MOMENTS.into_iter().map(|share| count_crossings(&self.on_the_way(matches, share))).sum()
+    }
+
+    /// The sheets that cross others or themselves.
+    fn crossed(&self, matches: &[Match]) -> BTreeSet<usize> {
+        MOMENTS.into_iter().flat_map(|share| crossing_sheets(&self.on_the_way(matches, share))).collect()
+    }
+
+    fn cost(&self, matches: &[Match]) -> (usize, f64) {
+        (self.crossings(matches), self.all_motion(matches))
+    }
+
+    fn all_motion(&self, matches: &[Match]) -> f64 {
+        matches.iter().enumerate().map(|(source, of)| self.motion(source, *of)).sum()
+    }
+
+    /// Turns one or exchanges two as long as fewer cross, or as many with less motion; and how many such changes were tried.
+    fn untangled(&self, mut matches: Vec<Match>) -> (Vec<Match>, usize) {
+        let less = |a: (usize, f64), b: (usize, f64)| a.0 < b.0 || (a.0 == b.0 && a.1 < b.1 * (1.0 - 1e-12));
+        let most = MOST_LOOKS / matches.len().max(1);
+        let (mut cost, mut tries) = (self.cost(&matches), 0);
+        while cost.0 > 0 && tries < most {
+            let candidates = self.nearest_neighbours(&matches, (most / PER_CHANGE).min(most - tries));
+            tries += candidates.len();
+            let candidates = candidates.into_iter().map(|other| (self.cost(&other), other));
+            let best = candidates.reduce(|a, b| if less(b.0, a.0) { b } else { a });
+            match best {
+                Some((better, other)) if less(better, cost) => (cost, matches) = (better, other),
+                _ => break,
+            }
+        }
+        (matches, tries)
+    }
+
+    /// Up to `most` matches with a sheet that crosses turned, or exchanged with another, that are allowed: those that move least.
+    /// Two that cross nothing take no crossing away.
+    fn nearest_neighbours(&self, matches: &[Match], most: usize) -> Vec<Vec<Match>> {
+        let crossed = self.crossed(matches);
+        let mut changes = Vec::new();
+        for one in 0..matches.len() {
+            let pairs = (0..=one).filter(|other| crossed.contains(&one) || crossed.contains(other));
+            let allowed = pairs
+                .map(|other| self.change(matches, [one, other]))
+                .filter(|change| change.iter().all(|(source, of)| self.wanted[*source].allows(*of)));
+            changes.extend(allowed);
+        }
+        let more = |change: &[(usize, Match); 2]| -> f64 {
+            // A sheet that turns stands here twice.
+            let changed = if change[0].0 == change[1].0 { &change[..1] } else { change };
+            changed.iter().map(|(source, of)| self.motion(*source, *of) - self.motion(*source, matches[*source])).sum()
+        };
+        if changes.len() > most {
+            changes.sort_by(|a, b| more(a).total_cmp(&more(b)));
+            changes.truncate(most);
+        }
+        let changed = |change: [(usize, Match); 2]| {
+            let mut all = matches.to_vec();
+            change.into_iter().for_each(|(source, of)| all[source] = of);
+            all
+        };
+        changes.into_iter().map(changed).collect()
+    }
+
+    /// What two sheets become where they exchange their targets, or a sheet where it is turned.
+    fn change(&self, matches: &[Match], [one, other]: [usize; 2]) -> [(usize, Match); 2] {
+        if one == other {
+            let of = matches[one];
+            return [(one, Match { reversed: !of.reversed, ..of }); 2];
+        }
+        [(one, matches[other].target), (other, matches[one].target)]
+            .map(|(source, target)| (source, Match { target, reversed: self.best(source, target).1 }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(from: [f64; 2], to: [f64; 2]) -> Polyline {
+        Polyline::new(vec![from.into(), to.into()]).unwrap()
+    }
+
+    fn matches(sources: &[Polyline], targets: &[Polyline]) -> Vec<(usize, bool)> {
+        wanted_matches(sources, targets, &vec![WantedMatch::default(); sources.len()])
+    }
+
+    fn wanted_matches(sources: &[Polyline], targets: &[Polyline], wanted: &[WantedMatch]) -> Vec<(usize, bool)> {
+        let found = match_sheets(sources, &targets.iter().collect::<Vec<_>>(), wanted);
+        found.into_iter().map(|of| (of.target, of.reversed)).collect()
+    }
+
+    #[test]
+    fn sheets_go_to_the_nearest_targets_whichever_way_they_were_drawn() {
+        let sources = [line([0.0, 0.0], [10.0, 0.0]), line([0.0, 5.0], [10.0, 5.0])];
+        let targets = [line([10.0, 6.0], [0.0, 6.0]), line([0.0, 1.0], [10.0, 1.0])];
+        assert_eq!(matches(&sources, &targets), [(1, false), (0, true)]);
+    }
+
+    #[test]
+    fn what_a_person_wants_comes_before_what_is_near() {
+        let sources = [line([0.0, 0.0], [10.0, 0.0]), line([0.0, 5.0], [10.0, 5.0])];
+        let targets = [line([10.0, 6.0], [0.0, 6.0]), line([0.0, 1.0], [10.0, 1.0])];
+        let mut wanted = [WantedMatch::default(), WantedMatch { target: Some(1), reversed: None }];
+        assert_eq!(wanted_matches(&sources, &targets, &wanted), [(0, true), (1, false)]);
+        wanted[1].reversed = Some(true);
+        assert_eq!(wanted_matches(&sources, &targets, &wanted), [(0, true), (1, true)]);
+    }
+
+    #[test]
+    fn all_together_move_least_even_where_one_could_move_less() {
+        // Both like the first target best, but only the second source can take the second one cheaply.
+        let sources = [line([0.0, 0.0], [10.0, 0.0]), line([0.0, 2.0], [10.0, 2.0])];
+        let targets = [line([0.0, 1.5], [10.0, 1.5]), line([0.0, 9.0], [10.0, 9.0])];
+        assert_eq!(matches(&sources, &targets), [(0, false), (1, false)]);
+    }
+
+    /// A sheet turns a quarter about one of its ends or the other: the first moves it less, but through another.
+    #[test]
+    fn sheets_that_would_cross_midway_are_turned() {
+        let sources = [line([0.0, 0.0], [10.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])];
+        let targets = [line([1.0, 10.0], [0.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])];
+        let wanted = [WantedMatch::default(); 2];
+        let found = match_sheets(&sources, &targets.iter().collect::<Vec<_>>(), &wanted);
+        let comparison = comparison(&sources, &targets, &wanted);
+        let through = [Match { target: 0, reversed: true }, Match { target: 1, reversed: false }];
+        assert!(comparison.best(0, 0).1 && comparison.crossings(&through) > 0);
+        assert_eq!(comparison.crossings(&found), 0);
+    }
+
+    fn comparison<'a>(sources: &[Polyline], targets: &[Polyline], wanted: &'a [WantedMatch]) -> Comparison<'a> {
+        let sampled = |line: &Polyline| line.evenly(SAMPLES);
+        Comparison {
+            wanted,
+            sources: sources.iter().map(sampled).collect(),
+            targets: targets.iter().map(sampled).collect(),
+            lengths: [vec![1.0; sources.len()], vec![1.0; targets.len()]],
+        }
+    }
+
+    /// The same beside very many sheets that stay: only what the two could become is looked at.
+    #[test]
+    fn a_crossing_among_many_sheets_takes_few_tries() {
+        const MANY: usize = 200;
+        let rows = || (0..MANY).map(|row| line([30.0, row as f64], [40.0, row as f64]));
+        let with_rows = |two: [Polyline; 2]| two.into_iter().chain(rows()).collect::<Vec<_>>();
+        let sources = with_rows([line([0.0, 0.0], [10.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])]);
+        let targets = with_rows([line([1.0, 10.0], [0.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])]);
+        let wanted = vec![WantedMatch::default(); MANY + 2];
+        let comparison = comparison(&sources, &targets, &wanted);
+        let through: Vec<Match> = (0..MANY + 2).map(|target| Match { target, reversed: target == 0 }).collect();
+        assert!(comparison.crossings(&through) > 0);
+        let (found, tries) = comparison.untangled(through);
+        assert_eq!(comparison.crossings(&found), 0);
+        assert!(tries > 0 && tries <= MOST_LOOKS / (MANY + 2) / PER_CHANGE, "{tries} tries");
+    }
+}

@@ -1,0 +1,396 @@
+//! What splits and merges on the way from one shape to the next (thesis, figs. 2.4 and 2.5).
+
+use bansho_base::{math::DVec2, parameters::Auto};
+
+use crate::shapes::{
+    MergeParameters, ShapeFault, ShapeFaultKind, ShapeParameters, SplitParameters,
+    geometry::polyline::shares,
+    interpolation::{
+        gap::Gap,
+        spline_track::{Parents, Track},
+    },
+};
+
+/// A strand in a chain of strands that grow together, first to last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Link {
+    pub(super) strand: usize,
+    /// Whether it runs against the chain.
+    pub(super) reversed: bool,
+}
+
+/// Two new control points, coincident at first (split) or at last (merge), and the old ones that they were added to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pair {
+    pub(crate) new: [usize; 2],
+    pub(crate) old: [usize; 2],
+}
+
+/// The strands that move from a shape to the next: the sheets, cut where they split. A strand is a list of tracks.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Change {
+    pub(crate) strands: Vec<Vec<usize>>,
+    /// What each sheet of the next shape is made of.
+    pub(crate) chains: Vec<Vec<Link>>,
+    pub(crate) splits: Vec<Pair>,
+    pub(crate) merges: Vec<Pair>,
+}
+
+/// A cut of a sheet: after which control point, and at which share of the segment.
+type Cut = (usize, f64);
+
+impl Change {
+    /// The change that leads to shape `index` from the one before, whose sheets are `sheets`.
+    ///
+    /// # Errors
+    /// A sheet or segment that is not there, a point that is no end, two changes of one place, a ring.
+    pub(crate) fn new(
+        parameters: &ShapeParameters,
+        index: usize,
+        sheets: &[Vec<usize>],
+        tracks: &mut Vec<Track>,
+    ) -> Result<Self, ShapeFault> {
+        let mut change = Self::default();
+        // The strands of each sheet, in order.
+        let mut parts = Vec::new();
+        let cuts = cuts(parameters, index, sheets, tracks)?;
+        for (sheet, cuts) in sheets.iter().zip(cuts) {
+            let first = change.strands.len();
+            change.cut(sheet, &cuts, index - 1, tracks);
+            parts.push([first, change.strands.len() - 1]);
+        }
+        let mut chains = Chains::new(change.strands.len());
+        for (number, merge) in parameters.merge.iter().enumerate() {
+            let fault = |kind| ShapeFault { key: format!("shapes.{index}.merge.{number}"), kind };
+            let ends = merged_ends(merge, sheets, tracks, index - 1).map_err(fault)?;
+            let places = ends.map(|(sheet, end)| (parts[sheet][end], end));
+            for (place, (sheet, end)) in places.iter().zip(ends) {
+                if chains.links[place.0][place.1].is_some() {
+                    return Err(fault(ShapeFaultKind::MergedTwice { sheet: sheet + 1, is_end: end == 1 }));
+                }
+            }
+            if !chains.join(places) {
+                return Err(fault(ShapeFaultKind::Ring { sheet: ends[0].0 + 1 }));
+            }
+            change.extend(places, index - 1, tracks);
+        }
+        change.chains = chains.collect();
+        Ok(change)
+    }
+
+    /// Adds the strands of a sheet: at each cut both sides let go and take a new point there.
+    fn cut(&mut self, sheet: &[usize], cuts: &[Cut], knot: usize, tracks: &mut Vec<Track>) {
+        let mut strand = Vec::new();
+        let mut start = 0;
+        for &(segment, share) in cuts {
+            let old = [sheet[segment], sheet[segment + 1]];
+            let new = [0, 1].map(|_| born(Parents { tracks: old, share }, knot, tracks));
+            strand.extend_from_slice(&sheet[start..=segment]);
+            strand.push(new[0]);
+            self.strands.push(std::mem::replace(&mut strand, vec![new[1]]));
+            self.splits.push(Pair { new, old });
+            start = segment + 1;
+        }
+        strand.extend_from_slice(&sheet[start..]);
+        self.strands.push(strand);
+    }
+
+    /// Adds a new point at each of two ends that grow together.
+    fn extend(&mut self, places: [(usize, usize); 2], knot: usize, tracks: &mut Vec<Track>) {
+        let mut pair = Pair { new: [0; 2], old: [0; 2] };
+        for (side, (strand, end)) in places.into_iter().enumerate() {
+            let strand = &mut self.strands[strand];
+            let place = if end == 0 { 0 } else { strand.len() };
+            let old = strand[place.saturating_sub(end)];
+            let new = born(Parents { tracks: [old; 2], share: 0.0 }, knot, tracks);
+            strand.insert(place, new);
+            (pair.new[side], pair.old[side]) = (new, old);
+        }
+        self.merges.push(pair);
+    }
+
+    /// Gives every strand at least `count` control points by halving its longest segments, which changes no line.
+    pub(crate) fn refine(&mut self, count: usize, knot: usize, tracks: &mut Vec<Track>) {
+        for strand in &mut self.strands {
+            while strand.len() < count {
+                let at = |track: usize| tracks[track].knot(knot).position;
+                let length = |place: usize| at(strand[place]).distance_squared(at(strand[place + 1]));
+                let longest = (0..strand.len() - 1).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
+                let parents = Parents { tracks: [strand[longest], strand[longest + 1]], share: 0.5 };
+                strand.insert(longest + 1, born(parents, knot, tracks));
+            }
+        }
+    }
+
+    /// The gaps that open and close.
+    pub(crate) fn gaps(&self) -> Vec<Gap> {
+        let gap = |pair: &Pair, opens: bool| Gap { ends: pair.new, opens };
+        let opening = self.splits.iter().map(|pair| gap(pair, true));
+        opening.chain(self.merges.iter().map(|pair| gap(pair, false))).collect()
+    }
+
+    /// The tracks of chain `chain`, along it.
+    pub(super) fn tracks_of(&self, chain: usize) -> Vec<usize> {
+        self.chains[chain].iter().flat_map(|&link| self.along(link)).collect()
+    }
+
+    /// The tracks of a strand in the direction of its chain.
+    pub(crate) fn along(&self, link: Link) -> Vec<usize> {
+        let mut tracks = self.strands[link.strand].clone();
+        if link.reversed {
+            tracks.reverse();
+        }
+        tracks
+    }
+}
+
+/// A new control point between two others.
+fn born(parents: Parents, knot: usize, tracks: &mut Vec<Track>) -> usize {
+    let [first, second] = parents.tracks.map(|parent| tracks[parent].knot(knot));
+    tracks.push(Track::new(knot, Some(parents), first.lerp(second, parents.share)));
+    tracks.len() - 1
+}
+
+/// The index of the sheet that a person calls `number`.
+pub(super) fn sheet_index(number: i64, count: usize) -> Result<usize, ShapeFaultKind> {
+    let index = usize::try_from(number - 1).ok().filter(|&index| index < count);
+    index.ok_or(ShapeFaultKind::NoSuchSheet { sheet: number, count })
+}
+
+/// Where each sheet is cut, in order along it.
+fn cuts(
+    parameters: &ShapeParameters,
+    index: usize,
+    sheets: &[Vec<usize>],
+    tracks: &[Track],
+) -> Result<Vec<Vec<Cut>>, ShapeFault> {
+    let mut cuts: Vec<Vec<Cut>> = vec![Vec::new(); sheets.len()];
+    for (number, split) in parameters.split.iter().enumerate() {
+        let fault = |kind| ShapeFault { key: format!("shapes.{index}.split.{number}"), kind };
+        let sheet = sheet_index(split.sheet, sheets.len()).map_err(fault)?;
+        let positions: Vec<DVec2> = sheets[sheet].iter().map(|&track| tracks[track].knot(index - 1).position).collect();
+        let cut = cut_of(split, sheet, &positions).map_err(fault)?;
+        if cuts[sheet].iter().any(|other| other.0 == cut.0) {
+            return Err(fault(ShapeFaultKind::SplitTwice { sheet: sheet + 1, segment: cut.0 + 1 }));
+        }
+        cuts[sheet].push(cut);
+    }
+    cuts.iter_mut().for_each(|cuts| cuts.sort_by_key(|cut| cut.0));
+    Ok(cuts)
+}
+
+fn cut_of(split: &SplitParameters, sheet: usize, positions: &[DVec2]) -> Result<Cut, ShapeFaultKind> {
+    let segments = positions.len() - 1;
+    match (split.segment, split.at) {
+        (Some(_), Some(_)) => Err(ShapeFaultKind::SegmentAndShare),
+        (Some(segment), None) => {
+            let index = usize::try_from(segment - 1).ok().filter(|&index| index < segments);
+            let missing = ShapeFaultKind::NoSuchSegment { sheet: sheet + 1, segment, count: segments };
+            index.map(|index| (index, 0.5)).ok_or(missing)
+        }
+        (None, at) => {
+            let (at, shares) = (at.unwrap_or(0.5), shares(positions));
+            let segment = shares.partition_point(|&share| share <= at).clamp(1, segments) - 1;
+            let length = shares[segment + 1] - shares[segment];
+            let share = if length > 0.0 { (at - shares[segment]) / length } else { 0.5 };
+            Ok((segment, share.clamp(0.0, 1.0)))
+        }
+    }
+}
+
+/// The two ends that a merge names: sheet, and 0 for its start or 1 for its end.
+fn merged_ends(
+    merge: &MergeParameters,
+    sheets: &[Vec<usize>],
+    tracks: &[Track],
+    knot: usize,
+) -> Result<[(usize, usize); 2], ShapeFaultKind> {
+    let [first, second] = merge.sheets;
+    let pair = [sheet_index(first, sheets.len())?, sheet_index(second, sheets.len())?];
+    if pair[0] == pair[1] {
+        return Err(ShapeFaultKind::Ring { sheet: pair[0] + 1 });
+    }
+    let Auto::Set(at) = merge.at else { return Ok(nearest_ends(pair, sheets, tracks, knot)) };
+    let end = |side: usize| match at[side] {
+        0.0 => Ok((pair[side], 0)),
+        1.0 => Ok((pair[side], 1)),
+        at => Err(ShapeFaultKind::NotAnEnd { sheet: pair[side] + 1, at }),
+    };
+    Ok([end(0)?, end(1)?])
+}
+
+fn nearest_ends(pair: [usize; 2], sheets: &[Vec<usize>], tracks: &[Track], knot: usize) -> [(usize, usize); 2] {
+    let at = |side: usize, end: usize| {
+        let sheet = &sheets[pair[side]];
+        tracks[sheet[end * (sheet.len() - 1)]].knot(knot).position
+    };
+    let distance = |ends: &[usize; 2]| at(0, ends[0]).distance_squared(at(1, ends[1]));
+    let all = [[1, 0], [0, 1], [0, 0], [1, 1]];
+    let ends = all.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or([1, 0]);
+    [(pair[0], ends[0]), (pair[1], ends[1])]
+}
+
+/// Strands joined end to end.
+struct Chains {
+    /// What each end of each strand is joined to: strand and end.
+    links: Vec<[Option<(usize, usize)>; 2]>,
+    /// A number that all strands of a chain have.
+    chain: Vec<usize>,
+}
+
+impl Chains {
+    fn new(count: usize) -> Self {
+        Self { links: vec![[None; 2]; count], chain: (0..count).collect() }
+    }
+
+    /// Joins two ends; `false` if that would close a ring.
+    fn join(&mut self, [a, b]: [(usize, usize); 2]) -> bool {
+        let [one, other] = [self.chain[a.0], self.chain[b.0]];
+        if one == other {
+            return false;
+        }
+        self.links[a.0][a.1] = Some(b);
+        self.links[b.0][b.1] = Some(a);
+        self.chain.iter_mut().filter(|chain| **chain == other).for_each(|chain| *chain = one);
+        true
+    }
+
+    /// The chains, by the first strand of each, which none runs against.
+    fn collect(&self) -> Vec<Vec<Link>> {
+        let mut seen = vec![false; self.links.len()];
+        let mut chains = Vec::new();
+        for strand in 0..self.links.len() {
+            if seen[strand] {
+                continue;
+            }
+            let mut chain = vec![Link { strand, reversed: false }];
+            for end in [0, 1] {
+                let mut at = self.links[strand][end];
+                while let Some((next, entered)) = at {
+                    // Walking toward the start, a strand entered at its end runs with the chain.
+                    let link = Link { strand: next, reversed: entered == end };
+                    if end == 0 {
+                        chain.insert(0, link)
+                    } else {
+                        chain.push(link)
+                    }
+                    at = self.links[next][1 - entered];
+                }
+            }
+            chain.iter().for_each(|link| seen[link.strand] = true);
+            chains.push(chain);
+        }
+        chains
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shapes::interpolation::spline_track::Knot;
+
+    /// Sheets of 4 points along x, 1 km apart, at z = 0, 10, ...
+    fn setting(count: usize) -> (Vec<Vec<usize>>, Vec<Track>) {
+        let position = |index: usize| DVec2::new((index % 4) as f64, 10.0 * (index / 4) as f64);
+        let track = |index: usize| Track::new(0, None, Knot { position: position(index), values: [1.0; 2] });
+        let sheets = (0..count).map(|sheet| (4 * sheet..4 * sheet + 4).collect()).collect();
+        (sheets, (0..4 * count).map(track).collect())
+    }
+
+    fn change(parameters: &ShapeParameters, sheets: usize) -> Result<(Change, Vec<Track>), ShapeFault> {
+        let (sheets, mut tracks) = setting(sheets);
+        Change::new(parameters, 1, &sheets, &mut tracks).map(|change| (change, tracks))
+    }
+
+    fn split(sheet: i64, segment: Option<i64>, at: Option<f64>) -> ShapeParameters {
+        ShapeParameters { split: vec![SplitParameters { sheet, segment, at }], ..ShapeParameters::default() }
+    }
+
+    fn merge(merges: &[([i64; 2], Auto<[f64; 2]>)]) -> ShapeParameters {
+        let merge = merges.iter().map(|&(sheets, at)| MergeParameters { sheets, at }).collect();
+        ShapeParameters { merge, ..ShapeParameters::default() }
+    }
+
+    #[test]
+    fn a_split_segment_lets_go_and_takes_two_points_in_its_middle() {
+        let (change, tracks) = change(&split(1, Some(2), None), 1).unwrap();
+        assert_eq!(change.strands, [vec![0, 1, 4], vec![5, 2, 3]]);
+        assert_eq!(change.chains.len(), 2);
+        assert_eq!((change.splits[0].new, change.splits[0].old), ([4, 5], [1, 2]));
+        assert!([4, 5].iter().all(|&new| tracks[new].knot(0).position == DVec2::new(1.5, 0.0)));
+    }
+
+    #[test]
+    fn a_split_at_a_share_opens_exactly_there() {
+        let (_, tracks) = change(&split(1, None, Some(0.25)), 1).unwrap();
+        assert_eq!(tracks[4].knot(0).position, DVec2::new(0.75, 0.0));
+        let (middle, tracks) = change(&split(1, None, None), 1).unwrap();
+        assert_eq!(tracks[4].knot(0).position, DVec2::new(1.5, 0.0));
+        assert_eq!(middle.strands.len(), 2);
+        for at in [0.0, 1.0] {
+            let (change, _) = change(&split(1, None, Some(at)), 1).unwrap();
+            assert!(change.strands.iter().all(|strand| strand.len() >= 2));
+        }
+    }
+
+    #[test]
+    fn merged_ends_take_a_point_each() {
+        let (change, tracks) = change(&merge(&[([1, 2], Auto::Set([1.0, 1.0]))]), 2).unwrap();
+        assert_eq!(change.strands, [vec![0, 1, 2, 3, 8], vec![4, 5, 6, 7, 9]]);
+        let links = [Link { strand: 0, reversed: false }, Link { strand: 1, reversed: true }];
+        assert_eq!(change.chains, [links]);
+        assert_eq!(change.along(links[1]), [9, 7, 6, 5, 4]);
+        assert_eq!(tracks[9].knot(0).position, DVec2::new(3.0, 10.0));
+    }
+
+    #[test]
+    fn three_sheets_become_one_whichever_is_named_first() {
+        let start_to_end = Auto::Set([0.0, 1.0]);
+        let (change, _) = change(&merge(&[([1, 2], start_to_end), ([2, 3], start_to_end)]), 3).unwrap();
+        let order: Vec<(usize, bool)> = change.chains[0].iter().map(|link| (link.strand, link.reversed)).collect();
+        assert_eq!(order, [(2, false), (1, false), (0, false)]);
+        assert_eq!(change.strands[1].len(), 6);
+    }
+
+    #[test]
+    fn the_nearest_ends_merge_unless_told() {
+        let (change, _) = change(&merge(&[([1, 2], Auto::Auto)]), 2).unwrap();
+        let ends: Vec<usize> = change.merges[0].old.to_vec();
+        assert!(ends == [3, 7] || ends == [0, 4], "{ends:?}");
+    }
+
+    #[test]
+    fn refining_halves_the_longest_segments() {
+        let (mut change, mut tracks) = change(&split(1, Some(2), None), 1).unwrap();
+        change.refine(4, 0, &mut tracks);
+        assert!(change.strands.iter().all(|strand| strand.len() == 4));
+        let xs: Vec<f64> = change.strands[0].iter().map(|&track| tracks[track].knot(0).position.x).collect();
+        assert_eq!(xs, [0.0, 0.5, 1.0, 1.5]);
+    }
+
+    #[test]
+    fn faults_name_sheet_and_segment() {
+        let kind = |parameters: &ShapeParameters| change(parameters, 2).unwrap_err();
+        for (parameters, expected) in [
+            (split(3, None, None), "shapes.1.split.0: there is no sheet 3 in the shape before; allowed: 1 to 2"),
+            (split(2, Some(4), None), "shapes.1.split.0: sheet 2 has no segment 4; allowed: 1 to 3"),
+            (split(2, Some(1), Some(0.5)), "says both `segment` and `at`"),
+            (merge(&[([1, 5], Auto::Auto)]), "shapes.1.merge.0: there is no sheet 5"),
+            (merge(&[([1, 2], Auto::Set([1.0, 0.4]))]), "the point at 0.4 of sheet 2 is not an end"),
+            (merge(&[([2, 2], Auto::Set([0.0, 1.0]))]), "would close sheet 2 to a ring"),
+            (
+                merge(&[([1, 2], Auto::Set([1.0, 0.0])), ([1, 2], Auto::Set([0.0, 1.0]))]),
+                "shapes.1.merge.1: this merge would close",
+            ),
+            (
+                merge(&[([1, 2], Auto::Set([1.0, 0.0])), ([1, 2], Auto::Set([1.0, 1.0]))]),
+                "the end of sheet 1 is merged already",
+            ),
+        ] {
+            let shown = kind(&parameters).to_string();
+            assert!(shown.contains(expected), "{shown}");
+        }
+        let twice = ShapeParameters { split: vec![SplitParameters::default(); 2], ..ShapeParameters::default() };
+        assert!(kind(&twice).to_string().contains("segment 2 of sheet 1 is split already"));
+    }
+}

@@ -1,0 +1,110 @@
+//! Square cells over a part of the plane, and which of them a segment passes.
+
+use std::ops::Range;
+
+use bansho_base::math::DVec2;
+
+/// Cells in rows, from north-west.
+#[derive(Clone, Debug)]
+pub(crate) struct CellGrid {
+    low: DVec2,
+    cell: f64,
+    size: [usize; 2],
+}
+
+impl CellGrid {
+    /// Cells of side `cell` over the rectangle from `low` to `high`, made larger if there would be more than `most` on a side.
+    pub(crate) fn new(low: DVec2, high: DVec2, cell: f64, most: usize) -> Self {
+        let extent = (high - low).max_element();
+        let cell = cell.max(extent / most as f64).max(f64::MIN_POSITIVE);
+        let size = ((high - low) / cell).to_array().map(|cells| (cells.floor() as usize + 1).min(most + 1));
+        Self { low, cell, size }
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.size[0] * self.size[1]
+    }
+
+    /// The cell of `point`; of one outside, the nearest column and row.
+    pub(super) fn cell_of(&self, point: DVec2) -> usize {
+        self.line(1, point.y) * self.size[0] + self.line(0, point.x)
+    }
+
+    /// The middle of a cell.
+    pub(super) fn middle(&self, cell: usize) -> DVec2 {
+        let [column, row] = [cell % self.size[0], cell / self.size[0]].map(|place| place as f64 + 0.5);
+        self.low + DVec2::new(column, row) * self.cell
+    }
+
+    /// Side of a cell.
+    pub(super) fn side(&self) -> f64 {
+        self.cell
+    }
+
+    /// From the middle of a cell to its corners.
+    pub(super) fn half_diagonal(&self) -> f64 {
+        self.cell * std::f64::consts::FRAC_1_SQRT_2
+    }
+
+    /// Column (`axis` 0) or row (1) of a coordinate.
+    fn line(&self, axis: usize, coordinate: f64) -> usize {
+        // Casts saturate, so what lies outside or is no number ends in a border cell.
+        (((coordinate - self.low[axis]) / self.cell) as usize).min(self.size[axis] - 1)
+    }
+
+    /// Visits every cell that the segment from `a` to `b` passes, and few others. Both ends must lie within the cells.
+    pub(crate) fn for_each_passed(&self, a: DVec2, b: DVec2, mut visit: impl FnMut(usize)) {
+        self.for_each_run(a, b, 0.0, |run| run.for_each(&mut visit));
+    }
+
+    /// Visits the runs of cells, row by row, that the segment from `a` to `b` passes within `margin`, and few others. Both ends must lie within
+    /// the cells.
+    pub(super) fn for_each_run(&self, a: DVec2, b: DVec2, margin: f64, mut visit: impl FnMut(Range<usize>)) {
+        let (top, bottom) = if a.y <= b.y { (a, b) } else { (b, a) };
+        let place_at = |height: f64| {
+            let share = ((height - top.y) / (bottom.y - top.y)).clamp(0.0, 1.0);
+            top.x + (bottom.x - top.x) * share
+        };
+        for row in self.line(1, top.y - margin)..=self.line(1, bottom.y + margin) {
+            let slab = self.low.y + row as f64 * self.cell;
+            let ends = if bottom.y > top.y {
+                [place_at(slab - margin), place_at(slab + self.cell + margin)]
+            } else {
+                [top.x, bottom.x]
+            };
+            let left = self.line(0, ends[0].min(ends[1]) - margin);
+            let right = self.line(0, ends[0].max(ends[1]) + margin);
+            visit(row * self.size[0] + left..row * self.size[0] + right + 1);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn passed(a: [f64; 2], b: [f64; 2], margin: f64) -> Vec<usize> {
+        let grid = CellGrid::new(DVec2::ZERO, DVec2::splat(3.9), 1.0, 100);
+        let mut cells = Vec::new();
+        grid.for_each_run(a.into(), b.into(), margin, |run| cells.extend(run));
+        cells.sort_unstable();
+        cells
+    }
+
+    #[test]
+    fn a_segment_passes_the_cells_under_it() {
+        assert_eq!(passed([0.5, 0.5], [2.5, 0.5], 0.0), [0, 1, 2]);
+        assert_eq!(passed([0.5, 2.5], [0.5, 0.5], 0.0), [0, 4, 8]);
+        // Through (1, 0.75) and (2, 1.25) and (3, 1.75): the cells (0, 0), (1, 0), (1, 1), (2, 1).
+        assert_eq!(passed([0.5, 0.5], [2.5, 1.5], 0.0), [0, 1, 5, 6]);
+        assert_eq!(passed([1.5, 1.5], [1.5, 1.5], 1.0), [0, 1, 2, 4, 5, 6, 8, 9, 10]);
+    }
+
+    #[test]
+    fn cells_grow_rather_than_become_too_many() {
+        let grid = CellGrid::new(DVec2::ZERO, DVec2::new(1000.0, 10.0), 1e-9, 100);
+        assert!(grid.count() <= 101 * 2);
+        assert_eq!(grid.cell_of(DVec2::new(-5.0, f64::NAN)), 0);
+        assert_eq!(grid.cell_of(DVec2::new(1e9, 0.0)), grid.size[0] - 1);
+    }
+}

@@ -1,0 +1,5 @@
+//! Shapes between shapes: splines through the key shapes.
+
+pub(crate) mod control_points;
+pub(crate) mod gap;
+pub(crate) mod spline_track;

@@ -1,0 +1,37 @@
+//! The aurora's foot as an artist draws it, and as it moves (thesis, 2.2.1 and 2.2.2).
+//!
+//! A scene lists shapes; each has sheets, and says what splits and merges on the way to it. [`Sequence`] is the shape at any time.
+//!
+//! Geometry is in km in the plane at 100 km altitude: x east, z south, the observer's nadir at the origin. Points are
+//! [`DVec2`](bansho_base::math::DVec2)s whose second component is z.
+
+pub(crate) mod correspondence;
+mod default_shapes;
+mod fault;
+mod form;
+pub(crate) mod geometry;
+pub(crate) mod interpolation;
+mod parameters;
+mod sequence;
+mod shape;
+pub(crate) mod strokes;
+
+pub use fault::{ShapeFault, ShapeFaultKind};
+pub use form::Form;
+pub(crate) use geometry::polyline::lengths;
+pub use geometry::{
+    nearest_segment::Neighbourhood,
+    segments::{Sample, Segments},
+};
+pub use interpolation::gap::Bridge;
+pub use parameters::{
+    Correspondence, FRAME_S, LinkParameters, MergeParameters, MotionParameters, ShapeParameters, SheetParameters,
+    Spacing, SplitParameters,
+};
+pub(crate) use sequence::Listing;
+pub use sequence::Sequence;
+pub use shape::{Shape, Sheet};
+pub use strokes::intersection::{SegmentId, count_crossings, first_crossing};
+
+#[cfg(test)]
+mod tests;

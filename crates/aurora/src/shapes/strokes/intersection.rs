@@ -1,0 +1,218 @@
+//! Where sheets cross: themselves or one another. Sheets of an aurora never do (thesis, 2.2.1).
+
+use std::collections::BTreeSet;
+
+use bansho_base::math::DVec2;
+
+use crate::shapes::geometry::cell_grid::CellGrid;
+
+/// A segment of one of several sheets; both count from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SegmentId {
+    /// The sheet.
+    pub sheet: usize,
+    /// The segment, from point `segment` to the next.
+    pub segment: usize,
+}
+
+#[derive(Clone, Copy)]
+struct SheetSegment {
+    id: SegmentId,
+    ends: [DVec2; 2],
+    /// Whether it goes on from the one before it in the list.
+    continues: bool,
+}
+
+/// Which meetings of segments count.
+#[derive(Clone, Copy, PartialEq)]
+enum Meeting {
+    /// Also those that only touch.
+    Touching,
+    /// Those where each passes from one side of the other to its other side.
+    Proper,
+}
+
+/// The first crossing along the sheets, touching included: of all segments that meet an earlier one the first, and the earliest that it meets.
+///
+/// A cell list makes it linear for strokes as hands draw them; it ends at the first crossing.
+pub fn first_crossing<S: AsRef<[DVec2]>>(sheets: &[S]) -> Option<[SegmentId; 2]> {
+    let mut found = None;
+    for_each_meeting(sheets, Meeting::Touching, |pair| {
+        found = Some(pair);
+        false
+    });
+    found
+}
+
+/// How many pairs of segments pass through each other. In-between shapes may; it is a figure to show, not a fault.
+pub fn count_crossings<S: AsRef<[DVec2]>>(sheets: &[S]) -> usize {
+    let mut count = 0;
+    for_each_meeting(sheets, Meeting::Proper, |_| {
+        count += 1;
+        true
+    });
+    count
+}
+
+/// The sheets of which a segment passes through one of another or of its own.
+pub(crate) fn crossing_sheets<S: AsRef<[DVec2]>>(sheets: &[S]) -> BTreeSet<usize> {
+    let mut found = BTreeSet::new();
+    for_each_meeting(sheets, Meeting::Proper, |pair| {
+        found.extend(pair.map(|segment| segment.sheet));
+        true
+    });
+    found
+}
+
+/// All segments that have a length, in order.
+fn segments<S: AsRef<[DVec2]>>(sheets: &[S]) -> Vec<SheetSegment> {
+    let mut list = Vec::new();
+    for (sheet, points) in sheets.iter().enumerate() {
+        let mut continues = false;
+        for (segment, pair) in points.as_ref().windows(2).enumerate().filter(|(_, pair)| pair[0] != pair[1]) {
+            list.push(SheetSegment { id: SegmentId { sheet, segment }, ends: [pair[0], pair[1]], continues });
+            continues = true;
+        }
+    }
+    list
+}
+
+/// Cells about as long as a segment, and not many more than there are segments, since all of them are cleared.
+fn grid(segments: &[SheetSegment]) -> CellGrid {
+    let ends = || segments.iter().flat_map(|segment| segment.ends);
+    let low = ends().fold(DVec2::INFINITY, DVec2::min);
+    let high = ends().fold(DVec2::NEG_INFINITY, DVec2::max);
+    let length: f64 = segments.iter().map(|segment| segment.ends[0].distance(segment.ends[1])).sum();
+    CellGrid::new(low, high, length / segments.len() as f64, (4 * segments.len()).isqrt() + 16)
+}
+
+const NONE: u32 = u32::MAX;
+
+/// Calls `visit` with each pair that meets, the later segment last, until it says `false`.
+fn for_each_meeting<S: AsRef<[DVec2]>>(sheets: &[S], meeting: Meeting, mut visit: impl FnMut([SegmentId; 2]) -> bool) {
+    let segments = segments(sheets);
+    if segments.len() < 2 {
+        return;
+    }
+    let grid = grid(&segments);
+    // Each cell's list of segments, linked from the latest to the earliest.
+    let mut heads = vec![NONE; grid.count()];
+    let mut links: Vec<(u32, u32)> = Vec::with_capacity(4 * segments.len());
+    let mut compared_with = vec![NONE; segments.len()];
+    let mut met: Vec<u32> = Vec::new();
+    for (index, segment) in segments.iter().enumerate() {
+        grid.for_each_passed(segment.ends[0], segment.ends[1], |cell| {
+            let mut link = heads[cell];
+            while link != NONE {
+                let (other, next) = links[link as usize];
+                if compared_with[other as usize] != index as u32 {
+                    compared_with[other as usize] = index as u32;
+                    let follows = segment.continues && other as usize + 1 == index;
+                    if meets(&segments[other as usize], segment, follows, meeting) {
+                        met.push(other);
+                    }
+                }
+                link = next;
+            }
+            links.push((index as u32, heads[cell]));
+            heads[cell] = links.len() as u32 - 1;
+        });
+        met.sort_unstable();
+        if !met.drain(..).all(|other| visit([segments[other as usize].id, segment.id])) {
+            return;
+        }
+    }
+}
+
+/// Twice the area of the triangle, positive on one side of the line from `a` to `b`.
+fn side(a: DVec2, b: DVec2, point: DVec2) -> f64 {
+    (b - a).perp_dot(point - a)
+}
+
+fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Meeting) -> bool {
+    let [[a, b], [c, d]] = [first.ends, second.ends];
+    if follows {
+        // They share a point; they meet elsewhere only if the second runs back over the first.
+        return meeting == Meeting::Touching && side(a, b, d) == 0.0 && (b - a).dot(d - c) < 0.0;
+    }
+    let [c_side, d_side, a_side, b_side] = [side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b)];
+    let apart = |x: f64, y: f64| (x < 0.0 && y > 0.0) || (x > 0.0 && y < 0.0);
+    if apart(c_side, d_side) && apart(a_side, b_side) {
+        return true;
+    }
+    meeting == Meeting::Touching
+        && [(c_side, a, b, c), (d_side, a, b, d), (a_side, c, d, a), (b_side, c, d, b)]
+            .into_iter()
+            .any(|(side, from, to, point)| side == 0.0 && (point - from).dot(point - to) <= 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math::random::{Key, Purpose};
+
+    use super::*;
+
+    fn points(list: &[[f64; 2]]) -> Vec<DVec2> {
+        list.iter().map(|&point| point.into()).collect()
+    }
+
+    fn pair(first: [usize; 2], second: [usize; 2]) -> Option<[SegmentId; 2]> {
+        Some([first, second].map(|[sheet, segment]| SegmentId { sheet, segment }))
+    }
+
+    #[test]
+    fn a_loop_crosses_itself_and_a_bend_does_not() {
+        let bend = points(&[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]);
+        assert_eq!(first_crossing(&[&bend]), None);
+        let knot = points(&[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, -1.0]]);
+        assert_eq!(first_crossing(&[&knot]), pair([0, 0], [0, 3]));
+        assert_eq!(count_crossings(&[&knot]), 1);
+    }
+
+    #[test]
+    fn touching_and_running_back_count_for_drawn_shapes_only() {
+        let closed = points(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]);
+        assert_eq!(first_crossing(&[&closed]), pair([0, 0], [0, 2]));
+        assert_eq!(count_crossings(&[&closed]), 0);
+        let back = points(&[[0.0, 0.0], [2.0, 0.0], [1.0, 0.0]]);
+        assert_eq!(first_crossing(&[&back]), pair([0, 0], [0, 1]));
+        let branch = [points(&[[0.0, 0.0], [2.0, 0.0]]), points(&[[1.0, 0.0], [1.0, 1.0]])];
+        assert_eq!(first_crossing(&branch), pair([0, 0], [1, 0]));
+        assert_eq!(count_crossings(&branch), 0);
+    }
+
+    #[test]
+    fn coincident_points_are_no_crossing() {
+        let still = points(&[[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [2.0, 0.0]]);
+        assert_eq!(first_crossing(&[&still]), None);
+        assert_eq!(first_crossing(&[points(&[[1.0, 1.0]])]), None);
+    }
+
+    /// Against every pair compared with every other.
+    #[test]
+    fn the_cell_list_finds_what_comparing_all_pairs_finds() {
+        let key = Key::new(4, "strokes");
+        for stroke in 0..2_000 {
+            let count = 3 + (stroke % 12) as usize;
+            let mut at = DVec2::ZERO;
+            let walk: Vec<DVec2> = (0..count as u64)
+                .map(|step| {
+                    let [x, y, ..] = key.uniforms(stroke, step as u32, Purpose::named("step"));
+                    at += DVec2::new(f64::from(x) - 0.2, f64::from(y) - 0.5);
+                    at
+                })
+                .collect();
+            let all = segments(&[&walk]);
+            let mut every = Vec::new();
+            for (j, second) in all.iter().enumerate() {
+                for (i, first) in all[..j].iter().enumerate() {
+                    if meets(first, second, i + 1 == j, Meeting::Proper) {
+                        every.push([first.id, second.id]);
+                    }
+                }
+            }
+            assert_eq!(first_crossing(&[&walk]), every.first().copied(), "stroke {stroke}");
+            assert_eq!(count_crossings(&[&walk]), every.len());
+        }
+    }
+}

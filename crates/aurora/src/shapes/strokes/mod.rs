@@ -1,0 +1,6 @@
+//! Strokes as they are drawn, and the faults that they may have.
+
+pub(crate) mod factors;
+pub(crate) mod intersection;
+pub(crate) mod passing;
+pub(crate) mod validate;

@@ -1,0 +1,235 @@
+//! From parameters to drawn sheets, checked one by one and against each other.
+
+use bansho_base::{
+    geometry::strokes::Drawing,
+    host::assets::{AssetError, AssetProblem, Assets},
+    math::{self, DVec2},
+    parameters::Auto,
+};
+
+use super::{factors::Factors, intersection::first_crossing};
+use crate::shapes::{
+    SegmentId, ShapeFault, ShapeFaultKind, ShapeParameters, SheetParameters, Spacing,
+    geometry::polyline::{Polyline, by_recorded_points, smoothed},
+};
+
+/// Points closer than this are one, km.
+const SAME_KM: f64 = 1e-6;
+
+/// Length of a form as a share of the drawn square.
+const USUAL_LENGTH: f64 = 0.6;
+
+/// Most sheets of a shape.
+const MOST_SHEETS: usize = 256;
+
+/// A sheet as it was drawn, in its drawn direction.
+#[derive(Clone, Debug)]
+pub(crate) struct DrawnSheet {
+    pub(crate) line: Polyline,
+    /// The points that were given, without repetitions.
+    recorded: Vec<DVec2>,
+    /// Which point of the parameters each recorded one is.
+    origins: Vec<usize>,
+    /// Pieces of the line between two recorded points.
+    pieces: usize,
+    pub(crate) factors: Factors,
+    /// The parameter that it comes from, below `sheets`, and whether that lists points.
+    entry: usize,
+    lists_points: bool,
+}
+
+impl DrawnSheet {
+    /// `count` control points P_i.
+    pub(crate) fn control_points(&self, count: usize, spacing: Spacing) -> Vec<DVec2> {
+        match spacing {
+            Spacing::ArcLength => self.line.evenly(count),
+            Spacing::Recorded => by_recorded_points(&self.recorded, count),
+        }
+    }
+
+    /// The parameter's point at or before a point of the line.
+    fn origin(&self, point: usize) -> usize {
+        self.origins[(point / self.pieces).min(self.origins.len() - 1)]
+    }
+}
+
+/// Where a shape stands in the parameters, and the square that it must lie in.
+#[derive(Clone, Copy)]
+pub(crate) struct ShapeContext {
+    pub(crate) shape: usize,
+    pub(crate) extent_km: f64,
+}
+
+impl ShapeContext {
+    fn fault(self, key: &str, kind: ShapeFaultKind) -> ShapeFault {
+        ShapeFault { key: format!("shapes.{}{key}", self.shape), kind }
+    }
+
+    /// A fault at a point of a sheet.
+    fn fault_at(self, sheet: &DrawnSheet, point: usize, kind: ShapeFaultKind) -> ShapeFault {
+        let point = if sheet.lists_points { format!(".points.{}", sheet.origin(point)) } else { String::new() };
+        self.fault(&format!(".sheets.{}{point}", sheet.entry), kind)
+    }
+}
+
+/// All sheets of a shape, in order.
+///
+/// # Errors
+/// The first sheet that is no line, leaves the square, or meets itself or another.
+pub(crate) fn drawn_sheets(
+    parameters: &ShapeParameters,
+    context: ShapeContext,
+    assets: &dyn Assets,
+) -> Result<Vec<DrawnSheet>, ShapeFault> {
+    let arc = [SheetParameters::default()];
+    let entries = if parameters.sheets.is_empty() { &arc[..] } else { &parameters.sheets[..] };
+    let mut sheets = Vec::new();
+    for (entry, parameters) in entries.iter().enumerate() {
+        draw_entry(parameters, entry, context, assets, &mut sheets)?;
+        if sheets.len() > MOST_SHEETS {
+            let kind = ShapeFaultKind::TooManySheets { found: sheets.len(), most: MOST_SHEETS };
+            return Err(context.fault(".sheets", kind));
+        }
+    }
+    check_extent(&sheets, context)?;
+    check_crossings(&sheets, context)?;
+    Ok(sheets)
+}
+
+/// Adds the sheets of one entry: one a stroke and copy.
+fn draw_entry(
+    parameters: &SheetParameters,
+    entry: usize,
+    context: ShapeContext,
+    assets: &dyn Assets,
+    sheets: &mut Vec<DrawnSheet>,
+) -> Result<(), ShapeFault> {
+    let fault = |key: &str, kind| context.fault(&format!(".sheets.{entry}{key}"), kind);
+    if parameters.stroke.is_some() && parameters.path.is_none() {
+        return Err(fault(".stroke", ShapeFaultKind::StrokeOfNoFile));
+    }
+    let strokes = match (&parameters.points, &parameters.path, parameters.form) {
+        (Some(points), None, None) => vec![points.iter().map(|&point| DVec2::from(point)).collect()],
+        (None, Some(path), None) => {
+            let id = parameters.stroke.as_deref();
+            strokes(&path.0, id, context.extent_km, assets).map_err(|error| {
+                fault(
+                    if matches!(error.problem, AssetProblem::NoStroke(_)) { ".stroke" } else { ".path" },
+                    error.into(),
+                )
+            })?
+        }
+        (None, None, _) => vec![form_line(parameters, context.extent_km)],
+        _ => return Err(fault("", ShapeFaultKind::SeveralSources { sheet: sheets.len() + 1 })),
+    };
+    let factors = Factors::new(parameters);
+    for copy in 0..parameters.copies {
+        let offset = (copy as f64 - (parameters.copies - 1) as f64 / 2.0) * parameters.spacing_km;
+        for stroke in &strokes {
+            let placed = stroke.iter().map(|&point| placed(point, offset, parameters)).collect();
+            let sheet = sheet(placed, parameters, entry, factors.clone()).map_err(|found| {
+                let key = if parameters.points.is_some() { ".points" } else { "" };
+                fault(key, ShapeFaultKind::TooFewPoints { sheet: sheets.len() + 1, found })
+            })?;
+            sheets.push(sheet);
+        }
+    }
+    Ok(())
+}
+
+/// A sheet through different points.
+///
+/// # Errors
+/// The number of different points, where it is below two.
+fn sheet(
+    points: Vec<DVec2>,
+    parameters: &SheetParameters,
+    entry: usize,
+    factors: Factors,
+) -> Result<DrawnSheet, usize> {
+    let mut recorded: Vec<DVec2> = Vec::with_capacity(points.len());
+    let mut origins = Vec::with_capacity(points.len());
+    for (origin, point) in points.into_iter().enumerate() {
+        if recorded.last().is_none_or(|last| last.distance(point) > SAME_KM) {
+            recorded.push(point);
+            origins.push(origin);
+        }
+    }
+    let (line, pieces) = if parameters.smooth { smoothed(recorded.clone()) } else { (recorded.clone(), 1) };
+    let line = Polyline::new(line).filter(|_| recorded.len() > 1).ok_or(recorded.len())?;
+    Ok(DrawnSheet { line, recorded, origins, pieces, factors, entry, lists_points: parameters.points.is_some() })
+}
+
+fn form_line(parameters: &SheetParameters, extent_km: f64) -> Vec<DVec2> {
+    let set = |auto: Auto<f64>| if let Auto::Set(value) = auto { Some(value) } else { None };
+    let count = if let Auto::Set(count) = parameters.count { Some(count) } else { None };
+    let length = set(parameters.length_km).unwrap_or(USUAL_LENGTH * extent_km);
+    let line = parameters.form.unwrap_or_default().line(set(parameters.bend_deg), count);
+    line.into_iter().map(|point| point * length).collect()
+}
+
+/// Size, mirror, turn and shift, in this order; a copy lies `offset` km to the south before it is turned.
+fn placed(point: DVec2, offset: f64, parameters: &SheetParameters) -> DVec2 {
+    let mut point = point * parameters.scale;
+    if parameters.mirror {
+        point.y = -point.y;
+    }
+    let (sin, cos) = math::sin_cos(parameters.rotation_deg.to_radians());
+    DVec2::new(cos, sin).rotate(point + DVec2::new(0.0, offset)) + DVec2::from(parameters.position_km)
+}
+
+/// The strokes of a drawing whose sheet is fitted to the drawn square.
+fn strokes(file: &str, id: Option<&str>, extent_km: f64, assets: &dyn Assets) -> Result<Vec<Vec<DVec2>>, AssetError> {
+    let drawing = assets.drawing(file)?;
+    let wanted = drawing.strokes.iter().filter(|stroke| id.is_none() || stroke.id.as_deref() == id);
+    let strokes: Vec<Vec<DVec2>> = wanted.map(|stroke| fitted(&stroke.points, &drawing, extent_km)).collect();
+    if strokes.is_empty() {
+        let problem =
+            id.map_or(AssetProblem::NoStrokes { instead: Vec::new() }, |id| AssetProblem::NoStroke(id.to_owned()));
+        return Err(AssetError { path: file.to_owned(), problem });
+    }
+    Ok(strokes)
+}
+
+fn fitted(points: &[DVec2], drawing: &Drawing, extent_km: f64) -> Vec<DVec2> {
+    let middle = drawing.low.midpoint(drawing.high);
+    let scale = extent_km / (drawing.high - drawing.low).max_element();
+    points.iter().map(|&point| (point - middle) * scale).collect()
+}
+
+/// The points that were given come first, so that a fault names one of them; then the smooth line between them.
+fn check_extent(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeFault> {
+    let half = context.extent_km / 2.0;
+    let outside = |point: &DVec2| point.abs().max_element() > half;
+    for (index, sheet) in sheets.iter().enumerate() {
+        let given = sheet.recorded.iter().position(outside).map(|at| at * sheet.pieces);
+        let Some(at) = given.or_else(|| sheet.line.points().iter().position(outside)) else { continue };
+        let point = sheet.line.points()[at];
+        let number = sheet.origin(at) + 1;
+        let (x, z, sheet_number) = (point.x, point.y, index + 1);
+        let kind = if given.is_some() {
+            ShapeFaultKind::Outside { sheet: sheet_number, point: number, x, z, half }
+        } else {
+            ShapeFaultKind::BendsOutside { sheet: sheet_number, point: number, x, z, half }
+        };
+        return Err(context.fault_at(sheet, at, kind));
+    }
+    Ok(())
+}
+
+fn check_crossings(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeFault> {
+    let lines: Vec<&[DVec2]> = sheets.iter().map(|sheet| sheet.line.points()).collect();
+    let Some([earlier, later]) = first_crossing(&lines) else { return Ok(()) };
+    let point = |at: SegmentId| sheets[at.sheet].origin(at.segment) + 1;
+    let kind = if earlier.sheet == later.sheet {
+        ShapeFaultKind::CrossesItself { sheet: later.sheet + 1, point: point(later), earlier: point(earlier) }
+    } else {
+        ShapeFaultKind::CrossesSheet {
+            sheet: later.sheet + 1,
+            point: point(later),
+            other: earlier.sheet + 1,
+            other_point: point(earlier),
+        }
+    };
+    Err(context.fault_at(&sheets[later.sheet], later.segment, kind))
+}

@@ -1,0 +1,252 @@
+//! What each particle brings into the air: energy and power, by its place on the sheets.
+
+use bansho_base::{math::random::Key, noise::LANES};
+
+use super::AuroraParticles;
+use crate::{
+    AuroraParameters,
+    physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV},
+    simulate::sheets::{
+        nodes::{Layout, Nodes},
+        rays::{Places, RayTable, Rays},
+        refined_shape::{Course, Projection},
+    },
+};
+use fearless_simd::Level;
+use rayon::prelude::*;
+
+/// Particles that a task of the thread pool takes, a multiple of the lanes.
+const TASK: usize = 4096;
+/// What a particle far from every sheet keeps of its power in a step.
+const STRAY: f32 = 0.85;
+/// Stretches of a sheet that have their drawn power each, at least and at most, and how many particles each has at least where there may be
+/// more.
+const COARSE: [f64; 2] = [16.0, 32.0];
+const PER_COARSE: f64 = 128.0;
+/// The same of those along which the particles' own density is evened out: where a fold is born they lie in a heap for seconds.
+const FINE: [f64; 2] = [32.0, 256.0];
+const PER_FINE: f64 = 64.0;
+/// Where particles are scarce, one gets at most this many times what it would have if all were evenly spread.
+const MOST_UNEVEN: f64 = 6.0;
+/// The power of a particle comes this share nearer in a step to what it shall be.
+const FOLLOWING: f32 = 0.2;
+/// Least and most that all powers are changed by to make up for that delay: a flux that is keyed to jump is followed in some steps still.
+const BALANCE: [f64; 2] = [0.9, 1.1];
+/// W for one mW/m^2 on one km^2.
+const W_PER_KM2: f64 = 1e3;
+
+/// The flux and energy of an aurora and the pattern along its sheets.
+#[derive(Clone, Debug)]
+pub(super) struct Precipitation {
+    parameters: AuroraParameters,
+    rays: Rays,
+}
+
+/// A part of the arrays that one task works on.
+struct ParticleChunk<'a> {
+    positions: [&'a [f32]; 2],
+    fades: &'a [f32],
+    energies: &'a mut [f32],
+    powers: &'a mut [f32],
+    full_powers: &'a mut [f32],
+    shares: &'a mut [f32],
+    sheets: &'a mut [u32],
+}
+
+impl Precipitation {
+    pub(super) fn new(parameters: &AuroraParameters, key: Key) -> Self {
+        Self { parameters: parameters.clone(), rays: Rays::new(parameters, key) }
+    }
+
+    /// The coarse and the fine stretches of sheets of those lengths.
+    fn layouts(&self, lengths: &[f64]) -> [Layout; 2] {
+        let count = self.parameters.particles.count as f64;
+        [(PER_COARSE, COARSE), (PER_FINE, FINE)].map(|(per, bounds)| Layout::new(lengths, count / per, bounds))
+    }
+
+    /// Power of the electrons on all sheets without pulsation and black rays, by sheet and node, W: flux times length times thickness.
+    fn wanted<'a>(&self, course: &Course, layout: &'a Layout, time: f64) -> Nodes<'a> {
+        let width = 2.0 * self.parameters.half_thickness_km();
+        let flux = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * width;
+        let mut wanted = Nodes::new(layout);
+        // Parts as long as half of a stretch: sheets that bridge a gap have fewer pieces than nodes.
+        course
+            .pieces(|sheet| 0.5 / (layout.count(sheet) - 1) as f64)
+            .for_each(|(sheet, share, factor, length)| wanted.add(sheet as u32, share as f32, flux * factor * length));
+        wanted
+    }
+
+    /// The pattern along the sheets at a time.
+    pub(super) fn rays(&self, course: &Course, time: f64) -> RayTable {
+        self.rays.table(&course.sheet_lengths(), |sheet, last| course.alongs(sheet, last), time)
+    }
+
+    /// Gives every particle its share of the power.
+    ///
+    /// All together have the power of the sheets, and those along a stretch that of the stretch, however many they are: no
+    /// birth, death, split or merge can make the aurora flicker, and the flux along it is the one that was drawn. Within a stretch each
+    /// stands for the more of the sheet's length the fewer of them there are, and has the rays' pattern.
+    pub(super) fn share_out(&self, particles: &mut AuroraParticles, (course, rays): (&Course, &RayTable), time: f64) {
+        let lengths = course.sheet_lengths();
+        let [coarse, fine] = self.layouts(&lengths);
+        let weigh = |part| self.weigh(part, (course, &fine), (rays, time));
+        let weighed: Vec<Weighed> = chunks(particles).into_par_iter().with_max_len(1).map(weigh).collect();
+        let counts = weighed.iter().fold(Nodes::new(&fine), |sum, part| sum.plus(&part.counts));
+        let lengths = Nodes::of_lengths(&fine, &lengths).shared_by(&counts, MOST_UNEVEN);
+        let add_up = |(part, weighed): (ParticleChunk, &Weighed)| part.add_up(&weighed.weights, &lengths, &coarse);
+        let weights: Vec<_> = chunks(particles).into_par_iter().with_max_len(1).zip(&weighed).map(add_up).collect();
+        let weights = weights.iter().fold(Nodes::new(&coarse), |sum, part| sum.plus(part));
+        let factors = self.wanted(course, &coarse, time).shared_by(&weights, MOST_UNEVEN);
+        let given: Vec<[f64; 2]> =
+            chunks(particles).into_par_iter().with_max_len(1).map(|part| part.brighten(&factors)).collect();
+        balance(particles, &given);
+    }
+
+    /// Weighs a chunk of particles, as negative powers while they wait for their factors.
+    fn weigh<'a>(
+        &self,
+        part: ParticleChunk,
+        (course, layout): (&Course, &'a Layout),
+        (rays, time): (&RayTable, f64),
+    ) -> Weighed<'a> {
+        let mut weighed = Weighed { counts: Nodes::new(layout), weights: vec![0.0; part.fades.len()] };
+        let (level, energy) = (Level::new(), self.parameters.energy_ev.at(time));
+        let side_scale = 1.0 / self.parameters.half_thickness_km();
+        for first in (0..part.fades.len()).step_by(LANES) {
+            let count = LANES.min(part.fades.len() - first);
+            let mut feet: [Option<Projection>; LANES] = [None; LANES];
+            let mut places = Places { noises: [[0.0; 4]; LANES], side: [0.0; LANES] };
+            for lane in 0..count {
+                let Some(foot) = part.foot(course, first + lane) else { continue };
+                places.noises[lane] = rays.at(foot.sheet, foot.share);
+                places.side[lane] = (foot.side * side_scale) as f32;
+                feet[lane] = Some(foot);
+            }
+            let pattern = self.rays.at(level, &places, time);
+            for (lane, foot) in feet.into_iter().enumerate().take(count) {
+                let index = first + lane;
+                let Some(foot) = foot else {
+                    part.full_powers[index] *= STRAY;
+                    part.powers[index] = part.fades[index] * part.full_powers[index];
+                    continue;
+                };
+                let weight = foot.flux as f32 * pattern.brightness[lane];
+                weighed.counts.add(foot.sheet, foot.share as f32, f64::from(part.fades[index]));
+                weighed.weights[index] = weight;
+                part.powers[index] = -weight * pattern.dimming[lane];
+                let own = energy * foot.energy * f64::from(pattern.hardness[lane]);
+                part.energies[index] = own.clamp(LOWEST_EV, HIGHEST_EV) as f32;
+                part.shares[index] = foot.share as f32;
+                part.sheets[index] = foot.sheet;
+            }
+        }
+        weighed
+    }
+}
+
+/// A chunk of particles, weighed.
+struct Weighed<'a> {
+    /// How many there are along the sheets.
+    counts: Nodes<'a>,
+    /// The weight of each before black rays and pulsation; 0 for strays.
+    weights: Vec<f32>,
+}
+
+impl ParticleChunk<'_> {
+    fn foot(&self, course: &Course, index: usize) -> Option<Projection> {
+        course.foot([f64::from(self.positions[0][index]), f64::from(self.positions[1][index])].into())
+    }
+
+    /// Adds up the weights of particles that stand for so much of the sheets' length each, and gives it to their negative powers.
+    fn add_up<'a>(self, weights: &[f32], lengths: &Nodes, layout: &'a Layout) -> Nodes<'a> {
+        let mut sums = Nodes::new(layout);
+        for (index, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+            let (sheet, share) = (self.sheets[index], self.shares[index]);
+            let length = lengths.at(sheet, share);
+            self.powers[index] *= length as f32;
+            sums.add(sheet, share, f64::from(self.fades[index] * weight) * length);
+        }
+        sums
+    }
+
+    /// Gives particles that wait for them their factors. Their power follows what it shall be with a delay: where two parts of a sheet
+    /// lie close together, a particle that passes from the one to the other does not flash. Gives the power that they shall have together, and
+    /// the one that they have, W.
+    fn brighten(self, factors: &Nodes) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        for (index, power) in self.powers.iter_mut().enumerate().filter(|(_, power)| power.is_sign_negative()) {
+            let (sheet, share) = (self.sheets[index], self.shares[index]);
+            let wanted = -*power * factors.at(sheet, share) as f32;
+            let full = &mut self.full_powers[index];
+            // Those that are just appearing begin with nothing: as fast as they rise, those around them give up their share.
+            let follows = *full > 0.0 || self.fades[index] < 1.0;
+            *full = if follows { *full + FOLLOWING * (wanted - *full) } else { wanted };
+            *power = self.fades[index] * *full;
+            sums[0] += f64::from(self.fades[index] * wanted);
+            sums[1] += f64::from(*power);
+        }
+        sums
+    }
+}
+
+/// Makes up for the delay with which powers follow, from the powers that parts of the particles shall have and those that they have: else all
+/// would be too bright while many are being born, for those that were there give up their share late.
+fn balance(particles: &mut AuroraParticles, given: &[[f64; 2]]) {
+    let [wanted, found] = given.iter().fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+    if found > 0.0 {
+        let factor = (wanted / found).clamp(BALANCE[0], BALANCE[1]) as f32;
+        particles.powers_w.par_chunks_mut(TASK).for_each(|powers| powers.iter_mut().for_each(|power| *power *= factor));
+    }
+}
+
+fn chunks(particles: &mut AuroraParticles) -> Vec<ParticleChunk<'_>> {
+    let [xs, zs] = &particles.positions;
+    let reads = xs.chunks(TASK).zip(zs.chunks(TASK)).zip(particles.fades.chunks(TASK));
+    let powers = particles.powers_w.chunks_mut(TASK).zip(particles.full_powers_w.chunks_mut(TASK));
+    let light = particles.energies_ev.chunks_mut(TASK).zip(powers);
+    let places = particles.shares.chunks_mut(TASK).zip(particles.sheets.chunks_mut(TASK));
+    let chunk = |(((xs, zs), fades), ((energies, (powers, full_powers)), (shares, sheets)))| ParticleChunk {
+        positions: [xs, zs],
+        fades,
+        energies,
+        powers,
+        full_powers,
+        shares,
+        sheets,
+    };
+    reads.zip(light.zip(places)).map(chunk).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math::DVec2;
+
+    use super::*;
+    use crate::{
+        shapes::{Shape, Sheet},
+        simulate::sheets::{arc_length::Along, refined_shape::Folding},
+    };
+
+    #[test]
+    fn a_sheet_of_a_few_pieces_is_as_bright_everywhere() {
+        let (parameters, key) = (AuroraParameters::default(), Key::new(2, "precipitation"));
+        // As long as a bridge over a gap.
+        let points = vec![DVec2::ZERO, DVec2::new(17.0, 0.0)];
+        let sheet = Sheet { points, flux: vec![1.0; 2], energy: vec![1.0; 2] };
+        let shape = Shape { sheets: vec![sheet] };
+        let course = Course::new((&shape, &[]), &Along::alone(&shape), &Folding::new(&parameters, key), 0.0, 20.0);
+        let precipitation = Precipitation::new(&parameters, key);
+        let [layout, _] = precipitation.layouts(&course.sheet_lengths());
+        let stretches = layout.count(0) - 1;
+        let pieces = course.pieces(|_| 1.0).count();
+        assert!(pieces < stretches / 2, "{pieces} pieces");
+        let wanted = precipitation.wanted(&course, &layout, 0.0);
+        let length = course.sheet_lengths()[0];
+        let flux = parameters.flux_mw_per_m2.at(0.0) * W_PER_KM2 * 2.0 * parameters.half_thickness_km();
+        assert!((wanted.sum() / (flux * length) - 1.0).abs() < 1e-9);
+        let even = flux * length / stretches as f64;
+        for node in &wanted.of_sheet(0)[1..stretches] {
+            assert!((node / even - 1.0).abs() < 0.05, "{node} W for {even} W");
+        }
+    }
+}

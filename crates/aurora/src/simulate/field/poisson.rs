@@ -1,0 +1,238 @@
+//! Poisson's equation on a grid, solved exactly in one go: sine transform along x, elimination along z.
+
+use std::{f64::consts::PI, sync::Arc};
+
+use bansho_base::math;
+
+use super::{grid::Grid2, sine_transform::SineTransform};
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+
+/// Rows that a task of the thread pool transforms, an even number.
+const TASK_ROWS: usize = 16;
+/// Columns that a task of the thread pool eliminates.
+const TASK_COLUMNS: usize = 64;
+
+/// Solver of the five-point equation `laplacian(phi) - phi / l^2 = source` with phi = 0 in the ghost cells around the grid.
+///
+/// The sine transform along x parts the equation into one tridiagonal system along z for each wave number, which elimination solves. The
+/// answer is that of converged relaxation, the aurora thesis (2.6), to rounding. A transform is fast if columns + 1 has small
+/// prime factors only: 255 is a good number of columns; 256, where 257 is prime, takes twice as long. Rows may be any number.
+#[derive(Clone)]
+pub struct PoissonSolver {
+    size: [usize; 2],
+    area: f64,
+    transform: Arc<SineTransform>,
+    /// Factors of the elimination, one a cell, row by row.
+    factors: Vec<f64>,
+}
+
+impl std::fmt::Debug for PoissonSolver {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("PoissonSolver")
+            .field("size", &self.size)
+            .field("area", &self.area)
+            .finish_non_exhaustive()
+    }
+}
+
+impl PoissonSolver {
+    /// For grids of that many columns and rows of cells `spacing` wide; `screening` is `1 / l^2`, not below 0.
+    ///
+    /// The screening length l is how far a charge reaches; 0 is Poisson's equation itself.
+    #[must_use]
+    pub fn new(size: [usize; 2], spacing: f64, screening: f64) -> Self {
+        let [columns, rows] = size;
+        let area = spacing * spacing;
+        let diagonal = |k: usize| {
+            let sine = math::sin(PI * (k + 1) as f64 / (2 * (columns + 1)) as f64);
+            (4.0 * sine).mul_add(sine, area.mul_add(screening, 2.0))
+        };
+        let diagonals: Vec<f64> = (0..columns).map(diagonal).collect();
+        let mut factors = Vec::with_capacity(columns * rows);
+        let mut above = vec![0.0; columns];
+        for _ in 0..rows {
+            above.iter_mut().zip(&diagonals).for_each(|(factor, diagonal)| *factor = 1.0 / (diagonal - *factor));
+            factors.extend_from_slice(&above);
+        }
+        Self { size, area, transform: Arc::new(SineTransform::new(columns)), factors }
+    }
+
+    /// Turns a grid that holds the source, `rho / eps`, into one that holds the potential.
+    ///
+    /// # Panics
+    /// If the grid is not of the solver's size.
+    pub fn solve(&self, grid: &mut Grid2) {
+        assert_eq!(grid.size(), self.size, "a solver is made for one size");
+        if grid.values().is_empty() {
+            return;
+        }
+        // Twice transformed, a row is (columns + 1) / 2 times itself.
+        let scale = -self.area * 2.0 / (self.size[0] + 1) as f64;
+        self.transform_rows(grid);
+        self.eliminate(grid, scale);
+        self.transform_rows(grid);
+    }
+
+    fn transform_rows(&self, grid: &mut Grid2) {
+        let columns = self.size[0];
+        let tasks = grid.values_mut().par_chunks_mut(TASK_ROWS * columns);
+        tasks.for_each_init(
+            || self.transform.scratch(),
+            |scratch, rows| {
+                rows.chunks_mut(2 * columns).for_each(|pair| self.transform.apply(pair, scratch));
+            },
+        );
+    }
+
+    /// Solves `-phi_(j-1) + b phi_j - phi_(j+1) = scale * source_j` for every wave number.
+    fn eliminate(&self, grid: &mut Grid2, scale: f64) {
+        let scale = if cfg!(feature = "broken-kernel") { -scale } else { scale };
+        let columns = self.size[0];
+        let mut stretches: Vec<Vec<&mut [f64]>> = Vec::new();
+        stretches.resize_with(columns.div_ceil(TASK_COLUMNS), Vec::new);
+        for row in grid.values_mut().chunks_mut(columns) {
+            row.chunks_mut(TASK_COLUMNS).zip(&mut stretches).for_each(|(part, stretch)| stretch.push(part));
+        }
+        let level = Level::new();
+        stretches.into_par_iter().enumerate().for_each(|(number, mut stretch)| {
+            let factors: Vec<&[f64]> =
+                self.factors.chunks(columns).map(|row| &row[number * TASK_COLUMNS..][..stretch[0].len()]).collect();
+            dispatch!(level, _simd => eliminate_stretch(&mut stretch, &factors, scale));
+        });
+    }
+}
+
+/// Down with the source, up with the potential.
+#[inline(always)]
+fn eliminate_stretch(rows: &mut [&mut [f64]], factors: &[&[f64]], scale: f64) {
+    let mut above = [0.0; TASK_COLUMNS];
+    for (row, factors) in rows.iter_mut().zip(factors) {
+        for ((value, factor), above) in row.iter_mut().zip(*factors).zip(&mut above) {
+            *value = *factor * scale.mul_add(*value, *above);
+            *above = *value;
+        }
+    }
+    let mut below = [0.0; TASK_COLUMNS];
+    for (row, factors) in rows.iter_mut().zip(factors).rev() {
+        for ((value, factor), below) in row.iter_mut().zip(*factors).zip(&mut below) {
+            *value = factor.mul_add(*below, *value);
+            *below = *value;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math::random::{Key, Purpose};
+
+    use super::{super::residual, *};
+    use crate::simulate::field::relax;
+
+    /// Charges on an arc, as a drawn aurora has them, and a little of a random one everywhere.
+    fn charges(size: [usize; 2], spacing: f64) -> Grid2 {
+        let mut grid = Grid2::new(size, spacing, [0.0; 2]);
+        let key = Key::new(3, "charges");
+        for index in 0..size[0] * size[1] {
+            let (x, z) = ((index % size[0]) as f64 / size[0] as f64, (index / size[0]) as f64 / size[1] as f64);
+            let near = (z - 0.4 - 0.3 * x * (1.0 - x)).abs() < 0.03 && (0.2..0.8).contains(&x);
+            let noise = f64::from(key.uniforms(index as u64, 0, Purpose(0))[0]);
+            grid.values_mut()[index] = 0.01 * noise + if near { 5.0 } else { 0.0 };
+        }
+        grid
+    }
+
+    #[test]
+    fn the_equation_holds_to_rounding() {
+        for size in [[255, 255], [256, 256], [256, 100], [31, 64], [1, 1], [2, 7], [7, 1], [130, 33]] {
+            for screening in [0.0, 2.5] {
+                let source = charges(size, 0.3);
+                let mut potential = source.clone();
+                PoissonSolver::new(size, 0.3, screening).solve(&mut potential);
+                let left = residual(&potential, &source, screening);
+                assert!(left < 1e-10, "{size:?}, screening {screening}: {left}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_uniform_source_is_no_exception() {
+        let mut source = Grid2::new([256, 256], 1.0, [0.0; 2]);
+        source.values_mut().fill(1.0);
+        let mut potential = source.clone();
+        PoissonSolver::new([256, 256], 1.0, 0.0).solve(&mut potential);
+        assert!(residual(&potential, &source, 0.0) < 1e-10);
+        assert!(potential.values().iter().all(|value| *value < 0.0));
+    }
+
+    /// `sin(pi a (i + 1) / (n + 1)) sin(pi b (j + 1) / (m + 1))` is an eigenvector of the five-point equation.
+    #[test]
+    fn an_eigenvector_is_divided_by_its_eigenvalue() {
+        let (size, spacing, screening) = ([20, 33], 0.5, 0.7);
+        let wave =
+            |count: usize, number: f64, cell: usize| math::sin(PI * number * (cell + 1) as f64 / (count + 1) as f64);
+        let half = |count: usize, number: f64| math::sin(0.5 * PI * number / (count + 1) as f64);
+        let eigenvalue = -4.0 / 0.25 * (half(20, 3.0) * half(20, 3.0) + half(33, 5.0) * half(33, 5.0)) - screening;
+        let mut grid = Grid2::new(size, spacing, [0.0; 2]);
+        for index in 0..size[0] * size[1] {
+            grid.values_mut()[index] = wave(20, 3.0, index % 20) * wave(33, 5.0, index / 20);
+        }
+        let source = grid.clone();
+        PoissonSolver::new(size, spacing, screening).solve(&mut grid);
+        for (value, source) in grid.values().iter().zip(source.values()) {
+            assert!((value - source / eigenvalue).abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn converged_relaxation_agrees() {
+        for screening in [0.0, 0.5] {
+            let source = charges([48, 40], 0.3);
+            let (mut relaxed, mut solved) = (Grid2::new([48, 40], 0.3, [0.0; 2]), source.clone());
+            let sweeps = (0..20_000).take_while(|_| relax(&mut relaxed, &source, screening) > 1e-12).count();
+            assert!(sweeps < 20_000, "not converged");
+            PoissonSolver::new([48, 40], 0.3, screening).solve(&mut solved);
+            let greatest = solved.values().iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+            for (relaxed, solved) in relaxed.values().iter().zip(solved.values()) {
+                assert!((relaxed - solved).abs() < 1e-6 * greatest, "{relaxed} {solved}");
+            }
+        }
+    }
+
+    /// By hand: one cell has `-4 phi / h^2 = source`.
+    #[test]
+    fn one_cell_is_a_quarter() {
+        let mut grid = Grid2::new([1, 1], 0.5, [0.0; 2]);
+        grid.values_mut()[0] = 8.0;
+        PoissonSolver::new([1, 1], 0.5, 0.0).solve(&mut grid);
+        assert!((grid.values()[0] + 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn screening_shortens_the_reach() {
+        let mut source = Grid2::new([63, 63], 1.0, [0.0; 2]);
+        source.values_mut()[31 * 63 + 31] = 1.0;
+        let reach = |screening: f64| {
+            let mut potential = source.clone();
+            PoissonSolver::new([63, 63], 1.0, screening).solve(&mut potential);
+            potential.at(41, 31) / potential.at(32, 31)
+        };
+        // Ten cells out, nine of them at a screening length of 3: about exp(-9 / 3) and a little more for the plane.
+        let (far, near) = (reach(0.0), reach(1.0 / 9.0));
+        assert!(far > 0.3 && near < 0.05 && near > 0.005, "{far} {near}");
+    }
+
+    #[test]
+    fn threads_change_no_bit() {
+        let source = charges([256, 255], 1.0);
+        let solve = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut potential = source.clone();
+            pool.install(|| PoissonSolver::new([256, 255], 1.0, 0.01).solve(&mut potential));
+            potential
+        };
+        let one = solve(1);
+        assert!((2..=3).all(|threads| solve(threads) == one));
+    }
+}

@@ -1,0 +1,248 @@
+//! The field that pulls particles to the in-between shape (thesis, 2.2.3).
+//!
+//! Units: km and s, the particle's charge and mass are 1, so the field is an acceleration in km/s^2 and the potential is in km^2/s^2. What
+//! is natural here is the cell and the frame, as the constants say.
+
+use bansho_base::{
+    math::{
+        self, DVec2, MulAdd,
+        random::{Key, Purpose},
+    },
+    noise::{Coordinate, Fractal, Noise},
+    parameters::Auto,
+};
+
+use super::{
+    Grid2, PoissonSolver, relax,
+    scatter::Scattered,
+    sheet_charge::{LineCharge, SheetCoordinate, WantedCharge},
+};
+use crate::{AuroraParameters, FieldCharge, FieldSolver, shapes::FRAME_S, simulate::sheets::refined_shape::Course};
+use fearless_simd::Level;
+use rayon::prelude::*;
+
+/// Screening length l unless a scene says otherwise, cells: particles are drawn in from a few cells, strays beyond can die.
+const REACH_CELLS: f64 = 3.0;
+/// How often the charge along the sheets is made better.
+const ADJUSTMENTS: usize = 4;
+/// Scattered particles that a task of the thread pool finds the places of, at least.
+const TASK: usize = 4096;
+/// Field at the edge of a sheet at a pull of 1, cells per frame^2.
+const EDGE_FIELD: f64 = 0.25;
+
+/// Everything about fields that does not change from shape to shape.
+#[derive(Clone, Debug)]
+pub(crate) struct FieldMaker {
+    parameters: AuroraParameters,
+    solver: PoissonSolver,
+    /// 1 / l^2, 1/km^2.
+    pub(crate) screening: f64,
+    noise: Noise<3>,
+}
+
+/// The field of one in-between shape.
+#[derive(Clone, Debug)]
+pub(crate) struct Field {
+    /// N(i, j): how many particles were scattered into each cell.
+    pub(crate) counts: Grid2,
+    /// phi(i, j) without noise, which relocation looks at.
+    pub(crate) potential: Grid2,
+    /// Potential with noise, and the field from it by (2.7) to (2.9) and nothing, one a cell and one row and column of ghosts around.
+    table: Vec<[f32; 4]>,
+    /// Columns and rows, the lower corner in cells, and cells a km.
+    size: [f32; 2],
+    corner: [f32; 2],
+    per_km: f32,
+}
+
+/// Potential and field where a particle is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct FieldSample {
+    /// km^2/s^2.
+    pub(crate) potential: f32,
+    /// km/s^2, x and z.
+    pub(crate) field: [f32; 2],
+}
+
+impl FieldMaker {
+    pub(crate) fn new(parameters: &AuroraParameters, key: Key) -> Self {
+        let cells = parameters.field.cells as usize;
+        let reach = match parameters.field.reach_km {
+            Auto::Auto => REACH_CELLS * parameters.cell_km(),
+            Auto::Set(reach) => reach,
+        };
+        let screening = 1.0 / (reach * reach);
+        let [seed, ..] = key.words(0, 0, Purpose::named("aurora field noise"));
+        Self {
+            solver: PoissonSolver::new([cells; 2], parameters.cell_km(), screening),
+            screening,
+            noise: Noise::new(seed, Fractal { octaves: 3, ..Fractal::default() }, [0; 3])
+                .expect("three octaves without a period are noise"),
+            parameters: parameters.clone(),
+        }
+    }
+
+    /// An empty grid over the drawn square.
+    pub(super) fn grid(&self) -> Grid2 {
+        let cells = self.parameters.field.cells as usize;
+        Grid2::new([cells; 2], self.parameters.cell_km(), [-self.parameters.extent_km / 2.0; 2])
+    }
+
+    /// Screening length, km.
+    pub(super) fn reach_km(&self) -> f64 {
+        1.0 / self.screening.sqrt()
+    }
+
+    /// The field of particles scattered about a shape, with the noise of a time.
+    pub(crate) fn make(&self, course: &Course, scattered: &[Scattered], time: f64) -> Field {
+        let counts = self.sum(scattered.iter().map(|particle| (particle.place, 1.0)));
+        let source = self.source(course, scattered, &counts);
+        let potential = match self.parameters.field.solver {
+            FieldSolver::SineTransform => self.solved(source),
+            FieldSolver::GaussSeidel => self.relaxed(&source),
+        };
+        let table = self.table(&potential, time);
+        let per_km = 1.0 / counts.spacing();
+        Field {
+            size: counts.size().map(|cells| cells as f32),
+            corner: counts.origin().map(|corner| (corner * per_km) as f32),
+            per_km: per_km as f32,
+            counts,
+            potential,
+            table,
+        }
+    }
+
+    /// Sum of values at places over those in each cell.
+    pub(crate) fn sum(&self, values: impl Iterator<Item = (DVec2, f64)>) -> Grid2 {
+        let mut sums = self.grid();
+        for (place, value) in values {
+            if let Some(cell) = sums.index(place.to_array()) {
+                sums.values_mut()[cell] += value;
+            }
+        }
+        sums
+    }
+
+    /// Charge density over eps, eq. (2.2): such that all sheets pull alike, however many particles stand for them, and unless it shall be
+    /// even are at one potential all along.
+    pub(crate) fn source(&self, course: &Course, scattered: &[Scattered], counts: &Grid2) -> Grid2 {
+        let half_thickness = self.parameters.half_thickness_km();
+        let density = self.edge_field() / half_thickness;
+        let unit = density / full_count(counts).max(1.0);
+        // In the middle of a long, straight, lone sheet.
+        let reach = self.reach_km();
+        let potential = density * reach * reach * (math::exp(-half_thickness / reach) - 1.0);
+        let wanted = WantedCharge { potential, density, half_thickness };
+        let mut charge = LineCharge::even(course, self.parameters.cell_km(), self.parameters.particles.count as f64);
+        let places: Vec<(usize, SheetCoordinate)> = scattered
+            .par_iter()
+            .with_min_len(TASK)
+            .filter_map(|particle| Some((counts.index(particle.place.to_array())?, charge.place(particle))))
+            .collect();
+        let source = |charge: &LineCharge| {
+            let mut source = self.grid();
+            let cells = source.values_mut();
+            for (cell, place) in &places {
+                cells[*cell] += unit * charge.at(*place);
+            }
+            source
+        };
+        // Sheets that do not pull have no potential to be at.
+        let is_conductor = self.parameters.field.charge == FieldCharge::Conductor;
+        let adjustments = if density > 0.0 && is_conductor { ADJUSTMENTS } else { 0 };
+        for _ in 0..adjustments {
+            charge.adjust(course, &self.solved(source(&charge)), wanted);
+        }
+        source(&charge)
+    }
+
+    /// Field at the edge of a sheet, km/s^2.
+    fn edge_field(&self) -> f64 {
+        self.parameters.field.pull * EDGE_FIELD * self.parameters.cell_km() / (FRAME_S * FRAME_S)
+    }
+
+    /// `laplacian(phi) - phi / l^2 = rho`, phi = 0 around the grid; negative, lowest on the shape.
+    fn solved(&self, mut source: Grid2) -> Grid2 {
+        self.solver.solve(&mut source);
+        source
+    }
+
+    /// Eq. (2.6), stopped after so many sweeps or where no cell changes by more than the tolerance.
+    fn relaxed(&self, source: &Grid2) -> Grid2 {
+        let mut potential = self.grid();
+        let least = self.parameters.field.tolerance * self.edge_field() * self.reach_km();
+        let sweeps = self.parameters.field.sweeps;
+        (0..sweeps).take_while(|_| relax(&mut potential, source, self.screening) > least).count();
+        potential
+    }
+
+    /// Adds the noise of (x, z, t) and takes the gradient.
+    fn table(&self, potential: &Grid2, time: f64) -> Vec<[f32; 4]> {
+        let mut noisy = potential.clone();
+        self.add_noise(&mut noisy, time);
+        let gradient = noisy.gradient();
+        let [columns, rows] = noisy.size();
+        let value = |index: usize| {
+            let held = |place: usize, count: usize| place.clamp(1, count) - 1;
+            let (column, row) = (index % (columns + 2), index / (columns + 2));
+            let inner = held(row, rows) * columns + held(column, columns);
+            let [x, z] = gradient.values()[inner];
+            [noisy.values()[inner] as f32, -x as f32, -z as f32, 0.0]
+        };
+        (0..(columns + 2) * (rows + 2)).into_par_iter().with_min_len(TASK).map(value).collect()
+    }
+
+    fn add_noise(&self, potential: &mut Grid2, time: f64) {
+        let field = &self.parameters.field;
+        if field.noise == 0.0 {
+            return;
+        }
+        let depth = potential.values().iter().fold(0.0_f64, |low, value| low.min(*value)).abs();
+        let scale = potential.spacing() / field.noise_scale_km;
+        let columns = potential.size()[0];
+        let along: Vec<f32> = (0..columns).map(|column| (column as f64 * scale) as f32).collect();
+        let level = Level::new();
+        let rows = potential.values_mut().par_chunks_mut(columns).enumerate();
+        rows.for_each_with(vec![0.0_f32; columns], |values, (row, cells)| {
+            let origin = [0.0, row as f64 * scale, time / field.noise_life_s].map(Coordinate::from_f64);
+            self.noise.row(level, origin, &along, values);
+            cells.iter_mut().zip(values).for_each(|(cell, noise)| *cell += field.noise * depth * f64::from(*noise));
+        });
+    }
+}
+
+/// How many a cell holds that lies all within a sheet: the mean over particles of the count where they are.
+pub(crate) fn full_count(counts: &Grid2) -> f64 {
+    let sum: f64 = counts.values().iter().sum();
+    let squares: f64 = counts.values().iter().map(|count| count * count).sum();
+    if sum > 0.0 { squares / sum } else { 0.0 }
+}
+
+impl Field {
+    /// Bilinear between the middles of cells; as at the nearest middle beyond the outermost.
+    #[inline(always)]
+    pub(crate) fn sample(&self, x: f32, z: f32) -> FieldSample {
+        let places = [x, z];
+        let (mut cells, mut parts) = ([0; 2], [0.0; 2]);
+        for axis in 0..2 {
+            let place = places[axis].fma(self.per_km, 0.5 - self.corner[axis]);
+            let held = if place > 0.0 { place } else { 0.0 };
+            let most = self.size[axis] + 0.999;
+            let held = if held < most { held } else { most };
+            cells[axis] = held as usize;
+            parts[axis] = held - cells[axis] as f32;
+        }
+        let columns = self.size[0] as usize + 2;
+        let first = cells[1] * columns + cells[0];
+        let (lower, upper) = (&self.table[first..first + 2], &self.table[first + columns..first + columns + 2]);
+        let mut sample = [0.0; 4];
+        for k in 0..4 {
+            let lower = parts[0].fma(lower[1][k] - lower[0][k], lower[0][k]);
+            let upper = parts[0].fma(upper[1][k] - upper[0][k], upper[0][k]);
+            sample[k] = parts[1].fma(upper - lower, lower);
+        }
+        let [potential, east, south, _] = sample;
+        FieldSample { potential, field: [east, south] }
+    }
+}

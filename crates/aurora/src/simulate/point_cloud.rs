@@ -1,0 +1,68 @@
+//! The particles for other programs.
+
+use bansho_base::{
+    geometry::point_cloud::{PointCloud, Quantity},
+    math::{self, DVec2, DVec3},
+};
+
+use super::{AuroraParticles, AuroraSimulation};
+use crate::render::project::field_lines::{EARTH_RADIUS_KM, FOOT_KM};
+
+/// Half of the time over which a velocity is taken, s.
+const MOMENT_S: f64 = 1e-3;
+
+/// Where the particles pass 100 km altitude, `later` seconds after their step: x east, y up, z south, as the camera has
+/// it.
+pub(crate) fn point_cloud(particles: &AuroraParticles, later: f64) -> PointCloud {
+    let later = later.clamp(-AuroraSimulation::STEP_S, AuroraSimulation::STEP_S);
+    let [us, ws] = &particles.velocities;
+    let place = |index: usize, time: f64| {
+        let velocity = DVec2::new(f64::from(us[index]), f64::from(ws[index]));
+        on_shell(particles.place(index) + velocity * time)
+    };
+    let velocity = |index: usize| (place(index, MOMENT_S) - place(index, -MOMENT_S)) / (2.0 * MOMENT_S);
+    PointCloud {
+        positions: (0..particles.len()).map(|index| place(index, later).as_vec3().to_array()).collect(),
+        velocities: (0..particles.len()).map(|index| velocity(index).as_vec3().to_array()).collect(),
+        quantities: [(Quantity::Energy, &particles.energies_ev), (Quantity::Power, &particles.powers_w)]
+            .map(|(quantity, values)| (quantity, values.clone()))
+            .into(),
+    }
+}
+
+/// A place of the drawn plane, km, on the shell that it is spread over, m: as far from the middle along it.
+fn on_shell(place: DVec2) -> DVec3 {
+    const SHELL_M: f64 = 1e3 * (EARTH_RADIUS_KM + FOOT_KM);
+    let distance = place.length();
+    let (sin, cos) = math::sin_cos(1e3 * distance / SHELL_M);
+    let level = place.normalize_or_zero() * (sin * SHELL_M);
+    DVec3::new(level.x, cos * SHELL_M - 1e3 * EARTH_RADIUS_KM, level.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn particles_lie_on_the_shell_with_their_quantities() {
+        let particles = AuroraParticles {
+            positions: [vec![0.0, 647.1], vec![0.0, 0.0]],
+            velocities: [vec![3.0, 1.0], vec![0.0, 0.0]],
+            ids: vec![0, 1],
+            energies_ev: vec![5000.0, 700.0],
+            powers_w: vec![2.0, 8.0],
+            ..AuroraParticles::default()
+        };
+        let cloud = point_cloud(&particles, 0.01);
+        // 30 m on at 3 km/s; a tenth of a radian along the shell.
+        assert!((cloud.positions[0][0] - 30.0).abs() < 1e-2 && (cloud.positions[0][1] - 1e5).abs() < 1e-2);
+        let [x, y, z] = point_cloud(&particles, 0.0).positions[1].map(f64::from);
+        assert!((x - 6.471e6 * 0.099_833_42).abs() < 1.0 && (y - (6.471e6 * 0.995_004_17 - 6.371e6)).abs() < 1.0);
+        assert_eq!(z, 0.0);
+        // East there is downward by the same angle.
+        let [u, v, w] = cloud.velocities[1].map(f64::from);
+        assert!((u - 995.004).abs() < 0.1 && (v + 99.83).abs() < 0.1 && w == 0.0);
+        assert_eq!(cloud.quantities[&Quantity::Energy], [5000.0, 700.0]);
+        assert_eq!(cloud.quantities[&Quantity::Power], [2.0, 8.0]);
+    }
+}

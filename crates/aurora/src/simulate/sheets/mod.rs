@@ -1,0 +1,6 @@
+//! Sheets as the simulation sees them: refined, folded, with rays along their length.
+
+pub(crate) mod arc_length;
+pub(crate) mod nodes;
+pub(crate) mod rays;
+pub(crate) mod refined_shape;

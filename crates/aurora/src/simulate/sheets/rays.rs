@@ -1,0 +1,352 @@
+//! How bright and how hard the precipitation is along the sheets: rays, black rays, pulsation.
+
+use bansho_base::{
+    math::{
+        approximations,
+        random::{Key, Purpose},
+    },
+    noise::{Coordinate, Fractal, LANES, Noise, VARIANCE},
+};
+
+use super::nodes::split;
+use crate::{AuroraParameters, PulsationParameters, RayParameters};
+use fearless_simd::{Level, dispatch};
+
+/// Octaves of the rays: groups of rays, rays, and streaks in them.
+const RAYS: Fractal = Fractal { octaves: 3, lacunarity: 2, gain: 0.7 };
+/// Nodes of the table for the length of the finest cell of noise: with straight lines between them within a hundredth of it.
+const NODES_PER_CELL: f64 = 12.0;
+/// Most nodes of all sheets together for each particle: finer rays are finer than what particles show.
+const NODES_PER_PARTICLE: f64 = 0.5;
+/// Where the coordinate runs so many times as fast as the sheet is long, rays begin to fade, and so many times they are gone: they would be so
+/// much narrower, or stand beside others where it jumps.
+const FAST: f64 = 1.5;
+const GONE: f64 = 3.0;
+/// Width of a black ray beside the distance between two.
+const BLACK_WIDTH: f32 = 0.12;
+
+/// The pattern along the sheets at a moment.
+#[derive(Clone, Debug)]
+pub(crate) struct Rays {
+    rays: RayParameters,
+    pulsation: PulsationParameters,
+    noise: [Noise<2>; 2],
+    black: Noise<2>,
+    patches: Noise<2>,
+    /// What noise is divided by so that its variance is 1.
+    deviation: f32,
+    most_nodes: f64,
+}
+
+/// The noises of rays on both sides, of black rays and of patches.
+type Noises = [f32; 4];
+
+/// The noises along the sheets at a moment, in a table: they cost what the sheets' detail costs, not the particles.
+pub(crate) struct RayTable {
+    /// By sheet, evenly spaced over its length.
+    sheets: Vec<Vec<Noises>>,
+}
+
+/// Sixteen places on the sheets.
+pub(crate) struct Places {
+    /// The noises there.
+    pub(crate) noises: [Noises; LANES],
+    /// Which side of the sheet, from -1 to 1 within its thickness.
+    pub(crate) side: [f32; LANES],
+}
+
+/// What the pattern does at sixteen places.
+pub(crate) struct Pattern {
+    /// Factor of the power, before it is shared out.
+    pub(crate) brightness: [f32; LANES],
+    /// Factor of the power after it has been shared out: what makes the whole aurora darker.
+    pub(crate) dimming: [f32; LANES],
+    /// Factor of the energy.
+    pub(crate) hardness: [f32; LANES],
+}
+
+impl Rays {
+    pub(crate) fn new(parameters: &AuroraParameters, key: Key) -> Self {
+        let [a, b, c, d] = key.words(0, 0, Purpose::named("aurora rays"));
+        let noise = |seed, fractal| Noise::new(seed, fractal, [0; 2]).expect("few octaves without a period are noise");
+        let amplitude = |amplitude: &f64| Some(amplitude * f64::from(RAYS.gain));
+        let amplitudes = || std::iter::successors(Some(1.0), amplitude).take(RAYS.octaves as usize);
+        let (sum, squares): (f64, f64) = (amplitudes().sum(), amplitudes().map(|a| a * a).sum());
+        Self {
+            rays: parameters.rays.clone(),
+            pulsation: parameters.pulsation.clone(),
+            noise: [noise(a, RAYS), noise(b, RAYS)],
+            black: noise(c, Fractal::SINGLE),
+            patches: noise(d, Fractal::SINGLE),
+            deviation: ((VARIANCE[0] * squares).sqrt() / sum) as f32,
+            most_nodes: NODES_PER_PARTICLE * parameters.particles.count as f64,
+        }
+    }
+
+    /// The noises at a time along sheets of those lengths in km; `alongs` gives the coordinate after every so many equal parts of a sheet.
+    pub(crate) fn table(&self, lengths: &[f64], alongs: impl Fn(usize, usize) -> Vec<f64>, time: f64) -> RayTable {
+        let level = Level::new();
+        let node = self.node_km().max(lengths.iter().sum::<f64>() / self.most_nodes);
+        let sheet = |(sheet, length): (usize, &f64)| {
+            let last = (length / node).max(1.0).ceil();
+            let places = alongs(sheet, last as usize);
+            let mut nodes = Vec::with_capacity(places.len().next_multiple_of(LANES));
+            for places in places.chunks(LANES) {
+                let batch = std::array::from_fn(|lane| places[lane.min(places.len() - 1)]);
+                let noises = self.noises(level, &batch, time);
+                nodes.extend((0..places.len()).map(|lane| noises.map(|values| values[lane])));
+            }
+            fade(&mut nodes, &places, length / last, self.rays.scale_km);
+            nodes
+        };
+        RayTable { sheets: lengths.iter().enumerate().map(sheet).collect() }
+    }
+
+    /// Distance of nodes that shows the finest of what is asked for.
+    fn node_km(&self) -> f64 {
+        let finest = |strength: f64, scale: f64| if strength > 0.0 { scale } else { f64::INFINITY };
+        let rays = finest(self.rays.contrast.max(self.rays.energy), self.rays.scale_km);
+        let others = finest(self.rays.black_rays, self.rays.black_scale_km)
+            .min(finest(self.pulsation.depth, self.pulsation.patch_km));
+        rays.min(others) / NODES_PER_CELL
+    }
+
+    /// The pattern at sixteen places at a time.
+    pub(crate) fn at(&self, level: Level, places: &Places, time: f64) -> Pattern {
+        dispatch!(level, _simd => self.combined(places, time))
+    }
+
+    #[inline(always)]
+    fn combined(&self, places: &Places, time: f64) -> Pattern {
+        let mut pattern = Pattern { brightness: [1.0; LANES], dimming: [1.0; LANES], hardness: [1.0; LANES] };
+        for i in 0..LANES {
+            let [left, right, black, patch] = places.noises[i];
+            let share = (0.5 + 0.5 * places.side[i]).clamp(0.0, 1.0);
+            // Two patterns mix to less than the variance of one.
+            let variance = share * share + (1.0 - share) * (1.0 - share);
+            let mixed = (left + share * (right - left)) / (self.deviation * variance.sqrt());
+            pattern.brightness[i] = approximations::exp(self.rays.contrast as f32 * mixed);
+            pattern.hardness[i] = approximations::exp(self.rays.energy as f32 * mixed);
+            pattern.dimming[i] = self.darkness(black) * self.pulse(patch, time);
+        }
+        pattern
+    }
+
+    /// The noise of the rays on both sides, of black rays and of patches; what is not asked for is 0.
+    fn noises(&self, level: Level, places: &[f64; LANES], time: f64) -> [[f32; LANES]; 4] {
+        let rays = &self.rays;
+        let (way, age) = (rays.shear_km_per_s * time, time / rays.life_s);
+        // Groups of rays are four rays long. Black rays run against the rays of the one side.
+        let [group, black, patch] = [4.0 * rays.scale_km, rays.black_scale_km, self.pulsation.patch_km];
+        let wanted = [
+            (rays.contrast.max(rays.energy), &self.noise[0], way, group, age),
+            (rays.contrast.max(rays.energy), &self.noise[1], -way, group, age),
+            (rays.black_rays, &self.black, -way, black, age),
+            (self.pulsation.depth, &self.patches, 0.0, patch, 0.0),
+        ];
+        wanted.map(|(strength, noise, way, scale, age)| {
+            if strength > 0.0 {
+                values(level, noise, places.map(|along| (along - way) / scale), age)
+            } else {
+                [0.0; LANES]
+            }
+        })
+    }
+
+    /// Black rays are where a noise passes 0.
+    #[inline(always)]
+    fn darkness(&self, noise: f32) -> f32 {
+        let depth = (1.0 - (noise / BLACK_WIDTH).abs()).max(0.0);
+        1.0 - self.rays.black_rays as f32 * depth.sqrt()
+    }
+
+    /// Patches go bright and dark, each in its own time.
+    #[inline(always)]
+    fn pulse(&self, noise: f32, time: f64) -> f32 {
+        let turns = time / self.pulsation.period_s;
+        let turns = (turns - turns.floor()) as f32;
+        let dark = 0.5 - 0.5 * approximations::cos_turns(turns + 2.0 * noise);
+        1.0 - self.pulsation.depth as f32 * dark
+    }
+}
+
+/// Fades the rays of nodes of a sheet, `spacing` km apart, about those between which the coordinate runs fast or jumps: over `scale` km to
+/// both sides.
+fn fade(nodes: &mut [Noises], places: &[f64], spacing: f64, scale: f64) {
+    let mut strengths = vec![1.0_f64; nodes.len()];
+    for (node, pair) in places.windows(2).enumerate() {
+        let speed = (pair[1] - pair[0]).abs() / spacing.max(f64::MIN_POSITIVE);
+        let strength = ((GONE - speed) / (GONE - FAST)).clamp(0.0, 1.0);
+        for end in [node, node + 1] {
+            strengths[end] = strengths[end].min(strength);
+        }
+    }
+    let rise = spacing / scale;
+    for node in 1..strengths.len() {
+        strengths[node] = strengths[node].min(strengths[node - 1] + rise);
+    }
+    for node in (1..strengths.len()).rev() {
+        strengths[node - 1] = strengths[node - 1].min(strengths[node] + rise);
+    }
+    for ([left, right, ..], strength) in nodes.iter_mut().zip(strengths) {
+        *left *= strength as f32;
+        *right *= strength as f32;
+    }
+}
+
+impl RayTable {
+    /// The noises at a share of a sheet's length.
+    #[inline]
+    pub(crate) fn at(&self, sheet: u32, share: f64) -> Noises {
+        let nodes = &self.sheets[sheet as usize];
+        let (node, part) = split(share, nodes.len());
+        let (low, high, part) = (&nodes[node], &nodes[node + 1], part as f32);
+        let mut noises = [0.0; 4];
+        for k in 0..4 {
+            noises[k] = low[k] + part * (high[k] - low[k]);
+        }
+        noises
+    }
+}
+
+/// Noise at sixteen places, in cells, and an age, in lives.
+fn values(level: Level, noise: &Noise<2>, places: [f64; LANES], age: f64) -> [f32; LANES] {
+    let (mut cells, mut fractions) = ([[0; LANES]; 2], [[0.0; LANES]; 2]);
+    let age = Coordinate::from_f64(age);
+    for i in 0..LANES {
+        let place = Coordinate::from_f64(places[i]);
+        (cells[0][i], fractions[0][i]) = (place.cell, place.fraction);
+        (cells[1][i], fractions[1][i]) = (age.cell, age.fraction);
+    }
+    dispatch!(level, _simd => noise.lanes(&cells, &fractions))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::AuroraParameters;
+
+    const KEY: Key = Key::new(4, "rays");
+
+    /// Coordinates after every `last`th part of a sheet of that length.
+    fn evenly(length: f64, last: usize) -> Vec<f64> {
+        (0..=last).map(|node| length * node as f64 / last as f64).collect()
+    }
+
+    /// Brightness, dimming and hardness every 50 m along the left side of a sheet.
+    fn along(parameters: &AuroraParameters, time: f64) -> [Vec<f64>; 3] {
+        let rays = Rays::new(parameters, KEY);
+        let mut all: [Vec<f64>; 3] = Default::default();
+        // A sheet of 800 km whose coordinate is its length.
+        let table = rays.table(&[800.0], |_, last| evenly(800.0, last), time);
+        for first in 0..1000 {
+            let place = |lane: usize| table.at(0, (first * LANES + lane) as f64 / 16_000.0);
+            let places = Places { noises: std::array::from_fn(place), side: [-1.0; LANES] };
+            let Pattern { brightness, dimming, hardness } = rays.at(Level::new(), &places, time);
+            for (all, values) in all.iter_mut().zip([brightness, dimming, hardness]) {
+                all.extend(values.map(f64::from));
+            }
+        }
+        all
+    }
+
+    fn deviation(values: &[f64]) -> f64 {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        (values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / values.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn contrast_is_the_deviation_of_the_logarithm_and_hardness_goes_with_it() {
+        let mut parameters = AuroraParameters::default();
+        parameters.rays.contrast = 0.5;
+        parameters.rays.energy = 0.1;
+        let [brightness, dimming, hardness] = along(&parameters, 3.0);
+        let logarithm = |values: &[f64]| values.iter().map(|value| bansho_base::math::ln(*value)).collect::<Vec<_>>();
+        assert!((deviation(&logarithm(&brightness)) / 0.5 - 1.0).abs() < 0.15);
+        assert!((deviation(&logarithm(&hardness)) / 0.1 - 1.0).abs() < 0.15);
+        assert!(dimming.iter().all(|dimming| *dimming == 1.0));
+        parameters.rays.contrast = 0.0;
+        assert!(along(&parameters, 3.0)[0].iter().all(|brightness| *brightness == 1.0));
+    }
+
+    #[test]
+    fn the_table_holds_the_finest_noise() {
+        let rays = Rays::new(&AuroraParameters::default(), KEY);
+        let table = rays.table(&[300.0], |_, last| evenly(300.0, last), 2.0);
+        for first in 0..500 {
+            let along = std::array::from_fn(|lane| 0.0371 * (first * LANES + lane) as f64);
+            let [left, ..] = rays.noises(Level::new(), &along, 2.0);
+            for lane in 0..LANES {
+                assert!((table.at(0, along[lane] / 300.0)[0] - left[lane]).abs() < 0.01 * rays.deviation * 4.0);
+            }
+        }
+    }
+
+    #[test]
+    fn there_are_no_more_nodes_than_particles_show() {
+        let nodes = |particles: i64| {
+            let mut parameters = AuroraParameters::default();
+            (parameters.particles.count, parameters.rays.scale_km) = (particles, 0.05);
+            let table = Rays::new(&parameters, KEY).table(&[2000.0, 500.0], |_, last| evenly(1.0, last), 1.0);
+            table.sheets.iter().map(Vec::len).collect::<Vec<_>>()
+        };
+        assert_eq!(nodes(500), [201, 51]);
+        // A twelfth of 50 m apart.
+        assert_eq!(nodes(5_000_000), [480_001, 120_001]);
+    }
+
+    #[test]
+    fn rays_fade_where_the_coordinate_jumps() {
+        let parameters = AuroraParameters::default();
+        let rays = Rays::new(&parameters, KEY);
+        // 50 km beyond the middle of the sheet all else.
+        let jump = |_, last| {
+            evenly(300.0, last).into_iter().map(|along| along + if along > 150.0 { 50.0 } else { 0.0 }).collect()
+        };
+        let (even, torn) = (rays.table(&[300.0], |_, last| evenly(300.0, last), 2.0), rays.table(&[300.0], jump, 2.0));
+        let step = |table: &RayTable, share: f64| (table.at(0, share + 2e-4)[0] - table.at(0, share - 2e-4)[0]).abs();
+        assert!(step(&torn, 0.5) < 0.1 * f64::from(rays.deviation) as f32, "{}", step(&torn, 0.5));
+        // A ray away it is as it was.
+        let away = 0.5 - 1.1 * parameters.rays.scale_km / 300.0;
+        assert_eq!(torn.at(0, away), even.at(0, away));
+        let ten = (1..60).map(|place| torn.at(0, f64::from(place) / 60.0)[0].abs()).fold(0.0, f32::max);
+        assert!(ten > rays.deviation, "elsewhere there are rays");
+    }
+
+    #[test]
+    fn rays_run_along_the_sheet() {
+        let mut parameters = AuroraParameters::default();
+        parameters.rays.shear_km_per_s = 3.0;
+        parameters.rays.life_s = 1e5;
+        let [before, ..] = along(&parameters, 1.0);
+        let [after, ..] = along(&parameters, 1.5);
+        // 1.5 km are 30 places; on the left they run onward.
+        let moved = |shift: isize| -> f64 {
+            (100..15_000).map(|i| (after[(i as isize + shift) as usize] - before[i]).abs()).sum()
+        };
+        assert!(moved(30) < 0.01 * moved(0) && moved(30) < 0.01 * moved(-30));
+    }
+
+    #[test]
+    fn black_rays_are_narrow_and_dark() {
+        let mut parameters = AuroraParameters::default();
+        parameters.rays.black_rays = 1.0;
+        let [_, dimming, _] = along(&parameters, 3.0);
+        let dark = dimming.iter().filter(|dimming| **dimming < 0.3).count() as f64 / dimming.len() as f64;
+        let whole = dimming.iter().filter(|dimming| **dimming == 1.0).count() as f64 / dimming.len() as f64;
+        assert!((0.02..0.3).contains(&dark) && whole > 0.5, "{dark} {whole}");
+    }
+
+    #[test]
+    fn patches_pulsate_with_their_period() {
+        let mut parameters = AuroraParameters::default();
+        parameters.pulsation.depth = 0.8;
+        parameters.pulsation.period_s = 5.0;
+        let at = |time: f64| along(&parameters, time)[1].clone();
+        let same = at(1.0).iter().zip(at(6.0)).all(|(a, b)| (a - b).abs() < 1e-5);
+        let range =
+            (0..20).map(|i| at(0.25 * f64::from(i))[7]).fold((1.0_f64, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)));
+        assert!(same && range.0 < 0.22 && range.1 > 0.98, "{range:?}");
+        assert!(deviation(&at(1.0)) > 0.1, "patches have phases of their own");
+    }
+}

@@ -1,0 +1,146 @@
+//! The thesis's blur (2.28): in the picture, by Gaussians whose radii in pixels depend on the line alone.
+//!
+//! A sum of equal Gaussians is one blur of the sum of points. So the whole picture is looked up on the charts, with a
+//! margin, and every emitter's light is blurred along rows and then along columns.
+
+use bansho_base::{
+    camera::Camera,
+    math,
+    math::simd::{FourLanes, Real},
+    phenomenon::strip::View,
+};
+
+use crate::{
+    drawing_parameters::BlurParameters,
+    physics::emission::{EMITTERS, Emitter, PerEmitter},
+    render::{
+        prepared::{BATCH, Batch},
+        project::field_lines::FieldLines,
+        shade::chart_sampler::Sampler,
+    },
+};
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use rayon::prelude::*;
+
+/// Reach of a Gaussian beside its standard deviation.
+const REACH: f64 = 3.0;
+/// Standard deviation that light on the charts has already, pixels: that of the smallest patch.
+const HAD: f64 = 0.6;
+
+/// A picture of light by emitter, kR.
+pub(crate) struct Blurred {
+    light: Vec<PerEmitter<f32>>,
+    /// Pixels in a row, those of the margin among them, and the margin.
+    width: usize,
+    margin: usize,
+}
+
+/// Weights by emitter from the middle outward.
+struct Kernel(Vec<PerEmitter<f32>>);
+
+impl Kernel {
+    fn new(radii: &BlurParameters) -> Self {
+        let sigmas = EMITTERS.map(|emitter| radii.pixels(emitter));
+        let most = sigmas.into_iter().fold(0.0, f64::max);
+        let count = (REACH * most).ceil() as usize + 1;
+        let by_emitter = sigmas.map(|sigma| {
+            let left = math::sqrt((sigma * sigma - HAD * HAD).max(1e-4));
+            let gaussian = |away: usize| math::exp(-0.5 * math::pow(away as f64 / left, 2.0));
+            let whole = 2.0 * (0..count).map(gaussian).sum::<f64>() - 1.0;
+            (0..count).map(|away| (gaussian(away) / whole) as f32).collect::<Vec<_>>()
+        });
+        Self((0..count).map(|away| std::array::from_fn(|emitter| by_emitter[emitter][away])).collect())
+    }
+
+    fn reach(&self) -> usize {
+        self.0.len() - 1
+    }
+
+    /// The weighted sum about the middle of places that lie `stride` apart.
+    #[inline(always)]
+    fn sum<S: Simd>(&self, simd: S, light: &[PerEmitter<f32>], middle: usize, stride: usize) -> PerEmitter<f32> {
+        let mut sum = FourLanes::simd_from(simd, self.0[0]) * FourLanes::simd_from(simd, light[middle]);
+        for (away, weights) in self.0.iter().enumerate().skip(1) {
+            let before = FourLanes::simd_from(simd, light[middle - away * stride]);
+            let after = FourLanes::simd_from(simd, light[middle + away * stride]);
+            sum = (before + after).fma(FourLanes::simd_from(simd, *weights), sum);
+        }
+        sum.into()
+    }
+}
+
+impl Blurred {
+    /// The whole picture of a view.
+    pub(crate) fn new(view: &View, field: &FieldLines, samplers: &[Sampler; 2], radii: &BlurParameters) -> Self {
+        let level = Level::new();
+        let kernel = Kernel::new(radii);
+        let margin = kernel.reach();
+        let [width, height] = view.size.map(|side| side + 2 * margin);
+        let camera = view.camera.with_overscan(margin);
+        let mut rows = vec![[0.0; 4]; width * height];
+        rows.par_chunks_mut(width).enumerate().for_each_init(Vec::new, |sharp: &mut Vec<PerEmitter<f32>>, (y, row)| {
+            dispatch!(level, simd => {
+                look_up(simd, &camera, field, samplers, y, width, sharp);
+                for (x, light) in row.iter_mut().enumerate().take(width - margin).skip(margin) {
+                    *light = kernel.sum(simd, sharp, x, 1);
+                }
+            });
+        });
+        let mut light = vec![[0.0; 4]; width * view.size[1]];
+        light.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+            dispatch!(level, simd => {
+                for (x, light) in row.iter_mut().enumerate().take(width - margin).skip(margin) {
+                    *light = kernel.sum(simd, &rows, (y + margin) * width + x, width);
+                }
+            });
+        });
+        Self { light, width, margin }
+    }
+
+    /// The light of pixels from `x` on in row `y`; that of the last where the picture ends.
+    #[inline(always)]
+    pub(crate) fn batch(&self, x: usize, y: usize) -> [PerEmitter<f32>; BATCH] {
+        let row = &self.light[y * self.width..(y + 1) * self.width];
+        let mut light = [[0.0; 4]; BATCH];
+        for (i, light) in light.iter_mut().enumerate() {
+            *light = row[(x + i + self.margin).min(self.width - 1)];
+        }
+        light
+    }
+}
+
+/// Light by emitter of a row as the charts have it.
+#[inline(always)]
+fn look_up<S: Simd>(
+    simd: S,
+    camera: &Camera,
+    field: &FieldLines,
+    samplers: &[Sampler; 2],
+    y: usize,
+    width: usize,
+    light: &mut Vec<PerEmitter<f32>>,
+) {
+    light.clear();
+    let mut x = 0;
+    while x < width {
+        let batch = Batch::new(camera, field, x, y);
+        let mut found = [[0.0; 4]; BATCH];
+        for sampler in samplers {
+            sampler.add(simd, &batch.longitude, &batch.colatitude, &mut found);
+        }
+        light.extend_from_slice(&found[..BATCH.min(width - x)]);
+        x += BATCH;
+    }
+}
+
+impl BlurParameters {
+    /// Standard deviation of an emitter's light, pixels.
+    fn pixels(&self, emitter: Emitter) -> f64 {
+        match emitter {
+            Emitter::OxygenGreen => self.green_px,
+            Emitter::OxygenRed => self.red_px,
+            Emitter::NitrogenIon => self.violet_px,
+            Emitter::Nitrogen => self.deep_red_px,
+        }
+    }
+}

@@ -1,0 +1,404 @@
+//! Cameras: where they stand, what their lens does, and how world and picture meet.
+
+pub mod directions;
+pub mod upright_quad;
+
+use glam::{DMat3, DVec2, DVec3};
+
+use crate::{
+    image::CameraHeader,
+    math,
+    parameters::{Range, animated::Animated},
+};
+
+crate::choice! {
+    /// How directions become places in the picture.
+    pub enum Lens {
+        /// Straight lines stay straight.
+        Perspective = "perspective",
+        /// Equidistant fisheye: distance from the centre of an inscribed circle grows with the angle (domes).
+        Fisheye = "fisheye",
+        /// Equirectangular panorama: 360 degrees across, 180 degrees down.
+        Panorama = "panorama",
+    }
+}
+
+/// Height of an observer's eye, m.
+const EYE_HEIGHT: f64 = 1.7;
+
+crate::parameters! {
+    /// Where the picture is taken from. A dome looks at `target` with the center of its circle. Without `position` and `target`, a scene whose
+    /// phenomena are all of one kind and as they are by default in place and size, without obstacles and plate, is seen from where such a phenomenon is
+    /// seen well: a flame from near, rain along its lamps. Auroras are seen from the ground, looking up to the north; a dome's middle is then the zenith.
+    pub struct CameraParameters {
+        /// Where the camera stands.
+        position: Animated<[f64; 3]> = Animated::from([0.0, 1.2, 4.0]), unit("m");
+        /// What it looks at.
+        target: Animated<[f64; 3]> = Animated::from([0.0, 0.9, 0.0]), unit("m");
+        /// Turn about the line of sight; positive tilts the camera to its left.
+        roll_deg: Animated<f64> = Animated::from(0.0), limits(Range::new(-3600.0, 3600.0)), unit("degrees");
+        /// What the lens does: straight lines, a dome, or all around.
+        lens: Lens = Lens::Perspective;
+        /// Vertical field of view of a perspective lens, unless `focal_length_mm` is given.
+        vertical_fov_deg: Animated<f64> = Animated::from(32.0), limits(VERTICAL_FOV_DEG), unit("degrees");
+        /// Focal length; with `sensor_height_mm` it gives the field of view.
+        focal_length_mm: Option<Animated<f64>> = None, limits(Range::new(0.1, 10_000.0)), unit("mm");
+        /// Height of the sensor that `focal_length_mm` refers to.
+        sensor_height_mm: f64 = 24.0, limits(Range::new(0.1, 1000.0)), unit("mm");
+        /// Whole angle of a fisheye's circle.
+        fisheye_fov_deg: f64 = 180.0, limits(Range::new(1.0, 360.0)), unit("degrees");
+        /// Nothing nearer is drawn.
+        near: f64 = 0.05, limits(Range::new(1e-4, 1e4)), unit("m");
+        /// Shift of the principal point to the right and up, in picture heights.
+        shift: [f64; 2] = [0.0, 0.0], limits(Range::new(-10.0, 10.0)), unit("picture heights");
+        /// Time the shutter is open; half a frame when left out.
+        shutter_s: Option<f64> = None, limits(Range::new(0.0, 10.0)), unit("s");
+        /// When the shutter opens, from the frame's time.
+        shutter_offset_s: f64 = 0.0, limits(Range::new(-10.0, 10.0)), unit("s");
+    }
+}
+
+/// Least and greatest vertical field of view of a perspective lens, whether it is stated or follows from focal length and sensor, degrees.
+pub const VERTICAL_FOV_DEG: Range = Range::new(0.1, 170.0);
+
+/// Vertical field of view of a lens of 14 mm, with which auroras are photographed, degrees.
+pub const SKY_FOV_DEG: f64 = 81.0;
+
+impl CameraParameters {
+    /// Stands at the origin and looks up at the sky: to the north with a lens that has an up, to the zenith with a dome.
+    pub fn look_up(&mut self) {
+        let target = match self.lens {
+            // From the horizon nearly to the zenith.
+            Lens::Perspective => [0.0, 60.0, -60.0],
+            Lens::Fisheye => [0.0, 100.0, 0.0],
+            Lens::Panorama => [0.0, EYE_HEIGHT, -60.0],
+        };
+        (self.position, self.target) = (Animated::from([0.0, EYE_HEIGHT, 0.0]), Animated::from(target));
+    }
+
+    /// Least and greatest vertical field of view of the lens over all time, degrees, where it follows from the focal length.
+    #[must_use]
+    pub fn fov_of_focal_length(&self) -> Option<[f64; 2]> {
+        // Keyed lengths stay between their keys.
+        let [shortest, longest] = self.focal_length_mm.as_ref()?.bounds();
+        Some([longest, shortest].map(|focal| (2.0 * half_fov(self.sensor_height_mm, focal)).to_degrees()))
+    }
+
+    /// The camera at time `t` for a picture of `size` pixels.
+    pub fn at(&self, t: f64, size: [usize; 2]) -> Camera {
+        let half_fov = match &self.focal_length_mm {
+            Some(focal) => half_fov(self.sensor_height_mm, focal.at(t)),
+            None => 0.5 * self.vertical_fov_deg.at(t).to_radians(),
+        };
+        let orientation =
+            look_at(DVec3::from(self.position.at(t)), DVec3::from(self.target.at(t)), self.roll_deg.at(t).to_radians());
+        let height = size[1] as f64;
+        Camera {
+            lens: self.lens,
+            position: DVec3::from(self.position.at(t)),
+            orientation,
+            near: self.near,
+            centre: DVec2::new(0.5 * size[0] as f64 - self.shift[0] * height, 0.5 * height + self.shift[1] * height),
+            size: [size[0] as f64, height],
+            focal_pixels: match self.lens {
+                Lens::Perspective => 0.5 * height / math::tan(half_fov),
+                Lens::Fisheye => 0.5 * height.min(size[0] as f64) / (0.5 * self.fisheye_fov_deg.to_radians()),
+                Lens::Panorama => height / std::f64::consts::PI,
+            },
+            half_angle: 0.5 * self.fisheye_fov_deg.to_radians(),
+            half_fov,
+        }
+    }
+}
+
+/// Half the field of view across a sensor of some size, radians.
+fn half_fov(sensor_mm: f64, focal_mm: f64) -> f64 {
+    math::atan(0.5 * sensor_mm / focal_mm)
+}
+
+/// Columns: right, up, backward. Looking straight up keeps north (-z) at the top, so that east lies left, as on star
+/// charts; looking straight down, south is at the top.
+fn look_at(position: DVec3, target: DVec3, roll: f64) -> DMat3 {
+    let back = (position - target).try_normalize().unwrap_or(DVec3::Z);
+    let reference = if back.y.abs() > 0.999_999 { DVec3::new(0.0, 0.0, back.y.signum()) } else { DVec3::Y };
+    let right = reference.cross(back).normalize();
+    let up = back.cross(right);
+    let (sin, cos) = math::sin_cos(roll);
+    DMat3::from_cols(right * cos + up * sin, up * cos - right * sin, back)
+}
+
+/// A camera at one instant, for a picture of one size. Pixel (0, 0) is the top left one, its centre at (0.5, 0.5).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Lens.
+    pub lens: Lens,
+    /// Where it stands, m.
+    pub position: DVec3,
+    /// Columns: right, up and backward in the world.
+    pub orientation: DMat3,
+    /// Nothing nearer is drawn, m.
+    pub near: f64,
+    /// Principal point, pixels.
+    pub centre: DVec2,
+    /// Picture size, pixels.
+    pub size: [f64; 2],
+    /// Pixels a unit of tangent (perspective) or a radian (fisheye, panorama).
+    pub focal_pixels: f64,
+    half_angle: f64,
+    half_fov: f64,
+}
+
+/// Where a point of the world lies in the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Projection {
+    /// Pixels from the picture's left and top edges.
+    pub pixel: DVec2,
+    /// Depth, m: along the axis for perspective, distance for fisheye and panorama.
+    pub depth: f64,
+    /// Pixels that a metre across the line of sight covers there.
+    pub pixels_per_metre: f64,
+}
+
+impl Camera {
+    /// The same camera with a picture that reaches `pixels` further on every side.
+    pub fn with_overscan(mut self, pixels: usize) -> Self {
+        self.centre += DVec2::splat(pixels as f64);
+        self.size = self.size.map(|side| side + 2.0 * pixels as f64);
+        self
+    }
+
+    /// The camera behind a level mirror at `height`: it sees at each pixel what this one sees there in the mirror.
+    /// Its frame is left-handed.
+    pub fn mirrored(mut self, height: f64) -> Self {
+        self.position.y = 2.0 * height - self.position.y;
+        self.orientation = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0)) * self.orientation;
+        self
+    }
+
+    /// `point` in the camera's frame: right, up, backward, m.
+    #[inline(always)]
+    pub fn to_camera(&self, point: DVec3) -> DVec3 {
+        self.orientation.transpose() * (point - self.position)
+    }
+
+    /// Depth of `point` as this lens measures it, m; negative behind a perspective camera.
+    #[inline(always)]
+    pub fn depth(&self, point: DVec3) -> f64 {
+        match self.lens {
+            Lens::Perspective => -self.to_camera(point).z,
+            Lens::Fisheye | Lens::Panorama => (point - self.position).length(),
+        }
+    }
+
+    /// Where `point` lies in the picture; `None` where the lens cannot see it or it is nearer than `near`.
+    #[inline(always)]
+    pub fn project(&self, point: DVec3) -> Option<Projection> {
+        let local = self.to_camera(point);
+        let depth = self.depth(point);
+        if depth.is_nan() || depth < self.near {
+            return None;
+        }
+        let offset = match self.lens {
+            Lens::Perspective => DVec2::new(local.x, local.y) / depth,
+            Lens::Fisheye => {
+                let across = math::hypot(local.x, local.y);
+                let angle = math::atan2(across, -local.z);
+                if angle > self.half_angle {
+                    return None;
+                }
+                if across > 0.0 { DVec2::new(local.x, local.y) * (angle / across) } else { DVec2::ZERO }
+            }
+            Lens::Panorama => {
+                DVec2::new(math::atan2(local.x, -local.z), math::asin((local.y / depth).clamp(-1.0, 1.0)))
+            }
+        };
+        Some(Projection {
+            pixel: self.centre + DVec2::new(offset.x, -offset.y) * self.focal_pixels,
+            depth,
+            pixels_per_metre: self.focal_pixels / depth,
+        })
+    }
+
+    /// The direction seen at a place in the picture, in the world; `None` outside a fisheye's circle.
+    ///
+    /// Its length is 1 for fisheye and panorama; for perspective its extent along the axis is 1, so that
+    /// `position + depth * direction` is the point at a depth for every lens.
+    pub fn direction(&self, pixel: DVec2) -> Option<DVec3> {
+        let x = (pixel.x - self.centre.x) / self.focal_pixels;
+        let y = (self.centre.y - pixel.y) / self.focal_pixels;
+        let local = match self.lens {
+            Lens::Perspective => DVec3::new(x, y, -1.0),
+            Lens::Fisheye => {
+                let angle = math::hypot(x, y);
+                if angle > self.half_angle {
+                    return None;
+                }
+                let (sin, cos) = math::sin_cos(angle);
+                let across = if angle > 0.0 { sin / angle } else { 1.0 };
+                DVec3::new(x * across, y * across, -cos)
+            }
+            Lens::Panorama => {
+                let (sin_longitude, cos_longitude) = math::sin_cos(x);
+                let (sin_latitude, cos_latitude) = math::sin_cos(y);
+                DVec3::new(sin_longitude * cos_latitude, sin_latitude, -cos_longitude * cos_latitude)
+            }
+        };
+        Some(self.orientation * local)
+    }
+
+    /// Angle from the axis as far as a fisheye lens sees, radians.
+    #[must_use]
+    pub fn half_angle(&self) -> f64 {
+        self.half_angle
+    }
+
+    /// What EXR headers say of it.
+    pub fn header(&self) -> CameraHeader {
+        let rotation = self.orientation.transpose();
+        let translation = -(rotation * self.position);
+        let mut world_to_camera = [[0.0_f64; 4]; 4];
+        for row in 0..3 {
+            for column in 0..3 {
+                world_to_camera[row][column] = rotation.col(row)[column];
+            }
+            world_to_camera[3][row] = translation[row];
+        }
+        world_to_camera[3][3] = 1.0;
+        let single = |matrix: [[f64; 4]; 4]| matrix.map(|row| row.map(|value| value as f32));
+        let (straight, round) = (self.lens == Lens::Perspective, self.lens == Lens::Fisheye);
+        CameraHeader {
+            world_to_camera: single(world_to_camera),
+            world_to_ndc: straight.then(|| single(self.world_to_ndc(&world_to_camera))),
+            vertical_fov_deg: straight.then_some((2.0 * self.half_fov).to_degrees() as f32),
+            lens: Some(self.lens),
+            fisheye_fov_deg: round.then_some((2.0 * self.half_angle).to_degrees() as f32),
+        }
+    }
+
+    /// Row-vector matrix to the screen window [-1, 1] of a perspective lens.
+    fn world_to_ndc(&self, world_to_camera: &[[f64; 4]; 4]) -> [[f64; 4]; 4] {
+        let [width, height] = self.size;
+        let (shift_x, shift_y) = (2.0 * self.centre.x / width - 1.0, 1.0 - 2.0 * self.centre.y / height);
+        let projection = [
+            [2.0 * self.focal_pixels / width, 0.0, 0.0, 0.0],
+            [0.0, 2.0 * self.focal_pixels / height, 0.0, 0.0],
+            [-shift_x, -shift_y, -1.0, -1.0],
+            [0.0, 0.0, -2.0 * self.near, 0.0],
+        ];
+        let mut product = [[0.0; 4]; 4];
+        for (row, result) in product.iter_mut().enumerate() {
+            for (column, cell) in result.iter_mut().enumerate() {
+                *cell = (0..4).map(|k| world_to_camera[row][k] * projection[k][column]).sum();
+            }
+        }
+        product
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(lens: Lens) -> Camera {
+        let parameters = CameraParameters {
+            lens,
+            position: Animated::from([1.0, 2.0, 3.0]),
+            target: Animated::from([-2.0, 2.5, -4.0]),
+            roll_deg: Animated::from(11.0),
+            shift: [0.03, -0.02],
+            ..CameraParameters::default()
+        };
+        parameters.at(0.0, [320, 240])
+    }
+
+    #[test]
+    fn projection_and_direction_are_each_others_inverse_for_every_lens() {
+        for lens in [Lens::Perspective, Lens::Fisheye, Lens::Panorama] {
+            let camera = camera(lens);
+            for pixel in [DVec2::new(160.0, 120.0), DVec2::new(100.5, 60.5), DVec2::new(201.0, 170.0)] {
+                let direction = camera.direction(pixel).unwrap();
+                let point = camera.position + direction * 7.5;
+                let projection = camera.project(point).unwrap();
+                assert!((projection.pixel - pixel).length() < 1e-9, "{lens:?} {pixel} {projection:?}");
+                assert!((projection.depth - 7.5).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_mirrored_camera_sees_the_reflected_ray() {
+        let (camera, height) = (camera(Lens::Perspective), 0.5);
+        let pixel = DVec2::new(40.0, 200.0);
+        let direction = camera.direction(pixel).unwrap();
+        assert!(direction.y < 0.0);
+        let ground = camera.position + direction * ((height - camera.position.y) / direction.y);
+        let seen = ground + DVec3::new(direction.x, -direction.y, direction.z) * 3.0;
+        let mirrored = camera.mirrored(height);
+        assert!((mirrored.project(seen).unwrap().pixel - pixel).length() < 1e-9);
+        assert_eq!(mirrored.mirrored(height), camera);
+    }
+
+    #[test]
+    fn the_target_lies_in_the_middle_and_up_is_up() {
+        let parameters = CameraParameters::default();
+        let camera = parameters.at(0.0, [640, 480]);
+        let middle = camera.project(DVec3::new(0.0, 0.9, 0.0)).unwrap();
+        assert!((middle.pixel - DVec2::new(320.0, 240.0)).length() < 1e-9);
+        let above = camera.project(DVec3::new(0.0, 1.4, 0.0)).unwrap();
+        assert!(above.pixel.y < 240.0 && (above.pixel.x - 320.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn vertical_field_of_view_reaches_from_edge_to_edge() {
+        let parameters = CameraParameters {
+            position: Animated::from([0.0, 0.0, 0.0]),
+            target: Animated::from([0.0, 0.0, -1.0]),
+            vertical_fov_deg: Animated::from(90.0),
+            ..CameraParameters::default()
+        };
+        let top = parameters.at(0.0, [200, 100]).project(DVec3::new(0.0, 2.0, -2.0)).unwrap();
+        assert!(top.pixel.y.abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_dome_shows_its_horizon_on_the_circle_and_nothing_beyond() {
+        let parameters = CameraParameters {
+            lens: Lens::Fisheye,
+            position: Animated::from([0.0, 0.0, 0.0]),
+            target: Animated::from([0.0, 1.0, 0.0]),
+            ..CameraParameters::default()
+        };
+        let camera = parameters.at(0.0, [512, 512]);
+        let horizon = camera.project(DVec3::new(10.0, 0.001, 0.0)).unwrap();
+        assert!(((horizon.pixel - camera.centre).length() - 256.0).abs() < 0.1);
+        assert!(camera.project(DVec3::new(10.0, -0.1, 0.0)).is_none());
+        assert!(camera.direction(DVec2::new(1.0, 1.0)).is_none());
+    }
+
+    #[test]
+    fn header_matrices_put_the_target_in_the_middle_of_the_screen_window() {
+        let camera = CameraParameters { shift: [0.1, 0.2], ..CameraParameters::default() }.at(0.0, [400, 300]);
+        let header = camera.header();
+        let point = [0.3_f32, 1.1, -0.5, 1.0];
+        let clip: Vec<f32> =
+            (0..4).map(|column| (0..4).map(|k| point[k] * header.world_to_ndc.unwrap()[k][column]).sum()).collect();
+        let seen = camera.project(DVec3::new(0.3, 1.1, -0.5)).unwrap().pixel;
+        let expected = DVec2::new(2.0 * seen.x / 400.0 - 1.0, 1.0 - 2.0 * seen.y / 300.0);
+        assert!((f64::from(clip[0] / clip[3]) - expected.x).abs() < 1e-5);
+        assert!((f64::from(clip[1] / clip[3]) - expected.y).abs() < 1e-5);
+    }
+
+    #[test]
+    fn headers_say_of_each_lens_what_is_true_of_it() {
+        let header =
+            |lens| CameraParameters { lens, fisheye_fov_deg: 200.0, ..Default::default() }.at(0.0, [8, 8]).header();
+        let straight = header(Lens::Perspective);
+        assert_eq!((straight.lens, straight.fisheye_fov_deg), (Some(Lens::Perspective), None));
+        assert!((straight.vertical_fov_deg.unwrap() - 32.0).abs() < 1e-4 && straight.world_to_ndc.is_some());
+        let dome = header(Lens::Fisheye);
+        assert_eq!((dome.lens, dome.vertical_fov_deg, dome.world_to_ndc), (Some(Lens::Fisheye), None, None));
+        assert!((dome.fisheye_fov_deg.unwrap() - 200.0).abs() < 1e-4);
+        let around = header(Lens::Panorama);
+        assert_eq!((around.vertical_fov_deg, around.world_to_ndc, around.fisheye_fov_deg), (None, None, None));
+    }
+}

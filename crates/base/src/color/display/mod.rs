@@ -1,0 +1,9 @@
+//! From exposed light to the codes of a display, and back.
+
+pub mod alpha;
+pub mod gamut;
+pub mod quantize;
+pub(crate) mod row;
+pub mod tone;
+pub mod transfer;
+pub mod view;

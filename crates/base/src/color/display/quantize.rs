@@ -1,0 +1,291 @@
+//! From display light to codes: alpha, encoding, dither and rounding, one pixel at a time and alike at every vector width.
+
+use super::transfer::{clamp_unit, encode_srgb};
+use crate::math::{MulAdd, approximations};
+
+/// A number that stands for a display component.
+pub trait DisplayCode: Copy + Default + sealed::Sealed {
+    /// The code of full light.
+    const LARGEST: f32;
+    /// Width of the dither in codes.
+    const DITHER: f32;
+    /// A pixel of whole numbers from 0 to [`LARGEST`](Self::LARGEST).
+    fn from_wholes(wholes: [u32; 4]) -> [Self; 4];
+}
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for u8 {}
+    impl Sealed for u16 {}
+}
+
+impl DisplayCode for u8 {
+    const LARGEST: f32 = 255.0;
+    /// Less than one, so that a value within 1/32 of a whole code keeps that code: what was 8 bits stays as it was.
+    const DITHER: f32 = 1.0 - 2.0 / 32.0;
+    #[inline(always)]
+    fn from_wholes([r, g, b, a]: [u32; 4]) -> [Self; 4] {
+        (r | g << 8 | b << 16 | a << 24).to_le_bytes()
+    }
+}
+
+impl DisplayCode for u16 {
+    const LARGEST: f32 = 65_535.0;
+    /// A step of 1/65535 cannot be seen.
+    const DITHER: f32 = 0.0;
+    #[inline(always)]
+    fn from_wholes([r, g, b, a]: [u32; 4]) -> [Self; 4] {
+        [r as Self, g as Self, b as Self, a as Self]
+    }
+}
+
+/// Fractions of 2^32 that step the dither along x and y: the two-dimensional generalisation of the golden ratio (Roberts 2018, R2
+/// sequence), whose values spread as evenly as blue noise and need no table.
+const STEP_X: u32 = 0xC13F_A9A9;
+const STEP_Y: u32 = 0x91E1_0DA5;
+/// Places of the four channels in the pattern, far apart so that their errors do not add up to grey.
+const CHANNEL_OFFSETS: [u32; 4] = [0, 0x5555_5555, 0xAAAA_AAAA, 0x8000_0000];
+
+/// The dither's phase at a pixel.
+#[inline(always)]
+pub(super) fn dither_phase(x: u32, y: u32) -> u32 {
+    x.wrapping_mul(STEP_X).wrapping_add(y.wrapping_mul(STEP_Y))
+}
+
+/// Dither in codes, within half of `C::DITHER` of zero, evenly distributed. A triangle of the phase, so that it has no seam.
+#[inline(always)]
+fn dither<C: DisplayCode>(phase: u32, channel: usize) -> f32 {
+    let saw = phase.wrapping_add(CHANNEL_OFFSETS[channel]);
+    let triangle = (saw << 1) ^ (saw.cast_signed() >> 31).cast_unsigned();
+    let unit = (triangle >> 8).cast_signed() as f32 * (1.0 / 16_777_216.0);
+    (unit - 0.5) * C::DITHER
+}
+
+/// The code of a number from -0.5 to 65535.5.
+#[inline(always)]
+fn code_of(x: f32) -> u32 {
+    approximations::whole(x).cast_unsigned()
+}
+
+/// Encodes light (0..=1) unless `RAW`, and rounds it to a code.
+#[inline(always)]
+fn component_code<C: DisplayCode, const RAW: bool>(light: f32, phase: u32, channel: usize) -> u32 {
+    let encoded = if RAW { clamp_unit(light) } else { encode_srgb(light) };
+    code_of(encoded.fma(C::LARGEST, dither::<C>(phase, channel)))
+}
+
+/// Codes of an opaque pixel.
+#[inline(always)]
+pub(super) fn opaque_codes<C: DisplayCode, const RAW: bool>([r, g, b]: [f32; 3], phase: u32) -> [u32; 4] {
+    [
+        component_code::<C, RAW>(r, phase, 0),
+        component_code::<C, RAW>(g, phase, 1),
+        component_code::<C, RAW>(b, phase, 2),
+        C::LARGEST as u32,
+    ]
+}
+
+/// Codes of a pixel without a plate behind it, for programs that blend linear light: `A = max(alpha, r, g, b)` in linear light, color
+/// `rgb / A`, encoded.
+///
+/// Alpha is rounded first and the color divided by the rounded alpha, so that color times alpha is exact over black even where alpha
+/// has few codes. Where light can be seen alpha is therefore rounded up, elsewhere it is dithered.
+#[inline(always)]
+pub(super) fn linear_alpha_codes<C: DisplayCode, const RAW: bool>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
+    let [r, g, b] = light;
+    let green_or_blue = if g > b { g } else { b };
+    let brightest = if r > green_or_blue { r } else { green_or_blue };
+    let alpha = clamp_unit(alpha);
+    let coverage = if alpha > brightest { alpha } else { brightest };
+
+    let needed = approximations::rounded(brightest.fma(C::LARGEST, 0.499));
+    // In 16 bits 65535 + 0.499 is 65535.5 in single precision, and rounds to a code that there is not.
+    let needed = if needed < C::LARGEST { needed } else { C::LARGEST };
+    // Half a code over black: 0.5 / 12.92 of one in the straight part of sRGB.
+    let needed = if brightest >= 0.5 / 12.92 / C::LARGEST { needed } else { 0.0 };
+    let dithered = approximations::rounded(coverage.fma(C::LARGEST, dither::<C>(phase, 3)));
+    let code = if dithered > needed { dithered } else { needed };
+
+    let quotient = C::LARGEST / code;
+    let scale = if code > 0.0 { quotient } else { 0.0 };
+    let [r, g, b, _] = opaque_codes::<C, RAW>([r * scale, g * scale, b * scale], phase);
+    [r, g, b, code_of(code)]
+}
+
+/// The background before which [`encoded_alpha_codes`] are nearest to the truth: mid-gray, half of the encoded range.
+const MID_GRAY_ENCODED: f32 = 0.5;
+/// Its linear light.
+const MID_GRAY: f32 = 0.214_041_14;
+
+/// Codes of a pixel without a plate behind it, for programs that blend sRGB-encoded values, `out = A color + (1 - A) background`.
+///
+/// With `E = encode(rgb)` the codes that are seen over black, the color is `E / A`, so that the blend over black is `E` whatever `A` is.
+/// `A` is the least-squares solution over a mid-gray background `G`: the truth there is `encode(rgb + (1 - alpha) G)`, hence
+/// `1 - A = mean over r, g, b of (encode(rgb + (1 - alpha) G) - E) / encode(G)`; at least the largest `E`, which a color can carry.
+#[inline(always)]
+pub(super) fn encoded_alpha_codes<C: DisplayCode>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
+    let over_black = opaque_codes::<C, false>(light, phase);
+    let transmitted = (1.0 - clamp_unit(alpha)) * MID_GRAY;
+    let mut gained = 0.0;
+    for component in light {
+        gained += encode_srgb(clamp_unit(component) + transmitted) - encode_srgb(component);
+    }
+    let coverage = clamp_unit(gained.fma(-1.0 / (3.0 * MID_GRAY_ENCODED), 1.0));
+
+    let dithered = code_of(coverage.fma(C::LARGEST, dither::<C>(phase, 3)));
+    let [r, g, b, _] = over_black;
+    let code = dithered.max(r).max(g).max(b);
+    let quotient = C::LARGEST / code as f32;
+    let scale = if code > 0 { quotient } else { 0.0 };
+    // At most the largest code, since `code` is at least as large as each.
+    let color = |component: u32| code_of(component as f32 * scale);
+    [color(r), color(g), color(b), code]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::decode_srgb8;
+
+    fn phases() -> impl Iterator<Item = u32> {
+        (0..64 * 64).map(|i| dither_phase(i % 64, i / 64))
+    }
+
+    #[test]
+    fn exact_codes_survive_dither() {
+        for phase in phases() {
+            for code in [0_u8, 1, 2, 77, 128, 254, 255] {
+                let light = decode_srgb8(code);
+                assert_eq!(opaque_codes::<u8, false>([light; 3], phase), [code, code, code, 255].map(u32::from));
+            }
+        }
+    }
+
+    #[test]
+    fn dither_keeps_the_mean() {
+        for level in [10.3_f32, 100.5, 200.75] {
+            let light = level / 255.0;
+            let sum: u32 = phases().map(|phase| opaque_codes::<u8, true>([light; 3], phase)[1]).sum();
+            let mean = sum as f32 / 4096.0;
+            assert!((mean - level).abs() < 0.03, "{mean} is not {level}");
+        }
+    }
+
+    #[test]
+    fn colour_times_alpha_is_exact_over_black() {
+        for step in 0..2000 {
+            let light = [1.0, 0.4, 0.1].map(|v| v * libm::powf(step as f32 / 2000.0, 3.0));
+            for phase in phases().step_by(997) {
+                let codes = linear_alpha_codes::<u8, false>(light, 0.0, phase);
+                for (code, expected) in codes.iter().zip(light) {
+                    let shown = decode_srgb8(*code as u8) * codes[3] as f32 / 255.0;
+                    let error = (encode_srgb(shown) - encode_srgb(expected)) * 255.0;
+                    assert!(error.abs() < 1.01, "{light:?}: {error} codes");
+                }
+            }
+        }
+    }
+
+    /// Numbers at and beyond the ends of the range, and what is not a number.
+    const EXTREMES: [f32; 12] =
+        [0.0, -0.0, 1e-40, 1e-6, 0.003_130_8, 0.5, 0.999_999_94, 1.0, 1.000_000_1, 7.0, f32::INFINITY, f32::NAN];
+
+    /// Every combination of extremes in two components of light and in alpha; the third component is one of them too.
+    fn extreme_pixels() -> impl Iterator<Item = ([f32; 3], f32)> {
+        let all = || EXTREMES.into_iter().chain([-1.0, f32::NEG_INFINITY]);
+        all().flat_map(move |r| all().flat_map(move |g| all().map(move |alpha| ([r, g, 0.25], alpha))))
+    }
+
+    fn seen(light: f32) -> f32 {
+        if light.is_nan() { 0.0 } else { light.clamp(0.0, 1.0) }
+    }
+
+    #[test]
+    fn saturated_pixels_keep_their_alpha_in_every_depth() {
+        fn hold<C: DisplayCode>() {
+            let largest = C::LARGEST as u32;
+            for (light, alpha) in extreme_pixels() {
+                for phase in phases().step_by(211) {
+                    let linear = linear_alpha_codes::<C, false>(light.map(seen), alpha, phase);
+                    let raw = linear_alpha_codes::<C, true>(light.map(seen), alpha, phase);
+                    let encoded = encoded_alpha_codes::<C>(light, alpha, phase);
+                    let opaque = opaque_codes::<C, false>(light, phase);
+                    for codes in [linear, raw, encoded, opaque] {
+                        assert!(codes.iter().all(|code| *code <= largest), "{light:?} {alpha}: {codes:?}");
+                        let brightest = light.map(seen).into_iter().fold(seen(alpha), f32::max);
+                        if brightest == 1.0 {
+                            assert_eq!(codes[3], largest, "{light:?} {alpha}: {codes:?}");
+                        }
+                    }
+                }
+            }
+        }
+        hold::<u8>();
+        hold::<u16>();
+    }
+
+    /// Light of many colors and brightnesses with much and little coverage.
+    fn pixels() -> impl Iterator<Item = ([f32; 3], f32)> {
+        let colors = [[1.0, 0.4, 0.1], [0.1, 1.0, 0.3], [1.0, 1.0, 1.0], [0.0, 0.0, 1.0]];
+        let brightness = (0..60).map(|step| libm::powf(step as f32 / 59.0, 3.0));
+        brightness.flat_map(move |v| {
+            colors.into_iter().flat_map(move |color| [0.0, 0.1, 0.7, 1.0].map(|alpha| (color.map(|c| c * v), alpha)))
+        })
+    }
+
+    #[test]
+    fn an_encoded_blend_over_black_is_exact_to_a_code() {
+        for (light, alpha) in pixels() {
+            for phase in phases().step_by(61) {
+                let [r, g, b, a] = encoded_alpha_codes::<u8>(light, alpha, phase);
+                let expected = opaque_codes::<u8, false>(light, phase);
+                for (color, expected) in [r, g, b].into_iter().zip(expected) {
+                    assert_eq!((color * a + 127) / 255, expected, "{light:?} {alpha}");
+                }
+                let [r, g, b, a] = encoded_alpha_codes::<u16>(light, alpha, phase).map(u64::from);
+                let expected = opaque_codes::<u16, false>(light, phase);
+                for (color, expected) in [r, g, b].into_iter().zip(expected) {
+                    let over_black = (color * a + 32_767) / 65_535;
+                    assert!(over_black.abs_diff(u64::from(expected)) <= 1, "{light:?} {alpha}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_other_alpha_is_nearer_to_the_truth_over_mid_gray() {
+        for (light, coverage) in pixels() {
+            let truth = light.map(|v| encode_srgb(v + (1.0 - coverage) * MID_GRAY) * 65_535.0);
+            let over_black = opaque_codes::<u16, false>(light, 0).map(|code| code as f32);
+            let error = |alpha: f32| {
+                let gray = (1.0 - alpha / 65_535.0) * MID_GRAY_ENCODED * 65_535.0;
+                (0..3).map(|c| over_black[c] + gray - truth[c]).map(|difference| difference * difference).sum::<f32>()
+            };
+            let alpha = encoded_alpha_codes::<u16>(light, coverage, 0)[3] as f32;
+            let least = over_black[0].max(over_black[1]).max(over_black[2]);
+            for other in [alpha - 400.0, alpha + 400.0, least, 65_535.0] {
+                if (least..=65_535.0).contains(&other) {
+                    assert!(error(alpha) <= error(other) * 1.001 + 10.0, "{light:?} {coverage}: {alpha} {other}");
+                }
+            }
+        }
+        let quiet = dither_phase(0, 0);
+        assert_eq!(encoded_alpha_codes::<u8>([0.0; 3], 0.0, quiet), [0; 4]);
+        assert_eq!(encoded_alpha_codes::<u8>([0.0; 3], 1.0, quiet), [0, 0, 0, 255]);
+        assert_eq!(encoded_alpha_codes::<u8>([1.0; 3], 0.0, quiet), [255; 4]);
+        // Half of the light behind passes: code 128 times (1 - A) is to be encode(0.107) = 0.3608, hence A = 0.2785.
+        assert_eq!(encoded_alpha_codes::<u16>([0.0; 3], 0.5, quiet)[3], 18_248);
+    }
+
+    #[test]
+    fn alpha_is_the_larger_of_coverage_and_light() {
+        let quiet = dither_phase(0, 0);
+        assert_eq!(linear_alpha_codes::<u8, false>([0.0; 3], 0.0, quiet), [0; 4]);
+        assert_eq!(linear_alpha_codes::<u8, false>([0.0; 3], 1.0, quiet), [0, 0, 0, 255]);
+        assert_eq!(linear_alpha_codes::<u16, false>([0.0; 3], 0.25, quiet)[3], 16_384);
+        assert_eq!(linear_alpha_codes::<u8, false>([1.0; 3], 0.0, quiet), [255; 4]);
+        // Light 0.2 under alpha 0.4 = 102/255: straight 0.5 encodes to 0.7354 * 255 = 187.5.
+        let codes = linear_alpha_codes::<u8, false>([0.2, 0.2, 0.0], 0.4, quiet);
+        assert!((187..=188).contains(&codes[0]) && codes[2] == 0 && codes[3] == 102, "{codes:?}");
+    }
+}

@@ -1,0 +1,383 @@
+//! The view transform: exposed scene-linear ACEScg to display pixels, and back.
+
+use fearless_simd::{Level, dispatch};
+
+use super::{
+    alpha::AlphaConvention,
+    gamut::{from_cube, sanitised, to_cube},
+    quantize::DisplayCode,
+    row,
+    tone::ToneCurve,
+    transfer::clamp_unit,
+};
+use crate::color::{
+    space::{acescg_from_srgb, srgb_from_acescg},
+    white_balance::WhiteBalance,
+};
+
+/// Scene brightness up to which the default view changes nothing.
+const KNEE: f32 = 0.6;
+/// Scene brightness that the default view shows as full display light.
+const WHITE: f32 = 16.0;
+/// Pixels that are balanced at once.
+const BALANCED: usize = 256;
+
+/// How exposed scene light is shown.
+///
+/// - `display`: for looking at. Identity for colours inside sRGB below 0.6, a shoulder to 16, highlights run to white, hue kept but for
+///   warm highlights, which bend toward yellow ([`gamut`](super::gamut)).
+/// - `standard`: identity inside sRGB up to 1.0; only what lies beyond is changed, by the same path.
+/// - `raw`: the ACEScg numbers, clamped to 0..=1 and not encoded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// `None` for `raw`.
+    tone: Option<ToneCurve>,
+    /// What is done to light first, unless it is shown `raw`.
+    balance: Option<WhiteBalance>,
+    name: &'static str,
+}
+
+/// There is no view of that name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no view `{name}` (allowed: display, standard, raw)")]
+pub struct UnknownView {
+    /// The name that was asked for.
+    pub name: String,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self::DISPLAY
+    }
+}
+
+impl View {
+    /// The default: tone curve, highlights to white, gamut map, sRGB.
+    pub const DISPLAY: Self =
+        Self { tone: Some(ToneCurve::with_shoulder(KNEE, WHITE)), balance: None, name: "display" };
+    /// No tone curve: gamut map and sRGB.
+    pub const STANDARD: Self = Self { tone: Some(ToneCurve::clip()), balance: None, name: "standard" };
+    /// Linear ACEScg, clamped.
+    pub const RAW: Self = Self { tone: None, balance: None, name: "raw" };
+
+    /// The names of all views, default first.
+    pub const NAMES: [&'static str; 3] = [Self::DISPLAY.name, Self::STANDARD.name, Self::RAW.name];
+
+    /// The view called `name`.
+    ///
+    /// # Errors
+    /// There is none of that name; the message lists those there are.
+    pub fn from_name(name: &str) -> Result<Self, UnknownView> {
+        [Self::DISPLAY, Self::STANDARD, Self::RAW]
+            .into_iter()
+            .find(|view| view.name == name)
+            .ok_or_else(|| UnknownView { name: name.to_owned() })
+    }
+
+    /// The same view of a camera whose white balance is set to the light of a black body of that temperature, K; of one that takes D65 for
+    /// white without. `raw` shows light as it is.
+    #[must_use]
+    pub fn balanced(mut self, temperature_k: Option<f64>) -> Self {
+        self.balance = temperature_k.filter(|_| self.tone.is_some()).map(WhiteBalance::of_black_body);
+        self
+    }
+
+    /// The view's name.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// Exposed ACEScg to linear display light within 0..=1: linear sRGB, or clamped ACEScg for `raw`. Never NaN.
+    #[inline(always)]
+    #[must_use]
+    pub fn to_display(&self, acescg: [f32; 3]) -> [f32; 3] {
+        match (&self.tone, &self.balance) {
+            (Some(tone), Some(balance)) => shown(tone, balanced(balance, acescg)),
+            (Some(tone), None) => shown(tone, acescg),
+            (None, _) => clamped(acescg),
+        }
+    }
+
+    /// The exposed ACEScg that this view shows as the linear sRGB `display` (clamped to 0..=1): the inverse of
+    /// [`to_display`](Self::to_display) to within 1e-5. Bright saturated colours come from outside sRGB. `raw` has no sRGB to
+    /// invert; for it the colour is only brought into ACEScg.
+    #[inline(always)]
+    #[must_use]
+    pub fn to_scene(&self, display: [f32; 3]) -> [f32; 3] {
+        match (&self.tone, &self.balance) {
+            (Some(tone), Some(balance)) => balance.invert(unshown(tone, display)),
+            (Some(tone), None) => unshown(tone, display),
+            (None, _) => acescg_from_srgb(clamped(display)),
+        }
+    }
+
+    /// [`to_scene`](Self::to_scene) for many pixels in place: linear sRGB in, exposed ACEScg out; the fourth component is left alone.
+    pub fn to_scene_row(&self, level: Level, pixels: &mut [[f32; 4]]) {
+        let Some(tone) = &self.tone else {
+            for pixel in pixels {
+                [pixel[0], pixel[1], pixel[2]] = self.to_scene([pixel[0], pixel[1], pixel[2]]);
+            }
+            return;
+        };
+        dispatch!(level, _simd => row::to_scene(tone, pixels));
+        if let Some(balance) = &self.balance {
+            for pixel in pixels {
+                [pixel[0], pixel[1], pixel[2]] = balance.invert([pixel[0], pixel[1], pixel[2]]);
+            }
+        }
+    }
+
+    /// One row of display codes of premultiplied, exposed ACEScg.
+    ///
+    /// `y` and `x0` are the picture coordinates of the row and its first pixel, so that a crop is dithered like the whole. Without a
+    /// convention of `alpha` (there is a plate) pixels are opaque. With [`AlphaConvention::Linear`] `A = max(alpha, r, g, b)` in linear
+    /// display light and the color is `rgb / A`, encoded; with [`AlphaConvention::Encoded`] a blend of encoded values over black gives
+    /// the opaque codes, and one over mid-gray is nearest to the truth. `raw` encodes nothing and is always linear.
+    /// Black is code 0 and display white the largest code; 8 bits are dithered, except that values which are 8-bit codes stay so.
+    /// What is below 0 or not a number counts as 0, in alpha too; what is infinite, as the brightest light.
+    /// The shorter of `pixels` and `out` decides how many are written. Same bytes at every `level`.
+    pub fn display_row<C: DisplayCode>(
+        &self,
+        level: Level,
+        pixels: &[[f32; 4]],
+        y: i64,
+        x0: i64,
+        alpha: Option<AlphaConvention>,
+        out: &mut [[C; 4]],
+    ) {
+        let Some(balance) = &self.balance else { return self.row(level, pixels, [x0, y], alpha, out) };
+        let mut buffer = [[0.0; 4]; BALANCED];
+        for ((part, out), first) in pixels.chunks(BALANCED).zip(out.chunks_mut(BALANCED)).zip((0..).step_by(BALANCED)) {
+            let shown = &mut buffer[..part.len()];
+            for (shown, [r, g, b, alpha]) in shown.iter_mut().zip(part) {
+                let [r, g, b] = balanced(balance, [*r, *g, *b]);
+                *shown = [r, g, b, *alpha];
+            }
+            self.row(level, shown, [x0.wrapping_add(first), y], alpha, out);
+        }
+    }
+
+    /// One row of light that has been balanced.
+    fn row<C: DisplayCode>(
+        &self,
+        level: Level,
+        pixels: &[[f32; 4]],
+        [x0, y]: [i64; 2],
+        alpha: Option<AlphaConvention>,
+        out: &mut [[C; 4]],
+    ) {
+        // Coordinates only feed the dither, which repeats after 2^32.
+        let place = row::Place { x: x0 as u32, y: y as u32 };
+        match &self.tone {
+            Some(tone) => dispatch!(level, _simd => row::encoded::<C>(tone, pixels, place, alpha, out)),
+            None => dispatch!(level, _simd => row::raw::<C>(pixels, place, alpha, out)),
+        }
+    }
+}
+
+/// Light under a white balance. What the matrix would turn into no number at all, such as infinite light in all three components, is brought
+/// within bounds before.
+#[inline(always)]
+fn balanced(balance: &WhiteBalance, [r, g, b]: [f32; 3]) -> [f32; 3] {
+    balance.apply([sanitised(r), sanitised(g), sanitised(b)])
+}
+
+/// Exposed ACEScg to linear display sRGB under a tone curve.
+#[inline(always)]
+pub(super) fn shown(tone: &ToneCurve, [r, g, b]: [f32; 3]) -> [f32; 3] {
+    let finite = [sanitised(r), sanitised(g), sanitised(b)];
+    to_cube(tone, srgb_from_acescg(finite))
+}
+
+/// Linear display sRGB to the exposed ACEScg that [`shown`] takes to it.
+#[inline(always)]
+pub(super) fn unshown(tone: &ToneCurve, display: [f32; 3]) -> [f32; 3] {
+    acescg_from_srgb(from_cube(tone, clamped(display)))
+}
+
+/// Components within 0..=1.
+#[inline(always)]
+pub(super) fn clamped([r, g, b]: [f32; 3]) -> [f32; 3] {
+    [clamp_unit(r), clamp_unit(g), clamp_unit(b)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::decode_srgb8;
+
+    /// Well spread 32-bit numbers, for pictures without structure.
+    fn scattered(index: u32) -> u32 {
+        let mixed = (index ^ (index >> 16)).wrapping_mul(0x7FEB_352D);
+        (mixed ^ (mixed >> 15)).wrapping_mul(0x846C_A68B)
+    }
+
+    /// Pixels of every kind: dark, bright, outside sRGB, empty, not finite.
+    fn wild_pixels(count: u32) -> Vec<[f32; 4]> {
+        let component = |seed: u32| match seed % 19 {
+            0 => 0.0,
+            1 => f32::NAN,
+            2 => f32::INFINITY,
+            3 => f32::NEG_INFINITY,
+            4 => -0.0,
+            5 => f32::MAX,
+            6 => 1e-40,
+            _ => ((seed >> 8) as f32 / 16_777_216.0 - 0.2) * libm::exp2f((seed % 31) as f32 - 12.0),
+        };
+        (0..count).map(|i| [0, 1, 2, 3].map(|c| component(scattered(4 * i + c)))).collect()
+    }
+
+    #[test]
+    fn cube_survives_the_way_to_the_scene_and_back() {
+        for view in [View::DISPLAY, View::STANDARD, View::DISPLAY.balanced(Some(4000.0))] {
+            for index in 0..17 * 17 * 17 {
+                let c = [index % 17, index / 17 % 17, index / 289].map(|i| i as f32 / 16.0);
+                let back = view.to_display(view.to_scene(c));
+                let worst = c.iter().zip(back).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                assert!(worst < 1e-5, "{}: {c:?} came back as {back:?}", view.name());
+            }
+        }
+    }
+
+    #[test]
+    fn an_8_bit_plate_comes_back_byte_for_byte() {
+        let level = Level::new();
+        // All combinations of steep and flat codes, and a scatter of others.
+        let steep = [0, 1, 2, 3, 5, 10, 11, 40, 127, 128, 200, 239, 250, 253, 254, 255];
+        let combined = (0..4096).map(|i| [steep[i % 16], steep[i / 16 % 16], steep[i / 256]]);
+        let other = (0..40_000).map(|i| [0, 8, 16].map(|shift| (scattered(i) >> shift) as u8));
+        let plate: Vec<[u8; 3]> = combined.chain(other).collect();
+        for view in [View::DISPLAY, View::STANDARD] {
+            let mut scene: Vec<[f32; 4]> =
+                plate.iter().map(|c| [decode_srgb8(c[0]), decode_srgb8(c[1]), decode_srgb8(c[2]), 1.0]).collect();
+            view.to_scene_row(level, &mut scene);
+            let mut eight = vec![[0_u8; 4]; scene.len()];
+            let mut sixteen = vec![[0_u16; 4]; scene.len()];
+            view.display_row(level, &scene, 7, -3, None, &mut eight);
+            view.display_row(level, &scene, 7, -3, None, &mut sixteen);
+            for ((plate, eight), sixteen) in plate.iter().zip(&eight).zip(&sixteen) {
+                let [r, g, b] = *plate;
+                assert_eq!(*eight, [r, g, b, 255], "{}", view.name());
+                // In 16 bits the roundings of the way through the scene may show as one step of 65535.
+                let exact = [r, g, b, 255].map(|code| u16::from(code) * 257);
+                assert!(sixteen.iter().zip(exact).all(|(a, b)| a.abs_diff(b) <= 1), "{sixteen:?} is not {exact:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_level_gives_the_same_bytes() {
+        let pixels = wild_pixels(4099);
+        for view in [View::DISPLAY, View::STANDARD, View::RAW, View::DISPLAY.balanced(Some(4000.0))] {
+            for alpha in [None, Some(AlphaConvention::Linear), Some(AlphaConvention::Encoded)] {
+                let (mut wide, mut narrow) = (vec![[0_u8; 4]; 4099], vec![[9_u8; 4]; 4099]);
+                view.display_row(Level::new(), &pixels, 5, 11, alpha, &mut wide);
+                view.display_row(Level::baseline(), &pixels, 5, 11, alpha, &mut narrow);
+                assert_eq!(wide, narrow);
+                let (mut wide, mut narrow) = (vec![[0_u16; 4]; 4099], vec![[9_u16; 4]; 4099]);
+                view.display_row(Level::new(), &pixels, 5, 11, alpha, &mut wide);
+                view.display_row(Level::baseline(), &pixels, 5, 11, alpha, &mut narrow);
+                assert_eq!(wide, narrow);
+            }
+            let (mut wide, mut narrow) = (pixels.clone(), pixels.clone());
+            view.to_scene_row(Level::new(), &mut wide);
+            view.to_scene_row(Level::baseline(), &mut narrow);
+            let bits = |row: &[[f32; 4]]| row.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&wide), bits(&narrow));
+        }
+    }
+
+    #[test]
+    fn rows_agree_with_the_scalar_view() {
+        let pixels = wild_pixels(1000);
+        for view in [View::DISPLAY, View::DISPLAY.balanced(Some(4000.0))] {
+            let mut out = vec![[0_u16; 4]; pixels.len()];
+            view.display_row(Level::new(), &pixels, 0, 0, None, &mut out);
+            for (pixel, codes) in pixels.iter().zip(&out) {
+                let shown = view.to_display([pixel[0], pixel[1], pixel[2]]);
+                assert!(shown.iter().all(|v| (0.0..=1.0).contains(v)), "{pixel:?} {shown:?}");
+                for (light, code) in shown.iter().zip(codes) {
+                    let expected = crate::color::encode_srgb(*light) * 65_535.0;
+                    assert!((expected - f32::from(*code)).abs() <= 0.51, "{pixel:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_crop_is_part_of_the_whole() {
+        let pixels = wild_pixels(300);
+        for alpha in [None, Some(AlphaConvention::Linear), Some(AlphaConvention::Encoded)] {
+            let mut whole = vec![[0_u8; 4]; 300];
+            View::DISPLAY.display_row(Level::new(), &pixels, 40, -20, alpha, &mut whole);
+            for (start, end) in [(0, 1), (7, 100), (33, 290), (299, 300)] {
+                let mut part = vec![[0_u8; 4]; end - start];
+                View::DISPLAY.display_row(Level::new(), &pixels[start..end], 40, start as i64 - 20, alpha, &mut part);
+                assert_eq!(part, whole[start..end]);
+            }
+        }
+    }
+
+    #[test]
+    fn black_and_white_are_exact() {
+        let row = [[0.0; 4], [0.0, 0.0, 0.0, 1.0], [20.0, 20.0, 20.0, 1.0], [1e6, 1e6, 1e6, 0.0]];
+        for view in [View::DISPLAY, View::STANDARD, View::RAW] {
+            for y in 0..50 {
+                let mut out = [[7_u8; 4]; 4];
+                for alpha in [AlphaConvention::Linear, AlphaConvention::Encoded] {
+                    view.display_row(Level::new(), &row, y, 13 * y, Some(alpha), &mut out);
+                    assert_eq!(out, [[0; 4], [0, 0, 0, 255], [255; 4], [255; 4]]);
+                    let mut wide = [[7_u16; 4]; 4];
+                    view.display_row(Level::new(), &row, y, 13 * y, Some(alpha), &mut wide);
+                    assert_eq!(wide, [[0; 4], [0, 0, 0, 65_535], [65_535; 4], [65_535; 4]]);
+                }
+                view.display_row(Level::new(), &row, y, 13 * y, None, &mut out);
+                assert_eq!(out[0], [0, 0, 0, 255]);
+                view.display_row(Level::new(), &row[..1], y, 13 * y, None, &mut out[3..]);
+                assert_eq!(out[3], [0, 0, 0, 255]);
+            }
+        }
+    }
+
+    #[test]
+    fn raw_and_standard_show_what_they_say() {
+        assert_eq!(View::RAW.to_display([0.25, -0.5, 3.0]), [0.25, 0.0, 1.0]);
+        let shown = View::STANDARD.to_display(acescg_from_srgb([0.9, 0.7, 0.1]));
+        assert!(shown.iter().zip([0.9, 0.7, 0.1]).all(|(a, b)| (a - b).abs() < 1e-6), "{shown:?}");
+        let mut out = [[0_u16; 4]];
+        View::RAW.display_row(Level::new(), &[[0.5, 0.25, 0.0, 1.0]], 0, 0, None, &mut out);
+        assert_eq!(out, [[32_768, 16_384, 0, 65_535]]);
+    }
+
+    #[test]
+    fn infinite_light_is_white_and_what_is_no_number_is_nothing_under_any_white_balance() {
+        let huge = [f32::INFINITY, f32::MAX, 1e38, 1e9];
+        let row: Vec<[f32; 4]> = huge.iter().map(|&light| [light, light, light, 1.0]).collect();
+        for kelvin in [None, Some(1500.0), Some(4000.0), Some(6504.0), Some(20_000.0)] {
+            for view in [View::DISPLAY, View::STANDARD].map(|view| view.balanced(kelvin)) {
+                let name = view.name();
+                for light in huge {
+                    let shown = view.to_display([light; 3]);
+                    assert!(shown.iter().all(|value| *value > 0.999_99), "{name} {kelvin:?} {light}: {shown:?}");
+                }
+                let mut codes = vec![[0_u16; 4]; row.len()];
+                view.display_row(Level::new(), &row, 0, 0, Some(AlphaConvention::Linear), &mut codes);
+                assert_eq!(codes, vec![[u16::MAX; 4]; row.len()], "{name} {kelvin:?}");
+                assert_eq!(view.to_display([f32::NAN; 3]), [0.0; 3], "{name} {kelvin:?}");
+                // A component that is no number is missing, and no more than that.
+                let green = view.to_display([f32::NAN, 0.5, f32::NAN]);
+                assert_eq!(green, view.to_display([0.0, 0.5, 0.0]), "{name} {kelvin:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn names() {
+        for name in View::NAMES {
+            assert_eq!(View::from_name(name).map(|view| view.name()), Ok(name));
+        }
+        let message = View::from_name("filmc").unwrap_err().to_string();
+        assert!(View::NAMES.iter().all(|name| message.contains(name)) && message.contains("filmc"), "{message}");
+    }
+}

@@ -1,0 +1,285 @@
+//! The distance to a mesh, on a grid: negative inside.
+//!
+//! Near the surface distances are exact; from there the nearest triangle is handed on from point to point in sweeps
+//! (Zhao 2005, as Bridson's SDFGen does). A point is inside where lines along at least two of the three axes
+//! cross the surface an odd number of times, so that a small hole does not turn the world inside out.
+
+use glam::{DVec3, UVec3, Vec3};
+
+use super::mesh::Mesh;
+use crate::math;
+
+/// Cells along the longest side of the mesh.
+const CELLS: f64 = 64.0;
+/// Cells around the mesh on every side.
+const MARGIN: f64 = 3.0;
+/// Cells across a thin mesh, so that some lie within it,
+const CELLS_ACROSS: f64 = 2.5;
+/// and about as many cells in all at most for that.
+const MOST_CELLS: f64 = 7e5;
+
+/// Signed distance to a mesh, m.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DistanceField {
+    origin: DVec3,
+    spacing: f64,
+    size: [usize; 3],
+    /// Distance at each grid point, x fastest.
+    distance: Vec<f32>,
+}
+
+impl DistanceField {
+    /// The distances to `mesh`.
+    pub fn new(mesh: &Mesh) -> Self {
+        let [min, max] = mesh.bounds();
+        let spacing = spacing(mesh, (max - min).max_element());
+        let size = ((max - min) / spacing + 2.0 * MARGIN).ceil().as_uvec3() + UVec3::ONE;
+        let origin = min - MARGIN * spacing;
+        let mut building = Building::new(mesh, origin, spacing, size.to_array().map(|side| side as usize));
+        building.sweep();
+        let inside = building.inside();
+        let signed = |(distance, inside): (f32, bool)| if inside { -distance } else { distance };
+        let distance =
+            building.distance.iter().zip(inside).map(|(d, inside)| signed((*d * spacing as f32, inside))).collect();
+        Self { origin, spacing, size: building.size, distance }
+    }
+
+    /// Distance at `point`; beyond the grid at least as far as its edge is.
+    pub fn at(&self, point: DVec3) -> f64 {
+        let last = DVec3::from(self.size.map(|side| (side - 1) as f64));
+        let place = (point - self.origin) / self.spacing;
+        let held = place.clamp(DVec3::ZERO, last);
+        let cell = held.floor().min(last - 1.0);
+        let f = held - cell;
+        let [x, y, z] = cell.to_array().map(|c| c as usize);
+        let corner = |i: usize, j: usize, k: usize| f64::from(self.distance[self.index([x + i, y + j, z + k])]);
+        let along = |j, k| corner(0, j, k) * (1.0 - f.x) + corner(1, j, k) * f.x;
+        let across = |k| along(0, k) * (1.0 - f.y) + along(1, k) * f.y;
+        across(0) * (1.0 - f.z) + across(1) * f.z + (place - held).length() * self.spacing
+    }
+
+    /// Unit vector away from the mesh at `point`: the gradient of the distance.
+    pub fn normal(&self, point: DVec3) -> DVec3 {
+        let step = 0.5 * self.spacing;
+        let slope = |axis: DVec3| self.at(point + axis * step) - self.at(point - axis * step);
+        DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize_or(DVec3::Y)
+    }
+
+    fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        (z * self.size[1] + y) * self.size[0] + x
+    }
+}
+
+/// Distance between grid points for a mesh with such a longest side: small enough for its thickness, if that can be.
+fn spacing(mesh: &Mesh, longest: f64) -> f64 {
+    let [min, max] = mesh.bounds();
+    let (middle, mut volume, mut area) = (0.5 * (min + max), 0.0, 0.0);
+    for [a, b, c] in mesh.triangles().map(|corners| corners.map(|corner| corner - middle)) {
+        volume += a.dot(b.cross(c)) / 6.0;
+        area += 0.5 * (b - a).cross(c - a).length();
+    }
+    // A plate's sides are all its area, twice; what is nowhere as thin is thicker by that.
+    let thickness = 2.0 * volume.abs() / area.max(f64::MIN_POSITIVE);
+    let finest = math::cbrt((max - min + thickness).element_product() / MOST_CELLS);
+    // A sheet without thickness has no inside that a finer grid would find.
+    let across = if thickness > finest { (thickness / CELLS_ACROSS).max(finest) } else { f64::INFINITY };
+    across.min(longest / CELLS).max(1e-9)
+}
+
+/// The grid while it is filled; lengths in cells.
+struct Building {
+    size: [usize; 3],
+    triangles: Vec<[Vec3; 3]>,
+    distance: Vec<f32>,
+    nearest: Vec<u32>,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Building {
+    fn new(mesh: &Mesh, origin: DVec3, spacing: f64, size: [usize; 3]) -> Self {
+        let cells = |corner: DVec3| ((corner - origin) / spacing).as_vec3();
+        let count = size.iter().product();
+        let triangles = mesh.triangles().map(|corners| corners.map(cells)).collect();
+        let mut building = Self { size, triangles, distance: vec![f32::INFINITY; count], nearest: vec![NONE; count] };
+        (0..building.triangles.len()).for_each(|triangle| building.mark_near(triangle));
+        building
+    }
+
+    /// Exact distances of the points within a cell of the box around a triangle.
+    fn mark_near(&mut self, triangle: usize) {
+        let [a, b, c] = self.triangles[triangle];
+        let low = (a.min(b).min(c).floor() - 1.0).max(Vec3::ZERO).as_uvec3();
+        let high = (a.max(b).max(c).ceil() + 1.0).max(Vec3::ZERO).as_uvec3();
+        let size = self.size;
+        let end = |axis: usize| (high[axis] as usize + 1).min(size[axis]);
+        for z in low.z as usize..end(2) {
+            for y in low.y as usize..end(1) {
+                for x in low.x as usize..end(0) {
+                    self.offer([x, y, z], triangle as u32);
+                }
+            }
+        }
+    }
+
+    fn offer(&mut self, place: [usize; 3], triangle: u32) {
+        let index = (place[2] * self.size[1] + place[1]) * self.size[0] + place[0];
+        let point = Vec3::from(place.map(|coordinate| coordinate as f32));
+        let distance = distance_to_triangle(point, self.triangles[triangle as usize]);
+        if distance < self.distance[index] {
+            self.distance[index] = distance;
+            self.nearest[index] = triangle;
+        }
+    }
+
+    /// Hands nearest triangles on along all eight diagonals, twice.
+    fn sweep(&mut self) {
+        let [width, height, depth] = self.size;
+        for diagonal in 0..16 {
+            let forward = |bit: usize, i: usize, side: usize| if diagonal >> bit & 1 == 0 { i } else { side - 1 - i };
+            for k in 0..depth {
+                for j in 0..height {
+                    for i in 0..width {
+                        let place = [forward(0, i, width), forward(1, j, height), forward(2, k, depth)];
+                        self.take_over(place, diagonal);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Tries the nearest triangles of the three points behind `place`.
+    fn take_over(&mut self, place: [usize; 3], diagonal: usize) {
+        for axis in 0..3 {
+            let mut behind = place;
+            behind[axis] = if diagonal >> axis & 1 == 0 { place[axis].wrapping_sub(1) } else { place[axis] + 1 };
+            if behind[axis] < self.size[axis] {
+                let triangle = self.nearest[(behind[2] * self.size[1] + behind[1]) * self.size[0] + behind[0]];
+                if triangle != NONE {
+                    self.offer(place, triangle);
+                }
+            }
+        }
+    }
+
+    /// Whether each point is inside, by majority of three lines.
+    fn inside(&self) -> Vec<bool> {
+        let mut votes = vec![0u8; self.distance.len()];
+        for axis in 0..3 {
+            self.vote(axis, &mut votes);
+        }
+        votes.into_iter().map(|votes| votes >= 2).collect()
+    }
+
+    /// Adds a vote to every point before which the line along `axis` has crossed the surface an odd number of times.
+    fn vote(&self, axis: usize, votes: &mut [u8]) {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let strides = [1, self.size[0], self.size[0] * self.size[1]];
+        let mut crossings = vec![Vec::new(); self.size[u] * self.size[v]];
+        for corners in &self.triangles {
+            mark_crossings(corners, [axis, u, v], [self.size[u], self.size[v]], &mut crossings);
+        }
+        for (line, crossings) in crossings.iter_mut().enumerate() {
+            crossings.sort_unstable_by(f32::total_cmp);
+            let start = line % self.size[u] * strides[u] + line / self.size[u] * strides[v];
+            let mut passed = 0;
+            for i in 0..self.size[axis] {
+                while crossings.get(passed).is_some_and(|at| *at < i as f32) {
+                    passed += 1;
+                }
+                votes[start + i * strides[axis]] += u8::from(passed % 2 == 1);
+            }
+        }
+    }
+}
+
+/// Notes where the grid's lines along the first of `axes` cross a triangle.
+fn mark_crossings(corners: &[Vec3; 3], [axis, u, v]: [usize; 3], size: [usize; 2], crossings: &mut [Vec<f32>]) {
+    // Lines a hair beside the grid's points pass no corner and no edge of a mesh that was made on round numbers.
+    let shift = [1.371e-4, 2.137e-4];
+    let flat = corners.map(|corner| [corner[u] - shift[0], corner[v] - shift[1]]);
+    let cross = |[ax, ay]: [f32; 2], [bx, by]: [f32; 2], [px, py]: [f32; 2]| {
+        f64::from(bx - ax) * f64::from(py - ay) - f64::from(by - ay) * f64::from(px - ax)
+    };
+    let area = cross(flat[0], flat[1], flat[2]);
+    let range = |k: usize| {
+        let (low, high) = (flat.map(|c| c[k]), flat.map(|c| c[k]));
+        let low = low.into_iter().fold(f32::INFINITY, f32::min).ceil().max(0.0) as usize;
+        let high = high.into_iter().fold(f32::NEG_INFINITY, f32::max).floor();
+        if high < 0.0 { low..low } else { low..(high as usize + 1).min(size[k]) }
+    };
+    for j in range(1) {
+        for i in range(0) {
+            let point = [i as f32, j as f32];
+            let weights = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| cross(flat[a], flat[b], point) / area);
+            if area != 0.0 && weights.iter().all(|weight| *weight >= 0.0) {
+                let at: f64 = (0..3).map(|k| weights[k] * f64::from(corners[k][axis])).sum();
+                crossings[j * size[0] + i].push(at as f32);
+            }
+        }
+    }
+}
+
+/// Distance from a point to a triangle (Ericson, "Real-time collision detection", 5.1.5).
+fn distance_to_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
+    let (ab, ac, bc) = (b - a, c - a, c - b);
+    let normal = ab.cross(ac);
+    let outside = |edge: Vec3, corner: Vec3| edge.cross(p - corner).dot(normal) < 0.0;
+    let to_edge = |edge: Vec3, corner: Vec3| {
+        let along = ((p - corner).dot(edge) / edge.length_squared().max(1e-30)).clamp(0.0, 1.0);
+        (p - corner - edge * along).length()
+    };
+    if outside(ab, a) || outside(bc, b) || outside(-ac, c) {
+        to_edge(ab, a).min(to_edge(bc, b)).min(to_edge(ac, a))
+    } else {
+        ((p - a).dot(normal) / normal.length().max(1e-30)).abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::mesh;
+
+    #[test]
+    fn a_cube_is_negative_inside_and_exact_before_its_faces() {
+        let field = DistanceField::new(&mesh::cube());
+        assert!((field.at(DVec3::splat(0.5)) + 0.5).abs() < 0.01);
+        assert!((field.at(DVec3::new(0.5, 1.03, 0.4)) - 0.03).abs() < 1e-4);
+        assert!((field.at(DVec3::new(0.9, 0.5, 0.5)) + 0.1).abs() < 1e-4);
+        assert!((field.at(DVec3::new(4.0, 0.5, 0.5)) - 3.0).abs() < 0.01, "beyond the grid");
+        assert!((field.normal(DVec3::new(0.3, 1.02, 0.6)) - DVec3::Y).length() < 1e-3);
+    }
+
+    #[test]
+    fn a_thin_plate_that_leans_has_an_inside() {
+        let turned = glam::DQuat::from_rotation_z(0.6);
+        let plate = |corner: DVec3| (turned * (corner * DVec3::new(1.0, 0.02, 1.0))).as_vec3().to_array();
+        let corners: Vec<[f32; 3]> = mesh::cube().triangles().flatten().map(plate).collect();
+        let triangles = (0..12).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let field = DistanceField::new(&Mesh::new(corners, triangles).unwrap());
+        for step in 1..40 {
+            let along = 0.025 * f64::from(step);
+            let middle = turned * DVec3::new(along, 0.01, 0.98 * along);
+            assert!(field.at(middle) < -1e-3, "{} m at {middle}", field.at(middle));
+        }
+    }
+
+    #[test]
+    fn a_small_hole_does_not_turn_it_inside_out() {
+        let cube = mesh::cube();
+        let corners: Vec<[f32; 3]> = cube.triangles().flatten().map(|c| c.as_vec3().to_array()).collect();
+        let triangles = (1..12).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let field = DistanceField::new(&Mesh::new(corners, triangles).unwrap());
+        assert!(field.at(DVec3::new(0.3, 0.4, 0.7)) < -0.2);
+        assert!(field.at(DVec3::new(1.1, 0.4, 0.7)) > 0.0 && field.at(DVec3::new(0.4, -0.04, 1.04)) > 0.0);
+    }
+
+    #[test]
+    fn distance_to_a_triangle_is_to_its_face_edge_or_corner() {
+        let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        assert_eq!(distance_to_triangle(Vec3::new(0.2, 0.2, 3.0), triangle), 3.0);
+        assert_eq!(distance_to_triangle(Vec3::new(0.5, -2.0, 0.0), triangle), 2.0);
+        assert_eq!(distance_to_triangle(Vec3::new(-3.0, -4.0, 0.0), triangle), 5.0);
+    }
+}

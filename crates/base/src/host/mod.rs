@@ -1,0 +1,9 @@
+//! What the library asks of the program that runs it: files, memory, a way to stop, text for terminals, and scratch memory.
+
+pub mod assets;
+pub mod memory;
+pub mod observer;
+pub mod once;
+pub mod plural;
+pub mod printable;
+pub mod scratch_pool;

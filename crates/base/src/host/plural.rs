@@ -1,0 +1,18 @@
+//! Counts as people read them in messages.
+
+/// `count` things, each called `one`: `1 item`, `2 items`.
+///
+/// ```
+/// use self::counted;
+/// assert_eq!((counted(0, "item"), counted(1, "item"), counted(2, "item")), ("0 items".into(), "1 item".into(), "2 items".into()));
+/// ```
+#[must_use]
+pub fn counted(count: usize, one: &str) -> String {
+    if count == 1 { format!("1 {one}") } else { format!("{count} {one}s") }
+}
+
+/// How many are allowed: `exactly 2 items` or `1 to 8 items`.
+#[must_use]
+pub fn between(min: usize, max: usize, one: &str) -> String {
+    if min == max { format!("exactly {}", counted(min, one)) } else { format!("{min} to {}", counted(max, one)) }
+}

@@ -1,0 +1,93 @@
+//! Text that others wrote, as it may be shown on a terminal.
+
+use std::{borrow::Cow, fmt::Write};
+
+/// `text` in one line, with every character that would steer a terminal or turn the direction of reading as its escape, such as `\u{1b}`:
+/// names of files and values of scenes may hold any.
+///
+/// ```
+/// use self::printable;
+/// assert_eq!(printable("a\x1b[2J.png"), "a\\u{1b}[2J.png");
+/// assert_eq!(printable("火.png"), "火.png");
+/// ```
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if !text.chars().any(steers) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len());
+    for character in text.chars() {
+        // Writing to a string does not fail.
+        let _ = if steers(character) {
+            write!(shown, "{}", character.escape_default())
+        } else {
+            shown.write_char(character)
+        };
+    }
+    Cow::Owned(shown)
+}
+
+/// As [`printable`], with one character for each, so that a mark below it stands where it should: a space for a tab, the picture of a control
+/// (U+2400 and after), and a replacement character for what turns the direction of reading.
+///
+/// ```
+/// assert_eq!(self::pictured("a\t=\x1b[2J\u{202e}"), "a =\u{241b}[2J\u{fffd}");
+/// ```
+pub fn pictured(text: &str) -> String {
+    let picture = |character: char| match character {
+        '\t' => ' ',
+        '\0'..='\x1f' => char::from_u32(0x2400 + u32::from(character)).unwrap_or(char::REPLACEMENT_CHARACTER),
+        '\x7f' => '\u{2421}',
+        other if steers(other) => char::REPLACEMENT_CHARACTER,
+        other => other,
+    };
+    text.chars().map(picture).collect()
+}
+
+/// Characters of a text that are shown at its start, and at its end, where not all are.
+const SHOWN: [usize; 2] = [2000, 1000];
+
+/// As [`printable`], without the middle of a text of more than 3,000 characters: what is wrong stands in front, what is allowed at the end,
+/// and between them a value of any length.
+///
+/// ```
+/// use self::message;
+/// let shown = message(&format!("`{}` is not known; allowed: fire", "a".repeat(1_000_000))).into_owned();
+/// assert!(shown.starts_with("`aaa") && shown.contains("aaa [...] aaa") && shown.ends_with("allowed: fire") && shown.len() < 3100);
+/// ```
+pub fn message(text: &str) -> Cow<'_, str> {
+    let [first, last] = SHOWN;
+    let cut = |(start, _): (usize, char)| start;
+    let (Some(end), Some(start)) =
+        (text.char_indices().nth(first).map(cut), text.char_indices().rev().nth(last - 1).map(cut))
+    else {
+        return printable(text);
+    };
+    if end >= start {
+        return printable(text);
+    }
+    Cow::Owned(format!("{} [...] {}", printable(&text[..end]), printable(&text[start..])))
+}
+
+/// Controls, line and paragraph separators, and the marks of the Unicode bidirectional algorithm (UAX #9) that let text look like other text.
+fn steers(character: char) -> bool {
+    character.is_control()
+        || matches!(character, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_steers_a_terminal_is_shown_as_its_escape() {
+        for (text, shown) in [
+            ("a\nerror: b", "a\\nerror: b"),
+            ("\u{9b}2J\u{7f}\0", "\\u{9b}2J\\u{7f}\\u{0}"),
+            ("ab\u{202e}gnp.exe", "ab\\u{202e}gnp.exe"),
+            ("tab\there", "tab\\there"),
+        ] {
+            assert_eq!(printable(text), shown);
+        }
+        assert!(matches!(printable("Größe 3×4 火"), Cow::Borrowed(_)));
+    }
+}

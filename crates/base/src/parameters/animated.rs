@@ -1,0 +1,231 @@
+//! Values that change over time.
+
+use crate::math::curve::{Curve, CurveError, Interpolation};
+
+/// A value that can be keyed: made of numbers that are interpolated one by one.
+pub trait Animate: Copy + PartialEq {
+    /// How many numbers it is made of.
+    const COMPONENTS: usize;
+
+    /// The number at `index`, below [`COMPONENTS`](Self::COMPONENTS).
+    fn component(&self, index: usize) -> f64;
+
+    /// The value made of the number that `component` gives for each index.
+    fn from_components(component: impl FnMut(usize) -> f64) -> Self;
+}
+
+impl Animate for f64 {
+    const COMPONENTS: usize = 1;
+
+    fn component(&self, _index: usize) -> f64 {
+        *self
+    }
+
+    fn from_components(mut component: impl FnMut(usize) -> f64) -> Self {
+        component(0)
+    }
+}
+
+impl<const N: usize> Animate for [f64; N] {
+    const COMPONENTS: usize = N;
+
+    fn component(&self, index: usize) -> f64 {
+        self[index]
+    }
+
+    fn from_components(component: impl FnMut(usize) -> f64) -> Self {
+        std::array::from_fn(component)
+    }
+}
+
+/// A constant, or a value keyed over time; before the first key and after the last, their values hold, unless it repeats. Times are
+/// seconds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Animated<T> {
+    motion: Motion<T>,
+    period: Option<f64>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Motion<T> {
+    Constant(T),
+    /// One curve a component, all with the same times.
+    Keyed(Vec<Curve>),
+}
+
+impl<T: Animate> From<T> for Animated<T> {
+    fn from(value: T) -> Self {
+        Self { motion: Motion::Constant(value), period: None }
+    }
+}
+
+impl<T: Animate> Animated<T> {
+    /// The value through `keys` (time, value), times ascending.
+    ///
+    /// # Errors
+    /// No key, times not ascending, or a number that is not finite or too steep; see [`Curve::new`].
+    pub fn keyed(keys: Vec<(f64, T)>, interpolation: Interpolation) -> Result<Self, CurveError> {
+        let curve = |component: usize| {
+            let points = keys.iter().map(|(time, value)| [*time, value.component(component)]).collect();
+            Curve::new(points, interpolation)
+        };
+        let curves: Vec<Curve> = (0..T::COMPONENTS).map(curve).collect::<Result<_, _>>()?;
+        Ok(Self { motion: Motion::Keyed(curves), period: None })
+    }
+
+    /// Makes it repeat what it does between 0 and `period` (s, above 0); says whether it ends there as it began.
+    pub fn close(&mut self, period: f64) -> bool {
+        self.period = None;
+        let closes = self.at(0.0) == self.at(period);
+        self.period = Some(period);
+        closes
+    }
+
+    /// Value at time `t`.
+    pub fn at(&self, t: f64) -> T {
+        let (_, t) = self.turns(t);
+        self.each(|value| value, |curve| curve.eval(t))
+    }
+
+    /// Change a second at time `t`; see [`Curve::derivative`].
+    pub fn rate(&self, t: f64) -> T {
+        let (_, t) = self.turns(t);
+        self.each(|_| 0.0, |curve| curve.derivative(t))
+    }
+
+    /// Integral over time from `from` to `to`, exact but for rounding: the way that a keyed speed covers, so that any frame alone is right.
+    pub fn integral(&self, from: f64, to: f64) -> T {
+        let keyed = |curve: &Curve| {
+            let Some(period) = self.period else { return curve.integral(from, to) };
+            let [(before, from), (after, to)] = [from, to].map(|t| self.turns(t));
+            (after - before).mul_add(curve.integral(0.0, period), curve.integral(from, to))
+        };
+        self.each(|value| value * (to - from), keyed)
+    }
+
+    /// Whole periods before time `t`, and the time within its period.
+    fn turns(&self, t: f64) -> (f64, f64) {
+        let Some(period) = self.period else { return (0.0, t) };
+        let turns = (t / period).floor();
+        (turns, t - turns * period)
+    }
+
+    /// The value, if it never changes: no keys, or keys that all agree.
+    pub fn constant(&self) -> Option<T> {
+        match &self.motion {
+            Motion::Constant(value) => Some(*value),
+            Motion::Keyed(_) => {
+                let [low, high] = self.bounds();
+                (low == high).then_some(low)
+            }
+        }
+    }
+
+    /// Least and greatest value of each component over all time.
+    pub fn bounds(&self) -> [T; 2] {
+        [0, 1].map(|side| self.each(|value| value, |curve| curve.range()[side]))
+    }
+
+    /// Keys (time, value), ascending; none for a constant.
+    pub fn keys(&self) -> Vec<(f64, T)> {
+        match &self.motion {
+            Motion::Keyed(curves) if !curves.is_empty() => {
+                let key = |index: usize| {
+                    let time = curves[0].points()[index][0];
+                    (time, T::from_components(|component| curves[component].points()[index][1]))
+                };
+                (0..curves[0].points().len()).map(key).collect()
+            }
+            Motion::Keyed(_) | Motion::Constant(_) => Vec::new(),
+        }
+    }
+
+    /// How values between keys are found; a constant says [`Interpolation::Step`].
+    pub fn interpolation(&self) -> Interpolation {
+        match &self.motion {
+            Motion::Keyed(curves) if !curves.is_empty() => curves[0].interpolation(),
+            Motion::Keyed(_) | Motion::Constant(_) => Interpolation::Step,
+        }
+    }
+
+    /// The value whose components are `constant` of a constant's, or `keyed` of the curves.
+    fn each(&self, constant: impl Fn(f64) -> f64, keyed: impl Fn(&Curve) -> f64) -> T {
+        match &self.motion {
+            Motion::Constant(value) => T::from_components(|index| constant(value.component(index))),
+            Motion::Keyed(curves) => T::from_components(|index| keyed(&curves[index])),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn constants_hold_for_all_time() {
+        let constant = Animated::from([1.0, 2.0, 3.0]);
+        assert_eq!(constant.at(-7.0), [1.0, 2.0, 3.0]);
+        assert_eq!(constant.rate(1.0), [0.0; 3]);
+        assert_eq!(constant.integral(1.0, 3.0), [2.0, 4.0, 6.0]);
+        assert_eq!(constant.constant(), Some([1.0, 2.0, 3.0]));
+        assert_eq!(constant.bounds(), [[1.0, 2.0, 3.0]; 2]);
+        assert!(constant.keys().is_empty());
+    }
+
+    #[test]
+    fn what_repeats_has_the_same_values_and_integrals_in_every_period() {
+        let once = Animated::keyed(vec![(0.0, 1.0), (1.0, 3.0), (4.0, 1.0)], Interpolation::Linear).unwrap();
+        let mut repeating = once.clone();
+        assert!(!repeating.close(3.0) && repeating.close(4.0));
+        for t in [0.0, 0.5, 1.0, 2.75] {
+            assert_eq!([-8.0, -4.0, 0.0, 4.0].map(|turn| repeating.at(t + turn)), [once.at(t); 4]);
+            assert_eq!(repeating.rate(t + 4.0), once.rate(t));
+        }
+        // The mean is 2: 3 s from the second half of a period into the next but one.
+        assert_eq!(repeating.integral(2.0, 2.0 + 12.0), 24.0);
+        assert_eq!(repeating.integral(-1.0, 1.0), once.integral(3.0, 4.0) + once.integral(0.0, 1.0));
+    }
+
+    #[test]
+    fn vectors_are_keyed_one_component_at_a_time() {
+        let keys = vec![(0.0, [0.5, 0.0, 0.0]), (4.0, [2.0, 0.0, -8.0])];
+        let wind = Animated::keyed(keys.clone(), Interpolation::Linear).unwrap();
+        assert_eq!(wind.at(2.0), [1.25, 0.0, -4.0]);
+        assert_eq!(wind.rate(2.0), [0.375, 0.0, -2.0]);
+        assert_eq!(wind.integral(-1.0, 5.0), [0.5 + 5.0 + 2.0, 0.0, -24.0]);
+        assert_eq!(wind.bounds(), [[0.5, 0.0, -8.0], [2.0, 0.0, 0.0]]);
+        assert_eq!((wind.constant(), wind.keys(), wind.interpolation()), (None, keys, Interpolation::Linear));
+    }
+
+    #[test]
+    fn the_way_of_a_keyed_speed_is_its_integral_from_any_start() {
+        for interpolation in [Interpolation::Linear, Interpolation::Step, Interpolation::Monotone] {
+            let speed = Animated::keyed(vec![(1.0, 0.2), (2.5, 1.7), (3.0, 1.0), (7.0, 0.0)], interpolation).unwrap();
+            // Against 200,000 midpoints; a step between midpoints costs at most its height times their distance.
+            let (n, end) = (200_000, 9.0);
+            let sum: f64 = (0..n).map(|i| speed.at((i as f64 + 0.5) * end / n as f64)).sum::<f64>() * end / n as f64;
+            assert!((speed.integral(0.0, end) - sum).abs() < 1e-4, "{interpolation:?}");
+            let frames: f64 = (0..90).map(|i| speed.integral(i as f64 * 0.1, (i + 1) as f64 * 0.1)).sum();
+            assert!((speed.integral(0.0, end) - frames).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn keys_that_agree_are_a_constant() {
+        let still = Animated::keyed(vec![(0.0, 3.0), (1.0, 3.0)], Interpolation::Monotone).unwrap();
+        assert_eq!(still.constant(), Some(3.0));
+    }
+
+    #[test]
+    fn faulty_keys_are_named() {
+        assert_eq!(Animated::<f64>::keyed(vec![], Interpolation::Step), Err(CurveError::Empty));
+        assert_eq!(
+            Animated::keyed(vec![(0.0, [0.0; 3]), (0.0, [1.0; 3])], Interpolation::Linear),
+            Err(CurveError::NotAscending { index: 1 })
+        );
+        assert_eq!(
+            Animated::keyed(vec![(0.0, [0.0, 0.0, f64::INFINITY])], Interpolation::Linear),
+            Err(CurveError::NotFinite { index: 0 })
+        );
+    }
+}

@@ -1,0 +1,96 @@
+//! Strips laid before and behind each other.
+
+use super::*;
+use crate::{camera::Lens, math::curve::Interpolation, parameters::animated::Animated};
+
+#[test]
+fn what_is_drawn_later_lies_behind() {
+    let mut strip = Strip::default();
+    strip.reset(Rect::of_size(1, 1), None, 0);
+    strip.add_behind(0, [1.0; 3], [0.5; 3], 2.0);
+    strip.add_behind(0, [4.0; 3], [0.25; 3], 3.0);
+    assert_eq!(strip.radiance[0][0], 3.0);
+    assert_eq!(strip.transmittance(0), [0.125; 3]);
+    assert_eq!(strip.depth[0], 2.0);
+}
+
+#[test]
+fn gray_and_coloured_absorption_come_to_the_same() {
+    let mut gray = Strip::default();
+    gray.reset(Rect::of_size(2, 1), None, 0);
+    let mut coloured = gray.clone();
+    coloured.transmittance_planes_mut();
+    for strip in [&mut gray, &mut coloured] {
+        strip.add_row_behind(0, [&[1.0, 2.0]; 3], Some(&[0.25, 0.5]), &[1.0, 1.0]);
+        strip.add_row_behind(0, [&[4.0, 4.0]; 3], None, &[2.0, 2.0]);
+    }
+    assert_eq!(gray.radiance, coloured.radiance);
+    assert_eq!(gray.radiance[2], [4.0, 4.0]);
+    assert_eq!((gray.transmittance(0), gray.transmittance(1)), ([0.75; 3], [0.5; 3]));
+    gray.add_behind(1, [0.0; 3], [1.0, 0.5, 0.0], 3.0);
+    assert_eq!((gray.transmittance(0), gray.transmittance(1)), ([0.75; 3], [0.5, 0.25, 0.0]));
+}
+
+#[test]
+fn dissolves_mix_light_and_transmittance_and_keep_what_is_nearest() {
+    let mut strip = Strip::default();
+    strip.reset(Rect::of_size(1, 1), Some(&|_| &[9.0]), 2);
+    let mut other = strip.emptied();
+    assert_eq!((other.rect, other.plate_depth(0), other.aovs.len()), (strip.rect, 9.0, 2));
+    strip.add_behind(0, [8.0; 3], [1.0; 3], 2.0);
+    strip.aovs[0].add(0, 100.0, 1.0);
+    strip.aovs[1].keep_nearest(0, 5.0, 2.0);
+    other.add_behind(0, [0.0, 4.0, 16.0], [0.0, 0.5, 1.0], 1.0);
+    other.aovs[0].add(0, 20.0, 3.0);
+    other.aovs[1].keep_nearest(0, 7.0, 1.0);
+    let aov = |rule| AovDescriptor { name: "", unit: "", doc: "", rule };
+    strip.dissolve(other, 0.75, &[aov(AovRule::WeightedMean), aov(AovRule::Nearest)]);
+    assert_eq!(strip.radiance.map(|plane| plane[0]), [6.0, 7.0, 10.0]);
+    assert_eq!((strip.transmittance[0][0], strip.transmittance[1][0], strip.depth[0]), (0.75, 0.875, 1.0));
+    assert_eq!(strip.aovs[0].resolve(0, AovRule::WeightedMean), (75.0 + 15.0) / 1.5);
+    assert_eq!(strip.aovs[1].resolve(0, AovRule::Nearest), 7.0);
+}
+
+#[test]
+fn the_plate_hides_what_is_not_before_it() {
+    let plate = [1.0_f32, 5.0];
+    let mut strip = Strip::default();
+    strip.reset(Rect { x: 1, y: 0, width: 1, height: 1 }, Some(&|_| &plate), 0);
+    assert!(strip.visible(0, 4.9) && !strip.visible(0, 5.0));
+}
+
+#[test]
+fn weighted_means_ignore_the_order_of_samples() {
+    let mut strip = Strip::default();
+    strip.reset(Rect::of_size(1, 1), None, 1);
+    strip.aovs[0].add(0, 1000.0, 1.0);
+    strip.aovs[0].add(0, 2000.0, 3.0);
+    assert_eq!(strip.aovs[0].resolve(0, AovRule::WeightedMean), 1750.0);
+}
+
+#[test]
+fn a_dome_that_rolls_needs_several_instants() {
+    let path = |roll: f64| {
+        let keys = vec![(0.0, 0.0), (1.0, roll)];
+        CameraParameters {
+            lens: Lens::Fisheye,
+            position: Animated::from([0.0; 3]),
+            target: Animated::from([0.0, 1.0, 0.0]),
+            roll_deg: Animated::keyed(keys, Interpolation::Linear).unwrap(),
+            ..CameraParameters::default()
+        }
+    };
+    let view = |roll: f64| View::new(path(roll), Shutter { open: 0.0, close: 0.1 }, 0.0, [512, 512], 0);
+    // Half a degree on a circle of 256 pixels: 0.96 of the radius, 2.1 pixels by the angle in the sky.
+    let rolling = view(5.0);
+    assert!((rolling.motion_pixels() - 1.4).abs() < 0.1, "{}", rolling.motion_pixels());
+    assert_eq!((view(0.0).cameras().len(), rolling.cameras().len()), (1, 2));
+    assert_eq!(view(900.0).cameras().len(), 16);
+}
+
+#[test]
+fn a_picture_in_a_mirror_is_not_measured() {
+    let mut view = View::new(CameraParameters::default(), Shutter { open: 0.0, close: 0.0 }, 0.0, [8, 8], 0);
+    view.measured = true;
+    assert!(!view.mirrored(0.0).measured);
+}

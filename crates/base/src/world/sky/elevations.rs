@@ -1,0 +1,126 @@
+//! Light that was measured by elevation alone, as a photograph shows it.
+
+use std::f64::consts::PI;
+
+use crate::math::{self, MulAdd};
+
+/// Bands of elevation, each as wide in its sine.
+const BANDS: usize = 24;
+/// Steps of the integral over the upper hemisphere.
+const STEPS: usize = 96;
+
+/// Radiance (ACEScg) by elevation, the same all around: straight between the middles of bands of equal solid angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ElevationProfile {
+    bands: [[f32; 3]; BANDS],
+    /// Illuminance of open, level ground.
+    horizontal: [f32; 3],
+}
+
+/// Light from one direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ElevationSample {
+    /// Sine of the direction's elevation.
+    pub sine: f64,
+    /// Solid angle that it stands for, in any unit.
+    pub weight: f64,
+    /// Radiance, ACEScg.
+    pub radiance: [f32; 3],
+}
+
+impl ElevationProfile {
+    /// The mean of `samples` in each band; a band without any has that of the nearest with some. `None` where there is none at all.
+    pub fn of_samples(samples: impl IntoIterator<Item = ElevationSample>) -> Option<Self> {
+        let mut sums = [[0.0_f64; 4]; BANDS];
+        for ElevationSample { sine, weight, radiance } in samples {
+            let sum = &mut sums[((position(sine) + 0.5) as usize).min(BANDS - 1)];
+            (0..3).for_each(|c| sum[c] = weight.fma(f64::from(radiance[c]), sum[c]));
+            sum[3] += weight;
+        }
+        let seen: Vec<usize> = (0..BANDS).filter(|band| sums[*band][3] > 0.0).collect();
+        let nearest = |band: usize| seen.iter().min_by_key(|other| other.abs_diff(band));
+        let mut bands = [[0.0; 3]; BANDS];
+        for (band, radiance) in bands.iter_mut().enumerate() {
+            let [red, green, blue, weight] = sums[*nearest(band)?];
+            *radiance = [red, green, blue].map(|sum| (sum / weight) as f32);
+        }
+        Some(Self::new(bands))
+    }
+
+    fn new(bands: [[f32; 3]; BANDS]) -> Self {
+        let mut horizontal = [0.0_f64; 3];
+        for step in 0..STEPS {
+            let sine = (step as f64 + 0.5) / STEPS as f64;
+            let radiance = between(&bands, sine);
+            (0..3).for_each(|c| horizontal[c] += f64::from(radiance[c]) * 2.0 * PI * sine / STEPS as f64);
+        }
+        Self { bands, horizontal: horizontal.map(|value| value as f32) }
+    }
+
+    /// The same light, so many times as bright.
+    #[must_use]
+    pub fn scaled(&self, factor: f32) -> Self {
+        let scaled = |colour: [f32; 3]| colour.map(|value| value * factor);
+        Self { bands: self.bands.map(scaled), horizontal: scaled(self.horizontal) }
+    }
+
+    /// Radiance from directions whose elevation has this sine.
+    pub(super) fn radiance(&self, sine: f64) -> [f32; 3] {
+        between(&self.bands, sine)
+    }
+
+    /// Illuminance of open, level ground.
+    pub(super) fn horizontal_illuminance(&self) -> [f32; 3] {
+        self.horizontal
+    }
+
+    /// Whether it gives no light.
+    pub(super) fn is_dark(&self) -> bool {
+        self.bands.as_flattened().iter().all(|value| *value <= 0.0)
+    }
+}
+
+/// Where between the middles of bands a sine of elevation lies, counted from the lowest.
+fn position(sine: f64) -> f64 {
+    (0.5 * (sine + 1.0) * BANDS as f64 - 0.5).clamp(0.0, (BANDS - 1) as f64)
+}
+
+fn between(bands: &[[f32; 3]; BANDS], sine: f64) -> [f32; 3] {
+    let position = position(sine);
+    let lower = (position as usize).min(BANDS - 2);
+    let share = position - lower as f64;
+    std::array::from_fn(|c| math::lerp(f64::from(bands[lower][c]), f64::from(bands[lower + 1][c]), share) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(sine: f64, value: f32) -> ElevationSample {
+        ElevationSample { sine, weight: 1.0, radiance: [value, 0.5 * value, 0.0] }
+    }
+
+    #[test]
+    fn a_uniform_surrounding_has_its_radiance_everywhere_and_pi_of_it_on_the_ground() {
+        let even = ElevationProfile::of_samples([sample(0.1, 3.0)]).unwrap();
+        for sine in [-1.0, -0.3, 0.0, 0.8, 1.0] {
+            assert_eq!(even.radiance(sine), [3.0, 1.5, 0.0]);
+        }
+        assert!((f64::from(even.horizontal_illuminance()[0]) - 3.0 * PI).abs() < 1e-3);
+        assert_eq!(even.scaled(2.0).radiance(0.2), [6.0, 3.0, 0.0]);
+        assert!(!even.is_dark() && even.scaled(0.0).is_dark());
+        assert_eq!(ElevationProfile::of_samples([]), None);
+    }
+
+    #[test]
+    fn bright_sky_over_dark_ground_stays_above_and_goes_on_beyond_what_was_seen() {
+        let seen = (0..200).map(|i| {
+            let sine = f64::from(i) / 199.0 - 0.5;
+            sample(sine, if sine > 0.0 { 8.0 } else { 1.0 })
+        });
+        let profile = ElevationProfile::of_samples(seen).unwrap();
+        assert_eq!([1.0, 0.2, -0.2, -1.0].map(|sine| profile.radiance(sine)[0]), [8.0, 8.0, 1.0, 1.0]);
+        let rising = (0..40).map(|i| profile.radiance(f64::from(i) / 200.0 - 0.1)[0]).collect::<Vec<_>>();
+        assert!(rising.is_sorted(), "{rising:?}");
+    }
+}

@@ -1,0 +1,237 @@
+//! The sky as a light: what it shines from each direction.
+
+mod elevations;
+mod night;
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+use crate::{
+    color::{black_body, luminance},
+    math,
+    parameters::{Range, animated::Animated},
+};
+
+pub use elevations::{ElevationProfile, ElevationSample};
+pub use night::{EARTH_RADIUS_KM, Night, NightParameters, Parallel};
+
+/// Air masses along a line of sight `elevation` radians above the horizon: 1 overhead, 38 at the horizon (Kasten & Young 1989). What lies
+/// below the horizon has the horizon's.
+#[must_use]
+pub fn air_mass(elevation: f64) -> f64 {
+    let degrees = elevation.to_degrees().clamp(0.0, 90.0);
+    1.0 / (math::sin(degrees.to_radians()) + 0.50572 * math::pow(degrees + 6.07995, -1.6364))
+}
+
+crate::choice! {
+    /// How the sky's luminance is spread.
+    pub enum SkyKind {
+        /// The CIE overcast sky: three times as bright overhead as at the horizon.
+        Overcast = "overcast",
+        /// The same from everywhere.
+        Uniform = "uniform",
+        /// Airglow, stars and twilight, as `night` says.
+        Night = "night",
+    }
+}
+
+crate::parameters! {
+    /// The sky behind everything. It lights the scene; where there is a plate, the plate is seen in its place. A scene that states neither a
+    /// sky nor a light has one all the same where all its phenomena are of one kind that needs it: auroras stand in a night, rain falls at dusk. Such
+    /// a sky is seen too, unless the picture shall be transparent; one that is stated is always opaque.
+    pub struct SkyParameters {
+        /// How its luminance is spread.
+        kind: SkyKind = SkyKind::Overcast;
+        /// Luminance overhead: a rainy day has 500 to 5000, late dusk 1.
+        luminance: Animated<f64> = Animated::from(2000.0), limits(Range::new(0.0, 1e6)), unit("cd/m^2");
+        /// Temperature of a black body of its colour; by day, for at night each of its lights has its own.
+        temperature_k: f64 = 7000.0, limits(Range::new(1000.0, 10_000.0)), unit("K");
+        /// Whether it is seen, or only lights.
+        visible: bool = true;
+        /// Height of the hills all around, before the sky; 0 for none.
+        hills_deg: f64 = 0.0, limits(Range::new(0.0, 30.0)), unit("degrees");
+        /// Height of the trees on them; 0 for none.
+        trees_deg: f64 = 0.0, limits(Range::new(0.0, 30.0)), unit("degrees");
+        /// How far away hills and trees stand.
+        hills_distance: f64 = 8000.0, limits(Range::new(1.0, 1e5)), unit("m");
+        /// The sky at night.
+        night: NightParameters = NightParameters::default();
+    }
+}
+
+impl SkyParameters {
+    /// The sky at time `t`.
+    pub fn at(&self, t: f64) -> Sky {
+        if self.kind == SkyKind::Night {
+            return Sky::of_night(self.night.at(t));
+        }
+        let colour = black_body().radiance(self.temperature_k as f32);
+        let scale = self.luminance.at(t) / f64::from(luminance(colour)).max(f64::MIN_POSITIVE);
+        Sky { kind: self.kind, zenith: colour.map(|value| (f64::from(value) * scale) as f32), ..Sky::DARK }
+    }
+}
+
+/// Share of its light that the ground, as far as the sky knows it, throws back: seen from below the horizon.
+const GROUND_ALBEDO: f64 = 0.15;
+
+/// The sky at one time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sky {
+    kind: SkyKind,
+    zenith: [f32; 3],
+    night: Option<Night>,
+    measured: Option<ElevationProfile>,
+}
+
+impl Sky {
+    /// No light from anywhere.
+    pub const DARK: Self = Self { kind: SkyKind::Uniform, zenith: [0.0; 3], night: None, measured: None };
+
+    /// Light that was measured, from above and from below (ACEScg, cd/m^2).
+    #[must_use]
+    pub fn measured(profile: ElevationProfile) -> Self {
+        Self { zenith: profile.radiance(1.0), measured: Some(profile), ..Self::DARK }
+    }
+
+    fn of_night(night: Night) -> Self {
+        Self { kind: SkyKind::Night, zenith: night.radiance(DVec3::Y), night: Some(night), measured: None }
+    }
+
+    /// Radiance from a direction, a unit vector (ACEScg, cd/m^2). From below the horizon comes what a dull ground throws back, unless it
+    /// was measured.
+    pub fn radiance(&self, direction: DVec3) -> [f32; 3] {
+        if let Some(measured) = &self.measured {
+            return measured.radiance(direction.y);
+        }
+        if direction.y < 0.0 {
+            return self.horizontal_illuminance().map(|value| value * (GROUND_ALBEDO / PI) as f32);
+        }
+        if let Some(night) = &self.night {
+            return night.radiance(direction);
+        }
+        let share = match self.kind {
+            SkyKind::Overcast => overcast(direction.y),
+            SkyKind::Uniform | SkyKind::Night => 1.0,
+        };
+        self.zenith.map(|value| value * share as f32)
+    }
+
+    /// [`radiance`](Self::radiance) from directions whose sines of elevation these are, by component; `None` of a night, which is not the
+    /// same all around.
+    #[inline(always)]
+    pub fn radiance_at_elevations<const N: usize>(&self, sines: &[f32; N]) -> Option<[[f32; N]; 3]> {
+        if self.night.is_some() {
+            return None;
+        }
+        if let Some(measured) = &self.measured {
+            let each = sines.map(|sine| measured.radiance(f64::from(sine)));
+            return Some(std::array::from_fn(|c| each.map(|radiance| radiance[c])));
+        }
+        let ground = self.radiance(-DVec3::Y);
+        let mut shares = [1.0; N];
+        if self.kind == SkyKind::Overcast {
+            for i in 0..N {
+                shares[i] = overcast(f64::from(sines[i])) as f32;
+            }
+        }
+        let mut planes = [[0.0; N]; 3];
+        for c in 0..3 {
+            for i in 0..N {
+                planes[c][i] = if sines[i] < 0.0 { ground[c] } else { self.zenith[c] * shares[i] };
+            }
+        }
+        Some(planes)
+    }
+
+    /// Illuminance of open, level ground (ACEScg, lux).
+    pub fn horizontal_illuminance(&self) -> [f32; 3] {
+        if let Some(measured) = &self.measured {
+            return measured.horizontal_illuminance();
+        }
+        let hemisphere = match self.kind {
+            SkyKind::Overcast => 7.0 / 9.0 * PI,
+            // Nearly even: what the horizon has more of airglow the air takes.
+            SkyKind::Uniform | SkyKind::Night => PI,
+        };
+        self.zenith.map(|value| value * hemisphere as f32)
+    }
+
+    /// The night, if that is what it is.
+    pub fn night(&self) -> Option<&Night> {
+        self.night.as_ref()
+    }
+
+    /// Whether it gives no light.
+    pub fn is_dark(&self) -> bool {
+        self.measured.map_or(self.zenith == [0.0; 3], |measured| measured.is_dark())
+    }
+}
+
+/// Luminance of an overcast sky beside that of its zenith, by the sine of the elevation: CIE S 011, `L = Lz (1 + 2 sin elevation) / 3`.
+#[inline(always)]
+fn overcast(sine: f64) -> f64 {
+    (1.0 + 2.0 * sine) / 3.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math;
+
+    fn sky(kind: SkyKind) -> Sky {
+        SkyParameters { kind, luminance: Animated::from(900.0), ..SkyParameters::default() }.at(0.0)
+    }
+
+    #[test]
+    fn luminance_is_as_set_overhead_and_a_third_at_an_overcast_horizon() {
+        let overcast = sky(SkyKind::Overcast);
+        assert!((luminance(overcast.radiance(DVec3::Y)) - 900.0).abs() < 0.1);
+        assert!((luminance(overcast.radiance(DVec3::X)) - 300.0).abs() < 0.1);
+        assert!((luminance(sky(SkyKind::Uniform).radiance(DVec3::X)) - 900.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn many_elevations_have_the_radiance_of_each() {
+        let sines = [-1.0, -0.25, 0.0, 0.3, 0.71, 1.0_f32];
+        for kind in [SkyKind::Overcast, SkyKind::Uniform] {
+            let planes = sky(kind).radiance_at_elevations(&sines).unwrap();
+            for (i, sine) in sines.into_iter().map(f64::from).enumerate() {
+                let direction = DVec3::new(math::sqrt(1.0 - sine * sine), sine, 0.0);
+                assert_eq!(planes.map(|plane| plane[i]), sky(kind).radiance(direction));
+            }
+        }
+        assert_eq!(sky(SkyKind::Night).radiance_at_elevations(&sines), None);
+        let samples = [(-0.5, 1.0), (0.5, 9.0)];
+        let sample = |(sine, value)| ElevationSample { sine, weight: 1.0, radiance: [value; 3] };
+        let measured = Sky::measured(ElevationProfile::of_samples(samples.map(sample)).unwrap());
+        let planes = measured.radiance_at_elevations(&sines).unwrap();
+        assert_eq!(planes[1].map(|value| value), sines.map(|sine| measured.radiance(DVec3::Y * f64::from(sine))[1]));
+    }
+
+    #[test]
+    fn illuminance_is_the_integral_of_radiance_over_the_hemisphere() {
+        for kind in [SkyKind::Overcast, SkyKind::Uniform] {
+            let sky = sky(kind);
+            let steps = 2000;
+            let sum: f64 = (0..steps)
+                .map(|step| {
+                    let elevation = (f64::from(step) + 0.5) / f64::from(steps) * 0.5 * PI;
+                    let (sin, cos) = math::sin_cos(elevation);
+                    let radiance = luminance(sky.radiance(DVec3::new(cos, sin, 0.0)));
+                    2.0 * PI * sin * cos * f64::from(radiance) * 0.5 * PI / f64::from(steps)
+                })
+                .sum();
+            let closed = f64::from(luminance(sky.horizontal_illuminance()));
+            assert!((sum / closed - 1.0).abs() < 1e-4, "{kind:?}: {sum} against {closed}");
+        }
+    }
+
+    #[test]
+    fn a_warmer_sky_is_redder() {
+        let warm = SkyParameters { temperature_k: 3000.0, ..SkyParameters::default() }.at(0.0).radiance(DVec3::Y);
+        let cold = SkyParameters { temperature_k: 10_000.0, ..SkyParameters::default() }.at(0.0).radiance(DVec3::Y);
+        assert!(warm[0] / warm[2] > 2.0 * cold[0] / cold[2]);
+        assert!(Sky::DARK.is_dark() && !sky(SkyKind::Overcast).is_dark());
+    }
+}

@@ -1,0 +1,202 @@
+//! The sky at night: airglow, unresolved stars, and what is left of the day.
+
+use glam::DVec3;
+
+use super::air_mass;
+use crate::{
+    color::{ACESCG_FROM_XYZ, LUMINOUS_EFFICACY_LM_PER_W, black_body, line_xyz, luminance},
+    math,
+    parameters::{Range, animated::Animated},
+};
+
+const SHARE: Range = Range::new(0.0, 100.0);
+
+crate::parameters! {
+    /// What is seen at night, with `kind = "night"`; brightness is absolute, so that the sky's own `luminance` plays no part.
+    pub struct NightParameters {
+        /// How high the sun stands: below -18 no light of it is left, from -6 on the brightest stars appear.
+        sun_elevation_deg: Animated<f64> = Animated::from(-30.0), limits(Range::new(-90.0, 0.0)), unit("degrees");
+        /// Where the sun stands, from north over east.
+        sun_azimuth_deg: f64 = 0.0, limits(Range::new(-360.0, 360.0)), unit("degrees");
+        /// Brightness of the airglow beside a usual night's.
+        airglow: f64 = 1.0, limits(SHARE);
+        /// Brightness of the stars beside the real sky's; 0 for none.
+        stars: f64 = 1.0, limits(SHARE);
+        /// Brightness of the Milky Way beside the real one's.
+        milky_way: f64 = 1.0, limits(SHARE);
+        /// Magnitudes that the air takes overhead.
+        extinction: f64 = 0.22, limits(Range::new(0.0, 5.0)), unit("mag");
+    }
+}
+
+/// Lines of the airglow: wavelength in nm, brightness overhead in kR, altitude of the layer in km (Roach & Gordon 1973; Leinert et
+/// al. 1998). The last stands for the hydroxyl bands that the eye sees.
+const AIRGLOW: [(f64, f64, f64); 4] =
+    [(557.7, 0.22, 97.0), (630.0, 0.08, 250.0), (589.3, 0.03, 92.0), (660.0, 0.2, 87.0)];
+/// Luminance of zodiacal light, faint stars and the airglow's continuum together, cd/m^2 (Leinert et al. 1998), and its colour, K.
+const BACKGROUND: f64 = 1.2e-4;
+const BACKGROUND_K: f32 = 9500.0;
+/// Logarithm (base 10) of the luminance overhead, cd/m^2, for every 3 degrees that the sun is lower, from the horizon on (Koomen et
+/// al. 1952).
+const TWILIGHT: [f64; 7] = [2.3, 1.2, -0.2, -1.7, -3.0, -4.1, -5.6];
+/// Height of the twilight arch, radians.
+const TWILIGHT_ARCH: f64 = 0.17;
+/// Mean radius of the Earth, km.
+pub const EARTH_RADIUS_KM: f64 = 6371.0;
+/// h c / (4 pi) for a kilorayleigh, W m^-2 sr^-1 nm.
+const KILORAYLEIGH: f64 = 1e13 / (4.0 * std::f64::consts::PI) * 6.626_070_15e-34 * 299_792_458.0 * 1e9;
+
+/// The night at one time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Night {
+    airglow: f64,
+    /// Luminance overhead that the sun leaves, cd/m^2.
+    twilight: f64,
+    /// Unit vector to where the sun stands below the horizon.
+    sunward: DVec3,
+    extinction: f64,
+}
+
+impl NightParameters {
+    /// The night at time `t`.
+    pub(super) fn at(&self, t: f64) -> Night {
+        let depression = -self.sun_elevation_deg.at(t) / 3.0;
+        let last = TWILIGHT.len() - 1;
+        let place = (depression as usize).min(last - 1);
+        let log = math::lerp(TWILIGHT[place], TWILIGHT[place + 1], depression - place as f64);
+        let (east, north) = math::sin_cos(self.sun_azimuth_deg.to_radians());
+        Night {
+            airglow: self.airglow,
+            twilight: if depression < last as f64 + 1.0 { math::pow(10.0, log) } else { 0.0 },
+            sunward: DVec3::new(east, 0.0, -north),
+            extinction: self.extinction,
+        }
+    }
+}
+
+/// The night along a circle of one elevation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Parallel {
+    /// What is there all around: ACEScg, cd/m^2.
+    even: [f32; 3],
+    /// What is added over the sun, by the fourth power of how far a direction turns to it.
+    glow: [f32; 3],
+    /// What is added in proportion to that.
+    blue: [f32; 3],
+}
+
+impl Parallel {
+    /// What radiance is made of: all around, over the sun by the fourth power of how far a direction turns to it, and in proportion
+    /// to that.
+    #[must_use]
+    pub fn terms(&self) -> [[f32; 3]; 3] {
+        [self.even, self.glow, self.blue]
+    }
+
+    /// Radiance where a direction turns toward the sun by `toward`: 1 over it, 0 opposite.
+    #[inline(always)]
+    #[must_use]
+    pub fn radiance(&self, toward: f32) -> [f32; 3] {
+        let squared = toward * toward;
+        let fourth = squared * squared;
+        std::array::from_fn(|c| self.glow[c].mul_add(fourth, self.blue[c].mul_add(toward, self.even[c])))
+    }
+}
+
+impl Night {
+    /// Radiance from a direction above the horizon (ACEScg, cd/m^2).
+    pub(super) fn radiance(&self, direction: DVec3) -> [f32; 3] {
+        let elevation = math::asin(direction.y.clamp(0.0, 1.0));
+        self.parallel(elevation).radiance(self.toward(direction) as f32)
+    }
+
+    /// Unit vector to where the sun stands below the horizon.
+    #[must_use]
+    pub fn sunward(&self) -> DVec3 {
+        self.sunward
+    }
+
+    /// How far a direction turns toward the sun: 1 over it, 0 opposite.
+    fn toward(&self, direction: DVec3) -> f64 {
+        0.5 + 0.5 * DVec3::new(direction.x, 0.0, direction.z).normalize_or_zero().dot(self.sunward)
+    }
+
+    /// Share of a star's light that arrives from an elevation in radians.
+    #[must_use]
+    pub fn transmittance(&self, elevation: f64) -> f64 {
+        math::pow(10.0, -0.4 * self.extinction * air_mass(elevation))
+    }
+
+    /// All directions of an elevation in radians.
+    #[must_use]
+    pub fn parallel(&self, elevation: f64) -> Parallel {
+        let overhead = self.transmittance(std::f64::consts::FRAC_PI_2);
+        // Scattered light fills up a third of what the air takes.
+        let diffuse = 0.3 + 0.7 * self.transmittance(elevation) / overhead.max(f64::MIN_POSITIVE);
+        let mut even = of_kind(BACKGROUND_K, BACKGROUND * diffuse);
+        for (wavelength_nm, kilorayleigh, altitude_km) in AIRGLOW {
+            let scale = LUMINOUS_EFFICACY_LM_PER_W * KILORAYLEIGH / wavelength_nm;
+            let brightness = self.airglow * kilorayleigh * van_rhijn(elevation, altitude_km) * diffuse * scale;
+            even += DVec3::from(ACESCG_FROM_XYZ.apply(line_xyz(wavelength_nm))) * brightness;
+        }
+        // What is left of the day: blue overhead, brighter and yellow low over the sun.
+        let low = math::exp(-elevation / TWILIGHT_ARCH);
+        let blue = of_kind(10_000.0, self.twilight);
+        let single = |colour: DVec3| colour.to_array().map(|value| value as f32);
+        Parallel {
+            even: single(even + blue),
+            glow: single(of_kind(3200.0, self.twilight * 9.0 * low * low)),
+            blue: single(blue * (2.0 * low)),
+        }
+    }
+}
+
+/// How much longer the way through a thin layer is at an elevation than overhead (van Rhijn 1921).
+fn van_rhijn(elevation: f64, altitude_km: f64) -> f64 {
+    let share = EARTH_RADIUS_KM / (EARTH_RADIUS_KM + altitude_km) * math::cos(elevation);
+    1.0 / math::sqrt(1.0 - share * share)
+}
+
+/// Light of a black body's colour and of that luminance.
+fn of_kind(temperature_k: f32, brightness: f64) -> DVec3 {
+    let colour = black_body().radiance(temperature_k);
+    let scale = brightness / f64::from(luminance(colour)).max(f64::MIN_POSITIVE);
+    DVec3::from(colour.map(f64::from)) * scale
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn overhead(parameters: &NightParameters) -> f64 {
+        f64::from(luminance(parameters.at(0.0).radiance(DVec3::Y)))
+    }
+
+    #[test]
+    fn a_dark_night_has_about_22_magnitudes_per_square_second() {
+        // 21.6 to 22 mag/arcsec^2 at good sites: 1.7e-4 to 2.5e-4 cd/m^2.
+        let dark = overhead(&NightParameters::default());
+        assert!((1.6e-4..2.6e-4).contains(&dark), "{dark}");
+    }
+
+    #[test]
+    fn airglow_brightens_toward_the_horizon_and_the_way_is_the_published_one() {
+        // Roach & Meinel (1955): 100 km, zenith distance 80 degrees: 3.9.
+        assert!((van_rhijn(10f64.to_radians(), 100.0) - 4.0).abs() < 0.2);
+        assert_eq!(van_rhijn(std::f64::consts::FRAC_PI_2, 100.0), 1.0);
+        let night = NightParameters::default().at(0.0);
+        let low = DVec3::new(0.97, 0.24, 0.0).normalize();
+        assert!(luminance(night.radiance(low)) > 1.1 * luminance(night.radiance(DVec3::Y)));
+    }
+
+    #[test]
+    fn twilight_falls_a_thousandfold_from_6_to_12_degrees_and_lies_over_the_sun() {
+        let at =
+            |degrees: f64| NightParameters { sun_elevation_deg: Animated::from(degrees), ..NightParameters::default() };
+        let ratio = overhead(&at(-6.0)) / overhead(&at(-12.0));
+        assert!((200.0..1500.0).contains(&ratio), "{ratio}");
+        let night = at(-9.0).at(0.0);
+        let seen = |z: f64| luminance(night.radiance(DVec3::new(0.0, 0.1, z).normalize()));
+        assert!(seen(-1.0) > 2.0 * seen(1.0));
+    }
+}

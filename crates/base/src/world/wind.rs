@@ -1,0 +1,160 @@
+//! The one wind of a scene: it bends flames, slants rain and drives particles.
+
+use glam::DVec3;
+
+use crate::{
+    math::random::{Key, Purpose},
+    noise::{Coordinate, Fractal, Noise, VARIANCE},
+    parameters::{Range, animated::Animated},
+};
+
+crate::parameters! {
+    /// The wind, the same for everything in the scene.
+    pub struct WindParameters {
+        /// Mean velocity: x to the right, y up, z toward the viewer of an unturned camera.
+        velocity: Animated<[f64; 3]> = Animated::from([0.0, 0.0, 0.0]), limits(Range::new(-100.0, 100.0)), unit("m/s");
+        /// Turbulence intensity: standard deviation of the speed, as a share of the mean speed.
+        gust: f64 = 0.3, limits(Range::new(0.0, 2.0));
+        /// Size of gusts; they drift with the mean wind (in a seamless loop they stay and only change).
+        gust_length: f64 = 6.0, limits(Range::new(0.1, 1000.0)), unit("m");
+        /// How long a gust lasts where it is.
+        gust_period_s: f64 = 2.0, limits(Range::new(0.05, 600.0)), unit("s");
+    }
+}
+
+/// Two octaves, the second half as high.
+const FRACTAL: Fractal = Fractal { octaves: 2, lacunarity: 2, gain: 0.5 };
+/// Shares of the octaves squared and summed: (2/3)^2 + (1/3)^2.
+const FRACTAL_VARIANCE: f64 = 5.0 / 9.0;
+/// Gusts rise and fall less than they swing sideways, since the ground is near.
+const GUST_SHAPE: DVec3 = DVec3::new(1.0, 0.35, 1.0);
+
+/// The wind of a shot.
+#[derive(Clone, Debug)]
+pub struct Wind {
+    parameters: WindParameters,
+    /// Noise of each component over (x, y, z, t).
+    gusts: Option<[Noise<4>; 3]>,
+    /// Where in the noise the shot lies, so that seeds differ even at the origin.
+    origin: DVec3,
+    loop_s: Option<f64>,
+}
+
+impl Wind {
+    /// The wind with these parameters; in a loop it blows the same every `loop_s` seconds.
+    pub fn new(mut parameters: WindParameters, seed: u64, loop_s: Option<f64>) -> Self {
+        let key = Key::new(seed, "wind");
+        let words = key.words(0, 0, Purpose::named("gusts"));
+        let period = loop_s.map_or(0, |seconds| loop_cells(seconds, parameters.gust_period_s));
+        let component = |index: usize| Noise::new(words[index], FRACTAL, [0, 0, 0, period]).ok();
+        let gusts = match [component(0), component(1), component(2)] {
+            [Some(x), Some(y), Some(z)] => Some([x, y, z]),
+            _ => None,
+        };
+        let origin = DVec3::from(
+            key.uniforms(1, 0, Purpose::named("gusts")).first_chunk().map_or([0.0; 3], |u: &[f32; 3]| u.map(f64::from)),
+        );
+        if let Some(seconds) = loop_s {
+            parameters.velocity.close(seconds);
+        }
+        Self { parameters, gusts, origin: origin * 64.0, loop_s }
+    }
+
+    /// Mean velocity at time `t`, m/s.
+    pub fn mean(&self, t: f64) -> DVec3 {
+        DVec3::from(self.parameters.velocity.at(t))
+    }
+
+    /// How far the mean wind travels from one time to another, m.
+    pub fn travel(&self, from: f64, to: f64) -> DVec3 {
+        DVec3::from(self.parameters.velocity.integral(from, to))
+    }
+
+    /// Size of the gusts, m; `None` where there never are any.
+    pub fn gust_length(&self) -> Option<f64> {
+        let [low, high] = self.parameters.velocity.bounds();
+        let gusty = self.parameters.gust > 0.0 && [low, high].into_iter().flatten().any(|speed| speed != 0.0);
+        gusty.then_some(self.parameters.gust_length)
+    }
+
+    /// Velocity at a point at time `t`, gusts included, m/s.
+    pub fn at(&self, point: DVec3, t: f64) -> DVec3 {
+        let mean = self.mean(t);
+        let strength = self.parameters.gust * mean.length();
+        let Some(gusts) = self.gusts.as_ref().filter(|_| strength > 0.0) else { return mean };
+        let WindParameters { gust_length, gust_period_s, .. } = &self.parameters;
+        let (drift, turns) = match self.loop_s {
+            None => (self.travel(0.0, t), t / gust_period_s),
+            Some(seconds) => (DVec3::ZERO, t / seconds * f64::from(loop_cells(seconds, *gust_period_s))),
+        };
+        let place = (point - drift) / *gust_length + self.origin;
+        let coordinates = [place.x, place.y, place.z, turns].map(Coordinate::from_f64);
+        let noise = DVec3::from([0, 1, 2].map(|axis| f64::from(gusts[axis].at(coordinates))));
+        let deviation = crate::math::sqrt(VARIANCE[2] * FRACTAL_VARIANCE);
+        mean + GUST_SHAPE * noise * (strength / deviation)
+    }
+}
+
+/// Whole gusts in a loop.
+fn loop_cells(seconds: f64, gust_period_s: f64) -> u32 {
+    (seconds / gust_period_s).round().clamp(1.0, 1e6) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wind(loop_s: Option<f64>) -> Wind {
+        let velocity = Animated::from([4.0, 0.0, 0.0]);
+        Wind::new(WindParameters { velocity, gust: 0.25, ..WindParameters::default() }, 7, loop_s)
+    }
+
+    #[test]
+    fn gusts_have_the_turbulence_intensity_that_was_asked_for() {
+        let wind = wind(None);
+        let speeds: Vec<f64> = (0..20_000)
+            .map(|i| {
+                wind.at(DVec3::new(f64::from(i) * 3.7, f64::from(i % 97), f64::from(i % 31) * 5.3), f64::from(i) * 0.11)
+                    .x
+            })
+            .collect();
+        let mean = speeds.iter().sum::<f64>() / speeds.len() as f64;
+        let variance = speeds.iter().map(|speed| (speed - mean) * (speed - mean)).sum::<f64>() / speeds.len() as f64;
+        assert!((mean - 4.0).abs() < 0.05, "{mean}");
+        assert!((variance.sqrt() - 1.0).abs() < 0.08, "standard deviation {}", variance.sqrt());
+    }
+
+    #[test]
+    fn the_mean_wind_travels_as_its_integral_says() {
+        let keyed =
+            Animated::keyed(vec![(0.0, [0.0; 3]), (2.0, [4.0, 0.0, -2.0])], crate::math::curve::Interpolation::Linear);
+        let velocity = keyed.unwrap();
+        let wind = Wind::new(WindParameters { velocity, ..WindParameters::default() }, 7, None);
+        assert!((wind.travel(0.0, 2.0) - DVec3::new(4.0, 0.0, -2.0)).length() < 1e-12);
+        assert_eq!(wind.gust_length(), Some(6.0));
+        assert_eq!(Wind::new(WindParameters::default(), 7, None).gust_length(), None);
+    }
+
+    #[test]
+    fn gusts_drift_with_the_mean_wind() {
+        let wind = wind(None);
+        let still = Wind::new(WindParameters { gust_period_s: 600.0, ..wind.parameters.clone() }, 7, None);
+        let here = still.at(DVec3::new(1.0, 2.0, 3.0), 0.0);
+        let there = still.at(DVec3::new(5.0, 2.0, 3.0), 1.0);
+        assert!((here - there).length() < 0.02, "{here} {there}");
+    }
+
+    #[test]
+    fn a_loop_blows_the_same_after_one_turn() {
+        let wind = wind(Some(4.0));
+        let point = DVec3::new(0.3, 1.0, -2.0);
+        assert!((wind.at(point, 0.7) - wind.at(point, 4.7)).length() < 1e-4);
+        assert!((wind.at(point, 0.7) - wind.at(point, 2.7)).length() > 1e-3);
+    }
+
+    #[test]
+    fn still_air_has_no_gusts() {
+        let wind = Wind::new(WindParameters::default(), 1, None);
+        assert_eq!(wind.at(DVec3::ONE, 3.0), DVec3::ZERO);
+    }
+}

@@ -1,0 +1,476 @@
+//! The sky as a backdrop: what lies behind everything where there is no plate.
+
+mod night;
+mod row_cache;
+mod skyline;
+mod stars;
+
+use std::{
+    f64::consts::TAU,
+    ops::Range,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use bansho_base::{
+    camera::{Camera, directions::Directions},
+    color,
+    host::observer::{Cancelled, Observer},
+    image::Rect,
+    math::{DVec2, DVec3, MulAdd, approximations, simd::LANES},
+    phenomenon::{
+        Phenomenon, Prepared,
+        strip::{AovDescriptor, DepthInterval, Shutter, Strip, View},
+        surroundings::{Publication, Surroundings},
+    },
+    world::sky::{Sky, SkyKind, SkyParameters},
+};
+
+use fearless_simd::{Level, Simd, dispatch};
+use night::NightSky;
+use row_cache::{SkyRow, Still};
+use skyline::Skyline;
+use stars::{MOST_PIXELS, Stars};
+
+/// The sky of a scene, infinitely far and opaque, with hills before it; at night with stars.
+pub struct SkyBackdrop {
+    parameters: SkyParameters,
+    stars: Option<Stars>,
+    skyline: Option<Skyline>,
+    /// What the frame before showed, which the next one shows again if neither camera nor sky change.
+    still: Mutex<Option<Still>>,
+}
+
+impl SkyBackdrop {
+    /// The name of its layer.
+    pub const NAME: &str = "sky";
+
+    /// A sky with these parameters.
+    pub fn new(parameters: SkyParameters, seed: u64) -> Self {
+        let night = parameters.kind == SkyKind::Night;
+        let stars = (night && parameters.night.stars > 0.0).then(|| Stars::new(seed));
+        Self { stars, skyline: Skyline::new(&parameters, seed), parameters, still: Mutex::default() }
+    }
+
+    /// The night that a sky shows in a view; none by day.
+    fn still(&self, sky: &Sky, view: &View, cameras: &[Camera]) -> Option<Still> {
+        let night = sky.night()?;
+        // The lock is never held while threads work together.
+        let kept = || self.still.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(still) = kept().as_mut().filter(|still| still.is_of(cameras, view.size, sky)) {
+            still.keep_rows();
+            return Some(still.clone());
+        }
+        let spots = self.stars.as_ref().map(|stars| stars.spots(view, night, self.parameters.night.stars));
+        let still = Still {
+            cameras: cameras.to_vec(),
+            size: view.size,
+            sky: *sky,
+            night: Arc::new(NightSky::new(sky, night, self.parameters.night.milky_way)),
+            spots: Arc::new(spots.unwrap_or_default()),
+            rows: None,
+        };
+        *kept() = Some(still.clone());
+        Some(still)
+    }
+
+    /// Where the hills stand.
+    fn hills(&self) -> DepthInterval {
+        let near = self.parameters.hills_distance;
+        DepthInterval { near, far: near * (1.0 + 1e-4) }
+    }
+}
+
+/// Behind everything that has a depth.
+const FAR: DepthInterval = DepthInterval { near: 1e12, far: f64::INFINITY };
+/// Light of hills and trees beside that of the sky overhead.
+const HILL_SHADE: f32 = 0.04;
+
+impl Phenomenon for SkyBackdrop {
+    fn name(&self) -> &str {
+        Self::NAME
+    }
+
+    fn aovs(&self) -> &'static [AovDescriptor] {
+        &[]
+    }
+
+    fn luminance(&self) -> f64 {
+        f64::from(color::luminance(self.parameters.at(0.0).radiance(DVec3::Y)))
+    }
+
+    fn publish(&self, _shutter: Shutter) -> Publication {
+        Publication::default()
+    }
+
+    fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
+        if self.skyline.is_some() { vec![self.hills(), FAR] } else { vec![FAR] }
+    }
+
+    fn prepare<'a>(
+        &'a self,
+        view: &'a View,
+        surroundings: &'a Surroundings<'a>,
+        _observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        let sky = surroundings.sky;
+        let cameras = view.cameras();
+        let still = self.still(&sky, view, &cameras);
+        Ok(Box::new(PreparedSky { view, cameras, sky, still, skyline: self.skyline.as_ref(), hills: self.hills() }))
+    }
+}
+
+struct PreparedSky<'a> {
+    view: &'a View,
+    /// At as many instants as its motion needs, each for an equal part of the exposure.
+    cameras: Vec<Camera>,
+    sky: Sky,
+    /// The night; none by day.
+    still: Option<Still>,
+    skyline: Option<&'a Skyline>,
+    /// Where it stands.
+    hills: DepthInterval,
+}
+
+impl PreparedSky<'_> {
+    #[inline(always)]
+    fn draw_sky<S: Simd>(&self, simd: S, strip: &mut Strip) {
+        let rect = strip.rect;
+        let far = vec![f32::INFINITY; rect.width];
+        let mut own = SkyRow::default();
+        for y in rect.y..rect.bottom() {
+            let first = (y - rect.y) * rect.width;
+            let kept = if rect.width == self.view.size[0] { self.kept_row(simd, y) } else { None };
+            let row = match kept {
+                Some(row) if !strip.has_plate() => row,
+                _ => {
+                    match kept {
+                        Some(row) => own.clone_from(row),
+                        None => self.fill_row(simd, &mut own, y, rect.x..rect.right()),
+                    }
+                    own.hide_behind(strip, first);
+                    &own
+                }
+            };
+            let [red, green, blue] = &row.planes;
+            strip.add_row_behind(first, [red, green, blue], Some(&row.opacity), &far);
+        }
+    }
+
+    /// A whole row of the picture, if such are kept.
+    #[inline(always)]
+    fn kept_row<S: Simd>(&self, simd: S, y: usize) -> Option<&SkyRow> {
+        let row = self.still.as_ref()?.rows.as_ref()?.get(y)?;
+        if row.get().is_none() {
+            // Not within a closure, which would be compiled without the machine's vectors.
+            let mut drawn = SkyRow::default();
+            self.fill_row(simd, &mut drawn, y, 0..self.view.size[0]);
+            return Some(row.get_or_init(|| drawn));
+        }
+        row.get()
+    }
+
+    /// Draws pixels of row `y`, whatever is before them.
+    #[inline(always)]
+    fn fill_row<S: Simd>(&self, simd: S, row: &mut SkyRow, y: usize, pixels: Range<usize>) {
+        let share = 1.0 / self.cameras.len() as f32;
+        row.clear(pixels.len());
+        // Batches lie on the picture's own grid, so that a crop changes no pixel.
+        let mut x = pixels.start / LANES * LANES;
+        while x < pixels.end {
+            for camera in &self.cameras {
+                let mut directions = Directions::new(camera, x, y);
+                directions.normalize();
+                let colours = self.radiance(simd, &directions);
+                for i in pixels.start.max(x) - x..pixels.end.min(x + LANES) - x {
+                    if directions.seen[i] {
+                        row.add(x + i - pixels.start, colours[i], share);
+                    }
+                }
+            }
+            x += LANES;
+        }
+        self.add_stars(row, y, pixels);
+    }
+
+    /// Radiance from directions, red, green, blue and nothing.
+    #[inline(always)]
+    fn radiance<S: Simd>(&self, simd: S, directions: &Directions) -> [[f32; 4]; LANES] {
+        if let Some(still) = &self.still {
+            return still.night.radiance(simd, directions);
+        }
+        let mut colours = [[0.0; 4]; LANES];
+        if let Some(planes) = self.sky.radiance_at_elevations(&directions.axes[1]) {
+            for i in 0..LANES {
+                for c in 0..3 {
+                    colours[i][c] = planes[c][i];
+                }
+            }
+        }
+        colours
+    }
+
+    /// Adds the stars of one row where the sky is seen.
+    #[inline(always)]
+    fn add_stars(&self, row: &mut SkyRow, y: usize, pixels: Range<usize>) {
+        let spots = self.still.as_ref().map_or(&[][..], |still| &still.spots);
+        let from = spots.partition_point(|spot| spot.pixel.y < y as f64 - 12.0);
+        for spot in &spots[from..] {
+            if spot.pixel.y >= y as f64 + 12.0 {
+                return;
+            }
+            if (y as f64 + 0.5 - spot.pixel.y).abs() >= spot.reach {
+                continue;
+            }
+            let low = (spot.pixel.x - spot.reach).floor().max(pixels.start as f64) as usize;
+            let high = (spot.pixel.x + spot.reach).ceil().clamp(0.0, pixels.end as f64) as usize;
+            if low >= high {
+                continue;
+            }
+            let shapes = spot.row(low, y);
+            for x in low..high.min(low + MOST_PIXELS) {
+                let at = x - pixels.start;
+                let shape = shapes[x - low] * row.opacity[at];
+                for c in 0..3 {
+                    row.planes[c][at] = spot.radiance[c].fma(shape, row.planes[c][at]);
+                }
+            }
+        }
+    }
+
+    /// Hills and trees, black before the sky.
+    #[inline(always)]
+    fn draw_hills(&self, skyline: &Skyline, strip: &mut Strip) {
+        let rect = strip.rect;
+        let shade = self.sky.radiance(DVec3::Y).map(|value| value * HILL_SHADE);
+        let near = self.hills.near as f32;
+        let highest = skyline.highest + 1.0 / self.view.camera.focal_pixels as f32;
+        let mut x = rect.x / LANES * LANES;
+        while x < rect.right() {
+            if self.is_above(rect, x, highest) {
+                x += LANES;
+                continue;
+            }
+            let inside = rect.x.max(x) - x..rect.right().min(x + LANES) - x;
+            for y in rect.y..rect.bottom() {
+                let mut covers = self.covers(skyline, x, y);
+                let first = (y - rect.y) * rect.width + x + inside.start - rect.x;
+                if strip.has_plate() {
+                    for i in inside.clone() {
+                        covers[i] = if strip.visible(first + i - inside.start, near) { covers[i] } else { 0.0 };
+                    }
+                }
+                if covers == [0.0; LANES] {
+                    continue;
+                }
+                let (mut planes, mut depths) = ([[0.0; LANES]; 3], [f32::INFINITY; LANES]);
+                for i in 0..LANES {
+                    for c in 0..3 {
+                        planes[c][i] = shade[c] * covers[i];
+                    }
+                    depths[i] = if covers[i] > 0.0 { near } else { f32::INFINITY };
+                }
+                let [red, green, blue] = &planes;
+                let light = [&red[inside.clone()], &green[inside.clone()], &blue[inside.clone()]];
+                strip.add_row_behind(first, light, Some(&covers[inside.clone()]), &depths[inside.clone()]);
+            }
+            x += LANES;
+        }
+    }
+
+    /// How much of the pixels from `x` on in row `y` the hills hide, while the shutter is open.
+    #[inline(always)]
+    fn covers(&self, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
+        let share = 1.0 / self.cameras.len() as f32;
+        let mut mean = [0.0; LANES];
+        for camera in &self.cameras {
+            let covers = covers_at(camera, skyline, x, y);
+            for i in 0..LANES {
+                mean[i] = covers[i].fma(share, mean[i]);
+            }
+        }
+        mean
+    }
+
+    /// Whether the pixels of a strip from `x` on surely look higher than at that sine of the elevation.
+    fn is_above(&self, rect: Rect, x: usize, sine: f32) -> bool {
+        // From corner to corner the sine hardly bends.
+        let angle = LANES as f64 / self.view.camera.focal_pixels;
+        let least = f64::from(sine) + angle * angle;
+        let rows = [rect.y, rect.bottom()].map(|y| y as f64);
+        let mut corners = rows.into_iter().flat_map(|y| [x, x + LANES].map(|x| DVec2::new(x as f64, y)));
+        let is_above = |corner: DVec2| {
+            self.cameras
+                .iter()
+                .all(|camera| camera.direction(corner).is_some_and(|toward| toward.y > least * toward.length()))
+        };
+        corners.all(is_above)
+    }
+}
+
+/// How much of the pixels from `x` on in row `y` of a camera the hills hide.
+#[inline(always)]
+fn covers_at(camera: &Camera, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
+    let sharpness = camera.focal_pixels as f32;
+    let mut directions = Directions::new(camera, x, y);
+    directions.normalize();
+    let Directions { axes: [xs, sines, zs], seen } = &directions;
+    let (mut above, mut below) = (true, true);
+    for i in 0..LANES {
+        above &= sines[i] > skyline.highest + 1.0 / sharpness;
+        below &= sines[i] < skyline.lowest - 1.0 / sharpness;
+    }
+    let (mut covers, mut turns) = ([0.0; LANES], [0.0; LANES]);
+    if above {
+        return covers;
+    }
+    if !below {
+        for i in 0..LANES {
+            turns[i] = approximations::atan2(xs[i], -zs[i]) * (1.0 / TAU) as f32;
+        }
+    }
+    for i in 0..LANES {
+        let hidden = if below { 1.0 } else { skyline.sine(turns[i]) };
+        let cover = (hidden - sines[i]).fma(sharpness, 0.5).clamp(0.0, 1.0);
+        covers[i] = if seen[i] { cover } else { 0.0 };
+    }
+    covers
+}
+
+impl Prepared for PreparedSky<'_> {
+    fn bounds(&self, slice: &DepthInterval) -> Rect {
+        let hills = self.skyline.is_some() && slice.overlaps(&self.hills);
+        if hills || slice.overlaps(&FAR) {
+            Rect::of_size(self.view.size[0], self.view.size[1])
+        } else {
+            Rect::default()
+        }
+    }
+
+    fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        let level = Level::new();
+        if let Some(skyline) = self.skyline.filter(|_| slice.contains(self.hills.near)) {
+            dispatch!(level, _simd => self.draw_hills(skyline, strip));
+        }
+        if slice.overlaps(&FAR) {
+            dispatch!(level, simd => self.draw_sky(simd, strip));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{
+        camera::CameraParameters,
+        host::observer::Unobserved,
+        math,
+        math::curve::Interpolation,
+        parameters::animated::Animated,
+        world::wind::{Wind, WindParameters},
+    };
+
+    use super::*;
+
+    /// Light of a night as a camera sees it that turns by so many degrees while the shutter is open: green, row by row.
+    fn night_seen(turn_deg: f64, hills_deg: f64) -> Vec<f32> {
+        let parameters = SkyParameters { kind: SkyKind::Night, hills_deg, ..SkyParameters::default() };
+        let backdrop = SkyBackdrop::new(parameters.clone(), 3);
+        let [x, z] = [math::sin(turn_deg.to_radians()) * 60.0, math::cos(turn_deg.to_radians()) * -60.0];
+        let keys = vec![(0.0, [0.0, 30.0, -60.0]), (1.0, [x, 30.0, z])];
+        let camera = CameraParameters {
+            position: [0.0; 3].into(),
+            target: Animated::keyed(keys, Interpolation::Linear).unwrap(),
+            vertical_fov_deg: 60.0.into(),
+            ..CameraParameters::default()
+        };
+        let view = View::new(camera, Shutter { open: 0.0, close: 1.0 }, 0.0, [240, 160], 0);
+        let wind = Wind::new(WindParameters::default(), 1, None);
+        let surroundings = Surroundings { sky: parameters.at(0.5), ..Surroundings::of_wind(&wind) };
+        let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).unwrap();
+        let mut strip = Strip::default();
+        strip.reset(Rect::of_size(240, 160), None, 0);
+        prepared.draw(&DepthInterval::ALL, &mut strip);
+        assert!((0..strip.len()).all(|pixel| strip.transmittance(pixel)[1] < 1e-5), "the sky is opaque");
+        strip.radiance[1].clone()
+    }
+
+    #[test]
+    fn stars_draw_trails_where_the_camera_turns() {
+        let [still, turning] = [0.0, 6.0].map(|turn| night_seen(turn, 0.0));
+        let brightest = |light: &[f32]| light.iter().fold(0.0_f32, |most, value| most.max(*value));
+        let sum = |light: &[f32]| light.iter().map(|value| f64::from(*value)).sum::<f64>();
+        // 6 degrees are some 15 pixels; a star's light is spread over them, and none is lost.
+        assert!(brightest(&turning) < 0.3 * brightest(&still), "{} {}", brightest(&turning), brightest(&still));
+        assert!((sum(&turning) / sum(&still) - 1.0).abs() < 0.15, "{}", sum(&turning) / sum(&still));
+    }
+
+    #[test]
+    fn hills_are_soft_where_the_camera_turns() {
+        // Neighbours along a row differ most at the hills' edges.
+        let steepest = |light: Vec<f32>| {
+            let rows = light.chunks(240).skip(120);
+            let steps = rows.flat_map(|row| row.windows(2).map(|pair| (pair[0] - pair[1]).abs()).collect::<Vec<_>>());
+            steps.fold(0.0_f32, f32::max)
+        };
+        let [still, turning] = [0.0, 6.0].map(|turn| steepest(night_seen(turn, 12.0)));
+        assert!(turning < 0.5 * still, "{turning} {still}");
+    }
+
+    /// Light of a night in a part of a picture, of which the plate hides every third pixel.
+    fn night_in(backdrop: &SkyBackdrop, rect: Rect, has_plate: bool) -> [Vec<f32>; 3] {
+        let camera = CameraParameters {
+            position: [0.0; 3].into(),
+            target: [0.0, 30.0, -60.0].into(),
+            vertical_fov_deg: 60.0.into(),
+            ..CameraParameters::default()
+        };
+        let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [150, 90], 0);
+        let wind = Wind::new(WindParameters::default(), 1, None);
+        let surroundings = Surroundings { sky: backdrop.parameters.at(0.0), ..Surroundings::of_wind(&wind) };
+        let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).expect("nobody asks to stop");
+        let depths: Vec<f32> = (0..150 * 90).map(|pixel| if pixel % 3 == 0 { 5.0 } else { f32::INFINITY }).collect();
+        let mut strip = Strip::default();
+        let rows = |y: usize| &depths[150 * y..150 * (y + 1)];
+        strip.reset(rect, has_plate.then_some(&rows), 0);
+        prepared.draw(&DepthInterval::ALL, &mut strip);
+        strip.radiance
+    }
+
+    #[test]
+    fn a_sky_that_is_shown_again_is_the_same() {
+        let parameters = SkyParameters { kind: SkyKind::Night, ..SkyParameters::default() };
+        let shown = SkyBackdrop::new(parameters.clone(), 3);
+        let whole = Rect::of_size(150, 90);
+        for (rect, has_plate) in [
+            (whole, false),
+            (whole, false),
+            (Rect { x: 37, y: 11, width: 50, height: 30 }, false),
+            (whole, true),
+            (Rect { y: 40, height: 8, ..whole }, false),
+        ] {
+            let first = night_in(&SkyBackdrop::new(parameters.clone(), 3), rect, has_plate);
+            assert!(night_in(&shown, rect, has_plate) == first, "{rect:?}, plate: {has_plate}");
+            assert_eq!(first[1].contains(&0.0), has_plate);
+        }
+        let kept = shown.still.lock().unwrap_or_else(PoisonError::into_inner);
+        let rows = kept.as_ref().and_then(|still| still.rows.clone()).expect("it was shown again");
+        assert!(rows.iter().all(|row| row.get().is_some()));
+    }
+
+    #[test]
+    fn it_fills_the_picture_behind_everything_and_hides_what_is_behind_it() {
+        let parameters = SkyParameters { luminance: Animated::from(300.0), ..SkyParameters::default() };
+        let backdrop = SkyBackdrop::new(parameters.clone(), 1);
+        let shutter = Shutter { open: 0.0, close: 0.0 };
+        let view = View::new(CameraParameters::default(), shutter, 0.0, [16, 8], 0);
+        let wind = Wind::new(WindParameters::default(), 1, None);
+        let surroundings = Surroundings { sky: parameters.at(0.0), ..Surroundings::of_wind(&wind) };
+        let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).unwrap();
+        let mut strip = Strip::default();
+        strip.reset(Rect::of_size(16, 8), None, 0);
+        prepared.draw(&FAR, &mut strip);
+        assert!(strip.radiance[1].iter().all(|value| *value > 0.0));
+        assert_eq!(strip.transmittance(77), [0.0; 3]);
+        assert!(prepared.bounds(&DepthInterval { near: 0.0, far: 1e6 }).is_empty());
+        assert!(strip.radiance[1][0] > strip.radiance[1][16 * 7], "an overcast sky is brighter above");
+    }
+}

@@ -1,0 +1,170 @@
+//! 100,000 particles drawn at 1280 x 720, and their haze, each with the naive way beside it: every sprite onto every pixel that it covers.
+
+mod plume;
+mod support;
+
+use std::hint::black_box;
+
+use bansho_base::{
+    camera::CameraParameters,
+    color,
+    host::observer::Unobserved,
+    image::Rect,
+    math::{self, DVec2, DVec3, random::Key},
+    parameters::animated::Animated,
+    phenomenon::{
+        Prepared,
+        strip::{DepthInterval, Shutter, Strip, View},
+        surroundings::Surroundings,
+    },
+    world::{
+        air::Air,
+        wind::{Wind, WindParameters},
+    },
+};
+
+use bansho_fire::particles::{
+    Particles,
+    render::{Ending, Gas, LookParameters, Memory, PreparedGas, line_gradient, line_integral, soot_absorption},
+};
+use criterion::{Criterion, criterion_group, criterion_main};
+use rayon::prelude::*;
+use support::pinned_pool;
+
+const SIZE: [usize; 2] = [1280, 720];
+const STRIP: usize = 8;
+const COUNT: usize = 100_000;
+const HEIGHT: f64 = 1.5;
+const TIME: f64 = 3.0;
+
+/// A camera that the plume fills most of the height of.
+fn view() -> View {
+    let camera = CameraParameters {
+        position: Animated::from([0.0, 0.5 * HEIGHT, 2.2 * HEIGHT]),
+        target: Animated::from([0.0, 0.5 * HEIGHT, 0.0]),
+        ..CameraParameters::default()
+    };
+    View::new(camera, Shutter { open: TIME, close: TIME + 1.0 / 60.0 }, TIME + 1.0 / 30.0, SIZE, 0)
+}
+
+fn gas<'a>(particles: &'a Particles, memory: &'a Memory) -> Gas<'a> {
+    Gas {
+        particles,
+        time: TIME,
+        air_temperature_k: 293.15,
+        detail_speed: 0.3 * HEIGHT,
+        base: DVec3::ZERO,
+        size: DVec2::ONE,
+        key: Key::new(1, "plume"),
+        ending: Ending::NEVER,
+        memory,
+    }
+}
+
+/// What is drawn, and with what memory.
+struct Subject {
+    particles: Particles,
+    view: View,
+    memory: Memory,
+}
+
+/// Prepares the gas and hands it to `each`.
+fn prepared(subject: &Subject, look: &LookParameters, each: impl FnOnce(&PreparedGas)) {
+    let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
+    let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
+    let gas = gas(&subject.particles, &subject.memory);
+    if let Ok(prepared) = PreparedGas::new(gas, look, &subject.view, &surroundings, &Unobserved) {
+        each(&prepared);
+    }
+}
+
+/// Draws the gas, and hands it to `before` before.
+fn draw(subject: &Subject, look: &LookParameters, before: impl Fn(&PreparedGas) + Sync) {
+    prepared(subject, look, |prepared| {
+        before(prepared);
+        (0..SIZE[1].div_ceil(STRIP)).into_par_iter().for_each_init(Strip::default, |strip, index| {
+            let y = index * STRIP;
+            strip.reset(Rect { x: 0, y, width: SIZE[0], height: STRIP.min(SIZE[1] - y) }, None, 0);
+            prepared.draw(&DepthInterval::ALL, strip);
+            black_box(&strip.radiance);
+        });
+    });
+}
+
+/// Every sprite evaluated at every pixel that it covers, for `WIDTH` values: light, or deflection.
+fn naive<const WIDTH: usize>(particles: &Particles, view: &View, value: impl Fn(usize, [f64; 2], f64) -> [f64; WIDTH]) {
+    let mut picture = vec![[0.0_f64; WIDTH]; SIZE[0] * SIZE[1]];
+    for index in 0..particles.len() {
+        let place = DVec3::from(particles.positions().map(|values| f64::from(values[index])));
+        let Some(seen) = view.camera.project(place) else { continue };
+        let radius = f64::from(particles.support_radii()[index]);
+        let reach = radius * seen.pixels_per_metre;
+        let clip = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
+        for y in clip(seen.pixel.y - reach, SIZE[1])..clip(seen.pixel.y + reach + 1.0, SIZE[1]) {
+            for x in clip(seen.pixel.x - reach, SIZE[0])..clip(seen.pixel.x + reach + 1.0, SIZE[0]) {
+                let offset = [x as f64 + 0.5 - seen.pixel.x, y as f64 + 0.5 - seen.pixel.y];
+                let offset = offset.map(|pixels| pixels / seen.pixels_per_metre);
+                let sums = &mut picture[y * SIZE[0] + x];
+                sums.iter_mut().zip(value(index, offset, radius)).for_each(|(sum, value)| *sum += value);
+            }
+        }
+    }
+    black_box(picture);
+}
+
+fn gas_720p(criterion: &mut Criterion) {
+    let pool = pinned_pool(2);
+    let subject = Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), memory: Memory::default() };
+    let Subject { particles, view, .. } = &subject;
+    let look = LookParameters::default();
+    let volume = |index: usize| f64::from(particles.masses()[index] / particles.densities()[index]);
+    let mut group = criterion.benchmark_group("flame gas 1280x720");
+    group.sample_size(10);
+    group.bench_function("sums and detail", |bencher| {
+        pool.install(|| bencher.iter(|| draw(&subject, &look, |_| ())));
+    });
+    group.bench_function("sums, detail and haze", |bencher| {
+        pool.install(|| {
+            bencher.iter(|| draw(&subject, &look, |prepared| assert!(prepared.deflection().is_some())));
+        });
+    });
+    let smooth = LookParameters { detail: 0.0, ..look.clone() };
+    group.bench_function("sums alone", |bencher| {
+        pool.install(|| bencher.iter(|| draw(&subject, &smooth, |_| ())));
+    });
+    group.bench_function("naive sums", |bencher| {
+        bencher.iter(|| {
+            naive(particles, view, |index, [u, v], radius| {
+                let tau = line_integral(math::hypot(u, v), radius)
+                    * volume(index)
+                    * soot_absorption(f64::from(particles.soots()[index]), &look);
+                let [red, green, blue] = color::black_body().radiance(particles.temperatures()[index]).map(f64::from);
+                [tau, tau * red, tau * green, tau * blue]
+            });
+        });
+    });
+    // Of gas that neither shines nor hides only the haze is summed.
+    let clear = LookParameters { soot_gain: 0.0, base_blue: 0.0, ..look.clone() };
+    group.bench_function("haze of clear gas", |bencher| {
+        pool.install(|| {
+            bencher.iter(|| {
+                prepared(&subject, &clear, |prepared| {
+                    black_box(prepared.deflection().map(|bend| bend.depth));
+                });
+            });
+        });
+    });
+    group.bench_function("naive haze", |bencher| {
+        bencher.iter(|| {
+            naive(particles, view, |index, [u, v], radius| {
+                let b = math::hypot(u, v).max(1e-9);
+                let slope = line_gradient(b, radius) * volume(index) / b;
+                [slope * u, slope * v]
+            });
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(gas_benches, gas_720p);
+criterion_main!(gas_benches);

@@ -1,0 +1,3 @@
+//! The way of the paper itself, where a scene selects it: sprites instead of gas (figure 7).
+
+pub(crate) mod squares;

@@ -1,0 +1,222 @@
+//! The particle flame as a phenomenon: its simulation, and how it is drawn and seen by others.
+
+use bansho_base::{
+    color,
+    geometry::point_cloud::{PointCloud, Quantity},
+    host::{
+        assets::Assets,
+        observer::{Cancelled, Observer},
+    },
+    math::{self, DVec2, DVec3, random::Key},
+    parameters::{Auto, Parameter},
+    phenomenon::{
+        Phenomenon, Prepared, Remark, SnapshotError, Stepping,
+        strip::{AovDescriptor, DepthInterval, Shutter, View},
+        surroundings::{Neighbours, Publication, Surroundings},
+    },
+};
+
+use super::{
+    fault::{ParticleFault, ParticleFaultKind},
+    parameters::{FlameParticlesParameters, TemperatureLaw},
+    render::{self, Ending, Gas, Memory, PreparedGas, SpriteStyle},
+};
+use crate::particles::simulate::{
+    burner::Burner, derived::Design, particles::Particles, simulation::Simulation, snapshot,
+};
+
+/// A particle flame at some moment of its life.
+#[derive(Clone, Debug)]
+pub struct FlameParticles {
+    name: String,
+    key: Key,
+    parameters: FlameParticlesParameters,
+    simulation: Simulation,
+    /// Time of the state, s.
+    time: f64,
+    /// Temperature of the air at the last step, K.
+    air_temperature_k: f64,
+    /// What it draws with.
+    memory: Memory,
+}
+
+impl FlameParticles {
+    /// The particle flame `name` of a scene, before its preroll. Meshes of burners come from `assets`.
+    ///
+    /// # Errors
+    /// Parameters that do not go together, a mesh that cannot be had, a flow that does not end a loop as it begins it.
+    pub fn new(
+        mut parameters: FlameParticlesParameters,
+        name: &str,
+        seed: u64,
+        loop_s: Option<f64>,
+        assets: &dyn Assets,
+    ) -> Result<Self, ParticleFault> {
+        if let Some(seconds) = loop_s {
+            close_loop(&mut parameters, seconds)?;
+        }
+        let key = Key::new(seed, name);
+        let design = Design::new(&parameters, loop_s, assets)?;
+        let steps = (design.preroll / parameters.step_s).round();
+        Ok(Self {
+            name: name.to_owned(),
+            key,
+            time: -steps * parameters.step_s,
+            air_temperature_k: bansho_base::world::air::Air::default().temperature_k,
+            simulation: Simulation::new(&parameters, design, key),
+            memory: Memory::default(),
+            parameters,
+        })
+    }
+
+    /// The gas as it is now.
+    pub fn particles(&self) -> &Particles {
+        &self.simulation.particles
+    }
+
+    /// The gas as the drawing sees it.
+    fn gas(&self) -> Gas<'_> {
+        let tallest = self.tallest();
+        let place = DVec3::from(self.parameters.position) + tallest.position(self.time);
+        Gas {
+            particles: &self.simulation.particles,
+            time: self.time,
+            air_temperature_k: self.air_temperature_k,
+            detail_speed: match self.parameters.look.detail_speed {
+                Auto::Set(speed) => speed,
+                Auto::Auto => UNSTRETCHED * tallest.axis_speed(0.5 * tallest.height),
+            },
+            base: place,
+            size: DVec2::new(tallest.diameter, tallest.height),
+            key: self.key,
+            ending: self.ending(),
+            memory: &self.memory,
+        }
+    }
+
+    fn ending(&self) -> Ending {
+        /// Share of the time that burnt gas stays.
+        const FADING: f64 = 0.2;
+        let seconds = (FADING * self.parameters.life.afterlife_s).max(self.parameters.step_s) as f32;
+        Ending { seconds, domain: self.simulation.design.domain.map(|corner| corner.as_vec3()) }
+    }
+
+    fn tallest(&self) -> &Burner {
+        let burners = &self.simulation.design.burners;
+        // A design has at least one burner.
+        let taller = |a: &&Burner, b: &&Burner| a.height.total_cmp(&b.height);
+        burners.iter().max_by(taller).unwrap_or(&burners[0])
+    }
+}
+
+/// Makes what is keyed repeat.
+fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result<(), ParticleFault> {
+    match parameters.close_loop(seconds) {
+        Some(key) => Err(ParticleFault { key, kind: ParticleFaultKind::LoopJumps { seconds } }),
+        None => Ok(()),
+    }
+}
+
+/// Speed of gas that draws its detail as it is, beside that of gas half way up.
+const UNSTRETCHED: f64 = 0.35;
+
+impl Phenomenon for FlameParticles {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn aovs(&self) -> &'static [AovDescriptor] {
+        render::AOVS
+    }
+
+    fn remark(&self, neighbours: &Neighbours) -> Option<Remark> {
+        let burners = &self.simulation.design.burners;
+        let gives = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
+        if !burners.iter().any(gives) {
+            return Some(Remark::Unfed);
+        }
+        let origin = DVec3::from(self.parameters.position);
+        let is_buried = |burner: &Burner| {
+            let within = |birth: u64| {
+                let place = origin + burner.birthplace(self.simulation.key, birth, 0.0).position;
+                neighbours.occluders().any(|occluder| occluder.signed_distance(place) < 0.0)
+            };
+            // As many births as show it.
+            gives(burner) && (0..32).all(within)
+        };
+        burners.iter().position(is_buried).map(|index| Remark::Buried { burner: index + 1 })
+    }
+
+    fn luminance(&self) -> f64 {
+        /// Bright parts beside a whole flame of the hottest soot.
+        const BRIGHT: f64 = 0.09;
+        let hottest = match self.parameters.life.temperature {
+            TemperatureLaw::Living => self.parameters.life.flame_temperature_k,
+            TemperatureLaw::Constant => self.tallest().parameters.temperature_k,
+        };
+        let black = f64::from(color::luminance(color::black_body().radiance(hottest as f32)));
+        let absorption = render::soot_absorption(self.parameters.life.soot_ppm * 1e-6, &self.parameters.look);
+        let emissivity = match self.parameters.look.sprite {
+            SpriteStyle::Integral => -math::exp_m1(-absorption * 0.5 * self.tallest().diameter),
+            SpriteStyle::Poly6 | SpriteStyle::Squares => 1.0,
+        };
+        BRIGHT * black * emissivity
+    }
+
+    fn stepping(&self) -> Option<Stepping> {
+        let Design { preroll, dissolve, .. } = self.simulation.design;
+        Some(Stepping { step: self.parameters.step_s, preroll, dissolve })
+    }
+
+    fn step(&mut self, time: f64, surroundings: &Surroundings) {
+        self.simulation.step(time, surroundings);
+        self.time = time + self.simulation.step_s();
+        self.air_temperature_k = surroundings.air.temperature_k;
+    }
+
+    fn snapshot(&self) -> Vec<u8> {
+        let head = [self.time, self.air_temperature_k].into_iter().flat_map(f64::to_le_bytes);
+        head.chain(snapshot::write(&self.simulation.particles)).collect()
+    }
+
+    fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError> {
+        let (time, rest) = state.split_first_chunk::<8>().ok_or(SnapshotError::Damaged)?;
+        let (air, rest) = rest.split_first_chunk::<8>().ok_or(SnapshotError::Damaged)?;
+        let (time, air) = (f64::from_le_bytes(*time), f64::from_le_bytes(*air));
+        if !time.is_finite() || !air.is_finite() {
+            return Err(SnapshotError::Damaged);
+        }
+        let burners = self.simulation.design.burners.len();
+        self.simulation.particles = snapshot::read(&self.simulation.particles, rest, burners)?;
+        (self.time, self.air_temperature_k) = (time, air);
+        Ok(())
+    }
+
+    fn particles(&self, t: f64) -> Option<PointCloud> {
+        let gas = self.gas();
+        let Particles { velocity: [u, v, w], temperature, density, .. } = gas.particles;
+        Some(PointCloud {
+            positions: (0..gas.particles.len()).map(|index| gas.place(index, t).as_vec3().to_array()).collect(),
+            velocities: u.iter().zip(v).zip(w).map(|((u, v), w)| [*u, *v, *w]).collect(),
+            quantities: [(Quantity::Temperature, temperature.clone()), (Quantity::Density, density.clone())].into(),
+        })
+    }
+
+    fn publish(&self, shutter: Shutter) -> Publication {
+        let lights = render::luminous(&self.gas(), &self.parameters.look, shutter.middle());
+        Publication { lights, ..Publication::default() }
+    }
+
+    fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
+        render::depth_intervals(&self.gas(), &self.parameters.look, view)
+    }
+
+    fn prepare<'a>(
+        &'a self,
+        view: &'a View,
+        surroundings: &'a Surroundings<'a>,
+        observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        Ok(Box::new(PreparedGas::new(self.gas(), &self.parameters.look, view, surroundings, observer)?))
+    }
+}

@@ -1,0 +1,182 @@
+//! What the gas says of itself beside its light: temperature, optical depth, deflection and motion.
+
+use bansho_base::{
+    image::Rect,
+    phenomenon::strip::{AovDescriptor, AovRule, Strip, View},
+};
+
+use super::gas::Gas;
+use crate::particles::{
+    look_parameters::LookParameters,
+    render::{
+        project::sprite::{Kind, Seen, seen},
+        resolve::{
+            resolve_gas::{Extents, Layer, Resolve, Row},
+            spline,
+        },
+        splat::{
+            accumulate::{COARSE, Sheet, Sprite, splat},
+            grid::{Grid, weigh},
+            kernel::Profile,
+        },
+    },
+};
+
+/// What a particle flame can write beside its light, in the order of a strip's planes.
+pub const AOVS: &[AovDescriptor] = &[
+    AovDescriptor {
+        name: "temperature_k",
+        unit: "K",
+        doc: "Gas temperature, weighted by the luminance that its soot adds; 0 where no soot glows.",
+        rule: AovRule::WeightedMean,
+    },
+    AovDescriptor {
+        name: "optical_depth",
+        unit: "",
+        doc: "Optical depth of soot along the line of sight, before detail; 0 where there is none.",
+        rule: AovRule::Sum,
+    },
+    AovDescriptor {
+        name: "deflection.X",
+        unit: "rad",
+        doc: "Angle to the right by which hot gas bends the light of what lies behind, with the artist's gain; 0 where it is straight.",
+        rule: AovRule::Sum,
+    },
+    AovDescriptor {
+        name: "deflection.Y",
+        unit: "rad",
+        doc: "Angle upward by which hot gas bends the light of what lies behind, with the artist's gain; 0 where it is straight.",
+        rule: AovRule::Sum,
+    },
+    AovDescriptor {
+        name: "motion.X",
+        unit: "pixels",
+        doc: "Motion of the gas to the next frame, to the right, weighted by luminance; 0 where no soot glows.",
+        rule: AovRule::WeightedMean,
+    },
+    AovDescriptor {
+        name: "motion.Y",
+        unit: "pixels",
+        doc: "Motion of the gas to the next frame, downward, weighted by luminance; 0 where no soot glows.",
+        rule: AovRule::WeightedMean,
+    },
+];
+
+/// Places of the planes among a strip's AOVs.
+const TEMPERATURE: usize = 0;
+const OPTICAL_DEPTH: usize = 1;
+pub(crate) const DEFLECTION: [usize; 2] = [2, 3];
+const MOTION: [usize; 2] = [4, 5];
+
+/// Summed motion of the glowing gas: luminance, and luminance times pixels to the right and down.
+pub(crate) struct Motion<'a> {
+    grid: Grid<'a>,
+    weights: Vec<[f32; 4]>,
+    /// Least and greatest motion of any gas, for each of the two.
+    bounds: [[f32; 2]; 2],
+}
+
+/// Glowing gas as sprites of its motion.
+struct Glowing<'a> {
+    gas: &'a Gas<'a>,
+    look: &'a LookParameters,
+}
+
+impl Glowing<'_> {
+    #[inline(always)]
+    fn light(&self, index: usize) -> f64 {
+        self.gas.absorption(index, self.look) * self.gas.luminance(index) * self.gas.volume(index)
+    }
+}
+
+impl Kind for Glowing<'_> {
+    type Record = Sprite<3>;
+
+    #[inline(always)]
+    fn wants(&self, index: usize) -> bool {
+        self.light(index) > 0.0
+    }
+
+    #[inline(always)]
+    fn record(&self, seen: &Seen) -> Sprite<3> {
+        let weight = (self.light(seen.index) * f64::from(seen.ellipse.peak)) as f32;
+        let values = [weight, weight * seen.motion[0], weight * seen.motion[1]];
+        Sprite { ellipse: seen.ellipse, layer: 0, split: 0.0, values }
+    }
+}
+
+impl<'a> Motion<'a> {
+    pub(crate) fn new(gas: &Gas<'a>, look: &LookParameters, view: &View) -> Option<Self> {
+        let sprites = seen(gas, view, &Glowing { gas, look });
+        let motions = |axis: usize| {
+            sprites.iter().flat_map(|task| task.iter()).map(move |sprite| sprite.values[1 + axis] / sprite.values[0])
+        };
+        let bounds = [0, 1].map(|axis| bounds(motions(axis)));
+        let grid = splat(
+            &Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, picture: view.size, window: view.window },
+            &sprites,
+            gas.memory,
+        );
+        let grid = grid.sums()?;
+        Some(Self { weights: spline::weights(&grid.cells), grid, bounds })
+    }
+
+    /// Pixels to the right and down that the gas at a pixel moves until the next frame.
+    fn at(&self, x: usize, y: usize) -> [f32; 2] {
+        let cells = &self.grid.cells;
+        let ((column, across), (row, down)) = (cells.before(0, x), cells.before(1, y));
+        let start = 3 * self.grid.first_of_four(column);
+        let rows = [-1, 0, 1, 2].map(|k| &self.grid.row(row + k)[start..start + 12]);
+        let mut four = [0.0; 12];
+        weigh(&mut four, rows, &self.weights[down]);
+        let plane = |plane: usize| (0..4).map(|k| four[3 * k + plane] * self.weights[across][k]).sum::<f32>();
+        let weight = plane(0);
+        let mean = |axis: usize| {
+            let [least, greatest] = self.bounds[axis];
+            (plane(1 + axis) / weight).max(least).min(greatest)
+        };
+        if weight > 0.0 { [mean(0), mean(1)] } else { [0.0; 2] }
+    }
+}
+
+/// Least and greatest of some numbers.
+pub(crate) fn bounds(values: impl Iterator<Item = f32>) -> [f32; 2] {
+    values.fold([f32::INFINITY, f32::NEG_INFINITY], |[least, greatest], value| [least.min(value), greatest.max(value)])
+}
+
+impl Resolve<'_> {
+    /// Adds the AOVs of a layer in the part `rect` of a strip. Only what is asked for is measured, a pixel at a time.
+    pub(crate) fn measure_layer(
+        &self,
+        layer: &Layer,
+        extents: &Extents,
+        motion: Option<&Motion<'_>>,
+        rect: Rect,
+        row: &mut Row,
+        strip: &mut Strip,
+    ) {
+        /// Luminance whose soot still counts as glowing, cd/m^2.
+        const DARK: f32 = 1e-3;
+        for y in rect.y..rect.bottom() {
+            let Some([first, last]) = self.fill(layer.index, y, extents, row) else { continue };
+            let from = first.max(rect.x) / 16 * 16;
+            for x in (from..last.min(rect.right())).step_by(16) {
+                let Some(sums) = self.sums(row, layer.index, x) else { continue };
+                for pixel in x.max(rect.x)..(x + 16).min(rect.right()) {
+                    let lane = pixel - x;
+                    let index = (y - strip.rect.y) * strip.rect.width + pixel - strip.rect.x;
+                    let [tau, glow, heat] = [sums.tau[lane], sums.glow[lane], sums.heat[lane]];
+                    if !strip.visible(index, layer.depth as f32) {
+                        continue;
+                    }
+                    strip.aovs[OPTICAL_DEPTH].add(index, tau, 1.0);
+                    if glow > DARK {
+                        strip.aovs[TEMPERATURE].add(index, self.temperature(heat, glow), glow);
+                        let moved = motion.map_or([0.0; 2], |motion| motion.at(pixel, y));
+                        (0..2).for_each(|axis| strip.aovs[MOTION[axis]].add(index, moved[axis], glow));
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! The light that the gas throws on others.
+
+use std::ops::Range;
+
+use bansho_base::{
+    color,
+    math::DVec3,
+    phenomenon::surroundings::{Emitter, Light},
+};
+
+use super::{gas::Gas, prepared::PARTICLES_OF_TASK};
+use crate::particles::look_parameters::LookParameters;
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+
+/// Heights into which the flame is cut to find where its light comes from.
+const SLABS: usize = 48;
+
+/// What one slab sends out.
+#[derive(Clone, Copy, Debug, Default)]
+struct Slab {
+    /// Candela in every direction were nothing hidden, ACEScg.
+    intensity: [f64; 3],
+    /// Luminous intensity times place, and times the square of the place across.
+    moment: DVec3,
+    spread: f64,
+    /// Sum of absorption times volume, m^2: optical depth times area.
+    shade: f64,
+}
+
+impl Slab {
+    fn luminous(&self) -> f64 {
+        self.intensity.iter().sum::<f64>().max(0.0)
+    }
+
+    /// Adds a share of another.
+    #[inline(always)]
+    fn add(&mut self, other: &Self, share: f64) {
+        for c in 0..3 {
+            self.intensity[c] += share * other.intensity[c];
+        }
+        self.moment += other.moment * share;
+        self.spread += share * other.spread;
+        self.shade += share * other.shade;
+    }
+}
+
+/// Point lights that stand for the gas at time `t`: `look.light.count` parts of equal power along its height, each where its light is
+/// centred, so that they move as smoothly as the gas does.
+///
+/// Soot of volume V with absorption k and temperature T sends `V k B(T)` in every direction; what the soot of its part hides
+/// is taken off as by a slab of the same optical depth, `(1 - exp(-tau)) / tau`.
+pub fn luminous(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Light> {
+    let count = look.light.count.max(1) as usize;
+    if look.light.scale <= 0.0 || gas.particles.is_empty() {
+        return Vec::new();
+    }
+    let slabs = slabs(gas, look, t);
+    let total: f64 = slabs.iter().map(Slab::luminous).sum();
+    if total.is_nan() || total <= 0.0 {
+        return Vec::new();
+    }
+    (0..count)
+        .filter_map(|part| part_light(&slabs, [part, part + 1].map(|edge| total * edge as f64 / count as f64), look))
+        .collect()
+}
+
+/// The gas cut by height; a particle is shared by the two slabs around it.
+fn slabs(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Slab> {
+    let (low, high) = heights(gas, t);
+    let step = ((high - low) / (SLABS - 1) as f64).max(1e-9);
+    let level = Level::new();
+    let of_task = |range: Range<usize>| {
+        let mut slabs = vec![Slab::default(); SLABS + 1];
+        dispatch!(level, _simd => add_to_slabs(gas, look, t, range.clone(), [low, step], &mut slabs));
+        slabs
+    };
+    // Sums of whole tasks, added in order, are the same however many threads there are.
+    let of_tasks: Vec<Vec<Slab>> = tasks(gas).into_par_iter().map(of_task).collect();
+    of_tasks.into_iter().fold(vec![Slab::default(); SLABS + 1], |mut sums, slabs| {
+        sums.iter_mut().zip(&slabs).for_each(|(sum, slab)| sum.add(slab, 1.0));
+        sums
+    })
+}
+
+/// The particles of each task.
+fn tasks(gas: &Gas) -> Vec<Range<usize>> {
+    let count = gas.particles.len();
+    (0..count).step_by(PARTICLES_OF_TASK).map(|first| first..(first + PARTICLES_OF_TASK).min(count)).collect()
+}
+
+/// Heights of the lowest and the highest particle, m.
+fn heights(gas: &Gas, t: f64) -> (f64, f64) {
+    let of_task = |range: Range<usize>| {
+        range.map(|index| gas.place(index, t).y).fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
+    };
+    let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+    tasks(gas).into_par_iter().map(of_task).reduce(|| (f64::MAX, f64::MIN), both)
+}
+
+/// Adds particles to slabs `step` apart from the height `low` on.
+#[inline(always)]
+fn add_to_slabs(
+    gas: &Gas,
+    look: &LookParameters,
+    t: f64,
+    range: Range<usize>,
+    [low, step]: [f64; 2],
+    slabs: &mut [Slab],
+) {
+    let table = color::black_body();
+    for index in range {
+        let shade = gas.absorption(index, look) * gas.volume(index);
+        if shade <= 0.0 {
+            continue;
+        }
+        let place = gas.place(index, t);
+        let radiance = table.radiance(gas.particles.temperature[index]).map(f64::from);
+        let at = ((place.y - low) / step).clamp(0.0, (SLABS - 1) as f64);
+        let part = at - at.floor();
+        let intensity = radiance.map(|value| value * shade);
+        let power: f64 = intensity.iter().sum();
+        let spread = (place.x * place.x + place.z * place.z) * power;
+        let whole = Slab { intensity, moment: place * power, spread, shade };
+        slabs[at as usize].add(&whole, 1.0 - part);
+        slabs[at as usize + 1].add(&whole, part);
+    }
+}
+
+/// The light of what lies between two sums of power, counted from below.
+fn part_light(slabs: &[Slab], [from, to]: [f64; 2], look: &LookParameters) -> Option<Light> {
+    let mut sum = Slab::default();
+    let mut below = 0.0;
+    for slab in slabs {
+        let above = below + slab.luminous();
+        let taken = (above.min(to) - below.max(from)).max(0.0);
+        if taken > 0.0 {
+            sum.add(slab, taken / slab.luminous());
+        }
+        below = above;
+    }
+    let power = sum.luminous();
+    if power <= 0.0 {
+        return None;
+    }
+    let position = sum.moment / power;
+    let across = (sum.spread / power - position.x * position.x - position.z * position.z).max(0.0).sqrt();
+    let radius = across.max(1e-3);
+    // Seen from the side, the part covers about a disc of twice its deviation.
+    let tau = sum.shade / (4.0 * std::f64::consts::PI * radius * radius);
+    let escapes = if tau > 1e-6 { -bansho_base::math::exp_m1(-tau) / tau } else { 1.0 };
+    let scale = look.light.scale * escapes;
+    Some(Light {
+        emitter: Emitter::Point { position, radius },
+        intensity: sum.intensity.map(|value| (value * scale) as f32),
+    })
+}

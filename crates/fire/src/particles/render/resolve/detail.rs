@@ -1,0 +1,190 @@
+//! Detail finer than the particles: where within a particle's reach gas burns, and where it does not.
+//!
+//! Sums over particles are as smooth as their kernels; a flame is not. At its edge, turbulent gas burns now here, now not
+//! (intermittency), in sheets with sharp rims. So the smooth optical depth tau is redistributed: a share gamma of the place burns, with
+//! the optical depth tau / gamma, the rest not at all. Which share does, fractal noise decides, which is carried in the gas's own
+//! coordinates and is stretched as the gas is. Over many places the mean stays tau, and with it the light of the exact sum.
+
+use bansho_base::{
+    math::{self, approximations, random::Purpose},
+    noise::{Coordinate, Fractal, LANES, Noise, VARIANCE},
+};
+
+use crate::particles::{look_parameters::LookParameters, render::gas::Gas};
+
+/// A sigmoid of slope 1 is the distribution of noise of this standard deviation: pi / sqrt(3).
+const LOGISTIC: f32 = 1.813_799_4;
+/// Optical depth, in particles, beyond which gas burns no more densely: even cores have gaps.
+const FULLEST: f32 = 2.5;
+/// Mean number of particles in the line of sight at which half of the place burns.
+const HALF_BURNING: f64 = 0.42;
+/// By how much more detail extends upward than sideways around a lone particle.
+const UPRIGHT: f64 = 0.45;
+/// How much hotter, as a share, gas looks where it burns most. Its luminance stays.
+const HEAT: f32 = 0.03;
+
+/// Detail of one flame in one frame.
+#[derive(Clone, Debug)]
+pub(crate) struct Detail {
+    noise: Noise<3>,
+    /// 1 over the standard deviation of the noise, times [`LOGISTIC`].
+    steepness: f32,
+    /// Cells a metre along x, y and z.
+    pub(crate) cells_per_metre: [f32; 3],
+    /// Cells a second that the noise moves upward.
+    rate: f64,
+    /// Where the noise begins at the time of this frame.
+    base: [Coordinate; 3],
+    /// How far the noise moves while the shutter is open, cells.
+    shift: [f32; 3],
+    /// Moments that are averaged while the shutter is open.
+    moments: usize,
+    /// 1 / optical depth at which half of the place burns.
+    per_depth: f32,
+    /// 1 / width of the transition between burning and not.
+    sharpness: f32,
+    /// Exponent that keeps the mean in spite of that width.
+    keep: f32,
+    amount: f32,
+    /// Size of a cell of the noise, pixels.
+    pub(crate) cell_pixels: f32,
+}
+
+/// Burning gas at sixteen places.
+pub(crate) struct Burning {
+    /// By what the optical depth is multiplied.
+    pub(crate) depth: [f32; LANES],
+    /// By what the temperature is multiplied.
+    pub(crate) heat: [f32; LANES],
+}
+
+/// The view of the gas as detail sees it.
+pub(crate) struct Scale {
+    /// Typical support radius, m.
+    pub(crate) radius: f64,
+    /// Typical absorption coefficient, 1/m.
+    pub(crate) absorption: f64,
+    /// Pixels a metre.
+    pub(crate) pixels_per_metre: f64,
+    /// Time at the middle of the exposure, s.
+    pub(crate) time: f64,
+    /// How long the shutter is open, s.
+    pub(crate) open: f64,
+    /// How far what stands still moves before the camera while the shutter is open, m in the world.
+    pub(crate) sway: [f64; 3],
+}
+
+impl Detail {
+    /// The detail of a flame; `None` where there is none to add.
+    pub(crate) fn new(gas: &Gas, look: &LookParameters, scale: &Scale) -> Option<Self> {
+        if look.detail <= 0.0 || !(scale.radius > 0.0 && scale.absorption > 0.0) {
+            return None;
+        }
+        let size = look.detail_size * scale.radius;
+        let octaves = (math::log2(size * scale.pixels_per_metre / 2.5).floor() as i64 + 1).clamp(1, 4) as u32;
+        let fractal = Fractal { octaves, lacunarity: 2, gain: 0.55 };
+        let words = gas.key.words(0, 0, Purpose::named("detail"));
+        let noise = Noise::new(words[0], fractal, [0; 3]).ok()?;
+        let cells_per_metre = [1.0 / size, UPRIGHT / size, 1.0 / size];
+        let rate = gas.detail_speed / size;
+        let moved = rate * scale.time;
+        let shift: [f64; 3] = std::array::from_fn(|axis| {
+            cells_per_metre[axis] * scale.sway[axis] - if axis == 1 { rate * scale.open } else { 0.0 }
+        });
+        let length = shift.iter().map(|s| s * s).sum::<f64>().sqrt() * f64::from(1 << (octaves - 1));
+        let softness = math::lerp(1.6, 0.16, look.sharpness);
+        Some(Self {
+            steepness: LOGISTIC / deviation(&fractal),
+            noise,
+            cells_per_metre: cells_per_metre.map(|cells| cells as f32),
+            rate,
+            base: [0.0, -moved, 0.0].map(Coordinate::from_f64),
+            shift: shift.map(|s| s as f32),
+            moments: length.round().clamp(1.0, 6.0) as usize,
+            per_depth: (1.0 / (HALF_BURNING * scale.absorption * scale.radius)) as f32,
+            sharpness: (1.0 / softness) as f32,
+            keep: (1.0 / (1.0 + softness * softness).sqrt()) as f32,
+            amount: look.detail as f32,
+            cell_pixels: (size * scale.pixels_per_metre) as f32,
+        })
+    }
+
+    /// Where in the noise particle `index` lies beyond what its place says, cells: the place at which it was born and the time since.
+    #[inline(always)]
+    pub(crate) fn matter(&self, gas: &Gas, index: usize, since: f64) -> [f32; 3] {
+        let particles = gas.particles;
+        let mut matter = [0.0; 3];
+        for axis in 0..3 {
+            let now = (since as f32).mul_add(particles.velocity[axis][index], particles.position[axis][index]);
+            matter[axis] = (particles.birthplace[axis][index] - now) * self.cells_per_metre[axis];
+        }
+        let age = f64::from(particles.age[index]) + since;
+        matter[1] += (self.rate * age) as f32;
+        matter
+    }
+
+    /// Whether so little gas is at sixteen places that detail could not be seen in it.
+    #[inline(always)]
+    pub(crate) fn is_lost(&self, tau: &[f32; LANES]) -> bool {
+        /// Optical depth beside that at which half of the place burns; even the densest noise leaves this dark.
+        const LITTLE: f32 = 2e-4;
+        let mut most = 0.0_f32;
+        for lane in 0..LANES {
+            most = most.max(tau[lane]);
+        }
+        most * self.per_depth < LITTLE
+    }
+
+    /// What burns at sixteen places of the noise, where the smooth optical depth is `tau` and so much of the detail is `shown`.
+    #[inline(always)]
+    pub(crate) fn burning(&self, places: &[[f32; LANES]; 3], tau: &[f32; LANES], shown: &[f32; LANES]) -> Burning {
+        let mut limit = [0.0; LANES];
+        let mut share = [0.0; LANES];
+        for lane in 0..LANES {
+            let x = (tau[lane] * self.per_depth).max(1e-6);
+            let x = x / (1.0 + x * (1.0 / FULLEST));
+            let log = approximations::log2(x);
+            limit[lane] = log * std::f32::consts::LN_2;
+            share[lane] = 1.0 + approximations::exp2(-self.keep * log);
+        }
+        let (mut burns, mut mean) = ([0.0; LANES], [0.0; LANES]);
+        for moment in 0..self.moments {
+            let noise = self.noise_at(places, (moment as f32 + 0.5) / self.moments as f32 - 0.5);
+            for lane in 0..LANES {
+                let z = noise[lane] * self.steepness;
+                mean[lane] += z;
+                burns[lane] += 1.0 / (1.0 + approximations::exp(-(z + limit[lane]) * self.sharpness));
+            }
+        }
+        let each = 1.0 / self.moments as f32;
+        let mut burning = Burning { depth: [1.0; LANES], heat: [1.0; LANES] };
+        for lane in 0..LANES {
+            let amount = self.amount * shown[lane];
+            burning.depth[lane] = (burns[lane] * each * share[lane] - 1.0).mul_add(amount, 1.0);
+            let warm = (mean[lane] * each * 0.5).clamp(-1.5, 1.5);
+            burning.heat[lane] = (HEAT * amount).mul_add(warm, 1.0);
+        }
+        burning
+    }
+
+    /// Noise while the shutter is open, `moment` from -1/2 to 1/2.
+    #[inline(always)]
+    fn noise_at(&self, places: &[[f32; LANES]; 3], moment: f32) -> [f32; LANES] {
+        let (mut cells, mut fractions) = ([[0; LANES]; 3], [[0.0; LANES]; 3]);
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                let at = self.base[axis].advanced(self.shift[axis].mul_add(moment, places[axis][lane]));
+                cells[axis][lane] = at.cell;
+                fractions[axis][lane] = at.fraction;
+            }
+        }
+        self.noise.lanes(&cells, &fractions)
+    }
+}
+
+/// Standard deviation of fractal noise.
+fn deviation(fractal: &Fractal) -> f32 {
+    let amplitudes = (0..fractal.octaves).map(|octave| math::pow(f64::from(fractal.gain), f64::from(octave)));
+    let (sum, squares) = amplitudes.fold((0.0, 0.0), |(sum, squares), a| (sum + a, squares + a * a));
+    math::sqrt(VARIANCE[1] * squares / (sum * sum)) as f32
+}

@@ -1,0 +1,104 @@
+//! Where the gas carries its detail too finely to be shown: where streams of different birth meet, or gas was pressed together.
+//!
+//! Detail lies where the gas was born, a mean over the line of sight. Where that mean passes from one stream to another it runs through
+//! many cells of the noise within a particle's reach, which no flame does and no picture could show. There the smooth sum alone is drawn.
+
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+
+use bansho_base::math::simd::LANES;
+
+use super::resolve_gas::{Extents, MATTER, PLANES, TAU};
+use crate::particles::render::splat::grid::Grid;
+
+/// How many times more finely than it was made detail may lie before it begins to fade, and when it is gone.
+const FADING: [f32; 2] = [1.0, 3.0];
+/// Optical depth below which a cell is empty.
+const EMPTY: f32 = 1e-6;
+/// Share of a cell's optical depth that a cell beside it must have to be compared with it.
+const COUNTS: f32 = 0.02;
+
+/// The slope of the gas's own detail coordinates in each cell of each layer, beside that of detail as it was made.
+pub(crate) struct Strain {
+    layers: usize,
+    columns: usize,
+    rows: usize,
+    values: Vec<f32>,
+}
+
+impl Strain {
+    /// `cell` is the size of a cell of the noise as it was made, pixels.
+    pub(crate) fn new(grid: &Grid, extents: &Extents, layers: usize, cell: f32) -> Self {
+        let (columns, rows, level) = (grid.cells.columns, grid.cells.rows, Level::new());
+        let scale = cell / grid.cells.size as f32;
+        let mut values = vec![0.0; rows * layers * columns];
+        values.par_chunks_mut(columns).enumerate().for_each(|(index, out)| {
+            let (row, layer) = (index / layers, index % layers);
+            if let Some([first, last]) = extents.of(row, layer) {
+                let rows = [-1, 0, 1].map(|by| grid.row(row as i32 + by));
+                let range = first.max(1) as usize..(last as usize + 1).min(columns - 1);
+                dispatch!(level, _simd => {
+                    for column in range {
+                        let at = |row: usize, column: usize| Matter::of(&rows[row][column * grid.depth + layer * PLANES..]);
+                        let own = at(1, column);
+                        if own.tau > EMPTY {
+                            let beside = [at(0, column), at(2, column), at(1, column - 1), at(1, column + 1)];
+                            out[column] = scale * own.greatest_step(&beside);
+                        }
+                    }
+                });
+            }
+        });
+        Self { layers, columns, rows, values }
+    }
+
+    /// Values along a row of cells of a layer; those beyond the grid are none.
+    pub(crate) fn row(&self, row: i32, layer: usize) -> &[f32] {
+        let row = row.clamp(0, self.rows as i32 - 1) as usize;
+        &self.values[(row * self.layers + layer) * self.columns..][..self.columns]
+    }
+}
+
+/// How much of its detail gas of a strain still shows.
+#[inline(always)]
+pub(crate) fn shown(strain: &[f32; LANES]) -> [f32; LANES] {
+    let [begins, gone] = FADING;
+    let mut shown = [0.0; LANES];
+    for lane in 0..LANES {
+        let left = ((gone - strain[lane]) * (1.0 / (gone - begins))).clamp(0.0, 1.0);
+        shown[lane] = left * left * 2.0_f32.mul_add(-left, 3.0);
+    }
+    shown
+}
+
+/// Where in the noise the gas of a cell lies, cells of the noise.
+struct Matter {
+    tau: f32,
+    place: [f32; 3],
+}
+
+impl Matter {
+    #[inline(always)]
+    fn of(sums: &[f32]) -> Self {
+        let tau = sums[TAU];
+        let share = 1.0 / tau.max(EMPTY);
+        Self { tau, place: [0, 1, 2].map(|axis| sums[MATTER + axis] * share) }
+    }
+
+    /// The greatest distance in the noise to one of the cells beside.
+    #[inline(always)]
+    fn greatest_step(&self, beside: &[Self; 4]) -> f32 {
+        let mut greatest = 0.0_f32;
+        for other in beside {
+            let mut square = 0.0;
+            for axis in 0..3 {
+                let step = other.place[axis] - self.place[axis];
+                square = step.mul_add(step, square);
+            }
+            if other.tau > COUNTS * self.tau {
+                greatest = greatest.max(square);
+            }
+        }
+        greatest.sqrt()
+    }
+}

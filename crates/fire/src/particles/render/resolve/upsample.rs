@@ -1,0 +1,103 @@
+//! Interpolation along a row of pixels, sixteen at a time.
+//!
+//! Each cell's value goes to all sixteen, times what it weighs at each: nothing has to change places between the lanes of a vector, as it
+//! would if every pixel looked up its own four cells.
+
+use std::ops::Range;
+
+use bansho_base::math::simd::LANES;
+
+use crate::particles::render::splat::grid::Grid;
+
+/// What the cells around sixteen pixels weigh at each of them.
+struct Span {
+    /// The first of the cells.
+    first: usize,
+    /// Where their weights are.
+    weights: Range<usize>,
+}
+
+/// The cells around all pixels of a row of the whole picture.
+pub(crate) struct Across {
+    spans: Vec<Span>,
+    weights: Vec<[f32; LANES]>,
+}
+
+impl Across {
+    /// For rows of `width` pixels, with the weights of the four cells around a pixel of each phase.
+    pub(crate) fn new(grid: &Grid, width: usize, weights_of: &[[f32; 4]]) -> Self {
+        let columns = grid.columns(0, width);
+        let mut across = Self { spans: Vec::with_capacity(columns.len().div_ceil(LANES)), weights: Vec::new() };
+        for batch in columns.chunks(LANES) {
+            let [first, last] = [batch[0].0, batch[batch.len() - 1].0];
+            let begin = across.weights.len();
+            across.weights.resize(begin + last + 4 - first, [0.0; LANES]);
+            for (lane, (column, phase)) in batch.iter().enumerate() {
+                for (k, weight) in weights_of[*phase].iter().enumerate() {
+                    across.weights[begin + column - first + k][lane] = *weight;
+                }
+            }
+            across.spans.push(Span { first, weights: begin..across.weights.len() });
+        }
+        across
+    }
+
+    /// Values at the sixteen pixels from `x` on, a multiple of sixteen: those of the cells begin `stride` apart in `row`, and of each
+    /// those at `places` are wanted. 0 beyond the picture.
+    #[inline(always)]
+    pub(crate) fn at<const N: usize>(
+        &self,
+        row: &[f32],
+        stride: usize,
+        x: usize,
+        places: [usize; N],
+    ) -> [[f32; LANES]; N] {
+        let mut sums = [[0.0; LANES]; N];
+        let Some(span) = self.spans.get(x / LANES) else { return sums };
+        let cells = row[span.first * stride..].chunks_exact(stride);
+        for (weights, values) in self.weights[span.weights.clone()].iter().zip(cells) {
+            for n in 0..N {
+                let value = values[places[n]];
+                for lane in 0..LANES {
+                    sums[n][lane] = weights[lane].mul_add(value, sums[n][lane]);
+                }
+            }
+        }
+        sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::image::Rect;
+
+    use super::{super::spline, *};
+    use crate::particles::render::splat::{buffers::Memory, grid::Raster};
+
+    #[test]
+    fn sixteen_pixels_are_what_each_of_them_is() {
+        const DEPTH: usize = 3;
+        let memory = Memory::default();
+        for (size, width) in [(1, 64), (2, 50), (3, 47), (4, 64), (6, 130), (8, 17), (32, 99)] {
+            let cells = Raster::around(Rect { x: 5, y: 0, width: width - 9, height: 4 }, size, false);
+            let mut grid = Grid::new(cells, DEPTH, &memory);
+            for (index, value) in grid.values_mut().iter_mut().enumerate() {
+                *value = (index * index % 17) as f32;
+            }
+            let weights = spline::weights(&grid.cells);
+            let (across, columns, row) = (Across::new(&grid, width, &weights), grid.columns(0, width), grid.row(2));
+            for x in (0..width).step_by(LANES) {
+                let found = across.at(row, DEPTH, x, [2, 0]);
+                for pixel in x..(x + LANES).min(width) {
+                    let (first, phase) = columns[pixel];
+                    for (plane, values) in [2, 0].into_iter().zip(&found) {
+                        let sum = (0..4)
+                            .fold(0.0_f32, |sum, k| weights[phase][k].mul_add(row[(first + k) * DEPTH + plane], sum));
+                        assert_eq!(values[pixel - x], sum, "pixel {pixel} of cells of {size}");
+                    }
+                }
+            }
+            assert_eq!(across.at(row, DEPTH, width.next_multiple_of(LANES), [1]), [[0.0; LANES]]);
+        }
+    }
+}

@@ -1,0 +1,330 @@
+//! Burners: where gas is born, and the scales that follow from how large and how strong a burner is.
+
+use std::sync::Arc;
+
+use bansho_base::{
+    geometry::{
+        mesh::{Mesh, SurfaceSampler},
+        transform::Placement,
+    },
+    host::assets::Assets,
+    math::{
+        self, DVec3,
+        random::{Key, Purpose, uniform, uniform_f64},
+    },
+    parameters::Auto,
+    world::gravity::STANDARD_GRAVITY,
+};
+
+use crate::particles::{
+    fault::ParticleFaultKind,
+    parameters::{BurnerParameters, BurnerShape, FlameParticlesParameters},
+};
+
+/// Acceleration along the axis of a fire, m/s^2: half the square of the 6.8 in McCaffrey's `u = 6.8 sqrt(z)` (1979).
+const AXIS_ACCELERATION: f64 = 23.0;
+/// Speed of gas where it leaves the burner, in `sqrt(g D)`.
+const BASE_FROUDE: f64 = 0.4;
+
+/// A burner of a flame, with its scales.
+#[derive(Clone, Debug)]
+pub(crate) struct Burner {
+    pub(crate) parameters: BurnerParameters,
+    /// How it is turned and scaled; where it is changes over time.
+    turned: Placement,
+    area: Area,
+    /// Width D across which gas burns: sets puffing and eddies, m.
+    pub(crate) diameter: f64,
+    /// Area from which gas comes, m^2.
+    pub(crate) square_metres: f64,
+    /// Mean height of the visible flame, m.
+    pub(crate) height: f64,
+    /// Speed of gas at birth, m/s.
+    pub(crate) speed: f64,
+    /// Acceleration of gas along the axis, m/s^2.
+    pub(crate) acceleration: f64,
+    /// Radius of a ball around its position that holds the burner, m.
+    pub(crate) reach: f64,
+    /// Corners of the box around it as it is turned, beside its position, m.
+    pub(crate) extent: [DVec3; 2],
+}
+
+#[derive(Clone, Debug)]
+enum Area {
+    Disc,
+    Ball,
+    Strip,
+    Surface(SurfaceSampler),
+    Cuboid,
+}
+
+/// Where a particle is born, and which way it leaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Birthplace {
+    pub(crate) position: DVec3,
+    pub(crate) direction: DVec3,
+    /// How far it is from the middle of a disc or a strip: 0 there to 1 at the rim, a mean place elsewhere.
+    pub(crate) outward: f64,
+}
+
+impl Burner {
+    pub(crate) fn new(
+        parameters: &BurnerParameters,
+        flame: &FlameParticlesParameters,
+        assets: &dyn Assets,
+    ) -> Result<Self, ParticleFaultKind> {
+        let scale = if parameters.shape == BurnerShape::Mesh { parameters.scale } else { 1.0 };
+        let turned = Placement::new([0.0; 3], parameters.rotation_deg, scale);
+        let (area, size) = area(parameters, assets)?;
+        let equivalent = math::sqrt(4.0 * size.square_metres / std::f64::consts::PI);
+        let height = match parameters.height {
+            Auto::Set(height) => height,
+            Auto::Auto => heskestad(parameters.heat_release_kw, equivalent).max(0.5 * size.diameter),
+        };
+        let speed = match parameters.speed {
+            Auto::Set(speed) => speed.max(1e-3),
+            Auto::Auto => BASE_FROUDE * math::sqrt(STANDARD_GRAVITY * size.diameter),
+        };
+        Ok(Self {
+            parameters: parameters.clone(),
+            turned,
+            area,
+            diameter: size.diameter,
+            square_metres: size.square_metres,
+            height,
+            speed,
+            acceleration: AXIS_ACCELERATION * flame.motion.buoyancy,
+            reach: size.reach,
+            extent: match &size.mesh {
+                Some(mesh) => extent(mesh, &turned),
+                None => around(parameters, &turned),
+            },
+        })
+    }
+
+    /// Where its middle is at `t`, m from the flame's position.
+    pub(crate) fn position(&self, t: f64) -> DVec3 {
+        self.parameters.position.at(t).into()
+    }
+
+    /// Speed of gas at `height` along the axis, m/s.
+    pub(crate) fn axis_speed(&self, height: f64) -> f64 {
+        math::sqrt(self.speed * self.speed + 2.0 * self.acceleration * height.max(0.0))
+    }
+
+    /// Time that gas takes to the flame's tip, s.
+    pub(crate) fn rise_time(&self) -> f64 {
+        // The same as (axis_speed - speed) / acceleration, without the division by a vanishing acceleration.
+        2.0 * self.height / (self.speed + self.axis_speed(self.height))
+    }
+
+    /// How often the fire puffs, Hz (Cetegen and Ahmed 1993).
+    pub(crate) fn puffing_hz(&self, flame: &FlameParticlesParameters) -> f64 {
+        match flame.motion.puffing_hz {
+            Auto::Set(hz) => hz,
+            Auto::Auto => 1.5 / math::sqrt(self.diameter),
+        }
+    }
+
+    /// Where the particle `birth` is born at `t`: as likely anywhere on the burner.
+    pub(crate) fn birthplace(&self, key: Key, birth: u64, t: f64) -> Birthplace {
+        let words = key.words(birth, 0, Purpose::named("birthplace"));
+        let (position, direction) = self.local(words);
+        let radius = 0.5 * self.parameters.diameter;
+        let outward = match self.area {
+            Area::Disc | Area::Ball => position.length() / radius,
+            Area::Strip => position.z.abs() / radius,
+            Area::Cuboid | Area::Surface(_) => std::f64::consts::FRAC_1_SQRT_2,
+        };
+        let placement = Placement { position: self.position(t), ..self.turned };
+        Birthplace { position: placement.to_world(position), direction: placement.turn(direction), outward }
+    }
+
+    /// Place and direction in the burner's own coordinates.
+    fn local(&self, words: [u32; 4]) -> (DVec3, DVec3) {
+        let [u, v, w, _] = words.map(|word| f64::from(uniform(word)));
+        let radius = 0.5 * self.parameters.diameter;
+        let (sine, cosine) = math::sin_cos(std::f64::consts::TAU * v);
+        match &self.area {
+            Area::Disc => (DVec3::new(cosine, 0.0, sine) * (radius * math::sqrt(u)), DVec3::Y),
+            Area::Ball => {
+                let height = 2.0 * w - 1.0;
+                let across = math::sqrt((1.0 - height * height).max(0.0));
+                (DVec3::new(cosine * across, height, sine * across) * (radius * math::cbrt(u)), DVec3::Y)
+            }
+            Area::Strip => {
+                let along = self.parameters.length * (u - 0.5);
+                (DVec3::new(along, 0.0, self.parameters.diameter * (w - 0.5)), DVec3::Y)
+            }
+            Area::Cuboid => cuboid(self.parameters.size, [u, v, w]),
+            Area::Surface(sampler) => sampler.at([uniform_f64(words[0], words[3]), v, w]),
+        }
+    }
+}
+
+/// Mean height of the visible flame, m, from the heat release rate in kW and the diameter in m (Heskestad 1983).
+pub fn heskestad(heat_release_kw: f64, diameter: f64) -> f64 {
+    0.235 * math::pow(heat_release_kw, 0.4) - 1.02 * diameter
+}
+
+struct Size {
+    diameter: f64,
+    square_metres: f64,
+    reach: f64,
+    mesh: Option<Arc<Mesh>>,
+}
+
+/// Corners of the box around a mesh as it is turned.
+fn extent(mesh: &Mesh, turned: &Placement) -> [DVec3; 2] {
+    let corners = mesh.triangles().flatten().map(|corner| turned.to_world(corner));
+    let around = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
+    corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around)
+}
+
+/// The same of any other area.
+fn around(parameters: &BurnerParameters, turned: &Placement) -> [DVec3; 2] {
+    let BurnerParameters { diameter, length, size, .. } = *parameters;
+    let radius = 0.5 * diameter;
+    let axis = |unit: DVec3, half: f64| turned.turn(unit) * half;
+    let half = match parameters.shape {
+        BurnerShape::Point | BurnerShape::Mesh => DVec3::splat(radius),
+        BurnerShape::Disc => {
+            let [x, z] = [axis(DVec3::X, radius), axis(DVec3::Z, radius)];
+            DVec3::from([0, 1, 2].map(|c| math::sqrt(x[c] * x[c] + z[c] * z[c])))
+        }
+        BurnerShape::Line => axis(DVec3::X, 0.5 * length).abs() + axis(DVec3::Z, radius).abs(),
+        BurnerShape::Box => {
+            let [x, y, z] = size.map(|side| 0.5 * side);
+            axis(DVec3::X, x).abs() + axis(DVec3::Y, y).abs() + axis(DVec3::Z, z).abs()
+        }
+    };
+    [-half, half]
+}
+
+fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(Area, Size), ParticleFaultKind> {
+    let BurnerParameters { diameter, length, size: [x, y, z], scale, .. } = *parameters;
+    let round = 0.25 * std::f64::consts::PI * diameter * diameter;
+    let size = |diameter, square_metres, reach| Size { diameter, square_metres, reach, mesh: None };
+    Ok(match parameters.shape {
+        BurnerShape::Disc => (Area::Disc, size(diameter, round, 0.5 * diameter)),
+        BurnerShape::Point => (Area::Ball, size(diameter, round, 0.5 * diameter)),
+        BurnerShape::Line => (Area::Strip, size(diameter, diameter * length, 0.5 * (diameter + length))),
+        BurnerShape::Box => {
+            let surface = 2.0 * (x * y + y * z + z * x);
+            (Area::Cuboid, size(x.min(z), surface, 0.5 * DVec3::new(x, y, z).length()))
+        }
+        BurnerShape::Mesh => {
+            let file = parameters.file.as_ref().ok_or(ParticleFaultKind::NoFile)?;
+            let mesh = assets.mesh(&file.0)?;
+            let [min, max] = mesh.bounds();
+            let sides = (max - min) * scale;
+            let sampler = mesh.sampler();
+            let square_metres = sampler.area() * scale * scale;
+            let across = sides.x.min(sides.z).max(0.2 * sides.max_element());
+            let reach = min.abs().max(max.abs()).length() * scale;
+            (Area::Surface(sampler), Size { mesh: Some(mesh), ..size(across, square_metres, reach) })
+        }
+    })
+}
+
+/// A point on the surface of a box, each part as likely as its area.
+fn cuboid(sides: [f64; 3], [which, u, v]: [f64; 3]) -> (DVec3, DVec3) {
+    let faces = [0, 1, 2].map(|axis| sides[(axis + 1) % 3] * sides[(axis + 2) % 3]);
+    let mut wanted = which * 2.0 * faces.iter().sum::<f64>();
+    let (mut axis, mut side) = (2, 1.0);
+    for face in 0..6 {
+        if wanted < faces[face / 2] {
+            (axis, side) = (face / 2, if face % 2 == 0 { -1.0 } else { 1.0 });
+            break;
+        }
+        wanted -= faces[face / 2];
+    }
+    let (mut position, mut direction) = (DVec3::ZERO, DVec3::ZERO);
+    position[axis] = 0.5 * side * sides[axis];
+    position[(axis + 1) % 3] = (u - 0.5) * sides[(axis + 1) % 3];
+    position[(axis + 2) % 3] = (v - 0.5) * sides[(axis + 2) % 3];
+    direction[axis] = side;
+    (position, direction)
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::host::assets::MemoryAssets;
+
+    use super::*;
+
+    fn burner(parameters: BurnerParameters) -> Burner {
+        Burner::new(&parameters, &FlameParticlesParameters::default(), &MemoryAssets::default()).unwrap()
+    }
+
+    fn places(burner: &Burner) -> impl Iterator<Item = Birthplace> + '_ {
+        (0..4000).map(|birth| burner.birthplace(Key::new(1, "burner"), birth, 0.0))
+    }
+
+    #[test]
+    fn heskestad_worked_by_hand() {
+        // 1000^(2/5) = 15.8489.
+        assert!((heskestad(1000.0, 1.0) - (0.235 * 15.848_93 - 1.02)).abs() < 1e-5);
+    }
+
+    #[test]
+    fn gas_rises_as_mccaffrey_measured() {
+        let burner = burner(BurnerParameters { speed: Auto::Set(0.0), ..Default::default() });
+        assert!((burner.axis_speed(1.0) - 6.8).abs() < 0.05);
+        let (t, h) = (burner.rise_time(), burner.height);
+        assert!((0.5 * 23.0 * t * t - h).abs() < 0.01 * h);
+    }
+
+    #[test]
+    fn discs_are_even_and_turn_with_the_burner() {
+        let parameters = BurnerParameters { diameter: 2.0, rotation_deg: [90.0, 0.0, 0.0], ..Default::default() };
+        let burner = burner(parameters);
+        let inner = places(&burner).filter(|place| place.position.length() < 0.5).count();
+        assert!((900..1100).contains(&inner), "a quarter of the area holds {inner} of 4000");
+        assert!(places(&burner).all(|place| place.position.z.abs() < 1e-9 || place.position.y.abs() < 1e-9));
+        assert!(places(&burner).all(|place| (place.direction - DVec3::Z).length() < 1e-9));
+    }
+
+    #[test]
+    fn boxes_are_even_over_their_faces() {
+        let burner = burner(BurnerParameters { shape: BurnerShape::Box, size: [2.0, 1.0, 1.0], ..Default::default() });
+        let ends = places(&burner).filter(|place| place.direction.x.abs() > 0.5).count();
+        assert!((700..900).contains(&ends), "a fifth of the area holds {ends} of 4000");
+        for place in places(&burner) {
+            assert!(
+                (place.position.dot(place.direction) - if place.direction.x.abs() > 0.5 { 1.0 } else { 0.5 }).abs()
+                    < 1e-9
+            );
+        }
+    }
+
+    #[test]
+    fn all_places_lie_within_the_extent_and_fill_it() {
+        for (number, shape) in
+            [BurnerShape::Point, BurnerShape::Disc, BurnerShape::Line, BurnerShape::Box].into_iter().enumerate()
+        {
+            let rotation_deg = [20.0 * number as f64, 65.0, -40.0];
+            let parameters = BurnerParameters { shape, diameter: 0.3, length: 2.0, rotation_deg, ..Default::default() };
+            let burner = burner(parameters);
+            let [low, high] = burner.extent;
+            let around = |[low, high]: [DVec3; 2], place: DVec3| [low.min(place), high.max(place)];
+            let all = places(&burner).map(|place| place.position);
+            let [least, most] = all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around);
+            assert!((least - low).cmpgt(DVec3::splat(-1e-5)).all() && (high - most).cmpgt(DVec3::splat(-1e-5)).all());
+            let empty = (least - low).max(high - most).max_element();
+            assert!(empty < 0.06 * burner.reach, "{shape:?}: {empty} m are empty");
+        }
+    }
+
+    #[test]
+    fn points_lines_and_meshes_stay_within_their_bounds() {
+        let line =
+            burner(BurnerParameters { shape: BurnerShape::Line, length: 3.0, diameter: 0.2, ..Default::default() });
+        assert!(places(&line).all(|place| place.position.x.abs() <= 1.5 && place.position.z.abs() <= 0.1));
+        let point = burner(BurnerParameters { shape: BurnerShape::Point, diameter: 0.1, ..Default::default() });
+        assert!(places(&point).all(|place| place.position.length() <= 0.05));
+        let missing = BurnerParameters { shape: BurnerShape::Mesh, ..Default::default() };
+        let fault = Burner::new(&missing, &FlameParticlesParameters::default(), &MemoryAssets::default());
+        assert_eq!(fault.unwrap_err(), ParticleFaultKind::NoFile);
+    }
+}

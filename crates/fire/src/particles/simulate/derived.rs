@@ -1,0 +1,291 @@
+//! The numbers of the simulation that the paper leaves open, in SI, from the size and speed of the burners.
+
+use bansho_base::{
+    host::{assets::Assets, memory},
+    math::{self, DVec3},
+    parameters::{Auto, animated::Animated},
+    world::air::Air,
+};
+
+use super::burner::Burner;
+use crate::particles::{
+    fault::{ParticleFault, ParticleFaultKind},
+    parameters::{BurnerParameters, FlameParticlesParameters},
+};
+
+/// Most particles of all flames of a scene.
+const MOST_PARTICLES: i64 = 20_000_000;
+/// Bytes that a living particle takes, measured over a run: its state and the buffers of a step. (Drawing takes more for a while.)
+const PARTICLE_BYTES: f64 = 670.0;
+/// Times until its tip that gas may take before it is removed, whatever holds it.
+const LONGEST_RISE: f64 = 3.0;
+/// How much the fuel that a fire draws from its burner rises and falls as it puffs, as a share.
+const PULSE: f64 = 0.6;
+/// How far a burner may reach beyond the domain, of its own size: turning rounds.
+const SLACK: f64 = 1e-6;
+/// Fewest steps that gas lives, so that births in one step stay bounded.
+const FEWEST_STEPS: f64 = 4.0;
+
+/// All that follows from the parameters and stays.
+///
+/// Every particle stands for the same volume V of gas at birth. So many live that all burners together hold `particles`:
+/// a burner gives `A w / V` a second, and gas lives for the time until the tip and its afterlife. The support radius d is
+/// `support` times the mean distance `V^(1/3)`, mass m is V times the density of air as hot as the gas, rho_0 a share of
+/// that density, and k the square of a speed of sound that is a few times the gas's own speed.
+#[derive(Clone, Debug)]
+pub(crate) struct Design {
+    pub(crate) burners: Vec<Burner>,
+    /// Births a second of each burner at full flow.
+    pub(crate) rates: Vec<f64>,
+    /// How often each burner puffs, Hz.
+    pub(crate) puffing_hz: Vec<f64>,
+    /// How much more gas than on the mean comes at the height of a beat, as a share.
+    pub(crate) pulse: f64,
+    /// Support radius d, m.
+    pub(crate) support_radius: f32,
+    /// Mass m, kg.
+    pub(crate) mass: f32,
+    /// Density of gas at the burner, kg/m^3.
+    pub(crate) density: f32,
+    /// Density of reference rho_0, kg/m^3.
+    pub(crate) rest_density: f32,
+    /// k of eq. (11) a kelvin, m^2/(s^2 K).
+    pub(crate) stiffness_per_kelvin: f32,
+    /// Corners of the domain, m, from the flame's position.
+    pub(crate) domain: [DVec3; 2],
+    /// How long it burns before the shot, s.
+    pub(crate) preroll: f64,
+    /// In a loop: for how long one run passes into the next, s.
+    pub(crate) dissolve: f64,
+    /// More than these never live.
+    pub(crate) most: usize,
+}
+
+impl Design {
+    pub(crate) fn new(
+        parameters: &FlameParticlesParameters,
+        loop_s: Option<f64>,
+        assets: &dyn Assets,
+    ) -> Result<Self, ParticleFault> {
+        check_count(parameters.particles, 0)?;
+        let burners = burners(parameters, assets)?;
+        let domain = domain(parameters, &burners)?;
+        let stays: Vec<f64> = burners.iter().map(|burner| stay(parameters, burner)).collect();
+        let fluxes: Vec<f64> = burners.iter().map(|burner| burner.square_metres * burner.speed).collect();
+        let living: f64 = fluxes.iter().zip(&stays).map(|(flux, stay)| flux * stay).sum();
+        let volume = living / parameters.particles as f64;
+        let support_radius = support_radius(parameters, volume, &domain)?;
+        let coolest = burners.iter().map(|burner| burner.parameters.temperature_k).fold(f64::INFINITY, f64::min);
+        let density = Air::default().density_at(coolest);
+        let fastest = burners.iter().map(|burner| burner.speed).fold(0.0, f64::max);
+        let sound = parameters.fluid.stiffness * fastest;
+        let longest = stays.into_iter().fold(0.0, f64::max);
+        // By then all gas is other gas.
+        let dissolve = loop_s.map_or(0.0, |turn| longest.min(turn));
+        Ok(Self {
+            rates: fluxes.into_iter().map(|flux| flux / volume).collect(),
+            puffing_hz: burners.iter().map(|burner| burner.puffing_hz(parameters)).collect(),
+            pulse: (PULSE * parameters.motion.puffing).min(0.9),
+            support_radius: support_radius as f32,
+            mass: (density * volume) as f32,
+            density: density as f32,
+            rest_density: (parameters.fluid.rest_density * density) as f32,
+            stiffness_per_kelvin: (sound * sound / coolest) as f32,
+            domain,
+            preroll: preroll(parameters, longest) + 0.5 * dissolve,
+            dissolve,
+            most: 2 * parameters.particles as usize + 16,
+            burners,
+        })
+    }
+
+    /// Age at which a particle of burner `index` is removed even if it still burns, s.
+    pub(crate) fn longest_life(&self, index: usize, afterlife_s: f64) -> f64 {
+        LONGEST_RISE * self.burners[index].rise_time() + afterlife_s
+    }
+}
+
+/// How long gas of a burner stays, s: until the tip, and its afterlife.
+fn stay(parameters: &FlameParticlesParameters, burner: &Burner) -> f64 {
+    (burner.rise_time() + parameters.life.afterlife_s).max(FEWEST_STEPS * parameters.step_s)
+}
+
+/// The support radius d, m, of particles that stand for so much gas at birth.
+fn support_radius(
+    parameters: &FlameParticlesParameters,
+    volume: f64,
+    domain: &[DVec3; 2],
+) -> Result<f64, ParticleFault> {
+    let (radius, side) = (parameters.fluid.support * math::cbrt(volume), (domain[1] - domain[0]).min_element());
+    if radius <= side {
+        return Ok(radius);
+    }
+    Err(ParticleFault { key: "particles".into(), kind: ParticleFaultKind::SupportBeyondDomain { radius, side } })
+}
+
+/// How long it burns before the shot, s; by default twice as long as gas stays at the `longest`.
+fn preroll(parameters: &FlameParticlesParameters, longest: f64) -> f64 {
+    match parameters.preroll_s {
+        Auto::Set(seconds) => seconds,
+        Auto::Auto => (2.0 * longest).min(60.0),
+    }
+}
+
+/// Whether the system would give so many particles their memory.
+fn have_memory(count: i64) -> bool {
+    memory::is_granted(count as f64 * PARTICLE_BYTES)
+}
+
+/// Whether `count` particles may live beside the `others` of all other flames.
+///
+/// # Errors
+/// More than are taken or than there is memory for, with the number that would be.
+pub fn check_count(count: i64, others: i64) -> Result<(), ParticleFault> {
+    let taken = (MOST_PARTICLES - others).max(0);
+    if count <= taken && have_memory(count + others) {
+        return Ok(());
+    }
+    let most = memory::most(taken.min(count), |most| have_memory(most + others));
+    let most = if count > taken && have_memory(taken + others) { taken } else { most };
+    let gib = (count as f64 + others as f64) * PARTICLE_BYTES / f64::from(1 << 30);
+    let kind = ParticleFaultKind::TooManyParticles { count, others, gib, most };
+    Err(ParticleFault { key: "particles".into(), kind })
+}
+
+fn burners(parameters: &FlameParticlesParameters, assets: &dyn Assets) -> Result<Vec<Burner>, ParticleFault> {
+    let single = [BurnerParameters::default()];
+    let listed = if parameters.burners.is_empty() { &single[..] } else { &parameters.burners };
+    let make = |(index, burner): (usize, &BurnerParameters)| {
+        Burner::new(burner, parameters, assets)
+            .map_err(|kind| ParticleFault { key: format!("burners.{index}.file"), kind })
+    };
+    listed.iter().enumerate().map(make).collect()
+}
+
+/// The box that gas may fill: as given, or with room for three flames above and around.
+fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[DVec3; 2], ParticleFault> {
+    if let (Auto::Set(min), Auto::Set(max)) = (parameters.domain_min, parameters.domain_max)
+        && DVec3::from(min).cmpge(DVec3::from(max)).any()
+    {
+        return Err(ParticleFault { key: "domain_max".into(), kind: ParticleFaultKind::EmptyDomain { min, max } });
+    }
+    for (index, burner) in burners.iter().enumerate() {
+        let corners = burner.parameters.position.bounds().map(DVec3::from);
+        let reached = [corners[0] + burner.extent[0], corners[1] + burner.extent[1]];
+        for place in corners.into_iter().chain(reached) {
+            stands_within(parameters, place, SLACK * burner.reach).map_err(|(corner, kind)| {
+                // What the user did not write cannot be at fault.
+                let moved = burner.parameters.position != Animated::from([0.0; 3]);
+                ParticleFault { key: if moved { format!("burners.{index}.position") } else { corner.into() }, kind }
+            })?;
+        }
+    }
+    let room = |burner: &Burner| burner.reach + 3.0 * burner.height;
+    // The corners of the box in which each burner moves.
+    let ways = || burners.iter().map(|burner| (burner, burner.parameters.position.bounds().map(DVec3::from)));
+    let low = ways().map(|(burner, [low, _])| low - room(burner)).fold(DVec3::INFINITY, DVec3::min);
+    let high = ways().map(|(burner, [_, high])| high + room(burner)).fold(DVec3::NEG_INFINITY, DVec3::max);
+    let given = |corner: Auto<[f64; 3]>, auto| if let Auto::Set(corner) = corner { DVec3::from(corner) } else { auto };
+    Ok([given(parameters.domain_min, low), given(parameters.domain_max, high)])
+}
+
+/// Whether a place of a burner lies within the corners of the domain that are given, or `slack` m beyond; if not, beyond which of them.
+fn stands_within(
+    parameters: &FlameParticlesParameters,
+    place: DVec3,
+    slack: f64,
+) -> Result<(), (&'static str, ParticleFaultKind)> {
+    let FlameParticlesParameters { domain_min, domain_max, .. } = parameters;
+    let beyond = |corner, limit| Err((corner, ParticleFaultKind::OutsideDomain { place: place.into(), corner, limit }));
+    match (domain_min, domain_max) {
+        (Auto::Set(min), _) if (place + slack).cmplt(DVec3::from(*min)).any() => beyond("domain_min", *min),
+        (_, Auto::Set(max)) if (place - slack).cmpgt(DVec3::from(*max)).any() => beyond("domain_max", *max),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{geometry::mesh::Mesh, host::assets::MemoryAssets, parameters::AssetPath};
+
+    use super::*;
+    use crate::particles::parameters::BurnerShape;
+
+    fn design(parameters: &FlameParticlesParameters) -> Result<Design, ParticleFault> {
+        Design::new(parameters, None, &MemoryAssets::default())
+    }
+
+    #[test]
+    fn rates_hold_the_number_of_particles_and_volumes_meet_at_the_burner() {
+        let small = BurnerParameters { diameter: 0.1, heat_release_kw: 10.0, ..Default::default() };
+        let parameters = FlameParticlesParameters {
+            burners: vec![small, BurnerParameters::default()],
+            ..FlameParticlesParameters::default()
+        };
+        let design = design(&parameters).unwrap();
+        let stay = |burner: &Burner| burner.rise_time() + parameters.life.afterlife_s;
+        let living: f64 = design.burners.iter().zip(&design.rates).map(|(burner, rate)| rate * stay(burner)).sum();
+        assert!((living - parameters.particles as f64).abs() < 1.0);
+        let spacing = f64::from(design.support_radius) / parameters.fluid.support;
+        let layer = design.rates[1] / (design.burners[1].square_metres * design.burners[1].speed);
+        assert!((spacing * spacing * spacing * layer - 1.0).abs() < 1e-5);
+    }
+
+    /// A flame on a triangle of half a square metre that lies `far` to the side of the mesh's origin, in a domain of two metres each way.
+    fn on_a_mesh_beside_its_origin(far: f32, rotation_deg: [f64; 3]) -> Result<Design, ParticleFault> {
+        let corners = vec![[far, 0.0, 0.0], [far, 0.0, 1.0], [far + 1.0, 0.0, 0.0]];
+        let mut assets = MemoryAssets::default();
+        assets.insert_mesh("far.gltf", Mesh::new(corners, vec![[0, 1, 2]]).unwrap());
+        let file = Some(AssetPath("far.gltf".into()));
+        let burner = BurnerParameters { shape: BurnerShape::Mesh, file, rotation_deg, ..Default::default() };
+        let [domain_min, domain_max] = [-2.0, 2.0].map(|corner| Auto::Set([corner; 3]));
+        let parameters =
+            FlameParticlesParameters { burners: vec![burner], domain_min, domain_max, ..Default::default() };
+        Design::new(&parameters, None, &assets)
+    }
+
+    #[test]
+    fn a_mesh_that_lies_outside_the_domain_is_a_burner_outside_it() {
+        assert!(on_a_mesh_beside_its_origin(0.5, [0.0; 3]).is_ok());
+        // A part of it is enough: what is born there would die at once.
+        assert_eq!(on_a_mesh_beside_its_origin(1.5, [0.0; 3]).unwrap_err().key, "domain_max");
+        // Turned half about the upright axis it lies on the other side.
+        for (far, turn, key) in [(50.0, 0.0, "domain_max"), (50.0, 180.0, "domain_min")] {
+            let fault = on_a_mesh_beside_its_origin(far, [0.0, turn, 0.0]).unwrap_err();
+            assert_eq!(fault.key, key);
+            assert!(matches!(fault.kind, ParticleFaultKind::OutsideDomain { place, .. } if place[0].abs() >= 50.0));
+        }
+    }
+
+    #[test]
+    fn parameters_that_do_not_go_together_are_named() {
+        let default = FlameParticlesParameters::default;
+        let fault = |parameters| design(&parameters).unwrap_err();
+        let far = BurnerParameters { position: [0.0, 90.0, 0.0].into(), ..Default::default() };
+        let outside = FlameParticlesParameters {
+            burners: vec![BurnerParameters::default(), far],
+            domain_max: Auto::Set([5.0; 3]),
+            ..default()
+        };
+        assert_eq!(fault(outside).key, "burners.1.position");
+        let long = BurnerParameters { shape: BurnerShape::Line, length: 3.0, ..Default::default() };
+        let partly = FlameParticlesParameters { burners: vec![long], domain_max: Auto::Set([1.0; 3]), ..default() };
+        assert_eq!(fault(partly).key, "domain_max");
+        // The corner is what the user wrote, if no position is.
+        let beyond_default = FlameParticlesParameters { domain_min: Auto::Set([1.0; 3]), ..default() };
+        assert_eq!(fault(beyond_default).key, "domain_min");
+        let corners = [Auto::Set([-40.0; 3]), Auto::Set([-50.0; 3])];
+        let empty = FlameParticlesParameters { domain_min: corners[0], domain_max: corners[1], ..default() };
+        assert_eq!(fault(empty).key, "domain_max");
+        let thin = [Auto::Set([-0.01; 3]), Auto::Set([0.01; 3])];
+        let narrow = vec![BurnerParameters { diameter: 0.015, ..Default::default() }];
+        let [domain_min, domain_max] = thin;
+        let wide = FlameParticlesParameters { particles: 5, burners: narrow, domain_min, domain_max, ..default() };
+        assert!(matches!(fault(wide).kind, ParticleFaultKind::SupportBeyondDomain { .. }));
+        let many = fault(FlameParticlesParameters { particles: 900_000_000, ..default() });
+        let expected = "particles: 900000000 particles would take 562 GiB; allowed: up to ";
+        let most: Option<i64> = many.to_string().strip_prefix(expected).and_then(|most| most.parse().ok());
+        // A small machine takes fewer.
+        assert!(most.is_some_and(|most| (1_000_000..=MOST_PARTICLES).contains(&most)), "{many}");
+    }
+}

@@ -1,0 +1,63 @@
+//! How the air's own motion carries the gas of each burner: the draw toward the axis, vortex rings, eddies; sixteen particles at a time.
+
+use fearless_simd::{Simd, prelude::*};
+
+use bansho_base::math::simd::{Lanes, Real};
+
+use super::{entrainment_axis::Axis, turbulence::Eddies, vortex_rings::Ring, wind::Breeze};
+use crate::particles::simulate::vector_lanes::{length, less, plus};
+
+/// What acts on the gas of one burner.
+pub(crate) struct Draught<'a> {
+    /// The wind over it.
+    pub(crate) breeze: Breeze,
+    pub(crate) rings: Vec<Ring>,
+    pub(crate) axis: Axis,
+    pub(crate) eddies: Eddies<'a>,
+    pub(crate) turbulence: f32,
+    /// Age at which turbulence has grown to half its strength, s.
+    pub(crate) turbulent_age: f32,
+    /// Entrainment coefficient over the radius of the fire, 1/m.
+    pub(crate) entrainment: f32,
+    /// Coefficient of the drag of air that blows across, over the radius of the fire, 1/m.
+    pub(crate) drag: f32,
+    /// Share of its fuel that gas burns in a metre of its way, and in a second.
+    pub(crate) burning: [f32; 2],
+}
+
+/// The air's motion at the places of particles, m/s.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Flow<R> {
+    /// That of rings and of the draw toward the axis.
+    pub(crate) steady: [R; 3],
+    /// That of eddies of unit strength.
+    pub(crate) eddies: [R; 3],
+}
+
+impl Draught<'_> {
+    /// Share of its own mass that gas of such a velocity takes up from the air, 1/s.
+    #[inline(always)]
+    pub(crate) fn mixing<R: Real>(&self, velocity: &[R; 3], wind: &[R; 3], to_air: R) -> R {
+        let like = |value: f32| to_air.broadcast(value);
+        length(&less(velocity, wind)) * to_air.fma(like(self.entrainment), like(0.5 * self.entrainment))
+    }
+
+    /// Velocity with which the air carries gas of `speed` and `age`, m/s.
+    #[inline(always)]
+    pub(crate) fn velocity<R: Real>(&self, flow: &Flow<R>, speed: R, age: R) -> [R; 3] {
+        let grown = age / (age + age.broadcast(self.turbulent_age));
+        plus(&flow.steady, &flow.eddies, speed * grown * age.broadcast(self.turbulence))
+    }
+
+    /// The motion at sixteen places.
+    #[inline(always)]
+    pub(crate) fn flow<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> Flow<Lanes<S>> {
+        let mut steady = self.axis.velocity(simd, place);
+        for ring in &self.rings {
+            ring.add_velocity(place, &mut steady);
+        }
+        let none = [Lanes::splat(simd, 0.0); 3];
+        let eddies = if self.turbulence > 0.0 { self.eddies.velocity(simd, place) } else { none };
+        Flow { steady, eddies }
+    }
+}

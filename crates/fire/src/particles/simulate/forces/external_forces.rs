@@ -1,0 +1,202 @@
+//! All that acts on the gas from outside in a step: wind, eddies, vortex rings, the draw toward the axis.
+
+use bansho_base::{
+    math::{DVec3, Vec3, random::Key},
+    phenomenon::surroundings::{Occluder, Surroundings},
+    world::{air::Air, gravity::STANDARD_GRAVITY},
+};
+
+use super::{
+    burner_forces::Draught,
+    entrainment_axis::{Axis, axes},
+    turbulence::{Eddies, Turbulence},
+    vortex_rings::{Ring, rings},
+    wind::Breeze,
+};
+use crate::particles::{
+    parameters::{FlameParticlesParameters, WindForce},
+    simulate::{derived::Design, particles::Particles},
+};
+use rayon::prelude::*;
+
+/// Where turbulence has grown to half its strength, as a share of the time that gas takes to the tip.
+const TURBULENT_AGE: f32 = 0.1;
+
+/// Speed at which eddies drift beside the wind: the gas that holds them takes it up as it rises.
+const EDDY_DRIFT: f64 = 0.5;
+
+/// Drag coefficient of a fire in wind from the side.
+const CROSS_DRAG: f64 = 0.25;
+
+/// Share of its fuel that gas burns on a way as long as the flame is high, on the mean; and in the time that it takes there.
+const WAY_SHARE: f64 = 1.02;
+const TIME_SHARE: f64 = 0.25;
+
+/// Particles of a task.
+const PARTICLES_OF_TASK: usize = 8192;
+
+/// What of a fire stays while it burns.
+#[derive(Clone, Copy)]
+pub(crate) struct Setting<'a> {
+    pub(crate) parameters: &'a FlameParticlesParameters,
+    pub(crate) design: &'a Design,
+    pub(crate) turbulence: &'a Turbulence,
+    pub(crate) key: Key,
+}
+
+/// What acts on the gas in a step.
+pub(crate) struct Weather<'a> {
+    setting: Setting<'a>,
+    around: &'a Surroundings<'a>,
+    pub(crate) origin: DVec3,
+    pub(crate) occluders: &'a [Occluder],
+    pub(crate) air_temperature: f32,
+    /// Gravity against which gas rises, m/s^2.
+    pub(crate) buoyancy: f32,
+    pub(crate) wind: WindForce,
+    pub(crate) wind_gain: f32,
+    /// Density of air at 1 K, kg K/m^3.
+    pub(crate) density_kelvin: f32,
+    /// The air's motion over each burner.
+    pub(crate) draughts: Vec<Draught<'a>>,
+}
+
+impl<'a> Weather<'a> {
+    /// The weather of a step that begins at `t`.
+    pub(crate) fn new(setting: Setting<'a>, particles: &Particles, around: &'a Surroundings, t: f64) -> Self {
+        let Setting { parameters: flame, design, .. } = setting;
+        let axes = axes(&design.burners, particles.positions(), &particles.burner, flame.motion.narrowing, t);
+        let bounds = bounds(particles, design.burners.len());
+        let draughts = axes.into_iter().zip(bounds).enumerate().map(|(number, (axis, bounds))| {
+            let breeze = Breeze::new(around.wind, particles.origin, bounds, t);
+            setting.draught(number, axis, breeze, around, t)
+        });
+        Self {
+            draughts: draughts.collect(),
+            setting,
+            around,
+            origin: particles.origin,
+            occluders: &around.others.occluders,
+            air_temperature: around.air.temperature_k as f32,
+            buoyancy: (STANDARD_GRAVITY * flame.motion.buoyancy) as f32,
+            wind: flame.motion.wind,
+            wind_gain: flame.motion.wind_gain as f32,
+            density_kelvin: density_kelvin(around.air),
+        }
+    }
+
+    /// Lets rings and eddies go on to the moment `t`; axes and wind stay for the step.
+    pub(crate) fn pass(&mut self, t: f64) {
+        for (number, draught) in self.draughts.iter_mut().enumerate() {
+            draught.rings = self.setting.rings(number, &draught.axis, t);
+            draught.eddies = self.setting.eddies(number, self.around, t);
+        }
+    }
+}
+
+impl<'a> Setting<'a> {
+    fn draught(self, number: usize, axis: Axis, breeze: Breeze, around: &Surroundings, t: f64) -> Draught<'a> {
+        let (burner, motion) = (&self.design.burners[number], &self.parameters.motion);
+        Draught {
+            breeze,
+            rings: self.rings(number, &axis, t),
+            axis,
+            eddies: self.eddies(number, around, t),
+            turbulence: motion.turbulence as f32,
+            turbulent_age: TURBULENT_AGE * burner.rise_time() as f32,
+            entrainment: (motion.entrainment / (0.5 * burner.diameter)) as f32,
+            drag: (CROSS_DRAG * motion.wind_gain / (0.5 * burner.diameter)) as f32,
+            burning: [(WAY_SHARE / burner.height) as f32, (TIME_SHARE / burner.rise_time()) as f32],
+        }
+    }
+
+    fn rings(self, number: usize, axis: &Axis, t: f64) -> Vec<Ring> {
+        rings(&self.design.burners[number], self.parameters, self.key, number as u32, t, axis)
+    }
+
+    fn eddies(self, number: usize, around: &Surroundings, t: f64) -> Eddies<'a> {
+        let (burner, motion) = (&self.design.burners[number], &self.parameters.motion);
+        let drift = around.wind.travel(0.0, t) * (EDDY_DRIFT * motion.wind_gain);
+        self.turbulence.at(t, motion.eddy_size * burner.diameter, burner.axis_speed(0.5 * burner.height), drift)
+    }
+}
+
+fn density_kelvin(air: &Air) -> f32 {
+    air.density_at(1.0) as f32
+}
+
+/// Corners of the box around the particles of each burner.
+fn bounds(particles: &Particles, burners: usize) -> Vec<[Vec3; 2]> {
+    const NOTHING: [Vec3; 2] = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+    let [x, y, z] = particles.positions();
+    let of_task = |first: usize| {
+        let mut bounds = vec![NOTHING; burners];
+        for index in first..(first + PARTICLES_OF_TASK).min(particles.len()) {
+            let place = Vec3::new(x[index], y[index], z[index]);
+            let [low, high] = &mut bounds[particles.burner[index] as usize];
+            (*low, *high) = (low.min(place), high.max(place));
+        }
+        bounds
+    };
+    let both = |mut one: Vec<[Vec3; 2]>, other: Vec<[Vec3; 2]>| {
+        for ([low, high], [other_low, other_high]) in one.iter_mut().zip(other) {
+            (*low, *high) = (low.min(other_low), high.max(other_high));
+        }
+        one
+    };
+    let parts = (0..particles.len()).into_par_iter().step_by(PARTICLES_OF_TASK);
+    let bounds = parts.map(of_task).reduce(|| vec![NOTHING; burners], both);
+    // A burner that nothing came from yet has no wind to speak of.
+    bounds.into_iter().map(|bounds| if bounds[0].x <= bounds[1].x { bounds } else { [Vec3::ZERO, Vec3::ONE] }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{
+        host::assets::MemoryAssets,
+        math::{random::Key, simd::Lanes},
+        world::{
+            air::Air,
+            wind::{Wind, WindParameters},
+        },
+    };
+
+    use super::*;
+    use crate::particles::{parameters::BurnerParameters, simulate::simulation::Simulation};
+
+    use fearless_simd::prelude::*;
+
+    #[test]
+    fn each_burner_feels_the_wind_that_blows_where_it_stands() {
+        let burners = [0.0, 50.0].map(|x| BurnerParameters { position: [x, 0.0, 0.0].into(), ..Default::default() });
+        let parameters = FlameParticlesParameters {
+            burners: burners.to_vec(),
+            particles: 600,
+            ..FlameParticlesParameters::default()
+        };
+        let design = Design::new(&parameters, None, &MemoryAssets::default()).unwrap();
+        let mut simulation = Simulation::new(&parameters, design, Key::new(1, "flame"));
+        let gusty = WindParameters { velocity: [2.0, 0.0, 0.0].into(), gust: 1.5, ..WindParameters::default() };
+        let (wind, air) = (Wind::new(gusty, 3, None), Air::default());
+        let around = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
+        (0..30).for_each(|step| simulation.step(f64::from(step) * simulation.step_s(), &around));
+        let Simulation { parameters, design, turbulence, key, .. } = &simulation;
+        let setting = Setting { parameters, design, turbulence, key: *key };
+        let weather = Weather::new(setting, &simulation.particles, &around, 0.25);
+        let at = |burner: usize, place: Vec3| {
+            bansho_base::dispatch_baseline!(simd => {
+                let lanes = place.to_array().map(|x| Lanes::splat(simd, x));
+                Vec3::from(weather.draughts[burner].breeze.at(simd, &lanes).map(|values| values.as_slice()[0]))
+            })
+        };
+        let (particles, mut off, mut apart) = (&simulation.particles, 0.0_f32, 0.0_f32);
+        for index in 0..particles.len() {
+            let place = Vec3::from(particles.positions().map(|values| values[index]));
+            let exact = wind.at(place.as_dvec3(), 0.25).as_vec3();
+            let [own, other] = [0, 1].map(|swap| at(particles.burner[index] as usize ^ swap, place));
+            off = off.max((own - exact).length());
+            apart = apart.max((other - exact).length());
+        }
+        assert!(off < 0.4 && apart > 4.0, "{off} m/s off the wind, that of the other burner {apart}");
+    }
+}

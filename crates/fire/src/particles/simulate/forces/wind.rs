@@ -1,0 +1,92 @@
+//! The wind over the gas: the scene's wind on a coarse grid, since gusts are larger than flames.
+
+use bansho_base::{
+    math::{
+        DVec3, Vec3,
+        simd::{Lanes, Real, fetch, wrap_split},
+    },
+    world::wind::Wind,
+};
+
+use super::turbulence::mixed;
+use fearless_simd::{Simd, prelude::*};
+
+/// Grid points along each side of the box around the gas.
+const POINTS: usize = 4;
+
+/// Grid points of the box.
+const ALL_POINTS: usize = POINTS * POINTS * POINTS;
+
+/// The wind at one moment within a box.
+#[derive(Clone, Debug)]
+pub(crate) struct Breeze {
+    low: [f32; 3],
+    /// Cells a metre.
+    scale: [f32; 3],
+    /// Velocities on the grid; the fourth number is 0.
+    velocity: Box<[[f32; 4]; ALL_POINTS]>,
+}
+
+impl Breeze {
+    /// The wind at time `t` between the corners `low` and `high`, which count from `origin`, m.
+    pub(crate) fn new(wind: &Wind, origin: DVec3, [low, high]: [Vec3; 2], t: f64) -> Self {
+        let size = (high - low).max(Vec3::splat(1e-3));
+        let last = (POINTS - 1) as f32;
+        let mut velocity = Box::new([[0.0; 4]; ALL_POINTS]);
+        for (index, velocity) in velocity.iter_mut().enumerate() {
+            let place = [index % POINTS, index / POINTS % POINTS, index / (POINTS * POINTS)];
+            let place = low + size * Vec3::from(place.map(|step| step as f32)) / last;
+            *velocity = wind.at(origin + place.as_dvec3(), t).as_vec3().extend(0.0).to_array();
+        }
+        Self { low: low.to_array(), scale: (last / size).to_array(), velocity }
+    }
+
+    /// Velocity at sixteen places, m/s.
+    #[inline(always)]
+    pub(crate) fn at<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        const MASK: u32 = POINTS as u32 - 1;
+        let like = |value: f32| Lanes::splat(simd, value);
+        let mut on_grid = *place;
+        for c in 0..3 {
+            // Never the last point itself, beside which there is none.
+            let last = like((POINTS - 1) as f32 - 1e-3);
+            on_grid[c] = ((place[c] - like(self.low[c])) * like(self.scale[c])).simd_max(like(0.0)).simd_min(last);
+        }
+        let ((x, across), (y, up), (z, along)) =
+            (wrap_split(on_grid[0], MASK), wrap_split(on_grid[1], MASK), wrap_split(on_grid[2], MASK));
+        let first = (((z << POINTS.ilog2()) + y) << POINTS.ilog2()) + x;
+        let [next_y, next_z] = [POINTS as u32, (POINTS * POINTS) as u32];
+        let starts = [first, first + next_y, first + next_z, first + (next_y + next_z)];
+        let mut rows = [[like(0.0); 4]; 4];
+        for k in 0..4 {
+            let [here, beside] = [fetch(simd, &self.velocity, starts[k]), fetch(simd, &self.velocity, starts[k] + 1)];
+            rows[k] = mixed(&here, &beside, across);
+        }
+        let (near, far) = (mixed(&rows[0], &rows[1], up), mixed(&rows[2], &rows[3], up));
+        let [x, y, z, _] = mixed(&near, &far, along);
+        [x, y, z]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{parameters::animated::Animated, world::wind::WindParameters};
+
+    use super::*;
+
+    #[test]
+    fn it_is_the_wind_itself_within_a_few_percent() {
+        let parameters = WindParameters { velocity: Animated::from([3.0, 0.0, 1.0]), ..WindParameters::default() };
+        let wind = Wind::new(parameters, 5, None);
+        let origin = DVec3::new(10.0, 0.0, -4.0);
+        let breeze = Breeze::new(&wind, origin, [Vec3::ZERO, Vec3::new(1.0, 2.0, 1.0)], 2.0);
+        for place in [Vec3::splat(0.1), Vec3::new(0.9, 1.3, 0.4), Vec3::new(0.5, 2.0, 1.0)] {
+            let exact = wind.at(origin + place.as_dvec3(), 2.0).as_vec3();
+            let found = bansho_base::dispatch_baseline!(simd => {
+                let velocity = breeze.at(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
+                Vec3::from(velocity.map(|values| values.as_slice()[11]))
+            });
+            assert!((found - exact).length() < 0.1, "{found} {exact}");
+        }
+    }
+}

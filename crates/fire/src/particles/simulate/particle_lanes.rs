@@ -1,0 +1,176 @@
+//! Particles sixteen at a time, all of one burner: rows of a task's arrays.
+
+use std::ops::Range;
+
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use rayon::prelude::*;
+
+use bansho_base::math::simd::{LANES, Lanes};
+
+use crate::particles::simulate::forces::burner_forces::Draught;
+
+/// Particles of a task.
+pub(crate) const PARTICLES_OF_TASK: usize = 512;
+
+/// What a task reads of its particles and does not change.
+pub(crate) trait Still: Copy + Sync {
+    /// What belongs to these particles.
+    fn part(self, range: Range<usize>) -> Self;
+}
+
+/// Work on `N` numbers of each particle, for sixteen of one burner at a time.
+pub(crate) trait Work<S: Still, const N: usize>: Sync {
+    /// Works on rows of a task.
+    fn rows<V: Simd>(&self, simd: V, draught: &Draught, rows: Rows, still: S, moving: &mut [&mut [f32]; N]);
+}
+
+/// Works on all particles, burner by burner within each task.
+pub(crate) fn burner_by_burner<S: Still, const N: usize>(
+    work: &impl Work<S, N>,
+    draughts: &[Draught],
+    burners: &[u32],
+    still: S,
+    moving: [&mut Vec<f32>; N],
+) {
+    let level = Level::new();
+    columns(moving).into_par_iter().enumerate().for_each(|(task, mut moving)| {
+        let first = task * PARTICLES_OF_TASK;
+        let range = first..first + moving[0].len();
+        let sorted = ByBurner::new(&burners[range.clone()], draughts.len());
+        let still = still.part(range);
+        dispatch!(level, simd => work_task(simd, work, draughts, &sorted, still, &mut moving));
+    });
+}
+
+#[inline(always)]
+fn work_task<V: Simd, S: Still, const N: usize>(
+    simd: V,
+    work: &impl Work<S, N>,
+    draughts: &[Draught],
+    sorted: &ByBurner,
+    still: S,
+    moving: &mut [&mut [f32]; N],
+) {
+    for (number, draught) in draughts.iter().enumerate() {
+        for rows in sorted.of(number).chunks(LANES) {
+            work.rows(simd, draught, Rows(rows), still, moving);
+        }
+    }
+}
+
+/// The part of each array that belongs to each task.
+fn columns<const N: usize>(arrays: [&mut Vec<f32>; N]) -> Vec<[&mut [f32]; N]> {
+    let tasks = arrays.first().map_or(0, |values| values.len().div_ceil(PARTICLES_OF_TASK));
+    let mut parts = arrays.map(|values| values.chunks_mut(PARTICLES_OF_TASK));
+    (0..tasks).map(|_| parts.each_mut().map(|parts| parts.next().unwrap_or_default())).collect()
+}
+
+/// The rows of a task's arrays, burner by burner.
+#[derive(Debug)]
+struct ByBurner {
+    rows: Vec<u32>,
+    /// Where the rows of each burner end.
+    ends: Vec<usize>,
+}
+
+impl ByBurner {
+    /// Sorts the rows of a task whose particles came from these burners, of `count` that there are.
+    fn new(burners: &[u32], count: usize) -> Self {
+        let mut sorted = Self { rows: vec![0; burners.len()], ends: vec![0; count] };
+        for burner in burners {
+            sorted.ends[*burner as usize] += 1;
+        }
+        let mut start = 0;
+        for end in &mut sorted.ends {
+            start += std::mem::replace(end, start);
+        }
+        for (row, burner) in burners.iter().enumerate() {
+            let place = &mut sorted.ends[*burner as usize];
+            sorted.rows[*place] = row as u32;
+            *place += 1;
+        }
+        sorted
+    }
+
+    /// The rows of a burner, upward.
+    fn of(&self, burner: usize) -> &[u32] {
+        let start = if burner == 0 { 0 } else { self.ends[burner - 1] };
+        &self.rows[start..self.ends[burner]]
+    }
+}
+
+/// Up to sixteen rows, upward.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rows<'a>(pub(crate) &'a [u32]);
+
+impl Rows<'_> {
+    /// The first row, if they are sixteen that follow each other.
+    #[inline(always)]
+    fn run(self) -> Option<usize> {
+        let (first, last) = (self.0[0] as usize, self.0[self.0.len() - 1] as usize);
+        (self.0.len() == LANES && last - first == LANES - 1).then_some(first)
+    }
+
+    /// Their values; lanes beyond the last row hold the last row's.
+    #[inline(always)]
+    pub(crate) fn load<S: Simd>(self, simd: S, values: &[f32]) -> Lanes<S> {
+        if let Some(first) = self.run() {
+            return Lanes::from_slice(simd, &values[first..first + LANES]);
+        }
+        let last = values[self.0[self.0.len() - 1] as usize];
+        let mut lanes = [last; LANES];
+        for (lane, row) in lanes.iter_mut().zip(self.0) {
+            *lane = values[*row as usize];
+        }
+        Lanes::from_slice(simd, &lanes)
+    }
+
+    /// The values of several arrays.
+    #[inline(always)]
+    pub(crate) fn load_all<S: Simd, const N: usize>(self, simd: S, arrays: [&[f32]; N]) -> [Lanes<S>; N] {
+        let mut batches = [Lanes::splat(simd, 0.0); N];
+        for k in 0..N {
+            batches[k] = self.load(simd, arrays[k]);
+        }
+        batches
+    }
+
+    /// Puts values into their rows.
+    #[inline(always)]
+    pub(crate) fn store<S: Simd>(self, batch: Lanes<S>, values: &mut [f32]) {
+        if let Some(first) = self.run() {
+            batch.store_slice(&mut values[first..first + LANES]);
+            return;
+        }
+        let mut lanes = [0.0; LANES];
+        batch.store_slice(&mut lanes);
+        for (lane, row) in lanes.iter().zip(self.0) {
+            values[*row as usize] = *lane;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_each_burner_come_together_and_values_go_back_where_they_were() {
+        let burners: Vec<u32> = (0..100).map(|row| if row < 40 { 2 } else { row % 3 }).collect();
+        let sorted = ByBurner::new(&burners, 5);
+        let values: Vec<f32> = (0..100).map(|row| row as f32).collect();
+        let mut seen = vec![0.0; 100];
+        for burner in 0..5 {
+            let rows = sorted.of(burner);
+            assert!(rows.iter().all(|row| burners[*row as usize] as usize == burner) && rows.is_sorted());
+            for rows in rows.chunks(LANES).map(Rows) {
+                bansho_base::dispatch_baseline!(simd => {
+                    let batch = rows.load(simd, &values);
+                    assert_eq!(batch.as_slice()[LANES - 1], rows.0[rows.0.len() - 1] as f32);
+                    rows.store(batch + batch, &mut seen);
+                });
+            }
+        }
+        assert!((0..100).all(|row| seen[row] == 2.0 * values[row]), "{seen:?}");
+    }
+}

@@ -1,0 +1,141 @@
+//! Curves over [0, 1] as tables, two side by side so that one load fetches both at one place.
+
+use fearless_simd::{Simd, u32x16};
+
+use bansho_base::math::simd::{Lanes, Real, any_positive, fetch, wrap_split};
+
+/// Straight pieces of a table.
+pub(crate) const SEGMENTS: usize = 512;
+/// The greatest place below 1, so that the last piece serves the end too.
+const LAST: f32 = 1.0 - f32::EPSILON / 2.0;
+
+/// Two functions of one variable in [0, 1]: for each piece, value and rise of the first, then of the second.
+#[derive(Clone, Debug)]
+pub(crate) struct CurvePair {
+    pieces: Box<[[f32; 4]; SEGMENTS]>,
+}
+
+/// Pieces of a table and the places in them.
+pub(crate) struct Located<S: Simd> {
+    piece: u32x16<S>,
+    part: Lanes<S>,
+}
+
+/// Where sixteen places lie in any table; they are held to [0, 1].
+#[inline(always)]
+pub(crate) fn locate<S: Simd>(x: Lanes<S>) -> Located<S> {
+    let place = x.simd_max(x.broadcast(0.0)).simd_min(x.broadcast(LAST)) * x.broadcast(SEGMENTS as f32);
+    let (piece, part) = wrap_split(place, SEGMENTS as u32 - 1);
+    Located { piece, part }
+}
+
+/// Where sixteen places lie that are often all the same, as the heights of a level row of pixels: then one look-up serves.
+pub(crate) enum Near<S: Simd> {
+    /// All at one place.
+    Same(f32, Lanes<S>),
+    /// Each at its own.
+    Apart(Located<S>),
+}
+
+/// Whether sixteen places are the same in any table, and where they lie.
+#[inline(always)]
+pub(crate) fn locate_near<S: Simd>(x: Lanes<S>) -> Near<S> {
+    /// Spread within which one look-up serves all: a twentieth of a piece.
+    const STEADY: f32 = 0.05 / SEGMENTS as f32;
+    let first = x.broadcast(x[0]);
+    if any_positive((x - first).simd_abs() - x.broadcast(STEADY)) {
+        Near::Apart(locate(x))
+    } else {
+        Near::Same(x[0], first)
+    }
+}
+
+impl CurvePair {
+    /// The table of what `values` gives at each of the `SEGMENTS + 1` places x.
+    pub(crate) fn new(mut values: impl FnMut(f64) -> [f64; 2]) -> Self {
+        Self::from_samples(|i| {
+            let [first, second] = values(i as f64 / SEGMENTS as f64);
+            [first as f32, second as f32]
+        })
+    }
+
+    /// The table of samples by their index, 0 to `SEGMENTS`.
+    #[inline(always)]
+    pub(crate) fn from_samples(mut sample: impl FnMut(usize) -> [f32; 2]) -> Self {
+        let mut pieces = Box::new([[0.0; 4]; SEGMENTS]);
+        let mut low = sample(0);
+        for (i, piece) in pieces.iter_mut().enumerate() {
+            let high = sample(i + 1);
+            *piece = [low[0], high[0] - low[0], low[1], high[1] - low[1]];
+            low = high;
+        }
+        Self { pieces }
+    }
+
+    /// Both functions at located places.
+    #[inline(always)]
+    pub(crate) fn fetch<S: Simd>(&self, at: &Located<S>) -> [Lanes<S>; 2] {
+        let [first, first_rise, second, second_rise] = fetch(at.part.simd, &self.pieces, at.piece);
+        [first_rise.fma(at.part, first), second_rise.fma(at.part, second)]
+    }
+
+    /// Both functions at sixteen places.
+    #[inline(always)]
+    pub(crate) fn sample<S: Simd>(&self, x: Lanes<S>) -> [Lanes<S>; 2] {
+        self.fetch(&locate(x))
+    }
+
+    /// Both functions at places that are often all the same.
+    #[inline(always)]
+    pub(crate) fn near<S: Simd>(&self, at: &Near<S>) -> [Lanes<S>; 2] {
+        match at {
+            Near::Same(x, lanes) => self.at(*x).map(|value| lanes.broadcast(value)),
+            Near::Apart(located) => self.fetch_apart(located),
+        }
+    }
+
+    /// [`fetch`](Self::fetch), out of line.
+    fn fetch_apart<S: Simd>(&self, at: &Located<S>) -> [Lanes<S>; 2] {
+        at.part.simd.vectorize(
+            #[inline(always)]
+            || self.fetch(at),
+        )
+    }
+
+    /// Both functions at one place.
+    #[inline(always)]
+    pub(crate) fn at(&self, x: f32) -> [f32; 2] {
+        let place = x.simd_max(0.0).simd_min(LAST) * SEGMENTS as f32;
+        let piece = place as i32;
+        let part = place - piece as f32;
+        let [first, first_rise, second, second_rise] = self.pieces[piece as usize & (SEGMENTS - 1)];
+        [first_rise.mul_add(part, first), second_rise.mul_add(part, second)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::SimdBase;
+
+    use bansho_base::math::simd::ramp;
+
+    use super::*;
+
+    #[test]
+    fn a_table_holds_its_ends_and_is_straight_between_samples() {
+        let table = CurvePair::new(|x| [x, 1.0 - x * x]);
+        assert_eq!((table.at(0.0), table.at(-3.0)), ([0.0, 1.0], [0.0, 1.0]));
+        let end = table.at(7.0);
+        assert!((end[0] - 1.0).abs() < 1e-6 && end[1].abs() < 1e-5);
+        for i in 0..1000 {
+            let x = i as f32 / 999.0;
+            let [line, parabola] = table.at(x);
+            assert!((line - x).abs() < 1e-6 && (parabola - (1.0 - x * x)).abs() < 2e-6);
+            let batch =
+                bansho_base::dispatch_baseline!(simd => table.sample(Lanes::splat(simd, x)).map(|values| values[7]));
+            assert!((batch[0] - line).abs() < 1e-6 && (batch[1] - parabola).abs() < 1e-6);
+            let near = bansho_base::dispatch_baseline!(simd => table.near(&locate_near(ramp(simd, x, 1e-5))).map(|values| values[11]));
+            assert!((near[0] - line).abs() < 2e-4 && (near[1] - parabola).abs() < 4e-4, "{near:?}");
+        }
+    }
+}

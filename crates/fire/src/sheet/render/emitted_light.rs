@@ -1,0 +1,124 @@
+//! The light that a flame throws on others: its own coloured field, integrated coarsely at each moment.
+
+use bansho_base::{
+    math::{
+        DVec3, lerp,
+        simd::{LANES, Lanes, Real, ramp},
+    },
+    phenomenon::{
+        strip::Shutter,
+        surroundings::{Emitter, Light},
+    },
+};
+
+use super::{
+    flame::Flame,
+    projection::Batch,
+    shade::{State, shade},
+};
+use crate::sheet::{
+    FlameSheet,
+    animate::moment::{Moment, Push},
+};
+use fearless_simd::{Level, Simd, prelude::*};
+
+/// Rows of the coarse grid; it is sixteen wide.
+const ROWS: usize = 32;
+
+/// What each row of the grid sends out, candela (ACEScg) in all directions that see the sheet's face.
+pub(crate) type RowIntensities = [[f32; 3]; ROWS];
+
+impl FlameSheet {
+    /// Luminous intensity of the rows of a flame's sheet at time `t`, from the base up: luminance times area of each cell, summed.
+    ///
+    /// The flame is taken as still air would leave it. A sheet is thin, and turned to every viewer, so that its intensity is the
+    /// same in all directions.
+    pub(crate) fn row_intensities(&self, flame: &Flame, t: f64) -> RowIntensities {
+        let still = Push { across: 0.0, toward: 0.0 };
+        let time = self.flame_time(flame, t);
+        let moment = Moment::new(&self.parameters, self.shape(), &flame.motion, &self.clock, time, still);
+        let texture = flame.source.texture(moment.scroll);
+        let state = State { moment, texture, pixel: [2.0 / LANES as f32, 1.0 / ROWS as f32] };
+        let size = self.sheet_size(flame);
+        let cell_area = size.x * size.y / (LANES * ROWS) as f64;
+        let scale = (cell_area * self.luminance_at(t)) as f32;
+        fearless_simd::dispatch!(Level::new(), simd => rows(simd, self, &state, scale))
+    }
+
+    /// The point lights that stand for a flame while the shutter is open.
+    pub(crate) fn point_lights(&self, flame: &Flame, shutter: Shutter) -> Vec<Light> {
+        let t = shutter.middle();
+        let (base, size) = (self.base(flame, t), self.sheet_size(flame));
+        let rows = self.row_intensities(flame, t);
+        let count = self.parameters.light.count.max(1) as usize;
+        let scale = self.parameters.light.scale as f32;
+        let stand_at = |height: f64| base + DVec3::Y * (height * size.y);
+        (0..count)
+            .map(|index| share(&rows, index, count))
+            .filter(|(intensity, _)| intensity.iter().any(|value| *value * scale > 0.0))
+            .map(|(intensity, height)| Light {
+                emitter: Emitter::Point { position: stand_at(height), radius: 0.15 * size.x },
+                intensity: intensity.map(|value| value * scale),
+            })
+            .collect()
+    }
+}
+
+#[inline(always)]
+fn rows<S: Simd>(simd: S, sheet: &FlameSheet, state: &State, scale: f32) -> RowIntensities {
+    let x = ramp(simd, 0.5 / LANES as f32, 1.0 / LANES as f32);
+    let mut rows = [[0.0; 3]; ROWS];
+    for (index, row) in rows.iter_mut().enumerate() {
+        let y = Lanes::splat(simd, (index as f32 + 0.5) / ROWS as f32);
+        let batch = Batch { x, y, depth: y.broadcast(1.0) };
+        if let Some(shade) = shade(sheet.shape(), sheet.ramp(), state, &batch) {
+            for k in 0..3 {
+                row[k] = shade.light[k].as_slice().iter().sum::<f32>() * scale;
+            }
+        }
+    }
+    rows
+}
+
+/// Part `index` of `count` of the rows, each with the same share of the energy, and the height at which it is centred.
+///
+/// Parts of equal energy move up and down smoothly as the flame flickers.
+fn share(rows: &RowIntensities, index: usize, count: usize) -> ([f32; 3], f64) {
+    let energy = |row: &[f32; 3]| f64::from(row.iter().sum::<f32>().max(0.0));
+    let total: f64 = rows.iter().map(energy).sum();
+    let (from, to) = (total * index as f64 / count as f64, total * (index + 1) as f64 / count as f64);
+    let (mut below, mut intensity, mut moment) = (0.0, [0.0_f32; 3], 0.0);
+    for (place, row) in rows.iter().enumerate() {
+        let above = below + energy(row);
+        let taken = (above.min(to) - below.max(from)).max(0.0);
+        if taken > 0.0 {
+            let part = taken / energy(row);
+            for k in 0..3 {
+                intensity[k] += row[k] * part as f32;
+            }
+            moment += taken * (place as f64 + 0.5) / ROWS as f64;
+        }
+        below = above;
+    }
+    let taken = to - from;
+    (intensity, if taken > 0.0 { moment / taken } else { lerp(0.0, 1.0, 0.3) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_have_equal_energy_and_add_up() {
+        let mut rows = [[0.0; 3]; ROWS];
+        for (i, row) in rows.iter_mut().enumerate().take(10) {
+            *row = [3.0, 2.0, 1.0 + i as f32];
+        }
+        let parts: Vec<_> = (0..3).map(|index| share(&rows, index, 3)).collect();
+        let energy = |part: &([f32; 3], f64)| part.0.iter().sum::<f32>();
+        assert!((energy(&parts[0]) - energy(&parts[2])).abs() < 1e-3);
+        let red: f32 = parts.iter().map(|part| part.0[0]).sum();
+        assert!((red - 30.0).abs() < 1e-4);
+        assert!(parts[0].1 < parts[1].1 && parts[1].1 < parts[2].1);
+    }
+}

@@ -1,0 +1,206 @@
+//! One flame of a sheet: its waves, its texture, where it stands and what it shows a view.
+
+use std::sync::Arc;
+
+use bansho_base::{
+    camera::{
+        Camera,
+        upright_quad::{UprightQuad, right_facing},
+    },
+    image::Rect,
+    math::{self, DVec2, DVec3, random::Key},
+    parameters::Auto,
+    phenomenon::strip::{Shutter, View},
+    world::wind::Wind,
+};
+
+use super::{
+    projection::{Mapping, bounds},
+    shade::{Drawn, Sample, State},
+};
+use crate::sheet::{
+    FlameSheet,
+    animate::moment::{Moment, Motion, Push},
+    parameters::{Facing, Instance, StageShown},
+    texture::{FRACTAL, FractalLayers, PaperLayer, Texture, TextureTable},
+};
+
+/// Where a flame's texture comes from.
+#[derive(Clone, Debug)]
+pub(crate) enum Source {
+    /// The layers of this flame on the common table.
+    Fractal(FractalLayers),
+    /// The paper's table, common to the sheet's flames.
+    Paper(Arc<PaperLayer>),
+}
+
+impl Source {
+    /// Texels of the table in a sheet's height.
+    fn texels_up(&self) -> f64 {
+        match self {
+            Self::Fractal(layers) => layers.texels_up(),
+            Self::Paper(layer) => layer.texels_up(),
+        }
+    }
+}
+
+/// One flame among the instances of a sheet.
+#[derive(Clone, Debug)]
+pub(crate) struct Flame {
+    pub(crate) place: Instance,
+    pub(crate) key: Key,
+    pub(crate) motion: Motion,
+    pub(crate) source: Source,
+}
+
+impl Source {
+    /// T0 after `scroll` sheet heights, at full resolution.
+    pub(crate) fn texture(&self, scroll: f64) -> Texture {
+        match self {
+            Self::Fractal(layers) => layers.at(&FRACTAL, scroll),
+            Self::Paper(layer) => layer.at(scroll),
+        }
+    }
+
+    /// The same with its table filtered for a sheet `height_pixels` tall.
+    pub(crate) fn filtered(&self, height_pixels: f64) -> FilteredSource {
+        let level = math::log2(self.texels_up() / height_pixels.max(1.0)) as f32;
+        match self {
+            Self::Fractal(layers) if level > 0.0 => FilteredSource::Fractal(*layers, Arc::new(FRACTAL.filtered(level))),
+            Self::Fractal(layers) => FilteredSource::Fractal(*layers, FRACTAL.clone()),
+            Self::Paper(layer) if level > 0.0 => FilteredSource::Paper(Arc::new(layer.filtered(level))),
+            Self::Paper(layer) => FilteredSource::Paper(layer.clone()),
+        }
+    }
+}
+
+/// A flame's texture at the resolution of one frame.
+pub(crate) enum FilteredSource {
+    /// Layers and their table.
+    Fractal(FractalLayers, Arc<TextureTable>),
+    /// The paper's texture.
+    Paper(Arc<PaperLayer>),
+}
+
+impl FilteredSource {
+    /// Fractal layers for a sheet `height_pixels` tall.
+    pub(crate) fn fractal(layers: FractalLayers, height_pixels: f64) -> Self {
+        Source::Fractal(layers).filtered(height_pixels)
+    }
+
+    /// T0 after `scroll` sheet heights.
+    pub(crate) fn texture(&self, scroll: f64) -> Texture {
+        match self {
+            Self::Fractal(layers, table) => layers.at(table, scroll),
+            Self::Paper(layer) => layer.at(scroll),
+        }
+    }
+}
+
+impl FlameSheet {
+    /// Middle of a flame's base at time `t`, m.
+    pub(crate) fn base(&self, flame: &Flame, t: f64) -> DVec3 {
+        DVec3::from(self.parameters.position.at(self.clock.time(t))) + DVec3::from(flame.place.position)
+    }
+
+    /// A flame's own time.
+    pub(crate) fn flame_time(&self, flame: &Flame, t: f64) -> f64 {
+        t + self.parameters.phase_s + flame.place.phase_s
+    }
+
+    /// Width and height of a flame's sheet, m.
+    pub(crate) fn sheet_size(&self, flame: &Flame) -> DVec2 {
+        DVec2::new(self.parameters.width, self.parameters.height) * flame.place.scale
+    }
+
+    /// Mean speed of the rising gas, m/s.
+    pub(crate) fn rise_speed(&self, flame: &Flame, t: f64) -> f64 {
+        // Over a height the texture passes in 1/s seconds, wherever the acceleration puts it.
+        self.clock.speed(t) * self.sheet_size(flame).y
+    }
+
+    /// Level direction across a flame's sheet.
+    pub(crate) fn right(&self, flame: &Flame, camera: &Camera, base: DVec3) -> DVec3 {
+        match self.parameters.facing {
+            Facing::Camera => right_facing(camera, base),
+            Facing::Fixed => {
+                let (sin, cos) = math::sin_cos((self.parameters.turn_deg + flame.place.turn_deg).to_radians());
+                DVec3::new(cos, 0.0, -sin)
+            }
+        }
+    }
+
+    /// A flame at time `t`, its sheet turned to `right`: how the wind pushes it, its stand and its moment.
+    pub(crate) fn settle(&self, flame: &Flame, right: DVec3, wind: &Wind, t: f64) -> (UprightQuad, Moment) {
+        let (base, size) = (self.base(flame, t), self.sheet_size(flame));
+        let middle = base + DVec3::Y * (0.5 * size.y);
+        let push = Push::new(wind, middle, t, right, self.rise_speed(flame, t), self.parameters.wind_response);
+        let stand = UprightQuad::new(base, right, size, push.toward);
+        let time = self.flame_time(flame, t);
+        (stand, Moment::new(&self.parameters, self.shape(), &flame.motion, &self.clock, time, push))
+    }
+
+    /// Moments that stand for the exposure: enough that the gas scrolls a few pixels from one to the next.
+    pub(crate) fn time_samples(&self, flame: &Flame, shutter: Shutter, pixels_per_metre: f64) -> usize {
+        const PIXELS_APART: f64 = 8.0;
+        const MOST: f64 = 8.0;
+        match self.parameters.time_samples {
+            Auto::Set(count) => count as usize,
+            Auto::Auto => {
+                let scrolled = self.rise_speed(flame, shutter.middle()) * shutter.duration() * pixels_per_metre;
+                (scrolled / PIXELS_APART).ceil().clamp(1.0, MOST) as usize
+            }
+        }
+    }
+
+    /// What of the chain is drawn.
+    pub(crate) fn drawn(&self) -> Drawn {
+        match self.parameters.stage {
+            StageShown::Flame => Drawn::Flame,
+            StageShown::Texture => Drawn::FlatTexture,
+            StageShown::Thresholded | StageShown::Sharpened | StageShown::Coloured => Drawn::FlatCut,
+        }
+    }
+
+    /// A flame's samples over the exposure and the pixels they may touch.
+    pub(crate) fn samples(
+        &self,
+        flame: &Flame,
+        source: &FilteredSource,
+        view: &View,
+        wind: &Wind,
+        count: usize,
+    ) -> (Vec<Sample>, Rect) {
+        let mut samples = Vec::with_capacity(count);
+        let mut rect = Rect::default();
+        for index in 0..count {
+            let t = view.shutter.instant(index, count);
+            let camera = if count == 1 { view.camera } else { view.camera_at(t) };
+            let right = self.right(flame, &camera, self.base(flame, t));
+            let (stand, moment) = self.settle(flame, right, wind, t);
+            let Some(mapping) = Mapping::new(&camera, &stand) else { continue };
+            let [low, high] = moment.centre_range;
+            rect = rect.union(&bounds(&camera, &stand, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size));
+            let pixels_per_metre = pixels_per_metre(&camera, &stand);
+            let state = State {
+                texture: source.texture(moment.scroll),
+                pixel: [2.0 / (pixels_per_metre * stand.size.x) as f32, 1.0 / (pixels_per_metre * stand.size.y) as f32],
+                moment,
+            };
+            let luminance = self.luminance_at(t) as f32 / count as f32;
+            samples.push(Sample { mapping, stand, state, luminance, smoke: None });
+        }
+        (samples, rect)
+    }
+
+    /// Luminance of the brightest colour at time `t`, cd/m^2.
+    pub(crate) fn luminance_at(&self, t: f64) -> f64 {
+        self.parameters.colour.luminance.at(self.clock.time(t))
+    }
+}
+
+/// Pixels that a metre of the sheet covers, at its middle.
+pub(crate) fn pixels_per_metre(camera: &Camera, stand: &UprightQuad) -> f64 {
+    let depth = camera.depth(stand.point(0.5, 0.5)).abs().max(camera.near);
+    camera.focal_pixels / depth
+}

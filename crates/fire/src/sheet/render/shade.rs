@@ -1,0 +1,176 @@
+//! What sixteen pixels see of a sheet: from their places on it to light.
+
+use bansho_base::{
+    camera::upright_quad::UprightQuad,
+    math::simd::{Lanes, Real, any_positive},
+};
+
+use super::{
+    projection::{Batch, Mapping},
+    ramp::Ramp,
+    shape_tables::{Place, Shape},
+    smoke::{SmokeState, shade_smoke},
+};
+use crate::sheet::{animate::moment::Moment, equations, texture::Texture};
+
+use fearless_simd::Simd;
+
+/// What a sheet shows at one moment.
+pub(crate) struct State {
+    /// Edges, centre line, scroll.
+    pub(crate) moment: Moment,
+    /// T0.
+    pub(crate) texture: Texture,
+    /// Size of a pixel in x' and in y.
+    pub(crate) pixel: [f32; 2],
+}
+
+impl State {
+    /// Texels to a unit of u and of w, of the finer layer; a texture that was filtered for small pixels has as many as pixels.
+    #[inline(always)]
+    pub(crate) fn texels(&self) -> [f32; 2] {
+        let [across, up] = self.texture.texels();
+        let kept = (1.0 / (self.pixel[1] * up)).min(1.0);
+        [across * kept, up * kept]
+    }
+}
+
+/// A sheet at one moment of the exposure, as one camera sees it.
+pub(crate) struct Sample {
+    /// From pixels to the sheet.
+    pub(crate) mapping: Mapping,
+    /// Where the sheet stands.
+    pub(crate) stand: UprightQuad,
+    /// What it shows.
+    pub(crate) state: State,
+    /// Where it is smoke, what that is made of.
+    pub(crate) smoke: Option<SmokeState>,
+    /// Luminance of the brightest colour, divided by the number of samples; cd/m^2.
+    pub(crate) luminance: f32,
+}
+
+/// What sixteen pixels see of the flame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shade<S: Simd> {
+    /// T1, eq. (5).
+    pub(crate) t1: Lanes<S>,
+    /// Red, green, blue of luminance up to 1, and opacity.
+    pub(crate) light: [Lanes<S>; 4],
+}
+
+/// Light of places of the flame; `None` where there is none.
+#[inline(always)]
+pub(crate) fn shade_place<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, place: &Place<S>) -> Option<Shade<S>> {
+    let coverage = place.coverage(state.pixel);
+    if !any_positive(coverage) {
+        return None;
+    }
+    let t1 = equations::above_threshold(shape.gas(state.texture.sample(place.u, place.w)), place.threshold);
+    let zero = t1.broadcast(0.0);
+    let strength = zero.select_lt(t1, coverage * place.glow, zero);
+    let blue = ramp.base_blue[2] > 0.0 && any_positive(place.w.broadcast(BLUE_TOP) - place.w);
+    if !blue && !any_positive(strength) {
+        return None;
+    }
+    let [red, green_beside_red] = place.cooling;
+    let (red, opacity) = (red * strength, strength);
+    let green = red * green_beside_red;
+    let blue_left = green * green_beside_red * green_beside_red.simd_sqrt();
+    let mut light = ramp.light(t1);
+    for (plane, left) in light.iter_mut().zip([red, green, blue_left, opacity]) {
+        *plane *= left;
+    }
+    if blue {
+        add_base_blue(&mut light, ramp, place, coverage);
+    }
+    Some(Shade { t1, light })
+}
+
+/// Places of a batch of pixels on the flame; compiled once for each kind of vector.
+pub(crate) fn place<S: Simd>(shape: &Shape, state: &State, batch: &Batch<S>) -> Place<S> {
+    batch.x.simd.vectorize(
+        #[inline(always)]
+        || {
+            let (x, y) = state.moment.straighten(batch.x, batch.y);
+            shape.place(x, y, &state.moment.edges, state.pixel)
+        },
+    )
+}
+
+/// Whether any flame reaches a batch, and what of it; compiled once for each kind of vector.
+pub(crate) fn shade<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<S>) -> Option<Shade<S>> {
+    let place = place(shape, state, batch);
+    batch.x.simd.vectorize(
+        #[inline(always)]
+        || shade_place(shape, ramp, state, &place),
+    )
+}
+
+/// What a batch sees of a sample, whatever is drawn.
+pub(crate) fn shade_as<S: Simd>(
+    shape: &Shape,
+    ramp: &Ramp,
+    sample: &Sample,
+    drawn: Drawn,
+    batch: &Batch<S>,
+) -> Option<Shade<S>> {
+    let state = &sample.state;
+    match (&sample.smoke, drawn) {
+        (None, Drawn::Flame | Drawn::Smoke) => shade(shape, ramp, state, batch),
+        (None, Drawn::FlatTexture | Drawn::FlatCut) => batch.x.simd.vectorize(
+            #[inline(always)]
+            || shade_flat(shape, ramp, state, batch, drawn == Drawn::FlatCut),
+        ),
+        (Some(smoke), _) => batch.x.simd.vectorize(
+            #[inline(always)]
+            || shade_smoke(state, smoke, batch),
+        ),
+    }
+}
+
+/// Height w up to which the base burns blue.
+const BLUE_TOP: f32 = 0.45;
+
+/// The blue zone hugs the flame's lower edge, where fuel meets air before soot forms.
+#[inline(always)]
+fn add_base_blue<S: Simd>(light: &mut [Lanes<S>; 4], ramp: &Ramp, place: &Place<S>, coverage: Lanes<S>) {
+    let one = place.w.broadcast(1.0);
+    let across = equations::axis_distance(place.u);
+    let up = (one - place.w * one.broadcast(1.0 / BLUE_TOP)).simd_clamp01();
+    let rim = (across * across).fma(one.broadcast(0.75), one.broadcast(0.25)) * (one - across) * one.broadcast(3.0);
+    let amount = up * up * rim * coverage;
+    for (plane, blue) in light.iter_mut().zip(ramp.base_blue) {
+        *plane = amount.fma(one.broadcast(blue), *plane);
+    }
+}
+
+/// The flat texture square of the paper's pictures 1 to 4.
+#[inline(always)]
+fn shade_flat<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<S>, cut: bool) -> Option<Shade<S>> {
+    let (zero, one) = (batch.x.broadcast(0.0), batch.x.broadcast(1.0));
+    let outside = |x: Lanes<S>| (zero - x).simd_max(x - one).simd_max(zero);
+    let strength = zero.select_lt(outside(batch.x) + outside(batch.y), zero, one);
+    if !any_positive(strength) {
+        return None;
+    }
+    let texture = shape.gas(state.texture.sample(batch.x, batch.y));
+    let t1 = if cut { equations::above_threshold(texture, shape.flat_threshold(batch.x, batch.y)) } else { texture };
+    let mut light = ramp.light(t1);
+    for plane in &mut light {
+        *plane *= strength;
+    }
+    Some(Shade { t1, light })
+}
+
+/// Which part of the chain is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Drawn {
+    /// The mapped flame.
+    Flame,
+    /// The texture square before the threshold.
+    FlatTexture,
+    /// The texture square after the threshold.
+    FlatCut,
+    /// Smoke.
+    Smoke,
+}

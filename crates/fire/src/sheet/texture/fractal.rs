@@ -1,0 +1,261 @@
+//! The default texture: layers of one table of domain-warped gradient noise that rise at different speeds.
+//!
+//! A single wrapped table repeats when it has scrolled by its height. Here two things prevent that. The scroll crosses the table aslant, so
+//! that the table comes back moved sideways by an irrational part of its width; and a second, finer layer rises faster and
+//! crosses it the other way. Both change the gas as it rises, as a real flame changes.
+
+use std::sync::{Arc, LazyLock};
+
+use bansho_base::{
+    math,
+    math::{
+        random::{Key, Purpose},
+        simd::Real,
+    },
+};
+
+use super::{COLUMNS, Layer, ROWS, Texture, TextureTable};
+use crate::sheet::animate::clock::Clock;
+
+/// Lattice cells of the first octave across and up the table; 32 and 64 texels wide.
+const CELLS: [usize; 2] = [8, 8];
+/// The table, the same for every flame; flames differ by where they look.
+pub(crate) static FRACTAL: LazyLock<Arc<TextureTable>> = LazyLock::new(|| Arc::new(TextureTable::new(&warped_noise())));
+
+/// A texture as texels, row after row.
+type Texels = Vec<f32>;
+
+/// Gradient noise (Perlin 1985, with the quintic fade of 2002) on a lattice that divides the table, so that it wraps.
+fn gradient_noise(cells: [usize; 2], key: Key, purpose: Purpose) -> Texels {
+    let gradients: Vec<[f32; 2]> = (0..cells[0] * cells[1])
+        .map(|cell| {
+            let turn = key.uniforms(cell as u64, 0, purpose)[0];
+            let (sin, cos) = math::f32::sin_cos(std::f32::consts::TAU * turn);
+            [cos, sin]
+        })
+        .collect();
+    let (across, up) = (axis(COLUMNS, cells[0]), axis(ROWS, cells[1]));
+    let mut texels = Vec::with_capacity(ROWS * COLUMNS);
+    for (low, high, fy, fade_y) in &up {
+        for (left, right, fx, fade_x) in &across {
+            let dot = |column: usize, row: usize, x: f32, y: f32| {
+                let gradient = gradients[row * cells[0] + column];
+                gradient[0] * x + gradient[1] * y
+            };
+            let below = math::f32::lerp(dot(*left, *low, *fx, *fy), dot(*right, *low, fx - 1.0, *fy), *fade_x);
+            let above =
+                math::f32::lerp(dot(*left, *high, *fx, fy - 1.0), dot(*right, *high, fx - 1.0, fy - 1.0), *fade_x);
+            texels.push(math::f32::lerp(below, above, *fade_y));
+        }
+    }
+    texels
+}
+
+/// For each of `count` texels: its cell, the next, the place within it and the faded place.
+fn axis(count: usize, cells: usize) -> Vec<(usize, usize, f32, f32)> {
+    let width = count / cells;
+    let place = |i: usize| {
+        let f = (i % width) as f32 / width as f32;
+        (i / width, (i / width + 1) % cells, f, f * f * f * (f * (f * 6.0 - 15.0) + 10.0))
+    };
+    (0..count).map(place).collect()
+}
+
+/// Octaves of noise, each twice as fine and `gain` times as strong as the last.
+fn octaves(count: usize, gain: f32, key: Key, name: Purpose) -> Texels {
+    let mut sum = vec![0.0_f32; ROWS * COLUMNS];
+    let mut amplitude = 1.0;
+    for octave in 0..count {
+        let purpose = Purpose(name.0.wrapping_add(octave as u32));
+        let noise = gradient_noise(CELLS.map(|cells| cells << octave), key, purpose);
+        sum.iter_mut().zip(noise).for_each(|(sum, noise)| *sum += amplitude * noise);
+        amplitude *= gain;
+    }
+    sum
+}
+
+/// Noise whose coordinates are displaced by other noise: gas that was stirred.
+fn warped_noise() -> Texels {
+    /// Greatest displacement across and up, texels, at a noise value of 1.
+    const STIR: [f32; 2] = [34.0, 60.0];
+    let key = Key::new(1985, "flame sheet fractal");
+    let gas = TextureTable::new(&octaves(4, 0.5, key, Purpose::named("gas")));
+    let across = octaves(2, 0.5, key, Purpose::named("stir across"));
+    let up = octaves(2, 0.5, key, Purpose::named("stir up"));
+    let place = |i: usize| {
+        let column = STIR[0].fma(across[i], (i % COLUMNS) as f32);
+        gas.bilinear(column, STIR[1].fma(up[i], (i / COLUMNS) as f32))
+    };
+    spread_evenly((0..ROWS * COLUMNS).map(place).collect())
+}
+
+/// Replaces each value by its rank in [0, 1]: no value is more frequent than another, the paper's one wish for the texture.
+fn spread_evenly(texels: Texels) -> Texels {
+    const BINS: usize = 4096;
+    let low = texels.iter().copied().fold(f32::INFINITY, f32::min);
+    let high = texels.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let scale = BINS as f32 / (high - low).max(f32::MIN_POSITIVE);
+    let place = |value: f32| ((value - low) * scale).min(BINS as f32 - 0.001);
+    let mut below = vec![0.0_f64; BINS + 1];
+    texels.iter().for_each(|value| below[place(*value) as usize + 1] += 1.0 / texels.len() as f64);
+    for bin in 0..BINS {
+        below[bin + 1] += below[bin];
+    }
+    let rank = |value: f32| {
+        let place = place(value);
+        let bin = place as usize;
+        math::lerp(below[bin], below[bin + 1], f64::from(place) - bin as f64) as f32
+    };
+    texels.into_iter().map(rank).collect()
+}
+
+/// Mean of two evenly distributed numbers, distributed evenly again: the distribution of the sum is a triangle.
+#[inline(always)]
+pub(super) fn mix_evenly<N: Real>(a: N, b: N) -> N {
+    let (sum, one) = (a + b, a.broadcast(1.0));
+    let low = sum.simd_min(a.broadcast(2.0) - sum);
+    let rank = a.broadcast(0.5) * low * low;
+    sum.select_lt(one, rank, one - rank)
+}
+
+/// How one layer crosses the table.
+#[derive(Clone, Copy, Debug)]
+struct Crossing {
+    /// Table widths across the sheet.
+    widths: f64,
+    /// Table widths that it moves aslant in a sheet height.
+    slant: f64,
+    /// Table heights in a sheet height.
+    heights: f64,
+    /// Speed beside the scroll.
+    rate: f64,
+    /// Where it begins, in table widths and heights.
+    start: [f64; 2],
+}
+
+/// The layers of one flame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FractalLayers {
+    crossings: [Crossing; 2],
+}
+
+impl FractalLayers {
+    /// Layers whose tongues are `size` times as wide and long as usual and which rise at `speed` times the scroll, begun where
+    /// `key` says.
+    pub(crate) fn new([width, length]: [f64; 2], speed: f64, key: Key, clock: &Clock) -> Self {
+        let start = key.uniforms(0, 0, Purpose::named("fractal layers")).map(f64::from);
+        let coarse = Crossing { widths: 0.37, slant: 0.061_8, heights: 0.243, rate: 1.0, start: [start[0], start[1]] };
+        let fine = Crossing { widths: -0.71, slant: -0.104_7, heights: 0.419, rate: 1.21, start: [start[2], start[3]] };
+        let fit = |crossing: Crossing| {
+            let heights = crossing.heights / length;
+            // Wave numbers of what scrolls by at the layer's own rate, moved to where they close a loop.
+            let pace = crossing.rate * speed.max(1e-3);
+            let closed = clock.waves(heights * pace, 1.0) / (heights * pace);
+            let stretch = closed.clamp(0.8, 1.25);
+            let rate = pace * closed / stretch;
+            let slant = clock.waves(crossing.slant * rate, 0.0) / rate;
+            Crossing { widths: crossing.widths / width, slant, heights: heights * stretch, rate, ..crossing }
+        };
+        Self { crossings: [fit(coarse), fit(fine)] }
+    }
+
+    /// The texture scrolled by `scroll` sheet heights; `table` is [`FRACTAL`] or a filtered copy of it.
+    pub(crate) fn at(&self, table: &Arc<TextureTable>, scroll: f64) -> Texture {
+        let layer = |crossing: &Crossing| {
+            let scroll = crossing.rate * scroll;
+            let column = math::reduce_phase(crossing.start[0] - crossing.slant * scroll);
+            let row = math::reduce_phase(crossing.start[1] - crossing.heights * scroll);
+            let (columns, rows) = (COLUMNS as f64, ROWS as f64);
+            Layer {
+                columns: [
+                    (columns * crossing.widths) as f32,
+                    (columns * crossing.slant) as f32,
+                    columns as f32 * column,
+                ],
+                rows: [(rows * crossing.heights) as f32, rows as f32 * row],
+            }
+        };
+        Texture::Mixed(table.clone(), [layer(&self.crossings[0]), layer(&self.crossings[1])])
+    }
+
+    /// Texels of the table in a sheet's height, of the finer layer.
+    pub(crate) fn texels_up(&self) -> f64 {
+        ROWS as f64 * self.crossings[1].heights
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{math::simd::Lanes, parameters::animated::Animated};
+
+    use super::*;
+    use fearless_simd::prelude::*;
+
+    fn layers(loop_s: Option<f64>) -> (FractalLayers, Clock) {
+        let clock = Clock::new(Animated::from(1.1), loop_s);
+        (FractalLayers::new([1.0, 1.0], 1.0, Key::new(3, "test"), &clock), clock)
+    }
+
+    /// 16 x 24 samples of the sheet at time `t`.
+    fn picture(layers: &FractalLayers, clock: &Clock, t: f64) -> Vec<f32> {
+        let texture = layers.at(&FRACTAL, clock.scroll(t));
+        bansho_base::dispatch_baseline!(simd => {
+            let u = Lanes::from_fn(simd, |i| i as f32 / 15.0);
+            (0..24).flat_map(|j| texture.sample(u, u.broadcast(j as f32 / 23.0)).as_slice().to_vec()).collect()
+        })
+    }
+
+    fn correlation(a: &[f32], b: &[f32]) -> f32 {
+        let mean = |values: &[f32]| values.iter().sum::<f32>() / values.len() as f32;
+        let (mean_a, mean_b) = (mean(a), mean(b));
+        let dot =
+            |x: &[f32], y: &[f32], mx: f32, my: f32| x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum::<f32>();
+        dot(a, b, mean_a, mean_b) / (dot(a, a, mean_a, mean_a) * dot(b, b, mean_b, mean_b)).sqrt()
+    }
+
+    #[test]
+    fn every_value_is_as_frequent_as_every_other() {
+        let mut counts = [0_usize; 10];
+        let (layers, clock) = layers(None);
+        for second in 0..400 {
+            for value in picture(&layers, &clock, f64::from(second) * 1.37) {
+                assert!((0.0..=1.0).contains(&value));
+                counts[((value * 10.0) as usize).min(9)] += 1;
+            }
+        }
+        let total: usize = counts.iter().sum();
+        for count in counts {
+            let share = count as f64 / total as f64;
+            assert!((0.06..0.15).contains(&share), "{counts:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_repeats_within_ten_minutes() {
+        let (layers, clock) = layers(None);
+        let first = picture(&layers, &clock, 100.0);
+        assert!(correlation(&first, &picture(&layers, &clock, 100.005)) > 0.9);
+        let mut worst = -1.0_f32;
+        for step in 0..12_000 {
+            let t = 101.5 + 0.05 * f64::from(step);
+            worst = worst.max(correlation(&first, &picture(&layers, &clock, t)));
+        }
+        assert!(worst < 0.85, "{worst}");
+    }
+
+    #[test]
+    fn a_loop_closes_whatever_its_length() {
+        for length in [1.0, 2.4, 4.0, 7.3] {
+            let (layers, clock) = layers(Some(length));
+            let before = picture(&layers, &clock, 0.3);
+            let after = picture(&layers, &clock, 0.3 + length);
+            let value = |t: f64| {
+                let texture = layers.at(&FRACTAL, clock.scroll(t));
+                bansho_base::dispatch_baseline!(simd => texture.sample(Lanes::splat(simd, 0.3), Lanes::splat(simd, 0.3))[0])
+            };
+            let (just_short, start) = (value(length * (1.0 - 1e-9)), value(0.0));
+            assert!((just_short - start).abs() < 1e-3, "{length}: {just_short} {start}");
+            before.iter().zip(&after).for_each(|(a, b)| assert!((a - b).abs() < 1e-3));
+        }
+    }
+}

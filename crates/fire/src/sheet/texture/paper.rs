@@ -1,0 +1,221 @@
+//! The paper's texture, eq. (20), exactly, and as a table.
+
+use std::{
+    f64::consts::{FRAC_PI_2, PI},
+    sync::Arc,
+};
+
+use bansho_base::math::{self, MulAdd};
+
+use super::{COLUMNS, Layer, ROWS, Texture, TextureTable};
+use crate::sheet::animate::clock::Clock;
+
+/// `Fx_0` of eq. (20), radians a unit of p.
+const FIRST_ACROSS: f64 = 16.0;
+/// `Fy_0` of eq. (20), radians a unit of q.
+const FIRST_UP: f64 = 26.0;
+/// `C_{i+1} / C_i` of eq. (20).
+const AMPLITUDE_RATIO: f64 = 0.707;
+/// Period in p: that of `sin(Fx_0 x / 2)`.
+const PERIOD_ACROSS: f64 = PI / 4.0;
+/// Period in q: that of `sin(Fy_0 y / 2)`.
+const PERIOD_UP: f64 = 2.0 * PI / 13.0;
+
+/// T(p, q) of eq. (20) with `octaves` terms, halved so that it lies in [0, 1] as eq. (2) demands.
+pub fn paper_texture(p: f64, q: f64, octaves: u32) -> f64 {
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for octave in Octave::all(octaves) {
+        let phi = octave.across.fma(p, FRAC_PI_2 * math::sin(0.5 * octave.up * q));
+        let psi = octave.up.fma(q, FRAC_PI_2 * math::sin(0.5 * octave.across * p));
+        sum += octave.weight * (math::cos(phi) * math::cos(psi) + 1.0);
+        weights += octave.weight;
+    }
+    0.5 * sum / weights
+}
+
+/// `Fx_i`, `Fy_i` and `C_i^2`.
+#[derive(Clone, Copy)]
+struct Octave {
+    across: f64,
+    up: f64,
+    weight: f64,
+}
+
+impl Octave {
+    fn all(octaves: u32) -> impl Iterator<Item = Self> {
+        let first = Self { across: FIRST_ACROSS, up: FIRST_UP, weight: 1.0 };
+        let next = |octave: &Self| {
+            let weight = octave.weight * AMPLITUDE_RATIO * AMPLITUDE_RATIO;
+            Some(Self { across: 2.0 * octave.across, up: 2.0 * octave.up, weight })
+        };
+        std::iter::successors(Some(first), next).take(octaves as usize)
+    }
+
+    /// The four functions of one coordinate, at `place`, whose products with those of the other make a term.
+    ///
+    /// With a = Fx x, b = Px(y), c = Fy y, d = Py(x): cos(a+b) cos(c+d) is the product of
+    /// (cos a cos b - sin a sin b) and (cos c cos d - sin c sin d), and a, d belong to x while b, c belong to y.
+    fn factors(place: f64, frequency: f64) -> [f64; 4] {
+        let (sin_own, cos_own) = math::sin_cos(frequency * place);
+        let (sin_phase, cos_phase) = math::sin_cos(FRAC_PI_2 * math::sin(0.5 * frequency * place));
+        [cos_own * cos_phase, cos_own * sin_phase, sin_own * cos_phase, sin_own * sin_phase]
+    }
+}
+
+/// Eq. (20) over a grid, as products of row functions and column functions: four multiply-adds an octave and sample.
+#[derive(Clone, Debug)]
+pub struct PaperTexture {
+    /// For each octave and factor, its values over the columns, with the signs and weights in them.
+    across: Vec<Vec<f32>>,
+    /// For each row, the values of each octave and factor.
+    up: Vec<Vec<f32>>,
+}
+
+impl PaperTexture {
+    /// Row and column functions for `octaves` terms at the places `p` (columns) and `q` (rows).
+    pub fn new(p: &[f64], q: &[f64], octaves: u32) -> Self {
+        let terms: Vec<Octave> = Octave::all(octaves).collect();
+        let total: f64 = terms.iter().map(|octave| octave.weight).sum();
+        let column_factors = |octave: &Octave| {
+            let factors: Vec<[f64; 4]> = p.iter().map(|p| Octave::factors(*p, octave.across)).collect();
+            // cos a cos d, cos a sin d, sin a cos d, sin a sin d meet cos b cos c, cos b sin c, sin b cos c, sin b sin c.
+            let scale = 0.5 * octave.weight / total;
+            [0, 1, 2, 3].map(|k| {
+                let sign = if k == 0 || k == 3 { scale } else { -scale };
+                factors.iter().map(|factor| (sign * factor[k]) as f32).collect::<Vec<f32>>()
+            })
+        };
+        let row_factors = |q: &f64| {
+            // Own is c = Fy y, phase is b = Px(y): reorder [cc cb, cc sb, sc cb, sc sb] to match the columns.
+            let reorder =
+                |[cc_cb, cc_sb, sc_cb, sc_sb]: [f64; 4]| [cc_cb, sc_cb, cc_sb, sc_sb].map(|value| value as f32);
+            terms.iter().flat_map(|octave| reorder(Octave::factors(*q, octave.up))).collect()
+        };
+        Self { across: terms.iter().flat_map(column_factors).collect(), up: q.iter().map(row_factors).collect() }
+    }
+
+    /// Writes row `row` over all columns; values in [0, 1].
+    #[inline(always)]
+    pub fn fill_row(&self, row: usize, values: &mut [f32]) {
+        values.fill(0.5);
+        for (column_factor, row_factor) in self.across.chunks_exact(4).zip(self.up[row].chunks_exact(4)) {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|k| &column_factor[k][..values.len()]);
+            for (i, value) in values.iter_mut().enumerate() {
+                let first = a[i].fma(row_factor[0], b[i].fma(row_factor[1], *value));
+                *value = c[i].fma(row_factor[2], d[i].fma(row_factor[3], first));
+            }
+        }
+    }
+
+    /// Rows of the grid.
+    pub fn rows(&self) -> usize {
+        self.up.len()
+    }
+}
+
+/// The paper's texture over one period as a table.
+#[derive(Clone, Debug)]
+pub(crate) struct PaperLayer {
+    table: Arc<TextureTable>,
+    waves: f64,
+}
+
+impl PaperLayer {
+    /// The table of `octaves` terms.
+    pub(crate) fn new(octaves: u32, clock: &Clock) -> Self {
+        let p: Vec<f64> = (0..COLUMNS).map(|i| PERIOD_ACROSS * i as f64 / COLUMNS as f64).collect();
+        let q: Vec<f64> = (0..ROWS).map(|i| PERIOD_UP * i as f64 / ROWS as f64).collect();
+        let texture = PaperTexture::new(&p, &q, octaves);
+        let mut texels = vec![0.0; ROWS * COLUMNS];
+        let level = fearless_simd::Level::new();
+        fearless_simd::dispatch!(level, _simd => fill(&texture, &mut texels));
+        Self { table: Arc::new(TextureTable::new(&texels)), waves: clock.waves(1.0 / PERIOD_UP, 1.0) * PERIOD_UP }
+    }
+
+    /// The texture scrolled by `scroll` sheet heights, eq. (1).
+    pub(crate) fn at(&self, scroll: f64) -> Texture {
+        let columns = (COLUMNS as f64 / PERIOD_ACROSS) as f32;
+        let rows = ROWS as f64 / PERIOD_UP;
+        // `waves` is 1 unless a loop needs the scroll to be a whole number of periods.
+        let offset = math::reduce_phase(-self.waves * scroll / PERIOD_UP) * ROWS as f32;
+        Texture::Single(self.table.clone(), Layer { columns: [columns, 0.0, 0.0], rows: [rows as f32, offset] })
+    }
+
+    /// The same with the table filtered to `level`.
+    pub(crate) fn filtered(&self, level: f32) -> Self {
+        Self { table: Arc::new(self.table.filtered(level)), waves: self.waves }
+    }
+
+    /// Texels of the table in a sheet's height.
+    pub(crate) fn texels_up(&self) -> f64 {
+        ROWS as f64 / PERIOD_UP
+    }
+}
+
+#[inline(always)]
+fn fill(texture: &PaperTexture, texels: &mut [f32]) {
+    for (row, values) in texels.chunks_exact_mut(COLUMNS).enumerate() {
+        texture.fill_row(row, values);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{math::simd::Lanes, parameters::animated::Animated};
+
+    use super::*;
+    use fearless_simd::prelude::*;
+
+    #[test]
+    fn texture_20_has_hand_worked_values() {
+        // At the origin every phase is 0: cos 0 cos 0 + 1 = 2, halved 1.
+        assert_eq!(paper_texture(0.0, 0.0, 1), 1.0);
+        assert_eq!(paper_texture(0.0, 0.0, 5), 1.0);
+        // x = pi/16: PHI = pi, PSI = (pi/2) sin(pi/2) = pi/2, so the term is 1 and its half 1/2.
+        assert!((paper_texture(PI / 16.0, 0.0, 1) - 0.5).abs() < 1e-12);
+        // y = pi/26: PSI = pi, PHI = (pi/2) sin(pi/2) = pi/2.
+        assert!((paper_texture(0.0, PI / 26.0, 1) - 0.5).abs() < 1e-12);
+        // x = pi/8: PHI = 2 pi, PSI = (pi/2) sin(pi) = 0: the peak again; the second octave agrees.
+        assert!((paper_texture(PI / 8.0, 0.0, 2) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn it_stays_within_0_and_1_and_has_the_stated_periods() {
+        for i in 0..5000 {
+            let (p, q) = (f64::from(i) * 0.00137, f64::from(i) * 0.00791);
+            let value = paper_texture(p, q, 5);
+            assert!((0.0..=1.0).contains(&value));
+            assert!((paper_texture(p + PERIOD_ACROSS, q + PERIOD_UP, 5) - value).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn products_of_row_and_column_functions_are_the_sum() {
+        let p: Vec<f64> = (0..40).map(|i| f64::from(i) * 0.0251).collect();
+        let q: Vec<f64> = (0..30).map(|i| f64::from(i) * 0.0337 - 0.4).collect();
+        let texture = PaperTexture::new(&p, &q, 5);
+        let mut values = vec![0.0; 40];
+        for (row, q) in q.iter().enumerate() {
+            texture.fill_row(row, &mut values);
+            for (value, p) in values.iter().zip(&p) {
+                assert!((f64::from(*value) - paper_texture(*p, *q, 5)).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn the_table_is_the_texture_within_its_resolution() {
+        let layer = PaperLayer::new(5, &Clock::new(Animated::from(1.0), None));
+        let scroll = 1234.567;
+        let (u, w): ([f32; 16], [f32; 16]) =
+            (std::array::from_fn(|i| 0.06 * i as f32 + 0.03), std::array::from_fn(|i| 0.055 * i as f32));
+        let texture = layer.at(scroll);
+        let values = bansho_base::dispatch_baseline!(simd => {
+            texture.sample(Lanes::from_slice(simd, &u), Lanes::from_slice(simd, &w)).as_slice().to_vec()
+        });
+        for i in 0..16 {
+            let exact = paper_texture(f64::from(u[i]), f64::from(w[i]) - scroll, 5);
+            assert!((f64::from(values[i]) - exact).abs() < 0.02, "{} {exact}", values[i]);
+        }
+    }
+}

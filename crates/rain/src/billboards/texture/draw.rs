@@ -1,0 +1,82 @@
+//! One streak into a texture, exactly antialiased: each pixel gets the share of it that the drop hides.
+
+use bansho_base::image::Image;
+
+use crate::streaks::coverage::Streak;
+
+/// Lines within a row of pixels at a streak's ends, where its width changes along it.
+const LINES: usize = 4;
+
+/// Draws a streak over what is there, around the edges. The drop's middle is at `start` when the shutter opens, m from the left and
+/// upper edge, and falls; a pixel is `pixel` wide and high, m. Of the drop there is the `share`, 0 to 1.
+pub(crate) fn draw_streak(streak: &Streak, [axis, start]: [f64; 2], pixel: [f64; 2], share: f64, image: &mut Image<1>) {
+    let [width, height] = pixel;
+    let first_column = ((axis - streak.radius) / width).floor();
+    let columns = ((axis + streak.radius) / width).floor() - first_column + 1.0;
+    let across = Across { streak, left: first_column * width - axis, pixel, columns: columns as usize };
+    let mut opacities = vec![0.0; across.columns];
+    let within = across.line(0.5 * streak.length);
+    let first_row = ((start - streak.radius) / height).floor() as i64;
+    let last_row = ((start + streak.length + streak.radius) / height).floor() as i64;
+    for row in first_row..=last_row {
+        let from = row as f64 * height - start;
+        let whole = streak.is_within(from) && streak.is_within(from + height);
+        let opacities = if whole { &within } else { across.end_row(from, &mut opacities) };
+        let y = row.rem_euclid(image.height() as i64) as usize;
+        blend(image.row_mut(y), first_column as i64, share, opacities);
+    }
+}
+
+/// Lays a share of opacities over a row, around its end.
+fn blend(row: &mut [[f32; 1]], first_column: i64, share: f64, opacities: &[f64]) {
+    let width = row.len();
+    let mut x = first_column.rem_euclid(width as i64) as usize;
+    for &opacity in opacities {
+        let [under] = &mut row[x];
+        *under += (share * opacity) as f32 * (1.0 - *under);
+        x = if x + 1 == width { 0 } else { x + 1 };
+    }
+}
+
+/// The pixels that a streak covers in every row.
+struct Across<'a> {
+    streak: &'a Streak,
+    /// Left edge of the first pixel, from the axis, m.
+    left: f64,
+    pixel: [f64; 2],
+    columns: usize,
+}
+
+impl Across<'_> {
+    /// Mean opacity of each pixel on the line at `s`.
+    fn line(&self, s: f64) -> Vec<f64> {
+        let mut opacities = vec![0.0; self.columns];
+        self.add_line(s, 1.0, &mut opacities);
+        opacities
+    }
+
+    fn add_line(&self, s: f64, weight: f64, opacities: &mut [f64]) {
+        let mut before = 0.0;
+        for (index, opacity) in opacities.iter_mut().enumerate() {
+            let until = self.streak.opacity_until(self.left + (index + 1) as f64 * self.pixel[0], s);
+            *opacity += weight * (until - before) / self.pixel[0];
+            before = until;
+        }
+    }
+
+    /// Mean opacity of each pixel of a row that begins at `from` and holds an end of the streak: the form by some lines,
+    /// the sum exactly.
+    fn end_row<'b>(&self, from: f64, opacities: &'b mut [f64]) -> &'b [f64] {
+        let (streak, [width, height]) = (self.streak, self.pixel);
+        let (top, bottom) = (from.max(-streak.radius), (from + height).min(streak.length + streak.radius));
+        opacities.fill(0.0);
+        let step = (bottom - top) / LINES as f64;
+        (0..LINES).for_each(|line| self.add_line(top + step * (line as f64 + 0.5), 1.0, opacities));
+        let area = streak.blocked_area() * (streak.share_along(from + height) - streak.share_along(from));
+        let found: f64 = opacities.iter().sum();
+        let scale = if found > 0.0 { area / (found * width * height) } else { 0.0 };
+        // Rounding near a resolved drop's rim may exceed what a pixel can hide.
+        opacities.iter_mut().for_each(|opacity| *opacity = (*opacity * scale).clamp(0.0, 1.0));
+        opacities
+    }
+}

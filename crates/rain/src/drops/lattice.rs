@@ -1,0 +1,215 @@
+//! How the drops of one diameter fall: a lattice of cells that fall together, so that any moment is known by itself.
+//!
+//! Cells are about one metre high and wide. They are anchored in the world, whatever the camera does; wind carries them along, row by row,
+//! and their contents are keyed by their place in the lattice. A cell that leaves through the ground never returns:
+//! the next one comes from above with drops of its own.
+
+use std::ops::RangeInclusive;
+
+use bansho_base::{
+    math::{DVec2, DVec3},
+    world::wind::Wind,
+};
+
+/// Width of a cell, m, and about its height.
+pub(crate) const CELL: f64 = 1.0;
+
+/// A cell of the lattice: x, y (counted from the ground up at time 0) and z.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct Cell(pub(crate) [i64; 3]);
+
+/// How drops fall and drift.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Falling<'a> {
+    /// Terminal velocity, m/s.
+    pub(crate) speed: f64,
+    pub(crate) wind: &'a Wind,
+    /// How much of the wind they follow.
+    pub(crate) response: f64,
+    /// Height of the ground, m.
+    pub(crate) ground: f64,
+    /// Length of a loop, s. The height of a cell gives way so that whole cells fall through in it.
+    pub(crate) loop_s: Option<f64>,
+}
+
+/// The lattice of one diameter at one time.
+///
+/// The wind `v` has carried a row that comes to the ground at time t0 by `integral of v from t0 to now`, before it comes there backward: where a
+/// drop lands is its own, and wind only says from where it comes. So a wind that is changed by a little, however late, moves
+/// drops by a little; counted from time 0 it would move all of them by the change times the time. In a loop the row that repeats another is
+/// carried as that was.
+#[derive(Clone, Debug)]
+pub(crate) struct Lattice {
+    /// Height of a cell, m.
+    height: f64,
+    /// Height of row 0, m.
+    base: f64,
+    /// The first row that may be asked for, and how far the wind has carried it and those above, m: x and z.
+    first: i64,
+    carried: Vec<DVec2>,
+    /// Rows after which cells repeat in a loop.
+    rows: Option<i64>,
+}
+
+impl Lattice {
+    /// Drops at time `t` between two `heights`, m.
+    pub(crate) fn new(falling: &Falling, heights: RangeInclusive<f64>, t: f64) -> Self {
+        let Falling { speed, wind, response, ground, loop_s } = *falling;
+        let (height, rows) = match loop_s {
+            None => (CELL, None),
+            Some(seconds) => {
+                let rows = (speed * seconds / CELL).round().max(1.0);
+                (speed * seconds / rows, Some(rows as i64))
+            }
+        };
+        let base = ground - speed * t;
+        let row = |y: f64| ((y - base) / height).floor() as i64;
+        let (first, last) = (row(*heights.start()), row(*heights.end()));
+        // A drop is fast enough to come down within a year, or the wind may have it for so long.
+        let slowest = speed.max(1e-6);
+        let carried = |row: i64| {
+            let way = wind.travel((row as f64 + 0.5) * height / slowest, t) * response;
+            DVec2::new(way.x, way.z)
+        };
+        Self { height, base, first, carried: (first..=last).map(carried).collect(), rows }
+    }
+
+    /// Volume of a cell, m^3.
+    pub(crate) fn volume(&self) -> f64 {
+        CELL * CELL * self.height
+    }
+
+    /// Height of a cell, m.
+    pub(crate) fn height(&self) -> f64 {
+        self.height
+    }
+
+    /// How far a cell's drops are from its middle along the world's axes, m: up to `aside` level.
+    pub(crate) fn half_extents(&self, aside: f64) -> DVec3 {
+        DVec3::new(aside, 0.5 * self.height, aside)
+    }
+
+    /// The row at a height, m.
+    pub(crate) fn row(&self, y: f64) -> i64 {
+        ((y - self.base) / self.height).floor() as i64
+    }
+
+    /// The column of cells in a row at a place of the world, m: x and z.
+    pub(crate) fn column(&self, row: i64, level: DVec2) -> [i64; 2] {
+        ((level - self.carried(row)) / CELL).to_array().map(|place| place.floor() as i64)
+    }
+
+    /// The point of the world at a place within a cell, in shares of its edges, m.
+    pub(crate) fn world(&self, Cell([x, row, z]): Cell, within: DVec3) -> DVec3 {
+        let level = DVec2::new(x as f64 + within.x, z as f64 + within.z) * CELL + self.carried(row);
+        DVec3::new(level.x, (row as f64 + within.y) * self.height + self.base, level.y)
+    }
+
+    /// How far the wind has carried a row, m: x and z. Beyond the heights that it was made for, as the nearest.
+    fn carried(&self, row: i64) -> DVec2 {
+        let last = self.carried.len().saturating_sub(1) as i64;
+        let index = (row - self.first).clamp(0, last) as usize;
+        self.carried.get(index).copied().unwrap_or_default()
+    }
+
+    /// Which contents a cell has: cells that a loop repeats have the same. Keys hold 21, 22 and 21 bits of the three counts.
+    pub(crate) fn contents(&self, cell: Cell) -> u64 {
+        let [x, y, z] = cell.0;
+        let y = self.rows.map_or(y, |rows| y.rem_euclid(rows));
+        let bits = |count: i64, bits: u32| count as u64 & ((1 << bits) - 1);
+        bits(x, 21) << 43 | bits(y, 22) << 21 | bits(z, 21)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{math::curve::Interpolation, parameters::animated::Animated, world::wind::WindParameters};
+
+    use super::*;
+
+    fn wind(velocity: impl Into<Animated<[f64; 3]>>, loop_s: Option<f64>) -> Wind {
+        Wind::new(WindParameters { velocity: velocity.into(), ..WindParameters::default() }, 1, loop_s)
+    }
+
+    fn lattice(speed: f64, wind: &Wind, loop_s: Option<f64>, t: f64) -> Lattice {
+        Lattice::new(&Falling { speed, wind, response: 1.0, ground: 0.0, loop_s }, -20.0..=40.0, t)
+    }
+
+    /// What keys blow to x.
+    fn keyed(keys: &[[f64; 2]]) -> Animated<[f64; 3]> {
+        let keys = keys.iter().map(|[t, speed]| (*t, [*speed, 0.0, 0.0])).collect();
+        Animated::keyed(keys, Interpolation::Linear).unwrap()
+    }
+
+    #[test]
+    fn a_drop_falls_at_its_speed_and_drifts_with_the_wind() {
+        let wind = wind([3.0, 0.0, -1.0], None);
+        let (cell, within) = (Cell([4, 620, -2]), DVec3::new(0.3, 0.7, 0.8));
+        let at = |t: f64| lattice(6.0, &wind, None, t).world(cell, within);
+        let moved = at(100.5) - at(100.0);
+        assert!((moved - DVec3::new(1.5, -3.0, -0.5)).length() < 1e-9, "{moved}");
+    }
+
+    #[test]
+    fn a_drop_drifts_by_the_integral_of_a_keyed_wind() {
+        let wind = wind(keyed(&[[0.0, 0.0], [4.0, 8.0]]), None);
+        let at = |t: f64| lattice(6.0, &wind, None, t).world(Cell([0, 12, 0]), DVec3::splat(0.5));
+        // The integral of 2 t from 1 to 2.
+        assert!(((at(2.0) - at(1.0)) - DVec3::new(3.0, -6.0, 0.0)).length() < 1e-9);
+    }
+
+    #[test]
+    fn a_little_more_wind_moves_drops_by_a_little_however_late() {
+        for t in [1.0, 100.0, 5000.0] {
+            let row = (6.0 * t) as i64 + 3;
+            let at = |speed: f64| {
+                lattice(6.0, &wind([speed, 0.0, 0.0], None), None, t).world(Cell([0, row, 0]), DVec3::splat(0.5))
+            };
+            let moved = at(2.1) - at(2.0);
+            // 3.5 m above the ground, which it comes to in 3.5 / 6 s.
+            assert!((moved.x + 0.1 * 3.5 / 6.0).abs() < 1e-6 && moved.y == 0.0, "{t}: {moved}");
+        }
+    }
+
+    #[test]
+    fn what_blew_before_a_drop_was_near_does_not_matter() {
+        let [calm, storm] =
+            [keyed(&[[0.0, 0.0], [50.0, 0.0], [51.0, 2.0]]), keyed(&[[0.0, 40.0], [50.0, 0.0], [51.0, 2.0]])];
+        let at = |velocity: Animated<[f64; 3]>| {
+            lattice(6.0, &wind(velocity, None), None, 60.0).world(Cell([1, 361, 0]), DVec3::ZERO)
+        };
+        assert!((at(calm) - at(storm)).length() < 1e-9);
+    }
+
+    #[test]
+    fn every_point_lies_in_the_cell_that_is_found_for_it() {
+        let wind = wind([3.0, 0.0, -1.0], None);
+        for loop_s in [None, Some(2.0)] {
+            let lattice = lattice(4.03, &wind, loop_s, 1.3);
+            let point = DVec3::new(-7.3, 2.2, 11.8);
+            let row = lattice.row(point.y);
+            let [x, z] = lattice.column(row, DVec2::new(point.x, point.z));
+            let within = point - lattice.world(Cell([x, row, z]), DVec3::ZERO);
+            let edges = DVec3::new(CELL, lattice.height(), CELL);
+            assert!(within.cmpge(DVec3::ZERO).all() && within.cmplt(edges).all(), "{within}");
+        }
+    }
+
+    #[test]
+    fn after_a_loop_the_same_contents_are_where_they_were() {
+        let steady = wind([3.0, 0.0, -1.0], Some(2.0));
+        let changing = wind(keyed(&[[0.0, 1.0], [0.7, 5.0], [2.0, 1.0]]), Some(2.0));
+        for wind in [steady, changing] {
+            let [first, last] = [0.4, 2.4].map(|t| lattice(4.03, &wind, Some(2.0), t));
+            assert!((first.height() - 1.0).abs() < 0.1);
+            for cell in [[0, 0, 0], [3, 5, -2], [-4, -1, 7]] {
+                let point = first.world(Cell(cell), DVec3::splat(0.5));
+                let row = last.row(point.y);
+                let [x, z] = last.column(row, DVec2::new(point.x, point.z));
+                let found = Cell([x, row, z]);
+                assert!((last.world(found, DVec3::splat(0.5)) - point).length() < 1e-9);
+                assert_eq!(last.contents(found), first.contents(Cell(cell)));
+            }
+        }
+    }
+}

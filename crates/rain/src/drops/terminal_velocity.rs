@@ -1,0 +1,280 @@
+//! How fast drops fall in still air.
+
+use bansho_base::{math, world::gravity::STANDARD_GRAVITY};
+
+/// Density of water rho_p, kg/m^3.
+const WATER_DENSITY: f64 = 998.2;
+
+bansho_base::choice! {
+    /// Where terminal velocities come from.
+    pub enum VelocityLaw {
+        /// Measured by Gunn and Kinzer: large drops flatten and fall no faster than 9.2 m/s.
+        Measured = "measured",
+        /// The paper's formula (2)-(4) for a rigid sphere: 4 % slow at 1 mm, 29 % fast at 5 mm.
+        Formula = "formula",
+    }
+}
+
+/// The air that drops fall through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Air {
+    /// Density rho_f, kg/m^3.
+    pub density: f64,
+    /// Dynamic viscosity mu, Pa s.
+    pub viscosity: f64,
+}
+
+impl Default for Air {
+    /// Dry air at 20 degrees Celsius and 1013.25 hPa.
+    fn default() -> Self {
+        Self { density: 1.204, viscosity: 1.81e-5 }
+    }
+}
+
+impl Air {
+    /// Dry air as an ideal gas, its viscosity by Sutherland's law.
+    pub fn at(temperature_k: f64, pressure_pa: f64) -> Self {
+        /// Gas constant of dry air, J/(kg K).
+        const GAS_CONSTANT: f64 = 287.05;
+        let viscosity = 1.458e-6 * temperature_k * math::sqrt(temperature_k) / (temperature_k + 110.4);
+        Self { density: pressure_pa / (GAS_CONSTANT * temperature_k), viscosity }
+    }
+}
+
+/// The paper's fixed point does not exist, or lies where its drag is not known.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoTerminalVelocity {
+    /// The drag (3) jumps at Re = 1 from 24 to 28.6, and the drop would need one between.
+    #[error("formula (2)-(4) has no solution for a drop of {diameter_mm} mm: the drag jumps at Re = 1")]
+    DragJump {
+        /// Diameter D, mm.
+        diameter_mm: f64,
+    },
+    /// Re would reach 1e4, beyond which the paper gives no drag.
+    #[error("formula (2)-(4) ends at Re = 10000; a drop of {diameter_mm} mm falls with Re = {reynolds}")]
+    TooFast {
+        /// Diameter D, mm.
+        diameter_mm: f64,
+        /// Reynolds number Re.
+        reynolds: f64,
+    },
+}
+
+/// Drops falling by a law through an air.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fall {
+    /// Where the velocities come from.
+    pub law: VelocityLaw,
+    /// What the drops fall through.
+    pub air: Air,
+}
+
+impl Default for Fall {
+    fn default() -> Self {
+        Self { law: VelocityLaw::Measured, air: Air::default() }
+    }
+}
+
+impl Fall {
+    /// Terminal velocity of a drop of diameter D, m/s downward; rises with D.
+    ///
+    /// Where the paper's formula has no solution, between 79.5 and 84 um, its drag below Re = 1 is used; above Re = 1e4, its
+    /// drag below.
+    pub fn speed(&self, diameter_mm: f64) -> f64 {
+        match self.law {
+            VelocityLaw::Measured => measured(diameter_mm) * density_correction(&self.air),
+            VelocityLaw::Formula => match fixed_point(diameter_mm, &self.air) {
+                Ok(speed) => speed,
+                Err(NoTerminalVelocity::DragJump { .. }) => stokes(diameter_mm, &self.air),
+                Err(NoTerminalVelocity::TooFast { reynolds, .. }) => {
+                    reynolds * self.air.viscosity / (self.air.density * 1e-3 * diameter_mm)
+                }
+            },
+        }
+    }
+}
+
+/// Measured terminal velocities, mm and m/s: R. Gunn and G. D. Kinzer, "The terminal velocity of fall for water droplets in
+/// stagnant air", J. Meteor. 6 (1949), at 20 degrees Celsius and 1013 hPa.
+const GUNN_KINZER: [[f64; 2]; 35] = [
+    [0.078, 0.18],
+    [0.1, 0.27],
+    [0.2, 0.72],
+    [0.3, 1.17],
+    [0.4, 1.62],
+    [0.5, 2.06],
+    [0.6, 2.47],
+    [0.7, 2.87],
+    [0.8, 3.27],
+    [0.9, 3.67],
+    [1.0, 4.03],
+    [1.2, 4.64],
+    [1.4, 5.17],
+    [1.6, 5.65],
+    [1.8, 6.09],
+    [2.0, 6.49],
+    [2.2, 6.9],
+    [2.4, 7.27],
+    [2.6, 7.57],
+    [2.8, 7.82],
+    [3.0, 8.06],
+    [3.2, 8.26],
+    [3.4, 8.44],
+    [3.6, 8.6],
+    [3.8, 8.72],
+    [4.0, 8.83],
+    [4.2, 8.92],
+    [4.4, 8.98],
+    [4.6, 9.03],
+    [4.8, 9.07],
+    [5.0, 9.09],
+    [5.2, 9.12],
+    [5.4, 9.14],
+    [5.6, 9.16],
+    [5.8, 9.17],
+];
+
+/// Measured terminal velocity at 20 degrees Celsius and 1013 hPa, m/s.
+///
+/// Linear between the table's rows; by Stokes' square of D below 0.078 mm; that of the largest measured drop beyond 5.8 mm, where
+/// drops break up.
+pub fn measured(diameter_mm: f64) -> f64 {
+    let [smallest, slowest] = GUNN_KINZER[0];
+    if diameter_mm < smallest {
+        let share = diameter_mm.max(0.0) / smallest;
+        return slowest * share * share;
+    }
+    let upper = GUNN_KINZER.partition_point(|row| row[0] <= diameter_mm).min(GUNN_KINZER.len() - 1);
+    let ([d0, v0], [d1, v1]) = (GUNN_KINZER[upper - 1], GUNN_KINZER[upper]);
+    math::lerp(v0, v1, ((diameter_mm - d0) / (d1 - d0)).min(1.0))
+}
+
+/// How much faster measured drops fall in thinner air: G. B. Foote and P. S. du Toit, J. Appl. Meteor. 8 (1969).
+fn density_correction(air: &Air) -> f64 {
+    math::pow(Air::default().density / air.density, 0.4)
+}
+
+/// Drag C of a rigid sphere, eq. (3).
+pub fn drag(reynolds: f64) -> f64 {
+    if reynolds < 1.0 {
+        24.0 / reynolds
+    } else {
+        let root = 0.55 + 4.8 / math::sqrt(reynolds);
+        root * root
+    }
+}
+
+/// Reynolds number Re, eq. (4).
+pub fn reynolds(speed: f64, diameter_mm: f64, air: &Air) -> f64 {
+    speed * air.density * 1e-3 * diameter_mm / air.viscosity
+}
+
+/// Velocity at which weight and the drag C are in balance, eq. (2).
+fn balance(diameter_mm: f64, drag: f64, air: &Air) -> f64 {
+    math::sqrt(4.0 * STANDARD_GRAVITY * 1e-3 * diameter_mm * (WATER_DENSITY - air.density) / (3.0 * air.density * drag))
+}
+
+/// Stokes' velocity: the solution for C = 24/Re.
+fn stokes(diameter_mm: f64, air: &Air) -> f64 {
+    let diameter = 1e-3 * diameter_mm;
+    STANDARD_GRAVITY * diameter * diameter * (WATER_DENSITY - air.density) / (18.0 * air.viscosity)
+}
+
+/// Terminal velocity by the paper's iteration of (2)-(4), converged to one part in 1e12, m/s; 0 for no drop.
+///
+/// # Errors
+/// There is no such velocity, or it lies where (3) gives no drag.
+pub fn fixed_point(diameter_mm: f64, air: &Air) -> Result<f64, NoTerminalVelocity> {
+    /// The slowest convergence, far below Re = 1, halves the error with every step.
+    const STEPS: usize = 200;
+    if diameter_mm.is_nan() || diameter_mm <= 0.0 {
+        return Ok(0.0);
+    }
+    let mut speed = 1.0;
+    for _ in 0..STEPS {
+        let next = balance(diameter_mm, drag(reynolds(speed, diameter_mm, air)), air);
+        let converged = (next - speed).abs() <= 1e-12 * next;
+        speed = next;
+        if converged {
+            let reynolds = reynolds(speed, diameter_mm, air);
+            let known = reynolds < 1e4;
+            return if known { Ok(speed) } else { Err(NoTerminalVelocity::TooFast { diameter_mm, reynolds }) };
+        }
+    }
+    Err(NoTerminalVelocity::DragJump { diameter_mm })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::{near, rows};
+
+    #[test]
+    fn measured_velocities_are_those_of_gunn_and_kinzer() {
+        for [diameter, speed, ..] in rows::<8>(include_str!("../../data/raindrop_gunn_kinzer.csv")) {
+            assert!(near(Fall::default().speed(diameter), speed, 1e-12), "{diameter} mm");
+        }
+        for [diameter, _, _, _, _, _, _, speed, ..] in rows::<13>(include_str!("../../data/raindrop_velocity.csv")) {
+            assert!(near(measured(diameter), speed, 1e-3), "{diameter} mm");
+        }
+        assert_eq!((measured(0.0), measured(0.039), measured(20.0)), (0.0, 0.045, 9.17));
+    }
+
+    #[test]
+    fn the_formula_gives_the_reference_velocities() {
+        let air = Air::default();
+        for [diameter, speed, re, c, ..] in rows::<13>(include_str!("../../data/raindrop_velocity.csv")) {
+            let found = fixed_point(diameter, &air).expect("converges");
+            assert!(near(found, speed, 1e-4), "{diameter} mm: {found}");
+            let number = reynolds(found, diameter, &air);
+            assert!(near(number, re, 1e-4) && near(drag(number), c, 1e-4), "{diameter} mm");
+        }
+    }
+
+    #[test]
+    fn a_solution_satisfies_all_three_equations() {
+        let air = Air::at(273.15, 90_000.0);
+        for diameter in [0.02, 0.05, 0.2, 1.0, 3.0, 6.0] {
+            let speed = fixed_point(diameter, &air).expect("converges");
+            assert!(near(balance(diameter, drag(reynolds(speed, diameter, &air)), &air), speed, 1e-11));
+        }
+        assert!(near(fixed_point(0.05, &air).expect("converges"), stokes(0.05, &air), 1e-11));
+    }
+
+    #[test]
+    fn the_formula_says_where_it_has_no_solution() {
+        let air = Air::default();
+        let (mut first, mut last) = (f64::INFINITY, 0.0_f64);
+        for micrometre in (700..900).map(|tenth| tenth as f64 * 0.1) {
+            match fixed_point(1e-3 * micrometre, &air) {
+                Ok(_) => {}
+                Err(NoTerminalVelocity::DragJump { .. }) => {
+                    (first, last) = (first.min(micrometre), last.max(micrometre))
+                }
+                Err(other) => panic!("{other}"),
+            }
+        }
+        assert!((79.0..80.0).contains(&first) && (83.0..85.0).contains(&last), "{first} to {last} um");
+        assert!(matches!(fixed_point(12.0, &air), Err(NoTerminalVelocity::TooFast { reynolds, .. }) if reynolds > 1e4));
+    }
+
+    #[test]
+    fn velocities_rise_with_diameter_under_both_laws() {
+        for law in [VelocityLaw::Measured, VelocityLaw::Formula] {
+            let fall = Fall { law, air: Air::default() };
+            let speeds: Vec<f64> = (0..=800).map(|i| fall.speed(0.01 * i as f64)).collect();
+            assert!(speeds.is_sorted_by(|a, b| a <= b || (a - b) / a < 0.2), "{law:?}");
+            assert!(speeds.iter().all(|speed| (0.0..20.0).contains(speed)));
+        }
+    }
+
+    #[test]
+    fn thin_air_lets_drops_fall_faster() {
+        // Half the density: 2^0.4 = 1.3195.
+        let air = Air { density: 0.602, ..Air::default() };
+        let fall = Fall { law: VelocityLaw::Measured, air };
+        assert!(near(fall.speed(2.0), 6.49 * 1.3195, 1e-4));
+        assert!(near(Air::at(293.15, 101_325.0).density, 1.204, 1e-3));
+        assert!(near(Air::at(293.15, 101_325.0).viscosity, 1.81e-5, 5e-3));
+    }
+}

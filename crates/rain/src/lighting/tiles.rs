@@ -1,0 +1,114 @@
+//! Light that changes slowly over the picture: known at the corners of tiles, straight between.
+
+use bansho_base::{
+    camera::Camera,
+    image::Rect,
+    math::{DVec2, DVec3},
+    phenomenon::strip::View,
+};
+use rayon::prelude::*;
+
+/// Side of a tile where light changes little from one to the next, pixels.
+pub(crate) const COARSE: usize = 32;
+/// Side of a tile where lamps and the edges of their cones are seen, pixels.
+pub(crate) const FINE: usize = 16;
+
+/// Side of a tile close to a lamp, pixels.
+pub(crate) const FINEST: usize = 4;
+
+/// Corners of the tiles of a picture, or of a part of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Tiles {
+    /// Place of the first corner, pixels.
+    origin: [usize; 2],
+    /// Side of a tile, pixels.
+    pub(crate) side: usize,
+    /// Corners in a row, and rows of corners.
+    pub(crate) size: [usize; 2],
+    /// Unit vectors that are seen at the corners, row after row; 0 where the lens sees nothing.
+    pub(crate) lines: Vec<DVec3>,
+}
+
+impl Tiles {
+    pub(crate) fn new(view: &View, side: usize) -> Self {
+        Self::over(view, side, Rect::of_size(view.size[0], view.size[1]))
+    }
+
+    /// Tiles that cover a part of the picture.
+    pub(crate) fn over(view: &View, side: usize, rect: Rect) -> Self {
+        let origin = [rect.x, rect.y];
+        let size = [rect.width, rect.height].map(|pixels| pixels.max(1).div_ceil(side) + 1);
+        let place = |index: usize| [origin[0] + index % size[0] * side, origin[1] + index / size[0] * side];
+        let lines = (0..size[0] * size[1]).map(|index| line(&view.camera, place(index))).collect();
+        Self { origin, side, size, lines }
+    }
+
+    /// One value at each corner, made in parallel.
+    pub(crate) fn map<T: Send>(&self, value: impl Fn(usize, DVec3) -> T + Sync) -> Vec<T> {
+        self.lines.par_iter().enumerate().map(|(index, line)| value(index, *line)).collect()
+    }
+
+    /// A colour known at the corners, at a place of the picture (pixels); beyond the picture that at its edge.
+    pub(crate) fn at(&self, corners: &[[f32; 3]], [x, y]: [f32; 2]) -> [f32; 3] {
+        let ((column, across), (row, down)) = (self.column_at(x), self.row_at(y));
+        let index = row * self.size[0] + column;
+        let line = |index: usize| mix(corners[index], corners[index + 1], across);
+        mix(line(index), line(index + self.size[0]), down)
+    }
+
+    /// The four corners around a place of the picture (pixels), each with its share.
+    pub(crate) fn corners(&self, [x, y]: [f32; 2]) -> [(usize, f32); 4] {
+        let ((column, across), (row, down)) = (self.column_at(x), self.row_at(y));
+        let index = row * self.size[0] + column;
+        let below = index + self.size[0];
+        [
+            (index, (1.0 - across) * (1.0 - down)),
+            (index + 1, across * (1.0 - down)),
+            (below, (1.0 - across) * down),
+            (below + 1, across * down),
+        ]
+    }
+
+    /// The corner above a height in the picture (pixels), and how far it is to the corner below, 0 to 1.
+    pub(crate) fn row_at(&self, y: f32) -> (usize, f32) {
+        self.split(y, 1)
+    }
+
+    /// The corner left of a place across the picture (pixels), and how far it is to the corner right of it, 0 to 1.
+    pub(crate) fn column_at(&self, x: f32) -> (usize, f32) {
+        self.split(x, 0)
+    }
+
+    fn split(&self, coordinate: f32, axis: usize) -> (usize, f32) {
+        let corners = self.size[axis];
+        let place = ((coordinate - self.origin[axis] as f32) / self.side as f32).clamp(0.0, (corners - 1) as f32);
+        let whole = (place as usize).min(corners.saturating_sub(2));
+        (whole, place - whole as f32)
+    }
+}
+
+fn line(camera: &Camera, pixel: [usize; 2]) -> DVec3 {
+    let pixel = DVec2::new(pixel[0] as f64, pixel[1] as f64);
+    camera.direction(pixel).map_or(DVec3::ZERO, DVec3::normalize_or_zero)
+}
+
+/// Numbers that grow by the same ratio from `first` to at least `last`.
+pub(crate) fn geometric(first: f64, last: f64, ratio: f64) -> Vec<f64> {
+    let mut numbers = vec![first];
+    let mut next = first;
+    while next < last {
+        next *= ratio;
+        numbers.push(next);
+    }
+    numbers
+}
+
+/// The colour `share` of the way from one to another. Not fused: it is needed where vectors are not.
+#[inline(always)]
+pub(crate) fn mix(from: [f32; 3], to: [f32; 3], share: f32) -> [f32; 3] {
+    let mut mixed = from;
+    for c in 0..3 {
+        mixed[c] += (to[c] - from[c]) * share;
+    }
+    mixed
+}

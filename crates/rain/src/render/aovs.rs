@@ -1,0 +1,35 @@
+//! What rain measures of itself, pixel by pixel.
+
+use bansho_base::phenomenon::strip::{AovDescriptor, AovPlane, AovRule};
+
+/// What rain can write beside its light, in the order of a strip's planes.
+pub(crate) const AOVS: &[AovDescriptor] = &[
+    AovDescriptor {
+        name: "streak_opacity",
+        unit: "",
+        doc: "Opacity of the streaks in a pixel, summed; 0 where there are none. The veil of far rain is not in it.",
+        rule: AovRule::Sum,
+    },
+    AovDescriptor {
+        name: "streak_depth",
+        unit: "m",
+        doc: "Depth of the nearest streak in a pixel; 0 where there is none.",
+        rule: AovRule::Nearest,
+    },
+    AovDescriptor {
+        name: "diameter_mm",
+        unit: "mm",
+        doc: "Diameter of the drop of the nearest streak in a pixel; 0 where there is none.",
+        rule: AovRule::Nearest,
+    },
+];
+
+/// Measures a pixel of a streak that hides so much of it; `depth` in m.
+pub(super) fn measure(aovs: &mut [AovPlane], index: usize, opacity: f32, depth: f32, diameter_mm: f32) {
+    let [opacities, depths, diameters] = aovs else { return };
+    if opacity > 0.0 {
+        opacities.add(index, 1.0, opacity);
+        depths.keep_nearest(index, depth, depth);
+        diameters.keep_nearest(index, diameter_mm, depth);
+    }
+}

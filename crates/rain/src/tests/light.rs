@@ -1,0 +1,133 @@
+//! Rain in the light of lamps.
+
+use bansho_base::{
+    image::Rect,
+    math::{self, DVec3},
+    phenomenon::{
+        strip::{DepthInterval, Strip},
+        surroundings::{Emitter, Light, Publication, Surroundings},
+    },
+};
+
+use super::{METHODS, Method, draw, draw_part, lamp, rain, streaks, view_at, wind};
+use crate::{
+    RainParameters,
+    lighting::{
+        drop_lighting::{Lighting, Scattering},
+        drop_phase_function::DropLens,
+    },
+};
+
+const SIZE: [usize; 2] = [160, 90];
+
+fn lit_by(parameters: RainParameters, lights: Vec<Light>, white: Option<f64>) -> Strip {
+    let calm = wind([0.0; 3], 0.0);
+    let others = Publication { lights, ..Publication::default() };
+    let surroundings = Surroundings { others, ..Surroundings::of_wind(&calm) };
+    let mut view = view_at(1.0, 1.0 / 60.0, SIZE);
+    view.white_luminance = white;
+    draw(&rain(parameters, 1), &view, &surroundings)
+}
+
+#[test]
+fn along_a_beam_light_falls_with_the_square_of_the_distance() {
+    let scattering = Scattering::new(&DropLens::new());
+    let spot = Emitter::Spot { position: DVec3::ZERO, axis: DVec3::X, cos_inner: 0.95, cos_outer: 0.9 };
+    let lights = [Light { emitter: spot, intensity: [1000.0; 3] }];
+    let lighting = Lighting { scattering: &scattering, lights: &lights, extinction: 0.0 };
+    // Seen from the side, so that every drop turns the light by the same angle.
+    let samples: Vec<[f64; 2]> = (1..40)
+        .map(|i| {
+            let distance = 0.5 * f64::from(i);
+            let radiance = lighting.radiance(&lights[0], DVec3::X * distance, -DVec3::Z)[1];
+            [math::ln(distance), math::ln(f64::from(radiance))]
+        })
+        .collect();
+    let count = samples.len() as f64;
+    let mean = |k: usize| samples.iter().map(|sample| sample[k]).sum::<f64>() / count;
+    let (x, y) = (mean(0), mean(1));
+    let covariance: f64 = samples.iter().map(|sample| (sample[0] - x) * (sample[1] - y)).sum();
+    let exponent = -covariance / samples.iter().map(|sample| (sample[0] - x) * (sample[0] - x)).sum::<f64>();
+    assert!((exponent - 2.0).abs() < 0.05, "{exponent}");
+}
+
+#[test]
+fn twice_the_fire_is_twice_the_light_of_streaks_and_veil() {
+    for method in METHODS {
+        let parameters = || RainParameters { method, ..RainParameters::default() };
+        let [once, twice] = [300.0, 600.0].map(|power| lit_by(parameters(), vec![lamp([0.5, 1.0, -3.0], power)], None));
+        let sum = |strip: &Strip| strip.radiance[0].iter().map(|value| f64::from(*value)).sum::<f64>();
+        assert!(sum(&once) > 0.0 && (sum(&twice) / sum(&once) - 2.0).abs() < 1e-5);
+        for (once, twice) in once.radiance[2].iter().zip(&twice.radiance[2]) {
+            assert!((twice - 2.0 * once).abs() <= 1e-4 * twice.abs().max(1e-3));
+        }
+    }
+}
+
+#[test]
+fn culling_changes_no_pixel_by_a_255th() {
+    let lights = || vec![lamp([2.0, 4.0, -3.0], 200.0)];
+    let white = 2.0;
+    let parameters =
+        |culling| RainParameters { culling, rate_mm_per_h: 100.0.into(), ..streaks(Method::Billboards, 100.0) };
+    let (culled, all) =
+        (lit_by(parameters(true), lights(), Some(white)), lit_by(parameters(false), lights(), Some(white)));
+    let mut differ = 0;
+    for index in 0..all.len() {
+        for c in 0..3 {
+            let difference = f64::from((culled.radiance[c][index] - all.radiance[c][index]).abs());
+            assert!(difference <= white / 255.0, "{difference}");
+            differ += usize::from(difference > 0.0);
+        }
+        assert_eq!(culled.transmittance(index), all.transmittance(index));
+    }
+    assert!(differ > 0, "nothing was culled");
+}
+
+#[test]
+fn the_thickest_veil_around_lamps_stays_finite() {
+    let light = lamp([0.2, 1.0, -3.0], 1e6);
+    let thick = RainParameters {
+        rate_mm_per_h: 300.0.into(),
+        veil_distance: 5000.0,
+        opacity_gain: 20.0,
+        ..streaks(Method::Drops, 300.0)
+    };
+    let (view, calm) = (view_at(1.0, 1.0 / 60.0, [48, 27]), wind([0.0; 3], 0.0));
+    let others = Publication { lights: vec![light], ..Publication::default() };
+    let surroundings = Surroundings { others, ..Surroundings::of_wind(&calm) };
+    for slice in [[0.0, 1e5], [800.0, 1600.0], [4000.0, 1e5]] {
+        let slice = DepthInterval { near: slice[0], far: slice[1] };
+        let strip = draw_part(&rain(thick.clone(), 1), &view, &surroundings, Rect::of_size(48, 27), &slice);
+        assert!(strip.radiance.iter().flatten().all(|value| value.is_finite()), "{slice:?}");
+    }
+}
+
+#[test]
+fn the_veil_is_single_scattering_along_each_line_of_sight() {
+    // All drops veil: none is drawn as a streak.
+    let parameters = RainParameters { diameters_mm: vec![8.0], veil_distance: 30.0, ..streaks(Method::Drops, 20.0) };
+    let light = lamp([1.0, 3.0, -9.0], 5000.0);
+    let strip = lit_by(parameters.clone(), vec![light], None);
+    let view = view_at(1.0, 1.0 / 60.0, SIZE);
+    let rain = rain(parameters, 1);
+    let [beta, _] = rain.extinctions(1.0);
+    let lighting = Lighting { scattering: &rain.optics.scattering, lights: &[light], extinction: beta };
+    for (x, y) in [(80, 20), (40, 32), (100, 40), (128, 16), (92, 33)] {
+        let line = view.camera.direction(math::DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap().normalize();
+        let end = rain.near_reach();
+        let steps = 20_000;
+        let step = end / f64::from(steps);
+        let expected: f64 = (0..steps)
+            .map(|i| {
+                let at = (f64::from(i) + 0.5) * step;
+                let radiance = f64::from(lighting.radiance(&light, view.camera.position + line * at, line)[1]);
+                radiance * beta * math::exp(-beta * at) * step
+            })
+            .sum();
+        let found = f64::from(strip.radiance[1][y * SIZE[0] + x]);
+        assert!((found / expected - 1.0).abs() < 0.06, "{x} {y}: {found} {expected}");
+        let through = f64::from(strip.transmittance(y * SIZE[0] + x)[1]);
+        assert!((through - math::exp(-beta * end)).abs() < 2e-3, "{through}");
+    }
+}

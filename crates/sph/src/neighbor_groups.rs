@@ -1,0 +1,152 @@
+//! Groups of eight particles that lie beside each other, and the particles near enough to matter to any of them.
+
+use std::ops::Range;
+
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use rayon::prelude::*;
+
+use bansho_base::math::simd::{HalfLanes, Real};
+
+use super::{
+    batch::{BATCH, load, squared},
+    cells::{Cells, RowPart},
+};
+
+/// Groups that one task takes.
+const GROUPS: usize = 32;
+
+/// Some groups that follow each other: a task of the thread pool. What it finds depends on its groups and those around them alone, so
+/// it does not matter where one ends.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Stretch {
+    pub(super) groups: Vec<Group>,
+    /// Particles near each group, group after group.
+    pub(super) candidates: Vec<u32>,
+}
+
+/// Up to eight particles that follow each other in a row of cells.
+#[derive(Clone, Debug)]
+pub(super) struct Group {
+    /// Their numbers in sorted order.
+    pub(super) particles: Range<usize>,
+    /// Where the stretch lists the particles that are nearer to the box around them than the support radius; they themselves are among them.
+    pub(super) candidates: Range<usize>,
+}
+
+impl Stretch {
+    /// The particles of all groups.
+    pub(super) fn particles(&self) -> Range<usize> {
+        let at = |group: Option<&Group>, edge: fn(&Group) -> usize| group.map_or(0, edge);
+        at(self.groups.first(), |group| group.particles.start)..at(self.groups.last(), |group| group.particles.end)
+    }
+}
+
+/// The smallest box, along the axes, around some particles.
+struct Bounds<const D: usize> {
+    lower: [f32; D],
+    upper: [f32; D],
+}
+
+impl<const D: usize> Bounds<D> {
+    fn of(positions: &[&[f32]; D], particles: Range<usize>) -> Self {
+        let mut bounds = Self { lower: [f32::INFINITY; D], upper: [f32::NEG_INFINITY; D] };
+        for c in 0..D {
+            for value in &positions[c][particles.clone()] {
+                bounds.lower[c] = bounds.lower[c].min(*value);
+                bounds.upper[c] = bounds.upper[c].max(*value);
+            }
+        }
+        bounds
+    }
+
+    /// Squared distances of points from the box, 0 inside.
+    #[inline(always)]
+    fn distance_squared<R: Real>(&self, point: &[R; D]) -> R {
+        let mut outside = *point;
+        for c in 0..D {
+            let below = point[c].broadcast(self.lower[c]) - point[c];
+            let above = point[c] - point[c].broadcast(self.upper[c]);
+            outside[c] = below.simd_max(above).simd_max(point[c].broadcast(0.0));
+        }
+        squared(&outside)
+    }
+}
+
+/// Writes those particles of a run that are near a box at the front of a list, and says how many they are; what follows is spoilt.
+#[inline(always)]
+fn list_near<S: Simd, const D: usize>(
+    simd: S,
+    positions: &[&[f32]; D],
+    bounds: &Bounds<D>,
+    reach_squared: f32,
+    run: Range<usize>,
+    list: &mut [u32],
+) -> usize {
+    let reach = HalfLanes::splat(simd, reach_squared);
+    let mut count = 0;
+    for start in run.clone().step_by(BATCH) {
+        let near = bounds.distance_squared(&load(simd, positions, start)).simd_lt(reach).to_bitmask() as usize;
+        // The last batch goes on behind the run.
+        let near = near & (0xff >> (BATCH - (run.end - start).min(BATCH)));
+        for (to, place) in list[count..count + BATCH].iter_mut().zip(&PLACES[near]) {
+            *to = start as u32 + u32::from(*place);
+        }
+        count += near.count_ones() as usize;
+    }
+    count
+}
+
+/// For each set of bits the places of those that are set.
+const PLACES: [[u8; BATCH]; 256] = {
+    let mut places = [[0; BATCH]; 256];
+    let mut bits = 0;
+    while bits < 256 {
+        let (mut bit, mut count) = (0, 0);
+        while bit < BATCH {
+            if bits >> bit & 1 == 1 {
+                places[bits][count] = bit as u8;
+                count += 1;
+            }
+            bit += 1;
+        }
+        bits += 1;
+    }
+    places
+};
+
+impl Stretch {
+    /// Parts rows into stretches and finds everybody's candidates.
+    pub(super) fn find_all<const D: usize>(stretches: &mut Vec<Self>, cells: &Cells<D>, parts: &[RowPart]) {
+        let level = Level::new();
+        stretches.resize_with(parts.len().div_ceil(GROUPS), Self::default);
+        stretches.par_iter_mut().with_max_len(1).zip(parts.par_chunks(GROUPS)).for_each(|(stretch, parts)| {
+            dispatch!(level, simd => stretch.find(simd, cells, parts));
+        });
+    }
+
+    /// Finds the candidates of some parts of rows.
+    #[inline(always)]
+    fn find<S: Simd, const D: usize>(&mut self, simd: S, cells: &Cells<D>, parts: &[RowPart]) {
+        let (positions, support) = (cells.positions(), cells.support_radius());
+        let Self { groups, candidates } = self;
+        groups.clear();
+        candidates.clear();
+        let Some(first) = parts.first() else { return };
+        let mut around = cells.runs_from(first);
+        let mut listed = 0;
+        for part in parts {
+            let particles = part.particles.start as usize..part.particles.end as usize;
+            let bounds = Bounds::of(&positions, particles.clone());
+            let runs = around.around(part);
+            let most: usize = runs.iter().map(|run| run.len() + BATCH).sum();
+            candidates.resize(listed + most, 0);
+            let first = listed;
+            for run in runs {
+                listed +=
+                    list_near(simd, &positions, &bounds, support * support, run.clone(), &mut candidates[listed..]);
+            }
+            groups.push(Group { particles, candidates: first..listed });
+        }
+        candidates.truncate(listed);
+    }
+}

@@ -1,0 +1,168 @@
+//! Sorts particles by the keys of their cells, each thread those of a range of keys.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+/// Particles that one task takes at least.
+pub(super) const AT_ONCE: usize = 4096;
+/// Most bits sorted by in one pass.
+const DIGIT_BITS: u32 = 11;
+/// Keys for each range that tell where ranges end, so that all have about as many particles.
+const SAMPLES: usize = 64;
+
+/// A key and the index of the particle that it belongs to.
+type Entry = (u64, u32);
+
+/// A cell that holds particles: its key and its first particle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cell {
+    pub(super) key: u64,
+    pub(super) start: u32,
+}
+
+/// What sorting writes on the way, kept from step to step.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sorting {
+    entries: Vec<Entry>,
+    /// The sample that ends of ranges are taken from.
+    sample: Vec<u64>,
+    ranges: Vec<SortedRange>,
+}
+
+/// The particles of a range of keys.
+#[derive(Clone, Debug, Default)]
+struct SortedRange {
+    entries: Vec<Entry>,
+    spare: Vec<Entry>,
+    cells: Vec<Cell>,
+}
+
+impl Sorting {
+    /// Sorts one particle an id, with keys of so many bits, by key and then by id: gives their indices in that order, and the cells.
+    pub(super) fn sort(
+        &mut self,
+        key: impl Fn(usize) -> u64 + Sync,
+        bits: u32,
+        ids: &[u64],
+        (order, cells): (&mut Vec<u32>, &mut Vec<Cell>),
+    ) {
+        let all = (0..ids.len()).into_par_iter().with_min_len(AT_ONCE);
+        all.map(|index| (key(index), index as u32)).collect_into_vec(&mut self.entries);
+        let count = rayon::current_num_threads().min(ids.len() / AT_ONCE).max(1);
+        self.ranges.resize_with(count, SortedRange::default);
+        let starts = self.starts_of_ranges();
+        let Self { entries, ranges, .. } = self;
+        ranges.par_iter_mut().enumerate().for_each(|(number, range)| {
+            range.take(entries, starts[number], starts.get(number + 1).copied());
+            range.sort(bits, ids);
+        });
+        order.resize(ids.len(), 0);
+        let (mut rest, mut start, mut parts) = (order.as_mut_slice(), 0, Vec::with_capacity(count));
+        for range in ranges {
+            let (own, others) = rest.split_at_mut(range.entries.len());
+            parts.push((own, start));
+            (rest, start) = (others, start + range.entries.len() as u32);
+        }
+        self.ranges.par_iter_mut().zip(parts).for_each(|(range, (order, start))| range.write(order, start));
+        cells.clear();
+        self.ranges.iter().for_each(|range| cells.extend_from_slice(&range.cells));
+    }
+
+    /// The least key of each range.
+    fn starts_of_ranges(&mut self) -> Vec<u64> {
+        let count = self.ranges.len();
+        self.sample.clear();
+        let step = (self.entries.len() / (count * SAMPLES)).max(1);
+        self.sample.extend(self.entries.iter().step_by(step).map(|entry| entry.0));
+        self.sample.sort_unstable();
+        let start = |number: usize| if number == 0 { 0 } else { self.sample[number * self.sample.len() / count] };
+        (0..count).map(start).collect()
+    }
+}
+
+impl SortedRange {
+    /// Takes the particles with keys from `start` to before `end`.
+    fn take(&mut self, all: &[Entry], start: u64, end: Option<u64>) {
+        self.entries.clear();
+        let last = end.map_or(u64::MAX, |end| end.wrapping_sub(1));
+        let is_own = |entry: &&Entry| start <= entry.0 && entry.0 <= last && end != Some(start);
+        self.entries.extend(all.iter().filter(is_own));
+    }
+
+    /// Sorts them by key, then by id.
+    fn sort(&mut self, bits: u32, ids: &[u64]) {
+        let Self { entries, spare, .. } = self;
+        spare.resize(entries.len(), (0, 0));
+        let passes = bits.div_ceil(DIGIT_BITS);
+        for pass in 0..passes {
+            let [from, to] = [pass, pass + 1].map(|pass| bits * pass / passes);
+            counting_pass(entries, spare, from..to);
+            std::mem::swap(entries, spare);
+        }
+        for cell in entries.chunk_by_mut(|a, b| a.0 == b.0).filter(|cell| cell.len() > 1) {
+            cell.sort_unstable_by_key(|entry| ids[entry.1 as usize]);
+        }
+    }
+
+    /// Writes their indices in order, and lists the cells, the first of which begins at particle `start`.
+    fn write(&mut self, order: &mut [u32], mut start: u32) {
+        order.iter_mut().zip(&self.entries).for_each(|(index, entry)| *index = entry.1);
+        self.cells.clear();
+        for cell in self.entries.chunk_by(|a, b| a.0 == b.0) {
+            self.cells.push(Cell { key: cell[0].0, start });
+            start += cell.len() as u32;
+        }
+    }
+}
+
+/// One stable pass of a radix sort, over some bits of the keys.
+fn counting_pass(from: &[Entry], to: &mut [Entry], bits: Range<u32>) {
+    let mut places = [0_u32; 1 << DIGIT_BITS];
+    let mask = (1 << bits.len()) - 1;
+    let digit = |key: u64| (key >> bits.start) as usize & mask;
+    from.iter().for_each(|entry| places[digit(entry.0)] += 1);
+    let mut sum = 0;
+    for place in &mut places[..=mask] {
+        sum += std::mem::replace(place, sum);
+    }
+    for entry in from {
+        let place = &mut places[digit(entry.0)];
+        to[*place as usize] = *entry;
+        *place += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math::random::{Key, Purpose};
+
+    use super::*;
+
+    /// Keys of some particles, the same as a plain sort gives, with any number of threads.
+    #[test]
+    fn ranges_put_together_are_all_in_order() {
+        let random = Key::new(4, "sorting");
+        // As many keys as particles, few keys, and one for all: ranges may be empty.
+        for most in [1 << 20, 50, 1] {
+            let words: Vec<_> = (0..50_000).map(|index| random.words(index, 0, Purpose::named("key"))).collect();
+            let key = |index: usize| u64::from(words[index][0]) % most;
+            // No two are the same.
+            let ids: Vec<u64> = (0..).zip(&words).map(|(index, words)| u64::from(words[1]) << 32 | index).collect();
+            let mut expected: Vec<u32> = (0..50_000).collect();
+            expected.sort_by_key(|index| (key(*index as usize), ids[*index as usize]));
+            for threads in [1, 2, 7] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("few threads");
+                let (mut order, mut cells) = (Vec::new(), Vec::new());
+                pool.install(|| Sorting::default().sort(key, 21, &ids, (&mut order, &mut cells)));
+                assert!(order == expected, "{most} keys, {threads} threads");
+                let firsts = (0..50_000).filter(|place| {
+                    let key = |place: u32| key(expected[place as usize] as usize);
+                    *place == 0 || key(*place) != key(place - 1)
+                });
+                assert!(cells.iter().map(|cell| cell.start).eq(firsts), "{most} keys, {threads} threads");
+                assert!(cells.iter().all(|cell| cell.key == key(expected[cell.start as usize] as usize)));
+            }
+        }
+    }
+}
