@@ -2,14 +2,17 @@
 #![no_main]
 
 use bansho_base::host::assets::MemoryAssets;
-use bansho_render::{Scene, phenomena::KINDS, scene::edit::{self, EditError}};
+use bansho::KINDS;
+use bansho_render::{Scene, scene::edit::{self, EditError}};
 use bansho_fuzz::{draw_small, one_thread};
 
 libfuzzer_sys::fuzz_target!(|text: &str| {
     one_thread();
     edit(text);
-    match Scene::parse("fuzz.toml", text, KINDS, &MemoryAssets::default()) {
-        Ok(scene) => draw_small(scene, MemoryAssets::default()),
+    match Scene::parse("fuzz.toml", text, KINDS) {
+        Ok(scene) => {
+            draw_small(scene, MemoryAssets::default());
+        }
         Err(error) => {
             assert!(!error.problems.is_empty());
             assert!(!error.to_string().is_empty());

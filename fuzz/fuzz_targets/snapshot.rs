@@ -2,7 +2,7 @@
 //!
 //! The first byte says of which scene; the others are the state of its phenomenon. One input of a hundred, by its digest, is given to a whole
 //! shot instead, with a header and a checksum that are right, since a checksum would keep nearly every change from being looked at, and goes
-//! on from there; a few as they are. Shots make all of their scene anew to restore it, which takes hundreds of times longer.
+//! on from there; a few as they are. Shots start all runs of their scene anew to restore it, which takes longer.
 #![no_main]
 
 use std::{
@@ -10,8 +10,9 @@ use std::{
     sync::{Arc, LazyLock},
 };
 
-use bansho_base::{host::{assets::MemoryAssets, observer::Unobserved}, phenomenon::Phenomenon, geometry::point_cloud::PointCloud};
-use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, Scene, Shot, phenomena::KINDS};
+use bansho_base::{host::{assets::MemoryAssets, observer::Unobserved}, phenomenon::Run, geometry::point_cloud::PointCloud};
+use bansho::compile_scene;
+use bansho_render::{CompiledScene, Plan, PlanOptions, Shot};
 use bansho_fuzz::one_thread;
 
 const GAS: &str = "bansho = 1\n[picture]\nsize = [8, 6]\n[[flame_particles]]\nparticles = 60\npreroll_s = 0.0\n";
@@ -26,39 +27,38 @@ const CLOCK: usize = 8 + 8;
 const AS_IT_IS: u8 = 0;
 const GOES_ON: u8 = 2;
 
-fn plan(scene: &str) -> Arc<Plan> {
-    let assets = MemoryAssets::default();
-    let scene = Scene::parse("snapshot.toml", scene, KINDS, &assets).expect("the scene is right");
-    Arc::new(Plan::new(scene, &PlanOptions::default(), Arc::new(assets)).expect("the scene can be planned"))
+fn compiled(scene: &str) -> Arc<CompiledScene> {
+    compile_scene("snapshot.toml", scene, Arc::new(MemoryAssets::default())).expect("the scene is right")
 }
 
-fn open(plan: &Arc<Plan>) -> Restored {
-    let shot = CpuBackend.open(plan.clone()).expect("the shot opens");
+fn open(compiled: &Arc<CompiledScene>) -> Restored {
+    let plan = Plan::new(compiled, &PlanOptions::default()).expect("the scene can be planned");
+    let shot = Shot::open(compiled.clone(), Arc::new(plan));
     let header = shot.snapshot()[..HEADER].to_vec();
-    let phenomenon = plan.open().expect("its phenomena can be made").remove(0);
-    Restored { shot, header, phenomenon }
+    let run = compiled.phenomena().next().expect("it shows a phenomenon").clone().start();
+    Restored { shot, header, run }
 }
 
-/// A scene's shot, the header of its snapshots, and its phenomenon by itself.
+/// A scene's shot, the header of its snapshots, and a run of its phenomenon by itself.
 struct Restored {
-    shot: Box<dyn Shot>,
+    shot: Shot,
     header: Vec<u8>,
-    phenomenon: Box<dyn Phenomenon>,
+    run: Box<dyn Run>,
 }
 
 thread_local! {
-    static SCENES: RefCell<Vec<Restored>> = RefCell::new(PLANS.iter().map(open).collect());
+    static SCENES: RefCell<Vec<Restored>> = RefCell::new(COMPILED.iter().map(open).collect());
 }
 
-static PLANS: LazyLock<[Arc<Plan>; 2]> = LazyLock::new(|| {
+static COMPILED: LazyLock<[Arc<CompiledScene>; 2]> = LazyLock::new(|| {
     one_thread();
-    [plan(GAS), plan(AURORA)]
+    [compiled(GAS), compiled(AURORA)]
 });
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let Some((&first, rest)) = bytes.split_first() else { return };
     SCENES.with_borrow_mut(|scenes| {
-        let Restored { shot, header, phenomenon } = &mut scenes[usize::from(first & 1)];
+        let Restored { shot, header, run } = &mut scenes[usize::from(first & 1)];
         let digest = blake3::hash(bytes).as_bytes()[0];
         if digest <= AS_IT_IS {
             if shot.restore(rest).is_ok() {
@@ -67,12 +67,15 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
         } else if digest <= GOES_ON {
             if shot.restore(&sealed(header, rest)).is_ok() {
                 check(&shot.particles());
-                check_next(shot.as_mut());
+                check_next(shot);
             }
-        } else if rest.len() > CLOCK && phenomenon.restore(&rest[CLOCK..]).is_ok() {
-            phenomenon.particles(0.0).iter().for_each(check);
-            let again = phenomenon.snapshot();
-            phenomenon.restore(&again).expect("what was restored is written as something that can be restored");
+        } else if rest.len() > CLOCK {
+            let stepped = run.as_stepped_mut().expect("it is stepped");
+            if stepped.restore(&rest[CLOCK..]).is_ok() {
+                let again = stepped.snapshot();
+                stepped.restore(&again).expect("what was restored is written as something that can be restored");
+                run.export(0.0).iter().for_each(check);
+            }
         }
     });
 });
@@ -89,7 +92,7 @@ fn check(points: &PointCloud) {
     assert!(values.chain(points.quantities.values().flatten()).all(|value| value.is_finite()));
 }
 
-fn check_next(shot: &mut dyn Shot) {
+fn check_next(shot: &mut Shot) {
     if shot.advance(1, &Unobserved).is_ok() && shot.draw(&Unobserved).is_ok() {
         check(&shot.particles());
         let frame = shot.read().expect("what was drawn can be read");

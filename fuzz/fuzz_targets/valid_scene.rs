@@ -2,7 +2,8 @@
 #![no_main]
 
 use bansho_base::{host::assets::MemoryAssets, parameters::{self, Table}};
-use bansho_render::{Scene, phenomena::KINDS, scene::SHARED_TABLES};
+use bansho::KINDS;
+use bansho_render::{Scene, scene::SHARED_TABLES};
 use bansho_fuzz::{draw_small, one_thread};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
@@ -18,7 +19,7 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
         text += &table_text(&format!("[[{}]]", kind.key), &parameters::sample((kind.table)(), &mut uniform));
     }
     // Values that do not go together, such as A + D above 1, are refused; each alone is valid.
-    if let Ok(scene) = Scene::parse("fuzz.toml", &text, KINDS, &MemoryAssets::default()) {
+    if let Ok(scene) = Scene::parse("fuzz.toml", &text, KINDS) {
         draw_small(scene, MemoryAssets::default());
     }
 });

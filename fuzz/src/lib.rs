@@ -14,11 +14,11 @@ use bansho_base::{
     },
     image::Frame,
 };
+use bansho::KINDS;
 use bansho_media::plates::{decode_picture, limits};
 use bansho_render::{
-    Backend, CpuBackend, Plan, PlanOptions, RenderError, Scene,
+    CompiledScene, Plan, PlanOptions, RenderError, Scene, SceneOptions, Shot,
     display::{BitDepth, display},
-    phenomena::KINDS,
 };
 
 /// Stops a frame that takes too long: a scene may rightly ask for much work, and that is no fault.
@@ -49,24 +49,35 @@ pub fn one_thread() {
 ///
 /// # Panics
 /// The frame holds a number that is not finite, or a plan of a checked scene fails.
-pub fn draw_small(mut scene: Scene, assets: MemoryAssets) {
+///
+/// Whether it can be built.
+pub fn draw_small(mut scene: Scene, assets: MemoryAssets) -> bool {
     one_thread();
     scene.picture.overscan = scene.picture.overscan.min(4);
     let number = scene.picture.first_frame + 1;
     let size = scene.picture.size.map(|side| (side as usize).min(32));
     let options = PlanOptions { size: Some(size), layers: true, aovs: true, ..PlanOptions::default() };
     let interruptible = scene.instances.iter().all(|instance| instance.kind.key == "flame_sheet");
-    let plan = Plan::new(scene, &options, Arc::new(assets)).expect("a checked scene can be planned");
+    let scene = Arc::new(scene.adapted(&SceneOptions::default()).expect("it is no loop"));
+    let compiled = match CompiledScene::build(scene, Arc::new(assets), None) {
+        Ok(compiled) => Arc::new(compiled),
+        Err(errors) => {
+            assert!(!errors.located("fuzz.toml", "").problems.is_empty());
+            return false;
+        }
+    };
+    let plan = Plan::new(&compiled, &options).expect("a checked scene can be planned");
     if !interruptible {
-        return;
+        return true;
     }
-    let mut shot = CpuBackend.open(Arc::new(plan)).expect("a planned shot opens");
+    let mut shot = Shot::open(compiled, Arc::new(plan));
     let deadline = Deadline(Instant::now() + Duration::from_secs(2));
     match shot.advance(number, &deadline).and_then(|()| shot.draw(&deadline)) {
         Err(RenderError::Cancelled(_)) => {}
         Err(error) => panic!("a checked scene cannot be drawn: {error}"),
         Ok(()) => check(&shot.read().expect("what was drawn can be read")),
     }
+    true
 }
 
 /// # Panics
@@ -125,7 +136,7 @@ fn check_plate(picture: Picture) {
         let mut assets = MemoryAssets::default();
         assets.insert_picture("plate", picture);
         let scene = "bansho = 1\n[picture]\nsize = [16, 9]\n[plate]\nimage = \"plate\"\n[[flame_sheet]]\n";
-        let scene = Scene::parse("plate.toml", scene, KINDS, &assets).expect("a scene with its plate is valid");
-        draw_small(scene, assets);
+        let scene = Scene::parse("plate.toml", scene, KINDS).expect("a scene is valid");
+        assert!(draw_small(scene, assets), "a scene with its plate is valid");
     }
 }

@@ -15,7 +15,7 @@ use bansho_base::{
     math::{self, DVec3},
     parameters::animated::Animated,
     phenomenon::{
-        Phenomenon,
+        Run,
         strip::{DepthInterval, Shutter, Strip, View},
         surroundings::Surroundings,
     },

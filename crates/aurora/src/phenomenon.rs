@@ -1,19 +1,21 @@
 //! The aurora as the renderer knows it.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
     color,
     geometry::point_cloud::PointCloud,
     host::{
         assets::Assets,
+        constructions,
         observer::{Cancelled, Observer},
         once::get_or_make,
     },
     math::{DVec3, random::Key},
     parameters::Parameter,
     phenomenon::{
-        Phenomenon, Prepared, Remark, SnapshotError, Stepping,
+        Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
+        kind::{BuildContext, BuildError, Describe},
         strip::{AovDescriptor, AovRule, DepthInterval, Shutter, View},
         surroundings::{Neighbours, Publication, Surroundings},
     },
@@ -49,13 +51,13 @@ const BRIGHT_PER_COLUMN: f64 = 0.75;
 /// How far a spectrum reaches beyond its energy, and rays beyond that, in nodes of the grid of energies: sixfold.
 const SPECTRUM_NODES: usize = 25;
 
-/// An aurora, ready to be stepped and drawn.
+/// An aurora, ready to be stepped and drawn. The one that is built stands at its beginning; runs are copies of it, which share what is fixed.
 #[derive(Clone, Debug)]
 pub struct Aurora {
     name: String,
     seed: u64,
     parameters: AuroraParameters,
-    sequence: Sequence,
+    sequence: Arc<Sequence>,
     /// Made when it is first stepped or drawn: there may be hundreds of auroras, each of which is made to be checked.
     working: OnceLock<Working>,
     /// Luminance of the brightest column of all shapes, cd/m^2.
@@ -70,10 +72,10 @@ pub struct Aurora {
 #[derive(Clone, Debug)]
 struct Working {
     simulation: AuroraSimulation,
-    profiles: Profiles,
-    red_profiles: Profiles,
-    shading: Shading,
-    collisions: Option<Collisions>,
+    profiles: Arc<Profiles>,
+    red_profiles: Arc<Profiles>,
+    shading: Arc<Shading>,
+    collisions: Option<Arc<Collisions>>,
 }
 
 /// Longest dissolve in a loop, s: by then particles have gone a long way along their sheets.
@@ -106,27 +108,14 @@ impl Aurora {
     /// # Errors
     /// Shapes that are no aurora's, flux or energy that do not end a loop as they begin it.
     pub fn new(
-        parameters: AuroraParameters,
+        mut parameters: AuroraParameters,
         name: &str,
         seed: u64,
         loop_s: Option<f64>,
         assets: &dyn Assets,
     ) -> Result<Self, ShapeFault> {
+        constructions::count("aurora");
         let sequence = Sequence::new(&parameters.shapes, &parameters.motion, parameters.extent_km, assets, loop_s)?;
-        Self::moving(parameters, sequence, name, seed, loop_s)
-    }
-
-    /// The same, of the sequence that its shapes and that loop make.
-    ///
-    /// # Errors
-    /// Flux or energy that do not end a loop as they begin it, energies beyond the tables.
-    pub fn moving(
-        mut parameters: AuroraParameters,
-        sequence: Sequence,
-        name: &str,
-        seed: u64,
-        loop_s: Option<f64>,
-    ) -> Result<Self, ShapeFault> {
         let dissolve = loop_s.map_or(Ok(0.0), |turn| close_loop(&mut parameters, turn))?;
         energy_range::check(&parameters)?;
         let crossing = sequence.crossing();
@@ -138,7 +127,7 @@ impl Aurora {
             brightest: brightest(&parameters, emission, &factors),
             working: OnceLock::new(),
             parameters,
-            sequence,
+            sequence: Arc::new(sequence),
             crossing,
             dissolve,
         })
@@ -158,10 +147,10 @@ impl Aurora {
         let key = Key::new(self.seed, &self.name);
         let collisions = || Collisions::new(emission, &parameters.drawing, hardest, key);
         Working {
-            collisions: by_collisions.then(collisions),
-            profiles: Profiles::new(emission),
-            red_profiles: Profiles::of_red_by_height(emission),
-            shading: Shading::new(&parameters.drawing.air),
+            collisions: by_collisions.then(|| Arc::new(collisions())),
+            profiles: Arc::new(Profiles::new(emission)),
+            red_profiles: Arc::new(Profiles::of_red_by_height(emission)),
+            shading: Arc::new(Shading::new(&parameters.drawing.air)),
             simulation,
         }
     }
@@ -193,7 +182,7 @@ impl Aurora {
 
     /// What single collisions are drawn from, where they are asked for.
     pub(super) fn collisions(&self) -> Option<&Collisions> {
-        self.working().collisions.as_ref()
+        self.working().collisions.as_deref()
     }
 
     /// The magnetic field about an observer at a place in m.
@@ -264,59 +253,66 @@ const AOVS: &[AovDescriptor] = &[
     MAPS[3],
 ];
 
-impl Phenomenon for Aurora {
-    fn name(&self) -> &str {
-        &self.name
-    }
+impl Describe for AuroraParameters {
+    const KEY: &'static str = "aurora";
+    const PLACEMENT_KEYS: &'static [&'static str] = &["shapes", "extent_km"];
+    const FIRST_KEYS: &'static [&'static str] = &[
+        "flux_mw_per_m2",
+        "energy_ev",
+        "dip_deg",
+        "time_lapse",
+        "particles.count",
+        "rays.contrast",
+        "folds.amplitude_km",
+    ];
+    const IN_THE_SKY: bool = true;
+    // From the ground toward the northern sky of a clear night. With the airglow of a quiet night the sky stays darker than the curtains.
+    const SETTING: &'static str = "\
+        picture = { exposure_ev100 = -6.9, white_balance_k = 4000.0 }\n\
+        camera = { position = [0.0, 1.7, 0.0], target = [0.0, 32.0, -57.0], vertical_fov_deg = 62.0 }\n\
+        sky = { kind = \"night\", hills_deg = 2.0, trees_deg = 1.1, night = { airglow = 0.3, stars = 0.6, milky_way = 0.5 } }\n";
 
-    fn aovs(&self) -> &'static [AovDescriptor] {
-        AOVS
+    fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
+        match Aurora::new(self.clone(), context.name, context.seed, context.loop_s, context.assets) {
+            Ok(aurora) => Ok(Arc::new(aurora)),
+            Err(fault) => Err(match fault.kind {
+                ShapeFaultKind::Asset(error) => BuildError { key: fault.key, kind: error.into() },
+                other => BuildError::new(fault.key, other),
+            }),
+        }
+    }
+}
+
+impl Phenomenon for Aurora {
+    fn info(&self) -> PhenomenonInfo<'_> {
+        let preroll = self.parameters.preroll_s;
+        let stepping = Stepping { step: AuroraSimulation::STEP_S, preroll, dissolve: self.dissolve };
+        PhenomenonInfo { aovs: AOVS, stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 
     fn luminance(&self) -> f64 {
         BRIGHT_PER_COLUMN * self.brightest
     }
 
-    fn stepping(&self) -> Option<Stepping> {
-        let preroll = self.parameters.preroll_s;
-        Some(Stepping { step: AuroraSimulation::STEP_S, preroll, dissolve: self.dissolve })
+    fn remark(&self, _neighbors: &Neighbours) -> Option<Remark> {
+        let shape = self.crossing?;
+        let message = format!(
+            "its sheets pass through each other on the way to shape {}; another shape between, `link`, or sheets in another order would keep \
+             them apart",
+            shape + 1
+        );
+        Some(Remark::at(format!("shapes.{shape}"), message))
     }
 
-    fn step(&mut self, _time: f64, _surroundings: &Surroundings) {
-        if let Some(simulation) = self.simulation_mut() {
-            simulation.step();
-        }
+    fn start(self: Arc<Self>) -> Box<dyn Run> {
+        self.working();
+        Box::new((*self).clone())
     }
+}
 
-    fn drawn_from(&self, shutter: Shutter) -> f64 {
-        if shutter::is_long(shutter) { shutter.open } else { shutter.middle() }
-    }
-
-    fn snapshot(&self) -> Vec<u8> {
-        self.simulation().snapshot()
-    }
-
-    fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError> {
-        self.simulation_mut().map_or(Err(SnapshotError::NoState), |simulation| simulation.restore(state))
-    }
-
-    fn particles(&self, t: f64) -> Option<PointCloud> {
-        let step = AuroraSimulation::STEP_S;
-        if t - self.simulation().time() <= step {
-            return Some(point_cloud(self.simulation().particles(), t - self.simulation().time()));
-        }
-        // In the midst of a long exposure.
-        let mut simulation = self.simulation().clone();
-        shutter::step_until(&mut simulation, t);
-        Some(point_cloud(simulation.particles(), t - simulation.time()))
-    }
-
+impl Run for Aurora {
     fn publish(&self, _shutter: Shutter) -> Publication {
         Publication { lights: self.lamp().into_iter().collect(), ..Publication::default() }
-    }
-
-    fn remark(&self, _neighbours: &Neighbours) -> Option<Remark> {
-        self.crossing.map(|shape| Remark::Crossing { shape: shape + 1 })
     }
 
     fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
@@ -330,5 +326,44 @@ impl Phenomenon for Aurora {
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         Ok(Box::new(PreparedAurora::new(self, view, observer)?))
+    }
+
+    fn export(&self, t: f64) -> Option<PointCloud> {
+        let step = AuroraSimulation::STEP_S;
+        if t - self.simulation().time() <= step {
+            return Some(point_cloud(self.simulation().particles(), t - self.simulation().time()));
+        }
+        // In the midst of a long exposure.
+        let mut simulation = self.simulation().clone();
+        shutter::step_until(&mut simulation, t);
+        Some(point_cloud(simulation.particles(), t - simulation.time()))
+    }
+
+    fn as_stepped(&self) -> Option<&dyn Stepped> {
+        Some(self)
+    }
+
+    fn as_stepped_mut(&mut self) -> Option<&mut dyn Stepped> {
+        Some(self)
+    }
+}
+
+impl Stepped for Aurora {
+    fn step(&mut self, _time: f64, _surroundings: &Surroundings) {
+        if let Some(simulation) = self.simulation_mut() {
+            simulation.step();
+        }
+    }
+
+    fn time_for(&self, shutter: Shutter) -> f64 {
+        if shutter::is_long(shutter) { shutter.open } else { shutter.middle() }
+    }
+
+    fn snapshot(&self) -> Vec<u8> {
+        self.simulation().snapshot()
+    }
+
+    fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError> {
+        self.simulation_mut().map_or(Err(SnapshotError::NoState), |simulation| simulation.restore(state))
     }
 }

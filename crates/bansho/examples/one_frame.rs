@@ -9,19 +9,19 @@ use std::{
 };
 
 use bansho::{
-    AlphaConvention, Backend, BitDepth, CpuBackend, MemoryAssets, Plan, PlanOptions, SceneBuilder, Unobserved, View,
+    AlphaConvention, BitDepth, CompiledScene, MemoryAssets, Plan, PlanOptions, SceneBuilder, Shot, Unobserved, View,
     base::image::DisplayPixels, fire::sheet::FlameSheetParameters, render::scene::PictureParameters,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
     let picture = PictureParameters { size: [72, 36], ..Default::default() };
     let flame = FlameSheetParameters { width: 1.4, ..Default::default() };
-    let assets = Arc::new(MemoryAssets::default());
-    let scene = SceneBuilder::new().picture(&picture).phenomenon("fire", &flame).build(assets.as_ref())?;
+    let scene = SceneBuilder::new().picture(&picture).phenomenon("fire", &flame).build()?;
 
-    let plan = Plan::new(scene, &PlanOptions::default(), assets)?;
-    let mut shot = CpuBackend.open(Arc::new(plan))?;
-    let frame = bansho::draw(shot.as_mut(), 30, &Unobserved)?;
+    let compiled = Arc::new(CompiledScene::build(Arc::new(scene), Arc::new(MemoryAssets::default()), None)?);
+    let plan = Plan::new(&compiled, &PlanOptions::default())?;
+    let mut shot = Shot::open(compiled, Arc::new(plan));
+    let frame = bansho::draw(&mut shot, 30, &Unobserved)?;
 
     let shown = bansho::display(&frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
     let DisplayPixels::Eight(pixels) = &shown.pixels else { return Ok(()) };

@@ -4,25 +4,25 @@ use std::fmt::Write;
 
 use bansho_base::{
     camera::CameraParameters,
-    host::assets::Assets,
     parameters::{Parameters, Table, Value},
     world::{air::Air, sky::SkyParameters, wind::WindParameters},
 };
 use bansho_render::{
     Scene, SceneError,
-    phenomena::KINDS,
-    scene::{Describe, FORMAT, LightParameters, ObstacleParameters, PictureParameters, PlateParameters},
+    scene::{FORMAT, LightParameters, ObstacleParameters, PictureParameters, PlateParameters},
 };
 
+use crate::KINDS;
+use bansho_base::phenomenon::kind::Describe;
 use bansho_environment::ground::GroundParameters;
 
 /// Gathers the tables of a scene. Values are checked when it is built, by the same rules as a scene file.
 ///
 /// ```
-/// use bansho::{MemoryAssets, SceneBuilder, render::scene::PictureParameters};
+/// use bansho::{SceneBuilder, render::scene::PictureParameters};
 ///
 /// let picture = PictureParameters { size: [64, 36], frames: 2, ..Default::default() };
-/// let scene = SceneBuilder::new().picture(&picture).build(&MemoryAssets::default())?;
+/// let scene = SceneBuilder::new().picture(&picture).build()?;
 /// assert_eq!(scene.picture.size, [64, 36]);
 /// # Ok::<(), bansho::SceneError>(())
 /// ```
@@ -102,8 +102,8 @@ impl SceneBuilder {
     ///
     /// # Errors
     /// What a scene file would be refused for; lines are those of [`to_toml`](Self::to_toml).
-    pub fn build(&self, assets: &dyn Assets) -> Result<Scene, SceneError> {
-        Scene::parse("scene", &self.text, KINDS, assets)
+    pub fn build(&self) -> Result<Scene, SceneError> {
+        Scene::parse("scene", &self.text, KINDS)
     }
 
     fn table(mut self, header: &str, name: Option<&str>, table: Table) -> Self {
@@ -120,7 +120,6 @@ impl SceneBuilder {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::host::assets::MemoryAssets;
     use bansho_render::scene::SHARED_TABLES;
 
     use super::*;
@@ -146,7 +145,7 @@ mod tests {
         for table in SHARED_TABLES {
             assert!(builder.to_toml().contains(&format!("[{}]", table.key)), "nothing states [{}]", table.key);
         }
-        let scene = builder.build(&MemoryAssets::default()).unwrap();
+        let scene = builder.build().unwrap();
         assert_eq!((scene.picture, scene.camera, scene.air), (picture, camera, air));
         assert_eq!((scene.wind, scene.plate), (WindParameters::default(), PlateParameters::default()));
         assert_eq!((scene.sky, scene.ground), (Some(SkyParameters::default()), Some(ground)));
@@ -157,7 +156,7 @@ mod tests {
     #[test]
     fn values_out_of_range_are_refused_as_in_a_file() {
         let picture = PictureParameters { size: [0, 200], ..Default::default() };
-        let error = SceneBuilder::new().picture(&picture).build(&MemoryAssets::default()).err().unwrap();
+        let error = SceneBuilder::new().picture(&picture).build().err().unwrap();
         assert!(error.to_string().contains("picture.size"), "{error}");
     }
 }

@@ -1,17 +1,18 @@
 //! Flames, rain and aurora for pictures, as a library.
 //!
-//! A scene is three lines of TOML or a [`SceneBuilder`]; a [`Plan`] fixes the shot; a [`Backend`] opens it; the [`Shot`]
-//! draws frames to memory. Nothing here prints, reads a clock, or keeps threads of its own: work runs in the caller's
-//! rayon pool and reports to the caller's [`Observer`].
+//! A scene is three lines of TOML or a [`SceneBuilder`]; a [`CompiledScene`] builds all that it shows, once; a [`Plan`] fixes the shot; the
+//! [`Shot`] draws frames to memory. Nothing here prints, reads a clock, or keeps threads of its own: work runs in the caller's rayon pool and
+//! reports to the caller's [`Observer`].
 //!
 //! ```
 //! use std::sync::Arc;
-//! use bansho::{Backend, CpuBackend, MemoryAssets, Plan, PlanOptions, Unobserved, parse_scene};
+//! use bansho::{MemoryAssets, Plan, PlanOptions, Shot, Unobserved, compile_scene};
 //!
-//! let scene = parse_scene("fire", "bansho = 1\n[picture]\nsize = [64, 36]\n", &MemoryAssets::default())?;
-//! let plan = Plan::new(scene, &PlanOptions::default(), Arc::new(MemoryAssets::default()))?;
-//! let mut shot = CpuBackend.open(Arc::new(plan))?;
-//! let frame = bansho::draw(shot.as_mut(), 0, &Unobserved)?;
+//! let text = "bansho = 1\n[picture]\nsize = [64, 36]\n";
+//! let compiled = compile_scene("fire", text, Arc::new(MemoryAssets::default()))?;
+//! let plan = Plan::new(&compiled, &PlanOptions::default())?;
+//! let mut shot = Shot::open(compiled, Arc::new(plan));
+//! let frame = bansho::draw(&mut shot, 0, &Unobserved)?;
 //! assert_eq!((frame.beauty.width(), frame.beauty.height()), (64, 36));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -19,9 +20,12 @@
 //! With the feature `files` (on by default) there is also `job`: from a scene file to pictures on disk, as the program
 //! `bansho render` does it.
 
+use std::sync::Arc;
+
 mod build;
 #[cfg(feature = "files")]
 pub mod job;
+mod kinds;
 
 pub use bansho_aurora as aurora;
 pub use bansho_base as base;
@@ -42,25 +46,36 @@ pub use bansho_base::{
     image::{DisplayImage, Frame, Image, Rect},
 };
 pub use bansho_render::{
-    Backend, CpuBackend, Plan, PlanError, PlanOptions, RenderError, Scene, SceneError, Shot,
+    BuildErrors, CompiledScene, LoopError, Plan, PlanError, PlanOptions, RenderError, Scene, SceneError, SceneOptions,
+    Shot,
     display::{BitDepth, display},
-    phenomena::KINDS,
 };
 pub use build::SceneBuilder;
+pub use kinds::KINDS;
 
-/// Reads and checks a scene of every kind of phenomenon this version knows; `file` is what errors call it.
+/// Reads and checks a scene of every kind of phenomenon this version knows; `file` is what errors call it. [`CompiledScene::build`] then reads
+/// what it names and builds what it shows.
+///
+/// # Errors
+/// Every fault of the text, with its place, what is wrong and what is allowed.
+pub fn parse_scene(file: &str, text: &str) -> Result<Scene, SceneError> {
+    Scene::parse(file, text, KINDS)
+}
+
+/// Reads a scene and builds all that it shows.
 ///
 /// # Errors
 /// Every fault of the text and of the assets it names, with its place, what is wrong and what is allowed.
-pub fn parse_scene(file: &str, text: &str, assets: &dyn Assets) -> Result<Scene, SceneError> {
-    Scene::parse(file, text, KINDS, assets)
+pub fn compile_scene(file: &str, text: &str, assets: Arc<dyn Assets>) -> Result<Arc<CompiledScene>, SceneError> {
+    let scene = Arc::new(parse_scene(file, text)?);
+    CompiledScene::build(scene, assets, None).map(Arc::new).map_err(|errors| errors.located(file, text))
 }
 
 /// Advances `shot` to frame `number` and draws it.
 ///
 /// # Errors
 /// The observer asked to stop, or a picture that the scene names cannot be had.
-pub fn draw(shot: &mut dyn Shot, number: i64, observer: &dyn Observer) -> Result<Frame, RenderError> {
+pub fn draw(shot: &mut Shot, number: i64, observer: &dyn Observer) -> Result<Frame, RenderError> {
     shot.advance(number, observer)?;
     shot.draw(observer)?;
     Ok(shot.read().ok_or(Cancelled)?)

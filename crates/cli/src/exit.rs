@@ -16,8 +16,6 @@ const FAILED: u8 = 1;
 const USAGE: u8 = 2;
 /// The scene is faulty.
 const SCENE: u8 = 3;
-/// There is no usable GPU.
-const GPU: u8 = 4;
 
 /// An error that has been told already; only its exit code is left.
 #[derive(Debug, thiserror::Error)]
@@ -30,7 +28,6 @@ pub(crate) fn code(error: &anyhow::Error) -> u8 {
     match error.downcast_ref::<JobError>().or_else(told).map(JobError::cause) {
         Some(Cause::Usage) => USAGE,
         Some(Cause::Scene) => SCENE,
-        Some(Cause::Gpu) => GPU,
         Some(Cause::Cancelled) => interrupt::exit_code(),
         None if error.is::<Unknown>() => USAGE,
         Some(Cause::Work) | None => FAILED,

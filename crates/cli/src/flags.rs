@@ -15,7 +15,6 @@ use bansho::{
 /// An error as the user of the program reads it.
 pub(crate) fn error(error: &JobError) -> String {
     match error {
-        JobError::NoGpu => format!("{error}; allowed: --backend cpu, auto"),
         JobError::Unreadable { path, source: InputError::Io(source), near: None }
             if source.kind() == io::ErrorKind::NotFound =>
         {

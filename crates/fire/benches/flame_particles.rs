@@ -8,7 +8,7 @@ use std::hint::black_box;
 use bansho_base::{
     host::assets::MemoryAssets,
     parameters::{Auto, animated::Animated},
-    phenomenon::{Phenomenon, surroundings::Surroundings},
+    phenomenon::{Stepped, surroundings::Surroundings},
     world::{
         air::Air,
         wind::{Wind, WindParameters},

@@ -9,7 +9,7 @@ use bansho_base::{
     math,
     parameters::{Auto, animated::Animated},
     phenomenon::{
-        Phenomenon,
+        Run,
         strip::{DepthInterval, Shutter, Strip, View},
         surroundings::Surroundings,
     },

@@ -157,13 +157,13 @@ impl Burning {
         let flame = FlameParticles::new(parameters, "bench", 1, None, &MemoryAssets::default()).ok()?;
         let wind = Wind::new(WindParameters { velocity: [0.5, 0.0, 0.0].into(), ..Default::default() }, 1, None);
         let mut burning = Self { flame, wind, steps: 0 };
-        let preroll = burning.flame.stepping()?.preroll_steps();
+        let preroll = burning.flame.info().stepping?.preroll_steps();
         (0..preroll).for_each(|_| burning.step());
         Some(burning)
     }
 
     fn step(&mut self) {
-        let Some(stepping) = self.flame.stepping() else { return };
+        let Some(stepping) = self.flame.info().stepping else { return };
         self.flame.step(stepping.time_after(self.steps), &Surroundings::of_wind(&self.wind));
         self.steps += 1;
     }

@@ -13,7 +13,7 @@ use bansho_base::{
     },
     parameters::animated::Animated,
     phenomenon::{
-        Phenomenon,
+        Run,
         strip::{DepthInterval, Shutter, Strip, View},
         surroundings::{Emitter, Light, Publication, Surroundings},
     },

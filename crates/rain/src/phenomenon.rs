@@ -1,14 +1,21 @@
 //! Rain as a phenomenon of a scene.
 
-use std::{ops::RangeInclusive, sync::LazyLock};
+use std::{
+    ops::RangeInclusive,
+    sync::{Arc, LazyLock},
+};
 
 use bansho_base::{
-    host::observer::{Cancelled, Observer, check},
+    host::{
+        constructions,
+        observer::{Cancelled, Observer, check},
+    },
     math::random::Key,
     parameters::parameter_fault::{FaultKind, ParameterFault},
     phenomenon::{
-        Phenomenon, Prepared, Remark,
-        strip::{AovDescriptor, DepthInterval, Shutter, View},
+        Phenomenon, PhenomenonInfo, Prepared, Remark, Run,
+        kind::{BuildContext, BuildError, Describe},
+        strip::{DepthInterval, Shutter, View},
         surroundings::{Emitter, Light, Neighbours, Publication, Surroundings},
     },
     world::wind::Wind,
@@ -81,6 +88,7 @@ impl Rain {
             let kind = FaultKind::NotAscending { value: pair[0], next: pair[1] };
             return Err(ParameterFault { key: "diameters_mm", kind });
         }
+        constructions::count("rain");
         let fall = Fall { law: parameters.velocity, air: Air::default() };
         let [_, heaviest] = parameters.rate_mm_per_h.bounds();
         let sizes = DropSizes::marshall_palmer(heaviest);
@@ -149,13 +157,31 @@ impl Rain {
     }
 }
 
-impl Phenomenon for Rain {
-    fn name(&self) -> &str {
-        &self.name
-    }
+impl Describe for RainParameters {
+    const KEY: &'static str = "rain";
+    const FIRST_KEYS: &'static [&'static str] = &["rate_mm_per_h", "distance", "veil_distance", "splashes.amount"];
+    // Lamps at dusk along a wet street: drops only show the light of others.
+    const SETTING: &'static str = "\
+        camera = { position = [0.4, 1.3, 4.2], target = [0.0, 1.25, 0.0], vertical_fov_deg = 34.0 }\n\
+        sky = { luminance = 0.12, temperature_k = 10000.0 }\n\
+        ground = { wetness = 0.9, puddles = 0.4 }\n\
+        light = [\
+        { visible = true, position = [-1.3, 2.3, -1.5], intensity = 120.0, colour = [1.0, 0.68, 0.36] }, \
+        { visible = true, position = [2.4, 2.3, -9.0], intensity = 120.0, colour = [1.0, 0.68, 0.36] }, \
+        { visible = true, position = [-4.6, 2.3, -17.0], intensity = 120.0, colour = [1.0, 0.68, 0.36] }]\n";
 
-    fn aovs(&self) -> &'static [AovDescriptor] {
-        AOVS
+    fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
+        match Rain::new(self.clone(), context.name, context.seed, context.loop_s) {
+            Ok(rain) => Ok(Arc::new(rain)),
+            Err(fault) => Err(BuildError::new(fault.key, fault.kind)),
+        }
+    }
+}
+
+impl Phenomenon for Rain {
+    fn info(&self) -> PhenomenonInfo<'_> {
+        let strengthened_by = "raise `rate_mm_per_h` or `opacity_gain`, add a [[light]] of more candela";
+        PhenomenonInfo { aovs: AOVS, strengthened_by, ..PhenomenonInfo::new(&self.name) }
     }
 
     /// Rain sends no light of its own.
@@ -163,18 +189,21 @@ impl Phenomenon for Rain {
         0.0
     }
 
+    fn remark(&self, neighbors: &Neighbours) -> Option<Remark> {
+        let dark = |light: &Light| light.intensity.iter().all(|value| *value <= 0.0);
+        let unlit = neighbors.sky.is_dark() && neighbors.lights().all(dark);
+        let message = "nothing lights it, so it is drawn black; a [[light]], a [sky] or a fire would";
+        unlit.then(|| Remark { unless_lit_later: true, ..Remark::new(message) })
+    }
+
+    fn start(self: Arc<Self>) -> Box<dyn Run> {
+        Box::new(self)
+    }
+}
+
+impl Run for Rain {
     fn publish(&self, shutter: Shutter) -> Publication {
         Publication { extinction: self.extinctions(shutter.middle())[0], ..Publication::default() }
-    }
-
-    fn remark(&self, neighbours: &Neighbours) -> Option<Remark> {
-        let dark = |light: &Light| light.intensity.iter().all(|value| *value <= 0.0);
-        let unlit = neighbours.sky.is_dark() && neighbours.lights().all(dark);
-        unlit.then_some(Remark::Unlit)
-    }
-
-    fn strengthened_by(&self) -> &'static str {
-        "raise `rate_mm_per_h` or `opacity_gain`, add a [[light]] of more candela"
     }
 
     /// Rain fills all depths; it is cut where lights stand, so that a fire has streaks before, within and behind it.

@@ -8,6 +8,7 @@ use bansho_base::{
 };
 
 use crate::{
+    compiled::CompiledScene,
     plan::Plan,
     scene::{LightParameters, Scene},
 };
@@ -37,13 +38,30 @@ const IN_AIR: [f64; 3] = [1.0, 2.0, 4.0];
 /// How much of the light on drops and smoke the air between them lets a line of sight show.
 const AIR_SHARE: f64 = 0.1;
 
+/// The exposure of a shot: the scene's own, or measured.
+pub(crate) fn measure(compiled: &CompiledScene, plan: &Plan) -> f32 {
+    match plan.scene.picture.exposure_ev100 {
+        Auto::Set(ev100) => ev100 as f32,
+        Auto::Auto => of_plate(compiled).unwrap_or_else(|| {
+            let brightest = compiled.phenomena().map(|phenomenon| phenomenon.luminance()).fold(0.0, f64::max);
+            automatic(plan, brightest)
+        }) as f32,
+    }
+}
+
+/// The exposure value of a plate that neither the scene nor the picture states, and the shot therefore assumes.
+pub(crate) fn assumed_of_plate(compiled: &CompiledScene, plan: &Plan) -> Option<f64> {
+    let is_open = plan.scene.has_plate() && plan.scene.picture.exposure_ev100 == Auto::Auto;
+    (is_open && of_plate(compiled).is_none()).then(|| f64::from(plan.exposure_ev100))
+}
+
 /// Exposure value at ISO 100 with which the plate was taken, as far as the scene or the picture says so.
-pub(crate) fn of_plate(plan: &Plan) -> Option<f64> {
-    let plate = &plan.scene().plate;
+fn of_plate(compiled: &CompiledScene) -> Option<f64> {
+    let plate = &compiled.scene().plate;
     let path = plate.image.as_ref()?;
     match plate.exposure_ev100 {
         Auto::Set(ev100) => Some(ev100),
-        Auto::Auto => plan.assets.picture(&path.0, plan.scene().picture.first_frame).ok()?.exposure_ev100,
+        Auto::Auto => compiled.assets().picture(&path.0, compiled.scene().picture.first_frame).ok()?.exposure_ev100,
     }
 }
 
@@ -51,7 +69,7 @@ pub(crate) fn of_plate(plan: &Plan) -> Option<f64> {
 ///
 /// Over a plate of unknown exposure it is that of the plate as one may guess it: the one at which what shines is shown well, a `[sky]` is
 /// nearly white, and otherwise that of an overcast day.
-pub(crate) fn automatic(plan: &Plan, brightest: f64) -> f64 {
+fn automatic(plan: &Plan, brightest: f64) -> f64 {
     let scene = plan.scene();
     let (other, usual) = if scene.has_plate() {
         (stated_sky(scene) / SKY_SHARE, OVERCAST_EV100)

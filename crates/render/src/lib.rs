@@ -1,18 +1,22 @@
-//! From a scene file to frames: the scene, the plan of a shot, slices of depth, compositing, and the CPU backend.
+//! From a scene file to frames: the scene, what is compiled of it, the plan of a shot, and the shot itself.
 
-pub mod backend;
-mod cpu;
+pub mod compiled;
+mod composite;
+mod context;
+mod crossfade;
 pub mod display;
-mod dissolving;
 mod exposure;
+mod faint;
 pub mod fingerprint;
 pub mod frames;
-pub mod phenomena;
+mod loop_start;
 pub mod plan;
+pub mod remarks;
 pub mod scene;
-pub mod slices;
+pub mod shot;
 
-pub use backend::{Backend, RenderError, Shot};
-pub use cpu::CpuBackend;
+pub use compiled::{BuildErrors, CompiledScene};
+pub use composite::slices;
 pub use plan::{Plan, PlanError, PlanOptions};
-pub use scene::{Scene, SceneError};
+pub use scene::{LoopError, Scene, SceneError, SceneOptions};
+pub use shot::{RenderError, Shot};

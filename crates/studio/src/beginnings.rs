@@ -84,7 +84,10 @@ name = \"aurora\"
 mod tests {
     use std::sync::Arc;
 
-    use bansho::{Assets, Backend, CpuBackend, MemoryAssets, Plan, PlanOptions, Unobserved, base::color, parse_scene};
+    use bansho::{
+        Assets, CompiledScene, MemoryAssets, Plan, PlanOptions, SceneOptions, Shot, Unobserved, base::color,
+        parse_scene,
+    };
 
     use super::*;
 
@@ -93,11 +96,11 @@ mod tests {
         for (name, text) in BEGINNINGS {
             let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
             let quick = text.replace("[[aurora]]", "[[aurora]]\nparticles = { count = 2000 }");
-            let scene = parse_scene(name, &quick, assets.as_ref()).unwrap();
-            let plan =
-                Plan::new(scene, &PlanOptions { size: Some([96, 54]), ..PlanOptions::default() }, assets).unwrap();
-            let mut shot = CpuBackend.open(Arc::new(plan)).unwrap();
-            let frame = bansho::draw(shot.as_mut(), 3, &Unobserved).unwrap();
+            let scene = Arc::new(parse_scene(name, &quick).unwrap().adapted(&SceneOptions::default()).unwrap());
+            let compiled = Arc::new(CompiledScene::build(scene, assets, None).unwrap());
+            let plan = Plan::new(&compiled, &PlanOptions { size: Some([96, 54]), ..PlanOptions::default() }).unwrap();
+            let mut shot = Shot::open(compiled, Arc::new(plan));
+            let frame = bansho::draw(&mut shot, 3, &Unobserved).unwrap();
             let brightest = frame.beauty.pixels().iter().map(|[r, g, b, _]| color::luminance([*r, *g, *b]));
             let brightest = brightest.fold(0.0, f32::max);
             assert_eq!(brightest > 0.3, name != "Nothing", "{name}: {brightest}");

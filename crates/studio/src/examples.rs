@@ -196,7 +196,7 @@ mod tests {
         assert_eq!(names, SCENES.iter().map(|(name, _)| *name).collect::<Vec<_>>());
         let assets: Arc<dyn Assets> = Arc::new(Bundle::default());
         for (name, text) in SCENES {
-            let scene = bansho::parse_scene(name, text, assets.as_ref());
+            let scene = bansho::compile_scene(name, text, assets.clone());
             assert!(scene.is_ok(), "{name}: {:?}", scene.err());
         }
         let (name, text) = SCENES.iter().find(|(name, _)| *name == "inagaki_haze.toml").unwrap();

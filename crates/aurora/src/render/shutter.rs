@@ -52,7 +52,7 @@ impl Aurora {
 
     /// The mean of the states that come while the shutter is open.
     ///
-    /// They begin with that of [`Phenomenon::drawn_from`](bansho_base::phenomenon::Phenomenon::drawn_from); in a loop, where two runs
+    /// They begin with that of [`Run, Stepped::drawn_from`](bansho_base::phenomenon::Phenomenon::drawn_from); in a loop, where two runs
     /// are drawn at the time of the shutter's middle, with that one.
     fn long_exposure(&self, view: &View, field: &FieldLines) -> Sources {
         let mut simulation = self.simulation().clone();
@@ -90,7 +90,7 @@ mod tests {
         host::{assets::MemoryAssets, observer::Unobserved},
         image::Rect,
         phenomenon::{
-            Phenomenon,
+            Run, Stepped,
             strip::{DepthInterval, Strip},
             surroundings::Surroundings,
         },
@@ -118,7 +118,7 @@ mod tests {
         camera.look_up();
         let wind = Wind::new(WindParameters::default(), 1, None);
         let surroundings = Surroundings::of_wind(&wind);
-        let from = aurora.drawn_from(shutter);
+        let from = aurora.time_for(shutter);
         step_until(aurora.simulation_mut().unwrap(), from);
         let view = View::new(camera, shutter, 0.0, SIZE, 0);
         let prepared = aurora.prepare(&view, &surroundings, &Unobserved).unwrap();
@@ -154,7 +154,7 @@ mod tests {
         step_until(aurora.simulation_mut().unwrap(), 0.0);
         let early = aurora.clone();
         step_until(aurora.simulation_mut().unwrap(), 1.0);
-        assert_eq!(early.particles(1.0), aurora.particles(1.0));
-        assert_ne!(early.particles(0.0), aurora.particles(1.0));
+        assert_eq!(early.export(1.0), aurora.export(1.0));
+        assert_ne!(early.export(0.0), aurora.export(1.0));
     }
 }

@@ -1,5 +1,7 @@
 //! The simulation: what it is made of and what a step does.
 
+use std::sync::Arc;
+
 use bansho_base::{
     math::{DVec2, random::Key},
     phenomenon::SnapshotError,
@@ -53,7 +55,7 @@ pub struct AuroraSimulation {
 struct Making {
     key: Key,
     parameters: AuroraParameters,
-    sequence: Sequence,
+    sequence: Arc<Sequence>,
     folding: Folding,
     fields: FieldMaker,
 }
@@ -133,7 +135,8 @@ impl AuroraSimulation {
 
     /// The aurora `name` at the beginning of its preroll: particles evenly about the first shape, at rest.
     #[must_use]
-    pub fn new(parameters: AuroraParameters, sequence: Sequence, name: &str, seed: u64) -> Self {
+    pub fn new(parameters: AuroraParameters, sequence: impl Into<Arc<Sequence>>, name: &str, seed: u64) -> Self {
+        let sequence = sequence.into();
         let key = Key::new(seed, name);
         let time = -parameters.preroll_s;
         let along = Along::begin(&sequence.at(time), &sequence.listing(time));

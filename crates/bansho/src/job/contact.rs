@@ -11,7 +11,7 @@ use bansho_media::{
     label,
     sequence::{Picture, Slot},
 };
-use bansho_render::fingerprint;
+use bansho_render::{Shot, fingerprint};
 
 use super::{error::JobError, observer::JobObserver, prepare::PreparedJob, sheet::Gather, shoot::shoot};
 
@@ -42,7 +42,8 @@ pub(super) fn run(job: &PreparedJob, sheet: &Sheet, observer: &dyn JobObserver) 
         numbered(job.format.show(frame, observer), frame.header.number)
     };
     let gather = Gather::new(sheet.count, observer, show);
-    shoot(&job.plan, job.backend.as_ref(), &job.frames, &job.snapshots, &gather, observer)?;
+    let mut shot = Shot::open(job.compiled.clone(), job.plan.clone());
+    shoot(&mut shot, &job.frames, &job.snapshots, &gather, observer)?;
     let _stage = StageGuard::begin(observer, Stage::Write);
     let picture = tile_display(&gather.into_tiles(), sheet.columns, sheet.gutter, FILL)?;
     sink.write(Slot { index: 0, number: job.frames[0] }, Picture::Display(&picture, &own_fingerprint(job)))?;
@@ -76,7 +77,7 @@ fn numbered(mut tile: DisplayImage, number: i64) -> DisplayImage {
 fn own_fingerprint(job: &PreparedJob) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     for &number in &job.frames {
-        hasher.update(&fingerprint::of_frame(&job.plan, number));
+        hasher.update(&fingerprint::of_frame(&job.compiled, &job.plan, number));
     }
     hasher.update(job.contact_background.name().as_bytes());
     job.format.fingerprint(*hasher.update(b"contact sheet").finalize().as_bytes())

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bansho_base::host::{observer::Cancelled, plural::counted};
 use bansho_media::{MediaError, flipbook::TileError, input::InputError, naming::NamingError};
-use bansho_render::{PlanError, RenderError, SceneError, scene::edit::EditError};
+use bansho_render::{LoopError, PlanError, RenderError, SceneError, scene::edit::EditError};
 
 use super::{ranges::ranges, streaks::StreaksFault};
 
@@ -47,12 +47,12 @@ pub enum JobError {
     /// What was asked for does not fit the scene.
     #[error(transparent)]
     Plan(#[from] PlanError),
+    /// The scene is no loop of the length that was asked for.
+    #[error(transparent)]
+    Loop(#[from] LoopError),
     /// Options that do not go together.
     #[error(transparent)]
     Conflict(#[from] Conflict),
-    /// A GPU was asked for.
-    #[error("there is no usable GPU: this build of Bansho draws on the processor only")]
-    NoGpu,
     /// The name of the output cannot be used.
     #[error(transparent)]
     Naming(#[from] NamingError),
@@ -270,7 +270,6 @@ impl From<RenderError> for JobError {
     fn from(error: RenderError) -> Self {
         match error {
             RenderError::Cancelled(Cancelled) => Self::Cancelled,
-            RenderError::Plan(error) => Self::Plan(error),
             other => Self::Render(other),
         }
     }
@@ -283,8 +282,6 @@ pub enum Cause {
     Usage,
     /// The scene, or an asset that it names.
     Scene,
-    /// There is no usable GPU.
-    Gpu,
     /// The work failed on the way.
     Work,
     /// The observer asked to stop.
@@ -301,11 +298,14 @@ impl JobError {
     pub fn cause(&self) -> Cause {
         match self {
             Self::Unreadable { .. } | Self::NotUtf8 { .. } | Self::Scene(_) => Cause::Scene,
-            Self::Plan(PlanError::Opening { .. }) => Cause::Scene,
-            Self::Edit { .. } | Self::SetScene(_) | Self::Plan(_) | Self::Conflict(_) | Self::Naming(_) => Cause::Usage,
+            Self::Edit { .. }
+            | Self::SetScene(_)
+            | Self::Plan(_)
+            | Self::Loop(_)
+            | Self::Conflict(_)
+            | Self::Naming(_) => Cause::Usage,
             Self::Render(RenderError::Plate(_)) => Cause::Scene,
             Self::Streaks(_) => Cause::Usage,
-            Self::NoGpu => Cause::Gpu,
             Self::Cancelled | Self::WholeCancelled { .. } => Cause::Cancelled,
             Self::ParticlesCancelled | Self::StreaksCancelled => Cause::Cancelled,
             Self::Media(MediaError::Naming(_)) => Cause::Usage,

@@ -1,7 +1,7 @@
 //! Whether there is memory for the pictures of a job, found out before anything is drawn.
 
 use bansho_base::{host::memory, parameters::ProblemKind};
-use bansho_render::{Plan, RenderError, display::BitDepth};
+use bansho_render::{CompiledScene, Plan, display::BitDepth};
 
 use super::{
     error::{Conflict, JobError},
@@ -15,7 +15,7 @@ const FRAME_BYTES: f64 = 20.0;
 
 /// What a job asks of memory, beside its plan.
 #[derive(Clone, Copy)]
-pub(super) struct Wanted {
+pub(super) struct MemoryRequest {
     /// How many frames.
     pub(super) frames: usize,
     /// How many of them are kept for a sheet.
@@ -35,26 +35,26 @@ struct Need {
 }
 
 impl Need {
-    fn new(plan: &Plan, wanted: Wanted) -> Result<(Self, usize), JobError> {
-        let phenomena = plan.open().map_err(RenderError::from)?;
+    fn new(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest) -> (Self, usize) {
+        let infos: Vec<_> = compiled.phenomena().map(|phenomenon| phenomenon.info()).collect();
         let scene = plan.scene();
-        let layers = if plan.layers { 4 * (phenomena.len() + usize::from(scene.has_plate())) } else { 0 };
-        let aovs: usize = phenomena.iter().filter(|_| plan.aovs).map(|each| each.aovs().len()).sum();
+        let layers = if plan.layers { 4 * (infos.len() + usize::from(scene.has_plate())) } else { 0 };
+        let aovs: usize = infos.iter().filter(|_| plan.aovs).map(|info| info.aovs.len()).sum();
         let channels = layers + aovs;
         let frame = FRAME_BYTES + 4.0 * channels as f64;
         // A display picture, the samples of the file and the file itself; an EXR holds half colours and single channels.
-        let written = match wanted.display {
+        let written = match request.display {
             Some(BitDepth::Eight) => 3.0 * 4.0,
             Some(BitDepth::Sixteen) => 3.0 * 8.0,
             None => 12.0 + 3.0 * channels as f64,
         };
         // Two are being written while a third is drawn; a sheet keeps the pixels of each, and is laid out and encoded as a whole.
-        let (drawn, encoded) = (wanted.frames.min(3) as f64, wanted.frames.min(2).max(wanted.tiles) as f64);
+        let (drawn, encoded) = (request.frames.min(3) as f64, request.frames.min(2).max(request.tiles) as f64);
         let drawn = drawn * frame + encoded * written;
         let plate = if scene.has_plate() { FRAME_BYTES } else { 0.0 };
         // What a mirror shows, what of it is blurred, and the plate in it.
-        let mirror = if phenomena.iter().any(|each| each.mirror().is_some()) { 2.0 * FRAME_BYTES + plate } else { 0.0 };
-        Ok((Self { drawn, whole: plate + mirror }, channels))
+        let mirror = if infos.iter().any(|info| info.mirror.is_some()) { 2.0 * FRAME_BYTES + plate } else { 0.0 };
+        (Self { drawn, whole: plate + mirror }, channels)
     }
 
     fn bytes(&self, drawn: f64, whole: f64) -> f64 {
@@ -66,17 +66,22 @@ impl Need {
 ///
 /// # Errors
 /// It would not, with the size that it would give it for: at its place in the scene, or as what was asked for.
-pub(super) fn check(scene: &SceneFile, plan: &Plan, wanted: Wanted) -> Result<(), JobError> {
-    let (window, size, overscan) = (plan.window(), plan.size(), plan.scene().picture.overscan);
+pub(super) fn check(
+    scene: &SceneFile,
+    compiled: &CompiledScene,
+    plan: &Plan,
+    request: MemoryRequest,
+) -> Result<(), JobError> {
+    let (window, size, overscan) = (plan.window(), plan.size(), plan.overscan() as i64);
     let pixels = |[width, height]: [usize; 2], overscan: i64| {
         (width as f64 + 2.0 * overscan as f64) * (height as f64 + 2.0 * overscan as f64)
     };
     let drawn = pixels([window.width, window.height], 0);
     let whole = pixels(size, overscan);
-    if drawn.max(whole) * (wanted.tiles.max(1) as f64) < FEW_PIXELS {
+    if drawn.max(whole) * (request.tiles.max(1) as f64) < FEW_PIXELS {
         return Ok(());
     }
-    let (need, channels) = Need::new(plan, wanted)?;
+    let (need, channels) = Need::new(compiled, plan, request);
     let bytes = need.bytes(drawn, whole);
     if memory::is_granted(bytes) {
         return Ok(());
@@ -97,7 +102,7 @@ pub(super) fn check(scene: &SceneFile, plan: &Plan, wanted: Wanted) -> Result<()
     let share = memory::most(1000, |share| memory::is_granted(0.001 * share as f64 * bytes));
     let most = [window.width, window.height].map(|side| (side as f64 * (0.001 * share as f64).sqrt()).floor() as usize);
     let conflict = Conflict::Memory { size: [window.width, window.height], channels, would, most };
-    if wanted.own_size || channels > 0 {
+    if request.own_size || channels > 0 {
         return Err(conflict.into());
     }
     Err(scene.fault("picture.size", ProblemKind::Conflict(conflict.to_string())))

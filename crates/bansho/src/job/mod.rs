@@ -48,18 +48,6 @@ pub use scene_file::{SCENE_BYTES, SceneFile};
 pub use simulate::{PreparedSimulation, Simulate};
 pub use streaks::{ListKind, PreparedStreaks, StreakFormat, Streaks, StreaksFault};
 
-bansho_base::choice! {
-    /// What draws.
-    pub enum BackendChoice {
-        /// The best there is: in this version the processor.
-        Auto = "auto",
-        /// The processor; its pictures are the ones that all others are compared with.
-        Cpu = "cpu",
-        /// A graphics processor; this version has none.
-        Gpu = "gpu",
-    }
-}
-
 /// What is to be drawn, and where it goes. Begin with [`Job::new`], which takes everything from the scene.
 #[derive(Clone, Debug)]
 pub struct Job {
@@ -103,8 +91,6 @@ pub struct Job {
     pub snapshots: Option<PathBuf>,
     /// Frames between snapshots; a second's worth when left out.
     pub snapshot_every: Option<u64>,
-    /// What draws.
-    pub backend: BackendChoice,
 }
 
 impl Job {
@@ -131,7 +117,6 @@ impl Job {
             overwrite: false,
             snapshots: None,
             snapshot_every: None,
-            backend: BackendChoice::Auto,
         }
     }
 }

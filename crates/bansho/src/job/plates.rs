@@ -1,7 +1,7 @@
 //! Whether the plate of every frame is there, found out before anything is drawn.
 
 use bansho_base::{host::assets::AssetError, parameters::ProblemKind};
-use bansho_render::{Plan, RenderError};
+use bansho_render::{CompiledScene, RenderError};
 
 use super::{error::JobError, scene_file::SceneFile};
 
@@ -9,13 +9,13 @@ use super::{error::JobError, scene_file::SceneFile};
 ///
 /// # Errors
 /// The first that is missing, at its place in the scene.
-pub(super) fn check(scene: &SceneFile, plan: &Plan, numbers: &[i64]) -> Result<(), JobError> {
-    let plate = &plan.scene().plate;
+pub(super) fn check(scene: &SceneFile, compiled: &CompiledScene, numbers: &[i64]) -> Result<(), JobError> {
+    let plate = &compiled.scene().plate;
     for (key, path) in [("plate.image", &plate.image), ("plate.depth", &plate.depth)] {
         let Some(path) = path.as_ref().filter(|path| path.0.contains('#')) else { continue };
-        let missing = |&&number: &&i64| plan.assets.find(&path.0, number).is_err();
+        let missing = |&&number: &&i64| compiled.assets().find(&path.0, number).is_err();
         let Some(first) = numbers.iter().find(missing) else { continue };
-        let Err(error) = plan.assets.find(&path.0, *first) else { continue };
+        let Err(error) = compiled.assets().find(&path.0, *first) else { continue };
         let count = numbers.iter().filter(missing).count();
         return Err(scene.fault(key, ProblemKind::Conflict(told(&error, *first, count, numbers.len()))));
     }

@@ -16,27 +16,27 @@ use bansho_media::{
     overwriting::OverwritePolicy,
     plates::FileAssets,
 };
-use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth, scene::Positions};
+use bansho_render::{CompiledScene, Plan, PlanOptions, SceneOptions, display::BitDepth, scene::Positions};
 
 use super::{
-    BackendChoice, Job,
+    Job,
     contact::{self, ContactBackground},
     error::{Channels, Conflict, JobError, SheetKind},
     figures, inputs,
-    memory::{self, Wanted},
+    memory::{self, MemoryRequest},
     observer::{Note, Spot},
     output::{self, Format},
     overwriting, plates,
     scene_file::SceneFile,
     sheet::{self, MOST_TILES},
-    snapshots::{self, Snapshots},
+    snapshots::Snapshots,
 };
 
 /// A job that can be carried out, as far as can be known without doing so.
 pub struct PreparedJob {
     pub(super) scene: SceneFile,
+    pub(super) compiled: Arc<CompiledScene>,
     pub(super) plan: Arc<Plan>,
-    pub(super) backend: Box<dyn Backend>,
     pub(super) frames: Vec<i64>,
     pub(super) format: Format,
     /// Where all frames go into one picture.
@@ -78,44 +78,35 @@ pub(super) fn assets(scene: &SceneFile) -> Arc<dyn Assets> {
 ///
 /// # Errors
 /// What the scene would be refused for.
-pub fn check_scene(scene: &SceneFile) -> Result<Plan, JobError> {
-    let assets = assets(scene);
-    let checked = scene.check(assets.as_ref())?;
+pub fn check_scene(scene: &SceneFile) -> Result<(Arc<CompiledScene>, Plan), JobError> {
+    let compiled = scene.compile(
+        scene.parse()?.adapted(&SceneOptions { implied_backdrop: true, ..SceneOptions::default() })?,
+        &assets(scene),
+    )?;
+    let plan = Plan::new(&compiled, &PlanOptions::default())?;
     // With its overscan, as EXR is drawn.
-    let usual = PlanOptions { implied_backdrop: true, ..PlanOptions::default() };
-    let widest = PlanOptions { overscan: true, ..usual };
-    let plan = Plan::new(checked.clone(), &widest, assets.clone())?;
+    let widest = PlanOptions { overscan: true, ..PlanOptions::default() };
+    let widest = Plan::given(plan.scene().clone(), &widest, plan.exposure_ev100, plan.loop_start)?;
     let frames = (plan.frames().end - plan.frames().start) as usize;
-    memory::check(scene, &plan, Wanted { frames, tiles: 0, display: Some(BitDepth::Eight), own_size: false })?;
-    let plan = Plan::new(checked, &usual, assets)?;
-    plates::check(scene, &plan, &plan.frames().collect::<Vec<_>>())?;
-    Ok(plan)
+    let request = MemoryRequest { frames, tiles: 0, display: Some(BitDepth::Eight), own_size: false };
+    memory::check(scene, &compiled, &widest, request)?;
+    plates::check(scene, &compiled, &plan.frames().collect::<Vec<_>>())?;
+    Ok((compiled, plan))
 }
 
 /// What users should know of how the phenomena of a scene will look, each at its place in the file.
-///
-/// # Errors
-/// A phenomenon cannot be made.
-pub fn remarks(scene: &SceneFile, plan: &Plan) -> Result<Vec<Note>, JobError> {
-    let remarks = plan.remarks()?;
+pub fn remarks(scene: &SceneFile, compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<Note> {
+    let remarks = bansho_render::remarks::remarks(compiled, plan);
     if remarks.is_empty() {
-        return Ok(Vec::new());
+        return Vec::new();
     }
     let mut positions = Positions::new(plan.scene(), &scene.text);
     let note = |(name, remark): (String, Remark)| {
-        let position = positions.of(&name, remark.key().as_deref());
+        let position = positions.of(&name, remark.key.as_deref());
         let place = position.map(|position| Spot { file: scene.name.clone(), position });
         Note::Remark { place, name, remark }
     };
-    Ok(remarks.into_iter().map(note).collect())
-}
-
-/// What draws.
-pub(super) fn backend(choice: BackendChoice) -> Result<Box<dyn Backend>, JobError> {
-    match choice {
-        BackendChoice::Auto | BackendChoice::Cpu => Ok(Box::new(CpuBackend)),
-        BackendChoice::Gpu => Err(JobError::NoGpu),
-    }
+    remarks.into_iter().map(note).collect()
 }
 
 impl Job {
@@ -124,16 +115,15 @@ impl Job {
     /// # Errors
     /// The first thing that stands in the way; of the scene all faults at once.
     pub fn prepare(&self) -> Result<PreparedJob, JobError> {
-        let backend = backend(self.backend)?;
-        let assets = assets(&self.scene);
-        let scene = self.scene.check(assets.as_ref())?;
+        let scene = self.scene.parse()?;
         let kind = self.output_kind()?;
         self.check_channels(kind)?;
         self.check_figures(kind)?;
         let alpha = alpha_convention(self.alpha, self.view, AlphaConvention::Encoded)?;
-        let plan = Arc::new(Plan::new(scene, &self.plan_options(kind), assets)?);
+        let compiled = self.scene.compile(scene.adapted(&self.scene_options())?, &assets(&self.scene))?;
+        let plan = Arc::new(Plan::new(&compiled, &self.plan_options(kind))?);
         let frames = self.chosen_frames(&plan)?;
-        plates::check(&self.scene, &plan, &frames)?;
+        plates::check(&self.scene, &compiled, &frames)?;
         let files = if self.contact_sheet.is_some() { 1 } else { frames.len() };
         let pattern = OutputPattern::parse(&self.output_path(), files)?;
         output::check_writable(&pattern.path(frames[0]))?;
@@ -141,21 +131,21 @@ impl Job {
         overwriting::check(&overwrite, self.outputs(&pattern, &frames))?;
         let tile = [plan.window().width, plan.window().height];
         let sheet = self.contact_sheet.map(|tiles| sheet::holding(tiles, tile, contact::GUTTER)).transpose()?;
-        memory::check(&self.scene, &plan, self.wanted(kind, frames.len()))?;
-        let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan, &overwrite)?;
+        memory::check(&self.scene, &compiled, &plan, self.memory_request(kind, frames.len()))?;
+        let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, (&compiled, &plan), &overwrite)?;
         let mut prepared = PreparedJob {
             scene: self.scene.clone(),
             format: Format { pattern, view: self.view, bits: self.bits, alpha, figures: self.figures, overwrite },
             resume: self.resume && kind.is_sequence() && sheet.is_none(),
             notes: Vec::new(),
+            compiled,
             plan,
-            backend,
             frames,
             sheet,
             contact_background: self.contact_background,
             snapshots,
         };
-        prepared.notes = self.notes(&prepared)?;
+        prepared.notes = self.notes(&prepared);
         Ok(prepared)
     }
 
@@ -165,9 +155,9 @@ impl Job {
         self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem).join(name))
     }
 
-    fn wanted(&self, kind: OutputKind, frames: usize) -> Wanted {
+    fn memory_request(&self, kind: OutputKind, frames: usize) -> MemoryRequest {
         let display = (!kind.is_scene_linear()).then_some(self.bits);
-        Wanted { frames, tiles: self.contact_sheet.unwrap_or(0), display, own_size: self.size.is_some() }
+        MemoryRequest { frames, tiles: self.contact_sheet.unwrap_or(0), display, own_size: self.size.is_some() }
     }
 
     /// Every file that will be written.
@@ -209,14 +199,15 @@ impl Job {
         Ok(())
     }
 
+    fn scene_options(&self) -> SceneOptions {
+        SceneOptions { seed: self.seed, loop_s: self.loop_s, implied_backdrop: !self.transparent }
+    }
+
     fn plan_options(&self, kind: OutputKind) -> PlanOptions {
         PlanOptions {
             size: self.size,
-            implied_backdrop: !self.transparent,
             overscan: kind == OutputKind::Exr,
-            seed: self.seed,
             crop: self.crop,
-            loop_s: self.loop_s,
             layers: self.layers,
             aovs: self.aovs,
             figures: self.figures,
@@ -240,10 +231,10 @@ impl Job {
         }
     }
 
-    fn notes(&self, job: &PreparedJob) -> Result<Vec<Note>, JobError> {
+    fn notes(&self, job: &PreparedJob) -> Vec<Note> {
         let kind = job.format.pattern.kind();
         let mut notes: Vec<Note> = outside(&job.plan, &job.frames).into_iter().collect();
-        notes.extend(remarks(&self.scene, &job.plan)?);
+        notes.extend(remarks(&self.scene, &job.compiled, &job.plan));
         let wide = matches!(kind, OutputKind::Png | OutputKind::Apng | OutputKind::Mov | OutputKind::Webm);
         if self.bits == BitDepth::Sixteen && !wide {
             notes.push(Note::BitsUnused { kind });
@@ -266,7 +257,7 @@ impl Job {
         if self.snapshots.is_some() && job.snapshots == Snapshots::default() {
             notes.push(Note::SnapshotsUnused);
         }
-        Ok(notes)
+        notes
     }
 }
 
@@ -301,14 +292,14 @@ pub(super) fn chosen_frames(asked: Option<&[i64]>, plan: &Plan) -> Result<Vec<i6
 pub(super) fn snapshots(
     folder: Option<&Path>,
     every: Option<u64>,
-    plan: &Plan,
+    (compiled, plan): (&CompiledScene, &Plan),
     overwrite: &OverwritePolicy,
 ) -> Result<Snapshots, JobError> {
     let second = (1.0 / plan.fps().frame_s()).round().max(1.0) as u64;
     let every = every.unwrap_or(second);
     match folder {
         _ if every == 0 => Err(Conflict::SnapshotStep(every).into()),
-        Some(folder) if snapshots::has_state(plan)? => {
+        Some(folder) if compiled.is_stepped() => {
             let snapshots = Snapshots::new(folder.to_path_buf(), plan, every, overwrite.clone());
             snapshots.check()?;
             Ok(snapshots)
@@ -322,7 +313,7 @@ pub(super) fn outside(plan: &Plan, frames: &[i64]) -> Option<Note> {
     let own = plan.frames();
     let count = frames.iter().filter(|frame| !own.contains(frame)).count();
     let (first, last) = (own.start, own.end - 1);
-    match (count, plan.loop_s) {
+    match (count, plan.loop_s()) {
         (0, _) => None,
         (_, Some(_)) => Some(Note::OutsideLoop { count, first, last }),
         (_, None) => Some(Note::OutsideScene { count, first, last }),

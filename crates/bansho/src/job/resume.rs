@@ -38,7 +38,7 @@ impl PreparedJob {
 
     /// Whether frame `number` of this very job is there, with its figures if it has some.
     fn is_whole(&self, number: i64) -> bool {
-        let expected = self.format.fingerprint(fingerprint::of_frame(&self.plan, number));
+        let expected = self.format.fingerprint(fingerprint::of_frame(&self.compiled, &self.plan, number));
         let path = self.format.pattern.path(number);
         existing_fingerprint(&path) == Some(expected) && (!self.format.figures || figures::are_there(&path, expected))
     }

@@ -2,6 +2,8 @@
 
 use std::{path::PathBuf, sync::atomic::AtomicUsize};
 
+use bansho_render::Shot;
+
 use super::{
     contact,
     error::JobError,
@@ -64,7 +66,8 @@ impl PreparedJob {
         let window = rayon::current_num_threads() + 1;
         let sink = self.format.open(&self.plan, numbers.len(), size, window)?;
         let files = ToFiles { format: &self.format, sink, window, observer, drawn: AtomicUsize::new(0), finished };
-        shoot(&self.plan, self.backend.as_ref(), numbers, &self.snapshots, &files, observer)?;
+        let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
+        shoot(&mut shot, numbers, &self.snapshots, &files, observer)?;
         Ok(files.sink.finish()?)
     }
 }

@@ -4,6 +4,7 @@ use std::{
     fs,
     io::{self, Read},
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use bansho_base::{
@@ -15,12 +16,12 @@ use bansho_media::{
     plates::InputLimits,
 };
 use bansho_render::{
-    Scene, SceneError,
-    phenomena::KINDS,
+    CompiledScene, Scene, SceneError,
     scene::edit::{self, EditError},
 };
 
 use super::error::JobError;
+use crate::KINDS;
 
 /// Most bytes of a scene's text.
 pub const SCENE_BYTES: u64 = 16 << 20;
@@ -80,30 +81,49 @@ impl SceneFile {
         })
     }
 
-    /// Makes the changes and checks all.
+    /// Makes the changes and reads the scene, without anything that it names.
     ///
     /// # Errors
     /// Faults of the file if it has any, at their lines; else those of the changes.
-    pub fn check(&self, assets: &dyn Assets) -> Result<Scene, JobError> {
+    pub fn parse(&self) -> Result<Scene, JobError> {
         let changed = match self.changed() {
             // The text itself is at fault, which the parser says better.
             Err(JobError::Edit { source: EditError::Syntax(_), .. }) => self.text.clone(),
             changed => changed?,
         };
-        let error = match Scene::parse(&self.name, &changed, KINDS, assets) {
+        let error = match Scene::parse(&self.name, &changed, KINDS) {
             Ok(scene) => return Ok(scene),
             Err(error) => Box::new(error),
         };
-        if self.changes.is_empty() {
-            return Err(JobError::Scene(error));
-        }
-        match Scene::parse(&self.name, &self.text, KINDS, assets) {
+        match Scene::parse(&self.name, &self.text, KINDS) {
+            _ if self.changes.is_empty() => Err(JobError::Scene(error)),
             Err(own) => Err(JobError::Scene(Box::new(own))),
-            Ok(_) => {
-                let file = format!("{} as changed", self.name);
-                Err(JobError::SetScene(Box::new(SceneError { file, ..*error })))
-            }
+            Ok(_) => Err(self.as_changed(*error)),
         }
+    }
+
+    /// Builds all that a `scene` that was read from this file shows, and reads what it names.
+    ///
+    /// # Errors
+    /// Faults that only building shows, as those of [`parse`](Self::parse).
+    pub fn compile(&self, scene: Scene, assets: &Arc<dyn Assets>) -> Result<Arc<CompiledScene>, JobError> {
+        let errors = match CompiledScene::build(Arc::new(scene), assets.clone(), None) {
+            Ok(compiled) => return Ok(Arc::new(compiled)),
+            Err(errors) => errors,
+        };
+        if self.changes.is_empty() {
+            return Err(JobError::Scene(Box::new(errors.located(&self.name, &self.text))));
+        }
+        // Whose fault it is: the file's, if it has faults of its own.
+        let own = Scene::parse(&self.name, &self.text, KINDS).ok();
+        match own.map(|own| CompiledScene::build(Arc::new(own), assets.clone(), None)) {
+            Some(Err(own)) => Err(JobError::Scene(Box::new(own.located(&self.name, &self.text)))),
+            _ => Err(self.as_changed(errors.located(&self.name, &self.changed()?))),
+        }
+    }
+
+    fn as_changed(&self, error: SceneError) -> JobError {
+        JobError::SetScene(Box::new(SceneError { file: format!("{} as changed", self.name), ..error }))
     }
 
     /// A fault of what stands at the dotted `path`, which only showed when the scene was looked at from outside its text.

@@ -1,12 +1,10 @@
 //! The frames of a job, one after the other: drawn here, finished by whichever thread of the pool is free.
 
-use std::sync::Arc;
-
 use bansho_base::{
     host::observer::{Observer, check},
     image::Frame,
 };
-use bansho_render::{Backend, Plan, Shot};
+use bansho_render::{RenderError, Shot};
 
 use super::{
     error::JobError,
@@ -14,6 +12,42 @@ use super::{
     observer::JobObserver,
     snapshots::Snapshots,
 };
+
+/// What frames come from: a shot, or one whose state and pictures are known in tests. See [`Shot`] for each.
+pub(super) trait FrameSource: Send {
+    fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError>;
+    fn draw(&mut self, observer: &dyn Observer) -> Result<(), RenderError>;
+    fn read(&mut self) -> Option<Frame>;
+    fn recycle(&mut self, spent: Frame);
+    fn snapshot(&self) -> Vec<u8>;
+    fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError>;
+}
+
+impl FrameSource for Shot {
+    fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError> {
+        Self::advance(self, number, observer)
+    }
+
+    fn draw(&mut self, observer: &dyn Observer) -> Result<(), RenderError> {
+        Self::draw(self, observer)
+    }
+
+    fn read(&mut self) -> Option<Frame> {
+        Self::read(self)
+    }
+
+    fn recycle(&mut self, spent: Frame) {
+        Self::recycle(self, spent);
+    }
+
+    fn snapshot(&self) -> Vec<u8> {
+        Self::snapshot(self)
+    }
+
+    fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError> {
+        Self::restore(self, snapshot)
+    }
+}
 
 /// What becomes of a drawn frame.
 pub(super) trait Finish: Sync {
@@ -34,8 +68,7 @@ const MEMORY_IN_FLIGHT: usize = 1 << 30;
 /// # Errors
 /// The first failure of a frame, or the observer asked to stop. Frames that were finished stay.
 pub(super) fn shoot(
-    plan: &Arc<Plan>,
-    backend: &dyn Backend,
+    shot: &mut dyn FrameSource,
     numbers: &[i64],
     snapshots: &Snapshots,
     finish: &dyn Finish,
@@ -43,7 +76,6 @@ pub(super) fn shoot(
 ) -> Result<(), JobError> {
     let flight = Flight::default();
     let watch = Watch { observer, flight: &flight };
-    let mut shot = backend.open(plan.clone())?;
     let mut last = None;
     let drawn = rayon::in_place_scope_fifo(|scope| {
         for (index, &number) in numbers.iter().enumerate() {
@@ -51,7 +83,7 @@ pub(super) fn shoot(
             if let Some(spent) = flight.take_spent() {
                 shot.recycle(spent);
             }
-            let mut frame = draw(shot.as_mut(), number, seek, snapshots, &watch, observer)?;
+            let mut frame = draw(shot, number, seek, snapshots, &watch, observer)?;
             last = Some(number);
             flight.depart(index, limit(&frame, finish));
             let (flight, watch) = (&flight, &watch);
@@ -75,7 +107,7 @@ pub(super) fn shoot(
 
 /// Draws frame `number`; `seek` holds the frame drawn before where the two are not neighbours.
 fn draw(
-    shot: &mut dyn Shot,
+    shot: &mut dyn FrameSource,
     number: i64,
     seek: Option<Option<i64>>,
     snapshots: &Snapshots,
@@ -103,7 +135,7 @@ fn limit(frame: &Frame, finish: &dyn Finish) -> usize {
 mod tests {
     use std::{
         sync::{
-            Mutex,
+            Arc, Mutex,
             atomic::{AtomicUsize, Ordering},
         },
         thread,
@@ -113,7 +145,7 @@ mod tests {
     use super::*;
     use crate::job::{
         error::Conflict,
-        testing::{Counter, Finisher, Witness, plan},
+        testing::{Counter, Finisher, Witness},
     };
 
     fn in_pool<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
@@ -122,7 +154,7 @@ mod tests {
 
     fn run(numbers: &[i64], finish: &dyn Finish, witness: &Witness) -> Result<(), JobError> {
         let counter = Counter { steps: Arc::default() };
-        shoot(&plan(), &counter, numbers, &Snapshots::default(), finish, witness)
+        shoot(&mut counter.shot(), numbers, &Snapshots::default(), finish, witness)
     }
 
     #[test]

@@ -4,16 +4,15 @@ use std::{path::PathBuf, sync::Arc};
 
 use bansho_base::host::observer::{Stage, StageGuard, check};
 use bansho_media::{atomic, naming::NumberedPath, overwriting::OverwritePolicy, ply};
-use bansho_render::{Backend, Plan, PlanOptions, RenderError};
+use bansho_render::{CompiledScene, Plan, PlanOptions, SceneOptions, Shot};
 
 use super::{
-    BackendChoice,
     error::{Conflict, JobError},
     finished::Finished,
     inputs,
     observer::{FrameDone, JobObserver, Note, Outline},
     output, overwriting,
-    prepare::{assets, backend, chosen_frames, outside, snapshots},
+    prepare::{assets, chosen_frames, outside, snapshots},
     run::Summary,
     scene_file::SceneFile,
     snapshots::Snapshots,
@@ -36,14 +35,12 @@ pub struct Simulate {
     pub snapshot_every: Option<u64>,
     /// Whether files that Bansho did not make may be written over. What the scene is read from never is.
     pub overwrite: bool,
-    /// What simulates.
-    pub backend: BackendChoice,
 }
 
 /// A simulation that can be carried out, as far as can be known without doing so.
 pub struct PreparedSimulation {
+    compiled: Arc<CompiledScene>,
     plan: Arc<Plan>,
-    backend: Box<dyn Backend>,
     frames: Vec<i64>,
     pattern: NumberedPath,
     snapshots: Snapshots,
@@ -54,16 +51,7 @@ pub struct PreparedSimulation {
 impl Simulate {
     /// All frames of `scene` to `particles`.
     pub fn new(scene: SceneFile, particles: PathBuf) -> Self {
-        Self {
-            scene,
-            particles,
-            frames: None,
-            seed: None,
-            snapshots: None,
-            snapshot_every: None,
-            overwrite: false,
-            backend: BackendChoice::Auto,
-        }
+        Self { scene, particles, frames: None, seed: None, snapshots: None, snapshot_every: None, overwrite: false }
     }
 
     /// Checks everything and writes nothing.
@@ -71,13 +59,10 @@ impl Simulate {
     /// # Errors
     /// The first thing that stands in the way: faults of the scene, a scene without particles, a name that cannot be used.
     pub fn prepare(&self) -> Result<PreparedSimulation, JobError> {
-        let backend = backend(self.backend)?;
-        let assets = assets(&self.scene);
-        let scene = self.scene.check(assets.as_ref())?;
-        let options = PlanOptions { seed: self.seed, ..PlanOptions::default() };
-        let plan = Arc::new(Plan::new(scene, &options, assets)?);
-        let phenomena = plan.open().map_err(RenderError::from)?;
-        if phenomena.iter().all(|phenomenon| phenomenon.particles(0.0).is_none()) {
+        let options = SceneOptions { seed: self.seed, ..SceneOptions::default() };
+        let compiled = self.scene.compile(self.scene.parse()?.adapted(&options)?, &assets(&self.scene))?;
+        let plan = Arc::new(Plan::new(&compiled, &PlanOptions::default())?);
+        if compiled.phenomena().all(|phenomenon| phenomenon.clone().start().export(0.0).is_none()) {
             return Err(Conflict::NoParticles.into());
         }
         let frames = chosen_frames(self.frames.as_deref(), &plan)?;
@@ -85,9 +70,9 @@ impl Simulate {
         output::check_writable(&pattern.path(frames[0]))?;
         let overwrite = OverwritePolicy::new(inputs::inputs(&self.scene, &plan, &frames), self.overwrite);
         overwriting::check(&overwrite, frames.iter().map(|&number| pattern.path(number)))?;
-        let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, &plan, &overwrite)?;
+        let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, (&compiled, &plan), &overwrite)?;
         let notes = outside(&plan, &frames).into_iter().collect();
-        Ok(PreparedSimulation { plan, backend, frames, pattern, snapshots, overwrite, notes })
+        Ok(PreparedSimulation { compiled, plan, frames, pattern, snapshots, overwrite, notes })
     }
 }
 
@@ -108,15 +93,15 @@ impl PreparedSimulation {
         self.notes.iter().for_each(|note| observer.note(note));
         let size = [self.plan.window().width, self.plan.window().height];
         observer.started(&Outline { total: self.frames.len(), kept: 0, size });
-        let mut shot = self.backend.open(self.plan.clone())?;
+        let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
         let (mut last, finished) = (None, Finished::default());
         for (index, &number) in self.frames.iter().enumerate() {
             check(observer).map_err(|_| JobError::Cancelled)?;
             if last.is_none_or(|last| number != last + 1) {
-                self.snapshots.warm_up(shot.as_mut(), last, number, observer, observer)?;
+                self.snapshots.warm_up(&mut shot, last, number, observer, observer)?;
             }
             shot.advance(number, observer)?;
-            self.snapshots.keep(shot.as_ref(), number, observer)?;
+            self.snapshots.keep(&shot, number, observer)?;
             last = Some(number);
             let _stage = StageGuard::begin(observer, Stage::Write);
             let path = self.pattern.path(number);

@@ -7,12 +7,13 @@ use std::{
 
 use bansho_base::host::observer::{Observer, Stage, StageGuard};
 use bansho_media::{atomic, identity::resolved, overwriting::OverwritePolicy};
-use bansho_render::{Plan, RenderError, Shot};
+use bansho_render::Plan;
 
 use super::{
     error::JobError,
     observer::{JobObserver, Note},
     overwriting,
+    shoot::FrameSource,
 };
 
 /// Where snapshots lie and how many frames lie between them. Files are called `state.<frame>.bansho`.
@@ -32,7 +33,7 @@ impl Snapshots {
     /// Snapshots in `folder`, `every` so many frames from the scene's first.
     pub(super) fn new(folder: PathBuf, plan: &Plan, every: u64, overwrite: OverwritePolicy) -> Self {
         let frames = plan.frames();
-        let turn = plan.loop_s.map(|_| frames.end - frames.start);
+        let turn = plan.loop_s().map(|_| frames.end - frames.start);
         Self { folder: Some(folder), first_frame: frames.start, every, turn, overwrite }
     }
 
@@ -64,7 +65,7 @@ impl Snapshots {
     /// The observer asked to stop, or a snapshot cannot be written.
     pub(super) fn warm_up(
         &self,
-        shot: &mut dyn Shot,
+        shot: &mut dyn FrameSource,
         last: Option<i64>,
         number: i64,
         watch: &dyn Observer,
@@ -90,7 +91,7 @@ impl Snapshots {
 
     /// Puts `shot` at the latest snapshot after frame `past` and not after `number` that is of use. Those that are damaged or
     /// foreign are noted.
-    fn seek(&self, shot: &mut dyn Shot, past: Option<i64>, number: i64, observer: &dyn JobObserver) -> Found {
+    fn seek(&self, shot: &mut dyn FrameSource, past: Option<i64>, number: i64, observer: &dyn JobObserver) -> Found {
         let mut found = Found::default();
         let Some(folder) = &self.folder else { return found };
         let mut candidates = match numbers(folder) {
@@ -123,7 +124,7 @@ impl Snapshots {
     }
 
     /// Writes the state at frame `number` where one is due, or lies there, and it is not the very same.
-    pub(super) fn keep(&self, shot: &dyn Shot, number: i64, observer: &dyn Observer) -> Result<(), JobError> {
+    pub(super) fn keep(&self, shot: &dyn FrameSource, number: i64, observer: &dyn Observer) -> Result<(), JobError> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let number = self.in_turn(number);
         let path = self.path(folder, number);
@@ -156,15 +157,6 @@ struct Found {
     refused: Vec<i64>,
 }
 
-/// Whether any phenomenon of the plan has a state.
-///
-/// # Errors
-/// A phenomenon cannot be made.
-pub(super) fn has_state(plan: &Plan) -> Result<bool, JobError> {
-    let phenomena = plan.open().map_err(RenderError::from)?;
-    Ok(phenomena.iter().any(|phenomenon| phenomenon.stepping().is_some()))
-}
-
 /// Frames of which there is a snapshot; a folder that is not there has none.
 fn numbers(folder: &Path) -> io::Result<Vec<i64>> {
     let entries = match fs::read_dir(folder) {
@@ -187,7 +179,7 @@ mod tests {
         phenomenon::SnapshotError,
     };
     use bansho_media::mark;
-    use bansho_render::{Backend, CpuBackend, PlanOptions};
+    use bansho_render::{PlanOptions, RenderError, Shot};
 
     use super::*;
     use crate::job::{
@@ -204,7 +196,7 @@ mod tests {
     fn steps(snapshots: &Snapshots, numbers: &[i64], witness: &Witness) -> usize {
         let counter = Counter { steps: Arc::default() };
         let finish = Finisher { each: |_, _| Ok(()), window: 4 };
-        shoot(&plan(), &counter, numbers, snapshots, &finish, witness).unwrap();
+        shoot(&mut counter.shot(), numbers, snapshots, &finish, witness).unwrap();
         counter.steps.load(Ordering::Relaxed)
     }
 
@@ -279,9 +271,9 @@ mod tests {
     fn states_of_the_renderer_bear_the_mark() {
         let assets = Arc::new(MemoryAssets::default());
         let text = "bansho = 1\n[[flame_particles]]\nparticles = 60\n";
-        let scene = crate::parse_scene("test", text, assets.as_ref()).unwrap();
-        let plan = Plan::new(scene, &PlanOptions::default(), assets).unwrap();
-        let shot = CpuBackend.open(Arc::new(plan)).unwrap();
+        let compiled = crate::compile_scene("test", text, assets).unwrap();
+        let plan = Plan::new(&compiled, &PlanOptions::default()).unwrap();
+        let shot = Shot::open(compiled, Arc::new(plan));
         assert!(shot.snapshot().starts_with(&mark::SNAPSHOT));
     }
 

@@ -6,7 +6,6 @@ use std::sync::{
 };
 
 use bansho_base::{
-    geometry::point_cloud::PointCloud,
     host::{
         assets::MemoryAssets,
         observer::{Observer, Stage, check},
@@ -15,20 +14,21 @@ use bansho_base::{
     phenomenon::SnapshotError,
 };
 use bansho_media::mark;
-use bansho_render::{Backend, Plan, PlanOptions, RenderError, Shot};
+use bansho_render::{CompiledScene, Plan, PlanOptions, RenderError};
 
 use super::{
     error::JobError,
     observer::{JobObserver, Note},
-    shoot::Finish,
+    shoot::{Finish, FrameSource},
 };
 
 /// A plan of a picture of one pixel with nothing in it.
 pub(super) fn plan() -> Arc<Plan> {
     let assets = Arc::new(MemoryAssets::default());
     let text = "bansho = 1\n[picture]\nsize = [1, 1]\nfps = 10\nfirst_frame = -4\n";
-    let scene = crate::parse_scene("test", text, assets.as_ref()).unwrap_or_else(|error| panic!("{error}"));
-    Arc::new(Plan::new(scene, &PlanOptions::default(), assets).unwrap())
+    let scene = crate::parse_scene("test", text).unwrap_or_else(|error| panic!("{error}"));
+    let compiled = Arc::new(CompiledScene::build(Arc::new(scene), assets, None).unwrap());
+    Arc::new(Plan::new(&compiled, &PlanOptions::default()).unwrap())
 }
 
 /// Takes a step for each frame, and counts them all.
@@ -51,17 +51,7 @@ impl Counter {
     }
 }
 
-impl Backend for Counter {
-    fn name(&self) -> &'static str {
-        "counter"
-    }
-
-    fn open(&self, _plan: Arc<Plan>) -> Result<Box<dyn Shot>, RenderError> {
-        Ok(Box::new(self.shot()))
-    }
-}
-
-impl Shot for CounterShot {
+impl FrameSource for CounterShot {
     fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError> {
         check(observer)?;
         if number < self.number {
@@ -82,18 +72,7 @@ impl Shot for CounterShot {
         std::mem::take(&mut self.drawn).then(|| blank(&self.plan, self.number))
     }
 
-    fn replan(&mut self, plan: Arc<Plan>) -> Result<(), RenderError> {
-        self.plan = plan;
-        Ok(())
-    }
-
-    fn is_exact(&self) -> bool {
-        true
-    }
-
-    fn particles(&self) -> PointCloud {
-        PointCloud::default()
-    }
+    fn recycle(&mut self, _spent: Frame) {}
 
     fn snapshot(&self) -> Vec<u8> {
         state(self.number)
@@ -119,7 +98,7 @@ pub(super) fn frame(number: i64) -> Frame {
 
 pub(super) fn blank(plan: &Plan, number: i64) -> Frame {
     let beauty = Image::filled(1, 1, [number as f32; 4]);
-    let header = plan.header(number);
+    let header = plan.header(number, [7; 32]);
     let content = Rect::of_size(1, 1);
     Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false, figures: Vec::new(), content }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use bansho::PlanOptions;
+use bansho::SceneOptions;
 
 use crate::{
     SMALL,
@@ -13,7 +13,7 @@ use crate::{
 const EARLY: i64 = 4;
 
 fn film(scene: &str, frames: &[i64]) -> Film {
-    Film::of(scene, SMALL, frames, &PlanOptions::default())
+    Film::of(scene, SMALL, frames, &SceneOptions::default())
 }
 
 /// A scene's text without the sky, which would hide what is faint.

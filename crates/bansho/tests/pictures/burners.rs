@@ -4,7 +4,7 @@ use bansho::{
     base::{
         host::assets::MemoryAssets,
         parameters::{AssetPath, Auto},
-        phenomenon::{Phenomenon, surroundings::Surroundings},
+        phenomenon::{Phenomenon, Stepped, surroundings::Surroundings},
         world::{
             air::Air,
             wind::{Wind, WindParameters},
@@ -60,7 +60,7 @@ fn gas_comes_evenly_from_the_whole_surface_of_a_gltf_mesh() {
     let mut flame = FlameParticles::new(parameters, "mesh", 1, None, &assets).unwrap();
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let around = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
-    let stepping = flame.stepping().unwrap();
+    let stepping = flame.info().stepping.unwrap();
     (0..6).for_each(|taken| flame.step(stepping.time_after(taken), &around));
     let [x, y, z] = flame.particles().positions();
     assert!(x.len() > 1500, "{}", x.len());

@@ -1,6 +1,6 @@
 //! The flame sheet.
 
-use bansho::PlanOptions;
+use bansho::SceneOptions;
 
 use crate::{
     SMALL,
@@ -11,7 +11,7 @@ use crate::{
 fn flames_go_from_red_through_orange_to_yellow_white() {
     // The paper paints its cores yellowish white, so it has less orange.
     for (scene, least_orange) in [("campfire", 0.2), ("torch", 0.2), ("ohshima_itahashi", 0.05)] {
-        let film = Film::of(scene, SMALL, &[20, 60, 100], &PlanOptions::default());
+        let film = Film::of(scene, SMALL, &[20, 60, 100], &SceneOptions::default());
         let [red, orange, yellow] = hues(&film);
         assert!(
             red > 0.02 && orange > least_orange && yellow > 0.05,
@@ -25,7 +25,7 @@ fn flames_go_from_red_through_orange_to_yellow_white() {
 #[test]
 fn cores_keep_their_modelling() {
     for scene in ["candle", "torch", "campfire"] {
-        let film = Film::of(scene, SMALL, &[20, 60, 100], &PlanOptions::default());
+        let film = Film::of(scene, SMALL, &[20, 60, 100], &SceneOptions::default());
         let flat = film.pixels().filter(|p| p.iter().all(|value| *value > 0.99)).count() as f64 / film.len() as f64;
         assert!(flat < 0.001, "{scene}: {flat} of the picture is clipped");
     }
@@ -34,7 +34,7 @@ fn cores_keep_their_modelling() {
 #[test]
 fn a_campfire_flickers_as_fires_do() {
     let frames: Vec<i64> = (0..120).collect();
-    let film = Film::of("campfire", [96, 54], &frames, &PlanOptions::default());
+    let film = Film::of("campfire", [96, 54], &frames, &SceneOptions::default());
     let light: Vec<f64> = (0..frames.len()).map(|frame| film.mean(frame)).collect();
     let mean = light.iter().sum::<f64>() / light.len() as f64;
     let deviation = (light.iter().map(|l| (l - mean) * (l - mean)).sum::<f64>() / light.len() as f64).sqrt() / mean;
@@ -58,7 +58,7 @@ fn flames_narrow_upward_and_never_touch_the_edges_of_their_sheet() {
     let frames: Vec<i64> = (0..12).map(|i| 10 * i).collect();
     let text = "bansho = 1\n[picture]\nsize = [144, 144]\n[camera]\nposition = [0, 0.85, 4]\ntarget = [0, 0.85, 0]\n\
                 [[flame_sheet]]\nwind_response = 0\n";
-    let film = Film::of_text(text, [144, 144], &frames, &PlanOptions::default());
+    let film = Film::of_text(text, [144, 144], &frames, &SceneOptions::default());
     let lit_at = |share: f64| -> f64 {
         // The sheet, 1.7 m high, fills 84 of 144 rows around the middle of the picture.
         let row = 72 + (84.0 * (0.5 - share)) as usize;
@@ -83,7 +83,7 @@ fn wind_bends_the_flame_and_more_wind_bends_it_more() {
         let text = format!(
             "bansho = 1\n[picture]\nsize = [160, 120]\n[wind]\nvelocity = [{speed}, 0, 0]\ngust = 0\n[[flame_sheet]]\n"
         );
-        let film = Film::of_text(&text, [160, 120], &[0, 15, 30, 45, 60], &PlanOptions::default());
+        let film = Film::of_text(&text, [160, 120], &[0, 15, 30, 45, 60], &SceneOptions::default());
         film.centroid_of_upper_half()[0] - 80.0
     };
     let [left, still, right, strong] = [-1.0, 0.0, 1.0, 2.5].map(lean);
@@ -103,7 +103,7 @@ fn last_and_first_frame_of_a_loop_differ_no_more_than_the_median_pair() {
 
 fn seam_is_calm(scene: &str, text: &str) {
     let text = text.replace("fps = 60", "fps = 30");
-    let options = PlanOptions { loop_s: Some(2.0), ..PlanOptions::default() };
+    let options = SceneOptions { loop_s: Some(2.0), ..SceneOptions::default() };
     let frames: Vec<i64> = (0..60).collect();
     let film = Film::of_text(&text, [128, 72], &frames, &options);
     let mut steps: Vec<f64> = (0..59).map(|frame| film.difference(frame, frame + 1)).collect();
@@ -124,7 +124,7 @@ fn gradients_show_no_bands() {
 fn the_papers_stages_follow_from_each_other() {
     let stage = |name: &str| {
         let text = scene_text("ohshima_itahashi").replace("stage = \"flame\"", &format!("stage = \"{name}\""));
-        Film::of_text(&text, [256, 256], &[0], &PlanOptions::default())
+        Film::of_text(&text, [256, 256], &[0], &SceneOptions::default())
     };
     let [texture, thresholded, sharpened, coloured] = ["texture", "thresholded", "sharpened", "coloured"].map(stage);
     let lit = |film: &Film| film.pixels().filter(|pixel| luminance(**pixel) > 0.01).count() as f64 / film.len() as f64;

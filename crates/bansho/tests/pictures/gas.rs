@@ -1,6 +1,6 @@
 //! The particle flame.
 
-use bansho::PlanOptions;
+use bansho::SceneOptions;
 
 use crate::looks::{Film, hues, luminance, mean_luminances, scene_text};
 
@@ -11,7 +11,7 @@ fn gas_in_wind(scene: &str, speed: f64) -> Film {
         &format!("[wind]\nvelocity = [{speed:?}, 0, 0]\ngust = 0\n[[flame_particles]]"),
     );
     let frames: Vec<i64> = (1..=12).map(|index| 10 * index).collect();
-    Film::of_text(&text, [160, 90], &frames, &PlanOptions::default())
+    Film::of_text(&text, [160, 90], &frames, &SceneOptions::default())
 }
 
 #[test]
@@ -44,12 +44,12 @@ fn a_scene_begins_with_a_developed_flame() {
 #[test]
 fn burning_gas_has_sharp_rims_bright_cores_and_gaps() {
     let text = scene_text("inagaki_still");
-    let film = Film::of_text(&text, [640, 360], &[20, 60], &PlanOptions::default());
+    let film = Film::of_text(&text, [640, 360], &[20, 60], &SceneOptions::default());
     let smooth = Film::of_text(
         &format!("{text}[flame_particles.look]\ndetail = 0\n"),
         [640, 360],
         &[20, 60],
-        &PlanOptions::default(),
+        &SceneOptions::default(),
     );
     // How steeply luminance changes from pixel to pixel, beside how much there is: sums of kernels alone are a blur.
     let steepness = |film: &Film| {
@@ -75,7 +75,7 @@ fn burning_gas_has_sharp_rims_bright_cores_and_gaps() {
 #[test]
 fn haze_displaces_the_plate_around_the_flame_and_nowhere_else() {
     let text = scene_text("inagaki_haze");
-    let draw = |text: &str| Film::of_text(text, [320, 180], &[40], &PlanOptions::default());
+    let draw = |text: &str| Film::of_text(text, [320, 180], &[40], &SceneOptions::default());
     let (bent, straight) = (draw(&text), draw(&text.replace("haze_gain = 14.0", "haze_gain = 0.0")));
     let moved = |columns: std::ops::Range<usize>| {
         let pixels = || (0..180).flat_map(|row| columns.clone().map(move |x| (row, x)));

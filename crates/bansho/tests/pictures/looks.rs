@@ -3,7 +3,7 @@
 use std::{ops::Range, path::PathBuf, sync::Arc};
 
 use bansho::{
-    Backend, BitDepth, CpuBackend, DisplayImage, Plan, PlanOptions, Unobserved, View,
+    BitDepth, CompiledScene, DisplayImage, Plan, PlanOptions, SceneOptions, Shot, Unobserved, View,
     base::image::{DisplayPixels, Frame},
     media::plates::{FileAssets, decode_picture, limits::MemoryLimit},
 };
@@ -22,18 +22,20 @@ fn look_at<T>(
     text: &str,
     size: [usize; 2],
     frames: &[i64],
-    options: &PlanOptions,
+    options: &SceneOptions,
     look: impl Fn(&Frame) -> T,
 ) -> Vec<T> {
     let assets = Arc::new(FileAssets::new(scenes()));
-    let scene = bansho::parse_scene("scene", text, assets.as_ref()).unwrap_or_else(|error| panic!("{error}"));
-    let options = PlanOptions { size: Some(size), ..options.clone() };
-    let plan = Arc::new(Plan::new(scene, &options, assets).unwrap());
-    let mut shot = CpuBackend.open(plan).unwrap();
-    frames.iter().map(|number| look(&bansho::draw(shot.as_mut(), *number, &Unobserved).unwrap())).collect()
+    let scene = bansho::parse_scene("scene", text).unwrap_or_else(|error| panic!("{error}"));
+    let scene = scene.adapted(options).unwrap_or_else(|error| panic!("{error}"));
+    let compiled = CompiledScene::build(Arc::new(scene), assets, None).unwrap_or_else(|errors| panic!("{errors}"));
+    let compiled = Arc::new(compiled);
+    let plan = Plan::new(&compiled, &PlanOptions { size: Some(size), ..PlanOptions::default() }).unwrap();
+    let mut shot = Shot::open(compiled, Arc::new(plan));
+    frames.iter().map(|number| look(&bansho::draw(&mut shot, *number, &Unobserved).unwrap())).collect()
 }
 
-fn draw(text: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions, depth: BitDepth) -> Vec<DisplayImage> {
+fn draw(text: &str, size: [usize; 2], frames: &[i64], options: &SceneOptions, depth: BitDepth) -> Vec<DisplayImage> {
     look_at(text, size, frames, options, |frame| {
         bansho::display(frame, &View::DISPLAY, depth, bansho::AlphaConvention::Linear)
     })
@@ -49,7 +51,7 @@ pub(crate) fn mean_luminances(text: &str, size: [usize; 2], frames: &[i64]) -> V
 /// white.
 pub(crate) fn block_luminances(text: &str, size: [usize; 2], side: usize, frames: &[i64]) -> Vec<Vec<f64>> {
     let [columns, rows] = size.map(|pixels| pixels.div_ceil(side));
-    look_at(text, size, frames, &PlanOptions::default(), |frame| {
+    look_at(text, size, frames, &SceneOptions::default(), |frame| {
         let mut blocks = vec![0.0; columns * rows];
         for (index, [red, green, blue, _]) in frame.beauty.pixels().iter().enumerate() {
             let block = index / size[0] / side * columns + index % size[0] / side;
@@ -92,12 +94,12 @@ pub(crate) fn luminance([red, green, blue]: [f64; 3]) -> f64 {
 
 impl Film {
     /// Frames of a shipped scene.
-    pub(crate) fn of(scene: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions) -> Self {
+    pub(crate) fn of(scene: &str, size: [usize; 2], frames: &[i64], options: &SceneOptions) -> Self {
         Self::of_text(&scene_text(scene), size, frames, options)
     }
 
     /// Frames of a scene in a text.
-    pub(crate) fn of_text(text: &str, size: [usize; 2], frames: &[i64], options: &PlanOptions) -> Self {
+    pub(crate) fn of_text(text: &str, size: [usize; 2], frames: &[i64], options: &SceneOptions) -> Self {
         let linear = |image: &DisplayImage| {
             let decode = |value: f32| f64::from(bansho::base::color::decode_srgb(value));
             encoded(image).into_iter().map(|pixel| pixel.map(decode)).collect()
@@ -176,7 +178,7 @@ pub(crate) fn hues(film: &Film) -> [f64; 3] {
 /// Share of the length of gradients, along rows and columns, that lies in bands: more than 8 pixels of one 8-bit code where 16 bits move by a
 /// quarter of a code.
 pub(crate) fn wide_bands(text: &str, size: [usize; 2], frame: i64) -> f64 {
-    let codes = |depth| encoded(&draw(text, size, &[frame], &PlanOptions::default(), depth)[0]);
+    let codes = |depth| encoded(&draw(text, size, &[frame], &SceneOptions::default(), depth)[0]);
     let (coarse, fine) = (codes(BitDepth::Eight), codes(BitDepth::Sixteen));
     let row = |y: usize| (0..size[0]).map(move |x| y * size[0] + x).collect();
     let column = |x: usize| (0..size[1]).map(move |y| y * size[0] + x).collect();
@@ -219,7 +221,7 @@ pub(crate) fn golden(scene: &str, size: [usize; 2], frame: i64) -> Option<String
         text = text.replace("count = 120_000", "count = 12_000");
         name = format!("{scene}_{frame}");
     }
-    let image = &draw(&text, size, &[frame], &PlanOptions::default(), BitDepth::Eight)[0];
+    let image = &draw(&text, size, &[frame], &SceneOptions::default(), BitDepth::Eight)[0];
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("tests/golden/{name}.png"));
     if std::env::var_os("BANSHO_BLESS").is_some() {
         write_png(&path, image);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use bansho::PlanOptions;
+use bansho::SceneOptions;
 
 use crate::{
     SMALL,
@@ -17,7 +17,7 @@ fn mean(film: &Film, rows: Range<usize>, columns: Range<usize>) -> f64 {
 #[test]
 fn rain_streaks_are_upright_and_brightest_near_the_lamp() {
     let size = [480, 270];
-    let film = Film::of("street_lamp", size, &[30], &PlanOptions::default());
+    let film = Film::of("street_lamp", size, &[30], &SceneOptions::default());
     let (mut across, mut down) = (0.0, 0.0);
     for row in 0..190 {
         let (here, below) = (film.row(0, row), film.row(0, row + 1));
@@ -34,7 +34,7 @@ fn rain_streaks_are_upright_and_brightest_near_the_lamp() {
 
 #[test]
 fn headlights_light_a_cone_of_rain() {
-    let film = Film::of("headlights", [480, 270], &[30], &PlanOptions::default());
+    let film = Film::of("headlights", [480, 270], &[30], &SceneOptions::default());
     // The lamps stand in row 148, columns 69 and 120, and shine to the right.
     let (beam, above, behind) =
         (mean(&film, 130..165, 130..190), mean(&film, 20..60, 80..140), mean(&film, 130..165, 0..50));
@@ -47,7 +47,7 @@ fn culling_changes_no_pixel_of_a_scene_by_a_255th() {
         let text = scene_text(scene);
         let all = text.replace("[[rain]]\n", "[[rain]]\nculling = false\n");
         assert_ne!(text, all);
-        let [culled, all] = [text, all].map(|text| Film::of_text(&text, SMALL, &[30], &PlanOptions::default()));
+        let [culled, all] = [text, all].map(|text| Film::of_text(&text, SMALL, &[30], &SceneOptions::default()));
         let pairs = culled.pixels().flatten().zip(all.pixels().flatten());
         let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(worst <= 1.0 / 255.0, "{scene}: {worst}");
@@ -59,7 +59,7 @@ fn a_downpour_dims_the_far_more_than_the_near_and_leaves_the_sky() {
     let text = scene_text("downpour_day");
     let dry = text.replace("rate_mm_per_h = 70.0", "rate_mm_per_h = 0.0");
     assert_ne!(text, dry);
-    let [wet, dry] = [text, dry].map(|text| Film::of_text(&text, [240, 135], &[30], &PlanOptions::default()));
+    let [wet, dry] = [text, dry].map(|text| Film::of_text(&text, [240, 135], &[30], &SceneOptions::default()));
     let change = |rows: Range<usize>, columns: Range<usize>| {
         mean(&wet, rows.clone(), columns.clone()) / mean(&dry, rows, columns) - 1.0
     };

@@ -1,6 +1,6 @@
 //! New scenes, as `bansho new` writes them, as pictures.
 
-use bansho::{KINDS, PlanOptions, render::scene::template};
+use bansho::{KINDS, SceneOptions, render::scene::template};
 
 use crate::{
     SMALL,
@@ -10,8 +10,8 @@ use crate::{
 #[test]
 fn a_new_scene_of_any_kind_shows_something_well_exposed() {
     for kind in KINDS {
-        let film = Film::of_text(&template::commented(kind), SMALL, &[4], &PlanOptions::default());
-        let short = Film::of_text(&template::short(kind), SMALL, &[4], &PlanOptions::default());
+        let film = Film::of_text(&template::commented(kind), SMALL, &[4], &SceneOptions::default());
+        let short = Film::of_text(&template::short(kind), SMALL, &[4], &SceneOptions::default());
         assert!(film.pixels().eq(short.pixels()), "{}: a short scene shows the same", kind.key);
         let share = |of: &dyn Fn(f64) -> bool| {
             film.pixels().filter(|pixel| of(luminance(**pixel))).count() as f64 / film.len() as f64

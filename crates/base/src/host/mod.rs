@@ -1,6 +1,7 @@
 //! What the library asks of the program that runs it: files, memory, a way to stop, text for terminals, and scratch memory.
 
 pub mod assets;
+pub mod constructions;
 pub mod memory;
 pub mod observer;
 pub mod once;

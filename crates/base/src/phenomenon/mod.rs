@@ -1,8 +1,11 @@
 //! What fire, rain, aurora and whatever comes next have in common for the renderer.
 
 pub(crate) mod aov;
+pub mod kind;
 pub mod strip;
 pub mod surroundings;
+
+use std::{fmt, sync::Arc};
 
 use crate::{
     geometry::point_cloud::PointCloud,
@@ -71,61 +74,33 @@ pub enum SnapshotError {
 }
 
 /// What a user should know of how a phenomenon will look, and that stops nothing.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum Remark {
-    /// It only shows the light of others, and there is none.
-    #[error("nothing lights it, so it is drawn black; a [[light]], a [sky] or a fire would")]
-    Unlit,
-    /// Sheets of an aurora meet on their way from shape to shape.
-    #[error(
-        "its sheets pass through each other on the way to shape {shape}; another shape between, `link`, or sheets in \
-         another order would keep them apart"
-    )]
-    Crossing {
-        /// The shape on whose way they first do, counted from 1.
-        shape: usize,
-    },
-    /// A burner that lies within an obstacle.
-    #[error("its burner {burner} lies within an obstacle, from which its gas cannot come out")]
-    Buried {
-        /// Which of its burners, counted from 1.
-        burner: usize,
-    },
-    /// Nothing is ever given off.
-    #[error("none of its burners gives gas; a `flow` above 0 would")]
-    Unfed,
-    /// A plate that does not say with which exposure it was taken.
-    #[error(
-        "with which exposure it was taken is not known; EV {ev100:.1} (at ISO 100) is assumed, so that its white is {white:.0} cd/m^2; \
-         `exposure_ev100` in [plate] states it"
-    )]
-    PlateExposureAssumed {
-        /// What is assumed.
-        ev100: f64,
-        /// Luminance of display white at it, cd/m^2.
-        white: f64,
-    },
-    /// Something that changes the plate hardly.
-    #[error(
-        "it changes the picture by {percent:.1} %, which is hardly seen; to show it, {advice}, or lower `exposure_ev100` in [plate]"
-    )]
-    Faint {
-        /// Mean change of the picture, beside its mean.
-        percent: f64,
-        /// What else would show it.
-        advice: &'static str,
-    },
+#[derive(Clone, Debug, PartialEq)]
+pub struct Remark {
+    /// The parameter of the phenomenon's own table that it speaks of, as in `shapes.1` (counting from 0); none where it is all of it.
+    pub key: Option<String>,
+    /// What to know, and what would change it.
+    pub message: String,
+    /// Whether it only holds while nothing else shines: what is simulated may shine later than the frames that were looked at.
+    pub unless_lit_later: bool,
 }
 
 impl Remark {
-    /// The parameter of the phenomenon's own table that it speaks of, as in `shapes.1` (counting from 0); none where it is all of it.
+    /// A remark on a phenomenon as a whole.
     #[must_use]
-    pub fn key(&self) -> Option<String> {
-        match self {
-            Self::Unlit | Self::Unfed | Self::PlateExposureAssumed { .. } | Self::Faint { .. } => None,
-            Self::Buried { burner } => Some(format!("burners.{}", burner.saturating_sub(1))),
-            Self::Crossing { shape } => Some(format!("shapes.{}", shape.saturating_sub(1))),
-        }
+    pub fn new(message: impl Into<String>) -> Self {
+        Self { key: None, message: message.into(), unless_lit_later: false }
+    }
+
+    /// A remark on what stands at `key` in the phenomenon's own table.
+    #[must_use]
+    pub fn at(key: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { key: Some(key.into()), ..Self::new(message) }
+    }
+}
+
+impl fmt::Display for Remark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
     }
 }
 
@@ -146,71 +121,56 @@ impl LevelMirror {
     }
 }
 
-/// One phenomenon of a scene, ready to be drawn at any time (closed form) or stepped there.
-///
-/// Everything is a function of the parameters, the seed, the name and the time: never of the threads, of the frames
-/// drawn before, or of the size of the picture.
-pub trait Phenomenon: Send + Sync {
+/// What is fixed when a phenomenon is built.
+#[derive(Clone, Copy, Debug)]
+pub struct PhenomenonInfo<'a> {
     /// Its name in the scene, which also names its layers.
-    fn name(&self) -> &str;
-
+    pub name: &'a str,
     /// The quantities it can write beside its light.
-    fn aovs(&self) -> &'static [AovDescriptor];
+    pub aovs: &'static [AovDescriptor],
+    /// How it steps; `None` for a closed form, which is drawn at any time without steps.
+    pub stepping: Option<Stepping>,
+    /// The level mirror that it is. It then gets a picture of everything else seen in that mirror.
+    pub mirror: Option<LevelMirror>,
+    /// What to do to make it stronger, as a remark says it.
+    pub strengthened_by: &'static str,
+}
+
+impl<'a> PhenomenonInfo<'a> {
+    /// A closed form without AOVs, which is no mirror.
+    #[must_use]
+    pub fn new(name: &'a str) -> Self {
+        let strengthened_by = "make it larger or brighter";
+        Self { name, aovs: &[], stepping: None, mirror: None, strengthened_by }
+    }
+}
+
+/// One phenomenon of a scene, built once from its parameters and shared by all that looks at it: checks, remarks, exposure, shots.
+///
+/// What changes from step to step lives in a [`Run`]. Everything is a function of the parameters, the seed, the name and the time: never of
+/// the threads, of the frames drawn before, or of the size of the picture.
+pub trait Phenomenon: Send + Sync {
+    /// What is fixed.
+    fn info(&self) -> PhenomenonInfo<'_>;
 
     /// Luminance of its bright parts, cd/m^2, from which `exposure_ev100 = "auto"` is chosen once a shot.
     fn luminance(&self) -> f64;
 
-    /// How it steps; `None` for a closed form, which is drawn at any time without steps.
-    fn stepping(&self) -> Option<Stepping> {
+    /// What a user should know of how it will look among others.
+    fn remark(&self, _neighbors: &Neighbours) -> Option<Remark> {
         None
     }
 
-    /// Steps from `time` to one step later. Closed forms do nothing.
-    fn step(&mut self, _time: f64, _surroundings: &Surroundings) {}
+    /// A run of it, at its beginning: before the preroll of what is stepped. Takes no construction; any number of runs may live at once.
+    fn start(self: Arc<Self>) -> Box<dyn Run>;
+}
 
-    /// Time of the state that an exposure is drawn from: it is stepped until then. What happens after that while the shutter is open,
-    /// it finds out itself.
-    fn drawn_from(&self, shutter: Shutter) -> f64 {
-        shutter.middle()
-    }
-
-    /// Its state; empty for a closed form.
-    fn snapshot(&self) -> Vec<u8> {
-        Vec::new()
-    }
-
-    /// Returns to a state that [`snapshot`](Self::snapshot) gave.
-    ///
-    /// # Errors
-    /// The bytes are not such a state; the phenomenon is then unchanged.
-    fn restore(&mut self, _state: &[u8]) -> Result<(), SnapshotError> {
-        Err(SnapshotError::NoState)
-    }
-
-    /// Its particles at time `t`, while the shutter is open; `None` where it has none.
-    fn particles(&self, _t: f64) -> Option<PointCloud> {
-        None
-    }
-
+/// A phenomenon in the course of a shot: drawn at any time where it is a closed form, at the time that it was stepped to where it is not.
+pub trait Run: Send + Sync {
     /// What the others see of it while the shutter is open.
     fn publish(&self, shutter: Shutter) -> Publication;
 
-    /// What a user should know of how it will look among others.
-    fn remark(&self, _neighbours: &Neighbours) -> Option<Remark> {
-        None
-    }
-
-    /// What to do to make it stronger, as a remark says it.
-    fn strengthened_by(&self) -> &'static str {
-        "make it larger or brighter"
-    }
-
-    /// The level mirror that it is. It then gets a picture of everything else seen in that mirror.
-    fn mirror(&self) -> Option<LevelMirror> {
-        None
-    }
-
-    /// The stretches of depth that it fills, in any order. Slices are cut at their ends.
+    /// The intervals of depth that it fills, in any order. Slices are cut at their ends.
     fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval>;
 
     /// Prepares one frame, so that strips of it can be drawn in any order by any thread.
@@ -223,6 +183,70 @@ pub trait Phenomenon: Send + Sync {
         surroundings: &'a Surroundings<'a>,
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled>;
+
+    /// Its particles at time `t`, while the shutter is open, for exports; `None` where it has none.
+    fn export(&self, _t: f64) -> Option<PointCloud> {
+        None
+    }
+
+    /// Its state, where it is stepped.
+    fn as_stepped(&self) -> Option<&dyn Stepped> {
+        None
+    }
+
+    /// Its state to step, where it is stepped.
+    fn as_stepped_mut(&mut self) -> Option<&mut dyn Stepped> {
+        None
+    }
+}
+
+/// Runs of a closed form are the phenomenon itself.
+impl<P: Run + ?Sized> Run for Arc<P> {
+    fn publish(&self, shutter: Shutter) -> Publication {
+        (**self).publish(shutter)
+    }
+
+    fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval> {
+        (**self).depth_intervals(view, surroundings)
+    }
+
+    fn prepare<'a>(
+        &'a self,
+        view: &'a View,
+        surroundings: &'a Surroundings<'a>,
+        observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        (**self).prepare(view, surroundings, observer)
+    }
+
+    fn export(&self, t: f64) -> Option<PointCloud> {
+        (**self).export(t)
+    }
+
+    fn as_stepped(&self) -> Option<&dyn Stepped> {
+        (**self).as_stepped()
+    }
+}
+
+/// What a run that is simulated adds: a state that moves in fixed steps.
+pub trait Stepped: Send + Sync {
+    /// Steps from `time` to one step later.
+    fn step(&mut self, time: f64, surroundings: &Surroundings);
+
+    /// Time of the state that an exposure is drawn from: it is stepped until then. What happens after that while the shutter is open,
+    /// it finds out itself.
+    fn time_for(&self, shutter: Shutter) -> f64 {
+        shutter.middle()
+    }
+
+    /// Its state.
+    fn snapshot(&self) -> Vec<u8>;
+
+    /// Returns to a state that [`snapshot`](Self::snapshot) gave.
+    ///
+    /// # Errors
+    /// The bytes are not such a state; it is then unchanged.
+    fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError>;
 }
 
 /// One frame of a phenomenon, ready to draw.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bansho::{
     AlphaConvention, BitDepth, View,
-    job::{BackendChoice, Flipbook, FlipbookCrop, JobError},
+    job::{Flipbook, FlipbookCrop, JobError},
 };
 use clap::Args;
 
@@ -63,9 +63,6 @@ pub(crate) struct FlipbookArgs {
     /// How the light is shown in .png.
     #[arg(long, default_value = "display", value_parser = values::view_parser())]
     view: View,
-    /// What draws. `gpu` fails in this version, which has none.
-    #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
-    backend: BackendChoice,
     #[command(flatten)]
     inputs: InputArgs,
     #[command(flatten)]
@@ -89,7 +86,6 @@ impl FlipbookArgs {
             alpha: self.alpha,
             out: self.out.clone(),
             overwrite: self.output.overwrite,
-            backend: self.backend,
             ..Flipbook::new(scene, self.grid)
         })
     }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bansho::{
     AlphaConvention, BitDepth, Rect, View,
-    job::{BackendChoice, ContactBackground, Job, JobError},
+    job::{ContactBackground, Job, JobError},
 };
 use clap::Args;
 
@@ -106,9 +106,6 @@ pub(crate) struct RenderArgs {
     resume: bool,
     #[command(flatten)]
     states: StateArgs,
-    /// What draws. `gpu` fails in this version, which has none.
-    #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
-    backend: BackendChoice,
     #[command(flatten)]
     inputs: InputArgs,
     #[command(flatten)]
@@ -142,7 +139,6 @@ impl RenderArgs {
             overwrite: self.output.overwrite,
             snapshots: self.states.snapshots.clone(),
             snapshot_every: self.states.snapshot_every,
-            backend: self.backend,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use bansho::job::{BackendChoice, JobError, Simulate};
+use bansho::job::{JobError, Simulate};
 use clap::Args;
 
 use super::{
@@ -38,9 +38,6 @@ pub(crate) struct SimulateArgs {
     set: Vec<String>,
     #[command(flatten)]
     states: StateArgs,
-    /// What simulates. `gpu` fails in this version, which has none.
-    #[arg(long, default_value = "auto", value_parser = values::backend_parser(), help_heading = "Work")]
-    backend: BackendChoice,
     #[command(flatten)]
     inputs: InputArgs,
     #[command(flatten)]
@@ -59,7 +56,6 @@ impl SimulateArgs {
             snapshots: self.states.snapshots.clone(),
             snapshot_every: self.states.snapshot_every,
             overwrite: self.output.overwrite,
-            backend: self.backend,
             ..Simulate::new(scene, self.particles.clone())
         })
     }

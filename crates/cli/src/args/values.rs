@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bansho::{
     AlphaConvention, BitDepth, Rect, View,
-    job::{BackendChoice, ContactBackground, FlipbookCrop, StreakFormat},
+    job::{ContactBackground, FlipbookCrop, StreakFormat},
     rain::drops::terminal_velocity::VelocityLaw,
     render::{
         frames::{self, FrameSpecError},
@@ -139,11 +139,6 @@ pub(super) fn streak_format_parser() -> impl TypedValueParser<Value = StreakForm
 
 pub(super) fn view_parser() -> impl TypedValueParser<Value = View> {
     PossibleValuesParser::new(View::NAMES).try_map(|name| View::from_name(&name))
-}
-
-pub(super) fn backend_parser() -> impl TypedValueParser<Value = BackendChoice> {
-    let names = BackendChoice::CHOICES.iter().map(|choice| choice.name);
-    PossibleValuesParser::new(names).map(|name| BackendChoice::from_name(&name).unwrap_or_default())
 }
 
 pub(super) fn contact_background_parser() -> impl TypedValueParser<Value = ContactBackground> {

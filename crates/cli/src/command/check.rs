@@ -30,8 +30,8 @@ pub(crate) fn run(args: &CheckArgs) -> anyhow::Result<()> {
 
 fn describe(path: &Path, inputs: &InputArgs) -> Result<String, JobError> {
     let scene = inputs.read(path, &[])?;
-    let plan = job::check_scene(&scene)?;
-    for remark in job::remarks(&scene, &plan)? {
+    let (compiled, plan) = job::check_scene(&scene)?;
+    for remark in job::remarks(&scene, &compiled, &plan) {
         output::tell("warning", &remark.to_string());
     }
     let [width, height] = plan.size();

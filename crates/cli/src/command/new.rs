@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use bansho::{
     KINDS,
+    base::phenomenon::kind::PhenomenonKind,
     base::{host::printable::printable, parameters::nearest},
     media::{MediaError, atomic},
-    render::scene::{PhenomenonKind, template},
+    render::scene::template,
 };
 
 use crate::{

@@ -1,7 +1,6 @@
 //! `bansho upgrade`
 
 use bansho::{
-    MemoryAssets,
     base::host::printable::printable,
     job::SceneFile,
     media::atomic,
@@ -17,7 +16,7 @@ pub(crate) fn run(args: &UpgradeArgs) -> anyhow::Result<()> {
         Ok(upgraded) => upgraded,
         Err(error) => {
             // The parser says the same with the place in the file.
-            scene.check(&MemoryAssets::default())?;
+            scene.parse()?;
             return Err(error.into());
         }
     };

@@ -217,15 +217,6 @@ fn words_that_are_no_options_are_refused_with_the_nearest() {
     misused(&["--bits", "12"], &["8", "16"]);
 }
 
-#[test]
-fn a_gpu_that_is_not_there_has_its_own_exit_code() {
-    let folder = Folder::with_scene(FLAME);
-    let run = folder.run(&["render", "scene.toml", "--backend", "gpu"]);
-    assert_eq!((run.code, run.errors()), (Some(4), 1));
-    says(&run.stderr, &["no usable GPU", "cpu, auto"]);
-    assert_eq!(folder.names(), ["scene.toml"]);
-}
-
 /// What the program says of a particle flame with these lines.
 fn refused_gas(lines: &str) -> String {
     refused(&format!("bansho = 1\n[picture]\nsize = [32, 18]\n[[flame_particles]]\n{lines}"), 3)

@@ -3,13 +3,31 @@
 use std::{collections::BTreeMap, process::Command};
 
 /// Each crate with those of the workspace that it may depend on: the table of ARCHITECTURE.md.
-const MAY_KNOW: [(&str, &[&str]); 7] = [
+const MAY_KNOW: [(&str, &[&str]); 11] = [
     ("bansho-base", &[]),
-    ("bansho-models", &["bansho-base"]),
-    ("bansho-render", &["bansho-base", "bansho-models"]),
+    ("bansho-sph", &["bansho-base"]),
+    // No phenomenon knows another.
+    ("bansho-fire", &["bansho-base", "bansho-sph"]),
+    ("bansho-rain", &["bansho-base"]),
+    ("bansho-aurora", &["bansho-base", "bansho-sph"]),
+    ("bansho-environment", &["bansho-base"]),
+    // It names no phenomenon: the face lists their kinds.
+    ("bansho-render", &["bansho-base", "bansho-environment"]),
     ("bansho-media", &["bansho-base"]),
     // The job needs to draw and to write: the one edge from the face to files, behind the feature `files`.
-    ("bansho", &["bansho-base", "bansho-models", "bansho-render", "bansho-media"]),
+    (
+        "bansho",
+        &[
+            "bansho-base",
+            "bansho-sph",
+            "bansho-fire",
+            "bansho-rain",
+            "bansho-aurora",
+            "bansho-environment",
+            "bansho-render",
+            "bansho-media",
+        ],
+    ),
     ("bansho-cli", &["bansho"]),
     ("bansho-studio", &["bansho"]),
 ];

@@ -10,13 +10,15 @@ mod surface;
 mod waves;
 mod wet_reflection;
 
+use std::sync::Arc;
+
 use bansho_base::{
     host::observer::{Cancelled, Observer, check},
     image::Image,
     math::{DVec2, random::Key},
     phenomenon::{
-        LevelMirror, Phenomenon, Prepared,
-        strip::{AovDescriptor, DepthInterval, Shutter, View},
+        Phenomenon, PhenomenonInfo, Prepared, Run,
+        strip::{DepthInterval, Shutter, View},
         surroundings::{Backdrop, Occluder, Publication, Surroundings},
     },
 };
@@ -63,12 +65,9 @@ struct Lake {
 }
 
 impl Phenomenon for Ground {
-    fn name(&self) -> &str {
-        Self::NAME
-    }
-
-    fn aovs(&self) -> &'static [AovDescriptor] {
-        &[]
+    fn info(&self) -> PhenomenonInfo<'_> {
+        let dry = self.parameters.wetness.constant() == Some(0.0) && self.parameters.kind != GroundKind::Water;
+        PhenomenonInfo { mirror: (!dry).then(|| self.parameters.level()), ..PhenomenonInfo::new(Self::NAME) }
     }
 
     /// It only shows the light of others.
@@ -76,15 +75,16 @@ impl Phenomenon for Ground {
         0.0
     }
 
+    fn start(self: Arc<Self>) -> Box<dyn Run> {
+        Box::new(self)
+    }
+}
+
+impl Run for Ground {
     fn publish(&self, _shutter: Shutter) -> Publication {
         let point = bansho_base::math::DVec3::new(0.0, self.parameters.height, 0.0);
         let solid = Occluder::HalfSpace { point, normal: bansho_base::math::DVec3::Y };
         Publication { occluders: vec![solid], ..Publication::default() }
-    }
-
-    fn mirror(&self) -> Option<LevelMirror> {
-        let dry = self.parameters.wetness.constant() == Some(0.0) && self.parameters.kind != GroundKind::Water;
-        (!dry).then(|| self.parameters.level())
     }
 
     fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {

@@ -105,7 +105,7 @@ fn a_plates_ground_is_darkened_but_not_covered() {
 
 #[test]
 fn only_dry_land_is_no_mirror() {
-    let mirror = |parameters| Ground::new(parameters, 1, None).mirror().map(|mirror| mirror.height);
+    let mirror = |parameters| Ground::new(parameters, 1, None).info().mirror.map(|mirror| mirror.height);
     assert_eq!(mirror(plain()), None);
     assert_eq!(mirror(GroundParameters { wetness: 0.1.into(), height: 0.5, ..plain() }), Some(0.5));
     assert_eq!(mirror(GroundParameters { kind: GroundKind::Water, ..plain() }), Some(0.0));

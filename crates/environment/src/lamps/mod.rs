@@ -1,13 +1,15 @@
 //! Lamps as they are seen: a glowing ball where a point light or a spot stands, and the glare that a camera's lens makes of it.
 
+use std::sync::Arc;
+
 use bansho_base::{
     color,
     host::observer::{Cancelled, Observer},
     image::Rect,
     math::{self, DVec2},
     phenomenon::{
-        Phenomenon, Prepared,
-        strip::{AovDescriptor, DepthInterval, Shutter, Strip, View},
+        Phenomenon, PhenomenonInfo, Prepared, Run,
+        strip::{DepthInterval, Shutter, Strip, View},
         surroundings::{Emitter, Light, Publication, Surroundings},
     },
 };
@@ -158,12 +160,8 @@ impl Disc {
 }
 
 impl Phenomenon for Lamps {
-    fn name(&self) -> &str {
-        Self::NAME
-    }
-
-    fn aovs(&self) -> &'static [AovDescriptor] {
-        &[]
+    fn info(&self) -> PhenomenonInfo<'_> {
+        PhenomenonInfo::new(Self::NAME)
     }
 
     /// Lamps do not set the exposure: they are meant to be far brighter than what they light.
@@ -171,6 +169,12 @@ impl Phenomenon for Lamps {
         0.0
     }
 
+    fn start(self: Arc<Self>) -> Box<dyn Run> {
+        Box::new(self)
+    }
+}
+
+impl Run for Lamps {
     /// The lights are the scene's own, so all have them already.
     fn publish(&self, _shutter: Shutter) -> Publication {
         Publication::default()

@@ -18,8 +18,8 @@ use bansho_base::{
     image::Rect,
     math::{DVec2, DVec3, MulAdd, approximations, simd::LANES},
     phenomenon::{
-        Phenomenon, Prepared,
-        strip::{AovDescriptor, DepthInterval, Shutter, Strip, View},
+        Phenomenon, PhenomenonInfo, Prepared, Run,
+        strip::{DepthInterval, Shutter, Strip, View},
         surroundings::{Publication, Surroundings},
     },
     world::sky::{Sky, SkyKind, SkyParameters},
@@ -86,18 +86,20 @@ const FAR: DepthInterval = DepthInterval { near: 1e12, far: f64::INFINITY };
 const HILL_SHADE: f32 = 0.04;
 
 impl Phenomenon for SkyBackdrop {
-    fn name(&self) -> &str {
-        Self::NAME
-    }
-
-    fn aovs(&self) -> &'static [AovDescriptor] {
-        &[]
+    fn info(&self) -> PhenomenonInfo<'_> {
+        PhenomenonInfo::new(Self::NAME)
     }
 
     fn luminance(&self) -> f64 {
         f64::from(color::luminance(self.parameters.at(0.0).radiance(DVec3::Y)))
     }
 
+    fn start(self: Arc<Self>) -> Box<dyn Run> {
+        Box::new(self)
+    }
+}
+
+impl Run for SkyBackdrop {
     fn publish(&self, _shutter: Shutter) -> Publication {
         Publication::default()
     }

@@ -1,17 +1,21 @@
 //! The particle flame as a phenomenon: its simulation, and how it is drawn and seen by others.
 
+use std::sync::Arc;
+
 use bansho_base::{
     color,
     geometry::point_cloud::{PointCloud, Quantity},
     host::{
         assets::Assets,
+        constructions,
         observer::{Cancelled, Observer},
     },
     math::{self, DVec2, DVec3, random::Key},
     parameters::{Auto, Parameter},
     phenomenon::{
-        Phenomenon, Prepared, Remark, SnapshotError, Stepping,
-        strip::{AovDescriptor, DepthInterval, Shutter, View},
+        Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
+        kind::{BuildContext, BuildError, Describe},
+        strip::{DepthInterval, Shutter, View},
         surroundings::{Neighbours, Publication, Surroundings},
     },
 };
@@ -22,10 +26,14 @@ use super::{
     render::{self, Ending, Gas, Memory, PreparedGas, SpriteStyle},
 };
 use crate::particles::simulate::{
-    burner::Burner, derived::Design, particles::Particles, simulation::Simulation, snapshot,
+    burner::Burner,
+    derived::{Design, check_count},
+    particles::Particles,
+    simulation::Simulation,
+    snapshot,
 };
 
-/// A particle flame at some moment of its life.
+/// A particle flame at some moment of its life. The one that is built stands at its beginning; runs are copies of it, which share what is fixed.
 #[derive(Clone, Debug)]
 pub struct FlameParticles {
     name: String,
@@ -55,6 +63,7 @@ impl FlameParticles {
         if let Some(seconds) = loop_s {
             close_loop(&mut parameters, seconds)?;
         }
+        constructions::count("flame_particles");
         let key = Key::new(seed, name);
         let design = Design::new(&parameters, loop_s, assets)?;
         let steps = (design.preroll / parameters.step_s).round();
@@ -120,31 +129,43 @@ fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result
 /// Speed of gas that draws its detail as it is, beside that of gas half way up.
 const UNSTRETCHED: f64 = 0.35;
 
-impl Phenomenon for FlameParticles {
-    fn name(&self) -> &str {
-        &self.name
+impl Describe for FlameParticlesParameters {
+    const KEY: &'static str = "flame_particles";
+    const PLACEMENT_KEYS: &'static [&'static str] = &["position", "burners", "domain_min", "domain_max"];
+    const FIRST_KEYS: &'static [&'static str] = &[
+        "position",
+        "particles",
+        "motion.turbulence",
+        "life.soot_ppm",
+        "life.smoke",
+        "burners.diameter",
+        "burners.heat_release_kw",
+    ];
+    const SETTING: &'static str = "\
+        camera = { position = [0.0, 0.9, 3.8], target = [0.0, 0.9, 0.0] }\n\
+        wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";
+
+    fn check_particle_budget(&self, others: i64) -> Result<i64, BuildError> {
+        check_count(self.particles, others).map_err(|fault| BuildError::new(fault.key, fault.kind))?;
+        Ok(self.particles + others)
     }
 
-    fn aovs(&self) -> &'static [AovDescriptor] {
-        render::AOVS
-    }
-
-    fn remark(&self, neighbours: &Neighbours) -> Option<Remark> {
-        let burners = &self.simulation.design.burners;
-        let gives = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
-        if !burners.iter().any(gives) {
-            return Some(Remark::Unfed);
+    fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
+        match FlameParticles::new(self.clone(), context.name, context.seed, context.loop_s, context.assets) {
+            Ok(flame) => Ok(Arc::new(flame)),
+            Err(fault) => Err(match fault.kind {
+                ParticleFaultKind::Asset(error) => BuildError { key: fault.key, kind: error.into() },
+                other => BuildError::new(fault.key, other),
+            }),
         }
-        let origin = DVec3::from(self.parameters.position);
-        let is_buried = |burner: &Burner| {
-            let within = |birth: u64| {
-                let place = origin + burner.birthplace(self.simulation.key, birth, 0.0).position;
-                neighbours.occluders().any(|occluder| occluder.signed_distance(place) < 0.0)
-            };
-            // As many births as show it.
-            gives(burner) && (0..32).all(within)
-        };
-        burners.iter().position(is_buried).map(|index| Remark::Buried { burner: index + 1 })
+    }
+}
+
+impl Phenomenon for FlameParticles {
+    fn info(&self) -> PhenomenonInfo<'_> {
+        let Design { preroll, dissolve, .. } = *self.simulation.design;
+        let stepping = Stepping { step: self.parameters.step_s, preroll, dissolve };
+        PhenomenonInfo { aovs: render::AOVS, stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 
     fn luminance(&self) -> f64 {
@@ -163,11 +184,72 @@ impl Phenomenon for FlameParticles {
         BRIGHT * black * emissivity
     }
 
-    fn stepping(&self) -> Option<Stepping> {
-        let Design { preroll, dissolve, .. } = self.simulation.design;
-        Some(Stepping { step: self.parameters.step_s, preroll, dissolve })
+    fn remark(&self, neighbors: &Neighbours) -> Option<Remark> {
+        let burners = &self.simulation.design.burners;
+        let gives = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
+        if !burners.iter().any(gives) {
+            return Some(Remark::new("none of its burners gives gas; a `flow` above 0 would"));
+        }
+        let origin = DVec3::from(self.parameters.position);
+        let is_buried = |burner: &Burner| {
+            let within = |birth: u64| {
+                let place = origin + burner.birthplace(self.simulation.key, birth, 0.0).position;
+                neighbors.occluders().any(|occluder| occluder.signed_distance(place) < 0.0)
+            };
+            // As many births as show it.
+            gives(burner) && (0..32).all(within)
+        };
+        burners.iter().position(is_buried).map(|index| {
+            let message =
+                format!("its burner {} lies within an obstacle, from which its gas cannot come out", index + 1);
+            Remark::at(format!("burners.{index}"), message)
+        })
     }
 
+    fn start(self: Arc<Self>) -> Box<dyn Run> {
+        Box::new((*self).clone())
+    }
+}
+
+impl Run for FlameParticles {
+    fn publish(&self, shutter: Shutter) -> Publication {
+        let lights = render::luminous(&self.gas(), &self.parameters.look, shutter.middle());
+        Publication { lights, ..Publication::default() }
+    }
+
+    fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
+        render::depth_intervals(&self.gas(), &self.parameters.look, view)
+    }
+
+    fn prepare<'a>(
+        &'a self,
+        view: &'a View,
+        surroundings: &'a Surroundings<'a>,
+        observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        Ok(Box::new(PreparedGas::new(self.gas(), &self.parameters.look, view, surroundings, observer)?))
+    }
+
+    fn export(&self, t: f64) -> Option<PointCloud> {
+        let gas = self.gas();
+        let Particles { velocity: [u, v, w], temperature, density, .. } = gas.particles;
+        Some(PointCloud {
+            positions: (0..gas.particles.len()).map(|index| gas.place(index, t).as_vec3().to_array()).collect(),
+            velocities: u.iter().zip(v).zip(w).map(|((u, v), w)| [*u, *v, *w]).collect(),
+            quantities: [(Quantity::Temperature, temperature.clone()), (Quantity::Density, density.clone())].into(),
+        })
+    }
+
+    fn as_stepped(&self) -> Option<&dyn Stepped> {
+        Some(self)
+    }
+
+    fn as_stepped_mut(&mut self) -> Option<&mut dyn Stepped> {
+        Some(self)
+    }
+}
+
+impl Stepped for FlameParticles {
     fn step(&mut self, time: f64, surroundings: &Surroundings) {
         self.simulation.step(time, surroundings);
         self.time = time + self.simulation.step_s();
@@ -190,33 +272,5 @@ impl Phenomenon for FlameParticles {
         self.simulation.particles = snapshot::read(&self.simulation.particles, rest, burners)?;
         (self.time, self.air_temperature_k) = (time, air);
         Ok(())
-    }
-
-    fn particles(&self, t: f64) -> Option<PointCloud> {
-        let gas = self.gas();
-        let Particles { velocity: [u, v, w], temperature, density, .. } = gas.particles;
-        Some(PointCloud {
-            positions: (0..gas.particles.len()).map(|index| gas.place(index, t).as_vec3().to_array()).collect(),
-            velocities: u.iter().zip(v).zip(w).map(|((u, v), w)| [*u, *v, *w]).collect(),
-            quantities: [(Quantity::Temperature, temperature.clone()), (Quantity::Density, density.clone())].into(),
-        })
-    }
-
-    fn publish(&self, shutter: Shutter) -> Publication {
-        let lights = render::luminous(&self.gas(), &self.parameters.look, shutter.middle());
-        Publication { lights, ..Publication::default() }
-    }
-
-    fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
-        render::depth_intervals(&self.gas(), &self.parameters.look, view)
-    }
-
-    fn prepare<'a>(
-        &'a self,
-        view: &'a View,
-        surroundings: &'a Surroundings<'a>,
-        observer: &dyn Observer,
-    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
-        Ok(Box::new(PreparedGas::new(self.gas(), &self.parameters.look, view, surroundings, observer)?))
     }
 }

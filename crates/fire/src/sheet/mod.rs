@@ -15,12 +15,14 @@ use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
     host::{
+        constructions,
         observer::{Cancelled, Observer, check},
         once::get_or_make,
     },
     parameters::parameter_fault::{FaultKind, ParameterFault},
     phenomenon::{
-        Phenomenon, Prepared,
+        Phenomenon, PhenomenonInfo, Prepared, Run,
+        kind::{BuildContext, BuildError, Describe},
         strip::{AovDescriptor, AovRule, DepthInterval, Shutter, View},
         surroundings::{Publication, Surroundings},
     },
@@ -67,6 +69,7 @@ impl FlameSheet {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
             return Err(ParameterFault { key: "loop", kind: FaultKind::LoopLength { seconds } });
         }
+        constructions::count("flame_sheet");
         let clock = Clock::new(parameters.speed.clone(), loop_s);
         Shape::check(&parameters.shape)?;
         Ramp::check(&parameters.texture)?;
@@ -158,13 +161,35 @@ const AOVS: &[AovDescriptor] = &[
     },
 ];
 
-impl Phenomenon for FlameSheet {
-    fn name(&self) -> &str {
-        &self.name
-    }
+impl Describe for FlameSheetParameters {
+    const KEY: &'static str = "flame_sheet";
+    const PLACEMENT_KEYS: &'static [&'static str] = &["position", "width", "height"];
+    // From where the flame nearly fills the height of the picture.
+    const SETTING: &'static str = "camera = { position = [0.0, 0.76, 2.75], target = [0.0, 0.76, 0.0] }\n";
+    const FIRST_KEYS: &'static [&'static str] = &[
+        "position",
+        "width",
+        "height",
+        "speed",
+        "variation",
+        "texture.contrast",
+        "colour.luminance",
+        "colour.core_temperature_k",
+        "sparks.rate",
+        "smoke.optical_depth",
+    ];
 
-    fn aovs(&self) -> &'static [AovDescriptor] {
-        AOVS
+    fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
+        match FlameSheet::new(self.clone(), context.name, context.seed, context.loop_s) {
+            Ok(sheet) => Ok(Arc::new(sheet)),
+            Err(fault) => Err(BuildError::new(fault.key, fault.kind)),
+        }
+    }
+}
+
+impl Phenomenon for FlameSheet {
+    fn info(&self) -> PhenomenonInfo<'_> {
+        PhenomenonInfo { aovs: AOVS, ..PhenomenonInfo::new(&self.name) }
     }
 
     fn luminance(&self) -> f64 {
@@ -173,6 +198,12 @@ impl Phenomenon for FlameSheet {
         BRIGHT * self.parameters.colour.luminance.bounds()[1]
     }
 
+    fn start(self: Arc<Self>) -> Box<dyn Run> {
+        Box::new(self)
+    }
+}
+
+impl Run for FlameSheet {
     fn publish(&self, shutter: Shutter) -> Publication {
         let lights = self.flames.iter().flat_map(|flame| self.point_lights(flame, shutter)).collect();
         Publication { lights, ..Publication::default() }

@@ -11,7 +11,7 @@ use bansho_base::{
     },
     parameters::{Auto, Parameters, Reader, animated::Animated, sample},
     phenomenon::{
-        Phenomenon,
+        Run,
         strip::{DepthInterval, Shutter, Strip, View},
         surroundings::{Emitter, Surroundings},
     },

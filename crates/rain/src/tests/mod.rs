@@ -10,7 +10,7 @@ use bansho_base::{
     image::Rect,
     parameters::{Range, animated::Animated},
     phenomenon::{
-        Phenomenon,
+        Run,
         strip::{AovRule, DepthInterval, Shutter, Strip, View},
         surroundings::{Emitter, Light, Publication, Surroundings},
     },

@@ -1,15 +1,14 @@
 //! What a scene must fulfil beyond the ranges of single parameters.
 
-use std::collections::HashMap;
-
 use bansho_base::{
     camera::{Lens, VERTICAL_FOV_DEG},
-    host::assets::Assets,
     math,
     parameters::{Auto, Node, ProblemKind, Range, Reader, Span, Table, Value, nearest},
 };
 
-use super::{FORMAT, Instance, Opening, OpeningFault, PhenomenonKind, Place, SHARED_TABLES, Scene, picture::LightKind};
+use bansho_base::phenomenon::kind::{BuildError, PhenomenonKind};
+
+use super::{FORMAT, Place, SHARED_TABLES, Scene, picture::LightKind};
 use bansho_environment::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
 /// The format number must be one that this program reads.
@@ -105,59 +104,15 @@ fn name_fault(name: &str) -> Option<String> {
     None
 }
 
-/// Every asset must be there, and every phenomenon must come to be, unless it is as it was in a `good` scene.
-pub(super) fn assets_and_openings(
-    scene: &mut Scene,
-    good: Option<&Scene>,
-    root: &Table,
-    assets: &dyn Assets,
-    reader: &mut Reader,
-) {
+/// What the values of several parameters say together.
+pub(super) fn values(scene: &Scene, root: &Table, reader: &mut Reader) {
     camera(scene, root, reader);
     lights(scene, root, reader);
-    plate(scene, good, root, assets, reader);
-    for (index, obstacle) in scene.obstacles.iter().enumerate() {
-        if let Err(fault) = obstacle.open(assets) {
-            report(fault, format!("obstacle.{index}"), root, reader);
-        }
-    }
-    let (mut seen, mut crowd) = (std::collections::BTreeMap::new(), 0);
-    let seed = scene.picture.seed as u64;
-    let good = good.filter(|good| good.picture.seed == scene.picture.seed);
-    let known: HashMap<&str, &Instance> =
-        good.iter().flat_map(|good| &good.instances).map(|instance| (instance.name.as_str(), instance)).collect();
-    for instance in &mut scene.instances {
-        let index: &mut usize = seen.entry(instance.kind.key).or_default();
-        let path = format!("{}.{index}", instance.kind.key);
-        *index += 1;
-        if instance.enabled {
-            match instance.source.crowd(crowd) {
-                Ok(together) => crowd = together,
-                Err(fault) => {
-                    report(fault, path, root, reader);
-                    continue;
-                }
-            }
-        }
-        instance.luminance = known.get(instance.name.as_str()).and_then(|old| known_luminance(old, instance));
-        if instance.luminance.is_some() {
-            continue;
-        }
-        match instance.source.open(&Opening { name: &instance.name, seed, loop_s: None, assets }) {
-            Ok(phenomenon) => instance.luminance = Some(phenomenon.luminance()),
-            Err(fault) => report(fault, path, root, reader),
-        }
-    }
-}
-
-/// The luminance of a phenomenon if it is as its namesake was in a scene that was good.
-fn known_luminance(old: &Instance, instance: &Instance) -> Option<f64> {
-    let same = old.kind.key == instance.kind.key && old.source.canonical() == instance.source.canonical();
-    old.luminance.filter(|_| same)
+    plate(scene, root, reader);
 }
 
 /// Notes a fault of what stands at `path`.
-fn report(fault: OpeningFault, path: String, root: &Table, reader: &mut Reader) {
+pub(crate) fn report(fault: BuildError, path: String, root: &Table, reader: &mut Reader) {
     let place = place(root, &format!("{path}.{}", fault.key));
     reader.within(path, |reader| {
         reader.within(fault.key, |reader| reader.report_at(place, fault.kind));
@@ -193,7 +148,7 @@ fn field_of_view(scene: &Scene, root: &Table, reader: &mut Reader) {
         focal(min)
     );
     report(
-        OpeningFault { key: "focal_length_mm".into(), kind: ProblemKind::Conflict(told) },
+        BuildError { key: "focal_length_mm".into(), kind: ProblemKind::Conflict(told) },
         "camera".into(),
         root,
         reader,
@@ -205,7 +160,7 @@ fn field_of_view(scene: &Scene, root: &Table, reader: &mut Reader) {
 fn lights(scene: &Scene, root: &Table, reader: &mut Reader) {
     for (index, light) in scene.lights.iter().enumerate() {
         let path = format!("light.{index}");
-        let fault = |key: &str, text| OpeningFault { key: key.into(), kind: ProblemKind::Conflict(text) };
+        let fault = |key: &str, text| BuildError { key: key.into(), kind: ProblemKind::Conflict(text) };
         if light.is_directed() && !light.has_direction() {
             let told = "is no direction; allowed: any three numbers that are not all 0".to_owned();
             report(fault("direction", told), path.clone(), root, reader);
@@ -221,13 +176,8 @@ fn lights(scene: &Scene, root: &Table, reader: &mut Reader) {
     }
 }
 
-/// The plate of the first frame must be whole and its depth fit it, unless it is as it was in a `good` scene.
-fn plate(scene: &Scene, good: Option<&Scene>, root: &Table, assets: &dyn Assets, reader: &mut Reader) {
-    let frame = scene.picture.first_frame;
-    let known = good.is_some_and(|good| good.plate == scene.plate && good.picture.first_frame == frame);
-    if !known && let Err(fault) = scene.plate.read_frame(assets, frame) {
-        report(fault, "plate".into(), root, reader);
-    }
+/// What belongs to a plate needs one.
+fn plate(scene: &Scene, root: &Table, reader: &mut Reader) {
     if scene.plate.image.is_none() && scene.plate.depth.is_some() {
         let place = place(root, "plate.depth");
         let kind = ProblemKind::Conflict("a depth needs an `image` that it belongs to".into());
@@ -236,7 +186,7 @@ fn plate(scene: &Scene, good: Option<&Scene>, root: &Table, assets: &dyn Assets,
     if scene.plate.image.is_none() && scene.plate.exposure_ev100 != Auto::Auto {
         let told = "an exposure needs an `image` that was taken with it".to_owned();
         report(
-            OpeningFault { key: "exposure_ev100".into(), kind: ProblemKind::Conflict(told) },
+            BuildError { key: "exposure_ev100".into(), kind: ProblemKind::Conflict(told) },
             "plate".into(),
             root,
             reader,

@@ -20,7 +20,7 @@ use super::{PhenomenonKind, toml};
 const NIGHT_WHITE_K: f64 = 4000.0;
 
 /// Which shared tables the text of a scene leaves out and its phenomena bring along. They light the scene; whether they are seen is said by
-/// [`PlanOptions::implied_backdrop`](crate::PlanOptions::implied_backdrop).
+/// [`SceneOptions::implied_backdrop`](super::SceneOptions::implied_backdrop).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ImpliedBackdrop {
     /// `[sky]`

@@ -12,7 +12,6 @@ pub(crate) mod plate;
 mod positions;
 pub mod report;
 pub mod schema;
-pub mod source;
 mod suggest;
 pub mod template;
 mod toml;
@@ -21,16 +20,17 @@ use std::{collections::HashSet, sync::Arc};
 
 use bansho_base::{
     camera::{CameraParameters, SKY_FOV_DEG},
-    host::assets::Assets,
     parameters::{
-        Parameter, Parameters, Problem, ProblemKind, Problems, Reader, Table, TableDescriptor, Value,
+        self, Parameter, Parameters, Problem, ProblemKind, Problems, Reader, Table, TableDescriptor, Value,
         animated::Animated,
     },
+    phenomenon::kind::{CheckedParameters, PhenomenonKind},
     world::{air::Air, sky::SkyParameters, wind::WindParameters},
 };
 
 use bansho_environment::ground::GroundParameters;
 
+pub(crate) use self::check::PLATE_LAYER;
 pub use self::{
     defaults::ImpliedBackdrop,
     obstacle::{ObstacleParameters, ObstacleShape},
@@ -38,7 +38,6 @@ pub use self::{
     place::{Place, Segment},
     positions::Positions,
     report::SceneError,
-    source::{Describe, Memo, Opening, OpeningFault, PhenomenonKind, Source},
 };
 
 /// The scene format that this version reads and writes.
@@ -96,9 +95,7 @@ pub struct Instance {
     /// Whether it is drawn.
     pub enabled: bool,
     /// Its parameters.
-    pub source: Arc<dyn Source>,
-    /// Luminance of its bright parts, cd/m^2, where it was made once to see whether it can be: with the scene's own seed, in no loop.
-    pub luminance: Option<f64>,
+    pub parameters: Arc<dyn CheckedParameters>,
 }
 
 /// A checked scene.
@@ -126,48 +123,63 @@ pub struct Scene {
     pub instances: Vec<Instance>,
     /// Which of sky, ground and lights the text does not state.
     pub implied: ImpliedBackdrop,
+    /// Seed of everything random: that of `[picture]`, or another that was asked for.
+    pub seed: u64,
+    /// Length of the seamless loop that it is, s: a whole number of frames.
+    pub loop_s: Option<f64>,
+}
+
+/// What may be asked of a scene beside its text.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SceneOptions {
+    /// Another seed.
+    pub seed: Option<u64>,
+    /// A seamless loop of about so many seconds.
+    pub loop_s: Option<f64>,
+    /// Whether sky, ground and lamps that the scene's text does not state are seen; they light the scene either way.
+    pub implied_backdrop: bool,
+}
+
+/// Why a scene is no loop.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LoopError {
+    /// A loop shorter than two frames or longer than an hour.
+    #[error("a loop of {seconds} s is out of range; allowed: {min} (two frames) to 3600 s")]
+    Length {
+        /// What was asked for.
+        seconds: f64,
+        /// Two frames.
+        min: f64,
+    },
+    /// Something keyed does not end as it begins.
+    #[error(
+        "the loop of {seconds} s jumps: {what} differs between its first and its last moment; allowed: the same at 0 s and at {seconds} s"
+    )]
+    Jumps {
+        /// Length of the loop.
+        seconds: f64,
+        /// What is keyed.
+        what: String,
+    },
+}
+
+/// The nearest whole number of frames.
+fn loop_length(seconds: f64, fps: FrameRate) -> Result<f64, LoopError> {
+    let min = 2.0 * fps.frame_s();
+    if !(min * 0.999..=3600.0).contains(&seconds) {
+        let min = (1e3 * min).ceil() / 1e3;
+        return Err(LoopError::Length { seconds, min });
+    }
+    Ok((seconds / fps.frame_s()).round() * f64::from(fps.seconds) / f64::from(fps.frames))
 }
 
 impl Scene {
-    /// Reads and checks the scene `text`; `file` is what errors call it.
+    /// Reads and checks the scene `text`; `file` is what errors call it. No asset is read and nothing is built: see
+    /// [`CompiledScene`](crate::CompiledScene) for that.
     ///
     /// # Errors
-    /// Every fault of the text and of the assets it names, each with its place, what is wrong and what is allowed.
-    pub fn parse(file: &str, text: &str, kinds: &[PhenomenonKind], assets: &dyn Assets) -> Result<Self, SceneError> {
-        Self::parse_after(None, file, text, kinds, assets)
-    }
-
-    /// [`parse`](Self::parse) after an edit: phenomena that are as they were in `good`, which was parsed with the same assets, are not
-    /// made again to see whether they can be.
-    ///
-    /// # Errors
-    /// Those of [`parse`](Self::parse).
-    pub fn parse_after(
-        good: Option<&Self>,
-        file: &str,
-        text: &str,
-        kinds: &[PhenomenonKind],
-        assets: &dyn Assets,
-    ) -> Result<Self, SceneError> {
-        Self::parse_and(file, text, kinds, |scene, root, reader| {
-            check::assets_and_openings(scene, good, root, assets, reader);
-        })
-    }
-
-    /// Reads a scene `text` in which [`parse`](Self::parse) found no fault elsewhere: no asset is read and no phenomenon made.
-    ///
-    /// # Errors
-    /// Every fault of the text alone.
-    pub fn reparse(file: &str, text: &str, kinds: &[PhenomenonKind]) -> Result<Self, SceneError> {
-        Self::parse_and(file, text, kinds, |_, _, _| {})
-    }
-
-    fn parse_and(
-        file: &str,
-        text: &str,
-        kinds: &[PhenomenonKind],
-        check: impl FnOnce(&mut Self, &Table, &mut Reader),
-    ) -> Result<Self, SceneError> {
+    /// Every fault of the text, each with its place, what is wrong and what is allowed.
+    pub fn parse(file: &str, text: &str, kinds: &[PhenomenonKind]) -> Result<Self, SceneError> {
         let fail = |Problems { listed, omitted }| SceneError {
             file: file.to_owned(),
             text: text.to_owned(),
@@ -176,11 +188,32 @@ impl Scene {
         };
         let root = toml::parse(text).map_err(|problem| fail(Problems { listed: vec![problem], omitted: 0 }))?;
         let mut reader = Reader::new();
-        let mut scene = Self::read(&root, kinds, &mut reader);
+        let scene = Self::read(&root, kinds, &mut reader);
         if reader.is_clean() {
-            check(&mut scene, &root, &mut reader);
+            check::values(&scene, &root, &mut reader);
         }
         if reader.is_clean() { Ok(scene) } else { Err(fail(reader.into_problems())) }
+    }
+
+    /// The scene as a shot has it: with another seed, as a seamless loop of about so many seconds, without what its text only implies.
+    ///
+    /// # Errors
+    /// A length that no loop has, or something keyed that does not end a loop as it begins it.
+    pub fn adapted(mut self, options: &SceneOptions) -> Result<Self, LoopError> {
+        if let Some(seed) = options.seed {
+            self.seed = seed;
+        }
+        if !options.implied_backdrop {
+            self.hide_implied_backdrop();
+        }
+        self.loop_s = options.loop_s.map(|seconds| loop_length(seconds, self.picture.fps)).transpose()?;
+        let Some(seconds) = self.loop_s else { return Ok(self) };
+        let jumps =
+            |table: &SharedTable| (table.close_loop)(&mut self, seconds).map(|rest| parameters::path(table.key, &rest));
+        match SHARED_TABLES.iter().find_map(jumps) {
+            Some(what) => Err(LoopError::Jumps { seconds, what }),
+            None => Ok(self),
+        }
     }
 
     fn read(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) -> Self {
@@ -192,8 +225,11 @@ impl Scene {
 
     /// Reads a scene whose defaults that depend on other values are in `root`.
     fn read_completed(root: &Table, kinds: &[PhenomenonKind], implied: ImpliedBackdrop, reader: &mut Reader) -> Self {
+        let picture: PictureParameters = read_shared(root, "picture", reader);
         Self {
-            picture: read_shared(root, "picture", reader),
+            seed: picture.seed as u64,
+            loop_s: None,
+            picture,
             camera: read_shared(root, "camera", reader),
             plate: read_shared(root, "plate", reader),
             wind: read_shared(root, "wind", reader),
@@ -235,7 +271,7 @@ impl Scene {
         let plate = [&self.plate.image, &self.plate.depth].into_iter().flatten();
         let solids = self.obstacles.iter().filter_map(|obstacle| obstacle.file.as_ref());
         let own = plate.chain(solids).map(|path| path.0.clone());
-        own.chain(self.instances.iter().flat_map(|instance| instance.source.assets())).collect()
+        own.chain(self.instances.iter().flat_map(|instance| instance.parameters.assets())).collect()
     }
 
     /// Leaves sky, ground and lamps that the text does not state out of the picture; sky and lamps go on to light it.
@@ -333,8 +369,7 @@ fn read_instance(kind: PhenomenonKind, index: usize, table: &Table, reader: &mut
         kind,
         name: name.unwrap_or_else(|| default_name(kind.key, index)),
         enabled: enabled.unwrap_or(true),
-        source: Arc::from((kind.read)(table, reader)),
-        luminance: None,
+        parameters: Arc::from((kind.read)(table, reader)),
     }
 }
 

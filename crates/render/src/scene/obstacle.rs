@@ -10,7 +10,7 @@ use bansho_base::{
     phenomenon::surroundings::Occluder,
 };
 
-use super::OpeningFault;
+use bansho_base::{host::constructions, phenomenon::kind::BuildError};
 
 bansho_base::choice! {
     /// Shape of an obstacle.
@@ -51,7 +51,8 @@ impl ObstacleParameters {
     ///
     /// # Errors
     /// A mesh without a file, or a file without a mesh.
-    pub fn open(&self, assets: &dyn Assets) -> Result<Occluder, OpeningFault> {
+    pub fn build(&self, assets: &dyn Assets) -> Result<Occluder, BuildError> {
+        constructions::count("obstacle");
         let placement = Placement::new(self.position, self.rotation_deg, self.scale);
         Ok(match self.shape {
             ObstacleShape::Sphere => Occluder::Sphere { centre: placement.position, radius: self.radius },
@@ -62,10 +63,11 @@ impl ObstacleParameters {
             },
             ObstacleShape::Plane => Occluder::HalfSpace { point: placement.position, normal: placement.turn(DVec3::Y) },
             ObstacleShape::Mesh => {
-                let fault = |kind| OpeningFault { key: "file".into(), kind };
+                let fault = |kind| BuildError { key: "file".into(), kind };
                 let missing = || ProblemKind::Conflict("an obstacle of shape \"mesh\" needs a `file`".into());
                 let file = self.file.as_ref().ok_or_else(|| fault(missing()))?;
                 let mesh = assets.mesh(&file.0).map_err(|error| fault(ProblemKind::Asset(error)))?;
+                constructions::count("distance_field");
                 Occluder::Mesh { distance: Arc::new(DistanceField::new(&mesh)), placement }
             }
         })

@@ -7,7 +7,9 @@ use bansho_base::{
     parameters::ProblemKind,
 };
 
-use super::{OpeningFault, PlateParameters};
+use bansho_base::phenomenon::kind::BuildError;
+
+use super::PlateParameters;
 
 /// What a plate shows in one frame.
 pub(crate) struct PlatePictures {
@@ -25,8 +27,8 @@ impl PlateParameters {
     ///
     /// # Errors
     /// A picture cannot be had, the depth has no depth, or is of another size than the image.
-    pub(crate) fn read_frame(&self, assets: &dyn Assets, frame: i64) -> Result<Option<PlatePictures>, OpeningFault> {
-        let fault = |key: &str, kind| OpeningFault { key: key.to_owned(), kind };
+    pub(crate) fn read_frame(&self, assets: &dyn Assets, frame: i64) -> Result<Option<PlatePictures>, BuildError> {
+        let fault = |key: &str, kind| BuildError { key: key.to_owned(), kind };
         let read = |key: &str, path: &str| assets.picture(path, frame).map_err(|error| fault(key, error.into()));
         let Some(path) = &self.image else { return Ok(None) };
         let image = read("image", &path.0)?;

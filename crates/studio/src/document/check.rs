@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bansho::{
-    Assets, KINDS, Plan, PlanOptions, SceneError,
+    Assets, CompiledScene, KINDS, Plan, PlanOptions, SceneError, SceneOptions,
     base::{
         host::assets::{AssetError, AssetProblem},
         parameters::{Problem, ProblemKind, Span, Table, Value},
@@ -15,40 +15,52 @@ use bansho::{
     },
 };
 
-/// The picture as `bansho render` draws it unless it is told otherwise.
-fn options() -> PlanOptions {
-    PlanOptions { implied_backdrop: true, ..PlanOptions::default() }
+/// The scene as `bansho render` draws it unless it is told otherwise.
+fn parse(name: &str, text: &str) -> Result<Arc<Scene>, SceneError> {
+    let options = SceneOptions { implied_backdrop: true, ..SceneOptions::default() };
+    let scene = Scene::parse(name, text, KINDS)?.adapted(&options);
+    scene.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
 }
 
-/// The plan of the scene `text`. Makes every phenomenon once, which may take a while.
+/// A scene without faults: built, and planned.
+#[derive(Clone)]
+pub struct Checked {
+    /// What it shows.
+    pub compiled: Arc<CompiledScene>,
+    /// How it is drawn.
+    pub plan: Arc<Plan>,
+}
+
+/// Builds and plans the scene `text`, which may take a while.
 ///
 /// # Errors
 /// Every fault of the text and of the assets it names.
-pub fn check(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<Arc<Plan>, SceneError> {
+pub fn check(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<Checked, SceneError> {
     Checker::default().check(name, text, assets)
 }
 
-/// Checks the states of a scene one after another: phenomena that are as they were in the last good one are not made again.
+/// Checks the states of a scene one after another: each builds only what it changed.
 #[derive(Default)]
 pub struct Checker {
-    /// That one, and what it was parsed with.
-    good: Option<(Arc<dyn Assets>, Scene)>,
+    /// The last good one.
+    good: Option<Arc<CompiledScene>>,
+    /// The last good draft.
+    draft: Option<Arc<CompiledScene>>,
 }
 
 impl Checker {
-    /// The plan of the scene `text`.
+    /// Builds and plans the scene `text`.
     ///
     /// # Errors
     /// Every fault of the text and of the assets it names.
-    pub fn check(&mut self, name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<Arc<Plan>, SceneError> {
-        let good = self.good.as_ref().filter(|(own, _)| Arc::ptr_eq(own, assets)).map(|(_, scene)| scene);
-        let scene = Scene::parse_after(good, name, text, KINDS, assets.as_ref())?;
-        self.good = Some((assets.clone(), scene.clone()));
-        let plan = Plan::new(scene, &options(), assets.clone());
-        plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
+    pub fn check(&mut self, name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<Checked, SceneError> {
+        let compiled = build(name, text, assets, &mut self.good)?;
+        let plan = Plan::new(&compiled, &PlanOptions::default());
+        let plan = plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))?;
+        Ok(Checked { compiled, plan })
     }
 
-    /// The plan of a draft of the scene `text`, which is simulated with fewer particles; `None` where no fewer would do.
+    /// A draft of the scene `text`, which is simulated with fewer particles; `None` where no fewer would do.
     ///
     /// # Errors
     /// As [`check`](Self::check); faults are those of the scene itself.
@@ -57,11 +69,32 @@ impl Checker {
         name: &str,
         text: &str,
         assets: &Arc<dyn Assets>,
-    ) -> Option<Result<Arc<Plan>, SceneError>> {
+    ) -> Option<Result<Checked, SceneError>> {
         let fewer = fewer_particles(&values(text).ok()?);
         let draft = operation::apply(text, &fewer).ok().filter(|_| !fewer.is_empty())?;
-        Some(self.check(name, text, assets).and_then(|plan| recheck(name, &draft, assets, Ok(plan.exposure_ev100))))
+        let whole = self.check(name, text, assets);
+        let planned = |whole: Checked| {
+            let compiled = build(name, &draft, assets, &mut self.draft)?;
+            let plan = Plan::given(compiled.scene().clone(), &PlanOptions::default(), whole.plan.exposure_ev100, 0);
+            let plan = plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))?;
+            Ok(Checked { compiled, plan })
+        };
+        Some(whole.and_then(planned))
     }
+}
+
+/// Builds the scene `text` with what the `last` one has in common with it, in whose stead it then is.
+fn build(
+    name: &str,
+    text: &str,
+    assets: &Arc<dyn Assets>,
+    last: &mut Option<Arc<CompiledScene>>,
+) -> Result<Arc<CompiledScene>, SceneError> {
+    let scene = parse(name, text)?;
+    let compiled = CompiledScene::build(scene, assets.clone(), last.as_deref());
+    let compiled = Arc::new(compiled.map_err(|errors| errors.located(name, text))?);
+    *last = Some(compiled.clone());
+    Ok(compiled)
 }
 
 /// A fault that another [`check`] found, in words.
@@ -99,21 +132,15 @@ impl From<Found> for Problem {
     }
 }
 
-/// The plan of the scene `text` where another [`check`] found its exposure, or its faults. No phenomenon is made, so that it takes a
-/// moment.
+/// The plan of the scene `text` where another [`check`] found its exposure, or its faults. Nothing is built, so that it takes a moment.
 ///
 /// # Errors
 /// Every fault of the text, or what the other check found.
-pub fn recheck(
-    name: &str,
-    text: &str,
-    assets: &Arc<dyn Assets>,
-    found: Result<f32, Vec<Found>>,
-) -> Result<Arc<Plan>, SceneError> {
-    let scene = Scene::reparse(name, text, KINDS)?;
+pub fn recheck(name: &str, text: &str, found: Result<f32, Vec<Found>>) -> Result<Arc<Plan>, SceneError> {
+    let scene = parse(name, text)?;
     match found {
         Ok(ev100) => {
-            let plan = Plan::exposed(scene, &options(), assets.clone(), ev100);
+            let plan = Plan::given(scene, &PlanOptions::default(), ev100, 0);
             plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
         }
         Err(found) => {
@@ -178,7 +205,7 @@ mod tests {
     use super::*;
     use crate::examples::Bundle;
 
-    fn draft(text: &str) -> Option<Result<Arc<Plan>, SceneError>> {
+    fn draft(text: &str) -> Option<Result<Checked, SceneError>> {
         let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
         Checker::default().check_draft("scene", text, &assets)
     }
@@ -231,7 +258,7 @@ mod tests {
             let text = format!("bansho = 1\n{burner}{rest}");
             let plan = checker.check("scene", &text, &assets);
             let alone = check("scene", &text, &(Arc::new(Bundle::default()) as Arc<dyn Assets>));
-            assert_eq!(plan.map(|plan| plan.exposure_ev100).ok(), alone.map(|plan| plan.exposure_ev100).ok());
+            assert_eq!(plan.map(|own| own.plan.exposure_ev100).ok(), alone.map(|own| own.plan.exposure_ev100).ok());
             counting.meshes.load(Ordering::Relaxed) - before
         };
         assert_eq!(made(""), 1);
@@ -254,10 +281,10 @@ mod tests {
     fn what_another_check_found_gives_the_same_plan_without_its_work() {
         let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
         let text = "bansho = 1\n[picture]\nframes = 9\n[[flame_sheet]]\n";
-        let first = check("scene", text, &assets).unwrap();
-        let again = recheck("scene", text, &assets, Ok(first.exposure_ev100)).unwrap();
+        let first = check("scene", text, &assets).unwrap().plan;
+        let again = recheck("scene", text, Ok(first.exposure_ev100)).unwrap();
         assert_eq!((again.exposure_ev100, again.frames()), (first.exposure_ev100, 0..9));
-        let faulty = recheck("scene", "bansho = 1\n[[flame_shet]]\n", &assets, Err(Vec::new())).err().unwrap();
+        let faulty = recheck("scene", "bansho = 1\n[[flame_shet]]\n", Err(Vec::new())).err().unwrap();
         assert!(faulty.to_string().contains("flame_shet"));
     }
 
@@ -269,7 +296,7 @@ mod tests {
         let error = check("scene", text, &assets).err().unwrap();
         let found: Vec<Found> = error.problems.iter().map(Found::from).collect();
         let made = counting.meshes.load(Ordering::Relaxed);
-        let told = recheck("scene", text, &assets, Err(found)).err().unwrap();
+        let told = recheck("scene", text, Err(found)).err().unwrap();
         assert_eq!(counting.meshes.load(Ordering::Relaxed), made);
         assert_eq!(told.to_string(), error.to_string());
         assert!(told.to_string().contains("gone.png: no such file"));

@@ -28,7 +28,7 @@ use bansho::{
     },
 };
 
-pub use check::{Checker, Found, check, recheck};
+pub use check::{Checked, Checker, Found, check, recheck};
 pub use named_files::named_files;
 pub use phenomena::{Listed, operations};
 
@@ -173,7 +173,7 @@ impl Document {
 
     /// Checks this state here and now.
     pub fn check_now(&mut self, assets: &Arc<dyn Assets>) {
-        let outcome = check(&self.name, &self.text, assets);
+        let outcome = check(&self.name, &self.text, assets).map(|checked| checked.plan);
         self.judge(self.revision, outcome);
     }
 

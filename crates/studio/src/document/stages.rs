@@ -3,19 +3,22 @@
 use std::sync::Arc;
 
 use bansho::{
-    Assets, KINDS, Plan, PlanOptions,
+    Assets, CompiledScene, KINDS, Plan, PlanOptions, SceneOptions,
     base::{
         camera::CameraParameters,
         color::ev100_of_white_luminance,
         parameters::{Auto, Parameters, Reader, Table, Value},
+        phenomenon::kind::Describe,
     },
     fire::sheet::{FlameSheetParameters, StageShown},
     render::scene::{
-        Describe, Instance, Place, PlateParameters, Scene,
+        Instance, Place, PlateParameters, Scene,
         operation::{self, Operation},
         values,
     },
 };
+
+use super::Checked;
 
 /// Size of a stage's picture, pixels.
 const SIZE: [usize; 2] = [112, 112];
@@ -32,18 +35,12 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 }
 
 /// Plans of the stages of flame sheet `index` of the scene `text`; `None` where it is faulty or has no such sheet.
-pub fn plans(name: &str, text: &str, assets: &Arc<dyn Assets>, index: usize) -> Option<Vec<Arc<Plan>>> {
+pub fn plans(name: &str, text: &str, assets: &Arc<dyn Assets>, index: usize) -> Option<Vec<Checked>> {
     let root = values(text).ok()?;
     names().map(|stage| plan(name, [text, stage], &root, assets, index)).collect()
 }
 
-fn plan(
-    name: &str,
-    [text, stage]: [&str; 2],
-    root: &Table,
-    assets: &Arc<dyn Assets>,
-    index: usize,
-) -> Option<Arc<Plan>> {
+fn plan(name: &str, [text, stage]: [&str; 2], root: &Table, assets: &Arc<dyn Assets>, index: usize) -> Option<Checked> {
     let place = Place::root().key(FlameSheetParameters::KEY).index(index);
     let Value::Table(table) = &place.find(root)?.value else { return None };
     let sheet = FlameSheetParameters::read_table(table, &mut Reader::new(), &[]);
@@ -53,7 +50,7 @@ fn plan(
         Operation::Set { place: place.key("position"), value: Value::numbers([0.0; 3]) },
     ];
     operations.extend(stated("instances").then(|| Operation::Remove { place: place.key("instances") }));
-    let scene = Scene::reparse(name, &operation::apply(text, &operations).ok()?, KINDS).ok()?;
+    let scene = Scene::parse(name, &operation::apply(text, &operations).ok()?, KINDS).ok()?;
     let mut sheets = scene.instances.iter().filter(|instance| instance.kind.key == FlameSheetParameters::KEY);
     let alone = Instance { enabled: true, ..sheets.nth(index)?.clone() };
     let mut picture = scene.picture.clone();
@@ -73,7 +70,10 @@ fn plan(
         ..scene
     };
     let options = PlanOptions { size: Some(SIZE), ..PlanOptions::default() };
-    Plan::new(scene, &options, assets.clone()).ok().map(Arc::new)
+    let scene = scene.adapted(&SceneOptions::default()).ok()?;
+    let compiled = Arc::new(CompiledScene::build(Arc::new(scene), assets.clone(), None).ok()?);
+    let plan = Arc::new(Plan::new(&compiled, &options).ok()?);
+    Some(Checked { compiled, plan })
 }
 
 /// A camera before a sheet at the origin that sees all of it.
@@ -102,7 +102,7 @@ mod tests {
         let plans = plans("scene", text, &assets, 1).unwrap();
         assert_eq!(names().collect::<Vec<_>>(), ["texture", "thresholded", "sharpened", "coloured"]);
         assert_eq!(plans.len(), 4);
-        for plan in &plans {
+        for Checked { plan, .. } in &plans {
             let names: Vec<&str> = plan.scene().instances.iter().map(|instance| instance.name.as_str()).collect();
             assert_eq!((names, plan.size()), (vec!["second"], SIZE));
             assert_eq!(plan.scene().camera.target.at(0.0), [0.0, 1.5, 0.0]);

@@ -120,7 +120,7 @@ fn stale_news_is_no_news() {
     let mut document = scene();
     let before = document.revision();
     document.edit("height", &[height(1.0)]).unwrap();
-    document.judge(before, check("fire.toml", SCENE, &assets()));
+    document.judge(before, check("fire.toml", SCENE, &assets()).map(|checked| checked.plan));
     assert!(document.plan().is_none() && !document.is_checked());
 }
 

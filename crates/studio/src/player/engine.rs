@@ -3,7 +3,7 @@
 use std::{path::Path, sync::Arc};
 
 use bansho::{
-    AlphaConvention, Assets, Backend, BitDepth, CpuBackend, DisplayImage, Observer, Plan, RenderError, Shot, View,
+    AlphaConvention, Assets, BitDepth, DisplayImage, Observer, RenderError, Shot, View,
     base::image::{DisplayPixels, Frame},
     display,
     media::{
@@ -15,7 +15,7 @@ use bansho::{
 use web_time::Instant;
 
 use super::{Event, Picture, Wish, states::States};
-use crate::document::{Checker, Revision, stages};
+use crate::document::{Checked, Checker, Revision, stages};
 
 /// Why a wish is not fulfilled.
 #[derive(Debug, thiserror::Error)]
@@ -41,11 +41,11 @@ pub(super) struct Engine {
     /// What was judged last.
     judged: Option<Judged>,
     checker: Checker,
-    /// The last good plan, at the scene's own size, and whether it is a draft.
-    plan: Option<(Arc<Plan>, bool)>,
+    /// The last good scene with its plan, at the scene's own size, and whether it is a draft.
+    checked: Option<(Checked, bool)>,
     shot: Option<Opened>,
     /// Of finished pictures; each goes on from the one before.
-    still: Option<(Arc<Plan>, Box<dyn Shot>)>,
+    still: Option<(Checked, Shot)>,
     states: States,
     stages: StageShots,
 }
@@ -59,8 +59,8 @@ struct Judged {
 
 /// A shot, with the plan and the size that it was last planned for.
 struct Opened {
-    shot: Box<dyn Shot>,
-    of: Arc<Plan>,
+    shot: Shot,
+    of: Checked,
     size: [usize; 2],
 }
 
@@ -84,23 +84,24 @@ impl Engine {
             let is_draft = drafted.is_some();
             let outcome = drafted.unwrap_or_else(|| self.checker.check(name, text, assets));
             self.judged = Some(Judged { revision: wish.revision, assets: assets.clone(), draft });
-            if let Ok(plan) = &outcome {
-                self.plan = Some((plan.clone(), is_draft));
+            if let Ok(checked) = &outcome {
+                self.checked = Some((checked.clone(), is_draft));
             }
-            emit(Event::Judged { revision: wish.revision, outcome });
+            emit(Event::Judged { revision: wish.revision, outcome: outcome.map(|checked| checked.plan) });
         }
-        let Some((plan, draft)) = self.plan.clone() else { return Ok(()) };
+        let Some((checked, draft)) = self.checked.clone() else { return Ok(()) };
         if wish.still {
-            let number = wish.number.unwrap_or(plan.frames().start);
-            emit(Event::Still { number, png: self.finish(&plan, number, observer)? });
+            let number = wish.number.unwrap_or(checked.plan.frames().start);
+            emit(Event::Still { number, png: self.finish(&checked, number, observer)? });
             return Ok(());
         }
-        let picture = self.draw(&plan, wish, observer)?;
+        let picture = self.draw(&checked, wish, observer)?;
         emit(Event::Drawn(Picture { draft, ..picture }));
         if let Some(sheet) = wish.stages {
-            self.stages.turn_to(&plan, sheet, wish)?;
+            self.stages.turn_to(&checked, sheet, wish);
             for (stage, opened) in self.stages.shots.iter_mut().enumerate() {
-                let picture = opened.draw(wish, wish.number.unwrap_or(plan.frames().start), &mut None, observer)?;
+                let picture =
+                    opened.draw(wish, wish.number.unwrap_or(checked.plan.frames().start), &mut None, observer)?;
                 emit(Event::Stage(stage, picture));
             }
         }
@@ -110,26 +111,26 @@ impl Engine {
     /// Forgets the shot, as after a panic in it.
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn forget(&mut self) {
-        *self = Self { judged: self.judged.take(), plan: self.plan.take(), ..Self::default() };
+        *self = Self { judged: self.judged.take(), checked: self.checked.take(), ..Self::default() };
     }
 
     /// The file of the finished frame `number`. Where it was stopped, or the last one ended, it goes on.
-    fn finish(&mut self, plan: &Arc<Plan>, number: i64, observer: &dyn Observer) -> Result<Vec<u8>, Unfulfilled> {
-        let begun = self.still.take().filter(|(of, _)| Arc::ptr_eq(of, plan));
+    fn finish(&mut self, checked: &Checked, number: i64, observer: &dyn Observer) -> Result<Vec<u8>, Unfulfilled> {
+        let begun = self.still.take().filter(|(of, _)| Arc::ptr_eq(&of.plan, &checked.plan));
         let (_, shot) = self.still.insert(match begun {
             Some(begun) => begun,
-            None => (plan.clone(), CpuBackend.open(plan.clone())?),
+            None => (checked.clone(), Shot::open(checked.compiled.clone(), checked.plan.clone())),
         });
-        let frame = bansho::draw(shot.as_mut(), number, observer)?;
+        let frame = bansho::draw(shot, number, observer)?;
         let png = encoded(&frame);
         shot.recycle(frame);
         Ok(png?)
     }
 
-    fn draw(&mut self, plan: &Arc<Plan>, wish: &Wish, observer: &dyn Observer) -> Result<Picture, RenderError> {
-        let number = wish.number.unwrap_or(plan.frames().start);
-        let size = fitted(plan.size(), wish.within);
-        let opened = open(&mut self.shot, plan, size, wish.exact)?;
+    fn draw(&mut self, checked: &Checked, wish: &Wish, observer: &dyn Observer) -> Result<Picture, RenderError> {
+        let number = wish.number.unwrap_or(checked.plan.frames().start);
+        let size = fitted(checked.plan.size(), wish.within);
+        let opened = open(&mut self.shot, checked, size, wish.exact);
         opened.draw(wish, number, &mut Some(&mut self.states), observer)
     }
 }
@@ -145,9 +146,9 @@ impl Opened {
     ) -> Result<Picture, RenderError> {
         let Self { shot, of, size } = self;
         let began = Instant::now();
-        states.iter_mut().for_each(|states| states.seek(of, shot.as_mut(), number));
+        states.iter_mut().for_each(|states| states.seek(&of.compiled, shot, number));
         shot.advance(number, observer)?;
-        states.iter_mut().for_each(|states| states.keep(of, shot.as_ref(), number));
+        states.iter_mut().for_each(|states| states.keep(&of.compiled, shot, number));
         let advanced = Instant::now();
         shot.draw(observer)?;
         let mut frame = shot.read().ok_or(RenderError::Cancelled(bansho::Cancelled))?;
@@ -157,7 +158,7 @@ impl Opened {
             revision: wish.revision,
             number,
             size: *size,
-            scene_size: of.size(),
+            scene_size: of.plan.size(),
             pixels,
             exact: shot.is_exact(),
             draft: false,
@@ -171,43 +172,38 @@ impl Opened {
 #[derive(Default)]
 struct StageShots {
     /// Of which plan and which sheet.
-    of: Option<(Arc<Plan>, usize)>,
+    of: Option<(Checked, usize)>,
     shots: Vec<Opened>,
 }
 
 impl StageShots {
-    fn turn_to(&mut self, plan: &Arc<Plan>, sheet: usize, wish: &Wish) -> Result<(), RenderError> {
-        if self.of.as_ref().is_some_and(|(of, own)| Arc::ptr_eq(of, plan) && *own == sheet) {
-            return Ok(());
+    fn turn_to(&mut self, checked: &Checked, sheet: usize, wish: &Wish) {
+        if self.of.as_ref().is_some_and(|(of, own)| Arc::ptr_eq(&of.plan, &checked.plan) && *own == sheet) {
+            return;
         }
         // Of a text with faults there are none; the last pictures stay.
         let plans = stages::plans(&wish.name, &wish.text, &wish.assets, sheet).unwrap_or_default();
-        let open = |plan: Arc<Plan>| -> Result<Opened, RenderError> {
-            Ok(Opened { shot: CpuBackend.open(plan.clone())?, size: plan.size(), of: plan })
-        };
-        self.shots = plans.into_iter().map(open).collect::<Result<_, _>>()?;
-        self.of = Some((plan.clone(), sheet));
-        Ok(())
+        let open =
+            |of: Checked| Opened { shot: Shot::open(of.compiled.clone(), of.plan.clone()), size: of.plan.size(), of };
+        self.shots = plans.into_iter().map(open).collect();
+        self.of = Some((checked.clone(), sheet));
     }
 }
 
-/// The shot of `plan` at `size`: the one there is where it can go on, else a new one.
-fn open<'a>(
-    slot: &'a mut Option<Opened>,
-    plan: &Arc<Plan>,
-    size: [usize; 2],
-    exact: bool,
-) -> Result<&'a mut Opened, RenderError> {
-    let usable = slot.take().filter(|opened| !exact || (opened.shot.is_exact() && Arc::ptr_eq(&opened.of, plan)));
+/// The shot of a scene at `size`: the one there is where it can go on, else a new one.
+fn open<'a>(slot: &'a mut Option<Opened>, checked: &Checked, size: [usize; 2], exact: bool) -> &'a mut Opened {
+    let is_of = |opened: &Opened| Arc::ptr_eq(&opened.of.plan, &checked.plan);
+    let usable = slot.take().filter(|opened| !exact || (opened.shot.is_exact() && is_of(opened)));
+    let (compiled, plan) = (checked.compiled.clone(), || Arc::new(checked.plan.at_size(size)));
     let opened = match usable {
-        None => Opened { shot: CpuBackend.open(Arc::new(plan.at_size(size)))?, of: plan.clone(), size },
-        Some(opened) if Arc::ptr_eq(&opened.of, plan) && opened.size == size => opened,
+        None => Opened { shot: Shot::open(compiled, plan()), of: checked.clone(), size },
+        Some(opened) if is_of(&opened) && opened.size == size => opened,
         Some(mut opened) => {
-            opened.shot.replan(Arc::new(plan.at_size(size)))?;
-            Opened { of: plan.clone(), size, ..opened }
+            opened.shot.replan(compiled, plan());
+            Opened { of: checked.clone(), size, ..opened }
         }
     };
-    Ok(slot.insert(opened))
+    slot.insert(opened)
 }
 
 /// The largest size of `size`'s proportions that fits `within`; `size` itself where that does.
@@ -244,9 +240,9 @@ mod tests {
     #[test]
     fn a_picture_that_fits_no_file_is_told_of() {
         let assets: Arc<dyn Assets> = Arc::new(bansho::MemoryAssets::default());
-        let plan = crate::document::check("scene", "bansho = 1\n[picture]\nsize = [8, 4]\n", &assets).unwrap();
-        let mut shot = CpuBackend.open(plan).unwrap();
-        let mut frame = bansho::draw(shot.as_mut(), 0, &bansho::Unobserved).unwrap();
+        let checked = crate::document::check("scene", "bansho = 1\n[picture]\nsize = [8, 4]\n", &assets).unwrap();
+        let mut shot = Shot::open(checked.compiled, checked.plan);
+        let mut frame = bansho::draw(&mut shot, 0, &bansho::Unobserved).unwrap();
         assert!(encoded(&frame).unwrap().starts_with(b"\x89PNG"));
         frame.beauty = Image::filled(png::SIDE_LIMIT + 1, 1, [0.0; 4]);
         assert!(matches!(encoded(&frame), Err(MediaError::Size { .. })));

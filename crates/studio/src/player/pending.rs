@@ -82,7 +82,7 @@ impl Pending {
         Some(match reply {
             Reply::Judged { number, found } => {
                 let wish = self.wish_of(number)?;
-                let outcome = recheck(&wish.name, &wish.text, &wish.assets, found);
+                let outcome = recheck(&wish.name, &wish.text, found);
                 Event::Judged { revision: wish.revision, outcome }
             }
             Reply::Drawn { picture } => Event::Drawn(picture),

@@ -2,17 +2,17 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use bansho::{Plan, Shot, render::fingerprint};
+use bansho::{CompiledScene, Shot, render::fingerprint};
 
 /// Bytes of states that are kept.
 const MOST_BYTES: usize = 256 << 20;
 /// Frames between two states.
 const APART: i64 = 10;
 
-/// States of one plan, by frame.
+/// States of one scene, by frame.
 #[derive(Default)]
 pub(super) struct States {
-    of: Option<(Arc<Plan>, [u8; 32])>,
+    of: Option<(Arc<CompiledScene>, [u8; 32])>,
     by_frame: BTreeMap<i64, Vec<u8>>,
     bytes: usize,
     /// The frame that the shot stands at.
@@ -21,8 +21,8 @@ pub(super) struct States {
 
 impl States {
     /// Brings `shot` nearer to frame `number` where that lies behind it and a state does not.
-    pub(super) fn seek(&mut self, plan: &Arc<Plan>, shot: &mut dyn Shot, number: i64) {
-        self.turn_to(plan);
+    pub(super) fn seek(&mut self, compiled: &Arc<CompiledScene>, shot: &mut Shot, number: i64) {
+        self.turn_to(compiled);
         if self.last.is_none_or(|last| last <= number) {
             return;
         }
@@ -33,8 +33,8 @@ impl States {
     }
 
     /// Keeps the state at frame `number` where it is worth it: only states that the plan leads to are.
-    pub(super) fn keep(&mut self, plan: &Arc<Plan>, shot: &dyn Shot, number: i64) {
-        self.turn_to(plan);
+    pub(super) fn keep(&mut self, compiled: &Arc<CompiledScene>, shot: &Shot, number: i64) {
+        self.turn_to(compiled);
         self.last = Some(number);
         let near = self.by_frame.range(number - APART + 1..=number).next().is_some();
         if near || !shot.is_exact() || self.bytes >= MOST_BYTES {
@@ -45,16 +45,16 @@ impl States {
         self.by_frame.insert(number, state);
     }
 
-    /// States of another plan are of no use.
-    fn turn_to(&mut self, plan: &Arc<Plan>) {
-        if self.of.as_ref().is_some_and(|(own, _)| Arc::ptr_eq(own, plan)) {
+    /// States of another scene are of no use.
+    fn turn_to(&mut self, compiled: &Arc<CompiledScene>) {
+        if self.of.as_ref().is_some_and(|(own, _)| Arc::ptr_eq(own, compiled)) {
             return;
         }
-        let of = fingerprint::of_state(plan);
+        let of = fingerprint::of_state(compiled);
         if self.of.as_ref().is_none_or(|(_, own)| *own != of) {
             self.bytes = 0;
             self.by_frame.clear();
         }
-        self.of = Some((plan.clone(), of));
+        self.of = Some((compiled.clone(), of));
     }
 }

@@ -4,7 +4,8 @@ use std::{
 };
 
 use bansho::{
-    AlphaConvention, Assets, Backend, BitDepth, CpuBackend, MemoryAssets, Plan, PlanOptions, Unobserved, View,
+    AlphaConvention, Assets, BitDepth, CompiledScene, MemoryAssets, Plan, PlanOptions, SceneOptions, Shot, Unobserved,
+    View,
     base::{
         geometry::{mesh::Mesh, strokes::Drawing},
         host::assets::{AssetError, Picture as Plate},
@@ -56,10 +57,11 @@ fn rendered(text: &str, number: i64) -> Vec<[u8; 4]> {
 
 fn rendered_with_alpha(text: &str, number: i64, opaque: bool) -> Vec<[u8; 4]> {
     let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
-    let scene = parse_scene("scene", text, assets.as_ref()).unwrap();
-    let plan = Plan::new(scene, &PlanOptions::default(), assets).unwrap();
-    let mut shot = CpuBackend.open(Arc::new(plan)).unwrap();
-    let mut frame = bansho::draw(shot.as_mut(), number, &Unobserved).unwrap();
+    let scene = Arc::new(parse_scene("scene", text).unwrap().adapted(&SceneOptions::default()).unwrap());
+    let compiled = Arc::new(CompiledScene::build(scene, assets, None).unwrap());
+    let plan = Plan::new(&compiled, &PlanOptions::default()).unwrap();
+    let mut shot = Shot::open(compiled, Arc::new(plan));
+    let mut frame = bansho::draw(&mut shot, number, &Unobserved).unwrap();
     frame.opaque = opaque;
     match display(&frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded).pixels {
         DisplayPixels::Eight(pixels) => pixels,

@@ -207,7 +207,8 @@ fn every_measured_line_is_there_and_named_by_its_wavelength() {
         ..AuroraParameters::default()
     };
     let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
-    let measured: Vec<_> = aurora.aovs().iter().map(|aov| aov.name).filter(|name| name.starts_with("kilo")).collect();
+    let measured: Vec<_> =
+        aurora.info().aovs.iter().map(|aov| aov.name).filter(|name| name.starts_with("kilo")).collect();
     assert_eq!(names.collect::<Vec<_>>(), measured);
     assert_eq!(measured.len(), brightnesses().count());
     let [green, red, fainter_red, _, _, band, all_bands] = brightnesses().collect::<Vec<_>>()[..] else { panic!() };

@@ -8,7 +8,7 @@ use bansho_base::{
     image::{DisplayPixels, Frame, Rect},
 };
 use bansho_render::{
-    Backend, Plan,
+    CompiledScene, Plan, Shot,
     display::{BitDepth, display},
     scene::picture::LARGEST_SIDE,
 };
@@ -92,8 +92,8 @@ impl Region {
 /// # Errors
 /// Those of drawing.
 pub(super) fn lit(
+    compiled: &Arc<CompiledScene>,
     plan: &Plan,
-    backend: &dyn Backend,
     numbers: &[i64],
     exact: bool,
     observer: &dyn JobObserver,
@@ -106,7 +106,7 @@ pub(super) fn lit(
     // Half a code of 8 bits, in codes of 16, of one pixel alone among those that a small one stands for.
     let least = if exact { 1 } else { (128.0 / (shrunk * shrunk)).max(1.0) as u16 };
     let survey = Survey { lit: Mutex::default(), view: plan.display, least };
-    shoot(&Arc::new(small), backend, numbers, &Snapshots::default(), &survey, observer)?;
+    shoot(&mut Shot::open(compiled.clone(), Arc::new(small)), numbers, &Snapshots::default(), &survey, observer)?;
     let lit = survey.lit.into_inner().unwrap_or_else(PoisonError::into_inner);
     Ok((!lit.is_empty()).then(|| Region::of(&lit, size)))
 }

@@ -197,7 +197,7 @@ impl Files {
             "frame_count": sheet.count,
             "fps": f64::from(fps.frames) / f64::from(fps.seconds),
             "duration_s": sheet.count as f64 * fps.frame_s(),
-            "loop": plan.loop_s.is_some(),
+            "loop": plan.loop_s().is_some(),
             "colour": colour,
         });
         if !self.is_linear() {

@@ -16,15 +16,14 @@ use bansho_media::{
     naming::{OutputKind, OutputPattern},
     overwriting::OverwritePolicy,
 };
-use bansho_render::{Backend, Plan, PlanOptions, Scene, display::BitDepth, scene::FrameRate};
+use bansho_render::{CompiledScene, Plan, PlanOptions, Scene, SceneOptions, Shot, display::BitDepth, scene::FrameRate};
 
 pub use self::crop::FlipbookCrop;
 use self::{files::Files, motion::Tile};
 use super::{
-    BackendChoice,
     error::{Conflict, JobError, SheetKind},
     inputs,
-    memory::{self, Wanted},
+    memory::{self, MemoryRequest},
     observer::{JobObserver, Note, Outline},
     output, overwriting, plates, prepare,
     scene_file::SceneFile,
@@ -66,8 +65,6 @@ pub struct Flipbook {
     pub out: Option<PathBuf>,
     /// Whether files that Bansho did not make may be written over. What the scene is read from never is.
     pub overwrite: bool,
-    /// What draws.
-    pub backend: BackendChoice,
 }
 
 /// What a flipbook became.
@@ -96,7 +93,6 @@ impl Flipbook {
             alpha: None,
             out: None,
             overwrite: false,
-            backend: BackendChoice::Auto,
         }
     }
 
@@ -105,9 +101,7 @@ impl Flipbook {
     /// # Errors
     /// The first thing that stands in the way; of the scene all faults at once.
     pub fn prepare(&self) -> Result<PreparedFlipbook, JobError> {
-        let backend = prepare::backend(self.backend)?;
-        let assets = prepare::assets(&self.scene);
-        let mut scene = self.scene.check(assets.as_ref())?;
+        let mut scene = self.scene.parse()?;
         let [columns, rows] = self.grid;
         let sheet = Sheet { count: columns.saturating_mul(rows), columns, cell: self.cell(&scene), gutter: 0 };
         let sheet = sheet::checked(sheet, SheetKind::Flipbook)?;
@@ -116,25 +110,25 @@ impl Flipbook {
         }
         let options = PlanOptions {
             size: Some(sheet.cell),
-            seed: self.seed,
-            loop_s: self.loop_s,
             layers: true,
             aovs: true,
             display: self.view,
             ..PlanOptions::default()
         };
-        let plan = Arc::new(Plan::new(scene, &options, assets)?);
+        let wish = SceneOptions { seed: self.seed, loop_s: self.loop_s, implied_backdrop: false };
+        let compiled = self.scene.compile(scene.adapted(&wish)?, &prepare::assets(&self.scene))?;
+        let plan = Arc::new(Plan::new(&compiled, &options)?);
         let first = self.first_frame.unwrap_or(plan.frames().start);
         let numbers: Vec<i64> = (first..first.saturating_add(sheet.count as i64)).collect();
-        plates::check(&self.scene, &plan, &numbers)?;
+        plates::check(&self.scene, &compiled, &numbers)?;
         let frames = numbers.len();
-        let wanted = Wanted { frames, tiles: frames, display: Some(self.bits), own_size: true };
-        memory::check(&self.scene, &plan, wanted)?;
+        let wanted = MemoryRequest { frames, tiles: frames, display: Some(self.bits), own_size: true };
+        memory::check(&self.scene, &compiled, &plan, wanted)?;
         let overwrite = OverwritePolicy::new(inputs::inputs(&self.scene, &plan, &numbers), self.overwrite);
         let files = self.files(overwrite)?;
         overwriting::check(&files.overwrite, files.paths())?;
         let (scene, own_size, crop) = (self.scene.clone(), self.tile.is_some(), self.crop);
-        Ok(PreparedFlipbook { scene, backend, plan, sheet, own_size, crop, numbers, files })
+        Ok(PreparedFlipbook { scene, compiled, plan, sheet, own_size, crop, numbers, files })
     }
 
     /// Size of a frame: as asked for, or the scene's made small enough for a sheet of the usual side.
@@ -165,7 +159,7 @@ impl Flipbook {
 /// A flipbook that can be made, as far as can be known without doing so.
 pub struct PreparedFlipbook {
     scene: SceneFile,
-    backend: Box<dyn Backend>,
+    compiled: Arc<CompiledScene>,
     plan: Arc<Plan>,
     sheet: Sheet,
     own_size: bool,
@@ -185,12 +179,13 @@ impl PreparedFlipbook {
     /// # Errors
     /// The observer asked to stop, or a sheet cannot be written.
     pub fn run(&self, observer: &dyn JobObserver) -> Result<FlipbookSummary, JobError> {
-        let Self { scene, backend, numbers, files, .. } = self;
+        let Self { scene, compiled, numbers, files, .. } = self;
         observer.started(&Outline { total: numbers.len(), kept: 0, size: self.sheet.cell });
         let told = |error| plates::located(scene, error).of_whole("a flipbook");
         let (plan, sheet) = &self.cropped(observer).map_err(told)?;
         let gather = Gather::new(sheet.count, observer, |frame, observer| Tile::of(frame, files, observer));
-        shoot(plan, backend.as_ref(), numbers, &Snapshots::default(), &gather, observer).map_err(told)?;
+        let mut shot = Shot::open(compiled.clone(), plan.clone());
+        shoot(&mut shot, numbers, &Snapshots::default(), &gather, observer).map_err(told)?;
         let tiles = gather.into_tiles();
         if !tiles.iter().any(|tile| tile.has_motion) {
             observer.note(&Note::NoMotion);
@@ -207,7 +202,7 @@ impl PreparedFlipbook {
             return all();
         }
         let exact = self.files.is_exact();
-        let region = crop::lit(&self.plan, self.backend.as_ref(), &self.numbers, exact, observer)?;
+        let region = crop::lit(&self.compiled, &self.plan, &self.numbers, exact, observer)?;
         let most = [self.sheet.columns, self.sheet.rows()].map(|tiles| USUAL_SIDE / tiles);
         let whole = self.plan.scene().picture.size.map(|side| side as usize);
         let fitting = |region: crop::Region| {
@@ -220,8 +215,8 @@ impl PreparedFlipbook {
         let plan = Arc::new(self.plan.cropped(size, part)?);
         let sheet = sheet::checked(Sheet { cell: [part.width, part.height], ..self.sheet }, SheetKind::Flipbook)?;
         let frames = self.numbers.len();
-        let wanted = Wanted { frames, tiles: frames, display: Some(self.files.bits), own_size: true };
-        memory::check(&self.scene, &plan, wanted)?;
+        let wanted = MemoryRequest { frames, tiles: frames, display: Some(self.files.bits), own_size: true };
+        memory::check(&self.scene, &self.compiled, &plan, wanted)?;
         Ok((plan, sheet))
     }
 }

@@ -1,5 +1,7 @@
 //! A step of the simulation, section 4.3, and what Bansho adds to it.
 
+use std::sync::Arc;
+
 use bansho_base::{
     math::{Vec3, random::Key},
     phenomenon::surroundings::Surroundings,
@@ -24,7 +26,8 @@ use rayon::prelude::*;
 /// The gas and what it needs to move.
 #[derive(Clone, Debug)]
 pub(crate) struct Simulation {
-    pub(crate) design: Design,
+    /// Shared by all runs.
+    pub(crate) design: Arc<Design>,
     laws: Laws,
     pub(crate) parameters: FlameParticlesParameters,
     pub(crate) turbulence: Turbulence,
@@ -41,7 +44,7 @@ impl Simulation {
             particles: Particles::new(parameters.position.into()),
             fluid: Fluid::new(&parameters.fluid, &design),
             parameters: parameters.clone(),
-            design,
+            design: Arc::new(design),
             key,
         }
     }

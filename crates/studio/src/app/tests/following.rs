@@ -60,7 +60,7 @@ impl Fake {
     fn fulfil(&self, draw_s: f64) {
         let wish = self.last();
         let nowhere: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
-        let outcome = check(&wish.name, &wish.text, &nowhere);
+        let outcome = check(&wish.name, &wish.text, &nowhere).map(|checked| checked.plan);
         let scene_size = outcome.as_ref().map_or([64, 36], |plan| plan.size());
         let size = wish.within.map(|side| side.min(640));
         let picture = Picture {

@@ -1,0 +1,94 @@
+//! A part of a picture is the same part of the whole: light, depth, layers and AOVs, to the bit.
+
+#[path = "support/planned.rs"]
+mod planned;
+
+use std::sync::Arc;
+
+use bansho::KINDS;
+use bansho_base::{
+    host::{assets::MemoryAssets, observer::Unobserved},
+    image::{Frame, Rect},
+};
+use bansho_render::{PlanOptions, Scene};
+use planned::Planned;
+
+const SIZE: [usize; 2] = [101, 67];
+/// Parts that begin and end at odd places, so that strips and vectors of theirs never meet those of the whole.
+const PARTS: [[usize; 4]; 6] =
+    [[13, 7, 41, 29], [50, 33, 51, 34], [0, 19, 101, 5], [37, 0, 3, 67], [59, 41, 1, 1], [3, 1, 9, 11]];
+
+fn draw(text: &str, frame: i64, crop: Option<Rect>) -> Frame {
+    let assets = Arc::new(MemoryAssets::default());
+    let scene = Scene::parse("scene.toml", text, KINDS).unwrap_or_else(|error| panic!("{error}"));
+    let options = PlanOptions { size: Some(SIZE), crop, layers: true, aovs: true, ..PlanOptions::default() };
+    let mut shot = Planned::new(scene, &options, assets).open();
+    shot.advance(frame, &Unobserved).unwrap();
+    shot.draw(&Unobserved).unwrap();
+    shot.read().unwrap()
+}
+
+/// Every plane of a frame, by its name.
+fn planes(frame: &Frame) -> Vec<(String, Vec<f32>)> {
+    let beauty = ["R", "G", "B", "A"].into_iter().enumerate();
+    let mut planes: Vec<(String, Vec<f32>)> =
+        beauty.map(|(c, name)| (name.into(), frame.beauty.pixels().iter().map(|pixel| pixel[c]).collect())).collect();
+    planes.extend(frame.depth.clone().map(|depth| ("Z".into(), depth)));
+    planes.extend(frame.channels.iter().map(|channel| (channel.name.clone(), channel.values.clone())));
+    planes
+}
+
+fn assert_parts_agree(text: &str, frame: i64) {
+    let whole = planes(&draw(text, frame, None));
+    assert!(whole.iter().filter(|(name, _)| name.contains('.')).count() > 4);
+    for [x, y, width, height] in PARTS {
+        let part = planes(&draw(text, frame, Some(Rect { x, y, width, height })));
+        assert_eq!(part.len(), whole.len());
+        for ((name, whole), (_, part)) in whole.iter().zip(&part) {
+            for (index, value) in part.iter().enumerate() {
+                let there = whole[(y + index / width) * SIZE[0] + x + index % width];
+                let same = value.to_bits() == there.to_bits();
+                assert!(same, "{name} of {:?} at {index}: {value} and {there}\n{text}", [x, y, width, height]);
+            }
+        }
+    }
+}
+
+#[test]
+fn of_flame_sheets_with_sparks_and_smoke() {
+    let sheet = "[[flame_sheet]]\nsparks = { rate = 60 }\nsmoke = { optical_depth = 0.6 }\n";
+    assert_parts_agree(&format!("bansho = 1\n{sheet}"), 9);
+    assert_parts_agree(&format!("bansho = 1\n{sheet}texture = {{ kind = \"ohshima_itahashi\" }}\n"), 9);
+}
+
+#[test]
+fn of_particle_flames() {
+    // Fine sprites, which many columns hold nothing of, and coarse ones.
+    for lines in ["burners = [{ diameter = 0.3 }]\n", "look = { haze_gain = 2.0 }\n", "look = { sprite = \"poly6\" }\n"]
+    {
+        let text =
+            format!("bansho = 1\n[[flame_particles]]\nparticles = 3000\npreroll_s = 1\n{lines}[sky]\n[ground]\n");
+        assert_parts_agree(&text, 4);
+    }
+    let far = "[camera]\nposition = [0.0, 1.0, 14.0]\ntarget = [0.3, 0.8, 0.0]\n";
+    assert_parts_agree(&format!("bansho = 1\n[[flame_particles]]\nparticles = 2000\npreroll_s = 1\n{far}"), 4);
+}
+
+#[test]
+fn of_rain_among_lamps_over_wet_ground() {
+    assert_parts_agree("bansho = 1\n[[rain]]\n", 3);
+    assert_parts_agree("bansho = 1\n[[rain]]\nmethod = \"billboards\"\n[camera]\nlens = \"fisheye\"\n", 3);
+}
+
+#[test]
+fn of_auroras() {
+    let small = "[[aurora]]\npreroll_s = 0.2\nparticles = { count = 4000 }\nfield = { cells = 96 }\n";
+    assert_parts_agree(&format!("bansho = 1\n{small}"), 2);
+}
+
+#[test]
+fn of_phenomena_that_interleave() {
+    let text = "bansho = 1\n[[flame_sheet]]\n[[flame_particles]]\nposition = [0.3, 0, 0.2]\nparticles = 1500\npreroll_s = 1\n\
+                [[rain]]\n[ground]\nwetness = 0.9\n[sky]\n[[light]]\nvisible = true\nposition = [0.5, 1, -2]\n";
+    assert_parts_agree(text, 4);
+}

@@ -1,0 +1,176 @@
+//! Random valid scenes of every phenomenon draw a small frame: no panic, no NaN.
+//!
+//! `BANSHO_RANDOM_SCENES` says how many, `BANSHO_RANDOM_SEED` from which seed on. Seeds that failed once are in `random_seeds.txt` and are
+//! tried first, whatever the two say.
+
+use std::{panic, sync::Arc};
+
+use bansho::KINDS;
+use bansho_base::{
+    camera::CameraParameters,
+    color,
+    host::{assets::MemoryAssets, observer::Unobserved},
+    math::random::{Key, Purpose, uniform},
+    parameters::{Parameters, Reader, Table, Value, sample},
+};
+use bansho_render::{
+    CompiledScene, Plan, PlanOptions, Scene, SceneOptions, Shot,
+    display::{BitDepth, display},
+    scene::SHARED_TABLES,
+};
+use rayon::prelude::*;
+
+/// How many are drawn, unless `BANSHO_RANDOM_SCENES` says otherwise, as in `.ci/run` and `.ci/long`.
+const SCENES: u64 = 250;
+
+#[test]
+fn scenes_that_failed_once_draw_finite_pictures() {
+    let kept = include_str!("random_seeds.txt").lines().filter(|line| !line.starts_with('#'));
+    let seeds: Vec<u64> = kept.map(|line| line.parse().expect("a seed a line")).collect();
+    assert!(!seeds.is_empty());
+    let outcomes: Vec<Outcome> = seeds.into_par_iter().map(outcome).collect();
+    assert_finite(&outcomes);
+}
+
+#[test]
+fn random_valid_scenes_draw_finite_pictures() {
+    let (asked, first) = (number("BANSHO_RANDOM_SCENES").unwrap_or(SCENES), number("BANSHO_RANDOM_SEED").unwrap_or(0));
+    // Some parameters do not go together, such as core and fringe wider than the sheet, and are refused: fewer than one scene in four.
+    let tried = asked + asked.div_ceil(3);
+    let outcomes: Vec<Outcome> = (first..first + tried).into_par_iter().map(outcome).collect();
+    assert_finite(&outcomes);
+    let drawn = outcomes.iter().filter(|outcome| matches!(outcome, Outcome::Drawn)).count() as u64;
+    assert!(drawn >= asked, "only {drawn} of {tried} scenes were valid");
+}
+
+fn number(variable: &str) -> Option<u64> {
+    std::env::var(variable).ok()?.parse().ok()
+}
+
+/// What became of a scene.
+enum Outcome {
+    Drawn,
+    Refused,
+    /// The seed of one that ended in a panic, and what that said.
+    Failed(u64, String),
+}
+
+fn outcome(seed: u64) -> Outcome {
+    match panic::catch_unwind(|| draw(&scene(seed))) {
+        Ok(true) => Outcome::Drawn,
+        Ok(false) => Outcome::Refused,
+        Err(said) => {
+            let text = said.downcast_ref::<String>().cloned();
+            Outcome::Failed(seed, text.or_else(|| Some((*said.downcast_ref::<&str>()?).to_owned())).unwrap_or_default())
+        }
+    }
+}
+
+/// All failures at once, each with its seed, which belongs into `random_seeds.txt` then.
+fn assert_finite(outcomes: &[Outcome]) {
+    let each = outcomes.iter().filter_map(|outcome| match outcome {
+        Outcome::Failed(seed, said) => Some(format!("seed {seed} (to be added to random_seeds.txt): {said}")),
+        Outcome::Drawn | Outcome::Refused => None,
+    });
+    let failed: Vec<String> = each.collect();
+    assert!(failed.is_empty(), "{}", failed.join("\n\n"));
+}
+
+/// Draws a frame of a scene that is valid; `false` for one whose parameters do not go together.
+fn draw(text: &str) -> bool {
+    let assets = Arc::new(MemoryAssets::default());
+    let Ok(mut scene) = Scene::parse("random.toml", text, KINDS) else { return false };
+    scene.picture.overscan = scene.picture.overscan.min(2);
+    let number = scene.picture.first_frame + 1;
+    let options =
+        PlanOptions { size: Some([17, 11]), overscan: true, layers: true, aovs: true, ..PlanOptions::default() };
+    let scene = scene.adapted(&SceneOptions::default()).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let Ok(compiled) = CompiledScene::build(Arc::new(scene), assets, None) else { return false };
+    let compiled = Arc::new(compiled);
+    let plan = Plan::new(&compiled, &options).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let mut shot = Shot::open(compiled, Arc::new(plan));
+    shot.advance(number, &Unobserved).unwrap();
+    shot.draw(&Unobserved).unwrap();
+    let frame = shot.read().unwrap();
+    let channels = frame.channels.iter().flat_map(|channel| &channel.values);
+    let mut values = frame.beauty.pixels().iter().flatten().chain(channels);
+    assert!(values.all(|value| value.is_finite()), "{text}");
+    assert!(frame.depth.iter().flatten().all(|depth| *depth >= 0.0), "{text}");
+    display(&frame, &color::View::DISPLAY, BitDepth::Eight, color::AlphaConvention::Encoded);
+    true
+}
+
+/// A phenomenon, in every eighth scene one of each, under random shared tables.
+fn scene(seed: u64) -> String {
+    let key = Key::new(seed, "random scene");
+    let mut drawn = 0;
+    let mut uniform = || {
+        drawn += 1;
+        f64::from(uniform(key.words(drawn, 0, Purpose(0))[0]))
+    };
+    let mut text = String::from("bansho = 1\n");
+    for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate") {
+        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        let mut table = sample((shared.table)(), &mut uniform);
+        // Random tables name no files, so no obstacle can be a mesh; the picture's size is whole and given anyhow.
+        let left_out = [("obstacle", "shape"), ("picture", "size")];
+        table.entries.retain(|entry| !left_out.contains(&(shared.key, &entry.key)));
+        let camera = CameraParameters::read_table(&table, &mut Reader::new(), &[]);
+        if shared.key == "camera" && camera.fov_of_focal_length().is_some_and(|[_, widest]| widest > 170.0) {
+            table.entries.retain(|entry| entry.key != "focal_length_mm");
+        }
+        text += &lines(&header, &table);
+    }
+    for (index, kind) in KINDS.iter().enumerate() {
+        let mut table = sample((kind.table)(), &mut uniform);
+        keep_small(&mut table, kind.key);
+        // Most random shapes are refused: flames wider than their sheet, auroras that cross. Most scenes do without, so that they
+        // are drawn.
+        if !seed.is_multiple_of(4) {
+            table.entries.retain(|entry| !["shape", "shapes"].contains(&entry.key.as_str()));
+        }
+        // Many together are refused if one of them is, so most scenes hold one.
+        if seed.is_multiple_of(8) || seed as usize % KINDS.len() == index {
+            text += &lines(&format!("[[{}]]", kind.key), &table);
+        }
+    }
+    text
+}
+
+/// Keeps a simulation short and rain near, and leaves out meshes, which random tables cannot name.
+fn keep_small(table: &mut Table, kind: &str) {
+    let mut drop = |keys: &[&str]| table.entries.retain(|entry| !keys.contains(&entry.key.as_str()));
+    match kind {
+        "flame_particles" => {
+            drop(&["particles", "burners", "step_s", "preroll_s", "domain_min", "domain_max"]);
+            table.push("particles", Value::Integer(60));
+            table.push("preroll_s", Value::Number(0.2));
+        }
+        "rain" => drop(&["distance", "diameters_mm"]),
+        "aurora" => {
+            drop(&["particles", "preroll_s"]);
+            table.push("particles", one("count", 500));
+            table.push("preroll_s", Value::Number(0.1));
+            match table.entries.iter_mut().find(|entry| entry.key == "field").map(|entry| &mut entry.node.value) {
+                Some(Value::Table(field)) => {
+                    field.entries.retain(|entry| entry.key != "cells");
+                    field.push("cells", Value::Integer(48));
+                }
+                _ => table.push("field", one("cells", 48)),
+            }
+        }
+        _ => {}
+    }
+}
+
+/// A table of one whole number.
+fn one(key: &str, value: i64) -> Value {
+    let mut table = Table::default();
+    table.push(key, Value::Integer(value));
+    Value::Table(table)
+}
+
+fn lines(header: &str, table: &Table) -> String {
+    let lines = table.entries.iter().map(|entry| format!("{} = {}\n", entry.key, entry.node.value));
+    format!("{header}\n{}", lines.collect::<String>())
+}

@@ -1,0 +1,124 @@
+//! A slab of fog before the camera: Beer's law, and light scattered toward the camera.
+
+use std::sync::Arc;
+
+use bansho_base::phenomenon::kind::{BuildContext, BuildError, Describe};
+use bansho_base::{
+    host::observer::{Cancelled, Observer},
+    image::Rect,
+    math::{self, DVec2},
+    parameters::Range,
+    phenomenon::{
+        Phenomenon, PhenomenonInfo, Prepared, Run,
+        strip::{AovDescriptor, AovRule, DepthInterval, Shutter, Strip, View},
+        surroundings::{Publication, Surroundings},
+    },
+};
+
+bansho_base::parameters! {
+    /// A slab of fog across the whole picture.
+    pub struct AbsorberParameters {
+        /// Where it begins.
+        near: f64 = 1.0, limits(Range::new(0.01, 1000.0)), unit("m");
+        /// Where it ends.
+        far: f64 = 3.0, limits(Range::new(0.02, 1000.0)), unit("m");
+        /// Extinction of red, green and blue.
+        extinction: [f64; 3] = [0.5, 0.5, 0.5], limits(Range::new(0.0, 100.0)), unit("1/m");
+        /// Share of the light that falls on it that comes toward the camera, for each optical depth.
+        scatter: f64 = 0.0, limits(Range::new(0.0, 1.0));
+    }
+}
+
+impl Describe for AbsorberParameters {
+    const KEY: &'static str = "absorber";
+
+    fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
+        if self.far <= self.near {
+            let kind = bansho_base::parameters::ProblemKind::Conflict("must lie behind `near`".into());
+            return Err(BuildError { key: "far".into(), kind });
+        }
+        Ok(Arc::new(Absorber { name: context.name.to_owned(), parameters: self.clone() }))
+    }
+}
+
+struct Absorber {
+    name: String,
+    parameters: AbsorberParameters,
+}
+
+const AOVS: [AovDescriptor; 1] = [AovDescriptor {
+    name: "optical_depth",
+    unit: "",
+    doc: "Green optical depth; 0 where there is none.",
+    rule: AovRule::Sum,
+}];
+
+impl Phenomenon for Absorber {
+    fn info(&self) -> PhenomenonInfo<'_> {
+        PhenomenonInfo { aovs: &AOVS, ..PhenomenonInfo::new(&self.name) }
+    }
+
+    fn luminance(&self) -> f64 {
+        0.0
+    }
+
+    fn start(self: Arc<Self>) -> Box<dyn Run> {
+        Box::new(self)
+    }
+}
+
+impl Run for Absorber {
+    fn publish(&self, _shutter: Shutter) -> Publication {
+        Publication { extinction: self.parameters.extinction[1], ..Publication::default() }
+    }
+
+    fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
+        vec![DepthInterval { near: self.parameters.near, far: self.parameters.far }]
+    }
+
+    fn prepare<'a>(
+        &'a self,
+        view: &'a View,
+        surroundings: &'a Surroundings<'a>,
+        _observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        Ok(Box::new(PreparedAbsorber { absorber: self, view, surroundings }))
+    }
+}
+
+struct PreparedAbsorber<'a> {
+    absorber: &'a Absorber,
+    view: &'a View,
+    surroundings: &'a Surroundings<'a>,
+}
+
+impl Prepared for PreparedAbsorber<'_> {
+    fn bounds(&self, _slice: &DepthInterval) -> Rect {
+        Rect::of_size(self.view.size[0], self.view.size[1])
+    }
+
+    fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        let AbsorberParameters { near, far, extinction, scatter } = &self.absorber.parameters;
+        let near = near.max(slice.near);
+        let camera = &self.view.camera;
+        for index in 0..strip.len() {
+            let (x, y) = (strip.rect.x + index % strip.rect.width, strip.rect.y + index / strip.rect.width);
+            let Some(direction) = camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5)) else { continue };
+            let far = far.min(slice.far).min(f64::from(strip.plate_depth(index)));
+            let thickness = (far - near).max(0.0);
+            let middle = camera.position + direction * (near + 0.5 * thickness);
+            let mut light = [0.0; 3];
+            for source in &self.surroundings.others.lights {
+                let (illuminance, _) = source.illuminance(middle);
+                (0..3).for_each(|c| {
+                    light[c] += illuminance[c] * (scatter * extinction[c] * thickness) as f32;
+                });
+            }
+            let transmittance = extinction.map(|extinction| math::exp(-extinction * thickness) as f32);
+            strip.add_behind(index, light, transmittance, near as f32);
+            if let Some(plane) = strip.aovs.first_mut() {
+                plane.add(index, (extinction[1] * thickness) as f32, 1.0);
+            }
+        }
+    }
+}

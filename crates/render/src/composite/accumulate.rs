@@ -1,0 +1,149 @@
+//! Compositing front to back: `C += Tacc L; Tacc *= T` (the hot loop of a frame that holds little).
+
+use bansho_base::{
+    image::Rect,
+    math::MulAdd,
+    phenomenon::strip::{AovDescriptor, AovPlane, Strip},
+};
+use fearless_simd::{Level, dispatch};
+
+/// What a strip of the picture has come to, from the camera up to some depth. Planes are row after row.
+#[derive(Default)]
+pub(crate) struct Accumulator {
+    pub(crate) rect: Rect,
+    /// C: red, green, blue of the light that reaches the camera.
+    pub(crate) colour: [Vec<f32>; 3],
+    /// Tacc: share of the light from behind that still reaches the camera; holds nothing until something absorbs.
+    transmittance: [Vec<f32>; 3],
+    absorbs: bool,
+    /// Depth of the nearest sample, m.
+    pub(crate) depth: Vec<f32>,
+    /// Red, green, blue and alpha that each phenomenon adds to the picture; empty unless layers are wanted.
+    pub(crate) layers: Vec<[Vec<f32>; 4]>,
+    /// AOVs of each phenomenon; empty unless they are wanted.
+    pub(crate) aovs: Vec<Vec<AovPlane>>,
+}
+
+fn refill(plane: &mut Vec<f32>, pixels: usize, value: f32) {
+    plane.clear();
+    plane.resize(pixels, value);
+}
+
+impl Accumulator {
+    /// Makes it empty over `rect`, with so many layers, and so many AOVs for each phenomenon.
+    pub(crate) fn reset(&mut self, rect: Rect, layers: usize, aovs: &[usize]) {
+        let pixels = rect.width * rect.height;
+        self.rect = rect;
+        self.colour.iter_mut().for_each(|plane| refill(plane, pixels, 0.0));
+        self.absorbs = false;
+        refill(&mut self.depth, pixels, f32::INFINITY);
+        self.layers.resize_with(layers, Default::default);
+        self.layers.iter_mut().flatten().for_each(|plane| refill(plane, pixels, 0.0));
+        self.aovs.resize_with(aovs.len(), Vec::new);
+        for (planes, &count) in self.aovs.iter_mut().zip(aovs) {
+            planes.resize_with(count, AovPlane::default);
+            planes.iter_mut().for_each(|plane| plane.reset(pixels));
+        }
+    }
+
+    /// Planes of Tacc; `None` while nothing absorbs, so that all are 1.
+    pub(crate) fn transmittance(&self) -> Option<&[Vec<f32>; 3]> {
+        self.absorbs.then_some(&self.transmittance)
+    }
+
+    /// Tacc at a pixel of the strip.
+    pub(crate) fn transmittance_at(&self, index: usize) -> [f32; 3] {
+        if self.absorbs { [0, 1, 2].map(|c| self.transmittance[c][index]) } else { [1.0; 3] }
+    }
+
+    fn begin_to_absorb(&mut self) {
+        if !self.absorbs {
+            let pixels = self.rect.width * self.rect.height;
+            self.transmittance.iter_mut().for_each(|plane| refill(plane, pixels, 1.0));
+            self.absorbs = true;
+        }
+    }
+
+    /// Puts `strip`, drawn by the phenomenon of a number with such `aovs`, behind what is there.
+    pub(crate) fn add_behind(&mut self, level: Level, strip: &Strip, phenomenon: usize, aovs: &[AovDescriptor]) {
+        if strip.transmittance_planes().is_some() {
+            self.begin_to_absorb();
+        }
+        for row in 0..strip.rect.height {
+            let from = row * strip.rect.width;
+            let to = (strip.rect.y - self.rect.y + row) * self.rect.width + strip.rect.x - self.rect.x;
+            if phenomenon < self.layers.len() {
+                self.add_layer_row(strip, phenomenon, from, to);
+            }
+            self.add_row(level, strip, from, to);
+        }
+        if let Some(planes) = self.aovs.get_mut(phenomenon) {
+            let each = planes.iter_mut().zip(&strip.aovs).zip(aovs);
+            each.for_each(|((sum, plane), aov)| sum.add_plane(plane, aov.rule));
+        }
+    }
+
+    fn add_row(&mut self, level: Level, strip: &Strip, from: usize, to: usize) {
+        let width = strip.rect.width;
+        for c in 0..3 {
+            let colour = &mut self.colour[c][to..][..width];
+            let radiance = &strip.radiance[c][from..][..width];
+            if !self.absorbs {
+                dispatch!(level, _simd => add_light(colour, radiance));
+                continue;
+            }
+            let transmittance = &mut self.transmittance[c][to..][..width];
+            match strip.transmittance_planes() {
+                None => dispatch!(level, _simd => emit_row(colour, transmittance, radiance)),
+                Some(planes) => {
+                    let absorbed = &planes[c][from..][..width];
+                    dispatch!(level, _simd => absorb_row(colour, transmittance, radiance, absorbed));
+                }
+            }
+        }
+        let nearest = &mut self.depth[to..][..width];
+        dispatch!(level, _simd => nearest_row(nearest, &strip.depth[from..][..width]));
+    }
+
+    /// A layer's share of the picture: its light as the camera gets it, and the mean transmittance that it takes.
+    fn add_layer_row(&mut self, strip: &Strip, phenomenon: usize, from: usize, to: usize) {
+        for x in 0..strip.rect.width {
+            let taken = strip.transmittance(from + x);
+            let reaches = self.transmittance_at(to + x);
+            let layer = &mut self.layers[phenomenon];
+            let mut alpha = 0.0;
+            for c in 0..3 {
+                layer[c][to + x] = reaches[c].fma(strip.radiance[c][from + x], layer[c][to + x]);
+                alpha += reaches[c] * (1.0 - taken[c]);
+            }
+            layer[3][to + x] += alpha / 3.0;
+        }
+    }
+}
+
+#[inline(always)]
+fn add_light(colour: &mut [f32], radiance: &[f32]) {
+    colour.iter_mut().zip(radiance).for_each(|(colour, radiance)| *colour += radiance);
+}
+
+#[inline(always)]
+fn nearest_row(nearest: &mut [f32], depth: &[f32]) {
+    nearest.iter_mut().zip(depth).for_each(|(old, new)| *old = if *new < *old { *new } else { *old });
+}
+
+#[inline(always)]
+fn emit_row(colour: &mut [f32], transmittance: &[f32], radiance: &[f32]) {
+    for ((colour, transmittance), radiance) in colour.iter_mut().zip(transmittance).zip(radiance) {
+        *colour = transmittance.fma(*radiance, *colour);
+    }
+}
+
+#[inline(always)]
+fn absorb_row(colour: &mut [f32], transmittance: &mut [f32], radiance: &[f32], absorbed: &[f32]) {
+    for (((colour, transmittance), radiance), absorbed) in
+        colour.iter_mut().zip(transmittance).zip(radiance).zip(absorbed)
+    {
+        *colour = transmittance.fma(*radiance, *colour);
+        *transmittance *= absorbed;
+    }
+}

@@ -1,0 +1,83 @@
+//! Remarks: what users should know of how a scene will look.
+
+use std::sync::{Arc, OnceLock};
+
+use bansho_base::{
+    color,
+    host::once::get_or_make,
+    phenomenon::{
+        Remark,
+        strip::Shutter,
+        surroundings::{Neighbours, Publication},
+    },
+    world::sky::Sky,
+};
+
+use crate::{
+    compiled::{ActiveRun, CompiledScene},
+    context::ShotContext,
+    exposure::assumed_of_plate,
+    faint::faint,
+    plan::Plan,
+    scene::PLATE_LAYER,
+    shot::stepping::of_scene,
+};
+
+/// What there is in a scene at one moment.
+struct Moment<'a> {
+    shutter: Shutter,
+    runs: &'a [ActiveRun],
+    scene: Publication,
+    /// What phenomena publish, as far as anybody has asked.
+    published: Vec<OnceLock<Publication>>,
+    sky: Sky,
+}
+
+impl<'a> Moment<'a> {
+    fn new(context: &ShotContext, runs: &'a [ActiveRun], shutter: Shutter) -> Self {
+        Self {
+            shutter,
+            runs,
+            scene: of_scene(context, shutter),
+            published: runs.iter().map(|_| OnceLock::new()).collect(),
+            sky: context.sky(shutter.middle()),
+        }
+    }
+
+    fn remark(&self, index: usize) -> Option<Remark> {
+        let published =
+            |other: usize| get_or_make(&self.published[other], || self.runs[other].run.publish(self.shutter));
+        let count = self.runs.len();
+        let neighbours = Neighbours { scene: &self.scene, count, published: &published, own: index, sky: &self.sky };
+        self.runs[index].participant.phenomenon.remark(&neighbours)
+    }
+}
+
+/// What users should know of how phenomena will look, each with its phenomenon's name.
+///
+/// Said only of what is so in the first, the middle and the last frame; that nothing lights it, only where nothing is simulated that may
+/// shine later.
+pub fn remarks(compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<(String, Remark)> {
+    let context = ShotContext::new(compiled.clone(), Arc::new(plan.clone()));
+    let runs = compiled.start();
+    let may_shine_later = compiled.is_stepped();
+    let frames = plan.frames();
+    let shutters = [frames.start, (frames.start + frames.end) / 2, frames.end - 1].map(|number| plan.shutter(number));
+    let moments = shutters.map(|shutter| Moment::new(&context, &runs, shutter));
+    let remark = |index: usize| {
+        let [first, middle, last] = moments.each_ref().map(|moment| moment.remark(index));
+        let always = first.filter(|remark| Some(remark) == middle.as_ref() && middle == last)?;
+        let holds = !(may_shine_later && always.unless_lit_later);
+        holds.then(|| (runs[index].info().name.to_owned(), always))
+    };
+    let plate = assumed_of_plate(compiled, plan).map(|ev100| {
+        let message = format!(
+            "with which exposure it was taken is not known; EV {ev100:.1} (at ISO 100) is assumed, so that its white is {:.0} cd/m^2; \
+             `exposure_ev100` in [plate] states it",
+            color::white_luminance(ev100)
+        );
+        (PLATE_LAYER.to_owned(), Remark::new(message))
+    });
+    let looks = (0..runs.len()).filter_map(remark);
+    plate.into_iter().chain(looks).chain(faint(compiled, plan)).collect()
+}

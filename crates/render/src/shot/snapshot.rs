@@ -1,0 +1,71 @@
+//! Snapshots of a shot: a header with version and key, each phenomenon's steps and state, a checksum behind all.
+
+use bansho_base::phenomenon::SnapshotError;
+
+use crate::{
+    compiled::{ActiveRun, CompiledScene},
+    fingerprint,
+    shot::RenderError,
+};
+
+const MAGIC: &[u8; 8] = b"BANSHOSS";
+const VERSION: u32 = 1;
+const CHECKSUM: usize = 32;
+
+pub(crate) fn write(compiled: &CompiledScene, runs: &[ActiveRun]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    bytes.extend_from_slice(MAGIC);
+    bytes.extend_from_slice(&VERSION.to_le_bytes());
+    bytes.extend_from_slice(&fingerprint::of_state(compiled));
+    bytes.extend_from_slice(&(runs.len() as u64).to_le_bytes());
+    for run in runs {
+        let state = run.as_stepped().map(|stepped| stepped.snapshot()).unwrap_or_default();
+        bytes.extend_from_slice(&run.taken.to_le_bytes());
+        bytes.extend_from_slice(&(state.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(&state);
+    }
+    let checksum = *blake3::hash(&bytes).as_bytes();
+    bytes.extend_from_slice(&checksum);
+    bytes
+}
+
+/// Restores `runs`, which must be at their beginnings.
+pub(crate) fn read(compiled: &CompiledScene, bytes: &[u8], runs: &mut [ActiveRun]) -> Result<(), RenderError> {
+    let damaged = || RenderError::from(SnapshotError::Damaged);
+    let (contents, checksum) = bytes.len().checked_sub(CHECKSUM).map(|at| bytes.split_at(at)).ok_or_else(damaged)?;
+    let mut rest = contents.strip_prefix(MAGIC).ok_or_else(damaged)?;
+    let found = u32::from_le_bytes(take(&mut rest).ok_or_else(damaged)?);
+    if found != VERSION {
+        return Err(SnapshotError::Version { found, known: VERSION }.into());
+    }
+    if blake3::hash(contents).as_bytes() != checksum {
+        return Err(damaged());
+    }
+    let key: [u8; 32] = take(&mut rest).ok_or_else(damaged)?;
+    if key != fingerprint::of_state(compiled) {
+        return Err(RenderError::ForeignSnapshot);
+    }
+    if u64::from_le_bytes(take(&mut rest).ok_or_else(damaged)?) != runs.len() as u64 {
+        return Err(damaged());
+    }
+    runs.iter_mut().try_for_each(|run| read_one(&mut rest, run))
+}
+
+fn read_one(rest: &mut &[u8], run: &mut ActiveRun) -> Result<(), RenderError> {
+    let mut word = || take(rest).map(u64::from_le_bytes).ok_or(SnapshotError::Damaged);
+    let (taken, length) = (word()?, word()?);
+    let length = usize::try_from(length).ok().filter(|length| *length <= rest.len()).ok_or(SnapshotError::Damaged)?;
+    let (state, behind) = rest.split_at(length);
+    *rest = behind;
+    if let Some(stepped) = run.run.as_stepped_mut() {
+        stepped.restore(state)?;
+    }
+    run.taken = taken;
+    Ok(())
+}
+
+fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
+    let (head, behind) = rest.split_first_chunk::<N>()?;
+    *rest = behind;
+    Some(*head)
+}

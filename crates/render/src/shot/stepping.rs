@@ -1,0 +1,71 @@
+//! Time of what is stepped: fixed steps in one order, whatever the frames.
+
+use bansho_base::{
+    host::observer::{self, Cancelled, Observer},
+    phenomenon::{
+        strip::Shutter,
+        surroundings::{Publication, Surroundings},
+    },
+};
+
+use crate::{compiled::ActiveRun, composite::mirror::Mirror, context::ShotContext};
+
+/// What phenomenon `index` is among during `shutter`.
+pub(crate) fn surroundings<'a>(
+    context: &'a ShotContext,
+    publications: &[Publication],
+    index: usize,
+    shutter: Shutter,
+    mirror: Option<&'a Mirror>,
+) -> Surroundings<'a> {
+    Surroundings {
+        wind: context.compiled.wind(),
+        air: &context.plan.scene.air,
+        sky: context.sky(shutter.middle()),
+        reflection: mirror.map(|mirror| &mirror.seen),
+        backdrop: mirror.and_then(|mirror| mirror.backdrop.as_ref()),
+        others: others(context, publications, index, shutter),
+    }
+}
+
+/// What everybody but `index` publishes during `shutter`, and the scene's own lights and obstacles.
+fn others(context: &ShotContext, publications: &[Publication], index: usize, shutter: Shutter) -> Publication {
+    let mut others = of_scene(context, shutter);
+    for (other, publication) in publications.iter().enumerate() {
+        if other != index {
+            others.extend(publication);
+        }
+    }
+    others
+}
+
+/// The scene's own lights and obstacles.
+pub(crate) fn of_scene(context: &ShotContext, shutter: Shutter) -> Publication {
+    let lights = context.plan.scene.lights.iter().map(|light| light.at(shutter.middle())).collect();
+    Publication { lights, occluders: context.compiled.obstacles().cloned().collect(), ..Publication::default() }
+}
+
+/// Steps everybody until no state lies more than a step before that which an exposure is drawn from, always the one that is furthest
+/// behind, so that the order of steps depends on nothing but the steps themselves.
+pub(crate) fn advance(
+    context: &ShotContext,
+    runs: &mut [ActiveRun],
+    shutter: Shutter,
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
+    loop {
+        let behind = (0..runs.len())
+            .filter(|&index| runs[index].taken < runs[index].steps_until(shutter))
+            .filter_map(|index| Some((index, runs[index].stepping?.time_after(runs[index].taken))))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((index, now)) = behind else { return Ok(()) };
+        observer::check(observer)?;
+        let instant = Shutter { open: now, close: now };
+        let publications: Vec<Publication> = runs.iter().map(|other| other.run.publish(instant)).collect();
+        let surroundings = surroundings(context, &publications, index, instant, None);
+        if let Some(stepped) = runs[index].run.as_stepped_mut() {
+            stepped.step(now, &surroundings);
+        }
+        runs[index].taken += 1;
+    }
+}
