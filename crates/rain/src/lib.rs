@@ -7,17 +7,16 @@
 
 pub mod billboards;
 pub mod drops;
+pub(crate) mod lanes;
 pub mod lighting;
 mod parameters;
 mod phenomenon;
 pub(crate) mod render;
+pub(crate) mod shutter_cameras;
 pub mod streaks;
 
 pub use parameters::{Method, RainParameters, SplashParameters};
 pub use phenomenon::Rain;
-
-#[cfg(test)]
-mod reference;
 
 #[cfg(test)]
 mod tests;

@@ -12,7 +12,7 @@ use bansho_base::{
 };
 
 /// Width of a cell, m, and about its height.
-pub(crate) const CELL: f64 = 1.0;
+pub(crate) const CELL_SIZE: f64 = 1.0;
 
 /// A cell of the lattice: x, y (counted from the ground up at time 0) and z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -20,7 +20,7 @@ pub(crate) struct Cell(pub(crate) [i64; 3]);
 
 /// How drops fall and drift.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Falling<'a> {
+pub(crate) struct LatticeMotion<'a> {
     /// Terminal velocity, m/s.
     pub(crate) speed: f64,
     pub(crate) wind: &'a Wind,
@@ -46,19 +46,19 @@ pub(crate) struct Lattice {
     base: f64,
     /// The first row that may be asked for, and how far the wind has carried it and those above, m: x and z.
     first: i64,
-    carried: Vec<DVec2>,
+    drift: Vec<DVec2>,
     /// Rows after which cells repeat in a loop.
     rows: Option<i64>,
 }
 
 impl Lattice {
-    /// Drops at time `t` between two `heights`, m.
-    pub(crate) fn new(falling: &Falling, heights: RangeInclusive<f64>, t: f64) -> Self {
-        let Falling { speed, wind, response, ground, loop_s } = *falling;
+    /// DropBatch at time `t` between two `heights`, m.
+    pub(crate) fn new(falling: &LatticeMotion, heights: RangeInclusive<f64>, t: f64) -> Self {
+        let LatticeMotion { speed, wind, response, ground, loop_s } = *falling;
         let (height, rows) = match loop_s {
-            None => (CELL, None),
+            None => (CELL_SIZE, None),
             Some(seconds) => {
-                let rows = (speed * seconds / CELL).round().max(1.0);
+                let rows = (speed * seconds / CELL_SIZE).round().max(1.0);
                 (speed * seconds / rows, Some(rows as i64))
             }
         };
@@ -67,16 +67,16 @@ impl Lattice {
         let (first, last) = (row(*heights.start()), row(*heights.end()));
         // A drop is fast enough to come down within a year, or the wind may have it for so long.
         let slowest = speed.max(1e-6);
-        let carried = |row: i64| {
-            let way = wind.travel((row as f64 + 0.5) * height / slowest, t) * response;
-            DVec2::new(way.x, way.z)
+        let drift = |row: i64| {
+            let drift = wind.travel((row as f64 + 0.5) * height / slowest, t) * response;
+            DVec2::new(drift.x, drift.z)
         };
-        Self { height, base, first, carried: (first..=last).map(carried).collect(), rows }
+        Self { height, base, first, drift: (first..=last).map(drift).collect(), rows }
     }
 
     /// Volume of a cell, m^3.
     pub(crate) fn volume(&self) -> f64 {
-        CELL * CELL * self.height
+        CELL_SIZE * CELL_SIZE * self.height
     }
 
     /// Height of a cell, m.
@@ -85,8 +85,8 @@ impl Lattice {
     }
 
     /// How far a cell's drops are from its middle along the world's axes, m: up to `aside` level.
-    pub(crate) fn half_extents(&self, aside: f64) -> DVec3 {
-        DVec3::new(aside, 0.5 * self.height, aside)
+    pub(crate) fn half_extents(&self, half_width: f64) -> DVec3 {
+        DVec3::new(half_width, 0.5 * self.height, half_width)
     }
 
     /// The row at a height, m.
@@ -95,21 +95,21 @@ impl Lattice {
     }
 
     /// The column of cells in a row at a place of the world, m: x and z.
-    pub(crate) fn column(&self, row: i64, level: DVec2) -> [i64; 2] {
-        ((level - self.carried(row)) / CELL).to_array().map(|place| place.floor() as i64)
+    pub(crate) fn column(&self, row: i64, horizontal: DVec2) -> [i64; 2] {
+        ((horizontal - self.drift(row)) / CELL_SIZE).to_array().map(|coordinate| coordinate.floor() as i64)
     }
 
     /// The point of the world at a place within a cell, in shares of its edges, m.
-    pub(crate) fn world(&self, Cell([x, row, z]): Cell, within: DVec3) -> DVec3 {
-        let level = DVec2::new(x as f64 + within.x, z as f64 + within.z) * CELL + self.carried(row);
-        DVec3::new(level.x, (row as f64 + within.y) * self.height + self.base, level.y)
+    pub(crate) fn world(&self, Cell([x, row, z]): Cell, fraction: DVec3) -> DVec3 {
+        let horizontal = DVec2::new(x as f64 + fraction.x, z as f64 + fraction.z) * CELL_SIZE + self.drift(row);
+        DVec3::new(horizontal.x, (row as f64 + fraction.y) * self.height + self.base, horizontal.y)
     }
 
     /// How far the wind has carried a row, m: x and z. Beyond the heights that it was made for, as the nearest.
-    fn carried(&self, row: i64) -> DVec2 {
-        let last = self.carried.len().saturating_sub(1) as i64;
+    fn drift(&self, row: i64) -> DVec2 {
+        let last = self.drift.len().saturating_sub(1) as i64;
         let index = (row - self.first).clamp(0, last) as usize;
-        self.carried.get(index).copied().unwrap_or_default()
+        self.drift.get(index).copied().unwrap_or_default()
     }
 
     /// Which contents a cell has: cells that a loop repeats have the same. Keys hold 21, 22 and 21 bits of the three counts.
@@ -132,7 +132,7 @@ mod tests {
     }
 
     fn lattice(speed: f64, wind: &Wind, loop_s: Option<f64>, t: f64) -> Lattice {
-        Lattice::new(&Falling { speed, wind, response: 1.0, ground: 0.0, loop_s }, -20.0..=40.0, t)
+        Lattice::new(&LatticeMotion { speed, wind, response: 1.0, ground: 0.0, loop_s }, -20.0..=40.0, t)
     }
 
     /// What keys blow to x.
@@ -144,10 +144,10 @@ mod tests {
     #[test]
     fn a_drop_falls_at_its_speed_and_drifts_with_the_wind() {
         let wind = wind([3.0, 0.0, -1.0], None);
-        let (cell, within) = (Cell([4, 620, -2]), DVec3::new(0.3, 0.7, 0.8));
-        let at = |t: f64| lattice(6.0, &wind, None, t).world(cell, within);
-        let moved = at(100.5) - at(100.0);
-        assert!((moved - DVec3::new(1.5, -3.0, -0.5)).length() < 1e-9, "{moved}");
+        let (cell, fraction) = (Cell([4, 620, -2]), DVec3::new(0.3, 0.7, 0.8));
+        let at = |t: f64| lattice(6.0, &wind, None, t).world(cell, fraction);
+        let displacement = at(100.5) - at(100.0);
+        assert!((displacement - DVec3::new(1.5, -3.0, -0.5)).length() < 1e-9, "{displacement}");
     }
 
     #[test]
@@ -165,9 +165,9 @@ mod tests {
             let at = |speed: f64| {
                 lattice(6.0, &wind([speed, 0.0, 0.0], None), None, t).world(Cell([0, row, 0]), DVec3::splat(0.5))
             };
-            let moved = at(2.1) - at(2.0);
+            let displacement = at(2.1) - at(2.0);
             // 3.5 m above the ground, which it comes to in 3.5 / 6 s.
-            assert!((moved.x + 0.1 * 3.5 / 6.0).abs() < 1e-6 && moved.y == 0.0, "{t}: {moved}");
+            assert!((displacement.x + 0.1 * 3.5 / 6.0).abs() < 1e-6 && displacement.y == 0.0, "{t}: {displacement}");
         }
     }
 
@@ -189,9 +189,9 @@ mod tests {
             let point = DVec3::new(-7.3, 2.2, 11.8);
             let row = lattice.row(point.y);
             let [x, z] = lattice.column(row, DVec2::new(point.x, point.z));
-            let within = point - lattice.world(Cell([x, row, z]), DVec3::ZERO);
-            let edges = DVec3::new(CELL, lattice.height(), CELL);
-            assert!(within.cmpge(DVec3::ZERO).all() && within.cmplt(edges).all(), "{within}");
+            let fraction = point - lattice.world(Cell([x, row, z]), DVec3::ZERO);
+            let edges = DVec3::new(CELL_SIZE, lattice.height(), CELL_SIZE);
+            assert!(fraction.cmpge(DVec3::ZERO).all() && fraction.cmplt(edges).all(), "{fraction}");
         }
     }
 

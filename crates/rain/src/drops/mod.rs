@@ -1,4 +1,4 @@
-//! Drops in the air: how many of which size, how fast they fall, where they are.
+//! DropBatch in the air: how many of which size, how fast they fall, where they are.
 
 pub(crate) mod cell;
 pub(crate) mod exposure;

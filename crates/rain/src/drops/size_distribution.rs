@@ -4,14 +4,14 @@ use std::f64::consts::PI;
 
 use bansho_base::{math, math::random};
 
-use super::terminal_velocity::Fall;
+use super::terminal_velocity::TerminalVelocity;
 
 /// Intercept N0 of Marshall and Palmer, per m^3 per mm.
 const INTERCEPT: f64 = 8000.0;
 
-/// Drops of each diameter, per m^3 of air per mm of diameter: n(D).
+/// DropBatch of each diameter, per m^3 of air per mm of diameter: n(D).
 #[derive(Clone, Debug, PartialEq)]
-pub enum DropSizes {
+pub enum DropSizeDistribution {
     /// `n = 8000 exp(-slope D)`, with the slope in 1/mm.
     Exponential {
         /// Slope Lambda, 1/mm; infinite where there is no rain.
@@ -21,7 +21,7 @@ pub enum DropSizes {
     Table(SizeTable),
 }
 
-impl DropSizes {
+impl DropSizeDistribution {
     /// All diameters, mm.
     pub const ALL: [f64; 2] = [0.0, f64::INFINITY];
 
@@ -53,7 +53,7 @@ impl DropSizes {
         }
     }
 
-    /// Drops per m^3 with diameters in a range (mm).
+    /// DropBatch per m^3 with diameters in a range (mm).
     pub fn count(&self, range_mm: [f64; 2]) -> f64 {
         self.moment(0, range_mm)
     }
@@ -92,7 +92,7 @@ impl DropSizes {
     /// The rain rate that the drops of a range bring down, mm/h.
     ///
     /// Marshall and Palmer's fit does not give back its own rate: with measured velocities 14 to 18 % more.
-    pub fn rain_rate(&self, fall: &Fall, [low, high]: [f64; 2]) -> f64 {
+    pub fn rain_rate(&self, fall: &TerminalVelocity, [low, high]: [f64; 2]) -> f64 {
         /// Enough for 1e-6: the velocity is a table with steps of 0.1 to 0.2 mm.
         const STEPS: usize = 2000;
         let high = high.min(LARGEST_MM);
@@ -176,14 +176,14 @@ impl SizeTable {
     }
 
     /// The straight pieces within a range of diameters.
-    fn pieces(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = [[f64; 2]; 2]> {
-        let piece = move |pair: &[[f64; 2]]| {
+    fn segments(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = [[f64; 2]; 2]> {
+        let segment = move |pair: &[[f64; 2]]| {
             let [[d0, n0], [d1, n1]] = [pair[0], pair[1]];
             let (from, to) = (d0.max(low), d1.min(high));
             let at = |d: f64| [d, math::lerp(n0, n1, (d - d0) / (d1 - d0))];
             (from < to).then(|| [at(from), at(to)])
         };
-        self.0.windows(2).filter_map(piece)
+        self.0.windows(2).filter_map(segment)
     }
 
     fn density(&self, diameter_mm: f64) -> f64 {
@@ -198,27 +198,27 @@ impl SizeTable {
     fn moment(&self, k: u32, range: [f64; 2]) -> f64 {
         // Of d^k (a + b d), exactly.
         let power = |d: f64, exponent: u32| (0..exponent).fold(1.0, |product, _| product * d);
-        let of_piece = |[[d0, n0], [d1, n1]]: [[f64; 2]; 2]| {
+        let segment_moment = |[[d0, n0], [d1, n1]]: [[f64; 2]; 2]| {
             let slope = (n1 - n0) / (d1 - d0);
-            let until = |d: f64| {
+            let antiderivative = |d: f64| {
                 (n0 - slope * d0) * power(d, k + 1) / (k + 1) as f64 + slope * power(d, k + 2) / (k + 2) as f64
             };
-            until(d1) - until(d0)
+            antiderivative(d1) - antiderivative(d0)
         };
-        self.pieces(range).map(of_piece).sum()
+        self.segments(range).map(segment_moment).sum()
     }
 
     fn quantile(&self, u: f64, range: [f64; 2]) -> f64 {
-        let mut left = u * self.moment(0, range);
-        for [[d0, n0], [d1, n1]] in self.pieces(range) {
+        let mut remaining = u * self.moment(0, range);
+        for [[d0, n0], [d1, n1]] in self.segments(range) {
             let drops = 0.5 * (n0 + n1) * (d1 - d0);
-            if left < drops {
+            if remaining < drops {
                 // n0 x + slope x^2 / 2 = left, in the form that holds for slopes of 0.
                 let slope = (n1 - n0) / (d1 - d0);
-                let root = math::sqrt((n0 * n0 + 2.0 * slope * left).max(0.0));
-                return (d0 + 2.0 * left / (n0 + root).max(f64::MIN_POSITIVE)).min(d1);
+                let root = math::sqrt((n0 * n0 + 2.0 * slope * remaining).max(0.0));
+                return (d0 + 2.0 * remaining / (n0 + root).max(f64::MIN_POSITIVE)).min(d1);
             }
-            left -= drops;
+            remaining -= drops;
         }
         range[1].min(self.0[self.0.len() - 1][0]).max(range[0])
     }
@@ -235,16 +235,16 @@ pub struct SizeBin {
 
 impl SizeBin {
     /// Width of a bin that stands alone, mm: that of the paper's.
-    pub const LONE_WIDTH_MM: f64 = 0.2;
+    pub const DEFAULT_WIDTH_MM: f64 = 0.2;
 
     /// Bins around rising diameters, which meet half way between neighbours; the outer ones are symmetric.
     pub fn around(diameters_mm: &[f64]) -> Vec<Self> {
         let gap = |index: usize| diameters_mm.get(index..index + 2).map(|pair| 0.5 * (pair[1] - pair[0]));
         let bin = |(index, &diameter_mm): (usize, &f64)| {
             let (below, above) = (index.checked_sub(1).and_then(gap), gap(index));
-            let lone = 0.5 * Self::LONE_WIDTH_MM;
-            let below_half = below.or(above).unwrap_or(lone).min(diameter_mm);
-            let above_half = above.or(below).unwrap_or(lone);
+            let default_half = 0.5 * Self::DEFAULT_WIDTH_MM;
+            let below_half = below.or(above).unwrap_or(default_half).min(diameter_mm);
+            let above_half = above.or(below).unwrap_or(default_half);
             Self { diameter_mm, range_mm: [diameter_mm - below_half, diameter_mm + above_half] }
         };
         diameters_mm.iter().enumerate().map(bin).collect()
@@ -255,8 +255,8 @@ impl SizeBin {
         self.range_mm[1] - self.range_mm[0]
     }
 
-    /// Drops per m^3 in it: the integral of n(D). The paper's `n dD` at the bin's diameter is 1 to 3 % less for its bins.
-    pub fn count(&self, sizes: &DropSizes) -> f64 {
+    /// DropBatch per m^3 in it: the integral of n(D). The paper's `n dD` at the bin's diameter is 1 to 3 % less for its bins.
+    pub fn count(&self, sizes: &DropSizeDistribution) -> f64 {
         sizes.count(self.range_mm)
     }
 }
@@ -264,7 +264,7 @@ impl SizeBin {
 /// A number of drops for volume `index` of many alike that hold `mean` each: its fractional part is a chance, spread evenly over
 /// the volumes, so that any run of them holds its mean to within two. It never falls as the mean rises. `words` are
 /// random and the same for all volumes.
-pub fn even_count(mean: f64, index: u32, words: [u32; 2]) -> u64 {
+pub fn stratified_count(mean: f64, index: u32, words: [u32; 2]) -> u64 {
     /// Golden ratio less one: the multiples are the most evenly spread there are.
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let offset = random::uniform_f64(words[0], words[1]) + GOLDEN * f64::from(index);

@@ -60,32 +60,32 @@ pub enum NoTerminalVelocity {
     },
 }
 
-/// Drops falling by a law through an air.
+/// DropBatch falling by a law through an air.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fall {
+pub struct TerminalVelocity {
     /// Where the velocities come from.
     pub law: VelocityLaw,
     /// What the drops fall through.
     pub air: Air,
 }
 
-impl Default for Fall {
+impl Default for TerminalVelocity {
     fn default() -> Self {
         Self { law: VelocityLaw::Measured, air: Air::default() }
     }
 }
 
-impl Fall {
+impl TerminalVelocity {
     /// Terminal velocity of a drop of diameter D, m/s downward; rises with D.
     ///
     /// Where the paper's formula has no solution, between 79.5 and 84 um, its drag below Re = 1 is used; above Re = 1e4, its
     /// drag below.
     pub fn speed(&self, diameter_mm: f64) -> f64 {
         match self.law {
-            VelocityLaw::Measured => measured(diameter_mm) * density_correction(&self.air),
-            VelocityLaw::Formula => match fixed_point(diameter_mm, &self.air) {
+            VelocityLaw::Measured => measured_velocity(diameter_mm) * density_correction(&self.air),
+            VelocityLaw::Formula => match fixed_point_velocity(diameter_mm, &self.air) {
                 Ok(speed) => speed,
-                Err(NoTerminalVelocity::DragJump { .. }) => stokes(diameter_mm, &self.air),
+                Err(NoTerminalVelocity::DragJump { .. }) => stokes_velocity(diameter_mm, &self.air),
                 Err(NoTerminalVelocity::TooFast { reynolds, .. }) => {
                     reynolds * self.air.viscosity / (self.air.density * 1e-3 * diameter_mm)
                 }
@@ -138,11 +138,11 @@ const GUNN_KINZER: [[f64; 2]; 35] = [
 ///
 /// Linear between the table's rows; by Stokes' square of D below 0.078 mm; that of the largest measured drop beyond 5.8 mm, where
 /// drops break up.
-pub fn measured(diameter_mm: f64) -> f64 {
+pub fn measured_velocity(diameter_mm: f64) -> f64 {
     let [smallest, slowest] = GUNN_KINZER[0];
     if diameter_mm < smallest {
-        let share = diameter_mm.max(0.0) / smallest;
-        return slowest * share * share;
+        let ratio = diameter_mm.max(0.0) / smallest;
+        return slowest * ratio * ratio;
     }
     let upper = GUNN_KINZER.partition_point(|row| row[0] <= diameter_mm).min(GUNN_KINZER.len() - 1);
     let ([d0, v0], [d1, v1]) = (GUNN_KINZER[upper - 1], GUNN_KINZER[upper]);
@@ -155,7 +155,7 @@ fn density_correction(air: &Air) -> f64 {
 }
 
 /// Drag C of a rigid sphere, eq. (3).
-pub fn drag(reynolds: f64) -> f64 {
+pub fn drag_coefficient(reynolds: f64) -> f64 {
     if reynolds < 1.0 {
         24.0 / reynolds
     } else {
@@ -165,17 +165,17 @@ pub fn drag(reynolds: f64) -> f64 {
 }
 
 /// Reynolds number Re, eq. (4).
-pub fn reynolds(speed: f64, diameter_mm: f64, air: &Air) -> f64 {
+pub fn reynolds_number(speed: f64, diameter_mm: f64, air: &Air) -> f64 {
     speed * air.density * 1e-3 * diameter_mm / air.viscosity
 }
 
 /// Velocity at which weight and the drag C are in balance, eq. (2).
-fn balance(diameter_mm: f64, drag: f64, air: &Air) -> f64 {
+fn equilibrium_velocity(diameter_mm: f64, drag: f64, air: &Air) -> f64 {
     math::sqrt(4.0 * STANDARD_GRAVITY * 1e-3 * diameter_mm * (WATER_DENSITY - air.density) / (3.0 * air.density * drag))
 }
 
 /// Stokes' velocity: the solution for C = 24/Re.
-fn stokes(diameter_mm: f64, air: &Air) -> f64 {
+fn stokes_velocity(diameter_mm: f64, air: &Air) -> f64 {
     let diameter = 1e-3 * diameter_mm;
     STANDARD_GRAVITY * diameter * diameter * (WATER_DENSITY - air.density) / (18.0 * air.viscosity)
 }
@@ -184,7 +184,7 @@ fn stokes(diameter_mm: f64, air: &Air) -> f64 {
 ///
 /// # Errors
 /// There is no such velocity, or it lies where (3) gives no drag.
-pub fn fixed_point(diameter_mm: f64, air: &Air) -> Result<f64, NoTerminalVelocity> {
+pub fn fixed_point_velocity(diameter_mm: f64, air: &Air) -> Result<f64, NoTerminalVelocity> {
     /// The slowest convergence, far below Re = 1, halves the error with every step.
     const STEPS: usize = 200;
     if diameter_mm.is_nan() || diameter_mm <= 0.0 {
@@ -192,11 +192,11 @@ pub fn fixed_point(diameter_mm: f64, air: &Air) -> Result<f64, NoTerminalVelocit
     }
     let mut speed = 1.0;
     for _ in 0..STEPS {
-        let next = balance(diameter_mm, drag(reynolds(speed, diameter_mm, air)), air);
+        let next = equilibrium_velocity(diameter_mm, drag_coefficient(reynolds_number(speed, diameter_mm, air)), air);
         let converged = (next - speed).abs() <= 1e-12 * next;
         speed = next;
         if converged {
-            let reynolds = reynolds(speed, diameter_mm, air);
+            let reynolds = reynolds_number(speed, diameter_mm, air);
             let known = reynolds < 1e4;
             return if known { Ok(speed) } else { Err(NoTerminalVelocity::TooFast { diameter_mm, reynolds }) };
         }
@@ -207,27 +207,27 @@ pub fn fixed_point(diameter_mm: f64, air: &Air) -> Result<f64, NoTerminalVelocit
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::{near, rows};
+    use crate::tests::reference::{near, rows};
 
     #[test]
     fn measured_velocities_are_those_of_gunn_and_kinzer() {
         for [diameter, speed, ..] in rows::<8>(include_str!("../../data/raindrop_gunn_kinzer.csv")) {
-            assert!(near(Fall::default().speed(diameter), speed, 1e-12), "{diameter} mm");
+            assert!(near(TerminalVelocity::default().speed(diameter), speed, 1e-12), "{diameter} mm");
         }
         for [diameter, _, _, _, _, _, _, speed, ..] in rows::<13>(include_str!("../../data/raindrop_velocity.csv")) {
-            assert!(near(measured(diameter), speed, 1e-3), "{diameter} mm");
+            assert!(near(measured_velocity(diameter), speed, 1e-3), "{diameter} mm");
         }
-        assert_eq!((measured(0.0), measured(0.039), measured(20.0)), (0.0, 0.045, 9.17));
+        assert_eq!((measured_velocity(0.0), measured_velocity(0.039), measured_velocity(20.0)), (0.0, 0.045, 9.17));
     }
 
     #[test]
     fn the_formula_gives_the_reference_velocities() {
         let air = Air::default();
         for [diameter, speed, re, c, ..] in rows::<13>(include_str!("../../data/raindrop_velocity.csv")) {
-            let found = fixed_point(diameter, &air).expect("converges");
+            let found = fixed_point_velocity(diameter, &air).expect("converges");
             assert!(near(found, speed, 1e-4), "{diameter} mm: {found}");
-            let number = reynolds(found, diameter, &air);
-            assert!(near(number, re, 1e-4) && near(drag(number), c, 1e-4), "{diameter} mm");
+            let number = reynolds_number(found, diameter, &air);
+            assert!(near(number, re, 1e-4) && near(drag_coefficient(number), c, 1e-4), "{diameter} mm");
         }
     }
 
@@ -235,10 +235,14 @@ mod tests {
     fn a_solution_satisfies_all_three_equations() {
         let air = Air::at(273.15, 90_000.0);
         for diameter in [0.02, 0.05, 0.2, 1.0, 3.0, 6.0] {
-            let speed = fixed_point(diameter, &air).expect("converges");
-            assert!(near(balance(diameter, drag(reynolds(speed, diameter, &air)), &air), speed, 1e-11));
+            let speed = fixed_point_velocity(diameter, &air).expect("converges");
+            assert!(near(
+                equilibrium_velocity(diameter, drag_coefficient(reynolds_number(speed, diameter, &air)), &air),
+                speed,
+                1e-11
+            ));
         }
-        assert!(near(fixed_point(0.05, &air).expect("converges"), stokes(0.05, &air), 1e-11));
+        assert!(near(fixed_point_velocity(0.05, &air).expect("converges"), stokes_velocity(0.05, &air), 1e-11));
     }
 
     #[test]
@@ -246,7 +250,7 @@ mod tests {
         let air = Air::default();
         let (mut first, mut last) = (f64::INFINITY, 0.0_f64);
         for micrometre in (700..900).map(|tenth| tenth as f64 * 0.1) {
-            match fixed_point(1e-3 * micrometre, &air) {
+            match fixed_point_velocity(1e-3 * micrometre, &air) {
                 Ok(_) => {}
                 Err(NoTerminalVelocity::DragJump { .. }) => {
                     (first, last) = (first.min(micrometre), last.max(micrometre))
@@ -255,14 +259,16 @@ mod tests {
             }
         }
         assert!((79.0..80.0).contains(&first) && (83.0..85.0).contains(&last), "{first} to {last} um");
-        assert!(matches!(fixed_point(12.0, &air), Err(NoTerminalVelocity::TooFast { reynolds, .. }) if reynolds > 1e4));
+        assert!(
+            matches!(fixed_point_velocity(12.0, &air), Err(NoTerminalVelocity::TooFast { reynolds, .. }) if reynolds > 1e4)
+        );
     }
 
     #[test]
     fn velocities_rise_with_diameter_under_both_laws() {
         for law in [VelocityLaw::Measured, VelocityLaw::Formula] {
-            let fall = Fall { law, air: Air::default() };
-            let speeds: Vec<f64> = (0..=800).map(|i| fall.speed(0.01 * i as f64)).collect();
+            let velocity = TerminalVelocity { law, air: Air::default() };
+            let speeds: Vec<f64> = (0..=800).map(|i| velocity.speed(0.01 * i as f64)).collect();
             assert!(speeds.is_sorted_by(|a, b| a <= b || (a - b) / a < 0.2), "{law:?}");
             assert!(speeds.iter().all(|speed| (0.0..20.0).contains(speed)));
         }
@@ -272,8 +278,8 @@ mod tests {
     fn thin_air_lets_drops_fall_faster() {
         // Half the density: 2^0.4 = 1.3195.
         let air = Air { density: 0.602, ..Air::default() };
-        let fall = Fall { law: VelocityLaw::Measured, air };
-        assert!(near(fall.speed(2.0), 6.49 * 1.3195, 1e-4));
+        let velocity = TerminalVelocity { law: VelocityLaw::Measured, air };
+        assert!(near(velocity.speed(2.0), 6.49 * 1.3195, 1e-4));
         assert!(near(Air::at(293.15, 101_325.0).density, 1.204, 1e-3));
         assert!(near(Air::at(293.15, 101_325.0).viscosity, 1.81e-5, 5e-3));
     }

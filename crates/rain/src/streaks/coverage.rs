@@ -52,22 +52,22 @@ impl Streak {
         PI * self.radius * self.radius
     }
 
-    /// Share of the blocked area whose distance from the axis is below `b`.
-    pub fn share_across(&self, b: f64) -> f64 {
+    /// DropSelection of the blocked area whose distance from the axis is below `b`.
+    pub fn area_fraction_across(&self, b: f64) -> f64 {
         let u = (b / self.radius).clamp(-1.0, 1.0);
         0.5 + (math::asin(u) + u * math::sqrt(1.0 - u * u)) / PI
     }
 
-    /// Share of the blocked area that lies before `s` along the path.
-    pub fn share_along(&self, s: f64) -> f64 {
+    /// DropSelection of the blocked area that lies before `s` along the path.
+    pub fn area_fraction_along(&self, s: f64) -> f64 {
         // Each moment's disc has the share `share_across(s - s_drop)` before s; this is its mean over the path.
-        let share = self.radius / self.length
+        let fraction = self.radius / self.length
             * (disc_integral(s / self.radius) - disc_integral((s - self.length) / self.radius));
-        share.clamp(0.0, 1.0)
+        fraction.clamp(0.0, 1.0)
     }
 
     /// Integral of [`opacity`](Self::opacity) over the width from the streak's edge to `b`, at `s`; m.
-    pub fn opacity_until(&self, b: f64, s: f64) -> f64 {
+    pub fn opacity_integral_to(&self, b: f64, s: f64) -> f64 {
         (self.clamped_until(b, s) + self.clamped_until(b, self.length - s)) / self.length
     }
 
@@ -82,7 +82,7 @@ impl Streak {
         let w = self.half_chord(s);
         let b = b.clamp(-self.radius, self.radius);
         let area = 0.5 * self.blocked_area();
-        let chord_until = |b: f64| area * self.share_across(b);
+        let chord_until = |b: f64| area * self.area_fraction_across(b);
         let outside = chord_until(b.min(-w)) + (chord_until(b.max(w)) - chord_until(w));
         let inside = s.abs() * (b.clamp(-w, w) + w);
         if s < 0.0 { -(outside + inside) } else { outside + inside }
@@ -104,28 +104,28 @@ fn disc_integral(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::{fields, near};
+    use crate::tests::reference::{fields, near};
 
     /// Streaks of the reference table with its exposure share and its mean over the streak's box, which take a square drop.
     fn references() -> Vec<(Streak, f64, f64)> {
         let row = |line: &str| {
-            let [diameter, _, speed, exposure, _, share, length, aspect, mean] =
+            let [diameter, _, speed, exposure, _, fraction, length, aspect, mean] =
                 fields::<9>(line).map(|field| field.parse::<f64>().unwrap_or(f64::NAN));
             let streak = Streak::new(diameter, speed, exposure);
             assert!(near(streak.length, 1e-3 * length, 1e-3), "{line}");
             assert!(near(streak.length + 2.0 * streak.radius, aspect * 2.0 * streak.radius, 1e-3), "{line}");
-            (streak, share, mean)
+            (streak, fraction, mean)
         };
         include_str!("../../data/streak_opacity.csv").lines().skip(1).map(row).collect()
     }
 
     #[test]
     fn opacities_are_the_reference_shares_of_exposure() {
-        for (streak, share, mean) in references() {
-            assert!(near(streak.profile(0.0), share, 1e-3), "{streak:?}");
-            assert!(near(streak.opacity(0.0, 0.5 * streak.length), share, 1e-3));
+        for (streak, fraction, mean) in references() {
+            assert!(near(streak.profile(0.0), fraction, 1e-3), "{streak:?}");
+            assert!(near(streak.opacity(0.0, 0.5 * streak.length), fraction, 1e-3));
             // A disc fills pi/4 of the square that the table takes.
-            assert!(near(streak.mean_opacity(), 0.25 * PI * share, 1e-3));
+            assert!(near(streak.mean_opacity(), 0.25 * PI * fraction, 1e-3));
             let area = 2.0 * streak.radius * (streak.length + 2.0 * streak.radius);
             assert!(near(streak.blocked_area() / area, 0.25 * PI * mean, 1e-3));
         }
@@ -162,7 +162,7 @@ mod tests {
         // A drop that hangs still is seen as a drop.
         let still = Streak::new(2.0, 0.0, 1.0);
         assert_eq!((still.profile(0.9e-3), still.opacity(0.0, 0.0)), (1.0, 1.0));
-        assert!(near(still.share_along(0.0), 0.5, 1e-3));
+        assert!(near(still.area_fraction_along(0.0), 0.5, 1e-3));
     }
 
     #[test]
@@ -174,7 +174,7 @@ mod tests {
                     let steps = 4000;
                     let step = (b + 1e-3) / steps as f64;
                     let sum: f64 = (0..steps).map(|i| streak.opacity(-1e-3 + step * (i as f64 + 0.5), s)).sum();
-                    let found = streak.opacity_until(b, s);
+                    let found = streak.opacity_integral_to(b, s);
                     assert!((found - sum * step).abs() < 1e-7, "{length} {s} {b}: {found} {}", sum * step);
                 }
             }
@@ -184,11 +184,14 @@ mod tests {
     #[test]
     fn shares_run_from_nothing_to_all() {
         let streak = Streak { radius: 1e-3, length: 5e-3 };
-        assert_eq!((streak.share_across(-2e-3), streak.share_across(0.0), streak.share_across(1e-3)), (0.0, 0.5, 1.0));
-        assert_eq!((streak.share_along(-1e-3), streak.share_along(6e-3)), (0.0, 1.0));
-        assert!(near(streak.share_along(2.5e-3), 0.5, 1e-12));
+        assert_eq!(
+            (streak.area_fraction_across(-2e-3), streak.area_fraction_across(0.0), streak.area_fraction_across(1e-3)),
+            (0.0, 0.5, 1.0)
+        );
+        assert_eq!((streak.area_fraction_along(-1e-3), streak.area_fraction_along(6e-3)), (0.0, 1.0));
+        assert!(near(streak.area_fraction_along(2.5e-3), 0.5, 1e-12));
         // Within, each length holds its share of 1/length: 1 mm of 5.
-        assert!(near(streak.share_along(3e-3) - streak.share_along(2e-3), 0.2, 1e-12));
+        assert!(near(streak.area_fraction_along(3e-3) - streak.area_fraction_along(2e-3), 0.2, 1e-12));
         assert!(streak.is_within(1e-3) && !streak.is_within(0.9e-3) && !streak.is_within(4.1e-3));
     }
 }

@@ -2,10 +2,7 @@
 
 pub(crate) mod bin;
 pub mod coverage;
-pub(crate) mod near_region;
 pub(crate) mod project;
 pub(crate) mod project_lanes;
 pub(crate) mod rasterize;
-pub(crate) mod shutter_cameras;
 pub(crate) mod splashes;
-pub(crate) mod time_steps;

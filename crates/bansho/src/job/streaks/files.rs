@@ -19,7 +19,7 @@ use bansho_render::display::BitDepth;
 
 use super::{StreakFormat, Streaks, Texture};
 use crate::job::error::JobError;
-use bansho_rain::lighting::drop_phase_function::DropLens;
+use bansho_rain::lighting::drop_phase_function::DropPhaseFunction;
 
 /// Version of the program, on which files depend.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -34,7 +34,7 @@ pub(super) struct Lit {
 }
 
 impl Lit {
-    pub(super) fn new(toward: [f64; 3], lens: &DropLens) -> Self {
+    pub(super) fn new(toward: [f64; 3], lens: &DropPhaseFunction) -> Self {
         let toward = DVec3::from(toward).normalize();
         // The light travels against `toward`, and goes on to the viewer along z.
         let phase = lens.phase(-toward.z as f32);

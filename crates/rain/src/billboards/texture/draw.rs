@@ -5,15 +5,21 @@ use bansho_base::image::Image;
 use crate::streaks::coverage::Streak;
 
 /// Lines within a row of pixels at a streak's ends, where its width changes along it.
-const LINES: usize = 4;
+const SAMPLE_LINES: usize = 4;
 
 /// Draws a streak over what is there, around the edges. The drop's middle is at `start` when the shutter opens, m from the left and
 /// upper edge, and falls; a pixel is `pixel` wide and high, m. Of the drop there is the `share`, 0 to 1.
-pub(crate) fn draw_streak(streak: &Streak, [axis, start]: [f64; 2], pixel: [f64; 2], share: f64, image: &mut Image<1>) {
+pub(crate) fn draw_streak(
+    streak: &Streak,
+    [axis, start]: [f64; 2],
+    pixel: [f64; 2],
+    weight: f64,
+    image: &mut Image<1>,
+) {
     let [width, height] = pixel;
     let first_column = ((axis - streak.radius) / width).floor();
     let columns = ((axis + streak.radius) / width).floor() - first_column + 1.0;
-    let across = Across { streak, left: first_column * width - axis, pixel, columns: columns as usize };
+    let across = PixelColumns { streak, left: first_column * width - axis, pixel, columns: columns as usize };
     let mut opacities = vec![0.0; across.columns];
     let within = across.line(0.5 * streak.length);
     let first_row = ((start - streak.radius) / height).floor() as i64;
@@ -23,23 +29,23 @@ pub(crate) fn draw_streak(streak: &Streak, [axis, start]: [f64; 2], pixel: [f64;
         let whole = streak.is_within(from) && streak.is_within(from + height);
         let opacities = if whole { &within } else { across.end_row(from, &mut opacities) };
         let y = row.rem_euclid(image.height() as i64) as usize;
-        blend(image.row_mut(y), first_column as i64, share, opacities);
+        blend(image.row_mut(y), first_column as i64, weight, opacities);
     }
 }
 
 /// Lays a share of opacities over a row, around its end.
-fn blend(row: &mut [[f32; 1]], first_column: i64, share: f64, opacities: &[f64]) {
+fn blend(row: &mut [[f32; 1]], first_column: i64, weight: f64, opacities: &[f64]) {
     let width = row.len();
     let mut x = first_column.rem_euclid(width as i64) as usize;
     for &opacity in opacities {
         let [under] = &mut row[x];
-        *under += (share * opacity) as f32 * (1.0 - *under);
+        *under += (weight * opacity) as f32 * (1.0 - *under);
         x = if x + 1 == width { 0 } else { x + 1 };
     }
 }
 
 /// The pixels that a streak covers in every row.
-struct Across<'a> {
+struct PixelColumns<'a> {
     streak: &'a Streak,
     /// Left edge of the first pixel, from the axis, m.
     left: f64,
@@ -47,7 +53,7 @@ struct Across<'a> {
     columns: usize,
 }
 
-impl Across<'_> {
+impl PixelColumns<'_> {
     /// Mean opacity of each pixel on the line at `s`.
     fn line(&self, s: f64) -> Vec<f64> {
         let mut opacities = vec![0.0; self.columns];
@@ -58,7 +64,7 @@ impl Across<'_> {
     fn add_line(&self, s: f64, weight: f64, opacities: &mut [f64]) {
         let mut before = 0.0;
         for (index, opacity) in opacities.iter_mut().enumerate() {
-            let until = self.streak.opacity_until(self.left + (index + 1) as f64 * self.pixel[0], s);
+            let until = self.streak.opacity_integral_to(self.left + (index + 1) as f64 * self.pixel[0], s);
             *opacity += weight * (until - before) / self.pixel[0];
             before = until;
         }
@@ -70,9 +76,10 @@ impl Across<'_> {
         let (streak, [width, height]) = (self.streak, self.pixel);
         let (top, bottom) = (from.max(-streak.radius), (from + height).min(streak.length + streak.radius));
         opacities.fill(0.0);
-        let step = (bottom - top) / LINES as f64;
-        (0..LINES).for_each(|line| self.add_line(top + step * (line as f64 + 0.5), 1.0, opacities));
-        let area = streak.blocked_area() * (streak.share_along(from + height) - streak.share_along(from));
+        let step = (bottom - top) / SAMPLE_LINES as f64;
+        (0..SAMPLE_LINES).for_each(|line| self.add_line(top + step * (line as f64 + 0.5), 1.0, opacities));
+        let area =
+            streak.blocked_area() * (streak.area_fraction_along(from + height) - streak.area_fraction_along(from));
         let found: f64 = opacities.iter().sum();
         let scale = if found > 0.0 { area / (found * width * height) } else { 0.0 };
         // Rounding near a resolved drop's rim may exceed what a pixel can hide.

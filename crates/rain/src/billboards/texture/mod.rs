@@ -12,8 +12,8 @@ use bansho_base::{
 
 use crate::{
     drops::{
-        size_distribution::{DropSizes, SizeBin, even_count},
-        terminal_velocity::Fall,
+        size_distribution::{DropSizeDistribution, SizeBin, stratified_count},
+        terminal_velocity::TerminalVelocity,
     },
     streaks::coverage::Streak,
 };
@@ -30,14 +30,20 @@ pub struct StreakCube {
     /// How long the shutter is open, s.
     pub exposure: f64,
     /// How fast drops fall.
-    pub fall: Fall,
+    pub terminal_velocity: TerminalVelocity,
     /// Whether each drop has a diameter of its own within its bin, by the distribution, instead of the bin's.
     pub spread: bool,
 }
 
 impl Default for StreakCube {
     fn default() -> Self {
-        Self { edge: 1.0, size: 512, exposure: 1.0 / 30.0, fall: Fall::default(), spread: false }
+        Self {
+            edge: 1.0,
+            size: 512,
+            exposure: 1.0 / 30.0,
+            terminal_velocity: TerminalVelocity::default(),
+            spread: false,
+        }
     }
 }
 
@@ -53,7 +59,7 @@ pub struct FallingDrop {
 }
 
 const COUNT: Purpose = Purpose::named("drop count");
-const PLACE: Purpose = Purpose::named("drop place");
+const POSITION: Purpose = Purpose::named("drop place");
 
 impl StreakCube {
     /// Edge of a pixel, m.
@@ -62,22 +68,22 @@ impl StreakCube {
     }
 
     /// How many drops of a bin the cube holds on average.
-    pub fn mean_count(&self, sizes: &DropSizes, bin: &SizeBin) -> f64 {
+    pub fn mean_count(&self, sizes: &DropSizeDistribution, bin: &SizeBin) -> f64 {
         bin.count(sizes) * self.edge * self.edge * self.edge
     }
 
     /// The drops of one bin. Variants are other drops of the same rain; all variants together keep the mean count.
     ///
     /// A stronger rain holds the drops of a weaker one and more, so textures of rising rates never lose a streak.
-    pub fn drops(&self, sizes: &DropSizes, bin: &SizeBin, seed: u64, variant: u32) -> Vec<FallingDrop> {
+    pub fn drops(&self, sizes: &DropSizeDistribution, bin: &SizeBin, seed: u64, variant: u32) -> Vec<FallingDrop> {
         let key = Key::new(seed, &format!("streaks of {} mm", bin.diameter_mm));
         let [high, low, ..] = key.words(0, 0, COUNT);
-        let count = even_count(self.mean_count(sizes, bin), variant, [high, low]);
+        let count = stratified_count(self.mean_count(sizes, bin), variant, [high, low]);
         let drop = |index: u64| {
-            let [x, y, z, size] = key.words(index, variant, PLACE).map(|word| random::uniform_f64(word, 0));
+            let [x, y, z, size] = key.words(index, variant, POSITION).map(|word| random::uniform_f64(word, 0));
             let diameter_mm = if self.spread { sizes.quantile(size, bin.range_mm) } else { bin.diameter_mm };
-            let speed = self.fall.speed(diameter_mm);
-            FallingDrop { diameter_mm, speed, position: [x, y, z].map(|share| share * self.edge) }
+            let speed = self.terminal_velocity.speed(diameter_mm);
+            FallingDrop { diameter_mm, speed, position: [x, y, z].map(|fraction| fraction * self.edge) }
         };
         (0..count).map(drop).collect()
     }

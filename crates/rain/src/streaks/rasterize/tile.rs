@@ -2,41 +2,38 @@
 
 use bansho_base::{image::Rect, math::MulAdd, phenomenon::strip::GrayPlanes};
 
-use crate::streaks::bin::BAND;
+use crate::streaks::bin::{TILE_COLUMNS, TILE_ROWS};
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-/// Columns of a patch: its pixels and their depths fit into a core's first cache.
-pub(crate) const STRETCH: usize = 128;
-
 /// A number for each of eight pixels that stand below each other.
-pub(crate) type Rows = [f32; BAND];
+pub(crate) type TileRows = [f32; TILE_ROWS];
 
 /// Eight rows of so many columns. The pixels of a column stand side by side, so that one instruction lays a streak over all eight: most
 /// streaks run down.
-pub(crate) struct Patch {
+pub(crate) struct TileBuffer {
     /// Its first column and row in the picture.
     origin: [usize; 2],
-    columns: [Column; STRETCH],
+    columns: [PixelColumn; TILE_COLUMNS],
     /// Depth of the plate by column, m; where there is none, it is not asked for.
-    plate_depth: [Rows; STRETCH],
+    plate_depth: [TileRows; TILE_COLUMNS],
     has_plate: bool,
 }
 
 /// Eight pixels below each other: red, green and blue of L, T, and the depth of the nearest sample, m.
-type Column = [Rows; 5];
-const THROUGH: usize = 3;
+type PixelColumn = [TileRows; 5];
+const TRANSMITTANCE: usize = 3;
 const DEPTH: usize = 4;
 
 /// What is laid over the pixels of a patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Layer {
+pub(crate) struct Shading {
     /// Radiance where it hides all, ACEScg, cd/m^2.
     pub(crate) light: [f32; 3],
     /// m.
     pub(crate) depth: f32,
 }
 
-impl Layer {
+impl Shading {
     /// A dark one.
     pub(crate) fn new(depth: f32) -> Self {
         Self { light: [0.0; 3], depth }
@@ -48,18 +45,18 @@ impl Layer {
     }
 }
 
-impl Default for Patch {
+impl Default for TileBuffer {
     fn default() -> Self {
         Self {
             origin: [0; 2],
-            columns: [[[0.0; BAND]; 5]; STRETCH],
-            plate_depth: [[0.0; BAND]; STRETCH],
+            columns: [[[0.0; TILE_ROWS]; 5]; TILE_COLUMNS],
+            plate_depth: [[0.0; TILE_ROWS]; TILE_COLUMNS],
             has_plate: false,
         }
     }
 }
 
-impl Patch {
+impl TileBuffer {
     /// Takes the pixels of `rect` from the planes of `strip`; those around it hold anything.
     #[inline(always)]
     pub(crate) fn load<S: Simd>(&mut self, simd: S, origin: [usize; 2], rect: Rect, strip: Rect, planes: &GrayPlanes) {
@@ -92,12 +89,12 @@ impl Patch {
     #[inline(always)]
     fn blocks(&self, rect: Rect, strip: Rect) -> impl Iterator<Item = Block> + use<> {
         let [x, y] = self.origin;
-        (rect.x..rect.right()).step_by(BAND).map(move |column| Block {
+        (rect.x..rect.right()).step_by(TILE_ROWS).map(move |column| Block {
             column: column - x,
             row: rect.y - y,
-            size: [BAND.min(rect.right() - column), rect.height],
+            size: [TILE_ROWS.min(rect.right() - column), rect.height],
             start: (rect.y - strip.y) * strip.width + column - strip.x,
-            pitch: strip.width,
+            stride: strip.width,
         })
     }
 
@@ -108,32 +105,32 @@ impl Patch {
 
     /// Takes from the opacities of a column's pixels those that the plate hides at a depth.
     #[inline(always)]
-    pub(crate) fn hide_by_plate(&self, column: usize, depth: f32, opacities: &mut Rows) {
+    pub(crate) fn mask_by_plate(&self, column: usize, depth: f32, opacities: &mut TileRows) {
         if !self.has_plate {
             return;
         }
         let Some(plate) = self.plate_depth.get(column) else { return };
-        for row in 0..BAND {
+        for row in 0..TILE_ROWS {
             opacities[row] = if plate[row] <= depth { 0.0 } else { opacities[row] };
         }
     }
 
     /// Lays a layer of some opacities behind what the pixels of a column hold, `L += T a l; T -= T a`.
     #[inline(always)]
-    pub(crate) fn put_behind(&mut self, column: usize, opacities: &Rows, layer: &Layer) {
+    pub(crate) fn composite_under(&mut self, column: usize, opacities: &TileRows, shading: &Shading) {
         let Some(pixels) = self.columns.get_mut(column) else { return };
-        let mut hidden = [0.0; BAND];
-        for row in 0..BAND {
-            hidden[row] = pixels[THROUGH][row] * opacities[row];
+        let mut blocked = [0.0; TILE_ROWS];
+        for row in 0..TILE_ROWS {
+            blocked[row] = pixels[TRANSMITTANCE][row] * opacities[row];
         }
         for c in 0..3 {
-            for row in 0..BAND {
-                pixels[c][row] = hidden[row].fma(layer.light[c], pixels[c][row]);
+            for row in 0..TILE_ROWS {
+                pixels[c][row] = blocked[row].fma(shading.light[c], pixels[c][row]);
             }
         }
-        for row in 0..BAND {
-            pixels[THROUGH][row] -= hidden[row];
-            let depth = if opacities[row] > 0.0 { layer.depth } else { f32::INFINITY };
+        for row in 0..TILE_ROWS {
+            pixels[TRANSMITTANCE][row] -= blocked[row];
+            let depth = if opacities[row] > 0.0 { shading.depth } else { f32::INFINITY };
             pixels[DEPTH][row] = if depth < pixels[DEPTH][row] { depth } else { pixels[DEPTH][row] };
         }
     }
@@ -148,17 +145,17 @@ struct Block {
     /// Where its first pixel is in a plane.
     start: usize,
     /// How far it is from there to the row below.
-    pitch: usize,
+    stride: usize,
 }
 
 impl Block {
     /// Takes it from a plane.
     #[inline(always)]
-    fn load<S: Simd, C>(&self, simd: S, plane: &[f32], columns: &mut [C], rows: impl Fn(&mut C) -> &mut Rows) {
+    fn load<S: Simd, C>(&self, simd: S, plane: &[f32], columns: &mut [C], rows: impl Fn(&mut C) -> &mut TileRows) {
         let [width, height] = self.size;
-        let mut square = [[0.0; BAND]; BAND];
+        let mut square = [[0.0; TILE_ROWS]; TILE_ROWS];
         for y in 0..height {
-            copy(&plane[self.start + y * self.pitch..][..width], &mut square[self.row + y][..width]);
+            copy(&plane[self.start + y * self.stride..][..width], &mut square[self.row + y][..width]);
         }
         transpose(simd, &mut square);
         for x in 0..width {
@@ -168,15 +165,15 @@ impl Block {
 
     /// Gives it back to a plane.
     #[inline(always)]
-    fn store<S: Simd, C>(&self, simd: S, columns: &[C], rows: impl Fn(&C) -> &Rows, plane: &mut [f32]) {
+    fn store<S: Simd, C>(&self, simd: S, columns: &[C], rows: impl Fn(&C) -> &TileRows, plane: &mut [f32]) {
         let [width, height] = self.size;
-        let mut square = [[0.0; BAND]; BAND];
+        let mut square = [[0.0; TILE_ROWS]; TILE_ROWS];
         for x in 0..width {
             square[x] = *rows(&columns[self.column + x]);
         }
         transpose(simd, &mut square);
         for y in 0..height {
-            copy(&square[self.row + y][..width], &mut plane[self.start + y * self.pitch..][..width]);
+            copy(&square[self.row + y][..width], &mut plane[self.start + y * self.stride..][..width]);
         }
     }
 }
@@ -184,28 +181,28 @@ impl Block {
 /// Copies up to eight numbers: nearly always eight, in one instruction.
 #[inline(always)]
 fn copy(from: &[f32], to: &mut [f32]) {
-    match (<&Rows>::try_from(from), <&mut Rows>::try_from(&mut *to)) {
+    match (<&TileRows>::try_from(from), <&mut TileRows>::try_from(&mut *to)) {
         (Ok(from), Ok(to)) => *to = *from,
         _ => to.copy_from_slice(from),
     }
 }
 
-/// Rows as columns: three perfect shuffles.
+/// TileRows as columns: three perfect shuffles.
 #[inline(always)]
-fn transpose<S: Simd>(simd: S, square: &mut [Rows; BAND]) {
-    const HALF: usize = BAND / 2;
-    let mut vectors = [f32x8::splat(simd, 0.0); BAND];
-    for y in 0..BAND {
+fn transpose<S: Simd>(simd: S, square: &mut [TileRows; TILE_ROWS]) {
+    const HALF: usize = TILE_ROWS / 2;
+    let mut vectors = [f32x8::splat(simd, 0.0); TILE_ROWS];
+    for y in 0..TILE_ROWS {
         vectors[y] = f32x8::from_slice(simd, &square[y]);
     }
-    for _ in 0..BAND.ilog2() {
+    for _ in 0..TILE_ROWS.ilog2() {
         let before = vectors;
         for i in 0..HALF {
             vectors[2 * i] = before[i].zip_low(before[i + HALF]);
             vectors[2 * i + 1] = before[i].zip_high(before[i + HALF]);
         }
     }
-    for x in 0..BAND {
+    for x in 0..TILE_ROWS {
         vectors[x].store_slice(&mut square[x]);
     }
 }

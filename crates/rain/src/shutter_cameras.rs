@@ -7,29 +7,35 @@ use bansho_base::{
     phenomenon::strip::View,
 };
 
-use super::{
-    bin::Extent,
-    project_lanes::{NOTHING, Row, Vectors},
-};
+use crate::lanes::{Lanes, Vec3Lanes, ZERO_LANES};
+
+/// The part of the picture that a thing may touch: columns and rows `[low, high]`, pixels; may reach beyond the picture.
+pub(crate) type PixelBounds = [[f32; 2]; 2];
+
+/// Radius of the pupil, m: that of a 24 mm lens at f/3.
+pub(crate) const PUPIL_RADIUS: f32 = 4e-3;
+
+/// Furthest that a drop is seen from its middle, m: the radius of the largest, and what the lens spreads.
+pub(crate) const MAX_DROP_RADIUS: f64 = 4e-3 + PUPIL_RADIUS as f64;
 
 /// An exposure's cameras.
 #[derive(Clone, Debug)]
-pub(crate) struct Sight {
+pub(crate) struct ShutterCameras {
     /// When the shutter opens, half way, and when it closes.
     pub(crate) cameras: [Camera; 3],
     /// The same, for sixteen points at a time.
-    pub(crate) eyes: [Eye; 3],
+    pub(crate) projectors: [Projector; 3],
     /// Columns and rows of the part of the picture that is drawn, pixels.
-    pub(crate) window: Extent,
+    pub(crate) window: PixelBounds,
     /// How long the shutter is open, s.
-    pub(crate) exposure: f64,
+    pub(crate) exposure_time: f64,
     /// What the cameras see of the part of the picture that is drawn; none where they see all around.
     frusta: Vec<Frustum>,
 }
 
 /// A camera for sixteen points at a time.
 #[derive(Clone, Debug)]
-pub(crate) struct Eye {
+pub(crate) struct Projector {
     camera: Camera,
     /// Where points are counted from, m.
     origin: DVec3,
@@ -37,29 +43,29 @@ pub(crate) struct Eye {
     axes: [[f32; 3]; 3],
     /// Place of the origin along these, m.
     offset: [f32; 3],
-    centre: [f32; 2],
+    center: [f32; 2],
     focal: f32,
     near: f32,
 }
 
 /// Where sixteen points lie in the picture.
-pub(crate) struct Places {
+pub(crate) struct ProjectedPoints {
     /// Pixels; not a number where the lens does not see the point.
-    pub(crate) x: Row,
-    pub(crate) y: Row,
+    pub(crate) x: Lanes,
+    pub(crate) y: Lanes,
     /// As the lens measures it, m.
-    pub(crate) depth: Row,
+    pub(crate) depth: Lanes,
     /// Pixels that a metre across the line of sight covers there.
-    pub(crate) scale: Row,
+    pub(crate) scale: Lanes,
 }
 
-impl Eye {
+impl Projector {
     fn new(camera: Camera, origin: DVec3) -> Self {
         let axes = [0, 1, 2].map(|axis| camera.orientation.col(axis).as_vec3().to_array());
         Self {
             axes,
             offset: camera.to_camera(origin).as_vec3().to_array(),
-            centre: camera.centre.as_vec2().to_array(),
+            center: camera.centre.as_vec2().to_array(),
             focal: camera.focal_pixels as f32,
             near: camera.near as f32,
             camera,
@@ -73,17 +79,17 @@ impl Eye {
     }
 
     #[inline(always)]
-    pub(crate) fn project(&self, points: &Vectors) -> Places {
+    pub(crate) fn project(&self, points: &Vec3Lanes) -> ProjectedPoints {
         match self.camera.lens {
-            Lens::Perspective => self.project_flat(points),
-            Lens::Fisheye | Lens::Panorama => self.project_round(points),
+            Lens::Perspective => self.project_perspective(points),
+            Lens::Fisheye | Lens::Panorama => self.project_curvilinear(points),
         }
     }
 
     /// As [`Camera::project`] in single precision.
     #[inline(always)]
-    fn project_flat(&self, [xs, ys, zs]: &Vectors) -> Places {
-        let mut places = Places { x: NOTHING, y: NOTHING, depth: NOTHING, scale: NOTHING };
+    fn project_perspective(&self, [xs, ys, zs]: &Vec3Lanes) -> ProjectedPoints {
+        let mut points = ProjectedPoints { x: ZERO_LANES, y: ZERO_LANES, depth: ZERO_LANES, scale: ZERO_LANES };
         let [right, up, back] = &self.axes;
         for i in 0..LANES {
             let (x, y, z) = (xs[i], ys[i], zs[i]);
@@ -92,25 +98,25 @@ impl Eye {
             let depth = -back[2].fma(z, back[1].fma(y, back[0].fma(x, self.offset[2])));
             let scale = self.focal / depth;
             let scale = if depth >= self.near { scale } else { f32::NAN };
-            places.x[i] = across.fma(scale, self.centre[0]);
-            places.y[i] = self.centre[1] - above * scale;
-            (places.depth[i], places.scale[i]) = (depth, scale);
+            points.x[i] = across.fma(scale, self.center[0]);
+            points.y[i] = self.center[1] - above * scale;
+            (points.depth[i], points.scale[i]) = (depth, scale);
         }
-        places
+        points
     }
 
-    fn project_round(&self, [xs, ys, zs]: &Vectors) -> Places {
-        const NOWHERE: Row = [f32::NAN; LANES];
-        let mut places = Places { x: NOWHERE, y: NOWHERE, depth: NOWHERE, scale: NOWHERE };
+    fn project_curvilinear(&self, [xs, ys, zs]: &Vec3Lanes) -> ProjectedPoints {
+        const NOT_VISIBLE: Lanes = [f32::NAN; LANES];
+        let mut points = ProjectedPoints { x: NOT_VISIBLE, y: NOT_VISIBLE, depth: NOT_VISIBLE, scale: NOT_VISIBLE };
         for i in 0..LANES {
             let point = self.origin + DVec3::new(xs[i].into(), ys[i].into(), zs[i].into());
-            if let Some(place) = self.camera.project(point) {
-                let DVec2 { x, y } = place.pixel;
-                (places.x[i], places.y[i]) = (x as f32, y as f32);
-                (places.depth[i], places.scale[i]) = (place.depth as f32, place.pixels_per_metre as f32);
+            if let Some(projection) = self.camera.project(point) {
+                let DVec2 { x, y } = projection.pixel;
+                (points.x[i], points.y[i]) = (x as f32, y as f32);
+                (points.depth[i], points.scale[i]) = (projection.depth as f32, projection.pixels_per_metre as f32);
             }
         }
-        places
+        points
     }
 }
 
@@ -119,53 +125,53 @@ impl Eye {
 struct Frustum {
     position: DVec3,
     /// Unit vectors outward: right, left, bottom, top and back; all x, all y and all z, and after them zeros.
-    sides: [[f64; SIDES]; 3],
+    planes: [[f64; PLANE_COUNT]; 3],
 }
 
 /// Sides of a frustum, and as many more as vectors are filled with.
-const SIDES: usize = 8;
+const PLANE_COUNT: usize = 8;
 
 impl Frustum {
     /// `None` where a lens has no flat sides.
     fn new(camera: &Camera, window: &Rect) -> Option<Self> {
         let [across, up, back] = [0, 1, 2].map(|axis| camera.orientation.col(axis));
-        let tangent = |pixels: usize, centre: f64| (pixels as f64 - centre) / camera.focal_pixels;
+        let tangent = |pixels: usize, center: f64| (pixels as f64 - center) / camera.focal_pixels;
         let [left, right] = [window.x, window.right()].map(|side| across + back * tangent(side, camera.centre.x));
         let [top, bottom] = [window.y, window.bottom()].map(|side| -up + back * tangent(side, camera.centre.y));
-        let mut sides = [[0.0; SIDES]; 3];
+        let mut planes = [[0.0; PLANE_COUNT]; 3];
         for (side, outward) in [right, -left, bottom, -top, back].map(DVec3::normalize).into_iter().enumerate() {
-            (0..3).for_each(|axis| sides[axis][side] = outward[axis]);
+            (0..3).for_each(|axis| planes[axis][side] = outward[axis]);
         }
-        (camera.lens == Lens::Perspective).then_some(Self { position: camera.position, sides })
+        (camera.lens == Lens::Perspective).then_some(Self { position: camera.position, planes })
     }
 
     #[inline(always)]
-    fn may_see(&self, point: DVec3, half: DVec3, radius: f64) -> bool {
+    fn may_be_visible(&self, point: DVec3, half: DVec3, radius: f64) -> bool {
         let offset = point - self.position;
-        let [xs, ys, zs] = &self.sides;
-        let mut before = false;
+        let [xs, ys, zs] = &self.planes;
+        let mut outside = false;
         // Not one after the other: a branch for each side would be guessed wrongly.
-        for side in 0..SIDES {
-            let place = xs[side] * offset.x + ys[side] * offset.y + zs[side] * offset.z;
-            let reach = xs[side].abs() * half.x + ys[side].abs() * half.y + zs[side].abs() * half.z;
-            before |= place - reach > radius;
+        for side in 0..PLANE_COUNT {
+            let projection = xs[side] * offset.x + ys[side] * offset.y + zs[side] * offset.z;
+            let extent = xs[side].abs() * half.x + ys[side].abs() * half.y + zs[side].abs() * half.z;
+            outside |= projection - extent > radius;
         }
-        !before
+        !outside
     }
 }
 
-impl Sight {
+impl ShutterCameras {
     pub(crate) fn new(view: &View) -> Self {
         let shutter = view.shutter;
         let cameras = [view.camera_at(shutter.open), view.camera, view.camera_at(shutter.close)];
         let mut distinct = cameras.to_vec();
         distinct.dedup();
         let frusta = distinct.iter().filter_map(|camera| Frustum::new(camera, &view.window)).collect();
-        let eyes = cameras.map(|camera| Eye::new(camera, view.camera.position));
+        let projectors = cameras.map(|camera| Projector::new(camera, view.camera.position));
         let window = &view.window;
         let window =
-            [[window.x, window.right()], [window.y, window.bottom()]].map(|sides| sides.map(|side| side as f32));
-        Self { cameras, eyes, window, exposure: shutter.duration(), frusta }
+            [[window.x, window.right()], [window.y, window.bottom()]].map(|planes| planes.map(|side| side as f32));
+        Self { cameras, projectors, window, exposure_time: shutter.duration(), frusta }
     }
 
     /// The camera half way.
@@ -181,16 +187,16 @@ impl Sight {
     /// Velocity of the camera's place while the shutter is open, m/s.
     pub(crate) fn velocity(&self) -> DVec3 {
         let way = self.cameras[2].position - self.cameras[0].position;
-        if self.exposure > 0.0 { way / self.exposure } else { DVec3::ZERO }
+        if self.exposure_time > 0.0 { way / self.exposure_time } else { DVec3::ZERO }
     }
 
     /// Whether anything within `radius` (m) of a box may be seen at any time of the exposure; the box reaches as far as `half` to both
     /// sides of `point` along the world's axes.
     #[inline(always)]
-    pub(crate) fn may_see(&self, point: DVec3, half: DVec3, radius: f64) -> bool {
+    pub(crate) fn may_be_visible(&self, point: DVec3, half: DVec3, radius: f64) -> bool {
         let mut seen = self.frusta.is_empty();
         for frustum in &self.frusta {
-            seen |= frustum.may_see(point, half, radius);
+            seen |= frustum.may_be_visible(point, half, radius);
         }
         seen
     }
@@ -212,7 +218,7 @@ mod tests {
     #[test]
     fn whatever_projects_into_the_picture_may_be_seen() {
         let view = View::new(CameraParameters::default(), Shutter { open: 0.0, close: 0.02 }, 0.03, [320, 180], 4);
-        let sight = Sight::new(&view);
+        let cameras = ShutterCameras::new(&view);
         let (mut seen, mut hidden) = (0, 0);
         for i in 0..4000 {
             let u = Key::new(1, "sight").uniforms(i, 0, Purpose::named("point")).map(f64::from);
@@ -220,10 +226,10 @@ mod tests {
             let inside = |pixel: DVec2| {
                 (0.0..view.size[0] as f64).contains(&pixel.x) && (0.0..view.size[1] as f64).contains(&pixel.y)
             };
-            let projects = view.camera.project(point).is_some_and(|place| inside(place.pixel));
-            assert!(!projects || sight.may_see(point, DVec3::ZERO, 0.0));
+            let projects = view.camera.project(point).is_some_and(|projection| inside(projection.pixel));
+            assert!(!projects || cameras.may_be_visible(point, DVec3::ZERO, 0.0));
             seen += usize::from(projects);
-            hidden += usize::from(!sight.may_see(point, DVec3::splat(0.5), 0.0));
+            hidden += usize::from(!cameras.may_be_visible(point, DVec3::splat(0.5), 0.0));
         }
         assert!(seen > 50 && hidden > 3000, "{seen} {hidden}");
     }

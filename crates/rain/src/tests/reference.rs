@@ -1,17 +1,17 @@
 //! The reference figures, for tests.
 
 /// Rows of a table of comma-separated figures, without its first line; texts become NaN.
-pub(super) fn rows<const N: usize>(table: &str) -> Vec<[f64; N]> {
+pub(crate) fn rows<const N: usize>(table: &str) -> Vec<[f64; N]> {
     table.lines().skip(1).map(|line| fields(line).map(|field| field.parse().unwrap_or(f64::NAN))).collect()
 }
 
 /// Fields of one line.
-pub(super) fn fields<const N: usize>(line: &str) -> [&str; N] {
+pub(crate) fn fields<const N: usize>(line: &str) -> [&str; N] {
     let mut fields = line.split(',');
     std::array::from_fn(|_| fields.next().expect("a field for every column"))
 }
 
 /// Whether `value` is within `share` of `expected`.
-pub(super) fn near(value: f64, expected: f64, share: f64) -> bool {
+pub(crate) fn near(value: f64, expected: f64, share: f64) -> bool {
     (value - expected).abs() <= share * expected.abs()
 }
