@@ -1,17 +1,18 @@
-//! Arithmetic on sixteen drops at a time, in loops that the compiler vectorizes.
+//! Arrays of sixteen values, one for each drop of a batch. Loops over them are vectorized by the compiler.
 
 use bansho_base::math::simd::LANES;
 
-/// A number for each of sixteen drops.
+/// One `f32` for each of sixteen drops.
 pub(crate) type Lanes = [f32; LANES];
 
-/// A vector for each of them: all x, all y and all z.
+/// One vector for each of sixteen drops, as a structure of arrays: all x, all y, all z.
 pub(crate) type Vec3Lanes = [Lanes; 3];
 
-/// Nothing, for each drop.
+/// Zero in each lane.
 pub(crate) const ZERO_LANES: Lanes = [0.0; LANES];
 
-/// Comparisons that become one instruction each, unlike those that ask what is not a number.
+/// The larger of two numbers by one compare and select, `bound` where `value` is NaN. `f32::max` handles NaN in both
+/// operands and needs more instructions.
 #[inline(always)]
 pub(crate) fn fast_max(least: f32, value: f32) -> f32 {
     if value > least { value } else { least }
@@ -22,7 +23,7 @@ pub(crate) fn fast_min(most: f32, value: f32) -> f32 {
     if value < most { value } else { most }
 }
 
-/// The cubic `3 t^2 - 2 t^3` of `t` held to 0 to 1.
+/// The cubic `3 t^2 - 2 t^3`, with `t` clamped to 0..=1.
 #[inline(always)]
 pub(crate) fn smoothstep(t: f32) -> f32 {
     let t = fast_min(1.0, fast_max(0.0, t));

@@ -1,4 +1,5 @@
-//! What an exposure can see: the camera when the shutter opens, half way and when it closes.
+//! The cameras of one exposure: when the shutter opens, at its middle and when it closes. Visibility tests against
+//! their frusta.
 
 use bansho_base::{
     camera::{Camera, Lens},
@@ -9,53 +10,53 @@ use bansho_base::{
 
 use crate::lanes::{Lanes, Vec3Lanes, ZERO_LANES};
 
-/// The part of the picture that a thing may touch: columns and rows `[low, high]`, pixels; may reach beyond the picture.
+/// Bounding box in the picture: columns and rows `[low, high]`, pixels. It may extend beyond the picture.
 pub(crate) type PixelBounds = [[f32; 2]; 2];
 
-/// Radius of the pupil, m: that of a 24 mm lens at f/3.
+/// Radius of the lens's entrance pupil, m: that of a 24 mm lens at f/3.
 pub(crate) const PUPIL_RADIUS: f32 = 4e-3;
 
-/// Furthest that a drop is seen from its middle, m: the radius of the largest, and what the lens spreads.
+/// Largest radius at which a drop is visible around its center, m: that of the largest drop and its defocus blur.
 pub(crate) const MAX_DROP_RADIUS: f64 = 4e-3 + PUPIL_RADIUS as f64;
 
-/// An exposure's cameras.
+/// The cameras of one exposure.
 #[derive(Clone, Debug)]
 pub(crate) struct ShutterCameras {
-    /// When the shutter opens, half way, and when it closes.
+    /// When the shutter opens, at the middle of the exposure, and when it closes.
     pub(crate) cameras: [Camera; 3],
-    /// The same, for sixteen points at a time.
+    /// The same cameras, for sixteen points at a time.
     pub(crate) projectors: [Projector; 3],
-    /// Columns and rows of the part of the picture that is drawn, pixels.
+    /// Columns and rows of the crop window, pixels.
     pub(crate) window: PixelBounds,
-    /// How long the shutter is open, s.
+    /// Duration of the exposure, s.
     pub(crate) exposure_time: f64,
-    /// What the cameras see of the part of the picture that is drawn; none where they see all around.
+    /// View frusta of the crop window; empty for lenses that see all around.
     frusta: Vec<Frustum>,
 }
 
-/// A camera for sixteen points at a time.
+/// Projects sixteen points at a time.
 #[derive(Clone, Debug)]
 pub(crate) struct Projector {
     camera: Camera,
-    /// Where points are counted from, m.
+    /// Origin of the points' coordinates, m.
     origin: DVec3,
-    /// Right, up and backward.
+    /// The camera's axes: right, up and backward.
     axes: [[f32; 3]; 3],
-    /// Place of the origin along these, m.
+    /// The origin in camera coordinates, m.
     offset: [f32; 3],
     center: [f32; 2],
     focal: f32,
     near: f32,
 }
 
-/// Where sixteen points lie in the picture.
+/// Sixteen points projected into the picture.
 pub(crate) struct ProjectedPoints {
-    /// Pixels; not a number where the lens does not see the point.
+    /// Pixels; NaN where the lens does not see the point.
     pub(crate) x: Lanes,
     pub(crate) y: Lanes,
-    /// As the lens measures it, m.
+    /// Depth by the lens's definition, m.
     pub(crate) depth: Lanes,
-    /// Pixels that a metre across the line of sight covers there.
+    /// Pixels for one meter perpendicular to the line of sight.
     pub(crate) scale: Lanes,
 }
 
@@ -86,7 +87,7 @@ impl Projector {
         }
     }
 
-    /// As [`Camera::project`] in single precision.
+    /// [`Camera::project`] in single precision.
     #[inline(always)]
     fn project_perspective(&self, [xs, ys, zs]: &Vec3Lanes) -> ProjectedPoints {
         let mut points = ProjectedPoints { x: ZERO_LANES, y: ZERO_LANES, depth: ZERO_LANES, scale: ZERO_LANES };
@@ -120,19 +121,19 @@ impl Projector {
     }
 }
 
-/// What a camera sees: all that no side has before it.
+/// View frustum: a point is inside if it is inside all planes.
 #[derive(Clone, Debug)]
 struct Frustum {
     position: DVec3,
-    /// Unit vectors outward: right, left, bottom, top and back; all x, all y and all z, and after them zeros.
+    /// Outward unit normals: right, left, bottom, top and back; all x, all y and all z, padded with zeros.
     planes: [[f64; PLANE_COUNT]; 3],
 }
 
-/// Sides of a frustum, and as many more as vectors are filled with.
+/// Planes of a frustum, padded to a whole SIMD vector.
 const PLANE_COUNT: usize = 8;
 
 impl Frustum {
-    /// `None` where a lens has no flat sides.
+    /// `None` for a lens without planar sides.
     fn new(camera: &Camera, window: &Rect) -> Option<Self> {
         let [across, up, back] = [0, 1, 2].map(|axis| camera.orientation.col(axis));
         let tangent = |pixels: usize, center: f64| (pixels as f64 - center) / camera.focal_pixels;
@@ -150,7 +151,7 @@ impl Frustum {
         let offset = point - self.position;
         let [xs, ys, zs] = &self.planes;
         let mut outside = false;
-        // Not one after the other: a branch for each side would be guessed wrongly.
+        // Without early exit: a branch for each plane would be mispredicted.
         for side in 0..PLANE_COUNT {
             let projection = xs[side] * offset.x + ys[side] * offset.y + zs[side] * offset.z;
             let extent = xs[side].abs() * half.x + ys[side].abs() * half.y + zs[side].abs() * half.z;
@@ -174,7 +175,7 @@ impl ShutterCameras {
         Self { cameras, projectors, window, exposure_time: shutter.duration(), frusta }
     }
 
-    /// The camera half way.
+    /// The camera at the middle of the exposure.
     pub(crate) fn middle(&self) -> &Camera {
         &self.cameras[1]
     }
@@ -184,14 +185,14 @@ impl ShutterCameras {
         self.cameras[1].size.map(|side| side as usize)
     }
 
-    /// Velocity of the camera's place while the shutter is open, m/s.
+    /// Velocity of the camera's position during the exposure, m/s.
     pub(crate) fn velocity(&self) -> DVec3 {
         let way = self.cameras[2].position - self.cameras[0].position;
         if self.exposure_time > 0.0 { way / self.exposure_time } else { DVec3::ZERO }
     }
 
-    /// Whether anything within `radius` (m) of a box may be seen at any time of the exposure; the box reaches as far as `half` to both
-    /// sides of `point` along the world's axes.
+    /// Whether anything within `radius` (m) of an axis-aligned box may be visible at any time of the exposure. The box
+    /// has the center `point` and the half extents `half`.
     #[inline(always)]
     pub(crate) fn may_be_visible(&self, point: DVec3, half: DVec3, radius: f64) -> bool {
         let mut seen = self.frusta.is_empty();

@@ -1,7 +1,8 @@
-//! Billboards: upright squares that face the camera, each with the streaks of all drops of one diameter in a cell.
+//! Billboards: upright quads that turn about the vertical toward the camera, each with the streaks of all drops of one
+//! diameter in a cell.
 //!
-//! The texture T(R, D) that they carry is kept as the places of its drops instead of as pixels: a drop is narrower than a pixel, so that
-//! nearly all of a picture of them is empty, and what is drawn from places is as sharp at any size.
+//! The texture T(R, D) of a billboard is stored as a list of drop positions, not as pixels: a drop is narrower than a
+//! pixel, so nearly all pixels would be empty, and streaks drawn from positions are sharp at any size.
 
 pub mod texture;
 
@@ -31,19 +32,19 @@ use fearless_simd::dispatch;
 const TEXTURE: Purpose = Purpose::named("rain texture");
 const OFFSET: Purpose = Purpose::named("rain billboard offset");
 const POSITION: Purpose = Purpose::named("rain billboard place");
-/// Furthest that any of a billboard is from its middle, m.
+/// Greatest distance of any of a billboard's points from its center, m.
 const BILLBOARD_RADIUS: f64 = 0.75;
-/// Textures of each diameter, so that the same streaks are seldom near each other.
+/// Texture variants of each diameter, against visible repetition.
 const VARIANTS: usize = 2;
 
-/// Where the drops of a texture are, across and up, 0 to 1, sixteen at a time.
+/// Positions of a texture's drops, across and up, 0 to 1, sixteen at a time.
 type DropTexture = Vec<[Lanes; 2]>;
 
-/// The textures of all diameters at one rate.
+/// The textures of all diameters at one rain rate.
 struct DropTextures(Vec<[DropTexture; VARIANTS]>);
 
 impl DropTextures {
-    /// Drop after drop, so that a texture with more of them has the same and others.
+    /// Drops are keyed by their index, so that a texture with more drops contains those with fewer.
     fn new(key: Key, classes: &[DropClassState]) -> Self {
         let texture = |class: &DropClassState, variant: usize| -> DropTexture {
             let drops = class.count().ceil() as u64;
@@ -59,36 +60,36 @@ impl DropTextures {
     }
 }
 
-/// A billboard: where it stands and which part of which texture it shows.
+/// A billboard: a quad, and a window into a texture.
 struct Billboard<'a> {
     quad: UprightQuad,
     /// m/s.
     velocity: DVec3,
     texture: &'a DropTexture,
-    /// Where in the texture it begins.
+    /// Texture coordinates of its corner.
     offset: [f32; 2],
-    /// 1, or -1 where it is mirrored.
+    /// 1, or -1 if mirrored.
     mirror: f32,
-    /// Which part of a drop its texture must hold for the card to show that drop.
+    /// Threshold for the last, fractional drop of its texture.
     threshold: f32,
 }
 
 impl Billboard<'_> {
-    /// How much it shows of the last drop of a texture, of which this holds a part: that of all billboards together, each all of it or
-    /// nothing but for those that change.
+    /// Visibility of a texture's last drop, of which the count contains `part`: that fraction of all billboards shows
+    /// it, each of them wholly, but for a short fade.
     #[inline(always)]
     fn visibility(&self, part: f32) -> f32 {
         fast_min(1.0, fast_max(0.0, (part - self.threshold * (1.0 - FADE_IN) as f32) * (1.0 / FADE_IN) as f32))
     }
 }
 
-/// A place in a texture, which repeats in both directions.
+/// Wraps a texture coordinate into 0..1.
 #[inline(always)]
 fn wrapped(coordinate: f32) -> f32 {
     coordinate - coordinate.floor()
 }
 
-/// What billboards are made from.
+/// Makes the streaks of billboards.
 pub(super) struct Billboards<'a> {
     projection: StreakProjection<'a>,
     textures: DropTextures,
@@ -97,13 +98,14 @@ pub(super) struct Billboards<'a> {
 }
 
 impl<'a> Billboards<'a> {
-    /// Streaks whose light is nowhere above `least_light` (cd/m^2) are drawn without that of lamps and fires.
+    /// Streaks whose radiance is below `culling_radiance` (cd/m^2) everywhere are drawn without the light of lamps and
+    /// fires.
     pub(super) fn new(projection: StreakProjection<'a>, culling_radiance: f32) -> Self {
         let exposure = projection.exposure;
         Self { projection, textures: DropTextures::new(exposure.key, &exposure.classes), culling_radiance }
     }
 
-    /// All that may show within a ball.
+    /// The streaks of all cells that may be visible within a sphere.
     pub(super) fn chunks(&self, within: Sphere) -> Vec<StreakChunk> {
         self.projection.cell_chunks(
             &[within],
@@ -117,7 +119,7 @@ impl<'a> Billboards<'a> {
     fn add_billboard(&self, class: &DropClassState, cell: Cell, builder: &mut StreakChunkBuilder) {
         let billboard = self.billboard(class, cell);
         let [base, right, up] = self.quad_edges(&billboard.quad);
-        // A bound that holds for all its streaks is worth finding only where it may spare some their light.
+        // The bound costs more than it saves without culling.
         let least_peak = if self.culling_radiance > 0.0 {
             self.culling_radiance
                 / self.projection.lighting.max_radiance(billboard.quad.point(0.5, 0.5), BILLBOARD_RADIUS)
@@ -147,7 +149,7 @@ impl<'a> Billboards<'a> {
         }
     }
 
-    /// The first corner of a square from the camera, and its edges, m.
+    /// Corner of a quad relative to the camera, and its edge vectors, m.
     fn quad_edges(&self, quad: &UprightQuad) -> [[f32; 3]; 3] {
         let eye = self.projection.exposure.cameras.middle().position;
         let [corner, right, up] = [quad.point(0.0, 0.0), quad.point(1.0, 0.0), quad.point(0.0, 1.0)];
@@ -159,7 +161,7 @@ impl<'a> Billboards<'a> {
         let contents = class.lattice.contents(cell);
         let [across, up, choice, mirrored] = exposure.key.uniforms(contents, 0, class.purpose(OFFSET));
         let [x, z, threshold, _] = exposure.key.uniforms(contents, 0, class.purpose(POSITION));
-        // Anywhere within the cell's ground: no two stand in a row.
+        // At a random position within the cell, so that billboards do not line up.
         let (middle, velocity) = exposure.drop_state(class, cell, DVec3::new(x.into(), 0.5, z.into()));
         let height = class.lattice.height();
         let base = middle - DVec3::Y * (0.5 * height);

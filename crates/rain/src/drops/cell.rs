@@ -1,23 +1,23 @@
-//! The drops of one cell half way through an exposure.
+//! Positions and velocities of the drops of one lattice cell at the middle of an exposure.
 
 use bansho_base::math::{DVec3, MulAdd, simd::LANES};
 
 use crate::lanes::{Lanes, Vec3Lanes, ZERO_LANES};
 
-/// Where the drops of a cell are and how they move: steady, and what gusts add.
+/// Position and motion of a cell's drops: uniform motion plus the gusts.
 pub(crate) struct CellState {
-    /// Its first corner from the camera, m.
+    /// Its first corner relative to the camera, m.
     pub(super) base: [f32; 3],
-    /// Its edges, m.
+    /// Its edge vectors, m.
     pub(super) axes: [[f32; 3]; 3],
-    /// Of all its drops in the mean wind, m/s.
+    /// Velocity of all its drops in the mean wind, m/s.
     pub(super) velocity: [f32; 3],
     pub(super) gusts: Option<GustInterpolant>,
 }
 
-/// What gusts do within a cell: what they do at its corners, straight between. Coefficients of 1, x, y, xy, z, xz, yz and xyz.
+/// Trilinear interpolation of gusts from the corners of a cell. Coefficients of 1, x, y, xy, z, xz, yz and xyz.
 pub(super) struct GustInterpolant {
-    /// Displacement along x and z, m, and velocity, m/s.
+    /// Displacement along x and z, m, and velocity along x and z, m/s.
     horizontal: [[f32; 8]; 4],
 }
 
@@ -26,7 +26,7 @@ impl GustInterpolant {
     pub(super) fn new(corners: [[DVec3; 2]; 8]) -> Self {
         let along = |quantity: fn([DVec3; 2]) -> f64| {
             let mut sums = corners.map(quantity);
-            // A corner less those that it shares an edge with, axis after axis.
+            // Differences along each axis in turn turn corner values into polynomial coefficients.
             for axis in [1, 2, 4] {
                 for corner in 0..8 {
                     if corner & axis != 0 {
@@ -39,7 +39,7 @@ impl GustInterpolant {
         Self { horizontal: [along(|[d, _]| d.x), along(|[d, _]| d.z), along(|[_, v]| v.x), along(|[_, v]| v.z)] }
     }
 
-    /// One quantity at sixteen places within the cell.
+    /// One quantity at sixteen positions within the cell.
     #[inline(always)]
     fn evaluate(coefficients: &[f32; 8], [xs, ys, zs]: &Vec3Lanes) -> Lanes {
         let mut values = ZERO_LANES;
@@ -54,7 +54,8 @@ impl GustInterpolant {
 }
 
 impl CellState {
-    /// ProjectedPoints from the camera (m) and velocities (m/s) of drops at shares of the cell's edges.
+    /// Positions relative to the camera (m) and velocities (m/s) of drops, from their positions as fractions of the
+    /// cell's edges.
     #[inline(always)]
     pub(crate) fn drop_states(&self, fractions: &Vec3Lanes) -> (Vec3Lanes, Vec3Lanes) {
         let (mut positions, mut velocities) = ([ZERO_LANES; 3], [ZERO_LANES; 3]);

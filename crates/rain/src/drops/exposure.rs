@@ -1,4 +1,4 @@
-//! The rain of one exposure: how many drops of each diameter there are, where they are and how they move.
+//! The state of the rain for one exposure: how many drops of each diameter there are, where they are and how they move.
 
 use bansho_base::{
     math::{
@@ -22,43 +22,45 @@ use crate::{
     shutter_cameras::{MAX_DROP_RADIUS, ShutterCameras},
 };
 
-/// What gusts displace a drop more or less than the middle of its cell, m.
+/// Largest difference between the gust displacement of a drop and that of its cell's center, m.
 const GUST_MARGIN: f64 = 0.2;
-/// StreakChunk of the region's radius over which rain changes from streaks to veil, half of it on each side.
+/// Width of the transition from streaks to single scattering as a fraction of the region's radius, half of it on each
+/// side.
 const REGION_FADE: f64 = 0.2;
-/// How far beyond that cells may be asked for, m: lamps at its border light some around them.
+/// How far beyond the region cells may be requested, m: lamps at its border have spheres of per-drop streaks around
+/// them.
 const LAMP_MARGIN: f64 = 8.0;
 
 /// The drops of one diameter during an exposure.
 #[derive(Clone, Debug)]
 pub(crate) struct DropClassState {
-    /// Which diameter, counted from the smallest.
+    /// Index of the diameter, from the smallest.
     pub(crate) index: usize,
     /// Diameter D, mm.
     pub(crate) diameter_mm: f64,
     /// Terminal velocity v, m/s.
     pub(crate) speed: f64,
-    /// Most drops a cubic metre that the shot ever has.
+    /// Largest number of drops per cubic meter in the whole shot.
     pub(crate) max_density: f64,
-    /// How many of them there are now, 0 to 1.
+    /// Fraction of these that exist now, 0 to 1.
     pub(crate) fraction: f64,
-    /// Where its cells are.
+    /// Positions of its cells.
     pub(crate) lattice: Lattice,
 }
 
 impl DropClassState {
-    /// DropBatch of a cell now, on average.
+    /// Expected number of drops in a cell now.
     pub(crate) fn count(&self) -> f64 {
         self.max_density * self.fraction * self.lattice.volume()
     }
 
-    /// Numbers for `purpose` that no other diameter shares.
+    /// A random stream for `purpose` that no other diameter uses.
     pub(crate) fn purpose(&self, purpose: Purpose) -> Purpose {
         Purpose(purpose.0.wrapping_add(self.index as u32))
     }
 }
 
-/// A part of the air.
+/// A sphere of air.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sphere {
     pub(crate) center: DVec3,
@@ -66,7 +68,7 @@ pub(crate) struct Sphere {
     pub(crate) radius: f64,
 }
 
-/// Rain while the shutter is open.
+/// The rain while the shutter is open.
 #[derive(Clone, Debug)]
 pub(crate) struct ExposureState {
     pub(crate) key: Key,
@@ -74,14 +76,14 @@ pub(crate) struct ExposureState {
     pub(crate) classes: Vec<DropClassState>,
     /// Height of the ground, m.
     pub(crate) ground: f64,
-    /// How far streaks are drawn, m.
+    /// Distance to which streaks are drawn, m.
     pub(crate) distance: f64,
-    /// Opacity beside what optics gives.
+    /// Opacity gain: a factor on the physical opacity.
     pub(crate) gain: f64,
-    /// Mean wind as drops follow it, level, m/s.
+    /// Horizontal mean wind, scaled by the response of the drops, m/s.
     wind: DVec3,
     gusts: Option<GustField>,
-    /// Solids that rain does not fall through.
+    /// Solids that shelter what is beneath them.
     occluders: Vec<Occluder>,
 }
 
@@ -108,14 +110,15 @@ impl ExposureState {
         }
     }
 
-    /// How much of a drop at `distance` from the camera is drawn as a streak: all within the region, nothing beyond its soft edge.
+    /// The weight with which a drop at `distance` from the camera is drawn as a streak: 1 within the region, 0 beyond
+    /// its transition.
     #[inline(always)]
     pub(crate) fn streak_weight(&self, distance: f32) -> f32 {
         let region = self.distance as f32;
         smoothstep(((1.0 + 0.5 * REGION_FADE as f32) * region - distance) / (REGION_FADE as f32 * region))
     }
 
-    /// All that is within `radius` (m) of the camera.
+    /// The sphere of `radius` (m) around the camera.
     pub(crate) fn around_camera(&self, radius: f64) -> Sphere {
         Sphere { center: self.cameras.middle().position, radius }
     }
@@ -141,7 +144,8 @@ impl ExposureState {
         CellState { base, axes: [right, up, back], velocity, gusts }
     }
 
-    /// Where a place within a cell of a class is half way through the exposure, in shares of its edges, and its velocity, m/s.
+    /// Position of a point of a cell (given as fractions of its edges) at the middle of the exposure, and its velocity,
+    /// m/s.
     pub(crate) fn drop_state(&self, class: &DropClassState, cell: Cell, within: DVec3) -> (DVec3, DVec3) {
         let steady = class.lattice.world(cell, within);
         let velocity = self.wind - DVec3::Y * class.speed;
@@ -154,8 +158,8 @@ impl ExposureState {
         }
     }
 
-    /// Cells of a class of which any drop may show within a ball, with the distances of their middles from the camera; its drops are
-    /// drawn up to `aside` (m) level from its middle in x and z.
+    /// Cells of a class of which any drop may be visible within a sphere, with the distances of their centers from the
+    /// camera. Drops are drawn up to `half_width` (m) from the cell's center in x and z.
     pub(crate) fn visible_cells(
         &self,
         class: &DropClassState,
@@ -191,23 +195,23 @@ impl ExposureState {
         cells
     }
 
-    /// Whether any solid may keep rain from what is beneath it.
+    /// Whether any solid may shelter anything.
     pub(crate) fn has_occluders(&self) -> bool {
         !self.occluders.is_empty()
     }
 
-    /// Whether a solid keeps the rain that comes with `velocity` from `point`.
+    /// Whether a solid blocks the rain that arrives at `point` with `velocity`.
     pub(crate) fn is_sheltered(&self, point: DVec3, velocity: DVec3) -> bool {
         self.occluders.iter().any(|occluder| ray_hits_occluder(occluder, point, -velocity.normalize_or_zero()))
     }
 }
 
-/// All below a plane is ground, not roof.
+/// A half space is ground: nothing is beneath it.
 fn is_ground(solid: &Occluder) -> bool {
     matches!(solid, Occluder::HalfSpace { .. })
 }
 
-/// Height of the highest level ground among solids, m.
+/// Height of the highest horizontal ground plane among the solids, m.
 pub(crate) fn ground_height(occluders: &[Occluder]) -> Option<f64> {
     let level = |occluder: &Occluder| match occluder {
         Occluder::HalfSpace { point, normal } if normal.y > 0.999 => Some(point.y),
@@ -216,12 +220,12 @@ pub(crate) fn ground_height(occluders: &[Occluder]) -> Option<f64> {
     occluders.iter().filter_map(level).max_by(f64::total_cmp)
 }
 
-/// Steps after which a way that only grazes a solid counts as free.
+/// Steps of sphere tracing after which a grazing ray counts as a miss.
 const MAX_TRACE_STEPS: usize = 64;
-/// How high roofs may stand, m.
+/// Greatest height of a sheltering solid, m.
 const MAX_OCCLUDER_HEIGHT: f64 = 200.0;
 
-/// Whether the way from `point` toward `up` meets a solid, in steps as long as its distance allows.
+/// Sphere tracing from `point` toward `up`: whether the ray meets the solid.
 fn ray_hits_occluder(occluder: &Occluder, point: DVec3, up: DVec3) -> bool {
     let mut travel = 0.0;
     for _ in 0..MAX_TRACE_STEPS {

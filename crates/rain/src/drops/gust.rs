@@ -1,21 +1,22 @@
-//! What gusts add to the mean wind that carries all drops alike.
+//! Displacement and velocity of drops by gusts, on top of the mean wind that carries all drops alike.
 
 use bansho_base::{math::DVec3, world::wind::Wind};
 
-/// A drop's way to where it is decides how far gusts have pushed it. Older gusts are forgotten little by little over this time, s: a drop
-/// falls through the visible region in less.
+/// Memory of a drop's horizontal displacement, s. The weight of a past gust decreases linearly to 0 over this time, in
+/// which a drop falls through the visible region.
 const GUST_MEMORY_S: f64 = 2.0;
-/// Steps in which that way is followed back.
+/// Steps of the integral back in time.
 const HISTORY_STEPS: usize = 6;
-/// Speed at which the way leads up; gusts are much larger than what drops of other speeds differ by.
+/// Fall speed with which the path is followed back, m/s. Gusts are much larger than the distances by which drops of
+/// other speeds differ.
 const TYPICAL_FALL_SPEED: f64 = 5.5;
-/// Least distance of nodes as a share of the region's radius: gusts that are finer are smoothed.
+/// Smallest node spacing as a fraction of the region's radius: finer gusts are smoothed out.
 const MIN_SPACING_RATIO: f64 = 0.4;
 
-/// Furthest displacement in distances of nodes: storms may shake rain about, but must not fetch it from far outside the region.
+/// Largest displacement in units of the node spacing: a storm must not carry drops in from far outside the region.
 const MAX_DISPLACEMENT_RATIO: f64 = 1.5;
 
-/// GustField around the camera at one time: on nodes that are fixed in the world, straight between them.
+/// The gusts around the camera at one time, trilinearly interpolated between nodes that are fixed in the world.
 #[derive(Clone, Debug)]
 pub(crate) struct GustField {
     spacing: f64,
@@ -26,13 +27,13 @@ pub(crate) struct GustField {
 }
 
 impl GustField {
-    /// GustField within `radius` of `centre` at time `t`; `None` where the wind has none.
-    pub(crate) fn new(wind: &Wind, response: f64, centre: DVec3, radius: f64, t: f64) -> Option<Self> {
+    /// Gusts within `radius` of `center` at time `t`; `None` where the wind has none.
+    pub(crate) fn new(wind: &Wind, response: f64, center: DVec3, radius: f64, t: f64) -> Option<Self> {
         let gust_length = wind.gust_length().filter(|_| response > 0.0)?;
         let spacing = (gust_length / 3.0).max(MIN_SPACING_RATIO * radius);
         let node_index = |value: f64| (value / spacing).floor() as i64;
-        let first = (centre - radius).to_array().map(node_index);
-        let last = (centre + radius).to_array().map(|value| node_index(value) + 1);
+        let first = (center - radius).to_array().map(node_index);
+        let last = (center + radius).to_array().map(|value| node_index(value) + 1);
         let count = std::array::from_fn(|axis| (last[axis] - first[axis] + 1) as usize);
         let [columns, rows, layers] = count;
         let node = |index: usize| {
@@ -45,11 +46,11 @@ impl GustField {
         Some(Self { spacing, first, count, nodes: (0..columns * rows * layers).map(node).collect() })
     }
 
-    /// A box that holds every point which is displaced into the box between two corners.
+    /// A box that contains every point whose displaced position lies in the box between two corners.
     pub(crate) fn source_bounds(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
-        /// After these the box no longer shrinks by much.
+        /// After this many iterations the box hardly shrinks any more.
         const ROUNDS: usize = 8;
-        // Displacements anywhere first, then those within the box that this leaves, and so on.
+        // Fixed-point iteration: bounds on the displacement everywhere first, then on that within the box found so far.
         let mut source_bounds = [DVec3::splat(f64::NEG_INFINITY), DVec3::splat(f64::INFINITY)];
         for _ in 0..ROUNDS {
             let [lower, limit] = self.displacement_range(source_bounds);
@@ -58,8 +59,8 @@ impl GustField {
         source_bounds
     }
 
-    /// Least and greatest displacement along each axis within a box: between nodes it is straight along every axis, so the ends lie
-    /// at nodes and on the box's corners.
+    /// Least and greatest displacement along each axis within a box. The interpolant is linear along each axis, so
+    /// extrema lie at nodes and on the faces of the box.
     fn displacement_range(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
         let ends = |axis: usize| {
             let node = |index: usize| (self.first[axis] + index as i64) as f64 * self.spacing;
@@ -102,9 +103,10 @@ impl GustField {
     }
 }
 
-/// Displacement of a drop at `point` by the gusts on its way and its rate along that way: what the gusts add to its velocity.
+/// Displacement of a drop at `point` by the gusts along its path, and its derivative along that path: the velocity that
+/// gusts add.
 fn displacement_and_rate(wind: &Wind, point: DVec3, t: f64) -> [DVec3; 2] {
-    /// Half of the time over which the rate is taken, s: about an exposure.
+    /// Half the interval of the central difference, s: about an exposure.
     const HALF: f64 = 0.01;
     let mean = horizontal(wind.mean(t));
     let path = (mean - DVec3::Y * TYPICAL_FALL_SPEED) * HALF;
@@ -112,7 +114,7 @@ fn displacement_and_rate(wind: &Wind, point: DVec3, t: f64) -> [DVec3; 2] {
     [0.5 * (before + after), (after - before) / (2.0 * HALF)]
 }
 
-/// `integral of g(s) (1 - s / memory) ds` over the past s of a drop along its way, level, m.
+/// Horizontal displacement `integral of g(s) (1 - s / memory) ds` over the past s along a drop's path, m.
 fn displacement(wind: &Wind, point: DVec3, t: f64) -> DVec3 {
     let mean = horizontal(wind.mean(t));
     let step = GUST_MEMORY_S / HISTORY_STEPS as f64;
@@ -124,13 +126,13 @@ fn displacement(wind: &Wind, point: DVec3, t: f64) -> DVec3 {
     (0..HISTORY_STEPS).map(fraction).sum()
 }
 
-/// As it is up to half of `most`, beyond that ever less more, never as long as `most`.
+/// Limits a vector's length to less than `limit`, smoothly (C1); unchanged up to half of it.
 fn soft_limited(vector: DVec3, limit: f64) -> DVec3 {
     let (length, half) = (vector.length(), 0.5 * limit);
     if length <= half { vector } else { vector * ((limit - half * half / length) / length) }
 }
 
-/// Without what is up or down: near the ground wind is level.
+/// The horizontal part: near the ground wind is horizontal.
 fn horizontal(vector: DVec3) -> DVec3 {
     DVec3::new(vector.x, 0.0, vector.z)
 }

@@ -1,4 +1,4 @@
-//! How fast drops fall in still air.
+//! Terminal velocity of drops in still air: measured, and by the paper's equations (2) to (4).
 
 use bansho_base::{math, world::gravity::STANDARD_GRAVITY};
 
@@ -15,7 +15,7 @@ bansho_base::choice! {
     }
 }
 
-/// The air that drops fall through.
+/// Properties of the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Air {
     /// Density rho_f, kg/m^3.
@@ -32,7 +32,7 @@ impl Default for Air {
 }
 
 impl Air {
-    /// Dry air as an ideal gas, its viscosity by Sutherland's law.
+    /// Dry air as an ideal gas, with Sutherland's formula for the viscosity.
     pub fn at(temperature_k: f64, pressure_pa: f64) -> Self {
         /// Gas constant of dry air, J/(kg K).
         const GAS_CONSTANT: f64 = 287.05;
@@ -41,16 +41,16 @@ impl Air {
     }
 }
 
-/// The paper's fixed point does not exist, or lies where its drag is not known.
+/// The paper's fixed point does not exist, or lies outside the range of its drag coefficient.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoTerminalVelocity {
-    /// The drag (3) jumps at Re = 1 from 24 to 28.6, and the drop would need one between.
+    /// The drag coefficient (3) jumps from 24 to 28.6 at Re = 1, and the drop would need a value between.
     #[error("formula (2)-(4) has no solution for a drop of {diameter_mm} mm: the drag jumps at Re = 1")]
     DragJump {
         /// Diameter D, mm.
         diameter_mm: f64,
     },
-    /// Re would reach 1e4, beyond which the paper gives no drag.
+    /// Re is 1e4 or more, where the paper gives no drag coefficient.
     #[error("formula (2)-(4) ends at Re = 10000; a drop of {diameter_mm} mm falls with Re = {reynolds}")]
     TooFast {
         /// Diameter D, mm.
@@ -60,12 +60,12 @@ pub enum NoTerminalVelocity {
     },
 }
 
-/// DropBatch falling by a law through an air.
+/// Terminal velocity of drops: a law and the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TerminalVelocity {
     /// Where the velocities come from.
     pub law: VelocityLaw,
-    /// What the drops fall through.
+    /// The air.
     pub air: Air,
 }
 
@@ -76,10 +76,10 @@ impl Default for TerminalVelocity {
 }
 
 impl TerminalVelocity {
-    /// Terminal velocity of a drop of diameter D, m/s downward; rises with D.
+    /// Terminal velocity of a drop of diameter D, m/s downward; increases with D.
     ///
-    /// Where the paper's formula has no solution, between 79.5 and 84 um, its drag below Re = 1 is used; above Re = 1e4, its
-    /// drag below.
+    /// Where the paper's equations have no solution, between 79.5 and 84 um, Stokes' law is used; above Re = 1e4, the
+    /// velocity at which Re was computed last.
     pub fn speed(&self, diameter_mm: f64) -> f64 {
         match self.law {
             VelocityLaw::Measured => measured_velocity(diameter_mm) * density_correction(&self.air),
@@ -136,8 +136,8 @@ const GUNN_KINZER: [[f64; 2]; 35] = [
 
 /// Measured terminal velocity at 20 degrees Celsius and 1013 hPa, m/s.
 ///
-/// Linear between the table's rows; by Stokes' square of D below 0.078 mm; that of the largest measured drop beyond 5.8 mm, where
-/// drops break up.
+/// Linear interpolation of the table; proportional to D^2 (Stokes) below 0.078 mm; constant beyond 5.8 mm, where drops
+/// break up.
 pub fn measured_velocity(diameter_mm: f64) -> f64 {
     let [smallest, slowest] = GUNN_KINZER[0];
     if diameter_mm < smallest {
@@ -149,12 +149,13 @@ pub fn measured_velocity(diameter_mm: f64) -> f64 {
     math::lerp(v0, v1, ((diameter_mm - d0) / (d1 - d0)).min(1.0))
 }
 
-/// How much faster measured drops fall in thinner air: G. B. Foote and P. S. du Toit, J. Appl. Meteor. 8 (1969).
+/// Correction of measured velocities for the density of the air: G. B. Foote and P. S. du Toit, J. Appl. Meteor. 8
+/// (1969).
 fn density_correction(air: &Air) -> f64 {
     math::pow(Air::default().density / air.density, 0.4)
 }
 
-/// Drag C of a rigid sphere, eq. (3).
+/// Drag coefficient C of a rigid sphere, eq. (3).
 pub fn drag_coefficient(reynolds: f64) -> f64 {
     if reynolds < 1.0 {
         24.0 / reynolds
@@ -169,7 +170,7 @@ pub fn reynolds_number(speed: f64, diameter_mm: f64, air: &Air) -> f64 {
     speed * air.density * 1e-3 * diameter_mm / air.viscosity
 }
 
-/// Velocity at which weight and the drag C are in balance, eq. (2).
+/// Velocity at which weight and drag are in equilibrium for the drag coefficient C, eq. (2).
 fn equilibrium_velocity(diameter_mm: f64, drag: f64, air: &Air) -> f64 {
     math::sqrt(4.0 * STANDARD_GRAVITY * 1e-3 * diameter_mm * (WATER_DENSITY - air.density) / (3.0 * air.density * drag))
 }
@@ -185,7 +186,7 @@ fn stokes_velocity(diameter_mm: f64, air: &Air) -> f64 {
 /// # Errors
 /// There is no such velocity, or it lies where (3) gives no drag.
 pub fn fixed_point_velocity(diameter_mm: f64, air: &Air) -> Result<f64, NoTerminalVelocity> {
-    /// The slowest convergence, far below Re = 1, halves the error with every step.
+    /// Steps for the slowest convergence: far below Re = 1 each step halves the error.
     const STEPS: usize = 200;
     if diameter_mm.is_nan() || diameter_mm <= 0.0 {
         return Ok(0.0);

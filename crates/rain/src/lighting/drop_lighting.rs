@@ -1,4 +1,4 @@
-//! The light that drops send to the camera.
+//! Radiance of drops in the light of lamps and fires.
 
 use bansho_base::{
     math::{self, DVec3, MulAdd, approximations, simd::LANES},
@@ -8,15 +8,15 @@ use bansho_base::{
 use super::{drop_phase_function::DropPhaseFunction, tiles::lerp_color};
 use crate::lanes::{Lanes, Vec3Lanes, ZERO_LANES, fast_max, fast_min};
 
-/// Steps of [`ScatteringTable`].
+/// Steps of a [`ScatteringTable`].
 const TABLE_STEPS: usize = 2048;
 
-/// The radiance of a drop for the illuminance on it, `p / (4 pi)`, by the sine of half the angle that it turns light by: quick to look
-/// up from a cosine, and finest where a drop turns light least.
+/// Radiance of a drop over its illuminance, `p / (4 pi)`, tabulated by the sine of half the scattering angle: this
+/// needs only a square root of the cosine, and is finest in the forward direction.
 #[derive(Debug)]
 pub(crate) struct ScatteringTable {
     table: Vec<[f32; 3]>,
-    /// Greatest of all colours and deviations, 1/sr.
+    /// Maximum over all colors and angles, 1/sr.
     greatest: f32,
 }
 
@@ -31,19 +31,19 @@ impl ScatteringTable {
         Self { table, greatest }
     }
 
-    /// For a deviation of the light whose cosine is given, 1/sr.
+    /// At the cosine of the scattering angle, 1/sr.
     #[inline(always)]
     pub(crate) fn at(&self, cos_deviation: f32) -> [f32; 3] {
         self.of(Self::position(cos_deviation))
     }
 
-    /// Where in the table a deviation is whose cosine is given.
+    /// Table position for the cosine of the scattering angle.
     #[inline(always)]
     fn position(cos_deviation: f32) -> f32 {
         fast_min(1.0, fast_max(0.0, (1.0 - cos_deviation) * 0.5)).sqrt() * TABLE_STEPS as f32
     }
 
-    /// At a place in the table.
+    /// Linear interpolation at a table position.
     #[inline(always)]
     fn of(&self, position: f32) -> [f32; 3] {
         let step = (position as i32 as usize).min(TABLE_STEPS - 1);
@@ -51,17 +51,18 @@ impl ScatteringTable {
     }
 }
 
-/// What falls on drops from lamps and fires.
+/// The lamps and fires that light the drops.
 #[derive(Clone, Copy)]
 pub(crate) struct DropLighting<'a> {
     pub(crate) scattering: &'a ScatteringTable,
     pub(crate) lights: &'a [Light],
-    /// What rain takes on the way from a light to a drop, 1/m.
+    /// Extinction coefficient between a light and a drop, 1/m.
     pub(crate) extinction: f64,
 }
 
 impl DropLighting<'_> {
-    /// Mean radiance of a drop at `point` by one light, seen along `line` (unit vector from the eye), ACEScg, cd/m^2: `E p / (4 pi)`.
+    /// Mean radiance of a drop at `point` by one light, seen along `line` (unit vector from the eye), ACEScg, cd/m^2:
+    /// `E p / (4 pi)`.
     #[inline(always)]
     pub(crate) fn radiance(&self, light: &Light, point: DVec3, direction: DVec3) -> [f32; 3] {
         let Arrival { illuminance, toward, distance } = light.arriving(point);
@@ -73,14 +74,14 @@ impl DropLighting<'_> {
         [0, 1, 2].map(|c| illuminance[c] * through * scattered[c])
     }
 
-    /// The lights as drops see them whose places are counted from `eye`.
+    /// The lights, prepared for drops whose positions are relative to `eye`.
     pub(crate) fn prepare_lights(&self, eye: DVec3) -> Vec<PreparedLight> {
         self.lights.iter().map(|light| PreparedLight::new(light, eye)).collect()
     }
 
-    /// Adds the radiance of sixteen drops by a light, as far as they are `lit` by it.
+    /// Adds the radiance of sixteen drops by a light, times `lit`.
     ///
-    /// Also of those that are not: a branch for each would be guessed wrongly, and keep the sums before it from being done for all at once.
+    /// Without skipping those of weight 0: a branch for each would be mispredicted, and prevent vectorization.
     #[inline(always)]
     pub(crate) fn add(
         &self,
@@ -98,15 +99,15 @@ impl DropLighting<'_> {
         }
     }
 
-    /// No drop within `radius` (m) of a point has a greater radiance in any colour, cd/m^2.
-    pub(crate) fn max_radiance(&self, centre: DVec3, radius: f64) -> f32 {
+    /// Upper bound on the radiance of drops within `radius` (m) of a point, in any color, cd/m^2.
+    pub(crate) fn max_radiance(&self, center: DVec3, radius: f64) -> f32 {
         let max_radiance = |light: &Light| {
             let intensity = light.intensity.into_iter().fold(0.0, f32::max) * self.scattering.greatest;
-            let nearest = (light.arriving(centre).distance - radius).max(f64::MIN_POSITIVE);
+            let nearest = (light.arriving(center).distance - radius).max(f64::MIN_POSITIVE);
             match light.emitter {
                 Emitter::Directional { .. } => intensity,
                 Emitter::Spot { position, axis, cos_outer, .. }
-                    if cone_misses_sphere(centre - position, radius, axis, cos_outer) =>
+                    if cone_misses_sphere(center - position, radius, axis, cos_outer) =>
                 {
                     0.0
                 }
@@ -118,15 +119,16 @@ impl DropLighting<'_> {
     }
 }
 
-/// A light as sixteen drops at a time see it: [`Light::arriving`] in single precision.
+/// [`Light::arriving`] in single precision, for sixteen drops at a time.
 pub(crate) struct PreparedLight {
-    /// Where it stands from the camera, m; toward it where it is infinitely far.
+    /// Position relative to the camera, m; for a directional light, the direction toward it.
     position: [f32; 3],
-    /// 1 for one that stands somewhere, 0 for one that is infinitely far.
+    /// 1 for a light with a position, 0 for a directional one.
     is_local: f32,
-    /// Square of the distance within which its light no longer grows, m^2.
-    least_square: f32,
-    /// DropSelection of a cone by the cosine of the angle from its axis: how much it rises for each unit, and where it would be 0; of others 1.
+    /// Square of the radius of the lamp, within which the illuminance is constant, m^2.
+    min_distance_squared: f32,
+    /// Cone of a spot light: its axis, and slope and offset of the falloff as a function of the cosine of the angle
+    /// from the axis; constant 1 for other lights.
     axis: [f32; 3],
     cone: [f32; 2],
     intensity: [f32; 3],
@@ -146,15 +148,15 @@ impl PreparedLight {
         Self {
             position: position.as_vec3().to_array(),
             is_local,
-            least_square: (radius * radius).max(1e-12) as f32,
+            min_distance_squared: (radius * radius).max(1e-12) as f32,
             axis,
             cone,
             intensity: light.intensity,
         }
     }
 
-    /// Illuminance at sixteen places from the camera over its intensity, what rain leaves of it, and where in the table of
-    /// [`ScatteringTable`] the deviation toward the camera is.
+    /// For sixteen positions relative to the camera: illuminance over intensity, attenuated by the rain, and the table
+    /// position in [`ScatteringTable`] of the scattering angle toward the camera.
     #[inline(always)]
     fn arriving(&self, [xs, ys, zs]: &Vec3Lanes, extinction: f32) -> (Lanes, Lanes) {
         let (mut factors, mut table_positions) = (ZERO_LANES, ZERO_LANES);
@@ -168,7 +170,7 @@ impl PreparedLight {
             let from = -(offset[0] * self.axis[0] + offset[1] * self.axis[1] + offset[2] * self.axis[2]) * inverse;
             let cone = fast_min(1.0, fast_max(0.0, from.fma(self.cone[0], self.cone[1])));
             let cone_factor = cone * cone * (3.0 - 2.0 * cone);
-            let attenuation = fast_max(self.least_square, is_local * square + (1.0 - is_local));
+            let attenuation = fast_max(self.min_distance_squared, is_local * square + (1.0 - is_local));
             factors[i] = cone_factor / attenuation * approximations::exp(-extinction * is_local * distance);
             let away = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
             let along = offset[0] * xs[i] + offset[1] * ys[i] + offset[2] * zs[i];
@@ -178,7 +180,7 @@ impl PreparedLight {
     }
 }
 
-/// Whether a cone around `axis` misses a ball that lies at `offset` from its apex.
+/// Whether a cone around `axis` misses a sphere at `offset` from its apex.
 fn cone_misses_sphere(offset: DVec3, radius: f64, axis: DVec3, cos_outer: f64) -> bool {
     let away = offset.length();
     if away <= radius {

@@ -1,29 +1,31 @@
-//! How a drop sends on the light that falls on it.
+//! Phase function of a water drop, by ray tracing.
 //!
-//! A round drop of clear water, by geometric optics: at each surface Fresnel's formulas divide the light. Path 0 is reflected outside,
-//! path 1 goes straight through, path 2 is reflected once inside (the rainbow), and so on. All light leaves again.
+//! A sphere of clear water in geometric optics. Fresnel's equations divide the light at each surface. Path 0 is
+//! reflected outside, path 1 is transmitted directly, path 2 is reflected once inside (the primary rainbow), and so on.
+//! There is no absorption: all light leaves again. Diffraction and polarization are not included.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use bansho_base::math::{self, DVec3};
 
-/// Refractive index of water at 20 degrees Celsius and 630, 540 and 460 nm, about where red, green and blue of ACEScg lie.
+/// Refractive index of water at 20 degrees Celsius and 630, 540 and 460 nm, about the wavelengths of ACEScg's red,
+/// green and blue.
 const WATER: [f64; 3] = [1.3317, 1.3346, 1.3380];
-/// Steps of the phase function from 0 to 180 degrees.
+/// Steps of the table from 0 to 180 degrees.
 const ANGLE_STEPS: usize = 180;
-/// Paths followed; what is left after them is 0.02 % of the light.
+/// Paths followed; the rest carries 0.02 % of the light.
 const PATHS: usize = 10;
 /// Angles of incidence traced.
 const RAYS: usize = 1024;
-/// Directions that stand for a drop's surroundings.
+/// Directions of the quadrature over a drop's surroundings.
 const DIRECTIONS: usize = 48;
 
-/// The phase function of a drop of water, made once.
+/// The tabulated phase function of a water drop.
 #[derive(Clone, Debug)]
 pub struct DropPhaseFunction {
-    /// Phase function at each step of deviation, for red, green and blue; straight between.
+    /// Phase function by scattering angle, for red, green and blue; linear interpolation.
     phase: [[f32; 3]; ANGLE_STEPS + 1],
-    /// Directions of equal shares of the light, relative to a line of sight along z.
+    /// Directions of equal probability by the phase function, relative to a line of sight along z.
     directions: [DVec3; DIRECTIONS],
 }
 
@@ -34,16 +36,16 @@ impl Default for DropPhaseFunction {
 }
 
 impl DropPhaseFunction {
-    /// Traces the rays; some milliseconds.
+    /// Traces the rays; takes some milliseconds.
     pub fn new() -> Self {
         let channels = WATER.map(|index| phase_table(&trace_rays(index)));
         let phase = std::array::from_fn(|i| [0, 1, 2].map(|c| channels[c][i] as f32));
         Self { phase, directions: stratified_directions(&channels[1]) }
     }
 
-    /// Phase function for red, green and blue at a deviation of the light whose cosine is given: 1 is straight on. Its mean over all
-    /// directions is 1, so a drop in illuminance E has the mean radiance `E p / (4 pi)`; under a sky of one radiance it
-    /// has that radiance.
+    /// Phase function for red, green and blue at the cosine of the scattering angle; 1 is forward. Its mean over the
+    /// sphere is 1, so a drop in illuminance E has the mean radiance `E p / (4 pi)`, and under a uniform sky it has the
+    /// radiance of the sky.
     pub fn phase(&self, cos_deviation: f32) -> [f32; 3] {
         let steps = math::f32::acos(cos_deviation.clamp(-1.0, 1.0)) * (ANGLE_STEPS as f32 / std::f32::consts::PI);
         let lower = (steps as usize).min(ANGLE_STEPS - 1);
@@ -51,8 +53,8 @@ impl DropPhaseFunction {
         [0, 1, 2].map(|c| self.phase[lower][c] * (1.0 - fraction) + self.phase[lower + 1][c] * fraction)
     }
 
-    /// Mean radiance of a drop that is seen along `line` (unit vector from the eye to the drop): the radiance of its
-    /// surroundings by direction, averaged as the drop refracts and reflects them.
+    /// Mean radiance of a drop that is seen along `line` (unit vector from the eye to the drop): the integral of
+    /// `radiance` by direction times the phase function, by quasi-Monte Carlo importance sampling.
     pub fn mean_radiance(&self, line: DVec3, radiance: impl Fn(DVec3) -> [f32; 3]) -> [f32; 3] {
         let (side, up) = line.any_orthonormal_pair();
         let sum = self.directions.iter().fold([0.0; 3], |sum: [f32; 3], direction| {
@@ -63,16 +65,16 @@ impl DropPhaseFunction {
     }
 }
 
-/// What leaves a drop by one path at one angle of incidence.
+/// A ray that leaves a drop, by path and angle of incidence.
 #[derive(Clone, Copy, Debug)]
 struct ExitingRay {
-    /// Angle between the light before and after, 0 to pi.
+    /// Scattering angle, 0 to pi.
     deviation: f64,
-    /// DropSelection of the light that falls on the drop.
+    /// Fraction of the light that falls on the drop.
     fraction: f64,
 }
 
-/// Shares of light that are reflected at an angle of incidence and refraction, in both polarisations (Fresnel).
+/// Fresnel reflectances for s and p polarization at angles of incidence and refraction.
 fn fresnel_reflectances(incidence: f64, refraction: f64) -> [f64; 2] {
     let (difference, sum) = (incidence - refraction, incidence + refraction);
     let square = |x: f64| x * x;
@@ -82,14 +84,14 @@ fn fresnel_reflectances(incidence: f64, refraction: f64) -> [f64; 2] {
     ]
 }
 
-/// The light by path through a drop of refractive index `index`, at evenly spaced angles of incidence.
+/// Rays of all paths through a drop of refractive index `index`, at evenly spaced angles of incidence.
 fn trace_rays(index: f64) -> Vec<[ExitingRay; PATHS]> {
     let step = FRAC_PI_2 / RAYS as f64;
     let paths = |ray: usize| {
         let incidence = step * (ray as f64 + 0.5);
         let refraction = math::asin(math::sin(incidence) / index);
         let reflected = fresnel_reflectances(incidence, refraction);
-        // The disc's share at this angle, from d(sin^2 i): the shares of all angles sum to 1.
+        // The fraction of the disc's area at this angle, from d(sin^2 i): they sum to 1 over all angles.
         let fraction = math::sin(2.0 * incidence) * math::sin(step);
         std::array::from_fn(|path| ExitingRay {
             deviation: deviation(path, incidence, refraction),
@@ -99,7 +101,7 @@ fn trace_rays(index: f64) -> Vec<[ExitingRay; PATHS]> {
     (0..RAYS).map(paths).collect()
 }
 
-/// DropSelection of the light of one polarisation that leaves by a path.
+/// Fraction of the light of one polarization that leaves by a path.
 fn exit_fraction(reflected: f64, path: usize) -> f64 {
     if path == 0 {
         return reflected;
@@ -108,7 +110,7 @@ fn exit_fraction(reflected: f64, path: usize) -> f64 {
     (1.0 - reflected) * (1.0 - reflected) * inside
 }
 
-/// Angle by which a path turns the light, folded to 0 .. pi.
+/// Scattering angle of a path, folded to 0..=pi.
 fn deviation(path: usize, incidence: f64, refraction: f64) -> f64 {
     let turned = match path {
         0 => PI - 2.0 * incidence,
@@ -118,7 +120,8 @@ fn deviation(path: usize, incidence: f64, refraction: f64) -> f64 {
     turned.min(2.0 * PI - turned)
 }
 
-/// The phase function at each step, of mean 1 over the sphere when taken straight between the steps.
+/// The phase function at each step, normalized to a mean of 1 over the sphere with linear interpolation between the
+/// steps.
 fn phase_table(rays: &[[ExitingRay; PATHS]]) -> [f64; ANGLE_STEPS + 1] {
     let mut energy = [0.0; ANGLE_STEPS + 1];
     for ray in rays.as_flattened() {
@@ -132,18 +135,18 @@ fn phase_table(rays: &[[ExitingRay; PATHS]]) -> [f64; ANGLE_STEPS + 1] {
     std::array::from_fn(|i| 4.0 * PI * energy[i] / (whole * solid_angle(i)))
 }
 
-/// Integral over the sphere of the tent that is 1 at a step and 0 at its neighbours.
+/// Integral over the sphere of the hat function that is 1 at a step and 0 at its neighbors.
 fn solid_angle(step: usize) -> f64 {
     let h = PI / ANGLE_STEPS as f64;
     let theta = h * step as f64;
-    // Of sin(theta) times the rising side of the tent, which ends at theta; and the falling one, mirrored.
+    // The integral of sin(theta) times the rising side of the hat, which ends at theta; the falling side by symmetry.
     let side = |theta: f64| -math::cos(theta) + (math::sin(theta) - math::sin(theta - h)) / h;
     let rising = if step > 0 { side(theta) } else { 0.0 };
     let falling = if step < ANGLE_STEPS { side(PI - theta) } else { 0.0 };
     2.0 * PI * (rising + falling)
 }
 
-/// Directions along a golden spiral, each for an equal share of the light.
+/// Directions along a golden-angle spiral, stratified by the cumulative distribution of the phase function.
 fn stratified_directions(phase: &[f64; ANGLE_STEPS + 1]) -> [DVec3; DIRECTIONS] {
     /// Golden angle, turns.
     const GOLDEN: f64 = 0.381_966_011_250_105;

@@ -1,21 +1,22 @@
-//! What all drops together take from light on a long way.
+//! Extinction coefficient and meteorological visibility of rain.
 
 use std::f64::consts::PI;
 
 use crate::drops::size_distribution::DropSizeDistribution;
 
-/// What counts as lost from a beam that meets a drop.
+/// Which extinction efficiency Q of a drop is meant. Drops are large compared with the wavelength, so Q is 2 in all
+/// (the extinction paradox).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExtinctionEfficiency {
-    /// What falls on the drop, Q = 1: it continues what single streaks hide.
+    /// Geometric cross section, Q = 1: consistent with the opacity of single streaks.
     Geometric,
-    /// And what the drop diffracts, as much again, Q = 2: for meteorological visibility.
+    /// Geometric cross section and diffraction, Q = 2: for meteorological visibility.
     WithDiffraction,
 }
 
 impl ExtinctionEfficiency {
-    /// Extinction efficiency Q of a drop, which is large beside the wavelength.
-    pub fn efficiency(self) -> f64 {
+    /// Extinction efficiency Q.
+    pub fn value(self) -> f64 {
         match self {
             Self::Geometric => 1.0,
             Self::WithDiffraction => 2.0,
@@ -24,13 +25,13 @@ impl ExtinctionEfficiency {
 }
 
 /// Extinction coefficient `beta = Q (pi/4) integral of n D^2 dD` of the drops between two diameters (mm), 1/m.
-pub fn extinction(sizes: &DropSizeDistribution, losses: ExtinctionEfficiency, diameters_mm: [f64; 2]) -> f64 {
+pub fn extinction(sizes: &DropSizeDistribution, efficiency: ExtinctionEfficiency, diameters_mm: [f64; 2]) -> f64 {
     // n per m^3 per mm, D and dD in mm: mm^2 per m^3 are 1e-6 per m.
-    losses.efficiency() * 0.25e-6 * PI * sizes.moment(2, diameters_mm)
+    efficiency.value() * 0.25e-6 * PI * sizes.moment(2, diameters_mm)
 }
 
-/// Meteorological visibility, m: how far a black thing differs by 2 % from the horizon sky (Koschmieder 1924),
-/// `3.912 / beta` with diffraction counted; infinite without drops.
+/// Meteorological visibility, m: the distance at which a black object has 2 % contrast against the horizon sky
+/// (Koschmieder 1924), `3.912 / beta` with Q = 2; infinite without drops.
 pub fn visibility(sizes: &DropSizeDistribution) -> f64 {
     /// -ln 0.02.
     const CONTRAST: f64 = 3.912_023_005_428_146;

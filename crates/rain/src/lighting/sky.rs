@@ -1,4 +1,4 @@
-//! The sky that is seen through drops.
+//! Sky light on drops, for the directions of a camera.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -9,15 +9,15 @@ use super::{
     tiles::{COARSE_TILE, FINE_TILE, TileGrid},
 };
 
-/// What a camera sees of a sky in and through the rain.
+/// The sky as a camera sees it in and through the rain.
 #[derive(Debug)]
 pub(crate) struct SkyLighting {
     camera: Camera,
     size: [usize; 2],
     sky: Sky,
-    /// TileGrid for streaks, and what the sky shines through drops toward the camera from each of their corners.
+    /// Grid for streaks, and the radiance of drops under the sky at each of its corners.
     pub(crate) coarse: (TileGrid, Vec<[f32; 3]>),
-    /// The same for the veil, and what endless rain shows there.
+    /// Grid for single scattering, with the radiance of drops and that of infinitely deep rain.
     pub(crate) fine: (TileGrid, [Vec<[f32; 3]>; 2]),
 }
 
@@ -25,23 +25,29 @@ impl SkyLighting {
     fn new(phase_function: &DropPhaseFunction, view: &View, sky: Sky) -> Self {
         let (coarse, fine) = (TileGrid::new(view, COARSE_TILE), TileGrid::new(view, FINE_TILE));
         let drops = [&coarse, &fine].map(|tiles| sky_through_drops(phase_function, tiles, &sky));
-        let [streaks, veil] = drops;
+        let [coarse_drops, fine_drops] = drops;
         let endless = endless_rain(&fine, &sky);
-        Self { camera: view.camera, size: view.size, sky, coarse: (coarse, streaks), fine: (fine, [veil, endless]) }
+        Self {
+            camera: view.camera,
+            size: view.size,
+            sky,
+            coarse: (coarse, coarse_drops),
+            fine: (fine, [fine_drops, endless]),
+        }
     }
 }
 
-/// Skies as they were seen last: while neither camera nor sky change, they need not be found again.
+/// Cache of recent skies, keyed by camera, picture size and sky.
 #[derive(Debug, Default)]
 pub(crate) struct SkyLightingCache(Mutex<Vec<Arc<SkyLighting>>>);
 
-/// How many are kept: the scene's, and what a mirror shows of it.
+/// The scene's own view and one mirrored view.
 const CACHE_CAPACITY: usize = 2;
 
 impl SkyLightingCache {
     /// What the camera of `view` sees.
     pub(crate) fn of(&self, phase_function: &DropPhaseFunction, view: &View, sky: Sky) -> Arc<SkyLighting> {
-        // Only whole ones are ever kept.
+        // The list is always consistent, so a poisoned lock is usable.
         let cached = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let same = |seen: &&Arc<SkyLighting>| (seen.camera, seen.size, seen.sky) == (view.camera, view.size, sky);
         if let Some(seen) = cached().iter().find(same) {
@@ -55,7 +61,7 @@ impl SkyLightingCache {
     }
 }
 
-/// What the sky shines through drops toward the camera from each corner of the tiles.
+/// Radiance of drops under the sky, toward the camera, at each corner of the grid.
 fn sky_through_drops(phase_function: &DropPhaseFunction, tiles: &TileGrid, sky: &Sky) -> Vec<[f32; 3]> {
     if sky.is_dark() {
         return vec![[0.0; 3]; tiles.directions.len()];
@@ -63,7 +69,7 @@ fn sky_through_drops(phase_function: &DropPhaseFunction, tiles: &TileGrid, sky: 
     tiles.map(|_, line| phase_function.mean_radiance(line, |direction| sky.radiance(direction)))
 }
 
-/// What endless rain shows from each corner: the sky, below the horizon that at the horizon (Koschmieder 1924).
+/// Radiance of infinitely deep rain at each corner: the sky, below the horizon that at the horizon (Koschmieder 1924).
 fn endless_rain(tiles: &TileGrid, sky: &Sky) -> Vec<[f32; 3]> {
     tiles.map(|_, line| sky.radiance(DVec3::new(line.x, line.y.max(0.0), line.z).normalize_or_zero()))
 }

@@ -1,4 +1,4 @@
-//! Light that changes slowly over the picture: known at the corners of tiles, straight between.
+//! A grid over the picture for values that vary slowly: evaluated at tile corners, interpolated bilinearly.
 
 use bansho_base::{
     camera::Camera,
@@ -8,24 +8,24 @@ use bansho_base::{
 };
 use rayon::prelude::*;
 
-/// Side of a tile where light changes little from one to the next, pixels.
+/// Tile side for light that varies slowly, pixels.
 pub(crate) const COARSE_TILE: usize = 32;
-/// Side of a tile where lamps and the edges of their cones are seen, pixels.
+/// Tile side for the light of lamps and the edges of their cones, pixels.
 pub(crate) const FINE_TILE: usize = 16;
 
-/// Side of a tile close to a lamp, pixels.
+/// Tile side close to a lamp, pixels.
 pub(crate) const FINEST_TILE: usize = 4;
 
-/// Corners of the tiles of a picture, or of a part of it.
+/// Tile corners of a picture, or of a rectangle of it.
 #[derive(Clone, Debug)]
 pub(crate) struct TileGrid {
-    /// Place of the first corner, pixels.
+    /// Pixel of the first corner.
     origin: [usize; 2],
     /// Side of a tile, pixels.
     pub(crate) side: usize,
-    /// Corners in a row, and rows of corners.
+    /// Number of corners in a row, and number of rows.
     pub(crate) size: [usize; 2],
-    /// Unit vectors that are seen at the corners, row after row; 0 where the lens sees nothing.
+    /// Unit vectors of the lines of sight at the corners, row by row; 0 where the lens sees nothing.
     pub(crate) directions: Vec<DVec3>,
 }
 
@@ -34,7 +34,7 @@ impl TileGrid {
         Self::over(view, side, Rect::of_size(view.size[0], view.size[1]))
     }
 
-    /// TileGrid that cover a part of the picture.
+    /// The grid over a rectangle of the picture.
     pub(crate) fn over(view: &View, side: usize, rect: Rect) -> Self {
         let origin = [rect.x, rect.y];
         let size = [rect.width, rect.height].map(|pixels| pixels.max(1).div_ceil(side) + 1);
@@ -43,20 +43,20 @@ impl TileGrid {
         Self { origin, side, size, directions }
     }
 
-    /// One value at each corner, made in parallel.
+    /// One value for each corner, computed in parallel.
     pub(crate) fn map<T: Send>(&self, value: impl Fn(usize, DVec3) -> T + Sync) -> Vec<T> {
         self.directions.par_iter().enumerate().map(|(index, pixel_direction)| value(index, *pixel_direction)).collect()
     }
 
-    /// A colour known at the corners, at a place of the picture (pixels); beyond the picture that at its edge.
-    pub(crate) fn at(&self, corner_weights: &[[f32; 3]], [x, y]: [f32; 2]) -> [f32; 3] {
+    /// Interpolates colors at corners to a position in the picture (pixels), clamped to its edge.
+    pub(crate) fn at(&self, corners: &[[f32; 3]], [x, y]: [f32; 2]) -> [f32; 3] {
         let ((column, across), (row, down)) = (self.column_at(x), self.row_at(y));
         let index = row * self.size[0] + column;
-        let pixel_direction = |index: usize| lerp_color(corner_weights[index], corner_weights[index + 1], across);
-        lerp_color(pixel_direction(index), pixel_direction(index + self.size[0]), down)
+        let row_color = |index: usize| lerp_color(corners[index], corners[index + 1], across);
+        lerp_color(row_color(index), row_color(index + self.size[0]), down)
     }
 
-    /// The four corners around a place of the picture (pixels), each with its share.
+    /// The four corners around a position in the picture (pixels), with their bilinear weights.
     pub(crate) fn corner_weights(&self, [x, y]: [f32; 2]) -> [(usize, f32); 4] {
         let ((column, across), (row, down)) = (self.column_at(x), self.row_at(y));
         let index = row * self.size[0] + column;
@@ -69,12 +69,12 @@ impl TileGrid {
         ]
     }
 
-    /// The corner above a height in the picture (pixels), and how far it is to the corner below, 0 to 1.
+    /// Row index and fraction of a vertical position (pixels).
     pub(crate) fn row_at(&self, y: f32) -> (usize, f32) {
         self.split(y, 1)
     }
 
-    /// The corner left of a place across the picture (pixels), and how far it is to the corner right of it, 0 to 1.
+    /// Column index and fraction of a horizontal position (pixels).
     pub(crate) fn column_at(&self, x: f32) -> (usize, f32) {
         self.split(x, 0)
     }
@@ -93,7 +93,7 @@ fn pixel_direction(camera: &Camera, pixel: [usize; 2]) -> DVec3 {
     camera.direction(pixel).map_or(DVec3::ZERO, DVec3::normalize_or_zero)
 }
 
-/// Numbers that grow by the same ratio from `first` to at least `last`.
+/// Geometric sequence from `first` to at least `last`.
 pub(crate) fn geometric_sequence(first: f64, last: f64, ratio: f64) -> Vec<f64> {
     let mut terms = vec![first];
     let mut next = first;
@@ -104,7 +104,8 @@ pub(crate) fn geometric_sequence(first: f64, last: f64, ratio: f64) -> Vec<f64> 
     terms
 }
 
-/// The colour `share` of the way from one to another. Not fused: it is needed where vectors are not.
+/// Linear interpolation of colors. Not fused, because it is used in scalar code too, where a fused multiply-add is
+/// slow.
 #[inline(always)]
 pub(crate) fn lerp_color(from: [f32; 3], to: [f32; 3], t: f32) -> [f32; 3] {
     let mut mixed = from;

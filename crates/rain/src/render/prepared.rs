@@ -1,4 +1,4 @@
-//! One frame of rain, ready to draw in strips.
+//! A prepared frame of rain: streaks in chunks, and the medium of single scattering. It draws strips of the picture.
 
 use bansho_base::{
     image::{Figure, Rect},
@@ -29,7 +29,7 @@ use crate::{
 };
 use fearless_simd::{Level, Simd, dispatch};
 
-/// What rain can write beside its light, in the order of a strip's planes.
+/// The AOVs of rain, in the order of a strip's planes.
 pub(crate) const AOVS: &[AovDescriptor] = &[
     AovDescriptor {
         name: "streak_opacity",
@@ -51,7 +51,7 @@ pub(crate) const AOVS: &[AovDescriptor] = &[
     },
 ];
 
-/// Measures a pixel of a streak that hides so much of it; `depth` in m.
+/// Writes the AOVs of one pixel of a streak; `depth` in m.
 fn write_aovs(aovs: &mut [AovPlane], index: usize, opacity: f32, depth: f32, diameter_mm: f32) {
     let [opacities, depths, diameters] = aovs else { return };
     if opacity > 0.0 {
@@ -61,7 +61,7 @@ fn write_aovs(aovs: &mut [AovPlane], index: usize, opacity: f32, depth: f32, dia
     }
 }
 
-/// Light below this share of display white is left out: with a hundred streaks over each other it still is below a 255th.
+/// Culling threshold as a fraction of display white: a hundred overlapping streaks below it stay below one 8-bit code.
 const CULLING_FRACTION: f64 = 1.0 / (255.0 * 128.0);
 
 /// A frame, ready to draw.
@@ -70,7 +70,7 @@ pub(crate) struct PreparedRain<'a> {
     level: Level,
     /// Nearest first.
     chunks: Vec<StreakChunk>,
-    /// No streak is further away, m.
+    /// Greatest distance of a streak, m.
     streaks_end: f64,
     single_scattering: Option<SingleScattering<'a>>,
     figures: Vec<Figure>,
@@ -118,7 +118,7 @@ impl<'a> PreparedRain<'a> {
     }
 }
 
-/// What a frame's parts are made from.
+/// The inputs of a frame.
 struct Frame<'a> {
     rain: &'a Rain,
     exposure: &'a ExposureState,
@@ -130,7 +130,7 @@ struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// What turns drops into streaks.
+    /// The projection of the selected drops.
     fn projection(&self, selection: DropSelection<'a>) -> StreakProjection<'a> {
         StreakProjection {
             level: Level::new(),
@@ -142,7 +142,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// The sky through drops, if it shines.
+    /// The sky through drops; `None` if it is dark.
     fn shining_sky(&self) -> Option<(&'a TileGrid, &'a [[f32; 3]])> {
         self.sky.iter().flatten().any(|value| *value > 0.0).then_some((self.tiles, self.sky))
     }
@@ -157,13 +157,13 @@ impl<'a> Frame<'a> {
         splashes.chunks()
     }
 
-    /// Light that no display would show, cd/m^2.
+    /// Radiance below which the light of a streak is culled, cd/m^2.
     fn culling_radiance(&self) -> f32 {
         let white = self.view.white_luminance.filter(|_| self.rain.parameters.culling);
         white.map_or(0.0, |white| (white * CULLING_FRACTION) as f32)
     }
 
-    /// What the frame is known by.
+    /// Figures of the frame.
     fn figures(&self, streaks: usize, billboards: usize) -> Vec<Figure> {
         let t = self.view.shutter.middle();
         let sizes = DropSizeDistribution::marshall_palmer(self.rain.rate(t));
@@ -207,7 +207,7 @@ impl PreparedRain<'_> {
     fn draw_streaks<S: Simd>(&self, simd: S, tile_row: usize, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
         let rect = strip.rect;
         let mut aovs = std::mem::take(&mut strip.aovs);
-        // Rain alone draws into its strip, and takes all colours alike.
+        // Only rain draws into its strip, and its transmittance is the same for all colors.
         if let Some(mut planes) = strip.gray_planes_mut() {
             let (mut buffer, mut streaks) = (TileBuffer::default(), Vec::new());
             for tile_column in rows.x / TILE_COLUMNS..rows.right().div_ceil(TILE_COLUMNS) {

@@ -1,23 +1,24 @@
-//! What each band of rows has to draw, from left to right.
+//! Tile binning: for each tile of the picture, the streaks that may touch it.
 
 use super::rasterize::{PackedStreak, StreakSegment};
 use crate::shutter_cameras::PixelBounds;
 
-/// Rows of a band.
+/// Rows of a tile: one SIMD vector.
 pub(crate) const TILE_ROWS: usize = 8;
-/// Columns of a patch: its pixels and their depths fit into a core's first cache.
+/// Columns of a tile: its pixels and their depths fit into the L1 cache.
 pub(crate) const TILE_COLUMNS: usize = 128;
 
-/// For each band of rows of a picture, and each stretch of its columns, numbers of the things that touch it, in their order.
+/// For each tile of a picture, the indices of the streaks that may touch it, in drawing order; stored as in a
+/// compressed sparse row matrix.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TileBins {
-    /// Stretches of a band.
+    /// Tiles in a row of tiles.
     tile_columns: usize,
     starts: Vec<u32>,
     members: Vec<u32>,
 }
 
-/// Which bands, and which stretches of them, a thing touches: the first, and one past the last.
+/// The range of tiles that a streak may touch, in rows and columns of tiles: the first, and one past the last.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TileRange {
     tile_rows: [u16; 2],
@@ -25,7 +26,7 @@ pub(crate) struct TileRange {
 }
 
 impl TileRange {
-    /// Those of a thing in a picture of `size` pixels, in stretches of `width` columns.
+    /// The range for a bounding box in a picture of `size` pixels, with tiles of `width` columns.
     #[inline(always)]
     pub(crate) fn new([columns, rows]: PixelBounds, size: [usize; 2], width: usize) -> Self {
         Self {
@@ -34,7 +35,7 @@ impl TileRange {
         }
     }
 
-    /// Visits the stretches, of which a band has so many.
+    /// Visits the indices of all tiles in the range.
     #[inline(always)]
     fn for_each(&self, columns_per_row: usize, mut visit: impl FnMut(usize)) {
         for tile_row in self.tile_rows[0]..self.tile_rows[1] {
@@ -45,10 +46,10 @@ impl TileRange {
     }
 }
 
-/// The parts of `part` pixels each, of `length` pixels, that `[low, high]` touches.
+/// The tiles of `tile_size` pixels each, along `length` pixels, that the interval `[low, high]` touches.
 #[inline(always)]
 fn touched_tiles([low, high]: [f32; 2], length: usize, tile_size: usize) -> [u16; 2] {
-    // Not a number touches nothing.
+    // NaN touches nothing.
     if !(high >= 0.0 && low < length as f32) {
         return [0, 0];
     }
@@ -58,7 +59,7 @@ fn touched_tiles([low, high]: [f32; 2], length: usize, tile_size: usize) -> [u16
 }
 
 impl TileBins {
-    /// Sorts things into the bands of a picture of `size` pixels, in stretches of `width` columns.
+    /// Bins streaks by counting sort into the tiles of a picture of `size` pixels, with tiles of `width` columns.
     pub(crate) fn new(size: [usize; 2], width: usize, ranges: &[TileRange]) -> Self {
         let tile_columns = size[0].div_ceil(width);
         let count = size[1].div_ceil(TILE_ROWS) * tile_columns;
@@ -78,7 +79,7 @@ impl TileBins {
         Self { tile_columns, starts, members }
     }
 
-    /// What touches a stretch of a band; nothing beyond the picture.
+    /// The streaks of a tile; none outside the picture.
     #[inline(always)]
     pub(crate) fn members(&self, tile_row: usize, tile_column: usize) -> &[u32] {
         let tile = tile_row * self.tile_columns + tile_column;
@@ -89,17 +90,17 @@ impl TileBins {
     }
 }
 
-/// Streaks in the order in which they are drawn, each known to the bands and stretches of the picture that it touches.
+/// Streaks in drawing order, binned into the tiles of the picture.
 ///
-/// Parts are made by themselves, so that no thread waits for all streaks to be sorted.
+/// Chunks are binned independently, so that no thread waits for a global sort.
 pub(crate) struct StreakChunk {
     streaks: Vec<PackedStreak>,
     bins: TileBins,
-    /// How many cells have streaks in it.
+    /// Number of cells with streaks in it.
     pub(crate) cell_count: usize,
 }
 
-/// A part that streaks are added to.
+/// A chunk under construction.
 pub(crate) struct StreakChunkBuilder {
     /// Columns and rows of the picture.
     size: [usize; 2],
@@ -109,19 +110,19 @@ pub(crate) struct StreakChunkBuilder {
 }
 
 impl StreakChunkBuilder {
-    /// Nothing yet, of a picture of `size` pixels.
+    /// An empty chunk for a picture of `size` pixels.
     pub(crate) fn new(size: [usize; 2]) -> Self {
         Self { size, streaks: Vec::new(), ranges: Vec::new(), cell_count: 0 }
     }
 
-    /// Adds a streak that may touch so much of the picture.
+    /// Adds a streak with its bounding box.
     #[inline(always)]
     pub(crate) fn add(&mut self, segment: &StreakSegment, extent: PixelBounds) {
         self.ranges.push(TileRange::new(extent, self.size, TILE_COLUMNS));
         self.streaks.push(PackedStreak::new(segment));
     }
 
-    /// Adds a cell's streaks and counts it, if there are any.
+    /// Adds a cell's streaks, and counts the cell if there are any.
     #[inline(always)]
     pub(crate) fn add_cell(&mut self, add: impl FnOnce(&mut Self)) {
         let before = self.streaks.len();
@@ -129,7 +130,7 @@ impl StreakChunkBuilder {
         self.cell_count += usize::from(self.streaks.len() > before);
     }
 
-    /// All of it, sorted.
+    /// Bins the streaks.
     pub(crate) fn build(self) -> StreakChunk {
         StreakChunk {
             bins: TileBins::new(self.size, TILE_COLUMNS, &self.ranges),
@@ -140,14 +141,15 @@ impl StreakChunkBuilder {
 }
 
 impl StreakChunk {
-    /// Its streaks.
+    /// Number of streaks.
     pub(crate) fn count(&self) -> usize {
         self.streaks.len()
     }
 
-    /// Adds its streaks that touch a stretch of a band.
+    /// Appends the streaks of a tile to `streaks`.
     ///
-    /// They stand far apart in memory; copied together they are waited for all at once instead of one by one as they are drawn.
+    /// They are far apart in memory: copying them in one go overlaps the cache misses, which would otherwise occur one
+    /// by one while drawing.
     #[inline(always)]
     pub(crate) fn collect_tile(&self, tile_row: usize, tile_column: usize, streaks: &mut Vec<PackedStreak>) {
         let members = self.bins.members(tile_row, tile_column);

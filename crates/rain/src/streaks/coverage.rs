@@ -1,28 +1,29 @@
-//! What one falling drop hides while the shutter is open.
+//! Opacity of the streak that a falling drop leaves in one exposure.
 //!
-//! The paper's opacity comes from S. Starik and M. Werman, "Simulation of rain in videos" (2002), and K. Garg and S. K. Nayar, "Vision and
-//! rain" (2007): the share of the exposure for which the drop covers a point.
+//! The paper's opacity comes from S. Starik and M. Werman, "Simulation of rain in videos" (2002), and K. Garg and S. K.
+//! Nayar, "Vision and rain" (2007): the fraction of the exposure during which the drop covers a point.
 
 use std::f64::consts::PI;
 
 use bansho_base::math;
 
-/// The path of a round drop while the shutter is open: straight, at constant speed.
+/// The streak of a spherical drop that moves in a straight line at constant speed during the exposure.
 ///
-/// Across it, `b` is the distance from its axis; along it, `s` runs from the drop's middle when the shutter opens (0) to its
-/// middle when it closes (`length`). All in m.
+/// `b` is the distance from its axis; `s` is the position along it, from the drop's center when the shutter opens (0)
+/// to its center when it closes (`length`). All in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Streak {
     /// Radius of the drop r, m.
     pub radius: f64,
-    /// How far it moves, `v T`, m; more than 0.
+    /// Distance that it moves, `v T`, m; more than 0.
     pub length: f64,
 }
 
 impl Streak {
     /// The streak of a drop of diameter D that falls with `speed` (m/s) through an exposure (s).
     pub fn new(diameter_mm: f64, speed: f64, exposure: f64) -> Self {
-        // A drop that does not move covers what it covers for the whole exposure: a path of no length, but for dividing by it.
+        // The least length avoids a division by zero for a drop at rest, which covers the same points for the whole
+        // exposure.
         Self { radius: 0.5e-3 * diameter_mm, length: (speed * exposure).max(1e-12) }
     }
 
@@ -31,36 +32,38 @@ impl Streak {
         math::sqrt((self.radius * self.radius - b * b).max(0.0))
     }
 
-    /// Opacity at a point: the share of the exposure for which the drop covers it. Up to 1, where the drop moves less than its chord.
+    /// Opacity at a point: the fraction of the exposure during which the drop covers it. 1 where the drop moves less
+    /// than its chord.
     pub fn opacity(&self, b: f64, s: f64) -> f64 {
         let chord = self.half_chord(b);
         (s.clamp(-chord, chord) + (self.length - s).clamp(-chord, chord)) / self.length
     }
 
-    /// Opacity at distance `b` from the axis away from the ends: `2 sqrt(r^2 - b^2) / (v T)`, at most 1.
+    /// Opacity at distance `b` from the axis, away from the ends: `2 sqrt(r^2 - b^2) / (v T)`, at most 1.
     pub fn profile(&self, b: f64) -> f64 {
         (2.0 * self.half_chord(b) / self.length).min(1.0)
     }
 
-    /// Mean opacity across a streak, `(pi/4) D / (v T)`, of one that is longer than wide.
+    /// Mean opacity across the streak, `(pi/4) D / (v T)`, if it is longer than wide.
     pub fn mean_opacity(&self) -> f64 {
         0.5 * PI * self.radius / self.length
     }
 
-    /// What it blocks in all: `pi D^2 / 4`, m^2, whatever the shutter.
+    /// Integral of the opacity over the streak: `pi D^2 / 4`, m^2, for any exposure.
     pub fn blocked_area(&self) -> f64 {
         PI * self.radius * self.radius
     }
 
-    /// DropSelection of the blocked area whose distance from the axis is below `b`.
+    /// Fraction of the blocked area at distances from the axis below `b`: a cumulative distribution.
     pub fn area_fraction_across(&self, b: f64) -> f64 {
         let u = (b / self.radius).clamp(-1.0, 1.0);
         0.5 + (math::asin(u) + u * math::sqrt(1.0 - u * u)) / PI
     }
 
-    /// DropSelection of the blocked area that lies before `s` along the path.
+    /// Fraction of the blocked area before `s` along the path: a cumulative distribution.
     pub fn area_fraction_along(&self, s: f64) -> f64 {
-        // Each moment's disc has the share `share_across(s - s_drop)` before s; this is its mean over the path.
+        // The disc at any one time has the fraction `area_fraction_across(s - s_drop)` before s; this is its mean over
+        // the path.
         let fraction = self.radius / self.length
             * (disc_integral(s / self.radius) - disc_integral((s - self.length) / self.radius));
         fraction.clamp(0.0, 1.0)
@@ -71,14 +74,14 @@ impl Streak {
         (self.clamped_until(b, s) + self.clamped_until(b, self.length - s)) / self.length
     }
 
-    /// Whether the drop covers the points at `s` for their whole chord: away from the ends.
+    /// Whether the opacity at `s` equals the profile: away from the ends.
     pub fn is_within(&self, s: f64) -> bool {
         s >= self.radius && self.length - s >= self.radius
     }
 
     /// Integral of `clamp(s, -chord, chord)` from the streak's edge to `b`, m^2.
     fn clamped_until(&self, b: f64, s: f64) -> f64 {
-        // Within +-w the half chord exceeds |s| and the term is s; outside, the half chord itself.
+        // Within +-w the half chord exceeds |s| and the integrand is s; outside it is the half chord.
         let w = self.half_chord(s);
         let b = b.clamp(-self.radius, self.radius);
         let area = 0.5 * self.blocked_area();
@@ -89,7 +92,7 @@ impl Streak {
     }
 }
 
-/// Integral from -1 to `x` of the share of a disc of radius 1 that lies before a line.
+/// Integral from -1 to `x` of the fraction of a unit disc's area before a line.
 fn disc_integral(x: f64) -> f64 {
     if x <= -1.0 {
         return 0.0;

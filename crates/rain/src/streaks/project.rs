@@ -1,4 +1,4 @@
-//! DropBatch and the streaks that they leave.
+//! Projection of drops into streaks: which drops of which cells are visible, and how each is lit.
 
 use bansho_base::{
     math::{
@@ -29,39 +29,39 @@ use rayon::prelude::*;
 
 const COUNT: Purpose = Purpose::named("rain drops of a cell");
 const DROP: Purpose = Purpose::named("rain drop");
-/// Parts that all cells make, and fewest and most cells of each.
+/// Number of chunks of all cells, and bounds on the number of cells in each.
 const CHUNK_COUNT: usize = 64;
 const CELLS_PER_CHUNK: [usize; 2] = [8, 256];
-/// Over which part of the number of drops a drop fades in, so that a rising rate shows no drop at once.
+/// Range of the drop count over which a drop fades in, as a fraction of all drops, so that a rising rate does not pop.
 pub(crate) const FADE_IN: f64 = 0.02;
 
-/// What turns drops into streaks.
+/// Turns drops into lit streaks.
 #[derive(Clone, Copy)]
 pub(crate) struct StreakProjection<'a> {
     pub(crate) level: Level,
     pub(crate) exposure: &'a ExposureState,
     pub(crate) lighting: &'a DropLighting<'a>,
-    /// Its lights.
+    /// The same lights, prepared for SIMD.
     pub(crate) lights: &'a [PreparedLight],
-    /// What the sky shines through drops at the corners of tiles; `None` from a dark one.
+    /// Radiance of drops under the sky at grid corners; `None` for a dark sky.
     pub(crate) sky: Option<(&'a TileGrid, &'a [[f32; 3]])>,
-    /// Which share of a drop is drawn.
+    /// Which drops are drawn, by weight.
     pub(crate) selection: DropSelection<'a>,
 }
 
-/// Which share of a drop is drawn, where some are drawn by themselves and others on billboards.
+/// The weight of drops, where near drops are drawn one by one and others on billboards.
 #[derive(Clone, Copy)]
 pub(crate) enum DropSelection<'a> {
-    /// All of it.
+    /// All drops.
     All,
-    /// That which is drawn by itself.
+    /// The drops that are drawn one by one.
     PerDrop(&'a PerDropRegion),
-    /// That which is on billboards.
+    /// The drops on billboards.
     Billboard(&'a PerDropRegion),
 }
 
 impl DropSelection<'_> {
-    /// For drops at places from the camera.
+    /// Weights of drops at positions relative to the camera.
     #[inline(always)]
     fn of(&self, positions: &Vec3Lanes) -> Lanes {
         let mut weights = [1.0; LANES];
@@ -79,20 +79,20 @@ impl DropSelection<'_> {
     }
 }
 
-/// Sixteen drops of one diameter half way through the exposure.
+/// Sixteen drops of one diameter at the middle of the exposure.
 pub(crate) struct DropBatch {
-    /// ProjectedPoints from the camera, m.
+    /// Positions relative to the camera, m.
     pub(crate) positions: Vec3Lanes,
     /// m/s.
     pub(crate) velocities: Vec3Lanes,
     /// mm.
     pub(crate) diameter_mm: f32,
-    /// How much of each is there, 0 to 1.
+    /// Fade-in weight, 0 to 1; 0 in unused lanes.
     pub(crate) presence: Lanes,
 }
 
 impl StreakProjection<'_> {
-    /// The streaks of all cells that may show within some balls, drop by drop.
+    /// The streaks of all cells that may be visible within some spheres, drop by drop.
     pub(crate) fn drop_chunks(&self, within: &[Sphere]) -> Vec<StreakChunk> {
         self.cell_chunks(
             within,
@@ -101,8 +101,8 @@ impl StreakProjection<'_> {
         )
     }
 
-    /// The streaks of all cells that may show within some balls, those of the nearest cells first; `add` adds those of a cell, up to
-    /// `aside` (m) level from its middle.
+    /// The streaks of all cells that may be visible within some spheres, nearest cells first. `add` adds those of one
+    /// cell, up to `half_width` (m) horizontally from its center.
     pub(crate) fn cell_chunks(
         &self,
         within: &[Sphere],
@@ -132,7 +132,7 @@ impl StreakProjection<'_> {
         cells.par_chunks((cells.len() / CHUNK_COUNT).clamp(fewest, most)).map(fill).collect()
     }
 
-    /// The cells of a class, each once.
+    /// The cells of a class, without duplicates.
     fn cells(&self, class: &DropClassState, within: &[Sphere], half_width: f64) -> Vec<(f64, Cell)> {
         let mut cells: Vec<_> =
             within.iter().flat_map(|ball| self.exposure.visible_cells(class, *ball, half_width)).collect();
@@ -163,7 +163,7 @@ impl StreakProjection<'_> {
         }
     }
 
-    /// Adds the streaks of drops as far as they show. Those that are nowhere more opaque than `least_peak` are not lit by lamps and fires.
+    /// Adds the streaks of visible drops. Those with a peak opacity below `least_peak` are not lit by lamps and fires.
     #[inline(always)]
     pub(crate) fn add_drops(&self, drops: &DropBatch, least_peak: f32, builder: &mut StreakChunkBuilder) {
         let exposure = self.exposure;
@@ -201,7 +201,7 @@ impl StreakProjection<'_> {
         self.add_streaks(&streaks, &drops.positions, &paths.diameter_mm, least_peak, builder);
     }
 
-    /// Adds the streaks that are seen of drops at some places, lit.
+    /// Lights and adds the visible streaks of drops at some positions.
     #[inline(always)]
     pub(crate) fn add_streaks(
         &self,
@@ -235,22 +235,23 @@ impl StreakProjection<'_> {
     }
 }
 
-/// One of sixteen vectors.
+/// The vector of one lane.
 fn vector(vectors: &Vec3Lanes, i: usize) -> DVec3 {
     DVec3::new(vectors[0][i].into(), vectors[1][i].into(), vectors[2][i].into())
 }
 
-/// Distance from the camera at which billboards begin, m: a cubic metre that is nearer cannot be seen as flat.
+/// Radius around the camera within which drops are drawn one by one, m: at this distance a cubic meter cannot be
+/// treated as flat.
 pub(super) const CAMERA_RADIUS: f64 = 1.0;
-/// Distance from a lamp at which they begin, m: a cubic metre that is nearer is lit too unevenly.
+/// The same around a lamp, m: a cubic meter is lit too unevenly there.
 pub(super) const LAMP_RADIUS: f64 = 1.3;
-/// Over how much further they take over, m.
+/// Width of the transition to billboards, m.
 const FADE_WIDTH: f64 = 0.2;
 
-/// The air around the camera and around lamps in the region.
+/// The region around the camera and around lamps in which drops are drawn one by one, beside billboards.
 pub(crate) struct PerDropRegion {
     spheres: Vec<Sphere>,
-    /// Their middles from the camera, and their radii, m.
+    /// Centers relative to the camera and radii of the spheres, m.
     from_camera: Vec<([f32; 3], f32)>,
 }
 
@@ -270,12 +271,12 @@ impl PerDropRegion {
         Self { from_camera: spheres.iter().map(from_camera).collect(), spheres }
     }
 
-    /// Outside of these no drop is drawn by itself.
+    /// No drop outside of these is drawn one by one.
     pub(crate) fn spheres(&self) -> &[Sphere] {
         &self.spheres
     }
 
-    /// How much of drops at places from the camera is drawn by itself, 0 to 1.
+    /// Weights of drops at positions relative to the camera, 0 to 1.
     #[inline(always)]
     pub(super) fn weights(&self, [xs, ys, zs]: &Vec3Lanes) -> Lanes {
         let mut weights = ZERO_LANES;

@@ -1,6 +1,6 @@
-//! Sixteen drops at a time on their way through the world, and the streaks that they leave in the picture.
+//! Motion of sixteen drops at a time during the exposure, and its projection into the picture.
 //!
-//! ProjectedPoints are counted from where the camera is half way through the exposure, so that single precision holds them.
+//! Positions are relative to the camera at the middle of the exposure, which keeps single precision sufficient.
 
 use bansho_base::{camera::Lens, math::simd::LANES};
 
@@ -10,20 +10,20 @@ use crate::{
     shutter_cameras::{PUPIL_RADIUS, PixelBounds, ShutterCameras},
 };
 
-/// Ways of drops while the shutter is open.
+/// Paths of drops while the shutter is open.
 pub(crate) struct DropPaths {
-    /// Where they are when the shutter opens, m.
+    /// Positions when the shutter opens, m.
     pub(crate) from: Vec3Lanes,
-    /// Where they are when it closes, m.
+    /// Positions when it closes, m.
     pub(crate) to: Vec3Lanes,
     /// mm.
     pub(crate) diameter_mm: Lanes,
-    /// Opacity beside what optics gives; a drop without any leaves no streak.
+    /// Opacity gain; 0 for no streak.
     pub(crate) gain: Lanes,
 }
 
 impl DropPaths {
-    /// Leaves the parts of the ways above the ground: drops are on them for a share of the exposure.
+    /// Clips the paths at the ground and scales the gain by the fraction of the exposure that remains.
     #[inline(always)]
     pub(crate) fn clip_at_ground(&mut self, ground: f32) {
         for i in 0..LANES {
@@ -37,11 +37,11 @@ impl DropPaths {
         }
     }
 
-    /// What the picture shows of them, still without light.
+    /// The streaks in the picture, without light.
     #[inline(always)]
     pub(crate) fn streaks(&self, cameras: &ShutterCameras) -> StreakBatch {
         let [open, center, close] = &cameras.projectors;
-        // The shutter's end comes early for a drop that ends on the way; cameras hardly move in between.
+        // A clipped path ends before the shutter closes; the camera's motion within that time is neglected.
         let (from, to) = (open.project(&self.from), close.project(&self.to));
         let perspective = center.lens() == Lens::Perspective;
         let mut streaks = StreakBatch::NONE;
@@ -52,7 +52,7 @@ impl DropPaths {
             let path_sum = [0, 1, 2].map(|axis| self.from[axis][i] + self.to[axis][i]);
             let distance =
                 0.5 * (path_sum[0] * path_sum[0] + path_sum[1] * path_sum[1] + path_sum[2] * path_sum[2]).sqrt();
-            // A flat picture stretches toward its corners, so that a ball covers more of it.
+            // Perspective stretches spheres away from the optical axis into ellipses of a larger area.
             let stretch = if perspective { fast_min(10.0, fast_max(1.0, distance / depth)) } else { 1.0 };
             let ends = [[from.x[i], from.y[i]], [to.x[i], to.y[i]]];
             let blocked_area = std::f32::consts::PI * radius * radius * stretch * self.gain[i];
@@ -67,16 +67,16 @@ impl DropPaths {
     }
 }
 
-/// By how much a lens that is focused on a metre or beyond spreads what is nearer, m at its place: the drop hides as much of the
-/// picture, but more thinly.
+/// Radius of the defocus blur of a lens focused at one meter for nearer drops, m at their depth. The blocked area is
+/// unchanged, the opacity lower.
 #[inline(always)]
 fn defocus_radius(depth: f32) -> f32 {
-    /// m.
+    /// Focus distance, m.
     const FOCUS: f32 = 1.0;
     PUPIL_RADIUS * fast_max(0.0, 1.0 - depth * (1.0 / FOCUS))
 }
 
-/// StreakBatch of sixteen drops, part by part.
+/// Streaks of sixteen drops, as a structure of arrays.
 pub(crate) struct StreakBatch {
     center: [Lanes; 2],
     steep: [u32; LANES],
@@ -85,11 +85,11 @@ pub(crate) struct StreakBatch {
     half_width: Lanes,
     line_coverage: Lanes,
     depth: Lanes,
-    /// Their extents: left, right, top and bottom.
+    /// Bounding boxes: left, right, top and bottom.
     bounds: [Lanes; 4],
-    /// Greatest opacity of any pixel.
+    /// Maximum opacity.
     pub(crate) peak: Lanes,
-    /// 1 for those that the picture shows, 0 for others.
+    /// 1 for visible streaks, 0 for others.
     pub(crate) visible: [u32; LANES],
 }
 
@@ -117,12 +117,12 @@ impl StreakBatch {
         let [[left, right], [top, bottom]] = segment.extent();
         (self.bounds[0][i], self.bounds[1][i], self.bounds[2][i], self.bounds[3][i]) = (left, right, top, bottom);
         let [columns, rows] = window;
-        // No place in the picture is not a number, and meets nothing.
+        // Positions outside the picture are NaN, and every comparison with NaN is false.
         let meets = (right > columns[0]) & (left < columns[1]) & (bottom > rows[0]) & (top < rows[1]);
         self.visible[i] = u32::from(meets & (gain > 0.0));
     }
 
-    /// Whether any is seen.
+    /// Whether any is visible.
     #[inline(always)]
     pub(crate) fn any(&self) -> bool {
         let mut any = 0;
@@ -132,13 +132,13 @@ impl StreakBatch {
         any != 0
     }
 
-    /// Half way along one, pixels.
+    /// Center of one, pixels.
     #[inline(always)]
     pub(crate) fn center(&self, i: usize) -> [f32; 2] {
         [self.center[0][i], self.center[1][i]]
     }
 
-    /// Where one may touch the picture.
+    /// Bounding box of one.
     #[inline(always)]
     pub(crate) fn extent(&self, i: usize) -> PixelBounds {
         [[self.bounds[0][i], self.bounds[1][i]], [self.bounds[2][i], self.bounds[3][i]]]

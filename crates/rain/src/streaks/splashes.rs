@@ -1,7 +1,7 @@
-//! DropBatch that hit the ground: each throws up a ring of droplets for a moment.
+//! Splashes: drops that hit the ground throw up a crown of droplets.
 //!
-//! In closed form like the drops themselves: the ground is divided into squares and time into turns, and each square has in each turn
-//! its own impacts with their times and places.
+//! In closed form, like the drops: the ground is divided into squares and time into periods. Each square has random
+//! impacts of its own in each period.
 
 use std::f64::consts::TAU;
 
@@ -23,25 +23,25 @@ use crate::{drops::exposure::DropClassState, lanes::ZERO_LANES, parameters::Spla
 use fearless_simd::dispatch;
 use rayon::prelude::*;
 
-/// Side of a square of ground, m.
+/// Side of a ground square, m.
 const SQUARE_SIZE: f64 = 0.5;
-/// Squares whose droplets make a part.
+/// Squares whose droplets make a chunk.
 const SQUARES_PER_CHUNK: usize = 32;
-/// Length of a turn, s; no splash lasts longer.
+/// Length of a period, s, and the maximum age of a splash.
 const SPLASH_PERIOD: f64 = 0.25;
-/// Droplets of a splash: a ring, and some that fly higher.
+/// Droplets of a splash: those of the crown, and some with a higher trajectory.
 const RING_DROPLETS: usize = 6;
 const HIGH_DROPLETS: usize = 2;
-/// Smallest drop that splashes visibly, mm.
+/// Smallest drop with a visible splash, mm.
 const MIN_DIAMETER_MM: f64 = 1.3;
-/// Beyond this distance only some splashes are drawn, each so much stronger, m.
+/// Beyond this distance, m, splashes are thinned out, and the rest made more opaque in proportion.
 const FULL_DENSITY_DISTANCE: f64 = 3.0;
 
 const COUNT: Purpose = Purpose::named("rain splashes of a square");
 const IMPACT: Purpose = Purpose::named("rain splash");
 const DROPLET: Purpose = Purpose::named("rain splash droplet");
 
-/// What splashes are made from.
+/// Makes the streaks of splashes.
 #[derive(Clone, Copy)]
 pub(crate) struct Splashes<'a> {
     pub(crate) projection: StreakProjection<'a>,
@@ -52,22 +52,22 @@ pub(crate) struct Splashes<'a> {
     pub(crate) loop_s: Option<f64>,
 }
 
-/// One drop's impact.
+/// The impact of one drop.
 struct Impact {
     position: DVec3,
-    /// How long ago it was, s.
+    /// Age, s.
     age: f64,
     /// Diameter of the drop, mm.
     diameter_mm: f64,
-    /// Its number within its square and turn.
+    /// Random key of its square.
     id: u64,
     step: u32,
-    /// Opacity beside the droplets' own.
+    /// Opacity gain.
     strength: f64,
 }
 
 impl Splashes<'_> {
-    /// The streaks of all droplets that may show.
+    /// The streaks of all droplets that may be visible.
     pub(crate) fn chunks(&self) -> Vec<StreakChunk> {
         let (exposure, reach) = (self.projection.exposure, self.parameters.distance);
         let eye = exposure.cameras.middle().position;
@@ -99,14 +99,15 @@ impl Splashes<'_> {
         squares.par_chunks(SQUARES_PER_CHUNK).map(part).collect()
     }
 
-    /// Turns until now, as a number and a part; in a loop a whole number of turns fits.
+    /// Index of the current period, the elapsed fraction of it, and its length, s. A loop holds a whole number of
+    /// periods.
     fn period(&self) -> (i64, f64, f64) {
         let length = self.loop_s.map_or(SPLASH_PERIOD, |seconds| seconds / (seconds / SPLASH_PERIOD).floor().max(1.0));
         let turns = self.time / length;
         (turns.floor() as i64, turns - turns.floor(), length)
     }
 
-    /// Adds the droplets over one square of ground.
+    /// Adds the droplets above one ground square.
     fn square(&self, [x, z]: [i64; 2], middle: DVec3, builder: &mut StreakChunkBuilder) {
         let (period, part, length) = self.period();
         let key = self.projection.exposure.key;
@@ -155,7 +156,7 @@ impl Splashes<'_> {
             let words = exposure.key.words(impact.id, impact.step, Purpose(DROPLET.0 ^ (droplet as u32) << 24));
             self.droplet(impact, droplet, words.map(|word| f64::from(uniform(word))), &mut paths);
         }
-        // Light is even over so small a place.
+        // One position for all droplets of a splash: the light hardly varies within it.
         let position = (impact.position + DVec3::Y * 0.01 - exposure.cameras.middle().position).as_vec3().to_array();
         let positions = position.map(|coordinate| [coordinate; LANES]);
         dispatch!(level, _simd => {
@@ -164,7 +165,7 @@ impl Splashes<'_> {
         });
     }
 
-    /// Notes one droplet's way, if it has not fallen back.
+    /// Sets the path of one droplet, if it is in the air during the exposure: a ballistic trajectory.
     fn droplet(&self, impact: &Impact, index: usize, random: [f64; 4], paths: &mut DropPaths) {
         let cameras = &self.projection.exposure.cameras;
         let high = index >= RING_DROPLETS;

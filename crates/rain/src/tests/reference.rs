@@ -1,6 +1,6 @@
-//! The reference figures, for tests.
+//! Reference tables for tests.
 
-/// Rows of a table of comma-separated figures, without its first line; texts become NaN.
+/// Rows of a CSV table without its header; text becomes NaN.
 pub(crate) fn rows<const N: usize>(table: &str) -> Vec<[f64; N]> {
     table.lines().skip(1).map(|line| fields(line).map(|field| field.parse().unwrap_or(f64::NAN))).collect()
 }
@@ -11,7 +11,7 @@ pub(crate) fn fields<const N: usize>(line: &str) -> [&str; N] {
     std::array::from_fn(|_| fields.next().expect("a field for every column"))
 }
 
-/// Whether `value` is within `share` of `expected`.
+/// Whether the relative error of `value` is at most `share`.
 pub(crate) fn near(value: f64, expected: f64, share: f64) -> bool {
     (value - expected).abs() <= share * expected.abs()
 }

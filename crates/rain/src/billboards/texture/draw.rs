@@ -1,14 +1,14 @@
-//! One streak into a texture, exactly antialiased: each pixel gets the share of it that the drop hides.
+//! Draws one streak into a texture with exact area coverage.
 
 use bansho_base::image::Image;
 
 use crate::streaks::coverage::Streak;
 
-/// Lines within a row of pixels at a streak's ends, where its width changes along it.
+/// Quadrature lines within a row of pixels at a streak's ends, where its width varies.
 const SAMPLE_LINES: usize = 4;
 
-/// Draws a streak over what is there, around the edges. The drop's middle is at `start` when the shutter opens, m from the left and
-/// upper edge, and falls; a pixel is `pixel` wide and high, m. Of the drop there is the `share`, 0 to 1.
+/// Draws a streak over an image, with wrap-around. The drop's center is at `start` when the shutter opens, m from the
+/// left and upper edges, and falls. A pixel is `pixel` wide and high, m. `weight` (0 to 1) scales the opacity.
 pub(crate) fn draw_streak(
     streak: &Streak,
     [axis, start]: [f64; 2],
@@ -33,7 +33,7 @@ pub(crate) fn draw_streak(
     }
 }
 
-/// Lays a share of opacities over a row, around its end.
+/// Composites opacities over a row, with wrap-around.
 fn blend(row: &mut [[f32; 1]], first_column: i64, weight: f64, opacities: &[f64]) {
     let width = row.len();
     let mut x = first_column.rem_euclid(width as i64) as usize;
@@ -44,10 +44,10 @@ fn blend(row: &mut [[f32; 1]], first_column: i64, weight: f64, opacities: &[f64]
     }
 }
 
-/// The pixels that a streak covers in every row.
+/// The columns of pixels that a streak covers.
 struct PixelColumns<'a> {
     streak: &'a Streak,
-    /// Left edge of the first pixel, from the axis, m.
+    /// Left edge of the first pixel relative to the axis, m.
     left: f64,
     pixel: [f64; 2],
     columns: usize,
@@ -70,8 +70,8 @@ impl PixelColumns<'_> {
         }
     }
 
-    /// Mean opacity of each pixel of a row that begins at `from` and holds an end of the streak: the form by some lines,
-    /// the sum exactly.
+    /// Mean opacity of each pixel of a row that begins at `from` and contains an end of the streak. The distribution
+    /// comes from quadrature, the sum is exact.
     fn end_row<'b>(&self, from: f64, opacities: &'b mut [f64]) -> &'b [f64] {
         let (streak, [width, height]) = (self.streak, self.pixel);
         let (top, bottom) = (from.max(-streak.radius), (from + height).min(streak.length + streak.radius));
@@ -82,7 +82,7 @@ impl PixelColumns<'_> {
             streak.blocked_area() * (streak.area_fraction_along(from + height) - streak.area_fraction_along(from));
         let found: f64 = opacities.iter().sum();
         let scale = if found > 0.0 { area / (found * width * height) } else { 0.0 };
-        // Rounding near a resolved drop's rim may exceed what a pixel can hide.
+        // Near the rim of a resolved drop, rounding may exceed the range of an opacity.
         opacities.iter_mut().for_each(|opacity| *opacity = (*opacity * scale).clamp(0.0, 1.0));
         opacities
     }

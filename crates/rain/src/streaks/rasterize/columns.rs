@@ -1,4 +1,4 @@
-//! Laying a streak into a patch: eight rows of a column at a time.
+//! Rasterization of a streak into a tile, one column of eight rows at a time.
 
 use bansho_base::math::MulAdd;
 
@@ -11,8 +11,9 @@ use crate::{
     streaks::bin::{TILE_COLUMNS, TILE_ROWS},
 };
 
-/// DropSelection of a disc's area that lies left of `t`, with the disc from -1 to 1: the integral of `2 sqrt(1 - t^2) / pi`, eq. of the streak's
-/// profile, as its series with the last term set so that it ends at 1; at most 0.002 off.
+/// Cumulative distribution of a disc's area: the fraction left of `t`, for a disc from -1 to 1. The integral of `2
+/// sqrt(1 - t^2) / pi`, which is the streak's profile. A series whose last term is chosen so that it ends at 1; the
+/// error is at most 0.002.
 #[inline(always)]
 fn disc_cdf(t: f32) -> f32 {
     let t = fast_min(1.0, fast_max(-1.0, t));
@@ -21,25 +22,26 @@ fn disc_cdf(t: f32) -> f32 {
     odd.fma(std::f32::consts::FRAC_2_PI, 0.5)
 }
 
-/// 0, 1 and so on, of each row.
+/// Upper edges of the rows of a tile.
 const ROW_OFFSETS: TileRows = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
-/// Those of the next rows.
+/// Lower edges of the rows of a tile.
 const NEXT_ROW_OFFSETS: TileRows = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
 
-/// The opacities of a streak in eight rows, column after column.
+/// The opacities of a streak in successive columns of eight rows.
 trait ColumnCoverage {
-    /// Those of the pixels right of `x`, pixels from the streak's middle.
+    /// Opacities of the column whose left edge is at `x`, pixels from the streak's center.
     fn next_column(&mut self, x: f32) -> TileRows;
 }
 
 impl StreakSegment {
-    /// Lays it behind what a patch holds; `measure` is told column and row in the patch and opacity of each pixel.
+    /// Composites it under the contents of a tile; `measure` gets column and row within the tile and the opacity of
+    /// each pixel.
     #[inline(always)]
     pub(crate) fn draw(&self, buffer: &mut TileBuffer, measure: &mut impl FnMut([usize; 2], f32)) {
-        // All places are counted from the streak's middle.
+        // All coordinates are relative to the streak's center.
         let [left, top] = [0, 1].map(|axis| buffer.origin()[axis] as i32 as f32 - self.center[axis]);
         let touched_columns = self.touched_columns(left, top);
-        // Nothing of it lies left of its first column, unless the patch begins there.
+        // Nothing of it lies left of its first column, unless the tile begins there.
         let clip_left = if touched_columns.start > 0 { None } else { Some(left) };
         match (self.is_wide(), self.steep) {
             (false, true) => {
@@ -65,7 +67,7 @@ impl StreakSegment {
         }
     }
 
-    /// ColumnCoverage of a patch that it may touch.
+    /// Columns of a tile that it may touch.
     #[inline(always)]
     fn touched_columns(&self, left: f32, top: f32) -> std::ops::Range<usize> {
         let (reach, bottom) = (self.reach(), top + TILE_ROWS as f32);
@@ -74,7 +76,7 @@ impl StreakSegment {
             let ends = [fast_max(-reach, top), fast_min(reach, bottom)].map(|along| self.slope * along);
             [fast_min(ends[0], ends[1]) - self.half_width, fast_max(ends[0], ends[1]) + self.half_width]
         } else {
-            /// Below this lean the rows end no streak.
+            /// Below this slope the rows do not bound the columns.
             const MIN_SLOPE: f32 = 1e-3;
             let within = [top - self.half_width, bottom + self.half_width].map(|row| row / self.slope);
             let [from, to] = [fast_min(within[0], within[1]) - 1.0, fast_max(within[0], within[1]) + 1.0];
@@ -105,7 +107,8 @@ impl StreakSegment {
         }
     }
 
-    /// What a line of pixels across it between two places along takes of a thin one: its sum, and where it crosses that line.
+    /// For a thin streak, coverage of a line of pixels across it between two positions along it, and the position of
+    /// its axis there.
     #[inline(always)]
     fn line_crossing(&self, from: f32, to: f32) -> (f32, f32) {
         let (from, to) = (fast_max(-self.half_length, from), fast_min(self.half_length, to));
@@ -113,14 +116,14 @@ impl StreakSegment {
     }
 }
 
-/// A thin streak that runs down.
+/// A thin streak that is steeper than 45 degrees.
 struct SteepStreak {
     coverage: TileRows,
-    /// Where it crosses each row.
+    /// Position of its axis in each row.
     center: TileRows,
-    /// One over half its width.
+    /// Reciprocal of its half width.
     scale: f32,
-    /// DropSelection of each row's amount that lies left of the next column.
+    /// Cumulative distribution at the left edge of the next column, for each row.
     cdf_left: TileRows,
 }
 
@@ -159,7 +162,7 @@ impl ColumnCoverage for SteepStreak {
     }
 }
 
-/// A thin streak that runs across.
+/// A thin streak that is shallower than 45 degrees.
 struct ShallowStreak<'a> {
     segment: &'a StreakSegment,
     top: f32,
@@ -179,15 +182,15 @@ impl ColumnCoverage for ShallowStreak<'_> {
     }
 }
 
-/// A wide streak, along rows or columns as its axis runs.
+/// A wide streak, steep or shallow.
 struct WideStreak<'a, const STEEP: bool> {
     segment: &'a StreakSegment,
     top: f32,
 }
 
 impl<const STEEP: bool> ColumnCoverage for WideStreak<'_, STEEP> {
-    /// So far aside of the axis, the disc covers a place while its chord passes: for the overlap of chord and way. What it hides
-    /// there in all is the profile's share of that line.
+    /// At an offset from the axis, the disc covers a point while its chord passes over it: for the overlap of chord and
+    /// path. The total over the line is the profile's fraction of the blocked area.
     #[inline(always)]
     fn next_column(&mut self, x: f32) -> TileRows {
         let StreakSegment { half_length, slope, half_width, line_coverage, .. } = *self.segment;
@@ -198,7 +201,7 @@ impl<const STEEP: bool> ColumnCoverage for WideStreak<'_, STEEP> {
             let (along, offset) = if STEEP { (y, x) } else { (x, y) };
             let offset = offset - slope * (along + 0.5);
             let share = disc_cdf((offset + 1.0) * scale) - disc_cdf(offset * scale);
-            // In coordinates that lean as the streak does a disc is an ellipse, and its chords have their middles off the axis.
+            // Sheared by the slope, a disc becomes an ellipse, whose chords have their centers off the axis.
             let center = -slope * (offset + 0.5) / (slope * slope + 1.0);
             let chord = fast_max(MIN_HALF_CHORD, self.segment.chord(offset + 0.5));
             let covered =
@@ -209,10 +212,11 @@ impl<const STEEP: bool> ColumnCoverage for WideStreak<'_, STEEP> {
     }
 }
 
-/// Half the least chord that is told apart from none, pixels.
+/// Least half chord, pixels: avoids a division by zero.
 const MIN_HALF_CHORD: f32 = 0.1;
 
-/// DropSelection of all that a chord covers on its way that lies before `along`: of the overlap of `+-chord` about `along` with the way `+-half`.
+/// Cumulative distribution of a chord's coverage along its path: of the overlap of `+-chord` about `along` with the
+/// path `+-half`.
 #[inline(always)]
 fn covered(along: f32, half_length: f32, chord: f32) -> f32 {
     let reach = half_length + chord;
@@ -221,7 +225,7 @@ fn covered(along: f32, half_length: f32, chord: f32) -> f32 {
         / (4.0 * half_length * chord)
 }
 
-/// Integral of `clamp(s, -chord, chord)` up to `s`, from 0.
+/// Integral of `clamp(s, -chord, chord)` from 0 to `s`.
 #[inline(always)]
 fn clamp_integral(s: f32, chord: f32) -> f32 {
     let size = s.abs();
@@ -229,7 +233,7 @@ fn clamp_integral(s: f32, chord: f32) -> f32 {
     least * (size - 0.5 * least)
 }
 
-/// What is an opacity whatever rounding did.
+/// Clamps rounding errors.
 #[inline(always)]
 fn clamp_opacity(value: f32) -> f32 {
     fast_min(1.0, fast_max(0.0, value))

@@ -1,4 +1,4 @@
-//! One drop's way while the shutter is open, as the picture shows it.
+//! Rasterization of streaks with exact coverage.
 
 mod columns;
 mod packed;
@@ -9,49 +9,51 @@ use tile::Shading;
 
 pub(crate) use packed::PackedStreak;
 
-/// A streak in the picture: what a drop hides and the light it sends.
+/// A streak in the picture: its coverage and the light of its drop.
 ///
-/// What it hides of each pixel is a difference of distribution functions, along it and across, so that all pixels add up to what the drop
-/// hides however thin or short the streak is. A thin one has the same profile from end to end; a wide one is what its disc covers on its
-/// way, with round ends that are as soft as the disc is wide.
+/// The coverage of a pixel is a difference of cumulative distributions, along the streak and across it, so that the sum
+/// over all pixels is the blocked area however thin or short the streak is. A thin streak has the same profile from end
+/// to end. A wide one is the area swept by its disc, with round ends as soft as its width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct StreakSegment {
-    /// Half way along it, pixels.
+    /// Center, pixels.
     pub(super) center: [f32; 2],
-    /// Whether it runs down the picture rather than across: its axis is then 1, else 0.
+    /// Whether it is steeper than 45 degrees: its major axis is then the picture's y axis, else x.
     pub(super) steep: bool,
-    /// Half its length along that axis, pixels: of a thin one as a line that spreads as much, of a wide one that of its disc's way.
+    /// Half its length along the major axis, pixels. For a thin streak, that of a line with the same variance; for a
+    /// wide one, that of its disc's path.
     pub(super) half_length: f32,
-    /// How far it leans to the other axis for each pixel along.
+    /// Change along the minor axis for each pixel along the major axis.
     pub(super) slope: f32,
-    /// Half width across at each pixel along, as a disc that spreads as much: the drop's, and its lean within a pixel.
+    /// Half width along the minor axis, pixels, as of a disc with the same variance: the drop's own, and the slope
+    /// within one pixel.
     pub(super) half_width: f32,
-    /// What it hides of each line of pixels across it, square pixels.
+    /// Blocked area for each line of pixels across it, square pixels.
     pub(super) line_coverage: f32,
     /// Diameter of the drop, mm.
     pub(crate) diameter_mm: f32,
-    /// What it shows.
+    /// Radiance and depth.
     pub(crate) shading: Shading,
 }
 
-/// A drop's way through the picture.
+/// A drop's path in the picture.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScreenPath {
-    /// Where the drop's middle was when the shutter opened and when it closed, pixels.
+    /// Its center when the shutter opens and when it closes, pixels.
     pub(crate) ends: [[f32; 2]; 2],
     /// Radius of the drop, pixels.
     pub(crate) radius: f32,
-    /// What it hides of the picture, summed over all pixels and averaged over the exposure, square pixels: `pi r^2` and whatever gain.
+    /// Blocked area, averaged over the exposure and summed over all pixels, square pixels: `pi r^2` times a gain.
     pub(crate) blocked_area: f32,
 }
 
-/// Half width from which on a streak is wide, pixels: the ends of others are as sharp as a pixel.
+/// Half width from which on a streak is treated as wide, pixels. The ends of thin ones are sharp.
 const MIN_WIDE_HALF_WIDTH: f32 = 1.25;
-/// Half the least way of a wide one, pixels.
+/// Least half length of a wide one, pixels.
 const MIN_HALF_LENGTH: f32 = 0.1;
 
 impl StreakSegment {
-    /// The streak of a drop, still without light.
+    /// The streak of a drop, without light.
     #[inline(always)]
     pub(crate) fn new(
         ScreenPath { ends: [from, to], radius, blocked_area }: ScreenPath,
@@ -62,7 +64,8 @@ impl StreakSegment {
         let steep = travel[1].abs() >= travel[0].abs();
         let (length, offset) = if steep { (travel[1], travel[0]) } else { (travel[0], travel[1]) };
         let slope = packed::quantize_slope(if length == 0.0 { 0.0 } else { offset / length });
-        // A disc that moves: variances add, that of a disc is r^2/4, that of a way L^2/12. Not fused: this is needed where vectors are not.
+        // Variances of a moving disc add: r^2/4 of the disc, L^2/12 of the path. Not fused, because this runs in scalar
+        // code too.
         let square = radius * radius;
         let half_width =
             packed::round_to_bf16((square * (slope * slope + 1.0) + slope * slope * (1.0 / 3.0)).sqrt().max(1e-4));
@@ -83,7 +86,8 @@ impl StreakSegment {
         }
     }
 
-    /// Greatest opacity of any of its pixels: that of its axis, or all that a line hides where it is narrower than a pixel.
+    /// Maximum opacity of its pixels: that on its axis, or the whole coverage of a line where it is narrower than a
+    /// pixel.
     #[inline(always)]
     pub(crate) fn peak(&self) -> f32 {
         let shortening = if self.is_wide() { (self.half_length / self.chord(0.0)).min(1.0) } else { 1.0 };
@@ -95,14 +99,14 @@ impl StreakSegment {
         self.half_width >= MIN_WIDE_HALF_WIDTH
     }
 
-    /// Half the chord of its disc along its axis, so far aside of it, pixels.
+    /// Half the chord of its disc along the major axis, at an offset from the axis, pixels.
     #[inline(always)]
     fn chord(&self, offset: f32) -> f32 {
         let square = self.half_width * self.half_width - offset * offset;
         (if square > 0.0 { square.sqrt() } else { 0.0 }) / (self.slope * self.slope + 1.0)
     }
 
-    /// How far it reaches along its axis from its middle, pixels.
+    /// How far it extends along its major axis from the center, pixels.
     #[inline(always)]
     fn reach(&self) -> f32 {
         if self.is_wide() {
@@ -112,7 +116,7 @@ impl StreakSegment {
         }
     }
 
-    /// Where it may touch the picture.
+    /// Its bounding box.
     #[inline(always)]
     pub(crate) fn extent(&self) -> PixelBounds {
         let along = self.reach();

@@ -1,11 +1,11 @@
-//! A streak as it is kept: rain in sight may be millions of them.
+//! Packed streaks: a frame may have millions of them.
 
 use bansho_base::math::approximations;
 
 use super::{StreakSegment, tile::Shading};
 
-/// A [`StreakSegment`] in half a line of a core's cache. What it gives back is what it was given, but for the light, which is kept to
-/// 0.4 %, and the diameter, to half a micrometre.
+/// A [`StreakSegment`] in 32 bytes, half a cache line. Packing is lossless but for the light (0.4 %) and the diameter
+/// (half a micrometer), since a segment's slope and width are quantized when it is made.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
 pub(crate) struct PackedStreak {
@@ -14,10 +14,10 @@ pub(crate) struct PackedStreak {
     line_coverage: f32,
     depth: f32,
     slope: i16,
-    /// The upper halves of floats.
+    /// bfloat16.
     half_width: u16,
     light: [u16; 3],
-    /// Diameter of the drop in micrometres; the highest bit is that of an upright streak.
+    /// Diameter of the drop in micrometers; the highest bit is set for a steep streak.
     diameter_and_steep: u16,
 }
 
@@ -25,31 +25,31 @@ const SLOPE_SCALE: f32 = 32_767.0;
 const STEEP_BIT: u16 = 1 << 15;
 const UM_PER_MM: f32 = 1000.0;
 
-/// The upper half of a number, rounded.
+/// Rounds to bfloat16: the upper half of an `f32`.
 #[inline(always)]
 fn bits(value: f32) -> u16 {
     ((value.to_bits() + (1 << 15)) >> 16) as u16
 }
 
-/// The number of an upper half.
+/// Expands a bfloat16.
 #[inline(always)]
 fn bf16_to_f32(bits: u16) -> f32 {
     f32::from_bits(u32::from(bits) << 16)
 }
 
-/// The nearest number that a record keeps as half a width.
+/// The nearest bfloat16, as kept for half widths.
 #[inline(always)]
 pub(super) fn round_to_bf16(value: f32) -> f32 {
     bf16_to_f32(bits(value))
 }
 
-/// The nearest number that a record keeps as a lean of up to 1.
+/// The nearest slope that is kept, for slopes of -1 to 1.
 #[inline(always)]
 pub(super) fn quantize_slope(value: f32) -> f32 {
     approximations::rounded(value * SLOPE_SCALE) * (1.0 / SLOPE_SCALE)
 }
 
-/// The nearest whole number as an integer, modulo 2^16.
+/// The nearest integer, modulo 2^16.
 #[inline(always)]
 fn round_to_u16(value: f32) -> u16 {
     approximations::whole(value) as u16

@@ -1,45 +1,46 @@
-//! The part of a picture that streaks are laid into at a time.
+//! The tile buffer into which streaks are composited.
 
 use bansho_base::{image::Rect, math::MulAdd, phenomenon::strip::GrayPlanes};
 
 use crate::streaks::bin::{TILE_COLUMNS, TILE_ROWS};
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-/// A number for each of eight pixels that stand below each other.
+/// One `f32` for each of the eight pixels of a column.
 pub(crate) type TileRows = [f32; TILE_ROWS];
 
-/// Eight rows of so many columns. The pixels of a column stand side by side, so that one instruction lays a streak over all eight: most
-/// streaks run down.
+/// A tile of the picture, stored column by column: the eight pixels of a column are adjacent, so that one instruction
+/// composites a streak over all of them. Most streaks are steep.
 pub(crate) struct TileBuffer {
     /// Its first column and row in the picture.
     origin: [usize; 2],
     columns: [PixelColumn; TILE_COLUMNS],
-    /// Depth of the plate by column, m; where there is none, it is not asked for.
+    /// Depth of the plate by column, m; unset without a plate.
     plate_depth: [TileRows; TILE_COLUMNS],
     has_plate: bool,
 }
 
-/// Eight pixels below each other: red, green and blue of L, T, and the depth of the nearest sample, m.
+/// Eight pixels of a column: red, green and blue of the radiance, transmittance, and the depth of the nearest sample,
+/// m.
 type PixelColumn = [TileRows; 5];
 const TRANSMITTANCE: usize = 3;
 const DEPTH: usize = 4;
 
-/// What is laid over the pixels of a patch.
+/// Light and depth of a streak.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Shading {
-    /// Radiance where it hides all, ACEScg, cd/m^2.
+    /// Radiance at full opacity, ACEScg, cd/m^2.
     pub(crate) light: [f32; 3],
     /// m.
     pub(crate) depth: f32,
 }
 
 impl Shading {
-    /// A dark one.
+    /// Without light.
     pub(crate) fn new(depth: f32) -> Self {
         Self { light: [0.0; 3], depth }
     }
 
-    /// Adds radiance where it hides all, ACEScg, cd/m^2.
+    /// Adds radiance at full opacity, ACEScg, cd/m^2.
     pub(crate) fn add_light(&mut self, light: [f32; 3]) {
         (0..3).for_each(|c| self.light[c] += light[c]);
     }
@@ -57,7 +58,7 @@ impl Default for TileBuffer {
 }
 
 impl TileBuffer {
-    /// Takes the pixels of `rect` from the planes of `strip`; those around it hold anything.
+    /// Loads the pixels of `rect` from the planes of `strip`; the others are unspecified.
     #[inline(always)]
     pub(crate) fn load<S: Simd>(&mut self, simd: S, origin: [usize; 2], rect: Rect, strip: Rect, planes: &GrayPlanes) {
         self.origin = origin;
@@ -73,7 +74,7 @@ impl TileBuffer {
         }
     }
 
-    /// Gives the pixels of `rect` back to the planes of `strip`.
+    /// Stores the pixels of `rect` into the planes of `strip`.
     #[inline(always)]
     pub(crate) fn store<S: Simd>(&self, simd: S, rect: Rect, strip: Rect, planes: &mut GrayPlanes) {
         let [red, green, blue] = &mut planes.radiance;
@@ -85,7 +86,7 @@ impl TileBuffer {
         }
     }
 
-    /// The parts of `rect` of up to eight columns.
+    /// The blocks of `rect`, of up to eight columns each.
     #[inline(always)]
     fn blocks(&self, rect: Rect, strip: Rect) -> impl Iterator<Item = Block> + use<> {
         let [x, y] = self.origin;
@@ -103,7 +104,7 @@ impl TileBuffer {
         self.origin
     }
 
-    /// Takes from the opacities of a column's pixels those that the plate hides at a depth.
+    /// Clears the opacities of a column's pixels at which the plate is in front of `depth`.
     #[inline(always)]
     pub(crate) fn mask_by_plate(&self, column: usize, depth: f32, opacities: &mut TileRows) {
         if !self.has_plate {
@@ -115,7 +116,7 @@ impl TileBuffer {
         }
     }
 
-    /// Lays a layer of some opacities behind what the pixels of a column hold, `L += T a l; T -= T a`.
+    /// Composites a column of opacities under the pixels of the tile, `L += T a l; T -= T a`.
     #[inline(always)]
     pub(crate) fn composite_under(&mut self, column: usize, opacities: &TileRows, shading: &Shading) {
         let Some(pixels) = self.columns.get_mut(column) else { return };
@@ -136,20 +137,20 @@ impl TileBuffer {
     }
 }
 
-/// Up to eight columns of up to eight rows: in the patch, and in a strip's planes.
+/// A block of up to eight columns and rows, in the tile and in a strip's planes.
 #[derive(Clone, Copy)]
 struct Block {
     column: usize,
     row: usize,
     size: [usize; 2],
-    /// Where its first pixel is in a plane.
+    /// Index of its first pixel in a plane.
     start: usize,
-    /// How far it is from there to the row below.
+    /// Pixels from one row of a plane to the next.
     stride: usize,
 }
 
 impl Block {
-    /// Takes it from a plane.
+    /// Loads it from a plane.
     #[inline(always)]
     fn load<S: Simd, C>(&self, simd: S, plane: &[f32], columns: &mut [C], rows: impl Fn(&mut C) -> &mut TileRows) {
         let [width, height] = self.size;
@@ -163,7 +164,7 @@ impl Block {
         }
     }
 
-    /// Gives it back to a plane.
+    /// Stores it into a plane.
     #[inline(always)]
     fn store<S: Simd, C>(&self, simd: S, columns: &[C], rows: impl Fn(&C) -> &TileRows, plane: &mut [f32]) {
         let [width, height] = self.size;
@@ -178,7 +179,7 @@ impl Block {
     }
 }
 
-/// Copies up to eight numbers: nearly always eight, in one instruction.
+/// Copies up to eight numbers: nearly always eight, which is one instruction.
 #[inline(always)]
 fn copy(from: &[f32], to: &mut [f32]) {
     match (<&TileRows>::try_from(from), <&mut TileRows>::try_from(&mut *to)) {
@@ -187,7 +188,7 @@ fn copy(from: &[f32], to: &mut [f32]) {
     }
 }
 
-/// TileRows as columns: three perfect shuffles.
+/// Transposes an 8 x 8 block by three perfect shuffles.
 #[inline(always)]
 fn transpose<S: Simd>(simd: S, square: &mut [TileRows; TILE_ROWS]) {
     const HALF: usize = TILE_ROWS / 2;
