@@ -5,10 +5,7 @@
 
 use std::path::Path;
 
-use bansho_media::{
-    naming::{NumberedPath, OutputPattern},
-    plates::FileAssets,
-};
+use bansho_media::{output::naming::{NumberedPath, OutputPattern}, assets::FileAssets};
 
 libfuzzer_sys::fuzz_target!(|text: &str| {
     let mut lines = text.splitn(3, '\n');

@@ -8,9 +8,12 @@ use bansho_base::{
 };
 use bansho_media::{
     exr,
-    naming::OutputPattern,
-    png, resume,
-    sequence::{Picture, Sink, SinkOptions, Slot},
+    output::{
+        naming::OutputPattern,
+        resume,
+        sink::{Picture, Sink, SinkOptions, Slot},
+    },
+    png,
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use rayon::prelude::*;

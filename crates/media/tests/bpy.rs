@@ -6,7 +6,7 @@ use bansho_base::{
     color,
     image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision, Rect},
 };
-use bansho_media::{atomic, exr};
+use bansho_media::{exr, output::atomic};
 use half::f16;
 
 const SIZE: [usize; 2] = [37, 41];

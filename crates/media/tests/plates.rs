@@ -8,13 +8,13 @@ use bansho_base::{
     image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
 };
 use bansho_media::{
+    assets::{self, FileAssets, InputLimits, limits::MemoryLimit},
     exr,
-    plates::{self, FileAssets, InputLimits, limits::MemoryLimit},
     png::{self, PngEffort},
 };
 
 fn decode_picture(bytes: &[u8], extension: &str) -> Result<Picture, AssetProblem> {
-    plates::decode_picture(bytes, extension, MemoryLimit::default())
+    assets::decode_picture(bytes, extension, MemoryLimit::default())
 }
 
 fn display(width: usize, height: usize) -> DisplayImage {
@@ -362,7 +362,7 @@ fn plates_of_every_kind_say_with_which_exposure_they_were_taken() {
 
 /// The least memory with which `bytes` are read, and what is said of one byte less.
 fn least_memory(bytes: &[u8], extension: &str) -> u64 {
-    let read = |total| plates::decode_picture(bytes, extension, MemoryLimit { total, used: 0 });
+    let read = |total| assets::decode_picture(bytes, extension, MemoryLimit { total, used: 0 });
     let AssetProblem::Memory { bytes: least, limit: 0, others: 0 } = read(0).unwrap_err() else {
         panic!("{extension}")
     };

@@ -12,10 +12,12 @@ use bansho_base::{
 };
 use bansho_media::{
     MediaError,
-    naming::OutputPattern,
-    resume::existing_fingerprint,
-    sequence::{Picture, Sink, SinkOptions, Slot, Wants},
-    video::{VideoOptions, WebmCodec},
+    film::ffmpeg::{VideoOptions, WebmCodec},
+    output::{
+        naming::OutputPattern,
+        resume::existing_fingerprint,
+        sink::{Picture, Sink, SinkOptions, Slot, Wants},
+    },
 };
 
 /// Smooth colours with a soft alpha that move a little each frame.
@@ -210,7 +212,7 @@ fn films_carry_their_frames_colours_and_tags() {
 
 fn check_colours(name: &str, found: &[[u8; 4]], width: usize, has_alpha: bool) {
     let original = picture(65, 67, 0);
-    let expected = if has_alpha { original } else { bansho_media::flatten::over_black(&original) };
+    let expected = if has_alpha { original } else { bansho_media::output::flatten::over_black(&original) };
     let DisplayPixels::Eight(expected) = expected.pixels else { unreachable!() };
     let mut worst = 0;
     for (i, wanted) in expected.iter().enumerate() {

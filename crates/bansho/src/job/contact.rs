@@ -6,10 +6,10 @@ use bansho_base::{
     host::observer::{Observer, Stage, StageGuard},
     image::{DisplayImage, Frame},
 };
-use bansho_media::{
-    flipbook::{Sheet, tile_display},
+use bansho_media::output::{
     label,
-    sequence::{Picture, Slot},
+    sink::{Picture, Slot},
+    sprite_sheet::{Sheet, tile_display},
 };
 use bansho_render::fingerprint;
 

@@ -3,7 +3,11 @@
 use std::path::PathBuf;
 
 use bansho_base::host::{observer::Cancelled, plural::counted};
-use bansho_media::{MediaError, flipbook::TileError, input::InputError, naming::NamingError};
+use bansho_media::{
+    MediaError,
+    input::InputError,
+    output::{naming::NamingError, sprite_sheet::TileError},
+};
 use bansho_render::{PlanError, RenderError, SceneError, scene::edit::EditError};
 
 use super::{ranges::ranges, streaks::StreaksFault};

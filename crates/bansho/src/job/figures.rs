@@ -6,7 +6,10 @@ use std::{
 };
 
 use bansho_base::image::{Figure, FigureSet, Frame};
-use bansho_media::{MediaError, atomic, mark, overwriting::OverwritePolicy};
+use bansho_media::{
+    MediaError,
+    output::{atomic, overwrite_policy::OverwritePolicy, provenance},
+};
 use serde_json::{Map, Value, json};
 
 /// Key of the fingerprint of the picture that figures belong to.
@@ -40,7 +43,7 @@ fn describe(frame: &Frame, picture: &Path) -> Value {
     let [frames, seconds] = header.fps;
     json!({
         "format": 1,
-        "program": mark::PROGRAM,
+        "program": provenance::PROGRAM,
         "picture": picture.file_name().unwrap_or_default().to_string_lossy(),
         "frame": header.number,
         "fps": f64::from(frames) / f64::from(seconds.max(1)),

@@ -8,7 +8,7 @@ use std::{
     time::SystemTime,
 };
 
-use bansho_media::{identity::FileIdentity, mark::is_marked};
+use bansho_media::output::{file_identity::FileIdentity, provenance::is_marked};
 
 /// What tells cheaply that a file was not touched.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -13,9 +13,11 @@ use bansho_base::{
 };
 use bansho_media::{
     MediaError,
-    naming::{OutputKind, OutputPattern},
-    overwriting::OverwritePolicy,
-    sequence::{Picture, Sink, SinkOptions, Slot, Wants},
+    output::{
+        naming::{OutputKind, OutputPattern},
+        overwrite_policy::OverwritePolicy,
+        sink::{Picture, Sink, SinkOptions, Slot, Wants},
+    },
 };
 use bansho_render::{
     Plan,

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use bansho_media::{
-    identity::resolved,
-    overwriting::{Kept, OverwritePolicy},
+use bansho_media::output::{
+    file_identity::resolved,
+    overwrite_policy::{Kept, OverwritePolicy},
 };
 
 use super::error::{Conflict, JobError};

@@ -11,10 +11,12 @@ use bansho_base::{
     phenomenon::Remark,
 };
 use bansho_media::{
-    flipbook::Sheet,
-    naming::{self, OutputKind, OutputPattern},
-    overwriting::OverwritePolicy,
-    plates::FileAssets,
+    assets::FileAssets,
+    output::{
+        naming::{self, OutputKind, OutputPattern},
+        overwrite_policy::OverwritePolicy,
+        sprite_sheet::Sheet,
+    },
 };
 use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth, scene::Positions};
 

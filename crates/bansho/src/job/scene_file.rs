@@ -11,8 +11,8 @@ use bansho_base::{
     parameters::{ProblemKind, nearest},
 };
 use bansho_media::{
+    assets::InputLimits,
     input::{self, InputError},
-    plates::InputLimits,
 };
 use bansho_render::{
     Scene, SceneError,

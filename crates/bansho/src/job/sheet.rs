@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use bansho_base::{host::observer::Observer, image::Frame};
-use bansho_media::flipbook::Sheet;
+use bansho_media::output::sprite_sheet::Sheet;
 
 use super::{
     error::{Conflict, JobError, SheetKind},

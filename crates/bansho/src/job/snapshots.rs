@@ -6,7 +6,7 @@ use std::{
 };
 
 use bansho_base::host::observer::{Observer, Stage, StageGuard};
-use bansho_media::{atomic, identity::resolved, overwriting::OverwritePolicy};
+use bansho_media::output::{atomic, file_identity::resolved, overwrite_policy::OverwritePolicy};
 use bansho_render::{Plan, RenderError, Shot};
 
 use super::{
@@ -186,7 +186,7 @@ mod tests {
         host::{assets::MemoryAssets, observer::Unobserved},
         phenomenon::SnapshotError,
     };
-    use bansho_media::mark;
+    use bansho_media::output::provenance;
     use bansho_render::{Backend, CpuBackend, PlanOptions};
 
     use super::*;
@@ -282,7 +282,7 @@ mod tests {
         let scene = crate::parse_scene("test", text, assets.as_ref()).unwrap();
         let plan = Plan::new(scene, &PlanOptions::default(), assets).unwrap();
         let shot = CpuBackend.open(Arc::new(plan)).unwrap();
-        assert!(shot.snapshot().starts_with(&mark::SNAPSHOT));
+        assert!(shot.snapshot().starts_with(&provenance::SNAPSHOT));
     }
 
     #[test]

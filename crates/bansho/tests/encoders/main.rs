@@ -12,15 +12,17 @@ use std::{
     process::{Command, Stdio},
 };
 
-use bansho::base::{
-    color::{AlphaConvention, View},
-    image::{DisplayImage, Frame},
+use bansho::{
+    base::{
+        color::{AlphaConvention, View},
+        image::{DisplayImage, Frame},
+    },
+    media::output::{
+        naming::OutputPattern,
+        sink::{Picture, Sink, SinkOptions, Slot, Wants},
+    },
+    render::display::BitDepth,
 };
-use bansho::media::{
-    naming::OutputPattern,
-    sequence::{Picture, Sink, SinkOptions, Slot, Wants},
-};
-use bansho::render::display::BitDepth;
 
 /// How frames become a file.
 struct Writing {

@@ -5,7 +5,7 @@ use std::{ops::Range, path::PathBuf, sync::Arc};
 use bansho::{
     Backend, BitDepth, CpuBackend, DisplayImage, Plan, PlanOptions, Unobserved, View,
     base::image::{DisplayPixels, Frame},
-    media::plates::{FileAssets, decode_picture, limits::MemoryLimit},
+    media::assets::{FileAssets, decode_picture, limits::MemoryLimit},
 };
 
 fn scenes() -> PathBuf {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use bansho::{
     KINDS,
     base::{host::printable::printable, parameters::nearest},
-    media::{MediaError, atomic},
+    media::{MediaError, output::atomic},
     render::scene::{PhenomenonKind, template},
 };
 

@@ -4,7 +4,7 @@ use bansho::{
     MemoryAssets,
     base::host::printable::printable,
     job::SceneFile,
-    media::atomic,
+    media::output::atomic,
     render::scene::{FORMAT, edit},
 };
 

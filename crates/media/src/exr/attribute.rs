@@ -1,13 +1,14 @@
 //! The attributes of an OpenEXR header, as bytes ("OpenEXR File Layout": name, type, size, value; little-endian).
 
-use super::{
-    KEY_COLOR_SPACE, KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_FISHEYE_FOV, KEY_LENS, KEY_VERSION, plane::Plane,
-};
-use crate::{animation::timing, stamp};
 use bansho_base::{
     color::white_balance::chromaticity,
     image::{CameraHeader, FrameHeader, Precision},
 };
+
+use super::{
+    KEY_COLOR_SPACE, KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_FISHEYE_FOV, KEY_LENS, KEY_VERSION, plane::Plane,
+};
+use crate::{film::timing, output::fingerprint};
 
 /// CIE xy of the ACEScg (AP1) red, green and blue and of its white, D60 (SMPTE ST 2065-4, S-2014-004).
 pub(crate) const AP1: [[f32; 2]; 4] = [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]];
@@ -63,9 +64,9 @@ pub(crate) fn header(frame: &FrameHeader, planes: &[Plane<'_>], data: Window, di
     bytes.floats(KEY_EXPOSURE, "float", &[frame.exposure_ev100]);
     bytes.floats("worldToCamera", "m44f", frame.camera.world_to_camera.as_flattened());
     lens(&frame.camera, &mut bytes);
-    bytes.attribute("software", "string", format!("Bansho {}", stamp::VERSION).as_bytes());
-    bytes.attribute(KEY_VERSION, "string", stamp::VERSION.as_bytes());
-    bytes.attribute(KEY_FINGERPRINT, "string", stamp::to_hex(&frame.fingerprint).as_bytes());
+    bytes.attribute("software", "string", format!("Bansho {}", fingerprint::VERSION).as_bytes());
+    bytes.attribute(KEY_VERSION, "string", fingerprint::VERSION.as_bytes());
+    bytes.attribute(KEY_FINGERPRINT, "string", fingerprint::to_hex(&frame.fingerprint).as_bytes());
     bytes.attribute(KEY_DIGEST, "string", &[b'0'; 64]);
     let HeaderBytes(mut bytes) = bytes;
     let digest_at = bytes.len() - 64;

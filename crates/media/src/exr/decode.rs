@@ -26,7 +26,8 @@ use super::{
     parse::{self, Outline, Part},
     primaries,
 };
-use crate::plates::limits::{self, MemoryLimit};
+use crate::assets::limits::{self, MemoryLimit};
+
 use rayon::prelude::*;
 
 /// Most chunks that are decompressed at a time.

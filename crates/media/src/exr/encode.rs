@@ -15,7 +15,6 @@ use ::exr::{
     },
 };
 use bansho_base::image::{Frame, Precision};
-use rayon::prelude::*;
 
 use super::{
     attribute::{self, Window},
@@ -23,8 +22,9 @@ use super::{
 };
 use crate::{
     error::{MediaError, SizeRule},
-    stamp,
+    output::fingerprint,
 };
+use rayon::prelude::*;
 
 /// Lines that are compressed together.
 const LINES_PER_BLOCK: usize = 16;
@@ -58,7 +58,7 @@ pub fn encode(frame: &Frame, path: &Path) -> Result<Vec<u8>, MediaError> {
         file.extend((block.len() as u32).to_le_bytes());
         file.extend_from_slice(block);
     }
-    let digest = stamp::to_hex(blake3::hash(&file).as_bytes());
+    let digest = fingerprint::to_hex(blake3::hash(&file).as_bytes());
     file[digest_at..digest_at + 64].copy_from_slice(digest.as_bytes());
     Ok(file)
 }

@@ -11,7 +11,7 @@ use bansho_base::image::{DisplayImage, DisplayPixels};
 use super::{KEY_ALPHA, KEY_FINGERPRINT, KEY_VERSION};
 use crate::{
     error::{MediaError, SizeRule},
-    stamp,
+    output::fingerprint,
 };
 
 /// How much work goes into making a PNG small.
@@ -82,10 +82,10 @@ fn compress(
         DisplayPixels::Sixteen(_) => BitDepth::Sixteen,
     });
     mark_srgb(&mut encoder);
-    encoder.add_text_chunk("Software".to_owned(), format!("Bansho {}", stamp::VERSION))?;
-    encoder.add_text_chunk(KEY_VERSION.to_owned(), stamp::VERSION.to_owned())?;
+    encoder.add_text_chunk("Software".to_owned(), format!("Bansho {}", fingerprint::VERSION))?;
+    encoder.add_text_chunk(KEY_VERSION.to_owned(), fingerprint::VERSION.to_owned())?;
     if let Some(fingerprint) = fingerprint {
-        encoder.add_text_chunk(KEY_FINGERPRINT.to_owned(), stamp::to_hex(fingerprint))?;
+        encoder.add_text_chunk(KEY_FINGERPRINT.to_owned(), fingerprint::to_hex(fingerprint))?;
     }
     if !picture.opaque {
         encoder.add_text_chunk(KEY_ALPHA.to_owned(), picture.alpha.name().to_owned())?;

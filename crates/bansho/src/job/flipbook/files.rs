@@ -8,11 +8,14 @@ use bansho_base::{
     image::{DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Rect},
 };
 use bansho_media::{
-    atomic, exr,
-    flipbook::{Sheet, tile, tile_display},
-    mark,
-    naming::OutputKind,
-    overwriting::OverwritePolicy,
+    exr,
+    output::{
+        atomic,
+        naming::OutputKind,
+        overwrite_policy::OverwritePolicy,
+        provenance,
+        sprite_sheet::{Sheet, tile, tile_display},
+    },
     png::{self, PngEffort},
 };
 use bansho_render::{
@@ -25,6 +28,7 @@ use super::{
     motion::{self, Colour, Tile},
 };
 use crate::job::{error::JobError, finished::Finished};
+
 use serde_json::{Value, json};
 
 /// Where a flipbook goes and what its sheets are.
@@ -185,7 +189,7 @@ impl Files {
         let ([width, height], part) = (plan.size(), plan.window());
         let mut description = json!({
             "format": 1,
-            "program": mark::PROGRAM,
+            "program": provenance::PROGRAM,
             "size": sheet.size(),
             "grid": [sheet.columns, sheet.rows()],
             "tile": sheet.cell,

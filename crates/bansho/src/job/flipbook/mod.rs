@@ -11,14 +11,13 @@ use bansho_base::{
     color::{AlphaConvention, View},
     image::Rect,
 };
-use bansho_media::{
-    flipbook::Sheet,
+use bansho_media::output::{
     naming::{OutputKind, OutputPattern},
-    overwriting::OverwritePolicy,
+    overwrite_policy::OverwritePolicy,
+    sprite_sheet::Sheet,
 };
 use bansho_render::{Backend, Plan, PlanOptions, Scene, display::BitDepth, scene::FrameRate};
 
-pub use self::crop::FlipbookCrop;
 use self::{files::Files, motion::Tile};
 use super::{
     BackendChoice,
@@ -32,6 +31,8 @@ use super::{
     shoot::shoot,
     snapshots::Snapshots,
 };
+
+pub use self::crop::FlipbookCrop;
 
 /// A flipbook that is wanted. Begin with [`Flipbook::new`].
 ///

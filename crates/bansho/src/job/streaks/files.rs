@@ -11,15 +11,15 @@ use bansho_base::{
     math::DVec3,
 };
 use bansho_media::{
-    atomic, exr,
-    overwriting::OverwritePolicy,
+    exr,
+    output::{atomic, overwrite_policy::OverwritePolicy},
     png::{self, MeasuredImage, PngEffort},
 };
+use bansho_rain::lighting::drop_phase_function::DropPhaseFunction;
 use bansho_render::display::BitDepth;
 
 use super::{StreakFormat, Streaks, Texture};
 use crate::job::error::JobError;
-use bansho_rain::lighting::drop_phase_function::DropPhaseFunction;
 
 /// Version of the program, on which files depend.
 const VERSION: &str = env!("CARGO_PKG_VERSION");

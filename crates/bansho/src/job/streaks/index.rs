@@ -3,18 +3,19 @@
 use std::f64::consts::PI;
 
 use bansho_base::image::Image;
-use bansho_media::mark;
+use bansho_media::output::provenance;
+use bansho_rain::{
+    billboards::texture::{FallingDrop, StreakCube},
+    drops::size_distribution::{DropSizeDistribution, SizeBin},
+    lighting::extinction::{ExtinctionEfficiency, extinction, visibility},
+};
 use bansho_render::display::BitDepth;
 
 use super::{
     StreakFormat, Streaks, Texture,
     files::{Writer, Written},
 };
-use bansho_rain::{
-    billboards::texture::{FallingDrop, StreakCube},
-    drops::size_distribution::{DropSizeDistribution, SizeBin},
-    lighting::extinction::{ExtinctionEfficiency, extinction, visibility},
-};
+
 use serde_json::{Value, json};
 
 /// One texture as the index tells it.
@@ -80,7 +81,7 @@ pub(super) fn describe(
     let rain = |(&rate, sizes): (&f64, &DropSizeDistribution)| describe_rain(rate, sizes, &bins, cube);
     let mut index = json!({
         "format": 1,
-        "program": mark::PROGRAM,
+        "program": provenance::PROGRAM,
         "size_pixels": cube.size,
         "box_m": cube.edge,
         "pixel_m": cube.pixel(),

@@ -13,7 +13,15 @@ use std::{
 use bansho_base::host::observer::check;
 use bansho_media::{
     MediaError,
-    overwriting::{InputFiles, OverwritePolicy},
+    output::overwrite_policy::{InputFiles, OverwritePolicy},
+};
+use bansho_rain::{
+    billboards::texture::StreakCube,
+    drops::{
+        size_distribution::{DropSizeDistribution, SizeBin},
+        terminal_velocity::{Air, TerminalVelocity, VelocityLaw, fixed_point_velocity},
+    },
+    lighting::drop_phase_function::DropPhaseFunction,
 };
 use bansho_render::display::BitDepth;
 
@@ -27,14 +35,7 @@ use super::{
     observer::{FrameDone, JobObserver, Outline},
     output, overwriting,
 };
-use bansho_rain::{
-    billboards::texture::StreakCube,
-    drops::{
-        size_distribution::{DropSizeDistribution, SizeBin},
-        terminal_velocity::{Air, TerminalVelocity, VelocityLaw, fixed_point_velocity},
-    },
-    lighting::drop_phase_function::DropPhaseFunction,
-};
+
 use rayon::prelude::*;
 
 pub use fault::{ListKind, StreaksFault};

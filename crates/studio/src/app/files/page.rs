@@ -3,10 +3,9 @@
 use std::path::Path;
 
 use bansho::{
-    media::{naming, zip::Zip},
+    media::{output::naming, zip::Zip},
     render::scene::Place,
 };
-use eframe::egui::{Context, Ui};
 
 use super::{
     Files,
@@ -18,6 +17,7 @@ use crate::{
     app::{scene_panel::Subject, session::Session, store::Store},
     player::{Event, Player, Wish, WorkerPlayer, shoot::Ended},
 };
+use eframe::egui::{Context, Ui};
 
 /// What the page knows of files.
 pub(super) struct Shelf {

@@ -12,20 +12,18 @@ use std::{
 
 use ::gif::{DisposalMethod, Encoder, Extension, Repeat};
 use bansho_base::image::{DisplayImage, DisplayPixels};
-use rayon::prelude::*;
 
 use super::{
+    ordered::Film,
     palette::{Ditherer, FrameHistogram, Histogram, palette},
     timing::GifTiming,
 };
 use crate::{
-    atomic::AtomicFile,
     error::{MediaError, SizeRule},
-    flatten, mark,
-    ordered::Film,
-    overwriting::OverwritePolicy,
+    output::{atomic::AtomicFile, flatten, overwrite_policy::OverwritePolicy, provenance},
     png,
 };
+use rayon::prelude::*;
 
 /// Most pixels on a side of a GIF.
 const SIDE_LIMIT: usize = 65535;
@@ -157,7 +155,7 @@ impl Writer<'_> {
         let [width, height] = self.format.size.map(|side| side as u16);
         let mut encoder = Encoder::new(&mut out, width, height, colours).map_err(|error| self.encoding(error))?;
         encoder.set_repeat(Repeat::Infinite).map_err(|error| self.encoding(error))?;
-        let comment = encoder.write_raw_extension(Extension::Comment.into(), &[mark::TAG.as_bytes()]);
+        let comment = encoder.write_raw_extension(Extension::Comment.into(), &[provenance::TAG.as_bytes()]);
         comment.map_err(|error| self.encoding(error))?;
         for batch in spooled.chunks(BATCH) {
             let read = |spooled: &Spooled| {

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use crate::{exr, input, png, stamp};
+use super::fingerprint;
+use crate::{exr, input, png};
 
 /// Most bytes of a frame: a file with more is none of ours, and is not read.
 const FRAME_BYTES: u64 = 8 << 30;
@@ -26,7 +27,7 @@ fn of_png(file: &[u8]) -> Option<[u8; 32]> {
         match &chunk.kind {
             b"tEXt" => {
                 let prefix = [png::KEY_FINGERPRINT.as_bytes(), b"\0"].concat();
-                found = found.or(chunk.contents.strip_prefix(&prefix[..]).and_then(stamp::from_hex));
+                found = found.or(chunk.contents.strip_prefix(&prefix[..]).and_then(fingerprint::from_hex));
             }
             b"IDAT" => has_pixels = true,
             b"IEND" => ended = true,
@@ -40,13 +41,13 @@ fn of_exr(file: &[u8]) -> Option<[u8; 32]> {
     let outline = exr::parse::outline(file).ok()?;
     let [part] = &outline.parts[..] else { return None };
     let digest_at = part.string(exr::KEY_DIGEST).filter(|place| place.len() == 64)?;
-    let digest = stamp::from_hex(file.get(digest_at.clone())?)?;
+    let digest = fingerprint::from_hex(file.get(digest_at.clone())?)?;
     let mut hasher = blake3::Hasher::new();
     hasher.update(file.get(..digest_at.start)?).update(&[b'0'; 64]).update(file.get(digest_at.end..)?);
     if *hasher.finalize().as_bytes() != digest {
         return None;
     }
-    stamp::from_hex(file.get(part.string(exr::KEY_FINGERPRINT)?)?)
+    fingerprint::from_hex(file.get(part.string(exr::KEY_FINGERPRINT)?)?)
 }
 
 #[cfg(test)]

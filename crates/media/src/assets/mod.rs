@@ -1,9 +1,11 @@
 //! Assets in files: plates, depth, meshes, drawings, text.
 
 mod cache;
-mod decode;
-mod exposure;
+mod exif;
+pub mod gltf;
+mod image;
 pub mod limits;
+pub mod svg;
 
 use std::{
     collections::HashMap,
@@ -22,12 +24,12 @@ use self::{
     limits::{MEMORY_BYTES, MemoryLimit, TEXT_BYTES},
 };
 use crate::{
-    drawings::decode_drawing,
     exr,
     input::{self, InputError},
-    meshes::{decode_mesh, files_beside},
-    naming::FrameTemplate,
+    output::naming::FrameTemplate,
 };
+use gltf::{decode_mesh, files_beside};
+use svg::decode_drawing;
 
 /// Most bytes of pictures that are kept for the next frame unless told otherwise.
 pub const CACHE_BYTES: usize = 512 << 20;
@@ -243,8 +245,8 @@ fn extension(path: &Path) -> &str {
 /// not fill.
 pub fn decode_picture(bytes: &[u8], extension: &str, limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     match extension.to_ascii_lowercase().as_str() {
-        "png" => decode::png(bytes, limit),
-        "jpg" | "jpeg" => decode::jpeg(bytes, limit),
+        "png" => image::png(bytes, limit),
+        "jpg" | "jpeg" => image::jpeg(bytes, limit),
         "exr" => exr::decode(bytes, limit),
         _ => Err(AssetProblem::UnknownKind),
     }

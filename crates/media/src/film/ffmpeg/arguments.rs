@@ -3,7 +3,10 @@
 use std::{ffi::OsString, path::Path};
 
 use super::{VideoFormat, WebmCodec};
-use crate::{mark, naming::OutputKind, png::KEY_ALPHA};
+use crate::{
+    output::{naming::OutputKind, provenance},
+    png::KEY_ALPHA,
+};
 
 /// All arguments for a film at `output`, which is there already and empty.
 pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
@@ -39,7 +42,7 @@ pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
 
 /// The tag by which a film says that Bansho made it. MP4 has no tags of one's own, so there it is the comment.
 fn mark_in(kind: OutputKind) -> String {
-    if kind == OutputKind::Mp4 { format!("comment={}", mark::TAG) } else { mark::TAG.to_owned() }
+    if kind == OutputKind::Mp4 { format!("comment={}", provenance::TAG) } else { provenance::TAG.to_owned() }
 }
 
 fn pixel_format(format: &VideoFormat) -> &'static str {
@@ -89,8 +92,7 @@ fn container(kind: OutputKind) -> &'static str {
 mod tests {
     use bansho_base::color::AlphaConvention;
 
-    use super::*;
-    use crate::video::VideoOptions;
+    use super::{super::VideoOptions, *};
 
     fn words(kind: OutputKind, opaque: bool, webm: WebmCodec) -> String {
         let options = VideoOptions { webm, ..VideoOptions::default() };

@@ -7,20 +7,22 @@ use bansho_base::{
     image::{DisplayImage, DisplayPixels, Frame},
 };
 
-use crate::{
-    animation::{
-        apng::{self, ApngFilm, ApngFormat},
-        gif::{self, GifFilm, GifFormat},
-        timing::GifTiming,
-    },
+use super::{
     atomic::{self, AtomicFile},
+    naming::{OutputKind, OutputPattern},
+    overwrite_policy::OverwritePolicy,
+};
+use crate::{
     error::{MediaError, SizeRule},
     exr,
-    naming::{OutputKind, OutputPattern},
-    ordered::Ordered,
-    overwriting::OverwritePolicy,
+    film::{
+        apng::{self, ApngFilm, ApngFormat},
+        ffmpeg::{self, VideoFilm, VideoFormat, VideoOptions},
+        gif::{self, GifFilm, GifFormat},
+        ordered::Ordered,
+        timing::GifTiming,
+    },
     png::{self, PngEffort},
-    video::{self, VideoFilm, VideoFormat, VideoOptions},
 };
 
 /// Which picture a format takes.
@@ -89,7 +91,7 @@ impl SinkOptions {
             OutputKind::Png | OutputKind::Apng => Wants::Display,
             OutputKind::Gif if self.gif_transparent => Wants::Display,
             OutputKind::Gif => Wants::OpaqueDisplay,
-            film if video::carries_alpha(film, &self.video) => Wants::Display,
+            film if ffmpeg::carries_alpha(film, &self.video) => Wants::Display,
             _ => Wants::OpaqueDisplay,
         }
     }
@@ -207,7 +209,7 @@ impl Sink {
             }
             (Target::Video(film, format), Picture::Display(image, _)) => {
                 self.check_frame(image, &path)?;
-                film.push(slot.index, video::prepare(image, format))
+                film.push(slot.index, ffmpeg::prepare(image, format))
             }
             _ => Err(MediaError::WrongPicture { path, wanted: self.wants() }),
         }
@@ -249,7 +251,7 @@ impl Sink {
     }
 }
 
-fn ordered<F: crate::ordered::Film>(film: F, (path, count, window): (PathBuf, usize, usize)) -> Ordered<F> {
+fn ordered<F: crate::film::ordered::Film>(film: F, (path, count, window): (PathBuf, usize, usize)) -> Ordered<F> {
     Ordered::new(film, path, count, window)
 }
 

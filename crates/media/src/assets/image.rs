@@ -9,9 +9,10 @@ use bansho_base::{
 };
 
 use super::{
-    exposure::exif_ev100,
+    exif::exif_ev100,
     limits::{self, MemoryLimit},
 };
+
 use zune_jpeg::{
     JpegDecoder,
     zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},

@@ -8,7 +8,11 @@ use std::{
 };
 
 use super::{VideoFormat, arguments};
-use crate::{atomic::AtomicFile, error::MediaError, ordered::Film, overwriting::OverwritePolicy};
+use crate::{
+    error::MediaError,
+    film::ordered::Film,
+    output::{atomic::AtomicFile, overwrite_policy::OverwritePolicy},
+};
 
 /// How much of what `ffmpeg` says is kept.
 const TAIL_BYTES: usize = 4096;

@@ -183,11 +183,12 @@ mod tests {
 
     use super::*;
     use crate::{
-        naming::OutputPattern,
-        overwriting::OverwritePolicy,
-        ply,
-        sequence::{Picture, Sink, SinkOptions, Slot, Wants},
-        testing,
+        output::{
+            naming::OutputPattern,
+            overwrite_policy::OverwritePolicy,
+            sink::{Picture, Sink, SinkOptions, Slot, Wants},
+        },
+        ply, testing,
     };
 
     /// A file of two frames, as the program writes it; of a sequence the second.

@@ -14,8 +14,9 @@ use bansho_base::{
     image::{DisplayImage, DisplayPixels},
 };
 
+use crate::output::{flatten, naming::OutputKind};
+
 pub(crate) use self::process::VideoFilm;
-use crate::{flatten, naming::OutputKind};
 
 /// How films are made.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -19,7 +19,7 @@ use bansho_base::{
 };
 
 use self::{accessor::Accessor, buffers::Buffers, glb::Glb, json::Object, nodes::Shown};
-use crate::plates::limits::MemoryLimit;
+use super::limits::MemoryLimit;
 
 /// Gives the bytes of a file that a glTF names, if they are at most so many.
 pub type Beside<'a> = &'a dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>;

@@ -11,11 +11,11 @@ use std::{
 
 use tempfile::NamedTempFile;
 
-use crate::{
-    error::MediaError,
-    overwriting::{Kept, OverwritePolicy},
-    unfinished::{self, Listed},
+use super::{
+    overwrite_policy::{Kept, OverwritePolicy},
+    temporary_files::{self, Listed},
 };
+use crate::error::MediaError;
 
 /// A file that bears its name only once it is finished. Dropped before, it vanishes.
 #[derive(Debug)]
@@ -63,7 +63,7 @@ impl AtomicFile {
             _ => path.to_path_buf(),
         };
         allow(policy, &target, path)?;
-        let (temporary, listed) = unfinished::list(|| temporary_in(folder_of(&target), &target)).map_err(fail)?;
+        let (temporary, listed) = temporary_files::list(|| temporary_in(folder_of(&target), &target)).map_err(fail)?;
         Ok(Self { temporary, _listed: listed, path: path.to_path_buf(), target, policy: policy.clone() })
     }
 
@@ -199,7 +199,7 @@ mod tests {
     fn no_link_that_is_made_on_the_way_leads_to_an_input() {
         use std::os::unix::fs::symlink;
 
-        use crate::overwriting::InputFiles;
+        use crate::output::overwrite_policy::InputFiles;
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::write(at("plate.png"), "plate").unwrap();

@@ -8,7 +8,7 @@ use std::{
 use bansho_base::host::assets::AssetProblem;
 
 use super::{Beside, base64, json::Object};
-use crate::plates::limits::MemoryLimit;
+use crate::assets::limits::MemoryLimit;
 
 /// All buffers. What several of them name is held once.
 pub(super) struct Buffers<'a> {

@@ -7,7 +7,7 @@ use std::{
     sync::Arc,
 };
 
-use crate::{identity::FileIdentity, mark::is_marked};
+use super::{file_identity::FileIdentity, provenance::is_marked};
 
 /// Files that work is made from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -6,13 +6,10 @@ use std::{io::Write, path::Path};
 
 use bansho_base::image::DisplayImage;
 
-use super::timing;
+use super::{ordered::Film, timing};
 use crate::{
-    atomic::AtomicFile,
     error::MediaError,
-    flatten,
-    ordered::Film,
-    overwriting::OverwritePolicy,
+    output::{atomic::AtomicFile, flatten, overwrite_policy::OverwritePolicy},
     png::{self, chunk},
 };
 
