@@ -1,7 +1,10 @@
 //! Meshes as glTF, text and binary: any bytes are refused, or are triangles within the bounds that a mesh promises.
 #![no_main]
 
-use bansho_base::{host::assets::AssetProblem, geometry::mesh::{MOST_TRIANGLES, Mesh}};
+use bansho_base::{
+    geometry::mesh::{MOST_TRIANGLES, Mesh},
+    host::assets::AssetProblem,
+};
 use bansho_media::assets::{gltf::decode_mesh, limits::MemoryLimit};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {

@@ -110,7 +110,7 @@ pub enum MediaError {
         /// The file that was to be written.
         path: PathBuf,
         /// What it takes.
-        wanted: crate::output::sink::Wants,
+        wanted: crate::output::sink::PictureFormat,
     },
     /// A frame of a film came too early, twice, or beyond the end.
     #[error(

@@ -12,7 +12,7 @@ const SHARED: [u8; 10] = [10, 0, 0, 8, 0, 0, 0, 0, 0x21, 0];
 
 /// A ZIP under way.
 #[derive(Debug)]
-pub struct Zip<W> {
+pub struct ZipWriter<W> {
     out: W,
     /// Bytes written so far.
     length: u64,
@@ -20,7 +20,7 @@ pub struct Zip<W> {
     count: u16,
 }
 
-impl<W: Write> Zip<W> {
+impl<W: Write> ZipWriter<W> {
     /// An empty one, written to `out`.
     pub fn new(out: W) -> Self {
         Self { out, length: 0, directory: Vec::new(), count: 0 }
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn a_file_is_stored_with_its_heads() {
-        let mut zip = Zip::new(Vec::new());
+        let mut zip = ZipWriter::new(Vec::new());
         zip.add("a.txt", b"123456789").unwrap();
         let bytes = zip.finish().unwrap();
         // The checksum of these nine bytes is the one that every description of CRC-32 gives.
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn more_files_than_it_can_count_are_refused() {
-        let mut zip = Zip::new(io::sink());
+        let mut zip = ZipWriter::new(io::sink());
         (0..u16::MAX).for_each(|number| zip.add(&number.to_string(), b"").unwrap());
         assert_eq!(zip.add("one more", b"").unwrap_err().kind(), io::ErrorKind::FileTooLarge);
         zip.finish().unwrap();
@@ -115,7 +115,7 @@ mod tests {
     fn other_programs_read_it() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("frames.zip");
-        let mut zip = Zip::new(std::fs::File::create(&path).unwrap());
+        let mut zip = ZipWriter::new(std::fs::File::create(&path).unwrap());
         zip.add("feuer/0001.png", b"one").unwrap();
         zip.add("fe\u{fc}er/0002.png", &[7; 70_000]).unwrap();
         zip.finish().unwrap();

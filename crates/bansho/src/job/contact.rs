@@ -8,7 +8,7 @@ use bansho_base::{
 };
 use bansho_media::output::{
     label,
-    sink::{Picture, Slot},
+    sink::{FrameSlot, Picture},
     sprite_sheet::{Sheet, tile_display},
 };
 use bansho_render::fingerprint;
@@ -45,7 +45,7 @@ pub(super) fn run(job: &PreparedJob, sheet: &Sheet, observer: &dyn JobObserver) 
     shoot(&job.plan, job.backend.as_ref(), &job.frames, &job.snapshots, &gather, observer)?;
     let _stage = StageGuard::begin(observer, Stage::Write);
     let picture = tile_display(&gather.into_tiles(), sheet.columns, sheet.gutter, FILL)?;
-    sink.write(Slot { index: 0, number: job.frames[0] }, Picture::Display(&picture, &own_fingerprint(job)))?;
+    sink.write(FrameSlot { index: 0, number: job.frames[0] }, Picture::Display(&picture, &own_fingerprint(job)))?;
     Ok(sink.finish()?)
 }
 

@@ -16,7 +16,7 @@ use bansho_media::{
     output::{
         naming::{OutputKind, OutputPattern},
         overwrite_policy::OverwritePolicy,
-        sink::{Picture, Sink, SinkOptions, Slot, Wants},
+        sink::{FrameSlot, Picture, PictureFormat, Sink, SinkOptions},
     },
 };
 use bansho_render::{
@@ -89,11 +89,11 @@ impl Format {
             // Before the picture, so that a picture that is there has its figures.
             figures::write(frame, &sink.path(frame.header.number), &self.overwrite)?;
         }
-        let slot = Slot { index, number: frame.header.number };
-        let shown = match sink.wants() {
-            Wants::Frame => None,
-            Wants::Display => Some(self.show(frame, observer)),
-            Wants::OpaqueDisplay => {
+        let slot = FrameSlot { index, number: frame.header.number };
+        let shown = match sink.picture_format() {
+            PictureFormat::Frame => None,
+            PictureFormat::Display => Some(self.show(frame, observer)),
+            PictureFormat::OpaqueDisplay => {
                 // Premultiplied light over black is the light itself.
                 frame.opaque = true;
                 Some(self.show(frame, observer))

@@ -15,7 +15,7 @@ use bansho_media::{
     output::{
         naming::{self, OutputKind, OutputPattern},
         overwrite_policy::OverwritePolicy,
-        sprite_sheet::Sheet,
+        sprite_sheet::SheetLayout,
     },
 };
 use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, display::BitDepth, scene::Positions};
@@ -42,7 +42,7 @@ pub struct PreparedJob {
     pub(super) frames: Vec<i64>,
     pub(super) format: Format,
     /// Where all frames go into one picture.
-    pub(super) sheet: Option<Sheet>,
+    pub(super) sheet: Option<SheetLayout>,
     pub(super) contact_background: ContactBackground,
     pub(super) resume: bool,
     pub(super) snapshots: Snapshots,

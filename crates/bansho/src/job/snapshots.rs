@@ -282,7 +282,7 @@ mod tests {
         let scene = crate::parse_scene("test", text, assets.as_ref()).unwrap();
         let plan = Plan::new(scene, &PlanOptions::default(), assets).unwrap();
         let shot = CpuBackend.open(Arc::new(plan)).unwrap();
-        assert!(shot.snapshot().starts_with(&provenance::SNAPSHOT));
+        assert!(shot.snapshot().starts_with(&provenance::SNAPSHOT_MAGIC));
     }
 
     #[test]

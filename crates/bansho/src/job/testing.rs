@@ -100,7 +100,7 @@ impl Shot for CounterShot {
     }
 
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError> {
-        let bytes = snapshot.strip_prefix(&provenance::SNAPSHOT).and_then(|state| state.try_into().ok());
+        let bytes = snapshot.strip_prefix(&provenance::SNAPSHOT_MAGIC).and_then(|state| state.try_into().ok());
         let bytes = bytes.ok_or(SnapshotError::Damaged)?;
         self.number = i64::from_le_bytes(bytes);
         Ok(())
@@ -109,7 +109,7 @@ impl Shot for CounterShot {
 
 /// The snapshot at a frame.
 pub(super) fn state(number: i64) -> Vec<u8> {
-    [provenance::SNAPSHOT, number.to_le_bytes()].concat()
+    [provenance::SNAPSHOT_MAGIC, number.to_le_bytes()].concat()
 }
 
 /// A frame of one pixel.

@@ -6,7 +6,7 @@ use bansho_base::host::assets::Picture;
 
 /// Pictures in the order of their last use, the latest last.
 #[derive(Debug, Default)]
-pub(crate) struct Cache {
+pub(crate) struct PictureCache {
     pictures: Vec<(PathBuf, Arc<Picture>)>,
 }
 
@@ -15,7 +15,7 @@ fn bytes(picture: &Picture) -> usize {
     size_of_val(picture.colour.pixels()) + picture.depth.as_ref().map_or(0, |depth| size_of_val(&depth[..]))
 }
 
-impl Cache {
+impl PictureCache {
     pub(crate) fn get(&mut self, path: &PathBuf) -> Option<Arc<Picture>> {
         let place = self.pictures.iter().position(|(key, _)| key == path)?;
         let entry = self.pictures.remove(place);
@@ -61,7 +61,7 @@ mod tests {
                 exposure_ev100: None,
             })
         };
-        let (mut cache, budget) = (Cache::default(), 2 * 4 * 4 * 16);
+        let (mut cache, budget) = (PictureCache::default(), 2 * 4 * 4 * 16);
         let path = |name: &str| PathBuf::from(name);
         cache.insert(path("a"), picture(), budget);
         cache.insert(path("b"), picture(), budget);

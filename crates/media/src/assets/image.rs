@@ -105,23 +105,23 @@ pub(crate) fn jpeg(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProb
     let exposure_ev100 = decoder.exif().and_then(|block| exif_ev100(block));
     let bytes = decoder.decode().map_err(damaged)?;
     let pixels = match decoder.output_colorspace() {
-        Some(ColorSpace::Luma) => bytes.iter().map(|&code| grey(code)).collect(),
-        _ => bytes.as_chunks::<3>().0.iter().map(|&rgb| coloured(rgb)).collect(),
+        Some(ColorSpace::Luma) => bytes.iter().map(|&code| gray(code)).collect(),
+        _ => bytes.as_chunks::<3>().0.iter().map(|&codes| rgb(codes)).collect(),
     };
     Ok(Picture { exposure_ev100, ..picture(width, height, pixels, Encoding::DisplaySrgb)? })
 }
 
-fn grey(code: u8) -> [f32; 4] {
-    coloured([code; 3])
+fn gray(code: u8) -> [f32; 4] {
+    rgb([code; 3])
 }
 
-fn coloured(codes: [u8; 3]) -> [f32; 4] {
+fn rgb(codes: [u8; 3]) -> [f32; 4] {
     let [r, g, b] = codes.map(|code| f32::from(code) / 255.0);
     [r, g, b, 1.0]
 }
 
 fn picture(width: u64, height: u64, pixels: Vec<[f32; 4]>, encoding: Encoding) -> Result<Picture, AssetProblem> {
-    let colour = Image::from_pixels(width as usize, height as usize, pixels);
-    let colour = colour.ok_or_else(|| damaged("its pixels do not fill it"))?;
-    Ok(Picture { colour, depth: None, encoding, exposure_ev100: None })
+    let color = Image::from_pixels(width as usize, height as usize, pixels);
+    let color = color.ok_or_else(|| damaged("its pixels do not fill it"))?;
+    Ok(Picture { colour: color, depth: None, encoding, exposure_ev100: None })
 }

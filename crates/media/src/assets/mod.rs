@@ -20,7 +20,7 @@ use bansho_base::{
 };
 
 use self::{
-    cache::Cache,
+    cache::PictureCache,
     limits::{MEMORY_BYTES, MemoryLimit, TEXT_BYTES},
 };
 use crate::{
@@ -60,18 +60,18 @@ pub struct FileAssets {
     folder: PathBuf,
     limits: InputLimits,
     cache_bytes: usize,
-    memory: Mutex<Memory>,
+    memory: Mutex<AssetCache>,
 }
 
 #[derive(Debug, Default)]
-struct Memory {
-    pictures: Cache,
+struct AssetCache {
+    pictures: PictureCache,
     meshes: HashMap<PathBuf, Arc<Mesh>>,
     drawings: HashMap<PathBuf, Arc<Drawing>>,
     digests: HashMap<PathBuf, [u8; 32]>,
 }
 
-impl Memory {
+impl AssetCache {
     /// Bytes of what is in use or kept.
     fn used(&self) -> u64 {
         let meshes = self.meshes.values().map(|mesh| mesh.memory_bytes());
@@ -95,7 +95,7 @@ impl FileAssets {
 
     /// As [`FileAssets::new`], within `limits`.
     pub fn with_limits(folder: impl Into<PathBuf>, limits: InputLimits) -> Self {
-        Self { folder: folder.into(), limits, cache_bytes: CACHE_BYTES, memory: Mutex::new(Memory::default()) }
+        Self { folder: folder.into(), limits, cache_bytes: CACHE_BYTES, memory: Mutex::new(AssetCache::default()) }
     }
 
     /// As [`FileAssets::new`], keeping at most `cache_bytes` of pictures, but always the last one.
@@ -105,7 +105,7 @@ impl FileAssets {
 
     /// Forgets everything that was read, because files may have changed.
     pub fn forget(&self) {
-        *self.memory() = Memory::default();
+        *self.cache() = AssetCache::default();
     }
 
     /// The file that `path` means for frame `frame`.
@@ -121,20 +121,20 @@ impl FileAssets {
         Ok(self.folder.join(folder).join(template.name(frame)))
     }
 
-    fn memory(&self) -> MutexGuard<'_, Memory> {
+    fn cache(&self) -> MutexGuard<'_, AssetCache> {
         // The memory is only ever replaced whole, so a panic elsewhere leaves it usable.
         self.memory.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn limit(&self) -> MemoryLimit {
-        MemoryLimit { total: self.limits.memory_bytes, used: self.memory().used() }
+        MemoryLimit { total: self.limits.memory_bytes, used: self.cache().used() }
     }
 
     /// Reads something within the memory that is left, and where it is too little again without what is only kept.
     fn within_limit<T>(&self, read: impl Fn(MemoryLimit) -> Result<T, AssetProblem>) -> Result<T, AssetProblem> {
         match read(self.limit()) {
             Err(AssetProblem::Memory { .. } | AssetProblem::FileSize { .. } | AssetProblem::NoMemory { .. }) => {
-                self.memory().make_room();
+                self.cache().make_room();
                 read(self.limit())
             }
             result => result,
@@ -161,7 +161,7 @@ impl FileAssets {
     }
 
     fn read_mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetProblem> {
-        if let Some(mesh) = self.memory().meshes.get(path) {
+        if let Some(mesh) = self.cache().meshes.get(path) {
             return Ok(mesh.clone());
         }
         let beside = |name: &str, left: u64| self.read(&path.with_file_name(name), left);
@@ -170,7 +170,7 @@ impl FileAssets {
             decode_mesh(&file, extension(path), &beside, limit)
         });
         let mesh = Arc::new(mesh?);
-        self.memory().meshes.insert(path.to_path_buf(), mesh.clone());
+        self.cache().meshes.insert(path.to_path_buf(), mesh.clone());
         Ok(mesh)
     }
 
@@ -180,7 +180,7 @@ impl FileAssets {
     }
 
     fn read_drawing(&self, path: &Path) -> Result<Arc<Drawing>, AssetProblem> {
-        if let Some(drawing) = self.memory().drawings.get(path) {
+        if let Some(drawing) = self.cache().drawings.get(path) {
             return Ok(drawing.clone());
         }
         let drawing = self.within_limit(|limit| {
@@ -188,7 +188,7 @@ impl FileAssets {
             limit.check(drawing.memory_bytes()).map(|()| drawing)
         });
         let drawing = Arc::new(drawing?);
-        self.memory().drawings.insert(path.to_path_buf(), drawing.clone());
+        self.cache().drawings.insert(path.to_path_buf(), drawing.clone());
         Ok(drawing)
     }
 
@@ -255,7 +255,7 @@ pub fn decode_picture(bytes: &[u8], extension: &str, limit: MemoryLimit) -> Resu
 impl Assets for FileAssets {
     fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError> {
         let path = self.resolve(path, frame)?;
-        if let Some(picture) = self.memory().pictures.get(&path) {
+        if let Some(picture) = self.cache().pictures.get(&path) {
             return Ok(picture);
         }
         let picture = self.within_limit(|limit| {
@@ -263,7 +263,7 @@ impl Assets for FileAssets {
             decode_picture(&file, extension(&path), limit)
         });
         let picture = Arc::new(picture.map_err(|problem| error(&path, problem))?);
-        self.memory().pictures.insert(path, picture.clone(), self.cache_bytes);
+        self.cache().pictures.insert(path, picture.clone(), self.cache_bytes);
         Ok(picture)
     }
 
@@ -290,11 +290,11 @@ impl Assets for FileAssets {
 
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
         let path = self.resolve(path, frame)?;
-        if let Some(digest) = self.memory().digests.get(&path) {
+        if let Some(digest) = self.cache().digests.get(&path) {
             return Ok(*digest);
         }
         let digest = self.hash(&path).map_err(|problem| error(&path, problem))?;
-        self.memory().digests.insert(path, digest);
+        self.cache().digests.insert(path, digest);
         Ok(digest)
     }
 }

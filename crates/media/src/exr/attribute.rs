@@ -6,7 +6,8 @@ use bansho_base::{
 };
 
 use super::{
-    KEY_COLOR_SPACE, KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_FISHEYE_FOV, KEY_LENS, KEY_VERSION, plane::Plane,
+    KEY_COLOR_SPACE, KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_FISHEYE_FOV, KEY_LENS, KEY_VERSION,
+    plane::ChannelPlane,
 };
 use crate::{film::timing, output::fingerprint};
 
@@ -35,14 +36,19 @@ pub(crate) struct HeaderBytes(Vec<u8>);
 
 /// A frame rate as the format holds it: its numerator has a sign.
 fn rational(fps: [u32; 2]) -> [u32; 2] {
-    const MOST: u32 = i32::MAX.cast_unsigned();
-    if fps[0] <= MOST { fps } else { timing::within(fps, MOST).unwrap_or(fps) }
+    const MAX: u32 = i32::MAX.cast_unsigned();
+    if fps[0] <= MAX { fps } else { timing::approximate(fps, MAX).unwrap_or(fps) }
 }
 
 /// The header of a frame and where in it the 64 digits of the digest go, which are zeros here.
 ///
 /// No attribute depends on time, host or path, and their order is fixed.
-pub(crate) fn header(frame: &FrameHeader, planes: &[Plane<'_>], data: Window, display: Window) -> (Vec<u8>, usize) {
+pub(crate) fn header(
+    frame: &FrameHeader,
+    planes: &[ChannelPlane<'_>],
+    data: Window,
+    display: Window,
+) -> (Vec<u8>, usize) {
     let mut bytes = HeaderBytes::begin(planes.iter().any(|plane| plane.name.len() > 31));
     bytes.attribute("channels", "chlist", &channel_list(planes));
     bytes.attribute("compression", "compression", &[COMPRESSION_ZIP16]);
@@ -117,7 +123,7 @@ impl HeaderBytes {
     }
 }
 
-fn channel_list(planes: &[Plane<'_>]) -> Vec<u8> {
+fn channel_list(planes: &[ChannelPlane<'_>]) -> Vec<u8> {
     let mut list = Vec::new();
     for plane in planes {
         list.extend(plane.name.as_bytes());

@@ -18,7 +18,7 @@ use bansho_base::image::{Frame, Precision};
 
 use super::{
     attribute::{self, Window},
-    plane::{Plane, Row, planes},
+    plane::{ChannelPlane, Row, planes},
 };
 use crate::{
     error::{MediaError, SizeRule},
@@ -63,7 +63,7 @@ pub fn encode(frame: &Frame, path: &Path) -> Result<Vec<u8>, MediaError> {
     Ok(file)
 }
 
-fn check_planes(frame: &Frame, planes: &[Plane<'_>], path: &Path) -> Result<(), MediaError> {
+fn check_planes(frame: &Frame, planes: &[ChannelPlane<'_>], path: &Path) -> Result<(), MediaError> {
     let expected = frame.beauty.width() * frame.beauty.height();
     for (index, plane) in planes.iter().enumerate() {
         let name = &*plane.name;
@@ -101,10 +101,10 @@ fn window(origin: [i64; 2], size: [usize; 2]) -> Option<Window> {
     Some(Window { min, max })
 }
 
-fn compressed_blocks(frame: &Frame, planes: &[Plane<'_>], path: &Path) -> Result<Vec<Vec<u8>>, MediaError> {
+fn compressed_blocks(frame: &Frame, planes: &[ChannelPlane<'_>], path: &Path) -> Result<Vec<Vec<u8>>, MediaError> {
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     let header = crate_header(planes, width, height);
-    let bytes_per_line = width * planes.iter().map(Plane::bytes_per_value).sum::<usize>();
+    let bytes_per_line = width * planes.iter().map(ChannelPlane::bytes_per_value).sum::<usize>();
     let block = |index: usize| {
         let lines = index * LINES_PER_BLOCK..((index + 1) * LINES_PER_BLOCK).min(height);
         let (mut bytes, mut row) = (Vec::with_capacity(bytes_per_line * lines.len()), Row::default());
@@ -122,8 +122,8 @@ fn compressed_blocks(frame: &Frame, planes: &[Plane<'_>], path: &Path) -> Result
 }
 
 /// What the crate must know of the picture in order to compress a part of it.
-fn crate_header(planes: &[Plane<'_>], width: usize, height: usize) -> Header {
-    let channel = |plane: &Plane<'_>| {
+fn crate_header(planes: &[ChannelPlane<'_>], width: usize, height: usize) -> Header {
+    let channel = |plane: &ChannelPlane<'_>| {
         let kind = match plane.precision {
             Precision::Half => SampleType::F16,
             Precision::Single => SampleType::F32,

@@ -41,8 +41,8 @@ pub(crate) fn conversion(chromaticities: Option<[[f32; 2]; 4]>) -> Option<Conver
 /// XYZ of chromaticity xy with Y = 1.
 fn xyz([x, y]: [f32; 2]) -> Option<[f64; 3]> {
     let (x, y) = (f64::from(x), f64::from(y));
-    let colour = [x / y, 1.0, (1.0 - x - y) / y];
-    colour.iter().all(|value| value.is_finite()).then_some(colour)
+    let color = [x / y, 1.0, (1.0 - x - y) / y];
+    color.iter().all(|value| value.is_finite()).then_some(color)
 }
 
 fn white(chromaticities: [[f32; 2]; 4]) -> Option<[f64; 3]> {

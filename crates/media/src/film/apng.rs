@@ -6,7 +6,7 @@ use std::{io::Write, path::Path};
 
 use bansho_base::image::DisplayImage;
 
-use super::{ordered::Film, timing};
+use super::{ordered::FilmEncoder, timing};
 use crate::{
     error::MediaError,
     output::{atomic::AtomicFile, flatten, overwrite_policy::OverwritePolicy},
@@ -64,16 +64,16 @@ pub(crate) fn prepare(picture: &DisplayImage, opaque: bool, path: &Path) -> Resu
     }
 }
 
-impl Film for ApngFilm {
-    type Piece = Vec<u8>;
+impl FilmEncoder for ApngFilm {
+    type EncodedFrame = Vec<u8>;
 
-    fn append(&mut self, piece: Vec<u8>) -> Result<(), MediaError> {
-        let (mut bytes, is_first) = (Vec::with_capacity(piece.len() + 256), self.sequence == 0);
+    fn append(&mut self, encoded: Vec<u8>) -> Result<(), MediaError> {
+        let (mut bytes, is_first) = (Vec::with_capacity(encoded.len() + 256), self.sequence == 0);
         if is_first {
             bytes.extend(chunk::SIGNATURE);
         }
         let mut controlled = false;
-        for chunk in chunk::chunks(&piece).into_iter().flatten().flatten() {
+        for chunk in chunk::chunks(&encoded).into_iter().flatten().flatten() {
             match &chunk.kind {
                 b"IDAT" => {
                     if !std::mem::replace(&mut controlled, true) {

@@ -14,7 +14,7 @@ use ::gif::{DisposalMethod, Encoder, Extension, Repeat};
 use bansho_base::image::{DisplayImage, DisplayPixels};
 
 use super::{
-    ordered::Film,
+    ordered::FilmEncoder,
     palette::{Ditherer, FrameHistogram, Histogram, palette},
     timing::GifTiming,
 };
@@ -30,7 +30,7 @@ const SIDE_LIMIT: usize = 65535;
 /// Frames that are dithered and compressed at a time.
 const BATCH: usize = 8;
 /// Alpha from which a pixel of a transparent GIF is shown.
-const SHOWN: u8 = 128;
+const ALPHA_THRESHOLD: u8 = 128;
 
 /// What is the same for every frame.
 #[derive(Clone, Debug)]
@@ -43,20 +43,20 @@ pub(crate) struct GifFormat {
 }
 
 /// A frame, compressed, and the colours it holds; `None` for one that a fast film leaves out.
-pub(crate) struct GifPiece(Option<(Vec<u8>, FrameHistogram)>);
+pub(crate) struct GifFrame(Option<(Vec<u8>, FrameHistogram)>);
 
 pub(crate) struct GifFilm {
     file: AtomicFile,
     spool: File,
     /// Where in the spool each kept frame lies, and which frame it is.
-    spooled: Vec<Spooled>,
+    spooled: Vec<SpooledFrame>,
     histogram: Histogram,
     format: GifFormat,
     received: usize,
 }
 
 #[derive(Clone, Copy)]
-struct Spooled {
+struct SpooledFrame {
     index: usize,
     length: usize,
 }
@@ -81,15 +81,15 @@ pub(crate) fn prepare(
     index: usize,
     format: &GifFormat,
     path: &Path,
-) -> Result<GifPiece, MediaError> {
-    if !format.timing.keeps(index) {
-        return Ok(GifPiece(None));
+) -> Result<GifFrame, MediaError> {
+    if !format.timing.is_kept(index) {
+        return Ok(GifFrame(None));
     }
     let pixels = if format.transparent {
         let mut pixels = flatten::to_eight_bits(&picture.pixels);
-        pixels
-            .iter_mut()
-            .for_each(|pixel| *pixel = if pixel[3] < SHOWN { [0; 4] } else { [pixel[0], pixel[1], pixel[2], 255] });
+        pixels.iter_mut().for_each(|pixel| {
+            *pixel = if pixel[3] < ALPHA_THRESHOLD { [0; 4] } else { [pixel[0], pixel[1], pixel[2], 255] }
+        });
         pixels
     } else {
         flatten::to_eight_bits(&flatten::over_black(picture).pixels)
@@ -103,16 +103,16 @@ pub(crate) fn prepare(
         alpha: picture.alpha,
         pixels: DisplayPixels::Eight(pixels),
     };
-    Ok(GifPiece(Some((png::encode_frame(&picture, path)?, histogram))))
+    Ok(GifFrame(Some((png::encode_frame(&picture, path)?, histogram))))
 }
 
-impl Film for GifFilm {
-    type Piece = GifPiece;
+impl FilmEncoder for GifFilm {
+    type EncodedFrame = GifFrame;
 
-    fn append(&mut self, GifPiece(piece): GifPiece) -> Result<(), MediaError> {
-        if let Some((bytes, histogram)) = piece {
+    fn append(&mut self, GifFrame(encoded): GifFrame) -> Result<(), MediaError> {
+        if let Some((bytes, histogram)) = encoded {
             self.spool.write_all(&bytes).map_err(|source| MediaError::from_io(self.file.path(), source))?;
-            self.spooled.push(Spooled { index: self.received, length: bytes.len() });
+            self.spooled.push(SpooledFrame { index: self.received, length: bytes.len() });
             self.histogram.add(&histogram);
         }
         self.received += 1;
@@ -129,10 +129,10 @@ impl Film for GifFilm {
             format: &self.format,
             path: &path,
         };
-        let mut colours = entries.into_flattened();
-        colours.extend(transparent.iter().flat_map(|_| [0; 3]));
+        let mut colors = entries.into_flattened();
+        colors.extend(transparent.iter().flat_map(|_| [0; 3]));
         self.spool.seek(SeekFrom::Start(0)).map_err(|source| MediaError::from_io(&path, source))?;
-        writer.write(&mut self.spool, &self.spooled, &colours, BufWriter::new(self.file.file()))?;
+        writer.write(&mut self.spool, &self.spooled, &colors, BufWriter::new(self.file.file()))?;
         self.file.finish()
     }
 }
@@ -148,17 +148,17 @@ impl Writer<'_> {
     fn write(
         &self,
         spool: &mut File,
-        spooled: &[Spooled],
-        colours: &[u8],
+        spooled: &[SpooledFrame],
+        colors: &[u8],
         mut out: BufWriter<&mut File>,
     ) -> Result<(), MediaError> {
         let [width, height] = self.format.size.map(|side| side as u16);
-        let mut encoder = Encoder::new(&mut out, width, height, colours).map_err(|error| self.encoding(error))?;
+        let mut encoder = Encoder::new(&mut out, width, height, colors).map_err(|error| self.encoding(error))?;
         encoder.set_repeat(Repeat::Infinite).map_err(|error| self.encoding(error))?;
-        let comment = encoder.write_raw_extension(Extension::Comment.into(), &[provenance::TAG.as_bytes()]);
+        let comment = encoder.write_raw_extension(Extension::Comment.into(), &[provenance::COMMENT_TAG.as_bytes()]);
         comment.map_err(|error| self.encoding(error))?;
         for batch in spooled.chunks(BATCH) {
-            let read = |spooled: &Spooled| {
+            let read = |spooled: &SpooledFrame| {
                 let mut bytes = vec![0; spooled.length];
                 spool.read_exact(&mut bytes).map_err(|source| MediaError::from_io(self.path, source))?;
                 Ok((spooled.index, bytes))
@@ -177,7 +177,7 @@ impl Writer<'_> {
     /// One frame with its length, dithered and compressed.
     fn frame(&self, index: usize, bytes: &[u8]) -> Result<::gif::Frame<'static>, MediaError> {
         let [width, height] = self.format.size;
-        let (pixels, channels) = decoded(bytes).ok_or_else(|| MediaError::Encode {
+        let (pixels, channels) = unpack(bytes).ok_or_else(|| MediaError::Encode {
             path: PathBuf::from(self.path),
             reason: "a frame kept in the temporary file was lost".to_owned(),
         })?;
@@ -211,7 +211,7 @@ impl Writer<'_> {
 }
 
 /// The samples of a PNG that `prepare` made, and how many make a pixel.
-fn decoded(bytes: &[u8]) -> Option<(Vec<u8>, usize)> {
+fn unpack(bytes: &[u8]) -> Option<(Vec<u8>, usize)> {
     let mut reader = ::png::Decoder::new(Cursor::new(bytes)).read_info().ok()?;
     let mut pixels = vec![0; reader.output_buffer_size()?];
     let info = reader.next_frame(&mut pixels).ok()?;

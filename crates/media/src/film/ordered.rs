@@ -9,40 +9,40 @@ use std::{
 use crate::error::MediaError;
 
 /// A file that holds all frames one after the other.
-pub(crate) trait Film: Send {
+pub(crate) trait FilmEncoder: Send {
     /// A frame, ready to be appended.
-    type Piece: Send;
+    type EncodedFrame: Send;
 
     /// Adds the next frame.
-    fn append(&mut self, piece: Self::Piece) -> Result<(), MediaError>;
+    fn append(&mut self, encoded: Self::EncodedFrame) -> Result<(), MediaError>;
 
     /// Ends the file and gives it its name. Dropping a film instead leaves nothing behind.
     fn finish(self) -> Result<(), MediaError>;
 }
 
 /// A film that takes its frames in any order within a window and never blocks on one that is missing.
-pub(crate) struct Ordered<F: Film> {
+pub(crate) struct ReorderBuffer<F: FilmEncoder> {
     path: PathBuf,
     frame_count: usize,
     window: usize,
     state: Mutex<State<F>>,
 }
 
-struct State<F: Film> {
+struct State<F: FilmEncoder> {
     /// `None` once a frame has failed.
     film: Option<F>,
     next: usize,
-    waiting: BTreeMap<usize, F::Piece>,
+    waiting: BTreeMap<usize, F::EncodedFrame>,
 }
 
-impl<F: Film> Ordered<F> {
+impl<F: FilmEncoder> ReorderBuffer<F> {
     pub(crate) fn new(film: F, path: PathBuf, frame_count: usize, window: usize) -> Self {
         let state = Mutex::new(State { film: Some(film), next: 0, waiting: BTreeMap::new() });
         Self { path, frame_count, window: window.max(1), state }
     }
 
     /// Appends the frame at position `index`, now or when those before it have come.
-    pub(crate) fn push(&self, index: usize, piece: F::Piece) -> Result<(), MediaError> {
+    pub(crate) fn push(&self, index: usize, encoded: F::EncodedFrame) -> Result<(), MediaError> {
         // A thread that panicked while it held the lock left `film` as it was; the file is never named, so it is harmless.
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let state = &mut *state;
@@ -58,9 +58,9 @@ impl<F: Film> Ordered<F> {
                 window: self.window,
             });
         }
-        state.waiting.insert(index, piece);
-        while let Some(piece) = state.waiting.remove(&state.next) {
-            if let Err(error) = film.append(piece) {
+        state.waiting.insert(index, encoded);
+        while let Some(encoded) = state.waiting.remove(&state.next) {
+            if let Err(error) = film.append(encoded) {
                 state.film = None;
                 state.waiting.clear();
                 return Err(error);
@@ -89,14 +89,14 @@ mod tests {
 
     struct Record(Arc<Mutex<Vec<usize>>>);
 
-    impl Film for Record {
-        type Piece = usize;
+    impl FilmEncoder for Record {
+        type EncodedFrame = usize;
 
-        fn append(&mut self, piece: usize) -> Result<(), MediaError> {
-            if piece == usize::MAX {
+        fn append(&mut self, encoded: usize) -> Result<(), MediaError> {
+            if encoded == usize::MAX {
                 return Err(MediaError::DiskFull { path: PathBuf::new() });
             }
-            self.0.lock().unwrap().push(piece);
+            self.0.lock().unwrap().push(encoded);
             Ok(())
         }
 
@@ -106,9 +106,9 @@ mod tests {
         }
     }
 
-    fn film(frames: usize, window: usize) -> (Ordered<Record>, Arc<Mutex<Vec<usize>>>) {
+    fn film(frames: usize, window: usize) -> (ReorderBuffer<Record>, Arc<Mutex<Vec<usize>>>) {
         let record = Arc::new(Mutex::new(Vec::new()));
-        (Ordered::new(Record(record.clone()), PathBuf::from("a.gif"), frames, window), record)
+        (ReorderBuffer::new(Record(record.clone()), PathBuf::from("a.gif"), frames, window), record)
     }
 
     #[test]

@@ -13,9 +13,9 @@ const BINS: usize = 1 << (3 * BITS);
 /// Codes of a channel that fall into a bin.
 const BIN_WIDTH: u8 = 1 << (8 - BITS);
 /// Rounds of moving colours to the means of their neighbourhoods.
-const ROUNDS: usize = 3;
+const KMEANS_STEPS: usize = 3;
 /// How much the eye minds an error in red, green and blue.
-const WEIGHTS: [f32; 3] = [3.0, 4.0, 2.0];
+const CHANNEL_WEIGHTS: [f32; 3] = [3.0, 4.0, 2.0];
 
 /// How many colors fall into a bin, and sums of what their channels have beyond the bin's least codes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -29,7 +29,7 @@ impl Bin<u64> {
     /// skies have colors of few bins, and would all become darker or brighter.
     fn mean(&self, index: usize) -> [f32; 3] {
         std::array::from_fn(|axis| {
-            (f64::from(least_code(index, axis)) + self.beyond[axis] as f64 / self.count as f64) as f32
+            (f64::from(bin_min_code(index, axis)) + self.beyond[axis] as f64 / self.count as f64) as f32
         })
     }
 }
@@ -45,7 +45,7 @@ impl FrameHistogram {
 
     /// Counts a color.
     pub(crate) fn count(&mut self, color: [u8; 3]) {
-        let bin = &mut self.0[bin(color)];
+        let bin = &mut self.0[histogram_bin(color)];
         bin.count = bin.count.saturating_add(1);
         for (sum, code) in bin.beyond.iter_mut().zip(color) {
             *sum = sum.saturating_add(u32::from(code % BIN_WIDTH));
@@ -70,77 +70,77 @@ impl Histogram {
         }
     }
 
-    fn colours(&self) -> Vec<Weighted> {
+    fn colors(&self) -> Vec<WeightedColor> {
         let occupied = self.0.iter().enumerate().filter(|(_, bin)| bin.count > 0);
         // By the root of their number: a bright core of few pixels must not lose to the many of the glow around it.
-        let weighted = |(index, bin): (usize, &Bin<u64>)| Weighted {
-            colour: bin.mean(index),
+        let weighted = |(index, bin): (usize, &Bin<u64>)| WeightedColor {
+            color: bin.mean(index),
             weight: (bin.count as f64).sqrt() as f32,
         };
         occupied.map(weighted).collect()
     }
 }
 
-fn bin([r, g, b]: [u8; 3]) -> usize {
+fn histogram_bin([r, g, b]: [u8; 3]) -> usize {
     let part = |channel: u8| usize::from(channel) >> (8 - BITS);
     (part(r) << (2 * BITS)) | (part(g) << BITS) | part(b)
 }
 
 /// The least code of a channel in the bin with this index.
-fn least_code(index: usize, axis: usize) -> u8 {
+fn bin_min_code(index: usize, axis: usize) -> u8 {
     (((index >> ((2 - axis) * BITS)) & ((1 << BITS) - 1)) << (8 - BITS)) as u8
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Weighted {
-    colour: [f32; 3],
+struct WeightedColor {
+    color: [f32; 3],
     weight: f32,
 }
 
 /// Colours that share a palette entry while the palette is built.
-struct Cell {
-    colours: Vec<Weighted>,
+struct ColorBox {
+    colors: Vec<WeightedColor>,
     /// Axis of the greatest spread, mean along it, and spread times weight.
     axis: usize,
     mean: f32,
     spread: f32,
 }
 
-impl Cell {
-    fn new(colours: Vec<Weighted>) -> Self {
-        let total: f32 = colours.iter().map(|entry| entry.weight).sum();
+impl ColorBox {
+    fn new(colors: Vec<WeightedColor>) -> Self {
+        let total: f32 = colors.iter().map(|entry| entry.weight).sum();
         let along = |axis: usize| {
-            let sum: f32 = colours.iter().map(|entry| entry.weight * entry.colour[axis]).sum();
+            let sum: f32 = colors.iter().map(|entry| entry.weight * entry.color[axis]).sum();
             let mean = sum / total.max(f32::MIN_POSITIVE);
-            let square = |entry: &Weighted| entry.weight * (entry.colour[axis] - mean) * (entry.colour[axis] - mean);
-            (axis, mean, WEIGHTS[axis] * colours.iter().map(square).sum::<f32>())
+            let square = |entry: &WeightedColor| entry.weight * (entry.color[axis] - mean) * (entry.color[axis] - mean);
+            (axis, mean, CHANNEL_WEIGHTS[axis] * colors.iter().map(square).sum::<f32>())
         };
         let [a, b, c] = [0, 1, 2].map(along);
         let (axis, mean, spread) = [b, c].into_iter().fold(a, |best, next| if next.2 > best.2 { next } else { best });
-        Self { colours, axis, mean, spread }
+        Self { colors, axis, mean, spread }
     }
 
     fn split(self) -> [Self; 2] {
         let (axis, mean) = (self.axis, self.mean);
-        let (low, high) = self.colours.into_iter().partition(|entry| entry.colour[axis] <= mean);
+        let (low, high) = self.colors.into_iter().partition(|entry| entry.color[axis] <= mean);
         [Self::new(low), Self::new(high)]
     }
 
     fn centroid(&self) -> [f32; 3] {
-        mean(&self.colours).unwrap_or([0.0; 3])
+        mean(&self.colors).unwrap_or([0.0; 3])
     }
 }
 
-fn mean(colours: &[Weighted]) -> Option<[f32; 3]> {
-    let total: f32 = colours.iter().map(|entry| entry.weight).sum();
-    let along = |axis: usize| colours.iter().map(|entry| entry.weight * entry.colour[axis]).sum::<f32>() / total;
+fn mean(colors: &[WeightedColor]) -> Option<[f32; 3]> {
+    let total: f32 = colors.iter().map(|entry| entry.weight).sum();
+    let along = |axis: usize| colors.iter().map(|entry| entry.weight * entry.color[axis]).sum::<f32>() / total;
     (total > 0.0).then(|| [0, 1, 2].map(along))
 }
 
 /// Up to `size` colours that stand for all that were counted; at least one.
 pub(crate) fn palette(histogram: &Histogram, size: usize) -> Vec<[u8; 3]> {
-    let colours = histogram.colours();
-    let mut cells = vec![Cell::new(colours.clone())];
+    let colors = histogram.colors();
+    let mut cells = vec![ColorBox::new(colors.clone())];
     while cells.len() < size {
         let widest =
             (0..cells.len()).fold(0, |best, next| if cells[next].spread > cells[best].spread { next } else { best });
@@ -150,29 +150,29 @@ pub(crate) fn palette(histogram: &Histogram, size: usize) -> Vec<[u8; 3]> {
         let halves = cells.swap_remove(widest).split();
         cells.extend(halves);
     }
-    let mut entries: Vec<[f32; 3]> = cells.iter().map(Cell::centroid).collect();
-    for _ in 0..ROUNDS {
-        entries = moved_to_means(&colours, &entries);
+    let mut entries: Vec<[f32; 3]> = cells.iter().map(ColorBox::centroid).collect();
+    for _ in 0..KMEANS_STEPS {
+        entries = kmeans_step(&colors, &entries);
     }
-    entries.into_iter().map(|colour| colour.map(|channel| (channel.clamp(0.0, 255.0) + 0.5) as u8)).collect()
+    entries.into_iter().map(|color| color.map(|channel| (channel.clamp(0.0, 255.0) + 0.5) as u8)).collect()
 }
 
-fn moved_to_means(colours: &[Weighted], entries: &[[f32; 3]]) -> Vec<[f32; 3]> {
+fn kmeans_step(colors: &[WeightedColor], entries: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let mut groups = vec![Vec::new(); entries.len()];
-    colours.iter().for_each(|entry| groups[nearest(entry.colour, entries)].push(*entry));
+    colors.iter().for_each(|entry| groups[nearest(entry.color, entries)].push(*entry));
     groups.iter().zip(entries).map(|(group, entry)| mean(group).unwrap_or(*entry)).collect()
 }
 
 /// Squared difference as the eye weighs it.
 fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
-    (0..3).map(|axis| WEIGHTS[axis] * (a[axis] - b[axis]) * (a[axis] - b[axis])).sum()
+    (0..3).map(|axis| CHANNEL_WEIGHTS[axis] * (a[axis] - b[axis]) * (a[axis] - b[axis])).sum()
 }
 
 /// The entry nearest to `colour`, the first of several as near.
-fn nearest(colour: [f32; 3], entries: &[[f32; 3]]) -> usize {
+fn nearest(color: [f32; 3], entries: &[[f32; 3]]) -> usize {
     let mut best = (0, f32::INFINITY);
     for (index, entry) in entries.iter().enumerate() {
-        let distance = distance(colour, *entry);
+        let distance = distance(color, *entry);
         if distance < best.1 {
             best = (index, distance);
         }
@@ -182,7 +182,7 @@ fn nearest(colour: [f32; 3], entries: &[[f32; 3]]) -> usize {
 
 /// Two entries of the palette between which a colour lies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Pair {
+struct EntryPair {
     near: u8,
     far: u8,
 }
@@ -191,7 +191,7 @@ struct Pair {
 pub(crate) struct Ditherer {
     entries: Vec<[f32; 3]>,
     /// For the eight octants of each bin: a pair for a whole bin would show the bins of dark skies as bands.
-    pairs: Vec<[Pair; 8]>,
+    pairs: Vec<[EntryPair; 8]>,
 }
 
 /// Which of its bin's halves a color lies in along each axis.
@@ -200,11 +200,11 @@ fn octant(color: [u8; 3]) -> usize {
 }
 
 /// The color in the middle of an octant of the bin with this index.
-fn middle(index: usize, octant: usize) -> [f32; 3] {
+fn octant_center(index: usize, octant: usize) -> [f32; 3] {
     let half = BIN_WIDTH / 2;
     std::array::from_fn(|axis| {
         let upper = (octant >> (2 - axis)) as u8 & 1;
-        f32::from(least_code(index, axis) + upper * half) + 0.5 * f32::from(half - 1)
+        f32::from(bin_min_code(index, axis) + upper * half) + 0.5 * f32::from(half - 1)
     })
 }
 
@@ -216,13 +216,13 @@ const OCTANT_RADIUS: f32 = 1.5;
 impl Ditherer {
     /// Finds for every colour that was counted the pair to mix it from. `palette` has 1 to 256 entries.
     pub(crate) fn new(palette: &[[u8; 3]], histogram: &Histogram) -> Self {
-        let entries: Vec<[f32; 3]> = palette.iter().take(256).map(|colour| colour.map(f32::from)).collect();
+        let entries: Vec<[f32; 3]> = palette.iter().take(256).map(|color| color.map(f32::from)).collect();
         let counts = histogram.0.par_iter().enumerate().with_min_len(1024);
         let pair_of = |(index, bin): (usize, &Bin<u64>)| {
             if bin.count == 0 {
-                return [Pair::default(); 8];
+                return [EntryPair::default(); 8];
             }
-            std::array::from_fn(|octant| pair(middle(index, octant), &entries))
+            std::array::from_fn(|octant| pair(octant_center(index, octant), &entries))
         };
         let pairs = counts.map(pair_of).collect();
         Self { entries, pairs }
@@ -230,41 +230,42 @@ impl Ditherer {
 
     /// The entry for `colour` at column `x`, row `y`.
     #[inline]
-    pub(crate) fn index(&self, colour: [u8; 3], x: usize, y: usize) -> u8 {
-        let Pair { near, far } = self.pairs[bin(colour)][octant(colour)];
-        let share = share(colour.map(f32::from), self.entries[usize::from(near)], self.entries[usize::from(far)]);
-        if share > BAYER[y & 7][x & 7] { far } else { near }
+    pub(crate) fn index(&self, color: [u8; 3], x: usize, y: usize) -> u8 {
+        let EntryPair { near, far } = self.pairs[histogram_bin(color)][octant(color)];
+        let far_fraction =
+            far_fraction(color.map(f32::from), self.entries[usize::from(near)], self.entries[usize::from(far)]);
+        if far_fraction > BAYER[y & 7][x & 7] { far } else { near }
     }
 }
 
 /// How much of `far` must be mixed with `near` to come nearest to `colour`, from 0 to 1.
-fn share(colour: [f32; 3], near: [f32; 3], far: [f32; 3]) -> f32 {
+fn far_fraction(color: [f32; 3], near: [f32; 3], far: [f32; 3]) -> f32 {
     let (mut along, mut length) = (0.0, 0.0);
     for axis in 0..3 {
         let step = far[axis] - near[axis];
-        along += WEIGHTS[axis] * step * (colour[axis] - near[axis]);
-        length += WEIGHTS[axis] * step * step;
+        along += CHANNEL_WEIGHTS[axis] * step * (color[axis] - near[axis]);
+        length += CHANNEL_WEIGHTS[axis] * step * step;
     }
     if length > 0.0 { (along / length).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// The pair for the colors of an octant, of which `colour` is the middle.
-fn pair(colour: [f32; 3], entries: &[[f32; 3]]) -> Pair {
-    let near = nearest(colour, entries);
+fn pair(color: [f32; 3], entries: &[[f32; 3]]) -> EntryPair {
+    let near = nearest(color, entries);
     let (start, mut best) = (entries[near], (near, f32::INFINITY));
     for (far, &end) in entries.iter().enumerate().filter(|(far, _)| *far != near) {
-        let t = share(colour, start, end);
+        let t = far_fraction(color, start, end);
         let mixed = std::array::from_fn(|axis| (end[axis] - start[axis]).mul_add(t, start[axis]));
         let length = distance(start, end);
         // Were the middle itself an entry, any other would do beside it, also the brightest; but other colors of the octant lie beside the
         // middle, and would get dots of that.
         let dots = (t + OCTANT_RADIUS / length.sqrt().max(1.0)).min(0.5);
-        let error = distance(colour, mixed) + DOT_PENALTY * dots * (1.0 - dots) * length;
+        let error = distance(color, mixed) + DOT_PENALTY * dots * (1.0 - dots) * length;
         if error < best.1 {
             best = (far, error);
         }
     }
-    Pair { near: near as u8, far: best.0 as u8 }
+    EntryPair { near: near as u8, far: best.0 as u8 }
 }
 
 /// Bayer's matrix of 8 x 8: each threshold once, spread as evenly as can be.
@@ -291,10 +292,10 @@ const fn bayer() -> [[f32; 8]; 8] {
 mod tests {
     use super::*;
 
-    fn counted(colours: &[([u8; 3], usize)]) -> Histogram {
+    fn counted(colors: &[([u8; 3], usize)]) -> Histogram {
         let (mut frame, mut histogram) = (FrameHistogram::new(), Histogram::new());
-        for (colour, times) in colours {
-            (0..*times).for_each(|_| frame.count(*colour));
+        for (color, times) in colors {
+            (0..*times).for_each(|_| frame.count(*color));
         }
         histogram.add(&frame);
         histogram
@@ -360,11 +361,11 @@ mod tests {
     fn a_ramp_of_fire_is_covered_within_two_codes() {
         let fire = |heat: usize| [heat.min(255) as u8, (heat * heat / 300).min(255) as u8, (heat / 5) as u8];
         let histogram = counted(&(0..256).map(|heat| (fire(heat), 10)).collect::<Vec<_>>());
-        let palette: Vec<[f32; 3]> = palette(&histogram, 255).into_iter().map(|colour| colour.map(f32::from)).collect();
+        let palette: Vec<[f32; 3]> = palette(&histogram, 255).into_iter().map(|color| color.map(f32::from)).collect();
         for heat in 0..256 {
-            let colour = fire(heat).map(f32::from);
-            let found = palette[nearest(colour, &palette)];
-            assert!((0..3).all(|axis| (found[axis] - colour[axis]).abs() <= 4.5), "{colour:?} {found:?}");
+            let color = fire(heat).map(f32::from);
+            let found = palette[nearest(color, &palette)];
+            assert!((0..3).all(|axis| (found[axis] - color[axis]).abs() <= 4.5), "{color:?} {found:?}");
         }
     }
 

@@ -1,29 +1,29 @@
 //! When frames of an animation begin, in the units that its format counts in.
 
 /// Greatest common divisor.
-fn divisor(a: u32, b: u32) -> u32 {
-    if b == 0 { a } else { divisor(b, a % b) }
+fn greatest_common_divisor(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
 /// `fps` in lowest terms; `None` for a rate of zero or without end.
-pub(crate) fn reduced([frames, seconds]: [u32; 2]) -> Option<[u32; 2]> {
-    let common = divisor(frames, seconds);
+pub(crate) fn reduce([frames, seconds]: [u32; 2]) -> Option<[u32; 2]> {
+    let common = greatest_common_divisor(frames, seconds);
     (frames > 0 && seconds > 0).then(|| [frames / common, seconds / common])
 }
 
 /// The rate nearest to `fps` among the convergents of its continued fraction whose numbers are `most` at the most: `fps` itself in lowest terms
 /// where they are, else less than 1 part in `most` away. `None` for a rate that is zero, without end, or beyond what such numbers hold.
-pub(crate) fn within(fps: [u32; 2], most: u32) -> Option<[u32; 2]> {
-    let [mut rest, mut divisor] = reduced(fps)?.map(u64::from);
+pub(crate) fn approximate(fps: [u32; 2], most: u32) -> Option<[u32; 2]> {
+    let [mut rest, mut greatest_common_divisor] = reduce(fps)?.map(u64::from);
     let (mut before, mut found) = ([0_u64, 1], [1_u64, 0]);
-    while divisor > 0 {
-        let whole = rest / divisor;
+    while greatest_common_divisor > 0 {
+        let whole = rest / greatest_common_divisor;
         let next = [0, 1].map(|part| whole * found[part] + before[part]);
         if next.iter().any(|part| *part > u64::from(most)) {
             break;
         }
         (before, found) = (found, next);
-        (rest, divisor) = (divisor, rest % divisor);
+        (rest, greatest_common_divisor) = (greatest_common_divisor, rest % greatest_common_divisor);
     }
     let [frames, seconds] = found.map(|part| u32::try_from(part).unwrap_or(most));
     (frames > 0 && seconds > 0).then_some([frames, seconds])
@@ -32,12 +32,12 @@ pub(crate) fn within(fps: [u32; 2], most: u32) -> Option<[u32; 2]> {
 /// Length of a frame for APNG, seconds as a fraction of 16-bit numbers. Rates whose fraction is longer become the nearest that fits, less than
 /// 1 part in 65,535 away.
 pub(crate) fn apng_delay(fps: [u32; 2]) -> Option<[u16; 2]> {
-    let [frames, seconds] = within(fps, u32::from(u16::MAX))?;
+    let [frames, seconds] = approximate(fps, u32::from(u16::MAX))?;
     Some([u16::try_from(seconds).ok()?, u16::try_from(frames).ok()?])
 }
 
 /// Shortest length of a GIF frame that programs show as it is, in hundredths of a second; shorter ones they slow down.
-const SHORTEST_CS: u64 = 2;
+const MIN_DELAY_CS: u64 = 2;
 
 /// Frames of a GIF: which are kept and how long each stays.
 #[derive(Clone, Copy, Debug)]
@@ -48,36 +48,36 @@ pub(crate) struct GifTiming {
 impl GifTiming {
     /// `None` for a rate of zero, or so slow that a frame's length does not fit.
     pub(crate) fn new(fps: [u32; 2]) -> Option<Self> {
-        let fps = reduced(fps)?.map(u64::from);
+        let fps = reduce(fps)?.map(u64::from);
         (fps[1] * 100 / fps[0] < u64::from(u16::MAX)).then_some(Self { fps })
     }
 
     fn is_too_fast(&self) -> bool {
-        self.fps[0] * SHORTEST_CS > self.fps[1] * 100
+        self.fps[0] * MIN_DELAY_CS > self.fps[1] * 100
     }
 
     /// The slot of a fiftieth of a second in which frame `index` begins.
     fn slot(&self, index: usize) -> u64 {
-        index as u64 * self.fps[1] * (100 / SHORTEST_CS) / self.fps[0]
+        index as u64 * self.fps[1] * (100 / MIN_DELAY_CS) / self.fps[0]
     }
 
     /// Whether frame `index` is shown: all up to 50 frames a second; of faster films the first frame in each fiftieth.
-    pub(crate) fn keeps(&self, index: usize) -> bool {
+    pub(crate) fn is_kept(&self, index: usize) -> bool {
         index == 0 || !self.is_too_fast() || self.slot(index) != self.slot(index - 1)
     }
 
     /// When frame `index` begins, hundredths of a second, rounded from the exact time so that no error adds up.
     pub(crate) fn start_cs(&self, index: usize) -> u64 {
         if self.is_too_fast() {
-            return self.slot(index) * SHORTEST_CS;
+            return self.slot(index) * MIN_DELAY_CS;
         }
         (index as u64 * self.fps[1] * 200 + self.fps[0]) / (2 * self.fps[0])
     }
 
     /// How long frame `index` of `count` stays, until the next that is kept, hundredths of a second.
     pub(crate) fn length_cs(&self, index: usize, count: usize) -> u16 {
-        let next = (index + 1..count).find(|&next| self.keeps(next)).unwrap_or(count);
-        let length = self.start_cs(next).saturating_sub(self.start_cs(index)).max(SHORTEST_CS);
+        let next = (index + 1..count).find(|&next| self.is_kept(next)).unwrap_or(count);
+        let length = self.start_cs(next).saturating_sub(self.start_cs(index)).max(MIN_DELAY_CS);
         u16::try_from(length).unwrap_or(u16::MAX)
     }
 }
@@ -93,7 +93,7 @@ mod tests {
             let exact = 24_000.0 * f64::from(fps[1]) / f64::from(fps[0]);
             let total: u64 = (0..240).map(|index| u64::from(timing.length_cs(index, 240))).sum();
             assert!((total as f64 - exact).abs() <= 0.5, "{fps:?}: {total} for {exact}");
-            assert!((0..240).all(|index| timing.keeps(index)));
+            assert!((0..240).all(|index| timing.is_kept(index)));
         }
         // 30 frames a second: 3, 4 and 3 hundredths, again and again.
         let timing = GifTiming::new([30, 1]).unwrap();
@@ -105,7 +105,7 @@ mod tests {
         for (fps, kept) in [([60, 1], 50), ([100, 1], 50), ([120, 1], 50), ([240, 1], 50)] {
             let timing = GifTiming::new(fps).unwrap();
             let frames = fps[0] as usize;
-            let shown: Vec<usize> = (0..frames).filter(|&index| timing.keeps(index)).collect();
+            let shown: Vec<usize> = (0..frames).filter(|&index| timing.is_kept(index)).collect();
             assert_eq!(shown.len(), kept, "{fps:?}");
             assert!(shown.iter().all(|&index| timing.length_cs(index, frames) == 2));
             let gaps: Vec<usize> = shown.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -135,12 +135,12 @@ mod tests {
             let [seconds, frames] = apng_delay(fps).unwrap().map(u32::from);
             let error = (rate([frames, seconds]) / exact - 1.0).abs();
             assert!(error < 1.0 / 65_535.0, "{fps:?}: {frames}/{seconds}, wrong by {error}");
-            let signed = within(fps, i32::MAX as u32).unwrap();
+            let signed = approximate(fps, i32::MAX as u32).unwrap();
             assert!((rate(signed) / exact - 1.0).abs() < 1.0 / 2_147_483_647.0, "{fps:?}: {signed:?}");
         }
-        assert_eq!(within([60_000, 2000], u32::MAX), Some([30, 1]));
-        assert_eq!(within([u32::MAX, u32::MAX - 1], u32::MAX), Some([u32::MAX, u32::MAX - 1]));
-        assert_eq!((within([1, 100_000], 65_535), within([100_000, 1], 65_535)), (None, None));
+        assert_eq!(approximate([60_000, 2000], u32::MAX), Some([30, 1]));
+        assert_eq!(approximate([u32::MAX, u32::MAX - 1], u32::MAX), Some([u32::MAX, u32::MAX - 1]));
+        assert_eq!((approximate([1, 100_000], 65_535), approximate([100_000, 1], 65_535)), (None, None));
     }
 
     #[test]

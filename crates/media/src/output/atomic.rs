@@ -12,8 +12,8 @@ use std::{
 use tempfile::NamedTempFile;
 
 use super::{
-    overwrite_policy::{Kept, OverwritePolicy},
-    temporary_files::{self, Listed},
+    overwrite_policy::{OverwriteError, OverwritePolicy},
+    temporary_files::{self, TemporaryFileGuard},
 };
 use crate::error::MediaError;
 
@@ -22,7 +22,7 @@ use crate::error::MediaError;
 pub struct AtomicFile {
     temporary: NamedTempFile,
     /// Dropped after the file, which is then gone or finished.
-    _listed: Listed,
+    _guard: TemporaryFileGuard,
     path: PathBuf,
     /// What `path` means, where it is a link.
     target: PathBuf,
@@ -63,8 +63,8 @@ impl AtomicFile {
             _ => path.to_path_buf(),
         };
         allow(policy, &target, path)?;
-        let (temporary, listed) = temporary_files::list(|| temporary_in(folder_of(&target), &target)).map_err(fail)?;
-        Ok(Self { temporary, _listed: listed, path: path.to_path_buf(), target, policy: policy.clone() })
+        let (temporary, guard) = temporary_files::create(|| temporary_in(folder_of(&target), &target)).map_err(fail)?;
+        Ok(Self { temporary, _guard: guard, path: path.to_path_buf(), target, policy: policy.clone() })
     }
 
     /// The file to write to.
@@ -117,8 +117,8 @@ fn folder_of(path: &Path) -> &Path {
 fn allow(policy: &OverwritePolicy, target: &Path, path: &Path) -> Result<(), MediaError> {
     let path = path.to_path_buf();
     policy.check(target).map_err(|kept| match kept {
-        Kept::Input => MediaError::OverInput { path },
-        Kept::Unmarked => MediaError::Unmarked { path },
+        OverwriteError::Input => MediaError::OverInput { path },
+        OverwriteError::Unmarked => MediaError::Unmarked { path },
     })
 }
 

@@ -99,7 +99,7 @@ pub enum NamingError {
         path: PathBuf,
     },
     /// A frame number of more digits than numbers have.
-    #[error("{path}: a frame number of {digits} digits; allowed: up to {MOST_DIGITS}", path = .path.display())]
+    #[error("{path}: a frame number of {digits} digits; allowed: up to {MAX_DIGITS}", path = .path.display())]
     ManyDigits {
         /// The name.
         path: PathBuf,
@@ -125,7 +125,7 @@ pub enum NamingError {
 const ALLOWED: &str = ".png, .exr, .apng, .gif, .mp4, .mov, .webm";
 
 /// Most digits that a placeholder may ask for; more than any file system's use.
-const MOST_DIGITS: usize = 20;
+const MAX_DIGITS: usize = 20;
 
 /// A file name with at most one place for the frame number.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -151,7 +151,7 @@ impl FrameTemplate {
             let (placeholder, length) = match first {
                 '#' => {
                     let run = rest.len() - rest.trim_start_matches('#').len();
-                    if run > MOST_DIGITS {
+                    if run > MAX_DIGITS {
                         return Err(TemplateError::ManyDigits(run));
                     }
                     (Some(run), run)
@@ -194,7 +194,7 @@ fn printf_digits(text: &str) -> Option<(usize, usize)> {
     let inner = text.strip_prefix('%')?;
     let width = &inner[..inner.find('d')?];
     let digits = if width.is_empty() { 1 } else { width.parse().ok().filter(|_| !width.starts_with('+'))? };
-    (digits <= MOST_DIGITS).then_some((digits, width.len() + 2))
+    (digits <= MAX_DIGITS).then_some((digits, width.len() + 2))
 }
 
 /// What the pictures of a scene called `stem` are called unless another name is given.

@@ -7,7 +7,7 @@ use std::{
     sync::Arc,
 };
 
-use super::{file_identity::FileIdentity, provenance::is_marked};
+use super::{file_identity::FileIdentity, provenance::is_bansho_file};
 
 /// Files that work is made from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub struct OverwritePolicy {
 
 /// Why a file must stay as it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kept {
+pub enum OverwriteError {
     /// The work is made from it.
     Input,
     /// Bansho did not make it.
@@ -63,13 +63,17 @@ impl OverwritePolicy {
     ///
     /// # Errors
     /// Why not.
-    pub fn check(&self, path: &Path) -> Result<(), Kept> {
+    pub fn check(&self, path: &Path) -> Result<(), OverwriteError> {
         let Ok(there) = fs::metadata(path) else { return Ok(()) };
         if self.inputs.contains(path) {
-            return Err(Kept::Input);
+            return Err(OverwriteError::Input);
         }
         // What is no file is refused by whoever writes, for what it is.
-        if self.any || !there.is_file() || there.len() == 0 || is_marked(path) { Ok(()) } else { Err(Kept::Unmarked) }
+        if self.any || !there.is_file() || there.len() == 0 || is_bansho_file(path) {
+            Ok(())
+        } else {
+            Err(OverwriteError::Unmarked)
+        }
     }
 }
 
@@ -93,11 +97,11 @@ mod tests {
         for name in ["ours.ply", "empty.png", "new.png", "gone", ""] {
             assert_eq!((check(&usual, name), check(&all, name)), (Ok(()), Ok(())), "{name}");
         }
-        assert_eq!((check(&usual, "theirs.png"), check(&all, "theirs.png")), (Err(Kept::Unmarked), Ok(())));
-        assert_eq!([&usual, &all].map(|policy| check(policy, "plate.ply")), [Err(Kept::Input); 2]);
+        assert_eq!((check(&usual, "theirs.png"), check(&all, "theirs.png")), (Err(OverwriteError::Unmarked), Ok(())));
+        assert_eq!([&usual, &all].map(|policy| check(policy, "plate.ply")), [Err(OverwriteError::Input); 2]);
         // Saved anew, as editors do.
         fs::copy(at("plate.ply"), at("saved")).unwrap();
         fs::rename(at("saved"), at("plate.ply")).unwrap();
-        assert_eq!(check(&all, "plate.ply"), Err(Kept::Input));
+        assert_eq!(check(&all, "plate.ply"), Err(OverwriteError::Input));
     }
 }

@@ -27,27 +27,27 @@ use crate::{exr, png::chunk};
 /// What `"program"` is in JSON files. It stands second, behind `"format"`.
 pub const PROGRAM: &str = concat!("Bansho ", env!("CARGO_PKG_VERSION"));
 /// First bytes of a snapshot of a simulation.
-pub const SNAPSHOT: [u8; 8] = *b"BANSHOSS";
+pub const SNAPSHOT_MAGIC: [u8; 8] = *b"BANSHOSS";
 
 /// What GIF files bear as a comment and films as a tag.
-pub(crate) const TAG: &str = concat!("bansho:version=", env!("CARGO_PKG_VERSION"));
+pub(crate) const COMMENT_TAG: &str = concat!("bansho:version=", env!("CARGO_PKG_VERSION"));
 /// How all marks begin that are keys, names or comments.
 const PREFIX: &[u8] = b"bansho:";
 
 /// Bytes in which the mark stands where a format lets it stand in front.
-const HEAD: u64 = 16 << 10;
+const HEAD_BYTES: u64 = 16 << 10;
 /// Most bytes of an EXR header that are read: that of the most channels that are read at all, with long names.
-const EXR_HEADER: u64 = 2 << 20;
+const EXR_HEADER_BYTES: u64 = 2 << 20;
 /// Most bytes of a film's tags that are read.
-const TAGS: u64 = 64 << 10;
+const TAG_BYTES: u64 = 64 << 10;
 /// Most boxes of a film that are passed over.
-const MOST_BOXES: usize = 256;
+const MAX_MP4_BOXES: usize = 256;
 
 /// First bytes of Matroska and WebM.
 const EBML: [u8; 4] = [0x1a, 0x45, 0xdf, 0xa3];
 
 /// Whether the file at `path` bears the mark of Bansho. Reads at most 2 MiB of it; what is no ordinary file or cannot be read bears none.
-pub fn is_marked(path: &Path) -> bool {
+pub fn is_bansho_file(path: &Path) -> bool {
     // A pipe would be waited for.
     fs::metadata(path).is_ok_and(|found| found.is_file()) && look(path).unwrap_or(false)
 }
@@ -55,19 +55,19 @@ pub fn is_marked(path: &Path) -> bool {
 fn look(path: &Path) -> io::Result<bool> {
     let mut file = File::open(path)?;
     let length = file.metadata()?.len();
-    let head = part(&mut file, 0..HEAD)?;
+    let head = part(&mut file, 0..HEAD_BYTES)?;
     Ok(match &head[..] {
         head if head.starts_with(&chunk::SIGNATURE) => in_png(head),
         head if head.starts_with(&exr::attribute::MAGIC) => {
-            in_exr(head) || length > HEAD && in_exr(&part(&mut file, 0..EXR_HEADER)?)
+            in_exr(head) || length > HEAD_BYTES && in_exr(&part(&mut file, 0..EXR_HEADER_BYTES)?)
         }
         head if head.starts_with(b"GIF8") => in_gif(head).is_some(),
         head if head.starts_with(&EBML) => {
-            has_prefix(head) || has_prefix(&part(&mut file, length.saturating_sub(TAGS)..length)?)
+            has_prefix(head) || has_prefix(&part(&mut file, length.saturating_sub(TAG_BYTES)..length)?)
         }
         head if head.get(4..8) == Some(b"ftyp") => in_film(&mut file, length)?,
         head if head.starts_with(b"ply\n") => in_ply(head),
-        head if head.starts_with(&SNAPSHOT) => true,
+        head if head.starts_with(&SNAPSHOT_MAGIC) => true,
         head => in_json(head),
     })
 }
@@ -94,7 +94,7 @@ fn in_png(head: &[u8]) -> bool {
 }
 
 fn in_exr(head: &[u8]) -> bool {
-    let outline = exr::parse::outline(head);
+    let outline = exr::parse::parse_header(head);
     outline.is_ok_and(|outline| {
         outline.parts.iter().flat_map(|part| &part.strings).any(|(name, _)| begins(name.as_bytes()))
     })
@@ -127,7 +127,7 @@ fn in_film(file: &mut File, length: u64) -> io::Result<bool> {
     let Some(movie) = find_box(file, 0..length, *b"moov")? else { return Ok(false) };
     for kind in [*b"udta", *b"meta"] {
         if let Some(tags) = find_box(file, movie.clone(), kind)?
-            && has_prefix(&part(file, tags.start..tags.end.min(tags.start.saturating_add(TAGS)))?)
+            && has_prefix(&part(file, tags.start..tags.end.min(tags.start.saturating_add(TAG_BYTES)))?)
         {
             return Ok(true);
         }
@@ -138,7 +138,7 @@ fn in_film(file: &mut File, length: u64) -> io::Result<bool> {
 /// Where the contents of the first box of that kind lie.
 fn find_box(file: &mut File, within: Range<u64>, wanted: [u8; 4]) -> io::Result<Option<Range<u64>>> {
     let mut at = within.start;
-    for _ in 0..MOST_BOXES {
+    for _ in 0..MAX_MP4_BOXES {
         let head = part(file, at..within.end.min(at.saturating_add(16)))?;
         let Some((size, kind)) = head.first_chunk().copied().zip(head.get(4..8)) else { break };
         let (size, start) = match (u32::from_be_bytes(size), head.get(8..16).and_then(|long| long.try_into().ok())) {
@@ -186,7 +186,7 @@ mod tests {
         output::{
             naming::OutputPattern,
             overwrite_policy::OverwritePolicy,
-            sink::{Picture, Sink, SinkOptions, Slot, Wants},
+            sink::{FrameSlot, Picture, PictureFormat, Sink, SinkOptions},
         },
         ply, testing,
     };
@@ -198,11 +198,11 @@ mod tests {
             SinkOptions { opaque, overwrite: OverwritePolicy::any(), ..SinkOptions::new([34, 16], [24, 1], 2) };
         let sink = Sink::open(pattern, options).unwrap();
         for index in 0..2 {
-            let slot = Slot { index, number: index as i64 };
+            let slot = FrameSlot { index, number: index as i64 };
             let picture = bansho_base::image::DisplayImage { opaque, ..testing::display(34, 16, index) };
             let linear = testing::frame(34, 16);
-            let picture = match sink.wants() {
-                Wants::Frame => Picture::Linear(&linear),
+            let picture = match sink.picture_format() {
+                PictureFormat::Frame => Picture::Linear(&linear),
                 _ => Picture::Display(&picture, &[7; 32]),
             };
             sink.write(slot, picture).unwrap();
@@ -216,7 +216,7 @@ mod tests {
         let mut bytes = fs::read(path).unwrap();
         change(&mut bytes);
         fs::write(path, bytes).unwrap();
-        is_marked(path)
+        is_bansho_file(path)
     }
 
     /// The file without the letters of the mark is somebody's.
@@ -231,7 +231,7 @@ mod tests {
         for name in ["a.png", "a.exr", "a.apng", "a.gif"] {
             for opaque in [false, true] {
                 let path = made(folder.path(), name, opaque);
-                assert!(is_marked(&path), "{name}");
+                assert!(is_bansho_file(&path), "{name}");
                 // What a power cut may leave.
                 assert!(rewritten(&path, |bytes| bytes.truncate(bytes.len() * 9 / 10)), "{name}");
                 assert!(!rewritten(&path, |bytes| unmark(bytes)), "{name}");
@@ -246,7 +246,7 @@ mod tests {
         for name in ["a.mp4", "a.mov", "a.webm"] {
             for opaque in [false, true] {
                 let path = made(folder.path(), name, opaque);
-                assert!(is_marked(&path), "{name}");
+                assert!(is_bansho_file(&path), "{name}");
                 assert!(!rewritten(&path, |bytes| unmark(bytes)), "{name}");
             }
         }
@@ -256,7 +256,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
         fs::write(&path, bytes).unwrap();
-        is_marked(&path)
+        is_bansho_file(&path)
     }
 
     #[test]
@@ -289,7 +289,7 @@ mod tests {
             bansho_base::image::Channel { name, ..channel.clone() }
         }));
         let file = exr::encode(&frame, Path::new("a.exr")).unwrap();
-        assert!(file.windows(9).position(|bytes| bytes == b"bansho:ve").unwrap() > HEAD as usize);
+        assert!(file.windows(9).position(|bytes| bytes == b"bansho:ve").unwrap() > HEAD_BYTES as usize);
         assert!(is_marked_with(&file));
         // A film of 1 TB whose index stands behind the pictures: a sparse file.
         let folder = tempfile::tempdir().unwrap();
@@ -303,7 +303,7 @@ mod tests {
         file.seek(SeekFrom::Start(12 + (1 << 40))).unwrap();
         file.write_all(&small(b"moov", &[small(b"trak", &[0; 99]), small(b"meta", b"mdtabansho:version")].concat()))
             .unwrap();
-        assert!(is_marked(&path));
+        assert!(is_bansho_file(&path));
     }
 
     #[test]
@@ -321,6 +321,6 @@ mod tests {
     #[test]
     fn what_is_no_file_bears_no_mark() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(!is_marked(folder.path()) && !is_marked(&folder.path().join("gone")));
+        assert!(!is_bansho_file(folder.path()) && !is_bansho_file(&folder.path().join("gone")));
     }
 }

@@ -38,7 +38,7 @@ fn of_png(file: &[u8]) -> Option<[u8; 32]> {
 }
 
 fn of_exr(file: &[u8]) -> Option<[u8; 32]> {
-    let outline = exr::parse::outline(file).ok()?;
+    let outline = exr::parse::parse_header(file).ok()?;
     let [part] = &outline.parts[..] else { return None };
     let digest_at = part.string(exr::KEY_DIGEST).filter(|place| place.len() == 64)?;
     let digest = fingerprint::from_hex(file.get(digest_at.clone())?)?;

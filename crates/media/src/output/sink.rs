@@ -17,9 +17,9 @@ use crate::{
     exr,
     film::{
         apng::{self, ApngFilm, ApngFormat},
-        ffmpeg::{self, VideoFilm, VideoFormat, VideoOptions},
+        ffmpeg::{self, FfmpegFilm, VideoFormat, VideoOptions},
         gif::{self, GifFilm, GifFormat},
-        ordered::Ordered,
+        ordered::ReorderBuffer,
         timing::GifTiming,
     },
     png::{self, PngEffort},
@@ -27,7 +27,7 @@ use crate::{
 
 /// Which picture a format takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Wants {
+pub enum PictureFormat {
     /// Scene-linear frames.
     #[error("a scene-linear frame")]
     Frame,
@@ -85,21 +85,21 @@ impl SinkOptions {
     }
 
     /// What a sink of `kind` with these options takes.
-    pub fn wants(&self, kind: OutputKind) -> Wants {
+    pub fn picture_format(&self, kind: OutputKind) -> PictureFormat {
         match kind {
-            OutputKind::Exr => Wants::Frame,
-            OutputKind::Png | OutputKind::Apng => Wants::Display,
-            OutputKind::Gif if self.gif_transparent => Wants::Display,
-            OutputKind::Gif => Wants::OpaqueDisplay,
-            film if ffmpeg::carries_alpha(film, &self.video) => Wants::Display,
-            _ => Wants::OpaqueDisplay,
+            OutputKind::Exr => PictureFormat::Frame,
+            OutputKind::Png | OutputKind::Apng => PictureFormat::Display,
+            OutputKind::Gif if self.gif_transparent => PictureFormat::Display,
+            OutputKind::Gif => PictureFormat::OpaqueDisplay,
+            film if ffmpeg::carries_alpha(film, &self.video) => PictureFormat::Display,
+            _ => PictureFormat::OpaqueDisplay,
         }
     }
 }
 
 /// Which frame it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Slot {
+pub struct FrameSlot {
     /// Position among the frames of the job, from 0; orders a film.
     pub index: usize,
     /// Frame number; names a file of a sequence.
@@ -129,9 +129,9 @@ pub struct Sink {
 enum Target {
     Png,
     Exr,
-    Apng(Ordered<ApngFilm>),
-    Gif(Ordered<GifFilm>, GifFormat),
-    Video(Ordered<VideoFilm>, VideoFormat),
+    Apng(ReorderBuffer<ApngFilm>),
+    Gif(ReorderBuffer<GifFilm>, GifFormat),
+    Video(ReorderBuffer<FfmpegFilm>, VideoFormat),
 }
 
 impl Sink {
@@ -163,7 +163,7 @@ impl Sink {
             }
             OutputKind::Mp4 | OutputKind::Mov | OutputKind::Webm => {
                 let format = video_format(kind, &options);
-                Target::Video(ordered(VideoFilm::create(&path, &format, overwrite)?, ordered_end), format)
+                Target::Video(ordered(FfmpegFilm::create(&path, &format, overwrite)?, ordered_end), format)
             }
         };
         Ok(Self { pattern, options, target })
@@ -175,8 +175,8 @@ impl Sink {
     }
 
     /// Which picture it takes.
-    pub fn wants(&self) -> Wants {
-        self.options.wants(self.kind())
+    pub fn picture_format(&self) -> PictureFormat {
+        self.options.picture_format(self.kind())
     }
 
     /// The file in which frame `number` is or will be.
@@ -189,7 +189,7 @@ impl Sink {
     /// # Errors
     /// The frame cannot be written or would take the place of a file that must stay, is not of the kind or size that is wanted, or comes out
     /// of turn.
-    pub fn write(&self, slot: Slot, picture: Picture<'_>) -> Result<(), MediaError> {
+    pub fn write(&self, slot: FrameSlot, picture: Picture<'_>) -> Result<(), MediaError> {
         let path = self.path(slot.number);
         match (&self.target, picture) {
             (Target::Exr, Picture::Linear(frame)) => {
@@ -211,7 +211,7 @@ impl Sink {
                 self.check_frame(image, &path)?;
                 film.push(slot.index, ffmpeg::prepare(image, format))
             }
-            _ => Err(MediaError::WrongPicture { path, wanted: self.wants() }),
+            _ => Err(MediaError::WrongPicture { path, wanted: self.picture_format() }),
         }
     }
 
@@ -251,8 +251,8 @@ impl Sink {
     }
 }
 
-fn ordered<F: crate::film::ordered::Film>(film: F, (path, count, window): (PathBuf, usize, usize)) -> Ordered<F> {
-    Ordered::new(film, path, count, window)
+fn ordered<F: crate::film::ordered::FilmEncoder>(film: F, (path, count, window): (PathBuf, usize, usize)) -> ReorderBuffer<F> {
+    ReorderBuffer::new(film, path, count, window)
 }
 
 /// Most pixels on a side of a film.

@@ -4,7 +4,7 @@ use bansho_base::image::{DisplayImage, DisplayPixels, Image, Rect};
 
 /// Why pictures cannot be laid out on a sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum TileError {
+pub enum SheetError {
     /// There is no picture.
     #[error("a sheet needs at least one picture")]
     Nothing,
@@ -31,7 +31,7 @@ pub enum TileError {
 
 /// Where pictures lie on a sheet: row by row from the top left, `gutter` pixels between them and none around.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Sheet {
+pub struct SheetLayout {
     /// How many pictures.
     pub count: usize,
     /// How many stand beside each other.
@@ -42,7 +42,7 @@ pub struct Sheet {
     pub gutter: usize,
 }
 
-impl Sheet {
+impl SheetLayout {
     /// How many rows there are; the last may not be full.
     pub fn rows(&self) -> usize {
         self.count.div_ceil(self.columns.max(1))
@@ -76,19 +76,19 @@ impl Sheet {
     }
 }
 
-fn sheet(sizes: impl Iterator<Item = [usize; 2]>, columns: usize, gutter: usize) -> Result<Sheet, TileError> {
+fn sheet(sizes: impl Iterator<Item = [usize; 2]>, columns: usize, gutter: usize) -> Result<SheetLayout, SheetError> {
     if columns == 0 {
-        return Err(TileError::NoColumns);
+        return Err(SheetError::NoColumns);
     }
     let (mut cell, mut count) = (None, 0);
     for (index, [width, height]) in sizes.enumerate() {
         if *cell.get_or_insert([width, height]) != [width, height] {
-            return Err(TileError::Sizes { index, width, height });
+            return Err(SheetError::Sizes { index, width, height });
         }
         count += 1;
     }
-    let cell = cell.ok_or(TileError::Nothing)?;
-    Ok(Sheet { count, columns: columns.min(count), cell, gutter })
+    let cell = cell.ok_or(SheetError::Nothing)?;
+    Ok(SheetLayout { count, columns: columns.min(count), cell, gutter })
 }
 
 /// One picture of all `images`, `columns` beside each other; `fill` between them and where the last row is not full.
@@ -100,11 +100,11 @@ pub fn tile<const N: usize>(
     columns: usize,
     gutter: usize,
     fill: [f32; N],
-) -> Result<Image<N>, TileError> {
+) -> Result<Image<N>, SheetError> {
     let sheet = sheet(images.iter().map(|image| [image.width(), image.height()]), columns, gutter)?;
     let pixels: Vec<_> = images.iter().map(Image::pixels).collect();
     let [width, height] = sheet.size();
-    Image::from_pixels(width, height, sheet.lay(&pixels, fill)).ok_or(TileError::Nothing)
+    Image::from_pixels(width, height, sheet.lay(&pixels, fill)).ok_or(SheetError::Nothing)
 }
 
 /// As [`tile`], for display pixels; `fill` in 8 bits. The sheet is opaque if all pictures and the fill are.
@@ -116,7 +116,7 @@ pub fn tile_display(
     columns: usize,
     gutter: usize,
     fill: [u8; 4],
-) -> Result<DisplayImage, TileError> {
+) -> Result<DisplayImage, SheetError> {
     let sheet = sheet(images.iter().map(|image| [image.width, image.height]), columns, gutter)?;
     let (mut eight, mut sixteen) = (Vec::new(), Vec::new());
     for (index, image) in images.iter().enumerate() {
@@ -125,7 +125,7 @@ pub fn tile_display(
             DisplayPixels::Sixteen(pixels) => sixteen.push(&pixels[..]),
         }
         if !eight.is_empty() && !sixteen.is_empty() {
-            return Err(TileError::Depths { index });
+            return Err(SheetError::Depths { index });
         }
     }
     let [width, height] = sheet.size();
@@ -181,12 +181,12 @@ mod tests {
     #[test]
     fn what_does_not_fit_together_is_refused() {
         let image = |width| Image::<1>::filled(width, 1, [0.0]);
-        assert_eq!(tile(&[image(1)], 0, 0, [0.0]), Err(TileError::NoColumns));
-        assert_eq!(tile::<1>(&[], 1, 0, [0.0]), Err(TileError::Nothing));
-        assert_eq!(tile(&[image(1), image(2)], 1, 0, [0.0]), Err(TileError::Sizes { index: 1, width: 2, height: 1 }));
+        assert_eq!(tile(&[image(1)], 0, 0, [0.0]), Err(SheetError::NoColumns));
+        assert_eq!(tile::<1>(&[], 1, 0, [0.0]), Err(SheetError::Nothing));
+        assert_eq!(tile(&[image(1), image(2)], 1, 0, [0.0]), Err(SheetError::Sizes { index: 1, width: 2, height: 1 }));
         let pixels = DisplayPixels::Eight(vec![[0; 4]]);
         let eight = DisplayImage { width: 1, height: 1, opaque: true, alpha: AlphaConvention::Linear, pixels };
         let sixteen = DisplayImage { pixels: DisplayPixels::Sixteen(vec![[0; 4]]), ..eight.clone() };
-        assert_eq!(tile_display(&[eight, sixteen], 1, 0, [0; 4]), Err(TileError::Depths { index: 1 }));
+        assert_eq!(tile_display(&[eight, sixteen], 1, 0, [0; 4]), Err(SheetError::Depths { index: 1 }));
     }
 }

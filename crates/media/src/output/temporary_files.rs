@@ -10,39 +10,41 @@ use std::{
 use tempfile::NamedTempFile;
 
 /// Temporary files that have not got their final name.
-static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+static TEMPORARY_FILES: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+fn temporary_files() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     // A set of paths is whole at any time.
-    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+    TEMPORARY_FILES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A temporary file's place in the list, which it leaves when this is dropped.
 #[derive(Debug)]
-pub(crate) struct Listed(PathBuf);
+pub(crate) struct TemporaryFileGuard(PathBuf);
 
-impl Drop for Listed {
+impl Drop for TemporaryFileGuard {
     fn drop(&mut self) {
-        unfinished().remove(&self.0);
+        temporary_files().remove(&self.0);
     }
 }
 
 /// Makes a temporary file that is in the list as long as it is there.
-pub(crate) fn list(make: impl FnOnce() -> io::Result<NamedTempFile>) -> io::Result<(NamedTempFile, Listed)> {
+pub(crate) fn create(
+    make: impl FnOnce() -> io::Result<NamedTempFile>,
+) -> io::Result<(NamedTempFile, TemporaryFileGuard)> {
     // Locked while the file is made, so that no file is ever missing from the list.
-    let mut unfinished = unfinished();
+    let mut unfinished = temporary_files();
     let file = make()?;
     let path: &Path = file.path();
     unfinished.insert(path.to_path_buf());
-    let listed = Listed(path.to_path_buf());
-    Ok((file, listed))
+    let guard = TemporaryFileGuard(path.to_path_buf());
+    Ok((file, guard))
 }
 
 /// Removes every file that is being written but does not bear its final name yet, and lets no other be begun: whoever tries waits for ever.
 ///
 /// For a program that ends right after, without waiting for what its other threads do. Files that bear their names stay, whole.
 pub fn abandon_all() {
-    let unfinished = unfinished();
+    let unfinished = temporary_files();
     // One that just got its name is not there any more, which is as well.
     unfinished.iter().for_each(|path| drop(fs::remove_file(path)));
     mem::forget(unfinished);

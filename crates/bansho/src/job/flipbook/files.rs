@@ -14,7 +14,7 @@ use bansho_media::{
         naming::OutputKind,
         overwrite_policy::OverwritePolicy,
         provenance,
-        sprite_sheet::{Sheet, tile, tile_display},
+        sprite_sheet::{SheetLayout, tile, tile_display},
     },
     png::{self, PngEffort},
 };
@@ -83,7 +83,7 @@ impl Files {
     pub(super) fn write(
         &self,
         plan: &Plan,
-        sheet: &Sheet,
+        sheet: &SheetLayout,
         numbers: &[i64],
         tiles: &[Tile],
         observer: &dyn Observer,
@@ -112,7 +112,7 @@ impl Files {
         Ok(())
     }
 
-    fn write_linear(&self, sheet: &Sheet, tiles: &[Tile], finished: &Finished) -> Result<(), JobError> {
+    fn write_linear(&self, sheet: &SheetLayout, tiles: &[Tile], finished: &Finished) -> Result<(), JobError> {
         let header = FrameHeader { display_size: sheet.size(), data_origin: [0, 0], ..tiles[0].header.clone() };
         let colours: Vec<Image<4>> = tiles.iter().filter_map(|tile| tile.linear().cloned()).collect();
         let motion: Vec<Image<2>> = tiles.iter().map(|tile| tile.motion.clone()).collect();
@@ -140,7 +140,13 @@ impl Files {
         Ok(())
     }
 
-    fn write_shown(&self, sheet: &Sheet, tiles: &[Tile], scale: f32, finished: &Finished) -> Result<(), JobError> {
+    fn write_shown(
+        &self,
+        sheet: &SheetLayout,
+        tiles: &[Tile],
+        scale: f32,
+        finished: &Finished,
+    ) -> Result<(), JobError> {
         let shown: Vec<DisplayImage> = tiles.iter().filter_map(|tile| tile.shown().cloned()).collect();
         let colour = tile_display(&shown, sheet.columns, 0, [0; 4])?;
         let alpha = DisplayImage { opaque: true, pixels: alpha(&colour.pixels), ..colour };
@@ -162,7 +168,7 @@ impl Files {
         Ok(())
     }
 
-    fn description(&self, plan: &Plan, sheet: &Sheet, numbers: &[i64], scale: f32) -> Value {
+    fn description(&self, plan: &Plan, sheet: &SheetLayout, numbers: &[i64], scale: f32) -> Value {
         let fps = plan.fps();
         let frame = |(index, &number): (usize, &i64)| {
             let place = sheet.place(index);

@@ -14,7 +14,7 @@ use bansho_base::{
 use bansho_media::output::{
     naming::{OutputKind, OutputPattern},
     overwrite_policy::OverwritePolicy,
-    sprite_sheet::Sheet,
+    sprite_sheet::SheetLayout,
 };
 use bansho_render::{Backend, Plan, PlanOptions, Scene, display::BitDepth, scene::FrameRate};
 
@@ -110,7 +110,7 @@ impl Flipbook {
         let assets = prepare::assets(&self.scene);
         let mut scene = self.scene.check(assets.as_ref())?;
         let [columns, rows] = self.grid;
-        let sheet = Sheet { count: columns.saturating_mul(rows), columns, cell: self.cell(&scene), gutter: 0 };
+        let sheet = SheetLayout { count: columns.saturating_mul(rows), columns, cell: self.cell(&scene), gutter: 0 };
         let sheet = sheet::checked(sheet, SheetKind::Flipbook)?;
         if let Some(seconds) = self.loop_s {
             scene.picture.fps = turn_rate(sheet.count, seconds)?;
@@ -168,7 +168,7 @@ pub struct PreparedFlipbook {
     scene: SceneFile,
     backend: Box<dyn Backend>,
     plan: Arc<Plan>,
-    sheet: Sheet,
+    sheet: SheetLayout,
     own_size: bool,
     crop: FlipbookCrop,
     numbers: Vec<i64>,
@@ -202,7 +202,7 @@ impl PreparedFlipbook {
 
 impl PreparedFlipbook {
     /// The plan and the sheet of what tiles show: first it must be known what is lit.
-    fn cropped(&self, observer: &dyn JobObserver) -> Result<(Arc<Plan>, Sheet), JobError> {
+    fn cropped(&self, observer: &dyn JobObserver) -> Result<(Arc<Plan>, SheetLayout), JobError> {
         let all = || Ok((self.plan.clone(), self.sheet));
         if self.crop == FlipbookCrop::None {
             return all();
@@ -219,7 +219,7 @@ impl PreparedFlipbook {
         };
         let Some((size, part)) = region.and_then(fitting) else { return all() };
         let plan = Arc::new(self.plan.cropped(size, part)?);
-        let sheet = sheet::checked(Sheet { cell: [part.width, part.height], ..self.sheet }, SheetKind::Flipbook)?;
+        let sheet = sheet::checked(SheetLayout { cell: [part.width, part.height], ..self.sheet }, SheetKind::Flipbook)?;
         let frames = self.numbers.len();
         let wanted = Wanted { frames, tiles: frames, display: Some(self.files.bits), own_size: true };
         memory::check(&self.scene, &plan, wanted)?;

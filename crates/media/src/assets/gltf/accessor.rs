@@ -9,18 +9,18 @@ use super::{buffers::Buffers, json::Object};
 enum Element {
     /// Three floats of 32 bits.
     Vector,
-    Whole8,
-    Whole16,
-    Whole32,
+    U8,
+    U16,
+    U32,
 }
 
 impl Element {
     fn of(accessor: &Object) -> Result<Option<Self>, AssetProblem> {
         Ok(match (accessor.needed("componentType")?, accessor.text("type")?) {
             (5126, Some("VEC3")) => Some(Self::Vector),
-            (5121, Some("SCALAR")) => Some(Self::Whole8),
-            (5123, Some("SCALAR")) => Some(Self::Whole16),
-            (5125, Some("SCALAR")) => Some(Self::Whole32),
+            (5121, Some("SCALAR")) => Some(Self::U8),
+            (5123, Some("SCALAR")) => Some(Self::U16),
+            (5125, Some("SCALAR")) => Some(Self::U32),
             _ => None,
         })
     }
@@ -28,9 +28,9 @@ impl Element {
     fn bytes(self) -> usize {
         match self {
             Self::Vector => 12,
-            Self::Whole8 => 1,
-            Self::Whole16 => 2,
-            Self::Whole32 => 4,
+            Self::U8 => 1,
+            Self::U16 => 2,
+            Self::U32 => 4,
         }
     }
 }
@@ -109,12 +109,12 @@ impl<'b> Accessor<'b> {
     }
 
     /// Its elements as whole numbers; none where they are vectors.
-    pub(super) fn wholes(self) -> Vec<u32> {
+    pub(super) fn indices_u32(self) -> Vec<u32> {
         match self.element {
             Element::Vector => Vec::new(),
-            Element::Whole8 => self.elements().map(|[byte]| u32::from(byte)).collect(),
-            Element::Whole16 => self.elements().map(|bytes| u32::from(u16::from_le_bytes(bytes))).collect(),
-            Element::Whole32 => self.elements().map(u32::from_le_bytes).collect(),
+            Element::U8 => self.elements().map(|[byte]| u32::from(byte)).collect(),
+            Element::U16 => self.elements().map(|bytes| u32::from(u16::from_le_bytes(bytes))).collect(),
+            Element::U32 => self.elements().map(u32::from_le_bytes).collect(),
         }
     }
 }

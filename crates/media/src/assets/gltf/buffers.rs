@@ -7,7 +7,7 @@ use std::{
 
 use bansho_base::host::assets::AssetProblem;
 
-use super::{Beside, base64, json::Object};
+use super::{ReadResource, base64, json::Object};
 use crate::assets::limits::MemoryLimit;
 
 /// All buffers. What several of them name is held once.
@@ -22,7 +22,7 @@ impl<'a> Buffers<'a> {
     pub(super) fn read(
         root: &Object<'a>,
         binary: Option<&'a [u8]>,
-        beside: Beside,
+        read_resource: ReadResource,
         limit: MemoryLimit,
     ) -> Result<Self, AssetProblem> {
         let mut buffers = Self { contents: Vec::new(), content_of: Vec::new() };
@@ -34,7 +34,7 @@ impl<'a> Buffers<'a> {
                 Some(&slot) => slot,
                 None => {
                     let left = limit.available().saturating_sub(buffers.memory_bytes());
-                    let content = content(&buffer, uri, binary, &|uri| beside(uri, left))?;
+                    let content = content(&buffer, uri, binary, &|uri| read_resource(uri, left))?;
                     known.insert(uri, buffers.contents.len());
                     buffers.contents.push(content);
                     limit.check(buffers.memory_bytes())?;
@@ -78,13 +78,13 @@ fn content<'a>(
     buffer: &Object,
     uri: Option<&'a str>,
     binary: Option<&'a [u8]>,
-    beside: &dyn Fn(&str) -> Result<Vec<u8>, AssetProblem>,
+    read_resource: &dyn Fn(&str) -> Result<Vec<u8>, AssetProblem>,
 ) -> Result<Cow<'a, [u8]>, AssetProblem> {
     let Some(uri) = uri else {
         let missing = || buffer.fault("uri", "is missing, and there is no binary buffer in the file");
         return binary.map(Cow::Borrowed).ok_or_else(missing);
     };
-    let Some(data) = uri.strip_prefix("data:") else { return beside(uri).map(Cow::Owned) };
+    let Some(data) = uri.strip_prefix("data:") else { return read_resource(uri).map(Cow::Owned) };
     let decoded = data.split_once(";base64,").and_then(|(_, text)| base64::decode(text));
     decoded.map(Cow::Owned).ok_or_else(|| buffer.fault("uri", "is not base64; allowed: `data:...;base64,...`"))
 }

@@ -8,7 +8,7 @@ use super::damaged;
 use serde_json::{Map, Value};
 
 /// Most values that are read; each takes up to two hundred bytes of memory.
-const MOST_VALUES: usize = 2_000_000;
+const MAX_VALUES: usize = 2_000_000;
 
 /// Bytes that a value takes in memory when it is read: those of an object with one field, the largest there is.
 const VALUE_BYTES: u64 = 400;
@@ -20,14 +20,14 @@ fn count_values(json: &[u8]) -> usize {
 
 /// Bytes that the values of `json` take when they are read: its texts are kept once more.
 pub(super) fn memory_bytes(json: &[u8]) -> u64 {
-    json.len() as u64 + VALUE_BYTES * count_values(json).min(MOST_VALUES) as u64
+    json.len() as u64 + VALUE_BYTES * count_values(json).min(MAX_VALUES) as u64
 }
 
 /// The JSON, parsed.
 pub(super) fn parse(json: &[u8]) -> Result<Value, AssetProblem> {
     let values = count_values(json);
-    if values > MOST_VALUES {
-        return Err(damaged(format!("its JSON has about {values} values; allowed: up to {MOST_VALUES}")));
+    if values > MAX_VALUES {
+        return Err(damaged(format!("its JSON has about {values} values; allowed: up to {MAX_VALUES}")));
     }
     serde_json::from_slice(json).map_err(|error| damaged(format!("its JSON cannot be read: {error}")))
 }

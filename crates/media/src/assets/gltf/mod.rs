@@ -18,11 +18,11 @@ use bansho_base::{
     math::{DMat4, DVec3},
 };
 
-use self::{accessor::Accessor, buffers::Buffers, glb::Glb, json::Object, nodes::Shown};
+use self::{accessor::Accessor, buffers::Buffers, glb::Glb, json::Object, nodes::MeshInstance};
 use super::limits::MemoryLimit;
 
 /// Gives the bytes of a file that a glTF names, if they are at most so many.
-pub type Beside<'a> = &'a dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>;
+pub type ReadResource<'a> = &'a dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>;
 
 /// Bytes that a corner and a triangle take while meshes are gathered: where lists of them grow, twice those of the mesh itself, and for a
 /// triangle the order of its corners.
@@ -41,7 +41,12 @@ fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
 ///
 /// # Errors
 /// Another extension, damage, more than is read, more memory than `limit`, or no triangles. Never panics.
-pub fn decode_mesh(file: &[u8], extension: &str, beside: Beside, limit: MemoryLimit) -> Result<Mesh, AssetProblem> {
+pub fn decode_mesh(
+    file: &[u8],
+    extension: &str,
+    read_resource: ReadResource,
+    limit: MemoryLimit,
+) -> Result<Mesh, AssetProblem> {
     let Glb { json, binary } = match extension.to_ascii_lowercase().as_str() {
         "glb" => glb::split(file)?,
         "gltf" => Glb { json: file, binary: None },
@@ -52,20 +57,20 @@ pub fn decode_mesh(file: &[u8], extension: &str, beside: Beside, limit: MemoryLi
     let value = json::parse(json)?;
     let root = Object::root(&value)?;
     check_demands(&root)?;
-    let shown = nodes::shown(&root)?;
+    let mesh_instances = nodes::mesh_instances(&root)?;
     let limit = MemoryLimit { used: limit.used.saturating_add(read_bytes), ..limit };
-    let buffers = Buffers::read(&root, binary, beside, limit)?;
+    let buffers = Buffers::read(&root, binary, read_resource, limit)?;
     let mut shapes = BTreeMap::new();
-    for &Shown { mesh, .. } in &shown {
+    for &MeshInstance { mesh, .. } in &mesh_instances {
         if let std::collections::btree_map::Entry::Vacant(entry) = shapes.entry(mesh) {
-            entry.insert(Shape::read(&root, mesh, &buffers)?);
+            entry.insert(PrimitiveMesh::read(&root, mesh, &buffers)?);
         }
     }
-    let gathered_bytes = check_totals(shown.iter().map(|shown| &shapes[&shown.mesh]))?;
+    let gathered_bytes = check_totals(mesh_instances.iter().map(|mesh_instances| &shapes[&mesh_instances.mesh]))?;
     limit.check(buffers.memory_bytes().saturating_add(gathered_bytes))?;
-    let mut gathering = Gathering::default();
-    for Shown { mesh, world_from_mesh } in &shown {
-        shapes[mesh].parts.iter().try_for_each(|part| gathering.add(part, world_from_mesh))?;
+    let mut gathering = MeshBuilder::default();
+    for MeshInstance { mesh, world_from_mesh } in &mesh_instances {
+        shapes[mesh].parts.iter().try_for_each(|primitive_data| gathering.add(primitive_data, world_from_mesh))?;
     }
     Ok(Mesh::new(gathering.corners, gathering.triangles)?)
 }
@@ -99,7 +104,7 @@ fn check_demands(root: &Object) -> Result<(), AssetProblem> {
 }
 
 /// Refuses more than a mesh may have, before any of it is read; the bytes that gathering it takes.
-fn check_totals<'s>(shapes: impl Iterator<Item = &'s Shape<'s>>) -> Result<u64, MeshError> {
+fn check_totals<'s>(shapes: impl Iterator<Item = &'s PrimitiveMesh<'s>>) -> Result<u64, MeshError> {
     let (mut triangles, mut corners) = (0_usize, 0_usize);
     for shape in shapes {
         triangles = triangles.saturating_add(shape.triangles);
@@ -115,28 +120,28 @@ fn check_totals<'s>(shapes: impl Iterator<Item = &'s Shape<'s>>) -> Result<u64, 
 }
 
 /// What a mesh of the file shows.
-struct Shape<'b> {
-    parts: Vec<Part<'b>>,
+struct PrimitiveMesh<'b> {
+    parts: Vec<Primitive<'b>>,
     triangles: usize,
     corners: usize,
 }
 
 /// A primitive that makes triangles.
-struct Part<'b> {
+struct Primitive<'b> {
     positions: Accessor<'b>,
     indices: Option<Accessor<'b>>,
-    mode: Mode,
+    mode: PrimitiveMode,
 }
 
 /// How corners follow each other to make triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Mode {
+enum PrimitiveMode {
     Triangles,
     Strip,
     Fan,
 }
 
-impl Mode {
+impl PrimitiveMode {
     /// That of a primitive; `None` for points and lines.
     fn of(primitive: &Object) -> Result<Option<Self>, AssetProblem> {
         match primitive.whole("mode")? {
@@ -157,29 +162,30 @@ impl Mode {
     }
 }
 
-impl<'b> Shape<'b> {
+impl<'b> PrimitiveMesh<'b> {
     fn read(root: &Object, mesh: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
         let mut shape = Self { parts: Vec::new(), triangles: 0, corners: 0 };
         for primitive in root.item("meshes", mesh)?.items("primitives")? {
-            let Some(part) = Part::read(root, &primitive?, buffers)? else { continue };
-            let triangles = part.mode.triangles(part.indices.unwrap_or(part.positions).count);
+            let Some(primitive_data) = Primitive::read(root, &primitive?, buffers)? else { continue };
+            let triangles =
+                primitive_data.mode.triangles(primitive_data.indices.unwrap_or(primitive_data.positions).count);
             if triangles > 0 {
                 shape.triangles = shape.triangles.saturating_add(triangles);
-                shape.corners = shape.corners.saturating_add(part.positions.count);
-                shape.parts.push(part);
+                shape.corners = shape.corners.saturating_add(primitive_data.positions.count);
+                shape.parts.push(primitive_data);
             }
         }
         Ok(shape)
     }
 }
 
-impl<'b> Part<'b> {
+impl<'b> Primitive<'b> {
     /// `None` for points, lines and primitives without positions.
     fn read(root: &Object, primitive: &Object, buffers: &'b Buffers) -> Result<Option<Self>, AssetProblem> {
         let accessors = root.list("accessors")?.len();
         let attributes = primitive.object("attributes")?;
         let positions = attributes.map(|attributes| attributes.index("POSITION", accessors)).transpose()?.flatten();
-        let (Some(mode), Some(positions)) = (Mode::of(primitive)?, positions) else { return Ok(None) };
+        let (Some(mode), Some(positions)) = (PrimitiveMode::of(primitive)?, positions) else { return Ok(None) };
         let positions = Accessor::positions(root, positions, buffers)?;
         let indices = primitive.index("indices", accessors)?;
         let indices = indices.map(|indices| Accessor::indices(root, indices, buffers)).transpose()?;
@@ -188,21 +194,21 @@ impl<'b> Part<'b> {
 }
 
 #[derive(Default)]
-struct Gathering {
+struct MeshBuilder {
     corners: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
 }
 
-impl Gathering {
+impl MeshBuilder {
     /// Adds what a part shows at a place. Its own corners alone may be named.
-    fn add(&mut self, part: &Part, world_from_mesh: &DMat4) -> Result<(), MeshError> {
-        let (first, corners) = (self.corners.len() as u32, part.positions.count);
+    fn add(&mut self, primitive_data: &Primitive, world_from_mesh: &DMat4) -> Result<(), MeshError> {
+        let (first, corners) = (self.corners.len() as u32, primitive_data.positions.count);
         let place = |corner: [f32; 3]| {
             world_from_mesh.transform_point3(DVec3::from(corner.map(f64::from))).as_vec3().to_array()
         };
-        self.corners.extend(part.positions.vectors().map(place));
-        let order = part.indices.map_or_else(|| (0..corners as u32).collect(), Accessor::wholes);
-        let triangles = triangles(part.mode, &order);
+        self.corners.extend(primitive_data.positions.vectors().map(place));
+        let order = primitive_data.indices.map_or_else(|| (0..corners as u32).collect(), Accessor::indices_u32);
+        let triangles = triangles(primitive_data.mode, &order);
         for (triangle, named) in triangles.iter().enumerate() {
             if let Some(&corner) = named.iter().find(|&&corner| corner as usize >= corners) {
                 return Err(MeshError::NoSuchCorner { triangle, corner, corners });
@@ -214,17 +220,17 @@ impl Gathering {
 }
 
 /// The triangles that corners in this order make.
-fn triangles(mode: Mode, order: &[u32]) -> Vec<[u32; 3]> {
+fn triangles(mode: PrimitiveMode, order: &[u32]) -> Vec<[u32; 3]> {
     match mode {
-        Mode::Triangles => order.as_chunks::<3>().0.to_vec(),
-        Mode::Strip => {
+        PrimitiveMode::Triangles => order.as_chunks::<3>().0.to_vec(),
+        PrimitiveMode::Strip => {
             let turn = |(index, corners): (usize, &[u32])| match index % 2 {
                 0 => [corners[0], corners[1], corners[2]],
                 _ => [corners[1], corners[0], corners[2]],
             };
             order.windows(3).enumerate().map(turn).collect()
         }
-        Mode::Fan => {
+        PrimitiveMode::Fan => {
             let (Some(&hub), rim) = (order.first(), order.get(1..).unwrap_or_default()) else { return Vec::new() };
             rim.windows(2).map(|pair| [hub, pair[0], pair[1]]).collect()
         }

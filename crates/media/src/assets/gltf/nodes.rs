@@ -8,10 +8,10 @@ use bansho_base::{
 use super::{damaged, json::Object};
 
 /// Most nodes that are read.
-const MOST_NODES: usize = 100_000;
+const MAX_NODES: usize = 100_000;
 
 /// A mesh that a node shows.
-pub(super) struct Shown {
+pub(super) struct MeshInstance {
     pub(super) mesh: usize,
     pub(super) world_from_mesh: DMat4,
 }
@@ -24,26 +24,26 @@ struct Node {
 }
 
 /// The meshes of the default scene; of the first, where none is the default; of all nodes, where there is none.
-pub(super) fn shown(root: &Object) -> Result<Vec<Shown>, AssetProblem> {
-    let nodes = tree(root)?;
-    let mut shown = Vec::new();
+pub(super) fn mesh_instances(root: &Object) -> Result<Vec<MeshInstance>, AssetProblem> {
+    let nodes = read_tree(root)?;
+    let mut mesh_instances = Vec::new();
     let mut open: Vec<(usize, DMat4)> =
-        beginnings(root, &nodes)?.into_iter().map(|node| (node, DMat4::IDENTITY)).collect();
+        root_nodes(root, &nodes)?.into_iter().map(|node| (node, DMat4::IDENTITY)).collect();
     // Every node has one parent at most, so that none comes twice.
     while let Some((index, world_from_parent)) = open.pop() {
         let node = &nodes[index];
         let world_from_node = world_from_parent * node.parent_from_node;
-        shown.extend(node.mesh.map(|mesh| Shown { mesh, world_from_mesh: world_from_node }));
+        mesh_instances.extend(node.mesh.map(|mesh| MeshInstance { mesh, world_from_mesh: world_from_node }));
         open.extend(node.children.iter().map(|&child| (child, world_from_node)));
     }
-    Ok(shown)
+    Ok(mesh_instances)
 }
 
 /// All nodes, which must make trees: no node is a child twice or lies within itself.
-fn tree(root: &Object) -> Result<Vec<Node>, AssetProblem> {
+fn read_tree(root: &Object) -> Result<Vec<Node>, AssetProblem> {
     let count = root.list("nodes")?.len();
-    if count > MOST_NODES {
-        return Err(root.fault("nodes", format!("has {count} elements; allowed: up to {MOST_NODES}")));
+    if count > MAX_NODES {
+        return Err(root.fault("nodes", format!("has {count} elements; allowed: up to {MAX_NODES}")));
     }
     let meshes = root.list("meshes")?.len();
     let mut nodes: Vec<Node> =
@@ -92,15 +92,15 @@ fn read(node: &Object, nodes: usize, meshes: usize) -> Result<Node, AssetProblem
 }
 
 /// The nodes that the scene begins with.
-fn beginnings(root: &Object, nodes: &[Node]) -> Result<Vec<usize>, AssetProblem> {
+fn root_nodes(root: &Object, nodes: &[Node]) -> Result<Vec<usize>, AssetProblem> {
     let scenes = root.list("scenes")?.len();
     let Some(scene) = root.index("scene", scenes)?.or((scenes > 0).then_some(0)) else {
         return Ok((0..nodes.len()).filter(|&index| nodes[index].parent.is_none()).collect());
     };
     let scene = root.item("scenes", scene)?;
-    let beginnings = scene.indices("nodes", nodes.len())?;
+    let root_nodes = scene.indices("nodes", nodes.len())?;
     let mut named = vec![false; nodes.len()];
-    for &index in &beginnings {
+    for &index in &root_nodes {
         if let Some(parent) = nodes[index].parent {
             let told = format!("names {index}, which is a child of node {parent}; allowed: nodes without a parent");
             return Err(scene.fault("nodes", told));
@@ -109,5 +109,5 @@ fn beginnings(root: &Object, nodes: &[Node]) -> Result<Vec<usize>, AssetProblem>
             return Err(scene.fault("nodes", format!("names {index} twice; allowed: every node once")));
         }
     }
-    Ok(beginnings)
+    Ok(root_nodes)
 }

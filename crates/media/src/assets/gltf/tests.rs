@@ -53,9 +53,9 @@ fn triangles_stand_where_their_node_does() {
 
 #[test]
 fn buffers_may_lie_beside_or_inside_the_text() {
-    let beside = document(r#","uri":"flame.bin""#, 3, "");
+    let read_resource = document(r#","uri":"flame.bin""#, 3, "");
     let found = decode_mesh(
-        beside.as_bytes(),
+        read_resource.as_bytes(),
         "gltf",
         &|name, _| {
             assert_eq!(name, "flame.bin");
@@ -64,7 +64,7 @@ fn buffers_may_lie_beside_or_inside_the_text() {
         LIMIT,
     );
     assert_eq!(found.unwrap().len(), 1);
-    assert_eq!(reason(beside.as_bytes(), "gltf"), "no such file");
+    assert_eq!(reason(read_resource.as_bytes(), "gltf"), "no such file");
     let text = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIA";
     let inside = document(&format!(r#","uri":"data:application/octet-stream;base64,{text}""#), 3, "");
     assert_eq!(decode_mesh(inside.as_bytes(), "gltf", &nothing_beside, LIMIT).unwrap().len(), 1);
@@ -72,9 +72,9 @@ fn buffers_may_lie_beside_or_inside_the_text() {
 
 #[test]
 fn strips_and_fans_make_triangles_that_face_the_same_way() {
-    assert_eq!(triangles(Mode::Strip, &[0, 1, 2, 3]), [[0, 1, 2], [2, 1, 3]]);
-    assert_eq!(triangles(Mode::Fan, &[0, 1, 2, 3]), [[0, 1, 2], [0, 2, 3]]);
-    for mode in [Mode::Triangles, Mode::Strip, Mode::Fan] {
+    assert_eq!(triangles(PrimitiveMode::Strip, &[0, 1, 2, 3]), [[0, 1, 2], [2, 1, 3]]);
+    assert_eq!(triangles(PrimitiveMode::Fan, &[0, 1, 2, 3]), [[0, 1, 2], [0, 2, 3]]);
+    for mode in [PrimitiveMode::Triangles, PrimitiveMode::Strip, PrimitiveMode::Fan] {
         let counts = (0..9).map(|corners| triangles(mode, &vec![0; corners]).len());
         assert!(counts.eq((0..9).map(|corners| mode.triangles(corners))), "{mode:?}");
     }
@@ -222,9 +222,9 @@ fn lists_without_end_are_refused() {
 
 #[test]
 fn a_file_that_many_buffers_name_is_read_once() {
-    let beside = document(r#","uri":"flame.bin""#, 3, "");
+    let read_resource = document(r#","uri":"flame.bin""#, 3, "");
     let many = format!(r#""buffers":[{}{{"#, r#"{"byteLength":12000000,"uri":"flame.bin"},"#.repeat(2000));
-    let json = beside.replace(r#""buffers":[{"#, &many);
+    let json = read_resource.replace(r#""buffers":[{"#, &many);
     let times = std::cell::Cell::new(0);
     let flame = |_: &str, _: u64| {
         times.set(times.get() + 1);
@@ -238,9 +238,9 @@ fn a_file_that_many_buffers_name_is_read_once() {
 
 #[test]
 fn what_would_take_too_much_memory_is_refused_before_it_is_read() {
-    let beside = document(r#","uri":"flame.bin""#, 3, "");
-    let decode = |total, beside_bytes: Beside| {
-        decode_mesh(beside.as_bytes(), "gltf", beside_bytes, MemoryLimit { total, used: 1000 })
+    let read_resource = document(r#","uri":"flame.bin""#, 3, "");
+    let decode = |total, beside_bytes: ReadResource| {
+        decode_mesh(read_resource.as_bytes(), "gltf", beside_bytes, MemoryLimit { total, used: 1000 })
     };
     let given = |_: &str, _: u64| Ok(bytes());
     let fits = (0..100_000).find(|&total| decode(total, &given).is_ok()).unwrap();

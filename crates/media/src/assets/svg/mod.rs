@@ -19,13 +19,13 @@ use self::{
 };
 
 /// Most points of all strokes together.
-const MOST_POINTS: usize = 1_000_000;
+const MAX_POINTS: usize = 1_000_000;
 
 /// Elements whose contents are not drawn where they stand.
-const UNDRAWN: [&str; 8] = ["defs", "symbol", "clipPath", "mask", "marker", "pattern", "metadata", "style"];
+const HIDDEN_ELEMENTS: [&str; 8] = ["defs", "symbol", "clipPath", "mask", "marker", "pattern", "metadata", "style"];
 
 /// Elements that are drawn but are no strokes.
-const NO_STROKES: [&str; 7] = ["use", "text", "rect", "circle", "ellipse", "image", "foreignObject"];
+const UNSUPPORTED_ELEMENTS: [&str; 7] = ["use", "text", "rect", "circle", "ellipse", "image", "foreignObject"];
 
 fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
@@ -37,7 +37,7 @@ fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
 /// # Errors
 /// A text that is no SVG, a path that cannot be read, no strokes, or more than a million points. Never panics.
 pub fn decode_drawing(text: &str) -> Result<Drawing, AssetProblem> {
-    let mut reading = Reading::default();
+    let mut reading = SvgReader::default();
     let mut events = Events::new(text);
     let mut is_svg = false;
     while let Some(event) = events.next().map_err(damaged)? {
@@ -57,14 +57,14 @@ pub fn decode_drawing(text: &str) -> Result<Drawing, AssetProblem> {
 
 /// What an element hands down to those in it.
 #[derive(Clone, Copy)]
-struct Level {
+struct GroupState {
     transform: Transform,
     is_drawn: bool,
 }
 
 #[derive(Default)]
-struct Reading {
-    levels: Vec<Level>,
+struct SvgReader {
+    levels: Vec<GroupState>,
     strokes: Vec<Stroke>,
     points: usize,
     /// What else is drawn.
@@ -73,13 +73,14 @@ struct Reading {
     sheet: Option<[DVec2; 2]>,
 }
 
-impl Reading {
+impl SvgReader {
     fn start(&mut self, tag: &Tag) -> Result<(), AssetProblem> {
-        let outer = self.levels.last().copied().unwrap_or(Level { transform: Transform::IDENTITY, is_drawn: true });
+        let outer =
+            self.levels.last().copied().unwrap_or(GroupState { transform: Transform::IDENTITY, is_drawn: true });
         let own = Transform::parse(tag.get("transform").unwrap_or_default());
         let own = own.ok_or_else(|| damaged(format!("{}: its transform cannot be read", self.name(tag))))?;
-        let is_hidden = UNDRAWN.contains(&tag.name) || tag.get("display") == Some("none") || hides(tag);
-        let level = Level { transform: outer.transform.after(&own), is_drawn: outer.is_drawn && !is_hidden };
+        let is_hidden = HIDDEN_ELEMENTS.contains(&tag.name) || tag.get("display") == Some("none") || is_hidden(tag);
+        let level = GroupState { transform: outer.transform.after(&own), is_drawn: outer.is_drawn && !is_hidden };
         if tag.name == "svg" && self.levels.is_empty() {
             self.sheet = sheet(tag)?;
         }
@@ -87,12 +88,12 @@ impl Reading {
         if !level.is_drawn {
             return Ok(());
         }
-        let other = NO_STROKES.into_iter().find(|name| *name == tag.name);
+        let other = UNSUPPORTED_ELEMENTS.into_iter().find(|name| *name == tag.name);
         self.others.extend(other.filter(|name| !self.others.contains(name)));
         for line in lines(tag).map_err(|reason| damaged(format!("{}: {reason}", self.name(tag))))? {
             self.points += line.len();
-            if self.points > MOST_POINTS {
-                return Err(damaged(format!("it has more than {MOST_POINTS} points")));
+            if self.points > MAX_POINTS {
+                return Err(damaged(format!("it has more than {MAX_POINTS} points")));
             }
             let points: Vec<DVec2> = line.into_iter().map(|point| level.transform.apply(point)).collect();
             if !points.iter().all(|point| point.is_finite()) {
@@ -122,7 +123,7 @@ impl Reading {
     }
 }
 
-fn hides(tag: &Tag) -> bool {
+fn is_hidden(tag: &Tag) -> bool {
     let style = tag.get("style").unwrap_or_default();
     style
         .split(';')
@@ -150,11 +151,11 @@ fn sheet(tag: &Tag) -> Result<Option<[DVec2; 2]>, AssetProblem> {
 fn lines(tag: &Tag) -> Result<Vec<Vec<DVec2>>, PathError> {
     let number = |name: &str| tag.get(name).and_then(|value| Numbers::new(value).next()).unwrap_or(0.0);
     Ok(match tag.name {
-        "path" => path::subpaths(tag.get("d").unwrap_or_default(), MOST_POINTS)?,
+        "path" => path::subpaths(tag.get("d").unwrap_or_default(), MAX_POINTS)?,
         "polyline" | "polygon" => {
             let mut numbers = Numbers::new(tag.get("points").unwrap_or_default());
             let mut line: Vec<DVec2> =
-                std::iter::from_fn(|| numbers.take_all::<2>()).map(DVec2::from).take(MOST_POINTS + 1).collect();
+                std::iter::from_fn(|| numbers.take_all::<2>()).map(DVec2::from).take(MAX_POINTS + 1).collect();
             if tag.name == "polygon" {
                 line.extend(line.first().copied());
             }

@@ -5,7 +5,7 @@ use bansho_base::math::{self, DVec2};
 use super::numbers::Numbers;
 
 /// Points on each curve and on each quarter of an arc.
-const PIECES: usize = 16;
+const CURVE_SEGMENTS: usize = 16;
 
 /// What is wrong with a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -37,7 +37,7 @@ struct Pen {
 ///
 /// # Errors
 /// An unknown command, missing numbers, moves alone, or more than `most` points.
-pub(super) fn subpaths(data: &str, most: usize) -> Result<Vec<Vec<DVec2>>, PathError> {
+pub(super) fn subpaths(data: &str, limit: usize) -> Result<Vec<Vec<DVec2>>, PathError> {
     let mut numbers = Numbers::new(data);
     let mut pen = Pen::default();
     let mut command = None;
@@ -51,8 +51,8 @@ pub(super) fn subpaths(data: &str, most: usize) -> Result<Vec<Vec<DVec2>>, PathE
             return Err(PathError::NoMove);
         }
         pen.draw(letter, &mut numbers)?;
-        if pen.points > most {
-            return Err(PathError::ManyPoints(most));
+        if pen.points > limit {
+            return Err(PathError::ManyPoints(limit));
         }
         // Further pairs after a move are lines; nothing may follow a closing but a command.
         command = match letter {
@@ -132,8 +132,8 @@ impl Pen {
 
     fn cubic_to(&mut self, first: DVec2, second: DVec2, end: DVec2) {
         let start = self.at;
-        for piece in 1..=PIECES {
-            let t = piece as f64 / PIECES as f64;
+        for piece in 1..=CURVE_SEGMENTS {
+            let t = piece as f64 / CURVE_SEGMENTS as f64;
             let [a, b, c] = [start.lerp(first, t), first.lerp(second, t), second.lerp(end, t)];
             self.push(a.lerp(b, t).lerp(b.lerp(c, t), t));
         }
@@ -142,8 +142,8 @@ impl Pen {
 
     fn quadratic_to(&mut self, control: DVec2, end: DVec2) {
         let start = self.at;
-        for piece in 1..=PIECES {
-            let t = piece as f64 / PIECES as f64;
+        for piece in 1..=CURVE_SEGMENTS {
+            let t = piece as f64 / CURVE_SEGMENTS as f64;
             self.push(start.lerp(control, t).lerp(control.lerp(end, t), t));
         }
         self.control = Some((false, control));
@@ -176,7 +176,7 @@ impl Pen {
             way -= std::f64::consts::TAU;
         }
         let middle = self.at.midpoint(end);
-        let pieces = (way.abs() / std::f64::consts::FRAC_PI_2 * PIECES as f64).ceil().max(1.0) as usize;
+        let pieces = (way.abs() / std::f64::consts::FRAC_PI_2 * CURVE_SEGMENTS as f64).ceil().max(1.0) as usize;
         for piece in 1..pieces {
             let (sin, cos) = math::sin_cos(from + way * piece as f64 / pieces as f64);
             self.push(middle + axis.rotate((centre + DVec2::new(cos, sin)) * radii));

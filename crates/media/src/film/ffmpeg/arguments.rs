@@ -42,7 +42,11 @@ pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
 
 /// The tag by which a film says that Bansho made it. MP4 has no tags of one's own, so there it is the comment.
 fn mark_in(kind: OutputKind) -> String {
-    if kind == OutputKind::Mp4 { format!("comment={}", provenance::TAG) } else { provenance::TAG.to_owned() }
+    if kind == OutputKind::Mp4 {
+        format!("comment={}", provenance::COMMENT_TAG)
+    } else {
+        provenance::COMMENT_TAG.to_owned()
+    }
 }
 
 fn pixel_format(format: &VideoFormat) -> &'static str {

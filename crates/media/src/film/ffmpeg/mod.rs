@@ -16,7 +16,7 @@ use bansho_base::{
 
 use crate::output::{flatten, naming::OutputKind};
 
-pub(crate) use self::process::VideoFilm;
+pub(crate) use self::process::FfmpegFilm;
 
 /// How films are made.
 #[derive(Clone, Debug, PartialEq, Eq)]

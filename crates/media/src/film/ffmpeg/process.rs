@@ -10,7 +10,7 @@ use std::{
 use super::{VideoFormat, arguments};
 use crate::{
     error::MediaError,
-    film::ordered::Film,
+    film::ordered::FilmEncoder,
     output::{atomic::AtomicFile, overwrite_policy::OverwritePolicy},
 };
 
@@ -22,19 +22,19 @@ const TAIL_BYTES: usize = 4096;
 const CREATE_NEW_PROCESS_GROUP: u32 = 0x200;
 
 /// A film being made. Dropped before it is finished, `ffmpeg` is stopped and nothing stays behind.
-pub(crate) struct VideoFilm {
+pub(crate) struct FfmpegFilm {
     // Fields are dropped in this order: the program must have ended before its file is removed.
-    running: Running,
+    running: FfmpegProcess,
     file: AtomicFile,
 }
 
-struct Running {
+struct FfmpegProcess {
     child: Child,
     frames: Option<ChildStdin>,
-    said: Option<JoinHandle<Vec<u8>>>,
+    stderr: Option<JoinHandle<Vec<u8>>>,
 }
 
-impl VideoFilm {
+impl FfmpegFilm {
     pub(crate) fn create(path: &Path, format: &VideoFormat, overwrite: &OverwritePolicy) -> Result<Self, MediaError> {
         let [numerator, denominator] = format.fps;
         if numerator == 0 || denominator == 0 {
@@ -58,8 +58,8 @@ impl VideoFilm {
             _ => MediaError::from_io(path, source),
         })?;
         let frames = child.stdin.take();
-        let said = child.stderr.take().map(|stream| std::thread::spawn(move || tail(stream)));
-        Ok(Self { running: Running { child, frames, said }, file })
+        let stderr = child.stderr.take().map(|stream| std::thread::spawn(move || tail(stream)));
+        Ok(Self { running: FfmpegProcess { child, frames, stderr }, file })
     }
 }
 
@@ -73,14 +73,14 @@ fn tail(mut stream: impl Read) -> Vec<u8> {
     kept
 }
 
-impl Running {
+impl FfmpegProcess {
     /// Waits for the end; `Ok` if it was a good one. The status alone does not say so: `ffmpeg` (5.1 at least) ends with 0 where only
     /// the trailer or the closing of the file failed. It is told to speak of errors alone, so a good end is a silent one.
     fn end(&mut self, path: &Path) -> Result<(), MediaError> {
         drop(self.frames.take());
         let status = self.child.wait().map_err(|source| MediaError::from_io(path, source))?;
-        let said = self.said.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
-        let tail = String::from_utf8_lossy(&said).trim().to_owned();
+        let stderr = self.stderr.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
+        let tail = String::from_utf8_lossy(&stderr).trim().to_owned();
         if status.success() && tail.is_empty() {
             return Ok(());
         }
@@ -91,7 +91,7 @@ impl Running {
     }
 }
 
-impl Drop for Running {
+impl Drop for FfmpegProcess {
     fn drop(&mut self) {
         // Both fail only where the program has already ended and been waited for.
         let _ = self.child.kill();
@@ -99,11 +99,11 @@ impl Drop for Running {
     }
 }
 
-impl Film for VideoFilm {
-    type Piece = Vec<u8>;
+impl FilmEncoder for FfmpegFilm {
+    type EncodedFrame = Vec<u8>;
 
-    fn append(&mut self, piece: Vec<u8>) -> Result<(), MediaError> {
-        let written = self.running.frames.as_mut().map(|pipe| pipe.write_all(&piece));
+    fn append(&mut self, encoded: Vec<u8>) -> Result<(), MediaError> {
+        let written = self.running.frames.as_mut().map(|pipe| pipe.write_all(&encoded));
         match written {
             Some(Ok(())) => Ok(()),
             // The pipe is closed because the program gave up; its own words say why.
