@@ -5,8 +5,6 @@
 
 use std::io::{self, Write};
 
-use crate::png::checksum::crc32;
-
 /// What follows the signature of a file's heads: version 1.0, UTF-8 names, stored, 1 January 1980. The same files make the same bytes.
 const SHARED: [u8; 10] = [10, 0, 0, 8, 0, 0, 0, 0, 0x21, 0];
 
@@ -70,7 +68,7 @@ impl<W: Write> ZipWriter<W> {
 fn head(name: &str, bytes: &[u8]) -> io::Result<Vec<u8>> {
     let size = small(bytes.len() as u64)?.to_le_bytes();
     let name = u16::try_from(name.len()).map_err(|_| too_large())?.to_le_bytes();
-    let parts: [&[u8]; 6] = [&SHARED, &crc32(&[bytes]).to_le_bytes(), &size, &size, &name, &[0; 2]];
+    let parts: [&[u8]; 6] = [&SHARED, &crc32fast::hash(bytes).to_le_bytes(), &size, &size, &name, &[0; 2]];
     Ok(parts.concat())
 }
 

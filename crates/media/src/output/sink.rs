@@ -251,7 +251,10 @@ impl Sink {
     }
 }
 
-fn ordered<F: crate::film::ordered::FilmEncoder>(film: F, (path, count, window): (PathBuf, usize, usize)) -> ReorderBuffer<F> {
+fn ordered<F: crate::film::ordered::FilmEncoder>(
+    film: F,
+    (path, count, window): (PathBuf, usize, usize),
+) -> ReorderBuffer<F> {
     ReorderBuffer::new(film, path, count, window)
 }
 

@@ -1,7 +1,5 @@
 //! The chunks a PNG is made of: length, kind, contents, checksum (PNG third edition, section 5.3).
 
-use super::checksum::crc32;
-
 /// First bytes of every PNG.
 pub(crate) const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
@@ -43,7 +41,10 @@ fn split(bytes: &[u8]) -> Option<(Chunk<'_>, &[u8])> {
     let (contents, bytes) = bytes.split_at_checked(u32::from_be_bytes(*length) as usize)?;
     let (checksum, rest) = bytes.split_first_chunk::<4>()?;
     let chunk = Chunk { kind: *kind, contents };
-    (u32::from_be_bytes(*checksum) == crc32(&[kind, contents])).then_some((chunk, rest))
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(kind);
+    hasher.update(contents);
+    (u32::from_be_bytes(*checksum) == hasher.finalize()).then_some((chunk, rest))
 }
 
 /// Appends a chunk whose contents are the parts one after the other, at most 2^31 - 1 bytes together.
@@ -53,7 +54,7 @@ pub(crate) fn push(file: &mut Vec<u8>, kind: [u8; 4], parts: &[&[u8]]) {
     let start = file.len();
     file.extend(kind);
     parts.iter().for_each(|part| file.extend_from_slice(part));
-    let checksum = crc32(&[&file[start..]]);
+    let checksum = crc32fast::hash(&file[start..]);
     file.extend(checksum.to_be_bytes());
 }
 

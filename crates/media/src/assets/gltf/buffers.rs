@@ -6,8 +6,12 @@ use std::{
 };
 
 use bansho_base::host::assets::AssetProblem;
+use base64::{
+    Engine, alphabet,
+    engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig},
+};
 
-use super::{ReadResource, base64, json::Object};
+use super::{ReadResource, json::Object};
 use crate::assets::limits::MemoryLimit;
 
 /// All buffers. What several of them name is held once.
@@ -85,6 +89,27 @@ fn content<'a>(
         return binary.map(Cow::Borrowed).ok_or_else(missing);
     };
     let Some(data) = uri.strip_prefix("data:") else { return read_resource(uri).map(Cow::Owned) };
-    let decoded = data.split_once(";base64,").and_then(|(_, text)| base64::decode(text));
+    let decoded = data.split_once(";base64,").and_then(|(_, text)| decode_base64(text));
     decoded.map(Cow::Owned).ok_or_else(|| buffer.fault("uri", "is not base64; allowed: `data:...;base64,...`"))
+}
+
+/// Decodes base64 (RFC 4648), with or without padding: some writers of glTF leave it out.
+fn decode_base64(text: &str) -> Option<Vec<u8>> {
+    const LENIENT: GeneralPurposeConfig = GeneralPurposeConfig::new()
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+        .with_decode_allow_trailing_bits(true);
+    GeneralPurpose::new(&alphabet::STANDARD, LENIENT).decode(text.trim_end_matches('=')).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::decode_base64;
+
+    #[test]
+    fn base64_is_read_with_and_without_padding() {
+        for (text, bytes) in [("", ""), ("Zg==", "f"), ("Zm8", "fo"), ("Zm9v", "foo"), ("Zm9vYmE=", "fooba")] {
+            assert_eq!(decode_base64(text).as_deref(), Some(bytes.as_bytes()));
+        }
+        assert_eq!([decode_base64("a b"), decode_base64("A")], [None, None]);
+    }
 }

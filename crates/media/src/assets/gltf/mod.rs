@@ -4,7 +4,6 @@
 //! meshes are shown where. What all of them together would take is counted before the first corner is read.
 
 mod accessor;
-mod base64;
 mod buffers;
 mod glb;
 mod json;
