@@ -14,7 +14,7 @@ use bansho_base::{
     },
     image::Frame,
 };
-use bansho_media::plates::{decode_picture, limits};
+use bansho_media::assets::{decode_picture, limits};
 use bansho_render::{
     Backend, CpuBackend, Plan, PlanOptions, RenderError, Scene,
     display::{BitDepth, display},

@@ -20,7 +20,7 @@ use bansho_media::{
     },
 };
 
-/// Smooth colours with a soft alpha that move a little each frame.
+/// Smooth colors with a soft alpha that move a little each frame.
 fn picture(width: usize, height: usize, frame: usize) -> DisplayImage {
     let pixel = |i: usize| {
         let (x, y) = (i % width, i / width);

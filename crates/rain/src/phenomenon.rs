@@ -64,7 +64,7 @@ struct Class {
     bin: SizeBin,
     /// Terminal velocity, m/s.
     speed: f64,
-    /// Most drops a cubic metre in the shot.
+    /// Most drops a cubic meter in the shot.
     most: f64,
 }
 

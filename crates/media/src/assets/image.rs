@@ -25,8 +25,8 @@ fn damaged(reason: impl ToString) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
 }
 
-/// Reads a PNG of any kind: 1 to 16 bits, grey, palette, with alpha or without. Taken as sRGB, unless it says that its
-/// values are linear (a gAMA of 1 and no sRGB chunk); colour profiles are not looked at.
+/// Reads a PNG of any kind: 1 to 16 bits, gray, palette, with alpha or without. Taken as sRGB, unless it says that its
+/// values are linear (a gAMA of 1 and no sRGB chunk); color profiles are not looked at.
 pub(crate) fn png(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     // For everything but pixels: text and profiles.
     let metadata = Limits { bytes: 64 << 20 };
@@ -86,7 +86,7 @@ fn extend_by(pixels: &mut Vec<[f32; 4]>, mut values: impl Iterator<Item = f32>, 
     }
 }
 
-/// Reads a JPEG, grey or coloured, taken as sRGB.
+/// Reads a JPEG, gray or colored, taken as sRGB.
 pub(crate) fn jpeg(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     let options = DecoderOptions::default()
         .set_max_width(usize::from(u16::MAX))

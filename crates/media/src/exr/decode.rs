@@ -1,4 +1,4 @@
-//! OpenEXR plates: colour and depth of any part, any sample type, lines or tiles.
+//! OpenEXR plates: color and depth of any part, any sample type, lines or tiles.
 //!
 //! The header is first read by [`super::parse`], which trusts nothing, so that a file cannot make the decoder ask for more
 //! memory than it could ever fill.
@@ -30,16 +30,17 @@ use crate::assets::limits::{self, MemoryLimit};
 
 use rayon::prelude::*;
 
-/// Most chunks that are decompressed at a time.
+/// Largest number of chunks that are decompressed in parallel.
 const MAX_CHUNKS: u64 = 32;
-/// Bytes of pixels that a few chunks at a time may hold; a single one may hold more.
+/// Bytes of pixels in one batch of chunks; a single chunk may exceed it.
 const BATCH_BYTES: u64 = 64 << 20;
-/// How many times the bytes of its pixels a chunk takes while it is decompressed: in the file, between two steps, and as pixels.
+/// Memory of a chunk while it is decompressed, in multiples of its pixels: in the file, between two steps, and as
+/// pixels.
 const CHUNK_COPIES: u64 = 4;
 
-/// Reads a plate: the part and layer with `R`, `G` and `B` (or a lone grey `Y`), with `A` where there is one, and depth
+/// Reads a plate: the part and layer with `R`, `G` and `B` (or a lone gray `Y`), with `A` where there is one, and depth
 /// from `Z`, `depth.Z`, or the only channel of a file that has just one. Pixels cover the display window; where the file
-/// has none they are transparent and infinitely far. Colours are given straight, those that are no numbers as 0.
+/// has none they are transparent and infinitely far. Colors are given straight, those that are no numbers as 0.
 pub(crate) fn decode(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     let header = parse::parse_header(file).map_err(damaged)?;
     check(&header, file)?;
@@ -64,7 +65,7 @@ fn all_names(header: &FileHeader) -> String {
     names.take(12).collect::<Vec<_>>().join(", ")
 }
 
-/// Refuses what would need more memory than is allowed, or than the file's bytes could ever fill.
+/// Refuses files that would need more memory than is allowed, or than their bytes could ever fill.
 fn check(header: &FileHeader, file: &[u8]) -> Result<(), AssetProblem> {
     if header.deep {
         return Err(damaged("deep pixels are not read; flatten them first"));
@@ -86,7 +87,7 @@ fn check(header: &FileHeader, file: &[u8]) -> Result<(), AssetProblem> {
     Ok(())
 }
 
-/// How many bytes of pixels a byte of the file can stand for at most.
+/// Largest compression ratio of a part.
 fn greatest_ratio(part: &PartHeader) -> u64 {
     match part.compression {
         Some(0) => 1,
@@ -98,12 +99,12 @@ fn greatest_ratio(part: &PartHeader) -> u64 {
     }
 }
 
-/// Which channel of which part goes into which plane.
+/// The selected channels of color and depth.
 struct ChannelSelection {
     part: usize,
-    /// Index in the part's list of channels, for red, green, blue, alpha.
+    /// Index in the part's channel list, for red, green, blue and alpha.
     color: [Option<usize>; 4],
-    /// PartHeader and channel of depth.
+    /// Part and channel of the depth.
     depth: Option<(usize, usize)>,
 }
 
@@ -135,7 +136,7 @@ impl ChannelSelection {
         DecodedPlanes { color, depth: self.depth.map(|_| vec![f32::INFINITY; pixels]) }
     }
 
-    /// Bytes of what [`planes`](Self::planes) and `finish` make for so many pixels.
+    /// Bytes of the result for this number of pixels.
     fn bytes(&self, pixels: u64) -> u64 {
         let depth = if self.depth.is_some() { size_of::<f32>() } else { 0 };
         pixels * (size_of::<[f32; 4]>() + depth) as u64
@@ -167,7 +168,7 @@ struct PlaneWriter {
     values: DecodedPlanes,
 }
 
-/// How many chunks are decompressed at a time, and the bytes that this takes.
+/// Number of chunks in a batch, and the bytes that it takes.
 struct ChunkBatch {
     chunks: usize,
     bytes: u64,
@@ -271,7 +272,7 @@ fn check_dwa(chunk: &Chunk, meta: &MetaData) -> Result<(), AssetProblem> {
 }
 
 impl PlaneWriter {
-    /// Copies what a block holds of the wanted channels.
+    /// Copies the selected channels of a block.
     fn copy_block(&mut self, block: &UncompressedBlock, header: &Header, selection: &ChannelSelection) {
         let part = block.index.layer;
         for line in block.lines(&header.channels) {
@@ -288,7 +289,7 @@ impl PlaneWriter {
         }
     }
 
-    /// How many values of a line lie left of the picture, and which pixels the others are; `None` if it lies outside.
+    /// Number of values of a line left of the picture, and the pixels of the others; `None` outside of the picture.
     fn span(&self, line: &LineRef<'_>, header: &Header) -> Option<(usize, Range<usize>)> {
         let origin = header.own_attributes.layer_position;
         let x = line.location.position.0 as i64 + i64::from(origin.0) - i64::from(self.display_min[0]);
@@ -300,7 +301,7 @@ impl PlaneWriter {
     }
 }
 
-/// Writes one channel's values into the components it stands for.
+/// Writes the values of a channel into its color components.
 fn copy_color(pixels: &mut [[f32; 4]], values: impl Iterator<Item = f32>, color: [Option<usize>; 4], channel: usize) {
     let targets = color.map(|selection| selection == Some(channel));
     if !targets.contains(&true) {
@@ -315,7 +316,7 @@ fn copy_color(pixels: &mut [[f32; 4]], values: impl Iterator<Item = f32>, color:
     }
 }
 
-/// The values of a line as floats.
+/// The values of a line as `f32`.
 fn samples<'a>(line: &LineRef<'a>, kind: SampleType) -> Box<dyn Iterator<Item = f32> + 'a> {
     let bytes = line.value;
     match kind {
@@ -325,13 +326,13 @@ fn samples<'a>(line: &LineRef<'a>, kind: SampleType) -> Box<dyn Iterator<Item = 
     }
 }
 
-/// Straight alpha, known primaries, and no values that would spoil what is composited over them.
+/// Converts to straight alpha and known primaries, and removes values that would spoil compositing.
 fn finish(header: &FileHeader, selection: &ChannelSelection, planes: PlaneWriter) -> Result<Picture, AssetProblem> {
     let (width, height) = (planes.width, planes.height);
     let conversion = primaries::conversion(header.parts[selection.part].chromaticities)
         .ok_or_else(|| damaged("its chromaticities describe no colours"))?;
     let mut color = planes.values.color.unwrap_or_else(|| {
-        // A file of depth alone: shown as grey, opaque.
+        // A file of depth alone: shown as gray, opaque.
         let depth = planes.values.depth.iter().flatten();
         depth.map(|&z| [z, z, z, 1.0]).collect()
     });
@@ -352,7 +353,7 @@ fn exposure(part: &PartHeader) -> Option<f64> {
     own.or_else(|| ev100_of_camera(part.float("aperture")?, part.float("expTime")?, part.float("isoSpeed")?))
 }
 
-/// Greatest value that is kept: that of half floats, so that an infinity does not spread.
+/// Largest finite half: infinities are clamped to it.
 const HALF_MAX: f32 = 65504.0;
 
 fn finite(value: f32) -> f32 {

@@ -26,15 +26,15 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// Lines that are compressed together.
+/// Lines in a compressed block.
 const LINES_PER_BLOCK: usize = 16;
-/// Most pixels on a side that are written.
+/// Largest side that is written, pixels.
 const SIDE_LIMIT: usize = 1 << 20;
 
 /// The bytes of an OpenEXR file of `frame`: beauty as half `R,G,B,A`, depth as float `Z`, and every layer and AOV under
 /// its own name; a name that ends in no component (`torch.temperature_k`) gets `.V`, without which readers lose the channel.
-/// Colours are ACEScg, premultiplied. Compressed in parallel in the caller's thread pool; the same frame
-/// gives the same bytes whatever the number of threads. Colours beyond the range of half are written as 65504, colours that are no numbers as 0,
+/// Colors are ACEScg, premultiplied. Compressed in parallel in the caller's thread pool; the same frame
+/// gives the same bytes whatever the number of threads. Colors beyond the range of half are written as 65504, colors that are no numbers as 0,
 /// as display formats show them; depth and AOVs are written as they are.
 ///
 /// # Errors

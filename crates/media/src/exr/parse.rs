@@ -1,10 +1,10 @@
-//! A look at an OpenEXR file's header without trust: every length is checked against the bytes that are there.
+//! Parser of OpenEXR headers for untrusted files: every length is checked against the bytes of the file.
 
 use std::ops::Range;
 
 use super::attribute::{FLAG_LONG_NAMES, MAGIC, Window};
 
-/// What a file's header says of one of its parts.
+/// The header of one part.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct PartHeader {
     pub(crate) channels: Vec<ChannelEntry>,
@@ -17,7 +17,7 @@ pub(crate) struct PartHeader {
     pub(crate) floats: Vec<(String, f32)>,
 }
 
-/// A channel and how many pixels share a sample.
+/// A channel and its subsampling.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ChannelEntry {
     pub(crate) name: String,
@@ -25,14 +25,14 @@ pub(crate) struct ChannelEntry {
     pub(crate) sampling: [i32; 2],
 }
 
-/// All parts of a file.
+/// The headers of all parts.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FileHeader {
     pub(crate) parts: Vec<PartHeader>,
     pub(crate) deep: bool,
 }
 
-/// What makes a header unreadable.
+/// Why a header is unreadable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum HeaderError {
     #[error("does not begin as an OpenEXR file")]
@@ -54,7 +54,7 @@ impl PartHeader {
         self.floats.iter().find(|(key, _)| key == name).map(|(_, value)| f64::from(*value))
     }
 
-    /// The place of the string attribute `name` in the file.
+    /// Byte range of the string attribute `name` in the file.
     pub(crate) fn string(&self, name: &str) -> Option<Range<usize>> {
         self.strings.iter().find(|(key, _)| key == name).map(|(_, place)| place.clone())
     }
@@ -77,7 +77,7 @@ pub(crate) fn parse_header(file: &[u8]) -> Result<FileHeader, HeaderError> {
         if parts.len() > MAX_PARTS || channels > MAX_CHANNELS {
             return Err(HeaderError::TooManyParts);
         }
-        // Several parts end in an empty header, which is a lone zero.
+        // A list of several parts ends with an empty header, a single zero byte.
         if version & FLAG_PARTS == 0 || reader.file.get(reader.at) == Some(&0) {
             return Ok(FileHeader { parts, deep: version & FLAG_DEEP != 0 });
         }

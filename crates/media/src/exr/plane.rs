@@ -1,14 +1,14 @@
-//! The planes of a frame in the order in which a file holds them.
+//! The channels of a frame in file order.
 
 use std::{borrow::Cow, ops::Range};
 
 use bansho_base::image::{Frame, Precision};
 use half::slice::HalfFloatSliceExt;
 
-/// Greatest finite half: brighter pixels are written as this, since an infinity spoils every later blur, as does what is not a number.
+/// Largest finite half: brighter pixels are clamped to it, since infinities and NaN spoil every filter.
 const HALF_MAX: f32 = 65504.0;
 
-/// Last parts of channel names that readers know as components of a layer. Blender drops channels that end in anything else.
+/// Component names that readers recognize. Blender drops channels that end in anything else.
 const COMPONENTS: [&str; 10] = ["R", "G", "B", "A", "X", "Y", "Z", "U", "V", "W"];
 
 /// One channel of the file.
@@ -19,12 +19,12 @@ pub(crate) struct ChannelPlane<'a> {
 }
 
 enum ChannelSource<'a> {
-    /// Component 0 to 3 of the beauty.
+    /// Component 0 to 3 of the color.
     Beauty(&'a [[f32; 4]], usize),
     Values(&'a [f32]),
 }
 
-/// Every plane of `frame`, sorted by name as the format demands.
+/// All channels of `frame`, sorted by name as the format demands.
 pub(crate) fn planes(frame: &Frame) -> Vec<ChannelPlane<'_>> {
     let beauty = ["R", "G", "B", "A"].into_iter().enumerate().map(|(component, name)| ChannelPlane {
         name: name.into(),
@@ -46,14 +46,14 @@ pub(crate) fn planes(frame: &Frame) -> Vec<ChannelPlane<'_>> {
     planes
 }
 
-/// The name that a channel gets in the file: a plain quantity, `torch.temperature_k`, is the only component, `V`, of its layer.
+/// Channel name in the file: a plain quantity, `torch.temperature_k`, becomes the only component, `V`, of its layer.
 fn exr_channel_name(name: &str) -> Cow<'_, str> {
     let is_component = name.rsplit('.').next().is_some_and(|last| COMPONENTS.contains(&last));
     if is_component { name.into() } else { format!("{name}.V").into() }
 }
 
 impl ChannelPlane<'_> {
-    /// How many values it has; as many as the frame has pixels.
+    /// Number of values: that of the frame's pixels.
     pub(crate) fn len(&self) -> usize {
         match self.source {
             ChannelSource::Beauty(pixels, _) => pixels.len(),

@@ -1,10 +1,10 @@
-//! From a file's chromaticities to colours that Bansho knows.
+//! From a file's chromaticities to colors that Bansho knows.
 
 use bansho_base::host::assets::Encoding;
 
 use super::attribute::AP1;
 
-/// What the colours of a file are, after the matrix, if there is one.
+/// What the colors of a file are, after the matrix, if there is one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Conversion {
     pub(crate) encoding: Encoding,
@@ -19,7 +19,7 @@ const TOLERANCE: f32 = 0.001;
 
 type Matrix = [[f64; 3]; 3];
 
-/// What to do with colours of these chromaticities; a file without them means Rec. 709. `None` where they lie on a line.
+/// What to do with colors of these chromaticities; a file without them means Rec. 709. `None` where they lie on a line.
 pub(crate) fn conversion(chromaticities: Option<[[f32; 2]; 4]>) -> Option<Conversion> {
     let given = chromaticities.unwrap_or(REC709);
     let is = |known: [[f32; 2]; 4]| {

@@ -1,6 +1,6 @@
-//! Animated PNG (PNG third edition, sections 4.9 and 11.3.6), loops for ever.
+//! Animated PNG (PNG third edition, sections 4.9 and 11.3.6), in an endless loop.
 //!
-//! Each frame is compressed as a PNG of its own, in any thread; here only its chunks are renumbered and appended.
+//! Each frame is compressed as a PNG of its own, on any thread; here its chunks are renumbered and appended.
 
 use std::{io::Write, path::Path};
 
@@ -13,7 +13,7 @@ use crate::{
     png::{self, chunk},
 };
 
-/// What is the same for every frame.
+/// The format of all frames.
 #[derive(Clone, Debug)]
 pub(crate) struct ApngFormat {
     pub(crate) frame_count: usize,
@@ -49,13 +49,13 @@ impl ApngFilm {
         let sequence = self.next_sequence();
         let [width, height] = self.format.size.map(|side| (side as u32).to_be_bytes());
         let [seconds, frames] = self.delay.map(u16::to_be_bytes);
-        // At the origin; nothing is disposed of, since each frame replaces all pixels.
+        // No offset, no disposal: each frame replaces all pixels.
         let rest: &[&[u8]] = &[&sequence, &width, &height, &[0; 8], &seconds, &frames, &[0, 0]];
         chunk::push(bytes, *b"fcTL", rest);
     }
 }
 
-/// The bytes of one frame as a PNG, of the colour type that all frames share.
+/// One frame as a PNG, with the color type that all frames share.
 pub(crate) fn prepare(picture: &DisplayImage, opaque: bool, path: &Path) -> Result<Vec<u8>, MediaError> {
     match (opaque, picture.opaque) {
         (true, false) => png::encode_frame(&flatten::over_black(picture), path),

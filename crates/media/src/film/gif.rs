@@ -25,30 +25,30 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// Most pixels on a side of a GIF.
+/// Largest side of a GIF, pixels.
 const SIDE_LIMIT: usize = 65535;
-/// Frames that are dithered and compressed at a time.
+/// Frames that are dithered and compressed in parallel.
 const BATCH: usize = 8;
-/// Alpha from which a pixel of a transparent GIF is shown.
+/// Alpha threshold of a transparent GIF.
 const ALPHA_THRESHOLD: u8 = 128;
 
-/// What is the same for every frame.
+/// The format of all frames.
 #[derive(Clone, Debug)]
 pub(crate) struct GifFormat {
     pub(crate) frame_count: usize,
     pub(crate) size: [usize; 2],
     pub(crate) timing: GifTiming,
-    /// Pixels are shown or not by half their alpha, instead of all over black.
+    /// Transparency by an alpha threshold, instead of compositing over black.
     pub(crate) transparent: bool,
 }
 
-/// A frame, compressed, and the colours it holds; `None` for one that a fast film leaves out.
+/// A compressed frame and its color histogram; `None` for one that is dropped because of the frame rate.
 pub(crate) struct GifFrame(Option<(Vec<u8>, FrameHistogram)>);
 
 pub(crate) struct GifFilm {
     file: AtomicFile,
     spool: File,
-    /// Where in the spool each kept frame lies, and which frame it is.
+    /// Position of each frame in the temporary file, and its index.
     spooled: Vec<SpooledFrame>,
     histogram: Histogram,
     format: GifFormat,
@@ -75,7 +75,7 @@ impl GifFilm {
     }
 }
 
-/// Makes a frame ready to be kept.
+/// Prepares a frame for the temporary file.
 pub(crate) fn prepare(
     picture: &DisplayImage,
     index: usize,
@@ -174,7 +174,7 @@ impl Writer<'_> {
         out.flush().map_err(|source| MediaError::from_io(self.path, source))
     }
 
-    /// One frame with its length, dithered and compressed.
+    /// One frame with its delay, dithered and compressed.
     fn frame(&self, index: usize, bytes: &[u8]) -> Result<::gif::Frame<'static>, MediaError> {
         let [width, height] = self.format.size;
         let (pixels, channels) = unpack(bytes).ok_or_else(|| MediaError::Encode {
@@ -210,7 +210,7 @@ impl Writer<'_> {
     }
 }
 
-/// The samples of a PNG that `prepare` made, and how many make a pixel.
+/// The samples of a PNG of `prepare`, and the number of samples for each pixel.
 fn unpack(bytes: &[u8]) -> Option<(Vec<u8>, usize)> {
     let mut reader = ::png::Decoder::new(Cursor::new(bytes)).read_info().ok()?;
     let mut pixels = vec![0; reader.output_buffer_size()?];

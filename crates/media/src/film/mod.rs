@@ -1,4 +1,4 @@
-//! Animations that need nothing installed: APNG and GIF.
+//! Films: APNG and GIF, encoded in this process, and other formats by `ffmpeg`. Frames may arrive out of order.
 
 pub(crate) mod apng;
 pub mod ffmpeg;

@@ -1,4 +1,4 @@
-//! Frames of a film, handed on in order although several threads make them.
+//! Reordering of the frames of a film that several threads render.
 
 use std::{
     collections::BTreeMap,
@@ -8,19 +8,19 @@ use std::{
 
 use crate::error::MediaError;
 
-/// A file that holds all frames one after the other.
+/// An encoder that appends frames to one file.
 pub(crate) trait FilmEncoder: Send {
-    /// A frame, ready to be appended.
+    /// A frame, encoded as far as it can be on its own.
     type EncodedFrame: Send;
 
-    /// Adds the next frame.
+    /// Appends the next frame.
     fn append(&mut self, encoded: Self::EncodedFrame) -> Result<(), MediaError>;
 
-    /// Ends the file and gives it its name. Dropping a film instead leaves nothing behind.
+    /// Completes the file and renames it. A dropped encoder leaves no file behind.
     fn finish(self) -> Result<(), MediaError>;
 }
 
-/// A film that takes its frames in any order within a window and never blocks on one that is missing.
+/// Accepts frames in any order within a window, and never blocks on a missing one.
 pub(crate) struct ReorderBuffer<F: FilmEncoder> {
     path: PathBuf,
     frame_count: usize,
@@ -29,7 +29,7 @@ pub(crate) struct ReorderBuffer<F: FilmEncoder> {
 }
 
 struct State<F: FilmEncoder> {
-    /// `None` once a frame has failed.
+    /// `None` after an error.
     film: Option<F>,
     next: usize,
     waiting: BTreeMap<usize, F::EncodedFrame>,
@@ -41,9 +41,9 @@ impl<F: FilmEncoder> ReorderBuffer<F> {
         Self { path, frame_count, window: window.max(1), state }
     }
 
-    /// Appends the frame at position `index`, now or when those before it have come.
+    /// Appends the frame at position `index`, at once or after those before it.
     pub(crate) fn push(&self, index: usize, encoded: F::EncodedFrame) -> Result<(), MediaError> {
-        // A thread that panicked while it held the lock left `film` as it was; the file is never named, so it is harmless.
+        // After a panic of a lock's owner, `film` is unchanged; the file is never renamed.
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let state = &mut *state;
         let Some(film) = &mut state.film else {
@@ -70,7 +70,7 @@ impl<F: FilmEncoder> ReorderBuffer<F> {
         Ok(())
     }
 
-    /// Ends the film.
+    /// Completes the film.
     pub(crate) fn finish(self) -> Result<(), MediaError> {
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         let film = state.film.ok_or(MediaError::AlreadyFailed { path: self.path.clone() })?;

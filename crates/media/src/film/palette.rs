@@ -1,7 +1,7 @@
-//! One palette for a whole animation, from the colours of all its frames.
+//! One palette for a whole animation, from the colors of all its frames.
 //!
-//! Boxes of a colour histogram are split where their spread is greatest (after X. Wu, "Efficient statistical computations
-//! for optimal color quantization", 1991), then moved to the means of the colours nearest to them (Lloyd). Everything
+//! Boxes of a color histogram are split where their spread is greatest (after X. Wu, "Efficient statistical computations
+//! for optimal color quantization", 1991), then moved to the means of the colors nearest to them (Lloyd). Everything
 //! begins from integer counts, so that neither threads nor the order of frames can change the outcome.
 
 use rayon::prelude::*;
@@ -12,12 +12,12 @@ const BITS: usize = 6;
 const BINS: usize = 1 << (3 * BITS);
 /// Codes of a channel that fall into a bin.
 const BIN_WIDTH: u8 = 1 << (8 - BITS);
-/// Rounds of moving colours to the means of their neighbourhoods.
+/// Steps of k-means.
 const KMEANS_STEPS: usize = 3;
-/// How much the eye minds an error in red, green and blue.
+/// Perceptual weights of errors in red, green and blue.
 const CHANNEL_WEIGHTS: [f32; 3] = [3.0, 4.0, 2.0];
 
-/// How many colors fall into a bin, and sums of what their channels have beyond the bin's least codes.
+/// Number of colors in a bin, and sums of their channels relative to the bin's lowest codes.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bin<N> {
     count: N,
@@ -25,8 +25,8 @@ struct Bin<N> {
 }
 
 impl Bin<u64> {
-    /// The mean of its colors, of which it has one at least, if it is the bin with this index. The middle of the bin would not do: night
-    /// skies have colors of few bins, and would all become darker or brighter.
+    /// Mean of the colors of a bin that has some. The bin's center would not do: night skies have colors of few bins,
+    /// and would all become darker or brighter.
     fn mean(&self, index: usize) -> [f32; 3] {
         std::array::from_fn(|axis| {
             (f64::from(bin_min_code(index, axis)) + self.beyond[axis] as f64 / self.count as f64) as f32
@@ -72,7 +72,8 @@ impl Histogram {
 
     fn colors(&self) -> Vec<WeightedColor> {
         let occupied = self.0.iter().enumerate().filter(|(_, bin)| bin.count > 0);
-        // By the root of their number: a bright core of few pixels must not lose to the many of the glow around it.
+        // Weighted by the square root of the count: a bright core of few pixels must not lose to the many pixels of the
+        // glow around it.
         let weighted = |(index, bin): (usize, &Bin<u64>)| WeightedColor {
             color: bin.mean(index),
             weight: (bin.count as f64).sqrt() as f32,
@@ -86,7 +87,7 @@ fn histogram_bin([r, g, b]: [u8; 3]) -> usize {
     (part(r) << (2 * BITS)) | (part(g) << BITS) | part(b)
 }
 
-/// The least code of a channel in the bin with this index.
+/// The lowest code of a channel in the bin with this index.
 fn bin_min_code(index: usize, axis: usize) -> u8 {
     (((index >> ((2 - axis) * BITS)) & ((1 << BITS) - 1)) << (8 - BITS)) as u8
 }
@@ -97,7 +98,7 @@ struct WeightedColor {
     weight: f32,
 }
 
-/// Colours that share a palette entry while the palette is built.
+/// A box of colors that share a palette entry while the palette is built.
 struct ColorBox {
     colors: Vec<WeightedColor>,
     /// Axis of the greatest spread, mean along it, and spread times weight.
@@ -137,7 +138,7 @@ fn mean(colors: &[WeightedColor]) -> Option<[f32; 3]> {
     (total > 0.0).then(|| [0, 1, 2].map(along))
 }
 
-/// Up to `size` colours that stand for all that were counted; at least one.
+/// Up to `size` palette entries for all counted colors; at least one.
 pub(crate) fn palette(histogram: &Histogram, size: usize) -> Vec<[u8; 3]> {
     let colors = histogram.colors();
     let mut cells = vec![ColorBox::new(colors.clone())];
@@ -163,12 +164,12 @@ fn kmeans_step(colors: &[WeightedColor], entries: &[[f32; 3]]) -> Vec<[f32; 3]> 
     groups.iter().zip(entries).map(|(group, entry)| mean(group).unwrap_or(*entry)).collect()
 }
 
-/// Squared difference as the eye weighs it.
+/// Weighted squared difference.
 fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     (0..3).map(|axis| CHANNEL_WEIGHTS[axis] * (a[axis] - b[axis]) * (a[axis] - b[axis])).sum()
 }
 
-/// The entry nearest to `colour`, the first of several as near.
+/// Index of the nearest entry, the first of several.
 fn nearest(color: [f32; 3], entries: &[[f32; 3]]) -> usize {
     let mut best = (0, f32::INFINITY);
     for (index, entry) in entries.iter().enumerate() {
@@ -180,26 +181,26 @@ fn nearest(color: [f32; 3], entries: &[[f32; 3]]) -> usize {
     best.0
 }
 
-/// Two entries of the palette between which a colour lies.
+/// Two palette entries to dither between.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct EntryPair {
     near: u8,
     far: u8,
 }
 
-/// Turns colours into palette entries, dithered by an ordered pattern that stands still from frame to frame.
+/// Maps colors to palette entries with ordered dithering, which is constant over time.
 pub(crate) struct Ditherer {
     entries: Vec<[f32; 3]>,
-    /// For the eight octants of each bin: a pair for a whole bin would show the bins of dark skies as bands.
+    /// For the eight octants of each bin: one pair for a whole bin would show banding in dark skies.
     pairs: Vec<[EntryPair; 8]>,
 }
 
-/// Which of its bin's halves a color lies in along each axis.
+/// Index of the octant of a color within its bin.
 fn octant(color: [u8; 3]) -> usize {
     color.into_iter().fold(0, |octant, code| (octant << 1) | usize::from(code % BIN_WIDTH >= BIN_WIDTH / 2))
 }
 
-/// The color in the middle of an octant of the bin with this index.
+/// The center of an octant of the bin with this index.
 fn octant_center(index: usize, octant: usize) -> [f32; 3] {
     let half = BIN_WIDTH / 2;
     std::array::from_fn(|axis| {
@@ -208,13 +209,14 @@ fn octant_center(index: usize, octant: usize) -> [f32; 3] {
     })
 }
 
-/// How much a pair of unlike colours is worse than one of like colours with the same mean: dots must not stand out.
+/// Penalty of pairs of unlike colors relative to pairs of like colors with the same mean: dither dots must not stand
+/// out.
 const DOT_PENALTY: f32 = 0.15;
-/// How far colors of an octant lie from its middle, as the root of [`distance`] measures it.
+/// Radius of an octant, as the root of [`distance`].
 const OCTANT_RADIUS: f32 = 1.5;
 
 impl Ditherer {
-    /// Finds for every colour that was counted the pair to mix it from. `palette` has 1 to 256 entries.
+    /// Finds the dither pair for every counted color. `palette` has 1 to 256 entries.
     pub(crate) fn new(palette: &[[u8; 3]], histogram: &Histogram) -> Self {
         let entries: Vec<[f32; 3]> = palette.iter().take(256).map(|color| color.map(f32::from)).collect();
         let counts = histogram.0.par_iter().enumerate().with_min_len(1024);
@@ -228,7 +230,7 @@ impl Ditherer {
         Self { entries, pairs }
     }
 
-    /// The entry for `colour` at column `x`, row `y`.
+    /// The entry for a color at column `x`, row `y`.
     #[inline]
     pub(crate) fn index(&self, color: [u8; 3], x: usize, y: usize) -> u8 {
         let EntryPair { near, far } = self.pairs[histogram_bin(color)][octant(color)];
@@ -238,7 +240,7 @@ impl Ditherer {
     }
 }
 
-/// How much of `far` must be mixed with `near` to come nearest to `colour`, from 0 to 1.
+/// Fraction of `far` in the mix of `near` and `far` that is nearest to the color, 0 to 1.
 fn far_fraction(color: [f32; 3], near: [f32; 3], far: [f32; 3]) -> f32 {
     let (mut along, mut length) = (0.0, 0.0);
     for axis in 0..3 {
@@ -249,7 +251,7 @@ fn far_fraction(color: [f32; 3], near: [f32; 3], far: [f32; 3]) -> f32 {
     if length > 0.0 { (along / length).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// The pair for the colors of an octant, of which `colour` is the middle.
+/// The pair for an octant with its center at the color.
 fn pair(color: [f32; 3], entries: &[[f32; 3]]) -> EntryPair {
     let near = nearest(color, entries);
     let (start, mut best) = (entries[near], (near, f32::INFINITY));
@@ -257,8 +259,8 @@ fn pair(color: [f32; 3], entries: &[[f32; 3]]) -> EntryPair {
         let t = far_fraction(color, start, end);
         let mixed = std::array::from_fn(|axis| (end[axis] - start[axis]).mul_add(t, start[axis]));
         let length = distance(start, end);
-        // Were the middle itself an entry, any other would do beside it, also the brightest; but other colors of the octant lie beside the
-        // middle, and would get dots of that.
+        // If the center itself were an entry, any second entry would do, even the brightest; but other colors of the
+        // octant would get dots of it.
         let dots = (t + OCTANT_RADIUS / length.sqrt().max(1.0)).min(0.5);
         let error = distance(color, mixed) + DOT_PENALTY * dots * (1.0 - dots) * length;
         if error < best.1 {
@@ -268,7 +270,7 @@ fn pair(color: [f32; 3], entries: &[[f32; 3]]) -> EntryPair {
     EntryPair { near: near as u8, far: best.0 as u8 }
 }
 
-/// Bayer's matrix of 8 x 8: each threshold once, spread as evenly as can be.
+/// Bayer matrix of 8 x 8 thresholds.
 const BAYER: [[f32; 8]; 8] = bayer();
 
 const fn bayer() -> [[f32; 8]; 8] {

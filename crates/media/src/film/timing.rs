@@ -1,4 +1,4 @@
-//! When frames of an animation begin, in the units that its format counts in.
+//! Frame times of animations, in the units of their formats.
 
 /// Greatest common divisor.
 fn greatest_common_divisor(a: u32, b: u32) -> u32 {
@@ -36,10 +36,10 @@ pub(crate) fn apng_delay(fps: [u32; 2]) -> Option<[u16; 2]> {
     Some([u16::try_from(seconds).ok()?, u16::try_from(frames).ok()?])
 }
 
-/// Shortest length of a GIF frame that programs show as it is, in hundredths of a second; shorter ones they slow down.
+/// Shortest GIF delay that viewers respect, hundredths of a second; they slow shorter ones down.
 const MIN_DELAY_CS: u64 = 2;
 
-/// Frames of a GIF: which are kept and how long each stays.
+/// Frames of a GIF: which are kept, and their delays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GifTiming {
     fps: [u64; 2],
@@ -56,17 +56,18 @@ impl GifTiming {
         self.fps[0] * MIN_DELAY_CS > self.fps[1] * 100
     }
 
-    /// The slot of a fiftieth of a second in which frame `index` begins.
+    /// The fiftieth of a second in which frame `index` begins.
     fn slot(&self, index: usize) -> u64 {
         index as u64 * self.fps[1] * (100 / MIN_DELAY_CS) / self.fps[0]
     }
 
-    /// Whether frame `index` is shown: all up to 50 frames a second; of faster films the first frame in each fiftieth.
+    /// Whether frame `index` is kept: all, up to 50 frames a second; of faster films the first in each fiftieth of a
+    /// second.
     pub(crate) fn is_kept(&self, index: usize) -> bool {
         index == 0 || !self.is_too_fast() || self.slot(index) != self.slot(index - 1)
     }
 
-    /// When frame `index` begins, hundredths of a second, rounded from the exact time so that no error adds up.
+    /// Start of frame `index`, hundredths of a second, rounded from the exact time so that errors do not accumulate.
     pub(crate) fn start_cs(&self, index: usize) -> u64 {
         if self.is_too_fast() {
             return self.slot(index) * MIN_DELAY_CS;
@@ -74,7 +75,7 @@ impl GifTiming {
         (index as u64 * self.fps[1] * 200 + self.fps[0]) / (2 * self.fps[0])
     }
 
-    /// How long frame `index` of `count` stays, until the next that is kept, hundredths of a second.
+    /// Delay of frame `index` of `count` until the next that is kept, hundredths of a second.
     pub(crate) fn length_cs(&self, index: usize, count: usize) -> u16 {
         let next = (index + 1..count).find(|&next| self.is_kept(next)).unwrap_or(count);
         let length = self.start_cs(next).saturating_sub(self.start_cs(index)).max(MIN_DELAY_CS);

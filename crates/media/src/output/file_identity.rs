@@ -1,4 +1,4 @@
-//! Which file a path means, so that two paths can be told to mean the same one.
+//! Identity of files, to recognize two paths to the same file.
 
 use std::{
     fs, io,

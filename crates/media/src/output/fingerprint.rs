@@ -1,4 +1,4 @@
-//! The fingerprint that a file carries of everything its pixels depend on.
+//! Encoding of the fingerprint that a file carries of everything its pixels depend on.
 
 /// Version that is written into files.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");

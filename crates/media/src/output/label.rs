@@ -1,4 +1,4 @@
-//! Numbers written into pictures that are made to be looked at: which frame a tile of a contact sheet shows.
+//! Frame numbers drawn into pictures for viewing, such as the cells of a contact sheet.
 
 use bansho_base::image::{DisplayImage, DisplayPixels};
 

@@ -1,4 +1,4 @@
-//! Which files that are there may be written over.
+//! Protection of existing files from being overwritten.
 
 use std::{
     collections::HashSet,
@@ -9,57 +9,56 @@ use std::{
 
 use super::{file_identity::FileIdentity, provenance::is_bansho_file};
 
-/// Files that work is made from.
+/// The input files of a job.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InputFiles {
     identities: HashSet<FileIdentity>,
-    /// Without links: a file that is saved anew under its name is another one.
+    /// Canonical paths: a file that is saved again under its name is another inode.
     paths: HashSet<PathBuf>,
 }
 
 impl InputFiles {
-    /// Adds the file at `path`, if there is one.
+    /// Adds the file at `path`, if it exists.
     pub fn insert(&mut self, path: &Path) {
         self.identities.extend(FileIdentity::of(path));
         self.paths.extend(fs::canonicalize(path));
     }
 
-    /// Whether `path` leads to one of them, by its name or by a link of any kind.
+    /// Whether `path` refers to one of them, by name or by any link.
     pub fn contains(&self, path: &Path) -> bool {
         FileIdentity::of(path).is_ok_and(|file| self.identities.contains(&file))
             || !self.paths.is_empty() && fs::canonicalize(path).is_ok_and(|file| self.paths.contains(&file))
     }
 }
 
-/// Which files that are there may be written over. By default those that bear the mark of Bansho ([`is_marked`]) and empty ones, which hold
-/// nothing that could be lost.
+/// Which existing files may be overwritten. By default those that Bansho made ([`is_bansho_file`]), and empty ones.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct OverwritePolicy {
     inputs: Arc<InputFiles>,
     any: bool,
 }
 
-/// Why a file must stay as it is.
+/// Why a file must not be overwritten.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OverwriteError {
-    /// The work is made from it.
+    /// It is an input of the job.
     Input,
     /// Bansho did not make it.
     Unmarked,
 }
 
 impl OverwritePolicy {
-    /// Nothing may be written over `inputs`. `any` says whether files without the mark of Bansho may be.
+    /// Protects `inputs`. `any` allows overwriting of files that Bansho did not make.
     pub fn new(inputs: InputFiles, any: bool) -> Self {
         Self { inputs: Arc::new(inputs), any }
     }
 
-    /// Every file may be written over.
+    /// Every file may be overwritten.
     pub fn any() -> Self {
         Self::new(InputFiles::default(), true)
     }
 
-    /// Whether what `path` leads to, if anything, may be written over.
+    /// Whether the file at `path`, if there is one, may be overwritten.
     ///
     /// # Errors
     /// Why not.
@@ -68,7 +67,7 @@ impl OverwritePolicy {
         if self.inputs.contains(path) {
             return Err(OverwriteError::Input);
         }
-        // What is no file is refused by whoever writes, for what it is.
+        // What is not a regular file is refused by the writer, with its own reason.
         if self.any || !there.is_file() || there.len() == 0 || is_bansho_file(path) {
             Ok(())
         } else {

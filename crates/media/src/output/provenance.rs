@@ -24,31 +24,32 @@ use std::{
 
 use crate::{exr, png::chunk};
 
-/// What `"program"` is in JSON files. It stands second, behind `"format"`.
+/// Value of `"program"` in JSON files. It is the second key, after `"format"`.
 pub const PROGRAM: &str = concat!("Bansho ", env!("CARGO_PKG_VERSION"));
 /// First bytes of a snapshot of a simulation.
 pub const SNAPSHOT_MAGIC: [u8; 8] = *b"BANSHOSS";
 
-/// What GIF files bear as a comment and films as a tag.
+/// Comment of GIF files, and tag of films.
 pub(crate) const COMMENT_TAG: &str = concat!("bansho:version=", env!("CARGO_PKG_VERSION"));
-/// How all marks begin that are keys, names or comments.
+/// Prefix of all keys, names and comments that mark a file.
 const PREFIX: &[u8] = b"bansho:";
 
-/// Bytes in which the mark stands where a format lets it stand in front.
+/// Bytes at the start of a file that are searched.
 const HEAD_BYTES: u64 = 16 << 10;
-/// Most bytes of an EXR header that are read: that of the most channels that are read at all, with long names.
+/// Largest EXR header that is read, bytes: that of the largest number of channels, with long names.
 const EXR_HEADER_BYTES: u64 = 2 << 20;
-/// Most bytes of a film's tags that are read.
+/// Largest size of a film's tags that are read, bytes.
 const TAG_BYTES: u64 = 64 << 10;
-/// Most boxes of a film that are passed over.
+/// Largest number of a film's boxes that are skipped.
 const MAX_MP4_BOXES: usize = 256;
 
-/// First bytes of Matroska and WebM.
+/// Magic number of Matroska and WebM.
 const EBML: [u8; 4] = [0x1a, 0x45, 0xdf, 0xa3];
 
-/// Whether the file at `path` bears the mark of Bansho. Reads at most 2 MiB of it; what is no ordinary file or cannot be read bears none.
+/// Whether Bansho made the file at `path`, by its provenance mark. Reads at most 2 MiB; `false` for what is not a
+/// regular file or cannot be read.
 pub fn is_bansho_file(path: &Path) -> bool {
-    // A pipe would be waited for.
+    // Opening a pipe would block.
     fs::metadata(path).is_ok_and(|found| found.is_file()) && look(path).unwrap_or(false)
 }
 
@@ -72,7 +73,7 @@ fn look(path: &Path) -> io::Result<bool> {
     })
 }
 
-/// The bytes of `range` that the file has.
+/// The bytes of `range`, as far as the file has them.
 fn part(file: &mut File, range: Range<u64>) -> io::Result<Vec<u8>> {
     file.seek(SeekFrom::Start(range.start))?;
     let mut bytes = Vec::new();
@@ -122,7 +123,7 @@ fn in_gif(head: &[u8]) -> Option<()> {
     None
 }
 
-/// Looks into the tags of MP4 and QuickTime, which stand in boxes of `moov` (ISO/IEC 14496-12, section 4.2).
+/// Searches the tags of MP4 and QuickTime, in boxes of `moov` (ISO/IEC 14496-12, section 4.2).
 fn in_film(file: &mut File, length: u64) -> io::Result<bool> {
     let Some(movie) = find_box(file, 0..length, *b"moov")? else { return Ok(false) };
     for kind in [*b"udta", *b"meta"] {
@@ -135,7 +136,7 @@ fn in_film(file: &mut File, length: u64) -> io::Result<bool> {
     Ok(false)
 }
 
-/// Where the contents of the first box of that kind lie.
+/// The contents of the first box of a kind.
 fn find_box(file: &mut File, within: Range<u64>, wanted: [u8; 4]) -> io::Result<Option<Range<u64>>> {
     let mut at = within.start;
     for _ in 0..MAX_MP4_BOXES {

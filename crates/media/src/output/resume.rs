@@ -1,11 +1,11 @@
-//! Which frames are already there and whole.
+//! Fingerprints of frames that exist and are complete, so that a job can skip them.
 
 use std::path::Path;
 
 use super::fingerprint;
 use crate::{exr, input, png};
 
-/// Most bytes of a frame: a file with more is none of ours, and is not read.
+/// Largest frame file that is read, bytes: a larger one is not Bansho's.
 const FRAME_BYTES: u64 = 8 << 30;
 
 /// The fingerprint of the PNG or OpenEXR file at `path` if it is one that Bansho wrote and is whole to the last byte:

@@ -1,4 +1,4 @@
-//! Where finished frames go: a sequence of files or one film, behind one door.
+//! The sink of finished frames: a sequence of files, or one film.
 
 use std::path::{Path, PathBuf};
 
@@ -25,7 +25,7 @@ use crate::{
     png::{self, PngEffort},
 };
 
-/// Which picture a format takes.
+/// The pixel data that a format takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PictureFormat {
     /// Scene-linear frames.
@@ -42,32 +42,32 @@ pub enum PictureFormat {
 /// How frames are written. Begin with [`SinkOptions::new`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SinkOptions {
-    /// Width and height of every frame, pixels. Sequences do not look at it.
+    /// Width and height of every frame, pixels; unused for sequences.
     pub size: [usize; 2],
-    /// Frames a second as a fraction.
+    /// Frames per second, as a fraction.
     pub fps: [u32; 2],
     /// How many frames there will be.
     pub frame_count: usize,
-    /// Whether a plate fills the picture, so that films are made without alpha.
+    /// Whether a plate fills the picture, so that films need no alpha.
     pub opaque: bool,
-    /// What straight alpha is made for, which films with alpha name.
+    /// The convention of straight alpha, which films with alpha declare.
     pub alpha: AlphaConvention,
     /// Whether display pixels have 16 bits, for films that keep more than 8.
     pub sixteen_bits: bool,
-    /// How small PNG files are made.
+    /// Compression effort of PNG files.
     pub png_effort: PngEffort,
-    /// GIF: pixels of less than half alpha are left out, instead of all lying over black.
+    /// GIF: transparency by an alpha threshold, instead of compositing over black.
     pub gif_transparent: bool,
     /// How `ffmpeg` is used.
     pub video: VideoOptions,
     /// How many frames of a film may wait for an earlier one; at least 1.
     pub window: usize,
-    /// Which files that are there may be written over.
+    /// Which existing files may be overwritten.
     pub overwrite: OverwritePolicy,
 }
 
 impl SinkOptions {
-    /// The usual choices for `frame_count` frames of `size` pixels at `fps` frames a second.
+    /// Default options for `frame_count` frames of `size` pixels at `fps` frames per second.
     pub fn new(size: [usize; 2], fps: [u32; 2], frame_count: usize) -> Self {
         Self {
             size,
@@ -84,7 +84,7 @@ impl SinkOptions {
         }
     }
 
-    /// What a sink of `kind` with these options takes.
+    /// The pixel data that a sink of `kind` with these options takes.
     pub fn picture_format(&self, kind: OutputKind) -> PictureFormat {
         match kind {
             OutputKind::Exr => PictureFormat::Frame,
@@ -97,7 +97,7 @@ impl SinkOptions {
     }
 }
 
-/// Which frame it is.
+/// Position and number of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameSlot {
     /// Position among the frames of the job, from 0; orders a film.
@@ -111,7 +111,7 @@ pub struct FrameSlot {
 pub enum Picture<'a> {
     /// Scene-linear, for EXR; carries its fingerprint in its header.
     Linear(&'a Frame),
-    /// For looking at, with the fingerprint of everything its pixels depend on.
+    /// Display pixels, with the fingerprint of everything they depend on.
     Display(&'a DisplayImage, &'a [u8; 32]),
 }
 
@@ -174,12 +174,12 @@ impl Sink {
         self.pattern.kind()
     }
 
-    /// Which picture it takes.
+    /// The pixel data that it takes.
     pub fn picture_format(&self) -> PictureFormat {
         self.options.picture_format(self.kind())
     }
 
-    /// The file in which frame `number` is or will be.
+    /// The file of frame `number`.
     pub fn path(&self, number: i64) -> PathBuf {
         self.pattern.path(number)
     }
@@ -228,7 +228,7 @@ impl Sink {
         }
     }
 
-    /// All frames of a film are of one size.
+    /// All frames of a film have one size.
     fn check_frame(&self, image: &DisplayImage, path: &Path) -> Result<(), MediaError> {
         let [width, height] = self.options.size;
         if [image.width, image.height] != [width, height] {
@@ -258,7 +258,7 @@ fn ordered<F: crate::film::ordered::FilmEncoder>(
     ReorderBuffer::new(film, path, count, window)
 }
 
-/// Most pixels on a side of a film.
+/// Largest side of a film, pixels.
 const FILM_SIDE_LIMIT: usize = 65535;
 
 fn check_film(path: &Path, options: &SinkOptions) -> Result<(), MediaError> {

@@ -1,4 +1,4 @@
-//! Sheets of pictures: flipbooks for game engines, contact sheets for the eye.
+//! Sprite sheets: flipbooks for game engines, and contact sheets.
 
 use bansho_base::image::{DisplayImage, DisplayPixels, Image, Rect};
 
@@ -29,16 +29,16 @@ pub enum SheetError {
     },
 }
 
-/// Where pictures lie on a sheet: row by row from the top left, `gutter` pixels between them and none around.
+/// Layout of a sheet: cells row by row from the top left, with `gutter` pixels between them and none around.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SheetLayout {
-    /// How many pictures.
+    /// Number of pictures.
     pub count: usize,
-    /// How many stand beside each other.
+    /// Number of columns.
     pub columns: usize,
     /// Width and height of each, pixels.
     pub cell: [usize; 2],
-    /// Pixels between two of them.
+    /// Pixels between two cells.
     pub gutter: usize,
 }
 
@@ -54,7 +54,7 @@ impl SheetLayout {
         [along(self.columns, self.cell[0]), along(self.rows(), self.cell[1])]
     }
 
-    /// Where the picture at position `index` lies.
+    /// The rectangle of the picture at position `index`.
     pub fn place(&self, index: usize) -> Rect {
         let columns = self.columns.max(1);
         let [width, height] = self.cell;
@@ -62,7 +62,7 @@ impl SheetLayout {
         Rect { x, y, width, height }
     }
 
-    /// Lays out `images`, rows of pixels of one size, over `fill`.
+    /// Copies `images`, rows of pixels of one size, onto a sheet filled with `fill`.
     fn lay<T: Copy>(&self, images: &[&[T]], fill: T) -> Vec<T> {
         let [sheet_width, sheet_height] = self.size();
         let mut sheet = vec![fill; sheet_width * sheet_height];

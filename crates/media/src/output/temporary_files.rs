@@ -1,4 +1,4 @@
-//! The temporary files that this process is writing, so that a program that must end at once can remove them first.
+//! Register of temporary files, so that a program that must end at once can remove them first.
 
 use std::{
     collections::BTreeSet,
@@ -9,15 +9,15 @@ use std::{
 
 use tempfile::NamedTempFile;
 
-/// Temporary files that have not got their final name.
+/// Temporary files that have not been renamed yet.
 static TEMPORARY_FILES: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn temporary_files() -> MutexGuard<'static, BTreeSet<PathBuf>> {
-    // A set of paths is whole at any time.
+    // The set is always consistent, so a poisoned lock is usable.
     TEMPORARY_FILES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A temporary file's place in the list, which it leaves when this is dropped.
+/// Registration of a temporary file, removed when dropped.
 #[derive(Debug)]
 pub(crate) struct TemporaryFileGuard(PathBuf);
 
@@ -27,11 +27,11 @@ impl Drop for TemporaryFileGuard {
     }
 }
 
-/// Makes a temporary file that is in the list as long as it is there.
+/// Creates a temporary file and registers it.
 pub(crate) fn create(
     make: impl FnOnce() -> io::Result<NamedTempFile>,
 ) -> io::Result<(NamedTempFile, TemporaryFileGuard)> {
-    // Locked while the file is made, so that no file is ever missing from the list.
+    // Locked while the file is created, so that no file is ever missing from the register.
     let mut unfinished = temporary_files();
     let file = make()?;
     let path: &Path = file.path();

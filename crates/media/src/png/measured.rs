@@ -24,7 +24,7 @@ pub enum Samples {
 pub struct MeasuredImage {
     /// Width and height, pixels.
     pub size: [usize; 2],
-    /// 1 (grey) or 3 (red, green, blue) for each pixel.
+    /// 1 (gray) or 3 (red, green, blue) for each pixel.
     pub channels: usize,
     /// The codes.
     pub samples: Samples,

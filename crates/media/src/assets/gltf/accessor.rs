@@ -1,10 +1,10 @@
-//! Numbers in glTF buffers, every place checked against the bytes that are there.
+//! Accessors: typed views of glTF buffers, with all bounds checked.
 
 use bansho_base::host::assets::AssetProblem;
 
 use super::{buffers::Buffers, json::Object};
 
-/// What the elements of an accessor are.
+/// Element types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Element {
     /// Three floats of 32 bits.
@@ -35,10 +35,10 @@ impl Element {
     }
 }
 
-/// Elements that lie in a buffer.
+/// The elements of an accessor.
 #[derive(Clone, Copy)]
 pub(super) struct Accessor<'b> {
-    /// From the first byte of the first to the last byte of the last.
+    /// From the first byte of the first element to the last byte of the last.
     bytes: &'b [u8],
     stride: usize,
     pub(super) count: usize,
@@ -46,7 +46,7 @@ pub(super) struct Accessor<'b> {
 }
 
 impl<'b> Accessor<'b> {
-    /// The positions that `accessors[index]` says: vectors of three floats.
+    /// The accessor `accessors[index]` as positions: vectors of three floats.
     pub(super) fn positions(root: &Object, index: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
         let accessor = root.item("accessors", index)?;
         match Element::of(&accessor)? {
@@ -55,7 +55,7 @@ impl<'b> Accessor<'b> {
         }
     }
 
-    /// The indices that `accessors[index]` says: whole numbers of 8, 16 or 32 bits.
+    /// The accessor `accessors[index]` as indices: unsigned integers of 8, 16 or 32 bits.
     pub(super) fn indices(root: &Object, index: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
         let accessor = root.item("accessors", index)?;
         match Element::of(&accessor)? {
@@ -98,7 +98,7 @@ impl<'b> Accessor<'b> {
         (0..self.count).filter_map(element)
     }
 
-    /// Its elements as vectors; none where they are whole numbers.
+    /// Its elements as vectors; none if they are integers.
     pub(super) fn vectors(self) -> impl Iterator<Item = [f32; 3]> + use<'b> {
         let vector = |bytes: [u8; 12]| {
             std::array::from_fn(|axis| {
@@ -108,7 +108,7 @@ impl<'b> Accessor<'b> {
         self.elements::<12>().map(vector)
     }
 
-    /// Its elements as whole numbers; none where they are vectors.
+    /// Its elements as integers; none if they are vectors.
     pub(super) fn indices_u32(self) -> Vec<u32> {
         match self.element {
             Element::Vector => Vec::new(),

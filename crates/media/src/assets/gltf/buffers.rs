@@ -1,4 +1,4 @@
-//! The bytes that a glTF's numbers lie in.
+//! The buffers of a glTF.
 
 use std::{
     borrow::Cow,
@@ -14,15 +14,15 @@ use base64::{
 use super::{ReadResource, json::Object};
 use crate::assets::limits::MemoryLimit;
 
-/// All buffers. What several of them name is held once.
+/// All buffers. One that is named several times is held once.
 pub(super) struct Buffers<'a> {
     contents: Vec<Cow<'a, [u8]>>,
-    /// Which of the contents each buffer is.
+    /// Index of each buffer's content.
     content_of: Vec<usize>,
 }
 
 impl<'a> Buffers<'a> {
-    /// Reads them from `binary`, from the JSON itself, and from `beside`, within `limit` together.
+    /// Reads them from `binary`, from data URIs, and by `read_resource`, within `limit` in total.
     pub(super) fn read(
         root: &Object<'a>,
         binary: Option<&'a [u8]>,
@@ -54,7 +54,7 @@ impl<'a> Buffers<'a> {
         Ok(buffers)
     }
 
-    /// Bytes of all that are not parts of the file itself.
+    /// Bytes of the contents that are not part of the file itself.
     pub(super) fn memory_bytes(&self) -> u64 {
         let own = self.contents.iter().filter(|content| matches!(content, Cow::Owned(_)));
         own.map(|content| content.len() as u64).sum()
@@ -71,7 +71,7 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// Files that the buffers of a glTF lie in, as it names them, each once; as many as can be found in one that is damaged.
+/// URIs of external buffers, each once; as many as can be found in a damaged file.
 pub(super) fn files<'a>(root: &Object<'a>) -> BTreeSet<&'a str> {
     let buffers = root.items("buffers").into_iter().flatten().filter_map(Result::ok);
     let names = buffers.filter_map(|buffer| buffer.text("uri").ok().flatten());

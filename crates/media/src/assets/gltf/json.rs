@@ -1,4 +1,4 @@
-//! The JSON of a glTF: objects that know where they stand, so that every fault can say it.
+//! The JSON of a glTF: objects that know their path, for error messages.
 
 use std::fmt::Display;
 
@@ -7,10 +7,10 @@ use bansho_base::host::assets::AssetProblem;
 use super::damaged;
 use serde_json::{Map, Value};
 
-/// Most values that are read; each takes up to two hundred bytes of memory.
+/// Largest number of values; each takes up to two hundred bytes of memory.
 const MAX_VALUES: usize = 2_000_000;
 
-/// Bytes that a value takes in memory when it is read: those of an object with one field, the largest there is.
+/// Bytes of a value in memory: those of an object with one field, the largest one.
 const VALUE_BYTES: u64 = 400;
 
 /// Before every value but the first stands one of these.
@@ -18,7 +18,7 @@ fn count_values(json: &[u8]) -> usize {
     json.iter().filter(|byte| matches!(byte, b'[' | b'{' | b',')).count()
 }
 
-/// Bytes that the values of `json` take when they are read: its texts are kept once more.
+/// Memory of the parsed values of `json`; its strings are stored once more.
 pub(super) fn memory_bytes(json: &[u8]) -> u64 {
     json.len() as u64 + VALUE_BYTES * count_values(json).min(MAX_VALUES) as u64
 }
@@ -34,7 +34,7 @@ pub(super) fn parse(json: &[u8]) -> Result<Value, AssetProblem> {
 
 /// An object of the JSON.
 pub(super) struct Object<'a> {
-    /// Where it stands, such as `nodes[3]`; empty for the outermost.
+    /// Its path, such as `nodes[3]`; empty for the root.
     path: String,
     fields: &'a Map<String, Value>,
 }
@@ -50,7 +50,7 @@ impl<'a> Object<'a> {
         if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
     }
 
-    /// What is wrong with the value of `key`.
+    /// An error at the value of `key`.
     pub(super) fn fault(&self, key: &str, told: impl Display) -> AssetProblem {
         damaged(format!("{} {told}", self.path_of(key)))
     }
@@ -123,7 +123,7 @@ impl<'a> Object<'a> {
         Ok((0..self.list(key)?.len()).map(move |index| self.item(key, index)))
     }
 
-    /// The number of an element of another list, which has `length`.
+    /// An index into another list, of `length` elements.
     pub(super) fn index(&self, key: &str, length: usize) -> Result<Option<usize>, AssetProblem> {
         match self.whole(key)? {
             Some(index) if index >= length => Err(self.fault(key, format!("names {index}; {}", only(length)))),
@@ -131,7 +131,7 @@ impl<'a> Object<'a> {
         }
     }
 
-    /// The numbers of elements of another list, which has `length`.
+    /// Indices into another list, of `length` elements.
     pub(super) fn indices(&self, key: &str, length: usize) -> Result<Vec<usize>, AssetProblem> {
         let index = |value: &Value| usize::try_from(value.as_u64()?).ok().filter(|index| *index < length);
         let fault = |value: &Value| self.fault(key, format!("names {value}; {}", only(length)));

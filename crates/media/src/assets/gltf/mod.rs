@@ -20,11 +20,11 @@ use bansho_base::{
 use self::{accessor::Accessor, buffers::Buffers, glb::Glb, json::Object, nodes::MeshInstance};
 use super::limits::MemoryLimit;
 
-/// Gives the bytes of a file that a glTF names, if they are at most so many.
+/// Reads an external resource of a glTF by its URI, up to a number of bytes.
 pub type ReadResource<'a> = &'a dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>;
 
-/// Bytes that a corner and a triangle take while meshes are gathered: where lists of them grow, twice those of the mesh itself, and for a
-/// triangle the order of its corners.
+/// Memory of a vertex and a triangle while meshes are built: growing lists take twice the size, and triangles need
+/// their vertex order too.
 const CORNER_BYTES: usize = 2 * size_of::<[f32; 3]>();
 const TRIANGLE_BYTES: usize = 2 * size_of::<[u32; 3]>() + 2 * size_of::<[u32; 3]>();
 
@@ -86,7 +86,7 @@ pub fn files_beside(file: &[u8], extension: &str) -> Vec<String> {
     root.map(|root| buffers::files(&root).into_iter().map(str::to_owned).collect()).unwrap_or_default()
 }
 
-/// What the file says of itself must be what is read here.
+/// Refuses required extensions and other versions.
 fn check_demands(root: &Object) -> Result<(), AssetProblem> {
     let asset =
         root.object("asset")?.ok_or_else(|| root.fault("asset", "is missing; allowed: { \"version\": \"2.0\" }"))?;
@@ -102,7 +102,7 @@ fn check_demands(root: &Object) -> Result<(), AssetProblem> {
     }
 }
 
-/// Refuses more than a mesh may have, before any of it is read; the bytes that gathering it takes.
+/// Refuses more than a mesh may have before reading any of it; returns the memory that building it takes.
 fn check_totals<'s>(shapes: impl Iterator<Item = &'s PrimitiveMesh<'s>>) -> Result<u64, MeshError> {
     let (mut triangles, mut corners) = (0_usize, 0_usize);
     for shape in shapes {
@@ -118,21 +118,21 @@ fn check_totals<'s>(shapes: impl Iterator<Item = &'s PrimitiveMesh<'s>>) -> Resu
     Ok((corners * CORNER_BYTES + triangles * TRIANGLE_BYTES) as u64)
 }
 
-/// What a mesh of the file shows.
+/// The triangle primitives of a mesh.
 struct PrimitiveMesh<'b> {
     parts: Vec<Primitive<'b>>,
     triangles: usize,
     corners: usize,
 }
 
-/// A primitive that makes triangles.
+/// A primitive of triangles.
 struct Primitive<'b> {
     positions: Accessor<'b>,
     indices: Option<Accessor<'b>>,
     mode: PrimitiveMode,
 }
 
-/// How corners follow each other to make triangles.
+/// Topology of a primitive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum PrimitiveMode {
     Triangles,
@@ -141,7 +141,7 @@ enum PrimitiveMode {
 }
 
 impl PrimitiveMode {
-    /// That of a primitive; `None` for points and lines.
+    /// The mode of a primitive; `None` for points and lines.
     fn of(primitive: &Object) -> Result<Option<Self>, AssetProblem> {
         match primitive.whole("mode")? {
             None | Some(4) => Ok(Some(Self::Triangles)),
@@ -152,7 +152,7 @@ impl PrimitiveMode {
         }
     }
 
-    /// How many triangles so many corners make.
+    /// Number of triangles for this number of vertices.
     fn triangles(self, corners: usize) -> usize {
         match self {
             Self::Triangles => corners / 3,
@@ -199,7 +199,7 @@ struct MeshBuilder {
 }
 
 impl MeshBuilder {
-    /// Adds what a part shows at a place. Its own corners alone may be named.
+    /// Adds a primitive, transformed. Indices must refer to its own vertices.
     fn add(&mut self, primitive_data: &Primitive, world_from_mesh: &DMat4) -> Result<(), MeshError> {
         let (first, corners) = (self.corners.len() as u32, primitive_data.positions.count);
         let place = |corner: [f32; 3]| {
@@ -218,7 +218,7 @@ impl MeshBuilder {
     }
 }
 
-/// The triangles that corners in this order make.
+/// The triangles of a vertex order.
 fn triangles(mode: PrimitiveMode, order: &[u32]) -> Vec<[u32; 3]> {
     match mode {
         PrimitiveMode::Triangles => order.as_chunks::<3>().0.to_vec(),

@@ -1,4 +1,4 @@
-//! The tree of nodes: which meshes a scene shows, and where.
+//! The node hierarchy: which meshes a scene shows, and their transforms.
 
 use bansho_base::{
     host::assets::AssetProblem,
@@ -7,10 +7,10 @@ use bansho_base::{
 
 use super::{damaged, json::Object};
 
-/// Most nodes that are read.
+/// Largest number of nodes.
 const MAX_NODES: usize = 100_000;
 
-/// A mesh that a node shows.
+/// A mesh of a node, with its world transform.
 pub(super) struct MeshInstance {
     pub(super) mesh: usize,
     pub(super) world_from_mesh: DMat4,
@@ -29,7 +29,7 @@ pub(super) fn mesh_instances(root: &Object) -> Result<Vec<MeshInstance>, AssetPr
     let mut mesh_instances = Vec::new();
     let mut open: Vec<(usize, DMat4)> =
         root_nodes(root, &nodes)?.into_iter().map(|node| (node, DMat4::IDENTITY)).collect();
-    // Every node has one parent at most, so that none comes twice.
+    // Every node has at most one parent, so none is visited twice.
     while let Some((index, world_from_parent)) = open.pop() {
         let node = &nodes[index];
         let world_from_node = world_from_parent * node.parent_from_node;
@@ -39,7 +39,7 @@ pub(super) fn mesh_instances(root: &Object) -> Result<Vec<MeshInstance>, AssetPr
     Ok(mesh_instances)
 }
 
-/// All nodes, which must make trees: no node is a child twice or lies within itself.
+/// Reads all nodes, which must form trees: no node has two parents or is its own ancestor.
 fn read_tree(root: &Object) -> Result<Vec<Node>, AssetProblem> {
     let count = root.list("nodes")?.len();
     if count > MAX_NODES {
@@ -91,7 +91,7 @@ fn read(node: &Object, nodes: usize, meshes: usize) -> Result<Node, AssetProblem
     })
 }
 
-/// The nodes that the scene begins with.
+/// The root nodes of the scene.
 fn root_nodes(root: &Object, nodes: &[Node]) -> Result<Vec<usize>, AssetProblem> {
     let scenes = root.list("scenes")?.len();
     let Some(scene) = root.index("scene", scenes)?.or((scenes > 0).then_some(0)) else {

@@ -18,13 +18,13 @@ use self::{
     xml::{Event, Events, Tag},
 };
 
-/// Most points of all strokes together.
+/// Largest number of points in all strokes.
 const MAX_POINTS: usize = 1_000_000;
 
-/// Elements whose contents are not drawn where they stand.
+/// Elements whose contents are not drawn.
 const HIDDEN_ELEMENTS: [&str; 8] = ["defs", "symbol", "clipPath", "mask", "marker", "pattern", "metadata", "style"];
 
-/// Elements that are drawn but are no strokes.
+/// Elements that are drawn but are not strokes.
 const UNSUPPORTED_ELEMENTS: [&str; 7] = ["use", "text", "rect", "circle", "ellipse", "image", "foreignObject"];
 
 fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
@@ -55,7 +55,7 @@ pub fn decode_drawing(text: &str) -> Result<Drawing, AssetProblem> {
     reading.finish()
 }
 
-/// What an element hands down to those in it.
+/// Inherited state of an element.
 #[derive(Clone, Copy)]
 struct GroupState {
     transform: Transform,
@@ -67,9 +67,9 @@ struct SvgReader {
     levels: Vec<GroupState>,
     strokes: Vec<Stroke>,
     points: usize,
-    /// What else is drawn.
+    /// Names of unsupported elements that were drawn.
     others: Vec<&'static str>,
-    /// The sheet that was drawn on, as the outermost element says it.
+    /// The drawing area, from the root element.
     sheet: Option<[DVec2; 2]>,
 }
 
@@ -104,7 +104,7 @@ impl SvgReader {
         Ok(())
     }
 
-    /// What an element is called in faults: by its id, or else by the strokes before it.
+    /// Name of an element in error messages: its id, or else the number of strokes before it.
     fn name(&self, tag: &Tag) -> String {
         match tag.get("id") {
             Some(id) => format!("{} `{id}`", tag.name),

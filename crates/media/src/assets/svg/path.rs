@@ -1,13 +1,13 @@
-//! The `d` of an SVG path as lines through points.
+//! Path data (the `d` attribute), flattened to polylines.
 
 use bansho_base::math::{self, DVec2};
 
 use super::numbers::Numbers;
 
-/// Points on each curve and on each quarter of an arc.
+/// Segments of a curve, and of each quarter of an arc.
 const CURVE_SEGMENTS: usize = 16;
 
-/// What is wrong with a path.
+/// Why path data cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum PathError {
     #[error("a path does not begin with a move (M or m)")]
@@ -22,14 +22,14 @@ pub(super) enum PathError {
     ManyPoints(usize),
 }
 
-/// Where the pen is.
+/// The state of the pen.
 #[derive(Default)]
 struct Pen {
     subpaths: Vec<Vec<DVec2>>,
     points: usize,
     at: DVec2,
     start: DVec2,
-    /// The last control point of a cubic (`true`) or quadratic curve, which smooth ones mirror.
+    /// The last control point of a cubic (`true`) or quadratic curve, for smooth curves.
     control: Option<(bool, DVec2)>,
 }
 
@@ -122,7 +122,7 @@ impl Pen {
         self.move_to(start);
     }
 
-    /// The mirror of the last control point, or the pen itself after anything but a curve of the same kind.
+    /// The reflected control point, or the current point after anything but a curve of the same kind.
     fn mirrored(&self, cubic: bool) -> DVec2 {
         match self.control {
             Some((kind, control)) if kind == cubic => 2.0 * self.at - control,
@@ -160,12 +160,12 @@ impl Pen {
             self.push(end);
             return;
         }
-        // Radii that are too small to reach grow until they do.
+        // Radii that are too small are scaled up (F.6.6).
         let radii = radii * (half / radii).length().max(1.0);
         let ratio = half / radii;
         let square = (1.0 / ratio.length_squared() - 1.0).max(0.0).sqrt();
         let sign = if large == sweep { -1.0 } else { 1.0 };
-        // On the unit circle: centre, and the angles of both ends.
+        // On the unit circle: center, and the angles of both ends.
         let centre = sign * square * DVec2::new(ratio.y, -ratio.x);
         let angle = |point: DVec2| math::atan2(point.y - centre.y, point.x - centre.x);
         let from = angle(ratio);

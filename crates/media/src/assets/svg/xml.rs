@@ -1,6 +1,6 @@
-//! As much of XML as a drawing needs: tags with their attributes, in order.
+//! A minimal XML tokenizer for drawings: tags with their attributes.
 
-/// What stands in an XML text, in order. Text between tags, comments and declarations are passed over.
+/// An event of the tokenizer. Text, comments and declarations are skipped.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Event<'a> {
     /// A tag opens.
@@ -18,13 +18,13 @@ pub(super) struct Tag<'a> {
 }
 
 impl Tag<'_> {
-    /// The value of an attribute, as written: entities stay as they are, since neither numbers nor ids need any.
+    /// The value of an attribute, verbatim: entities are not resolved, since neither numbers nor ids need them.
     pub(super) fn get(&self, name: &str) -> Option<&str> {
         self.attributes.iter().find(|(key, _)| *key == name).map(|(_, value)| *value)
     }
 }
 
-/// Where a text is no XML.
+/// Where a text is not XML.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum XmlError {
     #[error("a tag, comment or declaration does not end")]

@@ -1,4 +1,4 @@
-//! What `ffmpeg` is told.
+//! Command line of `ffmpeg`.
 
 use std::{ffi::OsString, path::Path};
 
@@ -8,15 +8,15 @@ use crate::{
     png::KEY_ALPHA,
 };
 
-/// All arguments for a film at `output`, which is there already and empty.
+/// All arguments for a film at `output`, which exists and is empty.
 pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
     let [width, height] = format.coded_size();
     let [frames, seconds] = format.fps;
     let (size, rate) = (format!("{width}x{height}"), format!("{frames}/{seconds}"));
     let input = if format.sixteen_bits { "rgba64le" } else { "rgba" };
     let pixels = pixel_format(format);
-    // The scaler must be told the matrix, which it otherwise guesses; the frames must carry the tags, because ProRes takes
-    // them from there; the options after it are for the container.
+    // The scaler must be told the matrix, which it otherwise guesses. The frames must carry the tags, because ProRes
+    // takes them from there. The options after it are for the container.
     let filter = format!(
         "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+full_chroma_inp+bitexact,\
          format={pixels},setparams=range=tv:color_primaries=bt709:color_trc=iec61966-2-1:colorspace=bt709"
@@ -40,7 +40,7 @@ pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
     words.map(OsString::from).chain([output.as_os_str().to_owned()]).collect()
 }
 
-/// The tag by which a film says that Bansho made it. MP4 has no tags of one's own, so there it is the comment.
+/// The provenance tag. MP4 has no custom tags, so it is the comment there.
 fn mark_in(kind: OutputKind) -> String {
     if kind == OutputKind::Mp4 {
         format!("comment={}", provenance::COMMENT_TAG)
@@ -61,7 +61,7 @@ fn pixel_format(format: &VideoFormat) -> &'static str {
 
 fn codec(format: &VideoFormat) -> &'static [&'static str] {
     match (format.kind, format.options.webm) {
-        // Straight alpha of 16 bits; the vendor that other programs expect.
+        // Straight alpha of 16 bits, and the vendor code that other programs expect.
         (OutputKind::Mov, _) => &[
             "-c:v",
             "prores_ks",
@@ -75,11 +75,12 @@ fn codec(format: &VideoFormat) -> &'static [&'static str] {
             "+write_colr+use_metadata_tags",
         ],
         (OutputKind::Webm, WebmCodec::Av1) => &["-c:v", "libsvtav1", "-preset", "8", "-crf", "24", "-g", "120"],
-        // Alternate reference frames cannot be had with alpha.
+        // Alternate reference frames do not work with alpha.
         (OutputKind::Webm, WebmCodec::Vp9) => {
             &["-c:v", "libvpx-vp9", "-crf", "20", "-b:v", "0", "-row-mt", "1", "-cpu-used", "4", "-auto-alt-ref", "0"]
         }
-        // Dark gradients of fire and night need more than the usual quality; the index goes to the front for the web.
+        // Dark gradients of fire and night need a higher quality than the default. The index goes to the front, for
+        // streaming.
         _ => &["-c:v", "libx264", "-preset", "medium", "-crf", "16", "-movflags", "+faststart+write_colr"],
     }
 }

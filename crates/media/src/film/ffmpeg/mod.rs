@@ -18,12 +18,12 @@ use crate::output::{flatten, naming::OutputKind};
 
 pub(crate) use self::process::FfmpegFilm;
 
-/// How films are made.
+/// Options of films by `ffmpeg`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VideoOptions {
-    /// The program; a bare name is looked for where the system looks for programs.
+    /// The program; a bare name is searched in the system's path.
     pub program: PathBuf,
-    /// What goes into `.webm`.
+    /// Codec of `.webm`.
     pub webm: WebmCodec,
 }
 
@@ -43,7 +43,7 @@ pub enum WebmCodec {
     Av1,
 }
 
-/// What is the same for every frame of a film.
+/// The format of all frames of a film.
 #[derive(Clone, Debug)]
 pub(crate) struct VideoFormat {
     pub(crate) kind: OutputKind,
@@ -56,12 +56,12 @@ pub(crate) struct VideoFormat {
 }
 
 impl VideoFormat {
-    /// Whether alpha is left out.
+    /// Whether the film has no alpha.
     fn is_flat(&self) -> bool {
         self.opaque || !carries_alpha(self.kind, &self.options)
     }
 
-    /// The size that is coded: 4:2:0 without alpha needs even sides, so that an odd one gets its last pixels twice.
+    /// The encoded size: 4:2:0 without alpha needs even sides, so an odd one repeats its last pixels.
     fn coded_size(&self) -> [usize; 2] {
         let odd_is_fine = self.kind == OutputKind::Mov;
         if odd_is_fine { self.size } else { self.size.map(|side| side.next_multiple_of(2)) }
@@ -77,7 +77,7 @@ pub(crate) fn carries_alpha(kind: OutputKind, options: &VideoOptions) -> bool {
     }
 }
 
-/// The bytes of a frame as `ffmpeg` is told they come: RGBA, row after row, 8 or 16 bits little-endian.
+/// A frame as raw video for `ffmpeg`: RGBA rows of 8 bits, or of 16 bits little-endian.
 pub(crate) fn prepare(picture: &DisplayImage, format: &VideoFormat) -> Vec<u8> {
     let flat;
     let picture = if format.is_flat() && !picture.opaque {

@@ -1,4 +1,4 @@
-//! The running `ffmpeg`.
+//! The `ffmpeg` process.
 
 use std::{
     io::{self, Read, Write},
@@ -14,16 +14,16 @@ use crate::{
     output::{atomic::AtomicFile, overwrite_policy::OverwritePolicy},
 };
 
-/// How much of what `ffmpeg` says is kept.
+/// Bytes of the end of its standard error that are kept.
 const TAIL_BYTES: usize = 4096;
 
-/// Windows' flag of `CreateProcess` for a program that Ctrl-C in the console does not reach.
+/// `CreateProcess` flag for a process that Ctrl-C in the console does not reach.
 #[cfg(windows)]
 const CREATE_NEW_PROCESS_GROUP: u32 = 0x200;
 
-/// A film being made. Dropped before it is finished, `ffmpeg` is stopped and nothing stays behind.
+/// A film in progress. When dropped unfinished, it stops `ffmpeg` and leaves no file.
 pub(crate) struct FfmpegFilm {
-    // Fields are dropped in this order: the program must have ended before its file is removed.
+    // Drop order: the process must have ended before its file is removed.
     running: FfmpegProcess,
     file: AtomicFile,
 }
@@ -44,9 +44,9 @@ impl FfmpegFilm {
         let mut command = Command::new(&format.options.program);
         command.args(arguments(format, file.temporary_path()));
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
-        // SVT-AV1 does not heed `-loglevel`; this is its own way to be told to speak of errors alone.
+        // SVT-AV1 ignores `-loglevel`; this is its own option to log errors only.
         command.env("SVT_LOG", "1");
-        // In a group of its own, so that Ctrl-C reaches Bansho alone and the film ends in order.
+        // A process group of its own, so that Ctrl-C reaches Bansho only and the film ends in order.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         #[cfg(windows)]
@@ -63,7 +63,7 @@ impl FfmpegFilm {
     }
 }
 
-/// The last bytes of a stream, read to its end so that the program never waits for us.
+/// The end of a stream, which is read completely so that the process never blocks on it.
 fn tail(mut stream: impl Read) -> Vec<u8> {
     let (mut kept, mut part) = (Vec::new(), [0; 1024]);
     while let Ok(length @ 1..) = stream.read(&mut part) {
@@ -74,8 +74,8 @@ fn tail(mut stream: impl Read) -> Vec<u8> {
 }
 
 impl FfmpegProcess {
-    /// Waits for the end; `Ok` if it was a good one. The status alone does not say so: `ffmpeg` (5.1 at least) ends with 0 where only
-    /// the trailer or the closing of the file failed. It is told to speak of errors alone, so a good end is a silent one.
+    /// Waits for the process and checks its result. The exit status alone is not enough: `ffmpeg` (at least 5.1) exits
+    /// with 0 if only writing the trailer or closing the file failed. It logs errors only, so success is a silent end.
     fn end(&mut self, path: &Path) -> Result<(), MediaError> {
         drop(self.frames.take());
         let status = self.child.wait().map_err(|source| MediaError::from_io(path, source))?;
@@ -93,7 +93,7 @@ impl FfmpegProcess {
 
 impl Drop for FfmpegProcess {
     fn drop(&mut self) {
-        // Both fail only where the program has already ended and been waited for.
+        // Both fail only if the process has already been waited for.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -53,7 +53,7 @@ fn the_papers_textures_hide_the_discs_of_their_drops() {
 
 #[test]
 fn a_streak_within_one_column_is_worked_by_hand() {
-    // 1 mm in 1/30 s on pixels of 2 mm: (pi/4) D^2 / (v T) over each metre of its way, spread over 2 mm.
+    // 1 mm in 1/30 s on pixels of 2 mm: (pi/4) D^2 / (v T) over each meter of its way, spread over 2 mm.
     let cube = StreakCube { edge: 1.024, ..StreakCube::default() };
     let image = cube.draw(&[drop(1.0, [0.201, 0.8, 0.5])]);
     let expected = 0.25 * PI * 1e-6 / (4.03 / 30.0) / 2e-3;
