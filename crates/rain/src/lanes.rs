@@ -14,13 +14,13 @@ pub(crate) const ZERO_LANES: Lanes = [0.0; LANES];
 /// The larger of two numbers by one compare and select, `bound` where `value` is NaN. `f32::max` handles NaN in both
 /// operands and needs more instructions.
 #[inline(always)]
-pub(crate) fn fast_max(least: f32, value: f32) -> f32 {
-    if value > least { value } else { least }
+pub(crate) fn fast_max(bound: f32, value: f32) -> f32 {
+    if value > bound { value } else { bound }
 }
 
 #[inline(always)]
-pub(crate) fn fast_min(most: f32, value: f32) -> f32 {
-    if value < most { value } else { most }
+pub(crate) fn fast_min(bound: f32, value: f32) -> f32 {
+    if value < bound { value } else { bound }
 }
 
 /// The cubic `3 t^2 - 2 t^3`, with `t` clamped to 0..=1.

@@ -187,8 +187,8 @@ impl ShutterCameras {
 
     /// Velocity of the camera's position during the exposure, m/s.
     pub(crate) fn velocity(&self) -> DVec3 {
-        let way = self.cameras[2].position - self.cameras[0].position;
-        if self.exposure_time > 0.0 { way / self.exposure_time } else { DVec3::ZERO }
+        let displacement = self.cameras[2].position - self.cameras[0].position;
+        if self.exposure_time > 0.0 { displacement / self.exposure_time } else { DVec3::ZERO }
     }
 
     /// Whether anything within `radius` (m) of an axis-aligned box may be visible at any time of the exposure. The box

@@ -9,7 +9,7 @@ use bansho_base::{
 use bansho_media::output::{
     label,
     sink::{FrameSlot, Picture},
-    sprite_sheet::{Sheet, tile_display},
+    sprite_sheet::{SheetLayout, tile_display},
 };
 use bansho_render::fingerprint;
 
@@ -35,7 +35,7 @@ const SQUARE: usize = 8;
 const SQUARES: [f32; 2] = [0.051_269_46, 0.116_970_67];
 
 /// Draws all frames of `job` into one picture and writes it.
-pub(super) fn run(job: &PreparedJob, sheet: &Sheet, observer: &dyn JobObserver) -> Result<(), JobError> {
+pub(super) fn run(job: &PreparedJob, sheet: &SheetLayout, observer: &dyn JobObserver) -> Result<(), JobError> {
     let sink = job.format.open(&job.plan, 1, sheet.size(), 1)?;
     let show = |frame: &mut Frame, observer: &dyn Observer| {
         lay_over(frame, job.contact_background, &job.format.view);

@@ -6,7 +6,7 @@ use bansho_base::host::{observer::Cancelled, plural::counted};
 use bansho_media::{
     MediaError,
     input::InputError,
-    output::{naming::NamingError, sprite_sheet::TileError},
+    output::{naming::NamingError, sprite_sheet::SheetError},
 };
 use bansho_render::{PlanError, RenderError, SceneError, scene::edit::EditError};
 
@@ -86,7 +86,7 @@ pub enum JobError {
     },
     /// Tiles that make no sheet.
     #[error(transparent)]
-    Tiles(#[from] TileError),
+    Tiles(#[from] SheetError),
     /// Streak textures that cannot be made.
     #[error(transparent)]
     Streaks(#[from] StreaksFault),

@@ -79,7 +79,7 @@ mod tests {
         let fingerprint = frame.header.fingerprint;
         assert!(!are_there(&picture, fingerprint));
         write(&frame, &picture, &OverwritePolicy::default()).unwrap();
-        assert!(mark::is_bansho_file(&path(&picture)));
+        assert!(provenance::is_bansho_file(&path(&picture)));
         let value: Value = serde_json::from_slice(&fs::read(folder.path().join("rain.0007.json")).unwrap()).unwrap();
         assert_eq!(value["phenomena"]["shower"]["rate"], json!({ "value": 20.0, "unit": "mm/h" }));
         assert_eq!(value["phenomena"]["shower"]["visibility"]["value"], Value::Null);

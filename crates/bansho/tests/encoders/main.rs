@@ -19,7 +19,7 @@ use bansho::{
     },
     media::output::{
         naming::OutputPattern,
-        sink::{Picture, Sink, SinkOptions, Slot, Wants},
+        sink::{FrameSlot, Picture, PictureFormat, Sink, SinkOptions},
     },
     render::display::BitDepth,
 };
@@ -50,14 +50,14 @@ impl Writing {
         let sink = Sink::open(OutputPattern::parse(path, frames.len()).unwrap(), options).unwrap();
         let mut all = Vec::new();
         for (index, frame) in frames.iter().enumerate() {
-            let slot = Slot { index, number: index as i64 };
+            let slot = FrameSlot { index, number: index as i64 };
             let mut frame = frame.clone();
-            if sink.wants() == Wants::Frame {
+            if sink.picture_format() == PictureFormat::Frame {
                 sink.write(slot, Picture::Linear(&frame)).unwrap();
                 continue;
             }
             // Premultiplied light over black is the light itself.
-            frame.opaque |= sink.wants() == Wants::OpaqueDisplay;
+            frame.opaque |= sink.picture_format() == PictureFormat::OpaqueDisplay;
             let shown = light::shown(&frame, &self.view, self.bits, self.alpha);
             sink.write(slot, Picture::Display(&shown, &[7; 32])).unwrap();
             all.push(shown);

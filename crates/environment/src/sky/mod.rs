@@ -320,13 +320,13 @@ impl PreparedSky<'_> {
     fn is_above(&self, rect: Rect, x: usize, sine: f32) -> bool {
         // Bound on the deviation of the sine from linear interpolation between the corners.
         let angle = LANES as f64 / self.view.camera.focal_pixels;
-        let least = f64::from(sine) + angle * angle;
+        let min_sine = f64::from(sine) + angle * angle;
         let rows = [rect.y, rect.bottom()].map(|y| y as f64);
         let mut corners = rows.into_iter().flat_map(|y| [x, x + LANES].map(|x| DVec2::new(x as f64, y)));
         let is_above = |corner: DVec2| {
             self.cameras
                 .iter()
-                .all(|camera| camera.direction(corner).is_some_and(|toward| toward.y > least * toward.length()))
+                .all(|camera| camera.direction(corner).is_some_and(|toward| toward.y > min_sine * toward.length()))
         };
         corners.all(is_above)
     }

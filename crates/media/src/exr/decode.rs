@@ -257,17 +257,17 @@ fn check_dwa(chunk: &Chunk, meta: &MetaData) -> Result<(), AssetProblem> {
         CompressedBlock::ScanLine(lines) => &lines.compressed_pixels_le,
         _ => return Err(damaged("deep pixels are not read")),
     };
-    let place = header.get_block_data_indices(&chunk.compressed_block).map_err(damaged)?;
-    let area = header.get_absolute_block_pixel_coordinates(place).map_err(damaged)?.size.area();
+    let index = header.get_block_data_indices(&chunk.compressed_block).map_err(damaged)?;
+    let area = header.get_absolute_block_pixel_coordinates(index).map_err(damaged)?.size.area();
     let pixel_bytes = area * header.channels.bytes_per_pixel;
     // A chunk that compression would have made larger is stored as it is, without the fields.
     if bytes.is_empty() || bytes.len() == pixel_bytes {
         return Ok(());
     }
     // Coefficients stand for samples one to one, with at most as many ends of blocks.
-    let most = 4 * pixel_bytes as u64 + 4096;
+    let limit = 4 * pixel_bytes as u64 + 4096;
     let fields: Option<&[[u8; 8]]> = bytes.as_chunks().0.get(..DWA_FIELDS);
-    let is_possible = fields.is_some_and(|fields| fields.iter().all(|field| u64::from_le_bytes(*field) <= most));
+    let is_possible = fields.is_some_and(|fields| fields.iter().all(|field| u64::from_le_bytes(*field) <= limit));
     if is_possible { Ok(()) } else { Err(damaged("a chunk claims more than its pixels can take")) }
 }
 
@@ -278,13 +278,13 @@ impl PlaneWriter {
         for line in block.lines(&header.channels) {
             let channel = line.location.channel;
             let Some(kind) = header.channels.list.get(channel).map(|channel| channel.sample_type) else { continue };
-            let Some((skipped, places)) = self.span(&line, header) else { continue };
+            let Some((skipped, pixels)) = self.span(&line, header) else { continue };
             let values = || samples(&line, kind).skip(skipped);
             if let Some(depth) = self.values.depth.as_mut().filter(|_| selection.depth == Some((part, channel))) {
-                depth[places.clone()].iter_mut().zip(values()).for_each(|(z, value)| *z = value);
+                depth[pixels.clone()].iter_mut().zip(values()).for_each(|(z, value)| *z = value);
             }
             if let Some(color) = self.values.color.as_mut().filter(|_| selection.part == part) {
-                copy_color(&mut color[places], values(), selection.color, channel);
+                copy_color(&mut color[pixels], values(), selection.color, channel);
             }
         }
     }

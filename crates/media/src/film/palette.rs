@@ -275,9 +275,9 @@ const BAYER: [[f32; 8]; 8] = bayer();
 
 const fn bayer() -> [[f32; 8]; 8] {
     let mut matrix = [[0.0; 8]; 8];
-    let mut place = 0;
-    while place < 64 {
-        let (x, y) = (place % 8, place / 8);
+    let mut index = 0;
+    while index < 64 {
+        let (x, y) = (index % 8, index / 8);
         let (mut rank, mut bit) = (0, 0);
         while bit < 3 {
             // The bits of x xor y and of y, interleaved and reversed.
@@ -285,7 +285,7 @@ const fn bayer() -> [[f32; 8]; 8] {
             bit += 1;
         }
         matrix[y][x] = (rank as f32 + 0.5) / 64.0;
-        place += 1;
+        index += 1;
     }
     matrix
 }
@@ -378,7 +378,7 @@ mod tests {
         let ditherer = Ditherer::new(&[[0, 0, 0], [255, 255, 255]], &histogram);
         for level in levels {
             let at = |x: usize, y: usize| u32::from(ditherer.index([level; 3], x, y));
-            let on: u32 = (0..64).map(|place| at(place % 8, place / 8)).sum();
+            let on: u32 = (0..64).map(|index| at(index % 8, index / 8)).sum();
             assert!((on as f32 / 64.0 - f32::from(level) / 255.0).abs() <= 1.0 / 64.0, "{level}: {on}");
             assert_eq!(at(3, 5), at(11, 13));
         }

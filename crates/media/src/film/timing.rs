@@ -13,19 +13,19 @@ pub(crate) fn reduce([frames, seconds]: [u32; 2]) -> Option<[u32; 2]> {
 
 /// The rate nearest to `fps` among the convergents of its continued fraction whose numbers are `most` at the most: `fps` itself in lowest terms
 /// where they are, else less than 1 part in `most` away. `None` for a rate that is zero, without end, or beyond what such numbers hold.
-pub(crate) fn approximate(fps: [u32; 2], most: u32) -> Option<[u32; 2]> {
+pub(crate) fn approximate(fps: [u32; 2], limit: u32) -> Option<[u32; 2]> {
     let [mut rest, mut greatest_common_divisor] = reduce(fps)?.map(u64::from);
     let (mut before, mut found) = ([0_u64, 1], [1_u64, 0]);
     while greatest_common_divisor > 0 {
         let whole = rest / greatest_common_divisor;
-        let next = [0, 1].map(|part| whole * found[part] + before[part]);
-        if next.iter().any(|part| *part > u64::from(most)) {
+        let next = [0, 1].map(|term| whole * found[term] + before[term]);
+        if next.iter().any(|term| *term > u64::from(limit)) {
             break;
         }
         (before, found) = (found, next);
         (rest, greatest_common_divisor) = (greatest_common_divisor, rest % greatest_common_divisor);
     }
-    let [frames, seconds] = found.map(|part| u32::try_from(part).unwrap_or(most));
+    let [frames, seconds] = found.map(|term| u32::try_from(term).unwrap_or(limit));
     (frames > 0 && seconds > 0).then_some([frames, seconds])
 }
 

@@ -55,7 +55,7 @@ impl SheetLayout {
     }
 
     /// The rectangle of the picture at position `index`.
-    pub fn place(&self, index: usize) -> Rect {
+    pub fn cell_rect(&self, index: usize) -> Rect {
         let columns = self.columns.max(1);
         let [width, height] = self.cell;
         let (x, y) = ((index % columns) * (width + self.gutter), (index / columns) * (height + self.gutter));
@@ -63,11 +63,11 @@ impl SheetLayout {
     }
 
     /// Copies `images`, rows of pixels of one size, onto a sheet filled with `fill`.
-    fn lay<T: Copy>(&self, images: &[&[T]], fill: T) -> Vec<T> {
+    fn copy_cells<T: Copy>(&self, images: &[&[T]], fill: T) -> Vec<T> {
         let [sheet_width, sheet_height] = self.size();
         let mut sheet = vec![fill; sheet_width * sheet_height];
         for (index, pixels) in images.iter().enumerate() {
-            let place = self.place(index);
+            let place = self.cell_rect(index);
             for (row, line) in pixels.chunks_exact(place.width.max(1)).enumerate() {
                 sheet[(place.y + row) * sheet_width + place.x..][..place.width].copy_from_slice(line);
             }
@@ -104,7 +104,7 @@ pub fn tile<const N: usize>(
     let sheet = sheet(images.iter().map(|image| [image.width(), image.height()]), columns, gutter)?;
     let pixels: Vec<_> = images.iter().map(Image::pixels).collect();
     let [width, height] = sheet.size();
-    Image::from_pixels(width, height, sheet.lay(&pixels, fill)).ok_or(SheetError::Nothing)
+    Image::from_pixels(width, height, sheet.copy_cells(&pixels, fill)).ok_or(SheetError::Nothing)
 }
 
 /// As [`tile`], for display pixels; `fill` in 8 bits. The sheet is opaque if all pictures and the fill are.
@@ -130,9 +130,9 @@ pub fn tile_display(
     }
     let [width, height] = sheet.size();
     let pixels = if sixteen.is_empty() {
-        DisplayPixels::Eight(sheet.lay(&eight, fill))
+        DisplayPixels::Eight(sheet.copy_cells(&eight, fill))
     } else {
-        DisplayPixels::Sixteen(sheet.lay(&sixteen, fill.map(|code| u16::from(code) * 257)))
+        DisplayPixels::Sixteen(sheet.copy_cells(&sixteen, fill.map(|code| u16::from(code) * 257)))
     };
     let is_full = gutter == 0 && sheet.count == sheet.columns * sheet.rows();
     let opaque = images.iter().all(|image| image.opaque) && (is_full || fill[3] == u8::MAX);

@@ -51,8 +51,8 @@ impl DropTextures {
             let mut texture = vec![[ZERO_LANES; 2]; (drops as usize).div_ceil(LANES)];
             for index in 0..drops {
                 let [x, y, ..] = key.uniforms((variant as u64) << 32 | index, 0, class.purpose(TEXTURE));
-                let (part, i) = (&mut texture[index as usize / LANES], index as usize % LANES);
-                (part[0][i], part[1][i]) = (x, y);
+                let (batch, i) = (&mut texture[index as usize / LANES], index as usize % LANES);
+                (batch[0][i], batch[1][i]) = (x, y);
             }
             texture
         };
@@ -78,8 +78,8 @@ impl Billboard<'_> {
     /// Visibility of a texture's last drop, of which the count contains `part`: that fraction of all billboards shows
     /// it, each of them wholly, but for a short fade.
     #[inline(always)]
-    fn visibility(&self, part: f32) -> f32 {
-        fast_min(1.0, fast_max(0.0, (part - self.threshold * (1.0 - FADE_IN) as f32) * (1.0 / FADE_IN) as f32))
+    fn visibility(&self, batch: f32) -> f32 {
+        fast_min(1.0, fast_max(0.0, (batch - self.threshold * (1.0 - FADE_IN) as f32) * (1.0 / FADE_IN) as f32))
     }
 }
 
@@ -128,7 +128,7 @@ impl<'a> Billboards<'a> {
         };
         let velocity = billboard.velocity.as_vec3().to_array();
         let (diameter_mm, count) = (class.diameter_mm as f32, class.count() as f32);
-        for (part, texture) in billboard.texture.iter().enumerate() {
+        for (batch, texture) in billboard.texture.iter().enumerate() {
             let mut drops = DropBatch {
                 positions: [ZERO_LANES; 3],
                 velocities: velocity.map(|v| [v; LANES]),
@@ -136,7 +136,7 @@ impl<'a> Billboards<'a> {
                 presence: ZERO_LANES,
             };
             for i in 0..LANES {
-                drops.presence[i] = billboard.visibility(count - (part * LANES + i) as i32 as f32);
+                drops.presence[i] = billboard.visibility(count - (batch * LANES + i) as i32 as f32);
                 let (x, y) = (
                     wrapped(billboard.mirror * (texture[0][i] - billboard.offset[0])),
                     wrapped(texture[1][i] - billboard.offset[1]),

@@ -172,9 +172,10 @@ impl PreparedLight {
             let cone_factor = cone * cone * (3.0 - 2.0 * cone);
             let attenuation = fast_max(self.min_distance_squared, is_local * square + (1.0 - is_local));
             factors[i] = cone_factor / attenuation * approximations::exp(-extinction * is_local * distance);
-            let away = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
+            let drop_distance = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
             let along = offset[0] * xs[i] + offset[1] * ys[i] + offset[2] * zs[i];
-            table_positions[i] = ScatteringTable::position(along * inverse / fast_max(f32::MIN_POSITIVE, away));
+            table_positions[i] =
+                ScatteringTable::position(along * inverse / fast_max(f32::MIN_POSITIVE, drop_distance));
         }
         (factors, table_positions)
     }
@@ -182,12 +183,12 @@ impl PreparedLight {
 
 /// Whether a cone around `axis` misses a sphere at `offset` from its apex.
 fn cone_misses_sphere(offset: DVec3, radius: f64, axis: DVec3, cos_outer: f64) -> bool {
-    let away = offset.length();
-    if away <= radius {
+    let drop_distance = offset.length();
+    if drop_distance <= radius {
         return false;
     }
-    let turned = math::acos((offset.dot(axis) / away).clamp(-1.0, 1.0));
-    turned - math::asin(radius / away) > math::acos(cos_outer.clamp(-1.0, 1.0))
+    let angle = math::acos((offset.dot(axis) / drop_distance).clamp(-1.0, 1.0));
+    angle - math::asin(radius / drop_distance) > math::acos(cos_outer.clamp(-1.0, 1.0))
 }
 
 #[cfg(test)]

@@ -173,9 +173,9 @@ impl<'a> SingleScattering<'a> {
         let integrator =
             InScatterIntegrator { lighting, extinction: profile, eye, distances: &distances, depths: &depths, end };
         let tiles = &sky.fine.0;
-        let (shown, others) = integrator.split_lights(view);
+        let (visible, others) = integrator.split_lights(view);
         let halos: Vec<LampHalo> =
-            shown.into_iter().map(|(light, pixel)| integrator.halo(&light, pixel, tiles, view)).collect();
+            visible.into_iter().map(|(light, pixel)| integrator.halo(&light, pixel, tiles, view)).collect();
         let in_scattering = (!lighting.lights.is_empty()).then(|| {
             let radiance = tiles.map(|_, direction| integrator.accumulate(direction, &others));
             let mut in_scattering = InScattering::new(&radiance, distances.len());
@@ -247,16 +247,16 @@ impl<'a> SingleScattering<'a> {
         let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
         let range = self.distance_range(pixel, slice, plate).filter(|range| range[0] < range[1])?;
         let direction = self.view.camera.direction(pixel)?.normalize_or_zero();
-        let place = pixel.as_vec2().to_array();
+        let position = pixel.as_vec2().to_array();
         let mut correction = [0.0_f32; 3];
         let segment = self.segment(range);
         let nearest = ray_distance(halo.offset, direction);
-        for (corner, t) in halo.fine_tiles.corner_weights(place) {
+        for (corner, t) in halo.fine_tiles.corner_weights(position) {
             let factor = t * halo.ray_distance[corner] / nearest;
             let lit = segment.in_scattered(&halo.fine_in_scattering, corner);
             (0..3).for_each(|c| correction[c] += lit[c] * factor);
         }
-        for (corner, t) in self.tiles().corner_weights(place) {
+        for (corner, t) in self.tiles().corner_weights(position) {
             let lit = segment.in_scattered(&halo.in_scattering, corner);
             (0..3).for_each(|c| correction[c] -= lit[c] * t);
         }
@@ -269,10 +269,10 @@ impl<'a> SingleScattering<'a> {
             let rect = halo.rect.intersection(&rows);
             for y in rect.y..rect.bottom() {
                 for x in rect.x..rect.right() {
-                    let away = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - halo.pixel).length() / HALO_RADIUS;
+                    let distance = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - halo.pixel).length() / HALO_RADIUS;
                     let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
                     let plate = strip.has_plate().then(|| f64::from(strip.plate_depth(index)));
-                    let fade = 1.0 - math::smoothstep(0.6, 1.0, away) as f32;
+                    let fade = 1.0 - math::smoothstep(0.6, 1.0, distance) as f32;
                     let Some(light) = self.halo(halo, x, y, slice, plate).filter(|_| fade > 0.0) else { continue };
                     // The medium in front of it is contained in the strip's transmittance too; its effect is small.
                     (0..3)
@@ -315,11 +315,11 @@ impl<'a> SingleScattering<'a> {
         let side = self.tiles().side;
         let columns = rows.x / side..rows.right().div_ceil(side) + 1;
         let edge = |y: f64| -> Vec<[f32; 4]> {
-            let place = self.tiles().row_at(y as f32);
+            let position = self.tiles().row_at(y as f32);
             let corner = |column: usize| {
                 let range = self.distance_range(DVec2::new((column * side) as f64, y), slice, None);
                 range.map_or([0.0, 0.0, 0.0, 1.0], |range| {
-                    self.radiance_and_transmittance(column, place, &self.segment(range))
+                    self.radiance_and_transmittance(column, position, &self.segment(range))
                 })
             };
             columns.clone().map(corner).collect()
@@ -334,7 +334,7 @@ impl<'a> SingleScattering<'a> {
             let start = (y - strip.rect.y) * strip.rect.width;
             for column in 0..edges[0].len() - 1 {
                 let left = (columns.start + column) * side;
-                let shown = left.max(rows.x)..(left + side).min(rows.right());
+                let visible = left.max(rows.x)..(left + side).min(rows.right());
                 let mut values = [[0.0_f32; FINE_TILE]; 4];
                 for (c, values) in values.iter_mut().enumerate() {
                     let (from, to) = (corner(column, c), corner(column + 1, c));
@@ -344,9 +344,9 @@ impl<'a> SingleScattering<'a> {
                 }
                 values[3].iter_mut().for_each(|transmittance| *transmittance = 1.0 - *transmittance);
                 let [red, green, blue, opacity] =
-                    values.each_ref().map(|row| &row[shown.start - left..shown.end - left]);
-                let first = start + shown.start - strip.rect.x;
-                strip.add_row_behind(first, [red, green, blue], Some(opacity), &NO_DEPTH[..shown.len()]);
+                    values.each_ref().map(|row| &row[visible.start - left..visible.end - left]);
+                let first = start + visible.start - strip.rect.x;
+                strip.add_row_behind(first, [red, green, blue], Some(opacity), &NO_DEPTH[..visible.len()]);
             }
         }
     }
@@ -354,7 +354,7 @@ impl<'a> SingleScattering<'a> {
     /// A plate may end the medium at any depth, so intervals are evaluated for each pixel.
     fn draw_before_plate(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
         for y in rows.y..rows.bottom() {
-            let place = self.tiles().row_at(y as f32 + 0.5);
+            let position = self.tiles().row_at(y as f32 + 0.5);
             for x in rows.x..rows.right() {
                 let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
                 let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
@@ -369,7 +369,7 @@ impl<'a> SingleScattering<'a> {
                 let across = ((x % side) as f32 + 0.5) / side as f32;
                 let segment = self.segment(range);
                 let [left, right] =
-                    [column, column + 1].map(|column| self.radiance_and_transmittance(column, place, &segment));
+                    [column, column + 1].map(|column| self.radiance_and_transmittance(column, position, &segment));
                 composite_pixel(strip, index, std::array::from_fn(|c| (right[c] - left[c]).fma(across, left[c])));
             }
         }
@@ -395,21 +395,21 @@ struct InScatterIntegrator<'a> {
 impl InScatterIntegrator<'_> {
     /// Lamps in and near the picture with their pixels, and all other lights.
     fn split_lights(&self, view: &View) -> (Vec<(Light, DVec2)>, Vec<Light>) {
-        let (mut shown, mut others) = (Vec::new(), Vec::new());
+        let (mut visible, mut others) = (Vec::new(), Vec::new());
         for light in self.lighting.lights {
-            let place = match light.emitter {
+            let projection = match light.emitter {
                 Emitter::Point { position, .. } | Emitter::Spot { position, .. } => view.camera.project(position),
                 Emitter::Directional { .. } => None,
             };
             let near = |pixel: DVec2| {
                 (0..2).all(|axis| (-HALO_RADIUS..view.size[axis] as f64 + HALO_RADIUS).contains(&pixel[axis]))
             };
-            match place.map(|place| place.pixel).filter(|pixel| near(*pixel)) {
-                Some(pixel) if shown.len() < MAX_HALOS => shown.push((*light, pixel)),
+            match projection.map(|projection| projection.pixel).filter(|pixel| near(*pixel)) {
+                Some(pixel) if visible.len() < MAX_HALOS => visible.push((*light, pixel)),
                 _ => others.push(*light),
             }
         }
-        (shown, others)
+        (visible, others)
     }
 
     fn halo(&self, light: &Light, pixel: DVec2, tiles: &TileGrid, view: &View) -> LampHalo {
@@ -437,9 +437,9 @@ impl InScatterIntegrator<'_> {
             let mut sum = [0.0_f32; 3];
             for k in 0..self.distances.len() - 1 {
                 let in_range = self.distances[k] < self.end;
-                let part = if in_range { self.segment(light, direction, k) } else { [0.0; 3] };
+                let radiance = if in_range { self.segment(light, direction, k) } else { [0.0; 3] };
                 for c in 0..3 {
-                    sum[c] += part[c];
+                    sum[c] += radiance[c];
                     sums[k + 1][c] += sum[c];
                 }
             }
@@ -464,8 +464,8 @@ impl InScatterIntegrator<'_> {
         (0..samples as usize).fold([0.0; 3], |sum: [f32; 3], index| {
             let offset = h * math::tan(first + step * (index as f64 + 0.5));
             let length = step * (h * h + offset * offset) / h;
-            let part = self.sample(light, direction, nearest + offset, length, k);
-            std::array::from_fn(|c| sum[c] + part[c])
+            let radiance = self.sample(light, direction, nearest + offset, length, k);
+            std::array::from_fn(|c| sum[c] + radiance[c])
         })
     }
 

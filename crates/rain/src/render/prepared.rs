@@ -212,7 +212,7 @@ impl PreparedRain<'_> {
             let (mut buffer, mut streaks) = (TileBuffer::default(), Vec::new());
             for tile_column in rows.x / TILE_COLUMNS..rows.right().div_ceil(TILE_COLUMNS) {
                 let origin = [tile_column * TILE_COLUMNS, tile_row * TILE_ROWS];
-                let shown = rows.intersection(&Rect { x: origin[0], width: TILE_COLUMNS, ..rows });
+                let tile_rect = rows.intersection(&Rect { x: origin[0], width: TILE_COLUMNS, ..rows });
                 streaks.clear();
                 for chunk in &self.chunks {
                     chunk.collect_tile(tile_row, tile_column, &mut streaks);
@@ -220,7 +220,7 @@ impl PreparedRain<'_> {
                 if streaks.is_empty() {
                     continue;
                 }
-                buffer.load(simd, origin, shown, rect, &planes);
+                buffer.load(simd, origin, tile_rect, rect, &planes);
                 let segments = streaks.iter().map(PackedStreak::unpack);
                 for segment in segments.filter(|segment| slice.contains(f64::from(segment.shading.depth))) {
                     if aovs.is_empty() {
@@ -229,13 +229,15 @@ impl PreparedRain<'_> {
                     }
                     segment.draw(&mut buffer, &mut |[column, row], opacity| {
                         let [x, y] = [origin[0] + column, origin[1] + row];
-                        if (shown.x..shown.right()).contains(&x) && (shown.y..shown.bottom()).contains(&y) {
+                        if (tile_rect.x..tile_rect.right()).contains(&x)
+                            && (tile_rect.y..tile_rect.bottom()).contains(&y)
+                        {
                             let index = (y - rect.y) * rect.width + x - rect.x;
                             write_aovs(&mut aovs, index, opacity, segment.shading.depth, segment.diameter_mm);
                         }
                     });
                 }
-                buffer.store(simd, shown, rect, &mut planes);
+                buffer.store(simd, tile_rect, rect, &mut planes);
             }
         }
         strip.aovs = aovs;

@@ -128,8 +128,8 @@ impl StreakProjection<'_> {
             }
             builder.build()
         };
-        let [fewest, most] = CELLS_PER_CHUNK;
-        cells.par_chunks((cells.len() / CHUNK_COUNT).clamp(fewest, most)).map(fill).collect()
+        let [min, max] = CELLS_PER_CHUNK;
+        cells.par_chunks((cells.len() / CHUNK_COUNT).clamp(min, max)).map(fill).collect()
     }
 
     /// The cells of a class, without duplicates.
@@ -283,8 +283,8 @@ impl PerDropRegion {
         for &([x, y, z], radius) in &self.from_camera {
             for i in 0..LANES {
                 let offset = [xs[i] - x, ys[i] - y, zs[i] - z];
-                let away = (offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]).sqrt();
-                weights[i] = fast_max(weights[i], smoothstep((radius - away) * (1.0 / FADE_WIDTH) as f32));
+                let distance = (offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]).sqrt();
+                weights[i] = fast_max(weights[i], smoothstep((radius - distance) * (1.0 / FADE_WIDTH) as f32));
             }
         }
         weights

@@ -91,12 +91,12 @@ impl Splashes<'_> {
                 )
         };
         let squares: Vec<&[i64; 2]> = squares.iter().filter(shows).collect();
-        let part = |squares: &[&[i64; 2]]| {
+        let phase = |squares: &[&[i64; 2]]| {
             let mut builder = StreakChunkBuilder::new(exposure.cameras.size());
             squares.iter().for_each(|square| self.square(**square, middle(**square), &mut builder));
             builder.build()
         };
-        squares.par_chunks(SQUARES_PER_CHUNK).map(part).collect()
+        squares.par_chunks(SQUARES_PER_CHUNK).map(phase).collect()
     }
 
     /// Index of the current period, the elapsed fraction of it, and its length, s. A loop holds a whole number of
@@ -109,7 +109,7 @@ impl Splashes<'_> {
 
     /// Adds the droplets above one ground square.
     fn square(&self, [x, z]: [i64; 2], middle: DVec3, builder: &mut StreakChunkBuilder) {
-        let (period, part, length) = self.period();
+        let (period, phase, length) = self.period();
         let key = self.projection.exposure.key;
         let id = (x as u64 & 0xffff_ffff) << 32 | z as u64 & 0xffff_ffff;
         let distance = (middle - self.projection.exposure.cameras.middle().position).length();
@@ -130,7 +130,7 @@ impl Splashes<'_> {
                     if uniforms[3] >= class.fraction * probability {
                         continue;
                     }
-                    let age = (part - uniforms[2] + back as f64) * length;
+                    let age = (phase - uniforms[2] + back as f64) * length;
                     let position = middle + DVec3::new(uniforms[0] - 0.5, 0.0, uniforms[1] - 0.5) * SQUARE_SIZE;
                     let strength = fade * thinning * self.projection.exposure.gain;
                     let step = step.wrapping_mul(1 << 16).wrapping_add((class.index as u32) << 12 | number as u32);

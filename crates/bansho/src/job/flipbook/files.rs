@@ -171,7 +171,7 @@ impl Files {
     fn description(&self, plan: &Plan, sheet: &SheetLayout, numbers: &[i64], scale: f32) -> Value {
         let fps = plan.fps();
         let frame = |(index, &number): (usize, &i64)| {
-            let place = sheet.place(index);
+            let place = sheet.cell_rect(index);
             let time_s = index as f64 * fps.frame_s();
             json!({ "number": number, "time_s": time_s, "x": place.x, "y": place.y, "width": place.width, "height": place.height })
         };

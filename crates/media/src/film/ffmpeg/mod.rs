@@ -106,8 +106,8 @@ fn padded<T: Copy>(pixels: &[T], [width, height]: [usize; 2], coded: [usize; 2])
     if coded == [width, height] {
         return pixels.to_vec();
     }
-    let pixel = |place: usize| {
-        let (x, y) = (place % coded[0], place / coded[0]);
+    let pixel = |index: usize| {
+        let (x, y) = (index % coded[0], index / coded[0]);
         pixels[y.min(height - 1) * width + x.min(width - 1)]
     };
     (0..coded[0] * coded[1]).map(pixel).collect()

@@ -65,9 +65,9 @@ impl FfmpegFilm {
 
 /// The end of a stream, which is read completely so that the process never blocks on it.
 fn tail(mut stream: impl Read) -> Vec<u8> {
-    let (mut kept, mut part) = (Vec::new(), [0; 1024]);
-    while let Ok(length @ 1..) = stream.read(&mut part) {
-        kept.extend_from_slice(&part[..length]);
+    let (mut kept, mut buffer) = (Vec::new(), [0; 1024]);
+    while let Ok(length @ 1..) = stream.read(&mut buffer) {
+        kept.extend_from_slice(&buffer[..length]);
         kept.drain(..kept.len().saturating_sub(TAIL_BYTES));
     }
     kept

@@ -200,13 +200,13 @@ impl<const STEEP: bool> ColumnCoverage for WideStreak<'_, STEEP> {
             let y = self.top + ROW_OFFSETS[row];
             let (along, offset) = if STEEP { (y, x) } else { (x, y) };
             let offset = offset - slope * (along + 0.5);
-            let share = disc_cdf((offset + 1.0) * scale) - disc_cdf(offset * scale);
+            let fraction = disc_cdf((offset + 1.0) * scale) - disc_cdf(offset * scale);
             // Sheared by the slope, a disc becomes an ellipse, whose chords have their centers off the axis.
             let center = -slope * (offset + 0.5) / (slope * slope + 1.0);
             let chord = fast_max(MIN_HALF_CHORD, self.segment.chord(offset + 0.5));
             let covered =
                 covered(along + 1.0 - center, half_length, chord) - covered(along - center, half_length, chord);
-            opacities[row] = clamp_opacity(whole * share * covered);
+            opacities[row] = clamp_opacity(whole * fraction * covered);
         }
         opacities
     }
@@ -229,8 +229,8 @@ fn covered(along: f32, half_length: f32, chord: f32) -> f32 {
 #[inline(always)]
 fn clamp_integral(s: f32, chord: f32) -> f32 {
     let size = s.abs();
-    let least = fast_min(chord, size);
-    least * (size - 0.5 * least)
+    let limit = fast_min(chord, size);
+    limit * (size - 0.5 * limit)
 }
 
 /// Clamps rounding errors.
@@ -252,8 +252,8 @@ mod tests {
             let end = (i as f32 + 1.0) / steps as f32 * 2.0 - 1.0;
             assert!((disc_cdf(end) - sum).abs() < 2.5e-3, "{end}");
         }
-        for (t, share) in [(-2.0, 0.0), (0.0, 0.5), (2.0, 1.0)] {
-            assert!((disc_cdf(t) - share).abs() < 1e-6);
+        for (t, fraction) in [(-2.0, 0.0), (0.0, 0.5), (2.0, 1.0)] {
+            assert!((disc_cdf(t) - fraction).abs() < 1e-6);
         }
     }
 }
