@@ -18,6 +18,7 @@ pub(crate) fn fast_max(bound: f32, value: f32) -> f32 {
     if value > bound { value } else { bound }
 }
 
+/// The smaller of two numbers, likewise; `bound` where `value` is NaN.
 #[inline(always)]
 pub(crate) fn fast_min(bound: f32, value: f32) -> f32 {
     if value < bound { value } else { bound }

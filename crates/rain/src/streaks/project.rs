@@ -135,7 +135,7 @@ impl StreakProjection<'_> {
     /// The cells of a class, without duplicates.
     fn cells(&self, class: &DropClassState, within: &[Sphere], half_width: f64) -> Vec<(f64, Cell)> {
         let mut cells: Vec<_> =
-            within.iter().flat_map(|ball| self.exposure.visible_cells(class, *ball, half_width)).collect();
+            within.iter().flat_map(|sphere| self.exposure.visible_cells(class, *sphere, half_width)).collect();
         cells.sort_by_key(|(_, cell)| *cell);
         cells.dedup_by_key(|(_, cell)| *cell);
         cells

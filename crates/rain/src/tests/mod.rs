@@ -285,7 +285,7 @@ fn rain_shows_against_dark_and_vanishes_against_an_even_sky() {
         let behind = sky.radiance(bansho_base::math::DVec3::Y)[1];
         for index in 0..strip.len() {
             let against_sky = strip.transmittance(index)[1].mul_add(behind, strip.radiance[1][index]);
-            // DropBatch low in the picture show a little of the ground.
+            // Drops low in the picture show a little of the ground.
             assert!((against_sky / behind - 1.0).abs() < 0.06, "{against_sky}");
         }
         assert!(strip.radiance[1].iter().sum::<f32>() > 0.005 * behind * strip.len() as f32);
