@@ -1,16 +1,16 @@
-//! The pictures last used, within a budget of bytes.
+//! Least-recently-used cache of pictures with a budget of bytes.
 
 use std::{path::PathBuf, sync::Arc};
 
 use bansho_base::host::assets::Picture;
 
-/// Pictures in the order of their last use, the latest last.
+/// Pictures by last use, the latest last.
 #[derive(Debug, Default)]
 pub(crate) struct PictureCache {
     pictures: Vec<(PathBuf, Arc<Picture>)>,
 }
 
-/// Bytes a picture takes in memory.
+/// Memory of a picture, bytes.
 fn bytes(picture: &Picture) -> usize {
     size_of_val(picture.colour.pixels()) + picture.depth.as_ref().map_or(0, |depth| size_of_val(&depth[..]))
 }
@@ -24,7 +24,7 @@ impl PictureCache {
         Some(picture)
     }
 
-    /// Keeps `picture`, and of the others the latest used that fit within `budget` bytes together with it.
+    /// Inserts `picture` and evicts the least recently used others beyond `budget` bytes.
     pub(crate) fn insert(&mut self, path: PathBuf, picture: Arc<Picture>, budget: usize) {
         self.pictures.retain(|(key, _)| *key != path);
         self.pictures.push((path, picture));
@@ -35,7 +35,7 @@ impl PictureCache {
         }
     }
 
-    /// Bytes that the kept pictures take.
+    /// Memory of the cached pictures, bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.pictures.iter().map(|(_, picture)| bytes(picture)).sum()
     }

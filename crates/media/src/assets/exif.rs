@@ -1,4 +1,4 @@
-//! The exposure with which a photograph was taken, as Exif records it.
+//! Exposure value of a photograph from its Exif data.
 
 use bansho_base::{color::ev100_of_camera, math};
 use exif::{Exif, In, Reader, Tag, Value};
@@ -15,7 +15,7 @@ pub(crate) fn exif_ev100(block: &[u8]) -> Option<f64> {
     ev100_of_camera(f_number?, time?, sensitivity(&exif)?)
 }
 
-/// Greatest sensitivity that its usual tag can hold, which then means that another tag states it.
+/// Largest value of the usual sensitivity tag, which refers to another tag.
 const FULL: f64 = 65_535.0;
 
 fn sensitivity(exif: &Exif) -> Option<f64> {
@@ -24,7 +24,7 @@ fn sensitivity(exif: &Exif) -> Option<f64> {
     usual.or_else(|| others.into_iter().find_map(|tag| number(exif, tag)))
 }
 
-/// The first value of a tag of the main picture, where that is a number above 0 or, in APEX units, any.
+/// The first value of a tag of the primary image: positive, or any in APEX units.
 fn number(exif: &Exif, tag: Tag) -> Option<f64> {
     let value = match &exif.get_field(tag, In::PRIMARY)?.value {
         Value::Rational(values) => values.first()?.to_f64(),

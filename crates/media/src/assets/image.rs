@@ -18,7 +18,7 @@ use zune_jpeg::{
     zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
 };
 
-/// Bytes of a pixel of a picture that was read.
+/// Memory of a decoded pixel, bytes.
 const PIXEL_BYTES: u64 = size_of::<[f32; 4]>() as u64;
 
 fn damaged(reason: impl ToString) -> AssetProblem {
@@ -43,7 +43,7 @@ pub(crate) fn png(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProbl
     let (color_type, bit_depth) = reader.output_color_type();
     let row_bytes = reader.output_line_size(width as u32).ok_or_else(|| damaged("its rows do not fit in memory"))?;
     let is_interlaced = reader.info().interlaced;
-    // Interlaced rows come seven times in part, so that all bytes are kept until the last of them.
+    // An interlaced PNG has seven passes, so all rows are kept until the last.
     let kept_rows = if is_interlaced { height } else { 1 };
     limit.check(file.len() as u64 + width * height * PIXEL_BYTES + kept_rows * row_bytes as u64)?;
     let mut pixels = Vec::with_capacity((width * height) as usize);

@@ -1,26 +1,26 @@
-//! What a plate may claim, checked before any memory is taken for it.
+//! Limits on claimed sizes, checked before memory is allocated.
 
 use bansho_base::host::{assets::AssetProblem, memory};
 
 use crate::exr::attribute::Window;
 
-/// Most pixels on a side.
+/// Largest side, pixels.
 pub const SIDE: u64 = 16384;
-/// Most pixels in all: half of the greatest square, which as floats is 2 GiB.
+/// Largest number of pixels: half of the largest square, 2 GiB as floats.
 pub const PIXELS: u64 = SIDE * SIDE / 2;
-/// Bytes that the inputs of a scene may take together unless told otherwise.
+/// Default memory limit of a scene's inputs, bytes.
 pub const MEMORY_BYTES: u64 = 2 << 30;
-/// Most bytes of a text: a drawing, or another that a scene names.
+/// Largest text file (a drawing, or another that a scene names), bytes.
 pub const TEXT_BYTES: u64 = 64 << 20;
-/// How many bytes one byte of DEFLATE can stand for: 258 in two bits, and a little for headers.
+/// Largest compression ratio of DEFLATE: 258 bytes in two bits, and some margin for headers.
 pub(crate) const DEFLATE_RATIO: u64 = 1040;
 
-/// How much memory an input may take while it is read.
+/// Memory limit of an input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MemoryLimit {
     /// Bytes that all inputs together may take.
     pub total: u64,
-    /// Bytes that others take already.
+    /// Bytes that other inputs use already.
     pub used: u64,
 }
 
@@ -31,7 +31,7 @@ impl Default for MemoryLimit {
 }
 
 impl MemoryLimit {
-    /// Bytes that are left.
+    /// Remaining bytes.
     pub fn available(self) -> u64 {
         self.total.saturating_sub(self.used)
     }
@@ -62,7 +62,7 @@ pub(crate) fn check_size([width, height]: [u64; 2]) -> Result<[u64; 2], AssetPro
     Ok([width, height])
 }
 
-/// Refuses a picture of `claimed_bytes` that its file could not hold even if compressed as far as its format can.
+/// Refuses a picture of `claimed_bytes` that its file could not hold even at the format's largest compression ratio.
 pub(crate) fn check_expansion(
     [width, height]: [u64; 2],
     claimed_bytes: u64,

@@ -1,4 +1,4 @@
-//! Assets in files: plates, depth, meshes, drawings, text.
+//! Assets from files: plates, depth, meshes, drawings, text.
 
 mod cache;
 mod exif;
@@ -31,10 +31,10 @@ use crate::{
 use gltf::{decode_mesh, files_beside};
 use svg::decode_drawing;
 
-/// Most bytes of pictures that are kept for the next frame unless told otherwise.
+/// Default size of the picture cache, bytes.
 pub const CACHE_BYTES: usize = 512 << 20;
 
-/// What the files that a scene names may take, and where they may lie.
+/// Limits on the files that a scene names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputLimits {
     /// Bytes of memory that they may take together while they are read and used.
@@ -72,14 +72,14 @@ struct AssetCache {
 }
 
 impl AssetCache {
-    /// Bytes of what is in use or kept.
+    /// Memory of the cached assets, bytes.
     fn used(&self) -> u64 {
         let meshes = self.meshes.values().map(|mesh| mesh.memory_bytes());
         let drawings = self.drawings.values().map(|drawing| drawing.memory_bytes());
         self.pictures.bytes() as u64 + meshes.chain(drawings).sum::<u64>()
     }
 
-    /// Forgets pictures, and meshes and drawings that nobody uses.
+    /// Evicts pictures, and meshes and drawings without other users.
     fn make_room(&mut self) {
         self.pictures.clear();
         self.meshes.retain(|_, mesh| Arc::strong_count(mesh) > 1);
@@ -103,7 +103,7 @@ impl FileAssets {
         Self { cache_bytes, ..Self::new(folder) }
     }
 
-    /// Forgets everything that was read, because files may have changed.
+    /// Empties the cache, because files may have changed.
     pub fn forget(&self) {
         *self.cache() = AssetCache::default();
     }
@@ -122,7 +122,7 @@ impl FileAssets {
     }
 
     fn cache(&self) -> MutexGuard<'_, AssetCache> {
-        // The memory is only ever replaced whole, so a panic elsewhere leaves it usable.
+        // The cache is only ever replaced as a whole, so a poisoned lock is usable.
         self.memory.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -130,7 +130,7 @@ impl FileAssets {
         MemoryLimit { total: self.limits.memory_bytes, used: self.cache().used() }
     }
 
-    /// Reads something within the memory that is left, and where it is too little again without what is only kept.
+    /// Reads within the remaining memory, and if that fails again after eviction.
     fn within_limit<T>(&self, read: impl Fn(MemoryLimit) -> Result<T, AssetProblem>) -> Result<T, AssetProblem> {
         match read(self.limit()) {
             Err(AssetProblem::Memory { .. } | AssetProblem::FileSize { .. } | AssetProblem::NoMemory { .. }) => {
@@ -141,12 +141,13 @@ impl FileAssets {
         }
     }
 
-    /// The file at `path` as it may be opened: where all must lie in one folder, with links followed, if it does.
+    /// The path that may be opened: the canonical path if all files must be in the root folder and it is.
     fn allowed(&self, path: &Path) -> Result<PathBuf, AssetProblem> {
         let Some(root) = &self.limits.root else { return Ok(path.to_path_buf()) };
         let outside = || AssetProblem::Outside { root: root.display().to_string() };
         let within = fs::canonicalize(root).map_err(|error| AssetProblem::Unreadable(error.to_string()))?;
-        // Of what is not there, as much as is: nobody is told what there is elsewhere.
+        // For a missing file, the check is made on its existing ancestors, so that errors reveal nothing outside of the
+        // root.
         let found = path.ancestors().find_map(|part| {
             let part = if part.as_os_str().is_empty() { Path::new(".") } else { part };
             fs::canonicalize(part).ok()

@@ -1,7 +1,7 @@
-//! Whole files or none: written under a temporary name in the same folder, then renamed.
+//! Atomic writing of files: a temporary file in the same folder, then a rename.
 //!
-//! The temporary name is `.NAME.RANDOM.part`: hidden, unique, so that two machines that write the same frame never
-//! spoil it. After a power cut or SIGKILL such a file may stay; nothing reads it and it may be deleted.
+//! The temporary name is `.NAME.RANDOM.part`: hidden and unique, so that two machines that write the same frame do not
+//! interfere. After a power failure or SIGKILL such a file may remain; nothing reads it and it may be deleted.
 
 use std::{
     fs::{self, File},
@@ -17,14 +17,14 @@ use super::{
 };
 use crate::error::MediaError;
 
-/// A file that bears its name only once it is finished. Dropped before, it vanishes.
+/// A file that gets its name only when it is finished. If dropped before, it is deleted.
 #[derive(Debug)]
 pub struct AtomicFile {
     temporary: NamedTempFile,
-    /// Dropped after the file, which is then gone or finished.
+    /// Dropped after the file.
     _guard: TemporaryFileGuard,
     path: PathBuf,
-    /// What `path` means, where it is a link.
+    /// The target of `path`, if it is a symbolic link.
     target: PathBuf,
     policy: OverwritePolicy,
 }
@@ -44,21 +44,21 @@ impl AtomicFile {
     /// As [`AtomicFile::create`], or `path` leads to a file that must stay.
     pub fn create_with(path: &Path, policy: &OverwritePolicy) -> Result<Self, MediaError> {
         let fail = |source| MediaError::from_io(path, source);
-        // First, since only then it is certain where a path such as `missing/../a.png` leads.
+        // First, because a path such as `missing/../a.png` can only be resolved when its folders exist.
         fs::create_dir_all(folder_of(path)).map_err(|source| match source.kind() {
-            // `create_dir_all` says so when a file stands where a folder should be made.
+            // The error of `create_dir_all` if a file is in the place of a folder.
             io::ErrorKind::AlreadyExists => MediaError::NotAFolder { path: path.to_path_buf() },
             _ => fail(source),
         })?;
         match fs::metadata(path) {
             Ok(there) if there.is_dir() => return Err(MediaError::IsFolder { path: path.to_path_buf() }),
-            // A rename would put a file in its place.
+            // A rename would replace it.
             Ok(there) if !there.is_file() => return Err(MediaError::NotAFile { path: path.to_path_buf() }),
             _ => {}
         }
         let target = match fs::canonicalize(path) {
             Ok(target) if path.is_symlink() => target,
-            // A link that leads nowhere is replaced, one that leads back to itself is somebody's mistake.
+            // A dangling link is replaced; a link to itself is an error.
             Err(source) if path.is_symlink() && source.kind() != io::ErrorKind::NotFound => return Err(fail(source)),
             _ => path.to_path_buf(),
         };
@@ -72,12 +72,12 @@ impl AtomicFile {
         self.temporary.as_file_mut()
     }
 
-    /// Where it lies until it is finished, for a program that writes by name.
+    /// The path of the temporary file, for programs that write by name.
     pub fn temporary_path(&self) -> &Path {
         self.temporary.path()
     }
 
-    /// The name it will bear.
+    /// The final path.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -113,7 +113,7 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Whether `target`, which is called `path`, may be written over.
+/// Whether `target`, given as `path`, may be overwritten.
 fn allow(policy: &OverwritePolicy, target: &Path, path: &Path) -> Result<(), MediaError> {
     let path = path.to_path_buf();
     policy.check(target).map_err(|kept| match kept {
@@ -122,9 +122,9 @@ fn allow(policy: &OverwritePolicy, target: &Path, path: &Path) -> Result<(), Med
     })
 }
 
-/// A new, empty, hidden file in `folder`. It is as readable as any other file of the user, since it becomes the picture.
+/// A new, empty, hidden file in `folder`, with the user's default permissions, since it becomes the picture.
 fn temporary_in(folder: &Path, path: &Path) -> io::Result<NamedTempFile> {
-    // A name may have 255 bytes, so a long one is cut before the letters that make it unique.
+    // Names are limited to 255 bytes: a long one is cut in front of the unique letters.
     let name: String = path.file_name().unwrap_or_default().to_string_lossy().chars().take(50).collect();
     let prefix = format!(".{name}.");
     let mut builder = tempfile::Builder::new();

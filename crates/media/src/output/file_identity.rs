@@ -5,15 +5,15 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
-/// A file, whatever path or link it is reached by. On Unix hard links of one file are equal too; elsewhere they are told apart, since the
-/// system's number of a file cannot be had there.
+/// Identity of a file, independent of path and links. On Unix hard links are equal too; elsewhere they differ, because
+/// the system's file number is not available in safe code.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct FileIdentity(Identity);
 
 /// Device and inode.
 #[cfg(unix)]
 type Identity = [u64; 2];
-/// The path without links.
+/// The canonical path.
 #[cfg(not(unix))]
 type Identity = PathBuf;
 

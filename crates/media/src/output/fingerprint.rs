@@ -1,6 +1,6 @@
 //! Encoding of the fingerprint that a file carries of everything its pixels depend on.
 
-/// Version that is written into files.
+/// The version that is written into files.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// `bytes` as lower-case hexadecimal digits.
@@ -12,7 +12,7 @@ pub(crate) fn to_hex(bytes: &[u8; 32]) -> String {
         .collect()
 }
 
-/// The 32 bytes that 64 hexadecimal digits say; `None` for anything else.
+/// Parses 64 hexadecimal digits.
 pub(crate) fn from_hex(text: &[u8]) -> Option<[u8; 32]> {
     let pairs: &[[u8; 2]; 32] = text.as_chunks().0.try_into().ok().filter(|_| text.len() == 64)?;
     let digit = |letter: u8| char::from(letter).to_digit(16);

@@ -1,4 +1,4 @@
-//! Pictures with alpha over black, for formats that have none.
+//! Compositing of display pictures over black, for formats without alpha.
 
 use bansho_base::{
     color::{AlphaConvention, decode_srgb, decode_srgb8, encode_srgb},
@@ -28,7 +28,7 @@ pub fn over_black(picture: &DisplayImage) -> DisplayImage {
     DisplayImage { width: picture.width, height: picture.height, opaque: true, alpha: picture.alpha, pixels }
 }
 
-/// Codes times alpha, rounded: what a blend of encoded values leaves over black.
+/// Rounded product of codes and alpha: encoded values over black.
 fn encoded_eight(rgb: [u8; 3], alpha: u8) -> [u8; 4] {
     let [r, g, b] = rgb.map(|code| ((u32::from(code) * u32::from(alpha) + 127) / 255) as u8);
     [r, g, b, u8::MAX]
@@ -63,11 +63,11 @@ fn sixteen(&[r, g, b, alpha]: &[u16; 4]) -> [u16; 4] {
     [r, g, b, u16::MAX]
 }
 
-/// The same picture with 8 bits a channel.
+/// The picture with 8 bits per channel.
 pub(crate) fn to_eight_bits(pixels: &DisplayPixels) -> Vec<[u8; 4]> {
     match pixels {
         DisplayPixels::Eight(pixels) => pixels.clone(),
-        // 257 codes of 16 bits to one of 8.
+        // 257 codes of 16 bits map to one of 8.
         DisplayPixels::Sixteen(pixels) => {
             pixels.iter().map(|pixel| pixel.map(|code| ((u32::from(code) + 128) / 257) as u8)).collect()
         }

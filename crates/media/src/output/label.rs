@@ -5,7 +5,7 @@ use bansho_base::image::{DisplayImage, DisplayPixels};
 /// Columns and rows of a glyph.
 const GLYPH: [usize; 2] = [5, 7];
 
-/// The digits, then the minus sign: rows from the top, the leftmost column in the highest of five bits.
+/// Bitmaps of the digits and the minus sign: rows from the top, the leftmost column in the highest of five bits.
 const GLYPHS: [[u8; 7]; 11] = [
     [0b01110, 0b10001, 0b10011, 0b10101, 0b11001, 0b10001, 0b01110],
     [0b00100, 0b01100, 0b00100, 0b00100, 0b00100, 0b00100, 0b01110],
@@ -20,11 +20,11 @@ const GLYPHS: [[u8; 7]; 11] = [
     [0b00000, 0b00000, 0b00000, 0b11111, 0b00000, 0b00000, 0b00000],
 ];
 
-/// Dots around the glyphs that are dark too.
+/// Dark border around the glyphs, dots.
 const MARGIN: usize = 1;
 
-/// Writes `number` into the top left corner of `picture`, white on black: about a sixteenth of its height and never more than an eighth; not at
-/// all where it would not be readable at that size or not fit.
+/// Draws `number` into the top left corner of `picture`, white on black: about a sixteenth of its height, at most an
+/// eighth; not at all where it would be illegible or not fit.
 pub fn number(picture: &mut DisplayImage, number: i64) {
     let glyphs: Vec<usize> =
         number.to_string().bytes().map(|byte| usize::from(byte.wrapping_sub(b'0')).min(10)).collect();
@@ -44,7 +44,7 @@ fn dots(glyphs: &[usize]) -> [usize; 2] {
     [glyphs.len() * (GLYPH[0] + 1) - 1 + 2 * MARGIN, GLYPH[1] + 2 * MARGIN]
 }
 
-/// Pixels along a dot.
+/// Pixels for each dot.
 fn scale([columns, rows]: [usize; 2], [width, height]: [usize; 2]) -> Option<usize> {
     let most = (height / (8 * rows)).min(width / columns);
     let usual = (height + 8 * rows) / (16 * rows);

@@ -1,13 +1,13 @@
-//! Names of outputs: `frame.####.exr`, `frame.%04d.exr`, `film.mp4`.
+//! Output file names with frame numbers: `frame.####.exr`, `frame.%04d.exr`, `film.mp4`.
 
 use std::path::{Path, PathBuf};
 
-/// What kind of file a name asks for.
+/// Output formats, by extension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum OutputKind {
-    /// One PNG a frame, for looking at.
+    /// One PNG for each frame: display pixels.
     Png,
-    /// One OpenEXR a frame, scene-linear.
+    /// One OpenEXR for each frame: scene-linear.
     Exr,
     /// Animated PNG.
     Apng,
@@ -38,7 +38,7 @@ impl OutputKind {
         }
     }
 
-    /// The kind with this extension, in capitals or not.
+    /// The format with this extension, case-insensitive.
     pub fn from_extension(extension: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.extension().eq_ignore_ascii_case(extension))
     }
@@ -48,12 +48,12 @@ impl OutputKind {
         matches!(self, Self::Png | Self::Exr)
     }
 
-    /// Whether it takes scene-linear pixels.
+    /// Whether it holds scene-linear pixels.
     pub fn is_scene_linear(self) -> bool {
         self == Self::Exr
     }
 
-    /// Whether the program `ffmpeg` makes it.
+    /// Whether it is made by the program `ffmpeg`.
     pub fn needs_ffmpeg(self) -> bool {
         matches!(self, Self::Mp4 | Self::Mov | Self::Webm)
     }
@@ -86,7 +86,7 @@ pub enum NamingError {
         /// The one that will do.
         allowed: &'static str,
     },
-    /// More than one place for the frame number.
+    /// More than one placeholder for the frame number.
     #[error("{path}: more than one place for the frame number; use one run of # or one %04d", path = .path.display())]
     TwoPlaceholders {
         /// The name.
@@ -124,10 +124,10 @@ pub enum NamingError {
 
 const ALLOWED: &str = ".png, .exr, .apng, .gif, .mp4, .mov, .webm";
 
-/// Most digits that a placeholder may ask for; more than any file system's use.
+/// Largest width of a placeholder.
 const MAX_DIGITS: usize = 20;
 
-/// A file name with at most one place for the frame number.
+/// A file name with at most one placeholder for the frame number.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct FrameTemplate {
     before: String,
@@ -135,7 +135,7 @@ pub(crate) struct FrameTemplate {
     after: String,
 }
 
-/// What stands where in a name.
+/// Why a name with placeholders cannot be parsed.
 pub(crate) enum TemplateError {
     TwoPlaceholders,
     BadPercent,
@@ -143,7 +143,7 @@ pub(crate) enum TemplateError {
 }
 
 impl FrameTemplate {
-    /// Reads runs of `#` and, where `printf` is set, `%d`, `%04d` and `%%`.
+    /// Parses runs of `#` and, with `printf`, `%d`, `%04d` and `%%`.
     pub(crate) fn parse(name: &str, printf: bool) -> Result<Self, TemplateError> {
         let mut template = Self { before: String::new(), digits: None, after: String::new() };
         let mut rest = name;
@@ -189,7 +189,7 @@ impl FrameTemplate {
     }
 }
 
-/// `%d`, `%4d` or `%04d` at the start of `text`: how many digits, and how long the placeholder is.
+/// `%d`, `%4d` or `%04d` at the start of `text`: its width in digits, and the length of the placeholder.
 fn printf_digits(text: &str) -> Option<(usize, usize)> {
     let inner = text.strip_prefix('%')?;
     let width = &inner[..inner.find('d')?];
@@ -197,18 +197,18 @@ fn printf_digits(text: &str) -> Option<(usize, usize)> {
     (digits <= MAX_DIGITS).then_some((digits, width.len() + 2))
 }
 
-/// What the pictures of a scene called `stem` are called unless another name is given.
+/// Default name of the pictures of a scene with the file stem `stem`.
 pub fn pictures(stem: &str) -> String {
     format!("{stem}.####.png")
 }
 
-/// What the picture of frame `number` of a scene called `stem` is called unless another name is given.
+/// Default name of the picture of frame `number` of a scene with the file stem `stem`.
 pub fn picture(stem: &str, number: i64) -> String {
     let (before, after) = (format!("{stem}."), ".png".to_owned());
     FrameTemplate { before, digits: Some(4), after }.name(number)
 }
 
-/// A path whose last part may hold the frame number.
+/// A path whose file name may contain the frame number.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NumberedPath {
     folder: PathBuf,
@@ -245,7 +245,7 @@ impl NumberedPath {
         Ok(Self { folder: path.parent().map(Path::to_path_buf).unwrap_or_default(), template })
     }
 
-    /// Makes room for a number before the extension where there is none.
+    /// Inserts a placeholder before the extension if there is none.
     fn number(&mut self) {
         let template = &mut self.template;
         if template.digits.is_none() {
@@ -256,7 +256,7 @@ impl NumberedPath {
         }
     }
 
-    /// Whether the frame number stands in the name.
+    /// Whether the name contains the frame number.
     pub fn is_numbered(&self) -> bool {
         self.template.digits.is_some()
     }
@@ -273,7 +273,7 @@ impl NumberedPath {
     }
 }
 
-/// Where the frames of a job go.
+/// The output path of a job.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutputPattern {
     numbered: NumberedPath,
@@ -299,12 +299,12 @@ impl OutputPattern {
         Ok(Self { numbered, kind })
     }
 
-    /// What kind of file it is.
+    /// The format.
     pub fn kind(&self) -> OutputKind {
         self.kind
     }
 
-    /// Whether the frame number stands in the name.
+    /// Whether the name contains the frame number.
     pub fn is_numbered(&self) -> bool {
         self.numbered.is_numbered()
     }
@@ -314,7 +314,7 @@ impl OutputPattern {
         self.numbered.of_all()
     }
 
-    /// The file for frame `number`; for a film the same file whatever the number.
+    /// The file of frame `number`; a film has one file for all.
     pub fn path(&self, number: i64) -> PathBuf {
         self.numbered.path(number)
     }

@@ -1,4 +1,4 @@
-//! Measured numbers to PNG bytes: linear, without a view transform, and with their scale.
+//! Encoding of measured values as PNG: linear, without a view transform, and with their scale.
 
 use std::path::Path;
 
