@@ -1,8 +1,11 @@
 //! Meshes as glTF, text and binary: any bytes are refused, or are triangles within the bounds that a mesh promises.
 #![no_main]
 
-use bansho_base::{host::assets::AssetProblem, geometry::mesh::{MOST_TRIANGLES, Mesh}};
-use bansho_media::{meshes::decode_mesh, plates::limits::MemoryLimit};
+use bansho_base::{
+    geometry::mesh::{MOST_TRIANGLES, Mesh},
+    host::assets::AssetProblem,
+};
+use bansho_media::assets::{gltf::decode_mesh, limits::MemoryLimit};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     // A file beside it is itself, or is missing.

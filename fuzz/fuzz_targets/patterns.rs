@@ -6,8 +6,8 @@
 use std::path::Path;
 
 use bansho_media::{
-    naming::{NumberedPath, OutputPattern},
-    plates::FileAssets,
+    assets::FileAssets,
+    output::naming::{NumberedPath, OutputPattern},
 };
 
 libfuzzer_sys::fuzz_target!(|text: &str| {

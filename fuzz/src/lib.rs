@@ -15,7 +15,7 @@ use bansho_base::{
     image::Frame,
 };
 use bansho::KINDS;
-use bansho_media::plates::{decode_picture, limits};
+use bansho_media::assets::{decode_picture, limits};
 use bansho_render::{
     CompiledScene, Plan, PlanOptions, RenderError, Scene, SceneOptions, Shot,
     display::{BitDepth, display},

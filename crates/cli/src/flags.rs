@@ -9,7 +9,7 @@ use bansho::{
         parameters::{Problem, ProblemKind},
     },
     job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksFault},
-    media::{MediaError, input::InputError, plates::limits::TEXT_BYTES},
+    media::{MediaError, assets::limits::TEXT_BYTES, input::InputError},
 };
 
 /// An error as the user of the program reads it.

@@ -14,7 +14,7 @@ use std::{
     time::Duration,
 };
 
-use bansho::media::unfinished;
+use bansho::media::output::temporary_files;
 use signal_hook::{
     consts::{SIGINT, SIGTERM},
     flag, low_level,
@@ -64,7 +64,7 @@ fn watch() {
     let (done, wait) = mpsc::channel();
     // Both may block: on a pipe that nobody reads, on a disk that does not answer.
     let last_words = move || {
-        unfinished::abandon_all();
+        temporary_files::abandon_all();
         tell.iter().for_each(|tell| tell());
         // Nobody waits any longer where this fails.
         let _ = done.send(());

@@ -11,7 +11,7 @@ use std::{collections::HashMap, hint::black_box};
 use bansho_base::{
     host::assets::MemoryAssets,
     math::random::{Key, Purpose},
-    phenomenon::{Phenomenon, surroundings::Surroundings},
+    phenomenon::{Phenomenon, Stepped, surroundings::Surroundings},
     world::wind::{Wind, WindParameters},
 };
 

@@ -8,9 +8,12 @@ use bansho_base::{
 };
 use bansho_media::{
     exr,
-    naming::OutputPattern,
-    png, resume,
-    sequence::{Picture, Sink, SinkOptions, Slot},
+    output::{
+        naming::OutputPattern,
+        resume,
+        sink::{FrameSlot, Picture, Sink, SinkOptions},
+    },
+    png,
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use rayon::prelude::*;
@@ -109,7 +112,7 @@ fn gif_film(picture: &DisplayImage, folder: &Path) {
     let pattern = OutputPattern::parse(&folder.join("a.gif"), FILM_FRAMES).expect("a name");
     let sink = Sink::open(pattern, SinkOptions::new([WIDTH, HEIGHT], [24, 1], FILM_FRAMES)).expect("a sink");
     (0..FILM_FRAMES).into_par_iter().for_each(|index| {
-        sink.write(Slot { index, number: 0 }, Picture::Display(picture, &[0; 32])).expect("a frame");
+        sink.write(FrameSlot { index, number: 0 }, Picture::Display(picture, &[0; 32])).expect("a frame");
     });
     sink.finish().expect("a film");
 }

@@ -4,7 +4,7 @@ use std::{io, path::PathBuf};
 
 use bansho_base::host::plural::counted;
 
-use crate::naming::NamingError;
+use crate::output::naming::NamingError;
 
 /// Why a picture or a film could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -110,7 +110,7 @@ pub enum MediaError {
         /// The file that was to be written.
         path: PathBuf,
         /// What it takes.
-        wanted: crate::sequence::Wants,
+        wanted: crate::output::sink::PictureFormat,
     },
     /// A frame of a film came too early, twice, or beyond the end.
     #[error(

@@ -1,6 +1,7 @@
-//! Reading files that others made: ordinary files only, and none with more bytes than is allowed.
+//! Bounded reading of files that others made: regular files only, up to a limit of bytes.
 //!
-//! What bears a name is looked at before it is opened, since opening a pipe waits for somebody to write, and a device may have no end.
+//! The file type is checked before opening, because opening a pipe blocks until there is a writer, and a device may be
+//! endless.
 
 use std::{
     fs::{self, File, Metadata},
@@ -10,24 +11,24 @@ use std::{
 
 use bansho_base::host::{assets::AssetProblem, memory};
 
-/// Why the bytes of a file cannot be had.
+/// Why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
-    /// What bears the name is not an ordinary file.
+    /// Not a regular file.
     #[error("is {found}; allowed: an ordinary file")]
     NotAFile {
-        /// What it is, such as `a pipe`.
+        /// Its type, such as `a pipe`.
         found: &'static str,
     },
-    /// More bytes than are read.
+    /// More bytes than the limit.
     #[error("has {}; allowed: up to {}", size(.bytes), memory::shown(*.limit))]
     Size {
-        /// How many it has; `None` for a stream, which is not read to its end.
+        /// Its length; `None` for a stream, which is not read to its end.
         bytes: Option<u64>,
-        /// Most that are read.
+        /// The limit, bytes.
         limit: u64,
     },
-    /// What the system said.
+    /// An error of the system.
     #[error(transparent)]
     Io(#[from] io::Error),
 }
@@ -54,7 +55,7 @@ impl From<InputError> for AssetProblem {
 pub fn open(path: &Path, limit: u64) -> Result<(File, u64), InputError> {
     check(&fs::metadata(path)?, limit)?;
     let file = File::open(path)?;
-    // Another may bear the name by now.
+    // Checked again after opening: the name may refer to another file by now.
     let bytes = check(&file.metadata()?, limit)?;
     Ok((file, bytes))
 }
@@ -86,7 +87,7 @@ pub fn read_stream(stream: impl Read, limit: u64) -> Result<Vec<u8>, InputError>
     if bytes.len() as u64 > limit { Err(InputError::Size { bytes: None, limit }) } else { Ok(bytes) }
 }
 
-/// The number of bytes that a file says it has.
+/// The length that the file system reports.
 fn check(found: &Metadata, limit: u64) -> Result<u64, InputError> {
     if !found.is_file() {
         return Err(InputError::NotAFile { found: kind(found) });
@@ -97,7 +98,7 @@ fn check(found: &Metadata, limit: u64) -> Result<u64, InputError> {
     }
 }
 
-/// What something other than a file is called.
+/// Name of the type of a file that is not regular.
 fn kind(found: &Metadata) -> &'static str {
     if found.is_dir() { "a folder" } else { special_kind(found) }
 }

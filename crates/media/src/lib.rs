@@ -1,39 +1,25 @@
-//! Bansho's pictures in and out.
+//! Reading and writing of pictures, films and other assets.
 //!
-//! - Out: [`naming`] says where frames go and as what, [`sequence::Sink`] takes them from any thread, [`atomic`] sees to it
-//!   that a file is whole or not there, [`overwriting`] that it takes no other's place, [`resume`] finds those that need not be made
-//!   again. [`png`], [`exr`] and [`video`] are the formats, [`mark`] is what they all bear, [`flatten`] and [`flipbook`] prepare pictures for them.
-//! - In: [`plates::FileAssets`] gives a scene its plates, meshes and drawings, with limits that no hostile file can pass;
-//!   [`input`] reads the bytes of ordinary files alone.
+//! - [`output`]: file names, the sink that takes frames from any thread, atomic writing, protection of other files,
+//!   fingerprints and resuming, and the preparation of display pictures (flattening, labels, sprite sheets).
+//! - [`film`]: animations that encode in this process (APNG, GIF), and films by `ffmpeg`.
+//! - [`png`], [`exr`], [`ply`], [`zip`]: formats.
+//! - [`assets`]: a scene's plates, meshes and drawings from files, with limits that no hostile file can exceed.
+//! - [`input`]: bytes of regular files only.
 //!
-//! PNG, EXR, APNG and GIF files are the same bytes for the same frames on every machine and with any number of threads:
-//! nothing here reads the clock, the environment or the host. Work runs in the caller's rayon pool.
+//! PNG, EXR, APNG and GIF output is deterministic: the same frames give the same bytes on every machine and with any
+//! number of threads. Nothing here reads the clock, the environment or the host. Work runs in the caller's rayon pool.
 
-mod animation;
-pub mod atomic;
-pub mod drawings;
+pub mod assets;
 mod error;
 pub mod exr;
-pub mod flatten;
-pub mod flipbook;
-pub mod identity;
+pub mod film;
 pub mod input;
-pub mod label;
-pub mod mark;
-pub mod meshes;
-pub mod naming;
-mod ordered;
-pub mod overwriting;
-pub mod plates;
+pub mod output;
 pub mod ply;
 pub mod png;
-pub mod resume;
-pub mod sequence;
-mod stamp;
 #[cfg(test)]
 mod testing;
-pub mod unfinished;
-pub mod video;
 pub mod zip;
 
 pub use error::{MediaError, SizeRule};

@@ -1,18 +1,19 @@
-//! Files in one, as a ZIP that stores them as they are: pictures are compressed already (APPNOTE 6.3, sections 4.3.7 to 4.3.16).
+//! A ZIP writer for stored files, without compression: pictures are compressed already (APPNOTE 6.3, sections 4.3.7 to
+//! 4.3.16).
 //!
-//! Our own, since it is short and a page writes it piece by piece, without going back. The crate `zip` (9.4) then writes each checksum after
-//! its file, which readers that go piece by piece too cannot take of stored files, and brings random numbers and the system's calls.
+//! Not a crate, because this is short and streams without seeking. The crate `zip` (9.4), when streaming, writes each
+//! checksum after its file, which streaming readers cannot take for stored files, and it depends on random numbers and
+//! system calls.
 
 use std::io::{self, Write};
 
-use crate::png::checksum::crc32;
-
-/// What follows the signature of a file's heads: version 1.0, UTF-8 names, stored, 1 January 1980. The same files make the same bytes.
+/// Common part of local headers and central directory entries: version 1.0, UTF-8 names, stored, 1 January 1980. The
+/// output is deterministic.
 const SHARED: [u8; 10] = [10, 0, 0, 8, 0, 0, 0, 0, 0x21, 0];
 
-/// A ZIP under way.
+/// A ZIP in progress.
 #[derive(Debug)]
-pub struct Zip<W> {
+pub struct ZipWriter<W> {
     out: W,
     /// Bytes written so far.
     length: u64,
@@ -20,8 +21,8 @@ pub struct Zip<W> {
     count: u16,
 }
 
-impl<W: Write> Zip<W> {
-    /// An empty one, written to `out`.
+impl<W: Write> ZipWriter<W> {
+    /// An empty ZIP, written to `out`.
     pub fn new(out: W) -> Self {
         Self { out, length: 0, directory: Vec::new(), count: 0 }
     }
@@ -36,7 +37,7 @@ impl<W: Write> Zip<W> {
         let head = head(name, bytes)?;
         let count = self.count.checked_add(1).ok_or_else(too_large)?;
         self.put(&[b"PK\x03\x04", head.as_slice(), name.as_bytes(), bytes])?;
-        // Made by version 1.0 as well; no comment, first disk, no attributes.
+        // Made by version 1.0 too; no comment, first disk, no attributes.
         let entry: [&[u8]; 6] = [b"PK\x01\x02", &[10, 0], &head, &[0; 10], &start.to_le_bytes(), name.as_bytes()];
         self.directory.extend(entry.concat());
         self.count = count;
@@ -66,11 +67,11 @@ impl<W: Write> Zip<W> {
     }
 }
 
-/// What the head of a file before its bytes and that in the directory share.
+/// The common part of a file's local header and its directory entry.
 fn head(name: &str, bytes: &[u8]) -> io::Result<Vec<u8>> {
     let size = small(bytes.len() as u64)?.to_le_bytes();
     let name = u16::try_from(name.len()).map_err(|_| too_large())?.to_le_bytes();
-    let parts: [&[u8]; 6] = [&SHARED, &crc32(&[bytes]).to_le_bytes(), &size, &size, &name, &[0; 2]];
+    let parts: [&[u8]; 6] = [&SHARED, &crc32fast::hash(bytes).to_le_bytes(), &size, &size, &name, &[0; 2]];
     Ok(parts.concat())
 }
 
@@ -88,7 +89,7 @@ mod tests {
 
     #[test]
     fn a_file_is_stored_with_its_heads() {
-        let mut zip = Zip::new(Vec::new());
+        let mut zip = ZipWriter::new(Vec::new());
         zip.add("a.txt", b"123456789").unwrap();
         let bytes = zip.finish().unwrap();
         // The checksum of these nine bytes is the one that every description of CRC-32 gives.
@@ -104,7 +105,7 @@ mod tests {
 
     #[test]
     fn more_files_than_it_can_count_are_refused() {
-        let mut zip = Zip::new(io::sink());
+        let mut zip = ZipWriter::new(io::sink());
         (0..u16::MAX).for_each(|number| zip.add(&number.to_string(), b"").unwrap());
         assert_eq!(zip.add("one more", b"").unwrap_err().kind(), io::ErrorKind::FileTooLarge);
         zip.finish().unwrap();
@@ -115,7 +116,7 @@ mod tests {
     fn other_programs_read_it() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("frames.zip");
-        let mut zip = Zip::new(std::fs::File::create(&path).unwrap());
+        let mut zip = ZipWriter::new(std::fs::File::create(&path).unwrap());
         zip.add("feuer/0001.png", b"one").unwrap();
         zip.add("fe\u{fc}er/0002.png", &[7; 70_000]).unwrap();
         zip.finish().unwrap();

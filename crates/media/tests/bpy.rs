@@ -6,7 +6,7 @@ use bansho_base::{
     color,
     image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision, Rect},
 };
-use bansho_media::{atomic, exr};
+use bansho_media::{exr, output::atomic};
 use half::f16;
 
 const SIZE: [usize; 2] = [37, 41];
@@ -127,7 +127,7 @@ fn bpy_reads_every_pass_with_its_type_and_its_colors() {
         let planes = ["R", "G", "B", "A"].map(|component| plane(&format!("{name}.{component}")));
         sums((0..planes[0].len()).map(|index| in_blender(planes.map(|plane| plane[index]))))
     };
-    // The compositor's picture of a number is grey and opaque.
+    // The compositor's picture of a number is gray and opaque.
     let number = |values: &[f32]| sums(values.iter().map(|&value| [value, value, value, 1.0]));
     let [x, y] = ["X", "Y"].map(|axis| plane(&format!("{LAYER}.motion.{axis}")));
     let depth = frame.depth.as_deref().unwrap();

@@ -2,9 +2,11 @@
 
 use std::{collections::BTreeMap, path::Path, process::Command};
 
-use bansho_base::camera::Lens;
-use bansho_base::image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision, Rect};
-use bansho_media::{atomic, exr};
+use bansho_base::{
+    camera::Lens,
+    image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision, Rect},
+};
+use bansho_media::{exr, output::atomic};
 use half::f16;
 
 fn frame() -> Frame {

@@ -8,13 +8,13 @@ use bansho_base::{
     image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
 };
 use bansho_media::{
+    assets::{self, FileAssets, InputLimits, limits::MemoryLimit},
     exr,
-    plates::{self, FileAssets, InputLimits, limits::MemoryLimit},
     png::{self, PngEffort},
 };
 
 fn decode_picture(bytes: &[u8], extension: &str) -> Result<Picture, AssetProblem> {
-    plates::decode_picture(bytes, extension, MemoryLimit::default())
+    assets::decode_picture(bytes, extension, MemoryLimit::default())
 }
 
 fn display(width: usize, height: usize) -> DisplayImage {
@@ -59,7 +59,7 @@ fn exr_bytes(frame: &Frame) -> Vec<u8> {
     exr::encode(frame, Path::new("a.exr")).unwrap()
 }
 
-/// A PNG of any colour type, by the plain encoder.
+/// A PNG of any color type, by the plain encoder.
 fn raw_png(width: u32, height: u32, kind: ::png::ColorType, depth: ::png::BitDepth, data: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut bytes, width, height);
@@ -98,7 +98,7 @@ fn what_bansho_writes_it_reads() {
     let picture = decode_picture(&exr_bytes(&original), "exr").unwrap();
     assert_eq!(picture.encoding, Encoding::LinearAcescg);
     assert_eq!(picture.depth, original.depth);
-    // Straight colour from premultiplied.
+    // Straight color from premultiplied.
     assert_eq!(picture.colour.at(4, 0), [4.0, 0.5, -1.0, 0.5]);
 }
 
@@ -161,7 +161,7 @@ fn tiled_float_and_depth_only_exr_files_are_read() {
     assert!(matches!(useless, Err(AssetProblem::NoChannel(_))));
 }
 
-/// A grey JPEG of 8 x 8 pixels, all 128: the smallest baseline file there can be.
+/// A gray JPEG of 8 x 8 pixels, all 128: the smallest baseline file there can be.
 fn grey_jpeg() -> Vec<u8> {
     let mut file = vec![0xFF, 0xD8, 0xFF, 0xDB, 0, 67, 0];
     file.extend([1; 64]);
@@ -362,7 +362,7 @@ fn plates_of_every_kind_say_with_which_exposure_they_were_taken() {
 
 /// The least memory with which `bytes` are read, and what is said of one byte less.
 fn least_memory(bytes: &[u8], extension: &str) -> u64 {
-    let read = |total| plates::decode_picture(bytes, extension, MemoryLimit { total, used: 0 });
+    let read = |total| assets::decode_picture(bytes, extension, MemoryLimit { total, used: 0 });
     let AssetProblem::Memory { bytes: least, limit: 0, others: 0 } = read(0).unwrap_err() else {
         panic!("{extension}")
     };

@@ -12,13 +12,15 @@ use bansho_base::{
 };
 use bansho_media::{
     MediaError,
-    naming::OutputPattern,
-    resume::existing_fingerprint,
-    sequence::{Picture, Sink, SinkOptions, Slot, Wants},
-    video::{VideoOptions, WebmCodec},
+    film::ffmpeg::{VideoOptions, WebmCodec},
+    output::{
+        naming::OutputPattern,
+        resume::existing_fingerprint,
+        sink::{FrameSlot, Picture, PictureFormat, Sink, SinkOptions},
+    },
 };
 
-/// Smooth colours with a soft alpha that move a little each frame.
+/// Smooth colors with a soft alpha that move a little each frame.
 fn picture(width: usize, height: usize, frame: usize) -> DisplayImage {
     let pixel = |i: usize| {
         let (x, y) = (i % width, i / width);
@@ -36,7 +38,7 @@ fn open(folder: &Path, name: &str, frames: usize, options: impl FnOnce(&mut Sink
 }
 
 fn write(sink: &Sink, index: usize) -> Result<(), MediaError> {
-    let slot = Slot { index, number: index as i64 + 1001 };
+    let slot = FrameSlot { index, number: index as i64 + 1001 };
     sink.write(slot, Picture::Display(&picture(65, 67, index), &[index as u8; 32]))
 }
 
@@ -101,10 +103,10 @@ fn films_take_frames_out_of_order_and_are_the_same_bytes() {
 fn pictures_of_the_wrong_kind_or_size_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let sink = open(folder.path(), "a.####.exr", 2, |_| {}).unwrap();
-    assert_eq!(sink.wants(), Wants::Frame);
-    assert!(matches!(write(&sink, 0), Err(MediaError::WrongPicture { wanted: Wants::Frame, .. })));
+    assert_eq!(sink.picture_format(), PictureFormat::Frame);
+    assert!(matches!(write(&sink, 0), Err(MediaError::WrongPicture { wanted: PictureFormat::Frame, .. })));
     let sink = open(folder.path(), "a.gif", 2, |options| options.size = [64, 67]).unwrap();
-    assert_eq!(sink.wants(), Wants::OpaqueDisplay);
+    assert_eq!(sink.picture_format(), PictureFormat::OpaqueDisplay);
     assert!(matches!(write(&sink, 0), Err(MediaError::Size { width: 65, .. })));
     assert!(matches!(open(folder.path(), "a.gif", 2, |o| o.size = [0, 1]), Err(MediaError::Size { .. })));
     assert!(matches!(open(folder.path(), "a.apng", 2, |o| o.fps = [0, 1]), Err(MediaError::FrameRate { .. })));
@@ -195,12 +197,12 @@ fn films_carry_their_frames_colours_and_tags() {
     for (name, webm, codec, width, decoder) in cases {
         let sink = open(folder.path(), name, 5, |o| o.video = VideoOptions { webm, ..o.video.clone() }).unwrap();
         [1, 0, 2, 4, 3].into_iter().for_each(|index| write(&sink, index).unwrap());
-        let has_alpha = sink.wants() == Wants::Display;
+        let has_alpha = sink.picture_format() == PictureFormat::Display;
         sink.finish().unwrap();
         let path = folder.path().join(name);
         let said = probe(&path);
-        let colours = ["color_space=bt709", "color_transfer=iec61966-2-1", "color_primaries=bt709", "color_range=tv"];
-        for part in colours.iter().chain(&["nb_read_frames=5", "24000/1001", &format!("codec_name={codec}")]) {
+        let colors = ["color_space=bt709", "color_transfer=iec61966-2-1", "color_primaries=bt709", "color_range=tv"];
+        for part in colors.iter().chain(&["nb_read_frames=5", "24000/1001", &format!("codec_name={codec}")]) {
             assert!(said.contains(part), "{name}: no {part} in\n{said}");
         }
         check_colours(name, &first_frame(&path, decoder), width, has_alpha);
@@ -210,7 +212,7 @@ fn films_carry_their_frames_colours_and_tags() {
 
 fn check_colours(name: &str, found: &[[u8; 4]], width: usize, has_alpha: bool) {
     let original = picture(65, 67, 0);
-    let expected = if has_alpha { original } else { bansho_media::flatten::over_black(&original) };
+    let expected = if has_alpha { original } else { bansho_media::output::flatten::over_black(&original) };
     let DisplayPixels::Eight(expected) = expected.pixels else { unreachable!() };
     let mut worst = 0;
     for (i, wanted) in expected.iter().enumerate() {
@@ -259,7 +261,7 @@ fn a_full_disk_is_said_and_leaves_whole_frames_only() {
     let image = DisplayImage { width: 65, height: 67, opaque: false, alpha: AlphaConvention::Linear, pixels };
     for name in ["f.png", "f.apng", "f.gif"] {
         let sink = open(disk.0.path(), name, 40, |_| {}).unwrap();
-        let write = |index| sink.write(Slot { index, number: index as i64 }, Picture::Display(&image, &[1; 32]));
+        let write = |index| sink.write(FrameSlot { index, number: index as i64 }, Picture::Display(&image, &[1; 32]));
         let failed = (0..40).find_map(|index| write(index).err()).or_else(|| sink.finish().err());
         assert!(matches!(failed, Some(MediaError::DiskFull { .. })), "{name}: {failed:?}");
         let left = names(disk.0.path());

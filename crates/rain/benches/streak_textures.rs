@@ -7,8 +7,8 @@ use bansho_base::image::Image;
 
 use bansho_rain::{
     billboards::texture::{FallingDrop, StreakCube},
-    drops::size_distribution::{DropSizes, SizeBin},
-    lighting::drop_phase_function::DropLens,
+    drops::size_distribution::{DropSizeDistribution, SizeBin},
+    lighting::drop_phase_function::DropPhaseFunction,
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 
@@ -18,9 +18,9 @@ const DIAMETERS: [f64; 6] = [1.0, 1.2, 1.4, 1.6, 1.8, 2.0];
 const SAMPLES: i64 = 16;
 
 /// Every rain and bin of the paper.
-fn every(mut each: impl FnMut(&DropSizes, &SizeBin)) {
+fn every(mut each: impl FnMut(&DropSizeDistribution, &SizeBin)) {
     for rate in RATES {
-        let sizes = DropSizes::marshall_palmer(rate);
+        let sizes = DropSizeDistribution::marshall_palmer(rate);
         SizeBin::around(&DIAMETERS).iter().for_each(|bin| each(&sizes, bin));
     }
 }
@@ -68,7 +68,7 @@ fn textures(criterion: &mut Criterion) {
 }
 
 fn lens(criterion: &mut Criterion) {
-    criterion.bench_function("drop lens", |bencher| bencher.iter(DropLens::new));
+    criterion.bench_function("drop lens", |bencher| bencher.iter(DropPhaseFunction::new));
 }
 
 criterion_group!(benches, textures, lens);

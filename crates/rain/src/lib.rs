@@ -1,23 +1,61 @@
-//! Rain: calibrated streaks from the physics of its drops.
+//! Rain: streaks whose opacity, number and light follow from the physics of drops.
 //!
-//! Y. Yoshida, Y. Dobashi and T. Yamamoto, "A fast rendering method of raindrop streaks for rainy scenes". How many drops of which
-//! size a rain rate has ([`drops::size_distribution`]), how fast they fall ([`drops::terminal_velocity`]), what a streak hides while the shutter is open
-//! ([`streaks::coverage`]), all drops of a size in one picture ([`billboards::texture`]), what all drops together take from a distant light
-//! ([`lighting::extinction`]), and how a drop sends light on ([`lighting::drop_phase_function`]).
+//! Near drops are streaks, drawn one by one or on billboards with streak textures; all other drops are a participating medium with extinction and
+//! single scattering (airlight, halos around lamps). Everything is a closed form of time: there is no simulation state.
+//!
+//! # References
+//! - Y. Yoshida, Y. Dobashi and T. Yamamoto, "A fast rendering method of raindrop streaks for rainy scenes" (in Japanese): "the paper".
+//! - J. S. Marshall and W. M. Palmer, "The distribution of raindrops with size", J. Meteor. 5 (1948).
+//! - R. Gunn and G. D. Kinzer, "The terminal velocity of fall for water droplets in stagnant air", J. Meteor. 6 (1949); density correction of
+//!   G. B. Foote and P. S. du Toit, J. Appl. Meteor. 8 (1969).
+//! - S. Starik and M. Werman, "Simulation of rain in videos" (2002); K. Garg and S. K. Nayar, "Vision and rain" (2007): opacity of streaks.
+//! - C. Kulla and M. Fajardo, "Importance sampling techniques for path tracing in participating media" (2012): equiangular sampling.
+//! - H. Koschmieder (1924): visibility, and the radiance of infinitely deep rain.
+//!
+//! # Equations
+//!
+//! | equation | function |
+//! | --- | --- |
+//! | (1) drop size distribution `n = 8000 exp(-4.1 R^-0.21 D)` | [`DropSizeDistribution::marshall_palmer`](drops::size_distribution::DropSizeDistribution::marshall_palmer) |
+//! | number of drops of a bin, integral of `n dD` | [`SizeBin::count`](drops::size_distribution::SizeBin::count), [`stratified_count`](drops::size_distribution::stratified_count) |
+//! | (2) terminal velocity `v = sqrt(4 g D (rho_p - rho_f) / (3 rho_f C))` | [`fixed_point_velocity`](drops::terminal_velocity::fixed_point_velocity) |
+//! | (3) drag coefficient C of a sphere | [`drag_coefficient`](drops::terminal_velocity::drag_coefficient) |
+//! | (4) Reynolds number `Re = v rho_f D / mu` | [`reynolds_number`](drops::terminal_velocity::reynolds_number) |
+//! | measured terminal velocity | [`measured_velocity`](drops::terminal_velocity::measured_velocity) |
+//! | streak opacity (the paper's `2D/v`) `alpha = 2 sqrt(r^2 - b^2) / (v T)` | [`Streak::profile`](streaks::coverage::Streak::profile), [`Streak::opacity`](streaks::coverage::Streak::opacity) |
+//! | blocked area `pi D^2 / 4` | [`Streak::blocked_area`](streaks::coverage::Streak::blocked_area) |
+//! | streak texture T(R, D) | [`StreakCube::draw`](billboards::texture::StreakCube::draw) |
+//! | extinction `beta = Q (pi/4) integral of n D^2 dD` | [`extinction`](lighting::extinction::extinction()) |
+//! | meteorological visibility `3.912 / beta` | [`visibility`](lighting::extinction::visibility) |
+//! | phase function p of a drop | [`DropPhaseFunction::phase`](lighting::drop_phase_function::DropPhaseFunction::phase) |
+//! | sky light through a drop, integral of `p L` | [`DropPhaseFunction::mean_radiance`](lighting::drop_phase_function::DropPhaseFunction::mean_radiance) |
+//! | radiance of a drop under a lamp, `E p / (4 pi)` | `DropLighting::radiance` |
+//! | single scattering `integral of beta E p / (4 pi) e^-tau ds` | `InScatterIntegrator::segment` |
+//! | gust displacement `integral of g(s) (1 - s / memory) ds` | `gust::displacement` |
+//!
+//! # Data flow
+//! 1. [`Rain::new`] divides [`RainParameters`]' diameters into bins with terminal velocities.
+//! 2. For a frame, `shutter_cameras` holds the cameras when the shutter opens, at its middle and when it closes, and `drops::exposure` the state of
+//!    the rain: a `lattice` of cells for each diameter, displaced by the wind, with `gust`s on top.
+//! 3. `lighting` prepares lamps, the sky through drops at the corners of a tile grid, and single scattering along lines of sight.
+//! 4. `streaks::project` visits the visible cells, nearest first, and turns batches of sixteen drops (`streaks::project_lanes`) into lit streaks. On
+//!    [`billboards`], drops come from the positions of a streak texture; on the ground `streaks::splashes` adds droplets.
+//! 5. `streaks::bin` sorts packed streaks into tiles of 128 x 8 pixels, in chunks.
+//! 6. `render::prepared` draws a strip tile by tile: `streaks::rasterize` computes the exact coverage of each pixel and composites front to back;
+//!    then `lighting::single_scattering` adds the medium under it.
 
 pub mod billboards;
 pub mod drops;
+pub(crate) mod lanes;
 pub mod lighting;
 mod parameters;
 mod phenomenon;
 pub(crate) mod render;
+pub(crate) mod shutter_cameras;
 pub mod streaks;
 
 pub use parameters::{Method, RainParameters, SplashParameters};
 pub use phenomenon::Rain;
-
-#[cfg(test)]
-mod reference;
 
 #[cfg(test)]
 mod tests;

@@ -24,18 +24,18 @@ use bansho_base::{
 use super::parameters::RainParameters;
 use crate::{
     drops::{
-        exposure::{ClassNow, ground},
-        lattice::{Falling, Lattice},
-        size_distribution::{DropSizes, SizeBin},
-        terminal_velocity::{Air, Fall},
+        exposure::{DropClassState, ground_height},
+        lattice::{Lattice, LatticeMotion},
+        size_distribution::{DropSizeDistribution, SizeBin},
+        terminal_velocity::{Air, TerminalVelocity},
     },
     lighting::{
-        drop_lighting::Scattering,
-        drop_phase_function::DropLens,
-        extinction::{Losses, extinction},
-        sky::SeenSkies,
+        drop_lighting::ScatteringTable,
+        drop_phase_function::DropPhaseFunction,
+        extinction::{ExtinctionEfficiency, extinction},
+        sky::SkyLightingCache,
     },
-    render::{aovs::AOVS, prepared::PreparedRain},
+    render::prepared::{AOVS, PreparedRain},
 };
 
 /// How far it rains over ground that leads to the horizon, m.
@@ -48,7 +48,7 @@ pub struct Rain {
     pub(super) parameters: RainParameters,
     pub(super) key: Key,
     pub(super) optics: &'static Optics,
-    pub(super) skies: SeenSkies,
+    pub(super) skies: SkyLightingCache,
     classes: Vec<Class>,
     pub(super) loop_s: Option<f64>,
 }
@@ -56,13 +56,13 @@ pub struct Rain {
 /// How a drop sends light on: the same for all rain.
 #[derive(Debug)]
 pub(super) struct Optics {
-    pub(super) lens: DropLens,
-    pub(super) scattering: Scattering,
+    pub(super) lens: DropPhaseFunction,
+    pub(super) scattering: ScatteringTable,
 }
 
 static OPTICS: LazyLock<Optics> = LazyLock::new(|| {
-    let lens = DropLens::new();
-    Optics { scattering: Scattering::new(&lens), lens }
+    let lens = DropPhaseFunction::new();
+    Optics { scattering: ScatteringTable::new(&lens), lens }
 });
 
 /// The drops that one diameter stands for.
@@ -71,7 +71,7 @@ struct Class {
     bin: SizeBin,
     /// Terminal velocity, m/s.
     speed: f64,
-    /// Most drops a cubic metre in the shot.
+    /// Most drops a cubic meter in the shot.
     most: f64,
 }
 
@@ -89,16 +89,16 @@ impl Rain {
             return Err(ParameterFault { key: "diameters_mm", kind });
         }
         constructions::count("rain");
-        let fall = Fall { law: parameters.velocity, air: Air::default() };
+        let velocity = TerminalVelocity { law: parameters.velocity, air: Air::default() };
         let [_, heaviest] = parameters.rate_mm_per_h.bounds();
-        let sizes = DropSizes::marshall_palmer(heaviest);
-        let class = |bin: SizeBin| Class { bin, speed: fall.speed(bin.diameter_mm), most: bin.count(&sizes) };
+        let sizes = DropSizeDistribution::marshall_palmer(heaviest);
+        let class = |bin: SizeBin| Class { bin, speed: velocity.speed(bin.diameter_mm), most: bin.count(&sizes) };
         let classes = SizeBin::around(&parameters.diameters_mm).into_iter().map(class).collect();
         Ok(Self {
             name: name.to_owned(),
             key: Key::new(seed, name),
             optics: &OPTICS,
-            skies: SeenSkies::default(),
+            skies: SkyLightingCache::default(),
             classes,
             loop_s,
             parameters,
@@ -116,16 +116,26 @@ impl Rain {
     }
 
     /// The drops of each diameter at time `t` between two `heights` (m) over the `ground`.
-    pub(super) fn classes(&self, t: f64, wind: &Wind, ground: f64, heights: RangeInclusive<f64>) -> Vec<ClassNow> {
-        let sizes = DropSizes::marshall_palmer(self.rate(t));
+    pub(super) fn classes(
+        &self,
+        t: f64,
+        wind: &Wind,
+        ground: f64,
+        heights: RangeInclusive<f64>,
+    ) -> Vec<DropClassState> {
+        let sizes = DropSizeDistribution::marshall_palmer(self.rate(t));
         let (response, loop_s) = (self.parameters.wind_response, self.loop_s);
-        let now = |(index, class): (usize, &Class)| ClassNow {
+        let now = |(index, class): (usize, &Class)| DropClassState {
             index,
             diameter_mm: class.bin.diameter_mm,
             speed: class.speed,
-            most: class.most,
-            share: if class.most > 0.0 { class.bin.count(&sizes) / class.most } else { 0.0 },
-            lattice: Lattice::new(&Falling { speed: class.speed, wind, response, ground, loop_s }, heights.clone(), t),
+            max_density: class.most,
+            fraction: if class.most > 0.0 { class.bin.count(&sizes) / class.most } else { 0.0 },
+            lattice: Lattice::new(
+                &LatticeMotion { speed: class.speed, wind, response, ground, loop_s },
+                heights.clone(),
+                t,
+            ),
         };
         self.classes.iter().enumerate().map(now).collect()
     }
@@ -142,17 +152,17 @@ impl Rain {
 
     /// How far from the camera there is any rain, m: over ground that leads to the horizon as far as it.
     pub(super) fn reach(&self, surroundings: &Surroundings) -> f64 {
-        let horizon = self.parameters.veil_distance > 0.0 && ground(&surroundings.others.occluders).is_some();
+        let horizon = self.parameters.veil_distance > 0.0 && ground_height(&surroundings.others.occluders).is_some();
         if horizon { HORIZON.max(self.near_reach()) } else { self.near_reach() }
     }
 
     /// Extinction of all drops, and of those alone that are drawn as streaks, at time `t`, Q = 1, 1/m.
     pub(super) fn extinctions(&self, t: f64) -> [f64; 2] {
-        let sizes = DropSizes::marshall_palmer(self.rate(t));
+        let sizes = DropSizeDistribution::marshall_palmer(self.rate(t));
         let gain = self.parameters.opacity_gain;
         let disc = |class: &Class| 0.25e-6 * std::f64::consts::PI * class.bin.diameter_mm * class.bin.diameter_mm;
         let drawn: f64 = self.classes.iter().map(|class| class.bin.count(&sizes) * disc(class)).sum();
-        let all = extinction(&sizes, Losses::Geometric, DropSizes::ALL);
+        let all = extinction(&sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL);
         [gain * all.max(drawn), gain * drawn]
     }
 }

@@ -8,11 +8,7 @@ use bansho::{
         geometry::{mesh::Mesh, strokes::Drawing},
         host::assets::{AssetError, AssetProblem, Picture},
     },
-    media::{
-        drawings::decode_drawing,
-        meshes::decode_mesh,
-        plates::{decode_picture, limits::MemoryLimit},
-    },
+    media::assets::{decode_picture, gltf::decode_mesh, limits::MemoryLimit, svg::decode_drawing},
 };
 
 macro_rules! files {

@@ -6,10 +6,10 @@ use bansho_base::{
     host::observer::{Observer, Stage, StageGuard},
     image::{DisplayImage, Frame},
 };
-use bansho_media::{
-    flipbook::{Sheet, tile_display},
+use bansho_media::output::{
     label,
-    sequence::{Picture, Slot},
+    sink::{FrameSlot, Picture},
+    sprite_sheet::{SheetLayout, tile_display},
 };
 use bansho_render::{Shot, fingerprint};
 
@@ -35,7 +35,7 @@ const SQUARE: usize = 8;
 const SQUARES: [f32; 2] = [0.051_269_46, 0.116_970_67];
 
 /// Draws all frames of `job` into one picture and writes it.
-pub(super) fn run(job: &PreparedJob, sheet: &Sheet, observer: &dyn JobObserver) -> Result<(), JobError> {
+pub(super) fn run(job: &PreparedJob, sheet: &SheetLayout, observer: &dyn JobObserver) -> Result<(), JobError> {
     let sink = job.format.open(&job.plan, 1, sheet.size(), 1)?;
     let show = |frame: &mut Frame, observer: &dyn Observer| {
         lay_over(frame, job.contact_background, &job.format.view);
@@ -46,7 +46,7 @@ pub(super) fn run(job: &PreparedJob, sheet: &Sheet, observer: &dyn JobObserver) 
     shoot(&mut shot, &job.frames, &job.snapshots, &gather, observer)?;
     let _stage = StageGuard::begin(observer, Stage::Write);
     let picture = tile_display(&gather.into_tiles(), sheet.columns, sheet.gutter, FILL)?;
-    sink.write(Slot { index: 0, number: job.frames[0] }, Picture::Display(&picture, &own_fingerprint(job)))?;
+    sink.write(FrameSlot { index: 0, number: job.frames[0] }, Picture::Display(&picture, &own_fingerprint(job)))?;
     Ok(sink.finish()?)
 }
 

@@ -3,7 +3,11 @@
 use std::path::PathBuf;
 
 use bansho_base::host::{observer::Cancelled, plural::counted};
-use bansho_media::{MediaError, flipbook::TileError, input::InputError, naming::NamingError};
+use bansho_media::{
+    MediaError,
+    input::InputError,
+    output::{naming::NamingError, sprite_sheet::SheetError},
+};
 use bansho_render::{LoopError, PlanError, RenderError, SceneError, scene::edit::EditError};
 
 use super::{ranges::ranges, streaks::StreaksFault};
@@ -82,7 +86,7 @@ pub enum JobError {
     },
     /// Tiles that make no sheet.
     #[error(transparent)]
-    Tiles(#[from] TileError),
+    Tiles(#[from] SheetError),
     /// Streak textures that cannot be made.
     #[error(transparent)]
     Streaks(#[from] StreaksFault),

@@ -6,7 +6,10 @@ use std::{
 };
 
 use bansho_base::image::{Figure, FigureSet, Frame};
-use bansho_media::{MediaError, atomic, mark, overwriting::OverwritePolicy};
+use bansho_media::{
+    MediaError,
+    output::{atomic, overwrite_policy::OverwritePolicy, provenance},
+};
 use serde_json::{Map, Value, json};
 
 /// Key of the fingerprint of the picture that figures belong to.
@@ -40,7 +43,7 @@ fn describe(frame: &Frame, picture: &Path) -> Value {
     let [frames, seconds] = header.fps;
     json!({
         "format": 1,
-        "program": mark::PROGRAM,
+        "program": provenance::PROGRAM,
         "picture": picture.file_name().unwrap_or_default().to_string_lossy(),
         "frame": header.number,
         "fps": f64::from(frames) / f64::from(seconds.max(1)),
@@ -76,7 +79,7 @@ mod tests {
         let fingerprint = frame.header.fingerprint;
         assert!(!are_there(&picture, fingerprint));
         write(&frame, &picture, &OverwritePolicy::default()).unwrap();
-        assert!(mark::is_marked(&path(&picture)));
+        assert!(provenance::is_bansho_file(&path(&picture)));
         let value: Value = serde_json::from_slice(&fs::read(folder.path().join("rain.0007.json")).unwrap()).unwrap();
         assert_eq!(value["phenomena"]["shower"]["rate"], json!({ "value": 20.0, "unit": "mm/h" }));
         assert_eq!(value["phenomena"]["shower"]["visibility"]["value"], Value::Null);

@@ -8,7 +8,7 @@ use std::{
     time::SystemTime,
 };
 
-use bansho_media::{identity::FileIdentity, mark::is_marked};
+use bansho_media::output::{file_identity::FileIdentity, provenance::is_bansho_file};
 
 /// What tells cheaply that a file was not touched.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,7 +52,7 @@ impl Finished {
     pub(super) fn is_there(&self, path: &Path) -> bool {
         let length = self.lock().get(path).and_then(|state| Some(state.as_ref()?.length));
         self.is_untouched(path)
-            || length.is_some() && length == fs::metadata(path).ok().map(|found| found.len()) && is_marked(path)
+            || length.is_some() && length == fs::metadata(path).ok().map(|found| found.len()) && is_bansho_file(path)
     }
 
     /// The files that were noted and are no longer there, in order.

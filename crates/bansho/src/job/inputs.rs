@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use bansho_media::{overwriting::InputFiles, plates::FileAssets};
+use bansho_media::{assets::FileAssets, output::overwrite_policy::InputFiles};
 use bansho_render::Plan;
 
 use super::scene_file::SceneFile;

@@ -13,9 +13,11 @@ use bansho_base::{
 };
 use bansho_media::{
     MediaError,
-    naming::{OutputKind, OutputPattern},
-    overwriting::OverwritePolicy,
-    sequence::{Picture, Sink, SinkOptions, Slot, Wants},
+    output::{
+        naming::{OutputKind, OutputPattern},
+        overwrite_policy::OverwritePolicy,
+        sink::{FrameSlot, Picture, PictureFormat, Sink, SinkOptions},
+    },
 };
 use bansho_render::{
     Plan,
@@ -87,11 +89,11 @@ impl Format {
             // Before the picture, so that a picture that is there has its figures.
             figures::write(frame, &sink.path(frame.header.number), &self.overwrite)?;
         }
-        let slot = Slot { index, number: frame.header.number };
-        let shown = match sink.wants() {
-            Wants::Frame => None,
-            Wants::Display => Some(self.show(frame, observer)),
-            Wants::OpaqueDisplay => {
+        let slot = FrameSlot { index, number: frame.header.number };
+        let shown = match sink.picture_format() {
+            PictureFormat::Frame => None,
+            PictureFormat::Display => Some(self.show(frame, observer)),
+            PictureFormat::OpaqueDisplay => {
                 // Premultiplied light over black is the light itself.
                 frame.opaque = true;
                 Some(self.show(frame, observer))

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use bansho_media::{
-    identity::resolved,
-    overwriting::{Kept, OverwritePolicy},
+use bansho_media::output::{
+    file_identity::resolved,
+    overwrite_policy::{OverwriteError, OverwritePolicy},
 };
 
 use super::error::{Conflict, JobError};
@@ -19,9 +19,9 @@ pub(super) fn check(policy: &OverwritePolicy, outputs: impl IntoIterator<Item = 
     for path in outputs {
         match policy.check(&folder.resolved(&path)) {
             Ok(()) => {}
-            Err(Kept::Input) => return Err(Conflict::OverInput { path }.into()),
-            Err(Kept::Unmarked) if unmarked.is_none() => unmarked = Some(path),
-            Err(Kept::Unmarked) => others += 1,
+            Err(OverwriteError::Input) => return Err(Conflict::OverInput { path }.into()),
+            Err(OverwriteError::Unmarked) if unmarked.is_none() => unmarked = Some(path),
+            Err(OverwriteError::Unmarked) => others += 1,
         }
     }
     unmarked.map_or(Ok(()), |path| Err(Conflict::Unmarked { path, others }.into()))

@@ -11,10 +11,12 @@ use bansho_base::{
     phenomenon::Remark,
 };
 use bansho_media::{
-    flipbook::Sheet,
-    naming::{self, OutputKind, OutputPattern},
-    overwriting::OverwritePolicy,
-    plates::FileAssets,
+    assets::FileAssets,
+    output::{
+        naming::{self, OutputKind, OutputPattern},
+        overwrite_policy::OverwritePolicy,
+        sprite_sheet::SheetLayout,
+    },
 };
 use bansho_render::{CompiledScene, Plan, PlanOptions, SceneOptions, display::BitDepth, scene::Positions};
 
@@ -40,7 +42,7 @@ pub struct PreparedJob {
     pub(super) frames: Vec<i64>,
     pub(super) format: Format,
     /// Where all frames go into one picture.
-    pub(super) sheet: Option<Sheet>,
+    pub(super) sheet: Option<SheetLayout>,
     pub(super) contact_background: ContactBackground,
     pub(super) resume: bool,
     pub(super) snapshots: Snapshots,

@@ -1,10 +1,10 @@
 //! Which frames of a job are already there, whole and its own.
 
-use bansho_media::resume::existing_fingerprint;
+use bansho_media::output::resume::existing_fingerprint;
 use bansho_render::fingerprint;
-use rayon::prelude::*;
 
 use super::{error::JobError, figures, finished::Finished, prepare::PreparedJob};
+use rayon::prelude::*;
 
 impl PreparedJob {
     /// The frames that are still to be drawn; the files of the others are noted as finished. A frame that is cut off, damaged or of another

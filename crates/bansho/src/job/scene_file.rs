@@ -12,8 +12,8 @@ use bansho_base::{
     parameters::{ProblemKind, nearest},
 };
 use bansho_media::{
+    assets::InputLimits,
     input::{self, InputError},
-    plates::InputLimits,
 };
 use bansho_render::{
     CompiledScene, Scene, SceneError,

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use bansho_base::{host::observer::Observer, image::Frame};
-use bansho_media::flipbook::Sheet;
+use bansho_media::output::sprite_sheet::SheetLayout;
 
 use super::{
     error::{Conflict, JobError, SheetKind},
@@ -15,13 +15,13 @@ use super::{
 pub(super) const MOST_TILES: usize = 4096;
 
 /// The sheet nearest to a square of tiles that holds `count` of them.
-pub(super) fn holding(count: usize, cell: [usize; 2], gutter: usize) -> Result<Sheet, Conflict> {
+pub(super) fn holding(count: usize, cell: [usize; 2], gutter: usize) -> Result<SheetLayout, Conflict> {
     let columns = (1..=count).find(|columns| columns * columns >= count).unwrap_or(1);
-    checked(Sheet { count, columns, cell, gutter }, SheetKind::Contact)
+    checked(SheetLayout { count, columns, cell, gutter }, SheetKind::Contact)
 }
 
 /// A sheet holds some tiles, and may be as large as a picture.
-pub(super) fn checked(sheet: Sheet, of: SheetKind) -> Result<Sheet, Conflict> {
+pub(super) fn checked(sheet: SheetLayout, of: SheetKind) -> Result<SheetLayout, Conflict> {
     let most = bansho_render::scene::picture::LARGEST_SIDE as usize;
     if !(1..=MOST_TILES).contains(&sheet.count) {
         return Err(Conflict::Tiles { of, tiles: sheet.count, most: MOST_TILES });

@@ -3,7 +3,10 @@
 use std::{path::PathBuf, sync::Arc};
 
 use bansho_base::host::observer::{Stage, StageGuard, check};
-use bansho_media::{atomic, naming::NumberedPath, overwriting::OverwritePolicy, ply};
+use bansho_media::{
+    output::{atomic, naming::NumberedPath, overwrite_policy::OverwritePolicy},
+    ply,
+};
 use bansho_render::{CompiledScene, Plan, PlanOptions, SceneOptions, Shot};
 
 use super::{

@@ -6,7 +6,7 @@ use std::{
 };
 
 use bansho_base::host::observer::{Observer, Stage, StageGuard};
-use bansho_media::{atomic, identity::resolved, overwriting::OverwritePolicy};
+use bansho_media::output::{atomic, file_identity::resolved, overwrite_policy::OverwritePolicy};
 use bansho_render::Plan;
 
 use super::{
@@ -178,7 +178,7 @@ mod tests {
         host::{assets::MemoryAssets, observer::Unobserved},
         phenomenon::SnapshotError,
     };
-    use bansho_media::mark;
+    use bansho_media::output::provenance;
     use bansho_render::{PlanOptions, RenderError, Shot};
 
     use super::*;
@@ -274,7 +274,7 @@ mod tests {
         let compiled = crate::compile_scene("test", text, assets).unwrap();
         let plan = Plan::new(&compiled, &PlanOptions::default()).unwrap();
         let shot = Shot::open(compiled, Arc::new(plan));
-        assert!(shot.snapshot().starts_with(&mark::SNAPSHOT));
+        assert!(shot.snapshot().starts_with(&provenance::SNAPSHOT_MAGIC));
     }
 
     #[test]

@@ -13,7 +13,7 @@ use bansho_base::{
     image::{Frame, Image, Rect},
     phenomenon::SnapshotError,
 };
-use bansho_media::mark;
+use bansho_media::output::provenance;
 use bansho_render::{CompiledScene, Plan, PlanOptions, RenderError};
 
 use super::{
@@ -79,7 +79,7 @@ impl FrameSource for CounterShot {
     }
 
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError> {
-        let bytes = snapshot.strip_prefix(&mark::SNAPSHOT).and_then(|state| state.try_into().ok());
+        let bytes = snapshot.strip_prefix(&provenance::SNAPSHOT_MAGIC).and_then(|state| state.try_into().ok());
         let bytes = bytes.ok_or(SnapshotError::Damaged)?;
         self.number = i64::from_le_bytes(bytes);
         Ok(())
@@ -88,7 +88,7 @@ impl FrameSource for CounterShot {
 
 /// The snapshot at a frame.
 pub(super) fn state(number: i64) -> Vec<u8> {
-    [mark::SNAPSHOT, number.to_le_bytes()].concat()
+    [provenance::SNAPSHOT_MAGIC, number.to_le_bytes()].concat()
 }
 
 /// A frame of one pixel.

@@ -12,15 +12,17 @@ use std::{
     process::{Command, Stdio},
 };
 
-use bansho::base::{
-    color::{AlphaConvention, View},
-    image::{DisplayImage, Frame},
+use bansho::{
+    base::{
+        color::{AlphaConvention, View},
+        image::{DisplayImage, Frame},
+    },
+    media::output::{
+        naming::OutputPattern,
+        sink::{FrameSlot, Picture, PictureFormat, Sink, SinkOptions},
+    },
+    render::display::BitDepth,
 };
-use bansho::media::{
-    naming::OutputPattern,
-    sequence::{Picture, Sink, SinkOptions, Slot, Wants},
-};
-use bansho::render::display::BitDepth;
 
 /// How frames become a file.
 struct Writing {
@@ -48,14 +50,14 @@ impl Writing {
         let sink = Sink::open(OutputPattern::parse(path, frames.len()).unwrap(), options).unwrap();
         let mut all = Vec::new();
         for (index, frame) in frames.iter().enumerate() {
-            let slot = Slot { index, number: index as i64 };
+            let slot = FrameSlot { index, number: index as i64 };
             let mut frame = frame.clone();
-            if sink.wants() == Wants::Frame {
+            if sink.picture_format() == PictureFormat::Frame {
                 sink.write(slot, Picture::Linear(&frame)).unwrap();
                 continue;
             }
             // Premultiplied light over black is the light itself.
-            frame.opaque |= sink.wants() == Wants::OpaqueDisplay;
+            frame.opaque |= sink.picture_format() == PictureFormat::OpaqueDisplay;
             let shown = light::shown(&frame, &self.view, self.bits, self.alpha);
             sink.write(slot, Picture::Display(&shown, &[7; 32])).unwrap();
             all.push(shown);

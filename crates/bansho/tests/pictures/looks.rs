@@ -5,7 +5,7 @@ use std::{ops::Range, path::PathBuf, sync::Arc};
 use bansho::{
     BitDepth, CompiledScene, DisplayImage, Plan, PlanOptions, SceneOptions, Shot, Unobserved, View,
     base::image::{DisplayPixels, Frame},
-    media::plates::{FileAssets, decode_picture, limits::MemoryLimit},
+    media::assets::{FileAssets, decode_picture, limits::MemoryLimit},
 };
 
 fn scenes() -> PathBuf {

@@ -7,11 +7,11 @@ use std::{
 
 use bansho::{
     job::{JobError, SceneFile},
-    media::plates::InputLimits,
+    media::assets::InputLimits,
 };
-use clap::Args;
 
 use super::values;
+use clap::Args;
 
 /// What errors and outputs call a scene from standard input.
 const STDIN: &str = "stdin";

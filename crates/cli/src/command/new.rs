@@ -6,7 +6,7 @@ use bansho::{
     KINDS,
     base::phenomenon::kind::PhenomenonKind,
     base::{host::printable::printable, parameters::nearest},
-    media::{MediaError, atomic},
+    media::{MediaError, output::atomic},
     render::scene::template,
 };
 

@@ -3,7 +3,7 @@
 use bansho::{
     base::host::printable::printable,
     job::SceneFile,
-    media::atomic,
+    media::output::atomic,
     render::scene::{FORMAT, edit},
 };
 

@@ -1,4 +1,4 @@
-//! What a lake mirrors in waves too short to be seen: a picture drawn out toward the viewer.
+//! Reflection in waves too short to be resolved: an anisotropic blur of the mirrored picture.
 
 use bansho_base::{
     image::Image,
@@ -9,62 +9,67 @@ use rayon::prelude::*;
 
 type Pixel = [f32; 4];
 
-/// The reflection seen in facets whose slopes are Gaussian with an r.m.s. of `slope`, right for what is far away. Alpha is of no use here;
-/// the reflection has pixels of `side` times as many of the view's.
+/// The reflection in facets with Gaussian slopes of r.m.s. `slope`, exact for distant objects. Alpha is unused in the
+/// result. `side` is the size of the reflection's pixels in pixels of the view.
 ///
-/// A facet turned toward the viewer by s moves what it shows by 2 s in elevation, one turned sideways by 2 s times the sine of the
-/// viewing elevation. So the blur along columns is the same everywhere, the one along rows vanishes at the horizon.
-pub(super) fn rough(reflection: &Image<4>, side: usize, view: &View, slope: f64) -> Image<4> {
+/// A facet tilted toward the viewer by s displaces the reflection by 2 s in elevation, one tilted sideways by 2 s times
+/// the sine of the viewing elevation. So the vertical blur is the same everywhere, and the horizontal one vanishes at
+/// the horizon.
+pub(super) fn blurred_reflection(reflection: &Image<4>, side: usize, view: &View, slope: f64) -> Image<4> {
     let (width, height) = (reflection.width(), reflection.height());
     let side = side as f64;
-    let spread = 2.0 * slope * view.camera.focal_pixels / side;
-    let sines: Vec<f64> = (0..height).map(|y| sine_of_elevation(view, (y as f64 + 0.5) * side)).collect();
+    let sigma = 2.0 * slope * view.camera.focal_pixels / side;
+    let elevation_sines: Vec<f64> = (0..height).map(|y| elevation_sine(view, (y as f64 + 0.5) * side)).collect();
     let columns: Vec<Vec<Pixel>> = (0..width)
         .into_par_iter()
         .map(|x| {
-            let mut column: Vec<Pixel> = (0..height).map(|y| masked(reflection.at(x, y), sines[y] > 0.0)).collect();
-            blur(&mut column, spread);
+            let mut column: Vec<Pixel> =
+                (0..height).map(|y| with_coverage(reflection.at(x, y), elevation_sines[y] > 0.0)).collect();
+            blur(&mut column, sigma);
             column
         })
         .collect();
     let mut result = Image::filled(width, height, [0.0; 4]);
     result.pixels_mut().par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row)| {
         row.iter_mut().zip(&columns).for_each(|(pixel, column)| *pixel = column[y]);
-        blur(row, spread * sines[y]);
+        blur(row, sigma * elevation_sines[y]);
         row.iter_mut().for_each(|pixel| *pixel = pixel.map(|value| value / pixel[3].max(f32::MIN_POSITIVE)));
     });
     result
 }
 
-/// Alpha counts the light: beyond the horizon and the picture's edges nothing is known, and the rest stands for it.
-fn masked([red, green, blue, _]: Pixel, seen: bool) -> Pixel {
+/// Alpha as coverage: beyond the horizon and the picture's edges nothing is known, and the blur is normalized by the
+/// rest.
+fn with_coverage([red, green, blue, _]: Pixel, seen: bool) -> Pixel {
     if seen { [red, green, blue, 1.0] } else { [0.0; 4] }
 }
 
-/// Sine of the angle at which the picture's middle, `y` pixels from its top, looks down on level ground; 0 above the horizon.
-fn sine_of_elevation(view: &View, y: f64) -> f64 {
+/// Sine of the angle at which the picture's center column, `y` pixels from its top, looks down on the plane; 0 above
+/// the horizon.
+fn elevation_sine(view: &View, y: f64) -> f64 {
     let direction = view.camera.direction(DVec2::new(0.5 * view.size[0] as f64, y));
     direction.map_or(0.0, |direction| (-direction.y / direction.length()).clamp(0.0, 1.0))
 }
 
-/// Blurs a line of pixels by a Gaussian of standard deviation `sigma`, as three running means. Beyond its ends lies nothing.
+/// Gaussian blur of standard deviation `sigma` by three extended box filters. Zero beyond the ends.
 fn blur(line: &mut [Pixel], sigma: f64) {
     if sigma <= 0.0 {
         return;
     }
-    // Boxes of half width `whole` and a `part` of the pixels beside them, so that three have the variance asked for (Gwosdek et al. 2011).
+    // Boxes of half width `whole` plus a `fraction` of the pixels beside them, so that three of them have the variance
+    // (Gwosdek et al. 2011).
     let variance = sigma * sigma / 3.0;
     let whole = (0.5 * (math::sqrt(12.0 * variance + 1.0) - 1.0)).floor();
-    let part = (2.0 * whole + 1.0) * (whole * (whole + 1.0) - 3.0 * variance)
+    let fraction = (2.0 * whole + 1.0) * (whole * (whole + 1.0) - 3.0 * variance)
         / (6.0 * (variance - (whole + 1.0) * (whole + 1.0)));
-    (0..3).for_each(|_| running_mean(line, whole as usize, part));
+    (0..3).for_each(|_| running_mean(line, whole as usize, fraction));
 }
 
-/// The mean over `whole` pixels and a `part` of the next on both sides. Sums are f64: lamps are 1e8 times brighter than what
-/// lies beside them, and must leave nothing behind when they leave the sum.
-fn running_mean(line: &mut [Pixel], whole: usize, part: f64) {
+/// Box filter over `whole` pixels and a `fraction` of the next one on both sides. Sums are f64: lamps are 1e8 times
+/// brighter than their surroundings and must cancel exactly when they leave the sum.
+fn running_mean(line: &mut [Pixel], whole: usize, fraction: f64) {
     let source = line.to_vec();
-    let width = (2 * whole + 1) as f64 + 2.0 * part;
+    let width = (2 * whole + 1) as f64 + 2.0 * fraction;
     let at =
         |index: Option<usize>, c: usize| index.and_then(|i| source.get(i)).map_or(0.0, |pixel| f64::from(pixel[c]));
     for c in 0..4 {
@@ -72,7 +77,7 @@ fn running_mean(line: &mut [Pixel], whole: usize, part: f64) {
         for (index, pixel) in line.iter_mut().enumerate() {
             sum += at(index.checked_add(whole), c);
             let edges = at(index.checked_sub(whole + 1), c) + at(index.checked_add(whole + 1), c);
-            pixel[c] = (part.fma(edges, sum) / width) as f32;
+            pixel[c] = (fraction.fma(edges, sum) / width) as f32;
             sum -= at(index.checked_sub(whole), c);
         }
     }

@@ -1,7 +1,35 @@
-//! A level ground: lit by lamps, fires and sky, dry or wet, or a lake.
+//! A horizontal ground plane: land, a plate's own ground, or a lake; lit by lamps, fires and the sky, dry or wet.
 //!
-//! Not one of the four methods: what they stand on. Wet ground mirrors everything in the scene, through a picture that the renderer draws
-//! with a camera behind the mirror ([`Surroundings::reflection`]).
+//! Wet ground and lakes mirror the scene. The renderer draws a picture with a camera mirrored at the plane
+//! ([`Surroundings::reflection`]); puddles show it sharply, lakes displaced by waves and blurred by those too short to
+//! be resolved, and rough films of water show lamps and sky through microfacets.
+//!
+//! # References
+//! - J. Lekner and M. C. Dorf, "Why some things are darker when wet", Appl. Opt. 27 (1988).
+//! - C. Schlick, "An inexpensive BRDF model for physically-based rendering" (1994): Fresnel approximation.
+//! - R. L. Cook and K. E. Torrance, "A reflectance model for computer graphics" (1982).
+//! - B. Burley, "Physically-based shading at Disney" (2012): GTR distribution, here with exponent 3.
+//! - P. Gwosdek, S. Grewenig, A. Bruhn and J. Weickert, "Theoretical foundations of Gaussian convolution by extended
+//!   box filtering" (2011).
+//!
+//! # Equations
+//!
+//! | equation | function |
+//! | --- | --- |
+//! | diffuse reflection `albedo E / pi` | `shade::PreparedGround::diffuse` |
+//! | albedo of wet ground | `shade::wet_albedo_factor` |
+//! | Fresnel reflectance `F = F0 + (1 - F0) (1 - cos)^5`, n = 1.333 | `surface::fresnel` |
+//! | microfacet reflection `F D G / (4 cos)` | `wet_reflection::Microfacets::specular_lobe` |
+//! | GTR distribution D and Smith masking G | `wet_reflection::gtr3_distribution_with_masking` |
+//! | deep-water waves, `omega^2 = g k` | `waves::Waves::new`, `waves::Waves::slope` |
+//! | blur by unresolved slopes, `sigma = 2 s f` pixels | `lake_reflection::blurred_reflection` |
+//!
+//! # Data flow
+//! `Surface` is the pattern of the ground, made once from [`GroundParameters`]: octaves of noise for albedo, puddles
+//! and films. For a frame, `Ground::lake` makes the waves of the time and the blurred reflection, and `prepare`
+//! collects them in a `PreparedGround`. `PreparedGround` intersects each pixel's line of sight with the plane, samples
+//! the surface with a filter of the pixel's footprint, and adds the diffuse and the specular radiance. A ground of kind
+//! `plate` only darkens the plate and adds reflections, where the plate's depth says that it is ground.
 
 mod lake_reflection;
 mod parameters;
@@ -46,22 +74,25 @@ impl Ground {
     }
 
     /// The lake, if that is what it is.
-    fn lake(&self, view: &View, surroundings: &Surroundings) -> Option<Lake> {
+    fn lake(&self, view: &View, surroundings: &Surroundings) -> Option<LakeFrame> {
         let parameters = &self.parameters;
         let sharp = surroundings.reflection.filter(|_| parameters.kind == GroundKind::Water)?;
         let t = view.shutter.middle();
         let wind = surroundings.wind.mean(t);
         let heading = DVec2::new(wind.x, wind.z).try_normalize().unwrap_or(DVec2::X);
         let waves = Waves::new(self.key, parameters.waves, parameters.wave_length, heading, t, self.loop_s);
-        Some(Lake { waves, rough: lake_reflection::rough(sharp, 1, view, parameters.waves) })
+        Some(LakeFrame {
+            waves,
+            blurred_reflection: lake_reflection::blurred_reflection(sharp, 1, view, parameters.waves),
+        })
     }
 }
 
-/// One frame of a lake.
-struct Lake {
+/// A lake in one frame.
+struct LakeFrame {
     waves: Waves,
-    /// What is mirrored by waves too short to be seen.
-    rough: Image<4>,
+    /// The reflection, blurred by waves too short to be resolved.
+    blurred_reflection: Image<4>,
 }
 
 impl Phenomenon for Ground {
@@ -110,7 +141,7 @@ impl Run for Ground {
             wetness,
             lake: self.lake(view, surroundings),
             backdrop: surroundings.backdrop.map(|sharp| Backdrop {
-                image: lake_reflection::rough(&sharp.image, sharp.side, view, self.surface.mean_slope()),
+                image: lake_reflection::blurred_reflection(&sharp.image, sharp.side, view, self.surface.mean_slope()),
                 side: sharp.side,
             }),
         }))

@@ -6,7 +6,7 @@ use bansho_base::{
     phenomenon::LevelMirror,
 };
 
-use super::shade::{WATER_ALBEDO, darkening};
+use super::shade::{WATER_ALBEDO, wet_albedo_factor};
 
 bansho_base::choice! {
     /// What the ground is.
@@ -58,7 +58,7 @@ impl GroundParameters {
             GroundKind::Water => f64::from(WATER_ALBEDO),
             GroundKind::Land | GroundKind::Plate => {
                 let dry = luminance(acescg_from_srgb(self.colour.map(|value| value as f32)));
-                f64::from(dry) * darkening(self.wetness.at(t))
+                f64::from(dry) * wet_albedo_factor(self.wetness.at(t))
             }
         }
     }

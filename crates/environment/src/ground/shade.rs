@@ -1,4 +1,4 @@
-//! The ground's light, pixel by pixel.
+//! Shading of the ground, pixel by pixel.
 
 use std::f32::consts::PI;
 
@@ -13,24 +13,24 @@ use bansho_base::{
 };
 
 use super::{
-    Lake,
+    LakeFrame,
     parameters::{GroundKind, GroundParameters},
-    surface::{Patch, Surface, fresnel},
-    waves::Slope,
-    wet_reflection::gloss,
+    surface::{Surface, SurfaceSample, fresnel},
+    waves::WaveSlope,
+    wet_reflection::glossy_reflection,
 };
 
-/// Depth at which the ground ends, m: nearer than the sky, farther than all else.
+/// Depth at which the ground ends, m: in front of the sky, behind everything else.
 pub(super) const HORIZON: f64 = 1e6;
-/// Share of its light that soaked ground loses, since water keeps light in (Lekner & Dorf 1988).
+/// Fraction of its albedo that soaked ground loses, by total internal reflection in the water (Lekner & Dorf 1988).
 const WET_DARKENING: f64 = 0.55;
-/// Share of its light that soaked ground loses beyond that where water stands on it, which is deeper and often turbid.
+/// Fraction that puddles lose beyond that: they are deeper, and often turbid.
 const PUDDLE_DARKENING: f64 = 0.4;
 /// Albedo of deep water.
 pub(super) const WATER_ALBEDO: f32 = 0.02;
 
-/// Share of its dry light that ground of this wetness keeps.
-pub(super) fn darkening(wetness: f64) -> f64 {
+/// Albedo of wet ground relative to dry ground.
+pub(super) fn wet_albedo_factor(wetness: f64) -> f64 {
     1.0 - WET_DARKENING * wetness
 }
 
@@ -41,21 +41,21 @@ pub(super) struct PreparedGround<'a> {
     pub(super) view: &'a View,
     pub(super) surroundings: &'a Surroundings<'a>,
     pub(super) wetness: f64,
-    pub(super) lake: Option<Lake>,
-    /// What stands behind all, as a film too rough for more mirrors it: the plate and its sky.
+    pub(super) lake: Option<LakeFrame>,
+    /// The plate and its sky, as a film too rough for sharp reflections mirrors them.
     pub(super) backdrop: Option<Backdrop>,
 }
 
-/// Where a pixel meets the ground.
+/// Intersection of a pixel's line of sight with the ground.
 struct Hit {
     pixel: DVec2,
     point: DVec3,
     depth: f64,
-    /// Cosine between line of sight and normal.
+    /// Cosine of the angle between the line of sight and the normal.
     cos: f64,
-    /// Length of ground that the pixel covers, the mean of along and across the line of sight, m.
+    /// Length of ground that the pixel covers, m: the geometric mean of along and across the line of sight.
     footprint: f64,
-    /// Share of the pixel below the horizon.
+    /// Fraction of the pixel below the horizon.
     coverage: f64,
 }
 
@@ -65,23 +65,23 @@ impl PreparedGround<'_> {
         let direction = camera.direction(pixel)?;
         let length = direction.length();
         let cos = -direction.y / length;
-        // A pixel spans about 1 / focal radians.
+        // A pixel subtends about 1 / focal radians.
         let coverage = (cos * camera.focal_pixels + 0.5).clamp(0.0, 1.0);
-        let drop = camera.position.y - self.parameters.height;
-        if coverage <= 0.0 || drop <= 0.0 {
+        let camera_height = camera.position.y - self.parameters.height;
+        if coverage <= 0.0 || camera_height <= 0.0 {
             return None;
         }
         let cos = cos.max(0.5 / camera.focal_pixels);
-        let distance = (drop / cos).min(HORIZON * 0.5);
+        let distance = (camera_height / cos).min(HORIZON * 0.5);
         let depth = distance / length;
         let footprint = distance / (camera.focal_pixels * math::sqrt(cos.max(1e-6)));
         Some(Hit { pixel, point: camera.position + direction * depth, depth, cos, footprint, coverage })
     }
 
-    /// Light thrown back evenly to all sides: `albedo / pi` of the illuminance.
-    fn diffuse(&self, hit: &Hit, patch: &Patch) -> [f32; 3] {
+    /// Lambertian reflection: `albedo / pi` times the illuminance.
+    fn diffuse(&self, hit: &Hit, sample: &SurfaceSample) -> [f32; 3] {
         let plate = self.parameters.kind == GroundKind::Plate;
-        // A plate was lit by its own sky.
+        // The plate already contains the light of its own sky.
         let mut illuminance = if plate { [0.0; 3] } else { self.surroundings.sky.horizontal_illuminance() };
         for light in &self.surroundings.others.lights {
             let (each, toward) = light.illuminance(hit.point);
@@ -90,83 +90,85 @@ impl PreparedGround<'_> {
         }
         let albedo = match self.parameters.kind {
             GroundKind::Water => [WATER_ALBEDO; 3],
-            GroundKind::Plate => patch.albedo.map(|value| value * self.darkening()),
+            GroundKind::Plate => sample.albedo.map(|value| value * self.wet_albedo_factor()),
             GroundKind::Land => {
-                let standing = 1.0 - PUDDLE_DARKENING * self.wetness * patch.puddle;
-                patch.albedo.map(|value| value * self.darkening() * standing as f32)
+                let standing = 1.0 - PUDDLE_DARKENING * self.wetness * sample.puddle;
+                sample.albedo.map(|value| value * self.wet_albedo_factor() * standing as f32)
             }
         };
         [0, 1, 2].map(|c| illuminance[c] * albedo[c] / PI)
     }
 
-    /// Share of its dry light that the wet ground keeps.
-    fn darkening(&self) -> f32 {
-        darkening(self.wetness) as f32
+    /// Albedo of the wet ground relative to dry ground.
+    fn wet_albedo_factor(&self) -> f32 {
+        wet_albedo_factor(self.wetness) as f32
     }
 
-    /// Light that the water on the ground mirrors.
-    fn mirrored(&self, hit: &Hit, patch: &Patch) -> [f32; 3] {
+    /// Radiance that water on the ground reflects.
+    fn specular(&self, hit: &Hit, sample: &SurfaceSample) -> [f32; 3] {
         if self.wetness <= 0.0 {
             return [0.0; 3];
         }
         match &self.lake {
-            Some(lake) => self.seen_in_lake(hit, lake),
-            None => self.seen_in_film(hit, patch),
+            Some(lake) => self.lake_specular(hit, lake),
+            None => self.film_reflection(hit, sample),
         }
     }
 
-    /// A wet ground mirrors sharply in its puddles, and in streaks between them.
-    fn seen_in_film(&self, hit: &Hit, patch: &Patch) -> [f32; 3] {
+    /// Wet ground: sharp reflections in puddles, glossy ones between them.
+    fn film_reflection(&self, hit: &Hit, sample: &SurfaceSample) -> [f32; 3] {
         let viewer = -(hit.point - self.view.camera.position).normalize_or_zero();
-        let place = DVec2::new(hit.point.x, hit.point.z);
-        let facets = self.surface.facets(place, hit.footprint, patch.film);
+        let position = DVec2::new(hit.point.x, hit.point.z);
+        let microfacets = self.surface.microfacets(position, hit.footprint, sample.film);
         let backdrop = self.backdrop.as_ref().map(|Backdrop { image, side }| {
             let [red, green, blue, _] = image.between(hit.pixel / *side as f64);
             [red, green, blue]
         });
-        let rough = gloss(self.surroundings, backdrop, hit.point, viewer, &facets);
-        let still = self.surroundings.reflection.map_or([0.0; 4], |image| image.between(hit.pixel));
-        let (puddle, fresnel, wetness) = (patch.puddle as f32, fresnel(hit.cos) as f32, self.wetness as f32);
-        [0, 1, 2].map(|c| wetness * (puddle * fresnel).fma(still[c], (1.0 - puddle) * rough[c]))
+        let blurred_reflection = glossy_reflection(self.surroundings, backdrop, hit.point, viewer, &microfacets);
+        let mirror_image = self.surroundings.reflection.map_or([0.0; 4], |image| image.between(hit.pixel));
+        let (puddle, fresnel, wetness) = (sample.puddle as f32, fresnel(hit.cos) as f32, self.wetness as f32);
+        [0, 1, 2].map(|c| wetness * (puddle * fresnel).fma(mirror_image[c], (1.0 - puddle) * blurred_reflection[c]))
     }
 
-    fn seen_in_lake(&self, hit: &Hit, lake: &Lake) -> [f32; 3] {
+    fn lake_specular(&self, hit: &Hit, lake: &LakeFrame) -> [f32; 3] {
         let slope = lake.waves.slope(DVec2::new(hit.point.x, hit.point.z), hit.footprint);
-        let still = self.surroundings.reflection.map_or([0.0; 4], |image| image.between(self.seen_in_wave(hit, slope)));
-        let rough = lake.rough.between(hit.pixel);
-        let (lost, fresnel) = (slope.unresolved as f32, fresnel(hit.cos) as f32);
-        [0, 1, 2].map(|c| fresnel * lost.fma(rough[c], (1.0 - lost) * still[c]))
+        let mirror_image =
+            self.surroundings.reflection.map_or([0.0; 4], |image| image.between(self.reflected_pixel(hit, slope)));
+        let blurred_reflection = lake.blurred_reflection.between(hit.pixel);
+        let (unresolved, fresnel) = (slope.unresolved as f32, fresnel(hit.cos) as f32);
+        [0, 1, 2].map(|c| fresnel * unresolved.fma(blurred_reflection[c], (1.0 - unresolved) * mirror_image[c]))
     }
 
-    /// The pixel of the mirror's picture that a tilted wave shows: what lies far away moves by twice the tilt.
-    fn seen_in_wave(&self, hit: &Hit, slope: Slope) -> DVec2 {
+    /// The pixel of the mirrored picture that a tilted wave shows, for distant objects: the reflection turns by twice
+    /// the tilt.
+    fn reflected_pixel(&self, hit: &Hit, slope: WaveSlope) -> DVec2 {
         let camera = &self.view.camera;
-        let sight = (hit.point - camera.position).normalize_or_zero();
+        let view_direction = (hit.point - camera.position).normalize_or_zero();
         let normal = DVec3::new(-slope.resolved.x, 1.0, -slope.resolved.y).normalize();
-        let mirrored = sight - 2.0 * sight.dot(normal) * normal;
-        let below = DVec3::new(mirrored.x, -mirrored.y.abs(), mirrored.z);
-        camera.project(camera.position + below * HORIZON).map_or(hit.pixel, |place| place.pixel)
+        let reflected = view_direction - 2.0 * view_direction.dot(normal) * normal;
+        let below = DVec3::new(reflected.x, -reflected.y.abs(), reflected.z);
+        camera.project(camera.position + below * HORIZON).map_or(hit.pixel, |position| position.pixel)
     }
 
     fn radiance(&self, hit: &Hit) -> [f32; 3] {
-        let patch = self.surface.at(DVec2::new(hit.point.x, hit.point.z), hit.footprint);
-        let (diffuse, mirrored) = (self.diffuse(hit, &patch), self.mirrored(hit, &patch));
-        [0, 1, 2].map(|c| hit.coverage as f32 * (diffuse[c] + mirrored[c]))
+        let sample = self.surface.at(DVec2::new(hit.point.x, hit.point.z), hit.footprint);
+        let (diffuse, specular) = (self.diffuse(hit, &sample), self.specular(hit, &sample));
+        [0, 1, 2].map(|c| hit.coverage as f32 * (diffuse[c] + specular[c]))
     }
 
-    /// Whether what the plate shows at a pixel, at this depth, is ground: no higher than the tolerance, nor than a pixel that looks along it
-    /// can tell.
+    /// Whether the plate at a pixel, with this depth, shows ground: within the tolerance of the height, and within what
+    /// a pixel resolves at grazing angles.
     fn is_ground(&self, hit: &Hit, plate: f64) -> bool {
-        let drop = self.view.camera.position.y - self.parameters.height;
-        let above = drop * (1.0 - plate / hit.depth);
+        let camera_height = self.view.camera.position.y - self.parameters.height;
+        let above = camera_height * (1.0 - plate / hit.depth);
         above.abs() < self.parameters.level().tolerance_at(plate, self.view.camera.focal_pixels)
     }
 
-    /// Whether the sample is to be drawn, and what it lets through.
-    fn through(&self, hit: &Hit, strip: &Strip, index: usize) -> Option<f32> {
+    /// The transmittance of the sample; `None` if it is hidden.
+    fn transmittance(&self, hit: &Hit, strip: &Strip, index: usize) -> Option<f32> {
         if self.parameters.kind == GroundKind::Plate {
             let here = !strip.has_plate() || self.is_ground(hit, f64::from(strip.plate_depth(index)));
-            return here.then_some(self.darkening());
+            return here.then_some(self.wet_albedo_factor());
         }
         strip.visible(index, hit.depth as f32).then_some(1.0 - hit.coverage as f32)
     }
@@ -186,8 +188,8 @@ impl Prepared for PreparedGround<'_> {
             if !slice.contains(hit.depth) {
                 continue;
             }
-            if let Some(through) = self.through(&hit, strip, index) {
-                strip.add_behind(index, self.radiance(&hit), [through; 3], hit.depth as f32);
+            if let Some(transmittance) = self.transmittance(&hit, strip, index) {
+                strip.add_behind(index, self.radiance(&hit), [transmittance; 3], hit.depth as f32);
             }
         }
     }

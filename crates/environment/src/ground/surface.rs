@@ -1,4 +1,4 @@
-//! What the ground is like at a place: its colour and where water stands.
+//! The pattern of the ground: albedo, puddles and films of water.
 
 use bansho_base::{
     color::acescg_from_srgb,
@@ -9,32 +9,32 @@ use bansho_base::{
     noise::{Coordinate, Fractal, Noise, VARIANCE},
 };
 
-use super::{parameters::GroundParameters, wet_reflection::Facets};
+use super::{parameters::GroundParameters, wet_reflection::Microfacets};
 
-/// Octaves of the ground's texture, each half as large and as strong as the one before.
+/// Octaves of the ground's texture, each of half the size of the one before.
 const OCTAVES: usize = 8;
-/// Strength of the largest octave, and of each over that of the one before. Soil and asphalt have most of their contrast in their grain:
-/// were it as strong in their large patches, bright ground would look like clouds.
-const STRENGTH: f64 = 0.2;
-const GAIN: f64 = 1.24;
-/// Height of an octave over that of the one before.
+/// Amplitude of the largest octave, and the ratio of successive amplitudes. Soil and asphalt have most of their
+/// contrast at the scale of grains: with as much at large scales, bright ground would look like clouds.
+const BASE_AMPLITUDE: f64 = 0.2;
+const AMPLITUDE_GAIN: f64 = 1.24;
+/// Ratio of successive heights in the relief.
 const RELIEF_GAIN: f64 = 0.6;
-/// Standard deviation of the relief, which is roughly normal.
-const DEVIATION: f64 = 0.34;
-/// One octave at a time, so that each can fade where it is too small to be seen.
-const SINGLE: Fractal = Fractal { octaves: 1, lacunarity: 2, gain: 0.5 };
+/// Standard deviation of the relief, which is approximately normal.
+const RELIEF_DEVIATION: f64 = 0.34;
+/// Octaves are evaluated one by one, so that each fades out where a pixel cannot resolve it.
+const SINGLE_OCTAVE: Fractal = Fractal { octaves: 1, lacunarity: 2, gain: 0.5 };
 
-/// Bumps of a film of water: size of the largest, m, octaves, each half as large as the one before, and their share of the film's
-/// mean square slope.
-const BUMP: f64 = 0.15;
-const BUMPS: usize = 3;
-const BUMP_SHARE: f64 = 0.4;
-/// Slope of grains that stand out of the film, over that of the film.
-const GRAIN: f64 = 3.0;
-/// Greatest share of wet ground that is film between the grains.
-const FILM_SHARE: f64 = 0.6;
+/// Bumps of a film of water: size of the largest, m, octaves of half the size each, and the fraction of the film's
+/// slope variance that they carry.
+const BUMP_SIZE: f64 = 0.15;
+const BUMP_OCTAVES: usize = 3;
+const BUMP_VARIANCE_FRACTION: f64 = 0.4;
+/// Slope of grains that stand out of the film, relative to that of the film.
+const GRAIN_SLOPE_RATIO: f64 = 3.0;
+/// Largest fraction of wet ground that is film between the grains.
+const MAX_FILM_FRACTION: f64 = 0.6;
 
-/// The ground's pattern.
+/// The pattern of the ground.
 pub(super) struct Surface {
     albedo: [f32; 3],
     texture: f64,
@@ -44,14 +44,14 @@ pub(super) struct Surface {
     roughness: f64,
 }
 
-/// The ground at a place.
+/// The ground at one position.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Patch {
-    /// Share of light that it throws back when dry.
+pub(super) struct SurfaceSample {
+    /// Albedo when dry.
     pub(super) albedo: [f32; 3],
-    /// Share covered by puddles when wet.
+    /// Fraction covered by puddles when wet.
     pub(super) puddle: f64,
-    /// Share of the rest whose film of water is whole: grains stand out of it where the ground is high.
+    /// Fraction of the rest with an unbroken film of water; high ground has grains that stand out of it.
     pub(super) film: f64,
 }
 
@@ -59,7 +59,7 @@ impl Surface {
     pub(super) fn new(parameters: &GroundParameters, key: Key) -> Self {
         let words = [0, 1].map(|part| key.words(part, 0, Purpose::named("ground")));
         let octaves =
-            words.as_flattened().iter().take(OCTAVES).filter_map(|&seed| Noise::new(seed, SINGLE, [0, 0]).ok());
+            words.as_flattened().iter().take(OCTAVES).filter_map(|&seed| Noise::new(seed, SINGLE_OCTAVE, [0, 0]).ok());
         Self {
             albedo: acescg_from_srgb(parameters.colour.map(|value| value as f32)),
             texture: parameters.texture,
@@ -70,73 +70,75 @@ impl Surface {
         }
     }
 
-    /// The ground at a `place` (x, z), of which a pixel covers `footprint` m.
-    pub(super) fn at(&self, place: DVec2, footprint: f64) -> Patch {
+    /// The ground at a position (x, z), filtered with a pixel's `footprint`, m.
+    pub(super) fn at(&self, position: DVec2, footprint: f64) -> SurfaceSample {
         let (mut grain, mut relief) = (0.0, 0.0);
-        let (mut size, mut strength, mut height) = (self.size, STRENGTH, 1.0_f64);
+        let (mut size, mut amplitude, mut height) = (self.size, BASE_AMPLITUDE, 1.0_f64);
         for octave in &self.octaves {
-            let seen = math::smoothstep(1.0, 3.0, size / footprint.max(1e-9));
-            if seen <= 0.0 {
+            let visibility = math::smoothstep(1.0, 3.0, size / footprint.max(1e-9));
+            if visibility <= 0.0 {
                 break;
             }
-            let coordinates = [place.x / size, place.y / size].map(Coordinate::from_f64);
-            let value = seen * f64::from(octave.at(coordinates));
-            (grain, relief) = (strength.fma(value, grain), height.fma(value, relief));
-            (size, strength, height) = (0.5 * size, GAIN * strength, RELIEF_GAIN * height);
+            let coordinates = [position.x / size, position.y / size].map(Coordinate::from_f64);
+            let value = visibility * f64::from(octave.at(coordinates));
+            (grain, relief) = (amplitude.fma(value, grain), height.fma(value, relief));
+            (size, amplitude, height) = (0.5 * size, AMPLITUDE_GAIN * amplitude, RELIEF_GAIN * height);
         }
         let shade = math::exp(self.texture * grain) as f32;
         let albedo = self.albedo.map(|value| (value * shade).min(1.0));
         let pixels = self.size / footprint.max(1e-9);
-        let seen = |first: f64, whole: f64| math::smoothstep(first, whole, pixels);
-        Patch {
+        let visibility = |first: f64, whole: f64| math::smoothstep(first, whole, pixels);
+        SurfaceSample {
             albedo,
-            puddle: math::lerp(self.puddles, self.puddle(relief), seen(1.0, 3.0)),
-            // Its edges are sharp and its light strong: patches of a few pixels would be dashes at the horizon.
-            film: math::lerp(0.5, film(relief), seen(2.0, 8.0)),
+            puddle: math::lerp(self.puddles, self.puddle_fraction(relief), visibility(1.0, 3.0)),
+            // Films have sharp edges and strong highlights: filtered earlier, so that the horizon has no flicker of
+            // dashes.
+            film: math::lerp(0.5, film_fraction(relief), visibility(2.0, 8.0)),
         }
     }
 
-    /// The facets of wet ground at a `place` (x, z), of which a pixel covers `footprint` m, where `film` of it is whole.
-    pub(super) fn facets(&self, place: DVec2, footprint: f64, film: f64) -> Facets {
-        let each = math::sqrt(BUMP_SHARE / BUMPS as f64) * self.roughness;
+    /// The microfacets of wet ground at a position (x, z), filtered with a pixel's `footprint`, m; `film` is the
+    /// fraction with a film.
+    pub(super) fn microfacets(&self, position: DVec2, footprint: f64, film: f64) -> Microfacets {
+        let amplitude = math::sqrt(BUMP_VARIANCE_FRACTION / BUMP_OCTAVES as f64) * self.roughness;
         let deviation = math::sqrt(VARIANCE[0]);
-        let (mut tilt, mut rest, mut size) = (DVec2::ZERO, self.roughness * self.roughness, BUMP);
-        for pair in self.octaves.chunks_exact(2).take(BUMPS) {
-            let seen = math::smoothstep(1.5, 5.0, size / footprint.max(1e-9));
-            if seen <= 0.0 {
+        let (mut tilt, mut unresolved_variance, mut size) = (DVec2::ZERO, self.roughness * self.roughness, BUMP_SIZE);
+        for pair in self.octaves.chunks_exact(2).take(BUMP_OCTAVES) {
+            let visibility = math::smoothstep(1.5, 5.0, size / footprint.max(1e-9));
+            if visibility <= 0.0 {
                 break;
             }
-            // Aside of the texture that has the same noise.
-            let coordinates = [place.x / size + 61.3, place.y / size - 17.7].map(Coordinate::from_f64);
+            // Offset, because the texture uses the same noise.
+            let coordinates = [position.x / size + 61.3, position.y / size - 17.7].map(Coordinate::from_f64);
             let slope = [0, 1].map(|axis| f64::from(pair[axis].at(coordinates)) / deviation);
-            tilt += DVec2::from(slope) * (seen * each);
-            rest -= seen * seen * each * each;
+            tilt += DVec2::from(slope) * (visibility * amplitude);
+            unresolved_variance -= visibility * visibility * amplitude * amplitude;
             size *= 0.5;
         }
-        let grain = GRAIN * self.roughness;
-        Facets { tilt, slopes: [math::sqrt(rest), grain], film: FILM_SHARE * film }
+        let grain = GRAIN_SLOPE_RATIO * self.roughness;
+        Microfacets { tilt, slopes: [math::sqrt(unresolved_variance), grain], film: MAX_FILM_FRACTION * film }
     }
 
     /// Mean slope of wet ground, films and grains together.
     pub(super) fn mean_slope(&self) -> f64 {
-        math::lerp(GRAIN, 1.0, 0.5 * FILM_SHARE) * self.roughness
+        math::lerp(GRAIN_SLOPE_RATIO, 1.0, 0.5 * MAX_FILM_FRACTION) * self.roughness
     }
 
-    /// Water stands where the ground lies low.
-    fn puddle(&self, relief: f64) -> f64 {
-        // The quantile at a share p of what is roughly normal is near the logistic's.
-        let share = self.puddles.clamp(1e-6, 1.0 - 1e-6);
-        let level = DEVIATION * math::ln(share / (1.0 - share)) / 1.7;
+    /// Fraction of puddles: water collects where the relief is low.
+    fn puddle_fraction(&self, relief: f64) -> f64 {
+        // The normal quantile at a probability p is approximately the logistic one.
+        let fraction = self.puddles.clamp(1e-6, 1.0 - 1e-6);
+        let level = RELIEF_DEVIATION * math::ln(fraction / (1.0 - fraction)) / 1.7;
         1.0 - math::smoothstep(level - 0.12, level + 0.12, relief)
     }
 }
 
-/// Half of the ground has a film, with soft edges.
-fn film(relief: f64) -> f64 {
-    1.0 - math::smoothstep(-DEVIATION, DEVIATION, relief)
+/// Fraction of film: half of the ground, with soft edges.
+fn film_fraction(relief: f64) -> f64 {
+    1.0 - math::smoothstep(-RELIEF_DEVIATION, RELIEF_DEVIATION, relief)
 }
 
-/// Share of light that water mirrors at an angle with cosine `cos` to its normal (Schlick 1994, n = 1.333).
+/// Fresnel reflectance of water at the cosine of the angle of incidence (Schlick 1994, n = 1.333).
 pub(super) fn fresnel(cos: f64) -> f64 {
     let grazing = 1.0 - cos.clamp(0.0, 1.0);
     let fifth = grazing * grazing * grazing * grazing * grazing;
@@ -149,16 +151,16 @@ mod tests {
 
     #[test]
     fn puddles_cover_the_share_asked_for_and_films_half_of_the_ground() {
-        for share in [0.0, 0.2, 0.6, 1.0] {
-            let parameters = GroundParameters { puddles: share, ..GroundParameters::default() };
+        for fraction in [0.0, 0.2, 0.6, 1.0] {
+            let parameters = GroundParameters { puddles: fraction, ..GroundParameters::default() };
             let surface = Surface::new(&parameters, Key::new(3, "ground"));
             let count = 40_000;
             let at = |i: i32| surface.at(DVec2::new(f64::from(i % 200) * 0.31, f64::from(i / 200) * 0.37), 1e-3);
-            let mean = |of: fn(Patch) -> f64| (0..count).map(|i| of(at(i))).sum::<f64>() / f64::from(count);
-            let (puddle, film) = (mean(|patch| patch.puddle), mean(|patch| patch.film));
-            assert!((puddle - share).abs() < 0.07, "{share}: {puddle}");
+            let mean = |of: fn(SurfaceSample) -> f64| (0..count).map(|i| of(at(i))).sum::<f64>() / f64::from(count);
+            let (puddle, film) = (mean(|sample| sample.puddle), mean(|sample| sample.film));
+            assert!((puddle - fraction).abs() < 0.07, "{fraction}: {puddle}");
             assert!((film - 0.5).abs() < 0.07, "{film}");
-            assert!((surface.at(DVec2::ZERO, 1e3).puddle - share).abs() < 1e-9);
+            assert!((surface.at(DVec2::ZERO, 1e3).puddle - fraction).abs() < 1e-9);
         }
     }
 
@@ -181,8 +183,8 @@ mod tests {
             let mean = values.iter().sum::<f64>() / values.len() as f64;
             values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / values.len() as f64
         };
-        let share = variance(&coarse) / variance(&all);
-        assert!(share < 0.15, "{share}");
+        let fraction = variance(&coarse) / variance(&all);
+        assert!(fraction < 0.15, "{fraction}");
     }
 
     #[test]

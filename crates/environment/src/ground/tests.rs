@@ -90,10 +90,10 @@ fn a_wet_ground_is_darker_and_mirrors_what_fresnel_says() {
     let soaked = at(&drawn(wet.clone(), vec![lamp(2.0)], None), DVec3::ZERO);
     // Without a picture of its surroundings a puddle shows none of them: soaked ground keeps 0.45, under standing water 0.6 of that.
     assert!((soaked / dry - 0.27).abs() < 1e-3, "{}", soaked / dry);
-    let mirrored = at(&drawn(wet, Vec::new(), Some(&mirror)), DVec3::ZERO);
+    let specular = at(&drawn(wet, Vec::new(), Some(&mirror)), DVec3::ZERO);
     // Seen from (0, 2, 6): the cosine to the normal is 2 / sqrt(40).
     let cos = 2.0 / bansho_base::math::sqrt(40.0);
-    assert!((mirrored / (1000.0 * surface::fresnel(cos)) - 1.0).abs() < 0.05, "{mirrored}");
+    assert!((specular / (1000.0 * surface::fresnel(cos)) - 1.0).abs() < 0.05, "{specular}");
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn a_wall_stays_dry_three_centimetres_above_the_ground() {
     let wind = Wind::new(WindParameters::default(), 1, None);
     let surroundings = Surroundings::of_wind(&wind);
     // What the ground lets through of a plate that stands everywhere this high above the ground, in a row 6 m away.
-    let through = |above: f64, plate_tolerance: f64| {
+    let transmittance = |above: f64, plate_tolerance: f64| {
         let wet =
             GroundParameters { kind: GroundKind::Plate, wetness: 1.0.into(), puddles: 0.0, plate_tolerance, ..plain() };
         let row = view.camera.project(DVec3::ZERO).unwrap().pixel.y as usize;
@@ -131,8 +131,8 @@ fn a_wall_stays_dry_three_centimetres_above_the_ground() {
         ground.prepare(&view, &surroundings, &Unobserved).unwrap().draw(&DepthInterval::ALL, &mut strip);
         strip.transmittance(320)[0]
     };
-    assert_eq!(through(0.03, 0.02), 1.0);
-    assert_eq!(through(-0.03, 0.02), 1.0);
-    assert!((through(0.0, 0.02) - 0.45).abs() < 1e-6 && (through(0.01, 0.02) - 0.45).abs() < 1e-6);
-    assert!((through(0.03, 0.05) - 0.45).abs() < 1e-6, "depth that is only a guess");
+    assert_eq!(transmittance(0.03, 0.02), 1.0);
+    assert_eq!(transmittance(-0.03, 0.02), 1.0);
+    assert!((transmittance(0.0, 0.02) - 0.45).abs() < 1e-6 && (transmittance(0.01, 0.02) - 0.45).abs() < 1e-6);
+    assert!((transmittance(0.03, 0.05) - 0.45).abs() < 1e-6, "depth that is only a guess");
 }

@@ -1,4 +1,4 @@
-//! Waves of open water: a sum of deep-water waves that run with the wind, in closed form.
+//! Waves of open water: a sum of deep-water gravity waves in closed form.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,12 +10,12 @@ use bansho_base::{
     world::gravity::STANDARD_GRAVITY,
 };
 
-/// Waves in the sum: enough that their pattern never shows a beat, few enough to be added at every pixel.
-const COUNT: usize = 14;
-/// Longest over shortest wave.
-const RANGE: f64 = 40.0;
-/// How far waves turn from the wind's direction at most.
-const SPREAD: f64 = 0.42 * PI;
+/// Number of waves in the sum: enough to show no beat, few enough to evaluate at every pixel.
+const WAVE_COUNT: usize = 14;
+/// Ratio of the longest to the shortest wavelength.
+const LENGTH_RATIO: f64 = 40.0;
+/// Largest angle between a wave and the wind, radians.
+const MAX_ANGLE: f64 = 0.42 * PI;
 
 /// One wave: slope = amplitude * cos(k . x - omega t + phase) along k.
 #[derive(Clone, Copy, Debug)]
@@ -26,62 +26,67 @@ struct Wave {
     slope: DVec2,
 }
 
-/// Waves at one time.
+/// The waves at one time.
 #[derive(Clone, Debug)]
 pub(super) struct Waves {
     waves: Vec<Wave>,
 }
 
-/// The slope of the water somewhere.
+/// The slope of the water at a position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Slope {
-    /// Rise a metre along x and z.
+pub(super) struct WaveSlope {
+    /// Slope along x and z, of the waves that a pixel resolves.
     pub(super) resolved: DVec2,
-    /// Share of the slope's variance in waves too short to be seen.
+    /// Fraction of the slope variance in waves too short to be resolved.
     pub(super) unresolved: f64,
 }
 
 impl Waves {
-    /// Waves with an r.m.s. `slope`, the longest `longest` m, before a wind toward `heading` at time `t`. In a loop every wave
-    /// repeats after `loop_s` seconds.
+    /// Waves with an r.m.s. `slope` and a maximum wavelength `longest` (m), in a wind toward `heading`, at time `t`. In
+    /// a loop every wave is periodic in `loop_s` seconds.
     pub(super) fn new(key: Key, slope: f64, longest: f64, heading: DVec2, t: f64, loop_s: Option<f64>) -> Self {
         let wave = |index: usize| {
             let words = key.words(index as u64, 0, Purpose::named("wave"));
             let [turn, phase] = [uniform_f64(words[0], words[1]), uniform_f64(words[2], words[3])];
-            let share = index as f64 / (COUNT - 1) as f64;
-            let length = longest * math::pow(RANGE, -share);
-            let along = heading.rotate(unit((2.0 * turn - 1.0) * SPREAD));
+            let fraction = index as f64 / (WAVE_COUNT - 1) as f64;
+            let length = longest * math::pow(LENGTH_RATIO, -fraction);
+            let along = heading.rotate(unit_vector((2.0 * turn - 1.0) * MAX_ANGLE));
             let number = TAU / length;
-            // Deep water: omega^2 = g k.
-            let turns = whole_turns(math::sqrt(STANDARD_GRAVITY * number) / TAU, loop_s) * t;
-            let each = slope * math::sqrt(2.0 / COUNT as f64);
-            Wave { vector: along * number, length, phase: TAU * (phase - turns.rem_euclid(1.0)), slope: along * each }
+            // Dispersion relation of deep water: omega^2 = g k.
+            let frequency = quantize_frequency(math::sqrt(STANDARD_GRAVITY * number) / TAU, loop_s) * t;
+            let amplitude = slope * math::sqrt(2.0 / WAVE_COUNT as f64);
+            Wave {
+                vector: along * number,
+                length,
+                phase: TAU * (phase - frequency.rem_euclid(1.0)),
+                slope: along * amplitude,
+            }
         };
-        Self { waves: (0..COUNT).map(wave).collect() }
+        Self { waves: (0..WAVE_COUNT).map(wave).collect() }
     }
 
-    /// The slope at a `place` (x, z), of which a pixel covers `footprint` m.
-    pub(super) fn slope(&self, place: DVec2, footprint: f64) -> Slope {
-        let mut slope = Slope::default();
+    /// The slope at a position (x, z), filtered with a pixel's `footprint`, m.
+    pub(super) fn slope(&self, position: DVec2, footprint: f64) -> WaveSlope {
+        let mut slope = WaveSlope::default();
         for wave in &self.waves {
-            // A wave shorter than two pixels is not seen as a wave; one of six pixels wholly.
+            // Below two pixels a wave is not resolved, from six pixels on wholly.
             let seen = math::smoothstep(2.0, 6.0, wave.length / footprint.max(1e-9));
             if seen > 0.0 {
-                slope.resolved += wave.slope * (seen * math::cos(wave.vector.dot(place) + wave.phase));
+                slope.resolved += wave.slope * (seen * math::cos(wave.vector.dot(position) + wave.phase));
             }
-            slope.unresolved += (1.0 - seen * seen) / COUNT as f64;
+            slope.unresolved += (1.0 - seen * seen) / WAVE_COUNT as f64;
         }
         slope
     }
 }
 
-/// Turns a second, changed so little that a whole number of them fills the loop.
-fn whole_turns(turns: f64, loop_s: Option<f64>) -> f64 {
-    loop_s.map_or(turns, |seconds| (turns * seconds).round().max(1.0) / seconds)
+/// Rounds a frequency (1/s) to a whole number of periods in the loop.
+fn quantize_frequency(frequency: f64, loop_s: Option<f64>) -> f64 {
+    loop_s.map_or(frequency, |seconds| (frequency * seconds).round().max(1.0) / seconds)
 }
 
 /// The unit vector at an angle.
-fn unit(angle: f64) -> DVec2 {
+fn unit_vector(angle: f64) -> DVec2 {
     let (sin, cos) = math::sin_cos(angle);
     DVec2::new(cos, sin)
 }
@@ -97,19 +102,19 @@ mod tests {
     #[test]
     fn the_slope_has_the_variance_asked_for() {
         let waves = waves(0.0, None);
-        let places = 20_000;
+        let positions = 20_000;
         let square = |index: i32| {
-            let place = DVec2::new(f64::from(index) * 1.37, f64::from(index % 611) * 3.11);
-            waves.slope(place, 0.0).resolved.length_squared()
+            let position = DVec2::new(f64::from(index) * 1.37, f64::from(index % 611) * 3.11);
+            waves.slope(position, 0.0).resolved.length_squared()
         };
-        let mean = (0..places).map(square).sum::<f64>() / f64::from(places);
+        let mean = (0..positions).map(square).sum::<f64>() / f64::from(positions);
         assert!((math::sqrt(mean) / 0.05 - 1.0).abs() < 0.1, "{}", math::sqrt(mean));
     }
 
     #[test]
     fn far_water_has_no_waves_to_be_seen() {
         let slope = waves(0.0, None).slope(DVec2::new(3.0, 4.0), 10.0);
-        assert_eq!(slope, Slope { resolved: DVec2::ZERO, unresolved: slope.unresolved });
+        assert_eq!(slope, WaveSlope { resolved: DVec2::ZERO, unresolved: slope.unresolved });
         assert!((slope.unresolved - 1.0).abs() < 1e-12);
     }
 

@@ -1,4 +1,4 @@
-//! Light that a rough film of water mirrors: the long streaks of lamps on a wet road.
+//! Glossy reflection in a rough film of water: the long highlights of lamps on a wet road.
 
 use std::f64::consts::PI;
 
@@ -9,72 +9,77 @@ use bansho_base::{
 
 use super::surface::fresnel;
 
-/// How the facets of wet ground lie at a place. Their slopes scatter with longer tails than Gaussian ones (Burley 2012: GTR with
-/// exponent 3), so that what shines brightly fades without an edge.
+/// Microfacets of wet ground. The slope distribution has longer tails than a Gaussian (Burley 2012: GTR with exponent
+/// 3), so that highlights fade without an edge.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Facets {
-    /// Slope of the film that is large enough to be seen.
+pub(super) struct Microfacets {
+    /// Mean slope: that of the bumps that are resolved.
     pub(super) tilt: DVec2,
-    /// Slopes of the rest of the film and of the grains that stand out of it: r.m.s. along each axis of Gaussian ones with the same median.
+    /// Slopes of the unresolved film and of the grains that stand out of it: r.m.s. along each axis of a Gaussian with
+    /// the same median.
     pub(super) slopes: [f64; 2],
-    /// Share of the film.
+    /// Fraction of the film.
     pub(super) film: f64,
 }
 
-impl Facets {
-    /// Radiance toward `viewer` for one lux from `light` on a plane that faces it: `F D G / (4 cos_viewer)` (Cook & Torrance 1982).
-    /// The facets of a light that is `width` wide lie so much further apart.
-    fn lobe(&self, light: DVec3, viewer: DVec3, width: f64) -> f64 {
+impl Microfacets {
+    /// Radiance toward `viewer` for an illuminance of one lux from `light` on a plane that faces it: `F D G / (4
+    /// cos_viewer)` (Cook & Torrance 1982). A light of angular diameter `width` widens the distribution.
+    fn specular_lobe(&self, light: DVec3, viewer: DVec3, width: f64) -> f64 {
         let Some(half) = (light + viewer).try_normalize() else { return 0.0 };
         if light.y <= 0.0 || viewer.y <= 0.0 {
             return 0.0;
         }
         let slope = DVec2::new(-half.x, -half.z) / half.y - self.tilt;
         let square = slope.length_squared();
-        let share = |slope: f64| facing(square, math::hypot(slope.max(1e-3), 0.25 * width), light.y, viewer.y);
-        let facets = math::lerp(share(self.slopes[1]), share(self.slopes[0]), self.film);
+        let weight = |slope: f64| {
+            gtr3_distribution_with_masking(square, math::hypot(slope.max(1e-3), 0.25 * width), light.y, viewer.y)
+        };
+        let microfacets = math::lerp(weight(self.slopes[1]), weight(self.slopes[0]), self.film);
         let cos_squared = half.y * half.y;
-        fresnel(viewer.dot(half)) * facets / (4.0 * viewer.y.max(1e-3) * cos_squared * cos_squared)
+        fresnel(viewer.dot(half)) * microfacets / (4.0 * viewer.y.max(1e-3) * cos_squared * cos_squared)
     }
 
     /// Mean slope toward a viewer.
-    fn mean(&self) -> f64 {
+    fn mean_slope(&self) -> f64 {
         math::lerp(self.slopes[1], self.slopes[0], self.film)
     }
 }
 
-/// Density of facets whose slope differs by the root of `square` from the mean, as far as both directions see them (Smith), given their
-/// cosines to the normal.
-fn facing(square: f64, slope: f64, light: f64, viewer: f64) -> f64 {
-    /// Square of the scale at which half of the facets lean as much as of Gaussian ones: `2 ln 2 / (sqrt 2 - 1)`.
+/// GTR distribution D of facets whose slope differs by the root of `square` from the mean, times Smith masking and
+/// shadowing G for the cosines of light and viewer.
+fn gtr3_distribution_with_masking(square: f64, slope: f64, light: f64, viewer: f64) -> f64 {
+    /// Square of the scale at which the median slope equals that of a Gaussian: `2 ln 2 / (sqrt 2 - 1)`.
     const MEDIAN: f64 = 3.346_817;
     let width = MEDIAN * slope * slope;
     let tail = 1.0 + square / width;
-    let hidden = |cos: f64| 0.5 * (math::sqrt(1.0 + width * (1.0 / (cos * cos).max(1e-9) - 1.0)) - 1.0);
-    2.0 / (PI * width * tail * tail * tail * (1.0 + hidden(light) + hidden(viewer)))
+    let masking = |cos: f64| 0.5 * (math::sqrt(1.0 + width * (1.0 / (cos * cos).max(1e-9) - 1.0)) - 1.0);
+    2.0 / (PI * width * tail * tail * tail * (1.0 + masking(light) + masking(viewer)))
 }
 
-/// Radiance from a film of water on level ground at `point`, seen from the unit vector `viewer`; before a `backdrop`, if not the sky.
-pub(super) fn gloss(
+/// Radiance of a film of water on horizontal ground at `point`, toward the unit vector `viewer`. It reflects
+/// `backdrop`, or else the sky.
+pub(super) fn glossy_reflection(
     surroundings: &Surroundings,
     backdrop: Option<[f32; 3]>,
     point: DVec3,
     viewer: DVec3,
-    facets: &Facets,
+    microfacets: &Microfacets,
 ) -> [f32; 3] {
-    // What looks along rough ground sees the facets that lean toward it: they mirror less, and what stands higher.
-    let rise = math::hypot(viewer.y, facets.mean());
-    let mirrored = DVec3::new(-viewer.x, rise, -viewer.z).normalize();
-    let behind = backdrop.unwrap_or_else(|| surroundings.sky.radiance(mirrored));
-    let mut radiance = behind.map(|value| value * fresnel(rise) as f32);
+    // At grazing angles the visible facets are those tilted toward the viewer: they reflect less, and reflect what is
+    // higher.
+    let rise = math::hypot(viewer.y, microfacets.mean_slope());
+    let specular = DVec3::new(-viewer.x, rise, -viewer.z).normalize();
+    let backdrop_radiance = backdrop.unwrap_or_else(|| surroundings.sky.radiance(specular));
+    let mut radiance = backdrop_radiance.map(|value| value * fresnel(rise) as f32);
     for light in &surroundings.others.lights {
         let (illuminance, toward) = light.illuminance(point);
         let width = match light.emitter {
             Emitter::Point { position, radius } => radius / (position - point).length().max(radius),
             Emitter::Directional { .. } | Emitter::Spot { .. } => 0.0,
         };
-        let share = facets.lobe(toward, viewer, width) as f32;
-        (0..3).for_each(|c| radiance[c] = illuminance[c].fma(share, radiance[c]));
+        let weight = microfacets.specular_lobe(toward, viewer, width) as f32;
+        (0..3).for_each(|c| radiance[c] = illuminance[c].fma(weight, radiance[c]));
     }
     radiance
 }
@@ -83,9 +88,9 @@ pub(super) fn gloss(
 mod tests {
     use super::*;
 
-    /// Facets of one kind, none of which is seen by itself.
-    fn even(slope: f64) -> Facets {
-        Facets { tilt: DVec2::ZERO, slopes: [slope; 2], film: 1.0 }
+    /// Microfacets of one kind, none of which is seen by itself.
+    fn even(slope: f64) -> Microfacets {
+        Microfacets { tilt: DVec2::ZERO, slopes: [slope; 2], film: 1.0 }
     }
 
     /// Share of a lux that is mirrored into the whole hemisphere, over what Fresnel says of a level mirror.
@@ -98,7 +103,7 @@ mod tests {
             let across = math::sqrt(1.0 - y * y);
             for turn in 0..turns {
                 let (sin, cos) = math::sin_cos(f64::from(turn) / f64::from(turns) * 2.0 * PI);
-                sum += even(slope).lobe(light, DVec3::new(across * cos, y, across * sin), 0.0) * y;
+                sum += even(slope).specular_lobe(light, DVec3::new(across * cos, y, across * sin), 0.0) * y;
             }
         }
         sum * 2.0 * PI / f64::from(rings * turns) / (light.y * fresnel(light.y))
@@ -108,8 +113,8 @@ mod tests {
     fn a_little_rough_water_mirrors_as_much_as_calm_water() {
         let light = DVec3::new(0.6, 0.8, 0.0);
         for slope in [0.03, 0.08] {
-            let share = mirrored_share(light, slope);
-            assert!((share - 1.0).abs() < 0.06, "slope {slope}: {share}");
+            let weight = mirrored_share(light, slope);
+            assert!((weight - 1.0).abs() < 0.06, "slope {slope}: {weight}");
         }
     }
 
@@ -120,7 +125,7 @@ mod tests {
             DVec3::new(-cos, rise, sin).normalize()
         };
         let light = DVec3::new(1.0, 0.2, 0.0).normalize();
-        let at = |turn, rise| even(0.06).lobe(light, viewer(turn, rise), 0.0);
+        let at = |turn, rise| even(0.06).specular_lobe(light, viewer(turn, rise), 0.0);
         let straight = at(0.0, 0.2);
         assert!(at(0.0, 0.3) > 0.3 * straight, "0.1 radians up");
         assert!(at(0.1, 0.2) < 0.3 * straight, "0.1 radians sideways");
@@ -129,10 +134,10 @@ mod tests {
     #[test]
     fn a_lamp_fades_without_an_edge() {
         let light = DVec3::new(1.0, 0.2, 0.0).normalize();
-        let facets = Facets { tilt: DVec2::ZERO, slopes: [0.04, 0.16], film: 0.5 };
+        let microfacets = Microfacets { tilt: DVec2::ZERO, slopes: [0.04, 0.16], film: 0.5 };
         let at = |step: i32| {
             let (sin, cos) = math::sin_cos(1e-3 * f64::from(step));
-            facets.lobe(light, DVec3::new(-cos, 0.2, sin).normalize(), 0.0)
+            microfacets.specular_lobe(light, DVec3::new(-cos, 0.2, sin).normalize(), 0.0)
         };
         // From one pixel of a usual lens to the next; a Gaussian's tail loses a third.
         assert!((0..400).all(|step| at(step + 1) < at(step) && at(step + 1) > 0.85 * at(step)));
@@ -143,7 +148,7 @@ mod tests {
         let (light, viewer) = (DVec3::new(0.6, 0.8, 0.0), DVec3::new(-0.6, 0.8, 0.1).normalize());
         let half = (light + viewer).normalize();
         let tilt = DVec2::new(-half.x, -half.z) / half.y;
-        let lobe = |tilt| Facets { tilt, ..even(0.03) }.lobe(light, viewer, 0.0);
+        let lobe = |tilt| Microfacets { tilt, ..even(0.03) }.specular_lobe(light, viewer, 0.0);
         assert!(lobe(tilt) > lobe(DVec2::ZERO) && lobe(tilt) > lobe(2.0 * tilt));
     }
 }

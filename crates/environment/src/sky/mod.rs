@@ -1,4 +1,29 @@
-//! The sky as a backdrop: what lies behind everything where there is no plate.
+//! The sky as a background, where there is no plate: by day, at twilight or at night, with a skyline of hills and
+//! trees.
+//!
+//! The radiance model itself is [`Sky`], since it also lights other things; this module draws it. By night it adds
+//! stars and the Milky Way.
+//!
+//! # References
+//! - Allen's Astrophysical Quantities, 4th edition (2000): numbers of stars by magnitude.
+//! - A. F. J. Moffat, Astron. Astrophys. 3 (1969): point spread function of a star's image.
+//!
+//! # Equations
+//!
+//! | equation | function |
+//! | --- | --- |
+//! | radiance by day, by elevation | [`Sky::radiance_at_elevations`] |
+//! | radiance by night: an almucantar's even part, twilight glow and Milky Way | `night::NightSky::radiance` |
+//! | number of stars brighter than a magnitude | `stars::log_count`, `stars::magnitude_of_rank` |
+//! | illuminance of a star, `2.54e-6 lux * 10^(-0.4 m)` | `stars::star` |
+//! | Moffat's point spread function, `(1 + (r / core)^2)^-5/2` | `stars::StarImage::psf_row` |
+//!
+//! # Data flow
+//! [`SkyBackdrop`] makes stars and skyline once. For a frame, `night::NightSky` tabulates the night by elevation, and
+//! `stars` projects the visible stars into images; both are kept in a `row_cache::SkyCache` for following frames with
+//! the same camera and sky. `PreparedSky` draws rows of sixteen pixels at a time, averaged over the cameras of the
+//! exposure: first the hills of `skyline` at their distance, then the sky behind everything else, with the stars added
+//! where nothing hides it.
 
 mod night;
 mod row_cache;
@@ -27,9 +52,9 @@ use bansho_base::{
 
 use fearless_simd::{Level, Simd, dispatch};
 use night::NightSky;
-use row_cache::{SkyRow, Still};
+use row_cache::{SkyCache, SkyRow};
 use skyline::Skyline;
-use stars::{MOST_PIXELS, Stars};
+use stars::{MAX_IMAGE_WIDTH, Stars};
 
 /// The sky of a scene, infinitely far and opaque, with hills before it; at night with stars.
 pub struct SkyBackdrop {
@@ -37,7 +62,7 @@ pub struct SkyBackdrop {
     stars: Option<Stars>,
     skyline: Option<Skyline>,
     /// What the frame before showed, which the next one shows again if neither camera nor sky change.
-    still: Mutex<Option<Still>>,
+    cache: Mutex<Option<SkyCache>>,
 }
 
 impl SkyBackdrop {
@@ -48,29 +73,29 @@ impl SkyBackdrop {
     pub fn new(parameters: SkyParameters, seed: u64) -> Self {
         let night = parameters.kind == SkyKind::Night;
         let stars = (night && parameters.night.stars > 0.0).then(|| Stars::new(seed));
-        Self { stars, skyline: Skyline::new(&parameters, seed), parameters, still: Mutex::default() }
+        Self { stars, skyline: Skyline::new(&parameters, seed), parameters, cache: Mutex::default() }
     }
 
     /// The night that a sky shows in a view; none by day.
-    fn still(&self, sky: &Sky, view: &View, cameras: &[Camera]) -> Option<Still> {
+    fn cache(&self, sky: &Sky, view: &View, cameras: &[Camera]) -> Option<SkyCache> {
         let night = sky.night()?;
         // The lock is never held while threads work together.
-        let kept = || self.still.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(still) = kept().as_mut().filter(|still| still.is_of(cameras, view.size, sky)) {
-            still.keep_rows();
-            return Some(still.clone());
+        let cached = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(cache) = cached().as_mut().filter(|cache| cache.matches(cameras, view.size, sky)) {
+            cache.enable_row_cache();
+            return Some(cache.clone());
         }
-        let spots = self.stars.as_ref().map(|stars| stars.spots(view, night, self.parameters.night.stars));
-        let still = Still {
+        let star_images = self.stars.as_ref().map(|stars| stars.star_images(view, night, self.parameters.night.stars));
+        let cache = SkyCache {
             cameras: cameras.to_vec(),
             size: view.size,
             sky: *sky,
             night: Arc::new(NightSky::new(sky, night, self.parameters.night.milky_way)),
-            spots: Arc::new(spots.unwrap_or_default()),
+            star_images: Arc::new(star_images.unwrap_or_default()),
             rows: None,
         };
-        *kept() = Some(still.clone());
-        Some(still)
+        *cached() = Some(cache.clone());
+        Some(cache)
     }
 
     /// Where the hills stand.
@@ -80,9 +105,9 @@ impl SkyBackdrop {
     }
 }
 
-/// Behind everything that has a depth.
+/// Depth of the sky: behind everything.
 const FAR: DepthInterval = DepthInterval { near: 1e12, far: f64::INFINITY };
-/// Light of hills and trees beside that of the sky overhead.
+/// Radiance of hills and trees relative to the zenith.
 const HILL_SHADE: f32 = 0.04;
 
 impl Phenomenon for SkyBackdrop {
@@ -116,8 +141,8 @@ impl Run for SkyBackdrop {
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         let sky = surroundings.sky;
         let cameras = view.cameras();
-        let still = self.still(&sky, view, &cameras);
-        Ok(Box::new(PreparedSky { view, cameras, sky, still, skyline: self.skyline.as_ref(), hills: self.hills() }))
+        let cache = self.cache(&sky, view, &cameras);
+        Ok(Box::new(PreparedSky { view, cameras, sky, cache, skyline: self.skyline.as_ref(), hills: self.hills() }))
     }
 }
 
@@ -127,7 +152,7 @@ struct PreparedSky<'a> {
     cameras: Vec<Camera>,
     sky: Sky,
     /// The night; none by day.
-    still: Option<Still>,
+    cache: Option<SkyCache>,
     skyline: Option<&'a Skyline>,
     /// Where it stands.
     hills: DepthInterval,
@@ -138,19 +163,19 @@ impl PreparedSky<'_> {
     fn draw_sky<S: Simd>(&self, simd: S, strip: &mut Strip) {
         let rect = strip.rect;
         let far = vec![f32::INFINITY; rect.width];
-        let mut own = SkyRow::default();
+        let mut uncached = SkyRow::default();
         for y in rect.y..rect.bottom() {
             let first = (y - rect.y) * rect.width;
-            let kept = if rect.width == self.view.size[0] { self.kept_row(simd, y) } else { None };
-            let row = match kept {
+            let cached = if rect.width == self.view.size[0] { self.cached_row(simd, y) } else { None };
+            let row = match cached {
                 Some(row) if !strip.has_plate() => row,
                 _ => {
-                    match kept {
-                        Some(row) => own.clone_from(row),
-                        None => self.fill_row(simd, &mut own, y, rect.x..rect.right()),
+                    match cached {
+                        Some(row) => uncached.clone_from(row),
+                        None => self.fill_row(simd, &mut uncached, y, rect.x..rect.right()),
                     }
-                    own.hide_behind(strip, first);
-                    &own
+                    uncached.mask_by_plate(strip, first);
+                    &uncached
                 }
             };
             let [red, green, blue] = &row.planes;
@@ -158,12 +183,12 @@ impl PreparedSky<'_> {
         }
     }
 
-    /// A whole row of the picture, if such are kept.
+    /// A complete row of the picture from the cache, if there is one.
     #[inline(always)]
-    fn kept_row<S: Simd>(&self, simd: S, y: usize) -> Option<&SkyRow> {
-        let row = self.still.as_ref()?.rows.as_ref()?.get(y)?;
+    fn cached_row<S: Simd>(&self, simd: S, y: usize) -> Option<&SkyRow> {
+        let row = self.cache.as_ref()?.rows.as_ref()?.get(y)?;
         if row.get().is_none() {
-            // Not within a closure, which would be compiled without the machine's vectors.
+            // Not in a closure, which would be compiled without the target features of `S`.
             let mut drawn = SkyRow::default();
             self.fill_row(simd, &mut drawn, y, 0..self.view.size[0]);
             return Some(row.get_or_init(|| drawn));
@@ -171,21 +196,21 @@ impl PreparedSky<'_> {
         row.get()
     }
 
-    /// Draws pixels of row `y`, whatever is before them.
+    /// Draws pixels of row `y`, ignoring the plate.
     #[inline(always)]
     fn fill_row<S: Simd>(&self, simd: S, row: &mut SkyRow, y: usize, pixels: Range<usize>) {
-        let share = 1.0 / self.cameras.len() as f32;
+        let weight = 1.0 / self.cameras.len() as f32;
         row.clear(pixels.len());
-        // Batches lie on the picture's own grid, so that a crop changes no pixel.
+        // Batches are aligned to the picture, so that a crop changes no pixel.
         let mut x = pixels.start / LANES * LANES;
         while x < pixels.end {
             for camera in &self.cameras {
                 let mut directions = Directions::new(camera, x, y);
                 directions.normalize();
-                let colours = self.radiance(simd, &directions);
+                let colors = self.radiance(simd, &directions);
                 for i in pixels.start.max(x) - x..pixels.end.min(x + LANES) - x {
                     if directions.seen[i] {
-                        row.add(x + i - pixels.start, colours[i], share);
+                        row.add(x + i - pixels.start, colors[i], weight);
                     }
                 }
             }
@@ -194,52 +219,52 @@ impl PreparedSky<'_> {
         self.add_stars(row, y, pixels);
     }
 
-    /// Radiance from directions, red, green, blue and nothing.
+    /// Radiance in batches of directions: red, green, blue and 0.
     #[inline(always)]
     fn radiance<S: Simd>(&self, simd: S, directions: &Directions) -> [[f32; 4]; LANES] {
-        if let Some(still) = &self.still {
-            return still.night.radiance(simd, directions);
+        if let Some(cache) = &self.cache {
+            return cache.night.radiance(simd, directions);
         }
-        let mut colours = [[0.0; 4]; LANES];
+        let mut colors = [[0.0; 4]; LANES];
         if let Some(planes) = self.sky.radiance_at_elevations(&directions.axes[1]) {
             for i in 0..LANES {
                 for c in 0..3 {
-                    colours[i][c] = planes[c][i];
+                    colors[i][c] = planes[c][i];
                 }
             }
         }
-        colours
+        colors
     }
 
-    /// Adds the stars of one row where the sky is seen.
+    /// Adds the stars of one row where the sky is visible.
     #[inline(always)]
     fn add_stars(&self, row: &mut SkyRow, y: usize, pixels: Range<usize>) {
-        let spots = self.still.as_ref().map_or(&[][..], |still| &still.spots);
-        let from = spots.partition_point(|spot| spot.pixel.y < y as f64 - 12.0);
-        for spot in &spots[from..] {
-            if spot.pixel.y >= y as f64 + 12.0 {
+        let star_images = self.cache.as_ref().map_or(&[][..], |cache| &cache.star_images);
+        let from = star_images.partition_point(|image| image.pixel.y < y as f64 - 12.0);
+        for image in &star_images[from..] {
+            if image.pixel.y >= y as f64 + 12.0 {
                 return;
             }
-            if (y as f64 + 0.5 - spot.pixel.y).abs() >= spot.reach {
+            if (y as f64 + 0.5 - image.pixel.y).abs() >= image.radius {
                 continue;
             }
-            let low = (spot.pixel.x - spot.reach).floor().max(pixels.start as f64) as usize;
-            let high = (spot.pixel.x + spot.reach).ceil().clamp(0.0, pixels.end as f64) as usize;
+            let low = (image.pixel.x - image.radius).floor().max(pixels.start as f64) as usize;
+            let high = (image.pixel.x + image.radius).ceil().clamp(0.0, pixels.end as f64) as usize;
             if low >= high {
                 continue;
             }
-            let shapes = spot.row(low, y);
-            for x in low..high.min(low + MOST_PIXELS) {
+            let shapes = image.psf_row(low, y);
+            for x in low..high.min(low + MAX_IMAGE_WIDTH) {
                 let at = x - pixels.start;
                 let shape = shapes[x - low] * row.opacity[at];
                 for c in 0..3 {
-                    row.planes[c][at] = spot.radiance[c].fma(shape, row.planes[c][at]);
+                    row.planes[c][at] = image.radiance[c].fma(shape, row.planes[c][at]);
                 }
             }
         }
     }
 
-    /// Hills and trees, black before the sky.
+    /// Draws hills and trees as a dark silhouette.
     #[inline(always)]
     fn draw_hills(&self, skyline: &Skyline, strip: &mut Strip) {
         let rect = strip.rect;
@@ -254,64 +279,64 @@ impl PreparedSky<'_> {
             }
             let inside = rect.x.max(x) - x..rect.right().min(x + LANES) - x;
             for y in rect.y..rect.bottom() {
-                let mut covers = self.covers(skyline, x, y);
+                let mut coverage = self.coverage(skyline, x, y);
                 let first = (y - rect.y) * rect.width + x + inside.start - rect.x;
                 if strip.has_plate() {
                     for i in inside.clone() {
-                        covers[i] = if strip.visible(first + i - inside.start, near) { covers[i] } else { 0.0 };
+                        coverage[i] = if strip.visible(first + i - inside.start, near) { coverage[i] } else { 0.0 };
                     }
                 }
-                if covers == [0.0; LANES] {
+                if coverage == [0.0; LANES] {
                     continue;
                 }
                 let (mut planes, mut depths) = ([[0.0; LANES]; 3], [f32::INFINITY; LANES]);
                 for i in 0..LANES {
                     for c in 0..3 {
-                        planes[c][i] = shade[c] * covers[i];
+                        planes[c][i] = shade[c] * coverage[i];
                     }
-                    depths[i] = if covers[i] > 0.0 { near } else { f32::INFINITY };
+                    depths[i] = if coverage[i] > 0.0 { near } else { f32::INFINITY };
                 }
                 let [red, green, blue] = &planes;
                 let light = [&red[inside.clone()], &green[inside.clone()], &blue[inside.clone()]];
-                strip.add_row_behind(first, light, Some(&covers[inside.clone()]), &depths[inside.clone()]);
+                strip.add_row_behind(first, light, Some(&coverage[inside.clone()]), &depths[inside.clone()]);
             }
             x += LANES;
         }
     }
 
-    /// How much of the pixels from `x` on in row `y` the hills hide, while the shutter is open.
+    /// Coverage of pixels from `x` on in row `y` by the hills, averaged over the exposure.
     #[inline(always)]
-    fn covers(&self, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
-        let share = 1.0 / self.cameras.len() as f32;
+    fn coverage(&self, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
+        let weight = 1.0 / self.cameras.len() as f32;
         let mut mean = [0.0; LANES];
         for camera in &self.cameras {
-            let covers = covers_at(camera, skyline, x, y);
+            let coverage = hill_coverage(camera, skyline, x, y);
             for i in 0..LANES {
-                mean[i] = covers[i].fma(share, mean[i]);
+                mean[i] = coverage[i].fma(weight, mean[i]);
             }
         }
         mean
     }
 
-    /// Whether the pixels of a strip from `x` on surely look higher than at that sine of the elevation.
+    /// Conservative test: whether all pixels of a strip from `x` on are above this sine of the elevation.
     fn is_above(&self, rect: Rect, x: usize, sine: f32) -> bool {
-        // From corner to corner the sine hardly bends.
+        // Bound on the deviation of the sine from linear interpolation between the corners.
         let angle = LANES as f64 / self.view.camera.focal_pixels;
-        let least = f64::from(sine) + angle * angle;
+        let min_sine = f64::from(sine) + angle * angle;
         let rows = [rect.y, rect.bottom()].map(|y| y as f64);
         let mut corners = rows.into_iter().flat_map(|y| [x, x + LANES].map(|x| DVec2::new(x as f64, y)));
         let is_above = |corner: DVec2| {
             self.cameras
                 .iter()
-                .all(|camera| camera.direction(corner).is_some_and(|toward| toward.y > least * toward.length()))
+                .all(|camera| camera.direction(corner).is_some_and(|toward| toward.y > min_sine * toward.length()))
         };
         corners.all(is_above)
     }
 }
 
-/// How much of the pixels from `x` on in row `y` of a camera the hills hide.
+/// Coverage of pixels from `x` on in row `y` by the hills, for one camera.
 #[inline(always)]
-fn covers_at(camera: &Camera, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
+fn hill_coverage(camera: &Camera, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
     let sharpness = camera.focal_pixels as f32;
     let mut directions = Directions::new(camera, x, y);
     directions.normalize();
@@ -321,9 +346,9 @@ fn covers_at(camera: &Camera, skyline: &Skyline, x: usize, y: usize) -> [f32; LA
         above &= sines[i] > skyline.highest + 1.0 / sharpness;
         below &= sines[i] < skyline.lowest - 1.0 / sharpness;
     }
-    let (mut covers, mut turns) = ([0.0; LANES], [0.0; LANES]);
+    let (mut coverage, mut turns) = ([0.0; LANES], [0.0; LANES]);
     if above {
-        return covers;
+        return coverage;
     }
     if !below {
         for i in 0..LANES {
@@ -333,9 +358,9 @@ fn covers_at(camera: &Camera, skyline: &Skyline, x: usize, y: usize) -> [f32; LA
     for i in 0..LANES {
         let hidden = if below { 1.0 } else { skyline.sine(turns[i]) };
         let cover = (hidden - sines[i]).fma(sharpness, 0.5).clamp(0.0, 1.0);
-        covers[i] = if seen[i] { cover } else { 0.0 };
+        coverage[i] = if seen[i] { cover } else { 0.0 };
     }
-    covers
+    coverage
 }
 
 impl Prepared for PreparedSky<'_> {
@@ -453,8 +478,8 @@ mod tests {
             assert!(night_in(&shown, rect, has_plate) == first, "{rect:?}, plate: {has_plate}");
             assert_eq!(first[1].contains(&0.0), has_plate);
         }
-        let kept = shown.still.lock().unwrap_or_else(PoisonError::into_inner);
-        let rows = kept.as_ref().and_then(|still| still.rows.clone()).expect("it was shown again");
+        let cached = shown.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        let rows = cached.as_ref().and_then(|cache| cache.rows.clone()).expect("it was shown again");
         assert!(rows.iter().all(|row| row.get().is_some()));
     }
 

@@ -1,36 +1,36 @@
-//! What a night shows through a camera, which pictures show again as long as neither camera nor sky change.
+//! Cache of a night sky: reused by following frames while neither camera nor sky change.
 
 use std::sync::{Arc, OnceLock};
 
 use bansho_base::{camera::Camera, math::MulAdd, phenomenon::strip::Strip, world::sky::Sky};
 
-use super::{FAR, night::NightSky, stars::Spot};
+use super::{FAR, night::NightSky, stars::StarImage};
 
-/// Larger pictures are not kept: 16 bytes a pixel.
-const MOST_KEPT: usize = 1 << 22;
+/// Largest picture whose rows are cached, pixels: 16 bytes each.
+const MAX_CACHED_PIXELS: usize = 1 << 22;
 
-/// A night through a camera.
+/// A night sky through a camera.
 #[derive(Clone)]
-pub(super) struct Still {
+pub(super) struct SkyCache {
     pub(super) cameras: Vec<Camera>,
     pub(super) size: [usize; 2],
     pub(super) sky: Sky,
     pub(super) night: Arc<NightSky>,
     /// Stars, from the top down.
-    pub(super) spots: Arc<Vec<Spot>>,
-    /// Its whole rows, as they are drawn; none before a second picture shows it.
+    pub(super) star_images: Arc<Vec<StarImage>>,
+    /// Finished rows; `None` until a second frame shows the same sky.
     pub(super) rows: Option<Arc<Vec<OnceLock<SkyRow>>>>,
 }
 
-impl Still {
-    /// Whether a picture through these cameras shows the same.
-    pub(super) fn is_of(&self, cameras: &[Camera], size: [usize; 2], sky: &Sky) -> bool {
+impl SkyCache {
+    /// Whether a frame through these cameras shows the same.
+    pub(super) fn matches(&self, cameras: &[Camera], size: [usize; 2], sky: &Sky) -> bool {
         self.cameras == cameras && self.size == size && self.sky == *sky
     }
 
-    /// Keeps what is drawn from now on.
-    pub(super) fn keep_rows(&mut self) {
-        if self.rows.is_none() && self.size[0] * self.size[1] <= MOST_KEPT {
+    /// Caches rows from now on.
+    pub(super) fn enable_row_cache(&mut self) {
+        if self.rows.is_none() && self.size[0] * self.size[1] <= MAX_CACHED_PIXELS {
             self.rows = Some(Arc::new((0..self.size[1]).map(|_| OnceLock::new()).collect()));
         }
     }
@@ -44,7 +44,7 @@ pub(super) struct SkyRow {
 }
 
 impl SkyRow {
-    /// Nothing, so wide.
+    /// Clears it to a width.
     pub(super) fn clear(&mut self, width: usize) {
         for plane in self.planes.iter_mut().chain([&mut self.opacity]) {
             plane.clear();
@@ -52,18 +52,18 @@ impl SkyRow {
         }
     }
 
-    /// Adds the sky of a part of the exposure.
+    /// Adds the sky of one camera of the exposure.
     #[inline(always)]
-    pub(super) fn add(&mut self, x: usize, [red, green, blue, _]: [f32; 4], share: f32) {
+    pub(super) fn add(&mut self, x: usize, [red, green, blue, _]: [f32; 4], weight: f32) {
         let [reds, greens, blues] = &mut self.planes;
-        reds[x] = red.fma(share, reds[x]);
-        greens[x] = green.fma(share, greens[x]);
-        blues[x] = blue.fma(share, blues[x]);
-        self.opacity[x] = (self.opacity[x] + share).min(1.0);
+        reds[x] = red.fma(weight, reds[x]);
+        greens[x] = green.fma(weight, greens[x]);
+        blues[x] = blue.fma(weight, blues[x]);
+        self.opacity[x] = (self.opacity[x] + weight).min(1.0);
     }
 
-    /// Leaves out what is behind the plate of a strip, in which the row begins at pixel `first`.
-    pub(super) fn hide_behind(&mut self, strip: &Strip, first: usize) {
+    /// Clears the pixels in which the plate of a strip hides the sky; the row begins at pixel `first` of the strip.
+    pub(super) fn mask_by_plate(&mut self, strip: &Strip, first: usize) {
         if !strip.has_plate() {
             return;
         }

@@ -1,4 +1,4 @@
-//! Hills and trees along the horizon: how high they stand by direction.
+//! The skyline of hills and trees: elevation by azimuth.
 
 use bansho_base::{
     math::{
@@ -10,36 +10,37 @@ use bansho_base::{
 
 /// Samples around the horizon, a power of two.
 const SAMPLES: usize = 1 << 15;
-/// Octaves of the hills; the first has so many waves around.
+/// Octaves of the hills, and waves around the horizon in the first.
 const OCTAVES: u32 = 7;
 const FIRST_WAVES: u64 = 5;
-/// Trees for each width of a tree: a closed wood.
-const DENSITY: f64 = 3.0;
-/// Width of a tree beside its height.
-const SLENDERNESS: f64 = 0.42;
+/// Trees for each width of a tree: a closed forest.
+const TREE_DENSITY: f64 = 3.0;
+/// Width of a tree relative to its height.
+const TREE_WIDTH_RATIO: f64 = 0.42;
 
 const HILL: Purpose = Purpose::named("skyline hill");
 const TREE: Purpose = Purpose::named("skyline tree");
 
-/// Sine of the elevation that is hidden, all around from north over east.
+/// Sine of the hidden elevation by azimuth, from north over east.
 #[derive(Clone, Debug)]
 pub(super) struct Skyline {
     sines: Vec<f32>,
-    /// The highest and the lowest.
+    /// Maximum and minimum.
     pub(super) highest: f32,
     pub(super) lowest: f32,
 }
 
 impl Skyline {
-    /// Hills and trees; none where neither has any height.
+    /// The skyline; `None` if hills and trees have no height.
     pub(super) fn new(parameters: &SkyParameters, seed: u64) -> Option<Self> {
         if parameters.hills_deg == 0.0 && parameters.trees_deg == 0.0 {
             return None;
         }
         let key = Key::new(seed, "skyline");
-        let mut heights: Vec<f64> = (0..SAMPLES).map(|sample| parameters.hills_deg * hill(key, sample)).collect();
+        let mut heights: Vec<f64> =
+            (0..SAMPLES).map(|sample| parameters.hills_deg * hill_height(key, sample)).collect();
         if parameters.trees_deg > 0.0 {
-            plant(&mut heights, parameters.trees_deg, key);
+            add_trees(&mut heights, parameters.trees_deg, key);
         }
         let sines: Vec<f32> = heights.iter().map(|height| math::sin(height.to_radians()) as f32).collect();
         let highest = sines.iter().copied().fold(0.0, f32::max);
@@ -47,49 +48,49 @@ impl Skyline {
         Some(Self { sines, highest, lowest })
     }
 
-    /// Sine of the elevation that is hidden in a direction, in turns from north over east within -1 to 1.
+    /// Sine of the hidden elevation at an azimuth in turns from north over east, -1 to 1.
     #[inline(always)]
     pub(super) fn sine(&self, turns: f32) -> f32 {
         const MASK: u32 = SAMPLES as u32 - 1;
-        let place = (turns + 1.0).fma(SAMPLES as f32, -0.5);
-        let first = place as u32;
-        let part = place - first as f32;
+        let position = (turns + 1.0).fma(SAMPLES as f32, -0.5);
+        let first = position as u32;
+        let fraction = position - first as f32;
         let (low, high) = (self.sines[(first & MASK) as usize], self.sines[((first + 1) & MASK) as usize]);
-        part.fma(high - low, low)
+        fraction.fma(high - low, low)
     }
 }
 
-/// Height of the hills at a sample, 0 to 1.
-fn hill(key: Key, sample: usize) -> f64 {
-    let place = sample as f64 / SAMPLES as f64;
+/// Height of the hills at a sample, 0 to 1: value noise.
+fn hill_height(key: Key, sample: usize) -> f64 {
+    let position = sample as f64 / SAMPLES as f64;
     let mut sum = 0.0;
     for octave in 0..OCTAVES {
         let waves = FIRST_WAVES << octave;
-        let at = place * waves as f64;
-        let (cell, part) = (at as u64, at - at.floor());
+        let at = position * waves as f64;
+        let (cell, fraction) = (at as u64, at - at.floor());
         let value = |cell: u64| f64::from(key.uniforms(cell % waves, octave, HILL)[0]);
-        let blend = part * part * (3.0 - 2.0 * part);
+        let blend = fraction * fraction * (3.0 - 2.0 * fraction);
         sum += math::lerp(value(cell), value(cell + 1), blend) * math::pow(0.45, f64::from(octave));
     }
     sum * 0.55
 }
 
-/// Stands trees on the hills.
-fn plant(heights: &mut [f64], tree_deg: f64, key: Key) {
+/// Adds trees to the hills.
+fn add_trees(heights: &mut [f64], tree_deg: f64, key: Key) {
     let degrees_per_sample = 360.0 / SAMPLES as f64;
-    let count = (360.0 / (tree_deg * SLENDERNESS) * DENSITY) as u64;
+    let count = (360.0 / (tree_deg * TREE_WIDTH_RATIO) * TREE_DENSITY) as u64;
     let hills = heights.to_vec();
     for number in 0..count.min(SAMPLES as u64) {
-        let [place, size, shape, lean] = key.uniforms(number, 0, TREE).map(f64::from);
-        let middle = place * SAMPLES as f64;
+        let [position, size, shape, lean] = key.uniforms(number, 0, TREE).map(f64::from);
+        let middle = position * SAMPLES as f64;
         let height = tree_deg * (0.4 + 0.6 * size * size);
-        let half = (0.5 * SLENDERNESS * (0.6 + 0.8 * shape) * height / degrees_per_sample).max(1.0);
+        let half = (0.5 * TREE_WIDTH_RATIO * (0.6 + 0.8 * shape) * height / degrees_per_sample).max(1.0);
         let foot = hills[middle as usize % SAMPLES];
         for sample in (middle - half).ceil() as i64..=(middle + half).floor() as i64 {
-            let away = (sample as f64 - middle - lean * 0.2 * half).abs() / half;
-            // Branches hang in tiers: a spruce's ragged cone.
-            let tier = (away * 6.0 + size * 7.0).fract() * 0.09;
-            let top = foot + height * (1.0 - away - tier).max(0.0);
+            let distance = (sample as f64 - middle - lean * 0.2 * half).abs() / half;
+            // Branches in tiers: the ragged cone of a spruce.
+            let tier = (distance * 6.0 + size * 7.0).fract() * 0.09;
+            let top = foot + height * (1.0 - distance - tier).max(0.0);
             let slot = &mut heights[sample.rem_euclid(SAMPLES as i64) as usize];
             *slot = slot.max(top);
         }

@@ -1,13 +1,15 @@
 //! The attributes of an OpenEXR header, as bytes ("OpenEXR File Layout": name, type, size, value; little-endian).
 
-use super::{
-    KEY_COLOR_SPACE, KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_FISHEYE_FOV, KEY_LENS, KEY_VERSION, plane::Plane,
-};
-use crate::{animation::timing, stamp};
 use bansho_base::{
     color::white_balance::chromaticity,
     image::{CameraHeader, FrameHeader, Precision},
 };
+
+use super::{
+    KEY_COLOR_SPACE, KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_FISHEYE_FOV, KEY_LENS, KEY_VERSION,
+    plane::ChannelPlane,
+};
+use crate::{film::timing, output::fingerprint};
 
 /// CIE xy of the ACEScg (AP1) red, green and blue and of its white, D60 (SMPTE ST 2065-4, S-2014-004).
 pub(crate) const AP1: [[f32; 2]; 4] = [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]];
@@ -34,14 +36,19 @@ pub(crate) struct HeaderBytes(Vec<u8>);
 
 /// A frame rate as the format holds it: its numerator has a sign.
 fn rational(fps: [u32; 2]) -> [u32; 2] {
-    const MOST: u32 = i32::MAX.cast_unsigned();
-    if fps[0] <= MOST { fps } else { timing::within(fps, MOST).unwrap_or(fps) }
+    const MAX: u32 = i32::MAX.cast_unsigned();
+    if fps[0] <= MAX { fps } else { timing::approximate(fps, MAX).unwrap_or(fps) }
 }
 
 /// The header of a frame and where in it the 64 digits of the digest go, which are zeros here.
 ///
 /// No attribute depends on time, host or path, and their order is fixed.
-pub(crate) fn header(frame: &FrameHeader, planes: &[Plane<'_>], data: Window, display: Window) -> (Vec<u8>, usize) {
+pub(crate) fn header(
+    frame: &FrameHeader,
+    planes: &[ChannelPlane<'_>],
+    data: Window,
+    display: Window,
+) -> (Vec<u8>, usize) {
     let mut bytes = HeaderBytes::begin(planes.iter().any(|plane| plane.name.len() > 31));
     bytes.attribute("channels", "chlist", &channel_list(planes));
     bytes.attribute("compression", "compression", &[COMPRESSION_ZIP16]);
@@ -63,9 +70,9 @@ pub(crate) fn header(frame: &FrameHeader, planes: &[Plane<'_>], data: Window, di
     bytes.floats(KEY_EXPOSURE, "float", &[frame.exposure_ev100]);
     bytes.floats("worldToCamera", "m44f", frame.camera.world_to_camera.as_flattened());
     lens(&frame.camera, &mut bytes);
-    bytes.attribute("software", "string", format!("Bansho {}", stamp::VERSION).as_bytes());
-    bytes.attribute(KEY_VERSION, "string", stamp::VERSION.as_bytes());
-    bytes.attribute(KEY_FINGERPRINT, "string", stamp::to_hex(&frame.fingerprint).as_bytes());
+    bytes.attribute("software", "string", format!("Bansho {}", fingerprint::VERSION).as_bytes());
+    bytes.attribute(KEY_VERSION, "string", fingerprint::VERSION.as_bytes());
+    bytes.attribute(KEY_FINGERPRINT, "string", fingerprint::to_hex(&frame.fingerprint).as_bytes());
     bytes.attribute(KEY_DIGEST, "string", &[b'0'; 64]);
     let HeaderBytes(mut bytes) = bytes;
     let digest_at = bytes.len() - 64;
@@ -116,7 +123,7 @@ impl HeaderBytes {
     }
 }
 
-fn channel_list(planes: &[Plane<'_>]) -> Vec<u8> {
+fn channel_list(planes: &[ChannelPlane<'_>]) -> Vec<u8> {
     let mut list = Vec::new();
     for plane in planes {
         list.extend(plane.name.as_bytes());

@@ -1,4 +1,4 @@
-//! OpenEXR plates: colour and depth of any part, any sample type, lines or tiles.
+//! OpenEXR plates: color and depth of any part, any sample type, lines or tiles.
 //!
 //! The header is first read by [`super::parse`], which trusts nothing, so that a file cannot make the decoder ask for more
 //! memory than it could ever fill.
@@ -23,52 +23,54 @@ use bansho_base::{
 
 use super::{
     KEY_EXPOSURE,
-    parse::{self, Outline, Part},
+    parse::{self, FileHeader, PartHeader},
     primaries,
 };
-use crate::plates::limits::{self, MemoryLimit};
+use crate::assets::limits::{self, MemoryLimit};
+
 use rayon::prelude::*;
 
-/// Most chunks that are decompressed at a time.
-const MOST_CHUNKS: u64 = 32;
-/// Bytes of pixels that a few chunks at a time may hold; a single one may hold more.
+/// Largest number of chunks that are decompressed in parallel.
+const MAX_CHUNKS: u64 = 32;
+/// Bytes of pixels in one batch of chunks; a single chunk may exceed it.
 const BATCH_BYTES: u64 = 64 << 20;
-/// How many times the bytes of its pixels a chunk takes while it is decompressed: in the file, between two steps, and as pixels.
+/// Memory of a chunk while it is decompressed, in multiples of its pixels: in the file, between two steps, and as
+/// pixels.
 const CHUNK_COPIES: u64 = 4;
 
-/// Reads a plate: the part and layer with `R`, `G` and `B` (or a lone grey `Y`), with `A` where there is one, and depth
+/// Reads a plate: the part and layer with `R`, `G` and `B` (or a lone gray `Y`), with `A` where there is one, and depth
 /// from `Z`, `depth.Z`, or the only channel of a file that has just one. Pixels cover the display window; where the file
-/// has none they are transparent and infinitely far. Colours are given straight, those that are no numbers as 0.
+/// has none they are transparent and infinitely far. Colors are given straight, those that are no numbers as 0.
 pub(crate) fn decode(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProblem> {
-    let outline = parse::outline(file).map_err(damaged)?;
-    check(&outline, file)?;
-    let wanted = Wanted::choose(&outline)
-        .ok_or_else(|| AssetProblem::NoChannel(format!("R, Y or Z (it has {})", all_names(&outline))))?;
-    let display = outline.parts[0].display.ok_or_else(|| damaged("it has no display window"))?;
+    let header = parse::parse_header(file).map_err(damaged)?;
+    check(&header, file)?;
+    let selection = ChannelSelection::choose(&header)
+        .ok_or_else(|| AssetProblem::NoChannel(format!("R, Y or Z (it has {})", all_names(&header))))?;
+    let display = header.parts[0].display.ok_or_else(|| damaged("it has no display window"))?;
     let size = limits::window_size(display);
     let (width, height) = (size[0] as usize, size[1] as usize);
-    let batch = Batch::new(&outline, &wanted);
-    limit.check(file.len() as u64 + wanted.bytes(size[0] * size[1]) + batch.bytes)?;
-    let mut planes = Planes { width, height, display_min: display.min, values: wanted.planes(width * height) };
-    read_chunks(file, &wanted, batch.chunks, &mut planes)?;
-    finish(&outline, &wanted, planes)
+    let batch = ChunkBatch::new(&header, &selection);
+    limit.check(file.len() as u64 + selection.bytes(size[0] * size[1]) + batch.bytes)?;
+    let mut planes = PlaneWriter { width, height, display_min: display.min, values: selection.planes(width * height) };
+    read_chunks(file, &selection, batch.chunks, &mut planes)?;
+    finish(&header, &selection, planes)
 }
 
 fn damaged(reason: impl ToString) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
 }
 
-fn all_names(outline: &Outline) -> String {
-    let names = outline.parts.iter().flat_map(|part| &part.channels).map(|channel| channel.name.as_str());
+fn all_names(header: &FileHeader) -> String {
+    let names = header.parts.iter().flat_map(|part| &part.channels).map(|channel| channel.name.as_str());
     names.take(12).collect::<Vec<_>>().join(", ")
 }
 
-/// Refuses what would need more memory than is allowed, or than the file's bytes could ever fill.
-fn check(outline: &Outline, file: &[u8]) -> Result<(), AssetProblem> {
-    if outline.deep {
+/// Refuses files that would need more memory than is allowed, or than their bytes could ever fill.
+fn check(header: &FileHeader, file: &[u8]) -> Result<(), AssetProblem> {
+    if header.deep {
         return Err(damaged("deep pixels are not read; flatten them first"));
     }
-    for part in &outline.parts {
+    for part in &header.parts {
         let (Some(data), Some(display)) = (part.data, part.display) else {
             return Err(damaged("its header lacks a window"));
         };
@@ -85,8 +87,8 @@ fn check(outline: &Outline, file: &[u8]) -> Result<(), AssetProblem> {
     Ok(())
 }
 
-/// How many bytes of pixels a byte of the file can stand for at most.
-fn greatest_ratio(part: &Part) -> u64 {
+/// Largest compression ratio of a part.
+fn greatest_ratio(part: &PartHeader) -> u64 {
     match part.compression {
         Some(0) => 1,
         Some(1) => 64, // run lengths of up to 128 in 2 bytes
@@ -97,100 +99,103 @@ fn greatest_ratio(part: &Part) -> u64 {
     }
 }
 
-/// Which channel of which part goes into which plane.
-struct Wanted {
+/// The selected channels of color and depth.
+struct ChannelSelection {
     part: usize,
-    /// Index in the part's list of channels, for red, green, blue, alpha.
-    colour: [Option<usize>; 4],
-    /// Part and channel of depth.
+    /// Index in the part's channel list, for red, green, blue and alpha.
+    color: [Option<usize>; 4],
+    /// Part and channel of the depth.
     depth: Option<(usize, usize)>,
 }
 
-impl Wanted {
-    fn choose(outline: &Outline) -> Option<Self> {
-        let find = |part: &Part, name: &str| part.channels.iter().position(|channel| channel.name == name);
-        let parts = || outline.parts.iter().enumerate();
+impl ChannelSelection {
+    fn choose(header: &FileHeader) -> Option<Self> {
+        let find = |part: &PartHeader, name: &str| part.channels.iter().position(|channel| channel.name == name);
+        let parts = || header.parts.iter().enumerate();
         let depth = ["Z", "depth.Z", "Depth.Z", "depth.z", "depth"]
             .iter()
             .find_map(|name| parts().find_map(|(index, part)| Some((index, find(part, name)?))))
-            .or_else(|| (outline.parts.len() == 1 && outline.parts[0].channels.len() == 1).then_some((0, 0)));
-        let layer = |part: &Part, prefix: &str| {
+            .or_else(|| (header.parts.len() == 1 && header.parts[0].channels.len() == 1).then_some((0, 0)));
+        let layer = |part: &PartHeader, prefix: &str| {
             let channel = |name: &str| find(part, &format!("{prefix}{name}"));
             Some([Some(channel("R")?), Some(channel("G")?), Some(channel("B")?), channel("A")])
         };
-        let grey = |part: &Part| find(part, "Y").map(|y| [Some(y), Some(y), Some(y), find(part, "A")]);
-        let colour = parts()
-            .find_map(|(index, part)| Some((index, layer(part, "").or_else(|| grey(part))?)))
+        let gray = |part: &PartHeader| find(part, "Y").map(|y| [Some(y), Some(y), Some(y), find(part, "A")]);
+        let color = parts()
+            .find_map(|(index, part)| Some((index, layer(part, "").or_else(|| gray(part))?)))
             .or_else(|| parts().find_map(|(index, part)| Some((index, first_layer(part, &layer)?))));
-        match (colour, depth) {
+        match (color, depth) {
             (None, None) => None,
-            (Some((part, colour)), depth) => Some(Self { part, colour, depth }),
-            (None, Some((part, channel))) => Some(Self { part, colour: [None; 4], depth: Some((part, channel)) }),
+            (Some((part, color)), depth) => Some(Self { part, color, depth }),
+            (None, Some((part, channel))) => Some(Self { part, color: [None; 4], depth: Some((part, channel)) }),
         }
     }
 
-    fn planes(&self, pixels: usize) -> Values {
-        let colour = self.colour[0].map(|_| vec![[0.0; 4]; pixels]);
-        Values { colour, depth: self.depth.map(|_| vec![f32::INFINITY; pixels]) }
+    fn planes(&self, pixels: usize) -> DecodedPlanes {
+        let color = self.color[0].map(|_| vec![[0.0; 4]; pixels]);
+        DecodedPlanes { color, depth: self.depth.map(|_| vec![f32::INFINITY; pixels]) }
     }
 
-    /// Bytes of what [`planes`](Self::planes) and `finish` make for so many pixels.
+    /// Bytes of the result for this number of pixels.
     fn bytes(&self, pixels: u64) -> u64 {
         let depth = if self.depth.is_some() { size_of::<f32>() } else { 0 };
         pixels * (size_of::<[f32; 4]>() + depth) as u64
     }
 
-    fn wants_part(&self, part: usize) -> bool {
-        (self.colour[0].is_some() && part == self.part) || self.depth.is_some_and(|(depth, _)| depth == part)
+    fn contains_part(&self, part: usize) -> bool {
+        (self.color[0].is_some() && part == self.part) || self.depth.is_some_and(|(depth, _)| depth == part)
     }
 }
 
 /// The first layer `name.R, name.G, name.B` of a part.
-fn first_layer(part: &Part, layer: &impl Fn(&Part, &str) -> Option<[Option<usize>; 4]>) -> Option<[Option<usize>; 4]> {
+fn first_layer(
+    part: &PartHeader,
+    layer: &impl Fn(&PartHeader, &str) -> Option<[Option<usize>; 4]>,
+) -> Option<[Option<usize>; 4]> {
     let prefixes = part.channels.iter().filter_map(|channel| channel.name.strip_suffix('R'));
     prefixes.filter(|prefix| prefix.ends_with('.')).find_map(|prefix| layer(part, prefix))
 }
 
-struct Values {
-    colour: Option<Vec<[f32; 4]>>,
+struct DecodedPlanes {
+    color: Option<Vec<[f32; 4]>>,
     depth: Option<Vec<f32>>,
 }
 
-struct Planes {
+struct PlaneWriter {
     width: usize,
     height: usize,
     display_min: [i32; 2],
-    values: Values,
+    values: DecodedPlanes,
 }
 
-/// How many chunks are decompressed at a time, and the bytes that this takes.
-struct Batch {
+/// Number of chunks in a batch, and the bytes that it takes.
+struct ChunkBatch {
     chunks: usize,
     bytes: u64,
 }
 
-impl Batch {
-    fn new(outline: &Outline, wanted: &Wanted) -> Self {
-        let parts = || outline.parts.iter().enumerate().filter(|(index, _)| wanted.wants_part(*index));
+impl ChunkBatch {
+    fn new(header: &FileHeader, selection: &ChannelSelection) -> Self {
+        let parts = || header.parts.iter().enumerate().filter(|(index, _)| selection.contains_part(*index));
         let largest = parts().map(|(_, part)| chunk_bytes(part)).max().unwrap_or(0).max(1);
         let all: u64 = parts().map(|(_, part)| part_bytes(part)).sum();
-        let chunks = (BATCH_BYTES / largest).clamp(1, MOST_CHUNKS);
+        let chunks = (BATCH_BYTES / largest).clamp(1, MAX_CHUNKS);
         Self { chunks: chunks as usize, bytes: (chunks * largest).min(all) * CHUNK_COPIES }
     }
 }
 
 /// Bytes of a part's pixels.
-fn part_bytes(part: &Part) -> u64 {
+fn part_bytes(part: &PartHeader) -> u64 {
     let [width, height] = part.data.map_or([0, 0], limits::window_size);
     width * height * pixel_bytes(part)
 }
 
-fn pixel_bytes(part: &Part) -> u64 {
+fn pixel_bytes(part: &PartHeader) -> u64 {
     part.channels.iter().map(|channel| channel.bytes_per_sample).sum()
 }
 
 /// Bytes of the pixels of a part's chunk.
-fn chunk_bytes(part: &Part) -> u64 {
+fn chunk_bytes(part: &PartHeader) -> u64 {
     let [width, height] = part.data.map_or([0, 0], limits::window_size);
     let rows = match part.compression {
         Some(0..=2) => 1,
@@ -202,10 +207,15 @@ fn chunk_bytes(part: &Part) -> u64 {
     columns.min(width) * rows.min(height) * pixel_bytes(part)
 }
 
-fn read_chunks(file: &[u8], wanted: &Wanted, at_a_time: usize, planes: &mut Planes) -> Result<(), AssetProblem> {
+fn read_chunks(
+    file: &[u8],
+    selection: &ChannelSelection,
+    at_a_time: usize,
+    planes: &mut PlaneWriter,
+) -> Result<(), AssetProblem> {
     let reader = ::exr::block::read(Cursor::new(file), false).map_err(damaged)?;
     let full_size = |_: &MetaData, tile: ::exr::block::chunk::TileCoordinates, block: ::exr::block::BlockIndex| {
-        tile.is_largest_resolution_level() && wanted.wants_part(block.layer)
+        tile.is_largest_resolution_level() && selection.contains_part(block.layer)
     };
     let mut chunks = reader.filter_chunks(false, full_size).map_err(damaged)?;
     let meta = chunks.meta_data().clone();
@@ -218,7 +228,7 @@ fn read_chunks(file: &[u8], wanted: &Wanted, at_a_time: usize, planes: &mut Plan
             batch.into_par_iter().map(|chunk| decompress(chunk, &meta)).collect::<Result<_, _>>()?;
         for block in &blocks {
             let header = meta.headers.get(block.index.layer).ok_or_else(|| damaged("a block of no part"))?;
-            planes.place(block, header, wanted);
+            planes.copy_block(block, header, selection);
         }
     }
 }
@@ -247,39 +257,39 @@ fn check_dwa(chunk: &Chunk, meta: &MetaData) -> Result<(), AssetProblem> {
         CompressedBlock::ScanLine(lines) => &lines.compressed_pixels_le,
         _ => return Err(damaged("deep pixels are not read")),
     };
-    let place = header.get_block_data_indices(&chunk.compressed_block).map_err(damaged)?;
-    let area = header.get_absolute_block_pixel_coordinates(place).map_err(damaged)?.size.area();
+    let index = header.get_block_data_indices(&chunk.compressed_block).map_err(damaged)?;
+    let area = header.get_absolute_block_pixel_coordinates(index).map_err(damaged)?.size.area();
     let pixel_bytes = area * header.channels.bytes_per_pixel;
     // A chunk that compression would have made larger is stored as it is, without the fields.
     if bytes.is_empty() || bytes.len() == pixel_bytes {
         return Ok(());
     }
     // Coefficients stand for samples one to one, with at most as many ends of blocks.
-    let most = 4 * pixel_bytes as u64 + 4096;
+    let limit = 4 * pixel_bytes as u64 + 4096;
     let fields: Option<&[[u8; 8]]> = bytes.as_chunks().0.get(..DWA_FIELDS);
-    let is_possible = fields.is_some_and(|fields| fields.iter().all(|field| u64::from_le_bytes(*field) <= most));
+    let is_possible = fields.is_some_and(|fields| fields.iter().all(|field| u64::from_le_bytes(*field) <= limit));
     if is_possible { Ok(()) } else { Err(damaged("a chunk claims more than its pixels can take")) }
 }
 
-impl Planes {
-    /// Copies what a block holds of the wanted channels.
-    fn place(&mut self, block: &UncompressedBlock, header: &Header, wanted: &Wanted) {
+impl PlaneWriter {
+    /// Copies the selected channels of a block.
+    fn copy_block(&mut self, block: &UncompressedBlock, header: &Header, selection: &ChannelSelection) {
         let part = block.index.layer;
         for line in block.lines(&header.channels) {
             let channel = line.location.channel;
             let Some(kind) = header.channels.list.get(channel).map(|channel| channel.sample_type) else { continue };
-            let Some((skipped, places)) = self.span(&line, header) else { continue };
+            let Some((skipped, pixels)) = self.span(&line, header) else { continue };
             let values = || samples(&line, kind).skip(skipped);
-            if let Some(depth) = self.values.depth.as_mut().filter(|_| wanted.depth == Some((part, channel))) {
-                depth[places.clone()].iter_mut().zip(values()).for_each(|(z, value)| *z = value);
+            if let Some(depth) = self.values.depth.as_mut().filter(|_| selection.depth == Some((part, channel))) {
+                depth[pixels.clone()].iter_mut().zip(values()).for_each(|(z, value)| *z = value);
             }
-            if let Some(colour) = self.values.colour.as_mut().filter(|_| wanted.part == part) {
-                place_colour(&mut colour[places], values(), wanted.colour, channel);
+            if let Some(color) = self.values.color.as_mut().filter(|_| selection.part == part) {
+                copy_color(&mut color[pixels], values(), selection.color, channel);
             }
         }
     }
 
-    /// How many values of a line lie left of the picture, and which pixels the others are; `None` if it lies outside.
+    /// Number of values of a line left of the picture, and the pixels of the others; `None` outside of the picture.
     fn span(&self, line: &LineRef<'_>, header: &Header) -> Option<(usize, Range<usize>)> {
         let origin = header.own_attributes.layer_position;
         let x = line.location.position.0 as i64 + i64::from(origin.0) - i64::from(self.display_min[0]);
@@ -291,27 +301,22 @@ impl Planes {
     }
 }
 
-/// Writes one channel's values into the components it stands for.
-fn place_colour(
-    pixels: &mut [[f32; 4]],
-    values: impl Iterator<Item = f32>,
-    colour: [Option<usize>; 4],
-    channel: usize,
-) {
-    let targets = colour.map(|wanted| wanted == Some(channel));
+/// Writes the values of a channel into its color components.
+fn copy_color(pixels: &mut [[f32; 4]], values: impl Iterator<Item = f32>, color: [Option<usize>; 4], channel: usize) {
+    let targets = color.map(|selection| selection == Some(channel));
     if !targets.contains(&true) {
         return;
     }
     for (pixel, value) in pixels.iter_mut().zip(values) {
         (0..4).filter(|component| targets[*component]).for_each(|component| pixel[component] = value);
         // Without alpha in the file, the pixels that it has are opaque and the others are not.
-        if colour[3].is_none() {
+        if color[3].is_none() {
             pixel[3] = 1.0;
         }
     }
 }
 
-/// The values of a line as floats.
+/// The values of a line as `f32`.
 fn samples<'a>(line: &LineRef<'a>, kind: SampleType) -> Box<dyn Iterator<Item = f32> + 'a> {
     let bytes = line.value;
     match kind {
@@ -321,47 +326,47 @@ fn samples<'a>(line: &LineRef<'a>, kind: SampleType) -> Box<dyn Iterator<Item = 
     }
 }
 
-/// Straight alpha, known primaries, and no values that would spoil what is composited over them.
-fn finish(outline: &Outline, wanted: &Wanted, planes: Planes) -> Result<Picture, AssetProblem> {
+/// Converts to straight alpha and known primaries, and removes values that would spoil compositing.
+fn finish(header: &FileHeader, selection: &ChannelSelection, planes: PlaneWriter) -> Result<Picture, AssetProblem> {
     let (width, height) = (planes.width, planes.height);
-    let conversion = primaries::conversion(outline.parts[wanted.part].chromaticities)
+    let conversion = primaries::conversion(header.parts[selection.part].chromaticities)
         .ok_or_else(|| damaged("its chromaticities describe no colours"))?;
-    let mut colour = planes.values.colour.unwrap_or_else(|| {
-        // A file of depth alone: shown as grey, opaque.
+    let mut color = planes.values.color.unwrap_or_else(|| {
+        // A file of depth alone: shown as gray, opaque.
         let depth = planes.values.depth.iter().flatten();
         depth.map(|&z| [z, z, z, 1.0]).collect()
     });
-    colour.par_iter_mut().for_each(|pixel| *pixel = straight(pixel.map(finite), conversion.matrix.as_ref()));
+    color.par_iter_mut().for_each(|pixel| *pixel = unpremultiply(pixel.map(finite), conversion.matrix.as_ref()));
     let depth = planes.values.depth.map(|mut depth| {
         // No distance at all counts as infinitely far.
         depth.iter_mut().filter(|z| z.is_nan()).for_each(|z| *z = f32::INFINITY);
         depth
     });
-    let colour = Image::from_pixels(width, height, colour).ok_or_else(|| damaged("its pixels do not fill it"))?;
-    let exposure_ev100 = exposure(&outline.parts[wanted.part]);
-    Ok(Picture { colour, depth, encoding: conversion.encoding, exposure_ev100 })
+    let color = Image::from_pixels(width, height, color).ok_or_else(|| damaged("its pixels do not fill it"))?;
+    let exposure_ev100 = exposure(&header.parts[selection.part]);
+    Ok(Picture { colour: color, depth, encoding: conversion.encoding, exposure_ev100 })
 }
 
 /// Exposure value at ISO 100 by Bansho's own attribute, or by those of OpenEXR for a camera's settings.
-fn exposure(part: &Part) -> Option<f64> {
+fn exposure(part: &PartHeader) -> Option<f64> {
     let own = part.float(KEY_EXPOSURE).filter(|ev100| ev100.abs() <= LARGEST_EV100);
     own.or_else(|| ev100_of_camera(part.float("aperture")?, part.float("expTime")?, part.float("isoSpeed")?))
 }
 
-/// Greatest value that is kept: that of half floats, so that an infinity does not spread.
-const GREATEST: f32 = 65504.0;
+/// Largest finite half: infinities are clamped to it.
+const HALF_MAX: f32 = 65504.0;
 
 fn finite(value: f32) -> f32 {
-    if value.is_nan() { 0.0 } else { value.clamp(-GREATEST, GREATEST) }
+    if value.is_nan() { 0.0 } else { value.clamp(-HALF_MAX, HALF_MAX) }
 }
 
-fn straight([r, g, b, alpha]: [f32; 4], matrix: Option<&[[f32; 3]; 3]>) -> [f32; 4] {
+fn unpremultiply([r, g, b, alpha]: [f32; 4], matrix: Option<&[[f32; 3]; 3]>) -> [f32; 4] {
     let alpha = alpha.clamp(0.0, 1.0);
     let scale = if alpha > 0.0 { 1.0 / alpha } else { 1.0 };
-    let colour = [r * scale, g * scale, b * scale].map(finite);
+    let color = [r * scale, g * scale, b * scale].map(finite);
     let [r, g, b] = match matrix {
-        None => colour,
-        Some(rows) => rows.map(|row| row[0].mul_add(colour[0], row[1].mul_add(colour[1], row[2] * colour[2]))),
+        None => color,
+        Some(rows) => rows.map(|row| row[0].mul_add(color[0], row[1].mul_add(color[1], row[2] * color[2]))),
     };
     [r, g, b, alpha]
 }

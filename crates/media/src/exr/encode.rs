@@ -15,26 +15,26 @@ use ::exr::{
     },
 };
 use bansho_base::image::{Frame, Precision};
-use rayon::prelude::*;
 
 use super::{
     attribute::{self, Window},
-    plane::{Plane, Row, planes},
+    plane::{ChannelPlane, Row, planes},
 };
 use crate::{
     error::{MediaError, SizeRule},
-    stamp,
+    output::fingerprint,
 };
+use rayon::prelude::*;
 
-/// Lines that are compressed together.
+/// Lines in a compressed block.
 const LINES_PER_BLOCK: usize = 16;
-/// Most pixels on a side that are written.
+/// Largest side that is written, pixels.
 const SIDE_LIMIT: usize = 1 << 20;
 
 /// The bytes of an OpenEXR file of `frame`: beauty as half `R,G,B,A`, depth as float `Z`, and every layer and AOV under
 /// its own name; a name that ends in no component (`torch.temperature_k`) gets `.V`, without which readers lose the channel.
-/// Colours are ACEScg, premultiplied. Compressed in parallel in the caller's thread pool; the same frame
-/// gives the same bytes whatever the number of threads. Colours beyond the range of half are written as 65504, colours that are no numbers as 0,
+/// Colors are ACEScg, premultiplied. Compressed in parallel in the caller's thread pool; the same frame
+/// gives the same bytes whatever the number of threads. Colors beyond the range of half are written as 65504, colors that are no numbers as 0,
 /// as display formats show them; depth and AOVs are written as they are.
 ///
 /// # Errors
@@ -58,12 +58,12 @@ pub fn encode(frame: &Frame, path: &Path) -> Result<Vec<u8>, MediaError> {
         file.extend((block.len() as u32).to_le_bytes());
         file.extend_from_slice(block);
     }
-    let digest = stamp::to_hex(blake3::hash(&file).as_bytes());
+    let digest = fingerprint::to_hex(blake3::hash(&file).as_bytes());
     file[digest_at..digest_at + 64].copy_from_slice(digest.as_bytes());
     Ok(file)
 }
 
-fn check_planes(frame: &Frame, planes: &[Plane<'_>], path: &Path) -> Result<(), MediaError> {
+fn check_planes(frame: &Frame, planes: &[ChannelPlane<'_>], path: &Path) -> Result<(), MediaError> {
     let expected = frame.beauty.width() * frame.beauty.height();
     for (index, plane) in planes.iter().enumerate() {
         let name = &*plane.name;
@@ -101,10 +101,10 @@ fn window(origin: [i64; 2], size: [usize; 2]) -> Option<Window> {
     Some(Window { min, max })
 }
 
-fn compressed_blocks(frame: &Frame, planes: &[Plane<'_>], path: &Path) -> Result<Vec<Vec<u8>>, MediaError> {
+fn compressed_blocks(frame: &Frame, planes: &[ChannelPlane<'_>], path: &Path) -> Result<Vec<Vec<u8>>, MediaError> {
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     let header = crate_header(planes, width, height);
-    let bytes_per_line = width * planes.iter().map(Plane::bytes_per_value).sum::<usize>();
+    let bytes_per_line = width * planes.iter().map(ChannelPlane::bytes_per_value).sum::<usize>();
     let block = |index: usize| {
         let lines = index * LINES_PER_BLOCK..((index + 1) * LINES_PER_BLOCK).min(height);
         let (mut bytes, mut row) = (Vec::with_capacity(bytes_per_line * lines.len()), Row::default());
@@ -122,8 +122,8 @@ fn compressed_blocks(frame: &Frame, planes: &[Plane<'_>], path: &Path) -> Result
 }
 
 /// What the crate must know of the picture in order to compress a part of it.
-fn crate_header(planes: &[Plane<'_>], width: usize, height: usize) -> Header {
-    let channel = |plane: &Plane<'_>| {
+fn crate_header(planes: &[ChannelPlane<'_>], width: usize, height: usize) -> Header {
+    let channel = |plane: &ChannelPlane<'_>| {
         let kind = match plane.precision {
             Precision::Half => SampleType::F16,
             Precision::Single => SampleType::F32,

@@ -1,12 +1,12 @@
-//! A look at an OpenEXR file's header without trust: every length is checked against the bytes that are there.
+//! Parser of OpenEXR headers for untrusted files: every length is checked against the bytes of the file.
 
 use std::ops::Range;
 
 use super::attribute::{FLAG_LONG_NAMES, MAGIC, Window};
 
-/// What a file's header says of one of its parts.
+/// The header of one part.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Part {
+pub(crate) struct PartHeader {
     pub(crate) channels: Vec<ChannelEntry>,
     pub(crate) compression: Option<u8>,
     pub(crate) data: Option<Window>,
@@ -17,7 +17,7 @@ pub(crate) struct Part {
     pub(crate) floats: Vec<(String, f32)>,
 }
 
-/// A channel and how many pixels share a sample.
+/// A channel and its subsampling.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ChannelEntry {
     pub(crate) name: String,
@@ -25,60 +25,61 @@ pub(crate) struct ChannelEntry {
     pub(crate) sampling: [i32; 2],
 }
 
-/// All parts of a file.
+/// The headers of all parts.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Outline {
-    pub(crate) parts: Vec<Part>,
+pub(crate) struct FileHeader {
+    pub(crate) parts: Vec<PartHeader>,
     pub(crate) deep: bool,
 }
 
-/// What makes a header unreadable.
+/// Why a header is unreadable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum HeaderProblem {
+pub(crate) enum HeaderError {
     #[error("does not begin as an OpenEXR file")]
     NotExr,
     #[error("its header is cut off or damaged")]
     Damaged,
-    #[error("its header has more than {MOST_PARTS} parts or {MOST_CHANNELS} channels")]
+    #[error("its header has more than {MAX_PARTS} parts or {MAX_CHANNELS} channels")]
     TooManyParts,
 }
 
-const MOST_PARTS: usize = 256;
-const MOST_CHANNELS: usize = 4096;
+const MAX_PARTS: usize = 256;
+const MAX_CHANNELS: usize = 4096;
 const FLAG_DEEP: u32 = 0x800;
 const FLAG_PARTS: u32 = 0x1000;
 
-impl Part {
+impl PartHeader {
     /// The float attribute `name`.
     pub(crate) fn float(&self, name: &str) -> Option<f64> {
         self.floats.iter().find(|(key, _)| key == name).map(|(_, value)| f64::from(*value))
     }
 
-    /// The place of the string attribute `name` in the file.
+    /// Byte range of the string attribute `name` in the file.
     pub(crate) fn string(&self, name: &str) -> Option<Range<usize>> {
         self.strings.iter().find(|(key, _)| key == name).map(|(_, place)| place.clone())
     }
 }
 
 /// Reads the header of `file`.
-pub(crate) fn outline(file: &[u8]) -> Result<Outline, HeaderProblem> {
+pub(crate) fn parse_header(file: &[u8]) -> Result<FileHeader, HeaderError> {
     let mut reader = Reader { file, at: 0 };
     if reader.array() != Some(MAGIC) {
-        return Err(HeaderProblem::NotExr);
+        return Err(HeaderError::NotExr);
     }
-    let version = reader.array().map(u32::from_le_bytes).ok_or(HeaderProblem::Damaged)?;
+    let version = reader.array().map(u32::from_le_bytes).ok_or(HeaderError::Damaged)?;
     let name_limit = if version & FLAG_LONG_NAMES != 0 { 255 } else { 31 };
     let mut parts = Vec::new();
     loop {
-        let part = reader.part(name_limit).ok_or(HeaderProblem::Damaged)?;
-        let channels: usize = part.channels.len() + parts.iter().map(|part: &Part| part.channels.len()).sum::<usize>();
+        let part = reader.part(name_limit).ok_or(HeaderError::Damaged)?;
+        let channels: usize =
+            part.channels.len() + parts.iter().map(|part: &PartHeader| part.channels.len()).sum::<usize>();
         parts.push(part);
-        if parts.len() > MOST_PARTS || channels > MOST_CHANNELS {
-            return Err(HeaderProblem::TooManyParts);
+        if parts.len() > MAX_PARTS || channels > MAX_CHANNELS {
+            return Err(HeaderError::TooManyParts);
         }
-        // Several parts end in an empty header, which is a lone zero.
+        // A list of several parts ends with an empty header, a single zero byte.
         if version & FLAG_PARTS == 0 || reader.file.get(reader.at) == Some(&0) {
-            return Ok(Outline { parts, deep: version & FLAG_DEEP != 0 });
+            return Ok(FileHeader { parts, deep: version & FLAG_DEEP != 0 });
         }
     }
 }
@@ -115,8 +116,8 @@ impl<'a> Reader<'a> {
         Some(&rest[..length])
     }
 
-    fn part(&mut self, name_limit: usize) -> Option<Part> {
-        let mut part = Part::default();
+    fn part(&mut self, name_limit: usize) -> Option<PartHeader> {
+        let mut part = PartHeader::default();
         loop {
             let name = self.text(name_limit)?;
             if name.is_empty() {
@@ -158,7 +159,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-impl Part {
+impl PartHeader {
     fn set(&mut self, name: &str, kind: &[u8], mut value: Reader<'_>) -> Option<()> {
         match (name, kind) {
             ("channels", b"chlist") => self.channels = value.channels()?,

@@ -1,63 +1,63 @@
-//! The planes of a frame in the order in which a file holds them.
+//! The channels of a frame in file order.
 
 use std::{borrow::Cow, ops::Range};
 
 use bansho_base::image::{Frame, Precision};
 use half::slice::HalfFloatSliceExt;
 
-/// Greatest finite half: brighter pixels are written as this, since an infinity spoils every later blur, as does what is not a number.
+/// Largest finite half: brighter pixels are clamped to it, since infinities and NaN spoil every filter.
 const HALF_MAX: f32 = 65504.0;
 
-/// Last parts of channel names that readers know as components of a layer. Blender drops channels that end in anything else.
+/// Component names that readers recognize. Blender drops channels that end in anything else.
 const COMPONENTS: [&str; 10] = ["R", "G", "B", "A", "X", "Y", "Z", "U", "V", "W"];
 
 /// One channel of the file.
-pub(crate) struct Plane<'a> {
+pub(crate) struct ChannelPlane<'a> {
     pub(crate) name: Cow<'a, str>,
     pub(crate) precision: Precision,
-    source: Source<'a>,
+    source: ChannelSource<'a>,
 }
 
-enum Source<'a> {
-    /// Component 0 to 3 of the beauty.
+enum ChannelSource<'a> {
+    /// Component 0 to 3 of the color.
     Beauty(&'a [[f32; 4]], usize),
     Values(&'a [f32]),
 }
 
-/// Every plane of `frame`, sorted by name as the format demands.
-pub(crate) fn planes(frame: &Frame) -> Vec<Plane<'_>> {
-    let beauty = ["R", "G", "B", "A"].into_iter().enumerate().map(|(component, name)| Plane {
+/// All channels of `frame`, sorted by name as the format demands.
+pub(crate) fn planes(frame: &Frame) -> Vec<ChannelPlane<'_>> {
+    let beauty = ["R", "G", "B", "A"].into_iter().enumerate().map(|(component, name)| ChannelPlane {
         name: name.into(),
         precision: Precision::Half,
-        source: Source::Beauty(frame.beauty.pixels(), component),
+        source: ChannelSource::Beauty(frame.beauty.pixels(), component),
     });
-    let depth = frame.depth.iter().map(|values| Plane {
+    let depth = frame.depth.iter().map(|values| ChannelPlane {
         name: "Z".into(),
         precision: Precision::Single,
-        source: Source::Values(values),
+        source: ChannelSource::Values(values),
     });
-    let channels = frame.channels.iter().map(|channel| Plane {
-        name: in_file(&channel.name),
+    let channels = frame.channels.iter().map(|channel| ChannelPlane {
+        name: exr_channel_name(&channel.name),
         precision: channel.precision,
-        source: Source::Values(&channel.values),
+        source: ChannelSource::Values(&channel.values),
     });
     let mut planes: Vec<_> = beauty.chain(depth).chain(channels).collect();
     planes.sort_by(|a, b| a.name.as_bytes().cmp(b.name.as_bytes()));
     planes
 }
 
-/// The name that a channel gets in the file: a plain quantity, `torch.temperature_k`, is the only component, `V`, of its layer.
-fn in_file(name: &str) -> Cow<'_, str> {
+/// Channel name in the file: a plain quantity, `torch.temperature_k`, becomes the only component, `V`, of its layer.
+fn exr_channel_name(name: &str) -> Cow<'_, str> {
     let is_component = name.rsplit('.').next().is_some_and(|last| COMPONENTS.contains(&last));
     if is_component { name.into() } else { format!("{name}.V").into() }
 }
 
-impl Plane<'_> {
-    /// How many values it has; as many as the frame has pixels.
+impl ChannelPlane<'_> {
+    /// Number of values: that of the frame's pixels.
     pub(crate) fn len(&self) -> usize {
         match self.source {
-            Source::Beauty(pixels, _) => pixels.len(),
-            Source::Values(values) => values.len(),
+            ChannelSource::Beauty(pixels, _) => pixels.len(),
+            ChannelSource::Values(values) => values.len(),
         }
     }
 
@@ -73,8 +73,10 @@ impl Plane<'_> {
     pub(crate) fn append(&self, range: Range<usize>, row: &mut Row, bytes: &mut Vec<u8>) {
         row.floats.clear();
         match self.source {
-            Source::Beauty(pixels, component) => row.floats.extend(pixels[range].iter().map(|pixel| pixel[component])),
-            Source::Values(values) => row.floats.extend_from_slice(&values[range]),
+            ChannelSource::Beauty(pixels, component) => {
+                row.floats.extend(pixels[range].iter().map(|pixel| pixel[component]))
+            }
+            ChannelSource::Values(values) => row.floats.extend_from_slice(&values[range]),
         }
         match self.precision {
             Precision::Single => bytes.extend_from_slice(bytemuck::cast_slice(&row.floats)),

@@ -1,10 +1,10 @@
-//! From a file's chromaticities to colours that Bansho knows.
+//! Conversion from a file's chromaticities to known primaries.
 
 use bansho_base::host::assets::Encoding;
 
 use super::attribute::AP1;
 
-/// What the colours of a file are, after the matrix, if there is one.
+/// The encoding after the matrix, if there is one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Conversion {
     pub(crate) encoding: Encoding,
@@ -14,12 +14,12 @@ pub(crate) struct Conversion {
 /// CIE xy of red, green, blue and white of Rec. 709 and sRGB.
 const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
 
-/// How far written chromaticities may lie from the ones they mean.
+/// Tolerance of written chromaticities.
 const TOLERANCE: f32 = 0.001;
 
 type Matrix = [[f64; 3]; 3];
 
-/// What to do with colours of these chromaticities; a file without them means Rec. 709. `None` where they lie on a line.
+/// The conversion for these chromaticities; without any, Rec. 709 is assumed. `None` for collinear ones.
 pub(crate) fn conversion(chromaticities: Option<[[f32; 2]; 4]>) -> Option<Conversion> {
     let given = chromaticities.unwrap_or(REC709);
     let is = |known: [[f32; 2]; 4]| {
@@ -41,8 +41,8 @@ pub(crate) fn conversion(chromaticities: Option<[[f32; 2]; 4]>) -> Option<Conver
 /// XYZ of chromaticity xy with Y = 1.
 fn xyz([x, y]: [f32; 2]) -> Option<[f64; 3]> {
     let (x, y) = (f64::from(x), f64::from(y));
-    let colour = [x / y, 1.0, (1.0 - x - y) / y];
-    colour.iter().all(|value| value.is_finite()).then_some(colour)
+    let color = [x / y, 1.0, (1.0 - x - y) / y];
+    color.iter().all(|value| value.is_finite()).then_some(color)
 }
 
 fn white(chromaticities: [[f32; 2]; 4]) -> Option<[f64; 3]> {
@@ -57,7 +57,7 @@ fn to_xyz(chromaticities: [[f32; 2]; 4]) -> Option<Matrix> {
     Some(columns.map(|row| [row[0] * scale[0], row[1] * scale[1], row[2] * scale[2]]))
 }
 
-/// Bradford's adaptation from one white to another (ICC.1:2022, annex E).
+/// Bradford chromatic adaptation (ICC.1:2022, annex E).
 fn bradford(from: [f64; 3], to: [f64; 3]) -> Option<Matrix> {
     const CONES: Matrix = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]];
     let (before, after) = (apply(CONES, from), apply(CONES, to));

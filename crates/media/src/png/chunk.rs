@@ -1,6 +1,4 @@
-//! The chunks a PNG is made of: length, kind, contents, checksum (PNG third edition, section 5.3).
-
-use super::checksum::crc32;
+//! PNG chunks: length, type, data, CRC (PNG third edition, section 5.3).
 
 /// First bytes of every PNG.
 pub(crate) const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
@@ -12,7 +10,7 @@ pub(crate) struct Chunk<'a> {
     pub(crate) contents: &'a [u8],
 }
 
-/// Walks the chunks of a file; `Err` once where a chunk is cut off or its checksum is wrong.
+/// Iterator over the chunks of a file; ends with `Err` at a truncated chunk or a wrong CRC.
 pub(crate) struct Chunks<'a>(&'a [u8]);
 
 /// A chunk that is cut off or damaged.
@@ -43,17 +41,20 @@ fn split(bytes: &[u8]) -> Option<(Chunk<'_>, &[u8])> {
     let (contents, bytes) = bytes.split_at_checked(u32::from_be_bytes(*length) as usize)?;
     let (checksum, rest) = bytes.split_first_chunk::<4>()?;
     let chunk = Chunk { kind: *kind, contents };
-    (u32::from_be_bytes(*checksum) == crc32(&[kind, contents])).then_some((chunk, rest))
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(kind);
+    hasher.update(contents);
+    (u32::from_be_bytes(*checksum) == hasher.finalize()).then_some((chunk, rest))
 }
 
-/// Appends a chunk whose contents are the parts one after the other, at most 2^31 - 1 bytes together.
+/// Appends a chunk whose data are the concatenated `parts`, at most 2^31 - 1 bytes.
 pub(crate) fn push(file: &mut Vec<u8>, kind: [u8; 4], parts: &[&[u8]]) {
     let length: usize = parts.iter().map(|part| part.len()).sum();
     file.extend((length as u32).to_be_bytes());
     let start = file.len();
     file.extend(kind);
     parts.iter().for_each(|part| file.extend_from_slice(part));
-    let checksum = crc32(&[&file[start..]]);
+    let checksum = crc32fast::hash(&file[start..]);
     file.extend(checksum.to_be_bytes());
 }
 

@@ -1,4 +1,4 @@
-//! Display pixels to PNG bytes.
+//! Encoding of display pictures as PNG.
 
 use std::{borrow::Cow, path::Path};
 
@@ -11,10 +11,10 @@ use bansho_base::image::{DisplayImage, DisplayPixels};
 use super::{KEY_ALPHA, KEY_FINGERPRINT, KEY_VERSION};
 use crate::{
     error::{MediaError, SizeRule},
-    stamp,
+    output::fingerprint,
 };
 
-/// How much work goes into making a PNG small.
+/// Compression effort.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PngEffort {
     /// Fast: frames of a sequence, so that writing does not hold up rendering.
@@ -47,10 +47,10 @@ pub(crate) fn encode_frame(picture: &DisplayImage, path: &Path) -> Result<Vec<u8
         .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
 }
 
-/// Most pixels on a side of a PNG, as most readers allow.
+/// Largest side of a PNG, as most readers allow.
 pub const SIDE_LIMIT: usize = 1_000_000;
 
-/// Width and height, once they agree with the pixels.
+/// Width and height, checked against the number of pixels.
 fn checked_size(picture: &DisplayImage, path: &Path) -> Result<[u32; 2], MediaError> {
     let (width, height) = (picture.width, picture.height);
     if [width, height].iter().any(|side| !(1..=SIDE_LIMIT).contains(side)) {
@@ -82,10 +82,10 @@ fn compress(
         DisplayPixels::Sixteen(_) => BitDepth::Sixteen,
     });
     mark_srgb(&mut encoder);
-    encoder.add_text_chunk("Software".to_owned(), format!("Bansho {}", stamp::VERSION))?;
-    encoder.add_text_chunk(KEY_VERSION.to_owned(), stamp::VERSION.to_owned())?;
+    encoder.add_text_chunk("Software".to_owned(), format!("Bansho {}", fingerprint::VERSION))?;
+    encoder.add_text_chunk(KEY_VERSION.to_owned(), fingerprint::VERSION.to_owned())?;
     if let Some(fingerprint) = fingerprint {
-        encoder.add_text_chunk(KEY_FINGERPRINT.to_owned(), stamp::to_hex(fingerprint))?;
+        encoder.add_text_chunk(KEY_FINGERPRINT.to_owned(), fingerprint::to_hex(fingerprint))?;
     }
     if !picture.opaque {
         encoder.add_text_chunk(KEY_ALPHA.to_owned(), picture.alpha.name().to_owned())?;
@@ -97,8 +97,7 @@ fn compress(
     Ok(file)
 }
 
-/// Marks the pixels as sRGB, with gAMA and cHRM beside it as the standard says (section 11.3.2.5), for programs that know
-/// only those.
+/// Declares sRGB, with gAMA and cHRM as the standard says (section 11.3.2.5), for programs that know only those.
 fn mark_srgb<W: std::io::Write>(encoder: &mut Encoder<'_, W>) {
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
     encoder.set_source_gamma(ScaledFloat::from_scaled(45_455));
@@ -118,7 +117,7 @@ pub(super) fn set_effort<W: std::io::Write>(encoder: &mut Encoder<'_, W>, effort
     }
 }
 
-/// The samples as they stand in the file: big-endian, alpha left out where the picture is opaque.
+/// The samples in file order: big-endian, without alpha where the picture is opaque.
 fn samples(picture: &DisplayImage) -> Cow<'_, [u8]> {
     match (&picture.pixels, picture.opaque) {
         (DisplayPixels::Eight(pixels), false) => Cow::Borrowed(bytemuck::cast_slice(pixels)),

@@ -1,4 +1,4 @@
-//! Measured numbers to PNG bytes: linear, without a view transform, and with their scale.
+//! Encoding of measured values as PNG: linear, without a view transform, and with their scale.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use ::png::{BitDepth, ColorType, Encoder, EncodingError, ScaledFloat};
 use super::{KEY_FINGERPRINT, KEY_SCALE, KEY_VERSION, PngEffort, encode::set_effort};
 use crate::{
     error::{MediaError, SizeRule},
-    stamp,
+    output::fingerprint,
 };
 
 /// Samples of a measured picture, pixel after pixel, rows from the top; of three channels red, green and blue in turn.
@@ -24,7 +24,7 @@ pub enum Samples {
 pub struct MeasuredImage {
     /// Width and height, pixels.
     pub size: [usize; 2],
-    /// 1 (grey) or 3 (red, green, blue) for each pixel.
+    /// 1 (gray) or 3 (red, green, blue) for each pixel.
     pub channels: usize,
     /// The codes.
     pub samples: Samples,
@@ -91,9 +91,9 @@ fn compress(picture: &MeasuredImage, fingerprint: &[u8; 32], effort: PngEffort) 
         Samples::Eight(_) => BitDepth::Eight,
         Samples::Sixteen(_) => BitDepth::Sixteen,
     });
-    encoder.add_text_chunk("Software".to_owned(), format!("Bansho {}", stamp::VERSION))?;
-    encoder.add_text_chunk(KEY_VERSION.to_owned(), stamp::VERSION.to_owned())?;
-    encoder.add_text_chunk(KEY_FINGERPRINT.to_owned(), stamp::to_hex(fingerprint))?;
+    encoder.add_text_chunk("Software".to_owned(), format!("Bansho {}", fingerprint::VERSION))?;
+    encoder.add_text_chunk(KEY_VERSION.to_owned(), fingerprint::VERSION.to_owned())?;
+    encoder.add_text_chunk(KEY_FINGERPRINT.to_owned(), fingerprint::to_hex(fingerprint))?;
     encoder.add_text_chunk(KEY_SCALE.to_owned(), picture.scale.to_string())?;
     set_effort(&mut encoder, effort);
     let mut writer = encoder.write_header()?;

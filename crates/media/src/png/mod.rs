@@ -1,6 +1,5 @@
 //! PNG: display pixels with straight alpha, sRGB; and measured numbers, linear.
 
-pub(crate) mod checksum;
 pub(crate) mod chunk;
 mod encode;
 mod measured;

@@ -1,4 +1,4 @@
-//! The rain of one exposure: how many drops of each diameter there are, where they are and how they move.
+//! The state of the rain for one exposure: how many drops of each diameter there are, where they are and how they move.
 
 use bansho_base::{
     math::{
@@ -12,92 +12,91 @@ use bansho_base::{
 };
 
 use super::{
-    cell::{Blown, CellNow},
-    gust::Gusts,
-    lattice::{CELL, Cell, Lattice},
+    cell::{CellState, GustInterpolant},
+    gust::GustField,
+    lattice::{CELL_SIZE, Cell, Lattice},
 };
 use crate::{
     Rain,
-    streaks::{
-        project_lanes::LARGEST,
-        rasterize::{at_least, at_most},
-        shutter_cameras::Sight,
-    },
+    lanes::smoothstep,
+    shutter_cameras::{MAX_DROP_RADIUS, ShutterCameras},
 };
 
-/// What gusts displace a drop more or less than the middle of its cell, m.
-const GUST_SLACK: f64 = 0.2;
-/// Part of the region's radius over which rain changes from streaks to veil, half of it on each side.
-const EDGE: f64 = 0.2;
-/// How far beyond that cells may be asked for, m: lamps at its border light some around them.
-const AROUND_REGION: f64 = 8.0;
+/// Largest difference between the gust displacement of a drop and that of its cell's center, m.
+const GUST_MARGIN: f64 = 0.2;
+/// Width of the transition from streaks to single scattering as a fraction of the region's radius, half of it on each
+/// side.
+const REGION_FADE: f64 = 0.2;
+/// How far beyond the region cells may be requested, m: lamps at its border have spheres of per-drop streaks around
+/// them.
+const LAMP_MARGIN: f64 = 8.0;
 
 /// The drops of one diameter during an exposure.
 #[derive(Clone, Debug)]
-pub(crate) struct ClassNow {
-    /// Which diameter, counted from the smallest.
+pub(crate) struct DropClassState {
+    /// Index of the diameter, from the smallest.
     pub(crate) index: usize,
     /// Diameter D, mm.
     pub(crate) diameter_mm: f64,
     /// Terminal velocity v, m/s.
     pub(crate) speed: f64,
-    /// Most drops a cubic metre that the shot ever has.
-    pub(crate) most: f64,
-    /// How many of them there are now, 0 to 1.
-    pub(crate) share: f64,
-    /// Where its cells are.
+    /// Largest number of drops per cubic meter in the whole shot.
+    pub(crate) max_density: f64,
+    /// Fraction of these that exist now, 0 to 1.
+    pub(crate) fraction: f64,
+    /// Positions of its cells.
     pub(crate) lattice: Lattice,
 }
 
-impl ClassNow {
-    /// Drops of a cell now, on average.
+impl DropClassState {
+    /// Expected number of drops in a cell now.
     pub(crate) fn count(&self) -> f64 {
-        self.most * self.share * self.lattice.volume()
+        self.max_density * self.fraction * self.lattice.volume()
     }
 
-    /// Numbers for `purpose` that no other diameter shares.
+    /// A random stream for `purpose` that no other diameter uses.
     pub(crate) fn purpose(&self, purpose: Purpose) -> Purpose {
         Purpose(purpose.0.wrapping_add(self.index as u32))
     }
 }
 
-/// A part of the air.
+/// A sphere of air.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ball {
-    pub(crate) centre: DVec3,
+pub(crate) struct Sphere {
+    pub(crate) center: DVec3,
     /// m.
     pub(crate) radius: f64,
 }
 
-/// Rain while the shutter is open.
+/// The rain while the shutter is open.
 #[derive(Clone, Debug)]
-pub(crate) struct Moment {
+pub(crate) struct ExposureState {
     pub(crate) key: Key,
-    pub(crate) sight: Sight,
-    pub(crate) classes: Vec<ClassNow>,
+    pub(crate) cameras: ShutterCameras,
+    pub(crate) classes: Vec<DropClassState>,
     /// Height of the ground, m.
     pub(crate) ground: f64,
-    /// How far streaks are drawn, m.
+    /// Distance to which streaks are drawn, m.
     pub(crate) distance: f64,
-    /// Opacity beside what optics gives.
+    /// Opacity gain: a factor on the physical opacity.
     pub(crate) gain: f64,
-    /// Mean wind as drops follow it, level, m/s.
+    /// Horizontal mean wind, scaled by the response of the drops, m/s.
     wind: DVec3,
-    gusts: Option<Gusts>,
-    /// Solids that rain does not fall through.
-    roofs: Vec<Occluder>,
+    gusts: Option<GustField>,
+    /// Solids that shelter what is beneath them.
+    occluders: Vec<Occluder>,
 }
 
-impl Moment {
+impl ExposureState {
     pub(crate) fn new(rain: &Rain, view: &View, surroundings: &Surroundings) -> Self {
         let parameters = &rain.parameters;
-        let sight = Sight::new(view);
+        let cameras = ShutterCameras::new(view);
         let t = view.shutter.middle();
         let (wind, response) = (surroundings.wind, parameters.wind_response);
-        let radius = parameters.distance * (1.0 + EDGE) + 2.0 * CELL;
+        let radius = parameters.distance * (1.0 + REGION_FADE) + 2.0 * CELL_SIZE;
         let mean = wind.mean(t) * response;
-        let ground = ground(&surroundings.others.occluders).unwrap_or(parameters.ground_height);
-        let (eye, reach) = (sight.middle().position, parameters.distance * (1.0 + EDGE) + AROUND_REGION);
+        let ground = ground_height(&surroundings.others.occluders).unwrap_or(parameters.ground_height);
+        let (eye, reach) = (cameras.middle().position, parameters.distance * (1.0 + REGION_FADE) + LAMP_MARGIN);
         Self {
             key: rain.key,
             classes: rain.classes(t, wind, ground, eye.y - reach..=eye.y + reach),
@@ -105,27 +104,28 @@ impl Moment {
             distance: parameters.distance,
             gain: parameters.opacity_gain,
             wind: DVec3::new(mean.x, 0.0, mean.z),
-            gusts: Gusts::new(wind, response, sight.middle().position, radius, t),
-            roofs: surroundings.others.occluders.iter().filter(|solid| !is_ground(solid)).cloned().collect(),
-            sight,
+            gusts: GustField::new(wind, response, cameras.middle().position, radius, t),
+            occluders: surroundings.others.occluders.iter().filter(|solid| !is_ground(solid)).cloned().collect(),
+            cameras,
         }
     }
 
-    /// How much of a drop at `distance` from the camera is drawn as a streak: all within the region, nothing beyond its soft edge.
+    /// The weight with which a drop at `distance` from the camera is drawn as a streak: 1 within the region, 0 beyond
+    /// its transition.
     #[inline(always)]
-    pub(crate) fn nearness(&self, distance: f32) -> f32 {
+    pub(crate) fn streak_weight(&self, distance: f32) -> f32 {
         let region = self.distance as f32;
-        smoothstep(((1.0 + 0.5 * EDGE as f32) * region - distance) / (EDGE as f32 * region))
+        smoothstep(((1.0 + 0.5 * REGION_FADE as f32) * region - distance) / (REGION_FADE as f32 * region))
     }
 
-    /// All that is within `radius` (m) of the camera.
-    pub(crate) fn around_camera(&self, radius: f64) -> Ball {
-        Ball { centre: self.sight.middle().position, radius }
+    /// The sphere of `radius` (m) around the camera.
+    pub(crate) fn around_camera(&self, radius: f64) -> Sphere {
+        Sphere { center: self.cameras.middle().position, radius }
     }
 
     /// The drops of a cell of a class.
-    pub(crate) fn cell(&self, class: &ClassNow, cell: Cell) -> CellNow {
-        let eye = self.sight.middle().position;
+    pub(crate) fn cell_state(&self, class: &DropClassState, cell: Cell) -> CellState {
+        let eye = self.cameras.middle().position;
         let corner = |step: [f64; 3]| class.lattice.world(cell, DVec3::from(step));
         let origin = corner([0.0; 3]);
         let [base, right, up, back] = [
@@ -136,16 +136,17 @@ impl Moment {
         ]
         .map(|vector| vector.as_vec3().to_array());
         let velocity = (self.wind - DVec3::Y * class.speed).as_vec3().to_array();
-        let blown = self.gusts.as_ref().map(|gusts| {
-            Blown::new(std::array::from_fn(|index| {
+        let gusts = self.gusts.as_ref().map(|gusts| {
+            GustInterpolant::new(std::array::from_fn(|index| {
                 gusts.at(corner([index & 1, index >> 1 & 1, index >> 2].map(|step| step as f64)))
             }))
         });
-        CellNow { base, axes: [right, up, back], velocity, blown }
+        CellState { base, axes: [right, up, back], velocity, gusts }
     }
 
-    /// Where a place within a cell of a class is half way through the exposure, in shares of its edges, and its velocity, m/s.
-    pub(crate) fn drop(&self, class: &ClassNow, cell: Cell, within: DVec3) -> (DVec3, DVec3) {
+    /// Position of a point of a cell (given as fractions of its edges) at the middle of the exposure, and its velocity,
+    /// m/s.
+    pub(crate) fn drop_state(&self, class: &DropClassState, cell: Cell, within: DVec3) -> (DVec3, DVec3) {
         let steady = class.lattice.world(cell, within);
         let velocity = self.wind - DVec3::Y * class.speed;
         match &self.gusts {
@@ -157,27 +158,35 @@ impl Moment {
         }
     }
 
-    /// Cells of a class of which any drop may show within a ball, with the distances of their middles from the camera; its drops are
-    /// drawn up to `aside` (m) level from its middle in x and z.
-    pub(crate) fn cells(&self, class: &ClassNow, Ball { centre, radius }: Ball, aside: f64) -> Vec<(f64, Cell)> {
-        let eye = self.sight.middle().position;
-        let slack = self.gusts.as_ref().map_or(0.0, |_| GUST_SLACK);
-        let half = class.lattice.half_extents(aside) + slack;
+    /// Cells of a class of which any drop may be visible within a sphere, with the distances of their centers from the
+    /// camera. Drops are drawn up to `half_width` (m) from the cell's center in x and z.
+    pub(crate) fn visible_cells(
+        &self,
+        class: &DropClassState,
+        Sphere { center, radius }: Sphere,
+        half_width: f64,
+    ) -> Vec<(f64, Cell)> {
+        let eye = self.cameras.middle().position;
+        let margin = self.gusts.as_ref().map_or(0.0, |_| GUST_MARGIN);
+        let half = class.lattice.half_extents(half_width) + margin;
         let reach = radius + half.max_element();
-        let around = [centre - reach, centre + reach];
-        let [low, high] = self.gusts.as_ref().map_or(around, |gusts| gusts.origins(around));
-        let way = 0.5 * (class.speed + self.sight.velocity().length()) * self.sight.exposure + slack + LARGEST;
-        let rows = [low.y.max(self.ground - CELL), high.y].map(|y| class.lattice.row(y));
+        let bounds = [center - reach, center + reach];
+        let [low, high] = self.gusts.as_ref().map_or(bounds, |gusts| gusts.source_bounds(bounds));
+        let travel = 0.5 * (class.speed + self.cameras.velocity().length()) * self.cameras.exposure_time
+            + margin
+            + MAX_DROP_RADIUS;
+        let rows = [low.y.max(self.ground - CELL_SIZE), high.y].map(|y| class.lattice.row(y));
         let mut cells = Vec::new();
         for row in rows[0]..=rows[1] {
             let [first, last] = [low, high].map(|corner| class.lattice.column(row, DVec2::new(corner.x, corner.z)));
             for x in first[0]..=last[0] {
                 for z in first[1]..=last[1] {
                     let cell = Cell([x, row, z]);
-                    let (point, velocity) = self.drop(class, cell, DVec3::splat(0.5));
-                    let nearest = ((point - centre).abs() - half).max(DVec3::ZERO).length();
-                    let blown = 0.5 * DVec3::new(velocity.x, 0.0, velocity.z).length() * self.sight.exposure;
-                    if nearest < radius && self.sight.may_see(point, half, way + blown) {
+                    let (point, velocity) = self.drop_state(class, cell, DVec3::splat(0.5));
+                    let nearest = ((point - center).abs() - half).max(DVec3::ZERO).length();
+                    let wind_travel =
+                        0.5 * DVec3::new(velocity.x, 0.0, velocity.z).length() * self.cameras.exposure_time;
+                    if nearest < radius && self.cameras.may_be_visible(point, half, travel + wind_travel) {
                         cells.push(((point - eye).length(), cell));
                     }
                 }
@@ -186,31 +195,24 @@ impl Moment {
         cells
     }
 
-    /// Whether any solid may keep rain from what is beneath it.
-    pub(crate) fn has_roofs(&self) -> bool {
-        !self.roofs.is_empty()
+    /// Whether any solid may shelter anything.
+    pub(crate) fn has_occluders(&self) -> bool {
+        !self.occluders.is_empty()
     }
 
-    /// Whether a solid keeps the rain that comes with `velocity` from `point`.
-    pub(crate) fn sheltered(&self, point: DVec3, velocity: DVec3) -> bool {
-        self.roofs.iter().any(|roof| shelters(roof, point, -velocity.normalize_or_zero()))
+    /// Whether a solid blocks the rain that arrives at `point` with `velocity`.
+    pub(crate) fn is_sheltered(&self, point: DVec3, velocity: DVec3) -> bool {
+        self.occluders.iter().any(|occluder| ray_hits_occluder(occluder, point, -velocity.normalize_or_zero()))
     }
 }
 
-/// The cubic `3 t^2 - 2 t^3` of `t` held to 0 to 1.
-#[inline(always)]
-pub(crate) fn smoothstep(t: f32) -> f32 {
-    let t = at_most(1.0, at_least(0.0, t));
-    t * t * (3.0 - 2.0 * t)
-}
-
-/// All below a plane is ground, not roof.
+/// A half space is ground: nothing is beneath it.
 fn is_ground(solid: &Occluder) -> bool {
     matches!(solid, Occluder::HalfSpace { .. })
 }
 
-/// Height of the highest level ground among solids, m.
-pub(crate) fn ground(occluders: &[Occluder]) -> Option<f64> {
+/// Height of the highest horizontal ground plane among the solids, m.
+pub(crate) fn ground_height(occluders: &[Occluder]) -> Option<f64> {
     let level = |occluder: &Occluder| match occluder {
         Occluder::HalfSpace { point, normal } if normal.y > 0.999 => Some(point.y),
         _ => None,
@@ -218,21 +220,21 @@ pub(crate) fn ground(occluders: &[Occluder]) -> Option<f64> {
     occluders.iter().filter_map(level).max_by(f64::total_cmp)
 }
 
-/// Steps after which a way that only grazes a solid counts as free.
-const TRACE_STEPS: usize = 64;
-/// How high roofs may stand, m.
-const HIGHEST_ROOF: f64 = 200.0;
+/// Steps of sphere tracing after which a grazing ray counts as a miss.
+const MAX_TRACE_STEPS: usize = 64;
+/// Greatest height of a sheltering solid, m.
+const MAX_OCCLUDER_HEIGHT: f64 = 200.0;
 
-/// Whether the way from `point` toward `up` meets a solid, in steps as long as its distance allows.
-fn shelters(roof: &Occluder, point: DVec3, up: DVec3) -> bool {
-    let mut way = 0.0;
-    for _ in 0..TRACE_STEPS {
-        let distance = roof.signed_distance(point + up * way);
+/// Sphere tracing from `point` toward `up`: whether the ray meets the solid.
+fn ray_hits_occluder(occluder: &Occluder, point: DVec3, up: DVec3) -> bool {
+    let mut travel = 0.0;
+    for _ in 0..MAX_TRACE_STEPS {
+        let distance = occluder.signed_distance(point + up * travel);
         if distance < 1e-3 {
             return true;
         }
-        way += distance;
-        if way > HIGHEST_ROOF {
+        travel += distance;
+        if travel > MAX_OCCLUDER_HEIGHT {
             break;
         }
     }
@@ -247,18 +249,27 @@ mod tests {
 
     #[test]
     fn roofs_shelter_what_is_beneath_them_and_slanted_rain_comes_in() {
-        let roof = Occluder::Cuboid {
+        let occluder = Occluder::Cuboid {
             centre: DVec3::new(0.0, 3.1, 0.0),
             half_extents: DVec3::new(1.0, 0.1, 1.0),
             rotation: DQuat::IDENTITY,
         };
         let slanted = DVec3::new(1.0, 1.0, 0.0).normalize();
-        assert!(shelters(&roof, DVec3::ZERO, DVec3::Y) && !shelters(&roof, DVec3::new(2.0, 0.0, 0.0), DVec3::Y));
-        assert!(!shelters(&roof, DVec3::ZERO, slanted) && shelters(&roof, DVec3::new(-3.0, 0.0, 0.0), slanted));
-        assert!(!shelters(&roof, DVec3::new(0.0, 4.0, 0.0), DVec3::Y));
+        assert!(
+            ray_hits_occluder(&occluder, DVec3::ZERO, DVec3::Y)
+                && !ray_hits_occluder(&occluder, DVec3::new(2.0, 0.0, 0.0), DVec3::Y)
+        );
+        assert!(
+            !ray_hits_occluder(&occluder, DVec3::ZERO, slanted)
+                && ray_hits_occluder(&occluder, DVec3::new(-3.0, 0.0, 0.0), slanted)
+        );
+        assert!(!ray_hits_occluder(&occluder, DVec3::new(0.0, 4.0, 0.0), DVec3::Y));
         let ball = Occluder::Sphere { centre: DVec3::new(0.0, 2.0, 0.0), radius: 0.5 };
-        assert!(shelters(&ball, DVec3::ZERO, DVec3::Y) && !shelters(&ball, DVec3::new(0.6, 0.0, 0.0), DVec3::Y));
+        assert!(
+            ray_hits_occluder(&ball, DVec3::ZERO, DVec3::Y)
+                && !ray_hits_occluder(&ball, DVec3::new(0.6, 0.0, 0.0), DVec3::Y)
+        );
         let ground = Occluder::HalfSpace { point: DVec3::ZERO, normal: DVec3::Y };
-        assert!(is_ground(&ground) && !is_ground(&roof) && !is_ground(&ball));
+        assert!(is_ground(&ground) && !is_ground(&occluder) && !is_ground(&ball));
     }
 }

@@ -1,23 +1,24 @@
-//! What gusts add to the mean wind that carries all drops alike.
+//! Displacement and velocity of drops by gusts, on top of the mean wind that carries all drops alike.
 
 use bansho_base::{math::DVec3, world::wind::Wind};
 
-/// A drop's way to where it is decides how far gusts have pushed it. Older gusts are forgotten little by little over this time, s: a drop
-/// falls through the visible region in less.
-const MEMORY_S: f64 = 2.0;
-/// Steps in which that way is followed back.
-const STEPS: usize = 6;
-/// Speed at which the way leads up; gusts are much larger than what drops of other speeds differ by.
-const FALL: f64 = 5.5;
-/// Least distance of nodes as a share of the region's radius: gusts that are finer are smoothed.
-const FINEST: f64 = 0.4;
+/// Memory of a drop's horizontal displacement, s. The weight of a past gust decreases linearly to 0 over this time, in
+/// which a drop falls through the visible region.
+const GUST_MEMORY_S: f64 = 2.0;
+/// Steps of the integral back in time.
+const HISTORY_STEPS: usize = 6;
+/// Fall speed with which the path is followed back, m/s. Gusts are much larger than the distances by which drops of
+/// other speeds differ.
+const TYPICAL_FALL_SPEED: f64 = 5.5;
+/// Smallest node spacing as a fraction of the region's radius: finer gusts are smoothed out.
+const MIN_SPACING_RATIO: f64 = 0.4;
 
-/// Furthest displacement in distances of nodes: storms may shake rain about, but must not fetch it from far outside the region.
-const FURTHEST: f64 = 1.5;
+/// Largest displacement in units of the node spacing: a storm must not carry drops in from far outside the region.
+const MAX_DISPLACEMENT_RATIO: f64 = 1.5;
 
-/// Gusts around the camera at one time: on nodes that are fixed in the world, straight between them.
+/// The gusts around the camera at one time, trilinearly interpolated between nodes that are fixed in the world.
 #[derive(Clone, Debug)]
-pub(crate) struct Gusts {
+pub(crate) struct GustField {
     spacing: f64,
     first: [i64; 3],
     count: [usize; 3],
@@ -25,70 +26,75 @@ pub(crate) struct Gusts {
     nodes: Vec<[DVec3; 2]>,
 }
 
-impl Gusts {
-    /// Gusts within `radius` of `centre` at time `t`; `None` where the wind has none.
-    pub(crate) fn new(wind: &Wind, response: f64, centre: DVec3, radius: f64, t: f64) -> Option<Self> {
+impl GustField {
+    /// Gusts within `radius` of `center` at time `t`; `None` where the wind has none.
+    pub(crate) fn new(wind: &Wind, response: f64, center: DVec3, radius: f64, t: f64) -> Option<Self> {
         let gust_length = wind.gust_length().filter(|_| response > 0.0)?;
-        let spacing = (gust_length / 3.0).max(FINEST * radius);
-        let whole = |value: f64| (value / spacing).floor() as i64;
-        let first = (centre - radius).to_array().map(whole);
-        let last = (centre + radius).to_array().map(|value| whole(value) + 1);
+        let spacing = (gust_length / 3.0).max(MIN_SPACING_RATIO * radius);
+        let node_index = |value: f64| (value / spacing).floor() as i64;
+        let first = (center - radius).to_array().map(node_index);
+        let last = (center + radius).to_array().map(|value| node_index(value) + 1);
         let count = std::array::from_fn(|axis| (last[axis] - first[axis] + 1) as usize);
         let [columns, rows, layers] = count;
         let node = |index: usize| {
-            let place = [index % columns, index / columns % rows, index / columns / rows];
-            let point = DVec3::from(std::array::from_fn(|axis| (first[axis] + place[axis] as i64) as f64 * spacing));
-            let [displacement, velocity] = along_the_way(wind, point, t).map(|vector| vector * response);
-            [held(displacement, FURTHEST * spacing), velocity]
+            let grid_position = [index % columns, index / columns % rows, index / columns / rows];
+            let point =
+                DVec3::from(std::array::from_fn(|axis| (first[axis] + grid_position[axis] as i64) as f64 * spacing));
+            let [displacement, velocity] = displacement_and_rate(wind, point, t).map(|vector| vector * response);
+            [soft_limited(displacement, MAX_DISPLACEMENT_RATIO * spacing), velocity]
         };
         Some(Self { spacing, first, count, nodes: (0..columns * rows * layers).map(node).collect() })
     }
 
-    /// A box that holds every point which is displaced into the box between two corners.
-    pub(crate) fn origins(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
-        /// After these the box no longer shrinks by much.
+    /// A box that contains every point whose displaced position lies in the box between two corners.
+    pub(crate) fn source_bounds(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
+        /// After this many iterations the box hardly shrinks any more.
         const ROUNDS: usize = 8;
-        // Displacements anywhere first, then those within the box that this leaves, and so on.
-        let mut origins = [DVec3::splat(f64::NEG_INFINITY), DVec3::splat(f64::INFINITY)];
+        // Fixed-point iteration: bounds on the displacement everywhere first, then on that within the box found so far.
+        let mut source_bounds = [DVec3::splat(f64::NEG_INFINITY), DVec3::splat(f64::INFINITY)];
         for _ in 0..ROUNDS {
-            let [least, most] = self.range(origins);
-            origins = [low - most, high - least];
+            let [lower, limit] = self.displacement_range(source_bounds);
+            source_bounds = [low - limit, high - lower];
         }
-        origins
+        source_bounds
     }
 
-    /// Least and greatest displacement along each axis within a box: between nodes it is straight along every axis, so the ends lie
-    /// at nodes and on the box's corners.
-    fn range(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
+    /// Least and greatest displacement along each axis within a box. The interpolant is linear along each axis, so
+    /// extrema lie at nodes and on the faces of the box.
+    fn displacement_range(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
         let ends = |axis: usize| {
             let node = |index: usize| (self.first[axis] + index as i64) as f64 * self.spacing;
-            let inside = (0..self.count[axis]).map(node).filter(move |place| *place > low[axis] && *place < high[axis]);
-            let border = [low[axis], high[axis]].map(|place| place.clamp(node(0), node(self.count[axis] - 1)));
+            let inside = (0..self.count[axis])
+                .map(node)
+                .filter(move |grid_position| *grid_position > low[axis] && *grid_position < high[axis]);
+            let border =
+                [low[axis], high[axis]].map(|grid_position| grid_position.clamp(node(0), node(self.count[axis] - 1)));
             inside.chain(border).collect::<Vec<f64>>()
         };
         let [xs, ys, zs] = [0, 1, 2].map(ends);
-        let mut range = [DVec3::splat(f64::INFINITY), DVec3::splat(f64::NEG_INFINITY)];
+        let mut displacement_range = [DVec3::splat(f64::INFINITY), DVec3::splat(f64::NEG_INFINITY)];
         for point in xs.iter().flat_map(|x| ys.iter().flat_map(|y| zs.iter().map(|z| DVec3::new(*x, *y, *z)))) {
             let [displacement, _] = self.at(point);
-            range = [range[0].min(displacement), range[1].max(displacement)];
+            displacement_range = [displacement_range[0].min(displacement), displacement_range[1].max(displacement)];
         }
-        range
+        displacement_range
     }
 
     /// Displacement (m) and velocity (m/s) at a point.
     pub(crate) fn at(&self, point: DVec3) -> [DVec3; 2] {
-        let place = point / self.spacing;
+        let grid_position = point / self.spacing;
         let mut low = [0; 3];
-        let mut part = [0.0; 3];
+        let mut fraction = [0.0; 3];
         for axis in 0..3 {
-            let within = (place[axis] - self.first[axis] as f64).clamp(0.0, (self.count[axis] - 1) as f64);
+            let within = (grid_position[axis] - self.first[axis] as f64).clamp(0.0, (self.count[axis] - 1) as f64);
             low[axis] = (within as usize).min(self.count[axis] - 2);
-            part[axis] = within - low[axis] as f64;
+            fraction[axis] = within - low[axis] as f64;
         }
         let mut sum = [DVec3::ZERO; 2];
         for corner in 0..8_usize {
             let step = [corner & 1, corner >> 1 & 1, corner >> 2];
-            let weight: f64 = (0..3).map(|axis| if step[axis] == 1 { part[axis] } else { 1.0 - part[axis] }).product();
+            let weight: f64 =
+                (0..3).map(|axis| if step[axis] == 1 { fraction[axis] } else { 1.0 - fraction[axis] }).product();
             let [x, y, z] = std::array::from_fn(|axis| low[axis] + step[axis]);
             let node = &self.nodes[(z * self.count[1] + y) * self.count[0] + x];
             sum = [sum[0] + node[0] * weight, sum[1] + node[1] * weight];
@@ -97,36 +103,37 @@ impl Gusts {
     }
 }
 
-/// Displacement of a drop at `point` by the gusts on its way and its rate along that way: what the gusts add to its velocity.
-fn along_the_way(wind: &Wind, point: DVec3, t: f64) -> [DVec3; 2] {
-    /// Half of the time over which the rate is taken, s: about an exposure.
+/// Displacement of a drop at `point` by the gusts along its path, and its derivative along that path: the velocity that
+/// gusts add.
+fn displacement_and_rate(wind: &Wind, point: DVec3, t: f64) -> [DVec3; 2] {
+    /// Half the interval of the central difference, s: about an exposure.
     const HALF: f64 = 0.01;
-    let mean = level(wind.mean(t));
-    let way = (mean - DVec3::Y * FALL) * HALF;
-    let [before, after] = [(point - way, t - HALF), (point + way, t + HALF)].map(|(p, t)| displacement(wind, p, t));
+    let mean = horizontal(wind.mean(t));
+    let path = (mean - DVec3::Y * TYPICAL_FALL_SPEED) * HALF;
+    let [before, after] = [(point - path, t - HALF), (point + path, t + HALF)].map(|(p, t)| displacement(wind, p, t));
     [0.5 * (before + after), (after - before) / (2.0 * HALF)]
 }
 
-/// `integral of g(s) (1 - s / memory) ds` over the past s of a drop along its way, level, m.
+/// Horizontal displacement `integral of g(s) (1 - s / memory) ds` over the past s along a drop's path, m.
 fn displacement(wind: &Wind, point: DVec3, t: f64) -> DVec3 {
-    let mean = level(wind.mean(t));
-    let step = MEMORY_S / STEPS as f64;
-    let part = |index: usize| {
+    let mean = horizontal(wind.mean(t));
+    let step = GUST_MEMORY_S / HISTORY_STEPS as f64;
+    let fraction = |index: usize| {
         let age = (index as f64 + 0.5) * step;
-        let gust = wind.at(point + (DVec3::Y * FALL - mean) * age, t - age) - wind.mean(t - age);
-        level(gust) * (step * (1.0 - age / MEMORY_S))
+        let gust = wind.at(point + (DVec3::Y * TYPICAL_FALL_SPEED - mean) * age, t - age) - wind.mean(t - age);
+        horizontal(gust) * (step * (1.0 - age / GUST_MEMORY_S))
     };
-    (0..STEPS).map(part).sum()
+    (0..HISTORY_STEPS).map(fraction).sum()
 }
 
-/// As it is up to half of `most`, beyond that ever less more, never as long as `most`.
-fn held(vector: DVec3, most: f64) -> DVec3 {
-    let (length, half) = (vector.length(), 0.5 * most);
-    if length <= half { vector } else { vector * ((most - half * half / length) / length) }
+/// Limits a vector's length to less than `limit`, smoothly (C1); unchanged up to half of it.
+fn soft_limited(vector: DVec3, limit: f64) -> DVec3 {
+    let (length, half) = (vector.length(), 0.5 * limit);
+    if length <= half { vector } else { vector * ((limit - half * half / length) / length) }
 }
 
-/// Without what is up or down: near the ground wind is level.
-fn level(vector: DVec3) -> DVec3 {
+/// The horizontal part: near the ground wind is horizontal.
+fn horizontal(vector: DVec3) -> DVec3 {
     DVec3::new(vector.x, 0.0, vector.z)
 }
 
@@ -145,7 +152,7 @@ mod tests {
         Wind::new(WindParameters { velocity, gust, ..WindParameters::default() }, 3, None)
     }
 
-    impl Gusts {
+    impl GustField {
         /// The furthest displacement at any node, m.
         fn reach(&self) -> f64 {
             self.nodes.iter().map(|[displacement, _]| displacement.length()).fold(0.0, f64::max)
@@ -154,7 +161,7 @@ mod tests {
 
     #[test]
     fn displacements_are_held_smoothly() {
-        let along = |length: f64| held(DVec3::X * length, 3.0).x;
+        let along = |length: f64| soft_limited(DVec3::X * length, 3.0).x;
         assert_eq!((along(0.0), along(1.5)), (0.0, 1.5));
         // 3 - 1.5^2 / 3 at twice the half, with the slope 1 where it begins to bend.
         assert!((along(3.0) - 2.25).abs() < 1e-12 && (along(1.5 + 1e-6) - 1.5 - 1e-6).abs() < 1e-11);
@@ -168,8 +175,8 @@ mod tests {
             let velocity = Animated::from([60.0, 0.0, 20.0]);
             let storm =
                 Wind::new(WindParameters { velocity, gust: 0.9, gust_length, ..WindParameters::default() }, 3, None);
-            let gusts = Gusts::new(&storm, 1.0, DVec3::ZERO, 7.0, 1.0).expect("gusts");
-            let [first, last] = gusts.origins([low, high]);
+            let gusts = GustField::new(&storm, 1.0, DVec3::ZERO, 7.0, 1.0).expect("gusts");
+            let [first, last] = gusts.source_bounds([low, high]);
             assert!((last - first - (high - low)).max_element() < slack * gusts.reach(), "{first} {last}");
             let mut hits = 0;
             for i in 0..20_000 {
@@ -190,16 +197,19 @@ mod tests {
     fn storms_fetch_no_rain_from_far_away() {
         let velocity = Animated::from([90.0, 0.0, 40.0]);
         let storm = Wind::new(WindParameters { velocity, gust: 0.9, ..WindParameters::default() }, 3, None);
-        let gusts = Gusts::new(&storm, 1.0, DVec3::ZERO, 7.0, 1.0).expect("gusts");
-        assert!(gusts.reach() < FURTHEST * gusts.spacing && gusts.reach() > 0.5 * FURTHEST * gusts.spacing);
+        let gusts = GustField::new(&storm, 1.0, DVec3::ZERO, 7.0, 1.0).expect("gusts");
+        assert!(
+            gusts.reach() < MAX_DISPLACEMENT_RATIO * gusts.spacing
+                && gusts.reach() > 0.5 * MAX_DISPLACEMENT_RATIO * gusts.spacing
+        );
         let fastest = gusts.nodes.iter().map(|[_, velocity]| velocity.length()).fold(0.0, f64::max);
         assert!(fastest > 20.0, "{fastest}");
     }
 
     #[test]
     fn calm_and_steady_winds_have_no_gusts() {
-        assert!(Gusts::new(&wind(0.0), 1.0, DVec3::ZERO, 5.0, 1.0).is_none());
-        assert!(Gusts::new(&wind(0.3), 0.0, DVec3::ZERO, 5.0, 1.0).is_none());
+        assert!(GustField::new(&wind(0.0), 1.0, DVec3::ZERO, 5.0, 1.0).is_none());
+        assert!(GustField::new(&wind(0.3), 0.0, DVec3::ZERO, 5.0, 1.0).is_none());
     }
 
     #[test]
@@ -209,9 +219,9 @@ mod tests {
         let (mut missed, mut moved) = (0.0, 0.0);
         for i in 0..50 {
             let (t, point) = (0.37 * f64::from(i), DVec3::new(0.4, 3.0, -1.0));
-            let [here, velocity] = along_the_way(&wind, point, t);
-            let next = point + (DVec3::X * 5.0 - DVec3::Y * FALL) * frame;
-            let [there, later] = along_the_way(&wind, next, t + frame);
+            let [here, velocity] = displacement_and_rate(&wind, point, t);
+            let next = point + (DVec3::X * 5.0 - DVec3::Y * TYPICAL_FALL_SPEED) * frame;
+            let [there, later] = displacement_and_rate(&wind, next, t + frame);
             missed += (there - here - 0.5 * (velocity + later) * frame).length();
             moved += (there - here).length();
         }
@@ -222,8 +232,8 @@ mod tests {
     fn nodes_are_fixed_in_the_world_so_that_a_moving_camera_sees_the_same_gusts() {
         let wind = wind(0.3);
         let point = DVec3::new(0.7, 1.3, 0.2);
-        let here = Gusts::new(&wind, 1.0, DVec3::ZERO, 5.0, 1.0).unwrap().at(point);
-        let there = Gusts::new(&wind, 1.0, DVec3::new(1.9, 0.4, -1.1), 5.0, 1.0).unwrap().at(point);
+        let here = GustField::new(&wind, 1.0, DVec3::ZERO, 5.0, 1.0).unwrap().at(point);
+        let there = GustField::new(&wind, 1.0, DVec3::new(1.9, 0.4, -1.1), 5.0, 1.0).unwrap().at(point);
         assert!((here[0] - there[0]).length() < 1e-9 && here[0].length() > 0.0);
     }
 }

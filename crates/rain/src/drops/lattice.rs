@@ -1,8 +1,9 @@
-//! How the drops of one diameter fall: a lattice of cells that fall together, so that any moment is known by itself.
+//! The lattice of drop cells: closed-form motion of the drops of one diameter.
 //!
-//! Cells are about one metre high and wide. They are anchored in the world, whatever the camera does; wind carries them along, row by row,
-//! and their contents are keyed by their place in the lattice. A cell that leaves through the ground never returns:
-//! the next one comes from above with drops of its own.
+//! All drops of one diameter fall at the same speed, so cells of about 1 m^3 fall as a whole and their state at any
+//! time needs no simulation. The lattice is fixed to the world and independent of the camera. Wind displaces it row by
+//! row. The random contents of a cell are keyed by its lattice index. A cell that has passed through the ground never
+//! returns: new cells with drops of their own enter from above.
 
 use std::ops::RangeInclusive;
 
@@ -11,72 +12,72 @@ use bansho_base::{
     world::wind::Wind,
 };
 
-/// Width of a cell, m, and about its height.
-pub(crate) const CELL: f64 = 1.0;
+/// Width of a cell, m; also its height, but for loops.
+pub(crate) const CELL_SIZE: f64 = 1.0;
 
-/// A cell of the lattice: x, y (counted from the ground up at time 0) and z.
+/// Lattice index of a cell: x, y (upward from the ground at time 0) and z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Cell(pub(crate) [i64; 3]);
 
-/// How drops fall and drift.
+/// How the drops of a lattice fall and drift.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Falling<'a> {
+pub(crate) struct LatticeMotion<'a> {
     /// Terminal velocity, m/s.
     pub(crate) speed: f64,
     pub(crate) wind: &'a Wind,
-    /// How much of the wind they follow.
+    /// Response to the wind: 1 as the air.
     pub(crate) response: f64,
     /// Height of the ground, m.
     pub(crate) ground: f64,
-    /// Length of a loop, s. The height of a cell gives way so that whole cells fall through in it.
+    /// Length of a loop, s. The height of a cell is adjusted so that a whole number of cells falls through in it.
     pub(crate) loop_s: Option<f64>,
 }
 
 /// The lattice of one diameter at one time.
 ///
-/// The wind `v` has carried a row that comes to the ground at time t0 by `integral of v from t0 to now`, before it comes there backward: where a
-/// drop lands is its own, and wind only says from where it comes. So a wind that is changed by a little, however late, moves
-/// drops by a little; counted from time 0 it would move all of them by the change times the time. In a loop the row that repeats another is
-/// carried as that was.
+/// The horizontal displacement of a row that reaches the ground at time t0 is `integral of v from t0 to now`, v being
+/// the wind. The point where a drop lands does not depend on the wind, only the direction from which it comes. So a
+/// small change of the wind moves drops by a small amount, however late in the shot; counted from time 0 it would move
+/// them by the change times the elapsed time. In a loop, a row that repeats another has the same displacement.
 #[derive(Clone, Debug)]
 pub(crate) struct Lattice {
     /// Height of a cell, m.
     height: f64,
     /// Height of row 0, m.
     base: f64,
-    /// The first row that may be asked for, and how far the wind has carried it and those above, m: x and z.
+    /// The lowest row in range, and the horizontal displacement of it and those above, m: x and z.
     first: i64,
-    carried: Vec<DVec2>,
-    /// Rows after which cells repeat in a loop.
+    drift: Vec<DVec2>,
+    /// Number of rows after which cells repeat in a loop.
     rows: Option<i64>,
 }
 
 impl Lattice {
-    /// Drops at time `t` between two `heights`, m.
-    pub(crate) fn new(falling: &Falling, heights: RangeInclusive<f64>, t: f64) -> Self {
-        let Falling { speed, wind, response, ground, loop_s } = *falling;
+    /// The lattice at time `t`, for `heights` in a range, m.
+    pub(crate) fn new(falling: &LatticeMotion, heights: RangeInclusive<f64>, t: f64) -> Self {
+        let LatticeMotion { speed, wind, response, ground, loop_s } = *falling;
         let (height, rows) = match loop_s {
-            None => (CELL, None),
+            None => (CELL_SIZE, None),
             Some(seconds) => {
-                let rows = (speed * seconds / CELL).round().max(1.0);
+                let rows = (speed * seconds / CELL_SIZE).round().max(1.0);
                 (speed * seconds / rows, Some(rows as i64))
             }
         };
         let base = ground - speed * t;
         let row = |y: f64| ((y - base) / height).floor() as i64;
         let (first, last) = (row(*heights.start()), row(*heights.end()));
-        // A drop is fast enough to come down within a year, or the wind may have it for so long.
+        // Bounds the time to the ground, for drops that hardly fall.
         let slowest = speed.max(1e-6);
-        let carried = |row: i64| {
-            let way = wind.travel((row as f64 + 0.5) * height / slowest, t) * response;
-            DVec2::new(way.x, way.z)
+        let drift = |row: i64| {
+            let drift = wind.travel((row as f64 + 0.5) * height / slowest, t) * response;
+            DVec2::new(drift.x, drift.z)
         };
-        Self { height, base, first, carried: (first..=last).map(carried).collect(), rows }
+        Self { height, base, first, drift: (first..=last).map(drift).collect(), rows }
     }
 
     /// Volume of a cell, m^3.
     pub(crate) fn volume(&self) -> f64 {
-        CELL * CELL * self.height
+        CELL_SIZE * CELL_SIZE * self.height
     }
 
     /// Height of a cell, m.
@@ -84,9 +85,9 @@ impl Lattice {
         self.height
     }
 
-    /// How far a cell's drops are from its middle along the world's axes, m: up to `aside` level.
-    pub(crate) fn half_extents(&self, aside: f64) -> DVec3 {
-        DVec3::new(aside, 0.5 * self.height, aside)
+    /// Half extents of the bounding box of a cell's drops, m; `half_width` horizontally.
+    pub(crate) fn half_extents(&self, half_width: f64) -> DVec3 {
+        DVec3::new(half_width, 0.5 * self.height, half_width)
     }
 
     /// The row at a height, m.
@@ -94,25 +95,26 @@ impl Lattice {
         ((y - self.base) / self.height).floor() as i64
     }
 
-    /// The column of cells in a row at a place of the world, m: x and z.
-    pub(crate) fn column(&self, row: i64, level: DVec2) -> [i64; 2] {
-        ((level - self.carried(row)) / CELL).to_array().map(|place| place.floor() as i64)
+    /// The column of cells (x and z) of a row that contains a horizontal position in the world, m.
+    pub(crate) fn column(&self, row: i64, horizontal: DVec2) -> [i64; 2] {
+        ((horizontal - self.drift(row)) / CELL_SIZE).to_array().map(|coordinate| coordinate.floor() as i64)
     }
 
-    /// The point of the world at a place within a cell, in shares of its edges, m.
-    pub(crate) fn world(&self, Cell([x, row, z]): Cell, within: DVec3) -> DVec3 {
-        let level = DVec2::new(x as f64 + within.x, z as f64 + within.z) * CELL + self.carried(row);
-        DVec3::new(level.x, (row as f64 + within.y) * self.height + self.base, level.y)
+    /// World position of a point of a cell, given as fractions of its edges, m.
+    pub(crate) fn world(&self, Cell([x, row, z]): Cell, fraction: DVec3) -> DVec3 {
+        let horizontal = DVec2::new(x as f64 + fraction.x, z as f64 + fraction.z) * CELL_SIZE + self.drift(row);
+        DVec3::new(horizontal.x, (row as f64 + fraction.y) * self.height + self.base, horizontal.y)
     }
 
-    /// How far the wind has carried a row, m: x and z. Beyond the heights that it was made for, as the nearest.
-    fn carried(&self, row: i64) -> DVec2 {
-        let last = self.carried.len().saturating_sub(1) as i64;
+    /// Horizontal displacement of a row, m: x and z. Outside the range of heights, that of the nearest row.
+    fn drift(&self, row: i64) -> DVec2 {
+        let last = self.drift.len().saturating_sub(1) as i64;
         let index = (row - self.first).clamp(0, last) as usize;
-        self.carried.get(index).copied().unwrap_or_default()
+        self.drift.get(index).copied().unwrap_or_default()
     }
 
-    /// Which contents a cell has: cells that a loop repeats have the same. Keys hold 21, 22 and 21 bits of the three counts.
+    /// Random key of a cell's contents: equal for cells that a loop repeats. It packs 21, 22 and 21 bits of the three
+    /// indices.
     pub(crate) fn contents(&self, cell: Cell) -> u64 {
         let [x, y, z] = cell.0;
         let y = self.rows.map_or(y, |rows| y.rem_euclid(rows));
@@ -132,7 +134,7 @@ mod tests {
     }
 
     fn lattice(speed: f64, wind: &Wind, loop_s: Option<f64>, t: f64) -> Lattice {
-        Lattice::new(&Falling { speed, wind, response: 1.0, ground: 0.0, loop_s }, -20.0..=40.0, t)
+        Lattice::new(&LatticeMotion { speed, wind, response: 1.0, ground: 0.0, loop_s }, -20.0..=40.0, t)
     }
 
     /// What keys blow to x.
@@ -144,10 +146,10 @@ mod tests {
     #[test]
     fn a_drop_falls_at_its_speed_and_drifts_with_the_wind() {
         let wind = wind([3.0, 0.0, -1.0], None);
-        let (cell, within) = (Cell([4, 620, -2]), DVec3::new(0.3, 0.7, 0.8));
-        let at = |t: f64| lattice(6.0, &wind, None, t).world(cell, within);
-        let moved = at(100.5) - at(100.0);
-        assert!((moved - DVec3::new(1.5, -3.0, -0.5)).length() < 1e-9, "{moved}");
+        let (cell, fraction) = (Cell([4, 620, -2]), DVec3::new(0.3, 0.7, 0.8));
+        let at = |t: f64| lattice(6.0, &wind, None, t).world(cell, fraction);
+        let displacement = at(100.5) - at(100.0);
+        assert!((displacement - DVec3::new(1.5, -3.0, -0.5)).length() < 1e-9, "{displacement}");
     }
 
     #[test]
@@ -165,9 +167,9 @@ mod tests {
             let at = |speed: f64| {
                 lattice(6.0, &wind([speed, 0.0, 0.0], None), None, t).world(Cell([0, row, 0]), DVec3::splat(0.5))
             };
-            let moved = at(2.1) - at(2.0);
+            let displacement = at(2.1) - at(2.0);
             // 3.5 m above the ground, which it comes to in 3.5 / 6 s.
-            assert!((moved.x + 0.1 * 3.5 / 6.0).abs() < 1e-6 && moved.y == 0.0, "{t}: {moved}");
+            assert!((displacement.x + 0.1 * 3.5 / 6.0).abs() < 1e-6 && displacement.y == 0.0, "{t}: {displacement}");
         }
     }
 
@@ -189,9 +191,9 @@ mod tests {
             let point = DVec3::new(-7.3, 2.2, 11.8);
             let row = lattice.row(point.y);
             let [x, z] = lattice.column(row, DVec2::new(point.x, point.z));
-            let within = point - lattice.world(Cell([x, row, z]), DVec3::ZERO);
-            let edges = DVec3::new(CELL, lattice.height(), CELL);
-            assert!(within.cmpge(DVec3::ZERO).all() && within.cmplt(edges).all(), "{within}");
+            let fraction = point - lattice.world(Cell([x, row, z]), DVec3::ZERO);
+            let edges = DVec3::new(CELL_SIZE, lattice.height(), CELL_SIZE);
+            assert!(fraction.cmpge(DVec3::ZERO).all() && fraction.cmplt(edges).all(), "{fraction}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! Drops in the air: how many of which size, how fast they fall, where they are.
+//! Drops in the air: size distribution, terminal velocity, positions and motion in the wind.
 
 pub(crate) mod cell;
 pub(crate) mod exposure;

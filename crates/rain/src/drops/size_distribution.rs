@@ -1,27 +1,27 @@
-//! How many drops of which size.
+//! Drop size distributions n(D): Marshall and Palmer's exponential, and tables.
 
 use std::f64::consts::PI;
 
 use bansho_base::{math, math::random};
 
-use super::terminal_velocity::Fall;
+use super::terminal_velocity::TerminalVelocity;
 
 /// Intercept N0 of Marshall and Palmer, per m^3 per mm.
 const INTERCEPT: f64 = 8000.0;
 
-/// Drops of each diameter, per m^3 of air per mm of diameter: n(D).
+/// Drop size distribution n(D): drops per m^3 of air per mm of diameter.
 #[derive(Clone, Debug, PartialEq)]
-pub enum DropSizes {
+pub enum DropSizeDistribution {
     /// `n = 8000 exp(-slope D)`, with the slope in 1/mm.
     Exponential {
         /// Slope Lambda, 1/mm; infinite where there is no rain.
         slope_per_mm: f64,
     },
-    /// Straight lines between points of a table; no drops outside it.
+    /// Piecewise linear between points of a table; no drops outside it.
     Table(SizeTable),
 }
 
-impl DropSizes {
+impl DropSizeDistribution {
     /// All diameters, mm.
     pub const ALL: [f64; 2] = [0.0, f64::INFINITY];
 
@@ -43,7 +43,7 @@ impl DropSizes {
         }
     }
 
-    /// Integral of `n D^k dD` over the diameters of a range (mm), mm^k per m^3.
+    /// Moment of order k: integral of `n D^k dD` over a range of diameters (mm), mm^k per m^3.
     pub fn moment(&self, k: u32, [low, high]: [f64; 2]) -> f64 {
         match self {
             Self::Exponential { slope_per_mm } => {
@@ -58,7 +58,8 @@ impl DropSizes {
         self.moment(0, range_mm)
     }
 
-    /// The diameter below which the share `u` of the drops of a range lies, mm: of uniform numbers it makes diameters.
+    /// Inverse of the cumulative distribution within a range, mm: the diameter below which the fraction `u` of its
+    /// drops lies. It maps uniform random numbers to diameters.
     pub fn quantile(&self, u: f64, [low, high]: [f64; 2]) -> f64 {
         match self {
             Self::Exponential { slope_per_mm } if slope_per_mm.is_finite() => {
@@ -70,12 +71,12 @@ impl DropSizes {
         }
     }
 
-    /// Water in the air, g per m^3.
+    /// Liquid water content, g per m^3.
     pub fn liquid_water(&self) -> f64 {
         1e-3 * PI / 6.0 * self.moment(3, Self::ALL)
     }
 
-    /// Median volume diameter, mm: half of the water is in larger drops; 0 without drops.
+    /// Median volume diameter, mm: larger drops hold half of the water; 0 without drops.
     pub fn median_volume_diameter(&self) -> f64 {
         let whole = self.moment(3, Self::ALL);
         if whole <= 0.0 {
@@ -89,11 +90,12 @@ impl DropSizes {
         high
     }
 
-    /// The rain rate that the drops of a range bring down, mm/h.
+    /// The rain rate of the drops in a range of diameters, mm/h.
     ///
-    /// Marshall and Palmer's fit does not give back its own rate: with measured velocities 14 to 18 % more.
-    pub fn rain_rate(&self, fall: &Fall, [low, high]: [f64; 2]) -> f64 {
-        /// Enough for 1e-6: the velocity is a table with steps of 0.1 to 0.2 mm.
+    /// The fit of Marshall and Palmer does not reproduce its own rate: with measured velocities it gives 14 to 18 %
+    /// more.
+    pub fn rain_rate(&self, fall: &TerminalVelocity, [low, high]: [f64; 2]) -> f64 {
+        /// Midpoint rule with an error of 1e-6: the velocity is a table with steps of 0.1 to 0.2 mm.
         const STEPS: usize = 2000;
         let high = high.min(LARGEST_MM);
         let step = (high - low).max(0.0) / STEPS as f64;
@@ -103,12 +105,12 @@ impl DropSizes {
                 self.moment(3, range) * fall.speed(0.5 * (range[0] + range[1]))
             })
             .sum();
-        // mm^3 per m^3 times m/s: 1e-9 m/s; 3.6e6 mm/h make 1 m/s.
+        // mm^3 per m^3 times m/s is 1e-9 m/s; 1 m/s is 3.6e6 mm/h.
         3.6e-3 * PI / 6.0 * flux
     }
 }
 
-/// Beyond this there are no drops, mm: it ends integrals that need an end.
+/// Upper bound on diameters, mm, for integrals that need a finite one.
 const LARGEST_MM: f64 = 20.0;
 
 /// Integral of `D^k exp(-slope D)` from `x` to infinity.
@@ -126,28 +128,28 @@ fn exponential_tail(k: u32, slope: f64, x: f64) -> f64 {
     })
 }
 
-/// A measured or invented distribution: points (D in mm, n per m^3 per mm).
+/// A tabulated distribution: points (D in mm, n per m^3 per mm).
 #[derive(Clone, Debug, PartialEq)]
 pub struct SizeTable(Vec<[f64; 2]>);
 
-/// Why a table is no distribution of drop sizes.
+/// Why a table is not a drop size distribution.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SizeTableError {
-    /// Fewer than two points span no range of diameters.
+    /// Fewer than two points.
     #[error("a table of drop sizes needs at least two points")]
     TooShort,
-    /// Diameters are negative, infinite, or do not rise.
+    /// Diameters are negative, infinite, or not ascending.
     #[error("diameters must rise from 0 mm on; point {} has {diameter_mm} mm", index + 1)]
     Diameter {
-        /// Which point, from 0.
+        /// Index of the point, from 0.
         index: usize,
         /// Its diameter, mm.
         diameter_mm: f64,
     },
-    /// A number of drops is negative or infinite.
+    /// A density is negative or infinite.
     #[error("there cannot be {density} drops per m^3 and mm at {diameter_mm} mm; allowed: 0 or more")]
     Density {
-        /// Where, mm.
+        /// Diameter, mm.
         diameter_mm: f64,
         /// n(D) there.
         density: f64,
@@ -175,15 +177,15 @@ impl SizeTable {
         Ok(Self(points))
     }
 
-    /// The straight pieces within a range of diameters.
-    fn pieces(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = [[f64; 2]; 2]> {
-        let piece = move |pair: &[[f64; 2]]| {
+    /// The linear segments within a range of diameters.
+    fn segments(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = [[f64; 2]; 2]> {
+        let segment = move |pair: &[[f64; 2]]| {
             let [[d0, n0], [d1, n1]] = [pair[0], pair[1]];
             let (from, to) = (d0.max(low), d1.min(high));
             let at = |d: f64| [d, math::lerp(n0, n1, (d - d0) / (d1 - d0))];
             (from < to).then(|| [at(from), at(to)])
         };
-        self.0.windows(2).filter_map(piece)
+        self.0.windows(2).filter_map(segment)
     }
 
     fn density(&self, diameter_mm: f64) -> f64 {
@@ -196,55 +198,55 @@ impl SizeTable {
     }
 
     fn moment(&self, k: u32, range: [f64; 2]) -> f64 {
-        // Of d^k (a + b d), exactly.
+        // Integral of d^k (a + b d), in closed form.
         let power = |d: f64, exponent: u32| (0..exponent).fold(1.0, |product, _| product * d);
-        let of_piece = |[[d0, n0], [d1, n1]]: [[f64; 2]; 2]| {
+        let segment_moment = |[[d0, n0], [d1, n1]]: [[f64; 2]; 2]| {
             let slope = (n1 - n0) / (d1 - d0);
-            let until = |d: f64| {
+            let antiderivative = |d: f64| {
                 (n0 - slope * d0) * power(d, k + 1) / (k + 1) as f64 + slope * power(d, k + 2) / (k + 2) as f64
             };
-            until(d1) - until(d0)
+            antiderivative(d1) - antiderivative(d0)
         };
-        self.pieces(range).map(of_piece).sum()
+        self.segments(range).map(segment_moment).sum()
     }
 
     fn quantile(&self, u: f64, range: [f64; 2]) -> f64 {
-        let mut left = u * self.moment(0, range);
-        for [[d0, n0], [d1, n1]] in self.pieces(range) {
+        let mut remaining = u * self.moment(0, range);
+        for [[d0, n0], [d1, n1]] in self.segments(range) {
             let drops = 0.5 * (n0 + n1) * (d1 - d0);
-            if left < drops {
-                // n0 x + slope x^2 / 2 = left, in the form that holds for slopes of 0.
+            if remaining < drops {
+                // Solves n0 x + slope x^2 / 2 = remaining, in the form that is stable for a slope of 0.
                 let slope = (n1 - n0) / (d1 - d0);
-                let root = math::sqrt((n0 * n0 + 2.0 * slope * left).max(0.0));
-                return (d0 + 2.0 * left / (n0 + root).max(f64::MIN_POSITIVE)).min(d1);
+                let root = math::sqrt((n0 * n0 + 2.0 * slope * remaining).max(0.0));
+                return (d0 + 2.0 * remaining / (n0 + root).max(f64::MIN_POSITIVE)).min(d1);
             }
-            left -= drops;
+            remaining -= drops;
         }
         range[1].min(self.0[self.0.len() - 1][0]).max(range[0])
     }
 }
 
-/// A range of diameters that one diameter stands for.
+/// A bin of diameters, represented by one of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SizeBin {
-    /// The diameter that stands for it, mm.
+    /// The representative diameter, mm.
     pub diameter_mm: f64,
-    /// From and to, mm.
+    /// Lower and upper bound, mm.
     pub range_mm: [f64; 2],
 }
 
 impl SizeBin {
-    /// Width of a bin that stands alone, mm: that of the paper's.
-    pub const LONE_WIDTH_MM: f64 = 0.2;
+    /// Width of a single bin, mm: that of the paper.
+    pub const DEFAULT_WIDTH_MM: f64 = 0.2;
 
-    /// Bins around rising diameters, which meet half way between neighbours; the outer ones are symmetric.
+    /// Bins around ascending diameters. Bounds lie half way between neighbors; the outer bins are symmetric.
     pub fn around(diameters_mm: &[f64]) -> Vec<Self> {
         let gap = |index: usize| diameters_mm.get(index..index + 2).map(|pair| 0.5 * (pair[1] - pair[0]));
         let bin = |(index, &diameter_mm): (usize, &f64)| {
             let (below, above) = (index.checked_sub(1).and_then(gap), gap(index));
-            let lone = 0.5 * Self::LONE_WIDTH_MM;
-            let below_half = below.or(above).unwrap_or(lone).min(diameter_mm);
-            let above_half = above.or(below).unwrap_or(lone);
+            let default_half = 0.5 * Self::DEFAULT_WIDTH_MM;
+            let below_half = below.or(above).unwrap_or(default_half).min(diameter_mm);
+            let above_half = above.or(below).unwrap_or(default_half);
             Self { diameter_mm, range_mm: [diameter_mm - below_half, diameter_mm + above_half] }
         };
         diameters_mm.iter().enumerate().map(bin).collect()
@@ -255,17 +257,18 @@ impl SizeBin {
         self.range_mm[1] - self.range_mm[0]
     }
 
-    /// Drops per m^3 in it: the integral of n(D). The paper's `n dD` at the bin's diameter is 1 to 3 % less for its bins.
-    pub fn count(&self, sizes: &DropSizes) -> f64 {
+    /// Drops per m^3 in the bin: the integral of n(D). For the paper's bins, its `n dD` at the bin's diameter is 1 to 3
+    /// % less.
+    pub fn count(&self, sizes: &DropSizeDistribution) -> f64 {
         sizes.count(self.range_mm)
     }
 }
 
-/// A number of drops for volume `index` of many alike that hold `mean` each: its fractional part is a chance, spread evenly over
-/// the volumes, so that any run of them holds its mean to within two. It never falls as the mean rises. `words` are
-/// random and the same for all volumes.
-pub fn even_count(mean: f64, index: u32, words: [u32; 2]) -> u64 {
-    /// Golden ratio less one: the multiples are the most evenly spread there are.
+/// Stratified rounding of `mean` drops for volume `index` of many: the fractional part is a probability, and the sum
+/// over any run of volumes is within two of its mean. The count never decreases as the mean rises. `words` are random
+/// and the same for all volumes.
+pub fn stratified_count(mean: f64, index: u32, words: [u32; 2]) -> u64 {
+    /// Golden ratio less one: its multiples modulo 1 are a low-discrepancy sequence.
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let offset = random::uniform_f64(words[0], words[1]) + GOLDEN * f64::from(index);
     (mean.max(0.0) + (offset - offset.floor())).floor() as u64

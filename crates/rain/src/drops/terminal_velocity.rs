@@ -1,4 +1,4 @@
-//! How fast drops fall in still air.
+//! Terminal velocity of drops in still air: measured, and by the paper's equations (2) to (4).
 
 use bansho_base::{math, world::gravity::STANDARD_GRAVITY};
 
@@ -15,7 +15,7 @@ bansho_base::choice! {
     }
 }
 
-/// The air that drops fall through.
+/// Properties of the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Air {
     /// Density rho_f, kg/m^3.
@@ -32,7 +32,7 @@ impl Default for Air {
 }
 
 impl Air {
-    /// Dry air as an ideal gas, its viscosity by Sutherland's law.
+    /// Dry air as an ideal gas, with Sutherland's formula for the viscosity.
     pub fn at(temperature_k: f64, pressure_pa: f64) -> Self {
         /// Gas constant of dry air, J/(kg K).
         const GAS_CONSTANT: f64 = 287.05;
@@ -41,16 +41,16 @@ impl Air {
     }
 }
 
-/// The paper's fixed point does not exist, or lies where its drag is not known.
+/// The paper's fixed point does not exist, or lies outside the range of its drag coefficient.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoTerminalVelocity {
-    /// The drag (3) jumps at Re = 1 from 24 to 28.6, and the drop would need one between.
+    /// The drag coefficient (3) jumps from 24 to 28.6 at Re = 1, and the drop would need a value between.
     #[error("formula (2)-(4) has no solution for a drop of {diameter_mm} mm: the drag jumps at Re = 1")]
     DragJump {
         /// Diameter D, mm.
         diameter_mm: f64,
     },
-    /// Re would reach 1e4, beyond which the paper gives no drag.
+    /// Re is 1e4 or more, where the paper gives no drag coefficient.
     #[error("formula (2)-(4) ends at Re = 10000; a drop of {diameter_mm} mm falls with Re = {reynolds}")]
     TooFast {
         /// Diameter D, mm.
@@ -60,32 +60,32 @@ pub enum NoTerminalVelocity {
     },
 }
 
-/// Drops falling by a law through an air.
+/// Terminal velocity of drops: a law and the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fall {
+pub struct TerminalVelocity {
     /// Where the velocities come from.
     pub law: VelocityLaw,
-    /// What the drops fall through.
+    /// The air.
     pub air: Air,
 }
 
-impl Default for Fall {
+impl Default for TerminalVelocity {
     fn default() -> Self {
         Self { law: VelocityLaw::Measured, air: Air::default() }
     }
 }
 
-impl Fall {
-    /// Terminal velocity of a drop of diameter D, m/s downward; rises with D.
+impl TerminalVelocity {
+    /// Terminal velocity of a drop of diameter D, m/s downward; increases with D.
     ///
-    /// Where the paper's formula has no solution, between 79.5 and 84 um, its drag below Re = 1 is used; above Re = 1e4, its
-    /// drag below.
+    /// Where the paper's equations have no solution, between 79.5 and 84 um, Stokes' law is used; above Re = 1e4, the
+    /// velocity at which Re was computed last.
     pub fn speed(&self, diameter_mm: f64) -> f64 {
         match self.law {
-            VelocityLaw::Measured => measured(diameter_mm) * density_correction(&self.air),
-            VelocityLaw::Formula => match fixed_point(diameter_mm, &self.air) {
+            VelocityLaw::Measured => measured_velocity(diameter_mm) * density_correction(&self.air),
+            VelocityLaw::Formula => match fixed_point_velocity(diameter_mm, &self.air) {
                 Ok(speed) => speed,
-                Err(NoTerminalVelocity::DragJump { .. }) => stokes(diameter_mm, &self.air),
+                Err(NoTerminalVelocity::DragJump { .. }) => stokes_velocity(diameter_mm, &self.air),
                 Err(NoTerminalVelocity::TooFast { reynolds, .. }) => {
                     reynolds * self.air.viscosity / (self.air.density * 1e-3 * diameter_mm)
                 }
@@ -136,26 +136,27 @@ const GUNN_KINZER: [[f64; 2]; 35] = [
 
 /// Measured terminal velocity at 20 degrees Celsius and 1013 hPa, m/s.
 ///
-/// Linear between the table's rows; by Stokes' square of D below 0.078 mm; that of the largest measured drop beyond 5.8 mm, where
-/// drops break up.
-pub fn measured(diameter_mm: f64) -> f64 {
+/// Linear interpolation of the table; proportional to D^2 (Stokes) below 0.078 mm; constant beyond 5.8 mm, where drops
+/// break up.
+pub fn measured_velocity(diameter_mm: f64) -> f64 {
     let [smallest, slowest] = GUNN_KINZER[0];
     if diameter_mm < smallest {
-        let share = diameter_mm.max(0.0) / smallest;
-        return slowest * share * share;
+        let ratio = diameter_mm.max(0.0) / smallest;
+        return slowest * ratio * ratio;
     }
     let upper = GUNN_KINZER.partition_point(|row| row[0] <= diameter_mm).min(GUNN_KINZER.len() - 1);
     let ([d0, v0], [d1, v1]) = (GUNN_KINZER[upper - 1], GUNN_KINZER[upper]);
     math::lerp(v0, v1, ((diameter_mm - d0) / (d1 - d0)).min(1.0))
 }
 
-/// How much faster measured drops fall in thinner air: G. B. Foote and P. S. du Toit, J. Appl. Meteor. 8 (1969).
+/// Correction of measured velocities for the density of the air: G. B. Foote and P. S. du Toit, J. Appl. Meteor. 8
+/// (1969).
 fn density_correction(air: &Air) -> f64 {
     math::pow(Air::default().density / air.density, 0.4)
 }
 
-/// Drag C of a rigid sphere, eq. (3).
-pub fn drag(reynolds: f64) -> f64 {
+/// Drag coefficient C of a rigid sphere, eq. (3).
+pub fn drag_coefficient(reynolds: f64) -> f64 {
     if reynolds < 1.0 {
         24.0 / reynolds
     } else {
@@ -165,17 +166,17 @@ pub fn drag(reynolds: f64) -> f64 {
 }
 
 /// Reynolds number Re, eq. (4).
-pub fn reynolds(speed: f64, diameter_mm: f64, air: &Air) -> f64 {
+pub fn reynolds_number(speed: f64, diameter_mm: f64, air: &Air) -> f64 {
     speed * air.density * 1e-3 * diameter_mm / air.viscosity
 }
 
-/// Velocity at which weight and the drag C are in balance, eq. (2).
-fn balance(diameter_mm: f64, drag: f64, air: &Air) -> f64 {
+/// Velocity at which weight and drag are in equilibrium for the drag coefficient C, eq. (2).
+fn equilibrium_velocity(diameter_mm: f64, drag: f64, air: &Air) -> f64 {
     math::sqrt(4.0 * STANDARD_GRAVITY * 1e-3 * diameter_mm * (WATER_DENSITY - air.density) / (3.0 * air.density * drag))
 }
 
 /// Stokes' velocity: the solution for C = 24/Re.
-fn stokes(diameter_mm: f64, air: &Air) -> f64 {
+fn stokes_velocity(diameter_mm: f64, air: &Air) -> f64 {
     let diameter = 1e-3 * diameter_mm;
     STANDARD_GRAVITY * diameter * diameter * (WATER_DENSITY - air.density) / (18.0 * air.viscosity)
 }
@@ -184,19 +185,19 @@ fn stokes(diameter_mm: f64, air: &Air) -> f64 {
 ///
 /// # Errors
 /// There is no such velocity, or it lies where (3) gives no drag.
-pub fn fixed_point(diameter_mm: f64, air: &Air) -> Result<f64, NoTerminalVelocity> {
-    /// The slowest convergence, far below Re = 1, halves the error with every step.
+pub fn fixed_point_velocity(diameter_mm: f64, air: &Air) -> Result<f64, NoTerminalVelocity> {
+    /// Steps for the slowest convergence: far below Re = 1 each step halves the error.
     const STEPS: usize = 200;
     if diameter_mm.is_nan() || diameter_mm <= 0.0 {
         return Ok(0.0);
     }
     let mut speed = 1.0;
     for _ in 0..STEPS {
-        let next = balance(diameter_mm, drag(reynolds(speed, diameter_mm, air)), air);
+        let next = equilibrium_velocity(diameter_mm, drag_coefficient(reynolds_number(speed, diameter_mm, air)), air);
         let converged = (next - speed).abs() <= 1e-12 * next;
         speed = next;
         if converged {
-            let reynolds = reynolds(speed, diameter_mm, air);
+            let reynolds = reynolds_number(speed, diameter_mm, air);
             let known = reynolds < 1e4;
             return if known { Ok(speed) } else { Err(NoTerminalVelocity::TooFast { diameter_mm, reynolds }) };
         }
@@ -207,27 +208,27 @@ pub fn fixed_point(diameter_mm: f64, air: &Air) -> Result<f64, NoTerminalVelocit
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::{near, rows};
+    use crate::tests::reference::{near, rows};
 
     #[test]
     fn measured_velocities_are_those_of_gunn_and_kinzer() {
         for [diameter, speed, ..] in rows::<8>(include_str!("../../data/raindrop_gunn_kinzer.csv")) {
-            assert!(near(Fall::default().speed(diameter), speed, 1e-12), "{diameter} mm");
+            assert!(near(TerminalVelocity::default().speed(diameter), speed, 1e-12), "{diameter} mm");
         }
         for [diameter, _, _, _, _, _, _, speed, ..] in rows::<13>(include_str!("../../data/raindrop_velocity.csv")) {
-            assert!(near(measured(diameter), speed, 1e-3), "{diameter} mm");
+            assert!(near(measured_velocity(diameter), speed, 1e-3), "{diameter} mm");
         }
-        assert_eq!((measured(0.0), measured(0.039), measured(20.0)), (0.0, 0.045, 9.17));
+        assert_eq!((measured_velocity(0.0), measured_velocity(0.039), measured_velocity(20.0)), (0.0, 0.045, 9.17));
     }
 
     #[test]
     fn the_formula_gives_the_reference_velocities() {
         let air = Air::default();
         for [diameter, speed, re, c, ..] in rows::<13>(include_str!("../../data/raindrop_velocity.csv")) {
-            let found = fixed_point(diameter, &air).expect("converges");
+            let found = fixed_point_velocity(diameter, &air).expect("converges");
             assert!(near(found, speed, 1e-4), "{diameter} mm: {found}");
-            let number = reynolds(found, diameter, &air);
-            assert!(near(number, re, 1e-4) && near(drag(number), c, 1e-4), "{diameter} mm");
+            let number = reynolds_number(found, diameter, &air);
+            assert!(near(number, re, 1e-4) && near(drag_coefficient(number), c, 1e-4), "{diameter} mm");
         }
     }
 
@@ -235,10 +236,14 @@ mod tests {
     fn a_solution_satisfies_all_three_equations() {
         let air = Air::at(273.15, 90_000.0);
         for diameter in [0.02, 0.05, 0.2, 1.0, 3.0, 6.0] {
-            let speed = fixed_point(diameter, &air).expect("converges");
-            assert!(near(balance(diameter, drag(reynolds(speed, diameter, &air)), &air), speed, 1e-11));
+            let speed = fixed_point_velocity(diameter, &air).expect("converges");
+            assert!(near(
+                equilibrium_velocity(diameter, drag_coefficient(reynolds_number(speed, diameter, &air)), &air),
+                speed,
+                1e-11
+            ));
         }
-        assert!(near(fixed_point(0.05, &air).expect("converges"), stokes(0.05, &air), 1e-11));
+        assert!(near(fixed_point_velocity(0.05, &air).expect("converges"), stokes_velocity(0.05, &air), 1e-11));
     }
 
     #[test]
@@ -246,7 +251,7 @@ mod tests {
         let air = Air::default();
         let (mut first, mut last) = (f64::INFINITY, 0.0_f64);
         for micrometre in (700..900).map(|tenth| tenth as f64 * 0.1) {
-            match fixed_point(1e-3 * micrometre, &air) {
+            match fixed_point_velocity(1e-3 * micrometre, &air) {
                 Ok(_) => {}
                 Err(NoTerminalVelocity::DragJump { .. }) => {
                     (first, last) = (first.min(micrometre), last.max(micrometre))
@@ -255,14 +260,16 @@ mod tests {
             }
         }
         assert!((79.0..80.0).contains(&first) && (83.0..85.0).contains(&last), "{first} to {last} um");
-        assert!(matches!(fixed_point(12.0, &air), Err(NoTerminalVelocity::TooFast { reynolds, .. }) if reynolds > 1e4));
+        assert!(
+            matches!(fixed_point_velocity(12.0, &air), Err(NoTerminalVelocity::TooFast { reynolds, .. }) if reynolds > 1e4)
+        );
     }
 
     #[test]
     fn velocities_rise_with_diameter_under_both_laws() {
         for law in [VelocityLaw::Measured, VelocityLaw::Formula] {
-            let fall = Fall { law, air: Air::default() };
-            let speeds: Vec<f64> = (0..=800).map(|i| fall.speed(0.01 * i as f64)).collect();
+            let velocity = TerminalVelocity { law, air: Air::default() };
+            let speeds: Vec<f64> = (0..=800).map(|i| velocity.speed(0.01 * i as f64)).collect();
             assert!(speeds.is_sorted_by(|a, b| a <= b || (a - b) / a < 0.2), "{law:?}");
             assert!(speeds.iter().all(|speed| (0.0..20.0).contains(speed)));
         }
@@ -272,8 +279,8 @@ mod tests {
     fn thin_air_lets_drops_fall_faster() {
         // Half the density: 2^0.4 = 1.3195.
         let air = Air { density: 0.602, ..Air::default() };
-        let fall = Fall { law: VelocityLaw::Measured, air };
-        assert!(near(fall.speed(2.0), 6.49 * 1.3195, 1e-4));
+        let velocity = TerminalVelocity { law: VelocityLaw::Measured, air };
+        assert!(near(velocity.speed(2.0), 6.49 * 1.3195, 1e-4));
         assert!(near(Air::at(293.15, 101_325.0).density, 1.204, 1e-3));
         assert!(near(Air::at(293.15, 101_325.0).viscosity, 1.81e-5, 5e-3));
     }

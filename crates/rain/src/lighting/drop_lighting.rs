@@ -1,109 +1,113 @@
-//! The light that drops send to the camera.
+//! Radiance of drops in the light of lamps and fires.
 
 use bansho_base::{
     math::{self, DVec3, MulAdd, approximations, simd::LANES},
     phenomenon::surroundings::{Arrival, Emitter, Light},
 };
 
-use super::{drop_phase_function::DropLens, tiles::mix};
-use crate::streaks::{
-    project_lanes::{NOTHING, Row, Vectors},
-    rasterize::{at_least, at_most},
-};
+use super::{drop_phase_function::DropPhaseFunction, tiles::lerp_color};
+use crate::lanes::{Lanes, Vec3Lanes, ZERO_LANES, fast_max, fast_min};
 
-/// Steps of [`Scattering`].
-const STEPS: usize = 2048;
+/// Steps of a [`ScatteringTable`].
+const TABLE_STEPS: usize = 2048;
 
-/// The radiance of a drop for the illuminance on it, `p / (4 pi)`, by the sine of half the angle that it turns light by: quick to look
-/// up from a cosine, and finest where a drop turns light least.
+/// Radiance of a drop over its illuminance, `p / (4 pi)`, tabulated by the sine of half the scattering angle: this
+/// needs only a square root of the cosine, and is finest in the forward direction.
 #[derive(Debug)]
-pub(crate) struct Scattering {
+pub(crate) struct ScatteringTable {
     table: Vec<[f32; 3]>,
-    /// Greatest of all colours and deviations, 1/sr.
+    /// Maximum over all colors and angles, 1/sr.
     greatest: f32,
 }
 
-impl Scattering {
-    pub(crate) fn new(lens: &DropLens) -> Self {
+impl ScatteringTable {
+    pub(crate) fn new(lens: &DropPhaseFunction) -> Self {
         let at = |step: usize| {
-            let half_sine = step as f32 / STEPS as f32;
+            let half_sine = step as f32 / TABLE_STEPS as f32;
             lens.phase(1.0 - 2.0 * half_sine * half_sine).map(|phase| phase * (0.25 / std::f32::consts::PI))
         };
-        let table: Vec<[f32; 3]> = (0..=STEPS).map(at).collect();
+        let table: Vec<[f32; 3]> = (0..=TABLE_STEPS).map(at).collect();
         let greatest = table.iter().flatten().copied().fold(0.0, f32::max);
         Self { table, greatest }
     }
 
-    /// For a deviation of the light whose cosine is given, 1/sr.
+    /// At the cosine of the scattering angle, 1/sr.
     #[inline(always)]
     pub(crate) fn at(&self, cos_deviation: f32) -> [f32; 3] {
-        self.of(Self::place(cos_deviation))
+        self.of(Self::position(cos_deviation))
     }
 
-    /// Where in the table a deviation is whose cosine is given.
+    /// Table position for the cosine of the scattering angle.
     #[inline(always)]
-    fn place(cos_deviation: f32) -> f32 {
-        at_most(1.0, at_least(0.0, (1.0 - cos_deviation) * 0.5)).sqrt() * STEPS as f32
+    fn position(cos_deviation: f32) -> f32 {
+        fast_min(1.0, fast_max(0.0, (1.0 - cos_deviation) * 0.5)).sqrt() * TABLE_STEPS as f32
     }
 
-    /// At a place in the table.
+    /// Linear interpolation at a table position.
     #[inline(always)]
-    fn of(&self, place: f32) -> [f32; 3] {
-        let step = (place as i32 as usize).min(STEPS - 1);
-        mix(self.table[step], self.table[step + 1], place - step as i32 as f32)
+    fn of(&self, position: f32) -> [f32; 3] {
+        let step = (position as i32 as usize).min(TABLE_STEPS - 1);
+        lerp_color(self.table[step], self.table[step + 1], position - step as i32 as f32)
     }
 }
 
-/// What falls on drops from lamps and fires.
+/// The lamps and fires that light the drops.
 #[derive(Clone, Copy)]
-pub(crate) struct Lighting<'a> {
-    pub(crate) scattering: &'a Scattering,
+pub(crate) struct DropLighting<'a> {
+    pub(crate) scattering: &'a ScatteringTable,
     pub(crate) lights: &'a [Light],
-    /// What rain takes on the way from a light to a drop, 1/m.
+    /// Extinction coefficient between a light and a drop, 1/m.
     pub(crate) extinction: f64,
 }
 
-impl Lighting<'_> {
-    /// Mean radiance of a drop at `point` by one light, seen along `line` (unit vector from the eye), ACEScg, cd/m^2: `E p / (4 pi)`.
+impl DropLighting<'_> {
+    /// Mean radiance of a drop at `point` by one light, seen along `line` (unit vector from the eye), ACEScg, cd/m^2:
+    /// `E p / (4 pi)`.
     #[inline(always)]
-    pub(crate) fn radiance(&self, light: &Light, point: DVec3, line: DVec3) -> [f32; 3] {
+    pub(crate) fn radiance(&self, light: &Light, point: DVec3, direction: DVec3) -> [f32; 3] {
         let Arrival { illuminance, toward, distance } = light.arriving(point);
         if illuminance == [0.0; 3] {
             return [0.0; 3];
         }
         let through = approximations::exp(-(self.extinction * distance) as f32);
-        let scattered = self.scattering.at(toward.dot(line) as f32);
+        let scattered = self.scattering.at(toward.dot(direction) as f32);
         [0, 1, 2].map(|c| illuminance[c] * through * scattered[c])
     }
 
-    /// The lights as drops see them whose places are counted from `eye`.
-    pub(crate) fn beams(&self, eye: DVec3) -> Vec<Beam> {
-        self.lights.iter().map(|light| Beam::new(light, eye)).collect()
+    /// The lights, prepared for drops whose positions are relative to `eye`.
+    pub(crate) fn prepare_lights(&self, eye: DVec3) -> Vec<PreparedLight> {
+        self.lights.iter().map(|light| PreparedLight::new(light, eye)).collect()
     }
 
-    /// Adds the radiance of sixteen drops by a light, as far as they are `lit` by it.
+    /// Adds the radiance of sixteen drops by a light, times `lit`.
     ///
-    /// Also of those that are not: a branch for each would be guessed wrongly, and keep the sums before it from being done for all at once.
+    /// Without skipping those of weight 0: a branch for each would be mispredicted, and prevent vectorization.
     #[inline(always)]
-    pub(crate) fn add(&self, beam: &Beam, places: &Vectors, lit: &Row, radiance: &mut [[f32; 3]; LANES]) {
-        let (factors, steps) = beam.arriving(places, self.extinction as f32);
+    pub(crate) fn add(
+        &self,
+        light: &PreparedLight,
+        positions: &Vec3Lanes,
+        lit: &Lanes,
+        radiance: &mut [[f32; 3]; LANES],
+    ) {
+        let (factors, table_positions) = light.arriving(positions, self.extinction as f32);
         for i in 0..LANES {
-            let (scattered, factor) = (self.scattering.of(steps[i]), factors[i] * lit[i]);
+            let (scattered, factor) = (self.scattering.of(table_positions[i]), factors[i] * lit[i]);
             for c in 0..3 {
-                radiance[i][c] += beam.intensity[c] * factor * scattered[c];
+                radiance[i][c] += light.intensity[c] * factor * scattered[c];
             }
         }
     }
 
-    /// No drop within `radius` (m) of a point has a greater radiance in any colour, cd/m^2.
-    pub(crate) fn brightest(&self, centre: DVec3, radius: f64) -> f32 {
-        let brightest = |light: &Light| {
+    /// Upper bound on the radiance of drops within `radius` (m) of a point, in any color, cd/m^2.
+    pub(crate) fn max_radiance(&self, center: DVec3, radius: f64) -> f32 {
+        let max_radiance = |light: &Light| {
             let intensity = light.intensity.into_iter().fold(0.0, f32::max) * self.scattering.greatest;
-            let nearest = (light.arriving(centre).distance - radius).max(f64::MIN_POSITIVE);
+            let nearest = (light.arriving(center).distance - radius).max(f64::MIN_POSITIVE);
             match light.emitter {
                 Emitter::Directional { .. } => intensity,
                 Emitter::Spot { position, axis, cos_outer, .. }
-                    if misses(centre - position, radius, axis, cos_outer) =>
+                    if cone_misses_sphere(center - position, radius, axis, cos_outer) =>
                 {
                     0.0
                 }
@@ -111,28 +115,29 @@ impl Lighting<'_> {
                 Emitter::Spot { .. } => intensity / (nearest * nearest) as f32,
             }
         };
-        self.lights.iter().map(brightest).sum()
+        self.lights.iter().map(max_radiance).sum()
     }
 }
 
-/// A light as sixteen drops at a time see it: [`Light::arriving`] in single precision.
-pub(crate) struct Beam {
-    /// Where it stands from the camera, m; toward it where it is infinitely far.
-    place: [f32; 3],
-    /// 1 for one that stands somewhere, 0 for one that is infinitely far.
-    near: f32,
-    /// Square of the distance within which its light no longer grows, m^2.
-    least_square: f32,
-    /// Share of a cone by the cosine of the angle from its axis: how much it rises for each unit, and where it would be 0; of others 1.
+/// [`Light::arriving`] in single precision, for sixteen drops at a time.
+pub(crate) struct PreparedLight {
+    /// Position relative to the camera, m; for a directional light, the direction toward it.
+    position: [f32; 3],
+    /// 1 for a light with a position, 0 for a directional one.
+    is_local: f32,
+    /// Square of the radius of the lamp, within which the illuminance is constant, m^2.
+    min_distance_squared: f32,
+    /// Cone of a spot light: its axis, and slope and offset of the falloff as a function of the cosine of the angle
+    /// from the axis; constant 1 for other lights.
     axis: [f32; 3],
     cone: [f32; 2],
     intensity: [f32; 3],
 }
 
-impl Beam {
+impl PreparedLight {
     fn new(light: &Light, eye: DVec3) -> Self {
         let even = ([0.0; 3], [0.0, 1.0]);
-        let (place, near, radius, (axis, cone)) = match light.emitter {
+        let (position, is_local, radius, (axis, cone)) = match light.emitter {
             Emitter::Directional { toward } => (toward, 0.0, 0.0, even),
             Emitter::Point { position, radius } => (position - eye, 1.0, radius, even),
             Emitter::Spot { position, axis, cos_inner, cos_outer } => {
@@ -141,48 +146,49 @@ impl Beam {
             }
         };
         Self {
-            place: place.as_vec3().to_array(),
-            near,
-            least_square: (radius * radius).max(1e-12) as f32,
+            position: position.as_vec3().to_array(),
+            is_local,
+            min_distance_squared: (radius * radius).max(1e-12) as f32,
             axis,
             cone,
             intensity: light.intensity,
         }
     }
 
-    /// Illuminance at sixteen places from the camera over its intensity, what rain leaves of it, and where in the table of
-    /// [`Scattering`] the deviation toward the camera is.
+    /// For sixteen positions relative to the camera: illuminance over intensity, attenuated by the rain, and the table
+    /// position in [`ScatteringTable`] of the scattering angle toward the camera.
     #[inline(always)]
-    fn arriving(&self, [xs, ys, zs]: &Vectors, extinction: f32) -> (Row, Row) {
-        let (mut factors, mut steps) = (NOTHING, NOTHING);
-        let [x, y, z] = self.place;
+    fn arriving(&self, [xs, ys, zs]: &Vec3Lanes, extinction: f32) -> (Lanes, Lanes) {
+        let (mut factors, mut table_positions) = (ZERO_LANES, ZERO_LANES);
+        let [x, y, z] = self.position;
         for i in 0..LANES {
-            let near = self.near;
-            let offset = [x - near * xs[i], y - near * ys[i], z - near * zs[i]];
+            let is_local = self.is_local;
+            let offset = [x - is_local * xs[i], y - is_local * ys[i], z - is_local * zs[i]];
             let square = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
             let distance = square.sqrt();
-            let inverse = 1.0 / at_least(f32::MIN_POSITIVE, distance);
+            let inverse = 1.0 / fast_max(f32::MIN_POSITIVE, distance);
             let from = -(offset[0] * self.axis[0] + offset[1] * self.axis[1] + offset[2] * self.axis[2]) * inverse;
-            let cone = at_most(1.0, at_least(0.0, from.fma(self.cone[0], self.cone[1])));
-            let share = cone * cone * (3.0 - 2.0 * cone);
-            let fall = at_least(self.least_square, near * square + (1.0 - near));
-            factors[i] = share / fall * approximations::exp(-extinction * near * distance);
-            let away = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
+            let cone = fast_min(1.0, fast_max(0.0, from.fma(self.cone[0], self.cone[1])));
+            let cone_factor = cone * cone * (3.0 - 2.0 * cone);
+            let attenuation = fast_max(self.min_distance_squared, is_local * square + (1.0 - is_local));
+            factors[i] = cone_factor / attenuation * approximations::exp(-extinction * is_local * distance);
+            let drop_distance = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
             let along = offset[0] * xs[i] + offset[1] * ys[i] + offset[2] * zs[i];
-            steps[i] = Scattering::place(along * inverse / at_least(f32::MIN_POSITIVE, away));
+            table_positions[i] =
+                ScatteringTable::position(along * inverse / fast_max(f32::MIN_POSITIVE, drop_distance));
         }
-        (factors, steps)
+        (factors, table_positions)
     }
 }
 
-/// Whether a cone around `axis` misses a ball that lies at `offset` from its apex.
-fn misses(offset: DVec3, radius: f64, axis: DVec3, cos_outer: f64) -> bool {
-    let away = offset.length();
-    if away <= radius {
+/// Whether a cone around `axis` misses a sphere at `offset` from its apex.
+fn cone_misses_sphere(offset: DVec3, radius: f64, axis: DVec3, cos_outer: f64) -> bool {
+    let drop_distance = offset.length();
+    if drop_distance <= radius {
         return false;
     }
-    let turned = math::acos((offset.dot(axis) / away).clamp(-1.0, 1.0));
-    turned - math::asin(radius / away) > math::acos(cos_outer.clamp(-1.0, 1.0))
+    let angle = math::acos((offset.dot(axis) / drop_distance).clamp(-1.0, 1.0));
+    angle - math::asin(radius / drop_distance) > math::acos(cos_outer.clamp(-1.0, 1.0))
 }
 
 #[cfg(test)]
@@ -193,7 +199,7 @@ mod tests {
 
     #[test]
     fn sixteen_drops_are_lit_as_one_is() {
-        let scattering = Scattering::new(&DropLens::new());
+        let scattering = ScatteringTable::new(&DropPhaseFunction::new());
         let position = DVec3::new(3.0, 4.0, -2.0);
         let emitters = [
             Emitter::Point { position, radius: 0.1 },
@@ -210,18 +216,18 @@ mod tests {
                 Emitter::Directional { .. } => emitter,
             };
             let lights = [Light { emitter: moved, intensity: [100.0, 50.0, 20.0] }];
-            let lighting = Lighting { scattering: &scattering, lights: &lights, extinction: 0.01 };
-            let mut places = [NOTHING; 3];
+            let lighting = DropLighting { scattering: &scattering, lights: &lights, extinction: 0.01 };
+            let mut positions = [ZERO_LANES; 3];
             for i in 0..LANES {
                 let u = Key::new(2, "beam").uniforms(i as u64, 0, Purpose::named("place"));
-                (0..3).for_each(|axis| places[axis][i] = 8.0 * u[axis] - 4.0);
+                (0..3).for_each(|axis| positions[axis][i] = 8.0 * u[axis] - 4.0);
             }
             let mut found = [[0.0; 3]; LANES];
-            lighting.add(&lighting.beams(eye)[0], &places, &[1.0; LANES], &mut found);
+            lighting.add(&lighting.prepare_lights(eye)[0], &positions, &[1.0; LANES], &mut found);
             let mut lit = 0;
             for i in 0..LANES {
-                let line = DVec3::from(places.map(|row| f64::from(row[i])));
-                let expected = lighting.radiance(&lights[0], eye + line, line.normalize());
+                let direction = DVec3::from(positions.map(|row| f64::from(row[i])));
+                let expected = lighting.radiance(&lights[0], eye + direction, direction.normalize());
                 for c in 0..3 {
                     assert!(
                         (found[i][c] - expected[c]).abs() <= 2e-3 * expected[c].max(1e-3),

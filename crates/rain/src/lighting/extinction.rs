@@ -1,21 +1,22 @@
-//! What all drops together take from light on a long way.
+//! Extinction coefficient and meteorological visibility of rain.
 
 use std::f64::consts::PI;
 
-use crate::drops::size_distribution::DropSizes;
+use crate::drops::size_distribution::DropSizeDistribution;
 
-/// What counts as lost from a beam that meets a drop.
+/// Which extinction efficiency Q of a drop is meant. Drops are large compared with the wavelength, so Q is 2 in all
+/// (the extinction paradox).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Losses {
-    /// What falls on the drop, Q = 1: it continues what single streaks hide.
+pub enum ExtinctionEfficiency {
+    /// Geometric cross section, Q = 1: consistent with the opacity of single streaks.
     Geometric,
-    /// And what the drop diffracts, as much again, Q = 2: for meteorological visibility.
+    /// Geometric cross section and diffraction, Q = 2: for meteorological visibility.
     WithDiffraction,
 }
 
-impl Losses {
-    /// Extinction efficiency Q of a drop, which is large beside the wavelength.
-    pub fn efficiency(self) -> f64 {
+impl ExtinctionEfficiency {
+    /// Extinction efficiency Q.
+    pub fn value(self) -> f64 {
         match self {
             Self::Geometric => 1.0,
             Self::WithDiffraction => 2.0,
@@ -24,42 +25,46 @@ impl Losses {
 }
 
 /// Extinction coefficient `beta = Q (pi/4) integral of n D^2 dD` of the drops between two diameters (mm), 1/m.
-pub fn extinction(sizes: &DropSizes, losses: Losses, diameters_mm: [f64; 2]) -> f64 {
+pub fn extinction(sizes: &DropSizeDistribution, efficiency: ExtinctionEfficiency, diameters_mm: [f64; 2]) -> f64 {
     // n per m^3 per mm, D and dD in mm: mm^2 per m^3 are 1e-6 per m.
-    losses.efficiency() * 0.25e-6 * PI * sizes.moment(2, diameters_mm)
+    efficiency.value() * 0.25e-6 * PI * sizes.moment(2, diameters_mm)
 }
 
-/// Meteorological visibility, m: how far a black thing differs by 2 % from the horizon sky (Koschmieder 1924),
-/// `3.912 / beta` with diffraction counted; infinite without drops.
-pub fn visibility(sizes: &DropSizes) -> f64 {
+/// Meteorological visibility, m: the distance at which a black object has 2 % contrast against the horizon sky
+/// (Koschmieder 1924), `3.912 / beta` with Q = 2; infinite without drops.
+pub fn visibility(sizes: &DropSizeDistribution) -> f64 {
     /// -ln 0.02.
     const CONTRAST: f64 = 3.912_023_005_428_146;
-    CONTRAST / extinction(sizes, Losses::WithDiffraction, DropSizes::ALL)
+    CONTRAST / extinction(sizes, ExtinctionEfficiency::WithDiffraction, DropSizeDistribution::ALL)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::near;
+    use crate::tests::reference::near;
 
     #[test]
     fn the_whole_distribution_has_its_closed_form() {
         // Integral of n D^2 is 16000 / Lambda^3; Lambda = 4.1 at 1 mm/h: 232.15 mm^2 per m^3, times pi/4 and 1e-6.
-        let sizes = DropSizes::marshall_palmer(1.0);
-        assert!(near(extinction(&sizes, Losses::Geometric, DropSizes::ALL), 1.82331e-4, 1e-5));
-        assert!(near(extinction(&sizes, Losses::WithDiffraction, DropSizes::ALL), 3.64662e-4, 1e-5));
+        let sizes = DropSizeDistribution::marshall_palmer(1.0);
+        assert!(near(extinction(&sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL), 1.82331e-4, 1e-5));
+        assert!(near(
+            extinction(&sizes, ExtinctionEfficiency::WithDiffraction, DropSizeDistribution::ALL),
+            3.64662e-4,
+            1e-5
+        ));
         assert!(near(visibility(&sizes), 10_727.8, 1e-4));
-        assert_eq!(visibility(&DropSizes::marshall_palmer(0.0)), f64::INFINITY);
+        assert_eq!(visibility(&DropSizeDistribution::marshall_palmer(0.0)), f64::INFINITY);
     }
 
     #[test]
     fn parts_add_up_and_the_papers_bins_hold_28_to_52_percent() {
         // Of (x^2/2 + x + 1) e^-x with x = Lambda D, the difference between 0.9 and 2.1 mm.
         for (rate, share) in [(1.0, 0.27862), (5.0, 0.45455), (20.0, 0.5218)] {
-            let sizes = DropSizes::marshall_palmer(rate);
-            let between = |range| extinction(&sizes, Losses::Geometric, range);
+            let sizes = DropSizeDistribution::marshall_palmer(rate);
+            let between = |range| extinction(&sizes, ExtinctionEfficiency::Geometric, range);
             let [below, within, above] = [[0.0, 0.9], [0.9, 2.1], [2.1, f64::INFINITY]].map(between);
-            let whole = between(DropSizes::ALL);
+            let whole = between(DropSizeDistribution::ALL);
             assert!(near(below + within + above, whole, 1e-12));
             assert!(near(within / whole, share, 1e-3), "{rate} mm/h: {}", within / whole);
         }

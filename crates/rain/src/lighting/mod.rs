@@ -1,4 +1,5 @@
-//! The light that drops send on: the phase function of a drop, lamps and sky, extinction and single scattering.
+//! Lighting: the phase function of a drop, light from lamps and sky on streaks, extinction, and single scattering of
+//! the drops that are not drawn as streaks.
 
 pub(crate) mod drop_lighting;
 pub mod drop_phase_function;

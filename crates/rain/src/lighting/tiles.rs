@@ -1,4 +1,4 @@
-//! Light that changes slowly over the picture: known at the corners of tiles, straight between.
+//! A grid over the picture for values that vary slowly: evaluated at tile corners, interpolated bilinearly.
 
 use bansho_base::{
     camera::Camera,
@@ -8,56 +8,56 @@ use bansho_base::{
 };
 use rayon::prelude::*;
 
-/// Side of a tile where light changes little from one to the next, pixels.
-pub(crate) const COARSE: usize = 32;
-/// Side of a tile where lamps and the edges of their cones are seen, pixels.
-pub(crate) const FINE: usize = 16;
+/// Tile side for light that varies slowly, pixels.
+pub(crate) const COARSE_TILE: usize = 32;
+/// Tile side for the light of lamps and the edges of their cones, pixels.
+pub(crate) const FINE_TILE: usize = 16;
 
-/// Side of a tile close to a lamp, pixels.
-pub(crate) const FINEST: usize = 4;
+/// Tile side close to a lamp, pixels.
+pub(crate) const FINEST_TILE: usize = 4;
 
-/// Corners of the tiles of a picture, or of a part of it.
+/// Tile corners of a picture, or of a rectangle of it.
 #[derive(Clone, Debug)]
-pub(crate) struct Tiles {
-    /// Place of the first corner, pixels.
+pub(crate) struct TileGrid {
+    /// Pixel of the first corner.
     origin: [usize; 2],
     /// Side of a tile, pixels.
     pub(crate) side: usize,
-    /// Corners in a row, and rows of corners.
+    /// Number of corners in a row, and number of rows.
     pub(crate) size: [usize; 2],
-    /// Unit vectors that are seen at the corners, row after row; 0 where the lens sees nothing.
-    pub(crate) lines: Vec<DVec3>,
+    /// Unit vectors of the lines of sight at the corners, row by row; 0 where the lens sees nothing.
+    pub(crate) directions: Vec<DVec3>,
 }
 
-impl Tiles {
+impl TileGrid {
     pub(crate) fn new(view: &View, side: usize) -> Self {
         Self::over(view, side, Rect::of_size(view.size[0], view.size[1]))
     }
 
-    /// Tiles that cover a part of the picture.
+    /// The grid over a rectangle of the picture.
     pub(crate) fn over(view: &View, side: usize, rect: Rect) -> Self {
         let origin = [rect.x, rect.y];
         let size = [rect.width, rect.height].map(|pixels| pixels.max(1).div_ceil(side) + 1);
-        let place = |index: usize| [origin[0] + index % size[0] * side, origin[1] + index / size[0] * side];
-        let lines = (0..size[0] * size[1]).map(|index| line(&view.camera, place(index))).collect();
-        Self { origin, side, size, lines }
+        let position = |index: usize| [origin[0] + index % size[0] * side, origin[1] + index / size[0] * side];
+        let directions = (0..size[0] * size[1]).map(|index| pixel_direction(&view.camera, position(index))).collect();
+        Self { origin, side, size, directions }
     }
 
-    /// One value at each corner, made in parallel.
+    /// One value for each corner, computed in parallel.
     pub(crate) fn map<T: Send>(&self, value: impl Fn(usize, DVec3) -> T + Sync) -> Vec<T> {
-        self.lines.par_iter().enumerate().map(|(index, line)| value(index, *line)).collect()
+        self.directions.par_iter().enumerate().map(|(index, pixel_direction)| value(index, *pixel_direction)).collect()
     }
 
-    /// A colour known at the corners, at a place of the picture (pixels); beyond the picture that at its edge.
+    /// Interpolates colors at corners to a position in the picture (pixels), clamped to its edge.
     pub(crate) fn at(&self, corners: &[[f32; 3]], [x, y]: [f32; 2]) -> [f32; 3] {
         let ((column, across), (row, down)) = (self.column_at(x), self.row_at(y));
         let index = row * self.size[0] + column;
-        let line = |index: usize| mix(corners[index], corners[index + 1], across);
-        mix(line(index), line(index + self.size[0]), down)
+        let row_color = |index: usize| lerp_color(corners[index], corners[index + 1], across);
+        lerp_color(row_color(index), row_color(index + self.size[0]), down)
     }
 
-    /// The four corners around a place of the picture (pixels), each with its share.
-    pub(crate) fn corners(&self, [x, y]: [f32; 2]) -> [(usize, f32); 4] {
+    /// The four corners around a position in the picture (pixels), with their bilinear weights.
+    pub(crate) fn corner_weights(&self, [x, y]: [f32; 2]) -> [(usize, f32); 4] {
         let ((column, across), (row, down)) = (self.column_at(x), self.row_at(y));
         let index = row * self.size[0] + column;
         let below = index + self.size[0];
@@ -69,46 +69,48 @@ impl Tiles {
         ]
     }
 
-    /// The corner above a height in the picture (pixels), and how far it is to the corner below, 0 to 1.
+    /// Row index and fraction of a vertical position (pixels).
     pub(crate) fn row_at(&self, y: f32) -> (usize, f32) {
         self.split(y, 1)
     }
 
-    /// The corner left of a place across the picture (pixels), and how far it is to the corner right of it, 0 to 1.
+    /// Column index and fraction of a horizontal position (pixels).
     pub(crate) fn column_at(&self, x: f32) -> (usize, f32) {
         self.split(x, 0)
     }
 
     fn split(&self, coordinate: f32, axis: usize) -> (usize, f32) {
-        let corners = self.size[axis];
-        let place = ((coordinate - self.origin[axis] as f32) / self.side as f32).clamp(0.0, (corners - 1) as f32);
-        let whole = (place as usize).min(corners.saturating_sub(2));
-        (whole, place - whole as f32)
+        let corner_weights = self.size[axis];
+        let position =
+            ((coordinate - self.origin[axis] as f32) / self.side as f32).clamp(0.0, (corner_weights - 1) as f32);
+        let whole = (position as usize).min(corner_weights.saturating_sub(2));
+        (whole, position - whole as f32)
     }
 }
 
-fn line(camera: &Camera, pixel: [usize; 2]) -> DVec3 {
+fn pixel_direction(camera: &Camera, pixel: [usize; 2]) -> DVec3 {
     let pixel = DVec2::new(pixel[0] as f64, pixel[1] as f64);
     camera.direction(pixel).map_or(DVec3::ZERO, DVec3::normalize_or_zero)
 }
 
-/// Numbers that grow by the same ratio from `first` to at least `last`.
-pub(crate) fn geometric(first: f64, last: f64, ratio: f64) -> Vec<f64> {
-    let mut numbers = vec![first];
+/// Geometric sequence from `first` to at least `last`.
+pub(crate) fn geometric_sequence(first: f64, last: f64, ratio: f64) -> Vec<f64> {
+    let mut terms = vec![first];
     let mut next = first;
     while next < last {
         next *= ratio;
-        numbers.push(next);
+        terms.push(next);
     }
-    numbers
+    terms
 }
 
-/// The colour `share` of the way from one to another. Not fused: it is needed where vectors are not.
+/// Linear interpolation of colors. Not fused, because it is used in scalar code too, where a fused multiply-add is
+/// slow.
 #[inline(always)]
-pub(crate) fn mix(from: [f32; 3], to: [f32; 3], share: f32) -> [f32; 3] {
+pub(crate) fn lerp_color(from: [f32; 3], to: [f32; 3], t: f32) -> [f32; 3] {
     let mut mixed = from;
     for c in 0..3 {
-        mixed[c] += (to[c] - from[c]) * share;
+        mixed[c] += (to[c] - from[c]) * t;
     }
     mixed
 }

@@ -1,4 +1,3 @@
-//! One frame of rain: what is prepared once, and its strips.
+//! Rendering of one frame.
 
-pub(crate) mod aovs;
 pub(crate) mod prepared;

@@ -1,143 +1,178 @@
-//! One frame of rain, ready to draw in strips.
+//! A prepared frame of rain: streaks in chunks, and the medium of single scattering. It draws strips of the picture.
 
 use bansho_base::{
     image::{Figure, Rect},
     phenomenon::{
         Prepared,
-        strip::{DepthInterval, Strip, View},
+        strip::{AovDescriptor, AovPlane, AovRule, DepthInterval, Strip, View},
         surroundings::Surroundings,
     },
 };
 
-use super::aovs::measure;
 use crate::{
     Rain,
     billboards::Billboards,
-    drops::{exposure::Moment, size_distribution::DropSizes},
+    drops::{exposure::ExposureState, size_distribution::DropSizeDistribution},
     lighting::{
-        drop_lighting::{Beam, Lighting},
-        extinction::{Losses, extinction, visibility},
-        single_scattering::Veil,
-        tiles::Tiles,
+        drop_lighting::{DropLighting, PreparedLight},
+        extinction::{ExtinctionEfficiency, extinction, visibility},
+        single_scattering::SingleScattering,
+        tiles::TileGrid,
     },
     parameters::Method,
     streaks::{
-        bin::BAND,
-        near_region::Singles,
-        project::{Share, Shower},
-        rasterize::{
-            Record,
-            tile::{Patch, STRETCH},
-        },
+        bin::{StreakChunk, TILE_COLUMNS, TILE_ROWS},
+        project::{DropSelection, PerDropRegion, StreakProjection},
+        rasterize::{PackedStreak, tile::TileBuffer},
         splashes::Splashes,
-        time_steps::Part,
     },
 };
 use fearless_simd::{Level, Simd, dispatch};
 
-/// Light below this share of display white is left out: with a hundred streaks over each other it still is below a 255th.
-const LEAST_SHARE: f64 = 1.0 / (255.0 * 128.0);
+/// The AOVs of rain, in the order of a strip's planes.
+pub(crate) const AOVS: &[AovDescriptor] = &[
+    AovDescriptor {
+        name: "streak_opacity",
+        unit: "",
+        doc: "Opacity of the streaks in a pixel, summed; 0 where there are none. The veil of far rain is not in it.",
+        rule: AovRule::Sum,
+    },
+    AovDescriptor {
+        name: "streak_depth",
+        unit: "m",
+        doc: "Depth of the nearest streak in a pixel; 0 where there is none.",
+        rule: AovRule::Nearest,
+    },
+    AovDescriptor {
+        name: "diameter_mm",
+        unit: "mm",
+        doc: "Diameter of the drop of the nearest streak in a pixel; 0 where there is none.",
+        rule: AovRule::Nearest,
+    },
+];
+
+/// Writes the AOVs of one pixel of a streak; `depth` in m.
+fn write_aovs(aovs: &mut [AovPlane], index: usize, opacity: f32, depth: f32, diameter_mm: f32) {
+    let [opacities, depths, diameters] = aovs else { return };
+    if opacity > 0.0 {
+        opacities.add(index, 1.0, opacity);
+        depths.keep_nearest(index, depth, depth);
+        diameters.keep_nearest(index, diameter_mm, depth);
+    }
+}
+
+/// Culling threshold as a fraction of display white: a hundred overlapping streaks below it stay below one 8-bit code.
+const CULLING_FRACTION: f64 = 1.0 / (255.0 * 128.0);
 
 /// A frame, ready to draw.
 pub(crate) struct PreparedRain<'a> {
     view: &'a View,
     level: Level,
     /// Nearest first.
-    parts: Vec<Part>,
-    /// No streak is further away, m.
+    chunks: Vec<StreakChunk>,
+    /// Greatest distance of a streak, m.
     streaks_end: f64,
-    veil: Option<Veil<'a>>,
+    single_scattering: Option<SingleScattering<'a>>,
     figures: Vec<Figure>,
 }
 
 impl<'a> PreparedRain<'a> {
     pub(crate) fn new(rain: &'a Rain, view: &'a View, surroundings: &'a Surroundings) -> Self {
-        let moment = Moment::new(rain, view, surroundings);
+        let exposure = ExposureState::new(rain, view, surroundings);
         let extinctions = rain.extinctions(view.shutter.middle());
         let lights = &surroundings.others.lights;
-        let lighting = Lighting { scattering: &rain.optics.scattering, lights, extinction: extinctions[0] };
-        let seen = rain.skies.of(&rain.optics.lens, view, surroundings.sky);
-        let (tiles, sky) = &seen.coarse;
-        let beams = lighting.beams(moment.sight.middle().position);
-        let frame = Frame { rain, moment: &moment, lighting: &lighting, beams: &beams, tiles, sky, view };
-        let region = moment.around_camera(1.1 * moment.distance);
+        let lighting = DropLighting { scattering: &rain.optics.scattering, lights, extinction: extinctions[0] };
+        let sky_lighting = rain.skies.of(&rain.optics.lens, view, surroundings.sky);
+        let (tiles, sky) = &sky_lighting.coarse;
+        let prepared_lights = lighting.prepare_lights(exposure.cameras.middle().position);
+        let frame = Frame {
+            rain,
+            exposure: &exposure,
+            lighting: &lighting,
+            prepared_lights: &prepared_lights,
+            tiles,
+            sky,
+            view,
+        };
+        let bounds = exposure.around_camera(1.1 * exposure.distance);
         let mut billboards = 0;
-        let mut parts = match rain.parameters.method {
-            Method::Drops => frame.shower(Share::Whole).drops(&[region]),
+        let mut chunks = match rain.parameters.method {
+            Method::Drops => frame.projection(DropSelection::All).drop_chunks(&[bounds]),
             Method::Billboards => {
-                let singles = Singles::new(&moment, lights);
-                let mut parts = frame.shower(Share::Single(&singles)).drops(singles.balls());
-                let shower = frame.shower(Share::OnBillboard(&singles));
-                let cards = Billboards::new(shower, frame.least_light()).parts(region);
-                billboards = cards.iter().map(|part| part.cells).sum();
-                parts.extend(cards);
-                parts
+                let region = PerDropRegion::new(&exposure, lights);
+                let mut chunks = frame.projection(DropSelection::PerDrop(&region)).drop_chunks(region.spheres());
+                let projection = frame.projection(DropSelection::Billboard(&region));
+                let billboard_chunks = Billboards::new(projection, frame.culling_radiance()).chunks(bounds);
+                billboards = billboard_chunks.iter().map(|chunk| chunk.cell_count).sum();
+                chunks.extend(billboard_chunks);
+                chunks
             }
         };
-        parts.extend(frame.splashes());
+        chunks.extend(frame.splashes());
         let ends =
             [if rain.parameters.veil_distance > 0.0 { rain.near_reach() } else { 0.0 }, rain.reach(surroundings)];
-        let veil = Veil::new(&moment, &lighting, seen.clone(), view, extinctions, ends);
-        let figures = frame.figures(parts.iter().map(Part::count).sum(), billboards);
-        Self { view, level: Level::new(), parts, streaks_end: rain.streaks_end(), veil, figures }
+        let single_scattering =
+            SingleScattering::new(&exposure, &lighting, sky_lighting.clone(), view, extinctions, ends);
+        let figures = frame.figures(chunks.iter().map(StreakChunk::count).sum(), billboards);
+        Self { view, level: Level::new(), chunks, streaks_end: rain.streaks_end(), single_scattering, figures }
     }
 }
 
-/// What a frame's parts are made from.
+/// The inputs of a frame.
 struct Frame<'a> {
     rain: &'a Rain,
-    moment: &'a Moment,
-    lighting: &'a Lighting<'a>,
-    beams: &'a [Beam],
-    tiles: &'a Tiles,
+    exposure: &'a ExposureState,
+    lighting: &'a DropLighting<'a>,
+    prepared_lights: &'a [PreparedLight],
+    tiles: &'a TileGrid,
     sky: &'a [[f32; 3]],
     view: &'a View,
 }
 
 impl<'a> Frame<'a> {
-    /// What turns drops into streaks.
-    fn shower(&self, share: Share<'a>) -> Shower<'a> {
-        Shower {
+    /// The projection of the selected drops.
+    fn projection(&self, selection: DropSelection<'a>) -> StreakProjection<'a> {
+        StreakProjection {
             level: Level::new(),
-            moment: self.moment,
+            exposure: self.exposure,
             lighting: self.lighting,
-            beams: self.beams,
+            lights: self.prepared_lights,
             sky: self.shining_sky(),
-            share,
+            selection,
         }
     }
 
-    /// The sky through drops, if it shines.
-    fn shining_sky(&self) -> Option<(&'a Tiles, &'a [[f32; 3]])> {
+    /// The sky through drops; `None` if it is dark.
+    fn shining_sky(&self) -> Option<(&'a TileGrid, &'a [[f32; 3]])> {
         self.sky.iter().flatten().any(|value| *value > 0.0).then_some((self.tiles, self.sky))
     }
 
-    fn splashes(&self) -> Vec<Part> {
+    fn splashes(&self) -> Vec<StreakChunk> {
         let splashes = Splashes {
-            shower: self.shower(Share::Whole),
+            projection: self.projection(DropSelection::All),
             parameters: &self.rain.parameters.splashes,
             time: self.view.shutter.middle(),
             loop_s: self.rain.loop_s,
         };
-        splashes.parts()
+        splashes.chunks()
     }
 
-    /// Light that no display would show, cd/m^2.
-    fn least_light(&self) -> f32 {
+    /// Radiance below which the light of a streak is culled, cd/m^2.
+    fn culling_radiance(&self) -> f32 {
         let white = self.view.white_luminance.filter(|_| self.rain.parameters.culling);
-        white.map_or(0.0, |white| (white * LEAST_SHARE) as f32)
+        white.map_or(0.0, |white| (white * CULLING_FRACTION) as f32)
     }
 
-    /// What the frame is known by.
+    /// Figures of the frame.
     fn figures(&self, streaks: usize, billboards: usize) -> Vec<Figure> {
         let t = self.view.shutter.middle();
-        let sizes = DropSizes::marshall_palmer(self.rain.rate(t));
+        let sizes = DropSizeDistribution::marshall_palmer(self.rain.rate(t));
         let figure = |name, unit, value| Figure { name, unit, value };
         vec![
             figure("rain_rate", "mm/h", self.rain.rate(t)),
             figure("drops_in_view", "", streaks as f64),
             figure("billboards_in_view", "", billboards as f64),
-            figure("extinction", "1/m", extinction(&sizes, Losses::Geometric, DropSizes::ALL)),
+            figure("extinction", "1/m", extinction(&sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL)),
             figure("visibility", "m", visibility(&sizes)),
         ]
     }
@@ -154,13 +189,14 @@ impl Prepared for PreparedRain<'_> {
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let rect = strip.rect;
-        for band in rect.y / BAND..rect.bottom().div_ceil(BAND) {
-            let rows = Rect { x: rect.x, y: band * BAND, width: rect.width, height: BAND }.intersection(&rect);
+        for tile_row in rect.y / TILE_ROWS..rect.bottom().div_ceil(TILE_ROWS) {
+            let rows =
+                Rect { x: rect.x, y: tile_row * TILE_ROWS, width: rect.width, height: TILE_ROWS }.intersection(&rect);
             if slice.near < self.streaks_end {
-                dispatch!(self.level, simd => self.draw_streaks(simd, band, slice, rows, strip));
+                dispatch!(self.level, simd => self.draw_streaks(simd, tile_row, slice, rows, strip));
             }
-            if let Some(veil) = &self.veil {
-                veil.draw(slice, band, rows, strip);
+            if let Some(single_scattering) = &self.single_scattering {
+                single_scattering.draw(slice, tile_row, rows, strip);
             }
         }
     }
@@ -168,38 +204,40 @@ impl Prepared for PreparedRain<'_> {
 
 impl PreparedRain<'_> {
     #[inline(always)]
-    fn draw_streaks<S: Simd>(&self, simd: S, band: usize, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
+    fn draw_streaks<S: Simd>(&self, simd: S, tile_row: usize, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
         let rect = strip.rect;
         let mut aovs = std::mem::take(&mut strip.aovs);
-        // Rain alone draws into its strip, and takes all colours alike.
+        // Only rain draws into its strip, and its transmittance is the same for all colors.
         if let Some(mut planes) = strip.gray_planes_mut() {
-            let (mut patch, mut streaks) = (Patch::default(), Vec::new());
-            for stretch in rows.x / STRETCH..rows.right().div_ceil(STRETCH) {
-                let origin = [stretch * STRETCH, band * BAND];
-                let shown = rows.intersection(&Rect { x: origin[0], width: STRETCH, ..rows });
+            let (mut buffer, mut streaks) = (TileBuffer::default(), Vec::new());
+            for tile_column in rows.x / TILE_COLUMNS..rows.right().div_ceil(TILE_COLUMNS) {
+                let origin = [tile_column * TILE_COLUMNS, tile_row * TILE_ROWS];
+                let tile_rect = rows.intersection(&Rect { x: origin[0], width: TILE_COLUMNS, ..rows });
                 streaks.clear();
-                for part in &self.parts {
-                    part.collect(band, stretch, &mut streaks);
+                for chunk in &self.chunks {
+                    chunk.collect_tile(tile_row, tile_column, &mut streaks);
                 }
                 if streaks.is_empty() {
                     continue;
                 }
-                patch.load(simd, origin, shown, rect, &planes);
-                let strokes = streaks.iter().map(Record::stroke);
-                for stroke in strokes.filter(|stroke| slice.contains(f64::from(stroke.layer.depth))) {
+                buffer.load(simd, origin, tile_rect, rect, &planes);
+                let segments = streaks.iter().map(PackedStreak::unpack);
+                for segment in segments.filter(|segment| slice.contains(f64::from(segment.shading.depth))) {
                     if aovs.is_empty() {
-                        stroke.draw(&mut patch, &mut |_, _| {});
+                        segment.draw(&mut buffer, &mut |_, _| {});
                         continue;
                     }
-                    stroke.draw(&mut patch, &mut |[column, row], opacity| {
+                    segment.draw(&mut buffer, &mut |[column, row], opacity| {
                         let [x, y] = [origin[0] + column, origin[1] + row];
-                        if (shown.x..shown.right()).contains(&x) && (shown.y..shown.bottom()).contains(&y) {
+                        if (tile_rect.x..tile_rect.right()).contains(&x)
+                            && (tile_rect.y..tile_rect.bottom()).contains(&y)
+                        {
                             let index = (y - rect.y) * rect.width + x - rect.x;
-                            measure(&mut aovs, index, opacity, stroke.layer.depth, stroke.diameter_mm);
+                            write_aovs(&mut aovs, index, opacity, segment.shading.depth, segment.diameter_mm);
                         }
                     });
                 }
-                patch.store(simd, shown, rect, &mut planes);
+                buffer.store(simd, tile_rect, rect, &mut planes);
             }
         }
         strip.aovs = aovs;

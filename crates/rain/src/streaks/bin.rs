@@ -1,85 +1,161 @@
-//! What each band of rows has to draw, from left to right.
+//! Tile binning: for each tile of the picture, the streaks that may touch it.
 
-/// Rows of a band.
-pub(crate) const BAND: usize = 8;
+use super::rasterize::{PackedStreak, StreakSegment};
+use crate::shutter_cameras::PixelBounds;
 
-/// The part of the picture that a thing may touch: columns and rows `[low, high]`, pixels; may reach beyond the picture.
-pub(crate) type Extent = [[f32; 2]; 2];
+/// Rows of a tile: one SIMD vector.
+pub(crate) const TILE_ROWS: usize = 8;
+/// Columns of a tile: its pixels and their depths fit into the L1 cache.
+pub(crate) const TILE_COLUMNS: usize = 128;
 
-/// For each band of rows of a picture, and each stretch of its columns, numbers of the things that touch it, in their order.
+/// For each tile of a picture, the indices of the streaks that may touch it, in drawing order; stored as in a
+/// compressed sparse row matrix.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Bands {
-    /// Stretches of a band.
-    stretches: usize,
+pub(crate) struct TileBins {
+    /// Tiles in a row of tiles.
+    tile_columns: usize,
     starts: Vec<u32>,
     members: Vec<u32>,
 }
 
-/// Which bands, and which stretches of them, a thing touches: the first, and one past the last.
+/// The range of tiles that a streak may touch, in rows and columns of tiles: the first, and one past the last.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Spans {
-    bands: [u16; 2],
-    stretches: [u16; 2],
+pub(crate) struct TileRange {
+    tile_rows: [u16; 2],
+    tile_columns: [u16; 2],
 }
 
-impl Spans {
-    /// Those of a thing in a picture of `size` pixels, in stretches of `width` columns.
+impl TileRange {
+    /// The range for a bounding box in a picture of `size` pixels, with tiles of `width` columns.
     #[inline(always)]
-    pub(crate) fn new([columns, rows]: Extent, size: [usize; 2], width: usize) -> Self {
-        Self { bands: span(rows, size[1], BAND), stretches: span(columns, size[0], width) }
+    pub(crate) fn new([columns, rows]: PixelBounds, size: [usize; 2], width: usize) -> Self {
+        Self {
+            tile_rows: touched_tiles(rows, size[1], TILE_ROWS),
+            tile_columns: touched_tiles(columns, size[0], width),
+        }
     }
 
-    /// Visits the stretches, of which a band has so many.
+    /// Visits the indices of all tiles in the range.
     #[inline(always)]
-    fn each(&self, of_band: usize, mut visit: impl FnMut(usize)) {
-        for band in self.bands[0]..self.bands[1] {
-            for stretch in self.stretches[0]..self.stretches[1] {
-                visit(usize::from(band) * of_band + usize::from(stretch));
+    fn for_each(&self, columns_per_row: usize, mut visit: impl FnMut(usize)) {
+        for tile_row in self.tile_rows[0]..self.tile_rows[1] {
+            for tile_column in self.tile_columns[0]..self.tile_columns[1] {
+                visit(usize::from(tile_row) * columns_per_row + usize::from(tile_column));
             }
         }
     }
 }
 
-/// The parts of `part` pixels each, of `length` pixels, that `[low, high]` touches.
+/// The tiles of `tile_size` pixels each, along `length` pixels, that the interval `[low, high]` touches.
 #[inline(always)]
-fn span([low, high]: [f32; 2], length: usize, part: usize) -> [u16; 2] {
-    // Not a number touches nothing.
+fn touched_tiles([low, high]: [f32; 2], length: usize, tile_size: usize) -> [u16; 2] {
+    // NaN touches nothing.
     if !(high >= 0.0 && low < length as f32) {
         return [0, 0];
     }
-    let (last, scale) = (((length - 1) / part) as f32, 1.0 / part as f32);
-    let held = |place: f32| (place * scale).clamp(0.0, last) as i32 as u16;
-    [held(low), held(high) + 1]
+    let (last, scale) = (((length - 1) / tile_size) as f32, 1.0 / tile_size as f32);
+    let tile_index = |tile: f32| (tile * scale).clamp(0.0, last) as i32 as u16;
+    [tile_index(low), tile_index(high) + 1]
 }
 
-impl Bands {
-    /// Sorts things into the bands of a picture of `size` pixels, in stretches of `width` columns.
-    pub(crate) fn new(size: [usize; 2], width: usize, things: &[Spans]) -> Self {
-        let stretches = size[0].div_ceil(width);
-        let count = size[1].div_ceil(BAND) * stretches;
+impl TileBins {
+    /// Bins streaks by counting sort into the tiles of a picture of `size` pixels, with tiles of `width` columns.
+    pub(crate) fn new(size: [usize; 2], width: usize, ranges: &[TileRange]) -> Self {
+        let tile_columns = size[0].div_ceil(width);
+        let count = size[1].div_ceil(TILE_ROWS) * tile_columns;
         let mut starts = vec![0_u32; count + 1];
-        things.iter().for_each(|spans| spans.each(stretches, |place| starts[place + 1] += 1));
-        for place in 0..count {
-            starts[place + 1] += starts[place];
+        ranges.iter().for_each(|range| range.for_each(tile_columns, |tile| starts[tile + 1] += 1));
+        for tile in 0..count {
+            starts[tile + 1] += starts[tile];
         }
         let mut members = vec![0; starts[count] as usize];
         let mut next = starts.clone();
-        for (index, spans) in things.iter().enumerate() {
-            spans.each(stretches, |place| {
-                members[next[place] as usize] = index as u32;
-                next[place] += 1;
+        for (index, range) in ranges.iter().enumerate() {
+            range.for_each(tile_columns, |tile| {
+                members[next[tile] as usize] = index as u32;
+                next[tile] += 1;
             });
         }
-        Self { stretches, starts, members }
+        Self { tile_columns, starts, members }
     }
 
-    /// What touches a stretch of a band; nothing beyond the picture.
+    /// The streaks of a tile; none outside the picture.
     #[inline(always)]
-    pub(crate) fn members(&self, band: usize, stretch: usize) -> &[u32] {
-        let place = band * self.stretches + stretch;
-        match self.starts.get(place..place + 2) {
-            Some(&[start, end]) if stretch < self.stretches => &self.members[start as usize..end as usize],
+    pub(crate) fn members(&self, tile_row: usize, tile_column: usize) -> &[u32] {
+        let tile = tile_row * self.tile_columns + tile_column;
+        match self.starts.get(tile..tile + 2) {
+            Some(&[start, end]) if tile_column < self.tile_columns => &self.members[start as usize..end as usize],
             _ => &[],
+        }
+    }
+}
+
+/// Streaks in drawing order, binned into the tiles of the picture.
+///
+/// Chunks are binned independently, so that no thread waits for a global sort.
+pub(crate) struct StreakChunk {
+    streaks: Vec<PackedStreak>,
+    bins: TileBins,
+    /// Number of cells with streaks in it.
+    pub(crate) cell_count: usize,
+}
+
+/// A chunk under construction.
+pub(crate) struct StreakChunkBuilder {
+    /// Columns and rows of the picture.
+    size: [usize; 2],
+    streaks: Vec<PackedStreak>,
+    ranges: Vec<TileRange>,
+    cell_count: usize,
+}
+
+impl StreakChunkBuilder {
+    /// An empty chunk for a picture of `size` pixels.
+    pub(crate) fn new(size: [usize; 2]) -> Self {
+        Self { size, streaks: Vec::new(), ranges: Vec::new(), cell_count: 0 }
+    }
+
+    /// Adds a streak with its bounding box.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, segment: &StreakSegment, extent: PixelBounds) {
+        self.ranges.push(TileRange::new(extent, self.size, TILE_COLUMNS));
+        self.streaks.push(PackedStreak::new(segment));
+    }
+
+    /// Adds a cell's streaks, and counts the cell if there are any.
+    #[inline(always)]
+    pub(crate) fn add_cell(&mut self, add: impl FnOnce(&mut Self)) {
+        let before = self.streaks.len();
+        add(self);
+        self.cell_count += usize::from(self.streaks.len() > before);
+    }
+
+    /// Bins the streaks.
+    pub(crate) fn build(self) -> StreakChunk {
+        StreakChunk {
+            bins: TileBins::new(self.size, TILE_COLUMNS, &self.ranges),
+            streaks: self.streaks,
+            cell_count: self.cell_count,
+        }
+    }
+}
+
+impl StreakChunk {
+    /// Number of streaks.
+    pub(crate) fn count(&self) -> usize {
+        self.streaks.len()
+    }
+
+    /// Appends the streaks of a tile to `streaks`.
+    ///
+    /// They are far apart in memory: copying them in one go overlaps the cache misses, which would otherwise occur one
+    /// by one while drawing.
+    #[inline(always)]
+    pub(crate) fn collect_tile(&self, tile_row: usize, tile_column: usize, streaks: &mut Vec<PackedStreak>) {
+        let members = self.bins.members(tile_row, tile_column);
+        streaks.reserve(members.len());
+        for index in members {
+            streaks.push(self.streaks[*index as usize]);
         }
     }
 }
@@ -94,13 +170,13 @@ mod tests {
         let rows = [[-5.0, 3.0], [7.5, 16.5], [30.0, 40.0], [-9.0, -1.0], [f32::NAN, 3.0], [0.0, 1e9]];
         let narrow = [[31.0, 33.0], [0.0, 3.0]];
         let extents = rows.into_iter().map(|rows| [all, rows]).chain([narrow]);
-        let spans: Vec<Spans> = extents.map(|extent| Spans::new(extent, [48, 21], 32)).collect();
-        let bands = Bands::new([48, 21], 32, &spans);
-        assert_eq!(bands.members(0, 0), [0, 1, 5, 6]);
-        assert_eq!(bands.members(0, 1), [0, 1, 5, 6]);
-        assert_eq!([0, 1].map(|stretch| bands.members(1, stretch)), [[1, 5]; 2]);
-        assert_eq!([0, 1].map(|stretch| bands.members(2, stretch)), [[1, 5]; 2]);
-        assert!(bands.members(3, 0).is_empty() && bands.members(0, 2).is_empty());
-        assert!(Bands::default().members(0, 0).is_empty());
+        let range: Vec<TileRange> = extents.map(|extent| TileRange::new(extent, [48, 21], 32)).collect();
+        let tile_rows = TileBins::new([48, 21], 32, &range);
+        assert_eq!(tile_rows.members(0, 0), [0, 1, 5, 6]);
+        assert_eq!(tile_rows.members(0, 1), [0, 1, 5, 6]);
+        assert_eq!([0, 1].map(|tile_column| tile_rows.members(1, tile_column)), [[1, 5]; 2]);
+        assert_eq!([0, 1].map(|tile_column| tile_rows.members(2, tile_column)), [[1, 5]; 2]);
+        assert!(tile_rows.members(3, 0).is_empty() && tile_rows.members(0, 2).is_empty());
+        assert!(TileBins::default().members(0, 0).is_empty());
     }
 }

@@ -1,28 +1,29 @@
-//! What one falling drop hides while the shutter is open.
+//! Opacity of the streak that a falling drop leaves in one exposure.
 //!
-//! The paper's opacity comes from S. Starik and M. Werman, "Simulation of rain in videos" (2002), and K. Garg and S. K. Nayar, "Vision and
-//! rain" (2007): the share of the exposure for which the drop covers a point.
+//! The paper's opacity comes from S. Starik and M. Werman, "Simulation of rain in videos" (2002), and K. Garg and S. K.
+//! Nayar, "Vision and rain" (2007): the fraction of the exposure during which the drop covers a point.
 
 use std::f64::consts::PI;
 
 use bansho_base::math;
 
-/// The path of a round drop while the shutter is open: straight, at constant speed.
+/// The streak of a spherical drop that moves in a straight line at constant speed during the exposure.
 ///
-/// Across it, `b` is the distance from its axis; along it, `s` runs from the drop's middle when the shutter opens (0) to its
-/// middle when it closes (`length`). All in m.
+/// `b` is the distance from its axis; `s` is the position along it, from the drop's center when the shutter opens (0)
+/// to its center when it closes (`length`). All in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Streak {
     /// Radius of the drop r, m.
     pub radius: f64,
-    /// How far it moves, `v T`, m; more than 0.
+    /// Distance that it moves, `v T`, m; more than 0.
     pub length: f64,
 }
 
 impl Streak {
     /// The streak of a drop of diameter D that falls with `speed` (m/s) through an exposure (s).
     pub fn new(diameter_mm: f64, speed: f64, exposure: f64) -> Self {
-        // A drop that does not move covers what it covers for the whole exposure: a path of no length, but for dividing by it.
+        // The least length avoids a division by zero for a drop at rest, which covers the same points for the whole
+        // exposure.
         Self { radius: 0.5e-3 * diameter_mm, length: (speed * exposure).max(1e-12) }
     }
 
@@ -31,65 +32,67 @@ impl Streak {
         math::sqrt((self.radius * self.radius - b * b).max(0.0))
     }
 
-    /// Opacity at a point: the share of the exposure for which the drop covers it. Up to 1, where the drop moves less than its chord.
+    /// Opacity at a point: the fraction of the exposure during which the drop covers it. 1 where the drop moves less
+    /// than its chord.
     pub fn opacity(&self, b: f64, s: f64) -> f64 {
         let chord = self.half_chord(b);
         (s.clamp(-chord, chord) + (self.length - s).clamp(-chord, chord)) / self.length
     }
 
-    /// Opacity at distance `b` from the axis away from the ends: `2 sqrt(r^2 - b^2) / (v T)`, at most 1.
+    /// Opacity at distance `b` from the axis, away from the ends: `2 sqrt(r^2 - b^2) / (v T)`, at most 1.
     pub fn profile(&self, b: f64) -> f64 {
         (2.0 * self.half_chord(b) / self.length).min(1.0)
     }
 
-    /// Mean opacity across a streak, `(pi/4) D / (v T)`, of one that is longer than wide.
+    /// Mean opacity across the streak, `(pi/4) D / (v T)`, if it is longer than wide.
     pub fn mean_opacity(&self) -> f64 {
         0.5 * PI * self.radius / self.length
     }
 
-    /// What it blocks in all: `pi D^2 / 4`, m^2, whatever the shutter.
+    /// Integral of the opacity over the streak: `pi D^2 / 4`, m^2, for any exposure.
     pub fn blocked_area(&self) -> f64 {
         PI * self.radius * self.radius
     }
 
-    /// Share of the blocked area whose distance from the axis is below `b`.
-    pub fn share_across(&self, b: f64) -> f64 {
+    /// Fraction of the blocked area at distances from the axis below `b`: a cumulative distribution.
+    pub fn area_fraction_across(&self, b: f64) -> f64 {
         let u = (b / self.radius).clamp(-1.0, 1.0);
         0.5 + (math::asin(u) + u * math::sqrt(1.0 - u * u)) / PI
     }
 
-    /// Share of the blocked area that lies before `s` along the path.
-    pub fn share_along(&self, s: f64) -> f64 {
-        // Each moment's disc has the share `share_across(s - s_drop)` before s; this is its mean over the path.
-        let share = self.radius / self.length
+    /// Fraction of the blocked area before `s` along the path: a cumulative distribution.
+    pub fn area_fraction_along(&self, s: f64) -> f64 {
+        // The disc at any one time has the fraction `area_fraction_across(s - s_drop)` before s; this is its mean over
+        // the path.
+        let fraction = self.radius / self.length
             * (disc_integral(s / self.radius) - disc_integral((s - self.length) / self.radius));
-        share.clamp(0.0, 1.0)
+        fraction.clamp(0.0, 1.0)
     }
 
     /// Integral of [`opacity`](Self::opacity) over the width from the streak's edge to `b`, at `s`; m.
-    pub fn opacity_until(&self, b: f64, s: f64) -> f64 {
+    pub fn opacity_integral_to(&self, b: f64, s: f64) -> f64 {
         (self.clamped_until(b, s) + self.clamped_until(b, self.length - s)) / self.length
     }
 
-    /// Whether the drop covers the points at `s` for their whole chord: away from the ends.
+    /// Whether the opacity at `s` equals the profile: away from the ends.
     pub fn is_within(&self, s: f64) -> bool {
         s >= self.radius && self.length - s >= self.radius
     }
 
     /// Integral of `clamp(s, -chord, chord)` from the streak's edge to `b`, m^2.
     fn clamped_until(&self, b: f64, s: f64) -> f64 {
-        // Within +-w the half chord exceeds |s| and the term is s; outside, the half chord itself.
+        // Within +-w the half chord exceeds |s| and the integrand is s; outside it is the half chord.
         let w = self.half_chord(s);
         let b = b.clamp(-self.radius, self.radius);
         let area = 0.5 * self.blocked_area();
-        let chord_until = |b: f64| area * self.share_across(b);
+        let chord_until = |b: f64| area * self.area_fraction_across(b);
         let outside = chord_until(b.min(-w)) + (chord_until(b.max(w)) - chord_until(w));
         let inside = s.abs() * (b.clamp(-w, w) + w);
         if s < 0.0 { -(outside + inside) } else { outside + inside }
     }
 }
 
-/// Integral from -1 to `x` of the share of a disc of radius 1 that lies before a line.
+/// Integral from -1 to `x` of the fraction of a unit disc's area before a line.
 fn disc_integral(x: f64) -> f64 {
     if x <= -1.0 {
         return 0.0;
@@ -104,28 +107,28 @@ fn disc_integral(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::{fields, near};
+    use crate::tests::reference::{fields, near};
 
     /// Streaks of the reference table with its exposure share and its mean over the streak's box, which take a square drop.
     fn references() -> Vec<(Streak, f64, f64)> {
         let row = |line: &str| {
-            let [diameter, _, speed, exposure, _, share, length, aspect, mean] =
+            let [diameter, _, speed, exposure, _, fraction, length, aspect, mean] =
                 fields::<9>(line).map(|field| field.parse::<f64>().unwrap_or(f64::NAN));
             let streak = Streak::new(diameter, speed, exposure);
             assert!(near(streak.length, 1e-3 * length, 1e-3), "{line}");
             assert!(near(streak.length + 2.0 * streak.radius, aspect * 2.0 * streak.radius, 1e-3), "{line}");
-            (streak, share, mean)
+            (streak, fraction, mean)
         };
         include_str!("../../data/streak_opacity.csv").lines().skip(1).map(row).collect()
     }
 
     #[test]
     fn opacities_are_the_reference_shares_of_exposure() {
-        for (streak, share, mean) in references() {
-            assert!(near(streak.profile(0.0), share, 1e-3), "{streak:?}");
-            assert!(near(streak.opacity(0.0, 0.5 * streak.length), share, 1e-3));
+        for (streak, fraction, mean) in references() {
+            assert!(near(streak.profile(0.0), fraction, 1e-3), "{streak:?}");
+            assert!(near(streak.opacity(0.0, 0.5 * streak.length), fraction, 1e-3));
             // A disc fills pi/4 of the square that the table takes.
-            assert!(near(streak.mean_opacity(), 0.25 * PI * share, 1e-3));
+            assert!(near(streak.mean_opacity(), 0.25 * PI * fraction, 1e-3));
             let area = 2.0 * streak.radius * (streak.length + 2.0 * streak.radius);
             assert!(near(streak.blocked_area() / area, 0.25 * PI * mean, 1e-3));
         }
@@ -162,7 +165,7 @@ mod tests {
         // A drop that hangs still is seen as a drop.
         let still = Streak::new(2.0, 0.0, 1.0);
         assert_eq!((still.profile(0.9e-3), still.opacity(0.0, 0.0)), (1.0, 1.0));
-        assert!(near(still.share_along(0.0), 0.5, 1e-3));
+        assert!(near(still.area_fraction_along(0.0), 0.5, 1e-3));
     }
 
     #[test]
@@ -174,7 +177,7 @@ mod tests {
                     let steps = 4000;
                     let step = (b + 1e-3) / steps as f64;
                     let sum: f64 = (0..steps).map(|i| streak.opacity(-1e-3 + step * (i as f64 + 0.5), s)).sum();
-                    let found = streak.opacity_until(b, s);
+                    let found = streak.opacity_integral_to(b, s);
                     assert!((found - sum * step).abs() < 1e-7, "{length} {s} {b}: {found} {}", sum * step);
                 }
             }
@@ -184,11 +187,14 @@ mod tests {
     #[test]
     fn shares_run_from_nothing_to_all() {
         let streak = Streak { radius: 1e-3, length: 5e-3 };
-        assert_eq!((streak.share_across(-2e-3), streak.share_across(0.0), streak.share_across(1e-3)), (0.0, 0.5, 1.0));
-        assert_eq!((streak.share_along(-1e-3), streak.share_along(6e-3)), (0.0, 1.0));
-        assert!(near(streak.share_along(2.5e-3), 0.5, 1e-12));
+        assert_eq!(
+            (streak.area_fraction_across(-2e-3), streak.area_fraction_across(0.0), streak.area_fraction_across(1e-3)),
+            (0.0, 0.5, 1.0)
+        );
+        assert_eq!((streak.area_fraction_along(-1e-3), streak.area_fraction_along(6e-3)), (0.0, 1.0));
+        assert!(near(streak.area_fraction_along(2.5e-3), 0.5, 1e-12));
         // Within, each length holds its share of 1/length: 1 mm of 5.
-        assert!(near(streak.share_along(3e-3) - streak.share_along(2e-3), 0.2, 1e-12));
+        assert!(near(streak.area_fraction_along(3e-3) - streak.area_fraction_along(2e-3), 0.2, 1e-12));
         assert!(streak.is_within(1e-3) && !streak.is_within(0.9e-3) && !streak.is_within(4.1e-3));
     }
 }

@@ -1,11 +1,8 @@
-//! Streaks: drops as an exposure sees them, sorted into tiles and rasterized.
+//! Streaks: drops as an exposure shows them. Projection into the picture, binning into tiles, rasterization.
 
 pub(crate) mod bin;
 pub mod coverage;
-pub(crate) mod near_region;
 pub(crate) mod project;
 pub(crate) mod project_lanes;
 pub(crate) mod rasterize;
-pub(crate) mod shutter_cameras;
 pub(crate) mod splashes;
-pub(crate) mod time_steps;

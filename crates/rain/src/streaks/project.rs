@@ -1,25 +1,27 @@
-//! Drops and the streaks that they leave.
+//! Projection of drops into streaks: which drops of which cells are visible, and how each is lit.
 
-use bansho_base::math::{
-    DVec3,
-    random::{self, Purpose},
-    simd::LANES,
+use bansho_base::{
+    math::{
+        DVec3,
+        random::{self, Purpose},
+        simd::LANES,
+    },
+    phenomenon::surroundings::{Emitter, Light},
 };
 
 use super::{
-    near_region::Singles,
-    project_lanes::{Flights, NOTHING, Row, Streaks, Vectors},
-    rasterize::{at_least, at_most},
-    time_steps::{Gathering, Part},
+    bin::{StreakChunk, StreakChunkBuilder},
+    project_lanes::{DropPaths, StreakBatch},
 };
 use crate::{
     drops::{
-        exposure::{Ball, ClassNow, Moment},
-        lattice::{CELL, Cell},
+        exposure::{DropClassState, ExposureState, Sphere},
+        lattice::{CELL_SIZE, Cell},
     },
+    lanes::{Lanes, Vec3Lanes, ZERO_LANES, fast_max, fast_min, smoothstep},
     lighting::{
-        drop_lighting::{Beam, Lighting},
-        tiles::Tiles,
+        drop_lighting::{DropLighting, PreparedLight},
+        tiles::TileGrid,
     },
 };
 use fearless_simd::{Level, dispatch};
@@ -27,107 +29,113 @@ use rayon::prelude::*;
 
 const COUNT: Purpose = Purpose::named("rain drops of a cell");
 const DROP: Purpose = Purpose::named("rain drop");
-/// Parts that all cells make, and fewest and most cells of each.
-const PARTS: usize = 64;
-const CELLS_OF_PART: [usize; 2] = [8, 256];
-/// Over which part of the number of drops a drop fades in, so that a rising rate shows no drop at once.
-pub(crate) const FADE: f64 = 0.02;
+/// Number of chunks of all cells, and bounds on the number of cells in each.
+const CHUNK_COUNT: usize = 64;
+const CELLS_PER_CHUNK: [usize; 2] = [8, 256];
+/// Range of the drop count over which a drop fades in, as a fraction of all drops, so that a rising rate does not pop.
+pub(crate) const FADE_IN: f64 = 0.02;
 
-/// What turns drops into streaks.
+/// Turns drops into lit streaks.
 #[derive(Clone, Copy)]
-pub(crate) struct Shower<'a> {
+pub(crate) struct StreakProjection<'a> {
     pub(crate) level: Level,
-    pub(crate) moment: &'a Moment,
-    pub(crate) lighting: &'a Lighting<'a>,
-    /// Its lights.
-    pub(crate) beams: &'a [Beam],
-    /// What the sky shines through drops at the corners of tiles; `None` from a dark one.
-    pub(crate) sky: Option<(&'a Tiles, &'a [[f32; 3]])>,
-    /// Which share of a drop is drawn.
-    pub(crate) share: Share<'a>,
+    pub(crate) exposure: &'a ExposureState,
+    pub(crate) lighting: &'a DropLighting<'a>,
+    /// The same lights, prepared for SIMD.
+    pub(crate) lights: &'a [PreparedLight],
+    /// Radiance of drops under the sky at grid corners; `None` for a dark sky.
+    pub(crate) sky: Option<(&'a TileGrid, &'a [[f32; 3]])>,
+    /// Which drops are drawn, by weight.
+    pub(crate) selection: DropSelection<'a>,
 }
 
-/// Which share of a drop is drawn, where some are drawn by themselves and others on billboards.
+/// The weight of drops, where near drops are drawn one by one and others on billboards.
 #[derive(Clone, Copy)]
-pub(crate) enum Share<'a> {
-    /// All of it.
-    Whole,
-    /// That which is drawn by itself.
-    Single(&'a Singles),
-    /// That which is on billboards.
-    OnBillboard(&'a Singles),
+pub(crate) enum DropSelection<'a> {
+    /// All drops.
+    All,
+    /// The drops that are drawn one by one.
+    PerDrop(&'a PerDropRegion),
+    /// The drops on billboards.
+    Billboard(&'a PerDropRegion),
 }
 
-impl Share<'_> {
-    /// For drops at places from the camera.
+impl DropSelection<'_> {
+    /// Weights of drops at positions relative to the camera.
     #[inline(always)]
-    fn of(&self, places: &Vectors) -> Row {
-        let mut shares = [1.0; LANES];
+    fn of(&self, positions: &Vec3Lanes) -> Lanes {
+        let mut weights = [1.0; LANES];
         match self {
-            Self::Whole => {}
-            Self::Single(singles) => shares = singles.shares(places),
-            Self::OnBillboard(singles) => {
-                let single = singles.shares(places);
+            Self::All => {}
+            Self::PerDrop(region) => weights = region.weights(positions),
+            Self::Billboard(region) => {
+                let per_drop = region.weights(positions);
                 for i in 0..LANES {
-                    shares[i] -= single[i];
+                    weights[i] -= per_drop[i];
                 }
             }
         }
-        shares
+        weights
     }
 }
 
-/// Sixteen drops of one diameter half way through the exposure.
-pub(crate) struct Drops {
-    /// Places from the camera, m.
-    pub(crate) places: Vectors,
+/// Sixteen drops of one diameter at the middle of the exposure.
+pub(crate) struct DropBatch {
+    /// Positions relative to the camera, m.
+    pub(crate) positions: Vec3Lanes,
     /// m/s.
-    pub(crate) velocities: Vectors,
+    pub(crate) velocities: Vec3Lanes,
     /// mm.
     pub(crate) diameter_mm: f32,
-    /// How much of each is there, 0 to 1.
-    pub(crate) there: Row,
+    /// Fade-in weight, 0 to 1; 0 in unused lanes.
+    pub(crate) presence: Lanes,
 }
 
-impl Shower<'_> {
-    /// The streaks of all cells that may show within some balls, drop by drop.
-    pub(crate) fn drops(&self, within: &[Ball]) -> Vec<Part> {
-        self.parts(
+impl StreakProjection<'_> {
+    /// The streaks of all cells that may be visible within some spheres, drop by drop.
+    pub(crate) fn drop_chunks(&self, within: &[Sphere]) -> Vec<StreakChunk> {
+        self.cell_chunks(
             within,
-            0.5 * CELL,
-            |class, cell, gathering| dispatch!(self.level, _simd => self.add_cell(class, cell, gathering)),
+            0.5 * CELL_SIZE,
+            |class, cell, builder| dispatch!(self.level, _simd => self.add_cell(class, cell, builder)),
         )
     }
 
-    /// The streaks of all cells that may show within some balls, those of the nearest cells first; `add` adds those of a cell, up to
-    /// `aside` (m) level from its middle.
-    pub(crate) fn parts(
+    /// The streaks of all cells that may be visible within some spheres, nearest cells first. `add` adds those of one
+    /// cell, up to `half_width` (m) horizontally from its center.
+    pub(crate) fn cell_chunks(
         &self,
-        within: &[Ball],
-        aside: f64,
-        add: impl Fn(&ClassNow, Cell, &mut Gathering) + Sync,
-    ) -> Vec<Part> {
-        let classes = self.moment.classes.par_iter().filter(|class| class.share > 0.0);
+        within: &[Sphere],
+        half_width: f64,
+        add: impl Fn(&DropClassState, Cell, &mut StreakChunkBuilder) + Sync,
+    ) -> Vec<StreakChunk> {
+        let classes = self.exposure.classes.par_iter().filter(|class| class.fraction > 0.0);
         let lists: Vec<Vec<_>> = classes
-            .map(|class| self.cells(class, within, aside).into_iter().map(|(away, cell)| (away, cell, class)).collect())
+            .map(|class| {
+                self.cells(class, within, half_width)
+                    .into_iter()
+                    .map(|(distance, cell)| (distance, cell, class))
+                    .collect()
+            })
             .collect();
         let mut cells = lists.concat();
         cells.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let size = self.moment.sight.size();
-        let fill = |cells: &[(f64, Cell, &ClassNow)]| {
-            let mut gathering = Gathering::new(size);
+        let size = self.exposure.cameras.size();
+        let fill = |cells: &[(f64, Cell, &DropClassState)]| {
+            let mut builder = StreakChunkBuilder::new(size);
             for (_, cell, class) in cells {
-                gathering.add_cell(|gathering| add(class, *cell, gathering));
+                builder.add_cell(|builder| add(class, *cell, builder));
             }
-            gathering.part()
+            builder.build()
         };
-        let [fewest, most] = CELLS_OF_PART;
-        cells.par_chunks((cells.len() / PARTS).clamp(fewest, most)).map(fill).collect()
+        let [min, max] = CELLS_PER_CHUNK;
+        cells.par_chunks((cells.len() / CHUNK_COUNT).clamp(min, max)).map(fill).collect()
     }
 
-    /// The cells of a class, each once.
-    fn cells(&self, class: &ClassNow, within: &[Ball], aside: f64) -> Vec<(f64, Cell)> {
-        let mut cells: Vec<_> = within.iter().flat_map(|ball| self.moment.cells(class, *ball, aside)).collect();
+    /// The cells of a class, without duplicates.
+    fn cells(&self, class: &DropClassState, within: &[Sphere], half_width: f64) -> Vec<(f64, Cell)> {
+        let mut cells: Vec<_> =
+            within.iter().flat_map(|sphere| self.exposure.visible_cells(class, *sphere, half_width)).collect();
         cells.sort_by_key(|(_, cell)| *cell);
         cells.dedup_by_key(|(_, cell)| *cell);
         cells
@@ -135,95 +143,150 @@ impl Shower<'_> {
 
     /// Adds the streaks of a cell, drop by drop.
     #[inline(always)]
-    fn add_cell(&self, class: &ClassNow, cell: Cell, gathering: &mut Gathering) {
-        let key = self.moment.key;
+    fn add_cell(&self, class: &DropClassState, cell: Cell, builder: &mut StreakChunkBuilder) {
+        let key = self.exposure.key;
         let contents = class.lattice.contents(cell);
         let words = key.words(contents, 0, class.purpose(COUNT));
-        let count = random::poisson(class.most * class.lattice.volume(), [words[0], words[1]]) as usize;
-        let now = self.moment.cell(class, cell);
-        let rising = ((1.0 + FADE) * class.share) as f32;
+        let count = random::poisson(class.max_density * class.lattice.volume(), [words[0], words[1]]) as usize;
+        let now = self.exposure.cell_state(class, cell);
+        let rising = ((1.0 + FADE_IN) * class.fraction) as f32;
         for first in (0..count).step_by(LANES) {
-            let [x, y, z, turn] = key.uniforms_of_steps(contents, first as u32, class.purpose(DROP));
-            let mut there = NOTHING;
+            let [x, y, z, threshold] = key.uniforms_of_steps(contents, first as u32, class.purpose(DROP));
+            let mut presence = ZERO_LANES;
             for i in 0..LANES {
-                let risen = at_most(1.0, at_least(0.0, (rising - turn[i]) * (1.0 / FADE) as f32));
-                there[i] = if first + i < count { risen } else { 0.0 };
+                let risen = fast_min(1.0, fast_max(0.0, (rising - threshold[i]) * (1.0 / FADE_IN) as f32));
+                presence[i] = if first + i < count { risen } else { 0.0 };
             }
-            let (places, velocities) = now.drops(&[x, y, z]);
+            let (positions, velocities) = now.drop_states(&[x, y, z]);
             let diameter_mm = class.diameter_mm as f32;
-            self.add_drops(&Drops { places, velocities, diameter_mm, there }, 0.0, gathering);
+            self.add_drops(&DropBatch { positions, velocities, diameter_mm, presence }, 0.0, builder);
         }
     }
 
-    /// Adds the streaks of drops as far as they show. Those that are nowhere more opaque than `least_peak` are not lit by lamps and fires.
+    /// Adds the streaks of visible drops. Those with a peak opacity below `least_peak` are not lit by lamps and fires.
     #[inline(always)]
-    pub(crate) fn add_drops(&self, drops: &Drops, least_peak: f32, gathering: &mut Gathering) {
-        let moment = self.moment;
-        let [xs, ys, zs] = &drops.places;
-        let shares = self.share.of(&drops.places);
-        let half = 0.5 * moment.sight.exposure as f32;
-        let mut flights =
-            Flights { from: drops.places, to: drops.places, diameter_mm: [drops.diameter_mm; LANES], gain: NOTHING };
+    pub(crate) fn add_drops(&self, drops: &DropBatch, least_peak: f32, builder: &mut StreakChunkBuilder) {
+        let exposure = self.exposure;
+        let [xs, ys, zs] = &drops.positions;
+        let weights = self.selection.of(&drops.positions);
+        let half = 0.5 * exposure.cameras.exposure_time as f32;
+        let mut paths = DropPaths {
+            from: drops.positions,
+            to: drops.positions,
+            diameter_mm: [drops.diameter_mm; LANES],
+            gain: ZERO_LANES,
+        };
         for i in 0..LANES {
-            let away = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
-            flights.gain[i] = drops.there[i] * moment.nearness(away) * shares[i] * moment.gain as f32;
+            let distance = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
+            paths.gain[i] = drops.presence[i] * exposure.streak_weight(distance) * weights[i] * exposure.gain as f32;
         }
         for axis in 0..3 {
             for i in 0..LANES {
-                let way = half * drops.velocities[axis][i];
-                flights.from[axis][i] -= way;
-                flights.to[axis][i] += way;
+                let travel = half * drops.velocities[axis][i];
+                paths.from[axis][i] -= travel;
+                paths.to[axis][i] += travel;
             }
         }
-        let eye = moment.sight.middle().position;
-        flights.cut((moment.ground - eye.y) as f32);
-        let mut streaks = flights.streaks(&moment.sight);
-        if moment.has_roofs() {
+        let eye = exposure.cameras.middle().position;
+        paths.clip_at_ground((exposure.ground - eye.y) as f32);
+        let mut streaks = paths.streaks(&exposure.cameras);
+        if exposure.has_occluders() {
             for i in 0..LANES {
-                let [place, velocity] = [&drops.places, &drops.velocities].map(|vectors| vector(vectors, i));
-                if streaks.seen[i] != 0 && moment.sheltered(eye + place, velocity) {
-                    streaks.seen[i] = 0;
+                let [position, velocity] = [&drops.positions, &drops.velocities].map(|vectors| vector(vectors, i));
+                if streaks.visible[i] != 0 && exposure.is_sheltered(eye + position, velocity) {
+                    streaks.visible[i] = 0;
                 }
             }
         }
-        self.add(&streaks, &drops.places, &flights.diameter_mm, least_peak, gathering);
+        self.add_streaks(&streaks, &drops.positions, &paths.diameter_mm, least_peak, builder);
     }
 
-    /// Adds the streaks that are seen of drops at some places, lit.
+    /// Lights and adds the visible streaks of drops at some positions.
     #[inline(always)]
-    pub(crate) fn add(
+    pub(crate) fn add_streaks(
         &self,
-        streaks: &Streaks,
-        places: &Vectors,
-        diameters_mm: &Row,
+        streaks: &StreakBatch,
+        positions: &Vec3Lanes,
+        diameters_mm: &Lanes,
         least_peak: f32,
-        gathering: &mut Gathering,
+        builder: &mut StreakChunkBuilder,
     ) {
         if !streaks.any() {
             return;
         }
-        let mut lit = NOTHING;
+        let mut lit = ZERO_LANES;
         for i in 0..LANES {
             lit[i] = if streaks.peak[i] >= least_peak { 1.0 } else { 0.0 };
         }
-        let mut light = [[0.0; 3]; LANES];
-        for beam in self.beams {
-            self.lighting.add(beam, places, &lit, &mut light);
+        let mut radiance = [[0.0; 3]; LANES];
+        for light in self.lights {
+            self.lighting.add(light, positions, &lit, &mut radiance);
         }
         for i in 0..LANES {
-            if streaks.seen[i] == 0 {
+            if streaks.visible[i] == 0 {
                 continue;
             }
-            let mut stroke = streaks.stroke(i, diameters_mm[i], light[i]);
+            let mut segment = streaks.segment(i, diameters_mm[i], radiance[i]);
             if let Some((tiles, sky)) = self.sky {
-                stroke.layer.add_light(tiles.at(sky, stroke.middle));
+                segment.shading.add_light(tiles.at(sky, segment.center));
             }
-            gathering.add(&stroke, streaks.extent(i));
+            builder.add(&segment, streaks.extent(i));
         }
     }
 }
 
-/// One of sixteen vectors.
-fn vector(vectors: &Vectors, i: usize) -> DVec3 {
+/// The vector of one lane.
+fn vector(vectors: &Vec3Lanes, i: usize) -> DVec3 {
     DVec3::new(vectors[0][i].into(), vectors[1][i].into(), vectors[2][i].into())
+}
+
+/// Radius around the camera within which drops are drawn one by one, m: at this distance a cubic meter cannot be
+/// treated as flat.
+pub(super) const CAMERA_RADIUS: f64 = 1.0;
+/// The same around a lamp, m: a cubic meter is lit too unevenly there.
+pub(super) const LAMP_RADIUS: f64 = 1.3;
+/// Width of the transition to billboards, m.
+const FADE_WIDTH: f64 = 0.2;
+
+/// The region around the camera and around lamps in which drops are drawn one by one, beside billboards.
+pub(crate) struct PerDropRegion {
+    spheres: Vec<Sphere>,
+    /// Centers relative to the camera and radii of the spheres, m.
+    from_camera: Vec<([f32; 3], f32)>,
+}
+
+impl PerDropRegion {
+    pub(crate) fn new(exposure: &ExposureState, lights: &[Light]) -> Self {
+        let eye = exposure.cameras.middle().position;
+        let lamp = |light: &Light| match light.emitter {
+            Emitter::Directional { .. } => None,
+            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => Some(position),
+        };
+        let radius = LAMP_RADIUS + FADE_WIDTH;
+        let near = |position: &DVec3| (*position - eye).length() < 1.1 * exposure.distance + radius;
+        let lamps = lights.iter().filter_map(lamp).filter(near).map(|center| Sphere { center, radius });
+        let spheres: Vec<Sphere> =
+            [exposure.around_camera(CAMERA_RADIUS + FADE_WIDTH)].into_iter().chain(lamps).collect();
+        let from_camera = |sphere: &Sphere| ((sphere.center - eye).as_vec3().to_array(), sphere.radius as f32);
+        Self { from_camera: spheres.iter().map(from_camera).collect(), spheres }
+    }
+
+    /// No drop outside of these is drawn one by one.
+    pub(crate) fn spheres(&self) -> &[Sphere] {
+        &self.spheres
+    }
+
+    /// Weights of drops at positions relative to the camera, 0 to 1.
+    #[inline(always)]
+    pub(super) fn weights(&self, [xs, ys, zs]: &Vec3Lanes) -> Lanes {
+        let mut weights = ZERO_LANES;
+        for &([x, y, z], radius) in &self.from_camera {
+            for i in 0..LANES {
+                let offset = [xs[i] - x, ys[i] - y, zs[i] - z];
+                let distance = (offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]).sqrt();
+                weights[i] = fast_max(weights[i], smoothstep((radius - distance) * (1.0 / FADE_WIDTH) as f32));
+            }
+        }
+        weights
+    }
 }

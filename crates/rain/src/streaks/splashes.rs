@@ -1,7 +1,7 @@
-//! Drops that hit the ground: each throws up a ring of droplets for a moment.
+//! Splashes: drops that hit the ground throw up a crown of droplets.
 //!
-//! In closed form like the drops themselves: the ground is divided into squares and time into turns, and each square has in each turn
-//! its own impacts with their times and places.
+//! In closed form, like the drops: the ground is divided into squares and time into periods. Each square has random
+//! impacts of its own in each period.
 
 use std::f64::consts::TAU;
 
@@ -15,36 +15,36 @@ use bansho_base::{
 };
 
 use super::{
-    project::Shower,
-    project_lanes::{Flights, NOTHING},
-    time_steps::{Gathering, Part},
+    bin::{StreakChunk, StreakChunkBuilder},
+    project::StreakProjection,
+    project_lanes::DropPaths,
 };
-use crate::{drops::exposure::ClassNow, parameters::SplashParameters};
+use crate::{drops::exposure::DropClassState, lanes::ZERO_LANES, parameters::SplashParameters};
 use fearless_simd::dispatch;
 use rayon::prelude::*;
 
-/// Side of a square of ground, m.
-const SQUARE: f64 = 0.5;
-/// Squares whose droplets make a part.
-const SQUARES_OF_PART: usize = 32;
-/// Length of a turn, s; no splash lasts longer.
-const TURN: f64 = 0.25;
-/// Droplets of a splash: a ring, and some that fly higher.
-const RING: usize = 6;
-const HIGH: usize = 2;
-/// Smallest drop that splashes visibly, mm.
-const LEAST_MM: f64 = 1.3;
-/// Beyond this distance only some splashes are drawn, each so much stronger, m.
-const ALL_WITHIN: f64 = 3.0;
+/// Side of a ground square, m.
+const SQUARE_SIZE: f64 = 0.5;
+/// Squares whose droplets make a chunk.
+const SQUARES_PER_CHUNK: usize = 32;
+/// Length of a period, s, and the maximum age of a splash.
+const SPLASH_PERIOD: f64 = 0.25;
+/// Droplets of a splash: those of the crown, and some with a higher trajectory.
+const RING_DROPLETS: usize = 6;
+const HIGH_DROPLETS: usize = 2;
+/// Smallest drop with a visible splash, mm.
+const MIN_DIAMETER_MM: f64 = 1.3;
+/// Beyond this distance, m, splashes are thinned out, and the rest made more opaque in proportion.
+const FULL_DENSITY_DISTANCE: f64 = 3.0;
 
 const COUNT: Purpose = Purpose::named("rain splashes of a square");
 const IMPACT: Purpose = Purpose::named("rain splash");
 const DROPLET: Purpose = Purpose::named("rain splash droplet");
 
-/// What splashes are made from.
+/// Makes the streaks of splashes.
 #[derive(Clone, Copy)]
 pub(crate) struct Splashes<'a> {
-    pub(crate) shower: Shower<'a>,
+    pub(crate) projection: StreakProjection<'a>,
     pub(crate) parameters: &'a SplashParameters,
     /// Middle of the exposure, s.
     pub(crate) time: f64,
@@ -52,132 +52,142 @@ pub(crate) struct Splashes<'a> {
     pub(crate) loop_s: Option<f64>,
 }
 
-/// One drop's impact.
+/// The impact of one drop.
 struct Impact {
-    place: DVec3,
-    /// How long ago it was, s.
+    position: DVec3,
+    /// Age, s.
     age: f64,
     /// Diameter of the drop, mm.
     diameter_mm: f64,
-    /// Its number within its square and turn.
+    /// Random key of its square.
     id: u64,
     step: u32,
-    /// Opacity beside the droplets' own.
+    /// Opacity gain.
     strength: f64,
 }
 
 impl Splashes<'_> {
-    /// The streaks of all droplets that may show.
-    pub(crate) fn parts(&self) -> Vec<Part> {
-        let (moment, reach) = (self.shower.moment, self.parameters.distance);
-        let eye = moment.sight.middle().position;
-        let high = (eye.y - moment.ground).abs();
+    /// The streaks of all droplets that may be visible.
+    pub(crate) fn chunks(&self) -> Vec<StreakChunk> {
+        let (exposure, reach) = (self.projection.exposure, self.parameters.distance);
+        let eye = exposure.cameras.middle().position;
+        let high = (eye.y - exposure.ground).abs();
         if self.parameters.amount <= 0.0 || high >= reach {
             return Vec::new();
         }
-        let range =
-            |centre: f64| ((centre - reach) / SQUARE).floor() as i64..=((centre + reach) / SQUARE).floor() as i64;
+        let range = |center: f64| {
+            ((center - reach) / SQUARE_SIZE).floor() as i64..=((center + reach) / SQUARE_SIZE).floor() as i64
+        };
         let squares: Vec<[i64; 2]> = range(eye.x).flat_map(|x| range(eye.z).map(move |z| [x, z])).collect();
-        let middle = |[x, z]: [i64; 2]| DVec3::new((x as f64 + 0.5) * SQUARE, moment.ground, (z as f64 + 0.5) * SQUARE);
+        let middle = |[x, z]: [i64; 2]| {
+            DVec3::new((x as f64 + 0.5) * SQUARE_SIZE, exposure.ground, (z as f64 + 0.5) * SQUARE_SIZE)
+        };
         let shows = |square: &&[i64; 2]| {
             (middle(**square) - eye).length() < reach
-                && moment.sight.may_see(middle(**square), DVec3::new(0.5 * SQUARE, 0.0, 0.5 * SQUARE), 0.3)
+                && exposure.cameras.may_be_visible(
+                    middle(**square),
+                    DVec3::new(0.5 * SQUARE_SIZE, 0.0, 0.5 * SQUARE_SIZE),
+                    0.3,
+                )
         };
         let squares: Vec<&[i64; 2]> = squares.iter().filter(shows).collect();
-        let part = |squares: &[&[i64; 2]]| {
-            let mut gathering = Gathering::new(moment.sight.size());
-            squares.iter().for_each(|square| self.square(**square, middle(**square), &mut gathering));
-            gathering.part()
+        let phase = |squares: &[&[i64; 2]]| {
+            let mut builder = StreakChunkBuilder::new(exposure.cameras.size());
+            squares.iter().for_each(|square| self.square(**square, middle(**square), &mut builder));
+            builder.build()
         };
-        squares.par_chunks(SQUARES_OF_PART).map(part).collect()
+        squares.par_chunks(SQUARES_PER_CHUNK).map(phase).collect()
     }
 
-    /// Turns until now, as a number and a part; in a loop a whole number of turns fits.
-    fn turn(&self) -> (i64, f64, f64) {
-        let length = self.loop_s.map_or(TURN, |seconds| seconds / (seconds / TURN).floor().max(1.0));
+    /// Index of the current period, the elapsed fraction of it, and its length, s. A loop holds a whole number of
+    /// periods.
+    fn period(&self) -> (i64, f64, f64) {
+        let length = self.loop_s.map_or(SPLASH_PERIOD, |seconds| seconds / (seconds / SPLASH_PERIOD).floor().max(1.0));
         let turns = self.time / length;
         (turns.floor() as i64, turns - turns.floor(), length)
     }
 
-    /// Adds the droplets over one square of ground.
-    fn square(&self, [x, z]: [i64; 2], middle: DVec3, gathering: &mut Gathering) {
-        let (turn, part, length) = self.turn();
-        let key = self.shower.moment.key;
+    /// Adds the droplets above one ground square.
+    fn square(&self, [x, z]: [i64; 2], middle: DVec3, builder: &mut StreakChunkBuilder) {
+        let (period, phase, length) = self.period();
+        let key = self.projection.exposure.key;
         let id = (x as u64 & 0xffff_ffff) << 32 | z as u64 & 0xffff_ffff;
-        let away = (middle - self.shower.moment.sight.middle().position).length();
-        let thinned = (away / ALL_WITHIN).max(1.0);
-        let share = self.parameters.amount / (thinned * thinned);
-        let fading = 1.0 - math::smoothstep(0.7, 1.0, away / self.parameters.distance);
+        let distance = (middle - self.projection.exposure.cameras.middle().position).length();
+        let thinning = (distance / FULL_DENSITY_DISTANCE).max(1.0);
+        let probability = self.parameters.amount / (thinning * thinning);
+        let fade = 1.0 - math::smoothstep(0.7, 1.0, distance / self.parameters.distance);
         for back in 0..2 {
-            let step =
-                self.loop_s.map_or(turn - back, |seconds| (turn - back).rem_euclid((seconds / length).round() as i64));
+            let step = self
+                .loop_s
+                .map_or(period - back, |seconds| (period - back).rem_euclid((seconds / length).round() as i64));
             let step = step as u32;
-            for class in self.shower.moment.classes.iter().filter(|class| class.diameter_mm >= LEAST_MM) {
+            for class in self.projection.exposure.classes.iter().filter(|class| class.diameter_mm >= MIN_DIAMETER_MM) {
                 let words = key.words(id, step, class.purpose(COUNT));
-                let mean = class.most * class.speed * SQUARE * SQUARE * length;
+                let mean = class.max_density * class.speed * SQUARE_SIZE * SQUARE_SIZE * length;
                 for number in 0..random::poisson(mean, [words[0], words[1]]) {
                     let uniforms =
                         key.uniforms(id, step, Purpose(class.purpose(IMPACT).0 ^ (number as u32) << 8)).map(f64::from);
-                    if uniforms[3] >= class.share * share {
+                    if uniforms[3] >= class.fraction * probability {
                         continue;
                     }
-                    let age = (part - uniforms[2] + back as f64) * length;
-                    let place = middle + DVec3::new(uniforms[0] - 0.5, 0.0, uniforms[1] - 0.5) * SQUARE;
-                    let strength = fading * thinned * self.shower.moment.gain;
+                    let age = (phase - uniforms[2] + back as f64) * length;
+                    let position = middle + DVec3::new(uniforms[0] - 0.5, 0.0, uniforms[1] - 0.5) * SQUARE_SIZE;
+                    let strength = fade * thinning * self.projection.exposure.gain;
                     let step = step.wrapping_mul(1 << 16).wrapping_add((class.index as u32) << 12 | number as u32);
                     self.add(
                         class,
-                        &Impact { place, age, diameter_mm: class.diameter_mm, id, step, strength },
-                        gathering,
+                        &Impact { position, age, diameter_mm: class.diameter_mm, id, step, strength },
+                        builder,
                     );
                 }
             }
         }
     }
 
-    fn add(&self, class: &ClassNow, impact: &Impact, gathering: &mut Gathering) {
-        let Shower { moment, level, .. } = self.shower;
+    fn add(&self, class: &DropClassState, impact: &Impact, builder: &mut StreakChunkBuilder) {
+        let StreakProjection { exposure, level, .. } = self.projection;
         let fall = DVec3::Y * -class.speed;
-        if !(0.0..TURN).contains(&impact.age) || moment.sheltered(impact.place, fall) {
+        if !(0.0..SPLASH_PERIOD).contains(&impact.age) || exposure.is_sheltered(impact.position, fall) {
             return;
         }
-        let mut flights = Flights { from: [NOTHING; 3], to: [NOTHING; 3], diameter_mm: NOTHING, gain: NOTHING };
-        for droplet in 0..RING + HIGH {
-            let words = moment.key.words(impact.id, impact.step, Purpose(DROPLET.0 ^ (droplet as u32) << 24));
-            self.droplet(impact, droplet, words.map(|word| f64::from(uniform(word))), &mut flights);
+        let mut paths =
+            DropPaths { from: [ZERO_LANES; 3], to: [ZERO_LANES; 3], diameter_mm: ZERO_LANES, gain: ZERO_LANES };
+        for droplet in 0..RING_DROPLETS + HIGH_DROPLETS {
+            let words = exposure.key.words(impact.id, impact.step, Purpose(DROPLET.0 ^ (droplet as u32) << 24));
+            self.droplet(impact, droplet, words.map(|word| f64::from(uniform(word))), &mut paths);
         }
-        // Light is even over so small a place.
-        let place = (impact.place + DVec3::Y * 0.01 - moment.sight.middle().position).as_vec3().to_array();
-        let places = place.map(|coordinate| [coordinate; LANES]);
+        // One position for all droplets of a splash: the light hardly varies within it.
+        let position = (impact.position + DVec3::Y * 0.01 - exposure.cameras.middle().position).as_vec3().to_array();
+        let positions = position.map(|coordinate| [coordinate; LANES]);
         dispatch!(level, _simd => {
-            let streaks = flights.streaks(&moment.sight);
-            self.shower.add(&streaks, &places, &flights.diameter_mm, 0.0, gathering);
+            let streaks = paths.streaks(&exposure.cameras);
+            self.projection.add_streaks(&streaks, &positions, &paths.diameter_mm, 0.0, builder);
         });
     }
 
-    /// Notes one droplet's way, if it has not fallen back.
-    fn droplet(&self, impact: &Impact, index: usize, random: [f64; 4], flights: &mut Flights) {
-        let sight = &self.shower.moment.sight;
-        let high = index >= RING;
-        let turns = if high { random[0] } else { (index as f64 + 0.6 * random[0]) / RING as f64 };
+    /// Sets the path of one droplet, if it is in the air during the exposure: a ballistic trajectory.
+    fn droplet(&self, impact: &Impact, index: usize, random: [f64; 4], paths: &mut DropPaths) {
+        let cameras = &self.projection.exposure.cameras;
+        let high = index >= RING_DROPLETS;
+        let turns = if high { random[0] } else { (index as f64 + 0.6 * random[0]) / RING_DROPLETS as f64 };
         let elevation = if high { 1.2 + 0.3 * random[1] } else { 0.85 + 0.3 * random[1] };
         let speed = (if high { 1.1 } else { 0.75 }) * (0.7 + 0.6 * random[2]) * math::sqrt(0.5 * impact.diameter_mm);
-        let speed = (speed * self.parameters.speed).min(0.5 * STANDARD_GRAVITY * TURN);
+        let speed = (speed * self.parameters.speed).min(0.5 * STANDARD_GRAVITY * SPLASH_PERIOD);
         let ((sin_turn, cos_turn), (sin_up, cos_up)) = (math::sin_cos(TAU * turns), math::sin_cos(elevation));
         let velocity = DVec3::new(cos_turn * cos_up, sin_up, sin_turn * cos_up) * speed;
-        let half = 0.5 * sight.exposure;
+        let half = 0.5 * cameras.exposure_time;
         let landing = 2.0 * velocity.y / STANDARD_GRAVITY;
         let (from, to) = ((impact.age - half).max(0.0), (impact.age + half).min(landing));
         if from >= to {
             return;
         }
-        let place = impact.place - sight.middle().position;
-        let at = |age: f64| place + velocity * age - DVec3::Y * (0.5 * STANDARD_GRAVITY * age * age);
-        let share = if half > 0.0 { (to - from) / (2.0 * half) } else { 1.0 };
-        for (vectors, point) in [(&mut flights.from, at(from)), (&mut flights.to, at(to))] {
+        let position = impact.position - cameras.middle().position;
+        let at = |age: f64| position + velocity * age - DVec3::Y * (0.5 * STANDARD_GRAVITY * age * age);
+        let probability = if half > 0.0 { (to - from) / (2.0 * half) } else { 1.0 };
+        for (vectors, point) in [(&mut paths.from, at(from)), (&mut paths.to, at(to))] {
             (0..3).for_each(|axis| vectors[axis][index] = point[axis] as f32);
         }
-        flights.diameter_mm[index] = (impact.diameter_mm * (0.16 + 0.14 * random[3])) as f32;
-        flights.gain[index] = (impact.strength * share) as f32;
+        paths.diameter_mm[index] = (impact.diameter_mm * (0.16 + 0.14 * random[3])) as f32;
+        paths.gain[index] = (impact.strength * probability) as f32;
     }
 }

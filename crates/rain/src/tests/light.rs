@@ -13,8 +13,8 @@ use super::{METHODS, Method, draw, draw_part, lamp, rain, streaks, view_at, wind
 use crate::{
     RainParameters,
     lighting::{
-        drop_lighting::{Lighting, Scattering},
-        drop_phase_function::DropLens,
+        drop_lighting::{DropLighting, ScatteringTable},
+        drop_phase_function::DropPhaseFunction,
     },
 };
 
@@ -31,10 +31,10 @@ fn lit_by(parameters: RainParameters, lights: Vec<Light>, white: Option<f64>) ->
 
 #[test]
 fn along_a_beam_light_falls_with_the_square_of_the_distance() {
-    let scattering = Scattering::new(&DropLens::new());
+    let scattering = ScatteringTable::new(&DropPhaseFunction::new());
     let spot = Emitter::Spot { position: DVec3::ZERO, axis: DVec3::X, cos_inner: 0.95, cos_outer: 0.9 };
     let lights = [Light { emitter: spot, intensity: [1000.0; 3] }];
-    let lighting = Lighting { scattering: &scattering, lights: &lights, extinction: 0.0 };
+    let lighting = DropLighting { scattering: &scattering, lights: &lights, extinction: 0.0 };
     // Seen from the side, so that every drop turns the light by the same angle.
     let samples: Vec<[f64; 2]> = (1..40)
         .map(|i| {
@@ -112,7 +112,7 @@ fn the_veil_is_single_scattering_along_each_line_of_sight() {
     let view = view_at(1.0, 1.0 / 60.0, SIZE);
     let rain = rain(parameters, 1);
     let [beta, _] = rain.extinctions(1.0);
-    let lighting = Lighting { scattering: &rain.optics.scattering, lights: &[light], extinction: beta };
+    let lighting = DropLighting { scattering: &rain.optics.scattering, lights: &[light], extinction: beta };
     for (x, y) in [(80, 20), (40, 32), (100, 40), (128, 16), (92, 33)] {
         let line = view.camera.direction(math::DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap().normalize();
         let end = rain.near_reach();

@@ -41,7 +41,7 @@ impl Store {
     /// Keeps `text` as `name`; whether it could.
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn write(&self, name: &str, text: &str) -> bool {
-        self.file(name).is_none_or(|file| bansho::media::atomic::write_bytes(&file, text.as_bytes()).is_ok())
+        self.file(name).is_none_or(|file| bansho::media::output::atomic::write_bytes(&file, text.as_bytes()).is_ok())
     }
 
     /// The text `name`, if it is kept.

@@ -8,7 +8,7 @@ use std::{
 
 use bansho::{
     job::{JobError, SceneFile},
-    media::{MediaError, atomic},
+    media::{MediaError, output::atomic},
 };
 
 use super::Document;

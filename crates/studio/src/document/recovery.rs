@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bansho::media::{MediaError, atomic};
+use bansho::media::{MediaError, output::atomic};
 
 use super::Document;
 

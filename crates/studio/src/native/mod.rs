@@ -7,7 +7,7 @@ use std::{
     sync::{Arc, mpsc},
 };
 
-use bansho::{Assets, media::plates::FileAssets};
+use bansho::{Assets, media::assets::FileAssets};
 use bansho_studio::{
     app::{Session, Studio, window_size},
     beginnings::FLAME_SHEET,
@@ -16,12 +16,12 @@ use bansho_studio::{
     player::{StartError, ThreadPlayer},
     software::window::Build,
 };
-use eframe::egui;
 
 use self::{
     arguments::{Asked, Work},
     painting::Painting,
 };
+use eframe::egui;
 
 mod arguments;
 mod painting;

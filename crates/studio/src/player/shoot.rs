@@ -12,7 +12,7 @@ use std::{
 use bansho::{
     Observer,
     job::{FrameDone, Job, JobError, JobObserver, Outline, SceneFile},
-    media::plates::InputLimits,
+    media::assets::InputLimits,
 };
 
 /// A job under way.

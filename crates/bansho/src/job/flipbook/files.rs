@@ -8,11 +8,14 @@ use bansho_base::{
     image::{DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Rect},
 };
 use bansho_media::{
-    atomic, exr,
-    flipbook::{Sheet, tile, tile_display},
-    mark,
-    naming::OutputKind,
-    overwriting::OverwritePolicy,
+    exr,
+    output::{
+        atomic,
+        naming::OutputKind,
+        overwrite_policy::OverwritePolicy,
+        provenance,
+        sprite_sheet::{SheetLayout, tile, tile_display},
+    },
     png::{self, PngEffort},
 };
 use bansho_render::{
@@ -25,6 +28,7 @@ use super::{
     motion::{self, Colour, Tile},
 };
 use crate::job::{error::JobError, finished::Finished};
+
 use serde_json::{Value, json};
 
 /// Where a flipbook goes and what its sheets are.
@@ -79,7 +83,7 @@ impl Files {
     pub(super) fn write(
         &self,
         plan: &Plan,
-        sheet: &Sheet,
+        sheet: &SheetLayout,
         numbers: &[i64],
         tiles: &[Tile],
         observer: &dyn Observer,
@@ -108,7 +112,7 @@ impl Files {
         Ok(())
     }
 
-    fn write_linear(&self, sheet: &Sheet, tiles: &[Tile], finished: &Finished) -> Result<(), JobError> {
+    fn write_linear(&self, sheet: &SheetLayout, tiles: &[Tile], finished: &Finished) -> Result<(), JobError> {
         let header = FrameHeader { display_size: sheet.size(), data_origin: [0, 0], ..tiles[0].header.clone() };
         let colours: Vec<Image<4>> = tiles.iter().filter_map(|tile| tile.linear().cloned()).collect();
         let motion: Vec<Image<2>> = tiles.iter().map(|tile| tile.motion.clone()).collect();
@@ -136,7 +140,13 @@ impl Files {
         Ok(())
     }
 
-    fn write_shown(&self, sheet: &Sheet, tiles: &[Tile], scale: f32, finished: &Finished) -> Result<(), JobError> {
+    fn write_shown(
+        &self,
+        sheet: &SheetLayout,
+        tiles: &[Tile],
+        scale: f32,
+        finished: &Finished,
+    ) -> Result<(), JobError> {
         let shown: Vec<DisplayImage> = tiles.iter().filter_map(|tile| tile.shown().cloned()).collect();
         let colour = tile_display(&shown, sheet.columns, 0, [0; 4])?;
         let alpha = DisplayImage { opaque: true, pixels: alpha(&colour.pixels), ..colour };
@@ -158,10 +168,10 @@ impl Files {
         Ok(())
     }
 
-    fn description(&self, plan: &Plan, sheet: &Sheet, numbers: &[i64], scale: f32) -> Value {
+    fn description(&self, plan: &Plan, sheet: &SheetLayout, numbers: &[i64], scale: f32) -> Value {
         let fps = plan.fps();
         let frame = |(index, &number): (usize, &i64)| {
-            let place = sheet.place(index);
+            let place = sheet.cell_rect(index);
             let time_s = index as f64 * fps.frame_s();
             json!({ "number": number, "time_s": time_s, "x": place.x, "y": place.y, "width": place.width, "height": place.height })
         };
@@ -185,7 +195,7 @@ impl Files {
         let ([width, height], part) = (plan.size(), plan.window());
         let mut description = json!({
             "format": 1,
-            "program": mark::PROGRAM,
+            "program": provenance::PROGRAM,
             "size": sheet.size(),
             "grid": [sheet.columns, sheet.rows()],
             "tile": sheet.cell,

@@ -11,14 +11,13 @@ use bansho_base::{
     color::{AlphaConvention, View},
     image::Rect,
 };
-use bansho_media::{
-    flipbook::Sheet,
+use bansho_media::output::{
     naming::{OutputKind, OutputPattern},
-    overwriting::OverwritePolicy,
+    overwrite_policy::OverwritePolicy,
+    sprite_sheet::SheetLayout,
 };
 use bansho_render::{CompiledScene, Plan, PlanOptions, Scene, SceneOptions, Shot, display::BitDepth, scene::FrameRate};
 
-pub use self::crop::FlipbookCrop;
 use self::{files::Files, motion::Tile};
 use super::{
     error::{Conflict, JobError, SheetKind},
@@ -31,6 +30,8 @@ use super::{
     shoot::shoot,
     snapshots::Snapshots,
 };
+
+pub use self::crop::FlipbookCrop;
 
 /// A flipbook that is wanted. Begin with [`Flipbook::new`].
 ///
@@ -103,7 +104,7 @@ impl Flipbook {
     pub fn prepare(&self) -> Result<PreparedFlipbook, JobError> {
         let mut scene = self.scene.parse()?;
         let [columns, rows] = self.grid;
-        let sheet = Sheet { count: columns.saturating_mul(rows), columns, cell: self.cell(&scene), gutter: 0 };
+        let sheet = SheetLayout { count: columns.saturating_mul(rows), columns, cell: self.cell(&scene), gutter: 0 };
         let sheet = sheet::checked(sheet, SheetKind::Flipbook)?;
         if let Some(seconds) = self.loop_s {
             scene.picture.fps = turn_rate(sheet.count, seconds)?;
@@ -161,7 +162,7 @@ pub struct PreparedFlipbook {
     scene: SceneFile,
     compiled: Arc<CompiledScene>,
     plan: Arc<Plan>,
-    sheet: Sheet,
+    sheet: SheetLayout,
     own_size: bool,
     crop: FlipbookCrop,
     numbers: Vec<i64>,
@@ -196,7 +197,7 @@ impl PreparedFlipbook {
 
 impl PreparedFlipbook {
     /// The plan and the sheet of what tiles show: first it must be known what is lit.
-    fn cropped(&self, observer: &dyn JobObserver) -> Result<(Arc<Plan>, Sheet), JobError> {
+    fn cropped(&self, observer: &dyn JobObserver) -> Result<(Arc<Plan>, SheetLayout), JobError> {
         let all = || Ok((self.plan.clone(), self.sheet));
         if self.crop == FlipbookCrop::None {
             return all();
@@ -213,7 +214,7 @@ impl PreparedFlipbook {
         };
         let Some((size, part)) = region.and_then(fitting) else { return all() };
         let plan = Arc::new(self.plan.cropped(size, part)?);
-        let sheet = sheet::checked(Sheet { cell: [part.width, part.height], ..self.sheet }, SheetKind::Flipbook)?;
+        let sheet = sheet::checked(SheetLayout { cell: [part.width, part.height], ..self.sheet }, SheetKind::Flipbook)?;
         let frames = self.numbers.len();
         let wanted = MemoryRequest { frames, tiles: frames, display: Some(self.files.bits), own_size: true };
         memory::check(&self.scene, &self.compiled, &plan, wanted)?;

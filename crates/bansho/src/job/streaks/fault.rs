@@ -4,7 +4,7 @@ use bansho_base::host::plural::counted;
 
 use super::Streaks;
 use bansho_rain::drops::{
-    size_distribution::{DropSizes, SizeBin},
+    size_distribution::{DropSizeDistribution, SizeBin},
     terminal_velocity::NoTerminalVelocity,
 };
 
@@ -145,7 +145,7 @@ fn check_list(list: ListKind, values: &[f64]) -> Result<(), StreaksFault> {
 fn check_counts(streaks: &Streaks) -> Result<(), StreaksFault> {
     let bins = SizeBin::around(&streaks.diameters);
     for &rate in &streaks.rates {
-        let sizes = DropSizes::marshall_palmer(rate);
+        let sizes = DropSizeDistribution::marshall_palmer(rate);
         for bin in &bins {
             let drops = streaks.cube.mean_count(&sizes, bin);
             if drops > f64::from(MOST_DROPS) {

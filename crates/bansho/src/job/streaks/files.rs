@@ -11,15 +11,15 @@ use bansho_base::{
     math::DVec3,
 };
 use bansho_media::{
-    atomic, exr,
-    overwriting::OverwritePolicy,
+    exr,
+    output::{atomic, overwrite_policy::OverwritePolicy},
     png::{self, MeasuredImage, PngEffort},
 };
+use bansho_rain::lighting::drop_phase_function::DropPhaseFunction;
 use bansho_render::display::BitDepth;
 
 use super::{StreakFormat, Streaks, Texture};
 use crate::job::error::JobError;
-use bansho_rain::lighting::drop_phase_function::DropLens;
 
 /// Version of the program, on which files depend.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -34,7 +34,7 @@ pub(super) struct Lit {
 }
 
 impl Lit {
-    pub(super) fn new(toward: [f64; 3], lens: &DropLens) -> Self {
+    pub(super) fn new(toward: [f64; 3], lens: &DropPhaseFunction) -> Self {
         let toward = DVec3::from(toward).normalize();
         // The light travels against `toward`, and goes on to the viewer along z.
         let phase = lens.phase(-toward.z as f32);

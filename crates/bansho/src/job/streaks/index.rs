@@ -3,18 +3,19 @@
 use std::f64::consts::PI;
 
 use bansho_base::image::Image;
-use bansho_media::mark;
+use bansho_media::output::provenance;
+use bansho_rain::{
+    billboards::texture::{FallingDrop, StreakCube},
+    drops::size_distribution::{DropSizeDistribution, SizeBin},
+    lighting::extinction::{ExtinctionEfficiency, extinction, visibility},
+};
 use bansho_render::display::BitDepth;
 
 use super::{
     StreakFormat, Streaks, Texture,
     files::{Writer, Written},
 };
-use bansho_rain::{
-    billboards::texture::{FallingDrop, StreakCube},
-    drops::size_distribution::{DropSizes, SizeBin},
-    lighting::extinction::{Losses, extinction, visibility},
-};
+
 use serde_json::{Value, json};
 
 /// One texture as the index tells it.
@@ -73,20 +74,20 @@ pub(super) fn describe(
     streaks: &Streaks,
     cube: &StreakCube,
     writer: &Writer,
-    rains: &[DropSizes],
+    rains: &[DropSizeDistribution],
     entries: &[Entry],
 ) -> Value {
     let bins = SizeBin::around(&streaks.diameters);
-    let rain = |(&rate, sizes): (&f64, &DropSizes)| describe_rain(rate, sizes, &bins, cube);
+    let rain = |(&rate, sizes): (&f64, &DropSizeDistribution)| describe_rain(rate, sizes, &bins, cube);
     let mut index = json!({
         "format": 1,
-        "program": mark::PROGRAM,
+        "program": provenance::PROGRAM,
         "size_pixels": cube.size,
         "box_m": cube.edge,
         "pixel_m": cube.pixel(),
         "exposure_s": cube.exposure,
         "velocity": streaks.law.name(),
-        "air": { "density_kg_per_m3": cube.fall.air.density, "viscosity_pa_s": cube.fall.air.viscosity },
+        "air": { "density_kg_per_m3": cube.terminal_velocity.air.density, "viscosity_pa_s": cube.terminal_velocity.air.viscosity },
         "diameters": if cube.spread { "each drop's own, within its bin" } else { "the bin's" },
         "seed": streaks.seed,
         "how_to_read": how_to_read(streaks, writer),
@@ -142,17 +143,17 @@ fn how_to_read(streaks: &Streaks, writer: &Writer) -> Value {
     about
 }
 
-fn describe_rain(rate: f64, sizes: &DropSizes, bins: &[SizeBin], cube: &StreakCube) -> Value {
-    let whole = extinction(sizes, Losses::Geometric, DropSizes::ALL);
-    let within = |range| extinction(sizes, Losses::Geometric, range);
+fn describe_rain(rate: f64, sizes: &DropSizeDistribution, bins: &[SizeBin], cube: &StreakCube) -> Value {
+    let whole = extinction(sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL);
+    let within = |range| extinction(sizes, ExtinctionEfficiency::Geometric, range);
     let in_bins: f64 = bins.iter().map(|bin| within(bin.range_mm)).sum();
     let mut about = json!({
         "rate_mm_per_h": rate,
-        "drops_per_m3": sizes.count(DropSizes::ALL),
+        "drops_per_m3": sizes.count(DropSizeDistribution::ALL),
         "drops_per_m3_in_bins": bins.iter().map(|bin| bin.count(sizes)).sum::<f64>(),
         "liquid_water_g_per_m3": sizes.liquid_water(),
         "median_volume_diameter_mm": sizes.median_volume_diameter(),
-        "rate_from_drops_mm_per_h": sizes.rain_rate(&cube.fall, DropSizes::ALL),
+        "rate_from_drops_mm_per_h": sizes.rain_rate(&cube.terminal_velocity, DropSizeDistribution::ALL),
         "extinction_per_m": whole,
         "extinction_per_m_in_bins": in_bins,
     });
@@ -162,7 +163,7 @@ fn describe_rain(rate: f64, sizes: &DropSizes, bins: &[SizeBin], cube: &StreakCu
 }
 
 fn describe_bin(bin: &SizeBin, cube: &StreakCube) -> Value {
-    let speed = cube.fall.speed(bin.diameter_mm);
+    let speed = cube.terminal_velocity.speed(bin.diameter_mm);
     let streak = cube.streak(&FallingDrop { diameter_mm: bin.diameter_mm, speed, position: [0.0; 3] });
     json!({
         "diameter_mm": bin.diameter_mm,

@@ -13,7 +13,15 @@ use std::{
 use bansho_base::host::observer::check;
 use bansho_media::{
     MediaError,
-    overwriting::{InputFiles, OverwritePolicy},
+    output::overwrite_policy::{InputFiles, OverwritePolicy},
+};
+use bansho_rain::{
+    billboards::texture::StreakCube,
+    drops::{
+        size_distribution::{DropSizeDistribution, SizeBin},
+        terminal_velocity::{Air, TerminalVelocity, VelocityLaw, fixed_point_velocity},
+    },
+    lighting::drop_phase_function::DropPhaseFunction,
 };
 use bansho_render::display::BitDepth;
 
@@ -27,14 +35,7 @@ use super::{
     observer::{FrameDone, JobObserver, Outline},
     output, overwriting,
 };
-use bansho_rain::{
-    billboards::texture::StreakCube,
-    drops::{
-        size_distribution::{DropSizes, SizeBin},
-        terminal_velocity::{Air, Fall, VelocityLaw, fixed_point},
-    },
-    lighting::drop_phase_function::DropLens,
-};
+
 use rayon::prelude::*;
 
 pub use fault::{ListKind, StreaksFault};
@@ -97,7 +98,7 @@ impl Default for Streaks {
 /// One texture of many.
 struct Texture<'a> {
     rate: f64,
-    sizes: &'a DropSizes,
+    sizes: &'a DropSizeDistribution,
     bin: SizeBin,
     variant: u32,
 }
@@ -115,11 +116,11 @@ impl Streaks {
             let bins = SizeBin::around(&self.diameters);
             let ends = bins.iter().filter(|_| self.cube.spread).flat_map(|bin| bin.range_mm);
             for diameter_mm in self.diameters.iter().copied().chain(ends) {
-                fixed_point(diameter_mm, &air).map_err(StreaksFault::Velocity)?;
+                fixed_point_velocity(diameter_mm, &air).map_err(StreaksFault::Velocity)?;
             }
         }
-        let cube = StreakCube { fall: Fall { law: self.law, air }, ..self.cube };
-        let light = self.light.map(|toward| Lit::new(toward, &DropLens::new()));
+        let cube = StreakCube { terminal_velocity: TerminalVelocity { law: self.law, air }, ..self.cube };
+        let light = self.light.map(|toward| Lit::new(toward, &DropPhaseFunction::new()));
         let folder = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join("streaks"));
         let overwrite = OverwritePolicy::new(InputFiles::default(), self.overwrite);
         let writer = Writer { folder, format: self.format, bits: self.bits, light, overwrite, streaks: self.clone() };
@@ -148,14 +149,14 @@ impl PreparedStreaks {
 
     /// Every file that will be written.
     fn files(&self) -> Vec<PathBuf> {
-        let rains: Vec<DropSizes> = self.rains();
+        let rains: Vec<DropSizeDistribution> = self.rains();
         let textures = self.textures(&rains);
         let pictures = textures.iter().flat_map(|texture| self.writer.files(&self.writer.name(texture)));
         pictures.chain([self.writer.index_path()]).collect()
     }
 
-    fn rains(&self) -> Vec<DropSizes> {
-        self.streaks.rates.iter().map(|&rate| DropSizes::marshall_palmer(rate)).collect()
+    fn rains(&self) -> Vec<DropSizeDistribution> {
+        self.streaks.rates.iter().map(|&rate| DropSizeDistribution::marshall_palmer(rate)).collect()
     }
 
     /// Draws and writes all textures in the caller's rayon pool, the index last. Gives the path of the index.
@@ -206,7 +207,7 @@ impl PreparedStreaks {
         }
     }
 
-    fn textures<'a>(&self, rains: &'a [DropSizes]) -> Vec<Texture<'a>> {
+    fn textures<'a>(&self, rains: &'a [DropSizeDistribution]) -> Vec<Texture<'a>> {
         let bins = SizeBin::around(&self.streaks.diameters);
         let mut textures = Vec::with_capacity(self.texture_count());
         for (&rate, sizes) in self.streaks.rates.iter().zip(rains) {

@@ -1,19 +1,25 @@
-//! One streak into a texture, exactly antialiased: each pixel gets the share of it that the drop hides.
+//! Draws one streak into a texture with exact area coverage.
 
 use bansho_base::image::Image;
 
 use crate::streaks::coverage::Streak;
 
-/// Lines within a row of pixels at a streak's ends, where its width changes along it.
-const LINES: usize = 4;
+/// Quadrature lines within a row of pixels at a streak's ends, where its width varies.
+const SAMPLE_LINES: usize = 4;
 
-/// Draws a streak over what is there, around the edges. The drop's middle is at `start` when the shutter opens, m from the left and
-/// upper edge, and falls; a pixel is `pixel` wide and high, m. Of the drop there is the `share`, 0 to 1.
-pub(crate) fn draw_streak(streak: &Streak, [axis, start]: [f64; 2], pixel: [f64; 2], share: f64, image: &mut Image<1>) {
+/// Draws a streak over an image, with wrap-around. The drop's center is at `start` when the shutter opens, m from the
+/// left and upper edges, and falls. A pixel is `pixel` wide and high, m. `weight` (0 to 1) scales the opacity.
+pub(crate) fn draw_streak(
+    streak: &Streak,
+    [axis, start]: [f64; 2],
+    pixel: [f64; 2],
+    weight: f64,
+    image: &mut Image<1>,
+) {
     let [width, height] = pixel;
     let first_column = ((axis - streak.radius) / width).floor();
     let columns = ((axis + streak.radius) / width).floor() - first_column + 1.0;
-    let across = Across { streak, left: first_column * width - axis, pixel, columns: columns as usize };
+    let across = PixelColumns { streak, left: first_column * width - axis, pixel, columns: columns as usize };
     let mut opacities = vec![0.0; across.columns];
     let within = across.line(0.5 * streak.length);
     let first_row = ((start - streak.radius) / height).floor() as i64;
@@ -23,31 +29,31 @@ pub(crate) fn draw_streak(streak: &Streak, [axis, start]: [f64; 2], pixel: [f64;
         let whole = streak.is_within(from) && streak.is_within(from + height);
         let opacities = if whole { &within } else { across.end_row(from, &mut opacities) };
         let y = row.rem_euclid(image.height() as i64) as usize;
-        blend(image.row_mut(y), first_column as i64, share, opacities);
+        blend(image.row_mut(y), first_column as i64, weight, opacities);
     }
 }
 
-/// Lays a share of opacities over a row, around its end.
-fn blend(row: &mut [[f32; 1]], first_column: i64, share: f64, opacities: &[f64]) {
+/// Composites opacities over a row, with wrap-around.
+fn blend(row: &mut [[f32; 1]], first_column: i64, weight: f64, opacities: &[f64]) {
     let width = row.len();
     let mut x = first_column.rem_euclid(width as i64) as usize;
     for &opacity in opacities {
         let [under] = &mut row[x];
-        *under += (share * opacity) as f32 * (1.0 - *under);
+        *under += (weight * opacity) as f32 * (1.0 - *under);
         x = if x + 1 == width { 0 } else { x + 1 };
     }
 }
 
-/// The pixels that a streak covers in every row.
-struct Across<'a> {
+/// The columns of pixels that a streak covers.
+struct PixelColumns<'a> {
     streak: &'a Streak,
-    /// Left edge of the first pixel, from the axis, m.
+    /// Left edge of the first pixel relative to the axis, m.
     left: f64,
     pixel: [f64; 2],
     columns: usize,
 }
 
-impl Across<'_> {
+impl PixelColumns<'_> {
     /// Mean opacity of each pixel on the line at `s`.
     fn line(&self, s: f64) -> Vec<f64> {
         let mut opacities = vec![0.0; self.columns];
@@ -58,24 +64,25 @@ impl Across<'_> {
     fn add_line(&self, s: f64, weight: f64, opacities: &mut [f64]) {
         let mut before = 0.0;
         for (index, opacity) in opacities.iter_mut().enumerate() {
-            let until = self.streak.opacity_until(self.left + (index + 1) as f64 * self.pixel[0], s);
+            let until = self.streak.opacity_integral_to(self.left + (index + 1) as f64 * self.pixel[0], s);
             *opacity += weight * (until - before) / self.pixel[0];
             before = until;
         }
     }
 
-    /// Mean opacity of each pixel of a row that begins at `from` and holds an end of the streak: the form by some lines,
-    /// the sum exactly.
+    /// Mean opacity of each pixel of a row that begins at `from` and contains an end of the streak. The distribution
+    /// comes from quadrature, the sum is exact.
     fn end_row<'b>(&self, from: f64, opacities: &'b mut [f64]) -> &'b [f64] {
         let (streak, [width, height]) = (self.streak, self.pixel);
         let (top, bottom) = (from.max(-streak.radius), (from + height).min(streak.length + streak.radius));
         opacities.fill(0.0);
-        let step = (bottom - top) / LINES as f64;
-        (0..LINES).for_each(|line| self.add_line(top + step * (line as f64 + 0.5), 1.0, opacities));
-        let area = streak.blocked_area() * (streak.share_along(from + height) - streak.share_along(from));
+        let step = (bottom - top) / SAMPLE_LINES as f64;
+        (0..SAMPLE_LINES).for_each(|line| self.add_line(top + step * (line as f64 + 0.5), 1.0, opacities));
+        let area =
+            streak.blocked_area() * (streak.area_fraction_along(from + height) - streak.area_fraction_along(from));
         let found: f64 = opacities.iter().sum();
         let scale = if found > 0.0 { area / (found * width * height) } else { 0.0 };
-        // Rounding near a resolved drop's rim may exceed what a pixel can hide.
+        // Near the rim of a resolved drop, rounding may exceed the range of an opacity.
         opacities.iter_mut().for_each(|opacity| *opacity = (*opacity * scale).clamp(0.0, 1.0));
         opacities
     }

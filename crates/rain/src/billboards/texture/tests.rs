@@ -1,12 +1,12 @@
 use std::f64::consts::PI;
 
 use super::*;
-use crate::reference::near;
+use crate::tests::reference::near;
 
 const PAPER_MM: [f64; 6] = [1.0, 1.2, 1.4, 1.6, 1.8, 2.0];
 
 fn drop(diameter_mm: f64, position: [f64; 3]) -> FallingDrop {
-    FallingDrop { diameter_mm, speed: Fall::default().speed(diameter_mm), position }
+    FallingDrop { diameter_mm, speed: TerminalVelocity::default().speed(diameter_mm), position }
 }
 
 fn sum(image: &Image<1>) -> f64 {
@@ -28,7 +28,7 @@ fn a_drop_hides_its_disc_at_any_resolution_and_shutter() {
                 let area = 0.25e-6 * PI * diameter * diameter;
                 let found = hidden(&cube, &[drop(diameter, place)]);
                 // A streak longer than the cube overlaps itself, and so hides less.
-                let overlaps = cube.fall.speed(diameter) * exposure + 1e-3 * diameter > edge;
+                let overlaps = cube.terminal_velocity.speed(diameter) * exposure + 1e-3 * diameter > edge;
                 let share = found / area;
                 assert!(
                     if overlaps { share < 1.0 } else { near(share, 1.0, 5e-4) },
@@ -44,7 +44,7 @@ fn the_papers_textures_hide_the_discs_of_their_drops() {
     let cube = StreakCube::default();
     for rate in [1.0, 5.0, 10.0, 20.0] {
         for bin in SizeBin::around(&PAPER_MM) {
-            let drops = cube.drops(&DropSizes::marshall_palmer(rate), &bin, 1, 0);
+            let drops = cube.drops(&DropSizeDistribution::marshall_palmer(rate), &bin, 1, 0);
             let area = 0.25e-6 * PI * bin.diameter_mm * bin.diameter_mm * drops.len() as f64;
             assert!((hidden(&cube, &drops) - area).abs() <= 0.005 * area, "{rate} mm/h, {bin:?}");
         }
@@ -53,7 +53,7 @@ fn the_papers_textures_hide_the_discs_of_their_drops() {
 
 #[test]
 fn a_streak_within_one_column_is_worked_by_hand() {
-    // 1 mm in 1/30 s on pixels of 2 mm: (pi/4) D^2 / (v T) over each metre of its way, spread over 2 mm.
+    // 1 mm in 1/30 s on pixels of 2 mm: (pi/4) D^2 / (v T) over each meter of its way, spread over 2 mm.
     let cube = StreakCube { edge: 1.024, ..StreakCube::default() };
     let image = cube.draw(&[drop(1.0, [0.201, 0.8, 0.5])]);
     let expected = 0.25 * PI * 1e-6 / (4.03 / 30.0) / 2e-3;
@@ -130,7 +130,8 @@ fn a_stronger_rain_keeps_the_drops_of_a_weaker() {
     let cube = StreakCube::default();
     for variant in [0, 5] {
         for bin in SizeBin::around(&PAPER_MM) {
-            let [weak, strong] = [4.0, 20.0].map(|r| cube.drops(&DropSizes::marshall_palmer(r), &bin, 3, variant));
+            let [weak, strong] =
+                [4.0, 20.0].map(|r| cube.drops(&DropSizeDistribution::marshall_palmer(r), &bin, 3, variant));
             assert!(strong.len() >= weak.len() && strong[..weak.len()] == weak[..]);
         }
     }
@@ -138,7 +139,7 @@ fn a_stronger_rain_keeps_the_drops_of_a_weaker() {
 
 #[test]
 fn variants_keep_the_mean_count_and_differ() {
-    let (cube, sizes) = (StreakCube::default(), DropSizes::marshall_palmer(1.0));
+    let (cube, sizes) = (StreakCube::default(), DropSizeDistribution::marshall_palmer(1.0));
     let [bin] = SizeBin::around(&[2.0])[..] else { panic!("one bin") };
     let counts: Vec<usize> = (0..200).map(|variant| cube.drops(&sizes, &bin, 1, variant).len()).collect();
     let whole: usize = counts.iter().sum();
@@ -153,7 +154,7 @@ fn variants_keep_the_mean_count_and_differ() {
 fn spread_drops_fill_their_bin() {
     let cube = StreakCube { spread: true, edge: 3.0, ..StreakCube::default() };
     let [bin] = SizeBin::around(&[1.0])[..] else { panic!("one bin") };
-    let drops = cube.drops(&DropSizes::marshall_palmer(20.0), &bin, 1, 0);
+    let drops = cube.drops(&DropSizeDistribution::marshall_palmer(20.0), &bin, 1, 0);
     let diameters = drops.iter().map(|drop| drop.diameter_mm);
     let (least, most) = diameters.fold((f64::INFINITY, 0.0_f64), |(least, most), d| (least.min(d), most.max(d)));
     assert!((0.9..0.901).contains(&least) && (1.099..1.1).contains(&most), "{least} {most}");
@@ -167,7 +168,7 @@ fn any_shutter_gives_opacities() {
     for exposure in [1e-6, 1e-5, 0.5, 10.0] {
         let cube = StreakCube { exposure, size: 64, ..StreakCube::default() };
         let [bin] = SizeBin::around(&[2.0])[..] else { panic!("one bin") };
-        let image = cube.draw(&cube.drops(&DropSizes::marshall_palmer(300.0), &bin, 1, 0));
+        let image = cube.draw(&cube.drops(&DropSizeDistribution::marshall_palmer(300.0), &bin, 1, 0));
         assert!(image.pixels().iter().all(|[opacity]| (0.0..=1.0).contains(opacity)));
         assert!(sum(&image) > 0.0);
     }

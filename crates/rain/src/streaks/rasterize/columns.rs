@@ -1,83 +1,104 @@
-//! Laying a streak into a patch: eight rows of a column at a time.
+//! Rasterization of a streak into a tile, one column of eight rows at a time.
 
 use bansho_base::math::MulAdd;
 
 use super::{
-    Stroke, at_least, at_most,
-    tile::{Patch, Rows, STRETCH},
+    StreakSegment,
+    tile::{TileBuffer, TileRows},
 };
-use crate::streaks::bin::BAND;
+use crate::{
+    lanes::{fast_max, fast_min},
+    streaks::bin::{TILE_COLUMNS, TILE_ROWS},
+};
 
-/// Share of a disc's area that lies left of `t`, with the disc from -1 to 1: the integral of `2 sqrt(1 - t^2) / pi`, eq. of the streak's
-/// profile, as its series with the last term set so that it ends at 1; at most 0.002 off.
+/// Cumulative distribution of a disc's area: the fraction left of `t`, for a disc from -1 to 1. The integral of `2
+/// sqrt(1 - t^2) / pi`, which is the streak's profile. A series whose last term is chosen so that it ends at 1; the
+/// error is at most 0.002.
 #[inline(always)]
-fn disc_share(t: f32) -> f32 {
-    let t = at_most(1.0, at_least(-1.0, t));
+fn disc_cdf(t: f32) -> f32 {
+    let t = fast_min(1.0, fast_max(-1.0, t));
     let s = t * t;
     let odd = t * (-0.022_935_f32).fma(s, -0.025).fma(s, -1.0 / 6.0).fma(s, 1.0);
     odd.fma(std::f32::consts::FRAC_2_PI, 0.5)
 }
 
-/// 0, 1 and so on, of each row.
-const NUMBERS: Rows = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
-/// Those of the next rows.
-const NEXT: Rows = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
+/// Upper edges of the rows of a tile.
+const ROW_OFFSETS: TileRows = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+/// Lower edges of the rows of a tile.
+const NEXT_ROW_OFFSETS: TileRows = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
 
-/// The opacities of a streak in eight rows, column after column.
-trait Columns {
-    /// Those of the pixels right of `x`, pixels from the streak's middle.
-    fn next(&mut self, x: f32) -> Rows;
+/// The opacities of a streak in successive columns of eight rows.
+trait ColumnCoverage {
+    /// Opacities of the column whose left edge is at `x`, pixels from the streak's center.
+    fn next_column(&mut self, x: f32) -> TileRows;
 }
 
-impl Stroke {
-    /// Lays it behind what a patch holds; `measure` is told column and row in the patch and opacity of each pixel.
+impl StreakSegment {
+    /// Composites it under the contents of a tile; `measure` gets column and row within the tile and the opacity of
+    /// each pixel.
     #[inline(always)]
-    pub(crate) fn draw(&self, patch: &mut Patch, measure: &mut impl FnMut([usize; 2], f32)) {
-        // All places are counted from the streak's middle.
-        let [left, top] = [0, 1].map(|axis| patch.origin()[axis] as i32 as f32 - self.middle[axis]);
-        let touched = self.touched(left, top);
-        // Nothing of it lies left of its first column, unless the patch begins there.
-        let cut = if touched.start > 0 { None } else { Some(left) };
-        match (self.is_wide(), self.upright) {
-            (false, true) => self.lay(touched, left, Down::new(self, cut, top), patch, measure),
-            (false, false) => self.lay(touched, left, Level { stroke: self, top }, patch, measure),
-            (true, true) => self.lay(touched, left, Swept::<true> { stroke: self, top }, patch, measure),
-            (true, false) => self.lay(touched, left, Swept::<false> { stroke: self, top }, patch, measure),
+    pub(crate) fn draw(&self, buffer: &mut TileBuffer, measure: &mut impl FnMut([usize; 2], f32)) {
+        // All coordinates are relative to the streak's center.
+        let [left, top] = [0, 1].map(|axis| buffer.origin()[axis] as i32 as f32 - self.center[axis]);
+        let touched_columns = self.touched_columns(left, top);
+        // Nothing of it lies left of its first column, unless the tile begins there.
+        let clip_left = if touched_columns.start > 0 { None } else { Some(left) };
+        match (self.is_wide(), self.steep) {
+            (false, true) => {
+                self.composite_columns(touched_columns, left, SteepStreak::new(self, clip_left, top), buffer, measure)
+            }
+            (false, false) => {
+                self.composite_columns(touched_columns, left, ShallowStreak { segment: self, top }, buffer, measure)
+            }
+            (true, true) => self.composite_columns(
+                touched_columns,
+                left,
+                WideStreak::<true> { segment: self, top },
+                buffer,
+                measure,
+            ),
+            (true, false) => self.composite_columns(
+                touched_columns,
+                left,
+                WideStreak::<false> { segment: self, top },
+                buffer,
+                measure,
+            ),
         }
     }
 
-    /// Columns of a patch that it may touch.
+    /// Columns of a tile that it may touch.
     #[inline(always)]
-    fn touched(&self, left: f32, top: f32) -> std::ops::Range<usize> {
-        let (reach, bottom) = (self.reach(), top + BAND as f32);
-        let [low, high] = if self.upright {
+    fn touched_columns(&self, left: f32, top: f32) -> std::ops::Range<usize> {
+        let (reach, bottom) = (self.reach(), top + TILE_ROWS as f32);
+        let [low, high] = if self.steep {
             // Its axis within the rows.
-            let ends = [at_least(-reach, top), at_most(reach, bottom)].map(|along| self.lean * along);
-            [at_most(ends[0], ends[1]) - self.across, at_least(ends[0], ends[1]) + self.across]
+            let ends = [fast_max(-reach, top), fast_min(reach, bottom)].map(|along| self.slope * along);
+            [fast_min(ends[0], ends[1]) - self.half_width, fast_max(ends[0], ends[1]) + self.half_width]
         } else {
-            /// Below this lean the rows end no streak.
-            const LEVEL: f32 = 1e-3;
-            let within = [top - self.across, bottom + self.across].map(|row| row / self.lean);
-            let [from, to] = [at_most(within[0], within[1]) - 1.0, at_least(within[0], within[1]) + 1.0];
-            if self.lean.abs() < LEVEL { [-reach, reach] } else { [at_least(-reach, from), at_most(reach, to)] }
+            /// Below this slope the rows do not bound the columns.
+            const MIN_SLOPE: f32 = 1e-3;
+            let within = [top - self.half_width, bottom + self.half_width].map(|row| row / self.slope);
+            let [from, to] = [fast_min(within[0], within[1]) - 1.0, fast_max(within[0], within[1]) + 1.0];
+            if self.slope.abs() < MIN_SLOPE { [-reach, reach] } else { [fast_max(-reach, from), fast_min(reach, to)] }
         };
-        let held = |place: f32| at_most(STRETCH as f32, at_least(0.0, place - left)) as i32 as usize;
-        held(low)..held(high + 1.0)
+        let column_index = |x: f32| fast_min(TILE_COLUMNS as f32, fast_max(0.0, x - left)) as i32 as usize;
+        column_index(low)..column_index(high + 1.0)
     }
 
     #[inline(always)]
-    fn lay(
+    fn composite_columns(
         &self,
         columns: std::ops::Range<usize>,
         left: f32,
-        mut opacities: impl Columns,
-        patch: &mut Patch,
+        mut opacities: impl ColumnCoverage,
+        buffer: &mut TileBuffer,
         measure: &mut impl FnMut([usize; 2], f32),
     ) {
         for column in columns {
-            let mut opacities = opacities.next(left + column as i32 as f32);
-            patch.hide_by_plate(column, self.layer.depth, &mut opacities);
-            patch.put_behind(column, &opacities, &self.layer);
+            let mut opacities = opacities.next_column(left + column as i32 as f32);
+            buffer.mask_by_plate(column, self.shading.depth, &mut opacities);
+            buffer.composite_under(column, &opacities, &self.shading);
             for (row, opacity) in opacities.into_iter().enumerate() {
                 if opacity > 0.0 {
                     measure([column, row], opacity);
@@ -86,127 +107,136 @@ impl Stroke {
         }
     }
 
-    /// What a line of pixels across it between two places along takes of a thin one: its sum, and where it crosses that line.
+    /// For a thin streak, coverage of a line of pixels across it between two positions along it, and the position of
+    /// its axis there.
     #[inline(always)]
-    fn line(&self, from: f32, to: f32) -> (f32, f32) {
-        let (from, to) = (at_least(-self.half, from), at_most(self.half, to));
-        (self.density * at_least(0.0, to - from), self.lean * 0.5 * (from + to))
+    fn line_crossing(&self, from: f32, to: f32) -> (f32, f32) {
+        let (from, to) = (fast_max(-self.half_length, from), fast_min(self.half_length, to));
+        (self.line_coverage * fast_max(0.0, to - from), self.slope * 0.5 * (from + to))
     }
 }
 
-/// A thin streak that runs down.
-struct Down {
-    amount: Rows,
-    /// Where it crosses each row.
-    centre: Rows,
-    /// One over half its width.
+/// A thin streak that is steeper than 45 degrees.
+struct SteepStreak {
+    coverage: TileRows,
+    /// Position of its axis in each row.
+    center: TileRows,
+    /// Reciprocal of its half width.
     scale: f32,
-    /// Share of each row's amount that lies left of the next column.
-    before: Rows,
+    /// Cumulative distribution at the left edge of the next column, for each row.
+    cdf_left: TileRows,
 }
 
-impl Down {
+impl SteepStreak {
     #[inline(always)]
-    fn new(stroke: &Stroke, cut: Option<f32>, top: f32) -> Self {
-        let mut down =
-            Self { amount: [0.0; BAND], centre: [0.0; BAND], scale: 1.0 / stroke.across, before: [0.0; BAND] };
-        for row in 0..BAND {
-            (down.amount[row], down.centre[row]) = stroke.line(top + NUMBERS[row], top + NEXT[row]);
+    fn new(segment: &StreakSegment, clip_left: Option<f32>, top: f32) -> Self {
+        let mut down = Self {
+            coverage: [0.0; TILE_ROWS],
+            center: [0.0; TILE_ROWS],
+            scale: 1.0 / segment.half_width,
+            cdf_left: [0.0; TILE_ROWS],
+        };
+        for row in 0..TILE_ROWS {
+            (down.coverage[row], down.center[row]) =
+                segment.line_crossing(top + ROW_OFFSETS[row], top + NEXT_ROW_OFFSETS[row]);
         }
-        if let Some(left) = cut {
-            for row in 0..BAND {
-                down.before[row] = disc_share((left - down.centre[row]) * down.scale);
+        if let Some(left) = clip_left {
+            for row in 0..TILE_ROWS {
+                down.cdf_left[row] = disc_cdf((left - down.center[row]) * down.scale);
             }
         }
         down
     }
 }
 
-impl Columns for Down {
+impl ColumnCoverage for SteepStreak {
     #[inline(always)]
-    fn next(&mut self, x: f32) -> Rows {
-        let mut opacities = [0.0; BAND];
-        for row in 0..BAND {
-            let after = disc_share((x + 1.0 - self.centre[row]) * self.scale);
-            opacities[row] = opacity(self.amount[row] * (after - self.before[row]));
-            self.before[row] = after;
+    fn next_column(&mut self, x: f32) -> TileRows {
+        let mut opacities = [0.0; TILE_ROWS];
+        for row in 0..TILE_ROWS {
+            let after = disc_cdf((x + 1.0 - self.center[row]) * self.scale);
+            opacities[row] = clamp_opacity(self.coverage[row] * (after - self.cdf_left[row]));
+            self.cdf_left[row] = after;
         }
         opacities
     }
 }
 
-/// A thin streak that runs across.
-struct Level<'a> {
-    stroke: &'a Stroke,
+/// A thin streak that is shallower than 45 degrees.
+struct ShallowStreak<'a> {
+    segment: &'a StreakSegment,
     top: f32,
 }
 
-impl Columns for Level<'_> {
+impl ColumnCoverage for ShallowStreak<'_> {
     #[inline(always)]
-    fn next(&mut self, x: f32) -> Rows {
-        let (amount, centre) = self.stroke.line(x, x + 1.0);
-        let (above, scale) = (self.top - centre, 1.0 / self.stroke.across);
-        let mut opacities = [0.0; BAND];
-        for row in 0..BAND {
-            let [before, after] = [above + NUMBERS[row], above + NEXT[row]];
-            opacities[row] = opacity(amount * (disc_share(after * scale) - disc_share(before * scale)));
+    fn next_column(&mut self, x: f32) -> TileRows {
+        let (coverage, center) = self.segment.line_crossing(x, x + 1.0);
+        let (above, scale) = (self.top - center, 1.0 / self.segment.half_width);
+        let mut opacities = [0.0; TILE_ROWS];
+        for row in 0..TILE_ROWS {
+            let [cdf_left, after] = [above + ROW_OFFSETS[row], above + NEXT_ROW_OFFSETS[row]];
+            opacities[row] = clamp_opacity(coverage * (disc_cdf(after * scale) - disc_cdf(cdf_left * scale)));
         }
         opacities
     }
 }
 
-/// A wide streak, along rows or columns as its axis runs.
-struct Swept<'a, const UPRIGHT: bool> {
-    stroke: &'a Stroke,
+/// A wide streak, steep or shallow.
+struct WideStreak<'a, const STEEP: bool> {
+    segment: &'a StreakSegment,
     top: f32,
 }
 
-impl<const UPRIGHT: bool> Columns for Swept<'_, UPRIGHT> {
-    /// So far aside of the axis, the disc covers a place while its chord passes: for the overlap of chord and way. What it hides
-    /// there in all is the profile's share of that line.
+impl<const STEEP: bool> ColumnCoverage for WideStreak<'_, STEEP> {
+    /// At an offset from the axis, the disc covers a point while its chord passes over it: for the overlap of chord and
+    /// path. The total over the line is the profile's fraction of the blocked area.
     #[inline(always)]
-    fn next(&mut self, x: f32) -> Rows {
-        let Stroke { half, lean, across, density, .. } = *self.stroke;
-        let (whole, scale) = (2.0 * half * density, 1.0 / across);
-        let mut opacities = [0.0; BAND];
-        for row in 0..BAND {
-            let y = self.top + NUMBERS[row];
-            let (along, aside) = if UPRIGHT { (y, x) } else { (x, y) };
-            let aside = aside - lean * (along + 0.5);
-            let share = disc_share((aside + 1.0) * scale) - disc_share(aside * scale);
-            // In coordinates that lean as the streak does a disc is an ellipse, and its chords have their middles off the axis.
-            let middle = -lean * (aside + 0.5) / (lean * lean + 1.0);
-            let chord = at_least(LEAST_CHORD, self.stroke.chord(aside + 0.5));
-            let passed = passed(along + 1.0 - middle, half, chord) - passed(along - middle, half, chord);
-            opacities[row] = opacity(whole * share * passed);
+    fn next_column(&mut self, x: f32) -> TileRows {
+        let StreakSegment { half_length, slope, half_width, line_coverage, .. } = *self.segment;
+        let (whole, scale) = (2.0 * half_length * line_coverage, 1.0 / half_width);
+        let mut opacities = [0.0; TILE_ROWS];
+        for row in 0..TILE_ROWS {
+            let y = self.top + ROW_OFFSETS[row];
+            let (along, offset) = if STEEP { (y, x) } else { (x, y) };
+            let offset = offset - slope * (along + 0.5);
+            let fraction = disc_cdf((offset + 1.0) * scale) - disc_cdf(offset * scale);
+            // Sheared by the slope, a disc becomes an ellipse, whose chords have their centers off the axis.
+            let center = -slope * (offset + 0.5) / (slope * slope + 1.0);
+            let chord = fast_max(MIN_HALF_CHORD, self.segment.chord(offset + 0.5));
+            let covered =
+                covered(along + 1.0 - center, half_length, chord) - covered(along - center, half_length, chord);
+            opacities[row] = clamp_opacity(whole * fraction * covered);
         }
         opacities
     }
 }
 
-/// Half the least chord that is told apart from none, pixels.
-const LEAST_CHORD: f32 = 0.1;
+/// Least half chord, pixels: avoids a division by zero.
+const MIN_HALF_CHORD: f32 = 0.1;
 
-/// Share of all that a chord covers on its way that lies before `along`: of the overlap of `+-chord` about `along` with the way `+-half`.
+/// Cumulative distribution of a chord's coverage along its path: of the overlap of `+-chord` about `along` with the
+/// path `+-half`.
 #[inline(always)]
-fn passed(along: f32, half: f32, chord: f32) -> f32 {
-    let reach = half + chord;
-    let along = at_most(reach, at_least(-reach, along));
-    (climbed(along + half, chord) - climbed(along - half, chord)) / (4.0 * half * chord)
+fn covered(along: f32, half_length: f32, chord: f32) -> f32 {
+    let reach = half_length + chord;
+    let along = fast_min(reach, fast_max(-reach, along));
+    (clamp_integral(along + half_length, chord) - clamp_integral(along - half_length, chord))
+        / (4.0 * half_length * chord)
 }
 
-/// Integral of `clamp(s, -chord, chord)` up to `s`, from 0.
+/// Integral of `clamp(s, -chord, chord)` from 0 to `s`.
 #[inline(always)]
-fn climbed(s: f32, chord: f32) -> f32 {
+fn clamp_integral(s: f32, chord: f32) -> f32 {
     let size = s.abs();
-    let least = at_most(chord, size);
-    least * (size - 0.5 * least)
+    let limit = fast_min(chord, size);
+    limit * (size - 0.5 * limit)
 }
 
-/// What is an opacity whatever rounding did.
+/// Clamps rounding errors.
 #[inline(always)]
-fn opacity(value: f32) -> f32 {
-    at_most(1.0, at_least(0.0, value))
+fn clamp_opacity(value: f32) -> f32 {
+    fast_min(1.0, fast_max(0.0, value))
 }
 
 #[cfg(test)]
@@ -220,10 +250,10 @@ mod tests {
             let t = (i as f32 + 0.5) / steps as f32 * 2.0 - 1.0;
             sum += (1.0 - t * t).sqrt() * 2.0 / steps as f32 * std::f32::consts::FRAC_2_PI;
             let end = (i as f32 + 1.0) / steps as f32 * 2.0 - 1.0;
-            assert!((disc_share(end) - sum).abs() < 2.5e-3, "{end}");
+            assert!((disc_cdf(end) - sum).abs() < 2.5e-3, "{end}");
         }
-        for (t, share) in [(-2.0, 0.0), (0.0, 0.5), (2.0, 1.0)] {
-            assert!((disc_share(t) - share).abs() < 1e-6);
+        for (t, fraction) in [(-2.0, 0.0), (0.0, 0.5), (2.0, 1.0)] {
+            assert!((disc_cdf(t) - fraction).abs() < 1e-6);
         }
     }
 }

@@ -1,135 +1,137 @@
-//! One drop's way while the shutter is open, as the picture shows it.
+//! Rasterization of streaks with exact coverage.
 
 mod columns;
 mod packed;
 pub(crate) mod tile;
 
-use super::bin::Extent;
-use tile::Layer;
+use crate::shutter_cameras::PixelBounds;
+use tile::Shading;
 
-pub(crate) use packed::Record;
+pub(crate) use packed::PackedStreak;
 
-/// A streak in the picture: what a drop hides and the light it sends.
+/// A streak in the picture: its coverage and the light of its drop.
 ///
-/// What it hides of each pixel is a difference of distribution functions, along it and across, so that all pixels add up to what the drop
-/// hides however thin or short the streak is. A thin one has the same profile from end to end; a wide one is what its disc covers on its
-/// way, with round ends that are as soft as the disc is wide.
+/// The coverage of a pixel is a difference of cumulative distributions, along the streak and across it, so that the sum
+/// over all pixels is the blocked area however thin or short the streak is. A thin streak has the same profile from end
+/// to end. A wide one is the area swept by its disc, with round ends as soft as its width.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Stroke {
-    /// Half way along it, pixels.
-    pub(super) middle: [f32; 2],
-    /// Whether it runs down the picture rather than across: its axis is then 1, else 0.
-    pub(super) upright: bool,
-    /// Half its length along that axis, pixels: of a thin one as a line that spreads as much, of a wide one that of its disc's way.
-    pub(super) half: f32,
-    /// How far it leans to the other axis for each pixel along.
-    pub(super) lean: f32,
-    /// Half width across at each pixel along, as a disc that spreads as much: the drop's, and its lean within a pixel.
-    pub(super) across: f32,
-    /// What it hides of each line of pixels across it, square pixels.
-    pub(super) density: f32,
+pub(crate) struct StreakSegment {
+    /// Center, pixels.
+    pub(super) center: [f32; 2],
+    /// Whether it is steeper than 45 degrees: its major axis is then the picture's y axis, else x.
+    pub(super) steep: bool,
+    /// Half its length along the major axis, pixels. For a thin streak, that of a line with the same variance; for a
+    /// wide one, that of its disc's path.
+    pub(super) half_length: f32,
+    /// Change along the minor axis for each pixel along the major axis.
+    pub(super) slope: f32,
+    /// Half width along the minor axis, pixels, as of a disc with the same variance: the drop's own, and the slope
+    /// within one pixel.
+    pub(super) half_width: f32,
+    /// Blocked area for each line of pixels across it, square pixels.
+    pub(super) line_coverage: f32,
     /// Diameter of the drop, mm.
     pub(crate) diameter_mm: f32,
-    /// What it shows.
-    pub(crate) layer: Layer,
+    /// Radiance and depth.
+    pub(crate) shading: Shading,
 }
 
-/// A drop's way through the picture.
+/// A drop's path in the picture.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Way {
-    /// Where the drop's middle was when the shutter opened and when it closed, pixels.
+pub(crate) struct ScreenPath {
+    /// Its center when the shutter opens and when it closes, pixels.
     pub(crate) ends: [[f32; 2]; 2],
     /// Radius of the drop, pixels.
     pub(crate) radius: f32,
-    /// What it hides of the picture, summed over all pixels and averaged over the exposure, square pixels: `pi r^2` and whatever gain.
-    pub(crate) hidden: f32,
+    /// Blocked area, averaged over the exposure and summed over all pixels, square pixels: `pi r^2` times a gain.
+    pub(crate) blocked_area: f32,
 }
 
-/// Half width from which on a streak is wide, pixels: the ends of others are as sharp as a pixel.
-const WIDE: f32 = 1.25;
-/// Half the least way of a wide one, pixels.
-const SHORTEST: f32 = 0.1;
+/// Half width from which on a streak is treated as wide, pixels. The ends of thin ones are sharp.
+const MIN_WIDE_HALF_WIDTH: f32 = 1.25;
+/// Least half length of a wide one, pixels.
+const MIN_HALF_LENGTH: f32 = 0.1;
 
-impl Stroke {
-    /// The streak of a drop, still without light.
+impl StreakSegment {
+    /// The streak of a drop, without light.
     #[inline(always)]
-    pub(crate) fn new(Way { ends: [from, to], radius, hidden }: Way, depth: f32, diameter_mm: f32) -> Self {
-        let way = [to[0] - from[0], to[1] - from[1]];
-        let upright = way[1].abs() >= way[0].abs();
-        let (length, aside) = if upright { (way[1], way[0]) } else { (way[0], way[1]) };
-        let lean = packed::lean(if length == 0.0 { 0.0 } else { aside / length });
-        // A disc that moves: variances add, that of a disc is r^2/4, that of a way L^2/12. Not fused: this is needed where vectors are not.
+    pub(crate) fn new(
+        ScreenPath { ends: [from, to], radius, blocked_area }: ScreenPath,
+        depth: f32,
+        diameter_mm: f32,
+    ) -> Self {
+        let travel = [to[0] - from[0], to[1] - from[1]];
+        let steep = travel[1].abs() >= travel[0].abs();
+        let (length, offset) = if steep { (travel[1], travel[0]) } else { (travel[0], travel[1]) };
+        let slope = packed::quantize_slope(if length == 0.0 { 0.0 } else { offset / length });
+        // Variances of a moving disc add: r^2/4 of the disc, L^2/12 of the path. Not fused, because this runs in scalar
+        // code too.
         let square = radius * radius;
-        let across = packed::short((square * (lean * lean + 1.0) + lean * lean * (1.0 / 3.0)).sqrt().max(1e-4));
-        let half = if across < WIDE {
+        let half_width =
+            packed::round_to_bf16((square * (slope * slope + 1.0) + slope * slope * (1.0 / 3.0)).sqrt().max(1e-4));
+        let half_length = if half_width < MIN_WIDE_HALF_WIDTH {
             (0.5 * (length * length + 3.0 * square).sqrt()).max(1e-3)
         } else {
-            (0.5 * length.abs()).max(SHORTEST)
+            (0.5 * length.abs()).max(MIN_HALF_LENGTH)
         };
         Self {
-            middle: [0, 1].map(|axis| 0.5 * (from[axis] + to[axis])),
-            upright,
-            half,
-            lean,
-            across,
-            density: hidden * 0.5 / half,
+            center: [0, 1].map(|axis| 0.5 * (from[axis] + to[axis])),
+            steep,
+            half_length,
+            slope,
+            half_width,
+            line_coverage: blocked_area * 0.5 / half_length,
             diameter_mm,
-            layer: Layer::new(depth),
+            shading: Shading::new(depth),
         }
     }
 
-    /// Greatest opacity of any of its pixels: that of its axis, or all that a line hides where it is narrower than a pixel.
+    /// Maximum opacity of its pixels: that on its axis, or the whole coverage of a line where it is narrower than a
+    /// pixel.
     #[inline(always)]
     pub(crate) fn peak(&self) -> f32 {
-        let short = if self.is_wide() { (self.half / self.chord(0.0)).min(1.0) } else { 1.0 };
-        short * self.density * (std::f32::consts::FRAC_2_PI / self.across).min(1.0)
+        let shortening = if self.is_wide() { (self.half_length / self.chord(0.0)).min(1.0) } else { 1.0 };
+        shortening * self.line_coverage * (std::f32::consts::FRAC_2_PI / self.half_width).min(1.0)
     }
 
     #[inline(always)]
     fn is_wide(&self) -> bool {
-        self.across >= WIDE
+        self.half_width >= MIN_WIDE_HALF_WIDTH
     }
 
-    /// Half the chord of its disc along its axis, so far aside of it, pixels.
+    /// Half the chord of its disc along the major axis, at an offset from the axis, pixels.
     #[inline(always)]
-    fn chord(&self, aside: f32) -> f32 {
-        let square = self.across * self.across - aside * aside;
-        (if square > 0.0 { square.sqrt() } else { 0.0 }) / (self.lean * self.lean + 1.0)
+    fn chord(&self, offset: f32) -> f32 {
+        let square = self.half_width * self.half_width - offset * offset;
+        (if square > 0.0 { square.sqrt() } else { 0.0 }) / (self.slope * self.slope + 1.0)
     }
 
-    /// How far it reaches along its axis from its middle, pixels.
+    /// How far it extends along its major axis from the center, pixels.
     #[inline(always)]
     fn reach(&self) -> f32 {
-        if self.is_wide() { self.half + self.across / (self.lean * self.lean + 1.0).sqrt() } else { self.half }
+        if self.is_wide() {
+            self.half_length + self.half_width / (self.slope * self.slope + 1.0).sqrt()
+        } else {
+            self.half_length
+        }
     }
 
-    /// Where it may touch the picture.
+    /// Its bounding box.
     #[inline(always)]
-    pub(crate) fn extent(&self) -> Extent {
+    pub(crate) fn extent(&self) -> PixelBounds {
         let along = self.reach();
-        let aside = self.lean.abs() * along + self.across;
-        let reach = if self.upright { [aside, along] } else { [along, aside] };
-        [0, 1].map(|axis| [self.middle[axis] - reach[axis], self.middle[axis] + reach[axis]])
+        let offset = self.slope.abs() * along + self.half_width;
+        let reach = if self.steep { [offset, along] } else { [along, offset] };
+        [0, 1].map(|axis| [self.center[axis] - reach[axis], self.center[axis] + reach[axis]])
     }
-}
-
-/// Comparisons that become one instruction each, unlike those that ask what is not a number.
-#[inline(always)]
-pub(crate) fn at_least(least: f32, value: f32) -> f32 {
-    if value > least { value } else { least }
-}
-
-#[inline(always)]
-pub(crate) fn at_most(most: f32, value: f32) -> f32 {
-    if value < most { value } else { most }
 }
 
 #[cfg(test)]
 mod tests {
     use bansho_base::{image::Rect, phenomenon::strip::Strip};
 
-    use super::{tile::Patch, *};
-    use crate::streaks::{bin::BAND, coverage::Streak};
+    use super::{tile::TileBuffer, *};
+    use crate::streaks::{bin::TILE_ROWS, coverage::Streak};
     use fearless_simd::{Level, dispatch};
 
     /// What a drop hides that does not overlap itself.
@@ -137,31 +139,31 @@ mod tests {
         std::f32::consts::PI * radius * radius
     }
 
-    fn stroke(from: [f32; 2], to: [f32; 2], radius: f32) -> Stroke {
-        Stroke::new(Way { ends: [from, to], radius, hidden: disc(radius) }, 2.0, 1.0)
+    fn segment(from: [f32; 2], to: [f32; 2], radius: f32) -> StreakSegment {
+        StreakSegment::new(ScreenPath { ends: [from, to], radius, blocked_area: disc(radius) }, 2.0, 1.0)
     }
 
     /// Opacity of each pixel of a picture, drawn from column `left` on.
-    fn drawn(stroke: &Stroke, size: [usize; 2], left: usize) -> Vec<f32> {
+    fn drawn(segment: &StreakSegment, size: [usize; 2], left: usize) -> Vec<f32> {
         let mut opacity = vec![0.0; size[0] * size[1]];
-        for y in (0..size[1]).step_by(BAND) {
-            let rect = Rect { x: left, y, width: size[0] - left, height: BAND.min(size[1] - y) };
+        for y in (0..size[1]).step_by(TILE_ROWS) {
+            let rect = Rect { x: left, y, width: size[0] - left, height: TILE_ROWS.min(size[1] - y) };
             let mut strip = Strip::default();
             strip.reset(rect, None, 0);
             let mut planes = strip.gray_planes_mut().unwrap();
-            let mut patch = Patch::default();
+            let mut buffer = TileBuffer::default();
             let level = Level::new();
-            dispatch!(level, simd => patch.load(simd, [0, y], rect, rect, &planes));
-            stroke.draw(&mut patch, &mut |[column, row], value| {
+            dispatch!(level, simd => buffer.load(simd, [0, y], rect, rect, &planes));
+            segment.draw(&mut buffer, &mut |[column, row], value| {
                 if (left..size[0]).contains(&column) && row < rect.height {
                     opacity[(y + row) * size[0] + column] += value;
                 }
             });
-            dispatch!(level, simd => patch.store(simd, rect, rect, &mut planes));
-            let hidden = planes.transmittance.iter().map(|through| 1.0 - through);
-            for (index, hidden) in hidden.enumerate() {
+            dispatch!(level, simd => buffer.store(simd, rect, rect, &mut planes));
+            let blocked_area = planes.transmittance.iter().map(|through| 1.0 - through);
+            for (index, blocked_area) in blocked_area.enumerate() {
                 let known = opacity[(y + index / rect.width) * size[0] + left + index % rect.width];
-                assert!((hidden - known).abs() < 1e-6);
+                assert!((blocked_area - known).abs() < 1e-6);
             }
         }
         opacity
@@ -171,8 +173,8 @@ mod tests {
     fn a_streak_hides_its_drop_however_thin_short_or_slanted_it_is() {
         for to in [[20.3, 50.0], [24.9, 30.1], [50.0, 20.5], [35.2, 35.1], [20.3, 20.9]] {
             for radius in [0.01, 0.2, 0.9] {
-                let stroke = stroke([20.3, 20.9], to, radius);
-                let sum: f32 = drawn(&stroke, [64, 64], 0).iter().sum();
+                let segment = segment([20.3, 20.9], to, radius);
+                let sum: f32 = drawn(&segment, [64, 64], 0).iter().sum();
                 let longest = (to[0] - 20.3).abs().max((to[1] - 20.9_f32).abs());
                 // A drop that does not move is opaque and cannot hide more.
                 let tolerance = if longest < 2.0 * radius { 0.15 } else { 1e-4 };
@@ -184,13 +186,15 @@ mod tests {
     #[test]
     fn a_wide_streak_hides_its_drop_wherever_it_falls_between_pixels() {
         for place in [[60.0, 60.0], [60.3, 60.9], [60.5, 60.71]] {
-            for way in [[0.0, 0.0], [0.6, 2.0], [0.0, 70.0], [13.0, 51.0], [40.0, 40.0], [50.0, -19.0], [-37.0, 41.0]] {
+            for travel in
+                [[0.0, 0.0], [0.6, 2.0], [0.0, 70.0], [13.0, 51.0], [40.0, 40.0], [50.0, -19.0], [-37.0, 41.0]]
+            {
                 for radius in [1.26, 2.0, 4.4, 9.0] {
-                    let ends = [-0.5, 0.5].map(|share| [0, 1].map(|axis| place[axis] + share * way[axis]));
-                    let sum: f32 = drawn(&stroke(ends[0], ends[1], radius), [128, 128], 0).iter().sum();
+                    let ends = [-0.5, 0.5].map(|share| [0, 1].map(|axis| place[axis] + share * travel[axis]));
+                    let sum: f32 = drawn(&segment(ends[0], ends[1], radius), [128, 128], 0).iter().sum();
                     // One that hardly moves is opaque and cannot hide more.
-                    let tolerance = if way[1] * way[1] < 4.0 * radius * radius { 0.03 } else { 1e-3 };
-                    assert!((sum / disc(radius) - 1.0).abs() < tolerance, "{place:?} {way:?} {radius}: {sum}");
+                    let tolerance = if travel[1] * travel[1] < 4.0 * radius * radius { 0.03 } else { 1e-3 };
+                    assert!((sum / disc(radius) - 1.0).abs() < tolerance, "{place:?} {travel:?} {radius}: {sum}");
                 }
             }
         }
@@ -198,8 +202,8 @@ mod tests {
 
     #[test]
     fn a_thick_upright_streak_has_the_profile_of_the_paper_s_source() {
-        let stroke = stroke([32.0, 4.0], [32.0, 60.0], 6.0);
-        let opacity = drawn(&stroke, [64, 64], 0);
+        let segment = segment([32.0, 4.0], [32.0, 60.0], 6.0);
+        let opacity = drawn(&segment, [64, 64], 0);
         for column in 26..38 {
             let offset = column as f32 + 0.5 - 32.0;
             let expected = 2.0 * (36.0 - offset * offset).sqrt() / 56.0;
@@ -211,13 +215,13 @@ mod tests {
     #[test]
     fn a_crop_changes_no_pixel_and_no_pixel_lies_outside_the_rows() {
         for to in [[25.0, 50.0], [50.0, 26.0]] {
-            let stroke = stroke([20.3, 20.9], to, 1.3);
-            let whole = drawn(&stroke, [64, 64], 0);
-            let part = drawn(&stroke, [64, 64], 23);
+            let segment = segment([20.3, 20.9], to, 1.3);
+            let whole = drawn(&segment, [64, 64], 0);
+            let part = drawn(&segment, [64, 64], 23);
             for (index, opacity) in part.into_iter().enumerate() {
                 assert_eq!(opacity, if index % 64 < 23 { 0.0 } else { whole[index] });
             }
-            let [low, high] = stroke.extent()[1];
+            let [low, high] = segment.extent()[1];
             for (index, opacity) in whole.iter().enumerate() {
                 let row = (index / 64) as f32;
                 assert!(*opacity == 0.0 || (row + 1.0 >= low && row <= high), "{row} {low} {high}");
@@ -229,18 +233,18 @@ mod tests {
     fn a_wide_streak_is_what_its_disc_covers_on_its_way() {
         for (to, radius) in [([41.2, 66.9], 6.0), ([66.3, 30.1], 5.0), ([31.4, 60.2], 9.0), ([34.9, 39.6], 8.0)] {
             let from = [31.3, 31.1];
-            let opacity = drawn(&stroke(from, to, radius), [96, 96], 0);
-            let way = [to[0] - from[0], to[1] - from[1]].map(f64::from);
-            let length = (way[0] * way[0] + way[1] * way[1]).sqrt();
+            let opacity = drawn(&segment(from, to, radius), [96, 96], 0);
+            let travel = [to[0] - from[0], to[1] - from[1]].map(f64::from);
+            let length = (travel[0] * travel[0] + travel[1] * travel[1]).sqrt();
             let streak = Streak { radius: f64::from(radius), length };
             let peak = streak.profile(0.0);
             let (mut off, mut square) = (0.0_f64, 0.0);
             for (index, found) in opacity.iter().enumerate() {
                 let place = [index % 96, index / 96].map(|count| count as f64 + 0.5);
                 let offset = [0, 1].map(|axis| place[axis] - f64::from(from[axis]));
-                let along = (offset[0] * way[0] + offset[1] * way[1]) / length;
-                let aside = (offset[0] * way[1] - offset[1] * way[0]) / length;
-                let error = (f64::from(*found) - streak.opacity(aside, along)).abs() / peak;
+                let along = (offset[0] * travel[0] + offset[1] * travel[1]) / length;
+                let offset = (offset[0] * travel[1] - offset[1] * travel[0]) / length;
+                let error = (f64::from(*found) - streak.opacity(offset, along)).abs() / peak;
                 off = off.max(error);
                 square += error * error;
             }
@@ -254,20 +258,20 @@ mod tests {
     #[test]
     fn ends_of_wide_streaks_are_as_soft_as_they_are_wide() {
         for (to, radius) in [([60.0, 110.0], 12.0), ([110.0, 36.0], 12.0), ([61.0, 120.0], 2.0)] {
-            let stroke = stroke([60.0, 20.0], to, radius);
-            let opacity = drawn(&stroke, [128, 128], 0);
+            let segment = segment([60.0, 20.0], to, radius);
+            let opacity = drawn(&segment, [128, 128], 0);
             // Along its axis: the disc passes a place near its end in as many pixels as it is wide.
-            let along = if stroke.upright { 1 } else { 0 };
+            let along = if segment.steep { 1 } else { 0 };
             let at = |step: usize| {
                 let place = step as f32 + 0.5;
-                let aside = (stroke.middle[1 - along] + stroke.lean * (place - stroke.middle[along])) as usize;
-                opacity[if along == 1 { step * 128 + aside } else { aside * 128 + step }]
+                let offset = (segment.center[1 - along] + segment.slope * (place - segment.center[along])) as usize;
+                opacity[if along == 1 { step * 128 + offset } else { offset * 128 + step }]
             };
             let steepest = (1..128).map(|step| (at(step) - at(step - 1)).abs()).fold(0.0, f32::max);
             assert!(
-                steepest < 1.2 * stroke.peak() / (2.0 * radius) + 0.02 * stroke.peak(),
+                steepest < 1.2 * segment.peak() / (2.0 * radius) + 0.02 * segment.peak(),
                 "{steepest} {}",
-                stroke.peak()
+                segment.peak()
             );
         }
     }

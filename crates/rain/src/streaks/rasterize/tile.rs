@@ -1,66 +1,64 @@
-//! The part of a picture that streaks are laid into at a time.
+//! The tile buffer into which streaks are composited.
 
 use bansho_base::{image::Rect, math::MulAdd, phenomenon::strip::GrayPlanes};
 
-use crate::streaks::bin::BAND;
+use crate::streaks::bin::{TILE_COLUMNS, TILE_ROWS};
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-/// Columns of a patch: its pixels and their depths fit into a core's first cache.
-pub(crate) const STRETCH: usize = 128;
+/// One `f32` for each of the eight pixels of a column.
+pub(crate) type TileRows = [f32; TILE_ROWS];
 
-/// A number for each of eight pixels that stand below each other.
-pub(crate) type Rows = [f32; BAND];
-
-/// Eight rows of so many columns. The pixels of a column stand side by side, so that one instruction lays a streak over all eight: most
-/// streaks run down.
-pub(crate) struct Patch {
+/// A tile of the picture, stored column by column: the eight pixels of a column are adjacent, so that one instruction
+/// composites a streak over all of them. Most streaks are steep.
+pub(crate) struct TileBuffer {
     /// Its first column and row in the picture.
     origin: [usize; 2],
-    columns: [Column; STRETCH],
-    /// Depth of the plate by column, m; where there is none, it is not asked for.
-    plate_depth: [Rows; STRETCH],
+    columns: [PixelColumn; TILE_COLUMNS],
+    /// Depth of the plate by column, m; unset without a plate.
+    plate_depth: [TileRows; TILE_COLUMNS],
     has_plate: bool,
 }
 
-/// Eight pixels below each other: red, green and blue of L, T, and the depth of the nearest sample, m.
-type Column = [Rows; 5];
-const THROUGH: usize = 3;
+/// Eight pixels of a column: red, green and blue of the radiance, transmittance, and the depth of the nearest sample,
+/// m.
+type PixelColumn = [TileRows; 5];
+const TRANSMITTANCE: usize = 3;
 const DEPTH: usize = 4;
 
-/// What is laid over the pixels of a patch.
+/// Light and depth of a streak.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Layer {
-    /// Radiance where it hides all, ACEScg, cd/m^2.
+pub(crate) struct Shading {
+    /// Radiance at full opacity, ACEScg, cd/m^2.
     pub(crate) light: [f32; 3],
     /// m.
     pub(crate) depth: f32,
 }
 
-impl Layer {
-    /// A dark one.
+impl Shading {
+    /// Without light.
     pub(crate) fn new(depth: f32) -> Self {
         Self { light: [0.0; 3], depth }
     }
 
-    /// Adds radiance where it hides all, ACEScg, cd/m^2.
+    /// Adds radiance at full opacity, ACEScg, cd/m^2.
     pub(crate) fn add_light(&mut self, light: [f32; 3]) {
         (0..3).for_each(|c| self.light[c] += light[c]);
     }
 }
 
-impl Default for Patch {
+impl Default for TileBuffer {
     fn default() -> Self {
         Self {
             origin: [0; 2],
-            columns: [[[0.0; BAND]; 5]; STRETCH],
-            plate_depth: [[0.0; BAND]; STRETCH],
+            columns: [[[0.0; TILE_ROWS]; 5]; TILE_COLUMNS],
+            plate_depth: [[0.0; TILE_ROWS]; TILE_COLUMNS],
             has_plate: false,
         }
     }
 }
 
-impl Patch {
-    /// Takes the pixels of `rect` from the planes of `strip`; those around it hold anything.
+impl TileBuffer {
+    /// Loads the pixels of `rect` from the planes of `strip`; the others are unspecified.
     #[inline(always)]
     pub(crate) fn load<S: Simd>(&mut self, simd: S, origin: [usize; 2], rect: Rect, strip: Rect, planes: &GrayPlanes) {
         self.origin = origin;
@@ -76,7 +74,7 @@ impl Patch {
         }
     }
 
-    /// Gives the pixels of `rect` back to the planes of `strip`.
+    /// Stores the pixels of `rect` into the planes of `strip`.
     #[inline(always)]
     pub(crate) fn store<S: Simd>(&self, simd: S, rect: Rect, strip: Rect, planes: &mut GrayPlanes) {
         let [red, green, blue] = &mut planes.radiance;
@@ -88,16 +86,16 @@ impl Patch {
         }
     }
 
-    /// The parts of `rect` of up to eight columns.
+    /// The blocks of `rect`, of up to eight columns each.
     #[inline(always)]
     fn blocks(&self, rect: Rect, strip: Rect) -> impl Iterator<Item = Block> + use<> {
         let [x, y] = self.origin;
-        (rect.x..rect.right()).step_by(BAND).map(move |column| Block {
+        (rect.x..rect.right()).step_by(TILE_ROWS).map(move |column| Block {
             column: column - x,
             row: rect.y - y,
-            size: [BAND.min(rect.right() - column), rect.height],
+            size: [TILE_ROWS.min(rect.right() - column), rect.height],
             start: (rect.y - strip.y) * strip.width + column - strip.x,
-            pitch: strip.width,
+            stride: strip.width,
         })
     }
 
@@ -106,59 +104,59 @@ impl Patch {
         self.origin
     }
 
-    /// Takes from the opacities of a column's pixels those that the plate hides at a depth.
+    /// Clears the opacities of a column's pixels at which the plate is in front of `depth`.
     #[inline(always)]
-    pub(crate) fn hide_by_plate(&self, column: usize, depth: f32, opacities: &mut Rows) {
+    pub(crate) fn mask_by_plate(&self, column: usize, depth: f32, opacities: &mut TileRows) {
         if !self.has_plate {
             return;
         }
         let Some(plate) = self.plate_depth.get(column) else { return };
-        for row in 0..BAND {
+        for row in 0..TILE_ROWS {
             opacities[row] = if plate[row] <= depth { 0.0 } else { opacities[row] };
         }
     }
 
-    /// Lays a layer of some opacities behind what the pixels of a column hold, `L += T a l; T -= T a`.
+    /// Composites a column of opacities under the pixels of the tile, `L += T a l; T -= T a`.
     #[inline(always)]
-    pub(crate) fn put_behind(&mut self, column: usize, opacities: &Rows, layer: &Layer) {
+    pub(crate) fn composite_under(&mut self, column: usize, opacities: &TileRows, shading: &Shading) {
         let Some(pixels) = self.columns.get_mut(column) else { return };
-        let mut hidden = [0.0; BAND];
-        for row in 0..BAND {
-            hidden[row] = pixels[THROUGH][row] * opacities[row];
+        let mut blocked = [0.0; TILE_ROWS];
+        for row in 0..TILE_ROWS {
+            blocked[row] = pixels[TRANSMITTANCE][row] * opacities[row];
         }
         for c in 0..3 {
-            for row in 0..BAND {
-                pixels[c][row] = hidden[row].fma(layer.light[c], pixels[c][row]);
+            for row in 0..TILE_ROWS {
+                pixels[c][row] = blocked[row].fma(shading.light[c], pixels[c][row]);
             }
         }
-        for row in 0..BAND {
-            pixels[THROUGH][row] -= hidden[row];
-            let depth = if opacities[row] > 0.0 { layer.depth } else { f32::INFINITY };
+        for row in 0..TILE_ROWS {
+            pixels[TRANSMITTANCE][row] -= blocked[row];
+            let depth = if opacities[row] > 0.0 { shading.depth } else { f32::INFINITY };
             pixels[DEPTH][row] = if depth < pixels[DEPTH][row] { depth } else { pixels[DEPTH][row] };
         }
     }
 }
 
-/// Up to eight columns of up to eight rows: in the patch, and in a strip's planes.
+/// A block of up to eight columns and rows, in the tile and in a strip's planes.
 #[derive(Clone, Copy)]
 struct Block {
     column: usize,
     row: usize,
     size: [usize; 2],
-    /// Where its first pixel is in a plane.
+    /// Index of its first pixel in a plane.
     start: usize,
-    /// How far it is from there to the row below.
-    pitch: usize,
+    /// Pixels from one row of a plane to the next.
+    stride: usize,
 }
 
 impl Block {
-    /// Takes it from a plane.
+    /// Loads it from a plane.
     #[inline(always)]
-    fn load<S: Simd, C>(&self, simd: S, plane: &[f32], columns: &mut [C], rows: impl Fn(&mut C) -> &mut Rows) {
+    fn load<S: Simd, C>(&self, simd: S, plane: &[f32], columns: &mut [C], rows: impl Fn(&mut C) -> &mut TileRows) {
         let [width, height] = self.size;
-        let mut square = [[0.0; BAND]; BAND];
+        let mut square = [[0.0; TILE_ROWS]; TILE_ROWS];
         for y in 0..height {
-            copy(&plane[self.start + y * self.pitch..][..width], &mut square[self.row + y][..width]);
+            copy(&plane[self.start + y * self.stride..][..width], &mut square[self.row + y][..width]);
         }
         transpose(simd, &mut square);
         for x in 0..width {
@@ -166,46 +164,46 @@ impl Block {
         }
     }
 
-    /// Gives it back to a plane.
+    /// Stores it into a plane.
     #[inline(always)]
-    fn store<S: Simd, C>(&self, simd: S, columns: &[C], rows: impl Fn(&C) -> &Rows, plane: &mut [f32]) {
+    fn store<S: Simd, C>(&self, simd: S, columns: &[C], rows: impl Fn(&C) -> &TileRows, plane: &mut [f32]) {
         let [width, height] = self.size;
-        let mut square = [[0.0; BAND]; BAND];
+        let mut square = [[0.0; TILE_ROWS]; TILE_ROWS];
         for x in 0..width {
             square[x] = *rows(&columns[self.column + x]);
         }
         transpose(simd, &mut square);
         for y in 0..height {
-            copy(&square[self.row + y][..width], &mut plane[self.start + y * self.pitch..][..width]);
+            copy(&square[self.row + y][..width], &mut plane[self.start + y * self.stride..][..width]);
         }
     }
 }
 
-/// Copies up to eight numbers: nearly always eight, in one instruction.
+/// Copies up to eight numbers: nearly always eight, which is one instruction.
 #[inline(always)]
 fn copy(from: &[f32], to: &mut [f32]) {
-    match (<&Rows>::try_from(from), <&mut Rows>::try_from(&mut *to)) {
+    match (<&TileRows>::try_from(from), <&mut TileRows>::try_from(&mut *to)) {
         (Ok(from), Ok(to)) => *to = *from,
         _ => to.copy_from_slice(from),
     }
 }
 
-/// Rows as columns: three perfect shuffles.
+/// Transposes an 8 x 8 block by three perfect shuffles.
 #[inline(always)]
-fn transpose<S: Simd>(simd: S, square: &mut [Rows; BAND]) {
-    const HALF: usize = BAND / 2;
-    let mut vectors = [f32x8::splat(simd, 0.0); BAND];
-    for y in 0..BAND {
+fn transpose<S: Simd>(simd: S, square: &mut [TileRows; TILE_ROWS]) {
+    const HALF: usize = TILE_ROWS / 2;
+    let mut vectors = [f32x8::splat(simd, 0.0); TILE_ROWS];
+    for y in 0..TILE_ROWS {
         vectors[y] = f32x8::from_slice(simd, &square[y]);
     }
-    for _ in 0..BAND.ilog2() {
+    for _ in 0..TILE_ROWS.ilog2() {
         let before = vectors;
         for i in 0..HALF {
             vectors[2 * i] = before[i].zip_low(before[i + HALF]);
             vectors[2 * i + 1] = before[i].zip_high(before[i + HALF]);
         }
     }
-    for x in 0..BAND {
+    for x in 0..TILE_ROWS {
         vectors[x].store_slice(&mut square[x]);
     }
 }

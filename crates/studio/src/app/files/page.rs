@@ -3,10 +3,9 @@
 use std::path::Path;
 
 use bansho::{
-    media::{naming, zip::Zip},
+    media::{output::naming, zip::ZipWriter},
     render::scene::Place,
 };
-use eframe::egui::{Context, Ui};
 
 use super::{
     Files,
@@ -18,6 +17,7 @@ use crate::{
     app::{scene_panel::Subject, session::Session, store::Store},
     player::{Event, Player, Wish, WorkerPlayer, shoot::Ended},
 };
+use eframe::egui::{Context, Ui};
 
 /// What the page knows of files.
 pub(super) struct Shelf {
@@ -38,7 +38,7 @@ struct Rendering {
     done: usize,
     total: usize,
     /// Where the pictures of a shot are gathered.
-    shot: Option<Zip<Parts>>,
+    shot: Option<ZipWriter<Parts>>,
 }
 
 impl Shelf {
@@ -104,11 +104,18 @@ impl Files {
     pub(in crate::app) fn render_shot(&mut self, ctx: &Context, session: &mut Session) {
         let frames = session.transport.frames();
         let total = (frames.end() - frames.start() + 1) as usize;
-        self.render(ctx, session, *frames.start(), total, Some(Zip::new(Parts::default())));
+        self.render(ctx, session, *frames.start(), total, Some(ZipWriter::new(Parts::default())));
     }
 
     /// Makes `total` frames from `first` on as `bansho render` does; those of a `shot` are saved together.
-    fn render(&mut self, ctx: &Context, session: &mut Session, first: i64, total: usize, shot: Option<Zip<Parts>>) {
+    fn render(
+        &mut self,
+        ctx: &Context,
+        session: &mut Session,
+        first: i64,
+        total: usize,
+        shot: Option<ZipWriter<Parts>>,
+    ) {
         if self.progress().is_some() {
             session.set_notice(Some(
                 "pictures are being rendered already; wait, or stop that with the cross beside its bar".into(),
@@ -198,7 +205,7 @@ impl Rendering {
             self.player.wish(self.wish.clone());
             return Ok(None);
         }
-        let pictures = self.shot.take().map(Zip::finish).transpose().map_err(|error| error.to_string())?;
+        let pictures = self.shot.take().map(ZipWriter::finish).transpose().map_err(|error| error.to_string())?;
         save(&format!("{}.zip", self.stem), &pictures.unwrap_or_default()).map(Some)
     }
 }

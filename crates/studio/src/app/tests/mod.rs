@@ -16,12 +16,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bansho::{Assets, base::math::DVec3, media::plates::FileAssets};
-use eframe::egui::{self, Key, Modifiers, Role, vec2};
-use egui_kittest::{Harness, HarnessBuilder, kittest::Queryable};
+use bansho::{Assets, base::math::DVec3, media::assets::FileAssets};
 
 use super::{Session, Studio, shortcuts::SHORTCUTS};
 use crate::{document::Document, player::SlicePlayer};
+use eframe::egui::{self, Key, Modifiers, Role, vec2};
+use egui_kittest::{Harness, HarnessBuilder, kittest::Queryable};
 
 const SCENE: &str = "\
 # A fire.

@@ -1,0 +1,147 @@
+//! The JSON of a glTF: objects that know their path, for error messages.
+
+use std::fmt::Display;
+
+use bansho_base::host::assets::AssetProblem;
+
+use super::damaged;
+use serde_json::{Map, Value};
+
+/// Largest number of values; each takes up to two hundred bytes of memory.
+const MAX_VALUES: usize = 2_000_000;
+
+/// Bytes of a value in memory: those of an object with one field, the largest one.
+const VALUE_BYTES: u64 = 400;
+
+/// Before every value but the first stands one of these.
+fn count_values(json: &[u8]) -> usize {
+    json.iter().filter(|byte| matches!(byte, b'[' | b'{' | b',')).count()
+}
+
+/// Memory of the parsed values of `json`; its strings are stored once more.
+pub(super) fn memory_bytes(json: &[u8]) -> u64 {
+    json.len() as u64 + VALUE_BYTES * count_values(json).min(MAX_VALUES) as u64
+}
+
+/// The JSON, parsed.
+pub(super) fn parse(json: &[u8]) -> Result<Value, AssetProblem> {
+    let values = count_values(json);
+    if values > MAX_VALUES {
+        return Err(damaged(format!("its JSON has about {values} values; allowed: up to {MAX_VALUES}")));
+    }
+    serde_json::from_slice(json).map_err(|error| damaged(format!("its JSON cannot be read: {error}")))
+}
+
+/// An object of the JSON.
+pub(super) struct Object<'a> {
+    /// Its path, such as `nodes[3]`; empty for the root.
+    path: String,
+    fields: &'a Map<String, Value>,
+}
+
+impl<'a> Object<'a> {
+    /// The outermost object.
+    pub(super) fn root(value: &'a Value) -> Result<Self, AssetProblem> {
+        let fields = value.as_object().ok_or_else(|| damaged("its JSON is not an object"))?;
+        Ok(Self { path: String::new(), fields })
+    }
+
+    fn path_of(&self, key: &str) -> String {
+        if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
+    }
+
+    /// An error at the value of `key`.
+    pub(super) fn fault(&self, key: &str, told: impl Display) -> AssetProblem {
+        damaged(format!("{} {told}", self.path_of(key)))
+    }
+
+    fn get(&self, key: &str) -> Option<&'a Value> {
+        self.fields.get(key).filter(|value| !value.is_null())
+    }
+
+    /// The value of `key` as `read` reads it, which is `expected`; `None` where there is none.
+    fn read<T>(
+        &self,
+        key: &str,
+        expected: &str,
+        read: impl FnOnce(&'a Value) -> Option<T>,
+    ) -> Result<Option<T>, AssetProblem> {
+        let fault = || self.fault(key, format!("is wrong; allowed: {expected}"));
+        self.get(key).map(|value| read(value).ok_or_else(fault)).transpose()
+    }
+
+    /// A whole number.
+    pub(super) fn whole(&self, key: &str) -> Result<Option<usize>, AssetProblem> {
+        self.read(key, "a whole number from 0 on", |value| usize::try_from(value.as_u64()?).ok())
+    }
+
+    /// A whole number that must be there.
+    pub(super) fn needed(&self, key: &str) -> Result<usize, AssetProblem> {
+        self.whole(key)?.ok_or_else(|| self.fault(key, "is missing; allowed: a whole number from 0 on"))
+    }
+
+    /// A text.
+    pub(super) fn text(&self, key: &str) -> Result<Option<&'a str>, AssetProblem> {
+        self.read(key, "a text", Value::as_str)
+    }
+
+    /// `N` numbers.
+    pub(super) fn numbers<const N: usize>(&self, key: &str) -> Result<Option<[f32; N]>, AssetProblem> {
+        let numbers = |value: &Value| {
+            let list: Vec<f32> =
+                value.as_array()?.iter().map(|value| Some(value.as_f64()? as f32)).collect::<Option<_>>()?;
+            list.try_into().ok()
+        };
+        self.read(key, &format!("{N} numbers"), numbers)
+    }
+
+    /// An object.
+    pub(super) fn object(&self, key: &str) -> Result<Option<Self>, AssetProblem> {
+        let object = |value: &'a Value| Some(Self { path: self.path_of(key), fields: value.as_object()? });
+        self.read(key, "an object", object)
+    }
+
+    /// A list; empty where there is none.
+    pub(super) fn list(&self, key: &str) -> Result<&'a [Value], AssetProblem> {
+        Ok(self.read(key, "a list", |value| value.as_array().map(Vec::as_slice))?.unwrap_or_default())
+    }
+
+    /// The object at `index` of a list.
+    pub(super) fn item(&self, key: &str, index: usize) -> Result<Self, AssetProblem> {
+        let list = self.list(key)?;
+        let value =
+            list.get(index).ok_or_else(|| self.fault(key, format!("has no element {index}; {}", only(list.len()))))?;
+        let path = format!("{}[{index}]", self.path_of(key));
+        match value.as_object() {
+            Some(fields) => Ok(Self { path, fields }),
+            None => Err(damaged(format!("{path} is wrong; allowed: an object"))),
+        }
+    }
+
+    /// All objects of a list.
+    pub(super) fn items(&self, key: &str) -> Result<impl Iterator<Item = Result<Self, AssetProblem>>, AssetProblem> {
+        Ok((0..self.list(key)?.len()).map(move |index| self.item(key, index)))
+    }
+
+    /// An index into another list, of `length` elements.
+    pub(super) fn index(&self, key: &str, length: usize) -> Result<Option<usize>, AssetProblem> {
+        match self.whole(key)? {
+            Some(index) if index >= length => Err(self.fault(key, format!("names {index}; {}", only(length)))),
+            index => Ok(index),
+        }
+    }
+
+    /// Indices into another list, of `length` elements.
+    pub(super) fn indices(&self, key: &str, length: usize) -> Result<Vec<usize>, AssetProblem> {
+        let index = |value: &Value| usize::try_from(value.as_u64()?).ok().filter(|index| *index < length);
+        let fault = |value: &Value| self.fault(key, format!("names {value}; {}", only(length)));
+        self.list(key)?.iter().map(|value| index(value).ok_or_else(|| fault(value))).collect()
+    }
+}
+
+fn only(length: usize) -> String {
+    match length.checked_sub(1) {
+        Some(last) => format!("allowed: 0 to {last}"),
+        None => "allowed: none, since there are none".to_owned(),
+    }
+}

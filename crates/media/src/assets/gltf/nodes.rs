@@ -1,0 +1,113 @@
+//! The node hierarchy: which meshes a scene shows, and their transforms.
+
+use bansho_base::{
+    host::assets::AssetProblem,
+    math::{DMat4, DQuat, DVec3},
+};
+
+use super::{damaged, json::Object};
+
+/// Largest number of nodes.
+const MAX_NODES: usize = 100_000;
+
+/// A mesh of a node, with its world transform.
+pub(super) struct MeshInstance {
+    pub(super) mesh: usize,
+    pub(super) world_from_mesh: DMat4,
+}
+
+struct Node {
+    mesh: Option<usize>,
+    parent_from_node: DMat4,
+    children: Vec<usize>,
+    parent: Option<usize>,
+}
+
+/// The meshes of the default scene; of the first, where none is the default; of all nodes, where there is none.
+pub(super) fn mesh_instances(root: &Object) -> Result<Vec<MeshInstance>, AssetProblem> {
+    let nodes = read_tree(root)?;
+    let mut mesh_instances = Vec::new();
+    let mut open: Vec<(usize, DMat4)> =
+        root_nodes(root, &nodes)?.into_iter().map(|node| (node, DMat4::IDENTITY)).collect();
+    // Every node has at most one parent, so none is visited twice.
+    while let Some((index, world_from_parent)) = open.pop() {
+        let node = &nodes[index];
+        let world_from_node = world_from_parent * node.parent_from_node;
+        mesh_instances.extend(node.mesh.map(|mesh| MeshInstance { mesh, world_from_mesh: world_from_node }));
+        open.extend(node.children.iter().map(|&child| (child, world_from_node)));
+    }
+    Ok(mesh_instances)
+}
+
+/// Reads all nodes, which must form trees: no node has two parents or is its own ancestor.
+fn read_tree(root: &Object) -> Result<Vec<Node>, AssetProblem> {
+    let count = root.list("nodes")?.len();
+    if count > MAX_NODES {
+        return Err(root.fault("nodes", format!("has {count} elements; allowed: up to {MAX_NODES}")));
+    }
+    let meshes = root.list("meshes")?.len();
+    let mut nodes: Vec<Node> =
+        root.items("nodes")?.map(|node| read(&node?, count, meshes)).collect::<Result<_, _>>()?;
+    for index in 0..count {
+        for child in std::mem::take(&mut nodes[index].children) {
+            if let Some(other) = nodes[child].parent.replace(index) {
+                let told =
+                    format!("node {child} is a child of node {other} and again of node {index}; allowed: one parent");
+                return Err(damaged(told));
+            }
+            nodes[index].children.push(child);
+        }
+    }
+    let mut reached: Vec<usize> = (0..count).filter(|&index| nodes[index].parent.is_none()).collect();
+    let mut next = 0;
+    while let Some(&index) = reached.get(next) {
+        reached.extend(&nodes[index].children);
+        next += 1;
+    }
+    if reached.len() < count {
+        return Err(damaged("it has nodes that contain each other; allowed: trees of nodes"));
+    }
+    Ok(nodes)
+}
+
+fn read(node: &Object, nodes: usize, meshes: usize) -> Result<Node, AssetProblem> {
+    let vector = |key, otherwise: f32| {
+        let numbers: Option<[f32; 3]> = node.numbers(key)?;
+        Ok::<_, AssetProblem>(DVec3::from(numbers.unwrap_or([otherwise; 3]).map(f64::from)))
+    };
+    let parent_from_node = match node.numbers::<16>("matrix")? {
+        Some(columns) => DMat4::from_cols_array(&columns.map(f64::from)),
+        None => {
+            let rotation = node.numbers("rotation")?.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+            let rotation = DQuat::from_array(rotation.map(f64::from));
+            DMat4::from_scale_rotation_translation(vector("scale", 1.0)?, rotation, vector("translation", 0.0)?)
+        }
+    };
+    Ok(Node {
+        mesh: node.index("mesh", meshes)?,
+        parent_from_node,
+        children: node.indices("children", nodes)?,
+        parent: None,
+    })
+}
+
+/// The root nodes of the scene.
+fn root_nodes(root: &Object, nodes: &[Node]) -> Result<Vec<usize>, AssetProblem> {
+    let scenes = root.list("scenes")?.len();
+    let Some(scene) = root.index("scene", scenes)?.or((scenes > 0).then_some(0)) else {
+        return Ok((0..nodes.len()).filter(|&index| nodes[index].parent.is_none()).collect());
+    };
+    let scene = root.item("scenes", scene)?;
+    let root_nodes = scene.indices("nodes", nodes.len())?;
+    let mut named = vec![false; nodes.len()];
+    for &index in &root_nodes {
+        if let Some(parent) = nodes[index].parent {
+            let told = format!("names {index}, which is a child of node {parent}; allowed: nodes without a parent");
+            return Err(scene.fault("nodes", told));
+        }
+        if std::mem::replace(&mut named[index], true) {
+            return Err(scene.fault("nodes", format!("names {index} twice; allowed: every node once")));
+        }
+    }
+    Ok(root_nodes)
+}

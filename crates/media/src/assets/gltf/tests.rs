@@ -1,0 +1,278 @@
+use super::*;
+
+const LIMIT: MemoryLimit = MemoryLimit { total: 2 << 30, used: 0 };
+
+/// A right triangle of 3 positions and 3 indices of 16 bits, in `bytes()`.
+fn document(buffer: &str, count: usize, extra: &str) -> String {
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],
+        "nodes":[{{"mesh":0,"translation":[0,5,0],"scale":[2,2,2]{extra}}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":{count},"type":"VEC3","min":[0,0,0],"max":[1,1,0]}},
+                     {{"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":6}}],
+        "buffers":[{{"byteLength":42{buffer}}}]}}"#
+    )
+}
+
+fn bytes() -> Vec<u8> {
+    let positions = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let indices = [0_u16, 1, 2];
+    let positions = positions.iter().flat_map(|value| value.to_le_bytes());
+    positions.chain(indices.iter().flat_map(|value| value.to_le_bytes())).collect()
+}
+
+fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
+    let padded = json.to_owned() + &" ".repeat(json.len().next_multiple_of(4) - json.len());
+    let mut file = b"glTF\x02\0\0\0".to_vec();
+    file.extend(((20 + padded.len() + 8 + binary.len()) as u32).to_le_bytes());
+    file.extend((padded.len() as u32).to_le_bytes());
+    file.extend(b"JSON");
+    file.extend(padded.as_bytes());
+    file.extend((binary.len() as u32).to_le_bytes());
+    file.extend(b"BIN\0");
+    file.extend(binary);
+    file
+}
+
+fn nothing_beside(_: &str, _: u64) -> Result<Vec<u8>, AssetProblem> {
+    Err(AssetProblem::Missing)
+}
+
+fn reason(file: &[u8], extension: &str) -> String {
+    decode_mesh(file, extension, &nothing_beside, LIMIT).unwrap_err().to_string()
+}
+
+#[test]
+fn triangles_stand_where_their_node_does() {
+    let mesh = decode_mesh(&glb(&document("", 3, ""), &bytes()), "glb", &nothing_beside, LIMIT).unwrap();
+    let triangles: Vec<_> = mesh.triangles().collect();
+    let corner = DVec3::new;
+    assert_eq!(triangles, [[corner(0.0, 5.0, 0.0), corner(2.0, 5.0, 0.0), corner(0.0, 7.0, 0.0)]]);
+}
+
+#[test]
+fn buffers_may_lie_beside_or_inside_the_text() {
+    let read_resource = document(r#","uri":"flame.bin""#, 3, "");
+    let found = decode_mesh(
+        read_resource.as_bytes(),
+        "gltf",
+        &|name, _| {
+            assert_eq!(name, "flame.bin");
+            Ok(bytes())
+        },
+        LIMIT,
+    );
+    assert_eq!(found.unwrap().len(), 1);
+    assert_eq!(reason(read_resource.as_bytes(), "gltf"), "no such file");
+    let text = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIA";
+    let inside = document(&format!(r#","uri":"data:application/octet-stream;base64,{text}""#), 3, "");
+    assert_eq!(decode_mesh(inside.as_bytes(), "gltf", &nothing_beside, LIMIT).unwrap().len(), 1);
+}
+
+#[test]
+fn strips_and_fans_make_triangles_that_face_the_same_way() {
+    assert_eq!(triangles(PrimitiveMode::Strip, &[0, 1, 2, 3]), [[0, 1, 2], [2, 1, 3]]);
+    assert_eq!(triangles(PrimitiveMode::Fan, &[0, 1, 2, 3]), [[0, 1, 2], [0, 2, 3]]);
+    for mode in [PrimitiveMode::Triangles, PrimitiveMode::Strip, PrimitiveMode::Fan] {
+        let counts = (0..9).map(|corners| triangles(mode, &vec![0; corners]).len());
+        assert!(counts.eq((0..9).map(|corners| mode.triangles(corners))), "{mode:?}");
+    }
+}
+
+#[test]
+fn hostile_files_are_refused_with_a_reason() {
+    let good = glb(&document("", 3, ""), &bytes());
+    for end in 0..good.len() {
+        assert!(decode_mesh(&good[..end], "glb", &nothing_beside, LIMIT).is_err(), "{end} bytes of it");
+    }
+    let shorter = reason(&good[..good.len() - 1], "glb");
+    assert!(
+        shorter.ends_with(&format!("it is cut short: of its {} bytes {} are there", good.len(), good.len() - 1)),
+        "{shorter}"
+    );
+    assert!(
+        reason(&glb(&document("", 4_000_000_000, ""), &bytes()), "glb")
+            .contains("accessors[0].count reaches beyond its buffer")
+    );
+    assert!(reason(&glb(&document("", 0, ""), &bytes()), "glb").contains("triangle 1 names corner 1, and there are 0"));
+    let lines = document("", 3, "").replace(r#""indices":1"#, r#""indices":1,"mode":1"#);
+    assert_eq!(reason(&glb(&lines, &bytes()), "glb"), "holds no usable mesh: it has no triangles with an area");
+    assert!(reason(b"{", "gltf").starts_with("is damaged"));
+    assert!(reason(b"", "obj").contains("allowed: .glb, .gltf"));
+}
+
+/// The document with `from` replaced by `to`, which must be in it.
+fn changed(from: &str, to: &str) -> Vec<u8> {
+    let document = document("", 3, "");
+    assert!(document.contains(from), "{from}");
+    glb(&document.replace(from, to), &bytes())
+}
+
+#[test]
+fn a_fault_says_where_it_is_and_what_is_allowed() {
+    let faults = [
+        (r#""version":"2.0""#, r#""version":"1.0""#, r#"asset.version is "1.0"; allowed: "2.0""#),
+        (r#""scene":0"#, r#""scene":3"#, "scene names 3; allowed: 0 to 0"),
+        (r#""mesh":0"#, r#""mesh":-1"#, "nodes[0].mesh is wrong; allowed: a whole number from 0 on"),
+        (r#""scale":[2,2,2]"#, r#""scale":[2,2]"#, "nodes[0].scale is wrong; allowed: 3 numbers"),
+        (r#""POSITION":0"#, r#""POSITION":2"#, "meshes[0].primitives[0].attributes.POSITION names 2; allowed: 0 to 1"),
+        (r#""indices":1"#, r#""indices":0"#, "accessors[0].type is not that of indices; allowed: SCALAR of"),
+        (r#""indices":1"#, r#""indices":1,"mode":7"#, "meshes[0].primitives[0].mode is 7; allowed: 0 to 6"),
+        (r#""type":"VEC3""#, r#""type":"VEC2""#, "accessors[0].type is not that of positions; allowed: VEC3 of"),
+        (r#""bufferView":0,"#, "", "accessors[0].bufferView is missing, perhaps because the mesh is compressed"),
+        (r#""count":3,"type":"SCALAR""#, r#""count":3,"type":"SCALAR","sparse":{}"#, "accessors[1].sparse is not read"),
+        (
+            r#""byteOffset":36,"byteLength":6"#,
+            r#""byteOffset":37,"byteLength":6"#,
+            "bufferViews[1].byteLength reaches beyond",
+        ),
+        (r#""byteLength":42"#, r#""byteLength":43"#, "buffers[0].byteLength says 43 bytes, but 42 are there"),
+        (
+            r#""buffers":[{"#,
+            r#""extensionsRequired":["X"],"buffers":[{"#,
+            r#"extensionsRequired demands "X"; allowed: "#,
+        ),
+        (r#""buffers":[{"#, r#""buffers":[7,{"#, "buffers[0] is wrong; allowed: an object"),
+    ];
+    for (from, to, told) in faults {
+        let found = reason(&changed(from, to), "glb");
+        assert!(found.contains(told), "{to}: {found}");
+    }
+    let mut named_beyond = bytes();
+    named_beyond[40] = 3;
+    assert!(
+        reason(&glb(&document("", 3, ""), &named_beyond), "glb").contains("triangle 1 names corner 4, and there are 3")
+    );
+}
+
+#[test]
+fn nodes_make_trees() {
+    let three = |nodes: &str, scene: &str| {
+        let json = document("", 3, "").replace(r#""translation":[0,5,0],"scale":[2,2,2]}"#, nodes);
+        reason(&glb(&json.replace(r#""nodes":[0]"#, scene), &bytes()), "glb")
+    };
+    let scene = r#""nodes":[0]"#;
+    assert!(three(r#""children":[0]}"#, scene).contains("contain each other"));
+    assert!(three(r#""children":[1]},{"children":[2]},{"children":[0]}"#, scene).contains("contain each other"));
+    assert!(
+        three(r#""children":[1]},{"children":[2]},{"children":[1]}"#, scene)
+            .contains("node 1 is a child of node 0 and again of node 2")
+    );
+    assert!(
+        three(r#""children":[1]},{"mesh":0}"#, r#""nodes":[0,1]"#)
+            .contains("scenes[0].nodes names 1, which is a child of node 0")
+    );
+    assert!(three(r#""children":[1]},{"mesh":0}"#, r#""nodes":[0,0]"#).contains("scenes[0].nodes names 0 twice"));
+    let often = format!(r#""children":[{}1]}},{{"mesh":0}}"#, "1,".repeat(2999));
+    assert!(three(&often, scene).contains("node 1 is a child of node 0 and again of node 0; allowed: one parent"));
+    // Without a scene every node is shown once, where its parents put it.
+    let family = changed(r#""scene":0,"scenes":[{"nodes":[0]}],"#, "");
+    let family = String::from_utf8_lossy(&family[20..]).replace(r#""scale":[2,2,2]}"#, r#""children":[1]},{"mesh":0}"#);
+    let json = &family[..family.rfind('}').unwrap() + 1];
+    let mesh = decode_mesh(&glb(json, &bytes()), "glb", &nothing_beside, LIMIT).unwrap();
+    assert!(mesh.len() == 2 && mesh.bounds() == [DVec3::new(0.0, 5.0, 0.0), DVec3::new(1.0, 6.0, 0.0)]);
+}
+
+#[test]
+fn a_turned_and_nested_mesh_stands_where_the_format_says() {
+    let turned = r#""rotation":[0,0,0.7071067811865476,0.7071067811865476],"translation":[1,0,0],"children":[1]},
+        {"mesh":0,"matrix":[3,0,0,0, 0,3,0,0, 0,0,3,0, 0,2,0,1]}"#;
+    let json = document("", 3, "").replace(r#""mesh":0,"translation":[0,5,0],"scale":[2,2,2]}"#, turned);
+    let mesh = decode_mesh(&glb(&json, &bytes()), "glb", &nothing_beside, LIMIT).unwrap();
+    let corners = mesh.triangles().next().unwrap();
+    for (found, wanted) in corners.iter().zip([[-1.0, 0.0, 0.0], [-1.0, 3.0, 0.0], [-4.0, 0.0, 0.0]]) {
+        assert!((*found - DVec3::from(wanted)).length() < 1e-6, "{corners:?}");
+    }
+}
+
+#[test]
+fn what_is_shown_too_often_is_refused_before_it_is_read() {
+    let positions = 1_000_000;
+    let mut binary = vec![0; 12 * positions];
+    binary.extend([0, 0, 1, 0, 2, 0]);
+    let nodes = r#"{"mesh":0},"#.repeat(1999);
+    let scene: Vec<String> = (0..2000).map(|node| node.to_string()).collect();
+    let json = document("", positions, "")
+        .replace(r#""byteLength":36"#, &format!(r#""byteLength":{}"#, 12 * positions))
+        .replace(r#""byteOffset":36"#, &format!(r#""byteOffset":{}"#, 12 * positions))
+        .replace(r#""byteLength":42"#, &format!(r#""byteLength":{}"#, 12 * positions + 6))
+        .replace(r#""nodes":[{"#, &format!(r#""nodes":[{nodes}{{"#))
+        .replace(r#""nodes":[0]"#, &format!(r#""nodes":[{}]"#, scene.join(",")));
+    let told = reason(&glb(&json, &binary), "glb");
+    assert!(told.ends_with("it has 2000000000 corners; at most 12000000 are read"), "{told}");
+    let unindexed = json.replace(r#","indices":1"#, "");
+    let told = reason(&glb(&unindexed, &binary), "glb");
+    assert!(told.ends_with("it has 666666000 triangles; at most 4000000 are read"), "{told}");
+}
+
+#[test]
+fn lists_without_end_are_refused() {
+    let many = format!("[{}0]", "0,".repeat(2_000_000));
+    assert!(
+        reason(&changed(r#""scene":0"#, &format!(r#""more":{many},"scene":0"#)), "glb")
+            .contains("values; allowed: up to 2000000")
+    );
+    let nodes = format!(r#""nodes":[{}{{"#, "{},".repeat(100_000));
+    assert!(
+        reason(&changed(r#""nodes":[{"#, &nodes), "glb").contains("nodes has 100001 elements; allowed: up to 100000")
+    );
+    assert!(reason("[".repeat(100_000).as_bytes(), "gltf").starts_with("is damaged"));
+}
+
+#[test]
+fn a_file_that_many_buffers_name_is_read_once() {
+    let read_resource = document(r#","uri":"flame.bin""#, 3, "");
+    let many = format!(r#""buffers":[{}{{"#, r#"{"byteLength":12000000,"uri":"flame.bin"},"#.repeat(2000));
+    let json = read_resource.replace(r#""buffers":[{"#, &many);
+    let times = std::cell::Cell::new(0);
+    let flame = |_: &str, _: u64| {
+        times.set(times.get() + 1);
+        let mut file = bytes();
+        file.resize(12_000_000, 0);
+        Ok(file)
+    };
+    assert_eq!(decode_mesh(json.as_bytes(), "gltf", &flame, LIMIT).unwrap().len(), 1);
+    assert_eq!(times.get(), 1);
+}
+
+#[test]
+fn what_would_take_too_much_memory_is_refused_before_it_is_read() {
+    let read_resource = document(r#","uri":"flame.bin""#, 3, "");
+    let decode = |total, beside_bytes: ReadResource| {
+        decode_mesh(read_resource.as_bytes(), "gltf", beside_bytes, MemoryLimit { total, used: 1000 })
+    };
+    let given = |_: &str, _: u64| Ok(bytes());
+    let fits = (0..100_000).find(|&total| decode(total, &given).is_ok()).unwrap();
+    assert!((10_000..50_000).contains(&fits), "{fits}");
+    // A buffer is told how much is left, and asked for no more.
+    let asked = std::cell::Cell::new(None);
+    let refused = |_: &str, left: u64| {
+        asked.set(Some(left));
+        Err(AssetProblem::FileSize { bytes: left + 1, limit: left })
+    };
+    assert!(matches!(decode(fits, &refused), Err(AssetProblem::FileSize { .. })));
+    assert!(asked.get().is_some_and(|left| (42..1000).contains(&left)), "{asked:?}");
+    let told = decode(fits - 1, &given).unwrap_err();
+    assert!(matches!(told, AssetProblem::Memory { others, .. } if others > 1000), "{told}");
+    // Text that would be costly to parse is not parsed.
+    let many = format!("[{}0]", "{},".repeat(1_000_000));
+    let told = decode_mesh(many.as_bytes(), "gltf", &given, MemoryLimit { total: 100 << 20, used: 0 }).unwrap_err();
+    assert_eq!(
+        told,
+        AssetProblem::Memory { bytes: 2 * many.len() as u64 + 400 * 2_000_000, limit: 100 << 20, others: 0 }
+    );
+}
+
+#[test]
+fn every_single_damaged_byte_is_survived() {
+    let good = glb(&document("", 3, ""), &bytes());
+    for place in 0..good.len() {
+        for value in [0, b'9', b'"', 0xff] {
+            let mut bad = good.clone();
+            bad[place] = value;
+            // Whatever it makes of it, it must come back.
+            drop(decode_mesh(&bad, "glb", &nothing_beside, LIMIT));
+        }
+    }
+}

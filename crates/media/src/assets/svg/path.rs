@@ -1,0 +1,247 @@
+//! Path data (the `d` attribute), flattened to polylines.
+
+use bansho_base::math::{self, DVec2};
+
+use super::numbers::Numbers;
+
+/// Segments of a curve, and of each quarter of an arc.
+const CURVE_SEGMENTS: usize = 16;
+
+/// Why path data cannot be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub(super) enum PathError {
+    #[error("a path does not begin with a move (M or m)")]
+    NoMove,
+    #[error("after `{0}` a path lacks numbers")]
+    Numbers(char),
+    #[error("`{0}` is no command of a path")]
+    Command(char),
+    #[error("a path of a single point is no line; allowed: at least 2 points")]
+    OnePoint,
+    #[error("a path has more than {0} points")]
+    ManyPoints(usize),
+}
+
+/// The state of the pen.
+#[derive(Default)]
+struct Pen {
+    subpaths: Vec<Vec<DVec2>>,
+    points: usize,
+    at: DVec2,
+    start: DVec2,
+    /// The last control point of a cubic (`true`) or quadratic curve, for smooth curves.
+    control: Option<(bool, DVec2)>,
+}
+
+/// The lines of a path, one for each move; moves that draw nothing are left out beside others.
+///
+/// # Errors
+/// An unknown command, missing numbers, moves alone, or more than `most` points.
+pub(super) fn subpaths(data: &str, limit: usize) -> Result<Vec<Vec<DVec2>>, PathError> {
+    let mut numbers = Numbers::new(data);
+    let mut pen = Pen::default();
+    let mut command = None;
+    while let Some(next) = numbers.peek() {
+        if next.is_ascii_alphabetic() {
+            numbers.take();
+            command = Some(next);
+        }
+        let letter = command.ok_or(PathError::NoMove)?;
+        if pen.subpaths.is_empty() && !letter.eq_ignore_ascii_case(&'m') {
+            return Err(PathError::NoMove);
+        }
+        pen.draw(letter, &mut numbers)?;
+        if pen.points > limit {
+            return Err(PathError::ManyPoints(limit));
+        }
+        // Further pairs after a move are lines; nothing may follow a closing but a command.
+        command = match letter {
+            'M' => Some('L'),
+            'm' => Some('l'),
+            'Z' | 'z' => None,
+            other => Some(other),
+        };
+    }
+    let moves = !pen.subpaths.is_empty();
+    pen.subpaths.retain(|points| points.len() > 1);
+    if moves && pen.subpaths.is_empty() { Err(PathError::OnePoint) } else { Ok(pen.subpaths) }
+}
+
+impl Pen {
+    fn draw(&mut self, letter: char, numbers: &mut Numbers) -> Result<(), PathError> {
+        let origin = if letter.is_ascii_lowercase() { self.at } else { DVec2::ZERO };
+        let missing = PathError::Numbers(letter);
+        let mut point = || numbers.take_all::<2>().map(|pair| origin + DVec2::from(pair)).ok_or(missing);
+        match letter.to_ascii_uppercase() {
+            'M' => self.move_to(point()?),
+            'L' => self.line_to(point()?),
+            'H' => self.line_to(DVec2::new(origin.x + numbers.next().ok_or(missing)?, self.at.y)),
+            'V' => self.line_to(DVec2::new(self.at.x, origin.y + numbers.next().ok_or(missing)?)),
+            'C' => self.cubic_to(point()?, point()?, point()?),
+            'S' => self.cubic_to(self.mirrored(true), point()?, point()?),
+            'Q' => self.quadratic_to(point()?, point()?),
+            'T' => self.quadratic_to(self.mirrored(false), point()?),
+            'A' => {
+                let [rx, ry, turn] = numbers.take_all().ok_or(missing)?;
+                let large = numbers.flag().ok_or(missing)?;
+                let sweep = numbers.flag().ok_or(missing)?;
+                let end = numbers.take_all::<2>().map(|pair| origin + DVec2::from(pair)).ok_or(missing)?;
+                self.arc_to(DVec2::new(rx, ry), turn.to_radians(), [large, sweep], end);
+            }
+            'Z' => self.close(),
+            _ => return Err(PathError::Command(letter)),
+        }
+        Ok(())
+    }
+
+    fn move_to(&mut self, point: DVec2) {
+        self.subpaths.push(vec![point]);
+        self.points += 1;
+        (self.at, self.start, self.control) = (point, point, None);
+    }
+
+    fn push(&mut self, point: DVec2) {
+        if let Some(points) = self.subpaths.last_mut() {
+            points.push(point);
+        }
+        self.points += 1;
+        self.at = point;
+    }
+
+    fn line_to(&mut self, point: DVec2) {
+        self.push(point);
+        self.control = None;
+    }
+
+    fn close(&mut self) {
+        let start = self.start;
+        if self.at != start {
+            self.line_to(start);
+        }
+        // What follows without a move begins at the start.
+        self.move_to(start);
+    }
+
+    /// The reflected control point, or the current point after anything but a curve of the same kind.
+    fn mirrored(&self, cubic: bool) -> DVec2 {
+        match self.control {
+            Some((kind, control)) if kind == cubic => 2.0 * self.at - control,
+            _ => self.at,
+        }
+    }
+
+    fn cubic_to(&mut self, first: DVec2, second: DVec2, end: DVec2) {
+        let start = self.at;
+        for piece in 1..=CURVE_SEGMENTS {
+            let t = piece as f64 / CURVE_SEGMENTS as f64;
+            let [a, b, c] = [start.lerp(first, t), first.lerp(second, t), second.lerp(end, t)];
+            self.push(a.lerp(b, t).lerp(b.lerp(c, t), t));
+        }
+        self.control = Some((true, second));
+    }
+
+    fn quadratic_to(&mut self, control: DVec2, end: DVec2) {
+        let start = self.at;
+        for piece in 1..=CURVE_SEGMENTS {
+            let t = piece as f64 / CURVE_SEGMENTS as f64;
+            self.push(start.lerp(control, t).lerp(control.lerp(end, t), t));
+        }
+        self.control = Some((false, control));
+    }
+
+    /// An arc of an ellipse, by its end points (SVG 1.1, appendix F.6).
+    fn arc_to(&mut self, radii: DVec2, turn: f64, [large, sweep]: [bool; 2], end: DVec2) {
+        self.control = None;
+        let radii = radii.abs();
+        let (sin, cos) = math::sin_cos(turn);
+        let axis = DVec2::new(cos, sin);
+        let half = DVec2::new(cos, -sin).rotate((self.at - end) / 2.0);
+        if radii.min_element() == 0.0 || half == DVec2::ZERO {
+            self.push(end);
+            return;
+        }
+        // Radii that are too small are scaled up (F.6.6).
+        let radii = radii * (half / radii).length().max(1.0);
+        let ratio = half / radii;
+        let square = (1.0 / ratio.length_squared() - 1.0).max(0.0).sqrt();
+        let sign = if large == sweep { -1.0 } else { 1.0 };
+        // On the unit circle: center, and the angles of both ends.
+        let centre = sign * square * DVec2::new(ratio.y, -ratio.x);
+        let angle = |point: DVec2| math::atan2(point.y - centre.y, point.x - centre.x);
+        let from = angle(ratio);
+        let mut way = angle(-ratio) - from;
+        if sweep && way < 0.0 {
+            way += std::f64::consts::TAU;
+        } else if !sweep && way > 0.0 {
+            way -= std::f64::consts::TAU;
+        }
+        let middle = self.at.midpoint(end);
+        let pieces = (way.abs() / std::f64::consts::FRAC_PI_2 * CURVE_SEGMENTS as f64).ceil().max(1.0) as usize;
+        for piece in 1..pieces {
+            let (sin, cos) = math::sin_cos(from + way * piece as f64 / pieces as f64);
+            self.push(middle + axis.rotate((centre + DVec2::new(cos, sin)) * radii));
+        }
+        self.push(end);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(data: &str) -> Vec<Vec<[f64; 2]>> {
+        let lines = subpaths(data, 1000).unwrap();
+        lines.into_iter().map(|line| line.into_iter().map(|point| point.to_array()).collect()).collect()
+    }
+
+    #[test]
+    fn moves_lines_and_closings() {
+        assert_eq!(lines("M1 2 3,4h1v-1l-1-1"), [[[1.0, 2.0], [3.0, 4.0], [4.0, 4.0], [4.0, 3.0], [3.0, 2.0]]]);
+        assert_eq!(
+            lines("m1 1 1 0zm5 0l0 1"),
+            [vec![[1.0, 1.0], [2.0, 1.0], [1.0, 1.0]], vec![[6.0, 1.0], [6.0, 2.0]]]
+        );
+        assert_eq!(lines("M0 0 M1 1 L2 2"), [[[1.0, 1.0], [2.0, 2.0]]]);
+        assert!(lines("").is_empty());
+    }
+
+    #[test]
+    fn curves_pass_their_middle() {
+        // Half of a cubic is (a + 3 b + 3 c + d) / 8, of a quadratic (a + 2 b + c) / 4.
+        let cubic = &lines("M0 0C0 8 8 8 8 0S16-8 16 0")[0];
+        assert_eq!((cubic.len(), cubic[8], cubic[24]), (33, [4.0, 6.0], [12.0, -6.0]));
+        let quadratic = &lines("M0 0Q4 8 8 0T16 0")[0];
+        assert_eq!((quadratic[8], quadratic[24]), ([4.0, 4.0], [12.0, -4.0]));
+    }
+
+    #[test]
+    fn arcs_stay_on_their_circle() {
+        for (data, centre, pieces) in [
+            ("M1 0A1 1 0 0 1 0 1", [0.0, 0.0], 16),
+            ("M1 0A1 1 0 1 1 0 1", [1.0, 1.0], 48),
+            ("M1 0A1 1 0 0 0 0 1", [1.0, 1.0], 16),
+        ] {
+            let line = subpaths(data, 1000).unwrap().remove(0);
+            assert!(line.iter().all(|point| (point.distance(centre.into()) - 1.0).abs() < 1e-12), "{data}");
+            assert!(line.len().abs_diff(pieces + 1) <= 1, "{data}: {}", line.len());
+        }
+        // Too small a radius grows to half of the way; a turned ellipse keeps its ends.
+        let grown = subpaths("M0 0A1 1 0 0 1 4 0", 1000).unwrap().remove(0);
+        assert!(grown.iter().all(|point| (point.distance(DVec2::new(2.0, 0.0)) - 2.0).abs() < 1e-12));
+        let turned = subpaths("M0 0A3 1 30 0 1 4 1", 1000).unwrap().remove(0);
+        assert_eq!((turned[0], turned[turned.len() - 1]), (DVec2::ZERO, DVec2::new(4.0, 1.0)));
+        assert_eq!(lines("M0 0A0 1 0 0 1 4 1"), [[[0.0, 0.0], [4.0, 1.0]]]);
+    }
+
+    #[test]
+    fn broken_paths_are_errors() {
+        assert_eq!(subpaths("L1 1", 1000), Err(PathError::NoMove));
+        assert_eq!(subpaths("1 1", 1000), Err(PathError::NoMove));
+        assert_eq!(subpaths("M1", 1000), Err(PathError::Numbers('M')));
+        assert_eq!(subpaths("M1 1 B2 2", 1000), Err(PathError::Command('B')));
+        assert_eq!(subpaths("M1 1 L2 2 z 3", 1000), Err(PathError::NoMove));
+        assert_eq!(subpaths("M0 0 A1 1 0 2 0 1 1", 1000), Err(PathError::Numbers('A')));
+        // Closings alone make points too, and no more are made than may be.
+        assert_eq!(subpaths(&format!("M0 0{}", "z".repeat(1000)), 1000), Err(PathError::ManyPoints(1000)));
+    }
+}

@@ -1,0 +1,131 @@
+//! Films by `ffmpeg`: H.264, ProRes 4444 with alpha, VP9 with alpha, AV1.
+//!
+//! Raw frames go through a pipe; the film lies under a temporary name until `ffmpeg` has ended well. The pixels are marked
+//! as what they are: Rec. 709 primaries and matrix, sRGB transfer, limited range. Films agree between versions of
+//! `ffmpeg` to the eye, not to the byte.
+
+mod arguments;
+mod process;
+
+use std::path::{Path, PathBuf};
+
+use bansho_base::{
+    color::AlphaConvention,
+    image::{DisplayImage, DisplayPixels},
+};
+
+use crate::output::{flatten, naming::OutputKind};
+
+pub(crate) use self::process::FfmpegFilm;
+
+/// Options of films by `ffmpeg`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct VideoOptions {
+    /// The program; a bare name is searched in the system's path.
+    pub program: PathBuf,
+    /// Codec of `.webm`.
+    pub webm: WebmCodec,
+}
+
+impl Default for VideoOptions {
+    fn default() -> Self {
+        Self { program: PathBuf::from("ffmpeg"), webm: WebmCodec::default() }
+    }
+}
+
+/// Codecs of WebM.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WebmCodec {
+    /// VP9, 8 bits, with alpha.
+    #[default]
+    Vp9,
+    /// AV1, 10 bits, without alpha.
+    Av1,
+}
+
+/// The format of all frames of a film.
+#[derive(Clone, Debug)]
+pub(crate) struct VideoFormat {
+    pub(crate) kind: OutputKind,
+    pub(crate) size: [usize; 2],
+    pub(crate) fps: [u32; 2],
+    pub(crate) opaque: bool,
+    pub(crate) alpha: AlphaConvention,
+    pub(crate) sixteen_bits: bool,
+    pub(crate) options: VideoOptions,
+}
+
+impl VideoFormat {
+    /// Whether the film has no alpha.
+    fn is_flat(&self) -> bool {
+        self.opaque || !carries_alpha(self.kind, &self.options)
+    }
+
+    /// The encoded size: 4:2:0 without alpha needs even sides, so an odd one repeats its last pixels.
+    fn coded_size(&self) -> [usize; 2] {
+        let odd_is_fine = self.kind == OutputKind::Mov;
+        if odd_is_fine { self.size } else { self.size.map(|side| side.next_multiple_of(2)) }
+    }
+}
+
+/// Whether a film of this kind has alpha.
+pub(crate) fn carries_alpha(kind: OutputKind, options: &VideoOptions) -> bool {
+    match kind {
+        OutputKind::Mov => true,
+        OutputKind::Webm => options.webm == WebmCodec::Vp9,
+        _ => false,
+    }
+}
+
+/// A frame as raw video for `ffmpeg`: RGBA rows of 8 bits, or of 16 bits little-endian.
+pub(crate) fn prepare(picture: &DisplayImage, format: &VideoFormat) -> Vec<u8> {
+    let flat;
+    let picture = if format.is_flat() && !picture.opaque {
+        flat = flatten::over_black(picture);
+        &flat
+    } else {
+        picture
+    };
+    let coded = format.coded_size();
+    if format.sixteen_bits {
+        let wide = match &picture.pixels {
+            DisplayPixels::Sixteen(pixels) => padded(pixels, format.size, coded),
+            DisplayPixels::Eight(pixels) => {
+                let wide: Vec<[u16; 4]> = pixels.iter().map(|pixel| pixel.map(|code| u16::from(code) * 257)).collect();
+                padded(&wide, format.size, coded)
+            }
+        };
+        wide.as_flattened().iter().flat_map(|code| code.to_le_bytes()).collect()
+    } else {
+        padded(&flatten::to_eight_bits(&picture.pixels), format.size, coded).into_flattened()
+    }
+}
+
+/// `pixels` with the last column and row repeated up to the size `coded`.
+fn padded<T: Copy>(pixels: &[T], [width, height]: [usize; 2], coded: [usize; 2]) -> Vec<T> {
+    if coded == [width, height] {
+        return pixels.to_vec();
+    }
+    let pixel = |index: usize| {
+        let (x, y) = (index % coded[0], index / coded[0]);
+        pixels[y.min(height - 1) * width + x.min(width - 1)]
+    };
+    (0..coded[0] * coded[1]).map(pixel).collect()
+}
+
+/// The arguments that make the film at `output`.
+pub(crate) fn arguments(format: &VideoFormat, output: &Path) -> Vec<std::ffi::OsString> {
+    arguments::of(format, output)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn odd_sides_get_their_last_pixels_twice() {
+        assert_eq!(padded(&[1, 2, 3, 4, 5, 6], [3, 2], [4, 2]), [1, 2, 3, 3, 4, 5, 6, 6]);
+        assert_eq!(padded(&[1, 2, 3], [1, 3], [2, 4]), [1, 1, 2, 2, 3, 3, 3, 3]);
+        assert_eq!(padded(&[1, 2], [2, 1], [2, 1]), [1, 2]);
+    }
+}

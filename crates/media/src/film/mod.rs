@@ -1,0 +1,8 @@
+//! Films: APNG and GIF, encoded in this process, and other formats by `ffmpeg`. Frames may arrive out of order.
+
+pub(crate) mod apng;
+pub mod ffmpeg;
+pub(crate) mod gif;
+pub(crate) mod ordered;
+mod palette;
+pub(crate) mod timing;

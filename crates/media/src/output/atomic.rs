@@ -1,0 +1,343 @@
+//! Atomic writing of files: a temporary file in the same folder, then a rename.
+//!
+//! The temporary name is `.NAME.RANDOM.part`: hidden and unique, so that two machines that write the same frame do not
+//! interfere. After a power failure or SIGKILL such a file may remain; nothing reads it and it may be deleted.
+
+use std::{
+    fs::{self, File},
+    io::{self, BufWriter, Write},
+    path::{Path, PathBuf},
+};
+
+use tempfile::NamedTempFile;
+
+use super::{
+    overwrite_policy::{OverwriteError, OverwritePolicy},
+    temporary_files::{self, TemporaryFileGuard},
+};
+use crate::error::MediaError;
+
+/// A file that gets its name only when it is finished. If dropped before, it is deleted.
+#[derive(Debug)]
+pub struct AtomicFile {
+    temporary: NamedTempFile,
+    /// Dropped after the file.
+    _guard: TemporaryFileGuard,
+    path: PathBuf,
+    /// The target of `path`, if it is a symbolic link.
+    target: PathBuf,
+    policy: OverwritePolicy,
+}
+
+impl AtomicFile {
+    /// Makes the folders that lead to `path`, and a temporary file beside it, or beside what it links to.
+    ///
+    /// # Errors
+    /// The folder cannot be made or written, the disk is full, or `path` is a folder, a device or a pipe.
+    pub fn create(path: &Path) -> Result<Self, MediaError> {
+        Self::create_with(path, &OverwritePolicy::any())
+    }
+
+    /// As [`AtomicFile::create`], for a file that takes no other's place than `policy` allows, now and when it is finished.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::create`], or `path` leads to a file that must stay.
+    pub fn create_with(path: &Path, policy: &OverwritePolicy) -> Result<Self, MediaError> {
+        let fail = |source| MediaError::from_io(path, source);
+        // First, because a path such as `missing/../a.png` can only be resolved when its folders exist.
+        fs::create_dir_all(folder_of(path)).map_err(|source| match source.kind() {
+            // The error of `create_dir_all` if a file is in the place of a folder.
+            io::ErrorKind::AlreadyExists => MediaError::NotAFolder { path: path.to_path_buf() },
+            _ => fail(source),
+        })?;
+        match fs::metadata(path) {
+            Ok(there) if there.is_dir() => return Err(MediaError::IsFolder { path: path.to_path_buf() }),
+            // A rename would replace it.
+            Ok(there) if !there.is_file() => return Err(MediaError::NotAFile { path: path.to_path_buf() }),
+            _ => {}
+        }
+        let target = match fs::canonicalize(path) {
+            Ok(target) if path.is_symlink() => target,
+            // A dangling link is replaced; a link to itself is an error.
+            Err(source) if path.is_symlink() && source.kind() != io::ErrorKind::NotFound => return Err(fail(source)),
+            _ => path.to_path_buf(),
+        };
+        allow(policy, &target, path)?;
+        let (temporary, guard) = temporary_files::create(|| temporary_in(folder_of(&target), &target)).map_err(fail)?;
+        Ok(Self { temporary, _guard: guard, path: path.to_path_buf(), target, policy: policy.clone() })
+    }
+
+    /// The file to write to.
+    pub fn file(&mut self) -> &mut File {
+        self.temporary.as_file_mut()
+    }
+
+    /// The path of the temporary file, for programs that write by name.
+    pub fn temporary_path(&self) -> &Path {
+        self.temporary.path()
+    }
+
+    /// The final path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Gives it its name, which no file may bear.
+    ///
+    /// # Errors
+    /// A file bears it, or it cannot be renamed; the temporary file is then removed.
+    pub fn finish_new(self) -> Result<(), MediaError> {
+        let path = self.path;
+        self.temporary.persist_noclobber(&self.target).map(drop).map_err(|error| match error.error.kind() {
+            io::ErrorKind::AlreadyExists => MediaError::IsThere { path },
+            _ => MediaError::from_io(&path, error.error),
+        })
+    }
+
+    /// Gives it its name, in place of any file that bore it, and who may read and write that one may do so with this.
+    ///
+    /// # Errors
+    /// It cannot be renamed, or a file that must stay came to bear the name; the temporary file is then removed.
+    pub fn finish(self) -> Result<(), MediaError> {
+        let path = self.path;
+        allow(&self.policy, &self.target, &path)?;
+        let fail = |source| MediaError::from_io(&path, source);
+        if let Ok(old) = fs::metadata(&self.target) {
+            self.temporary.as_file().set_permissions(old.permissions()).map_err(fail)?;
+        }
+        self.temporary.persist(&self.target).map(drop).map_err(|error| fail(error.error))
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Whether `target`, given as `path`, may be overwritten.
+fn allow(policy: &OverwritePolicy, target: &Path, path: &Path) -> Result<(), MediaError> {
+    let path = path.to_path_buf();
+    policy.check(target).map_err(|kept| match kept {
+        OverwriteError::Input => MediaError::OverInput { path },
+        OverwriteError::Unmarked => MediaError::Unmarked { path },
+    })
+}
+
+/// A new, empty, hidden file in `folder`, with the user's default permissions, since it becomes the picture.
+fn temporary_in(folder: &Path, path: &Path) -> io::Result<NamedTempFile> {
+    // Names are limited to 255 bytes: a long one is cut in front of the unique letters.
+    let name: String = path.file_name().unwrap_or_default().to_string_lossy().chars().take(50).collect();
+    let prefix = format!(".{name}.");
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix).suffix(".part").rand_bytes(8);
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder)
+}
+
+/// Writes a whole file by `fill`, or none.
+///
+/// # Errors
+/// As [`AtomicFile::create`], or what `fill` could not write.
+pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>) -> Result<(), MediaError> {
+    let mut atomic = AtomicFile::create(path)?;
+    let mut buffer = BufWriter::with_capacity(1 << 16, atomic.file());
+    fill(&mut buffer).and_then(|()| buffer.flush()).map_err(|source| MediaError::from_io(path, source))?;
+    drop(buffer);
+    atomic.finish()
+}
+
+/// Writes `bytes` as a whole file, or none.
+///
+/// # Errors
+/// As [`AtomicFile::create`], or the bytes cannot be written.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), MediaError> {
+    write_bytes_with(path, bytes, &OverwritePolicy::any())
+}
+
+/// As [`write_bytes`], in place of no other file than `policy` allows.
+///
+/// # Errors
+/// As [`AtomicFile::create_with`], or the bytes cannot be written.
+pub fn write_bytes_with(path: &Path, bytes: &[u8], policy: &OverwritePolicy) -> Result<(), MediaError> {
+    let mut atomic = AtomicFile::create_with(path, policy)?;
+    atomic.file().write_all(bytes).map_err(|source| MediaError::from_io(path, source))?;
+    atomic.finish()
+}
+
+/// Writes `bytes` as a whole new file, or none; one that is there already stays.
+///
+/// # Errors
+/// As [`write_bytes`], or a file is there.
+pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), MediaError> {
+    if path.exists() {
+        return Err(MediaError::IsThere { path: path.to_path_buf() });
+    }
+    let mut atomic = AtomicFile::create(path)?;
+    atomic.file().write_all(bytes).map_err(|source| MediaError::from_io(path, source))?;
+    atomic.finish_new()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_new_file_never_takes_the_place_of_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        write_new(&path, b"first").unwrap();
+        assert!(matches!(write_new(&path, b"second"), Err(MediaError::IsThere { .. })));
+        // Also where it came in the meantime.
+        let late = AtomicFile::create(&path).unwrap();
+        assert!(matches!(late.finish_new(), Err(MediaError::IsThere { .. })));
+        assert_eq!(fs::read(&path).unwrap(), b"first");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn no_link_that_is_made_on_the_way_leads_to_an_input() {
+        use std::os::unix::fs::symlink;
+
+        use crate::output::overwrite_policy::InputFiles;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("plate.png"), "plate").unwrap();
+        let mut inputs = InputFiles::default();
+        inputs.insert(&at("plate.png"));
+        let policy = OverwritePolicy::new(inputs, true);
+        // Whether the folder that the path passes through is missing or there.
+        for _ in 0..2 {
+            let made = write_bytes_with(&at("x/../plate.png"), b"new", &policy);
+            assert!(matches!(made, Err(MediaError::OverInput { .. })));
+        }
+        symlink("plate.png", at("soft.png")).unwrap();
+        fs::hard_link(at("plate.png"), at("hard.png")).unwrap();
+        for name in ["soft.png", "hard.png"] {
+            let error = AtomicFile::create_with(&at(name), &policy).unwrap_err();
+            assert!(matches!(&error, MediaError::OverInput { path } if *path == at(name)), "{error}");
+        }
+        // The folder becomes a link while the file is written.
+        fs::create_dir(at("out")).unwrap();
+        let late = AtomicFile::create_with(&at("out/plate.png"), &policy).unwrap();
+        let temporary = late.temporary_path().to_path_buf();
+        fs::rename(&temporary, folder.path().join(temporary.file_name().unwrap())).unwrap();
+        fs::remove_dir(at("out")).unwrap();
+        symlink(".", at("out")).unwrap();
+        assert!(matches!(late.finish(), Err(MediaError::OverInput { .. })));
+        assert_eq!(fs::read(at("plate.png")).unwrap(), b"plate");
+    }
+
+    #[test]
+    fn a_file_without_our_mark_that_comes_on_the_way_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let late = AtomicFile::create_with(&path, &OverwritePolicy::default()).unwrap();
+        fs::write(&path, "a photograph").unwrap();
+        assert!(matches!(late.finish(), Err(MediaError::Unmarked { .. })));
+        assert!(matches!(write_bytes_with(&path, b"", &OverwritePolicy::default()), Err(MediaError::Unmarked { .. })));
+        assert_eq!((fs::read(&path).unwrap(), names(folder.path())), (b"a photograph".to_vec(), vec!["a.png".into()]));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_stays_a_device() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("0001.png");
+        std::os::unix::fs::symlink("/dev/null", &link).unwrap();
+        assert!(matches!(write_bytes(&link, b"x"), Err(MediaError::NotAFile { .. })));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_itself_is_an_error_and_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("a.png");
+        std::os::unix::fs::symlink("a.png", &link).unwrap();
+        assert!(matches!(write_bytes(&link, b"x"), Err(MediaError::Io { .. })));
+        assert!(link.is_symlink());
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_finished_file_replaces_the_old_one_and_leaves_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new/deep/a.png");
+        write_bytes(&path, b"first").unwrap();
+        write(&path, |file| file.write_all(b"second")).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"second");
+        assert_eq!(names(path.parent().unwrap()), ["a.png"]);
+    }
+
+    #[test]
+    fn a_failed_write_keeps_the_old_file_and_removes_the_temporary_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        write_bytes(&path, b"old").unwrap();
+        let error = write(&path, |file| {
+            file.write_all(b"half")?;
+            Err(io::ErrorKind::StorageFull.into())
+        });
+        assert!(matches!(error, Err(MediaError::DiskFull { .. })));
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["a.png"]);
+    }
+
+    #[test]
+    fn while_it_is_written_it_is_hidden_and_two_writers_do_not_meet() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let (one, two) = (AtomicFile::create(&path).unwrap(), AtomicFile::create(&path).unwrap());
+        assert_ne!(one.temporary_path(), two.temporary_path());
+        assert!(names(folder.path()).iter().all(|name| name.starts_with(".a.png.") && name.ends_with(".part")));
+        drop((one, two));
+        assert!(names(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn a_folder_and_a_file_in_the_way_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(matches!(write_bytes(folder.path(), b""), Err(MediaError::IsFolder { .. })));
+        let file = folder.path().join("file");
+        write_bytes(&file, b"").unwrap();
+        assert!(matches!(write_bytes(&file.join("a.png"), b""), Err(MediaError::NotAFolder { .. })));
+        assert!(matches!(write_bytes(&file.join("deep/a.png"), b""), Err(MediaError::NotAFolder { .. })));
+    }
+
+    #[test]
+    fn a_very_long_name_still_has_a_temporary_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(format!("{}.png", "火".repeat(80)));
+        write_bytes(&path, b"x").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"x");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_permissions_stay() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("deep/a.toml"), folder.path().join("link.toml"));
+        write_bytes(&file, b"old").unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
+        symlink("deep/a.toml", &link).unwrap();
+        write_bytes(&link, b"new").unwrap();
+        assert!(link.is_symlink() && fs::read(&file).unwrap() == b"new");
+        assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn others_may_read_a_finished_file_as_the_umask_allows() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let (plain, whole) = (folder.path().join("plain"), folder.path().join("whole"));
+        fs::write(&plain, b"").unwrap();
+        write_bytes(&whole, b"").unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&whole), mode(&plain));
+    }
+}

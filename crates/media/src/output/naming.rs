@@ -1,0 +1,436 @@
+//! Output file names with frame numbers: `frame.####.exr`, `frame.%04d.exr`, `film.mp4`.
+
+use std::path::{Path, PathBuf};
+
+/// Output formats, by extension.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum OutputKind {
+    /// One PNG for each frame: display pixels.
+    Png,
+    /// One OpenEXR for each frame: scene-linear.
+    Exr,
+    /// Animated PNG.
+    Apng,
+    /// Animated GIF.
+    Gif,
+    /// H.264 in MP4, by ffmpeg.
+    Mp4,
+    /// ProRes 4444 in QuickTime, by ffmpeg.
+    Mov,
+    /// VP9 or AV1 in WebM, by ffmpeg.
+    Webm,
+}
+
+impl OutputKind {
+    /// Every kind.
+    pub const ALL: [Self; 7] = [Self::Png, Self::Exr, Self::Apng, Self::Gif, Self::Mp4, Self::Mov, Self::Webm];
+
+    /// Its extension, without the dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Exr => "exr",
+            Self::Apng => "apng",
+            Self::Gif => "gif",
+            Self::Mp4 => "mp4",
+            Self::Mov => "mov",
+            Self::Webm => "webm",
+        }
+    }
+
+    /// The format with this extension, case-insensitive.
+    pub fn from_extension(extension: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.extension().eq_ignore_ascii_case(extension))
+    }
+
+    /// Whether every frame is a file of its own.
+    pub fn is_sequence(self) -> bool {
+        matches!(self, Self::Png | Self::Exr)
+    }
+
+    /// Whether it holds scene-linear pixels.
+    pub fn is_scene_linear(self) -> bool {
+        self == Self::Exr
+    }
+
+    /// Whether it is made by the program `ffmpeg`.
+    pub fn needs_ffmpeg(self) -> bool {
+        matches!(self, Self::Mp4 | Self::Mov | Self::Webm)
+    }
+}
+
+/// Why a name cannot be used for output.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NamingError {
+    /// Nothing after the last dot, or no dot.
+    #[error("{path}: has no extension; allowed: {ALLOWED}", path = .path.display())]
+    NoExtension {
+        /// The name.
+        path: PathBuf,
+    },
+    /// An extension that Bansho does not write.
+    #[error("{path}: `.{extension}` is not written; allowed: {ALLOWED}", path = .path.display())]
+    UnknownExtension {
+        /// The name.
+        path: PathBuf,
+        /// Its extension.
+        extension: String,
+    },
+    /// An extension other than the only one that will do.
+    #[error("{path}: `.{extension}` is not written here; allowed: .{allowed}", path = .path.display())]
+    OtherExtension {
+        /// The name.
+        path: PathBuf,
+        /// Its extension.
+        extension: String,
+        /// The one that will do.
+        allowed: &'static str,
+    },
+    /// More than one placeholder for the frame number.
+    #[error("{path}: more than one place for the frame number; use one run of # or one %04d", path = .path.display())]
+    TwoPlaceholders {
+        /// The name.
+        path: PathBuf,
+    },
+    /// A percent sign that is not a frame number.
+    #[error("{path}: `%` must begin %d or %04d; write %% for the sign itself", path = .path.display())]
+    BadPercent {
+        /// The name.
+        path: PathBuf,
+    },
+    /// A frame number of more digits than numbers have.
+    #[error("{path}: a frame number of {digits} digits; allowed: up to {MAX_DIGITS}", path = .path.display())]
+    ManyDigits {
+        /// The name.
+        path: PathBuf,
+        /// How many digits it asks for.
+        digits: usize,
+    },
+    /// A frame number in a file that holds all frames.
+    #[error("{path}: a .{extension} file holds all frames, so its name has no place for a frame number", path = .path.display())]
+    NumberedFilm {
+        /// The name.
+        path: PathBuf,
+        /// Its extension.
+        extension: &'static str,
+    },
+    /// A name that is not Unicode.
+    #[error("{path}: is not a Unicode name", path = .path.display())]
+    NotUnicode {
+        /// The name.
+        path: PathBuf,
+    },
+}
+
+const ALLOWED: &str = ".png, .exr, .apng, .gif, .mp4, .mov, .webm";
+
+/// Largest width of a placeholder.
+const MAX_DIGITS: usize = 20;
+
+/// A file name with at most one placeholder for the frame number.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct FrameTemplate {
+    before: String,
+    digits: Option<usize>,
+    after: String,
+}
+
+/// Why a name with placeholders cannot be parsed.
+pub(crate) enum TemplateError {
+    TwoPlaceholders,
+    BadPercent,
+    ManyDigits(usize),
+}
+
+impl FrameTemplate {
+    /// Parses runs of `#` and, with `printf`, `%d`, `%04d` and `%%`.
+    pub(crate) fn parse(name: &str, printf: bool) -> Result<Self, TemplateError> {
+        let mut template = Self { before: String::new(), digits: None, after: String::new() };
+        let mut rest = name;
+        while let Some(first) = rest.chars().next() {
+            let (placeholder, length) = match first {
+                '#' => {
+                    let run = rest.len() - rest.trim_start_matches('#').len();
+                    if run > MAX_DIGITS {
+                        return Err(TemplateError::ManyDigits(run));
+                    }
+                    (Some(run), run)
+                }
+                '%' if printf && rest.starts_with("%%") => {
+                    template.literal('%');
+                    (None, 2)
+                }
+                '%' if printf => {
+                    let (digits, length) = printf_digits(rest).ok_or(TemplateError::BadPercent)?;
+                    (Some(digits), length)
+                }
+                other => {
+                    template.literal(other);
+                    (None, other.len_utf8())
+                }
+            };
+            if placeholder.is_some() && template.digits.replace(placeholder.unwrap_or(0)).is_some() {
+                return Err(TemplateError::TwoPlaceholders);
+            }
+            rest = &rest[length..];
+        }
+        Ok(template)
+    }
+
+    fn literal(&mut self, letter: char) {
+        if self.digits.is_some() { self.after.push(letter) } else { self.before.push(letter) }
+    }
+
+    /// The name for frame `number`: the sign first, then the digits, padded with zeros.
+    pub(crate) fn name(&self, number: i64) -> String {
+        let Some(digits) = self.digits else { return self.before.clone() };
+        let sign = if number < 0 { "-" } else { "" };
+        format!("{}{sign}{:0digits$}{}", self.before, number.unsigned_abs(), self.after)
+    }
+}
+
+/// `%d`, `%4d` or `%04d` at the start of `text`: its width in digits, and the length of the placeholder.
+fn printf_digits(text: &str) -> Option<(usize, usize)> {
+    let inner = text.strip_prefix('%')?;
+    let width = &inner[..inner.find('d')?];
+    let digits = if width.is_empty() { 1 } else { width.parse().ok().filter(|_| !width.starts_with('+'))? };
+    (digits <= MAX_DIGITS).then_some((digits, width.len() + 2))
+}
+
+/// Default name of the pictures of a scene with the file stem `stem`.
+pub fn pictures(stem: &str) -> String {
+    format!("{stem}.####.png")
+}
+
+/// Default name of the picture of frame `number` of a scene with the file stem `stem`.
+pub fn picture(stem: &str, number: i64) -> String {
+    let (before, after) = (format!("{stem}."), ".png".to_owned());
+    FrameTemplate { before, digits: Some(4), after }.name(number)
+}
+
+/// A path whose file name may contain the frame number.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NumberedPath {
+    folder: PathBuf,
+    template: FrameTemplate,
+}
+
+impl NumberedPath {
+    /// Reads a name of files with this extension (without the dot), such as `gas.####.ply`. `count` is how many files there will be: a
+    /// lone `gas.ply` becomes `gas.####.ply` unless there is exactly one.
+    ///
+    /// # Errors
+    /// Another extension, two placeholders, a stray percent sign.
+    pub fn parse(path: &Path, extension: &'static str, count: usize) -> Result<Self, NamingError> {
+        let name = file_name(path)?;
+        let own = extension_of(path, name)?;
+        if !own.eq_ignore_ascii_case(extension) {
+            let path = path.to_path_buf();
+            return Err(NamingError::OtherExtension { path, extension: own.to_owned(), allowed: extension });
+        }
+        let mut numbered = Self::read(path, name)?;
+        if count != 1 {
+            numbered.number();
+        }
+        Ok(numbered)
+    }
+
+    fn read(path: &Path, name: &str) -> Result<Self, NamingError> {
+        let owned = || path.to_path_buf();
+        let template = FrameTemplate::parse(name, true).map_err(|error| match error {
+            TemplateError::TwoPlaceholders => NamingError::TwoPlaceholders { path: owned() },
+            TemplateError::BadPercent => NamingError::BadPercent { path: owned() },
+            TemplateError::ManyDigits(digits) => NamingError::ManyDigits { path: owned(), digits },
+        })?;
+        Ok(Self { folder: path.parent().map(Path::to_path_buf).unwrap_or_default(), template })
+    }
+
+    /// Inserts a placeholder before the extension if there is none.
+    fn number(&mut self) {
+        let template = &mut self.template;
+        if template.digits.is_none() {
+            let dot = template.before.rfind('.').unwrap_or(template.before.len());
+            template.after = template.before.split_off(dot);
+            template.before.push('.');
+            template.digits = Some(4);
+        }
+    }
+
+    /// Whether the name contains the frame number.
+    pub fn is_numbered(&self) -> bool {
+        self.template.digits.is_some()
+    }
+
+    /// The name of all files, with a `#` for each digit of the frame number.
+    pub fn of_all(&self) -> PathBuf {
+        let FrameTemplate { before, digits, after } = &self.template;
+        self.folder.join(format!("{before}{}{after}", "#".repeat(digits.unwrap_or(0))))
+    }
+
+    /// The file for frame `number`.
+    pub fn path(&self, number: i64) -> PathBuf {
+        self.folder.join(self.template.name(number))
+    }
+}
+
+/// The output path of a job.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OutputPattern {
+    numbered: NumberedPath,
+    kind: OutputKind,
+}
+
+impl OutputPattern {
+    /// Reads the name that was asked for. `frame_count` is how many frames the job has: a lone `name.png` becomes
+    /// `name.####.png` unless there is exactly one. Only the last part of the path may hold a placeholder.
+    ///
+    /// # Errors
+    /// No extension or one that is not written, two placeholders, a stray percent sign, a placeholder in a film's name.
+    pub fn parse(path: &Path, frame_count: usize) -> Result<Self, NamingError> {
+        let name = file_name(path)?;
+        let kind = kind_of(path, name)?;
+        let mut numbered = NumberedPath::read(path, name)?;
+        if numbered.is_numbered() && !kind.is_sequence() {
+            return Err(NamingError::NumberedFilm { path: path.to_path_buf(), extension: kind.extension() });
+        }
+        if kind.is_sequence() && frame_count != 1 {
+            numbered.number();
+        }
+        Ok(Self { numbered, kind })
+    }
+
+    /// The format.
+    pub fn kind(&self) -> OutputKind {
+        self.kind
+    }
+
+    /// Whether the name contains the frame number.
+    pub fn is_numbered(&self) -> bool {
+        self.numbered.is_numbered()
+    }
+
+    /// The name of all files, with a `#` for each digit of the frame number.
+    pub fn of_all(&self) -> PathBuf {
+        self.numbered.of_all()
+    }
+
+    /// The file of frame `number`; a film has one file for all.
+    pub fn path(&self, number: i64) -> PathBuf {
+        self.numbered.path(number)
+    }
+}
+
+fn file_name(path: &Path) -> Result<&str, NamingError> {
+    let name = path.file_name().ok_or_else(|| NamingError::NoExtension { path: path.to_path_buf() })?;
+    name.to_str().ok_or_else(|| NamingError::NotUnicode { path: path.to_path_buf() })
+}
+
+fn extension_of<'a>(path: &Path, name: &'a str) -> Result<&'a str, NamingError> {
+    match name.rsplit_once('.') {
+        Some((stem, extension)) if !stem.is_empty() && !extension.is_empty() => Ok(extension),
+        _ => Err(NamingError::NoExtension { path: path.to_path_buf() }),
+    }
+}
+
+fn kind_of(path: &Path, name: &str) -> Result<OutputKind, NamingError> {
+    let extension = extension_of(path, name)?;
+    OutputKind::from_extension(extension)
+        .ok_or_else(|| NamingError::UnknownExtension { path: path.to_path_buf(), extension: extension.to_owned() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_picture_is_called_as_the_pattern_of_all_says() {
+        let pattern = OutputPattern::parse(Path::new(&pictures("fire")), 2).unwrap();
+        for number in [-12_345, -5, 0, 7, 12_345] {
+            assert_eq!(pattern.path(number), Path::new(&picture("fire", number)));
+        }
+    }
+
+    fn name(pattern: &str, frames: usize, number: i64) -> String {
+        OutputPattern::parse(Path::new(pattern), frames).unwrap().path(number).display().to_string()
+    }
+
+    #[test]
+    fn particles_are_numbered_like_frames_and_have_an_extension_of_their_own() {
+        let name = |name: &str, count| NumberedPath::parse(Path::new(name), "ply", count).map(|path| path.path(7));
+        assert_eq!(name("a/gas.ply", 9), Ok("a/gas.0007.ply".into()));
+        assert_eq!((name("gas.ply", 1), name("gas.##.PLY", 1)), (Ok("gas.ply".into()), Ok("gas.07.PLY".into())));
+        assert!(matches!(name("gas.obj", 1), Err(NamingError::OtherExtension { allowed: "ply", .. })));
+        assert!(matches!(name("gas", 1), Err(NamingError::NoExtension { .. })));
+    }
+
+    fn error(pattern: &str) -> NamingError {
+        OutputPattern::parse(Path::new(pattern), 2).unwrap_err()
+    }
+
+    #[test]
+    fn hashes_and_printf_give_the_same_names() {
+        for pattern in ["out/frame.####.exr", "out/frame.%04d.exr"] {
+            assert_eq!(name(pattern, 9, 7), "out/frame.0007.exr");
+            assert_eq!(name(pattern, 9, 12345), "out/frame.12345.exr");
+            assert_eq!(name(pattern, 9, -3), "out/frame.-0003.exr");
+        }
+        assert_eq!(name("#.png", 9, 12), "12.png");
+        assert_eq!(name("f%d.png", 9, 5), "f5.png");
+        assert_eq!(name("f.######.PNG", 1, 5), "f.000005.PNG");
+    }
+
+    #[test]
+    fn all_files_have_a_name_too() {
+        let all = |pattern: &str, frames| OutputPattern::parse(Path::new(pattern), frames).unwrap().of_all();
+        for (pattern, frames, expected) in
+            [("a/f.%03d.png", 9, "a/f.###.png"), ("f.exr", 2, "f.####.exr"), ("f.exr", 1, "f.exr")]
+        {
+            assert_eq!(all(pattern, frames), Path::new(expected));
+        }
+    }
+
+    #[test]
+    fn the_smallest_frame_number_has_a_name() {
+        assert_eq!(name("####.png", 2, i64::MIN), "-9223372036854775808.png");
+    }
+
+    #[test]
+    fn a_doubled_percent_sign_is_itself() {
+        assert_eq!(name("100%%.%03d.png", 2, 5), "100%.005.png");
+        assert_eq!(name("100%%.png", 1, 5), "100%.png");
+    }
+
+    #[test]
+    fn a_lone_name_gets_a_number_only_for_several_frames() {
+        assert_eq!(name("a/fire.png", 240, 3), "a/fire.0003.png");
+        assert_eq!(name("a/fire.v2.exr", 2, 3), "a/fire.v2.0003.exr");
+        assert_eq!(name("a/fire.png", 1, 3), "a/fire.png");
+        assert_eq!(name("a/fire.mp4", 240, 3), "a/fire.mp4");
+    }
+
+    #[test]
+    fn signs_in_folder_names_are_left_alone() {
+        assert_eq!(name("c#/50%/a.#.png", 2, 4), "c#/50%/a.4.png");
+    }
+
+    #[test]
+    fn unusable_names_are_refused_with_the_reason() {
+        assert!(matches!(error("a.##.#.png"), NamingError::TwoPlaceholders { .. }));
+        assert!(matches!(error("a.##.%03d.png"), NamingError::TwoPlaceholders { .. }));
+        assert!(matches!(error("a.%s.png"), NamingError::BadPercent { .. }));
+        assert!(matches!(error("a.%099d.png"), NamingError::BadPercent { .. }));
+        assert!(matches!(error("a.%-4d.png"), NamingError::BadPercent { .. }));
+        assert!(matches!(error(&format!("{}.png", "#".repeat(21))), NamingError::ManyDigits { digits: 21, .. }));
+        // As many as the standard library could not write.
+        assert!(matches!(error(&format!("{}.png", "#".repeat(100_000))), NamingError::ManyDigits { .. }));
+        assert_eq!(name(&format!("{}.png", "#".repeat(20)), 2, 1), "00000000000000000001.png");
+        assert!(matches!(error("film.####.mp4"), NamingError::NumberedFilm { .. }));
+        for bare in ["frame", ".png", "frame.", "..", "/", ""] {
+            assert!(matches!(error(bare), NamingError::NoExtension { .. }), "{bare}");
+        }
+        let text = error("frame.tiff").to_string();
+        for extension in OutputKind::ALL.map(OutputKind::extension) {
+            assert!(text.contains(&format!(".{extension}")), "{text}");
+        }
+    }
+}

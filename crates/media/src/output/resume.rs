@@ -1,0 +1,114 @@
+//! Fingerprints of frames that exist and are complete, so that a job can skip them.
+
+use std::path::Path;
+
+use super::fingerprint;
+use crate::{exr, input, png};
+
+/// Largest frame file that is read, bytes: a larger one is not Bansho's.
+const FRAME_BYTES: u64 = 8 << 30;
+
+/// The fingerprint of the PNG or OpenEXR file at `path` if it is one that Bansho wrote and is whole to the last byte:
+/// every checksum of a PNG is right up to its end, an OpenEXR file has the digest that its header names.
+/// `None` for a file that is missing, cut off, damaged or someone else's, and for what is no ordinary file.
+pub fn existing_fingerprint(path: &Path) -> Option<[u8; 32]> {
+    fingerprint(&input::read(path, FRAME_BYTES).ok()?)
+}
+
+/// As [`existing_fingerprint`], of the bytes of a file.
+pub fn fingerprint(file: &[u8]) -> Option<[u8; 32]> {
+    if file.starts_with(&exr::attribute::MAGIC) { of_exr(file) } else { of_png(file) }
+}
+
+fn of_png(file: &[u8]) -> Option<[u8; 32]> {
+    let (mut found, mut has_pixels, mut ended) = (None, false, false);
+    for chunk in png::chunk::chunks(file)? {
+        let chunk = chunk.ok().filter(|_| !ended)?;
+        match &chunk.kind {
+            b"tEXt" => {
+                let prefix = [png::KEY_FINGERPRINT.as_bytes(), b"\0"].concat();
+                found = found.or(chunk.contents.strip_prefix(&prefix[..]).and_then(fingerprint::from_hex));
+            }
+            b"IDAT" => has_pixels = true,
+            b"IEND" => ended = true,
+            _ => {}
+        }
+    }
+    found.filter(|_| has_pixels && ended)
+}
+
+fn of_exr(file: &[u8]) -> Option<[u8; 32]> {
+    let outline = exr::parse::parse_header(file).ok()?;
+    let [part] = &outline.parts[..] else { return None };
+    let digest_at = part.string(exr::KEY_DIGEST).filter(|place| place.len() == 64)?;
+    let digest = fingerprint::from_hex(file.get(digest_at.clone())?)?;
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(file.get(..digest_at.start)?).update(&[b'0'; 64]).update(file.get(digest_at.end..)?);
+    if *hasher.finalize().as_bytes() != digest {
+        return None;
+    }
+    fingerprint::from_hex(file.get(part.string(exr::KEY_FINGERPRINT)?)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{
+        color::AlphaConvention,
+        image::{DisplayImage, DisplayPixels},
+    };
+
+    use super::*;
+    use crate::testing;
+
+    const FINGERPRINT: [u8; 32] = *b"the pixels depend on all of this";
+
+    fn a_png() -> Vec<u8> {
+        let pixels = (0..35).map(|i| [i * 7, i, 255 - i, 200]).collect();
+        let pixels = DisplayPixels::Eight(pixels);
+        let picture = DisplayImage { width: 7, height: 5, opaque: false, alpha: AlphaConvention::Encoded, pixels };
+        png::encode(&picture, &FINGERPRINT, png::PngEffort::Fast, Path::new("a.png")).unwrap()
+    }
+
+    fn an_exr() -> Vec<u8> {
+        let mut frame = testing::frame(20, 18);
+        frame.header.fingerprint = FINGERPRINT;
+        exr::encode(&frame, Path::new("a.exr")).unwrap()
+    }
+
+    #[test]
+    fn whole_files_give_their_fingerprint() {
+        assert_eq!(fingerprint(&a_png()), Some(FINGERPRINT));
+        assert_eq!(fingerprint(&an_exr()), Some(FINGERPRINT));
+    }
+
+    #[test]
+    fn cut_off_files_count_as_absent() {
+        for file in [a_png(), an_exr()] {
+            for length in 0..file.len() {
+                assert_eq!(fingerprint(&file[..length]), None, "cut to {length} of {}", file.len());
+            }
+        }
+    }
+
+    #[test]
+    fn any_changed_byte_makes_a_file_count_as_absent() {
+        for file in [a_png(), an_exr()] {
+            for place in 0..file.len() {
+                let mut damaged = file.clone();
+                damaged[place] ^= 0x10;
+                assert_eq!(fingerprint(&damaged), None, "byte {place} of {}", file.len());
+            }
+        }
+    }
+
+    #[test]
+    fn files_with_more_behind_them_and_missing_files_count_as_absent() {
+        for file in [a_png(), an_exr()] {
+            assert_eq!(fingerprint(&[&file[..], b"x"].concat()), None);
+        }
+        assert_eq!(existing_fingerprint(Path::new("no such folder/a.png")), None);
+        // A device without end.
+        #[cfg(unix)]
+        assert_eq!(existing_fingerprint(Path::new("/dev/zero")), None);
+    }
+}

@@ -1,0 +1,291 @@
+//! The sink of finished frames: a sequence of files, or one film.
+
+use std::path::{Path, PathBuf};
+
+use bansho_base::{
+    color::AlphaConvention,
+    image::{DisplayImage, DisplayPixels, Frame},
+};
+
+use super::{
+    atomic::{self, AtomicFile},
+    naming::{OutputKind, OutputPattern},
+    overwrite_policy::OverwritePolicy,
+};
+use crate::{
+    error::{MediaError, SizeRule},
+    exr,
+    film::{
+        apng::{self, ApngFilm, ApngFormat},
+        ffmpeg::{self, FfmpegFilm, VideoFormat, VideoOptions},
+        gif::{self, GifFilm, GifFormat},
+        ordered::ReorderBuffer,
+        timing::GifTiming,
+    },
+    png::{self, PngEffort},
+};
+
+/// The pixel data that a format takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PictureFormat {
+    /// Scene-linear frames.
+    #[error("a scene-linear frame")]
+    Frame,
+    /// Display pixels, with alpha unless a plate fills the picture.
+    #[error("display pixels")]
+    Display,
+    /// Display pixels over black or over a plate: the format has no alpha. Others are laid over black.
+    #[error("opaque display pixels")]
+    OpaqueDisplay,
+}
+
+/// How frames are written. Begin with [`SinkOptions::new`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SinkOptions {
+    /// Width and height of every frame, pixels; unused for sequences.
+    pub size: [usize; 2],
+    /// Frames per second, as a fraction.
+    pub fps: [u32; 2],
+    /// How many frames there will be.
+    pub frame_count: usize,
+    /// Whether a plate fills the picture, so that films need no alpha.
+    pub opaque: bool,
+    /// The convention of straight alpha, which films with alpha declare.
+    pub alpha: AlphaConvention,
+    /// Whether display pixels have 16 bits, for films that keep more than 8.
+    pub sixteen_bits: bool,
+    /// Compression effort of PNG files.
+    pub png_effort: PngEffort,
+    /// GIF: transparency by an alpha threshold, instead of compositing over black.
+    pub gif_transparent: bool,
+    /// How `ffmpeg` is used.
+    pub video: VideoOptions,
+    /// How many frames of a film may wait for an earlier one; at least 1.
+    pub window: usize,
+    /// Which existing files may be overwritten.
+    pub overwrite: OverwritePolicy,
+}
+
+impl SinkOptions {
+    /// Default options for `frame_count` frames of `size` pixels at `fps` frames per second.
+    pub fn new(size: [usize; 2], fps: [u32; 2], frame_count: usize) -> Self {
+        Self {
+            size,
+            fps,
+            frame_count,
+            opaque: false,
+            alpha: AlphaConvention::default(),
+            sixteen_bits: false,
+            png_effort: PngEffort::default(),
+            gif_transparent: false,
+            video: VideoOptions::default(),
+            window: 16,
+            overwrite: OverwritePolicy::default(),
+        }
+    }
+
+    /// The pixel data that a sink of `kind` with these options takes.
+    pub fn picture_format(&self, kind: OutputKind) -> PictureFormat {
+        match kind {
+            OutputKind::Exr => PictureFormat::Frame,
+            OutputKind::Png | OutputKind::Apng => PictureFormat::Display,
+            OutputKind::Gif if self.gif_transparent => PictureFormat::Display,
+            OutputKind::Gif => PictureFormat::OpaqueDisplay,
+            film if ffmpeg::carries_alpha(film, &self.video) => PictureFormat::Display,
+            _ => PictureFormat::OpaqueDisplay,
+        }
+    }
+}
+
+/// Position and number of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameSlot {
+    /// Position among the frames of the job, from 0; orders a film.
+    pub index: usize,
+    /// Frame number; names a file of a sequence.
+    pub number: i64,
+}
+
+/// A finished picture.
+#[derive(Clone, Copy, Debug)]
+pub enum Picture<'a> {
+    /// Scene-linear, for EXR; carries its fingerprint in its header.
+    Linear(&'a Frame),
+    /// Display pixels, with the fingerprint of everything they depend on.
+    Display(&'a DisplayImage, &'a [u8; 32]),
+}
+
+/// Takes finished frames. May be used from several threads at once.
+///
+/// Files of a sequence may come in any order, each whole or not at all. Frames of a film may come in any order within
+/// [`SinkOptions::window`] positions of the one that is due. A film bears its name only after [`Sink::finish`]; a sink
+/// that is dropped before leaves no film behind.
+pub struct Sink {
+    pattern: OutputPattern,
+    options: SinkOptions,
+    target: Target,
+}
+
+enum Target {
+    Png,
+    Exr,
+    Apng(ReorderBuffer<ApngFilm>),
+    Gif(ReorderBuffer<GifFilm>, GifFormat),
+    Video(ReorderBuffer<FfmpegFilm>, VideoFormat),
+}
+
+impl Sink {
+    /// Makes the folder, tries whether it can be written, and for a film begins it.
+    ///
+    /// # Errors
+    /// The place cannot be written, the disk is full, a film would take the place of a file that must stay, a size or frame rate the format
+    /// cannot hold, no `ffmpeg`.
+    pub fn open(pattern: OutputPattern, options: SinkOptions) -> Result<Self, MediaError> {
+        let path = pattern.path(0);
+        let kind = pattern.kind();
+        if !kind.is_sequence() {
+            check_film(&path, &options)?;
+        }
+        let ordered_end = (path.clone(), options.frame_count, options.window);
+        let overwrite = &options.overwrite;
+        let target = match kind {
+            OutputKind::Png | OutputKind::Exr => {
+                // Better to fail now than after the first frame has been rendered.
+                drop(AtomicFile::create(&path)?);
+                if kind == OutputKind::Png { Target::Png } else { Target::Exr }
+            }
+            OutputKind::Apng => {
+                Target::Apng(ordered(ApngFilm::create(&path, apng_format(&options), overwrite)?, ordered_end))
+            }
+            OutputKind::Gif => {
+                let format = gif_format(&path, &options)?;
+                Target::Gif(ordered(GifFilm::create(&path, format.clone(), overwrite)?, ordered_end), format)
+            }
+            OutputKind::Mp4 | OutputKind::Mov | OutputKind::Webm => {
+                let format = video_format(kind, &options);
+                Target::Video(ordered(FfmpegFilm::create(&path, &format, overwrite)?, ordered_end), format)
+            }
+        };
+        Ok(Self { pattern, options, target })
+    }
+
+    /// What kind of file it makes.
+    pub fn kind(&self) -> OutputKind {
+        self.pattern.kind()
+    }
+
+    /// The pixel data that it takes.
+    pub fn picture_format(&self) -> PictureFormat {
+        self.options.picture_format(self.kind())
+    }
+
+    /// The file of frame `number`.
+    pub fn path(&self, number: i64) -> PathBuf {
+        self.pattern.path(number)
+    }
+
+    /// Takes a frame. A picture with alpha is laid over black where the format has none.
+    ///
+    /// # Errors
+    /// The frame cannot be written or would take the place of a file that must stay, is not of the kind or size that is wanted, or comes out
+    /// of turn.
+    pub fn write(&self, slot: FrameSlot, picture: Picture<'_>) -> Result<(), MediaError> {
+        let path = self.path(slot.number);
+        match (&self.target, picture) {
+            (Target::Exr, Picture::Linear(frame)) => {
+                atomic::write_bytes_with(&path, &exr::encode(frame, &path)?, &self.options.overwrite)
+            }
+            (Target::Png, Picture::Display(image, fingerprint)) => {
+                let bytes = png::encode(image, fingerprint, self.options.png_effort, &path)?;
+                atomic::write_bytes_with(&path, &bytes, &self.options.overwrite)
+            }
+            (Target::Apng(film), Picture::Display(image, _)) => {
+                self.check_frame(image, &path)?;
+                film.push(slot.index, apng::prepare(image, self.options.opaque, &path)?)
+            }
+            (Target::Gif(film, format), Picture::Display(image, _)) => {
+                self.check_frame(image, &path)?;
+                film.push(slot.index, gif::prepare(image, slot.index, format, &path)?)
+            }
+            (Target::Video(film, format), Picture::Display(image, _)) => {
+                self.check_frame(image, &path)?;
+                film.push(slot.index, ffmpeg::prepare(image, format))
+            }
+            _ => Err(MediaError::WrongPicture { path, wanted: self.picture_format() }),
+        }
+    }
+
+    /// Ends a film and gives it its name; a sequence is already there.
+    ///
+    /// # Errors
+    /// Frames are missing, an earlier frame failed, or the film cannot be written.
+    pub fn finish(self) -> Result<(), MediaError> {
+        match self.target {
+            Target::Png | Target::Exr => Ok(()),
+            Target::Apng(film) => film.finish(),
+            Target::Gif(film, _) => film.finish(),
+            Target::Video(film, _) => film.finish(),
+        }
+    }
+
+    /// All frames of a film have one size.
+    fn check_frame(&self, image: &DisplayImage, path: &Path) -> Result<(), MediaError> {
+        let [width, height] = self.options.size;
+        if [image.width, image.height] != [width, height] {
+            let (path, allowed) = (path.to_path_buf(), SizeRule::Exactly(width, height));
+            return Err(MediaError::Size { path, width: image.width, height: image.height, allowed });
+        }
+        let got = match &image.pixels {
+            DisplayPixels::Eight(pixels) => pixels.len(),
+            DisplayPixels::Sixteen(pixels) => pixels.len(),
+        };
+        if got == width * height {
+            return Ok(());
+        }
+        Err(MediaError::PlaneLength {
+            path: path.to_path_buf(),
+            plane: "RGBA".to_owned(),
+            got,
+            expected: width * height,
+        })
+    }
+}
+
+fn ordered<F: crate::film::ordered::FilmEncoder>(
+    film: F,
+    (path, count, window): (PathBuf, usize, usize),
+) -> ReorderBuffer<F> {
+    ReorderBuffer::new(film, path, count, window)
+}
+
+/// Largest side of a film, pixels.
+const FILM_SIDE_LIMIT: usize = 65535;
+
+fn check_film(path: &Path, options: &SinkOptions) -> Result<(), MediaError> {
+    let [width, height] = options.size;
+    if [width, height].iter().all(|side| (1..=FILM_SIDE_LIMIT).contains(side)) {
+        return Ok(());
+    }
+    Err(MediaError::Size { path: path.to_path_buf(), width, height, allowed: SizeRule::UpTo(FILM_SIDE_LIMIT) })
+}
+
+fn apng_format(options: &SinkOptions) -> ApngFormat {
+    let SinkOptions { frame_count, size, fps, .. } = *options;
+    ApngFormat { frame_count, size, fps }
+}
+
+fn gif_format(path: &Path, options: &SinkOptions) -> Result<GifFormat, MediaError> {
+    let [numerator, denominator] = options.fps;
+    let timing = GifTiming::new(options.fps).ok_or_else(|| MediaError::FrameRate {
+        path: path.to_path_buf(),
+        numerator,
+        denominator,
+    })?;
+    let transparent = options.gif_transparent && !options.opaque;
+    Ok(GifFormat { frame_count: options.frame_count, size: options.size, timing, transparent })
+}
+
+fn video_format(kind: OutputKind, options: &SinkOptions) -> VideoFormat {
+    let SinkOptions { size, fps, opaque, alpha, sixteen_bits, .. } = *options;
+    VideoFormat { kind, size, fps, opaque, alpha, sixteen_bits, options: options.video.clone() }
+}

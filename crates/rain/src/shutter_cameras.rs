@@ -1,0 +1,237 @@
+//! The cameras of one exposure: when the shutter opens, at its middle and when it closes. Visibility tests against
+//! their frusta.
+
+use bansho_base::{
+    camera::{Camera, Lens},
+    image::Rect,
+    math::{DVec2, DVec3, MulAdd, simd::LANES},
+    phenomenon::strip::View,
+};
+
+use crate::lanes::{Lanes, Vec3Lanes, ZERO_LANES};
+
+/// Bounding box in the picture: columns and rows `[low, high]`, pixels. It may extend beyond the picture.
+pub(crate) type PixelBounds = [[f32; 2]; 2];
+
+/// Radius of the lens's entrance pupil, m: that of a 24 mm lens at f/3.
+pub(crate) const PUPIL_RADIUS: f32 = 4e-3;
+
+/// Largest radius at which a drop is visible around its center, m: that of the largest drop and its defocus blur.
+pub(crate) const MAX_DROP_RADIUS: f64 = 4e-3 + PUPIL_RADIUS as f64;
+
+/// The cameras of one exposure.
+#[derive(Clone, Debug)]
+pub(crate) struct ShutterCameras {
+    /// When the shutter opens, at the middle of the exposure, and when it closes.
+    pub(crate) cameras: [Camera; 3],
+    /// The same cameras, for sixteen points at a time.
+    pub(crate) projectors: [Projector; 3],
+    /// Columns and rows of the crop window, pixels.
+    pub(crate) window: PixelBounds,
+    /// Duration of the exposure, s.
+    pub(crate) exposure_time: f64,
+    /// View frusta of the crop window; empty for lenses that see all around.
+    frusta: Vec<Frustum>,
+}
+
+/// Projects sixteen points at a time.
+#[derive(Clone, Debug)]
+pub(crate) struct Projector {
+    camera: Camera,
+    /// Origin of the points' coordinates, m.
+    origin: DVec3,
+    /// The camera's axes: right, up and backward.
+    axes: [[f32; 3]; 3],
+    /// The origin in camera coordinates, m.
+    offset: [f32; 3],
+    center: [f32; 2],
+    focal: f32,
+    near: f32,
+}
+
+/// Sixteen points projected into the picture.
+pub(crate) struct ProjectedPoints {
+    /// Pixels; NaN where the lens does not see the point.
+    pub(crate) x: Lanes,
+    pub(crate) y: Lanes,
+    /// Depth by the lens's definition, m.
+    pub(crate) depth: Lanes,
+    /// Pixels for one meter perpendicular to the line of sight.
+    pub(crate) scale: Lanes,
+}
+
+impl Projector {
+    fn new(camera: Camera, origin: DVec3) -> Self {
+        let axes = [0, 1, 2].map(|axis| camera.orientation.col(axis).as_vec3().to_array());
+        Self {
+            axes,
+            offset: camera.to_camera(origin).as_vec3().to_array(),
+            center: camera.centre.as_vec2().to_array(),
+            focal: camera.focal_pixels as f32,
+            near: camera.near as f32,
+            camera,
+            origin,
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn lens(&self) -> Lens {
+        self.camera.lens
+    }
+
+    #[inline(always)]
+    pub(crate) fn project(&self, points: &Vec3Lanes) -> ProjectedPoints {
+        match self.camera.lens {
+            Lens::Perspective => self.project_perspective(points),
+            Lens::Fisheye | Lens::Panorama => self.project_curvilinear(points),
+        }
+    }
+
+    /// [`Camera::project`] in single precision.
+    #[inline(always)]
+    fn project_perspective(&self, [xs, ys, zs]: &Vec3Lanes) -> ProjectedPoints {
+        let mut points = ProjectedPoints { x: ZERO_LANES, y: ZERO_LANES, depth: ZERO_LANES, scale: ZERO_LANES };
+        let [right, up, back] = &self.axes;
+        for i in 0..LANES {
+            let (x, y, z) = (xs[i], ys[i], zs[i]);
+            let across = right[2].fma(z, right[1].fma(y, right[0].fma(x, self.offset[0])));
+            let above = up[2].fma(z, up[1].fma(y, up[0].fma(x, self.offset[1])));
+            let depth = -back[2].fma(z, back[1].fma(y, back[0].fma(x, self.offset[2])));
+            let scale = self.focal / depth;
+            let scale = if depth >= self.near { scale } else { f32::NAN };
+            points.x[i] = across.fma(scale, self.center[0]);
+            points.y[i] = self.center[1] - above * scale;
+            (points.depth[i], points.scale[i]) = (depth, scale);
+        }
+        points
+    }
+
+    fn project_curvilinear(&self, [xs, ys, zs]: &Vec3Lanes) -> ProjectedPoints {
+        const NOT_VISIBLE: Lanes = [f32::NAN; LANES];
+        let mut points = ProjectedPoints { x: NOT_VISIBLE, y: NOT_VISIBLE, depth: NOT_VISIBLE, scale: NOT_VISIBLE };
+        for i in 0..LANES {
+            let point = self.origin + DVec3::new(xs[i].into(), ys[i].into(), zs[i].into());
+            if let Some(projection) = self.camera.project(point) {
+                let DVec2 { x, y } = projection.pixel;
+                (points.x[i], points.y[i]) = (x as f32, y as f32);
+                (points.depth[i], points.scale[i]) = (projection.depth as f32, projection.pixels_per_metre as f32);
+            }
+        }
+        points
+    }
+}
+
+/// View frustum: a point is inside if it is inside all planes.
+#[derive(Clone, Debug)]
+struct Frustum {
+    position: DVec3,
+    /// Outward unit normals: right, left, bottom, top and back; all x, all y and all z, padded with zeros.
+    planes: [[f64; PLANE_COUNT]; 3],
+}
+
+/// Planes of a frustum, padded to a whole SIMD vector.
+const PLANE_COUNT: usize = 8;
+
+impl Frustum {
+    /// `None` for a lens without planar sides.
+    fn new(camera: &Camera, window: &Rect) -> Option<Self> {
+        let [across, up, back] = [0, 1, 2].map(|axis| camera.orientation.col(axis));
+        let tangent = |pixels: usize, center: f64| (pixels as f64 - center) / camera.focal_pixels;
+        let [left, right] = [window.x, window.right()].map(|side| across + back * tangent(side, camera.centre.x));
+        let [top, bottom] = [window.y, window.bottom()].map(|side| -up + back * tangent(side, camera.centre.y));
+        let mut planes = [[0.0; PLANE_COUNT]; 3];
+        for (side, outward) in [right, -left, bottom, -top, back].map(DVec3::normalize).into_iter().enumerate() {
+            (0..3).for_each(|axis| planes[axis][side] = outward[axis]);
+        }
+        (camera.lens == Lens::Perspective).then_some(Self { position: camera.position, planes })
+    }
+
+    #[inline(always)]
+    fn may_be_visible(&self, point: DVec3, half: DVec3, radius: f64) -> bool {
+        let offset = point - self.position;
+        let [xs, ys, zs] = &self.planes;
+        let mut outside = false;
+        // Without early exit: a branch for each plane would be mispredicted.
+        for side in 0..PLANE_COUNT {
+            let projection = xs[side] * offset.x + ys[side] * offset.y + zs[side] * offset.z;
+            let extent = xs[side].abs() * half.x + ys[side].abs() * half.y + zs[side].abs() * half.z;
+            outside |= projection - extent > radius;
+        }
+        !outside
+    }
+}
+
+impl ShutterCameras {
+    pub(crate) fn new(view: &View) -> Self {
+        let shutter = view.shutter;
+        let cameras = [view.camera_at(shutter.open), view.camera, view.camera_at(shutter.close)];
+        let mut distinct = cameras.to_vec();
+        distinct.dedup();
+        let frusta = distinct.iter().filter_map(|camera| Frustum::new(camera, &view.window)).collect();
+        let projectors = cameras.map(|camera| Projector::new(camera, view.camera.position));
+        let window = &view.window;
+        let window =
+            [[window.x, window.right()], [window.y, window.bottom()]].map(|planes| planes.map(|side| side as f32));
+        Self { cameras, projectors, window, exposure_time: shutter.duration(), frusta }
+    }
+
+    /// The camera at the middle of the exposure.
+    pub(crate) fn middle(&self) -> &Camera {
+        &self.cameras[1]
+    }
+
+    /// Columns and rows of the picture.
+    pub(crate) fn size(&self) -> [usize; 2] {
+        self.cameras[1].size.map(|side| side as usize)
+    }
+
+    /// Velocity of the camera's position during the exposure, m/s.
+    pub(crate) fn velocity(&self) -> DVec3 {
+        let displacement = self.cameras[2].position - self.cameras[0].position;
+        if self.exposure_time > 0.0 { displacement / self.exposure_time } else { DVec3::ZERO }
+    }
+
+    /// Whether anything within `radius` (m) of an axis-aligned box may be visible at any time of the exposure. The box
+    /// has the center `point` and the half extents `half`.
+    #[inline(always)]
+    pub(crate) fn may_be_visible(&self, point: DVec3, half: DVec3, radius: f64) -> bool {
+        let mut seen = self.frusta.is_empty();
+        for frustum in &self.frusta {
+            seen |= frustum.may_be_visible(point, half, radius);
+        }
+        seen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{
+        camera::CameraParameters,
+        math::{
+            DVec2,
+            random::{Key, Purpose},
+        },
+        phenomenon::strip::Shutter,
+    };
+
+    use super::*;
+
+    #[test]
+    fn whatever_projects_into_the_picture_may_be_seen() {
+        let view = View::new(CameraParameters::default(), Shutter { open: 0.0, close: 0.02 }, 0.03, [320, 180], 4);
+        let cameras = ShutterCameras::new(&view);
+        let (mut seen, mut hidden) = (0, 0);
+        for i in 0..4000 {
+            let u = Key::new(1, "sight").uniforms(i, 0, Purpose::named("point")).map(f64::from);
+            let point = DVec3::new(20.0 * u[0] - 10.0, 20.0 * u[1] - 10.0, 20.0 * u[2] - 10.0);
+            let inside = |pixel: DVec2| {
+                (0.0..view.size[0] as f64).contains(&pixel.x) && (0.0..view.size[1] as f64).contains(&pixel.y)
+            };
+            let projects = view.camera.project(point).is_some_and(|projection| inside(projection.pixel));
+            assert!(!projects || cameras.may_be_visible(point, DVec3::ZERO, 0.0));
+            seen += usize::from(projects);
+            hidden += usize::from(!cameras.may_be_visible(point, DVec3::splat(0.5), 0.0));
+        }
+        assert!(seen > 50 && hidden > 3000, "{seen} {hidden}");
+    }
+}
