@@ -25,7 +25,7 @@ use bansho_base::{
 
 use bansho_fire::particles::{
     Particles,
-    render::{Ending, Gas, LookParameters, Memory, PreparedGas, line_gradient, line_integral, soot_absorption},
+    render::{FadeOut, Gas, LookParameters, PreparedGas, ScratchPool, line_gradient, line_integral, soot_absorption},
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use rayon::prelude::*;
@@ -47,7 +47,7 @@ fn view() -> View {
     View::new(camera, Shutter { open: TIME, close: TIME + 1.0 / 60.0 }, TIME + 1.0 / 30.0, SIZE, 0)
 }
 
-fn gas<'a>(particles: &'a Particles, memory: &'a Memory) -> Gas<'a> {
+fn gas<'a>(particles: &'a Particles, scratch: &'a ScratchPool) -> Gas<'a> {
     Gas {
         particles,
         time: TIME,
@@ -56,8 +56,8 @@ fn gas<'a>(particles: &'a Particles, memory: &'a Memory) -> Gas<'a> {
         base: DVec3::ZERO,
         size: DVec2::ONE,
         key: Key::new(1, "plume"),
-        ending: Ending::NEVER,
-        memory,
+        fade_out: FadeOut::NEVER,
+        scratch,
     }
 }
 
@@ -65,14 +65,14 @@ fn gas<'a>(particles: &'a Particles, memory: &'a Memory) -> Gas<'a> {
 struct Subject {
     particles: Particles,
     view: View,
-    memory: Memory,
+    scratch: ScratchPool,
 }
 
 /// Prepares the gas and hands it to `each`.
 fn prepared(subject: &Subject, look: &LookParameters, each: impl FnOnce(&PreparedGas)) {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
-    let gas = gas(&subject.particles, &subject.memory);
+    let gas = gas(&subject.particles, &subject.scratch);
     if let Ok(prepared) = PreparedGas::new(gas, look, &subject.view, &surroundings, &Unobserved) {
         each(&prepared);
     }
@@ -114,7 +114,8 @@ fn naive<const WIDTH: usize>(particles: &Particles, view: &View, value: impl Fn(
 
 fn gas_720p(criterion: &mut Criterion) {
     let pool = pinned_pool(2);
-    let subject = Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), memory: Memory::default() };
+    let subject =
+        Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), scratch: ScratchPool::default() };
     let Subject { particles, view, .. } = &subject;
     let look = LookParameters::default();
     let volume = |index: usize| f64::from(particles.masses()[index] / particles.densities()[index]);

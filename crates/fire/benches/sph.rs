@@ -22,7 +22,7 @@ use support::pinned_pool;
 
 const NEIGHBOURS: f64 = 35.0;
 const SUPPORT: f32 = 0.1;
-const STATE: StateEquation = StateEquation { rest_density: 0.0, tension: false };
+const STATE: StateEquation = StateEquation { rest_density: 0.0, negative_pressure: false };
 const STIFFNESS: f32 = 1.0;
 /// So short that the cloud stays as it is however often it is stepped.
 const SECONDS: f32 = 1e-6;
@@ -106,7 +106,7 @@ fn scalar_step(particles: &mut Particles<3>, near: &dyn Fn(&Particles<3>, usize,
         near(particles, i, &mut |j, offset, distance| {
             if j != i {
                 let push = particles.masses[j] * (pressures[i] + pressures[j]) / (2.0 * densities[i] * densities[j]);
-                let factor = -push * force_kernel.slope(distance) / distance;
+                let factor = -push * force_kernel.derivative(distance) / distance;
                 (0..3).for_each(|c| accelerations[c][i] += factor * offset[c]);
             }
         });
@@ -144,13 +144,13 @@ fn unsorted_step(particles: &mut Particles<3>) {
 }
 
 /// A flame of a step that is not divided, which has burned long enough to be whole.
-struct Burning {
+struct DetailFactors {
     flame: FlameParticles,
     wind: Wind,
     steps: u64,
 }
 
-impl Burning {
+impl DetailFactors {
     fn new(particles: i64) -> Option<Self> {
         let mut parameters = FlameParticlesParameters { particles, ..Default::default() };
         parameters.fluid.sub_steps = 1;
@@ -201,7 +201,7 @@ fn benches(criterion: &mut Criterion) {
 
     let mut group = criterion.benchmark_group("burning gas, 1 thread");
     group.sample_size(20);
-    if let Some(mut burning) = Burning::new(30_000) {
+    if let Some(mut burning) = DetailFactors::new(30_000) {
         let pool = pinned_pool(1);
         group.bench_function("step of 30000", |bencher| pool.install(|| bencher.iter(|| burning.step())));
     }

@@ -22,7 +22,7 @@ use bansho_environment::{
     sky::SkyBackdrop,
 };
 use bansho_fire::{
-    particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind, check_count},
+    particles::{FlameParticles, FlameParticlesParameters, ParticleFaultKind, check_particle_count},
     sheet::{FlameSheet, FlameSheetParameters},
 };
 use bansho_rain::{Rain, RainParameters};
@@ -79,7 +79,7 @@ impl Describe for FlameParticlesParameters {
         wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";
 
     fn crowd(&self, others: i64) -> Result<i64, OpeningFault> {
-        check_count(self.particles, others).map_err(|fault| opening_fault(fault.key, fault.kind))?;
+        check_particle_count(self.particles, others).map_err(|fault| opening_fault(fault.key, fault.kind))?;
         Ok(self.particles + others)
     }
 

@@ -11,22 +11,22 @@ use rayon::prelude::*;
 
 use super::{
     batch::BATCH,
-    neighbor_groups::Stretch,
-    sorting::{AT_ONCE, Cell, Sorting},
+    neighbor_groups::GroupBatch,
+    sorting::{Cell, MIN_PARTICLES_PER_TASK, SampleSort},
 };
 
 /// Cells further than this from the origin, in support radii, are taken together; so a key of three axes fits 64 bits.
-const FARTHEST: i32 = 1 << 18;
+const MAX_CELL_COORDINATE: i32 = 1 << 18;
 /// Cells are this much larger than the support radius asks, so that rounding never puts two neighbours further apart.
-const MARGIN: f32 = 1.001;
+const CELL_SIZE_MARGIN: f32 = 1.001;
 /// Cells along x in a support radius: short ones keep the groups of a row short.
-const ALONG: i32 = 4;
+const CELLS_PER_RADIUS_X: i32 = 4;
 /// A group ends where it would be longer than this, in cells along x: what lies between would all be its candidates.
-const LONGEST_GROUP: u64 = 8 * ALONG as u64;
+const MAX_GROUP_LENGTH: u64 = 8 * CELLS_PER_RADIUS_X as u64;
 /// Where particles are put that are farther away or nowhere; squares of such distances are still finite.
-pub(super) const BEYOND: f32 = 1e12;
+pub(super) const OUT_OF_RANGE: f32 = 1e12;
 /// Cells looked at together when a search moves on: how far it goes is hard to foresee, for the processor too.
-const AHEAD: usize = 4;
+const SEARCH_WIDTH: usize = 4;
 
 /// Particles in cells by one support radius; the order they were given in does not matter.
 #[derive(Clone, Debug)]
@@ -38,20 +38,20 @@ pub struct Cells<const D: usize> {
     ids: Vec<u64>,
     /// Positions in sorted order, and a batch that is nowhere.
     positions: [Vec<f32>; D],
-    /// The cells that hold particles; the last [`AHEAD`] are sentinels behind all.
+    /// The cells that hold particles; the last [`SEARCH_WIDTH`] are sentinels behind all.
     occupied: Vec<Cell>,
-    row_parts: Vec<RowPart>,
-    stretches: Vec<Stretch>,
+    row_chunks: Vec<RowChunk>,
+    batches: Vec<GroupBatch>,
     /// Cells along each axis.
     coordinates: [Vec<i32>; D],
-    sorting: Sorting,
+    sorting: SampleSort,
     /// Arrays that take the place of those brought into order, one a thread.
-    spares: Vec<Vec<f32>>,
+    scratch: Vec<Vec<f32>>,
 }
 
 /// Up to [`BATCH`] particles that follow each other in a row, and the keys of the first and the last one's cell.
 #[derive(Clone, Debug)]
-pub(super) struct RowPart {
+pub(super) struct RowChunk {
     pub(super) particles: Range<u32>,
     first: u64,
     last: u64,
@@ -71,7 +71,7 @@ impl<const D: usize> Keys<D> {
         let mut shift = [0; D];
         let mut bits = 0;
         for c in 0..D {
-            let margin = if c == 0 { ALONG } else { 1 };
+            let margin = if c == 0 { CELLS_PER_RADIUS_X } else { 1 };
             shift[c] = bits;
             bits += u32::BITS - ((upper[c] - lower[c] + 2 * margin) as u32).leading_zeros();
             lower[c] -= margin;
@@ -111,7 +111,7 @@ impl<const D: usize> Cells<D> {
         const { assert!(D == 2 || D == 3, "particles live in two or three dimensions") };
         let none = || std::array::from_fn(|_| Vec::new());
         let keys = Keys::new([0; D], [0; D]);
-        let (order, ids, occupied, row_parts, stretches) = Default::default();
+        let (order, ids, occupied, row_chunks, batches) = Default::default();
         let coordinates = std::array::from_fn(|_| Vec::new());
         Self {
             support_radius,
@@ -120,11 +120,11 @@ impl<const D: usize> Cells<D> {
             ids,
             positions: none(),
             occupied,
-            row_parts,
-            stretches,
+            row_chunks,
+            batches,
             coordinates,
-            sorting: Sorting::default(),
-            spares: Vec::new(),
+            sorting: SampleSort::default(),
+            scratch: Vec::new(),
         }
     }
 
@@ -158,33 +158,33 @@ impl<const D: usize> Cells<D> {
     pub fn assign(&mut self, positions: [&[f32]; D], ids: &[u64]) {
         assert!(ids.len() <= 1 << 27, "particles are counted in 32 bits");
         assert!(positions.iter().all(|component| component.len() == ids.len()), "one position an id");
-        let scale = 1.0 / (self.support_radius * MARGIN);
+        let scale = 1.0 / (self.support_radius * CELL_SIZE_MARGIN);
         let mut bounds = [[0; 2]; D];
         let axes = self.coordinates.par_iter_mut().zip(positions).zip(&mut bounds);
         axes.enumerate().for_each(|(c, ((cells, component), bounds))| {
-            let along = if c == 0 { ALONG } else { 1 };
-            let (scale, farthest) = (scale * along as f32, (FARTHEST * along) as f32);
-            dispatch!(Level::new(), _simd => *bounds = cells_along(component, scale, farthest, cells));
+            let along = if c == 0 { CELLS_PER_RADIUS_X } else { 1 };
+            let (scale, max_coordinate) = (scale * along as f32, (MAX_CELL_COORDINATE * along) as f32);
+            dispatch!(Level::new(), _simd => *bounds = cell_coordinates(component, scale, max_coordinate, cells));
         });
         self.order.clear();
         self.occupied.clear();
         if !ids.is_empty() {
             self.sort(ids, &bounds);
         }
-        let within = |x: f32| if x.abs() < BEYOND { x } else { BEYOND };
+        let clamp_to_range = |x: f32| if x.abs() < OUT_OF_RANGE { x } else { OUT_OF_RANGE };
         let mut sorted = std::mem::replace(&mut self.positions, std::array::from_fn(|_| Vec::new()));
         sorted.par_iter_mut().zip(positions).for_each(|(to, from)| {
             to.clear();
-            to.extend(self.order.iter().map(|i| within(from[*i as usize])));
-            to.resize((ids.len() + BATCH).next_multiple_of(BATCH), -BEYOND);
+            to.extend(self.order.iter().map(|i| clamp_to_range(from[*i as usize])));
+            to.resize((ids.len() + BATCH).next_multiple_of(BATCH), -OUT_OF_RANGE);
         });
         self.positions = sorted;
         self.ids.clear();
-        self.ids.par_extend(self.order.par_iter().with_min_len(AT_ONCE).map(|i| ids[*i as usize]));
-        self.part_rows();
-        let mut stretches = std::mem::take(&mut self.stretches);
-        Stretch::find_all(&mut stretches, self, &self.row_parts);
-        self.stretches = stretches;
+        self.ids.par_extend(self.order.par_iter().with_min_len(MIN_PARTICLES_PER_TASK).map(|i| ids[*i as usize]));
+        self.chunk_rows();
+        let mut batches = std::mem::take(&mut self.batches);
+        GroupBatch::find_all(&mut batches, self, &self.row_chunks);
+        self.batches = batches;
     }
 
     /// Sorts by key, then by id, and lists the cells, of which the first and the last along each axis are given.
@@ -199,18 +199,20 @@ impl<const D: usize> Cells<D> {
             keys.key(cell)
         };
         sorting.sort(key, keys.bits, ids, (order, occupied));
-        occupied.resize(occupied.len() + AHEAD, Cell { key: u64::MAX, start: ids.len() as u32 });
+        occupied.resize(occupied.len() + SEARCH_WIDTH, Cell { key: u64::MAX, start: ids.len() as u32 });
         self.keys = keys;
     }
 
     /// Parts every row of cells into particles for groups.
-    fn part_rows(&mut self) {
-        self.row_parts.clear();
+    fn chunk_rows(&mut self) {
+        self.row_chunks.clear();
         let mut row = u64::MAX;
         for pair in self.occupied.windows(2) {
             let (key, mut start) = (pair[0].key, pair[0].start);
             let same_row = std::mem::replace(&mut row, self.keys.row(key)) == self.keys.row(key);
-            if let Some(part) = self.row_parts.last_mut().filter(|part| same_row && key - part.first <= LONGEST_GROUP) {
+            if let Some(part) =
+                self.row_chunks.last_mut().filter(|part| same_row && key - part.first <= MAX_GROUP_LENGTH)
+            {
                 let end = pair[1].start.min(part.particles.start + BATCH as u32);
                 if end > start {
                     (part.particles.end, part.last, start) = (end, key, end);
@@ -218,7 +220,7 @@ impl<const D: usize> Cells<D> {
             }
             while start < pair[1].start {
                 let end = pair[1].start.min(start + BATCH as u32);
-                self.row_parts.push(RowPart { particles: start..end, first: key, last: key });
+                self.row_chunks.push(RowChunk { particles: start..end, first: key, last: key });
                 start = end;
             }
         }
@@ -230,7 +232,7 @@ impl<const D: usize> Cells<D> {
     /// If they are not one a particle.
     pub fn reorder<T: Copy + Send + Sync>(&self, values: &mut Vec<T>) {
         assert_eq!(values.len(), self.order.len(), "one value a particle");
-        *values = self.order.par_iter().with_min_len(AT_ONCE).map(|i| values[*i as usize]).collect();
+        *values = self.order.par_iter().with_min_len(MIN_PARTICLES_PER_TASK).map(|i| values[*i as usize]).collect();
     }
 
     /// Does so with many arrays of numbers, without asking the system for memory again and again.
@@ -240,15 +242,15 @@ impl<const D: usize> Cells<D> {
     pub fn reorder_all<'a>(&mut self, arrays: impl IntoIterator<Item = &'a mut Vec<f32>>) {
         let mut arrays: Vec<&mut Vec<f32>> = arrays.into_iter().collect();
         let threads = rayon::current_num_threads().clamp(1, arrays.len().max(1));
-        let Self { order, spares, .. } = self;
-        spares.resize_with(threads, Vec::new);
+        let Self { order, scratch, .. } = self;
+        scratch.resize_with(threads, Vec::new);
         let share = arrays.len().div_ceil(threads).max(1);
-        arrays.par_chunks_mut(share).zip(spares).for_each(|(arrays, spare)| {
+        arrays.par_chunks_mut(share).zip(scratch).for_each(|(arrays, scratch)| {
             for values in arrays {
                 assert_eq!(values.len(), order.len(), "one value a particle");
-                spare.clear();
-                spare.extend(order.iter().map(|i| values[*i as usize]));
-                std::mem::swap(*values, spare);
+                scratch.clear();
+                scratch.extend(order.iter().map(|i| values[*i as usize]));
+                std::mem::swap(*values, scratch);
             }
         });
     }
@@ -264,45 +266,45 @@ impl<const D: usize> Cells<D> {
     }
 
     /// All groups of particles, in stretches.
-    pub(super) fn stretches(&self) -> &[Stretch] {
-        &self.stretches
+    pub(super) fn batches(&self) -> &[GroupBatch] {
+        &self.batches
     }
 
     /// The runs of particles around parts of rows, from `first` on.
-    pub(super) fn runs_from(&self, first: &RowPart) -> Runs<'_> {
+    pub(super) fn neighbor_runs(&self, first: &RowChunk) -> NeighborRuns<'_> {
         let start = |row: u64| self.occupied.partition_point(|cell| cell.key < first.lowest(row));
         let rows: Vec<(u64, usize, usize)> = self.keys.rows().map(|row| (row, start(row), 0)).collect();
-        Runs { occupied: &self.occupied, runs: vec![0..0; rows.len()], rows }
+        NeighborRuns { occupied: &self.occupied, runs: vec![0..0; rows.len()], rows }
     }
 }
 
-impl RowPart {
+impl RowChunk {
     /// The least key that may be near in the row that is so far away.
     fn lowest(&self, row: u64) -> u64 {
-        self.first.wrapping_add(row) - ALONG as u64
+        self.first.wrapping_add(row) - CELLS_PER_RADIUS_X as u64
     }
 
     /// The greatest.
     fn highest(&self, row: u64) -> u64 {
-        self.last.wrapping_add(row) + ALONG as u64
+        self.last.wrapping_add(row) + CELLS_PER_RADIUS_X as u64
     }
 }
 
 /// The runs of particles that may be near parts of rows, one after the other.
-pub(super) struct Runs<'a> {
+pub(super) struct NeighborRuns<'a> {
     occupied: &'a [Cell],
     /// How far away each neighbouring row is, and which of its cells were near last: they move on with the parts, so all searching is one pass.
     rows: Vec<(u64, usize, usize)>,
     runs: Vec<Range<usize>>,
 }
 
-impl Runs<'_> {
+impl NeighborRuns<'_> {
     /// The runs of those that may be near a part, which comes after those asked for before.
-    pub(super) fn around(&mut self, part: &RowPart) -> &[Range<usize>] {
+    pub(super) fn around(&mut self, part: &RowChunk) -> &[Range<usize>] {
         for (run, (row, start, end)) in self.runs.iter_mut().zip(&mut self.rows) {
             let (lowest, highest) = (part.lowest(*row), part.highest(*row));
-            *start = first_from(self.occupied, *start, lowest);
-            *end = first_from(self.occupied, (*end).max(*start), highest + 1);
+            *start = first_cell_from(self.occupied, *start, lowest);
+            *end = first_cell_from(self.occupied, (*end).max(*start), highest + 1);
             *run = self.occupied[*start].start as usize..self.occupied[*end].start as usize;
         }
         &self.runs
@@ -311,11 +313,11 @@ impl Runs<'_> {
 
 /// The first cell from `start` on whose key is not below `key`.
 #[inline(always)]
-fn first_from(cells: &[Cell], mut start: usize, key: u64) -> usize {
-    while let Some(ahead) = cells.get(start..start + AHEAD) {
+fn first_cell_from(cells: &[Cell], mut start: usize, key: u64) -> usize {
+    while let Some(ahead) = cells.get(start..start + SEARCH_WIDTH) {
         let below = ahead.iter().map(|cell| usize::from(cell.key < key)).sum::<usize>();
         start += below;
-        if below < AHEAD {
+        if below < SEARCH_WIDTH {
             break;
         }
     }
@@ -324,13 +326,13 @@ fn first_from(cells: &[Cell], mut start: usize, key: u64) -> usize {
 
 /// The cells of coordinates, `scale` cells a unit; gives the first and the last. No `floor`: where the processor lacks it that is a call.
 #[inline(always)]
-fn cells_along(component: &[f32], scale: f32, farthest: f32, cells: &mut Vec<i32>) -> [i32; 2] {
+fn cell_coordinates(component: &[f32], scale: f32, max_coordinate: f32, cells: &mut Vec<i32>) -> [i32; 2] {
     cells.resize(component.len(), 0);
     let (mut first, mut last) = (i32::MAX, i32::MIN);
     for (cell, value) in cells.iter_mut().zip(component) {
-        let place = (value * scale).clamp(-farthest, farthest);
-        let whole = place as i32;
-        *cell = whole - i32::from(whole as f32 > place);
+        let scaled = (value * scale).clamp(-max_coordinate, max_coordinate);
+        let truncated = scaled as i32;
+        *cell = truncated - i32::from(truncated as f32 > scaled);
         (first, last) = (first.min(*cell), last.max(*cell));
     }
     [first, last]

@@ -34,7 +34,7 @@ pub struct StateEquation {
     /// Rest density rho_0.
     pub rest_density: f32,
     /// Whether gas thinner than at rest pulls together, as in the papers; if not, its pressure is 0.
-    pub tension: bool,
+    pub negative_pressure: bool,
 }
 
 impl StateEquation {
@@ -43,6 +43,6 @@ impl StateEquation {
     #[inline]
     pub fn pressure(&self, stiffness: f32, density: f32) -> f32 {
         let pressure = stiffness * (density - self.rest_density);
-        if self.tension { pressure } else { pressure.max(0.0) }
+        if self.negative_pressure { pressure } else { pressure.max(0.0) }
     }
 }

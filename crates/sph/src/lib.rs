@@ -44,4 +44,4 @@ pub use mixing::mixing_weights;
 pub use neighbor_sums::{Pair, PairTerm};
 pub use particles::{Particles, retain};
 pub use pressure::PressureForce;
-pub use step::{longest_step, sub_steps};
+pub use step::{max_stable_step, substep_count};

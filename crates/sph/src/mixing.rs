@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::sorting::AT_ONCE;
+use super::sorting::MIN_PARTICLES_PER_TASK;
 
 /// Weights `w = m / sqrt(rho)`: for a pair they make the geometric mean of both densities.
 ///
@@ -10,5 +10,5 @@ use super::sorting::AT_ONCE;
 /// geometric in place of the arithmetic mean).
 pub fn mixing_weights(masses: &[f32], densities: &[f32], weights: &mut Vec<f32>) {
     let weight = |(mass, density): (&f32, &f32)| mass / density.sqrt();
-    masses.par_iter().zip(densities).with_min_len(AT_ONCE).map(weight).collect_into_vec(weights);
+    masses.par_iter().zip(densities).with_min_len(MIN_PARTICLES_PER_TASK).map(weight).collect_into_vec(weights);
 }

@@ -8,17 +8,17 @@ use rayon::prelude::*;
 use bansho_base::math::simd::{HalfLanes, Real};
 
 use super::{
-    batch::{BATCH, load, squared},
-    cells::{Cells, RowPart},
+    batch::{BATCH, length_squared, load},
+    cells::{Cells, RowChunk},
 };
 
 /// Groups that one task takes.
-const GROUPS: usize = 32;
+const GROUPS_PER_TASK: usize = 32;
 
 /// Some groups that follow each other: a task of the thread pool. What it finds depends on its groups and those around them alone, so
 /// it does not matter where one ends.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Stretch {
+pub(super) struct GroupBatch {
     pub(super) groups: Vec<Group>,
     /// Particles near each group, group after group.
     pub(super) candidates: Vec<u32>,
@@ -33,7 +33,7 @@ pub(super) struct Group {
     pub(super) candidates: Range<usize>,
 }
 
-impl Stretch {
+impl GroupBatch {
     /// The particles of all groups.
     pub(super) fn particles(&self) -> Range<usize> {
         let at = |group: Option<&Group>, edge: fn(&Group) -> usize| group.map_or(0, edge);
@@ -42,12 +42,12 @@ impl Stretch {
 }
 
 /// The smallest box, along the axes, around some particles.
-struct Bounds<const D: usize> {
+struct BoundingBox<const D: usize> {
     lower: [f32; D],
     upper: [f32; D],
 }
 
-impl<const D: usize> Bounds<D> {
+impl<const D: usize> BoundingBox<D> {
     fn of(positions: &[&[f32]; D], particles: Range<usize>) -> Self {
         let mut bounds = Self { lower: [f32::INFINITY; D], upper: [f32::NEG_INFINITY; D] };
         for c in 0..D {
@@ -68,7 +68,7 @@ impl<const D: usize> Bounds<D> {
             let above = point[c] - point[c].broadcast(self.upper[c]);
             outside[c] = below.simd_max(above).simd_max(point[c].broadcast(0.0));
         }
-        squared(&outside)
+        length_squared(&outside)
     }
 }
 
@@ -77,18 +77,18 @@ impl<const D: usize> Bounds<D> {
 fn list_near<S: Simd, const D: usize>(
     simd: S,
     positions: &[&[f32]; D],
-    bounds: &Bounds<D>,
-    reach_squared: f32,
+    bounds: &BoundingBox<D>,
+    support_squared: f32,
     run: Range<usize>,
-    list: &mut [u32],
+    candidates: &mut [u32],
 ) -> usize {
-    let reach = HalfLanes::splat(simd, reach_squared);
+    let support = HalfLanes::splat(simd, support_squared);
     let mut count = 0;
     for start in run.clone().step_by(BATCH) {
-        let near = bounds.distance_squared(&load(simd, positions, start)).simd_lt(reach).to_bitmask() as usize;
+        let near = bounds.distance_squared(&load(simd, positions, start)).simd_lt(support).to_bitmask() as usize;
         // The last batch goes on behind the run.
         let near = near & (0xff >> (BATCH - (run.end - start).min(BATCH)));
-        for (to, place) in list[count..count + BATCH].iter_mut().zip(&PLACES[near]) {
+        for (to, place) in candidates[count..count + BATCH].iter_mut().zip(&SET_BIT_INDICES[near]) {
             *to = start as u32 + u32::from(*place);
         }
         count += near.count_ones() as usize;
@@ -97,7 +97,7 @@ fn list_near<S: Simd, const D: usize>(
 }
 
 /// For each set of bits the places of those that are set.
-const PLACES: [[u8; BATCH]; 256] = {
+const SET_BIT_INDICES: [[u8; BATCH]; 256] = {
     let mut places = [[0; BATCH]; 256];
     let mut bits = 0;
     while bits < 256 {
@@ -114,39 +114,45 @@ const PLACES: [[u8; BATCH]; 256] = {
     places
 };
 
-impl Stretch {
+impl GroupBatch {
     /// Parts rows into stretches and finds everybody's candidates.
-    pub(super) fn find_all<const D: usize>(stretches: &mut Vec<Self>, cells: &Cells<D>, parts: &[RowPart]) {
+    pub(super) fn find_all<const D: usize>(batches: &mut Vec<Self>, cells: &Cells<D>, parts: &[RowChunk]) {
         let level = Level::new();
-        stretches.resize_with(parts.len().div_ceil(GROUPS), Self::default);
-        stretches.par_iter_mut().with_max_len(1).zip(parts.par_chunks(GROUPS)).for_each(|(stretch, parts)| {
-            dispatch!(level, simd => stretch.find(simd, cells, parts));
+        batches.resize_with(parts.len().div_ceil(GROUPS_PER_TASK), Self::default);
+        batches.par_iter_mut().with_max_len(1).zip(parts.par_chunks(GROUPS_PER_TASK)).for_each(|(batch, parts)| {
+            dispatch!(level, simd => batch.find(simd, cells, parts));
         });
     }
 
     /// Finds the candidates of some parts of rows.
     #[inline(always)]
-    fn find<S: Simd, const D: usize>(&mut self, simd: S, cells: &Cells<D>, parts: &[RowPart]) {
+    fn find<S: Simd, const D: usize>(&mut self, simd: S, cells: &Cells<D>, parts: &[RowChunk]) {
         let (positions, support) = (cells.positions(), cells.support_radius());
         let Self { groups, candidates } = self;
         groups.clear();
         candidates.clear();
         let Some(first) = parts.first() else { return };
-        let mut around = cells.runs_from(first);
-        let mut listed = 0;
+        let mut around = cells.neighbor_runs(first);
+        let mut count_so_far = 0;
         for part in parts {
             let particles = part.particles.start as usize..part.particles.end as usize;
-            let bounds = Bounds::of(&positions, particles.clone());
+            let bounds = BoundingBox::of(&positions, particles.clone());
             let runs = around.around(part);
-            let most: usize = runs.iter().map(|run| run.len() + BATCH).sum();
-            candidates.resize(listed + most, 0);
-            let first = listed;
+            let max_candidates: usize = runs.iter().map(|run| run.len() + BATCH).sum();
+            candidates.resize(count_so_far + max_candidates, 0);
+            let first = count_so_far;
             for run in runs {
-                listed +=
-                    list_near(simd, &positions, &bounds, support * support, run.clone(), &mut candidates[listed..]);
+                count_so_far += list_near(
+                    simd,
+                    &positions,
+                    &bounds,
+                    support * support,
+                    run.clone(),
+                    &mut candidates[count_so_far..],
+                );
             }
-            groups.push(Group { particles, candidates: first..listed });
+            groups.push(Group { particles, candidates: first..count_so_far });
         }
-        candidates.truncate(listed);
+        candidates.truncate(count_so_far);
     }
 }

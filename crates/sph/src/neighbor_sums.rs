@@ -12,15 +12,15 @@ use bansho_base::{
 };
 
 use super::{
-    batch::{BATCH, cut, difference, load, pick, spread, squared},
+    batch::{BATCH, length_squared, load, splat_all, subtract, truncate_all, values_at},
     cells::Cells,
-    neighbor_groups::{Group, Stretch},
+    neighbor_groups::{Group, GroupBatch},
 };
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
 /// Particles closer than this share of the support radius count as coincident.
-const COINCIDENT: f32 = 1e-6;
+const COINCIDENCE_RADIUS: f32 = 1e-6;
 
 /// Where a neighbour is.
 #[derive(Clone, Copy, Debug)]
@@ -69,28 +69,28 @@ impl<const D: usize> Cells<D> {
             values.resize(self.len(), 0.0);
             values.as_mut_slice()
         });
-        let around = Around { cells: self, positions: self.positions(), fields };
-        let stretches = self.stretches().par_iter().with_max_len(1);
-        stretches.zip(split(self.stretches(), results)).for_each(|(stretch, mut results)| {
-            dispatch!(level, simd => sum_stretch(simd, term, &around, stretch, &mut results));
+        let inputs = SumInputs { cells: self, positions: self.positions(), fields };
+        let batches = self.batches().par_iter().with_max_len(1);
+        batches.zip(split(self.batches(), results)).for_each(|(batch, mut results)| {
+            dispatch!(level, simd => sum_batch(simd, term, &inputs, batch, &mut results));
         });
     }
 }
 
 /// The part of each array that belongs to each stretch.
-fn split<'a, const OUT: usize>(stretches: &[Stretch], mut arrays: [&'a mut [f32]; OUT]) -> Vec<[&'a mut [f32]; OUT]> {
-    let mut part = |stretch: &Stretch| {
+fn split<'a, const OUT: usize>(batches: &[GroupBatch], mut arrays: [&'a mut [f32]; OUT]) -> Vec<[&'a mut [f32]; OUT]> {
+    let mut slice_of = |batch: &GroupBatch| {
         arrays.each_mut().map(|values| {
-            let (head, tail) = std::mem::take(values).split_at_mut(stretch.particles().len());
+            let (head, tail) = std::mem::take(values).split_at_mut(batch.particles().len());
             *values = tail;
             head
         })
     };
-    stretches.iter().map(&mut part).collect()
+    batches.iter().map(&mut slice_of).collect()
 }
 
 /// What sums read: positions and fields in sorted order.
-struct Around<'a, const D: usize, const IN: usize> {
+struct SumInputs<'a, const D: usize, const IN: usize> {
     cells: &'a Cells<D>,
     positions: [&'a [f32]; D],
     fields: [&'a [f32]; IN],
@@ -98,29 +98,29 @@ struct Around<'a, const D: usize, const IN: usize> {
 
 /// Sums for all particles of a stretch.
 #[inline(always)]
-fn sum_stretch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
+fn sum_batch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
-    around: &Around<'_, D, IN>,
-    stretch: &Stretch,
+    inputs: &SumInputs<'_, D, IN>,
+    batch: &GroupBatch,
     results: &mut [&mut [f32]; OUT],
 ) where
     T: PairTerm<D, IN, OUT>,
 {
-    let first = stretch.particles().start;
-    for group in &stretch.groups {
-        let candidates = &stretch.candidates[group.candidates.clone()];
-        let (sums, coincident) = sum_group(simd, term, around, group.particles.start, candidates);
+    let first = batch.particles().start;
+    for group in &batch.groups {
+        let candidates = &batch.candidates[group.candidates.clone()];
+        let (sums, coincident) = sum_group(simd, term, inputs, group.particles.start, candidates);
         let mut lanes = [[0.0; BATCH]; OUT];
         for k in 0..OUT {
             sums[k].store_slice(&mut lanes[k]);
         }
         if T::DIRECTED {
-            add_coincident(term, around, group, candidates, coincident, &mut lanes);
+            add_coincident(term, inputs, group, candidates, coincident, &mut lanes);
         }
-        let place = group.particles.start - first..group.particles.end - first;
+        let rows = group.particles.start - first..group.particles.end - first;
         for k in 0..OUT {
-            results[k][place.clone()].copy_from_slice(&lanes[k][..group.particles.len()]);
+            results[k][rows.clone()].copy_from_slice(&lanes[k][..group.particles.len()]);
         }
     }
 }
@@ -131,32 +131,32 @@ fn sum_stretch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
 fn sum_group<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
-    around: &Around<'_, D, IN>,
+    inputs: &SumInputs<'_, D, IN>,
     first: usize,
     candidates: &[u32],
 ) -> ([HalfLanes<S>; OUT], HalfLanes<S>)
 where
     T: PairTerm<D, IN, OUT>,
 {
-    let support = around.cells.support_radius();
-    let count = around.cells.len();
-    let (positions, fields) = (cut(around.positions, count), cut(around.fields, count));
-    let position = load(simd, &around.positions, first);
-    let own = load_held(simd, &fields, first);
+    let support = inputs.cells.support_radius();
+    let count = inputs.cells.len();
+    let (positions, fields) = (truncate_all(inputs.positions, count), truncate_all(inputs.fields, count));
+    let position = load(simd, &inputs.positions, first);
+    let own = load_padded(simd, &fields, first);
     let none = HalfLanes::splat(simd, 0.0);
-    let (farthest, nearest, one) =
-        (none.broadcast(support * support), none.broadcast(nearest_squared(support)), none.broadcast(1.0));
+    let (max_squared, min_squared, one) =
+        (none.broadcast(support * support), none.broadcast(coincidence_distance_squared(support)), none.broadcast(1.0));
     let (mut sums, mut coincident) = ([none; OUT], none);
     for candidate in candidates {
         let candidate = *candidate as usize;
-        let offset = difference(&position, &spread(simd, pick(&positions, candidate)));
-        let squared = squared(&offset);
-        let mut distance_squared = squared.simd_min(farthest);
+        let offset = subtract(&position, &splat_all(simd, values_at(&positions, candidate)));
+        let length_squared = length_squared(&offset);
+        let mut distance_squared = length_squared.simd_min(max_squared);
         if T::DIRECTED {
-            coincident += squared.select_lt(nearest, one, none);
-            distance_squared = distance_squared.simd_max(nearest);
+            coincident += length_squared.select_lt(min_squared, one, none);
+            distance_squared = distance_squared.simd_max(min_squared);
         }
-        let other = spread(simd, pick(&fields, candidate));
+        let other = splat_all(simd, values_at(&fields, candidate));
         term.add(&Pair { offset, distance_squared }, &own, &other, &mut sums);
     }
     (sums, coincident)
@@ -164,7 +164,7 @@ where
 
 /// The batch of each array that begins at an index; 0 behind their end.
 #[inline(always)]
-fn load_held<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], first: usize) -> [HalfLanes<S>; N] {
+fn load_padded<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], first: usize) -> [HalfLanes<S>; N] {
     let length = arrays.first().map_or(0, |array| array.len());
     if first + BATCH <= length {
         return load(simd, arrays, first);
@@ -179,15 +179,15 @@ fn load_held<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], first: usiz
 }
 
 /// Squared distance below which particles coincide.
-fn nearest_squared(support_radius: f32) -> f32 {
-    (support_radius * COINCIDENT) * (support_radius * COINCIDENT)
+fn coincidence_distance_squared(support_radius: f32) -> f32 {
+    (support_radius * COINCIDENCE_RADIUS) * (support_radius * COINCIDENCE_RADIUS)
 }
 
 /// Adds what those particles of a group gain that coincide with more than themselves.
 #[inline(always)]
 fn add_coincident<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     term: &T,
-    around: &Around<'_, D, IN>,
+    inputs: &SumInputs<'_, D, IN>,
     group: &Group,
     candidates: &[u32],
     coincident: HalfLanes<S>,
@@ -199,9 +199,9 @@ fn add_coincident<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>
         return;
     }
     for particle in group.particles.clone() {
-        let more = sum_coincident(term, around, candidates, particle);
+        let extra = sum_coincident(term, inputs, candidates, particle);
         for k in 0..OUT {
-            sums[k][particle - group.particles.start] += more[k];
+            sums[k][particle - group.particles.start] += extra[k];
         }
     }
 }
@@ -210,23 +210,24 @@ fn add_coincident<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>
 #[inline(never)]
 fn sum_coincident<T, const D: usize, const IN: usize, const OUT: usize>(
     term: &T,
-    around: &Around<'_, D, IN>,
+    inputs: &SumInputs<'_, D, IN>,
     candidates: &[u32],
     particle: usize,
 ) -> [f32; OUT]
 where
     T: PairTerm<D, IN, OUT>,
 {
-    let support = around.cells.support_radius();
-    let ids = around.cells.ids();
-    let (position, values) = (pick(&around.positions, particle), pick(&around.fields, particle));
+    let support = inputs.cells.support_radius();
+    let ids = inputs.cells.ids();
+    let (position, values) = (values_at(&inputs.positions, particle), values_at(&inputs.fields, particle));
     let mut sums = [0.0; OUT];
     for other in candidates.iter().map(|other| *other as usize).filter(|other| *other != particle) {
-        let between = difference(&position, &pick(&around.positions, other));
-        if squared(&between) < nearest_squared(support) {
-            let offset = direction(ids[particle], ids[other]).map(|component: f32| component * support * COINCIDENT);
-            let pair = Pair { offset, distance_squared: squared(&offset) };
-            term.add(&pair, &values, &pick(&around.fields, other), &mut sums);
+        let separation = subtract(&position, &values_at(&inputs.positions, other));
+        if length_squared(&separation) < coincidence_distance_squared(support) {
+            let offset =
+                direction(ids[particle], ids[other]).map(|component: f32| component * support * COINCIDENCE_RADIUS);
+            let pair = Pair { offset, distance_squared: length_squared(&offset) };
+            term.add(&pair, &values, &values_at(&inputs.fields, other), &mut sums);
         }
     }
     sums

@@ -3,7 +3,7 @@
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::{cells::Cells, sorting::AT_ONCE};
+use super::{cells::Cells, sorting::MIN_PARTICLES_PER_TASK};
 
 /// Particles in `D` dimensions as arrays, one entry a particle.
 ///
@@ -75,11 +75,13 @@ impl<const D: usize> Particles<D> {
         let level = Level::new();
         for c in 0..D {
             assert_eq!(accelerations[c].len(), self.len(), "one acceleration a particle");
-            let positions = self.positions[c].par_chunks_mut(AT_ONCE);
-            let moving = positions.zip(self.velocities[c].par_chunks_mut(AT_ONCE));
-            moving.zip(accelerations[c].par_chunks(AT_ONCE)).for_each(|((positions, velocities), accelerations)| {
-                dispatch!(level, _simd => advance(positions, velocities, accelerations, seconds));
-            });
+            let positions = self.positions[c].par_chunks_mut(MIN_PARTICLES_PER_TASK);
+            let moving = positions.zip(self.velocities[c].par_chunks_mut(MIN_PARTICLES_PER_TASK));
+            moving.zip(accelerations[c].par_chunks(MIN_PARTICLES_PER_TASK)).for_each(
+                |((positions, velocities), accelerations)| {
+                    dispatch!(level, _simd => advance(positions, velocities, accelerations, seconds));
+                },
+            );
         }
     }
 }

@@ -8,7 +8,7 @@ use super::{
     cells::Cells,
     kernel::{KernelShape, SmoothingKernel, with_kernel},
     neighbor_sums::{Pair, PairTerm},
-    sorting::AT_ONCE,
+    sorting::MIN_PARTICLES_PER_TASK,
 };
 
 /// `(p_i + p_j) m_j / rho_j` times the gradient of W: Inagaki et al. (12) with (8), but for a factor of i's own.
@@ -58,16 +58,23 @@ impl PressureForce {
     ) {
         assert!(masses.len() == densities.len() && densities.len() == pressures.len(), "one value a particle");
         let volume = |(mass, density): (&f32, &f32)| mass / density;
-        masses.par_iter().zip(densities).with_min_len(AT_ONCE).map(volume).collect_into_vec(&mut self.volume);
+        masses
+            .par_iter()
+            .zip(densities)
+            .with_min_len(MIN_PARTICLES_PER_TASK)
+            .map(volume)
+            .collect_into_vec(&mut self.volume);
         let fields = [pressures, self.volume.as_slice()];
         let results = accelerations.each_mut();
         with_kernel!(self.kernel, cells.support_radius(), D, |kernel| {
             cells.sum(&PressureTerm(kernel), fields, results);
         });
         for component in accelerations {
-            component.par_iter_mut().zip(densities).with_min_len(AT_ONCE).for_each(|(value, density)| {
-                *value *= -0.5 / density;
-            });
+            component.par_iter_mut().zip(densities).with_min_len(MIN_PARTICLES_PER_TASK).for_each(
+                |(value, density)| {
+                    *value *= -0.5 / density;
+                },
+            );
         }
     }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 /// Particles that one task takes at least.
-pub(super) const AT_ONCE: usize = 4096;
+pub(super) const MIN_PARTICLES_PER_TASK: usize = 4096;
 /// Most bits sorted by in one pass.
 const DIGIT_BITS: u32 = 11;
 /// Keys for each range that tell where ranges end, so that all have about as many particles.
@@ -23,22 +23,22 @@ pub(super) struct Cell {
 
 /// What sorting writes on the way, kept from step to step.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sorting {
+pub(super) struct SampleSort {
     entries: Vec<Entry>,
     /// The sample that ends of ranges are taken from.
     sample: Vec<u64>,
-    ranges: Vec<SortedRange>,
+    ranges: Vec<KeyRange>,
 }
 
 /// The particles of a range of keys.
 #[derive(Clone, Debug, Default)]
-struct SortedRange {
+struct KeyRange {
     entries: Vec<Entry>,
-    spare: Vec<Entry>,
+    scratch: Vec<Entry>,
     cells: Vec<Cell>,
 }
 
-impl Sorting {
+impl SampleSort {
     /// Sorts one particle an id, with keys of so many bits, by key and then by id: gives their indices in that order, and the cells.
     pub(super) fn sort(
         &mut self,
@@ -47,10 +47,10 @@ impl Sorting {
         ids: &[u64],
         (order, cells): (&mut Vec<u32>, &mut Vec<Cell>),
     ) {
-        let all = (0..ids.len()).into_par_iter().with_min_len(AT_ONCE);
+        let all = (0..ids.len()).into_par_iter().with_min_len(MIN_PARTICLES_PER_TASK);
         all.map(|index| (key(index), index as u32)).collect_into_vec(&mut self.entries);
-        let count = rayon::current_num_threads().min(ids.len() / AT_ONCE).max(1);
-        self.ranges.resize_with(count, SortedRange::default);
+        let count = rayon::current_num_threads().min(ids.len() / MIN_PARTICLES_PER_TASK).max(1);
+        self.ranges.resize_with(count, KeyRange::default);
         let starts = self.starts_of_ranges();
         let Self { entries, ranges, .. } = self;
         ranges.par_iter_mut().enumerate().for_each(|(number, range)| {
@@ -81,7 +81,7 @@ impl Sorting {
     }
 }
 
-impl SortedRange {
+impl KeyRange {
     /// Takes the particles with keys from `start` to before `end`.
     fn take(&mut self, all: &[Entry], start: u64, end: Option<u64>) {
         self.entries.clear();
@@ -92,13 +92,13 @@ impl SortedRange {
 
     /// Sorts them by key, then by id.
     fn sort(&mut self, bits: u32, ids: &[u64]) {
-        let Self { entries, spare, .. } = self;
-        spare.resize(entries.len(), (0, 0));
+        let Self { entries, scratch, .. } = self;
+        scratch.resize(entries.len(), (0, 0));
         let passes = bits.div_ceil(DIGIT_BITS);
         for pass in 0..passes {
             let [from, to] = [pass, pass + 1].map(|pass| bits * pass / passes);
-            counting_pass(entries, spare, from..to);
-            std::mem::swap(entries, spare);
+            radix_pass(entries, scratch, from..to);
+            std::mem::swap(entries, scratch);
         }
         for cell in entries.chunk_by_mut(|a, b| a.0 == b.0).filter(|cell| cell.len() > 1) {
             cell.sort_unstable_by_key(|entry| ids[entry.1 as usize]);
@@ -117,19 +117,19 @@ impl SortedRange {
 }
 
 /// One stable pass of a radix sort, over some bits of the keys.
-fn counting_pass(from: &[Entry], to: &mut [Entry], bits: Range<u32>) {
-    let mut places = [0_u32; 1 << DIGIT_BITS];
+fn radix_pass(from: &[Entry], to: &mut [Entry], bits: Range<u32>) {
+    let mut offsets = [0_u32; 1 << DIGIT_BITS];
     let mask = (1 << bits.len()) - 1;
     let digit = |key: u64| (key >> bits.start) as usize & mask;
-    from.iter().for_each(|entry| places[digit(entry.0)] += 1);
+    from.iter().for_each(|entry| offsets[digit(entry.0)] += 1);
     let mut sum = 0;
-    for place in &mut places[..=mask] {
-        sum += std::mem::replace(place, sum);
+    for offset in &mut offsets[..=mask] {
+        sum += std::mem::replace(offset, sum);
     }
     for entry in from {
-        let place = &mut places[digit(entry.0)];
-        to[*place as usize] = *entry;
-        *place += 1;
+        let offset = &mut offsets[digit(entry.0)];
+        to[*offset as usize] = *entry;
+        *offset += 1;
     }
 }
 
@@ -154,11 +154,11 @@ mod tests {
             for threads in [1, 2, 7] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("few threads");
                 let (mut order, mut cells) = (Vec::new(), Vec::new());
-                pool.install(|| Sorting::default().sort(key, 21, &ids, (&mut order, &mut cells)));
+                pool.install(|| SampleSort::default().sort(key, 21, &ids, (&mut order, &mut cells)));
                 assert!(order == expected, "{most} keys, {threads} threads");
-                let firsts = (0..50_000).filter(|place| {
-                    let key = |place: u32| key(expected[place as usize] as usize);
-                    *place == 0 || key(*place) != key(place - 1)
+                let firsts = (0..50_000).filter(|offset| {
+                    let key = |offset: u32| key(expected[offset as usize] as usize);
+                    *offset == 0 || key(*offset) != key(offset - 1)
                 });
                 assert!(cells.iter().map(|cell| cell.start).eq(firsts), "{most} keys, {threads} threads");
                 assert!(cells.iter().all(|cell| cell.key == key(expected[cell.start as usize] as usize)));

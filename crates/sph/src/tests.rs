@@ -64,7 +64,7 @@ fn all_pairs<const D: usize>(
         near(i).filter(|j| *j != i).fold([0.0; D], |sum, j| {
             let push = 3.0 * (density[i] + density[j]) / (2.0 * density[i] * density[j]);
             let r = distance(i, j);
-            let factor = -mass(j) * push * f64::from(slope.slope(r as f32)) / r;
+            let factor = -mass(j) * push * f64::from(slope.derivative(r as f32)) / r;
             std::array::from_fn(|c| sum[c] + factor * offset(i, j)[c])
         })
     };
@@ -231,7 +231,7 @@ fn a_pressed_lattice_moves_from_its_surface_inward_and_not_before() {
     let (mut particles, mut cells) = (lattice::<2>(25), Cells::new(2.5));
     let before = particles.positions.clone();
     let mut force = PressureForce::new(KernelShape::Spiky);
-    let state = StateEquation { rest_density: 0.0, tension: false };
+    let state = StateEquation { rest_density: 0.0, negative_pressure: false };
     // A step carries news by less than two support radii: after two the middle has heard nothing.
     (0..2).for_each(|_| step(&mut particles, &mut cells, &mut force, state));
     for i in 0..particles.len() {
@@ -251,7 +251,7 @@ fn the_middle_of_a_lattice_under_pressure_rests_until_sound_arrives() {
     let (mut particles, mut cells) = (lattice::<2>(side), Cells::new(2.5));
     let mut force = PressureForce::new(KernelShape::Spiky);
     // Denser than at rest by a tenth: every particle is pushed from all sides, and only the surface has nobody on the other.
-    let state = StateEquation { rest_density: 0.9, tension: false };
+    let state = StateEquation { rest_density: 0.9, negative_pressure: false };
     let centre = 0.5 * (side - 1) as f32;
     let mut arrived = 0.0_f32;
     for steps in 1..=600 {
@@ -289,7 +289,7 @@ fn totals<const D: usize>(particles: &Particles<D>) -> ([f64; D], f64, [f64; D])
 fn keeps_momentum<const D: usize>() {
     let (mut particles, mut cells) = (cloud::<D>(500, 0.5), Cells::new(0.3));
     let mut force = PressureForce::new(KernelShape::Spiky);
-    let state = StateEquation { rest_density: 0.0, tension: false };
+    let state = StateEquation { rest_density: 0.0, negative_pressure: false };
     let mass: f64 = particles.masses.iter().map(|mass| f64::from(*mass)).sum();
     let (momentum, _, centre) = totals(&particles);
     let mut worst = 0.0_f64;
@@ -325,7 +325,7 @@ fn coincident_particles_part_in_opposite_directions() {
     let strength = acceleration.iter().map(|a| a[0] * a[0]).sum::<f32>().sqrt();
     let kernel = Kernel::<3>::new(KernelShape::Spiky, 0.5);
     let density = 2.0 * Kernel::<3>::new(KernelShape::Poly6, 0.5).value(0.0);
-    let expected = -3.0 / density * kernel.slope(1e-7);
+    let expected = -3.0 / density * kernel.derivative(1e-7);
     assert!((strength / expected - 1.0).abs() < 1e-3, "{strength} {expected}");
     for c in 0..3 {
         assert_eq!(acceleration[c][0], -acceleration[c][1]);

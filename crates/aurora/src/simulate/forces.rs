@@ -72,8 +72,8 @@ impl Repulsion {
         dispatch!(level, _simd => masses_of(&particles.fades, &mut self.masses));
         densities(&self.cells, self.density_kernel, &self.masses, &mut self.densities);
         // To itself a particle is all there: one that is just appearing would be next to weightless, and be flung away.
-        let whole = self.density_kernel.at_centre::<2>(self.cells.support_radius());
-        let state = StateEquation { rest_density: rest_density as f32, tension: true };
+        let whole = self.density_kernel.at_center::<2>(self.cells.support_radius());
+        let state = StateEquation { rest_density: rest_density as f32, negative_pressure: true };
         let Self { masses, densities, pressures, stiffness, .. } = self;
         dispatch!(level, _simd => complete(densities, masses, whole));
         pressures.clear();

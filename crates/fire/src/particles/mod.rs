@@ -20,6 +20,6 @@ pub use parameters::{
 pub use phenomenon::FlameParticles;
 pub use simulate::{
     burner::heskestad,
-    derived::check_count,
+    derived::check_particle_count,
     particles::{Particle, Particles},
 };

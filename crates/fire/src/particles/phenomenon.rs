@@ -19,10 +19,10 @@ use bansho_base::{
 use super::{
     fault::{ParticleFault, ParticleFaultKind},
     parameters::{FlameParticlesParameters, TemperatureLaw},
-    render::{self, Ending, Gas, Memory, PreparedGas, SpriteStyle},
+    render::{self, FadeOut, Gas, PreparedGas, ScratchPool, SpriteStyle},
 };
 use crate::particles::simulate::{
-    burner::Burner, derived::Design, particles::Particles, simulation::Simulation, snapshot,
+    burner::Burner, derived::DerivedConstants, particles::Particles, simulation::Simulation, snapshot,
 };
 
 /// A particle flame at some moment of its life.
@@ -37,7 +37,7 @@ pub struct FlameParticles {
     /// Temperature of the air at the last step, K.
     air_temperature_k: f64,
     /// What it draws with.
-    memory: Memory,
+    scratch: ScratchPool,
 }
 
 impl FlameParticles {
@@ -56,15 +56,15 @@ impl FlameParticles {
             close_loop(&mut parameters, seconds)?;
         }
         let key = Key::new(seed, name);
-        let design = Design::new(&parameters, loop_s, assets)?;
-        let steps = (design.preroll / parameters.step_s).round();
+        let constants = DerivedConstants::new(&parameters, loop_s, assets)?;
+        let steps = (constants.preroll / parameters.step_s).round();
         Ok(Self {
             name: name.to_owned(),
             key,
             time: -steps * parameters.step_s,
             air_temperature_k: bansho_base::world::air::Air::default().temperature_k,
-            simulation: Simulation::new(&parameters, design, key),
-            memory: Memory::default(),
+            simulation: Simulation::new(&parameters, constants, key),
+            scratch: ScratchPool::default(),
             parameters,
         })
     }
@@ -89,20 +89,20 @@ impl FlameParticles {
             base: place,
             size: DVec2::new(tallest.diameter, tallest.height),
             key: self.key,
-            ending: self.ending(),
-            memory: &self.memory,
+            fade_out: self.fade_out(),
+            scratch: &self.scratch,
         }
     }
 
-    fn ending(&self) -> Ending {
+    fn fade_out(&self) -> FadeOut {
         /// Share of the time that burnt gas stays.
         const FADING: f64 = 0.2;
         let seconds = (FADING * self.parameters.life.afterlife_s).max(self.parameters.step_s) as f32;
-        Ending { seconds, domain: self.simulation.design.domain.map(|corner| corner.as_vec3()) }
+        FadeOut { seconds, domain: self.simulation.constants.domain.map(|corner| corner.as_vec3()) }
     }
 
     fn tallest(&self) -> &Burner {
-        let burners = &self.simulation.design.burners;
+        let burners = &self.simulation.constants.burners;
         // A design has at least one burner.
         let taller = |a: &&Burner, b: &&Burner| a.height.total_cmp(&b.height);
         burners.iter().max_by(taller).unwrap_or(&burners[0])
@@ -130,7 +130,7 @@ impl Phenomenon for FlameParticles {
     }
 
     fn remark(&self, neighbours: &Neighbours) -> Option<Remark> {
-        let burners = &self.simulation.design.burners;
+        let burners = &self.simulation.constants.burners;
         let gives = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
         if !burners.iter().any(gives) {
             return Some(Remark::Unfed);
@@ -138,7 +138,7 @@ impl Phenomenon for FlameParticles {
         let origin = DVec3::from(self.parameters.position);
         let is_buried = |burner: &Burner| {
             let within = |birth: u64| {
-                let place = origin + burner.birthplace(self.simulation.key, birth, 0.0).position;
+                let place = origin + burner.spawn_point(self.simulation.key, birth, 0.0).position;
                 neighbours.occluders().any(|occluder| occluder.signed_distance(place) < 0.0)
             };
             // As many births as show it.
@@ -164,7 +164,7 @@ impl Phenomenon for FlameParticles {
     }
 
     fn stepping(&self) -> Option<Stepping> {
-        let Design { preroll, dissolve, .. } = self.simulation.design;
+        let DerivedConstants { preroll, dissolve, .. } = self.simulation.constants;
         Some(Stepping { step: self.parameters.step_s, preroll, dissolve })
     }
 
@@ -186,7 +186,7 @@ impl Phenomenon for FlameParticles {
         if !time.is_finite() || !air.is_finite() {
             return Err(SnapshotError::Damaged);
         }
-        let burners = self.simulation.design.burners.len();
+        let burners = self.simulation.constants.burners.len();
         self.simulation.particles = snapshot::read(&self.simulation.particles, rest, burners)?;
         (self.time, self.air_temperature_k) = (time, air);
         Ok(())
@@ -203,7 +203,7 @@ impl Phenomenon for FlameParticles {
     }
 
     fn publish(&self, shutter: Shutter) -> Publication {
-        let lights = render::luminous(&self.gas(), &self.parameters.look, shutter.middle());
+        let lights = render::point_lights_of_gas(&self.gas(), &self.parameters.look, shutter.middle());
         Publication { lights, ..Publication::default() }
     }
 

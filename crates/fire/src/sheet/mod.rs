@@ -26,17 +26,17 @@ use bansho_base::{
     },
 };
 
-use animate::{clock::Clock, moment::Motion};
+use animate::{clock::Clock, warp::FlameWaves};
 use render::{
-    flame::{Flame, Source},
-    ramp::Ramp,
-    shape_tables::{Shape, instance_key},
+    flame::{FlameInstance, TextureSource},
+    ramp::ColorRamp,
+    shape_tables::{ShapeTables, instance_key},
 };
 use texture::{FractalLayers, PaperLayer};
 
 pub use parameters::{
-    ColourParameters, Colouring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters,
-    SmokeParameters, StageShown, TextureKind, TextureParameters,
+    ColorParameters, Coloring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters,
+    SmokeParameters, Stage, TextureKind, TextureParameters,
 };
 pub use texture::{PaperTexture, paper_texture};
 
@@ -50,7 +50,7 @@ pub struct FlameSheet {
     clock: Clock,
     /// Made when it is first seen: there may be thousands of sheets, each of which is made to be checked.
     tables: OnceLock<Tables>,
-    flames: Vec<Flame>,
+    flames: Vec<FlameInstance>,
 }
 
 impl FlameSheet {
@@ -68,8 +68,8 @@ impl FlameSheet {
             return Err(ParameterFault { key: "loop", kind: FaultKind::LoopLength { seconds } });
         }
         let clock = Clock::new(parameters.speed.clone(), loop_s);
-        Shape::check(&parameters.shape)?;
-        Ramp::check(&parameters.texture)?;
+        ShapeTables::check(&parameters.shape)?;
+        ColorRamp::check(&parameters.texture)?;
         let flames = flames(&parameters, name, seed, &clock);
         Ok(Self { name: name.to_owned(), parameters, clock, tables: OnceLock::new(), flames })
     }
@@ -82,19 +82,19 @@ impl FlameSheet {
     fn tables(&self) -> &Tables {
         let FlameSheetParameters { shape, texture, colour, stage, .. } = &self.parameters;
         let make = || Tables {
-            shape: Box::new(Shape::new(shape, texture, colour)),
-            ramp: Box::new(Ramp::new(texture, colour, *stage)),
+            shape: Box::new(ShapeTables::new(shape, texture, colour)),
+            ramp: Box::new(ColorRamp::new(texture, colour, *stage)),
         };
         get_or_make(&self.tables, make)
     }
 
     /// What of the chain does not change with time.
-    pub(crate) fn shape(&self) -> &Shape {
+    pub(crate) fn shape(&self) -> &ShapeTables {
         &self.tables().shape
     }
 
     /// From gas to light.
-    pub(crate) fn ramp(&self) -> &Ramp {
+    pub(crate) fn ramp(&self) -> &ColorRamp {
         &self.tables().ramp
     }
 }
@@ -102,28 +102,29 @@ impl FlameSheet {
 /// What a sheet is drawn with, and depends on its parameters alone.
 #[derive(Clone, Debug)]
 struct Tables {
-    shape: Box<Shape>,
-    ramp: Box<Ramp>,
+    shape: Box<ShapeTables>,
+    ramp: Box<ColorRamp>,
 }
 
-fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Clock) -> Vec<Flame> {
+fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Clock) -> Vec<FlameInstance> {
     let texture = &parameters.texture;
     let paper = (texture.kind == TextureKind::OhshimaItahashi)
         .then(|| Arc::new(PaperLayer::new(texture.octaves as u32, clock)));
-    let places = if parameters.instances.is_empty() { vec![Instance::default()] } else { parameters.instances.clone() };
-    let flame = |(index, place): (usize, Instance)| {
+    let placements =
+        if parameters.instances.is_empty() { vec![Instance::default()] } else { parameters.instances.clone() };
+    let flame = |(index, placement): (usize, Instance)| {
         let key = instance_key(seed, name, parameters.variation, index);
-        let source = match &paper {
-            Some(layer) => Source::Paper(layer.clone()),
-            None => Source::Fractal(FractalLayers::new(tongues(parameters), 1.0, key, clock)),
+        let texture_source = match &paper {
+            Some(layer) => TextureSource::Paper(layer.clone()),
+            None => TextureSource::Fractal(FractalLayers::new(tongue_size(parameters), 1.0, key, clock)),
         };
-        Flame { place, key, motion: Motion::new(&parameters.shape, key, clock), source }
+        FlameInstance { placement, key, waves: FlameWaves::new(&parameters.shape, key, clock), texture_source }
     };
-    places.into_iter().enumerate().map(flame).collect()
+    placements.into_iter().enumerate().map(flame).collect()
 }
 
 /// Size of the fractal's tongues in sheet widths and heights, beside the usual: they keep their form on a sheet of any aspect.
-fn tongues(parameters: &FlameSheetParameters) -> [f64; 2] {
+fn tongue_size(parameters: &FlameSheetParameters) -> [f64; 2] {
     /// Width over height of the sheet for which the usual size is meant.
     const USUAL: f64 = 0.65;
     let aspect = parameters.width / parameters.height / USUAL;

@@ -27,7 +27,7 @@ bansho_base::choice! {
 
 bansho_base::choice! {
     /// How the sharpened texture T2 becomes colour.
-    pub enum Colouring {
+    pub enum Coloring {
         /// T2 gives temperature and density of glowing soot, Planck's law gives the light.
         BlackBody = "black_body",
         /// The curves `red`, `green` and `blue`, eq. (7).
@@ -37,7 +37,7 @@ bansho_base::choice! {
 
 bansho_base::choice! {
     /// Which stage of the chain is shown; all but the flame show the flat texture square (u, w) as the paper's pictures 1 to 4.
-    pub enum StageShown {
+    pub enum Stage {
         /// The finished flame.
         Flame = "flame",
         /// The texture T0 (picture 1).
@@ -116,9 +116,9 @@ bansho_base::parameters! {
 
 bansho_base::parameters! {
     /// From the sharpened texture T2 to light, eq. (7) and beyond.
-    pub struct ColourParameters {
+    pub struct ColorParameters {
         /// Which colouring.
-        kind: Colouring = Colouring::BlackBody;
+        kind: Coloring = Coloring::BlackBody;
         /// Luminance of the brightest colour.
         luminance: Animated<f64> = Animated::from(12_000.0), limits(Range::new(0.0, 1e7)), unit("cd/m^2");
         /// R(s), eq. (7), as a display shows it (sRGB-encoded); for `kind = "paper"`.
@@ -214,7 +214,7 @@ bansho_base::parameters! {
         /// Texture, threshold and sharpening.
         texture: TextureParameters = TextureParameters::default();
         /// Colour and soot.
-        colour: ColourParameters = ColourParameters::default();
+        colour: ColorParameters = ColorParameters::default();
         /// Sparks.
         sparks: SparkParameters = SparkParameters::default();
         /// Smoke.
@@ -226,6 +226,6 @@ bansho_base::parameters! {
         /// Moments that are averaged while the shutter is open; `"auto"` follows the scroll in pixels.
         time_samples: Auto<i64> = Auto::Auto, limits(Range::new(1.0, 64.0));
         /// Which stage of the chain is shown.
-        stage: StageShown = StageShown::Flame;
+        stage: Stage = Stage::Flame;
     }
 }

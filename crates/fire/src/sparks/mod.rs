@@ -39,7 +39,7 @@ bansho_base::parameters! {
 }
 
 /// Where a spark stops to glow, K.
-const COLDEST_K: f64 = 900.0;
+const EXTINCTION_TEMPERATURE_K: f64 = 900.0;
 
 /// The random properties of one spark.
 struct Spark {
@@ -58,7 +58,7 @@ struct Spark {
 }
 
 /// A fire that throws up sparks, as it is while the shutter is open.
-pub(crate) struct Fire<'a> {
+pub(crate) struct SparkEmitter<'a> {
     pub(crate) parameters: &'a SparkParameters,
     pub(crate) key: Key,
     /// The fire's own time at the middle of the exposure, s; in a loop it repeats.
@@ -74,7 +74,7 @@ pub(crate) struct Fire<'a> {
     pub(crate) wind_response: f64,
 }
 
-impl Fire<'_> {
+impl SparkEmitter<'_> {
     /// The sparks of a flame that the exposure sees.
     pub(crate) fn streaks(&self, view: &View, wind: &Wind) -> Vec<Streak> {
         let sparks = self.parameters;
@@ -82,17 +82,17 @@ impl Fire<'_> {
             return Vec::new();
         }
         // In a loop the number of births is whole, and birth n is birth n + births again.
-        let (rate, births) = match self.loop_s {
+        let (rate, spawner) = match self.loop_s {
             Some(length) => {
                 ((sparks.rate * length).round().max(1.0) / length, Some((sparks.rate * length).round().max(1.0) as i64))
             }
             None => (sparks.rate, None),
         };
         let (first, last) = (((self.now - sparks.life_s) * rate).floor() as i64 - 1, (self.now * rate).ceil() as i64);
-        let same = |id: i64| births.map_or(id, |births| id.rem_euclid(births)) as u64;
+        let loop_index = |id: i64| spawner.map_or(id, |spawner| id.rem_euclid(spawner)) as u64;
         (first..=last)
             .filter_map(|id| {
-                let spark = self.spark(same(id), self.now - id as f64 / rate, rate)?;
+                let spark = self.spark(loop_index(id), self.now - id as f64 / rate, rate)?;
                 self.streak(&spark, view, wind)
             })
             .collect()
@@ -117,7 +117,7 @@ impl Fire<'_> {
     }
 
     /// Where a spark of `age` is from where it left, in still air, m: it slows as it cools and swirls ever wider.
-    fn flight(&self, spark: &Spark, age: f64) -> DVec3 {
+    fn displacement(&self, spark: &Spark, age: f64) -> DVec3 {
         const DRAG: f64 = 1.3;
         let life = self.parameters.life_s;
         let rise = spark.speed * life * -math::exp_m1(-DRAG * age / life) / DRAG;
@@ -147,13 +147,13 @@ impl Fire<'_> {
         let origin = self.base + DVec3::new(spark.start.x * size.x, spark.start.y * size.y, spark.start.z * size.x);
         let seen = |at: f64, camera: &Camera| {
             let age = (spark.age + at - t).clamp(0.0, spark.life);
-            camera.project(origin + self.flight(spark, age) + self.drift(wind, origin, at, age))
+            camera.project(origin + self.displacement(spark, age) + self.drift(wind, origin, at, age))
         };
         let opened = seen(view.shutter.open, &view.camera_at(view.shutter.open))?;
         let closed = seen(view.shutter.close, &view.camera_at(view.shutter.close))?;
         let cooled = math::pow(spark.age / spark.life, 0.8);
         let hottest = self.parameters.temperature_k;
-        let temperature = math::lerp(hottest, COLDEST_K.min(hottest), cooled);
+        let temperature = math::lerp(hottest, EXTINCTION_TEMPERATURE_K.min(hottest), cooled);
         let radius = 0.5 * self.parameters.size * self.scale * opened.pixels_per_metre;
         let area = std::f64::consts::PI * radius * radius;
         let radiance = color::black_body().radiance(temperature as f32);

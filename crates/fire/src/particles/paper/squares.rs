@@ -11,7 +11,7 @@ use crate::particles::{
     look_parameters::LookParameters,
     render::{
         gas::Gas,
-        project::sprite::{Kind, Seen, seen},
+        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
     },
 };
 
@@ -26,7 +26,7 @@ struct Square {
 }
 
 /// How all particles become squares.
-struct Drawn<'a> {
+struct SquareSprites<'a> {
     gas: &'a Gas<'a>,
     /// Side, support radii.
     side: f32,
@@ -34,14 +34,14 @@ struct Drawn<'a> {
     densest: f64,
 }
 
-impl Kind for Drawn<'_> {
+impl SpriteKind for SquareSprites<'_> {
     type Record = Option<Square>;
 
-    fn wants(&self, _index: usize) -> bool {
+    fn includes(&self, _index: usize) -> bool {
         true
     }
 
-    fn record(&self, seen: &Seen) -> Option<Square> {
+    fn record(&self, seen: &ProjectedParticle) -> Option<Square> {
         let radius = self.gas.particles.support_radius[seen.index];
         let side = (self.side * radius * seen.scale).max(1.0);
         let rect = square_rect(seen.ellipse.centre, side, self.window)?;
@@ -55,9 +55,14 @@ pub(crate) struct Squares(Vec<Square>);
 
 impl Squares {
     pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View) -> Self {
-        let kind = Drawn { gas, side: look.square_size as f32, window: view.window, densest: usual_density(gas) };
+        let kind = SquareSprites {
+            gas,
+            side: look.square_size as f32,
+            window: view.window,
+            densest: density_percentile_95(gas),
+        };
         let mut squares: Vec<Square> =
-            seen(gas, view, &kind).iter_mut().flat_map(|task| task.drain(..)).flatten().collect();
+            project_particles(gas, view, &kind).iter_mut().flat_map(|task| task.drain(..)).flatten().collect();
         // A stable sort: at one depth the elder lies before the younger.
         squares.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         Self(squares)
@@ -84,7 +89,7 @@ impl Squares {
 }
 
 /// The density that nineteen in twenty particles do not exceed, which is shown in full red.
-fn usual_density(gas: &Gas) -> f64 {
+fn density_percentile_95(gas: &Gas) -> f64 {
     let mut densities = gas.particles.density.clone();
     densities.sort_by(f32::total_cmp);
     densities.get(densities.len() * 19 / 20).map_or(1.0, |density| f64::from(density.max(1e-12)))

@@ -5,18 +5,18 @@ use bansho_base::{
     phenomenon::strip::{Strip, View},
 };
 
-use super::{aovs::DEFLECTION, gas::Gas, gas_statistics::shows};
+use super::{aovs::DEFLECTION, gas::Gas, gas_statistics::is_visible};
 use crate::particles::{
     look_parameters::LookParameters,
     render::{
-        project::sprite::{Kind, Seen, seen},
+        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
         resolve::{
             resolve_gas::{PATH, PLANES},
             spline,
         },
         splat::{
-            accumulate::{COARSE, Sheet, Sprite, splat},
-            grid::{Grid, weigh},
+            accumulate::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
+            grid::{Grid, weighted_sum},
             kernel::Profile,
         },
     },
@@ -35,7 +35,7 @@ pub(crate) fn refractivity(temperature_k: f64) -> f64 {
 }
 
 /// The angles by which the gas bends what lies behind it.
-pub(crate) struct Haze {
+pub(crate) struct HeatHaze {
     pub(crate) rect: Rect,
     pub(crate) angle: Image<2>,
 }
@@ -43,68 +43,75 @@ pub(crate) struct Haze {
 /// By how much the gas of a particle is optically shorter than air along a ray through its middle, in the picture's pixels there: the
 /// gradient of summed paths is an angle.
 #[inline(always)]
-pub(crate) fn path(gas: &Gas, look: &LookParameters, seen: &Seen) -> f32 {
-    let excess = excess(gas, seen.index);
-    let length = look.haze_gain * excess * gas.volume(seen.index) * f64::from(seen.ellipse.peak);
+pub(crate) fn path(gas: &Gas, look: &LookParameters, seen: &ProjectedParticle) -> f32 {
+    let refractivity_excess = refractivity_excess(gas, seen.index);
+    let length = look.haze_gain * refractivity_excess * gas.volume(seen.index) * f64::from(seen.ellipse.peak);
     (length * f64::from(seen.scale)) as f32
 }
 
 /// Refractivity of a particle's gas beside that of the air around.
 #[inline(always)]
-fn excess(gas: &Gas, index: usize) -> f64 {
+fn refractivity_excess(gas: &Gas, index: usize) -> f64 {
     refractivity(f64::from(gas.particles.temperature[index])) - refractivity(gas.air_temperature_k)
 }
 
 /// The gas that only bends, or all of it, as sprites of its paths.
-struct Rest<'a> {
+struct RefractionSprites<'a> {
     gas: &'a Gas<'a>,
     look: &'a LookParameters,
-    all: bool,
+    whole_gas: bool,
 }
 
-impl Kind for Rest<'_> {
+impl SpriteKind for RefractionSprites<'_> {
     type Record = Sprite<1>;
 
     #[inline(always)]
-    fn wants(&self, index: usize) -> bool {
-        (self.all || !shows(self.gas, self.look, index)) && excess(self.gas, index) != 0.0
+    fn includes(&self, index: usize) -> bool {
+        (self.whole_gas || !is_visible(self.gas, self.look, index)) && refractivity_excess(self.gas, index) != 0.0
     }
 
     #[inline(always)]
-    fn record(&self, seen: &Seen) -> Sprite<1> {
-        Sprite { ellipse: seen.ellipse, layer: 0, split: 0.0, values: [path(self.gas, self.look, seen)] }
+    fn record(&self, seen: &ProjectedParticle) -> Sprite<1> {
+        Sprite { ellipse: seen.ellipse, layer: 0, next_layer_weight: 0.0, values: [path(self.gas, self.look, seen)] }
     }
 }
 
-impl Haze {
+impl HeatHaze {
     /// `None` where nothing bends.
     ///
-    /// `summed` holds the paths of the gas that shows, as far as the window sees it; only those of the rest are summed here, and `all` where
+    /// `splatted` holds the paths of the gas that shows, as far as the window sees it; only those of the rest are summed here, and `whole_gas` where
     /// the whole picture shows none.
     pub(crate) fn new(
         gas: &Gas,
         look: &LookParameters,
         view: &View,
-        summed: Option<&Grid<'_>>,
-        all: bool,
+        splatted: Option<&Grid<'_>>,
+        whole_gas: bool,
     ) -> Option<Self> {
         if look.haze_gain <= 0.0 {
             return None;
         }
-        let sheet =
-            Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, picture: view.size, window: view.window };
-        let rest = splat(&sheet, &seen(gas, view, &Rest { gas, look, all }), gas.memory).sums();
-        let paths: Vec<Paths> = [(summed, PATH, PLANES), (rest.as_ref(), 0, 1)]
+        let settings = SplatSettings {
+            profile: Profile::LINE,
+            min_radius_cells: MIN_RADIUS_CELLS,
+            layers: 1,
+            picture: view.size,
+            window: view.window,
+        };
+        let rest =
+            splat(&settings, &project_particles(gas, view, &RefractionSprites { gas, look, whole_gas }), gas.scratch)
+                .sums();
+        let paths: Vec<OpticalPathField> = [(splatted, PATH, PLANES), (rest.as_ref(), 0, 1)]
             .into_iter()
-            .filter_map(|(grid, plane, planes)| Some(Paths::new(grid?, plane, planes)))
+            .filter_map(|(grid, plane, planes)| Some(OpticalPathField::new(grid?, plane, planes)))
             .collect();
         Self::from_paths(&paths, view.window)
     }
 
     /// The gradient of the summed paths at every pixel: to the right and upward.
-    fn from_paths(paths: &[Paths], window: Rect) -> Option<Self> {
+    fn from_paths(paths: &[OpticalPathField], window: Rect) -> Option<Self> {
         let covered = paths.iter().map(|paths| paths.sums.covered().intersection(&window));
-        let rect = covered.reduce(|all, own| all.union(&own))?;
+        let rect = covered.reduce(|whole_gas, own| whole_gas.union(&own))?;
         let mut angle = Image::filled(rect.width, rect.height, [0.0; 2]);
         let level = Level::new();
         // Beyond its own cells a grid holds nothing.
@@ -139,13 +146,13 @@ impl Haze {
 }
 
 /// Summed paths, whose slopes are angles.
-struct Paths<'a> {
+struct OpticalPathField<'a> {
     sums: Grid<'a>,
     weights: Vec<[f32; 4]>,
     slopes: Vec<[f32; 4]>,
 }
 
-impl<'a> Paths<'a> {
+impl<'a> OpticalPathField<'a> {
     fn new(grid: &Grid<'a>, plane: usize, planes: usize) -> Self {
         Self {
             sums: grid.one_plane(plane, planes),
@@ -161,8 +168,8 @@ impl<'a> Paths<'a> {
         let (cell, phase) = cells.before(1, y);
         let rows = [-1, 0, 1, 2].map(|k| self.sums.row(cell + k));
         let (mut level, mut steep) = (vec![0.0; cells.columns], vec![0.0; cells.columns]);
-        weigh(&mut level, rows, &self.weights[phase]);
-        weigh(&mut steep, rows, &self.slopes[phase]);
+        weighted_sum(&mut level, rows, &self.weights[phase]);
+        weighted_sum(&mut steep, rows, &self.slopes[phase]);
         for (angle, &(first, phase)) in out.iter_mut().zip(columns) {
             let (along, across) = (&self.slopes[phase], &self.weights[phase]);
             let (mut right, mut down) = (0.0_f32, 0.0_f32);

@@ -4,7 +4,7 @@ use bansho_base::phenomenon::strip::DepthInterval;
 
 /// Layers of equal thickness, anchored at whole multiples of it so that they stand still while the gas moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Layers {
+pub(crate) struct DepthLayers {
     /// Depth at which the first begins, m.
     pub(crate) near: f64,
     /// Thickness of each, m.
@@ -13,17 +13,17 @@ pub(crate) struct Layers {
 }
 
 /// Most layers of a flame.
-pub(crate) const MOST_LAYERS: usize = 4;
+pub(crate) const MAX_LAYERS: usize = 4;
 
 /// How gas is spread in depth: shares of the whole, and these times depth and its square.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Spread {
+pub(crate) struct DepthMoments {
     total: f64,
     first: f64,
     second: f64,
 }
 
-impl Spread {
+impl DepthMoments {
     #[inline(always)]
     pub(crate) fn add(&mut self, depth: f64, share: f64) {
         self.total += share;
@@ -38,17 +38,17 @@ impl Spread {
     }
 }
 
-impl Layers {
+impl DepthLayers {
     /// Layers that hold the bulk of the gas; what lies further out joins the outermost.
     ///
     /// `thin` is the least thickness that pays, m.
-    pub(crate) fn new(&Spread { total, first, second }: &Spread, thin: f64) -> Self {
+    pub(crate) fn new(&DepthMoments { total, first, second }: &DepthMoments, thin: f64) -> Self {
         let mean = if total > 0.0 { first / total } else { 0.0 };
         let deviation = if total > 0.0 { (second / total - mean * mean).max(0.0).sqrt() } else { 0.0 };
         let mut thickness = thin.max(1e-6);
         let (near, far) = ((mean - 2.0 * deviation).max(0.0), (mean + 2.0 * deviation).max(0.0));
         let count = |thickness: f64| (far / thickness).floor() - (near / thickness).floor() + 1.0;
-        while count(thickness) > MOST_LAYERS as f64 {
+        while count(thickness) > MAX_LAYERS as f64 {
             thickness *= 2.0;
         }
         Self { near: (near / thickness).floor() * thickness, thickness, count: count(thickness) as usize }
@@ -82,20 +82,20 @@ mod tests {
     #[test]
     fn layers_hold_the_bulk_and_stay_few() {
         for spread in [0.0, 0.01, 0.3, 5.0, 400.0] {
-            let mut gas = Spread::default();
+            let mut gas = DepthMoments::default();
             (0..100).for_each(|i| gas.add(1000.0 + spread * (f64::from(i) / 99.0 - 0.5), 1.0));
-            let layers = Layers::new(&gas, 0.1);
-            assert!((1..=MOST_LAYERS).contains(&layers.count), "{layers:?}");
+            let layers = DepthLayers::new(&gas, 0.1);
+            assert!((1..=MAX_LAYERS).contains(&layers.count), "{layers:?}");
             assert!(layers.intervals().any(|interval| interval.contains(1000.0)), "{layers:?}");
         }
     }
 
     #[test]
     fn a_depth_is_shared_by_the_two_layers_around_it() {
-        let layers = Layers { near: 2.0, thickness: 0.5, count: 3 };
+        let layers = DepthLayers { near: 2.0, thickness: 0.5, count: 3 };
         assert_eq!((layers.place(2.25), layers.place(2.5)), ((0, 0.0), (0, 0.5)));
         assert_eq!((layers.place(0.0), layers.place(3.25), layers.place(99.0)), ((0, 0.0), (1, 1.0), (1, 1.0)));
-        let lone = Layers { count: 1, ..layers };
+        let lone = DepthLayers { count: 1, ..layers };
         assert_eq!((lone.place(0.0), lone.place(9.0)), ((0, 0.0), (0, 0.0)));
     }
 }

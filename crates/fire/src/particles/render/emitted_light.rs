@@ -8,7 +8,7 @@ use bansho_base::{
     phenomenon::surroundings::{Emitter, Light},
 };
 
-use super::{gas::Gas, prepared::PARTICLES_OF_TASK};
+use super::{gas::Gas, prepared::PARTICLES_PER_TASK};
 use crate::particles::look_parameters::LookParameters;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -25,11 +25,11 @@ struct Slab {
     moment: DVec3,
     spread: f64,
     /// Sum of absorption times volume, m^2: optical depth times area.
-    shade: f64,
+    absorption_area: f64,
 }
 
 impl Slab {
-    fn luminous(&self) -> f64 {
+    fn point_lights_of_gas(&self) -> f64 {
         self.intensity.iter().sum::<f64>().max(0.0)
     }
 
@@ -41,7 +41,7 @@ impl Slab {
         }
         self.moment += other.moment * share;
         self.spread += share * other.spread;
-        self.shade += share * other.shade;
+        self.absorption_area += share * other.absorption_area;
     }
 }
 
@@ -50,18 +50,18 @@ impl Slab {
 ///
 /// Soot of volume V with absorption k and temperature T sends `V k B(T)` in every direction; what the soot of its part hides
 /// is taken off as by a slab of the same optical depth, `(1 - exp(-tau)) / tau`.
-pub fn luminous(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Light> {
+pub fn point_lights_of_gas(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Light> {
     let count = look.light.count.max(1) as usize;
     if look.light.scale <= 0.0 || gas.particles.is_empty() {
         return Vec::new();
     }
     let slabs = slabs(gas, look, t);
-    let total: f64 = slabs.iter().map(Slab::luminous).sum();
+    let total: f64 = slabs.iter().map(Slab::point_lights_of_gas).sum();
     if total.is_nan() || total <= 0.0 {
         return Vec::new();
     }
     (0..count)
-        .filter_map(|part| part_light(&slabs, [part, part + 1].map(|edge| total * edge as f64 / count as f64), look))
+        .filter_map(|part| range_light(&slabs, [part, part + 1].map(|edge| total * edge as f64 / count as f64), look))
         .collect()
 }
 
@@ -70,13 +70,13 @@ fn slabs(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Slab> {
     let (low, high) = heights(gas, t);
     let step = ((high - low) / (SLABS - 1) as f64).max(1e-9);
     let level = Level::new();
-    let of_task = |range: Range<usize>| {
+    let task_slabs = |range: Range<usize>| {
         let mut slabs = vec![Slab::default(); SLABS + 1];
         dispatch!(level, _simd => add_to_slabs(gas, look, t, range.clone(), [low, step], &mut slabs));
         slabs
     };
     // Sums of whole tasks, added in order, are the same however many threads there are.
-    let of_tasks: Vec<Vec<Slab>> = tasks(gas).into_par_iter().map(of_task).collect();
+    let of_tasks: Vec<Vec<Slab>> = tasks(gas).into_par_iter().map(task_slabs).collect();
     of_tasks.into_iter().fold(vec![Slab::default(); SLABS + 1], |mut sums, slabs| {
         sums.iter_mut().zip(&slabs).for_each(|(sum, slab)| sum.add(slab, 1.0));
         sums
@@ -86,16 +86,16 @@ fn slabs(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Slab> {
 /// The particles of each task.
 fn tasks(gas: &Gas) -> Vec<Range<usize>> {
     let count = gas.particles.len();
-    (0..count).step_by(PARTICLES_OF_TASK).map(|first| first..(first + PARTICLES_OF_TASK).min(count)).collect()
+    (0..count).step_by(PARTICLES_PER_TASK).map(|first| first..(first + PARTICLES_PER_TASK).min(count)).collect()
 }
 
 /// Heights of the lowest and the highest particle, m.
 fn heights(gas: &Gas, t: f64) -> (f64, f64) {
-    let of_task = |range: Range<usize>| {
+    let task_slabs = |range: Range<usize>| {
         range.map(|index| gas.place(index, t).y).fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
     };
     let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-    tasks(gas).into_par_iter().map(of_task).reduce(|| (f64::MAX, f64::MIN), both)
+    tasks(gas).into_par_iter().map(task_slabs).reduce(|| (f64::MAX, f64::MIN), both)
 }
 
 /// Adds particles to slabs `step` apart from the height `low` on.
@@ -110,36 +110,36 @@ fn add_to_slabs(
 ) {
     let table = color::black_body();
     for index in range {
-        let shade = gas.absorption(index, look) * gas.volume(index);
-        if shade <= 0.0 {
+        let absorption_area = gas.absorption(index, look) * gas.volume(index);
+        if absorption_area <= 0.0 {
             continue;
         }
         let place = gas.place(index, t);
         let radiance = table.radiance(gas.particles.temperature[index]).map(f64::from);
         let at = ((place.y - low) / step).clamp(0.0, (SLABS - 1) as f64);
         let part = at - at.floor();
-        let intensity = radiance.map(|value| value * shade);
+        let intensity = radiance.map(|value| value * absorption_area);
         let power: f64 = intensity.iter().sum();
         let spread = (place.x * place.x + place.z * place.z) * power;
-        let whole = Slab { intensity, moment: place * power, spread, shade };
+        let whole = Slab { intensity, moment: place * power, spread, absorption_area };
         slabs[at as usize].add(&whole, 1.0 - part);
         slabs[at as usize + 1].add(&whole, part);
     }
 }
 
 /// The light of what lies between two sums of power, counted from below.
-fn part_light(slabs: &[Slab], [from, to]: [f64; 2], look: &LookParameters) -> Option<Light> {
+fn range_light(slabs: &[Slab], [from, to]: [f64; 2], look: &LookParameters) -> Option<Light> {
     let mut sum = Slab::default();
     let mut below = 0.0;
     for slab in slabs {
-        let above = below + slab.luminous();
+        let above = below + slab.point_lights_of_gas();
         let taken = (above.min(to) - below.max(from)).max(0.0);
         if taken > 0.0 {
-            sum.add(slab, taken / slab.luminous());
+            sum.add(slab, taken / slab.point_lights_of_gas());
         }
         below = above;
     }
-    let power = sum.luminous();
+    let power = sum.point_lights_of_gas();
     if power <= 0.0 {
         return None;
     }
@@ -147,7 +147,7 @@ fn part_light(slabs: &[Slab], [from, to]: [f64; 2], look: &LookParameters) -> Op
     let across = (sum.spread / power - position.x * position.x - position.z * position.z).max(0.0).sqrt();
     let radius = across.max(1e-3);
     // Seen from the side, the part covers about a disc of twice its deviation.
-    let tau = sum.shade / (4.0 * std::f64::consts::PI * radius * radius);
+    let tau = sum.absorption_area / (4.0 * std::f64::consts::PI * radius * radius);
     let escapes = if tau > 1e-6 { -bansho_base::math::exp_m1(-tau) / tau } else { 1.0 };
     let scale = look.light.scale * escapes;
     Some(Light {

@@ -5,7 +5,7 @@ use bansho_base::{
     math::{self, DVec2, DVec3, Vec3, random::Key},
 };
 
-use crate::particles::{Particles, look_parameters::LookParameters, render::splat::buffers::Memory};
+use crate::particles::{Particles, look_parameters::LookParameters, render::splat::buffers::ScratchPool};
 
 /// The gas of one flame at one moment, with what the drawing needs to know of its surroundings.
 #[derive(Clone, Copy, Debug)]
@@ -25,21 +25,21 @@ pub struct Gas<'a> {
     /// Key of the flame's random numbers.
     pub key: Key,
     /// What becomes of particles that are soon removed.
-    pub ending: Ending,
+    pub fade_out: FadeOut,
     /// Memory to draw with, from frame to frame.
-    pub memory: &'a Memory,
+    pub scratch: &'a ScratchPool,
 }
 
 /// How particles leave the picture before they are removed: nothing pops.
 #[derive(Clone, Copy, Debug)]
-pub struct Ending {
+pub struct FadeOut {
     /// For how long a particle fades, s.
     pub seconds: f32,
     /// Corners of the box that gas may fill, from the particles' origin, m.
     pub domain: [Vec3; 2],
 }
 
-impl Ending {
+impl FadeOut {
     /// Nothing ends.
     pub const NEVER: Self = Self { seconds: f32::MIN_POSITIVE, domain: [Vec3::MIN, Vec3::MAX] };
 
@@ -67,7 +67,7 @@ const VISIBLE_SOOT_ABSORPTION: f64 = 4.9 / 550e-9;
 const BLUE_LUMINANCE: f64 = 300.0;
 
 /// Share of the fuel that has burnt when the blue light is strongest.
-const BEGUN: f64 = 0.06;
+const BLUE_PEAK_BURNED: f64 = 0.06;
 
 /// Absorption coefficient of soot of a volume fraction, 1/m.
 #[inline(always)]
@@ -91,7 +91,7 @@ impl Gas<'_> {
     pub(crate) fn volume(&self, index: usize) -> f64 {
         let Particles { position, velocity, density, mass, life, age, .. } = self.particles;
         let [place, velocity] = [position, velocity].map(|[x, y, z]| Vec3::new(x[index], y[index], z[index]));
-        let left = self.ending.share(place, velocity, life[index] - age[index]);
+        let left = self.fade_out.share(place, velocity, life[index] - age[index]);
         let density = f64::from(density[index]);
         if density > 0.0 { f64::from(left * mass[index]) / density } else { 0.0 }
     }
@@ -112,7 +112,7 @@ impl Gas<'_> {
     #[inline(always)]
     pub(crate) fn is_blue(&self, index: usize, look: &LookParameters) -> bool {
         /// Fuel at which less than 1e-4 of the most light is left.
-        const BURNT_OUT: f32 = 1.0 - 14.0 * BEGUN as f32;
+        const BURNT_OUT: f32 = 1.0 - 14.0 * BLUE_PEAK_BURNED as f32;
         let fuel = self.particles.fuel[index];
         look.base_blue > 0.0 && fuel < 1.0 && fuel > BURNT_OUT
     }
@@ -127,7 +127,7 @@ impl Gas<'_> {
         }
         /// Volume fraction of soot that outshines and quenches the blue light.
         const SOOTY: f64 = 1e-7;
-        let burnt = (1.0 - f64::from(self.particles.fuel[index])).clamp(0.0, 1.0) / BEGUN;
+        let burnt = (1.0 - f64::from(self.particles.fuel[index])).clamp(0.0, 1.0) / BLUE_PEAK_BURNED;
         let sooty = f64::from(self.particles.soot[index]).max(0.0) / SOOTY;
         BLUE_LUMINANCE * look.base_blue * burnt * math::exp(1.0 - burnt) / (1.0 + sooty * sooty)
     }

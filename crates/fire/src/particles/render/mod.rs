@@ -18,11 +18,11 @@ pub(crate) mod splat;
 
 pub use super::look_parameters::{GasLightParameters, LookParameters, SpriteStyle};
 pub use aovs::AOVS;
-pub use emitted_light::luminous;
-pub use gas::{Ending, Gas, soot_absorption};
+pub use emitted_light::point_lights_of_gas;
+pub use gas::{FadeOut, Gas, soot_absorption};
 pub use prepared::{PreparedGas, depth_intervals};
 pub use splat::{
-    buffers::Memory,
+    buffers::ScratchPool,
     kernel::{line_gradient, line_integral},
 };
 

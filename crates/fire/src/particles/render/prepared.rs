@@ -17,11 +17,11 @@ use bansho_base::{
 };
 
 use super::{
-    aovs::{Motion, bounds},
-    deflection::{self, Haze},
-    depth_layers::Layers,
+    aovs::{MotionField, min_max},
+    deflection::{self, HeatHaze},
+    depth_layers::DepthLayers,
     gas::Gas,
-    gas_statistics::{Survey, shows},
+    gas_statistics::{GasStatistics, is_visible},
 };
 use crate::{
     blue_flame,
@@ -29,22 +29,25 @@ use crate::{
         look_parameters::{LookParameters, SpriteStyle},
         paper::squares::Squares,
         render::{
-            project::sprite::{Kind, Seen, seen},
+            project::sprite::{ProjectedParticle, SpriteKind, project_particles},
             resolve::{
                 detail::Detail,
-                resolve_gas::{BLUE, Extents, GLOW, HEAT, Layer, MATTER, PATH, PLANES, Resolve, TAU},
+                resolve_gas::{
+                    BLUE, ColumnExtents, DETAIL_OFFSET, DepthLayer, GasResolver, LUMINANCE, LUMINANCE_KELVIN, PATH,
+                    PLANES, TAU,
+                },
                 spline,
                 strain::Strain,
-                upsample::Across,
+                upsample::RowInterpolator,
             },
             splat::{
-                accumulate::{COARSE, Sheet, Splat, Sprite, splat},
+                accumulate::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, splat},
                 grid::Grid,
                 kernel::Profile,
             },
         },
     },
-    sparks::{Fire, Streak},
+    sparks::{SparkEmitter, Streak},
 };
 use fearless_simd::{Level, dispatch};
 
@@ -54,43 +57,43 @@ pub struct PreparedGas<'a> {
     look: &'a LookParameters,
     view: &'a View,
     level: Level,
-    layers: Layers,
-    matter: Matter<'a>,
+    layers: DepthLayers,
+    matter: DrawMode<'a>,
     sparks: Vec<Streak>,
     /// Made where it is measured or bends what lies behind.
-    haze: OnceLock<Option<Haze>>,
+    haze: OnceLock<Option<HeatHaze>>,
 }
 
 /// Particles that one task takes.
-pub(crate) const PARTICLES_OF_TASK: usize = 2048;
+pub(crate) const PARTICLES_PER_TASK: usize = 2048;
 
 /// What is drawn of the particles.
-enum Matter<'a> {
+enum DrawMode<'a> {
     /// Nothing that the view could see.
-    Nothing,
+    Empty,
     /// Gas that other parts of the picture show.
-    Elsewhere,
+    OutsideWindow,
     /// Sums of sprites.
-    Sums(Box<Sums<'a>>),
+    SplattedGas(Box<SplattedGas<'a>>),
     /// Squares.
     Squares(Squares),
 }
 
-struct Sums<'a> {
+struct SplattedGas<'a> {
     grid: Grid<'a>,
-    extents: Extents,
+    extents: ColumnExtents,
     weights: Vec<[f32; 4]>,
-    across: Across,
+    across: RowInterpolator,
     detail: Option<(Detail, Strain)>,
     scattered: Vec<[f32; 3]>,
     /// Where it is measured, and anything glows.
-    motion: Option<Motion<'a>>,
+    motion: Option<MotionField<'a>>,
     temperatures: [f32; 2],
 }
 
 /// The fire whose sparks fly.
-fn fire<'a>(gas: &Gas, look: &'a LookParameters, view: &View) -> Fire<'a> {
-    Fire {
+fn spark_emitter<'a>(gas: &Gas, look: &'a LookParameters, view: &View) -> SparkEmitter<'a> {
+    SparkEmitter {
         parameters: &look.sparks,
         key: gas.key,
         now: view.shutter.middle(),
@@ -107,7 +110,7 @@ pub fn depth_intervals(gas: &Gas, look: &LookParameters, view: &View) -> Vec<Dep
     if gas.particles.is_empty() && look.sparks.rate <= 0.0 {
         return Vec::new();
     }
-    let layers = Survey::new(gas, look, view).layers(gas);
+    let layers = GasStatistics::new(gas, look, view).layers(gas);
     let mut intervals: Vec<DepthInterval> = layers.intervals().collect();
     if look.sparks.rate > 0.0 {
         let middle = layers.centre(layers.count / 2);
@@ -130,14 +133,14 @@ impl<'a> PreparedGas<'a> {
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
         check(observer)?;
-        let survey = Survey::new(&gas, look, view);
-        let layers = survey.layers(&gas);
+        let statistics = GasStatistics::new(&gas, look, view);
+        let layers = statistics.layers(&gas);
         let matter = match look.sprite {
-            SpriteStyle::Squares => Matter::Squares(Squares::new(&gas, look, view)),
-            _ => sums(&gas, look, view, &survey, surroundings),
+            SpriteStyle::Squares => DrawMode::Squares(Squares::new(&gas, look, view)),
+            _ => splatted(&gas, look, view, &statistics, surroundings),
         };
         check(observer)?;
-        let mut sparks = fire(&gas, look, view).streaks(view, surroundings.wind);
+        let mut sparks = spark_emitter(&gas, look, view).streaks(view, surroundings.wind);
         sparks.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         let prepared = Self { gas, look, view, level: Level::new(), layers, matter, sparks, haze: OnceLock::new() };
         if view.measured {
@@ -147,117 +150,123 @@ impl<'a> PreparedGas<'a> {
     }
 
     /// The layers that lie in a slice, nearest first.
-    fn layers_in<'b>(&'b self, slice: &'b DepthInterval) -> impl Iterator<Item = Layer> + 'b {
+    fn layers_in<'b>(&'b self, slice: &'b DepthInterval) -> impl Iterator<Item = DepthLayer> + 'b {
         let thickness = self.layers.thickness;
-        let layer = move |index| Layer { index, depth: self.layers.centre(index), thickness };
+        let layer = move |index| DepthLayer { index, depth: self.layers.centre(index), thickness };
         (0..self.layers.count).map(layer).filter(|layer| slice.contains(layer.depth))
     }
 
-    fn resolve<'b>(&'b self, sums: &'b Sums<'_>) -> Resolve<'b> {
-        Resolve {
-            grid: &sums.grid,
+    fn resolve<'b>(&'b self, splatted: &'b SplattedGas<'_>) -> GasResolver<'b> {
+        GasResolver {
+            grid: &splatted.grid,
             camera: &self.view.camera,
             origin: self.gas.particles.origin,
-            detail: sums.detail.as_ref().map(|(detail, strain)| (detail, strain)),
+            detail: splatted.detail.as_ref().map(|(detail, strain)| (detail, strain)),
             hides_itself: self.look.sprite == SpriteStyle::Integral,
             blue: blue_flame::colour(),
-            scattered: &sums.scattered,
-            weights: &sums.weights,
-            across: &sums.across,
-            temperatures: sums.temperatures,
+            scattered: &splatted.scattered,
+            weights: &splatted.weights,
+            across: &splatted.across,
+            temperatures: splatted.temperatures,
         }
     }
 }
 
 /// Sums all sprites in their layers.
-fn sums<'a>(
+fn splatted<'a>(
     gas: &Gas<'a>,
     look: &LookParameters,
     view: &View,
-    survey: &Survey,
+    statistics: &GasStatistics,
     surroundings: &Surroundings,
-) -> Matter<'a> {
-    let layers = survey.layers(gas);
-    let detail = survey.scale(gas, view).and_then(|scale| Detail::new(gas, look, &scale));
-    let shining = Shining {
+) -> DrawMode<'a> {
+    let layers = statistics.layers(gas);
+    let detail = statistics.scale(gas, view).and_then(|scale| Detail::new(gas, look, &scale));
+    let radiance = RadianceSprites {
         gas,
         look,
         layers: &layers,
         opacity: mean_density(gas).map_or(0.0, |density| look.opacity / density),
         detail: detail.as_ref(),
-        since: view.shutter.middle() - gas.time,
+        seconds_since_state: view.shutter.middle() - gas.time,
     };
-    let sprites = seen(gas, view, &shining);
+    let sprites = project_particles(gas, view, &radiance);
     let profile = if look.sprite == SpriteStyle::Poly6 { Profile::POLY6 } else { Profile::LINE };
     let grid = match splat(
-        &Sheet { profile, least_radius: COARSE, layers: layers.count, picture: view.size, window: view.window },
+        &SplatSettings {
+            profile,
+            min_radius_cells: MIN_RADIUS_CELLS,
+            layers: layers.count,
+            picture: view.size,
+            window: view.window,
+        },
         &sprites,
-        gas.memory,
+        gas.scratch,
     ) {
-        Splat::Sums(grid) => grid,
-        Splat::Elsewhere => return Matter::Elsewhere,
-        Splat::Nothing => return Matter::Nothing,
+        SplatResult::Sums(grid) => grid,
+        SplatResult::OutsideWindow => return DrawMode::OutsideWindow,
+        SplatResult::Empty => return DrawMode::Empty,
     };
-    let extents = Extents::new(&grid, layers.count);
+    let extents = ColumnExtents::new(&grid, layers.count);
     let strained = |detail: Detail| {
         let strain = Strain::new(&grid, &extents, layers.count, detail.cell_pixels);
         (detail, strain)
     };
     let detail = detail.map(strained);
     let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.centre(layer), surroundings));
-    Matter::Sums(Box::new(Sums {
+    DrawMode::SplattedGas(Box::new(SplattedGas {
         extents,
         weights: spline::weights(&grid.cells),
-        across: Across::new(&grid, view.size[0], &spline::weights(&grid.cells)),
+        across: RowInterpolator::new(&grid, view.size[0], &spline::weights(&grid.cells)),
         grid,
         detail,
         scattered: scattered.collect(),
-        motion: if view.measured { Motion::new(gas, look, view) } else { None },
-        temperatures: bounds(gas.particles.temperature.iter().copied()),
+        motion: if view.measured { MotionField::new(gas, look, view) } else { None },
+        temperatures: min_max(gas.particles.temperature.iter().copied()),
     }))
 }
 
 /// The gas that shows, as sprites of its light and shade.
-struct Shining<'a> {
+struct RadianceSprites<'a> {
     gas: &'a Gas<'a>,
     look: &'a LookParameters,
-    layers: &'a Layers,
+    layers: &'a DepthLayers,
     /// Opacity of a poly6 sprite beside the gas's density.
     opacity: f64,
     detail: Option<&'a Detail>,
     /// Time from the particles' state, s.
-    since: f64,
+    seconds_since_state: f64,
 }
 
-impl Kind for Shining<'_> {
+impl SpriteKind for RadianceSprites<'_> {
     type Record = Sprite<PLANES>;
 
     #[inline(always)]
-    fn wants(&self, index: usize) -> bool {
-        shows(self.gas, self.look, index)
+    fn includes(&self, index: usize) -> bool {
+        is_visible(self.gas, self.look, index)
     }
 
     #[inline(always)]
-    fn record(&self, seen: &Seen) -> Sprite<PLANES> {
-        let (layer, split) = self.layers.place(seen.depth);
+    fn record(&self, seen: &ProjectedParticle) -> Sprite<PLANES> {
+        let (layer, next_layer_weight) = self.layers.place(seen.depth);
         let mut values = match self.look.sprite {
             SpriteStyle::Poly6 => self.paper_values(seen.index),
             _ => self.values(seen),
         };
         if let Some(detail) = self.detail {
-            let matter = detail.matter(self.gas, seen.index, self.since);
+            let offset = detail.detail_offset(self.gas, seen.index, self.seconds_since_state);
             for axis in 0..3 {
-                values[MATTER + axis] = values[TAU] * matter[axis];
+                values[DETAIL_OFFSET + axis] = values[TAU] * offset[axis];
             }
         }
-        Sprite { ellipse: seen.ellipse, layer, split, values }
+        Sprite { ellipse: seen.ellipse, layer, next_layer_weight, values }
     }
 }
 
-impl Shining<'_> {
+impl RadianceSprites<'_> {
     /// What a ray through the middle of a particle's sprite sees.
     #[inline(always)]
-    fn values(&self, seen: &Seen) -> [f32; PLANES] {
+    fn values(&self, seen: &ProjectedParticle) -> [f32; PLANES] {
         let (gas, index) = (self.gas, seen.index);
         let length = gas.volume(index) * f64::from(seen.ellipse.peak);
         let tau = length * gas.absorption(index, self.look);
@@ -279,8 +288,8 @@ impl Shining<'_> {
         let glow = tau * self.gas.luminance(index);
         let mut values = [0.0; PLANES];
         values[TAU] = tau as f32;
-        values[GLOW] = glow as f32;
-        values[HEAT] = (glow * f64::from(self.gas.particles.temperature[index])) as f32;
+        values[LUMINANCE] = glow as f32;
+        values[LUMINANCE_KELVIN] = (glow * f64::from(self.gas.particles.temperature[index])) as f32;
         values
     }
 }
@@ -307,8 +316,8 @@ fn scattered(gas: &Gas, look: &LookParameters, view: &View, depth: f64, surround
 impl Prepared for PreparedGas<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
         let gas = match &self.matter {
-            Matter::Sums(sums) if self.layers_in(slice).next().is_some() => sums.grid.covered(),
-            Matter::Squares(squares) => squares.bounds(slice),
+            DrawMode::SplattedGas(splatted) if self.layers_in(slice).next().is_some() => splatted.grid.covered(),
+            DrawMode::Squares(squares) => squares.bounds(slice),
             _ => Rect::default(),
         };
         // Gas that bends light reaches further than what shines of it.
@@ -319,10 +328,10 @@ impl Prepared for PreparedGas<'_> {
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let mut sparks = self.sparks.iter().filter(|spark| slice.contains(spark.depth)).peekable();
-        if let Matter::Sums(sums) = &self.matter {
-            let resolve = self.resolve(sums);
+        if let DrawMode::SplattedGas(splatted) = &self.matter {
+            let resolve = self.resolve(splatted);
             let mut row = resolve.row();
-            let rect = sums.grid.covered().intersection(&strip.rect);
+            let rect = splatted.grid.covered().intersection(&strip.rect);
             for layer in self.layers_in(slice) {
                 while let Some(spark) = sparks.next_if(|spark| spark.depth < layer.depth) {
                     spark.draw(self.view.size, strip);
@@ -330,13 +339,13 @@ impl Prepared for PreparedGas<'_> {
                 if rect.is_empty() {
                     continue;
                 }
-                dispatch!(self.level, _simd => resolve.draw_layer(&layer, &sums.extents, rect, &mut row, strip));
+                dispatch!(self.level, _simd => resolve.draw_layer(&layer, &splatted.extents, rect, &mut row, strip));
                 if !strip.aovs.is_empty() {
-                    resolve.measure_layer(&layer, &sums.extents, sums.motion.as_ref(), rect, &mut row, strip);
+                    resolve.measure_layer(&layer, &splatted.extents, splatted.motion.as_ref(), rect, &mut row, strip);
                 }
             }
         }
-        if let Matter::Squares(squares) = &self.matter {
+        if let DrawMode::Squares(squares) = &self.matter {
             squares.draw(slice, strip);
         }
         if !strip.aovs.is_empty() {
@@ -358,17 +367,19 @@ impl Prepared for PreparedGas<'_> {
 
 impl PreparedGas<'_> {
     /// The haze, summed by all threads; where it is measured, strips find it made.
-    fn haze(&self) -> Option<&Haze> {
+    fn haze(&self) -> Option<&HeatHaze> {
         let (summed, all) = match &self.matter {
-            Matter::Sums(sums) if self.look.sprite == SpriteStyle::Integral => (Some(&sums.grid), false),
-            Matter::Elsewhere if self.look.sprite == SpriteStyle::Integral => (None, false),
+            DrawMode::SplattedGas(splatted) if self.look.sprite == SpriteStyle::Integral => {
+                (Some(&splatted.grid), false)
+            }
+            DrawMode::OutsideWindow if self.look.sprite == SpriteStyle::Integral => (None, false),
             _ => (None, true),
         };
-        get_or_make(&self.haze, || Haze::new(&self.gas, self.look, self.view, summed, all)).as_ref()
+        get_or_make(&self.haze, || HeatHaze::new(&self.gas, self.look, self.view, summed, all)).as_ref()
     }
 
     /// The haze where it is measured in a slice: in one alone, however many the layers fall into.
-    fn measured_haze(&self, slice: &DepthInterval) -> Option<&Haze> {
+    fn measured_haze(&self, slice: &DepthInterval) -> Option<&HeatHaze> {
         let is_here = self.view.measured && slice.contains(self.layers.centre(self.layers.count - 1));
         self.haze.get().and_then(Option::as_ref).filter(|_| is_here)
     }

@@ -31,12 +31,12 @@ const BASE_FROUDE: f64 = 0.4;
 pub(crate) struct Burner {
     pub(crate) parameters: BurnerParameters,
     /// How it is turned and scaled; where it is changes over time.
-    turned: Placement,
-    area: Area,
+    placement: Placement,
+    area: BurnerSurface,
     /// Width D across which gas burns: sets puffing and eddies, m.
     pub(crate) diameter: f64,
     /// Area from which gas comes, m^2.
-    pub(crate) square_metres: f64,
+    pub(crate) area_m2: f64,
     /// Mean height of the visible flame, m.
     pub(crate) height: f64,
     /// Speed of gas at birth, m/s.
@@ -44,13 +44,13 @@ pub(crate) struct Burner {
     /// Acceleration of gas along the axis, m/s^2.
     pub(crate) acceleration: f64,
     /// Radius of a ball around its position that holds the burner, m.
-    pub(crate) reach: f64,
+    pub(crate) bounding_radius: f64,
     /// Corners of the box around it as it is turned, beside its position, m.
     pub(crate) extent: [DVec3; 2],
 }
 
 #[derive(Clone, Debug)]
-enum Area {
+enum BurnerSurface {
     Disc,
     Ball,
     Strip,
@@ -60,11 +60,11 @@ enum Area {
 
 /// Where a particle is born, and which way it leaves.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Birthplace {
+pub(crate) struct SpawnPoint {
     pub(crate) position: DVec3,
     pub(crate) direction: DVec3,
     /// How far it is from the middle of a disc or a strip: 0 there to 1 at the rim, a mean place elsewhere.
-    pub(crate) outward: f64,
+    pub(crate) radial_fraction: f64,
 }
 
 impl Burner {
@@ -74,9 +74,9 @@ impl Burner {
         assets: &dyn Assets,
     ) -> Result<Self, ParticleFaultKind> {
         let scale = if parameters.shape == BurnerShape::Mesh { parameters.scale } else { 1.0 };
-        let turned = Placement::new([0.0; 3], parameters.rotation_deg, scale);
+        let placement = Placement::new([0.0; 3], parameters.rotation_deg, scale);
         let (area, size) = area(parameters, assets)?;
-        let equivalent = math::sqrt(4.0 * size.square_metres / std::f64::consts::PI);
+        let equivalent = math::sqrt(4.0 * size.area_m2 / std::f64::consts::PI);
         let height = match parameters.height {
             Auto::Set(height) => height,
             Auto::Auto => heskestad(parameters.heat_release_kw, equivalent).max(0.5 * size.diameter),
@@ -87,17 +87,17 @@ impl Burner {
         };
         Ok(Self {
             parameters: parameters.clone(),
-            turned,
+            placement,
             area,
             diameter: size.diameter,
-            square_metres: size.square_metres,
+            area_m2: size.area_m2,
             height,
             speed,
             acceleration: AXIS_ACCELERATION * flame.motion.buoyancy,
-            reach: size.reach,
+            bounding_radius: size.bounding_radius,
             extent: match &size.mesh {
-                Some(mesh) => extent(mesh, &turned),
-                None => around(parameters, &turned),
+                Some(mesh) => extent(mesh, &placement),
+                None => primitive_extent(parameters, &placement),
             },
         })
     }
@@ -127,17 +127,17 @@ impl Burner {
     }
 
     /// Where the particle `birth` is born at `t`: as likely anywhere on the burner.
-    pub(crate) fn birthplace(&self, key: Key, birth: u64, t: f64) -> Birthplace {
+    pub(crate) fn spawn_point(&self, key: Key, birth: u64, t: f64) -> SpawnPoint {
         let words = key.words(birth, 0, Purpose::named("birthplace"));
         let (position, direction) = self.local(words);
         let radius = 0.5 * self.parameters.diameter;
-        let outward = match self.area {
-            Area::Disc | Area::Ball => position.length() / radius,
-            Area::Strip => position.z.abs() / radius,
-            Area::Cuboid | Area::Surface(_) => std::f64::consts::FRAC_1_SQRT_2,
+        let radial_fraction = match self.area {
+            BurnerSurface::Disc | BurnerSurface::Ball => position.length() / radius,
+            BurnerSurface::Strip => position.z.abs() / radius,
+            BurnerSurface::Cuboid | BurnerSurface::Surface(_) => std::f64::consts::FRAC_1_SQRT_2,
         };
-        let placement = Placement { position: self.position(t), ..self.turned };
-        Birthplace { position: placement.to_world(position), direction: placement.turn(direction), outward }
+        let placement = Placement { position: self.position(t), ..self.placement };
+        SpawnPoint { position: placement.to_world(position), direction: placement.turn(direction), radial_fraction }
     }
 
     /// Place and direction in the burner's own coordinates.
@@ -146,18 +146,18 @@ impl Burner {
         let radius = 0.5 * self.parameters.diameter;
         let (sine, cosine) = math::sin_cos(std::f64::consts::TAU * v);
         match &self.area {
-            Area::Disc => (DVec3::new(cosine, 0.0, sine) * (radius * math::sqrt(u)), DVec3::Y),
-            Area::Ball => {
+            BurnerSurface::Disc => (DVec3::new(cosine, 0.0, sine) * (radius * math::sqrt(u)), DVec3::Y),
+            BurnerSurface::Ball => {
                 let height = 2.0 * w - 1.0;
                 let across = math::sqrt((1.0 - height * height).max(0.0));
                 (DVec3::new(cosine * across, height, sine * across) * (radius * math::cbrt(u)), DVec3::Y)
             }
-            Area::Strip => {
+            BurnerSurface::Strip => {
                 let along = self.parameters.length * (u - 0.5);
                 (DVec3::new(along, 0.0, self.parameters.diameter * (w - 0.5)), DVec3::Y)
             }
-            Area::Cuboid => cuboid(self.parameters.size, [u, v, w]),
-            Area::Surface(sampler) => sampler.at([uniform_f64(words[0], words[3]), v, w]),
+            BurnerSurface::Cuboid => box_surface_point(self.parameters.size, [u, v, w]),
+            BurnerSurface::Surface(sampler) => sampler.at([uniform_f64(words[0], words[3]), v, w]),
         }
     }
 }
@@ -169,23 +169,23 @@ pub fn heskestad(heat_release_kw: f64, diameter: f64) -> f64 {
 
 struct Size {
     diameter: f64,
-    square_metres: f64,
-    reach: f64,
+    area_m2: f64,
+    bounding_radius: f64,
     mesh: Option<Arc<Mesh>>,
 }
 
 /// Corners of the box around a mesh as it is turned.
-fn extent(mesh: &Mesh, turned: &Placement) -> [DVec3; 2] {
-    let corners = mesh.triangles().flatten().map(|corner| turned.to_world(corner));
-    let around = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
-    corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around)
+fn extent(mesh: &Mesh, placement: &Placement) -> [DVec3; 2] {
+    let corners = mesh.triangles().flatten().map(|corner| placement.to_world(corner));
+    let primitive_extent = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
+    corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], primitive_extent)
 }
 
 /// The same of any other area.
-fn around(parameters: &BurnerParameters, turned: &Placement) -> [DVec3; 2] {
+fn primitive_extent(parameters: &BurnerParameters, placement: &Placement) -> [DVec3; 2] {
     let BurnerParameters { diameter, length, size, .. } = *parameters;
     let radius = 0.5 * diameter;
-    let axis = |unit: DVec3, half: f64| turned.turn(unit) * half;
+    let axis = |unit: DVec3, half: f64| placement.turn(unit) * half;
     let half = match parameters.shape {
         BurnerShape::Point | BurnerShape::Mesh => DVec3::splat(radius),
         BurnerShape::Disc => {
@@ -201,17 +201,17 @@ fn around(parameters: &BurnerParameters, turned: &Placement) -> [DVec3; 2] {
     [-half, half]
 }
 
-fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(Area, Size), ParticleFaultKind> {
+fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(BurnerSurface, Size), ParticleFaultKind> {
     let BurnerParameters { diameter, length, size: [x, y, z], scale, .. } = *parameters;
     let round = 0.25 * std::f64::consts::PI * diameter * diameter;
-    let size = |diameter, square_metres, reach| Size { diameter, square_metres, reach, mesh: None };
+    let size = |diameter, area_m2, bounding_radius| Size { diameter, area_m2, bounding_radius, mesh: None };
     Ok(match parameters.shape {
-        BurnerShape::Disc => (Area::Disc, size(diameter, round, 0.5 * diameter)),
-        BurnerShape::Point => (Area::Ball, size(diameter, round, 0.5 * diameter)),
-        BurnerShape::Line => (Area::Strip, size(diameter, diameter * length, 0.5 * (diameter + length))),
+        BurnerShape::Disc => (BurnerSurface::Disc, size(diameter, round, 0.5 * diameter)),
+        BurnerShape::Point => (BurnerSurface::Ball, size(diameter, round, 0.5 * diameter)),
+        BurnerShape::Line => (BurnerSurface::Strip, size(diameter, diameter * length, 0.5 * (diameter + length))),
         BurnerShape::Box => {
             let surface = 2.0 * (x * y + y * z + z * x);
-            (Area::Cuboid, size(x.min(z), surface, 0.5 * DVec3::new(x, y, z).length()))
+            (BurnerSurface::Cuboid, size(x.min(z), surface, 0.5 * DVec3::new(x, y, z).length()))
         }
         BurnerShape::Mesh => {
             let file = parameters.file.as_ref().ok_or(ParticleFaultKind::NoFile)?;
@@ -219,16 +219,16 @@ fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(Area, Siz
             let [min, max] = mesh.bounds();
             let sides = (max - min) * scale;
             let sampler = mesh.sampler();
-            let square_metres = sampler.area() * scale * scale;
+            let area_m2 = sampler.area() * scale * scale;
             let across = sides.x.min(sides.z).max(0.2 * sides.max_element());
-            let reach = min.abs().max(max.abs()).length() * scale;
-            (Area::Surface(sampler), Size { mesh: Some(mesh), ..size(across, square_metres, reach) })
+            let bounding_radius = min.abs().max(max.abs()).length() * scale;
+            (BurnerSurface::Surface(sampler), Size { mesh: Some(mesh), ..size(across, area_m2, bounding_radius) })
         }
     })
 }
 
 /// A point on the surface of a box, each part as likely as its area.
-fn cuboid(sides: [f64; 3], [which, u, v]: [f64; 3]) -> (DVec3, DVec3) {
+fn box_surface_point(sides: [f64; 3], [which, u, v]: [f64; 3]) -> (DVec3, DVec3) {
     let faces = [0, 1, 2].map(|axis| sides[(axis + 1) % 3] * sides[(axis + 2) % 3]);
     let mut wanted = which * 2.0 * faces.iter().sum::<f64>();
     let (mut axis, mut side) = (2, 1.0);
@@ -257,8 +257,8 @@ mod tests {
         Burner::new(&parameters, &FlameParticlesParameters::default(), &MemoryAssets::default()).unwrap()
     }
 
-    fn places(burner: &Burner) -> impl Iterator<Item = Birthplace> + '_ {
-        (0..4000).map(|birth| burner.birthplace(Key::new(1, "burner"), birth, 0.0))
+    fn places(burner: &Burner) -> impl Iterator<Item = SpawnPoint> + '_ {
+        (0..4000).map(|birth| burner.spawn_point(Key::new(1, "burner"), birth, 0.0))
     }
 
     #[test]
@@ -307,12 +307,15 @@ mod tests {
             let parameters = BurnerParameters { shape, diameter: 0.3, length: 2.0, rotation_deg, ..Default::default() };
             let burner = burner(parameters);
             let [low, high] = burner.extent;
-            let around = |[low, high]: [DVec3; 2], place: DVec3| [low.min(place), high.max(place)];
+            let primitive_extent = |[low, high]: [DVec3; 2], place: DVec3| [low.min(place), high.max(place)];
             let all = places(&burner).map(|place| place.position);
-            let [least, most] = all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around);
-            assert!((least - low).cmpgt(DVec3::splat(-1e-5)).all() && (high - most).cmpgt(DVec3::splat(-1e-5)).all());
-            let empty = (least - low).max(high - most).max_element();
-            assert!(empty < 0.06 * burner.reach, "{shape:?}: {empty} m are empty");
+            let [low_corner, high_corner] = all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], primitive_extent);
+            assert!(
+                (low_corner - low).cmpgt(DVec3::splat(-1e-5)).all()
+                    && (high - high_corner).cmpgt(DVec3::splat(-1e-5)).all()
+            );
+            let empty = (low_corner - low).max(high - high_corner).max_element();
+            assert!(empty < 0.06 * burner.bounding_radius, "{shape:?}: {empty} m are empty");
         }
     }
 

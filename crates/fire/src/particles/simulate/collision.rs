@@ -6,19 +6,19 @@ use bansho_base::{
 };
 
 /// Most solids that turn a particle's way in one step, and how often each may.
-const ROUNDS: usize = 3;
+const MAX_ITERATIONS: usize = 3;
 /// Parts into which a way is cut at most to see whether it passes through a solid.
 const PARTS: f64 = 128.0;
 /// Halvings of the part in which a way meets a solid: what is left is nothing beside the clearance.
-const HALVINGS: usize = 8;
+const BISECTION_STEPS: usize = 8;
 /// By how much a distance may be too large: that to a mesh is measured beyond its grid by way of the grid's edge.
-const OVERESTIMATE: f64 = 3.0;
+const DISTANCE_OVERESTIMATE: f64 = 3.0;
 /// Change of a way's end, in clearances, that is none.
-const SETTLED: f64 = 1e-6;
+const CONVERGENCE_TOLERANCE: f64 = 1e-6;
 
 /// What stands in the gas's way.
 #[derive(Clone, Copy)]
-pub(crate) struct Solids<'a> {
+pub(crate) struct Colliders<'a> {
     pub(crate) occluders: &'a [Occluder],
     /// Where places count from, m.
     pub(crate) origin: DVec3,
@@ -33,25 +33,30 @@ struct Contact {
     normal: DVec3,
 }
 
-impl Solids<'_> {
+impl Colliders<'_> {
     /// Where a particle at `place` comes by `way`, and what becomes of its velocities: of all only what points into a solid is taken.
-    pub(crate) fn carry<const N: usize>(&self, place: Vec3, way: Vec3, mut velocities: [Vec3; N]) -> (Vec3, [Vec3; N]) {
+    pub(crate) fn collide<const N: usize>(
+        &self,
+        place: Vec3,
+        way: Vec3,
+        mut velocities: [Vec3; N],
+    ) -> (Vec3, [Vec3; N]) {
         let from = self.origin + place.as_dvec3();
         let unturned = from + way.as_dvec3();
         let mut to = unturned;
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ITERATIONS {
             let before = to;
             for occluder in self.occluders {
                 if let Some(Contact { place, normal }) = self.contact(occluder, from, to) {
                     let left = to - place;
-                    to = self.put_out(occluder, place + left - normal * left.dot(normal).min(0.0));
+                    to = self.push_out(occluder, place + left - normal * left.dot(normal).min(0.0));
                     let normal = normal.as_vec3();
                     for velocity in &mut velocities {
                         *velocity -= normal * velocity.dot(normal).min(0.0);
                     }
                 }
             }
-            if (to - before).length() < SETTLED * f64::from(self.clearance) {
+            if (to - before).length() < CONVERGENCE_TOLERANCE * f64::from(self.clearance) {
                 let end = if to == unturned { place + way } else { (to - self.origin).as_vec3() };
                 return (end, velocities);
             }
@@ -69,7 +74,7 @@ impl Solids<'_> {
         loop {
             let distance = occluder.signed_distance(at(gone)) - clearance;
             if distance < 0.0 {
-                for _ in 0..HALVINGS {
+                for _ in 0..BISECTION_STEPS {
                     let middle = 0.5 * (free + gone);
                     let inside = occluder.signed_distance(at(middle)) < clearance;
                     if inside { gone = middle } else { free = middle }
@@ -77,16 +82,16 @@ impl Solids<'_> {
                 return Some(Contact { place: at(gone), normal: occluder.normal(at(gone)) });
             }
             free = gone;
-            if gone >= length || distance > OVERESTIMATE * (length - gone) {
+            if gone >= length || distance > DISTANCE_OVERESTIMATE * (length - gone) {
                 return None;
             }
             // The clearance makes every solid at least twice as thick, so that none is stepped over.
-            gone = (gone + (distance / OVERESTIMATE).max(clearance).max(length / PARTS)).min(length);
+            gone = (gone + (distance / DISTANCE_OVERESTIMATE).max(clearance).max(length / PARTS)).min(length);
         }
     }
 
     /// The nearest place with clearance.
-    fn put_out(&self, occluder: &Occluder, place: DVec3) -> DVec3 {
+    fn push_out(&self, occluder: &Occluder, place: DVec3) -> DVec3 {
         let inside = f64::from(self.clearance) - occluder.signed_distance(place);
         if inside > 0.0 { place + occluder.normal(place) * inside } else { place }
     }
@@ -103,8 +108,8 @@ mod tests {
 
     use super::*;
 
-    fn solids(occluders: &[Occluder]) -> Solids<'_> {
-        Solids { occluders, origin: DVec3::ZERO, clearance: 0.01 }
+    fn solids(occluders: &[Occluder]) -> Colliders<'_> {
+        Colliders { occluders, origin: DVec3::ZERO, clearance: 0.01 }
     }
 
     /// A level plate whose middle lies at the height 0.6.
@@ -127,15 +132,15 @@ mod tests {
     #[test]
     fn gas_slides_along_the_ground() {
         let ground = [Occluder::HalfSpace { point: DVec3::Y, normal: DVec3::Y }];
-        let solids = Solids { origin: DVec3::new(5.0, 1.0, 0.0), clearance: 0.1, ..solids(&ground) };
+        let solids = Colliders { origin: DVec3::new(5.0, 1.0, 0.0), clearance: 0.1, ..solids(&ground) };
         let velocity = Vec3::new(2.0, -3.0, 0.0);
-        let (place, [left]) = solids.carry(Vec3::new(0.0, 0.2, 0.0), velocity * 0.1, [velocity]);
+        let (place, [left]) = solids.collide(Vec3::new(0.0, 0.2, 0.0), velocity * 0.1, [velocity]);
         assert!((place - Vec3::new(0.2, 0.1, 0.0)).length() < 1e-6, "{place}");
         assert_eq!(left, Vec3::new(2.0, 0.0, 0.0));
         // From within the ground it comes out at once, and what leads away is free.
-        assert!((solids.carry(Vec3::Y * -0.3, Vec3::ZERO, [Vec3::ZERO]).0 - Vec3::Y * 0.1).length() < 1e-6);
+        assert!((solids.collide(Vec3::Y * -0.3, Vec3::ZERO, [Vec3::ZERO]).0 - Vec3::Y * 0.1).length() < 1e-6);
         let rising = (Vec3::Y * 0.1, Vec3::Y * 0.05);
-        assert_eq!(solids.carry(rising.0, rising.1, [rising.1]), (Vec3::Y * 0.15, [rising.1]));
+        assert_eq!(solids.collide(rising.0, rising.1, [rising.1]), (Vec3::Y * 0.15, [rising.1]));
     }
 
     #[test]
@@ -145,7 +150,7 @@ mod tests {
             for (start, speed) in (0..400).map(|i| (0.3 + 0.0007 * i as f32, 0.01 + 0.003 * i as f32)) {
                 let below = (0.59 - 0.1 * f32::from(matches!(plate[0], Occluder::Mesh { .. }))).min(start);
                 let way = Vec3::new(0.3 * speed, speed, -0.1 * speed);
-                let (place, [velocity]) = solids(&plate).carry(Vec3::Y * below, way, [way]);
+                let (place, [velocity]) = solids(&plate).collide(Vec3::Y * below, way, [way]);
                 assert!(place.y < 0.6, "{:?}: from {below} by {way} to {place}", plate[0]);
                 assert!(place.y == below + way.y || velocity.y < 0.01 * speed, "{velocity} behind the plate");
                 assert!((place.x - way.x).abs() < 0.02 + 0.1 * speed, "it slides: {place} by {way}");
@@ -157,7 +162,7 @@ mod tests {
     fn gas_that_one_solid_turns_into_another_keeps_out_of_both() {
         let wall = Occluder::HalfSpace { point: DVec3::X * 0.2, normal: DVec3::NEG_X };
         let solids_of = [plate(0.1), wall];
-        let (place, [velocity]) = solids(&solids_of).carry(Vec3::Y * 0.4, Vec3::new(0.5, 0.5, 0.1), [Vec3::ONE]);
+        let (place, [velocity]) = solids(&solids_of).collide(Vec3::Y * 0.4, Vec3::new(0.5, 0.5, 0.1), [Vec3::ONE]);
         assert!((place - Vec3::new(0.19, 0.54, 0.1)).length() < 1e-5 && velocity.max_element() <= 1.0, "{place}");
         assert_eq!([velocity.x, velocity.y], [0.0; 2]);
     }

@@ -14,17 +14,17 @@ use crate::particles::{
 };
 
 /// Most particles of all flames of a scene.
-const MOST_PARTICLES: i64 = 20_000_000;
+const MAX_PARTICLES: i64 = 20_000_000;
 /// Bytes that a living particle takes, measured over a run: its state and the buffers of a step. (Drawing takes more for a while.)
 const PARTICLE_BYTES: f64 = 670.0;
 /// Times until its tip that gas may take before it is removed, whatever holds it.
-const LONGEST_RISE: f64 = 3.0;
+const MAX_RISE_TIMES: f64 = 3.0;
 /// How much the fuel that a fire draws from its burner rises and falls as it puffs, as a share.
 const PULSE: f64 = 0.6;
 /// How far a burner may reach beyond the domain, of its own size: turning rounds.
 const SLACK: f64 = 1e-6;
 /// Fewest steps that gas lives, so that births in one step stay bounded.
-const FEWEST_STEPS: f64 = 4.0;
+const MIN_STEPS: f64 = 4.0;
 
 /// All that follows from the parameters and stays.
 ///
@@ -33,7 +33,7 @@ const FEWEST_STEPS: f64 = 4.0;
 /// `support` times the mean distance `V^(1/3)`, mass m is V times the density of air as hot as the gas, rho_0 a share of
 /// that density, and k the square of a speed of sound that is a few times the gas's own speed.
 #[derive(Clone, Debug)]
-pub(crate) struct Design {
+pub(crate) struct DerivedConstants {
     pub(crate) burners: Vec<Burner>,
     /// Births a second of each burner at full flow.
     pub(crate) rates: Vec<f64>,
@@ -58,30 +58,30 @@ pub(crate) struct Design {
     /// In a loop: for how long one run passes into the next, s.
     pub(crate) dissolve: f64,
     /// More than these never live.
-    pub(crate) most: usize,
+    pub(crate) max_particles: usize,
 }
 
-impl Design {
+impl DerivedConstants {
     pub(crate) fn new(
         parameters: &FlameParticlesParameters,
         loop_s: Option<f64>,
         assets: &dyn Assets,
     ) -> Result<Self, ParticleFault> {
-        check_count(parameters.particles, 0)?;
+        check_particle_count(parameters.particles, 0)?;
         let burners = burners(parameters, assets)?;
         let domain = domain(parameters, &burners)?;
-        let stays: Vec<f64> = burners.iter().map(|burner| stay(parameters, burner)).collect();
-        let fluxes: Vec<f64> = burners.iter().map(|burner| burner.square_metres * burner.speed).collect();
-        let living: f64 = fluxes.iter().zip(&stays).map(|(flux, stay)| flux * stay).sum();
+        let residence_times: Vec<f64> = burners.iter().map(|burner| residence_time(parameters, burner)).collect();
+        let fluxes: Vec<f64> = burners.iter().map(|burner| burner.area_m2 * burner.speed).collect();
+        let living: f64 = fluxes.iter().zip(&residence_times).map(|(flux, residence_time)| flux * residence_time).sum();
         let volume = living / parameters.particles as f64;
         let support_radius = support_radius(parameters, volume, &domain)?;
         let coolest = burners.iter().map(|burner| burner.parameters.temperature_k).fold(f64::INFINITY, f64::min);
         let density = Air::default().density_at(coolest);
         let fastest = burners.iter().map(|burner| burner.speed).fold(0.0, f64::max);
         let sound = parameters.fluid.stiffness * fastest;
-        let longest = stays.into_iter().fold(0.0, f64::max);
+        let longest_residence = residence_times.into_iter().fold(0.0, f64::max);
         // By then all gas is other gas.
-        let dissolve = loop_s.map_or(0.0, |turn| longest.min(turn));
+        let dissolve = loop_s.map_or(0.0, |turn| longest_residence.min(turn));
         Ok(Self {
             rates: fluxes.into_iter().map(|flux| flux / volume).collect(),
             puffing_hz: burners.iter().map(|burner| burner.puffing_hz(parameters)).collect(),
@@ -92,22 +92,22 @@ impl Design {
             rest_density: (parameters.fluid.rest_density * density) as f32,
             stiffness_per_kelvin: (sound * sound / coolest) as f32,
             domain,
-            preroll: preroll(parameters, longest) + 0.5 * dissolve,
+            preroll: preroll(parameters, longest_residence) + 0.5 * dissolve,
             dissolve,
-            most: 2 * parameters.particles as usize + 16,
+            max_particles: 2 * parameters.particles as usize + 16,
             burners,
         })
     }
 
     /// Age at which a particle of burner `index` is removed even if it still burns, s.
-    pub(crate) fn longest_life(&self, index: usize, afterlife_s: f64) -> f64 {
-        LONGEST_RISE * self.burners[index].rise_time() + afterlife_s
+    pub(crate) fn max_age(&self, index: usize, afterlife_s: f64) -> f64 {
+        MAX_RISE_TIMES * self.burners[index].rise_time() + afterlife_s
     }
 }
 
 /// How long gas of a burner stays, s: until the tip, and its afterlife.
-fn stay(parameters: &FlameParticlesParameters, burner: &Burner) -> f64 {
-    (burner.rise_time() + parameters.life.afterlife_s).max(FEWEST_STEPS * parameters.step_s)
+fn residence_time(parameters: &FlameParticlesParameters, burner: &Burner) -> f64 {
+    (burner.rise_time() + parameters.life.afterlife_s).max(MIN_STEPS * parameters.step_s)
 }
 
 /// The support radius d, m, of particles that stand for so much gas at birth.
@@ -123,11 +123,11 @@ fn support_radius(
     Err(ParticleFault { key: "particles".into(), kind: ParticleFaultKind::SupportBeyondDomain { radius, side } })
 }
 
-/// How long it burns before the shot, s; by default twice as long as gas stays at the `longest`.
-fn preroll(parameters: &FlameParticlesParameters, longest: f64) -> f64 {
+/// How long it burns before the shot, s; by default twice as long as gas stays at the `longest_residence`.
+fn preroll(parameters: &FlameParticlesParameters, longest_residence: f64) -> f64 {
     match parameters.preroll_s {
         Auto::Set(seconds) => seconds,
-        Auto::Auto => (2.0 * longest).min(60.0),
+        Auto::Auto => (2.0 * longest_residence).min(60.0),
     }
 }
 
@@ -140,15 +140,15 @@ fn have_memory(count: i64) -> bool {
 ///
 /// # Errors
 /// More than are taken or than there is memory for, with the number that would be.
-pub fn check_count(count: i64, others: i64) -> Result<(), ParticleFault> {
-    let taken = (MOST_PARTICLES - others).max(0);
+pub fn check_particle_count(count: i64, others: i64) -> Result<(), ParticleFault> {
+    let taken = (MAX_PARTICLES - others).max(0);
     if count <= taken && have_memory(count + others) {
         return Ok(());
     }
-    let most = memory::most(taken.min(count), |most| have_memory(most + others));
-    let most = if count > taken && have_memory(taken + others) { taken } else { most };
+    let max_particles = memory::most(taken.min(count), |max_particles| have_memory(max_particles + others));
+    let max_particles = if count > taken && have_memory(taken + others) { taken } else { max_particles };
     let gib = (count as f64 + others as f64) * PARTICLE_BYTES / f64::from(1 << 30);
-    let kind = ParticleFaultKind::TooManyParticles { count, others, gib, most };
+    let kind = ParticleFaultKind::TooManyParticles { count, others, gib, most: max_particles };
     Err(ParticleFault { key: "particles".into(), kind })
 }
 
@@ -173,14 +173,14 @@ fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[
         let corners = burner.parameters.position.bounds().map(DVec3::from);
         let reached = [corners[0] + burner.extent[0], corners[1] + burner.extent[1]];
         for place in corners.into_iter().chain(reached) {
-            stands_within(parameters, place, SLACK * burner.reach).map_err(|(corner, kind)| {
+            stands_within(parameters, place, SLACK * burner.bounding_radius).map_err(|(corner, kind)| {
                 // What the user did not write cannot be at fault.
                 let moved = burner.parameters.position != Animated::from([0.0; 3]);
                 ParticleFault { key: if moved { format!("burners.{index}.position") } else { corner.into() }, kind }
             })?;
         }
     }
-    let room = |burner: &Burner| burner.reach + 3.0 * burner.height;
+    let room = |burner: &Burner| burner.bounding_radius + 3.0 * burner.height;
     // The corners of the box in which each burner moves.
     let ways = || burners.iter().map(|burner| (burner, burner.parameters.position.bounds().map(DVec3::from)));
     let low = ways().map(|(burner, [low, _])| low - room(burner)).fold(DVec3::INFINITY, DVec3::min);
@@ -211,8 +211,8 @@ mod tests {
     use super::*;
     use crate::particles::parameters::BurnerShape;
 
-    fn design(parameters: &FlameParticlesParameters) -> Result<Design, ParticleFault> {
-        Design::new(parameters, None, &MemoryAssets::default())
+    fn constants(parameters: &FlameParticlesParameters) -> Result<DerivedConstants, ParticleFault> {
+        DerivedConstants::new(parameters, None, &MemoryAssets::default())
     }
 
     #[test]
@@ -222,17 +222,18 @@ mod tests {
             burners: vec![small, BurnerParameters::default()],
             ..FlameParticlesParameters::default()
         };
-        let design = design(&parameters).unwrap();
-        let stay = |burner: &Burner| burner.rise_time() + parameters.life.afterlife_s;
-        let living: f64 = design.burners.iter().zip(&design.rates).map(|(burner, rate)| rate * stay(burner)).sum();
+        let constants = constants(&parameters).unwrap();
+        let residence_time = |burner: &Burner| burner.rise_time() + parameters.life.afterlife_s;
+        let living: f64 =
+            constants.burners.iter().zip(&constants.rates).map(|(burner, rate)| rate * residence_time(burner)).sum();
         assert!((living - parameters.particles as f64).abs() < 1.0);
-        let spacing = f64::from(design.support_radius) / parameters.fluid.support;
-        let layer = design.rates[1] / (design.burners[1].square_metres * design.burners[1].speed);
+        let spacing = f64::from(constants.support_radius) / parameters.fluid.support;
+        let layer = constants.rates[1] / (constants.burners[1].area_m2 * constants.burners[1].speed);
         assert!((spacing * spacing * spacing * layer - 1.0).abs() < 1e-5);
     }
 
     /// A flame on a triangle of half a square metre that lies `far` to the side of the mesh's origin, in a domain of two metres each way.
-    fn on_a_mesh_beside_its_origin(far: f32, rotation_deg: [f64; 3]) -> Result<Design, ParticleFault> {
+    fn on_a_mesh_beside_its_origin(far: f32, rotation_deg: [f64; 3]) -> Result<DerivedConstants, ParticleFault> {
         let corners = vec![[far, 0.0, 0.0], [far, 0.0, 1.0], [far + 1.0, 0.0, 0.0]];
         let mut assets = MemoryAssets::default();
         assets.insert_mesh("far.gltf", Mesh::new(corners, vec![[0, 1, 2]]).unwrap());
@@ -241,7 +242,7 @@ mod tests {
         let [domain_min, domain_max] = [-2.0, 2.0].map(|corner| Auto::Set([corner; 3]));
         let parameters =
             FlameParticlesParameters { burners: vec![burner], domain_min, domain_max, ..Default::default() };
-        Design::new(&parameters, None, &assets)
+        DerivedConstants::new(&parameters, None, &assets)
     }
 
     #[test]
@@ -260,7 +261,7 @@ mod tests {
     #[test]
     fn parameters_that_do_not_go_together_are_named() {
         let default = FlameParticlesParameters::default;
-        let fault = |parameters| design(&parameters).unwrap_err();
+        let fault = |parameters| constants(&parameters).unwrap_err();
         let far = BurnerParameters { position: [0.0, 90.0, 0.0].into(), ..Default::default() };
         let outside = FlameParticlesParameters {
             burners: vec![BurnerParameters::default(), far],
@@ -284,8 +285,12 @@ mod tests {
         assert!(matches!(fault(wide).kind, ParticleFaultKind::SupportBeyondDomain { .. }));
         let many = fault(FlameParticlesParameters { particles: 900_000_000, ..default() });
         let expected = "particles: 900000000 particles would take 562 GiB; allowed: up to ";
-        let most: Option<i64> = many.to_string().strip_prefix(expected).and_then(|most| most.parse().ok());
+        let max_particles: Option<i64> =
+            many.to_string().strip_prefix(expected).and_then(|max_particles| max_particles.parse().ok());
         // A small machine takes fewer.
-        assert!(most.is_some_and(|most| (1_000_000..=MOST_PARTICLES).contains(&most)), "{many}");
+        assert!(
+            max_particles.is_some_and(|max_particles| (1_000_000..=MAX_PARTICLES).contains(&max_particles)),
+            "{many}"
+        );
     }
 }

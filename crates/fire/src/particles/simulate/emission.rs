@@ -6,8 +6,8 @@ use bansho_base::math::{
 };
 
 use super::{
-    burner::{Birthplace, Burner},
-    derived::Design,
+    burner::{Burner, SpawnPoint},
+    derived::DerivedConstants,
     particles::{Particle, Particles},
 };
 use crate::particles::simulate::forces::turbulence::Turbulence;
@@ -19,77 +19,77 @@ const SPEED_SPREAD: f32 = 0.3;
 /// Speed beside the mean in the middle of the burner, and how much less it is at the rim.
 const SPEED_PROFILE: [f64; 2] = [1.25, 0.5];
 /// How fast gas from the middle burns beside the mean, and how much faster gas from the rim, which finds air first.
-const HUNGER_PROFILE: [f64; 2] = [0.62, 0.9];
+const BURN_RATE_PROFILE: [f64; 2] = [0.62, 0.9];
 /// How unevenly patches of gas burn, which makes tongues.
 const PATCHES: f64 = 0.3;
 /// Size of those patches, in diameters.
 const PATCH_SIZE: f64 = 0.35;
 
 /// What births follow from.
-pub(crate) struct Births<'a> {
-    pub(crate) design: &'a Design,
+pub(crate) struct Spawner<'a> {
+    pub(crate) constants: &'a DerivedConstants,
     pub(crate) turbulence: &'a Turbulence,
     pub(crate) key: Key,
     pub(crate) afterlife_s: f64,
 }
 
-impl Births<'_> {
+impl Spawner<'_> {
     /// Adds the particles that are born from `start` to `start + seconds`, as far along as they are at its end.
     ///
     /// Births are counted since the preroll began, so that each is the same however long steps are.
     pub(crate) fn add(&self, particles: &mut Particles, start: f64, seconds: f64) {
-        let design = self.design;
-        for (number, burner) in design.burners.iter().enumerate() {
-            let [before, after] = [start, start + seconds].map(|t| self.born(number, burner, t));
+        let constants = self.constants;
+        for (number, burner) in constants.burners.iter().enumerate() {
+            let [before, after] = [start, start + seconds].map(|t| self.spawned_count(number, burner, t));
             for ordinal in before.ceil().max(0.0) as u64..after.ceil().max(0.0) as u64 {
-                if particles.len() >= design.most {
+                if particles.len() >= constants.max_particles {
                     return;
                 }
                 let age = seconds * ((after - ordinal as f64) / (after - before)).clamp(0.0, 1.0);
                 let birth = (number as u64) << ORDINAL_BITS | ordinal;
-                self.add_one(particles, number, birth, start + seconds - age, age);
+                self.spawn_one(particles, number, birth, start + seconds - age, age);
             }
         }
     }
 
     /// How many were born until `t`, with parts of one.
-    fn born(&self, number: usize, burner: &Burner, t: f64) -> f64 {
-        let design = self.design;
+    fn spawned_count(&self, number: usize, burner: &Burner, t: f64) -> f64 {
+        let constants = self.constants;
         // Warped time lets gas come in beats and keeps their mean.
-        let beat = std::f64::consts::TAU * design.puffing_hz[number];
-        let warped = |t: f64| t + design.pulse / beat * math::sin(beat * t);
-        design.rates[number] * burner.parameters.flow.integral(warped(-design.preroll), warped(t))
+        let beat = std::f64::consts::TAU * constants.puffing_hz[number];
+        let warped = |t: f64| t + constants.pulse / beat * math::sin(beat * t);
+        constants.rates[number] * burner.parameters.flow.integral(warped(-constants.preroll), warped(t))
     }
 
     /// Adds particle `birth`, born at `t`, which is `age` old.
-    fn add_one(&self, particles: &mut Particles, number: usize, birth: u64, t: f64, age: f64) {
-        let (design, burner) = (self.design, &self.design.burners[number]);
-        let place = burner.birthplace(self.key, birth, t);
-        let chance = uniform(self.key.words(birth, 0, Purpose::named("birth speed"))[0]);
-        let outward = place.outward * place.outward;
-        let profile = (SPEED_PROFILE[0] - SPEED_PROFILE[1] * outward) as f32;
-        let speed = burner.speed as f32 * profile * (1.0 + SPEED_SPREAD * (chance - 0.5));
+    fn spawn_one(&self, particles: &mut Particles, number: usize, birth: u64, t: f64, age: f64) {
+        let (constants, burner) = (self.constants, &self.constants.burners[number]);
+        let place = burner.spawn_point(self.key, birth, t);
+        let random = uniform(self.key.words(birth, 0, Purpose::named("birth speed"))[0]);
+        let radial_fraction = place.radial_fraction * place.radial_fraction;
+        let profile = (SPEED_PROFILE[0] - SPEED_PROFILE[1] * radial_fraction) as f32;
+        let speed = burner.speed as f32 * profile * (1.0 + SPEED_SPREAD * (random - 0.5));
         let velocity = place.direction.as_vec3() * speed;
         let particle = Particle {
             birth,
             position: (place.position + velocity.as_dvec3() * age).as_vec3().to_array(),
             velocity: velocity.to_array(),
-            mass: design.mass,
-            density: design.density,
+            mass: constants.mass,
+            density: constants.density,
             temperature: burner.parameters.temperature_k as f32,
-            support_radius: design.support_radius,
+            support_radius: constants.support_radius,
             age: age as f32,
-            life: design.longest_life(number, self.afterlife_s) as f32,
+            life: constants.max_age(number, self.afterlife_s) as f32,
             fuel: 1.0,
             soot: 0.0,
         };
-        let hunger = self.hunger(burner, design.puffing_hz[number], &place, t) as f32;
-        particles.push_from(number as u32, hunger, particle);
+        let burn_rate = self.burn_rate(burner, constants.puffing_hz[number], &place, t) as f32;
+        particles.push_from(number as u32, burn_rate, particle);
     }
 
     /// How fast gas burns beside the mean: faster from the rim, and in patches that come and go.
-    fn hunger(&self, burner: &Burner, hz: f64, place: &Birthplace, t: f64) -> f64 {
-        let profile = HUNGER_PROFILE[0] + HUNGER_PROFILE[1] * place.outward * place.outward;
+    fn burn_rate(&self, burner: &Burner, hz: f64, place: &SpawnPoint, t: f64) -> f64 {
+        let profile = BURN_RATE_PROFILE[0] + BURN_RATE_PROFILE[1] * place.radial_fraction * place.radial_fraction;
         let patch = place.position / (PATCH_SIZE * burner.diameter) + DVec3::Y * (2.5 * hz * t);
         profile * (1.0 + PATCHES * f64::from(self.turbulence.patch(patch))).clamp(0.4, 2.0)
     }

@@ -5,12 +5,12 @@ use bansho_base::math::simd::Real;
 use super::particles::Particles;
 use bansho_sph::{Cells, Pair, PairTerm, Poly6, SmoothingKernel, mixing_weights};
 
-/// `w_j W` times 1, the differences of velocity and temperature, and the way to the neighbour.
+/// `w_j W` times 1, the differences of velocity and temperature, and the offset to the neighbour.
 ///
 /// Weights `m / sqrt(rho)` make it even from both sides, so that evening out keeps momentum and heat.
-struct BesideTerm(Poly6<3>);
+struct NeighborSumsTerm(Poly6<3>);
 
-impl PairTerm<3, 5, 8> for BesideTerm {
+impl PairTerm<3, 5, 8> for NeighborSumsTerm {
     const DIRECTED: bool = false;
 
     #[inline(always)]
@@ -28,7 +28,7 @@ impl PairTerm<3, 5, 8> for BesideTerm {
 
 /// What the sum says of one particle, or of several in the lanes of a vector.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Neighbourhood<R> {
+pub(crate) struct Neighborhood<R> {
     /// Sum of weights, the particle's own included.
     pub(crate) weight: R,
     /// Differences of the neighbours' velocities.
@@ -36,30 +36,30 @@ pub(crate) struct Neighbourhood<R> {
     /// Differences of their temperatures.
     pub(crate) temperature: R,
     /// Ways to them.
-    pub(crate) way: [R; 3],
+    pub(crate) offset: [R; 3],
 }
 
-impl<R> From<[R; 8]> for Neighbourhood<R> {
+impl<R> From<[R; 8]> for Neighborhood<R> {
     #[inline(always)]
     fn from([weight, u, v, w, temperature, x, y, z]: [R; 8]) -> Self {
-        Self { weight, velocity: [u, v, w], temperature, way: [x, y, z] }
+        Self { weight, velocity: [u, v, w], temperature, offset: [x, y, z] }
     }
 }
 
 /// Sums over the neighbours of every particle, in sorted order.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Beside {
+pub(crate) struct NeighborSums {
     /// `m / sqrt(rho)`.
     pub(crate) weights: Vec<f32>,
-    /// The numbers of each particle's [`Neighbourhood`].
+    /// The numbers of each particle's [`Neighborhood`].
     pub(crate) sums: [Vec<f32>; 8],
 }
 
-impl Beside {
-    pub(crate) fn look(&mut self, cells: &Cells<3>, particles: &Particles) {
+impl NeighborSums {
+    pub(crate) fn compute(&mut self, cells: &Cells<3>, particles: &Particles) {
         let Particles { mass, density, temperature, velocity: [u, v, w], .. } = particles;
         mixing_weights(mass, density, &mut self.weights);
         let fields = [&self.weights, u, v, w, temperature].map(Vec::as_slice);
-        cells.sum(&BesideTerm(Poly6::new(cells.support_radius())), fields, self.sums.each_mut());
+        cells.sum(&NeighborSumsTerm(Poly6::new(cells.support_radius())), fields, self.sums.each_mut());
     }
 }

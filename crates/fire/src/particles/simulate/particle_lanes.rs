@@ -7,73 +7,73 @@ use rayon::prelude::*;
 
 use bansho_base::math::simd::{LANES, Lanes};
 
-use crate::particles::simulate::forces::burner_forces::Draught;
+use crate::particles::simulate::forces::burner_forces::BurnerForces;
 
 /// Particles of a task.
-pub(crate) const PARTICLES_OF_TASK: usize = 512;
+pub(crate) const PARTICLES_PER_TASK: usize = 512;
 
 /// What a task reads of its particles and does not change.
-pub(crate) trait Still: Copy + Sync {
+pub(crate) trait SharedColumns: Copy + Sync {
     /// What belongs to these particles.
-    fn part(self, range: Range<usize>) -> Self;
+    fn slice(self, range: Range<usize>) -> Self;
 }
 
 /// Work on `N` numbers of each particle, for sixteen of one burner at a time.
-pub(crate) trait Work<S: Still, const N: usize>: Sync {
+pub(crate) trait BatchUpdate<S: SharedColumns, const N: usize>: Sync {
     /// Works on rows of a task.
-    fn rows<V: Simd>(&self, simd: V, draught: &Draught, rows: Rows, still: S, moving: &mut [&mut [f32]; N]);
+    fn rows<V: Simd>(&self, simd: V, burner: &BurnerForces, rows: RowBatch, shared: S, moving: &mut [&mut [f32]; N]);
 }
 
 /// Works on all particles, burner by burner within each task.
-pub(crate) fn burner_by_burner<S: Still, const N: usize>(
-    work: &impl Work<S, N>,
-    draughts: &[Draught],
+pub(crate) fn for_each_burner_batch<S: SharedColumns, const N: usize>(
+    work: &impl BatchUpdate<S, N>,
+    burner_forces: &[BurnerForces],
     burners: &[u32],
-    still: S,
+    shared: S,
     moving: [&mut Vec<f32>; N],
 ) {
     let level = Level::new();
     columns(moving).into_par_iter().enumerate().for_each(|(task, mut moving)| {
-        let first = task * PARTICLES_OF_TASK;
+        let first = task * PARTICLES_PER_TASK;
         let range = first..first + moving[0].len();
-        let sorted = ByBurner::new(&burners[range.clone()], draughts.len());
-        let still = still.part(range);
-        dispatch!(level, simd => work_task(simd, work, draughts, &sorted, still, &mut moving));
+        let sorted = RowsByBurner::new(&burners[range.clone()], burner_forces.len());
+        let shared = shared.slice(range);
+        dispatch!(level, simd => update_task(simd, work, burner_forces, &sorted, shared, &mut moving));
     });
 }
 
 #[inline(always)]
-fn work_task<V: Simd, S: Still, const N: usize>(
+fn update_task<V: Simd, S: SharedColumns, const N: usize>(
     simd: V,
-    work: &impl Work<S, N>,
-    draughts: &[Draught],
-    sorted: &ByBurner,
-    still: S,
+    work: &impl BatchUpdate<S, N>,
+    burner_forces: &[BurnerForces],
+    sorted: &RowsByBurner,
+    shared: S,
     moving: &mut [&mut [f32]; N],
 ) {
-    for (number, draught) in draughts.iter().enumerate() {
+    for (number, burner) in burner_forces.iter().enumerate() {
         for rows in sorted.of(number).chunks(LANES) {
-            work.rows(simd, draught, Rows(rows), still, moving);
+            work.rows(simd, burner, RowBatch(rows), shared, moving);
         }
     }
 }
 
 /// The part of each array that belongs to each task.
 fn columns<const N: usize>(arrays: [&mut Vec<f32>; N]) -> Vec<[&mut [f32]; N]> {
-    let tasks = arrays.first().map_or(0, |values| values.len().div_ceil(PARTICLES_OF_TASK));
-    let mut parts = arrays.map(|values| values.chunks_mut(PARTICLES_OF_TASK));
+    let tasks = arrays.first().map_or(0, |values| values.len().div_ceil(PARTICLES_PER_TASK));
+    let mut parts = arrays.map(|values| values.chunks_mut(PARTICLES_PER_TASK));
     (0..tasks).map(|_| parts.each_mut().map(|parts| parts.next().unwrap_or_default())).collect()
 }
 
 /// The rows of a task's arrays, burner by burner.
 #[derive(Debug)]
-struct ByBurner {
+struct RowsByBurner {
     rows: Vec<u32>,
     /// Where the rows of each burner end.
     ends: Vec<usize>,
 }
 
-impl ByBurner {
+impl RowsByBurner {
     /// Sorts the rows of a task whose particles came from these burners, of `count` that there are.
     fn new(burners: &[u32], count: usize) -> Self {
         let mut sorted = Self { rows: vec![0; burners.len()], ends: vec![0; count] };
@@ -101,12 +101,12 @@ impl ByBurner {
 
 /// Up to sixteen rows, upward.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rows<'a>(pub(crate) &'a [u32]);
+pub(crate) struct RowBatch<'a>(pub(crate) &'a [u32]);
 
-impl Rows<'_> {
+impl RowBatch<'_> {
     /// The first row, if they are sixteen that follow each other.
     #[inline(always)]
-    fn run(self) -> Option<usize> {
+    fn contiguous_start(self) -> Option<usize> {
         let (first, last) = (self.0[0] as usize, self.0[self.0.len() - 1] as usize);
         (self.0.len() == LANES && last - first == LANES - 1).then_some(first)
     }
@@ -114,7 +114,7 @@ impl Rows<'_> {
     /// Their values; lanes beyond the last row hold the last row's.
     #[inline(always)]
     pub(crate) fn load<S: Simd>(self, simd: S, values: &[f32]) -> Lanes<S> {
-        if let Some(first) = self.run() {
+        if let Some(first) = self.contiguous_start() {
             return Lanes::from_slice(simd, &values[first..first + LANES]);
         }
         let last = values[self.0[self.0.len() - 1] as usize];
@@ -138,7 +138,7 @@ impl Rows<'_> {
     /// Puts values into their rows.
     #[inline(always)]
     pub(crate) fn store<S: Simd>(self, batch: Lanes<S>, values: &mut [f32]) {
-        if let Some(first) = self.run() {
+        if let Some(first) = self.contiguous_start() {
             batch.store_slice(&mut values[first..first + LANES]);
             return;
         }
@@ -157,13 +157,13 @@ mod tests {
     #[test]
     fn rows_of_each_burner_come_together_and_values_go_back_where_they_were() {
         let burners: Vec<u32> = (0..100).map(|row| if row < 40 { 2 } else { row % 3 }).collect();
-        let sorted = ByBurner::new(&burners, 5);
+        let sorted = RowsByBurner::new(&burners, 5);
         let values: Vec<f32> = (0..100).map(|row| row as f32).collect();
         let mut seen = vec![0.0; 100];
         for burner in 0..5 {
             let rows = sorted.of(burner);
             assert!(rows.iter().all(|row| burners[*row as usize] as usize == burner) && rows.is_sorted());
-            for rows in rows.chunks(LANES).map(Rows) {
+            for rows in rows.chunks(LANES).map(RowBatch) {
                 bansho_base::dispatch_baseline!(simd => {
                     let batch = rows.load(simd, &values);
                     assert_eq!(batch.as_slice()[LANES - 1], rows.0[rows.0.len() - 1] as f32);

@@ -6,7 +6,7 @@ use bansho_sph::{Cells, retain};
 use rayon::prelude::*;
 
 /// How many arrays of numbers there are.
-pub(crate) const NUMBERS: usize = 21;
+pub(crate) const FLOAT_COLUMNS: usize = 21;
 /// Which of them are densities.
 const DENSITY: usize = 14;
 
@@ -45,11 +45,11 @@ pub struct Particles {
     pub(crate) birth: Vec<u64>,
     pub(crate) position: [Vec<f32>; 3],
     pub(crate) velocity: [Vec<f32>; 3],
-    pub(crate) birthplace: [Vec<f32>; 3],
+    pub(crate) spawn_point: [Vec<f32>; 3],
     /// The part of the velocity with which the air's own motion carries the particle, m/s.
     pub(crate) drift: [Vec<f32>; 3],
     /// How fast it burns beside the mean.
-    pub(crate) hunger: Vec<f32>,
+    pub(crate) burn_rate: Vec<f32>,
     /// Number of the burner it came from.
     pub(crate) burner: Vec<u32>,
     pub(crate) mass: Vec<f32>,
@@ -84,17 +84,17 @@ impl Particles {
     }
 
     /// Adds a particle of a burner, which burns so much faster than the mean.
-    pub(crate) fn push_from(&mut self, burner: u32, hunger: f32, particle: Particle) {
+    pub(crate) fn push_from(&mut self, burner: u32, burn_rate: f32, particle: Particle) {
         self.birth.push(particle.birth);
         self.burner.push(burner);
-        self.hunger.push(hunger);
+        self.burn_rate.push(burn_rate);
         for axis in 0..3 {
             self.position[axis].push(particle.position[axis]);
-            self.birthplace[axis].push(particle.position[axis]);
+            self.spawn_point[axis].push(particle.position[axis]);
             self.velocity[axis].push(particle.velocity[axis]);
             self.drift[axis].push(0.0);
         }
-        for (values, value) in self.scalars_mut().into_iter().zip(particle.scalars()) {
+        for (values, value) in self.scalar_columns_mut().into_iter().zip(particle.scalars()) {
             values.push(value);
         }
     }
@@ -124,22 +124,22 @@ impl Particles {
         if keep.contains(&false) {
             retain(&mut self.birth, keep);
             retain(&mut self.burner, keep);
-            self.numbers_mut().into_par_iter().for_each(|values| retain(values, keep));
+            self.float_columns_mut().into_par_iter().for_each(|values| retain(values, keep));
         }
     }
 
     /// Sorts them into cells, and what else is known of each; their numbers of birth order those of one cell. Their densities are to be
     /// found anew.
-    pub(crate) fn sort(&mut self, cells: &mut Cells<3>, more: &mut Vec<f32>) {
+    pub(crate) fn sort(&mut self, cells: &mut Cells<3>, companion: &mut Vec<f32>) {
         cells.assign(self.positions(), &self.birth);
         cells.reorder(&mut self.birth);
         cells.reorder(&mut self.burner);
-        let arrays = self.numbers_mut().into_iter().enumerate().filter(|(number, _)| *number != DENSITY);
-        cells.reorder_all(arrays.map(|(_, values)| values).chain([more]));
+        let arrays = self.float_columns_mut().into_iter().enumerate().filter(|(number, _)| *number != DENSITY);
+        cells.reorder_all(arrays.map(|(_, values)| values).chain([companion]));
     }
 
     /// Numbers of birth, no two alike.
-    pub fn births(&self) -> &[u64] {
+    pub fn spawner(&self) -> &[u64] {
         &self.birth
     }
 
@@ -154,8 +154,8 @@ impl Particles {
     }
 
     /// Places where they were born, m from the origin: with the age they name the gas, whatever became of it.
-    pub fn birthplaces(&self) -> [&[f32]; 3] {
-        self.birthplace.each_ref().map(Vec::as_slice)
+    pub fn spawn_positions(&self) -> [&[f32]; 3] {
+        self.spawn_point.each_ref().map(Vec::as_slice)
     }
 
     /// Masses m, kg.
@@ -199,20 +199,42 @@ impl Particles {
     }
 
     /// Every array of numbers, for what treats them all alike.
-    pub(crate) fn numbers(&self) -> [&Vec<f32>; NUMBERS] {
-        let Self { position: [x, y, z], velocity: [u, v, w], birthplace: [a, b, c], drift: [d, e, f], .. } = self;
-        let Self { hunger, mass, density, temperature, support_radius, age, life, fuel, soot, .. } = self;
-        [x, y, z, u, v, w, a, b, c, d, e, f, hunger, mass, density, temperature, support_radius, age, life, fuel, soot]
+    pub(crate) fn float_columns(&self) -> [&Vec<f32>; FLOAT_COLUMNS] {
+        let Self { position: [x, y, z], velocity: [u, v, w], spawn_point: [a, b, c], drift: [d, e, f], .. } = self;
+        let Self { burn_rate, mass, density, temperature, support_radius, age, life, fuel, soot, .. } = self;
+        [
+            x,
+            y,
+            z,
+            u,
+            v,
+            w,
+            a,
+            b,
+            c,
+            d,
+            e,
+            f,
+            burn_rate,
+            mass,
+            density,
+            temperature,
+            support_radius,
+            age,
+            life,
+            fuel,
+            soot,
+        ]
     }
 
-    /// As [`numbers`](Self::numbers), to change them.
-    pub(crate) fn numbers_mut(&mut self) -> [&mut Vec<f32>; NUMBERS] {
+    /// As [`float_columns`](Self::float_columns), to change them.
+    pub(crate) fn float_columns_mut(&mut self) -> [&mut Vec<f32>; FLOAT_COLUMNS] {
         let Self {
             position: [x, y, z],
             velocity: [u, v, w],
-            birthplace: [a, b, c],
+            spawn_point: [a, b, c],
             drift: [d, e, f],
-            hunger,
+            burn_rate,
             mass,
             density,
             temperature,
@@ -223,10 +245,32 @@ impl Particles {
             soot,
             ..
         } = self;
-        [x, y, z, u, v, w, a, b, c, d, e, f, hunger, mass, density, temperature, support_radius, age, life, fuel, soot]
+        [
+            x,
+            y,
+            z,
+            u,
+            v,
+            w,
+            a,
+            b,
+            c,
+            d,
+            e,
+            f,
+            burn_rate,
+            mass,
+            density,
+            temperature,
+            support_radius,
+            age,
+            life,
+            fuel,
+            soot,
+        ]
     }
 
-    fn scalars_mut(&mut self) -> [&mut Vec<f32>; 8] {
+    fn scalar_columns_mut(&mut self) -> [&mut Vec<f32>; 8] {
         let Self { mass, density, temperature, support_radius, age, life, fuel, soot, .. } = self;
         [mass, density, temperature, support_radius, age, life, fuel, soot]
     }
@@ -265,7 +309,7 @@ mod tests {
         let mut particles = Particles::new(DVec3::ZERO);
         (1..=5).for_each(|birth| particles.push(particle(birth)));
         particles.retain(&[true, false, true, false, true]);
-        assert_eq!(particles.births(), [1, 3, 5]);
+        assert_eq!(particles.spawner(), [1, 3, 5]);
         assert_eq!((0..3).filter_map(|index| particles.get(index)).collect::<Vec<_>>(), [1, 3, 5].map(particle));
         assert_eq!(particles.get(3), None);
     }

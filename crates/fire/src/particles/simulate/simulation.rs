@@ -6,15 +6,15 @@ use bansho_base::{
 };
 
 use super::{
-    combustion::Laws, derived::Design, emission::Births, fluid::Fluid, integrate::Motion,
-    particle_lanes::PARTICLES_OF_TASK, particles::Particles,
+    combustion::CombustionModel, derived::DerivedConstants, emission::Spawner, fluid::FluidSolver,
+    integrate::IntegrationStep, particle_lanes::PARTICLES_PER_TASK, particles::Particles,
 };
 use crate::particles::{
     parameters::FlameParticlesParameters,
     simulate::{
-        combustion::step::Living,
+        combustion::step::CombustionStep,
         forces::{
-            external_forces::{Setting, Weather},
+            external_forces::{ExternalForces, StepConstants},
             turbulence::Turbulence,
         },
     },
@@ -24,24 +24,24 @@ use rayon::prelude::*;
 /// The gas and what it needs to move.
 #[derive(Clone, Debug)]
 pub(crate) struct Simulation {
-    pub(crate) design: Design,
-    laws: Laws,
+    pub(crate) constants: DerivedConstants,
+    combustion: CombustionModel,
     pub(crate) parameters: FlameParticlesParameters,
     pub(crate) turbulence: Turbulence,
     pub(crate) key: Key,
     pub(crate) particles: Particles,
-    fluid: Fluid,
+    fluid: FluidSolver,
 }
 
 impl Simulation {
-    pub(crate) fn new(parameters: &FlameParticlesParameters, design: Design, key: Key) -> Self {
+    pub(crate) fn new(parameters: &FlameParticlesParameters, constants: DerivedConstants, key: Key) -> Self {
         Self {
-            laws: Laws::from(&parameters.life),
+            combustion: CombustionModel::from(&parameters.life),
             turbulence: Turbulence::new(key),
             particles: Particles::new(parameters.position.into()),
-            fluid: Fluid::new(&parameters.fluid, &design),
+            fluid: FluidSolver::new(&parameters.fluid, &constants),
             parameters: parameters.clone(),
-            design,
+            constants,
             key,
         }
     }
@@ -53,42 +53,50 @@ impl Simulation {
 
     /// Steps from `time` to one step later.
     ///
-    /// The gas moves in sub-steps. What is slow beside sound takes the whole step at once, at its beginning: evening out, mixing, burning
+    /// The gas moves in sub-steps. What is slow beside sound takes the step_seconds step at once, at its beginning: evening out, mixing, burning
     /// and cooling, and how the wind and the axes change.
-    pub(crate) fn step(&mut self, time: f64, around: &Surroundings) {
-        let Self { design, laws, parameters, turbulence, key, particles, fluid } = self;
-        let setting = Setting { parameters, design, turbulence, key: *key };
-        let mut weather = Weather::new(setting, particles, around, time);
-        let whole = parameters.step_s as f32;
-        let parts = fluid.sub_steps(particles, whole);
-        let (part_s, radius) = (parameters.step_s / f64::from(parts), fluid.support_radius());
-        let births = Births { design, turbulence, key: *key, afterlife_s: parameters.life.afterlife_s };
-        for part in 0..parts {
-            let (t, seconds) = (time + part_s * f64::from(part), part_s as f32);
-            fluid.press(particles, seconds);
-            if part == 0 {
-                fluid.look(particles);
-                let evening = [parameters.fluid.viscosity, parameters.fluid.conduction].map(|share| share as f32);
-                let (beside, afterlife) = (&fluid.beside, parameters.life.afterlife_s as f32);
-                let living = Living { laws, weather: &weather, beside, evening, afterlife, radius, seconds: whole };
-                living.pass(particles, &mut fluid.to_air);
+    pub(crate) fn step(&mut self, time: f64, surroundings: &Surroundings) {
+        let Self { constants, combustion, parameters, turbulence, key, particles, fluid } = self;
+        let step = StepConstants { parameters, constants, turbulence, key: *key };
+        let mut forces = ExternalForces::new(step, particles, surroundings, time);
+        let step_seconds = parameters.step_s as f32;
+        let substeps = fluid.substep_count(particles, step_seconds);
+        let (substep_s, radius) = (parameters.step_s / f64::from(substeps), fluid.support_radius());
+        let spawner = Spawner { constants, turbulence, key: *key, afterlife_s: parameters.life.afterlife_s };
+        for substep in 0..substeps {
+            let (t, seconds) = (time + substep_s * f64::from(substep), substep_s as f32);
+            fluid.compute_pressure_forces(particles, seconds);
+            if substep == 0 {
+                fluid.sum_over_neighbors(particles);
+                let smoothing = [parameters.fluid.viscosity, parameters.fluid.conduction].map(|share| share as f32);
+                let (neighbor_sums, afterlife) = (&fluid.neighbor_sums, parameters.life.afterlife_s as f32);
+                let combustion_step = CombustionStep {
+                    combustion,
+                    forces: &forces,
+                    neighbor_sums,
+                    smoothing,
+                    afterlife,
+                    radius,
+                    seconds: step_seconds,
+                };
+                combustion_step.update_thermochemistry(particles, &mut fluid.air_exposure);
             } else {
-                weather.pass(t);
+                forces.advance_vortex_rings(t);
             }
-            let (acceleration, to_air) = (fluid.acceleration.each_ref().map(Vec::as_slice), &fluid.to_air);
-            Motion { weather: &weather, acceleration, to_air, radius, seconds }.advance(particles);
-            births.add(particles, t, part_s);
+            let (acceleration, air_exposure) = (fluid.acceleration.each_ref().map(Vec::as_slice), &fluid.air_exposure);
+            IntegrationStep { forces: &forces, acceleration, air_exposure, radius, seconds }.advance(particles);
+            spawner.add(particles, t, substep_s);
         }
-        self.bury();
+        self.remove_expired();
     }
 
     /// Removes what has lived its time or left the domain, and whatever is not a number.
-    fn bury(&mut self) {
-        let [min, max] = self.design.domain.map(|corner| corner.as_vec3());
+    fn remove_expired(&mut self) {
+        let [min, max] = self.constants.domain.map(|corner| corner.as_vec3());
         let Particles { position, velocity, temperature, age, life, .. } = &self.particles;
         let keep: Vec<bool> = (0..age.len())
             .into_par_iter()
-            .with_min_len(PARTICLES_OF_TASK)
+            .with_min_len(PARTICLES_PER_TASK)
             .map(|index| {
                 let place = Vec3::from(position.each_ref().map(|values| values[index]));
                 let speed = Vec3::from(velocity.each_ref().map(|values| values[index])).length_squared();

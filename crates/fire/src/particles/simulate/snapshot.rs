@@ -2,13 +2,13 @@
 
 use bansho_base::phenomenon::SnapshotError;
 
-use super::particles::{NUMBERS, Particles};
+use super::particles::{FLOAT_COLUMNS, Particles};
 
 const VERSION: u32 = 2;
 /// Larger than any place, speed, temperature or other number of a simulated particle, and small enough to be reckoned with.
 const LARGEST: f32 = 1e12;
 /// Bytes of one particle: number of birth, burner, and all numbers.
-const PARTICLE: usize = 8 + 4 + 4 * NUMBERS;
+const PARTICLE: usize = 8 + 4 + 4 * FLOAT_COLUMNS;
 
 /// The particles' state; their origin belongs to the parameters.
 pub(crate) fn write(particles: &Particles) -> Vec<u8> {
@@ -17,7 +17,7 @@ pub(crate) fn write(particles: &Particles) -> Vec<u8> {
     bytes.extend((particles.len() as u64).to_le_bytes());
     bytes.extend(particles.birth.iter().flat_map(|birth| birth.to_le_bytes()));
     bytes.extend(particles.burner.iter().flat_map(|burner| burner.to_le_bytes()));
-    for values in particles.numbers() {
+    for values in particles.float_columns() {
         bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
     }
     bytes
@@ -35,18 +35,18 @@ pub(crate) fn read(particles: &Particles, bytes: &[u8], burners: usize) -> Resul
     if count.checked_mul(PARTICLE) != Some(rest.len()) {
         return Err(SnapshotError::Damaged);
     }
-    let (births, rest) = rest.split_at(8 * count);
+    let (spawner, rest) = rest.split_at(8 * count);
     let (numbers_of_burners, mut rest) = rest.split_at(4 * count);
     let mut read = Particles::new(particles.origin);
-    read.birth = births.as_chunks().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
+    read.birth = spawner.as_chunks().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
     read.burner = numbers_of_burners.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
-    for values in read.numbers_mut() {
+    for values in read.float_columns_mut() {
         let (head, tail) = rest.split_at(4 * count);
         *values = head.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
         rest = tail;
     }
     let known = read.burner.iter().all(|burner| (*burner as usize) < burners);
     // Of what is not a number the comparison is false.
-    let possible = read.numbers().iter().all(|values| values.iter().all(|value| value.abs() <= LARGEST));
+    let possible = read.float_columns().iter().all(|values| values.iter().all(|value| value.abs() <= LARGEST));
     if known && possible { Ok(read) } else { Err(SnapshotError::Damaged) }
 }

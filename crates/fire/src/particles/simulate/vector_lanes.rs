@@ -16,7 +16,7 @@ pub(crate) fn length<R: Real>(vector: &[R; 3]) -> R {
 
 /// Difference of two vectors.
 #[inline(always)]
-pub(crate) fn less<R: Real>(one: &[R; 3], other: &[R; 3]) -> [R; 3] {
+pub(crate) fn subtract<R: Real>(one: &[R; 3], other: &[R; 3]) -> [R; 3] {
     let mut difference = *one;
     for c in 0..3 {
         difference[c] = one[c] - other[c];
@@ -26,7 +26,7 @@ pub(crate) fn less<R: Real>(one: &[R; 3], other: &[R; 3]) -> [R; 3] {
 
 /// `one + other * factor`.
 #[inline(always)]
-pub(crate) fn plus<R: Real>(one: &[R; 3], other: &[R; 3], factor: R) -> [R; 3] {
+pub(crate) fn add_scaled<R: Real>(one: &[R; 3], other: &[R; 3], factor: R) -> [R; 3] {
     let mut sum = *one;
     for c in 0..3 {
         sum[c] = other[c].fma(factor, one[c]);
@@ -36,7 +36,7 @@ pub(crate) fn plus<R: Real>(one: &[R; 3], other: &[R; 3], factor: R) -> [R; 3] {
 
 /// The vector, or where it is longer than `most` one of that length.
 #[inline(always)]
-pub(crate) fn held_to<R: Real>(vector: &[R; 3], most: f32) -> [R; 3] {
+pub(crate) fn clamp_length<R: Real>(vector: &[R; 3], most: f32) -> [R; 3] {
     let like = |value: f32| vector[0].broadcast(value);
     let squared = dot(vector, vector).simd_max(like(f32::MIN_POSITIVE));
     let share = (squared.simd_rsqrt() * like(most)).simd_min(like(1.0));
@@ -53,9 +53,9 @@ mod tests {
 
     #[test]
     fn long_vectors_are_shortened_and_others_stay() {
-        assert_eq!(held_to(&[1.0, -2.0, 2.0], 3.1), [1.0, -2.0, 2.0]);
-        assert_eq!(held_to(&[0.0; 3], 1.0), [0.0; 3]);
-        let held = held_to(&[10.0, -20.0, 20.0], 3.0);
+        assert_eq!(clamp_length(&[1.0, -2.0, 2.0], 3.1), [1.0, -2.0, 2.0]);
+        assert_eq!(clamp_length(&[0.0; 3], 1.0), [0.0; 3]);
+        let held = clamp_length(&[10.0, -20.0, 20.0], 3.0);
         assert!((length(&held) - 3.0).abs() < 1e-5 && (held[1] + 2.0).abs() < 1e-5, "{held:?}");
     }
 }

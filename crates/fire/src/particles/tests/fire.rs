@@ -105,21 +105,21 @@ fn gas_is_born_where_a_moving_burner_is_and_stays_behind_it() {
     let mut moved = fire(60.0, 0.3);
     moved.burners[0].position = Animated::keyed(across, Interpolation::Linear).unwrap();
     let mut simulation = simulation(&moved);
-    let mut births = 0;
+    let mut spawner = 0;
     World::default().run(&mut simulation, 1.0, |simulation, t| {
         let burner = (4.0 * t - 3.0).clamp(-1.0, 1.0) as f32;
         let particles = &simulation.particles;
         let newborn = (0..particles.len()).filter(|index| particles.age[*index] <= 2.01 * simulation.step_s() as f32);
         for index in newborn {
-            births += 1;
+            spawner += 1;
             let aside = (place(simulation, index).x - burner).abs();
             assert!(aside < 0.3, "born {aside} m from the middle at {t}");
         }
     });
-    assert!(births > 1000);
+    assert!(spawner > 1000);
     let behind = lit(&simulation).iter().map(|index| place(&simulation, *index).x).fold(f32::INFINITY, f32::min);
     assert!(behind < 0.5, "what it left burns on where it was left: {behind}");
-    let [low, high] = simulation.design.domain;
+    let [low, high] = simulation.constants.domain;
     assert!(low.x < -2.0 && high.x > 2.0, "there is room at both ends of its way");
 }
 
@@ -138,8 +138,8 @@ fn gas_stands_on_its_burner_after_a_step_of_any_length() {
 
 /// Light that gas of a kind sends, and that times its height.
 fn light_by_height(simulation: &Simulation, of: impl Fn(&Gas, usize) -> f64) -> [f64; 2] {
-    let memory = Memory::default();
-    let gas = gas(simulation, &memory);
+    let scratch = ScratchPool::default();
+    let gas = gas(simulation, &scratch);
     let mut sums = [0.0; 2];
     for index in 0..gas.particles.len() {
         let light = of(&gas, index) * gas.volume(index);
@@ -202,7 +202,7 @@ fn smoke_is_the_soot_that_leaves_the_flame_and_cools_above_it() {
 
 /// Gas that the eye sees as one: groups of lit particles closer than the support radius, as lists of their places.
 fn bodies(simulation: &Simulation) -> Vec<Vec<Vec3>> {
-    let reach = simulation.design.support_radius;
+    let reach = simulation.constants.support_radius;
     let mut left: Vec<Vec3> = lit(simulation).into_iter().map(|index| place(simulation, index)).collect();
     let mut bodies = Vec::new();
     while let Some(first) = left.pop() {

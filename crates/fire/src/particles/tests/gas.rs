@@ -32,15 +32,15 @@ fn quiet() -> FlameParticlesParameters {
     }
 }
 
-fn particle(design: &Design, birth: u64, position: [f32; 3], velocity: [f32; 3]) -> Particle {
+fn particle(constants: &DerivedConstants, birth: u64, position: [f32; 3], velocity: [f32; 3]) -> Particle {
     Particle {
         birth,
         position,
         velocity,
-        mass: design.mass,
-        density: design.rest_density,
+        mass: constants.mass,
+        density: constants.rest_density,
         temperature: 1500.0,
-        support_radius: design.support_radius,
+        support_radius: constants.support_radius,
         age: 0.0,
         life: 1e9,
         fuel: 0.0,
@@ -66,15 +66,15 @@ fn centre(simulation: &Simulation) -> DVec3 {
 #[test]
 fn a_free_cloud_keeps_its_momentum_and_its_centre_goes_straight() {
     let mut simulation = simulation(&quiet());
-    let d = simulation.design.support_radius;
+    let d = simulation.constants.support_radius;
     for birth in 0..400 {
         let words = Key::new(2, "cloud").words(birth, 0, bansho_base::math::random::Purpose(0)).map(uniform);
         let position = [words[0], words[1], words[2]].map(|u| (u - 0.5) * 3.0 * d);
         let velocity = [0.3 + words[3] - words[0], words[1] - words[2], words[0] * words[3] - 0.2];
-        simulation.particles.push(particle(&simulation.design, birth, position, velocity));
+        simulation.particles.push(particle(&simulation.constants, birth, position, velocity));
     }
     let (before, size) = momentum(&simulation);
-    let (start, mean) = (centre(&simulation), before / (400.0 * f64::from(simulation.design.mass)));
+    let (start, mean) = (centre(&simulation), before / (400.0 * f64::from(simulation.constants.mass)));
     World::default().run_steps(&mut simulation, 0, 1000, |simulation, t| {
         let off = (centre(simulation) - start - mean * t).length();
         assert!(off < 1e-5 * (1.0 + mean.length() * t), "centre {off} m off its line after {t} s");
@@ -89,14 +89,14 @@ fn a_lattice_at_rest_stays_at_rest() {
     parameters.fluid.support = 2.6;
     parameters.fluid.rest_density = 1.0;
     let mut simulation = simulation(&parameters);
-    let spacing = simulation.design.support_radius / 2.6;
+    let spacing = simulation.constants.support_radius / 2.6;
     let start = |birth: u64| [birth % 9, birth / 9 % 9, birth / 81].map(|step| step as f32 * spacing);
     for birth in 0..729 {
-        simulation.particles.push(particle(&simulation.design, birth, start(birth), [0.0; 3]));
+        simulation.particles.push(particle(&simulation.constants, birth, start(birth), [0.0; 3]));
     }
     World::default().run_steps(&mut simulation, 0, 1000, |_, _| {});
     for index in 0..729 {
-        let moved = (place(&simulation, index) - Vec3::from(start(simulation.particles.births()[index]))).length();
+        let moved = (place(&simulation, index) - Vec3::from(start(simulation.particles.spawner()[index]))).length();
         assert!(moved < 1e-3 * spacing, "moved by {} spacings", moved / spacing);
     }
 }
@@ -106,11 +106,11 @@ fn eddies_at_a_wall_give_the_gas_no_speed_of_its_own() {
     let mut parameters = quiet();
     parameters.motion = MotionParameters { turbulence: 2.0, wind: WindForce::PerVolume, ..parameters.motion };
     let mut simulation = simulation(&parameters);
-    let d = simulation.design.support_radius;
+    let d = simulation.constants.support_radius;
     for birth in 0..100 {
         // Too far from each other to meet.
         let position = [3.0 * d * (birth % 10) as f32, 0.5 * d, 3.0 * d * (birth / 10) as f32];
-        simulation.particles.push(particle(&simulation.design, birth, position, [0.3, -1.0, 0.2]));
+        simulation.particles.push(particle(&simulation.constants, birth, position, [0.3, -1.0, 0.2]));
     }
     let floor = Occluder::HalfSpace { point: DVec3::ZERO, normal: DVec3::Y };
     World { occluders: vec![floor], ..World::default() }.run_steps(&mut simulation, 0, 300, |simulation, _| {
@@ -131,20 +131,20 @@ fn a_lattice_has_its_density_and_its_middle_rests_until_sound_arrives() {
     // Under pressure everywhere: what rests is pushed alike from all sides.
     parameters.fluid.rest_density = 0.9;
     let mut simulation = simulation(&parameters);
-    let spacing = simulation.design.support_radius / 2.6;
+    let spacing = simulation.constants.support_radius / 2.6;
     let (side, steps) = (20_u64, 8);
     let start = |birth: u64| [birth % side, birth / side % side, birth / (side * side)].map(|step| step as f32);
     for birth in 0..side * side * side {
         let position = start(birth).map(|step| step * spacing);
-        simulation.particles.push(particle(&simulation.design, birth, position, [0.0; 3]));
+        simulation.particles.push(particle(&simulation.constants, birth, position, [0.0; 3]));
     }
-    let expected = simulation.design.mass / (spacing * spacing * spacing);
+    let expected = simulation.constants.mass / (spacing * spacing * spacing);
     World::default().run_steps(&mut simulation, 0, steps, |_, _| {});
-    let sound = (simulation.design.stiffness_per_kelvin * 1500.0).sqrt() / spacing;
+    let sound = (simulation.constants.stiffness_per_kelvin * 1500.0).sqrt() / spacing;
     let reached = sound * steps as f32 * simulation.step_s() as f32 + 2.6;
     let (mut resting, mut given_way) = (0, 0.0_f32);
     for index in 0..simulation.particles.len() {
-        let start = Vec3::from(start(simulation.particles.births()[index]));
+        let start = Vec3::from(start(simulation.particles.spawner()[index]));
         let moved = (place(&simulation, index) / spacing - start).length();
         let depth = start.min(Vec3::splat((side - 1) as f32) - start).min_element();
         let density = simulation.particles.densities()[index];
@@ -188,7 +188,7 @@ fn one_particle_falls_and_rises_as_buoyancy_says() {
         let mut parameters = quiet();
         parameters.motion.buoyancy = 1.0;
         let mut simulation = simulation(&parameters);
-        let mut single = particle(&simulation.design, 0, [0.0; 3], [0.0; 3]);
+        let mut single = particle(&simulation.constants, 0, [0.0; 3], [0.0; 3]);
         single.temperature = (share * Air::default().temperature_k) as f32;
         simulation.particles.push(single);
         World::default().run_steps(&mut simulation, 0, 60, |simulation, t| {

@@ -2,4 +2,4 @@
 
 pub(crate) mod clock;
 pub(crate) mod fluctuation;
-pub(crate) mod moment;
+pub(crate) mod warp;

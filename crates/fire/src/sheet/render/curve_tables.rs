@@ -16,37 +16,37 @@ pub(crate) struct CurvePair {
 }
 
 /// Pieces of a table and the places in them.
-pub(crate) struct Located<S: Simd> {
+pub(crate) struct TableIndex<S: Simd> {
     piece: u32x16<S>,
     part: Lanes<S>,
 }
 
 /// Where sixteen places lie in any table; they are held to [0, 1].
 #[inline(always)]
-pub(crate) fn locate<S: Simd>(x: Lanes<S>) -> Located<S> {
+pub(crate) fn table_index<S: Simd>(x: Lanes<S>) -> TableIndex<S> {
     let place = x.simd_max(x.broadcast(0.0)).simd_min(x.broadcast(LAST)) * x.broadcast(SEGMENTS as f32);
     let (piece, part) = wrap_split(place, SEGMENTS as u32 - 1);
-    Located { piece, part }
+    TableIndex { piece, part }
 }
 
 /// Where sixteen places lie that are often all the same, as the heights of a level row of pixels: then one look-up serves.
-pub(crate) enum Near<S: Simd> {
+pub(crate) enum TableLookup<S: Simd> {
     /// All at one place.
-    Same(f32, Lanes<S>),
+    Uniform(f32, Lanes<S>),
     /// Each at its own.
-    Apart(Located<S>),
+    PerLane(TableIndex<S>),
 }
 
 /// Whether sixteen places are the same in any table, and where they lie.
 #[inline(always)]
-pub(crate) fn locate_near<S: Simd>(x: Lanes<S>) -> Near<S> {
+pub(crate) fn lookup_index<S: Simd>(x: Lanes<S>) -> TableLookup<S> {
     /// Spread within which one look-up serves all: a twentieth of a piece.
     const STEADY: f32 = 0.05 / SEGMENTS as f32;
     let first = x.broadcast(x[0]);
     if any_positive((x - first).simd_abs() - x.broadcast(STEADY)) {
-        Near::Apart(locate(x))
+        TableLookup::PerLane(table_index(x))
     } else {
-        Near::Same(x[0], first)
+        TableLookup::Uniform(x[0], first)
     }
 }
 
@@ -74,7 +74,7 @@ impl CurvePair {
 
     /// Both functions at located places.
     #[inline(always)]
-    pub(crate) fn fetch<S: Simd>(&self, at: &Located<S>) -> [Lanes<S>; 2] {
+    pub(crate) fn fetch<S: Simd>(&self, at: &TableIndex<S>) -> [Lanes<S>; 2] {
         let [first, first_rise, second, second_rise] = fetch(at.part.simd, &self.pieces, at.piece);
         [first_rise.fma(at.part, first), second_rise.fma(at.part, second)]
     }
@@ -82,20 +82,20 @@ impl CurvePair {
     /// Both functions at sixteen places.
     #[inline(always)]
     pub(crate) fn sample<S: Simd>(&self, x: Lanes<S>) -> [Lanes<S>; 2] {
-        self.fetch(&locate(x))
+        self.fetch(&table_index(x))
     }
 
     /// Both functions at places that are often all the same.
     #[inline(always)]
-    pub(crate) fn near<S: Simd>(&self, at: &Near<S>) -> [Lanes<S>; 2] {
+    pub(crate) fn lookup<S: Simd>(&self, at: &TableLookup<S>) -> [Lanes<S>; 2] {
         match at {
-            Near::Same(x, lanes) => self.at(*x).map(|value| lanes.broadcast(value)),
-            Near::Apart(located) => self.fetch_apart(located),
+            TableLookup::Uniform(x, lanes) => self.at(*x).map(|value| lanes.broadcast(value)),
+            TableLookup::PerLane(located) => self.fetch_per_lane(located),
         }
     }
 
     /// [`fetch`](Self::fetch), out of line.
-    fn fetch_apart<S: Simd>(&self, at: &Located<S>) -> [Lanes<S>; 2] {
+    fn fetch_per_lane<S: Simd>(&self, at: &TableIndex<S>) -> [Lanes<S>; 2] {
         at.part.simd.vectorize(
             #[inline(always)]
             || self.fetch(at),
@@ -134,8 +134,8 @@ mod tests {
             let batch =
                 bansho_base::dispatch_baseline!(simd => table.sample(Lanes::splat(simd, x)).map(|values| values[7]));
             assert!((batch[0] - line).abs() < 1e-6 && (batch[1] - parabola).abs() < 1e-6);
-            let near = bansho_base::dispatch_baseline!(simd => table.near(&locate_near(ramp(simd, x, 1e-5))).map(|values| values[11]));
-            assert!((near[0] - line).abs() < 2e-4 && (near[1] - parabola).abs() < 4e-4, "{near:?}");
+            let lookup = bansho_base::dispatch_baseline!(simd => table.lookup(&lookup_index(ramp(simd, x, 1e-5))).map(|values| values[11]));
+            assert!((lookup[0] - line).abs() < 2e-4 && (lookup[1] - parabola).abs() < 4e-4, "{lookup:?}");
         }
     }
 }

@@ -15,26 +15,26 @@ use bansho_base::{
 };
 
 use super::{
-    projection::{Mapping, bounds},
-    shade::{Drawn, Sample, State},
+    projection::{PixelToSheet, bounds},
+    shade::{SheetContent, SheetState, TimeSample},
 };
 use crate::sheet::{
     FlameSheet,
-    animate::moment::{Moment, Motion, Push},
-    parameters::{Facing, Instance, StageShown},
+    animate::warp::{FlameWaves, WarpState, WindLean},
+    parameters::{Facing, Instance, Stage},
     texture::{FRACTAL, FractalLayers, PaperLayer, Texture, TextureTable},
 };
 
 /// Where a flame's texture comes from.
 #[derive(Clone, Debug)]
-pub(crate) enum Source {
+pub(crate) enum TextureSource {
     /// The layers of this flame on the common table.
     Fractal(FractalLayers),
     /// The paper's table, common to the sheet's flames.
     Paper(Arc<PaperLayer>),
 }
 
-impl Source {
+impl TextureSource {
     /// Texels of the table in a sheet's height.
     fn texels_up(&self) -> f64 {
         match self {
@@ -46,14 +46,14 @@ impl Source {
 
 /// One flame among the instances of a sheet.
 #[derive(Clone, Debug)]
-pub(crate) struct Flame {
-    pub(crate) place: Instance,
+pub(crate) struct FlameInstance {
+    pub(crate) placement: Instance,
     pub(crate) key: Key,
-    pub(crate) motion: Motion,
-    pub(crate) source: Source,
+    pub(crate) waves: FlameWaves,
+    pub(crate) texture_source: TextureSource,
 }
 
-impl Source {
+impl TextureSource {
     /// T0 after `scroll` sheet heights, at full resolution.
     pub(crate) fn texture(&self, scroll: f64) -> Texture {
         match self {
@@ -63,29 +63,31 @@ impl Source {
     }
 
     /// The same with its table filtered for a sheet `height_pixels` tall.
-    pub(crate) fn filtered(&self, height_pixels: f64) -> FilteredSource {
+    pub(crate) fn filtered(&self, height_pixels: f64) -> FilteredTexture {
         let level = math::log2(self.texels_up() / height_pixels.max(1.0)) as f32;
         match self {
-            Self::Fractal(layers) if level > 0.0 => FilteredSource::Fractal(*layers, Arc::new(FRACTAL.filtered(level))),
-            Self::Fractal(layers) => FilteredSource::Fractal(*layers, FRACTAL.clone()),
-            Self::Paper(layer) if level > 0.0 => FilteredSource::Paper(Arc::new(layer.filtered(level))),
-            Self::Paper(layer) => FilteredSource::Paper(layer.clone()),
+            Self::Fractal(layers) if level > 0.0 => {
+                FilteredTexture::Fractal(*layers, Arc::new(FRACTAL.filtered(level)))
+            }
+            Self::Fractal(layers) => FilteredTexture::Fractal(*layers, FRACTAL.clone()),
+            Self::Paper(layer) if level > 0.0 => FilteredTexture::Paper(Arc::new(layer.filtered(level))),
+            Self::Paper(layer) => FilteredTexture::Paper(layer.clone()),
         }
     }
 }
 
 /// A flame's texture at the resolution of one frame.
-pub(crate) enum FilteredSource {
+pub(crate) enum FilteredTexture {
     /// Layers and their table.
     Fractal(FractalLayers, Arc<TextureTable>),
     /// The paper's texture.
     Paper(Arc<PaperLayer>),
 }
 
-impl FilteredSource {
+impl FilteredTexture {
     /// Fractal layers for a sheet `height_pixels` tall.
     pub(crate) fn fractal(layers: FractalLayers, height_pixels: f64) -> Self {
-        Source::Fractal(layers).filtered(height_pixels)
+        TextureSource::Fractal(layers).filtered(height_pixels)
     }
 
     /// T0 after `scroll` sheet heights.
@@ -99,49 +101,55 @@ impl FilteredSource {
 
 impl FlameSheet {
     /// Middle of a flame's base at time `t`, m.
-    pub(crate) fn base(&self, flame: &Flame, t: f64) -> DVec3 {
-        DVec3::from(self.parameters.position.at(self.clock.time(t))) + DVec3::from(flame.place.position)
+    pub(crate) fn base(&self, flame: &FlameInstance, t: f64) -> DVec3 {
+        DVec3::from(self.parameters.position.at(self.clock.time(t))) + DVec3::from(flame.placement.position)
     }
 
     /// A flame's own time.
-    pub(crate) fn flame_time(&self, flame: &Flame, t: f64) -> f64 {
-        t + self.parameters.phase_s + flame.place.phase_s
+    pub(crate) fn flame_time(&self, flame: &FlameInstance, t: f64) -> f64 {
+        t + self.parameters.phase_s + flame.placement.phase_s
     }
 
     /// Width and height of a flame's sheet, m.
-    pub(crate) fn sheet_size(&self, flame: &Flame) -> DVec2 {
-        DVec2::new(self.parameters.width, self.parameters.height) * flame.place.scale
+    pub(crate) fn sheet_size(&self, flame: &FlameInstance) -> DVec2 {
+        DVec2::new(self.parameters.width, self.parameters.height) * flame.placement.scale
     }
 
     /// Mean speed of the rising gas, m/s.
-    pub(crate) fn rise_speed(&self, flame: &Flame, t: f64) -> f64 {
+    pub(crate) fn rise_speed(&self, flame: &FlameInstance, t: f64) -> f64 {
         // Over a height the texture passes in 1/s seconds, wherever the acceleration puts it.
         self.clock.speed(t) * self.sheet_size(flame).y
     }
 
     /// Level direction across a flame's sheet.
-    pub(crate) fn right(&self, flame: &Flame, camera: &Camera, base: DVec3) -> DVec3 {
+    pub(crate) fn right(&self, flame: &FlameInstance, camera: &Camera, base: DVec3) -> DVec3 {
         match self.parameters.facing {
             Facing::Camera => right_facing(camera, base),
             Facing::Fixed => {
-                let (sin, cos) = math::sin_cos((self.parameters.turn_deg + flame.place.turn_deg).to_radians());
+                let (sin, cos) = math::sin_cos((self.parameters.turn_deg + flame.placement.turn_deg).to_radians());
                 DVec3::new(cos, 0.0, -sin)
             }
         }
     }
 
     /// A flame at time `t`, its sheet turned to `right`: how the wind pushes it, its stand and its moment.
-    pub(crate) fn settle(&self, flame: &Flame, right: DVec3, wind: &Wind, t: f64) -> (UprightQuad, Moment) {
+    pub(crate) fn evaluate_at(
+        &self,
+        flame: &FlameInstance,
+        right: DVec3,
+        wind: &Wind,
+        t: f64,
+    ) -> (UprightQuad, WarpState) {
         let (base, size) = (self.base(flame, t), self.sheet_size(flame));
         let middle = base + DVec3::Y * (0.5 * size.y);
-        let push = Push::new(wind, middle, t, right, self.rise_speed(flame, t), self.parameters.wind_response);
-        let stand = UprightQuad::new(base, right, size, push.toward);
+        let push = WindLean::new(wind, middle, t, right, self.rise_speed(flame, t), self.parameters.wind_response);
+        let quad = UprightQuad::new(base, right, size, push.toward);
         let time = self.flame_time(flame, t);
-        (stand, Moment::new(&self.parameters, self.shape(), &flame.motion, &self.clock, time, push))
+        (quad, WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, push))
     }
 
     /// Moments that stand for the exposure: enough that the gas scrolls a few pixels from one to the next.
-    pub(crate) fn time_samples(&self, flame: &Flame, shutter: Shutter, pixels_per_metre: f64) -> usize {
+    pub(crate) fn time_samples(&self, flame: &FlameInstance, shutter: Shutter, pixels_per_metre: f64) -> usize {
         const PIXELS_APART: f64 = 8.0;
         const MOST: f64 = 8.0;
         match self.parameters.time_samples {
@@ -154,41 +162,41 @@ impl FlameSheet {
     }
 
     /// What of the chain is drawn.
-    pub(crate) fn drawn(&self) -> Drawn {
+    pub(crate) fn content(&self) -> SheetContent {
         match self.parameters.stage {
-            StageShown::Flame => Drawn::Flame,
-            StageShown::Texture => Drawn::FlatTexture,
-            StageShown::Thresholded | StageShown::Sharpened | StageShown::Coloured => Drawn::FlatCut,
+            Stage::Flame => SheetContent::Flame,
+            Stage::Texture => SheetContent::FlatTexture,
+            Stage::Thresholded | Stage::Sharpened | Stage::Coloured => SheetContent::FlatThresholded,
         }
     }
 
     /// A flame's samples over the exposure and the pixels they may touch.
     pub(crate) fn samples(
         &self,
-        flame: &Flame,
-        source: &FilteredSource,
+        flame: &FlameInstance,
+        texture_source: &FilteredTexture,
         view: &View,
         wind: &Wind,
         count: usize,
-    ) -> (Vec<Sample>, Rect) {
+    ) -> (Vec<TimeSample>, Rect) {
         let mut samples = Vec::with_capacity(count);
         let mut rect = Rect::default();
         for index in 0..count {
             let t = view.shutter.instant(index, count);
             let camera = if count == 1 { view.camera } else { view.camera_at(t) };
             let right = self.right(flame, &camera, self.base(flame, t));
-            let (stand, moment) = self.settle(flame, right, wind, t);
-            let Some(mapping) = Mapping::new(&camera, &stand) else { continue };
-            let [low, high] = moment.centre_range;
-            rect = rect.union(&bounds(&camera, &stand, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size));
-            let pixels_per_metre = pixels_per_metre(&camera, &stand);
-            let state = State {
-                texture: source.texture(moment.scroll),
-                pixel: [2.0 / (pixels_per_metre * stand.size.x) as f32, 1.0 / (pixels_per_metre * stand.size.y) as f32],
-                moment,
+            let (quad, warp) = self.evaluate_at(flame, right, wind, t);
+            let Some(pixel_to_sheet) = PixelToSheet::new(&camera, &quad) else { continue };
+            let [low, high] = warp.centre_range;
+            rect = rect.union(&bounds(&camera, &quad, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size));
+            let pixels_per_metre = pixels_per_metre(&camera, &quad);
+            let state = SheetState {
+                texture: texture_source.texture(warp.scroll),
+                pixel: [2.0 / (pixels_per_metre * quad.size.x) as f32, 1.0 / (pixels_per_metre * quad.size.y) as f32],
+                warp,
             };
             let luminance = self.luminance_at(t) as f32 / count as f32;
-            samples.push(Sample { mapping, stand, state, luminance, smoke: None });
+            samples.push(TimeSample { pixel_to_sheet, quad, state, luminance, smoke: None });
         }
         (samples, rect)
     }
@@ -200,7 +208,7 @@ impl FlameSheet {
 }
 
 /// Pixels that a metre of the sheet covers, at its middle.
-pub(crate) fn pixels_per_metre(camera: &Camera, stand: &UprightQuad) -> f64 {
-    let depth = camera.depth(stand.point(0.5, 0.5)).abs().max(camera.near);
+pub(crate) fn pixels_per_metre(camera: &Camera, quad: &UprightQuad) -> f64 {
+    let depth = camera.depth(quad.point(0.5, 0.5)).abs().max(camera.near);
     camera.focal_pixels / depth
 }

@@ -9,7 +9,7 @@ use bansho_base::{
 use super::{curve_tables::CurvePair, shape_tables::from_origin};
 use crate::{
     blue_flame,
-    sheet::parameters::{ColourParameters, Colouring, StageShown, TextureParameters},
+    sheet::parameters::{ColorParameters, Coloring, Stage, TextureParameters},
 };
 
 use fearless_simd::Simd;
@@ -19,7 +19,7 @@ const LEVELS: usize = 4096;
 
 /// Light and soot over T1.
 #[derive(Clone, Debug)]
-pub(crate) struct Ramp {
+pub(crate) struct ColorRamp {
     /// Red, green, blue (ACEScg, the brightest of luminance 1) and opacity over T1, the nearest of many.
     light: Box<[[f32; 4]; LEVELS]>,
     /// Soot temperature in K over T1.
@@ -31,24 +31,24 @@ pub(crate) struct Ramp {
 }
 
 /// Soot temperature at T2.
-pub(crate) fn temperature(colour: &ColourParameters, t2: f64) -> f64 {
+pub(crate) fn temperature(colour: &ColorParameters, t2: f64) -> f64 {
     math::lerp(colour.edge_temperature_k, colour.core_temperature_k, t2)
 }
 
 /// Share of the light behind that soot of the optical depth of T2 takes, and at the same time its emissivity.
-fn opacity(colour: &ColourParameters, t2: f64) -> f64 {
+fn opacity(colour: &ColorParameters, t2: f64) -> f64 {
     -math::exp_m1(-colour.soot_optical_depth * t2)
 }
 
 /// ACEScg of T2 before it is scaled.
-fn hue(colour: &ColourParameters, t2: f64) -> [f64; 3] {
+fn unscaled_color(colour: &ColorParameters, t2: f64) -> [f64; 3] {
     match colour.kind {
-        Colouring::BlackBody => {
+        Coloring::BlackBody => {
             // Thin soot shines in proportion to its depth; none at all still has the colour of the thinnest.
             let emissivity = if colour.soot_optical_depth > 1e-6 { opacity(colour, t2) } else { t2 };
             color::black_body().radiance(temperature(colour, t2) as f32).map(|value| f64::from(value) * emissivity)
         }
-        Colouring::Paper => {
+        Coloring::Paper => {
             let display =
                 [&colour.red, &colour.green, &colour.blue].map(|curve| color::decode_srgb(curve.eval(t2) as f32));
             color::acescg_from_srgb(display).map(f64::from)
@@ -57,11 +57,11 @@ fn hue(colour: &ColourParameters, t2: f64) -> [f64; 3] {
 }
 
 /// What of the chain is shown at T2, T1 and T0 when it is not the light.
-fn gray(stage: StageShown, t1: f64, t2: f64) -> f64 {
-    if stage == StageShown::Sharpened { t2 } else { t1 }
+fn gray(stage: Stage, t1: f64, t2: f64) -> f64 {
+    if stage == Stage::Sharpened { t2 } else { t1 }
 }
 
-impl Ramp {
+impl ColorRamp {
     /// Whether there is a table for these parameters.
     ///
     /// # Errors
@@ -71,20 +71,20 @@ impl Ramp {
     }
 
     /// The table for these parameters, which were [checked](Self::check).
-    pub(crate) fn new(texture: &TextureParameters, colour: &ColourParameters, stage: StageShown) -> Self {
+    pub(crate) fn new(texture: &TextureParameters, colour: &ColorParameters, stage: Stage) -> Self {
         let sharpen = from_origin(&texture.sharpen, "texture.sharpen").unwrap_or_else(|_| texture.sharpen.clone());
         let luminance = |rgb: [f64; 3]| f64::from(color::luminance(rgb.map(|value| value as f32)));
-        let brightest = (0..=256).map(|i| luminance(hue(colour, f64::from(i) / 256.0))).fold(0.0, f64::max);
+        let brightest = (0..=256).map(|i| luminance(unscaled_color(colour, f64::from(i) / 256.0))).fold(0.0, f64::max);
         let scale = if brightest > 0.0 { 1.0 / brightest } else { 0.0 };
         let light = |t1: f64| {
             let t2 = sharpen.eval(t1);
             match stage {
-                StageShown::Flame => {
-                    let [r, g, b] = hue(colour, t2).map(|value| value * scale);
+                Stage::Flame => {
+                    let [r, g, b] = unscaled_color(colour, t2).map(|value| value * scale);
                     [r, g, b, opacity(colour, t2)]
                 }
-                StageShown::Coloured => {
-                    let [r, g, b] = hue(colour, t2).map(|value| value * scale);
+                Stage::Coloured => {
+                    let [r, g, b] = unscaled_color(colour, t2).map(|value| value * scale);
                     [r, g, b, 1.0]
                 }
                 _ => [gray(stage, t1, t2), gray(stage, t1, t2), gray(stage, t1, t2), 1.0],
@@ -93,7 +93,7 @@ impl Ramp {
         Self {
             light: levels(light),
             temperature: CurvePair::new(|t1| [temperature(colour, sharpen.eval(t1)), 0.0]),
-            absorbs: colour.soot_optical_depth > 0.0 || stage != StageShown::Flame,
+            absorbs: colour.soot_optical_depth > 0.0 || stage != Stage::Flame,
             base_blue: blue_flame::colour().map(|value| value * colour.base_blue as f32),
         }
     }
@@ -107,7 +107,7 @@ fn levels(light: impl Fn(f64) -> [f64; 4]) -> Box<[[f32; 4]; LEVELS]> {
     levels
 }
 
-impl Ramp {
+impl ColorRamp {
     /// Red, green, blue of luminance up to 1 and opacity at T1.
     #[inline(always)]
     pub(crate) fn light<S: Simd>(&self, t1: Lanes<S>) -> [Lanes<S>; 4] {

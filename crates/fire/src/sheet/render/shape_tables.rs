@@ -10,10 +10,10 @@ use bansho_base::{
     parameters::parameter_fault::{FaultKind, ParameterFault},
 };
 
-use super::curve_tables::{CurvePair, locate_near};
+use super::curve_tables::{CurvePair, lookup_index};
 use crate::sheet::{
     equations,
-    parameters::{ColourParameters, Colouring, ShapeParameters, TextureParameters},
+    parameters::{ColorParameters, Coloring, ShapeParameters, TextureParameters},
 };
 
 use fearless_simd::{Simd, prelude::*};
@@ -23,14 +23,14 @@ const REACH_BINS: usize = 128;
 
 /// Curves of eqs. (4) to (12) as tables.
 #[derive(Clone, Debug)]
-pub(crate) struct Shape {
+pub(crate) struct ShapeTables {
     initial_speed: f32,
     edge_speed: f32,
     contrast: f32,
     /// A and D over w.
     widths: CurvePair,
     /// F over the place in the fringe.
-    falling: CurvePair,
+    falloff: CurvePair,
     /// H over u'.
     across: CurvePair,
     /// V and the glow over w.
@@ -80,7 +80,7 @@ fn samples(first: &Curve, second: &Curve) -> Vec<[f32; 2]> {
 
 /// Where sixteen points lie in the flame.
 #[derive(Clone, Copy)]
-pub(crate) struct Place<S: Simd> {
+pub(crate) struct FlameCoordinates<S: Simd> {
     /// Texture coordinate u.
     pub(crate) u: Lanes<S>,
     /// Height w of the slowed rise.
@@ -92,18 +92,18 @@ pub(crate) struct Place<S: Simd> {
     /// Share of red light that cooling leaves, and of green beside red.
     pub(crate) cooling: [Lanes<S>; 2],
     /// Distance within the fluttering edge, pixels; negative outside.
-    side: Lanes<S>,
+    edge_distance_pixels: Lanes<S>,
     /// Height above the base, pixels.
-    above: Lanes<S>,
+    base_distance_pixels: Lanes<S>,
 }
 
-impl<S: Simd> Place<S> {
+impl<S: Simd> FlameCoordinates<S> {
     /// Share of the pixels that lies inside; 0 outside.
     #[inline(always)]
     pub(crate) fn coverage(&self, pixel: [f32; 2]) -> Lanes<S> {
         let (half, one) = (self.w.broadcast(0.5), self.w.broadcast(1.0));
         let top = (one - self.w).fma(one.broadcast(1.0 / pixel[1]), half).simd_clamp01();
-        (self.side + half).simd_clamp01() * (self.above + half).simd_clamp01() * top
+        (self.edge_distance_pixels + half).simd_clamp01() * (self.base_distance_pixels + half).simd_clamp01() * top
     }
 
     /// The most texels from one of sixteen pixels of a row to the next where there may be flame; there are so many to a unit of u and of w.
@@ -115,7 +115,10 @@ impl<S: Simd> Place<S> {
             (Lanes::from_slice(values.simd, &row[1..]) - values).simd_abs()
         };
         let (one, zero) = (self.w.broadcast(1.0), self.w.broadcast(0.0));
-        let inside = (self.side + one).simd_min(self.above + one).simd_min(one - self.w).simd_min(one - self.threshold);
+        let inside = (self.edge_distance_pixels + one)
+            .simd_min(self.base_distance_pixels + one)
+            .simd_min(one - self.w)
+            .simd_min(one - self.threshold);
         let across = step(self.u) * self.u.broadcast(texels[0]);
         let span = zero.select_lt(inside, step(self.w).fma(self.u.broadcast(texels[1]), across), zero);
         let mut each = [0.0; LANES];
@@ -125,31 +128,31 @@ impl<S: Simd> Place<S> {
 
     /// Moved by `part` of a change.
     #[inline(always)]
-    pub(crate) fn moved(&self, part: f32, change: &Self) -> Self {
-        self.with(change, |value, change| change.fma(value.broadcast(part), value))
+    pub(crate) fn add_scaled(&self, part: f32, change: &Self) -> Self {
+        self.zip_with(change, |value, change| change.fma(value.broadcast(part), value))
     }
 
     /// The change from `other` to this place.
     #[inline(always)]
-    pub(crate) fn less(&self, other: &Self) -> Self {
-        self.with(other, |value, other| value - other)
+    pub(crate) fn difference(&self, other: &Self) -> Self {
+        self.zip_with(other, |value, other| value - other)
     }
 
     #[inline(always)]
-    fn with(&self, other: &Self, join: impl Fn(Lanes<S>, Lanes<S>) -> Lanes<S>) -> Self {
+    fn zip_with(&self, other: &Self, join: impl Fn(Lanes<S>, Lanes<S>) -> Lanes<S>) -> Self {
         Self {
             u: join(self.u, other.u),
             w: join(self.w, other.w),
             threshold: join(self.threshold, other.threshold),
             glow: join(self.glow, other.glow),
             cooling: [join(self.cooling[0], other.cooling[0]), join(self.cooling[1], other.cooling[1])],
-            side: join(self.side, other.side),
-            above: join(self.above, other.above),
+            edge_distance_pixels: join(self.edge_distance_pixels, other.edge_distance_pixels),
+            base_distance_pixels: join(self.base_distance_pixels, other.base_distance_pixels),
         }
     }
 }
 
-impl Shape {
+impl ShapeTables {
     /// Whether there are tables for these curves.
     ///
     /// # Errors
@@ -160,7 +163,7 @@ impl Shape {
     }
 
     /// Tables for these curves, which were [checked](Self::check).
-    pub(crate) fn new(shape: &ShapeParameters, texture: &TextureParameters, colour: &ColourParameters) -> Self {
+    pub(crate) fn new(shape: &ShapeParameters, texture: &TextureParameters, colour: &ColorParameters) -> Self {
         let fringe = from_origin(&shape.fringe_width, "shape.fringe_width");
         let fringe = fringe.unwrap_or_else(|_| shape.fringe_width.clone());
         let width_samples = samples(&shape.core_width, &fringe);
@@ -169,14 +172,14 @@ impl Shape {
             edge_speed: shape.edge_speed as f32,
             contrast: texture.contrast as f32,
             widths: CurvePair::from_samples(|i| width_samples[i]),
-            falling: CurvePair::new(|place| [1.0 - shape.slowing.eval(place), 0.0]),
+            falloff: CurvePair::new(|coordinates| [1.0 - shape.slowing.eval(coordinates), 0.0]),
             across: CurvePair::new(|across| [texture.threshold_across.eval(across), 0.0]),
             heights: CurvePair::new(|w| [texture.threshold.eval(w), colour.glow.eval(w)]),
-            cooling: CurvePair::new(|w| cooled(colour, w)),
+            cooling: CurvePair::new(|w| cooling_factors(colour, w)),
             width_samples,
             reach: Box::new([1.0; REACH_BINS]),
         };
-        result.reach = result.find_reach();
+        result.reach = result.compute_reach();
         result
     }
 
@@ -193,12 +196,12 @@ impl Shape {
     #[inline(always)]
     fn slowed_rise<S: Simd>(&self, distance: Lanes<S>, y: Lanes<S>) -> Lanes<S> {
         let rise = equations::rise(y, self.initial_speed);
-        let [core, fringe] = self.widths.near(&locate_near(rise));
+        let [core, fringe] = self.widths.lookup(&lookup_index(rise));
         if !any_positive(distance - core) {
             return rise;
         }
-        let [falling, _] = self.falling.near(&locate_near(equations::fringe_place(distance, core, fringe)));
-        equations::slowed_rise(rise, equations::speed_profile(falling, self.edge_speed))
+        let [falloff, _] = self.falloff.lookup(&lookup_index(equations::fringe_position(distance, core, fringe)));
+        equations::slowed_rise(rise, equations::speed_profile(falloff, self.edge_speed))
     }
 
     /// The gas T0 of the texture at the artist's contrast; still within [0, 1].
@@ -211,34 +214,40 @@ impl Shape {
     pub(crate) fn slowed_rise_at(&self, distance: f32, y: f32) -> f32 {
         let rise = equations::rise(y, self.initial_speed);
         let [core, fringe] = self.widths.at(rise);
-        let [falling, _] = self.falling.at(equations::fringe_place(distance, core, fringe));
-        equations::slowed_rise(rise, equations::speed_profile(falling, self.edge_speed))
+        let [falloff, _] = self.falloff.at(equations::fringe_position(distance, core, fringe));
+        equations::slowed_rise(rise, equations::speed_profile(falloff, self.edge_speed))
     }
 
     /// The whole mapping, eqs. (9) to (18), and the threshold, eq. (4), for points of the unit square.
     ///
     /// `pixel` is the size of a pixel in x' and in y, over which edges are softened.
     #[inline(always)]
-    pub(crate) fn place<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>, edges: &CurvePair, pixel: [f32; 2]) -> Place<S> {
+    pub(crate) fn coordinates<S: Simd>(
+        &self,
+        x: Lanes<S>,
+        y: Lanes<S>,
+        edges: &CurvePair,
+        pixel: [f32; 2],
+    ) -> FlameCoordinates<S> {
         let distance = equations::axis_distance(x);
         let w = self.slowed_rise(distance, y.simd_clamp01());
-        let at = locate_near(w);
+        let at = lookup_index(w);
         let ([left, right], [vertical, glow], cooling) =
-            (edges.near(&at), self.heights.near(&at), self.cooling.near(&at));
+            (edges.lookup(&at), self.heights.lookup(&at), self.cooling.lookup(&at));
         let (half, one) = (x.broadcast(0.5), x.broadcast(1.0));
         let edge = x.select_lt(half, left, right);
-        let side = (edge - distance) * x.broadcast(1.0 / pixel[0]);
+        let edge_distance_pixels = (edge - distance) * x.broadcast(1.0 / pixel[0]);
         let across = equations::across(distance, edge).simd_min(one);
-        let [horizontal, _] = self.across.near(&locate_near(across));
+        let [horizontal, _] = self.across.lookup(&lookup_index(across));
         let threshold = equations::threshold(vertical, horizontal);
-        Place {
+        FlameCoordinates {
             u: equations::texture_u(across, x),
             w,
             threshold,
             glow,
             cooling,
-            side,
-            above: y * x.broadcast(1.0 / pixel[1]),
+            edge_distance_pixels,
+            base_distance_pixels: y * x.broadcast(1.0 / pixel[1]),
         }
     }
 
@@ -252,7 +261,7 @@ impl Shape {
 
     /// Whether no point of a piece of the picture can lie in the flame, of which points around its rim are given; x from the centre line.
     #[inline(always)]
-    pub(crate) fn out_of_reach(&self, x: &[f32; 6], y: &[f32; 6]) -> bool {
+    pub(crate) fn misses_flame(&self, x: &[f32; 6], y: &[f32; 6]) -> bool {
         let range = |values: &[f32; 6]| {
             values[1..].iter().fold([values[0]; 2], |[low, high], value| [value.simd_min(low), value.simd_max(high)])
         };
@@ -270,10 +279,10 @@ impl Shape {
     }
 
     /// For each piece of height the greatest x' with w <= 1 and within the fringe, with a margin for soft edges.
-    fn find_reach(&self) -> Box<[f32; REACH_BINS]> {
+    fn compute_reach(&self) -> Box<[f32; REACH_BINS]> {
         const STEPS: usize = 256;
         const MARGIN: f32 = 0.03;
-        let widest_above = self.widest_above();
+        let max_width_above = self.max_width_above();
         let mut reach = Box::new([0.0_f32; REACH_BINS]);
         for edge in 0..=REACH_BINS {
             let y = (edge as f32 / (REACH_BINS - 1) as f32).min(1.0);
@@ -281,8 +290,8 @@ impl Shape {
             for step in 1..=STEPS {
                 let distance = step as f32 / STEPS as f32;
                 let w = self.slowed_rise_at(distance, y);
-                let row = ((w * (widest_above.len() - 1) as f32) as usize).min(widest_above.len() - 1);
-                if w <= 1.05 && distance <= widest_above[row] + MARGIN {
+                let row = ((w * (max_width_above.len() - 1) as f32) as usize).min(max_width_above.len() - 1);
+                if w <= 1.05 && distance <= max_width_above[row] + MARGIN {
                     far = far.max(distance + MARGIN);
                 }
             }
@@ -294,7 +303,7 @@ impl Shape {
     }
 
     /// Greatest A + D at each sampled height or above it.
-    fn widest_above(&self) -> Vec<f32> {
+    fn max_width_above(&self) -> Vec<f32> {
         let mut widest: Vec<f32> = self.width_samples.iter().map(|[core, fringe]| core + fringe).collect();
         for i in (0..widest.len() - 1).rev() {
             widest[i] = widest[i].max(widest[i + 1]);
@@ -307,10 +316,10 @@ impl Shape {
 ///
 /// Wien's law: a share d of the temperature costs a factor exp(-c2 d / (lambda T)); here for 610 and 540 nm at 1700 K. Blue, at
 /// 460 nm, loses what green loses beside red, to the power 2.5.
-fn cooled(colour: &ColourParameters, w: f64) -> [f64; 2] {
+fn cooling_factors(colour: &ColorParameters, w: f64) -> [f64; 2] {
     const RED: f64 = 13.87;
     const GREEN: f64 = 15.67;
-    if colour.kind == Colouring::Paper {
+    if colour.kind == Coloring::Paper {
         return [1.0, 1.0];
     }
     let share = colour.cooling * w;

@@ -14,7 +14,7 @@ use bansho_base::{
     },
 };
 
-use super::{COLUMNS, Layer, ROWS, Texture, TextureTable};
+use super::{COLUMNS, ROWS, Texture, TextureLayer, TextureTable};
 use crate::sheet::animate::clock::Clock;
 
 /// Lattice cells of the first octave across and up the table; 32 and 64 texels wide.
@@ -77,20 +77,20 @@ fn octaves(count: usize, gain: f32, key: Key, name: Purpose) -> Texels {
 /// Noise whose coordinates are displaced by other noise: gas that was stirred.
 fn warped_noise() -> Texels {
     /// Greatest displacement across and up, texels, at a noise value of 1.
-    const STIR: [f32; 2] = [34.0, 60.0];
+    const WARP_TEXELS: [f32; 2] = [34.0, 60.0];
     let key = Key::new(1985, "flame sheet fractal");
     let gas = TextureTable::new(&octaves(4, 0.5, key, Purpose::named("gas")));
     let across = octaves(2, 0.5, key, Purpose::named("stir across"));
     let up = octaves(2, 0.5, key, Purpose::named("stir up"));
     let place = |i: usize| {
-        let column = STIR[0].fma(across[i], (i % COLUMNS) as f32);
-        gas.bilinear(column, STIR[1].fma(up[i], (i / COLUMNS) as f32))
+        let column = WARP_TEXELS[0].fma(across[i], (i % COLUMNS) as f32);
+        gas.bilinear(column, WARP_TEXELS[1].fma(up[i], (i / COLUMNS) as f32))
     };
-    spread_evenly((0..ROWS * COLUMNS).map(place).collect())
+    equalize_histogram((0..ROWS * COLUMNS).map(place).collect())
 }
 
 /// Replaces each value by its rank in [0, 1]: no value is more frequent than another, the paper's one wish for the texture.
-fn spread_evenly(texels: Texels) -> Texels {
+fn equalize_histogram(texels: Texels) -> Texels {
     const BINS: usize = 4096;
     let low = texels.iter().copied().fold(f32::INFINITY, f32::min);
     let high = texels.iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -111,7 +111,7 @@ fn spread_evenly(texels: Texels) -> Texels {
 
 /// Mean of two evenly distributed numbers, distributed evenly again: the distribution of the sum is a triangle.
 #[inline(always)]
-pub(super) fn mix_evenly<N: Real>(a: N, b: N) -> N {
+pub(super) fn mix_equalized<N: Real>(a: N, b: N) -> N {
     let (sum, one) = (a + b, a.broadcast(1.0));
     let low = sum.simd_min(a.broadcast(2.0) - sum);
     let rank = a.broadcast(0.5) * low * low;
@@ -120,7 +120,7 @@ pub(super) fn mix_evenly<N: Real>(a: N, b: N) -> N {
 
 /// How one layer crosses the table.
 #[derive(Clone, Copy, Debug)]
-struct Crossing {
+struct LayerMapping {
     /// Table widths across the sheet.
     widths: f64,
     /// Table widths that it moves aslant in a sheet height.
@@ -136,7 +136,7 @@ struct Crossing {
 /// The layers of one flame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FractalLayers {
-    crossings: [Crossing; 2],
+    mappings: [LayerMapping; 2],
 }
 
 impl FractalLayers {
@@ -144,43 +144,41 @@ impl FractalLayers {
     /// `key` says.
     pub(crate) fn new([width, length]: [f64; 2], speed: f64, key: Key, clock: &Clock) -> Self {
         let start = key.uniforms(0, 0, Purpose::named("fractal layers")).map(f64::from);
-        let coarse = Crossing { widths: 0.37, slant: 0.061_8, heights: 0.243, rate: 1.0, start: [start[0], start[1]] };
-        let fine = Crossing { widths: -0.71, slant: -0.104_7, heights: 0.419, rate: 1.21, start: [start[2], start[3]] };
-        let fit = |crossing: Crossing| {
-            let heights = crossing.heights / length;
+        let coarse =
+            LayerMapping { widths: 0.37, slant: 0.061_8, heights: 0.243, rate: 1.0, start: [start[0], start[1]] };
+        let fine =
+            LayerMapping { widths: -0.71, slant: -0.104_7, heights: 0.419, rate: 1.21, start: [start[2], start[3]] };
+        let fit = |mapping: LayerMapping| {
+            let heights = mapping.heights / length;
             // Wave numbers of what scrolls by at the layer's own rate, moved to where they close a loop.
-            let pace = crossing.rate * speed.max(1e-3);
+            let pace = mapping.rate * speed.max(1e-3);
             let closed = clock.waves(heights * pace, 1.0) / (heights * pace);
             let stretch = closed.clamp(0.8, 1.25);
             let rate = pace * closed / stretch;
-            let slant = clock.waves(crossing.slant * rate, 0.0) / rate;
-            Crossing { widths: crossing.widths / width, slant, heights: heights * stretch, rate, ..crossing }
+            let slant = clock.waves(mapping.slant * rate, 0.0) / rate;
+            LayerMapping { widths: mapping.widths / width, slant, heights: heights * stretch, rate, ..mapping }
         };
-        Self { crossings: [fit(coarse), fit(fine)] }
+        Self { mappings: [fit(coarse), fit(fine)] }
     }
 
     /// The texture scrolled by `scroll` sheet heights; `table` is [`FRACTAL`] or a filtered copy of it.
     pub(crate) fn at(&self, table: &Arc<TextureTable>, scroll: f64) -> Texture {
-        let layer = |crossing: &Crossing| {
-            let scroll = crossing.rate * scroll;
-            let column = math::reduce_phase(crossing.start[0] - crossing.slant * scroll);
-            let row = math::reduce_phase(crossing.start[1] - crossing.heights * scroll);
+        let layer = |mapping: &LayerMapping| {
+            let scroll = mapping.rate * scroll;
+            let column = math::reduce_phase(mapping.start[0] - mapping.slant * scroll);
+            let row = math::reduce_phase(mapping.start[1] - mapping.heights * scroll);
             let (columns, rows) = (COLUMNS as f64, ROWS as f64);
-            Layer {
-                columns: [
-                    (columns * crossing.widths) as f32,
-                    (columns * crossing.slant) as f32,
-                    columns as f32 * column,
-                ],
-                rows: [(rows * crossing.heights) as f32, rows as f32 * row],
+            TextureLayer {
+                columns: [(columns * mapping.widths) as f32, (columns * mapping.slant) as f32, columns as f32 * column],
+                rows: [(rows * mapping.heights) as f32, rows as f32 * row],
             }
         };
-        Texture::Mixed(table.clone(), [layer(&self.crossings[0]), layer(&self.crossings[1])])
+        Texture::Mixed(table.clone(), [layer(&self.mappings[0]), layer(&self.mappings[1])])
     }
 
     /// Texels of the table in a sheet's height, of the finer layer.
     pub(crate) fn texels_up(&self) -> f64 {
-        ROWS as f64 * self.crossings[1].heights
+        ROWS as f64 * self.mappings[1].heights
     }
 }
 

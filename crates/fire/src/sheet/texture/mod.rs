@@ -19,7 +19,7 @@ pub(crate) const COLUMNS: usize = 256;
 /// Rows of a table, along q.
 pub(crate) const ROWS: usize = 512;
 /// The coarsest level of a table.
-pub(crate) const COARSEST: usize = 5;
+pub(crate) const MAX_LEVEL: usize = 5;
 
 /// A periodic texture of [`ROWS`] x [`COLUMNS`] texels.
 ///
@@ -28,7 +28,7 @@ pub(crate) const COARSEST: usize = 5;
 pub(crate) struct TextureTable {
     corners: Box<[[f32; 4]; ROWS * COLUMNS]>,
     /// Texels of ever coarser tables, made when they are needed.
-    coarser: [OnceLock<Box<[f32]>>; COARSEST],
+    coarser: [OnceLock<Box<[f32]>>; MAX_LEVEL],
 }
 
 impl TextureTable {
@@ -72,10 +72,10 @@ impl TextureTable {
         (high - low).fma(up, low)
     }
 
-    /// A table a factor 2 coarser for each whole `level`, up to [`COARSEST`], blended between, still of the same size: for small sheets.
+    /// A table a factor 2 coarser for each whole `level`, up to [`MAX_LEVEL`], blended between, still of the same size: for small sheets.
     pub(crate) fn filtered(&self, level: f32) -> Self {
-        let level = level.clamp(0.0, COARSEST as f32);
-        let whole = (level as usize).min(COARSEST - 1);
+        let level = level.clamp(0.0, MAX_LEVEL as f32);
+        let whole = (level as usize).min(MAX_LEVEL - 1);
         let mut texels = self.coarse(whole).to_vec();
         smooth(&mut texels, 1 << whole, level - whole as f32);
         Self::new(&texels)
@@ -129,14 +129,14 @@ fn blend(row: &[f32], [next, last]: [&[f32]; 2], amount: f32, smooth: &mut [f32]
 
 /// How texture coordinates (u, w) become columns and rows of the table at one moment.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Layer {
+pub(crate) struct TextureLayer {
     /// Columns a unit of u, then of w, and where they begin.
     pub(crate) columns: [f32; 3],
     /// Rows a unit of w, and where they begin.
     pub(crate) rows: [f32; 2],
 }
 
-impl Layer {
+impl TextureLayer {
     /// Looks up the layer at sixteen places.
     #[inline(always)]
     fn sample<S: Simd>(&self, table: &TextureTable, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
@@ -150,9 +150,9 @@ impl Layer {
 #[derive(Clone, Debug)]
 pub(crate) enum Texture {
     /// The table as it is.
-    Single(Arc<TextureTable>, Layer),
+    Single(Arc<TextureTable>, TextureLayer),
     /// Two layers, both evenly distributed over [0, 1], mixed so that their mixture is again.
-    Mixed(Arc<TextureTable>, [Layer; 2]),
+    Mixed(Arc<TextureTable>, [TextureLayer; 2]),
 }
 
 impl Texture {
@@ -169,7 +169,7 @@ impl Texture {
         match self {
             Self::Single(table, layer) => layer.sample(table, u, w),
             Self::Mixed(table, [coarse, fine]) => {
-                fractal::mix_evenly(coarse.sample(table, u, w), fine.sample(table, u, w))
+                fractal::mix_equalized(coarse.sample(table, u, w), fine.sample(table, u, w))
             }
         }
     }

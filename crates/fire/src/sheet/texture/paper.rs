@@ -7,19 +7,19 @@ use std::{
 
 use bansho_base::math::{self, MulAdd};
 
-use super::{COLUMNS, Layer, ROWS, Texture, TextureTable};
+use super::{COLUMNS, ROWS, Texture, TextureLayer, TextureTable};
 use crate::sheet::animate::clock::Clock;
 
 /// `Fx_0` of eq. (20), radians a unit of p.
-const FIRST_ACROSS: f64 = 16.0;
+const FIRST_FREQUENCY_P: f64 = 16.0;
 /// `Fy_0` of eq. (20), radians a unit of q.
-const FIRST_UP: f64 = 26.0;
+const FIRST_FREQUENCY_Q: f64 = 26.0;
 /// `C_{i+1} / C_i` of eq. (20).
 const AMPLITUDE_RATIO: f64 = 0.707;
 /// Period in p: that of `sin(Fx_0 x / 2)`.
-const PERIOD_ACROSS: f64 = PI / 4.0;
+const PERIOD_P: f64 = PI / 4.0;
 /// Period in q: that of `sin(Fy_0 y / 2)`.
-const PERIOD_UP: f64 = 2.0 * PI / 13.0;
+const PERIOD_Q: f64 = 2.0 * PI / 13.0;
 
 /// T(p, q) of eq. (20) with `octaves` terms, halved so that it lies in [0, 1] as eq. (2) demands.
 pub fn paper_texture(p: f64, q: f64, octaves: u32) -> f64 {
@@ -43,7 +43,7 @@ struct Octave {
 
 impl Octave {
     fn all(octaves: u32) -> impl Iterator<Item = Self> {
-        let first = Self { across: FIRST_ACROSS, up: FIRST_UP, weight: 1.0 };
+        let first = Self { across: FIRST_FREQUENCY_P, up: FIRST_FREQUENCY_Q, weight: 1.0 };
         let next = |octave: &Self| {
             let weight = octave.weight * AMPLITUDE_RATIO * AMPLITUDE_RATIO;
             Some(Self { across: 2.0 * octave.across, up: 2.0 * octave.up, weight })
@@ -123,22 +123,22 @@ pub(crate) struct PaperLayer {
 impl PaperLayer {
     /// The table of `octaves` terms.
     pub(crate) fn new(octaves: u32, clock: &Clock) -> Self {
-        let p: Vec<f64> = (0..COLUMNS).map(|i| PERIOD_ACROSS * i as f64 / COLUMNS as f64).collect();
-        let q: Vec<f64> = (0..ROWS).map(|i| PERIOD_UP * i as f64 / ROWS as f64).collect();
+        let p: Vec<f64> = (0..COLUMNS).map(|i| PERIOD_P * i as f64 / COLUMNS as f64).collect();
+        let q: Vec<f64> = (0..ROWS).map(|i| PERIOD_Q * i as f64 / ROWS as f64).collect();
         let texture = PaperTexture::new(&p, &q, octaves);
         let mut texels = vec![0.0; ROWS * COLUMNS];
         let level = fearless_simd::Level::new();
         fearless_simd::dispatch!(level, _simd => fill(&texture, &mut texels));
-        Self { table: Arc::new(TextureTable::new(&texels)), waves: clock.waves(1.0 / PERIOD_UP, 1.0) * PERIOD_UP }
+        Self { table: Arc::new(TextureTable::new(&texels)), waves: clock.waves(1.0 / PERIOD_Q, 1.0) * PERIOD_Q }
     }
 
     /// The texture scrolled by `scroll` sheet heights, eq. (1).
     pub(crate) fn at(&self, scroll: f64) -> Texture {
-        let columns = (COLUMNS as f64 / PERIOD_ACROSS) as f32;
-        let rows = ROWS as f64 / PERIOD_UP;
+        let columns = (COLUMNS as f64 / PERIOD_P) as f32;
+        let rows = ROWS as f64 / PERIOD_Q;
         // `waves` is 1 unless a loop needs the scroll to be a whole number of periods.
-        let offset = math::reduce_phase(-self.waves * scroll / PERIOD_UP) * ROWS as f32;
-        Texture::Single(self.table.clone(), Layer { columns: [columns, 0.0, 0.0], rows: [rows as f32, offset] })
+        let offset = math::reduce_phase(-self.waves * scroll / PERIOD_Q) * ROWS as f32;
+        Texture::Single(self.table.clone(), TextureLayer { columns: [columns, 0.0, 0.0], rows: [rows as f32, offset] })
     }
 
     /// The same with the table filtered to `level`.
@@ -148,7 +148,7 @@ impl PaperLayer {
 
     /// Texels of the table in a sheet's height.
     pub(crate) fn texels_up(&self) -> f64 {
-        ROWS as f64 / PERIOD_UP
+        ROWS as f64 / PERIOD_Q
     }
 }
 
@@ -185,7 +185,7 @@ mod tests {
             let (p, q) = (f64::from(i) * 0.00137, f64::from(i) * 0.00791);
             let value = paper_texture(p, q, 5);
             assert!((0.0..=1.0).contains(&value));
-            assert!((paper_texture(p + PERIOD_ACROSS, q + PERIOD_UP, 5) - value).abs() < 1e-9);
+            assert!((paper_texture(p + PERIOD_P, q + PERIOD_Q, 5) - value).abs() < 1e-9);
         }
     }
 

@@ -6,7 +6,7 @@ use bansho_base::{
     phenomenon::strip::View,
 };
 
-use super::sprite::{Ellipse, FAR_OUT, FOOTPRINT, Kind, Seen};
+use super::sprite::{Ellipse, MAX_PIXEL_COORDINATE, PIXEL_FOOTPRINT, ProjectedParticle, SpriteKind};
 use crate::particles::render::{
     gas::Gas,
     splat::kernel::{LINE_PEAK, VARIANCE},
@@ -15,37 +15,37 @@ use crate::particles::render::{
 type Batch = [f32; LANES];
 
 /// A perspective camera now and at the next frame.
-pub(crate) struct Perspective {
-    now: Pinhole,
-    next: Pinhole,
+pub(crate) struct PerspectiveProjector {
+    now: PinholeCamera,
+    next: PinholeCamera,
     /// Shutter time beside the time from frame to frame.
-    open_share: f32,
+    shutter_fraction: f32,
     size: [f32; 2],
 }
 
 /// Particles in the picture.
-struct Projected {
+struct ProjectedBatch {
     pixel: [Batch; 2],
     depth: Batch,
     /// Pixels a metre.
     scale: Batch,
 }
 
-impl Perspective {
+impl PerspectiveProjector {
     /// `None` where the lens bends straight lines.
-    pub(crate) fn new(gas: &Gas, view: &View, next: &Camera, open_share: f64) -> Option<Self> {
-        let pinhole = |camera, t| Pinhole::new(camera, gas.particles.origin, t - gas.time);
+    pub(crate) fn new(gas: &Gas, view: &View, next: &Camera, shutter_fraction: f64) -> Option<Self> {
+        let pinhole = |camera, t| PinholeCamera::new(camera, gas.particles.origin, t - gas.time);
         (view.camera.lens == Lens::Perspective).then(|| Self {
             now: pinhole(&view.camera, view.shutter.middle()),
             next: pinhole(next, view.next_middle),
-            open_share: open_share as f32,
+            shutter_fraction: shutter_fraction as f32,
             size: view.camera.size.map(|side| side as f32),
         })
     }
 
     /// Records the particles of `range` that are wanted and can be seen.
     #[inline(always)]
-    pub(crate) fn see<K: Kind>(
+    pub(crate) fn project<K: SpriteKind>(
         &self,
         gas: &Gas,
         range: std::ops::Range<usize>,
@@ -54,23 +54,23 @@ impl Perspective {
     ) {
         let (mut chosen, mut count) = ([range.start; LANES], 0);
         for index in range {
-            if !kind.wants(index) {
+            if !kind.includes(index) {
                 continue;
             }
             chosen[count] = index;
             count += 1;
             if count == LANES {
-                self.see_batch(gas, &chosen, kind, records);
+                self.project_batch(gas, &chosen, kind, records);
                 count = 0;
             }
         }
         if count > 0 {
-            self.see_batch(gas, &chosen[..count], kind, records);
+            self.project_batch(gas, &chosen[..count], kind, records);
         }
     }
 
     #[inline(always)]
-    fn see_batch<K: Kind>(&self, gas: &Gas, chosen: &[usize], kind: &K, records: &mut Vec<K::Record>) {
+    fn project_batch<K: SpriteKind>(&self, gas: &Gas, chosen: &[usize], kind: &K, records: &mut Vec<K::Record>) {
         let (now, next) = (self.now.project(gas, chosen), self.next.project(gas, chosen));
         let mut motion = [[0.0; LANES]; 2];
         for axis in 0..2 {
@@ -86,12 +86,12 @@ impl Perspective {
             let mut shown = now.depth[lane] >= self.now.near && ellipses.peak[lane] > 0.0;
             for axis in 0..2 {
                 shown &= centre[axis] + reach[axis] > 0.0 && centre[axis] - reach[axis] < self.size[axis];
-                shown &= centre[axis].abs() < FAR_OUT as f32;
+                shown &= centre[axis].abs() < MAX_PIXEL_COORDINATE as f32;
             }
             if shown {
                 let shape = [ellipses.shape[0][lane], ellipses.shape[1][lane], ellipses.shape[2][lane]];
                 let (radius, peak) = (ellipses.radius[lane], ellipses.peak[lane]);
-                records.push(kind.record(&Seen {
+                records.push(kind.record(&ProjectedParticle {
                     index,
                     ellipse: Ellipse { centre, shape, reach, radius, peak },
                     depth: f64::from(now.depth[lane]),
@@ -104,18 +104,18 @@ impl Perspective {
 
     /// Circles, smeared along their motion: the matrix `q + k b b^T`, b being the smear, has the eigenvalue q across it.
     #[inline(always)]
-    fn ellipses(&self, gas: &Gas, chosen: &[usize], now: &Projected, motion: &[Batch; 2]) -> Ellipses {
+    fn ellipses(&self, gas: &Gas, chosen: &[usize], now: &ProjectedBatch, motion: &[Batch; 2]) -> EllipseBatch {
         const SMEAR: f32 = (1.0 / (12.0 * VARIANCE)) as f32;
         let zero = [0.0; LANES];
         let mut radii = zero;
         for (radius, &index) in radii.iter_mut().zip(chosen) {
             *radius = gas.particles.support_radius[index];
         }
-        let mut ellipses = Ellipses { shape: [zero; 3], reach: [zero; 2], radius: zero, peak: zero };
+        let mut ellipses = EllipseBatch { shape: [zero; 3], reach: [zero; 2], radius: zero, peak: zero };
         for lane in 0..LANES {
             let ball = now.scale[lane] * radii[lane];
-            let across = ball.mul_add(ball, (FOOTPRINT / VARIANCE) as f32);
-            let (x, y) = (motion[0][lane] * self.open_share, motion[1][lane] * self.open_share);
+            let across = ball.mul_add(ball, (PIXEL_FOOTPRINT / VARIANCE) as f32);
+            let (x, y) = (motion[0][lane] * self.shutter_fraction, motion[1][lane] * self.shutter_fraction);
             let (xx, yy) = ((SMEAR * x).mul_add(x, across), (SMEAR * y).mul_add(y, across));
             let determinant = across * (across + SMEAR * x.mul_add(x, y * y));
             let inverse = 1.0 / determinant;
@@ -126,16 +126,16 @@ impl Perspective {
             ellipses.reach[1][lane] = yy.sqrt();
             ellipses.radius[lane] = across.sqrt();
             // Only the part of a ball before the camera is seen.
-            let before = ((now.depth[lane] - self.now.near) / radii[lane]).clamp(0.0, 1.0);
-            let before = before * before * (3.0 - 2.0 * before);
-            let peak = LINE_PEAK as f32 * before * now.scale[lane] * now.scale[lane] / determinant.sqrt();
+            let in_front = ((now.depth[lane] - self.now.near) / radii[lane]).clamp(0.0, 1.0);
+            let in_front = in_front * in_front * (3.0 - 2.0 * in_front);
+            let peak = LINE_PEAK as f32 * in_front * now.scale[lane] * now.scale[lane] / determinant.sqrt();
             ellipses.peak[lane] = if determinant < f32::MAX { peak } else { 0.0 };
         }
         ellipses
     }
 }
 
-struct Ellipses {
+struct EllipseBatch {
     shape: [Batch; 3],
     reach: [Batch; 2],
     radius: Batch,
@@ -143,7 +143,7 @@ struct Ellipses {
 }
 
 /// A perspective camera beside the place from which particles count.
-struct Pinhole {
+struct PinholeCamera {
     /// Right, up and backward in the world.
     axes: [[f32; 3]; 3],
     /// The particles' origin in the camera's frame, m.
@@ -155,7 +155,7 @@ struct Pinhole {
     since: f32,
 }
 
-impl Pinhole {
+impl PinholeCamera {
     fn new(camera: &Camera, origin: DVec3, since: f64) -> Self {
         let axis = |i: usize| camera.orientation.col(i).as_vec3().to_array();
         Self {
@@ -169,7 +169,7 @@ impl Pinhole {
     }
 
     #[inline(always)]
-    fn project(&self, gas: &Gas, chosen: &[usize]) -> Projected {
+    fn project(&self, gas: &Gas, chosen: &[usize]) -> ProjectedBatch {
         let mut places = [[0.0; LANES]; 3];
         for axis in 0..3 {
             let (position, velocity) = (&gas.particles.position[axis], &gas.particles.velocity[axis]);
@@ -186,7 +186,7 @@ impl Pinhole {
             }
         }
         let zero = [0.0; LANES];
-        let mut projected = Projected { pixel: [zero; 2], depth: zero, scale: zero };
+        let mut projected = ProjectedBatch { pixel: [zero; 2], depth: zero, scale: zero };
         for lane in 0..LANES {
             let depth = -local[2][lane];
             let scale = self.focal_pixels / depth;

@@ -6,12 +6,12 @@ use bansho_base::{
     phenomenon::strip::View,
 };
 
-use super::perspective::Perspective;
+use super::perspective::PerspectiveProjector;
 use crate::particles::render::{
     gas::Gas,
-    prepared::PARTICLES_OF_TASK,
+    prepared::PARTICLES_PER_TASK,
     splat::{
-        buffers::Recycled,
+        buffers::PooledVec,
         kernel::{LINE_PEAK, VARIANCE},
     },
 };
@@ -35,7 +35,7 @@ pub(crate) struct Ellipse {
 
 /// A particle in the picture.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen {
+pub(crate) struct ProjectedParticle {
     pub(crate) index: usize,
     pub(crate) ellipse: Ellipse,
     pub(crate) depth: f64,
@@ -46,68 +46,72 @@ pub(crate) struct Seen {
 }
 
 /// Sprites further out than this are of no picture, pixels.
-pub(crate) const FAR_OUT: f64 = 1e6;
+pub(crate) const MAX_PIXEL_COORDINATE: f64 = 1e6;
 
 /// A pixel's own footprint as the variance of a sprite: sprites are widened by it, so that the smallest neither flicker nor vanish.
-pub(crate) const FOOTPRINT: f64 = 0.18;
+pub(crate) const PIXEL_FOOTPRINT: f64 = 0.18;
 
 /// Which particles are drawn, and as what.
-pub(crate) trait Kind: Sync {
+pub(crate) trait SpriteKind: Sync {
     type Record: Send + 'static;
-    fn wants(&self, index: usize) -> bool;
-    fn record(&self, seen: &Seen) -> Self::Record;
+    fn includes(&self, index: usize) -> bool;
+    fn record(&self, projected: &ProjectedParticle) -> Self::Record;
 }
 
 /// The records of all particles that a view can see, in their own order, task by task.
-pub(crate) fn seen<'a, K: Kind>(gas: &Gas<'a>, view: &View, kind: &K) -> Vec<Recycled<'a, K::Record>> {
-    let eye = Eye::new(view);
-    let perspective = Perspective::new(gas, view, &eye.next, eye.open_share);
+pub(crate) fn project_particles<'a, K: SpriteKind>(
+    gas: &Gas<'a>,
+    view: &View,
+    kind: &K,
+) -> Vec<PooledVec<'a, K::Record>> {
+    let projector = ParticleProjector::new(view);
+    let perspective = PerspectiveProjector::new(gas, view, &projector.next, projector.shutter_fraction);
     let (count, level) = (gas.particles.len(), Level::new());
     let of_task = |task: usize| {
-        let range = task * PARTICLES_OF_TASK..((task + 1) * PARTICLES_OF_TASK).min(count);
-        let mut records = gas.memory.list(PARTICLES_OF_TASK);
+        let range = task * PARTICLES_PER_TASK..((task + 1) * PARTICLES_PER_TASK).min(count);
+        let mut records = gas.scratch.list(PARTICLES_PER_TASK);
         records.clear();
         match &perspective {
             Some(perspective) => {
-                dispatch!(level, _simd => perspective.see(gas, range.clone(), kind, &mut records));
+                dispatch!(level, _simd => perspective.project(gas, range.clone(), kind, &mut records));
             }
             None => {
-                for index in range.filter(|index| kind.wants(*index)) {
-                    eye.see(gas, index, |seen| records.push(kind.record(&seen)));
+                for index in range.filter(|index| kind.includes(*index)) {
+                    projector.project(gas, index, |projected| records.push(kind.record(&projected)));
                 }
             }
         }
         records
     };
-    (0..count.div_ceil(PARTICLES_OF_TASK)).into_par_iter().map(of_task).collect()
+    (0..count.div_ceil(PARTICLES_PER_TASK)).into_par_iter().map(of_task).collect()
 }
 
 /// The camera now and at the next frame.
-struct Eye<'a> {
+struct ParticleProjector<'a> {
     view: &'a View,
     next: Camera,
     /// Shutter time beside the time from frame to frame.
-    open_share: f64,
+    shutter_fraction: f64,
 }
 
-impl<'a> Eye<'a> {
+impl<'a> ParticleProjector<'a> {
     fn new(view: &'a View) -> Self {
         let frame = (view.next_middle - view.shutter.middle()).max(1e-9);
-        Self { view, next: view.camera_at(view.next_middle), open_share: view.shutter.duration() / frame }
+        Self { view, next: view.camera_at(view.next_middle), shutter_fraction: view.shutter.duration() / frame }
     }
 
     /// Hands a particle to `each`, twice where a panorama's seam cuts it.
     #[inline(always)]
-    fn see(&self, gas: &Gas, index: usize, mut each: impl FnMut(Seen)) {
+    fn project(&self, gas: &Gas, index: usize, mut each: impl FnMut(ProjectedParticle)) {
         let place = gas.place(index, self.view.shutter.middle());
         let camera = &self.view.camera;
         let Some(first) = camera.project(place) else { return };
         let after = self.next.project(gas.place(index, self.view.next_middle));
         let motion = after.map_or(DVec2::ZERO, |after| across_seam(camera, after.pixel - first.pixel));
         let mut at = |projection: Projection| {
-            if let Some(ellipse) = self.ellipse(gas, index, place, &projection, motion * self.open_share) {
+            if let Some(ellipse) = self.ellipse(gas, index, place, &projection, motion * self.shutter_fraction) {
                 let (depth, scale) = (projection.depth, projection.pixels_per_metre as f32);
-                each(Seen { index, ellipse, depth, motion: motion.as_vec2().to_array(), scale });
+                each(ProjectedParticle { index, ellipse, depth, motion: motion.as_vec2().to_array(), scale });
             }
         };
         at(first);
@@ -124,9 +128,10 @@ impl<'a> Eye<'a> {
     fn ellipse(&self, gas: &Gas, index: usize, place: DVec3, projection: &Projection, blur: DVec2) -> Option<Ellipse> {
         let camera = &self.view.camera;
         let radius = f64::from(gas.particles.support_radius[index]);
-        let lens = lens_matrix(camera, place, projection);
+        let lens = lens_jacobian(camera, place, projection);
         let ball = lens * lens.transpose() * (radius * radius);
-        let smear = outer(blur) * (1.0 / (12.0 * VARIANCE)) + DMat2::from_diagonal(DVec2::splat(FOOTPRINT / VARIANCE));
+        let smear =
+            outer(blur) * (1.0 / (12.0 * VARIANCE)) + DMat2::from_diagonal(DVec2::splat(PIXEL_FOOTPRINT / VARIANCE));
         let matrix = ball + smear;
         let (trace, determinant) = (matrix.x_axis.x + matrix.y_axis.y, matrix.determinant());
         if !(determinant > 0.0 && determinant.is_finite()) {
@@ -138,11 +143,11 @@ impl<'a> Eye<'a> {
         let size = DVec2::new(camera.size[0], camera.size[1]);
         let centre = projection.pixel;
         let shown = (centre + reach).cmpgt(DVec2::ZERO).all() && (centre - reach).cmplt(size).all();
-        if !(shown && centre.abs().max_element() < FAR_OUT) {
+        if !(shown && centre.abs().max_element() < MAX_PIXEL_COORDINATE) {
             return None;
         }
-        let before = in_front(projection.depth, camera.near, radius);
-        let peak = LINE_PEAK * before * lens.determinant().abs() / determinant.sqrt();
+        let in_front = in_front(projection.depth, camera.near, radius);
+        let peak = LINE_PEAK * in_front * lens.determinant().abs() / determinant.sqrt();
         (peak > 0.0).then_some(Ellipse {
             centre: centre.as_vec2().to_array(),
             shape: [inverse.x_axis.x, inverse.x_axis.y, inverse.y_axis.y].map(|value| value as f32),
@@ -173,7 +178,7 @@ fn outer(v: DVec2) -> DMat2 {
 
 /// Pixels to the right and down for a metre across the line of sight: alike in all directions for a perspective lens; the others
 /// stretch circles, by how far two short steps from the place come.
-fn lens_matrix(camera: &Camera, place: DVec3, projection: &Projection) -> DMat2 {
+fn lens_jacobian(camera: &Camera, place: DVec3, projection: &Projection) -> DMat2 {
     let round = DMat2::from_diagonal(DVec2::new(projection.pixels_per_metre, -projection.pixels_per_metre));
     if camera.lens == Lens::Perspective {
         return round;
@@ -186,13 +191,13 @@ fn lens_matrix(camera: &Camera, place: DVec3, projection: &Projection) -> DMat2 
         Some(across_seam(camera, seen.pixel - projection.pixel) / step)
     };
     match (moved(one), moved(two)) {
-        (Some(one), Some(two)) => limited(DMat2::from_cols(one, two), projection.pixels_per_metre),
+        (Some(one), Some(two)) => limit_anisotropy(DMat2::from_cols(one, two), projection.pixels_per_metre),
         _ => round,
     }
 }
 
 /// At a panorama's poles circles become bands; beyond this stretch the sprite stays as it is.
-fn limited(matrix: DMat2, scale: f64) -> DMat2 {
+fn limit_anisotropy(matrix: DMat2, scale: f64) -> DMat2 {
     const MOST: f64 = 40.0;
     let longest = matrix.x_axis.length().max(matrix.y_axis.length());
     if longest > MOST * scale { matrix * (MOST * scale / longest) } else { matrix }
@@ -210,20 +215,20 @@ mod tests {
     use super::*;
     use crate::particles::{
         Particle, Particles,
-        render::{gas::Ending, splat::buffers::Memory},
+        render::{gas::FadeOut, splat::buffers::ScratchPool},
     };
 
     struct Everything;
 
-    impl Kind for Everything {
-        type Record = Seen;
+    impl SpriteKind for Everything {
+        type Record = ProjectedParticle;
 
-        fn wants(&self, _index: usize) -> bool {
+        fn includes(&self, _index: usize) -> bool {
             true
         }
 
-        fn record(&self, seen: &Seen) -> Seen {
-            *seen
+        fn record(&self, projected: &ProjectedParticle) -> ProjectedParticle {
+            *projected
         }
     }
 
@@ -263,13 +268,13 @@ mod tests {
             base: DVec3::ZERO,
             size: DVec2::ONE,
             key: Key::new(1, "flame"),
-            ending: Ending::NEVER,
-            memory: &Memory::default(),
+            fade_out: FadeOut::NEVER,
+            scratch: &ScratchPool::default(),
         };
-        let (eye, mut one_by_one) = (Eye::new(&view), Vec::new());
-        (0..particles.len()).for_each(|index| eye.see(&gas, index, |seen| one_by_one.push(seen)));
-        let seen = seen(&gas, &view, &Everything);
-        let together: Vec<Seen> = seen.iter().flat_map(|task| task.iter().copied()).collect();
+        let (projector, mut one_by_one) = (ParticleProjector::new(&view), Vec::new());
+        (0..particles.len()).for_each(|index| projector.project(&gas, index, |projected| one_by_one.push(projected)));
+        let projected = project_particles(&gas, &view, &Everything);
+        let together: Vec<ProjectedParticle> = projected.iter().flat_map(|task| task.iter().copied()).collect();
         assert!(one_by_one.len() > 40 && one_by_one.len() < 300, "{}", one_by_one.len());
         assert_eq!(together.len(), one_by_one.len());
         for (a, b) in together.iter().zip(&one_by_one) {

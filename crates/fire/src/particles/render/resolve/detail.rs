@@ -15,11 +15,11 @@ use crate::particles::{look_parameters::LookParameters, render::gas::Gas};
 /// A sigmoid of slope 1 is the distribution of noise of this standard deviation: pi / sqrt(3).
 const LOGISTIC: f32 = 1.813_799_4;
 /// Optical depth, in particles, beyond which gas burns no more densely: even cores have gaps.
-const FULLEST: f32 = 2.5;
+const MAX_DEPTH_PARTICLES: f32 = 2.5;
 /// Mean number of particles in the line of sight at which half of the place burns.
-const HALF_BURNING: f64 = 0.42;
+const MEAN_PARTICLES_HALF_BURNING: f64 = 0.42;
 /// By how much more detail extends upward than sideways around a lone particle.
-const UPRIGHT: f64 = 0.45;
+const VERTICAL_SCALE: f64 = 0.45;
 /// How much hotter, as a share, gas looks where it burns most. Its luminance stays.
 const HEAT: f32 = 0.03;
 
@@ -38,20 +38,20 @@ pub(crate) struct Detail {
     /// How far the noise moves while the shutter is open, cells.
     shift: [f32; 3],
     /// Moments that are averaged while the shutter is open.
-    moments: usize,
+    time_samples: usize,
     /// 1 / optical depth at which half of the place burns.
-    per_depth: f32,
+    inverse_half_depth: f32,
     /// 1 / width of the transition between burning and not.
     sharpness: f32,
     /// Exponent that keeps the mean in spite of that width.
-    keep: f32,
+    mean_exponent: f32,
     amount: f32,
     /// Size of a cell of the noise, pixels.
     pub(crate) cell_pixels: f32,
 }
 
 /// Burning gas at sixteen places.
-pub(crate) struct Burning {
+pub(crate) struct DetailFactors {
     /// By what the optical depth is multiplied.
     pub(crate) depth: [f32; LANES],
     /// By what the temperature is multiplied.
@@ -59,7 +59,7 @@ pub(crate) struct Burning {
 }
 
 /// The view of the gas as detail sees it.
-pub(crate) struct Scale {
+pub(crate) struct DetailScale {
     /// Typical support radius, m.
     pub(crate) radius: f64,
     /// Typical absorption coefficient, 1/m.
@@ -69,14 +69,14 @@ pub(crate) struct Scale {
     /// Time at the middle of the exposure, s.
     pub(crate) time: f64,
     /// How long the shutter is open, s.
-    pub(crate) open: f64,
+    pub(crate) exposure_s: f64,
     /// How far what stands still moves before the camera while the shutter is open, m in the world.
-    pub(crate) sway: [f64; 3],
+    pub(crate) camera_motion: [f64; 3],
 }
 
 impl Detail {
     /// The detail of a flame; `None` where there is none to add.
-    pub(crate) fn new(gas: &Gas, look: &LookParameters, scale: &Scale) -> Option<Self> {
+    pub(crate) fn new(gas: &Gas, look: &LookParameters, scale: &DetailScale) -> Option<Self> {
         if look.detail <= 0.0 || !(scale.radius > 0.0 && scale.absorption > 0.0) {
             return None;
         }
@@ -85,11 +85,11 @@ impl Detail {
         let fractal = Fractal { octaves, lacunarity: 2, gain: 0.55 };
         let words = gas.key.words(0, 0, Purpose::named("detail"));
         let noise = Noise::new(words[0], fractal, [0; 3]).ok()?;
-        let cells_per_metre = [1.0 / size, UPRIGHT / size, 1.0 / size];
+        let cells_per_metre = [1.0 / size, VERTICAL_SCALE / size, 1.0 / size];
         let rate = gas.detail_speed / size;
         let moved = rate * scale.time;
         let shift: [f64; 3] = std::array::from_fn(|axis| {
-            cells_per_metre[axis] * scale.sway[axis] - if axis == 1 { rate * scale.open } else { 0.0 }
+            cells_per_metre[axis] * scale.camera_motion[axis] - if axis == 1 { rate * scale.exposure_s } else { 0.0 }
         });
         let length = shift.iter().map(|s| s * s).sum::<f64>().sqrt() * f64::from(1 << (octaves - 1));
         let softness = math::lerp(1.6, 0.16, look.sharpness);
@@ -100,10 +100,10 @@ impl Detail {
             rate,
             base: [0.0, -moved, 0.0].map(Coordinate::from_f64),
             shift: shift.map(|s| s as f32),
-            moments: length.round().clamp(1.0, 6.0) as usize,
-            per_depth: (1.0 / (HALF_BURNING * scale.absorption * scale.radius)) as f32,
+            time_samples: length.round().clamp(1.0, 6.0) as usize,
+            inverse_half_depth: (1.0 / (MEAN_PARTICLES_HALF_BURNING * scale.absorption * scale.radius)) as f32,
             sharpness: (1.0 / softness) as f32,
-            keep: (1.0 / (1.0 + softness * softness).sqrt()) as f32,
+            mean_exponent: (1.0 / (1.0 + softness * softness).sqrt()) as f32,
             amount: look.detail as f32,
             cell_pixels: (size * scale.pixels_per_metre) as f32,
         })
@@ -111,53 +111,58 @@ impl Detail {
 
     /// Where in the noise particle `index` lies beyond what its place says, cells: the place at which it was born and the time since.
     #[inline(always)]
-    pub(crate) fn matter(&self, gas: &Gas, index: usize, since: f64) -> [f32; 3] {
+    pub(crate) fn detail_offset(&self, gas: &Gas, index: usize, since: f64) -> [f32; 3] {
         let particles = gas.particles;
-        let mut matter = [0.0; 3];
+        let mut detail_offset = [0.0; 3];
         for axis in 0..3 {
             let now = (since as f32).mul_add(particles.velocity[axis][index], particles.position[axis][index]);
-            matter[axis] = (particles.birthplace[axis][index] - now) * self.cells_per_metre[axis];
+            detail_offset[axis] = (particles.spawn_point[axis][index] - now) * self.cells_per_metre[axis];
         }
         let age = f64::from(particles.age[index]) + since;
-        matter[1] += (self.rate * age) as f32;
-        matter
+        detail_offset[1] += (self.rate * age) as f32;
+        detail_offset
     }
 
     /// Whether so little gas is at sixteen places that detail could not be seen in it.
     #[inline(always)]
-    pub(crate) fn is_lost(&self, tau: &[f32; LANES]) -> bool {
+    pub(crate) fn is_negligible(&self, tau: &[f32; LANES]) -> bool {
         /// Optical depth beside that at which half of the place burns; even the densest noise leaves this dark.
         const LITTLE: f32 = 2e-4;
         let mut most = 0.0_f32;
         for lane in 0..LANES {
             most = most.max(tau[lane]);
         }
-        most * self.per_depth < LITTLE
+        most * self.inverse_half_depth < LITTLE
     }
 
     /// What burns at sixteen places of the noise, where the smooth optical depth is `tau` and so much of the detail is `shown`.
     #[inline(always)]
-    pub(crate) fn burning(&self, places: &[[f32; LANES]; 3], tau: &[f32; LANES], shown: &[f32; LANES]) -> Burning {
+    pub(crate) fn burning(
+        &self,
+        places: &[[f32; LANES]; 3],
+        tau: &[f32; LANES],
+        shown: &[f32; LANES],
+    ) -> DetailFactors {
         let mut limit = [0.0; LANES];
         let mut share = [0.0; LANES];
         for lane in 0..LANES {
-            let x = (tau[lane] * self.per_depth).max(1e-6);
-            let x = x / (1.0 + x * (1.0 / FULLEST));
+            let x = (tau[lane] * self.inverse_half_depth).max(1e-6);
+            let x = x / (1.0 + x * (1.0 / MAX_DEPTH_PARTICLES));
             let log = approximations::log2(x);
             limit[lane] = log * std::f32::consts::LN_2;
-            share[lane] = 1.0 + approximations::exp2(-self.keep * log);
+            share[lane] = 1.0 + approximations::exp2(-self.mean_exponent * log);
         }
         let (mut burns, mut mean) = ([0.0; LANES], [0.0; LANES]);
-        for moment in 0..self.moments {
-            let noise = self.noise_at(places, (moment as f32 + 0.5) / self.moments as f32 - 0.5);
+        for moment in 0..self.time_samples {
+            let noise = self.noise_at(places, (moment as f32 + 0.5) / self.time_samples as f32 - 0.5);
             for lane in 0..LANES {
                 let z = noise[lane] * self.steepness;
                 mean[lane] += z;
                 burns[lane] += 1.0 / (1.0 + approximations::exp(-(z + limit[lane]) * self.sharpness));
             }
         }
-        let each = 1.0 / self.moments as f32;
-        let mut burning = Burning { depth: [1.0; LANES], heat: [1.0; LANES] };
+        let each = 1.0 / self.time_samples as f32;
+        let mut burning = DetailFactors { depth: [1.0; LANES], heat: [1.0; LANES] };
         for lane in 0..LANES {
             let amount = self.amount * shown[lane];
             burning.depth[lane] = (burns[lane] * each * share[lane] - 1.0).mul_add(amount, 1.0);

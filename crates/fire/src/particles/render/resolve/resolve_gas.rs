@@ -9,22 +9,22 @@ use bansho_base::{
 };
 
 use super::{
-    detail::{Burning, Detail},
+    detail::{Detail, DetailFactors},
     strain::{self, Strain},
-    upsample::Across,
+    upsample::RowInterpolator,
 };
-use crate::particles::render::splat::grid::{Grid, weigh};
+use crate::particles::render::splat::grid::{Grid, weighted_sum};
 
 /// Sums that a layer holds in each cell, as many as fill a vector.
 pub(crate) const PLANES: usize = 8;
 /// Optical depth of soot.
 pub(crate) const TAU: usize = 0;
 /// Optical depth times luminance of a black body as hot.
-pub(crate) const GLOW: usize = 1;
+pub(crate) const LUMINANCE: usize = 1;
 /// The same times temperature.
-pub(crate) const HEAT: usize = 2;
+pub(crate) const LUMINANCE_KELVIN: usize = 2;
 /// Optical depth times where in its detail the gas lies (three planes).
-pub(crate) const MATTER: usize = 3;
+pub(crate) const DETAIL_OFFSET: usize = 3;
 /// Luminance of the blue light.
 pub(crate) const BLUE: usize = 6;
 /// Path lengths by which the gas is optically shorter than the air, in pixels, for `haze`.
@@ -33,10 +33,10 @@ pub(crate) const PATH: usize = 7;
 type Batch = [f32; LANES];
 
 /// Sums below this are none.
-const FAINTEST: f32 = 1e-30;
+const MIN_DEPTH: f32 = 1e-30;
 
 /// How sums become light.
-pub(crate) struct Resolve<'a> {
+pub(crate) struct GasResolver<'a> {
     pub(crate) grid: &'a Grid<'a>,
     pub(crate) camera: &'a Camera,
     /// Where the places of detail count from, m.
@@ -51,13 +51,13 @@ pub(crate) struct Resolve<'a> {
     /// Interpolation of each phase of a cell.
     pub(crate) weights: &'a [[f32; 4]],
     /// Interpolation along a row.
-    pub(crate) across: &'a Across,
+    pub(crate) across: &'a RowInterpolator,
     /// Least and greatest temperature of the gas, K.
     pub(crate) temperatures: [f32; 2],
 }
 
 /// One layer of the gas in a strip.
-pub(crate) struct Layer {
+pub(crate) struct DepthLayer {
     pub(crate) index: usize,
     /// Depth of its middle, m.
     pub(crate) depth: f64,
@@ -65,7 +65,7 @@ pub(crate) struct Layer {
 }
 
 /// A row of pixels, still in cells.
-pub(crate) struct Row {
+pub(crate) struct RowBuffer {
     /// The sums of all layers.
     sums: Vec<f32>,
     /// The strain of the layer that was filled last.
@@ -73,22 +73,28 @@ pub(crate) struct Row {
 }
 
 /// The gas of one layer at sixteen pixels.
-pub(crate) struct Sums {
+pub(crate) struct LayerSums {
     pub(crate) tau: Batch,
     pub(crate) glow: Batch,
     pub(crate) heat: Batch,
     blue: Batch,
 }
 
-impl Resolve<'_> {
+impl GasResolver<'_> {
     /// Scratch for [`fill`](Self::fill).
-    pub(crate) fn row(&self) -> Row {
-        Row { sums: vec![0.0; self.grid.row_length()], strain: vec![0.0; self.grid.cells.columns] }
+    pub(crate) fn row(&self) -> RowBuffer {
+        RowBuffer { sums: vec![0.0; self.grid.row_length()], strain: vec![0.0; self.grid.cells.columns] }
     }
 
     /// The sums of a layer along row `y` of the picture, and the pixels that hold anything.
     #[inline(always)]
-    pub(crate) fn fill(&self, layer: usize, y: usize, extents: &Extents, row: &mut Row) -> Option<[usize; 2]> {
+    pub(crate) fn fill(
+        &self,
+        layer: usize,
+        y: usize,
+        extents: &ColumnExtents,
+        row: &mut RowBuffer,
+    ) -> Option<[usize; 2]> {
         let (cells, depth) = (&self.grid.cells, self.grid.depth);
         let (cell, phase) = cells.before(1, y);
         let [first, last] = extents.around(layer, cell)?;
@@ -104,19 +110,19 @@ impl Resolve<'_> {
         for column in from..to {
             let start = column * depth + layer * PLANES;
             let Some(sums) = row.sums[start..].first_chunk_mut::<PLANES>() else { continue };
-            *sums = weighted(rows, [start; 4], weights);
+            *sums = weighted_cells(rows, [start; 4], weights);
         }
         if let Some((_, strain)) = self.detail {
             let rows = [-1, 0, 1, 2].map(|by| &strain.row(cell + by, layer)[from..to]);
-            weigh(&mut row.strain[from..to], rows, weights);
+            weighted_sum(&mut row.strain[from..to], rows, weights);
         }
         Some(pixels)
     }
 
     /// The gas at sixteen pixels; `None` where there is none.
     #[inline(always)]
-    pub(crate) fn sums(&self, row: &Row, layer: usize, x: usize) -> Option<Sums> {
-        let mut planes = self.planes(row, layer, x, [TAU, GLOW, HEAT, BLUE]);
+    pub(crate) fn sums(&self, row: &RowBuffer, layer: usize, x: usize) -> Option<LayerSums> {
+        let mut planes = self.planes(row, layer, x, [TAU, LUMINANCE, LUMINANCE_KELVIN, BLUE]);
         // Less than this is seen neither in light nor in shade.
         let (mut most_tau, mut most_blue) = (1e-6_f32, 1e-3_f32);
         for lane in 0..LANES {
@@ -133,12 +139,12 @@ impl Resolve<'_> {
             }
         }
         let [tau, glow, heat, blue] = planes;
-        Some(Sums { tau, glow, heat, blue })
+        Some(LayerSums { tau, glow, heat, blue })
     }
 
     /// Planes of a layer at sixteen pixels.
     #[inline(always)]
-    fn planes<const N: usize>(&self, row: &Row, layer: usize, x: usize, mut planes: [usize; N]) -> [Batch; N] {
+    fn planes<const N: usize>(&self, row: &RowBuffer, layer: usize, x: usize, mut planes: [usize; N]) -> [Batch; N] {
         for plane in &mut planes {
             *plane += layer * PLANES;
         }
@@ -147,35 +153,50 @@ impl Resolve<'_> {
 
     /// How much of its detail the gas at sixteen pixels shows.
     #[inline(always)]
-    fn shown(&self, row: &Row, x: usize) -> Batch {
+    fn visible_fraction(&self, row: &RowBuffer, x: usize) -> Batch {
         let [strain] = self.across.at(&row.strain, 1, x, [0]);
-        strain::shown(&strain)
+        strain::visible_fraction(&strain)
     }
 
     /// Places in the detail of sixteen pixels.
     #[inline(always)]
-    fn places(&self, sums: &Sums, row: &Row, detail: &Detail, layer: &Layer, [x, y]: [usize; 2]) -> Option<[Batch; 3]> {
+    fn noise_positions(
+        &self,
+        sums: &LayerSums,
+        row: &RowBuffer,
+        detail: &Detail,
+        layer: &DepthLayer,
+        [x, y]: [usize; 2],
+    ) -> Option<[Batch; 3]> {
         let at = |column: f64| {
             let direction = self.camera.direction(DVec2::new(column, y as f64 + 0.5))?;
             Some((self.camera.position + direction * layer.depth - self.origin).as_vec3().to_array())
         };
         let (first, last) = (at(x as f64 + 0.5), at((x + LANES) as f64 - 0.5));
         let (first, last) = (first.or(last)?, last.or(first)?);
-        let mut places = self.planes(row, layer.index, x, [MATTER, MATTER + 1, MATTER + 2]);
+        let mut noise_positions =
+            self.planes(row, layer.index, x, [DETAIL_OFFSET, DETAIL_OFFSET + 1, DETAIL_OFFSET + 2]);
         for axis in 0..3 {
             let start = first[axis] * detail.cells_per_metre[axis];
             let step = (last[axis] - first[axis]) * detail.cells_per_metre[axis] * (1.0 / (LANES - 1) as f32);
             for lane in 0..LANES {
-                let matter = places[axis][lane] / sums.tau[lane].max(1e-20);
-                places[axis][lane] = step.mul_add(lane as f32, start) + matter.clamp(-1e4, 1e4);
+                let offset = noise_positions[axis][lane] / sums.tau[lane].max(1e-20);
+                noise_positions[axis][lane] = step.mul_add(lane as f32, start) + offset.clamp(-1e4, 1e4);
             }
         }
-        Some(places)
+        Some(noise_positions)
     }
 
     /// Adds a layer to the part `rect` of a strip, behind what it holds.
     #[inline(always)]
-    pub(crate) fn draw_layer(&self, layer: &Layer, extents: &Extents, rect: Rect, row: &mut Row, strip: &mut Strip) {
+    pub(crate) fn draw_layer(
+        &self,
+        layer: &DepthLayer,
+        extents: &ColumnExtents,
+        rect: Rect,
+        row: &mut RowBuffer,
+        strip: &mut Strip,
+    ) {
         for y in rect.y..rect.bottom() {
             let Some([first, last]) = self.fill(layer.index, y, extents, row) else { continue };
             // Batches begin at multiples of sixteen columns of the whole picture, so that crops change nothing.
@@ -189,24 +210,32 @@ impl Resolve<'_> {
     }
 
     #[inline(always)]
-    fn draw_batch(&self, sums: &Sums, row: &Row, layer: &Layer, [x, y]: [usize; 2], rect: Rect, strip: &mut Strip) {
+    fn draw_batch(
+        &self,
+        sums: &LayerSums,
+        row: &RowBuffer,
+        layer: &DepthLayer,
+        [x, y]: [usize; 2],
+        rect: Rect,
+        strip: &mut Strip,
+    ) {
         let from = x.max(rect.x);
         let to = (x + LANES).min(rect.right());
         if from >= to {
             return;
         }
         let start = (y - strip.rect.y) * strip.rect.width + from - strip.rect.x;
-        let mut shown = [1.0; LANES];
+        let mut visible_fraction = [1.0; LANES];
         if strip.has_plate() {
             for pixel in from..to {
                 let ahead = (f64::from(strip.plate_depth(start + pixel - from)) - layer.depth) / layer.thickness;
-                shown[pixel - x] = (ahead + 0.5).clamp(0.0, 1.0) as f32;
+                visible_fraction[pixel - x] = (ahead + 0.5).clamp(0.0, 1.0) as f32;
             }
         }
         let mut light = self.light(sums, row, layer, x, y);
         for plane in &mut light.planes {
             for lane in 0..LANES {
-                plane[lane] *= shown[lane];
+                plane[lane] *= visible_fraction[lane];
             }
         }
         let lit = from - x..to - x;
@@ -222,27 +251,28 @@ impl Resolve<'_> {
 
     /// Red, green, blue and opacity of sixteen pixels of a layer.
     #[inline(always)]
-    fn light(&self, sums: &Sums, row: &Row, layer: &Layer, x: usize, y: usize) -> Light {
-        let Sums { tau, glow, heat, .. } = sums;
+    fn light(&self, sums: &LayerSums, row: &RowBuffer, layer: &DepthLayer, x: usize, y: usize) -> PixelLight {
+        let LayerSums { tau, glow, heat, .. } = sums;
         let (mut depth_factor, mut heat_factor) = ([1.0; LANES], [1.0; LANES]);
         if let Some((detail, _)) = self.detail
-            && !detail.is_lost(tau)
-            && let Some(places) = self.places(sums, row, detail, layer, [x, y])
+            && !detail.is_negligible(tau)
+            && let Some(noise_positions) = self.noise_positions(sums, row, detail, layer, [x, y])
         {
-            Burning { depth: depth_factor, heat: heat_factor } = detail.burning(&places, tau, &self.shown(row, x));
+            DetailFactors { depth: depth_factor, heat: heat_factor } =
+                detail.burning(&noise_positions, tau, &self.visible_fraction(row, x));
         }
         let mut planes = [[0.0; LANES]; 4];
-        let mut emitting = [0.0; LANES];
+        let mut emission = [0.0; LANES];
         for lane in 0..LANES {
             let depth = tau[lane] * depth_factor[lane];
             planes[3][lane] = 1.0 - approximations::exp(-depth);
-            emitting[lane] = if self.hides_itself { planes[3][lane] } else { depth };
+            emission[lane] = if self.hides_itself { planes[3][lane] } else { depth };
         }
         // Where nothing glows both are held to what there is, and luminance is 0: no lane asks for itself.
         let (mut luminance, mut kelvin) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
-            luminance[lane] = emitting[lane] * glow[lane] / tau[lane].max(FAINTEST);
-            kelvin[lane] = self.temperature(heat[lane], glow[lane].max(FAINTEST)) * heat_factor[lane];
+            luminance[lane] = emission[lane] * glow[lane] / tau[lane].max(MIN_DEPTH);
+            kelvin[lane] = self.temperature(heat[lane], glow[lane].max(MIN_DEPTH)) * heat_factor[lane];
         }
         let table = color::black_body();
         for lane in 0..LANES {
@@ -266,11 +296,11 @@ impl Resolve<'_> {
                 planes[c][lane] += scattered[c].mul_add(planes[3][lane], blue);
             }
         }
-        Light { planes }
+        PixelLight { planes }
     }
 }
 
-impl Resolve<'_> {
+impl GasResolver<'_> {
     /// Mean temperature, K. Where hardly anything glows it is a ratio of rounding errors, so it is held to what is there.
     #[inline(always)]
     pub(crate) fn temperature(&self, heat: f32, glow: f32) -> f32 {
@@ -281,7 +311,7 @@ impl Resolve<'_> {
 
 /// The sum of four cells' values of a layer, found at `starts` in `rows`, times weights.
 #[inline(always)]
-fn weighted(rows: [&[f32]; 4], starts: [usize; 4], weights: &[f32; 4]) -> [f32; PLANES] {
+fn weighted_cells(rows: [&[f32]; 4], starts: [usize; 4], weights: &[f32; 4]) -> [f32; PLANES] {
     let mut sums = [0.0; PLANES];
     for k in 0..4 {
         let Some(values) = rows[k][starts[k]..].first_chunk::<PLANES>() else { continue };
@@ -293,17 +323,17 @@ fn weighted(rows: [&[f32]; 4], starts: [usize; 4], weights: &[f32; 4]) -> [f32; 
 }
 
 /// Red, green, blue and opacity.
-struct Light {
+struct PixelLight {
     planes: [Batch; 4],
 }
 
 /// The columns of cells of each row and layer that hold anything.
-pub(crate) struct Extents {
+pub(crate) struct ColumnExtents {
     layers: usize,
     rows: Vec<[u32; 2]>,
 }
 
-impl Extents {
+impl ColumnExtents {
     pub(crate) fn new(grid: &Grid, layers: usize) -> Self {
         use rayon::prelude::*;
         let columns = grid.cells.columns;

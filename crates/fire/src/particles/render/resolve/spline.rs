@@ -14,7 +14,7 @@ const SHARPEN: [f32; 3] = [181.0 / 120.0, -17.0 / 60.0, 7.0 / 240.0];
 /// The grid as [`weights`] and [`slopes`] want it: filtered down and across.
 pub(crate) fn sharpened<'a>(grid: &Grid<'a>) -> Grid<'a> {
     let (length, depth) = (grid.row_length(), grid.depth);
-    let (mut sharp, level) = (Grid::new(grid.cells, depth, grid.memory()), Level::new());
+    let (mut sharp, level) = (Grid::new(grid.cells, depth, grid.scratch()), Level::new());
     sharp.values_mut().par_chunks_mut(length).enumerate().for_each_init(
         || vec![0.0; length],
         |down, (row, out)| {
@@ -70,13 +70,13 @@ mod tests {
     use bansho_base::{image::Rect, math};
 
     use super::*;
-    use crate::particles::render::splat::buffers::Memory;
+    use crate::particles::render::splat::buffers::ScratchPool;
 
     /// How far values and slopes are off those of a wave of `length` cells, at pixels of every phase, beside their most.
     fn worst(length: f64) -> [f64; 2] {
         let cells = Raster::around(Rect { x: 0, y: 0, width: 128, height: 8 }, 4, false);
-        let memory = Memory::default();
-        let mut grid = Grid::new(cells, 1, &memory);
+        let scratch = ScratchPool::default();
+        let mut grid = Grid::new(cells, 1, &scratch);
         let turn = std::f64::consts::TAU / length;
         for (index, value) in grid.values_mut().iter_mut().enumerate() {
             *value = math::sin(turn * (index % cells.columns) as f64) as f32;

@@ -8,15 +8,15 @@ use rayon::prelude::*;
 
 use bansho_base::math::simd::LANES;
 
-use super::resolve_gas::{Extents, MATTER, PLANES, TAU};
+use super::resolve_gas::{ColumnExtents, DETAIL_OFFSET, PLANES, TAU};
 use crate::particles::render::splat::grid::Grid;
 
 /// How many times more finely than it was made detail may lie before it begins to fade, and when it is gone.
-const FADING: [f32; 2] = [1.0, 3.0];
+const FADE_RANGE: [f32; 2] = [1.0, 3.0];
 /// Optical depth below which a cell is empty.
-const EMPTY: f32 = 1e-6;
+const MIN_DEPTH: f32 = 1e-6;
 /// Share of a cell's optical depth that a cell beside it must have to be compared with it.
-const COUNTS: f32 = 0.02;
+const MIN_NEIGHBOR_DEPTH: f32 = 0.02;
 
 /// The slope of the gas's own detail coordinates in each cell of each layer, beside that of detail as it was made.
 pub(crate) struct Strain {
@@ -28,7 +28,7 @@ pub(crate) struct Strain {
 
 impl Strain {
     /// `cell` is the size of a cell of the noise as it was made, pixels.
-    pub(crate) fn new(grid: &Grid, extents: &Extents, layers: usize, cell: f32) -> Self {
+    pub(crate) fn new(grid: &Grid, extents: &ColumnExtents, layers: usize, cell: f32) -> Self {
         let (columns, rows, level) = (grid.cells.columns, grid.cells.rows, Level::new());
         let scale = cell / grid.cells.size as f32;
         let mut values = vec![0.0; rows * layers * columns];
@@ -39,11 +39,11 @@ impl Strain {
                 let range = first.max(1) as usize..(last as usize + 1).min(columns - 1);
                 dispatch!(level, _simd => {
                     for column in range {
-                        let at = |row: usize, column: usize| Matter::of(&rows[row][column * grid.depth + layer * PLANES..]);
+                        let at = |row: usize, column: usize| DetailCoordinates::of(&rows[row][column * grid.depth + layer * PLANES..]);
                         let own = at(1, column);
-                        if own.tau > EMPTY {
-                            let beside = [at(0, column), at(2, column), at(1, column - 1), at(1, column + 1)];
-                            out[column] = scale * own.greatest_step(&beside);
+                        if own.tau > MIN_DEPTH {
+                            let neighbors = [at(0, column), at(2, column), at(1, column - 1), at(1, column + 1)];
+                            out[column] = scale * own.max_distance(&neighbors);
                         }
                     }
                 });
@@ -61,41 +61,41 @@ impl Strain {
 
 /// How much of its detail gas of a strain still shows.
 #[inline(always)]
-pub(crate) fn shown(strain: &[f32; LANES]) -> [f32; LANES] {
-    let [begins, gone] = FADING;
-    let mut shown = [0.0; LANES];
+pub(crate) fn visible_fraction(strain: &[f32; LANES]) -> [f32; LANES] {
+    let [begins, gone] = FADE_RANGE;
+    let mut visible_fraction = [0.0; LANES];
     for lane in 0..LANES {
         let left = ((gone - strain[lane]) * (1.0 / (gone - begins))).clamp(0.0, 1.0);
-        shown[lane] = left * left * 2.0_f32.mul_add(-left, 3.0);
+        visible_fraction[lane] = left * left * 2.0_f32.mul_add(-left, 3.0);
     }
-    shown
+    visible_fraction
 }
 
 /// Where in the noise the gas of a cell lies, cells of the noise.
-struct Matter {
+struct DetailCoordinates {
     tau: f32,
     place: [f32; 3],
 }
 
-impl Matter {
+impl DetailCoordinates {
     #[inline(always)]
     fn of(sums: &[f32]) -> Self {
         let tau = sums[TAU];
-        let share = 1.0 / tau.max(EMPTY);
-        Self { tau, place: [0, 1, 2].map(|axis| sums[MATTER + axis] * share) }
+        let share = 1.0 / tau.max(MIN_DEPTH);
+        Self { tau, place: [0, 1, 2].map(|axis| sums[DETAIL_OFFSET + axis] * share) }
     }
 
     /// The greatest distance in the noise to one of the cells beside.
     #[inline(always)]
-    fn greatest_step(&self, beside: &[Self; 4]) -> f32 {
+    fn max_distance(&self, neighbors: &[Self; 4]) -> f32 {
         let mut greatest = 0.0_f32;
-        for other in beside {
+        for other in neighbors {
             let mut square = 0.0;
             for axis in 0..3 {
                 let step = other.place[axis] - self.place[axis];
                 square = step.mul_add(step, square);
             }
-            if other.tau > COUNTS * self.tau {
+            if other.tau > MIN_NEIGHBOR_DEPTH * self.tau {
                 greatest = greatest.max(square);
             }
         }

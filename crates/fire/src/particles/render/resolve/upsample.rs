@@ -18,12 +18,12 @@ struct Span {
 }
 
 /// The cells around all pixels of a row of the whole picture.
-pub(crate) struct Across {
+pub(crate) struct RowInterpolator {
     spans: Vec<Span>,
     weights: Vec<[f32; LANES]>,
 }
 
-impl Across {
+impl RowInterpolator {
     /// For rows of `width` pixels, with the weights of the four cells around a pixel of each phase.
     pub(crate) fn new(grid: &Grid, width: usize, weights_of: &[[f32; 4]]) -> Self {
         let columns = grid.columns(0, width);
@@ -72,20 +72,21 @@ mod tests {
     use bansho_base::image::Rect;
 
     use super::{super::spline, *};
-    use crate::particles::render::splat::{buffers::Memory, grid::Raster};
+    use crate::particles::render::splat::{buffers::ScratchPool, grid::Raster};
 
     #[test]
     fn sixteen_pixels_are_what_each_of_them_is() {
         const DEPTH: usize = 3;
-        let memory = Memory::default();
+        let scratch = ScratchPool::default();
         for (size, width) in [(1, 64), (2, 50), (3, 47), (4, 64), (6, 130), (8, 17), (32, 99)] {
             let cells = Raster::around(Rect { x: 5, y: 0, width: width - 9, height: 4 }, size, false);
-            let mut grid = Grid::new(cells, DEPTH, &memory);
+            let mut grid = Grid::new(cells, DEPTH, &scratch);
             for (index, value) in grid.values_mut().iter_mut().enumerate() {
                 *value = (index * index % 17) as f32;
             }
             let weights = spline::weights(&grid.cells);
-            let (across, columns, row) = (Across::new(&grid, width, &weights), grid.columns(0, width), grid.row(2));
+            let (across, columns, row) =
+                (RowInterpolator::new(&grid, width, &weights), grid.columns(0, width), grid.row(2));
             for x in (0..width).step_by(LANES) {
                 let found = across.at(row, DEPTH, x, [2, 0]);
                 for pixel in x..(x + LANES).min(width) {

@@ -7,7 +7,7 @@ use std::ops::Range;
 use bansho_base::math::approximations;
 
 use super::{
-    accumulate::{Sheet, Sprite},
+    accumulate::{SplatSettings, Sprite},
     grid::Raster,
     kernel::Profile,
 };
@@ -23,47 +23,47 @@ const FAINT: f32 = 0.045;
 
 /// A sprite in cells.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Placed<const P: usize> {
+pub(crate) struct RasterizedSprite<const P: usize> {
     centre: [f32; 2],
     /// How `s` falls along a row, for the square of the distance from its middle: a.
-    pub(crate) fall: f32,
+    pub(crate) falloff: f32,
     /// How far the middle of a row lies to the left, for each row below the centre: b/a.
-    lean: f32,
+    shear: f32,
     /// How `s` falls from middle to middle, for the square of the distance from the centre: c - b^2/a.
-    fading: f32,
+    row_falloff: f32,
     /// First row of the grid that it touches, and one past the last.
     pub(crate) rows: [i32; 2],
     /// What goes to its own layer and, if anything, to the next.
     layer: usize,
     own: [f32; P],
     next: [f32; P],
-    both: bool,
+    spans_two_layers: bool,
 }
 
-impl<const P: usize> Placed<P> {
+impl<const P: usize> RasterizedSprite<P> {
     #[inline(always)]
-    pub(crate) fn new(sheet: &Sheet, sprite: &Sprite<P>, cells: &Raster) -> Self {
+    pub(crate) fn new(settings: &SplatSettings, sprite: &Sprite<P>, cells: &Raster) -> Self {
         let ellipse = &sprite.ellipse;
         let cell = cells.size as f32;
-        let growth = (sheet.least_radius * cell / ellipse.radius.max(1e-3)).max(1.0);
-        let scale = cell * cell / (growth * growth);
+        let widening = (settings.min_radius_cells * cell / ellipse.radius.max(1e-3)).max(1.0);
+        let scale = cell * cell / (widening * widening);
         let centre = cells.place(ellipse.centre);
-        let reach = ellipse.reach[1] * growth / cell * (1.0 - FAINT).sqrt();
+        let reach = ellipse.reach[1] * widening / cell * (1.0 - FAINT).sqrt();
         let (first, last) = (cells.first[1], cells.first[1] + cells.rows as i32);
         let rows = [(centre[1] - reach).ceil(), (centre[1] + reach).floor() + 1.0];
         let rows = rows.map(|row| (row as i32).clamp(first, last));
         let [a, b, c] = ellipse.shape.map(|value| value * scale);
-        let lean = b / a;
-        let fading = c - b * lean;
+        let shear = b / a;
+        let row_falloff = c - b * shear;
         // Sprites that had to be widened are dimmed.
-        let dimmed = 1.0 / (growth * growth);
+        let attenuation = 1.0 / (widening * widening);
         let (mut own, mut next) = (sprite.values, sprite.values);
         for i in 0..P {
-            own[i] *= dimmed * (1.0 - sprite.split);
-            next[i] *= dimmed * sprite.split;
+            own[i] *= attenuation * (1.0 - sprite.next_layer_weight);
+            next[i] *= attenuation * sprite.next_layer_weight;
         }
-        let (layer, both) = (sprite.layer, sprite.split > 0.0);
-        Self { centre, fall: a, lean, fading, rows, layer, own, next, both }
+        let (layer, spans_two_layers) = (sprite.layer, sprite.next_layer_weight > 0.0);
+        Self { centre, falloff: a, shear, row_falloff, rows, layer, own, next, spans_two_layers }
     }
 
     /// The sprite in the rows from `first` on, where `s = 1 - (a u^2 + 2 b u v + c v^2)`.
@@ -71,17 +71,17 @@ impl<const P: usize> Placed<P> {
     pub(crate) fn chords(&self, first: i32, columns: &Range<i32>) -> Chords {
         let before = (first - 1) as f32;
         let (left, count) = (columns.start as f32, columns.len() as i32);
-        let widest = 1.0 / self.fall;
+        let widest = 1.0 / self.falloff;
         let mut chords = Chords { middle: [0.0; ROWS], most: [0.0; ROWS], first: [0; ROWS], end: [0; ROWS] };
         for row in 0..ROWS {
             let v = before + BEYOND[row] - self.centre[1];
-            let middle = self.centre[0] - self.lean * v;
-            let most = 1.0 - self.fading * v * v;
+            let middle = self.centre[0] - self.shear * v;
+            let most = 1.0 - self.row_falloff * v * v;
             let half = ((most - FAINT).max(0.0) * widest).sqrt();
             chords.middle[row] = middle;
             chords.most[row] = most;
-            chords.first[row] = columns.start + whole((middle - half).ceil() - left, count);
-            chords.end[row] = columns.start + whole((middle + half).floor() + 1.0 - left, count);
+            chords.first[row] = columns.start + statistics((middle - half).ceil() - left, count);
+            chords.end[row] = columns.start + statistics((middle + half).floor() + 1.0 - left, count);
         }
         chords
     }
@@ -89,7 +89,7 @@ impl<const P: usize> Placed<P> {
     /// Adds to a run of a row's cells that begins at column `x` of the grid. (Beyond the sprite weights are zero.)
     #[inline(always)]
     pub(crate) fn add(&self, row: &mut [[f32; P]], x: usize, layers: usize, weights: &[f32; COLUMNS]) {
-        match (P == 1 && layers == 1, self.both) {
+        match (P == 1 && layers == 1, self.spans_two_layers) {
             (true, _) => self.add_lone(&mut row.as_flattened_mut()[x..], weights),
             (_, true) => self.add_run::<true>(&mut row[x * layers + self.layer..], layers, weights),
             (_, false) => self.add_run::<false>(&mut row[x * layers + self.layer..], layers, weights),
@@ -97,14 +97,14 @@ impl<const P: usize> Placed<P> {
     }
 
     #[inline(always)]
-    fn add_run<const BOTH: bool>(&self, run: &mut [[f32; P]], layers: usize, weights: &[f32; COLUMNS]) {
+    fn add_run<const TWO_LAYERS: bool>(&self, run: &mut [[f32; P]], layers: usize, weights: &[f32; COLUMNS]) {
         let mut rest = run;
         for weight in weights {
             let Some((own, next)) = rest.split_first_mut() else { return };
             for i in 0..P {
                 own[i] = self.own[i].mul_add(*weight, own[i]);
             }
-            if BOTH && let Some(next) = next.first_mut() {
+            if TWO_LAYERS && let Some(next) = next.first_mut() {
                 for i in 0..P {
                     next[i] = self.next[i].mul_add(*weight, next[i]);
                 }
@@ -144,14 +144,14 @@ pub(crate) struct Chords {
 }
 
 impl Chords {
-    /// Weights of the cells of a row from column `x` on, where `s` falls by `fall` for the square of each column's distance.
+    /// Weights of the cells of a row from column `x` on, where `s` falls by `falloff` for the square of each column's distance.
     #[inline(always)]
-    pub(crate) fn weights(&self, profile: Profile, fall: f32, row: usize, x: i32) -> [f32; COLUMNS] {
+    pub(crate) fn weights(&self, profile: Profile, falloff: f32, row: usize, x: i32) -> [f32; COLUMNS] {
         let (before, middle, most) = ((x - 1) as f32, self.middle[row], self.most[row]);
         let mut weights = [0.0; COLUMNS];
         for lane in 0..COLUMNS {
             let u = before + BEYOND[lane] - middle;
-            let s = (-fall * u).mul_add(u, most);
+            let s = (-falloff * u).mul_add(u, most);
             let s = if s > 0.0 { s } else { 0.0 };
             weights[lane] = profile.at(s);
         }
@@ -161,6 +161,6 @@ impl Chords {
 
 /// A whole number, clamped from 0 to `most`.
 #[inline(always)]
-fn whole(value: f32, most: i32) -> i32 {
+fn statistics(value: f32, most: i32) -> i32 {
     approximations::whole(value.max(0.0).min(most as f32))
 }

@@ -2,7 +2,7 @@
 
 use bansho_base::image::Rect;
 
-use super::buffers::{Memory, Recycled};
+use super::buffers::{PooledVec, ScratchPool};
 use crate::particles::render::resolve::spline;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -43,7 +43,7 @@ impl Raster {
     }
 
     /// Its columns, counted from the picture's corner.
-    pub(crate) fn columns_of_picture(&self) -> std::ops::Range<i32> {
+    pub(crate) fn picture_columns(&self) -> std::ops::Range<i32> {
         self.first[0]..self.first[0] + self.columns as i32
     }
 
@@ -89,18 +89,18 @@ pub(crate) struct Grid<'a> {
     pub(crate) cells: Raster,
     /// Values of a cell.
     pub(crate) depth: usize,
-    values: Recycled<'a, f32>,
+    values: PooledVec<'a, f32>,
     /// Where they begin: so that no cell of eight lies across two lines of the cache.
     start: usize,
 }
 
 impl<'a> Grid<'a> {
     /// A grid of any values: whoever asks for it fills all its rows.
-    pub(crate) fn new(cells: Raster, depth: usize, memory: &'a Memory) -> Self {
+    pub(crate) fn new(cells: Raster, depth: usize, scratch: &'a ScratchPool) -> Self {
         /// A line of the cache, bytes.
         const LINE: usize = 64;
         let count = cells.columns * cells.rows * depth + LINE / size_of::<f32>();
-        let mut values = memory.list(count);
+        let mut values = scratch.list(count);
         if values.len() < count {
             // Zeros of the system's that nobody touches before they are wanted.
             *values = vec![0.0; values.capacity()];
@@ -110,8 +110,8 @@ impl<'a> Grid<'a> {
     }
 
     /// Where it came from.
-    pub(crate) fn memory(&self) -> &'a Memory {
-        self.values.memory()
+    pub(crate) fn scratch(&self) -> &'a ScratchPool {
+        self.values.scratch()
     }
 
     /// All values.
@@ -153,7 +153,7 @@ impl<'a> Grid<'a> {
 
     /// One value a cell: the sum over its layers of one of each layer's `planes` values.
     pub(crate) fn one_plane(&self, plane: usize, planes: usize) -> Self {
-        let mut one = Self::new(self.cells, 1, self.memory());
+        let mut one = Self::new(self.cells, 1, self.scratch());
         one.values_mut().par_chunks_mut(self.cells.columns).enumerate().for_each(|(row, out)| {
             for (sum, cell) in out.iter_mut().zip(self.row(row as i32).chunks_exact(self.depth)) {
                 *sum = cell[plane..].iter().step_by(planes).sum();
@@ -176,7 +176,7 @@ impl<'a> Grid<'a> {
                 let rows = [-1, 0, 1, 2].map(|k| coarser.row(first + k));
                 let weights = &quarters[fine.rem_euclid(2) as usize];
                 dispatch!(level, _simd => {
-                    weigh(column, rows, weights);
+                    weighted_sum(column, rows, weights);
                     coarser.add_between(column, &quarters, cells.first[0], values);
                 });
             },
@@ -203,7 +203,7 @@ impl<'a> Grid<'a> {
 
 /// `out = sum of weights times rows`.
 #[inline(always)]
-pub(crate) fn weigh(out: &mut [f32], rows: [&[f32]; 4], weights: &[f32; 4]) {
+pub(crate) fn weighted_sum(out: &mut [f32], rows: [&[f32]; 4], weights: &[f32; 4]) {
     let count = out.len();
     let (a, b, c, d) = (&rows[0][..count], &rows[1][..count], &rows[2][..count], &rows[3][..count]);
     for i in 0..count {

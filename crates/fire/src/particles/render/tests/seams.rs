@@ -11,7 +11,7 @@ fn wall(apart: [f32; 3]) -> Particles {
     particles.support_radius.fill(0.15);
     for index in 0..particles.len() {
         if particles.position[0][index] > 0.0 {
-            (0..3).for_each(|axis| particles.birthplace[axis][index] += apart[axis]);
+            (0..3).for_each(|axis| particles.spawn_point[axis][index] += apart[axis]);
         }
     }
     particles

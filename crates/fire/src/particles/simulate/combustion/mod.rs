@@ -21,11 +21,11 @@ const SOOT_FUEL: [f32; 2] = [0.16, 0.97];
 /// Share of its fuel over which soot forms.
 const SOOT_FORMING: f32 = 0.17;
 /// Most a particle's radius grows.
-const GREATEST_GROWTH: f32 = 3.0;
+const MAX_RADIUS_GROWTH: f32 = 3.0;
 
 /// What of a particle changes as it lives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Being<R> {
+pub(crate) struct ParticleState<R> {
     /// Temperature, K.
     pub(crate) temperature: R,
     /// Share of fuel left.
@@ -38,9 +38,9 @@ pub(crate) struct Being<R> {
 
 /// What acts on a particle for a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Exposure<R> {
+pub(crate) struct AmbientConditions<R> {
     /// How much of it lies at the edge of the gas: 0 inside to 1 alone.
-    pub(crate) to_air: R,
+    pub(crate) air_exposure: R,
     /// Share of its own mass that it takes up from the air, 1/s.
     pub(crate) mixing: R,
     /// Share of a mean particle's fuel that burns, 1/s.
@@ -55,8 +55,8 @@ pub(crate) struct Exposure<R> {
 
 /// The laws by which gas lives.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Laws {
-    living: bool,
+pub(crate) struct CombustionModel {
+    reacting: bool,
     flame_temperature: f32,
     heating_s: f32,
     air_hunger: f32,
@@ -65,10 +65,10 @@ pub(crate) struct Laws {
     radiation: f32,
 }
 
-impl From<&LifeParameters> for Laws {
+impl From<&LifeParameters> for CombustionModel {
     fn from(life: &LifeParameters) -> Self {
         Self {
-            living: life.temperature == TemperatureLaw::Living,
+            reacting: life.temperature == TemperatureLaw::Living,
             flame_temperature: life.flame_temperature_k as f32,
             heating_s: life.heating_s as f32,
             air_hunger: life.air_hunger as f32,
@@ -79,29 +79,35 @@ impl From<&LifeParameters> for Laws {
     }
 }
 
-impl Laws {
+impl CombustionModel {
     /// The particle after `seconds`.
     #[inline(always)]
-    pub(crate) fn live<R: Real>(&self, being: Being<R>, exposure: &Exposure<R>, seconds: f32) -> Being<R> {
+    pub(crate) fn advance<R: Real>(
+        &self,
+        being: ParticleState<R>,
+        exposure: &AmbientConditions<R>,
+        seconds: f32,
+    ) -> ParticleState<R> {
         let like = |value: f32| being.fuel.broadcast(value);
         // Gas at the edge burns faster than the mean, gas inside slower; a mean exposure of a third burns as the mean.
-        let air = exposure.to_air.fma(like(2.4 * self.air_hunger), like(1.0 - 0.8 * self.air_hunger));
+        let air = exposure.air_exposure.fma(like(2.4 * self.air_hunger), like(1.0 - 0.8 * self.air_hunger));
         let fuel = (being.fuel - exposure.burning * air * like(seconds)).simd_max(like(0.0));
         let growth = exposure.mixing.fma(like(seconds * (1.0 / 3.0)), like(1.0));
-        Being {
+        ParticleState {
             fuel,
-            temperature: if self.living { self.temperature(being, exposure, seconds) } else { being.temperature },
+            temperature: if self.reacting { self.temperature(being, exposure, seconds) } else { being.temperature },
             soot: like(self.soot) * self.soot_share(fuel),
-            support_radius: (being.support_radius * growth).simd_min(like(GREATEST_GROWTH * exposure.smallest_radius)),
+            support_radius: (being.support_radius * growth)
+                .simd_min(like(MAX_RADIUS_GROWTH * exposure.smallest_radius)),
         }
     }
 
     /// Heating, mixing and radiation, each implicit, so that no step is too long.
     #[inline(always)]
-    fn temperature<R: Real>(&self, being: Being<R>, exposure: &Exposure<R>, seconds: f32) -> R {
+    fn temperature<R: Real>(&self, being: ParticleState<R>, exposure: &AmbientConditions<R>, seconds: f32) -> R {
         let like = |value: f32| being.fuel.broadcast(value);
         let air = like(exposure.air_temperature);
-        let front = exposure.to_air.simd_sqrt().fma(like(1.0 - INNER_TEMPERATURE), like(INNER_TEMPERATURE));
+        let front = exposure.air_exposure.simd_sqrt().fma(like(1.0 - INNER_TEMPERATURE), like(INNER_TEMPERATURE));
         let (flame, heating) = (front * like(self.flame_temperature), like(seconds / self.heating_s));
         // Burning gas nears the flame's temperature, burnt gas the air's.
         let toward = being.fuel.select_lt(like(f32::MIN_POSITIVE), air, flame);
@@ -146,9 +152,9 @@ mod tests {
 
     use super::*;
 
-    const BEING: Being<f32> = Being { temperature: 1200.0, fuel: 0.6, soot: 0.0, support_radius: 0.02 };
-    const EXPOSURE: Exposure<f32> = Exposure {
-        to_air: 1.0,
+    const BEING: ParticleState<f32> = ParticleState { temperature: 1200.0, fuel: 0.6, soot: 0.0, support_radius: 0.02 };
+    const EXPOSURE: AmbientConditions<f32> = AmbientConditions {
+        air_exposure: 1.0,
         mixing: 5.0,
         burning: 2.0,
         density: 0.25,
@@ -156,41 +162,41 @@ mod tests {
         smallest_radius: 0.02,
     };
 
-    fn laws() -> Laws {
-        Laws::from(&LifeParameters::default())
+    fn combustion() -> CombustionModel {
+        CombustionModel::from(&LifeParameters::default())
     }
 
-    fn after(mut being: Being<f32>, exposure: Exposure<f32>, seconds: f32) -> Being<f32> {
+    fn after(mut being: ParticleState<f32>, exposure: AmbientConditions<f32>, seconds: f32) -> ParticleState<f32> {
         for _ in 0..1000 {
-            being = laws().live(being, &exposure, seconds / 1000.0);
+            being = combustion().advance(being, &exposure, seconds / 1000.0);
         }
         being
     }
 
     #[test]
     fn burning_gas_nears_the_flame_temperature_and_burnt_gas_the_air() {
-        let hot = after(BEING, Exposure { burning: 0.0, ..EXPOSURE }, 0.3);
+        let hot = after(BEING, AmbientConditions { burning: 0.0, ..EXPOSURE }, 0.3);
         assert!((1600.0..1900.0).contains(&hot.temperature), "{}", hot.temperature);
-        let cold = after(Being { fuel: 0.0, ..BEING }, EXPOSURE, 2.0);
+        let cold = after(ParticleState { fuel: 0.0, ..BEING }, EXPOSURE, 2.0);
         assert!(cold.temperature < 294.0 && cold.soot == 0.0);
         assert!((cold.support_radius - 0.06).abs() < 1e-6);
     }
 
     #[test]
     fn the_outside_burns_first() {
-        let inside = after(BEING, Exposure { to_air: 0.1, ..EXPOSURE }, 0.2);
+        let inside = after(BEING, AmbientConditions { air_exposure: 0.1, ..EXPOSURE }, 0.2);
         let outside = after(BEING, EXPOSURE, 0.2);
         assert!(outside.fuel < inside.fuel);
-        let mean = after(BEING, Exposure { to_air: 1.0 / 3.0, ..EXPOSURE }, 0.2);
+        let mean = after(BEING, AmbientConditions { air_exposure: 1.0 / 3.0, ..EXPOSURE }, 0.2);
         assert!((mean.fuel - 0.2).abs() < 1e-3);
     }
 
     #[test]
     fn black_body_cooling_of_dense_soot_follows_the_fourth_power() {
         // dT/dt = -4 sigma kappa T^4 / (rho c_p), by hand at 1500 K with one part in a million of soot.
-        let laws = Laws { heating_s: 1e9, radiation: 1.0, ..laws() };
-        let being = Being { temperature: 1500.0, soot: 1e-6, ..BEING };
-        let cooled = laws.live(being, &Exposure { mixing: 0.0, ..EXPOSURE }, 1e-5);
+        let combustion = CombustionModel { heating_s: 1e9, radiation: 1.0, ..combustion() };
+        let being = ParticleState { temperature: 1500.0, soot: 1e-6, ..BEING };
+        let cooled = combustion.advance(being, &AmbientConditions { mixing: 0.0, ..EXPOSURE }, 1e-5);
         let kappa = 1862.0 * 1e-6 * 1500.0;
         let fourth = |kelvin: f64| kelvin * kelvin * kelvin * kelvin;
         let by_hand = 4.0 * 5.670_374e-8 * kappa * (fourth(1500.0) - fourth(293.0)) / (0.25 * 1200.0) * 1e-5;
@@ -204,21 +210,21 @@ mod tests {
             let fuel = Lanes::from_slice(simd, &fuels);
             let like = |value: f32| Lanes::splat(simd, value);
             let temperature = fuel.fma(like(1500.0), like(400.0));
-            let being = Being { temperature, fuel, soot: like(1e-6), support_radius: like(0.02) };
-            let exposure = Exposure {
-                to_air: fuel,
+            let being = ParticleState { temperature, fuel, soot: like(1e-6), support_radius: like(0.02) };
+            let exposure = AmbientConditions {
+                air_exposure: fuel,
                 mixing: like(5.0),
                 burning: like(2.0),
                 density: like(0.25),
                 air_temperature: 293.0,
                 smallest_radius: 0.02,
             };
-            let Being { temperature, fuel, soot, support_radius } = laws().live(being, &exposure, 0.02);
+            let ParticleState { temperature, fuel, soot, support_radius } = combustion().advance(being, &exposure, 0.02);
             [temperature, fuel, soot, support_radius].map(|values| values.as_slice().to_vec())
         });
         for (lane, fuel) in fuels.into_iter().enumerate() {
-            let being = Being { temperature: fuel.fma(1500.0, 400.0), fuel, soot: 1e-6, ..BEING };
-            let alone = laws().live(being, &Exposure { to_air: fuel, ..EXPOSURE }, 0.02);
+            let being = ParticleState { temperature: fuel.fma(1500.0, 400.0), fuel, soot: 1e-6, ..BEING };
+            let alone = combustion().advance(being, &AmbientConditions { air_exposure: fuel, ..EXPOSURE }, 0.02);
             let alone = [alone.temperature, alone.fuel, alone.soot, alone.support_radius];
             assert_eq!(together.each_ref().map(|values| values[lane]), alone, "with {fuel} of its fuel");
         }
@@ -226,15 +232,15 @@ mod tests {
 
     #[test]
     fn constant_temperature_stays() {
-        let laws = Laws { living: false, ..laws() };
-        assert_eq!(laws.live(BEING, &EXPOSURE, 0.1).temperature, 1200.0);
+        let combustion = CombustionModel { reacting: false, ..combustion() };
+        assert_eq!(combustion.advance(BEING, &EXPOSURE, 0.1).temperature, 1200.0);
     }
 
     #[test]
     fn soot_forms_in_burning_gas_and_burns_unless_it_is_smoke() {
-        let clean = laws();
+        let clean = combustion();
         assert_eq!((clean.soot_share(1.0), clean.soot_share(0.5), clean.soot_share(0.0)), (0.0, 1.0, 0.0));
-        let smoky = Laws { smoke: 0.4, ..clean };
+        let smoky = CombustionModel { smoke: 0.4, ..clean };
         assert!((smoky.soot_share(0.0) - 0.4).abs() < 1e-6);
     }
 }

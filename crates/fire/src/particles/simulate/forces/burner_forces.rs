@@ -4,16 +4,16 @@ use fearless_simd::{Simd, prelude::*};
 
 use bansho_base::math::simd::{Lanes, Real};
 
-use super::{entrainment_axis::Axis, turbulence::Eddies, vortex_rings::Ring, wind::Breeze};
-use crate::particles::simulate::vector_lanes::{length, less, plus};
+use super::{entrainment_axis::PlumeAxis, turbulence::EddyField, vortex_rings::VortexRing, wind::WindField};
+use crate::particles::simulate::vector_lanes::{add_scaled, length, subtract};
 
 /// What acts on the gas of one burner.
-pub(crate) struct Draught<'a> {
+pub(crate) struct BurnerForces<'a> {
     /// The wind over it.
-    pub(crate) breeze: Breeze,
-    pub(crate) rings: Vec<Ring>,
-    pub(crate) axis: Axis,
-    pub(crate) eddies: Eddies<'a>,
+    pub(crate) wind_field: WindField,
+    pub(crate) rings: Vec<VortexRing>,
+    pub(crate) axis: PlumeAxis,
+    pub(crate) eddies: EddyField<'a>,
     pub(crate) turbulence: f32,
     /// Age at which turbulence has grown to half its strength, s.
     pub(crate) turbulent_age: f32,
@@ -27,37 +27,37 @@ pub(crate) struct Draught<'a> {
 
 /// The air's motion at the places of particles, m/s.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Flow<R> {
+pub(crate) struct AirVelocity<R> {
     /// That of rings and of the draw toward the axis.
     pub(crate) steady: [R; 3],
     /// That of eddies of unit strength.
     pub(crate) eddies: [R; 3],
 }
 
-impl Draught<'_> {
+impl BurnerForces<'_> {
     /// Share of its own mass that gas of such a velocity takes up from the air, 1/s.
     #[inline(always)]
-    pub(crate) fn mixing<R: Real>(&self, velocity: &[R; 3], wind: &[R; 3], to_air: R) -> R {
-        let like = |value: f32| to_air.broadcast(value);
-        length(&less(velocity, wind)) * to_air.fma(like(self.entrainment), like(0.5 * self.entrainment))
+    pub(crate) fn mixing<R: Real>(&self, velocity: &[R; 3], wind: &[R; 3], air_exposure: R) -> R {
+        let like = |value: f32| air_exposure.broadcast(value);
+        length(&subtract(velocity, wind)) * air_exposure.fma(like(self.entrainment), like(0.5 * self.entrainment))
     }
 
     /// Velocity with which the air carries gas of `speed` and `age`, m/s.
     #[inline(always)]
-    pub(crate) fn velocity<R: Real>(&self, flow: &Flow<R>, speed: R, age: R) -> [R; 3] {
+    pub(crate) fn velocity<R: Real>(&self, flow: &AirVelocity<R>, speed: R, age: R) -> [R; 3] {
         let grown = age / (age + age.broadcast(self.turbulent_age));
-        plus(&flow.steady, &flow.eddies, speed * grown * age.broadcast(self.turbulence))
+        add_scaled(&flow.steady, &flow.eddies, speed * grown * age.broadcast(self.turbulence))
     }
 
     /// The motion at sixteen places.
     #[inline(always)]
-    pub(crate) fn flow<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> Flow<Lanes<S>> {
+    pub(crate) fn flow<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> AirVelocity<Lanes<S>> {
         let mut steady = self.axis.velocity(simd, place);
         for ring in &self.rings {
             ring.add_velocity(place, &mut steady);
         }
         let none = [Lanes::splat(simd, 0.0); 3];
         let eddies = if self.turbulence > 0.0 { self.eddies.velocity(simd, place) } else { none };
-        Flow { steady, eddies }
+        AirVelocity { steady, eddies }
     }
 }

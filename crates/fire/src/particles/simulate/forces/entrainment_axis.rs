@@ -18,14 +18,14 @@ use fearless_simd::{Simd, prelude::*};
 /// Layers of height.
 const LAYERS: usize = 24;
 /// Greatest speed at which gas draws together, as a share of the speed on the axis.
-const GREATEST_SHARE: f32 = 0.2;
+const MAX_INFLOW_FRACTION: f32 = 0.2;
 
 /// What air at the base adds to that, in `sqrt(g D)`.
 const INFLOW_FROUDE: f64 = 0.2;
 
 /// The axis of one burner's gas.
 #[derive(Clone, Debug)]
-pub(crate) struct Axis {
+pub(crate) struct PlumeAxis {
     base: f32,
     /// Layers a metre.
     scale: f32,
@@ -41,8 +41,14 @@ pub(crate) struct Axis {
 }
 
 /// The axes of all burners at `t`; the particles at `positions` came from burners of these numbers.
-pub(crate) fn axes(burners: &[Burner], positions: [&[f32]; 3], numbers: &[u32], strength: f64, t: f64) -> Vec<Axis> {
-    let scale = |burner: &Burner| LAYERS as f64 / (1.5 * burner.height + burner.reach);
+pub(crate) fn plume_axes(
+    burners: &[Burner],
+    positions: [&[f32]; 3],
+    numbers: &[u32],
+    strength: f64,
+    t: f64,
+) -> Vec<PlumeAxis> {
+    let scale = |burner: &Burner| LAYERS as f64 / (1.5 * burner.height + burner.bounding_radius);
     let bases: Vec<(f64, f64)> = burners.iter().map(|b| (b.position(t).y, scale(b))).collect();
     let mut sums = vec![[[0.0_f64; 3]; LAYERS + 1]; burners.len()];
     for (index, &number) in numbers.iter().enumerate() {
@@ -55,11 +61,11 @@ pub(crate) fn axes(burners: &[Burner], positions: [&[f32]; 3], numbers: &[u32], 
     burners
         .iter()
         .zip(&sums)
-        .map(|(burner, sums)| Axis::new(burner, burner.position(t), scale(burner), sums, strength))
+        .map(|(burner, sums)| PlumeAxis::new(burner, burner.position(t), scale(burner), sums, strength))
         .collect()
 }
 
-impl Axis {
+impl PlumeAxis {
     fn new(burner: &Burner, base: DVec3, scale: f64, sums: &[[f64; 3]; LAYERS + 1], strength: f64) -> Self {
         let mut axis = Self {
             base: base.y as f32,
@@ -109,7 +115,7 @@ impl Axis {
         let speed = speed_squared.simd_sqrt().simd_max(like(1e-6));
         // The pull of one axis ends where a large burner has others of its own.
         let near = (like(2.0) - distance * like(1.0 / self.reach)).simd_clamp01();
-        let greatest = speed.fma(like(GREATEST_SHARE), like(self.inflow));
+        let greatest = speed.fma(like(MAX_INFLOW_FRACTION), like(self.inflow));
         let inward = (distance * like(0.5 * self.acceleration) / speed).simd_min(greatest) * near * like(self.strength);
         let pull = (like(0.0) - inward) / distance.simd_max(like(f32::MIN_POSITIVE));
         [away[0] * pull, like(0.0), away[1] * pull]
@@ -143,20 +149,20 @@ mod tests {
     use super::*;
     use crate::particles::parameters::{BurnerParameters, FlameParticlesParameters};
 
-    fn velocity(axis: &Axis, place: Vec3) -> Vec3 {
+    fn velocity(axis: &PlumeAxis, place: Vec3) -> Vec3 {
         bansho_base::dispatch_baseline!(simd => {
             let velocity = axis.velocity(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
             Vec3::from(velocity.map(|values| values.as_slice()[3]))
         })
     }
 
-    fn axis(strength: f64) -> Axis {
+    fn axis(strength: f64) -> PlumeAxis {
         let parameters = BurnerParameters { height: bansho_base::parameters::Auto::Set(1.0), ..Default::default() };
         let burner = Burner::new(&parameters, &FlameParticlesParameters::default(), &MemoryAssets::default()).unwrap();
         // A column that leans to +x: x = y / 2.
         let y: Vec<f32> = (0..200).map(|i| i as f32 / 150.0).collect();
         let x: Vec<f32> = y.iter().map(|y| 0.5 * y).collect();
-        axes(&[burner], [&x, &y, &[0.0; 200]], &[0; 200], strength, 0.0).remove(0)
+        plume_axes(&[burner], [&x, &y, &[0.0; 200]], &[0; 200], strength, 0.0).remove(0)
     }
 
     #[test]

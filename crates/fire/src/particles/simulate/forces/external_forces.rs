@@ -7,15 +7,15 @@ use bansho_base::{
 };
 
 use super::{
-    burner_forces::Draught,
-    entrainment_axis::{Axis, axes},
-    turbulence::{Eddies, Turbulence},
-    vortex_rings::{Ring, rings},
-    wind::Breeze,
+    burner_forces::BurnerForces,
+    entrainment_axis::{PlumeAxis, plume_axes},
+    turbulence::{EddyField, Turbulence},
+    vortex_rings::{VortexRing, rings},
+    wind::WindField,
 };
 use crate::particles::{
     parameters::{FlameParticlesParameters, WindForce},
-    simulate::{derived::Design, particles::Particles},
+    simulate::{derived::DerivedConstants, particles::Particles},
 };
 use rayon::prelude::*;
 
@@ -29,24 +29,24 @@ const EDDY_DRIFT: f64 = 0.5;
 const CROSS_DRAG: f64 = 0.25;
 
 /// Share of its fuel that gas burns on a way as long as the flame is high, on the mean; and in the time that it takes there.
-const WAY_SHARE: f64 = 1.02;
-const TIME_SHARE: f64 = 0.25;
+const BURNED_PER_HEIGHT: f64 = 1.02;
+const BURNED_PER_RISE_TIME: f64 = 0.25;
 
 /// Particles of a task.
-const PARTICLES_OF_TASK: usize = 8192;
+const PARTICLES_PER_TASK: usize = 8192;
 
 /// What of a fire stays while it burns.
 #[derive(Clone, Copy)]
-pub(crate) struct Setting<'a> {
+pub(crate) struct StepConstants<'a> {
     pub(crate) parameters: &'a FlameParticlesParameters,
-    pub(crate) design: &'a Design,
+    pub(crate) constants: &'a DerivedConstants,
     pub(crate) turbulence: &'a Turbulence,
     pub(crate) key: Key,
 }
 
 /// What acts on the gas in a step.
-pub(crate) struct Weather<'a> {
-    setting: Setting<'a>,
+pub(crate) struct ExternalForces<'a> {
+    step: StepConstants<'a>,
     around: &'a Surroundings<'a>,
     pub(crate) origin: DVec3,
     pub(crate) occluders: &'a [Occluder],
@@ -58,22 +58,23 @@ pub(crate) struct Weather<'a> {
     /// Density of air at 1 K, kg K/m^3.
     pub(crate) density_kelvin: f32,
     /// The air's motion over each burner.
-    pub(crate) draughts: Vec<Draught<'a>>,
+    pub(crate) burner_forces: Vec<BurnerForces<'a>>,
 }
 
-impl<'a> Weather<'a> {
+impl<'a> ExternalForces<'a> {
     /// The weather of a step that begins at `t`.
-    pub(crate) fn new(setting: Setting<'a>, particles: &Particles, around: &'a Surroundings, t: f64) -> Self {
-        let Setting { parameters: flame, design, .. } = setting;
-        let axes = axes(&design.burners, particles.positions(), &particles.burner, flame.motion.narrowing, t);
-        let bounds = bounds(particles, design.burners.len());
-        let draughts = axes.into_iter().zip(bounds).enumerate().map(|(number, (axis, bounds))| {
-            let breeze = Breeze::new(around.wind, particles.origin, bounds, t);
-            setting.draught(number, axis, breeze, around, t)
+    pub(crate) fn new(step: StepConstants<'a>, particles: &Particles, around: &'a Surroundings, t: f64) -> Self {
+        let StepConstants { parameters: flame, constants, .. } = step;
+        let plume_axes =
+            plume_axes(&constants.burners, particles.positions(), &particles.burner, flame.motion.narrowing, t);
+        let bounds = bounds(particles, constants.burners.len());
+        let burner_forces = plume_axes.into_iter().zip(bounds).enumerate().map(|(number, (axis, bounds))| {
+            let wind_field = WindField::new(around.wind, particles.origin, bounds, t);
+            step.burner(number, axis, wind_field, around, t)
         });
         Self {
-            draughts: draughts.collect(),
-            setting,
+            burner_forces: burner_forces.collect(),
+            step,
             around,
             origin: particles.origin,
             occluders: &around.others.occluders,
@@ -86,19 +87,26 @@ impl<'a> Weather<'a> {
     }
 
     /// Lets rings and eddies go on to the moment `t`; axes and wind stay for the step.
-    pub(crate) fn pass(&mut self, t: f64) {
-        for (number, draught) in self.draughts.iter_mut().enumerate() {
-            draught.rings = self.setting.rings(number, &draught.axis, t);
-            draught.eddies = self.setting.eddies(number, self.around, t);
+    pub(crate) fn advance_vortex_rings(&mut self, t: f64) {
+        for (number, burner) in self.burner_forces.iter_mut().enumerate() {
+            burner.rings = self.step.rings(number, &burner.axis, t);
+            burner.eddies = self.step.eddies(number, self.around, t);
         }
     }
 }
 
-impl<'a> Setting<'a> {
-    fn draught(self, number: usize, axis: Axis, breeze: Breeze, around: &Surroundings, t: f64) -> Draught<'a> {
-        let (burner, motion) = (&self.design.burners[number], &self.parameters.motion);
-        Draught {
-            breeze,
+impl<'a> StepConstants<'a> {
+    fn burner(
+        self,
+        number: usize,
+        axis: PlumeAxis,
+        wind_field: WindField,
+        around: &Surroundings,
+        t: f64,
+    ) -> BurnerForces<'a> {
+        let (burner, motion) = (&self.constants.burners[number], &self.parameters.motion);
+        BurnerForces {
+            wind_field,
             rings: self.rings(number, &axis, t),
             axis,
             eddies: self.eddies(number, around, t),
@@ -106,16 +114,16 @@ impl<'a> Setting<'a> {
             turbulent_age: TURBULENT_AGE * burner.rise_time() as f32,
             entrainment: (motion.entrainment / (0.5 * burner.diameter)) as f32,
             drag: (CROSS_DRAG * motion.wind_gain / (0.5 * burner.diameter)) as f32,
-            burning: [(WAY_SHARE / burner.height) as f32, (TIME_SHARE / burner.rise_time()) as f32],
+            burning: [(BURNED_PER_HEIGHT / burner.height) as f32, (BURNED_PER_RISE_TIME / burner.rise_time()) as f32],
         }
     }
 
-    fn rings(self, number: usize, axis: &Axis, t: f64) -> Vec<Ring> {
-        rings(&self.design.burners[number], self.parameters, self.key, number as u32, t, axis)
+    fn rings(self, number: usize, axis: &PlumeAxis, t: f64) -> Vec<VortexRing> {
+        rings(&self.constants.burners[number], self.parameters, self.key, number as u32, t, axis)
     }
 
-    fn eddies(self, number: usize, around: &Surroundings, t: f64) -> Eddies<'a> {
-        let (burner, motion) = (&self.design.burners[number], &self.parameters.motion);
+    fn eddies(self, number: usize, around: &Surroundings, t: f64) -> EddyField<'a> {
+        let (burner, motion) = (&self.constants.burners[number], &self.parameters.motion);
         let drift = around.wind.travel(0.0, t) * (EDDY_DRIFT * motion.wind_gain);
         self.turbulence.at(t, motion.eddy_size * burner.diameter, burner.axis_speed(0.5 * burner.height), drift)
     }
@@ -131,7 +139,7 @@ fn bounds(particles: &Particles, burners: usize) -> Vec<[Vec3; 2]> {
     let [x, y, z] = particles.positions();
     let of_task = |first: usize| {
         let mut bounds = vec![NOTHING; burners];
-        for index in first..(first + PARTICLES_OF_TASK).min(particles.len()) {
+        for index in first..(first + PARTICLES_PER_TASK).min(particles.len()) {
             let place = Vec3::new(x[index], y[index], z[index]);
             let [low, high] = &mut bounds[particles.burner[index] as usize];
             (*low, *high) = (low.min(place), high.max(place));
@@ -144,7 +152,7 @@ fn bounds(particles: &Particles, burners: usize) -> Vec<[Vec3; 2]> {
         }
         one
     };
-    let parts = (0..particles.len()).into_par_iter().step_by(PARTICLES_OF_TASK);
+    let parts = (0..particles.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
     let bounds = parts.map(of_task).reduce(|| vec![NOTHING; burners], both);
     // A burner that nothing came from yet has no wind to speak of.
     bounds.into_iter().map(|bounds| if bounds[0].x <= bounds[1].x { bounds } else { [Vec3::ZERO, Vec3::ONE] }).collect()
@@ -174,19 +182,19 @@ mod tests {
             particles: 600,
             ..FlameParticlesParameters::default()
         };
-        let design = Design::new(&parameters, None, &MemoryAssets::default()).unwrap();
-        let mut simulation = Simulation::new(&parameters, design, Key::new(1, "flame"));
+        let constants = DerivedConstants::new(&parameters, None, &MemoryAssets::default()).unwrap();
+        let mut simulation = Simulation::new(&parameters, constants, Key::new(1, "flame"));
         let gusty = WindParameters { velocity: [2.0, 0.0, 0.0].into(), gust: 1.5, ..WindParameters::default() };
         let (wind, air) = (Wind::new(gusty, 3, None), Air::default());
         let around = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
         (0..30).for_each(|step| simulation.step(f64::from(step) * simulation.step_s(), &around));
-        let Simulation { parameters, design, turbulence, key, .. } = &simulation;
-        let setting = Setting { parameters, design, turbulence, key: *key };
-        let weather = Weather::new(setting, &simulation.particles, &around, 0.25);
+        let Simulation { parameters, constants, turbulence, key, .. } = &simulation;
+        let step = StepConstants { parameters, constants, turbulence, key: *key };
+        let forces = ExternalForces::new(step, &simulation.particles, &around, 0.25);
         let at = |burner: usize, place: Vec3| {
             bansho_base::dispatch_baseline!(simd => {
                 let lanes = place.to_array().map(|x| Lanes::splat(simd, x));
-                Vec3::from(weather.draughts[burner].breeze.at(simd, &lanes).map(|values| values.as_slice()[0]))
+                Vec3::from(forces.burner_forces[burner].wind_field.at(simd, &lanes).map(|values| values.as_slice()[0]))
             })
         };
         let (particles, mut off, mut apart) = (&simulation.particles, 0.0_f32, 0.0_f32);

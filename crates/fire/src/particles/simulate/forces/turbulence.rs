@@ -23,7 +23,7 @@ const EDDIES: u32 = 5;
 /// Speed of the two layers beside the gas on the axis.
 const LAYER_SPEED: [f64; 2] = [0.55, 0.3];
 /// Standard deviation of the two layers; their squares sum to 1.
-const LAYER_SHARE: [f32; 2] = [0.86, 0.51];
+const LAYER_WEIGHT: [f32; 2] = [0.86, 0.51];
 
 /// A periodic field of velocity, of standard deviation 1 a component.
 #[derive(Clone, Debug)]
@@ -35,7 +35,7 @@ pub(crate) struct Turbulence {
 
 /// Turbulence at one moment.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Eddies<'a> {
+pub(crate) struct EddyField<'a> {
     tile: &'a [[f32; 4]],
     /// Grid points a metre, and the place of the flame's position on the grid, for each layer.
     layers: [(f32, [f32; 3]); 2],
@@ -58,7 +58,7 @@ impl Turbulence {
     }
 
     /// The eddies at time `t`, the largest `eddy_size` m wide, rising in gas of `speed` and drifting with the wind's `drift` since time 0.
-    pub(crate) fn at(&self, t: f64, eddy_size: f64, speed: f64, drift: DVec3) -> Eddies<'_> {
+    pub(crate) fn at(&self, t: f64, eddy_size: f64, speed: f64, drift: DVec3) -> EddyField<'_> {
         let layer = |index: usize| {
             let scale = SIDE as f64 / (f64::from(EDDIES) * eddy_size) * (index + 1) as f64;
             let moved = DVec3::Y * (speed * LAYER_SPEED[index] * t) + drift;
@@ -66,7 +66,7 @@ impl Turbulence {
             let origin = (-moved * scale + 11.3 * index as f64).rem_euclid(DVec3::splat(SIDE as f64));
             (scale as f32, origin.as_vec3().to_array())
         };
-        Eddies { tile: self.tile(), layers: [layer(0), layer(1)] }
+        EddyField { tile: self.tile(), layers: [layer(0), layer(1)] }
     }
 }
 
@@ -81,13 +81,13 @@ fn tile(key: Key) -> Vec<[f32; 4]> {
     tile.into_iter().map(|velocity| velocity.extend(0.0).to_array()).collect()
 }
 
-impl Eddies<'_> {
+impl EddyField<'_> {
     /// Velocity at `place`, m from the flame's position, of standard deviation 1 a component.
     #[inline(always)]
     pub(crate) fn velocity<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
         let mut sum = [Lanes::splat(simd, 0.0); 3];
         let Ok(tile) = <&[[f32; 4]; SIDE * SIDE * SIDE]>::try_from(self.tile) else { return sum };
-        for (layer, share) in LAYER_SHARE.into_iter().enumerate() {
+        for (layer, share) in LAYER_WEIGHT.into_iter().enumerate() {
             let (scale, origin) = &self.layers[layer];
             let mut on_grid = *place;
             for c in 0..3 {
@@ -110,9 +110,9 @@ fn sample_lanes<S: Simd>(simd: S, tile: &[[f32; 4]; SIDE * SIDE * SIDE], place: 
         (wrap_split(place[0], MASK), wrap_split(place[1], MASK), wrap_split(place[2], MASK));
     let (next_x, next_y, next_z) = ((x + 1) & MASK, (y + 1) & MASK, (z + 1) & MASK);
     let row = Row { tile, x: [x, next_x], across };
-    let near = mixed(&row.at(simd, y, z), &row.at(simd, next_y, z), up);
-    let far = mixed(&row.at(simd, y, next_z), &row.at(simd, next_y, next_z), up);
-    let [x, y, z, _] = mixed(&near, &far, along);
+    let near = lerp4(&row.at(simd, y, z), &row.at(simd, next_y, z), up);
+    let far = lerp4(&row.at(simd, y, next_z), &row.at(simd, next_y, next_z), up);
+    let [x, y, z, _] = lerp4(&near, &far, along);
     [x, y, z]
 }
 
@@ -129,18 +129,18 @@ impl<S: Simd> Row<'_, S> {
     #[inline(always)]
     fn at(&self, simd: S, y: u32x16<S>, z: u32x16<S>) -> [Lanes<S>; 4] {
         let start = ((z << SIDE.ilog2()) + y) << SIDE.ilog2();
-        mixed(&fetch(simd, self.tile, start + self.x[0]), &fetch(simd, self.tile, start + self.x[1]), self.across)
+        lerp4(&fetch(simd, self.tile, start + self.x[0]), &fetch(simd, self.tile, start + self.x[1]), self.across)
     }
 }
 
 /// Values at a share of the way from one to the other.
 #[inline(always)]
-pub(crate) fn mixed<R: Real>(one: &[R; 4], other: &[R; 4], share: R) -> [R; 4] {
-    let mut mixed = *one;
+pub(crate) fn lerp4<R: Real>(one: &[R; 4], other: &[R; 4], share: R) -> [R; 4] {
+    let mut lerp4 = *one;
     for c in 0..4 {
-        mixed[c] = share.fma(other[c] - one[c], one[c]);
+        lerp4[c] = share.fma(other[c] - one[c], one[c]);
     }
-    mixed
+    lerp4
 }
 
 /// A tile at a place in grid points, straight between them.
@@ -151,9 +151,9 @@ fn sample(tile: &[[f32; 4]], place: Vec3) -> [f32; 4] {
     let wrap = |coordinate: i32, step: i32| (coordinate.wrapping_add(step) & (SIDE as i32 - 1)) as usize;
     let row = |j: i32, k: i32| {
         let start = (wrap(cell.z, k) * SIDE + wrap(cell.y, j)) * SIDE;
-        mixed(&tile[start + wrap(cell.x, 0)], &tile[start + wrap(cell.x, 1)], f.x)
+        lerp4(&tile[start + wrap(cell.x, 0)], &tile[start + wrap(cell.x, 1)], f.x)
     };
-    mixed(&mixed(&row(0, 0), &row(1, 0), f.y), &mixed(&row(0, 1), &row(1, 1), f.y), f.z)
+    lerp4(&lerp4(&row(0, 0), &row(1, 0), f.y), &lerp4(&row(0, 1), &row(1, 1), f.y), f.z)
 }
 
 /// One potential on the grid.
@@ -185,7 +185,7 @@ fn curl(potentials: &[Vec<f32>; 3], index: usize) -> Vec3 {
 mod tests {
     use super::*;
 
-    fn velocity(eddies: &Eddies, place: Vec3) -> Vec3 {
+    fn velocity(eddies: &EddyField, place: Vec3) -> Vec3 {
         bansho_base::dispatch_baseline!(simd => {
             let velocity = eddies.velocity(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
             Vec3::from(velocity.map(|values| values.as_slice()[9]))

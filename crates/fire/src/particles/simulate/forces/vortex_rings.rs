@@ -12,7 +12,7 @@ use bansho_base::math::{
     simd::{Lanes, Real, any_positive},
 };
 
-use super::entrainment_axis::Axis;
+use super::entrainment_axis::PlumeAxis;
 use crate::particles::{
     parameters::FlameParticlesParameters,
     simulate::{burner::Burner, vector_lanes::dot},
@@ -21,11 +21,11 @@ use crate::particles::{
 use fearless_simd::Simd;
 
 /// Most rings that a burner sheds side by side.
-const MOST_STREAMS: f64 = 6.0;
+const MAX_STREAMS: f64 = 6.0;
 /// Most rings of a stream that are alive, latest first,
-const MOST_ALIVE: i64 = 9;
+const MAX_RINGS: i64 = 9;
 /// and the age at which one is gone, whatever holds it, beats: before the last of those is as old, at its earliest.
-const GREATEST_AGE: f64 = MOST_ALIVE as f64 - 2.2;
+const MAX_AGE_BEATS: f64 = MAX_RINGS as f64 - 2.2;
 /// Speed of a ring beside the gas on the axis.
 const RING_SPEED: f64 = 0.7;
 /// Speed in a ring's middle beside the gas on the axis at its height.
@@ -37,7 +37,7 @@ const RING_GROWTH: f64 = 0.28;
 
 /// A ring at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Ring {
+pub(crate) struct VortexRing {
     /// Its middle, m from the flame's position.
     centre: Vec3,
     /// Unit vector along which its middle blows.
@@ -48,7 +48,7 @@ pub(crate) struct Ring {
     strength: f32,
 }
 
-impl Ring {
+impl VortexRing {
     /// Adds the velocity of the air at `place`, m/s.
     #[inline(always)]
     pub(crate) fn add_velocity<S: Simd>(&self, place: &[Lanes<S>; 3], sum: &mut [Lanes<S>; 3]) {
@@ -86,35 +86,35 @@ pub(crate) fn rings(
     key: Key,
     number: u32,
     t: f64,
-    axis: &Axis,
-) -> Vec<Ring> {
+    axis: &PlumeAxis,
+) -> Vec<VortexRing> {
     if flame.motion.puffing == 0.0 {
         return Vec::new();
     }
     let hz = burner.puffing_hz(flame);
     let side = std::f64::consts::FRAC_PI_4 * burner.diameter * burner.diameter;
-    let streams = (burner.square_metres / side).round().clamp(1.0, MOST_STREAMS) as u32;
+    let streams = (burner.area_m2 / side).round().clamp(1.0, MAX_STREAMS) as u32;
     let latest = (t * hz).floor() as i64 + 1;
     let stream_rings = |stream: u32| {
-        let shed = Shed { burner, key, purpose: Purpose(number * 64 + stream), streams, hz, t, axis };
-        (0..MOST_ALIVE).filter_map(move |back| shed.ring(latest - back, flame.motion.puffing))
+        let shed = VortexShedding { burner, key, purpose: Purpose(number * 64 + stream), streams, hz, t, axis };
+        (0..MAX_RINGS).filter_map(move |back| shed.ring(latest - back, flame.motion.puffing))
     };
     (0..streams).flat_map(stream_rings).collect()
 }
 
-struct Shed<'a> {
+struct VortexShedding<'a> {
     burner: &'a Burner,
     key: Key,
     purpose: Purpose,
     streams: u32,
     hz: f64,
     t: f64,
-    axis: &'a Axis,
+    axis: &'a PlumeAxis,
 }
 
-impl Shed<'_> {
+impl VortexShedding<'_> {
     /// Ring `beat`, if it is alive.
-    fn ring(&self, beat: i64, puffing: f64) -> Option<Ring> {
+    fn ring(&self, beat: i64, puffing: f64) -> Option<VortexRing> {
         let words = self.key.words(beat as u64, 1, self.purpose);
         let [early, strong, tilt_x, tilt_z] = words.map(|word| f64::from(uniform(word)));
         let phase = f64::from(self.purpose.0 % 64) * 0.618;
@@ -131,12 +131,12 @@ impl Shed<'_> {
             * cbrt(height / burner.diameter).clamp(0.6, 1.2);
         // It rolls up within a beat and fades as it leaves the flame.
         let rolled = beats / (beats + 0.35);
-        let fade = (1.6 - height / burner.height).clamp(0.0, 0.6) / 0.6 * (GREATEST_AGE - beats).clamp(0.0, 1.0);
+        let fade = (1.6 - height / burner.height).clamp(0.0, 0.6) / 0.6 * (MAX_AGE_BEATS - beats).clamp(0.0, 1.0);
         let speed = burner.axis_speed(height) * RING_STRENGTH * (0.75 + 0.5 * strong) * rolled * fade * puffing;
         let [above, base] = [height, 0.0].map(|height| self.axis.at(height as f32).map(f64::from));
         let lean = DVec3::new(above[0] - base[0], height, above[1] - base[1]);
         let axis = DVec3::new(0.5 * (tilt_x - 0.5), 1.0, 0.5 * (tilt_z - 0.5)).normalize();
-        Some(Ring {
+        Some(VortexRing {
             centre: (self.middle(beat, [tilt_x, tilt_z]) + lean).as_vec3(),
             axis: axis.as_vec3(),
             inverse_extent: (1.0 / extent) as f32,
@@ -151,7 +151,7 @@ impl Shed<'_> {
             let offset = DVec3::new(z - 0.5, 0.0, x - 0.5) * (0.4 * burner.diameter);
             return burner.position(self.t) + offset;
         }
-        burner.birthplace(self.key, beat as u64 ^ u64::from(self.purpose.0) << 48, self.t).position
+        burner.spawn_point(self.key, beat as u64 ^ u64::from(self.purpose.0) << 48, self.t).position
     }
 }
 
@@ -160,10 +160,10 @@ mod tests {
     use bansho_base::host::assets::MemoryAssets;
 
     use super::*;
-    use crate::particles::{parameters::BurnerParameters, simulate::forces::entrainment_axis::axes};
+    use crate::particles::{parameters::BurnerParameters, simulate::forces::entrainment_axis::plume_axes};
     use fearless_simd::prelude::*;
 
-    fn velocity(ring: &Ring, place: Vec3) -> Vec3 {
+    fn velocity(ring: &VortexRing, place: Vec3) -> Vec3 {
         bansho_base::dispatch_baseline!(simd => {
             let mut sum = [Lanes::splat(simd, 0.0); 3];
             ring.add_velocity(&place.to_array().map(|x| Lanes::splat(simd, x)), &mut sum);
@@ -171,8 +171,8 @@ mod tests {
         })
     }
 
-    fn ring() -> Ring {
-        Ring { centre: Vec3::new(0.1, 0.5, 0.0), axis: Vec3::Y, inverse_extent: 2.5, strength: 1.5 }
+    fn ring() -> VortexRing {
+        VortexRing { centre: Vec3::new(0.1, 0.5, 0.0), axis: Vec3::Y, inverse_extent: 2.5, strength: 1.5 }
     }
 
     #[test]
@@ -194,7 +194,7 @@ mod tests {
         let mut flame = FlameParticlesParameters::default();
         flame.motion.puffing_hz = bansho_base::parameters::Auto::Set(40.0);
         let burner = Burner::new(&BurnerParameters::default(), &flame, &MemoryAssets::default()).unwrap();
-        let axis = axes(std::slice::from_ref(&burner), [&[]; 3], &[], 0.0, 0.0).remove(0);
+        let axis = plume_axes(std::slice::from_ref(&burner), [&[]; 3], &[], 0.0, 0.0).remove(0);
         let total = |t: f64| {
             let rings = rings(&burner, &flame, Key::new(4, "rings"), 0, t, &axis);
             (rings.iter().map(|ring| f64::from(ring.strength)).sum::<f64>(), rings.len())
@@ -205,7 +205,7 @@ mod tests {
             assert!((now - before).abs() < 0.01 * before, "from {before} to {now}");
             (before, most) = (now, most.max(count));
         }
-        assert!(most as i64 >= MOST_ALIVE - 2, "{most} rings");
+        assert!(most as i64 >= MAX_RINGS - 2, "{most} rings");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use bansho_base::{
     world::wind::Wind,
 };
 
-use super::turbulence::mixed;
+use super::turbulence::lerp4;
 use fearless_simd::{Simd, prelude::*};
 
 /// Grid points along each side of the box around the gas.
@@ -19,7 +19,7 @@ const ALL_POINTS: usize = POINTS * POINTS * POINTS;
 
 /// The wind at one moment within a box.
 #[derive(Clone, Debug)]
-pub(crate) struct Breeze {
+pub(crate) struct WindField {
     low: [f32; 3],
     /// Cells a metre.
     scale: [f32; 3],
@@ -27,7 +27,7 @@ pub(crate) struct Breeze {
     velocity: Box<[[f32; 4]; ALL_POINTS]>,
 }
 
-impl Breeze {
+impl WindField {
     /// The wind at time `t` between the corners `low` and `high`, which count from `origin`, m.
     pub(crate) fn new(wind: &Wind, origin: DVec3, [low, high]: [Vec3; 2], t: f64) -> Self {
         let size = (high - low).max(Vec3::splat(1e-3));
@@ -60,10 +60,10 @@ impl Breeze {
         let mut rows = [[like(0.0); 4]; 4];
         for k in 0..4 {
             let [here, beside] = [fetch(simd, &self.velocity, starts[k]), fetch(simd, &self.velocity, starts[k] + 1)];
-            rows[k] = mixed(&here, &beside, across);
+            rows[k] = lerp4(&here, &beside, across);
         }
-        let (near, far) = (mixed(&rows[0], &rows[1], up), mixed(&rows[2], &rows[3], up));
-        let [x, y, z, _] = mixed(&near, &far, along);
+        let (near, far) = (lerp4(&rows[0], &rows[1], up), lerp4(&rows[2], &rows[3], up));
+        let [x, y, z, _] = lerp4(&near, &far, along);
         [x, y, z]
     }
 }
@@ -79,11 +79,11 @@ mod tests {
         let parameters = WindParameters { velocity: Animated::from([3.0, 0.0, 1.0]), ..WindParameters::default() };
         let wind = Wind::new(parameters, 5, None);
         let origin = DVec3::new(10.0, 0.0, -4.0);
-        let breeze = Breeze::new(&wind, origin, [Vec3::ZERO, Vec3::new(1.0, 2.0, 1.0)], 2.0);
+        let wind_field = WindField::new(&wind, origin, [Vec3::ZERO, Vec3::new(1.0, 2.0, 1.0)], 2.0);
         for place in [Vec3::splat(0.1), Vec3::new(0.9, 1.3, 0.4), Vec3::new(0.5, 2.0, 1.0)] {
             let exact = wind.at(origin + place.as_dvec3(), 2.0).as_vec3();
             let found = bansho_base::dispatch_baseline!(simd => {
-                let velocity = breeze.at(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
+                let velocity = wind_field.at(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
                 Vec3::from(velocity.map(|values| values.as_slice()[11]))
             });
             assert!((found - exact).length() < 0.1, "{found} {exact}");

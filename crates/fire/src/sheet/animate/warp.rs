@@ -13,8 +13,8 @@ use super::{clock::Clock, fluctuation::Fluctuation};
 use crate::sheet::{
     parameters::{FlameSheetParameters, ShapeParameters},
     render::{
-        curve_tables::{CurvePair, SEGMENTS, locate_near},
-        shape_tables::Shape,
+        curve_tables::{CurvePair, SEGMENTS, lookup_index},
+        shape_tables::ShapeTables,
     },
 };
 
@@ -22,14 +22,14 @@ use fearless_simd::Simd;
 
 /// The waves of one flame: its edges P (15), its tip's wandering and its height's flicker.
 #[derive(Clone, Debug)]
-pub(crate) struct Motion {
+pub(crate) struct FlameWaves {
     left: Fluctuation,
     right: Fluctuation,
     sway: Fluctuation,
     flicker: Fluctuation,
 }
 
-impl Motion {
+impl FlameWaves {
     /// The waves that `key` gives a flame of this shape.
     pub(crate) fn new(shape: &ShapeParameters, key: Key, clock: &Clock) -> Self {
         let edge = |name| {
@@ -49,30 +49,30 @@ impl Motion {
 
 /// How the wind pushes a sheet: across it (to the right) and toward `right x up`, as the tangent of the gas's path.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Push {
+pub(crate) struct WindLean {
     /// Tangent at the top, to the right.
     pub(crate) across: f64,
     /// Tangent toward the front of the sheet.
     pub(crate) toward: f64,
 }
 
-impl Push {
+impl WindLean {
     /// Steepest lean of the plane and of the bend.
-    const MOST: f64 = 1.5;
+    const MAX_TANGENT: f64 = 1.5;
 
     /// The push of `wind` at `point` on gas that rises at `rise_speed` m/s.
     ///
     /// Drift over rise is the tangent; it saturates smoothly, since a flame that lies flat is no sheet any more.
     pub(crate) fn new(wind: &Wind, point: DVec3, t: f64, right: DVec3, rise_speed: f64, response: f64) -> Self {
         let velocity = wind.at(point, t) * (response / rise_speed.max(0.05));
-        let soft = |tangent: f64| Self::MOST * math::tanh(tangent / Self::MOST);
+        let soft = |tangent: f64| Self::MAX_TANGENT * math::tanh(tangent / Self::MAX_TANGENT);
         Self { across: soft(velocity.dot(right)), toward: soft(velocity.dot(right.cross(DVec3::Y))) }
     }
 }
 
 /// One flame at one moment.
 #[derive(Clone, Debug)]
-pub(crate) struct Moment {
+pub(crate) struct WarpState {
     /// E left and right over w.
     pub(crate) edges: CurvePair,
     /// How far the centre line has moved to the right, in sheet widths, over y.
@@ -80,36 +80,36 @@ pub(crate) struct Moment {
     /// Least and greatest of that.
     pub(crate) centre_range: [f64; 2],
     /// What y is multiplied by, below 1 while the flame is taller than usual.
-    squeeze: f32,
+    height_scale: f32,
     /// Distance that the texture has scrolled, sheet heights.
     pub(crate) scroll: f64,
 }
 
-impl Moment {
+impl WarpState {
     /// The flame at time `t` (its own, phase included), pushed across by `push`.
     pub(crate) fn new(
         parameters: &FlameSheetParameters,
-        shape: &Shape,
-        motion: &Motion,
+        shape: &ShapeTables,
+        waves: &FlameWaves,
         clock: &Clock,
         t: f64,
-        push: Push,
+        push: WindLean,
     ) -> Self {
         let level = fearless_simd::Level::new();
-        fearless_simd::dispatch!(level, _simd => settle(parameters, shape, motion, clock, t, push))
+        fearless_simd::dispatch!(level, _simd => evaluate_warp(parameters, shape, waves, clock, t, push))
     }
 
     /// The point of the unbent, usual flame that (x, y) of the sheet shows.
     #[inline(always)]
-    pub(crate) fn straighten<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
-        let [centre, _] = self.centre.near(&locate_near(y));
-        (x - centre, y * y.broadcast(self.squeeze))
+    pub(crate) fn unwarp<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
+        let [centre, _] = self.centre.lookup(&lookup_index(y));
+        (x - centre, y * y.broadcast(self.height_scale))
     }
 
-    /// [`straighten`](Self::straighten) for one point.
+    /// [`unwarp`](Self::unwarp) for one point.
     #[inline(always)]
-    pub(crate) fn straighten_at(&self, [x, y]: [f32; 2]) -> [f32; 2] {
-        [x - self.centre.at(y)[0], y * self.squeeze]
+    pub(crate) fn unwarp_at(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        [x - self.centre.at(y)[0], y * self.height_scale]
     }
 
     /// Where the centre line stands at height y, in sheet widths from the axis.
@@ -119,44 +119,44 @@ impl Moment {
 }
 
 #[inline(always)]
-fn settle(
+fn evaluate_warp(
     parameters: &FlameSheetParameters,
-    shape: &Shape,
-    motion: &Motion,
+    shape: &ShapeTables,
+    waves: &FlameWaves,
     clock: &Clock,
     t: f64,
-    push: Push,
-) -> Moment {
+    push: WindLean,
+) -> WarpState {
     let (time, scroll) = (clock.time(t), clock.scroll(t));
-    let look = &parameters.shape;
+    let shape_parameters = &parameters.shape;
     let edge = |waves: &Fluctuation| {
         let mut values = [0.0; SEGMENTS + 1];
         waves.fill(-scroll, 1.0 / SEGMENTS as f64, &mut values);
         // P in [0, 1]; its strength takes it away from 1, where the edge is at its outermost.
-        values.map(|value| (0.5 * look.flutter as f32).mul_add(value - 1.0, 1.0))
+        values.map(|value| (0.5 * shape_parameters.flutter as f32).mul_add(value - 1.0, 1.0))
     };
-    let edges = shape.edges(&edge(&motion.left), &edge(&motion.right));
-    let centre = centre_line(parameters, motion, time, push);
+    let edges = shape.edges(&edge(&waves.left), &edge(&waves.right));
+    let centre = centre_line(parameters, waves, time, push);
     let ends = (0..=16).map(|i| f64::from(centre.at(i as f32 / 16.0)[0]));
     let centre_range = ends.fold([0.0_f64; 2], |[low, high], value| [low.min(value), high.max(value)]);
-    let flicker = look.flicker * f64::from(motion.flicker.at(time));
+    let flicker = shape_parameters.flicker * f64::from(waves.flicker.at(time));
     // Sheets leave headroom for growth: at rest the flame reaches 1 / (1 + flicker) of the sheet.
-    let squeeze = ((1.0 + look.flicker) / (1.0 + flicker)) as f32;
-    Moment { edges, centre, centre_range, squeeze, scroll }
+    let height_scale = ((1.0 + shape_parameters.flicker) / (1.0 + flicker)) as f32;
+    WarpState { edges, centre, centre_range, height_scale, scroll }
 }
 
 /// Drift grows like y^1.5, as gas that is pushed evenly while it accelerates upward; sway travels up with the gas.
 #[inline(always)]
-fn centre_line(parameters: &FlameSheetParameters, motion: &Motion, time: f64, push: Push) -> CurvePair {
+fn centre_line(parameters: &FlameSheetParameters, waves: &FlameWaves, time: f64, push: WindLean) -> CurvePair {
     /// How long a swing takes from base to tip, as a share of its period.
     const LAG: f64 = 0.6;
-    let look = &parameters.shape;
+    let shape_parameters = &parameters.shape;
     let bend = push.across * parameters.height / parameters.width / 1.5;
     let mut swings = [0.0; SEGMENTS + 1];
-    motion.sway.fill(time, -LAG / look.sway_hz / SEGMENTS as f64, &mut swings);
+    waves.sway.fill(time, -LAG / shape_parameters.sway_hz / SEGMENTS as f64, &mut swings);
     CurvePair::from_samples(|i| {
         let y = i as f32 / SEGMENTS as f32;
         let drift = y * y.sqrt();
-        [drift * (look.sway as f32).mul_add(swings[i], bend as f32), 0.0]
+        [drift * (shape_parameters.sway as f32).mul_add(swings[i], bend as f32), 0.0]
     })
 }
