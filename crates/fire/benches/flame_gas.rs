@@ -95,8 +95,8 @@ fn draw(subject: &Subject, look: &LookParameters, before: impl Fn(&PreparedGas) 
 fn naive<const WIDTH: usize>(particles: &Particles, view: &View, value: impl Fn(usize, [f64; 2], f64) -> [f64; WIDTH]) {
     let mut picture = vec![[0.0_f64; WIDTH]; SIZE[0] * SIZE[1]];
     for index in 0..particles.len() {
-        let place = DVec3::from(particles.positions().map(|values| f64::from(values[index])));
-        let Some(seen) = view.camera.project(place) else { continue };
+        let position = DVec3::from(particles.positions().map(|values| f64::from(values[index])));
+        let Some(seen) = view.camera.project(position) else { continue };
         let radius = f64::from(particles.support_radii()[index]);
         let reach = radius * seen.pixels_per_metre;
         let clip = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
@@ -138,7 +138,7 @@ fn gas_720p(criterion: &mut Criterion) {
             naive(particles, view, |index, [u, v], radius| {
                 let tau = line_integral(math::hypot(u, v), radius)
                     * volume(index)
-                    * soot_absorption(f64::from(particles.soots()[index]), &look);
+                    * soot_absorption(f64::from(particles.soot_fractions()[index]), &look);
                 let [red, green, blue] = color::black_body().radiance(particles.temperatures()[index]).map(f64::from);
                 [tau, tau * red, tau * green, tau * blue]
             });

@@ -16,7 +16,7 @@ use bansho_base::{
 };
 
 use bansho_fire::particles::{FlameParticles, FlameParticlesParameters};
-use bansho_sph::{Cells, Kernel, KernelShape, Particles, PressureForce, StateEquation, densities};
+use bansho_sph::{Cells, Kernel, KernelShape, Particles, PressureForce, StateEquation, compute_densities};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use support::pinned_pool;
 
@@ -37,8 +37,8 @@ fn cloud<const D: usize>(count: u64) -> Particles<D> {
     let key = Key::new(1, "cloud");
     let mut particles = Particles::default();
     for id in 0..count {
-        let place = key.uniforms(id, 0, Purpose(1));
-        particles.push(std::array::from_fn(|c| place[c] * side as f32), [0.0; D], 1.0, id);
+        let uniforms = key.uniforms(id, 0, Purpose(1));
+        particles.push(std::array::from_fn(|c| uniforms[c] * side as f32), [0.0; D], 1.0, id);
     }
     particles
 }
@@ -69,15 +69,15 @@ impl<const D: usize> Simulation<D> {
         self.particles.sort(&mut self.cells);
     }
 
-    fn densities(&mut self) {
-        densities(&self.cells, KernelShape::Poly6, &self.particles.masses, &mut self.densities);
+    fn compute_densities(&mut self) {
+        compute_densities(&self.cells, KernelShape::Poly6, &self.particles.masses, &mut self.densities);
     }
 
     fn forces(&mut self) {
         self.pressures.clear();
         self.pressures.extend(self.densities.iter().map(|density| STATE.pressure(STIFFNESS, *density)));
         let Self { force, cells, particles, densities, pressures, accelerations } = self;
-        force.accelerations(cells, &particles.masses, densities, pressures, accelerations);
+        force.compute_accelerations(cells, &particles.masses, densities, pressures, accelerations);
     }
 
     fn step(&mut self) {

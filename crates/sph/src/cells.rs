@@ -210,12 +210,12 @@ impl<const D: usize> Cells<D> {
         for pair in self.occupied.windows(2) {
             let (key, mut start) = (pair[0].key, pair[0].start);
             let same_row = std::mem::replace(&mut row, self.keys.row(key)) == self.keys.row(key);
-            if let Some(part) =
-                self.row_chunks.last_mut().filter(|part| same_row && key - part.first <= MAX_GROUP_LENGTH)
+            if let Some(chunk) =
+                self.row_chunks.last_mut().filter(|chunk| same_row && key - chunk.first <= MAX_GROUP_LENGTH)
             {
-                let end = pair[1].start.min(part.particles.start + BATCH as u32);
+                let end = pair[1].start.min(chunk.particles.start + BATCH as u32);
                 if end > start {
-                    (part.particles.end, part.last, start) = (end, key, end);
+                    (chunk.particles.end, chunk.last, start) = (end, key, end);
                 }
             }
             while start < pair[1].start {
@@ -244,8 +244,8 @@ impl<const D: usize> Cells<D> {
         let threads = rayon::current_num_threads().clamp(1, arrays.len().max(1));
         let Self { order, scratch, .. } = self;
         scratch.resize_with(threads, Vec::new);
-        let share = arrays.len().div_ceil(threads).max(1);
-        arrays.par_chunks_mut(share).zip(scratch).for_each(|(arrays, scratch)| {
+        let arrays_per_thread = arrays.len().div_ceil(threads).max(1);
+        arrays.par_chunks_mut(arrays_per_thread).zip(scratch).for_each(|(arrays, scratch)| {
             for values in arrays {
                 assert_eq!(values.len(), order.len(), "one value a particle");
                 scratch.clear();
@@ -272,7 +272,7 @@ impl<const D: usize> Cells<D> {
 
     /// The runs of particles around parts of rows, from `first` on.
     pub(super) fn neighbor_runs(&self, first: &RowChunk) -> NeighborRuns<'_> {
-        let start = |row: u64| self.occupied.partition_point(|cell| cell.key < first.lowest(row));
+        let start = |row: u64| self.occupied.partition_point(|cell| cell.key < first.min_key(row));
         let rows: Vec<(u64, usize, usize)> = self.keys.rows().map(|row| (row, start(row), 0)).collect();
         NeighborRuns { occupied: &self.occupied, runs: vec![0..0; rows.len()], rows }
     }
@@ -280,12 +280,12 @@ impl<const D: usize> Cells<D> {
 
 impl RowChunk {
     /// The least key that may be near in the row that is so far away.
-    fn lowest(&self, row: u64) -> u64 {
+    fn min_key(&self, row: u64) -> u64 {
         self.first.wrapping_add(row) - CELLS_PER_RADIUS_X as u64
     }
 
     /// The greatest.
-    fn highest(&self, row: u64) -> u64 {
+    fn max_key(&self, row: u64) -> u64 {
         self.last.wrapping_add(row) + CELLS_PER_RADIUS_X as u64
     }
 }
@@ -300,11 +300,11 @@ pub(super) struct NeighborRuns<'a> {
 
 impl NeighborRuns<'_> {
     /// The runs of those that may be near a part, which comes after those asked for before.
-    pub(super) fn around(&mut self, part: &RowChunk) -> &[Range<usize>] {
+    pub(super) fn near(&mut self, chunk: &RowChunk) -> &[Range<usize>] {
         for (run, (row, start, end)) in self.runs.iter_mut().zip(&mut self.rows) {
-            let (lowest, highest) = (part.lowest(*row), part.highest(*row));
-            *start = first_cell_from(self.occupied, *start, lowest);
-            *end = first_cell_from(self.occupied, (*end).max(*start), highest + 1);
+            let (min_key, max_key) = (chunk.min_key(*row), chunk.max_key(*row));
+            *start = first_cell_from(self.occupied, *start, min_key);
+            *end = first_cell_from(self.occupied, (*end).max(*start), max_key + 1);
             *run = self.occupied[*start].start as usize..self.occupied[*end].start as usize;
         }
         &self.runs

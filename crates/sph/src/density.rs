@@ -24,7 +24,12 @@ impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 1, 1> for DensityTerm<K>
 ///
 /// # Panics
 /// If `masses` are not one a particle.
-pub fn densities<const D: usize>(cells: &Cells<D>, kernel: KernelShape, masses: &[f32], densities: &mut Vec<f32>) {
+pub fn compute_densities<const D: usize>(
+    cells: &Cells<D>,
+    kernel: KernelShape,
+    masses: &[f32],
+    densities: &mut Vec<f32>,
+) {
     with_kernel!(kernel, cells.support_radius(), D, |kernel| cells.sum(&DensityTerm(kernel), [masses], [densities]))
 }
 

@@ -2,7 +2,7 @@
 //!
 //! One code for both: everything takes the number of dimensions `D`, two or three. A step of a model is
 //! ```
-//! use self::{Cells, KernelShape, Particles, PressureForce, StateEquation, densities};
+//! use self::{Cells, KernelShape, Particles, PressureForce, StateEquation, compute_densities};
 //!
 //! let mut particles = Particles::<3>::default();
 //! particles.push([0.0; 3], [0.0; 3], 1.0, 0);
@@ -13,9 +13,9 @@
 //! let (mut density, mut acceleration) = (Vec::new(), Default::default());
 //!
 //! particles.sort(&mut cells); // then `cells.reorder` for arrays of the model's own
-//! densities(&cells, KernelShape::Poly6, &particles.masses, &mut density);
+//! compute_densities(&cells, KernelShape::Poly6, &particles.masses, &mut density);
 //! let pressure: Vec<f32> = density.iter().map(|density| state.pressure(10.0, *density)).collect();
-//! force.accelerations(&cells, &particles.masses, &density, &pressure, &mut acceleration);
+//! force.compute_accelerations(&cells, &particles.masses, &density, &pressure, &mut acceleration);
 //! particles.advance(&acceleration, 1e-3);
 //! assert!(particles.velocities[0][0] < 0.0 && particles.velocities[0][1] > 0.0);
 //! ```
@@ -38,7 +38,7 @@ mod tests;
 pub use bansho_base::math::simd::Real;
 
 pub use cells::Cells;
-pub use density::{StateEquation, densities};
+pub use density::{StateEquation, compute_densities};
 pub use kernel::{CubicSpline, Kernel, KernelShape, Poly6, SmoothingKernel, Spiky};
 pub use mixing::mixing_weights;
 pub use neighbor_sums::{Pair, PairTerm};

@@ -88,8 +88,8 @@ fn list_near<S: Simd, const D: usize>(
         let near = bounds.distance_squared(&load(simd, positions, start)).simd_lt(support).to_bitmask() as usize;
         // The last batch goes on behind the run.
         let near = near & (0xff >> (BATCH - (run.end - start).min(BATCH)));
-        for (to, place) in candidates[count..count + BATCH].iter_mut().zip(&SET_BIT_INDICES[near]) {
-            *to = start as u32 + u32::from(*place);
+        for (to, bit_index) in candidates[count..count + BATCH].iter_mut().zip(&SET_BIT_INDICES[near]) {
+            *to = start as u32 + u32::from(*bit_index);
         }
         count += near.count_ones() as usize;
     }
@@ -98,46 +98,46 @@ fn list_near<S: Simd, const D: usize>(
 
 /// For each set of bits the places of those that are set.
 const SET_BIT_INDICES: [[u8; BATCH]; 256] = {
-    let mut places = [[0; BATCH]; 256];
+    let mut indices = [[0; BATCH]; 256];
     let mut bits = 0;
     while bits < 256 {
         let (mut bit, mut count) = (0, 0);
         while bit < BATCH {
             if bits >> bit & 1 == 1 {
-                places[bits][count] = bit as u8;
+                indices[bits][count] = bit as u8;
                 count += 1;
             }
             bit += 1;
         }
         bits += 1;
     }
-    places
+    indices
 };
 
 impl GroupBatch {
     /// Parts rows into stretches and finds everybody's candidates.
-    pub(super) fn find_all<const D: usize>(batches: &mut Vec<Self>, cells: &Cells<D>, parts: &[RowChunk]) {
+    pub(super) fn find_all<const D: usize>(batches: &mut Vec<Self>, cells: &Cells<D>, chunks: &[RowChunk]) {
         let level = Level::new();
-        batches.resize_with(parts.len().div_ceil(GROUPS_PER_TASK), Self::default);
-        batches.par_iter_mut().with_max_len(1).zip(parts.par_chunks(GROUPS_PER_TASK)).for_each(|(batch, parts)| {
-            dispatch!(level, simd => batch.find(simd, cells, parts));
+        batches.resize_with(chunks.len().div_ceil(GROUPS_PER_TASK), Self::default);
+        batches.par_iter_mut().with_max_len(1).zip(chunks.par_chunks(GROUPS_PER_TASK)).for_each(|(batch, chunks)| {
+            dispatch!(level, simd => batch.find(simd, cells, chunks));
         });
     }
 
     /// Finds the candidates of some parts of rows.
     #[inline(always)]
-    fn find<S: Simd, const D: usize>(&mut self, simd: S, cells: &Cells<D>, parts: &[RowChunk]) {
+    fn find<S: Simd, const D: usize>(&mut self, simd: S, cells: &Cells<D>, chunks: &[RowChunk]) {
         let (positions, support) = (cells.positions(), cells.support_radius());
         let Self { groups, candidates } = self;
         groups.clear();
         candidates.clear();
-        let Some(first) = parts.first() else { return };
-        let mut around = cells.neighbor_runs(first);
+        let Some(first) = chunks.first() else { return };
+        let mut neighbor_runs = cells.neighbor_runs(first);
         let mut count_so_far = 0;
-        for part in parts {
-            let particles = part.particles.start as usize..part.particles.end as usize;
+        for chunk in chunks {
+            let particles = chunk.particles.start as usize..chunk.particles.end as usize;
             let bounds = BoundingBox::of(&positions, particles.clone());
-            let runs = around.around(part);
+            let runs = neighbor_runs.near(chunk);
             let max_candidates: usize = runs.iter().map(|run| run.len() + BATCH).sum();
             candidates.resize(count_so_far + max_candidates, 0);
             let first = count_so_far;

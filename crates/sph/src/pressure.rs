@@ -48,7 +48,7 @@ impl PressureForce {
     ///
     /// # Panics
     /// If there is not one mass, density and pressure a particle.
-    pub fn accelerations<const D: usize>(
+    pub fn compute_accelerations<const D: usize>(
         &mut self,
         cells: &Cells<D>,
         masses: &[f32],

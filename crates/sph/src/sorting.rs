@@ -58,13 +58,13 @@ impl SampleSort {
             range.sort(bits, ids);
         });
         order.resize(ids.len(), 0);
-        let (mut rest, mut start, mut parts) = (order.as_mut_slice(), 0, Vec::with_capacity(count));
+        let (mut rest, mut start, mut slices) = (order.as_mut_slice(), 0, Vec::with_capacity(count));
         for range in ranges {
             let (own, others) = rest.split_at_mut(range.entries.len());
-            parts.push((own, start));
+            slices.push((own, start));
             (rest, start) = (others, start + range.entries.len() as u32);
         }
-        self.ranges.par_iter_mut().zip(parts).for_each(|(range, (order, start))| range.write(order, start));
+        self.ranges.par_iter_mut().zip(slices).for_each(|(range, (order, start))| range.write(order, start));
         cells.clear();
         self.ranges.iter().for_each(|range| cells.extend_from_slice(&range.cells));
     }

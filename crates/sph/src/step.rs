@@ -11,12 +11,12 @@ pub fn max_stable_step(support_radius: f32, stiffness: f32, greatest_speed: f32)
     COURANT_NUMBER * 0.5 * support_radius / (stiffness.max(0.0).sqrt() + greatest_speed)
 }
 
-/// Into how many equal parts to cut `seconds` so that none is longer than `longest`; at least 1, at most `limit`.
+/// Into how many equal parts to cut `seconds` so that none is longer than `max_step`; at least 1, at most `limit`.
 #[must_use]
-pub fn substep_count(seconds: f32, longest: f32, limit: u32) -> u32 {
-    let parts = (seconds / longest).ceil();
+pub fn substep_count(seconds: f32, max_step: f32, limit: u32) -> u32 {
+    let steps = (seconds / max_step).ceil();
     // A comparison that also sends what is not a number to the limit.
-    if parts < limit as f32 { (parts as u32).max(1) } else { limit.max(1) }
+    if steps < limit as f32 { (steps as u32).max(1) } else { limit.max(1) }
 }
 
 #[cfg(test)]

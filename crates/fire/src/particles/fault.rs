@@ -16,10 +16,10 @@ pub struct ParticleFault {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ParticleFaultKind {
     /// A burner whose middle, or a mesh of which any part, lies outside the domain.
-    #[error("the burner stands at {place:?} m, beyond `{corner}` {limit:?} m")]
+    #[error("the burner stands at {position:?} m, beyond `{corner}` {limit:?} m")]
     OutsideDomain {
         /// Where the middle of its area is; of a mesh the corner of the box around it.
-        place: [f64; 3],
+        position: [f64; 3],
         /// Which corner of the domain it lies beyond.
         corner: &'static str,
         /// That corner.

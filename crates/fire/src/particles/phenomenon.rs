@@ -77,7 +77,7 @@ impl FlameParticles {
     /// The gas as the drawing sees it.
     fn gas(&self) -> Gas<'_> {
         let tallest = self.tallest();
-        let place = DVec3::from(self.parameters.position) + tallest.position(self.time);
+        let position = DVec3::from(self.parameters.position) + tallest.position(self.time);
         Gas {
             particles: &self.simulation.particles,
             time: self.time,
@@ -86,7 +86,7 @@ impl FlameParticles {
                 Auto::Set(speed) => speed,
                 Auto::Auto => UNSTRETCHED * tallest.axis_speed(0.5 * tallest.height),
             },
-            base: place,
+            base: position,
             size: DVec2::new(tallest.diameter, tallest.height),
             key: self.key,
             fade_out: self.fade_out(),
@@ -137,9 +137,9 @@ impl Phenomenon for FlameParticles {
         }
         let origin = DVec3::from(self.parameters.position);
         let is_buried = |burner: &Burner| {
-            let within = |birth: u64| {
-                let place = origin + burner.spawn_point(self.simulation.key, birth, 0.0).position;
-                neighbours.occluders().any(|occluder| occluder.signed_distance(place) < 0.0)
+            let within = |id: u64| {
+                let position = origin + burner.spawn_point(self.simulation.key, id, 0.0).position;
+                neighbours.occluders().any(|occluder| occluder.signed_distance(position) < 0.0)
             };
             // As many births as show it.
             gives(burner) && (0..32).all(within)
@@ -196,7 +196,7 @@ impl Phenomenon for FlameParticles {
         let gas = self.gas();
         let Particles { velocity: [u, v, w], temperature, density, .. } = gas.particles;
         Some(PointCloud {
-            positions: (0..gas.particles.len()).map(|index| gas.place(index, t).as_vec3().to_array()).collect(),
+            positions: (0..gas.particles.len()).map(|index| gas.position(index, t).as_vec3().to_array()).collect(),
             velocities: u.iter().zip(v).zip(w).map(|((u, v), w)| [*u, *v, *w]).collect(),
             quantities: [(Quantity::Temperature, temperature.clone()), (Quantity::Density, density.clone())].into(),
         })

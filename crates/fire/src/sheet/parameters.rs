@@ -47,7 +47,7 @@ bansho_base::choice! {
         /// After sharpening, T2 (picture 3).
         Sharpened = "sharpened",
         /// Coloured, before it is mapped to the flame's shape (picture 4).
-        Coloured = "coloured",
+        Colored = "coloured",
     }
 }
 

@@ -105,7 +105,7 @@ impl SparkEmitter<'_> {
         let second = self.key.uniforms(id, 0, Purpose::named("spark flight")).map(f64::from);
         let age = since_turn - first[0] / rate;
         let life = sparks.life_s * (0.35 + 0.65 * first[1] * first[1]);
-        let vary = |share: f64| 1.0 + sparks.spread * (2.0 * share - 1.0);
+        let vary = |variate: f64| 1.0 + sparks.spread * (2.0 * variate - 1.0);
         (0.0..life).contains(&age).then(|| Spark {
             age,
             life,
@@ -145,12 +145,12 @@ impl SparkEmitter<'_> {
         let t = view.shutter.middle();
         let size = self.size;
         let origin = self.base + DVec3::new(spark.start.x * size.x, spark.start.y * size.y, spark.start.z * size.x);
-        let seen = |at: f64, camera: &Camera| {
+        let project_at = |at: f64, camera: &Camera| {
             let age = (spark.age + at - t).clamp(0.0, spark.life);
             camera.project(origin + self.displacement(spark, age) + self.drift(wind, origin, at, age))
         };
-        let opened = seen(view.shutter.open, &view.camera_at(view.shutter.open))?;
-        let closed = seen(view.shutter.close, &view.camera_at(view.shutter.close))?;
+        let opened = project_at(view.shutter.open, &view.camera_at(view.shutter.open))?;
+        let closed = project_at(view.shutter.close, &view.camera_at(view.shutter.close))?;
         let cooled = math::pow(spark.age / spark.life, 0.8);
         let hottest = self.parameters.temperature_k;
         let temperature = math::lerp(hottest, EXTINCTION_TEMPERATURE_K.min(hottest), cooled);

@@ -34,7 +34,7 @@ impl Streak {
         if !((max_pixel - min_pixel).max_element() < LONGEST && min_pixel.abs().max_element() < 1e9) {
             return None;
         }
-        let whole = |place: DVec2| [place.x.floor() as i64, place.y.floor() as i64];
+        let whole = |fraction: DVec2| [fraction.x.floor() as i64, fraction.y.floor() as i64];
         let mut streak =
             Self { from, to, radius, radiance, depth, min_pixel: whole(min_pixel), max_pixel: whole(max_pixel) };
         let covered = streak.covered();
@@ -65,8 +65,8 @@ impl Streak {
     fn coverage(&self, x: i64, y: i64) -> f64 {
         let point = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
         let along = self.to - self.from;
-        let place = ((point - self.from).dot(along) / along.length_squared().max(1e-12)).clamp(0.0, 1.0);
-        let distance = (point - self.from - along * place).length();
+        let fraction = ((point - self.from).dot(along) / along.length_squared().max(1e-12)).clamp(0.0, 1.0);
+        let distance = (point - self.from - along * fraction).length();
         1.0 - math::smoothstep(self.radius - EDGE_SOFTNESS, self.radius + EDGE_SOFTNESS, distance)
     }
 

@@ -22,7 +22,7 @@ const LUMINANCE: f32 = 6000.0;
 struct Square {
     rect: Rect,
     depth: f64,
-    colour: [f32; 3],
+    color: [f32; 3],
 }
 
 /// How all particles become squares.
@@ -44,9 +44,9 @@ impl SpriteKind for SquareSprites<'_> {
     fn record(&self, seen: &ProjectedParticle) -> Option<Square> {
         let radius = self.gas.particles.support_radius[seen.index];
         let side = (self.side * radius * seen.scale).max(1.0);
-        let rect = square_rect(seen.ellipse.centre, side, self.window)?;
+        let rect = square_rect(seen.ellipse.center, side, self.window)?;
         let density = f64::from(self.gas.particles.density[seen.index]) / self.densest;
-        Some(Square { rect, depth: seen.depth, colour: colour(density) })
+        Some(Square { rect, depth: seen.depth, color: color(density) })
     }
 }
 
@@ -80,7 +80,7 @@ impl Squares {
                 for x in rect.x..rect.right() {
                     let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
                     if strip.visible(index, square.depth as f32) {
-                        strip.add_behind(index, square.colour, [0.0; 3], square.depth as f32);
+                        strip.add_behind(index, square.color, [0.0; 3], square.depth as f32);
                     }
                 }
             }
@@ -96,16 +96,16 @@ fn density_percentile_95(gas: &Gas) -> f64 {
 }
 
 /// From blue (thin) through violet to red (dense), ACEScg of [`LUMINANCE`].
-fn colour(share: f64) -> [f32; 3] {
-    let red = math::smoothstep(0.0, 1.0, share) as f32;
+fn color(density_ratio: f64) -> [f32; 3] {
+    let red = math::smoothstep(0.0, 1.0, density_ratio) as f32;
     let rgb = color::acescg_from_srgb([red, 0.08, 1.0 - red]);
     let scale = LUMINANCE / color::luminance(rgb);
     rgb.map(|value| value * scale * (0.35 + 0.65 * red))
 }
 
-fn square_rect(centre: [f32; 2], side: f32, window: Rect) -> Option<Rect> {
+fn square_rect(center: [f32; 2], side: f32, window: Rect) -> Option<Rect> {
     let clip = |value: f32, from: usize, to: usize| (value.max(0.0) as usize).clamp(from, to);
-    let low = centre.map(|value| (value - 0.5 * side).round());
+    let low = center.map(|value| (value - 0.5 * side).round());
     let high = low.map(|value| value + side.round().max(1.0));
     let (x, y) = (clip(low[0], window.x, window.right()), clip(low[1], window.y, window.bottom()));
     let (right, bottom) = (clip(high[0], window.x, window.right()), clip(high[1], window.y, window.bottom()));

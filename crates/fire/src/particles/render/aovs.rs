@@ -130,7 +130,7 @@ impl<'a> MotionField<'a> {
     /// Pixels to the right and down that the gas at a pixel moves until the next frame.
     fn at(&self, x: usize, y: usize) -> [f32; 2] {
         let cells = &self.grid.cells;
-        let ((column, across), (row, down)) = (cells.before(0, x), cells.before(1, y));
+        let ((column, across), (row, down)) = (cells.cell_before(0, x), cells.cell_before(1, y));
         let start = 3 * self.grid.first_of_four(column);
         let rows = [-1, 0, 1, 2].map(|k| &self.grid.row(row + k)[start..start + 12]);
         let mut four = [0.0; 12];

@@ -111,19 +111,21 @@ impl HeatHaze {
     /// The gradient of the summed paths at every pixel: to the right and upward.
     fn from_paths(paths: &[OpticalPathField], window: Rect) -> Option<Self> {
         let covered = paths.iter().map(|paths| paths.sums.covered().intersection(&window));
-        let rect = covered.reduce(|whole_gas, own| whole_gas.union(&own))?;
+        let rect = covered.reduce(|whole_gas, covered| whole_gas.union(&covered))?;
         let mut angle = Image::filled(rect.width, rect.height, [0.0; 2]);
         let level = Level::new();
         // Beyond its own cells a grid holds nothing.
-        let parts = paths.iter().map(|paths| {
-            let own = paths.sums.covered().intersection(&rect);
-            (paths, own, paths.sums.columns(own.x, own.width))
+        let fields = paths.iter().map(|paths| {
+            let covered = paths.sums.covered().intersection(&rect);
+            (paths, covered, paths.sums.columns(covered.x, covered.width))
         });
-        let parts: Vec<_> = parts.collect();
+        let fields: Vec<_> = fields.collect();
         angle.pixels_mut().par_chunks_mut(rect.width.max(1)).enumerate().for_each(|(row, out)| {
             let y = rect.y + row;
-            for (paths, own, columns) in parts.iter().filter(|(_, own, _)| (own.y..own.bottom()).contains(&y)) {
-                let out = &mut out[own.x - rect.x..][..own.width];
+            for (paths, covered, columns) in
+                fields.iter().filter(|(_, covered, _)| (covered.y..covered.bottom()).contains(&y))
+            {
+                let out = &mut out[covered.x - rect.x..][..covered.width];
                 dispatch!(level, _simd => paths.add_gradient(columns, y, out));
             }
         });
@@ -165,17 +167,17 @@ impl<'a> OpticalPathField<'a> {
     #[inline(always)]
     fn add_gradient(&self, columns: &[(usize, usize)], y: usize, out: &mut [[f32; 2]]) {
         let cells = &self.sums.cells;
-        let (cell, phase) = cells.before(1, y);
+        let (cell, phase) = cells.cell_before(1, y);
         let rows = [-1, 0, 1, 2].map(|k| self.sums.row(cell + k));
-        let (mut level, mut steep) = (vec![0.0; cells.columns], vec![0.0; cells.columns]);
-        weighted_sum(&mut level, rows, &self.weights[phase]);
-        weighted_sum(&mut steep, rows, &self.slopes[phase]);
+        let (mut values, mut gradients) = (vec![0.0; cells.columns], vec![0.0; cells.columns]);
+        weighted_sum(&mut values, rows, &self.weights[phase]);
+        weighted_sum(&mut gradients, rows, &self.slopes[phase]);
         for (angle, &(first, phase)) in out.iter_mut().zip(columns) {
             let (along, across) = (&self.slopes[phase], &self.weights[phase]);
             let (mut right, mut down) = (0.0_f32, 0.0_f32);
             for k in 0..4 {
-                right = along[k].mul_add(level[first + k], right);
-                down = across[k].mul_add(steep[first + k], down);
+                right = along[k].mul_add(values[first + k], right);
+                down = across[k].mul_add(gradients[first + k], down);
             }
             // Rows count downward, angles upward.
             *angle = [angle[0] + right, angle[1] - down];

@@ -25,13 +25,13 @@ pub(crate) struct DepthMoments {
 
 impl DepthMoments {
     #[inline(always)]
-    pub(crate) fn add(&mut self, depth: f64, share: f64) {
-        self.total += share;
-        self.first += share * depth;
-        self.second += share * depth * depth;
+    pub(crate) fn add(&mut self, depth: f64, weight: f64) {
+        self.total += weight;
+        self.first += weight * depth;
+        self.second += weight * depth * depth;
     }
 
-    pub(crate) fn join(&mut self, other: &Self) {
+    pub(crate) fn merge(&mut self, other: &Self) {
         self.total += other.total;
         self.first += other.first;
         self.second += other.second;
@@ -41,11 +41,11 @@ impl DepthMoments {
 impl DepthLayers {
     /// Layers that hold the bulk of the gas; what lies further out joins the outermost.
     ///
-    /// `thin` is the least thickness that pays, m.
-    pub(crate) fn new(&DepthMoments { total, first, second }: &DepthMoments, thin: f64) -> Self {
+    /// `min_thickness` is the least thickness that pays, m.
+    pub(crate) fn new(&DepthMoments { total, first, second }: &DepthMoments, min_thickness: f64) -> Self {
         let mean = if total > 0.0 { first / total } else { 0.0 };
         let deviation = if total > 0.0 { (second / total - mean * mean).max(0.0).sqrt() } else { 0.0 };
-        let mut thickness = thin.max(1e-6);
+        let mut thickness = min_thickness.max(1e-6);
         let (near, far) = ((mean - 2.0 * deviation).max(0.0), (mean + 2.0 * deviation).max(0.0));
         let count = |thickness: f64| (far / thickness).floor() - (near / thickness).floor() + 1.0;
         while count(thickness) > MAX_LAYERS as f64 {
@@ -56,14 +56,14 @@ impl DepthLayers {
 
     /// The layer before the depth, and the share of what lies there that belongs to the next.
     #[inline(always)]
-    pub(crate) fn place(&self, depth: f64) -> (usize, f32) {
-        let place = ((depth - self.near) / self.thickness - 0.5).clamp(0.0, (self.count - 1) as f64);
-        let layer = (place as usize).min(self.count.saturating_sub(2));
-        (layer, (place - layer as f64) as f32)
+    pub(crate) fn layer_at(&self, depth: f64) -> (usize, f32) {
+        let layer_at = ((depth - self.near) / self.thickness - 0.5).clamp(0.0, (self.count - 1) as f64);
+        let layer = (layer_at as usize).min(self.count.saturating_sub(2));
+        (layer, (layer_at - layer as f64) as f32)
     }
 
     /// Depth of the middle of a layer, m.
-    pub(crate) fn centre(&self, layer: usize) -> f64 {
+    pub(crate) fn center(&self, layer: usize) -> f64 {
         self.near + (layer as f64 + 0.5) * self.thickness
     }
 
@@ -93,9 +93,12 @@ mod tests {
     #[test]
     fn a_depth_is_shared_by_the_two_layers_around_it() {
         let layers = DepthLayers { near: 2.0, thickness: 0.5, count: 3 };
-        assert_eq!((layers.place(2.25), layers.place(2.5)), ((0, 0.0), (0, 0.5)));
-        assert_eq!((layers.place(0.0), layers.place(3.25), layers.place(99.0)), ((0, 0.0), (1, 1.0), (1, 1.0)));
+        assert_eq!((layers.layer_at(2.25), layers.layer_at(2.5)), ((0, 0.0), (0, 0.5)));
+        assert_eq!(
+            (layers.layer_at(0.0), layers.layer_at(3.25), layers.layer_at(99.0)),
+            ((0, 0.0), (1, 1.0), (1, 1.0))
+        );
         let lone = DepthLayers { count: 1, ..layers };
-        assert_eq!((lone.place(0.0), lone.place(9.0)), ((0, 0.0), (0, 0.0)));
+        assert_eq!((lone.layer_at(0.0), lone.layer_at(9.0)), ((0, 0.0), (0, 0.0)));
     }
 }

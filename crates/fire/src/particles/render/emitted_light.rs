@@ -35,13 +35,13 @@ impl Slab {
 
     /// Adds a share of another.
     #[inline(always)]
-    fn add(&mut self, other: &Self, share: f64) {
+    fn add(&mut self, other: &Self, weight: f64) {
         for c in 0..3 {
-            self.intensity[c] += share * other.intensity[c];
+            self.intensity[c] += weight * other.intensity[c];
         }
-        self.moment += other.moment * share;
-        self.spread += share * other.spread;
-        self.absorption_area += share * other.absorption_area;
+        self.moment += other.moment * weight;
+        self.spread += weight * other.spread;
+        self.absorption_area += weight * other.absorption_area;
     }
 }
 
@@ -61,13 +61,15 @@ pub fn point_lights_of_gas(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Ligh
         return Vec::new();
     }
     (0..count)
-        .filter_map(|part| range_light(&slabs, [part, part + 1].map(|edge| total * edge as f64 / count as f64), look))
+        .filter_map(|fraction| {
+            range_light(&slabs, [fraction, fraction + 1].map(|edge| total * edge as f64 / count as f64), look)
+        })
         .collect()
 }
 
 /// The gas cut by height; a particle is shared by the two slabs around it.
 fn slabs(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Slab> {
-    let (low, high) = heights(gas, t);
+    let (low, high) = height_range(gas, t);
     let step = ((high - low) / (SLABS - 1) as f64).max(1e-9);
     let level = Level::new();
     let task_slabs = |range: Range<usize>| {
@@ -90,12 +92,14 @@ fn tasks(gas: &Gas) -> Vec<Range<usize>> {
 }
 
 /// Heights of the lowest and the highest particle, m.
-fn heights(gas: &Gas, t: f64) -> (f64, f64) {
+fn height_range(gas: &Gas, t: f64) -> (f64, f64) {
     let task_slabs = |range: Range<usize>| {
-        range.map(|index| gas.place(index, t).y).fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
+        range
+            .map(|index| gas.position(index, t).y)
+            .fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
     };
-    let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-    tasks(gas).into_par_iter().map(task_slabs).reduce(|| (f64::MAX, f64::MIN), both)
+    let min_max = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+    tasks(gas).into_par_iter().map(task_slabs).reduce(|| (f64::MAX, f64::MIN), min_max)
 }
 
 /// Adds particles to slabs `step` apart from the height `low` on.
@@ -114,42 +118,42 @@ fn add_to_slabs(
         if absorption_area <= 0.0 {
             continue;
         }
-        let place = gas.place(index, t);
+        let position = gas.position(index, t);
         let radiance = table.radiance(gas.particles.temperature[index]).map(f64::from);
-        let at = ((place.y - low) / step).clamp(0.0, (SLABS - 1) as f64);
-        let part = at - at.floor();
+        let slab_position = ((position.y - low) / step).clamp(0.0, (SLABS - 1) as f64);
+        let fraction = slab_position - slab_position.floor();
         let intensity = radiance.map(|value| value * absorption_area);
         let power: f64 = intensity.iter().sum();
-        let spread = (place.x * place.x + place.z * place.z) * power;
-        let whole = Slab { intensity, moment: place * power, spread, absorption_area };
-        slabs[at as usize].add(&whole, 1.0 - part);
-        slabs[at as usize + 1].add(&whole, part);
+        let spread = (position.x * position.x + position.z * position.z) * power;
+        let contribution = Slab { intensity, moment: position * power, spread, absorption_area };
+        slabs[slab_position as usize].add(&contribution, 1.0 - fraction);
+        slabs[slab_position as usize + 1].add(&contribution, fraction);
     }
 }
 
 /// The light of what lies between two sums of power, counted from below.
 fn range_light(slabs: &[Slab], [from, to]: [f64; 2], look: &LookParameters) -> Option<Light> {
     let mut sum = Slab::default();
-    let mut below = 0.0;
+    let mut cumulative = 0.0;
     for slab in slabs {
-        let above = below + slab.point_lights_of_gas();
-        let taken = (above.min(to) - below.max(from)).max(0.0);
+        let next_cumulative = cumulative + slab.point_lights_of_gas();
+        let taken = (next_cumulative.min(to) - cumulative.max(from)).max(0.0);
         if taken > 0.0 {
             sum.add(slab, taken / slab.point_lights_of_gas());
         }
-        below = above;
+        cumulative = next_cumulative;
     }
     let power = sum.point_lights_of_gas();
     if power <= 0.0 {
         return None;
     }
     let position = sum.moment / power;
-    let across = (sum.spread / power - position.x * position.x - position.z * position.z).max(0.0).sqrt();
-    let radius = across.max(1e-3);
+    let deviation = (sum.spread / power - position.x * position.x - position.z * position.z).max(0.0).sqrt();
+    let radius = deviation.max(1e-3);
     // Seen from the side, the part covers about a disc of twice its deviation.
     let tau = sum.absorption_area / (4.0 * std::f64::consts::PI * radius * radius);
-    let escapes = if tau > 1e-6 { -bansho_base::math::exp_m1(-tau) / tau } else { 1.0 };
-    let scale = look.light.scale * escapes;
+    let escape_fraction = if tau > 1e-6 { -bansho_base::math::exp_m1(-tau) / tau } else { 1.0 };
+    let scale = look.light.scale * escape_fraction;
     Some(Light {
         emitter: Emitter::Point { position, radius },
         intensity: sum.intensity.map(|value| (value * scale) as f32),

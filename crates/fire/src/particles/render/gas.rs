@@ -43,18 +43,18 @@ impl FadeOut {
     /// Nothing ends.
     pub const NEVER: Self = Self { seconds: f32::MIN_POSITIVE, domain: [Vec3::MIN, Vec3::MAX] };
 
-    /// How much of a particle is left at `place`, which moves at `velocity` and has `seconds` to live.
+    /// How much of a particle is left at `position`, which moves at `velocity` and has `seconds` to live.
     #[inline(always)]
-    pub(crate) fn share(&self, place: Vec3, velocity: Vec3, seconds: f32) -> f32 {
+    pub(crate) fn remaining_fraction(&self, position: Vec3, velocity: Vec3, seconds: f32) -> f32 {
         let [low, high] = self.domain;
-        let ahead = place + velocity * self.seconds;
-        if seconds >= self.seconds && ahead.cmpge(low).all() && ahead.cmple(high).all() {
+        let predicted = position + velocity * self.seconds;
+        if seconds >= self.seconds && predicted.cmpge(low).all() && predicted.cmple(high).all() {
             return 1.0;
         }
         // The time until the first side toward which it moves.
-        let way = Vec3::select(velocity.cmplt(Vec3::ZERO), place - low, high - place).max(Vec3::ZERO);
-        let until = (way / velocity.abs().max(Vec3::splat(f32::MIN_POSITIVE))).min_element();
-        (until.min(seconds) / self.seconds).clamp(0.0, 1.0)
+        let distance = Vec3::select(velocity.cmplt(Vec3::ZERO), position - low, high - position).max(Vec3::ZERO);
+        let seconds_to_exit = (distance / velocity.abs().max(Vec3::splat(f32::MIN_POSITIVE))).min_element();
+        (seconds_to_exit.min(seconds) / self.seconds).clamp(0.0, 1.0)
     }
 }
 
@@ -78,7 +78,7 @@ pub fn soot_absorption(volume_fraction: f64, look: &LookParameters) -> f64 {
 impl Gas<'_> {
     /// Where particle `index` is at time `t`, m: its state, moved on by its velocity.
     #[inline(always)]
-    pub(crate) fn place(&self, index: usize, t: f64) -> DVec3 {
+    pub(crate) fn position(&self, index: usize, t: f64) -> DVec3 {
         let since = t - self.time;
         let coordinate = |axis: usize| {
             f64::from(self.particles.position[axis][index]) + since * f64::from(self.particles.velocity[axis][index])
@@ -89,11 +89,11 @@ impl Gas<'_> {
     /// The volume m/rho that a particle stands for, m^3; it fades before it is removed.
     #[inline(always)]
     pub(crate) fn volume(&self, index: usize) -> f64 {
-        let Particles { position, velocity, density, mass, life, age, .. } = self.particles;
-        let [place, velocity] = [position, velocity].map(|[x, y, z]| Vec3::new(x[index], y[index], z[index]));
-        let left = self.fade_out.share(place, velocity, life[index] - age[index]);
+        let Particles { position, velocity, density, mass, max_age, age, .. } = self.particles;
+        let [position, velocity] = [position, velocity].map(|[x, y, z]| Vec3::new(x[index], y[index], z[index]));
+        let remaining = self.fade_out.remaining_fraction(position, velocity, max_age[index] - age[index]);
         let density = f64::from(density[index]);
-        if density > 0.0 { f64::from(left * mass[index]) / density } else { 0.0 }
+        if density > 0.0 { f64::from(remaining * mass[index]) / density } else { 0.0 }
     }
 
     /// Absorption coefficient of a particle's soot, 1/m.
@@ -121,7 +121,7 @@ impl Gas<'_> {
     ///
     /// CH and C2 live only where fuel has just begun to burn, and nowhere that soot has formed.
     #[inline(always)]
-    pub(crate) fn blue(&self, index: usize, look: &LookParameters) -> f64 {
+    pub(crate) fn blue_luminance(&self, index: usize, look: &LookParameters) -> f64 {
         if !self.is_blue(index, look) {
             return 0.0;
         }

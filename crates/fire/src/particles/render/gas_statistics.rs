@@ -46,7 +46,7 @@ impl GasStatistics {
         };
         // Sums of whole tasks, added in order, are the same however many threads there are.
         let of_tasks: Vec<Self> = (0..count.div_ceil(PARTICLES_PER_TASK)).into_par_iter().map(of_task).collect();
-        of_tasks.iter().fold(Self::default(), Self::and)
+        of_tasks.iter().fold(Self::default(), Self::merge)
     }
 
     #[inline(always)]
@@ -63,7 +63,7 @@ impl GasStatistics {
         if !is_visible(gas, look, index) {
             return;
         }
-        let depth = view.camera.depth(gas.place(index, view.shutter.middle()));
+        let depth = view.camera.depth(gas.position(index, view.shutter.middle()));
         if depth <= 0.0 {
             return;
         }
@@ -79,8 +79,8 @@ impl GasStatistics {
         }
     }
 
-    fn and(mut self, other: &Self) -> Self {
-        self.spread.join(&other.spread);
+    fn merge(mut self, other: &Self) -> Self {
+        self.spread.merge(&other.spread);
         self.radius_sum += other.radius_sum;
         for (sum, other) in self.light.iter_mut().zip(other.light) {
             *sum += other;
@@ -110,8 +110,8 @@ impl GasStatistics {
 }
 
 /// How far what stands still at the flame moves before the camera while the shutter is open, m in the world.
-fn camera_motion(place: DVec3, view: &View) -> [f64; 3] {
+fn camera_motion(position: DVec3, view: &View) -> [f64; 3] {
     let (opened, closed) = (view.camera_at(view.shutter.open), view.camera_at(view.shutter.close));
-    let local = closed.to_camera(place) - opened.to_camera(place);
+    let local = closed.to_camera(position) - opened.to_camera(position);
     (view.camera.orientation * local).to_array().map(|value| -value)
 }

@@ -113,7 +113,7 @@ pub fn depth_intervals(gas: &Gas, look: &LookParameters, view: &View) -> Vec<Dep
     let layers = GasStatistics::new(gas, look, view).layers(gas);
     let mut intervals: Vec<DepthInterval> = layers.intervals().collect();
     if look.sparks.rate > 0.0 {
-        let middle = layers.centre(layers.count / 2);
+        let middle = layers.center(layers.count / 2);
         let reach = look.sparks.swirl + 0.5 * layers.thickness * layers.count as f64;
         intervals.push(DepthInterval { near: (middle - reach).max(0.0), far: middle + reach });
     }
@@ -152,7 +152,7 @@ impl<'a> PreparedGas<'a> {
     /// The layers that lie in a slice, nearest first.
     fn layers_in<'b>(&'b self, slice: &'b DepthInterval) -> impl Iterator<Item = DepthLayer> + 'b {
         let thickness = self.layers.thickness;
-        let layer = move |index| DepthLayer { index, depth: self.layers.centre(index), thickness };
+        let layer = move |index| DepthLayer { index, depth: self.layers.center(index), thickness };
         (0..self.layers.count).map(layer).filter(|layer| slice.contains(layer.depth))
     }
 
@@ -213,7 +213,7 @@ fn splatted<'a>(
         (detail, strain)
     };
     let detail = detail.map(strained);
-    let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.centre(layer), surroundings));
+    let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.center(layer), surroundings));
     DrawMode::SplattedGas(Box::new(SplattedGas {
         extents,
         weights: spline::weights(&grid.cells),
@@ -248,9 +248,9 @@ impl SpriteKind for RadianceSprites<'_> {
 
     #[inline(always)]
     fn record(&self, seen: &ProjectedParticle) -> Sprite<PLANES> {
-        let (layer, next_layer_weight) = self.layers.place(seen.depth);
+        let (layer, next_layer_weight) = self.layers.layer_at(seen.depth);
         let mut values = match self.look.sprite {
-            SpriteStyle::Poly6 => self.paper_values(seen.index),
+            SpriteStyle::Poly6 => self.density_values(seen.index),
             _ => self.values(seen),
         };
         if let Some(detail) = self.detail {
@@ -270,21 +270,21 @@ impl RadianceSprites<'_> {
         let (gas, index) = (self.gas, seen.index);
         let length = gas.volume(index) * f64::from(seen.ellipse.peak);
         let tau = length * gas.absorption(index, self.look);
-        let mut values = self.glowing(index, tau);
-        values[BLUE] = (length * gas.blue(index, self.look)) as f32;
+        let mut values = self.emission_values(index, tau);
+        values[BLUE] = (length * gas.blue_luminance(index, self.look)) as f32;
         values[PATH] = deflection::path(gas, self.look, seen);
         values
     }
 
     /// The paper's sprite (section 5.2): opacity by density, colour by temperature.
     #[inline(always)]
-    fn paper_values(&self, index: usize) -> [f32; PLANES] {
-        self.glowing(index, self.opacity * f64::from(self.gas.particles.density[index]))
+    fn density_values(&self, index: usize) -> [f32; PLANES] {
+        self.emission_values(index, self.opacity * f64::from(self.gas.particles.density[index]))
     }
 
     /// Optical depth, and what shines with it.
     #[inline(always)]
-    fn glowing(&self, index: usize, tau: f64) -> [f32; PLANES] {
+    fn emission_values(&self, index: usize, tau: f64) -> [f32; PLANES] {
         let glow = tau * self.gas.luminance(index);
         let mut values = [0.0; PLANES];
         values[TAU] = tau as f32;
@@ -303,12 +303,12 @@ fn mean_density(gas: &Gas) -> Option<f64> {
 /// What soot at a depth along the line of sight to the flame scatters where it hides everything: light of others, alike in all directions.
 fn scattered(gas: &Gas, look: &LookParameters, view: &View, depth: f64, surroundings: &Surroundings) -> [f32; 3] {
     let toward = (gas.particles.origin - view.camera.position).normalize_or(DVec3::NEG_Z);
-    let place = view.camera.position + toward * depth;
-    let share = (look.smoke_albedo / (4.0 * std::f64::consts::PI)) as f32;
+    let position = view.camera.position + toward * depth;
+    let scale = (look.smoke_albedo / (4.0 * std::f64::consts::PI)) as f32;
     let mut sum = [0.0; 3];
     for light in &surroundings.others.lights {
-        let (illuminance, _) = light.illuminance(place);
-        (0..3).for_each(|c| sum[c] += illuminance[c] * share);
+        let (illuminance, _) = light.illuminance(position);
+        (0..3).for_each(|c| sum[c] += illuminance[c] * scale);
     }
     sum
 }
@@ -360,7 +360,7 @@ impl Prepared for PreparedGas<'_> {
 
     fn deflection(&self) -> Option<Deflection<'_>> {
         let haze = self.haze()?;
-        let depth = self.layers.centre(self.layers.count - 1) + 0.5 * self.layers.thickness;
+        let depth = self.layers.center(self.layers.count - 1) + 0.5 * self.layers.thickness;
         Some(Deflection { depth, rect: haze.rect, angle: &haze.angle })
     }
 }
@@ -380,7 +380,7 @@ impl PreparedGas<'_> {
 
     /// The haze where it is measured in a slice: in one alone, however many the layers fall into.
     fn measured_haze(&self, slice: &DepthInterval) -> Option<&HeatHaze> {
-        let is_here = self.view.measured && slice.contains(self.layers.centre(self.layers.count - 1));
+        let is_here = self.view.measured && slice.contains(self.layers.center(self.layers.count - 1));
         self.haze.get().and_then(Option::as_ref).filter(|_| is_here)
     }
 

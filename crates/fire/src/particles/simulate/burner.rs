@@ -126,10 +126,10 @@ impl Burner {
         }
     }
 
-    /// Where the particle `birth` is born at `t`: as likely anywhere on the burner.
-    pub(crate) fn spawn_point(&self, key: Key, birth: u64, t: f64) -> SpawnPoint {
-        let words = key.words(birth, 0, Purpose::named("birthplace"));
-        let (position, direction) = self.local(words);
+    /// Where the particle `id` is born at `t`: as likely anywhere on the burner.
+    pub(crate) fn spawn_point(&self, key: Key, id: u64, t: f64) -> SpawnPoint {
+        let words = key.words(id, 0, Purpose::named("birthplace"));
+        let (position, direction) = self.sample_local(words);
         let radius = 0.5 * self.parameters.diameter;
         let radial_fraction = match self.area {
             BurnerSurface::Disc | BurnerSurface::Ball => position.length() / radius,
@@ -141,7 +141,7 @@ impl Burner {
     }
 
     /// Place and direction in the burner's own coordinates.
-    fn local(&self, words: [u32; 4]) -> (DVec3, DVec3) {
+    fn sample_local(&self, words: [u32; 4]) -> (DVec3, DVec3) {
         let [u, v, w, _] = words.map(|word| f64::from(uniform(word)));
         let radius = 0.5 * self.parameters.diameter;
         let (sine, cosine) = math::sin_cos(std::f64::consts::TAU * v);
@@ -203,11 +203,11 @@ fn primitive_extent(parameters: &BurnerParameters, placement: &Placement) -> [DV
 
 fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(BurnerSurface, Size), ParticleFaultKind> {
     let BurnerParameters { diameter, length, size: [x, y, z], scale, .. } = *parameters;
-    let round = 0.25 * std::f64::consts::PI * diameter * diameter;
+    let disc_area = 0.25 * std::f64::consts::PI * diameter * diameter;
     let size = |diameter, area_m2, bounding_radius| Size { diameter, area_m2, bounding_radius, mesh: None };
     Ok(match parameters.shape {
-        BurnerShape::Disc => (BurnerSurface::Disc, size(diameter, round, 0.5 * diameter)),
-        BurnerShape::Point => (BurnerSurface::Ball, size(diameter, round, 0.5 * diameter)),
+        BurnerShape::Disc => (BurnerSurface::Disc, size(diameter, disc_area, 0.5 * diameter)),
+        BurnerShape::Point => (BurnerSurface::Ball, size(diameter, disc_area, 0.5 * diameter)),
         BurnerShape::Line => (BurnerSurface::Strip, size(diameter, diameter * length, 0.5 * (diameter + length))),
         BurnerShape::Box => {
             let surface = 2.0 * (x * y + y * z + z * x);
@@ -257,8 +257,8 @@ mod tests {
         Burner::new(&parameters, &FlameParticlesParameters::default(), &MemoryAssets::default()).unwrap()
     }
 
-    fn places(burner: &Burner) -> impl Iterator<Item = SpawnPoint> + '_ {
-        (0..4000).map(|birth| burner.spawn_point(Key::new(1, "burner"), birth, 0.0))
+    fn spawn_points(burner: &Burner) -> impl Iterator<Item = SpawnPoint> + '_ {
+        (0..4000).map(|id| burner.spawn_point(Key::new(1, "burner"), id, 0.0))
     }
 
     #[test]
@@ -279,20 +279,25 @@ mod tests {
     fn discs_are_even_and_turn_with_the_burner() {
         let parameters = BurnerParameters { diameter: 2.0, rotation_deg: [90.0, 0.0, 0.0], ..Default::default() };
         let burner = burner(parameters);
-        let inner = places(&burner).filter(|place| place.position.length() < 0.5).count();
+        let inner = spawn_points(&burner).filter(|spawn_point| spawn_point.position.length() < 0.5).count();
         assert!((900..1100).contains(&inner), "a quarter of the area holds {inner} of 4000");
-        assert!(places(&burner).all(|place| place.position.z.abs() < 1e-9 || place.position.y.abs() < 1e-9));
-        assert!(places(&burner).all(|place| (place.direction - DVec3::Z).length() < 1e-9));
+        assert!(
+            spawn_points(&burner)
+                .all(|spawn_point| spawn_point.position.z.abs() < 1e-9 || spawn_point.position.y.abs() < 1e-9)
+        );
+        assert!(spawn_points(&burner).all(|spawn_point| (spawn_point.direction - DVec3::Z).length() < 1e-9));
     }
 
     #[test]
     fn boxes_are_even_over_their_faces() {
         let burner = burner(BurnerParameters { shape: BurnerShape::Box, size: [2.0, 1.0, 1.0], ..Default::default() });
-        let ends = places(&burner).filter(|place| place.direction.x.abs() > 0.5).count();
+        let ends = spawn_points(&burner).filter(|spawn_point| spawn_point.direction.x.abs() > 0.5).count();
         assert!((700..900).contains(&ends), "a fifth of the area holds {ends} of 4000");
-        for place in places(&burner) {
+        for spawn_point in spawn_points(&burner) {
             assert!(
-                (place.position.dot(place.direction) - if place.direction.x.abs() > 0.5 { 1.0 } else { 0.5 }).abs()
+                (spawn_point.position.dot(spawn_point.direction)
+                    - if spawn_point.direction.x.abs() > 0.5 { 1.0 } else { 0.5 })
+                .abs()
                     < 1e-9
             );
         }
@@ -307,8 +312,9 @@ mod tests {
             let parameters = BurnerParameters { shape, diameter: 0.3, length: 2.0, rotation_deg, ..Default::default() };
             let burner = burner(parameters);
             let [low, high] = burner.extent;
-            let primitive_extent = |[low, high]: [DVec3; 2], place: DVec3| [low.min(place), high.max(place)];
-            let all = places(&burner).map(|place| place.position);
+            let primitive_extent =
+                |[low, high]: [DVec3; 2], spawn_point: DVec3| [low.min(spawn_point), high.max(spawn_point)];
+            let all = spawn_points(&burner).map(|spawn_point| spawn_point.position);
             let [low_corner, high_corner] = all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], primitive_extent);
             assert!(
                 (low_corner - low).cmpgt(DVec3::splat(-1e-5)).all()
@@ -323,9 +329,12 @@ mod tests {
     fn points_lines_and_meshes_stay_within_their_bounds() {
         let line =
             burner(BurnerParameters { shape: BurnerShape::Line, length: 3.0, diameter: 0.2, ..Default::default() });
-        assert!(places(&line).all(|place| place.position.x.abs() <= 1.5 && place.position.z.abs() <= 0.1));
+        assert!(
+            spawn_points(&line)
+                .all(|spawn_point| spawn_point.position.x.abs() <= 1.5 && spawn_point.position.z.abs() <= 0.1)
+        );
         let point = burner(BurnerParameters { shape: BurnerShape::Point, diameter: 0.1, ..Default::default() });
-        assert!(places(&point).all(|place| place.position.length() <= 0.05));
+        assert!(spawn_points(&point).all(|spawn_point| spawn_point.position.length() <= 0.05));
         let missing = BurnerParameters { shape: BurnerShape::Mesh, ..Default::default() };
         let fault = Burner::new(&missing, &FlameParticlesParameters::default(), &MemoryAssets::default());
         assert_eq!(fault.unwrap_err(), ParticleFaultKind::NoFile);

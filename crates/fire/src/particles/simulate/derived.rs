@@ -172,8 +172,8 @@ fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[
     for (index, burner) in burners.iter().enumerate() {
         let corners = burner.parameters.position.bounds().map(DVec3::from);
         let reached = [corners[0] + burner.extent[0], corners[1] + burner.extent[1]];
-        for place in corners.into_iter().chain(reached) {
-            stands_within(parameters, place, SLACK * burner.bounding_radius).map_err(|(corner, kind)| {
+        for position in corners.into_iter().chain(reached) {
+            stands_within(parameters, position, SLACK * burner.bounding_radius).map_err(|(corner, kind)| {
                 // What the user did not write cannot be at fault.
                 let moved = burner.parameters.position != Animated::from([0.0; 3]);
                 ParticleFault { key: if moved { format!("burners.{index}.position") } else { corner.into() }, kind }
@@ -192,14 +192,15 @@ fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[
 /// Whether a place of a burner lies within the corners of the domain that are given, or `slack` m beyond; if not, beyond which of them.
 fn stands_within(
     parameters: &FlameParticlesParameters,
-    place: DVec3,
+    position: DVec3,
     slack: f64,
 ) -> Result<(), (&'static str, ParticleFaultKind)> {
     let FlameParticlesParameters { domain_min, domain_max, .. } = parameters;
-    let beyond = |corner, limit| Err((corner, ParticleFaultKind::OutsideDomain { place: place.into(), corner, limit }));
+    let beyond =
+        |corner, limit| Err((corner, ParticleFaultKind::OutsideDomain { position: position.into(), corner, limit }));
     match (domain_min, domain_max) {
-        (Auto::Set(min), _) if (place + slack).cmplt(DVec3::from(*min)).any() => beyond("domain_min", *min),
-        (_, Auto::Set(max)) if (place - slack).cmpgt(DVec3::from(*max)).any() => beyond("domain_max", *max),
+        (Auto::Set(min), _) if (position + slack).cmplt(DVec3::from(*min)).any() => beyond("domain_min", *min),
+        (_, Auto::Set(max)) if (position - slack).cmpgt(DVec3::from(*max)).any() => beyond("domain_max", *max),
         _ => Ok(()),
     }
 }
@@ -254,7 +255,9 @@ mod tests {
         for (far, turn, key) in [(50.0, 0.0, "domain_max"), (50.0, 180.0, "domain_min")] {
             let fault = on_a_mesh_beside_its_origin(far, [0.0, turn, 0.0]).unwrap_err();
             assert_eq!(fault.key, key);
-            assert!(matches!(fault.kind, ParticleFaultKind::OutsideDomain { place, .. } if place[0].abs() >= 50.0));
+            assert!(
+                matches!(fault.kind, ParticleFaultKind::OutsideDomain { position, .. } if position[0].abs() >= 50.0)
+            );
         }
     }
 

@@ -10,7 +10,7 @@ use super::{
     derived::DerivedConstants,
     particles::{Particle, Particles},
 };
-use crate::particles::simulate::forces::turbulence::Turbulence;
+use crate::particles::simulate::forces::turbulence::TurbulenceTile;
 
 /// Bits of a birth number that count the births of one burner; those above are the burner's own number.
 const ORDINAL_BITS: u32 = 40;
@@ -28,7 +28,7 @@ const PATCH_SIZE: f64 = 0.35;
 /// What births follow from.
 pub(crate) struct Spawner<'a> {
     pub(crate) constants: &'a DerivedConstants,
-    pub(crate) turbulence: &'a Turbulence,
+    pub(crate) turbulence: &'a TurbulenceTile,
     pub(crate) key: Key,
     pub(crate) afterlife_s: f64,
 }
@@ -37,17 +37,17 @@ impl Spawner<'_> {
     /// Adds the particles that are born from `start` to `start + seconds`, as far along as they are at its end.
     ///
     /// Births are counted since the preroll began, so that each is the same however long steps are.
-    pub(crate) fn add(&self, particles: &mut Particles, start: f64, seconds: f64) {
+    pub(crate) fn spawn(&self, particles: &mut Particles, start: f64, seconds: f64) {
         let constants = self.constants;
         for (number, burner) in constants.burners.iter().enumerate() {
             let [before, after] = [start, start + seconds].map(|t| self.spawned_count(number, burner, t));
-            for ordinal in before.ceil().max(0.0) as u64..after.ceil().max(0.0) as u64 {
+            for index_of_burner in before.ceil().max(0.0) as u64..after.ceil().max(0.0) as u64 {
                 if particles.len() >= constants.max_particles {
                     return;
                 }
-                let age = seconds * ((after - ordinal as f64) / (after - before)).clamp(0.0, 1.0);
-                let birth = (number as u64) << ORDINAL_BITS | ordinal;
-                self.spawn_one(particles, number, birth, start + seconds - age, age);
+                let age = seconds * ((after - index_of_burner as f64) / (after - before)).clamp(0.0, 1.0);
+                let id = (number as u64) << ORDINAL_BITS | index_of_burner;
+                self.spawn_one(particles, number, id, start + seconds - age, age);
             }
         }
     }
@@ -61,36 +61,37 @@ impl Spawner<'_> {
         constants.rates[number] * burner.parameters.flow.integral(warped(-constants.preroll), warped(t))
     }
 
-    /// Adds particle `birth`, born at `t`, which is `age` old.
-    fn spawn_one(&self, particles: &mut Particles, number: usize, birth: u64, t: f64, age: f64) {
+    /// Adds particle `id`, born at `t`, which is `age` old.
+    fn spawn_one(&self, particles: &mut Particles, number: usize, id: u64, t: f64, age: f64) {
         let (constants, burner) = (self.constants, &self.constants.burners[number]);
-        let place = burner.spawn_point(self.key, birth, t);
-        let random = uniform(self.key.words(birth, 0, Purpose::named("birth speed"))[0]);
-        let radial_fraction = place.radial_fraction * place.radial_fraction;
+        let spawn_point = burner.spawn_point(self.key, id, t);
+        let random = uniform(self.key.words(id, 0, Purpose::named("birth speed"))[0]);
+        let radial_fraction = spawn_point.radial_fraction * spawn_point.radial_fraction;
         let profile = (SPEED_PROFILE[0] - SPEED_PROFILE[1] * radial_fraction) as f32;
         let speed = burner.speed as f32 * profile * (1.0 + SPEED_SPREAD * (random - 0.5));
-        let velocity = place.direction.as_vec3() * speed;
+        let velocity = spawn_point.direction.as_vec3() * speed;
         let particle = Particle {
-            birth,
-            position: (place.position + velocity.as_dvec3() * age).as_vec3().to_array(),
+            id,
+            position: (spawn_point.position + velocity.as_dvec3() * age).as_vec3().to_array(),
             velocity: velocity.to_array(),
             mass: constants.mass,
             density: constants.density,
             temperature: burner.parameters.temperature_k as f32,
             support_radius: constants.support_radius,
             age: age as f32,
-            life: constants.max_age(number, self.afterlife_s) as f32,
+            max_age: constants.max_age(number, self.afterlife_s) as f32,
             fuel: 1.0,
             soot: 0.0,
         };
-        let burn_rate = self.burn_rate(burner, constants.puffing_hz[number], &place, t) as f32;
+        let burn_rate = self.burn_rate(burner, constants.puffing_hz[number], &spawn_point, t) as f32;
         particles.push_from(number as u32, burn_rate, particle);
     }
 
     /// How fast gas burns beside the mean: faster from the rim, and in patches that come and go.
-    fn burn_rate(&self, burner: &Burner, hz: f64, place: &SpawnPoint, t: f64) -> f64 {
-        let profile = BURN_RATE_PROFILE[0] + BURN_RATE_PROFILE[1] * place.radial_fraction * place.radial_fraction;
-        let patch = place.position / (PATCH_SIZE * burner.diameter) + DVec3::Y * (2.5 * hz * t);
-        profile * (1.0 + PATCHES * f64::from(self.turbulence.patch(patch))).clamp(0.4, 2.0)
+    fn burn_rate(&self, burner: &Burner, hz: f64, spawn_point: &SpawnPoint, t: f64) -> f64 {
+        let profile =
+            BURN_RATE_PROFILE[0] + BURN_RATE_PROFILE[1] * spawn_point.radial_fraction * spawn_point.radial_fraction;
+        let noise = spawn_point.position / (PATCH_SIZE * burner.diameter) + DVec3::Y * (2.5 * hz * t);
+        profile * (1.0 + PATCHES * f64::from(self.turbulence.noise(noise))).clamp(0.4, 2.0)
     }
 }

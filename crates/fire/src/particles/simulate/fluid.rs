@@ -6,7 +6,7 @@ use super::{
     derived::DerivedConstants, neighbor_sums::NeighborSums, particle_lanes::PARTICLES_PER_TASK, particles::Particles,
 };
 use crate::particles::parameters::{FluidParameters, Tension};
-use bansho_sph::{Cells, KernelShape, PressureForce, StateEquation, densities, max_stable_step, substep_count};
+use bansho_sph::{Cells, KernelShape, PressureForce, StateEquation, compute_densities, max_stable_step, substep_count};
 
 /// Speed of gas against the gas neighbor_sums it, as a share of its speed.
 const RELATIVE_SPEED: f32 = 0.15;
@@ -14,7 +14,7 @@ const RELATIVE_SPEED: f32 = 0.15;
 /// What sums over neighbours are made with, and what they find.
 #[derive(Clone, Debug)]
 pub(crate) struct FluidSolver {
-    state: StateEquation,
+    equation_of_state: StateEquation,
     stiffness_per_kelvin: f32,
     max_substeps: u32,
     cells: Cells<3>,
@@ -31,7 +31,7 @@ impl FluidSolver {
     pub(crate) fn new(fluid: &FluidParameters, constants: &DerivedConstants) -> Self {
         let negative_pressure = fluid.tension == Tension::Unclamped;
         Self {
-            state: StateEquation { rest_density: constants.rest_density, negative_pressure },
+            equation_of_state: StateEquation { rest_density: constants.rest_density, negative_pressure },
             stiffness_per_kelvin: constants.stiffness_per_kelvin,
             max_substeps: fluid.sub_steps as u32,
             cells: Cells::new(constants.support_radius),
@@ -57,15 +57,15 @@ impl FluidSolver {
     /// the motion holds what is left. The forces of the last step would also have to be part of every snapshot.
     pub(crate) fn substep_count(&self, particles: &Particles, seconds: f32) -> u32 {
         let [u, v, w] = &particles.velocity;
-        let square = |index: usize| u[index] * u[index] + v[index] * v[index] + w[index] * w[index];
-        let greatest = |values: &(dyn Fn(usize) -> f32 + Sync)| {
-            let parts = (0..u.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
-            let of_part =
+        let speed_squared = |index: usize| u[index] * u[index] + v[index] * v[index] + w[index] * w[index];
+        let max_over_particles = |values: &(dyn Fn(usize) -> f32 + Sync)| {
+            let tasks = (0..u.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
+            let task_max =
                 |first: usize| (first..(first + PARTICLES_PER_TASK).min(u.len())).map(values).fold(0.0, f32::max);
-            parts.map(of_part).reduce(|| 0.0, f32::max)
+            tasks.map(task_max).reduce(|| 0.0, f32::max)
         };
-        let speed = greatest(&square).sqrt();
-        let hottest = greatest(&|index| particles.temperature[index]);
+        let speed = max_over_particles(&speed_squared).sqrt();
+        let hottest = max_over_particles(&|index| particles.temperature[index]);
         let max_step =
             max_stable_step(self.support_radius(), self.stiffness_per_kelvin * hottest, RELATIVE_SPEED * speed);
         substep_count(seconds, max_step, self.max_substeps)
@@ -77,18 +77,20 @@ impl FluidSolver {
         self.air_exposure.resize(particles.len(), 0.0);
         particles.sort(&mut self.cells, &mut self.air_exposure);
         let Particles { density, temperature, mass, .. } = particles;
-        densities(&self.cells, KernelShape::Poly6, mass, density);
-        let fastest_sound = 0.2 * self.support_radius() / seconds;
-        let (state, per_kelvin, most) = (self.state, self.stiffness_per_kelvin, fastest_sound * fastest_sound);
-        let pressure =
-            |(density, temperature): (&f32, &f32)| state.pressure((per_kelvin * temperature).min(most), *density);
+        compute_densities(&self.cells, KernelShape::Poly6, mass, density);
+        let max_sound_speed = 0.2 * self.support_radius() / seconds;
+        let (equation_of_state, per_kelvin, max_stiffness) =
+            (self.equation_of_state, self.stiffness_per_kelvin, max_sound_speed * max_sound_speed);
+        let pressure = |(density, temperature): (&f32, &f32)| {
+            equation_of_state.pressure((per_kelvin * temperature).min(max_stiffness), *density)
+        };
         density
             .par_iter()
             .zip(&*temperature)
             .with_min_len(PARTICLES_PER_TASK)
             .map(pressure)
             .collect_into_vec(&mut self.pressure);
-        self.force.accelerations(&self.cells, mass, density, &self.pressure, &mut self.acceleration);
+        self.force.compute_accelerations(&self.cells, mass, density, &self.pressure, &mut self.acceleration);
     }
 
     /// Lets every particle look around; [`compute_pressure_forces`](Self::compute_pressure_forces) has sorted them.

@@ -80,7 +80,7 @@ impl<'a> BatchUpdate<IntegrationInputs<'a>, 10> for IntegrationStep<'_> {
         inputs: IntegrationInputs<'a>,
         [x, y, z, u, v, w, d, e, f, age]: &mut [&mut [f32]; 10],
     ) {
-        let place = rows.load_all(simd, [x, y, z]);
+        let position = rows.load_all(simd, [x, y, z]);
         let velocity = rows.load_all(simd, [u, v, w]);
         let gas = ForceInputs {
             velocity,
@@ -90,18 +90,18 @@ impl<'a> BatchUpdate<IntegrationInputs<'a>, 10> for IntegrationStep<'_> {
             density: rows.load(simd, inputs.density),
             air_exposure: rows.load(simd, inputs.air_exposure),
         };
-        let wind = burner.wind_field.at(simd, &place);
+        let wind = burner.wind_field.at(simd, &position);
         let own = self.apply_forces(burner, &gas, &wind);
-        let old = rows.load(simd, age);
-        let drift = burner.velocity(&burner.flow(simd, &place), length(&own), old);
-        let velocity = clamp_length(&add_scaled(&own, &drift, old.broadcast(1.0)), MAX_SPEED);
-        let after = self.advect(simd, place, [velocity, drift], rows.0.len());
+        let age_before = rows.load(simd, age);
+        let drift = burner.velocity(&burner.flow(simd, &position), length(&own), age_before);
+        let velocity = clamp_length(&add_scaled(&own, &drift, age_before.broadcast(1.0)), MAX_SPEED);
+        let after = self.advect(simd, position, [velocity, drift], rows.0.len());
         for (values, arrays) in after.into_iter().zip([[x, y, z], [u, v, w], [d, e, f]]) {
             for (batch, array) in values.into_iter().zip(arrays) {
                 rows.store(batch, array);
             }
         }
-        rows.store(old + old.broadcast(self.seconds), age);
+        rows.store(age_before + age_before.broadcast(self.seconds), age);
     }
 }
 
@@ -123,39 +123,39 @@ impl IntegrationStep<'_> {
     #[inline(always)]
     fn apply_forces<R: Real>(&self, burner: &BurnerForces, gas: &ForceInputs<R>, wind: &[R; 3]) -> [R; 3] {
         let Self { forces, seconds, .. } = *self;
-        let like = |value: f32| gas.density.broadcast(value);
+        let splat = |value: f32| gas.density.broadcast(value);
         // No force moves a particle by more than a quarter of d in a sub-step.
-        let most = 0.25 * self.radius / (seconds * seconds);
-        let mut acceleration = clamp_length(&gas.acceleration, most);
-        let thinner = gas.temperature * like(1.0 / forces.air_temperature);
-        acceleration[1] = (thinner - like(1.0)).fma(like(forces.buoyancy), acceleration[1]);
+        let max_acceleration = 0.25 * self.radius / (seconds * seconds);
+        let mut acceleration = clamp_length(&gas.acceleration, max_acceleration);
+        let density_ratio = gas.temperature * splat(1.0 / forces.air_temperature);
+        acceleration[1] = (density_ratio - splat(1.0)).fma(splat(forces.buoyancy), acceleration[1]);
         let per_volume = forces.wind == WindForce::PerVolume;
         if per_volume {
             acceleration =
-                add_scaled(&acceleration, wind, like(forces.wind_gain) / gas.density.simd_max(like(MIN_DENSITY)));
+                add_scaled(&acceleration, wind, splat(forces.wind_gain) / gas.density.simd_max(splat(MIN_DENSITY)));
         }
-        let pushed = add_scaled(&gas.own, &acceleration, like(seconds));
+        let accelerated = add_scaled(&gas.own, &acceleration, splat(seconds));
         // Air that the gas takes up brings its own momentum.
         let gain = if per_volume { 0.0 } else { forces.wind_gain };
-        let air = [wind[0] * like(gain), wind[1] * like(gain), wind[2] * like(gain)];
-        let rate = burner.mixing(&gas.velocity, wind, gas.air_exposure) * like(seconds);
-        let share = like(1.0) / (rate + like(1.0));
-        let mut mixed = add_scaled(&pushed, &air, rate);
+        let air = [wind[0] * splat(gain), wind[1] * splat(gain), wind[2] * splat(gain)];
+        let rate = burner.mixing(&gas.velocity, wind, gas.air_exposure) * splat(seconds);
+        let mix_weight = splat(1.0) / (rate + splat(1.0));
+        let mut mixed = add_scaled(&accelerated, &air, rate);
         for c in 0..3 {
-            mixed[c] = mixed[c] * share;
+            mixed[c] = mixed[c] * mix_weight;
         }
         let mixed = clamp_length(&mixed, MAX_SPEED);
-        if per_volume { mixed } else { self.apply_cross_drag(burner, &mixed, &air, thinner) }
+        if per_volume { mixed } else { self.apply_cross_drag(burner, &mixed, &air, density_ratio) }
     }
 
     /// Velocity after the drag of air that blows across the fire: `C rho_air / (rho r) |w - u| (w - u)`, level and implicit.
     ///
     /// Gas is several times thinner than air, so that a wind it would hardly mix with inputs bends it.
     #[inline(always)]
-    fn apply_cross_drag<R: Real>(&self, burner: &BurnerForces, own: &[R; 3], air: &[R; 3], thinner: R) -> [R; 3] {
+    fn apply_cross_drag<R: Real>(&self, burner: &BurnerForces, own: &[R; 3], air: &[R; 3], density_ratio: R) -> [R; 3] {
         let mut across = subtract(air, own);
-        across[1] = thinner.broadcast(0.0);
-        let rate = thinner * length(&across) * thinner.broadcast(burner.drag * self.seconds);
+        across[1] = density_ratio.broadcast(0.0);
+        let rate = density_ratio * length(&across) * density_ratio.broadcast(burner.drag * self.seconds);
         add_scaled(own, &across, rate / (rate + rate.broadcast(1.0)))
     }
 
@@ -164,40 +164,41 @@ impl IntegrationStep<'_> {
     fn advect<S: Simd>(
         &self,
         simd: S,
-        place: [Lanes<S>; 3],
+        position: [Lanes<S>; 3],
         [velocity, drift]: [[Lanes<S>; 3]; 2],
         count: usize,
     ) -> [[Lanes<S>; 3]; 3] {
         if self.forces.occluders.is_empty() {
-            return [add_scaled(&place, &velocity, place[0].broadcast(self.seconds)), velocity, drift];
+            return [add_scaled(&position, &velocity, position[0].broadcast(self.seconds)), velocity, drift];
         }
-        let mut carried = [place, velocity, drift];
+        let mut vectors = [position, velocity, drift];
         let mut lanes = [[[0.0; LANES]; 3]; 3];
-        for (batches, lanes) in carried.iter().zip(&mut lanes) {
+        for (batches, lanes) in vectors.iter().zip(&mut lanes) {
             for c in 0..3 {
                 batches[c].store_slice(&mut lanes[c]);
             }
         }
         self.resolve_collisions(&mut lanes, count);
-        for (batches, lanes) in carried.iter_mut().zip(&lanes) {
+        for (batches, lanes) in vectors.iter_mut().zip(&lanes) {
             for c in 0..3 {
                 batches[c] = Lanes::from_slice(simd, &lanes[c]);
             }
         }
-        carried
+        vectors
     }
 
     /// Carries the first `count` of places, velocities and the air's part of them around solids.
     #[inline(never)]
-    fn resolve_collisions(&self, carried: &mut [[[f32; LANES]; 3]; 3], count: usize) {
+    fn resolve_collisions(&self, vectors: &mut [[[f32; LANES]; 3]; 3], count: usize) {
         let ExternalForces { occluders, origin, .. } = *self.forces;
-        let solids = Colliders { occluders, origin, clearance: CLEARANCE * self.radius };
+        let colliders = Colliders { occluders, origin, clearance: CLEARANCE * self.radius };
         for lane in 0..count {
-            let [place, velocity, drift] = carried.map(|all| Vec3::from(all.map(|values| values[lane])));
-            let (place, [left, own]) = solids.collide(place, velocity * self.seconds, [velocity, velocity - drift]);
+            let [position, velocity, drift] = vectors.map(|all| Vec3::from(all.map(|values| values[lane])));
+            let (position, [remaining, own]) =
+                colliders.collide(position, velocity * self.seconds, [velocity, velocity - drift]);
             // What the gas has of its own does not grow where a solid takes the air's part: eddies are a share of it.
-            let drift = if left == velocity { drift } else { left - own };
-            for (all, vector) in carried.iter_mut().zip([place, left, drift]) {
+            let drift = if remaining == velocity { drift } else { remaining - own };
+            for (all, vector) in vectors.iter_mut().zip([position, remaining, drift]) {
                 for c in 0..3 {
                     all[c][lane] = vector[c];
                 }
@@ -220,12 +221,12 @@ mod tests {
         parameters::{FlameParticlesParameters, MotionParameters},
         simulate::{
             derived::DerivedConstants,
-            forces::{external_forces::StepConstants, turbulence::Turbulence},
+            forces::{external_forces::StepConstants, turbulence::TurbulenceTile},
         },
     };
 
     /// What the forces of particle `number` follow from, and the wind there.
-    fn pushed(number: u64) -> (ForceInputs<f32>, [f32; 3]) {
+    fn accelerated(number: u64) -> (ForceInputs<f32>, [f32; 3]) {
         let key = Key::new(4, "pushed");
         let vector = |step: u32| {
             let [x, y, z, _] = key.words(number, step, Purpose(0)).map(|word| 8.0 * uniform(word) - 4.0);
@@ -247,7 +248,7 @@ mod tests {
             let parameters = FlameParticlesParameters { motion, ..FlameParticlesParameters::default() };
             let constants = DerivedConstants::new(&parameters, None, &MemoryAssets::default()).unwrap();
             let (key, wind_field) = (Key::new(1, "flame"), Wind::new(WindParameters::default(), 1, None));
-            let turbulence = Turbulence::new(key);
+            let turbulence = TurbulenceTile::new(key);
             let step = StepConstants { parameters: &parameters, constants: &constants, turbulence: &turbulence, key };
             let around = Surroundings::of_wind(&wind_field);
             let forces = ExternalForces::new(step, &Particles::default(), &around, 0.0);
@@ -259,7 +260,7 @@ mod tests {
                 seconds: 0.005,
             };
             let burner = &forces.burner_forces[0];
-            let all: Vec<_> = (0..LANES as u64).map(pushed).collect();
+            let all: Vec<_> = (0..LANES as u64).map(accelerated).collect();
             let together = bansho_base::dispatch_baseline!(simd => {
                 let batch = |value: &dyn Fn(usize) -> f32| {
                     let values: [f32; LANES] = std::array::from_fn(value);

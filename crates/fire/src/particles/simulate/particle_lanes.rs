@@ -33,7 +33,7 @@ pub(crate) fn for_each_burner_batch<S: SharedColumns, const N: usize>(
     moving: [&mut Vec<f32>; N],
 ) {
     let level = Level::new();
-    columns(moving).into_par_iter().enumerate().for_each(|(task, mut moving)| {
+    split_into_tasks(moving).into_par_iter().enumerate().for_each(|(task, mut moving)| {
         let first = task * PARTICLES_PER_TASK;
         let range = first..first + moving[0].len();
         let sorted = RowsByBurner::new(&burners[range.clone()], burner_forces.len());
@@ -59,10 +59,10 @@ fn update_task<V: Simd, S: SharedColumns, const N: usize>(
 }
 
 /// The part of each array that belongs to each task.
-fn columns<const N: usize>(arrays: [&mut Vec<f32>; N]) -> Vec<[&mut [f32]; N]> {
+fn split_into_tasks<const N: usize>(arrays: [&mut Vec<f32>; N]) -> Vec<[&mut [f32]; N]> {
     let tasks = arrays.first().map_or(0, |values| values.len().div_ceil(PARTICLES_PER_TASK));
-    let mut parts = arrays.map(|values| values.chunks_mut(PARTICLES_PER_TASK));
-    (0..tasks).map(|_| parts.each_mut().map(|parts| parts.next().unwrap_or_default())).collect()
+    let mut chunks = arrays.map(|values| values.chunks_mut(PARTICLES_PER_TASK));
+    (0..tasks).map(|_| chunks.each_mut().map(|chunks| chunks.next().unwrap_or_default())).collect()
 }
 
 /// The rows of a task's arrays, burner by burner.
@@ -85,9 +85,9 @@ impl RowsByBurner {
             start += std::mem::replace(end, start);
         }
         for (row, burner) in burners.iter().enumerate() {
-            let place = &mut sorted.ends[*burner as usize];
-            sorted.rows[*place] = row as u32;
-            *place += 1;
+            let end = &mut sorted.ends[*burner as usize];
+            sorted.rows[*end] = row as u32;
+            *end += 1;
         }
         sorted
     }

@@ -14,7 +14,7 @@ const DENSITY: usize = 14;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Particle {
     /// Number of its birth, unique in the run: the key of all its random numbers.
-    pub birth: u64,
+    pub id: u64,
     /// Place x, m, from [`Particles::origin`].
     pub position: [f32; 3],
     /// Velocity u, m/s.
@@ -30,7 +30,7 @@ pub struct Particle {
     /// Time since its birth, s.
     pub age: f32,
     /// Age at which it is removed, s.
-    pub life: f32,
+    pub max_age: f32,
     /// Share of its fuel that has not burnt: 1 at birth, 0 once burnt out.
     pub fuel: f32,
     /// Volume fraction of soot, dimensionless (1e-6 is one part in a million, usual in a yellow flame).
@@ -42,7 +42,7 @@ pub struct Particle {
 pub struct Particles {
     /// Where the positions count from, m.
     pub origin: DVec3,
-    pub(crate) birth: Vec<u64>,
+    pub(crate) id: Vec<u64>,
     pub(crate) position: [Vec<f32>; 3],
     pub(crate) velocity: [Vec<f32>; 3],
     pub(crate) spawn_point: [Vec<f32>; 3],
@@ -57,7 +57,7 @@ pub struct Particles {
     pub(crate) temperature: Vec<f32>,
     pub(crate) support_radius: Vec<f32>,
     pub(crate) age: Vec<f32>,
-    pub(crate) life: Vec<f32>,
+    pub(crate) max_age: Vec<f32>,
     pub(crate) fuel: Vec<f32>,
     pub(crate) soot: Vec<f32>,
 }
@@ -70,12 +70,12 @@ impl Particles {
 
     /// How many live.
     pub fn len(&self) -> usize {
-        self.birth.len()
+        self.id.len()
     }
 
     /// Whether none lives.
     pub fn is_empty(&self) -> bool {
-        self.birth.is_empty()
+        self.id.is_empty()
     }
 
     /// Adds a particle of the first burner, born where it is; no other may have its birth number.
@@ -85,7 +85,7 @@ impl Particles {
 
     /// Adds a particle of a burner, which burns so much faster than the mean.
     pub(crate) fn push_from(&mut self, burner: u32, burn_rate: f32, particle: Particle) {
-        self.birth.push(particle.birth);
+        self.id.push(particle.id);
         self.burner.push(burner);
         self.burn_rate.push(burn_rate);
         for axis in 0..3 {
@@ -105,7 +105,7 @@ impl Particles {
             return None;
         }
         Some(Particle {
-            birth: self.birth[index],
+            id: self.id[index],
             position: std::array::from_fn(|axis| self.position[axis][index]),
             velocity: std::array::from_fn(|axis| self.velocity[axis][index]),
             mass: self.mass[index],
@@ -113,7 +113,7 @@ impl Particles {
             temperature: self.temperature[index],
             support_radius: self.support_radius[index],
             age: self.age[index],
-            life: self.life[index],
+            max_age: self.max_age[index],
             fuel: self.fuel[index],
             soot: self.soot[index],
         })
@@ -122,7 +122,7 @@ impl Particles {
     /// Removes all whose mask is not set; the others keep their order.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
         if keep.contains(&false) {
-            retain(&mut self.birth, keep);
+            retain(&mut self.id, keep);
             retain(&mut self.burner, keep);
             self.float_columns_mut().into_par_iter().for_each(|values| retain(values, keep));
         }
@@ -131,16 +131,16 @@ impl Particles {
     /// Sorts them into cells, and what else is known of each; their numbers of birth order those of one cell. Their densities are to be
     /// found anew.
     pub(crate) fn sort(&mut self, cells: &mut Cells<3>, companion: &mut Vec<f32>) {
-        cells.assign(self.positions(), &self.birth);
-        cells.reorder(&mut self.birth);
+        cells.assign(self.positions(), &self.id);
+        cells.reorder(&mut self.id);
         cells.reorder(&mut self.burner);
         let arrays = self.float_columns_mut().into_iter().enumerate().filter(|(number, _)| *number != DENSITY);
         cells.reorder_all(arrays.map(|(_, values)| values).chain([companion]));
     }
 
     /// Numbers of birth, no two alike.
-    pub fn spawner(&self) -> &[u64] {
-        &self.birth
+    pub fn ids(&self) -> &[u64] {
+        &self.id
     }
 
     /// Places x, y and z from the origin, m.
@@ -184,24 +184,24 @@ impl Particles {
     }
 
     /// Ages at removal, s.
-    pub fn lives(&self) -> &[f32] {
-        &self.life
+    pub fn max_ages(&self) -> &[f32] {
+        &self.max_age
     }
 
     /// Shares of the fuel that have not burnt.
-    pub fn fuels(&self) -> &[f32] {
+    pub fn fuel_fractions(&self) -> &[f32] {
         &self.fuel
     }
 
     /// Volume fractions of soot.
-    pub fn soots(&self) -> &[f32] {
+    pub fn soot_fractions(&self) -> &[f32] {
         &self.soot
     }
 
     /// Every array of numbers, for what treats them all alike.
     pub(crate) fn float_columns(&self) -> [&Vec<f32>; FLOAT_COLUMNS] {
         let Self { position: [x, y, z], velocity: [u, v, w], spawn_point: [a, b, c], drift: [d, e, f], .. } = self;
-        let Self { burn_rate, mass, density, temperature, support_radius, age, life, fuel, soot, .. } = self;
+        let Self { burn_rate, mass, density, temperature, support_radius, age, max_age, fuel, soot, .. } = self;
         [
             x,
             y,
@@ -221,7 +221,7 @@ impl Particles {
             temperature,
             support_radius,
             age,
-            life,
+            max_age,
             fuel,
             soot,
         ]
@@ -240,7 +240,7 @@ impl Particles {
             temperature,
             support_radius,
             age,
-            life,
+            max_age,
             fuel,
             soot,
             ..
@@ -264,22 +264,22 @@ impl Particles {
             temperature,
             support_radius,
             age,
-            life,
+            max_age,
             fuel,
             soot,
         ]
     }
 
     fn scalar_columns_mut(&mut self) -> [&mut Vec<f32>; 8] {
-        let Self { mass, density, temperature, support_radius, age, life, fuel, soot, .. } = self;
-        [mass, density, temperature, support_radius, age, life, fuel, soot]
+        let Self { mass, density, temperature, support_radius, age, max_age, fuel, soot, .. } = self;
+        [mass, density, temperature, support_radius, age, max_age, fuel, soot]
     }
 }
 
 impl Particle {
     fn scalars(&self) -> [f32; 8] {
-        let Self { mass, density, temperature, support_radius, age, life, fuel, soot, .. } = *self;
-        [mass, density, temperature, support_radius, age, life, fuel, soot]
+        let Self { mass, density, temperature, support_radius, age, max_age, fuel, soot, .. } = *self;
+        [mass, density, temperature, support_radius, age, max_age, fuel, soot]
     }
 }
 
@@ -287,10 +287,10 @@ impl Particle {
 mod tests {
     use super::*;
 
-    fn particle(birth: u64) -> Particle {
-        let number = birth as f32;
+    fn particle(id: u64) -> Particle {
+        let number = id as f32;
         Particle {
-            birth,
+            id,
             position: [number, 2.0, 3.0],
             velocity: [0.0, number, 0.0],
             mass: 1.0,
@@ -298,7 +298,7 @@ mod tests {
             temperature: 1500.0 + number,
             support_radius: 0.05,
             age: 0.0,
-            life: number,
+            max_age: number,
             fuel: 1.0,
             soot: number * 1e-6,
         }
@@ -307,9 +307,9 @@ mod tests {
     #[test]
     fn removal_keeps_order_and_rows_together() {
         let mut particles = Particles::new(DVec3::ZERO);
-        (1..=5).for_each(|birth| particles.push(particle(birth)));
+        (1..=5).for_each(|id| particles.push(particle(id)));
         particles.retain(&[true, false, true, false, true]);
-        assert_eq!(particles.spawner(), [1, 3, 5]);
+        assert_eq!(particles.ids(), [1, 3, 5]);
         assert_eq!((0..3).filter_map(|index| particles.get(index)).collect::<Vec<_>>(), [1, 3, 5].map(particle));
         assert_eq!(particles.get(3), None);
     }

@@ -15,7 +15,7 @@ use crate::particles::{
         combustion::step::CombustionStep,
         forces::{
             external_forces::{ExternalForces, StepConstants},
-            turbulence::Turbulence,
+            turbulence::TurbulenceTile,
         },
     },
 };
@@ -27,19 +27,19 @@ pub(crate) struct Simulation {
     pub(crate) constants: DerivedConstants,
     combustion: CombustionModel,
     pub(crate) parameters: FlameParticlesParameters,
-    pub(crate) turbulence: Turbulence,
+    pub(crate) turbulence: TurbulenceTile,
     pub(crate) key: Key,
     pub(crate) particles: Particles,
-    fluid: FluidSolver,
+    solver: FluidSolver,
 }
 
 impl Simulation {
     pub(crate) fn new(parameters: &FlameParticlesParameters, constants: DerivedConstants, key: Key) -> Self {
         Self {
             combustion: CombustionModel::from(&parameters.life),
-            turbulence: Turbulence::new(key),
+            turbulence: TurbulenceTile::new(key),
             particles: Particles::new(parameters.position.into()),
-            fluid: FluidSolver::new(&parameters.fluid, &constants),
+            solver: FluidSolver::new(&parameters.fluid, &constants),
             parameters: parameters.clone(),
             constants,
             key,
@@ -56,20 +56,20 @@ impl Simulation {
     /// The gas moves in sub-steps. What is slow beside sound takes the step_seconds step at once, at its beginning: evening out, mixing, burning
     /// and cooling, and how the wind and the axes change.
     pub(crate) fn step(&mut self, time: f64, surroundings: &Surroundings) {
-        let Self { constants, combustion, parameters, turbulence, key, particles, fluid } = self;
+        let Self { constants, combustion, parameters, turbulence, key, particles, solver } = self;
         let step = StepConstants { parameters, constants, turbulence, key: *key };
         let mut forces = ExternalForces::new(step, particles, surroundings, time);
         let step_seconds = parameters.step_s as f32;
-        let substeps = fluid.substep_count(particles, step_seconds);
-        let (substep_s, radius) = (parameters.step_s / f64::from(substeps), fluid.support_radius());
+        let substeps = solver.substep_count(particles, step_seconds);
+        let (substep_s, radius) = (parameters.step_s / f64::from(substeps), solver.support_radius());
         let spawner = Spawner { constants, turbulence, key: *key, afterlife_s: parameters.life.afterlife_s };
         for substep in 0..substeps {
             let (t, seconds) = (time + substep_s * f64::from(substep), substep_s as f32);
-            fluid.compute_pressure_forces(particles, seconds);
+            solver.compute_pressure_forces(particles, seconds);
             if substep == 0 {
-                fluid.sum_over_neighbors(particles);
+                solver.sum_over_neighbors(particles);
                 let smoothing = [parameters.fluid.viscosity, parameters.fluid.conduction].map(|share| share as f32);
-                let (neighbor_sums, afterlife) = (&fluid.neighbor_sums, parameters.life.afterlife_s as f32);
+                let (neighbor_sums, afterlife) = (&solver.neighbor_sums, parameters.life.afterlife_s as f32);
                 let combustion_step = CombustionStep {
                     combustion,
                     forces: &forces,
@@ -79,13 +79,14 @@ impl Simulation {
                     radius,
                     seconds: step_seconds,
                 };
-                combustion_step.update_thermochemistry(particles, &mut fluid.air_exposure);
+                combustion_step.update_thermochemistry(particles, &mut solver.air_exposure);
             } else {
                 forces.advance_vortex_rings(t);
             }
-            let (acceleration, air_exposure) = (fluid.acceleration.each_ref().map(Vec::as_slice), &fluid.air_exposure);
+            let (acceleration, air_exposure) =
+                (solver.acceleration.each_ref().map(Vec::as_slice), &solver.air_exposure);
             IntegrationStep { forces: &forces, acceleration, air_exposure, radius, seconds }.advance(particles);
-            spawner.add(particles, t, substep_s);
+            spawner.spawn(particles, t, substep_s);
         }
         self.remove_expired();
     }
@@ -93,15 +94,15 @@ impl Simulation {
     /// Removes what has lived its time or left the domain, and whatever is not a number.
     fn remove_expired(&mut self) {
         let [min, max] = self.constants.domain.map(|corner| corner.as_vec3());
-        let Particles { position, velocity, temperature, age, life, .. } = &self.particles;
+        let Particles { position, velocity, temperature, age, max_age, .. } = &self.particles;
         let keep: Vec<bool> = (0..age.len())
             .into_par_iter()
             .with_min_len(PARTICLES_PER_TASK)
             .map(|index| {
-                let place = Vec3::from(position.each_ref().map(|values| values[index]));
+                let position = Vec3::from(position.each_ref().map(|values| values[index]));
                 let speed = Vec3::from(velocity.each_ref().map(|values| values[index])).length_squared();
-                let inside = place.cmpge(min).all() && place.cmple(max).all();
-                inside && age[index] < life[index] && speed.is_finite() && temperature[index].is_finite()
+                let inside = position.cmpge(min).all() && position.cmple(max).all();
+                inside && age[index] < max_age[index] && speed.is_finite() && temperature[index].is_finite()
             })
             .collect();
         self.particles.retain(&keep);

@@ -15,7 +15,7 @@ pub(crate) fn write(particles: &Particles) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(12 + PARTICLE * particles.len());
     bytes.extend(VERSION.to_le_bytes());
     bytes.extend((particles.len() as u64).to_le_bytes());
-    bytes.extend(particles.birth.iter().flat_map(|birth| birth.to_le_bytes()));
+    bytes.extend(particles.id.iter().flat_map(|id| id.to_le_bytes()));
     bytes.extend(particles.burner.iter().flat_map(|burner| burner.to_le_bytes()));
     for values in particles.float_columns() {
         bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
@@ -38,7 +38,7 @@ pub(crate) fn read(particles: &Particles, bytes: &[u8], burners: usize) -> Resul
     let (spawner, rest) = rest.split_at(8 * count);
     let (numbers_of_burners, mut rest) = rest.split_at(4 * count);
     let mut read = Particles::new(particles.origin);
-    read.birth = spawner.as_chunks().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
+    read.id = spawner.as_chunks().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
     read.burner = numbers_of_burners.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
     for values in read.float_columns_mut() {
         let (head, tail) = rest.split_at(4 * count);

@@ -34,17 +34,17 @@ pub(crate) fn add_scaled<R: Real>(one: &[R; 3], other: &[R; 3], factor: R) -> [R
     sum
 }
 
-/// The vector, or where it is longer than `most` one of that length.
+/// The vector, or where it is longer than `max_length` one of that length.
 #[inline(always)]
-pub(crate) fn clamp_length<R: Real>(vector: &[R; 3], most: f32) -> [R; 3] {
-    let like = |value: f32| vector[0].broadcast(value);
-    let squared = dot(vector, vector).simd_max(like(f32::MIN_POSITIVE));
-    let share = (squared.simd_rsqrt() * like(most)).simd_min(like(1.0));
-    let mut held = *vector;
+pub(crate) fn clamp_length<R: Real>(vector: &[R; 3], max_length: f32) -> [R; 3] {
+    let splat = |value: f32| vector[0].broadcast(value);
+    let squared = dot(vector, vector).simd_max(splat(f32::MIN_POSITIVE));
+    let scale = (squared.simd_rsqrt() * splat(max_length)).simd_min(splat(1.0));
+    let mut clamped = *vector;
     for c in 0..3 {
-        held[c] = vector[c] * share;
+        clamped[c] = vector[c] * scale;
     }
-    held
+    clamped
 }
 
 #[cfg(test)]
@@ -55,7 +55,7 @@ mod tests {
     fn long_vectors_are_shortened_and_others_stay() {
         assert_eq!(clamp_length(&[1.0, -2.0, 2.0], 3.1), [1.0, -2.0, 2.0]);
         assert_eq!(clamp_length(&[0.0; 3], 1.0), [0.0; 3]);
-        let held = clamp_length(&[10.0, -20.0, 20.0], 3.0);
-        assert!((length(&held) - 3.0).abs() < 1e-5 && (held[1] + 2.0).abs() < 1e-5, "{held:?}");
+        let clamped = clamp_length(&[10.0, -20.0, 20.0], 3.0);
+        assert!((length(&clamped) - 3.0).abs() < 1e-5 && (clamped[1] + 2.0).abs() < 1e-5, "{clamped:?}");
     }
 }

@@ -52,14 +52,14 @@ impl World {
     }
 }
 
-fn place(simulation: &Simulation, index: usize) -> Vec3 {
+fn position(simulation: &Simulation, index: usize) -> Vec3 {
     Vec3::from(simulation.particles.positions().map(|values| values[index]))
 }
 
 /// Particles that the eye sees: hot enough to glow, with soot to glow with.
 fn lit(simulation: &Simulation) -> Vec<usize> {
     let particles = &simulation.particles;
-    let shines = |index: &usize| particles.soots()[*index] > 3e-7 && particles.temperatures()[*index] > 900.0;
+    let shines = |index: &usize| particles.soot_fractions()[*index] > 3e-7 && particles.temperatures()[*index] > 900.0;
     (0..particles.len()).filter(shines).collect()
 }
 

@@ -49,7 +49,7 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
     for values in particles.float_columns() {
         assert!(values.iter().all(|value| value.is_finite()), "seed {seed}: not a number");
     }
-    let spawner = particles.spawner().iter().collect::<std::collections::BTreeSet<_>>().len();
+    let unique_ids = particles.ids().iter().collect::<std::collections::BTreeSet<_>>().len();
     assert_eq!(spawner, particles.len(), "seed {seed}: one birth, two particles");
     let [low, high] = constants.domain.map(|corner| corner.as_vec3());
     // Gas is never colder than air, itself at birth or the inside of its flame, nor hotter than itself at birth or its flame.
@@ -61,8 +61,11 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
     }
     let most_soot = parameters.life.soot_ppm as f32 * 1e-6;
     for index in 0..particles.len() {
-        let place = place(simulation, index);
-        assert!(place.cmpge(low).all() && place.cmple(high).all(), "seed {seed}: {place} is outside the domain");
+        let position = position(simulation, index);
+        assert!(
+            position.cmpge(low).all() && position.cmple(high).all(),
+            "seed {seed}: {position} is outside the domain"
+        );
         let kelvin = f64::from(particles.temperature[index]);
         assert!((coldest - 0.1..hottest + 0.1).contains(&kelvin), "seed {seed}: {kelvin} K");
         assert!((0.0..=1.0).contains(&particles.fuel[index]), "seed {seed}: {} of its fuel", particles.fuel[index]);
@@ -70,7 +73,7 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
         assert!(particles.density[index] > 0.0 && particles.mass[index] == constants.mass, "seed {seed}: mass");
         let radius = particles.support_radius[index] / constants.support_radius;
         assert!((0.999..3.001).contains(&radius), "seed {seed}: {radius} support radii");
-        assert!(particles.age[index] <= particles.life[index], "seed {seed}: older than it may be");
+        assert!(particles.age[index] <= particles.max_age[index], "seed {seed}: older than it may be");
     }
 }
 
@@ -106,8 +109,8 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
 /// The speed of gas that `acceleration`, m/s^2, drives for as long as it may live, or as `far` as the domain goes.
 fn driven_speed(simulation: &Simulation, parameters: &FlameParticlesParameters, acceleration: f64, far: f64) -> f64 {
     let constants = &simulation.constants;
-    let lives = (0..constants.burners.len()).map(|index| constants.max_age(index, parameters.life.afterlife_s));
-    (acceleration * lives.fold(0.0, f64::max)).min((2.0 * acceleration * far).sqrt())
+    let max_ages = (0..constants.burners.len()).map(|index| constants.max_age(index, parameters.life.afterlife_s));
+    (acceleration * max_ages.fold(0.0, f64::max)).min((2.0 * acceleration * far).sqrt())
 }
 
 /// Speed of the fastest particle, m/s.

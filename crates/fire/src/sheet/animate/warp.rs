@@ -32,17 +32,17 @@ pub(crate) struct FlameWaves {
 impl FlameWaves {
     /// The waves that `key` gives a flame of this shape.
     pub(crate) fn new(shape: &ShapeParameters, key: Key, clock: &Clock) -> Self {
-        let edge = |name| {
+        let edge_fluctuation = |name| {
             let fit = |waves: f64| clock.waves(waves, 1.0);
             Fluctuation::new(key, Purpose::named(name), shape.flutter_waves, 0.9, fit)
         };
-        let in_time =
+        let time_fluctuation =
             |name, hz, roughness| Fluctuation::new(key, Purpose::named(name), hz, roughness, |f| clock.frequency(f));
         Self {
-            left: edge("left edge"),
-            right: edge("right edge"),
-            sway: in_time("sway", shape.sway_hz, 0.5),
-            flicker: in_time("flicker", shape.flicker_hz, 0.6),
+            left: edge_fluctuation("left edge"),
+            right: edge_fluctuation("right edge"),
+            sway: time_fluctuation("sway", shape.sway_hz, 0.5),
+            flicker: time_fluctuation("flicker", shape.flicker_hz, 0.6),
         }
     }
 }
@@ -65,8 +65,8 @@ impl WindLean {
     /// Drift over rise is the tangent; it saturates smoothly, since a flame that lies flat is no sheet any more.
     pub(crate) fn new(wind: &Wind, point: DVec3, t: f64, right: DVec3, rise_speed: f64, response: f64) -> Self {
         let velocity = wind.at(point, t) * (response / rise_speed.max(0.05));
-        let soft = |tangent: f64| Self::MAX_TANGENT * math::tanh(tangent / Self::MAX_TANGENT);
-        Self { across: soft(velocity.dot(right)), toward: soft(velocity.dot(right.cross(DVec3::Y))) }
+        let soft_clamp = |tangent: f64| Self::MAX_TANGENT * math::tanh(tangent / Self::MAX_TANGENT);
+        Self { across: soft_clamp(velocity.dot(right)), toward: soft_clamp(velocity.dot(right.cross(DVec3::Y))) }
     }
 }
 
@@ -76,9 +76,9 @@ pub(crate) struct WarpState {
     /// E left and right over w.
     pub(crate) edges: CurvePair,
     /// How far the centre line has moved to the right, in sheet widths, over y.
-    centre: CurvePair,
+    center: CurvePair,
     /// Least and greatest of that.
-    pub(crate) centre_range: [f64; 2],
+    pub(crate) center_range: [f64; 2],
     /// What y is multiplied by, below 1 while the flame is taller than usual.
     height_scale: f32,
     /// Distance that the texture has scrolled, sheet heights.
@@ -102,19 +102,19 @@ impl WarpState {
     /// The point of the unbent, usual flame that (x, y) of the sheet shows.
     #[inline(always)]
     pub(crate) fn unwarp<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
-        let [centre, _] = self.centre.lookup(&lookup_index(y));
-        (x - centre, y * y.broadcast(self.height_scale))
+        let [center, _] = self.center.lookup(&lookup_index(y));
+        (x - center, y * y.broadcast(self.height_scale))
     }
 
     /// [`unwarp`](Self::unwarp) for one point.
     #[inline(always)]
     pub(crate) fn unwarp_at(&self, [x, y]: [f32; 2]) -> [f32; 2] {
-        [x - self.centre.at(y)[0], y * self.height_scale]
+        [x - self.center.at(y)[0], y * self.height_scale]
     }
 
     /// Where the centre line stands at height y, in sheet widths from the axis.
-    pub(crate) fn centre(&self, y: f64) -> f64 {
-        f64::from(self.centre.at(y as f32)[0])
+    pub(crate) fn center(&self, y: f64) -> f64 {
+        f64::from(self.center.at(y as f32)[0])
     }
 }
 
@@ -129,25 +129,25 @@ fn evaluate_warp(
 ) -> WarpState {
     let (time, scroll) = (clock.time(t), clock.scroll(t));
     let shape_parameters = &parameters.shape;
-    let edge = |waves: &Fluctuation| {
+    let edge_fluctuation = |waves: &Fluctuation| {
         let mut values = [0.0; SEGMENTS + 1];
         waves.fill(-scroll, 1.0 / SEGMENTS as f64, &mut values);
         // P in [0, 1]; its strength takes it away from 1, where the edge is at its outermost.
         values.map(|value| (0.5 * shape_parameters.flutter as f32).mul_add(value - 1.0, 1.0))
     };
-    let edges = shape.edges(&edge(&waves.left), &edge(&waves.right));
-    let centre = centre_line(parameters, waves, time, push);
-    let ends = (0..=16).map(|i| f64::from(centre.at(i as f32 / 16.0)[0]));
-    let centre_range = ends.fold([0.0_f64; 2], |[low, high], value| [low.min(value), high.max(value)]);
+    let edges = shape.edges(&edge_fluctuation(&waves.left), &edge_fluctuation(&waves.right));
+    let center = center_line(parameters, waves, time, push);
+    let ends = (0..=16).map(|i| f64::from(center.at(i as f32 / 16.0)[0]));
+    let center_range = ends.fold([0.0_f64; 2], |[low, high], value| [low.min(value), high.max(value)]);
     let flicker = shape_parameters.flicker * f64::from(waves.flicker.at(time));
     // Sheets leave headroom for growth: at rest the flame reaches 1 / (1 + flicker) of the sheet.
     let height_scale = ((1.0 + shape_parameters.flicker) / (1.0 + flicker)) as f32;
-    WarpState { edges, centre, centre_range, height_scale, scroll }
+    WarpState { edges, center, center_range, height_scale, scroll }
 }
 
 /// Drift grows like y^1.5, as gas that is pushed evenly while it accelerates upward; sway travels up with the gas.
 #[inline(always)]
-fn centre_line(parameters: &FlameSheetParameters, waves: &FlameWaves, time: f64, push: WindLean) -> CurvePair {
+fn center_line(parameters: &FlameSheetParameters, waves: &FlameWaves, time: f64, push: WindLean) -> CurvePair {
     /// How long a swing takes from base to tip, as a share of its period.
     const LAG: f64 = 0.6;
     let shape_parameters = &parameters.shape;

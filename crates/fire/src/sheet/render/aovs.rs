@@ -30,12 +30,12 @@ pub(crate) struct AovContext<'a> {
 
 /// Adds the AOVs of all samples in the part `rect` of `strip`. Only what is asked for is measured, a pixel at a time.
 #[inline(always)]
-pub(crate) fn write_aov_rows<S: Simd>(simd: S, measured: &AovContext, rect: Rect, strip: &mut Strip) {
+pub(crate) fn write_aov_rows<S: Simd>(simd: S, context: &AovContext, rect: Rect, strip: &mut Strip) {
     let start = rect.x / LANES * LANES;
     for y in rect.y..rect.bottom() {
         for column in (start..rect.right()).step_by(LANES) {
-            for sample in measured.samples {
-                write_aov_batch(simd, measured, sample, [column, y], rect, strip);
+            for sample in context.samples {
+                write_aov_batch(simd, context, sample, [column, y], rect, strip);
             }
         }
     }
@@ -44,15 +44,15 @@ pub(crate) fn write_aov_rows<S: Simd>(simd: S, measured: &AovContext, rect: Rect
 #[inline(always)]
 fn write_aov_batch<S: Simd>(
     simd: S,
-    measured: &AovContext,
+    context: &AovContext,
     sample: &TimeSample,
     pixel: [usize; 2],
     rect: Rect,
     strip: &mut Strip,
 ) {
     let batch = sample.pixel_to_sheet.batch(simd, pixel[0], pixel[1]);
-    let sheet = measured.sheet;
-    let Some(shade) = shade_sample(sheet.shape(), sheet.ramp(), sample, measured.content, &batch) else { return };
+    let sheet = context.sheet;
+    let Some(shade) = shade_sample(sheet.shape(), sheet.ramp(), sample, context.content, &batch) else { return };
     for lane in 0..LANES {
         let x = pixel[0] + lane;
         if !(rect.x..rect.right()).contains(&x) {
@@ -62,13 +62,13 @@ fn write_aov_batch<S: Simd>(
         if !strip.visible(index, batch.depth[lane]) {
             continue;
         }
-        let share = 1.0 / measured.samples.len() as f32;
-        let depth = -math::f32::ln_1p(-shade.light[3][lane].min(0.999_999)) * share;
+        let sample_weight = 1.0 / context.samples.len() as f32;
+        let depth = -math::f32::ln_1p(-shade.light[3][lane].min(0.999_999)) * sample_weight;
         strip.aovs[OPTICAL_DEPTH].add(index, depth, 1.0);
         let weight = color::luminance([0, 1, 2].map(|k| shade.light[k][lane])) * sample.luminance;
-        if weight > 0.0 && measured.content == SheetContent::Flame {
+        if weight > 0.0 && context.content == SheetContent::Flame {
             strip.aovs[TEMPERATURE].add(index, sheet.ramp().temperature.at(shade.t1[lane])[0], weight);
-            let motion = measured.motion(sample, f64::from(batch.x[lane]), f64::from(batch.y[lane]));
+            let motion = context.motion(sample, f64::from(batch.x[lane]), f64::from(batch.y[lane]));
             for (plane, value) in MOTION.into_iter().zip(motion) {
                 strip.aovs[plane].add(index, value, weight);
             }
@@ -82,7 +82,7 @@ impl AovContext<'_> {
         let (now, next) = (self.view.shutter.middle(), self.view.next_middle);
         let rise = self.sheet.gas_speed(self.flame, x, y, now) * (next - now);
         let shift: DVec3 = self.sheet.base(self.flame, next) - self.sheet.base(self.flame, now);
-        let bend = sample.state.warp.centre(y + rise) - sample.state.warp.centre(y);
+        let bend = sample.state.warp.center(y + rise) - sample.state.warp.center(y);
         let before = self.view.camera.project(sample.quad.point(x, y));
         let after = self.view.camera_at(next).project(sample.quad.point(x + bend, y + rise) + shift);
         match (before, after) {

@@ -12,21 +12,21 @@ const LAST: f32 = 1.0 - f32::EPSILON / 2.0;
 /// Two functions of one variable in [0, 1]: for each piece, value and rise of the first, then of the second.
 #[derive(Clone, Debug)]
 pub(crate) struct CurvePair {
-    pieces: Box<[[f32; 4]; SEGMENTS]>,
+    segments: Box<[[f32; 4]; SEGMENTS]>,
 }
 
 /// Pieces of a table and the places in them.
 pub(crate) struct TableIndex<S: Simd> {
-    piece: u32x16<S>,
-    part: Lanes<S>,
+    segment: u32x16<S>,
+    fraction: Lanes<S>,
 }
 
 /// Where sixteen places lie in any table; they are held to [0, 1].
 #[inline(always)]
 pub(crate) fn table_index<S: Simd>(x: Lanes<S>) -> TableIndex<S> {
-    let place = x.simd_max(x.broadcast(0.0)).simd_min(x.broadcast(LAST)) * x.broadcast(SEGMENTS as f32);
-    let (piece, part) = wrap_split(place, SEGMENTS as u32 - 1);
-    TableIndex { piece, part }
+    let scaled = x.simd_max(x.broadcast(0.0)).simd_min(x.broadcast(LAST)) * x.broadcast(SEGMENTS as f32);
+    let (segment, fraction) = wrap_split(scaled, SEGMENTS as u32 - 1);
+    TableIndex { segment, fraction }
 }
 
 /// Where sixteen places lie that are often all the same, as the heights of a level row of pixels: then one look-up serves.
@@ -41,9 +41,9 @@ pub(crate) enum TableLookup<S: Simd> {
 #[inline(always)]
 pub(crate) fn lookup_index<S: Simd>(x: Lanes<S>) -> TableLookup<S> {
     /// Spread within which one look-up serves all: a twentieth of a piece.
-    const STEADY: f32 = 0.05 / SEGMENTS as f32;
+    const UNIFORM_TOLERANCE: f32 = 0.05 / SEGMENTS as f32;
     let first = x.broadcast(x[0]);
-    if any_positive((x - first).simd_abs() - x.broadcast(STEADY)) {
+    if any_positive((x - first).simd_abs() - x.broadcast(UNIFORM_TOLERANCE)) {
         TableLookup::PerLane(table_index(x))
     } else {
         TableLookup::Uniform(x[0], first)
@@ -62,21 +62,21 @@ impl CurvePair {
     /// The table of samples by their index, 0 to `SEGMENTS`.
     #[inline(always)]
     pub(crate) fn from_samples(mut sample: impl FnMut(usize) -> [f32; 2]) -> Self {
-        let mut pieces = Box::new([[0.0; 4]; SEGMENTS]);
+        let mut segments = Box::new([[0.0; 4]; SEGMENTS]);
         let mut low = sample(0);
-        for (i, piece) in pieces.iter_mut().enumerate() {
+        for (i, segment) in segments.iter_mut().enumerate() {
             let high = sample(i + 1);
-            *piece = [low[0], high[0] - low[0], low[1], high[1] - low[1]];
+            *segment = [low[0], high[0] - low[0], low[1], high[1] - low[1]];
             low = high;
         }
-        Self { pieces }
+        Self { segments }
     }
 
     /// Both functions at located places.
     #[inline(always)]
     pub(crate) fn fetch<S: Simd>(&self, at: &TableIndex<S>) -> [Lanes<S>; 2] {
-        let [first, first_rise, second, second_rise] = fetch(at.part.simd, &self.pieces, at.piece);
-        [first_rise.fma(at.part, first), second_rise.fma(at.part, second)]
+        let [first, first_delta, second, second_delta] = fetch(at.fraction.simd, &self.segments, at.segment);
+        [first_delta.fma(at.fraction, first), second_delta.fma(at.fraction, second)]
     }
 
     /// Both functions at sixteen places.
@@ -96,7 +96,7 @@ impl CurvePair {
 
     /// [`fetch`](Self::fetch), out of line.
     fn fetch_per_lane<S: Simd>(&self, at: &TableIndex<S>) -> [Lanes<S>; 2] {
-        at.part.simd.vectorize(
+        at.fraction.simd.vectorize(
             #[inline(always)]
             || self.fetch(at),
         )
@@ -105,11 +105,11 @@ impl CurvePair {
     /// Both functions at one place.
     #[inline(always)]
     pub(crate) fn at(&self, x: f32) -> [f32; 2] {
-        let place = x.simd_max(0.0).simd_min(LAST) * SEGMENTS as f32;
-        let piece = place as i32;
-        let part = place - piece as f32;
-        let [first, first_rise, second, second_rise] = self.pieces[piece as usize & (SEGMENTS - 1)];
-        [first_rise.mul_add(part, first), second_rise.mul_add(part, second)]
+        let scaled = x.simd_max(0.0).simd_min(LAST) * SEGMENTS as f32;
+        let segment = scaled as i32;
+        let fraction = scaled - segment as f32;
+        let [first, first_delta, second, second_delta] = self.segments[segment as usize & (SEGMENTS - 1)];
+        [first_delta.mul_add(fraction, first), second_delta.mul_add(fraction, second)]
     }
 }
 

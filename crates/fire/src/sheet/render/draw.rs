@@ -80,7 +80,7 @@ fn draw_each_row<S: Simd>(simd: S, context: &DrawContext, columns: Range<usize>,
                     sums.add(&shade, batch.depth, sample.luminance, context.samples.len());
                 }
             }
-            sums.compose(column, y, rect, context.absorbs, strip);
+            sums.composite(column, y, rect, context.absorbs, strip);
         }
     }
 }
@@ -99,7 +99,7 @@ struct RowBand<S: Simd> {
     /// Exact places on the first row.
     first: Vec<SheetSamples<S>>,
     /// How they differ on the first row of the next row_band.
-    slope: Vec<SheetSamples<S>>,
+    delta: Vec<SheetSamples<S>>,
     /// Exact places on that row.
     next: Vec<SheetSamples<S>>,
 }
@@ -109,7 +109,7 @@ impl<S: Simd> RowBand<S> {
     #[inline(always)]
     fn new(context: &DrawContext) -> Self {
         let room = || Vec::with_capacity(GROUP_COLUMNS / LANES * context.samples.len());
-        Self { first: room(), slope: room(), next: room() }
+        Self { first: room(), delta: room(), next: room() }
     }
 
     /// Forgets both rows: what comes next does not follow on them.
@@ -127,12 +127,12 @@ impl<S: Simd> RowBand<S> {
             add_sheet_samples(simd, context, columns, row, &mut self.first);
         }
         self.next.clear();
-        self.slope.clear();
+        self.delta.clear();
         if context.row_band > 1 {
             add_sheet_samples(simd, context, columns, row + context.row_band, &mut self.next);
             for (first, next) in self.first.iter().zip(&self.next) {
                 let minification = first.minification.max(next.minification);
-                self.slope.push(SheetSamples {
+                self.delta.push(SheetSamples {
                     coordinates: next.coordinates.difference(&first.coordinates),
                     depth: next.depth - first.depth,
                     minification,
@@ -153,7 +153,7 @@ fn draw_bands<S: Simd>(
     strip: &mut Strip,
 ) {
     row_band.clear();
-    let batches = columns.len().div_ceil(LANES);
+    let batch_count = columns.len().div_ceil(LANES);
     for first in (rect.y / context.row_band * context.row_band..rect.bottom()).step_by(context.row_band) {
         if context
             .samples
@@ -165,13 +165,13 @@ fn draw_bands<S: Simd>(
         }
         row_band.advance(simd, context, &columns, first);
         for row in first.max(rect.y)..(first + context.row_band).min(rect.bottom()) {
-            let part = (row - first) as f32 / context.row_band as f32;
-            for batch in 0..batches {
-                let share = batch * context.samples.len()..(batch + 1) * context.samples.len();
-                let slope = row_band.slope.get(share.clone()).unwrap_or(&[]);
+            let fraction = (row - first) as f32 / context.row_band as f32;
+            for batch in 0..batch_count {
+                let spots = batch * context.samples.len()..(batch + 1) * context.samples.len();
+                let delta = row_band.delta.get(spots.clone()).unwrap_or(&[]);
                 let column = columns.start + batch * LANES;
-                let sums = average_samples(simd, context, &row_band.first[share], slope, part, [column, row]);
-                sums.compose(column, row, rect, context.absorbs, strip);
+                let sums = average_samples(simd, context, &row_band.first[spots], delta, fraction, [column, row]);
+                sums.composite(column, row, rect, context.absorbs, strip);
             }
         }
     }
@@ -196,27 +196,27 @@ fn add_sheet_samples<S: Simd>(
     }
 }
 
-/// Averages all samples of the sixteen pixels from `pixel` on, `part` of the way between two exact rows.
+/// Averages all samples of the sixteen pixels from `pixel` on, `fraction` of the way between two exact rows.
 #[inline(always)]
 fn average_samples<S: Simd>(
     simd: S,
     context: &DrawContext,
     samples_of_row: &[SheetSamples<S>],
-    slopes: &[SheetSamples<S>],
-    part: f32,
+    deltas: &[SheetSamples<S>],
+    fraction: f32,
     pixel: [usize; 2],
 ) -> PixelSums<S> {
     let mut sums = PixelSums::new(simd);
-    for (index, (sample, spot)) in context.samples.iter().zip(samples_of_row).enumerate() {
-        let (coordinates, depth) = match slopes.get(index) {
-            Some(slope) => (
-                spot.coordinates.add_scaled(part, &slope.coordinates),
-                slope.depth.fma(spot.depth.broadcast(part), spot.depth),
+    for (index, (sample, sample_coordinates)) in context.samples.iter().zip(samples_of_row).enumerate() {
+        let (coordinates, depth) = match deltas.get(index) {
+            Some(delta) => (
+                sample_coordinates.coordinates.add_scaled(fraction, &delta.coordinates),
+                delta.depth.fma(sample_coordinates.depth.broadcast(fraction), sample_coordinates.depth),
             ),
-            None => (spot.coordinates, spot.depth),
+            None => (sample_coordinates.coordinates, sample_coordinates.depth),
         };
         let Some(shade) = shade_coordinates(context.shape, context.ramp, &sample.state, &coordinates) else { continue };
-        let minification = slopes.get(index).map_or(spot.minification, |slope| slope.minification);
+        let minification = deltas.get(index).map_or(sample_coordinates.minification, |delta| delta.minification);
         if minification > 1.0 {
             let offsets: &[_] = if minification > 2.0 { &SUPERSAMPLES_4 } else { &SUPERSAMPLES_2 };
             add_supersampled(simd, context, sample, pixel, offsets, &mut sums);
@@ -240,13 +240,13 @@ fn add_supersampled<S: Simd>(
         #[inline(always)]
         || {
             let batch = sample.pixel_to_sheet.batch(simd, pixel[0], pixel[1]);
-            let share = 1.0 / offsets.len() as f32;
+            let spots = 1.0 / offsets.len() as f32;
             for &[across, up] in offsets {
                 let near = batch.offset_by(0.5 * across * sample.state.pixel[0], up * sample.state.pixel[1]);
                 let coordinates = coordinates(context.shape, &sample.state, &near);
                 if let Some(mut shade) = shade_coordinates(context.shape, context.ramp, &sample.state, &coordinates) {
                     for plane in &mut shade.light {
-                        *plane *= share;
+                        *plane *= spots;
                     }
                     sums.add(&shade, batch.depth, sample.luminance, context.samples.len());
                 }
@@ -274,13 +274,13 @@ fn misses_flame(shape: &ShapeTables, sample: &TimeSample, columns: &Range<usize>
 struct PixelSums<S: Simd> {
     light: [Lanes<S>; 4],
     depth: Lanes<S>,
-    touched: bool,
+    covered: bool,
 }
 
 impl<S: Simd> PixelSums<S> {
     #[inline(always)]
     fn new(simd: S) -> Self {
-        Self { light: [Lanes::splat(simd, 0.0); 4], depth: Lanes::splat(simd, f32::INFINITY), touched: false }
+        Self { light: [Lanes::splat(simd, 0.0); 4], depth: Lanes::splat(simd, f32::INFINITY), covered: false }
     }
 
     #[inline(always)]
@@ -288,15 +288,15 @@ impl<S: Simd> PixelSums<S> {
         for (k, weight) in [luminance, luminance, luminance, 1.0 / samples as f32].into_iter().enumerate() {
             self.light[k] = shade.light[k].fma(depth.broadcast(weight), self.light[k]);
         }
-        let something = shade.light[0] + shade.light[2] + shade.light[3];
-        self.depth = depth.broadcast(0.0).select_lt(something, self.depth.simd_min(depth), self.depth);
-        self.touched = true;
+        let nonzero = shade.light[0] + shade.light[2] + shade.light[3];
+        self.depth = depth.broadcast(0.0).select_lt(nonzero, self.depth.simd_min(depth), self.depth);
+        self.covered = true;
     }
 
     /// Moves the pixels behind what the strip holds, where the plate does not hide them.
     #[inline(always)]
-    fn compose(&self, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
-        if !self.touched {
+    fn composite(&self, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
+        if !self.covered {
             return;
         }
         let [red, green, blue, opacity] = self.light;
@@ -309,7 +309,7 @@ impl<S: Simd> PixelSums<S> {
             self.light[k].store_slice(&mut pixels.light[k]);
         }
         self.depth.store_slice(&mut pixels.depth);
-        compose(&pixels, column, y, rect, absorbs, strip);
+        composite(&pixels, column, y, rect, absorbs, strip);
     }
 }
 
@@ -320,7 +320,7 @@ struct PixelArrays {
 }
 
 /// Moves those of sixteen pixels that lie in `rect` behind what the strip holds, where the plate does not hide them.
-fn compose(pixels: &PixelArrays, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
+fn composite(pixels: &PixelArrays, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
     let row = (y - strip.rect.y) * strip.rect.width;
     for lane in 0..LANES {
         let (x, depth) = (column + lane, pixels.depth[lane]);

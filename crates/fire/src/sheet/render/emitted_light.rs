@@ -34,27 +34,27 @@ impl FlameSheet {
     /// The flame is taken as still air would leave it. A sheet is thin, and turned to every viewer, so that its intensity is the
     /// same in all directions.
     pub(crate) fn row_intensities(&self, flame: &FlameInstance, t: f64) -> RowIntensities {
-        let still = WindLean { across: 0.0, toward: 0.0 };
+        let calm = WindLean { across: 0.0, toward: 0.0 };
         let time = self.flame_time(flame, t);
-        let warp = WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, still);
+        let warp = WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, calm);
         let texture = flame.texture_source.texture(warp.scroll);
         let state = SheetState { warp, texture, pixel: [2.0 / LANES as f32, 1.0 / ROWS as f32] };
         let size = self.sheet_size(flame);
         let cell_area = size.x * size.y / (LANES * ROWS) as f64;
         let scale = (cell_area * self.luminance_at(t)) as f32;
-        fearless_simd::dispatch!(Level::new(), simd => rows(simd, self, &state, scale))
+        fearless_simd::dispatch!(Level::new(), simd => row_light(simd, self, &state, scale))
     }
 
     /// The point lights that stand for a flame while the shutter is open.
     pub(crate) fn point_lights(&self, flame: &FlameInstance, shutter: Shutter) -> Vec<Light> {
         let t = shutter.middle();
         let (base, size) = (self.base(flame, t), self.sheet_size(flame));
-        let rows = self.row_intensities(flame, t);
+        let row_light = self.row_intensities(flame, t);
         let count = self.parameters.light.count.max(1) as usize;
         let scale = self.parameters.light.scale as f32;
         let light_position = |height: f64| base + DVec3::Y * (height * size.y);
         (0..count)
-            .map(|index| equal_energy_segment(&rows, index, count))
+            .map(|index| equal_energy_segment(&row_light, index, count))
             .filter(|(intensity, _)| intensity.iter().any(|value| *value * scale > 0.0))
             .map(|(intensity, height)| Light {
                 emitter: Emitter::Point { position: light_position(height), radius: 0.15 * size.x },
@@ -65,10 +65,10 @@ impl FlameSheet {
 }
 
 #[inline(always)]
-fn rows<S: Simd>(simd: S, sheet: &FlameSheet, state: &SheetState, scale: f32) -> RowIntensities {
+fn row_light<S: Simd>(simd: S, sheet: &FlameSheet, state: &SheetState, scale: f32) -> RowIntensities {
     let x = ramp(simd, 0.5 / LANES as f32, 1.0 / LANES as f32);
-    let mut rows = [[0.0; 3]; ROWS];
-    for (index, row) in rows.iter_mut().enumerate() {
+    let mut row_light = [[0.0; 3]; ROWS];
+    for (index, row) in row_light.iter_mut().enumerate() {
         let y = Lanes::splat(simd, (index as f32 + 0.5) / ROWS as f32);
         let batch = SheetCoordinates { x, y, depth: y.broadcast(1.0) };
         if let Some(shade) = shade(sheet.shape(), sheet.ramp(), state, &batch) {
@@ -77,31 +77,31 @@ fn rows<S: Simd>(simd: S, sheet: &FlameSheet, state: &SheetState, scale: f32) ->
             }
         }
     }
-    rows
+    row_light
 }
 
 /// Part `index` of `count` of the rows, each with the same share of the energy, and the height at which it is centred.
 ///
 /// Parts of equal energy move up and down smoothly as the flame flickers.
-fn equal_energy_segment(rows: &RowIntensities, index: usize, count: usize) -> ([f32; 3], f64) {
+fn equal_energy_segment(row_light: &RowIntensities, index: usize, count: usize) -> ([f32; 3], f64) {
     let energy = |row: &[f32; 3]| f64::from(row.iter().sum::<f32>().max(0.0));
-    let total: f64 = rows.iter().map(energy).sum();
+    let total: f64 = row_light.iter().map(energy).sum();
     let (from, to) = (total * index as f64 / count as f64, total * (index + 1) as f64 / count as f64);
-    let (mut below, mut intensity, mut height_moment) = (0.0, [0.0_f32; 3], 0.0);
-    for (place, row) in rows.iter().enumerate() {
-        let above = below + energy(row);
-        let taken = (above.min(to) - below.max(from)).max(0.0);
-        if taken > 0.0 {
-            let part = taken / energy(row);
+    let (mut cumulative, mut intensity, mut height_moment) = (0.0, [0.0_f32; 3], 0.0);
+    for (row_index, row) in row_light.iter().enumerate() {
+        let next_cumulative = cumulative + energy(row);
+        let overlap = (next_cumulative.min(to) - cumulative.max(from)).max(0.0);
+        if overlap > 0.0 {
+            let fraction = overlap / energy(row);
             for k in 0..3 {
-                intensity[k] += row[k] * part as f32;
+                intensity[k] += row[k] * fraction as f32;
             }
-            height_moment += taken * (place as f64 + 0.5) / ROWS as f64;
+            height_moment += overlap * (row_index as f64 + 0.5) / ROWS as f64;
         }
-        below = above;
+        cumulative = next_cumulative;
     }
-    let taken = to - from;
-    (intensity, if taken > 0.0 { height_moment / taken } else { lerp(0.0, 1.0, 0.3) })
+    let overlap = to - from;
+    (intensity, if overlap > 0.0 { height_moment / overlap } else { lerp(0.0, 1.0, 0.3) })
 }
 
 #[cfg(test)]
@@ -110,15 +110,15 @@ mod tests {
 
     #[test]
     fn shares_have_equal_energy_and_add_up() {
-        let mut rows = [[0.0; 3]; ROWS];
-        for (i, row) in rows.iter_mut().enumerate().take(10) {
+        let mut row_light = [[0.0; 3]; ROWS];
+        for (i, row) in row_light.iter_mut().enumerate().take(10) {
             *row = [3.0, 2.0, 1.0 + i as f32];
         }
-        let parts: Vec<_> = (0..3).map(|index| equal_energy_segment(&rows, index, 3)).collect();
-        let energy = |part: &([f32; 3], f64)| part.0.iter().sum::<f32>();
-        assert!((energy(&parts[0]) - energy(&parts[2])).abs() < 1e-3);
-        let red: f32 = parts.iter().map(|part| part.0[0]).sum();
+        let segments: Vec<_> = (0..3).map(|index| equal_energy_segment(&row_light, index, 3)).collect();
+        let energy = |fraction: &([f32; 3], f64)| fraction.0.iter().sum::<f32>();
+        assert!((energy(&segments[0]) - energy(&segments[2])).abs() < 1e-3);
+        let red: f32 = segments.iter().map(|fraction| fraction.0[0]).sum();
         assert!((red - 30.0).abs() < 1e-4);
-        assert!(parts[0].1 < parts[1].1 && parts[1].1 < parts[2].1);
+        assert!(segments[0].1 < segments[1].1 && segments[1].1 < segments[2].1);
     }
 }

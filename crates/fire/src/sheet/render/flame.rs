@@ -166,7 +166,7 @@ impl FlameSheet {
         match self.parameters.stage {
             Stage::Flame => SheetContent::Flame,
             Stage::Texture => SheetContent::FlatTexture,
-            Stage::Thresholded | Stage::Sharpened | Stage::Coloured => SheetContent::FlatThresholded,
+            Stage::Thresholded | Stage::Sharpened | Stage::Colored => SheetContent::FlatThresholded,
         }
     }
 
@@ -187,7 +187,7 @@ impl FlameSheet {
             let right = self.right(flame, &camera, self.base(flame, t));
             let (quad, warp) = self.evaluate_at(flame, right, wind, t);
             let Some(pixel_to_sheet) = PixelToSheet::new(&camera, &quad) else { continue };
-            let [low, high] = warp.centre_range;
+            let [low, high] = warp.center_range;
             rect = rect.union(&bounds(&camera, &quad, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size));
             let pixels_per_metre = pixels_per_metre(&camera, &quad);
             let state = SheetState {

@@ -31,33 +31,33 @@ pub(crate) struct ColorRamp {
 }
 
 /// Soot temperature at T2.
-pub(crate) fn temperature(colour: &ColorParameters, t2: f64) -> f64 {
-    math::lerp(colour.edge_temperature_k, colour.core_temperature_k, t2)
+pub(crate) fn temperature(color: &ColorParameters, t2: f64) -> f64 {
+    math::lerp(color.edge_temperature_k, color.core_temperature_k, t2)
 }
 
 /// Share of the light behind that soot of the optical depth of T2 takes, and at the same time its emissivity.
-fn opacity(colour: &ColorParameters, t2: f64) -> f64 {
-    -math::exp_m1(-colour.soot_optical_depth * t2)
+fn opacity(color: &ColorParameters, t2: f64) -> f64 {
+    -math::exp_m1(-color.soot_optical_depth * t2)
 }
 
 /// ACEScg of T2 before it is scaled.
-fn unscaled_color(colour: &ColorParameters, t2: f64) -> [f64; 3] {
-    match colour.kind {
+fn unscaled_color(color: &ColorParameters, t2: f64) -> [f64; 3] {
+    match color.kind {
         Coloring::BlackBody => {
             // Thin soot shines in proportion to its depth; none at all still has the colour of the thinnest.
-            let emissivity = if colour.soot_optical_depth > 1e-6 { opacity(colour, t2) } else { t2 };
-            color::black_body().radiance(temperature(colour, t2) as f32).map(|value| f64::from(value) * emissivity)
+            let emissivity = if color.soot_optical_depth > 1e-6 { opacity(color, t2) } else { t2 };
+            color::black_body().radiance(temperature(color, t2) as f32).map(|value| f64::from(value) * emissivity)
         }
         Coloring::Paper => {
             let display =
-                [&colour.red, &colour.green, &colour.blue].map(|curve| color::decode_srgb(curve.eval(t2) as f32));
+                [&color.red, &color.green, &color.blue].map(|curve| color::decode_srgb(curve.eval(t2) as f32));
             color::acescg_from_srgb(display).map(f64::from)
         }
     }
 }
 
 /// What of the chain is shown at T2, T1 and T0 when it is not the light.
-fn gray(stage: Stage, t1: f64, t2: f64) -> f64 {
+fn stage_value(stage: Stage, t1: f64, t2: f64) -> f64 {
     if stage == Stage::Sharpened { t2 } else { t1 }
 }
 
@@ -71,30 +71,30 @@ impl ColorRamp {
     }
 
     /// The table for these parameters, which were [checked](Self::check).
-    pub(crate) fn new(texture: &TextureParameters, colour: &ColorParameters, stage: Stage) -> Self {
+    pub(crate) fn new(texture: &TextureParameters, color: &ColorParameters, stage: Stage) -> Self {
         let sharpen = from_origin(&texture.sharpen, "texture.sharpen").unwrap_or_else(|_| texture.sharpen.clone());
         let luminance = |rgb: [f64; 3]| f64::from(color::luminance(rgb.map(|value| value as f32)));
-        let brightest = (0..=256).map(|i| luminance(unscaled_color(colour, f64::from(i) / 256.0))).fold(0.0, f64::max);
+        let brightest = (0..=256).map(|i| luminance(unscaled_color(color, f64::from(i) / 256.0))).fold(0.0, f64::max);
         let scale = if brightest > 0.0 { 1.0 / brightest } else { 0.0 };
         let light = |t1: f64| {
             let t2 = sharpen.eval(t1);
             match stage {
                 Stage::Flame => {
-                    let [r, g, b] = unscaled_color(colour, t2).map(|value| value * scale);
-                    [r, g, b, opacity(colour, t2)]
+                    let [r, g, b] = unscaled_color(color, t2).map(|value| value * scale);
+                    [r, g, b, opacity(color, t2)]
                 }
-                Stage::Coloured => {
-                    let [r, g, b] = unscaled_color(colour, t2).map(|value| value * scale);
+                Stage::Colored => {
+                    let [r, g, b] = unscaled_color(color, t2).map(|value| value * scale);
                     [r, g, b, 1.0]
                 }
-                _ => [gray(stage, t1, t2), gray(stage, t1, t2), gray(stage, t1, t2), 1.0],
+                _ => [stage_value(stage, t1, t2), stage_value(stage, t1, t2), stage_value(stage, t1, t2), 1.0],
             }
         };
         Self {
             light: levels(light),
-            temperature: CurvePair::new(|t1| [temperature(colour, sharpen.eval(t1)), 0.0]),
-            absorbs: colour.soot_optical_depth > 0.0 || stage != Stage::Flame,
-            base_blue: blue_flame::colour().map(|value| value * colour.base_blue as f32),
+            temperature: CurvePair::new(|t1| [temperature(color, sharpen.eval(t1)), 0.0]),
+            absorbs: color.soot_optical_depth > 0.0 || stage != Stage::Flame,
+            base_blue: blue_flame::colour().map(|value| value * color.base_blue as f32),
         }
     }
 }
@@ -111,7 +111,7 @@ impl ColorRamp {
     /// Red, green, blue of luminance up to 1 and opacity at T1.
     #[inline(always)]
     pub(crate) fn light<S: Simd>(&self, t1: Lanes<S>) -> [Lanes<S>; 4] {
-        let place = t1.simd_clamp01() * t1.broadcast((LEVELS - 1) as f32);
-        fetch(t1.simd, &self.light, nearest_whole(place))
+        let scaled = t1.simd_clamp01() * t1.broadcast((LEVELS - 1) as f32);
+        fetch(t1.simd, &self.light, nearest_whole(scaled))
     }
 }

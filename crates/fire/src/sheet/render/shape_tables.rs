@@ -126,10 +126,10 @@ impl<S: Simd> FlameCoordinates<S> {
         each.into_iter().fold(0.0, f32::max)
     }
 
-    /// Moved by `part` of a change.
+    /// Moved by `fraction` of a change.
     #[inline(always)]
-    pub(crate) fn add_scaled(&self, part: f32, change: &Self) -> Self {
-        self.zip_with(change, |value, change| change.fma(value.broadcast(part), value))
+    pub(crate) fn add_scaled(&self, fraction: f32, delta: &Self) -> Self {
+        self.zip_with(delta, |value, delta| delta.fma(value.broadcast(fraction), value))
     }
 
     /// The change from `other` to this place.
@@ -163,7 +163,7 @@ impl ShapeTables {
     }
 
     /// Tables for these curves, which were [checked](Self::check).
-    pub(crate) fn new(shape: &ShapeParameters, texture: &TextureParameters, colour: &ColorParameters) -> Self {
+    pub(crate) fn new(shape: &ShapeParameters, texture: &TextureParameters, color: &ColorParameters) -> Self {
         let fringe = from_origin(&shape.fringe_width, "shape.fringe_width");
         let fringe = fringe.unwrap_or_else(|_| shape.fringe_width.clone());
         let width_samples = samples(&shape.core_width, &fringe);
@@ -174,8 +174,8 @@ impl ShapeTables {
             widths: CurvePair::from_samples(|i| width_samples[i]),
             falloff: CurvePair::new(|coordinates| [1.0 - shape.slowing.eval(coordinates), 0.0]),
             across: CurvePair::new(|across| [texture.threshold_across.eval(across), 0.0]),
-            heights: CurvePair::new(|w| [texture.threshold.eval(w), colour.glow.eval(w)]),
-            cooling: CurvePair::new(|w| cooling_factors(colour, w)),
+            heights: CurvePair::new(|w| [texture.threshold.eval(w), color.glow.eval(w)]),
+            cooling: CurvePair::new(|w| cooling_factors(color, w)),
             width_samples,
             reach: Box::new([1.0; REACH_BINS]),
         };
@@ -286,17 +286,17 @@ impl ShapeTables {
         let mut reach = Box::new([0.0_f32; REACH_BINS]);
         for edge in 0..=REACH_BINS {
             let y = (edge as f32 / (REACH_BINS - 1) as f32).min(1.0);
-            let mut far = 0.0_f32;
+            let mut max_distance = 0.0_f32;
             for step in 1..=STEPS {
                 let distance = step as f32 / STEPS as f32;
                 let w = self.slowed_rise_at(distance, y);
                 let row = ((w * (max_width_above.len() - 1) as f32) as usize).min(max_width_above.len() - 1);
                 if w <= 1.05 && distance <= max_width_above[row] + MARGIN {
-                    far = far.max(distance + MARGIN);
+                    max_distance = max_distance.max(distance + MARGIN);
                 }
             }
             for bin in edge.saturating_sub(1)..=edge.min(REACH_BINS - 1) {
-                reach[bin] = reach[bin].max(far);
+                reach[bin] = reach[bin].max(max_distance);
             }
         }
         reach
@@ -316,14 +316,14 @@ impl ShapeTables {
 ///
 /// Wien's law: a share d of the temperature costs a factor exp(-c2 d / (lambda T)); here for 610 and 540 nm at 1700 K. Blue, at
 /// 460 nm, loses what green loses beside red, to the power 2.5.
-fn cooling_factors(colour: &ColorParameters, w: f64) -> [f64; 2] {
+fn cooling_factors(color: &ColorParameters, w: f64) -> [f64; 2] {
     const RED: f64 = 13.87;
     const GREEN: f64 = 15.67;
-    if colour.kind == Coloring::Paper {
+    if color.kind == Coloring::Paper {
         return [1.0, 1.0];
     }
-    let share = colour.cooling * w;
-    [math::exp(-RED * share), math::exp((RED - GREEN) * share)]
+    let cooled_fraction = color.cooling * w;
+    [math::exp(-RED * cooled_fraction), math::exp((RED - GREEN) * cooled_fraction)]
 }
 
 /// The random key of one flame among the instances of a sheet.

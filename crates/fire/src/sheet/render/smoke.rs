@@ -37,10 +37,10 @@ pub(crate) struct SmokeState {
 
 impl SmokeState {
     fn scattered_at(&self, y: f32) -> [f32; 3] {
-        let place = y.simd_clamp01() * (LIGHT_SAMPLES - 1) as f32;
-        let below = (place as usize).min(LIGHT_SAMPLES - 2);
-        let part = place - below as f32;
-        std::array::from_fn(|k| math::f32::lerp(self.scattered[below][k], self.scattered[below + 1][k], part))
+        let scaled = y.simd_clamp01() * (LIGHT_SAMPLES - 1) as f32;
+        let below = (scaled as usize).min(LIGHT_SAMPLES - 2);
+        let fraction = scaled - below as f32;
+        std::array::from_fn(|k| math::f32::lerp(self.scattered[below][k], self.scattered[below + 1][k], fraction))
     }
 }
 
@@ -57,12 +57,12 @@ pub(crate) fn shade_smoke<S: Simd>(
     let width =
         y.simd_max(zero).simd_sqrt().fma(one - one.broadcast(smoke.base_width), one.broadcast(smoke.base_width));
     let across = (two * (x - one.broadcast(0.5))).simd_abs() / width;
-    let soft = |place: Lanes<S>| {
-        let held = place.simd_clamp01();
+    let smoothstep = |scaled: Lanes<S>| {
+        let held = scaled.simd_clamp01();
         held * held * (one.broadcast(3.0) - two * held)
     };
-    let side = soft(one - across);
-    let ends = soft(y * one.broadcast(4.0)) * soft((one - y) * one.broadcast(1.6));
+    let side = smoothstep(one - across);
+    let ends = smoothstep(y * one.broadcast(4.0)) * smoothstep((one - y) * one.broadcast(1.6));
     let envelope = side * ends;
     if !any_positive(envelope) {
         return None;
@@ -86,11 +86,11 @@ impl FlameSheet {
     /// The layers and waves of a flame's smoke; `None` where it makes none.
     pub(crate) fn smoke_layers(&self, flame: &FlameInstance) -> Option<(FractalLayers, FlameWaves)> {
         let smoke = &self.parameters.smoke;
-        let still =
+        let still_shape =
             crate::sheet::parameters::ShapeParameters { flicker: 0.0, sway: 0.08, ..self.parameters.shape.clone() };
         (smoke.optical_depth > 0.0).then(|| {
             let layers = FractalLayers::new([1.0, 0.35], smoke.speed, flame.key, &self.clock);
-            (layers, FlameWaves::new(&still, flame.key, &self.clock))
+            (layers, FlameWaves::new(&still_shape, flame.key, &self.clock))
         })
     }
 
@@ -118,7 +118,7 @@ impl FlameSheet {
         let pixel_to_sheet = PixelToSheet::new(&view.camera, &quad)?;
         let scale = pixels_per_metre(&view.camera, &quad);
         let source = FilteredTexture::fractal(layers, scale * plume.y);
-        let [low, high] = warp.centre_range;
+        let [low, high] = warp.center_range;
         let rect = bounds(&view.camera, &quad, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size);
         let state = SheetState {
             texture: source.texture(warp.scroll),

@@ -54,11 +54,11 @@ fn gradient_noise(cells: [usize; 2], key: Key, purpose: Purpose) -> Texels {
 /// For each of `count` texels: its cell, the next, the place within it and the faded place.
 fn axis(count: usize, cells: usize) -> Vec<(usize, usize, f32, f32)> {
     let width = count / cells;
-    let place = |i: usize| {
+    let coordinate = |i: usize| {
         let f = (i % width) as f32 / width as f32;
         (i / width, (i / width + 1) % cells, f, f * f * f * (f * (f * 6.0 - 15.0) + 10.0))
     };
-    (0..count).map(place).collect()
+    (0..count).map(coordinate).collect()
 }
 
 /// Octaves of noise, each twice as fine and `gain` times as strong as the last.
@@ -82,11 +82,11 @@ fn warped_noise() -> Texels {
     let gas = TextureTable::new(&octaves(4, 0.5, key, Purpose::named("gas")));
     let across = octaves(2, 0.5, key, Purpose::named("stir across"));
     let up = octaves(2, 0.5, key, Purpose::named("stir up"));
-    let place = |i: usize| {
+    let coordinate = |i: usize| {
         let column = WARP_TEXELS[0].fma(across[i], (i % COLUMNS) as f32);
         gas.bilinear(column, WARP_TEXELS[1].fma(up[i], (i / COLUMNS) as f32))
     };
-    equalize_histogram((0..ROWS * COLUMNS).map(place).collect())
+    equalize_histogram((0..ROWS * COLUMNS).map(coordinate).collect())
 }
 
 /// Replaces each value by its rank in [0, 1]: no value is more frequent than another, the paper's one wish for the texture.
@@ -95,16 +95,16 @@ fn equalize_histogram(texels: Texels) -> Texels {
     let low = texels.iter().copied().fold(f32::INFINITY, f32::min);
     let high = texels.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let scale = BINS as f32 / (high - low).max(f32::MIN_POSITIVE);
-    let place = |value: f32| ((value - low) * scale).min(BINS as f32 - 0.001);
+    let coordinate = |value: f32| ((value - low) * scale).min(BINS as f32 - 0.001);
     let mut below = vec![0.0_f64; BINS + 1];
-    texels.iter().for_each(|value| below[place(*value) as usize + 1] += 1.0 / texels.len() as f64);
+    texels.iter().for_each(|value| below[coordinate(*value) as usize + 1] += 1.0 / texels.len() as f64);
     for bin in 0..BINS {
         below[bin + 1] += below[bin];
     }
     let rank = |value: f32| {
-        let place = place(value);
-        let bin = place as usize;
-        math::lerp(below[bin], below[bin + 1], f64::from(place) - bin as f64) as f32
+        let coordinate = coordinate(value);
+        let bin = coordinate as usize;
+        math::lerp(below[bin], below[bin + 1], f64::from(coordinate) - bin as f64) as f32
     };
     texels.into_iter().map(rank).collect()
 }
@@ -223,8 +223,8 @@ mod tests {
         }
         let total: usize = counts.iter().sum();
         for count in counts {
-            let share = count as f64 / total as f64;
-            assert!((0.06..0.15).contains(&share), "{counts:?}");
+            let frequency = count as f64 / total as f64;
+            assert!((0.06..0.15).contains(&frequency), "{counts:?}");
         }
     }
 

@@ -64,7 +64,7 @@ impl TextureTable {
 
     /// A bilinear look-up at one wrapped place of at least -2^16 texels.
     fn bilinear(&self, column: f32, row: f32) -> f32 {
-        let split = |place: f32| (place.floor() as i32 as usize, place - place.floor());
+        let split = |coordinate: f32| (coordinate.floor() as i32 as usize, coordinate - coordinate.floor());
         let ((left, across), (below, up)) = (split(column), split(row));
         let [low_left, low_right, high_left, high_right] = self.corners[below % ROWS * COLUMNS + left % COLUMNS];
         let low = (low_right - low_left).fma(across, low_left);
@@ -76,18 +76,18 @@ impl TextureTable {
     pub(crate) fn filtered(&self, level: f32) -> Self {
         let level = level.clamp(0.0, MAX_LEVEL as f32);
         let whole = (level as usize).min(MAX_LEVEL - 1);
-        let mut texels = self.coarse(whole).to_vec();
-        smooth(&mut texels, 1 << whole, level - whole as f32);
+        let mut texels = self.mip_level(whole).to_vec();
+        filter(&mut texels, 1 << whole, level - whole as f32);
         Self::new(&texels)
     }
 
     /// The texels of a table `level` factors of 2 coarser, which are kept.
-    fn coarse(&self, level: usize) -> &[f32] {
+    fn mip_level(&self, level: usize) -> &[f32] {
         self.coarser[level].get_or_init(|| match level.checked_sub(1) {
             None => self.texels().into(),
             Some(finer) => {
-                let mut texels = self.coarse(finer).to_vec();
-                smooth(&mut texels, 1 << finer, 1.0);
+                let mut texels = self.mip_level(finer).to_vec();
+                filter(&mut texels, 1 << finer, 1.0);
                 texels.into()
             }
         })
@@ -95,33 +95,33 @@ impl TextureTable {
 }
 
 /// Blends each texel by `amount` with the binomial mean (1 2 1)/4 of texels `spacing` apart, in both directions.
-fn smooth(texels: &mut [f32], spacing: usize, amount: f32) {
+fn filter(texels: &mut [f32], spacing: usize, amount: f32) {
     let before = texels.to_vec();
-    dispatch!(Level::new(), _simd => smooth_across(&before, texels, spacing, amount));
+    dispatch!(Level::new(), _simd => filter_rows(&before, texels, spacing, amount));
     let before = texels.to_vec();
-    dispatch!(Level::new(), _simd => smooth_up(&before, texels, spacing, amount));
+    dispatch!(Level::new(), _simd => filter_columns(&before, texels, spacing, amount));
 }
 
 #[inline(always)]
-fn smooth_across(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
-    for (row, smooth) in before.chunks_exact(COLUMNS).zip(texels.chunks_exact_mut(COLUMNS)) {
+fn filter_rows(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
+    for (row, filter) in before.chunks_exact(COLUMNS).zip(texels.chunks_exact_mut(COLUMNS)) {
         let wrapped = [&row[COLUMNS - spacing..], row, &row[..spacing]].concat();
-        blend(row, [&wrapped[2 * spacing..], &wrapped], amount, smooth);
+        blend(row, [&wrapped[2 * spacing..], &wrapped], amount, filter);
     }
 }
 
 #[inline(always)]
-fn smooth_up(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
+fn filter_columns(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
     let row = |row: usize| &before[row % ROWS * COLUMNS..][..COLUMNS];
-    for (place, smooth) in texels.chunks_exact_mut(COLUMNS).enumerate() {
-        blend(row(place), [row(place + spacing), row(place + ROWS - spacing)], amount, smooth);
+    for (coordinate, filter) in texels.chunks_exact_mut(COLUMNS).enumerate() {
+        blend(row(coordinate), [row(coordinate + spacing), row(coordinate + ROWS - spacing)], amount, filter);
     }
 }
 
 #[inline(always)]
-fn blend(row: &[f32], [next, last]: [&[f32]; 2], amount: f32, smooth: &mut [f32]) {
+fn blend(row: &[f32], [next, last]: [&[f32]; 2], amount: f32, filter: &mut [f32]) {
     let (row, next, last) = (&row[..COLUMNS], &next[..COLUMNS], &last[..COLUMNS]);
-    for (i, value) in smooth.iter_mut().enumerate() {
+    for (i, value) in filter.iter_mut().enumerate() {
         let mean = 0.25 * (next[i] + last[i]) + 0.5 * row[i];
         *value = (mean - row[i]).fma(amount, row[i]);
     }
@@ -168,8 +168,8 @@ impl Texture {
     pub(crate) fn sample<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
         match self {
             Self::Single(table, layer) => layer.sample(table, u, w),
-            Self::Mixed(table, [coarse, fine]) => {
-                fractal::mix_equalized(coarse.sample(table, u, w), fine.sample(table, u, w))
+            Self::Mixed(table, [mip_level, fine]) => {
+                fractal::mix_equalized(mip_level.sample(table, u, w), fine.sample(table, u, w))
             }
         }
     }

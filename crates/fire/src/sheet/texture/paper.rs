@@ -51,13 +51,13 @@ impl Octave {
         std::iter::successors(Some(first), next).take(octaves as usize)
     }
 
-    /// The four functions of one coordinate, at `place`, whose products with those of the other make a term.
+    /// The four functions of one coordinate, at `coordinate`, whose products with those of the other make a term.
     ///
     /// With a = Fx x, b = Px(y), c = Fy y, d = Py(x): cos(a+b) cos(c+d) is the product of
     /// (cos a cos b - sin a sin b) and (cos c cos d - sin c sin d), and a, d belong to x while b, c belong to y.
-    fn factors(place: f64, frequency: f64) -> [f64; 4] {
-        let (sin_own, cos_own) = math::sin_cos(frequency * place);
-        let (sin_phase, cos_phase) = math::sin_cos(FRAC_PI_2 * math::sin(0.5 * frequency * place));
+    fn factors(coordinate: f64, frequency: f64) -> [f64; 4] {
+        let (sin_own, cos_own) = math::sin_cos(frequency * coordinate);
+        let (sin_phase, cos_phase) = math::sin_cos(FRAC_PI_2 * math::sin(0.5 * frequency * coordinate));
         [cos_own * cos_phase, cos_own * sin_phase, sin_own * cos_phase, sin_own * sin_phase]
     }
 }

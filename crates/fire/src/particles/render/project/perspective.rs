@@ -81,19 +81,19 @@ impl PerspectiveProjector {
         }
         let ellipses = self.ellipses(gas, chosen, &now, &motion);
         for (lane, &index) in chosen.iter().enumerate() {
-            let centre = [now.pixel[0][lane], now.pixel[1][lane]];
+            let center = [now.pixel[0][lane], now.pixel[1][lane]];
             let reach = [ellipses.reach[0][lane], ellipses.reach[1][lane]];
             let mut shown = now.depth[lane] >= self.now.near && ellipses.peak[lane] > 0.0;
             for axis in 0..2 {
-                shown &= centre[axis] + reach[axis] > 0.0 && centre[axis] - reach[axis] < self.size[axis];
-                shown &= centre[axis].abs() < MAX_PIXEL_COORDINATE as f32;
+                shown &= center[axis] + reach[axis] > 0.0 && center[axis] - reach[axis] < self.size[axis];
+                shown &= center[axis].abs() < MAX_PIXEL_COORDINATE as f32;
             }
             if shown {
                 let shape = [ellipses.shape[0][lane], ellipses.shape[1][lane], ellipses.shape[2][lane]];
                 let (radius, peak) = (ellipses.radius[lane], ellipses.peak[lane]);
                 records.push(kind.record(&ProjectedParticle {
                     index,
-                    ellipse: Ellipse { centre, shape, reach, radius, peak },
+                    ellipse: Ellipse { center, shape, reach, radius, peak },
                     depth: f64::from(now.depth[lane]),
                     motion: [motion[0][lane], motion[1][lane]],
                     scale: now.scale[lane],
@@ -149,7 +149,7 @@ struct PinholeCamera {
     /// The particles' origin in the camera's frame, m.
     origin: [f32; 3],
     focal_pixels: f32,
-    centre: [f32; 2],
+    center: [f32; 2],
     near: f32,
     /// Time from the particles' state, s.
     since: f32,
@@ -162,7 +162,7 @@ impl PinholeCamera {
             axes: [axis(0), axis(1), axis(2)],
             origin: camera.to_camera(origin).as_vec3().to_array(),
             focal_pixels: camera.focal_pixels as f32,
-            centre: camera.centre.as_vec2().to_array(),
+            center: camera.centre.as_vec2().to_array(),
             near: camera.near as f32,
             since: since as f32,
         }
@@ -170,19 +170,19 @@ impl PinholeCamera {
 
     #[inline(always)]
     fn project(&self, gas: &Gas, chosen: &[usize]) -> ProjectedBatch {
-        let mut places = [[0.0; LANES]; 3];
+        let mut positions = [[0.0; LANES]; 3];
         for axis in 0..3 {
             let (position, velocity) = (&gas.particles.position[axis], &gas.particles.velocity[axis]);
-            for (place, &index) in places[axis].iter_mut().zip(chosen) {
-                *place = self.since.mul_add(velocity[index], position[index]);
+            for (moved, &index) in positions[axis].iter_mut().zip(chosen) {
+                *moved = self.since.mul_add(velocity[index], position[index]);
             }
         }
         let mut local = [[0.0; LANES]; 3];
         for i in 0..3 {
             let [x, y, z] = self.axes[i];
             for lane in 0..LANES {
-                let across = x.mul_add(places[0][lane], self.origin[i]);
-                local[i][lane] = z.mul_add(places[2][lane], y.mul_add(places[1][lane], across));
+                let across = x.mul_add(positions[0][lane], self.origin[i]);
+                local[i][lane] = z.mul_add(positions[2][lane], y.mul_add(positions[1][lane], across));
             }
         }
         let zero = [0.0; LANES];
@@ -192,8 +192,8 @@ impl PinholeCamera {
             let scale = self.focal_pixels / depth;
             projected.depth[lane] = depth;
             projected.scale[lane] = scale;
-            projected.pixel[0][lane] = scale.mul_add(local[0][lane], self.centre[0]);
-            projected.pixel[1][lane] = scale.mul_add(-local[1][lane], self.centre[1]);
+            projected.pixel[0][lane] = scale.mul_add(local[0][lane], self.center[0]);
+            projected.pixel[1][lane] = scale.mul_add(-local[1][lane], self.center[1]);
         }
         projected
     }

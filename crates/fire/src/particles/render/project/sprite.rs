@@ -22,7 +22,7 @@ use rayon::prelude::*;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ellipse {
     /// Pixels from the picture's left and top edges.
-    pub(crate) centre: [f32; 2],
+    pub(crate) center: [f32; 2],
     /// a, b and c, 1/pixel^2.
     pub(crate) shape: [f32; 3],
     /// How far it reaches sideways and upright, pixels.
@@ -103,13 +103,13 @@ impl<'a> ParticleProjector<'a> {
     /// Hands a particle to `each`, twice where a panorama's seam cuts it.
     #[inline(always)]
     fn project(&self, gas: &Gas, index: usize, mut each: impl FnMut(ProjectedParticle)) {
-        let place = gas.place(index, self.view.shutter.middle());
+        let position = gas.position(index, self.view.shutter.middle());
         let camera = &self.view.camera;
-        let Some(first) = camera.project(place) else { return };
-        let after = self.next.project(gas.place(index, self.view.next_middle));
+        let Some(first) = camera.project(position) else { return };
+        let after = self.next.project(gas.position(index, self.view.next_middle));
         let motion = after.map_or(DVec2::ZERO, |after| across_seam(camera, after.pixel - first.pixel));
         let mut at = |projection: Projection| {
-            if let Some(ellipse) = self.ellipse(gas, index, place, &projection, motion * self.shutter_fraction) {
+            if let Some(ellipse) = self.ellipse(gas, index, position, &projection, motion * self.shutter_fraction) {
                 let (depth, scale) = (projection.depth, projection.pixels_per_metre as f32);
                 each(ProjectedParticle { index, ellipse, depth, motion: motion.as_vec2().to_array(), scale });
             }
@@ -125,10 +125,17 @@ impl<'a> ParticleProjector<'a> {
     /// The ellipse of a ball seen at `projection` that moves by `blur` pixels while the shutter is open.
     ///
     /// A box of that length, and the pixel's footprint, widen the sprite to the same variance; what it holds stays the same.
-    fn ellipse(&self, gas: &Gas, index: usize, place: DVec3, projection: &Projection, blur: DVec2) -> Option<Ellipse> {
+    fn ellipse(
+        &self,
+        gas: &Gas,
+        index: usize,
+        position: DVec3,
+        projection: &Projection,
+        blur: DVec2,
+    ) -> Option<Ellipse> {
         let camera = &self.view.camera;
         let radius = f64::from(gas.particles.support_radius[index]);
-        let lens = lens_jacobian(camera, place, projection);
+        let lens = lens_jacobian(camera, position, projection);
         let ball = lens * lens.transpose() * (radius * radius);
         let smear =
             outer(blur) * (1.0 / (12.0 * VARIANCE)) + DMat2::from_diagonal(DVec2::splat(PIXEL_FOOTPRINT / VARIANCE));
@@ -141,15 +148,15 @@ impl<'a> ParticleProjector<'a> {
         let least = 0.5 * trace - (0.25 * trace * trace - determinant).max(0.0).sqrt();
         let reach = DVec2::new(matrix.x_axis.x.sqrt(), matrix.y_axis.y.sqrt());
         let size = DVec2::new(camera.size[0], camera.size[1]);
-        let centre = projection.pixel;
-        let shown = (centre + reach).cmpgt(DVec2::ZERO).all() && (centre - reach).cmplt(size).all();
-        if !(shown && centre.abs().max_element() < MAX_PIXEL_COORDINATE) {
+        let center = projection.pixel;
+        let shown = (center + reach).cmpgt(DVec2::ZERO).all() && (center - reach).cmplt(size).all();
+        if !(shown && center.abs().max_element() < MAX_PIXEL_COORDINATE) {
             return None;
         }
         let in_front = in_front(projection.depth, camera.near, radius);
         let peak = LINE_PEAK * in_front * lens.determinant().abs() / determinant.sqrt();
         (peak > 0.0).then_some(Ellipse {
-            centre: centre.as_vec2().to_array(),
+            center: center.as_vec2().to_array(),
             shape: [inverse.x_axis.x, inverse.x_axis.y, inverse.y_axis.y].map(|value| value as f32),
             reach: reach.as_vec2().to_array(),
             radius: least.max(0.0).sqrt() as f32,
@@ -178,16 +185,16 @@ fn outer(v: DVec2) -> DMat2 {
 
 /// Pixels to the right and down for a metre across the line of sight: alike in all directions for a perspective lens; the others
 /// stretch circles, by how far two short steps from the place come.
-fn lens_jacobian(camera: &Camera, place: DVec3, projection: &Projection) -> DMat2 {
+fn lens_jacobian(camera: &Camera, position: DVec3, projection: &Projection) -> DMat2 {
     let round = DMat2::from_diagonal(DVec2::new(projection.pixels_per_metre, -projection.pixels_per_metre));
     if camera.lens == Lens::Perspective {
         return round;
     }
-    let ray = (place - camera.position).normalize_or(DVec3::Z);
+    let ray = (position - camera.position).normalize_or(DVec3::Z);
     let (one, two) = ray.any_orthonormal_pair();
     let step = 1e-4 * projection.depth;
     let moved = |direction: DVec3| {
-        let seen = camera.project(place + direction * step)?;
+        let seen = camera.project(position + direction * step)?;
         Some(across_seam(camera, seen.pixel - projection.pixel) / step)
     };
     match (moved(one), moved(two)) {
@@ -243,11 +250,11 @@ mod tests {
         };
         let view = View::new(camera, Shutter { open: 1.0, close: 1.02 }, 1.04, [320, 180], 0);
         let mut particles = Particles::new(DVec3::new(0.1, -0.2, 0.05));
-        for birth in 0..333 {
-            let random = Key::new(5, "seen").uniforms(birth, 0, Purpose::named("place")).map(|u| 4.0 * (u - 0.5));
+        for id in 0..333 {
+            let random = Key::new(5, "seen").uniforms(id, 0, Purpose::named("place")).map(|u| 4.0 * (u - 0.5));
             let [x, y, z, w] = random;
             particles.push(Particle {
-                birth,
+                id,
                 position: [x, y, z],
                 velocity: [3.0 * w, 2.0 * x, y],
                 mass: 1e-4,
@@ -255,7 +262,7 @@ mod tests {
                 temperature: 1700.0,
                 support_radius: 0.05 + 0.04 * w.abs(),
                 age: 0.1,
-                life: 1.0,
+                max_age: 1.0,
                 fuel: 0.5,
                 soot: 1e-7,
             });
@@ -284,7 +291,7 @@ mod tests {
             assert!((a.depth - b.depth).abs() < 1e-5 && near(a.scale, b.scale, 1e-5));
             assert!(near(e.radius, f.radius, 1e-5) && (e.peak / f.peak - 1.0).abs() < 1e-3, "{e:?} {f:?}");
             for axis in 0..2 {
-                assert!(near(e.centre[axis], f.centre[axis], 1e-5) && near(e.reach[axis], f.reach[axis], 1e-5));
+                assert!(near(e.center[axis], f.center[axis], 1e-5) && near(e.reach[axis], f.reach[axis], 1e-5));
                 assert!(near(a.motion[axis], b.motion[axis], 1e-4), "{a:?} {b:?}");
             }
             assert!((0..3).all(|i| (e.shape[i] - f.shape[i]).abs() < 1e-4 * f.shape[0].max(f.shape[2])), "{e:?} {f:?}");

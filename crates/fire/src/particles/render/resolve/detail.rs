@@ -87,7 +87,7 @@ impl Detail {
         let noise = Noise::new(words[0], fractal, [0; 3]).ok()?;
         let cells_per_metre = [1.0 / size, VERTICAL_SCALE / size, 1.0 / size];
         let rate = gas.detail_speed / size;
-        let moved = rate * scale.time;
+        let scrolled = rate * scale.time;
         let shift: [f64; 3] = std::array::from_fn(|axis| {
             cells_per_metre[axis] * scale.camera_motion[axis] - if axis == 1 { rate * scale.exposure_s } else { 0.0 }
         });
@@ -98,7 +98,7 @@ impl Detail {
             noise,
             cells_per_metre: cells_per_metre.map(|cells| cells as f32),
             rate,
-            base: [0.0, -moved, 0.0].map(Coordinate::from_f64),
+            base: [0.0, -scrolled, 0.0].map(Coordinate::from_f64),
             shift: shift.map(|s| s as f32),
             time_samples: length.round().clamp(1.0, 6.0) as usize,
             inverse_half_depth: (1.0 / (MEAN_PARTICLES_HALF_BURNING * scale.absorption * scale.radius)) as f32,
@@ -135,50 +135,51 @@ impl Detail {
         most * self.inverse_half_depth < LITTLE
     }
 
-    /// What burns at sixteen places of the noise, where the smooth optical depth is `tau` and so much of the detail is `shown`.
+    /// What burns at sixteen places of the noise, where the smooth optical depth is `tau` and so much of the detail is `visible_fraction`.
     #[inline(always)]
     pub(crate) fn burning(
         &self,
-        places: &[[f32; LANES]; 3],
+        positions: &[[f32; LANES]; 3],
         tau: &[f32; LANES],
-        shown: &[f32; LANES],
+        visible_fraction: &[f32; LANES],
     ) -> DetailFactors {
-        let mut limit = [0.0; LANES];
-        let mut share = [0.0; LANES];
+        let mut logit = [0.0; LANES];
+        let mut normalization = [0.0; LANES];
         for lane in 0..LANES {
             let x = (tau[lane] * self.inverse_half_depth).max(1e-6);
             let x = x / (1.0 + x * (1.0 / MAX_DEPTH_PARTICLES));
             let log = approximations::log2(x);
-            limit[lane] = log * std::f32::consts::LN_2;
-            share[lane] = 1.0 + approximations::exp2(-self.mean_exponent * log);
+            logit[lane] = log * std::f32::consts::LN_2;
+            normalization[lane] = 1.0 + approximations::exp2(-self.mean_exponent * log);
         }
-        let (mut burns, mut mean) = ([0.0; LANES], [0.0; LANES]);
+        let (mut burning_fraction, mut mean) = ([0.0; LANES], [0.0; LANES]);
         for moment in 0..self.time_samples {
-            let noise = self.noise_at(places, (moment as f32 + 0.5) / self.time_samples as f32 - 0.5);
+            let noise = self.noise_at(positions, (moment as f32 + 0.5) / self.time_samples as f32 - 0.5);
             for lane in 0..LANES {
                 let z = noise[lane] * self.steepness;
                 mean[lane] += z;
-                burns[lane] += 1.0 / (1.0 + approximations::exp(-(z + limit[lane]) * self.sharpness));
+                burning_fraction[lane] += 1.0 / (1.0 + approximations::exp(-(z + logit[lane]) * self.sharpness));
             }
         }
-        let each = 1.0 / self.time_samples as f32;
+        let sample_weight = 1.0 / self.time_samples as f32;
         let mut burning = DetailFactors { depth: [1.0; LANES], heat: [1.0; LANES] };
         for lane in 0..LANES {
-            let amount = self.amount * shown[lane];
-            burning.depth[lane] = (burns[lane] * each * share[lane] - 1.0).mul_add(amount, 1.0);
-            let warm = (mean[lane] * each * 0.5).clamp(-1.5, 1.5);
-            burning.heat[lane] = (HEAT * amount).mul_add(warm, 1.0);
+            let amount = self.amount * visible_fraction[lane];
+            burning.depth[lane] =
+                (burning_fraction[lane] * sample_weight * normalization[lane] - 1.0).mul_add(amount, 1.0);
+            let excess = (mean[lane] * sample_weight * 0.5).clamp(-1.5, 1.5);
+            burning.heat[lane] = (HEAT * amount).mul_add(excess, 1.0);
         }
         burning
     }
 
     /// Noise while the shutter is open, `moment` from -1/2 to 1/2.
     #[inline(always)]
-    fn noise_at(&self, places: &[[f32; LANES]; 3], moment: f32) -> [f32; LANES] {
+    fn noise_at(&self, positions: &[[f32; LANES]; 3], moment: f32) -> [f32; LANES] {
         let (mut cells, mut fractions) = ([[0; LANES]; 3], [[0.0; LANES]; 3]);
         for axis in 0..3 {
             for lane in 0..LANES {
-                let at = self.base[axis].advanced(self.shift[axis].mul_add(moment, places[axis][lane]));
+                let at = self.base[axis].advanced(self.shift[axis].mul_add(moment, positions[axis][lane]));
                 cells[axis][lane] = at.cell;
                 fractions[axis][lane] = at.fraction;
             }

@@ -96,15 +96,15 @@ impl GasResolver<'_> {
         row: &mut RowBuffer,
     ) -> Option<[usize; 2]> {
         let (cells, depth) = (&self.grid.cells, self.grid.depth);
-        let (cell, phase) = cells.before(1, y);
+        let (cell, phase) = cells.cell_before(1, y);
         let [first, last] = extents.around(layer, cell)?;
         let pixel = |column: i64| ((column + i64::from(cells.first[0])) * cells.size as i64).max(0) as usize;
         // Where cubic interpolation reaches.
         let pixels = [pixel(i64::from(first) - 2), pixel(i64::from(last) + 3)];
         // All that sixteen pixels at a time look at is filled: what rows before have left there depends on where a strip begins.
         let [begin, end] = [pixels[0] / LANES * LANES, pixels[1].next_multiple_of(LANES)];
-        let from = self.grid.first_of_four(cells.before(0, begin).0);
-        let to = self.grid.first_of_four(cells.before(0, end.saturating_sub(1)).0) + 4;
+        let from = self.grid.first_of_four(cells.cell_before(0, begin).0);
+        let to = self.grid.first_of_four(cells.cell_before(0, end.saturating_sub(1)).0) + 4;
         let rows = [self.grid.row(cell - 1), self.grid.row(cell), self.grid.row(cell + 1), self.grid.row(cell + 2)];
         let weights = &self.weights[phase];
         for column in from..to {

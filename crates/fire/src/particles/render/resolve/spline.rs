@@ -85,11 +85,12 @@ mod tests {
         let (weights, slopes, row) = (weights(&cells), slopes(&cells), sharp.row(4));
         let mut worst = [0.0_f64; 2];
         for x in 16..112 {
-            let (cell, phase) = cells.before(0, x);
+            let (cell, phase) = cells.cell_before(0, x);
             let first = grid.first_of_four(cell);
             let sum = |weights: &[f32; 4]| f64::from((0..4).map(|k| weights[k] * row[first + k]).sum::<f32>());
-            let (sin, cos) =
-                math::sin_cos(turn * (f64::from(cells.place([x as f32 + 0.5, 0.0])[0]) - f64::from(cells.first[0])));
+            let (sin, cos) = math::sin_cos(
+                turn * (f64::from(cells.cell_coordinates([x as f32 + 0.5, 0.0])[0]) - f64::from(cells.first[0])),
+            );
             worst[0] = worst[0].max((sum(&weights[phase]) - sin).abs());
             worst[1] = worst[1].max((4.0 / turn * sum(&slopes[phase]) - cos).abs());
         }

@@ -74,15 +74,15 @@ pub(crate) fn visible_fraction(strain: &[f32; LANES]) -> [f32; LANES] {
 /// Where in the noise the gas of a cell lies, cells of the noise.
 struct DetailCoordinates {
     tau: f32,
-    place: [f32; 3],
+    position: [f32; 3],
 }
 
 impl DetailCoordinates {
     #[inline(always)]
     fn of(sums: &[f32]) -> Self {
         let tau = sums[TAU];
-        let share = 1.0 / tau.max(MIN_DEPTH);
-        Self { tau, place: [0, 1, 2].map(|axis| sums[DETAIL_OFFSET + axis] * share) }
+        let inverse_depth = 1.0 / tau.max(MIN_DEPTH);
+        Self { tau, position: [0, 1, 2].map(|axis| sums[DETAIL_OFFSET + axis] * inverse_depth) }
     }
 
     /// The greatest distance in the noise to one of the cells beside.
@@ -92,7 +92,7 @@ impl DetailCoordinates {
         for other in neighbors {
             let mut square = 0.0;
             for axis in 0..3 {
-                let step = other.place[axis] - self.place[axis];
+                let step = other.position[axis] - self.position[axis];
                 square = step.mul_add(step, square);
             }
             if other.tau > MIN_NEIGHBOR_DEPTH * self.tau {

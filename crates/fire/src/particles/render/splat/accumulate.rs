@@ -138,8 +138,8 @@ impl SpriteStatistics {
             let mut statistics = Self::EMPTY;
             for Sprite { ellipse, .. } in task.iter() {
                 for axis in 0..2 {
-                    statistics.low[axis] = statistics.low[axis].min(ellipse.centre[axis] - ellipse.reach[axis]);
-                    statistics.high[axis] = statistics.high[axis].max(ellipse.centre[axis] + ellipse.reach[axis]);
+                    statistics.low[axis] = statistics.low[axis].min(ellipse.center[axis] - ellipse.reach[axis]);
+                    statistics.high[axis] = statistics.high[axis].max(ellipse.center[axis] + ellipse.reach[axis]);
                 }
                 statistics.counts[settings.fineness(ellipse.radius)] += 1;
             }
@@ -224,10 +224,10 @@ impl RowBand<'_> {
         let row_length = self.columns.len() * self.layers;
         let end = self.first + (sums.len() / row_length) as i32;
         for &member in task.of(index) {
-            let placed = &task.placed[usize::from(member)];
-            let (from, to) = (placed.rows[0].max(self.first), placed.rows[1].min(end));
+            let sprites = &task.sprites[usize::from(member)];
+            let (from, to) = (sprites.rows[0].max(self.first), sprites.rows[1].min(end));
             for start in (from..to).step_by(ROWS) {
-                let chords = placed.chords(start, &self.whole_picture_columns);
+                let chords = sprites.chords(start, &self.whole_picture_columns);
                 for y in start..to.min(start + ROWS as i32) {
                     let row = &mut sums[(y - self.first) as usize * row_length..][..row_length];
                     let index = (y - start) as usize;
@@ -235,12 +235,12 @@ impl RowBand<'_> {
                     let cut = (self.columns.start - chords.first[index]).max(0) / COLUMNS as i32 * COLUMNS as i32;
                     let end = chords.end[index].min(self.columns.end);
                     for x in (chords.first[index] + cut..end).step_by(COLUMNS) {
-                        let weights = chords.weights(profile, placed.falloff, index, x);
+                        let weights = chords.weights(profile, sprites.falloff, index, x);
                         match usize::try_from(x - self.columns.start) {
-                            Ok(column) => placed.add(row, column, self.layers, &weights),
+                            Ok(column) => sprites.add(row, column, self.layers, &weights),
                             Err(_) => {
                                 let before = (self.columns.start - x) as usize;
-                                placed.add(row, 0, self.layers, &without_first(&weights, before));
+                                sprites.add(row, 0, self.layers, &skip_first(&weights, before));
                             }
                         }
                     }
@@ -251,13 +251,13 @@ impl RowBand<'_> {
 }
 
 /// Weights without the first `count`.
-fn without_first(weights: &[f32; COLUMNS], count: usize) -> [f32; COLUMNS] {
+fn skip_first(weights: &[f32; COLUMNS], count: usize) -> [f32; COLUMNS] {
     std::array::from_fn(|lane| weights.get(lane + count).copied().unwrap_or(0.0))
 }
 
 /// The sprites of a task on a grid, and which of them touch which band: a counting sort that keeps their order.
 struct BinnedSprites<'a, const P: usize> {
-    placed: PooledVec<'a, RasterizedSprite<P>>,
+    sprites: PooledVec<'a, RasterizedSprite<P>>,
     starts: Vec<u32>,
     members: Vec<u16>,
 }
@@ -270,21 +270,21 @@ impl<'a, const P: usize> BinnedSprites<'a, P> {
         cells: &Raster,
         is_on_this_grid: impl Fn(f32) -> bool,
     ) -> Self {
-        let mut placed = task.scratch().list(task.len());
-        placed.clear();
+        let mut sprites = task.scratch().list(task.len());
+        sprites.clear();
         for sprite in task.iter() {
             if is_on_this_grid(sprite.ellipse.radius) {
-                placed.push(RasterizedSprite::new(settings, sprite, cells));
+                sprites.push(RasterizedSprite::new(settings, sprite, cells));
             }
         }
-        let bands_of = |placed: &RasterizedSprite<P>| {
-            let [from, to] = placed.rows.map(|row| (row - cells.first[1]) as usize);
+        let bands_of = |sprites: &RasterizedSprite<P>| {
+            let [from, to] = sprites.rows.map(|row| (row - cells.first[1]) as usize);
             if from < to { from / BAND..to.div_ceil(BAND) } else { 0..0 }
         };
         let bands = cells.rows.div_ceil(BAND);
         let mut starts = vec![0_u32; bands + 1];
-        for placed in placed.iter() {
-            for row_band in bands_of(placed) {
+        for sprites in sprites.iter() {
+            for row_band in bands_of(sprites) {
                 starts[row_band + 1] += 1;
             }
         }
@@ -293,13 +293,13 @@ impl<'a, const P: usize> BinnedSprites<'a, P> {
         }
         let mut ends = starts.clone();
         let mut members = vec![0; starts[bands] as usize];
-        for (index, placed) in placed.iter().enumerate() {
-            for row_band in bands_of(placed) {
+        for (index, sprites) in sprites.iter().enumerate() {
+            for row_band in bands_of(sprites) {
                 members[ends[row_band] as usize] = index as u16;
                 ends[row_band] += 1;
             }
         }
-        Self { placed, starts, members }
+        Self { sprites, starts, members }
     }
 
     fn of(&self, row_band: usize) -> &[u16] {

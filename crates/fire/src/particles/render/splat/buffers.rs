@@ -97,10 +97,10 @@ mod tests {
         let scratch = ScratchPool::default();
         let room = |list: PooledVec<f32>| list.capacity();
         let (small, large) = (scratch.list::<f32>(100), scratch.list::<f32>(1000));
-        let places = [small.as_ptr(), large.as_ptr()];
+        let addresses = [small.as_ptr(), large.as_ptr()];
         drop((large, small));
         let (large, small) = (scratch.list::<f32>(900), scratch.list::<f32>(110));
-        assert_eq!(places, [small.as_ptr(), large.as_ptr()]);
+        assert_eq!(addresses, [small.as_ptr(), large.as_ptr()]);
         drop((small, large));
         assert!(scratch.list::<u8>(7).is_empty(), "lists of other types are other lists");
         assert!(room(scratch.list(5000)) >= 5000);

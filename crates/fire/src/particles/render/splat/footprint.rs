@@ -24,7 +24,7 @@ const FAINT: f32 = 0.045;
 /// A sprite in cells.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RasterizedSprite<const P: usize> {
-    centre: [f32; 2],
+    center: [f32; 2],
     /// How `s` falls along a row, for the square of the distance from its middle: a.
     pub(crate) falloff: f32,
     /// How far the middle of a row lies to the left, for each row below the centre: b/a.
@@ -47,10 +47,10 @@ impl<const P: usize> RasterizedSprite<P> {
         let cell = cells.size as f32;
         let widening = (settings.min_radius_cells * cell / ellipse.radius.max(1e-3)).max(1.0);
         let scale = cell * cell / (widening * widening);
-        let centre = cells.place(ellipse.centre);
+        let center = cells.cell_coordinates(ellipse.center);
         let reach = ellipse.reach[1] * widening / cell * (1.0 - FAINT).sqrt();
         let (first, last) = (cells.first[1], cells.first[1] + cells.rows as i32);
-        let rows = [(centre[1] - reach).ceil(), (centre[1] + reach).floor() + 1.0];
+        let rows = [(center[1] - reach).ceil(), (center[1] + reach).floor() + 1.0];
         let rows = rows.map(|row| (row as i32).clamp(first, last));
         let [a, b, c] = ellipse.shape.map(|value| value * scale);
         let shear = b / a;
@@ -63,7 +63,7 @@ impl<const P: usize> RasterizedSprite<P> {
             next[i] *= attenuation * sprite.next_layer_weight;
         }
         let (layer, spans_two_layers) = (sprite.layer, sprite.next_layer_weight > 0.0);
-        Self { centre, falloff: a, shear, row_falloff, rows, layer, own, next, spans_two_layers }
+        Self { center, falloff: a, shear, row_falloff, rows, layer, own, next, spans_two_layers }
     }
 
     /// The sprite in the rows from `first` on, where `s = 1 - (a u^2 + 2 b u v + c v^2)`.
@@ -74,8 +74,8 @@ impl<const P: usize> RasterizedSprite<P> {
         let widest = 1.0 / self.falloff;
         let mut chords = Chords { middle: [0.0; ROWS], most: [0.0; ROWS], first: [0; ROWS], end: [0; ROWS] };
         for row in 0..ROWS {
-            let v = before + BEYOND[row] - self.centre[1];
-            let middle = self.centre[0] - self.shear * v;
+            let v = before + BEYOND[row] - self.center[1];
+            let middle = self.center[0] - self.shear * v;
             let most = 1.0 - self.row_falloff * v * v;
             let half = ((most - FAINT).max(0.0) * widest).sqrt();
             chords.middle[row] = middle;

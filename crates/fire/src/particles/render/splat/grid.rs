@@ -60,14 +60,14 @@ impl Raster {
 
     /// A place of the picture in cells: whole numbers are their middles.
     #[inline(always)]
-    pub(crate) fn place(&self, pixel: [f32; 2]) -> [f32; 2] {
+    pub(crate) fn cell_coordinates(&self, pixel: [f32; 2]) -> [f32; 2] {
         let scale = 1.0 / self.size as f32;
         [pixel[0].mul_add(scale, -0.5), pixel[1].mul_add(scale, -0.5)]
     }
 
     /// The cell before the middle of pixel `pixel` of an axis, and the pixel's phase between that cell and the next.
     #[inline(always)]
-    pub(crate) fn before(&self, axis: usize, pixel: usize) -> (i32, usize) {
+    pub(crate) fn cell_before(&self, axis: usize, pixel: usize) -> (i32, usize) {
         // In halves of a pixel, so that the whole part is the cell whose middle comes before.
         let size = self.size as i32;
         let halves = 2 * pixel as i32 + 1 - size;
@@ -139,7 +139,7 @@ impl<'a> Grid<'a> {
     /// The first of the four columns around each pixel of a row from `x` on, and its phase.
     pub(crate) fn columns(&self, x: usize, count: usize) -> Vec<(usize, usize)> {
         let column = |x: usize| {
-            let (cell, phase) = self.cells.before(0, x);
+            let (cell, phase) = self.cells.cell_before(0, x);
             (self.first_of_four(cell), phase)
         };
         (x..x + count).map(column).collect()
@@ -177,7 +177,7 @@ impl<'a> Grid<'a> {
                 let weights = &quarters[fine.rem_euclid(2) as usize];
                 dispatch!(level, _simd => {
                     weighted_sum(column, rows, weights);
-                    coarser.add_between(column, &quarters, cells.first[0], values);
+                    coarser.add_interpolated(column, &quarters, cells.first[0], values);
                 });
             },
         );
@@ -185,13 +185,13 @@ impl<'a> Grid<'a> {
 
     /// Adds a row of these cells, interpolated, to one of cells half as large whose first is `first`.
     #[inline(always)]
-    fn add_between(&self, row: &[f32], quarters: &[[f32; 4]; 2], first: i32, values: &mut [f32]) {
+    fn add_interpolated(&self, row: &[f32], quarters: &[[f32; 4]; 2], first: i32, values: &mut [f32]) {
         let depth = self.depth;
         for (index, sums) in values.chunks_exact_mut(depth).enumerate() {
             let cell = first + index as i32;
             let [a, b, c, d] = quarters[cell.rem_euclid(2) as usize];
-            let four = self.first_of_four((cell - 1).div_euclid(2) - self.cells.first[0]) * depth;
-            let (before, rest) = row[four..][..4 * depth].split_at(depth);
+            let first_column = self.first_of_four((cell - 1).div_euclid(2) - self.cells.first[0]) * depth;
+            let (before, rest) = row[first_column..][..4 * depth].split_at(depth);
             let (near, rest) = rest.split_at(depth);
             let (far, beyond) = rest.split_at(depth);
             for i in 0..depth {

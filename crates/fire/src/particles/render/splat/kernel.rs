@@ -63,8 +63,8 @@ mod tests {
         for b in [0.0, 0.1, 0.2, 0.29, 0.31] {
             let steps = 20_000;
             let step = 2.0 * d / f64::from(steps);
-            let place = |i: i32| -d + step * (f64::from(i) + 0.5);
-            let sum: f64 = (0..steps).map(|i| poly6((b * b + place(i) * place(i)).sqrt(), d) * step).sum();
+            let distance = |i: i32| -d + step * (f64::from(i) + 0.5);
+            let sum: f64 = (0..steps).map(|i| poly6((b * b + distance(i) * distance(i)).sqrt(), d) * step).sum();
             assert!((line_integral(b, d) - sum).abs() < 1e-6 * line_integral(0.0, d), "{b}: {sum}");
         }
     }

@@ -45,9 +45,9 @@ fn view(camera: CameraParameters) -> View {
 }
 
 /// A litre of gas at `position`.
-fn ball(birth: u64, position: [f32; 3], temperature: f32, soot: f32) -> Particle {
+fn ball(id: u64, position: [f32; 3], temperature: f32, soot: f32) -> Particle {
     Particle {
-        birth,
+        id,
         position,
         velocity: [0.0; 3],
         mass: 0.0002,
@@ -55,7 +55,7 @@ fn ball(birth: u64, position: [f32; 3], temperature: f32, soot: f32) -> Particle
         temperature,
         support_radius: 0.3,
         age: 0.1,
-        life: 1.0,
+        max_age: 1.0,
         fuel: 0.0,
         soot,
     }
@@ -69,9 +69,9 @@ fn cloud(balls: impl IntoIterator<Item = Particle>) -> Particles {
 
 /// A cloud of glowing gas around the origin.
 fn glowing_cloud(count: u64) -> Particles {
-    cloud((0..count).map(|birth| {
-        let [x, y, z, w] = Key::new(3, "cloud").uniforms(birth, 0, Purpose::named("place")).map(|u| u - 0.5);
-        ball(birth, [0.9 * x, 1.2 * y, 0.9 * z], 1700.0 + 300.0 * w, 4e-7)
+    cloud((0..count).map(|id| {
+        let [x, y, z, w] = Key::new(3, "cloud").uniforms(id, 0, Purpose::named("place")).map(|u| u - 0.5);
+        ball(id, [0.9 * x, 1.2 * y, 0.9 * z], 1700.0 + 300.0 * w, 4e-7)
     }))
 }
 
@@ -374,8 +374,8 @@ fn temperature_is_weighted_by_light_and_stays_among_those_that_are_there() {
     let (cold, hot) = (ball(0, [0.0; 3], 1400.0, 1e-8), ball(1, [0.0, 0.0, -0.5], 1800.0, 1e-8));
     let both = drawn(&cloud([cold, hot]), &smooth(), &view, AOVS.len(), None);
     // Both are thin and as large, but the farther one is seen smaller by the ratio of distances.
-    let shares = [cold, hot].map(|ball| black(ball.temperature));
-    let expected = (1400.0 * shares[0] + 1800.0 * shares[1]) / (shares[0] + shares[1]);
+    let weights = [cold, hot].map(|ball| black(ball.temperature));
+    let expected = (1400.0 * weights[0] + 1800.0 * weights[1]) / (weights[0] + weights[1]);
     let seen = aov(&both, "temperature_k", 80, 60);
     assert!((seen - expected).abs() < 3.0, "{seen} for {expected}");
     let crowd = drawn(&glowing_cloud(400), &smooth(), &view, AOVS.len(), None);
@@ -471,11 +471,11 @@ fn freshly_burning_gas_shines_blue_and_hides_nothing_until_soot_outshines_it() {
     // Yellow flames are not blue: soot quenches CH and C2 and outshines what is left.
     let (sooty, _) = lit_ball(begun(0.94, 1e-6), &once, 0.0);
     assert!(sooty[0] > 2.0 * sooty[2], "{sooty:?}");
-    let share = gas_blue(begun(0.94, 1e-6)) / gas_blue(begun(0.94, 0.0));
-    assert!(share < 0.02, "{share}");
+    let ratio = gas_blue(begun(0.94, 1e-6)) / gas_blue(begun(0.94, 0.0));
+    assert!(ratio < 0.02, "{ratio}");
 }
 
 /// Luminance of a metre of a particle's gas in blue light.
 fn gas_blue(ball: Particle) -> f64 {
-    gas(&cloud([ball]), &ScratchPool::default()).blue(0, &smooth())
+    gas(&cloud([ball]), &ScratchPool::default()).blue_luminance(0, &smooth())
 }

@@ -15,11 +15,11 @@ const PLANCK_MEAN_SOOT_ABSORPTION: f32 = 1862.0;
 /// Temperature deep inside the flame, where gas waits for air, as a share of that at its front.
 pub(crate) const INNER_TEMPERATURE: f32 = 0.72;
 /// Times faster than burning gas, whose own heat makes up for it, burnt gas cools by mixing.
-const BURNT_MIXING: f32 = 2.5;
+const BURNT_MIXING_FACTOR: f32 = 2.5;
 /// Fuel below which burning soot off begins, and above which soot has not formed.
-const SOOT_FUEL: [f32; 2] = [0.16, 0.97];
+const SOOT_FUEL_RANGE: [f32; 2] = [0.16, 0.97];
 /// Share of its fuel over which soot forms.
-const SOOT_FORMING: f32 = 0.17;
+const SOOT_FORMATION_WIDTH: f32 = 0.17;
 /// Most a particle's radius grows.
 const MAX_RADIUS_GROWTH: f32 = 3.0;
 
@@ -84,62 +84,65 @@ impl CombustionModel {
     #[inline(always)]
     pub(crate) fn advance<R: Real>(
         &self,
-        being: ParticleState<R>,
-        exposure: &AmbientConditions<R>,
+        state: ParticleState<R>,
+        conditions: &AmbientConditions<R>,
         seconds: f32,
     ) -> ParticleState<R> {
-        let like = |value: f32| being.fuel.broadcast(value);
+        let splat = |value: f32| state.fuel.broadcast(value);
         // Gas at the edge burns faster than the mean, gas inside slower; a mean exposure of a third burns as the mean.
-        let air = exposure.air_exposure.fma(like(2.4 * self.air_hunger), like(1.0 - 0.8 * self.air_hunger));
-        let fuel = (being.fuel - exposure.burning * air * like(seconds)).simd_max(like(0.0));
-        let growth = exposure.mixing.fma(like(seconds * (1.0 / 3.0)), like(1.0));
+        let air = conditions.air_exposure.fma(splat(2.4 * self.air_hunger), splat(1.0 - 0.8 * self.air_hunger));
+        let fuel = (state.fuel - conditions.burning * air * splat(seconds)).simd_max(splat(0.0));
+        let growth = conditions.mixing.fma(splat(seconds * (1.0 / 3.0)), splat(1.0));
         ParticleState {
             fuel,
-            temperature: if self.reacting { self.temperature(being, exposure, seconds) } else { being.temperature },
-            soot: like(self.soot) * self.soot_share(fuel),
-            support_radius: (being.support_radius * growth)
-                .simd_min(like(MAX_RADIUS_GROWTH * exposure.smallest_radius)),
+            temperature: if self.reacting { self.temperature(state, conditions, seconds) } else { state.temperature },
+            soot: splat(self.soot) * self.soot_fraction(fuel),
+            support_radius: (state.support_radius * growth)
+                .simd_min(splat(MAX_RADIUS_GROWTH * conditions.smallest_radius)),
         }
     }
 
     /// Heating, mixing and radiation, each implicit, so that no step is too long.
     #[inline(always)]
-    fn temperature<R: Real>(&self, being: ParticleState<R>, exposure: &AmbientConditions<R>, seconds: f32) -> R {
-        let like = |value: f32| being.fuel.broadcast(value);
-        let air = like(exposure.air_temperature);
-        let front = exposure.air_exposure.simd_sqrt().fma(like(1.0 - INNER_TEMPERATURE), like(INNER_TEMPERATURE));
-        let (flame, heating) = (front * like(self.flame_temperature), like(seconds / self.heating_s));
+    fn temperature<R: Real>(&self, state: ParticleState<R>, conditions: &AmbientConditions<R>, seconds: f32) -> R {
+        let splat = |value: f32| state.fuel.broadcast(value);
+        let air = splat(conditions.air_temperature);
+        let front = conditions.air_exposure.simd_sqrt().fma(splat(1.0 - INNER_TEMPERATURE), splat(INNER_TEMPERATURE));
+        let (flame, heating) = (front * splat(self.flame_temperature), splat(seconds / self.heating_s));
         // Burning gas nears the flame's temperature, burnt gas the air's.
-        let toward = being.fuel.select_lt(like(f32::MIN_POSITIVE), air, flame);
-        let share =
-            being.fuel.select_lt(like(f32::MIN_POSITIVE), exposure.mixing * like(BURNT_MIXING * seconds), heating);
-        let temperature = relaxed(being.temperature, toward, share);
+        let target = state.fuel.select_lt(splat(f32::MIN_POSITIVE), air, flame);
+        let rate = state.fuel.select_lt(
+            splat(f32::MIN_POSITIVE),
+            conditions.mixing * splat(BURNT_MIXING_FACTOR * seconds),
+            heating,
+        );
+        let temperature = relax_implicit(state.temperature, target, rate);
         // 4 sigma kappa (T^4 - T_air^4) / (rho c_p), as a rate toward the air's temperature.
-        let absorption = being.soot * temperature * like(PLANCK_MEAN_SOOT_ABSORPTION);
+        let absorption = state.soot * temperature * splat(PLANCK_MEAN_SOOT_ABSORPTION);
         let fourth = temperature.fma(temperature, air * air) * (temperature + air);
-        let power = absorption * fourth * like(self.radiation * 4.0 * STEFAN_BOLTZMANN * seconds / SPECIFIC_HEAT);
-        relaxed(temperature, air, power / exposure.density)
+        let power = absorption * fourth * splat(self.radiation * 4.0 * STEFAN_BOLTZMANN * seconds / SPECIFIC_HEAT);
+        relax_implicit(temperature, air, power / conditions.density)
     }
 
     /// Soot beside the most that forms: none in fresh gas, most where it burns, what is left as smoke in burnt gas.
     #[inline(always)]
-    pub(crate) fn soot_share<R: Real>(&self, fuel: R) -> R {
-        let like = |value: f32| fuel.broadcast(value);
-        let formed = smooth((like(SOOT_FUEL[1]) - fuel) * like(1.0 / SOOT_FORMING));
-        let unburnt = smooth(fuel * like(1.0 / SOOT_FUEL[0]));
-        formed * unburnt.fma(like(1.0 - self.smoke), like(self.smoke))
+    pub(crate) fn soot_fraction<R: Real>(&self, fuel: R) -> R {
+        let splat = |value: f32| fuel.broadcast(value);
+        let formed = smoothstep((splat(SOOT_FUEL_RANGE[1]) - fuel) * splat(1.0 / SOOT_FORMATION_WIDTH));
+        let unburnt = smoothstep(fuel * splat(1.0 / SOOT_FUEL_RANGE[0]));
+        formed * unburnt.fma(splat(1.0 - self.smoke), splat(self.smoke))
     }
 }
 
 /// A value that nears another at such a rate, times the time, found implicitly.
 #[inline(always)]
-fn relaxed<R: Real>(value: R, toward: R, rate: R) -> R {
-    rate.fma(toward, value) / (rate + rate.broadcast(1.0))
+fn relax_implicit<R: Real>(value: R, target: R, rate: R) -> R {
+    rate.fma(target, value) / (rate + rate.broadcast(1.0))
 }
 
 /// From 0 to 1, level at both ends.
 #[inline(always)]
-fn smooth<R: Real>(x: R) -> R {
+fn smoothstep<R: Real>(x: R) -> R {
     let x = x.simd_clamp01();
     x * x * x.fma(x.broadcast(-2.0), x.broadcast(3.0))
 }
@@ -152,8 +155,8 @@ mod tests {
 
     use super::*;
 
-    const BEING: ParticleState<f32> = ParticleState { temperature: 1200.0, fuel: 0.6, soot: 0.0, support_radius: 0.02 };
-    const EXPOSURE: AmbientConditions<f32> = AmbientConditions {
+    const STATE: ParticleState<f32> = ParticleState { temperature: 1200.0, fuel: 0.6, soot: 0.0, support_radius: 0.02 };
+    const CONDITIONS: AmbientConditions<f32> = AmbientConditions {
         air_exposure: 1.0,
         mixing: 5.0,
         burning: 2.0,
@@ -166,28 +169,28 @@ mod tests {
         CombustionModel::from(&LifeParameters::default())
     }
 
-    fn after(mut being: ParticleState<f32>, exposure: AmbientConditions<f32>, seconds: f32) -> ParticleState<f32> {
+    fn after(mut state: ParticleState<f32>, conditions: AmbientConditions<f32>, seconds: f32) -> ParticleState<f32> {
         for _ in 0..1000 {
-            being = combustion().advance(being, &exposure, seconds / 1000.0);
+            state = combustion().advance(state, &conditions, seconds / 1000.0);
         }
-        being
+        state
     }
 
     #[test]
     fn burning_gas_nears_the_flame_temperature_and_burnt_gas_the_air() {
-        let hot = after(BEING, AmbientConditions { burning: 0.0, ..EXPOSURE }, 0.3);
+        let hot = after(STATE, AmbientConditions { burning: 0.0, ..CONDITIONS }, 0.3);
         assert!((1600.0..1900.0).contains(&hot.temperature), "{}", hot.temperature);
-        let cold = after(ParticleState { fuel: 0.0, ..BEING }, EXPOSURE, 2.0);
+        let cold = after(ParticleState { fuel: 0.0, ..STATE }, CONDITIONS, 2.0);
         assert!(cold.temperature < 294.0 && cold.soot == 0.0);
         assert!((cold.support_radius - 0.06).abs() < 1e-6);
     }
 
     #[test]
     fn the_outside_burns_first() {
-        let inside = after(BEING, AmbientConditions { air_exposure: 0.1, ..EXPOSURE }, 0.2);
-        let outside = after(BEING, EXPOSURE, 0.2);
+        let inside = after(STATE, AmbientConditions { air_exposure: 0.1, ..CONDITIONS }, 0.2);
+        let outside = after(STATE, CONDITIONS, 0.2);
         assert!(outside.fuel < inside.fuel);
-        let mean = after(BEING, AmbientConditions { air_exposure: 1.0 / 3.0, ..EXPOSURE }, 0.2);
+        let mean = after(STATE, AmbientConditions { air_exposure: 1.0 / 3.0, ..CONDITIONS }, 0.2);
         assert!((mean.fuel - 0.2).abs() < 1e-3);
     }
 
@@ -195,8 +198,8 @@ mod tests {
     fn black_body_cooling_of_dense_soot_follows_the_fourth_power() {
         // dT/dt = -4 sigma kappa T^4 / (rho c_p), by hand at 1500 K with one part in a million of soot.
         let combustion = CombustionModel { heating_s: 1e9, radiation: 1.0, ..combustion() };
-        let being = ParticleState { temperature: 1500.0, soot: 1e-6, ..BEING };
-        let cooled = combustion.advance(being, &AmbientConditions { mixing: 0.0, ..EXPOSURE }, 1e-5);
+        let state = ParticleState { temperature: 1500.0, soot: 1e-6, ..STATE };
+        let cooled = combustion.advance(state, &AmbientConditions { mixing: 0.0, ..CONDITIONS }, 1e-5);
         let kappa = 1862.0 * 1e-6 * 1500.0;
         let fourth = |kelvin: f64| kelvin * kelvin * kelvin * kelvin;
         let by_hand = 4.0 * 5.670_374e-8 * kappa * (fourth(1500.0) - fourth(293.0)) / (0.25 * 1200.0) * 1e-5;
@@ -205,26 +208,26 @@ mod tests {
 
     #[test]
     fn one_particle_and_sixteen_live_alike() {
-        let fuels: [f32; LANES] = std::array::from_fn(|lane| (lane as f32 - 2.0).max(0.0) * 0.07);
+        let fuel_fractions: [f32; LANES] = std::array::from_fn(|lane| (lane as f32 - 2.0).max(0.0) * 0.07);
         let together = bansho_base::dispatch_baseline!(simd => {
-            let fuel = Lanes::from_slice(simd, &fuels);
-            let like = |value: f32| Lanes::splat(simd, value);
-            let temperature = fuel.fma(like(1500.0), like(400.0));
-            let being = ParticleState { temperature, fuel, soot: like(1e-6), support_radius: like(0.02) };
-            let exposure = AmbientConditions {
+            let fuel = Lanes::from_slice(simd, &fuel_fractions);
+            let splat = |value: f32| Lanes::splat(simd, value);
+            let temperature = fuel.fma(splat(1500.0), splat(400.0));
+            let state = ParticleState { temperature, fuel, soot: splat(1e-6), support_radius: splat(0.02) };
+            let conditions = AmbientConditions {
                 air_exposure: fuel,
-                mixing: like(5.0),
-                burning: like(2.0),
-                density: like(0.25),
+                mixing: splat(5.0),
+                burning: splat(2.0),
+                density: splat(0.25),
                 air_temperature: 293.0,
                 smallest_radius: 0.02,
             };
-            let ParticleState { temperature, fuel, soot, support_radius } = combustion().advance(being, &exposure, 0.02);
+            let ParticleState { temperature, fuel, soot, support_radius } = combustion().advance(state, &conditions, 0.02);
             [temperature, fuel, soot, support_radius].map(|values| values.as_slice().to_vec())
         });
-        for (lane, fuel) in fuels.into_iter().enumerate() {
-            let being = ParticleState { temperature: fuel.fma(1500.0, 400.0), fuel, soot: 1e-6, ..BEING };
-            let alone = combustion().advance(being, &AmbientConditions { air_exposure: fuel, ..EXPOSURE }, 0.02);
+        for (lane, fuel) in fuel_fractions.into_iter().enumerate() {
+            let state = ParticleState { temperature: fuel.fma(1500.0, 400.0), fuel, soot: 1e-6, ..STATE };
+            let alone = combustion().advance(state, &AmbientConditions { air_exposure: fuel, ..CONDITIONS }, 0.02);
             let alone = [alone.temperature, alone.fuel, alone.soot, alone.support_radius];
             assert_eq!(together.each_ref().map(|values| values[lane]), alone, "with {fuel} of its fuel");
         }
@@ -233,14 +236,14 @@ mod tests {
     #[test]
     fn constant_temperature_stays() {
         let combustion = CombustionModel { reacting: false, ..combustion() };
-        assert_eq!(combustion.advance(BEING, &EXPOSURE, 0.1).temperature, 1200.0);
+        assert_eq!(combustion.advance(STATE, &CONDITIONS, 0.1).temperature, 1200.0);
     }
 
     #[test]
     fn soot_forms_in_burning_gas_and_burns_unless_it_is_smoke() {
         let clean = combustion();
-        assert_eq!((clean.soot_share(1.0), clean.soot_share(0.5), clean.soot_share(0.0)), (0.0, 1.0, 0.0));
+        assert_eq!((clean.soot_fraction(1.0), clean.soot_fraction(0.5), clean.soot_fraction(0.0)), (0.0, 1.0, 0.0));
         let smoky = CombustionModel { smoke: 0.4, ..clean };
-        assert!((smoky.soot_share(0.0) - 0.4).abs() < 1e-6);
+        assert!((smoky.soot_fraction(0.0) - 0.4).abs() < 1e-6);
     }
 }

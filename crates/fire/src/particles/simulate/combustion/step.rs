@@ -73,7 +73,7 @@ impl<'a> BatchUpdate<CombustionInputs<'a>, 9> for CombustionStep<'_> {
         burner: &BurnerForces,
         rows: RowBatch,
         inputs: CombustionInputs<'a>,
-        [u, v, w, temperature, fuel, soot, support_radius, life, edge]: &mut [&mut [f32]; 9],
+        [u, v, w, temperature, fuel, soot, support_radius, max_age, exposure]: &mut [&mut [f32]; 9],
     ) {
         let neighborhood = Neighborhood::from(rows.load_all(simd, inputs.sums));
         let air_exposure = self.air_exposure(rows.load(simd, inputs.weight), &neighborhood);
@@ -87,16 +87,19 @@ impl<'a> BatchUpdate<CombustionInputs<'a>, 9> for CombustionStep<'_> {
             support_radius: rows.load(simd, support_radius),
         };
         let mixing = burner.mixing(&velocity, &wind, air_exposure);
-        let burning = rows.load(simd, inputs.burn_rate) * self.burning(burner, length(&velocity));
-        let being =
-            self.combustion.advance(old, &self.exposure(air_exposure, mixing, burning, old.temperature), self.seconds);
-        let [age, end] = rows.load_all(simd, [inputs.age, life]);
-        rows.store(self.end(&old, &being, age, end), life);
-        rows.store(being.temperature, temperature);
-        rows.store(being.fuel, fuel);
-        rows.store(being.soot, soot);
-        rows.store(being.support_radius, support_radius);
-        rows.store(air_exposure, edge);
+        let burn_rate_at_speed = rows.load(simd, inputs.burn_rate) * self.burn_rate_at_speed(burner, length(&velocity));
+        let state = self.combustion.advance(
+            old,
+            &self.exposure(air_exposure, mixing, burn_rate_at_speed, old.temperature),
+            self.seconds,
+        );
+        let [age, removal_age] = rows.load_all(simd, [inputs.age, max_age]);
+        rows.store(self.removal_age(&old, &state, age, removal_age), max_age);
+        rows.store(state.temperature, temperature);
+        rows.store(state.fuel, fuel);
+        rows.store(state.soot, soot);
+        rows.store(state.support_radius, support_radius);
+        rows.store(air_exposure, exposure);
         let velocity = add_scaled(&velocity, &neighborhood.velocity, viscosity);
         for (batch, array) in velocity.into_iter().zip([u, v, w]) {
             rows.store(batch, array);
@@ -108,7 +111,7 @@ impl CombustionStep<'_> {
     /// Lets the particles live, and writes down how much of each lies at the edge of the gas.
     pub(crate) fn update_thermochemistry(&self, particles: &mut Particles, air_exposure: &mut Vec<f32>) {
         air_exposure.resize(particles.len(), 0.0);
-        let Particles { velocity: [u, v, w], temperature, fuel, soot, support_radius, life, .. } = particles;
+        let Particles { velocity: [u, v, w], temperature, fuel, soot, support_radius, max_age, .. } = particles;
         let inputs = CombustionInputs {
             position: particles.position.each_ref().map(Vec::as_slice),
             age: &particles.age,
@@ -117,51 +120,57 @@ impl CombustionStep<'_> {
             weight: &self.neighbor_sums.weights,
             sums: self.neighbor_sums.sums.each_ref().map(Vec::as_slice),
         };
-        let living = [u, v, w, temperature, fuel, soot, support_radius, life, air_exposure];
+        let living = [u, v, w, temperature, fuel, soot, support_radius, max_age, air_exposure];
         for_each_burner_batch(self, &self.forces.burner_forces, &particles.burner, inputs, living);
     }
 
     /// How much of a particle lies at the edge of the gas: neighbours all on one side, or none.
     #[inline(always)]
     fn air_exposure<R: Real>(&self, weight: R, neighborhood: &Neighborhood<R>) -> R {
-        let like = |value: f32| weight.broadcast(value);
-        let one_over_sum = like(1.0) / neighborhood.weight.simd_max(like(f32::MIN_POSITIVE));
-        let offset = length(&neighborhood.offset) * one_over_sum * like(1.0 / (self.radius * SURFACE_OFFSET));
-        let own = weight * one_over_sum * like(KernelShape::Poly6.at_center::<3>(self.radius));
-        let isolated = (own - like(ISOLATED_FRACTION[0])) * like(1.0 / ISOLATED_FRACTION[1]);
+        let splat = |value: f32| weight.broadcast(value);
+        let one_over_sum = splat(1.0) / neighborhood.weight.simd_max(splat(f32::MIN_POSITIVE));
+        let offset = length(&neighborhood.offset) * one_over_sum * splat(1.0 / (self.radius * SURFACE_OFFSET));
+        let own = weight * one_over_sum * splat(KernelShape::Poly6.at_center::<3>(self.radius));
+        let isolated = (own - splat(ISOLATED_FRACTION[0])) * splat(1.0 / ISOLATED_FRACTION[1]);
         offset.simd_max(isolated).simd_clamp01()
     }
 
     /// What of the difference to the neighbours is smoothing_weights out in velocity and temperature.
     #[inline(always)]
     fn smoothing_weights<R: Real>(&self, density: R) -> [R; 2] {
-        let share = |smoothing: f32| (smoothing * self.seconds / SMOOTHING_TIME).min(MAX_SMOOTHING);
+        let fraction = |smoothing: f32| (smoothing * self.seconds / SMOOTHING_TIME).min(MAX_SMOOTHING);
         let per_weight = density.simd_rsqrt();
         [
-            per_weight * density.broadcast(share(self.smoothing[0])),
-            per_weight * density.broadcast(share(self.smoothing[1])),
+            per_weight * density.broadcast(fraction(self.smoothing[0])),
+            per_weight * density.broadcast(fraction(self.smoothing[1])),
         ]
     }
 
     /// Share of a mean particle's fuel that burns at a speed, 1/s.
     #[inline(always)]
-    fn burning<R: Real>(&self, burner: &BurnerForces, speed: R) -> R {
+    fn burn_rate_at_speed<R: Real>(&self, burner: &BurnerForces, speed: R) -> R {
         speed.fma(speed.broadcast(burner.burning[0]), speed.broadcast(burner.burning[1]))
     }
 
     #[inline(always)]
-    fn exposure<R: Real>(&self, air_exposure: R, mixing: R, burning: R, temperature: R) -> AmbientConditions<R> {
+    fn exposure<R: Real>(
+        &self,
+        air_exposure: R,
+        mixing: R,
+        burn_rate_at_speed: R,
+        temperature: R,
+    ) -> AmbientConditions<R> {
         let density =
-            air_exposure.broadcast(self.forces.density_kelvin) / temperature.simd_max(air_exposure.broadcast(1.0));
+            air_exposure.broadcast(self.forces.density_at_1_k) / temperature.simd_max(air_exposure.broadcast(1.0));
         let air_temperature = self.forces.air_temperature;
         AmbientConditions { air_exposure, mixing, burning, density, air_temperature, smallest_radius: self.radius }
     }
 
     /// Age at which a particle is removed: that which it had, or where it has just burnt out after its afterlife.
     #[inline(always)]
-    fn end<R: Real>(&self, old: &ParticleState<R>, new: &ParticleState<R>, age: R, end: R) -> R {
+    fn removal_age<R: Real>(&self, old: &ParticleState<R>, new: &ParticleState<R>, age: R, removal_age: R) -> R {
         let none = age.broadcast(f32::MIN_POSITIVE);
-        let burnt_out = old.fuel.select_lt(none, end, age + age.broadcast(self.afterlife));
-        new.fuel.select_lt(none, burnt_out, end)
+        let burnt_out = old.fuel.select_lt(none, removal_age, age + age.broadcast(self.afterlife));
+        new.fuel.select_lt(none, burnt_out, removal_age)
     }
 }

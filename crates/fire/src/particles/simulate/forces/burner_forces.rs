@@ -38,8 +38,8 @@ impl BurnerForces<'_> {
     /// Share of its own mass that gas of such a velocity takes up from the air, 1/s.
     #[inline(always)]
     pub(crate) fn mixing<R: Real>(&self, velocity: &[R; 3], wind: &[R; 3], air_exposure: R) -> R {
-        let like = |value: f32| air_exposure.broadcast(value);
-        length(&subtract(velocity, wind)) * air_exposure.fma(like(self.entrainment), like(0.5 * self.entrainment))
+        let splat = |value: f32| air_exposure.broadcast(value);
+        length(&subtract(velocity, wind)) * air_exposure.fma(splat(self.entrainment), splat(0.5 * self.entrainment))
     }
 
     /// Velocity with which the air carries gas of `speed` and `age`, m/s.
@@ -51,13 +51,13 @@ impl BurnerForces<'_> {
 
     /// The motion at sixteen places.
     #[inline(always)]
-    pub(crate) fn flow<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> AirVelocity<Lanes<S>> {
-        let mut steady = self.axis.velocity(simd, place);
+    pub(crate) fn flow<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> AirVelocity<Lanes<S>> {
+        let mut steady = self.axis.velocity(simd, position);
         for ring in &self.rings {
-            ring.add_velocity(place, &mut steady);
+            ring.add_velocity(position, &mut steady);
         }
         let none = [Lanes::splat(simd, 0.0); 3];
-        let eddies = if self.turbulence > 0.0 { self.eddies.velocity(simd, place) } else { none };
+        let eddies = if self.turbulence > 0.0 { self.eddies.velocity(simd, position) } else { none };
         AirVelocity { steady, eddies }
     }
 }

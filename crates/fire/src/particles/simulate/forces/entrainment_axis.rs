@@ -30,7 +30,7 @@ pub(crate) struct PlumeAxis {
     /// Layers a metre.
     scale: f32,
     /// Mean x and z of the gas in each layer.
-    middle: [[f32; 2]; LAYERS + 1],
+    centers: [[f32; 2]; LAYERS + 1],
     speed_squared: f32,
     acceleration: f32,
     /// Speed of the air that flows in at the base, m/s.
@@ -44,14 +44,14 @@ pub(crate) struct PlumeAxis {
 pub(crate) fn plume_axes(
     burners: &[Burner],
     positions: [&[f32]; 3],
-    numbers: &[u32],
+    burner_indices: &[u32],
     strength: f64,
     t: f64,
 ) -> Vec<PlumeAxis> {
     let scale = |burner: &Burner| LAYERS as f64 / (1.5 * burner.height + burner.bounding_radius);
     let bases: Vec<(f64, f64)> = burners.iter().map(|b| (b.position(t).y, scale(b))).collect();
     let mut sums = vec![[[0.0_f64; 3]; LAYERS + 1]; burners.len()];
-    for (index, &number) in numbers.iter().enumerate() {
+    for (index, &number) in burner_indices.iter().enumerate() {
         let (base, scale) = bases[number as usize];
         let layer = ((f64::from(positions[1][index]) - base) * scale + 0.5).clamp(0.0, LAYERS as f64) as usize;
         let [x, z] = [positions[0][index], positions[2][index]].map(f64::from);
@@ -70,7 +70,7 @@ impl PlumeAxis {
         let mut axis = Self {
             base: base.y as f32,
             scale: scale as f32,
-            middle: [[base.x as f32, base.z as f32]; LAYERS + 1],
+            centers: [[base.x as f32, base.z as f32]; LAYERS + 1],
             speed_squared: (burner.speed * burner.speed) as f32,
             acceleration: burner.acceleration as f32,
             inflow: (INFLOW_FROUDE * math::sqrt(STANDARD_GRAVITY * burner.diameter)) as f32,
@@ -88,9 +88,9 @@ impl PlumeAxis {
             let total = |k: usize| sums[beside.clone()].iter().map(|sum| sum[k]).sum::<f64>();
             let count = total(2);
             if count > 0.0 {
-                self.middle[layer] = [(total(0) / count) as f32, (total(1) / count) as f32];
+                self.centers[layer] = [(total(0) / count) as f32, (total(1) / count) as f32];
             } else if layer > 0 {
-                self.middle[layer] = self.middle[layer - 1];
+                self.centers[layer] = self.centers[layer - 1];
             }
         }
     }
@@ -99,46 +99,47 @@ impl PlumeAxis {
     #[inline(always)]
     pub(crate) fn at(&self, height: f32) -> [f32; 2] {
         let layer = (height * self.scale).clamp(0.0, LAYERS as f32 - 1e-3);
-        let (below, part) = (layer as usize, layer.fract());
-        [0, 1].map(|k| self.middle[below][k] + (self.middle[below + 1][k] - self.middle[below][k]) * part)
+        let (below, fraction) = (layer as usize, layer.fract());
+        [0, 1].map(|k| self.centers[below][k] + (self.centers[below + 1][k] - self.centers[below][k]) * fraction)
     }
 
-    /// Velocity at which gas at `place` draws toward the axis, m/s.
+    /// Velocity at which gas at `position` draws toward the axis, m/s.
     #[inline(always)]
-    pub(crate) fn velocity<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
-        let like = |value: f32| Lanes::splat(simd, value);
-        let height = (place[1] - like(self.base)).simd_max(like(0.0));
-        let [x, z] = self.middle_at(simd, height);
-        let away = [place[0] - x, place[2] - z];
-        let distance = away[0].fma(away[0], away[1] * away[1]).simd_sqrt();
-        let speed_squared = height.fma(like(2.0 * self.acceleration), like(self.speed_squared));
-        let speed = speed_squared.simd_sqrt().simd_max(like(1e-6));
+    pub(crate) fn velocity<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        let splat = |value: f32| Lanes::splat(simd, value);
+        let height = (position[1] - splat(self.base)).simd_max(splat(0.0));
+        let [x, z] = self.centers_at(simd, height);
+        let offset = [position[0] - x, position[2] - z];
+        let distance = offset[0].fma(offset[0], offset[1] * offset[1]).simd_sqrt();
+        let speed_squared = height.fma(splat(2.0 * self.acceleration), splat(self.speed_squared));
+        let speed = speed_squared.simd_sqrt().simd_max(splat(1e-6));
         // The pull of one axis ends where a large burner has others of its own.
-        let near = (like(2.0) - distance * like(1.0 / self.reach)).simd_clamp01();
-        let greatest = speed.fma(like(MAX_INFLOW_FRACTION), like(self.inflow));
-        let inward = (distance * like(0.5 * self.acceleration) / speed).simd_min(greatest) * near * like(self.strength);
-        let pull = (like(0.0) - inward) / distance.simd_max(like(f32::MIN_POSITIVE));
-        [away[0] * pull, like(0.0), away[1] * pull]
+        let attenuation = (splat(2.0) - distance * splat(1.0 / self.reach)).simd_clamp01();
+        let greatest = speed.fma(splat(MAX_INFLOW_FRACTION), splat(self.inflow));
+        let inward =
+            (distance * splat(0.5 * self.acceleration) / speed).simd_min(greatest) * attenuation * splat(self.strength);
+        let pull = (splat(0.0) - inward) / distance.simd_max(splat(f32::MIN_POSITIVE));
+        [offset[0] * pull, splat(0.0), offset[1] * pull]
     }
 
     /// Where the axis is at heights above the burner: x and z, m.
     #[inline(always)]
-    fn middle_at<S: Simd>(&self, simd: S, height: Lanes<S>) -> [Lanes<S>; 2] {
-        let place = (height * height.broadcast(self.scale)).simd_min(height.broadcast(LAYERS as f32 - 1e-3));
-        let (layer, part) = wrap_split(place, 31);
+    fn centers_at<S: Simd>(&self, simd: S, height: Lanes<S>) -> [Lanes<S>; 2] {
+        let position = (height * height.broadcast(self.scale)).simd_min(height.broadcast(LAYERS as f32 - 1e-3));
+        let (layer, fraction) = wrap_split(position, 31);
         let mut layers = [0; LANES];
         layer.store_slice(&mut layers);
-        let mut middle = [part; 2];
+        let mut centers = [fraction; 2];
         for k in 0..2 {
             let (mut below, mut above) = ([0.0; LANES], [0.0; LANES]);
             for lane in 0..LANES {
                 let layer = (layers[lane] as usize).min(LAYERS - 1);
-                (below[lane], above[lane]) = (self.middle[layer][k], self.middle[layer + 1][k]);
+                (below[lane], above[lane]) = (self.centers[layer][k], self.centers[layer + 1][k]);
             }
             let (below, above) = (Lanes::from_slice(simd, &below), Lanes::from_slice(simd, &above));
-            middle[k] = part.fma(above - below, below);
+            centers[k] = fraction.fma(above - below, below);
         }
-        middle
+        centers
     }
 }
 
@@ -149,9 +150,9 @@ mod tests {
     use super::*;
     use crate::particles::parameters::{BurnerParameters, FlameParticlesParameters};
 
-    fn velocity(axis: &PlumeAxis, place: Vec3) -> Vec3 {
+    fn velocity(axis: &PlumeAxis, position: Vec3) -> Vec3 {
         bansho_base::dispatch_baseline!(simd => {
-            let velocity = axis.velocity(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
+            let velocity = axis.velocity(simd, &position.to_array().map(|x| Lanes::splat(simd, x)));
             Vec3::from(velocity.map(|values| values.as_slice()[3]))
         })
     }
@@ -180,7 +181,7 @@ mod tests {
         for start in 0..40 {
             let heights: [f32; LANES] = std::array::from_fn(|lane| 0.003 * (start * LANES + lane) as f32);
             let together = bansho_base::dispatch_baseline!(simd => {
-                axis.middle_at(simd, Lanes::from_slice(simd, &heights)).map(|values| values.as_slice().to_vec())
+                axis.centers_at(simd, Lanes::from_slice(simd, &heights)).map(|values| values.as_slice().to_vec())
             });
             for (lane, height) in heights.into_iter().enumerate() {
                 let alone = axis.at(height);

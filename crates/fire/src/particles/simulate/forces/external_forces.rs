@@ -9,8 +9,8 @@ use bansho_base::{
 use super::{
     burner_forces::BurnerForces,
     entrainment_axis::{PlumeAxis, plume_axes},
-    turbulence::{EddyField, Turbulence},
-    vortex_rings::{VortexRing, rings},
+    turbulence::{EddyField, TurbulenceTile},
+    vortex_rings::{VortexRing, active_rings},
     wind::WindField,
 };
 use crate::particles::{
@@ -40,14 +40,14 @@ const PARTICLES_PER_TASK: usize = 8192;
 pub(crate) struct StepConstants<'a> {
     pub(crate) parameters: &'a FlameParticlesParameters,
     pub(crate) constants: &'a DerivedConstants,
-    pub(crate) turbulence: &'a Turbulence,
+    pub(crate) turbulence: &'a TurbulenceTile,
     pub(crate) key: Key,
 }
 
 /// What acts on the gas in a step.
 pub(crate) struct ExternalForces<'a> {
     step: StepConstants<'a>,
-    around: &'a Surroundings<'a>,
+    surroundings: &'a Surroundings<'a>,
     pub(crate) origin: DVec3,
     pub(crate) occluders: &'a [Occluder],
     pub(crate) air_temperature: f32,
@@ -56,41 +56,41 @@ pub(crate) struct ExternalForces<'a> {
     pub(crate) wind: WindForce,
     pub(crate) wind_gain: f32,
     /// Density of air at 1 K, kg K/m^3.
-    pub(crate) density_kelvin: f32,
+    pub(crate) density_at_1_k: f32,
     /// The air's motion over each burner.
     pub(crate) burner_forces: Vec<BurnerForces<'a>>,
 }
 
 impl<'a> ExternalForces<'a> {
     /// The weather of a step that begins at `t`.
-    pub(crate) fn new(step: StepConstants<'a>, particles: &Particles, around: &'a Surroundings, t: f64) -> Self {
+    pub(crate) fn new(step: StepConstants<'a>, particles: &Particles, surroundings: &'a Surroundings, t: f64) -> Self {
         let StepConstants { parameters: flame, constants, .. } = step;
         let plume_axes =
             plume_axes(&constants.burners, particles.positions(), &particles.burner, flame.motion.narrowing, t);
         let bounds = bounds(particles, constants.burners.len());
-        let burner_forces = plume_axes.into_iter().zip(bounds).enumerate().map(|(number, (axis, bounds))| {
-            let wind_field = WindField::new(around.wind, particles.origin, bounds, t);
-            step.burner(number, axis, wind_field, around, t)
+        let burner_forces = plume_axes.into_iter().zip(bounds).enumerate().map(|(index, (axis, bounds))| {
+            let wind_field = WindField::new(surroundings.wind, particles.origin, bounds, t);
+            step.burner(index, axis, wind_field, surroundings, t)
         });
         Self {
             burner_forces: burner_forces.collect(),
             step,
-            around,
+            surroundings,
             origin: particles.origin,
-            occluders: &around.others.occluders,
-            air_temperature: around.air.temperature_k as f32,
+            occluders: &surroundings.others.occluders,
+            air_temperature: surroundings.air.temperature_k as f32,
             buoyancy: (STANDARD_GRAVITY * flame.motion.buoyancy) as f32,
             wind: flame.motion.wind,
             wind_gain: flame.motion.wind_gain as f32,
-            density_kelvin: density_kelvin(around.air),
+            density_at_1_k: density_at_1_k(surroundings.air),
         }
     }
 
     /// Lets rings and eddies go on to the moment `t`; axes and wind stay for the step.
     pub(crate) fn advance_vortex_rings(&mut self, t: f64) {
-        for (number, burner) in self.burner_forces.iter_mut().enumerate() {
-            burner.rings = self.step.rings(number, &burner.axis, t);
-            burner.eddies = self.step.eddies(number, self.around, t);
+        for (index, burner) in self.burner_forces.iter_mut().enumerate() {
+            burner.rings = self.step.rings(index, &burner.axis, t);
+            burner.eddies = self.step.eddies(index, self.surroundings, t);
         }
     }
 }
@@ -98,18 +98,18 @@ impl<'a> ExternalForces<'a> {
 impl<'a> StepConstants<'a> {
     fn burner(
         self,
-        number: usize,
+        index: usize,
         axis: PlumeAxis,
         wind_field: WindField,
-        around: &Surroundings,
+        surroundings: &Surroundings,
         t: f64,
     ) -> BurnerForces<'a> {
-        let (burner, motion) = (&self.constants.burners[number], &self.parameters.motion);
+        let (burner, motion) = (&self.constants.burners[index], &self.parameters.motion);
         BurnerForces {
             wind_field,
-            rings: self.rings(number, &axis, t),
+            rings: self.rings(index, &axis, t),
             axis,
-            eddies: self.eddies(number, around, t),
+            eddies: self.eddies(index, surroundings, t),
             turbulence: motion.turbulence as f32,
             turbulent_age: TURBULENT_AGE * burner.rise_time() as f32,
             entrainment: (motion.entrainment / (0.5 * burner.diameter)) as f32,
@@ -118,42 +118,42 @@ impl<'a> StepConstants<'a> {
         }
     }
 
-    fn rings(self, number: usize, axis: &PlumeAxis, t: f64) -> Vec<VortexRing> {
-        rings(&self.constants.burners[number], self.parameters, self.key, number as u32, t, axis)
+    fn rings(self, index: usize, axis: &PlumeAxis, t: f64) -> Vec<VortexRing> {
+        active_rings(&self.constants.burners[index], self.parameters, self.key, index as u32, t, axis)
     }
 
-    fn eddies(self, number: usize, around: &Surroundings, t: f64) -> EddyField<'a> {
-        let (burner, motion) = (&self.constants.burners[number], &self.parameters.motion);
-        let drift = around.wind.travel(0.0, t) * (EDDY_DRIFT * motion.wind_gain);
+    fn eddies(self, index: usize, surroundings: &Surroundings, t: f64) -> EddyField<'a> {
+        let (burner, motion) = (&self.constants.burners[index], &self.parameters.motion);
+        let drift = surroundings.wind.travel(0.0, t) * (EDDY_DRIFT * motion.wind_gain);
         self.turbulence.at(t, motion.eddy_size * burner.diameter, burner.axis_speed(0.5 * burner.height), drift)
     }
 }
 
-fn density_kelvin(air: &Air) -> f32 {
+fn density_at_1_k(air: &Air) -> f32 {
     air.density_at(1.0) as f32
 }
 
 /// Corners of the box around the particles of each burner.
 fn bounds(particles: &Particles, burners: usize) -> Vec<[Vec3; 2]> {
-    const NOTHING: [Vec3; 2] = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+    const EMPTY: [Vec3; 2] = [Vec3::INFINITY, Vec3::NEG_INFINITY];
     let [x, y, z] = particles.positions();
     let of_task = |first: usize| {
-        let mut bounds = vec![NOTHING; burners];
+        let mut bounds = vec![EMPTY; burners];
         for index in first..(first + PARTICLES_PER_TASK).min(particles.len()) {
-            let place = Vec3::new(x[index], y[index], z[index]);
+            let position = Vec3::new(x[index], y[index], z[index]);
             let [low, high] = &mut bounds[particles.burner[index] as usize];
-            (*low, *high) = (low.min(place), high.max(place));
+            (*low, *high) = (low.min(position), high.max(position));
         }
         bounds
     };
-    let both = |mut one: Vec<[Vec3; 2]>, other: Vec<[Vec3; 2]>| {
+    let merge = |mut one: Vec<[Vec3; 2]>, other: Vec<[Vec3; 2]>| {
         for ([low, high], [other_low, other_high]) in one.iter_mut().zip(other) {
             (*low, *high) = (low.min(other_low), high.max(other_high));
         }
         one
     };
-    let parts = (0..particles.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
-    let bounds = parts.map(of_task).reduce(|| vec![NOTHING; burners], both);
+    let tasks = (0..particles.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
+    let bounds = tasks.map(of_task).reduce(|| vec![EMPTY; burners], merge);
     // A burner that nothing came from yet has no wind to speak of.
     bounds.into_iter().map(|bounds| if bounds[0].x <= bounds[1].x { bounds } else { [Vec3::ZERO, Vec3::ONE] }).collect()
 }
@@ -186,22 +186,22 @@ mod tests {
         let mut simulation = Simulation::new(&parameters, constants, Key::new(1, "flame"));
         let gusty = WindParameters { velocity: [2.0, 0.0, 0.0].into(), gust: 1.5, ..WindParameters::default() };
         let (wind, air) = (Wind::new(gusty, 3, None), Air::default());
-        let around = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
-        (0..30).for_each(|step| simulation.step(f64::from(step) * simulation.step_s(), &around));
+        let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
+        (0..30).for_each(|step| simulation.step(f64::from(step) * simulation.step_s(), &surroundings));
         let Simulation { parameters, constants, turbulence, key, .. } = &simulation;
         let step = StepConstants { parameters, constants, turbulence, key: *key };
-        let forces = ExternalForces::new(step, &simulation.particles, &around, 0.25);
-        let at = |burner: usize, place: Vec3| {
+        let forces = ExternalForces::new(step, &simulation.particles, &surroundings, 0.25);
+        let at = |burner: usize, position: Vec3| {
             bansho_base::dispatch_baseline!(simd => {
-                let lanes = place.to_array().map(|x| Lanes::splat(simd, x));
+                let lanes = position.to_array().map(|x| Lanes::splat(simd, x));
                 Vec3::from(forces.burner_forces[burner].wind_field.at(simd, &lanes).map(|values| values.as_slice()[0]))
             })
         };
         let (particles, mut off, mut apart) = (&simulation.particles, 0.0_f32, 0.0_f32);
         for index in 0..particles.len() {
-            let place = Vec3::from(particles.positions().map(|values| values[index]));
-            let exact = wind.at(place.as_dvec3(), 0.25).as_vec3();
-            let [own, other] = [0, 1].map(|swap| at(particles.burner[index] as usize ^ swap, place));
+            let position = Vec3::from(particles.positions().map(|values| values[index]));
+            let exact = wind.at(position.as_dvec3(), 0.25).as_vec3();
+            let [own, other] = [0, 1].map(|swap| at(particles.burner[index] as usize ^ swap, position));
             off = off.max((own - exact).length());
             apart = apart.max((other - exact).length());
         }

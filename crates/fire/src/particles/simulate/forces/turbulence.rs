@@ -27,7 +27,7 @@ const LAYER_WEIGHT: [f32; 2] = [0.86, 0.51];
 
 /// A periodic field of velocity, of standard deviation 1 a component.
 #[derive(Clone, Debug)]
-pub(crate) struct Turbulence {
+pub(crate) struct TurbulenceTile {
     key: Key,
     /// Velocities on the grid; the fourth number is 0.
     tile: OnceLock<Vec<[f32; 4]>>,
@@ -41,7 +41,7 @@ pub(crate) struct EddyField<'a> {
     layers: [(f32, [f32; 3]); 2],
 }
 
-impl Turbulence {
+impl TurbulenceTile {
     pub(crate) fn new(key: Key) -> Self {
         Self { key, tile: OnceLock::new() }
     }
@@ -51,10 +51,10 @@ impl Turbulence {
         get_or_make(&self.tile, || tile(self.key)).as_slice()
     }
 
-    /// A number of mean 0 and standard deviation 1 that changes over a unit of `place`.
-    pub(crate) fn patch(&self, place: DVec3) -> f32 {
-        let place = (place * (SIDE as f64 / f64::from(EDDIES))).rem_euclid(DVec3::splat(SIDE as f64));
-        sample(self.tile(), place.as_vec3())[0]
+    /// A number of mean 0 and standard deviation 1 that changes over a unit of `position`.
+    pub(crate) fn noise(&self, position: DVec3) -> f32 {
+        let position = (position * (SIDE as f64 / f64::from(EDDIES))).rem_euclid(DVec3::splat(SIDE as f64));
+        sample(self.tile(), position.as_vec3())[0]
     }
 
     /// The eddies at time `t`, the largest `eddy_size` m wide, rising in gas of `speed` and drifting with the wind's `drift` since time 0.
@@ -82,20 +82,20 @@ fn tile(key: Key) -> Vec<[f32; 4]> {
 }
 
 impl EddyField<'_> {
-    /// Velocity at `place`, m from the flame's position, of standard deviation 1 a component.
+    /// Velocity at `position`, m from the flame's position, of standard deviation 1 a component.
     #[inline(always)]
-    pub(crate) fn velocity<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    pub(crate) fn velocity<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
         let mut sum = [Lanes::splat(simd, 0.0); 3];
         let Ok(tile) = <&[[f32; 4]; SIDE * SIDE * SIDE]>::try_from(self.tile) else { return sum };
-        for (layer, share) in LAYER_WEIGHT.into_iter().enumerate() {
+        for (layer, weight) in LAYER_WEIGHT.into_iter().enumerate() {
             let (scale, origin) = &self.layers[layer];
-            let mut on_grid = *place;
+            let mut grid_position = *position;
             for c in 0..3 {
-                on_grid[c] = place[c].fma(place[c].broadcast(*scale), place[c].broadcast(origin[c]));
+                grid_position[c] = position[c].fma(position[c].broadcast(*scale), position[c].broadcast(origin[c]));
             }
-            let velocity = sample_lanes(simd, tile, &on_grid);
+            let velocity = sample_lanes(simd, tile, &grid_position);
             for c in 0..3 {
-                sum[c] = velocity[c].fma(velocity[c].broadcast(share), sum[c]);
+                sum[c] = velocity[c].fma(velocity[c].broadcast(weight), sum[c]);
             }
         }
         sum
@@ -104,10 +104,10 @@ impl EddyField<'_> {
 
 /// A tile at places in grid points, straight between them.
 #[inline(always)]
-fn sample_lanes<S: Simd>(simd: S, tile: &[[f32; 4]; SIDE * SIDE * SIDE], place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+fn sample_lanes<S: Simd>(simd: S, tile: &[[f32; 4]; SIDE * SIDE * SIDE], position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
     const MASK: u32 = SIDE as u32 - 1;
     let ((x, across), (y, up), (z, along)) =
-        (wrap_split(place[0], MASK), wrap_split(place[1], MASK), wrap_split(place[2], MASK));
+        (wrap_split(position[0], MASK), wrap_split(position[1], MASK), wrap_split(position[2], MASK));
     let (next_x, next_y, next_z) = ((x + 1) & MASK, (y + 1) & MASK, (z + 1) & MASK);
     let row = Row { tile, x: [x, next_x], across };
     let near = lerp4(&row.at(simd, y, z), &row.at(simd, next_y, z), up);
@@ -135,18 +135,18 @@ impl<S: Simd> Row<'_, S> {
 
 /// Values at a share of the way from one to the other.
 #[inline(always)]
-pub(crate) fn lerp4<R: Real>(one: &[R; 4], other: &[R; 4], share: R) -> [R; 4] {
+pub(crate) fn lerp4<R: Real>(one: &[R; 4], other: &[R; 4], weight: R) -> [R; 4] {
     let mut lerp4 = *one;
     for c in 0..4 {
-        lerp4[c] = share.fma(other[c] - one[c], one[c]);
+        lerp4[c] = weight.fma(other[c] - one[c], one[c]);
     }
     lerp4
 }
 
 /// A tile at a place in grid points, straight between them.
-fn sample(tile: &[[f32; 4]], place: Vec3) -> [f32; 4] {
-    let floor = place.floor();
-    let f = place - floor;
+fn sample(tile: &[[f32; 4]], position: Vec3) -> [f32; 4] {
+    let floor = position.floor();
+    let f = position - floor;
     let cell = floor.as_ivec3();
     let wrap = |coordinate: i32, step: i32| (coordinate.wrapping_add(step) & (SIDE as i32 - 1)) as usize;
     let row = |j: i32, k: i32| {
@@ -169,12 +169,12 @@ fn potential(seed: u32) -> Vec<f32> {
 
 /// Curl of the potentials at a grid point, by central differences.
 fn curl(potentials: &[Vec<f32>; 3], index: usize) -> Vec3 {
-    let place = [index % SIDE, index / SIDE % SIDE, index / (SIDE * SIDE)];
+    let position = [index % SIDE, index / SIDE % SIDE, index / (SIDE * SIDE)];
     let slope = |of: usize, along: usize| {
         let value = |step: usize| {
-            let mut beside = place;
-            beside[along] = (beside[along] + step) % SIDE;
-            potentials[of][(beside[2] * SIDE + beside[1]) * SIDE + beside[0]]
+            let mut neighbor = position;
+            neighbor[along] = (neighbor[along] + step) % SIDE;
+            potentials[of][(neighbor[2] * SIDE + neighbor[1]) * SIDE + neighbor[0]]
         };
         value(1) - value(SIDE - 1)
     };
@@ -185,16 +185,16 @@ fn curl(potentials: &[Vec<f32>; 3], index: usize) -> Vec3 {
 mod tests {
     use super::*;
 
-    fn velocity(eddies: &EddyField, place: Vec3) -> Vec3 {
+    fn velocity(eddies: &EddyField, position: Vec3) -> Vec3 {
         bansho_base::dispatch_baseline!(simd => {
-            let velocity = eddies.velocity(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
+            let velocity = eddies.velocity(simd, &position.to_array().map(|x| Lanes::splat(simd, x)));
             Vec3::from(velocity.map(|values| values.as_slice()[9]))
         })
     }
 
     #[test]
     fn the_tile_is_free_of_divergence_and_of_unit_strength() {
-        let turbulence = Turbulence::new(Key::new(3, "turbulence"));
+        let turbulence = TurbulenceTile::new(Key::new(3, "turbulence"));
         let at = |x: usize, y: usize, z: usize| {
             Vec3::from_slice(&turbulence.tile()[((z % SIDE) * SIDE + y % SIDE) * SIDE + x % SIDE])
         };
@@ -207,34 +207,34 @@ mod tests {
             assert!(divergence.abs() < 1e-4, "{divergence}");
         }
         let eddies = turbulence.at(1.7, 0.3, 3.0, DVec3::ZERO);
-        let places = (0..20_000).map(|i| Vec3::new(0.013, 0.017, 0.023) * i as f32);
-        let squares: f32 = places.map(|place| velocity(&eddies, place).length_squared()).sum();
+        let positions = (0..20_000).map(|i| Vec3::new(0.013, 0.017, 0.023) * i as f32);
+        let squares: f32 = positions.map(|position| velocity(&eddies, position).length_squared()).sum();
         let deviation = (squares / 60_000.0).sqrt();
         assert!((0.7..1.1).contains(&deviation), "standard deviation {deviation}");
     }
 
     #[test]
     fn one_place_and_sixteen_find_the_same_velocity() {
-        let turbulence = Turbulence::new(Key::new(3, "turbulence"));
+        let turbulence = TurbulenceTile::new(Key::new(3, "turbulence"));
         let tile = <&[[f32; 4]; SIDE * SIDE * SIDE]>::try_from(turbulence.tile()).unwrap();
         for step in 0..200 {
-            let place = Vec3::new(0.37, 1.71, 0.83) * step as f32 - 40.0;
+            let position = Vec3::new(0.37, 1.71, 0.83) * step as f32 - 40.0;
             let together = bansho_base::dispatch_baseline!(simd => {
-                let lanes = place.to_array().map(|x| Lanes::splat(simd, x));
+                let lanes = position.to_array().map(|x| Lanes::splat(simd, x));
                 sample_lanes(simd, tile, &lanes).map(|values| values.as_slice()[7])
             });
-            let alone = sample(turbulence.tile(), place);
-            assert!((0..3).all(|c| (together[c] - alone[c]).abs() < 1e-5), "at {place}: {together:?} {alone:?}");
+            let alone = sample(turbulence.tile(), position);
+            assert!((0..3).all(|c| (together[c] - alone[c]).abs() < 1e-5), "at {position}: {together:?} {alone:?}");
         }
     }
 
     #[test]
     fn eddies_rise_with_the_gas_and_drift_with_the_wind() {
-        let turbulence = Turbulence::new(Key::new(3, "turbulence"));
-        let place = Vec3::new(0.1, 0.2, 0.3);
-        let still = velocity(&turbulence.at(0.0, 0.5, 2.0, DVec3::ZERO), place);
-        let drifted = velocity(&turbulence.at(0.0, 0.5, 2.0, DVec3::X * 0.7), place + Vec3::X * 0.7);
-        assert!((still - drifted).length() < 1e-3);
-        assert!((velocity(&turbulence.at(0.5, 0.5, 2.0, DVec3::ZERO), place) - still).length() > 0.01);
+        let turbulence = TurbulenceTile::new(Key::new(3, "turbulence"));
+        let position = Vec3::new(0.1, 0.2, 0.3);
+        let initial = velocity(&turbulence.at(0.0, 0.5, 2.0, DVec3::ZERO), position);
+        let drifted = velocity(&turbulence.at(0.0, 0.5, 2.0, DVec3::X * 0.7), position + Vec3::X * 0.7);
+        assert!((initial - drifted).length() < 1e-3);
+        assert!((velocity(&turbulence.at(0.5, 0.5, 2.0, DVec3::ZERO), position) - initial).length() > 0.01);
     }
 }

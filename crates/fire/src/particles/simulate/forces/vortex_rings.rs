@@ -39,7 +39,7 @@ const RING_GROWTH: f64 = 0.28;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct VortexRing {
     /// Its middle, m from the flame's position.
-    centre: Vec3,
+    center: Vec3,
     /// Unit vector along which its middle blows.
     axis: Vec3,
     /// 1 / c, 1/m.
@@ -49,42 +49,42 @@ pub(crate) struct VortexRing {
 }
 
 impl VortexRing {
-    /// Adds the velocity of the air at `place`, m/s.
+    /// Adds the velocity of the air at `position`, m/s.
     #[inline(always)]
-    pub(crate) fn add_velocity<S: Simd>(&self, place: &[Lanes<S>; 3], sum: &mut [Lanes<S>; 3]) {
-        let like = |value: f32| place[0].broadcast(value);
-        let (centre, axis) = (self.centre.to_array(), self.axis.to_array());
-        let mut offset = *place;
+    pub(crate) fn add_velocity<S: Simd>(&self, position: &[Lanes<S>; 3], sum: &mut [Lanes<S>; 3]) {
+        let splat = |value: f32| position[0].broadcast(value);
+        let (center, axis) = (self.center.to_array(), self.axis.to_array());
+        let mut offset = *position;
         for c in 0..3 {
-            offset[c] = (place[c] - like(centre[c])) * like(self.inverse_extent);
+            offset[c] = (position[c] - splat(center[c])) * splat(self.inverse_extent);
         }
-        let beyond = like(1.0) - dot(&offset, &offset);
-        if !any_positive(beyond) {
+        let q = splat(1.0) - dot(&offset, &offset);
+        if !any_positive(q) {
             return;
         }
-        let beyond = beyond.simd_max(like(0.0));
-        let axis = [like(axis[0]), like(axis[1]), like(axis[2])];
+        let q = q.simd_max(splat(0.0));
+        let axis = [splat(axis[0]), splat(axis[1]), splat(axis[2])];
         let height = dot(&offset, &axis);
         let mut radial = offset;
         for c in 0..3 {
-            radial[c] = axis[c].fma(like(0.0) - height, offset[c]);
+            radial[c] = axis[c].fma(splat(0.0) - height, offset[c]);
         }
         // psi = C r^2 q^4 with q = 1 - s^2: u_h = (1/r) dpsi/dr = C (2 q^4 - 8 r^2 q^3), u_r = -(1/r) dpsi/dh = 8 C r h q^3.
-        let cubed = beyond * beyond * beyond * like(self.strength);
-        let along = cubed * dot(&radial, &radial).fma(like(-8.0), beyond * like(2.0));
-        let outward = cubed * height * like(8.0);
+        let cubed = q * q * q * splat(self.strength);
+        let along = cubed * dot(&radial, &radial).fma(splat(-8.0), q * splat(2.0));
+        let outward = cubed * height * splat(8.0);
         for c in 0..3 {
             sum[c] = radial[c].fma(outward, axis[c].fma(along, sum[c]));
         }
     }
 }
 
-/// The rings of `burner`, number `number`, that are alive at time `t`, along the `axis` of its gas.
-pub(crate) fn rings(
+/// The rings of `burner`, number `burner_index`, that are alive at time `t`, along the `axis` of its gas.
+pub(crate) fn active_rings(
     burner: &Burner,
     flame: &FlameParticlesParameters,
     key: Key,
-    number: u32,
+    burner_index: u32,
     t: f64,
     axis: &PlumeAxis,
 ) -> Vec<VortexRing> {
@@ -96,8 +96,9 @@ pub(crate) fn rings(
     let streams = (burner.area_m2 / side).round().clamp(1.0, MAX_STREAMS) as u32;
     let latest = (t * hz).floor() as i64 + 1;
     let stream_rings = |stream: u32| {
-        let shed = VortexShedding { burner, key, purpose: Purpose(number * 64 + stream), streams, hz, t, axis };
-        (0..MAX_RINGS).filter_map(move |back| shed.ring(latest - back, flame.motion.puffing))
+        let shedding =
+            VortexShedding { burner, key, purpose: Purpose(burner_index * 64 + stream), streams, hz, t, axis };
+        (0..MAX_RINGS).filter_map(move |back| shedding.ring(latest - back, flame.motion.puffing))
     };
     (0..streams).flat_map(stream_rings).collect()
 }
@@ -137,7 +138,7 @@ impl VortexShedding<'_> {
         let lean = DVec3::new(above[0] - base[0], height, above[1] - base[1]);
         let axis = DVec3::new(0.5 * (tilt_x - 0.5), 1.0, 0.5 * (tilt_z - 0.5)).normalize();
         Some(VortexRing {
-            centre: (self.middle(beat, [tilt_x, tilt_z]) + lean).as_vec3(),
+            center: (self.middle(beat, [tilt_x, tilt_z]) + lean).as_vec3(),
             axis: axis.as_vec3(),
             inverse_extent: (1.0 / extent) as f32,
             strength: (0.5 * speed) as f32,
@@ -163,25 +164,25 @@ mod tests {
     use crate::particles::{parameters::BurnerParameters, simulate::forces::entrainment_axis::plume_axes};
     use fearless_simd::prelude::*;
 
-    fn velocity(ring: &VortexRing, place: Vec3) -> Vec3 {
+    fn velocity(ring: &VortexRing, position: Vec3) -> Vec3 {
         bansho_base::dispatch_baseline!(simd => {
             let mut sum = [Lanes::splat(simd, 0.0); 3];
-            ring.add_velocity(&place.to_array().map(|x| Lanes::splat(simd, x)), &mut sum);
+            ring.add_velocity(&position.to_array().map(|x| Lanes::splat(simd, x)), &mut sum);
             Vec3::from(sum.map(|values| values.as_slice()[5]))
         })
     }
 
     fn ring() -> VortexRing {
-        VortexRing { centre: Vec3::new(0.1, 0.5, 0.0), axis: Vec3::Y, inverse_extent: 2.5, strength: 1.5 }
+        VortexRing { center: Vec3::new(0.1, 0.5, 0.0), axis: Vec3::Y, inverse_extent: 2.5, strength: 1.5 }
     }
 
     #[test]
     fn a_ring_has_no_divergence() {
         let ring = ring();
-        for place in [Vec3::new(0.15, 0.6, 0.1), Vec3::new(0.3, 0.45, -0.1), Vec3::new(0.0, 0.3, 0.05)] {
+        for position in [Vec3::new(0.15, 0.6, 0.1), Vec3::new(0.3, 0.45, -0.1), Vec3::new(0.0, 0.3, 0.05)] {
             let h = 2e-3;
             let slope = |axis: Vec3| {
-                (velocity(&ring, place + axis * h) - velocity(&ring, place - axis * h)).dot(axis) / (2.0 * h)
+                (velocity(&ring, position + axis * h) - velocity(&ring, position - axis * h)).dot(axis) / (2.0 * h)
             };
             let divergence = slope(Vec3::X) + slope(Vec3::Y) + slope(Vec3::Z);
             assert!(divergence.abs() < 0.01 * slope(Vec3::Y).abs().max(1.0), "{divergence}");
@@ -196,8 +197,8 @@ mod tests {
         let burner = Burner::new(&BurnerParameters::default(), &flame, &MemoryAssets::default()).unwrap();
         let axis = plume_axes(std::slice::from_ref(&burner), [&[]; 3], &[], 0.0, 0.0).remove(0);
         let total = |t: f64| {
-            let rings = rings(&burner, &flame, Key::new(4, "rings"), 0, t, &axis);
-            (rings.iter().map(|ring| f64::from(ring.strength)).sum::<f64>(), rings.len())
+            let active_rings = active_rings(&burner, &flame, Key::new(4, "rings"), 0, t, &axis);
+            (active_rings.iter().map(|ring| f64::from(ring.strength)).sum::<f64>(), active_rings.len())
         };
         let (mut before, mut most) = (total(1.0).0, 0);
         for step in 1..4000 {
@@ -211,10 +212,10 @@ mod tests {
     #[test]
     fn a_ring_draws_in_below_and_pushes_out_above() {
         let ring = ring();
-        assert!((velocity(&ring, ring.centre) - Vec3::Y * 3.0).length() < 1e-6);
-        assert!(velocity(&ring, ring.centre + Vec3::new(0.15, -0.15, 0.0)).x < -0.1);
-        assert!(velocity(&ring, ring.centre + Vec3::new(0.15, 0.15, 0.0)).x > 0.1);
-        assert!(velocity(&ring, ring.centre + Vec3::new(0.3, 0.0, 0.0)).y < -0.05, "it rolls");
-        assert_eq!(velocity(&ring, ring.centre + Vec3::X * 0.5), Vec3::ZERO);
+        assert!((velocity(&ring, ring.center) - Vec3::Y * 3.0).length() < 1e-6);
+        assert!(velocity(&ring, ring.center + Vec3::new(0.15, -0.15, 0.0)).x < -0.1);
+        assert!(velocity(&ring, ring.center + Vec3::new(0.15, 0.15, 0.0)).x > 0.1);
+        assert!(velocity(&ring, ring.center + Vec3::new(0.3, 0.0, 0.0)).y < -0.05, "it rolls");
+        assert_eq!(velocity(&ring, ring.center + Vec3::X * 0.5), Vec3::ZERO);
     }
 }

@@ -34,33 +34,37 @@ impl WindField {
         let last = (POINTS - 1) as f32;
         let mut velocity = Box::new([[0.0; 4]; ALL_POINTS]);
         for (index, velocity) in velocity.iter_mut().enumerate() {
-            let place = [index % POINTS, index / POINTS % POINTS, index / (POINTS * POINTS)];
-            let place = low + size * Vec3::from(place.map(|step| step as f32)) / last;
-            *velocity = wind.at(origin + place.as_dvec3(), t).as_vec3().extend(0.0).to_array();
+            let position = [index % POINTS, index / POINTS % POINTS, index / (POINTS * POINTS)];
+            let position = low + size * Vec3::from(position.map(|step| step as f32)) / last;
+            *velocity = wind.at(origin + position.as_dvec3(), t).as_vec3().extend(0.0).to_array();
         }
         Self { low: low.to_array(), scale: (last / size).to_array(), velocity }
     }
 
     /// Velocity at sixteen places, m/s.
     #[inline(always)]
-    pub(crate) fn at<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    pub(crate) fn at<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
         const MASK: u32 = POINTS as u32 - 1;
-        let like = |value: f32| Lanes::splat(simd, value);
-        let mut on_grid = *place;
+        let splat = |value: f32| Lanes::splat(simd, value);
+        let mut grid_position = *position;
         for c in 0..3 {
             // Never the last point itself, beside which there is none.
-            let last = like((POINTS - 1) as f32 - 1e-3);
-            on_grid[c] = ((place[c] - like(self.low[c])) * like(self.scale[c])).simd_max(like(0.0)).simd_min(last);
+            let last = splat((POINTS - 1) as f32 - 1e-3);
+            grid_position[c] =
+                ((position[c] - splat(self.low[c])) * splat(self.scale[c])).simd_max(splat(0.0)).simd_min(last);
         }
-        let ((x, across), (y, up), (z, along)) =
-            (wrap_split(on_grid[0], MASK), wrap_split(on_grid[1], MASK), wrap_split(on_grid[2], MASK));
+        let ((x, across), (y, up), (z, along)) = (
+            wrap_split(grid_position[0], MASK),
+            wrap_split(grid_position[1], MASK),
+            wrap_split(grid_position[2], MASK),
+        );
         let first = (((z << POINTS.ilog2()) + y) << POINTS.ilog2()) + x;
         let [next_y, next_z] = [POINTS as u32, (POINTS * POINTS) as u32];
         let starts = [first, first + next_y, first + next_z, first + (next_y + next_z)];
-        let mut rows = [[like(0.0); 4]; 4];
+        let mut rows = [[splat(0.0); 4]; 4];
         for k in 0..4 {
-            let [here, beside] = [fetch(simd, &self.velocity, starts[k]), fetch(simd, &self.velocity, starts[k] + 1)];
-            rows[k] = lerp4(&here, &beside, across);
+            let [here, next] = [fetch(simd, &self.velocity, starts[k]), fetch(simd, &self.velocity, starts[k] + 1)];
+            rows[k] = lerp4(&here, &next, across);
         }
         let (near, far) = (lerp4(&rows[0], &rows[1], up), lerp4(&rows[2], &rows[3], up));
         let [x, y, z, _] = lerp4(&near, &far, along);
@@ -80,10 +84,10 @@ mod tests {
         let wind = Wind::new(parameters, 5, None);
         let origin = DVec3::new(10.0, 0.0, -4.0);
         let wind_field = WindField::new(&wind, origin, [Vec3::ZERO, Vec3::new(1.0, 2.0, 1.0)], 2.0);
-        for place in [Vec3::splat(0.1), Vec3::new(0.9, 1.3, 0.4), Vec3::new(0.5, 2.0, 1.0)] {
-            let exact = wind.at(origin + place.as_dvec3(), 2.0).as_vec3();
+        for position in [Vec3::splat(0.1), Vec3::new(0.9, 1.3, 0.4), Vec3::new(0.5, 2.0, 1.0)] {
+            let exact = wind.at(origin + position.as_dvec3(), 2.0).as_vec3();
             let found = bansho_base::dispatch_baseline!(simd => {
-                let velocity = wind_field.at(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
+                let velocity = wind_field.at(simd, &position.to_array().map(|x| Lanes::splat(simd, x)));
                 Vec3::from(velocity.map(|values| values.as_slice()[11]))
             });
             assert!((found - exact).length() < 0.1, "{found} {exact}");
