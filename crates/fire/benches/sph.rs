@@ -69,7 +69,7 @@ impl<const D: usize> Simulation<D> {
         self.particles.sort(&mut self.cells);
     }
 
-    fn compute_densities(&mut self) {
+    fn densities(&mut self) {
         compute_densities(&self.cells, KernelShape::Poly6, &self.particles.masses, &mut self.densities);
     }
 

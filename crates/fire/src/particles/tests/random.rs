@@ -50,7 +50,7 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
         assert!(values.iter().all(|value| value.is_finite()), "seed {seed}: not a number");
     }
     let unique_ids = particles.ids().iter().collect::<std::collections::BTreeSet<_>>().len();
-    assert_eq!(spawner, particles.len(), "seed {seed}: one birth, two particles");
+    assert_eq!(unique_ids, particles.len(), "seed {seed}: one birth, two particles");
     let [low, high] = constants.domain.map(|corner| corner.as_vec3());
     // Gas is never colder than air, itself at birth or the inside of its flame, nor hotter than itself at birth or its flame.
     let born = constants.burners.iter().map(|burner| burner.parameters.temperature_k);

@@ -90,7 +90,7 @@ impl<'a> BatchUpdate<CombustionInputs<'a>, 9> for CombustionStep<'_> {
         let burn_rate_at_speed = rows.load(simd, inputs.burn_rate) * self.burn_rate_at_speed(burner, length(&velocity));
         let state = self.combustion.advance(
             old,
-            &self.exposure(air_exposure, mixing, burn_rate_at_speed, old.temperature),
+            &self.ambient_conditions(air_exposure, mixing, burn_rate_at_speed, old.temperature),
             self.seconds,
         );
         let [age, removal_age] = rows.load_all(simd, [inputs.age, max_age]);
@@ -153,11 +153,11 @@ impl CombustionStep<'_> {
     }
 
     #[inline(always)]
-    fn exposure<R: Real>(
+    fn ambient_conditions<R: Real>(
         &self,
         air_exposure: R,
         mixing: R,
-        burn_rate_at_speed: R,
+        burning: R,
         temperature: R,
     ) -> AmbientConditions<R> {
         let density =
