@@ -10,10 +10,10 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{
-    batch::BATCH,
     neighbor_groups::GroupBatch,
     sorting::{Cell, MIN_PARTICLES_PER_TASK, SampleSort},
 };
+use crate::neighbor_groups::BATCH;
 
 /// Cells further than this from the origin, in support radii, are taken together; so a key of three axes fits 64 bits.
 const MAX_CELL_COORDINATE: i32 = 1 << 18;

@@ -12,10 +12,10 @@ use bansho_base::{
 };
 
 use super::{
-    batch::{BATCH, length_squared, load, splat_all, subtract, truncate_all, values_at},
     cells::Cells,
     neighbor_groups::{Group, GroupBatch},
 };
+use crate::neighbor_groups::{BATCH, length_squared, load, splat_all, subtract, truncate_all, values_at};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
