@@ -3,8 +3,7 @@
 //! S. Inagaki, M. Imura, S. Ikeda, Y. Manabe and K. Chihara, "Real-time rendering of flame using particle-based fluid simulation".
 
 mod fault;
-pub(crate) mod look_parameters;
-pub(crate) mod paper;
+pub(crate) mod paper_squares;
 mod parameters;
 mod phenomenon;
 pub mod render;

@@ -21,9 +21,8 @@ use super::{
     parameters::{FlameParticlesParameters, TemperatureLaw},
     render::{self, FadeOut, Gas, PreparedGas, ScratchPool, SpriteStyle},
 };
-use crate::particles::simulate::{
-    burner::Burner, derived::DerivedConstants, particles::Particles, simulation::Simulation, snapshot,
-};
+use crate::particles::simulate::Simulation;
+use crate::particles::simulate::{burner::Burner, derived::DerivedConstants, particles::Particles, snapshot};
 
 /// A particle flame at some moment of its life.
 #[derive(Clone, Debug)]

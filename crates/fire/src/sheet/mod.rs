@@ -28,9 +28,9 @@ use bansho_base::{
 
 use animate::{clock::Clock, warp::FlameWaves};
 use render::{
-    flame::{FlameInstance, TextureSource},
-    ramp::ColorRamp,
-    shape_tables::{ShapeTables, instance_key},
+    color_ramp::ColorRamp,
+    curve_tables::{ShapeTables, instance_key},
+    flame_instance::{FlameInstance, TextureSource},
 };
 use texture::{FractalLayers, PaperLayer};
 

@@ -16,7 +16,7 @@ use bansho_base::{
 
 pub(crate) use streak::Streak;
 
-const SHARE: Range = Range::new(0.0, 1.0);
+const FRACTION: Range = Range::new(0.0, 1.0);
 
 bansho_base::parameters! {
     /// Glowing sparks that the fire throws up.
@@ -26,7 +26,7 @@ bansho_base::parameters! {
         /// Speed at which they rise at first.
         speed: f64 = 2.2, limits(Range::new(0.0, 100.0)), unit("m/s");
         /// How much that differs between them, as a share.
-        spread: f64 = 0.5, limits(SHARE);
+        spread: f64 = 0.5, limits(FRACTION);
         /// How far they swirl sideways.
         swirl: f64 = 0.12, limits(Range::new(0.0, 100.0)), unit("m");
         /// How long they glow.

@@ -6,19 +6,19 @@ use bansho_base::{
 };
 
 use super::gas::Gas;
+use crate::particles::render::{
+    project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+    resolve::spline,
+    splat::{
+        grid::{Grid, weighted_sum},
+        kernel::Profile,
+    },
+};
 use crate::particles::{
-    look_parameters::LookParameters,
+    parameters::LookParameters,
     render::{
-        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-        resolve::{
-            resolve_gas::{ColumnExtents, DepthLayer, GasResolver, RowBuffer},
-            spline,
-        },
-        splat::{
-            accumulate::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
-            grid::{Grid, weighted_sum},
-            kernel::Profile,
-        },
+        resolve::{ColumnExtents, DepthLayer, GasResolver, RowBuffer},
+        splat::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
     },
 };
 

@@ -5,20 +5,21 @@ use bansho_base::{
     phenomenon::strip::{Strip, View},
 };
 
-use super::{aovs::DEFLECTION, gas::Gas, gas_statistics::is_visible};
+use super::{aovs::DEFLECTION, gas::Gas};
+use crate::particles::render::depth_layers::is_visible;
+use crate::particles::render::{
+    project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+    resolve::spline,
+    splat::{
+        grid::{Grid, weighted_sum},
+        kernel::Profile,
+    },
+};
 use crate::particles::{
-    look_parameters::LookParameters,
+    parameters::LookParameters,
     render::{
-        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-        resolve::{
-            resolve_gas::{PATH, PLANES},
-            spline,
-        },
-        splat::{
-            accumulate::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
-            grid::{Grid, weighted_sum},
-            kernel::Profile,
-        },
+        resolve::{PATH, PLANES},
+        splat::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
     },
 };
 use fearless_simd::{Level, dispatch};

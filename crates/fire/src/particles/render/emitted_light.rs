@@ -9,7 +9,7 @@ use bansho_base::{
 };
 
 use super::{gas::Gas, prepared::PARTICLES_PER_TASK};
-use crate::particles::look_parameters::LookParameters;
+use crate::particles::parameters::LookParameters;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 

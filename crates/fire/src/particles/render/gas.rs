@@ -5,7 +5,8 @@ use bansho_base::{
     math::{self, DVec2, DVec3, Vec3, random::Key},
 };
 
-use crate::particles::{Particles, look_parameters::LookParameters, render::splat::buffers::ScratchPool};
+use crate::particles::Particles;
+use crate::particles::{parameters::LookParameters, render::splat::scratch_pool::ScratchPool};
 
 /// The gas of one flame at one moment, with what the drawing needs to know of its surroundings.
 #[derive(Clone, Copy, Debug)]

@@ -10,20 +10,19 @@ mod deflection;
 mod depth_layers;
 mod emitted_light;
 pub(crate) mod gas;
-mod gas_statistics;
 mod prepared;
 pub(crate) mod project;
 pub(crate) mod resolve;
 pub(crate) mod splat;
 
-pub use super::look_parameters::{GasLightParameters, LookParameters, SpriteStyle};
+pub use crate::particles::parameters::{GasLightParameters, LookParameters, SpriteStyle};
 pub use aovs::AOVS;
 pub use emitted_light::point_lights_of_gas;
 pub use gas::{FadeOut, Gas, soot_absorption};
 pub use prepared::{PreparedGas, depth_intervals};
 pub use splat::{
-    buffers::ScratchPool,
     kernel::{line_gradient, line_integral},
+    scratch_pool::ScratchPool,
 };
 
 #[cfg(test)]

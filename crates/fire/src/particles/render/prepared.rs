@@ -21,31 +21,24 @@ use super::{
     deflection::{self, HeatHaze},
     depth_layers::DepthLayers,
     gas::Gas,
-    gas_statistics::{GasStatistics, is_visible},
+};
+use crate::particles::render::depth_layers::{GasStatistics, is_visible};
+use crate::particles::{
+    paper_squares::Squares,
+    parameters::{LookParameters, SpriteStyle},
+    render::{
+        resolve::{
+            BLUE, ColumnExtents, DETAIL_OFFSET, DepthLayer, GasResolver, LUMINANCE, LUMINANCE_KELVIN, PATH, PLANES, TAU,
+        },
+        splat::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, splat},
+    },
 };
 use crate::{
-    blue_flame,
-    particles::{
-        look_parameters::{LookParameters, SpriteStyle},
-        paper::squares::Squares,
-        render::{
-            project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-            resolve::{
-                detail::Detail,
-                resolve_gas::{
-                    BLUE, ColumnExtents, DETAIL_OFFSET, DepthLayer, GasResolver, LUMINANCE, LUMINANCE_KELVIN, PATH,
-                    PLANES, TAU,
-                },
-                spline,
-                strain::Strain,
-                upsample::RowInterpolator,
-            },
-            splat::{
-                accumulate::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, splat},
-                grid::Grid,
-                kernel::Profile,
-            },
-        },
+    chemiluminescence_color,
+    particles::render::{
+        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+        resolve::{detail::Detail, spline, strain::Strain, upsample::RowInterpolator},
+        splat::{grid::Grid, kernel::Profile},
     },
     sparks::{SparkEmitter, Streak},
 };
@@ -163,7 +156,7 @@ impl<'a> PreparedGas<'a> {
             origin: self.gas.particles.origin,
             detail: splatted.detail.as_ref().map(|(detail, strain)| (detail, strain)),
             hides_itself: self.look.sprite == SpriteStyle::Integral,
-            blue: blue_flame::colour(),
+            blue: chemiluminescence_color(),
             scattered: &splatted.scattered,
             weights: &splatted.weights,
             across: &splatted.across,

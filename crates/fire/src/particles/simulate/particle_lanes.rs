@@ -1,13 +1,10 @@
 //! Particles sixteen at a time, all of one burner: rows of a task's arrays.
 
-use std::ops::Range;
-
+use crate::particles::simulate::forces::external_forces::BurnerForces;
+use bansho_base::math::simd::{LANES, Lanes, Real};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
-
-use bansho_base::math::simd::{LANES, Lanes};
-
-use crate::particles::simulate::forces::burner_forces::BurnerForces;
+use std::ops::Range;
 
 /// Particles of a task.
 pub(crate) const PARTICLES_PER_TASK: usize = 512;
@@ -150,6 +147,51 @@ impl RowBatch<'_> {
     }
 }
 
+/// Product of two vectors.
+#[inline(always)]
+pub(crate) fn dot<R: Real>(one: &[R; 3], other: &[R; 3]) -> R {
+    one[0].fma(other[0], one[1].fma(other[1], one[2] * other[2]))
+}
+
+/// Length.
+#[inline(always)]
+pub(crate) fn length<R: Real>(vector: &[R; 3]) -> R {
+    dot(vector, vector).simd_sqrt()
+}
+
+/// Difference of two vectors.
+#[inline(always)]
+pub(crate) fn subtract<R: Real>(one: &[R; 3], other: &[R; 3]) -> [R; 3] {
+    let mut difference = *one;
+    for c in 0..3 {
+        difference[c] = one[c] - other[c];
+    }
+    difference
+}
+
+/// `one + other * factor`.
+#[inline(always)]
+pub(crate) fn add_scaled<R: Real>(one: &[R; 3], other: &[R; 3], factor: R) -> [R; 3] {
+    let mut sum = *one;
+    for c in 0..3 {
+        sum[c] = other[c].fma(factor, one[c]);
+    }
+    sum
+}
+
+/// The vector, or where it is longer than `max_length` one of that length.
+#[inline(always)]
+pub(crate) fn clamp_length<R: Real>(vector: &[R; 3], max_length: f32) -> [R; 3] {
+    let splat = |value: f32| vector[0].broadcast(value);
+    let squared = dot(vector, vector).simd_max(splat(f32::MIN_POSITIVE));
+    let scale = (squared.simd_rsqrt() * splat(max_length)).simd_min(splat(1.0));
+    let mut clamped = *vector;
+    for c in 0..3 {
+        clamped[c] = vector[c] * scale;
+    }
+    clamped
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -172,5 +214,13 @@ mod tests {
             }
         }
         assert!((0..100).all(|row| seen[row] == 2.0 * values[row]), "{seen:?}");
+    }
+
+    #[test]
+    fn long_vectors_are_shortened_and_others_stay() {
+        assert_eq!(clamp_length(&[1.0, -2.0, 2.0], 3.1), [1.0, -2.0, 2.0]);
+        assert_eq!(clamp_length(&[0.0; 3], 1.0), [0.0; 3]);
+        let clamped = clamp_length(&[10.0, -20.0, 20.0], 3.0);
+        assert!((length(&clamped) - 3.0).abs() < 1e-5 && (clamped[1] + 2.0).abs() < 1e-5, "{clamped:?}");
     }
 }

@@ -7,11 +7,9 @@ use bansho_base::{
     phenomenon::strip::{Strip, View},
 };
 
-use super::{
-    flame::FlameInstance,
-    shade::{SheetContent, TimeSample, shade_sample},
-};
+use super::shade::{SheetContent, TimeSample, shade_sample};
 use crate::sheet::FlameSheet;
+use crate::sheet::render::flame_instance::FlameInstance;
 use fearless_simd::Simd;
 
 /// Places of the planes among a strip's AOVs.

@@ -12,10 +12,10 @@ use bansho_base::{
     phenomenon::strip::Strip,
 };
 
-use super::{
-    ramp::ColorRamp,
-    shade::{ShadedBatch, SheetContent, TimeSample, coordinates, shade_coordinates, shade_sample},
-    shape_tables::{FlameCoordinates, ShapeTables},
+use super::shade::{ShadedBatch, SheetContent, TimeSample, coordinates, shade_coordinates, shade_sample};
+use crate::sheet::render::{
+    color_ramp::ColorRamp,
+    curve_tables::{FlameCoordinates, ShapeTables},
 };
 use fearless_simd::{Simd, prelude::*};
 

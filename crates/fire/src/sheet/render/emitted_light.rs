@@ -12,10 +12,10 @@ use bansho_base::{
 };
 
 use super::{
-    flame::FlameInstance,
     projection::SheetCoordinates,
     shade::{SheetState, shade},
 };
+use crate::sheet::render::flame_instance::FlameInstance;
 use crate::sheet::{
     FlameSheet,
     animate::warp::{WarpState, WindLean},

@@ -14,9 +14,9 @@ use bansho_base::{
 use super::{
     aovs::{AovContext, write_aov_rows},
     draw::{DrawContext, MAX_MINIFICATION, draw_rows, row_band_height},
-    flame::{FlameInstance, pixels_per_metre},
     shade::{SheetContent, TimeSample},
 };
+use crate::sheet::render::flame_instance::{FlameInstance, pixels_per_metre};
 use crate::{
     sheet::{FlameSheet, parameters::Stage},
     sparks::{SparkEmitter, Streak},

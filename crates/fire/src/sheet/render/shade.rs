@@ -7,9 +7,11 @@ use bansho_base::{
 
 use super::{
     projection::{PixelToSheet, SheetCoordinates},
-    ramp::ColorRamp,
-    shape_tables::{FlameCoordinates, ShapeTables},
     smoke::{SmokeState, shade_smoke},
+};
+use crate::sheet::render::{
+    color_ramp::ColorRamp,
+    curve_tables::{FlameCoordinates, ShapeTables},
 };
 use crate::sheet::{animate::warp::WarpState, equations, texture::Texture};
 

@@ -10,10 +10,10 @@ use bansho_base::{
 };
 
 use super::{
-    flame::{FilteredTexture, FlameInstance, pixels_per_metre},
     projection::{PixelToSheet, SheetCoordinates, bounds},
     shade::{ShadedBatch, SheetState, TimeSample},
 };
+use crate::sheet::render::flame_instance::{FilteredTexture, FlameInstance, pixels_per_metre};
 use crate::sheet::{
     FlameSheet,
     animate::warp::{FlameWaves, WarpState, WindLean},

@@ -7,13 +7,11 @@ use bansho_base::{
 };
 
 use super::perspective::PerspectiveProjector;
+use crate::particles::render::splat::scratch_pool::PooledVec;
 use crate::particles::render::{
     gas::Gas,
     prepared::PARTICLES_PER_TASK,
-    splat::{
-        buffers::PooledVec,
-        kernel::{LINE_PEAK, VARIANCE},
-    },
+    splat::kernel::{LINE_PEAK, VARIANCE},
 };
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -220,10 +218,8 @@ mod tests {
     };
 
     use super::*;
-    use crate::particles::{
-        Particle, Particles,
-        render::{gas::FadeOut, splat::buffers::ScratchPool},
-    };
+    use crate::particles::render::splat::scratch_pool::ScratchPool;
+    use crate::particles::{Particle, Particles, render::gas::FadeOut};
 
     struct Everything;
 

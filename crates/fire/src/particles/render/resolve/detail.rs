@@ -10,7 +10,8 @@ use bansho_base::{
     noise::{Coordinate, Fractal, LANES, Noise, VARIANCE},
 };
 
-use crate::particles::{look_parameters::LookParameters, render::gas::Gas};
+use crate::particles::parameters::LookParameters;
+use crate::particles::render::gas::Gas;
 
 /// A sigmoid of slope 1 is the distribution of noise of this standard deviation: pi / sqrt(3).
 const LOGISTIC: f32 = 1.813_799_4;

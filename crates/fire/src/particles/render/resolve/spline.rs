@@ -70,7 +70,7 @@ mod tests {
     use bansho_base::{image::Rect, math};
 
     use super::*;
-    use crate::particles::render::splat::buffers::ScratchPool;
+    use crate::particles::render::splat::scratch_pool::ScratchPool;
 
     /// How far values and slopes are off those of a wave of `length` cells, at pixels of every phase, beside their most.
     fn worst(length: f64) -> [f64; 2] {

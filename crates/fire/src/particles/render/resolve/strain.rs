@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use bansho_base::math::simd::LANES;
 
-use super::resolve_gas::{ColumnExtents, DETAIL_OFFSET, PLANES, TAU};
+use crate::particles::render::resolve::{ColumnExtents, DETAIL_OFFSET, PLANES, TAU};
 use crate::particles::render::splat::grid::Grid;
 
 /// How many times more finely than it was made detail may lie before it begins to fade, and when it is gone.

@@ -1,22 +1,29 @@
 //! All that acts on the gas from outside in a step: wind, eddies, vortex rings, the draw toward the axis.
 
-use bansho_base::{
-    math::{DVec3, Vec3, random::Key},
-    phenomenon::surroundings::{Occluder, Surroundings},
-    world::{air::Air, gravity::STANDARD_GRAVITY},
-};
-
 use super::{
-    burner_forces::BurnerForces,
     entrainment_axis::{PlumeAxis, plume_axes},
     turbulence::{EddyField, TurbulenceTile},
     vortex_rings::{VortexRing, active_rings},
-    wind::WindField,
+    wind_field::WindField,
 };
 use crate::particles::{
     parameters::{FlameParticlesParameters, WindForce},
-    simulate::{derived::DerivedConstants, particles::Particles},
+    simulate::{
+        derived::DerivedConstants,
+        particle_lanes::{add_scaled, length, subtract},
+        particles::Particles,
+    },
 };
+use bansho_base::{
+    math::{
+        DVec3, Vec3,
+        random::Key,
+        simd::{Lanes, Real},
+    },
+    phenomenon::surroundings::{Occluder, Surroundings},
+    world::{air::Air, gravity::STANDARD_GRAVITY},
+};
+use fearless_simd::{Simd, prelude::*};
 use rayon::prelude::*;
 
 /// Where turbulence has grown to half its strength, as a share of the time that gas takes to the tip.
@@ -158,8 +165,65 @@ fn bounds(particles: &Particles, burners: usize) -> Vec<[Vec3; 2]> {
     bounds.into_iter().map(|bounds| if bounds[0].x <= bounds[1].x { bounds } else { [Vec3::ZERO, Vec3::ONE] }).collect()
 }
 
+/// What acts on the gas of one burner.
+pub(crate) struct BurnerForces<'a> {
+    /// The wind over it.
+    pub(crate) wind_field: WindField,
+    pub(crate) rings: Vec<VortexRing>,
+    pub(crate) axis: PlumeAxis,
+    pub(crate) eddies: EddyField<'a>,
+    pub(crate) turbulence: f32,
+    /// Age at which turbulence has grown to half its strength, s.
+    pub(crate) turbulent_age: f32,
+    /// Entrainment coefficient over the radius of the fire, 1/m.
+    pub(crate) entrainment: f32,
+    /// Coefficient of the drag of air that blows across, over the radius of the fire, 1/m.
+    pub(crate) drag: f32,
+    /// Share of its fuel that gas burns in a metre of its way, and in a second.
+    pub(crate) burning: [f32; 2],
+}
+
+/// The air's motion at the places of particles, m/s.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AirVelocity<R> {
+    /// That of rings and of the draw toward the axis.
+    pub(crate) steady: [R; 3],
+    /// That of eddies of unit strength.
+    pub(crate) eddies: [R; 3],
+}
+
+impl BurnerForces<'_> {
+    /// Share of its own mass that gas of such a velocity takes up from the air, 1/s.
+    #[inline(always)]
+    pub(crate) fn mixing<R: Real>(&self, velocity: &[R; 3], wind: &[R; 3], air_exposure: R) -> R {
+        let splat = |value: f32| air_exposure.broadcast(value);
+        length(&subtract(velocity, wind)) * air_exposure.fma(splat(self.entrainment), splat(0.5 * self.entrainment))
+    }
+
+    /// Velocity with which the air carries gas of `speed` and `age`, m/s.
+    #[inline(always)]
+    pub(crate) fn velocity<R: Real>(&self, flow: &AirVelocity<R>, speed: R, age: R) -> [R; 3] {
+        let grown = age / (age + age.broadcast(self.turbulent_age));
+        add_scaled(&flow.steady, &flow.eddies, speed * grown * age.broadcast(self.turbulence))
+    }
+
+    /// The motion at sixteen places.
+    #[inline(always)]
+    pub(crate) fn flow<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> AirVelocity<Lanes<S>> {
+        let mut steady = self.axis.velocity(simd, position);
+        for ring in &self.rings {
+            ring.add_velocity(position, &mut steady);
+        }
+        let none = [Lanes::splat(simd, 0.0); 3];
+        let eddies = if self.turbulence > 0.0 { self.eddies.velocity(simd, position) } else { none };
+        AirVelocity { steady, eddies }
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::*;
+    use crate::particles::{parameters::BurnerParameters, simulate::Simulation};
     use bansho_base::{
         host::assets::MemoryAssets,
         math::{random::Key, simd::Lanes},
@@ -168,11 +232,6 @@ mod tests {
             wind::{Wind, WindParameters},
         },
     };
-
-    use super::*;
-    use crate::particles::{parameters::BurnerParameters, simulate::simulation::Simulation};
-
-    use fearless_simd::prelude::*;
 
     #[test]
     fn each_burner_feels_the_wind_that_blows_where_it_stands() {

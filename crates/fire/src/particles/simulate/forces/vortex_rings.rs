@@ -13,10 +13,8 @@ use bansho_base::math::{
 };
 
 use super::entrainment_axis::PlumeAxis;
-use crate::particles::{
-    parameters::FlameParticlesParameters,
-    simulate::{burner::Burner, vector_lanes::dot},
-};
+use crate::particles::simulate::particle_lanes::dot;
+use crate::particles::{parameters::FlameParticlesParameters, simulate::burner::Burner};
 
 use fearless_simd::Simd;
 

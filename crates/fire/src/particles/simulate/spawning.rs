@@ -1,16 +1,15 @@
 //! New particles, section 4.3 (1): each a pure function of its birth number.
 
+use crate::particles::simulate::{
+    burner::{Burner, SpawnPoint},
+    derived::DerivedConstants,
+    forces::turbulence::TurbulenceTile,
+    particles::{Particle, Particles},
+};
 use bansho_base::math::{
     self, DVec3,
     random::{Key, Purpose, uniform},
 };
-
-use super::{
-    burner::{Burner, SpawnPoint},
-    derived::DerivedConstants,
-    particles::{Particle, Particles},
-};
-use crate::particles::simulate::forces::turbulence::TurbulenceTile;
 
 /// Bits of a birth number that count the births of one burner; those above are the burner's own number.
 const ORDINAL_BITS: u32 = 40;

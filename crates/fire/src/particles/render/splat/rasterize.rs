@@ -2,15 +2,9 @@
 //!
 //! Places are those of the whole picture's cells, so that they are rounded alike whatever part of it is drawn.
 
-use std::ops::Range;
-
+use crate::particles::render::splat::{SplatSettings, Sprite, grid::Raster, kernel::Profile};
 use bansho_base::math::approximations;
-
-use super::{
-    accumulate::{SplatSettings, Sprite},
-    grid::Raster,
-    kernel::Profile,
-};
+use std::ops::Range;
 
 /// The weights of eight cells are found at a time: about a row of a sprite,
 pub(crate) const COLUMNS: usize = 8;

@@ -1,7 +1,15 @@
 //! One flame of a sheet: its waves, its texture, where it stands and what it shows a view.
 
-use std::sync::Arc;
-
+use crate::sheet::{
+    FlameSheet,
+    animate::warp::{FlameWaves, WarpState, WindLean},
+    parameters::{Facing, Instance, Stage},
+    render::{
+        projection::{PixelToSheet, bounds},
+        shade::{SheetContent, SheetState, TimeSample},
+    },
+    texture::{FRACTAL, FractalLayers, PaperLayer, Texture, TextureTable},
+};
 use bansho_base::{
     camera::{
         Camera,
@@ -13,17 +21,7 @@ use bansho_base::{
     phenomenon::strip::{Shutter, View},
     world::wind::Wind,
 };
-
-use super::{
-    projection::{PixelToSheet, bounds},
-    shade::{SheetContent, SheetState, TimeSample},
-};
-use crate::sheet::{
-    FlameSheet,
-    animate::warp::{FlameWaves, WarpState, WindLean},
-    parameters::{Facing, Instance, Stage},
-    texture::{FRACTAL, FractalLayers, PaperLayer, Texture, TextureTable},
-};
+use std::sync::Arc;
 
 /// Where a flame's texture comes from.
 #[derive(Clone, Debug)]

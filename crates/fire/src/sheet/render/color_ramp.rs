@@ -1,17 +1,20 @@
 //! From the texture above the threshold to light: sharpening, eq. (6), and colour, eq. (7), in one table.
 
+use crate::{
+    chemiluminescence_color,
+    sheet::{
+        parameters::{ColorParameters, Coloring, Stage, TextureParameters},
+        render::curve_tables::{CurvePair, from_origin},
+    },
+};
 use bansho_base::{
-    color, math,
-    math::simd::{Lanes, Real, fetch, nearest_whole},
+    color,
+    math::{
+        self,
+        simd::{Lanes, Real, fetch, nearest_whole},
+    },
     parameters::parameter_fault::ParameterFault,
 };
-
-use super::{curve_tables::CurvePair, shape_tables::from_origin};
-use crate::{
-    blue_flame,
-    sheet::parameters::{ColorParameters, Coloring, Stage, TextureParameters},
-};
-
 use fearless_simd::Simd;
 
 /// Steps of T1; finer than a display can show, so that the nearest serves.
@@ -94,7 +97,7 @@ impl ColorRamp {
             light: levels(light),
             temperature: CurvePair::new(|t1| [temperature(color, sharpen.eval(t1)), 0.0]),
             absorbs: color.soot_optical_depth > 0.0 || stage != Stage::Flame,
-            base_blue: blue_flame::colour().map(|value| value * color.base_blue as f32),
+            base_blue: chemiluminescence_color().map(|value| value * color.base_blue as f32),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The wind over the gas: the scene's wind on a coarse grid, since gusts are larger than flames.
 
+use crate::particles::simulate::forces::turbulence::lerp4;
 use bansho_base::{
     math::{
         DVec3, Vec3,
@@ -7,8 +8,6 @@ use bansho_base::{
     },
     world::wind::Wind,
 };
-
-use super::turbulence::lerp4;
 use fearless_simd::{Simd, prelude::*};
 
 /// Grid points along each side of the box around the gas.
@@ -74,9 +73,8 @@ impl WindField {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::{parameters::animated::Animated, world::wind::WindParameters};
-
     use super::*;
+    use bansho_base::{parameters::animated::Animated, world::wind::WindParameters};
 
     #[test]
     fn it_is_the_wind_itself_within_a_few_percent() {

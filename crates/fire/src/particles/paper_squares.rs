@@ -1,18 +1,17 @@
 //! The paper's figure 7: every particle a square, the redder the denser the gas around it.
 
+use crate::particles::{
+    parameters::LookParameters,
+    render::{
+        gas::Gas,
+        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+    },
+};
 use bansho_base::{
     color,
     image::Rect,
     math,
     phenomenon::strip::{DepthInterval, Strip, View},
-};
-
-use crate::particles::{
-    look_parameters::LookParameters,
-    render::{
-        gas::Gas,
-        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-    },
 };
 
 /// Luminance of a square, cd/m^2: as bright as the flame, so that one exposure serves both pictures.
