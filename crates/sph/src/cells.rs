@@ -1,8 +1,8 @@
-//! Particles sorted into cells, of which only those that hold some exist.
+//! Cell list: particles sorted by cell, storing occupied cells only.
 //!
-//! There is no grid: cells are a sorted list, so memory grows with the particles alone, however far they spread. A cell is as wide as the
-//! support radius, and a quarter as long along x. Cells follow each other along x, so that all in a row that are near are one run of
-//! particles, and the neighbours of a cell are 3 runs in the plane and 9 in space.
+//! There is no dense grid. Occupied cells are a sorted list, so memory is proportional to the number of particles, however far they
+//! spread. A cell is one support radius wide, and a quarter of that along x. Cells are ordered along x, so the near cells of one
+//! row hold one contiguous range of particles: 3 ranges in 2-D, 9 in 3-D.
 
 use std::ops::Range;
 
@@ -15,41 +15,41 @@ use super::{
 };
 use crate::neighbor_groups::BATCH;
 
-/// Cells further than this from the origin, in support radii, are taken together; so a key of three axes fits 64 bits.
+/// Cell coordinates are clamped to this distance from the origin, in support radii, so that a key of three axes fits 64 bits.
 const MAX_CELL_COORDINATE: i32 = 1 << 18;
-/// Cells are this much larger than the support radius asks, so that rounding never puts two neighbours further apart.
+/// Cells are larger than the support radius by this factor, so that rounding never separates two neighbors by more than one cell.
 const CELL_SIZE_MARGIN: f32 = 1.001;
-/// Cells along x in a support radius: short ones keep the groups of a row short.
+/// Cells along x per support radius. Short cells keep the candidate ranges of a row short.
 const CELLS_PER_RADIUS_X: i32 = 4;
-/// A group ends where it would be longer than this, in cells along x: what lies between would all be its candidates.
+/// Greatest length of a group, in cells along x: all particles within that length become candidates of the group.
 const MAX_GROUP_LENGTH: u64 = 8 * CELLS_PER_RADIUS_X as u64;
-/// Where particles are put that are farther away or nowhere; squares of such distances are still finite.
+/// Particles farther away than this, or at NaN, are placed here. The square of such a distance is still finite.
 pub(super) const OUT_OF_RANGE: f32 = 1e12;
-/// Cells looked at together when a search moves on: how far it goes is hard to foresee, for the processor too.
+/// Cells compared per iteration of a search, without branches: the length of a search is hard to predict.
 const SEARCH_WIDTH: usize = 4;
 
-/// Particles in cells by one support radius; the order they were given in does not matter.
+/// Particles sorted into cells of one support radius. The result does not depend on the order in which particles are given.
 #[derive(Clone, Debug)]
 pub struct Cells<const D: usize> {
     support_radius: f32,
     keys: Keys<D>,
-    /// For each particle in sorted order the index it was given at.
+    /// For each particle in sorted order, the index at which it was given.
     order: Vec<u32>,
     ids: Vec<u64>,
-    /// Positions in sorted order, and a batch that is nowhere.
+    /// Positions in sorted order, padded with one batch that is out of range.
     positions: [Vec<f32>; D],
-    /// The cells that hold particles; the last [`SEARCH_WIDTH`] are sentinels behind all.
+    /// Occupied cells; the last [`SEARCH_WIDTH`] are sentinels with the greatest key.
     occupied: Vec<Cell>,
     row_chunks: Vec<RowChunk>,
     batches: Vec<GroupBatch>,
-    /// Cells along each axis.
+    /// Cell coordinate of each particle, one array per axis.
     coordinates: [Vec<i32>; D],
     sorting: SampleSort,
-    /// Arrays that take the place of those brought into order, one a thread.
+    /// Scratch arrays that are swapped with those being reordered, one per thread.
     scratch: Vec<Vec<f32>>,
 }
 
-/// Up to [`BATCH`] particles that follow each other in a row, and the keys of the first and the last one's cell.
+/// Up to [`BATCH`] consecutive particles of a row of cells, with the keys of the first and last cell.
 #[derive(Clone, Debug)]
 pub(super) struct RowChunk {
     pub(super) particles: Range<u32>,
@@ -57,7 +57,7 @@ pub(super) struct RowChunk {
     last: u64,
 }
 
-/// How coordinates of cells become keys that sort by the last axis first and by x last.
+/// Packs cell coordinates into 64-bit keys, x in the lowest bits.
 #[derive(Clone, Copy, Debug)]
 struct Keys<const D: usize> {
     lower: [i32; D],
@@ -66,7 +66,7 @@ struct Keys<const D: usize> {
 }
 
 impl<const D: usize> Keys<D> {
-    /// For cells from `lower` to `upper` and a support radius more on each side.
+    /// For cells from `lower` to `upper`, with a margin of one support radius on each side.
     fn new(mut lower: [i32; D], upper: [i32; D]) -> Self {
         let mut shift = [0; D];
         let mut bits = 0;
@@ -87,12 +87,12 @@ impl<const D: usize> Keys<D> {
         key
     }
 
-    /// The row of a cell: what its key says but for x.
+    /// The row of a cell: its key without the bits of x.
     fn row(&self, key: u64) -> u64 {
         key >> self.shift[1]
     }
 
-    /// What the key of the same x in each neighbouring row adds, wrapping.
+    /// Key offsets to the cell of the same x in each neighboring row; wrapping.
     fn rows(&self) -> impl Iterator<Item = u64> {
         let shift = self.shift;
         (0..3_usize.pow(D as u32 - 1)).map(move |row| {
@@ -105,7 +105,7 @@ impl<const D: usize> Keys<D> {
 }
 
 impl<const D: usize> Cells<D> {
-    /// Cells for a support radius, in the unit of positions, finite and above 0.
+    /// Cells for a support radius, finite and above 0, in the unit of positions.
     #[must_use]
     pub fn new(support_radius: f32) -> Self {
         const { assert!(D == 2 || D == 3, "particles live in two or three dimensions") };
@@ -128,13 +128,13 @@ impl<const D: usize> Cells<D> {
         }
     }
 
-    /// The distance from which on particles do not see each other.
+    /// The support radius: particles at this distance or farther do not interact.
     #[must_use]
     pub fn support_radius(&self) -> f32 {
         self.support_radius
     }
 
-    /// Changes that distance for the next [`Cells::assign`], finite and above 0; buffers are kept.
+    /// Sets the support radius for the next [`Cells::assign`], finite and above 0. Buffers are kept.
     pub fn set_support_radius(&mut self, support_radius: f32) {
         self.support_radius = support_radius;
     }
@@ -151,10 +151,11 @@ impl<const D: usize> Cells<D> {
         self.order.is_empty()
     }
 
-    /// Sorts particles by cell, then by birth id, and remembers where they are. [`Cells::reorder`] and [`Cells::reorder_all`] then bring arrays into that order.
+    /// Sorts particles by cell, then by id, and finds the candidate neighbors of each group. [`Cells::reorder`] and
+    /// [`Cells::reorder_all`] then bring other arrays into that order.
     ///
     /// # Panics
-    /// If there are more than 2^27 of them, or positions and ids are not equally many.
+    /// If there are more than 2^27 particles, or `positions` and `ids` differ in length.
     pub fn assign(&mut self, positions: [&[f32]; D], ids: &[u64]) {
         assert!(ids.len() <= 1 << 27, "particles are counted in 32 bits");
         assert!(positions.iter().all(|component| component.len() == ids.len()), "one position an id");
@@ -187,7 +188,7 @@ impl<const D: usize> Cells<D> {
         self.batches = batches;
     }
 
-    /// Sorts by key, then by id, and lists the cells, of which the first and the last along each axis are given.
+    /// Sorts by key, then by id, and lists the occupied cells; `bounds` are the first and last cell along each axis.
     fn sort(&mut self, ids: &[u64], bounds: &[[i32; 2]; D]) {
         let Self { coordinates, sorting, order, occupied, .. } = self;
         let keys = Keys::new(bounds.map(|[first, _]| first), bounds.map(|[_, last]| last));
@@ -203,7 +204,7 @@ impl<const D: usize> Cells<D> {
         self.keys = keys;
     }
 
-    /// Parts every row of cells into particles for groups.
+    /// Splits every row of cells into chunks of up to [`BATCH`] particles.
     fn chunk_rows(&mut self) {
         self.row_chunks.clear();
         let mut row = u64::MAX;
@@ -229,16 +230,16 @@ impl<const D: usize> Cells<D> {
     /// Brings values, given in the order of [`Cells::assign`], into the sorted order.
     ///
     /// # Panics
-    /// If they are not one a particle.
+    /// If there is not one value per particle.
     pub fn reorder<T: Copy + Send + Sync>(&self, values: &mut Vec<T>) {
         assert_eq!(values.len(), self.order.len(), "one value a particle");
         *values = self.order.par_iter().with_min_len(MIN_PARTICLES_PER_TASK).map(|i| values[*i as usize]).collect();
     }
 
-    /// Does so with many arrays of numbers, without asking the system for memory again and again.
+    /// As [`Cells::reorder`] for many arrays of `f32`, with scratch memory that is reused.
     ///
     /// # Panics
-    /// If they are not one a particle.
+    /// If there is not one value per particle.
     pub fn reorder_all<'a>(&mut self, arrays: impl IntoIterator<Item = &'a mut Vec<f32>>) {
         let mut arrays: Vec<&mut Vec<f32>> = arrays.into_iter().collect();
         let threads = rayon::current_num_threads().clamp(1, arrays.len().max(1));
@@ -255,22 +256,22 @@ impl<const D: usize> Cells<D> {
         });
     }
 
-    /// Birth ids in sorted order.
+    /// Particle ids in sorted order.
     pub(super) fn ids(&self) -> &[u64] {
         &self.ids
     }
 
-    /// Positions in sorted order, one array a component, and a batch that is nowhere.
+    /// Positions in sorted order, one array per component, padded with one batch that is out of range.
     pub(super) fn positions(&self) -> [&[f32]; D] {
         self.positions.each_ref().map(Vec::as_slice)
     }
 
-    /// All groups of particles, in stretches.
+    /// All groups of particles, in batches of one task each.
     pub(super) fn batches(&self) -> &[GroupBatch] {
         &self.batches
     }
 
-    /// The runs of particles around parts of rows, from `first` on.
+    /// The ranges of neighbor candidates of row chunks, from `first` on.
     pub(super) fn neighbor_runs(&self, first: &RowChunk) -> NeighborRuns<'_> {
         let start = |row: u64| self.occupied.partition_point(|cell| cell.key < first.min_key(row));
         let rows: Vec<(u64, usize, usize)> = self.keys.rows().map(|row| (row, start(row), 0)).collect();
@@ -279,27 +280,28 @@ impl<const D: usize> Cells<D> {
 }
 
 impl RowChunk {
-    /// The least key that may be near in the row that is so far away.
+    /// Least key of cells within the support radius in the row at the key offset `row`.
     fn min_key(&self, row: u64) -> u64 {
         self.first.wrapping_add(row) - CELLS_PER_RADIUS_X as u64
     }
 
-    /// The greatest.
+    /// Greatest such key.
     fn max_key(&self, row: u64) -> u64 {
         self.last.wrapping_add(row) + CELLS_PER_RADIUS_X as u64
     }
 }
 
-/// The runs of particles that may be near parts of rows, one after the other.
+/// Ranges of particles that may lie within the support radius of row chunks, which are visited in ascending order.
 pub(super) struct NeighborRuns<'a> {
     occupied: &'a [Cell],
-    /// How far away each neighbouring row is, and which of its cells were near last: they move on with the parts, so all searching is one pass.
+    /// For each neighboring row its key offset, and the first and last cell that were near the previous chunk. Both only move
+    /// forward, so all searches together take one pass.
     rows: Vec<(u64, usize, usize)>,
     runs: Vec<Range<usize>>,
 }
 
 impl NeighborRuns<'_> {
-    /// The runs of those that may be near a part, which comes after those asked for before.
+    /// The candidate ranges of a chunk; chunks must be asked for in ascending order.
     pub(super) fn near(&mut self, chunk: &RowChunk) -> &[Range<usize>] {
         for (run, (row, start, end)) in self.runs.iter_mut().zip(&mut self.rows) {
             let (min_key, max_key) = (chunk.min_key(*row), chunk.max_key(*row));
@@ -324,7 +326,8 @@ fn first_cell_from(cells: &[Cell], mut start: usize, key: u64) -> usize {
     start
 }
 
-/// The cells of coordinates, `scale` cells a unit; gives the first and the last. No `floor`: where the processor lacks it that is a call.
+/// Cell coordinates of one component, `scale` cells per unit; returns the least and the greatest. `floor` is avoided: without
+/// SSE4.1 it is a function call.
 #[inline(always)]
 fn cell_coordinates(component: &[f32], scale: f32, max_coordinate: f32, cells: &mut Vec<i32>) -> [i32; 2] {
     cells.resize(component.len(), 0);

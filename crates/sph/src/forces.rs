@@ -9,7 +9,7 @@ use crate::{
 use bansho_base::math::simd::Real;
 use rayon::prelude::*;
 
-/// `m_j W(|x_i - x_j|)`.
+/// Term `m_j W(|x_i - x_j|)` of the density sum.
 struct DensityTerm<K>(K);
 
 impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 1, 1> for DensityTerm<K> {
@@ -24,7 +24,7 @@ impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 1, 1> for DensityTerm<K>
 /// Densities `rho_i = sum_j m_j W(|x_i - x_j|)`, the particle itself included: Inagaki et al. (3), the aurora thesis (2.11).
 ///
 /// # Panics
-/// If `masses` are not one a particle.
+/// If there is not one mass per particle.
 pub fn compute_densities<const D: usize>(
     cells: &Cells<D>,
     kernel: KernelShape,
@@ -34,17 +34,17 @@ pub fn compute_densities<const D: usize>(
     with_kernel!(kernel, cells.support_radius(), D, |kernel| cells.sum(&DensityTerm(kernel), [masses], [densities]))
 }
 
-/// How pressure follows from density: `p = k (rho - rho_0)`, Inagaki et al. (11), the aurora thesis (2.13).
+/// Equation of state `p = k (rho - rho_0)`: Inagaki et al. (11), the aurora thesis (2.13).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StateEquation {
     /// Rest density rho_0.
     pub rest_density: f32,
-    /// Whether gas thinner than at rest pulls together, as in the papers; if not, its pressure is 0.
+    /// Whether pressure is negative below the rest density, as in the papers. Otherwise it is clamped at 0.
     pub negative_pressure: bool,
 }
 
 impl StateEquation {
-    /// Pressure at a density; `stiffness` is k, which grows with temperature.
+    /// Pressure at a density. `stiffness` is k, which grows with temperature.
     #[must_use]
     #[inline]
     pub fn pressure(&self, stiffness: f32, density: f32) -> f32 {
@@ -53,7 +53,7 @@ impl StateEquation {
     }
 }
 
-/// `(p_i + p_j) m_j / rho_j` times the gradient of W: Inagaki et al. (12) with (8), but for a factor of i's own.
+/// Term `(p_i + p_j) m_j / rho_j grad W` of the pressure force: Inagaki et al. (12) with (8), without the factor `-1 / (2 rho_i)`.
 struct PressureTerm<K>(K);
 
 impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 2, D> for PressureTerm<K> {
@@ -68,17 +68,17 @@ impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 2, D> for PressureTerm<K
     }
 }
 
-/// Accelerations by pressure, from masses, densities and pressures in sorted order; buffers are kept from step to step.
+/// Computes accelerations by pressure from masses, densities and pressures in sorted order. Buffers are reused.
 #[derive(Clone, Debug)]
 pub struct PressureForce {
-    /// Kernel whose gradient pushes; one that is pointed at the centre keeps particles apart.
+    /// Kernel whose gradient gives the force. A kernel with a cusp at its center (spiky) keeps particles apart.
     pub kernel: KernelShape,
     /// `m / rho`.
     volume: Vec<f32>,
 }
 
 impl PressureForce {
-    /// The force by that kernel.
+    /// The pressure force with that kernel.
     #[must_use]
     pub fn new(kernel: KernelShape) -> Self {
         Self { kernel, volume: Vec::new() }
@@ -86,10 +86,10 @@ impl PressureForce {
 
     /// Accelerations `a_i = -sum_j m_j (p_i + p_j) / (2 rho_i rho_j) grad W`.
     ///
-    /// Each pair is computed from both sides with the same operations on the same numbers, so that momentum is kept to rounding.
+    /// Each pair is computed from both sides with the same operations on the same numbers, so momentum is conserved to rounding.
     ///
     /// # Panics
-    /// If there is not one mass, density and pressure a particle.
+    /// If there is not one mass, density and pressure per particle.
     pub fn compute_accelerations<const D: usize>(
         &mut self,
         cells: &Cells<D>,
@@ -121,31 +121,31 @@ impl PressureForce {
     }
 }
 
-/// Weights `w = m / sqrt(rho)`: for a pair they make the geometric mean of both densities.
+/// XSPH weights `w = m / sqrt(rho)` (Monaghan 1989, with the geometric in place of the arithmetic mean of both densities).
 ///
-/// Adding a share of `1 / sqrt(rho_i)` of `sum_j w_j (f_j - f_i) W` to each `f_i` keeps `sum m f` (XSPH, Monaghan 1989, with the
-/// geometric in place of the arithmetic mean).
+/// Adding `c / sqrt(rho_i)` times `sum_j w_j (f_j - f_i) W` to each `f_i` smooths a field and conserves `sum m f`.
 pub fn mixing_weights(masses: &[f32], densities: &[f32], weights: &mut Vec<f32>) {
     let weight = |(mass, density): (&f32, &f32)| mass / density.sqrt();
     masses.par_iter().zip(densities).with_min_len(MIN_PARTICLES_PER_TASK).map(weight).collect_into_vec(weights);
 }
 
-/// Share of the time in which sound and the fastest particle cross half the support radius.
+/// Courant number, relative to the time in which sound and the fastest particle cross half the support radius.
 const COURANT_NUMBER: f32 = 0.4;
 
-/// Longest stable step, s (Courant, Friedrichs and Lewy 1928; Monaghan 1992).
+/// Longest stable time step, s (Courant, Friedrichs and Lewy 1928; Monaghan 1992).
 ///
-/// The speed of sound of `p = k (rho - rho_0)` is `sqrt(k)`, with k the greatest `stiffness`; speeds are relative to the gas around.
+/// The speed of sound of `p = k (rho - rho_0)` is `sqrt(k)`; `stiffness` is the greatest k. `greatest_speed` is relative to the
+/// neighboring gas.
 #[must_use]
 pub fn max_stable_step(support_radius: f32, stiffness: f32, greatest_speed: f32) -> f32 {
     COURANT_NUMBER * 0.5 * support_radius / (stiffness.max(0.0).sqrt() + greatest_speed)
 }
 
-/// Into how many equal parts to cut `seconds` so that none is longer than `max_step`; at least 1, at most `limit`.
+/// Number of equal sub-steps of `seconds` such that none is longer than `max_step`; at least 1, at most `limit`.
 #[must_use]
 pub fn substep_count(seconds: f32, max_step: f32, limit: u32) -> u32 {
     let steps = (seconds / max_step).ceil();
-    // A comparison that also sends what is not a number to the limit.
+    // NaN fails this comparison and gives the limit.
     if steps < limit as f32 { (steps as u32).max(1) } else { limit.max(1) }
 }
 

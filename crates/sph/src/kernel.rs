@@ -1,7 +1,7 @@
-//! Smoothing kernels, in two and three dimensions.
+//! Smoothing kernels in two and three dimensions.
 //!
-//! All are written over q = r / d with d the support radius, at which every kernel ends, so that no power of d can overflow.
-//! With q at most 1 each integrates to 1 over the plane (`D = 2`) or over space (`D = 3`).
+//! All are functions of q = r / d, where d is the support radius at which every kernel ends, so that no power of d overflows. Each
+//! integrates to 1 over the plane (`D = 2`) or over space (`D = 3`).
 
 use std::f64::consts::PI;
 
@@ -19,7 +19,7 @@ bansho_base::choice! {
     }
 }
 
-/// Evaluates an expression with the kernel of a shape, in code of its own for each: `with_kernel!(shape, radius, D, |kernel| ...)`.
+/// Evaluates an expression with the kernel of a shape, monomorphized for each: `with_kernel!(shape, radius, D, |kernel| ...)`.
 macro_rules! with_kernel {
     ($shape:expr, $support_radius:expr, $D:ident, |$kernel:ident| $value:expr) => {{
         use $crate::kernel::{CubicSpline, KernelShape, Poly6, SmoothingKernel as _, Spiky};
@@ -42,7 +42,7 @@ macro_rules! with_kernel {
 pub(super) use with_kernel;
 
 impl KernelShape {
-    /// Value W(0) of the kernel of that support radius: what a particle of mass 1 adds to its own density.
+    /// W(0), the contribution of a particle of mass 1 to its own density.
     #[must_use]
     pub fn at_center<const D: usize>(self, support_radius: f32) -> f32 {
         with_kernel!(self, support_radius, D, |kernel| kernel.value(0.0))
@@ -51,7 +51,7 @@ impl KernelShape {
 
 /// A smoothing kernel in `D` dimensions, two or three.
 ///
-/// Distances come squared and must be less than the support radius; for the gradient they must also be more than 0.
+/// Distances are passed squared and must be less than the support radius; for the gradient they must also be above 0.
 pub trait SmoothingKernel<const D: usize>: Copy + Send + Sync {
     /// The kernel that ends at `support_radius`.
     #[must_use]
@@ -61,12 +61,13 @@ pub trait SmoothingKernel<const D: usize>: Copy + Send + Sync {
     #[must_use]
     fn value<R: Real>(&self, distance_squared: R) -> R;
 
-    /// `W'(r) / r` at a squared distance: times the offset `x_i - x_j` it is the gradient of `W(|x_i - x_j|)` by `x_i`.
+    /// `W'(r) / r` at a squared distance. Times the offset `x_i - x_j` it is the gradient of `W(|x_i - x_j|)` with respect to
+    /// `x_i`.
     #[must_use]
     fn gradient_factor<R: Real>(&self, distance_squared: R) -> R;
 }
 
-/// What all kernels need: squared distance to q^2, the factor of the value and the factor of `W'(r) / r`.
+/// Constants common to all kernels: `1 / d^2`, the factor of W and the factor of `W'(r) / r`.
 #[derive(Clone, Copy, Debug)]
 struct KernelConstants {
     to_q_squared: f32,
@@ -75,7 +76,7 @@ struct KernelConstants {
 }
 
 impl KernelConstants {
-    /// For a kernel `normalisation / d^D * w(q)` of which `slope * normalisation / d^(D + 2) * g(q)` is `W'(r) / r`.
+    /// For a kernel `normalization / d^D * w(q)` with `W'(r) / r = derivative * normalization / d^(D + 2) * g(q)`.
     fn new(dimensions: usize, support_radius: f32, normalization: f64, derivative: f64) -> Self {
         let inverse = 1.0 / f64::from(support_radius);
         let normalization = if cfg!(feature = "broken-kernel") { 0.9 * normalization } else { normalization };
@@ -86,7 +87,7 @@ impl KernelConstants {
     }
 }
 
-/// One of two numbers, by the number of dimensions.
+/// `plane` for `D = 2`, `space` for `D = 3`.
 const fn by_dimension<const D: usize>(plane: f64, space: f64) -> f64 {
     const { assert!(D == 2 || D == 3, "kernels exist in two and three dimensions") };
     if D == 2 { plane } else { space }
@@ -151,8 +152,8 @@ impl<const D: usize> SmoothingKernel<D> for Spiky<D> {
     }
 }
 
-/// `((2 - u)^3 - 4 (1 - u)^3) / 4`, u = 2 q, each power 0 where its base is negative: `40 / (7 pi d^2)` in the plane,
-/// `8 / (pi d^3)` in space.
+/// `((2 - u)^3 - 4 (1 - u)^3) / 4` with u = 2 q, each power 0 where its base is negative: `40 / (7 pi d^2)` in the plane, `8 / (pi
+/// d^3)` in space.
 ///
 /// The aurora thesis, (2.17) and (2.18), whose h is half the support radius d.
 #[derive(Clone, Copy, Debug)]
@@ -190,7 +191,7 @@ impl<const D: usize> CubicSpline<D> {
     }
 }
 
-/// A kernel chosen at run time, for single values.
+/// A kernel chosen at run time, for scalar evaluation.
 #[derive(Clone, Copy, Debug)]
 pub enum Kernel<const D: usize> {
     /// See [`Poly6`].

@@ -1,4 +1,6 @@
-//! Groups of eight particles that lie beside each other, and the particles near enough to matter to any of them.
+//! Groups of up to eight consecutive particles, with lists of their candidate neighbors, and operations on batches of eight.
+//!
+//! The batch operations loop over arrays instead of calling `map`: its closures do not vectorize.
 
 use super::cells::{Cells, RowChunk};
 use bansho_base::math::simd::{HalfLanes, Real};
@@ -6,24 +8,24 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Groups that one task takes.
+/// Groups per task of the thread pool.
 const GROUPS_PER_TASK: usize = 32;
 
-/// Some groups that follow each other: a task of the thread pool. What it finds depends on its groups and those around them alone, so
-/// it does not matter where one ends.
+/// Consecutive groups: one task of the thread pool. The candidates of a group do not depend on where a batch ends.
 #[derive(Clone, Debug, Default)]
 pub(super) struct GroupBatch {
     pub(super) groups: Vec<Group>,
-    /// Particles near each group, group after group.
+    /// Candidate neighbors of all groups, one after the other.
     pub(super) candidates: Vec<u32>,
 }
 
-/// Up to eight particles that follow each other in a row of cells.
+/// Up to eight consecutive particles of a row of cells.
 #[derive(Clone, Debug)]
 pub(super) struct Group {
-    /// Their numbers in sorted order.
+    /// Their indices in sorted order.
     pub(super) particles: Range<usize>,
-    /// Where the stretch lists the particles that are nearer to the box around them than the support radius; they themselves are among them.
+    /// Range in [`GroupBatch::candidates`] of the particles nearer than the support radius to the bounding box of the group, itself
+    /// included.
     pub(super) candidates: Range<usize>,
 }
 
@@ -35,7 +37,7 @@ impl GroupBatch {
     }
 }
 
-/// The smallest box, along the axes, around some particles.
+/// Axis-aligned bounding box of some particles.
 struct BoundingBox<const D: usize> {
     lower: [f32; D],
     upper: [f32; D],
@@ -53,7 +55,7 @@ impl<const D: usize> BoundingBox<D> {
         bounds
     }
 
-    /// Squared distances of points from the box, 0 inside.
+    /// Squared distance of points from the box, 0 inside.
     #[inline(always)]
     fn distance_squared<R: Real>(&self, point: &[R; D]) -> R {
         let mut outside = *point;
@@ -66,7 +68,8 @@ impl<const D: usize> BoundingBox<D> {
     }
 }
 
-/// Writes those particles of a run that are near a box at the front of a list, and says how many they are; what follows is spoilt.
+/// Writes the particles of a run that lie within the support radius of a box to the front of `candidates` and returns their number.
+/// Entries after them are overwritten.
 #[inline(always)]
 fn list_near<S: Simd, const D: usize>(
     simd: S,
@@ -80,7 +83,7 @@ fn list_near<S: Simd, const D: usize>(
     let mut count = 0;
     for start in run.clone().step_by(BATCH) {
         let near = bounds.distance_squared(&load(simd, positions, start)).simd_lt(support).to_bitmask() as usize;
-        // The last batch goes on behind the run.
+        // The last batch extends beyond the run.
         let near = near & (0xff >> (BATCH - (run.end - start).min(BATCH)));
         for (to, bit_index) in candidates[count..count + BATCH].iter_mut().zip(&SET_BIT_INDICES[near]) {
             *to = start as u32 + u32::from(*bit_index);
@@ -90,7 +93,7 @@ fn list_near<S: Simd, const D: usize>(
     count
 }
 
-/// For each set of bits the places of those that are set.
+/// For each 8-bit mask, the indices of the set bits.
 const SET_BIT_INDICES: [[u8; BATCH]; 256] = {
     let mut indices = [[0; BATCH]; 256];
     let mut bits = 0;
@@ -109,7 +112,7 @@ const SET_BIT_INDICES: [[u8; BATCH]; 256] = {
 };
 
 impl GroupBatch {
-    /// Parts rows into stretches and finds everybody's candidates.
+    /// Splits row chunks into batches and finds the candidates of every group.
     pub(super) fn find_all<const D: usize>(batches: &mut Vec<Self>, cells: &Cells<D>, chunks: &[RowChunk]) {
         let level = Level::new();
         batches.resize_with(chunks.len().div_ceil(GROUPS_PER_TASK), Self::default);
@@ -118,7 +121,7 @@ impl GroupBatch {
         });
     }
 
-    /// Finds the candidates of some parts of rows.
+    /// Finds the candidates of some row chunks.
     #[inline(always)]
     fn find<S: Simd, const D: usize>(&mut self, simd: S, cells: &Cells<D>, chunks: &[RowChunk]) {
         let (positions, support) = (cells.positions(), cells.support_radius());
@@ -151,7 +154,7 @@ impl GroupBatch {
     }
 }
 
-/// Particles looked at together.
+/// Particles per batch.
 pub(super) const BATCH: usize = 8;
 
 /// Squared length of an offset.
@@ -164,7 +167,7 @@ pub(super) fn length_squared<R: Real, const D: usize>(offset: &[R; D]) -> R {
     sum
 }
 
-/// Arrays cut to one length, so that one check of an index serves all.
+/// Truncates arrays to one length, so that one bounds check serves all.
 #[inline(always)]
 pub(super) fn truncate_all<const N: usize>(arrays: [&[f32]; N], length: usize) -> [&[f32]; N] {
     let mut truncate_all = arrays;
@@ -174,7 +177,7 @@ pub(super) fn truncate_all<const N: usize>(arrays: [&[f32]; N], length: usize) -
     truncate_all
 }
 
-/// The batch of each array that begins at an index.
+/// Loads the batch that begins at an index from each array.
 #[inline(always)]
 pub(super) fn load<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], first: usize) -> [HalfLanes<S>; N] {
     let mut batches = [HalfLanes::splat(simd, 0.0); N];
@@ -184,7 +187,7 @@ pub(super) fn load<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], first
     batches
 }
 
-/// One value of each array.
+/// The value at an index of each array.
 #[inline(always)]
 pub(super) fn values_at<const N: usize>(arrays: &[&[f32]; N], index: usize) -> [f32; N] {
     let mut values = [0.0; N];
@@ -194,7 +197,7 @@ pub(super) fn values_at<const N: usize>(arrays: &[&[f32]; N], index: usize) -> [
     values
 }
 
-/// Each of some numbers in all places of a batch.
+/// Broadcasts each value to all lanes of a batch.
 #[inline(always)]
 pub(super) fn splat_all<S: Simd, const N: usize>(simd: S, values: [f32; N]) -> [HalfLanes<S>; N] {
     let mut batches = [HalfLanes::splat(simd, 0.0); N];

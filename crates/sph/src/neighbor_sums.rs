@@ -1,7 +1,7 @@
-//! Sums over the neighbours of every particle: the one loop that density, forces and whatever a model adds run in.
+//! Sums over the neighbors of every particle: the one loop in which density, forces and all other pair terms run.
 //!
-//! Eight particles that lie beside each other go through their common candidates together, one candidate at a time: each has a lane of a
-//! vector to itself, so nothing waits and nothing is added up across lanes. A sum depends on who is near alone, not on threads.
+//! Eight consecutive particles visit their common candidates together, one candidate at a time. Each particle has a SIMD lane of
+//! its own, so there are no horizontal sums. A sum depends on the neighbors alone, not on threads.
 
 use bansho_base::{
     math,
@@ -19,42 +19,43 @@ use crate::neighbor_groups::{BATCH, length_squared, load, splat_all, subtract, t
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-/// Particles closer than this share of the support radius count as coincident.
+/// Particles closer than this fraction of the support radius count as coincident.
 const COINCIDENCE_RADIUS: f32 = 1e-6;
 
-/// Where a neighbour is.
+/// Relative position of a pair.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<R, const D: usize> {
-    /// `x_i - x_j`, from the neighbour to the particle.
+    /// `x_i - x_j`, from the neighbor to the particle.
     pub offset: [R; D],
     /// Its squared length.
     pub distance_squared: R,
 }
 
-/// One term of a sum over neighbours, in `D` dimensions, of `OUT` results, from `IN` values of each particle.
+/// Pair term of a sum over neighbors in `D` dimensions: `OUT` results from `IN` values of each particle.
 pub trait PairTerm<const D: usize, const IN: usize, const OUT: usize>: Sync {
-    /// Whether the term has the direction of the offset, and perhaps a pole at distance 0.
+    /// Whether the term is proportional to the offset, possibly with a pole at distance 0.
     ///
-    /// If so, squared distances are held above 0, a particle itself must add nothing by its offset of 0, and two that coincide push each
-    /// other in a direction by their birth ids. If not, the sum includes the particle itself, at distance 0.
+    /// If so, squared distances are clamped above 0, a particle contributes nothing to itself (its offset is 0), and two coincident
+    /// particles repel each other in a direction that follows from their ids. If not, the sum includes the particle itself at
+    /// distance 0.
     const DIRECTED: bool;
 
-    /// Adds to the sums of a particle with the values `own` what a neighbour with the values `other` gives.
+    /// Adds the contribution of a neighbor with the values `other` to the sums of a particle with the values `own`.
     ///
-    /// Mark it `#[inline(always)]`, and loop over arrays in place of `map`, whose closure would not become vector code. It is also called for
-    /// candidates too far to count, with the squared distance held to that of the support radius: kernels are 0 there, and so must the
-    /// term be, to rounding.
+    /// Implementations are `#[inline(always)]` and loop over arrays instead of calling `map`, whose closures do not vectorize. The
+    /// term is also evaluated for candidates beyond the support radius, with the squared distance clamped to its square: there it
+    /// must be 0 to rounding, as kernels are.
     fn add<R: Real>(&self, pair: &Pair<R, D>, own: &[R; IN], other: &[R; IN], sums: &mut [R; OUT]);
 }
 
 impl<const D: usize> Cells<D> {
-    /// Sums `term` over the neighbours of every particle, those nearer than the support radius.
+    /// Sums `term` over the neighbors of every particle, those nearer than the support radius.
     ///
-    /// `fields` are the values of the particles in sorted order, and so are the results. The same on every machine with fused
-    /// multiply-add, for any number of threads and any order in which the particles were given.
+    /// `fields` and `results` are in sorted order. Results are the same on every machine with fused multiply-add, for any number of
+    /// threads and any order in which particles were given.
     ///
     /// # Panics
-    /// If a field does not hold one value a particle.
+    /// If a field does not hold one value per particle.
     pub fn sum<T, const IN: usize, const OUT: usize>(
         &self,
         term: &T,
@@ -77,7 +78,7 @@ impl<const D: usize> Cells<D> {
     }
 }
 
-/// The part of each array that belongs to each stretch.
+/// The slice of each array that belongs to each batch of groups.
 fn split<'a, const OUT: usize>(batches: &[GroupBatch], mut arrays: [&'a mut [f32]; OUT]) -> Vec<[&'a mut [f32]; OUT]> {
     let mut slice_of = |batch: &GroupBatch| {
         arrays.each_mut().map(|values| {
@@ -89,14 +90,14 @@ fn split<'a, const OUT: usize>(batches: &[GroupBatch], mut arrays: [&'a mut [f32
     batches.iter().map(&mut slice_of).collect()
 }
 
-/// What sums read: positions and fields in sorted order.
+/// Inputs of a sum: positions and fields in sorted order.
 struct SumInputs<'a, const D: usize, const IN: usize> {
     cells: &'a Cells<D>,
     positions: [&'a [f32]; D],
     fields: [&'a [f32]; IN],
 }
 
-/// Sums for all particles of a stretch.
+/// Sums for all particles of a batch of groups.
 #[inline(always)]
 fn sum_batch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
@@ -125,8 +126,8 @@ fn sum_batch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     }
 }
 
-/// Sums for the eight particles from `first` on over all candidates; and how many of these coincide with each, itself included, if
-/// the term is directed.
+/// Sums for the eight particles from `first` on over all candidates; for directed terms also the number of candidates that coincide
+/// with each, itself included.
 #[inline(always)]
 fn sum_group<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
@@ -162,7 +163,7 @@ where
     (sums, coincident)
 }
 
-/// The batch of each array that begins at an index; 0 behind their end.
+/// Loads the batch that begins at an index from each array, padded with 0.
 #[inline(always)]
 fn load_padded<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], first: usize) -> [HalfLanes<S>; N] {
     let length = arrays.first().map_or(0, |array| array.len());
@@ -183,7 +184,7 @@ fn coincidence_distance_squared(support_radius: f32) -> f32 {
     (support_radius * COINCIDENCE_RADIUS) * (support_radius * COINCIDENCE_RADIUS)
 }
 
-/// Adds what those particles of a group gain that coincide with more than themselves.
+/// Adds the contributions of coincident particles to the members of a group that have any.
 #[inline(always)]
 fn add_coincident<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     term: &T,
@@ -206,7 +207,8 @@ fn add_coincident<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>
     }
 }
 
-/// What others at the place of a particle add, each pushed aside by a hair in a direction that both agree on.
+/// Contributions of particles at the same position, each displaced by the coincidence radius in a direction that both sides agree
+/// on.
 #[inline(never)]
 fn sum_coincident<T, const D: usize, const IN: usize, const OUT: usize>(
     term: &T,
@@ -233,7 +235,7 @@ where
     sums
 }
 
-/// A unit vector from particle `other` to particle `own`, opposite when they change places.
+/// Unit vector from particle `other` to particle `own` as a hash of both ids; antisymmetric.
 fn direction<const D: usize>(own: u64, other: u64) -> [f32; D] {
     let (low, high) = (own.min(other), own.max(other));
     let mut bytes = [0; 16];

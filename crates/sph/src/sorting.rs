@@ -1,36 +1,37 @@
-//! Sorts particles by the keys of their cells, each thread those of a range of keys.
+//! Parallel sort of particles by cell key: a sample sort that gives each thread a range of keys, and a radix sort within each
+//! range.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-/// Particles that one task takes at least.
+/// Least number of particles per task of the thread pool.
 pub(super) const MIN_PARTICLES_PER_TASK: usize = 4096;
-/// Most bits sorted by in one pass.
+/// Most key bits per radix pass.
 const DIGIT_BITS: u32 = 11;
-/// Keys for each range that tell where ranges end, so that all have about as many particles.
+/// Sampled keys per range. Their quantiles split the keys into ranges of about equal size.
 const SAMPLES: usize = 64;
 
-/// A key and the index of the particle that it belongs to.
+/// A key and the index of its particle.
 type Entry = (u64, u32);
 
-/// A cell that holds particles: its key and its first particle.
+/// An occupied cell: its key and the index of its first particle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cell {
     pub(super) key: u64,
     pub(super) start: u32,
 }
 
-/// What sorting writes on the way, kept from step to step.
+/// Buffers of the sort, reused from step to step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SampleSort {
     entries: Vec<Entry>,
-    /// The sample that ends of ranges are taken from.
+    /// Sampled keys.
     sample: Vec<u64>,
     ranges: Vec<KeyRange>,
 }
 
-/// The particles of a range of keys.
+/// The particles of one range of keys.
 #[derive(Clone, Debug, Default)]
 struct KeyRange {
     entries: Vec<Entry>,
@@ -39,7 +40,7 @@ struct KeyRange {
 }
 
 impl SampleSort {
-    /// Sorts one particle an id, with keys of so many bits, by key and then by id: gives their indices in that order, and the cells.
+    /// Sorts particles by key (of `bits` bits), then by id. Writes their indices in that order, and the occupied cells.
     pub(super) fn sort(
         &mut self,
         key: impl Fn(usize) -> u64 + Sync,
@@ -69,7 +70,7 @@ impl SampleSort {
         self.ranges.iter().for_each(|range| cells.extend_from_slice(&range.cells));
     }
 
-    /// The least key of each range.
+    /// Least key of each range.
     fn starts_of_ranges(&mut self) -> Vec<u64> {
         let count = self.ranges.len();
         self.sample.clear();
@@ -82,7 +83,7 @@ impl SampleSort {
 }
 
 impl KeyRange {
-    /// Takes the particles with keys from `start` to before `end`.
+    /// Takes the particles with keys from `start` up to, not including, `end`.
     fn take(&mut self, all: &[Entry], start: u64, end: Option<u64>) {
         self.entries.clear();
         let last = end.map_or(u64::MAX, |end| end.wrapping_sub(1));
@@ -105,7 +106,7 @@ impl KeyRange {
         }
     }
 
-    /// Writes their indices in order, and lists the cells, the first of which begins at particle `start`.
+    /// Writes the sorted indices and lists the occupied cells; `start` is the index of the first particle.
     fn write(&mut self, order: &mut [u32], mut start: u32) {
         order.iter_mut().zip(&self.entries).for_each(|(index, entry)| *index = entry.1);
         self.cells.clear();
@@ -116,7 +117,7 @@ impl KeyRange {
     }
 }
 
-/// One stable pass of a radix sort, over some bits of the keys.
+/// One stable counting pass of the radix sort, over some bits of the keys.
 fn radix_pass(from: &[Entry], to: &mut [Entry], bits: Range<u32>) {
     let mut offsets = [0_u32; 1 << DIGIT_BITS];
     let mask = (1 << bits.len()) - 1;

@@ -1,4 +1,4 @@
-//! The paper's figure 7: every particle a square, the redder the denser the gas around it.
+//! The paper's figure 7: each particle as a square, the redder the denser the gas.
 
 use crate::particles::{
     parameters::LookParameters,
@@ -14,7 +14,7 @@ use bansho_base::{
     phenomenon::strip::{DepthInterval, Strip, View},
 };
 
-/// Luminance of a square, cd/m^2: as bright as the flame, so that one exposure serves both pictures.
+/// Luminance of a square, cd/m^2: as bright as the flame, so that one exposure serves both.
 const LUMINANCE: f32 = 6000.0;
 
 /// A square in the picture.
@@ -24,10 +24,10 @@ struct Square {
     color: [f32; 3],
 }
 
-/// How all particles become squares.
+/// Conversion of particles to squares.
 struct SquareSprites<'a> {
     gas: &'a Gas<'a>,
-    /// Side, support radii.
+    /// Side, in support radii.
     side: f32,
     window: Rect,
     densest: f64,
@@ -62,7 +62,7 @@ impl Squares {
         };
         let mut squares: Vec<Square> =
             project_particles(gas, view, &kind).iter_mut().flat_map(|task| task.drain(..)).flatten().collect();
-        // A stable sort: at one depth the elder lies before the younger.
+        // A stable sort: at one depth the order of particles is kept.
         squares.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         Self(squares)
     }
@@ -87,7 +87,7 @@ impl Squares {
     }
 }
 
-/// The density that nineteen in twenty particles do not exceed, which is shown in full red.
+/// The 95th percentile of the density, which is shown as full red.
 fn density_percentile_95(gas: &Gas) -> f64 {
     let mut densities = gas.particles.density.clone();
     densities.sort_by(f32::total_cmp);

@@ -1,4 +1,4 @@
-//! What a scene says of a particle flame. Symbols and equation numbers are those of Inagaki et al.
+//! Parameters of the particle flame. Symbols and equation numbers are those of Inagaki et al.
 
 use crate::sparks::SparkParameters;
 use bansho_base::parameters::{AssetPath, Auto, Length, Range, animated::Animated};

@@ -1,4 +1,4 @@
-//! What the gas says of itself beside its light: temperature, optical depth, deflection and motion.
+//! AOVs of the gas: temperature, optical depth, deflection and motion.
 
 use bansho_base::{
     image::Rect,
@@ -22,7 +22,7 @@ use crate::particles::{
     },
 };
 
-/// What a particle flame can write beside its light, in the order of a strip's planes.
+/// AOVs of a particle flame, in the order of a strip's planes.
 pub const AOVS: &[AovDescriptor] = &[
     AovDescriptor {
         name: "temperature_k",
@@ -62,21 +62,21 @@ pub const AOVS: &[AovDescriptor] = &[
     },
 ];
 
-/// Places of the planes among a strip's AOVs.
+/// Indices of the planes among a strip's AOVs.
 const TEMPERATURE: usize = 0;
 const OPTICAL_DEPTH: usize = 1;
 pub(crate) const DEFLECTION: [usize; 2] = [2, 3];
 const MOTION: [usize; 2] = [4, 5];
 
-/// Summed motion of the glowing gas: luminance, and luminance times pixels to the right and down.
+/// Motion of the glowing gas: sums of luminance, and of luminance times motion in pixels to the right and down.
 pub(crate) struct MotionField<'a> {
     grid: Grid<'a>,
     weights: Vec<[f32; 4]>,
-    /// Least and greatest motion of any gas, for each of the two.
+    /// Least and greatest motion of any particle, for each component.
     min_max: [[f32; 2]; 2],
 }
 
-/// Glowing gas as sprites of its motion.
+/// Glowing particles as sprites of their motion.
 struct MotionSprites<'a> {
     gas: &'a Gas<'a>,
     look: &'a LookParameters,
@@ -127,7 +127,7 @@ impl<'a> MotionField<'a> {
         Some(Self { weights: spline::weights(&grid.cells), grid, min_max })
     }
 
-    /// Pixels to the right and down that the gas at a pixel moves until the next frame.
+    /// Motion of the gas at a pixel until the next frame, pixels to the right and down.
     fn at(&self, x: usize, y: usize) -> [f32; 2] {
         let cells = &self.grid.cells;
         let ((column, across), (row, down)) = (cells.cell_before(0, x), cells.cell_before(1, y));
@@ -145,7 +145,7 @@ impl<'a> MotionField<'a> {
     }
 }
 
-/// Least and greatest of some numbers.
+/// Least and greatest value.
 pub(crate) fn min_max(values: impl Iterator<Item = f32>) -> [f32; 2] {
     values.fold([f32::INFINITY, f32::NEG_INFINITY], |[min_value, max_value], value| {
         [min_value.min(value), max_value.max(value)]
@@ -153,7 +153,7 @@ pub(crate) fn min_max(values: impl Iterator<Item = f32>) -> [f32; 2] {
 }
 
 impl GasResolver<'_> {
-    /// Adds the AOVs of a layer in the part `rect` of a strip. Only what is asked for is measured, a pixel at a time.
+    /// Adds the AOVs of a layer in `rect` of a strip. Evaluated only where AOVs are requested, one pixel at a time.
     pub(crate) fn measure_layer(
         &self,
         layer: &DepthLayer,
@@ -163,7 +163,7 @@ impl GasResolver<'_> {
         row: &mut RowBuffer,
         strip: &mut Strip,
     ) {
-        /// Luminance whose soot still counts as glowing, cd/m^2.
+        /// Least luminance that counts as glowing, cd/m^2.
         const DARK: f32 = 1e-3;
         for y in rect.y..rect.bottom() {
             let Some([first, last]) = self.fill(layer.index, y, extents, row) else { continue };

@@ -1,4 +1,7 @@
-//! Heat haze: hot gas has a lower index of refraction, and light bends toward the denser air.
+//! Heat haze: hot gas has a lower refractive index, and light bends toward denser air.
+//!
+//! In the paraxial approximation the deflection of a ray is the gradient of the optical path length across it. The path length is a
+//! sum of sprites, as optical depth is.
 
 use bansho_base::{
     image::{Image, Rect},
@@ -25,24 +28,24 @@ use crate::particles::{
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-/// n - 1 of air at [`REFERENCE_K`] and atmospheric pressure; it falls with 1/T (Gladstone & Dale).
+/// n - 1 of air at [`REFERENCE_K`] and atmospheric pressure; proportional to 1/T (Gladstone-Dale).
 const REFRACTIVITY: f64 = 2.72e-4;
 const REFERENCE_K: f64 = 293.15;
 
-/// Refractivity n - 1 of air and of the gases of a flame at a temperature.
+/// Refractivity n - 1 of air and combustion gases at a temperature.
 #[inline(always)]
 pub(crate) fn refractivity(temperature_k: f64) -> f64 {
     REFRACTIVITY * REFERENCE_K / temperature_k.max(1.0)
 }
 
-/// The angles by which the gas bends what lies behind it.
+/// Deflection angles of the light from behind the gas.
 pub(crate) struct HeatHaze {
     pub(crate) rect: Rect,
     pub(crate) angle: Image<2>,
 }
 
-/// By how much the gas of a particle is optically shorter than air along a ray through its middle, in the picture's pixels there: the
-/// gradient of summed paths is an angle.
+/// Optical path difference to air along a ray through the center of a particle's sprite, in pixels at its depth: the gradient of
+/// the summed path differences, per pixel, is an angle.
 #[inline(always)]
 pub(crate) fn path(gas: &Gas, look: &LookParameters, seen: &ProjectedParticle) -> f32 {
     let refractivity_excess = refractivity_excess(gas, seen.index);
@@ -50,13 +53,13 @@ pub(crate) fn path(gas: &Gas, look: &LookParameters, seen: &ProjectedParticle) -
     (length * f64::from(seen.scale)) as f32
 }
 
-/// Refractivity of a particle's gas beside that of the air around.
+/// Refractivity of a particle's gas minus that of the surrounding air.
 #[inline(always)]
 fn refractivity_excess(gas: &Gas, index: usize) -> f64 {
     refractivity(f64::from(gas.particles.temperature[index])) - refractivity(gas.air_temperature_k)
 }
 
-/// The gas that only bends, or all of it, as sprites of its paths.
+/// Particles as sprites of their optical path: those that emit and absorb nothing, or all.
 struct RefractionSprites<'a> {
     gas: &'a Gas<'a>,
     look: &'a LookParameters,
@@ -78,10 +81,10 @@ impl SpriteKind for RefractionSprites<'_> {
 }
 
 impl HeatHaze {
-    /// `None` where nothing bends.
+    /// `None` where nothing is deflected.
     ///
-    /// `splatted` holds the paths of the gas that shows, as far as the window sees it; only those of the rest are summed here, and `whole_gas` where
-    /// the whole picture shows none.
+    /// `splatted` holds the paths of the visible gas inside the window; only the remaining gas is splatted here, or `whole_gas`
+    /// where no gas is visible in the whole picture.
     pub(crate) fn new(
         gas: &Gas,
         look: &LookParameters,
@@ -109,13 +112,13 @@ impl HeatHaze {
         Self::from_paths(&paths, view.window)
     }
 
-    /// The gradient of the summed paths at every pixel: to the right and upward.
+    /// The gradient of the summed paths at every pixel, to the right and upward.
     fn from_paths(paths: &[OpticalPathField], window: Rect) -> Option<Self> {
         let covered = paths.iter().map(|paths| paths.sums.covered().intersection(&window));
         let rect = covered.reduce(|whole_gas, covered| whole_gas.union(&covered))?;
         let mut angle = Image::filled(rect.width, rect.height, [0.0; 2]);
         let level = Level::new();
-        // Beyond its own cells a grid holds nothing.
+        // A grid holds nothing beyond its own cells.
         let fields = paths.iter().map(|paths| {
             let covered = paths.sums.covered().intersection(&rect);
             (paths, covered, paths.sums.columns(covered.x, covered.width))
@@ -133,7 +136,7 @@ impl HeatHaze {
         Some(Self { rect, angle })
     }
 
-    /// Adds the angles to the AOVs of a strip.
+    /// Writes the angles to the AOVs of a strip.
     pub(crate) fn measure(&self, strip: &mut Strip) {
         let rect = self.rect.intersection(&strip.rect);
         for y in rect.y..rect.bottom() {
@@ -148,7 +151,7 @@ impl HeatHaze {
     }
 }
 
-/// Summed paths, whose slopes are angles.
+/// Summed optical paths with spline weights for values and slopes.
 struct OpticalPathField<'a> {
     sums: Grid<'a>,
     weights: Vec<[f32; 4]>,
@@ -164,7 +167,7 @@ impl<'a> OpticalPathField<'a> {
         }
     }
 
-    /// Adds the gradient at row `y` of pixels that lie among `columns`.
+    /// Adds the gradient along row `y` for pixels in `columns`.
     #[inline(always)]
     fn add_gradient(&self, columns: &[(usize, usize)], y: usize, out: &mut [[f32; 2]]) {
         let cells = &self.sums.cells;
@@ -180,7 +183,7 @@ impl<'a> OpticalPathField<'a> {
                 right = along[k].mul_add(values[first + k], right);
                 down = across[k].mul_add(gradients[first + k], down);
             }
-            // Rows count downward, angles upward.
+            // Rows are counted downward, angles upward.
             *angle = [angle[0] + right, angle[1] - down];
         }
     }
@@ -202,7 +205,7 @@ mod tests {
             .collect();
         assert_eq!(rows.len(), 16);
         for row in rows {
-            // The sodium line, and green light, of which eyes see most.
+            // The sodium D line, and green light.
             for (column, allowed) in [(2, 2e-3), (6, 5e-3)] {
                 let off = refractivity(row[0]) / row[column] - 1.0;
                 assert!(off.abs() < allowed, "{off} off at {} K", row[0]);

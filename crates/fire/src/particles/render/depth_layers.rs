@@ -1,4 +1,6 @@
-//! Layers of depth within the gas: sheets of gas before and behind each other keep their own detail, and other phenomena can stand between.
+//! Depth layers of the gas, and statistics over all particles from which they follow.
+//!
+//! Gas in different layers has its own detail, and other phenomena can be composited between layers.
 
 use crate::particles::{
     parameters::{LookParameters, SpriteStyle},
@@ -12,20 +14,20 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Layers of equal thickness, anchored at whole multiples of it so that they stand still while the gas moves.
+/// Layers of equal thickness, at multiples of it, so that they stay in place while the gas moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct DepthLayers {
-    /// Depth at which the first begins, m.
+    /// Depth of the near side of the first layer, m.
     pub(crate) near: f64,
     /// Thickness of each, m.
     pub(crate) thickness: f64,
     pub(crate) count: usize,
 }
 
-/// Most layers of a flame.
+/// Greatest number of layers of a flame.
 pub(crate) const MAX_LAYERS: usize = 4;
 
-/// How gas is spread in depth: shares of the whole, and these times depth and its square.
+/// Moments of the gas's distribution in depth: weight, weight times depth, and weight times depth squared.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct DepthMoments {
     total: f64,
@@ -49,9 +51,9 @@ impl DepthMoments {
 }
 
 impl DepthLayers {
-    /// Layers that hold the bulk of the gas; what lies further out joins the outermost.
+    /// Layers that hold the bulk of the gas; gas farther out belongs to the outermost.
     ///
-    /// `min_thickness` is the least thickness that pays, m.
+    /// `min_thickness` is their least thickness, m.
     pub(crate) fn new(&DepthMoments { total, first, second }: &DepthMoments, min_thickness: f64) -> Self {
         let mean = if total > 0.0 { first / total } else { 0.0 };
         let deviation = if total > 0.0 { (second / total - mean * mean).max(0.0).sqrt() } else { 0.0 };
@@ -64,7 +66,7 @@ impl DepthLayers {
         Self { near: (near / thickness).floor() * thickness, thickness, count: count(thickness) as usize }
     }
 
-    /// The layer before the depth, and the share of what lies there that belongs to the next.
+    /// The layer before a depth, and the weight of the next layer there (linear interpolation between layer centers).
     #[inline(always)]
     pub(crate) fn layer_at(&self, depth: f64) -> (usize, f32) {
         let layer_at = ((depth - self.near) / self.thickness - 0.5).clamp(0.0, (self.count - 1) as f64);
@@ -72,12 +74,12 @@ impl DepthLayers {
         (layer, (layer_at - layer as f64) as f32)
     }
 
-    /// Depth of the middle of a layer, m.
+    /// Depth of a layer's center, m.
     pub(crate) fn center(&self, layer: usize) -> f64 {
         self.near + (layer as f64 + 0.5) * self.thickness
     }
 
-    /// The stretch of depth of each layer.
+    /// Depth interval of each layer.
     pub(crate) fn intervals(&self) -> impl Iterator<Item = DepthInterval> + use<> {
         let Self { near, thickness, count } = *self;
         let edge = move |layer: usize| near + layer as f64 * thickness;
@@ -85,7 +87,7 @@ impl DepthLayers {
     }
 }
 
-/// Whether a particle adds anything to the picture's light or shade.
+/// Whether a particle contributes to the picture's light or opacity.
 #[inline(always)]
 pub(crate) fn is_visible(gas: &Gas, look: &LookParameters, index: usize) -> bool {
     match look.sprite {
@@ -94,13 +96,13 @@ pub(crate) fn is_visible(gas: &Gas, look: &LookParameters, index: usize) -> bool
     }
 }
 
-/// Sums over the gas that shows, as a view sees it.
+/// Sums over the visible gas, as seen by a view.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct GasStatistics {
     spread: DepthMoments,
-    /// Of support radii, over all particles, m.
+    /// Sum of all support radii, m.
     radius_sum: f64,
-    /// Of light, and of light times support radius, absorption and pixels a metre.
+    /// Sums of luminous intensity, and of it times support radius, absorption coefficient and pixels per meter.
     light: [f64; 4],
 }
 
@@ -113,7 +115,7 @@ impl GasStatistics {
             dispatch!(level, _simd => statistics.add_all(gas, look, view, range.clone()));
             statistics
         };
-        // Sums of whole tasks, added in order, are the same however many threads there are.
+        // Tasks are summed in order, so that the result does not depend on the number of threads.
         let of_tasks: Vec<Self> = (0..count.div_ceil(PARTICLES_PER_TASK)).into_par_iter().map(of_task).collect();
         of_tasks.iter().fold(Self::default(), Self::merge)
     }
@@ -157,14 +159,14 @@ impl GasStatistics {
         self
     }
 
-    /// The layers of the gas.
+    /// The depth layers.
     pub(crate) fn layers(&self, gas: &Gas) -> DepthLayers {
-        /// Thickness of a layer in mean support radii, which no view changes, so that layers stand still.
+        /// Thickness of a layer in mean support radii: independent of the view, so that layers stay in place.
         const THICKNESS: f64 = 1.6;
         DepthLayers::new(&self.spread, THICKNESS * self.radius_sum / gas.particles.len().max(1) as f64)
     }
 
-    /// Means that set the scale of detail, by light; `None` where nothing shines.
+    /// Luminance-weighted means that set the scale of detail; `None` where nothing glows.
     pub(crate) fn scale(&self, gas: &Gas, view: &View) -> Option<DetailScale> {
         let [total, radius, absorption, pixels] = self.light;
         (total > 0.0).then(|| DetailScale {
@@ -178,7 +180,7 @@ impl GasStatistics {
     }
 }
 
-/// How far what stands still at the flame moves before the camera while the shutter is open, m in the world.
+/// Apparent motion of a static point at the flame while the shutter is open, m in world axes.
 fn camera_motion(position: DVec3, view: &View) -> [f64; 3] {
     let (opened, closed) = (view.camera_at(view.shutter.open), view.camera_at(view.shutter.close));
     let local = closed.to_camera(position) - opened.to_camera(position);

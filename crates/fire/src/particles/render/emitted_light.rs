@@ -1,4 +1,4 @@
-//! The light that the gas throws on others.
+//! Light that the gas casts on other objects: point lights along the flame.
 
 use std::ops::Range;
 
@@ -13,18 +13,18 @@ use crate::particles::parameters::LookParameters;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-/// Heights into which the flame is cut to find where its light comes from.
+/// Slabs of height over which emission is accumulated.
 const SLABS: usize = 48;
 
-/// What one slab sends out.
+/// Emission of one slab.
 #[derive(Clone, Copy, Debug, Default)]
 struct Slab {
-    /// Candela in every direction were nothing hidden, ACEScg.
+    /// Luminous intensity without self-absorption, cd, ACEScg.
     intensity: [f64; 3],
-    /// Luminous intensity times place, and times the square of the place across.
+    /// Intensity times position.
     moment: DVec3,
     spread: f64,
-    /// Sum of absorption times volume, m^2: optical depth times area.
+    /// Sum of absorption coefficient times volume, m^2: optical depth times area.
     absorption_area: f64,
 }
 
@@ -33,7 +33,7 @@ impl Slab {
         self.intensity.iter().sum::<f64>().max(0.0)
     }
 
-    /// Adds a share of another.
+    /// Adds another slab, times a weight.
     #[inline(always)]
     fn add(&mut self, other: &Self, weight: f64) {
         for c in 0..3 {
@@ -45,11 +45,11 @@ impl Slab {
     }
 }
 
-/// Point lights that stand for the gas at time `t`: `look.light.count` parts of equal power along its height, each where its light is
-/// centred, so that they move as smoothly as the gas does.
+/// Point lights that represent the gas at `t`: `look.light.count` segments of equal power along its height, each at its center of
+/// intensity, so that they move as smoothly as the gas.
 ///
-/// Soot of volume V with absorption k and temperature T sends `V k B(T)` in every direction; what the soot of its part hides
-/// is taken off as by a slab of the same optical depth, `(1 - exp(-tau)) / tau`.
+/// Soot of volume V with absorption coefficient k and temperature T emits `V k B(T)` in every direction. Self-absorption of a
+/// segment is that of a slab of the same optical depth, `(1 - exp(-tau)) / tau`.
 pub fn point_lights_of_gas(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Light> {
     let count = look.light.count.max(1) as usize;
     if look.light.scale <= 0.0 || gas.particles.is_empty() {
@@ -67,7 +67,7 @@ pub fn point_lights_of_gas(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Ligh
         .collect()
 }
 
-/// The gas cut by height; a particle is shared by the two slabs around it.
+/// Emission by height; a particle is distributed to the two nearest slabs.
 fn slabs(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Slab> {
     let (low, high) = height_range(gas, t);
     let step = ((high - low) / (SLABS - 1) as f64).max(1e-9);
@@ -77,7 +77,7 @@ fn slabs(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Slab> {
         dispatch!(level, _simd => add_to_slabs(gas, look, t, range.clone(), [low, step], &mut slabs));
         slabs
     };
-    // Sums of whole tasks, added in order, are the same however many threads there are.
+    // Tasks are summed in order, so that the result does not depend on the number of threads.
     let of_tasks: Vec<Vec<Slab>> = tasks(gas).into_par_iter().map(task_slabs).collect();
     of_tasks.into_iter().fold(vec![Slab::default(); SLABS + 1], |mut sums, slabs| {
         sums.iter_mut().zip(&slabs).for_each(|(sum, slab)| sum.add(slab, 1.0));
@@ -85,13 +85,13 @@ fn slabs(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Slab> {
     })
 }
 
-/// The particles of each task.
+/// The particle range of each task.
 fn tasks(gas: &Gas) -> Vec<Range<usize>> {
     let count = gas.particles.len();
     (0..count).step_by(PARTICLES_PER_TASK).map(|first| first..(first + PARTICLES_PER_TASK).min(count)).collect()
 }
 
-/// Heights of the lowest and the highest particle, m.
+/// Least and greatest height of particles, m.
 fn height_range(gas: &Gas, t: f64) -> (f64, f64) {
     let task_slabs = |range: Range<usize>| {
         range
@@ -102,7 +102,7 @@ fn height_range(gas: &Gas, t: f64) -> (f64, f64) {
     tasks(gas).into_par_iter().map(task_slabs).reduce(|| (f64::MAX, f64::MIN), min_max)
 }
 
-/// Adds particles to slabs `step` apart from the height `low` on.
+/// Adds particles to slabs that are `step` apart, from the height `low` on.
 #[inline(always)]
 fn add_to_slabs(
     gas: &Gas,
@@ -131,7 +131,7 @@ fn add_to_slabs(
     }
 }
 
-/// The light of what lies between two sums of power, counted from below.
+/// The light of the part of the flame between two values of cumulative power.
 fn range_light(slabs: &[Slab], [from, to]: [f64; 2], look: &LookParameters) -> Option<Light> {
     let mut sum = Slab::default();
     let mut cumulative = 0.0;
@@ -150,7 +150,7 @@ fn range_light(slabs: &[Slab], [from, to]: [f64; 2], look: &LookParameters) -> O
     let position = sum.moment / power;
     let deviation = (sum.spread / power - position.x * position.x - position.z * position.z).max(0.0).sqrt();
     let radius = deviation.max(1e-3);
-    // Seen from the side, the part covers about a disc of twice its deviation.
+    // Seen from the side, a segment covers about a disc of twice its standard deviation.
     let tau = sum.absorption_area / (4.0 * std::f64::consts::PI * radius * radius);
     let escape_fraction = if tau > 1e-6 { -bansho_base::math::exp_m1(-tau) / tau } else { 1.0 };
     let scale = look.light.scale * escape_fraction;

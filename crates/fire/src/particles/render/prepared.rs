@@ -1,4 +1,4 @@
-//! One frame of the gas, ready to draw.
+//! One prepared frame of the gas.
 
 use std::sync::OnceLock;
 
@@ -44,7 +44,7 @@ use crate::{
 };
 use fearless_simd::{Level, dispatch};
 
-/// The gas of one frame.
+/// The gas of one frame, ready to be drawn into strips.
 pub struct PreparedGas<'a> {
     gas: Gas<'a>,
     look: &'a LookParameters,
@@ -53,22 +53,22 @@ pub struct PreparedGas<'a> {
     layers: DepthLayers,
     matter: DrawMode<'a>,
     sparks: Vec<Streak>,
-    /// Made where it is measured or bends what lies behind.
+    /// Computed where it is requested as an AOV or bends the light from behind.
     haze: OnceLock<Option<HeatHaze>>,
 }
 
-/// Particles that one task takes.
+/// Particles per task of the thread pool.
 pub(crate) const PARTICLES_PER_TASK: usize = 2048;
 
-/// What is drawn of the particles.
+/// How the particles are drawn.
 enum DrawMode<'a> {
-    /// Nothing that the view could see.
+    /// The view sees no particles.
     Empty,
-    /// Gas that other parts of the picture show.
+    /// Particles are visible only outside the window that is drawn.
     OutsideWindow,
-    /// Sums of sprites.
+    /// Sprites summed on a grid.
     SplattedGas(Box<SplattedGas<'a>>),
-    /// Squares.
+    /// The paper's density squares.
     Squares(Squares),
 }
 
@@ -79,12 +79,12 @@ struct SplattedGas<'a> {
     across: RowInterpolator,
     detail: Option<(Detail, Strain)>,
     scattered: Vec<[f32; 3]>,
-    /// Where it is measured, and anything glows.
+    /// Where AOVs are requested, and anything glows.
     motion: Option<MotionField<'a>>,
     temperatures: [f32; 2],
 }
 
-/// The fire whose sparks fly.
+/// Sparks of the fire.
 fn spark_emitter<'a>(gas: &Gas, look: &'a LookParameters, view: &View) -> SparkEmitter<'a> {
     SparkEmitter {
         parameters: &look.sparks,
@@ -98,7 +98,7 @@ fn spark_emitter<'a>(gas: &Gas, look: &'a LookParameters, view: &View) -> SparkE
     }
 }
 
-/// The stretches of depth that the gas and its sparks fill.
+/// Depth intervals of the gas and its sparks.
 pub fn depth_intervals(gas: &Gas, look: &LookParameters, view: &View) -> Vec<DepthInterval> {
     if gas.particles.is_empty() && look.sparks.rate <= 0.0 {
         return Vec::new();
@@ -142,7 +142,7 @@ impl<'a> PreparedGas<'a> {
         Ok(prepared)
     }
 
-    /// The layers that lie in a slice, nearest first.
+    /// The layers in a slice, nearest first.
     fn layers_in<'b>(&'b self, slice: &'b DepthInterval) -> impl Iterator<Item = DepthLayer> + 'b {
         let thickness = self.layers.thickness;
         let layer = move |index| DepthLayer { index, depth: self.layers.center(index), thickness };
@@ -165,7 +165,7 @@ impl<'a> PreparedGas<'a> {
     }
 }
 
-/// Sums all sprites in their layers.
+/// Splats all sprites into their depth layers.
 fn splatted<'a>(
     gas: &Gas<'a>,
     look: &LookParameters,
@@ -219,15 +219,15 @@ fn splatted<'a>(
     }))
 }
 
-/// The gas that shows, as sprites of its light and shade.
+/// Visible particles as sprites of emission and absorption.
 struct RadianceSprites<'a> {
     gas: &'a Gas<'a>,
     look: &'a LookParameters,
     layers: &'a DepthLayers,
-    /// Opacity of a poly6 sprite beside the gas's density.
+    /// Opacity of a poly6 sprite per density.
     opacity: f64,
     detail: Option<&'a Detail>,
-    /// Time from the particles' state, s.
+    /// Time since the particles' state, s.
     seconds_since_state: f64,
 }
 
@@ -257,7 +257,7 @@ impl SpriteKind for RadianceSprites<'_> {
 }
 
 impl RadianceSprites<'_> {
-    /// What a ray through the middle of a particle's sprite sees.
+    /// Line integrals through the center of a particle's sprite.
     #[inline(always)]
     fn values(&self, seen: &ProjectedParticle) -> [f32; PLANES] {
         let (gas, index) = (self.gas, seen.index);
@@ -269,13 +269,13 @@ impl RadianceSprites<'_> {
         values
     }
 
-    /// The paper's sprite (section 5.2): opacity by density, colour by temperature.
+    /// The paper's sprite (section 5.2): opacity by density, color by temperature.
     #[inline(always)]
     fn density_values(&self, index: usize) -> [f32; PLANES] {
         self.emission_values(index, self.opacity * f64::from(self.gas.particles.density[index]))
     }
 
-    /// Optical depth, and what shines with it.
+    /// Optical depth, and the luminance that goes with it.
     #[inline(always)]
     fn emission_values(&self, index: usize, tau: f64) -> [f32; PLANES] {
         let glow = tau * self.gas.luminance(index);
@@ -293,7 +293,7 @@ fn mean_density(gas: &Gas) -> Option<f64> {
     (sum > 0.0).then(|| sum / densities.len() as f64)
 }
 
-/// What soot at a depth along the line of sight to the flame scatters where it hides everything: light of others, alike in all directions.
+/// Radiance that opaque soot at a depth scatters toward the camera: isotropic single scattering of other lights.
 fn scattered(gas: &Gas, look: &LookParameters, view: &View, depth: f64, surroundings: &Surroundings) -> [f32; 3] {
     let toward = (gas.particles.origin - view.camera.position).normalize_or(DVec3::NEG_Z);
     let position = view.camera.position + toward * depth;
@@ -313,7 +313,7 @@ impl Prepared for PreparedGas<'_> {
             DrawMode::Squares(squares) => squares.bounds(slice),
             _ => Rect::default(),
         };
-        // Gas that bends light reaches further than what shines of it.
+        // Gas that refracts extends farther than gas that emits.
         let all = self.measured_haze(slice).map_or(gas, |haze| gas.union(&haze.rect));
         let sparks = self.sparks.iter().filter(|spark| slice.contains(spark.depth));
         sparks.fold(all, |all, spark| all.union(&spark.bounds(self.view.size)))
@@ -359,7 +359,7 @@ impl Prepared for PreparedGas<'_> {
 }
 
 impl PreparedGas<'_> {
-    /// The haze, summed by all threads; where it is measured, strips find it made.
+    /// The haze, computed by all threads. Where AOVs are requested it exists before strips are drawn.
     fn haze(&self) -> Option<&HeatHaze> {
         let (summed, all) = match &self.matter {
             DrawMode::SplattedGas(splatted) if self.look.sprite == SpriteStyle::Integral => {
@@ -371,7 +371,7 @@ impl PreparedGas<'_> {
         get_or_make(&self.haze, || HeatHaze::new(&self.gas, self.look, self.view, summed, all)).as_ref()
     }
 
-    /// The haze where it is measured in a slice: in one alone, however many the layers fall into.
+    /// The haze, in the one slice in which its AOV is written.
     fn measured_haze(&self, slice: &DepthInterval) -> Option<&HeatHaze> {
         let is_here = self.view.measured && slice.contains(self.layers.center(self.layers.count - 1));
         self.haze.get().and_then(Option::as_ref).filter(|_| is_here)

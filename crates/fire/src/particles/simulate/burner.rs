@@ -1,4 +1,4 @@
-//! Burners: where gas is born, and the scales that follow from how large and how strong a burner is.
+//! Burners: where particles are spawned, and the length and velocity scales that follow from diameter and heat release rate.
 
 use std::sync::Arc;
 
@@ -30,22 +30,22 @@ const BASE_FROUDE: f64 = 0.4;
 #[derive(Clone, Debug)]
 pub(crate) struct Burner {
     pub(crate) parameters: BurnerParameters,
-    /// How it is turned and scaled; where it is changes over time.
+    /// Rotation and scale; the position varies over time.
     placement: Placement,
     area: BurnerSurface,
-    /// Width D across which gas burns: sets puffing and eddies, m.
+    /// Diameter D across which gas burns, m; it sets puffing frequency and eddy size.
     pub(crate) diameter: f64,
-    /// Area from which gas comes, m^2.
+    /// Area through which gas is emitted, m^2.
     pub(crate) area_m2: f64,
-    /// Mean height of the visible flame, m.
+    /// Mean visible flame height, m.
     pub(crate) height: f64,
-    /// Speed of gas at birth, m/s.
+    /// Exit velocity of gas, m/s.
     pub(crate) speed: f64,
-    /// Acceleration of gas along the axis, m/s^2.
+    /// Acceleration of gas along the plume axis, m/s^2.
     pub(crate) acceleration: f64,
-    /// Radius of a ball around its position that holds the burner, m.
+    /// Radius of a sphere around its position that encloses the burner, m.
     pub(crate) bounding_radius: f64,
-    /// Corners of the box around it as it is turned, beside its position, m.
+    /// Corners of its axis-aligned bounding box after rotation, relative to its position, m.
     pub(crate) extent: [DVec3; 2],
 }
 
@@ -58,12 +58,12 @@ enum BurnerSurface {
     Cuboid,
 }
 
-/// Where a particle is born, and which way it leaves.
+/// Position and direction at which a particle is spawned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SpawnPoint {
     pub(crate) position: DVec3,
     pub(crate) direction: DVec3,
-    /// How far it is from the middle of a disc or a strip: 0 there to 1 at the rim, a mean place elsewhere.
+    /// Radial position on a disc or strip: 0 at the center, 1 at the rim; a mean value for other shapes.
     pub(crate) radial_fraction: f64,
 }
 
@@ -102,23 +102,23 @@ impl Burner {
         })
     }
 
-    /// Where its middle is at `t`, m from the flame's position.
+    /// Position of its center at `t`, m from the flame's position.
     pub(crate) fn position(&self, t: f64) -> DVec3 {
         self.parameters.position.at(t).into()
     }
 
-    /// Speed of gas at `height` along the axis, m/s.
+    /// Speed of gas at `height` on the plume axis, m/s.
     pub(crate) fn axis_speed(&self, height: f64) -> f64 {
         math::sqrt(self.speed * self.speed + 2.0 * self.acceleration * height.max(0.0))
     }
 
-    /// Time that gas takes to the flame's tip, s.
+    /// Time that gas takes to rise to the flame's tip, s.
     pub(crate) fn rise_time(&self) -> f64 {
-        // The same as (axis_speed - speed) / acceleration, without the division by a vanishing acceleration.
+        // Equal to (axis_speed - speed) / acceleration, without dividing by a vanishing acceleration.
         2.0 * self.height / (self.speed + self.axis_speed(self.height))
     }
 
-    /// How often the fire puffs, Hz (Cetegen and Ahmed 1993).
+    /// Puffing frequency, Hz: `1.5 / sqrt(D)` (Cetegen and Ahmed 1993).
     pub(crate) fn puffing_hz(&self, flame: &FlameParticlesParameters) -> f64 {
         match flame.motion.puffing_hz {
             Auto::Set(hz) => hz,
@@ -126,7 +126,7 @@ impl Burner {
         }
     }
 
-    /// Where the particle `id` is born at `t`: as likely anywhere on the burner.
+    /// Spawn point of particle `id` at `t`, uniformly distributed over the burner.
     pub(crate) fn spawn_point(&self, key: Key, id: u64, t: f64) -> SpawnPoint {
         let words = key.words(id, 0, Purpose::named("birthplace"));
         let (position, direction) = self.sample_local(words);
@@ -140,7 +140,7 @@ impl Burner {
         SpawnPoint { position: placement.to_world(position), direction: placement.turn(direction), radial_fraction }
     }
 
-    /// Place and direction in the burner's own coordinates.
+    /// Position and direction in the burner's own coordinates.
     fn sample_local(&self, words: [u32; 4]) -> (DVec3, DVec3) {
         let [u, v, w, _] = words.map(|word| f64::from(uniform(word)));
         let radius = 0.5 * self.parameters.diameter;
@@ -162,7 +162,8 @@ impl Burner {
     }
 }
 
-/// Mean height of the visible flame, m, from the heat release rate in kW and the diameter in m (Heskestad 1983).
+/// Mean visible flame height `L = 0.235 Q^(2/5) - 1.02 D`, m, from the heat release rate Q in kW and the diameter D in m (Heskestad
+/// 1983).
 pub fn heskestad(heat_release_kw: f64, diameter: f64) -> f64 {
     0.235 * math::pow(heat_release_kw, 0.4) - 1.02 * diameter
 }
@@ -174,14 +175,14 @@ struct Size {
     mesh: Option<Arc<Mesh>>,
 }
 
-/// Corners of the box around a mesh as it is turned.
+/// Corners of the bounding box of a rotated mesh.
 fn extent(mesh: &Mesh, placement: &Placement) -> [DVec3; 2] {
     let corners = mesh.triangles().flatten().map(|corner| placement.to_world(corner));
     let primitive_extent = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
     corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], primitive_extent)
 }
 
-/// The same of any other area.
+/// The same for the analytic shapes.
 fn primitive_extent(parameters: &BurnerParameters, placement: &Placement) -> [DVec3; 2] {
     let BurnerParameters { diameter, length, size, .. } = *parameters;
     let radius = 0.5 * diameter;
@@ -227,7 +228,7 @@ fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(BurnerSur
     })
 }
 
-/// A point on the surface of a box, each part as likely as its area.
+/// Uniformly distributed point on the surface of a box, and its normal.
 fn box_surface_point(sides: [f64; 3], [which, u, v]: [f64; 3]) -> (DVec3, DVec3) {
     let faces = [0, 1, 2].map(|axis| sides[(axis + 1) % 3] * sides[(axis + 2) % 3]);
     let mut wanted = which * 2.0 * faces.iter().sum::<f64>();

@@ -1,40 +1,41 @@
-//! Gas against solids: it stops where its way meets one and slides along it.
+//! Continuous collision detection of particles with solids: particles stop at a surface and slide along it.
 
 use bansho_base::{
     math::{DVec3, Vec3},
     phenomenon::surroundings::Occluder,
 };
 
-/// Most solids that turn a particle's way in one step, and how often each may.
+/// Most passes over all solids per step; a particle that has not come to rest by then does not move.
 const MAX_ITERATIONS: usize = 3;
-/// Parts into which a way is cut at most to see whether it passes through a solid.
+/// Most sphere-tracing steps along one displacement.
 const MAX_MARCH_STEPS: f64 = 128.0;
-/// Halvings of the part in which a way meets a solid: what is left is nothing beside the clearance.
+/// Bisection steps that refine a contact; the remaining error is small compared with the clearance.
 const BISECTION_STEPS: usize = 8;
-/// By how much a distance may be too large: that to a mesh is measured beyond its grid by way of the grid's edge.
+/// Factor by which a distance may be overestimated: beyond its grid, the distance to a mesh is measured by way of the grid's edge.
 const DISTANCE_OVERESTIMATE: f64 = 3.0;
-/// Change of a way's end, in clearances, that is none.
+/// Change of the end point, in clearances, below which the iteration has converged.
 const CONVERGENCE_TOLERANCE: f64 = 1e-6;
 
-/// What stands in the gas's way.
+/// The solids that particles collide with.
 #[derive(Clone, Copy)]
 pub(crate) struct Colliders<'a> {
     pub(crate) occluders: &'a [Occluder],
-    /// Where places count from, m.
+    /// Origin of particle positions, m.
     pub(crate) origin: DVec3,
-    /// Distance from a surface at which particles stay, m.
+    /// Distance that particles keep from a surface, m.
     pub(crate) clearance: f32,
 }
 
-/// Where a way meets a solid.
+/// First contact of a displacement with a solid.
 struct Contact {
     position: DVec3,
-    /// Unit vector out of the solid.
+    /// Outward unit normal of the solid.
     normal: DVec3,
 }
 
 impl Colliders<'_> {
-    /// Where a particle at `position` comes by `displacement`, and what becomes of its velocities: of all only what points into a solid is taken.
+    /// Moves a particle from `position` by `displacement`, and removes the components of its velocities that point into solids.
+    /// Returns the new position and velocities.
     pub(crate) fn collide<const N: usize>(
         &self,
         position: Vec3,
@@ -61,11 +62,11 @@ impl Colliders<'_> {
                 return (end, velocities);
             }
         }
-        // Wedged between solids.
+        // Wedged between solids: it stays where it is.
         (position, [Vec3::ZERO; N])
     }
 
-    /// Where the way first lies within the clearance of a solid; none where it only leads out of it.
+    /// First contact within the clearance of a solid by sphere tracing; `None` where the displacement only leads out of it.
     fn contact(&self, occluder: &Occluder, start: DVec3, to: DVec3) -> Option<Contact> {
         let clearance = f64::from(self.clearance);
         let (displacement, length) = (to - start, (to - start).length());
@@ -92,7 +93,7 @@ impl Colliders<'_> {
         }
     }
 
-    /// The nearest place with clearance.
+    /// Projects a position out of a solid, to the clearance.
     fn push_out(&self, occluder: &Occluder, position: DVec3) -> DVec3 {
         let inside = f64::from(self.clearance) - occluder.signed_distance(position);
         if inside > 0.0 { position + occluder.normal(position) * inside } else { position }
@@ -114,13 +115,13 @@ mod tests {
         Colliders { occluders, origin: DVec3::ZERO, clearance: 0.01 }
     }
 
-    /// A level plate whose middle lies at the height 0.6.
+    /// A horizontal plate centered at a height of 0.6.
     fn plate(thickness: f64) -> Occluder {
         let half_extents = DVec3::new(3.0, 0.5 * thickness, 3.0);
         Occluder::Cuboid { centre: DVec3::Y * 0.6, half_extents, rotation: DQuat::IDENTITY }
     }
 
-    /// The same as a mesh of a box, two by 0.2 by two metres.
+    /// The same plate as a mesh, 2 x 0.2 x 2 m.
     fn slab() -> Occluder {
         let corner = |i: usize| [i & 1, i >> 1 & 1, i >> 2].map(|bit| bit as f32 - 0.5);
         let corners = (0..8).map(|i| std::array::from_fn(|axis| corner(i)[axis] * [2.0, 0.2, 2.0][axis])).collect();
@@ -139,7 +140,7 @@ mod tests {
         let (position, [remaining]) = solids.collide(Vec3::new(0.0, 0.2, 0.0), velocity * 0.1, [velocity]);
         assert!((position - Vec3::new(0.2, 0.1, 0.0)).length() < 1e-6, "{position}");
         assert_eq!(remaining, Vec3::new(2.0, 0.0, 0.0));
-        // From within the ground it comes out at once, and what leads away is free.
+        // A particle in the ground is pushed out at once; a velocity that leads away is unchanged.
         assert!((solids.collide(Vec3::Y * -0.3, Vec3::ZERO, [Vec3::ZERO]).0 - Vec3::Y * 0.1).length() < 1e-6);
         let rising = (Vec3::Y * 0.1, Vec3::Y * 0.05);
         assert_eq!(solids.collide(rising.0, rising.1, [rising.1]), (Vec3::Y * 0.15, [rising.1]));

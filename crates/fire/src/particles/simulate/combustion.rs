@@ -1,4 +1,7 @@
-//! What becomes of a particle: it heats where it burns, burns as fast as it finds air, cools by mixing and radiation, carries soot.
+//! Combustion and thermochemistry of particles: heating, fuel consumption, entrainment of air, soot formation, radiative cooling;
+//! and XSPH smoothing of velocity and temperature.
+//!
+//! Sixteen particles at a time.
 
 use crate::particles::{
     parameters::{LifeParameters, TemperatureLaw},
@@ -20,48 +23,48 @@ const SPECIFIC_HEAT: f32 = 1200.0;
 const STEFAN_BOLTZMANN: f32 = 5.670_374e-8;
 /// Planck-mean absorption of soot, 1/(m K), per volume fraction (Tien 1968): `kappa = 1862 f_v T`.
 const PLANCK_MEAN_SOOT_ABSORPTION: f32 = 1862.0;
-/// Temperature deep inside the flame, where gas waits for air, as a share of that at its front.
+/// Temperature inside the flame, where gas lacks air, relative to that at its front.
 pub(crate) const INNER_TEMPERATURE: f32 = 0.72;
-/// Times faster than burning gas, whose own heat makes up for it, burnt gas cools by mixing.
+/// Factor by which burnt gas cools faster by mixing than burning gas, whose heat release makes up for it.
 const BURNT_MIXING_FACTOR: f32 = 2.5;
-/// Fuel below which burning soot off begins, and above which soot has not formed.
+/// Fuel fractions between which soot exists: below the first it burns off, above the second it has not formed.
 const SOOT_FUEL_RANGE: [f32; 2] = [0.16, 0.97];
-/// Share of its fuel over which soot forms.
+/// Interval of the fuel fraction over which soot forms.
 const SOOT_FORMATION_WIDTH: f32 = 0.17;
-/// Most a particle's radius grows.
+/// Greatest growth of a particle's drawing radius.
 const MAX_RADIUS_GROWTH: f32 = 3.0;
 
-/// What of a particle changes as it lives.
+/// Thermochemical state of a particle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ParticleState<R> {
     /// Temperature, K.
     pub(crate) temperature: R,
-    /// Share of fuel left.
+    /// Fraction of fuel left.
     pub(crate) fuel: R,
     /// Volume fraction of soot.
     pub(crate) soot: R,
-    /// Support radius for drawing, m.
+    /// Support radius with which it is drawn, m.
     pub(crate) support_radius: R,
 }
 
-/// What acts on a particle for a time.
+/// Conditions that a particle is exposed to during a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AmbientConditions<R> {
-    /// How much of it lies at the edge of the gas: 0 inside to 1 alone.
+    /// Fraction of the particle that is exposed to air: 0 inside the gas, 1 isolated.
     pub(crate) air_exposure: R,
-    /// Share of its own mass that it takes up from the air, 1/s.
+    /// Entrainment rate: mass of air taken up per own mass, 1/s.
     pub(crate) mixing: R,
-    /// Share of a mean particle's fuel that burns, 1/s.
+    /// Fuel consumption rate of a mean particle, 1/s.
     pub(crate) burning: R,
-    /// Density of air as hot as it is, kg/m^3.
+    /// Density of air at the particle's temperature, kg/m^3.
     pub(crate) density: R,
     /// Temperature of the air, K.
     pub(crate) air_temperature: f32,
-    /// Support radius d at birth, m.
+    /// Support radius d at spawning, m.
     pub(crate) smallest_radius: f32,
 }
 
-/// The laws by which gas lives.
+/// Parameters of the combustion model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CombustionModel {
     reacting: bool,
@@ -88,7 +91,7 @@ impl From<&LifeParameters> for CombustionModel {
 }
 
 impl CombustionModel {
-    /// The particle after `seconds`.
+    /// The state after `seconds`.
     #[inline(always)]
     pub(crate) fn advance<R: Real>(
         &self,
@@ -97,7 +100,7 @@ impl CombustionModel {
         seconds: f32,
     ) -> ParticleState<R> {
         let splat = |value: f32| state.fuel.broadcast(value);
-        // Gas at the edge burns faster than the mean, gas inside slower; a mean exposure of a third burns as the mean.
+        // Exposed gas burns faster than the mean, enclosed gas slower; a mean exposure of 1/3 burns at the mean rate.
         let air = conditions.air_exposure.fma(splat(2.4 * self.air_hunger), splat(1.0 - 0.8 * self.air_hunger));
         let fuel = (state.fuel - conditions.burning * air * splat(seconds)).simd_max(splat(0.0));
         let growth = conditions.mixing.fma(splat(seconds * (1.0 / 3.0)), splat(1.0));
@@ -110,14 +113,14 @@ impl CombustionModel {
         }
     }
 
-    /// Heating, mixing and radiation, each implicit, so that no step is too long.
+    /// Temperature after heating, mixing and radiation. Each is integrated implicitly, so that any step is stable.
     #[inline(always)]
     fn temperature<R: Real>(&self, state: ParticleState<R>, conditions: &AmbientConditions<R>, seconds: f32) -> R {
         let splat = |value: f32| state.fuel.broadcast(value);
         let air = splat(conditions.air_temperature);
         let front = conditions.air_exposure.simd_sqrt().fma(splat(1.0 - INNER_TEMPERATURE), splat(INNER_TEMPERATURE));
         let (flame, heating) = (front * splat(self.flame_temperature), splat(seconds / self.heating_s));
-        // Burning gas nears the flame's temperature, burnt gas the air's.
+        // Burning gas approaches the flame temperature, burnt gas that of the air.
         let target = state.fuel.select_lt(splat(f32::MIN_POSITIVE), air, flame);
         let rate = state.fuel.select_lt(
             splat(f32::MIN_POSITIVE),
@@ -125,14 +128,14 @@ impl CombustionModel {
             heating,
         );
         let temperature = relax_implicit(state.temperature, target, rate);
-        // 4 sigma kappa (T^4 - T_air^4) / (rho c_p), as a rate toward the air's temperature.
+        // 4 sigma kappa (T^4 - T_air^4) / (rho c_p), as a relaxation rate toward the temperature of the air.
         let absorption = state.soot * temperature * splat(PLANCK_MEAN_SOOT_ABSORPTION);
         let fourth = temperature.fma(temperature, air * air) * (temperature + air);
         let power = absorption * fourth * splat(self.radiation * 4.0 * STEFAN_BOLTZMANN * seconds / SPECIFIC_HEAT);
         relax_implicit(temperature, air, power / conditions.density)
     }
 
-    /// Soot beside the most that forms: none in fresh gas, most where it burns, what is left as smoke in burnt gas.
+    /// Soot relative to the greatest amount: none in fresh gas, 1 where it burns, the smoke fraction in burnt gas.
     #[inline(always)]
     pub(crate) fn soot_fraction<R: Real>(&self, fuel: R) -> R {
         let splat = |value: f32| fuel.broadcast(value);
@@ -142,35 +145,36 @@ impl CombustionModel {
     }
 }
 
-/// A value that nears another at such a rate, times the time, found implicitly.
+/// One implicit Euler step of relaxation toward `target`; `rate` is the rate times the time step.
 #[inline(always)]
 fn relax_implicit<R: Real>(value: R, target: R, rate: R) -> R {
     rate.fma(target, value) / (rate + rate.broadcast(1.0))
 }
 
-/// From 0 to 1, level at both ends.
+/// Cubic smoothstep from 0 to 1.
 #[inline(always)]
 fn smoothstep<R: Real>(x: R) -> R {
     let x = x.simd_clamp01();
     x * x * x.fma(x.broadcast(-2.0), x.broadcast(3.0))
 }
 
-/// Time in which `viscosity` and `conduction` say how far neighbours even out, s.
+/// Time to which the parameters `viscosity` and `conduction` refer, s.
 const SMOOTHING_TIME: f32 = 0.01;
-/// Share of the difference to the neighbours that a step evens out at most: a particle among thinner gas has more than its share of them,
-/// and shall not come out beyond them all.
+/// Greatest fraction of the difference to its neighbors that a step removes. A particle next to thinner gas has larger weights, and
+/// must not overshoot.
 const MAX_SMOOTHING: f32 = 0.5;
-/// Mean distance of the neighbours from a particle on a flat surface of the gas, in support radii.
+/// Mean offset of the neighbors of a particle on a flat surface of the gas, in support radii.
 const SURFACE_OFFSET: f32 = 0.2;
-/// Share of its own in a particle's density: from there on it counts as isolated, fully after as much more.
+/// A particle counts as isolated where its own contribution to its density exceeds the first fraction, fully after a further
+/// second.
 const ISOLATED_FRACTION: [f32; 2] = [0.2, 0.5];
 
-/// What acts on the gas for `seconds`.
+/// One combustion step of all particles, over `seconds`.
 pub(crate) struct CombustionStep<'a> {
     pub(crate) combustion: &'a CombustionModel,
     pub(crate) forces: &'a ExternalForces<'a>,
     pub(crate) neighbor_sums: &'a NeighborSums,
-    /// How far neighbours even out velocity and temperature in [`SMOOTHING_TIME`].
+    /// XSPH smoothing of velocity and of temperature over [`SMOOTHING_TIME`].
     pub(crate) smoothing: [f32; 2],
     /// How long burnt gas stays, s.
     pub(crate) afterlife: f32,
@@ -179,14 +183,14 @@ pub(crate) struct CombustionStep<'a> {
     pub(crate) seconds: f32,
 }
 
-/// What living reads of particles and does not change.
+/// Particle columns that the step reads.
 #[derive(Clone, Copy)]
 struct CombustionInputs<'a> {
     position: [&'a [f32]; 3],
     age: &'a [f32],
     burn_rate: &'a [f32],
     density: &'a [f32],
-    /// The particle's own weight among its neighbours', and the sums over all.
+    /// The particle's own weight, and the sums over its neighbors.
     weight: &'a [f32],
     sums: [&'a [f32]; 8],
 }
@@ -247,7 +251,7 @@ impl<'a> BatchUpdate<CombustionInputs<'a>, 9> for CombustionStep<'_> {
 }
 
 impl CombustionStep<'_> {
-    /// Lets the particles live, and writes down how much of each lies at the edge of the gas.
+    /// Smooths, burns and cools all particles, and writes how much each is exposed to air.
     pub(crate) fn update_thermochemistry(&self, particles: &mut Particles, air_exposure: &mut Vec<f32>) {
         air_exposure.resize(particles.len(), 0.0);
         let Particles { velocity: [u, v, w], temperature, fuel, soot, support_radius, max_age, .. } = particles;
@@ -263,7 +267,7 @@ impl CombustionStep<'_> {
         for_each_burner_batch(self, &self.forces.burner_forces, &particles.burner, inputs, living);
     }
 
-    /// How much of a particle lies at the edge of the gas: neighbours all on one side, or none.
+    /// Exposure to air: from the offset of the neighbors' center (a surface), or from missing neighbors.
     #[inline(always)]
     fn air_exposure<R: Real>(&self, weight: R, neighborhood: &Neighborhood<R>) -> R {
         let splat = |value: f32| weight.broadcast(value);
@@ -274,7 +278,7 @@ impl CombustionStep<'_> {
         offset.simd_max(isolated).simd_clamp01()
     }
 
-    /// What of the difference to the neighbours is smoothing_weights out in velocity and temperature.
+    /// Weights with which differences of velocity and temperature to the neighbors are added.
     #[inline(always)]
     fn smoothing_weights<R: Real>(&self, density: R) -> [R; 2] {
         let fraction = |smoothing: f32| (smoothing * self.seconds / SMOOTHING_TIME).min(MAX_SMOOTHING);
@@ -285,7 +289,7 @@ impl CombustionStep<'_> {
         ]
     }
 
-    /// Share of a mean particle's fuel that burns at a speed, 1/s.
+    /// Fuel consumption rate of a mean particle at a speed, 1/s.
     #[inline(always)]
     fn burn_rate_at_speed<R: Real>(&self, burner: &BurnerForces, speed: R) -> R {
         speed.fma(speed.broadcast(burner.burning[0]), speed.broadcast(burner.burning[1]))
@@ -305,7 +309,7 @@ impl CombustionStep<'_> {
         AmbientConditions { air_exposure, mixing, burning, density, air_temperature, smallest_radius: self.radius }
     }
 
-    /// Age at which a particle is removed: that which it had, or where it has just burnt out after its afterlife.
+    /// Age at which a particle is removed: unchanged, or its age plus the afterlife where it has just burnt out.
     #[inline(always)]
     fn removal_age<R: Real>(&self, old: &ParticleState<R>, new: &ParticleState<R>, age: R, removal_age: R) -> R {
         let none = age.broadcast(f32::MIN_POSITIVE);
@@ -361,7 +365,7 @@ mod tests {
 
     #[test]
     fn black_body_cooling_of_dense_soot_follows_the_fourth_power() {
-        // dT/dt = -4 sigma kappa T^4 / (rho c_p), by hand at 1500 K with one part in a million of soot.
+        // dT/dt = -4 sigma kappa T^4 / (rho c_p), worked by hand at 1500 K with 1e-6 of soot.
         let combustion = CombustionModel { heating_s: 1e9, radiation: 1.0, ..combustion() };
         let state = ParticleState { temperature: 1500.0, soot: 1e-6, ..STATE };
         let cooled = combustion.advance(state, &AmbientConditions { mixing: 0.0, ..CONDITIONS }, 1e-5);

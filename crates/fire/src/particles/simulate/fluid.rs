@@ -1,4 +1,4 @@
-//! The gas as a fluid: its order in space, its density, and the pressure that drives it apart.
+//! The gas as a fluid: density, pressure force, and sums over neighbors.
 
 use super::{derived::DerivedConstants, particle_lanes::PARTICLES_PER_TASK, particles::Particles};
 use crate::particles::parameters::{FluidParameters, Tension};
@@ -9,10 +9,10 @@ use bansho_sph::{
 };
 use rayon::prelude::*;
 
-/// Speed of gas against the gas neighbor_sums it, as a share of its speed.
+/// Speed of gas relative to its neighbors, as a fraction of its speed.
 const RELATIVE_SPEED: f32 = 0.15;
 
-/// What sums over neighbours are made with, and what they find.
+/// SPH solver: sorting, density, equation of state, pressure force and neighbor sums, with their buffers.
 #[derive(Clone, Debug)]
 pub(crate) struct FluidSolver {
     equation_of_state: StateEquation,
@@ -24,7 +24,7 @@ pub(crate) struct FluidSolver {
     /// Accelerations by pressure, m/s^2.
     pub(crate) acceleration: [Vec<f32>; 3],
     pub(crate) neighbor_sums: NeighborSums,
-    /// How much of each particle lies at the edge of the gas, as of this step's beginning.
+    /// Exposure to air of each particle at the beginning of this step, 0 to 1.
     pub(crate) air_exposure: Vec<f32>,
 }
 
@@ -49,13 +49,13 @@ impl FluidSolver {
         self.cells.support_radius()
     }
 
-    /// Sub-steps by the condition of Courant, Friedrichs and Lewy, for gas that moves with the gas neighbor_sums it.
+    /// Number of sub-steps by the Courant-Friedrichs-Lewy condition, for gas that moves relative to its neighbors.
     ///
-    /// Gas that would need more than are allowed keeps its time and loses stiffness: `compute_pressure_forces` holds k where sound goes no further than a
-    /// fifth of d in a sub-step, and the motion holds every force there.
+    /// Gas that would need more sub-steps than allowed is made more compressible: `compute_pressure_forces` limits k such that
+    /// sound travels at most a fifth of d in a sub-step, and the integration limits every acceleration.
     ///
-    /// No acceleration shortens them: buoyancy and wind move neighbours alike, pressure's is bounded by the sound that counts here, and
-    /// the motion holds what is left. The forces of the last step would also have to be part of every snapshot.
+    /// Accelerations do not enter the condition: buoyancy and wind move neighbors alike, that by pressure is bounded by the speed
+    /// of sound, and the integration limits the rest. Forces of the last step would also have to be part of every snapshot.
     pub(crate) fn substep_count(&self, particles: &Particles, seconds: f32) -> u32 {
         let [u, v, w] = &particles.velocity;
         let speed_squared = |index: usize| u[index] * u[index] + v[index] * v[index] + w[index] * w[index];
@@ -72,8 +72,8 @@ impl FluidSolver {
         substep_count(seconds, max_step, self.max_substeps)
     }
 
-    /// Sorts the particles, and finds their density (3), pressure (11) and its force (12) for a sub-step of `seconds`, with k held where
-    /// sound does not outrun it.
+    /// Sorts the particles and computes density (3), pressure (11) and pressure force (12) for a sub-step of `seconds`; k is
+    /// limited such that sound stays within a fifth of d.
     pub(crate) fn compute_pressure_forces(&mut self, particles: &mut Particles, seconds: f32) {
         self.air_exposure.resize(particles.len(), 0.0);
         particles.sort(&mut self.cells, &mut self.air_exposure);
@@ -94,15 +94,15 @@ impl FluidSolver {
         self.force.compute_accelerations(&self.cells, mass, density, &self.pressure, &mut self.acceleration);
     }
 
-    /// Lets every particle look around; [`compute_pressure_forces`](Self::compute_pressure_forces) has sorted them.
+    /// Sums over the neighbors of every particle, which [`compute_pressure_forces`](Self::compute_pressure_forces) has sorted.
     pub(crate) fn sum_over_neighbors(&mut self, particles: &Particles) {
         self.neighbor_sums.compute(&self.cells, particles);
     }
 }
 
-/// `w_j W` times 1, the differences of velocity and temperature, and the offset to the neighbour.
+/// `w_j W` times 1, the differences of velocity and temperature, and the offset to the neighbor.
 ///
-/// Weights `m / sqrt(rho)` make it even from both sides, so that evening out keeps momentum and heat.
+/// The weights `m / sqrt(rho)` are symmetric for each pair, so that smoothing conserves momentum and heat.
 struct NeighborSumsTerm(Poly6<3>);
 
 impl PairTerm<3, 5, 8> for NeighborSumsTerm {
@@ -121,16 +121,16 @@ impl PairTerm<3, 5, 8> for NeighborSumsTerm {
     }
 }
 
-/// What the sum says of one particle, or of several in the lanes of a vector.
+/// Neighbor sums of one particle, or of several in SIMD lanes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Neighborhood<R> {
     /// Sum of weights, the particle's own included.
     pub(crate) weight: R,
-    /// Differences of the neighbours' velocities.
+    /// Weighted differences of the neighbors' velocities.
     pub(crate) velocity: [R; 3],
-    /// Differences of their temperatures.
+    /// Weighted differences of the neighbors' temperatures.
     pub(crate) temperature: R,
-    /// Ways to them.
+    /// Weighted offsets to the neighbors.
     pub(crate) offset: [R; 3],
 }
 
@@ -141,12 +141,12 @@ impl<R> From<[R; 8]> for Neighborhood<R> {
     }
 }
 
-/// Sums over the neighbours of every particle, in sorted order.
+/// Sums over the neighbors of every particle, in sorted order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NeighborSums {
     /// `m / sqrt(rho)`.
     pub(crate) weights: Vec<f32>,
-    /// The numbers of each particle's [`Neighborhood`].
+    /// The components of each particle's [`Neighborhood`].
     pub(crate) sums: [Vec<f32>; 8],
 }
 

@@ -1,4 +1,4 @@
-//! How gas moves in a sub-step: pressure, buoyancy, wind and the air's own motion; sixteen particles at a time.
+//! Time integration of a sub-step: pressure, buoyancy, wind, and advection by the air; sixteen particles at a time.
 
 use bansho_base::math::{
     Vec3,
@@ -17,30 +17,30 @@ use std::ops::Range;
 
 use fearless_simd::{Simd, prelude::*};
 
-/// Gas is never faster, m/s.
+/// Greatest speed of gas, m/s.
 pub(crate) const MAX_SPEED: f32 = 150.0;
-/// Distance from a solid, in support radii, at which gas stays.
+/// Distance that gas keeps from solids, in support radii.
 const CLEARANCE: f32 = 0.2;
-/// Thinner gas feels no more of a wind that is a force per volume, kg/m^3.
+/// Least density for a wind that is a force per volume, kg/m^3.
 const MIN_DENSITY: f32 = 1e-6;
 
-/// What moves the gas for `seconds`.
+/// One sub-step of `seconds`.
 pub(crate) struct IntegrationStep<'a> {
     pub(crate) forces: &'a ExternalForces<'a>,
     /// Accelerations by pressure, m/s^2.
     pub(crate) acceleration: [&'a [f32]; 3],
-    /// How much of each particle lies at the edge of the gas.
+    /// Exposure to air of each particle, 0 to 1.
     pub(crate) air_exposure: &'a [f32],
     /// Support radius d, m.
     pub(crate) radius: f32,
     pub(crate) seconds: f32,
 }
 
-/// What of a particle its forces follow from.
+/// Inputs of the forces on a particle.
 #[derive(Clone, Copy, Debug)]
 struct ForceInputs<R> {
     velocity: [R; 3],
-    /// The part of the velocity that is not the air's.
+    /// Velocity without that of the air's own motion.
     own: [R; 3],
     acceleration: [R; 3],
     temperature: R,
@@ -48,7 +48,7 @@ struct ForceInputs<R> {
     air_exposure: R,
 }
 
-/// What moving reads of particles and does not change.
+/// Particle columns that the integration reads.
 #[derive(Clone, Copy)]
 struct IntegrationInputs<'a> {
     acceleration: [&'a [f32]; 3],
@@ -104,7 +104,7 @@ impl<'a> BatchUpdate<IntegrationInputs<'a>, 10> for IntegrationStep<'_> {
 }
 
 impl IntegrationStep<'_> {
-    /// Moves the particles, and they age.
+    /// Advances velocities, positions and ages.
     pub(crate) fn advance(&self, particles: &mut Particles) {
         let Particles { position: [x, y, z], velocity: [u, v, w], drift: [d, e, f], age, .. } = particles;
         let inputs = IntegrationInputs {
@@ -122,7 +122,7 @@ impl IntegrationStep<'_> {
     fn apply_forces<R: Real>(&self, burner: &BurnerForces, gas: &ForceInputs<R>, wind: &[R; 3]) -> [R; 3] {
         let Self { forces, seconds, .. } = *self;
         let splat = |value: f32| gas.density.broadcast(value);
-        // No force moves a particle by more than a quarter of d in a sub-step.
+        // No force moves a particle by more than d/4 in a sub-step.
         let max_acceleration = 0.25 * self.radius / (seconds * seconds);
         let mut acceleration = clamp_length(&gas.acceleration, max_acceleration);
         let density_ratio = gas.temperature * splat(1.0 / forces.air_temperature);
@@ -133,7 +133,7 @@ impl IntegrationStep<'_> {
                 add_scaled(&acceleration, wind, splat(forces.wind_gain) / gas.density.simd_max(splat(MIN_DENSITY)));
         }
         let accelerated = add_scaled(&gas.own, &acceleration, splat(seconds));
-        // Air that the gas takes up brings its own momentum.
+        // Entrained air brings its own momentum.
         let gain = if per_volume { 0.0 } else { forces.wind_gain };
         let air = [wind[0] * splat(gain), wind[1] * splat(gain), wind[2] * splat(gain)];
         let rate = burner.mixing(&gas.velocity, wind, gas.air_exposure) * splat(seconds);
@@ -146,9 +146,9 @@ impl IntegrationStep<'_> {
         if per_volume { mixed } else { self.apply_cross_drag(burner, &mixed, &air, density_ratio) }
     }
 
-    /// Velocity after the drag of air that blows across the fire: `C rho_air / (rho r) |w - u| (w - u)`, level and implicit.
+    /// Velocity after the drag of cross wind, horizontal and implicit: `C rho_air / (rho r) |w - u| (w - u)`.
     ///
-    /// Gas is several times thinner than air, so that a wind it would hardly mix with inputs bends it.
+    /// Hot gas is several times less dense than air, so that it also bends in wind that it hardly mixes with.
     #[inline(always)]
     fn apply_cross_drag<R: Real>(&self, burner: &BurnerForces, own: &[R; 3], air: &[R; 3], density_ratio: R) -> [R; 3] {
         let mut across = subtract(air, own);
@@ -157,7 +157,7 @@ impl IntegrationStep<'_> {
         add_scaled(own, &across, rate / (rate + rate.broadcast(1.0)))
     }
 
-    /// Where particles come with a velocity, of which a part is the air's, and what solids leave of both; the first `count` lanes count.
+    /// Positions, velocities and drift velocities after advection and collisions; the first `count` lanes are valid.
     #[inline(always)]
     fn advect<S: Simd>(
         &self,
@@ -185,7 +185,7 @@ impl IntegrationStep<'_> {
         vectors
     }
 
-    /// Carries the first `count` of places, velocities and the air's part of them around solids.
+    /// Collides the first `count` lanes with solids, one by one.
     #[inline(never)]
     fn resolve_collisions(&self, vectors: &mut [[[f32; LANES]; 3]; 3], count: usize) {
         let ExternalForces { occluders, origin, .. } = *self.forces;
@@ -194,7 +194,7 @@ impl IntegrationStep<'_> {
             let [position, velocity, drift] = vectors.map(|all| Vec3::from(all.map(|values| values[lane])));
             let (position, [remaining, own]) =
                 colliders.collide(position, velocity * self.seconds, [velocity, velocity - drift]);
-            // What the gas has of its own does not grow where a solid takes the air's part: eddies are a share of it.
+            // A collision that takes away drift must not increase the own velocity, to which eddies are proportional.
             let drift = if remaining == velocity { drift } else { remaining - own };
             for (all, vector) in vectors.iter_mut().zip([position, remaining, drift]) {
                 for c in 0..3 {
@@ -223,7 +223,7 @@ mod tests {
         },
     };
 
-    /// What the forces of particle `number` follow from, and the wind there.
+    /// Inputs of particle `number`, and the wind at it.
     fn accelerated(number: u64) -> (ForceInputs<f32>, [f32; 3]) {
         let key = Key::new(4, "pushed");
         let vector = |step: u32| {

@@ -1,4 +1,4 @@
-//! The state of the flame and its steps.
+//! The state of the flame, and its time steps.
 
 use crate::particles::{
     parameters::FlameParticlesParameters,
@@ -34,7 +34,7 @@ pub mod particles;
 pub(crate) mod snapshot;
 pub(crate) mod spawning;
 
-/// The gas and what it needs to move.
+/// The simulation: particles, and all that moves them.
 #[derive(Clone, Debug)]
 pub(crate) struct Simulation {
     pub(crate) constants: DerivedConstants,
@@ -64,10 +64,10 @@ impl Simulation {
         self.parameters.step_s
     }
 
-    /// Steps from `time` to one step later.
+    /// Advances from `time` by one step.
     ///
-    /// The gas moves in sub-steps. What is slow beside sound takes the step_seconds step at once, at its beginning: evening out, mixing, burning
-    /// and cooling, and how the wind and the axes change.
+    /// Pressure and advection run in sub-steps. Processes that are slow compared with sound run once, at the beginning of the step:
+    /// viscosity and conduction, mixing, burning and cooling, and changes of wind and plume axes.
     pub(crate) fn step(&mut self, time: f64, surroundings: &Surroundings) {
         let Self { constants, combustion, parameters, turbulence, key, particles, solver } = self;
         let step = StepConstants { parameters, constants, turbulence, key: *key };
@@ -104,7 +104,7 @@ impl Simulation {
         self.remove_expired();
     }
 
-    /// Removes what has lived its time or left the domain, and whatever is not a number.
+    /// Removes particles that have reached their greatest age, have left the domain, or are not finite.
     fn remove_expired(&mut self) {
         let [min, max] = self.constants.domain.map(|corner| corner.as_vec3());
         let Particles { position, velocity, temperature, age, max_age, .. } = &self.particles;

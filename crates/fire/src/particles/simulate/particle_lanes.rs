@@ -1,4 +1,7 @@
-//! Particles sixteen at a time, all of one burner: rows of a task's arrays.
+//! SIMD batches of sixteen particles that came from one burner, and vector operations on them.
+//!
+//! Particles of all burners are mixed in memory. Within each task their row indices are sorted by burner, and batches gather and
+//! scatter rows.
 
 use crate::particles::simulate::forces::external_forces::BurnerForces;
 use bansho_base::math::simd::{LANES, Lanes, Real};
@@ -6,22 +9,22 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Particles of a task.
+/// Particles per task of the thread pool.
 pub(crate) const PARTICLES_PER_TASK: usize = 512;
 
-/// What a task reads of its particles and does not change.
+/// Particle columns that a task only reads.
 pub(crate) trait SharedColumns: Copy + Sync {
-    /// What belongs to these particles.
+    /// The rows of one task.
     fn slice(self, range: Range<usize>) -> Self;
 }
 
-/// Work on `N` numbers of each particle, for sixteen of one burner at a time.
+/// An update of `N` columns, for a batch of sixteen particles of one burner at a time.
 pub(crate) trait BatchUpdate<S: SharedColumns, const N: usize>: Sync {
-    /// Works on rows of a task.
+    /// Updates some rows of a task.
     fn rows<V: Simd>(&self, simd: V, burner: &BurnerForces, rows: RowBatch, shared: S, moving: &mut [&mut [f32]; N]);
 }
 
-/// Works on all particles, burner by burner within each task.
+/// Runs an update over all particles, burner by burner within each task.
 pub(crate) fn for_each_burner_batch<S: SharedColumns, const N: usize>(
     work: &impl BatchUpdate<S, N>,
     burner_forces: &[BurnerForces],
@@ -55,23 +58,23 @@ fn update_task<V: Simd, S: SharedColumns, const N: usize>(
     }
 }
 
-/// The part of each array that belongs to each task.
+/// The slice of each column that belongs to each task.
 fn split_into_tasks<const N: usize>(arrays: [&mut Vec<f32>; N]) -> Vec<[&mut [f32]; N]> {
     let tasks = arrays.first().map_or(0, |values| values.len().div_ceil(PARTICLES_PER_TASK));
     let mut chunks = arrays.map(|values| values.chunks_mut(PARTICLES_PER_TASK));
     (0..tasks).map(|_| chunks.each_mut().map(|chunks| chunks.next().unwrap_or_default())).collect()
 }
 
-/// The rows of a task's arrays, burner by burner.
+/// Row indices of a task, sorted by burner.
 #[derive(Debug)]
 struct RowsByBurner {
     rows: Vec<u32>,
-    /// Where the rows of each burner end.
+    /// End of the rows of each burner.
     ends: Vec<usize>,
 }
 
 impl RowsByBurner {
-    /// Sorts the rows of a task whose particles came from these burners, of `count` that there are.
+    /// Counting sort of a task's rows by `burners`, of which there are `count`.
     fn new(burners: &[u32], count: usize) -> Self {
         let mut sorted = Self { rows: vec![0; burners.len()], ends: vec![0; count] };
         for burner in burners {
@@ -89,26 +92,26 @@ impl RowsByBurner {
         sorted
     }
 
-    /// The rows of a burner, upward.
+    /// The rows of a burner, ascending.
     fn of(&self, burner: usize) -> &[u32] {
         let start = if burner == 0 { 0 } else { self.ends[burner - 1] };
         &self.rows[start..self.ends[burner]]
     }
 }
 
-/// Up to sixteen rows, upward.
+/// Up to sixteen row indices, ascending.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowBatch<'a>(pub(crate) &'a [u32]);
 
 impl RowBatch<'_> {
-    /// The first row, if they are sixteen that follow each other.
+    /// The first row, if these are sixteen contiguous rows.
     #[inline(always)]
     fn contiguous_start(self) -> Option<usize> {
         let (first, last) = (self.0[0] as usize, self.0[self.0.len() - 1] as usize);
         (self.0.len() == LANES && last - first == LANES - 1).then_some(first)
     }
 
-    /// Their values; lanes beyond the last row hold the last row's.
+    /// Gathers values; lanes beyond the last row repeat it.
     #[inline(always)]
     pub(crate) fn load<S: Simd>(self, simd: S, values: &[f32]) -> Lanes<S> {
         if let Some(first) = self.contiguous_start() {
@@ -122,7 +125,7 @@ impl RowBatch<'_> {
         Lanes::from_slice(simd, &lanes)
     }
 
-    /// The values of several arrays.
+    /// Gathers values of several columns.
     #[inline(always)]
     pub(crate) fn load_all<S: Simd, const N: usize>(self, simd: S, arrays: [&[f32]; N]) -> [Lanes<S>; N] {
         let mut batches = [Lanes::splat(simd, 0.0); N];
@@ -132,7 +135,7 @@ impl RowBatch<'_> {
         batches
     }
 
-    /// Puts values into their rows.
+    /// Scatters values to their rows.
     #[inline(always)]
     pub(crate) fn store<S: Simd>(self, batch: Lanes<S>, values: &mut [f32]) {
         if let Some(first) = self.contiguous_start() {
@@ -147,19 +150,19 @@ impl RowBatch<'_> {
     }
 }
 
-/// Product of two vectors.
+/// Dot product.
 #[inline(always)]
 pub(crate) fn dot<R: Real>(one: &[R; 3], other: &[R; 3]) -> R {
     one[0].fma(other[0], one[1].fma(other[1], one[2] * other[2]))
 }
 
-/// Length.
+/// Euclidean length.
 #[inline(always)]
 pub(crate) fn length<R: Real>(vector: &[R; 3]) -> R {
     dot(vector, vector).simd_sqrt()
 }
 
-/// Difference of two vectors.
+/// `one - other`.
 #[inline(always)]
 pub(crate) fn subtract<R: Real>(one: &[R; 3], other: &[R; 3]) -> [R; 3] {
     let mut difference = *one;
@@ -179,7 +182,7 @@ pub(crate) fn add_scaled<R: Real>(one: &[R; 3], other: &[R; 3], factor: R) -> [R
     sum
 }
 
-/// The vector, or where it is longer than `max_length` one of that length.
+/// Scales a vector down to `max_length` where it is longer.
 #[inline(always)]
 pub(crate) fn clamp_length<R: Real>(vector: &[R; 3], max_length: f32) -> [R; 3] {
     let splat = |value: f32| vector[0].broadcast(value);

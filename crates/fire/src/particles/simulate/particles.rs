@@ -1,56 +1,56 @@
-//! The gas as particles: structure of arrays, one entry a particle in every array.
+//! Particles as structure of arrays.
 
 use bansho_base::math::DVec3;
 
 use bansho_sph::{Cells, retain};
 use rayon::prelude::*;
 
-/// How many arrays of numbers there are.
+/// Number of `f32` columns.
 pub(crate) const FLOAT_COLUMNS: usize = 21;
-/// Which of them are densities.
+/// Index of the density column.
 const DENSITY: usize = 14;
 
-/// One particle, for pushing into [`Particles`] and for tests.
+/// One particle, for [`Particles::push`] and for tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Particle {
-    /// Number of its birth, unique in the run: the key of all its random numbers.
+    /// Unique number in the run: it seeds all random numbers of the particle.
     pub id: u64,
-    /// Place x, m, from [`Particles::origin`].
+    /// Position x, m, relative to [`Particles::origin`].
     pub position: [f32; 3],
     /// Velocity u, m/s.
     pub velocity: [f32; 3],
     /// Mass m, kg.
     pub mass: f32,
-    /// Density rho at its place, eq. (3), kg/m^3.
+    /// Density rho at its position, eq. (3), kg/m^3.
     pub density: f32,
     /// Temperature T, K.
     pub temperature: f32,
-    /// Support radius d of the kernel with which it is drawn, m; grows as the particle mixes with air.
+    /// Support radius d of the kernel with which it is drawn, m; it grows as the particle entrains air.
     pub support_radius: f32,
-    /// Time since its birth, s.
+    /// Time since it was spawned, s.
     pub age: f32,
     /// Age at which it is removed, s.
     pub max_age: f32,
-    /// Share of its fuel that has not burnt: 1 at birth, 0 once burnt out.
+    /// Fraction of fuel left: 1 when spawned, 0 when burnt out.
     pub fuel: f32,
-    /// Volume fraction of soot, dimensionless (1e-6 is one part in a million, usual in a yellow flame).
+    /// Volume fraction of soot (about 1e-6 in a yellow flame).
     pub soot: f32,
 }
 
-/// All living particles, in the order of the cells that they were last sorted into.
+/// All particles, in the order of the cells that they were last sorted into.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Particles {
-    /// Where the positions count from, m.
+    /// Origin of positions, m.
     pub origin: DVec3,
     pub(crate) id: Vec<u64>,
     pub(crate) position: [Vec<f32>; 3],
     pub(crate) velocity: [Vec<f32>; 3],
     pub(crate) spawn_point: [Vec<f32>; 3],
-    /// The part of the velocity with which the air's own motion carries the particle, m/s.
+    /// Velocity by which the air's own motion advects the particle, m/s; part of `velocity`.
     pub(crate) drift: [Vec<f32>; 3],
-    /// How fast it burns beside the mean.
+    /// Burning rate relative to the mean.
     pub(crate) burn_rate: Vec<f32>,
-    /// Number of the burner it came from.
+    /// Index of the burner it came from.
     pub(crate) burner: Vec<u32>,
     pub(crate) mass: Vec<f32>,
     pub(crate) density: Vec<f32>,
@@ -63,27 +63,27 @@ pub struct Particles {
 }
 
 impl Particles {
-    /// None, with positions counted from `origin`.
+    /// No particles, with positions relative to `origin`.
     pub fn new(origin: DVec3) -> Self {
         Self { origin, ..Self::default() }
     }
 
-    /// How many live.
+    /// Number of particles.
     pub fn len(&self) -> usize {
         self.id.len()
     }
 
-    /// Whether none lives.
+    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.id.is_empty()
     }
 
-    /// Adds a particle of the first burner, born where it is; no other may have its birth number.
+    /// Appends a particle of the first burner, spawned at its position. Its id must be unique.
     pub fn push(&mut self, particle: Particle) {
         self.push_from(0, 1.0, particle);
     }
 
-    /// Adds a particle of a burner, which burns so much faster than the mean.
+    /// Appends a particle of a burner, with a burning rate relative to the mean.
     pub(crate) fn push_from(&mut self, burner: u32, burn_rate: f32, particle: Particle) {
         self.id.push(particle.id);
         self.burner.push(burner);
@@ -119,7 +119,7 @@ impl Particles {
         })
     }
 
-    /// Removes all whose mask is not set; the others keep their order.
+    /// Keeps the particles whose mask is set, in their order.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
         if keep.contains(&false) {
             retain(&mut self.id, keep);
@@ -128,8 +128,7 @@ impl Particles {
         }
     }
 
-    /// Sorts them into cells, and what else is known of each; their numbers of birth order those of one cell. Their densities are to be
-    /// found anew.
+    /// Sorts the particles by cell, then by id, and one more column with them. Densities are not sorted: they are to be recomputed.
     pub(crate) fn sort(&mut self, cells: &mut Cells<3>, companion: &mut Vec<f32>) {
         cells.assign(self.positions(), &self.id);
         cells.reorder(&mut self.id);
@@ -138,12 +137,12 @@ impl Particles {
         cells.reorder_all(arrays.map(|(_, values)| values).chain([companion]));
     }
 
-    /// Numbers of birth, no two alike.
+    /// Unique ids.
     pub fn ids(&self) -> &[u64] {
         &self.id
     }
 
-    /// Places x, y and z from the origin, m.
+    /// Positions x, y and z relative to the origin, m.
     pub fn positions(&self) -> [&[f32]; 3] {
         self.position.each_ref().map(Vec::as_slice)
     }
@@ -153,7 +152,7 @@ impl Particles {
         self.velocity.each_ref().map(Vec::as_slice)
     }
 
-    /// Places where they were born, m from the origin: with the age they name the gas, whatever became of it.
+    /// Positions at which they were spawned, relative to the origin, m: Lagrangian coordinates of the gas.
     pub fn spawn_positions(&self) -> [&[f32]; 3] {
         self.spawn_point.each_ref().map(Vec::as_slice)
     }
@@ -178,17 +177,17 @@ impl Particles {
         &self.support_radius
     }
 
-    /// Times since birth, s.
+    /// Ages, s.
     pub fn ages(&self) -> &[f32] {
         &self.age
     }
 
-    /// Ages at removal, s.
+    /// Ages at which they are removed, s.
     pub fn max_ages(&self) -> &[f32] {
         &self.max_age
     }
 
-    /// Shares of the fuel that have not burnt.
+    /// Fractions of fuel left.
     pub fn fuel_fractions(&self) -> &[f32] {
         &self.fuel
     }
@@ -198,7 +197,7 @@ impl Particles {
         &self.soot
     }
 
-    /// Every array of numbers, for what treats them all alike.
+    /// All `f32` columns.
     pub(crate) fn float_columns(&self) -> [&Vec<f32>; FLOAT_COLUMNS] {
         let Self { position: [x, y, z], velocity: [u, v, w], spawn_point: [a, b, c], drift: [d, e, f], .. } = self;
         let Self { burn_rate, mass, density, temperature, support_radius, age, max_age, fuel, soot, .. } = self;
@@ -227,7 +226,7 @@ impl Particles {
         ]
     }
 
-    /// As [`float_columns`](Self::float_columns), to change them.
+    /// All `f32` columns, mutable.
     pub(crate) fn float_columns_mut(&mut self) -> [&mut Vec<f32>; FLOAT_COLUMNS] {
         let Self {
             position: [x, y, z],

@@ -1,16 +1,16 @@
-//! The gas as bytes and back: version, count, then array after array.
+//! Serialization of the particles: version, count, then column after column, little-endian.
 
 use bansho_base::phenomenon::SnapshotError;
 
 use super::particles::{FLOAT_COLUMNS, Particles};
 
 const VERSION: u32 = 2;
-/// Larger than any place, speed, temperature or other number of a simulated particle, and small enough to be reckoned with.
+/// Larger than any value of a simulated particle, and small enough to compute with.
 const LARGEST: f32 = 1e12;
-/// Bytes of one particle: number of birth, burner, and all numbers.
+/// Bytes per particle: id, burner, and all `f32` columns.
 const PARTICLE: usize = 8 + 4 + 4 * FLOAT_COLUMNS;
 
-/// The particles' state; their origin belongs to the parameters.
+/// Writes the particles; their origin follows from the parameters.
 pub(crate) fn write(particles: &Particles) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(12 + PARTICLE * particles.len());
     bytes.extend(VERSION.to_le_bytes());
@@ -23,7 +23,7 @@ pub(crate) fn write(particles: &Particles) -> Vec<u8> {
     bytes
 }
 
-/// Puts the state back into particles with the same origin, of so many burners.
+/// Reads particles with the same origin, of that many burners.
 pub(crate) fn read(particles: &Particles, bytes: &[u8], burners: usize) -> Result<Particles, SnapshotError> {
     let (version, rest) = bytes.split_first_chunk::<4>().ok_or(SnapshotError::Damaged)?;
     let found = u32::from_le_bytes(*version);
@@ -46,7 +46,7 @@ pub(crate) fn read(particles: &Particles, bytes: &[u8], burners: usize) -> Resul
         rest = tail;
     }
     let known = read.burner.iter().all(|burner| (*burner as usize) < burners);
-    // Of what is not a number the comparison is false.
+    // Comparisons with NaN are false.
     let possible = read.float_columns().iter().all(|values| values.iter().all(|value| value.abs() <= LARGEST));
     if known && possible { Ok(read) } else { Err(SnapshotError::Damaged) }
 }

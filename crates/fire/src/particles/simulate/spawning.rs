@@ -1,4 +1,4 @@
-//! New particles, section 4.3 (1): each a pure function of its birth number.
+//! Spawning of particles, section 4.3 (1): each particle is a pure function of its id.
 
 use crate::particles::simulate::{
     burner::{Burner, SpawnPoint},
@@ -11,20 +11,20 @@ use bansho_base::math::{
     random::{Key, Purpose, uniform},
 };
 
-/// Bits of a birth number that count the births of one burner; those above are the burner's own number.
+/// Low bits of an id that count the particles of one burner; the high bits hold the burner's index.
 const ORDINAL_BITS: u32 = 40;
-/// How much the speed of gas at birth differs, as a share.
+/// Relative spread of the exit velocity.
 const SPEED_SPREAD: f32 = 0.3;
-/// Speed beside the mean in the middle of the burner, and how much less it is at the rim.
+/// Exit velocity relative to the mean at the center of the burner, and its decrease toward the rim.
 const SPEED_PROFILE: [f64; 2] = [1.25, 0.5];
-/// How fast gas from the middle burns beside the mean, and how much faster gas from the rim, which finds air first.
+/// Burning rate relative to the mean at the center of the burner, and its increase toward the rim, which is exposed to air.
 const BURN_RATE_PROFILE: [f64; 2] = [0.62, 0.9];
-/// How unevenly patches of gas burn, which makes tongues.
+/// Amplitude of the burning rate's noise, which makes tongues.
 const PATCHES: f64 = 0.3;
-/// Size of those patches, in diameters.
+/// Wavelength of that noise, in diameters.
 const PATCH_SIZE: f64 = 0.35;
 
-/// What births follow from.
+/// Spawns the particles of all burners.
 pub(crate) struct Spawner<'a> {
     pub(crate) constants: &'a DerivedConstants,
     pub(crate) turbulence: &'a TurbulenceTile,
@@ -33,9 +33,9 @@ pub(crate) struct Spawner<'a> {
 }
 
 impl Spawner<'_> {
-    /// Adds the particles that are born from `start` to `start + seconds`, as far along as they are at its end.
+    /// Spawns the particles of the interval from `start` to `start + seconds`, advanced to its end.
     ///
-    /// Births are counted since the preroll began, so that each is the same however long steps are.
+    /// They are counted since the beginning of the preroll, so that each is the same for any length of step.
     pub(crate) fn spawn(&self, particles: &mut Particles, start: f64, seconds: f64) {
         let constants = self.constants;
         for (number, burner) in constants.burners.iter().enumerate() {
@@ -51,16 +51,16 @@ impl Spawner<'_> {
         }
     }
 
-    /// How many were born until `t`, with parts of one.
+    /// Number of particles spawned until `t`, with its fraction.
     fn spawned_count(&self, number: usize, burner: &Burner, t: f64) -> f64 {
         let constants = self.constants;
-        // Warped time lets gas come in beats and keeps their mean.
+        // Warped time makes the flow pulsate and keeps its mean.
         let beat = std::f64::consts::TAU * constants.puffing_hz[number];
         let warped = |t: f64| t + constants.pulse / beat * math::sin(beat * t);
         constants.rates[number] * burner.parameters.flow.integral(warped(-constants.preroll), warped(t))
     }
 
-    /// Adds particle `id`, born at `t`, which is `age` old.
+    /// Spawns particle `id` at `t`; it has reached `age` at the end of the step.
     fn spawn_one(&self, particles: &mut Particles, number: usize, id: u64, t: f64, age: f64) {
         let (constants, burner) = (self.constants, &self.constants.burners[number]);
         let spawn_point = burner.spawn_point(self.key, id, t);
@@ -86,7 +86,7 @@ impl Spawner<'_> {
         particles.push_from(number as u32, burn_rate, particle);
     }
 
-    /// How fast gas burns beside the mean: faster from the rim, and in patches that come and go.
+    /// Burning rate relative to the mean: higher at the rim, and with noise that varies in space and time.
     fn burn_rate(&self, burner: &Burner, hz: f64, spawn_point: &SpawnPoint, t: f64) -> f64 {
         let profile =
             BURN_RATE_PROFILE[0] + BURN_RATE_PROFILE[1] * spawn_point.radial_fraction * spawn_point.radial_fraction;

@@ -1,4 +1,5 @@
-//! Sixteen particles at a time through a perspective lens: circles stay circles, so that a sprite's ellipse has a short closed form.
+//! Sixteen particles at a time through a perspective lens: the projection of a ball is close to a circle, so that its ellipse has a
+//! closed form.
 
 use bansho_base::{
     camera::{Camera, Lens},
@@ -14,25 +15,25 @@ use crate::particles::render::{
 
 type Batch = [f32; LANES];
 
-/// A perspective camera now and at the next frame.
+/// A perspective camera at this frame and the next.
 pub(crate) struct PerspectiveProjector {
     now: PinholeCamera,
     next: PinholeCamera,
-    /// Shutter time beside the time from frame to frame.
+    /// Exposure time as a fraction of the frame interval.
     shutter_fraction: f32,
     size: [f32; 2],
 }
 
-/// Particles in the picture.
+/// Projected particles.
 struct ProjectedBatch {
     pixel: [Batch; 2],
     depth: Batch,
-    /// Pixels a metre.
+    /// Pixels per meter.
     scale: Batch,
 }
 
 impl PerspectiveProjector {
-    /// `None` where the lens bends straight lines.
+    /// `None` where the lens is not rectilinear.
     pub(crate) fn new(gas: &Gas, view: &View, next: &Camera, shutter_fraction: f64) -> Option<Self> {
         let pinhole = |camera, t| PinholeCamera::new(camera, gas.particles.origin, t - gas.time);
         (view.camera.lens == Lens::Perspective).then(|| Self {
@@ -43,7 +44,7 @@ impl PerspectiveProjector {
         })
     }
 
-    /// Records the particles of `range` that are wanted and can be seen.
+    /// Records the particles of `range` that are included and visible.
     #[inline(always)]
     pub(crate) fn project<K: SpriteKind>(
         &self,
@@ -102,7 +103,7 @@ impl PerspectiveProjector {
         }
     }
 
-    /// Circles, smeared along their motion: the matrix `q + k b b^T`, b being the smear, has the eigenvalue q across it.
+    /// Circles blurred along their motion: the matrix `q + k b b^T` with the motion blur b has the eigenvalue q across it.
     #[inline(always)]
     fn ellipses(&self, gas: &Gas, chosen: &[usize], now: &ProjectedBatch, motion: &[Batch; 2]) -> EllipseBatch {
         const SMEAR: f32 = (1.0 / (12.0 * VARIANCE)) as f32;
@@ -125,7 +126,7 @@ impl PerspectiveProjector {
             ellipses.reach[0][lane] = xx.sqrt();
             ellipses.reach[1][lane] = yy.sqrt();
             ellipses.radius[lane] = across.sqrt();
-            // Only the part of a ball before the camera is seen.
+            // Only the part of a ball in front of the camera is visible.
             let in_front = ((now.depth[lane] - self.now.near) / radii[lane]).clamp(0.0, 1.0);
             let in_front = in_front * in_front * (3.0 - 2.0 * in_front);
             let peak = LINE_PEAK as f32 * in_front * now.scale[lane] * now.scale[lane] / determinant.sqrt();
@@ -142,16 +143,16 @@ struct EllipseBatch {
     peak: Batch,
 }
 
-/// A perspective camera beside the place from which particles count.
+/// A perspective camera relative to the particles' origin.
 struct PinholeCamera {
-    /// Right, up and backward in the world.
+    /// Right, up and backward in world axes.
     axes: [[f32; 3]; 3],
-    /// The particles' origin in the camera's frame, m.
+    /// The particles' origin in camera space, m.
     origin: [f32; 3],
     focal_pixels: f32,
     center: [f32; 2],
     near: f32,
-    /// Time from the particles' state, s.
+    /// Time since the particles' state, s.
     since: f32,
 }
 

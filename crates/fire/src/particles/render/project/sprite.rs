@@ -1,4 +1,4 @@
-//! From particles to what the picture sees of them: ellipses of falling weight.
+//! Projection of particles to elliptical sprites, for every lens.
 
 use bansho_base::{
     camera::{Camera, Lens, Projection},
@@ -16,47 +16,48 @@ use crate::particles::render::{
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-/// An ellipse around a place in the picture: `q = a u^2 + 2 b u v + c v^2` is 1 on its edge.
+/// An ellipse in the picture: `q = a u^2 + 2 b u v + c v^2` is 1 at its edge.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ellipse {
-    /// Pixels from the picture's left and top edges.
+    /// Center, pixels from the picture's top left corner.
     pub(crate) center: [f32; 2],
     /// a, b and c, 1/pixel^2.
     pub(crate) shape: [f32; 3],
-    /// How far it reaches sideways and upright, pixels.
+    /// Half extents of its bounding box, pixels.
     pub(crate) reach: [f32; 2],
-    /// Half its shorter axis, pixels.
+    /// Semi-minor axis, pixels.
     pub(crate) radius: f32,
-    /// What a ray through the middle sees of a particle of one cubic metre that absorbs 1/m.
+    /// Line integral through the center, for a particle of 1 m^3 with an absorption coefficient of 1/m.
     pub(crate) peak: f32,
 }
 
-/// A particle in the picture.
+/// A projected particle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ProjectedParticle {
     pub(crate) index: usize,
     pub(crate) ellipse: Ellipse,
     pub(crate) depth: f64,
-    /// Pixels to the right and down that it moves until the next frame.
+    /// Motion until the next frame, pixels to the right and down.
     pub(crate) motion: [f32; 2],
-    /// Pixels a metre.
+    /// Pixels per meter.
     pub(crate) scale: f32,
 }
 
-/// Sprites further out than this are of no picture, pixels.
+/// Sprites with coordinates beyond this are discarded, pixels.
 pub(crate) const MAX_PIXEL_COORDINATE: f64 = 1e6;
 
-/// A pixel's own footprint as the variance of a sprite: sprites are widened by it, so that the smallest neither flicker nor vanish.
+/// Variance of a pixel's footprint, pixels^2, that is added to every sprite (as in EWA splatting), so that the smallest neither
+/// flicker nor vanish.
 pub(crate) const PIXEL_FOOTPRINT: f64 = 0.18;
 
-/// Which particles are drawn, and as what.
+/// Which particles become sprites, and what is recorded of each.
 pub(crate) trait SpriteKind: Sync {
     type Record: Send + 'static;
     fn includes(&self, index: usize) -> bool;
     fn record(&self, projected: &ProjectedParticle) -> Self::Record;
 }
 
-/// The records of all particles that a view can see, in their own order, task by task.
+/// Records of all particles that a view sees, in order, one list per task.
 pub(crate) fn project_particles<'a, K: SpriteKind>(
     gas: &Gas<'a>,
     view: &View,
@@ -84,11 +85,11 @@ pub(crate) fn project_particles<'a, K: SpriteKind>(
     (0..count.div_ceil(PARTICLES_PER_TASK)).into_par_iter().map(of_task).collect()
 }
 
-/// The camera now and at the next frame.
+/// The camera at this frame and the next.
 struct ParticleProjector<'a> {
     view: &'a View,
     next: Camera,
-    /// Shutter time beside the time from frame to frame.
+    /// Exposure time as a fraction of the frame interval.
     shutter_fraction: f64,
 }
 
@@ -98,7 +99,7 @@ impl<'a> ParticleProjector<'a> {
         Self { view, next: view.camera_at(view.next_middle), shutter_fraction: view.shutter.duration() / frame }
     }
 
-    /// Hands a particle to `each`, twice where a panorama's seam cuts it.
+    /// Projects a particle and passes it to `each`; twice where it crosses the seam of a panorama.
     #[inline(always)]
     fn project(&self, gas: &Gas, index: usize, mut each: impl FnMut(ProjectedParticle)) {
         let position = gas.position(index, self.view.shutter.middle());
@@ -120,9 +121,9 @@ impl<'a> ParticleProjector<'a> {
         }
     }
 
-    /// The ellipse of a ball seen at `projection` that moves by `blur` pixels while the shutter is open.
+    /// The ellipse of a ball at `projection` with a motion blur of `blur` pixels.
     ///
-    /// A box of that length, and the pixel's footprint, widen the sprite to the same variance; what it holds stays the same.
+    /// The sprite is widened by the variance of a box of that length and of the pixel's footprint; its integral is unchanged.
     fn ellipse(
         &self,
         gas: &Gas,
@@ -163,12 +164,12 @@ impl<'a> ParticleProjector<'a> {
     }
 }
 
-/// The share of a ball that lies before the camera, where it stands within the ball.
+/// Fraction of a ball in front of the camera, where the camera is inside the ball.
 fn in_front(depth: f64, near: f64, radius: f64) -> f64 {
     bansho_base::math::smoothstep(near, near + radius, depth)
 }
 
-/// A step across a panorama's seam is taken the short way.
+/// The shorter way around a panorama.
 fn across_seam(camera: &Camera, step: DVec2) -> DVec2 {
     if camera.lens != Lens::Panorama {
         return step;
@@ -181,8 +182,8 @@ fn outer(v: DVec2) -> DMat2 {
     DMat2::from_cols(v * v.x, v * v.y)
 }
 
-/// Pixels to the right and down for a metre across the line of sight: alike in all directions for a perspective lens; the others
-/// stretch circles, by how far two short steps from the place come.
+/// Jacobian of the projection: pixels to the right and down per meter across the line of sight. A multiple of the identity for a
+/// perspective lens, by finite differences for others.
 fn lens_jacobian(camera: &Camera, position: DVec3, projection: &Projection) -> DMat2 {
     let round = DMat2::from_diagonal(DVec2::new(projection.pixels_per_metre, -projection.pixels_per_metre));
     if camera.lens == Lens::Perspective {
@@ -201,7 +202,7 @@ fn lens_jacobian(camera: &Camera, position: DVec3, projection: &Projection) -> D
     }
 }
 
-/// At a panorama's poles circles become bands; beyond this stretch the sprite stays as it is.
+/// Limits the anisotropy of sprites near a panorama's poles.
 fn limit_anisotropy(matrix: DMat2, scale: f64) -> DMat2 {
     const MOST: f64 = 40.0;
     let longest = matrix.x_axis.length().max(matrix.y_axis.length());

@@ -1,9 +1,9 @@
-//! Detail finer than the particles: where within a particle's reach gas burns, and where it does not.
+//! Detail finer than the particles: intermittency of burning.
 //!
-//! Sums over particles are as smooth as their kernels; a flame is not. At its edge, turbulent gas burns now here, now not
-//! (intermittency), in sheets with sharp rims. So the smooth optical depth tau is redistributed: a share gamma of the place burns, with
-//! the optical depth tau / gamma, the rest not at all. Which share does, fractal noise decides, which is carried in the gas's own
-//! coordinates and is stretched as the gas is. Over many places the mean stays tau, and with it the light of the exact sum.
+//! Sums over particles are as smooth as their kernels; a flame is not. In turbulent gas burning is intermittent, with sharp edges.
+//! The smooth optical depth tau is therefore redistributed: a fraction gamma of the area burns with the optical depth tau / gamma,
+//! the rest not at all. Fractal noise decides which, in Lagrangian coordinates, so that it is advected and stretched with the gas.
+//! The mean over area stays tau, and with it the mean light.
 
 use bansho_base::{
     math::{self, approximations, random::Purpose},
@@ -13,65 +13,65 @@ use bansho_base::{
 use crate::particles::parameters::LookParameters;
 use crate::particles::render::gas::Gas;
 
-/// A sigmoid of slope 1 is the distribution of noise of this standard deviation: pi / sqrt(3).
+/// Standard deviation of the logistic distribution, pi / sqrt(3): its CDF is a sigmoid of slope 1.
 const LOGISTIC: f32 = 1.813_799_4;
-/// Optical depth, in particles, beyond which gas burns no more densely: even cores have gaps.
+/// Optical depth, in particles, at which the burning fraction saturates: dense cores keep gaps.
 const MAX_DEPTH_PARTICLES: f32 = 2.5;
-/// Mean number of particles in the line of sight at which half of the place burns.
+/// Mean number of particles along the line of sight at which half of the area burns.
 const MEAN_PARTICLES_HALF_BURNING: f64 = 0.42;
-/// By how much more detail extends upward than sideways around a lone particle.
+/// Scale of detail along the vertical relative to the horizontal.
 const VERTICAL_SCALE: f64 = 0.45;
-/// How much hotter, as a share, gas looks where it burns most. Its luminance stays.
+/// Relative increase of temperature where gas burns most. Its luminance is unchanged.
 const HEAT: f32 = 0.03;
 
 /// Detail of one flame in one frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Detail {
     noise: Noise<3>,
-    /// 1 over the standard deviation of the noise, times [`LOGISTIC`].
+    /// [`LOGISTIC`] divided by the standard deviation of the noise.
     steepness: f32,
-    /// Cells a metre along x, y and z.
+    /// Noise cells per meter along x, y and z.
     pub(crate) cells_per_metre: [f32; 3],
-    /// Cells a second that the noise moves upward.
+    /// Noise cells per second by which the noise moves upward.
     rate: f64,
-    /// Where the noise begins at the time of this frame.
+    /// Origin of the noise at the time of the frame.
     base: [Coordinate; 3],
-    /// How far the noise moves while the shutter is open, cells.
+    /// Displacement of the noise while the shutter is open, cells.
     shift: [f32; 3],
-    /// Moments that are averaged while the shutter is open.
+    /// Time samples that are averaged over the exposure.
     time_samples: usize,
-    /// 1 / optical depth at which half of the place burns.
+    /// 1 / optical depth at which half of the area burns.
     inverse_half_depth: f32,
-    /// 1 / width of the transition between burning and not.
+    /// 1 / width of the transition between burning and not burning.
     sharpness: f32,
-    /// Exponent that keeps the mean in spite of that width.
+    /// Exponent that preserves the mean for that width.
     mean_exponent: f32,
     amount: f32,
-    /// Size of a cell of the noise, pixels.
+    /// Size of a noise cell, pixels.
     pub(crate) cell_pixels: f32,
 }
 
-/// Burning gas at sixteen places.
+/// Factors that detail applies at sixteen pixels.
 pub(crate) struct DetailFactors {
-    /// By what the optical depth is multiplied.
+    /// Factor of the optical depth.
     pub(crate) depth: [f32; LANES],
-    /// By what the temperature is multiplied.
+    /// Factor of the temperature.
     pub(crate) heat: [f32; LANES],
 }
 
-/// The view of the gas as detail sees it.
+/// Scales of the gas as seen by a view, from which detail follows.
 pub(crate) struct DetailScale {
-    /// Typical support radius, m.
+    /// Mean support radius, m.
     pub(crate) radius: f64,
-    /// Typical absorption coefficient, 1/m.
+    /// Mean absorption coefficient, 1/m.
     pub(crate) absorption: f64,
-    /// Pixels a metre.
+    /// Pixels per meter.
     pub(crate) pixels_per_metre: f64,
     /// Time at the middle of the exposure, s.
     pub(crate) time: f64,
-    /// How long the shutter is open, s.
+    /// Exposure time, s.
     pub(crate) exposure_s: f64,
-    /// How far what stands still moves before the camera while the shutter is open, m in the world.
+    /// Apparent motion of a static point while the shutter is open, m in world axes.
     pub(crate) camera_motion: [f64; 3],
 }
 
@@ -110,7 +110,7 @@ impl Detail {
         })
     }
 
-    /// Where in the noise particle `index` lies beyond what its place says, cells: the place at which it was born and the time since.
+    /// Offset of particle `index` in the noise relative to its position, cells: its displacement since it was spawned, and its age.
     #[inline(always)]
     pub(crate) fn detail_offset(&self, gas: &Gas, index: usize, since: f64) -> [f32; 3] {
         let particles = gas.particles;
@@ -124,10 +124,10 @@ impl Detail {
         detail_offset
     }
 
-    /// Whether so little gas is at sixteen places that detail could not be seen in it.
+    /// Whether the optical depth at sixteen pixels is too small for detail to be visible.
     #[inline(always)]
     pub(crate) fn is_negligible(&self, tau: &[f32; LANES]) -> bool {
-        /// Optical depth beside that at which half of the place burns; even the densest noise leaves this dark.
+        /// Optical depth, relative to that at which half of the area burns, that stays dark even at peaks of the noise.
         const LITTLE: f32 = 2e-4;
         let mut most = 0.0_f32;
         for lane in 0..LANES {
@@ -136,7 +136,8 @@ impl Detail {
         most * self.inverse_half_depth < LITTLE
     }
 
-    /// What burns at sixteen places of the noise, where the smooth optical depth is `tau` and so much of the detail is `visible_fraction`.
+    /// Detail at sixteen positions in the noise, where the smooth optical depth is `tau` and `visible_fraction` of the detail is
+    /// shown.
     #[inline(always)]
     pub(crate) fn burning(
         &self,
@@ -174,7 +175,7 @@ impl Detail {
         burning
     }
 
-    /// Noise while the shutter is open, `moment` from -1/2 to 1/2.
+    /// Noise at a time within the exposure, `moment` from -1/2 to 1/2.
     #[inline(always)]
     fn noise_at(&self, positions: &[[f32; LANES]; 3], moment: f32) -> [f32; LANES] {
         let (mut cells, mut fractions) = ([[0; LANES]; 3], [[0.0; LANES]; 3]);

@@ -1,4 +1,4 @@
-//! From what particles left on the grid to light and transmittance for each pixel.
+//! Resolves summed sprites to light and opacity, row by row and layer by layer, sixteen pixels at a time.
 
 use crate::particles::render::{
     resolve::{
@@ -21,64 +21,64 @@ pub(crate) mod spline;
 pub(crate) mod strain;
 pub(crate) mod upsample;
 
-/// Sums that a layer holds in each cell, as many as fill a vector.
+/// Values per cell and layer: one SIMD vector.
 pub(crate) const PLANES: usize = 8;
-/// Optical depth of soot.
+/// Plane of the optical depth of soot.
 pub(crate) const TAU: usize = 0;
-/// Optical depth times luminance of a black body as hot.
+/// Plane of optical depth times luminance of a black body at the particle's temperature.
 pub(crate) const LUMINANCE: usize = 1;
-/// The same times temperature.
+/// Plane of the same times temperature.
 pub(crate) const LUMINANCE_KELVIN: usize = 2;
-/// Optical depth times where in its detail the gas lies (three planes).
+/// Three planes of optical depth times offset in the detail noise.
 pub(crate) const DETAIL_OFFSET: usize = 3;
-/// Luminance of the blue light.
+/// Plane of the luminance of CH and C2.
 pub(crate) const BLUE: usize = 6;
-/// Path lengths by which the gas is optically shorter than the air, in pixels, for `haze`.
+/// Plane of the optical path difference to air, in pixels, for heat haze.
 pub(crate) const PATH: usize = 7;
 
 type Batch = [f32; LANES];
 
-/// Sums below this are none.
+/// Least optical depth that is divided by.
 const MIN_DEPTH: f32 = 1e-30;
 
-/// How sums become light.
+/// Converts sums to light.
 pub(crate) struct GasResolver<'a> {
     pub(crate) grid: &'a Grid<'a>,
     pub(crate) camera: &'a Camera,
-    /// Where the places of detail count from, m.
+    /// Origin of detail coordinates, m.
     pub(crate) origin: DVec3,
     pub(crate) detail: Option<(&'a Detail, &'a Strain)>,
-    /// Whether light is that of soot that hides itself, `B (1 - exp(-tau))`, or simply the sum (the paper).
+    /// Whether soot absorbs its own light, `B (1 - exp(-tau))`, or emission is the plain sum (the paper).
     pub(crate) hides_itself: bool,
-    /// ACEScg of luminance 1.
+    /// Color of CH and C2: ACEScg of luminance 1.
     pub(crate) blue: [f32; 3],
-    /// What the soot of each layer scatters toward the camera where it hides everything, ACEScg, cd/m^2.
+    /// Radiance that opaque soot of each layer scatters toward the camera, ACEScg, cd/m^2.
     pub(crate) scattered: &'a [[f32; 3]],
-    /// Interpolation of each phase of a cell.
+    /// Spline weights for each pixel phase within a cell.
     pub(crate) weights: &'a [[f32; 4]],
-    /// Interpolation along a row.
+    /// Interpolation along rows.
     pub(crate) across: &'a RowInterpolator,
     /// Least and greatest temperature of the gas, K.
     pub(crate) temperatures: [f32; 2],
 }
 
-/// One layer of the gas in a strip.
+/// One depth layer of the gas.
 pub(crate) struct DepthLayer {
     pub(crate) index: usize,
-    /// Depth of its middle, m.
+    /// Depth of its center, m.
     pub(crate) depth: f64,
     pub(crate) thickness: f64,
 }
 
-/// A row of pixels, still in cells.
+/// One row of cells, interpolated vertically.
 pub(crate) struct RowBuffer {
-    /// The sums of all layers.
+    /// Sums of all layers.
     sums: Vec<f32>,
-    /// The strain of the layer that was filled last.
+    /// Detail strain of the layer that was filled last.
     strain: Vec<f32>,
 }
 
-/// The gas of one layer at sixteen pixels.
+/// Sums of one layer at sixteen pixels.
 pub(crate) struct LayerSums {
     pub(crate) tau: Batch,
     pub(crate) glow: Batch,
@@ -87,12 +87,12 @@ pub(crate) struct LayerSums {
 }
 
 impl GasResolver<'_> {
-    /// Scratch for [`fill`](Self::fill).
+    /// Buffers for [`fill`](Self::fill).
     pub(crate) fn row(&self) -> RowBuffer {
         RowBuffer { sums: vec![0.0; self.grid.row_length()], strain: vec![0.0; self.grid.cells.columns] }
     }
 
-    /// The sums of a layer along row `y` of the picture, and the pixels that hold anything.
+    /// Fills the buffer with the sums of a layer along row `y` of the picture; returns the range of pixels that may hold anything.
     #[inline(always)]
     pub(crate) fn fill(
         &self,
@@ -105,9 +105,9 @@ impl GasResolver<'_> {
         let (cell, phase) = cells.cell_before(1, y);
         let [first, last] = extents.around(layer, cell)?;
         let pixel = |column: i64| ((column + i64::from(cells.first[0])) * cells.size as i64).max(0) as usize;
-        // Where cubic interpolation reaches.
+        // Support of cubic interpolation.
         let pixels = [pixel(i64::from(first) - 2), pixel(i64::from(last) + 3)];
-        // All that sixteen pixels at a time look at is filled: what rows before have left there depends on where a strip begins.
+        // Whole batches of sixteen pixels are filled: cells that earlier rows left there would depend on where a strip begins.
         let [begin, end] = [pixels[0] / LANES * LANES, pixels[1].next_multiple_of(LANES)];
         let from = self.grid.first_of_four(cells.cell_before(0, begin).0);
         let to = self.grid.first_of_four(cells.cell_before(0, end.saturating_sub(1)).0) + 4;
@@ -129,7 +129,7 @@ impl GasResolver<'_> {
     #[inline(always)]
     pub(crate) fn sums(&self, row: &RowBuffer, layer: usize, x: usize) -> Option<LayerSums> {
         let mut planes = self.planes(row, layer, x, [TAU, LUMINANCE, LUMINANCE_KELVIN, BLUE]);
-        // Less than this is seen neither in light nor in shade.
+        // Less is visible neither as light nor as opacity.
         let (mut most_tau, mut most_blue) = (1e-6_f32, 1e-3_f32);
         for lane in 0..LANES {
             most_tau = most_tau.max(planes[0][lane]);
@@ -140,7 +140,7 @@ impl GasResolver<'_> {
         }
         for plane in &mut planes {
             for lane in 0..LANES {
-                // Cubics swing a little below nothing at the edges.
+                // Cubic splines undershoot at edges.
                 plane[lane] = plane[lane].max(0.0);
             }
         }
@@ -157,14 +157,14 @@ impl GasResolver<'_> {
         self.across.at(&row.sums, self.grid.depth, x, planes)
     }
 
-    /// How much of its detail the gas at sixteen pixels shows.
+    /// Fraction of its detail that the gas at sixteen pixels shows.
     #[inline(always)]
     fn visible_fraction(&self, row: &RowBuffer, x: usize) -> Batch {
         let [strain] = self.across.at(&row.strain, 1, x, [0]);
         strain::visible_fraction(&strain)
     }
 
-    /// Places in the detail of sixteen pixels.
+    /// Positions of sixteen pixels in the detail noise.
     #[inline(always)]
     fn noise_positions(
         &self,
@@ -193,7 +193,7 @@ impl GasResolver<'_> {
         Some(noise_positions)
     }
 
-    /// Adds a layer to the part `rect` of a strip, behind what it holds.
+    /// Composites a layer behind what `rect` of a strip holds.
     #[inline(always)]
     pub(crate) fn draw_layer(
         &self,
@@ -274,7 +274,7 @@ impl GasResolver<'_> {
             planes[3][lane] = 1.0 - approximations::exp(-depth);
             emission[lane] = if self.hides_itself { planes[3][lane] } else { depth };
         }
-        // Where nothing glows both are held to what there is, and luminance is 0: no lane asks for itself.
+        // Where nothing glows both denominators are clamped and luminance is 0, so that no lane branches.
         let (mut luminance, mut kelvin) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
             luminance[lane] = emission[lane] * glow[lane] / tau[lane].max(MIN_DEPTH);
@@ -288,7 +288,8 @@ impl GasResolver<'_> {
             }
         }
         for lane in 0..LANES {
-            // The sum's luminance is exact; its colour is that of its mean temperature, a little hotter where it burns most.
+            // The luminance is that of the sum; the color is that of the mean temperature, slightly hotter where the gas burns
+            // most.
             let own = color::luminance([planes[0][lane], planes[1][lane], planes[2][lane]]);
             let factor = luminance[lane] / own.max(1e-20);
             for c in 0..3 {
@@ -307,7 +308,7 @@ impl GasResolver<'_> {
 }
 
 impl GasResolver<'_> {
-    /// Mean temperature, K. Where hardly anything glows it is a ratio of rounding errors, so it is held to what is there.
+    /// Mean temperature, K, clamped to the range of the particles: where hardly anything glows it is a ratio of rounding errors.
     #[inline(always)]
     pub(crate) fn temperature(&self, heat: f32, glow: f32) -> f32 {
         let [coldest, hottest] = self.temperatures;
@@ -315,7 +316,7 @@ impl GasResolver<'_> {
     }
 }
 
-/// The sum of four cells' values of a layer, found at `starts` in `rows`, times weights.
+/// Weighted sum of four cells' values of a layer, found at `starts` in `rows`.
 #[inline(always)]
 fn weighted_cells(rows: [&[f32]; 4], starts: [usize; 4], weights: &[f32; 4]) -> [f32; PLANES] {
     let mut sums = [0.0; PLANES];
@@ -333,7 +334,7 @@ struct PixelLight {
     planes: [Batch; 4],
 }
 
-/// The columns of cells of each row and layer that hold anything.
+/// First and last occupied column of cells, for each row and layer.
 pub(crate) struct ColumnExtents {
     layers: usize,
     rows: Vec<[u32; 2]>,
@@ -356,13 +357,13 @@ impl ColumnExtents {
         Self { layers, rows }
     }
 
-    /// First and last column of a row of cells that hold anything.
+    /// First and last occupied column of a row of cells.
     pub(crate) fn of(&self, row: usize, layer: usize) -> Option<[u32; 2]> {
         let [first, last] = self.rows[row * self.layers + layer];
         (first <= last).then_some([first, last])
     }
 
-    /// First and last column that interpolation in the rows around `cell` can see.
+    /// First and last column within the support of interpolation in the rows around `cell`.
     fn around(&self, layer: usize, cell: i32) -> Option<[u32; 2]> {
         let rows = (self.rows.len() / self.layers) as i32;
         let extents = (cell - 1..=cell + 2)

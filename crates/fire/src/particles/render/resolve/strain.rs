@@ -1,7 +1,8 @@
-//! Where the gas carries its detail too finely to be shown: where streams of different birth meet, or gas was pressed together.
+//! Strain of the detail coordinates: where it is large, detail is too fine to be shown.
 //!
-//! Detail lies where the gas was born, a mean over the line of sight. Where that mean passes from one stream to another it runs through
-//! many cells of the noise within a particle's reach, which no flame does and no picture could show. There the smooth sum alone is drawn.
+//! Detail coordinates are mean Lagrangian coordinates along the line of sight. Where streams of different origin meet, or gas was
+//! compressed, they cross many noise cells within one support radius, which would alias. There detail fades, and the smooth sum
+//! alone is drawn.
 
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -11,14 +12,14 @@ use bansho_base::math::simd::LANES;
 use crate::particles::render::resolve::{ColumnExtents, DETAIL_OFFSET, PLANES, TAU};
 use crate::particles::render::splat::grid::Grid;
 
-/// How many times more finely than it was made detail may lie before it begins to fade, and when it is gone.
+/// Strain, relative to undeformed detail, at which detail begins to fade, and at which it has faded out.
 const FADE_RANGE: [f32; 2] = [1.0, 3.0];
 /// Optical depth below which a cell is empty.
 const MIN_DEPTH: f32 = 1e-6;
-/// Share of a cell's optical depth that a cell beside it must have to be compared with it.
+/// Least optical depth of a neighboring cell, relative to the cell's own, to be compared with.
 const MIN_NEIGHBOR_DEPTH: f32 = 0.02;
 
-/// The slope of the gas's own detail coordinates in each cell of each layer, beside that of detail as it was made.
+/// Gradient of the detail coordinates in each cell of each layer, relative to that of undeformed detail.
 pub(crate) struct Strain {
     layers: usize,
     columns: usize,
@@ -27,7 +28,7 @@ pub(crate) struct Strain {
 }
 
 impl Strain {
-    /// `cell` is the size of a cell of the noise as it was made, pixels.
+    /// `cell` is the size of an undeformed noise cell, pixels.
     pub(crate) fn new(grid: &Grid, extents: &ColumnExtents, layers: usize, cell: f32) -> Self {
         let (columns, rows, level) = (grid.cells.columns, grid.cells.rows, Level::new());
         let scale = cell / grid.cells.size as f32;
@@ -52,14 +53,14 @@ impl Strain {
         Self { layers, columns, rows, values }
     }
 
-    /// Values along a row of cells of a layer; those beyond the grid are none.
+    /// Values along a row of cells of a layer; rows beyond the grid repeat its edge.
     pub(crate) fn row(&self, row: i32, layer: usize) -> &[f32] {
         let row = row.clamp(0, self.rows as i32 - 1) as usize;
         &self.values[(row * self.layers + layer) * self.columns..][..self.columns]
     }
 }
 
-/// How much of its detail gas of a strain still shows.
+/// Fraction of detail that is shown at a strain.
 #[inline(always)]
 pub(crate) fn visible_fraction(strain: &[f32; LANES]) -> [f32; LANES] {
     let [begins, gone] = FADE_RANGE;
@@ -71,7 +72,7 @@ pub(crate) fn visible_fraction(strain: &[f32; LANES]) -> [f32; LANES] {
     visible_fraction
 }
 
-/// Where in the noise the gas of a cell lies, cells of the noise.
+/// Mean detail coordinates of a cell, in noise cells.
 struct DetailCoordinates {
     tau: f32,
     position: [f32; 3],
@@ -85,7 +86,7 @@ impl DetailCoordinates {
         Self { tau, position: [0, 1, 2].map(|axis| sums[DETAIL_OFFSET + axis] * inverse_depth) }
     }
 
-    /// The greatest distance in the noise to one of the cells beside.
+    /// Greatest distance in the noise to a neighboring cell.
     #[inline(always)]
     fn max_distance(&self, neighbors: &[Self; 4]) -> f32 {
         let mut greatest = 0.0_f32;

@@ -1,7 +1,7 @@
-//! Interpolation along a row of pixels, sixteen at a time.
+//! Interpolation along a row, sixteen pixels at a time.
 //!
-//! Each cell's value goes to all sixteen, times what it weighs at each: nothing has to change places between the lanes of a vector, as it
-//! would if every pixel looked up its own four cells.
+//! Each cell's value is broadcast and multiplied by its weights at the sixteen pixels. That needs no shuffles or gathers, as it
+//! would if each pixel fetched its own four cells.
 
 use std::ops::Range;
 
@@ -9,22 +9,22 @@ use bansho_base::math::simd::LANES;
 
 use crate::particles::render::splat::grid::Grid;
 
-/// What the cells around sixteen pixels weigh at each of them.
+/// The cells in the support of sixteen pixels.
 struct Span {
-    /// The first of the cells.
+    /// Index of the first cell.
     first: usize,
-    /// Where their weights are.
+    /// Range of their weights.
     weights: Range<usize>,
 }
 
-/// The cells around all pixels of a row of the whole picture.
+/// Weights of cells for all pixels of a row of the whole picture.
 pub(crate) struct RowInterpolator {
     spans: Vec<Span>,
     weights: Vec<[f32; LANES]>,
 }
 
 impl RowInterpolator {
-    /// For rows of `width` pixels, with the weights of the four cells around a pixel of each phase.
+    /// For rows of `width` pixels; `weights_of` are the weights of the four surrounding cells for each pixel phase.
     pub(crate) fn new(grid: &Grid, width: usize, weights_of: &[[f32; 4]]) -> Self {
         let columns = grid.columns(0, width);
         let mut across = Self { spans: Vec::with_capacity(columns.len().div_ceil(LANES)), weights: Vec::new() };
@@ -42,8 +42,8 @@ impl RowInterpolator {
         across
     }
 
-    /// Values at the sixteen pixels from `x` on, a multiple of sixteen: those of the cells begin `stride` apart in `row`, and of each
-    /// those at `places` are wanted. 0 beyond the picture.
+    /// Values at the sixteen pixels from `x` on, a multiple of sixteen: `places` are the planes wanted of cells that are `stride`
+    /// values apart in `row`. 0 beyond the picture.
     #[inline(always)]
     pub(crate) fn at<const N: usize>(
         &self,

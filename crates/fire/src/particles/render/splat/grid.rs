@@ -1,4 +1,4 @@
-//! A grid of cells over a part of the picture, several values a cell.
+//! A grid of cells over the picture, with several values per cell.
 
 use bansho_base::image::Rect;
 
@@ -7,25 +7,25 @@ use crate::particles::render::splat::scratch_pool::{PooledVec, ScratchPool};
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-/// Cells around what is covered that are looked at: two by interpolation, one by differences, two by the filter before them.
+/// Cells around the covered area that are read: two by interpolation, one by differences, two by the prefilter.
 const MARGIN: i32 = 5;
-/// The same where coarser grids are added, each of which is looked at as far beyond the finer one.
+/// The same where coarser grids are added, each of which is read as far beyond the finer one.
 const NESTED_MARGIN: i32 = 7;
 
-/// Where cells lie over the picture: cell (i, j) has its middle at `(i + 1/2) size` pixels of the whole picture, whatever part of it is
-/// drawn.
+/// Layout of cells over the picture: the center of cell (i, j) is at `(i + 1/2) size` pixels of the whole picture, independent of
+/// the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Raster {
     /// Side of a cell, pixels.
     pub(crate) size: usize,
-    /// The first column and row of cells, counted from the picture's corner.
+    /// First column and row, counted from the picture's corner.
     pub(crate) first: [i32; 2],
     pub(crate) columns: usize,
     pub(crate) rows: usize,
 }
 
 impl Raster {
-    /// The cells of `size` pixels that hold `rect` with a margin; a grid among coarser and finer ones is `nested`.
+    /// The cells of `size` pixels that cover `rect`, with a margin; `nested` where coarser grids are added.
     pub(crate) fn around(rect: Rect, size: usize, nested: bool) -> Self {
         let margin = if nested { NESTED_MARGIN } else { MARGIN };
         let low = [rect.x, rect.y].map(|value| (value / size) as i32 - margin);
@@ -33,7 +33,7 @@ impl Raster {
         Self { size, first: low, columns: (high[0] - low[0]) as usize, rows: (high[1] - low[1]) as usize }
     }
 
-    /// Those of its cells that are `other`'s too.
+    /// Intersection with `other`.
     pub(crate) fn within(self, other: &Self) -> Self {
         let ends = |cells: &Self| [cells.first[0] + cells.columns as i32, cells.first[1] + cells.rows as i32];
         let first = [0, 1].map(|axis| self.first[axis].max(other.first[axis]));
@@ -58,58 +58,58 @@ impl Raster {
         Rect { x, y, width: right - x, height: bottom - y }
     }
 
-    /// A place of the picture in cells: whole numbers are their middles.
+    /// Pixel coordinates in cells; cell centers are integers.
     #[inline(always)]
     pub(crate) fn cell_coordinates(&self, pixel: [f32; 2]) -> [f32; 2] {
         let scale = 1.0 / self.size as f32;
         [pixel[0].mul_add(scale, -0.5), pixel[1].mul_add(scale, -0.5)]
     }
 
-    /// The cell before the middle of pixel `pixel` of an axis, and the pixel's phase between that cell and the next.
+    /// The cell whose center precedes that of a pixel along an axis, and the pixel's phase between it and the next.
     #[inline(always)]
     pub(crate) fn cell_before(&self, axis: usize, pixel: usize) -> (i32, usize) {
-        // In halves of a pixel, so that the whole part is the cell whose middle comes before.
+        // In half pixels, so that the integer part is the preceding cell center.
         let size = self.size as i32;
         let halves = 2 * pixel as i32 + 1 - size;
         (halves.div_euclid(2 * size) - self.first[axis], (halves.rem_euclid(2 * size) / 2) as usize)
     }
 
-    /// How far pixels of each phase lie from the middle of the cell before, cells.
+    /// Distance of pixels of each phase from the preceding cell center, cells.
     pub(crate) fn phases(&self) -> impl Iterator<Item = f32> + use<> {
         let size = self.size;
-        // The middles of even cells lie between pixels.
+        // The center of a cell of even size lies between pixels.
         let half = if size.is_multiple_of(2) { 0.5 } else { 0.0 };
         (0..size).map(move |phase| (phase as f32 + half) / size as f32)
     }
 }
 
-/// Values over cells: those of a cell lie side by side, so that one vector adds all of a sprite to it.
+/// Values over cells. The values of a cell are contiguous, so that one SIMD vector accumulates a whole sprite value.
 #[derive(Debug)]
 pub(crate) struct Grid<'a> {
     pub(crate) cells: Raster,
-    /// Values of a cell.
+    /// Values per cell.
     pub(crate) depth: usize,
     values: PooledVec<'a, f32>,
-    /// Where they begin: so that no cell of eight lies across two lines of the cache.
+    /// Start of the values, aligned so that no cell of eight values straddles two cache lines.
     start: usize,
 }
 
 impl<'a> Grid<'a> {
-    /// A grid of any values: whoever asks for it fills all its rows.
+    /// A grid with uninitialized (arbitrary) values: the caller fills all rows.
     pub(crate) fn new(cells: Raster, depth: usize, scratch: &'a ScratchPool) -> Self {
-        /// A line of the cache, bytes.
+        /// Cache line, bytes.
         const LINE: usize = 64;
         let count = cells.columns * cells.rows * depth + LINE / size_of::<f32>();
         let mut values = scratch.list(count);
         if values.len() < count {
-            // Zeros of the system's that nobody touches before they are wanted.
+            // Zero pages from the operating system, not touched before they are used.
             *values = vec![0.0; values.capacity()];
         }
         let start = values.as_ptr().align_offset(LINE).min(LINE / size_of::<f32>());
         Self { cells, depth, values, start }
     }
 
-    /// Where it came from.
+    /// The pool that its memory came from.
     pub(crate) fn scratch(&self) -> &'a ScratchPool {
         self.values.scratch()
     }
@@ -120,7 +120,7 @@ impl<'a> Grid<'a> {
         &mut self.values[self.start..][..count]
     }
 
-    /// Values from a row to the next.
+    /// Values per row.
     pub(crate) fn row_length(&self) -> usize {
         self.cells.columns * self.depth
     }
@@ -130,13 +130,13 @@ impl<'a> Grid<'a> {
         self.cells.covered()
     }
 
-    /// A row of cells; rows beyond the grid are those at its edge, which hold nothing.
+    /// A row of cells; rows beyond the grid repeat its edge, which is empty.
     pub(crate) fn row(&self, row: i32) -> &[f32] {
         let row = row.clamp(0, self.cells.rows as i32 - 1) as usize;
         &self.values[self.start + row * self.row_length()..][..self.row_length()]
     }
 
-    /// The first of the four columns around each pixel of a row from `x` on, and its phase.
+    /// For `count` pixels of a row from `x` on, the first of the four surrounding columns and the pixel's phase.
     pub(crate) fn columns(&self, x: usize, count: usize) -> Vec<(usize, usize)> {
         let column = |x: usize| {
             let (cell, phase) = self.cells.cell_before(0, x);
@@ -145,13 +145,13 @@ impl<'a> Grid<'a> {
         (x..x + count).map(column).collect()
     }
 
-    /// The first of the four columns around a place whose cell before is `cell`.
+    /// The first of the four columns around a position whose preceding cell is `cell`.
     #[inline(always)]
     pub(crate) fn first_of_four(&self, cell: i32) -> usize {
         (cell - 1).clamp(0, self.cells.columns as i32 - 4) as usize
     }
 
-    /// One value a cell: the sum over its layers of one of each layer's `planes` values.
+    /// One value per cell: the sum over layers of plane `plane` of `planes`.
     pub(crate) fn one_plane(&self, plane: usize, planes: usize) -> Self {
         let mut one = Self::new(self.cells, 1, self.scratch());
         one.values_mut().par_chunks_mut(self.cells.columns).enumerate().for_each(|(row, out)| {
@@ -162,10 +162,10 @@ impl<'a> Grid<'a> {
         one
     }
 
-    /// Adds sharpened cells twice as large, interpolated.
+    /// Adds prefiltered cells twice as large, interpolated.
     pub(crate) fn add_coarser(&mut self, coarser: &Grid) {
         let cells = self.cells;
-        // Middles of fine cells lie a quarter before and behind those of coarse ones.
+        // Centers of fine cells lie at 1/4 and 3/4 between those of coarse cells.
         let quarters = [spline::value(0.75), spline::value(0.25)];
         let (row_length, level) = (self.row_length(), Level::new());
         self.values_mut().par_chunks_mut(row_length).enumerate().for_each_init(
@@ -183,7 +183,7 @@ impl<'a> Grid<'a> {
         );
     }
 
-    /// Adds a row of these cells, interpolated, to one of cells half as large whose first is `first`.
+    /// Adds an interpolated row of these cells to a row of cells half as large whose first is `first`.
     #[inline(always)]
     fn add_interpolated(&self, row: &[f32], quarters: &[[f32; 4]; 2], first: i32, values: &mut [f32]) {
         let depth = self.depth;

@@ -1,4 +1,8 @@
-//! Particles onto the grid of the picture.
+//! Splatting: sums of sprites on a grid. Each band of rows belongs to one task, which adds sprites in order.
+//!
+//! A sprite is smooth, so that a grid of a few cells per radius represents it, and the cost hardly depends on the resolution or on
+//! the size of sprites. Sprites of different sizes go to grids of different cell size; coarse grids are added to finer ones by
+//! cubic interpolation.
 
 use crate::particles::render::{
     project::sprite::Ellipse,
@@ -20,14 +24,14 @@ pub(crate) mod kernel;
 pub(crate) mod rasterize;
 pub(crate) mod scratch_pool;
 
-/// Least radius of a sprite in cells, for which splines are exact to a few hundredths of a lone sprite's peak.
+/// Least radius of a sprite in cells, at which splines are accurate to a few percent of a single sprite's peak.
 pub(crate) const MIN_RADIUS_CELLS: f32 = 2.75;
-/// Rows of one task.
+/// Rows per task.
 const BAND: usize = 32;
 /// Coarsest grid: cells of 4096 pixels, twelve octaves.
 const MAX_LEVEL: usize = 24;
 
-/// One sprite: `P` values, weighted by its profile, go to layer `layer` and, with the share `next_layer_weight`, to the next.
+/// One sprite: `P` values, weighted by its profile, for layer `layer` and, with the weight `next_layer_weight`, the next.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sprite<const P: usize> {
     pub(crate) ellipse: Ellipse,
@@ -36,7 +40,7 @@ pub(crate) struct Sprite<const P: usize> {
     pub(crate) values: [f32; P],
 }
 
-/// What a grid of sprites holds.
+/// Parameters of a splat.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SplatSettings {
     pub(crate) profile: Profile,
@@ -45,31 +49,31 @@ pub(crate) struct SplatSettings {
     pub(crate) layers: usize,
     /// Size of the whole picture, pixels.
     pub(crate) picture: [usize; 2],
-    /// The part of it that is drawn.
+    /// The window of it that is drawn.
     pub(crate) window: Rect,
 }
 
-/// What a part of the picture shows of sprites.
+/// Result of a splat.
 #[derive(Debug)]
 pub(crate) enum SplatResult<'a> {
-    /// No sprite is seen in the whole picture.
+    /// No sprite is visible in the whole picture.
     Empty,
-    /// Sprites are seen in other parts of it.
+    /// Sprites are visible only outside the window.
     OutsideWindow,
-    /// Their sums.
+    /// Sums over cells.
     Sums(Grid<'a>),
 }
 
 impl<'a> SplatResult<'a> {
-    /// The sums, where there are any.
+    /// The sums, if any.
     pub(crate) fn sums(self) -> Option<Grid<'a>> {
         if let Self::Sums(grid) = self { Some(grid) } else { None }
     }
 }
 
-/// The sums of all sprites, task by task, on the finest grid that any of them needs, sharpened for splines.
+/// Sums all sprites, task by task, on the finest grid that any of them needs, as spline coefficients.
 ///
-/// Cells end where those of the whole picture do, so that a part of it shows the same of sprites that hardly reach it.
+/// Cells coincide with those of the whole picture, so that a window shows the same of sprites at its edge.
 pub(crate) fn splat<'a, const P: usize>(
     settings: &SplatSettings,
     tasks: &[PooledVec<Sprite<P>>],
@@ -104,31 +108,31 @@ pub(crate) fn splat<'a, const P: usize>(
     coarser.map_or(SplatResult::Empty, SplatResult::Sums)
 }
 
-/// A part of the picture with what lies beside it within sixteen pixels: what those are worth is asked of all of them together.
+/// Extends a rectangle to whole batches of sixteen pixels.
 fn aligned_to_lanes(rect: Rect) -> Rect {
     let (x, end) = (rect.x / LANES * LANES, rect.right().next_multiple_of(LANES));
     Rect { x, width: end - x, ..rect }
 }
 
-/// Side of the cells of a fineness, pixels: two to an octave, 1, 2, 3, 4, 6, 8, 12... (There is none of 1.5.)
+/// Cell size of a fineness, pixels: two per octave, 1, 2, 3, 4, 6, 8, 12... (1.5 does not exist).
 fn cell_size(fineness: usize) -> usize {
     if fineness.is_multiple_of(2) { 1 << (fineness / 2) } else { 3 << (fineness / 2 - 1) }
 }
 
 impl SplatSettings {
-    /// The largest cells that are fine enough for a sprite.
+    /// The fineness of the largest cells that are small enough for a sprite.
     fn fineness(&self, radius: f32) -> usize {
-        // The exponent of a number is its whole octaves, the first bit after it says whether it is half-way to the next.
+        // The exponent of a float counts octaves; its first mantissa bit tells the upper from the lower half of an octave.
         let octaves = ((radius / self.min_radius_cells).max(1.0).to_bits() >> 22) as usize - (127 << 1);
         if octaves == 1 { 0 } else { octaves.min(MAX_LEVEL) }
     }
 }
 
-/// What all sprites together cover and need.
+/// Bounds and sizes of all sprites.
 struct SpriteStatistics {
     low: [f32; 2],
     high: [f32; 2],
-    /// How many sprites each fineness suits.
+    /// Number of sprites for each fineness.
     counts: [usize; MAX_LEVEL + 1],
 }
 
@@ -159,11 +163,11 @@ impl SpriteStatistics {
         self
     }
 
-    /// The fineness that suits all but the smallest sprites; those are widened to it.
+    /// The fineness that suits all but the smallest sprites, which are widened to it.
     ///
-    /// A few far particles would otherwise buy a fine grid of the whole flame.
+    /// A few distant particles would otherwise require a fine grid of the whole flame.
     fn finest(&self) -> usize {
-        /// Share of the sprites that may be finer.
+        /// 1 / fraction of the sprites that may be smaller.
         const FINER: usize = 50;
         let total: usize = self.counts.iter().sum();
         let mut finer = 0;
@@ -174,7 +178,7 @@ impl SpriteStatistics {
         self.counts.iter().position(suits).unwrap_or(0)
     }
 
-    /// The pixels of the picture that sprites touch, and those beside them that are worked on with them.
+    /// The pixels of the picture that sprites touch, extended to whole batches.
     fn covered(&self, picture: [usize; 2]) -> Option<Rect> {
         let clip = |value: [f32; 2]| {
             let [x, y] = value.map(|value| value.max(0.0) as usize);
@@ -185,7 +189,7 @@ impl SpriteStatistics {
     }
 }
 
-/// Adds the sprites whose radius belongs `is_on_this_grid`, on this grid.
+/// Adds the sprites whose radius belongs to this grid.
 fn add_sprites<'a, const P: usize>(
     settings: &SplatSettings,
     tasks: &[PooledVec<'a, Sprite<P>>],
@@ -208,12 +212,12 @@ fn add_sprites<'a, const P: usize>(
     });
 }
 
-/// Rows of the grid that one thread fills.
+/// Rows of the grid that one task fills.
 struct RowBand<'a> {
-    /// The first row, and the columns, of the whole picture's cells.
+    /// First row and columns, in cells of the whole picture.
     first: i32,
     columns: Range<i32>,
-    /// The columns that a grid of the whole picture has.
+    /// Columns of the grid of the whole picture.
     whole_picture_columns: Range<i32>,
     layers: usize,
     values: &'a mut [f32],
@@ -233,7 +237,7 @@ impl RowBand<'_> {
                 for y in start..to.min(start + ROWS as i32) {
                     let row = &mut sums[(y - self.first) as usize * row_length..][..row_length];
                     let index = (y - start) as usize;
-                    // Runs begin where they do in the whole picture: the last one of a row reaches beyond the sprite's end.
+                    // Runs of eight cells begin where they do in the whole picture: the last of a row extends beyond the sprite.
                     let cut = (self.columns.start - chords.first[index]).max(0) / COLUMNS as i32 * COLUMNS as i32;
                     let end = chords.end[index].min(self.columns.end);
                     for x in (chords.first[index] + cut..end).step_by(COLUMNS) {
@@ -257,7 +261,7 @@ fn skip_first(weights: &[f32; COLUMNS], count: usize) -> [f32; COLUMNS] {
     std::array::from_fn(|lane| weights.get(lane + count).copied().unwrap_or(0.0))
 }
 
-/// The sprites of a task on a grid, and which of them touch which band: a counting sort that keeps their order.
+/// The sprites of a task, binned by row band with a counting sort that keeps their order.
 struct BinnedSprites<'a, const P: usize> {
     sprites: PooledVec<'a, RasterizedSprite<P>>,
     starts: Vec<u32>,

@@ -1,33 +1,33 @@
-//! Sprites among the cells of a grid: which they cover, and what they add there.
+//! Rasterization of sprites: the cells that a sprite covers, and its weights there.
 //!
-//! Places are those of the whole picture's cells, so that they are rounded alike whatever part of it is drawn.
+//! Coordinates are in cells of the whole picture, so that rounding does not depend on the window.
 
 use crate::particles::render::splat::{SplatSettings, Sprite, grid::Raster, kernel::Profile};
 use bansho_base::math::approximations;
 use std::ops::Range;
 
-/// The weights of eight cells are found at a time: about a row of a sprite,
+/// Cells per batch of weights: about one row of a sprite.
 pub(crate) const COLUMNS: usize = 8;
-/// and chords of sixteen rows: about all of it.
+/// Rows per batch of chords: about one sprite.
 pub(crate) const ROWS: usize = 16;
-/// How far cells and rows lie beyond the one before the first. (Without a zero, of which compilers make a special case.)
+/// Offsets of cells and rows from the one before the first. (Without a zero, which compilers would treat as a special case.)
 const BEYOND: [f32; ROWS] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0];
-/// Where `s = 1 - b^2/d^2` is less, a sprite has less than 1e-4 of its peak, and is not added.
+/// Least `s = 1 - b^2/d^2` that is drawn: there a sprite has 1e-4 of its peak.
 const FAINT: f32 = 0.045;
 
-/// A sprite in cells.
+/// A sprite in cell coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RasterizedSprite<const P: usize> {
     center: [f32; 2],
-    /// How `s` falls along a row, for the square of the distance from its middle: a.
+    /// Coefficient a of the ellipse: decrease of `s` along a row per squared distance from the row's middle.
     pub(crate) falloff: f32,
-    /// How far the middle of a row lies to the left, for each row below the centre: b/a.
+    /// b/a: shift of a row's middle to the left per row below the center.
     shear: f32,
-    /// How `s` falls from middle to middle, for the square of the distance from the centre: c - b^2/a.
+    /// c - b^2/a: decrease of `s` at the row's middle per squared distance from the center.
     row_falloff: f32,
     /// First row of the grid that it touches, and one past the last.
     pub(crate) rows: [i32; 2],
-    /// What goes to its own layer and, if anything, to the next.
+    /// Its layer, and the values for that layer and the next.
     layer: usize,
     own: [f32; P],
     next: [f32; P],
@@ -49,7 +49,7 @@ impl<const P: usize> RasterizedSprite<P> {
         let [a, b, c] = ellipse.shape.map(|value| value * scale);
         let shear = b / a;
         let row_falloff = c - b * shear;
-        // Sprites that had to be widened are dimmed.
+        // Widened sprites are attenuated.
         let attenuation = 1.0 / (widening * widening);
         let (mut own, mut next) = (sprite.values, sprite.values);
         for i in 0..P {
@@ -60,7 +60,7 @@ impl<const P: usize> RasterizedSprite<P> {
         Self { center, falloff: a, shear, row_falloff, rows, layer, own, next, spans_two_layers }
     }
 
-    /// The sprite in the rows from `first` on, where `s = 1 - (a u^2 + 2 b u v + c v^2)`.
+    /// Chords of the sprite in the rows from `first` on, where `s = 1 - (a u^2 + 2 b u v + c v^2)` is large enough.
     #[inline(always)]
     pub(crate) fn chords(&self, first: i32, columns: &Range<i32>) -> Chords {
         let before = (first - 1) as f32;
@@ -80,7 +80,7 @@ impl<const P: usize> RasterizedSprite<P> {
         chords
     }
 
-    /// Adds to a run of a row's cells that begins at column `x` of the grid. (Beyond the sprite weights are zero.)
+    /// Accumulates a run of cells that begins at column `x` of the grid. (Weights beyond the sprite are 0.)
     #[inline(always)]
     pub(crate) fn add(&self, row: &mut [[f32; P]], x: usize, layers: usize, weights: &[f32; COLUMNS]) {
         match (P == 1 && layers == 1, self.spans_two_layers) {
@@ -108,7 +108,7 @@ impl<const P: usize> RasterizedSprite<P> {
         }
     }
 
-    /// The same where a cell holds one value: the cells themselves fill the vector.
+    /// The same for one value per cell: a SIMD vector holds consecutive cells.
     #[inline(always)]
     fn add_lone(&self, cells: &mut [f32], weights: &[f32; COLUMNS]) {
         let value = self.own[0];
@@ -127,18 +127,18 @@ impl<const P: usize> RasterizedSprite<P> {
     }
 }
 
-/// What a sprite is in each of sixteen rows.
+/// Chords of a sprite in sixteen rows.
 pub(crate) struct Chords {
-    /// The column where it is strongest, and its `s` there.
+    /// Column of the greatest `s`, and `s` there.
     middle: [f32; ROWS],
     most: [f32; ROWS],
-    /// The first cell that it covers, and one past the last.
+    /// First cell covered, and one past the last.
     pub(crate) first: [i32; ROWS],
     pub(crate) end: [i32; ROWS],
 }
 
 impl Chords {
-    /// Weights of the cells of a row from column `x` on, where `s` falls by `falloff` for the square of each column's distance.
+    /// Weights of the cells of a row from column `x` on, where `s` decreases by `falloff` per squared column distance.
     #[inline(always)]
     pub(crate) fn weights(&self, profile: Profile, falloff: f32, row: usize, x: i32) -> [f32; COLUMNS] {
         let (before, middle, most) = ((x - 1) as f32, self.middle[row], self.most[row]);
@@ -153,7 +153,7 @@ impl Chords {
     }
 }
 
-/// A whole number, clamped from 0 to `most`.
+/// Truncated, and clamped to 0 ..= `most`.
 #[inline(always)]
 fn statistics(value: f32, most: i32) -> i32 {
     approximations::whole(value.max(0.0).min(most as f32))

@@ -1,4 +1,4 @@
-//! Memory of grids and sprites, handed from one frame to the next: fresh pages cost as much as half of what is done in them.
+//! Pool of scratch buffers, reused from frame to frame: page faults of fresh memory cost up to half as much as the work done in it.
 
 use std::{
     any::Any,
@@ -7,11 +7,11 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-/// Lists that nobody needs at the moment. A clone begins with none.
+/// Buffers that are not in use. A clone begins empty.
 #[derive(Default)]
 pub struct ScratchPool(Mutex<Vec<FreeVec>>);
 
-/// A list of some type, and how many items it has room for.
+/// An unused vector of some type, and its capacity.
 struct FreeVec {
     room: usize,
     list: Box<dyn Any + Send>,
@@ -30,13 +30,14 @@ impl fmt::Debug for ScratchPool {
 }
 
 impl ScratchPool {
-    /// A list with room for `count` items. It holds what it held when it was last used, or nothing.
+    /// Takes a vector with a capacity of at least `count`. Its contents are those of its last use, or empty.
     pub(crate) fn list<T: Send + 'static>(&self, count: usize) -> PooledVec<'_, T> {
         let list = self.find_free(count).unwrap_or_else(|| Vec::with_capacity(count + count / 4));
         PooledVec { list, scratch: self }
     }
 
-    /// The smallest list with room enough. Where there is none, the largest goes: there are never more than were in use at once.
+    /// The smallest unused vector with enough capacity. Where there is none the largest is dropped, so that there are never more
+    /// than were in use at once.
     fn find_free<T: 'static>(&self, count: usize) -> Option<Vec<T>> {
         let mut free = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let room = |index: &usize| free[*index].room;
@@ -48,7 +49,7 @@ impl ScratchPool {
     }
 }
 
-/// A list that goes back into memory when it is dropped.
+/// A vector that returns to the pool when it is dropped.
 pub(crate) struct PooledVec<'a, T: Send + 'static> {
     list: Vec<T>,
     scratch: &'a ScratchPool,

@@ -1,8 +1,9 @@
-//! Why flames narrow upward: gas that rises ever faster must draw together, since its volume stays.
+//! Entrainment toward the plume axis: why flames narrow upward.
 //!
-//! Where gas on the axis gains speed at the rate `du/dh`, continuity moves the gas around at `-(r/2) du/dh`; air enters a fire no
-//! faster than its entrainment allows, a share of the speed on the axis, and at the base about a fifth of `sqrt(g D)`. The axis is
-//! where the gas is: the mean place in each layer of height, so that it leans with the wind.
+//! Rising gas accelerates and its volume is conserved, so it must contract. Where gas on the axis gains speed at the rate `du/dh`,
+//! continuity moves the surrounding gas inward at `-(r/2) du/dh`. The inflow is limited to a fraction of the speed on the axis (the
+//! entrainment), plus about a fifth of `sqrt(g D)` at the base. The axis is the mean position of the gas in each layer of height,
+//! so it leans with the wind.
 
 use bansho_base::{
     math::{
@@ -17,30 +18,30 @@ use fearless_simd::{Simd, prelude::*};
 
 /// Layers of height.
 const LAYERS: usize = 24;
-/// Greatest speed at which gas draws together, as a share of the speed on the axis.
+/// Greatest inflow velocity as a fraction of the speed on the axis.
 const MAX_INFLOW_FRACTION: f32 = 0.2;
 
-/// What air at the base adds to that, in `sqrt(g D)`.
+/// Additional inflow velocity at the base, in `sqrt(g D)`.
 const INFLOW_FROUDE: f64 = 0.2;
 
-/// The axis of one burner's gas.
+/// The plume axis of one burner.
 #[derive(Clone, Debug)]
 pub(crate) struct PlumeAxis {
     base: f32,
-    /// Layers a metre.
+    /// Layers per meter.
     scale: f32,
     /// Mean x and z of the gas in each layer.
     centers: [[f32; 2]; LAYERS + 1],
     speed_squared: f32,
     acceleration: f32,
-    /// Speed of the air that flows in at the base, m/s.
+    /// Inflow velocity at the base, m/s.
     inflow: f32,
     strength: f32,
-    /// The burner's width, m: farther out gas belongs to another part of a large burner.
+    /// The burner's diameter, m. The inflow fades out between one and two of them from the axis.
     reach: f32,
 }
 
-/// The axes of all burners at `t`; the particles at `positions` came from burners of these numbers.
+/// The plume axes of all burners at `t`; `burner_indices` are the burners that the particles at `positions` came from.
 pub(crate) fn plume_axes(
     burners: &[Burner],
     positions: [&[f32]; 3],
@@ -81,7 +82,7 @@ impl PlumeAxis {
         axis
     }
 
-    /// Means of layers, each with the layers beside it; empty layers take over the one below.
+    /// Mean position of each layer and its two neighbors; an empty layer takes the mean below.
     fn smooth(&mut self, sums: &[[f64; 3]; LAYERS + 1]) {
         for layer in 0..=LAYERS {
             let beside = layer.saturating_sub(1)..(layer + 2).min(LAYERS + 1);
@@ -95,7 +96,7 @@ impl PlumeAxis {
         }
     }
 
-    /// Where the axis is at `height` above the burner: x and z, m.
+    /// Position of the axis at `height` above the burner: x and z, m.
     #[inline(always)]
     pub(crate) fn at(&self, height: f32) -> [f32; 2] {
         let layer = (height * self.scale).clamp(0.0, LAYERS as f32 - 1e-3);
@@ -103,7 +104,7 @@ impl PlumeAxis {
         [0, 1].map(|k| self.centers[below][k] + (self.centers[below + 1][k] - self.centers[below][k]) * fraction)
     }
 
-    /// Velocity at which gas at `position` draws toward the axis, m/s.
+    /// Velocity of gas at `position` toward the axis, m/s.
     #[inline(always)]
     pub(crate) fn velocity<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
         let splat = |value: f32| Lanes::splat(simd, value);
@@ -113,7 +114,7 @@ impl PlumeAxis {
         let distance = offset[0].fma(offset[0], offset[1] * offset[1]).simd_sqrt();
         let speed_squared = height.fma(splat(2.0 * self.acceleration), splat(self.speed_squared));
         let speed = speed_squared.simd_sqrt().simd_max(splat(1e-6));
-        // The pull of one axis ends where a large burner has others of its own.
+        // A large burner has several plumes: the inflow toward one axis ends at two diameters.
         let attenuation = (splat(2.0) - distance * splat(1.0 / self.reach)).simd_clamp01();
         let greatest = speed.fma(splat(MAX_INFLOW_FRACTION), splat(self.inflow));
         let inward =
@@ -122,7 +123,7 @@ impl PlumeAxis {
         [offset[0] * pull, splat(0.0), offset[1] * pull]
     }
 
-    /// Where the axis is at heights above the burner: x and z, m.
+    /// Position of the axis at heights above the burner: x and z, m.
     #[inline(always)]
     fn centers_at<S: Simd>(&self, simd: S, height: Lanes<S>) -> [Lanes<S>; 2] {
         let position = (height * height.broadcast(self.scale)).simd_min(height.broadcast(LAYERS as f32 - 1e-3));
@@ -160,7 +161,7 @@ mod tests {
     fn axis(strength: f64) -> PlumeAxis {
         let parameters = BurnerParameters { height: bansho_base::parameters::Auto::Set(1.0), ..Default::default() };
         let burner = Burner::new(&parameters, &FlameParticlesParameters::default(), &MemoryAssets::default()).unwrap();
-        // A column that leans to +x: x = y / 2.
+        // A column that leans toward +x: x = y / 2.
         let y: Vec<f32> = (0..200).map(|i| i as f32 / 150.0).collect();
         let x: Vec<f32> = y.iter().map(|y| 0.5 * y).collect();
         plume_axes(&[burner], [&x, &y, &[0.0; 200]], &[0; 200], strength, 0.0).remove(0)

@@ -1,4 +1,5 @@
-//! All that acts on the gas from outside in a step: wind, eddies, vortex rings, the draw toward the axis.
+//! External forces of a step: wind, eddies, vortex rings and inflow toward the plume axis, for each burner; sixteen particles at a
+//! time.
 
 use super::{
     entrainment_axis::{PlumeAxis, plume_axes},
@@ -26,23 +27,23 @@ use bansho_base::{
 use fearless_simd::{Simd, prelude::*};
 use rayon::prelude::*;
 
-/// Where turbulence has grown to half its strength, as a share of the time that gas takes to the tip.
+/// Age at which turbulence has grown to half its strength, as a fraction of the rise time.
 const TURBULENT_AGE: f32 = 0.1;
 
-/// Speed at which eddies drift beside the wind: the gas that holds them takes it up as it rises.
+/// Drift velocity of eddies as a fraction of the wind's: the gas that holds them takes up the wind as it rises.
 const EDDY_DRIFT: f64 = 0.5;
 
-/// Drag coefficient of a fire in wind from the side.
+/// Drag coefficient of a fire in cross wind.
 const CROSS_DRAG: f64 = 0.25;
 
-/// Share of its fuel that gas burns on a way as long as the flame is high, on the mean; and in the time that it takes there.
+/// Mean fraction of its fuel that gas burns per flame height of travel, and per rise time.
 const BURNED_PER_HEIGHT: f64 = 1.02;
 const BURNED_PER_RISE_TIME: f64 = 0.25;
 
-/// Particles of a task.
+/// Particles per task of the thread pool.
 const PARTICLES_PER_TASK: usize = 8192;
 
-/// What of a fire stays while it burns.
+/// What does not change while a fire burns.
 #[derive(Clone, Copy)]
 pub(crate) struct StepConstants<'a> {
     pub(crate) parameters: &'a FlameParticlesParameters,
@@ -51,25 +52,25 @@ pub(crate) struct StepConstants<'a> {
     pub(crate) key: Key,
 }
 
-/// What acts on the gas in a step.
+/// The external forces of one step.
 pub(crate) struct ExternalForces<'a> {
     step: StepConstants<'a>,
     surroundings: &'a Surroundings<'a>,
     pub(crate) origin: DVec3,
     pub(crate) occluders: &'a [Occluder],
     pub(crate) air_temperature: f32,
-    /// Gravity against which gas rises, m/s^2.
+    /// Gravity times the buoyancy parameter, m/s^2.
     pub(crate) buoyancy: f32,
     pub(crate) wind: WindForce,
     pub(crate) wind_gain: f32,
     /// Density of air at 1 K, kg K/m^3.
     pub(crate) density_at_1_k: f32,
-    /// The air's motion over each burner.
+    /// The forces on the gas of each burner.
     pub(crate) burner_forces: Vec<BurnerForces<'a>>,
 }
 
 impl<'a> ExternalForces<'a> {
-    /// The weather of a step that begins at `t`.
+    /// The external forces of a step that begins at `t`.
     pub(crate) fn new(step: StepConstants<'a>, particles: &Particles, surroundings: &'a Surroundings, t: f64) -> Self {
         let StepConstants { parameters: flame, constants, .. } = step;
         let plume_axes =
@@ -93,7 +94,7 @@ impl<'a> ExternalForces<'a> {
         }
     }
 
-    /// Lets rings and eddies go on to the moment `t`; axes and wind stay for the step.
+    /// Advances vortex rings and eddies to `t`; plume axes and wind are kept for the whole step.
     pub(crate) fn advance_vortex_rings(&mut self, t: f64) {
         for (index, burner) in self.burner_forces.iter_mut().enumerate() {
             burner.rings = self.step.rings(index, &burner.axis, t);
@@ -140,7 +141,7 @@ fn density_at_1_k(air: &Air) -> f32 {
     air.density_at(1.0) as f32
 }
 
-/// Corners of the box around the particles of each burner.
+/// Bounding box of the particles of each burner.
 fn bounds(particles: &Particles, burners: usize) -> Vec<[Vec3; 2]> {
     const EMPTY: [Vec3; 2] = [Vec3::INFINITY, Vec3::NEG_INFINITY];
     let [x, y, z] = particles.positions();
@@ -161,13 +162,13 @@ fn bounds(particles: &Particles, burners: usize) -> Vec<[Vec3; 2]> {
     };
     let tasks = (0..particles.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
     let bounds = tasks.map(of_task).reduce(|| vec![EMPTY; burners], merge);
-    // A burner that nothing came from yet has no wind to speak of.
+    // A burner without particles gets a unit box: its wind is not used.
     bounds.into_iter().map(|bounds| if bounds[0].x <= bounds[1].x { bounds } else { [Vec3::ZERO, Vec3::ONE] }).collect()
 }
 
-/// What acts on the gas of one burner.
+/// The forces on the gas of one burner.
 pub(crate) struct BurnerForces<'a> {
-    /// The wind over it.
+    /// The wind around it.
     pub(crate) wind_field: WindField,
     pub(crate) rings: Vec<VortexRing>,
     pub(crate) axis: PlumeAxis,
@@ -175,39 +176,39 @@ pub(crate) struct BurnerForces<'a> {
     pub(crate) turbulence: f32,
     /// Age at which turbulence has grown to half its strength, s.
     pub(crate) turbulent_age: f32,
-    /// Entrainment coefficient over the radius of the fire, 1/m.
+    /// Entrainment coefficient divided by the radius of the fire, 1/m.
     pub(crate) entrainment: f32,
-    /// Coefficient of the drag of air that blows across, over the radius of the fire, 1/m.
+    /// Drag coefficient of cross wind divided by the radius of the fire, 1/m.
     pub(crate) drag: f32,
-    /// Share of its fuel that gas burns in a metre of its way, and in a second.
+    /// Fraction of its fuel that gas burns per meter of travel, and per second.
     pub(crate) burning: [f32; 2],
 }
 
-/// The air's motion at the places of particles, m/s.
+/// Velocity of the air at the positions of particles, m/s.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AirVelocity<R> {
-    /// That of rings and of the draw toward the axis.
+    /// That of vortex rings and of the inflow toward the axis.
     pub(crate) steady: [R; 3],
     /// That of eddies of unit strength.
     pub(crate) eddies: [R; 3],
 }
 
 impl BurnerForces<'_> {
-    /// Share of its own mass that gas of such a velocity takes up from the air, 1/s.
+    /// Entrainment rate, mass of air per own mass, 1/s: `alpha |u - w| / (D / 2)`, half of it for enclosed gas.
     #[inline(always)]
     pub(crate) fn mixing<R: Real>(&self, velocity: &[R; 3], wind: &[R; 3], air_exposure: R) -> R {
         let splat = |value: f32| air_exposure.broadcast(value);
         length(&subtract(velocity, wind)) * air_exposure.fma(splat(self.entrainment), splat(0.5 * self.entrainment))
     }
 
-    /// Velocity with which the air carries gas of `speed` and `age`, m/s.
+    /// Velocity with which the air advects gas of `speed` and `age`, m/s.
     #[inline(always)]
     pub(crate) fn velocity<R: Real>(&self, flow: &AirVelocity<R>, speed: R, age: R) -> [R; 3] {
         let grown = age / (age + age.broadcast(self.turbulent_age));
         add_scaled(&flow.steady, &flow.eddies, speed * grown * age.broadcast(self.turbulence))
     }
 
-    /// The motion at sixteen places.
+    /// Velocity of the air at sixteen positions.
     #[inline(always)]
     pub(crate) fn flow<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> AirVelocity<Lanes<S>> {
         let mut steady = self.axis.velocity(simd, position);

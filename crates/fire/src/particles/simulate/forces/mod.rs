@@ -1,4 +1,4 @@
-//! Forces beside those of pressure: buoyancy and wind, the burner's draft, entrainment, turbulence and vortex rings.
+//! External forces: buoyancy and wind, entrainment, turbulence and vortex rings.
 
 pub(crate) mod entrainment_axis;
 pub(crate) mod external_forces;

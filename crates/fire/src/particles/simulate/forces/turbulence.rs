@@ -1,7 +1,7 @@
-//! Turbulence: eddies of two sizes that rise with the gas, from tiles of divergence-free noise made once.
+//! Turbulence: curl noise in two layers that rise with the gas.
 //!
-//! The velocity is the curl of three noise potentials (Bridson, Hourihan and Nordenstam 2007), taken by central differences on a
-//! periodic grid. Two layers, one half as large, scroll at different speeds, so that eddies change while they rise.
+//! The velocity is the curl of three noise potentials (Bridson, Hourihan and Nordenstam 2007), computed once by central differences
+//! on a periodic grid. The second layer is half as large; both scroll at different speeds, so that eddies change while they rise.
 
 use std::sync::OnceLock;
 
@@ -20,24 +20,24 @@ use fearless_simd::{Simd, prelude::*, u32x16};
 const SIDE: usize = 32;
 /// Eddies along each side of the tile.
 const EDDIES: u32 = 5;
-/// Speed of the two layers beside the gas on the axis.
+/// Speed of the two layers relative to the gas on the axis.
 const LAYER_SPEED: [f64; 2] = [0.55, 0.3];
-/// Standard deviation of the two layers; their squares sum to 1.
+/// Standard deviation of the two layers; the squares sum to 1.
 const LAYER_WEIGHT: [f32; 2] = [0.86, 0.51];
 
-/// A periodic field of velocity, of standard deviation 1 a component.
+/// A periodic velocity field whose components have a standard deviation of 1.
 #[derive(Clone, Debug)]
 pub(crate) struct TurbulenceTile {
     key: Key,
-    /// Velocities on the grid; the fourth number is 0.
+    /// Velocities on the grid, padded to four components.
     tile: OnceLock<Vec<[f32; 4]>>,
 }
 
-/// Turbulence at one moment.
+/// The two layers of the turbulence at one time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EddyField<'a> {
     tile: &'a [[f32; 4]],
-    /// Grid points a metre, and the place of the flame's position on the grid, for each layer.
+    /// Grid points per meter, and the origin on the grid, of each layer.
     layers: [(f32, [f32; 3]); 2],
 }
 
@@ -46,23 +46,24 @@ impl TurbulenceTile {
         Self { key, tile: OnceLock::new() }
     }
 
-    /// The tile, made when a step first asks for it: a flame that is only checked does without.
+    /// The tile, computed when a step first needs it: a flame that is only checked does without.
     fn tile(&self) -> &[[f32; 4]] {
         get_or_make(&self.tile, || tile(self.key)).as_slice()
     }
 
-    /// A number of mean 0 and standard deviation 1 that changes over a unit of `position`.
+    /// Noise of mean 0 and standard deviation 1 that varies over a unit of `position`.
     pub(crate) fn noise(&self, position: DVec3) -> f32 {
         let position = (position * (SIDE as f64 / f64::from(EDDIES))).rem_euclid(DVec3::splat(SIDE as f64));
         sample(self.tile(), position.as_vec3())[0]
     }
 
-    /// The eddies at time `t`, the largest `eddy_size` m wide, rising in gas of `speed` and drifting with the wind's `drift` since time 0.
+    /// The eddies at `t`, the largest `eddy_size` m wide, in gas that rises at `speed`, displaced by the wind's `drift` since time
+    /// 0.
     pub(crate) fn at(&self, t: f64, eddy_size: f64, speed: f64, drift: DVec3) -> EddyField<'_> {
         let layer = |index: usize| {
             let scale = SIDE as f64 / (f64::from(EDDIES) * eddy_size) * (index + 1) as f64;
             let moved = DVec3::Y * (speed * LAYER_SPEED[index] * t) + drift;
-            // Shifted so that both layers do not share their zeros; reduced in f64, so that hours of time lose nothing.
+            // Offset so that the layers do not share their zeros; reduced in f64, so that hours of time lose no precision.
             let origin = (-moved * scale + 11.3 * index as f64).rem_euclid(DVec3::splat(SIDE as f64));
             (scale as f32, origin.as_vec3().to_array())
         };
@@ -82,7 +83,7 @@ fn tile(key: Key) -> Vec<[f32; 4]> {
 }
 
 impl EddyField<'_> {
-    /// Velocity at `position`, m from the flame's position, of standard deviation 1 a component.
+    /// Velocity at `position`, m from the flame's position; each component has a standard deviation of 1.
     #[inline(always)]
     pub(crate) fn velocity<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
         let mut sum = [Lanes::splat(simd, 0.0); 3];
@@ -102,7 +103,7 @@ impl EddyField<'_> {
     }
 }
 
-/// A tile at places in grid points, straight between them.
+/// Trilinear interpolation of the tile at positions in grid points.
 #[inline(always)]
 fn sample_lanes<S: Simd>(simd: S, tile: &[[f32; 4]; SIDE * SIDE * SIDE], position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
     const MASK: u32 = SIDE as u32 - 1;
@@ -116,16 +117,16 @@ fn sample_lanes<S: Simd>(simd: S, tile: &[[f32; 4]; SIDE * SIDE * SIDE], positio
     [x, y, z]
 }
 
-/// Two neighbours in every row of the grid.
+/// Two adjacent grid columns.
 struct Row<'a, S: Simd> {
     tile: &'a [[f32; 4]; SIDE * SIDE * SIDE],
     x: [u32x16<S>; 2],
-    /// Share of the way from one to the other.
+    /// Interpolation weight along x.
     across: Lanes<S>,
 }
 
 impl<S: Simd> Row<'_, S> {
-    /// Velocity between them in the row at `y` and `z`.
+    /// Velocity interpolated along x in the row at `y` and `z`.
     #[inline(always)]
     fn at(&self, simd: S, y: u32x16<S>, z: u32x16<S>) -> [Lanes<S>; 4] {
         let start = ((z << SIDE.ilog2()) + y) << SIDE.ilog2();
@@ -133,7 +134,7 @@ impl<S: Simd> Row<'_, S> {
     }
 }
 
-/// Values at a share of the way from one to the other.
+/// Linear interpolation of four components.
 #[inline(always)]
 pub(crate) fn lerp4<R: Real>(one: &[R; 4], other: &[R; 4], weight: R) -> [R; 4] {
     let mut lerp4 = *one;
@@ -143,7 +144,7 @@ pub(crate) fn lerp4<R: Real>(one: &[R; 4], other: &[R; 4], weight: R) -> [R; 4] 
     lerp4
 }
 
-/// A tile at a place in grid points, straight between them.
+/// Trilinear interpolation of the tile at one position in grid points.
 fn sample(tile: &[[f32; 4]], position: Vec3) -> [f32; 4] {
     let floor = position.floor();
     let f = position - floor;
@@ -156,9 +157,9 @@ fn sample(tile: &[[f32; 4]], position: Vec3) -> [f32; 4] {
     lerp4(&lerp4(&row(0, 0), &row(1, 0), f.y), &lerp4(&row(0, 1), &row(1, 1), f.y), f.z)
 }
 
-/// One potential on the grid.
+/// One noise potential on the grid.
 fn potential(seed: u32) -> Vec<f32> {
-    // The fractal and the period are constants within their bounds; without noise the tile is calm.
+    // The fractal and the period are constants within their bounds.
     let Ok(noise) = Noise::<3>::new(seed, Fractal::SINGLE, [EDDIES; 3]) else { return vec![0.0; SIDE * SIDE * SIDE] };
     let coordinate = |step: usize| Coordinate::from_f64((step * EDDIES as usize) as f64 / SIDE as f64);
     let at = |index: usize| {

@@ -1,10 +1,9 @@
-//! How a fire breathes: vortex rings that roll up around its base and rise with it.
+//! Puffing: vortex rings that roll up around the base of a fire and rise with it.
 //!
-//! Puffing is driven, not emergent: air is not simulated, so the instability that sheds the rings cannot appear by itself. Each
-//! burner sheds a ring at every beat of the frequency that Cetegen and Ahmed (1993) measured, a little early or late, strong or
-//! weak. A ring draws gas in below itself (the neck) and pushes it up and out above (the bulge), as the photographs of their fires
-//! show. Its flow has the stream function `C r^2 (1 - s^2/c^2)^4` within the distance c of its middle and none beyond, so it is
-//! free of divergence.
+//! Puffing is prescribed, not emergent: air is not simulated, so the instability that sheds the rings cannot appear. Each burner
+//! sheds a ring per period of the frequency measured by Cetegen and Ahmed (1993), with jitter of time and strength. Gas is drawn in
+//! below a ring (the neck) and pushed out above it (the bulge), as in their photographs. The flow has the Stokes stream function
+//! `psi = C r^2 (1 - s^2/c^2)^4` within the distance c of the ring's center and vanishes beyond, so it is divergence-free.
 
 use bansho_base::math::{
     DVec3, Vec3, cbrt,
@@ -20,29 +19,29 @@ use fearless_simd::Simd;
 
 /// Most rings that a burner sheds side by side.
 const MAX_STREAMS: f64 = 6.0;
-/// Most rings of a stream that are alive, latest first,
+/// Most rings of a stream that are alive.
 const MAX_RINGS: i64 = 9;
-/// and the age at which one is gone, whatever holds it, beats: before the last of those is as old, at its earliest.
+/// Age at which a ring has faded out, in periods; the last ring that is counted is always older.
 const MAX_AGE_BEATS: f64 = MAX_RINGS as f64 - 2.2;
-/// Speed of a ring beside the gas on the axis.
+/// Speed of a ring relative to the gas on the axis.
 const RING_SPEED: f64 = 0.7;
-/// Speed in a ring's middle beside the gas on the axis at its height.
+/// Speed at a ring's center relative to the gas on the axis at its height.
 const RING_STRENGTH: f64 = 0.6;
-/// Extent c of a ring at birth, in diameters of the burner.
+/// Extent c of a new ring, in burner diameters.
 const RING_EXTENT: f64 = 0.85;
-/// Growth of the extent a beat, by the air that the ring takes up.
+/// Growth of the extent per period, by entrained air.
 const RING_GROWTH: f64 = 0.28;
 
-/// A ring at one moment.
+/// A vortex ring at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct VortexRing {
-    /// Its middle, m from the flame's position.
+    /// Its center, m from the flame's position.
     center: Vec3,
-    /// Unit vector along which its middle blows.
+    /// Its axis: the direction of the flow at its center.
     axis: Vec3,
     /// 1 / c, 1/m.
     inverse_extent: f32,
-    /// C, 1/s times m: half the speed in its middle.
+    /// C: half the speed at its center, m/s.
     strength: f32,
 }
 
@@ -77,7 +76,7 @@ impl VortexRing {
     }
 }
 
-/// The rings of `burner`, number `burner_index`, that are alive at time `t`, along the `axis` of its gas.
+/// The rings of `burner` that are alive at `t`; they follow the plume `axis`.
 pub(crate) fn active_rings(
     burner: &Burner,
     flame: &FlameParticlesParameters,
@@ -112,7 +111,7 @@ struct VortexShedding<'a> {
 }
 
 impl VortexShedding<'_> {
-    /// Ring `beat`, if it is alive.
+    /// The ring shed in period `beat`, if it is alive.
     fn ring(&self, beat: i64, puffing: f64) -> Option<VortexRing> {
         let words = self.key.words(beat as u64, 1, self.purpose);
         let [early, strong, tilt_x, tilt_z] = words.map(|word| f64::from(uniform(word)));
@@ -128,7 +127,7 @@ impl VortexShedding<'_> {
             * burner.diameter
             * (1.0 + RING_GROWTH * beats)
             * cbrt(height / burner.diameter).clamp(0.6, 1.2);
-        // It rolls up within a beat and fades as it leaves the flame.
+        // A ring rolls up within a period and fades as it leaves the flame.
         let rolled = beats / (beats + 0.35);
         let fade = (1.6 - height / burner.height).clamp(0.0, 0.6) / 0.6 * (MAX_AGE_BEATS - beats).clamp(0.0, 1.0);
         let speed = burner.axis_speed(height) * RING_STRENGTH * (0.75 + 0.5 * strong) * rolled * fade * puffing;
@@ -143,7 +142,7 @@ impl VortexShedding<'_> {
         })
     }
 
-    /// Where a ring begins: near the middle of a small burner, anywhere on a long one.
+    /// Where a ring is shed: near the center of a small burner, at a random point of a long one.
     fn middle(&self, beat: i64, [x, z]: [f64; 2]) -> DVec3 {
         let burner = self.burner;
         if self.streams == 1 {
@@ -189,7 +188,7 @@ mod tests {
 
     #[test]
     fn rings_come_and_go_without_a_jump_however_many_there_are() {
-        // So many beats that rings go by their number, long before they are above the flame.
+        // A frequency at which rings are removed by their count, long before they rise above the flame.
         let mut flame = FlameParticlesParameters::default();
         flame.motion.puffing_hz = bansho_base::parameters::Auto::Set(40.0);
         let burner = Burner::new(&BurnerParameters::default(), &flame, &MemoryAssets::default()).unwrap();

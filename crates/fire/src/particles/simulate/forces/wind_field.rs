@@ -1,4 +1,4 @@
-//! The wind over the gas: the scene's wind on a coarse grid, since gusts are larger than flames.
+//! The scene's wind sampled on a coarse grid around the gas: gusts are larger than flames.
 
 use crate::particles::simulate::forces::turbulence::lerp4;
 use bansho_base::{
@@ -16,18 +16,18 @@ const POINTS: usize = 4;
 /// Grid points of the box.
 const ALL_POINTS: usize = POINTS * POINTS * POINTS;
 
-/// The wind at one moment within a box.
+/// The wind at one time within a box.
 #[derive(Clone, Debug)]
 pub(crate) struct WindField {
     low: [f32; 3],
-    /// Cells a metre.
+    /// Cells per meter.
     scale: [f32; 3],
-    /// Velocities on the grid; the fourth number is 0.
+    /// Velocities on the grid, padded to four components.
     velocity: Box<[[f32; 4]; ALL_POINTS]>,
 }
 
 impl WindField {
-    /// The wind at time `t` between the corners `low` and `high`, which count from `origin`, m.
+    /// The wind at `t` between the corners `low` and `high`, relative to `origin`, m.
     pub(crate) fn new(wind: &Wind, origin: DVec3, [low, high]: [Vec3; 2], t: f64) -> Self {
         let size = (high - low).max(Vec3::splat(1e-3));
         let last = (POINTS - 1) as f32;
@@ -40,14 +40,14 @@ impl WindField {
         Self { low: low.to_array(), scale: (last / size).to_array(), velocity }
     }
 
-    /// Velocity at sixteen places, m/s.
+    /// Trilinear interpolation at sixteen positions, m/s.
     #[inline(always)]
     pub(crate) fn at<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
         const MASK: u32 = POINTS as u32 - 1;
         let splat = |value: f32| Lanes::splat(simd, value);
         let mut grid_position = *position;
         for c in 0..3 {
-            // Never the last point itself, beside which there is none.
+            // The last grid point is excluded: it has no successor.
             let last = splat((POINTS - 1) as f32 - 1e-3);
             grid_position[c] =
                 ((position[c] - splat(self.low[c])) * splat(self.scale[c])).simd_max(splat(0.0)).simd_min(last);
