@@ -1,4 +1,13 @@
-//! Fire: the flame sheet, the particle flame, and the sparks of both.
+//! Fire: a flame sheet, a particle flame, and sparks for both.
+//!
+//! | module | model | after |
+//! |---|---|---|
+//! | [`sheet`] | a small, near flame as a warped, scrolling texture in closed form; with smoke | Ohshima and Itahashi |
+//! | [`particles`] | burning gas by smoothed-particle hydrodynamics, black-body light, heat haze | Inagaki et al. |
+//! | [`sparks`] | glowing particles in closed form, drawn as streaks | |
+//!
+//! The two flames do not depend on each other. The sheet is evaluated at any time; the particle flame is stepped. Each module's page lists
+//! its references and its equations with the functions that implement them.
 
 pub mod particles;
 pub mod sheet;

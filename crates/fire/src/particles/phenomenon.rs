@@ -35,7 +35,7 @@ pub struct FlameParticles {
     time: f64,
     /// Temperature of the air at the last step, K.
     air_temperature_k: f64,
-    /// What it draws with.
+    /// Scratch memory of the renderer.
     scratch: ScratchPool,
 }
 
@@ -73,7 +73,7 @@ impl FlameParticles {
         &self.simulation.particles
     }
 
-    /// The gas as the drawing sees it.
+    /// The gas as the renderer sees it.
     fn gas(&self) -> Gas<'_> {
         let tallest = self.tallest();
         let position = DVec3::from(self.parameters.position) + tallest.position(self.time);
@@ -94,7 +94,7 @@ impl FlameParticles {
     }
 
     fn fade_out(&self) -> FadeOut {
-        /// Share of the time that burnt gas stays.
+        /// Duration of the fade-out as a fraction of the afterlife.
         const FADING: f64 = 0.2;
         let seconds = (FADING * self.parameters.life.afterlife_s).max(self.parameters.step_s) as f32;
         FadeOut { seconds, domain: self.simulation.constants.domain.map(|corner| corner.as_vec3()) }
@@ -102,13 +102,13 @@ impl FlameParticles {
 
     fn tallest(&self) -> &Burner {
         let burners = &self.simulation.constants.burners;
-        // A design has at least one burner.
+        // There is at least one burner.
         let taller = |a: &&Burner, b: &&Burner| a.height.total_cmp(&b.height);
         burners.iter().max_by(taller).unwrap_or(&burners[0])
     }
 }
 
-/// Makes what is keyed repeat.
+/// Makes animated values repeat with the loop.
 fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result<(), ParticleFault> {
     match parameters.close_loop(seconds) {
         Some(key) => Err(ParticleFault { key, kind: ParticleFaultKind::LoopJumps { seconds } }),
@@ -116,7 +116,7 @@ fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result
     }
 }
 
-/// Speed of gas that draws its detail as it is, beside that of gas half way up.
+/// Speed of gas with isotropic detail, relative to gas half way up the flame.
 const UNSTRETCHED: f64 = 0.35;
 
 impl Phenomenon for FlameParticles {
@@ -140,14 +140,14 @@ impl Phenomenon for FlameParticles {
                 let position = origin + burner.spawn_point(self.simulation.key, id, 0.0).position;
                 neighbours.occluders().any(|occluder| occluder.signed_distance(position) < 0.0)
             };
-            // As many births as show it.
+            // Enough spawn points to decide.
             gives(burner) && (0..32).all(within)
         };
         burners.iter().position(is_buried).map(|index| Remark::Buried { burner: index + 1 })
     }
 
     fn luminance(&self) -> f64 {
-        /// Bright parts beside a whole flame of the hottest soot.
+        /// Mean of bright parts relative to a whole flame of the hottest soot.
         const BRIGHT: f64 = 0.09;
         let hottest = match self.parameters.life.temperature {
             TemperatureLaw::Living => self.parameters.life.flame_temperature_k,

@@ -1,7 +1,7 @@
-//! The paper's chain for one point, a function a row, numbered as in Ohshima & Itahashi.
+//! The paper's equations for one point, one function each, numbered as in Ohshima and Itahashi.
 //!
-//! Values of the artist's curves come in as numbers, so that the same functions serve look-up tables sixteen at a time and
-//! hand-worked tests. Nothing here branches on data or computes an elementary function beyond a square root.
+//! Values of the user's curves are arguments, so that the same functions serve SIMD batches with curve tables and hand-worked
+//! tests. Nothing branches on data or evaluates an elementary function beyond a square root.
 
 pub use bansho_base::math::simd::Real;
 
@@ -17,9 +17,9 @@ pub fn axis_distance<N: Real>(x: N) -> N {
     (x.broadcast(2.0) * (x - x.broadcast(0.5))).simd_abs()
 }
 
-/// How far into the fringe a point lies, `(x' - A) / D` of eq. (11), held to [0, 1].
+/// Position within the fringe, `(x' - A) / D` of eq. (11), clamped to [0, 1].
 ///
-/// Where the fringe has no width it is 0 up to `A` and 1 beyond, so nothing is divided by zero.
+/// Where the fringe has zero width it is 0 up to `A` and 1 beyond, without a division by zero.
 #[inline(always)]
 pub fn fringe_position<N: Real>(distance: N, core_width: N, fringe_width: N) -> N {
     const NARROWEST: f32 = 1e-6;
@@ -46,7 +46,7 @@ pub fn fluttering_edge<N: Real>(core_width: N, fringe_width: N, flutter: N) -> N
     fringe_width.fma(flutter, core_width)
 }
 
-/// Place across the flame `u' = x'/E`, eq. (16): 0 on the axis, 1 at the fluttering edge, more outside.
+/// Normalized distance from the axis `u' = x'/E`, eq. (16): 0 on the axis, 1 at the fluttering edge, more outside.
 #[inline(always)]
 pub fn across<N: Real>(distance: N, edge: N) -> N {
     distance / edge

@@ -1,4 +1,4 @@
-//! What a scene says of a flame sheet. Symbols and equation numbers are those of Ohshima & Itahashi.
+//! Parameters of the flame sheet. Symbols and equation numbers are those of Ohshima and Itahashi.
 
 use bansho_base::{
     math::curve::{Curve, Interpolation},
@@ -10,7 +10,7 @@ use crate::sparks::SparkParameters;
 const FRACTION: Range = Range::new(0.0, 1.0);
 const KELVIN: Range = Range::new(600.0, 4000.0);
 
-/// A default curve. Its points are literals below, never a scene's.
+/// A default curve; its points are literals below.
 fn curve(points: &[[f64; 2]]) -> Curve {
     Curve::new(points.to_vec(), Interpolation::Monotone).expect("default points ascend")
 }

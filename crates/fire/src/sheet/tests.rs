@@ -1,4 +1,4 @@
-//! The whole sheet: valid parameters of every kind, agreement between ways of drawing, loops, light.
+//! The whole sheet: random valid parameters, equality of strips, crops and SIMD widths, loops, light.
 
 use bansho_base::{
     camera::{CameraParameters, Lens},
@@ -85,7 +85,7 @@ fn rich() -> FlameSheetParameters {
     }
 }
 
-/// Draws at random until the parameters go together.
+/// Random parameters that are valid together.
 fn random_parameters(number: u64) -> FlameSheetParameters {
     let key = Key::new(number, "random sheets");
     let mut count = 0;
@@ -100,7 +100,7 @@ fn random_parameters(number: u64) -> FlameSheetParameters {
     parameters
 }
 
-/// T0, T1 and T2's light over the whole sheet, straight from the chain.
+/// T0, T1, threshold and coverage over the whole sheet.
 fn field<S: Simd>(simd: S, sheet: &FlameSheet, t: f64) -> Vec<[f32; 4]> {
     let flame = &sheet.flames[0];
     let push = WindLean { across: 0.4, toward: 0.0 };
@@ -229,7 +229,7 @@ fn published_light_flickers_about_the_light_that_is_drawn() {
         })
         .collect();
     let mean = red.iter().sum::<f32>() / 40.0;
-    // A fire about a metre tall: hundreds to thousands of candela, and never still.
+    // A fire about a meter tall: hundreds to thousands of candela, and it flickers.
     assert!((100.0..10_000.0).contains(&mean), "{mean}");
     assert!(red.iter().any(|value| (value / mean - 1.0).abs() > 0.05));
 }
@@ -280,7 +280,7 @@ fn curves_that_do_not_go_together_name_the_parameter() {
     assert!(FlameSheet::new(FlameSheetParameters::default(), "test", 1, Some(0.0)).is_err());
 }
 
-/// Red light of a sheet at 320 x 480, in bands of so many rows.
+/// Red light of a sheet at 320 x 480, with exact rows `rows` apart.
 fn red_in_bands(sheet: &FlameSheet, view: &View, rows: usize) -> Vec<f32> {
     with_wind([0.5, 0.0, 0.0], |surroundings| {
         let flame = &sheet.flames[0];
@@ -305,7 +305,7 @@ fn red_in_bands(sheet: &FlameSheet, view: &View, rows: usize) -> Vec<f32> {
 
 #[test]
 fn rows_between_exact_rows_are_as_good_as_exact_ones() {
-    // Sheets 600 and 1,080 pixels tall are drawn in bands of 4 and 16 rows; shrinking the bands to one row changes next to nothing.
+    // Sheets 600 and 1,080 pixels tall have exact rows every 4 and 16 rows; computing every row exactly changes next to nothing.
     let sheet = sheet(FlameSheetParameters { time_samples: Auto::Set(1), ..FlameSheetParameters::default() }, None);
     for (vertical_fov_deg, rows, most_apart) in [(20.0, 4, 0.002), (11.2, 16, 0.004)] {
         let camera =
@@ -320,7 +320,7 @@ fn rows_between_exact_rows_are_as_good_as_exact_ones() {
     }
 }
 
-/// Red light of the front of the campfire, `finer` times as large as in its scene; pixels that span many texels as `minification` says.
+/// Red light of the front of the campfire, `finer` times as large as in its scene, with supersampling above `minification`.
 fn red_of_campfire(finer: usize, minification: f32) -> Vec<f32> {
     let parameters = FlameSheetParameters {
         width: 0.62,

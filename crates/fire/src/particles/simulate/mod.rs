@@ -1,4 +1,7 @@
 //! The state of the flame, and its time steps.
+//!
+//! `derived` are the constants, `burner` and `spawning` the sources of particles, `fluid` density and pressure, `forces` everything that the
+//! air does, `combustion` thermochemistry, `integrate` and `collision` motion, `snapshot` serialization. `particles` is the state.
 
 use crate::particles::{
     parameters::FlameParticlesParameters,

@@ -1,4 +1,4 @@
-//! Everything of one flame that depends on time, settled for one moment.
+//! The warp of a flame's coordinates at one time: fluttering edges, sway, flicker and wind.
 
 use bansho_base::{
     math::{
@@ -18,7 +18,7 @@ use crate::sheet::{
 
 use fearless_simd::Simd;
 
-/// The waves of one flame: its edges P (15), its tip's wandering and its height's flicker.
+/// The fluctuations of one flame: its edges P (15), the sway of its center line and the flicker of its height.
 #[derive(Clone, Debug)]
 pub(crate) struct FlameWaves {
     left: Fluctuation,
@@ -28,7 +28,7 @@ pub(crate) struct FlameWaves {
 }
 
 impl FlameWaves {
-    /// The waves that `key` gives a flame of this shape.
+    /// The fluctuations that `key` gives a flame of this shape.
     pub(crate) fn new(shape: &ShapeParameters, key: Key, clock: &Clock) -> Self {
         let edge_fluctuation = |name| {
             let fit = |waves: f64| clock.waves(waves, 1.0);
@@ -45,7 +45,7 @@ impl FlameWaves {
     }
 }
 
-/// How the wind pushes a sheet: across it (to the right) and toward `right x up`, as the tangent of the gas's path.
+/// How the wind deflects a sheet: tangents of the gas's path to the right and toward `right x up`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WindLean {
     /// Tangent at the top, to the right.
@@ -55,12 +55,12 @@ pub(crate) struct WindLean {
 }
 
 impl WindLean {
-    /// Steepest lean of the plane and of the bend.
+    /// Greatest tangent of leaning and bending.
     const MAX_TANGENT: f64 = 1.5;
 
-    /// The push of `wind` at `point` on gas that rises at `rise_speed` m/s.
+    /// Deflection by `wind` at `point` of gas that rises at `rise_speed` m/s.
     ///
-    /// Drift over rise is the tangent; it saturates smoothly, since a flame that lies flat is no sheet any more.
+    /// The tangent is drift over rise. It saturates smoothly, since a flame that lies flat is not a sheet.
     pub(crate) fn new(wind: &Wind, point: DVec3, t: f64, right: DVec3, rise_speed: f64, response: f64) -> Self {
         let velocity = wind.at(point, t) * (response / rise_speed.max(0.05));
         let soft_clamp = |tangent: f64| Self::MAX_TANGENT * math::tanh(tangent / Self::MAX_TANGENT);
@@ -68,23 +68,23 @@ impl WindLean {
     }
 }
 
-/// One flame at one moment.
+/// The warp of one flame at one time.
 #[derive(Clone, Debug)]
 pub(crate) struct WarpState {
-    /// E left and right over w.
+    /// E, eq. (15), left and right, over w.
     pub(crate) edges: CurvePair,
-    /// How far the centre line has moved to the right, in sheet widths, over y.
+    /// Displacement of the center line to the right, in sheet widths, over y.
     center: CurvePair,
-    /// Least and greatest of that.
+    /// Least and greatest displacement.
     pub(crate) center_range: [f64; 2],
-    /// What y is multiplied by, below 1 while the flame is taller than usual.
+    /// Factor of y, below 1 while the flame is taller than the mean.
     height_scale: f32,
     /// Distance that the texture has scrolled, sheet heights.
     pub(crate) scroll: f64,
 }
 
 impl WarpState {
-    /// The flame at time `t` (its own, phase included), pushed across by `push`.
+    /// The warp at time `t` (of the flame itself, phase included), deflected by `push`.
     pub(crate) fn new(
         parameters: &FlameSheetParameters,
         shape: &ShapeTables,
@@ -97,7 +97,7 @@ impl WarpState {
         fearless_simd::dispatch!(level, _simd => evaluate_warp(parameters, shape, waves, clock, t, push))
     }
 
-    /// The point of the unbent, usual flame that (x, y) of the sheet shows.
+    /// Inverse warp: the point of the unbent flame of mean height that is seen at (x, y) of the sheet.
     #[inline(always)]
     pub(crate) fn unwarp<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
         let [center, _] = self.center.lookup(&lookup_index(y));
@@ -110,7 +110,7 @@ impl WarpState {
         [x - self.center.at(y)[0], y * self.height_scale]
     }
 
-    /// Where the centre line stands at height y, in sheet widths from the axis.
+    /// Displacement of the center line at height y, in sheet widths.
     pub(crate) fn center(&self, y: f64) -> f64 {
         f64::from(self.center.at(y as f32)[0])
     }
@@ -130,7 +130,7 @@ fn evaluate_warp(
     let edge_fluctuation = |waves: &Fluctuation| {
         let mut values = [0.0; SEGMENTS + 1];
         waves.fill(-scroll, 1.0 / SEGMENTS as f64, &mut values);
-        // P in [0, 1]; its strength takes it away from 1, where the edge is at its outermost.
+        // P in [0, 1]; with less strength it stays closer to 1, the outermost edge.
         values.map(|value| (0.5 * shape_parameters.flutter as f32).mul_add(value - 1.0, 1.0))
     };
     let edges = shape.edges(&edge_fluctuation(&waves.left), &edge_fluctuation(&waves.right));
@@ -138,15 +138,15 @@ fn evaluate_warp(
     let ends = (0..=16).map(|i| f64::from(center.at(i as f32 / 16.0)[0]));
     let center_range = ends.fold([0.0_f64; 2], |[low, high], value| [low.min(value), high.max(value)]);
     let flicker = shape_parameters.flicker * f64::from(waves.flicker.at(time));
-    // Sheets leave headroom for growth: at rest the flame reaches 1 / (1 + flicker) of the sheet.
+    // Sheets have headroom: at the mean height the flame fills 1 / (1 + flicker) of the sheet.
     let height_scale = ((1.0 + shape_parameters.flicker) / (1.0 + flicker)) as f32;
     WarpState { edges, center, center_range, height_scale, scroll }
 }
 
-/// Drift grows like y^1.5, as gas that is pushed evenly while it accelerates upward; sway travels up with the gas.
+/// Displacement grows as y^1.5, as of gas in uniform wind that accelerates upward; sway travels up with the gas.
 #[inline(always)]
 fn center_line(parameters: &FlameSheetParameters, waves: &FlameWaves, time: f64, push: WindLean) -> CurvePair {
-    /// How long a swing takes from base to tip, as a share of its period.
+    /// Time for sway to travel from base to tip, as a fraction of its period.
     const LAG: f64 = 0.6;
     let shape_parameters = &parameters.shape;
     let bend = push.across * parameters.height / parameters.width / 1.5;

@@ -1,4 +1,4 @@
-//! What a flame says of itself beside its light: temperature, optical depth and motion.
+//! AOVs of a flame: temperature, optical depth and motion.
 
 use bansho_base::{
     color,
@@ -12,12 +12,12 @@ use crate::sheet::FlameSheet;
 use crate::sheet::render::flame_instance::FlameInstance;
 use fearless_simd::Simd;
 
-/// Places of the planes among a strip's AOVs.
+/// Indices of the planes among a strip's AOVs.
 const TEMPERATURE: usize = 0;
 const OPTICAL_DEPTH: usize = 1;
 const MOTION: [usize; 2] = [2, 3];
 
-/// One flame as AOVs see it: where its gas will be at the next frame.
+/// One flame, and what its AOVs depend on.
 pub(crate) struct AovContext<'a> {
     pub(crate) sheet: &'a FlameSheet,
     pub(crate) flame: &'a FlameInstance,
@@ -26,7 +26,7 @@ pub(crate) struct AovContext<'a> {
     pub(crate) content: SheetContent,
 }
 
-/// Adds the AOVs of all samples in the part `rect` of `strip`. Only what is asked for is measured, a pixel at a time.
+/// Adds the AOVs of all time samples in `rect` of `strip`. Evaluated only where AOVs are requested, one pixel at a time.
 #[inline(always)]
 pub(crate) fn write_aov_rows<S: Simd>(simd: S, context: &AovContext, rect: Rect, strip: &mut Strip) {
     let start = rect.x / LANES * LANES;
@@ -75,7 +75,7 @@ fn write_aov_batch<S: Simd>(
 }
 
 impl AovContext<'_> {
-    /// Pixels that the gas at (x, y) of the sheet moves by until the next frame, right and down.
+    /// Motion of the gas at (x, y) of the sheet until the next frame, pixels to the right and down.
     fn motion(&self, sample: &TimeSample, x: f64, y: f64) -> [f32; 2] {
         let (now, next) = (self.view.shutter.middle(), self.view.next_middle);
         let rise = self.sheet.gas_speed(self.flame, x, y, now) * (next - now);
@@ -90,18 +90,19 @@ impl AovContext<'_> {
     }
 }
 
-/// Gas moves at most at twice the scroll speed: sqrt(y) of eq. (9) has that slope at the top, and its steep foot only slows it.
+/// Least dw/dy: gas moves at most at twice the scroll speed. sqrt(y) of eq. (9) has that slope at the top; near the base it is
+/// steeper and the gas slower.
 const LEAST_SLOPE: f32 = 0.5;
 
 impl FlameSheet {
-    /// dy/dt of the gas at (x, y), sheet heights a second: s over dw/dy.
+    /// dy/dt of the gas at (x, y), sheet heights per second: s / (dw/dy).
     fn gas_speed(&self, flame: &FlameInstance, x: f64, y: f64, t: f64) -> f64 {
         const STEP: f32 = 0.01;
         let distance = crate::sheet::equations::axis_distance(x as f32);
         let y = (y as f32).clamp(0.02, 0.98);
         let slope = (self.shape().slowed_rise_at(distance, y + STEP) - self.shape().slowed_rise_at(distance, y - STEP))
             / (2.0 * STEP);
-        // Where the outline folds the mapping over, its slope is no speed of gas.
+        // Where the outline folds the mapping over, its slope is not a speed of gas.
         self.clock.speed(self.flame_time(flame, t)) / f64::from(slope.max(LEAST_SLOPE))
     }
 }

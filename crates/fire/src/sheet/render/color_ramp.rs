@@ -1,4 +1,4 @@
-//! From the texture above the threshold to light: sharpening, eq. (6), and colour, eq. (7), in one table.
+//! Color ramp: sharpening, eq. (6), and color, eq. (7), tabulated over T1.
 
 use crate::{
     chemiluminescence_color,
@@ -17,37 +17,37 @@ use bansho_base::{
 };
 use fearless_simd::Simd;
 
-/// Steps of T1; finer than a display can show, so that the nearest serves.
+/// Entries over T1: finer than a display can show, so that nearest-neighbor lookup suffices.
 const LEVELS: usize = 4096;
 
-/// Light and soot over T1.
+/// Light, opacity and temperature over T1.
 #[derive(Clone, Debug)]
 pub(crate) struct ColorRamp {
-    /// Red, green, blue (ACEScg, the brightest of luminance 1) and opacity over T1, the nearest of many.
+    /// Red, green, blue (ACEScg, the brightest of luminance 1) and opacity over T1; nearest neighbor.
     light: Box<[[f32; 4]; LEVELS]>,
     /// Soot temperature in K over T1.
     pub(crate) temperature: CurvePair,
-    /// Whether there is any soot to hide what is behind.
+    /// Whether soot hides what is behind.
     pub(crate) absorbs: bool,
-    /// Light of the blue zone at the base, ACEScg of luminance 1 times its share.
+    /// Light of the blue zone at the base: ACEScg of luminance 1, times the parameter.
     pub(crate) base_blue: [f32; 3],
 }
 
-/// Soot temperature at T2.
+/// Soot temperature at T2, K.
 pub(crate) fn temperature(color: &ColorParameters, t2: f64) -> f64 {
     math::lerp(color.edge_temperature_k, color.core_temperature_k, t2)
 }
 
-/// Share of the light behind that soot of the optical depth of T2 takes, and at the same time its emissivity.
+/// Opacity, and emissivity, of soot of the optical depth of T2.
 fn opacity(color: &ColorParameters, t2: f64) -> f64 {
     -math::exp_m1(-color.soot_optical_depth * t2)
 }
 
-/// ACEScg of T2 before it is scaled.
+/// ACEScg of T2 before normalization.
 fn unscaled_color(color: &ColorParameters, t2: f64) -> [f64; 3] {
     match color.kind {
         Coloring::BlackBody => {
-            // Thin soot shines in proportion to its depth; none at all still has the colour of the thinnest.
+            // Emission of optically thin soot is proportional to its depth; at zero depth the color is that of the thin limit.
             let emissivity = if color.soot_optical_depth > 1e-6 { opacity(color, t2) } else { t2 };
             color::black_body().radiance(temperature(color, t2) as f32).map(|value| f64::from(value) * emissivity)
         }
@@ -59,13 +59,13 @@ fn unscaled_color(color: &ColorParameters, t2: f64) -> [f64; 3] {
     }
 }
 
-/// What of the chain is shown at T2, T1 and T0 when it is not the light.
+/// The value shown for a stage before color.
 fn stage_value(stage: Stage, t1: f64, t2: f64) -> f64 {
     if stage == Stage::Sharpened { t2 } else { t1 }
 }
 
 impl ColorRamp {
-    /// Whether there is a table for these parameters.
+    /// Checks the parameters.
     ///
     /// # Errors
     /// The sharpening curve does not begin at the origin.
@@ -73,7 +73,7 @@ impl ColorRamp {
         from_origin(&texture.sharpen, "texture.sharpen").map(drop)
     }
 
-    /// The table for these parameters, which were [checked](Self::check).
+    /// The table for parameters that were [checked](Self::check).
     pub(crate) fn new(texture: &TextureParameters, color: &ColorParameters, stage: Stage) -> Self {
         let sharpen = from_origin(&texture.sharpen, "texture.sharpen").unwrap_or_else(|_| texture.sharpen.clone());
         let luminance = |rgb: [f64; 3]| f64::from(color::luminance(rgb.map(|value| value as f32)));
@@ -111,7 +111,7 @@ fn levels(light: impl Fn(f64) -> [f64; 4]) -> Box<[[f32; 4]; LEVELS]> {
 }
 
 impl ColorRamp {
-    /// Red, green, blue of luminance up to 1 and opacity at T1.
+    /// Red, green, blue of luminance up to 1, and opacity, at T1.
     #[inline(always)]
     pub(crate) fn light<S: Simd>(&self, t1: Lanes<S>) -> [Lanes<S>; 4] {
         let scaled = t1.simd_clamp01() * t1.broadcast((LEVELS - 1) as f32);

@@ -1,4 +1,6 @@
-//! Curves over [0, 1] as tables, two side by side so that one load fetches both at one place.
+//! Tables of the user's curves, and the mapping of eqs. (9) to (18) and threshold (4) evaluated with them.
+//!
+//! A table holds two curves side by side, so that one load fetches both.
 
 use crate::sheet::{
     equations,
@@ -15,24 +17,24 @@ use bansho_base::{
 };
 use fearless_simd::{Simd, prelude::*, u32x16};
 
-/// Straight pieces of a table.
+/// Linear segments of a table.
 pub(crate) const SEGMENTS: usize = 512;
-/// The greatest place below 1, so that the last piece serves the end too.
+/// The greatest float below 1, so that the last segment includes the end.
 const LAST: f32 = 1.0 - f32::EPSILON / 2.0;
 
-/// Two functions of one variable in [0, 1]: for each piece, value and rise of the first, then of the second.
+/// Two functions on [0, 1], piecewise linear: for each segment value and increment of the first, then of the second.
 #[derive(Clone, Debug)]
 pub(crate) struct CurvePair {
     segments: Box<[[f32; 4]; SEGMENTS]>,
 }
 
-/// Pieces of a table and the places in them.
+/// Segment indices and the fractions within them.
 pub(crate) struct TableIndex<S: Simd> {
     segment: u32x16<S>,
     fraction: Lanes<S>,
 }
 
-/// Where sixteen places lie in any table; they are held to [0, 1].
+/// Segment indices of sixteen arguments, clamped to [0, 1].
 #[inline(always)]
 pub(crate) fn table_index<S: Simd>(x: Lanes<S>) -> TableIndex<S> {
     let scaled = x.simd_max(x.broadcast(0.0)).simd_min(x.broadcast(LAST)) * x.broadcast(SEGMENTS as f32);
@@ -40,18 +42,19 @@ pub(crate) fn table_index<S: Simd>(x: Lanes<S>) -> TableIndex<S> {
     TableIndex { segment, fraction }
 }
 
-/// Where sixteen places lie that are often all the same, as the heights of a level row of pixels: then one look-up serves.
+/// Table indices of sixteen arguments that are often all equal, such as the heights of a horizontal row of pixels: then one lookup
+/// suffices.
 pub(crate) enum TableLookup<S: Simd> {
-    /// All at one place.
+    /// All arguments are equal.
     Uniform(f32, Lanes<S>),
-    /// Each at its own.
+    /// Each lane has its own argument.
     PerLane(TableIndex<S>),
 }
 
-/// Whether sixteen places are the same in any table, and where they lie.
+/// The table indices of sixteen arguments, and whether they are all equal.
 #[inline(always)]
 pub(crate) fn lookup_index<S: Simd>(x: Lanes<S>) -> TableLookup<S> {
-    /// Spread within which one look-up serves all: a twentieth of a piece.
+    /// Spread that counts as equal: a twentieth of a segment.
     const UNIFORM_TOLERANCE: f32 = 0.05 / SEGMENTS as f32;
     let first = x.broadcast(x[0]);
     if any_positive((x - first).simd_abs() - x.broadcast(UNIFORM_TOLERANCE)) {
@@ -62,7 +65,7 @@ pub(crate) fn lookup_index<S: Simd>(x: Lanes<S>) -> TableLookup<S> {
 }
 
 impl CurvePair {
-    /// The table of what `values` gives at each of the `SEGMENTS + 1` places x.
+    /// The table of the values at `SEGMENTS + 1` equidistant arguments.
     pub(crate) fn new(mut values: impl FnMut(f64) -> [f64; 2]) -> Self {
         Self::from_samples(|i| {
             let [first, second] = values(i as f64 / SEGMENTS as f64);
@@ -70,7 +73,7 @@ impl CurvePair {
         })
     }
 
-    /// The table of samples by their index, 0 to `SEGMENTS`.
+    /// The table of samples by index, 0 to `SEGMENTS`.
     #[inline(always)]
     pub(crate) fn from_samples(mut sample: impl FnMut(usize) -> [f32; 2]) -> Self {
         let mut segments = Box::new([[0.0; 4]; SEGMENTS]);
@@ -83,20 +86,20 @@ impl CurvePair {
         Self { segments }
     }
 
-    /// Both functions at located places.
+    /// Both functions at table indices.
     #[inline(always)]
     pub(crate) fn fetch<S: Simd>(&self, at: &TableIndex<S>) -> [Lanes<S>; 2] {
         let [first, first_delta, second, second_delta] = fetch(at.fraction.simd, &self.segments, at.segment);
         [first_delta.fma(at.fraction, first), second_delta.fma(at.fraction, second)]
     }
 
-    /// Both functions at sixteen places.
+    /// Both functions at sixteen arguments.
     #[inline(always)]
     pub(crate) fn sample<S: Simd>(&self, x: Lanes<S>) -> [Lanes<S>; 2] {
         self.fetch(&table_index(x))
     }
 
-    /// Both functions at places that are often all the same.
+    /// Both functions at arguments that are often all equal.
     #[inline(always)]
     pub(crate) fn lookup<S: Simd>(&self, at: &TableLookup<S>) -> [Lanes<S>; 2] {
         match at {
@@ -113,7 +116,7 @@ impl CurvePair {
         )
     }
 
-    /// Both functions at one place.
+    /// Both functions at one argument.
     #[inline(always)]
     pub(crate) fn at(&self, x: f32) -> [f32; 2] {
         let scaled = x.simd_max(0.0).simd_min(LAST) * SEGMENTS as f32;
@@ -124,32 +127,32 @@ impl CurvePair {
     }
 }
 
-/// Pieces of height for which the reach of the flame is known.
+/// Bins of height for which the horizontal extent of the flame is known.
 const REACH_BINS: usize = 128;
 
-/// Curves of eqs. (4) to (12) as tables.
+/// Curves of eqs. (4) to (12) as tables: the part of the mapping that does not change with time.
 #[derive(Clone, Debug)]
 pub(crate) struct ShapeTables {
     initial_speed: f32,
     edge_speed: f32,
     contrast: f32,
-    /// A and D over w.
+    /// Core width A and fringe width D over w.
     widths: CurvePair,
-    /// F over the place in the fringe.
+    /// F over the position in the fringe.
     falloff: CurvePair,
     /// H over u'.
     across: CurvePair,
-    /// V and the glow over w.
+    /// V and the brightness over w.
     heights: CurvePair,
-    /// Share of red light that cooling leaves, and of green beside red, over w.
+    /// Fraction of red light left by cooling, and of green relative to red, over w.
     cooling: CurvePair,
-    /// A and D over w, at the places of a table.
+    /// A and D over w, at the samples of a table.
     width_samples: Vec<[f32; 2]>,
     /// Greatest x' at which there may be flame, over y.
     reach: Box<[f32; REACH_BINS]>,
 }
 
-/// A curve with the point (0, 0) that the paper demands added, unless the artist gave it.
+/// The curve with the point (0, 0) that the paper demands prepended, unless it has one.
 pub(crate) fn from_origin(curve: &Curve, key: &'static str) -> Result<Curve, ParameterFault> {
     let mut points = curve.points().to_vec();
     match points.first() {
@@ -177,25 +180,25 @@ fn check_widths(samples: &[[f32; 2]]) -> Result<(), ParameterFault> {
     }
 }
 
-/// Both curves at the places of a table.
+/// Both curves at the samples of a table.
 fn samples(first: &Curve, second: &Curve) -> Vec<[f32; 2]> {
     let count = super::curve_tables::SEGMENTS + 1;
     let rows = [first, second].map(|curve| curve.sample_table(count, 0.0, 1.0));
     rows[0].iter().zip(&rows[1]).map(|(a, b)| [*a, *b]).collect()
 }
 
-/// Where sixteen points lie in the flame.
+/// Flame coordinates of sixteen points.
 #[derive(Clone, Copy)]
 pub(crate) struct FlameCoordinates<S: Simd> {
     /// Texture coordinate u.
     pub(crate) u: Lanes<S>,
-    /// Height w of the slowed rise.
+    /// Height w of the slowed rise, eq. (12).
     pub(crate) w: Lanes<S>,
     /// Threshold L, eq. (4).
     pub(crate) threshold: Lanes<S>,
-    /// Brightness and soot at that height.
+    /// Relative brightness and soot at that height.
     pub(crate) glow: Lanes<S>,
-    /// Share of red light that cooling leaves, and of green beside red.
+    /// Fraction of red light left by cooling, and of green relative to red.
     pub(crate) cooling: [Lanes<S>; 2],
     /// Distance within the fluttering edge, pixels; negative outside.
     edge_distance_pixels: Lanes<S>,
@@ -204,7 +207,7 @@ pub(crate) struct FlameCoordinates<S: Simd> {
 }
 
 impl<S: Simd> FlameCoordinates<S> {
-    /// Share of the pixels that lies inside; 0 outside.
+    /// Pixel coverage of the flame's outline, for antialiasing; 0 outside.
     #[inline(always)]
     pub(crate) fn coverage(&self, pixel: [f32; 2]) -> Lanes<S> {
         let (half, one) = (self.w.broadcast(0.5), self.w.broadcast(1.0));
@@ -212,7 +215,8 @@ impl<S: Simd> FlameCoordinates<S> {
         (self.edge_distance_pixels + half).simd_clamp01() * (self.base_distance_pixels + half).simd_clamp01() * top
     }
 
-    /// The most texels from one of sixteen pixels of a row to the next where there may be flame; there are so many to a unit of u and of w.
+    /// Greatest number of texels between neighboring pixels of the row, where there may be flame; `texels` are per unit of u and of
+    /// w.
     #[inline(always)]
     pub(crate) fn span(&self, texels: [f32; 2]) -> f32 {
         let step = |values: Lanes<S>| {
@@ -232,13 +236,13 @@ impl<S: Simd> FlameCoordinates<S> {
         each.into_iter().fold(0.0, f32::max)
     }
 
-    /// Moved by `fraction` of a change.
+    /// `self + fraction * change`.
     #[inline(always)]
     pub(crate) fn add_scaled(&self, fraction: f32, delta: &Self) -> Self {
         self.zip_with(delta, |value, delta| delta.fma(value.broadcast(fraction), value))
     }
 
-    /// The change from `other` to this place.
+    /// `self - other`.
     #[inline(always)]
     pub(crate) fn difference(&self, other: &Self) -> Self {
         self.zip_with(other, |value, other| value - other)
@@ -259,7 +263,7 @@ impl<S: Simd> FlameCoordinates<S> {
 }
 
 impl ShapeTables {
-    /// Whether there are tables for these curves.
+    /// Checks the curves.
     ///
     /// # Errors
     /// A curve that must begin at the origin does not, or core and fringe together are wider than the sheet.
@@ -268,7 +272,7 @@ impl ShapeTables {
         check_widths(&samples(&shape.core_width, &fringe))
     }
 
-    /// Tables for these curves, which were [checked](Self::check).
+    /// Tables for curves that were [checked](Self::check).
     pub(crate) fn new(shape: &ShapeParameters, texture: &TextureParameters, color: &ColorParameters) -> Self {
         let fringe = from_origin(&shape.fringe_width, "shape.fringe_width");
         let fringe = fringe.unwrap_or_else(|_| shape.fringe_width.clone());
@@ -298,7 +302,7 @@ impl ShapeTables {
         })
     }
 
-    /// Rise, profile and slowed rise, eqs. (9) to (12).
+    /// Rise (9), speed profile (11) and slowed rise (12).
     #[inline(always)]
     fn slowed_rise<S: Simd>(&self, distance: Lanes<S>, y: Lanes<S>) -> Lanes<S> {
         let rise = equations::rise(y, self.initial_speed);
@@ -310,7 +314,7 @@ impl ShapeTables {
         equations::slowed_rise(rise, equations::speed_profile(falloff, self.edge_speed))
     }
 
-    /// The gas T0 of the texture at the artist's contrast; still within [0, 1].
+    /// T0 with the parameter `contrast` applied; within [0, 1].
     #[inline(always)]
     pub(crate) fn gas<S: Simd>(&self, texture: Lanes<S>) -> Lanes<S> {
         texture.fma(texture.broadcast(self.contrast), texture.broadcast(1.0 - self.contrast))
@@ -326,7 +330,7 @@ impl ShapeTables {
 
     /// The whole mapping, eqs. (9) to (18), and the threshold, eq. (4), for points of the unit square.
     ///
-    /// `pixel` is the size of a pixel in x' and in y, over which edges are softened.
+    /// `pixel` is the size of a pixel in x' and in y, over which edges are antialiased.
     #[inline(always)]
     pub(crate) fn coordinates<S: Simd>(
         &self,
@@ -365,7 +369,7 @@ impl ShapeTables {
         equations::threshold(vertical, horizontal)
     }
 
-    /// Whether no point of a piece of the picture can lie in the flame, of which points around its rim are given; x from the centre line.
+    /// Whether no point of a region can lie in the flame; points around its border are given, x relative to the center line.
     #[inline(always)]
     pub(crate) fn misses_flame(&self, x: &[f32; 6], y: &[f32; 6]) -> bool {
         let range = |values: &[f32; 6]| {
@@ -384,7 +388,7 @@ impl ShapeTables {
         !self.reach[bin(low)..bin(high) + 1].iter().any(|reach| nearest <= *reach)
     }
 
-    /// For each piece of height the greatest x' with w <= 1 and within the fringe, with a margin for soft edges.
+    /// For each bin of height the greatest x' with w <= 1 and within the fringe, with a margin for antialiasing.
     fn compute_reach(&self) -> Box<[f32; REACH_BINS]> {
         const STEPS: usize = 256;
         const MARGIN: f32 = 0.03;
@@ -408,7 +412,7 @@ impl ShapeTables {
         reach
     }
 
-    /// Greatest A + D at each sampled height or above it.
+    /// Greatest A + D at each sampled height or above.
     fn max_width_above(&self) -> Vec<f32> {
         let mut widest: Vec<f32> = self.width_samples.iter().map(|[core, fringe]| core + fringe).collect();
         for i in (0..widest.len() - 1).rev() {
@@ -418,10 +422,10 @@ impl ShapeTables {
     }
 }
 
-/// Share of red light that is left at height w, and of green beside red, once soot has cooled by the share `cooling` w.
+/// Fraction of red light left at height w, and of green relative to red, where soot has cooled by the fraction `cooling * w`.
 ///
-/// Wien's law: a share d of the temperature costs a factor exp(-c2 d / (lambda T)); here for 610 and 540 nm at 1700 K. Blue, at
-/// 460 nm, loses what green loses beside red, to the power 2.5.
+/// Wien's law: cooling by a fraction d multiplies the radiance by exp(-c2 d / (lambda T)); here for 610 and 540 nm at 1700 K. Blue,
+/// at 460 nm, loses what green loses relative to red, to the power 2.5.
 fn cooling_factors(color: &ColorParameters, w: f64) -> [f64; 2] {
     const RED: f64 = 13.87;
     const GREEN: f64 = 15.67;
@@ -432,7 +436,7 @@ fn cooling_factors(color: &ColorParameters, w: f64) -> [f64; 2] {
     [math::exp(-RED * cooled_fraction), math::exp((RED - GREEN) * cooled_fraction)]
 }
 
-/// The random key of one flame among the instances of a sheet.
+/// Key of the random numbers of one instance.
 pub(crate) fn instance_key(seed: u64, name: &str, variation: i64, index: usize) -> Key {
     Key::new(seed, &format!("{name}/{variation}/{index}"))
 }

@@ -1,8 +1,8 @@
-//! Sheets drawn into strips, sixteen pixels at a time.
+//! Draws sheets into strips, sixteen pixels at a time.
 //!
-//! Where a pixel lies on the flame, its threshold and its glow change slowly from row to row of a large picture. They are found exactly on
-//! every second, fourth or sixteenth row and taken as straight between; texture and colour are looked up for every pixel. Where the mapping
-//! squeezes the texture, at the flame's foot and in its fringe, a pixel spans many texels: there it is the mean of several exact places.
+//! Flame coordinates, threshold and brightness vary slowly from row to row of a large picture. They are computed exactly on every
+//! second, fourth or sixteenth row and interpolated linearly between; texture and color are looked up for every pixel. Where the
+//! mapping minifies the texture, at the flame's base and in its fringe, pixels are supersampled.
 
 use std::ops::Range;
 
@@ -26,33 +26,33 @@ pub(crate) struct DrawContext<'a> {
     pub(crate) ramp: &'a ColorRamp,
     pub(crate) samples: &'a [TimeSample],
     pub(crate) content: SheetContent,
-    /// Whether it hides anything.
+    /// Whether it hides what is behind.
     pub(crate) absorbs: bool,
-    /// Rows from one exact row to the next, a power of two.
+    /// Distance between exact rows, a power of two.
     pub(crate) row_band: usize,
-    /// Texels from one pixel to the next beyond which a pixel is drawn from several places, [`MAX_MINIFICATION`].
+    /// Texels between neighboring pixels above which pixels are supersampled, [`MAX_MINIFICATION`].
     pub(crate) minification: f32,
 }
 
-/// Texels from one pixel to the next that look-ups at their middles still show without dots and steps.
+/// Texels between neighboring pixels up to which one lookup per pixel shows no aliasing.
 pub(crate) const MAX_MINIFICATION: f32 = 4.0;
 
-/// Places within a squeezed pixel from its middle, pixels across and up: no two in one column or row.
+/// Supersampling offsets from the pixel center, pixels across and up: no two in one column or row.
 const SUPERSAMPLES_4: [[f32; 2]; 4] = [[-0.375, 0.125], [-0.125, -0.375], [0.125, 0.375], [0.375, -0.125]];
-/// The same of a pixel that spans less than twice as many texels as show well.
+/// The same for less than twice the greatest minification.
 const SUPERSAMPLES_2: [[f32; 2]; 2] = [[-0.25, 0.25], [0.25, -0.25]];
 
-/// Rows from one exact row to the next for a sheet of this height: 1 up to 255 pixels, 16 from 1024 on.
+/// Distance between exact rows for a sheet of that height: 1 up to 255 pixels, 16 from 1024 on.
 pub(crate) fn row_band_height(height_pixels: f64) -> usize {
-    /// Rows of a row_band, and from which height on they are taken.
+    /// Distances, and the heights from which on they apply.
     const BANDS: [(usize, f64); 3] = [(16, 1024.0), (4, 512.0), (2, 256.0)];
     BANDS.into_iter().find(|(_, least)| height_pixels >= *least).map_or(1, |(rows, _)| rows)
 }
 
-/// Pixels of a row that are tried together for whether any flame can be there.
+/// Pixels of a row that are tested together for whether any flame can be there.
 const GROUP_COLUMNS: usize = 4 * LANES;
 
-/// Draws all samples of one sheet into the part `rect` of `strip`, behind what it holds.
+/// Draws all time samples of one sheet into `rect` of `strip`, behind what it holds.
 ///
 /// Batches begin at multiples of sixteen columns of the whole picture and bands at multiples of their height, so that strips and
 /// crops change no pixel.
@@ -85,41 +85,41 @@ fn draw_each_row<S: Simd>(simd: S, context: &DrawContext, columns: Range<usize>,
     }
 }
 
-/// Sixteen points of one sample, and how far they are from the camera.
+/// Flame coordinates of sixteen pixels of one time sample, and their depth.
 #[derive(Clone, Copy)]
 struct SheetSamples<S: Simd> {
     coordinates: FlameCoordinates<S>,
     depth: Lanes<S>,
-    /// The most texels that a pixel spans, in those that show well with one look-up.
+    /// Greatest number of texels per pixel, relative to the threshold of supersampling.
     minification: f32,
 }
 
-/// What is known of the rows of a row_band, batch after batch and in each all samples.
+/// The exact rows around a band, for all batches and time samples.
 struct RowBand<S: Simd> {
-    /// Exact places on the first row.
+    /// The first row of the band.
     first: Vec<SheetSamples<S>>,
-    /// How they differ on the first row of the next row_band.
+    /// The first row of the next band minus that.
     delta: Vec<SheetSamples<S>>,
-    /// Exact places on that row.
+    /// The first row of the next band.
     next: Vec<SheetSamples<S>>,
 }
 
 impl<S: Simd> RowBand<S> {
-    /// Room for a group of columns.
+    /// With capacity for a group of columns.
     #[inline(always)]
     fn new(context: &DrawContext) -> Self {
         let room = || Vec::with_capacity(GROUP_COLUMNS / LANES * context.samples.len());
         Self { first: room(), delta: room(), next: room() }
     }
 
-    /// Forgets both rows: what comes next does not follow on them.
+    /// Discards both rows where the next band does not follow on them.
     #[inline(always)]
     fn clear(&mut self) {
         self.first.clear();
         self.next.clear();
     }
 
-    /// Moves on to the row_band that begins at `row`.
+    /// Advances to the band that begins at `row`.
     #[inline(always)]
     fn advance(&mut self, simd: S, context: &DrawContext, columns: &Range<usize>, row: usize) {
         std::mem::swap(&mut self.first, &mut self.next);
@@ -142,7 +142,7 @@ impl<S: Simd> RowBand<S> {
     }
 }
 
-/// Draws the flame in some columns, row_band after row_band; the last row of a row_band is the first of the next.
+/// Draws the flame in some columns, band by band; the last row of a band is the first of the next.
 #[inline(always)]
 fn draw_bands<S: Simd>(
     simd: S,
@@ -177,7 +177,7 @@ fn draw_bands<S: Simd>(
     }
 }
 
-/// Exact places of all samples on a row, batch after batch.
+/// Exact flame coordinates of all time samples on a row, batch by batch.
 #[inline(always)]
 fn add_sheet_samples<S: Simd>(
     simd: S,
@@ -196,7 +196,7 @@ fn add_sheet_samples<S: Simd>(
     }
 }
 
-/// Averages all samples of the sixteen pixels from `pixel` on, `fraction` of the way between two exact rows.
+/// Averages the time samples of the sixteen pixels from `pixel` on, interpolated by `fraction` between two exact rows.
 #[inline(always)]
 fn average_samples<S: Simd>(
     simd: S,
@@ -227,7 +227,7 @@ fn average_samples<S: Simd>(
     sums
 }
 
-/// Adds a sample of sixteen pixels as the mean over several places in each.
+/// Adds a time sample of sixteen pixels, averaged over several points of each.
 fn add_supersampled<S: Simd>(
     simd: S,
     context: &DrawContext,
@@ -270,7 +270,7 @@ fn misses_flame(shape: &ShapeTables, sample: &TimeSample, columns: &Range<usize>
     shape.misses_flame(&x, &y)
 }
 
-/// Mean light and opacity of sixteen pixels over the exposure, and the nearest depth at which they see anything.
+/// Mean light and opacity of sixteen pixels over the exposure, and the least depth at which they see anything.
 struct PixelSums<S: Simd> {
     light: [Lanes<S>; 4],
     depth: Lanes<S>,
@@ -293,7 +293,7 @@ impl<S: Simd> PixelSums<S> {
         self.covered = true;
     }
 
-    /// Moves the pixels behind what the strip holds, where the plate does not hide them.
+    /// Composites the pixels behind what the strip holds, where the plate does not hide them.
     #[inline(always)]
     fn composite(&self, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
         if !self.covered {
@@ -313,13 +313,13 @@ impl<S: Simd> PixelSums<S> {
     }
 }
 
-/// [`PixelSums`] as plain numbers.
+/// [`PixelSums`] as arrays.
 struct PixelArrays {
     light: [[f32; LANES]; 4],
     depth: [f32; LANES],
 }
 
-/// Moves those of sixteen pixels that lie in `rect` behind what the strip holds, where the plate does not hide them.
+/// Composites those of sixteen pixels that lie in `rect` behind what the strip holds, where the plate does not hide them.
 fn composite(pixels: &PixelArrays, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
     let row = (y - strip.rect.y) * strip.rect.width;
     for lane in 0..LANES {

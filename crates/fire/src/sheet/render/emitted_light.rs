@@ -1,4 +1,4 @@
-//! The light that a flame throws on others: its own coloured field, integrated coarsely at each moment.
+//! Light that a flame casts on other objects: its own colored field, integrated on a coarse grid at each time.
 
 use bansho_base::{
     math::{
@@ -22,17 +22,16 @@ use crate::sheet::{
 };
 use fearless_simd::{Level, Simd, prelude::*};
 
-/// Rows of the coarse grid; it is sixteen wide.
+/// Rows of the grid; it is sixteen wide.
 const ROWS: usize = 32;
 
-/// What each row of the grid sends out, candela (ACEScg) in all directions that see the sheet's face.
+/// Luminous intensity of each row of the grid, cd (ACEScg), in all directions that see the sheet's face.
 pub(crate) type RowIntensities = [[f32; 3]; ROWS];
 
 impl FlameSheet {
-    /// Luminous intensity of the rows of a flame's sheet at time `t`, from the base up: luminance times area of each cell, summed.
+    /// Luminous intensity of the rows of a flame's sheet at `t`, from the base up: luminance times area, summed over cells.
     ///
-    /// The flame is taken as still air would leave it. A sheet is thin, and turned to every viewer, so that its intensity is the
-    /// same in all directions.
+    /// Wind is ignored. The sheet is thin and turned to every viewer, so that its intensity is isotropic.
     pub(crate) fn row_intensities(&self, flame: &FlameInstance, t: f64) -> RowIntensities {
         let calm = WindLean { across: 0.0, toward: 0.0 };
         let time = self.flame_time(flame, t);
@@ -45,7 +44,7 @@ impl FlameSheet {
         fearless_simd::dispatch!(Level::new(), simd => row_light(simd, self, &state, scale))
     }
 
-    /// The point lights that stand for a flame while the shutter is open.
+    /// Point lights that represent a flame while the shutter is open.
     pub(crate) fn point_lights(&self, flame: &FlameInstance, shutter: Shutter) -> Vec<Light> {
         let t = shutter.middle();
         let (base, size) = (self.base(flame, t), self.sheet_size(flame));
@@ -80,9 +79,9 @@ fn row_light<S: Simd>(simd: S, sheet: &FlameSheet, state: &SheetState, scale: f3
     row_light
 }
 
-/// Part `index` of `count` of the rows, each with the same share of the energy, and the height at which it is centred.
+/// Segment `index` of `count` of the rows, each with the same energy, and the height of its center.
 ///
-/// Parts of equal energy move up and down smoothly as the flame flickers.
+/// Segments of equal energy move smoothly as the flame flickers.
 fn equal_energy_segment(row_light: &RowIntensities, index: usize, count: usize) -> ([f32; 3], f64) {
     let energy = |row: &[f32; 3]| f64::from(row.iter().sum::<f32>().max(0.0));
     let total: f64 = row_light.iter().map(energy).sum();

@@ -1,4 +1,4 @@
-//! One flame of a sheet: its waves, its texture, where it stands and what it shows a view.
+//! One instance of a flame: its fluctuations, its texture, its placement, and its time samples in a view.
 
 use crate::sheet::{
     FlameSheet,
@@ -23,17 +23,17 @@ use bansho_base::{
 };
 use std::sync::Arc;
 
-/// Where a flame's texture comes from.
+/// Source of a flame's texture.
 #[derive(Clone, Debug)]
 pub(crate) enum TextureSource {
-    /// The layers of this flame on the common table.
+    /// The layers of this flame on the common noise table.
     Fractal(FractalLayers),
-    /// The paper's table, common to the sheet's flames.
+    /// The paper's table, common to all instances.
     Paper(Arc<PaperLayer>),
 }
 
 impl TextureSource {
-    /// Texels of the table in a sheet's height.
+    /// Texels of the table per sheet height.
     fn texels_up(&self) -> f64 {
         match self {
             Self::Fractal(layers) => layers.texels_up(),
@@ -60,7 +60,7 @@ impl TextureSource {
         }
     }
 
-    /// The same with its table filtered for a sheet `height_pixels` tall.
+    /// The same with its table filtered (as a mip level) for a sheet `height_pixels` tall.
     pub(crate) fn filtered(&self, height_pixels: f64) -> FilteredTexture {
         let level = math::log2(self.texels_up() / height_pixels.max(1.0)) as f32;
         match self {
@@ -74,16 +74,16 @@ impl TextureSource {
     }
 }
 
-/// A flame's texture at the resolution of one frame.
+/// A flame's texture, filtered for one frame.
 pub(crate) enum FilteredTexture {
-    /// Layers and their table.
+    /// Layers and their filtered table.
     Fractal(FractalLayers, Arc<TextureTable>),
     /// The paper's texture.
     Paper(Arc<PaperLayer>),
 }
 
 impl FilteredTexture {
-    /// Fractal layers for a sheet `height_pixels` tall.
+    /// Fractal layers filtered for a sheet `height_pixels` tall.
     pub(crate) fn fractal(layers: FractalLayers, height_pixels: f64) -> Self {
         TextureSource::Fractal(layers).filtered(height_pixels)
     }
@@ -98,12 +98,12 @@ impl FilteredTexture {
 }
 
 impl FlameSheet {
-    /// Middle of a flame's base at time `t`, m.
+    /// Center of a flame's base at `t`, m.
     pub(crate) fn base(&self, flame: &FlameInstance, t: f64) -> DVec3 {
         DVec3::from(self.parameters.position.at(self.clock.time(t))) + DVec3::from(flame.placement.position)
     }
 
-    /// A flame's own time.
+    /// A flame's own time, with its phase.
     pub(crate) fn flame_time(&self, flame: &FlameInstance, t: f64) -> f64 {
         t + self.parameters.phase_s + flame.placement.phase_s
     }
@@ -115,11 +115,11 @@ impl FlameSheet {
 
     /// Mean speed of the rising gas, m/s.
     pub(crate) fn rise_speed(&self, flame: &FlameInstance, t: f64) -> f64 {
-        // Over a height the texture passes in 1/s seconds, wherever the acceleration puts it.
+        // The texture passes over a height in 1/s seconds, whatever the acceleration.
         self.clock.speed(t) * self.sheet_size(flame).y
     }
 
-    /// Level direction across a flame's sheet.
+    /// Horizontal direction across a flame's sheet.
     pub(crate) fn right(&self, flame: &FlameInstance, camera: &Camera, base: DVec3) -> DVec3 {
         match self.parameters.facing {
             Facing::Camera => right_facing(camera, base),
@@ -130,7 +130,7 @@ impl FlameSheet {
         }
     }
 
-    /// A flame at time `t`, its sheet turned to `right`: how the wind pushes it, its stand and its moment.
+    /// A flame at `t` with its sheet turned to `right`: its quad, leaned by the wind, and its warp.
     pub(crate) fn evaluate_at(
         &self,
         flame: &FlameInstance,
@@ -146,7 +146,7 @@ impl FlameSheet {
         (quad, WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, push))
     }
 
-    /// Moments that stand for the exposure: enough that the gas scrolls a few pixels from one to the next.
+    /// Number of time samples of the exposure: the gas scrolls by a few pixels between them.
     pub(crate) fn time_samples(&self, flame: &FlameInstance, shutter: Shutter, pixels_per_metre: f64) -> usize {
         const PIXELS_APART: f64 = 8.0;
         const MOST: f64 = 8.0;
@@ -159,7 +159,7 @@ impl FlameSheet {
         }
     }
 
-    /// What of the chain is drawn.
+    /// What is drawn: the flame, or the texture square at a stage.
     pub(crate) fn content(&self) -> SheetContent {
         match self.parameters.stage {
             Stage::Flame => SheetContent::Flame,
@@ -168,7 +168,7 @@ impl FlameSheet {
         }
     }
 
-    /// A flame's samples over the exposure and the pixels they may touch.
+    /// A flame's time samples over the exposure, and the pixels they may touch.
     pub(crate) fn samples(
         &self,
         flame: &FlameInstance,
@@ -199,13 +199,13 @@ impl FlameSheet {
         (samples, rect)
     }
 
-    /// Luminance of the brightest colour at time `t`, cd/m^2.
+    /// Luminance of the brightest color at `t`, cd/m^2.
     pub(crate) fn luminance_at(&self, t: f64) -> f64 {
         self.parameters.colour.luminance.at(self.clock.time(t))
     }
 }
 
-/// Pixels that a metre of the sheet covers, at its middle.
+/// Pixels per meter at the sheet's center.
 pub(crate) fn pixels_per_metre(camera: &Camera, quad: &UprightQuad) -> f64 {
     let depth = camera.depth(quad.point(0.5, 0.5)).abs().max(camera.near);
     camera.focal_pixels / depth

@@ -1,4 +1,4 @@
-//! From the sheet's parameters at a moment to pixels.
+//! Rendering of the sheet: projection, shading by tables, drawing into strips, AOVs and emitted light.
 
 pub(crate) mod aovs;
 pub(crate) mod color_ramp;

@@ -1,4 +1,4 @@
-//! One frame of a sheet: its flames in order of depth, nearest first.
+//! One prepared frame of a sheet: flames, smoke and sparks sorted by depth, nearest first.
 
 use bansho_base::{
     camera::upright_quad::UprightQuad,
@@ -23,7 +23,7 @@ use crate::{
 };
 use fearless_simd::Level;
 
-/// A frame, ready to draw in strips.
+/// A frame, ready to be drawn into strips.
 pub(crate) struct PreparedSheet<'a> {
     sheet: &'a FlameSheet,
     view: &'a View,
@@ -31,7 +31,7 @@ pub(crate) struct PreparedSheet<'a> {
     commands: Vec<DrawCommand<'a>>,
 }
 
-/// One thing that is drawn, at one depth.
+/// One item at one depth.
 struct DrawCommand<'a> {
     flame: &'a FlameInstance,
     depth: f64,
@@ -58,14 +58,14 @@ impl<'a> PreparedSheet<'a> {
             check(observer)?;
             sheet.add_draw_commands(flame, view, surroundings, &mut commands);
         }
-        // A stable sort: things at one depth keep the order flame, smoke, sparks of each instance.
+        // A stable sort: at one depth the order is flame, smoke, sparks of each instance.
         commands.sort_by(|a: &DrawCommand, b: &DrawCommand| a.depth.total_cmp(&b.depth));
         Ok(Self { sheet, view, level: Level::new(), commands })
     }
 }
 
 impl FlameSheet {
-    /// FlameInstance, smoke and sparks of one instance.
+    /// Flame, smoke and sparks of one instance.
     fn add_draw_commands<'a>(
         &'a self,
         flame: &'a FlameInstance,
@@ -96,7 +96,7 @@ impl FlameSheet {
         }
     }
 
-    /// The fire whose sparks fly.
+    /// Sparks of one instance.
     fn spark_emitter(&self, flame: &FlameInstance, view: &View) -> SparkEmitter<'_> {
         let t = view.shutter.middle();
         SparkEmitter {
@@ -111,7 +111,7 @@ impl FlameSheet {
         }
     }
 
-    /// The stretch of depth that a flame with its sparks fills.
+    /// Depth interval of a flame and its sparks.
     pub(crate) fn depth_interval(&self, flame: &FlameInstance, view: &View) -> DepthInterval {
         let base = self.base(flame, view.shutter.middle());
         let size = self.sheet_size(flame);

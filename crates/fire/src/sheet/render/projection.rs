@@ -1,4 +1,4 @@
-//! The sheet in the world and its pixels, for every lens.
+//! Mapping from pixels to sheet coordinates, for every lens.
 
 use bansho_base::{
     camera::{Camera, Lens, upright_quad::UprightQuad},
@@ -11,41 +11,41 @@ use bansho_base::{
 
 use fearless_simd::{Simd, prelude::*};
 
-/// Coordinates of a batch of sixteen pixels of a row on the sheet.
+/// Sheet coordinates of sixteen pixels of a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SheetCoordinates<S: Simd> {
     /// Across the sheet.
     pub(crate) x: Lanes<S>,
     /// Up the sheet; far outside where the pixel does not see the sheet's plane.
     pub(crate) y: Lanes<S>,
-    /// Depth as the lens measures it, m.
+    /// Depth, m.
     pub(crate) depth: Lanes<S>,
 }
 
 impl<S: Simd> SheetCoordinates<S> {
-    /// The same pixels at other places on the sheet.
+    /// The same pixels with offset sheet coordinates.
     #[inline(always)]
     pub(crate) fn offset_by(&self, across: f32, up: f32) -> Self {
         Self { x: self.x + self.x.broadcast(across), y: self.y + self.y.broadcast(up), depth: self.depth }
     }
 }
 
-/// The depth of what is not seen; finite, so that it can be interpolated.
+/// Depth of pixels that do not see the plane; finite, so that it can be interpolated.
 const BEYOND: f32 = 1e30;
 /// A y that lies outside every flame.
 const OUTSIDE: f32 = -1e6;
 
-/// From pixels to the sheet.
+/// Mapping from pixels to the sheet.
 #[derive(Clone, Debug)]
 pub(crate) enum PixelToSheet {
-    /// Perspective: x, y and 1 over depth are x/d, y/d and d, all linear in the pixel.
+    /// Perspective: x/depth, y/depth and 1/depth are linear in pixel coordinates (a homography).
     Linear {
         /// Constant, per column and per row, of x/depth, y/depth and 1/depth.
         forms: [[f64; 3]; 3],
-        /// Nearest depth that is drawn.
+        /// Near clipping depth.
         near: f64,
     },
-    /// Other lenses: a ray for some pixels of each batch.
+    /// Other lenses: some rays of each batch are traced.
     Rays {
         /// The camera.
         camera: Camera,
@@ -55,7 +55,7 @@ pub(crate) enum PixelToSheet {
 }
 
 impl PixelToSheet {
-    /// The mapping of `quad` seen by `camera`; `None` where it is seen exactly edge on.
+    /// The mapping to `quad` seen by `camera`; `None` where it is seen exactly edge on.
     pub(crate) fn new(camera: &Camera, quad: &UprightQuad) -> Option<Self> {
         let normal = quad.right.cross(quad.up);
         let offset = normal.dot(quad.base - camera.position);
@@ -65,7 +65,7 @@ impl PixelToSheet {
         if camera.lens != Lens::Perspective {
             return Some(Self::Rays { camera: *camera, quad: *quad });
         }
-        // direction = constant + column px + row py, with its extent along the axis 1.
+        // direction = constant + column px + row py, with a component of 1 along the optical axis.
         let scale = 1.0 / camera.focal_pixels;
         let column = camera.orientation.col(0) * scale;
         let row = -camera.orientation.col(1) * scale;
@@ -92,7 +92,7 @@ impl PixelToSheet {
 }
 
 impl PixelToSheet {
-    /// Sheet coordinates and depth at a place of the picture; `None` where it does not see the sheet's plane.
+    /// Sheet coordinates and depth at a pixel position; `None` where it does not see the sheet's plane.
     #[inline(always)]
     pub(crate) fn at(&self, px: f64, py: f64) -> Option<[f64; 3]> {
         match self {
@@ -105,7 +105,7 @@ impl PixelToSheet {
         }
     }
 
-    /// The sheet coordinates of one pixel, where they are cheap to know.
+    /// Sheet coordinates at a pixel center, for a perspective lens.
     #[inline(always)]
     pub(crate) fn pixel_center(&self, column: usize, row: usize) -> Option<[f32; 2]> {
         let Self::Linear { .. } = self else { return None };
@@ -113,7 +113,7 @@ impl PixelToSheet {
     }
 }
 
-/// A form that is linear in the pixel, at sixteen pixels of a row.
+/// A linear form at sixteen pixels of a row.
 #[inline(always)]
 fn linear<S: Simd>(simd: S, [constant, column, row]: [f64; 3], px: f64, py: f64) -> Lanes<S> {
     ramp(simd, (column * px + row * py + constant) as f32, column as f32)
@@ -133,7 +133,7 @@ fn linear_batch<S: Simd>(simd: S, forms: &[[f64; 3]; 3], near: f64, column: usiz
     }
 }
 
-/// A batch as plain numbers.
+/// Sheet coordinates as arrays.
 #[derive(Debug)]
 struct SheetCoordinateArrays {
     x: [f32; LANES],
@@ -149,7 +149,7 @@ impl SheetCoordinateArrays {
     }
 }
 
-/// Where the ray of a pixel meets the sheet's plane: x, y, depth.
+/// Intersection of a pixel's ray with the sheet's plane: x, y, depth.
 fn intersect_sheet(camera: &Camera, quad: &UprightQuad, px: f64, py: f64) -> Option<[f64; 3]> {
     let direction = camera.direction(DVec2::new(px, py))?;
     let normal = quad.right.cross(quad.up);
@@ -161,9 +161,9 @@ fn intersect_sheet(camera: &Camera, quad: &UprightQuad, px: f64, py: f64) -> Opt
     Some([offset.dot(quad.right) / quad.size.x + 0.5, offset.dot(quad.up) / quad.size.y, depth])
 }
 
-/// Rays are traced for three pixels of a batch; a parabola through them misses the others by less than a thousandth of a pixel
-/// wherever the sheet is small in the lens, and pixels are traced one by one where one of the three sees nothing or the parabola
-/// bends much.
+/// Traces the rays of three pixels of a batch and interpolates with a parabola, which is off by less than a thousandth of a pixel
+/// where the sheet is small in the field of view. Where one of the three misses the plane, or curvature is large, all pixels are
+/// traced.
 fn ray_batch(camera: &Camera, quad: &UprightQuad, column: usize, row: usize) -> SheetCoordinateArrays {
     let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
     let mut batch = SheetCoordinateArrays { x: [0.0; LANES], y: [OUTSIDE; LANES], depth: [BEYOND; LANES] };
@@ -192,7 +192,7 @@ fn ray_batch(camera: &Camera, quad: &UprightQuad, column: usize, row: usize) -> 
     batch
 }
 
-/// Whole pixels of a picture that may see the sheet between `left` and `right` (x), up to `top` (y).
+/// Bounding rectangle of the pixels that may see the sheet between `left` and `right` (x), up to `top` (y).
 pub(crate) fn bounds(
     camera: &Camera,
     quad: &UprightQuad,
@@ -214,7 +214,7 @@ pub(crate) fn bounds(
             high = high.max(seen.pixel);
         }
     }
-    // Curved lenses may bulge between the points.
+    // Edges may bulge between the points for curved lenses.
     let margin = DVec2::splat(2.0) + (high - low) * if camera.lens == Lens::Perspective { 0.0 } else { 0.05 };
     let (low, high) = ((low - margin).max(DVec2::ZERO), high + margin);
     let end = [high.x, high.y].map(|side| side.ceil().max(0.0) as usize);

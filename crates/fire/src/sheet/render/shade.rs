@@ -1,4 +1,4 @@
-//! What sixteen pixels see of a sheet: from their places on it to light.
+//! Shading of sixteen pixels: from sheet coordinates to light and opacity.
 
 use bansho_base::{
     camera::upright_quad::UprightQuad,
@@ -17,9 +17,9 @@ use crate::sheet::{animate::warp::WarpState, equations, texture::Texture};
 
 use fearless_simd::Simd;
 
-/// What a sheet shows at one moment.
+/// The state of a sheet at one time.
 pub(crate) struct SheetState {
-    /// Edges, centre line, scroll.
+    /// Edges, center line and scroll.
     pub(crate) warp: WarpState,
     /// T0.
     pub(crate) texture: Texture,
@@ -28,7 +28,7 @@ pub(crate) struct SheetState {
 }
 
 impl SheetState {
-    /// Texels to a unit of u and of w, of the finer layer; a texture that was filtered for small pixels has as many as pixels.
+    /// Texels per unit of u and of w, of the finer layer; a texture that is filtered for small pixels has as many texels as pixels.
     #[inline(always)]
     pub(crate) fn texels(&self) -> [f32; 2] {
         let [across, up] = self.texture.texels();
@@ -37,21 +37,21 @@ impl SheetState {
     }
 }
 
-/// A sheet at one moment of the exposure, as one camera sees it.
+/// A sheet at one time of the exposure, as one camera sees it.
 pub(crate) struct TimeSample {
-    /// From pixels to the sheet.
+    /// Mapping from pixels to the sheet.
     pub(crate) pixel_to_sheet: PixelToSheet,
-    /// Where the sheet stands.
+    /// The sheet's quad in the world.
     pub(crate) quad: UprightQuad,
-    /// What it shows.
+    /// Its state at that time.
     pub(crate) state: SheetState,
-    /// Where it is smoke, what that is made of.
+    /// For smoke, its properties.
     pub(crate) smoke: Option<SmokeState>,
-    /// Luminance of the brightest colour, divided by the number of samples; cd/m^2.
+    /// Luminance of the brightest color divided by the number of time samples, cd/m^2.
     pub(crate) luminance: f32,
 }
 
-/// What sixteen pixels see of the flame.
+/// Shaded pixels of the flame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadedBatch<S: Simd> {
     /// T1, eq. (5).
@@ -60,7 +60,7 @@ pub(crate) struct ShadedBatch<S: Simd> {
     pub(crate) light: [Lanes<S>; 4],
 }
 
-/// Light of places of the flame; `None` where there is none.
+/// Light at flame coordinates; `None` where there is none.
 #[inline(always)]
 pub(crate) fn shade_coordinates<S: Simd>(
     shape: &ShapeTables,
@@ -96,7 +96,7 @@ pub(crate) fn shade_coordinates<S: Simd>(
     Some(ShadedBatch { t1, light })
 }
 
-/// Places of a batch of pixels on the flame; compiled once for each kind of vector.
+/// Flame coordinates of a batch of pixels; a function boundary for SIMD code.
 pub(crate) fn coordinates<S: Simd>(
     shape: &ShapeTables,
     state: &SheetState,
@@ -111,7 +111,7 @@ pub(crate) fn coordinates<S: Simd>(
     )
 }
 
-/// Whether any flame reaches a batch, and what of it; compiled once for each kind of vector.
+/// Light of a batch of pixels, `None` where there is none; a function boundary for SIMD code.
 pub(crate) fn shade<S: Simd>(
     shape: &ShapeTables,
     ramp: &ColorRamp,
@@ -125,7 +125,7 @@ pub(crate) fn shade<S: Simd>(
     )
 }
 
-/// What a batch sees of a sample, whatever is drawn.
+/// Light of a batch of pixels of a time sample, whatever its content.
 pub(crate) fn shade_sample<S: Simd>(
     shape: &ShapeTables,
     ramp: &ColorRamp,
@@ -150,7 +150,7 @@ pub(crate) fn shade_sample<S: Simd>(
 /// Height w up to which the base burns blue.
 const BLUE_TOP: f32 = 0.45;
 
-/// The blue zone hugs the flame's lower edge, where fuel meets air before soot forms.
+/// The blue zone at the flame's lower edge, where fuel meets air before soot forms.
 #[inline(always)]
 fn add_base_blue<S: Simd>(
     light: &mut [Lanes<S>; 4],
@@ -192,7 +192,7 @@ fn shade_flat<S: Simd>(
     Some(ShadedBatch { t1, light })
 }
 
-/// Which part of the chain is drawn.
+/// What a sheet shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SheetContent {
     /// The mapped flame.

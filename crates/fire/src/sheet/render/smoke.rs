@@ -1,4 +1,4 @@
-//! Smoke: a second sheet above the flame, cut softly from the same texture; it takes light away and scatters what falls on it.
+//! Smoke: a second sheet above the flame with the same texture and a soft threshold, which absorbs light and scatters it once.
 
 use bansho_base::{
     camera::upright_quad::UprightQuad,
@@ -21,17 +21,17 @@ use crate::sheet::{
 };
 use fearless_simd::{Simd, prelude::*};
 
-/// Heights at which the light that falls on smoke is known.
+/// Heights at which the light on the smoke is sampled.
 const LIGHT_SAMPLES: usize = 17;
 
-/// What smoke is made of at one moment.
+/// Properties of smoke at one time.
 #[derive(Clone, Debug)]
 pub(crate) struct SmokeState {
     /// Greatest optical depth.
     depth: f32,
-    /// Half width at the base beside that at the top.
+    /// Width at the base relative to that at the top.
     base_width: f32,
-    /// What it scatters toward the viewer where it hides everything, at `LIGHT_SAMPLES` heights; ACEScg, cd/m^2.
+    /// Radiance scattered toward the viewer where the smoke is opaque, at `LIGHT_SAMPLES` heights; ACEScg, cd/m^2.
     scattered: [[f32; 3]; LIGHT_SAMPLES],
 }
 
@@ -53,7 +53,7 @@ pub(crate) fn shade_smoke<S: Simd>(
 ) -> Option<ShadedBatch<S>> {
     let (x, y) = state.warp.unwarp(batch.x, batch.y);
     let (zero, one, two) = (x.broadcast(0.0), x.broadcast(1.0), x.broadcast(2.0));
-    // A plume widens as it rises; its density falls smoothly to nothing at all its edges.
+    // A plume widens as it rises; its density falls smoothly to 0 at all edges.
     let width =
         y.simd_max(zero).simd_sqrt().fma(one - one.broadcast(smoke.base_width), one.broadcast(smoke.base_width));
     let across = (two * (x - one.broadcast(0.5))).simd_abs() / width;
@@ -83,7 +83,7 @@ pub(crate) fn shade_smoke<S: Simd>(
 }
 
 impl FlameSheet {
-    /// The layers and waves of a flame's smoke; `None` where it makes none.
+    /// Texture layers and fluctuations of a flame's smoke; `None` where it makes none.
     pub(crate) fn smoke_layers(&self, flame: &FlameInstance) -> Option<(FractalLayers, FlameWaves)> {
         let smoke = &self.parameters.smoke;
         let still_shape =
@@ -133,7 +133,7 @@ impl FlameSheet {
         Some((TimeSample { pixel_to_sheet, state, quad, luminance: 1.0, smoke: Some(smoke_state) }, rect))
     }
 
-    /// What smoke scatters at each height: isotropic single scattering of the fire beneath and of all other lights.
+    /// Radiance scattered at each height: isotropic single scattering of the fire below and of all other lights.
     fn smoke_light(
         &self,
         flame: &FlameInstance,

@@ -1,8 +1,8 @@
-//! The default texture: layers of one table of domain-warped gradient noise that rise at different speeds.
+//! The default texture: two layers of one table of domain-warped gradient noise that rise at different speeds.
 //!
-//! A single wrapped table repeats when it has scrolled by its height. Here two things prevent that. The scroll crosses the table aslant, so
-//! that the table comes back moved sideways by an irrational part of its width; and a second, finer layer rises faster and
-//! crosses it the other way. Both change the gas as it rises, as a real flame changes.
+//! A single periodic table repeats when it has scrolled by its height. Here the scroll direction is slanted, so that the table
+//! returns shifted by an irrational fraction of its width, and a second, finer layer rises faster with the opposite slant. Both
+//! also change the gas as it rises, as a real flame does.
 
 use std::sync::{Arc, LazyLock};
 
@@ -17,15 +17,15 @@ use bansho_base::{
 use super::{COLUMNS, ROWS, Texture, TextureLayer, TextureTable};
 use crate::sheet::animate::clock::Clock;
 
-/// Lattice cells of the first octave across and up the table; 32 and 64 texels wide.
+/// Lattice cells of the first octave along columns and rows; 32 and 64 texels wide.
 const CELLS: [usize; 2] = [8, 8];
-/// The table, the same for every flame; flames differ by where they look.
+/// The noise table, common to all flames, which differ by their offsets.
 pub(crate) static FRACTAL: LazyLock<Arc<TextureTable>> = LazyLock::new(|| Arc::new(TextureTable::new(&warped_noise())));
 
 /// A texture as texels, row after row.
 type Texels = Vec<f32>;
 
-/// Gradient noise (Perlin 1985, with the quintic fade of 2002) on a lattice that divides the table, so that it wraps.
+/// Periodic gradient noise (Perlin 1985, with the quintic fade of 2002) on a lattice that divides the table.
 fn gradient_noise(cells: [usize; 2], key: Key, purpose: Purpose) -> Texels {
     let gradients: Vec<[f32; 2]> = (0..cells[0] * cells[1])
         .map(|cell| {
@@ -51,7 +51,7 @@ fn gradient_noise(cells: [usize; 2], key: Key, purpose: Purpose) -> Texels {
     texels
 }
 
-/// For each of `count` texels: its cell, the next, the place within it and the faded place.
+/// For each of `count` texels: its cell, the next cell, the fraction within it, and the faded fraction.
 fn axis(count: usize, cells: usize) -> Vec<(usize, usize, f32, f32)> {
     let width = count / cells;
     let coordinate = |i: usize| {
@@ -61,7 +61,7 @@ fn axis(count: usize, cells: usize) -> Vec<(usize, usize, f32, f32)> {
     (0..count).map(coordinate).collect()
 }
 
-/// Octaves of noise, each twice as fine and `gain` times as strong as the last.
+/// Octaves of noise, each of twice the frequency and `gain` times the amplitude of the last.
 fn octaves(count: usize, gain: f32, key: Key, name: Purpose) -> Texels {
     let mut sum = vec![0.0_f32; ROWS * COLUMNS];
     let mut amplitude = 1.0;
@@ -74,7 +74,7 @@ fn octaves(count: usize, gain: f32, key: Key, name: Purpose) -> Texels {
     sum
 }
 
-/// Noise whose coordinates are displaced by other noise: gas that was stirred.
+/// Domain-warped noise: its coordinates are displaced by other noise.
 fn warped_noise() -> Texels {
     /// Greatest displacement across and up, texels, at a noise value of 1.
     const WARP_TEXELS: [f32; 2] = [34.0, 60.0];
@@ -89,7 +89,7 @@ fn warped_noise() -> Texels {
     equalize_histogram((0..ROWS * COLUMNS).map(coordinate).collect())
 }
 
-/// Replaces each value by its rank in [0, 1]: no value is more frequent than another, the paper's one wish for the texture.
+/// Histogram equalization: replaces each value by its rank in [0, 1]. The paper asks for a texture without frequent values.
 fn equalize_histogram(texels: Texels) -> Texels {
     const BINS: usize = 4096;
     let low = texels.iter().copied().fold(f32::INFINITY, f32::min);
@@ -109,7 +109,7 @@ fn equalize_histogram(texels: Texels) -> Texels {
     texels.into_iter().map(rank).collect()
 }
 
-/// Mean of two evenly distributed numbers, distributed evenly again: the distribution of the sum is a triangle.
+/// Mean of two uniformly distributed numbers, equalized again: their sum has a triangular distribution.
 #[inline(always)]
 pub(super) fn mix_equalized<N: Real>(a: N, b: N) -> N {
     let (sum, one) = (a + b, a.broadcast(1.0));
@@ -118,18 +118,18 @@ pub(super) fn mix_equalized<N: Real>(a: N, b: N) -> N {
     sum.select_lt(one, rank, one - rank)
 }
 
-/// How one layer crosses the table.
+/// How one layer is mapped to the table.
 #[derive(Clone, Copy, Debug)]
 struct LayerMapping {
     /// Table widths across the sheet.
     widths: f64,
-    /// Table widths that it moves aslant in a sheet height.
+    /// Table widths of slant per sheet height.
     slant: f64,
-    /// Table heights in a sheet height.
+    /// Table heights per sheet height.
     heights: f64,
-    /// Speed beside the scroll.
+    /// Speed relative to the scroll.
     rate: f64,
-    /// Where it begins, in table widths and heights.
+    /// Offset, in table widths and heights.
     start: [f64; 2],
 }
 
@@ -140,8 +140,8 @@ pub(crate) struct FractalLayers {
 }
 
 impl FractalLayers {
-    /// Layers whose tongues are `size` times as wide and long as usual and which rise at `speed` times the scroll, begun where
-    /// `key` says.
+    /// Layers whose tongues are `width` times as wide and `length` times as long as the default, and which rise at `speed` times
+    /// the scroll; `key` sets their offsets.
     pub(crate) fn new([width, length]: [f64; 2], speed: f64, key: Key, clock: &Clock) -> Self {
         let start = key.uniforms(0, 0, Purpose::named("fractal layers")).map(f64::from);
         let coarse =
@@ -150,7 +150,7 @@ impl FractalLayers {
             LayerMapping { widths: -0.71, slant: -0.104_7, heights: 0.419, rate: 1.21, start: [start[2], start[3]] };
         let fit = |mapping: LayerMapping| {
             let heights = mapping.heights / length;
-            // Wave numbers of what scrolls by at the layer's own rate, moved to where they close a loop.
+            // Wave numbers of the scroll at the layer's own rate, rounded to those that close a loop.
             let pace = mapping.rate * speed.max(1e-3);
             let closed = clock.waves(heights * pace, 1.0) / (heights * pace);
             let stretch = closed.clamp(0.8, 1.25);
@@ -161,7 +161,7 @@ impl FractalLayers {
         Self { mappings: [fit(coarse), fit(fine)] }
     }
 
-    /// The texture scrolled by `scroll` sheet heights; `table` is [`FRACTAL`] or a filtered copy of it.
+    /// The texture after `scroll` sheet heights; `table` is [`FRACTAL`] or a filtered copy of it.
     pub(crate) fn at(&self, table: &Arc<TextureTable>, scroll: f64) -> Texture {
         let layer = |mapping: &LayerMapping| {
             let scroll = mapping.rate * scroll;
@@ -176,7 +176,7 @@ impl FractalLayers {
         Texture::Mixed(table.clone(), [layer(&self.mappings[0]), layer(&self.mappings[1])])
     }
 
-    /// Texels of the table in a sheet's height, of the finer layer.
+    /// Texels per sheet height, of the finer layer.
     pub(crate) fn texels_up(&self) -> f64 {
         ROWS as f64 * self.mappings[1].heights
     }

@@ -1,4 +1,4 @@
-//! The gas as a texture: one wrapped table whose every entry holds the four corners of a bilinear look-up.
+//! The gas as a texture: a periodic table whose entries hold the four corners of a bilinear lookup.
 
 mod fractal;
 mod paper;
@@ -18,21 +18,21 @@ pub(crate) use paper::PaperLayer;
 pub(crate) const COLUMNS: usize = 256;
 /// Rows of a table, along q.
 pub(crate) const ROWS: usize = 512;
-/// The coarsest level of a table.
+/// The coarsest filter level.
 pub(crate) const MAX_LEVEL: usize = 5;
 
 /// A periodic texture of [`ROWS`] x [`COLUMNS`] texels.
 ///
-/// An entry holds the texel, its right neighbour, the one above and the one above right, so that a look-up is one load.
+/// An entry holds the texel and its neighbors to the right, above, and above right, so that a bilinear lookup is one load.
 #[derive(Clone, Debug)]
 pub(crate) struct TextureTable {
     corners: Box<[[f32; 4]; ROWS * COLUMNS]>,
-    /// Texels of ever coarser tables, made when they are needed.
+    /// Texels of ever coarser levels, computed on demand.
     coarser: [OnceLock<Box<[f32]>>; MAX_LEVEL],
 }
 
 impl TextureTable {
-    /// A table of the texels that `texel(row * COLUMNS + column)` gives.
+    /// A table of the texels `texels[row * COLUMNS + column]`.
     pub(crate) fn new(texels: &[f32]) -> Self {
         let at = |row: usize, column: usize| texels[(row % ROWS) * COLUMNS + column % COLUMNS];
         let corner = |i: usize| {
@@ -40,17 +40,17 @@ impl TextureTable {
             [at(row, column), at(row, column + 1), at(row + 1, column), at(row + 1, column + 1)]
         };
         let corners: Vec<[f32; 4]> = (0..ROWS * COLUMNS).map(corner).collect();
-        // The range above makes exactly the array's length.
+        // The range above has exactly the array's length.
         let corners = corners.into_boxed_slice().try_into().unwrap_or_else(|_| Box::new([[0.0; 4]; ROWS * COLUMNS]));
         Self { corners, coarser: Default::default() }
     }
 
-    /// The texels themselves, row after row.
+    /// The texels, row by row.
     pub(crate) fn texels(&self) -> Vec<f32> {
         self.corners.iter().map(|corner| corner[0]).collect()
     }
 
-    /// Bilinear look-ups at wrapped places, in texels.
+    /// Bilinear lookups at wrapped coordinates, in texels.
     #[inline(always)]
     pub(crate) fn sample<S: Simd>(&self, column: Lanes<S>, row: Lanes<S>) -> Lanes<S> {
         let (left, across) = wrap_split(column, COLUMNS as u32 - 1);
@@ -62,7 +62,7 @@ impl TextureTable {
         (high - low).fma(up, low)
     }
 
-    /// A bilinear look-up at one wrapped place of at least -2^16 texels.
+    /// One bilinear lookup at wrapped coordinates of at least -2^16 texels.
     fn bilinear(&self, column: f32, row: f32) -> f32 {
         let split = |coordinate: f32| (coordinate.floor() as i32 as usize, coordinate - coordinate.floor());
         let ((left, across), (below, up)) = (split(column), split(row));
@@ -72,7 +72,8 @@ impl TextureTable {
         (high - low).fma(up, low)
     }
 
-    /// A table a factor 2 coarser for each whole `level`, up to [`MAX_LEVEL`], blended between, still of the same size: for small sheets.
+    /// The table low-pass filtered by a factor of 2 per whole `level`, up to [`MAX_LEVEL`], blended between levels (trilinear); its
+    /// size is unchanged. For small sheets.
     pub(crate) fn filtered(&self, level: f32) -> Self {
         let level = level.clamp(0.0, MAX_LEVEL as f32);
         let whole = (level as usize).min(MAX_LEVEL - 1);
@@ -81,7 +82,7 @@ impl TextureTable {
         Self::new(&texels)
     }
 
-    /// The texels of a table `level` factors of 2 coarser, which are kept.
+    /// The texels filtered by `level` factors of 2, which are cached.
     fn mip_level(&self, level: usize) -> &[f32] {
         self.coarser[level].get_or_init(|| match level.checked_sub(1) {
             None => self.texels().into(),
@@ -94,7 +95,7 @@ impl TextureTable {
     }
 }
 
-/// Blends each texel by `amount` with the binomial mean (1 2 1)/4 of texels `spacing` apart, in both directions.
+/// Blends each texel by `amount` with the binomial mean (1 2 1)/4 of texels `spacing` apart, along rows and columns.
 fn filter(texels: &mut [f32], spacing: usize, amount: f32) {
     let before = texels.to_vec();
     dispatch!(Level::new(), _simd => filter_rows(&before, texels, spacing, amount));
@@ -104,40 +105,40 @@ fn filter(texels: &mut [f32], spacing: usize, amount: f32) {
 
 #[inline(always)]
 fn filter_rows(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
-    for (row, filter) in before.chunks_exact(COLUMNS).zip(texels.chunks_exact_mut(COLUMNS)) {
+    for (row, filtered) in before.chunks_exact(COLUMNS).zip(texels.chunks_exact_mut(COLUMNS)) {
         let wrapped = [&row[COLUMNS - spacing..], row, &row[..spacing]].concat();
-        blend(row, [&wrapped[2 * spacing..], &wrapped], amount, filter);
+        blend(row, [&wrapped[2 * spacing..], &wrapped], amount, filtered);
     }
 }
 
 #[inline(always)]
 fn filter_columns(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
     let row = |row: usize| &before[row % ROWS * COLUMNS..][..COLUMNS];
-    for (coordinate, filter) in texels.chunks_exact_mut(COLUMNS).enumerate() {
-        blend(row(coordinate), [row(coordinate + spacing), row(coordinate + ROWS - spacing)], amount, filter);
+    for (index, filtered) in texels.chunks_exact_mut(COLUMNS).enumerate() {
+        blend(row(index), [row(index + spacing), row(index + ROWS - spacing)], amount, filtered);
     }
 }
 
 #[inline(always)]
-fn blend(row: &[f32], [next, last]: [&[f32]; 2], amount: f32, filter: &mut [f32]) {
+fn blend(row: &[f32], [next, last]: [&[f32]; 2], amount: f32, filtered: &mut [f32]) {
     let (row, next, last) = (&row[..COLUMNS], &next[..COLUMNS], &last[..COLUMNS]);
-    for (i, value) in filter.iter_mut().enumerate() {
+    for (i, value) in filtered.iter_mut().enumerate() {
         let mean = 0.25 * (next[i] + last[i]) + 0.5 * row[i];
         *value = (mean - row[i]).fma(amount, row[i]);
     }
 }
 
-/// How texture coordinates (u, w) become columns and rows of the table at one moment.
+/// Mapping of texture coordinates (u, w) to columns and rows of the table at one time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct TextureLayer {
-    /// Columns a unit of u, then of w, and where they begin.
+    /// Columns per unit of u and of w, and the offset.
     pub(crate) columns: [f32; 3],
-    /// Rows a unit of w, and where they begin.
+    /// Rows per unit of w, and the offset.
     pub(crate) rows: [f32; 2],
 }
 
 impl TextureLayer {
-    /// Looks up the layer at sixteen places.
+    /// Looks up the layer at sixteen points.
     #[inline(always)]
     fn sample<S: Simd>(&self, table: &TextureTable, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
         let [across, slant, first] = self.columns;
@@ -146,24 +147,24 @@ impl TextureLayer {
     }
 }
 
-/// A texture at one moment: T0(u, w), eq. (2).
+/// A texture at one time: T0(u, w), eq. (2).
 #[derive(Clone, Debug)]
 pub(crate) enum Texture {
-    /// The table as it is.
+    /// One layer.
     Single(Arc<TextureTable>, TextureLayer),
-    /// Two layers, both evenly distributed over [0, 1], mixed so that their mixture is again.
+    /// Two layers, each uniformly distributed over [0, 1], mixed so that the mixture is too.
     Mixed(Arc<TextureTable>, [TextureLayer; 2]),
 }
 
 impl Texture {
-    /// Texels to a unit of u and of w, of the finer layer.
+    /// Texels per unit of u and of w, of the finer layer.
     #[inline(always)]
     pub(crate) fn texels(&self) -> [f32; 2] {
         let (Self::Single(_, fine) | Self::Mixed(_, [_, fine])) = self;
         [fine.columns[0].abs(), fine.rows[0].abs()]
     }
 
-    /// T0 at sixteen places; in [0, 1].
+    /// T0 at sixteen points; in [0, 1].
     #[inline(always)]
     pub(crate) fn sample<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
         match self {

@@ -1,4 +1,4 @@
-//! The paper's texture, eq. (20), exactly, and as a table.
+//! The paper's texture, eq. (20), exactly and as a table.
 
 use std::{
     f64::consts::{FRAC_PI_2, PI},
@@ -10,9 +10,9 @@ use bansho_base::math::{self, MulAdd};
 use super::{COLUMNS, ROWS, Texture, TextureLayer, TextureTable};
 use crate::sheet::animate::clock::Clock;
 
-/// `Fx_0` of eq. (20), radians a unit of p.
+/// `Fx_0` of eq. (20), radians per unit of p.
 const FIRST_FREQUENCY_P: f64 = 16.0;
-/// `Fy_0` of eq. (20), radians a unit of q.
+/// `Fy_0` of eq. (20), radians per unit of q.
 const FIRST_FREQUENCY_Q: f64 = 26.0;
 /// `C_{i+1} / C_i` of eq. (20).
 const AMPLITUDE_RATIO: f64 = 0.707;
@@ -51,10 +51,10 @@ impl Octave {
         std::iter::successors(Some(first), next).take(octaves as usize)
     }
 
-    /// The four functions of one coordinate, at `coordinate`, whose products with those of the other make a term.
+    /// The four functions of one coordinate whose products with those of the other sum to a term.
     ///
-    /// With a = Fx x, b = Px(y), c = Fy y, d = Py(x): cos(a+b) cos(c+d) is the product of
-    /// (cos a cos b - sin a sin b) and (cos c cos d - sin c sin d), and a, d belong to x while b, c belong to y.
+    /// With a = Fx x, b = Px(y), c = Fy y, d = Py(x): cos(a+b) cos(c+d) is the product of (cos a cos b - sin a sin b) and (cos c
+    /// cos d - sin c sin d), where a, d depend on x and b, c on y.
     fn factors(coordinate: f64, frequency: f64) -> [f64; 4] {
         let (sin_own, cos_own) = math::sin_cos(frequency * coordinate);
         let (sin_phase, cos_phase) = math::sin_cos(FRAC_PI_2 * math::sin(0.5 * frequency * coordinate));
@@ -62,17 +62,17 @@ impl Octave {
     }
 }
 
-/// Eq. (20) over a grid, as products of row functions and column functions: four multiply-adds an octave and sample.
+/// Eq. (20) over a grid as products of row functions and column functions: four multiply-adds per octave and sample.
 #[derive(Clone, Debug)]
 pub struct PaperTexture {
-    /// For each octave and factor, its values over the columns, with the signs and weights in them.
+    /// For each octave and factor, its values over the columns, including signs and weights.
     across: Vec<Vec<f32>>,
     /// For each row, the values of each octave and factor.
     up: Vec<Vec<f32>>,
 }
 
 impl PaperTexture {
-    /// Row and column functions for `octaves` terms at the places `p` (columns) and `q` (rows).
+    /// Row and column functions of `octaves` terms at `p` (columns) and `q` (rows).
     pub fn new(p: &[f64], q: &[f64], octaves: u32) -> Self {
         let terms: Vec<Octave> = Octave::all(octaves).collect();
         let total: f64 = terms.iter().map(|octave| octave.weight).sum();
@@ -94,7 +94,7 @@ impl PaperTexture {
         Self { across: terms.iter().flat_map(column_factors).collect(), up: q.iter().map(row_factors).collect() }
     }
 
-    /// Writes row `row` over all columns; values in [0, 1].
+    /// Writes row `row` for all columns; values in [0, 1].
     #[inline(always)]
     pub fn fill_row(&self, row: usize, values: &mut [f32]) {
         values.fill(0.5);
@@ -113,7 +113,7 @@ impl PaperTexture {
     }
 }
 
-/// The paper's texture over one period as a table.
+/// One period of the paper's texture as a table.
 #[derive(Clone, Debug)]
 pub(crate) struct PaperLayer {
     table: Arc<TextureTable>,
@@ -132,11 +132,11 @@ impl PaperLayer {
         Self { table: Arc::new(TextureTable::new(&texels)), waves: clock.waves(1.0 / PERIOD_Q, 1.0) * PERIOD_Q }
     }
 
-    /// The texture scrolled by `scroll` sheet heights, eq. (1).
+    /// The texture after `scroll` sheet heights, eq. (1).
     pub(crate) fn at(&self, scroll: f64) -> Texture {
         let columns = (COLUMNS as f64 / PERIOD_P) as f32;
         let rows = ROWS as f64 / PERIOD_Q;
-        // `waves` is 1 unless a loop needs the scroll to be a whole number of periods.
+        // `waves` is 1 unless a loop requires a whole number of periods.
         let offset = math::reduce_phase(-self.waves * scroll / PERIOD_Q) * ROWS as f32;
         Texture::Single(self.table.clone(), TextureLayer { columns: [columns, 0.0, 0.0], rows: [rows as f32, offset] })
     }
@@ -146,7 +146,7 @@ impl PaperLayer {
         Self { table: Arc::new(self.table.filtered(level)), waves: self.waves }
     }
 
-    /// Texels of the table in a sheet's height.
+    /// Texels per sheet height.
     pub(crate) fn texels_up(&self) -> f64 {
         ROWS as f64 / PERIOD_Q
     }
