@@ -1,4 +1,4 @@
-//! A whole step of a developed particle flame with everything on: births, cells, density, forces, neighbours, wind, rings, turbulence,
+//! A whole step of a developed particle flame with everything on: births, cells, density, forces, neighbors, wind, rings, turbulence,
 //! burning, integration; with 3,000, 30,000 and 100,000 particles.
 
 mod support;

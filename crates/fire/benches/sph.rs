@@ -1,7 +1,7 @@
-//! A step of smoothed particles, about 35 neighbours each: cells, density, pressure, integration.
+//! A step of smoothed particles, about 35 neighbors each: cells, density, pressure, integration.
 //!
 //! Beside it are all pairs (3,000 particles only: 100,000 would take a thousand times as long) and the unsorted way: cells in a hash map,
-//! particles where they happen to lie, one neighbour at a time. And a step of burning gas, all in: the same and its wind, eddies, mixing,
+//! particles where they happen to lie, one neighbor at a time. And a step of burning gas, all in: the same and its wind, eddies, mixing,
 //! burning, births and deaths.
 
 mod support;
@@ -88,10 +88,10 @@ impl<const D: usize> Simulation<D> {
     }
 }
 
-/// Told of a neighbour, the offset from it, and its distance.
+/// Told of a neighbor, the offset from it, and its distance.
 type Visitor<'a> = &'a mut dyn FnMut(usize, [f32; 3], f32);
 
-/// A step one pair at a time, the neighbours of each particle found by `near`.
+/// A step one pair at a time, the neighbors of each particle found by `near`.
 fn scalar_step(particles: &mut Particles<3>, near: &dyn Fn(&Particles<3>, usize, Visitor)) {
     let density_kernel = Kernel::<3>::new(KernelShape::Poly6, SUPPORT);
     let force_kernel = Kernel::<3>::new(KernelShape::Spiky, SUPPORT);

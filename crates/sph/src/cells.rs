@@ -109,7 +109,7 @@ impl<const D: usize> Cells<D> {
     #[must_use]
     pub fn new(support_radius: f32) -> Self {
         const { assert!(D == 2 || D == 3, "particles live in two or three dimensions") };
-        let none = || std::array::from_fn(|_| Vec::new());
+        let empty = || std::array::from_fn(|_| Vec::new());
         let keys = Keys::new([0; D], [0; D]);
         let (order, ids, occupied, row_chunks, batches) = Default::default();
         let coordinates = std::array::from_fn(|_| Vec::new());
@@ -118,7 +118,7 @@ impl<const D: usize> Cells<D> {
             keys,
             order,
             ids,
-            positions: none(),
+            positions: empty(),
             occupied,
             row_chunks,
             batches,

@@ -274,7 +274,7 @@ fn the_middle_of_a_lattice_under_pressure_rests_until_sound_arrives() {
     assert!(arrived > 0.02, "the surface gives way: {arrived}");
 }
 
-/// Total momentum, total of `m |v|`, and centre of mass.
+/// Total momentum, total of `m |v|`, and center of mass.
 fn totals<const D: usize>(particles: &Particles<D>) -> ([f64; D], f64, [f64; D]) {
     let sum =
         |f: &dyn Fn(usize) -> f64| (0..particles.len()).map(|i| f64::from(particles.masses[i]) * f(i)).sum::<f64>();
@@ -308,7 +308,7 @@ fn keeps_momentum<const D: usize>() {
 }
 
 #[test]
-fn a_free_cloud_keeps_its_momentum_and_its_centre_moves_straight() {
+fn a_free_cloud_keeps_its_momentum_and_its_center_moves_straight() {
     keeps_momentum::<2>();
     keeps_momentum::<3>();
 }

@@ -44,7 +44,7 @@ pub enum ParticleFaultKind {
         side: f64,
     },
     /// More particles than are allowed, or than there is memory for.
-    #[error("{count} particles{} would take {gib:.0} GiB; allowed: up to {most}", beside(*.others))]
+    #[error("{count} particles{} would take {gib:.0} GiB; allowed: up to {most}", beside_others(*.others))]
     TooManyParticles {
         /// Particles requested.
         count: i64,
@@ -72,6 +72,6 @@ pub enum ParticleFaultKind {
 }
 
 /// Text about the particles of other flames.
-fn beside(others: i64) -> String {
+fn beside_others(others: i64) -> String {
     if others == 0 { String::new() } else { format!(" beside {others} of other flames") }
 }

@@ -22,8 +22,8 @@ pub fn axis_distance<N: Real>(x: N) -> N {
 /// Where the fringe has zero width it is 0 up to `A` and 1 beyond, without a division by zero.
 #[inline(always)]
 pub fn fringe_position<N: Real>(distance: N, core_width: N, fringe_width: N) -> N {
-    const NARROWEST: f32 = 1e-6;
-    ((distance - core_width) / fringe_width.simd_max(distance.broadcast(NARROWEST))).simd_clamp01()
+    const MIN_FRINGE_WIDTH: f32 = 1e-6;
+    ((distance - core_width) / fringe_width.simd_max(distance.broadcast(MIN_FRINGE_WIDTH))).simd_clamp01()
 }
 
 /// Speed profile `K = h + (1-h) F`, eq. (11), from `falloff` = F((x'-A)/D).

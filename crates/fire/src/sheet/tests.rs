@@ -103,8 +103,8 @@ fn random_parameters(number: u64) -> FlameSheetParameters {
 /// T0, T1, threshold and coverage over the whole sheet.
 fn field<S: Simd>(simd: S, sheet: &FlameSheet, t: f64) -> Vec<[f32; 4]> {
     let flame = &sheet.flames[0];
-    let push = WindLean { across: 0.4, toward: 0.0 };
-    let warp = WarpState::new(&sheet.parameters, sheet.shape(), &flame.waves, &sheet.clock, t, push);
+    let lean = WindLean { across: 0.4, toward: 0.0 };
+    let warp = WarpState::new(&sheet.parameters, sheet.shape(), &flame.waves, &sheet.clock, t, lean);
     let state = SheetState { texture: flame.texture_source.texture(warp.scroll), warp, pixel: [0.05, 0.05] };
     let mut values = Vec::new();
     for row in 0..24 {

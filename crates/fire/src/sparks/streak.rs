@@ -28,10 +28,10 @@ impl Streak {
     /// A streak that distributes the light `radiance` times `area` (square pixels) over its coverage.
     pub(crate) fn new(from: DVec2, to: DVec2, radius: f64, radiance: [f32; 3], area: f64, depth: f64) -> Option<Self> {
         /// Longer streaks are discarded: the spark crosses the lens.
-        const LONGEST: f64 = 4000.0;
+        const MAX_LENGTH: f64 = 4000.0;
         let reach = DVec2::splat(radius + EDGE_SOFTNESS);
         let (min_pixel, max_pixel) = (from.min(to) - reach, from.max(to) + reach);
-        if !((max_pixel - min_pixel).max_element() < LONGEST && min_pixel.abs().max_element() < 1e9) {
+        if !((max_pixel - min_pixel).max_element() < MAX_LENGTH && min_pixel.abs().max_element() < 1e9) {
             return None;
         }
         let whole = |fraction: DVec2| [fraction.x.floor() as i64, fraction.y.floor() as i64];
@@ -47,8 +47,10 @@ impl Streak {
 
     /// Sum of the coverage over all pixels: counted where that is cheap, else the area of a capsule with soft edges.
     fn covered(&self) -> f64 {
-        const QUICK: i64 = 4096;
-        if (self.max_pixel[0] - self.min_pixel[0] + 1) * (self.max_pixel[1] - self.min_pixel[1] + 1) <= QUICK {
+        const MAX_COUNTED_PIXELS: i64 = 4096;
+        if (self.max_pixel[0] - self.min_pixel[0] + 1) * (self.max_pixel[1] - self.min_pixel[1] + 1)
+            <= MAX_COUNTED_PIXELS
+        {
             return self.pixels().map(|(x, y)| self.coverage(x, y)).sum();
         }
         // The variance of a smoothstep edge of half width s is s^2/5, that of a Beta(2, 2) distribution.

@@ -164,7 +164,7 @@ impl GasResolver<'_> {
         strip: &mut Strip,
     ) {
         /// Least luminance that counts as glowing, cd/m^2.
-        const DARK: f32 = 1e-3;
+        const MIN_LUMINANCE: f32 = 1e-3;
         for y in rect.y..rect.bottom() {
             let Some([first, last]) = self.fill(layer.index, y, extents, row) else { continue };
             let from = first.max(rect.x) / 16 * 16;
@@ -178,10 +178,10 @@ impl GasResolver<'_> {
                         continue;
                     }
                     strip.aovs[OPTICAL_DEPTH].add(index, tau, 1.0);
-                    if glow > DARK {
+                    if glow > MIN_LUMINANCE {
                         strip.aovs[TEMPERATURE].add(index, self.temperature(heat, glow), glow);
-                        let moved = motion.map_or([0.0; 2], |motion| motion.at(pixel, y));
-                        (0..2).for_each(|axis| strip.aovs[MOTION[axis]].add(index, moved[axis], glow));
+                        let motion_pixels = motion.map_or([0.0; 2], |motion| motion.at(pixel, y));
+                        (0..2).for_each(|axis| strip.aovs[MOTION[axis]].add(index, motion_pixels[axis], glow));
                     }
                 }
             }

@@ -172,7 +172,7 @@ impl GasStatistics {
         (total > 0.0).then(|| DetailScale {
             radius: radius / total,
             absorption: absorption / total,
-            pixels_per_metre: pixels / total,
+            pixels_per_meter: pixels / total,
             time: view.shutter.middle(),
             exposure_s: view.shutter.duration(),
             camera_motion: camera_motion(gas.particles.origin, view),

@@ -22,8 +22,8 @@ struct Slab {
     /// Luminous intensity without self-absorption, cd, ACEScg.
     intensity: [f64; 3],
     /// Intensity times position.
-    moment: DVec3,
-    spread: f64,
+    position_moment: DVec3,
+    radial_moment: f64,
     /// Sum of absorption coefficient times volume, m^2: optical depth times area.
     absorption_area: f64,
 }
@@ -39,8 +39,8 @@ impl Slab {
         for c in 0..3 {
             self.intensity[c] += weight * other.intensity[c];
         }
-        self.moment += other.moment * weight;
-        self.spread += weight * other.spread;
+        self.position_moment += other.position_moment * weight;
+        self.radial_moment += weight * other.radial_moment;
         self.absorption_area += weight * other.absorption_area;
     }
 }
@@ -124,8 +124,8 @@ fn add_to_slabs(
         let fraction = slab_position - slab_position.floor();
         let intensity = radiance.map(|value| value * absorption_area);
         let power: f64 = intensity.iter().sum();
-        let spread = (position.x * position.x + position.z * position.z) * power;
-        let contribution = Slab { intensity, moment: position * power, spread, absorption_area };
+        let radial_moment = (position.x * position.x + position.z * position.z) * power;
+        let contribution = Slab { intensity, position_moment: position * power, radial_moment, absorption_area };
         slabs[slab_position as usize].add(&contribution, 1.0 - fraction);
         slabs[slab_position as usize + 1].add(&contribution, fraction);
     }
@@ -147,8 +147,8 @@ fn range_light(slabs: &[Slab], [from, to]: [f64; 2], look: &LookParameters) -> O
     if power <= 0.0 {
         return None;
     }
-    let position = sum.moment / power;
-    let deviation = (sum.spread / power - position.x * position.x - position.z * position.z).max(0.0).sqrt();
+    let position = sum.position_moment / power;
+    let deviation = (sum.radial_moment / power - position.x * position.x - position.z * position.z).max(0.0).sqrt();
     let radius = deviation.max(1e-3);
     // Seen from the side, a segment covers about a disc of twice its standard deviation.
     let tau = sum.absorption_area / (4.0 * std::f64::consts::PI * radius * radius);

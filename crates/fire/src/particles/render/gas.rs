@@ -126,9 +126,9 @@ impl Gas<'_> {
             return 0.0;
         }
         /// Volume fraction of soot that quenches the blue light to one half.
-        const SOOTY: f64 = 1e-7;
+        const QUENCHING_SOOT: f64 = 1e-7;
         let burnt = (1.0 - f64::from(self.particles.fuel[index])).clamp(0.0, 1.0) / BLUE_PEAK_BURNED;
-        let sooty = f64::from(self.particles.soot[index]).max(0.0) / SOOTY;
+        let sooty = f64::from(self.particles.soot[index]).max(0.0) / QUENCHING_SOOT;
         BLUE_LUMINANCE * look.base_blue * burnt * math::exp(1.0 - burnt) / (1.0 + sooty * sooty)
     }
 }

@@ -51,7 +51,7 @@ pub struct PreparedGas<'a> {
     view: &'a View,
     level: Level,
     layers: DepthLayers,
-    matter: DrawMode<'a>,
+    mode: DrawMode<'a>,
     sparks: Vec<Streak>,
     /// Computed where it is requested as an AOV or bends the light from behind.
     haze: OnceLock<Option<HeatHaze>>,
@@ -128,14 +128,14 @@ impl<'a> PreparedGas<'a> {
         check(observer)?;
         let statistics = GasStatistics::new(&gas, look, view);
         let layers = statistics.layers(&gas);
-        let matter = match look.sprite {
+        let mode = match look.sprite {
             SpriteStyle::Squares => DrawMode::Squares(Squares::new(&gas, look, view)),
-            _ => splatted(&gas, look, view, &statistics, surroundings),
+            _ => splat_gas(&gas, look, view, &statistics, surroundings),
         };
         check(observer)?;
         let mut sparks = spark_emitter(&gas, look, view).streaks(view, surroundings.wind);
         sparks.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-        let prepared = Self { gas, look, view, level: Level::new(), layers, matter, sparks, haze: OnceLock::new() };
+        let prepared = Self { gas, look, view, level: Level::new(), layers, mode, sparks, haze: OnceLock::new() };
         if view.measured {
             prepared.haze();
         }
@@ -149,24 +149,24 @@ impl<'a> PreparedGas<'a> {
         (0..self.layers.count).map(layer).filter(|layer| slice.contains(layer.depth))
     }
 
-    fn resolve<'b>(&'b self, splatted: &'b SplattedGas<'_>) -> GasResolver<'b> {
+    fn resolve<'b>(&'b self, splat_gas: &'b SplattedGas<'_>) -> GasResolver<'b> {
         GasResolver {
-            grid: &splatted.grid,
+            grid: &splat_gas.grid,
             camera: &self.view.camera,
             origin: self.gas.particles.origin,
-            detail: splatted.detail.as_ref().map(|(detail, strain)| (detail, strain)),
-            hides_itself: self.look.sprite == SpriteStyle::Integral,
+            detail: splat_gas.detail.as_ref().map(|(detail, strain)| (detail, strain)),
+            self_absorption: self.look.sprite == SpriteStyle::Integral,
             blue: chemiluminescence_color(),
-            scattered: &splatted.scattered,
-            weights: &splatted.weights,
-            across: &splatted.across,
-            temperatures: splatted.temperatures,
+            scattered: &splat_gas.scattered,
+            weights: &splat_gas.weights,
+            across: &splat_gas.across,
+            temperatures: splat_gas.temperatures,
         }
     }
 }
 
 /// Splats all sprites into their depth layers.
-fn splatted<'a>(
+fn splat_gas<'a>(
     gas: &Gas<'a>,
     look: &LookParameters,
     view: &View,
@@ -201,11 +201,11 @@ fn splatted<'a>(
         SplatResult::Empty => return DrawMode::Empty,
     };
     let extents = ColumnExtents::new(&grid, layers.count);
-    let strained = |detail: Detail| {
+    let with_strain = |detail: Detail| {
         let strain = Strain::new(&grid, &extents, layers.count, detail.cell_pixels);
         (detail, strain)
     };
-    let detail = detail.map(strained);
+    let detail = detail.map(with_strain);
     let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.center(layer), surroundings));
     DrawMode::SplattedGas(Box::new(SplattedGas {
         extents,
@@ -308,8 +308,8 @@ fn scattered(gas: &Gas, look: &LookParameters, view: &View, depth: f64, surround
 
 impl Prepared for PreparedGas<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
-        let gas = match &self.matter {
-            DrawMode::SplattedGas(splatted) if self.layers_in(slice).next().is_some() => splatted.grid.covered(),
+        let gas = match &self.mode {
+            DrawMode::SplattedGas(splat_gas) if self.layers_in(slice).next().is_some() => splat_gas.grid.covered(),
             DrawMode::Squares(squares) => squares.bounds(slice),
             _ => Rect::default(),
         };
@@ -321,10 +321,10 @@ impl Prepared for PreparedGas<'_> {
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let mut sparks = self.sparks.iter().filter(|spark| slice.contains(spark.depth)).peekable();
-        if let DrawMode::SplattedGas(splatted) = &self.matter {
-            let resolve = self.resolve(splatted);
+        if let DrawMode::SplattedGas(splat_gas) = &self.mode {
+            let resolve = self.resolve(splat_gas);
             let mut row = resolve.row();
-            let rect = splatted.grid.covered().intersection(&strip.rect);
+            let rect = splat_gas.grid.covered().intersection(&strip.rect);
             for layer in self.layers_in(slice) {
                 while let Some(spark) = sparks.next_if(|spark| spark.depth < layer.depth) {
                     spark.draw(self.view.size, strip);
@@ -332,13 +332,13 @@ impl Prepared for PreparedGas<'_> {
                 if rect.is_empty() {
                     continue;
                 }
-                dispatch!(self.level, _simd => resolve.draw_layer(&layer, &splatted.extents, rect, &mut row, strip));
+                dispatch!(self.level, _simd => resolve.draw_layer(&layer, &splat_gas.extents, rect, &mut row, strip));
                 if !strip.aovs.is_empty() {
-                    resolve.measure_layer(&layer, &splatted.extents, splatted.motion.as_ref(), rect, &mut row, strip);
+                    resolve.measure_layer(&layer, &splat_gas.extents, splat_gas.motion.as_ref(), rect, &mut row, strip);
                 }
             }
         }
-        if let DrawMode::Squares(squares) = &self.matter {
+        if let DrawMode::Squares(squares) = &self.mode {
             squares.draw(slice, strip);
         }
         if !strip.aovs.is_empty() {
@@ -361,9 +361,9 @@ impl Prepared for PreparedGas<'_> {
 impl PreparedGas<'_> {
     /// The haze, computed by all threads. Where AOVs are requested it exists before strips are drawn.
     fn haze(&self) -> Option<&HeatHaze> {
-        let (summed, all) = match &self.matter {
-            DrawMode::SplattedGas(splatted) if self.look.sprite == SpriteStyle::Integral => {
-                (Some(&splatted.grid), false)
+        let (summed, all) = match &self.mode {
+            DrawMode::SplattedGas(splat_gas) if self.look.sprite == SpriteStyle::Integral => {
+                (Some(&splat_gas.grid), false)
             }
             DrawMode::OutsideWindow if self.look.sprite == SpriteStyle::Integral => (None, false),
             _ => (None, true),

@@ -16,13 +16,13 @@ use crate::particles::{
 /// Most particles of all flames of a scene.
 const MAX_PARTICLES: i64 = 20_000_000;
 /// Bytes per particle, measured over a run: its state and the buffers of a step. Drawing takes more, temporarily.
-const PARTICLE_BYTES: f64 = 670.0;
+const MEMORY_PER_PARTICLE: f64 = 670.0;
 /// Age, in rise times, at which gas is removed even if an obstacle holds it.
 const MAX_RISE_TIMES: f64 = 3.0;
 /// Relative amplitude of the fuel flow's pulsation as a fire puffs.
-const PULSE: f64 = 0.6;
+const FLOW_PULSATION: f64 = 0.6;
 /// Tolerance for burners at the edge of the domain, relative to their size: rotation rounds.
-const SLACK: f64 = 1e-6;
+const BURNER_TOLERANCE: f64 = 1e-6;
 /// Least residence time in steps, so that the number of particles spawned in one step is bounded.
 const MIN_STEPS: f64 = 4.0;
 
@@ -85,7 +85,7 @@ impl DerivedConstants {
         Ok(Self {
             rates: fluxes.into_iter().map(|flux| flux / volume).collect(),
             puffing_hz: burners.iter().map(|burner| burner.puffing_hz(parameters)).collect(),
-            pulse: (PULSE * parameters.motion.puffing).min(0.9),
+            pulse: (FLOW_PULSATION * parameters.motion.puffing).min(0.9),
             support_radius: support_radius as f32,
             mass: (density * volume) as f32,
             density: density as f32,
@@ -133,7 +133,7 @@ fn preroll(parameters: &FlameParticlesParameters, longest_residence: f64) -> f64
 
 /// Whether the operating system would grant the memory of so many particles.
 fn have_memory(count: i64) -> bool {
-    memory::is_granted(count as f64 * PARTICLE_BYTES)
+    memory::is_granted(count as f64 * MEMORY_PER_PARTICLE)
 }
 
 /// Checks whether `count` particles may be alive beside the `others` of all other flames.
@@ -147,7 +147,7 @@ pub fn check_particle_count(count: i64, others: i64) -> Result<(), ParticleFault
     }
     let max_particles = memory::most(taken.min(count), |max_particles| have_memory(max_particles + others));
     let max_particles = if count > taken && have_memory(taken + others) { taken } else { max_particles };
-    let gib = (count as f64 + others as f64) * PARTICLE_BYTES / f64::from(1 << 30);
+    let gib = (count as f64 + others as f64) * MEMORY_PER_PARTICLE / f64::from(1 << 30);
     let kind = ParticleFaultKind::TooManyParticles { count, others, gib, most: max_particles };
     Err(ParticleFault { key: "particles".into(), kind })
 }
@@ -173,11 +173,13 @@ fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[
         let corners = burner.parameters.position.bounds().map(DVec3::from);
         let reached = [corners[0] + burner.extent[0], corners[1] + burner.extent[1]];
         for position in corners.into_iter().chain(reached) {
-            stands_within(parameters, position, SLACK * burner.bounding_radius).map_err(|(corner, kind)| {
-                // A parameter that the user did not write is not named as the faulty one.
-                let moved = burner.parameters.position != Animated::from([0.0; 3]);
-                ParticleFault { key: if moved { format!("burners.{index}.position") } else { corner.into() }, kind }
-            })?;
+            stands_within(parameters, position, BURNER_TOLERANCE * burner.bounding_radius).map_err(
+                |(corner, kind)| {
+                    // A parameter that the user did not write is not named as the faulty one.
+                    let moved = burner.parameters.position != Animated::from([0.0; 3]);
+                    ParticleFault { key: if moved { format!("burners.{index}.position") } else { corner.into() }, kind }
+                },
+            )?;
         }
     }
     let room = |burner: &Burner| burner.bounding_radius + 3.0 * burner.height;

@@ -6,13 +6,13 @@ use super::particles::{FLOAT_COLUMNS, Particles};
 
 const VERSION: u32 = 2;
 /// Larger than any value of a simulated particle, and small enough to compute with.
-const LARGEST: f32 = 1e12;
+const MAX_MAGNITUDE: f32 = 1e12;
 /// Bytes per particle: id, burner, and all `f32` columns.
-const PARTICLE: usize = 8 + 4 + 4 * FLOAT_COLUMNS;
+const BYTES_PER_PARTICLE: usize = 8 + 4 + 4 * FLOAT_COLUMNS;
 
 /// Writes the particles; their origin follows from the parameters.
 pub(crate) fn write(particles: &Particles) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(12 + PARTICLE * particles.len());
+    let mut bytes = Vec::with_capacity(12 + BYTES_PER_PARTICLE * particles.len());
     bytes.extend(VERSION.to_le_bytes());
     bytes.extend((particles.len() as u64).to_le_bytes());
     bytes.extend(particles.id.iter().flat_map(|id| id.to_le_bytes()));
@@ -32,21 +32,21 @@ pub(crate) fn read(particles: &Particles, bytes: &[u8], burners: usize) -> Resul
     }
     let (count, rest) = rest.split_first_chunk::<8>().ok_or(SnapshotError::Damaged)?;
     let count = usize::try_from(u64::from_le_bytes(*count)).map_err(|_| SnapshotError::Damaged)?;
-    if count.checked_mul(PARTICLE) != Some(rest.len()) {
+    if count.checked_mul(BYTES_PER_PARTICLE) != Some(rest.len()) {
         return Err(SnapshotError::Damaged);
     }
     let (spawner, rest) = rest.split_at(8 * count);
-    let (numbers_of_burners, mut rest) = rest.split_at(4 * count);
+    let (burner_bytes, mut rest) = rest.split_at(4 * count);
     let mut read = Particles::new(particles.origin);
     read.id = spawner.as_chunks().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
-    read.burner = numbers_of_burners.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
+    read.burner = burner_bytes.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
     for values in read.float_columns_mut() {
         let (head, tail) = rest.split_at(4 * count);
         *values = head.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
         rest = tail;
     }
-    let known = read.burner.iter().all(|burner| (*burner as usize) < burners);
+    let burners_known = read.burner.iter().all(|burner| (*burner as usize) < burners);
     // Comparisons with NaN are false.
-    let possible = read.float_columns().iter().all(|values| values.iter().all(|value| value.abs() <= LARGEST));
-    if known && possible { Ok(read) } else { Err(SnapshotError::Damaged) }
+    let plausible = read.float_columns().iter().all(|values| values.iter().all(|value| value.abs() <= MAX_MAGNITUDE));
+    if burners_known && plausible { Ok(read) } else { Err(SnapshotError::Damaged) }
 }

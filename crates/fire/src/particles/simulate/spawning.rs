@@ -20,9 +20,9 @@ const SPEED_PROFILE: [f64; 2] = [1.25, 0.5];
 /// Burning rate relative to the mean at the center of the burner, and its increase toward the rim, which is exposed to air.
 const BURN_RATE_PROFILE: [f64; 2] = [0.62, 0.9];
 /// Amplitude of the burning rate's noise, which makes tongues.
-const PATCHES: f64 = 0.3;
+const BURN_RATE_NOISE: f64 = 0.3;
 /// Wavelength of that noise, in diameters.
-const PATCH_SIZE: f64 = 0.35;
+const BURN_RATE_NOISE_WAVELENGTH: f64 = 0.35;
 
 /// Spawns the particles of all burners.
 pub(crate) struct Spawner<'a> {
@@ -90,7 +90,7 @@ impl Spawner<'_> {
     fn burn_rate(&self, burner: &Burner, hz: f64, spawn_point: &SpawnPoint, t: f64) -> f64 {
         let profile =
             BURN_RATE_PROFILE[0] + BURN_RATE_PROFILE[1] * spawn_point.radial_fraction * spawn_point.radial_fraction;
-        let noise = spawn_point.position / (PATCH_SIZE * burner.diameter) + DVec3::Y * (2.5 * hz * t);
-        profile * (1.0 + PATCHES * f64::from(self.turbulence.noise(noise))).clamp(0.4, 2.0)
+        let noise = spawn_point.position / (BURN_RATE_NOISE_WAVELENGTH * burner.diameter) + DVec3::Y * (2.5 * hz * t);
+        profile * (1.0 + BURN_RATE_NOISE * f64::from(self.turbulence.noise(noise))).clamp(0.4, 2.0)
     }
 }

@@ -58,13 +58,13 @@ fn momentum(simulation: &Simulation) -> (DVec3, f64) {
     })
 }
 
-fn centre(simulation: &Simulation) -> DVec3 {
+fn center(simulation: &Simulation) -> DVec3 {
     let count = simulation.particles.len();
     (0..count).map(|index| position(simulation, index).as_dvec3()).sum::<DVec3>() / count as f64
 }
 
 #[test]
-fn a_free_cloud_keeps_its_momentum_and_its_centre_goes_straight() {
+fn a_free_cloud_keeps_its_momentum_and_its_center_goes_straight() {
     let mut simulation = simulation(&quiet());
     let d = simulation.constants.support_radius;
     for id in 0..400 {
@@ -74,10 +74,10 @@ fn a_free_cloud_keeps_its_momentum_and_its_centre_goes_straight() {
         simulation.particles.push(particle(&simulation.constants, id, position, velocity));
     }
     let (before, size) = momentum(&simulation);
-    let (start, mean) = (centre(&simulation), before / (400.0 * f64::from(simulation.constants.mass)));
+    let (start, mean) = (center(&simulation), before / (400.0 * f64::from(simulation.constants.mass)));
     World::default().run_steps(&mut simulation, 0, 1000, |simulation, t| {
-        let off = (centre(simulation) - start - mean * t).length();
-        assert!(off < 1e-5 * (1.0 + mean.length() * t), "centre {off} m off its line after {t} s");
+        let off = (center(simulation) - start - mean * t).length();
+        assert!(off < 1e-5 * (1.0 + mean.length() * t), "center {off} m off its line after {t} s");
     });
     let drift = (momentum(&simulation).0 - before).length() / size;
     assert!(drift < 1e-6, "momentum drifts by {drift}");

@@ -84,17 +84,17 @@ pub(crate) struct WarpState {
 }
 
 impl WarpState {
-    /// The warp at time `t` (of the flame itself, phase included), deflected by `push`.
+    /// The warp at time `t` (of the flame itself, phase included), deflected by `lean`.
     pub(crate) fn new(
         parameters: &FlameSheetParameters,
         shape: &ShapeTables,
         waves: &FlameWaves,
         clock: &Clock,
         t: f64,
-        push: WindLean,
+        lean: WindLean,
     ) -> Self {
         let level = fearless_simd::Level::new();
-        fearless_simd::dispatch!(level, _simd => evaluate_warp(parameters, shape, waves, clock, t, push))
+        fearless_simd::dispatch!(level, _simd => evaluate_warp(parameters, shape, waves, clock, t, lean))
     }
 
     /// Inverse warp: the point of the unbent flame of mean height that is seen at (x, y) of the sheet.
@@ -123,7 +123,7 @@ fn evaluate_warp(
     waves: &FlameWaves,
     clock: &Clock,
     t: f64,
-    push: WindLean,
+    lean: WindLean,
 ) -> WarpState {
     let (time, scroll) = (clock.time(t), clock.scroll(t));
     let shape_parameters = &parameters.shape;
@@ -134,7 +134,7 @@ fn evaluate_warp(
         values.map(|value| (0.5 * shape_parameters.flutter as f32).mul_add(value - 1.0, 1.0))
     };
     let edges = shape.edges(&edge_fluctuation(&waves.left), &edge_fluctuation(&waves.right));
-    let center = center_line(parameters, waves, time, push);
+    let center = center_line(parameters, waves, time, lean);
     let ends = (0..=16).map(|i| f64::from(center.at(i as f32 / 16.0)[0]));
     let center_range = ends.fold([0.0_f64; 2], |[low, high], value| [low.min(value), high.max(value)]);
     let flicker = shape_parameters.flicker * f64::from(waves.flicker.at(time));
@@ -145,11 +145,11 @@ fn evaluate_warp(
 
 /// Displacement grows as y^1.5, as of gas in uniform wind that accelerates upward; sway travels up with the gas.
 #[inline(always)]
-fn center_line(parameters: &FlameSheetParameters, waves: &FlameWaves, time: f64, push: WindLean) -> CurvePair {
+fn center_line(parameters: &FlameSheetParameters, waves: &FlameWaves, time: f64, lean: WindLean) -> CurvePair {
     /// Time for sway to travel from base to tip, as a fraction of its period.
     const LAG: f64 = 0.6;
     let shape_parameters = &parameters.shape;
-    let bend = push.across * parameters.height / parameters.width / 1.5;
+    let bend = lean.across * parameters.height / parameters.width / 1.5;
     let mut swings = [0.0; SEGMENTS + 1];
     waves.sway.fill(time, -LAG / shape_parameters.sway_hz / SEGMENTS as f64, &mut swings);
     CurvePair::from_samples(|i| {

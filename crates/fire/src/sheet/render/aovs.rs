@@ -92,7 +92,7 @@ impl AovContext<'_> {
 
 /// Least dw/dy: gas moves at most at twice the scroll speed. sqrt(y) of eq. (9) has that slope at the top; near the base it is
 /// steeper and the gas slower.
-const LEAST_SLOPE: f32 = 0.5;
+const MIN_SLOPE: f32 = 0.5;
 
 impl FlameSheet {
     /// dy/dt of the gas at (x, y), sheet heights per second: s / (dw/dy).
@@ -103,6 +103,6 @@ impl FlameSheet {
         let slope = (self.shape().slowed_rise_at(distance, y + STEP) - self.shape().slowed_rise_at(distance, y - STEP))
             / (2.0 * STEP);
         // Where the outline folds the mapping over, its slope is not a speed of gas.
-        self.clock.speed(self.flame_time(flame, t)) / f64::from(slope.max(LEAST_SLOPE))
+        self.clock.speed(self.flame_time(flame, t)) / f64::from(slope.max(MIN_SLOPE))
     }
 }

@@ -140,20 +140,20 @@ impl FlameSheet {
     ) -> (UprightQuad, WarpState) {
         let (base, size) = (self.base(flame, t), self.sheet_size(flame));
         let middle = base + DVec3::Y * (0.5 * size.y);
-        let push = WindLean::new(wind, middle, t, right, self.rise_speed(flame, t), self.parameters.wind_response);
-        let quad = UprightQuad::new(base, right, size, push.toward);
+        let lean = WindLean::new(wind, middle, t, right, self.rise_speed(flame, t), self.parameters.wind_response);
+        let quad = UprightQuad::new(base, right, size, lean.toward);
         let time = self.flame_time(flame, t);
-        (quad, WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, push))
+        (quad, WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, lean))
     }
 
     /// Number of time samples of the exposure: the gas scrolls by a few pixels between them.
-    pub(crate) fn time_samples(&self, flame: &FlameInstance, shutter: Shutter, pixels_per_metre: f64) -> usize {
+    pub(crate) fn time_samples(&self, flame: &FlameInstance, shutter: Shutter, pixels_per_meter: f64) -> usize {
         const PIXELS_APART: f64 = 8.0;
         const MOST: f64 = 8.0;
         match self.parameters.time_samples {
             Auto::Set(count) => count as usize,
             Auto::Auto => {
-                let scrolled = self.rise_speed(flame, shutter.middle()) * shutter.duration() * pixels_per_metre;
+                let scrolled = self.rise_speed(flame, shutter.middle()) * shutter.duration() * pixels_per_meter;
                 (scrolled / PIXELS_APART).ceil().clamp(1.0, MOST) as usize
             }
         }
@@ -187,10 +187,10 @@ impl FlameSheet {
             let Some(pixel_to_sheet) = PixelToSheet::new(&camera, &quad) else { continue };
             let [low, high] = warp.center_range;
             rect = rect.union(&bounds(&camera, &quad, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size));
-            let pixels_per_metre = pixels_per_metre(&camera, &quad);
+            let pixels_per_meter = pixels_per_meter(&camera, &quad);
             let state = SheetState {
                 texture: texture_source.texture(warp.scroll),
-                pixel: [2.0 / (pixels_per_metre * quad.size.x) as f32, 1.0 / (pixels_per_metre * quad.size.y) as f32],
+                pixel: [2.0 / (pixels_per_meter * quad.size.x) as f32, 1.0 / (pixels_per_meter * quad.size.y) as f32],
                 warp,
             };
             let luminance = self.luminance_at(t) as f32 / count as f32;
@@ -206,7 +206,7 @@ impl FlameSheet {
 }
 
 /// Pixels per meter at the sheet's center.
-pub(crate) fn pixels_per_metre(camera: &Camera, quad: &UprightQuad) -> f64 {
+pub(crate) fn pixels_per_meter(camera: &Camera, quad: &UprightQuad) -> f64 {
     let depth = camera.depth(quad.point(0.5, 0.5)).abs().max(camera.near);
     camera.focal_pixels / depth
 }

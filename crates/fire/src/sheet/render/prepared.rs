@@ -16,7 +16,7 @@ use super::{
     draw::{DrawContext, MAX_MINIFICATION, draw_rows, row_band_height},
     shade::{SheetContent, TimeSample},
 };
-use crate::sheet::render::flame_instance::{FlameInstance, pixels_per_metre};
+use crate::sheet::render::flame_instance::{FlameInstance, pixels_per_meter};
 use crate::{
     sheet::{FlameSheet, parameters::Stage},
     sparks::{SparkEmitter, Streak},
@@ -76,7 +76,7 @@ impl FlameSheet {
         let base = self.base(flame, view.shutter.middle());
         let right = self.right(flame, &view.camera, base);
         let quad = UprightQuad::new(base, right, self.sheet_size(flame), 0.0);
-        let scale = pixels_per_metre(&view.camera, &quad);
+        let scale = pixels_per_meter(&view.camera, &quad);
         let texture = flame.texture_source.filtered(scale * quad.size.y);
         let count = self.time_samples(flame, view.shutter, scale);
         let (samples, rect) = self.samples(flame, &texture, view, surroundings.wind, count);

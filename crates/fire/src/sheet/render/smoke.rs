@@ -13,7 +13,7 @@ use super::{
     projection::{PixelToSheet, SheetCoordinates, bounds},
     shade::{ShadedBatch, SheetState, TimeSample},
 };
-use crate::sheet::render::flame_instance::{FilteredTexture, FlameInstance, pixels_per_metre};
+use crate::sheet::render::flame_instance::{FilteredTexture, FlameInstance, pixels_per_meter};
 use crate::sheet::{
     FlameSheet,
     animate::warp::{FlameWaves, WarpState, WindLean},
@@ -110,13 +110,13 @@ impl FlameSheet {
         let plume = DVec2::new(size.x * smoke.width, size.y * smoke.height);
         let start = base + DVec3::Y * (smoke.start * size.y);
         let speed = (self.rise_speed(flame, t) * smoke.speed).max(0.3);
-        let push = WindLean::new(surroundings.wind, start, t, right, speed, self.parameters.wind_response);
-        let quad = UprightQuad::new(start, right, plume, push.toward);
-        let across = WindLean { across: push.across * plume.y / plume.x * size.x / size.y, ..push };
+        let lean = WindLean::new(surroundings.wind, start, t, right, speed, self.parameters.wind_response);
+        let quad = UprightQuad::new(start, right, plume, lean.toward);
+        let across = WindLean { across: lean.across * plume.y / plume.x * size.x / size.y, ..lean };
         let time = self.flame_time(flame, t);
         let warp = WarpState::new(&self.parameters, self.shape(), &waves, &self.clock, time, across);
         let pixel_to_sheet = PixelToSheet::new(&view.camera, &quad)?;
-        let scale = pixels_per_metre(&view.camera, &quad);
+        let scale = pixels_per_meter(&view.camera, &quad);
         let source = FilteredTexture::fractal(layers, scale * plume.y);
         let [low, high] = warp.center_range;
         let rect = bounds(&view.camera, &quad, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size);

@@ -68,7 +68,7 @@ pub(crate) fn project_particles<'a, K: SpriteKind>(
     let (count, level) = (gas.particles.len(), Level::new());
     let of_task = |task: usize| {
         let range = task * PARTICLES_PER_TASK..((task + 1) * PARTICLES_PER_TASK).min(count);
-        let mut records = gas.scratch.list(PARTICLES_PER_TASK);
+        let mut records = gas.scratch.take(PARTICLES_PER_TASK);
         records.clear();
         match &perspective {
             Some(perspective) => {

@@ -22,7 +22,7 @@ const MEAN_PARTICLES_HALF_BURNING: f64 = 0.42;
 /// Scale of detail along the vertical relative to the horizontal.
 const VERTICAL_SCALE: f64 = 0.45;
 /// Relative increase of temperature where gas burns most. Its luminance is unchanged.
-const HEAT: f32 = 0.03;
+const TEMPERATURE_VARIATION: f32 = 0.03;
 
 /// Detail of one flame in one frame.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ pub(crate) struct Detail {
     /// [`LOGISTIC`] divided by the standard deviation of the noise.
     steepness: f32,
     /// Noise cells per meter along x, y and z.
-    pub(crate) cells_per_metre: [f32; 3],
+    pub(crate) cells_per_meter: [f32; 3],
     /// Noise cells per second by which the noise moves upward.
     rate: f64,
     /// Origin of the noise at the time of the frame.
@@ -66,7 +66,7 @@ pub(crate) struct DetailScale {
     /// Mean absorption coefficient, 1/m.
     pub(crate) absorption: f64,
     /// Pixels per meter.
-    pub(crate) pixels_per_metre: f64,
+    pub(crate) pixels_per_meter: f64,
     /// Time at the middle of the exposure, s.
     pub(crate) time: f64,
     /// Exposure time, s.
@@ -82,22 +82,22 @@ impl Detail {
             return None;
         }
         let size = look.detail_size * scale.radius;
-        let octaves = (math::log2(size * scale.pixels_per_metre / 2.5).floor() as i64 + 1).clamp(1, 4) as u32;
+        let octaves = (math::log2(size * scale.pixels_per_meter / 2.5).floor() as i64 + 1).clamp(1, 4) as u32;
         let fractal = Fractal { octaves, lacunarity: 2, gain: 0.55 };
         let words = gas.key.words(0, 0, Purpose::named("detail"));
         let noise = Noise::new(words[0], fractal, [0; 3]).ok()?;
-        let cells_per_metre = [1.0 / size, VERTICAL_SCALE / size, 1.0 / size];
+        let cells_per_meter = [1.0 / size, VERTICAL_SCALE / size, 1.0 / size];
         let rate = gas.detail_speed / size;
         let scrolled = rate * scale.time;
         let shift: [f64; 3] = std::array::from_fn(|axis| {
-            cells_per_metre[axis] * scale.camera_motion[axis] - if axis == 1 { rate * scale.exposure_s } else { 0.0 }
+            cells_per_meter[axis] * scale.camera_motion[axis] - if axis == 1 { rate * scale.exposure_s } else { 0.0 }
         });
         let length = shift.iter().map(|s| s * s).sum::<f64>().sqrt() * f64::from(1 << (octaves - 1));
         let softness = math::lerp(1.6, 0.16, look.sharpness);
         Some(Self {
             steepness: LOGISTIC / deviation(&fractal),
             noise,
-            cells_per_metre: cells_per_metre.map(|cells| cells as f32),
+            cells_per_meter: cells_per_meter.map(|cells| cells as f32),
             rate,
             base: [0.0, -scrolled, 0.0].map(Coordinate::from_f64),
             shift: shift.map(|s| s as f32),
@@ -106,7 +106,7 @@ impl Detail {
             sharpness: (1.0 / softness) as f32,
             mean_exponent: (1.0 / (1.0 + softness * softness).sqrt()) as f32,
             amount: look.detail as f32,
-            cell_pixels: (size * scale.pixels_per_metre) as f32,
+            cell_pixels: (size * scale.pixels_per_meter) as f32,
         })
     }
 
@@ -117,7 +117,7 @@ impl Detail {
         let mut detail_offset = [0.0; 3];
         for axis in 0..3 {
             let now = (since as f32).mul_add(particles.velocity[axis][index], particles.position[axis][index]);
-            detail_offset[axis] = (particles.spawn_point[axis][index] - now) * self.cells_per_metre[axis];
+            detail_offset[axis] = (particles.spawn_point[axis][index] - now) * self.cells_per_meter[axis];
         }
         let age = f64::from(particles.age[index]) + since;
         detail_offset[1] += (self.rate * age) as f32;
@@ -128,12 +128,12 @@ impl Detail {
     #[inline(always)]
     pub(crate) fn is_negligible(&self, tau: &[f32; LANES]) -> bool {
         /// Optical depth, relative to that at which half of the area burns, that stays dark even at peaks of the noise.
-        const LITTLE: f32 = 2e-4;
+        const NEGLIGIBLE_DEPTH: f32 = 2e-4;
         let mut most = 0.0_f32;
         for lane in 0..LANES {
             most = most.max(tau[lane]);
         }
-        most * self.inverse_half_depth < LITTLE
+        most * self.inverse_half_depth < NEGLIGIBLE_DEPTH
     }
 
     /// Detail at sixteen positions in the noise, where the smooth optical depth is `tau` and `visible_fraction` of the detail is
@@ -170,7 +170,7 @@ impl Detail {
             burning.depth[lane] =
                 (burning_fraction[lane] * sample_weight * normalization[lane] - 1.0).mul_add(amount, 1.0);
             let excess = (mean[lane] * sample_weight * 0.5).clamp(-1.5, 1.5);
-            burning.heat[lane] = (HEAT * amount).mul_add(excess, 1.0);
+            burning.heat[lane] = (TEMPERATURE_VARIATION * amount).mul_add(excess, 1.0);
         }
         burning
     }

@@ -49,7 +49,7 @@ pub(crate) struct GasResolver<'a> {
     pub(crate) origin: DVec3,
     pub(crate) detail: Option<(&'a Detail, &'a Strain)>,
     /// Whether soot absorbs its own light, `B (1 - exp(-tau))`, or emission is the plain sum (the paper).
-    pub(crate) hides_itself: bool,
+    pub(crate) self_absorption: bool,
     /// Color of CH and C2: ACEScg of luminance 1.
     pub(crate) blue: [f32; 3],
     /// Radiance that opaque soot of each layer scatters toward the camera, ACEScg, cd/m^2.
@@ -183,8 +183,8 @@ impl GasResolver<'_> {
         let mut noise_positions =
             self.planes(row, layer.index, x, [DETAIL_OFFSET, DETAIL_OFFSET + 1, DETAIL_OFFSET + 2]);
         for axis in 0..3 {
-            let start = first[axis] * detail.cells_per_metre[axis];
-            let step = (last[axis] - first[axis]) * detail.cells_per_metre[axis] * (1.0 / (LANES - 1) as f32);
+            let start = first[axis] * detail.cells_per_meter[axis];
+            let step = (last[axis] - first[axis]) * detail.cells_per_meter[axis] * (1.0 / (LANES - 1) as f32);
             for lane in 0..LANES {
                 let offset = noise_positions[axis][lane] / sums.tau[lane].max(1e-20);
                 noise_positions[axis][lane] = step.mul_add(lane as f32, start) + offset.clamp(-1e4, 1e4);
@@ -272,7 +272,7 @@ impl GasResolver<'_> {
         for lane in 0..LANES {
             let depth = tau[lane] * depth_factor[lane];
             planes[3][lane] = 1.0 - approximations::exp(-depth);
-            emission[lane] = if self.hides_itself { planes[3][lane] } else { depth };
+            emission[lane] = if self.self_absorption { planes[3][lane] } else { depth };
         }
         // Where nothing glows both denominators are clamped and luminance is 0, so that no lane branches.
         let (mut luminance, mut kelvin) = ([0.0; LANES], [0.0; LANES]);

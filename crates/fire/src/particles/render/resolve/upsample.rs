@@ -42,7 +42,7 @@ impl RowInterpolator {
         across
     }
 
-    /// Values at the sixteen pixels from `x` on, a multiple of sixteen: `places` are the planes wanted of cells that are `stride`
+    /// Values at the sixteen pixels from `x` on, a multiple of sixteen: `planes` are the planes wanted of cells that are `stride`
     /// values apart in `row`. 0 beyond the picture.
     #[inline(always)]
     pub(crate) fn at<const N: usize>(
@@ -50,14 +50,14 @@ impl RowInterpolator {
         row: &[f32],
         stride: usize,
         x: usize,
-        places: [usize; N],
+        planes: [usize; N],
     ) -> [[f32; LANES]; N] {
         let mut sums = [[0.0; LANES]; N];
         let Some(span) = self.spans.get(x / LANES) else { return sums };
         let cells = row[span.first * stride..].chunks_exact(stride);
         for (weights, values) in self.weights[span.weights.clone()].iter().zip(cells) {
             for n in 0..N {
-                let value = values[places[n]];
+                let value = values[planes[n]];
                 for lane in 0..LANES {
                     sums[n][lane] = weights[lane].mul_add(value, sums[n][lane]);
                 }

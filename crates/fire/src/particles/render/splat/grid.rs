@@ -100,7 +100,7 @@ impl<'a> Grid<'a> {
         /// Cache line, bytes.
         const LINE: usize = 64;
         let count = cells.columns * cells.rows * depth + LINE / size_of::<f32>();
-        let mut values = scratch.list(count);
+        let mut values = scratch.take(count);
         if values.len() < count {
             // Zero pages from the operating system, not touched before they are used.
             *values = vec![0.0; values.capacity()];

@@ -27,7 +27,7 @@ pub(crate) mod scratch_pool;
 /// Least radius of a sprite in cells, at which splines are accurate to a few percent of a single sprite's peak.
 pub(crate) const MIN_RADIUS_CELLS: f32 = 2.75;
 /// Rows per task.
-const BAND: usize = 32;
+const ROWS_PER_TASK: usize = 32;
 /// Coarsest grid: cells of 4096 pixels, twelve octaves.
 const MAX_LEVEL: usize = 24;
 
@@ -151,10 +151,10 @@ impl SpriteStatistics {
             }
             statistics
         };
-        tasks.par_iter().map(of_task).reduce(|| Self::EMPTY, Self::and)
+        tasks.par_iter().map(of_task).reduce(|| Self::EMPTY, Self::merge)
     }
 
-    fn and(mut self, other: Self) -> Self {
+    fn merge(mut self, other: Self) -> Self {
         for axis in 0..2 {
             self.low[axis] = self.low[axis].min(other.low[axis]);
             self.high[axis] = self.high[axis].max(other.high[axis]);
@@ -168,12 +168,12 @@ impl SpriteStatistics {
     /// A few distant particles would otherwise require a fine grid of the whole flame.
     fn finest(&self) -> usize {
         /// 1 / fraction of the sprites that may be smaller.
-        const FINER: usize = 50;
+        const MAX_FINER_INVERSE: usize = 50;
         let total: usize = self.counts.iter().sum();
         let mut finer = 0;
         let suits = |count: &usize| {
             finer += count;
-            finer * FINER > total
+            finer * MAX_FINER_INVERSE > total
         };
         self.counts.iter().position(suits).unwrap_or(0)
     }
@@ -201,9 +201,9 @@ fn add_sprites<'a, const P: usize>(
     let (row_length, level) = (grid.row_length(), Level::new());
     let bin = |task: &PooledVec<'a, Sprite<P>>| dispatch!(level, _simd => BinnedSprites::new(settings, task, &cells, &is_on_this_grid));
     let binned: Vec<BinnedSprites<P>> = tasks.par_iter().map(bin).collect();
-    grid.values_mut().par_chunks_mut(BAND * row_length).enumerate().for_each(|(index, values)| {
+    grid.values_mut().par_chunks_mut(ROWS_PER_TASK * row_length).enumerate().for_each(|(index, values)| {
         let (columns, whole_picture_columns) = (cells.picture_columns(), whole_picture_columns.clone());
-        let top = cells.first[1] + (index * BAND) as i32;
+        let top = cells.first[1] + (index * ROWS_PER_TASK) as i32;
         values.fill(0.0);
         let mut row_band = RowBand { first: top, columns, whole_picture_columns, layers: settings.layers, values };
         for task in &binned {
@@ -276,7 +276,7 @@ impl<'a, const P: usize> BinnedSprites<'a, P> {
         cells: &Raster,
         is_on_this_grid: impl Fn(f32) -> bool,
     ) -> Self {
-        let mut sprites = task.scratch().list(task.len());
+        let mut sprites = task.scratch().take(task.len());
         sprites.clear();
         for sprite in task.iter() {
             if is_on_this_grid(sprite.ellipse.radius) {
@@ -285,9 +285,9 @@ impl<'a, const P: usize> BinnedSprites<'a, P> {
         }
         let bands_of = |sprites: &RasterizedSprite<P>| {
             let [from, to] = sprites.rows.map(|row| (row - cells.first[1]) as usize);
-            if from < to { from / BAND..to.div_ceil(BAND) } else { 0..0 }
+            if from < to { from / ROWS_PER_TASK..to.div_ceil(ROWS_PER_TASK) } else { 0..0 }
         };
-        let bands = cells.rows.div_ceil(BAND);
+        let bands = cells.rows.div_ceil(ROWS_PER_TASK);
         let mut starts = vec![0_u32; bands + 1];
         for sprites in sprites.iter() {
             for row_band in bands_of(sprites) {

@@ -11,9 +11,10 @@ pub(crate) const COLUMNS: usize = 8;
 /// Rows per batch of chords: about one sprite.
 pub(crate) const ROWS: usize = 16;
 /// Offsets of cells and rows from the one before the first. (Without a zero, which compilers would treat as a special case.)
-const BEYOND: [f32; ROWS] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0];
+const LANE_OFFSETS: [f32; ROWS] =
+    [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0];
 /// Least `s = 1 - b^2/d^2` that is drawn: there a sprite has 1e-4 of its peak.
-const FAINT: f32 = 0.045;
+const MIN_S: f32 = 0.045;
 
 /// A sprite in cell coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +43,7 @@ impl<const P: usize> RasterizedSprite<P> {
         let widening = (settings.min_radius_cells * cell / ellipse.radius.max(1e-3)).max(1.0);
         let scale = cell * cell / (widening * widening);
         let center = cells.cell_coordinates(ellipse.center);
-        let reach = ellipse.reach[1] * widening / cell * (1.0 - FAINT).sqrt();
+        let reach = ellipse.reach[1] * widening / cell * (1.0 - MIN_S).sqrt();
         let (first, last) = (cells.first[1], cells.first[1] + cells.rows as i32);
         let rows = [(center[1] - reach).ceil(), (center[1] + reach).floor() + 1.0];
         let rows = rows.map(|row| (row as i32).clamp(first, last));
@@ -66,16 +67,16 @@ impl<const P: usize> RasterizedSprite<P> {
         let before = (first - 1) as f32;
         let (left, count) = (columns.start as f32, columns.len() as i32);
         let widest = 1.0 / self.falloff;
-        let mut chords = Chords { middle: [0.0; ROWS], most: [0.0; ROWS], first: [0; ROWS], end: [0; ROWS] };
+        let mut chords = Chords { middle: [0.0; ROWS], s_max: [0.0; ROWS], first: [0; ROWS], end: [0; ROWS] };
         for row in 0..ROWS {
-            let v = before + BEYOND[row] - self.center[1];
+            let v = before + LANE_OFFSETS[row] - self.center[1];
             let middle = self.center[0] - self.shear * v;
-            let most = 1.0 - self.row_falloff * v * v;
-            let half = ((most - FAINT).max(0.0) * widest).sqrt();
+            let s_max = 1.0 - self.row_falloff * v * v;
+            let half = ((s_max - MIN_S).max(0.0) * widest).sqrt();
             chords.middle[row] = middle;
-            chords.most[row] = most;
-            chords.first[row] = columns.start + statistics((middle - half).ceil() - left, count);
-            chords.end[row] = columns.start + statistics((middle + half).floor() + 1.0 - left, count);
+            chords.s_max[row] = s_max;
+            chords.first[row] = columns.start + truncate_clamped((middle - half).ceil() - left, count);
+            chords.end[row] = columns.start + truncate_clamped((middle + half).floor() + 1.0 - left, count);
         }
         chords
     }
@@ -131,7 +132,7 @@ impl<const P: usize> RasterizedSprite<P> {
 pub(crate) struct Chords {
     /// Column of the greatest `s`, and `s` there.
     middle: [f32; ROWS],
-    most: [f32; ROWS],
+    s_max: [f32; ROWS],
     /// First cell covered, and one past the last.
     pub(crate) first: [i32; ROWS],
     pub(crate) end: [i32; ROWS],
@@ -141,11 +142,11 @@ impl Chords {
     /// Weights of the cells of a row from column `x` on, where `s` decreases by `falloff` per squared column distance.
     #[inline(always)]
     pub(crate) fn weights(&self, profile: Profile, falloff: f32, row: usize, x: i32) -> [f32; COLUMNS] {
-        let (before, middle, most) = ((x - 1) as f32, self.middle[row], self.most[row]);
+        let (before, middle, s_max) = ((x - 1) as f32, self.middle[row], self.s_max[row]);
         let mut weights = [0.0; COLUMNS];
         for lane in 0..COLUMNS {
-            let u = before + BEYOND[lane] - middle;
-            let s = (-falloff * u).mul_add(u, most);
+            let u = before + LANE_OFFSETS[lane] - middle;
+            let s = (-falloff * u).mul_add(u, s_max);
             let s = if s > 0.0 { s } else { 0.0 };
             weights[lane] = profile.at(s);
         }
@@ -153,8 +154,8 @@ impl Chords {
     }
 }
 
-/// Truncated, and clamped to 0 ..= `most`.
+/// Truncated, and clamped to 0 ..= `max`.
 #[inline(always)]
-fn statistics(value: f32, most: i32) -> i32 {
-    approximations::whole(value.max(0.0).min(most as f32))
+fn truncate_clamped(value: f32, max: i32) -> i32 {
+    approximations::whole(value.max(0.0).min(max as f32))
 }

@@ -13,7 +13,7 @@ pub struct ScratchPool(Mutex<Vec<FreeVec>>);
 
 /// An unused vector of some type, and its capacity.
 struct FreeVec {
-    room: usize,
+    capacity: usize,
     list: Box<dyn Any + Send>,
 }
 
@@ -31,7 +31,7 @@ impl fmt::Debug for ScratchPool {
 
 impl ScratchPool {
     /// Takes a vector with a capacity of at least `count`. Its contents are those of its last use, or empty.
-    pub(crate) fn list<T: Send + 'static>(&self, count: usize) -> PooledVec<'_, T> {
+    pub(crate) fn take<T: Send + 'static>(&self, count: usize) -> PooledVec<'_, T> {
         let list = self.find_free(count).unwrap_or_else(|| Vec::with_capacity(count + count / 4));
         PooledVec { list, scratch: self }
     }
@@ -40,12 +40,12 @@ impl ScratchPool {
     /// than were in use at once.
     fn find_free<T: 'static>(&self, count: usize) -> Option<Vec<T>> {
         let mut free = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let room = |index: &usize| free[*index].room;
+        let capacity = |index: &usize| free[*index].capacity;
         let of_type = || (0..free.len()).filter(|index| free[*index].list.is::<Vec<T>>());
-        let fits = of_type().filter(|index| room(index) >= count).min_by_key(room);
-        let chosen = fits.or_else(|| of_type().max_by_key(room))?;
-        let find_free = free.swap_remove(chosen);
-        fits.and_then(|_| find_free.list.downcast().ok().map(|list| *list))
+        let fits = of_type().filter(|index| capacity(index) >= count).min_by_key(capacity);
+        let chosen = fits.or_else(|| of_type().max_by_key(capacity))?;
+        let unused = free.swap_remove(chosen);
+        fits.and_then(|_| unused.list.downcast().ok().map(|list| *list))
     }
 }
 
@@ -64,8 +64,8 @@ impl<'a, T: Send + 'static> PooledVec<'a, T> {
 impl<T: Send + 'static> Drop for PooledVec<'_, T> {
     fn drop(&mut self) {
         let list = std::mem::take(&mut self.list);
-        let find_free = FreeVec { room: list.capacity(), list: Box::new(list) };
-        self.scratch.0.lock().unwrap_or_else(PoisonError::into_inner).push(find_free);
+        let unused = FreeVec { capacity: list.capacity(), list: Box::new(list) };
+        self.scratch.0.lock().unwrap_or_else(PoisonError::into_inner).push(unused);
     }
 }
 
@@ -96,16 +96,16 @@ mod tests {
     #[test]
     fn what_is_dropped_is_taken_again_and_no_more_is_kept_than_was_in_use() {
         let scratch = ScratchPool::default();
-        let room = |list: PooledVec<f32>| list.capacity();
-        let (small, large) = (scratch.list::<f32>(100), scratch.list::<f32>(1000));
+        let capacity = |list: PooledVec<f32>| list.capacity();
+        let (small, large) = (scratch.take::<f32>(100), scratch.take::<f32>(1000));
         let addresses = [small.as_ptr(), large.as_ptr()];
         drop((large, small));
-        let (large, small) = (scratch.list::<f32>(900), scratch.list::<f32>(110));
+        let (large, small) = (scratch.take::<f32>(900), scratch.take::<f32>(110));
         assert_eq!(addresses, [small.as_ptr(), large.as_ptr()]);
         drop((small, large));
-        assert!(scratch.list::<u8>(7).is_empty(), "lists of other types are other lists");
-        assert!(room(scratch.list(5000)) >= 5000);
+        assert!(scratch.take::<u8>(7).is_empty(), "lists of other types are other lists");
+        assert!(capacity(scratch.take(5000)) >= 5000);
         let free = scratch.0.lock().unwrap();
-        assert_eq!(free.iter().filter(|find_free| find_free.list.is::<Vec<f32>>()).count(), 2);
+        assert_eq!(free.iter().filter(|vec| vec.list.is::<Vec<f32>>()).count(), 2);
     }
 }

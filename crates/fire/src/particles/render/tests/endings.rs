@@ -42,7 +42,7 @@ fn gas_fades_toward_the_side_of_the_domain_through_which_it_leaves() {
         let smoke = Particle { velocity: [velocity, 0.0, 0.0], ..ball(0, [0.0; 3], 600.0, 1e-6) };
         f64::from(ENDING.remaining_fraction(Vec3::X * x, Vec3::from(smoke.velocity), 1.0))
     };
-    // Two metres a second leave 0.1 s at 0.8 m.
+    // Two meters a second leave 0.1 s at 0.8 m.
     for (x, velocity, left) in
         [(0.79, 2.0, 1.0), (0.9, 2.0, 0.5), (1.0, 2.0, 0.0), (0.9, -2.0, 1.0), (-0.9, -2.0, 0.5), (0.9, 0.0, 1.0)]
     {

@@ -156,7 +156,7 @@ fn all_the_light_of_a_thin_ball_arrives() {
 }
 
 #[test]
-fn a_hotter_flame_is_brighter_by_the_ratio_of_physics_and_has_its_colour() {
+fn a_hotter_flame_is_brighter_by_the_ratio_of_physics_and_has_its_color() {
     let view = view(camera());
     let pixel = |temperature: f32| {
         let strip = drawn(&cloud([ball(0, [0.0; 3], temperature, 1e-8)]), &smooth(), &view, 0, None);
@@ -475,7 +475,7 @@ fn freshly_burning_gas_shines_blue_and_hides_nothing_until_soot_outshines_it() {
     assert!(ratio < 0.02, "{ratio}");
 }
 
-/// Luminance of a metre of a particle's gas in blue light.
+/// Luminance per meter of a particle's gas in blue light.
 fn gas_blue(ball: Particle) -> f64 {
     gas(&cloud([ball]), &ScratchPool::default()).blue_luminance(0, &smooth())
 }

@@ -24,7 +24,7 @@ fn the_papers_sprites_hide_as_much_as_their_gas_is_dense() {
     let view = view(camera());
     let strip = drawn(&cloud([thin, dense]), &look, &view, 0, None);
     let scale = view.camera.focal_pixels / DISTANCE;
-    // Opacity follows from the density alone, not from soot: 0.3 at the centre of gas of the mean density, here of two thin balls.
+    // Opacity follows from the density alone, not from soot: 0.3 at the center of gas of the mean density, here of two thin balls.
     for (x, depth) in [(-0.5, 0.15), (0.5, 0.45)] {
         let index = 60 * SIZE[0] + (80.0 + x * scale) as usize;
         let opacity = 1.0 - f64::from(strip.transmittance(index)[0]);
