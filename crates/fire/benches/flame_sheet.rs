@@ -1,4 +1,4 @@
-//! A full flame sheet at 1920 x 1080, texture to color, and the paper's texture alone, each with the naive way beside it.
+//! A full flame sheet at 1920 x 1080, from texture to color, and the paper's texture alone, each beside a naive version.
 
 use std::hint::black_box;
 

@@ -1,8 +1,7 @@
-//! A step of smoothed particles, about 35 neighbors each: cells, density, pressure, integration.
+//! One SPH step with about 35 neighbors per particle: cell list, density, pressure force, integration.
 //!
-//! Beside it are all pairs (3,000 particles only: 100,000 would take a thousand times as long) and the unsorted way: cells in a hash map,
-//! particles where they happen to lie, one neighbor at a time. And a step of burning gas, all in: the same and its wind, eddies, mixing,
-//! burning, births and deaths.
+//! Beside it are a version with all pairs (3,000 particles only: 100,000 would take a thousand times as long) and one with unsorted
+//! particles, a hash map of cells and scalar code; and a step of the particle flame with all features.
 
 mod support;
 

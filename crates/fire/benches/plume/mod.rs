@@ -1,4 +1,4 @@
-//! A plume of gas in closed form, to draw without simulating it.
+//! A plume of particles in closed form, to be drawn without simulation.
 
 use bansho_base::math::{self, DVec3};
 
