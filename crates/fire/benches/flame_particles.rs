@@ -1,5 +1,5 @@
-//! A whole step of a developed particle flame with everything on: births, cells, density, forces, neighbours, wind, rings, turbulence,
-//! burning, integration; with 3,000, 30,000 and 100,000 particles.
+//! One step of a developed particle flame with all features: spawning, cell list, density, forces, neighbor sums, wind, vortex
+//! rings, turbulence, combustion, integration; with 3,000, 30,000 and 100,000 particles.
 
 mod support;
 

@@ -1,4 +1,4 @@
-//! A full flame sheet at 1920 x 1080, texture to colour, and the paper's texture alone, each with the naive way beside it.
+//! A full flame sheet at 1920 x 1080, from texture to color, and the paper's texture alone, each beside a naive version.
 
 use std::hint::black_box;
 
@@ -65,7 +65,7 @@ fn naive_pixel(parameters: &FlameSheetParameters, x: f64, y: f64, scroll: f64) -
     let rise = equations::rise(y as f32, shape.initial_speed as f32);
     let distance = equations::axis_distance(x as f32);
     let (core, fringe) = (shape.core_width.eval(rise.into()) as f32, shape.fringe_width.eval(rise.into()) as f32);
-    let falling = 1.0 - shape.slowing.eval(equations::fringe_place(distance, core, fringe).into()) as f32;
+    let falling = 1.0 - shape.slowing.eval(equations::fringe_position(distance, core, fringe).into()) as f32;
     let w = equations::slowed_rise(rise, equations::speed_profile(falling, shape.edge_speed as f32));
     let flutter = 0.5 + 0.5 * ((f64::from(w) - scroll) * 9.0).sin();
     let (core, fringe) = (shape.core_width.eval(w.into()) as f32, shape.fringe_width.eval(w.into()) as f32);

@@ -1,8 +1,7 @@
-//! A step of smoothed particles, about 35 neighbours each: cells, density, pressure, integration.
+//! One SPH step with about 35 neighbors per particle: cell list, density, pressure force, integration.
 //!
-//! Beside it are all pairs (3,000 particles only: 100,000 would take a thousand times as long) and the unsorted way: cells in a hash map,
-//! particles where they happen to lie, one neighbour at a time. And a step of burning gas, all in: the same and its wind, eddies, mixing,
-//! burning, births and deaths.
+//! Beside it are a version with all pairs (3,000 particles only: 100,000 would take a thousand times as long) and one with unsorted
+//! particles, a hash map of cells and scalar code; and a step of the particle flame with all features.
 
 mod support;
 
@@ -16,13 +15,13 @@ use bansho_base::{
 };
 
 use bansho_fire::particles::{FlameParticles, FlameParticlesParameters};
-use bansho_sph::{Cells, Kernel, KernelShape, Particles, PressureForce, StateEquation, densities};
+use bansho_sph::{Cells, Kernel, KernelShape, Particles, PressureForce, StateEquation, compute_densities};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use support::pinned_pool;
 
 const NEIGHBOURS: f64 = 35.0;
 const SUPPORT: f32 = 0.1;
-const STATE: StateEquation = StateEquation { rest_density: 0.0, tension: false };
+const STATE: StateEquation = StateEquation { rest_density: 0.0, negative_pressure: false };
 const STIFFNESS: f32 = 1.0;
 /// So short that the cloud stays as it is however often it is stepped.
 const SECONDS: f32 = 1e-6;
@@ -37,8 +36,8 @@ fn cloud<const D: usize>(count: u64) -> Particles<D> {
     let key = Key::new(1, "cloud");
     let mut particles = Particles::default();
     for id in 0..count {
-        let place = key.uniforms(id, 0, Purpose(1));
-        particles.push(std::array::from_fn(|c| place[c] * side as f32), [0.0; D], 1.0, id);
+        let uniforms = key.uniforms(id, 0, Purpose(1));
+        particles.push(std::array::from_fn(|c| uniforms[c] * side as f32), [0.0; D], 1.0, id);
     }
     particles
 }
@@ -70,14 +69,14 @@ impl<const D: usize> Simulation<D> {
     }
 
     fn densities(&mut self) {
-        densities(&self.cells, KernelShape::Poly6, &self.particles.masses, &mut self.densities);
+        compute_densities(&self.cells, KernelShape::Poly6, &self.particles.masses, &mut self.densities);
     }
 
     fn forces(&mut self) {
         self.pressures.clear();
         self.pressures.extend(self.densities.iter().map(|density| STATE.pressure(STIFFNESS, *density)));
         let Self { force, cells, particles, densities, pressures, accelerations } = self;
-        force.accelerations(cells, &particles.masses, densities, pressures, accelerations);
+        force.compute_accelerations(cells, &particles.masses, densities, pressures, accelerations);
     }
 
     fn step(&mut self) {
@@ -88,10 +87,10 @@ impl<const D: usize> Simulation<D> {
     }
 }
 
-/// Told of a neighbour, the offset from it, and its distance.
+/// Told of a neighbor, the offset from it, and its distance.
 type Visitor<'a> = &'a mut dyn FnMut(usize, [f32; 3], f32);
 
-/// A step one pair at a time, the neighbours of each particle found by `near`.
+/// A step one pair at a time, the neighbors of each particle found by `near`.
 fn scalar_step(particles: &mut Particles<3>, near: &dyn Fn(&Particles<3>, usize, Visitor)) {
     let density_kernel = Kernel::<3>::new(KernelShape::Poly6, SUPPORT);
     let force_kernel = Kernel::<3>::new(KernelShape::Spiky, SUPPORT);
@@ -106,7 +105,7 @@ fn scalar_step(particles: &mut Particles<3>, near: &dyn Fn(&Particles<3>, usize,
         near(particles, i, &mut |j, offset, distance| {
             if j != i {
                 let push = particles.masses[j] * (pressures[i] + pressures[j]) / (2.0 * densities[i] * densities[j]);
-                let factor = -push * force_kernel.slope(distance) / distance;
+                let factor = -push * force_kernel.derivative(distance) / distance;
                 (0..3).for_each(|c| accelerations[c][i] += factor * offset[c]);
             }
         });
@@ -144,13 +143,13 @@ fn unsorted_step(particles: &mut Particles<3>) {
 }
 
 /// A flame of a step that is not divided, which has burned long enough to be whole.
-struct Burning {
+struct DetailFactors {
     flame: FlameParticles,
     wind: Wind,
     steps: u64,
 }
 
-impl Burning {
+impl DetailFactors {
     fn new(particles: i64) -> Option<Self> {
         let mut parameters = FlameParticlesParameters { particles, ..Default::default() };
         parameters.fluid.sub_steps = 1;
@@ -201,7 +200,7 @@ fn benches(criterion: &mut Criterion) {
 
     let mut group = criterion.benchmark_group("burning gas, 1 thread");
     group.sample_size(20);
-    if let Some(mut burning) = Burning::new(30_000) {
+    if let Some(mut burning) = DetailFactors::new(30_000) {
         let pool = pinned_pool(1);
         group.bench_function("step of 30000", |bencher| pool.install(|| bencher.iter(|| burning.step())));
     }

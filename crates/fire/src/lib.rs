@@ -1,6 +1,23 @@
-//! Fire: the flame sheet, the particle flame, and the sparks of both.
+//! Fire: a flame sheet, a particle flame, and sparks for both.
+//!
+//! | module | model | after |
+//! |---|---|---|
+//! | [`sheet`] | a small, near flame as a warped, scrolling texture in closed form; with smoke | Ohshima and Itahashi |
+//! | [`particles`] | burning gas by smoothed-particle hydrodynamics, black-body light, heat haze | Inagaki et al. |
+//! | [`sparks`] | glowing particles in closed form, drawn as streaks | |
+//!
+//! The two flames do not depend on each other. The sheet is evaluated at any time; the particle flame is stepped. Each module's page lists
+//! its references and its equations with the functions that implement them.
 
-pub(crate) mod blue_flame;
 pub mod particles;
 pub mod sheet;
 pub mod sparks;
+
+use bansho_base::color;
+
+/// Color of the chemiluminescence of burning hydrocarbons, the CH (431 nm) and C2 (516 nm) bands: ACEScg of luminance 1.
+pub(crate) fn chemiluminescence_color() -> [f32; 3] {
+    let (ch, c2) = (color::line_xyz(431.0), color::line_xyz(516.0));
+    let xyz: [f64; 3] = std::array::from_fn(|i| ch[i] + 0.3 * c2[i]);
+    color::acescg_from_xyz(xyz.map(|value| value / xyz[1]))
+}

@@ -1,7 +1,7 @@
-//! Smoothing kernels, in two and three dimensions.
+//! Smoothing kernels in two and three dimensions.
 //!
-//! All are written over q = r / d with d the support radius, at which every kernel ends, so that no power of d can overflow.
-//! With q at most 1 each integrates to 1 over the plane (`D = 2`) or over space (`D = 3`).
+//! All are functions of q = r / d, where d is the support radius at which every kernel ends, so that no power of d overflows. Each
+//! integrates to 1 over the plane (`D = 2`) or over space (`D = 3`).
 
 use std::f64::consts::PI;
 
@@ -19,7 +19,7 @@ bansho_base::choice! {
     }
 }
 
-/// Evaluates an expression with the kernel of a shape, in code of its own for each: `with_kernel!(shape, radius, D, |kernel| ...)`.
+/// Evaluates an expression with the kernel of a shape, monomorphized for each: `with_kernel!(shape, radius, D, |kernel| ...)`.
 macro_rules! with_kernel {
     ($shape:expr, $support_radius:expr, $D:ident, |$kernel:ident| $value:expr) => {{
         use $crate::kernel::{CubicSpline, KernelShape, Poly6, SmoothingKernel as _, Spiky};
@@ -42,16 +42,16 @@ macro_rules! with_kernel {
 pub(super) use with_kernel;
 
 impl KernelShape {
-    /// Value W(0) of the kernel of that support radius: what a particle of mass 1 adds to its own density.
+    /// W(0), the contribution of a particle of mass 1 to its own density.
     #[must_use]
-    pub fn at_centre<const D: usize>(self, support_radius: f32) -> f32 {
+    pub fn at_center<const D: usize>(self, support_radius: f32) -> f32 {
         with_kernel!(self, support_radius, D, |kernel| kernel.value(0.0))
     }
 }
 
 /// A smoothing kernel in `D` dimensions, two or three.
 ///
-/// Distances come squared and must be less than the support radius; for the gradient they must also be more than 0.
+/// Distances are passed squared and must be less than the support radius; for the gradient they must also be above 0.
 pub trait SmoothingKernel<const D: usize>: Copy + Send + Sync {
     /// The kernel that ends at `support_radius`.
     #[must_use]
@@ -61,32 +61,33 @@ pub trait SmoothingKernel<const D: usize>: Copy + Send + Sync {
     #[must_use]
     fn value<R: Real>(&self, distance_squared: R) -> R;
 
-    /// `W'(r) / r` at a squared distance: times the offset `x_i - x_j` it is the gradient of `W(|x_i - x_j|)` by `x_i`.
+    /// `W'(r) / r` at a squared distance. Times the offset `x_i - x_j` it is the gradient of `W(|x_i - x_j|)` with respect to
+    /// `x_i`.
     #[must_use]
     fn gradient_factor<R: Real>(&self, distance_squared: R) -> R;
 }
 
-/// What all kernels need: squared distance to q^2, the factor of the value and the factor of `W'(r) / r`.
+/// Constants common to all kernels: `1 / d^2`, the factor of W and the factor of `W'(r) / r`.
 #[derive(Clone, Copy, Debug)]
-struct Scale {
+struct KernelConstants {
     to_q_squared: f32,
     value: f32,
     gradient: f32,
 }
 
-impl Scale {
-    /// For a kernel `normalisation / d^D * w(q)` of which `slope * normalisation / d^(D + 2) * g(q)` is `W'(r) / r`.
-    fn new(dimensions: usize, support_radius: f32, normalisation: f64, slope: f64) -> Self {
+impl KernelConstants {
+    /// For a kernel `normalization / d^D * w(q)` with `W'(r) / r = derivative * normalization / d^(D + 2) * g(q)`.
+    fn new(dimensions: usize, support_radius: f32, normalization: f64, derivative: f64) -> Self {
         let inverse = 1.0 / f64::from(support_radius);
-        let normalisation = if cfg!(feature = "broken-kernel") { 0.9 * normalisation } else { normalisation };
-        let value = (0..dimensions).fold(normalisation, |value, _| value * inverse);
+        let normalization = if cfg!(feature = "broken-kernel") { 0.9 * normalization } else { normalization };
+        let value = (0..dimensions).fold(normalization, |value, _| value * inverse);
         let to_q_squared = inverse * inverse;
-        let gradient = (slope * value * to_q_squared) as f32;
+        let gradient = (derivative * value * to_q_squared) as f32;
         Self { to_q_squared: to_q_squared as f32, value: value as f32, gradient }
     }
 }
 
-/// One of two numbers, by the number of dimensions.
+/// `plane` for `D = 2`, `space` for `D = 3`.
 const fn by_dimension<const D: usize>(plane: f64, space: f64) -> f64 {
     const { assert!(D == 2 || D == 3, "kernels exist in two and three dimensions") };
     if D == 2 { plane } else { space }
@@ -96,22 +97,22 @@ const fn by_dimension<const D: usize>(plane: f64, space: f64) -> f64 {
 ///
 /// Inagaki et al. (2); the aurora thesis, (2.12).
 #[derive(Clone, Copy, Debug)]
-pub struct Poly6<const D: usize>(Scale);
+pub struct Poly6<const D: usize>(KernelConstants);
 
 impl<const D: usize> SmoothingKernel<D> for Poly6<D> {
     fn new(support_radius: f32) -> Self {
-        Self(Scale::new(D, support_radius, by_dimension::<D>(4.0, 315.0 / 64.0) / PI, -6.0))
+        Self(KernelConstants::new(D, support_radius, by_dimension::<D>(4.0, 315.0 / 64.0) / PI, -6.0))
     }
 
     #[inline(always)]
     fn value<R: Real>(&self, distance_squared: R) -> R {
-        let rest = self.rest(distance_squared);
+        let rest = self.one_minus_q_squared(distance_squared);
         rest * rest * (rest * rest.broadcast(self.0.value))
     }
 
     #[inline(always)]
     fn gradient_factor<R: Real>(&self, distance_squared: R) -> R {
-        let rest = self.rest(distance_squared);
+        let rest = self.one_minus_q_squared(distance_squared);
         rest * rest * rest.broadcast(self.0.gradient)
     }
 }
@@ -119,7 +120,7 @@ impl<const D: usize> SmoothingKernel<D> for Poly6<D> {
 impl<const D: usize> Poly6<D> {
     /// `1 - q^2`.
     #[inline(always)]
-    fn rest<R: Real>(&self, distance_squared: R) -> R {
+    fn one_minus_q_squared<R: Real>(&self, distance_squared: R) -> R {
         distance_squared.fma(distance_squared.broadcast(-self.0.to_q_squared), distance_squared.broadcast(1.0))
     }
 }
@@ -128,11 +129,11 @@ impl<const D: usize> Poly6<D> {
 ///
 /// The aurora thesis, (2.15) and (2.16).
 #[derive(Clone, Copy, Debug)]
-pub struct Spiky<const D: usize>(Scale);
+pub struct Spiky<const D: usize>(KernelConstants);
 
 impl<const D: usize> SmoothingKernel<D> for Spiky<D> {
     fn new(support_radius: f32) -> Self {
-        Self(Scale::new(D, support_radius, by_dimension::<D>(10.0, 15.0) / PI, -3.0))
+        Self(KernelConstants::new(D, support_radius, by_dimension::<D>(10.0, 15.0) / PI, -3.0))
     }
 
     #[inline(always)]
@@ -151,16 +152,16 @@ impl<const D: usize> SmoothingKernel<D> for Spiky<D> {
     }
 }
 
-/// `((2 - u)^3 - 4 (1 - u)^3) / 4`, u = 2 q, each power 0 where its base is negative: `40 / (7 pi d^2)` in the plane,
-/// `8 / (pi d^3)` in space.
+/// `((2 - u)^3 - 4 (1 - u)^3) / 4` with u = 2 q, each power 0 where its base is negative: `40 / (7 pi d^2)` in the plane, `8 / (pi
+/// d^3)` in space.
 ///
 /// The aurora thesis, (2.17) and (2.18), whose h is half the support radius d.
 #[derive(Clone, Copy, Debug)]
-pub struct CubicSpline<const D: usize>(Scale);
+pub struct CubicSpline<const D: usize>(KernelConstants);
 
 impl<const D: usize> SmoothingKernel<D> for CubicSpline<D> {
     fn new(support_radius: f32) -> Self {
-        Self(Scale::new(D, support_radius, by_dimension::<D>(40.0 / 7.0, 8.0) / PI, 3.0))
+        Self(KernelConstants::new(D, support_radius, by_dimension::<D>(40.0 / 7.0, 8.0) / PI, 3.0))
     }
 
     #[inline(always)]
@@ -190,7 +191,7 @@ impl<const D: usize> CubicSpline<D> {
     }
 }
 
-/// A kernel chosen at run time, for single values.
+/// A kernel chosen at run time, for scalar evaluation.
 #[derive(Clone, Copy, Debug)]
 pub enum Kernel<const D: usize> {
     /// See [`Poly6`].
@@ -224,7 +225,7 @@ impl<const D: usize> Kernel<D> {
 
     /// `W'(r)` at a distance r above 0 and below the support radius.
     #[must_use]
-    pub fn slope(&self, distance: f32) -> f32 {
+    pub fn derivative(&self, distance: f32) -> f32 {
         let factor = match self {
             Self::Poly6(kernel) => kernel.gradient_factor(distance * distance),
             Self::Spiky(kernel) => kernel.gradient_factor(distance * distance),
@@ -264,23 +265,26 @@ mod tests {
         }
     }
 
-    fn slopes_are_differences<const D: usize>() {
+    fn derivatives_match_finite_differences<const D: usize>() {
         for shape in SHAPES {
             let kernel = Kernel::<D>::new(shape, 2.0);
             for i in 1..40 {
                 let r = 0.05 * i as f32;
                 let step = 2e-3;
-                let difference = (kernel.value(r + step) - kernel.value(r - step)) / (2.0 * step);
-                let slope = kernel.slope(r);
-                assert!((slope - difference).abs() < 2e-3, "{shape:?} at {r} in {D} dimensions: {slope} {difference}");
+                let subtract = (kernel.value(r + step) - kernel.value(r - step)) / (2.0 * step);
+                let derivative = kernel.derivative(r);
+                assert!(
+                    (derivative - subtract).abs() < 2e-3,
+                    "{shape:?} at {r} in {D} dimensions: {derivative} {subtract}"
+                );
             }
         }
     }
 
     #[test]
     fn slopes_match_finite_differences() {
-        slopes_are_differences::<2>();
-        slopes_are_differences::<3>();
+        derivatives_match_finite_differences::<2>();
+        derivatives_match_finite_differences::<3>();
     }
 
     #[test]
@@ -289,7 +293,7 @@ mod tests {
             let kernel = Kernel::<2>::new(shape, 0.5);
             let values: Vec<f32> = (0..100).map(|i| kernel.value(0.005 * i as f32)).collect();
             assert!(values.windows(2).all(|pair| pair[1] < pair[0]), "{shape:?}");
-            assert!(kernel.value(0.499_99) < 1e-4 * values[0] && kernel.slope(0.499_99).abs() < 0.01 * values[0]);
+            assert!(kernel.value(0.499_99) < 1e-4 * values[0] && kernel.derivative(0.499_99).abs() < 0.01 * values[0]);
         }
     }
 
@@ -301,12 +305,12 @@ mod tests {
         close(Kernel::<3>::new(KernelShape::Poly6, 2.0).value(1.0), 315.0 / (64.0 * PI * 512.0) * 27.0);
         // Thesis (2.12) and (2.16) at h = 2, r = 1.
         close(Kernel::<2>::new(KernelShape::Poly6, 2.0).value(1.0), 4.0 / (PI * 256.0) * 27.0);
-        close(Kernel::<2>::new(KernelShape::Spiky, 2.0).slope(1.0), -30.0 / (PI * 32.0));
+        close(Kernel::<2>::new(KernelShape::Spiky, 2.0).derivative(1.0), -30.0 / (PI * 32.0));
         // Thesis (2.17) and (2.18) at h = 1: r = 1/2 within, r = 3/2 without.
         let spline = Kernel::<2>::new(KernelShape::CubicSpline, 2.0);
         close(spline.value(0.5), 10.0 / (7.0 * PI) * (1.0 - 0.375 + 0.093_75));
         close(spline.value(1.5), 10.0 / (7.0 * PI) * 0.031_25);
-        close(spline.slope(0.5), 45.0 / (14.0 * PI) * (0.5 - 4.0 / 3.0) * 0.5);
-        close(spline.slope(1.5), -45.0 / (14.0 * PI) / 3.0 * 0.25);
+        close(spline.derivative(0.5), 45.0 / (14.0 * PI) * (0.5 - 4.0 / 3.0) * 0.5);
+        close(spline.derivative(1.5), -45.0 / (14.0 * PI) / 3.0 * 0.25);
     }
 }

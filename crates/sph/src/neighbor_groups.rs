@@ -1,39 +1,35 @@
-//! Groups of eight particles that lie beside each other, and the particles near enough to matter to any of them.
+//! Groups of up to eight consecutive particles, with lists of their candidate neighbors, and operations on batches of eight.
+//!
+//! The batch operations loop over arrays instead of calling `map`: its closures do not vectorize.
 
-use std::ops::Range;
-
+use super::cells::{Cells, RowChunk};
+use bansho_base::math::simd::{HalfLanes, Real};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
+use std::ops::Range;
 
-use bansho_base::math::simd::{HalfLanes, Real};
+/// Groups per task of the thread pool.
+const GROUPS_PER_TASK: usize = 32;
 
-use super::{
-    batch::{BATCH, load, squared},
-    cells::{Cells, RowPart},
-};
-
-/// Groups that one task takes.
-const GROUPS: usize = 32;
-
-/// Some groups that follow each other: a task of the thread pool. What it finds depends on its groups and those around them alone, so
-/// it does not matter where one ends.
+/// Consecutive groups: one task of the thread pool. The candidates of a group do not depend on where a batch ends.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Stretch {
+pub(super) struct GroupBatch {
     pub(super) groups: Vec<Group>,
-    /// Particles near each group, group after group.
+    /// Candidate neighbors of all groups, one after the other.
     pub(super) candidates: Vec<u32>,
 }
 
-/// Up to eight particles that follow each other in a row of cells.
+/// Up to eight consecutive particles of a row of cells.
 #[derive(Clone, Debug)]
 pub(super) struct Group {
-    /// Their numbers in sorted order.
+    /// Their indices in sorted order.
     pub(super) particles: Range<usize>,
-    /// Where the stretch lists the particles that are nearer to the box around them than the support radius; they themselves are among them.
+    /// Range in [`GroupBatch::candidates`] of the particles nearer than the support radius to the bounding box of the group, itself
+    /// included.
     pub(super) candidates: Range<usize>,
 }
 
-impl Stretch {
+impl GroupBatch {
     /// The particles of all groups.
     pub(super) fn particles(&self) -> Range<usize> {
         let at = |group: Option<&Group>, edge: fn(&Group) -> usize| group.map_or(0, edge);
@@ -41,13 +37,13 @@ impl Stretch {
     }
 }
 
-/// The smallest box, along the axes, around some particles.
-struct Bounds<const D: usize> {
+/// Axis-aligned bounding box of some particles.
+struct BoundingBox<const D: usize> {
     lower: [f32; D],
     upper: [f32; D],
 }
 
-impl<const D: usize> Bounds<D> {
+impl<const D: usize> BoundingBox<D> {
     fn of(positions: &[&[f32]; D], particles: Range<usize>) -> Self {
         let mut bounds = Self { lower: [f32::INFINITY; D], upper: [f32::NEG_INFINITY; D] };
         for c in 0..D {
@@ -59,7 +55,7 @@ impl<const D: usize> Bounds<D> {
         bounds
     }
 
-    /// Squared distances of points from the box, 0 inside.
+    /// Squared distance of points from the box, 0 inside.
     #[inline(always)]
     fn distance_squared<R: Real>(&self, point: &[R; D]) -> R {
         let mut outside = *point;
@@ -68,85 +64,155 @@ impl<const D: usize> Bounds<D> {
             let above = point[c] - point[c].broadcast(self.upper[c]);
             outside[c] = below.simd_max(above).simd_max(point[c].broadcast(0.0));
         }
-        squared(&outside)
+        length_squared(&outside)
     }
 }
 
-/// Writes those particles of a run that are near a box at the front of a list, and says how many they are; what follows is spoilt.
+/// Writes the particles of a run that lie within the support radius of a box to the front of `candidates` and returns their number.
+/// Entries after them are overwritten.
 #[inline(always)]
 fn list_near<S: Simd, const D: usize>(
     simd: S,
     positions: &[&[f32]; D],
-    bounds: &Bounds<D>,
-    reach_squared: f32,
+    bounds: &BoundingBox<D>,
+    support_squared: f32,
     run: Range<usize>,
-    list: &mut [u32],
+    candidates: &mut [u32],
 ) -> usize {
-    let reach = HalfLanes::splat(simd, reach_squared);
+    let support = HalfLanes::splat(simd, support_squared);
     let mut count = 0;
     for start in run.clone().step_by(BATCH) {
-        let near = bounds.distance_squared(&load(simd, positions, start)).simd_lt(reach).to_bitmask() as usize;
-        // The last batch goes on behind the run.
+        let near = bounds.distance_squared(&load(simd, positions, start)).simd_lt(support).to_bitmask() as usize;
+        // The last batch extends beyond the run.
         let near = near & (0xff >> (BATCH - (run.end - start).min(BATCH)));
-        for (to, place) in list[count..count + BATCH].iter_mut().zip(&PLACES[near]) {
-            *to = start as u32 + u32::from(*place);
+        for (to, bit_index) in candidates[count..count + BATCH].iter_mut().zip(&SET_BIT_INDICES[near]) {
+            *to = start as u32 + u32::from(*bit_index);
         }
         count += near.count_ones() as usize;
     }
     count
 }
 
-/// For each set of bits the places of those that are set.
-const PLACES: [[u8; BATCH]; 256] = {
-    let mut places = [[0; BATCH]; 256];
+/// For each 8-bit mask, the indices of the set bits.
+const SET_BIT_INDICES: [[u8; BATCH]; 256] = {
+    let mut indices = [[0; BATCH]; 256];
     let mut bits = 0;
     while bits < 256 {
         let (mut bit, mut count) = (0, 0);
         while bit < BATCH {
             if bits >> bit & 1 == 1 {
-                places[bits][count] = bit as u8;
+                indices[bits][count] = bit as u8;
                 count += 1;
             }
             bit += 1;
         }
         bits += 1;
     }
-    places
+    indices
 };
 
-impl Stretch {
-    /// Parts rows into stretches and finds everybody's candidates.
-    pub(super) fn find_all<const D: usize>(stretches: &mut Vec<Self>, cells: &Cells<D>, parts: &[RowPart]) {
+impl GroupBatch {
+    /// Splits row chunks into batches and finds the candidates of every group.
+    pub(super) fn find_all<const D: usize>(batches: &mut Vec<Self>, cells: &Cells<D>, chunks: &[RowChunk]) {
         let level = Level::new();
-        stretches.resize_with(parts.len().div_ceil(GROUPS), Self::default);
-        stretches.par_iter_mut().with_max_len(1).zip(parts.par_chunks(GROUPS)).for_each(|(stretch, parts)| {
-            dispatch!(level, simd => stretch.find(simd, cells, parts));
+        batches.resize_with(chunks.len().div_ceil(GROUPS_PER_TASK), Self::default);
+        batches.par_iter_mut().with_max_len(1).zip(chunks.par_chunks(GROUPS_PER_TASK)).for_each(|(batch, chunks)| {
+            dispatch!(level, simd => batch.find(simd, cells, chunks));
         });
     }
 
-    /// Finds the candidates of some parts of rows.
+    /// Finds the candidates of some row chunks.
     #[inline(always)]
-    fn find<S: Simd, const D: usize>(&mut self, simd: S, cells: &Cells<D>, parts: &[RowPart]) {
+    fn find<S: Simd, const D: usize>(&mut self, simd: S, cells: &Cells<D>, chunks: &[RowChunk]) {
         let (positions, support) = (cells.positions(), cells.support_radius());
         let Self { groups, candidates } = self;
         groups.clear();
         candidates.clear();
-        let Some(first) = parts.first() else { return };
-        let mut around = cells.runs_from(first);
-        let mut listed = 0;
-        for part in parts {
-            let particles = part.particles.start as usize..part.particles.end as usize;
-            let bounds = Bounds::of(&positions, particles.clone());
-            let runs = around.around(part);
-            let most: usize = runs.iter().map(|run| run.len() + BATCH).sum();
-            candidates.resize(listed + most, 0);
-            let first = listed;
+        let Some(first) = chunks.first() else { return };
+        let mut neighbor_runs = cells.neighbor_runs(first);
+        let mut count_so_far = 0;
+        for chunk in chunks {
+            let particles = chunk.particles.start as usize..chunk.particles.end as usize;
+            let bounds = BoundingBox::of(&positions, particles.clone());
+            let runs = neighbor_runs.near(chunk);
+            let max_candidates: usize = runs.iter().map(|run| run.len() + BATCH).sum();
+            candidates.resize(count_so_far + max_candidates, 0);
+            let first = count_so_far;
             for run in runs {
-                listed +=
-                    list_near(simd, &positions, &bounds, support * support, run.clone(), &mut candidates[listed..]);
+                count_so_far += list_near(
+                    simd,
+                    &positions,
+                    &bounds,
+                    support * support,
+                    run.clone(),
+                    &mut candidates[count_so_far..],
+                );
             }
-            groups.push(Group { particles, candidates: first..listed });
+            groups.push(Group { particles, candidates: first..count_so_far });
         }
-        candidates.truncate(listed);
+        candidates.truncate(count_so_far);
     }
+}
+
+/// Particles per batch.
+pub(super) const BATCH: usize = 8;
+
+/// Squared length of an offset.
+#[inline(always)]
+pub(super) fn length_squared<R: Real, const D: usize>(offset: &[R; D]) -> R {
+    let mut sum = offset[0] * offset[0];
+    for c in 1..D {
+        sum = offset[c].fma(offset[c], sum);
+    }
+    sum
+}
+
+/// Truncates arrays to one length, so that one bounds check serves all.
+#[inline(always)]
+pub(super) fn truncate_all<const N: usize>(arrays: [&[f32]; N], length: usize) -> [&[f32]; N] {
+    let mut truncate_all = arrays;
+    for k in 0..N {
+        truncate_all[k] = &arrays[k][..length];
+    }
+    truncate_all
+}
+
+/// Loads the batch that begins at an index from each array.
+#[inline(always)]
+pub(super) fn load<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], first: usize) -> [HalfLanes<S>; N] {
+    let mut batches = [HalfLanes::splat(simd, 0.0); N];
+    for k in 0..N {
+        batches[k] = HalfLanes::from_slice(simd, &arrays[k][first..first + BATCH]);
+    }
+    batches
+}
+
+/// The value at an index of each array.
+#[inline(always)]
+pub(super) fn values_at<const N: usize>(arrays: &[&[f32]; N], index: usize) -> [f32; N] {
+    let mut values = [0.0; N];
+    for k in 0..N {
+        values[k] = arrays[k][index];
+    }
+    values
+}
+
+/// Broadcasts each value to all lanes of a batch.
+#[inline(always)]
+pub(super) fn splat_all<S: Simd, const N: usize>(simd: S, values: [f32; N]) -> [HalfLanes<S>; N] {
+    let mut batches = [HalfLanes::splat(simd, 0.0); N];
+    for k in 0..N {
+        batches[k] = HalfLanes::splat(simd, values[k]);
+    }
+    batches
+}
+
+/// `one - other`, component by component.
+#[inline(always)]
+pub(super) fn subtract<R: Real, const D: usize>(one: &[R; D], other: &[R; D]) -> [R; D] {
+    let mut result = *one;
+    for c in 0..D {
+        result[c] = one[c] - other[c];
+    }
+    result
 }

@@ -1,7 +1,7 @@
-//! Sums over the neighbours of every particle: the one loop that density, forces and whatever a model adds run in.
+//! Sums over the neighbors of every particle: the one loop in which density, forces and all other pair terms run.
 //!
-//! Eight particles that lie beside each other go through their common candidates together, one candidate at a time: each has a lane of a
-//! vector to itself, so nothing waits and nothing is added up across lanes. A sum depends on who is near alone, not on threads.
+//! Eight consecutive particles visit their common candidates together, one candidate at a time. Each particle has a SIMD lane of
+//! its own, so there are no horizontal sums. A sum depends on the neighbors alone, not on threads.
 
 use bansho_base::{
     math,
@@ -12,49 +12,50 @@ use bansho_base::{
 };
 
 use super::{
-    batch::{BATCH, cut, difference, load, pick, spread, squared},
     cells::Cells,
-    neighbor_groups::{Group, Stretch},
+    neighbor_groups::{Group, GroupBatch},
 };
+use crate::neighbor_groups::{BATCH, length_squared, load, splat_all, subtract, truncate_all, values_at};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-/// Particles closer than this share of the support radius count as coincident.
-const COINCIDENT: f32 = 1e-6;
+/// Particles closer than this fraction of the support radius count as coincident.
+const COINCIDENCE_RADIUS: f32 = 1e-6;
 
-/// Where a neighbour is.
+/// Relative position of a pair.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<R, const D: usize> {
-    /// `x_i - x_j`, from the neighbour to the particle.
+    /// `x_i - x_j`, from the neighbor to the particle.
     pub offset: [R; D],
     /// Its squared length.
     pub distance_squared: R,
 }
 
-/// One term of a sum over neighbours, in `D` dimensions, of `OUT` results, from `IN` values of each particle.
+/// Pair term of a sum over neighbors in `D` dimensions: `OUT` results from `IN` values of each particle.
 pub trait PairTerm<const D: usize, const IN: usize, const OUT: usize>: Sync {
-    /// Whether the term has the direction of the offset, and perhaps a pole at distance 0.
+    /// Whether the term is proportional to the offset, possibly with a pole at distance 0.
     ///
-    /// If so, squared distances are held above 0, a particle itself must add nothing by its offset of 0, and two that coincide push each
-    /// other in a direction by their birth ids. If not, the sum includes the particle itself, at distance 0.
+    /// If so, squared distances are clamped above 0, a particle contributes nothing to itself (its offset is 0), and two coincident
+    /// particles repel each other in a direction that follows from their ids. If not, the sum includes the particle itself at
+    /// distance 0.
     const DIRECTED: bool;
 
-    /// Adds to the sums of a particle with the values `own` what a neighbour with the values `other` gives.
+    /// Adds the contribution of a neighbor with the values `other` to the sums of a particle with the values `own`.
     ///
-    /// Mark it `#[inline(always)]`, and loop over arrays in place of `map`, whose closure would not become vector code. It is also called for
-    /// candidates too far to count, with the squared distance held to that of the support radius: kernels are 0 there, and so must the
-    /// term be, to rounding.
+    /// Implementations are `#[inline(always)]` and loop over arrays instead of calling `map`, whose closures do not vectorize. The
+    /// term is also evaluated for candidates beyond the support radius, with the squared distance clamped to its square: there it
+    /// must be 0 to rounding, as kernels are.
     fn add<R: Real>(&self, pair: &Pair<R, D>, own: &[R; IN], other: &[R; IN], sums: &mut [R; OUT]);
 }
 
 impl<const D: usize> Cells<D> {
-    /// Sums `term` over the neighbours of every particle, those nearer than the support radius.
+    /// Sums `term` over the neighbors of every particle, those nearer than the support radius.
     ///
-    /// `fields` are the values of the particles in sorted order, and so are the results. The same on every machine with fused
-    /// multiply-add, for any number of threads and any order in which the particles were given.
+    /// `fields` and `results` are in sorted order. Results are the same on every machine with fused multiply-add, for any number of
+    /// threads and any order in which particles were given.
     ///
     /// # Panics
-    /// If a field does not hold one value a particle.
+    /// If a field does not hold one value per particle.
     pub fn sum<T, const IN: usize, const OUT: usize>(
         &self,
         term: &T,
@@ -69,102 +70,102 @@ impl<const D: usize> Cells<D> {
             values.resize(self.len(), 0.0);
             values.as_mut_slice()
         });
-        let around = Around { cells: self, positions: self.positions(), fields };
-        let stretches = self.stretches().par_iter().with_max_len(1);
-        stretches.zip(split(self.stretches(), results)).for_each(|(stretch, mut results)| {
-            dispatch!(level, simd => sum_stretch(simd, term, &around, stretch, &mut results));
+        let inputs = SumInputs { cells: self, positions: self.positions(), fields };
+        let batches = self.batches().par_iter().with_max_len(1);
+        batches.zip(split(self.batches(), results)).for_each(|(batch, mut results)| {
+            dispatch!(level, simd => sum_batch(simd, term, &inputs, batch, &mut results));
         });
     }
 }
 
-/// The part of each array that belongs to each stretch.
-fn split<'a, const OUT: usize>(stretches: &[Stretch], mut arrays: [&'a mut [f32]; OUT]) -> Vec<[&'a mut [f32]; OUT]> {
-    let mut part = |stretch: &Stretch| {
+/// The slice of each array that belongs to each batch of groups.
+fn split<'a, const OUT: usize>(batches: &[GroupBatch], mut arrays: [&'a mut [f32]; OUT]) -> Vec<[&'a mut [f32]; OUT]> {
+    let mut slice_of = |batch: &GroupBatch| {
         arrays.each_mut().map(|values| {
-            let (head, tail) = std::mem::take(values).split_at_mut(stretch.particles().len());
+            let (head, tail) = std::mem::take(values).split_at_mut(batch.particles().len());
             *values = tail;
             head
         })
     };
-    stretches.iter().map(&mut part).collect()
+    batches.iter().map(&mut slice_of).collect()
 }
 
-/// What sums read: positions and fields in sorted order.
-struct Around<'a, const D: usize, const IN: usize> {
+/// Inputs of a sum: positions and fields in sorted order.
+struct SumInputs<'a, const D: usize, const IN: usize> {
     cells: &'a Cells<D>,
     positions: [&'a [f32]; D],
     fields: [&'a [f32]; IN],
 }
 
-/// Sums for all particles of a stretch.
+/// Sums for all particles of a batch of groups.
 #[inline(always)]
-fn sum_stretch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
+fn sum_batch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
-    around: &Around<'_, D, IN>,
-    stretch: &Stretch,
+    inputs: &SumInputs<'_, D, IN>,
+    batch: &GroupBatch,
     results: &mut [&mut [f32]; OUT],
 ) where
     T: PairTerm<D, IN, OUT>,
 {
-    let first = stretch.particles().start;
-    for group in &stretch.groups {
-        let candidates = &stretch.candidates[group.candidates.clone()];
-        let (sums, coincident) = sum_group(simd, term, around, group.particles.start, candidates);
+    let first = batch.particles().start;
+    for group in &batch.groups {
+        let candidates = &batch.candidates[group.candidates.clone()];
+        let (sums, coincident) = sum_group(simd, term, inputs, group.particles.start, candidates);
         let mut lanes = [[0.0; BATCH]; OUT];
         for k in 0..OUT {
             sums[k].store_slice(&mut lanes[k]);
         }
         if T::DIRECTED {
-            add_coincident(term, around, group, candidates, coincident, &mut lanes);
+            add_coincident(term, inputs, group, candidates, coincident, &mut lanes);
         }
-        let place = group.particles.start - first..group.particles.end - first;
+        let rows = group.particles.start - first..group.particles.end - first;
         for k in 0..OUT {
-            results[k][place.clone()].copy_from_slice(&lanes[k][..group.particles.len()]);
+            results[k][rows.clone()].copy_from_slice(&lanes[k][..group.particles.len()]);
         }
     }
 }
 
-/// Sums for the eight particles from `first` on over all candidates; and how many of these coincide with each, itself included, if
-/// the term is directed.
+/// Sums for the eight particles from `first` on over all candidates; for directed terms also the number of candidates that coincide
+/// with each, itself included.
 #[inline(always)]
 fn sum_group<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     simd: S,
     term: &T,
-    around: &Around<'_, D, IN>,
+    inputs: &SumInputs<'_, D, IN>,
     first: usize,
     candidates: &[u32],
 ) -> ([HalfLanes<S>; OUT], HalfLanes<S>)
 where
     T: PairTerm<D, IN, OUT>,
 {
-    let support = around.cells.support_radius();
-    let count = around.cells.len();
-    let (positions, fields) = (cut(around.positions, count), cut(around.fields, count));
-    let position = load(simd, &around.positions, first);
-    let own = load_held(simd, &fields, first);
+    let support = inputs.cells.support_radius();
+    let count = inputs.cells.len();
+    let (positions, fields) = (truncate_all(inputs.positions, count), truncate_all(inputs.fields, count));
+    let position = load(simd, &inputs.positions, first);
+    let own = load_padded(simd, &fields, first);
     let none = HalfLanes::splat(simd, 0.0);
-    let (farthest, nearest, one) =
-        (none.broadcast(support * support), none.broadcast(nearest_squared(support)), none.broadcast(1.0));
+    let (max_squared, min_squared, one) =
+        (none.broadcast(support * support), none.broadcast(coincidence_distance_squared(support)), none.broadcast(1.0));
     let (mut sums, mut coincident) = ([none; OUT], none);
     for candidate in candidates {
         let candidate = *candidate as usize;
-        let offset = difference(&position, &spread(simd, pick(&positions, candidate)));
-        let squared = squared(&offset);
-        let mut distance_squared = squared.simd_min(farthest);
+        let offset = subtract(&position, &splat_all(simd, values_at(&positions, candidate)));
+        let length_squared = length_squared(&offset);
+        let mut distance_squared = length_squared.simd_min(max_squared);
         if T::DIRECTED {
-            coincident += squared.select_lt(nearest, one, none);
-            distance_squared = distance_squared.simd_max(nearest);
+            coincident += length_squared.select_lt(min_squared, one, none);
+            distance_squared = distance_squared.simd_max(min_squared);
         }
-        let other = spread(simd, pick(&fields, candidate));
+        let other = splat_all(simd, values_at(&fields, candidate));
         term.add(&Pair { offset, distance_squared }, &own, &other, &mut sums);
     }
     (sums, coincident)
 }
 
-/// The batch of each array that begins at an index; 0 behind their end.
+/// Loads the batch that begins at an index from each array, padded with 0.
 #[inline(always)]
-fn load_held<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], first: usize) -> [HalfLanes<S>; N] {
+fn load_padded<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], first: usize) -> [HalfLanes<S>; N] {
     let length = arrays.first().map_or(0, |array| array.len());
     if first + BATCH <= length {
         return load(simd, arrays, first);
@@ -179,15 +180,15 @@ fn load_held<S: Simd, const N: usize>(simd: S, arrays: &[&[f32]; N], first: usiz
 }
 
 /// Squared distance below which particles coincide.
-fn nearest_squared(support_radius: f32) -> f32 {
-    (support_radius * COINCIDENT) * (support_radius * COINCIDENT)
+fn coincidence_distance_squared(support_radius: f32) -> f32 {
+    (support_radius * COINCIDENCE_RADIUS) * (support_radius * COINCIDENCE_RADIUS)
 }
 
-/// Adds what those particles of a group gain that coincide with more than themselves.
+/// Adds the contributions of coincident particles to the members of a group that have any.
 #[inline(always)]
 fn add_coincident<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     term: &T,
-    around: &Around<'_, D, IN>,
+    inputs: &SumInputs<'_, D, IN>,
     group: &Group,
     candidates: &[u32],
     coincident: HalfLanes<S>,
@@ -199,40 +200,42 @@ fn add_coincident<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>
         return;
     }
     for particle in group.particles.clone() {
-        let more = sum_coincident(term, around, candidates, particle);
+        let extra = sum_coincident(term, inputs, candidates, particle);
         for k in 0..OUT {
-            sums[k][particle - group.particles.start] += more[k];
+            sums[k][particle - group.particles.start] += extra[k];
         }
     }
 }
 
-/// What others at the place of a particle add, each pushed aside by a hair in a direction that both agree on.
+/// Contributions of particles at the same position, each displaced by the coincidence radius in a direction that both sides agree
+/// on.
 #[inline(never)]
 fn sum_coincident<T, const D: usize, const IN: usize, const OUT: usize>(
     term: &T,
-    around: &Around<'_, D, IN>,
+    inputs: &SumInputs<'_, D, IN>,
     candidates: &[u32],
     particle: usize,
 ) -> [f32; OUT]
 where
     T: PairTerm<D, IN, OUT>,
 {
-    let support = around.cells.support_radius();
-    let ids = around.cells.ids();
-    let (position, values) = (pick(&around.positions, particle), pick(&around.fields, particle));
+    let support = inputs.cells.support_radius();
+    let ids = inputs.cells.ids();
+    let (position, values) = (values_at(&inputs.positions, particle), values_at(&inputs.fields, particle));
     let mut sums = [0.0; OUT];
     for other in candidates.iter().map(|other| *other as usize).filter(|other| *other != particle) {
-        let between = difference(&position, &pick(&around.positions, other));
-        if squared(&between) < nearest_squared(support) {
-            let offset = direction(ids[particle], ids[other]).map(|component: f32| component * support * COINCIDENT);
-            let pair = Pair { offset, distance_squared: squared(&offset) };
-            term.add(&pair, &values, &pick(&around.fields, other), &mut sums);
+        let separation = subtract(&position, &values_at(&inputs.positions, other));
+        if length_squared(&separation) < coincidence_distance_squared(support) {
+            let offset =
+                direction(ids[particle], ids[other]).map(|component: f32| component * support * COINCIDENCE_RADIUS);
+            let pair = Pair { offset, distance_squared: length_squared(&offset) };
+            term.add(&pair, &values, &values_at(&inputs.fields, other), &mut sums);
         }
     }
     sums
 }
 
-/// A unit vector from particle `other` to particle `own`, opposite when they change places.
+/// Unit vector from particle `other` to particle `own` as a hash of both ids; antisymmetric.
 fn direction<const D: usize>(own: u64, other: u64) -> [f32; D] {
     let (low, high) = (own.min(other), own.max(other));
     let mut bytes = [0; 16];

@@ -1,23 +1,23 @@
-//! What smoothed particles are made of.
+//! Particles as structure of arrays, and their time integration.
 
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::{cells::Cells, sorting::AT_ONCE};
+use super::{cells::Cells, sorting::MIN_PARTICLES_PER_TASK};
 
-/// Particles in `D` dimensions as arrays, one entry a particle.
+/// Particles in `D` dimensions as structure of arrays.
 ///
-/// Positions are relative to an origin of the owner's choice; the nearer they are to it, the finer a 32-bit float resolves them.
-/// Sorting moves particles between slots: only the birth id stays with one.
+/// Positions are relative to an origin chosen by the owner: the nearer to it, the finer a 32-bit float resolves them. Sorting moves
+/// particles between indices; only the id stays with a particle.
 #[derive(Clone, Debug)]
 pub struct Particles<const D: usize> {
-    /// Positions, one array a component.
+    /// Positions, one array per component.
     pub positions: [Vec<f32>; D],
-    /// Velocities, one array a component.
+    /// Velocities, one array per component.
     pub velocities: [Vec<f32>; D],
     /// Masses, all above 0.
     pub masses: Vec<f32>,
-    /// Birth ids, no two alike.
+    /// Unique particle ids.
     pub ids: Vec<u64>,
 }
 
@@ -41,7 +41,7 @@ impl<const D: usize> Particles<D> {
         self.ids.is_empty()
     }
 
-    /// Adds one at the end.
+    /// Appends a particle.
     pub fn push(&mut self, position: [f32; D], velocity: [f32; D], mass: f32, id: u64) {
         for c in 0..D {
             self.positions[c].push(position[c]);
@@ -51,35 +51,37 @@ impl<const D: usize> Particles<D> {
         self.ids.push(id);
     }
 
-    /// Keeps those of which `keep` says so by index, in their order. Use the same mask on arrays of your own with [`retain`].
+    /// Keeps the particles whose mask is set, in their order. Use [`retain`] with the same mask on other arrays.
     pub fn retain(&mut self, keep: &[bool]) {
         self.positions.iter_mut().chain(&mut self.velocities).for_each(|values| retain(values, keep));
         retain(&mut self.masses, keep);
         retain(&mut self.ids, keep);
     }
 
-    /// Sorts them into cells, by cell and then by id, and remembers the cells.
+    /// Sorts by cell, then by id.
     ///
-    /// Afterwards bring arrays of your own into the same order with [`Cells::reorder`].
+    /// Afterwards bring other arrays into the same order with [`Cells::reorder`].
     pub fn sort(&mut self, cells: &mut Cells<D>) {
         cells.assign(self.positions.each_ref().map(Vec::as_slice), &self.ids);
         cells.reorder_all(self.positions.iter_mut().chain(&mut self.velocities).chain([&mut self.masses]));
         self.ids.copy_from_slice(cells.ids());
     }
 
-    /// Velocity, then position (semi-implicit Euler): `v += a dt`, `x += v dt`.
+    /// Semi-implicit (symplectic) Euler: `v += a dt`, then `x += v dt`.
     ///
     /// # Panics
-    /// If `accelerations` are not one a particle.
+    /// If there is not one acceleration per particle.
     pub fn advance(&mut self, accelerations: &[Vec<f32>; D], seconds: f32) {
         let level = Level::new();
         for c in 0..D {
             assert_eq!(accelerations[c].len(), self.len(), "one acceleration a particle");
-            let positions = self.positions[c].par_chunks_mut(AT_ONCE);
-            let moving = positions.zip(self.velocities[c].par_chunks_mut(AT_ONCE));
-            moving.zip(accelerations[c].par_chunks(AT_ONCE)).for_each(|((positions, velocities), accelerations)| {
-                dispatch!(level, _simd => advance(positions, velocities, accelerations, seconds));
-            });
+            let positions = self.positions[c].par_chunks_mut(MIN_PARTICLES_PER_TASK);
+            let moving = positions.zip(self.velocities[c].par_chunks_mut(MIN_PARTICLES_PER_TASK));
+            moving.zip(accelerations[c].par_chunks(MIN_PARTICLES_PER_TASK)).for_each(
+                |((positions, velocities), accelerations)| {
+                    dispatch!(level, _simd => advance(positions, velocities, accelerations, seconds));
+                },
+            );
         }
     }
 }

@@ -1,45 +1,46 @@
-//! Sorts particles by the keys of their cells, each thread those of a range of keys.
+//! Parallel sort of particles by cell key: a sample sort that gives each thread a range of keys, and a radix sort within each
+//! range.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-/// Particles that one task takes at least.
-pub(super) const AT_ONCE: usize = 4096;
-/// Most bits sorted by in one pass.
+/// Least number of particles per task of the thread pool.
+pub(super) const MIN_PARTICLES_PER_TASK: usize = 4096;
+/// Most key bits per radix pass.
 const DIGIT_BITS: u32 = 11;
-/// Keys for each range that tell where ranges end, so that all have about as many particles.
+/// Sampled keys per range. Their quantiles split the keys into ranges of about equal size.
 const SAMPLES: usize = 64;
 
-/// A key and the index of the particle that it belongs to.
+/// A key and the index of its particle.
 type Entry = (u64, u32);
 
-/// A cell that holds particles: its key and its first particle.
+/// An occupied cell: its key and the index of its first particle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cell {
     pub(super) key: u64,
     pub(super) start: u32,
 }
 
-/// What sorting writes on the way, kept from step to step.
+/// Buffers of the sort, reused from step to step.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sorting {
+pub(super) struct SampleSort {
     entries: Vec<Entry>,
-    /// The sample that ends of ranges are taken from.
+    /// Sampled keys.
     sample: Vec<u64>,
-    ranges: Vec<SortedRange>,
+    ranges: Vec<KeyRange>,
 }
 
-/// The particles of a range of keys.
+/// The particles of one range of keys.
 #[derive(Clone, Debug, Default)]
-struct SortedRange {
+struct KeyRange {
     entries: Vec<Entry>,
-    spare: Vec<Entry>,
+    scratch: Vec<Entry>,
     cells: Vec<Cell>,
 }
 
-impl Sorting {
-    /// Sorts one particle an id, with keys of so many bits, by key and then by id: gives their indices in that order, and the cells.
+impl SampleSort {
+    /// Sorts particles by key (of `bits` bits), then by id. Writes their indices in that order, and the occupied cells.
     pub(super) fn sort(
         &mut self,
         key: impl Fn(usize) -> u64 + Sync,
@@ -47,10 +48,10 @@ impl Sorting {
         ids: &[u64],
         (order, cells): (&mut Vec<u32>, &mut Vec<Cell>),
     ) {
-        let all = (0..ids.len()).into_par_iter().with_min_len(AT_ONCE);
+        let all = (0..ids.len()).into_par_iter().with_min_len(MIN_PARTICLES_PER_TASK);
         all.map(|index| (key(index), index as u32)).collect_into_vec(&mut self.entries);
-        let count = rayon::current_num_threads().min(ids.len() / AT_ONCE).max(1);
-        self.ranges.resize_with(count, SortedRange::default);
+        let count = rayon::current_num_threads().min(ids.len() / MIN_PARTICLES_PER_TASK).max(1);
+        self.ranges.resize_with(count, KeyRange::default);
         let starts = self.starts_of_ranges();
         let Self { entries, ranges, .. } = self;
         ranges.par_iter_mut().enumerate().for_each(|(number, range)| {
@@ -58,18 +59,18 @@ impl Sorting {
             range.sort(bits, ids);
         });
         order.resize(ids.len(), 0);
-        let (mut rest, mut start, mut parts) = (order.as_mut_slice(), 0, Vec::with_capacity(count));
+        let (mut rest, mut start, mut slices) = (order.as_mut_slice(), 0, Vec::with_capacity(count));
         for range in ranges {
             let (own, others) = rest.split_at_mut(range.entries.len());
-            parts.push((own, start));
+            slices.push((own, start));
             (rest, start) = (others, start + range.entries.len() as u32);
         }
-        self.ranges.par_iter_mut().zip(parts).for_each(|(range, (order, start))| range.write(order, start));
+        self.ranges.par_iter_mut().zip(slices).for_each(|(range, (order, start))| range.write(order, start));
         cells.clear();
         self.ranges.iter().for_each(|range| cells.extend_from_slice(&range.cells));
     }
 
-    /// The least key of each range.
+    /// Least key of each range.
     fn starts_of_ranges(&mut self) -> Vec<u64> {
         let count = self.ranges.len();
         self.sample.clear();
@@ -81,8 +82,8 @@ impl Sorting {
     }
 }
 
-impl SortedRange {
-    /// Takes the particles with keys from `start` to before `end`.
+impl KeyRange {
+    /// Takes the particles with keys from `start` up to, not including, `end`.
     fn take(&mut self, all: &[Entry], start: u64, end: Option<u64>) {
         self.entries.clear();
         let last = end.map_or(u64::MAX, |end| end.wrapping_sub(1));
@@ -92,20 +93,20 @@ impl SortedRange {
 
     /// Sorts them by key, then by id.
     fn sort(&mut self, bits: u32, ids: &[u64]) {
-        let Self { entries, spare, .. } = self;
-        spare.resize(entries.len(), (0, 0));
+        let Self { entries, scratch, .. } = self;
+        scratch.resize(entries.len(), (0, 0));
         let passes = bits.div_ceil(DIGIT_BITS);
         for pass in 0..passes {
             let [from, to] = [pass, pass + 1].map(|pass| bits * pass / passes);
-            counting_pass(entries, spare, from..to);
-            std::mem::swap(entries, spare);
+            radix_pass(entries, scratch, from..to);
+            std::mem::swap(entries, scratch);
         }
         for cell in entries.chunk_by_mut(|a, b| a.0 == b.0).filter(|cell| cell.len() > 1) {
             cell.sort_unstable_by_key(|entry| ids[entry.1 as usize]);
         }
     }
 
-    /// Writes their indices in order, and lists the cells, the first of which begins at particle `start`.
+    /// Writes the sorted indices and lists the occupied cells; `start` is the index of the first particle.
     fn write(&mut self, order: &mut [u32], mut start: u32) {
         order.iter_mut().zip(&self.entries).for_each(|(index, entry)| *index = entry.1);
         self.cells.clear();
@@ -116,20 +117,20 @@ impl SortedRange {
     }
 }
 
-/// One stable pass of a radix sort, over some bits of the keys.
-fn counting_pass(from: &[Entry], to: &mut [Entry], bits: Range<u32>) {
-    let mut places = [0_u32; 1 << DIGIT_BITS];
+/// One stable counting pass of the radix sort, over some bits of the keys.
+fn radix_pass(from: &[Entry], to: &mut [Entry], bits: Range<u32>) {
+    let mut offsets = [0_u32; 1 << DIGIT_BITS];
     let mask = (1 << bits.len()) - 1;
     let digit = |key: u64| (key >> bits.start) as usize & mask;
-    from.iter().for_each(|entry| places[digit(entry.0)] += 1);
+    from.iter().for_each(|entry| offsets[digit(entry.0)] += 1);
     let mut sum = 0;
-    for place in &mut places[..=mask] {
-        sum += std::mem::replace(place, sum);
+    for offset in &mut offsets[..=mask] {
+        sum += std::mem::replace(offset, sum);
     }
     for entry in from {
-        let place = &mut places[digit(entry.0)];
-        to[*place as usize] = *entry;
-        *place += 1;
+        let offset = &mut offsets[digit(entry.0)];
+        to[*offset as usize] = *entry;
+        *offset += 1;
     }
 }
 
@@ -154,11 +155,11 @@ mod tests {
             for threads in [1, 2, 7] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("few threads");
                 let (mut order, mut cells) = (Vec::new(), Vec::new());
-                pool.install(|| Sorting::default().sort(key, 21, &ids, (&mut order, &mut cells)));
+                pool.install(|| SampleSort::default().sort(key, 21, &ids, (&mut order, &mut cells)));
                 assert!(order == expected, "{most} keys, {threads} threads");
-                let firsts = (0..50_000).filter(|place| {
-                    let key = |place: u32| key(expected[place as usize] as usize);
-                    *place == 0 || key(*place) != key(place - 1)
+                let firsts = (0..50_000).filter(|offset| {
+                    let key = |offset: u32| key(expected[offset as usize] as usize);
+                    *offset == 0 || key(*offset) != key(offset - 1)
                 });
                 assert!(cells.iter().map(|cell| cell.start).eq(firsts), "{most} keys, {threads} threads");
                 assert!(cells.iter().all(|cell| cell.key == key(expected[cell.start as usize] as usize)));

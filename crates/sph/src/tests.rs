@@ -11,12 +11,12 @@ fn cloud<const D: usize>(count: u64, half_width: f32) -> Particles<D> {
     let key = Key::new(7, "cloud");
     let mut particles = Particles::default();
     for id in 0..count {
-        let place = key.uniforms(id, 0, Purpose(1));
+        let uniforms = key.uniforms(id, 0, Purpose(1));
         let velocity = key.uniforms(id, 0, Purpose(2));
         let width = if id % 5 == 0 { 0.3 * half_width } else { half_width };
-        let position = std::array::from_fn(|c| width * (2.0 * place[c] - 1.0));
+        let position = std::array::from_fn(|c| width * (2.0 * uniforms[c] - 1.0));
         let velocity = std::array::from_fn(|c| 2.0 * velocity[c] - 1.0);
-        particles.push(position, velocity, 0.5 + place[3], 1000 + id);
+        particles.push(position, velocity, 0.5 + uniforms[3], 1000 + id);
     }
     particles
 }
@@ -38,10 +38,10 @@ fn evaluate<const D: usize>(
     shapes: [KernelShape; 2],
 ) -> (Vec<f32>, [Vec<f32>; D]) {
     let (mut density, mut acceleration) = (Vec::new(), std::array::from_fn(|_| Vec::new()));
-    densities(cells, shapes[0], &particles.masses, &mut density);
+    compute_densities(cells, shapes[0], &particles.masses, &mut density);
     let pressure: Vec<f32> = density.iter().map(|density| 3.0 * density).collect();
     let mut force = PressureForce::new(shapes[1]);
-    force.accelerations(cells, &particles.masses, &density, &pressure, &mut acceleration);
+    force.compute_accelerations(cells, &particles.masses, &density, &pressure, &mut acceleration);
     (density, acceleration)
 }
 
@@ -64,7 +64,7 @@ fn all_pairs<const D: usize>(
         near(i).filter(|j| *j != i).fold([0.0; D], |sum, j| {
             let push = 3.0 * (density[i] + density[j]) / (2.0 * density[i] * density[j]);
             let r = distance(i, j);
-            let factor = -mass(j) * push * f64::from(slope.slope(r as f32)) / r;
+            let factor = -mass(j) * push * f64::from(slope.derivative(r as f32)) / r;
             std::array::from_fn(|c| sum[c] + factor * offset(i, j)[c])
         })
     };
@@ -142,8 +142,9 @@ fn neither_threads_nor_the_order_given_change_a_bit() {
     let given = cloud::<3>(3000, 1.0);
     let mut turned = Particles::default();
     for i in (0..given.len()).map(|i| i * 1271 % given.len()) {
-        let (place, velocity) = (given.positions.each_ref().map(|x| x[i]), given.velocities.each_ref().map(|v| v[i]));
-        turned.push(place, velocity, given.masses[i], given.ids[i]);
+        let (uniforms, velocity) =
+            (given.positions.each_ref().map(|x| x[i]), given.velocities.each_ref().map(|v| v[i]));
+        turned.push(uniforms, velocity, given.masses[i], given.ids[i]);
     }
     let reference = bits(given.clone());
     assert_eq!(reference, bits(turned));
@@ -176,7 +177,7 @@ fn lattice_density<const D: usize>(side: usize, support: f32, kernel: KernelShap
     let (mut particles, mut cells) = (lattice::<D>(side), Cells::new(support));
     particles.sort(&mut cells);
     let mut density = Vec::new();
-    densities(&cells, kernel, &particles.masses, &mut density);
+    compute_densities(&cells, kernel, &particles.masses, &mut density);
     let middle = |i: &usize| particles.positions.iter().all(|x| x[*i] == (side / 2) as f32);
     density[(0..particles.len()).find(middle).unwrap()]
 }
@@ -220,9 +221,9 @@ fn step<const D: usize>(
 ) {
     let (mut density, mut acceleration) = (Vec::new(), std::array::from_fn(|_| Vec::new()));
     particles.sort(cells);
-    densities(cells, KernelShape::Poly6, &particles.masses, &mut density);
+    compute_densities(cells, KernelShape::Poly6, &particles.masses, &mut density);
     let pressure: Vec<f32> = density.iter().map(|density| state.pressure(2.0, *density)).collect();
-    force.accelerations(cells, &particles.masses, &density, &pressure, &mut acceleration);
+    force.compute_accelerations(cells, &particles.masses, &density, &pressure, &mut acceleration);
     particles.advance(&acceleration, 2e-3);
 }
 
@@ -231,7 +232,7 @@ fn a_pressed_lattice_moves_from_its_surface_inward_and_not_before() {
     let (mut particles, mut cells) = (lattice::<2>(25), Cells::new(2.5));
     let before = particles.positions.clone();
     let mut force = PressureForce::new(KernelShape::Spiky);
-    let state = StateEquation { rest_density: 0.0, tension: false };
+    let state = StateEquation { rest_density: 0.0, negative_pressure: false };
     // A step carries news by less than two support radii: after two the middle has heard nothing.
     (0..2).for_each(|_| step(&mut particles, &mut cells, &mut force, state));
     for i in 0..particles.len() {
@@ -251,8 +252,8 @@ fn the_middle_of_a_lattice_under_pressure_rests_until_sound_arrives() {
     let (mut particles, mut cells) = (lattice::<2>(side), Cells::new(2.5));
     let mut force = PressureForce::new(KernelShape::Spiky);
     // Denser than at rest by a tenth: every particle is pushed from all sides, and only the surface has nobody on the other.
-    let state = StateEquation { rest_density: 0.9, tension: false };
-    let centre = 0.5 * (side - 1) as f32;
+    let state = StateEquation { rest_density: 0.9, negative_pressure: false };
+    let center = 0.5 * (side - 1) as f32;
     let mut arrived = 0.0_f32;
     for steps in 1..=600 {
         step(&mut particles, &mut cells, &mut force, state);
@@ -260,8 +261,8 @@ fn the_middle_of_a_lattice_under_pressure_rests_until_sound_arrives() {
         let reached = 2.0_f32.sqrt() * 2e-3 * steps as f32 + 2.5;
         for i in 0..particles.len() {
             let id = particles.ids[i] as usize;
-            let depth = (centre
-                - [id % side, id / side].map(|x| (x as f32 - centre).abs()).into_iter().fold(0.0, f32::max))
+            let depth = (center
+                - [id % side, id / side].map(|x| (x as f32 - center).abs()).into_iter().fold(0.0, f32::max))
             .max(0.0);
             let speed = particles.velocities.iter().map(|v| v[i] * v[i]).sum::<f32>().sqrt();
             assert!(depth < reached + 5.0 || speed < 1e-4, "{depth} deep it moves at {speed} after {steps} steps");
@@ -273,7 +274,7 @@ fn the_middle_of_a_lattice_under_pressure_rests_until_sound_arrives() {
     assert!(arrived > 0.02, "the surface gives way: {arrived}");
 }
 
-/// Total momentum, total of `m |v|`, and centre of mass.
+/// Total momentum, total of `m |v|`, and center of mass.
 fn totals<const D: usize>(particles: &Particles<D>) -> ([f64; D], f64, [f64; D]) {
     let sum =
         |f: &dyn Fn(usize) -> f64| (0..particles.len()).map(|i| f64::from(particles.masses[i]) * f(i)).sum::<f64>();
@@ -289,9 +290,9 @@ fn totals<const D: usize>(particles: &Particles<D>) -> ([f64; D], f64, [f64; D])
 fn keeps_momentum<const D: usize>() {
     let (mut particles, mut cells) = (cloud::<D>(500, 0.5), Cells::new(0.3));
     let mut force = PressureForce::new(KernelShape::Spiky);
-    let state = StateEquation { rest_density: 0.0, tension: false };
+    let state = StateEquation { rest_density: 0.0, negative_pressure: false };
     let mass: f64 = particles.masses.iter().map(|mass| f64::from(*mass)).sum();
-    let (momentum, _, centre) = totals(&particles);
+    let (momentum, _, center) = totals(&particles);
     let mut worst = 0.0_f64;
     for _ in 0..1000 {
         step(&mut particles, &mut cells, &mut force, state);
@@ -301,13 +302,13 @@ fn keeps_momentum<const D: usize>() {
     assert!(worst < 1e-6, "momentum drifts by {worst}");
     let (_, scale, now) = totals(&particles);
     for c in 0..D {
-        let straight = centre[c] + momentum[c] / mass * 2.0;
+        let straight = center[c] + momentum[c] / mass * 2.0;
         assert!((now[c] - straight).abs() < 1e-6 * scale / mass * 2.0 + 1e-6, "{} {straight}", now[c]);
     }
 }
 
 #[test]
-fn a_free_cloud_keeps_its_momentum_and_its_centre_moves_straight() {
+fn a_free_cloud_keeps_its_momentum_and_its_center_moves_straight() {
     keeps_momentum::<2>();
     keeps_momentum::<3>();
 }
@@ -325,7 +326,7 @@ fn coincident_particles_part_in_opposite_directions() {
     let strength = acceleration.iter().map(|a| a[0] * a[0]).sum::<f32>().sqrt();
     let kernel = Kernel::<3>::new(KernelShape::Spiky, 0.5);
     let density = 2.0 * Kernel::<3>::new(KernelShape::Poly6, 0.5).value(0.0);
-    let expected = -3.0 / density * kernel.slope(1e-7);
+    let expected = -3.0 / density * kernel.derivative(1e-7);
     assert!((strength / expected - 1.0).abs() < 1e-3, "{strength} {expected}");
     for c in 0..3 {
         assert_eq!(acceleration[c][0], -acceleration[c][1]);
@@ -343,7 +344,7 @@ fn particles_may_be_anywhere() {
     let mut cells = Cells::new(1.0);
     particles.sort(&mut cells);
     let mut density = Vec::new();
-    densities(&cells, KernelShape::Poly6, &particles.masses, &mut density);
+    compute_densities(&cells, KernelShape::Poly6, &particles.masses, &mut density);
     let alone = Kernel::<3>::new(KernelShape::Poly6, 1.0).value(0.0);
     let of = |id: u64| density[particles.ids.iter().position(|other| *other == id).unwrap()];
     assert_eq!((of(0), of(8)), (alone, alone));
@@ -400,11 +401,11 @@ fn sums_change_nothing_of_the_sums_after_them() {
     let accelerations = |cells: &Cells<3>| -> [Vec<f32>; 3] {
         let mut results = std::array::from_fn(|_| Vec::new());
         let mut force = PressureForce::new(SHAPES[1]);
-        force.accelerations(cells, &particles.masses, &density, &pressure, &mut results);
+        force.compute_accelerations(cells, &particles.masses, &density, &pressure, &mut results);
         results
     };
     let before = accelerations(&cells);
-    densities(&cells, SHAPES[0], &particles.masses, &mut Vec::new());
+    compute_densities(&cells, SHAPES[0], &particles.masses, &mut Vec::new());
     assert!(before == accelerations(&cells) && before[0].iter().any(|a| a.abs() > 1.0));
 }
 

@@ -4,7 +4,7 @@ use bansho_base::math::{self, MulAdd};
 
 use super::AuroraParticles;
 use crate::{AuroraParameters, RepulsionKernel, shapes::FRAME_S, simulate::field::sheet_field::Field};
-use bansho_sph::{Cells, KernelShape, PressureForce, StateEquation, densities};
+use bansho_sph::{Cells, KernelShape, PressureForce, StateEquation, compute_densities};
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
@@ -70,16 +70,16 @@ impl Repulsion {
         particles.sort(&mut self.cells);
         let level = Level::new();
         dispatch!(level, _simd => masses_of(&particles.fades, &mut self.masses));
-        densities(&self.cells, self.density_kernel, &self.masses, &mut self.densities);
+        compute_densities(&self.cells, self.density_kernel, &self.masses, &mut self.densities);
         // To itself a particle is all there: one that is just appearing would be next to weightless, and be flung away.
-        let whole = self.density_kernel.at_centre::<2>(self.cells.support_radius());
-        let state = StateEquation { rest_density: rest_density as f32, tension: true };
+        let whole = self.density_kernel.at_center::<2>(self.cells.support_radius());
+        let state = StateEquation { rest_density: rest_density as f32, negative_pressure: true };
         let Self { masses, densities, pressures, stiffness, .. } = self;
         dispatch!(level, _simd => complete(densities, masses, whole));
         pressures.clear();
         pressures.extend(densities.iter().map(|density| state.pressure(*stiffness, *density)));
         let (cells, masses) = (&self.cells, &self.masses);
-        self.force.accelerations(cells, masses, &self.densities, &self.pressures, &mut self.accelerations);
+        self.force.compute_accelerations(cells, masses, &self.densities, &self.pressures, &mut self.accelerations);
         let count = self.densities.len().max(1) as f64;
         let mean = self.densities.iter().map(|density| f64::from(*density)).sum::<f64>() / count;
         support_km + FOLLOWING * (self.support_km(mean) - support_km)

@@ -1,4 +1,4 @@
-//! A plume of gas in closed form, to draw without simulating it.
+//! A plume of particles in closed form, to be drawn without simulation.
 
 use bansho_base::math::{self, DVec3};
 
@@ -14,18 +14,15 @@ pub(crate) fn plume(count: usize, height: f64, t: f64) -> Particles {
     let last = (t * rate).floor() as i64;
     // The plume is about a twentieth of its height cubed.
     let volume = 0.05 * height * height * height / count as f64;
-    for birth in (last - count as i64 + 1).max(0)..=last {
-        particles.push(particle(birth as u64, t - birth as f64 / rate, t, height, volume));
+    for id in (last - count as i64 + 1).max(0)..=last {
+        particles.push(particle(id as u64, t - id as f64 / rate, t, height, volume));
     }
     particles
 }
 
-fn particle(birth: u64, age: f64, t: f64, height: f64, volume: f64) -> Particle {
-    let random = bansho_base::math::random::Key::new(1, "plume").uniforms(
-        birth,
-        0,
-        bansho_base::math::random::Purpose::named("p"),
-    );
+fn particle(id: u64, age: f64, t: f64, height: f64, volume: f64) -> Particle {
+    let random =
+        bansho_base::math::random::Key::new(1, "plume").uniforms(id, 0, bansho_base::math::random::Purpose::named("p"));
     let [u, v, ..] = random.map(f64::from);
     let share = (age / LIFE).clamp(0.0, 1.0);
     let y = height * (0.35 * share + 0.65 * share * share);
@@ -35,20 +32,20 @@ fn particle(birth: u64, age: f64, t: f64, height: f64, volume: f64) -> Particle 
     let sway = |phase: f64| {
         0.10 * height * share * math::sin(std::f64::consts::TAU * (1.4 * (t - age) + 1.3 * y / height) + phase)
     };
-    let place = [disc * cos + sway(0.0 + 2.0 * u), y, disc * sin + sway(1.7 + 2.0 * v)];
+    let position = [disc * cos + sway(0.0 + 2.0 * u), y, disc * sin + sway(1.7 + 2.0 * v)];
     let hot = math::smoothstep(0.0, 0.15, share) * (1.0 - 0.35 * math::smoothstep(0.4, 1.0, share));
     let edge = math::sqrt(v) * 0.15;
     let soot = 1.5e-6 * math::smoothstep(0.05, 0.35, share) * (1.0 - math::smoothstep(0.55 - edge, 1.0 - edge, share));
     Particle {
-        birth,
-        position: place.map(|value| value as f32),
+        id,
+        position: position.map(|value| value as f32),
         velocity: [0.0, speed as f32, 0.0],
         mass: (DENSITY * volume) as f32,
         density: DENSITY as f32,
         temperature: (300.0 + 1650.0 * hot) as f32,
         support_radius: (2.2 * math::cbrt(volume)) as f32,
         age: age as f32,
-        life: LIFE as f32,
+        max_age: LIFE as f32,
         fuel: (1.0 - 3.0 * share).max(0.0) as f32,
         soot: soot as f32,
     }

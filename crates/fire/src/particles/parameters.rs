@@ -1,11 +1,10 @@
-//! What a scene says of a particle flame. Symbols and equation numbers are those of Inagaki et al.
+//! Parameters of the particle flame. Symbols and equation numbers are those of Inagaki et al.
 
+use crate::sparks::SparkParameters;
 use bansho_base::parameters::{AssetPath, Auto, Length, Range, animated::Animated};
-
-use super::render::LookParameters;
 use bansho_sph::KernelShape;
 
-const SHARE: Range = Range::new(0.0, 1.0);
+const FRACTION: Range = Range::new(0.0, 1.0);
 const LENGTH: Range = Range::new(1e-3, 1e4);
 const KELVIN: Range = Range::new(250.0, 4000.0);
 
@@ -83,7 +82,7 @@ bansho_base::parameters! {
         /// Temperature of the gas at birth.
         temperature_k: f64 = 1150.0, limits(KELVIN), unit("K");
         /// How much of the gas flows, over time: 0 shuts the burner.
-        flow: Animated<f64> = Animated::from(1.0), limits(SHARE);
+        flow: Animated<f64> = Animated::from(1.0), limits(FRACTION);
     }
 }
 
@@ -102,9 +101,9 @@ bansho_base::parameters! {
         /// Pressure of thin gas, eq. (11).
         tension: Tension = Tension::Clamped;
         /// How far neighbours even out their velocities in a hundredth of a second; 0 is the paper's Euler equation, eq. (1).
-        viscosity: f64 = 0.12, limits(SHARE);
+        viscosity: f64 = 0.12, limits(FRACTION);
         /// How far neighbours even out temperature in a hundredth of a second.
-        conduction: f64 = 0.08, limits(SHARE);
+        conduction: f64 = 0.08, limits(FRACTION);
         /// Sub-steps that a step is cut into at most. Gas that would need more keeps its time and gives way more easily.
         sub_steps: i64 = 3, limits(Range::new(1.0, 100.0));
     }
@@ -120,9 +119,9 @@ bansho_base::parameters! {
         /// Scale of the wind's effect; for `wind = "per_volume"` force per volume and wind speed, in N s/m^4.
         wind_gain: f64 = 1.0, limits(Range::new(0.0, 100.0));
         /// Entrainment coefficient: speed at which air enters the gas, as a share of the speed between them; slows, dilutes and cools it.
-        entrainment: f64 = 0.12, limits(SHARE);
+        entrainment: f64 = 0.12, limits(FRACTION);
         /// How far rising gas that grows faster grows narrower too; 1 keeps its volume.
-        narrowing: f64 = 0.9, limits(SHARE);
+        narrowing: f64 = 0.9, limits(FRACTION);
         /// Strength of the vortex rings that the fire sheds as it breathes; 1 is usual, 0 is a fire that does not puff.
         puffing: f64 = 1.0, limits(Range::new(0.0, 5.0));
         /// How often it sheds them; `"auto"` is `1.5 / sqrt(D)` Hz (Cetegen and Ahmed 1993).
@@ -145,11 +144,11 @@ bansho_base::parameters! {
         heating_s: f64 = 0.03, limits(Range::new(1e-3, 10.0)), unit("s");
         /// How much of the fuel's burning waits for air: 0 burns all gas alike, 1 burns what lies outside first, so that flames
         /// narrow upward.
-        air_hunger: f64 = 0.75, limits(SHARE);
+        air_hunger: f64 = 0.75, limits(FRACTION);
         /// Volume fraction of soot that forms in burning gas, in parts per million.
         soot_ppm: f64 = 1.2, limits(Range::new(0.0, 100.0)), unit("1e-6");
         /// Share of the soot that does not burn in the flame and leaves it as smoke.
-        smoke: f64 = 0.0, limits(SHARE);
+        smoke: f64 = 0.0, limits(FRACTION);
         /// Strength of cooling by the soot's own radiation; 1 is physical.
         radiation: f64 = 0.3, limits(Range::new(0.0, 10.0));
         /// How long burnt gas stays after its fuel is gone, unless it leaves the domain.
@@ -184,5 +183,59 @@ bansho_base::parameters! {
         step_s: f64 = 1.0 / 120.0, limits(Range::new(1e-4, 0.05)), unit("s");
         /// How long it burns before the shot; `"auto"` until the flame is developed.
         preroll_s: Auto<f64> = Auto::Auto, limits(Range::new(0.0, 600.0)), unit("s");
+    }
+}
+
+bansho_base::choice! {
+    /// What becomes of a particle in the picture.
+    pub enum SpriteStyle {
+        /// What a ray sees of its ball: sums are the exact line integrals of the gas, so that light and opacity follow from its soot.
+        Integral = "integral",
+        /// The paper's: poly6 itself, times the colour of a black body, added; opacity from density.
+        Poly6 = "poly6",
+        /// The paper's figure 7: a square, the redder the denser the gas.
+        Squares = "squares",
+    }
+}
+
+bansho_base::parameters! {
+    /// How the gas is drawn.
+    pub struct LookParameters {
+        /// What becomes of a particle: exact line integrals, the paper's sprites, or squares that show the density.
+        sprite: SpriteStyle = SpriteStyle::Integral;
+        /// How strongly soot absorbs, and so shines, beside what its volume fraction gives.
+        soot_gain: f64 = 1.0, limits(Range::new(0.0, 1000.0));
+        /// How unevenly gas finer than the particles burns: 0 is the smooth sum of the particles alone. The mean light stays.
+        detail: f64 = 0.85, limits(FRACTION);
+        /// Size of that detail, in support radii.
+        detail_size: f64 = 0.9, limits(Range::new(0.05, 20.0));
+        /// How crisp the edges of burning gas are.
+        sharpness: f64 = 0.7, limits(FRACTION);
+        /// Speed of gas that draws detail as it is; faster gas stretches it along its way.
+        detail_speed: Auto<f64> = Auto::Auto, limits(Range::new(0.01, 1000.0)), unit("m/s");
+        /// Light of the thin blue zone where fresh gas begins to burn.
+        base_blue: f64 = 1.0, limits(Range::new(0.0, 1000.0));
+        /// Opacity of the centre of a poly6 sprite in gas of mean density.
+        opacity: f64 = 0.06, limits(FRACTION);
+        /// Side of the squares of `sprite = "squares"`, in support radii.
+        square_size: f64 = 0.25, limits(Range::new(0.001, 10.0));
+        /// Share of the light of others that soot scatters on rather than takes away: what makes smoke visible.
+        smoke_albedo: f64 = 0.3, limits(FRACTION);
+        /// How strongly hot gas bends the light of what lies behind; 1 is physical, 0 leaves it straight.
+        haze_gain: f64 = 1.0, limits(Range::new(0.0, 1000.0));
+        /// Sparks.
+        sparks: SparkParameters = SparkParameters::default();
+        /// Light on others.
+        light: GasLightParameters = GasLightParameters::default();
+    }
+}
+
+bansho_base::parameters! {
+    /// The light that the flame throws on others; follows what the gas radiates at each moment.
+    pub struct GasLightParameters {
+        /// Scale of that light; 0 for none.
+        scale: f64 = 1.0, limits(Range::new(0.0, 1000.0));
+        /// How many point lights stand along the flame.
+        count: i64 = 3, limits(Range::new(1.0, 16.0));
     }
 }

@@ -23,13 +23,13 @@ use bansho_base::{
 use super::{
     fault::{ParticleFault, ParticleFaultKind},
     parameters::{FlameParticlesParameters, TemperatureLaw},
-    render::{self, Ending, Gas, Memory, PreparedGas, SpriteStyle},
+    render::{self, FadeOut, Gas, PreparedGas, ScratchPool, SpriteStyle},
 };
 use crate::particles::simulate::{
+    Simulation,
     burner::Burner,
-    derived::{Design, check_count},
+    derived::{DerivedConstants, check_particle_count},
     particles::Particles,
-    simulation::Simulation,
     snapshot,
 };
 
@@ -44,8 +44,8 @@ pub struct FlameParticles {
     time: f64,
     /// Temperature of the air at the last step, K.
     air_temperature_k: f64,
-    /// What it draws with.
-    memory: Memory,
+    /// Scratch memory of the renderer.
+    scratch: ScratchPool,
 }
 
 impl FlameParticles {
@@ -65,15 +65,15 @@ impl FlameParticles {
         }
         constructions::count("flame_particles");
         let key = Key::new(seed, name);
-        let design = Design::new(&parameters, loop_s, assets)?;
-        let steps = (design.preroll / parameters.step_s).round();
+        let constants = DerivedConstants::new(&parameters, loop_s, assets)?;
+        let steps = (constants.preroll / parameters.step_s).round();
         Ok(Self {
             name: name.to_owned(),
             key,
             time: -steps * parameters.step_s,
             air_temperature_k: bansho_base::world::air::Air::default().temperature_k,
-            simulation: Simulation::new(&parameters, design, key),
-            memory: Memory::default(),
+            simulation: Simulation::new(&parameters, constants, key),
+            scratch: ScratchPool::default(),
             parameters,
         })
     }
@@ -83,10 +83,10 @@ impl FlameParticles {
         &self.simulation.particles
     }
 
-    /// The gas as the drawing sees it.
+    /// The gas as the renderer sees it.
     fn gas(&self) -> Gas<'_> {
         let tallest = self.tallest();
-        let place = DVec3::from(self.parameters.position) + tallest.position(self.time);
+        let position = DVec3::from(self.parameters.position) + tallest.position(self.time);
         Gas {
             particles: &self.simulation.particles,
             time: self.time,
@@ -95,30 +95,30 @@ impl FlameParticles {
                 Auto::Set(speed) => speed,
                 Auto::Auto => UNSTRETCHED * tallest.axis_speed(0.5 * tallest.height),
             },
-            base: place,
+            base: position,
             size: DVec2::new(tallest.diameter, tallest.height),
             key: self.key,
-            ending: self.ending(),
-            memory: &self.memory,
+            fade_out: self.fade_out(),
+            scratch: &self.scratch,
         }
     }
 
-    fn ending(&self) -> Ending {
-        /// Share of the time that burnt gas stays.
+    fn fade_out(&self) -> FadeOut {
+        /// Duration of the fade-out as a fraction of the afterlife.
         const FADING: f64 = 0.2;
         let seconds = (FADING * self.parameters.life.afterlife_s).max(self.parameters.step_s) as f32;
-        Ending { seconds, domain: self.simulation.design.domain.map(|corner| corner.as_vec3()) }
+        FadeOut { seconds, domain: self.simulation.constants.domain.map(|corner| corner.as_vec3()) }
     }
 
     fn tallest(&self) -> &Burner {
-        let burners = &self.simulation.design.burners;
-        // A design has at least one burner.
+        let burners = &self.simulation.constants.burners;
+        // There is at least one burner.
         let taller = |a: &&Burner, b: &&Burner| a.height.total_cmp(&b.height);
         burners.iter().max_by(taller).unwrap_or(&burners[0])
     }
 }
 
-/// Makes what is keyed repeat.
+/// Makes animated values repeat with the loop.
 fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result<(), ParticleFault> {
     match parameters.close_loop(seconds) {
         Some(key) => Err(ParticleFault { key, kind: ParticleFaultKind::LoopJumps { seconds } }),
@@ -126,7 +126,7 @@ fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result
     }
 }
 
-/// Speed of gas that draws its detail as it is, beside that of gas half way up.
+/// Speed of gas with isotropic detail, relative to gas half way up the flame.
 const UNSTRETCHED: f64 = 0.35;
 
 impl Describe for FlameParticlesParameters {
@@ -146,7 +146,7 @@ impl Describe for FlameParticlesParameters {
         wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";
 
     fn check_particle_budget(&self, others: i64) -> Result<i64, BuildError> {
-        check_count(self.particles, others).map_err(|fault| BuildError::new(fault.key, fault.kind))?;
+        check_particle_count(self.particles, others).map_err(|fault| BuildError::new(fault.key, fault.kind))?;
         Ok(self.particles + others)
     }
 
@@ -163,13 +163,13 @@ impl Describe for FlameParticlesParameters {
 
 impl Phenomenon for FlameParticles {
     fn info(&self) -> PhenomenonInfo<'_> {
-        let Design { preroll, dissolve, .. } = *self.simulation.design;
+        let DerivedConstants { preroll, dissolve, .. } = *self.simulation.constants;
         let stepping = Stepping { step: self.parameters.step_s, preroll, dissolve };
         PhenomenonInfo { aovs: render::AOVS, stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 
     fn luminance(&self) -> f64 {
-        /// Bright parts beside a whole flame of the hottest soot.
+        /// Mean of bright parts relative to a whole flame of the hottest soot.
         const BRIGHT: f64 = 0.09;
         let hottest = match self.parameters.life.temperature {
             TemperatureLaw::Living => self.parameters.life.flame_temperature_k,
@@ -185,7 +185,7 @@ impl Phenomenon for FlameParticles {
     }
 
     fn remark(&self, neighbors: &Neighbours) -> Option<Remark> {
-        let burners = &self.simulation.design.burners;
+        let burners = &self.simulation.constants.burners;
         let gives = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
         if !burners.iter().any(gives) {
             return Some(Remark::new("none of its burners gives gas; a `flow` above 0 would"));
@@ -193,7 +193,7 @@ impl Phenomenon for FlameParticles {
         let origin = DVec3::from(self.parameters.position);
         let is_buried = |burner: &Burner| {
             let within = |birth: u64| {
-                let place = origin + burner.birthplace(self.simulation.key, birth, 0.0).position;
+                let place = origin + burner.spawn_point(self.simulation.key, birth, 0.0).position;
                 neighbors.occluders().any(|occluder| occluder.signed_distance(place) < 0.0)
             };
             // As many births as show it.
@@ -213,7 +213,7 @@ impl Phenomenon for FlameParticles {
 
 impl Run for FlameParticles {
     fn publish(&self, shutter: Shutter) -> Publication {
-        let lights = render::luminous(&self.gas(), &self.parameters.look, shutter.middle());
+        let lights = render::point_lights_of_gas(&self.gas(), &self.parameters.look, shutter.middle());
         Publication { lights, ..Publication::default() }
     }
 
@@ -234,7 +234,7 @@ impl Run for FlameParticles {
         let gas = self.gas();
         let Particles { velocity: [u, v, w], temperature, density, .. } = gas.particles;
         Some(PointCloud {
-            positions: (0..gas.particles.len()).map(|index| gas.place(index, t).as_vec3().to_array()).collect(),
+            positions: (0..gas.particles.len()).map(|index| gas.position(index, t).as_vec3().to_array()).collect(),
             velocities: u.iter().zip(v).zip(w).map(|((u, v), w)| [*u, *v, *w]).collect(),
             quantities: [(Quantity::Temperature, temperature.clone()), (Quantity::Density, density.clone())].into(),
         })
@@ -268,7 +268,7 @@ impl Stepped for FlameParticles {
         if !time.is_finite() || !air.is_finite() {
             return Err(SnapshotError::Damaged);
         }
-        let burners = self.simulation.design.burners.len();
+        let burners = self.simulation.constants.burners.len();
         self.simulation.particles = snapshot::read(&self.simulation.particles, rest, burners)?;
         (self.time, self.air_temperature_k) = (time, air);
         Ok(())

@@ -1,7 +1,7 @@
-//! The paper's chain for one point, a function a row, numbered as in Ohshima & Itahashi.
+//! The paper's equations for one point, one function each, numbered as in Ohshima and Itahashi.
 //!
-//! Values of the artist's curves come in as numbers, so that the same functions serve look-up tables sixteen at a time and
-//! hand-worked tests. Nothing here branches on data or computes an elementary function beyond a square root.
+//! Values of the user's curves are arguments, so that the same functions serve SIMD batches with curve tables and hand-worked
+//! tests. Nothing branches on data or evaluates an elementary function beyond a square root.
 
 pub use bansho_base::math::simd::Real;
 
@@ -17,21 +17,21 @@ pub fn axis_distance<N: Real>(x: N) -> N {
     (x.broadcast(2.0) * (x - x.broadcast(0.5))).simd_abs()
 }
 
-/// How far into the fringe a point lies, `(x' - A) / D` of eq. (11), held to [0, 1].
+/// Position within the fringe, `(x' - A) / D` of eq. (11), clamped to [0, 1].
 ///
-/// Where the fringe has no width it is 0 up to `A` and 1 beyond, so nothing is divided by zero.
+/// Where the fringe has zero width it is 0 up to `A` and 1 beyond, without a division by zero.
 #[inline(always)]
-pub fn fringe_place<N: Real>(distance: N, core_width: N, fringe_width: N) -> N {
-    const NARROWEST: f32 = 1e-6;
-    ((distance - core_width) / fringe_width.simd_max(distance.broadcast(NARROWEST))).simd_clamp01()
+pub fn fringe_position<N: Real>(distance: N, core_width: N, fringe_width: N) -> N {
+    const MIN_FRINGE_WIDTH: f32 = 1e-6;
+    ((distance - core_width) / fringe_width.simd_max(distance.broadcast(MIN_FRINGE_WIDTH))).simd_clamp01()
 }
 
-/// Speed profile `K = h + (1-h) F`, eq. (11), from `falling` = F((x'-A)/D).
+/// Speed profile `K = h + (1-h) F`, eq. (11), from `falloff` = F((x'-A)/D).
 ///
 /// F(0) = 1 gives K = 1 in the core and F(1) = 0 gives K = h beyond the fringe, where the paper leaves K open.
 #[inline(always)]
-pub fn speed_profile<N: Real>(falling: N, edge_speed: f32) -> N {
-    falling.broadcast(1.0 - edge_speed).fma(falling, falling.broadcast(edge_speed))
+pub fn speed_profile<N: Real>(falloff: N, edge_speed: f32) -> N {
+    falloff.broadcast(1.0 - edge_speed).fma(falloff, falloff.broadcast(edge_speed))
 }
 
 /// Slowed rise `w = w_p / K`, eq. (12). Above 1 lies outside the flame.
@@ -46,7 +46,7 @@ pub fn fluttering_edge<N: Real>(core_width: N, fringe_width: N, flutter: N) -> N
     fringe_width.fma(flutter, core_width)
 }
 
-/// Place across the flame `u' = x'/E`, eq. (16): 0 on the axis, 1 at the fluttering edge, more outside.
+/// Normalized distance from the axis `u' = x'/E`, eq. (16): 0 on the axis, 1 at the fluttering edge, more outside.
 #[inline(always)]
 pub fn across<N: Real>(distance: N, edge: N) -> N {
     distance / edge
@@ -90,7 +90,7 @@ mod tests {
     #[test]
     fn speed_profile_11_falls_from_1_in_the_core_to_h_beyond_the_fringe() {
         // A = 1/2, D = 1/4, F(s) = 1 - s, h = 1/5.
-        let speed = |distance| speed_profile(1.0 - fringe_place(distance, 0.5, 0.25), 0.2);
+        let speed = |distance| speed_profile(1.0 - fringe_position(distance, 0.5, 0.25), 0.2);
         assert_eq!((speed(0.3), speed(0.5)), (1.0, 1.0));
         assert!((speed(0.625) - 0.6).abs() < 1e-6);
         assert!((speed(0.75) - 0.2).abs() < 1e-6 && (speed(1.0) - 0.2).abs() < 1e-6);
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn a_fringe_without_width_divides_by_nothing() {
-        assert_eq!([0.4, 0.5, 0.6].map(|distance| fringe_place(distance, 0.5, 0.0)), [0.0, 0.0, 1.0]);
+        assert_eq!([0.4, 0.5, 0.6].map(|distance| fringe_position(distance, 0.5, 0.0)), [0.0, 0.0, 1.0]);
     }
 
     #[test]

@@ -1,9 +1,43 @@
-//! The flame sheet: a small, near flame from a scrolling two-dimensional texture.
+//! Flame sheet: a small, near flame (candle, torch, hearth, campfire) as a scrolling texture on an upright rectangle.
 //!
-//! T. Ohshima and S. Itahashi, "Easy representation of flame by using 2-dimensional texture". A monochrome texture scrolls up
-//! behind an upright rectangle; it is cut by a threshold that rises with height, sharpened and coloured, and the rectangle's
-//! coordinates are warped so that the gas accelerates and its edges flutter. Nothing is simulated: any moment is a function of
-//! time alone. [`equations`] holds the paper's equations one by one; the rest turns them into pictures quickly.
+//! # Model
+//! A monochrome texture scrolls upward behind a rectangle. A threshold that rises with height cuts it; then it is sharpened and colored. The
+//! coordinates of the rectangle are warped so that the gas accelerates and its edges flutter. Nothing is simulated: any frame is a function
+//! of time alone. Lengths are in meters, speeds of the texture in sheet heights per second, luminance in cd/m^2.
+//!
+//! # References
+//! - T. Ohshima and S. Itahashi, "Easy representation of flame by using 2-dimensional texture" (in Japanese). Equation numbers are theirs.
+//! - K. Perlin, "An image synthesizer" (1985) and "Improving noise" (2002): the gradient noise of the default texture.
+//!
+//! # Equations
+//! | step | equation | function |
+//! |---|---|---|
+//! | texture and scroll | `T0 = T(u, w - s (t - t0))` (1), (2) | `Clock::scroll`, `Texture::sample` |
+//! | threshold | `L = 1 - (1 - V(w)) (1 - H(u))` (4) | [`equations::threshold`] |
+//! | cut | `T1 = max(0, T0 - L)` (5) | [`equations::above_threshold`] |
+//! | sharpen | `T2 = C(T1)` (6) | `ColorRamp` |
+//! | color | `(r, g, b) = (R, G, B)(T2)` (7) | `ColorRamp` |
+//! | rise | `w_p = (1 - k) sqrt(y) + k y` (9) | [`equations::rise`] |
+//! | distance from the axis | `x' = 2 abs(x - 1/2)` (10), (13), (17) | [`equations::axis_distance`] |
+//! | speed profile | `K = h + (1 - h) F((x' - A) / D)` (11) | [`equations::fringe_position`], [`equations::speed_profile`] |
+//! | slowed rise | `w = w_p / K` (12) | [`equations::slowed_rise`] |
+//! | fluttering edge | `E = A(w) + D(w) P(w - s (t - t0))` (15) | [`equations::fluttering_edge`] |
+//! | across | `u' = x' / E` (16) | [`equations::across`] |
+//! | texture coordinate | `u = (1 +- u') / 2` (14), (18) | [`equations::texture_u`] |
+//! | the paper's texture | sum of products of cosines (20) | [`paper_texture`], [`PaperTexture`] |
+//!
+//! (8) and (19) do not exist in the paper.
+//!
+//! # Data flow
+//! 1. `parameters` holds the scene's values; [`FlameSheet::new`] checks them and makes one `FlameInstance` per entry of `instances`.
+//! 2. `render::curve_tables::ShapeTables` tabulates the user's curves, and `render::color_ramp::ColorRamp` sharpening and color, on first use.
+//! 3. For each time sample of the exposure, `animate::clock` gives time and scroll, `animate::fluctuation` the sums of sines, and
+//!    `animate::warp` the warp of the coordinates, including wind.
+//! 4. `texture` gives T0 at that scroll: layers of noise (`fractal`), or the paper's sum (`paper`), filtered for the sheet's size in pixels.
+//! 5. `render::projection` maps pixels to sheet coordinates for any lens; `render::curve_tables` maps those to flame coordinates.
+//! 6. `render::shade` turns flame coordinates into light and opacity; `render::smoke` does so for the smoke above the flame.
+//! 7. `render::draw` evaluates bands of rows and composites them into strips; `render::aovs` writes AOVs.
+//! 8. `render::prepared` sorts flames, smoke and [sparks](crate::sparks) by depth; `render::emitted_light` gives point lights for other objects.
 
 pub(crate) mod animate;
 pub mod equations;
@@ -28,17 +62,17 @@ use bansho_base::{
     },
 };
 
-use animate::{clock::Clock, moment::Motion};
+use animate::{clock::Clock, warp::FlameWaves};
 use render::{
-    flame::{Flame, Source},
-    ramp::Ramp,
-    shape_tables::{Shape, instance_key},
+    color_ramp::ColorRamp,
+    curve_tables::{ShapeTables, instance_key},
+    flame_instance::{FlameInstance, TextureSource},
 };
 use texture::{FractalLayers, PaperLayer};
 
 pub use parameters::{
-    ColourParameters, Colouring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters,
-    SmokeParameters, StageShown, TextureKind, TextureParameters,
+    ColorParameters, Coloring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters,
+    SmokeParameters, Stage, TextureKind, TextureParameters,
 };
 pub use texture::{PaperTexture, paper_texture};
 
@@ -52,7 +86,7 @@ pub struct FlameSheet {
     clock: Clock,
     /// Made when it is first seen: there may be thousands of sheets, each of which is made to be checked.
     tables: OnceLock<Tables>,
-    flames: Vec<Flame>,
+    flames: Vec<FlameInstance>,
 }
 
 impl FlameSheet {
@@ -71,8 +105,8 @@ impl FlameSheet {
         }
         constructions::count("flame_sheet");
         let clock = Clock::new(parameters.speed.clone(), loop_s);
-        Shape::check(&parameters.shape)?;
-        Ramp::check(&parameters.texture)?;
+        ShapeTables::check(&parameters.shape)?;
+        ColorRamp::check(&parameters.texture)?;
         let flames = flames(&parameters, name, seed, &clock);
         Ok(Self { name: name.to_owned(), parameters, clock, tables: OnceLock::new(), flames })
     }
@@ -85,19 +119,19 @@ impl FlameSheet {
     fn tables(&self) -> &Tables {
         let FlameSheetParameters { shape, texture, colour, stage, .. } = &self.parameters;
         let make = || Tables {
-            shape: Box::new(Shape::new(shape, texture, colour)),
-            ramp: Box::new(Ramp::new(texture, colour, *stage)),
+            shape: Box::new(ShapeTables::new(shape, texture, colour)),
+            ramp: Box::new(ColorRamp::new(texture, colour, *stage)),
         };
         get_or_make(&self.tables, make)
     }
 
     /// What of the chain does not change with time.
-    pub(crate) fn shape(&self) -> &Shape {
+    pub(crate) fn shape(&self) -> &ShapeTables {
         &self.tables().shape
     }
 
     /// From gas to light.
-    pub(crate) fn ramp(&self) -> &Ramp {
+    pub(crate) fn ramp(&self) -> &ColorRamp {
         &self.tables().ramp
     }
 }
@@ -105,28 +139,29 @@ impl FlameSheet {
 /// What a sheet is drawn with, and depends on its parameters alone.
 #[derive(Clone, Debug)]
 struct Tables {
-    shape: Box<Shape>,
-    ramp: Box<Ramp>,
+    shape: Box<ShapeTables>,
+    ramp: Box<ColorRamp>,
 }
 
-fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Clock) -> Vec<Flame> {
+fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Clock) -> Vec<FlameInstance> {
     let texture = &parameters.texture;
     let paper = (texture.kind == TextureKind::OhshimaItahashi)
         .then(|| Arc::new(PaperLayer::new(texture.octaves as u32, clock)));
-    let places = if parameters.instances.is_empty() { vec![Instance::default()] } else { parameters.instances.clone() };
-    let flame = |(index, place): (usize, Instance)| {
+    let placements =
+        if parameters.instances.is_empty() { vec![Instance::default()] } else { parameters.instances.clone() };
+    let flame = |(index, placement): (usize, Instance)| {
         let key = instance_key(seed, name, parameters.variation, index);
-        let source = match &paper {
-            Some(layer) => Source::Paper(layer.clone()),
-            None => Source::Fractal(FractalLayers::new(tongues(parameters), 1.0, key, clock)),
+        let texture_source = match &paper {
+            Some(layer) => TextureSource::Paper(layer.clone()),
+            None => TextureSource::Fractal(FractalLayers::new(tongue_size(parameters), 1.0, key, clock)),
         };
-        Flame { place, key, motion: Motion::new(&parameters.shape, key, clock), source }
+        FlameInstance { placement, key, waves: FlameWaves::new(&parameters.shape, key, clock), texture_source }
     };
-    places.into_iter().enumerate().map(flame).collect()
+    placements.into_iter().enumerate().map(flame).collect()
 }
 
 /// Size of the fractal's tongues in sheet widths and heights, beside the usual: they keep their form on a sheet of any aspect.
-fn tongues(parameters: &FlameSheetParameters) -> [f64; 2] {
+fn tongue_size(parameters: &FlameSheetParameters) -> [f64; 2] {
     /// Width over height of the sheet for which the usual size is meant.
     const USUAL: f64 = 0.65;
     let aspect = parameters.width / parameters.height / USUAL;

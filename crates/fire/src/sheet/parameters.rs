@@ -1,4 +1,4 @@
-//! What a scene says of a flame sheet. Symbols and equation numbers are those of Ohshima & Itahashi.
+//! Parameters of the flame sheet. Symbols and equation numbers are those of Ohshima and Itahashi.
 
 use bansho_base::{
     math::curve::{Curve, Interpolation},
@@ -7,10 +7,10 @@ use bansho_base::{
 
 use crate::sparks::SparkParameters;
 
-const SHARE: Range = Range::new(0.0, 1.0);
+const FRACTION: Range = Range::new(0.0, 1.0);
 const KELVIN: Range = Range::new(600.0, 4000.0);
 
-/// A default curve. Its points are literals below, never a scene's.
+/// A default curve; its points are literals below.
 fn curve(points: &[[f64; 2]]) -> Curve {
     Curve::new(points.to_vec(), Interpolation::Monotone).expect("default points ascend")
 }
@@ -27,7 +27,7 @@ bansho_base::choice! {
 
 bansho_base::choice! {
     /// How the sharpened texture T2 becomes colour.
-    pub enum Colouring {
+    pub enum Coloring {
         /// T2 gives temperature and density of glowing soot, Planck's law gives the light.
         BlackBody = "black_body",
         /// The curves `red`, `green` and `blue`, eq. (7).
@@ -37,7 +37,7 @@ bansho_base::choice! {
 
 bansho_base::choice! {
     /// Which stage of the chain is shown; all but the flame show the flat texture square (u, w) as the paper's pictures 1 to 4.
-    pub enum StageShown {
+    pub enum Stage {
         /// The finished flame.
         Flame = "flame",
         /// The texture T0 (picture 1).
@@ -47,7 +47,7 @@ bansho_base::choice! {
         /// After sharpening, T2 (picture 3).
         Sharpened = "sharpened",
         /// Coloured, before it is mapped to the flame's shape (picture 4).
-        Coloured = "coloured",
+        Colored = "coloured",
     }
 }
 
@@ -65,7 +65,7 @@ bansho_base::parameters! {
     /// The outline of the flame and how its gas moves, eqs. (9) to (18).
     pub struct ShapeParameters {
         /// k, eq. (9): 0 starts slowly and accelerates much, 1 rises at one speed.
-        initial_speed: f64 = 0.7, limits(SHARE);
+        initial_speed: f64 = 0.7, limits(FRACTION);
         /// h, eq. (11): slowest speed, at the edge, as a share of the fastest, on the axis.
         edge_speed: f64 = 0.55, limits(Range::new(0.02, 1.0));
         /// A(w), eq. (11): half width of the core that rises evenly, over height; 1 is the edge of the sheet.
@@ -76,11 +76,11 @@ bansho_base::parameters! {
         /// 1 - F, eq. (11): how the gas slows across the fringe, from 0 at its inner edge to 1 at its outer one.
         slowing: Curve = curve(&[[0.0, 0.0], [0.5, 0.4], [1.0, 1.0]]), limits(CurveLimits::default().rising());
         /// Strength of P, eq. (15): how far the edge swings into the fringe; 0 leaves it still at its outer edge.
-        flutter: f64 = 0.6, limits(SHARE);
+        flutter: f64 = 0.6, limits(FRACTION);
         /// Swings of the edge in a sheet height.
         flutter_waves: f64 = 1.1, limits(Range::new(0.1, 20.0)), unit("1/height");
         /// How far the tip wanders sideways, in sheet widths.
-        sway: f64 = 0.05, limits(SHARE);
+        sway: f64 = 0.05, limits(FRACTION);
         /// How often it wanders to and fro.
         sway_hz: f64 = 0.7, limits(Range::new(0.01, 20.0)), unit("Hz");
         /// How much the whole flame grows and shrinks, as a share of its height.
@@ -102,7 +102,7 @@ bansho_base::parameters! {
         /// Length of the fractal's tongues, 1 for about half the flame's height.
         tongue_length: f64 = 1.0, limits(Range::new(0.1, 10.0));
         /// Contrast of the texture: 1 as it is, towards 0 an even gas, as in a still candle.
-        contrast: f64 = 1.0, limits(SHARE);
+        contrast: f64 = 1.0, limits(FRACTION);
         /// V(w), eq. (4): threshold over height.
         threshold: Curve = curve(&[[0.0, 0.0], [0.25, 0.08], [0.6, 0.42], [0.85, 0.75], [1.0, 1.0]]),
             limits(CurveLimits::default().rising());
@@ -116,9 +116,9 @@ bansho_base::parameters! {
 
 bansho_base::parameters! {
     /// From the sharpened texture T2 to light, eq. (7) and beyond.
-    pub struct ColourParameters {
+    pub struct ColorParameters {
         /// Which colouring.
-        kind: Colouring = Colouring::BlackBody;
+        kind: Coloring = Coloring::BlackBody;
         /// Luminance of the brightest colour.
         luminance: Animated<f64> = Animated::from(12_000.0), limits(Range::new(0.0, 1e7)), unit("cd/m^2");
         /// R(s), eq. (7), as a display shows it (sRGB-encoded); for `kind = "paper"`.
@@ -138,7 +138,7 @@ bansho_base::parameters! {
         /// Brightness and soot over height w, from the dark zone at the base.
         glow: Curve = curve(&[[0.0, 0.0], [0.1, 0.12], [0.3, 1.0], [1.0, 1.0]]), limits(CurveLimits::default());
         /// Luminance of the blue light at the base, as a share of `luminance`.
-        base_blue: f64 = 0.0, limits(SHARE);
+        base_blue: f64 = 0.0, limits(FRACTION);
     }
 }
 
@@ -148,9 +148,9 @@ bansho_base::parameters! {
         /// Greatest optical depth; 0 for no smoke.
         optical_depth: f64 = 0.0, limits(Range::new(0.0, 20.0));
         /// Share of the light that it scatters on rather than takes away.
-        albedo: f64 = 0.55, limits(SHARE);
+        albedo: f64 = 0.55, limits(FRACTION);
         /// Tint of what it scatters, linear red, green and blue.
-        colour: [f64; 3] = [0.95, 0.97, 1.0], limits(SHARE);
+        colour: [f64; 3] = [0.95, 0.97, 1.0], limits(FRACTION);
         /// Height of the smoke in flame heights.
         height: f64 = 3.0, limits(Range::new(0.1, 50.0));
         /// Width of the smoke at its top in flame widths.
@@ -214,7 +214,7 @@ bansho_base::parameters! {
         /// Texture, threshold and sharpening.
         texture: TextureParameters = TextureParameters::default();
         /// Colour and soot.
-        colour: ColourParameters = ColourParameters::default();
+        colour: ColorParameters = ColorParameters::default();
         /// Sparks.
         sparks: SparkParameters = SparkParameters::default();
         /// Smoke.
@@ -226,6 +226,6 @@ bansho_base::parameters! {
         /// Moments that are averaged while the shutter is open; `"auto"` follows the scroll in pixels.
         time_samples: Auto<i64> = Auto::Auto, limits(Range::new(1.0, 64.0));
         /// Which stage of the chain is shown.
-        stage: StageShown = StageShown::Flame;
+        stage: Stage = Stage::Flame;
     }
 }

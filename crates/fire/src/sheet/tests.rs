@@ -1,4 +1,4 @@
-//! The whole sheet: valid parameters of every kind, agreement between ways of drawing, loops, light.
+//! The whole sheet: random valid parameters, equality of strips, crops and SIMD widths, loops, light.
 
 use bansho_base::{
     camera::{CameraParameters, Lens},
@@ -20,10 +20,10 @@ use bansho_base::{
 
 use super::*;
 use crate::sheet::{
-    animate::moment::{Moment, Push},
+    animate::warp::{WarpState, WindLean},
     render::{
-        draw::{Paint, SQUEEZED, draw_rows},
-        shade::{Drawn, State},
+        draw::{DrawContext, MAX_MINIFICATION, draw_rows},
+        shade::{SheetContent, SheetState},
     },
 };
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
@@ -85,7 +85,7 @@ fn rich() -> FlameSheetParameters {
     }
 }
 
-/// Draws at random until the parameters go together.
+/// Random parameters that are valid together.
 fn random_parameters(number: u64) -> FlameSheetParameters {
     let key = Key::new(number, "random sheets");
     let mut count = 0;
@@ -100,22 +100,22 @@ fn random_parameters(number: u64) -> FlameSheetParameters {
     parameters
 }
 
-/// T0, T1 and T2's light over the whole sheet, straight from the chain.
+/// T0, T1, threshold and coverage over the whole sheet.
 fn field<S: Simd>(simd: S, sheet: &FlameSheet, t: f64) -> Vec<[f32; 4]> {
     let flame = &sheet.flames[0];
-    let push = Push { across: 0.4, toward: 0.0 };
-    let moment = Moment::new(&sheet.parameters, sheet.shape(), &flame.motion, &sheet.clock, t, push);
-    let state = State { texture: flame.source.texture(moment.scroll), moment, pixel: [0.05, 0.05] };
+    let lean = WindLean { across: 0.4, toward: 0.0 };
+    let warp = WarpState::new(&sheet.parameters, sheet.shape(), &flame.waves, &sheet.clock, t, lean);
+    let state = SheetState { texture: flame.texture_source.texture(warp.scroll), warp, pixel: [0.05, 0.05] };
     let mut values = Vec::new();
     for row in 0..24 {
         let (x, y) = (ramp(simd, 0.01, 0.065), Lanes::splat(simd, row as f32 / 23.0));
-        let (x, y) = state.moment.straighten(x, y);
-        let place = sheet.shape().place(x, y, &state.moment.edges, state.pixel);
-        let coverage = place.coverage(state.pixel);
-        let texture = sheet.shape().gas(state.texture.sample(place.u, place.w));
-        let cut = equations::above_threshold(texture, place.threshold);
+        let (x, y) = state.warp.unwarp(x, y);
+        let coordinates = sheet.shape().coordinates(x, y, &state.warp.edges, state.pixel);
+        let coverage = coordinates.coverage(state.pixel);
+        let texture = sheet.shape().gas(state.texture.sample(coordinates.u, coordinates.w));
+        let cut = equations::above_threshold(texture, coordinates.threshold);
         for lane in 0..LANES {
-            values.push([texture[lane], cut[lane], place.threshold[lane], coverage[lane]]);
+            values.push([texture[lane], cut[lane], coordinates.threshold[lane], coverage[lane]]);
         }
     }
     values
@@ -123,16 +123,16 @@ fn field<S: Simd>(simd: S, sheet: &FlameSheet, t: f64) -> Vec<[f32; 4]> {
 
 #[test]
 fn every_valid_parameter_set_stays_within_0_and_1_before_colour() {
-    let mut drawn = 0;
+    let mut content = 0;
     for number in 0..1500 {
         let Ok(sheet) = FlameSheet::new(random_parameters(number), "random", number, None) else { continue };
         let level = Level::new();
         for value in dispatch!(level, simd => field(simd, &sheet, number as f64 * 0.37)).iter().flatten() {
             assert!((0.0..=1.0).contains(value), "set {number}: {value}");
-            drawn += 1;
+            content += 1;
         }
     }
-    assert!(drawn > 100_000, "{drawn}");
+    assert!(content > 100_000, "{content}");
 }
 
 #[test]
@@ -229,7 +229,7 @@ fn published_light_flickers_about_the_light_that_is_drawn() {
         })
         .collect();
     let mean = red.iter().sum::<f32>() / 40.0;
-    // A fire about a metre tall: hundreds to thousands of candela, and never still.
+    // A fire about a meter tall: hundreds to thousands of candela, and it flickers.
     assert!((100.0..10_000.0).contains(&mean), "{mean}");
     assert!(red.iter().any(|value| (value / mean - 1.0).abs() > 0.05));
 }
@@ -280,32 +280,32 @@ fn curves_that_do_not_go_together_name_the_parameter() {
     assert!(FlameSheet::new(FlameSheetParameters::default(), "test", 1, Some(0.0)).is_err());
 }
 
-/// Red light of a sheet at 320 x 480, in bands of so many rows.
+/// Red light of a sheet at 320 x 480, with exact rows `rows` apart.
 fn red_in_bands(sheet: &FlameSheet, view: &View, rows: usize) -> Vec<f32> {
     with_wind([0.5, 0.0, 0.0], |surroundings| {
         let flame = &sheet.flames[0];
-        let (samples, _) = sheet.samples(flame, &flame.source.filtered(1e4), view, surroundings.wind, 1);
+        let (samples, _) = sheet.samples(flame, &flame.texture_source.filtered(1e4), view, surroundings.wind, 1);
         let (shape, ramp) = (sheet.shape(), sheet.ramp());
-        let paint = Paint {
+        let context = DrawContext {
             shape,
             ramp,
             samples: &samples,
-            drawn: Drawn::Flame,
+            content: SheetContent::Flame,
             absorbs: true,
-            band: rows,
-            squeezed: f32::INFINITY,
+            row_band: rows,
+            minification: f32::INFINITY,
         };
         let rect = Rect::of_size(320, 480);
         let mut strip = Strip::default();
         strip.reset(rect, None, 0);
-        dispatch!(Level::new(), simd => draw_rows(simd, &paint, rect, &mut strip));
+        dispatch!(Level::new(), simd => draw_rows(simd, &context, rect, &mut strip));
         strip.radiance[0].clone()
     })
 }
 
 #[test]
 fn rows_between_exact_rows_are_as_good_as_exact_ones() {
-    // Sheets 600 and 1,080 pixels tall are drawn in bands of 4 and 16 rows; shrinking the bands to one row changes next to nothing.
+    // Sheets 600 and 1,080 pixels tall have exact rows every 4 and 16 rows; computing every row exactly changes next to nothing.
     let sheet = sheet(FlameSheetParameters { time_samples: Auto::Set(1), ..FlameSheetParameters::default() }, None);
     for (vertical_fov_deg, rows, most_apart) in [(20.0, 4, 0.002), (11.2, 16, 0.004)] {
         let camera =
@@ -320,8 +320,8 @@ fn rows_between_exact_rows_are_as_good_as_exact_ones() {
     }
 }
 
-/// Red light of the front of the campfire, `finer` times as large as in its scene; pixels that span many texels as `squeezed` says.
-fn red_of_campfire(finer: usize, squeezed: f32) -> Vec<f32> {
+/// Red light of the front of the campfire, `finer` times as large as in its scene, with supersampling above `minification`.
+fn red_of_campfire(finer: usize, minification: f32) -> Vec<f32> {
     let parameters = FlameSheetParameters {
         width: 0.62,
         height: 0.6,
@@ -341,13 +341,21 @@ fn red_of_campfire(finer: usize, squeezed: f32) -> Vec<f32> {
     let view = View::new(camera, Shutter { open: 4.0, close: 4.0 }, 4.04, size, 0);
     with_wind([0.25, 0.0, 0.0], |surroundings| {
         let flame = &sheet.flames[0];
-        let (samples, _) = sheet.samples(flame, &flame.source.filtered(270.0), &view, surroundings.wind, 1);
+        let (samples, _) = sheet.samples(flame, &flame.texture_source.filtered(270.0), &view, surroundings.wind, 1);
         let (shape, ramp) = (sheet.shape(), sheet.ramp());
-        let paint = Paint { shape, ramp, samples: &samples, drawn: Drawn::Flame, absorbs: true, band: 2, squeezed };
+        let context = DrawContext {
+            shape,
+            ramp,
+            samples: &samples,
+            content: SheetContent::Flame,
+            absorbs: true,
+            row_band: 2,
+            minification,
+        };
         let rect = Rect::of_size(size[0], size[1]);
         let mut strip = Strip::default();
         strip.reset(rect, None, 0);
-        dispatch!(Level::new(), simd => draw_rows(simd, &paint, rect, &mut strip));
+        dispatch!(Level::new(), simd => draw_rows(simd, &context, rect, &mut strip));
         strip.radiance[0].clone()
     })
 }
@@ -360,9 +368,9 @@ fn a_squeezed_texture_looks_as_if_supersampled() {
         (0..16).map(|k| fine[(y + k / 4) * 1280 + x + k % 4]).sum::<f32>() / 16.0
     };
     let wanted: Vec<f32> = (0..320 * 304).map(mean_of_16).collect();
-    let (plain, filtered) = (red_of_campfire(1, f32::INFINITY), red_of_campfire(1, SQUEEZED));
-    let squeezed: Vec<usize> = (0..plain.len()).filter(|&index| plain[index] != filtered[index]).collect();
-    let wrong = |drawn: &[f32]| squeezed.iter().map(|&index| (drawn[index] - wanted[index]).abs()).sum::<f32>();
+    let (plain, filtered) = (red_of_campfire(1, f32::INFINITY), red_of_campfire(1, MAX_MINIFICATION));
+    let minification: Vec<usize> = (0..plain.len()).filter(|&index| plain[index] != filtered[index]).collect();
+    let wrong = |content: &[f32]| minification.iter().map(|&index| (content[index] - wanted[index]).abs()).sum::<f32>();
     let (before, after) = (wrong(&plain), wrong(&filtered));
-    assert!(squeezed.len() > 100 && after < 0.7 * before, "{} pixels: {before} {after}", squeezed.len());
+    assert!(minification.len() > 100 && after < 0.7 * before, "{} pixels: {before} {after}", minification.len());
 }

@@ -1,4 +1,4 @@
-//! Sparks: each a function of its number and the time, so that any frame alone is right.
+//! Sparks: each is a function of its index and the time, so that any frame can be rendered alone.
 
 mod streak;
 
@@ -16,7 +16,7 @@ use bansho_base::{
 
 pub(crate) use streak::Streak;
 
-const SHARE: Range = Range::new(0.0, 1.0);
+const FRACTION: Range = Range::new(0.0, 1.0);
 
 bansho_base::parameters! {
     /// Glowing sparks that the fire throws up.
@@ -26,7 +26,7 @@ bansho_base::parameters! {
         /// Speed at which they rise at first.
         speed: f64 = 2.2, limits(Range::new(0.0, 100.0)), unit("m/s");
         /// How much that differs between them, as a share.
-        spread: f64 = 0.5, limits(SHARE);
+        spread: f64 = 0.5, limits(FRACTION);
         /// How far they swirl sideways.
         swirl: f64 = 0.12, limits(Range::new(0.0, 100.0)), unit("m");
         /// How long they glow.
@@ -38,74 +38,74 @@ bansho_base::parameters! {
     }
 }
 
-/// Where a spark stops to glow, K.
-const COLDEST_K: f64 = 900.0;
+/// Temperature at which a spark no longer glows, K.
+const EXTINCTION_TEMPERATURE_K: f64 = 900.0;
 
 /// The random properties of one spark.
 struct Spark {
-    /// How old it is, s.
+    /// Age, s.
     age: f64,
-    /// How long it glows, s.
+    /// Duration of its glow, s.
     life: f64,
-    /// Where it left the fire, from the base: fire widths and heights.
+    /// Initial position relative to the base, in widths and heights of the fire.
     start: DVec3,
-    /// Speed at first, m/s.
+    /// Initial speed, m/s.
     speed: f64,
     /// Phases of its swirl, turns.
     phases: [f64; 2],
-    /// Turns of its swirl a second.
+    /// Turns of its swirl per second.
     turns: f64,
 }
 
-/// A fire that throws up sparks, as it is while the shutter is open.
-pub(crate) struct Fire<'a> {
+/// Emitter of a fire's sparks during one exposure.
+pub(crate) struct SparkEmitter<'a> {
     pub(crate) parameters: &'a SparkParameters,
     pub(crate) key: Key,
-    /// The fire's own time at the middle of the exposure, s; in a loop it repeats.
+    /// The fire's own time at the middle of the exposure, s; it repeats in a loop.
     pub(crate) now: f64,
     pub(crate) loop_s: Option<f64>,
-    /// Middle of its base, m.
+    /// Center of its base, m.
     pub(crate) base: DVec3,
     /// Width and height, m.
     pub(crate) size: DVec2,
-    /// Size of sparks beside what the parameters say.
+    /// Size of sparks relative to the parameter.
     pub(crate) scale: f64,
-    /// How much the wind drives them.
+    /// Sensitivity to the wind.
     pub(crate) wind_response: f64,
 }
 
-impl Fire<'_> {
-    /// The sparks of a flame that the exposure sees.
+impl SparkEmitter<'_> {
+    /// Streaks of the sparks that the exposure sees.
     pub(crate) fn streaks(&self, view: &View, wind: &Wind) -> Vec<Streak> {
         let sparks = self.parameters;
         if sparks.rate <= 0.0 {
             return Vec::new();
         }
-        // In a loop the number of births is whole, and birth n is birth n + births again.
-        let (rate, births) = match self.loop_s {
+        // In a loop the number of sparks is whole, and spark n + births_per_loop is spark n again.
+        let (rate, births_per_loop) = match self.loop_s {
             Some(length) => {
                 ((sparks.rate * length).round().max(1.0) / length, Some((sparks.rate * length).round().max(1.0) as i64))
             }
             None => (sparks.rate, None),
         };
         let (first, last) = (((self.now - sparks.life_s) * rate).floor() as i64 - 1, (self.now * rate).ceil() as i64);
-        let same = |id: i64| births.map_or(id, |births| id.rem_euclid(births)) as u64;
+        let loop_index = |id: i64| births_per_loop.map_or(id, |births_per_loop| id.rem_euclid(births_per_loop)) as u64;
         (first..=last)
             .filter_map(|id| {
-                let spark = self.spark(same(id), self.now - id as f64 / rate, rate)?;
+                let spark = self.spark(loop_index(id), self.now - id as f64 / rate, rate)?;
                 self.streak(&spark, view, wind)
             })
             .collect()
     }
 
-    /// Spark `id`, if it glows `since_birth` seconds (less its own delay) after its turn came.
+    /// Spark `id`, if it glows `since_turn` seconds (minus its random delay) after it was due.
     fn spark(&self, id: u64, since_turn: f64, rate: f64) -> Option<Spark> {
         let sparks = self.parameters;
         let first = self.key.uniforms(id, 0, Purpose::named("spark start")).map(f64::from);
         let second = self.key.uniforms(id, 0, Purpose::named("spark flight")).map(f64::from);
         let age = since_turn - first[0] / rate;
         let life = sparks.life_s * (0.35 + 0.65 * first[1] * first[1]);
-        let vary = |share: f64| 1.0 + sparks.spread * (2.0 * share - 1.0);
+        let vary = |variate: f64| 1.0 + sparks.spread * (2.0 * variate - 1.0);
         (0.0..life).contains(&age).then(|| Spark {
             age,
             life,
@@ -116,8 +116,8 @@ impl Fire<'_> {
         })
     }
 
-    /// Where a spark of `age` is from where it left, in still air, m: it slows as it cools and swirls ever wider.
-    fn flight(&self, spark: &Spark, age: f64) -> DVec3 {
+    /// Displacement of a spark at `age` in still air, m: it slows down as it cools, and swirls in a growing spiral.
+    fn displacement(&self, spark: &Spark, age: f64) -> DVec3 {
         const DRAG: f64 = 1.3;
         let life = self.parameters.life_s;
         let rise = spark.speed * life * -math::exp_m1(-DRAG * age / life) / DRAG;
@@ -131,13 +131,13 @@ impl Fire<'_> {
         DVec3::new(swirl * wander(spark.phases[0]), rise, swirl * wander(spark.phases[1]))
     }
 
-    /// How far the wind carried a spark at the end of its first `age` seconds, m.
+    /// Displacement by the wind at the end of its first `age` seconds, m.
     fn drift(&self, wind: &Wind, origin: DVec3, t: f64, age: f64) -> DVec3 {
         const STEPS: usize = 4;
         let step = age / STEPS as f64;
         let mean: DVec3 =
             (0..STEPS).map(|i| wind.at(origin, t - age + step * (i as f64 + 0.5))).sum::<DVec3>() / STEPS as f64;
-        // Heavy beside gas, it takes a third of a second to follow.
+        // A spark is heavy: its velocity relaxes to that of the wind with a time constant of 0.33 s.
         mean * self.wind_response * (age + 0.33 * math::exp_m1(-age / 0.33))
     }
 
@@ -145,15 +145,15 @@ impl Fire<'_> {
         let t = view.shutter.middle();
         let size = self.size;
         let origin = self.base + DVec3::new(spark.start.x * size.x, spark.start.y * size.y, spark.start.z * size.x);
-        let seen = |at: f64, camera: &Camera| {
+        let project_at = |at: f64, camera: &Camera| {
             let age = (spark.age + at - t).clamp(0.0, spark.life);
-            camera.project(origin + self.flight(spark, age) + self.drift(wind, origin, at, age))
+            camera.project(origin + self.displacement(spark, age) + self.drift(wind, origin, at, age))
         };
-        let opened = seen(view.shutter.open, &view.camera_at(view.shutter.open))?;
-        let closed = seen(view.shutter.close, &view.camera_at(view.shutter.close))?;
+        let opened = project_at(view.shutter.open, &view.camera_at(view.shutter.open))?;
+        let closed = project_at(view.shutter.close, &view.camera_at(view.shutter.close))?;
         let cooled = math::pow(spark.age / spark.life, 0.8);
         let hottest = self.parameters.temperature_k;
-        let temperature = math::lerp(hottest, COLDEST_K.min(hottest), cooled);
+        let temperature = math::lerp(hottest, EXTINCTION_TEMPERATURE_K.min(hottest), cooled);
         let radius = 0.5 * self.parameters.size * self.scale * opened.pixels_per_metre;
         let area = std::f64::consts::PI * radius * radius;
         let radiance = color::black_body().radiance(temperature as f32);

@@ -1,4 +1,4 @@
-//! A short bright line between two places of the picture, soft at its edges.
+//! A motion-blurred spark: a line segment with soft edges.
 
 use bansho_base::{
     image::Rect,
@@ -6,36 +6,37 @@ use bansho_base::{
     phenomenon::strip::Strip,
 };
 
-/// A spark as the exposure sees it: a streak of light between two places of the picture.
+/// The streak of a spark during the exposure.
 #[derive(Clone, Debug)]
 pub(crate) struct Streak {
     from: DVec2,
     to: DVec2,
     radius: f64,
-    /// ACEScg at full coverage, cd/m^2; what the streak covers adds up to the spark's light.
+    /// ACEScg at full coverage, cd/m^2, such that the streak's total light is the spark's.
     radiance: [f32; 3],
     /// Depth, m.
     pub(crate) depth: f64,
-    /// Pixels it touches; may reach beyond the picture.
-    low: [i64; 2],
-    high: [i64; 2],
+    /// Bounding box, pixels; may extend beyond the picture.
+    min_pixel: [i64; 2],
+    max_pixel: [i64; 2],
 }
 
-/// Softness of a streak's edge, pixels.
-const SOFT: f64 = 0.7;
+/// Half width of a streak's soft edge, pixels.
+const EDGE_SOFTNESS: f64 = 0.7;
 
 impl Streak {
-    /// A streak that spreads the light `radiance` times `area` (square pixels) over what it covers.
+    /// A streak that distributes the light `radiance` times `area` (square pixels) over its coverage.
     pub(crate) fn new(from: DVec2, to: DVec2, radius: f64, radiance: [f32; 3], area: f64, depth: f64) -> Option<Self> {
-        /// Longer streaks are cut; a spark that crosses the lens says nothing.
-        const LONGEST: f64 = 4000.0;
-        let reach = DVec2::splat(radius + SOFT);
-        let (low, high) = (from.min(to) - reach, from.max(to) + reach);
-        if !((high - low).max_element() < LONGEST && low.abs().max_element() < 1e9) {
+        /// Longer streaks are discarded: the spark crosses the lens.
+        const MAX_LENGTH: f64 = 4000.0;
+        let reach = DVec2::splat(radius + EDGE_SOFTNESS);
+        let (min_pixel, max_pixel) = (from.min(to) - reach, from.max(to) + reach);
+        if !((max_pixel - min_pixel).max_element() < MAX_LENGTH && min_pixel.abs().max_element() < 1e9) {
             return None;
         }
-        let whole = |place: DVec2| [place.x.floor() as i64, place.y.floor() as i64];
-        let mut streak = Self { from, to, radius, radiance, depth, low: whole(low), high: whole(high) };
+        let whole = |fraction: DVec2| [fraction.x.floor() as i64, fraction.y.floor() as i64];
+        let mut streak =
+            Self { from, to, radius, radiance, depth, min_pixel: whole(min_pixel), max_pixel: whole(max_pixel) };
         let covered = streak.covered();
         if covered <= 0.0 {
             return None;
@@ -44,36 +45,38 @@ impl Streak {
         Some(streak)
     }
 
-    /// Sum of the coverage over all pixels: counted where that is quick, else the area of a capsule with soft edges.
+    /// Sum of the coverage over all pixels: counted where that is cheap, else the area of a capsule with soft edges.
     fn covered(&self) -> f64 {
-        const QUICK: i64 = 4096;
-        if (self.high[0] - self.low[0] + 1) * (self.high[1] - self.low[1] + 1) <= QUICK {
+        const MAX_COUNTED_PIXELS: i64 = 4096;
+        if (self.max_pixel[0] - self.min_pixel[0] + 1) * (self.max_pixel[1] - self.min_pixel[1] + 1)
+            <= MAX_COUNTED_PIXELS
+        {
             return self.pixels().map(|(x, y)| self.coverage(x, y)).sum();
         }
-        // The place of a smooth edge of half width s has the variance s^2/5 of a Beta(2, 2) distribution.
-        let round = self.radius * self.radius + SOFT * SOFT / 5.0;
+        // The variance of a smoothstep edge of half width s is s^2/5, that of a Beta(2, 2) distribution.
+        let round = self.radius * self.radius + EDGE_SOFTNESS * EDGE_SOFTNESS / 5.0;
         2.0 * (self.to - self.from).length() * self.radius + std::f64::consts::PI * round
     }
 
     fn pixels(&self) -> impl Iterator<Item = (i64, i64)> + use<> {
-        let (low, high) = (self.low, self.high);
-        (low[1]..=high[1]).flat_map(move |y| (low[0]..=high[0]).map(move |x| (x, y)))
+        let (min_pixel, max_pixel) = (self.min_pixel, self.max_pixel);
+        (min_pixel[1]..=max_pixel[1]).flat_map(move |y| (min_pixel[0]..=max_pixel[0]).map(move |x| (x, y)))
     }
 
-    /// Share of a pixel that the streak covers, by the distance of its centre.
+    /// Coverage of a pixel by the distance of its center.
     fn coverage(&self, x: i64, y: i64) -> f64 {
         let point = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
         let along = self.to - self.from;
-        let place = ((point - self.from).dot(along) / along.length_squared().max(1e-12)).clamp(0.0, 1.0);
-        let distance = (point - self.from - along * place).length();
-        1.0 - math::smoothstep(self.radius - SOFT, self.radius + SOFT, distance)
+        let fraction = ((point - self.from).dot(along) / along.length_squared().max(1e-12)).clamp(0.0, 1.0);
+        let distance = (point - self.from - along * fraction).length();
+        1.0 - math::smoothstep(self.radius - EDGE_SOFTNESS, self.radius + EDGE_SOFTNESS, distance)
     }
 
     /// The pixels of the picture that it may touch.
     pub(crate) fn bounds(&self, picture: [usize; 2]) -> Rect {
         let clip = |value: i64, side: usize| value.clamp(0, side as i64) as usize;
-        let start = [clip(self.low[0], picture[0]), clip(self.low[1], picture[1])];
-        let end = [clip(self.high[0] + 1, picture[0]), clip(self.high[1] + 1, picture[1])];
+        let start = [clip(self.min_pixel[0], picture[0]), clip(self.min_pixel[1], picture[1])];
+        let end = [clip(self.max_pixel[0] + 1, picture[0]), clip(self.max_pixel[1] + 1, picture[1])];
         if start[0] >= end[0] || start[1] >= end[1] {
             return Rect::default();
         }

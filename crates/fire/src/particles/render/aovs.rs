@@ -1,4 +1,4 @@
-//! What the gas says of itself beside its light: temperature, optical depth, deflection and motion.
+//! AOVs of the gas: temperature, optical depth, deflection and motion.
 
 use bansho_base::{
     image::Rect,
@@ -6,23 +6,23 @@ use bansho_base::{
 };
 
 use super::gas::Gas;
+use crate::particles::render::{
+    project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+    resolve::spline,
+    splat::{
+        grid::{Grid, weighted_sum},
+        kernel::Profile,
+    },
+};
 use crate::particles::{
-    look_parameters::LookParameters,
+    parameters::LookParameters,
     render::{
-        project::sprite::{Kind, Seen, seen},
-        resolve::{
-            resolve_gas::{Extents, Layer, Resolve, Row},
-            spline,
-        },
-        splat::{
-            accumulate::{COARSE, Sheet, Sprite, splat},
-            grid::{Grid, weigh},
-            kernel::Profile,
-        },
+        resolve::{ColumnExtents, DepthLayer, GasResolver, RowBuffer},
+        splat::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
     },
 };
 
-/// What a particle flame can write beside its light, in the order of a strip's planes.
+/// AOVs of a particle flame, in the order of a strip's planes.
 pub const AOVS: &[AovDescriptor] = &[
     AovDescriptor {
         name: "temperature_k",
@@ -62,101 +62,109 @@ pub const AOVS: &[AovDescriptor] = &[
     },
 ];
 
-/// Places of the planes among a strip's AOVs.
+/// Indices of the planes among a strip's AOVs.
 const TEMPERATURE: usize = 0;
 const OPTICAL_DEPTH: usize = 1;
 pub(crate) const DEFLECTION: [usize; 2] = [2, 3];
 const MOTION: [usize; 2] = [4, 5];
 
-/// Summed motion of the glowing gas: luminance, and luminance times pixels to the right and down.
-pub(crate) struct Motion<'a> {
+/// Motion of the glowing gas: sums of luminance, and of luminance times motion in pixels to the right and down.
+pub(crate) struct MotionField<'a> {
     grid: Grid<'a>,
     weights: Vec<[f32; 4]>,
-    /// Least and greatest motion of any gas, for each of the two.
-    bounds: [[f32; 2]; 2],
+    /// Least and greatest motion of any particle, for each component.
+    min_max: [[f32; 2]; 2],
 }
 
-/// Glowing gas as sprites of its motion.
-struct Glowing<'a> {
+/// Glowing particles as sprites of their motion.
+struct MotionSprites<'a> {
     gas: &'a Gas<'a>,
     look: &'a LookParameters,
 }
 
-impl Glowing<'_> {
+impl MotionSprites<'_> {
     #[inline(always)]
     fn light(&self, index: usize) -> f64 {
         self.gas.absorption(index, self.look) * self.gas.luminance(index) * self.gas.volume(index)
     }
 }
 
-impl Kind for Glowing<'_> {
+impl SpriteKind for MotionSprites<'_> {
     type Record = Sprite<3>;
 
     #[inline(always)]
-    fn wants(&self, index: usize) -> bool {
+    fn includes(&self, index: usize) -> bool {
         self.light(index) > 0.0
     }
 
     #[inline(always)]
-    fn record(&self, seen: &Seen) -> Sprite<3> {
+    fn record(&self, seen: &ProjectedParticle) -> Sprite<3> {
         let weight = (self.light(seen.index) * f64::from(seen.ellipse.peak)) as f32;
         let values = [weight, weight * seen.motion[0], weight * seen.motion[1]];
-        Sprite { ellipse: seen.ellipse, layer: 0, split: 0.0, values }
+        Sprite { ellipse: seen.ellipse, layer: 0, next_layer_weight: 0.0, values }
     }
 }
 
-impl<'a> Motion<'a> {
+impl<'a> MotionField<'a> {
     pub(crate) fn new(gas: &Gas<'a>, look: &LookParameters, view: &View) -> Option<Self> {
-        let sprites = seen(gas, view, &Glowing { gas, look });
+        let sprites = project_particles(gas, view, &MotionSprites { gas, look });
         let motions = |axis: usize| {
             sprites.iter().flat_map(|task| task.iter()).map(move |sprite| sprite.values[1 + axis] / sprite.values[0])
         };
-        let bounds = [0, 1].map(|axis| bounds(motions(axis)));
+        let min_max = [0, 1].map(|axis| min_max(motions(axis)));
         let grid = splat(
-            &Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, picture: view.size, window: view.window },
+            &SplatSettings {
+                profile: Profile::LINE,
+                min_radius_cells: MIN_RADIUS_CELLS,
+                layers: 1,
+                picture: view.size,
+                window: view.window,
+            },
             &sprites,
-            gas.memory,
+            gas.scratch,
         );
         let grid = grid.sums()?;
-        Some(Self { weights: spline::weights(&grid.cells), grid, bounds })
+        Some(Self { weights: spline::weights(&grid.cells), grid, min_max })
     }
 
-    /// Pixels to the right and down that the gas at a pixel moves until the next frame.
+    /// Motion of the gas at a pixel until the next frame, pixels to the right and down.
     fn at(&self, x: usize, y: usize) -> [f32; 2] {
         let cells = &self.grid.cells;
-        let ((column, across), (row, down)) = (cells.before(0, x), cells.before(1, y));
+        let ((column, across), (row, down)) = (cells.cell_before(0, x), cells.cell_before(1, y));
         let start = 3 * self.grid.first_of_four(column);
         let rows = [-1, 0, 1, 2].map(|k| &self.grid.row(row + k)[start..start + 12]);
         let mut four = [0.0; 12];
-        weigh(&mut four, rows, &self.weights[down]);
+        weighted_sum(&mut four, rows, &self.weights[down]);
         let plane = |plane: usize| (0..4).map(|k| four[3 * k + plane] * self.weights[across][k]).sum::<f32>();
         let weight = plane(0);
         let mean = |axis: usize| {
-            let [least, greatest] = self.bounds[axis];
-            (plane(1 + axis) / weight).max(least).min(greatest)
+            let [min_value, max_value] = self.min_max[axis];
+            (plane(1 + axis) / weight).max(min_value).min(max_value)
         };
         if weight > 0.0 { [mean(0), mean(1)] } else { [0.0; 2] }
     }
 }
 
-/// Least and greatest of some numbers.
-pub(crate) fn bounds(values: impl Iterator<Item = f32>) -> [f32; 2] {
-    values.fold([f32::INFINITY, f32::NEG_INFINITY], |[least, greatest], value| [least.min(value), greatest.max(value)])
+/// Least and greatest value.
+pub(crate) fn min_max(values: impl Iterator<Item = f32>) -> [f32; 2] {
+    values.fold([f32::INFINITY, f32::NEG_INFINITY], |[min_value, max_value], value| {
+        [min_value.min(value), max_value.max(value)]
+    })
 }
 
-impl Resolve<'_> {
-    /// Adds the AOVs of a layer in the part `rect` of a strip. Only what is asked for is measured, a pixel at a time.
+impl GasResolver<'_> {
+    /// Adds the AOVs of a layer in `rect` of a strip. Evaluated only where AOVs are requested, one pixel at a time.
     pub(crate) fn measure_layer(
         &self,
-        layer: &Layer,
-        extents: &Extents,
-        motion: Option<&Motion<'_>>,
+        layer: &DepthLayer,
+        extents: &ColumnExtents,
+        motion: Option<&MotionField<'_>>,
         rect: Rect,
-        row: &mut Row,
+        row: &mut RowBuffer,
         strip: &mut Strip,
     ) {
-        /// Luminance whose soot still counts as glowing, cd/m^2.
-        const DARK: f32 = 1e-3;
+        /// Least luminance that counts as glowing, cd/m^2.
+        const MIN_LUMINANCE: f32 = 1e-3;
         for y in rect.y..rect.bottom() {
             let Some([first, last]) = self.fill(layer.index, y, extents, row) else { continue };
             let from = first.max(rect.x) / 16 * 16;
@@ -170,10 +178,10 @@ impl Resolve<'_> {
                         continue;
                     }
                     strip.aovs[OPTICAL_DEPTH].add(index, tau, 1.0);
-                    if glow > DARK {
+                    if glow > MIN_LUMINANCE {
                         strip.aovs[TEMPERATURE].add(index, self.temperature(heat, glow), glow);
-                        let moved = motion.map_or([0.0; 2], |motion| motion.at(pixel, y));
-                        (0..2).for_each(|axis| strip.aovs[MOTION[axis]].add(index, moved[axis], glow));
+                        let motion_pixels = motion.map_or([0.0; 2], |motion| motion.at(pixel, y));
+                        (0..2).for_each(|axis| strip.aovs[MOTION[axis]].add(index, motion_pixels[axis], glow));
                     }
                 }
             }

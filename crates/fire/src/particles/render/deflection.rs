@@ -1,129 +1,142 @@
-//! Heat haze: hot gas has a lower index of refraction, and light bends toward the denser air.
+//! Heat haze: hot gas has a lower refractive index, and light bends toward denser air.
+//!
+//! In the paraxial approximation the deflection of a ray is the gradient of the optical path length across it. The path length is a
+//! sum of sprites, as optical depth is.
 
 use bansho_base::{
     image::{Image, Rect},
     phenomenon::strip::{Strip, View},
 };
 
-use super::{aovs::DEFLECTION, gas::Gas, gas_statistics::shows};
+use super::{aovs::DEFLECTION, gas::Gas};
+use crate::particles::render::depth_layers::is_visible;
+use crate::particles::render::{
+    project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+    resolve::spline,
+    splat::{
+        grid::{Grid, weighted_sum},
+        kernel::Profile,
+    },
+};
 use crate::particles::{
-    look_parameters::LookParameters,
+    parameters::LookParameters,
     render::{
-        project::sprite::{Kind, Seen, seen},
-        resolve::{
-            resolve_gas::{PATH, PLANES},
-            spline,
-        },
-        splat::{
-            accumulate::{COARSE, Sheet, Sprite, splat},
-            grid::{Grid, weigh},
-            kernel::Profile,
-        },
+        resolve::{PATH, PLANES},
+        splat::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
     },
 };
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-/// n - 1 of air at [`REFERENCE_K`] and atmospheric pressure; it falls with 1/T (Gladstone & Dale).
+/// n - 1 of air at [`REFERENCE_K`] and atmospheric pressure; proportional to 1/T (Gladstone-Dale).
 const REFRACTIVITY: f64 = 2.72e-4;
 const REFERENCE_K: f64 = 293.15;
 
-/// Refractivity n - 1 of air and of the gases of a flame at a temperature.
+/// Refractivity n - 1 of air and combustion gases at a temperature.
 #[inline(always)]
 pub(crate) fn refractivity(temperature_k: f64) -> f64 {
     REFRACTIVITY * REFERENCE_K / temperature_k.max(1.0)
 }
 
-/// The angles by which the gas bends what lies behind it.
-pub(crate) struct Haze {
+/// Deflection angles of the light from behind the gas.
+pub(crate) struct HeatHaze {
     pub(crate) rect: Rect,
     pub(crate) angle: Image<2>,
 }
 
-/// By how much the gas of a particle is optically shorter than air along a ray through its middle, in the picture's pixels there: the
-/// gradient of summed paths is an angle.
+/// Optical path difference to air along a ray through the center of a particle's sprite, in pixels at its depth: the gradient of
+/// the summed path differences, per pixel, is an angle.
 #[inline(always)]
-pub(crate) fn path(gas: &Gas, look: &LookParameters, seen: &Seen) -> f32 {
-    let excess = excess(gas, seen.index);
-    let length = look.haze_gain * excess * gas.volume(seen.index) * f64::from(seen.ellipse.peak);
+pub(crate) fn path(gas: &Gas, look: &LookParameters, seen: &ProjectedParticle) -> f32 {
+    let refractivity_excess = refractivity_excess(gas, seen.index);
+    let length = look.haze_gain * refractivity_excess * gas.volume(seen.index) * f64::from(seen.ellipse.peak);
     (length * f64::from(seen.scale)) as f32
 }
 
-/// Refractivity of a particle's gas beside that of the air around.
+/// Refractivity of a particle's gas minus that of the surrounding air.
 #[inline(always)]
-fn excess(gas: &Gas, index: usize) -> f64 {
+fn refractivity_excess(gas: &Gas, index: usize) -> f64 {
     refractivity(f64::from(gas.particles.temperature[index])) - refractivity(gas.air_temperature_k)
 }
 
-/// The gas that only bends, or all of it, as sprites of its paths.
-struct Rest<'a> {
+/// Particles as sprites of their optical path: those that emit and absorb nothing, or all.
+struct RefractionSprites<'a> {
     gas: &'a Gas<'a>,
     look: &'a LookParameters,
-    all: bool,
+    whole_gas: bool,
 }
 
-impl Kind for Rest<'_> {
+impl SpriteKind for RefractionSprites<'_> {
     type Record = Sprite<1>;
 
     #[inline(always)]
-    fn wants(&self, index: usize) -> bool {
-        (self.all || !shows(self.gas, self.look, index)) && excess(self.gas, index) != 0.0
+    fn includes(&self, index: usize) -> bool {
+        (self.whole_gas || !is_visible(self.gas, self.look, index)) && refractivity_excess(self.gas, index) != 0.0
     }
 
     #[inline(always)]
-    fn record(&self, seen: &Seen) -> Sprite<1> {
-        Sprite { ellipse: seen.ellipse, layer: 0, split: 0.0, values: [path(self.gas, self.look, seen)] }
+    fn record(&self, seen: &ProjectedParticle) -> Sprite<1> {
+        Sprite { ellipse: seen.ellipse, layer: 0, next_layer_weight: 0.0, values: [path(self.gas, self.look, seen)] }
     }
 }
 
-impl Haze {
-    /// `None` where nothing bends.
+impl HeatHaze {
+    /// `None` where nothing is deflected.
     ///
-    /// `summed` holds the paths of the gas that shows, as far as the window sees it; only those of the rest are summed here, and `all` where
-    /// the whole picture shows none.
+    /// `splatted` holds the paths of the visible gas inside the window; only the remaining gas is splatted here, or `whole_gas`
+    /// where no gas is visible in the whole picture.
     pub(crate) fn new(
         gas: &Gas,
         look: &LookParameters,
         view: &View,
-        summed: Option<&Grid<'_>>,
-        all: bool,
+        splatted: Option<&Grid<'_>>,
+        whole_gas: bool,
     ) -> Option<Self> {
         if look.haze_gain <= 0.0 {
             return None;
         }
-        let sheet =
-            Sheet { profile: Profile::LINE, least_radius: COARSE, layers: 1, picture: view.size, window: view.window };
-        let rest = splat(&sheet, &seen(gas, view, &Rest { gas, look, all }), gas.memory).sums();
-        let paths: Vec<Paths> = [(summed, PATH, PLANES), (rest.as_ref(), 0, 1)]
+        let settings = SplatSettings {
+            profile: Profile::LINE,
+            min_radius_cells: MIN_RADIUS_CELLS,
+            layers: 1,
+            picture: view.size,
+            window: view.window,
+        };
+        let rest =
+            splat(&settings, &project_particles(gas, view, &RefractionSprites { gas, look, whole_gas }), gas.scratch)
+                .sums();
+        let paths: Vec<OpticalPathField> = [(splatted, PATH, PLANES), (rest.as_ref(), 0, 1)]
             .into_iter()
-            .filter_map(|(grid, plane, planes)| Some(Paths::new(grid?, plane, planes)))
+            .filter_map(|(grid, plane, planes)| Some(OpticalPathField::new(grid?, plane, planes)))
             .collect();
         Self::from_paths(&paths, view.window)
     }
 
-    /// The gradient of the summed paths at every pixel: to the right and upward.
-    fn from_paths(paths: &[Paths], window: Rect) -> Option<Self> {
+    /// The gradient of the summed paths at every pixel, to the right and upward.
+    fn from_paths(paths: &[OpticalPathField], window: Rect) -> Option<Self> {
         let covered = paths.iter().map(|paths| paths.sums.covered().intersection(&window));
-        let rect = covered.reduce(|all, own| all.union(&own))?;
+        let rect = covered.reduce(|whole_gas, covered| whole_gas.union(&covered))?;
         let mut angle = Image::filled(rect.width, rect.height, [0.0; 2]);
         let level = Level::new();
-        // Beyond its own cells a grid holds nothing.
-        let parts = paths.iter().map(|paths| {
-            let own = paths.sums.covered().intersection(&rect);
-            (paths, own, paths.sums.columns(own.x, own.width))
+        // A grid holds nothing beyond its own cells.
+        let fields = paths.iter().map(|paths| {
+            let covered = paths.sums.covered().intersection(&rect);
+            (paths, covered, paths.sums.columns(covered.x, covered.width))
         });
-        let parts: Vec<_> = parts.collect();
+        let fields: Vec<_> = fields.collect();
         angle.pixels_mut().par_chunks_mut(rect.width.max(1)).enumerate().for_each(|(row, out)| {
             let y = rect.y + row;
-            for (paths, own, columns) in parts.iter().filter(|(_, own, _)| (own.y..own.bottom()).contains(&y)) {
-                let out = &mut out[own.x - rect.x..][..own.width];
+            for (paths, covered, columns) in
+                fields.iter().filter(|(_, covered, _)| (covered.y..covered.bottom()).contains(&y))
+            {
+                let out = &mut out[covered.x - rect.x..][..covered.width];
                 dispatch!(level, _simd => paths.add_gradient(columns, y, out));
             }
         });
         Some(Self { rect, angle })
     }
 
-    /// Adds the angles to the AOVs of a strip.
+    /// Writes the angles to the AOVs of a strip.
     pub(crate) fn measure(&self, strip: &mut Strip) {
         let rect = self.rect.intersection(&strip.rect);
         for y in rect.y..rect.bottom() {
@@ -138,14 +151,14 @@ impl Haze {
     }
 }
 
-/// Summed paths, whose slopes are angles.
-struct Paths<'a> {
+/// Summed optical paths with spline weights for values and slopes.
+struct OpticalPathField<'a> {
     sums: Grid<'a>,
     weights: Vec<[f32; 4]>,
     slopes: Vec<[f32; 4]>,
 }
 
-impl<'a> Paths<'a> {
+impl<'a> OpticalPathField<'a> {
     fn new(grid: &Grid<'a>, plane: usize, planes: usize) -> Self {
         Self {
             sums: grid.one_plane(plane, planes),
@@ -154,23 +167,23 @@ impl<'a> Paths<'a> {
         }
     }
 
-    /// Adds the gradient at row `y` of pixels that lie among `columns`.
+    /// Adds the gradient along row `y` for pixels in `columns`.
     #[inline(always)]
     fn add_gradient(&self, columns: &[(usize, usize)], y: usize, out: &mut [[f32; 2]]) {
         let cells = &self.sums.cells;
-        let (cell, phase) = cells.before(1, y);
+        let (cell, phase) = cells.cell_before(1, y);
         let rows = [-1, 0, 1, 2].map(|k| self.sums.row(cell + k));
-        let (mut level, mut steep) = (vec![0.0; cells.columns], vec![0.0; cells.columns]);
-        weigh(&mut level, rows, &self.weights[phase]);
-        weigh(&mut steep, rows, &self.slopes[phase]);
+        let (mut values, mut gradients) = (vec![0.0; cells.columns], vec![0.0; cells.columns]);
+        weighted_sum(&mut values, rows, &self.weights[phase]);
+        weighted_sum(&mut gradients, rows, &self.slopes[phase]);
         for (angle, &(first, phase)) in out.iter_mut().zip(columns) {
             let (along, across) = (&self.slopes[phase], &self.weights[phase]);
             let (mut right, mut down) = (0.0_f32, 0.0_f32);
             for k in 0..4 {
-                right = along[k].mul_add(level[first + k], right);
-                down = across[k].mul_add(steep[first + k], down);
+                right = along[k].mul_add(values[first + k], right);
+                down = across[k].mul_add(gradients[first + k], down);
             }
-            // Rows count downward, angles upward.
+            // Rows are counted downward, angles upward.
             *angle = [angle[0] + right, angle[1] - down];
         }
     }
@@ -192,7 +205,7 @@ mod tests {
             .collect();
         assert_eq!(rows.len(), 16);
         for row in rows {
-            // The sodium line, and green light, of which eyes see most.
+            // The sodium D line, and green light.
             for (column, allowed) in [(2, 2e-3), (6, 5e-3)] {
                 let off = refractivity(row[0]) / row[column] - 1.0;
                 assert!(off.abs() < allowed, "{off} off at {} K", row[0]);

@@ -1,4 +1,4 @@
-//! The light that the gas throws on others.
+//! Light that the gas casts on other objects: point lights along the flame.
 
 use std::ops::Range;
 
@@ -8,97 +8,101 @@ use bansho_base::{
     phenomenon::surroundings::{Emitter, Light},
 };
 
-use super::{gas::Gas, prepared::PARTICLES_OF_TASK};
-use crate::particles::look_parameters::LookParameters;
+use super::{gas::Gas, prepared::PARTICLES_PER_TASK};
+use crate::particles::parameters::LookParameters;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-/// Heights into which the flame is cut to find where its light comes from.
+/// Slabs of height over which emission is accumulated.
 const SLABS: usize = 48;
 
-/// What one slab sends out.
+/// Emission of one slab.
 #[derive(Clone, Copy, Debug, Default)]
 struct Slab {
-    /// Candela in every direction were nothing hidden, ACEScg.
+    /// Luminous intensity without self-absorption, cd, ACEScg.
     intensity: [f64; 3],
-    /// Luminous intensity times place, and times the square of the place across.
-    moment: DVec3,
-    spread: f64,
-    /// Sum of absorption times volume, m^2: optical depth times area.
-    shade: f64,
+    /// Intensity times position.
+    position_moment: DVec3,
+    radial_moment: f64,
+    /// Sum of absorption coefficient times volume, m^2: optical depth times area.
+    absorption_area: f64,
 }
 
 impl Slab {
-    fn luminous(&self) -> f64 {
+    fn point_lights_of_gas(&self) -> f64 {
         self.intensity.iter().sum::<f64>().max(0.0)
     }
 
-    /// Adds a share of another.
+    /// Adds another slab, times a weight.
     #[inline(always)]
-    fn add(&mut self, other: &Self, share: f64) {
+    fn add(&mut self, other: &Self, weight: f64) {
         for c in 0..3 {
-            self.intensity[c] += share * other.intensity[c];
+            self.intensity[c] += weight * other.intensity[c];
         }
-        self.moment += other.moment * share;
-        self.spread += share * other.spread;
-        self.shade += share * other.shade;
+        self.position_moment += other.position_moment * weight;
+        self.radial_moment += weight * other.radial_moment;
+        self.absorption_area += weight * other.absorption_area;
     }
 }
 
-/// Point lights that stand for the gas at time `t`: `look.light.count` parts of equal power along its height, each where its light is
-/// centred, so that they move as smoothly as the gas does.
+/// Point lights that represent the gas at `t`: `look.light.count` segments of equal power along its height, each at its center of
+/// intensity, so that they move as smoothly as the gas.
 ///
-/// Soot of volume V with absorption k and temperature T sends `V k B(T)` in every direction; what the soot of its part hides
-/// is taken off as by a slab of the same optical depth, `(1 - exp(-tau)) / tau`.
-pub fn luminous(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Light> {
+/// Soot of volume V with absorption coefficient k and temperature T emits `V k B(T)` in every direction. Self-absorption of a
+/// segment is that of a slab of the same optical depth, `(1 - exp(-tau)) / tau`.
+pub fn point_lights_of_gas(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Light> {
     let count = look.light.count.max(1) as usize;
     if look.light.scale <= 0.0 || gas.particles.is_empty() {
         return Vec::new();
     }
     let slabs = slabs(gas, look, t);
-    let total: f64 = slabs.iter().map(Slab::luminous).sum();
+    let total: f64 = slabs.iter().map(Slab::point_lights_of_gas).sum();
     if total.is_nan() || total <= 0.0 {
         return Vec::new();
     }
     (0..count)
-        .filter_map(|part| part_light(&slabs, [part, part + 1].map(|edge| total * edge as f64 / count as f64), look))
+        .filter_map(|fraction| {
+            range_light(&slabs, [fraction, fraction + 1].map(|edge| total * edge as f64 / count as f64), look)
+        })
         .collect()
 }
 
-/// The gas cut by height; a particle is shared by the two slabs around it.
+/// Emission by height; a particle is distributed to the two nearest slabs.
 fn slabs(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Slab> {
-    let (low, high) = heights(gas, t);
+    let (low, high) = height_range(gas, t);
     let step = ((high - low) / (SLABS - 1) as f64).max(1e-9);
     let level = Level::new();
-    let of_task = |range: Range<usize>| {
+    let task_slabs = |range: Range<usize>| {
         let mut slabs = vec![Slab::default(); SLABS + 1];
         dispatch!(level, _simd => add_to_slabs(gas, look, t, range.clone(), [low, step], &mut slabs));
         slabs
     };
-    // Sums of whole tasks, added in order, are the same however many threads there are.
-    let of_tasks: Vec<Vec<Slab>> = tasks(gas).into_par_iter().map(of_task).collect();
+    // Tasks are summed in order, so that the result does not depend on the number of threads.
+    let of_tasks: Vec<Vec<Slab>> = tasks(gas).into_par_iter().map(task_slabs).collect();
     of_tasks.into_iter().fold(vec![Slab::default(); SLABS + 1], |mut sums, slabs| {
         sums.iter_mut().zip(&slabs).for_each(|(sum, slab)| sum.add(slab, 1.0));
         sums
     })
 }
 
-/// The particles of each task.
+/// The particle range of each task.
 fn tasks(gas: &Gas) -> Vec<Range<usize>> {
     let count = gas.particles.len();
-    (0..count).step_by(PARTICLES_OF_TASK).map(|first| first..(first + PARTICLES_OF_TASK).min(count)).collect()
+    (0..count).step_by(PARTICLES_PER_TASK).map(|first| first..(first + PARTICLES_PER_TASK).min(count)).collect()
 }
 
-/// Heights of the lowest and the highest particle, m.
-fn heights(gas: &Gas, t: f64) -> (f64, f64) {
-    let of_task = |range: Range<usize>| {
-        range.map(|index| gas.place(index, t).y).fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
+/// Least and greatest height of particles, m.
+fn height_range(gas: &Gas, t: f64) -> (f64, f64) {
+    let task_slabs = |range: Range<usize>| {
+        range
+            .map(|index| gas.position(index, t).y)
+            .fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
     };
-    let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-    tasks(gas).into_par_iter().map(of_task).reduce(|| (f64::MAX, f64::MIN), both)
+    let min_max = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+    tasks(gas).into_par_iter().map(task_slabs).reduce(|| (f64::MAX, f64::MIN), min_max)
 }
 
-/// Adds particles to slabs `step` apart from the height `low` on.
+/// Adds particles to slabs that are `step` apart, from the height `low` on.
 #[inline(always)]
 fn add_to_slabs(
     gas: &Gas,
@@ -110,46 +114,46 @@ fn add_to_slabs(
 ) {
     let table = color::black_body();
     for index in range {
-        let shade = gas.absorption(index, look) * gas.volume(index);
-        if shade <= 0.0 {
+        let absorption_area = gas.absorption(index, look) * gas.volume(index);
+        if absorption_area <= 0.0 {
             continue;
         }
-        let place = gas.place(index, t);
+        let position = gas.position(index, t);
         let radiance = table.radiance(gas.particles.temperature[index]).map(f64::from);
-        let at = ((place.y - low) / step).clamp(0.0, (SLABS - 1) as f64);
-        let part = at - at.floor();
-        let intensity = radiance.map(|value| value * shade);
+        let slab_position = ((position.y - low) / step).clamp(0.0, (SLABS - 1) as f64);
+        let fraction = slab_position - slab_position.floor();
+        let intensity = radiance.map(|value| value * absorption_area);
         let power: f64 = intensity.iter().sum();
-        let spread = (place.x * place.x + place.z * place.z) * power;
-        let whole = Slab { intensity, moment: place * power, spread, shade };
-        slabs[at as usize].add(&whole, 1.0 - part);
-        slabs[at as usize + 1].add(&whole, part);
+        let radial_moment = (position.x * position.x + position.z * position.z) * power;
+        let contribution = Slab { intensity, position_moment: position * power, radial_moment, absorption_area };
+        slabs[slab_position as usize].add(&contribution, 1.0 - fraction);
+        slabs[slab_position as usize + 1].add(&contribution, fraction);
     }
 }
 
-/// The light of what lies between two sums of power, counted from below.
-fn part_light(slabs: &[Slab], [from, to]: [f64; 2], look: &LookParameters) -> Option<Light> {
+/// The light of the part of the flame between two values of cumulative power.
+fn range_light(slabs: &[Slab], [from, to]: [f64; 2], look: &LookParameters) -> Option<Light> {
     let mut sum = Slab::default();
-    let mut below = 0.0;
+    let mut cumulative = 0.0;
     for slab in slabs {
-        let above = below + slab.luminous();
-        let taken = (above.min(to) - below.max(from)).max(0.0);
+        let next_cumulative = cumulative + slab.point_lights_of_gas();
+        let taken = (next_cumulative.min(to) - cumulative.max(from)).max(0.0);
         if taken > 0.0 {
-            sum.add(slab, taken / slab.luminous());
+            sum.add(slab, taken / slab.point_lights_of_gas());
         }
-        below = above;
+        cumulative = next_cumulative;
     }
-    let power = sum.luminous();
+    let power = sum.point_lights_of_gas();
     if power <= 0.0 {
         return None;
     }
-    let position = sum.moment / power;
-    let across = (sum.spread / power - position.x * position.x - position.z * position.z).max(0.0).sqrt();
-    let radius = across.max(1e-3);
-    // Seen from the side, the part covers about a disc of twice its deviation.
-    let tau = sum.shade / (4.0 * std::f64::consts::PI * radius * radius);
-    let escapes = if tau > 1e-6 { -bansho_base::math::exp_m1(-tau) / tau } else { 1.0 };
-    let scale = look.light.scale * escapes;
+    let position = sum.position_moment / power;
+    let deviation = (sum.radial_moment / power - position.x * position.x - position.z * position.z).max(0.0).sqrt();
+    let radius = deviation.max(1e-3);
+    // Seen from the side, a segment covers about a disc of twice its standard deviation.
+    let tau = sum.absorption_area / (4.0 * std::f64::consts::PI * radius * radius);
+    let escape_fraction = if tau > 1e-6 { -bansho_base::math::exp_m1(-tau) / tau } else { 1.0 };
+    let scale = look.light.scale * escape_fraction;
     Some(Light {
         emitter: Emitter::Point { position, radius },
         intensity: sum.intensity.map(|value| (value * scale) as f32),

@@ -1,84 +1,84 @@
-//! The gas as the drawing sees it: where it is when the shutter is half closed, and what it radiates and absorbs.
+//! The gas as the renderer sees it: position at a time, emission and absorption of each particle.
 
 use bansho_base::{
     color,
     math::{self, DVec2, DVec3, Vec3, random::Key},
 };
 
-use crate::particles::{Particles, look_parameters::LookParameters, render::splat::buffers::Memory};
+use crate::particles::Particles;
+use crate::particles::{parameters::LookParameters, render::splat::scratch_pool::ScratchPool};
 
-/// The gas of one flame at one moment, with what the drawing needs to know of its surroundings.
+/// The gas of one flame at one time, with what rendering needs of its surroundings.
 #[derive(Clone, Copy, Debug)]
 pub struct Gas<'a> {
     /// The particles.
     pub particles: &'a Particles,
-    /// The time of their state, s.
+    /// Time of the particles' state, s.
     pub time: f64,
-    /// Temperature of the air around, K.
+    /// Temperature of the surrounding air, K.
     pub air_temperature_k: f64,
-    /// Speed of the gas where its detail is not stretched, m/s.
+    /// Speed of gas at which its detail is isotropic, m/s.
     pub detail_speed: f64,
-    /// Middle of the fire's base, m, from where sparks fly.
+    /// Center of the fire's base, m, where sparks start.
     pub base: DVec3,
-    /// Width and usual height of the fire, m.
+    /// Width and mean height of the fire, m.
     pub size: DVec2,
     /// Key of the flame's random numbers.
     pub key: Key,
-    /// What becomes of particles that are soon removed.
-    pub ending: Ending,
-    /// Memory to draw with, from frame to frame.
-    pub memory: &'a Memory,
+    /// How particles fade out before they are removed.
+    pub fade_out: FadeOut,
+    /// Scratch memory that is kept from frame to frame.
+    pub scratch: &'a ScratchPool,
 }
 
-/// How particles leave the picture before they are removed: nothing pops.
+/// Fading of particles before they are removed, so that none vanishes abruptly.
 #[derive(Clone, Copy, Debug)]
-pub struct Ending {
-    /// For how long a particle fades, s.
+pub struct FadeOut {
+    /// Duration of the fade, s.
     pub seconds: f32,
-    /// Corners of the box that gas may fill, from the particles' origin, m.
+    /// Corners of the domain relative to the particles' origin, m.
     pub domain: [Vec3; 2],
 }
 
-impl Ending {
-    /// Nothing ends.
+impl FadeOut {
+    /// No fading.
     pub const NEVER: Self = Self { seconds: f32::MIN_POSITIVE, domain: [Vec3::MIN, Vec3::MAX] };
 
-    /// How much of a particle is left at `place`, which moves at `velocity` and has `seconds` to live.
+    /// Remaining fraction of a particle at `position` that moves at `velocity` and has `seconds` to live.
     #[inline(always)]
-    pub(crate) fn share(&self, place: Vec3, velocity: Vec3, seconds: f32) -> f32 {
+    pub(crate) fn remaining_fraction(&self, position: Vec3, velocity: Vec3, seconds: f32) -> f32 {
         let [low, high] = self.domain;
-        let ahead = place + velocity * self.seconds;
-        if seconds >= self.seconds && ahead.cmpge(low).all() && ahead.cmple(high).all() {
+        let predicted = position + velocity * self.seconds;
+        if seconds >= self.seconds && predicted.cmpge(low).all() && predicted.cmple(high).all() {
             return 1.0;
         }
-        // The time until the first side toward which it moves.
-        let way = Vec3::select(velocity.cmplt(Vec3::ZERO), place - low, high - place).max(Vec3::ZERO);
-        let until = (way / velocity.abs().max(Vec3::splat(f32::MIN_POSITIVE))).min_element();
-        (until.min(seconds) / self.seconds).clamp(0.0, 1.0)
+        // Time until it leaves the domain through the first side that it moves toward.
+        let distance = Vec3::select(velocity.cmplt(Vec3::ZERO), position - low, high - position).max(Vec3::ZERO);
+        let seconds_to_exit = (distance / velocity.abs().max(Vec3::splat(f32::MIN_POSITIVE))).min_element();
+        (seconds_to_exit.min(seconds) / self.seconds).clamp(0.0, 1.0)
     }
 }
 
-/// Absorption coefficient of soot for visible light, 1/m, per volume fraction: about `4.9 / lambda` (Dalzell & Sarofim 1969), for
-/// green light.
+/// Absorption coefficient of soot per volume fraction, 1/m: `4.9 / lambda` (Dalzell and Sarofim 1969) for green light.
 const VISIBLE_SOOT_ABSORPTION: f64 = 4.9 / 550e-9;
 
-/// Luminance of a metre of freshly burning gas in the light of CH and C2, cd/m^2. The zone that shines is a film of a millimetre with
-/// some tens; particles spread it over centimetres.
+/// Luminance per meter of freshly burning gas in the light of CH and C2, cd/m^2. The real reaction zone is a film of a millimeter
+/// with some tens of cd/m^2; particles spread it over centimeters.
 const BLUE_LUMINANCE: f64 = 300.0;
 
-/// Share of the fuel that has burnt when the blue light is strongest.
-const BEGUN: f64 = 0.06;
+/// Fraction of burned fuel at which the blue light is strongest.
+const BLUE_PEAK_BURNED: f64 = 0.06;
 
-/// Absorption coefficient of soot of a volume fraction, 1/m.
+/// Absorption coefficient of soot for a volume fraction, 1/m.
 #[inline(always)]
 pub fn soot_absorption(volume_fraction: f64, look: &LookParameters) -> f64 {
     volume_fraction * VISIBLE_SOOT_ABSORPTION * look.soot_gain
 }
 
 impl Gas<'_> {
-    /// Where particle `index` is at time `t`, m: its state, moved on by its velocity.
+    /// Position of particle `index` at `t`, m, extrapolated by its velocity.
     #[inline(always)]
-    pub(crate) fn place(&self, index: usize, t: f64) -> DVec3 {
+    pub(crate) fn position(&self, index: usize, t: f64) -> DVec3 {
         let since = t - self.time;
         let coordinate = |axis: usize| {
             f64::from(self.particles.position[axis][index]) + since * f64::from(self.particles.velocity[axis][index])
@@ -86,14 +86,14 @@ impl Gas<'_> {
         self.particles.origin + DVec3::new(coordinate(0), coordinate(1), coordinate(2))
     }
 
-    /// The volume m/rho that a particle stands for, m^3; it fades before it is removed.
+    /// Volume m / rho that a particle represents, m^3, times its fade-out.
     #[inline(always)]
     pub(crate) fn volume(&self, index: usize) -> f64 {
-        let Particles { position, velocity, density, mass, life, age, .. } = self.particles;
-        let [place, velocity] = [position, velocity].map(|[x, y, z]| Vec3::new(x[index], y[index], z[index]));
-        let left = self.ending.share(place, velocity, life[index] - age[index]);
+        let Particles { position, velocity, density, mass, max_age, age, .. } = self.particles;
+        let [position, velocity] = [position, velocity].map(|[x, y, z]| Vec3::new(x[index], y[index], z[index]));
+        let remaining = self.fade_out.remaining_fraction(position, velocity, max_age[index] - age[index]);
         let density = f64::from(density[index]);
-        if density > 0.0 { f64::from(left * mass[index]) / density } else { 0.0 }
+        if density > 0.0 { f64::from(remaining * mass[index]) / density } else { 0.0 }
     }
 
     /// Absorption coefficient of a particle's soot, 1/m.
@@ -102,33 +102,33 @@ impl Gas<'_> {
         soot_absorption(f64::from(self.particles.soot[index]), look)
     }
 
-    /// Luminance of a black body as hot as a particle, cd/m^2.
+    /// Luminance of a black body at a particle's temperature, cd/m^2.
     #[inline(always)]
     pub(crate) fn luminance(&self, index: usize) -> f64 {
         f64::from(color::luminance(color::black_body().radiance(self.particles.temperature[index])))
     }
 
-    /// Whether a particle's gas has begun to burn and has not burnt out, and its blue light is drawn.
+    /// Whether a particle emits blue light: it has begun to burn and is not burnt out.
     #[inline(always)]
     pub(crate) fn is_blue(&self, index: usize, look: &LookParameters) -> bool {
-        /// Fuel at which less than 1e-4 of the most light is left.
-        const BURNT_OUT: f32 = 1.0 - 14.0 * BEGUN as f32;
+        /// Fuel fraction at which less than 1e-4 of the greatest blue light is left.
+        const BURNT_OUT: f32 = 1.0 - 14.0 * BLUE_PEAK_BURNED as f32;
         let fuel = self.particles.fuel[index];
         look.base_blue > 0.0 && fuel < 1.0 && fuel > BURNT_OUT
     }
 
-    /// Luminance of a metre of a particle's gas in the blue light of fresh flame, cd/m^2.
+    /// Luminance per meter of a particle's gas in the blue light of CH and C2, cd/m^2.
     ///
-    /// CH and C2 live only where fuel has just begun to burn, and nowhere that soot has formed.
+    /// CH and C2 exist where fuel has just begun to burn, and nowhere that soot has formed.
     #[inline(always)]
-    pub(crate) fn blue(&self, index: usize, look: &LookParameters) -> f64 {
+    pub(crate) fn blue_luminance(&self, index: usize, look: &LookParameters) -> f64 {
         if !self.is_blue(index, look) {
             return 0.0;
         }
-        /// Volume fraction of soot that outshines and quenches the blue light.
-        const SOOTY: f64 = 1e-7;
-        let burnt = (1.0 - f64::from(self.particles.fuel[index])).clamp(0.0, 1.0) / BEGUN;
-        let sooty = f64::from(self.particles.soot[index]).max(0.0) / SOOTY;
+        /// Volume fraction of soot that quenches the blue light to one half.
+        const QUENCHING_SOOT: f64 = 1e-7;
+        let burnt = (1.0 - f64::from(self.particles.fuel[index])).clamp(0.0, 1.0) / BLUE_PEAK_BURNED;
+        let sooty = f64::from(self.particles.soot[index]).max(0.0) / QUENCHING_SOOT;
         BLUE_LUMINANCE * look.base_blue * burnt * math::exp(1.0 - burnt) / (1.0 + sooty * sooty)
     }
 }

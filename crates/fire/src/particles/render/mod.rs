@@ -1,29 +1,32 @@
-//! How the gas looks: what it radiates, absorbs and bends, and the particles as the paper shows them.
+//! Rendering of the gas: emission, absorption and refraction of particles by splatting.
 //!
-//! Each particle is a ball of gas whose line integral is known in closed form (`kernel`). `survey` finds how the gas is spread, `sprite`
-//! each ball's ellipse in the picture (`perspective` sixteen at a time), `splat` sums all of them (`placed` among its cells) on a grid as
-//! coarse as they are smooth, in a few layers of depth; `resolve` turns the sums into light at every pixel, by splines (`spline`, `across`) and
-//! with the detail (`detail`) that sums lack. `haze` finds deflections, `light` what others are lit with.
+//! 1. `gas`: position, absorption and emission of each particle.
+//! 2. `depth_layers`: statistics over all particles, and depth layers of constant thickness.
+//! 3. `project`: the elliptical sprite of each particle, for every lens.
+//! 4. `splat`: line integrals of the kernel (`kernel`), rasterized (`rasterize`) and summed on grids (`grid`) as coarse as the sprites are
+//!    smooth, with memory from a pool (`scratch_pool`).
+//! 5. `resolve`: spline interpolation (`spline`, `upsample`), detail below the size of particles (`detail`, `strain`), and light per pixel.
+//! 6. `deflection`: heat haze. `emitted_light`: point lights for other objects. `aovs`: AOVs.
+//! 7. `prepared`: one frame, drawn into strips.
 
 mod aovs;
 mod deflection;
 mod depth_layers;
 mod emitted_light;
 pub(crate) mod gas;
-mod gas_statistics;
 mod prepared;
 pub(crate) mod project;
 pub(crate) mod resolve;
 pub(crate) mod splat;
 
-pub use super::look_parameters::{GasLightParameters, LookParameters, SpriteStyle};
+pub use crate::particles::parameters::{GasLightParameters, LookParameters, SpriteStyle};
 pub use aovs::AOVS;
-pub use emitted_light::luminous;
-pub use gas::{Ending, Gas, soot_absorption};
+pub use emitted_light::point_lights_of_gas;
+pub use gas::{FadeOut, Gas, soot_absorption};
 pub use prepared::{PreparedGas, depth_intervals};
 pub use splat::{
-    buffers::Memory,
     kernel::{line_gradient, line_integral},
+    scratch_pool::ScratchPool,
 };
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! One frame of the gas, ready to draw.
+//! One prepared frame of the gas.
 
 use std::sync::OnceLock;
 
@@ -17,80 +17,76 @@ use bansho_base::{
 };
 
 use super::{
-    aovs::{Motion, bounds},
-    deflection::{self, Haze},
-    depth_layers::Layers,
+    aovs::{MotionField, min_max},
+    deflection::{self, HeatHaze},
+    depth_layers::DepthLayers,
     gas::Gas,
-    gas_statistics::{Survey, shows},
+};
+use crate::particles::render::depth_layers::{GasStatistics, is_visible};
+use crate::particles::{
+    paper_squares::Squares,
+    parameters::{LookParameters, SpriteStyle},
+    render::{
+        resolve::{
+            BLUE, ColumnExtents, DETAIL_OFFSET, DepthLayer, GasResolver, LUMINANCE, LUMINANCE_KELVIN, PATH, PLANES, TAU,
+        },
+        splat::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, splat},
+    },
 };
 use crate::{
-    blue_flame,
-    particles::{
-        look_parameters::{LookParameters, SpriteStyle},
-        paper::squares::Squares,
-        render::{
-            project::sprite::{Kind, Seen, seen},
-            resolve::{
-                detail::Detail,
-                resolve_gas::{BLUE, Extents, GLOW, HEAT, Layer, MATTER, PATH, PLANES, Resolve, TAU},
-                spline,
-                strain::Strain,
-                upsample::Across,
-            },
-            splat::{
-                accumulate::{COARSE, Sheet, Splat, Sprite, splat},
-                grid::Grid,
-                kernel::Profile,
-            },
-        },
+    chemiluminescence_color,
+    particles::render::{
+        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+        resolve::{detail::Detail, spline, strain::Strain, upsample::RowInterpolator},
+        splat::{grid::Grid, kernel::Profile},
     },
-    sparks::{Fire, Streak},
+    sparks::{SparkEmitter, Streak},
 };
 use fearless_simd::{Level, dispatch};
 
-/// The gas of one frame.
+/// The gas of one frame, ready to be drawn into strips.
 pub struct PreparedGas<'a> {
     gas: Gas<'a>,
     look: &'a LookParameters,
     view: &'a View,
     level: Level,
-    layers: Layers,
-    matter: Matter<'a>,
+    layers: DepthLayers,
+    mode: DrawMode<'a>,
     sparks: Vec<Streak>,
-    /// Made where it is measured or bends what lies behind.
-    haze: OnceLock<Option<Haze>>,
+    /// Computed where it is requested as an AOV or bends the light from behind.
+    haze: OnceLock<Option<HeatHaze>>,
 }
 
-/// Particles that one task takes.
-pub(crate) const PARTICLES_OF_TASK: usize = 2048;
+/// Particles per task of the thread pool.
+pub(crate) const PARTICLES_PER_TASK: usize = 2048;
 
-/// What is drawn of the particles.
-enum Matter<'a> {
-    /// Nothing that the view could see.
-    Nothing,
-    /// Gas that other parts of the picture show.
-    Elsewhere,
-    /// Sums of sprites.
-    Sums(Box<Sums<'a>>),
-    /// Squares.
+/// How the particles are drawn.
+enum DrawMode<'a> {
+    /// The view sees no particles.
+    Empty,
+    /// Particles are visible only outside the window that is drawn.
+    OutsideWindow,
+    /// Sprites summed on a grid.
+    SplattedGas(Box<SplattedGas<'a>>),
+    /// The paper's density squares.
     Squares(Squares),
 }
 
-struct Sums<'a> {
+struct SplattedGas<'a> {
     grid: Grid<'a>,
-    extents: Extents,
+    extents: ColumnExtents,
     weights: Vec<[f32; 4]>,
-    across: Across,
+    across: RowInterpolator,
     detail: Option<(Detail, Strain)>,
     scattered: Vec<[f32; 3]>,
-    /// Where it is measured, and anything glows.
-    motion: Option<Motion<'a>>,
+    /// Where AOVs are requested, and anything glows.
+    motion: Option<MotionField<'a>>,
     temperatures: [f32; 2],
 }
 
-/// The fire whose sparks fly.
-fn fire<'a>(gas: &Gas, look: &'a LookParameters, view: &View) -> Fire<'a> {
-    Fire {
+/// Sparks of the fire.
+fn spark_emitter<'a>(gas: &Gas, look: &'a LookParameters, view: &View) -> SparkEmitter<'a> {
+    SparkEmitter {
         parameters: &look.sparks,
         key: gas.key,
         now: view.shutter.middle(),
@@ -102,15 +98,15 @@ fn fire<'a>(gas: &Gas, look: &'a LookParameters, view: &View) -> Fire<'a> {
     }
 }
 
-/// The stretches of depth that the gas and its sparks fill.
+/// Depth intervals of the gas and its sparks.
 pub fn depth_intervals(gas: &Gas, look: &LookParameters, view: &View) -> Vec<DepthInterval> {
     if gas.particles.is_empty() && look.sparks.rate <= 0.0 {
         return Vec::new();
     }
-    let layers = Survey::new(gas, look, view).layers(gas);
+    let layers = GasStatistics::new(gas, look, view).layers(gas);
     let mut intervals: Vec<DepthInterval> = layers.intervals().collect();
     if look.sparks.rate > 0.0 {
-        let middle = layers.centre(layers.count / 2);
+        let middle = layers.center(layers.count / 2);
         let reach = look.sparks.swirl + 0.5 * layers.thickness * layers.count as f64;
         intervals.push(DepthInterval { near: (middle - reach).max(0.0), far: middle + reach });
     }
@@ -130,157 +126,163 @@ impl<'a> PreparedGas<'a> {
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
         check(observer)?;
-        let survey = Survey::new(&gas, look, view);
-        let layers = survey.layers(&gas);
-        let matter = match look.sprite {
-            SpriteStyle::Squares => Matter::Squares(Squares::new(&gas, look, view)),
-            _ => sums(&gas, look, view, &survey, surroundings),
+        let statistics = GasStatistics::new(&gas, look, view);
+        let layers = statistics.layers(&gas);
+        let mode = match look.sprite {
+            SpriteStyle::Squares => DrawMode::Squares(Squares::new(&gas, look, view)),
+            _ => splat_gas(&gas, look, view, &statistics, surroundings),
         };
         check(observer)?;
-        let mut sparks = fire(&gas, look, view).streaks(view, surroundings.wind);
+        let mut sparks = spark_emitter(&gas, look, view).streaks(view, surroundings.wind);
         sparks.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-        let prepared = Self { gas, look, view, level: Level::new(), layers, matter, sparks, haze: OnceLock::new() };
+        let prepared = Self { gas, look, view, level: Level::new(), layers, mode, sparks, haze: OnceLock::new() };
         if view.measured {
             prepared.haze();
         }
         Ok(prepared)
     }
 
-    /// The layers that lie in a slice, nearest first.
-    fn layers_in<'b>(&'b self, slice: &'b DepthInterval) -> impl Iterator<Item = Layer> + 'b {
+    /// The layers in a slice, nearest first.
+    fn layers_in<'b>(&'b self, slice: &'b DepthInterval) -> impl Iterator<Item = DepthLayer> + 'b {
         let thickness = self.layers.thickness;
-        let layer = move |index| Layer { index, depth: self.layers.centre(index), thickness };
+        let layer = move |index| DepthLayer { index, depth: self.layers.center(index), thickness };
         (0..self.layers.count).map(layer).filter(|layer| slice.contains(layer.depth))
     }
 
-    fn resolve<'b>(&'b self, sums: &'b Sums<'_>) -> Resolve<'b> {
-        Resolve {
-            grid: &sums.grid,
+    fn resolve<'b>(&'b self, splat_gas: &'b SplattedGas<'_>) -> GasResolver<'b> {
+        GasResolver {
+            grid: &splat_gas.grid,
             camera: &self.view.camera,
             origin: self.gas.particles.origin,
-            detail: sums.detail.as_ref().map(|(detail, strain)| (detail, strain)),
-            hides_itself: self.look.sprite == SpriteStyle::Integral,
-            blue: blue_flame::colour(),
-            scattered: &sums.scattered,
-            weights: &sums.weights,
-            across: &sums.across,
-            temperatures: sums.temperatures,
+            detail: splat_gas.detail.as_ref().map(|(detail, strain)| (detail, strain)),
+            self_absorption: self.look.sprite == SpriteStyle::Integral,
+            blue: chemiluminescence_color(),
+            scattered: &splat_gas.scattered,
+            weights: &splat_gas.weights,
+            across: &splat_gas.across,
+            temperatures: splat_gas.temperatures,
         }
     }
 }
 
-/// Sums all sprites in their layers.
-fn sums<'a>(
+/// Splats all sprites into their depth layers.
+fn splat_gas<'a>(
     gas: &Gas<'a>,
     look: &LookParameters,
     view: &View,
-    survey: &Survey,
+    statistics: &GasStatistics,
     surroundings: &Surroundings,
-) -> Matter<'a> {
-    let layers = survey.layers(gas);
-    let detail = survey.scale(gas, view).and_then(|scale| Detail::new(gas, look, &scale));
-    let shining = Shining {
+) -> DrawMode<'a> {
+    let layers = statistics.layers(gas);
+    let detail = statistics.scale(gas, view).and_then(|scale| Detail::new(gas, look, &scale));
+    let radiance = RadianceSprites {
         gas,
         look,
         layers: &layers,
         opacity: mean_density(gas).map_or(0.0, |density| look.opacity / density),
         detail: detail.as_ref(),
-        since: view.shutter.middle() - gas.time,
+        seconds_since_state: view.shutter.middle() - gas.time,
     };
-    let sprites = seen(gas, view, &shining);
+    let sprites = project_particles(gas, view, &radiance);
     let profile = if look.sprite == SpriteStyle::Poly6 { Profile::POLY6 } else { Profile::LINE };
     let grid = match splat(
-        &Sheet { profile, least_radius: COARSE, layers: layers.count, picture: view.size, window: view.window },
+        &SplatSettings {
+            profile,
+            min_radius_cells: MIN_RADIUS_CELLS,
+            layers: layers.count,
+            picture: view.size,
+            window: view.window,
+        },
         &sprites,
-        gas.memory,
+        gas.scratch,
     ) {
-        Splat::Sums(grid) => grid,
-        Splat::Elsewhere => return Matter::Elsewhere,
-        Splat::Nothing => return Matter::Nothing,
+        SplatResult::Sums(grid) => grid,
+        SplatResult::OutsideWindow => return DrawMode::OutsideWindow,
+        SplatResult::Empty => return DrawMode::Empty,
     };
-    let extents = Extents::new(&grid, layers.count);
-    let strained = |detail: Detail| {
+    let extents = ColumnExtents::new(&grid, layers.count);
+    let with_strain = |detail: Detail| {
         let strain = Strain::new(&grid, &extents, layers.count, detail.cell_pixels);
         (detail, strain)
     };
-    let detail = detail.map(strained);
-    let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.centre(layer), surroundings));
-    Matter::Sums(Box::new(Sums {
+    let detail = detail.map(with_strain);
+    let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.center(layer), surroundings));
+    DrawMode::SplattedGas(Box::new(SplattedGas {
         extents,
         weights: spline::weights(&grid.cells),
-        across: Across::new(&grid, view.size[0], &spline::weights(&grid.cells)),
+        across: RowInterpolator::new(&grid, view.size[0], &spline::weights(&grid.cells)),
         grid,
         detail,
         scattered: scattered.collect(),
-        motion: if view.measured { Motion::new(gas, look, view) } else { None },
-        temperatures: bounds(gas.particles.temperature.iter().copied()),
+        motion: if view.measured { MotionField::new(gas, look, view) } else { None },
+        temperatures: min_max(gas.particles.temperature.iter().copied()),
     }))
 }
 
-/// The gas that shows, as sprites of its light and shade.
-struct Shining<'a> {
+/// Visible particles as sprites of emission and absorption.
+struct RadianceSprites<'a> {
     gas: &'a Gas<'a>,
     look: &'a LookParameters,
-    layers: &'a Layers,
-    /// Opacity of a poly6 sprite beside the gas's density.
+    layers: &'a DepthLayers,
+    /// Opacity of a poly6 sprite per density.
     opacity: f64,
     detail: Option<&'a Detail>,
-    /// Time from the particles' state, s.
-    since: f64,
+    /// Time since the particles' state, s.
+    seconds_since_state: f64,
 }
 
-impl Kind for Shining<'_> {
+impl SpriteKind for RadianceSprites<'_> {
     type Record = Sprite<PLANES>;
 
     #[inline(always)]
-    fn wants(&self, index: usize) -> bool {
-        shows(self.gas, self.look, index)
+    fn includes(&self, index: usize) -> bool {
+        is_visible(self.gas, self.look, index)
     }
 
     #[inline(always)]
-    fn record(&self, seen: &Seen) -> Sprite<PLANES> {
-        let (layer, split) = self.layers.place(seen.depth);
+    fn record(&self, seen: &ProjectedParticle) -> Sprite<PLANES> {
+        let (layer, next_layer_weight) = self.layers.layer_at(seen.depth);
         let mut values = match self.look.sprite {
-            SpriteStyle::Poly6 => self.paper_values(seen.index),
+            SpriteStyle::Poly6 => self.density_values(seen.index),
             _ => self.values(seen),
         };
         if let Some(detail) = self.detail {
-            let matter = detail.matter(self.gas, seen.index, self.since);
+            let offset = detail.detail_offset(self.gas, seen.index, self.seconds_since_state);
             for axis in 0..3 {
-                values[MATTER + axis] = values[TAU] * matter[axis];
+                values[DETAIL_OFFSET + axis] = values[TAU] * offset[axis];
             }
         }
-        Sprite { ellipse: seen.ellipse, layer, split, values }
+        Sprite { ellipse: seen.ellipse, layer, next_layer_weight, values }
     }
 }
 
-impl Shining<'_> {
-    /// What a ray through the middle of a particle's sprite sees.
+impl RadianceSprites<'_> {
+    /// Line integrals through the center of a particle's sprite.
     #[inline(always)]
-    fn values(&self, seen: &Seen) -> [f32; PLANES] {
+    fn values(&self, seen: &ProjectedParticle) -> [f32; PLANES] {
         let (gas, index) = (self.gas, seen.index);
         let length = gas.volume(index) * f64::from(seen.ellipse.peak);
         let tau = length * gas.absorption(index, self.look);
-        let mut values = self.glowing(index, tau);
-        values[BLUE] = (length * gas.blue(index, self.look)) as f32;
+        let mut values = self.emission_values(index, tau);
+        values[BLUE] = (length * gas.blue_luminance(index, self.look)) as f32;
         values[PATH] = deflection::path(gas, self.look, seen);
         values
     }
 
-    /// The paper's sprite (section 5.2): opacity by density, colour by temperature.
+    /// The paper's sprite (section 5.2): opacity by density, color by temperature.
     #[inline(always)]
-    fn paper_values(&self, index: usize) -> [f32; PLANES] {
-        self.glowing(index, self.opacity * f64::from(self.gas.particles.density[index]))
+    fn density_values(&self, index: usize) -> [f32; PLANES] {
+        self.emission_values(index, self.opacity * f64::from(self.gas.particles.density[index]))
     }
 
-    /// Optical depth, and what shines with it.
+    /// Optical depth, and the luminance that goes with it.
     #[inline(always)]
-    fn glowing(&self, index: usize, tau: f64) -> [f32; PLANES] {
+    fn emission_values(&self, index: usize, tau: f64) -> [f32; PLANES] {
         let glow = tau * self.gas.luminance(index);
         let mut values = [0.0; PLANES];
         values[TAU] = tau as f32;
-        values[GLOW] = glow as f32;
-        values[HEAT] = (glow * f64::from(self.gas.particles.temperature[index])) as f32;
+        values[LUMINANCE] = glow as f32;
+        values[LUMINANCE_KELVIN] = (glow * f64::from(self.gas.particles.temperature[index])) as f32;
         values
     }
 }
@@ -291,27 +293,27 @@ fn mean_density(gas: &Gas) -> Option<f64> {
     (sum > 0.0).then(|| sum / densities.len() as f64)
 }
 
-/// What soot at a depth along the line of sight to the flame scatters where it hides everything: light of others, alike in all directions.
+/// Radiance that opaque soot at a depth scatters toward the camera: isotropic single scattering of other lights.
 fn scattered(gas: &Gas, look: &LookParameters, view: &View, depth: f64, surroundings: &Surroundings) -> [f32; 3] {
     let toward = (gas.particles.origin - view.camera.position).normalize_or(DVec3::NEG_Z);
-    let place = view.camera.position + toward * depth;
-    let share = (look.smoke_albedo / (4.0 * std::f64::consts::PI)) as f32;
+    let position = view.camera.position + toward * depth;
+    let scale = (look.smoke_albedo / (4.0 * std::f64::consts::PI)) as f32;
     let mut sum = [0.0; 3];
     for light in &surroundings.others.lights {
-        let (illuminance, _) = light.illuminance(place);
-        (0..3).for_each(|c| sum[c] += illuminance[c] * share);
+        let (illuminance, _) = light.illuminance(position);
+        (0..3).for_each(|c| sum[c] += illuminance[c] * scale);
     }
     sum
 }
 
 impl Prepared for PreparedGas<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
-        let gas = match &self.matter {
-            Matter::Sums(sums) if self.layers_in(slice).next().is_some() => sums.grid.covered(),
-            Matter::Squares(squares) => squares.bounds(slice),
+        let gas = match &self.mode {
+            DrawMode::SplattedGas(splat_gas) if self.layers_in(slice).next().is_some() => splat_gas.grid.covered(),
+            DrawMode::Squares(squares) => squares.bounds(slice),
             _ => Rect::default(),
         };
-        // Gas that bends light reaches further than what shines of it.
+        // Gas that refracts extends farther than gas that emits.
         let all = self.measured_haze(slice).map_or(gas, |haze| gas.union(&haze.rect));
         let sparks = self.sparks.iter().filter(|spark| slice.contains(spark.depth));
         sparks.fold(all, |all, spark| all.union(&spark.bounds(self.view.size)))
@@ -319,10 +321,10 @@ impl Prepared for PreparedGas<'_> {
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let mut sparks = self.sparks.iter().filter(|spark| slice.contains(spark.depth)).peekable();
-        if let Matter::Sums(sums) = &self.matter {
-            let resolve = self.resolve(sums);
+        if let DrawMode::SplattedGas(splat_gas) = &self.mode {
+            let resolve = self.resolve(splat_gas);
             let mut row = resolve.row();
-            let rect = sums.grid.covered().intersection(&strip.rect);
+            let rect = splat_gas.grid.covered().intersection(&strip.rect);
             for layer in self.layers_in(slice) {
                 while let Some(spark) = sparks.next_if(|spark| spark.depth < layer.depth) {
                     spark.draw(self.view.size, strip);
@@ -330,13 +332,13 @@ impl Prepared for PreparedGas<'_> {
                 if rect.is_empty() {
                     continue;
                 }
-                dispatch!(self.level, _simd => resolve.draw_layer(&layer, &sums.extents, rect, &mut row, strip));
+                dispatch!(self.level, _simd => resolve.draw_layer(&layer, &splat_gas.extents, rect, &mut row, strip));
                 if !strip.aovs.is_empty() {
-                    resolve.measure_layer(&layer, &sums.extents, sums.motion.as_ref(), rect, &mut row, strip);
+                    resolve.measure_layer(&layer, &splat_gas.extents, splat_gas.motion.as_ref(), rect, &mut row, strip);
                 }
             }
         }
-        if let Matter::Squares(squares) = &self.matter {
+        if let DrawMode::Squares(squares) = &self.mode {
             squares.draw(slice, strip);
         }
         if !strip.aovs.is_empty() {
@@ -351,25 +353,27 @@ impl Prepared for PreparedGas<'_> {
 
     fn deflection(&self) -> Option<Deflection<'_>> {
         let haze = self.haze()?;
-        let depth = self.layers.centre(self.layers.count - 1) + 0.5 * self.layers.thickness;
+        let depth = self.layers.center(self.layers.count - 1) + 0.5 * self.layers.thickness;
         Some(Deflection { depth, rect: haze.rect, angle: &haze.angle })
     }
 }
 
 impl PreparedGas<'_> {
-    /// The haze, summed by all threads; where it is measured, strips find it made.
-    fn haze(&self) -> Option<&Haze> {
-        let (summed, all) = match &self.matter {
-            Matter::Sums(sums) if self.look.sprite == SpriteStyle::Integral => (Some(&sums.grid), false),
-            Matter::Elsewhere if self.look.sprite == SpriteStyle::Integral => (None, false),
+    /// The haze, computed by all threads. Where AOVs are requested it exists before strips are drawn.
+    fn haze(&self) -> Option<&HeatHaze> {
+        let (summed, all) = match &self.mode {
+            DrawMode::SplattedGas(splat_gas) if self.look.sprite == SpriteStyle::Integral => {
+                (Some(&splat_gas.grid), false)
+            }
+            DrawMode::OutsideWindow if self.look.sprite == SpriteStyle::Integral => (None, false),
             _ => (None, true),
         };
-        get_or_make(&self.haze, || Haze::new(&self.gas, self.look, self.view, summed, all)).as_ref()
+        get_or_make(&self.haze, || HeatHaze::new(&self.gas, self.look, self.view, summed, all)).as_ref()
     }
 
-    /// The haze where it is measured in a slice: in one alone, however many the layers fall into.
-    fn measured_haze(&self, slice: &DepthInterval) -> Option<&Haze> {
-        let is_here = self.view.measured && slice.contains(self.layers.centre(self.layers.count - 1));
+    /// The haze, in the one slice in which its AOV is written.
+    fn measured_haze(&self, slice: &DepthInterval) -> Option<&HeatHaze> {
+        let is_here = self.view.measured && slice.contains(self.layers.center(self.layers.count - 1));
         self.haze.get().and_then(Option::as_ref).filter(|_| is_here)
     }
 

@@ -1,4 +1,4 @@
-//! Burners: where gas is born, and the scales that follow from how large and how strong a burner is.
+//! Burners: where particles are spawned, and the length and velocity scales that follow from diameter and heat release rate.
 
 use std::sync::Arc;
 
@@ -30,27 +30,27 @@ const BASE_FROUDE: f64 = 0.4;
 #[derive(Clone, Debug)]
 pub(crate) struct Burner {
     pub(crate) parameters: BurnerParameters,
-    /// How it is turned and scaled; where it is changes over time.
-    turned: Placement,
-    area: Area,
-    /// Width D across which gas burns: sets puffing and eddies, m.
+    /// Rotation and scale; the position varies over time.
+    placement: Placement,
+    area: BurnerSurface,
+    /// Diameter D across which gas burns, m; it sets puffing frequency and eddy size.
     pub(crate) diameter: f64,
-    /// Area from which gas comes, m^2.
-    pub(crate) square_metres: f64,
-    /// Mean height of the visible flame, m.
+    /// Area through which gas is emitted, m^2.
+    pub(crate) area_m2: f64,
+    /// Mean visible flame height, m.
     pub(crate) height: f64,
-    /// Speed of gas at birth, m/s.
+    /// Exit velocity of gas, m/s.
     pub(crate) speed: f64,
-    /// Acceleration of gas along the axis, m/s^2.
+    /// Acceleration of gas along the plume axis, m/s^2.
     pub(crate) acceleration: f64,
-    /// Radius of a ball around its position that holds the burner, m.
-    pub(crate) reach: f64,
-    /// Corners of the box around it as it is turned, beside its position, m.
+    /// Radius of a sphere around its position that encloses the burner, m.
+    pub(crate) bounding_radius: f64,
+    /// Corners of its axis-aligned bounding box after rotation, relative to its position, m.
     pub(crate) extent: [DVec3; 2],
 }
 
 #[derive(Clone, Debug)]
-enum Area {
+enum BurnerSurface {
     Disc,
     Ball,
     Strip,
@@ -58,13 +58,13 @@ enum Area {
     Cuboid,
 }
 
-/// Where a particle is born, and which way it leaves.
+/// Position and direction at which a particle is spawned.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Birthplace {
+pub(crate) struct SpawnPoint {
     pub(crate) position: DVec3,
     pub(crate) direction: DVec3,
-    /// How far it is from the middle of a disc or a strip: 0 there to 1 at the rim, a mean place elsewhere.
-    pub(crate) outward: f64,
+    /// Radial position on a disc or strip: 0 at the center, 1 at the rim; a mean value for other shapes.
+    pub(crate) radial_fraction: f64,
 }
 
 impl Burner {
@@ -74,9 +74,9 @@ impl Burner {
         assets: &dyn Assets,
     ) -> Result<Self, ParticleFaultKind> {
         let scale = if parameters.shape == BurnerShape::Mesh { parameters.scale } else { 1.0 };
-        let turned = Placement::new([0.0; 3], parameters.rotation_deg, scale);
+        let placement = Placement::new([0.0; 3], parameters.rotation_deg, scale);
         let (area, size) = area(parameters, assets)?;
-        let equivalent = math::sqrt(4.0 * size.square_metres / std::f64::consts::PI);
+        let equivalent = math::sqrt(4.0 * size.area_m2 / std::f64::consts::PI);
         let height = match parameters.height {
             Auto::Set(height) => height,
             Auto::Auto => heskestad(parameters.heat_release_kw, equivalent).max(0.5 * size.diameter),
@@ -87,38 +87,38 @@ impl Burner {
         };
         Ok(Self {
             parameters: parameters.clone(),
-            turned,
+            placement,
             area,
             diameter: size.diameter,
-            square_metres: size.square_metres,
+            area_m2: size.area_m2,
             height,
             speed,
             acceleration: AXIS_ACCELERATION * flame.motion.buoyancy,
-            reach: size.reach,
+            bounding_radius: size.bounding_radius,
             extent: match &size.mesh {
-                Some(mesh) => extent(mesh, &turned),
-                None => around(parameters, &turned),
+                Some(mesh) => extent(mesh, &placement),
+                None => primitive_extent(parameters, &placement),
             },
         })
     }
 
-    /// Where its middle is at `t`, m from the flame's position.
+    /// Position of its center at `t`, m from the flame's position.
     pub(crate) fn position(&self, t: f64) -> DVec3 {
         self.parameters.position.at(t).into()
     }
 
-    /// Speed of gas at `height` along the axis, m/s.
+    /// Speed of gas at `height` on the plume axis, m/s.
     pub(crate) fn axis_speed(&self, height: f64) -> f64 {
         math::sqrt(self.speed * self.speed + 2.0 * self.acceleration * height.max(0.0))
     }
 
-    /// Time that gas takes to the flame's tip, s.
+    /// Time that gas takes to rise to the flame's tip, s.
     pub(crate) fn rise_time(&self) -> f64 {
-        // The same as (axis_speed - speed) / acceleration, without the division by a vanishing acceleration.
+        // Equal to (axis_speed - speed) / acceleration, without dividing by a vanishing acceleration.
         2.0 * self.height / (self.speed + self.axis_speed(self.height))
     }
 
-    /// How often the fire puffs, Hz (Cetegen and Ahmed 1993).
+    /// Puffing frequency, Hz: `1.5 / sqrt(D)` (Cetegen and Ahmed 1993).
     pub(crate) fn puffing_hz(&self, flame: &FlameParticlesParameters) -> f64 {
         match flame.motion.puffing_hz {
             Auto::Set(hz) => hz,
@@ -126,66 +126,67 @@ impl Burner {
         }
     }
 
-    /// Where the particle `birth` is born at `t`: as likely anywhere on the burner.
-    pub(crate) fn birthplace(&self, key: Key, birth: u64, t: f64) -> Birthplace {
-        let words = key.words(birth, 0, Purpose::named("birthplace"));
-        let (position, direction) = self.local(words);
+    /// Spawn point of particle `id` at `t`, uniformly distributed over the burner.
+    pub(crate) fn spawn_point(&self, key: Key, id: u64, t: f64) -> SpawnPoint {
+        let words = key.words(id, 0, Purpose::named("birthplace"));
+        let (position, direction) = self.sample_local(words);
         let radius = 0.5 * self.parameters.diameter;
-        let outward = match self.area {
-            Area::Disc | Area::Ball => position.length() / radius,
-            Area::Strip => position.z.abs() / radius,
-            Area::Cuboid | Area::Surface(_) => std::f64::consts::FRAC_1_SQRT_2,
+        let radial_fraction = match self.area {
+            BurnerSurface::Disc | BurnerSurface::Ball => position.length() / radius,
+            BurnerSurface::Strip => position.z.abs() / radius,
+            BurnerSurface::Cuboid | BurnerSurface::Surface(_) => std::f64::consts::FRAC_1_SQRT_2,
         };
-        let placement = Placement { position: self.position(t), ..self.turned };
-        Birthplace { position: placement.to_world(position), direction: placement.turn(direction), outward }
+        let placement = Placement { position: self.position(t), ..self.placement };
+        SpawnPoint { position: placement.to_world(position), direction: placement.turn(direction), radial_fraction }
     }
 
-    /// Place and direction in the burner's own coordinates.
-    fn local(&self, words: [u32; 4]) -> (DVec3, DVec3) {
+    /// Position and direction in the burner's own coordinates.
+    fn sample_local(&self, words: [u32; 4]) -> (DVec3, DVec3) {
         let [u, v, w, _] = words.map(|word| f64::from(uniform(word)));
         let radius = 0.5 * self.parameters.diameter;
         let (sine, cosine) = math::sin_cos(std::f64::consts::TAU * v);
         match &self.area {
-            Area::Disc => (DVec3::new(cosine, 0.0, sine) * (radius * math::sqrt(u)), DVec3::Y),
-            Area::Ball => {
+            BurnerSurface::Disc => (DVec3::new(cosine, 0.0, sine) * (radius * math::sqrt(u)), DVec3::Y),
+            BurnerSurface::Ball => {
                 let height = 2.0 * w - 1.0;
                 let across = math::sqrt((1.0 - height * height).max(0.0));
                 (DVec3::new(cosine * across, height, sine * across) * (radius * math::cbrt(u)), DVec3::Y)
             }
-            Area::Strip => {
+            BurnerSurface::Strip => {
                 let along = self.parameters.length * (u - 0.5);
                 (DVec3::new(along, 0.0, self.parameters.diameter * (w - 0.5)), DVec3::Y)
             }
-            Area::Cuboid => cuboid(self.parameters.size, [u, v, w]),
-            Area::Surface(sampler) => sampler.at([uniform_f64(words[0], words[3]), v, w]),
+            BurnerSurface::Cuboid => box_surface_point(self.parameters.size, [u, v, w]),
+            BurnerSurface::Surface(sampler) => sampler.at([uniform_f64(words[0], words[3]), v, w]),
         }
     }
 }
 
-/// Mean height of the visible flame, m, from the heat release rate in kW and the diameter in m (Heskestad 1983).
+/// Mean visible flame height `L = 0.235 Q^(2/5) - 1.02 D`, m, from the heat release rate Q in kW and the diameter D in m (Heskestad
+/// 1983).
 pub fn heskestad(heat_release_kw: f64, diameter: f64) -> f64 {
     0.235 * math::pow(heat_release_kw, 0.4) - 1.02 * diameter
 }
 
 struct Size {
     diameter: f64,
-    square_metres: f64,
-    reach: f64,
+    area_m2: f64,
+    bounding_radius: f64,
     mesh: Option<Arc<Mesh>>,
 }
 
-/// Corners of the box around a mesh as it is turned.
-fn extent(mesh: &Mesh, turned: &Placement) -> [DVec3; 2] {
-    let corners = mesh.triangles().flatten().map(|corner| turned.to_world(corner));
-    let around = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
-    corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around)
+/// Corners of the bounding box of a rotated mesh.
+fn extent(mesh: &Mesh, placement: &Placement) -> [DVec3; 2] {
+    let corners = mesh.triangles().flatten().map(|corner| placement.to_world(corner));
+    let primitive_extent = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
+    corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], primitive_extent)
 }
 
-/// The same of any other area.
-fn around(parameters: &BurnerParameters, turned: &Placement) -> [DVec3; 2] {
+/// The same for the analytic shapes.
+fn primitive_extent(parameters: &BurnerParameters, placement: &Placement) -> [DVec3; 2] {
     let BurnerParameters { diameter, length, size, .. } = *parameters;
     let radius = 0.5 * diameter;
-    let axis = |unit: DVec3, half: f64| turned.turn(unit) * half;
+    let axis = |unit: DVec3, half: f64| placement.turn(unit) * half;
     let half = match parameters.shape {
         BurnerShape::Point | BurnerShape::Mesh => DVec3::splat(radius),
         BurnerShape::Disc => {
@@ -201,17 +202,17 @@ fn around(parameters: &BurnerParameters, turned: &Placement) -> [DVec3; 2] {
     [-half, half]
 }
 
-fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(Area, Size), ParticleFaultKind> {
+fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(BurnerSurface, Size), ParticleFaultKind> {
     let BurnerParameters { diameter, length, size: [x, y, z], scale, .. } = *parameters;
-    let round = 0.25 * std::f64::consts::PI * diameter * diameter;
-    let size = |diameter, square_metres, reach| Size { diameter, square_metres, reach, mesh: None };
+    let disc_area = 0.25 * std::f64::consts::PI * diameter * diameter;
+    let size = |diameter, area_m2, bounding_radius| Size { diameter, area_m2, bounding_radius, mesh: None };
     Ok(match parameters.shape {
-        BurnerShape::Disc => (Area::Disc, size(diameter, round, 0.5 * diameter)),
-        BurnerShape::Point => (Area::Ball, size(diameter, round, 0.5 * diameter)),
-        BurnerShape::Line => (Area::Strip, size(diameter, diameter * length, 0.5 * (diameter + length))),
+        BurnerShape::Disc => (BurnerSurface::Disc, size(diameter, disc_area, 0.5 * diameter)),
+        BurnerShape::Point => (BurnerSurface::Ball, size(diameter, disc_area, 0.5 * diameter)),
+        BurnerShape::Line => (BurnerSurface::Strip, size(diameter, diameter * length, 0.5 * (diameter + length))),
         BurnerShape::Box => {
             let surface = 2.0 * (x * y + y * z + z * x);
-            (Area::Cuboid, size(x.min(z), surface, 0.5 * DVec3::new(x, y, z).length()))
+            (BurnerSurface::Cuboid, size(x.min(z), surface, 0.5 * DVec3::new(x, y, z).length()))
         }
         BurnerShape::Mesh => {
             let file = parameters.file.as_ref().ok_or(ParticleFaultKind::NoFile)?;
@@ -219,16 +220,16 @@ fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(Area, Siz
             let [min, max] = mesh.bounds();
             let sides = (max - min) * scale;
             let sampler = mesh.sampler();
-            let square_metres = sampler.area() * scale * scale;
+            let area_m2 = sampler.area() * scale * scale;
             let across = sides.x.min(sides.z).max(0.2 * sides.max_element());
-            let reach = min.abs().max(max.abs()).length() * scale;
-            (Area::Surface(sampler), Size { mesh: Some(mesh), ..size(across, square_metres, reach) })
+            let bounding_radius = min.abs().max(max.abs()).length() * scale;
+            (BurnerSurface::Surface(sampler), Size { mesh: Some(mesh), ..size(across, area_m2, bounding_radius) })
         }
     })
 }
 
-/// A point on the surface of a box, each part as likely as its area.
-fn cuboid(sides: [f64; 3], [which, u, v]: [f64; 3]) -> (DVec3, DVec3) {
+/// Uniformly distributed point on the surface of a box, and its normal.
+fn box_surface_point(sides: [f64; 3], [which, u, v]: [f64; 3]) -> (DVec3, DVec3) {
     let faces = [0, 1, 2].map(|axis| sides[(axis + 1) % 3] * sides[(axis + 2) % 3]);
     let mut wanted = which * 2.0 * faces.iter().sum::<f64>();
     let (mut axis, mut side) = (2, 1.0);
@@ -257,8 +258,8 @@ mod tests {
         Burner::new(&parameters, &FlameParticlesParameters::default(), &MemoryAssets::default()).unwrap()
     }
 
-    fn places(burner: &Burner) -> impl Iterator<Item = Birthplace> + '_ {
-        (0..4000).map(|birth| burner.birthplace(Key::new(1, "burner"), birth, 0.0))
+    fn spawn_points(burner: &Burner) -> impl Iterator<Item = SpawnPoint> + '_ {
+        (0..4000).map(|id| burner.spawn_point(Key::new(1, "burner"), id, 0.0))
     }
 
     #[test]
@@ -279,20 +280,25 @@ mod tests {
     fn discs_are_even_and_turn_with_the_burner() {
         let parameters = BurnerParameters { diameter: 2.0, rotation_deg: [90.0, 0.0, 0.0], ..Default::default() };
         let burner = burner(parameters);
-        let inner = places(&burner).filter(|place| place.position.length() < 0.5).count();
+        let inner = spawn_points(&burner).filter(|spawn_point| spawn_point.position.length() < 0.5).count();
         assert!((900..1100).contains(&inner), "a quarter of the area holds {inner} of 4000");
-        assert!(places(&burner).all(|place| place.position.z.abs() < 1e-9 || place.position.y.abs() < 1e-9));
-        assert!(places(&burner).all(|place| (place.direction - DVec3::Z).length() < 1e-9));
+        assert!(
+            spawn_points(&burner)
+                .all(|spawn_point| spawn_point.position.z.abs() < 1e-9 || spawn_point.position.y.abs() < 1e-9)
+        );
+        assert!(spawn_points(&burner).all(|spawn_point| (spawn_point.direction - DVec3::Z).length() < 1e-9));
     }
 
     #[test]
     fn boxes_are_even_over_their_faces() {
         let burner = burner(BurnerParameters { shape: BurnerShape::Box, size: [2.0, 1.0, 1.0], ..Default::default() });
-        let ends = places(&burner).filter(|place| place.direction.x.abs() > 0.5).count();
+        let ends = spawn_points(&burner).filter(|spawn_point| spawn_point.direction.x.abs() > 0.5).count();
         assert!((700..900).contains(&ends), "a fifth of the area holds {ends} of 4000");
-        for place in places(&burner) {
+        for spawn_point in spawn_points(&burner) {
             assert!(
-                (place.position.dot(place.direction) - if place.direction.x.abs() > 0.5 { 1.0 } else { 0.5 }).abs()
+                (spawn_point.position.dot(spawn_point.direction)
+                    - if spawn_point.direction.x.abs() > 0.5 { 1.0 } else { 0.5 })
+                .abs()
                     < 1e-9
             );
         }
@@ -307,12 +313,16 @@ mod tests {
             let parameters = BurnerParameters { shape, diameter: 0.3, length: 2.0, rotation_deg, ..Default::default() };
             let burner = burner(parameters);
             let [low, high] = burner.extent;
-            let around = |[low, high]: [DVec3; 2], place: DVec3| [low.min(place), high.max(place)];
-            let all = places(&burner).map(|place| place.position);
-            let [least, most] = all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around);
-            assert!((least - low).cmpgt(DVec3::splat(-1e-5)).all() && (high - most).cmpgt(DVec3::splat(-1e-5)).all());
-            let empty = (least - low).max(high - most).max_element();
-            assert!(empty < 0.06 * burner.reach, "{shape:?}: {empty} m are empty");
+            let primitive_extent =
+                |[low, high]: [DVec3; 2], spawn_point: DVec3| [low.min(spawn_point), high.max(spawn_point)];
+            let all = spawn_points(&burner).map(|spawn_point| spawn_point.position);
+            let [low_corner, high_corner] = all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], primitive_extent);
+            assert!(
+                (low_corner - low).cmpgt(DVec3::splat(-1e-5)).all()
+                    && (high - high_corner).cmpgt(DVec3::splat(-1e-5)).all()
+            );
+            let empty = (low_corner - low).max(high - high_corner).max_element();
+            assert!(empty < 0.06 * burner.bounding_radius, "{shape:?}: {empty} m are empty");
         }
     }
 
@@ -320,9 +330,12 @@ mod tests {
     fn points_lines_and_meshes_stay_within_their_bounds() {
         let line =
             burner(BurnerParameters { shape: BurnerShape::Line, length: 3.0, diameter: 0.2, ..Default::default() });
-        assert!(places(&line).all(|place| place.position.x.abs() <= 1.5 && place.position.z.abs() <= 0.1));
+        assert!(
+            spawn_points(&line)
+                .all(|spawn_point| spawn_point.position.x.abs() <= 1.5 && spawn_point.position.z.abs() <= 0.1)
+        );
         let point = burner(BurnerParameters { shape: BurnerShape::Point, diameter: 0.1, ..Default::default() });
-        assert!(places(&point).all(|place| place.position.length() <= 0.05));
+        assert!(spawn_points(&point).all(|spawn_point| spawn_point.position.length() <= 0.05));
         let missing = BurnerParameters { shape: BurnerShape::Mesh, ..Default::default() };
         let fault = Burner::new(&missing, &FlameParticlesParameters::default(), &MemoryAssets::default());
         assert_eq!(fault.unwrap_err(), ParticleFaultKind::NoFile);

@@ -1,94 +1,102 @@
-//! Gas against solids: it stops where its way meets one and slides along it.
+//! Continuous collision detection of particles with solids: particles stop at a surface and slide along it.
 
 use bansho_base::{
     math::{DVec3, Vec3},
     phenomenon::surroundings::Occluder,
 };
 
-/// Most solids that turn a particle's way in one step, and how often each may.
-const ROUNDS: usize = 3;
-/// Parts into which a way is cut at most to see whether it passes through a solid.
-const PARTS: f64 = 128.0;
-/// Halvings of the part in which a way meets a solid: what is left is nothing beside the clearance.
-const HALVINGS: usize = 8;
-/// By how much a distance may be too large: that to a mesh is measured beyond its grid by way of the grid's edge.
-const OVERESTIMATE: f64 = 3.0;
-/// Change of a way's end, in clearances, that is none.
-const SETTLED: f64 = 1e-6;
+/// Most passes over all solids per step; a particle that has not come to rest by then does not move.
+const MAX_ITERATIONS: usize = 3;
+/// Most sphere-tracing steps along one displacement.
+const MAX_MARCH_STEPS: f64 = 128.0;
+/// Bisection steps that refine a contact; the remaining error is small compared with the clearance.
+const BISECTION_STEPS: usize = 8;
+/// Factor by which a distance may be overestimated: beyond its grid, the distance to a mesh is measured by way of the grid's edge.
+const DISTANCE_OVERESTIMATE: f64 = 3.0;
+/// Change of the end point, in clearances, below which the iteration has converged.
+const CONVERGENCE_TOLERANCE: f64 = 1e-6;
 
-/// What stands in the gas's way.
+/// The solids that particles collide with.
 #[derive(Clone, Copy)]
-pub(crate) struct Solids<'a> {
+pub(crate) struct Colliders<'a> {
     pub(crate) occluders: &'a [Occluder],
-    /// Where places count from, m.
+    /// Origin of particle positions, m.
     pub(crate) origin: DVec3,
-    /// Distance from a surface at which particles stay, m.
+    /// Distance that particles keep from a surface, m.
     pub(crate) clearance: f32,
 }
 
-/// Where a way meets a solid.
+/// First contact of a displacement with a solid.
 struct Contact {
-    place: DVec3,
-    /// Unit vector out of the solid.
+    position: DVec3,
+    /// Outward unit normal of the solid.
     normal: DVec3,
 }
 
-impl Solids<'_> {
-    /// Where a particle at `place` comes by `way`, and what becomes of its velocities: of all only what points into a solid is taken.
-    pub(crate) fn carry<const N: usize>(&self, place: Vec3, way: Vec3, mut velocities: [Vec3; N]) -> (Vec3, [Vec3; N]) {
-        let from = self.origin + place.as_dvec3();
-        let unturned = from + way.as_dvec3();
-        let mut to = unturned;
-        for _ in 0..ROUNDS {
+impl Colliders<'_> {
+    /// Moves a particle from `position` by `displacement`, and removes the components of its velocities that point into solids.
+    /// Returns the new position and velocities.
+    pub(crate) fn collide<const N: usize>(
+        &self,
+        position: Vec3,
+        displacement: Vec3,
+        mut velocities: [Vec3; N],
+    ) -> (Vec3, [Vec3; N]) {
+        let start = self.origin + position.as_dvec3();
+        let straight_end = start + displacement.as_dvec3();
+        let mut to = straight_end;
+        for _ in 0..MAX_ITERATIONS {
             let before = to;
             for occluder in self.occluders {
-                if let Some(Contact { place, normal }) = self.contact(occluder, from, to) {
-                    let left = to - place;
-                    to = self.put_out(occluder, place + left - normal * left.dot(normal).min(0.0));
+                if let Some(Contact { position, normal }) = self.contact(occluder, start, to) {
+                    let remaining = to - position;
+                    to = self.push_out(occluder, position + remaining - normal * remaining.dot(normal).min(0.0));
                     let normal = normal.as_vec3();
                     for velocity in &mut velocities {
                         *velocity -= normal * velocity.dot(normal).min(0.0);
                     }
                 }
             }
-            if (to - before).length() < SETTLED * f64::from(self.clearance) {
-                let end = if to == unturned { place + way } else { (to - self.origin).as_vec3() };
+            if (to - before).length() < CONVERGENCE_TOLERANCE * f64::from(self.clearance) {
+                let end = if to == straight_end { position + displacement } else { (to - self.origin).as_vec3() };
                 return (end, velocities);
             }
         }
-        // Wedged between solids.
-        (place, [Vec3::ZERO; N])
+        // Wedged between solids: it stays where it is.
+        (position, [Vec3::ZERO; N])
     }
 
-    /// Where the way first lies within the clearance of a solid; none where it only leads out of it.
-    fn contact(&self, occluder: &Occluder, from: DVec3, to: DVec3) -> Option<Contact> {
+    /// First contact within the clearance of a solid by sphere tracing; `None` where the displacement only leads out of it.
+    fn contact(&self, occluder: &Occluder, start: DVec3, to: DVec3) -> Option<Contact> {
         let clearance = f64::from(self.clearance);
-        let (way, length) = (to - from, (to - from).length());
-        let at = |gone: f64| from + way * (gone / length.max(f64::MIN_POSITIVE)).min(1.0);
-        let (mut free, mut gone) = (0.0, 0.0);
+        let (displacement, length) = (to - start, (to - start).length());
+        let at = |distance_along: f64| start + displacement * (distance_along / length.max(f64::MIN_POSITIVE)).min(1.0);
+        let (mut last_free, mut distance_along) = (0.0, 0.0);
         loop {
-            let distance = occluder.signed_distance(at(gone)) - clearance;
+            let distance = occluder.signed_distance(at(distance_along)) - clearance;
             if distance < 0.0 {
-                for _ in 0..HALVINGS {
-                    let middle = 0.5 * (free + gone);
+                for _ in 0..BISECTION_STEPS {
+                    let middle = 0.5 * (last_free + distance_along);
                     let inside = occluder.signed_distance(at(middle)) < clearance;
-                    if inside { gone = middle } else { free = middle }
+                    if inside { distance_along = middle } else { last_free = middle }
                 }
-                return Some(Contact { place: at(gone), normal: occluder.normal(at(gone)) });
+                return Some(Contact { position: at(distance_along), normal: occluder.normal(at(distance_along)) });
             }
-            free = gone;
-            if gone >= length || distance > OVERESTIMATE * (length - gone) {
+            last_free = distance_along;
+            if distance_along >= length || distance > DISTANCE_OVERESTIMATE * (length - distance_along) {
                 return None;
             }
             // The clearance makes every solid at least twice as thick, so that none is stepped over.
-            gone = (gone + (distance / OVERESTIMATE).max(clearance).max(length / PARTS)).min(length);
+            distance_along = (distance_along
+                + (distance / DISTANCE_OVERESTIMATE).max(clearance).max(length / MAX_MARCH_STEPS))
+            .min(length);
         }
     }
 
-    /// The nearest place with clearance.
-    fn put_out(&self, occluder: &Occluder, place: DVec3) -> DVec3 {
-        let inside = f64::from(self.clearance) - occluder.signed_distance(place);
-        if inside > 0.0 { place + occluder.normal(place) * inside } else { place }
+    /// Projects a position out of a solid, to the clearance.
+    fn push_out(&self, occluder: &Occluder, position: DVec3) -> DVec3 {
+        let inside = f64::from(self.clearance) - occluder.signed_distance(position);
+        if inside > 0.0 { position + occluder.normal(position) * inside } else { position }
     }
 }
 
@@ -103,17 +111,17 @@ mod tests {
 
     use super::*;
 
-    fn solids(occluders: &[Occluder]) -> Solids<'_> {
-        Solids { occluders, origin: DVec3::ZERO, clearance: 0.01 }
+    fn solids(occluders: &[Occluder]) -> Colliders<'_> {
+        Colliders { occluders, origin: DVec3::ZERO, clearance: 0.01 }
     }
 
-    /// A level plate whose middle lies at the height 0.6.
+    /// A horizontal plate centered at a height of 0.6.
     fn plate(thickness: f64) -> Occluder {
         let half_extents = DVec3::new(3.0, 0.5 * thickness, 3.0);
         Occluder::Cuboid { centre: DVec3::Y * 0.6, half_extents, rotation: DQuat::IDENTITY }
     }
 
-    /// The same as a mesh of a box, two by 0.2 by two metres.
+    /// The same plate as a mesh, 2 x 0.2 x 2 m.
     fn slab() -> Occluder {
         let corner = |i: usize| [i & 1, i >> 1 & 1, i >> 2].map(|bit| bit as f32 - 0.5);
         let corners = (0..8).map(|i| std::array::from_fn(|axis| corner(i)[axis] * [2.0, 0.2, 2.0][axis])).collect();
@@ -127,15 +135,15 @@ mod tests {
     #[test]
     fn gas_slides_along_the_ground() {
         let ground = [Occluder::HalfSpace { point: DVec3::Y, normal: DVec3::Y }];
-        let solids = Solids { origin: DVec3::new(5.0, 1.0, 0.0), clearance: 0.1, ..solids(&ground) };
+        let solids = Colliders { origin: DVec3::new(5.0, 1.0, 0.0), clearance: 0.1, ..solids(&ground) };
         let velocity = Vec3::new(2.0, -3.0, 0.0);
-        let (place, [left]) = solids.carry(Vec3::new(0.0, 0.2, 0.0), velocity * 0.1, [velocity]);
-        assert!((place - Vec3::new(0.2, 0.1, 0.0)).length() < 1e-6, "{place}");
-        assert_eq!(left, Vec3::new(2.0, 0.0, 0.0));
-        // From within the ground it comes out at once, and what leads away is free.
-        assert!((solids.carry(Vec3::Y * -0.3, Vec3::ZERO, [Vec3::ZERO]).0 - Vec3::Y * 0.1).length() < 1e-6);
+        let (position, [remaining]) = solids.collide(Vec3::new(0.0, 0.2, 0.0), velocity * 0.1, [velocity]);
+        assert!((position - Vec3::new(0.2, 0.1, 0.0)).length() < 1e-6, "{position}");
+        assert_eq!(remaining, Vec3::new(2.0, 0.0, 0.0));
+        // A particle in the ground is pushed out at once; a velocity that leads away is unchanged.
+        assert!((solids.collide(Vec3::Y * -0.3, Vec3::ZERO, [Vec3::ZERO]).0 - Vec3::Y * 0.1).length() < 1e-6);
         let rising = (Vec3::Y * 0.1, Vec3::Y * 0.05);
-        assert_eq!(solids.carry(rising.0, rising.1, [rising.1]), (Vec3::Y * 0.15, [rising.1]));
+        assert_eq!(solids.collide(rising.0, rising.1, [rising.1]), (Vec3::Y * 0.15, [rising.1]));
     }
 
     #[test]
@@ -144,11 +152,17 @@ mod tests {
             let plate = [occluder];
             for (start, speed) in (0..400).map(|i| (0.3 + 0.0007 * i as f32, 0.01 + 0.003 * i as f32)) {
                 let below = (0.59 - 0.1 * f32::from(matches!(plate[0], Occluder::Mesh { .. }))).min(start);
-                let way = Vec3::new(0.3 * speed, speed, -0.1 * speed);
-                let (place, [velocity]) = solids(&plate).carry(Vec3::Y * below, way, [way]);
-                assert!(place.y < 0.6, "{:?}: from {below} by {way} to {place}", plate[0]);
-                assert!(place.y == below + way.y || velocity.y < 0.01 * speed, "{velocity} behind the plate");
-                assert!((place.x - way.x).abs() < 0.02 + 0.1 * speed, "it slides: {place} by {way}");
+                let displacement = Vec3::new(0.3 * speed, speed, -0.1 * speed);
+                let (position, [velocity]) = solids(&plate).collide(Vec3::Y * below, displacement, [displacement]);
+                assert!(position.y < 0.6, "{:?}: from {below} by {displacement} to {position}", plate[0]);
+                assert!(
+                    position.y == below + displacement.y || velocity.y < 0.01 * speed,
+                    "{velocity} behind the plate"
+                );
+                assert!(
+                    (position.x - displacement.x).abs() < 0.02 + 0.1 * speed,
+                    "it slides: {position} by {displacement}"
+                );
             }
         }
     }
@@ -157,8 +171,8 @@ mod tests {
     fn gas_that_one_solid_turns_into_another_keeps_out_of_both() {
         let wall = Occluder::HalfSpace { point: DVec3::X * 0.2, normal: DVec3::NEG_X };
         let solids_of = [plate(0.1), wall];
-        let (place, [velocity]) = solids(&solids_of).carry(Vec3::Y * 0.4, Vec3::new(0.5, 0.5, 0.1), [Vec3::ONE]);
-        assert!((place - Vec3::new(0.19, 0.54, 0.1)).length() < 1e-5 && velocity.max_element() <= 1.0, "{place}");
+        let (position, [velocity]) = solids(&solids_of).collide(Vec3::Y * 0.4, Vec3::new(0.5, 0.5, 0.1), [Vec3::ONE]);
+        assert!((position - Vec3::new(0.19, 0.54, 0.1)).length() < 1e-5 && velocity.max_element() <= 1.0, "{position}");
         assert_eq!([velocity.x, velocity.y], [0.0; 2]);
     }
 }

@@ -1,4 +1,4 @@
-//! The numbers of the simulation that the paper leaves open, in SI, from the size and speed of the burners.
+//! Constants of the simulation that the paper leaves open, derived in SI units from size and exit velocity of the burners.
 
 use bansho_base::{
     host::{assets::Assets, memory},
@@ -14,32 +14,32 @@ use crate::particles::{
 };
 
 /// Most particles of all flames of a scene.
-const MOST_PARTICLES: i64 = 20_000_000;
-/// Bytes that a living particle takes, measured over a run: its state and the buffers of a step. (Drawing takes more for a while.)
-const PARTICLE_BYTES: f64 = 670.0;
-/// Times until its tip that gas may take before it is removed, whatever holds it.
-const LONGEST_RISE: f64 = 3.0;
-/// How much the fuel that a fire draws from its burner rises and falls as it puffs, as a share.
-const PULSE: f64 = 0.6;
-/// How far a burner may reach beyond the domain, of its own size: turning rounds.
-const SLACK: f64 = 1e-6;
-/// Fewest steps that gas lives, so that births in one step stay bounded.
-const FEWEST_STEPS: f64 = 4.0;
+const MAX_PARTICLES: i64 = 20_000_000;
+/// Bytes per particle, measured over a run: its state and the buffers of a step. Drawing takes more, temporarily.
+const MEMORY_PER_PARTICLE: f64 = 670.0;
+/// Age, in rise times, at which gas is removed even if an obstacle holds it.
+const MAX_RISE_TIMES: f64 = 3.0;
+/// Relative amplitude of the fuel flow's pulsation as a fire puffs.
+const FLOW_PULSATION: f64 = 0.6;
+/// Tolerance for burners at the edge of the domain, relative to their size: rotation rounds.
+const BURNER_TOLERANCE: f64 = 1e-6;
+/// Least residence time in steps, so that the number of particles spawned in one step is bounded.
+const MIN_STEPS: f64 = 4.0;
 
-/// All that follows from the parameters and stays.
+/// Constants derived from the parameters.
 ///
-/// Every particle stands for the same volume V of gas at birth. So many live that all burners together hold `particles`:
-/// a burner gives `A w / V` a second, and gas lives for the time until the tip and its afterlife. The support radius d is
-/// `support` times the mean distance `V^(1/3)`, mass m is V times the density of air as hot as the gas, rho_0 a share of
-/// that density, and k the square of a speed of sound that is a few times the gas's own speed.
+/// Every particle represents the same volume V of gas at spawning. V follows from `particles`, the number alive at a time: a burner
+/// of area A and exit velocity w spawns `A w / V` per second, and gas stays for the rise time plus its afterlife. The support
+/// radius d is `fluid.support` times `V^(1/3)`; the mass m is V times the density of air at the temperature of the gas; rho_0 is a
+/// fraction of that density; k is the square of a speed of sound, a multiple of the gas's own speed.
 #[derive(Clone, Debug)]
-pub(crate) struct Design {
+pub(crate) struct DerivedConstants {
     pub(crate) burners: Vec<Burner>,
-    /// Births a second of each burner at full flow.
+    /// Particles per second of each burner at full flow.
     pub(crate) rates: Vec<f64>,
-    /// How often each burner puffs, Hz.
+    /// Puffing frequency of each burner, Hz.
     pub(crate) puffing_hz: Vec<f64>,
-    /// How much more gas than on the mean comes at the height of a beat, as a share.
+    /// Relative amplitude of the fuel flow's pulsation.
     pub(crate) pulse: f64,
     /// Support radius d, m.
     pub(crate) support_radius: f32,
@@ -47,70 +47,70 @@ pub(crate) struct Design {
     pub(crate) mass: f32,
     /// Density of gas at the burner, kg/m^3.
     pub(crate) density: f32,
-    /// Density of reference rho_0, kg/m^3.
+    /// Rest density rho_0, kg/m^3.
     pub(crate) rest_density: f32,
-    /// k of eq. (11) a kelvin, m^2/(s^2 K).
+    /// k of eq. (11) per kelvin, m^2/(s^2 K).
     pub(crate) stiffness_per_kelvin: f32,
-    /// Corners of the domain, m, from the flame's position.
+    /// Corners of the domain relative to the flame's position, m.
     pub(crate) domain: [DVec3; 2],
-    /// How long it burns before the shot, s.
+    /// Preroll before the shot, s.
     pub(crate) preroll: f64,
-    /// In a loop: for how long one run passes into the next, s.
+    /// Duration of the crossfade of a seamless loop, s.
     pub(crate) dissolve: f64,
-    /// More than these never live.
-    pub(crate) most: usize,
+    /// Greatest number of particles alive.
+    pub(crate) max_particles: usize,
 }
 
-impl Design {
+impl DerivedConstants {
     pub(crate) fn new(
         parameters: &FlameParticlesParameters,
         loop_s: Option<f64>,
         assets: &dyn Assets,
     ) -> Result<Self, ParticleFault> {
-        check_count(parameters.particles, 0)?;
+        check_particle_count(parameters.particles, 0)?;
         let burners = burners(parameters, assets)?;
         let domain = domain(parameters, &burners)?;
-        let stays: Vec<f64> = burners.iter().map(|burner| stay(parameters, burner)).collect();
-        let fluxes: Vec<f64> = burners.iter().map(|burner| burner.square_metres * burner.speed).collect();
-        let living: f64 = fluxes.iter().zip(&stays).map(|(flux, stay)| flux * stay).sum();
+        let residence_times: Vec<f64> = burners.iter().map(|burner| residence_time(parameters, burner)).collect();
+        let fluxes: Vec<f64> = burners.iter().map(|burner| burner.area_m2 * burner.speed).collect();
+        let living: f64 = fluxes.iter().zip(&residence_times).map(|(flux, residence_time)| flux * residence_time).sum();
         let volume = living / parameters.particles as f64;
         let support_radius = support_radius(parameters, volume, &domain)?;
         let coolest = burners.iter().map(|burner| burner.parameters.temperature_k).fold(f64::INFINITY, f64::min);
         let density = Air::default().density_at(coolest);
         let fastest = burners.iter().map(|burner| burner.speed).fold(0.0, f64::max);
         let sound = parameters.fluid.stiffness * fastest;
-        let longest = stays.into_iter().fold(0.0, f64::max);
-        // By then all gas is other gas.
-        let dissolve = loop_s.map_or(0.0, |turn| longest.min(turn));
+        let longest_residence = residence_times.into_iter().fold(0.0, f64::max);
+        // After the longest residence time all gas has been replaced.
+        let dissolve = loop_s.map_or(0.0, |turn| longest_residence.min(turn));
         Ok(Self {
             rates: fluxes.into_iter().map(|flux| flux / volume).collect(),
             puffing_hz: burners.iter().map(|burner| burner.puffing_hz(parameters)).collect(),
-            pulse: (PULSE * parameters.motion.puffing).min(0.9),
+            pulse: (FLOW_PULSATION * parameters.motion.puffing).min(0.9),
             support_radius: support_radius as f32,
             mass: (density * volume) as f32,
             density: density as f32,
             rest_density: (parameters.fluid.rest_density * density) as f32,
             stiffness_per_kelvin: (sound * sound / coolest) as f32,
             domain,
-            preroll: preroll(parameters, longest) + 0.5 * dissolve,
+            preroll: preroll(parameters, longest_residence) + 0.5 * dissolve,
             dissolve,
-            most: 2 * parameters.particles as usize + 16,
+            max_particles: 2 * parameters.particles as usize + 16,
             burners,
         })
     }
 
     /// Age at which a particle of burner `index` is removed even if it still burns, s.
-    pub(crate) fn longest_life(&self, index: usize, afterlife_s: f64) -> f64 {
-        LONGEST_RISE * self.burners[index].rise_time() + afterlife_s
+    pub(crate) fn max_age(&self, index: usize, afterlife_s: f64) -> f64 {
+        MAX_RISE_TIMES * self.burners[index].rise_time() + afterlife_s
     }
 }
 
-/// How long gas of a burner stays, s: until the tip, and its afterlife.
-fn stay(parameters: &FlameParticlesParameters, burner: &Burner) -> f64 {
-    (burner.rise_time() + parameters.life.afterlife_s).max(FEWEST_STEPS * parameters.step_s)
+/// Residence time of gas of a burner, s: rise time plus afterlife.
+fn residence_time(parameters: &FlameParticlesParameters, burner: &Burner) -> f64 {
+    (burner.rise_time() + parameters.life.afterlife_s).max(MIN_STEPS * parameters.step_s)
 }
 
-/// The support radius d, m, of particles that stand for so much gas at birth.
+/// Support radius d, m, of particles that represent that volume of gas at spawning.
 fn support_radius(
     parameters: &FlameParticlesParameters,
     volume: f64,
@@ -123,32 +123,32 @@ fn support_radius(
     Err(ParticleFault { key: "particles".into(), kind: ParticleFaultKind::SupportBeyondDomain { radius, side } })
 }
 
-/// How long it burns before the shot, s; by default twice as long as gas stays at the `longest`.
-fn preroll(parameters: &FlameParticlesParameters, longest: f64) -> f64 {
+/// Preroll before the shot, s; by default twice the longest residence time.
+fn preroll(parameters: &FlameParticlesParameters, longest_residence: f64) -> f64 {
     match parameters.preroll_s {
         Auto::Set(seconds) => seconds,
-        Auto::Auto => (2.0 * longest).min(60.0),
+        Auto::Auto => (2.0 * longest_residence).min(60.0),
     }
 }
 
-/// Whether the system would give so many particles their memory.
+/// Whether the operating system would grant the memory of so many particles.
 fn have_memory(count: i64) -> bool {
-    memory::is_granted(count as f64 * PARTICLE_BYTES)
+    memory::is_granted(count as f64 * MEMORY_PER_PARTICLE)
 }
 
-/// Whether `count` particles may live beside the `others` of all other flames.
+/// Checks whether `count` particles may be alive beside the `others` of all other flames.
 ///
 /// # Errors
-/// More than are taken or than there is memory for, with the number that would be.
-pub fn check_count(count: i64, others: i64) -> Result<(), ParticleFault> {
-    let taken = (MOST_PARTICLES - others).max(0);
+/// Too many particles, or not enough memory; the error says how many are allowed.
+pub fn check_particle_count(count: i64, others: i64) -> Result<(), ParticleFault> {
+    let taken = (MAX_PARTICLES - others).max(0);
     if count <= taken && have_memory(count + others) {
         return Ok(());
     }
-    let most = memory::most(taken.min(count), |most| have_memory(most + others));
-    let most = if count > taken && have_memory(taken + others) { taken } else { most };
-    let gib = (count as f64 + others as f64) * PARTICLE_BYTES / f64::from(1 << 30);
-    let kind = ParticleFaultKind::TooManyParticles { count, others, gib, most };
+    let max_particles = memory::most(taken.min(count), |max_particles| have_memory(max_particles + others));
+    let max_particles = if count > taken && have_memory(taken + others) { taken } else { max_particles };
+    let gib = (count as f64 + others as f64) * MEMORY_PER_PARTICLE / f64::from(1 << 30);
+    let kind = ParticleFaultKind::TooManyParticles { count, others, gib, most: max_particles };
     Err(ParticleFault { key: "particles".into(), kind })
 }
 
@@ -162,7 +162,7 @@ fn burners(parameters: &FlameParticlesParameters, assets: &dyn Assets) -> Result
     listed.iter().enumerate().map(make).collect()
 }
 
-/// The box that gas may fill: as given, or with room for three flames above and around.
+/// The domain: as given, or with a margin of three flame heights around the burners.
 fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[DVec3; 2], ParticleFault> {
     if let (Auto::Set(min), Auto::Set(max)) = (parameters.domain_min, parameters.domain_max)
         && DVec3::from(min).cmpge(DVec3::from(max)).any()
@@ -172,16 +172,18 @@ fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[
     for (index, burner) in burners.iter().enumerate() {
         let corners = burner.parameters.position.bounds().map(DVec3::from);
         let reached = [corners[0] + burner.extent[0], corners[1] + burner.extent[1]];
-        for place in corners.into_iter().chain(reached) {
-            stands_within(parameters, place, SLACK * burner.reach).map_err(|(corner, kind)| {
-                // What the user did not write cannot be at fault.
-                let moved = burner.parameters.position != Animated::from([0.0; 3]);
-                ParticleFault { key: if moved { format!("burners.{index}.position") } else { corner.into() }, kind }
-            })?;
+        for position in corners.into_iter().chain(reached) {
+            stands_within(parameters, position, BURNER_TOLERANCE * burner.bounding_radius).map_err(
+                |(corner, kind)| {
+                    // A parameter that the user did not write is not named as the faulty one.
+                    let moved = burner.parameters.position != Animated::from([0.0; 3]);
+                    ParticleFault { key: if moved { format!("burners.{index}.position") } else { corner.into() }, kind }
+                },
+            )?;
         }
     }
-    let room = |burner: &Burner| burner.reach + 3.0 * burner.height;
-    // The corners of the box in which each burner moves.
+    let room = |burner: &Burner| burner.bounding_radius + 3.0 * burner.height;
+    // The bounding box of each burner's motion.
     let ways = || burners.iter().map(|burner| (burner, burner.parameters.position.bounds().map(DVec3::from)));
     let low = ways().map(|(burner, [low, _])| low - room(burner)).fold(DVec3::INFINITY, DVec3::min);
     let high = ways().map(|(burner, [_, high])| high + room(burner)).fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -189,17 +191,19 @@ fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[
     Ok([given(parameters.domain_min, low), given(parameters.domain_max, high)])
 }
 
-/// Whether a place of a burner lies within the corners of the domain that are given, or `slack` m beyond; if not, beyond which of them.
+/// Checks whether a point of a burner lies within the given corners of the domain, with a tolerance of `slack` m. The error names
+/// the corner that it lies beyond.
 fn stands_within(
     parameters: &FlameParticlesParameters,
-    place: DVec3,
+    position: DVec3,
     slack: f64,
 ) -> Result<(), (&'static str, ParticleFaultKind)> {
     let FlameParticlesParameters { domain_min, domain_max, .. } = parameters;
-    let beyond = |corner, limit| Err((corner, ParticleFaultKind::OutsideDomain { place: place.into(), corner, limit }));
+    let beyond =
+        |corner, limit| Err((corner, ParticleFaultKind::OutsideDomain { position: position.into(), corner, limit }));
     match (domain_min, domain_max) {
-        (Auto::Set(min), _) if (place + slack).cmplt(DVec3::from(*min)).any() => beyond("domain_min", *min),
-        (_, Auto::Set(max)) if (place - slack).cmpgt(DVec3::from(*max)).any() => beyond("domain_max", *max),
+        (Auto::Set(min), _) if (position + slack).cmplt(DVec3::from(*min)).any() => beyond("domain_min", *min),
+        (_, Auto::Set(max)) if (position - slack).cmpgt(DVec3::from(*max)).any() => beyond("domain_max", *max),
         _ => Ok(()),
     }
 }
@@ -211,8 +215,8 @@ mod tests {
     use super::*;
     use crate::particles::parameters::BurnerShape;
 
-    fn design(parameters: &FlameParticlesParameters) -> Result<Design, ParticleFault> {
-        Design::new(parameters, None, &MemoryAssets::default())
+    fn constants(parameters: &FlameParticlesParameters) -> Result<DerivedConstants, ParticleFault> {
+        DerivedConstants::new(parameters, None, &MemoryAssets::default())
     }
 
     #[test]
@@ -222,17 +226,18 @@ mod tests {
             burners: vec![small, BurnerParameters::default()],
             ..FlameParticlesParameters::default()
         };
-        let design = design(&parameters).unwrap();
-        let stay = |burner: &Burner| burner.rise_time() + parameters.life.afterlife_s;
-        let living: f64 = design.burners.iter().zip(&design.rates).map(|(burner, rate)| rate * stay(burner)).sum();
+        let constants = constants(&parameters).unwrap();
+        let residence_time = |burner: &Burner| burner.rise_time() + parameters.life.afterlife_s;
+        let living: f64 =
+            constants.burners.iter().zip(&constants.rates).map(|(burner, rate)| rate * residence_time(burner)).sum();
         assert!((living - parameters.particles as f64).abs() < 1.0);
-        let spacing = f64::from(design.support_radius) / parameters.fluid.support;
-        let layer = design.rates[1] / (design.burners[1].square_metres * design.burners[1].speed);
+        let spacing = f64::from(constants.support_radius) / parameters.fluid.support;
+        let layer = constants.rates[1] / (constants.burners[1].area_m2 * constants.burners[1].speed);
         assert!((spacing * spacing * spacing * layer - 1.0).abs() < 1e-5);
     }
 
-    /// A flame on a triangle of half a square metre that lies `far` to the side of the mesh's origin, in a domain of two metres each way.
-    fn on_a_mesh_beside_its_origin(far: f32, rotation_deg: [f64; 3]) -> Result<Design, ParticleFault> {
+    /// A flame on a triangle of 0.5 m^2, offset by `far` from the mesh's origin, in a domain of 2 m in each direction.
+    fn on_a_mesh_beside_its_origin(far: f32, rotation_deg: [f64; 3]) -> Result<DerivedConstants, ParticleFault> {
         let corners = vec![[far, 0.0, 0.0], [far, 0.0, 1.0], [far + 1.0, 0.0, 0.0]];
         let mut assets = MemoryAssets::default();
         assets.insert_mesh("far.gltf", Mesh::new(corners, vec![[0, 1, 2]]).unwrap());
@@ -241,26 +246,28 @@ mod tests {
         let [domain_min, domain_max] = [-2.0, 2.0].map(|corner| Auto::Set([corner; 3]));
         let parameters =
             FlameParticlesParameters { burners: vec![burner], domain_min, domain_max, ..Default::default() };
-        Design::new(&parameters, None, &assets)
+        DerivedConstants::new(&parameters, None, &assets)
     }
 
     #[test]
     fn a_mesh_that_lies_outside_the_domain_is_a_burner_outside_it() {
         assert!(on_a_mesh_beside_its_origin(0.5, [0.0; 3]).is_ok());
-        // A part of it is enough: what is born there would die at once.
+        // A corner outside is enough: particles spawned there would be removed at once.
         assert_eq!(on_a_mesh_beside_its_origin(1.5, [0.0; 3]).unwrap_err().key, "domain_max");
-        // Turned half about the upright axis it lies on the other side.
+        // Turned by 180 degrees about the vertical axis it lies on the other side.
         for (far, turn, key) in [(50.0, 0.0, "domain_max"), (50.0, 180.0, "domain_min")] {
             let fault = on_a_mesh_beside_its_origin(far, [0.0, turn, 0.0]).unwrap_err();
             assert_eq!(fault.key, key);
-            assert!(matches!(fault.kind, ParticleFaultKind::OutsideDomain { place, .. } if place[0].abs() >= 50.0));
+            assert!(
+                matches!(fault.kind, ParticleFaultKind::OutsideDomain { position, .. } if position[0].abs() >= 50.0)
+            );
         }
     }
 
     #[test]
     fn parameters_that_do_not_go_together_are_named() {
         let default = FlameParticlesParameters::default;
-        let fault = |parameters| design(&parameters).unwrap_err();
+        let fault = |parameters| constants(&parameters).unwrap_err();
         let far = BurnerParameters { position: [0.0, 90.0, 0.0].into(), ..Default::default() };
         let outside = FlameParticlesParameters {
             burners: vec![BurnerParameters::default(), far],
@@ -284,8 +291,12 @@ mod tests {
         assert!(matches!(fault(wide).kind, ParticleFaultKind::SupportBeyondDomain { .. }));
         let many = fault(FlameParticlesParameters { particles: 900_000_000, ..default() });
         let expected = "particles: 900000000 particles would take 562 GiB; allowed: up to ";
-        let most: Option<i64> = many.to_string().strip_prefix(expected).and_then(|most| most.parse().ok());
+        let max_particles: Option<i64> =
+            many.to_string().strip_prefix(expected).and_then(|max_particles| max_particles.parse().ok());
         // A small machine takes fewer.
-        assert!(most.is_some_and(|most| (1_000_000..=MOST_PARTICLES).contains(&most)), "{many}");
+        assert!(
+            max_particles.is_some_and(|max_particles| (1_000_000..=MAX_PARTICLES).contains(&max_particles)),
+            "{many}"
+        );
     }
 }

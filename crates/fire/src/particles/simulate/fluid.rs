@@ -1,43 +1,46 @@
-//! The gas as a fluid: its order in space, its density, and the pressure that drives it apart.
+//! The gas as a fluid: density, pressure force, and sums over neighbors.
 
+use super::{derived::DerivedConstants, particle_lanes::PARTICLES_PER_TASK, particles::Particles};
+use crate::particles::parameters::{FluidParameters, Tension};
+use bansho_base::math::simd::Real;
+use bansho_sph::{
+    Cells, KernelShape, Pair, PairTerm, Poly6, PressureForce, SmoothingKernel, StateEquation, compute_densities,
+    max_stable_step, mixing_weights, substep_count,
+};
 use rayon::prelude::*;
 
-use super::{derived::Design, neighbor_sums::Beside, particle_lanes::PARTICLES_OF_TASK, particles::Particles};
-use crate::particles::parameters::{FluidParameters, Tension};
-use bansho_sph::{Cells, KernelShape, PressureForce, StateEquation, densities, longest_step, sub_steps};
-
-/// Speed of gas against the gas beside it, as a share of its speed.
+/// Speed of gas relative to its neighbors, as a fraction of its speed.
 const RELATIVE_SPEED: f32 = 0.15;
 
-/// What sums over neighbours are made with, and what they find.
+/// SPH solver: sorting, density, equation of state, pressure force and neighbor sums, with their buffers.
 #[derive(Clone, Debug)]
-pub(crate) struct Fluid {
-    state: StateEquation,
+pub(crate) struct FluidSolver {
+    equation_of_state: StateEquation,
     stiffness_per_kelvin: f32,
-    most_sub_steps: u32,
+    max_substeps: u32,
     cells: Cells<3>,
     force: PressureForce,
     pressure: Vec<f32>,
     /// Accelerations by pressure, m/s^2.
     pub(crate) acceleration: [Vec<f32>; 3],
-    pub(crate) beside: Beside,
-    /// How much of each particle lies at the edge of the gas, as of this step's beginning.
-    pub(crate) to_air: Vec<f32>,
+    pub(crate) neighbor_sums: NeighborSums,
+    /// Exposure to air of each particle at the beginning of this step, 0 to 1.
+    pub(crate) air_exposure: Vec<f32>,
 }
 
-impl Fluid {
-    pub(crate) fn new(fluid: &FluidParameters, design: &Design) -> Self {
-        let tension = fluid.tension == Tension::Unclamped;
+impl FluidSolver {
+    pub(crate) fn new(fluid: &FluidParameters, constants: &DerivedConstants) -> Self {
+        let negative_pressure = fluid.tension == Tension::Unclamped;
         Self {
-            state: StateEquation { rest_density: design.rest_density, tension },
-            stiffness_per_kelvin: design.stiffness_per_kelvin,
-            most_sub_steps: fluid.sub_steps as u32,
-            cells: Cells::new(design.support_radius),
+            equation_of_state: StateEquation { rest_density: constants.rest_density, negative_pressure },
+            stiffness_per_kelvin: constants.stiffness_per_kelvin,
+            max_substeps: fluid.sub_steps as u32,
+            cells: Cells::new(constants.support_radius),
             force: PressureForce::new(fluid.force_kernel),
             pressure: Vec::new(),
             acceleration: Default::default(),
-            beside: Beside::default(),
-            to_air: Vec::new(),
+            neighbor_sums: NeighborSums::default(),
+            air_exposure: Vec::new(),
         }
     }
 
@@ -46,50 +49,112 @@ impl Fluid {
         self.cells.support_radius()
     }
 
-    /// Sub-steps by the condition of Courant, Friedrichs and Lewy, for gas that moves with the gas beside it.
+    /// Number of sub-steps by the Courant-Friedrichs-Lewy condition, for gas that moves relative to its neighbors.
     ///
-    /// Gas that would need more than are allowed keeps its time and loses stiffness: `press` holds k where sound goes no further than a
-    /// fifth of d in a sub-step, and the motion holds every force there.
+    /// Gas that would need more sub-steps than allowed is made more compressible: `compute_pressure_forces` limits k such that
+    /// sound travels at most a fifth of d in a sub-step, and the integration limits every acceleration.
     ///
-    /// No acceleration shortens them: buoyancy and wind move neighbours alike, pressure's is bounded by the sound that counts here, and
-    /// the motion holds what is left. The forces of the last step would also have to be part of every snapshot.
-    pub(crate) fn sub_steps(&self, particles: &Particles, seconds: f32) -> u32 {
+    /// Accelerations do not enter the condition: buoyancy and wind move neighbors alike, that by pressure is bounded by the speed
+    /// of sound, and the integration limits the rest. Forces of the last step would also have to be part of every snapshot.
+    pub(crate) fn substep_count(&self, particles: &Particles, seconds: f32) -> u32 {
         let [u, v, w] = &particles.velocity;
-        let square = |index: usize| u[index] * u[index] + v[index] * v[index] + w[index] * w[index];
-        let greatest = |values: &(dyn Fn(usize) -> f32 + Sync)| {
-            let parts = (0..u.len()).into_par_iter().step_by(PARTICLES_OF_TASK);
-            let of_part =
-                |first: usize| (first..(first + PARTICLES_OF_TASK).min(u.len())).map(values).fold(0.0, f32::max);
-            parts.map(of_part).reduce(|| 0.0, f32::max)
+        let speed_squared = |index: usize| u[index] * u[index] + v[index] * v[index] + w[index] * w[index];
+        let max_over_particles = |values: &(dyn Fn(usize) -> f32 + Sync)| {
+            let tasks = (0..u.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
+            let task_max =
+                |first: usize| (first..(first + PARTICLES_PER_TASK).min(u.len())).map(values).fold(0.0, f32::max);
+            tasks.map(task_max).reduce(|| 0.0, f32::max)
         };
-        let speed = greatest(&square).sqrt();
-        let hottest = greatest(&|index| particles.temperature[index]);
-        let longest = longest_step(self.support_radius(), self.stiffness_per_kelvin * hottest, RELATIVE_SPEED * speed);
-        sub_steps(seconds, longest, self.most_sub_steps)
+        let speed = max_over_particles(&speed_squared).sqrt();
+        let hottest = max_over_particles(&|index| particles.temperature[index]);
+        let max_step =
+            max_stable_step(self.support_radius(), self.stiffness_per_kelvin * hottest, RELATIVE_SPEED * speed);
+        substep_count(seconds, max_step, self.max_substeps)
     }
 
-    /// Sorts the particles, and finds their density (3), pressure (11) and its force (12) for a sub-step of `seconds`, with k held where
-    /// sound does not outrun it.
-    pub(crate) fn press(&mut self, particles: &mut Particles, seconds: f32) {
-        self.to_air.resize(particles.len(), 0.0);
-        particles.sort(&mut self.cells, &mut self.to_air);
+    /// Sorts the particles and computes density (3), pressure (11) and pressure force (12) for a sub-step of `seconds`; k is
+    /// limited such that sound stays within a fifth of d.
+    pub(crate) fn compute_pressure_forces(&mut self, particles: &mut Particles, seconds: f32) {
+        self.air_exposure.resize(particles.len(), 0.0);
+        particles.sort(&mut self.cells, &mut self.air_exposure);
         let Particles { density, temperature, mass, .. } = particles;
-        densities(&self.cells, KernelShape::Poly6, mass, density);
-        let fastest_sound = 0.2 * self.support_radius() / seconds;
-        let (state, per_kelvin, most) = (self.state, self.stiffness_per_kelvin, fastest_sound * fastest_sound);
-        let pressure =
-            |(density, temperature): (&f32, &f32)| state.pressure((per_kelvin * temperature).min(most), *density);
+        compute_densities(&self.cells, KernelShape::Poly6, mass, density);
+        let max_sound_speed = 0.2 * self.support_radius() / seconds;
+        let (equation_of_state, per_kelvin, max_stiffness) =
+            (self.equation_of_state, self.stiffness_per_kelvin, max_sound_speed * max_sound_speed);
+        let pressure = |(density, temperature): (&f32, &f32)| {
+            equation_of_state.pressure((per_kelvin * temperature).min(max_stiffness), *density)
+        };
         density
             .par_iter()
             .zip(&*temperature)
-            .with_min_len(PARTICLES_OF_TASK)
+            .with_min_len(PARTICLES_PER_TASK)
             .map(pressure)
             .collect_into_vec(&mut self.pressure);
-        self.force.accelerations(&self.cells, mass, density, &self.pressure, &mut self.acceleration);
+        self.force.compute_accelerations(&self.cells, mass, density, &self.pressure, &mut self.acceleration);
     }
 
-    /// Lets every particle look around; [`press`](Self::press) has sorted them.
-    pub(crate) fn look(&mut self, particles: &Particles) {
-        self.beside.look(&self.cells, particles);
+    /// Sums over the neighbors of every particle, which [`compute_pressure_forces`](Self::compute_pressure_forces) has sorted.
+    pub(crate) fn sum_over_neighbors(&mut self, particles: &Particles) {
+        self.neighbor_sums.compute(&self.cells, particles);
+    }
+}
+
+/// `w_j W` times 1, the differences of velocity and temperature, and the offset to the neighbor.
+///
+/// The weights `m / sqrt(rho)` are symmetric for each pair, so that smoothing conserves momentum and heat.
+struct NeighborSumsTerm(Poly6<3>);
+
+impl PairTerm<3, 5, 8> for NeighborSumsTerm {
+    const DIRECTED: bool = false;
+
+    #[inline(always)]
+    fn add<R: Real>(&self, pair: &Pair<R, 3>, own: &[R; 5], other: &[R; 5], sums: &mut [R; 8]) {
+        let weight = other[0] * self.0.value(pair.distance_squared);
+        sums[0] = sums[0] + weight;
+        for k in 1..5 {
+            sums[k] = weight.fma(other[k] - own[k], sums[k]);
+        }
+        for axis in 0..3 {
+            sums[5 + axis] = weight.fma(weight.broadcast(0.0) - pair.offset[axis], sums[5 + axis]);
+        }
+    }
+}
+
+/// Neighbor sums of one particle, or of several in SIMD lanes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Neighborhood<R> {
+    /// Sum of weights, the particle's own included.
+    pub(crate) weight: R,
+    /// Weighted differences of the neighbors' velocities.
+    pub(crate) velocity: [R; 3],
+    /// Weighted differences of the neighbors' temperatures.
+    pub(crate) temperature: R,
+    /// Weighted offsets to the neighbors.
+    pub(crate) offset: [R; 3],
+}
+
+impl<R> From<[R; 8]> for Neighborhood<R> {
+    #[inline(always)]
+    fn from([weight, u, v, w, temperature, x, y, z]: [R; 8]) -> Self {
+        Self { weight, velocity: [u, v, w], temperature, offset: [x, y, z] }
+    }
+}
+
+/// Sums over the neighbors of every particle, in sorted order.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct NeighborSums {
+    /// `m / sqrt(rho)`.
+    pub(crate) weights: Vec<f32>,
+    /// The components of each particle's [`Neighborhood`].
+    pub(crate) sums: [Vec<f32>; 8],
+}
+
+impl NeighborSums {
+    pub(crate) fn compute(&mut self, cells: &Cells<3>, particles: &Particles) {
+        let Particles { mass, density, temperature, velocity: [u, v, w], .. } = particles;
+        mixing_weights(mass, density, &mut self.weights);
+        let fields = [&self.weights, u, v, w, temperature].map(Vec::as_slice);
+        cells.sum(&NeighborSumsTerm(Poly6::new(cells.support_radius())), fields, self.sums.each_mut());
     }
 }

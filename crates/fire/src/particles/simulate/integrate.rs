@@ -1,4 +1,4 @@
-//! How gas moves in a sub-step: pressure, buoyancy, wind and the air's own motion; sixteen particles at a time.
+//! Time integration of a sub-step: pressure, buoyancy, wind, and advection by the air; sixteen particles at a time.
 
 use bansho_base::math::{
     Vec3,
@@ -6,197 +6,197 @@ use bansho_base::math::{
 };
 
 use super::{
-    collision::Solids,
-    particle_lanes::{Rows, Still, Work, burner_by_burner},
+    collision::Colliders,
+    particle_lanes::{BatchUpdate, RowBatch, SharedColumns, for_each_burner_batch},
     particles::Particles,
-    vector_lanes::{held_to, length, less, plus},
 };
-use crate::particles::{
-    parameters::WindForce,
-    simulate::forces::{burner_forces::Draught, external_forces::Weather},
-};
+use crate::particles::simulate::forces::external_forces::BurnerForces;
+use crate::particles::simulate::particle_lanes::{add_scaled, clamp_length, length, subtract};
+use crate::particles::{parameters::WindForce, simulate::forces::external_forces::ExternalForces};
 use std::ops::Range;
 
 use fearless_simd::{Simd, prelude::*};
 
-/// Gas is never faster, m/s.
-pub(crate) const GREATEST_SPEED: f32 = 150.0;
-/// Distance from a solid, in support radii, at which gas stays.
+/// Greatest speed of gas, m/s.
+pub(crate) const MAX_SPEED: f32 = 150.0;
+/// Distance that gas keeps from solids, in support radii.
 const CLEARANCE: f32 = 0.2;
-/// Thinner gas feels no more of a wind that is a force per volume, kg/m^3.
-const THINNEST: f32 = 1e-6;
+/// Least density for a wind that is a force per volume, kg/m^3.
+const MIN_DENSITY: f32 = 1e-6;
 
-/// What moves the gas for `seconds`.
-pub(crate) struct Motion<'a> {
-    pub(crate) weather: &'a Weather<'a>,
+/// One sub-step of `seconds`.
+pub(crate) struct IntegrationStep<'a> {
+    pub(crate) forces: &'a ExternalForces<'a>,
     /// Accelerations by pressure, m/s^2.
     pub(crate) acceleration: [&'a [f32]; 3],
-    /// How much of each particle lies at the edge of the gas.
-    pub(crate) to_air: &'a [f32],
+    /// Exposure to air of each particle, 0 to 1.
+    pub(crate) air_exposure: &'a [f32],
     /// Support radius d, m.
     pub(crate) radius: f32,
     pub(crate) seconds: f32,
 }
 
-/// What of a particle its forces follow from.
+/// Inputs of the forces on a particle.
 #[derive(Clone, Copy, Debug)]
-struct Pushed<R> {
+struct ForceInputs<R> {
     velocity: [R; 3],
-    /// The part of the velocity that is not the air's.
+    /// Velocity without that of the air's own motion.
     own: [R; 3],
     acceleration: [R; 3],
     temperature: R,
     density: R,
-    to_air: R,
+    air_exposure: R,
 }
 
-/// What moving reads of particles and does not change.
+/// Particle columns that the integration reads.
 #[derive(Clone, Copy)]
-struct Unmoved<'a> {
+struct IntegrationInputs<'a> {
     acceleration: [&'a [f32]; 3],
     temperature: &'a [f32],
     density: &'a [f32],
-    to_air: &'a [f32],
+    air_exposure: &'a [f32],
 }
 
-impl Still for Unmoved<'_> {
-    fn part(self, range: Range<usize>) -> Self {
+impl SharedColumns for IntegrationInputs<'_> {
+    fn slice(self, range: Range<usize>) -> Self {
         Self {
             acceleration: self.acceleration.map(|values| &values[range.clone()]),
             temperature: &self.temperature[range.clone()],
             density: &self.density[range.clone()],
-            to_air: &self.to_air[range],
+            air_exposure: &self.air_exposure[range],
         }
     }
 }
 
-impl<'a> Work<Unmoved<'a>, 10> for Motion<'_> {
+impl<'a> BatchUpdate<IntegrationInputs<'a>, 10> for IntegrationStep<'_> {
     #[inline(always)]
     fn rows<S: Simd>(
         &self,
         simd: S,
-        draught: &Draught,
-        rows: Rows,
-        still: Unmoved<'a>,
+        burner: &BurnerForces,
+        rows: RowBatch,
+        inputs: IntegrationInputs<'a>,
         [x, y, z, u, v, w, d, e, f, age]: &mut [&mut [f32]; 10],
     ) {
-        let place = rows.load_all(simd, [x, y, z]);
+        let position = rows.load_all(simd, [x, y, z]);
         let velocity = rows.load_all(simd, [u, v, w]);
-        let gas = Pushed {
+        let gas = ForceInputs {
             velocity,
-            own: less(&velocity, &rows.load_all(simd, [d, e, f])),
-            acceleration: rows.load_all(simd, still.acceleration),
-            temperature: rows.load(simd, still.temperature),
-            density: rows.load(simd, still.density),
-            to_air: rows.load(simd, still.to_air),
+            own: subtract(&velocity, &rows.load_all(simd, [d, e, f])),
+            acceleration: rows.load_all(simd, inputs.acceleration),
+            temperature: rows.load(simd, inputs.temperature),
+            density: rows.load(simd, inputs.density),
+            air_exposure: rows.load(simd, inputs.air_exposure),
         };
-        let wind = draught.breeze.at(simd, &place);
-        let own = self.pushed(draught, &gas, &wind);
-        let old = rows.load(simd, age);
-        let drift = draught.velocity(&draught.flow(simd, &place), length(&own), old);
-        let velocity = held_to(&plus(&own, &drift, old.broadcast(1.0)), GREATEST_SPEED);
-        let after = self.carried(simd, place, [velocity, drift], rows.0.len());
+        let wind = burner.wind_field.at(simd, &position);
+        let own = self.apply_forces(burner, &gas, &wind);
+        let age_before = rows.load(simd, age);
+        let drift = burner.velocity(&burner.flow(simd, &position), length(&own), age_before);
+        let velocity = clamp_length(&add_scaled(&own, &drift, age_before.broadcast(1.0)), MAX_SPEED);
+        let after = self.advect(simd, position, [velocity, drift], rows.0.len());
         for (values, arrays) in after.into_iter().zip([[x, y, z], [u, v, w], [d, e, f]]) {
             for (batch, array) in values.into_iter().zip(arrays) {
                 rows.store(batch, array);
             }
         }
-        rows.store(old + old.broadcast(self.seconds), age);
+        rows.store(age_before + age_before.broadcast(self.seconds), age);
     }
 }
 
-impl Motion<'_> {
-    /// Moves the particles, and they age.
+impl IntegrationStep<'_> {
+    /// Advances velocities, positions and ages.
     pub(crate) fn advance(&self, particles: &mut Particles) {
         let Particles { position: [x, y, z], velocity: [u, v, w], drift: [d, e, f], age, .. } = particles;
-        let still = Unmoved {
+        let inputs = IntegrationInputs {
             acceleration: self.acceleration,
             temperature: &particles.temperature,
             density: &particles.density,
-            to_air: self.to_air,
+            air_exposure: self.air_exposure,
         };
         let moving = [x, y, z, u, v, w, d, e, f, age];
-        burner_by_burner(self, &self.weather.draughts, &particles.burner, still, moving);
+        for_each_burner_batch(self, &self.forces.burner_forces, &particles.burner, inputs, moving);
     }
 
     /// Own velocity after pressure, buoyancy and wind.
     #[inline(always)]
-    fn pushed<R: Real>(&self, draught: &Draught, gas: &Pushed<R>, wind: &[R; 3]) -> [R; 3] {
-        let Self { weather, seconds, .. } = *self;
-        let like = |value: f32| gas.density.broadcast(value);
-        // No force moves a particle by more than a quarter of d in a sub-step.
-        let most = 0.25 * self.radius / (seconds * seconds);
-        let mut acceleration = held_to(&gas.acceleration, most);
-        let thinner = gas.temperature * like(1.0 / weather.air_temperature);
-        acceleration[1] = (thinner - like(1.0)).fma(like(weather.buoyancy), acceleration[1]);
-        let per_volume = weather.wind == WindForce::PerVolume;
+    fn apply_forces<R: Real>(&self, burner: &BurnerForces, gas: &ForceInputs<R>, wind: &[R; 3]) -> [R; 3] {
+        let Self { forces, seconds, .. } = *self;
+        let splat = |value: f32| gas.density.broadcast(value);
+        // No force moves a particle by more than d/4 in a sub-step.
+        let max_acceleration = 0.25 * self.radius / (seconds * seconds);
+        let mut acceleration = clamp_length(&gas.acceleration, max_acceleration);
+        let density_ratio = gas.temperature * splat(1.0 / forces.air_temperature);
+        acceleration[1] = (density_ratio - splat(1.0)).fma(splat(forces.buoyancy), acceleration[1]);
+        let per_volume = forces.wind == WindForce::PerVolume;
         if per_volume {
-            acceleration = plus(&acceleration, wind, like(weather.wind_gain) / gas.density.simd_max(like(THINNEST)));
+            acceleration =
+                add_scaled(&acceleration, wind, splat(forces.wind_gain) / gas.density.simd_max(splat(MIN_DENSITY)));
         }
-        let pushed = plus(&gas.own, &acceleration, like(seconds));
-        // Air that the gas takes up brings its own momentum.
-        let gain = if per_volume { 0.0 } else { weather.wind_gain };
-        let air = [wind[0] * like(gain), wind[1] * like(gain), wind[2] * like(gain)];
-        let rate = draught.mixing(&gas.velocity, wind, gas.to_air) * like(seconds);
-        let share = like(1.0) / (rate + like(1.0));
-        let mut mixed = plus(&pushed, &air, rate);
+        let accelerated = add_scaled(&gas.own, &acceleration, splat(seconds));
+        // Entrained air brings its own momentum.
+        let gain = if per_volume { 0.0 } else { forces.wind_gain };
+        let air = [wind[0] * splat(gain), wind[1] * splat(gain), wind[2] * splat(gain)];
+        let rate = burner.mixing(&gas.velocity, wind, gas.air_exposure) * splat(seconds);
+        let mix_weight = splat(1.0) / (rate + splat(1.0));
+        let mut mixed = add_scaled(&accelerated, &air, rate);
         for c in 0..3 {
-            mixed[c] = mixed[c] * share;
+            mixed[c] = mixed[c] * mix_weight;
         }
-        let mixed = held_to(&mixed, GREATEST_SPEED);
-        if per_volume { mixed } else { self.dragged(draught, &mixed, &air, thinner) }
+        let mixed = clamp_length(&mixed, MAX_SPEED);
+        if per_volume { mixed } else { self.apply_cross_drag(burner, &mixed, &air, density_ratio) }
     }
 
-    /// Velocity after the drag of air that blows across the fire: `C rho_air / (rho r) |w - u| (w - u)`, level and implicit.
+    /// Velocity after the drag of cross wind, horizontal and implicit: `C rho_air / (rho r) |w - u| (w - u)`.
     ///
-    /// Gas is several times thinner than air, so that a wind it would hardly mix with still bends it.
+    /// Hot gas is several times less dense than air, so that it also bends in wind that it hardly mixes with.
     #[inline(always)]
-    fn dragged<R: Real>(&self, draught: &Draught, own: &[R; 3], air: &[R; 3], thinner: R) -> [R; 3] {
-        let mut across = less(air, own);
-        across[1] = thinner.broadcast(0.0);
-        let rate = thinner * length(&across) * thinner.broadcast(draught.drag * self.seconds);
-        plus(own, &across, rate / (rate + rate.broadcast(1.0)))
+    fn apply_cross_drag<R: Real>(&self, burner: &BurnerForces, own: &[R; 3], air: &[R; 3], density_ratio: R) -> [R; 3] {
+        let mut across = subtract(air, own);
+        across[1] = density_ratio.broadcast(0.0);
+        let rate = density_ratio * length(&across) * density_ratio.broadcast(burner.drag * self.seconds);
+        add_scaled(own, &across, rate / (rate + rate.broadcast(1.0)))
     }
 
-    /// Where particles come with a velocity, of which a part is the air's, and what solids leave of both; the first `count` lanes count.
+    /// Positions, velocities and drift velocities after advection and collisions; the first `count` lanes are valid.
     #[inline(always)]
-    fn carried<S: Simd>(
+    fn advect<S: Simd>(
         &self,
         simd: S,
-        place: [Lanes<S>; 3],
+        position: [Lanes<S>; 3],
         [velocity, drift]: [[Lanes<S>; 3]; 2],
         count: usize,
     ) -> [[Lanes<S>; 3]; 3] {
-        if self.weather.occluders.is_empty() {
-            return [plus(&place, &velocity, place[0].broadcast(self.seconds)), velocity, drift];
+        if self.forces.occluders.is_empty() {
+            return [add_scaled(&position, &velocity, position[0].broadcast(self.seconds)), velocity, drift];
         }
-        let mut carried = [place, velocity, drift];
+        let mut vectors = [position, velocity, drift];
         let mut lanes = [[[0.0; LANES]; 3]; 3];
-        for (batches, lanes) in carried.iter().zip(&mut lanes) {
+        for (batches, lanes) in vectors.iter().zip(&mut lanes) {
             for c in 0..3 {
                 batches[c].store_slice(&mut lanes[c]);
             }
         }
-        self.carry_one_by_one(&mut lanes, count);
-        for (batches, lanes) in carried.iter_mut().zip(&lanes) {
+        self.resolve_collisions(&mut lanes, count);
+        for (batches, lanes) in vectors.iter_mut().zip(&lanes) {
             for c in 0..3 {
                 batches[c] = Lanes::from_slice(simd, &lanes[c]);
             }
         }
-        carried
+        vectors
     }
 
-    /// Carries the first `count` of places, velocities and the air's part of them around solids.
+    /// Collides the first `count` lanes with solids, one by one.
     #[inline(never)]
-    fn carry_one_by_one(&self, carried: &mut [[[f32; LANES]; 3]; 3], count: usize) {
-        let Weather { occluders, origin, .. } = *self.weather;
-        let solids = Solids { occluders, origin, clearance: CLEARANCE * self.radius };
+    fn resolve_collisions(&self, vectors: &mut [[[f32; LANES]; 3]; 3], count: usize) {
+        let ExternalForces { occluders, origin, .. } = *self.forces;
+        let colliders = Colliders { occluders, origin, clearance: CLEARANCE * self.radius };
         for lane in 0..count {
-            let [place, velocity, drift] = carried.map(|all| Vec3::from(all.map(|values| values[lane])));
-            let (place, [left, own]) = solids.carry(place, velocity * self.seconds, [velocity, velocity - drift]);
-            // What the gas has of its own does not grow where a solid takes the air's part: eddies are a share of it.
-            let drift = if left == velocity { drift } else { left - own };
-            for (all, vector) in carried.iter_mut().zip([place, left, drift]) {
+            let [position, velocity, drift] = vectors.map(|all| Vec3::from(all.map(|values| values[lane])));
+            let (position, [remaining, own]) =
+                colliders.collide(position, velocity * self.seconds, [velocity, velocity - drift]);
+            // A collision that takes away drift must not increase the own velocity, to which eddies are proportional.
+            let drift = if remaining == velocity { drift } else { remaining - own };
+            for (all, vector) in vectors.iter_mut().zip([position, remaining, drift]) {
                 for c in 0..3 {
                     all[c][lane] = vector[c];
                 }
@@ -218,22 +218,25 @@ mod tests {
     use crate::particles::{
         parameters::{FlameParticlesParameters, MotionParameters},
         simulate::{
-            derived::Design,
-            forces::{external_forces::Setting, turbulence::Turbulence},
+            derived::DerivedConstants,
+            forces::{external_forces::StepConstants, turbulence::TurbulenceTile},
         },
     };
 
-    /// What the forces of particle `number` follow from, and the wind there.
-    fn pushed(number: u64) -> (Pushed<f32>, [f32; 3]) {
+    /// Inputs of particle `number`, and the wind at it.
+    fn accelerated(number: u64) -> (ForceInputs<f32>, [f32; 3]) {
         let key = Key::new(4, "pushed");
         let vector = |step: u32| {
             let [x, y, z, _] = key.words(number, step, Purpose(0)).map(|word| 8.0 * uniform(word) - 4.0);
             [x, y, z]
         };
-        let [temperature, density, to_air, _] = key.words(number, 9, Purpose(0)).map(uniform);
+        let [temperature, density, air_exposure, _] = key.words(number, 9, Purpose(0)).map(uniform);
         let acceleration = vector(2).map(|component| component * 300.0);
         let (temperature, density) = (300.0 + 1500.0 * temperature, 0.1 + density);
-        (Pushed { velocity: vector(0), own: vector(1), acceleration, temperature, density, to_air }, vector(3))
+        (
+            ForceInputs { velocity: vector(0), own: vector(1), acceleration, temperature, density, air_exposure },
+            vector(3),
+        )
     }
 
     #[test]
@@ -241,34 +244,39 @@ mod tests {
         for wind in [WindForce::Mixing, WindForce::PerVolume] {
             let motion = MotionParameters { wind, ..MotionParameters::default() };
             let parameters = FlameParticlesParameters { motion, ..FlameParticlesParameters::default() };
-            let design = Design::new(&parameters, None, &MemoryAssets::default()).unwrap();
-            let (key, breeze) = (Key::new(1, "flame"), Wind::new(WindParameters::default(), 1, None));
-            let turbulence = Turbulence::new(key);
-            let setting = Setting { parameters: &parameters, design: &design, turbulence: &turbulence, key };
-            let around = Surroundings::of_wind(&breeze);
-            let weather = Weather::new(setting, &Particles::default(), &around, 0.0);
-            let motion =
-                Motion { weather: &weather, acceleration: [&[]; 3], to_air: &[], radius: 0.05, seconds: 0.005 };
-            let draught = &weather.draughts[0];
-            let all: Vec<_> = (0..LANES as u64).map(pushed).collect();
+            let constants = DerivedConstants::new(&parameters, None, &MemoryAssets::default()).unwrap();
+            let (key, wind_field) = (Key::new(1, "flame"), Wind::new(WindParameters::default(), 1, None));
+            let turbulence = TurbulenceTile::new(key);
+            let step = StepConstants { parameters: &parameters, constants: &constants, turbulence: &turbulence, key };
+            let around = Surroundings::of_wind(&wind_field);
+            let forces = ExternalForces::new(step, &Particles::default(), &around, 0.0);
+            let motion = IntegrationStep {
+                forces: &forces,
+                acceleration: [&[]; 3],
+                air_exposure: &[],
+                radius: 0.05,
+                seconds: 0.005,
+            };
+            let burner = &forces.burner_forces[0];
+            let all: Vec<_> = (0..LANES as u64).map(accelerated).collect();
             let together = bansho_base::dispatch_baseline!(simd => {
                 let batch = |value: &dyn Fn(usize) -> f32| {
                     let values: [f32; LANES] = std::array::from_fn(value);
                     Lanes::from_slice(simd, &values)
                 };
                 let vector = |value: &dyn Fn(usize) -> [f32; 3]| [0, 1, 2].map(|c| batch(&|lane| value(lane)[c]));
-                let gas = Pushed {
+                let gas = ForceInputs {
                     velocity: vector(&|lane| all[lane].0.velocity),
                     own: vector(&|lane| all[lane].0.own),
                     acceleration: vector(&|lane| all[lane].0.acceleration),
                     temperature: batch(&|lane| all[lane].0.temperature),
                     density: batch(&|lane| all[lane].0.density),
-                    to_air: batch(&|lane| all[lane].0.to_air),
+                    air_exposure: batch(&|lane| all[lane].0.air_exposure),
                 };
-                motion.pushed(draught, &gas, &vector(&|lane| all[lane].1)).map(|values| values.as_slice().to_vec())
+                motion.apply_forces(burner, &gas, &vector(&|lane| all[lane].1)).map(|values| values.as_slice().to_vec())
             });
             for (lane, (gas, wind)) in all.iter().enumerate() {
-                let alone = motion.pushed(draught, gas, wind);
+                let alone = motion.apply_forces(burner, gas, wind);
                 assert_eq!(together.each_ref().map(|values| values[lane]), alone);
                 assert!(alone != gas.own);
             }

@@ -1,16 +1,129 @@
-//! The state of the flame and its steps.
+//! The state of the flame, and its time steps.
+//!
+//! `derived` are the constants, `burner` and `spawning` the sources of particles, `fluid` density and pressure, `forces` everything that the
+//! air does, `combustion` thermochemistry, `integrate` and `collision` motion, `snapshot` serialization. `particles` is the state.
+
+use crate::particles::{
+    parameters::FlameParticlesParameters,
+    simulate::{
+        combustion::{CombustionModel, CombustionStep},
+        derived::DerivedConstants,
+        fluid::FluidSolver,
+        forces::{
+            external_forces::{ExternalForces, StepConstants},
+            turbulence::TurbulenceTile,
+        },
+        integrate::IntegrationStep,
+        particle_lanes::PARTICLES_PER_TASK,
+        particles::Particles,
+        spawning::Spawner,
+    },
+};
+use std::sync::Arc;
+
+use bansho_base::{
+    math::{Vec3, random::Key},
+    phenomenon::surroundings::Surroundings,
+};
+use rayon::prelude::*;
 
 pub(crate) mod burner;
 pub(crate) mod collision;
 pub(crate) mod combustion;
 pub(crate) mod derived;
-pub(crate) mod emission;
 pub(crate) mod fluid;
 pub(crate) mod forces;
 pub(crate) mod integrate;
-pub(crate) mod neighbor_sums;
 pub(crate) mod particle_lanes;
 pub mod particles;
-pub(crate) mod simulation;
 pub(crate) mod snapshot;
-pub(crate) mod vector_lanes;
+pub(crate) mod spawning;
+
+/// The simulation: particles, and all that moves them.
+#[derive(Clone, Debug)]
+pub(crate) struct Simulation {
+    /// Shared by all runs.
+    pub(crate) constants: Arc<DerivedConstants>,
+    combustion: CombustionModel,
+    pub(crate) parameters: FlameParticlesParameters,
+    pub(crate) turbulence: TurbulenceTile,
+    pub(crate) key: Key,
+    pub(crate) particles: Particles,
+    solver: FluidSolver,
+}
+
+impl Simulation {
+    pub(crate) fn new(parameters: &FlameParticlesParameters, constants: DerivedConstants, key: Key) -> Self {
+        Self {
+            combustion: CombustionModel::from(&parameters.life),
+            turbulence: TurbulenceTile::new(key),
+            particles: Particles::new(parameters.position.into()),
+            solver: FluidSolver::new(&parameters.fluid, &constants),
+            parameters: parameters.clone(),
+            constants: Arc::new(constants),
+            key,
+        }
+    }
+
+    /// Length of a step, s.
+    pub(crate) fn step_s(&self) -> f64 {
+        self.parameters.step_s
+    }
+
+    /// Advances from `time` by one step.
+    ///
+    /// Pressure and advection run in sub-steps. Processes that are slow compared with sound run once, at the beginning of the step:
+    /// viscosity and conduction, mixing, burning and cooling, and changes of wind and plume axes.
+    pub(crate) fn step(&mut self, time: f64, surroundings: &Surroundings) {
+        let Self { constants, combustion, parameters, turbulence, key, particles, solver } = self;
+        let step = StepConstants { parameters, constants, turbulence, key: *key };
+        let mut forces = ExternalForces::new(step, particles, surroundings, time);
+        let step_seconds = parameters.step_s as f32;
+        let substeps = solver.substep_count(particles, step_seconds);
+        let (substep_s, radius) = (parameters.step_s / f64::from(substeps), solver.support_radius());
+        let spawner = Spawner { constants, turbulence, key: *key, afterlife_s: parameters.life.afterlife_s };
+        for substep in 0..substeps {
+            let (t, seconds) = (time + substep_s * f64::from(substep), substep_s as f32);
+            solver.compute_pressure_forces(particles, seconds);
+            if substep == 0 {
+                solver.sum_over_neighbors(particles);
+                let smoothing = [parameters.fluid.viscosity, parameters.fluid.conduction].map(|share| share as f32);
+                let (neighbor_sums, afterlife) = (&solver.neighbor_sums, parameters.life.afterlife_s as f32);
+                let combustion_step = CombustionStep {
+                    combustion,
+                    forces: &forces,
+                    neighbor_sums,
+                    smoothing,
+                    afterlife,
+                    radius,
+                    seconds: step_seconds,
+                };
+                combustion_step.update_thermochemistry(particles, &mut solver.air_exposure);
+            } else {
+                forces.advance_vortex_rings(t);
+            }
+            let (acceleration, air_exposure) =
+                (solver.acceleration.each_ref().map(Vec::as_slice), &solver.air_exposure);
+            IntegrationStep { forces: &forces, acceleration, air_exposure, radius, seconds }.advance(particles);
+            spawner.spawn(particles, t, substep_s);
+        }
+        self.remove_expired();
+    }
+
+    /// Removes particles that have reached their greatest age, have left the domain, or are not finite.
+    fn remove_expired(&mut self) {
+        let [min, max] = self.constants.domain.map(|corner| corner.as_vec3());
+        let Particles { position, velocity, temperature, age, max_age, .. } = &self.particles;
+        let keep: Vec<bool> = (0..age.len())
+            .into_par_iter()
+            .with_min_len(PARTICLES_PER_TASK)
+            .map(|index| {
+                let position = Vec3::from(position.each_ref().map(|values| values[index]));
+                let speed = Vec3::from(velocity.each_ref().map(|values| values[index])).length_squared();
+                let inside = position.cmpge(min).all() && position.cmple(max).all();
+                inside && age[index] < max_age[index] && speed.is_finite() && temperature[index].is_finite()
+            })
+            .collect();
+        self.particles.retain(&keep);
+    }
+}

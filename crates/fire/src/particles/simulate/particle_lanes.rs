@@ -1,80 +1,80 @@
-//! Particles sixteen at a time, all of one burner: rows of a task's arrays.
+//! SIMD batches of sixteen particles that came from one burner, and vector operations on them.
+//!
+//! Particles of all burners are mixed in memory. Within each task their row indices are sorted by burner, and batches gather and
+//! scatter rows.
 
-use std::ops::Range;
-
+use crate::particles::simulate::forces::external_forces::BurnerForces;
+use bansho_base::math::simd::{LANES, Lanes, Real};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
+use std::ops::Range;
 
-use bansho_base::math::simd::{LANES, Lanes};
+/// Particles per task of the thread pool.
+pub(crate) const PARTICLES_PER_TASK: usize = 512;
 
-use crate::particles::simulate::forces::burner_forces::Draught;
-
-/// Particles of a task.
-pub(crate) const PARTICLES_OF_TASK: usize = 512;
-
-/// What a task reads of its particles and does not change.
-pub(crate) trait Still: Copy + Sync {
-    /// What belongs to these particles.
-    fn part(self, range: Range<usize>) -> Self;
+/// Particle columns that a task only reads.
+pub(crate) trait SharedColumns: Copy + Sync {
+    /// The rows of one task.
+    fn slice(self, range: Range<usize>) -> Self;
 }
 
-/// Work on `N` numbers of each particle, for sixteen of one burner at a time.
-pub(crate) trait Work<S: Still, const N: usize>: Sync {
-    /// Works on rows of a task.
-    fn rows<V: Simd>(&self, simd: V, draught: &Draught, rows: Rows, still: S, moving: &mut [&mut [f32]; N]);
+/// An update of `N` columns, for a batch of sixteen particles of one burner at a time.
+pub(crate) trait BatchUpdate<S: SharedColumns, const N: usize>: Sync {
+    /// Updates some rows of a task.
+    fn rows<V: Simd>(&self, simd: V, burner: &BurnerForces, rows: RowBatch, shared: S, moving: &mut [&mut [f32]; N]);
 }
 
-/// Works on all particles, burner by burner within each task.
-pub(crate) fn burner_by_burner<S: Still, const N: usize>(
-    work: &impl Work<S, N>,
-    draughts: &[Draught],
+/// Runs an update over all particles, burner by burner within each task.
+pub(crate) fn for_each_burner_batch<S: SharedColumns, const N: usize>(
+    work: &impl BatchUpdate<S, N>,
+    burner_forces: &[BurnerForces],
     burners: &[u32],
-    still: S,
+    shared: S,
     moving: [&mut Vec<f32>; N],
 ) {
     let level = Level::new();
-    columns(moving).into_par_iter().enumerate().for_each(|(task, mut moving)| {
-        let first = task * PARTICLES_OF_TASK;
+    split_into_tasks(moving).into_par_iter().enumerate().for_each(|(task, mut moving)| {
+        let first = task * PARTICLES_PER_TASK;
         let range = first..first + moving[0].len();
-        let sorted = ByBurner::new(&burners[range.clone()], draughts.len());
-        let still = still.part(range);
-        dispatch!(level, simd => work_task(simd, work, draughts, &sorted, still, &mut moving));
+        let sorted = RowsByBurner::new(&burners[range.clone()], burner_forces.len());
+        let shared = shared.slice(range);
+        dispatch!(level, simd => update_task(simd, work, burner_forces, &sorted, shared, &mut moving));
     });
 }
 
 #[inline(always)]
-fn work_task<V: Simd, S: Still, const N: usize>(
+fn update_task<V: Simd, S: SharedColumns, const N: usize>(
     simd: V,
-    work: &impl Work<S, N>,
-    draughts: &[Draught],
-    sorted: &ByBurner,
-    still: S,
+    work: &impl BatchUpdate<S, N>,
+    burner_forces: &[BurnerForces],
+    sorted: &RowsByBurner,
+    shared: S,
     moving: &mut [&mut [f32]; N],
 ) {
-    for (number, draught) in draughts.iter().enumerate() {
+    for (number, burner) in burner_forces.iter().enumerate() {
         for rows in sorted.of(number).chunks(LANES) {
-            work.rows(simd, draught, Rows(rows), still, moving);
+            work.rows(simd, burner, RowBatch(rows), shared, moving);
         }
     }
 }
 
-/// The part of each array that belongs to each task.
-fn columns<const N: usize>(arrays: [&mut Vec<f32>; N]) -> Vec<[&mut [f32]; N]> {
-    let tasks = arrays.first().map_or(0, |values| values.len().div_ceil(PARTICLES_OF_TASK));
-    let mut parts = arrays.map(|values| values.chunks_mut(PARTICLES_OF_TASK));
-    (0..tasks).map(|_| parts.each_mut().map(|parts| parts.next().unwrap_or_default())).collect()
+/// The slice of each column that belongs to each task.
+fn split_into_tasks<const N: usize>(arrays: [&mut Vec<f32>; N]) -> Vec<[&mut [f32]; N]> {
+    let tasks = arrays.first().map_or(0, |values| values.len().div_ceil(PARTICLES_PER_TASK));
+    let mut chunks = arrays.map(|values| values.chunks_mut(PARTICLES_PER_TASK));
+    (0..tasks).map(|_| chunks.each_mut().map(|chunks| chunks.next().unwrap_or_default())).collect()
 }
 
-/// The rows of a task's arrays, burner by burner.
+/// Row indices of a task, sorted by burner.
 #[derive(Debug)]
-struct ByBurner {
+struct RowsByBurner {
     rows: Vec<u32>,
-    /// Where the rows of each burner end.
+    /// End of the rows of each burner.
     ends: Vec<usize>,
 }
 
-impl ByBurner {
-    /// Sorts the rows of a task whose particles came from these burners, of `count` that there are.
+impl RowsByBurner {
+    /// Counting sort of a task's rows by `burners`, of which there are `count`.
     fn new(burners: &[u32], count: usize) -> Self {
         let mut sorted = Self { rows: vec![0; burners.len()], ends: vec![0; count] };
         for burner in burners {
@@ -85,36 +85,36 @@ impl ByBurner {
             start += std::mem::replace(end, start);
         }
         for (row, burner) in burners.iter().enumerate() {
-            let place = &mut sorted.ends[*burner as usize];
-            sorted.rows[*place] = row as u32;
-            *place += 1;
+            let end = &mut sorted.ends[*burner as usize];
+            sorted.rows[*end] = row as u32;
+            *end += 1;
         }
         sorted
     }
 
-    /// The rows of a burner, upward.
+    /// The rows of a burner, ascending.
     fn of(&self, burner: usize) -> &[u32] {
         let start = if burner == 0 { 0 } else { self.ends[burner - 1] };
         &self.rows[start..self.ends[burner]]
     }
 }
 
-/// Up to sixteen rows, upward.
+/// Up to sixteen row indices, ascending.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rows<'a>(pub(crate) &'a [u32]);
+pub(crate) struct RowBatch<'a>(pub(crate) &'a [u32]);
 
-impl Rows<'_> {
-    /// The first row, if they are sixteen that follow each other.
+impl RowBatch<'_> {
+    /// The first row, if these are sixteen contiguous rows.
     #[inline(always)]
-    fn run(self) -> Option<usize> {
+    fn contiguous_start(self) -> Option<usize> {
         let (first, last) = (self.0[0] as usize, self.0[self.0.len() - 1] as usize);
         (self.0.len() == LANES && last - first == LANES - 1).then_some(first)
     }
 
-    /// Their values; lanes beyond the last row hold the last row's.
+    /// Gathers values; lanes beyond the last row repeat it.
     #[inline(always)]
     pub(crate) fn load<S: Simd>(self, simd: S, values: &[f32]) -> Lanes<S> {
-        if let Some(first) = self.run() {
+        if let Some(first) = self.contiguous_start() {
             return Lanes::from_slice(simd, &values[first..first + LANES]);
         }
         let last = values[self.0[self.0.len() - 1] as usize];
@@ -125,7 +125,7 @@ impl Rows<'_> {
         Lanes::from_slice(simd, &lanes)
     }
 
-    /// The values of several arrays.
+    /// Gathers values of several columns.
     #[inline(always)]
     pub(crate) fn load_all<S: Simd, const N: usize>(self, simd: S, arrays: [&[f32]; N]) -> [Lanes<S>; N] {
         let mut batches = [Lanes::splat(simd, 0.0); N];
@@ -135,10 +135,10 @@ impl Rows<'_> {
         batches
     }
 
-    /// Puts values into their rows.
+    /// Scatters values to their rows.
     #[inline(always)]
     pub(crate) fn store<S: Simd>(self, batch: Lanes<S>, values: &mut [f32]) {
-        if let Some(first) = self.run() {
+        if let Some(first) = self.contiguous_start() {
             batch.store_slice(&mut values[first..first + LANES]);
             return;
         }
@@ -150,6 +150,51 @@ impl Rows<'_> {
     }
 }
 
+/// Dot product.
+#[inline(always)]
+pub(crate) fn dot<R: Real>(one: &[R; 3], other: &[R; 3]) -> R {
+    one[0].fma(other[0], one[1].fma(other[1], one[2] * other[2]))
+}
+
+/// Euclidean length.
+#[inline(always)]
+pub(crate) fn length<R: Real>(vector: &[R; 3]) -> R {
+    dot(vector, vector).simd_sqrt()
+}
+
+/// `one - other`.
+#[inline(always)]
+pub(crate) fn subtract<R: Real>(one: &[R; 3], other: &[R; 3]) -> [R; 3] {
+    let mut difference = *one;
+    for c in 0..3 {
+        difference[c] = one[c] - other[c];
+    }
+    difference
+}
+
+/// `one + other * factor`.
+#[inline(always)]
+pub(crate) fn add_scaled<R: Real>(one: &[R; 3], other: &[R; 3], factor: R) -> [R; 3] {
+    let mut sum = *one;
+    for c in 0..3 {
+        sum[c] = other[c].fma(factor, one[c]);
+    }
+    sum
+}
+
+/// Scales a vector down to `max_length` where it is longer.
+#[inline(always)]
+pub(crate) fn clamp_length<R: Real>(vector: &[R; 3], max_length: f32) -> [R; 3] {
+    let splat = |value: f32| vector[0].broadcast(value);
+    let squared = dot(vector, vector).simd_max(splat(f32::MIN_POSITIVE));
+    let scale = (squared.simd_rsqrt() * splat(max_length)).simd_min(splat(1.0));
+    let mut clamped = *vector;
+    for c in 0..3 {
+        clamped[c] = vector[c] * scale;
+    }
+    clamped
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -157,13 +202,13 @@ mod tests {
     #[test]
     fn rows_of_each_burner_come_together_and_values_go_back_where_they_were() {
         let burners: Vec<u32> = (0..100).map(|row| if row < 40 { 2 } else { row % 3 }).collect();
-        let sorted = ByBurner::new(&burners, 5);
+        let sorted = RowsByBurner::new(&burners, 5);
         let values: Vec<f32> = (0..100).map(|row| row as f32).collect();
         let mut seen = vec![0.0; 100];
         for burner in 0..5 {
             let rows = sorted.of(burner);
             assert!(rows.iter().all(|row| burners[*row as usize] as usize == burner) && rows.is_sorted());
-            for rows in rows.chunks(LANES).map(Rows) {
+            for rows in rows.chunks(LANES).map(RowBatch) {
                 bansho_base::dispatch_baseline!(simd => {
                     let batch = rows.load(simd, &values);
                     assert_eq!(batch.as_slice()[LANES - 1], rows.0[rows.0.len() - 1] as f32);
@@ -172,5 +217,13 @@ mod tests {
             }
         }
         assert!((0..100).all(|row| seen[row] == 2.0 * values[row]), "{seen:?}");
+    }
+
+    #[test]
+    fn long_vectors_are_shortened_and_others_stay() {
+        assert_eq!(clamp_length(&[1.0, -2.0, 2.0], 3.1), [1.0, -2.0, 2.0]);
+        assert_eq!(clamp_length(&[0.0; 3], 1.0), [0.0; 3]);
+        let clamped = clamp_length(&[10.0, -20.0, 20.0], 3.0);
+        assert!((length(&clamped) - 3.0).abs() < 1e-5 && (clamped[1] + 2.0).abs() < 1e-5, "{clamped:?}");
     }
 }

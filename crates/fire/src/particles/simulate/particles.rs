@@ -1,100 +1,100 @@
-//! The gas as particles: structure of arrays, one entry a particle in every array.
+//! Particles as structure of arrays.
 
 use bansho_base::math::DVec3;
 
 use bansho_sph::{Cells, retain};
 use rayon::prelude::*;
 
-/// How many arrays of numbers there are.
-pub(crate) const NUMBERS: usize = 21;
-/// Which of them are densities.
+/// Number of `f32` columns.
+pub(crate) const FLOAT_COLUMNS: usize = 21;
+/// Index of the density column.
 const DENSITY: usize = 14;
 
-/// One particle, for pushing into [`Particles`] and for tests.
+/// One particle, for [`Particles::push`] and for tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Particle {
-    /// Number of its birth, unique in the run: the key of all its random numbers.
-    pub birth: u64,
-    /// Place x, m, from [`Particles::origin`].
+    /// Unique number in the run: it seeds all random numbers of the particle.
+    pub id: u64,
+    /// Position x, m, relative to [`Particles::origin`].
     pub position: [f32; 3],
     /// Velocity u, m/s.
     pub velocity: [f32; 3],
     /// Mass m, kg.
     pub mass: f32,
-    /// Density rho at its place, eq. (3), kg/m^3.
+    /// Density rho at its position, eq. (3), kg/m^3.
     pub density: f32,
     /// Temperature T, K.
     pub temperature: f32,
-    /// Support radius d of the kernel with which it is drawn, m; grows as the particle mixes with air.
+    /// Support radius d of the kernel with which it is drawn, m; it grows as the particle entrains air.
     pub support_radius: f32,
-    /// Time since its birth, s.
+    /// Time since it was spawned, s.
     pub age: f32,
     /// Age at which it is removed, s.
-    pub life: f32,
-    /// Share of its fuel that has not burnt: 1 at birth, 0 once burnt out.
+    pub max_age: f32,
+    /// Fraction of fuel left: 1 when spawned, 0 when burnt out.
     pub fuel: f32,
-    /// Volume fraction of soot, dimensionless (1e-6 is one part in a million, usual in a yellow flame).
+    /// Volume fraction of soot (about 1e-6 in a yellow flame).
     pub soot: f32,
 }
 
-/// All living particles, in the order of the cells that they were last sorted into.
+/// All particles, in the order of the cells that they were last sorted into.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Particles {
-    /// Where the positions count from, m.
+    /// Origin of positions, m.
     pub origin: DVec3,
-    pub(crate) birth: Vec<u64>,
+    pub(crate) id: Vec<u64>,
     pub(crate) position: [Vec<f32>; 3],
     pub(crate) velocity: [Vec<f32>; 3],
-    pub(crate) birthplace: [Vec<f32>; 3],
-    /// The part of the velocity with which the air's own motion carries the particle, m/s.
+    pub(crate) spawn_point: [Vec<f32>; 3],
+    /// Velocity by which the air's own motion advects the particle, m/s; part of `velocity`.
     pub(crate) drift: [Vec<f32>; 3],
-    /// How fast it burns beside the mean.
-    pub(crate) hunger: Vec<f32>,
-    /// Number of the burner it came from.
+    /// Burning rate relative to the mean.
+    pub(crate) burn_rate: Vec<f32>,
+    /// Index of the burner it came from.
     pub(crate) burner: Vec<u32>,
     pub(crate) mass: Vec<f32>,
     pub(crate) density: Vec<f32>,
     pub(crate) temperature: Vec<f32>,
     pub(crate) support_radius: Vec<f32>,
     pub(crate) age: Vec<f32>,
-    pub(crate) life: Vec<f32>,
+    pub(crate) max_age: Vec<f32>,
     pub(crate) fuel: Vec<f32>,
     pub(crate) soot: Vec<f32>,
 }
 
 impl Particles {
-    /// None, with positions counted from `origin`.
+    /// No particles, with positions relative to `origin`.
     pub fn new(origin: DVec3) -> Self {
         Self { origin, ..Self::default() }
     }
 
-    /// How many live.
+    /// Number of particles.
     pub fn len(&self) -> usize {
-        self.birth.len()
+        self.id.len()
     }
 
-    /// Whether none lives.
+    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.birth.is_empty()
+        self.id.is_empty()
     }
 
-    /// Adds a particle of the first burner, born where it is; no other may have its birth number.
+    /// Appends a particle of the first burner, spawned at its position. Its id must be unique.
     pub fn push(&mut self, particle: Particle) {
         self.push_from(0, 1.0, particle);
     }
 
-    /// Adds a particle of a burner, which burns so much faster than the mean.
-    pub(crate) fn push_from(&mut self, burner: u32, hunger: f32, particle: Particle) {
-        self.birth.push(particle.birth);
+    /// Appends a particle of a burner, with a burning rate relative to the mean.
+    pub(crate) fn push_from(&mut self, burner: u32, burn_rate: f32, particle: Particle) {
+        self.id.push(particle.id);
         self.burner.push(burner);
-        self.hunger.push(hunger);
+        self.burn_rate.push(burn_rate);
         for axis in 0..3 {
             self.position[axis].push(particle.position[axis]);
-            self.birthplace[axis].push(particle.position[axis]);
+            self.spawn_point[axis].push(particle.position[axis]);
             self.velocity[axis].push(particle.velocity[axis]);
             self.drift[axis].push(0.0);
         }
-        for (values, value) in self.scalars_mut().into_iter().zip(particle.scalars()) {
+        for (values, value) in self.scalar_columns_mut().into_iter().zip(particle.scalars()) {
             values.push(value);
         }
     }
@@ -105,7 +105,7 @@ impl Particles {
             return None;
         }
         Some(Particle {
-            birth: self.birth[index],
+            id: self.id[index],
             position: std::array::from_fn(|axis| self.position[axis][index]),
             velocity: std::array::from_fn(|axis| self.velocity[axis][index]),
             mass: self.mass[index],
@@ -113,37 +113,36 @@ impl Particles {
             temperature: self.temperature[index],
             support_radius: self.support_radius[index],
             age: self.age[index],
-            life: self.life[index],
+            max_age: self.max_age[index],
             fuel: self.fuel[index],
             soot: self.soot[index],
         })
     }
 
-    /// Removes all whose mask is not set; the others keep their order.
+    /// Keeps the particles whose mask is set, in their order.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
         if keep.contains(&false) {
-            retain(&mut self.birth, keep);
+            retain(&mut self.id, keep);
             retain(&mut self.burner, keep);
-            self.numbers_mut().into_par_iter().for_each(|values| retain(values, keep));
+            self.float_columns_mut().into_par_iter().for_each(|values| retain(values, keep));
         }
     }
 
-    /// Sorts them into cells, and what else is known of each; their numbers of birth order those of one cell. Their densities are to be
-    /// found anew.
-    pub(crate) fn sort(&mut self, cells: &mut Cells<3>, more: &mut Vec<f32>) {
-        cells.assign(self.positions(), &self.birth);
-        cells.reorder(&mut self.birth);
+    /// Sorts the particles by cell, then by id, and one more column with them. Densities are not sorted: they are to be recomputed.
+    pub(crate) fn sort(&mut self, cells: &mut Cells<3>, companion: &mut Vec<f32>) {
+        cells.assign(self.positions(), &self.id);
+        cells.reorder(&mut self.id);
         cells.reorder(&mut self.burner);
-        let arrays = self.numbers_mut().into_iter().enumerate().filter(|(number, _)| *number != DENSITY);
-        cells.reorder_all(arrays.map(|(_, values)| values).chain([more]));
+        let arrays = self.float_columns_mut().into_iter().enumerate().filter(|(number, _)| *number != DENSITY);
+        cells.reorder_all(arrays.map(|(_, values)| values).chain([companion]));
     }
 
-    /// Numbers of birth, no two alike.
-    pub fn births(&self) -> &[u64] {
-        &self.birth
+    /// Unique ids.
+    pub fn ids(&self) -> &[u64] {
+        &self.id
     }
 
-    /// Places x, y and z from the origin, m.
+    /// Positions x, y and z relative to the origin, m.
     pub fn positions(&self) -> [&[f32]; 3] {
         self.position.each_ref().map(Vec::as_slice)
     }
@@ -153,9 +152,9 @@ impl Particles {
         self.velocity.each_ref().map(Vec::as_slice)
     }
 
-    /// Places where they were born, m from the origin: with the age they name the gas, whatever became of it.
-    pub fn birthplaces(&self) -> [&[f32]; 3] {
-        self.birthplace.each_ref().map(Vec::as_slice)
+    /// Positions at which they were spawned, relative to the origin, m: Lagrangian coordinates of the gas.
+    pub fn spawn_positions(&self) -> [&[f32]; 3] {
+        self.spawn_point.each_ref().map(Vec::as_slice)
     }
 
     /// Masses m, kg.
@@ -178,64 +177,108 @@ impl Particles {
         &self.support_radius
     }
 
-    /// Times since birth, s.
+    /// Ages, s.
     pub fn ages(&self) -> &[f32] {
         &self.age
     }
 
-    /// Ages at removal, s.
-    pub fn lives(&self) -> &[f32] {
-        &self.life
+    /// Ages at which they are removed, s.
+    pub fn max_ages(&self) -> &[f32] {
+        &self.max_age
     }
 
-    /// Shares of the fuel that have not burnt.
-    pub fn fuels(&self) -> &[f32] {
+    /// Fractions of fuel left.
+    pub fn fuel_fractions(&self) -> &[f32] {
         &self.fuel
     }
 
     /// Volume fractions of soot.
-    pub fn soots(&self) -> &[f32] {
+    pub fn soot_fractions(&self) -> &[f32] {
         &self.soot
     }
 
-    /// Every array of numbers, for what treats them all alike.
-    pub(crate) fn numbers(&self) -> [&Vec<f32>; NUMBERS] {
-        let Self { position: [x, y, z], velocity: [u, v, w], birthplace: [a, b, c], drift: [d, e, f], .. } = self;
-        let Self { hunger, mass, density, temperature, support_radius, age, life, fuel, soot, .. } = self;
-        [x, y, z, u, v, w, a, b, c, d, e, f, hunger, mass, density, temperature, support_radius, age, life, fuel, soot]
-    }
-
-    /// As [`numbers`](Self::numbers), to change them.
-    pub(crate) fn numbers_mut(&mut self) -> [&mut Vec<f32>; NUMBERS] {
-        let Self {
-            position: [x, y, z],
-            velocity: [u, v, w],
-            birthplace: [a, b, c],
-            drift: [d, e, f],
-            hunger,
+    /// All `f32` columns.
+    pub(crate) fn float_columns(&self) -> [&Vec<f32>; FLOAT_COLUMNS] {
+        let Self { position: [x, y, z], velocity: [u, v, w], spawn_point: [a, b, c], drift: [d, e, f], .. } = self;
+        let Self { burn_rate, mass, density, temperature, support_radius, age, max_age, fuel, soot, .. } = self;
+        [
+            x,
+            y,
+            z,
+            u,
+            v,
+            w,
+            a,
+            b,
+            c,
+            d,
+            e,
+            f,
+            burn_rate,
             mass,
             density,
             temperature,
             support_radius,
             age,
-            life,
+            max_age,
+            fuel,
+            soot,
+        ]
+    }
+
+    /// All `f32` columns, mutable.
+    pub(crate) fn float_columns_mut(&mut self) -> [&mut Vec<f32>; FLOAT_COLUMNS] {
+        let Self {
+            position: [x, y, z],
+            velocity: [u, v, w],
+            spawn_point: [a, b, c],
+            drift: [d, e, f],
+            burn_rate,
+            mass,
+            density,
+            temperature,
+            support_radius,
+            age,
+            max_age,
             fuel,
             soot,
             ..
         } = self;
-        [x, y, z, u, v, w, a, b, c, d, e, f, hunger, mass, density, temperature, support_radius, age, life, fuel, soot]
+        [
+            x,
+            y,
+            z,
+            u,
+            v,
+            w,
+            a,
+            b,
+            c,
+            d,
+            e,
+            f,
+            burn_rate,
+            mass,
+            density,
+            temperature,
+            support_radius,
+            age,
+            max_age,
+            fuel,
+            soot,
+        ]
     }
 
-    fn scalars_mut(&mut self) -> [&mut Vec<f32>; 8] {
-        let Self { mass, density, temperature, support_radius, age, life, fuel, soot, .. } = self;
-        [mass, density, temperature, support_radius, age, life, fuel, soot]
+    fn scalar_columns_mut(&mut self) -> [&mut Vec<f32>; 8] {
+        let Self { mass, density, temperature, support_radius, age, max_age, fuel, soot, .. } = self;
+        [mass, density, temperature, support_radius, age, max_age, fuel, soot]
     }
 }
 
 impl Particle {
     fn scalars(&self) -> [f32; 8] {
-        let Self { mass, density, temperature, support_radius, age, life, fuel, soot, .. } = *self;
-        [mass, density, temperature, support_radius, age, life, fuel, soot]
+        let Self { mass, density, temperature, support_radius, age, max_age, fuel, soot, .. } = *self;
+        [mass, density, temperature, support_radius, age, max_age, fuel, soot]
     }
 }
 
@@ -243,10 +286,10 @@ impl Particle {
 mod tests {
     use super::*;
 
-    fn particle(birth: u64) -> Particle {
-        let number = birth as f32;
+    fn particle(id: u64) -> Particle {
+        let number = id as f32;
         Particle {
-            birth,
+            id,
             position: [number, 2.0, 3.0],
             velocity: [0.0, number, 0.0],
             mass: 1.0,
@@ -254,7 +297,7 @@ mod tests {
             temperature: 1500.0 + number,
             support_radius: 0.05,
             age: 0.0,
-            life: number,
+            max_age: number,
             fuel: 1.0,
             soot: number * 1e-6,
         }
@@ -263,9 +306,9 @@ mod tests {
     #[test]
     fn removal_keeps_order_and_rows_together() {
         let mut particles = Particles::new(DVec3::ZERO);
-        (1..=5).for_each(|birth| particles.push(particle(birth)));
+        (1..=5).for_each(|id| particles.push(particle(id)));
         particles.retain(&[true, false, true, false, true]);
-        assert_eq!(particles.births(), [1, 3, 5]);
+        assert_eq!(particles.ids(), [1, 3, 5]);
         assert_eq!((0..3).filter_map(|index| particles.get(index)).collect::<Vec<_>>(), [1, 3, 5].map(particle));
         assert_eq!(particles.get(3), None);
     }

@@ -1,29 +1,29 @@
-//! The gas as bytes and back: version, count, then array after array.
+//! Serialization of the particles: version, count, then column after column, little-endian.
 
 use bansho_base::phenomenon::SnapshotError;
 
-use super::particles::{NUMBERS, Particles};
+use super::particles::{FLOAT_COLUMNS, Particles};
 
 const VERSION: u32 = 2;
-/// Larger than any place, speed, temperature or other number of a simulated particle, and small enough to be reckoned with.
-const LARGEST: f32 = 1e12;
-/// Bytes of one particle: number of birth, burner, and all numbers.
-const PARTICLE: usize = 8 + 4 + 4 * NUMBERS;
+/// Larger than any value of a simulated particle, and small enough to compute with.
+const MAX_MAGNITUDE: f32 = 1e12;
+/// Bytes per particle: id, burner, and all `f32` columns.
+const BYTES_PER_PARTICLE: usize = 8 + 4 + 4 * FLOAT_COLUMNS;
 
-/// The particles' state; their origin belongs to the parameters.
+/// Writes the particles; their origin follows from the parameters.
 pub(crate) fn write(particles: &Particles) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(12 + PARTICLE * particles.len());
+    let mut bytes = Vec::with_capacity(12 + BYTES_PER_PARTICLE * particles.len());
     bytes.extend(VERSION.to_le_bytes());
     bytes.extend((particles.len() as u64).to_le_bytes());
-    bytes.extend(particles.birth.iter().flat_map(|birth| birth.to_le_bytes()));
+    bytes.extend(particles.id.iter().flat_map(|id| id.to_le_bytes()));
     bytes.extend(particles.burner.iter().flat_map(|burner| burner.to_le_bytes()));
-    for values in particles.numbers() {
+    for values in particles.float_columns() {
         bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
     }
     bytes
 }
 
-/// Puts the state back into particles with the same origin, of so many burners.
+/// Reads particles with the same origin, of that many burners.
 pub(crate) fn read(particles: &Particles, bytes: &[u8], burners: usize) -> Result<Particles, SnapshotError> {
     let (version, rest) = bytes.split_first_chunk::<4>().ok_or(SnapshotError::Damaged)?;
     let found = u32::from_le_bytes(*version);
@@ -32,21 +32,21 @@ pub(crate) fn read(particles: &Particles, bytes: &[u8], burners: usize) -> Resul
     }
     let (count, rest) = rest.split_first_chunk::<8>().ok_or(SnapshotError::Damaged)?;
     let count = usize::try_from(u64::from_le_bytes(*count)).map_err(|_| SnapshotError::Damaged)?;
-    if count.checked_mul(PARTICLE) != Some(rest.len()) {
+    if count.checked_mul(BYTES_PER_PARTICLE) != Some(rest.len()) {
         return Err(SnapshotError::Damaged);
     }
-    let (births, rest) = rest.split_at(8 * count);
-    let (numbers_of_burners, mut rest) = rest.split_at(4 * count);
+    let (spawner, rest) = rest.split_at(8 * count);
+    let (burner_bytes, mut rest) = rest.split_at(4 * count);
     let mut read = Particles::new(particles.origin);
-    read.birth = births.as_chunks().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
-    read.burner = numbers_of_burners.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
-    for values in read.numbers_mut() {
+    read.id = spawner.as_chunks().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
+    read.burner = burner_bytes.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
+    for values in read.float_columns_mut() {
         let (head, tail) = rest.split_at(4 * count);
         *values = head.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
         rest = tail;
     }
-    let known = read.burner.iter().all(|burner| (*burner as usize) < burners);
-    // Of what is not a number the comparison is false.
-    let possible = read.numbers().iter().all(|values| values.iter().all(|value| value.abs() <= LARGEST));
-    if known && possible { Ok(read) } else { Err(SnapshotError::Damaged) }
+    let burners_known = read.burner.iter().all(|burner| (*burner as usize) < burners);
+    // Comparisons with NaN are false.
+    let plausible = read.float_columns().iter().all(|values| values.iter().all(|value| value.abs() <= MAX_MAGNITUDE));
+    if burners_known && plausible { Ok(read) } else { Err(SnapshotError::Damaged) }
 }

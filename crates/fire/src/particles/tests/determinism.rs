@@ -13,7 +13,7 @@ use bansho_base::{
 
 use super::*;
 use crate::particles::{
-    render::{LookParameters, Memory, PreparedGas},
+    render::{LookParameters, PreparedGas, ScratchPool},
     simulate::snapshot,
 };
 
@@ -28,13 +28,13 @@ fn any_number_of_threads_gives_the_same_bits() {
     let look = LookParameters::default();
     let camera = CameraParameters { position: Animated::from([0.0, 0.4, 3.0]), ..CameraParameters::default() };
     let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.04, [256, 192], 0);
-    let (wind, memory) = (Wind::new(WindParameters::default(), 1, None), Memory::default());
+    let (wind, scratch) = (Wind::new(WindParameters::default(), 1, None), ScratchPool::default());
     let state = |threads| {
         let mut simulation = simulation(&parameters);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             World::default().run_steps(&mut simulation, -40, 0, |_, _| {});
-            let gas = gas(&simulation, &memory);
+            let gas = gas(&simulation, &scratch);
             let around = Surroundings::of_wind(&wind);
             let prepared = PreparedGas::new(gas, &look, &view, &around, &Unobserved).unwrap();
             let mut strip = Strip::default();

@@ -15,7 +15,7 @@ fn fire(heat_release_kw: f64, diameter: f64) -> FlameParticlesParameters {
 
 /// Height below which all but a fiftieth of the visible gas lies, m.
 fn top(simulation: &Simulation) -> f64 {
-    let mut heights: Vec<f32> = lit(simulation).iter().map(|index| place(simulation, *index).y).collect();
+    let mut heights: Vec<f32> = lit(simulation).iter().map(|index| position(simulation, *index).y).collect();
     heights.sort_by(f32::total_cmp);
     heights.get(heights.len() * 98 / 100).copied().unwrap_or(0.0).into()
 }
@@ -64,12 +64,12 @@ fn flames_narrow_upward_and_accelerate() {
     let mut sums = [[0.0_f32; 3]; 2];
     World::default().run(&mut simulation, 1.2, |simulation, t| {
         for (sum, band) in sums.iter_mut().zip([0.0..0.22, 0.68..9.0]) {
-            let inside = |index: &usize| t > 0.0 && band.contains(&place(simulation, *index).y);
+            let inside = |index: &usize| t > 0.0 && band.contains(&position(simulation, *index).y);
             let indices: Vec<usize> = lit(simulation).into_iter().filter(inside).collect();
             let middle =
-                indices.iter().map(|index| place(simulation, *index)).sum::<Vec3>() / indices.len().max(1) as f32;
+                indices.iter().map(|index| position(simulation, *index)).sum::<Vec3>() / indices.len().max(1) as f32;
             for index in indices {
-                let away = place(simulation, index) - middle;
+                let away = position(simulation, index) - middle;
                 sum[0] += 1.0;
                 sum[1] += simulation.particles.velocities()[1][index];
                 sum[2] += away.x * away.x + away.z * away.z;
@@ -88,9 +88,9 @@ fn wind_bends_the_flame_the_more_the_stronger_it_is() {
         let wind = WindParameters { velocity: Animated::from([speed, 0.0, 0.0]), ..WindParameters::default() };
         let (mut sum, mut count) = (0.0, 0.0);
         World { wind, ..World::default() }.run(&mut simulation(&fire(60.0, 0.3)), 1.0, |simulation, t| {
-            let places = lit(simulation).into_iter().map(|index| place(simulation, index));
-            for place in places.filter(|place| t > 0.0 && place.y > 0.4) {
-                (sum, count) = (sum + place.x, count + 1.0);
+            let positions = lit(simulation).into_iter().map(|index| position(simulation, index));
+            for position in positions.filter(|position| t > 0.0 && position.y > 0.4) {
+                (sum, count) = (sum + position.x, count + 1.0);
             }
         });
         sum / count
@@ -105,21 +105,21 @@ fn gas_is_born_where_a_moving_burner_is_and_stays_behind_it() {
     let mut moved = fire(60.0, 0.3);
     moved.burners[0].position = Animated::keyed(across, Interpolation::Linear).unwrap();
     let mut simulation = simulation(&moved);
-    let mut births = 0;
+    let mut spawner = 0;
     World::default().run(&mut simulation, 1.0, |simulation, t| {
         let burner = (4.0 * t - 3.0).clamp(-1.0, 1.0) as f32;
         let particles = &simulation.particles;
         let newborn = (0..particles.len()).filter(|index| particles.age[*index] <= 2.01 * simulation.step_s() as f32);
         for index in newborn {
-            births += 1;
-            let aside = (place(simulation, index).x - burner).abs();
+            spawner += 1;
+            let aside = (position(simulation, index).x - burner).abs();
             assert!(aside < 0.3, "born {aside} m from the middle at {t}");
         }
     });
-    assert!(births > 1000);
-    let behind = lit(&simulation).iter().map(|index| place(&simulation, *index).x).fold(f32::INFINITY, f32::min);
+    assert!(spawner > 1000);
+    let behind = lit(&simulation).iter().map(|index| position(&simulation, *index).x).fold(f32::INFINITY, f32::min);
     assert!(behind < 0.5, "what it left burns on where it was left: {behind}");
-    let [low, high] = simulation.design.domain;
+    let [low, high] = simulation.constants.domain;
     assert!(low.x < -2.0 && high.x > 2.0, "there is room at both ends of its way");
 }
 
@@ -130,7 +130,7 @@ fn gas_stands_on_its_burner_after_a_step_of_any_length() {
         World::default().run_steps(&mut simulation, -20, 0, |_, _| {});
         let particles = &simulation.particles;
         let youngest = particles.age.iter().copied().fold(f32::INFINITY, f32::min);
-        let lowest = (0..particles.len()).map(|index| place(&simulation, index).y).fold(f32::INFINITY, f32::min);
+        let lowest = (0..particles.len()).map(|index| position(&simulation, index).y).fold(f32::INFINITY, f32::min);
         let step = step_s as f32;
         assert!(youngest < 0.1 * step && lowest < 0.1 * step, "{youngest} s old, {lowest} m high, steps of {step} s");
     }
@@ -138,13 +138,13 @@ fn gas_stands_on_its_burner_after_a_step_of_any_length() {
 
 /// Light that gas of a kind sends, and that times its height.
 fn light_by_height(simulation: &Simulation, of: impl Fn(&Gas, usize) -> f64) -> [f64; 2] {
-    let memory = Memory::default();
-    let gas = gas(simulation, &memory);
+    let scratch = ScratchPool::default();
+    let gas = gas(simulation, &scratch);
     let mut sums = [0.0; 2];
     for index in 0..gas.particles.len() {
         let light = of(&gas, index) * gas.volume(index);
         sums[0] += light;
-        sums[1] += light * f64::from(place(simulation, index).y);
+        sums[1] += light * f64::from(position(simulation, index).y);
     }
     sums
 }
@@ -156,14 +156,15 @@ fn blue_light_stands_at_the_base_and_yellow_light_above_it() {
     let (mut blue, mut yellow, mut high) = ([0.0; 2], [0.0; 2], 0.0);
     World::default().run(&mut simulation, 1.0, |simulation, t| {
         if t > 0.0 {
-            let blue_light = |gas: &Gas, index| gas.blue(index, &look);
+            let blue_light = |gas: &Gas, index| gas.blue_luminance(index, &look);
             let add = |sum: &mut [f64; 2], more: [f64; 2]| (0..2).for_each(|i| sum[i] += more[i]);
             add(&mut blue, light_by_height(simulation, blue_light));
             add(
                 &mut yellow,
                 light_by_height(simulation, |gas, index| gas.absorption(index, &look) * gas.luminance(index)),
             );
-            let above = |gas: &Gas, index| if place(simulation, index).y > 0.4 { blue_light(gas, index) } else { 0.0 };
+            let above =
+                |gas: &Gas, index| if position(simulation, index).y > 0.4 { blue_light(gas, index) } else { 0.0 };
             high += light_by_height(simulation, above)[0];
         }
     });
@@ -191,7 +192,7 @@ fn smoke_is_the_soot_that_leaves_the_flame_and_cools_above_it() {
         assert!(burnt.len() > 300, "{}", burnt.len());
         let old = |index: &usize| particles.age[*index] > 1.2;
         let coldest = burnt.iter().copied().filter(old).map(|index| particles.temperature[index]).fold(0.0, f32::max);
-        (mean(&|index| particles.soot[index]), mean(&|index| place(&simulation, index).y), coldest)
+        (mean(&|index| particles.soot[index]), mean(&|index| position(&simulation, index).y), coldest)
     };
     let ((none, ..), (some, height, hottest)) = (smoke(0.0), smoke(0.3));
     assert_eq!(none, 0.0, "soot burns where none is to be left");
@@ -202,13 +203,13 @@ fn smoke_is_the_soot_that_leaves_the_flame_and_cools_above_it() {
 
 /// Gas that the eye sees as one: groups of lit particles closer than the support radius, as lists of their places.
 fn bodies(simulation: &Simulation) -> Vec<Vec<Vec3>> {
-    let reach = simulation.design.support_radius;
-    let mut left: Vec<Vec3> = lit(simulation).into_iter().map(|index| place(simulation, index)).collect();
+    let reach = simulation.constants.support_radius;
+    let mut left: Vec<Vec3> = lit(simulation).into_iter().map(|index| position(simulation, index)).collect();
     let mut bodies = Vec::new();
     while let Some(first) = left.pop() {
         let (mut body, mut edge) = (vec![first], vec![first]);
-        while let Some(place) = edge.pop() {
-            let (near, far): (Vec<Vec3>, Vec<Vec3>) = left.iter().partition(|other| other.distance(place) < reach);
+        while let Some(position) = edge.pop() {
+            let (near, far): (Vec<Vec3>, Vec<Vec3>) = left.iter().partition(|other| other.distance(position) < reach);
             left = far;
             edge.extend(&near);
             body.extend(near);
@@ -221,12 +222,12 @@ fn bodies(simulation: &Simulation) -> Vec<Vec<Vec3>> {
 /// How wide a body of gas is in each tenth of a height: standard deviation across; none where hardly anything is.
 fn widths(body: &[Vec3], height: f32) -> Vec<Option<f32>> {
     let width = |slab: usize| {
-        let inside = |place: &&Vec3| (place.y / height * 10.0) as usize == slab;
-        let places: Vec<&Vec3> = body.iter().filter(inside).collect();
-        let count = places.len() as f32;
-        let middle = places.iter().copied().sum::<Vec3>() / count;
-        let square = |place: &&Vec3| (**place - middle).with_y(0.0).length_squared();
-        (places.len() >= 8).then(|| (places.iter().map(square).sum::<f32>() / count).sqrt())
+        let inside = |position: &&Vec3| (position.y / height * 10.0) as usize == slab;
+        let positions: Vec<&Vec3> = body.iter().filter(inside).collect();
+        let count = positions.len() as f32;
+        let middle = positions.iter().copied().sum::<Vec3>() / count;
+        let square = |position: &&Vec3| (**position - middle).with_y(0.0).length_squared();
+        (positions.len() >= 8).then(|| (positions.iter().map(square).sum::<f32>() / count).sqrt())
     };
     (0..12).map(width).collect()
 }
@@ -243,7 +244,7 @@ fn flames_neck_and_shed_pockets_that_burn_out_above_them() {
         }
         let mut bodies = bodies(simulation);
         bodies.sort_by_key(|body| std::cmp::Reverse(body.len()));
-        let lowest = |body: &[Vec3]| body.iter().map(|place| place.y).fold(f32::INFINITY, f32::min);
+        let lowest = |body: &[Vec3]| body.iter().map(|position| position.y).fold(f32::INFINITY, f32::min);
         let pocket = bodies[1..].iter().any(|body| body.len() >= 8 && lowest(body) > 0.4 * height);
         // A waist: gas above it is a quarter wider.
         let widths: Vec<f32> = widths(&bodies[0], height).into_iter().flatten().collect();

@@ -32,17 +32,17 @@ fn quiet() -> FlameParticlesParameters {
     }
 }
 
-fn particle(design: &Design, birth: u64, position: [f32; 3], velocity: [f32; 3]) -> Particle {
+fn particle(constants: &DerivedConstants, id: u64, position: [f32; 3], velocity: [f32; 3]) -> Particle {
     Particle {
-        birth,
+        id,
         position,
         velocity,
-        mass: design.mass,
-        density: design.rest_density,
+        mass: constants.mass,
+        density: constants.rest_density,
         temperature: 1500.0,
-        support_radius: design.support_radius,
+        support_radius: constants.support_radius,
         age: 0.0,
-        life: 1e9,
+        max_age: 1e9,
         fuel: 0.0,
         soot: 0.0,
     }
@@ -58,26 +58,26 @@ fn momentum(simulation: &Simulation) -> (DVec3, f64) {
     })
 }
 
-fn centre(simulation: &Simulation) -> DVec3 {
+fn center(simulation: &Simulation) -> DVec3 {
     let count = simulation.particles.len();
-    (0..count).map(|index| place(simulation, index).as_dvec3()).sum::<DVec3>() / count as f64
+    (0..count).map(|index| position(simulation, index).as_dvec3()).sum::<DVec3>() / count as f64
 }
 
 #[test]
-fn a_free_cloud_keeps_its_momentum_and_its_centre_goes_straight() {
+fn a_free_cloud_keeps_its_momentum_and_its_center_goes_straight() {
     let mut simulation = simulation(&quiet());
-    let d = simulation.design.support_radius;
-    for birth in 0..400 {
-        let words = Key::new(2, "cloud").words(birth, 0, bansho_base::math::random::Purpose(0)).map(uniform);
+    let d = simulation.constants.support_radius;
+    for id in 0..400 {
+        let words = Key::new(2, "cloud").words(id, 0, bansho_base::math::random::Purpose(0)).map(uniform);
         let position = [words[0], words[1], words[2]].map(|u| (u - 0.5) * 3.0 * d);
         let velocity = [0.3 + words[3] - words[0], words[1] - words[2], words[0] * words[3] - 0.2];
-        simulation.particles.push(particle(&simulation.design, birth, position, velocity));
+        simulation.particles.push(particle(&simulation.constants, id, position, velocity));
     }
     let (before, size) = momentum(&simulation);
-    let (start, mean) = (centre(&simulation), before / (400.0 * f64::from(simulation.design.mass)));
+    let (start, mean) = (center(&simulation), before / (400.0 * f64::from(simulation.constants.mass)));
     World::default().run_steps(&mut simulation, 0, 1000, |simulation, t| {
-        let off = (centre(simulation) - start - mean * t).length();
-        assert!(off < 1e-5 * (1.0 + mean.length() * t), "centre {off} m off its line after {t} s");
+        let off = (center(simulation) - start - mean * t).length();
+        assert!(off < 1e-5 * (1.0 + mean.length() * t), "center {off} m off its line after {t} s");
     });
     let drift = (momentum(&simulation).0 - before).length() / size;
     assert!(drift < 1e-6, "momentum drifts by {drift}");
@@ -89,14 +89,14 @@ fn a_lattice_at_rest_stays_at_rest() {
     parameters.fluid.support = 2.6;
     parameters.fluid.rest_density = 1.0;
     let mut simulation = simulation(&parameters);
-    let spacing = simulation.design.support_radius / 2.6;
-    let start = |birth: u64| [birth % 9, birth / 9 % 9, birth / 81].map(|step| step as f32 * spacing);
-    for birth in 0..729 {
-        simulation.particles.push(particle(&simulation.design, birth, start(birth), [0.0; 3]));
+    let spacing = simulation.constants.support_radius / 2.6;
+    let start = |id: u64| [id % 9, id / 9 % 9, id / 81].map(|step| step as f32 * spacing);
+    for id in 0..729 {
+        simulation.particles.push(particle(&simulation.constants, id, start(id), [0.0; 3]));
     }
     World::default().run_steps(&mut simulation, 0, 1000, |_, _| {});
     for index in 0..729 {
-        let moved = (place(&simulation, index) - Vec3::from(start(simulation.particles.births()[index]))).length();
+        let moved = (position(&simulation, index) - Vec3::from(start(simulation.particles.ids()[index]))).length();
         assert!(moved < 1e-3 * spacing, "moved by {} spacings", moved / spacing);
     }
 }
@@ -106,11 +106,11 @@ fn eddies_at_a_wall_give_the_gas_no_speed_of_its_own() {
     let mut parameters = quiet();
     parameters.motion = MotionParameters { turbulence: 2.0, wind: WindForce::PerVolume, ..parameters.motion };
     let mut simulation = simulation(&parameters);
-    let d = simulation.design.support_radius;
-    for birth in 0..100 {
+    let d = simulation.constants.support_radius;
+    for id in 0..100 {
         // Too far from each other to meet.
-        let position = [3.0 * d * (birth % 10) as f32, 0.5 * d, 3.0 * d * (birth / 10) as f32];
-        simulation.particles.push(particle(&simulation.design, birth, position, [0.3, -1.0, 0.2]));
+        let position = [3.0 * d * (id % 10) as f32, 0.5 * d, 3.0 * d * (id / 10) as f32];
+        simulation.particles.push(particle(&simulation.constants, id, position, [0.3, -1.0, 0.2]));
     }
     let floor = Occluder::HalfSpace { point: DVec3::ZERO, normal: DVec3::Y };
     World { occluders: vec![floor], ..World::default() }.run_steps(&mut simulation, 0, 300, |simulation, _| {
@@ -131,21 +131,21 @@ fn a_lattice_has_its_density_and_its_middle_rests_until_sound_arrives() {
     // Under pressure everywhere: what rests is pushed alike from all sides.
     parameters.fluid.rest_density = 0.9;
     let mut simulation = simulation(&parameters);
-    let spacing = simulation.design.support_radius / 2.6;
+    let spacing = simulation.constants.support_radius / 2.6;
     let (side, steps) = (20_u64, 8);
-    let start = |birth: u64| [birth % side, birth / side % side, birth / (side * side)].map(|step| step as f32);
-    for birth in 0..side * side * side {
-        let position = start(birth).map(|step| step * spacing);
-        simulation.particles.push(particle(&simulation.design, birth, position, [0.0; 3]));
+    let start = |id: u64| [id % side, id / side % side, id / (side * side)].map(|step| step as f32);
+    for id in 0..side * side * side {
+        let position = start(id).map(|step| step * spacing);
+        simulation.particles.push(particle(&simulation.constants, id, position, [0.0; 3]));
     }
-    let expected = simulation.design.mass / (spacing * spacing * spacing);
+    let expected = simulation.constants.mass / (spacing * spacing * spacing);
     World::default().run_steps(&mut simulation, 0, steps, |_, _| {});
-    let sound = (simulation.design.stiffness_per_kelvin * 1500.0).sqrt() / spacing;
+    let sound = (simulation.constants.stiffness_per_kelvin * 1500.0).sqrt() / spacing;
     let reached = sound * steps as f32 * simulation.step_s() as f32 + 2.6;
     let (mut resting, mut given_way) = (0, 0.0_f32);
     for index in 0..simulation.particles.len() {
-        let start = Vec3::from(start(simulation.particles.births()[index]));
-        let moved = (place(&simulation, index) / spacing - start).length();
+        let start = Vec3::from(start(simulation.particles.ids()[index]));
+        let moved = (position(&simulation, index) / spacing - start).length();
         let depth = start.min(Vec3::splat((side - 1) as f32) - start).min_element();
         let density = simulation.particles.densities()[index];
         if depth > reached {
@@ -172,7 +172,7 @@ fn a_thin_plate_lets_nothing_through() {
         let mut reached = 0;
         world.run_steps(&mut simulation, 0, 150, |simulation, _| {
             for index in 0..simulation.particles.len() {
-                let height = place(simulation, index).y;
+                let height = position(simulation, index).y;
                 assert!(height < 0.6, "{height} m high, behind a plate of {thickness} m");
                 reached = reached.max(usize::from(height > 0.55));
             }
@@ -188,14 +188,14 @@ fn one_particle_falls_and_rises_as_buoyancy_says() {
         let mut parameters = quiet();
         parameters.motion.buoyancy = 1.0;
         let mut simulation = simulation(&parameters);
-        let mut single = particle(&simulation.design, 0, [0.0; 3], [0.0; 3]);
+        let mut single = particle(&simulation.constants, 0, [0.0; 3], [0.0; 3]);
         single.temperature = (share * Air::default().temperature_k) as f32;
         simulation.particles.push(single);
         World::default().run_steps(&mut simulation, 0, 60, |simulation, t| {
             let expected = 0.5 * acceleration * t * t;
             // The position is a step ahead of the parabola at most.
             let step = acceleration.abs() * t * simulation.step_s();
-            assert!((f64::from(place(simulation, 0).y) - expected).abs() < 0.51 * step + 1e-6);
+            assert!((f64::from(position(simulation, 0).y) - expected).abs() < 0.51 * step + 1e-6);
         });
     }
 }
@@ -209,9 +209,9 @@ fn gas_flows_around_a_ball() {
     let mut above = 0;
     world.run(&mut simulation(&parameters), 0.3, |simulation, _| {
         for index in 0..simulation.particles.len() {
-            let place = place(simulation, index).as_dvec3();
-            assert!(ball.signed_distance(place) > 0.0, "{place} lies in the ball");
-            above += usize::from(place.y > 0.6);
+            let position = position(simulation, index).as_dvec3();
+            assert!(ball.signed_distance(position) > 0.0, "{position} lies in the ball");
+            above += usize::from(position.y > 0.6);
         }
     });
     assert!(above > 100, "it gets past");

@@ -17,13 +17,14 @@ use bansho_base::{
 
 use super::{
     parameters::FlameParticlesParameters,
-    render::{Ending, Gas, Memory},
+    render::{FadeOut, Gas, ScratchPool},
 };
-use crate::particles::simulate::{derived::Design, simulation::Simulation};
+use crate::particles::simulate::Simulation;
+use crate::particles::simulate::derived::DerivedConstants;
 
 fn simulation(parameters: &FlameParticlesParameters) -> Simulation {
-    let design = Design::new(parameters, None, &MemoryAssets::default()).unwrap();
-    Simulation::new(parameters, design, Key::new(1, "flame"))
+    let constants = DerivedConstants::new(parameters, None, &MemoryAssets::default()).unwrap();
+    Simulation::new(parameters, constants, Key::new(1, "flame"))
 }
 
 /// What a simulation stands among.
@@ -36,7 +37,7 @@ struct World {
 impl World {
     /// Steps from the beginning of the preroll to `end`; `each` sees the simulation after every step, and the time then.
     fn run(&self, simulation: &mut Simulation, end: f64, each: impl FnMut(&Simulation, f64)) {
-        let first = -(simulation.design.preroll / simulation.step_s()).round() as i64;
+        let first = -(simulation.constants.preroll / simulation.step_s()).round() as i64;
         self.run_steps(simulation, first, (end / simulation.step_s()).round() as i64, each);
     }
 
@@ -52,19 +53,19 @@ impl World {
     }
 }
 
-fn place(simulation: &Simulation, index: usize) -> Vec3 {
+fn position(simulation: &Simulation, index: usize) -> Vec3 {
     Vec3::from(simulation.particles.positions().map(|values| values[index]))
 }
 
 /// Particles that the eye sees: hot enough to glow, with soot to glow with.
 fn lit(simulation: &Simulation) -> Vec<usize> {
     let particles = &simulation.particles;
-    let shines = |index: &usize| particles.soots()[*index] > 3e-7 && particles.temperatures()[*index] > 900.0;
+    let shines = |index: &usize| particles.soot_fractions()[*index] > 3e-7 && particles.temperatures()[*index] > 900.0;
     (0..particles.len()).filter(shines).collect()
 }
 
 /// The gas as the drawing sees it.
-fn gas<'a>(simulation: &'a Simulation, memory: &'a Memory) -> Gas<'a> {
+fn gas<'a>(simulation: &'a Simulation, scratch: &'a ScratchPool) -> Gas<'a> {
     Gas {
         particles: &simulation.particles,
         time: 0.0,
@@ -73,7 +74,7 @@ fn gas<'a>(simulation: &'a Simulation, memory: &'a Memory) -> Gas<'a> {
         base: DVec3::ZERO,
         size: DVec2::ONE,
         key: Key::new(1, "flame"),
-        ending: Ending::NEVER,
-        memory,
+        fade_out: FadeOut::NEVER,
+        scratch,
     }
 }

@@ -7,10 +7,8 @@ use bansho_base::{
 };
 
 use super::*;
-use crate::particles::{
-    parameters::WindForce,
-    simulate::{burner::Burner, combustion::INNER_TEMPERATURE},
-};
+use crate::particles::simulate::combustion::INNER_TEMPERATURE;
+use crate::particles::{parameters::WindForce, simulate::burner::Burner};
 use rayon::prelude::*;
 
 /// How many parameter sets: [`FEW`], or what `BANSHO_RANDOM_FLAMES` says.
@@ -39,21 +37,21 @@ fn draw(seed: u64) -> Option<(FlameParticlesParameters, WindParameters)> {
     let wind = WindParameters::read_table(&wind, &mut reader, &[]);
     assert!(reader.is_clean(), "{:?}", reader.into_problems());
     parameters.particles = 1 + (uniform() * 250.0) as i64;
-    Design::new(&parameters, None, &MemoryAssets::default()).ok().map(|_| (parameters, wind))
+    DerivedConstants::new(&parameters, None, &MemoryAssets::default()).ok().map(|_| (parameters, wind))
 }
 
 /// What must hold after every step, whatever the parameters say.
 fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParameters) {
-    let (particles, design) = (&simulation.particles, &simulation.design);
-    assert!(particles.len() <= design.most, "seed {seed}: {} particles", particles.len());
-    for values in particles.numbers() {
+    let (particles, constants) = (&simulation.particles, &simulation.constants);
+    assert!(particles.len() <= constants.max_particles, "seed {seed}: {} particles", particles.len());
+    for values in particles.float_columns() {
         assert!(values.iter().all(|value| value.is_finite()), "seed {seed}: not a number");
     }
-    let births = particles.births().iter().collect::<std::collections::BTreeSet<_>>().len();
-    assert_eq!(births, particles.len(), "seed {seed}: one birth, two particles");
-    let [low, high] = design.domain.map(|corner| corner.as_vec3());
+    let unique_ids = particles.ids().iter().collect::<std::collections::BTreeSet<_>>().len();
+    assert_eq!(unique_ids, particles.len(), "seed {seed}: one birth, two particles");
+    let [low, high] = constants.domain.map(|corner| corner.as_vec3());
     // Gas is never colder than air, itself at birth or the inside of its flame, nor hotter than itself at birth or its flame.
-    let born = design.burners.iter().map(|burner| burner.parameters.temperature_k);
+    let born = constants.burners.iter().map(|burner| burner.parameters.temperature_k);
     let flame = parameters.life.flame_temperature_k;
     let (mut coldest, mut hottest) = (Air::default().temperature_k.min(f64::from(INNER_TEMPERATURE) * flame), flame);
     for kelvin in born {
@@ -61,28 +59,31 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
     }
     let most_soot = parameters.life.soot_ppm as f32 * 1e-6;
     for index in 0..particles.len() {
-        let place = place(simulation, index);
-        assert!(place.cmpge(low).all() && place.cmple(high).all(), "seed {seed}: {place} is outside the domain");
+        let position = position(simulation, index);
+        assert!(
+            position.cmpge(low).all() && position.cmple(high).all(),
+            "seed {seed}: {position} is outside the domain"
+        );
         let kelvin = f64::from(particles.temperature[index]);
         assert!((coldest - 0.1..hottest + 0.1).contains(&kelvin), "seed {seed}: {kelvin} K");
         assert!((0.0..=1.0).contains(&particles.fuel[index]), "seed {seed}: {} of its fuel", particles.fuel[index]);
         assert!((0.0..=1.001 * most_soot).contains(&particles.soot[index]), "seed {seed}: soot");
-        assert!(particles.density[index] > 0.0 && particles.mass[index] == design.mass, "seed {seed}: mass");
-        let radius = particles.support_radius[index] / design.support_radius;
+        assert!(particles.density[index] > 0.0 && particles.mass[index] == constants.mass, "seed {seed}: mass");
+        let radius = particles.support_radius[index] / constants.support_radius;
         assert!((0.999..3.001).contains(&radius), "seed {seed}: {radius} support radii");
-        assert!(particles.age[index] <= particles.life[index], "seed {seed}: older than it may be");
+        assert!(particles.age[index] <= particles.max_age[index], "seed {seed}: older than it may be");
     }
 }
 
 /// The speed that parameters and wind could give the gas, m/s.
 fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters, wind: &WindParameters) -> f32 {
-    let (design, motion) = (&simulation.design, &parameters.motion);
-    let greatest = |speed: &dyn Fn(&Burner) -> f64| design.burners.iter().map(speed).fold(0.0, f64::max);
+    let (constants, motion) = (&simulation.constants, &parameters.motion);
+    let greatest = |speed: &dyn Fn(&Burner) -> f64| constants.burners.iter().map(speed).fold(0.0, f64::max);
     // On the axis at the top of the domain that a flame has by itself, with its eddies and rings.
-    let rise = greatest(&|burner| burner.axis_speed(burner.reach + 3.0 * burner.height));
+    let rise = greatest(&|burner| burner.axis_speed(burner.bounding_radius + 3.0 * burner.height));
     // Air flows in at a share of that, and at the base of a wide fire faster than anything rises.
     let inflow = greatest(&|burner| 0.2 * (STANDARD_GRAVITY * burner.diameter).sqrt());
-    let room = design.domain[1] - design.domain[0];
+    let room = constants.domain[1] - constants.domain[0];
     let corner = |corner: [f64; 3]| corner.map(f64::abs).into_iter().fold(0.0, f64::max);
     let blown =
         wind.velocity.bounds().map(corner).into_iter().fold(0.0, f64::max) * (1.0 + wind.gust) * motion.wind_gain;
@@ -90,10 +91,10 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
         WindForce::Mixing => blown,
         // Nothing holds gas back that a force drives, m/s^2 on gas as dense as at the burner.
         WindForce::PerVolume => {
-            driven_speed(simulation, parameters, blown / f64::from(design.density), room.max_element())
+            driven_speed(simulation, parameters, blown / f64::from(constants.density), room.max_element())
         }
     };
-    let hottest = design.burners.iter().map(|burner| burner.parameters.temperature_k);
+    let hottest = constants.burners.iter().map(|burner| burner.parameters.temperature_k);
     let hottest = hottest.fold(parameters.life.flame_temperature_k, f64::max);
     // Flames may be far hotter than those of their height are.
     let buoyancy = STANDARD_GRAVITY * motion.buoyancy * (hottest / Air::default().temperature_k - 1.0).max(0.0);
@@ -105,9 +106,9 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
 
 /// The speed of gas that `acceleration`, m/s^2, drives for as long as it may live, or as `far` as the domain goes.
 fn driven_speed(simulation: &Simulation, parameters: &FlameParticlesParameters, acceleration: f64, far: f64) -> f64 {
-    let design = &simulation.design;
-    let lives = (0..design.burners.len()).map(|index| design.longest_life(index, parameters.life.afterlife_s));
-    (acceleration * lives.fold(0.0, f64::max)).min((2.0 * acceleration * far).sqrt())
+    let constants = &simulation.constants;
+    let max_ages = (0..constants.burners.len()).map(|index| constants.max_age(index, parameters.life.afterlife_s));
+    (acceleration * max_ages.fold(0.0, f64::max)).min((2.0 * acceleration * far).sqrt())
 }
 
 /// Speed of the fastest particle, m/s.
@@ -127,8 +128,8 @@ fn mean_square_speed(simulation: &Simulation) -> f32 {
 /// What stands in the way of every second flame: a ball, a turned box or a slope, near it or where it burns.
 fn obstacle(seed: u64, simulation: &Simulation) -> Option<Occluder> {
     let words = Key::new(seed, "obstacles").uniforms(0, 0, bansho_base::math::random::Purpose(0)).map(f64::from);
-    let burner = &simulation.design.burners[0];
-    let size = burner.reach + burner.height;
+    let burner = &simulation.constants.burners[0];
+    let size = burner.bounding_radius + burner.height;
     let centre = burner.position(0.0) + size * DVec3::new(words[0] - 0.5, words[1], words[2] - 0.5);
     match (seed % 2, (3.0 * words[3]) as u32) {
         (0, _) => None,
@@ -150,7 +151,7 @@ fn burn(seed: u64, parameters: &FlameParticlesParameters, wind: WindParameters) 
     let mut simulation = simulation(parameters);
     let driven = driving_speed(&simulation, parameters, &wind);
     let world = World { wind, occluders: obstacle(seed, &simulation).into_iter().collect() };
-    let first = -(simulation.design.preroll / simulation.step_s()).round().min(200.0) as i64;
+    let first = -(simulation.constants.preroll / simulation.step_s()).round().min(200.0) as i64;
     let (mut mean, mut greatest) = (0.0_f32, 0.0_f32);
     world.run_steps(&mut simulation, first, first + STEPS, |simulation, _| {
         check(seed, simulation, parameters);

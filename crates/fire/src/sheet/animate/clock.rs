@@ -1,8 +1,9 @@
-//! Time, scroll and everything periodic, so that a seamless loop closes by construction.
+//! Time, texture scroll and periodic frequencies of a sheet; a seamless loop closes by construction.
 
 use bansho_base::parameters::animated::Animated;
 
-/// The time of one flame sheet: `S(t)`, the distance that its texture has scrolled, and how to fit waves into a loop.
+/// The clock of one flame sheet: `S(t)`, the distance that its texture has scrolled, and frequencies rounded to those that close a
+/// loop.
 #[derive(Clone, Debug)]
 pub(crate) struct Clock {
     speed: Animated<f64>,
@@ -11,7 +12,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// A clock for a scroll of `speed` sheet heights a second that repeats every `loop_s`, if given.
+    /// A clock for a scroll speed in sheet heights per second, which repeats every `loop_s` seconds, if given.
     pub(crate) fn new(speed: Animated<f64>, loop_s: Option<f64>) -> Self {
         let scroll_per_loop = loop_s.map_or(0.0, |length| speed.integral(0.0, length));
         Self { speed, loop_s, scroll_per_loop }
@@ -22,12 +23,12 @@ impl Clock {
         self.loop_s.map_or(t, |length| t - (t / length).floor() * length)
     }
 
-    /// `s (t - t0)` of eq. (1): the exact integral of the keyed speed, sheet heights.
+    /// `s (t - t0)` of eq. (1): the exact integral of the animated speed, sheet heights.
     pub(crate) fn scroll(&self, t: f64) -> f64 {
         self.speed.integral(0.0, self.time(t))
     }
 
-    /// Scroll speed at `t`, sheet heights a second.
+    /// Scroll speed at `t`, sheet heights per second.
     pub(crate) fn speed(&self, t: f64) -> f64 {
         self.speed.at(self.time(t))
     }
@@ -42,9 +43,9 @@ impl Clock {
         self.loop_s.map_or(hz, |length| (hz * length).round().max(1.0) / length)
     }
 
-    /// The number of waves in a sheet height nearest to `waves` (of either sign) that closes the loop.
+    /// The number of waves per sheet height (of either sign) nearest to `waves` that closes the loop.
     ///
-    /// Zero waves close any loop, so `least` says how few whole waves a loop may hold.
+    /// Zero waves close any loop; `least` is the least number of whole waves per loop.
     pub(crate) fn waves(&self, waves: f64, least: f64) -> f64 {
         if self.loop_s.is_none() || self.scroll_per_loop <= 0.0 {
             return waves;

@@ -1,4 +1,4 @@
-//! Fluctuations in closed form: sums of sine waves whose periods share no multiple within a shot.
+//! Fluctuations in closed form: sums of sines with incommensurate frequencies.
 
 use bansho_base::math::{
     self, MulAdd, approximations,
@@ -7,7 +7,7 @@ use bansho_base::math::{
 
 const WAVES: usize = 6;
 
-/// Frequencies of the waves beside the first, irrational to each other; amplitudes fall as 1/sqrt(f), rougher than smooth.
+/// Frequencies of the sines relative to the second, mutually irrational; amplitudes fall as 1/sqrt(f).
 const RATIOS: [f64; WAVES] = [0.412_7, 1.0, 1.618_03, 2.539_1, 3.763_7, 5.871_3];
 
 /// A function of one variable in [-1, 1] with mean 0.
@@ -19,9 +19,9 @@ pub(crate) struct Fluctuation {
 }
 
 impl Fluctuation {
-    /// Waves about `frequency` (cycles per unit of its variable), each moved by `fit` to where it closes a loop.
+    /// Sines about `frequency` (cycles per unit of the variable), each rounded by `fit` to one that closes a loop.
     ///
-    /// `roughness` in [0, 1] is how much the faster waves count.
+    /// `roughness` in [0, 1] weights the higher frequencies.
     pub(crate) fn new(key: Key, purpose: Purpose, frequency: f64, roughness: f64, fit: impl Fn(f64) -> f64) -> Self {
         let first = key.uniforms(0, 0, purpose);
         let second = key.uniforms(1, 0, purpose);
@@ -31,12 +31,12 @@ impl Fluctuation {
         Self {
             frequencies: RATIOS.map(|ratio| fit(ratio * frequency)),
             phases: std::array::from_fn(phase),
-            // Six waves never peak together; 1.4 uses the range and the clamp rounds what is left.
+            // Six sines never peak together: a factor of 1.4 uses the range, and the clamp catches the rest.
             amplitudes: raw.map(|amplitude| (1.4 * amplitude / total) as f32),
         }
     }
 
-    /// Its value at `x`.
+    /// The value at `x`.
     pub(crate) fn at(&self, x: f64) -> f32 {
         let mut sum = 0.0_f32;
         for i in 0..WAVES {
@@ -46,7 +46,7 @@ impl Fluctuation {
         sum.clamp(-1.0, 1.0)
     }
 
-    /// Its values at `start + i * step`; phases are reduced before they become `f32`.
+    /// The values at `start + i * step`; phases are reduced in f64 before they become `f32`.
     pub(crate) fn fill(&self, start: f64, step: f64, values: &mut [f32]) {
         values.fill(0.0);
         for i in 0..WAVES {

@@ -1,5 +1,5 @@
-//! How the sheet changes with time: its clock, its fluctuations and the moment that an exposure sees.
+//! How the sheet changes with time: clock, fluctuations, and the warp of its coordinates at one time.
 
 pub(crate) mod clock;
 pub(crate) mod fluctuation;
-pub(crate) mod moment;
+pub(crate) mod warp;

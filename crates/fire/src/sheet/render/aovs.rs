@@ -1,4 +1,4 @@
-//! What a flame says of itself beside its light: temperature, optical depth and motion.
+//! AOVs of a flame: temperature, optical depth and motion.
 
 use bansho_base::{
     color,
@@ -7,52 +7,50 @@ use bansho_base::{
     phenomenon::strip::{Strip, View},
 };
 
-use super::{
-    flame::Flame,
-    shade::{Drawn, Sample, shade_as},
-};
+use super::shade::{SheetContent, TimeSample, shade_sample};
 use crate::sheet::FlameSheet;
+use crate::sheet::render::flame_instance::FlameInstance;
 use fearless_simd::Simd;
 
-/// Places of the planes among a strip's AOVs.
+/// Indices of the planes among a strip's AOVs.
 const TEMPERATURE: usize = 0;
 const OPTICAL_DEPTH: usize = 1;
 const MOTION: [usize; 2] = [2, 3];
 
-/// One flame as AOVs see it: where its gas will be at the next frame.
-pub(crate) struct Measured<'a> {
+/// One flame, and what its AOVs depend on.
+pub(crate) struct AovContext<'a> {
     pub(crate) sheet: &'a FlameSheet,
-    pub(crate) flame: &'a Flame,
+    pub(crate) flame: &'a FlameInstance,
     pub(crate) view: &'a View,
-    pub(crate) samples: &'a [Sample],
-    pub(crate) drawn: Drawn,
+    pub(crate) samples: &'a [TimeSample],
+    pub(crate) content: SheetContent,
 }
 
-/// Adds the AOVs of all samples in the part `rect` of `strip`. Only what is asked for is measured, a pixel at a time.
+/// Adds the AOVs of all time samples in `rect` of `strip`. Evaluated only where AOVs are requested, one pixel at a time.
 #[inline(always)]
-pub(crate) fn measure_rows<S: Simd>(simd: S, measured: &Measured, rect: Rect, strip: &mut Strip) {
+pub(crate) fn write_aov_rows<S: Simd>(simd: S, context: &AovContext, rect: Rect, strip: &mut Strip) {
     let start = rect.x / LANES * LANES;
     for y in rect.y..rect.bottom() {
         for column in (start..rect.right()).step_by(LANES) {
-            for sample in measured.samples {
-                measure_batch(simd, measured, sample, [column, y], rect, strip);
+            for sample in context.samples {
+                write_aov_batch(simd, context, sample, [column, y], rect, strip);
             }
         }
     }
 }
 
 #[inline(always)]
-fn measure_batch<S: Simd>(
+fn write_aov_batch<S: Simd>(
     simd: S,
-    measured: &Measured,
-    sample: &Sample,
+    context: &AovContext,
+    sample: &TimeSample,
     pixel: [usize; 2],
     rect: Rect,
     strip: &mut Strip,
 ) {
-    let batch = sample.mapping.batch(simd, pixel[0], pixel[1]);
-    let sheet = measured.sheet;
-    let Some(shade) = shade_as(sheet.shape(), sheet.ramp(), sample, measured.drawn, &batch) else { return };
+    let batch = sample.pixel_to_sheet.batch(simd, pixel[0], pixel[1]);
+    let sheet = context.sheet;
+    let Some(shade) = shade_sample(sheet.shape(), sheet.ramp(), sample, context.content, &batch) else { return };
     for lane in 0..LANES {
         let x = pixel[0] + lane;
         if !(rect.x..rect.right()).contains(&x) {
@@ -62,13 +60,13 @@ fn measure_batch<S: Simd>(
         if !strip.visible(index, batch.depth[lane]) {
             continue;
         }
-        let share = 1.0 / measured.samples.len() as f32;
-        let depth = -math::f32::ln_1p(-shade.light[3][lane].min(0.999_999)) * share;
+        let sample_weight = 1.0 / context.samples.len() as f32;
+        let depth = -math::f32::ln_1p(-shade.light[3][lane].min(0.999_999)) * sample_weight;
         strip.aovs[OPTICAL_DEPTH].add(index, depth, 1.0);
         let weight = color::luminance([0, 1, 2].map(|k| shade.light[k][lane])) * sample.luminance;
-        if weight > 0.0 && measured.drawn == Drawn::Flame {
+        if weight > 0.0 && context.content == SheetContent::Flame {
             strip.aovs[TEMPERATURE].add(index, sheet.ramp().temperature.at(shade.t1[lane])[0], weight);
-            let motion = measured.motion(sample, f64::from(batch.x[lane]), f64::from(batch.y[lane]));
+            let motion = context.motion(sample, f64::from(batch.x[lane]), f64::from(batch.y[lane]));
             for (plane, value) in MOTION.into_iter().zip(motion) {
                 strip.aovs[plane].add(index, value, weight);
             }
@@ -76,15 +74,15 @@ fn measure_batch<S: Simd>(
     }
 }
 
-impl Measured<'_> {
-    /// Pixels that the gas at (x, y) of the sheet moves by until the next frame, right and down.
-    fn motion(&self, sample: &Sample, x: f64, y: f64) -> [f32; 2] {
+impl AovContext<'_> {
+    /// Motion of the gas at (x, y) of the sheet until the next frame, pixels to the right and down.
+    fn motion(&self, sample: &TimeSample, x: f64, y: f64) -> [f32; 2] {
         let (now, next) = (self.view.shutter.middle(), self.view.next_middle);
         let rise = self.sheet.gas_speed(self.flame, x, y, now) * (next - now);
         let shift: DVec3 = self.sheet.base(self.flame, next) - self.sheet.base(self.flame, now);
-        let bend = sample.state.moment.centre(y + rise) - sample.state.moment.centre(y);
-        let before = self.view.camera.project(sample.stand.point(x, y));
-        let after = self.view.camera_at(next).project(sample.stand.point(x + bend, y + rise) + shift);
+        let bend = sample.state.warp.center(y + rise) - sample.state.warp.center(y);
+        let before = self.view.camera.project(sample.quad.point(x, y));
+        let after = self.view.camera_at(next).project(sample.quad.point(x + bend, y + rise) + shift);
         match (before, after) {
             (Some(before), Some(after)) => (after.pixel - before.pixel).as_vec2().to_array(),
             _ => [0.0; 2],
@@ -92,18 +90,19 @@ impl Measured<'_> {
     }
 }
 
-/// Gas moves at most at twice the scroll speed: sqrt(y) of eq. (9) has that slope at the top, and its steep foot only slows it.
-const LEAST_SLOPE: f32 = 0.5;
+/// Least dw/dy: gas moves at most at twice the scroll speed. sqrt(y) of eq. (9) has that slope at the top; near the base it is
+/// steeper and the gas slower.
+const MIN_SLOPE: f32 = 0.5;
 
 impl FlameSheet {
-    /// dy/dt of the gas at (x, y), sheet heights a second: s over dw/dy.
-    fn gas_speed(&self, flame: &Flame, x: f64, y: f64, t: f64) -> f64 {
+    /// dy/dt of the gas at (x, y), sheet heights per second: s / (dw/dy).
+    fn gas_speed(&self, flame: &FlameInstance, x: f64, y: f64, t: f64) -> f64 {
         const STEP: f32 = 0.01;
         let distance = crate::sheet::equations::axis_distance(x as f32);
         let y = (y as f32).clamp(0.02, 0.98);
         let slope = (self.shape().slowed_rise_at(distance, y + STEP) - self.shape().slowed_rise_at(distance, y - STEP))
             / (2.0 * STEP);
-        // Where the outline folds the mapping over, its slope is no speed of gas.
-        self.clock.speed(self.flame_time(flame, t)) / f64::from(slope.max(LEAST_SLOPE))
+        // Where the outline folds the mapping over, its slope is not a speed of gas.
+        self.clock.speed(self.flame_time(flame, t)) / f64::from(slope.max(MIN_SLOPE))
     }
 }

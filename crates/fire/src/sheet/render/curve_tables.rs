@@ -1,57 +1,71 @@
-//! Curves over [0, 1] as tables, two side by side so that one load fetches both at one place.
+//! Tables of the user's curves, and the mapping of eqs. (9) to (18) and threshold (4) evaluated with them.
+//!
+//! A table holds two curves side by side, so that one load fetches both.
 
-use fearless_simd::{Simd, u32x16};
+use crate::sheet::{
+    equations,
+    parameters::{ColorParameters, Coloring, ShapeParameters, TextureParameters},
+};
+use bansho_base::{
+    math::{
+        self,
+        curve::Curve,
+        random::Key,
+        simd::{LANES, Lanes, Real, any_positive, fetch, wrap_split},
+    },
+    parameters::parameter_fault::{FaultKind, ParameterFault},
+};
+use fearless_simd::{Simd, prelude::*, u32x16};
 
-use bansho_base::math::simd::{Lanes, Real, any_positive, fetch, wrap_split};
-
-/// Straight pieces of a table.
+/// Linear segments of a table.
 pub(crate) const SEGMENTS: usize = 512;
-/// The greatest place below 1, so that the last piece serves the end too.
+/// The greatest float below 1, so that the last segment includes the end.
 const LAST: f32 = 1.0 - f32::EPSILON / 2.0;
 
-/// Two functions of one variable in [0, 1]: for each piece, value and rise of the first, then of the second.
+/// Two functions on [0, 1], piecewise linear: for each segment value and increment of the first, then of the second.
 #[derive(Clone, Debug)]
 pub(crate) struct CurvePair {
-    pieces: Box<[[f32; 4]; SEGMENTS]>,
+    segments: Box<[[f32; 4]; SEGMENTS]>,
 }
 
-/// Pieces of a table and the places in them.
-pub(crate) struct Located<S: Simd> {
-    piece: u32x16<S>,
-    part: Lanes<S>,
+/// Segment indices and the fractions within them.
+pub(crate) struct TableIndex<S: Simd> {
+    segment: u32x16<S>,
+    fraction: Lanes<S>,
 }
 
-/// Where sixteen places lie in any table; they are held to [0, 1].
+/// Segment indices of sixteen arguments, clamped to [0, 1].
 #[inline(always)]
-pub(crate) fn locate<S: Simd>(x: Lanes<S>) -> Located<S> {
-    let place = x.simd_max(x.broadcast(0.0)).simd_min(x.broadcast(LAST)) * x.broadcast(SEGMENTS as f32);
-    let (piece, part) = wrap_split(place, SEGMENTS as u32 - 1);
-    Located { piece, part }
+pub(crate) fn table_index<S: Simd>(x: Lanes<S>) -> TableIndex<S> {
+    let scaled = x.simd_max(x.broadcast(0.0)).simd_min(x.broadcast(LAST)) * x.broadcast(SEGMENTS as f32);
+    let (segment, fraction) = wrap_split(scaled, SEGMENTS as u32 - 1);
+    TableIndex { segment, fraction }
 }
 
-/// Where sixteen places lie that are often all the same, as the heights of a level row of pixels: then one look-up serves.
-pub(crate) enum Near<S: Simd> {
-    /// All at one place.
-    Same(f32, Lanes<S>),
-    /// Each at its own.
-    Apart(Located<S>),
+/// Table indices of sixteen arguments that are often all equal, such as the heights of a horizontal row of pixels: then one lookup
+/// suffices.
+pub(crate) enum TableLookup<S: Simd> {
+    /// All arguments are equal.
+    Uniform(f32, Lanes<S>),
+    /// Each lane has its own argument.
+    PerLane(TableIndex<S>),
 }
 
-/// Whether sixteen places are the same in any table, and where they lie.
+/// The table indices of sixteen arguments, and whether they are all equal.
 #[inline(always)]
-pub(crate) fn locate_near<S: Simd>(x: Lanes<S>) -> Near<S> {
-    /// Spread within which one look-up serves all: a twentieth of a piece.
-    const STEADY: f32 = 0.05 / SEGMENTS as f32;
+pub(crate) fn lookup_index<S: Simd>(x: Lanes<S>) -> TableLookup<S> {
+    /// Spread that counts as equal: a twentieth of a segment.
+    const UNIFORM_TOLERANCE: f32 = 0.05 / SEGMENTS as f32;
     let first = x.broadcast(x[0]);
-    if any_positive((x - first).simd_abs() - x.broadcast(STEADY)) {
-        Near::Apart(locate(x))
+    if any_positive((x - first).simd_abs() - x.broadcast(UNIFORM_TOLERANCE)) {
+        TableLookup::PerLane(table_index(x))
     } else {
-        Near::Same(x[0], first)
+        TableLookup::Uniform(x[0], first)
     }
 }
 
 impl CurvePair {
-    /// The table of what `values` gives at each of the `SEGMENTS + 1` places x.
+    /// The table of the values at `SEGMENTS + 1` equidistant arguments.
     pub(crate) fn new(mut values: impl FnMut(f64) -> [f64; 2]) -> Self {
         Self::from_samples(|i| {
             let [first, second] = values(i as f64 / SEGMENTS as f64);
@@ -59,67 +73,379 @@ impl CurvePair {
         })
     }
 
-    /// The table of samples by their index, 0 to `SEGMENTS`.
+    /// The table of samples by index, 0 to `SEGMENTS`.
     #[inline(always)]
     pub(crate) fn from_samples(mut sample: impl FnMut(usize) -> [f32; 2]) -> Self {
-        let mut pieces = Box::new([[0.0; 4]; SEGMENTS]);
+        let mut segments = Box::new([[0.0; 4]; SEGMENTS]);
         let mut low = sample(0);
-        for (i, piece) in pieces.iter_mut().enumerate() {
+        for (i, segment) in segments.iter_mut().enumerate() {
             let high = sample(i + 1);
-            *piece = [low[0], high[0] - low[0], low[1], high[1] - low[1]];
+            *segment = [low[0], high[0] - low[0], low[1], high[1] - low[1]];
             low = high;
         }
-        Self { pieces }
+        Self { segments }
     }
 
-    /// Both functions at located places.
+    /// Both functions at table indices.
     #[inline(always)]
-    pub(crate) fn fetch<S: Simd>(&self, at: &Located<S>) -> [Lanes<S>; 2] {
-        let [first, first_rise, second, second_rise] = fetch(at.part.simd, &self.pieces, at.piece);
-        [first_rise.fma(at.part, first), second_rise.fma(at.part, second)]
+    pub(crate) fn fetch<S: Simd>(&self, at: &TableIndex<S>) -> [Lanes<S>; 2] {
+        let [first, first_delta, second, second_delta] = fetch(at.fraction.simd, &self.segments, at.segment);
+        [first_delta.fma(at.fraction, first), second_delta.fma(at.fraction, second)]
     }
 
-    /// Both functions at sixteen places.
+    /// Both functions at sixteen arguments.
     #[inline(always)]
     pub(crate) fn sample<S: Simd>(&self, x: Lanes<S>) -> [Lanes<S>; 2] {
-        self.fetch(&locate(x))
+        self.fetch(&table_index(x))
     }
 
-    /// Both functions at places that are often all the same.
+    /// Both functions at arguments that are often all equal.
     #[inline(always)]
-    pub(crate) fn near<S: Simd>(&self, at: &Near<S>) -> [Lanes<S>; 2] {
+    pub(crate) fn lookup<S: Simd>(&self, at: &TableLookup<S>) -> [Lanes<S>; 2] {
         match at {
-            Near::Same(x, lanes) => self.at(*x).map(|value| lanes.broadcast(value)),
-            Near::Apart(located) => self.fetch_apart(located),
+            TableLookup::Uniform(x, lanes) => self.at(*x).map(|value| lanes.broadcast(value)),
+            TableLookup::PerLane(located) => self.fetch_per_lane(located),
         }
     }
 
     /// [`fetch`](Self::fetch), out of line.
-    fn fetch_apart<S: Simd>(&self, at: &Located<S>) -> [Lanes<S>; 2] {
-        at.part.simd.vectorize(
+    fn fetch_per_lane<S: Simd>(&self, at: &TableIndex<S>) -> [Lanes<S>; 2] {
+        at.fraction.simd.vectorize(
             #[inline(always)]
             || self.fetch(at),
         )
     }
 
-    /// Both functions at one place.
+    /// Both functions at one argument.
     #[inline(always)]
     pub(crate) fn at(&self, x: f32) -> [f32; 2] {
-        let place = x.simd_max(0.0).simd_min(LAST) * SEGMENTS as f32;
-        let piece = place as i32;
-        let part = place - piece as f32;
-        let [first, first_rise, second, second_rise] = self.pieces[piece as usize & (SEGMENTS - 1)];
-        [first_rise.mul_add(part, first), second_rise.mul_add(part, second)]
+        let scaled = x.simd_max(0.0).simd_min(LAST) * SEGMENTS as f32;
+        let segment = scaled as i32;
+        let fraction = scaled - segment as f32;
+        let [first, first_delta, second, second_delta] = self.segments[segment as usize & (SEGMENTS - 1)];
+        [first_delta.mul_add(fraction, first), second_delta.mul_add(fraction, second)]
     }
+}
+
+/// Bins of height for which the horizontal extent of the flame is known.
+const REACH_BINS: usize = 128;
+
+/// Curves of eqs. (4) to (12) as tables: the part of the mapping that does not change with time.
+#[derive(Clone, Debug)]
+pub(crate) struct ShapeTables {
+    initial_speed: f32,
+    edge_speed: f32,
+    contrast: f32,
+    /// Core width A and fringe width D over w.
+    widths: CurvePair,
+    /// F over the position in the fringe.
+    falloff: CurvePair,
+    /// H over u'.
+    across: CurvePair,
+    /// V and the brightness over w.
+    heights: CurvePair,
+    /// Fraction of red light left by cooling, and of green relative to red, over w.
+    cooling: CurvePair,
+    /// A and D over w, at the samples of a table.
+    width_samples: Vec<[f32; 2]>,
+    /// Greatest x' at which there may be flame, over y.
+    reach: Box<[f32; REACH_BINS]>,
+}
+
+/// The curve with the point (0, 0) that the paper demands prepended, unless it has one.
+pub(crate) fn from_origin(curve: &Curve, key: &'static str) -> Result<Curve, ParameterFault> {
+    let mut points = curve.points().to_vec();
+    match points.first() {
+        Some([x, y]) if *x <= 0.0 && *y != 0.0 => {
+            return Err(ParameterFault { key, kind: FaultKind::NotZeroAtOrigin { value: *y } });
+        }
+        Some([x, _]) if *x > 0.0 => points.insert(0, [0.0, 0.0]),
+        _ => {}
+    }
+    Ok(Curve::new(points, curve.interpolation()).unwrap_or_else(|_| curve.clone()))
+}
+
+fn check_widths(samples: &[[f32; 2]]) -> Result<(), ParameterFault> {
+    const SLACK: f32 = 1e-6;
+    let widest = samples.iter().enumerate().max_by(|a, b| (a.1[0] + a.1[1]).total_cmp(&(b.1[0] + b.1[1])));
+    match widest {
+        Some((i, [core, fringe])) if core + fringe > 1.0 + SLACK => Err(ParameterFault {
+            key: "shape.fringe_width",
+            kind: FaultKind::WiderThanSheet {
+                at: i as f64 / (samples.len() - 1) as f64,
+                sum: f64::from(core + fringe),
+            },
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Both curves at the samples of a table.
+fn samples(first: &Curve, second: &Curve) -> Vec<[f32; 2]> {
+    let count = super::curve_tables::SEGMENTS + 1;
+    let rows = [first, second].map(|curve| curve.sample_table(count, 0.0, 1.0));
+    rows[0].iter().zip(&rows[1]).map(|(a, b)| [*a, *b]).collect()
+}
+
+/// Flame coordinates of sixteen points.
+#[derive(Clone, Copy)]
+pub(crate) struct FlameCoordinates<S: Simd> {
+    /// Texture coordinate u.
+    pub(crate) u: Lanes<S>,
+    /// Height w of the slowed rise, eq. (12).
+    pub(crate) w: Lanes<S>,
+    /// Threshold L, eq. (4).
+    pub(crate) threshold: Lanes<S>,
+    /// Relative brightness and soot at that height.
+    pub(crate) glow: Lanes<S>,
+    /// Fraction of red light left by cooling, and of green relative to red.
+    pub(crate) cooling: [Lanes<S>; 2],
+    /// Distance within the fluttering edge, pixels; negative outside.
+    edge_distance_pixels: Lanes<S>,
+    /// Height above the base, pixels.
+    base_distance_pixels: Lanes<S>,
+}
+
+impl<S: Simd> FlameCoordinates<S> {
+    /// Pixel coverage of the flame's outline, for antialiasing; 0 outside.
+    #[inline(always)]
+    pub(crate) fn coverage(&self, pixel: [f32; 2]) -> Lanes<S> {
+        let (half, one) = (self.w.broadcast(0.5), self.w.broadcast(1.0));
+        let top = (one - self.w).fma(one.broadcast(1.0 / pixel[1]), half).simd_clamp01();
+        (self.edge_distance_pixels + half).simd_clamp01() * (self.base_distance_pixels + half).simd_clamp01() * top
+    }
+
+    /// Greatest number of texels between neighboring pixels of the row, where there may be flame; `texels` are per unit of u and of
+    /// w.
+    #[inline(always)]
+    pub(crate) fn span(&self, texels: [f32; 2]) -> f32 {
+        let step = |values: Lanes<S>| {
+            let mut row = [values[LANES - 1]; LANES + 1];
+            values.store_slice(&mut row[..LANES]);
+            (Lanes::from_slice(values.simd, &row[1..]) - values).simd_abs()
+        };
+        let (one, zero) = (self.w.broadcast(1.0), self.w.broadcast(0.0));
+        let inside = (self.edge_distance_pixels + one)
+            .simd_min(self.base_distance_pixels + one)
+            .simd_min(one - self.w)
+            .simd_min(one - self.threshold);
+        let across = step(self.u) * self.u.broadcast(texels[0]);
+        let span = zero.select_lt(inside, step(self.w).fma(self.u.broadcast(texels[1]), across), zero);
+        let mut each = [0.0; LANES];
+        span.store_slice(&mut each);
+        each.into_iter().fold(0.0, f32::max)
+    }
+
+    /// `self + fraction * change`.
+    #[inline(always)]
+    pub(crate) fn add_scaled(&self, fraction: f32, delta: &Self) -> Self {
+        self.zip_with(delta, |value, delta| delta.fma(value.broadcast(fraction), value))
+    }
+
+    /// `self - other`.
+    #[inline(always)]
+    pub(crate) fn difference(&self, other: &Self) -> Self {
+        self.zip_with(other, |value, other| value - other)
+    }
+
+    #[inline(always)]
+    fn zip_with(&self, other: &Self, join: impl Fn(Lanes<S>, Lanes<S>) -> Lanes<S>) -> Self {
+        Self {
+            u: join(self.u, other.u),
+            w: join(self.w, other.w),
+            threshold: join(self.threshold, other.threshold),
+            glow: join(self.glow, other.glow),
+            cooling: [join(self.cooling[0], other.cooling[0]), join(self.cooling[1], other.cooling[1])],
+            edge_distance_pixels: join(self.edge_distance_pixels, other.edge_distance_pixels),
+            base_distance_pixels: join(self.base_distance_pixels, other.base_distance_pixels),
+        }
+    }
+}
+
+impl ShapeTables {
+    /// Checks the curves.
+    ///
+    /// # Errors
+    /// A curve that must begin at the origin does not, or core and fringe together are wider than the sheet.
+    pub(crate) fn check(shape: &ShapeParameters) -> Result<(), ParameterFault> {
+        let fringe = from_origin(&shape.fringe_width, "shape.fringe_width")?;
+        check_widths(&samples(&shape.core_width, &fringe))
+    }
+
+    /// Tables for curves that were [checked](Self::check).
+    pub(crate) fn new(shape: &ShapeParameters, texture: &TextureParameters, color: &ColorParameters) -> Self {
+        let fringe = from_origin(&shape.fringe_width, "shape.fringe_width");
+        let fringe = fringe.unwrap_or_else(|_| shape.fringe_width.clone());
+        let width_samples = samples(&shape.core_width, &fringe);
+        let mut result = Self {
+            initial_speed: shape.initial_speed as f32,
+            edge_speed: shape.edge_speed as f32,
+            contrast: texture.contrast as f32,
+            widths: CurvePair::from_samples(|i| width_samples[i]),
+            falloff: CurvePair::new(|coordinates| [1.0 - shape.slowing.eval(coordinates), 0.0]),
+            across: CurvePair::new(|across| [texture.threshold_across.eval(across), 0.0]),
+            heights: CurvePair::new(|w| [texture.threshold.eval(w), color.glow.eval(w)]),
+            cooling: CurvePair::new(|w| cooling_factors(color, w)),
+            width_samples,
+            reach: Box::new([1.0; REACH_BINS]),
+        };
+        result.reach = result.compute_reach();
+        result
+    }
+
+    /// The fluttering edges left and right, over w, eq. (15).
+    #[inline(always)]
+    pub(crate) fn edges(&self, flutter_left: &[f32], flutter_right: &[f32]) -> CurvePair {
+        CurvePair::from_samples(|i| {
+            let [core, fringe] = self.width_samples[i];
+            [flutter_left[i], flutter_right[i]].map(|flutter| equations::fluttering_edge(core, fringe, flutter))
+        })
+    }
+
+    /// Rise (9), speed profile (11) and slowed rise (12).
+    #[inline(always)]
+    fn slowed_rise<S: Simd>(&self, distance: Lanes<S>, y: Lanes<S>) -> Lanes<S> {
+        let rise = equations::rise(y, self.initial_speed);
+        let [core, fringe] = self.widths.lookup(&lookup_index(rise));
+        if !any_positive(distance - core) {
+            return rise;
+        }
+        let [falloff, _] = self.falloff.lookup(&lookup_index(equations::fringe_position(distance, core, fringe)));
+        equations::slowed_rise(rise, equations::speed_profile(falloff, self.edge_speed))
+    }
+
+    /// T0 with the parameter `contrast` applied; within [0, 1].
+    #[inline(always)]
+    pub(crate) fn gas<S: Simd>(&self, texture: Lanes<S>) -> Lanes<S> {
+        texture.fma(texture.broadcast(self.contrast), texture.broadcast(1.0 - self.contrast))
+    }
+
+    /// The same for one point.
+    pub(crate) fn slowed_rise_at(&self, distance: f32, y: f32) -> f32 {
+        let rise = equations::rise(y, self.initial_speed);
+        let [core, fringe] = self.widths.at(rise);
+        let [falloff, _] = self.falloff.at(equations::fringe_position(distance, core, fringe));
+        equations::slowed_rise(rise, equations::speed_profile(falloff, self.edge_speed))
+    }
+
+    /// The whole mapping, eqs. (9) to (18), and the threshold, eq. (4), for points of the unit square.
+    ///
+    /// `pixel` is the size of a pixel in x' and in y, over which edges are antialiased.
+    #[inline(always)]
+    pub(crate) fn coordinates<S: Simd>(
+        &self,
+        x: Lanes<S>,
+        y: Lanes<S>,
+        edges: &CurvePair,
+        pixel: [f32; 2],
+    ) -> FlameCoordinates<S> {
+        let distance = equations::axis_distance(x);
+        let w = self.slowed_rise(distance, y.simd_clamp01());
+        let at = lookup_index(w);
+        let ([left, right], [vertical, glow], cooling) =
+            (edges.lookup(&at), self.heights.lookup(&at), self.cooling.lookup(&at));
+        let (half, one) = (x.broadcast(0.5), x.broadcast(1.0));
+        let edge = x.select_lt(half, left, right);
+        let edge_distance_pixels = (edge - distance) * x.broadcast(1.0 / pixel[0]);
+        let across = equations::across(distance, edge).simd_min(one);
+        let [horizontal, _] = self.across.lookup(&lookup_index(across));
+        let threshold = equations::threshold(vertical, horizontal);
+        FlameCoordinates {
+            u: equations::texture_u(across, x),
+            w,
+            threshold,
+            glow,
+            cooling,
+            edge_distance_pixels,
+            base_distance_pixels: y * x.broadcast(1.0 / pixel[1]),
+        }
+    }
+
+    /// The threshold, eq. (4), over the flat texture square.
+    #[inline(always)]
+    pub(crate) fn flat_threshold<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
+        let [vertical, _] = self.heights.sample(w);
+        let [horizontal, _] = self.across.sample(equations::axis_distance(u));
+        equations::threshold(vertical, horizontal)
+    }
+
+    /// Whether no point of a region can lie in the flame; points around its border are given, x relative to the center line.
+    #[inline(always)]
+    pub(crate) fn misses_flame(&self, x: &[f32; 6], y: &[f32; 6]) -> bool {
+        let range = |values: &[f32; 6]| {
+            values[1..].iter().fold([values[0]; 2], |[low, high], value| [value.simd_min(low), value.simd_max(high)])
+        };
+        let ([left, right], [low, high]) = (range(x), range(y));
+        if !(high > -0.1 && low < 1.1) {
+            return true;
+        }
+        let nearest = if left < 0.5 && right > 0.5 {
+            0.0
+        } else {
+            equations::axis_distance(left).simd_min(equations::axis_distance(right))
+        };
+        let bin = |y: f32| (y.simd_clamp01() * (REACH_BINS - 1) as f32) as i32 as usize & (REACH_BINS - 1);
+        !self.reach[bin(low)..bin(high) + 1].iter().any(|reach| nearest <= *reach)
+    }
+
+    /// For each bin of height the greatest x' with w <= 1 and within the fringe, with a margin for antialiasing.
+    fn compute_reach(&self) -> Box<[f32; REACH_BINS]> {
+        const STEPS: usize = 256;
+        const MARGIN: f32 = 0.03;
+        let max_width_above = self.max_width_above();
+        let mut reach = Box::new([0.0_f32; REACH_BINS]);
+        for edge in 0..=REACH_BINS {
+            let y = (edge as f32 / (REACH_BINS - 1) as f32).min(1.0);
+            let mut max_distance = 0.0_f32;
+            for step in 1..=STEPS {
+                let distance = step as f32 / STEPS as f32;
+                let w = self.slowed_rise_at(distance, y);
+                let row = ((w * (max_width_above.len() - 1) as f32) as usize).min(max_width_above.len() - 1);
+                if w <= 1.05 && distance <= max_width_above[row] + MARGIN {
+                    max_distance = max_distance.max(distance + MARGIN);
+                }
+            }
+            for bin in edge.saturating_sub(1)..=edge.min(REACH_BINS - 1) {
+                reach[bin] = reach[bin].max(max_distance);
+            }
+        }
+        reach
+    }
+
+    /// Greatest A + D at each sampled height or above.
+    fn max_width_above(&self) -> Vec<f32> {
+        let mut widest: Vec<f32> = self.width_samples.iter().map(|[core, fringe]| core + fringe).collect();
+        for i in (0..widest.len() - 1).rev() {
+            widest[i] = widest[i].max(widest[i + 1]);
+        }
+        widest
+    }
+}
+
+/// Fraction of red light left at height w, and of green relative to red, where soot has cooled by the fraction `cooling * w`.
+///
+/// Wien's law: cooling by a fraction d multiplies the radiance by exp(-c2 d / (lambda T)); here for 610 and 540 nm at 1700 K. Blue,
+/// at 460 nm, loses what green loses relative to red, to the power 2.5.
+fn cooling_factors(color: &ColorParameters, w: f64) -> [f64; 2] {
+    const RED: f64 = 13.87;
+    const GREEN: f64 = 15.67;
+    if color.kind == Coloring::Paper {
+        return [1.0, 1.0];
+    }
+    let cooled_fraction = color.cooling * w;
+    [math::exp(-RED * cooled_fraction), math::exp((RED - GREEN) * cooled_fraction)]
+}
+
+/// Key of the random numbers of one instance.
+pub(crate) fn instance_key(seed: u64, name: &str, variation: i64, index: usize) -> Key {
+    Key::new(seed, &format!("{name}/{variation}/{index}"))
 }
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::SimdBase;
-
-    use bansho_base::math::simd::ramp;
-
     use super::*;
+    use bansho_base::math::simd::ramp;
+    use fearless_simd::SimdBase;
 
     #[test]
     fn a_table_holds_its_ends_and_is_straight_between_samples() {
@@ -134,8 +460,8 @@ mod tests {
             let batch =
                 bansho_base::dispatch_baseline!(simd => table.sample(Lanes::splat(simd, x)).map(|values| values[7]));
             assert!((batch[0] - line).abs() < 1e-6 && (batch[1] - parabola).abs() < 1e-6);
-            let near = bansho_base::dispatch_baseline!(simd => table.near(&locate_near(ramp(simd, x, 1e-5))).map(|values| values[11]));
-            assert!((near[0] - line).abs() < 2e-4 && (near[1] - parabola).abs() < 4e-4, "{near:?}");
+            let lookup = bansho_base::dispatch_baseline!(simd => table.lookup(&lookup_index(ramp(simd, x, 1e-5))).map(|values| values[11]));
+            assert!((lookup[0] - line).abs() < 2e-4 && (lookup[1] - parabola).abs() < 4e-4, "{lookup:?}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The light that a flame throws on others: its own coloured field, integrated coarsely at each moment.
+//! Light that a flame casts on other objects: its own colored field, integrated on a coarse grid at each time.
 
 use bansho_base::{
     math::{
@@ -12,52 +12,51 @@ use bansho_base::{
 };
 
 use super::{
-    flame::Flame,
-    projection::Batch,
-    shade::{State, shade},
+    projection::SheetCoordinates,
+    shade::{SheetState, shade},
 };
+use crate::sheet::render::flame_instance::FlameInstance;
 use crate::sheet::{
     FlameSheet,
-    animate::moment::{Moment, Push},
+    animate::warp::{WarpState, WindLean},
 };
 use fearless_simd::{Level, Simd, prelude::*};
 
-/// Rows of the coarse grid; it is sixteen wide.
+/// Rows of the grid; it is sixteen wide.
 const ROWS: usize = 32;
 
-/// What each row of the grid sends out, candela (ACEScg) in all directions that see the sheet's face.
+/// Luminous intensity of each row of the grid, cd (ACEScg), in all directions that see the sheet's face.
 pub(crate) type RowIntensities = [[f32; 3]; ROWS];
 
 impl FlameSheet {
-    /// Luminous intensity of the rows of a flame's sheet at time `t`, from the base up: luminance times area of each cell, summed.
+    /// Luminous intensity of the rows of a flame's sheet at `t`, from the base up: luminance times area, summed over cells.
     ///
-    /// The flame is taken as still air would leave it. A sheet is thin, and turned to every viewer, so that its intensity is the
-    /// same in all directions.
-    pub(crate) fn row_intensities(&self, flame: &Flame, t: f64) -> RowIntensities {
-        let still = Push { across: 0.0, toward: 0.0 };
+    /// Wind is ignored. The sheet is thin and turned to every viewer, so that its intensity is isotropic.
+    pub(crate) fn row_intensities(&self, flame: &FlameInstance, t: f64) -> RowIntensities {
+        let calm = WindLean { across: 0.0, toward: 0.0 };
         let time = self.flame_time(flame, t);
-        let moment = Moment::new(&self.parameters, self.shape(), &flame.motion, &self.clock, time, still);
-        let texture = flame.source.texture(moment.scroll);
-        let state = State { moment, texture, pixel: [2.0 / LANES as f32, 1.0 / ROWS as f32] };
+        let warp = WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, calm);
+        let texture = flame.texture_source.texture(warp.scroll);
+        let state = SheetState { warp, texture, pixel: [2.0 / LANES as f32, 1.0 / ROWS as f32] };
         let size = self.sheet_size(flame);
         let cell_area = size.x * size.y / (LANES * ROWS) as f64;
         let scale = (cell_area * self.luminance_at(t)) as f32;
-        fearless_simd::dispatch!(Level::new(), simd => rows(simd, self, &state, scale))
+        fearless_simd::dispatch!(Level::new(), simd => row_light(simd, self, &state, scale))
     }
 
-    /// The point lights that stand for a flame while the shutter is open.
-    pub(crate) fn point_lights(&self, flame: &Flame, shutter: Shutter) -> Vec<Light> {
+    /// Point lights that represent a flame while the shutter is open.
+    pub(crate) fn point_lights(&self, flame: &FlameInstance, shutter: Shutter) -> Vec<Light> {
         let t = shutter.middle();
         let (base, size) = (self.base(flame, t), self.sheet_size(flame));
-        let rows = self.row_intensities(flame, t);
+        let row_light = self.row_intensities(flame, t);
         let count = self.parameters.light.count.max(1) as usize;
         let scale = self.parameters.light.scale as f32;
-        let stand_at = |height: f64| base + DVec3::Y * (height * size.y);
+        let light_position = |height: f64| base + DVec3::Y * (height * size.y);
         (0..count)
-            .map(|index| share(&rows, index, count))
+            .map(|index| equal_energy_segment(&row_light, index, count))
             .filter(|(intensity, _)| intensity.iter().any(|value| *value * scale > 0.0))
             .map(|(intensity, height)| Light {
-                emitter: Emitter::Point { position: stand_at(height), radius: 0.15 * size.x },
+                emitter: Emitter::Point { position: light_position(height), radius: 0.15 * size.x },
                 intensity: intensity.map(|value| value * scale),
             })
             .collect()
@@ -65,43 +64,43 @@ impl FlameSheet {
 }
 
 #[inline(always)]
-fn rows<S: Simd>(simd: S, sheet: &FlameSheet, state: &State, scale: f32) -> RowIntensities {
+fn row_light<S: Simd>(simd: S, sheet: &FlameSheet, state: &SheetState, scale: f32) -> RowIntensities {
     let x = ramp(simd, 0.5 / LANES as f32, 1.0 / LANES as f32);
-    let mut rows = [[0.0; 3]; ROWS];
-    for (index, row) in rows.iter_mut().enumerate() {
+    let mut row_light = [[0.0; 3]; ROWS];
+    for (index, row) in row_light.iter_mut().enumerate() {
         let y = Lanes::splat(simd, (index as f32 + 0.5) / ROWS as f32);
-        let batch = Batch { x, y, depth: y.broadcast(1.0) };
+        let batch = SheetCoordinates { x, y, depth: y.broadcast(1.0) };
         if let Some(shade) = shade(sheet.shape(), sheet.ramp(), state, &batch) {
             for k in 0..3 {
                 row[k] = shade.light[k].as_slice().iter().sum::<f32>() * scale;
             }
         }
     }
-    rows
+    row_light
 }
 
-/// Part `index` of `count` of the rows, each with the same share of the energy, and the height at which it is centred.
+/// Segment `index` of `count` of the rows, each with the same energy, and the height of its center.
 ///
-/// Parts of equal energy move up and down smoothly as the flame flickers.
-fn share(rows: &RowIntensities, index: usize, count: usize) -> ([f32; 3], f64) {
+/// Segments of equal energy move smoothly as the flame flickers.
+fn equal_energy_segment(row_light: &RowIntensities, index: usize, count: usize) -> ([f32; 3], f64) {
     let energy = |row: &[f32; 3]| f64::from(row.iter().sum::<f32>().max(0.0));
-    let total: f64 = rows.iter().map(energy).sum();
+    let total: f64 = row_light.iter().map(energy).sum();
     let (from, to) = (total * index as f64 / count as f64, total * (index + 1) as f64 / count as f64);
-    let (mut below, mut intensity, mut moment) = (0.0, [0.0_f32; 3], 0.0);
-    for (place, row) in rows.iter().enumerate() {
-        let above = below + energy(row);
-        let taken = (above.min(to) - below.max(from)).max(0.0);
-        if taken > 0.0 {
-            let part = taken / energy(row);
+    let (mut cumulative, mut intensity, mut height_moment) = (0.0, [0.0_f32; 3], 0.0);
+    for (row_index, row) in row_light.iter().enumerate() {
+        let next_cumulative = cumulative + energy(row);
+        let overlap = (next_cumulative.min(to) - cumulative.max(from)).max(0.0);
+        if overlap > 0.0 {
+            let fraction = overlap / energy(row);
             for k in 0..3 {
-                intensity[k] += row[k] * part as f32;
+                intensity[k] += row[k] * fraction as f32;
             }
-            moment += taken * (place as f64 + 0.5) / ROWS as f64;
+            height_moment += overlap * (row_index as f64 + 0.5) / ROWS as f64;
         }
-        below = above;
+        cumulative = next_cumulative;
     }
-    let taken = to - from;
-    (intensity, if taken > 0.0 { moment / taken } else { lerp(0.0, 1.0, 0.3) })
+    let overlap = to - from;
+    (intensity, if overlap > 0.0 { height_moment / overlap } else { lerp(0.0, 1.0, 0.3) })
 }
 
 #[cfg(test)]
@@ -110,15 +109,15 @@ mod tests {
 
     #[test]
     fn shares_have_equal_energy_and_add_up() {
-        let mut rows = [[0.0; 3]; ROWS];
-        for (i, row) in rows.iter_mut().enumerate().take(10) {
+        let mut row_light = [[0.0; 3]; ROWS];
+        for (i, row) in row_light.iter_mut().enumerate().take(10) {
             *row = [3.0, 2.0, 1.0 + i as f32];
         }
-        let parts: Vec<_> = (0..3).map(|index| share(&rows, index, 3)).collect();
-        let energy = |part: &([f32; 3], f64)| part.0.iter().sum::<f32>();
-        assert!((energy(&parts[0]) - energy(&parts[2])).abs() < 1e-3);
-        let red: f32 = parts.iter().map(|part| part.0[0]).sum();
+        let segments: Vec<_> = (0..3).map(|index| equal_energy_segment(&row_light, index, 3)).collect();
+        let energy = |fraction: &([f32; 3], f64)| fraction.0.iter().sum::<f32>();
+        assert!((energy(&segments[0]) - energy(&segments[2])).abs() < 1e-3);
+        let red: f32 = segments.iter().map(|fraction| fraction.0[0]).sum();
         assert!((red - 30.0).abs() < 1e-4);
-        assert!(parts[0].1 < parts[1].1 && parts[1].1 < parts[2].1);
+        assert!(segments[0].1 < segments[1].1 && segments[1].1 < segments[2].1);
     }
 }

@@ -1,4 +1,4 @@
-//! One frame of a sheet: its flames in order of depth, nearest first.
+//! One prepared frame of a sheet: flames, smoke and sparks sorted by depth, nearest first.
 
 use bansho_base::{
     camera::upright_quad::UprightQuad,
@@ -12,36 +12,36 @@ use bansho_base::{
 };
 
 use super::{
-    aovs::{Measured, measure_rows},
-    draw::{Paint, SQUEEZED, band_of, draw_rows},
-    flame::{Flame, pixels_per_metre},
-    shade::{Drawn, Sample},
+    aovs::{AovContext, write_aov_rows},
+    draw::{DrawContext, MAX_MINIFICATION, draw_rows, row_band_height},
+    shade::{SheetContent, TimeSample},
 };
+use crate::sheet::render::flame_instance::{FlameInstance, pixels_per_meter};
 use crate::{
-    sheet::{FlameSheet, parameters::StageShown},
-    sparks::{Fire, Streak},
+    sheet::{FlameSheet, parameters::Stage},
+    sparks::{SparkEmitter, Streak},
 };
 use fearless_simd::Level;
 
-/// A frame, ready to draw in strips.
+/// A frame, ready to be drawn into strips.
 pub(crate) struct PreparedSheet<'a> {
     sheet: &'a FlameSheet,
     view: &'a View,
     level: Level,
-    parts: Vec<Part<'a>>,
+    commands: Vec<DrawCommand<'a>>,
 }
 
-/// One thing that is drawn, at one depth.
-struct Part<'a> {
-    flame: &'a Flame,
+/// One item at one depth.
+struct DrawCommand<'a> {
+    flame: &'a FlameInstance,
     depth: f64,
     rect: Rect,
-    matter: Matter,
+    item: DrawItem,
 }
 
-enum Matter {
+enum DrawItem {
     /// A sheet of flame or smoke.
-    Sheet(Drawn, Vec<Sample>),
+    Sheet(SheetContent, Vec<TimeSample>),
     /// A spark.
     Spark(Streak),
 }
@@ -53,60 +53,66 @@ impl<'a> PreparedSheet<'a> {
         surroundings: &Surroundings,
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
-        let mut parts = Vec::new();
+        let mut commands = Vec::new();
         for flame in &sheet.flames {
             check(observer)?;
-            sheet.add_parts(flame, view, surroundings, &mut parts);
+            sheet.add_draw_commands(flame, view, surroundings, &mut commands);
         }
-        // A stable sort: things at one depth keep the order flame, smoke, sparks of each instance.
-        parts.sort_by(|a: &Part, b: &Part| a.depth.total_cmp(&b.depth));
-        Ok(Self { sheet, view, level: Level::new(), parts })
+        // A stable sort: at one depth the order is flame, smoke, sparks of each instance.
+        commands.sort_by(|a: &DrawCommand, b: &DrawCommand| a.depth.total_cmp(&b.depth));
+        Ok(Self { sheet, view, level: Level::new(), commands })
     }
 }
 
 impl FlameSheet {
     /// Flame, smoke and sparks of one instance.
-    fn add_parts<'a>(&'a self, flame: &'a Flame, view: &View, surroundings: &Surroundings, parts: &mut Vec<Part<'a>>) {
+    fn add_draw_commands<'a>(
+        &'a self,
+        flame: &'a FlameInstance,
+        view: &View,
+        surroundings: &Surroundings,
+        commands: &mut Vec<DrawCommand<'a>>,
+    ) {
         let base = self.base(flame, view.shutter.middle());
         let right = self.right(flame, &view.camera, base);
-        let stand = UprightQuad::new(base, right, self.sheet_size(flame), 0.0);
-        let scale = pixels_per_metre(&view.camera, &stand);
-        let source = flame.source.filtered(scale * stand.size.y);
+        let quad = UprightQuad::new(base, right, self.sheet_size(flame), 0.0);
+        let scale = pixels_per_meter(&view.camera, &quad);
+        let texture = flame.texture_source.filtered(scale * quad.size.y);
         let count = self.time_samples(flame, view.shutter, scale);
-        let (samples, rect) = self.samples(flame, &source, view, surroundings.wind, count);
-        let depth = view.camera.depth(stand.point(0.5, 0.5));
+        let (samples, rect) = self.samples(flame, &texture, view, surroundings.wind, count);
+        let depth = view.camera.depth(quad.point(0.5, 0.5));
         if !samples.is_empty() {
-            parts.push(Part { flame, depth, rect, matter: Matter::Sheet(self.drawn(), samples) });
+            commands.push(DrawCommand { flame, depth, rect, item: DrawItem::Sheet(self.content(), samples) });
         }
-        if self.parameters.stage != StageShown::Flame {
+        if self.parameters.stage != Stage::Flame {
             return;
         }
         if let Some((sample, rect)) = self.smoke_sample(flame, view, surroundings) {
-            parts.push(Part { flame, depth, rect, matter: Matter::Sheet(Drawn::Smoke, vec![sample]) });
+            commands.push(DrawCommand { flame, depth, rect, item: DrawItem::Sheet(SheetContent::Smoke, vec![sample]) });
         }
-        for streak in self.fire(flame, view).streaks(view, surroundings.wind) {
+        for streak in self.spark_emitter(flame, view).streaks(view, surroundings.wind) {
             let rect = streak.bounds(view.size);
-            parts.push(Part { flame, depth: streak.depth, rect, matter: Matter::Spark(streak) });
+            commands.push(DrawCommand { flame, depth: streak.depth, rect, item: DrawItem::Spark(streak) });
         }
     }
 
-    /// The fire whose sparks fly.
-    fn fire(&self, flame: &Flame, view: &View) -> Fire<'_> {
+    /// Sparks of one instance.
+    fn spark_emitter(&self, flame: &FlameInstance, view: &View) -> SparkEmitter<'_> {
         let t = view.shutter.middle();
-        Fire {
+        SparkEmitter {
             parameters: &self.parameters.sparks,
             key: flame.key,
             now: self.clock.time(self.flame_time(flame, t)),
             loop_s: self.clock.loop_s(),
             base: self.base(flame, t),
             size: self.sheet_size(flame),
-            scale: flame.place.scale,
+            scale: flame.placement.scale,
             wind_response: self.parameters.wind_response,
         }
     }
 
-    /// The stretch of depth that a flame with its sparks fills.
-    pub(crate) fn depth_interval(&self, flame: &Flame, view: &View) -> DepthInterval {
+    /// Depth interval of a flame and its sparks.
+    pub(crate) fn depth_interval(&self, flame: &FlameInstance, view: &View) -> DepthInterval {
         let base = self.base(flame, view.shutter.middle());
         let size = self.sheet_size(flame);
         let depth = view.camera.depth(base + bansho_base::math::DVec3::Y * (0.5 * size.y));
@@ -117,34 +123,48 @@ impl FlameSheet {
 
 impl Prepared for PreparedSheet<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
-        let shown = self.parts.iter().filter(|part| slice.contains(part.depth));
-        shown.fold(Rect::default(), |all, part| all.union(&part.rect))
+        let shown = self.commands.iter().filter(|command| slice.contains(command.depth));
+        shown.fold(Rect::default(), |all, command| all.union(&command.rect))
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
-        for part in self.parts.iter().filter(|part| slice.contains(part.depth)) {
-            let rect = part.rect.intersection(&strip.rect);
+        for command in self.commands.iter().filter(|command| slice.contains(command.depth)) {
+            let rect = command.rect.intersection(&strip.rect);
             if rect.is_empty() {
                 continue;
             }
-            match &part.matter {
-                Matter::Sheet(drawn, samples) => self.draw_sheet(part, *drawn, samples, rect, strip),
-                Matter::Spark(streak) => streak.draw(self.view.size, strip),
+            match &command.item {
+                DrawItem::Sheet(content, samples) => self.draw_sheet(command, *content, samples, rect, strip),
+                DrawItem::Spark(streak) => streak.draw(self.view.size, strip),
             }
         }
     }
 }
 
 impl PreparedSheet<'_> {
-    fn draw_sheet(&self, part: &Part, drawn: Drawn, samples: &[Sample], rect: Rect, strip: &mut Strip) {
-        let (sheet, absorbs) = (self.sheet, self.sheet.ramp().absorbs || drawn == Drawn::Smoke);
-        let band = samples.first().map_or(1, |sample| band_of(1.0 / f64::from(sample.state.pixel[1])));
-        let paint =
-            Paint { shape: sheet.shape(), ramp: sheet.ramp(), samples, drawn, absorbs, band, squeezed: SQUEEZED };
-        fearless_simd::dispatch!(self.level, simd => draw_rows(simd, &paint, rect, strip));
+    fn draw_sheet(
+        &self,
+        command: &DrawCommand,
+        content: SheetContent,
+        samples: &[TimeSample],
+        rect: Rect,
+        strip: &mut Strip,
+    ) {
+        let (sheet, absorbs) = (self.sheet, self.sheet.ramp().absorbs || content == SheetContent::Smoke);
+        let row_band = samples.first().map_or(1, |sample| row_band_height(1.0 / f64::from(sample.state.pixel[1])));
+        let context = DrawContext {
+            shape: sheet.shape(),
+            ramp: sheet.ramp(),
+            samples,
+            content,
+            absorbs,
+            row_band,
+            minification: MAX_MINIFICATION,
+        };
+        fearless_simd::dispatch!(self.level, simd => draw_rows(simd, &context, rect, strip));
         if !strip.aovs.is_empty() {
-            let measured = Measured { sheet, flame: part.flame, view: self.view, samples, drawn };
-            fearless_simd::dispatch!(self.level, simd => measure_rows(simd, &measured, rect, strip));
+            let measured = AovContext { sheet, flame: command.flame, view: self.view, samples, content };
+            fearless_simd::dispatch!(self.level, simd => write_aov_rows(simd, &measured, rect, strip));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The sheet in the world and its pixels, for every lens.
+//! Mapping from pixels to sheet coordinates, for every lens.
 
 use bansho_base::{
     camera::{Camera, Lens, upright_quad::UprightQuad},
@@ -11,61 +11,61 @@ use bansho_base::{
 
 use fearless_simd::{Simd, prelude::*};
 
-/// Coordinates of a batch of sixteen pixels of a row on the sheet.
+/// Sheet coordinates of sixteen pixels of a row.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Batch<S: Simd> {
+pub(crate) struct SheetCoordinates<S: Simd> {
     /// Across the sheet.
     pub(crate) x: Lanes<S>,
     /// Up the sheet; far outside where the pixel does not see the sheet's plane.
     pub(crate) y: Lanes<S>,
-    /// Depth as the lens measures it, m.
+    /// Depth, m.
     pub(crate) depth: Lanes<S>,
 }
 
-impl<S: Simd> Batch<S> {
-    /// The same pixels at other places on the sheet.
+impl<S: Simd> SheetCoordinates<S> {
+    /// The same pixels with offset sheet coordinates.
     #[inline(always)]
-    pub(crate) fn moved(&self, across: f32, up: f32) -> Self {
+    pub(crate) fn offset_by(&self, across: f32, up: f32) -> Self {
         Self { x: self.x + self.x.broadcast(across), y: self.y + self.y.broadcast(up), depth: self.depth }
     }
 }
 
-/// The depth of what is not seen; finite, so that it can be interpolated.
+/// Depth of pixels that do not see the plane; finite, so that it can be interpolated.
 const BEYOND: f32 = 1e30;
 /// A y that lies outside every flame.
-const NOWHERE: f32 = -1e6;
+const OUTSIDE: f32 = -1e6;
 
-/// From pixels to the sheet.
+/// Mapping from pixels to the sheet.
 #[derive(Clone, Debug)]
-pub(crate) enum Mapping {
-    /// Perspective: x, y and 1 over depth are x/d, y/d and d, all linear in the pixel.
+pub(crate) enum PixelToSheet {
+    /// Perspective: x/depth, y/depth and 1/depth are linear in pixel coordinates (a homography).
     Linear {
         /// Constant, per column and per row, of x/depth, y/depth and 1/depth.
         forms: [[f64; 3]; 3],
-        /// Nearest depth that is drawn.
+        /// Near clipping depth.
         near: f64,
     },
-    /// Other lenses: a ray for some pixels of each batch.
+    /// Other lenses: some rays of each batch are traced.
     Rays {
         /// The camera.
         camera: Camera,
         /// The sheet.
-        stand: UprightQuad,
+        quad: UprightQuad,
     },
 }
 
-impl Mapping {
-    /// The mapping of `stand` seen by `camera`; `None` where it is seen exactly edge on.
-    pub(crate) fn new(camera: &Camera, stand: &UprightQuad) -> Option<Self> {
-        let normal = stand.right.cross(stand.up);
-        let offset = normal.dot(stand.base - camera.position);
-        if offset.abs() < 1e-9 * stand.size.y {
+impl PixelToSheet {
+    /// The mapping to `quad` seen by `camera`; `None` where it is seen exactly edge on.
+    pub(crate) fn new(camera: &Camera, quad: &UprightQuad) -> Option<Self> {
+        let normal = quad.right.cross(quad.up);
+        let offset = normal.dot(quad.base - camera.position);
+        if offset.abs() < 1e-9 * quad.size.y {
             return None;
         }
         if camera.lens != Lens::Perspective {
-            return Some(Self::Rays { camera: *camera, stand: *stand });
+            return Some(Self::Rays { camera: *camera, quad: *quad });
         }
-        // direction = constant + column px + row py, with its extent along the axis 1.
+        // direction = constant + column px + row py, with a component of 1 along the optical axis.
         let scale = 1.0 / camera.focal_pixels;
         let column = camera.orientation.col(0) * scale;
         let row = -camera.orientation.col(1) * scale;
@@ -73,30 +73,30 @@ impl Mapping {
         let form = |axis: DVec3| [constant, column, row].map(|direction| axis.dot(direction));
         let inverse_depth = form(normal / offset);
         let on_sheet = |axis: DVec3, size: f64, shift: f64| {
-            let start = axis.dot(camera.position - stand.base) / size + shift;
+            let start = axis.dot(camera.position - quad.base) / size + shift;
             let slope = form(axis / size);
             std::array::from_fn(|i| start.mul_add(inverse_depth[i], slope[i]))
         };
-        let forms = [on_sheet(stand.right, stand.size.x, 0.5), on_sheet(stand.up, stand.size.y, 0.0), inverse_depth];
+        let forms = [on_sheet(quad.right, quad.size.x, 0.5), on_sheet(quad.up, quad.size.y, 0.0), inverse_depth];
         Some(Self::Linear { forms, near: camera.near })
     }
 
     /// Sheet coordinates of the pixels `column .. column + 16` of `row`.
     #[inline(always)]
-    pub(crate) fn batch<S: Simd>(&self, simd: S, column: usize, row: usize) -> Batch<S> {
+    pub(crate) fn batch<S: Simd>(&self, simd: S, column: usize, row: usize) -> SheetCoordinates<S> {
         match self {
             Self::Linear { forms, near } => linear_batch(simd, forms, *near, column, row),
-            Self::Rays { camera, stand } => ray_batch(camera, stand, column, row).load(simd),
+            Self::Rays { camera, quad } => ray_batch(camera, quad, column, row).load(simd),
         }
     }
 }
 
-impl Mapping {
-    /// Sheet coordinates and depth at a place of the picture; `None` where it does not see the sheet's plane.
+impl PixelToSheet {
+    /// Sheet coordinates and depth at a pixel position; `None` where it does not see the sheet's plane.
     #[inline(always)]
     pub(crate) fn at(&self, px: f64, py: f64) -> Option<[f64; 3]> {
         match self {
-            Self::Rays { camera, stand } => meet(camera, stand, px, py),
+            Self::Rays { camera, quad } => intersect_sheet(camera, quad, px, py),
             Self::Linear { forms, near } => {
                 let [x, y, inverse] = forms.map(|[constant, column, row]| column * px + row * py + constant);
                 let seen = inverse > 0.0 && inverse * near <= 1.0;
@@ -105,69 +105,69 @@ impl Mapping {
         }
     }
 
-    /// The sheet coordinates of one pixel, where they are cheap to know.
+    /// Sheet coordinates at a pixel center, for a perspective lens.
     #[inline(always)]
-    pub(crate) fn glance(&self, column: usize, row: usize) -> Option<[f32; 2]> {
+    pub(crate) fn pixel_center(&self, column: usize, row: usize) -> Option<[f32; 2]> {
         let Self::Linear { .. } = self else { return None };
         self.at(column as f64 + 0.5, row as f64 + 0.5).map(|[x, y, _]| [x as f32, y as f32])
     }
 }
 
-/// A form that is linear in the pixel, at sixteen pixels of a row.
+/// A linear form at sixteen pixels of a row.
 #[inline(always)]
 fn linear<S: Simd>(simd: S, [constant, column, row]: [f64; 3], px: f64, py: f64) -> Lanes<S> {
     ramp(simd, (column * px + row * py + constant) as f32, column as f32)
 }
 
 #[inline(always)]
-fn linear_batch<S: Simd>(simd: S, forms: &[[f64; 3]; 3], near: f64, column: usize, row: usize) -> Batch<S> {
+fn linear_batch<S: Simd>(simd: S, forms: &[[f64; 3]; 3], near: f64, column: usize, row: usize) -> SheetCoordinates<S> {
     let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
     let inverse = linear(simd, forms[2], px, py);
     let depth = inverse.broadcast(1.0) / inverse;
     // A depth beyond `near` is an inverse depth in (0, 1/near].
     let seen = inverse.simd_gt(inverse.broadcast(0.0)) & inverse.simd_le(inverse.broadcast((1.0 / near) as f32));
-    Batch {
+    SheetCoordinates {
         x: seen.select(linear(simd, forms[0], px, py) * depth, depth.broadcast(0.0)),
-        y: seen.select(linear(simd, forms[1], px, py) * depth, depth.broadcast(NOWHERE)),
+        y: seen.select(linear(simd, forms[1], px, py) * depth, depth.broadcast(OUTSIDE)),
         depth: seen.select(depth, depth.broadcast(BEYOND)),
     }
 }
 
-/// A batch as plain numbers.
+/// Sheet coordinates as arrays.
 #[derive(Debug)]
-struct Traced {
+struct SheetCoordinateArrays {
     x: [f32; LANES],
     y: [f32; LANES],
     depth: [f32; LANES],
 }
 
-impl Traced {
+impl SheetCoordinateArrays {
     #[inline(always)]
-    fn load<S: Simd>(&self, simd: S) -> Batch<S> {
+    fn load<S: Simd>(&self, simd: S) -> SheetCoordinates<S> {
         let [x, y, depth] = [&self.x, &self.y, &self.depth].map(|values| Lanes::from_slice(simd, values));
-        Batch { x, y, depth }
+        SheetCoordinates { x, y, depth }
     }
 }
 
-/// Where the ray of a pixel meets the sheet's plane: x, y, depth.
-fn meet(camera: &Camera, stand: &UprightQuad, px: f64, py: f64) -> Option<[f64; 3]> {
+/// Intersection of a pixel's ray with the sheet's plane: x, y, depth.
+fn intersect_sheet(camera: &Camera, quad: &UprightQuad, px: f64, py: f64) -> Option<[f64; 3]> {
     let direction = camera.direction(DVec2::new(px, py))?;
-    let normal = stand.right.cross(stand.up);
-    let depth = normal.dot(stand.base - camera.position) / normal.dot(direction);
+    let normal = quad.right.cross(quad.up);
+    let depth = normal.dot(quad.base - camera.position) / normal.dot(direction);
     if !(depth >= camera.near && depth.is_finite()) {
         return None;
     }
-    let offset = camera.position + direction * depth - stand.base;
-    Some([offset.dot(stand.right) / stand.size.x + 0.5, offset.dot(stand.up) / stand.size.y, depth])
+    let offset = camera.position + direction * depth - quad.base;
+    Some([offset.dot(quad.right) / quad.size.x + 0.5, offset.dot(quad.up) / quad.size.y, depth])
 }
 
-/// Rays are traced for three pixels of a batch; a parabola through them misses the others by less than a thousandth of a pixel
-/// wherever the sheet is small in the lens, and pixels are traced one by one where one of the three sees nothing or the parabola
-/// bends much.
-fn ray_batch(camera: &Camera, stand: &UprightQuad, column: usize, row: usize) -> Traced {
+/// Traces the rays of three pixels of a batch and interpolates with a parabola, which is off by less than a thousandth of a pixel
+/// where the sheet is small in the field of view. Where one of the three misses the plane, or curvature is large, all pixels are
+/// traced.
+fn ray_batch(camera: &Camera, quad: &UprightQuad, column: usize, row: usize) -> SheetCoordinateArrays {
     let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
-    let mut batch = Traced { x: [0.0; LANES], y: [NOWHERE; LANES], depth: [BEYOND; LANES] };
-    let knots = [0.0, 7.5, 15.0].map(|step| meet(camera, stand, px + step, py));
+    let mut batch = SheetCoordinateArrays { x: [0.0; LANES], y: [OUTSIDE; LANES], depth: [BEYOND; LANES] };
+    let knots = [0.0, 7.5, 15.0].map(|step| intersect_sheet(camera, quad, px + step, py));
     let gentle = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| {
         (a[2] - 2.0 * b[2] + c[2]).abs() < 0.002 * b[2] && (a[2] - c[2]).abs() < 0.1 * b[2]
     };
@@ -185,17 +185,17 @@ fn ray_batch(camera: &Camera, stand: &UprightQuad, column: usize, row: usize) ->
         return batch;
     }
     for i in 0..LANES {
-        if let Some([x, y, depth]) = meet(camera, stand, px + i as f64, py) {
+        if let Some([x, y, depth]) = intersect_sheet(camera, quad, px + i as f64, py) {
             (batch.x[i], batch.y[i], batch.depth[i]) = (x as f32, y as f32, depth as f32);
         }
     }
     batch
 }
 
-/// Whole pixels of a picture that may see the sheet between `left` and `right` (x), up to `top` (y).
+/// Bounding rectangle of the pixels that may see the sheet between `left` and `right` (x), up to `top` (y).
 pub(crate) fn bounds(
     camera: &Camera,
-    stand: &UprightQuad,
+    quad: &UprightQuad,
     left: f64,
     right: f64,
     top: f64,
@@ -207,14 +207,14 @@ pub(crate) fn bounds(
     for i in 0..=STEPS {
         for j in 0..=STEPS {
             let x = left + (right - left) * i as f64 / STEPS as f64;
-            let Some(seen) = camera.project(stand.point(x, top * j as f64 / STEPS as f64)) else {
+            let Some(seen) = camera.project(quad.point(x, top * j as f64 / STEPS as f64)) else {
                 return whole;
             };
             low = low.min(seen.pixel);
             high = high.max(seen.pixel);
         }
     }
-    // Curved lenses may bulge between the points.
+    // Edges may bulge between the points for curved lenses.
     let margin = DVec2::splat(2.0) + (high - low) * if camera.lens == Lens::Perspective { 0.0 } else { 0.05 };
     let (low, high) = ((low - margin).max(DVec2::ZERO), high + margin);
     let end = [high.x, high.y].map(|side| side.ceil().max(0.0) as usize);
@@ -247,10 +247,10 @@ mod tests {
         parameters.at(0.0, [640, 480])
     }
 
-    fn seen_batch(mapping: &Mapping, column: usize, row: usize) -> Traced {
+    fn seen_batch(pixel_to_sheet: &PixelToSheet, column: usize, row: usize) -> SheetCoordinateArrays {
         bansho_base::dispatch_baseline!(simd => {
-            let batch = mapping.batch(simd, column, row);
-            let mut traced = Traced { x: [0.0; LANES], y: [0.0; LANES], depth: [0.0; LANES] };
+            let batch = pixel_to_sheet.batch(simd, column, row);
+            let mut traced = SheetCoordinateArrays { x: [0.0; LANES], y: [0.0; LANES], depth: [0.0; LANES] };
             batch.x.store_slice(&mut traced.x);
             batch.y.store_slice(&mut traced.y);
             batch.depth.store_slice(&mut traced.depth);
@@ -258,7 +258,7 @@ mod tests {
         })
     }
 
-    fn stand(camera: &Camera) -> UprightQuad {
+    fn quad(camera: &Camera) -> UprightQuad {
         let base = DVec3::new(0.2, 0.1, -0.3);
         UprightQuad::new(base, right_facing(camera, base), DVec2::new(1.0, 2.0), 0.2)
     }
@@ -266,23 +266,23 @@ mod tests {
     #[test]
     fn a_facing_sheet_is_level_and_square_to_the_line_of_sight() {
         let camera = camera(Lens::Perspective);
-        let stand = stand(&camera);
-        assert!(stand.right.y.abs() < 1e-12 && (stand.right.length() - 1.0).abs() < 1e-12);
-        let toward = camera.position - stand.base;
-        assert!(stand.right.dot(DVec3::new(toward.x, 0.0, toward.z)).abs() < 1e-12);
-        assert!(stand.right.dot(camera.orientation.col(0)) > 0.9);
+        let quad = quad(&camera);
+        assert!(quad.right.y.abs() < 1e-12 && (quad.right.length() - 1.0).abs() < 1e-12);
+        let toward = camera.position - quad.base;
+        assert!(quad.right.dot(DVec3::new(toward.x, 0.0, toward.z)).abs() < 1e-12);
+        assert!(quad.right.dot(camera.orientation.col(0)) > 0.9);
     }
 
     #[test]
     fn pixels_find_the_point_of_the_sheet_that_they_show_through_every_lens() {
         for lens in [Lens::Perspective, Lens::Fisheye, Lens::Panorama] {
             let camera = camera(lens);
-            let stand = stand(&camera);
-            let mapping = Mapping::new(&camera, &stand).unwrap();
+            let quad = quad(&camera);
+            let pixel_to_sheet = PixelToSheet::new(&camera, &quad).unwrap();
             for (x, y) in [(0.5, 0.0), (0.1, 0.3), (0.9, 0.95), (0.5, 0.5)] {
-                let seen = camera.project(stand.point(x, y)).unwrap();
+                let seen = camera.project(quad.point(x, y)).unwrap();
                 let column = (seen.pixel.x - 0.5).floor() as usize;
-                let batch = seen_batch(&mapping, column & !15, (seen.pixel.y - 0.5).round() as usize);
+                let batch = seen_batch(&pixel_to_sheet, column & !15, (seen.pixel.y - 0.5).round() as usize);
                 let lane = column & 15;
                 let pixel = 1.0 / (seen.pixels_per_metre * 1.0);
                 assert!((f64::from(batch.x[lane]) - x).abs() < 1.2 * pixel, "{lens:?} {x} {y} {batch:?}");
@@ -295,13 +295,13 @@ mod tests {
     #[test]
     fn parabolas_through_three_rays_are_as_good_as_rays() {
         let camera = camera(Lens::Panorama);
-        let stand = stand(&camera);
-        let mapping = Mapping::new(&camera, &stand).unwrap();
-        let middle = camera.project(stand.point(0.5, 0.5)).unwrap().pixel;
+        let quad = quad(&camera);
+        let pixel_to_sheet = PixelToSheet::new(&camera, &quad).unwrap();
+        let middle = camera.project(quad.point(0.5, 0.5)).unwrap().pixel;
         let (column, row) = (middle.x as usize & !15, middle.y as usize);
-        let batch = seen_batch(&mapping, column, row);
+        let batch = seen_batch(&pixel_to_sheet, column, row);
         for i in 0..LANES {
-            let [x, y, _] = meet(&camera, &stand, (column + i) as f64 + 0.5, row as f64 + 0.5).unwrap();
+            let [x, y, _] = intersect_sheet(&camera, &quad, (column + i) as f64 + 0.5, row as f64 + 0.5).unwrap();
             assert!((f64::from(batch.x[i]) - x).abs() < 2e-4 && (f64::from(batch.y[i]) - y).abs() < 2e-4);
         }
     }
@@ -311,17 +311,17 @@ mod tests {
         let camera = camera(Lens::Perspective);
         let base = camera.position + camera.orientation.col(2) * 2.0 - DVec3::Y;
         let behind = UprightQuad::new(base, right_facing(&camera, base), DVec2::ONE, 0.0);
-        let batch = seen_batch(&Mapping::new(&camera, &behind).unwrap(), 320, 240);
-        assert!(batch.y.iter().all(|y| *y == NOWHERE));
+        let batch = seen_batch(&PixelToSheet::new(&camera, &behind).unwrap(), 320, 240);
+        assert!(batch.y.iter().all(|y| *y == OUTSIDE));
     }
 
     #[test]
     fn bounds_hold_every_corner() {
         let camera = camera(Lens::Perspective);
-        let stand = stand(&camera);
-        let rect = bounds(&camera, &stand, 0.0, 1.0, 1.0, [640, 480]);
+        let quad = quad(&camera);
+        let rect = bounds(&camera, &quad, 0.0, 1.0, 1.0, [640, 480]);
         for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-            let pixel = camera.project(stand.point(x, y)).unwrap().pixel;
+            let pixel = camera.project(quad.point(x, y)).unwrap().pixel;
             assert!(rect.x as f64 <= pixel.x && pixel.x <= rect.right() as f64);
             assert!(rect.y as f64 <= pixel.y.max(0.0) && pixel.y.min(480.0) <= rect.bottom() as f64);
         }

@@ -1,4 +1,4 @@
-//! What sixteen pixels see of a sheet: from their places on it to light.
+//! Shading of sixteen pixels: from sheet coordinates to light and opacity.
 
 use bansho_base::{
     camera::upright_quad::UprightQuad,
@@ -6,27 +6,29 @@ use bansho_base::{
 };
 
 use super::{
-    projection::{Batch, Mapping},
-    ramp::Ramp,
-    shape_tables::{Place, Shape},
+    projection::{PixelToSheet, SheetCoordinates},
     smoke::{SmokeState, shade_smoke},
 };
-use crate::sheet::{animate::moment::Moment, equations, texture::Texture};
+use crate::sheet::render::{
+    color_ramp::ColorRamp,
+    curve_tables::{FlameCoordinates, ShapeTables},
+};
+use crate::sheet::{animate::warp::WarpState, equations, texture::Texture};
 
 use fearless_simd::Simd;
 
-/// What a sheet shows at one moment.
-pub(crate) struct State {
-    /// Edges, centre line, scroll.
-    pub(crate) moment: Moment,
+/// The state of a sheet at one time.
+pub(crate) struct SheetState {
+    /// Edges, center line and scroll.
+    pub(crate) warp: WarpState,
     /// T0.
     pub(crate) texture: Texture,
     /// Size of a pixel in x' and in y.
     pub(crate) pixel: [f32; 2],
 }
 
-impl State {
-    /// Texels to a unit of u and of w, of the finer layer; a texture that was filtered for small pixels has as many as pixels.
+impl SheetState {
+    /// Texels per unit of u and of w, of the finer layer; a texture that is filtered for small pixels has as many texels as pixels.
     #[inline(always)]
     pub(crate) fn texels(&self) -> [f32; 2] {
         let [across, up] = self.texture.texels();
@@ -35,44 +37,52 @@ impl State {
     }
 }
 
-/// A sheet at one moment of the exposure, as one camera sees it.
-pub(crate) struct Sample {
-    /// From pixels to the sheet.
-    pub(crate) mapping: Mapping,
-    /// Where the sheet stands.
-    pub(crate) stand: UprightQuad,
-    /// What it shows.
-    pub(crate) state: State,
-    /// Where it is smoke, what that is made of.
+/// A sheet at one time of the exposure, as one camera sees it.
+pub(crate) struct TimeSample {
+    /// Mapping from pixels to the sheet.
+    pub(crate) pixel_to_sheet: PixelToSheet,
+    /// The sheet's quad in the world.
+    pub(crate) quad: UprightQuad,
+    /// Its state at that time.
+    pub(crate) state: SheetState,
+    /// For smoke, its properties.
     pub(crate) smoke: Option<SmokeState>,
-    /// Luminance of the brightest colour, divided by the number of samples; cd/m^2.
+    /// Luminance of the brightest color divided by the number of time samples, cd/m^2.
     pub(crate) luminance: f32,
 }
 
-/// What sixteen pixels see of the flame.
+/// Shaded pixels of the flame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shade<S: Simd> {
+pub(crate) struct ShadedBatch<S: Simd> {
     /// T1, eq. (5).
     pub(crate) t1: Lanes<S>,
     /// Red, green, blue of luminance up to 1, and opacity.
     pub(crate) light: [Lanes<S>; 4],
 }
 
-/// Light of places of the flame; `None` where there is none.
+/// Light at flame coordinates; `None` where there is none.
 #[inline(always)]
-pub(crate) fn shade_place<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, place: &Place<S>) -> Option<Shade<S>> {
-    let coverage = place.coverage(state.pixel);
+pub(crate) fn shade_coordinates<S: Simd>(
+    shape: &ShapeTables,
+    ramp: &ColorRamp,
+    state: &SheetState,
+    coordinates: &FlameCoordinates<S>,
+) -> Option<ShadedBatch<S>> {
+    let coverage = coordinates.coverage(state.pixel);
     if !any_positive(coverage) {
         return None;
     }
-    let t1 = equations::above_threshold(shape.gas(state.texture.sample(place.u, place.w)), place.threshold);
+    let t1 = equations::above_threshold(
+        shape.gas(state.texture.sample(coordinates.u, coordinates.w)),
+        coordinates.threshold,
+    );
     let zero = t1.broadcast(0.0);
-    let strength = zero.select_lt(t1, coverage * place.glow, zero);
-    let blue = ramp.base_blue[2] > 0.0 && any_positive(place.w.broadcast(BLUE_TOP) - place.w);
+    let strength = zero.select_lt(t1, coverage * coordinates.glow, zero);
+    let blue = ramp.base_blue[2] > 0.0 && any_positive(coordinates.w.broadcast(BLUE_TOP) - coordinates.w);
     if !blue && !any_positive(strength) {
         return None;
     }
-    let [red, green_beside_red] = place.cooling;
+    let [red, green_beside_red] = coordinates.cooling;
     let (red, opacity) = (red * strength, strength);
     let green = red * green_beside_red;
     let blue_left = green * green_beside_red * green_beside_red.simd_sqrt();
@@ -81,45 +91,54 @@ pub(crate) fn shade_place<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, pl
         *plane *= left;
     }
     if blue {
-        add_base_blue(&mut light, ramp, place, coverage);
+        add_base_blue(&mut light, ramp, coordinates, coverage);
     }
-    Some(Shade { t1, light })
+    Some(ShadedBatch { t1, light })
 }
 
-/// Places of a batch of pixels on the flame; compiled once for each kind of vector.
-pub(crate) fn place<S: Simd>(shape: &Shape, state: &State, batch: &Batch<S>) -> Place<S> {
+/// Flame coordinates of a batch of pixels; a function boundary for SIMD code.
+pub(crate) fn coordinates<S: Simd>(
+    shape: &ShapeTables,
+    state: &SheetState,
+    batch: &SheetCoordinates<S>,
+) -> FlameCoordinates<S> {
     batch.x.simd.vectorize(
         #[inline(always)]
         || {
-            let (x, y) = state.moment.straighten(batch.x, batch.y);
-            shape.place(x, y, &state.moment.edges, state.pixel)
+            let (x, y) = state.warp.unwarp(batch.x, batch.y);
+            shape.coordinates(x, y, &state.warp.edges, state.pixel)
         },
     )
 }
 
-/// Whether any flame reaches a batch, and what of it; compiled once for each kind of vector.
-pub(crate) fn shade<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<S>) -> Option<Shade<S>> {
-    let place = place(shape, state, batch);
+/// Light of a batch of pixels, `None` where there is none; a function boundary for SIMD code.
+pub(crate) fn shade<S: Simd>(
+    shape: &ShapeTables,
+    ramp: &ColorRamp,
+    state: &SheetState,
+    batch: &SheetCoordinates<S>,
+) -> Option<ShadedBatch<S>> {
+    let coordinates = coordinates(shape, state, batch);
     batch.x.simd.vectorize(
         #[inline(always)]
-        || shade_place(shape, ramp, state, &place),
+        || shade_coordinates(shape, ramp, state, &coordinates),
     )
 }
 
-/// What a batch sees of a sample, whatever is drawn.
-pub(crate) fn shade_as<S: Simd>(
-    shape: &Shape,
-    ramp: &Ramp,
-    sample: &Sample,
-    drawn: Drawn,
-    batch: &Batch<S>,
-) -> Option<Shade<S>> {
+/// Light of a batch of pixels of a time sample, whatever its content.
+pub(crate) fn shade_sample<S: Simd>(
+    shape: &ShapeTables,
+    ramp: &ColorRamp,
+    sample: &TimeSample,
+    content: SheetContent,
+    batch: &SheetCoordinates<S>,
+) -> Option<ShadedBatch<S>> {
     let state = &sample.state;
-    match (&sample.smoke, drawn) {
-        (None, Drawn::Flame | Drawn::Smoke) => shade(shape, ramp, state, batch),
-        (None, Drawn::FlatTexture | Drawn::FlatCut) => batch.x.simd.vectorize(
+    match (&sample.smoke, content) {
+        (None, SheetContent::Flame | SheetContent::Smoke) => shade(shape, ramp, state, batch),
+        (None, SheetContent::FlatTexture | SheetContent::FlatThresholded) => batch.x.simd.vectorize(
             #[inline(always)]
-            || shade_flat(shape, ramp, state, batch, drawn == Drawn::FlatCut),
+            || shade_flat(shape, ramp, state, batch, content == SheetContent::FlatThresholded),
         ),
         (Some(smoke), _) => batch.x.simd.vectorize(
             #[inline(always)]
@@ -131,12 +150,17 @@ pub(crate) fn shade_as<S: Simd>(
 /// Height w up to which the base burns blue.
 const BLUE_TOP: f32 = 0.45;
 
-/// The blue zone hugs the flame's lower edge, where fuel meets air before soot forms.
+/// The blue zone at the flame's lower edge, where fuel meets air before soot forms.
 #[inline(always)]
-fn add_base_blue<S: Simd>(light: &mut [Lanes<S>; 4], ramp: &Ramp, place: &Place<S>, coverage: Lanes<S>) {
-    let one = place.w.broadcast(1.0);
-    let across = equations::axis_distance(place.u);
-    let up = (one - place.w * one.broadcast(1.0 / BLUE_TOP)).simd_clamp01();
+fn add_base_blue<S: Simd>(
+    light: &mut [Lanes<S>; 4],
+    ramp: &ColorRamp,
+    coordinates: &FlameCoordinates<S>,
+    coverage: Lanes<S>,
+) {
+    let one = coordinates.w.broadcast(1.0);
+    let across = equations::axis_distance(coordinates.u);
+    let up = (one - coordinates.w * one.broadcast(1.0 / BLUE_TOP)).simd_clamp01();
     let rim = (across * across).fma(one.broadcast(0.75), one.broadcast(0.25)) * (one - across) * one.broadcast(3.0);
     let amount = up * up * rim * coverage;
     for (plane, blue) in light.iter_mut().zip(ramp.base_blue) {
@@ -146,7 +170,13 @@ fn add_base_blue<S: Simd>(light: &mut [Lanes<S>; 4], ramp: &Ramp, place: &Place<
 
 /// The flat texture square of the paper's pictures 1 to 4.
 #[inline(always)]
-fn shade_flat<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<S>, cut: bool) -> Option<Shade<S>> {
+fn shade_flat<S: Simd>(
+    shape: &ShapeTables,
+    ramp: &ColorRamp,
+    state: &SheetState,
+    batch: &SheetCoordinates<S>,
+    cut: bool,
+) -> Option<ShadedBatch<S>> {
     let (zero, one) = (batch.x.broadcast(0.0), batch.x.broadcast(1.0));
     let outside = |x: Lanes<S>| (zero - x).simd_max(x - one).simd_max(zero);
     let strength = zero.select_lt(outside(batch.x) + outside(batch.y), zero, one);
@@ -159,18 +189,18 @@ fn shade_flat<S: Simd>(shape: &Shape, ramp: &Ramp, state: &State, batch: &Batch<
     for plane in &mut light {
         *plane *= strength;
     }
-    Some(Shade { t1, light })
+    Some(ShadedBatch { t1, light })
 }
 
-/// Which part of the chain is drawn.
+/// What a sheet shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Drawn {
+pub(crate) enum SheetContent {
     /// The mapped flame.
     Flame,
     /// The texture square before the threshold.
     FlatTexture,
     /// The texture square after the threshold.
-    FlatCut,
+    FlatThresholded,
     /// Smoke.
     Smoke,
 }

@@ -1,8 +1,8 @@
-//! The default texture: layers of one table of domain-warped gradient noise that rise at different speeds.
+//! The default texture: two layers of one table of domain-warped gradient noise that rise at different speeds.
 //!
-//! A single wrapped table repeats when it has scrolled by its height. Here two things prevent that. The scroll crosses the table aslant, so
-//! that the table comes back moved sideways by an irrational part of its width; and a second, finer layer rises faster and
-//! crosses it the other way. Both change the gas as it rises, as a real flame changes.
+//! A single periodic table repeats when it has scrolled by its height. Here the scroll direction is slanted, so that the table
+//! returns shifted by an irrational fraction of its width, and a second, finer layer rises faster with the opposite slant. Both
+//! also change the gas as it rises, as a real flame does.
 
 use std::sync::{Arc, LazyLock};
 
@@ -14,18 +14,18 @@ use bansho_base::{
     },
 };
 
-use super::{COLUMNS, Layer, ROWS, Texture, TextureTable};
+use super::{COLUMNS, ROWS, Texture, TextureLayer, TextureTable};
 use crate::sheet::animate::clock::Clock;
 
-/// Lattice cells of the first octave across and up the table; 32 and 64 texels wide.
+/// Lattice cells of the first octave along columns and rows; 32 and 64 texels wide.
 const CELLS: [usize; 2] = [8, 8];
-/// The table, the same for every flame; flames differ by where they look.
+/// The noise table, common to all flames, which differ by their offsets.
 pub(crate) static FRACTAL: LazyLock<Arc<TextureTable>> = LazyLock::new(|| Arc::new(TextureTable::new(&warped_noise())));
 
 /// A texture as texels, row after row.
 type Texels = Vec<f32>;
 
-/// Gradient noise (Perlin 1985, with the quintic fade of 2002) on a lattice that divides the table, so that it wraps.
+/// Periodic gradient noise (Perlin 1985, with the quintic fade of 2002) on a lattice that divides the table.
 fn gradient_noise(cells: [usize; 2], key: Key, purpose: Purpose) -> Texels {
     let gradients: Vec<[f32; 2]> = (0..cells[0] * cells[1])
         .map(|cell| {
@@ -51,17 +51,17 @@ fn gradient_noise(cells: [usize; 2], key: Key, purpose: Purpose) -> Texels {
     texels
 }
 
-/// For each of `count` texels: its cell, the next, the place within it and the faded place.
+/// For each of `count` texels: its cell, the next cell, the fraction within it, and the faded fraction.
 fn axis(count: usize, cells: usize) -> Vec<(usize, usize, f32, f32)> {
     let width = count / cells;
-    let place = |i: usize| {
+    let coordinate = |i: usize| {
         let f = (i % width) as f32 / width as f32;
         (i / width, (i / width + 1) % cells, f, f * f * f * (f * (f * 6.0 - 15.0) + 10.0))
     };
-    (0..count).map(place).collect()
+    (0..count).map(coordinate).collect()
 }
 
-/// Octaves of noise, each twice as fine and `gain` times as strong as the last.
+/// Octaves of noise, each of twice the frequency and `gain` times the amplitude of the last.
 fn octaves(count: usize, gain: f32, key: Key, name: Purpose) -> Texels {
     let mut sum = vec![0.0_f32; ROWS * COLUMNS];
     let mut amplitude = 1.0;
@@ -74,113 +74,111 @@ fn octaves(count: usize, gain: f32, key: Key, name: Purpose) -> Texels {
     sum
 }
 
-/// Noise whose coordinates are displaced by other noise: gas that was stirred.
+/// Domain-warped noise: its coordinates are displaced by other noise.
 fn warped_noise() -> Texels {
     /// Greatest displacement across and up, texels, at a noise value of 1.
-    const STIR: [f32; 2] = [34.0, 60.0];
+    const WARP_TEXELS: [f32; 2] = [34.0, 60.0];
     let key = Key::new(1985, "flame sheet fractal");
     let gas = TextureTable::new(&octaves(4, 0.5, key, Purpose::named("gas")));
     let across = octaves(2, 0.5, key, Purpose::named("stir across"));
     let up = octaves(2, 0.5, key, Purpose::named("stir up"));
-    let place = |i: usize| {
-        let column = STIR[0].fma(across[i], (i % COLUMNS) as f32);
-        gas.bilinear(column, STIR[1].fma(up[i], (i / COLUMNS) as f32))
+    let coordinate = |i: usize| {
+        let column = WARP_TEXELS[0].fma(across[i], (i % COLUMNS) as f32);
+        gas.bilinear(column, WARP_TEXELS[1].fma(up[i], (i / COLUMNS) as f32))
     };
-    spread_evenly((0..ROWS * COLUMNS).map(place).collect())
+    equalize_histogram((0..ROWS * COLUMNS).map(coordinate).collect())
 }
 
-/// Replaces each value by its rank in [0, 1]: no value is more frequent than another, the paper's one wish for the texture.
-fn spread_evenly(texels: Texels) -> Texels {
+/// Histogram equalization: replaces each value by its rank in [0, 1]. The paper asks for a texture without frequent values.
+fn equalize_histogram(texels: Texels) -> Texels {
     const BINS: usize = 4096;
     let low = texels.iter().copied().fold(f32::INFINITY, f32::min);
     let high = texels.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let scale = BINS as f32 / (high - low).max(f32::MIN_POSITIVE);
-    let place = |value: f32| ((value - low) * scale).min(BINS as f32 - 0.001);
+    let coordinate = |value: f32| ((value - low) * scale).min(BINS as f32 - 0.001);
     let mut below = vec![0.0_f64; BINS + 1];
-    texels.iter().for_each(|value| below[place(*value) as usize + 1] += 1.0 / texels.len() as f64);
+    texels.iter().for_each(|value| below[coordinate(*value) as usize + 1] += 1.0 / texels.len() as f64);
     for bin in 0..BINS {
         below[bin + 1] += below[bin];
     }
     let rank = |value: f32| {
-        let place = place(value);
-        let bin = place as usize;
-        math::lerp(below[bin], below[bin + 1], f64::from(place) - bin as f64) as f32
+        let coordinate = coordinate(value);
+        let bin = coordinate as usize;
+        math::lerp(below[bin], below[bin + 1], f64::from(coordinate) - bin as f64) as f32
     };
     texels.into_iter().map(rank).collect()
 }
 
-/// Mean of two evenly distributed numbers, distributed evenly again: the distribution of the sum is a triangle.
+/// Mean of two uniformly distributed numbers, equalized again: their sum has a triangular distribution.
 #[inline(always)]
-pub(super) fn mix_evenly<N: Real>(a: N, b: N) -> N {
+pub(super) fn mix_equalized<N: Real>(a: N, b: N) -> N {
     let (sum, one) = (a + b, a.broadcast(1.0));
     let low = sum.simd_min(a.broadcast(2.0) - sum);
     let rank = a.broadcast(0.5) * low * low;
     sum.select_lt(one, rank, one - rank)
 }
 
-/// How one layer crosses the table.
+/// How one layer is mapped to the table.
 #[derive(Clone, Copy, Debug)]
-struct Crossing {
+struct LayerMapping {
     /// Table widths across the sheet.
     widths: f64,
-    /// Table widths that it moves aslant in a sheet height.
+    /// Table widths of slant per sheet height.
     slant: f64,
-    /// Table heights in a sheet height.
+    /// Table heights per sheet height.
     heights: f64,
-    /// Speed beside the scroll.
+    /// Speed relative to the scroll.
     rate: f64,
-    /// Where it begins, in table widths and heights.
+    /// Offset, in table widths and heights.
     start: [f64; 2],
 }
 
 /// The layers of one flame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FractalLayers {
-    crossings: [Crossing; 2],
+    mappings: [LayerMapping; 2],
 }
 
 impl FractalLayers {
-    /// Layers whose tongues are `size` times as wide and long as usual and which rise at `speed` times the scroll, begun where
-    /// `key` says.
+    /// Layers whose tongues are `width` times as wide and `length` times as long as the default, and which rise at `speed` times
+    /// the scroll; `key` sets their offsets.
     pub(crate) fn new([width, length]: [f64; 2], speed: f64, key: Key, clock: &Clock) -> Self {
         let start = key.uniforms(0, 0, Purpose::named("fractal layers")).map(f64::from);
-        let coarse = Crossing { widths: 0.37, slant: 0.061_8, heights: 0.243, rate: 1.0, start: [start[0], start[1]] };
-        let fine = Crossing { widths: -0.71, slant: -0.104_7, heights: 0.419, rate: 1.21, start: [start[2], start[3]] };
-        let fit = |crossing: Crossing| {
-            let heights = crossing.heights / length;
-            // Wave numbers of what scrolls by at the layer's own rate, moved to where they close a loop.
-            let pace = crossing.rate * speed.max(1e-3);
+        let coarse =
+            LayerMapping { widths: 0.37, slant: 0.061_8, heights: 0.243, rate: 1.0, start: [start[0], start[1]] };
+        let fine =
+            LayerMapping { widths: -0.71, slant: -0.104_7, heights: 0.419, rate: 1.21, start: [start[2], start[3]] };
+        let fit = |mapping: LayerMapping| {
+            let heights = mapping.heights / length;
+            // Wave numbers of the scroll at the layer's own rate, rounded to those that close a loop.
+            let pace = mapping.rate * speed.max(1e-3);
             let closed = clock.waves(heights * pace, 1.0) / (heights * pace);
             let stretch = closed.clamp(0.8, 1.25);
             let rate = pace * closed / stretch;
-            let slant = clock.waves(crossing.slant * rate, 0.0) / rate;
-            Crossing { widths: crossing.widths / width, slant, heights: heights * stretch, rate, ..crossing }
+            let slant = clock.waves(mapping.slant * rate, 0.0) / rate;
+            LayerMapping { widths: mapping.widths / width, slant, heights: heights * stretch, rate, ..mapping }
         };
-        Self { crossings: [fit(coarse), fit(fine)] }
+        Self { mappings: [fit(coarse), fit(fine)] }
     }
 
-    /// The texture scrolled by `scroll` sheet heights; `table` is [`FRACTAL`] or a filtered copy of it.
+    /// The texture after `scroll` sheet heights; `table` is [`FRACTAL`] or a filtered copy of it.
     pub(crate) fn at(&self, table: &Arc<TextureTable>, scroll: f64) -> Texture {
-        let layer = |crossing: &Crossing| {
-            let scroll = crossing.rate * scroll;
-            let column = math::reduce_phase(crossing.start[0] - crossing.slant * scroll);
-            let row = math::reduce_phase(crossing.start[1] - crossing.heights * scroll);
+        let layer = |mapping: &LayerMapping| {
+            let scroll = mapping.rate * scroll;
+            let column = math::reduce_phase(mapping.start[0] - mapping.slant * scroll);
+            let row = math::reduce_phase(mapping.start[1] - mapping.heights * scroll);
             let (columns, rows) = (COLUMNS as f64, ROWS as f64);
-            Layer {
-                columns: [
-                    (columns * crossing.widths) as f32,
-                    (columns * crossing.slant) as f32,
-                    columns as f32 * column,
-                ],
-                rows: [(rows * crossing.heights) as f32, rows as f32 * row],
+            TextureLayer {
+                columns: [(columns * mapping.widths) as f32, (columns * mapping.slant) as f32, columns as f32 * column],
+                rows: [(rows * mapping.heights) as f32, rows as f32 * row],
             }
         };
-        Texture::Mixed(table.clone(), [layer(&self.crossings[0]), layer(&self.crossings[1])])
+        Texture::Mixed(table.clone(), [layer(&self.mappings[0]), layer(&self.mappings[1])])
     }
 
-    /// Texels of the table in a sheet's height, of the finer layer.
+    /// Texels per sheet height, of the finer layer.
     pub(crate) fn texels_up(&self) -> f64 {
-        ROWS as f64 * self.crossings[1].heights
+        ROWS as f64 * self.mappings[1].heights
     }
 }
 
@@ -225,8 +223,8 @@ mod tests {
         }
         let total: usize = counts.iter().sum();
         for count in counts {
-            let share = count as f64 / total as f64;
-            assert!((0.06..0.15).contains(&share), "{counts:?}");
+            let frequency = count as f64 / total as f64;
+            assert!((0.06..0.15).contains(&frequency), "{counts:?}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! The gas as a texture: one wrapped table whose every entry holds the four corners of a bilinear look-up.
+//! The gas as a texture: a periodic table whose entries hold the four corners of a bilinear lookup.
 
 mod fractal;
 mod paper;
@@ -18,21 +18,21 @@ pub(crate) use paper::PaperLayer;
 pub(crate) const COLUMNS: usize = 256;
 /// Rows of a table, along q.
 pub(crate) const ROWS: usize = 512;
-/// The coarsest level of a table.
-pub(crate) const COARSEST: usize = 5;
+/// The coarsest filter level.
+pub(crate) const MAX_LEVEL: usize = 5;
 
 /// A periodic texture of [`ROWS`] x [`COLUMNS`] texels.
 ///
-/// An entry holds the texel, its right neighbour, the one above and the one above right, so that a look-up is one load.
+/// An entry holds the texel and its neighbors to the right, above, and above right, so that a bilinear lookup is one load.
 #[derive(Clone, Debug)]
 pub(crate) struct TextureTable {
     corners: Box<[[f32; 4]; ROWS * COLUMNS]>,
-    /// Texels of ever coarser tables, made when they are needed.
-    coarser: [OnceLock<Box<[f32]>>; COARSEST],
+    /// Texels of ever coarser levels, computed on demand.
+    coarser: [OnceLock<Box<[f32]>>; MAX_LEVEL],
 }
 
 impl TextureTable {
-    /// A table of the texels that `texel(row * COLUMNS + column)` gives.
+    /// A table of the texels `texels[row * COLUMNS + column]`.
     pub(crate) fn new(texels: &[f32]) -> Self {
         let at = |row: usize, column: usize| texels[(row % ROWS) * COLUMNS + column % COLUMNS];
         let corner = |i: usize| {
@@ -40,17 +40,17 @@ impl TextureTable {
             [at(row, column), at(row, column + 1), at(row + 1, column), at(row + 1, column + 1)]
         };
         let corners: Vec<[f32; 4]> = (0..ROWS * COLUMNS).map(corner).collect();
-        // The range above makes exactly the array's length.
+        // The range above has exactly the array's length.
         let corners = corners.into_boxed_slice().try_into().unwrap_or_else(|_| Box::new([[0.0; 4]; ROWS * COLUMNS]));
         Self { corners, coarser: Default::default() }
     }
 
-    /// The texels themselves, row after row.
+    /// The texels, row by row.
     pub(crate) fn texels(&self) -> Vec<f32> {
         self.corners.iter().map(|corner| corner[0]).collect()
     }
 
-    /// Bilinear look-ups at wrapped places, in texels.
+    /// Bilinear lookups at wrapped coordinates, in texels.
     #[inline(always)]
     pub(crate) fn sample<S: Simd>(&self, column: Lanes<S>, row: Lanes<S>) -> Lanes<S> {
         let (left, across) = wrap_split(column, COLUMNS as u32 - 1);
@@ -62,9 +62,9 @@ impl TextureTable {
         (high - low).fma(up, low)
     }
 
-    /// A bilinear look-up at one wrapped place of at least -2^16 texels.
+    /// One bilinear lookup at wrapped coordinates of at least -2^16 texels.
     fn bilinear(&self, column: f32, row: f32) -> f32 {
-        let split = |place: f32| (place.floor() as i32 as usize, place - place.floor());
+        let split = |coordinate: f32| (coordinate.floor() as i32 as usize, coordinate - coordinate.floor());
         let ((left, across), (below, up)) = (split(column), split(row));
         let [low_left, low_right, high_left, high_right] = self.corners[below % ROWS * COLUMNS + left % COLUMNS];
         let low = (low_right - low_left).fma(across, low_left);
@@ -72,72 +72,73 @@ impl TextureTable {
         (high - low).fma(up, low)
     }
 
-    /// A table a factor 2 coarser for each whole `level`, up to [`COARSEST`], blended between, still of the same size: for small sheets.
+    /// The table low-pass filtered by a factor of 2 per whole `level`, up to [`MAX_LEVEL`], blended between levels (trilinear); its
+    /// size is unchanged. For small sheets.
     pub(crate) fn filtered(&self, level: f32) -> Self {
-        let level = level.clamp(0.0, COARSEST as f32);
-        let whole = (level as usize).min(COARSEST - 1);
-        let mut texels = self.coarse(whole).to_vec();
-        smooth(&mut texels, 1 << whole, level - whole as f32);
+        let level = level.clamp(0.0, MAX_LEVEL as f32);
+        let whole = (level as usize).min(MAX_LEVEL - 1);
+        let mut texels = self.mip_level(whole).to_vec();
+        filter(&mut texels, 1 << whole, level - whole as f32);
         Self::new(&texels)
     }
 
-    /// The texels of a table `level` factors of 2 coarser, which are kept.
-    fn coarse(&self, level: usize) -> &[f32] {
+    /// The texels filtered by `level` factors of 2, which are cached.
+    fn mip_level(&self, level: usize) -> &[f32] {
         self.coarser[level].get_or_init(|| match level.checked_sub(1) {
             None => self.texels().into(),
             Some(finer) => {
-                let mut texels = self.coarse(finer).to_vec();
-                smooth(&mut texels, 1 << finer, 1.0);
+                let mut texels = self.mip_level(finer).to_vec();
+                filter(&mut texels, 1 << finer, 1.0);
                 texels.into()
             }
         })
     }
 }
 
-/// Blends each texel by `amount` with the binomial mean (1 2 1)/4 of texels `spacing` apart, in both directions.
-fn smooth(texels: &mut [f32], spacing: usize, amount: f32) {
+/// Blends each texel by `amount` with the binomial mean (1 2 1)/4 of texels `spacing` apart, along rows and columns.
+fn filter(texels: &mut [f32], spacing: usize, amount: f32) {
     let before = texels.to_vec();
-    dispatch!(Level::new(), _simd => smooth_across(&before, texels, spacing, amount));
+    dispatch!(Level::new(), _simd => filter_rows(&before, texels, spacing, amount));
     let before = texels.to_vec();
-    dispatch!(Level::new(), _simd => smooth_up(&before, texels, spacing, amount));
+    dispatch!(Level::new(), _simd => filter_columns(&before, texels, spacing, amount));
 }
 
 #[inline(always)]
-fn smooth_across(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
-    for (row, smooth) in before.chunks_exact(COLUMNS).zip(texels.chunks_exact_mut(COLUMNS)) {
+fn filter_rows(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
+    for (row, filtered) in before.chunks_exact(COLUMNS).zip(texels.chunks_exact_mut(COLUMNS)) {
         let wrapped = [&row[COLUMNS - spacing..], row, &row[..spacing]].concat();
-        blend(row, [&wrapped[2 * spacing..], &wrapped], amount, smooth);
+        blend(row, [&wrapped[2 * spacing..], &wrapped], amount, filtered);
     }
 }
 
 #[inline(always)]
-fn smooth_up(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
+fn filter_columns(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
     let row = |row: usize| &before[row % ROWS * COLUMNS..][..COLUMNS];
-    for (place, smooth) in texels.chunks_exact_mut(COLUMNS).enumerate() {
-        blend(row(place), [row(place + spacing), row(place + ROWS - spacing)], amount, smooth);
+    for (index, filtered) in texels.chunks_exact_mut(COLUMNS).enumerate() {
+        blend(row(index), [row(index + spacing), row(index + ROWS - spacing)], amount, filtered);
     }
 }
 
 #[inline(always)]
-fn blend(row: &[f32], [next, last]: [&[f32]; 2], amount: f32, smooth: &mut [f32]) {
+fn blend(row: &[f32], [next, last]: [&[f32]; 2], amount: f32, filtered: &mut [f32]) {
     let (row, next, last) = (&row[..COLUMNS], &next[..COLUMNS], &last[..COLUMNS]);
-    for (i, value) in smooth.iter_mut().enumerate() {
+    for (i, value) in filtered.iter_mut().enumerate() {
         let mean = 0.25 * (next[i] + last[i]) + 0.5 * row[i];
         *value = (mean - row[i]).fma(amount, row[i]);
     }
 }
 
-/// How texture coordinates (u, w) become columns and rows of the table at one moment.
+/// Mapping of texture coordinates (u, w) to columns and rows of the table at one time.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Layer {
-    /// Columns a unit of u, then of w, and where they begin.
+pub(crate) struct TextureLayer {
+    /// Columns per unit of u and of w, and the offset.
     pub(crate) columns: [f32; 3],
-    /// Rows a unit of w, and where they begin.
+    /// Rows per unit of w, and the offset.
     pub(crate) rows: [f32; 2],
 }
 
-impl Layer {
-    /// Looks up the layer at sixteen places.
+impl TextureLayer {
+    /// Looks up the layer at sixteen points.
     #[inline(always)]
     fn sample<S: Simd>(&self, table: &TextureTable, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
         let [across, slant, first] = self.columns;
@@ -146,30 +147,30 @@ impl Layer {
     }
 }
 
-/// A texture at one moment: T0(u, w), eq. (2).
+/// A texture at one time: T0(u, w), eq. (2).
 #[derive(Clone, Debug)]
 pub(crate) enum Texture {
-    /// The table as it is.
-    Single(Arc<TextureTable>, Layer),
-    /// Two layers, both evenly distributed over [0, 1], mixed so that their mixture is again.
-    Mixed(Arc<TextureTable>, [Layer; 2]),
+    /// One layer.
+    Single(Arc<TextureTable>, TextureLayer),
+    /// Two layers, each uniformly distributed over [0, 1], mixed so that the mixture is too.
+    Mixed(Arc<TextureTable>, [TextureLayer; 2]),
 }
 
 impl Texture {
-    /// Texels to a unit of u and of w, of the finer layer.
+    /// Texels per unit of u and of w, of the finer layer.
     #[inline(always)]
     pub(crate) fn texels(&self) -> [f32; 2] {
         let (Self::Single(_, fine) | Self::Mixed(_, [_, fine])) = self;
         [fine.columns[0].abs(), fine.rows[0].abs()]
     }
 
-    /// T0 at sixteen places; in [0, 1].
+    /// T0 at sixteen points; in [0, 1].
     #[inline(always)]
     pub(crate) fn sample<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
         match self {
             Self::Single(table, layer) => layer.sample(table, u, w),
-            Self::Mixed(table, [coarse, fine]) => {
-                fractal::mix_evenly(coarse.sample(table, u, w), fine.sample(table, u, w))
+            Self::Mixed(table, [mip_level, fine]) => {
+                fractal::mix_equalized(mip_level.sample(table, u, w), fine.sample(table, u, w))
             }
         }
     }

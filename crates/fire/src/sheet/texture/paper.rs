@@ -1,4 +1,4 @@
-//! The paper's texture, eq. (20), exactly, and as a table.
+//! The paper's texture, eq. (20), exactly and as a table.
 
 use std::{
     f64::consts::{FRAC_PI_2, PI},
@@ -7,19 +7,19 @@ use std::{
 
 use bansho_base::math::{self, MulAdd};
 
-use super::{COLUMNS, Layer, ROWS, Texture, TextureTable};
+use super::{COLUMNS, ROWS, Texture, TextureLayer, TextureTable};
 use crate::sheet::animate::clock::Clock;
 
-/// `Fx_0` of eq. (20), radians a unit of p.
-const FIRST_ACROSS: f64 = 16.0;
-/// `Fy_0` of eq. (20), radians a unit of q.
-const FIRST_UP: f64 = 26.0;
+/// `Fx_0` of eq. (20), radians per unit of p.
+const FIRST_FREQUENCY_P: f64 = 16.0;
+/// `Fy_0` of eq. (20), radians per unit of q.
+const FIRST_FREQUENCY_Q: f64 = 26.0;
 /// `C_{i+1} / C_i` of eq. (20).
 const AMPLITUDE_RATIO: f64 = 0.707;
 /// Period in p: that of `sin(Fx_0 x / 2)`.
-const PERIOD_ACROSS: f64 = PI / 4.0;
+const PERIOD_P: f64 = PI / 4.0;
 /// Period in q: that of `sin(Fy_0 y / 2)`.
-const PERIOD_UP: f64 = 2.0 * PI / 13.0;
+const PERIOD_Q: f64 = 2.0 * PI / 13.0;
 
 /// T(p, q) of eq. (20) with `octaves` terms, halved so that it lies in [0, 1] as eq. (2) demands.
 pub fn paper_texture(p: f64, q: f64, octaves: u32) -> f64 {
@@ -43,7 +43,7 @@ struct Octave {
 
 impl Octave {
     fn all(octaves: u32) -> impl Iterator<Item = Self> {
-        let first = Self { across: FIRST_ACROSS, up: FIRST_UP, weight: 1.0 };
+        let first = Self { across: FIRST_FREQUENCY_P, up: FIRST_FREQUENCY_Q, weight: 1.0 };
         let next = |octave: &Self| {
             let weight = octave.weight * AMPLITUDE_RATIO * AMPLITUDE_RATIO;
             Some(Self { across: 2.0 * octave.across, up: 2.0 * octave.up, weight })
@@ -51,28 +51,28 @@ impl Octave {
         std::iter::successors(Some(first), next).take(octaves as usize)
     }
 
-    /// The four functions of one coordinate, at `place`, whose products with those of the other make a term.
+    /// The four functions of one coordinate whose products with those of the other sum to a term.
     ///
-    /// With a = Fx x, b = Px(y), c = Fy y, d = Py(x): cos(a+b) cos(c+d) is the product of
-    /// (cos a cos b - sin a sin b) and (cos c cos d - sin c sin d), and a, d belong to x while b, c belong to y.
-    fn factors(place: f64, frequency: f64) -> [f64; 4] {
-        let (sin_own, cos_own) = math::sin_cos(frequency * place);
-        let (sin_phase, cos_phase) = math::sin_cos(FRAC_PI_2 * math::sin(0.5 * frequency * place));
+    /// With a = Fx x, b = Px(y), c = Fy y, d = Py(x): cos(a+b) cos(c+d) is the product of (cos a cos b - sin a sin b) and (cos c
+    /// cos d - sin c sin d), where a, d depend on x and b, c on y.
+    fn factors(coordinate: f64, frequency: f64) -> [f64; 4] {
+        let (sin_own, cos_own) = math::sin_cos(frequency * coordinate);
+        let (sin_phase, cos_phase) = math::sin_cos(FRAC_PI_2 * math::sin(0.5 * frequency * coordinate));
         [cos_own * cos_phase, cos_own * sin_phase, sin_own * cos_phase, sin_own * sin_phase]
     }
 }
 
-/// Eq. (20) over a grid, as products of row functions and column functions: four multiply-adds an octave and sample.
+/// Eq. (20) over a grid as products of row functions and column functions: four multiply-adds per octave and sample.
 #[derive(Clone, Debug)]
 pub struct PaperTexture {
-    /// For each octave and factor, its values over the columns, with the signs and weights in them.
+    /// For each octave and factor, its values over the columns, including signs and weights.
     across: Vec<Vec<f32>>,
     /// For each row, the values of each octave and factor.
     up: Vec<Vec<f32>>,
 }
 
 impl PaperTexture {
-    /// Row and column functions for `octaves` terms at the places `p` (columns) and `q` (rows).
+    /// Row and column functions of `octaves` terms at `p` (columns) and `q` (rows).
     pub fn new(p: &[f64], q: &[f64], octaves: u32) -> Self {
         let terms: Vec<Octave> = Octave::all(octaves).collect();
         let total: f64 = terms.iter().map(|octave| octave.weight).sum();
@@ -94,7 +94,7 @@ impl PaperTexture {
         Self { across: terms.iter().flat_map(column_factors).collect(), up: q.iter().map(row_factors).collect() }
     }
 
-    /// Writes row `row` over all columns; values in [0, 1].
+    /// Writes row `row` for all columns; values in [0, 1].
     #[inline(always)]
     pub fn fill_row(&self, row: usize, values: &mut [f32]) {
         values.fill(0.5);
@@ -113,7 +113,7 @@ impl PaperTexture {
     }
 }
 
-/// The paper's texture over one period as a table.
+/// One period of the paper's texture as a table.
 #[derive(Clone, Debug)]
 pub(crate) struct PaperLayer {
     table: Arc<TextureTable>,
@@ -123,22 +123,22 @@ pub(crate) struct PaperLayer {
 impl PaperLayer {
     /// The table of `octaves` terms.
     pub(crate) fn new(octaves: u32, clock: &Clock) -> Self {
-        let p: Vec<f64> = (0..COLUMNS).map(|i| PERIOD_ACROSS * i as f64 / COLUMNS as f64).collect();
-        let q: Vec<f64> = (0..ROWS).map(|i| PERIOD_UP * i as f64 / ROWS as f64).collect();
+        let p: Vec<f64> = (0..COLUMNS).map(|i| PERIOD_P * i as f64 / COLUMNS as f64).collect();
+        let q: Vec<f64> = (0..ROWS).map(|i| PERIOD_Q * i as f64 / ROWS as f64).collect();
         let texture = PaperTexture::new(&p, &q, octaves);
         let mut texels = vec![0.0; ROWS * COLUMNS];
         let level = fearless_simd::Level::new();
         fearless_simd::dispatch!(level, _simd => fill(&texture, &mut texels));
-        Self { table: Arc::new(TextureTable::new(&texels)), waves: clock.waves(1.0 / PERIOD_UP, 1.0) * PERIOD_UP }
+        Self { table: Arc::new(TextureTable::new(&texels)), waves: clock.waves(1.0 / PERIOD_Q, 1.0) * PERIOD_Q }
     }
 
-    /// The texture scrolled by `scroll` sheet heights, eq. (1).
+    /// The texture after `scroll` sheet heights, eq. (1).
     pub(crate) fn at(&self, scroll: f64) -> Texture {
-        let columns = (COLUMNS as f64 / PERIOD_ACROSS) as f32;
-        let rows = ROWS as f64 / PERIOD_UP;
-        // `waves` is 1 unless a loop needs the scroll to be a whole number of periods.
-        let offset = math::reduce_phase(-self.waves * scroll / PERIOD_UP) * ROWS as f32;
-        Texture::Single(self.table.clone(), Layer { columns: [columns, 0.0, 0.0], rows: [rows as f32, offset] })
+        let columns = (COLUMNS as f64 / PERIOD_P) as f32;
+        let rows = ROWS as f64 / PERIOD_Q;
+        // `waves` is 1 unless a loop requires a whole number of periods.
+        let offset = math::reduce_phase(-self.waves * scroll / PERIOD_Q) * ROWS as f32;
+        Texture::Single(self.table.clone(), TextureLayer { columns: [columns, 0.0, 0.0], rows: [rows as f32, offset] })
     }
 
     /// The same with the table filtered to `level`.
@@ -146,9 +146,9 @@ impl PaperLayer {
         Self { table: Arc::new(self.table.filtered(level)), waves: self.waves }
     }
 
-    /// Texels of the table in a sheet's height.
+    /// Texels per sheet height.
     pub(crate) fn texels_up(&self) -> f64 {
-        ROWS as f64 / PERIOD_UP
+        ROWS as f64 / PERIOD_Q
     }
 }
 
@@ -185,7 +185,7 @@ mod tests {
             let (p, q) = (f64::from(i) * 0.00137, f64::from(i) * 0.00791);
             let value = paper_texture(p, q, 5);
             assert!((0.0..=1.0).contains(&value));
-            assert!((paper_texture(p + PERIOD_ACROSS, q + PERIOD_UP, 5) - value).abs() < 1e-9);
+            assert!((paper_texture(p + PERIOD_P, q + PERIOD_Q, 5) - value).abs() < 1e-9);
         }
     }
 

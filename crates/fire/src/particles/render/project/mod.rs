@@ -1,4 +1,4 @@
-//! Particles as a lens sees them.
+//! Projection of particles to elliptical sprites.
 
 pub(crate) mod perspective;
 pub(crate) mod sprite;

@@ -1,4 +1,5 @@
-//! Sixteen particles at a time through a perspective lens: circles stay circles, so that a sprite's ellipse has a short closed form.
+//! Sixteen particles at a time through a perspective lens: the projection of a ball is close to a circle, so that its ellipse has a
+//! closed form.
 
 use bansho_base::{
     camera::{Camera, Lens},
@@ -6,7 +7,7 @@ use bansho_base::{
     phenomenon::strip::View,
 };
 
-use super::sprite::{Ellipse, FAR_OUT, FOOTPRINT, Kind, Seen};
+use super::sprite::{Ellipse, MAX_PIXEL_COORDINATE, PIXEL_FOOTPRINT, ProjectedParticle, SpriteKind};
 use crate::particles::render::{
     gas::Gas,
     splat::kernel::{LINE_PEAK, VARIANCE},
@@ -14,38 +15,38 @@ use crate::particles::render::{
 
 type Batch = [f32; LANES];
 
-/// A perspective camera now and at the next frame.
-pub(crate) struct Perspective {
-    now: Pinhole,
-    next: Pinhole,
-    /// Shutter time beside the time from frame to frame.
-    open_share: f32,
+/// A perspective camera at this frame and the next.
+pub(crate) struct PerspectiveProjector {
+    now: PinholeCamera,
+    next: PinholeCamera,
+    /// Exposure time as a fraction of the frame interval.
+    shutter_fraction: f32,
     size: [f32; 2],
 }
 
-/// Particles in the picture.
-struct Projected {
+/// Projected particles.
+struct ProjectedBatch {
     pixel: [Batch; 2],
     depth: Batch,
-    /// Pixels a metre.
+    /// Pixels per meter.
     scale: Batch,
 }
 
-impl Perspective {
-    /// `None` where the lens bends straight lines.
-    pub(crate) fn new(gas: &Gas, view: &View, next: &Camera, open_share: f64) -> Option<Self> {
-        let pinhole = |camera, t| Pinhole::new(camera, gas.particles.origin, t - gas.time);
+impl PerspectiveProjector {
+    /// `None` where the lens is not rectilinear.
+    pub(crate) fn new(gas: &Gas, view: &View, next: &Camera, shutter_fraction: f64) -> Option<Self> {
+        let pinhole = |camera, t| PinholeCamera::new(camera, gas.particles.origin, t - gas.time);
         (view.camera.lens == Lens::Perspective).then(|| Self {
             now: pinhole(&view.camera, view.shutter.middle()),
             next: pinhole(next, view.next_middle),
-            open_share: open_share as f32,
+            shutter_fraction: shutter_fraction as f32,
             size: view.camera.size.map(|side| side as f32),
         })
     }
 
-    /// Records the particles of `range` that are wanted and can be seen.
+    /// Records the particles of `range` that are included and visible.
     #[inline(always)]
-    pub(crate) fn see<K: Kind>(
+    pub(crate) fn project<K: SpriteKind>(
         &self,
         gas: &Gas,
         range: std::ops::Range<usize>,
@@ -54,23 +55,23 @@ impl Perspective {
     ) {
         let (mut chosen, mut count) = ([range.start; LANES], 0);
         for index in range {
-            if !kind.wants(index) {
+            if !kind.includes(index) {
                 continue;
             }
             chosen[count] = index;
             count += 1;
             if count == LANES {
-                self.see_batch(gas, &chosen, kind, records);
+                self.project_batch(gas, &chosen, kind, records);
                 count = 0;
             }
         }
         if count > 0 {
-            self.see_batch(gas, &chosen[..count], kind, records);
+            self.project_batch(gas, &chosen[..count], kind, records);
         }
     }
 
     #[inline(always)]
-    fn see_batch<K: Kind>(&self, gas: &Gas, chosen: &[usize], kind: &K, records: &mut Vec<K::Record>) {
+    fn project_batch<K: SpriteKind>(&self, gas: &Gas, chosen: &[usize], kind: &K, records: &mut Vec<K::Record>) {
         let (now, next) = (self.now.project(gas, chosen), self.next.project(gas, chosen));
         let mut motion = [[0.0; LANES]; 2];
         for axis in 0..2 {
@@ -81,19 +82,19 @@ impl Perspective {
         }
         let ellipses = self.ellipses(gas, chosen, &now, &motion);
         for (lane, &index) in chosen.iter().enumerate() {
-            let centre = [now.pixel[0][lane], now.pixel[1][lane]];
+            let center = [now.pixel[0][lane], now.pixel[1][lane]];
             let reach = [ellipses.reach[0][lane], ellipses.reach[1][lane]];
             let mut shown = now.depth[lane] >= self.now.near && ellipses.peak[lane] > 0.0;
             for axis in 0..2 {
-                shown &= centre[axis] + reach[axis] > 0.0 && centre[axis] - reach[axis] < self.size[axis];
-                shown &= centre[axis].abs() < FAR_OUT as f32;
+                shown &= center[axis] + reach[axis] > 0.0 && center[axis] - reach[axis] < self.size[axis];
+                shown &= center[axis].abs() < MAX_PIXEL_COORDINATE as f32;
             }
             if shown {
                 let shape = [ellipses.shape[0][lane], ellipses.shape[1][lane], ellipses.shape[2][lane]];
                 let (radius, peak) = (ellipses.radius[lane], ellipses.peak[lane]);
-                records.push(kind.record(&Seen {
+                records.push(kind.record(&ProjectedParticle {
                     index,
-                    ellipse: Ellipse { centre, shape, reach, radius, peak },
+                    ellipse: Ellipse { center, shape, reach, radius, peak },
                     depth: f64::from(now.depth[lane]),
                     motion: [motion[0][lane], motion[1][lane]],
                     scale: now.scale[lane],
@@ -102,20 +103,20 @@ impl Perspective {
         }
     }
 
-    /// Circles, smeared along their motion: the matrix `q + k b b^T`, b being the smear, has the eigenvalue q across it.
+    /// Circles blurred along their motion: the matrix `q + k b b^T` with the motion blur b has the eigenvalue q across it.
     #[inline(always)]
-    fn ellipses(&self, gas: &Gas, chosen: &[usize], now: &Projected, motion: &[Batch; 2]) -> Ellipses {
+    fn ellipses(&self, gas: &Gas, chosen: &[usize], now: &ProjectedBatch, motion: &[Batch; 2]) -> EllipseBatch {
         const SMEAR: f32 = (1.0 / (12.0 * VARIANCE)) as f32;
         let zero = [0.0; LANES];
         let mut radii = zero;
         for (radius, &index) in radii.iter_mut().zip(chosen) {
             *radius = gas.particles.support_radius[index];
         }
-        let mut ellipses = Ellipses { shape: [zero; 3], reach: [zero; 2], radius: zero, peak: zero };
+        let mut ellipses = EllipseBatch { shape: [zero; 3], reach: [zero; 2], radius: zero, peak: zero };
         for lane in 0..LANES {
             let ball = now.scale[lane] * radii[lane];
-            let across = ball.mul_add(ball, (FOOTPRINT / VARIANCE) as f32);
-            let (x, y) = (motion[0][lane] * self.open_share, motion[1][lane] * self.open_share);
+            let across = ball.mul_add(ball, (PIXEL_FOOTPRINT / VARIANCE) as f32);
+            let (x, y) = (motion[0][lane] * self.shutter_fraction, motion[1][lane] * self.shutter_fraction);
             let (xx, yy) = ((SMEAR * x).mul_add(x, across), (SMEAR * y).mul_add(y, across));
             let determinant = across * (across + SMEAR * x.mul_add(x, y * y));
             let inverse = 1.0 / determinant;
@@ -125,75 +126,75 @@ impl Perspective {
             ellipses.reach[0][lane] = xx.sqrt();
             ellipses.reach[1][lane] = yy.sqrt();
             ellipses.radius[lane] = across.sqrt();
-            // Only the part of a ball before the camera is seen.
-            let before = ((now.depth[lane] - self.now.near) / radii[lane]).clamp(0.0, 1.0);
-            let before = before * before * (3.0 - 2.0 * before);
-            let peak = LINE_PEAK as f32 * before * now.scale[lane] * now.scale[lane] / determinant.sqrt();
+            // Only the part of a ball in front of the camera is visible.
+            let in_front = ((now.depth[lane] - self.now.near) / radii[lane]).clamp(0.0, 1.0);
+            let in_front = in_front * in_front * (3.0 - 2.0 * in_front);
+            let peak = LINE_PEAK as f32 * in_front * now.scale[lane] * now.scale[lane] / determinant.sqrt();
             ellipses.peak[lane] = if determinant < f32::MAX { peak } else { 0.0 };
         }
         ellipses
     }
 }
 
-struct Ellipses {
+struct EllipseBatch {
     shape: [Batch; 3],
     reach: [Batch; 2],
     radius: Batch,
     peak: Batch,
 }
 
-/// A perspective camera beside the place from which particles count.
-struct Pinhole {
-    /// Right, up and backward in the world.
+/// A perspective camera relative to the particles' origin.
+struct PinholeCamera {
+    /// Right, up and backward in world axes.
     axes: [[f32; 3]; 3],
-    /// The particles' origin in the camera's frame, m.
+    /// The particles' origin in camera space, m.
     origin: [f32; 3],
     focal_pixels: f32,
-    centre: [f32; 2],
+    center: [f32; 2],
     near: f32,
-    /// Time from the particles' state, s.
+    /// Time since the particles' state, s.
     since: f32,
 }
 
-impl Pinhole {
+impl PinholeCamera {
     fn new(camera: &Camera, origin: DVec3, since: f64) -> Self {
         let axis = |i: usize| camera.orientation.col(i).as_vec3().to_array();
         Self {
             axes: [axis(0), axis(1), axis(2)],
             origin: camera.to_camera(origin).as_vec3().to_array(),
             focal_pixels: camera.focal_pixels as f32,
-            centre: camera.centre.as_vec2().to_array(),
+            center: camera.centre.as_vec2().to_array(),
             near: camera.near as f32,
             since: since as f32,
         }
     }
 
     #[inline(always)]
-    fn project(&self, gas: &Gas, chosen: &[usize]) -> Projected {
-        let mut places = [[0.0; LANES]; 3];
+    fn project(&self, gas: &Gas, chosen: &[usize]) -> ProjectedBatch {
+        let mut positions = [[0.0; LANES]; 3];
         for axis in 0..3 {
             let (position, velocity) = (&gas.particles.position[axis], &gas.particles.velocity[axis]);
-            for (place, &index) in places[axis].iter_mut().zip(chosen) {
-                *place = self.since.mul_add(velocity[index], position[index]);
+            for (moved, &index) in positions[axis].iter_mut().zip(chosen) {
+                *moved = self.since.mul_add(velocity[index], position[index]);
             }
         }
         let mut local = [[0.0; LANES]; 3];
         for i in 0..3 {
             let [x, y, z] = self.axes[i];
             for lane in 0..LANES {
-                let across = x.mul_add(places[0][lane], self.origin[i]);
-                local[i][lane] = z.mul_add(places[2][lane], y.mul_add(places[1][lane], across));
+                let across = x.mul_add(positions[0][lane], self.origin[i]);
+                local[i][lane] = z.mul_add(positions[2][lane], y.mul_add(positions[1][lane], across));
             }
         }
         let zero = [0.0; LANES];
-        let mut projected = Projected { pixel: [zero; 2], depth: zero, scale: zero };
+        let mut projected = ProjectedBatch { pixel: [zero; 2], depth: zero, scale: zero };
         for lane in 0..LANES {
             let depth = -local[2][lane];
             let scale = self.focal_pixels / depth;
             projected.depth[lane] = depth;
             projected.scale[lane] = scale;
-            projected.pixel[0][lane] = scale.mul_add(local[0][lane], self.centre[0]);
-            projected.pixel[1][lane] = scale.mul_add(-local[1][lane], self.centre[1]);
+            projected.pixel[0][lane] = scale.mul_add(local[0][lane], self.center[0]);
+            projected.pixel[1][lane] = scale.mul_add(-local[1][lane], self.center[1]);
         }
         projected
     }

@@ -1,4 +1,4 @@
-//! From particles to what the picture sees of them: ellipses of falling weight.
+//! Projection of particles to elliptical sprites, for every lens.
 
 use bansho_base::{
     camera::{Camera, Lens, Projection},
@@ -6,108 +6,111 @@ use bansho_base::{
     phenomenon::strip::View,
 };
 
-use super::perspective::Perspective;
+use super::perspective::PerspectiveProjector;
+use crate::particles::render::splat::scratch_pool::PooledVec;
 use crate::particles::render::{
     gas::Gas,
-    prepared::PARTICLES_OF_TASK,
-    splat::{
-        buffers::Recycled,
-        kernel::{LINE_PEAK, VARIANCE},
-    },
+    prepared::PARTICLES_PER_TASK,
+    splat::kernel::{LINE_PEAK, VARIANCE},
 };
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-/// An ellipse around a place in the picture: `q = a u^2 + 2 b u v + c v^2` is 1 on its edge.
+/// An ellipse in the picture: `q = a u^2 + 2 b u v + c v^2` is 1 at its edge.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ellipse {
-    /// Pixels from the picture's left and top edges.
-    pub(crate) centre: [f32; 2],
+    /// Center, pixels from the picture's top left corner.
+    pub(crate) center: [f32; 2],
     /// a, b and c, 1/pixel^2.
     pub(crate) shape: [f32; 3],
-    /// How far it reaches sideways and upright, pixels.
+    /// Half extents of its bounding box, pixels.
     pub(crate) reach: [f32; 2],
-    /// Half its shorter axis, pixels.
+    /// Semi-minor axis, pixels.
     pub(crate) radius: f32,
-    /// What a ray through the middle sees of a particle of one cubic metre that absorbs 1/m.
+    /// Line integral through the center, for a particle of 1 m^3 with an absorption coefficient of 1/m.
     pub(crate) peak: f32,
 }
 
-/// A particle in the picture.
+/// A projected particle.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen {
+pub(crate) struct ProjectedParticle {
     pub(crate) index: usize,
     pub(crate) ellipse: Ellipse,
     pub(crate) depth: f64,
-    /// Pixels to the right and down that it moves until the next frame.
+    /// Motion until the next frame, pixels to the right and down.
     pub(crate) motion: [f32; 2],
-    /// Pixels a metre.
+    /// Pixels per meter.
     pub(crate) scale: f32,
 }
 
-/// Sprites further out than this are of no picture, pixels.
-pub(crate) const FAR_OUT: f64 = 1e6;
+/// Sprites with coordinates beyond this are discarded, pixels.
+pub(crate) const MAX_PIXEL_COORDINATE: f64 = 1e6;
 
-/// A pixel's own footprint as the variance of a sprite: sprites are widened by it, so that the smallest neither flicker nor vanish.
-pub(crate) const FOOTPRINT: f64 = 0.18;
+/// Variance of a pixel's footprint, pixels^2, that is added to every sprite (as in EWA splatting), so that the smallest neither
+/// flicker nor vanish.
+pub(crate) const PIXEL_FOOTPRINT: f64 = 0.18;
 
-/// Which particles are drawn, and as what.
-pub(crate) trait Kind: Sync {
+/// Which particles become sprites, and what is recorded of each.
+pub(crate) trait SpriteKind: Sync {
     type Record: Send + 'static;
-    fn wants(&self, index: usize) -> bool;
-    fn record(&self, seen: &Seen) -> Self::Record;
+    fn includes(&self, index: usize) -> bool;
+    fn record(&self, projected: &ProjectedParticle) -> Self::Record;
 }
 
-/// The records of all particles that a view can see, in their own order, task by task.
-pub(crate) fn seen<'a, K: Kind>(gas: &Gas<'a>, view: &View, kind: &K) -> Vec<Recycled<'a, K::Record>> {
-    let eye = Eye::new(view);
-    let perspective = Perspective::new(gas, view, &eye.next, eye.open_share);
+/// Records of all particles that a view sees, in order, one list per task.
+pub(crate) fn project_particles<'a, K: SpriteKind>(
+    gas: &Gas<'a>,
+    view: &View,
+    kind: &K,
+) -> Vec<PooledVec<'a, K::Record>> {
+    let projector = ParticleProjector::new(view);
+    let perspective = PerspectiveProjector::new(gas, view, &projector.next, projector.shutter_fraction);
     let (count, level) = (gas.particles.len(), Level::new());
     let of_task = |task: usize| {
-        let range = task * PARTICLES_OF_TASK..((task + 1) * PARTICLES_OF_TASK).min(count);
-        let mut records = gas.memory.list(PARTICLES_OF_TASK);
+        let range = task * PARTICLES_PER_TASK..((task + 1) * PARTICLES_PER_TASK).min(count);
+        let mut records = gas.scratch.take(PARTICLES_PER_TASK);
         records.clear();
         match &perspective {
             Some(perspective) => {
-                dispatch!(level, _simd => perspective.see(gas, range.clone(), kind, &mut records));
+                dispatch!(level, _simd => perspective.project(gas, range.clone(), kind, &mut records));
             }
             None => {
-                for index in range.filter(|index| kind.wants(*index)) {
-                    eye.see(gas, index, |seen| records.push(kind.record(&seen)));
+                for index in range.filter(|index| kind.includes(*index)) {
+                    projector.project(gas, index, |projected| records.push(kind.record(&projected)));
                 }
             }
         }
         records
     };
-    (0..count.div_ceil(PARTICLES_OF_TASK)).into_par_iter().map(of_task).collect()
+    (0..count.div_ceil(PARTICLES_PER_TASK)).into_par_iter().map(of_task).collect()
 }
 
-/// The camera now and at the next frame.
-struct Eye<'a> {
+/// The camera at this frame and the next.
+struct ParticleProjector<'a> {
     view: &'a View,
     next: Camera,
-    /// Shutter time beside the time from frame to frame.
-    open_share: f64,
+    /// Exposure time as a fraction of the frame interval.
+    shutter_fraction: f64,
 }
 
-impl<'a> Eye<'a> {
+impl<'a> ParticleProjector<'a> {
     fn new(view: &'a View) -> Self {
         let frame = (view.next_middle - view.shutter.middle()).max(1e-9);
-        Self { view, next: view.camera_at(view.next_middle), open_share: view.shutter.duration() / frame }
+        Self { view, next: view.camera_at(view.next_middle), shutter_fraction: view.shutter.duration() / frame }
     }
 
-    /// Hands a particle to `each`, twice where a panorama's seam cuts it.
+    /// Projects a particle and passes it to `each`; twice where it crosses the seam of a panorama.
     #[inline(always)]
-    fn see(&self, gas: &Gas, index: usize, mut each: impl FnMut(Seen)) {
-        let place = gas.place(index, self.view.shutter.middle());
+    fn project(&self, gas: &Gas, index: usize, mut each: impl FnMut(ProjectedParticle)) {
+        let position = gas.position(index, self.view.shutter.middle());
         let camera = &self.view.camera;
-        let Some(first) = camera.project(place) else { return };
-        let after = self.next.project(gas.place(index, self.view.next_middle));
+        let Some(first) = camera.project(position) else { return };
+        let after = self.next.project(gas.position(index, self.view.next_middle));
         let motion = after.map_or(DVec2::ZERO, |after| across_seam(camera, after.pixel - first.pixel));
         let mut at = |projection: Projection| {
-            if let Some(ellipse) = self.ellipse(gas, index, place, &projection, motion * self.open_share) {
+            if let Some(ellipse) = self.ellipse(gas, index, position, &projection, motion * self.shutter_fraction) {
                 let (depth, scale) = (projection.depth, projection.pixels_per_metre as f32);
-                each(Seen { index, ellipse, depth, motion: motion.as_vec2().to_array(), scale });
+                each(ProjectedParticle { index, ellipse, depth, motion: motion.as_vec2().to_array(), scale });
             }
         };
         at(first);
@@ -118,15 +121,23 @@ impl<'a> Eye<'a> {
         }
     }
 
-    /// The ellipse of a ball seen at `projection` that moves by `blur` pixels while the shutter is open.
+    /// The ellipse of a ball at `projection` with a motion blur of `blur` pixels.
     ///
-    /// A box of that length, and the pixel's footprint, widen the sprite to the same variance; what it holds stays the same.
-    fn ellipse(&self, gas: &Gas, index: usize, place: DVec3, projection: &Projection, blur: DVec2) -> Option<Ellipse> {
+    /// The sprite is widened by the variance of a box of that length and of the pixel's footprint; its integral is unchanged.
+    fn ellipse(
+        &self,
+        gas: &Gas,
+        index: usize,
+        position: DVec3,
+        projection: &Projection,
+        blur: DVec2,
+    ) -> Option<Ellipse> {
         let camera = &self.view.camera;
         let radius = f64::from(gas.particles.support_radius[index]);
-        let lens = lens_matrix(camera, place, projection);
+        let lens = lens_jacobian(camera, position, projection);
         let ball = lens * lens.transpose() * (radius * radius);
-        let smear = outer(blur) * (1.0 / (12.0 * VARIANCE)) + DMat2::from_diagonal(DVec2::splat(FOOTPRINT / VARIANCE));
+        let smear =
+            outer(blur) * (1.0 / (12.0 * VARIANCE)) + DMat2::from_diagonal(DVec2::splat(PIXEL_FOOTPRINT / VARIANCE));
         let matrix = ball + smear;
         let (trace, determinant) = (matrix.x_axis.x + matrix.y_axis.y, matrix.determinant());
         if !(determinant > 0.0 && determinant.is_finite()) {
@@ -136,15 +147,15 @@ impl<'a> Eye<'a> {
         let least = 0.5 * trace - (0.25 * trace * trace - determinant).max(0.0).sqrt();
         let reach = DVec2::new(matrix.x_axis.x.sqrt(), matrix.y_axis.y.sqrt());
         let size = DVec2::new(camera.size[0], camera.size[1]);
-        let centre = projection.pixel;
-        let shown = (centre + reach).cmpgt(DVec2::ZERO).all() && (centre - reach).cmplt(size).all();
-        if !(shown && centre.abs().max_element() < FAR_OUT) {
+        let center = projection.pixel;
+        let shown = (center + reach).cmpgt(DVec2::ZERO).all() && (center - reach).cmplt(size).all();
+        if !(shown && center.abs().max_element() < MAX_PIXEL_COORDINATE) {
             return None;
         }
-        let before = in_front(projection.depth, camera.near, radius);
-        let peak = LINE_PEAK * before * lens.determinant().abs() / determinant.sqrt();
+        let in_front = in_front(projection.depth, camera.near, radius);
+        let peak = LINE_PEAK * in_front * lens.determinant().abs() / determinant.sqrt();
         (peak > 0.0).then_some(Ellipse {
-            centre: centre.as_vec2().to_array(),
+            center: center.as_vec2().to_array(),
             shape: [inverse.x_axis.x, inverse.x_axis.y, inverse.y_axis.y].map(|value| value as f32),
             reach: reach.as_vec2().to_array(),
             radius: least.max(0.0).sqrt() as f32,
@@ -153,12 +164,12 @@ impl<'a> Eye<'a> {
     }
 }
 
-/// The share of a ball that lies before the camera, where it stands within the ball.
+/// Fraction of a ball in front of the camera, where the camera is inside the ball.
 fn in_front(depth: f64, near: f64, radius: f64) -> f64 {
     bansho_base::math::smoothstep(near, near + radius, depth)
 }
 
-/// A step across a panorama's seam is taken the short way.
+/// The shorter way around a panorama.
 fn across_seam(camera: &Camera, step: DVec2) -> DVec2 {
     if camera.lens != Lens::Panorama {
         return step;
@@ -171,28 +182,28 @@ fn outer(v: DVec2) -> DMat2 {
     DMat2::from_cols(v * v.x, v * v.y)
 }
 
-/// Pixels to the right and down for a metre across the line of sight: alike in all directions for a perspective lens; the others
-/// stretch circles, by how far two short steps from the place come.
-fn lens_matrix(camera: &Camera, place: DVec3, projection: &Projection) -> DMat2 {
+/// Jacobian of the projection: pixels to the right and down per meter across the line of sight. A multiple of the identity for a
+/// perspective lens, by finite differences for others.
+fn lens_jacobian(camera: &Camera, position: DVec3, projection: &Projection) -> DMat2 {
     let round = DMat2::from_diagonal(DVec2::new(projection.pixels_per_metre, -projection.pixels_per_metre));
     if camera.lens == Lens::Perspective {
         return round;
     }
-    let ray = (place - camera.position).normalize_or(DVec3::Z);
+    let ray = (position - camera.position).normalize_or(DVec3::Z);
     let (one, two) = ray.any_orthonormal_pair();
     let step = 1e-4 * projection.depth;
     let moved = |direction: DVec3| {
-        let seen = camera.project(place + direction * step)?;
+        let seen = camera.project(position + direction * step)?;
         Some(across_seam(camera, seen.pixel - projection.pixel) / step)
     };
     match (moved(one), moved(two)) {
-        (Some(one), Some(two)) => limited(DMat2::from_cols(one, two), projection.pixels_per_metre),
+        (Some(one), Some(two)) => limit_anisotropy(DMat2::from_cols(one, two), projection.pixels_per_metre),
         _ => round,
     }
 }
 
-/// At a panorama's poles circles become bands; beyond this stretch the sprite stays as it is.
-fn limited(matrix: DMat2, scale: f64) -> DMat2 {
+/// Limits the anisotropy of sprites near a panorama's poles.
+fn limit_anisotropy(matrix: DMat2, scale: f64) -> DMat2 {
     const MOST: f64 = 40.0;
     let longest = matrix.x_axis.length().max(matrix.y_axis.length());
     if longest > MOST * scale { matrix * (MOST * scale / longest) } else { matrix }
@@ -208,22 +219,20 @@ mod tests {
     };
 
     use super::*;
-    use crate::particles::{
-        Particle, Particles,
-        render::{gas::Ending, splat::buffers::Memory},
-    };
+    use crate::particles::render::splat::scratch_pool::ScratchPool;
+    use crate::particles::{Particle, Particles, render::gas::FadeOut};
 
     struct Everything;
 
-    impl Kind for Everything {
-        type Record = Seen;
+    impl SpriteKind for Everything {
+        type Record = ProjectedParticle;
 
-        fn wants(&self, _index: usize) -> bool {
+        fn includes(&self, _index: usize) -> bool {
             true
         }
 
-        fn record(&self, seen: &Seen) -> Seen {
-            *seen
+        fn record(&self, projected: &ProjectedParticle) -> ProjectedParticle {
+            *projected
         }
     }
 
@@ -238,11 +247,11 @@ mod tests {
         };
         let view = View::new(camera, Shutter { open: 1.0, close: 1.02 }, 1.04, [320, 180], 0);
         let mut particles = Particles::new(DVec3::new(0.1, -0.2, 0.05));
-        for birth in 0..333 {
-            let random = Key::new(5, "seen").uniforms(birth, 0, Purpose::named("place")).map(|u| 4.0 * (u - 0.5));
+        for id in 0..333 {
+            let random = Key::new(5, "seen").uniforms(id, 0, Purpose::named("place")).map(|u| 4.0 * (u - 0.5));
             let [x, y, z, w] = random;
             particles.push(Particle {
-                birth,
+                id,
                 position: [x, y, z],
                 velocity: [3.0 * w, 2.0 * x, y],
                 mass: 1e-4,
@@ -250,7 +259,7 @@ mod tests {
                 temperature: 1700.0,
                 support_radius: 0.05 + 0.04 * w.abs(),
                 age: 0.1,
-                life: 1.0,
+                max_age: 1.0,
                 fuel: 0.5,
                 soot: 1e-7,
             });
@@ -263,13 +272,13 @@ mod tests {
             base: DVec3::ZERO,
             size: DVec2::ONE,
             key: Key::new(1, "flame"),
-            ending: Ending::NEVER,
-            memory: &Memory::default(),
+            fade_out: FadeOut::NEVER,
+            scratch: &ScratchPool::default(),
         };
-        let (eye, mut one_by_one) = (Eye::new(&view), Vec::new());
-        (0..particles.len()).for_each(|index| eye.see(&gas, index, |seen| one_by_one.push(seen)));
-        let seen = seen(&gas, &view, &Everything);
-        let together: Vec<Seen> = seen.iter().flat_map(|task| task.iter().copied()).collect();
+        let (projector, mut one_by_one) = (ParticleProjector::new(&view), Vec::new());
+        (0..particles.len()).for_each(|index| projector.project(&gas, index, |projected| one_by_one.push(projected)));
+        let projected = project_particles(&gas, &view, &Everything);
+        let together: Vec<ProjectedParticle> = projected.iter().flat_map(|task| task.iter().copied()).collect();
         assert!(one_by_one.len() > 40 && one_by_one.len() < 300, "{}", one_by_one.len());
         assert_eq!(together.len(), one_by_one.len());
         for (a, b) in together.iter().zip(&one_by_one) {
@@ -279,7 +288,7 @@ mod tests {
             assert!((a.depth - b.depth).abs() < 1e-5 && near(a.scale, b.scale, 1e-5));
             assert!(near(e.radius, f.radius, 1e-5) && (e.peak / f.peak - 1.0).abs() < 1e-3, "{e:?} {f:?}");
             for axis in 0..2 {
-                assert!(near(e.centre[axis], f.centre[axis], 1e-5) && near(e.reach[axis], f.reach[axis], 1e-5));
+                assert!(near(e.center[axis], f.center[axis], 1e-5) && near(e.reach[axis], f.reach[axis], 1e-5));
                 assert!(near(a.motion[axis], b.motion[axis], 1e-4), "{a:?} {b:?}");
             }
             assert!((0..3).all(|i| (e.shape[i] - f.shape[i]).abs() < 1e-4 * f.shape[0].max(f.shape[2])), "{e:?} {f:?}");

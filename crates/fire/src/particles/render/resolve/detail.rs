@@ -1,179 +1,187 @@
-//! Detail finer than the particles: where within a particle's reach gas burns, and where it does not.
+//! Detail finer than the particles: intermittency of burning.
 //!
-//! Sums over particles are as smooth as their kernels; a flame is not. At its edge, turbulent gas burns now here, now not
-//! (intermittency), in sheets with sharp rims. So the smooth optical depth tau is redistributed: a share gamma of the place burns, with
-//! the optical depth tau / gamma, the rest not at all. Which share does, fractal noise decides, which is carried in the gas's own
-//! coordinates and is stretched as the gas is. Over many places the mean stays tau, and with it the light of the exact sum.
+//! Sums over particles are as smooth as their kernels; a flame is not. In turbulent gas burning is intermittent, with sharp edges.
+//! The smooth optical depth tau is therefore redistributed: a fraction gamma of the area burns with the optical depth tau / gamma,
+//! the rest not at all. Fractal noise decides which, in Lagrangian coordinates, so that it is advected and stretched with the gas.
+//! The mean over area stays tau, and with it the mean light.
 
 use bansho_base::{
     math::{self, approximations, random::Purpose},
     noise::{Coordinate, Fractal, LANES, Noise, VARIANCE},
 };
 
-use crate::particles::{look_parameters::LookParameters, render::gas::Gas};
+use crate::particles::parameters::LookParameters;
+use crate::particles::render::gas::Gas;
 
-/// A sigmoid of slope 1 is the distribution of noise of this standard deviation: pi / sqrt(3).
+/// Standard deviation of the logistic distribution, pi / sqrt(3): its CDF is a sigmoid of slope 1.
 const LOGISTIC: f32 = 1.813_799_4;
-/// Optical depth, in particles, beyond which gas burns no more densely: even cores have gaps.
-const FULLEST: f32 = 2.5;
-/// Mean number of particles in the line of sight at which half of the place burns.
-const HALF_BURNING: f64 = 0.42;
-/// By how much more detail extends upward than sideways around a lone particle.
-const UPRIGHT: f64 = 0.45;
-/// How much hotter, as a share, gas looks where it burns most. Its luminance stays.
-const HEAT: f32 = 0.03;
+/// Optical depth, in particles, at which the burning fraction saturates: dense cores keep gaps.
+const MAX_DEPTH_PARTICLES: f32 = 2.5;
+/// Mean number of particles along the line of sight at which half of the area burns.
+const MEAN_PARTICLES_HALF_BURNING: f64 = 0.42;
+/// Scale of detail along the vertical relative to the horizontal.
+const VERTICAL_SCALE: f64 = 0.45;
+/// Relative increase of temperature where gas burns most. Its luminance is unchanged.
+const TEMPERATURE_VARIATION: f32 = 0.03;
 
 /// Detail of one flame in one frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Detail {
     noise: Noise<3>,
-    /// 1 over the standard deviation of the noise, times [`LOGISTIC`].
+    /// [`LOGISTIC`] divided by the standard deviation of the noise.
     steepness: f32,
-    /// Cells a metre along x, y and z.
-    pub(crate) cells_per_metre: [f32; 3],
-    /// Cells a second that the noise moves upward.
+    /// Noise cells per meter along x, y and z.
+    pub(crate) cells_per_meter: [f32; 3],
+    /// Noise cells per second by which the noise moves upward.
     rate: f64,
-    /// Where the noise begins at the time of this frame.
+    /// Origin of the noise at the time of the frame.
     base: [Coordinate; 3],
-    /// How far the noise moves while the shutter is open, cells.
+    /// Displacement of the noise while the shutter is open, cells.
     shift: [f32; 3],
-    /// Moments that are averaged while the shutter is open.
-    moments: usize,
-    /// 1 / optical depth at which half of the place burns.
-    per_depth: f32,
-    /// 1 / width of the transition between burning and not.
+    /// Time samples that are averaged over the exposure.
+    time_samples: usize,
+    /// 1 / optical depth at which half of the area burns.
+    inverse_half_depth: f32,
+    /// 1 / width of the transition between burning and not burning.
     sharpness: f32,
-    /// Exponent that keeps the mean in spite of that width.
-    keep: f32,
+    /// Exponent that preserves the mean for that width.
+    mean_exponent: f32,
     amount: f32,
-    /// Size of a cell of the noise, pixels.
+    /// Size of a noise cell, pixels.
     pub(crate) cell_pixels: f32,
 }
 
-/// Burning gas at sixteen places.
-pub(crate) struct Burning {
-    /// By what the optical depth is multiplied.
+/// Factors that detail applies at sixteen pixels.
+pub(crate) struct DetailFactors {
+    /// Factor of the optical depth.
     pub(crate) depth: [f32; LANES],
-    /// By what the temperature is multiplied.
+    /// Factor of the temperature.
     pub(crate) heat: [f32; LANES],
 }
 
-/// The view of the gas as detail sees it.
-pub(crate) struct Scale {
-    /// Typical support radius, m.
+/// Scales of the gas as seen by a view, from which detail follows.
+pub(crate) struct DetailScale {
+    /// Mean support radius, m.
     pub(crate) radius: f64,
-    /// Typical absorption coefficient, 1/m.
+    /// Mean absorption coefficient, 1/m.
     pub(crate) absorption: f64,
-    /// Pixels a metre.
-    pub(crate) pixels_per_metre: f64,
+    /// Pixels per meter.
+    pub(crate) pixels_per_meter: f64,
     /// Time at the middle of the exposure, s.
     pub(crate) time: f64,
-    /// How long the shutter is open, s.
-    pub(crate) open: f64,
-    /// How far what stands still moves before the camera while the shutter is open, m in the world.
-    pub(crate) sway: [f64; 3],
+    /// Exposure time, s.
+    pub(crate) exposure_s: f64,
+    /// Apparent motion of a static point while the shutter is open, m in world axes.
+    pub(crate) camera_motion: [f64; 3],
 }
 
 impl Detail {
     /// The detail of a flame; `None` where there is none to add.
-    pub(crate) fn new(gas: &Gas, look: &LookParameters, scale: &Scale) -> Option<Self> {
+    pub(crate) fn new(gas: &Gas, look: &LookParameters, scale: &DetailScale) -> Option<Self> {
         if look.detail <= 0.0 || !(scale.radius > 0.0 && scale.absorption > 0.0) {
             return None;
         }
         let size = look.detail_size * scale.radius;
-        let octaves = (math::log2(size * scale.pixels_per_metre / 2.5).floor() as i64 + 1).clamp(1, 4) as u32;
+        let octaves = (math::log2(size * scale.pixels_per_meter / 2.5).floor() as i64 + 1).clamp(1, 4) as u32;
         let fractal = Fractal { octaves, lacunarity: 2, gain: 0.55 };
         let words = gas.key.words(0, 0, Purpose::named("detail"));
         let noise = Noise::new(words[0], fractal, [0; 3]).ok()?;
-        let cells_per_metre = [1.0 / size, UPRIGHT / size, 1.0 / size];
+        let cells_per_meter = [1.0 / size, VERTICAL_SCALE / size, 1.0 / size];
         let rate = gas.detail_speed / size;
-        let moved = rate * scale.time;
+        let scrolled = rate * scale.time;
         let shift: [f64; 3] = std::array::from_fn(|axis| {
-            cells_per_metre[axis] * scale.sway[axis] - if axis == 1 { rate * scale.open } else { 0.0 }
+            cells_per_meter[axis] * scale.camera_motion[axis] - if axis == 1 { rate * scale.exposure_s } else { 0.0 }
         });
         let length = shift.iter().map(|s| s * s).sum::<f64>().sqrt() * f64::from(1 << (octaves - 1));
         let softness = math::lerp(1.6, 0.16, look.sharpness);
         Some(Self {
             steepness: LOGISTIC / deviation(&fractal),
             noise,
-            cells_per_metre: cells_per_metre.map(|cells| cells as f32),
+            cells_per_meter: cells_per_meter.map(|cells| cells as f32),
             rate,
-            base: [0.0, -moved, 0.0].map(Coordinate::from_f64),
+            base: [0.0, -scrolled, 0.0].map(Coordinate::from_f64),
             shift: shift.map(|s| s as f32),
-            moments: length.round().clamp(1.0, 6.0) as usize,
-            per_depth: (1.0 / (HALF_BURNING * scale.absorption * scale.radius)) as f32,
+            time_samples: length.round().clamp(1.0, 6.0) as usize,
+            inverse_half_depth: (1.0 / (MEAN_PARTICLES_HALF_BURNING * scale.absorption * scale.radius)) as f32,
             sharpness: (1.0 / softness) as f32,
-            keep: (1.0 / (1.0 + softness * softness).sqrt()) as f32,
+            mean_exponent: (1.0 / (1.0 + softness * softness).sqrt()) as f32,
             amount: look.detail as f32,
-            cell_pixels: (size * scale.pixels_per_metre) as f32,
+            cell_pixels: (size * scale.pixels_per_meter) as f32,
         })
     }
 
-    /// Where in the noise particle `index` lies beyond what its place says, cells: the place at which it was born and the time since.
+    /// Offset of particle `index` in the noise relative to its position, cells: its displacement since it was spawned, and its age.
     #[inline(always)]
-    pub(crate) fn matter(&self, gas: &Gas, index: usize, since: f64) -> [f32; 3] {
+    pub(crate) fn detail_offset(&self, gas: &Gas, index: usize, since: f64) -> [f32; 3] {
         let particles = gas.particles;
-        let mut matter = [0.0; 3];
+        let mut detail_offset = [0.0; 3];
         for axis in 0..3 {
             let now = (since as f32).mul_add(particles.velocity[axis][index], particles.position[axis][index]);
-            matter[axis] = (particles.birthplace[axis][index] - now) * self.cells_per_metre[axis];
+            detail_offset[axis] = (particles.spawn_point[axis][index] - now) * self.cells_per_meter[axis];
         }
         let age = f64::from(particles.age[index]) + since;
-        matter[1] += (self.rate * age) as f32;
-        matter
+        detail_offset[1] += (self.rate * age) as f32;
+        detail_offset
     }
 
-    /// Whether so little gas is at sixteen places that detail could not be seen in it.
+    /// Whether the optical depth at sixteen pixels is too small for detail to be visible.
     #[inline(always)]
-    pub(crate) fn is_lost(&self, tau: &[f32; LANES]) -> bool {
-        /// Optical depth beside that at which half of the place burns; even the densest noise leaves this dark.
-        const LITTLE: f32 = 2e-4;
+    pub(crate) fn is_negligible(&self, tau: &[f32; LANES]) -> bool {
+        /// Optical depth, relative to that at which half of the area burns, that stays dark even at peaks of the noise.
+        const NEGLIGIBLE_DEPTH: f32 = 2e-4;
         let mut most = 0.0_f32;
         for lane in 0..LANES {
             most = most.max(tau[lane]);
         }
-        most * self.per_depth < LITTLE
+        most * self.inverse_half_depth < NEGLIGIBLE_DEPTH
     }
 
-    /// What burns at sixteen places of the noise, where the smooth optical depth is `tau` and so much of the detail is `shown`.
+    /// Detail at sixteen positions in the noise, where the smooth optical depth is `tau` and `visible_fraction` of the detail is
+    /// shown.
     #[inline(always)]
-    pub(crate) fn burning(&self, places: &[[f32; LANES]; 3], tau: &[f32; LANES], shown: &[f32; LANES]) -> Burning {
-        let mut limit = [0.0; LANES];
-        let mut share = [0.0; LANES];
+    pub(crate) fn burning(
+        &self,
+        positions: &[[f32; LANES]; 3],
+        tau: &[f32; LANES],
+        visible_fraction: &[f32; LANES],
+    ) -> DetailFactors {
+        let mut logit = [0.0; LANES];
+        let mut normalization = [0.0; LANES];
         for lane in 0..LANES {
-            let x = (tau[lane] * self.per_depth).max(1e-6);
-            let x = x / (1.0 + x * (1.0 / FULLEST));
+            let x = (tau[lane] * self.inverse_half_depth).max(1e-6);
+            let x = x / (1.0 + x * (1.0 / MAX_DEPTH_PARTICLES));
             let log = approximations::log2(x);
-            limit[lane] = log * std::f32::consts::LN_2;
-            share[lane] = 1.0 + approximations::exp2(-self.keep * log);
+            logit[lane] = log * std::f32::consts::LN_2;
+            normalization[lane] = 1.0 + approximations::exp2(-self.mean_exponent * log);
         }
-        let (mut burns, mut mean) = ([0.0; LANES], [0.0; LANES]);
-        for moment in 0..self.moments {
-            let noise = self.noise_at(places, (moment as f32 + 0.5) / self.moments as f32 - 0.5);
+        let (mut burning_fraction, mut mean) = ([0.0; LANES], [0.0; LANES]);
+        for moment in 0..self.time_samples {
+            let noise = self.noise_at(positions, (moment as f32 + 0.5) / self.time_samples as f32 - 0.5);
             for lane in 0..LANES {
                 let z = noise[lane] * self.steepness;
                 mean[lane] += z;
-                burns[lane] += 1.0 / (1.0 + approximations::exp(-(z + limit[lane]) * self.sharpness));
+                burning_fraction[lane] += 1.0 / (1.0 + approximations::exp(-(z + logit[lane]) * self.sharpness));
             }
         }
-        let each = 1.0 / self.moments as f32;
-        let mut burning = Burning { depth: [1.0; LANES], heat: [1.0; LANES] };
+        let sample_weight = 1.0 / self.time_samples as f32;
+        let mut burning = DetailFactors { depth: [1.0; LANES], heat: [1.0; LANES] };
         for lane in 0..LANES {
-            let amount = self.amount * shown[lane];
-            burning.depth[lane] = (burns[lane] * each * share[lane] - 1.0).mul_add(amount, 1.0);
-            let warm = (mean[lane] * each * 0.5).clamp(-1.5, 1.5);
-            burning.heat[lane] = (HEAT * amount).mul_add(warm, 1.0);
+            let amount = self.amount * visible_fraction[lane];
+            burning.depth[lane] =
+                (burning_fraction[lane] * sample_weight * normalization[lane] - 1.0).mul_add(amount, 1.0);
+            let excess = (mean[lane] * sample_weight * 0.5).clamp(-1.5, 1.5);
+            burning.heat[lane] = (TEMPERATURE_VARIATION * amount).mul_add(excess, 1.0);
         }
         burning
     }
 
-    /// Noise while the shutter is open, `moment` from -1/2 to 1/2.
+    /// Noise at a time within the exposure, `moment` from -1/2 to 1/2.
     #[inline(always)]
-    fn noise_at(&self, places: &[[f32; LANES]; 3], moment: f32) -> [f32; LANES] {
+    fn noise_at(&self, positions: &[[f32; LANES]; 3], moment: f32) -> [f32; LANES] {
         let (mut cells, mut fractions) = ([[0; LANES]; 3], [[0.0; LANES]; 3]);
         for axis in 0..3 {
             for lane in 0..LANES {
-                let at = self.base[axis].advanced(self.shift[axis].mul_add(moment, places[axis][lane]));
+                let at = self.base[axis].advanced(self.shift[axis].mul_add(moment, positions[axis][lane]));
                 cells[axis][lane] = at.cell;
                 fractions[axis][lane] = at.fraction;
             }

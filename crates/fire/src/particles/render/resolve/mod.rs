@@ -1,7 +1,375 @@
-//! From what particles left on the grid to light and transmittance for each pixel.
+//! Resolves summed sprites to light and opacity, row by row and layer by layer, sixteen pixels at a time.
+
+use crate::particles::render::{
+    resolve::{
+        detail::{Detail, DetailFactors},
+        strain::Strain,
+        upsample::RowInterpolator,
+    },
+    splat::grid::{Grid, weighted_sum},
+};
+use bansho_base::{
+    camera::Camera,
+    color,
+    image::Rect,
+    math::{DVec2, DVec3, approximations, simd::LANES},
+    phenomenon::strip::Strip,
+};
 
 pub(crate) mod detail;
-pub(crate) mod resolve_gas;
 pub(crate) mod spline;
 pub(crate) mod strain;
 pub(crate) mod upsample;
+
+/// Values per cell and layer: one SIMD vector.
+pub(crate) const PLANES: usize = 8;
+/// Plane of the optical depth of soot.
+pub(crate) const TAU: usize = 0;
+/// Plane of optical depth times luminance of a black body at the particle's temperature.
+pub(crate) const LUMINANCE: usize = 1;
+/// Plane of the same times temperature.
+pub(crate) const LUMINANCE_KELVIN: usize = 2;
+/// Three planes of optical depth times offset in the detail noise.
+pub(crate) const DETAIL_OFFSET: usize = 3;
+/// Plane of the luminance of CH and C2.
+pub(crate) const BLUE: usize = 6;
+/// Plane of the optical path difference to air, in pixels, for heat haze.
+pub(crate) const PATH: usize = 7;
+
+type Batch = [f32; LANES];
+
+/// Least optical depth that is divided by.
+const MIN_DEPTH: f32 = 1e-30;
+
+/// Converts sums to light.
+pub(crate) struct GasResolver<'a> {
+    pub(crate) grid: &'a Grid<'a>,
+    pub(crate) camera: &'a Camera,
+    /// Origin of detail coordinates, m.
+    pub(crate) origin: DVec3,
+    pub(crate) detail: Option<(&'a Detail, &'a Strain)>,
+    /// Whether soot absorbs its own light, `B (1 - exp(-tau))`, or emission is the plain sum (the paper).
+    pub(crate) self_absorption: bool,
+    /// Color of CH and C2: ACEScg of luminance 1.
+    pub(crate) blue: [f32; 3],
+    /// Radiance that opaque soot of each layer scatters toward the camera, ACEScg, cd/m^2.
+    pub(crate) scattered: &'a [[f32; 3]],
+    /// Spline weights for each pixel phase within a cell.
+    pub(crate) weights: &'a [[f32; 4]],
+    /// Interpolation along rows.
+    pub(crate) across: &'a RowInterpolator,
+    /// Least and greatest temperature of the gas, K.
+    pub(crate) temperatures: [f32; 2],
+}
+
+/// One depth layer of the gas.
+pub(crate) struct DepthLayer {
+    pub(crate) index: usize,
+    /// Depth of its center, m.
+    pub(crate) depth: f64,
+    pub(crate) thickness: f64,
+}
+
+/// One row of cells, interpolated vertically.
+pub(crate) struct RowBuffer {
+    /// Sums of all layers.
+    sums: Vec<f32>,
+    /// Detail strain of the layer that was filled last.
+    strain: Vec<f32>,
+}
+
+/// Sums of one layer at sixteen pixels.
+pub(crate) struct LayerSums {
+    pub(crate) tau: Batch,
+    pub(crate) glow: Batch,
+    pub(crate) heat: Batch,
+    blue: Batch,
+}
+
+impl GasResolver<'_> {
+    /// Buffers for [`fill`](Self::fill).
+    pub(crate) fn row(&self) -> RowBuffer {
+        RowBuffer { sums: vec![0.0; self.grid.row_length()], strain: vec![0.0; self.grid.cells.columns] }
+    }
+
+    /// Fills the buffer with the sums of a layer along row `y` of the picture; returns the range of pixels that may hold anything.
+    #[inline(always)]
+    pub(crate) fn fill(
+        &self,
+        layer: usize,
+        y: usize,
+        extents: &ColumnExtents,
+        row: &mut RowBuffer,
+    ) -> Option<[usize; 2]> {
+        let (cells, depth) = (&self.grid.cells, self.grid.depth);
+        let (cell, phase) = cells.cell_before(1, y);
+        let [first, last] = extents.around(layer, cell)?;
+        let pixel = |column: i64| ((column + i64::from(cells.first[0])) * cells.size as i64).max(0) as usize;
+        // Support of cubic interpolation.
+        let pixels = [pixel(i64::from(first) - 2), pixel(i64::from(last) + 3)];
+        // Whole batches of sixteen pixels are filled: cells that earlier rows left there would depend on where a strip begins.
+        let [begin, end] = [pixels[0] / LANES * LANES, pixels[1].next_multiple_of(LANES)];
+        let from = self.grid.first_of_four(cells.cell_before(0, begin).0);
+        let to = self.grid.first_of_four(cells.cell_before(0, end.saturating_sub(1)).0) + 4;
+        let rows = [self.grid.row(cell - 1), self.grid.row(cell), self.grid.row(cell + 1), self.grid.row(cell + 2)];
+        let weights = &self.weights[phase];
+        for column in from..to {
+            let start = column * depth + layer * PLANES;
+            let Some(sums) = row.sums[start..].first_chunk_mut::<PLANES>() else { continue };
+            *sums = weighted_cells(rows, [start; 4], weights);
+        }
+        if let Some((_, strain)) = self.detail {
+            let rows = [-1, 0, 1, 2].map(|by| &strain.row(cell + by, layer)[from..to]);
+            weighted_sum(&mut row.strain[from..to], rows, weights);
+        }
+        Some(pixels)
+    }
+
+    /// The gas at sixteen pixels; `None` where there is none.
+    #[inline(always)]
+    pub(crate) fn sums(&self, row: &RowBuffer, layer: usize, x: usize) -> Option<LayerSums> {
+        let mut planes = self.planes(row, layer, x, [TAU, LUMINANCE, LUMINANCE_KELVIN, BLUE]);
+        // Less is visible neither as light nor as opacity.
+        let (mut most_tau, mut most_blue) = (1e-6_f32, 1e-3_f32);
+        for lane in 0..LANES {
+            most_tau = most_tau.max(planes[0][lane]);
+            most_blue = most_blue.max(planes[3][lane]);
+        }
+        if most_tau <= 1e-6 && most_blue <= 1e-3 {
+            return None;
+        }
+        for plane in &mut planes {
+            for lane in 0..LANES {
+                // Cubic splines undershoot at edges.
+                plane[lane] = plane[lane].max(0.0);
+            }
+        }
+        let [tau, glow, heat, blue] = planes;
+        Some(LayerSums { tau, glow, heat, blue })
+    }
+
+    /// Planes of a layer at sixteen pixels.
+    #[inline(always)]
+    fn planes<const N: usize>(&self, row: &RowBuffer, layer: usize, x: usize, mut planes: [usize; N]) -> [Batch; N] {
+        for plane in &mut planes {
+            *plane += layer * PLANES;
+        }
+        self.across.at(&row.sums, self.grid.depth, x, planes)
+    }
+
+    /// Fraction of its detail that the gas at sixteen pixels shows.
+    #[inline(always)]
+    fn visible_fraction(&self, row: &RowBuffer, x: usize) -> Batch {
+        let [strain] = self.across.at(&row.strain, 1, x, [0]);
+        strain::visible_fraction(&strain)
+    }
+
+    /// Positions of sixteen pixels in the detail noise.
+    #[inline(always)]
+    fn noise_positions(
+        &self,
+        sums: &LayerSums,
+        row: &RowBuffer,
+        detail: &Detail,
+        layer: &DepthLayer,
+        [x, y]: [usize; 2],
+    ) -> Option<[Batch; 3]> {
+        let at = |column: f64| {
+            let direction = self.camera.direction(DVec2::new(column, y as f64 + 0.5))?;
+            Some((self.camera.position + direction * layer.depth - self.origin).as_vec3().to_array())
+        };
+        let (first, last) = (at(x as f64 + 0.5), at((x + LANES) as f64 - 0.5));
+        let (first, last) = (first.or(last)?, last.or(first)?);
+        let mut noise_positions =
+            self.planes(row, layer.index, x, [DETAIL_OFFSET, DETAIL_OFFSET + 1, DETAIL_OFFSET + 2]);
+        for axis in 0..3 {
+            let start = first[axis] * detail.cells_per_meter[axis];
+            let step = (last[axis] - first[axis]) * detail.cells_per_meter[axis] * (1.0 / (LANES - 1) as f32);
+            for lane in 0..LANES {
+                let offset = noise_positions[axis][lane] / sums.tau[lane].max(1e-20);
+                noise_positions[axis][lane] = step.mul_add(lane as f32, start) + offset.clamp(-1e4, 1e4);
+            }
+        }
+        Some(noise_positions)
+    }
+
+    /// Composites a layer behind what `rect` of a strip holds.
+    #[inline(always)]
+    pub(crate) fn draw_layer(
+        &self,
+        layer: &DepthLayer,
+        extents: &ColumnExtents,
+        rect: Rect,
+        row: &mut RowBuffer,
+        strip: &mut Strip,
+    ) {
+        for y in rect.y..rect.bottom() {
+            let Some([first, last]) = self.fill(layer.index, y, extents, row) else { continue };
+            // Batches begin at multiples of sixteen columns of the whole picture, so that crops change nothing.
+            let from = first.max(rect.x) / LANES * LANES;
+            for x in (from..last.min(rect.right())).step_by(LANES) {
+                if let Some(sums) = self.sums(row, layer.index, x) {
+                    self.draw_batch(&sums, row, layer, [x, y], rect, strip);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn draw_batch(
+        &self,
+        sums: &LayerSums,
+        row: &RowBuffer,
+        layer: &DepthLayer,
+        [x, y]: [usize; 2],
+        rect: Rect,
+        strip: &mut Strip,
+    ) {
+        let from = x.max(rect.x);
+        let to = (x + LANES).min(rect.right());
+        if from >= to {
+            return;
+        }
+        let start = (y - strip.rect.y) * strip.rect.width + from - strip.rect.x;
+        let mut visible_fraction = [1.0; LANES];
+        if strip.has_plate() {
+            for pixel in from..to {
+                let ahead = (f64::from(strip.plate_depth(start + pixel - from)) - layer.depth) / layer.thickness;
+                visible_fraction[pixel - x] = (ahead + 0.5).clamp(0.0, 1.0) as f32;
+            }
+        }
+        let mut light = self.light(sums, row, layer, x, y);
+        for plane in &mut light.planes {
+            for lane in 0..LANES {
+                plane[lane] *= visible_fraction[lane];
+            }
+        }
+        let lit = from - x..to - x;
+        let mut depth = [f32::INFINITY; LANES];
+        for lane in lit.clone() {
+            if light.planes[3][lane] > 1e-3 || light.planes[1][lane] > 1e-2 {
+                depth[lane] = layer.depth as f32;
+            }
+        }
+        let [red, green, blue, opacity] = light.planes.each_ref().map(|plane| &plane[lit.clone()]);
+        strip.add_row_behind(start, [red, green, blue], Some(opacity), &depth[lit]);
+    }
+
+    /// Red, green, blue and opacity of sixteen pixels of a layer.
+    #[inline(always)]
+    fn light(&self, sums: &LayerSums, row: &RowBuffer, layer: &DepthLayer, x: usize, y: usize) -> PixelLight {
+        let LayerSums { tau, glow, heat, .. } = sums;
+        let (mut depth_factor, mut heat_factor) = ([1.0; LANES], [1.0; LANES]);
+        if let Some((detail, _)) = self.detail
+            && !detail.is_negligible(tau)
+            && let Some(noise_positions) = self.noise_positions(sums, row, detail, layer, [x, y])
+        {
+            DetailFactors { depth: depth_factor, heat: heat_factor } =
+                detail.burning(&noise_positions, tau, &self.visible_fraction(row, x));
+        }
+        let mut planes = [[0.0; LANES]; 4];
+        let mut emission = [0.0; LANES];
+        for lane in 0..LANES {
+            let depth = tau[lane] * depth_factor[lane];
+            planes[3][lane] = 1.0 - approximations::exp(-depth);
+            emission[lane] = if self.self_absorption { planes[3][lane] } else { depth };
+        }
+        // Where nothing glows both denominators are clamped and luminance is 0, so that no lane branches.
+        let (mut luminance, mut kelvin) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            luminance[lane] = emission[lane] * glow[lane] / tau[lane].max(MIN_DEPTH);
+            kelvin[lane] = self.temperature(heat[lane], glow[lane].max(MIN_DEPTH)) * heat_factor[lane];
+        }
+        let table = color::black_body();
+        for lane in 0..LANES {
+            let hue = table.radiance(kelvin[lane]);
+            for c in 0..3 {
+                planes[c][lane] = hue[c];
+            }
+        }
+        for lane in 0..LANES {
+            // The luminance is that of the sum; the color is that of the mean temperature, slightly hotter where the gas burns
+            // most.
+            let own = color::luminance([planes[0][lane], planes[1][lane], planes[2][lane]]);
+            let factor = luminance[lane] / own.max(1e-20);
+            for c in 0..3 {
+                planes[c][lane] *= factor;
+            }
+        }
+        let scattered = &self.scattered[layer.index];
+        for c in 0..3 {
+            for lane in 0..LANES {
+                let blue = self.blue[c] * sums.blue[lane];
+                planes[c][lane] += scattered[c].mul_add(planes[3][lane], blue);
+            }
+        }
+        PixelLight { planes }
+    }
+}
+
+impl GasResolver<'_> {
+    /// Mean temperature, K, clamped to the range of the particles: where hardly anything glows it is a ratio of rounding errors.
+    #[inline(always)]
+    pub(crate) fn temperature(&self, heat: f32, glow: f32) -> f32 {
+        let [coldest, hottest] = self.temperatures;
+        (heat / glow).max(coldest).min(hottest)
+    }
+}
+
+/// Weighted sum of four cells' values of a layer, found at `starts` in `rows`.
+#[inline(always)]
+fn weighted_cells(rows: [&[f32]; 4], starts: [usize; 4], weights: &[f32; 4]) -> [f32; PLANES] {
+    let mut sums = [0.0; PLANES];
+    for k in 0..4 {
+        let Some(values) = rows[k][starts[k]..].first_chunk::<PLANES>() else { continue };
+        for plane in 0..PLANES {
+            sums[plane] = weights[k].mul_add(values[plane], sums[plane]);
+        }
+    }
+    sums
+}
+
+/// Red, green, blue and opacity.
+struct PixelLight {
+    planes: [Batch; 4],
+}
+
+/// First and last occupied column of cells, for each row and layer.
+pub(crate) struct ColumnExtents {
+    layers: usize,
+    rows: Vec<[u32; 2]>,
+}
+
+impl ColumnExtents {
+    pub(crate) fn new(grid: &Grid, layers: usize) -> Self {
+        use rayon::prelude::*;
+        let columns = grid.cells.columns;
+        let extent = |index: usize| {
+            let (row, layer) = (index / layers, index % layers);
+            let cells = grid.row(row as i32);
+            let value = |column: usize, plane: usize| cells[column * grid.depth + layer * PLANES + plane];
+            let holds = |column: &usize| value(*column, TAU) > 0.0 || value(*column, BLUE) > 0.0;
+            let first = (0..columns).find(holds);
+            let last = (0..columns).rfind(holds);
+            first.zip(last).map_or([u32::MAX, 0], |(first, last)| [first as u32, last as u32])
+        };
+        let rows = (0..grid.cells.rows * layers).into_par_iter().with_min_len(64).map(extent).collect();
+        Self { layers, rows }
+    }
+
+    /// First and last occupied column of a row of cells.
+    pub(crate) fn of(&self, row: usize, layer: usize) -> Option<[u32; 2]> {
+        let [first, last] = self.rows[row * self.layers + layer];
+        (first <= last).then_some([first, last])
+    }
+
+    /// First and last column within the support of interpolation in the rows around `cell`.
+    fn around(&self, layer: usize, cell: i32) -> Option<[u32; 2]> {
+        let rows = (self.rows.len() / self.layers) as i32;
+        let extents = (cell - 1..=cell + 2)
+            .filter(|row| (0..rows).contains(row))
+            .map(|row| self.rows[row as usize * self.layers + layer]);
+        let [first, last] = extents.fold([u32::MAX, 0], |all, own| [all[0].min(own[0]), all[1].max(own[1])]);
+        (first <= last).then_some([first, last])
+    }
+}

@@ -1,24 +1,25 @@
-//! Where the gas carries its detail too finely to be shown: where streams of different birth meet, or gas was pressed together.
+//! Strain of the detail coordinates: where it is large, detail is too fine to be shown.
 //!
-//! Detail lies where the gas was born, a mean over the line of sight. Where that mean passes from one stream to another it runs through
-//! many cells of the noise within a particle's reach, which no flame does and no picture could show. There the smooth sum alone is drawn.
+//! Detail coordinates are mean Lagrangian coordinates along the line of sight. Where streams of different origin meet, or gas was
+//! compressed, they cross many noise cells within one support radius, which would alias. There detail fades, and the smooth sum
+//! alone is drawn.
 
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use bansho_base::math::simd::LANES;
 
-use super::resolve_gas::{Extents, MATTER, PLANES, TAU};
+use crate::particles::render::resolve::{ColumnExtents, DETAIL_OFFSET, PLANES, TAU};
 use crate::particles::render::splat::grid::Grid;
 
-/// How many times more finely than it was made detail may lie before it begins to fade, and when it is gone.
-const FADING: [f32; 2] = [1.0, 3.0];
+/// Strain, relative to undeformed detail, at which detail begins to fade, and at which it has faded out.
+const FADE_RANGE: [f32; 2] = [1.0, 3.0];
 /// Optical depth below which a cell is empty.
-const EMPTY: f32 = 1e-6;
-/// Share of a cell's optical depth that a cell beside it must have to be compared with it.
-const COUNTS: f32 = 0.02;
+const MIN_DEPTH: f32 = 1e-6;
+/// Least optical depth of a neighboring cell, relative to the cell's own, to be compared with.
+const MIN_NEIGHBOR_DEPTH: f32 = 0.02;
 
-/// The slope of the gas's own detail coordinates in each cell of each layer, beside that of detail as it was made.
+/// Gradient of the detail coordinates in each cell of each layer, relative to that of undeformed detail.
 pub(crate) struct Strain {
     layers: usize,
     columns: usize,
@@ -27,8 +28,8 @@ pub(crate) struct Strain {
 }
 
 impl Strain {
-    /// `cell` is the size of a cell of the noise as it was made, pixels.
-    pub(crate) fn new(grid: &Grid, extents: &Extents, layers: usize, cell: f32) -> Self {
+    /// `cell` is the size of an undeformed noise cell, pixels.
+    pub(crate) fn new(grid: &Grid, extents: &ColumnExtents, layers: usize, cell: f32) -> Self {
         let (columns, rows, level) = (grid.cells.columns, grid.cells.rows, Level::new());
         let scale = cell / grid.cells.size as f32;
         let mut values = vec![0.0; rows * layers * columns];
@@ -39,11 +40,11 @@ impl Strain {
                 let range = first.max(1) as usize..(last as usize + 1).min(columns - 1);
                 dispatch!(level, _simd => {
                     for column in range {
-                        let at = |row: usize, column: usize| Matter::of(&rows[row][column * grid.depth + layer * PLANES..]);
+                        let at = |row: usize, column: usize| DetailCoordinates::of(&rows[row][column * grid.depth + layer * PLANES..]);
                         let own = at(1, column);
-                        if own.tau > EMPTY {
-                            let beside = [at(0, column), at(2, column), at(1, column - 1), at(1, column + 1)];
-                            out[column] = scale * own.greatest_step(&beside);
+                        if own.tau > MIN_DEPTH {
+                            let neighbors = [at(0, column), at(2, column), at(1, column - 1), at(1, column + 1)];
+                            out[column] = scale * own.max_distance(&neighbors);
                         }
                     }
                 });
@@ -52,50 +53,50 @@ impl Strain {
         Self { layers, columns, rows, values }
     }
 
-    /// Values along a row of cells of a layer; those beyond the grid are none.
+    /// Values along a row of cells of a layer; rows beyond the grid repeat its edge.
     pub(crate) fn row(&self, row: i32, layer: usize) -> &[f32] {
         let row = row.clamp(0, self.rows as i32 - 1) as usize;
         &self.values[(row * self.layers + layer) * self.columns..][..self.columns]
     }
 }
 
-/// How much of its detail gas of a strain still shows.
+/// Fraction of detail that is shown at a strain.
 #[inline(always)]
-pub(crate) fn shown(strain: &[f32; LANES]) -> [f32; LANES] {
-    let [begins, gone] = FADING;
-    let mut shown = [0.0; LANES];
+pub(crate) fn visible_fraction(strain: &[f32; LANES]) -> [f32; LANES] {
+    let [begins, gone] = FADE_RANGE;
+    let mut visible_fraction = [0.0; LANES];
     for lane in 0..LANES {
         let left = ((gone - strain[lane]) * (1.0 / (gone - begins))).clamp(0.0, 1.0);
-        shown[lane] = left * left * 2.0_f32.mul_add(-left, 3.0);
+        visible_fraction[lane] = left * left * 2.0_f32.mul_add(-left, 3.0);
     }
-    shown
+    visible_fraction
 }
 
-/// Where in the noise the gas of a cell lies, cells of the noise.
-struct Matter {
+/// Mean detail coordinates of a cell, in noise cells.
+struct DetailCoordinates {
     tau: f32,
-    place: [f32; 3],
+    position: [f32; 3],
 }
 
-impl Matter {
+impl DetailCoordinates {
     #[inline(always)]
     fn of(sums: &[f32]) -> Self {
         let tau = sums[TAU];
-        let share = 1.0 / tau.max(EMPTY);
-        Self { tau, place: [0, 1, 2].map(|axis| sums[MATTER + axis] * share) }
+        let inverse_depth = 1.0 / tau.max(MIN_DEPTH);
+        Self { tau, position: [0, 1, 2].map(|axis| sums[DETAIL_OFFSET + axis] * inverse_depth) }
     }
 
-    /// The greatest distance in the noise to one of the cells beside.
+    /// Greatest distance in the noise to a neighboring cell.
     #[inline(always)]
-    fn greatest_step(&self, beside: &[Self; 4]) -> f32 {
+    fn max_distance(&self, neighbors: &[Self; 4]) -> f32 {
         let mut greatest = 0.0_f32;
-        for other in beside {
+        for other in neighbors {
             let mut square = 0.0;
             for axis in 0..3 {
-                let step = other.place[axis] - self.place[axis];
+                let step = other.position[axis] - self.position[axis];
                 square = step.mul_add(step, square);
             }
-            if other.tau > COUNTS * self.tau {
+            if other.tau > MIN_NEIGHBOR_DEPTH * self.tau {
                 greatest = greatest.max(square);
             }
         }

@@ -1,7 +1,7 @@
-//! Interpolation along a row of pixels, sixteen at a time.
+//! Interpolation along a row, sixteen pixels at a time.
 //!
-//! Each cell's value goes to all sixteen, times what it weighs at each: nothing has to change places between the lanes of a vector, as it
-//! would if every pixel looked up its own four cells.
+//! Each cell's value is broadcast and multiplied by its weights at the sixteen pixels. That needs no shuffles or gathers, as it
+//! would if each pixel fetched its own four cells.
 
 use std::ops::Range;
 
@@ -9,22 +9,22 @@ use bansho_base::math::simd::LANES;
 
 use crate::particles::render::splat::grid::Grid;
 
-/// What the cells around sixteen pixels weigh at each of them.
+/// The cells in the support of sixteen pixels.
 struct Span {
-    /// The first of the cells.
+    /// Index of the first cell.
     first: usize,
-    /// Where their weights are.
+    /// Range of their weights.
     weights: Range<usize>,
 }
 
-/// The cells around all pixels of a row of the whole picture.
-pub(crate) struct Across {
+/// Weights of cells for all pixels of a row of the whole picture.
+pub(crate) struct RowInterpolator {
     spans: Vec<Span>,
     weights: Vec<[f32; LANES]>,
 }
 
-impl Across {
-    /// For rows of `width` pixels, with the weights of the four cells around a pixel of each phase.
+impl RowInterpolator {
+    /// For rows of `width` pixels; `weights_of` are the weights of the four surrounding cells for each pixel phase.
     pub(crate) fn new(grid: &Grid, width: usize, weights_of: &[[f32; 4]]) -> Self {
         let columns = grid.columns(0, width);
         let mut across = Self { spans: Vec::with_capacity(columns.len().div_ceil(LANES)), weights: Vec::new() };
@@ -42,22 +42,22 @@ impl Across {
         across
     }
 
-    /// Values at the sixteen pixels from `x` on, a multiple of sixteen: those of the cells begin `stride` apart in `row`, and of each
-    /// those at `places` are wanted. 0 beyond the picture.
+    /// Values at the sixteen pixels from `x` on, a multiple of sixteen: `planes` are the planes wanted of cells that are `stride`
+    /// values apart in `row`. 0 beyond the picture.
     #[inline(always)]
     pub(crate) fn at<const N: usize>(
         &self,
         row: &[f32],
         stride: usize,
         x: usize,
-        places: [usize; N],
+        planes: [usize; N],
     ) -> [[f32; LANES]; N] {
         let mut sums = [[0.0; LANES]; N];
         let Some(span) = self.spans.get(x / LANES) else { return sums };
         let cells = row[span.first * stride..].chunks_exact(stride);
         for (weights, values) in self.weights[span.weights.clone()].iter().zip(cells) {
             for n in 0..N {
-                let value = values[places[n]];
+                let value = values[planes[n]];
                 for lane in 0..LANES {
                     sums[n][lane] = weights[lane].mul_add(value, sums[n][lane]);
                 }
@@ -72,20 +72,22 @@ mod tests {
     use bansho_base::image::Rect;
 
     use super::{super::spline, *};
-    use crate::particles::render::splat::{buffers::Memory, grid::Raster};
+    use crate::particles::render::splat::grid::Raster;
+    use crate::particles::render::splat::scratch_pool::ScratchPool;
 
     #[test]
     fn sixteen_pixels_are_what_each_of_them_is() {
         const DEPTH: usize = 3;
-        let memory = Memory::default();
+        let scratch = ScratchPool::default();
         for (size, width) in [(1, 64), (2, 50), (3, 47), (4, 64), (6, 130), (8, 17), (32, 99)] {
             let cells = Raster::around(Rect { x: 5, y: 0, width: width - 9, height: 4 }, size, false);
-            let mut grid = Grid::new(cells, DEPTH, &memory);
+            let mut grid = Grid::new(cells, DEPTH, &scratch);
             for (index, value) in grid.values_mut().iter_mut().enumerate() {
                 *value = (index * index % 17) as f32;
             }
             let weights = spline::weights(&grid.cells);
-            let (across, columns, row) = (Across::new(&grid, width, &weights), grid.columns(0, width), grid.row(2));
+            let (across, columns, row) =
+                (RowInterpolator::new(&grid, width, &weights), grid.columns(0, width), grid.row(2));
             for x in (0..width).step_by(LANES) {
                 let found = across.at(row, DEPTH, x, [2, 0]);
                 for pixel in x..(x + LANES).min(width) {

@@ -1,31 +1,31 @@
-//! A grid of cells over a part of the picture, several values a cell.
+//! A grid of cells over the picture, with several values per cell.
 
 use bansho_base::image::Rect;
 
-use super::buffers::{Memory, Recycled};
 use crate::particles::render::resolve::spline;
+use crate::particles::render::splat::scratch_pool::{PooledVec, ScratchPool};
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-/// Cells around what is covered that are looked at: two by interpolation, one by differences, two by the filter before them.
+/// Cells around the covered area that are read: two by interpolation, one by differences, two by the prefilter.
 const MARGIN: i32 = 5;
-/// The same where coarser grids are added, each of which is looked at as far beyond the finer one.
+/// The same where coarser grids are added, each of which is read as far beyond the finer one.
 const NESTED_MARGIN: i32 = 7;
 
-/// Where cells lie over the picture: cell (i, j) has its middle at `(i + 1/2) size` pixels of the whole picture, whatever part of it is
-/// drawn.
+/// Layout of cells over the picture: the center of cell (i, j) is at `(i + 1/2) size` pixels of the whole picture, independent of
+/// the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Raster {
     /// Side of a cell, pixels.
     pub(crate) size: usize,
-    /// The first column and row of cells, counted from the picture's corner.
+    /// First column and row, counted from the picture's corner.
     pub(crate) first: [i32; 2],
     pub(crate) columns: usize,
     pub(crate) rows: usize,
 }
 
 impl Raster {
-    /// The cells of `size` pixels that hold `rect` with a margin; a grid among coarser and finer ones is `nested`.
+    /// The cells of `size` pixels that cover `rect`, with a margin; `nested` where coarser grids are added.
     pub(crate) fn around(rect: Rect, size: usize, nested: bool) -> Self {
         let margin = if nested { NESTED_MARGIN } else { MARGIN };
         let low = [rect.x, rect.y].map(|value| (value / size) as i32 - margin);
@@ -33,7 +33,7 @@ impl Raster {
         Self { size, first: low, columns: (high[0] - low[0]) as usize, rows: (high[1] - low[1]) as usize }
     }
 
-    /// Those of its cells that are `other`'s too.
+    /// Intersection with `other`.
     pub(crate) fn within(self, other: &Self) -> Self {
         let ends = |cells: &Self| [cells.first[0] + cells.columns as i32, cells.first[1] + cells.rows as i32];
         let first = [0, 1].map(|axis| self.first[axis].max(other.first[axis]));
@@ -43,7 +43,7 @@ impl Raster {
     }
 
     /// Its columns, counted from the picture's corner.
-    pub(crate) fn columns_of_picture(&self) -> std::ops::Range<i32> {
+    pub(crate) fn picture_columns(&self) -> std::ops::Range<i32> {
         self.first[0]..self.first[0] + self.columns as i32
     }
 
@@ -58,60 +58,60 @@ impl Raster {
         Rect { x, y, width: right - x, height: bottom - y }
     }
 
-    /// A place of the picture in cells: whole numbers are their middles.
+    /// Pixel coordinates in cells; cell centers are integers.
     #[inline(always)]
-    pub(crate) fn place(&self, pixel: [f32; 2]) -> [f32; 2] {
+    pub(crate) fn cell_coordinates(&self, pixel: [f32; 2]) -> [f32; 2] {
         let scale = 1.0 / self.size as f32;
         [pixel[0].mul_add(scale, -0.5), pixel[1].mul_add(scale, -0.5)]
     }
 
-    /// The cell before the middle of pixel `pixel` of an axis, and the pixel's phase between that cell and the next.
+    /// The cell whose center precedes that of a pixel along an axis, and the pixel's phase between it and the next.
     #[inline(always)]
-    pub(crate) fn before(&self, axis: usize, pixel: usize) -> (i32, usize) {
-        // In halves of a pixel, so that the whole part is the cell whose middle comes before.
+    pub(crate) fn cell_before(&self, axis: usize, pixel: usize) -> (i32, usize) {
+        // In half pixels, so that the integer part is the preceding cell center.
         let size = self.size as i32;
         let halves = 2 * pixel as i32 + 1 - size;
         (halves.div_euclid(2 * size) - self.first[axis], (halves.rem_euclid(2 * size) / 2) as usize)
     }
 
-    /// How far pixels of each phase lie from the middle of the cell before, cells.
+    /// Distance of pixels of each phase from the preceding cell center, cells.
     pub(crate) fn phases(&self) -> impl Iterator<Item = f32> + use<> {
         let size = self.size;
-        // The middles of even cells lie between pixels.
+        // The center of a cell of even size lies between pixels.
         let half = if size.is_multiple_of(2) { 0.5 } else { 0.0 };
         (0..size).map(move |phase| (phase as f32 + half) / size as f32)
     }
 }
 
-/// Values over cells: those of a cell lie side by side, so that one vector adds all of a sprite to it.
+/// Values over cells. The values of a cell are contiguous, so that one SIMD vector accumulates a whole sprite value.
 #[derive(Debug)]
 pub(crate) struct Grid<'a> {
     pub(crate) cells: Raster,
-    /// Values of a cell.
+    /// Values per cell.
     pub(crate) depth: usize,
-    values: Recycled<'a, f32>,
-    /// Where they begin: so that no cell of eight lies across two lines of the cache.
+    values: PooledVec<'a, f32>,
+    /// Start of the values, aligned so that no cell of eight values straddles two cache lines.
     start: usize,
 }
 
 impl<'a> Grid<'a> {
-    /// A grid of any values: whoever asks for it fills all its rows.
-    pub(crate) fn new(cells: Raster, depth: usize, memory: &'a Memory) -> Self {
-        /// A line of the cache, bytes.
+    /// A grid with uninitialized (arbitrary) values: the caller fills all rows.
+    pub(crate) fn new(cells: Raster, depth: usize, scratch: &'a ScratchPool) -> Self {
+        /// Cache line, bytes.
         const LINE: usize = 64;
         let count = cells.columns * cells.rows * depth + LINE / size_of::<f32>();
-        let mut values = memory.list(count);
+        let mut values = scratch.take(count);
         if values.len() < count {
-            // Zeros of the system's that nobody touches before they are wanted.
+            // Zero pages from the operating system, not touched before they are used.
             *values = vec![0.0; values.capacity()];
         }
         let start = values.as_ptr().align_offset(LINE).min(LINE / size_of::<f32>());
         Self { cells, depth, values, start }
     }
 
-    /// Where it came from.
-    pub(crate) fn memory(&self) -> &'a Memory {
-        self.values.memory()
+    /// The pool that its memory came from.
+    pub(crate) fn scratch(&self) -> &'a ScratchPool {
+        self.values.scratch()
     }
 
     /// All values.
@@ -120,7 +120,7 @@ impl<'a> Grid<'a> {
         &mut self.values[self.start..][..count]
     }
 
-    /// Values from a row to the next.
+    /// Values per row.
     pub(crate) fn row_length(&self) -> usize {
         self.cells.columns * self.depth
     }
@@ -130,30 +130,30 @@ impl<'a> Grid<'a> {
         self.cells.covered()
     }
 
-    /// A row of cells; rows beyond the grid are those at its edge, which hold nothing.
+    /// A row of cells; rows beyond the grid repeat its edge, which is empty.
     pub(crate) fn row(&self, row: i32) -> &[f32] {
         let row = row.clamp(0, self.cells.rows as i32 - 1) as usize;
         &self.values[self.start + row * self.row_length()..][..self.row_length()]
     }
 
-    /// The first of the four columns around each pixel of a row from `x` on, and its phase.
+    /// For `count` pixels of a row from `x` on, the first of the four surrounding columns and the pixel's phase.
     pub(crate) fn columns(&self, x: usize, count: usize) -> Vec<(usize, usize)> {
         let column = |x: usize| {
-            let (cell, phase) = self.cells.before(0, x);
+            let (cell, phase) = self.cells.cell_before(0, x);
             (self.first_of_four(cell), phase)
         };
         (x..x + count).map(column).collect()
     }
 
-    /// The first of the four columns around a place whose cell before is `cell`.
+    /// The first of the four columns around a position whose preceding cell is `cell`.
     #[inline(always)]
     pub(crate) fn first_of_four(&self, cell: i32) -> usize {
         (cell - 1).clamp(0, self.cells.columns as i32 - 4) as usize
     }
 
-    /// One value a cell: the sum over its layers of one of each layer's `planes` values.
+    /// One value per cell: the sum over layers of plane `plane` of `planes`.
     pub(crate) fn one_plane(&self, plane: usize, planes: usize) -> Self {
-        let mut one = Self::new(self.cells, 1, self.memory());
+        let mut one = Self::new(self.cells, 1, self.scratch());
         one.values_mut().par_chunks_mut(self.cells.columns).enumerate().for_each(|(row, out)| {
             for (sum, cell) in out.iter_mut().zip(self.row(row as i32).chunks_exact(self.depth)) {
                 *sum = cell[plane..].iter().step_by(planes).sum();
@@ -162,10 +162,10 @@ impl<'a> Grid<'a> {
         one
     }
 
-    /// Adds sharpened cells twice as large, interpolated.
+    /// Adds prefiltered cells twice as large, interpolated.
     pub(crate) fn add_coarser(&mut self, coarser: &Grid) {
         let cells = self.cells;
-        // Middles of fine cells lie a quarter before and behind those of coarse ones.
+        // Centers of fine cells lie at 1/4 and 3/4 between those of coarse cells.
         let quarters = [spline::value(0.75), spline::value(0.25)];
         let (row_length, level) = (self.row_length(), Level::new());
         self.values_mut().par_chunks_mut(row_length).enumerate().for_each_init(
@@ -176,22 +176,22 @@ impl<'a> Grid<'a> {
                 let rows = [-1, 0, 1, 2].map(|k| coarser.row(first + k));
                 let weights = &quarters[fine.rem_euclid(2) as usize];
                 dispatch!(level, _simd => {
-                    weigh(column, rows, weights);
-                    coarser.add_between(column, &quarters, cells.first[0], values);
+                    weighted_sum(column, rows, weights);
+                    coarser.add_interpolated(column, &quarters, cells.first[0], values);
                 });
             },
         );
     }
 
-    /// Adds a row of these cells, interpolated, to one of cells half as large whose first is `first`.
+    /// Adds an interpolated row of these cells to a row of cells half as large whose first is `first`.
     #[inline(always)]
-    fn add_between(&self, row: &[f32], quarters: &[[f32; 4]; 2], first: i32, values: &mut [f32]) {
+    fn add_interpolated(&self, row: &[f32], quarters: &[[f32; 4]; 2], first: i32, values: &mut [f32]) {
         let depth = self.depth;
         for (index, sums) in values.chunks_exact_mut(depth).enumerate() {
             let cell = first + index as i32;
             let [a, b, c, d] = quarters[cell.rem_euclid(2) as usize];
-            let four = self.first_of_four((cell - 1).div_euclid(2) - self.cells.first[0]) * depth;
-            let (before, rest) = row[four..][..4 * depth].split_at(depth);
+            let first_column = self.first_of_four((cell - 1).div_euclid(2) - self.cells.first[0]) * depth;
+            let (before, rest) = row[first_column..][..4 * depth].split_at(depth);
             let (near, rest) = rest.split_at(depth);
             let (far, beyond) = rest.split_at(depth);
             for i in 0..depth {
@@ -203,7 +203,7 @@ impl<'a> Grid<'a> {
 
 /// `out = sum of weights times rows`.
 #[inline(always)]
-pub(crate) fn weigh(out: &mut [f32], rows: [&[f32]; 4], weights: &[f32; 4]) {
+pub(crate) fn weighted_sum(out: &mut [f32], rows: [&[f32]; 4], weights: &[f32; 4]) {
     let count = out.len();
     let (a, b, c, d) = (&rows[0][..count], &rows[1][..count], &rows[2][..count], &rows[3][..count]);
     for i in 0..count {

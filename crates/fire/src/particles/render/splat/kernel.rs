@@ -1,12 +1,12 @@
-//! What a ray sees of a poly6 ball: its line integral and the deflection that its gradient gives.
+//! Line integral of the poly6 kernel, and its gradient.
 //!
-//! Splatting needs powers of 7/2 millions of times a frame. `s^(7/2)` is `s^3 sqrt(s)`, and since the factor is small where a polynomial
-//! fails at a square root, a cubic serves: errors below 1e-4 of the peak, at a quarter of a root's cost.
+//! Splatting evaluates powers of 7/2 millions of times per frame. `s^(7/2) = s^3 sqrt(s)`, and since s^3 is small where a
+//! polynomial fits a square root badly, a cubic suffices: errors are below 1e-4 of the peak, at a quarter of the cost of a square
+//! root.
 
 use std::f64::consts::PI;
 
-/// The integral of poly6, eq. (2), along a ray that passes at the distance `b` from the centre, 1/m^2:
-/// `9/(2 pi d^2) (1 - b^2/d^2)^(7/2)`.
+/// The integral of poly6, eq. (2), along a ray at distance `b` from the center, 1/m^2: `9/(2 pi d^2) (1 - b^2/d^2)^(7/2)`.
 pub fn line_integral(b: f64, d: f64) -> f64 {
     let s = (1.0 - b * b / (d * d)).max(0.0);
     LINE_PEAK / (d * d) * s * s * s * s.sqrt()
@@ -18,15 +18,15 @@ pub fn line_gradient(b: f64, d: f64) -> f64 {
     -7.0 * LINE_PEAK / (d * d * d * d) * s * s * s.sqrt() * b
 }
 
-/// Line integral through the centre, times d^2: 9 / (2 pi).
+/// Line integral through the center, times d^2: 9 / (2 pi).
 pub(crate) const LINE_PEAK: f64 = 9.0 / (2.0 * PI);
 
-/// How a sprite falls off with `s = 1 - b^2/d^2`, 1 at its centre: `s^3` times a cubic.
+/// Profile of a sprite as a function of `s = 1 - b^2/d^2`, 1 at the center: `s^3` times a cubic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Profile([f32; 4]);
 
 impl Profile {
-    /// `s^(7/2)`, what a ray sees of a poly6 ball.
+    /// `s^(7/2)`, the line integral of poly6.
     pub(crate) const LINE: Self = Self([0.243_703_22, 1.182_117_6, -0.600_629_2, 0.174_890_54]);
     /// `s^3`, poly6 itself: the paper's sprite (figure 2).
     pub(crate) const POLY6: Self = Self([1.0, 0.0, 0.0, 0.0]);
@@ -44,7 +44,7 @@ fn cubic([a, b, c, d]: [f32; 4], s: f32) -> f32 {
     d.mul_add(s, c).mul_add(s, b).mul_add(s, a)
 }
 
-/// Variance of a sprite along either axis beside the square of its radius: with `s^(7/2)` over a disc, 1/11.
+/// Variance of a sprite along either axis relative to the square of its radius; 1/11 for `s^(7/2)` over a disc.
 pub(crate) const VARIANCE: f64 = 1.0 / 11.0;
 
 #[cfg(test)]
@@ -63,8 +63,8 @@ mod tests {
         for b in [0.0, 0.1, 0.2, 0.29, 0.31] {
             let steps = 20_000;
             let step = 2.0 * d / f64::from(steps);
-            let place = |i: i32| -d + step * (f64::from(i) + 0.5);
-            let sum: f64 = (0..steps).map(|i| poly6((b * b + place(i) * place(i)).sqrt(), d) * step).sum();
+            let distance = |i: i32| -d + step * (f64::from(i) + 0.5);
+            let sum: f64 = (0..steps).map(|i| poly6((b * b + distance(i) * distance(i)).sqrt(), d) * step).sum();
             assert!((line_integral(b, d) - sum).abs() < 1e-6 * line_integral(0.0, d), "{b}: {sum}");
         }
     }

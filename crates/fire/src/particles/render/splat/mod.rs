@@ -1,7 +1,340 @@
-//! Particles onto the grid of the picture.
+//! Splatting: sums of sprites on a grid. Each band of rows belongs to one task, which adds sprites in order.
+//!
+//! A sprite is smooth, so that a grid of a few cells per radius represents it, and the cost hardly depends on the resolution or on
+//! the size of sprites. Sprites of different sizes go to grids of different cell size; coarse grids are added to finer ones by
+//! cubic interpolation.
 
-pub(crate) mod accumulate;
-pub(crate) mod buffers;
-pub(crate) mod footprint;
+use crate::particles::render::{
+    project::sprite::Ellipse,
+    resolve::spline,
+    splat::{
+        grid::{Grid, Raster},
+        kernel::Profile,
+        rasterize::{COLUMNS, ROWS, RasterizedSprite},
+        scratch_pool::{PooledVec, ScratchPool},
+    },
+};
+use bansho_base::{image::Rect, math::simd::LANES};
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+use std::ops::Range;
+
 pub(crate) mod grid;
 pub(crate) mod kernel;
+pub(crate) mod rasterize;
+pub(crate) mod scratch_pool;
+
+/// Least radius of a sprite in cells, at which splines are accurate to a few percent of a single sprite's peak.
+pub(crate) const MIN_RADIUS_CELLS: f32 = 2.75;
+/// Rows per task.
+const ROWS_PER_TASK: usize = 32;
+/// Coarsest grid: cells of 4096 pixels, twelve octaves.
+const MAX_LEVEL: usize = 24;
+
+/// One sprite: `P` values, weighted by its profile, for layer `layer` and, with the weight `next_layer_weight`, the next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sprite<const P: usize> {
+    pub(crate) ellipse: Ellipse,
+    pub(crate) layer: usize,
+    pub(crate) next_layer_weight: f32,
+    pub(crate) values: [f32; P],
+}
+
+/// Parameters of a splat.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SplatSettings {
+    pub(crate) profile: Profile,
+    /// Least radius of a sprite in cells; smaller sprites are widened to it on the finest grid.
+    pub(crate) min_radius_cells: f32,
+    pub(crate) layers: usize,
+    /// Size of the whole picture, pixels.
+    pub(crate) picture: [usize; 2],
+    /// The window of it that is drawn.
+    pub(crate) window: Rect,
+}
+
+/// Result of a splat.
+#[derive(Debug)]
+pub(crate) enum SplatResult<'a> {
+    /// No sprite is visible in the whole picture.
+    Empty,
+    /// Sprites are visible only outside the window.
+    OutsideWindow,
+    /// Sums over cells.
+    Sums(Grid<'a>),
+}
+
+impl<'a> SplatResult<'a> {
+    /// The sums, if any.
+    pub(crate) fn sums(self) -> Option<Grid<'a>> {
+        if let Self::Sums(grid) = self { Some(grid) } else { None }
+    }
+}
+
+/// Sums all sprites, task by task, on the finest grid that any of them needs, as spline coefficients.
+///
+/// Cells coincide with those of the whole picture, so that a window shows the same of sprites at its edge.
+pub(crate) fn splat<'a, const P: usize>(
+    settings: &SplatSettings,
+    tasks: &[PooledVec<Sprite<P>>],
+    scratch: &'a ScratchPool,
+) -> SplatResult<'a> {
+    let statistics = SpriteStatistics::new(settings, tasks);
+    let Some(rect) = statistics.covered(settings.picture) else { return SplatResult::Empty };
+    let finest = statistics.finest();
+    let nested = statistics.counts.iter().skip(finest + 2).any(|count| *count > 0);
+    let cells_of_whole = |fineness| Raster::around(rect, cell_size(fineness), nested);
+    let shown = cells_of_whole(finest).covered().intersection(&settings.window);
+    if shown.is_empty() {
+        return SplatResult::OutsideWindow;
+    }
+    let shown = aligned_to_lanes(shown);
+    let cells = |fineness| Raster::around(shown, cell_size(fineness), nested).within(&cells_of_whole(fineness));
+    let whole_picture_columns = |fineness| cells_of_whole(fineness).picture_columns();
+    let mut coarser: Option<Grid> = None;
+    for fineness in (finest..MAX_LEVEL + 1).step_by(2).rev() {
+        let any = statistics.counts[fineness..].iter().take(2).any(|count| *count > 0);
+        if !any && fineness != finest && coarser.is_none() {
+            continue;
+        }
+        let mut grid = Grid::new(cells(fineness), settings.layers * P, scratch);
+        let is_on_this_grid = |radius: f32| settings.fineness(radius).max(finest).wrapping_sub(fineness) < 2;
+        add_sprites(settings, tasks, is_on_this_grid, whole_picture_columns(fineness), &mut grid);
+        if let Some(coarser) = coarser {
+            grid.add_coarser(&coarser);
+        }
+        coarser = Some(spline::sharpened(&grid));
+    }
+    coarser.map_or(SplatResult::Empty, SplatResult::Sums)
+}
+
+/// Extends a rectangle to whole batches of sixteen pixels.
+fn aligned_to_lanes(rect: Rect) -> Rect {
+    let (x, end) = (rect.x / LANES * LANES, rect.right().next_multiple_of(LANES));
+    Rect { x, width: end - x, ..rect }
+}
+
+/// Cell size of a fineness, pixels: two per octave, 1, 2, 3, 4, 6, 8, 12... (1.5 does not exist).
+fn cell_size(fineness: usize) -> usize {
+    if fineness.is_multiple_of(2) { 1 << (fineness / 2) } else { 3 << (fineness / 2 - 1) }
+}
+
+impl SplatSettings {
+    /// The fineness of the largest cells that are small enough for a sprite.
+    fn fineness(&self, radius: f32) -> usize {
+        // The exponent of a float counts octaves; its first mantissa bit tells the upper from the lower half of an octave.
+        let octaves = ((radius / self.min_radius_cells).max(1.0).to_bits() >> 22) as usize - (127 << 1);
+        if octaves == 1 { 0 } else { octaves.min(MAX_LEVEL) }
+    }
+}
+
+/// Bounds and sizes of all sprites.
+struct SpriteStatistics {
+    low: [f32; 2],
+    high: [f32; 2],
+    /// Number of sprites for each fineness.
+    counts: [usize; MAX_LEVEL + 1],
+}
+
+impl SpriteStatistics {
+    const EMPTY: Self = Self { low: [f32::MAX; 2], high: [f32::MIN; 2], counts: [0; MAX_LEVEL + 1] };
+
+    fn new<const P: usize>(settings: &SplatSettings, tasks: &[PooledVec<Sprite<P>>]) -> Self {
+        let of_task = |task: &PooledVec<Sprite<P>>| {
+            let mut statistics = Self::EMPTY;
+            for Sprite { ellipse, .. } in task.iter() {
+                for axis in 0..2 {
+                    statistics.low[axis] = statistics.low[axis].min(ellipse.center[axis] - ellipse.reach[axis]);
+                    statistics.high[axis] = statistics.high[axis].max(ellipse.center[axis] + ellipse.reach[axis]);
+                }
+                statistics.counts[settings.fineness(ellipse.radius)] += 1;
+            }
+            statistics
+        };
+        tasks.par_iter().map(of_task).reduce(|| Self::EMPTY, Self::merge)
+    }
+
+    fn merge(mut self, other: Self) -> Self {
+        for axis in 0..2 {
+            self.low[axis] = self.low[axis].min(other.low[axis]);
+            self.high[axis] = self.high[axis].max(other.high[axis]);
+        }
+        self.counts.iter_mut().zip(other.counts).for_each(|(own, other)| *own += other);
+        self
+    }
+
+    /// The fineness that suits all but the smallest sprites, which are widened to it.
+    ///
+    /// A few distant particles would otherwise require a fine grid of the whole flame.
+    fn finest(&self) -> usize {
+        /// 1 / fraction of the sprites that may be smaller.
+        const MAX_FINER_INVERSE: usize = 50;
+        let total: usize = self.counts.iter().sum();
+        let mut finer = 0;
+        let suits = |count: &usize| {
+            finer += count;
+            finer * MAX_FINER_INVERSE > total
+        };
+        self.counts.iter().position(suits).unwrap_or(0)
+    }
+
+    /// The pixels of the picture that sprites touch, extended to whole batches.
+    fn covered(&self, picture: [usize; 2]) -> Option<Rect> {
+        let clip = |value: [f32; 2]| {
+            let [x, y] = value.map(|value| value.max(0.0) as usize);
+            [x.min(picture[0]), y.min(picture[1])]
+        };
+        let ([x, y], [right, bottom]) = (clip(self.low), clip(self.high.map(|value| value + 1.0)));
+        (right > x && bottom > y).then(|| aligned_to_lanes(Rect { x, y, width: right - x, height: bottom - y }))
+    }
+}
+
+/// Adds the sprites whose radius belongs to this grid.
+fn add_sprites<'a, const P: usize>(
+    settings: &SplatSettings,
+    tasks: &[PooledVec<'a, Sprite<P>>],
+    is_on_this_grid: impl Fn(f32) -> bool + Sync,
+    whole_picture_columns: Range<i32>,
+    grid: &mut Grid,
+) {
+    let cells = grid.cells;
+    let (row_length, level) = (grid.row_length(), Level::new());
+    let bin = |task: &PooledVec<'a, Sprite<P>>| dispatch!(level, _simd => BinnedSprites::new(settings, task, &cells, &is_on_this_grid));
+    let binned: Vec<BinnedSprites<P>> = tasks.par_iter().map(bin).collect();
+    grid.values_mut().par_chunks_mut(ROWS_PER_TASK * row_length).enumerate().for_each(|(index, values)| {
+        let (columns, whole_picture_columns) = (cells.picture_columns(), whole_picture_columns.clone());
+        let top = cells.first[1] + (index * ROWS_PER_TASK) as i32;
+        values.fill(0.0);
+        let mut row_band = RowBand { first: top, columns, whole_picture_columns, layers: settings.layers, values };
+        for task in &binned {
+            dispatch!(level, _simd => row_band.add(settings.profile, task, index));
+        }
+    });
+}
+
+/// Rows of the grid that one task fills.
+struct RowBand<'a> {
+    /// First row and columns, in cells of the whole picture.
+    first: i32,
+    columns: Range<i32>,
+    /// Columns of the grid of the whole picture.
+    whole_picture_columns: Range<i32>,
+    layers: usize,
+    values: &'a mut [f32],
+}
+
+impl RowBand<'_> {
+    #[inline(always)]
+    fn add<const P: usize>(&mut self, profile: Profile, task: &BinnedSprites<P>, index: usize) {
+        let sums = self.values.as_chunks_mut::<P>().0;
+        let row_length = self.columns.len() * self.layers;
+        let end = self.first + (sums.len() / row_length) as i32;
+        for &member in task.of(index) {
+            let sprites = &task.sprites[usize::from(member)];
+            let (from, to) = (sprites.rows[0].max(self.first), sprites.rows[1].min(end));
+            for start in (from..to).step_by(ROWS) {
+                let chords = sprites.chords(start, &self.whole_picture_columns);
+                for y in start..to.min(start + ROWS as i32) {
+                    let row = &mut sums[(y - self.first) as usize * row_length..][..row_length];
+                    let index = (y - start) as usize;
+                    // Runs of eight cells begin where they do in the whole picture: the last of a row extends beyond the sprite.
+                    let cut = (self.columns.start - chords.first[index]).max(0) / COLUMNS as i32 * COLUMNS as i32;
+                    let end = chords.end[index].min(self.columns.end);
+                    for x in (chords.first[index] + cut..end).step_by(COLUMNS) {
+                        let weights = chords.weights(profile, sprites.falloff, index, x);
+                        match usize::try_from(x - self.columns.start) {
+                            Ok(column) => sprites.add(row, column, self.layers, &weights),
+                            Err(_) => {
+                                let before = (self.columns.start - x) as usize;
+                                sprites.add(row, 0, self.layers, &skip_first(&weights, before));
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Weights without the first `count`.
+fn skip_first(weights: &[f32; COLUMNS], count: usize) -> [f32; COLUMNS] {
+    std::array::from_fn(|lane| weights.get(lane + count).copied().unwrap_or(0.0))
+}
+
+/// The sprites of a task, binned by row band with a counting sort that keeps their order.
+struct BinnedSprites<'a, const P: usize> {
+    sprites: PooledVec<'a, RasterizedSprite<P>>,
+    starts: Vec<u32>,
+    members: Vec<u16>,
+}
+
+impl<'a, const P: usize> BinnedSprites<'a, P> {
+    #[inline(always)]
+    fn new(
+        settings: &SplatSettings,
+        task: &PooledVec<'a, Sprite<P>>,
+        cells: &Raster,
+        is_on_this_grid: impl Fn(f32) -> bool,
+    ) -> Self {
+        let mut sprites = task.scratch().take(task.len());
+        sprites.clear();
+        for sprite in task.iter() {
+            if is_on_this_grid(sprite.ellipse.radius) {
+                sprites.push(RasterizedSprite::new(settings, sprite, cells));
+            }
+        }
+        let bands_of = |sprites: &RasterizedSprite<P>| {
+            let [from, to] = sprites.rows.map(|row| (row - cells.first[1]) as usize);
+            if from < to { from / ROWS_PER_TASK..to.div_ceil(ROWS_PER_TASK) } else { 0..0 }
+        };
+        let bands = cells.rows.div_ceil(ROWS_PER_TASK);
+        let mut starts = vec![0_u32; bands + 1];
+        for sprites in sprites.iter() {
+            for row_band in bands_of(sprites) {
+                starts[row_band + 1] += 1;
+            }
+        }
+        for row_band in 0..bands {
+            starts[row_band + 1] += starts[row_band];
+        }
+        let mut ends = starts.clone();
+        let mut members = vec![0; starts[bands] as usize];
+        for (index, sprites) in sprites.iter().enumerate() {
+            for row_band in bands_of(sprites) {
+                members[ends[row_band] as usize] = index as u16;
+                ends[row_band] += 1;
+            }
+        }
+        Self { sprites, starts, members }
+    }
+
+    fn of(&self, row_band: usize) -> &[u16] {
+        &self.members[self.starts[row_band] as usize..self.starts[row_band + 1] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_are_the_coarsest_that_are_fine_enough() {
+        let settings = SplatSettings {
+            profile: Profile::LINE,
+            min_radius_cells: 2.75,
+            layers: 1,
+            picture: [0; 2],
+            window: Rect::default(),
+        };
+        let sizes: Vec<usize> = (2..10).map(cell_size).collect();
+        assert_eq!((cell_size(0), sizes), (1, vec![2, 3, 4, 6, 8, 12, 16, 24]));
+        for step in 0..4000 {
+            let radius = 0.5 + 0.25 * step as f32;
+            let size = cell_size(settings.fineness(radius));
+            let next =
+                [1, 2, 3, 4].into_iter().chain((1..).flat_map(|k| [6 << (k - 1), 8 << (k - 1)])).find(|s| *s > size);
+            assert!(size == 1 || size as f32 * 2.75 <= radius, "{radius} {size}");
+            assert!(next.is_none_or(|next| radius < 2.75 * next as f32), "{radius} {size} {next:?}");
+        }
+    }
+}

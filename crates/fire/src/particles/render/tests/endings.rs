@@ -4,14 +4,14 @@ use bansho_base::math::Vec3;
 
 use super::*;
 
-const ENDING: Ending = Ending { seconds: 0.1, domain: [Vec3::splat(-1.0), Vec3::ONE] };
+const ENDING: FadeOut = FadeOut { seconds: 0.1, domain: [Vec3::splat(-1.0), Vec3::ONE] };
 
 /// Optical depth in the middle of a lone ball of smoke that lives for a second, and by how much it bends the light beside.
 fn seen(particle: Particle) -> [f64; 2] {
-    let (memory, wind, air) = (Memory::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
+    let (scratch, wind, air) = (ScratchPool::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
     let particles = cloud([particle]);
-    let gas = Gas { ending: ENDING, ..gas(&particles, &memory) };
+    let gas = Gas { fade_out: ENDING, ..gas(&particles, &scratch) };
     let (view, look) = (view(camera()), smooth());
     let prepared = PreparedGas::new(gas, &look, &view, &surroundings, &Unobserved).unwrap();
     let mut strip = Strip::default();
@@ -40,13 +40,13 @@ fn smoke_and_haze_fade_before_the_gas_is_removed() {
 fn gas_fades_toward_the_side_of_the_domain_through_which_it_leaves() {
     let at = |x: f32, velocity: f32| {
         let smoke = Particle { velocity: [velocity, 0.0, 0.0], ..ball(0, [0.0; 3], 600.0, 1e-6) };
-        f64::from(ENDING.share(Vec3::X * x, Vec3::from(smoke.velocity), 1.0))
+        f64::from(ENDING.remaining_fraction(Vec3::X * x, Vec3::from(smoke.velocity), 1.0))
     };
-    // Two metres a second leave 0.1 s at 0.8 m.
+    // Two meters a second leave 0.1 s at 0.8 m.
     for (x, velocity, left) in
         [(0.79, 2.0, 1.0), (0.9, 2.0, 0.5), (1.0, 2.0, 0.0), (0.9, -2.0, 1.0), (-0.9, -2.0, 0.5), (0.9, 0.0, 1.0)]
     {
-        let share = at(x, velocity);
-        assert!((share - left).abs() < 1e-5, "{share} for {left} at {x} with {velocity}");
+        let ratio = at(x, velocity);
+        assert!((ratio - left).abs() < 1e-5, "{ratio} for {left} at {x} with {velocity}");
     }
 }

@@ -45,9 +45,9 @@ fn view(camera: CameraParameters) -> View {
 }
 
 /// A litre of gas at `position`.
-fn ball(birth: u64, position: [f32; 3], temperature: f32, soot: f32) -> Particle {
+fn ball(id: u64, position: [f32; 3], temperature: f32, soot: f32) -> Particle {
     Particle {
-        birth,
+        id,
         position,
         velocity: [0.0; 3],
         mass: 0.0002,
@@ -55,7 +55,7 @@ fn ball(birth: u64, position: [f32; 3], temperature: f32, soot: f32) -> Particle
         temperature,
         support_radius: 0.3,
         age: 0.1,
-        life: 1.0,
+        max_age: 1.0,
         fuel: 0.0,
         soot,
     }
@@ -69,13 +69,13 @@ fn cloud(balls: impl IntoIterator<Item = Particle>) -> Particles {
 
 /// A cloud of glowing gas around the origin.
 fn glowing_cloud(count: u64) -> Particles {
-    cloud((0..count).map(|birth| {
-        let [x, y, z, w] = Key::new(3, "cloud").uniforms(birth, 0, Purpose::named("place")).map(|u| u - 0.5);
-        ball(birth, [0.9 * x, 1.2 * y, 0.9 * z], 1700.0 + 300.0 * w, 4e-7)
+    cloud((0..count).map(|id| {
+        let [x, y, z, w] = Key::new(3, "cloud").uniforms(id, 0, Purpose::named("place")).map(|u| u - 0.5);
+        ball(id, [0.9 * x, 1.2 * y, 0.9 * z], 1700.0 + 300.0 * w, 4e-7)
     }))
 }
 
-fn gas<'a>(particles: &'a Particles, memory: &'a Memory) -> Gas<'a> {
+fn gas<'a>(particles: &'a Particles, scratch: &'a ScratchPool) -> Gas<'a> {
     Gas {
         particles,
         time: 1.0,
@@ -84,8 +84,8 @@ fn gas<'a>(particles: &'a Particles, memory: &'a Memory) -> Gas<'a> {
         base: DVec3::ZERO,
         size: DVec2::ONE,
         key: Key::new(1, "flame"),
-        ending: Ending::NEVER,
-        memory,
+        fade_out: FadeOut::NEVER,
+        scratch,
     }
 }
 
@@ -97,8 +97,8 @@ fn smooth() -> LookParameters {
 fn prepared<T>(particles: &Particles, look: &LookParameters, view: &View, each: impl FnOnce(&PreparedGas) -> T) -> T {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
-    let memory = Memory::default();
-    each(&PreparedGas::new(gas(particles, &memory), look, view, &surroundings, &Unobserved).unwrap())
+    let scratch = ScratchPool::default();
+    each(&PreparedGas::new(gas(particles, &scratch), look, view, &surroundings, &Unobserved).unwrap())
 }
 
 /// The whole picture drawn as one strip, with AOVs where wanted and a plate at `plate` m.
@@ -156,7 +156,7 @@ fn all_the_light_of_a_thin_ball_arrives() {
 }
 
 #[test]
-fn a_hotter_flame_is_brighter_by_the_ratio_of_physics_and_has_its_colour() {
+fn a_hotter_flame_is_brighter_by_the_ratio_of_physics_and_has_its_color() {
     let view = view(camera());
     let pixel = |temperature: f32| {
         let strip = drawn(&cloud([ball(0, [0.0; 3], temperature, 1e-8)]), &smooth(), &view, 0, None);
@@ -247,7 +247,7 @@ fn lights_carry_the_light_of_the_picture() {
     let scale = view.camera.focal_pixels / DISTANCE;
     let strip = drawn(&thin, &smooth(), &view, 0, None);
     let seen: f64 = strip.radiance[0].iter().map(|value| f64::from(*value)).sum::<f64>() / (scale * scale);
-    let lights = luminous(&gas(&thin, &Memory::default()), &LookParameters::default(), 1.0);
+    let lights = point_lights_of_gas(&gas(&thin, &ScratchPool::default()), &LookParameters::default(), 1.0);
     assert_eq!(lights.len(), 3);
     let sum: f64 = lights.iter().map(|light| f64::from(light.intensity[0])).sum();
     assert!((sum / seen - 1.0).abs() < 0.02, "{sum} {seen}");
@@ -374,8 +374,8 @@ fn temperature_is_weighted_by_light_and_stays_among_those_that_are_there() {
     let (cold, hot) = (ball(0, [0.0; 3], 1400.0, 1e-8), ball(1, [0.0, 0.0, -0.5], 1800.0, 1e-8));
     let both = drawn(&cloud([cold, hot]), &smooth(), &view, AOVS.len(), None);
     // Both are thin and as large, but the farther one is seen smaller by the ratio of distances.
-    let shares = [cold, hot].map(|ball| black(ball.temperature));
-    let expected = (1400.0 * shares[0] + 1800.0 * shares[1]) / (shares[0] + shares[1]);
+    let weights = [cold, hot].map(|ball| black(ball.temperature));
+    let expected = (1400.0 * weights[0] + 1800.0 * weights[1]) / (weights[0] + weights[1]);
     let seen = aov(&both, "temperature_k", 80, 60);
     assert!((seen - expected).abs() < 3.0, "{seen} for {expected}");
     let crowd = drawn(&glowing_cloud(400), &smooth(), &view, AOVS.len(), None);
@@ -426,13 +426,13 @@ fn motion_smears_the_sprite_along_its_way_and_loses_no_light() {
 
 /// Light and opacity in the middle of a ball of gas among lights of so much illuminance.
 fn lit_ball(ball: Particle, look: &LookParameters, illuminance: f32) -> ([f64; 3], f64) {
-    let (view, memory, wind, air) =
-        (view(camera()), Memory::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
+    let (view, scratch, wind, air) =
+        (view(camera()), ScratchPool::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
     let sun = Light { emitter: Emitter::Directional { toward: DVec3::Y }, intensity: [illuminance; 3] };
     let others = Publication { lights: vec![sun], ..Publication::default() };
     let surroundings = Surroundings { air: &air, others, ..Surroundings::of_wind(&wind) };
     let particles = cloud([ball]);
-    let prepared = PreparedGas::new(gas(&particles, &memory), look, &view, &surroundings, &Unobserved).unwrap();
+    let prepared = PreparedGas::new(gas(&particles, &scratch), look, &view, &surroundings, &Unobserved).unwrap();
     let mut strip = Strip::default();
     strip.reset(Rect::of_size(SIZE[0], SIZE[1]), None, 0);
     prepared.draw(&DepthInterval::ALL, &mut strip);
@@ -471,11 +471,11 @@ fn freshly_burning_gas_shines_blue_and_hides_nothing_until_soot_outshines_it() {
     // Yellow flames are not blue: soot quenches CH and C2 and outshines what is left.
     let (sooty, _) = lit_ball(begun(0.94, 1e-6), &once, 0.0);
     assert!(sooty[0] > 2.0 * sooty[2], "{sooty:?}");
-    let share = gas_blue(begun(0.94, 1e-6)) / gas_blue(begun(0.94, 0.0));
-    assert!(share < 0.02, "{share}");
+    let ratio = gas_blue(begun(0.94, 1e-6)) / gas_blue(begun(0.94, 0.0));
+    assert!(ratio < 0.02, "{ratio}");
 }
 
-/// Luminance of a metre of a particle's gas in blue light.
+/// Luminance per meter of a particle's gas in blue light.
 fn gas_blue(ball: Particle) -> f64 {
-    gas(&cloud([ball]), &Memory::default()).blue(0, &smooth())
+    gas(&cloud([ball]), &ScratchPool::default()).blue_luminance(0, &smooth())
 }

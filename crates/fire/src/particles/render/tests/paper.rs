@@ -10,9 +10,9 @@ fn the_papers_sprites_add_up_and_fall_off_as_poly6() {
     let two = drawn(&cloud([ball(0, [0.0; 3], 1800.0, 0.0), ball(1, [0.0; 3], 1800.0, 0.0)]), &look, &view, 0, None);
     assert!((luminance(&two, 80, 60) / luminance(&one, 80, 60) - 2.0).abs() < 1e-4);
     let scale = view.camera.focal_pixels / DISTANCE;
-    let share = 1.0 - (14.5 / scale / 0.3) * (14.5 / scale / 0.3);
+    let s = 1.0 - (14.5 / scale / 0.3) * (14.5 / scale / 0.3);
     let ratio = luminance(&one, 94, 60) / luminance(&one, 80, 60);
-    assert!((ratio - share * share * share).abs() < 0.04, "{ratio} for {}", share * share * share);
+    assert!((ratio - s * s * s).abs() < 0.04, "{ratio} for {}", s * s * s);
     assert!((luminance(&one, 80, 60) / black(1800.0) - 0.1).abs() < 0.005);
 }
 
@@ -24,7 +24,7 @@ fn the_papers_sprites_hide_as_much_as_their_gas_is_dense() {
     let view = view(camera());
     let strip = drawn(&cloud([thin, dense]), &look, &view, 0, None);
     let scale = view.camera.focal_pixels / DISTANCE;
-    // Opacity follows from the density alone, not from soot: 0.3 at the centre of gas of the mean density, here of two thin balls.
+    // Opacity follows from the density alone, not from soot: 0.3 at the center of gas of the mean density, here of two thin balls.
     for (x, depth) in [(-0.5, 0.15), (0.5, 0.45)] {
         let index = 60 * SIZE[0] + (80.0 + x * scale) as usize;
         let opacity = 1.0 - f64::from(strip.transmittance(index)[0]);

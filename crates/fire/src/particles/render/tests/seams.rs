@@ -4,14 +4,14 @@ use super::*;
 
 /// A wall of gas before the camera; what lies to the right was born `apart` from there.
 fn wall(apart: [f32; 3]) -> Particles {
-    let mut particles = cloud((0..6000).map(|birth| {
-        let [x, y, z, _] = Key::new(8, "wall").uniforms(birth, 0, Purpose::named("place")).map(|u| u - 0.5);
-        ball(birth, [2.4 * x, 1.8 * y, 0.2 * z], 1750.0, 1.5e-7)
+    let mut particles = cloud((0..6000).map(|id| {
+        let [x, y, z, _] = Key::new(8, "wall").uniforms(id, 0, Purpose::named("place")).map(|u| u - 0.5);
+        ball(id, [2.4 * x, 1.8 * y, 0.2 * z], 1750.0, 1.5e-7)
     }));
     particles.support_radius.fill(0.15);
     for index in 0..particles.len() {
         if particles.position[0][index] > 0.0 {
-            (0..3).for_each(|axis| particles.birthplace[axis][index] += apart[axis]);
+            (0..3).for_each(|axis| particles.spawn_point[axis][index] += apart[axis]);
         }
     }
     particles

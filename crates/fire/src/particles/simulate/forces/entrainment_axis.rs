@@ -1,8 +1,9 @@
-//! Why flames narrow upward: gas that rises ever faster must draw together, since its volume stays.
+//! Entrainment toward the plume axis: why flames narrow upward.
 //!
-//! Where gas on the axis gains speed at the rate `du/dh`, continuity moves the gas around at `-(r/2) du/dh`; air enters a fire no
-//! faster than its entrainment allows, a share of the speed on the axis, and at the base about a fifth of `sqrt(g D)`. The axis is
-//! where the gas is: the mean place in each layer of height, so that it leans with the wind.
+//! Rising gas accelerates and its volume is conserved, so it must contract. Where gas on the axis gains speed at the rate `du/dh`,
+//! continuity moves the surrounding gas inward at `-(r/2) du/dh`. The inflow is limited to a fraction of the speed on the axis (the
+//! entrainment), plus about a fifth of `sqrt(g D)` at the base. The axis is the mean position of the gas in each layer of height,
+//! so it leans with the wind.
 
 use bansho_base::{
     math::{
@@ -17,35 +18,41 @@ use fearless_simd::{Simd, prelude::*};
 
 /// Layers of height.
 const LAYERS: usize = 24;
-/// Greatest speed at which gas draws together, as a share of the speed on the axis.
-const GREATEST_SHARE: f32 = 0.2;
+/// Greatest inflow velocity as a fraction of the speed on the axis.
+const MAX_INFLOW_FRACTION: f32 = 0.2;
 
-/// What air at the base adds to that, in `sqrt(g D)`.
+/// Additional inflow velocity at the base, in `sqrt(g D)`.
 const INFLOW_FROUDE: f64 = 0.2;
 
-/// The axis of one burner's gas.
+/// The plume axis of one burner.
 #[derive(Clone, Debug)]
-pub(crate) struct Axis {
+pub(crate) struct PlumeAxis {
     base: f32,
-    /// Layers a metre.
+    /// Layers per meter.
     scale: f32,
     /// Mean x and z of the gas in each layer.
-    middle: [[f32; 2]; LAYERS + 1],
+    centers: [[f32; 2]; LAYERS + 1],
     speed_squared: f32,
     acceleration: f32,
-    /// Speed of the air that flows in at the base, m/s.
+    /// Inflow velocity at the base, m/s.
     inflow: f32,
     strength: f32,
-    /// The burner's width, m: farther out gas belongs to another part of a large burner.
+    /// The burner's diameter, m. The inflow fades out between one and two of them from the axis.
     reach: f32,
 }
 
-/// The axes of all burners at `t`; the particles at `positions` came from burners of these numbers.
-pub(crate) fn axes(burners: &[Burner], positions: [&[f32]; 3], numbers: &[u32], strength: f64, t: f64) -> Vec<Axis> {
-    let scale = |burner: &Burner| LAYERS as f64 / (1.5 * burner.height + burner.reach);
+/// The plume axes of all burners at `t`; `burner_indices` are the burners that the particles at `positions` came from.
+pub(crate) fn plume_axes(
+    burners: &[Burner],
+    positions: [&[f32]; 3],
+    burner_indices: &[u32],
+    strength: f64,
+    t: f64,
+) -> Vec<PlumeAxis> {
+    let scale = |burner: &Burner| LAYERS as f64 / (1.5 * burner.height + burner.bounding_radius);
     let bases: Vec<(f64, f64)> = burners.iter().map(|b| (b.position(t).y, scale(b))).collect();
     let mut sums = vec![[[0.0_f64; 3]; LAYERS + 1]; burners.len()];
-    for (index, &number) in numbers.iter().enumerate() {
+    for (index, &number) in burner_indices.iter().enumerate() {
         let (base, scale) = bases[number as usize];
         let layer = ((f64::from(positions[1][index]) - base) * scale + 0.5).clamp(0.0, LAYERS as f64) as usize;
         let [x, z] = [positions[0][index], positions[2][index]].map(f64::from);
@@ -55,16 +62,16 @@ pub(crate) fn axes(burners: &[Burner], positions: [&[f32]; 3], numbers: &[u32], 
     burners
         .iter()
         .zip(&sums)
-        .map(|(burner, sums)| Axis::new(burner, burner.position(t), scale(burner), sums, strength))
+        .map(|(burner, sums)| PlumeAxis::new(burner, burner.position(t), scale(burner), sums, strength))
         .collect()
 }
 
-impl Axis {
+impl PlumeAxis {
     fn new(burner: &Burner, base: DVec3, scale: f64, sums: &[[f64; 3]; LAYERS + 1], strength: f64) -> Self {
         let mut axis = Self {
             base: base.y as f32,
             scale: scale as f32,
-            middle: [[base.x as f32, base.z as f32]; LAYERS + 1],
+            centers: [[base.x as f32, base.z as f32]; LAYERS + 1],
             speed_squared: (burner.speed * burner.speed) as f32,
             acceleration: burner.acceleration as f32,
             inflow: (INFLOW_FROUDE * math::sqrt(STANDARD_GRAVITY * burner.diameter)) as f32,
@@ -75,64 +82,65 @@ impl Axis {
         axis
     }
 
-    /// Means of layers, each with the layers beside it; empty layers take over the one below.
+    /// Mean position of each layer and its two neighbors; an empty layer takes the mean below.
     fn smooth(&mut self, sums: &[[f64; 3]; LAYERS + 1]) {
         for layer in 0..=LAYERS {
             let beside = layer.saturating_sub(1)..(layer + 2).min(LAYERS + 1);
             let total = |k: usize| sums[beside.clone()].iter().map(|sum| sum[k]).sum::<f64>();
             let count = total(2);
             if count > 0.0 {
-                self.middle[layer] = [(total(0) / count) as f32, (total(1) / count) as f32];
+                self.centers[layer] = [(total(0) / count) as f32, (total(1) / count) as f32];
             } else if layer > 0 {
-                self.middle[layer] = self.middle[layer - 1];
+                self.centers[layer] = self.centers[layer - 1];
             }
         }
     }
 
-    /// Where the axis is at `height` above the burner: x and z, m.
+    /// Position of the axis at `height` above the burner: x and z, m.
     #[inline(always)]
     pub(crate) fn at(&self, height: f32) -> [f32; 2] {
         let layer = (height * self.scale).clamp(0.0, LAYERS as f32 - 1e-3);
-        let (below, part) = (layer as usize, layer.fract());
-        [0, 1].map(|k| self.middle[below][k] + (self.middle[below + 1][k] - self.middle[below][k]) * part)
+        let (below, fraction) = (layer as usize, layer.fract());
+        [0, 1].map(|k| self.centers[below][k] + (self.centers[below + 1][k] - self.centers[below][k]) * fraction)
     }
 
-    /// Velocity at which gas at `place` draws toward the axis, m/s.
+    /// Velocity of gas at `position` toward the axis, m/s.
     #[inline(always)]
-    pub(crate) fn velocity<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
-        let like = |value: f32| Lanes::splat(simd, value);
-        let height = (place[1] - like(self.base)).simd_max(like(0.0));
-        let [x, z] = self.middle_at(simd, height);
-        let away = [place[0] - x, place[2] - z];
-        let distance = away[0].fma(away[0], away[1] * away[1]).simd_sqrt();
-        let speed_squared = height.fma(like(2.0 * self.acceleration), like(self.speed_squared));
-        let speed = speed_squared.simd_sqrt().simd_max(like(1e-6));
-        // The pull of one axis ends where a large burner has others of its own.
-        let near = (like(2.0) - distance * like(1.0 / self.reach)).simd_clamp01();
-        let greatest = speed.fma(like(GREATEST_SHARE), like(self.inflow));
-        let inward = (distance * like(0.5 * self.acceleration) / speed).simd_min(greatest) * near * like(self.strength);
-        let pull = (like(0.0) - inward) / distance.simd_max(like(f32::MIN_POSITIVE));
-        [away[0] * pull, like(0.0), away[1] * pull]
+    pub(crate) fn velocity<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        let splat = |value: f32| Lanes::splat(simd, value);
+        let height = (position[1] - splat(self.base)).simd_max(splat(0.0));
+        let [x, z] = self.centers_at(simd, height);
+        let offset = [position[0] - x, position[2] - z];
+        let distance = offset[0].fma(offset[0], offset[1] * offset[1]).simd_sqrt();
+        let speed_squared = height.fma(splat(2.0 * self.acceleration), splat(self.speed_squared));
+        let speed = speed_squared.simd_sqrt().simd_max(splat(1e-6));
+        // A large burner has several plumes: the inflow toward one axis ends at two diameters.
+        let attenuation = (splat(2.0) - distance * splat(1.0 / self.reach)).simd_clamp01();
+        let greatest = speed.fma(splat(MAX_INFLOW_FRACTION), splat(self.inflow));
+        let inward =
+            (distance * splat(0.5 * self.acceleration) / speed).simd_min(greatest) * attenuation * splat(self.strength);
+        let pull = (splat(0.0) - inward) / distance.simd_max(splat(f32::MIN_POSITIVE));
+        [offset[0] * pull, splat(0.0), offset[1] * pull]
     }
 
-    /// Where the axis is at heights above the burner: x and z, m.
+    /// Position of the axis at heights above the burner: x and z, m.
     #[inline(always)]
-    fn middle_at<S: Simd>(&self, simd: S, height: Lanes<S>) -> [Lanes<S>; 2] {
-        let place = (height * height.broadcast(self.scale)).simd_min(height.broadcast(LAYERS as f32 - 1e-3));
-        let (layer, part) = wrap_split(place, 31);
+    fn centers_at<S: Simd>(&self, simd: S, height: Lanes<S>) -> [Lanes<S>; 2] {
+        let position = (height * height.broadcast(self.scale)).simd_min(height.broadcast(LAYERS as f32 - 1e-3));
+        let (layer, fraction) = wrap_split(position, 31);
         let mut layers = [0; LANES];
         layer.store_slice(&mut layers);
-        let mut middle = [part; 2];
+        let mut centers = [fraction; 2];
         for k in 0..2 {
             let (mut below, mut above) = ([0.0; LANES], [0.0; LANES]);
             for lane in 0..LANES {
                 let layer = (layers[lane] as usize).min(LAYERS - 1);
-                (below[lane], above[lane]) = (self.middle[layer][k], self.middle[layer + 1][k]);
+                (below[lane], above[lane]) = (self.centers[layer][k], self.centers[layer + 1][k]);
             }
             let (below, above) = (Lanes::from_slice(simd, &below), Lanes::from_slice(simd, &above));
-            middle[k] = part.fma(above - below, below);
+            centers[k] = fraction.fma(above - below, below);
         }
-        middle
+        centers
     }
 }
 
@@ -143,20 +151,20 @@ mod tests {
     use super::*;
     use crate::particles::parameters::{BurnerParameters, FlameParticlesParameters};
 
-    fn velocity(axis: &Axis, place: Vec3) -> Vec3 {
+    fn velocity(axis: &PlumeAxis, position: Vec3) -> Vec3 {
         bansho_base::dispatch_baseline!(simd => {
-            let velocity = axis.velocity(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
+            let velocity = axis.velocity(simd, &position.to_array().map(|x| Lanes::splat(simd, x)));
             Vec3::from(velocity.map(|values| values.as_slice()[3]))
         })
     }
 
-    fn axis(strength: f64) -> Axis {
+    fn axis(strength: f64) -> PlumeAxis {
         let parameters = BurnerParameters { height: bansho_base::parameters::Auto::Set(1.0), ..Default::default() };
         let burner = Burner::new(&parameters, &FlameParticlesParameters::default(), &MemoryAssets::default()).unwrap();
-        // A column that leans to +x: x = y / 2.
+        // A column that leans toward +x: x = y / 2.
         let y: Vec<f32> = (0..200).map(|i| i as f32 / 150.0).collect();
         let x: Vec<f32> = y.iter().map(|y| 0.5 * y).collect();
-        axes(&[burner], [&x, &y, &[0.0; 200]], &[0; 200], strength, 0.0).remove(0)
+        plume_axes(&[burner], [&x, &y, &[0.0; 200]], &[0; 200], strength, 0.0).remove(0)
     }
 
     #[test]
@@ -174,7 +182,7 @@ mod tests {
         for start in 0..40 {
             let heights: [f32; LANES] = std::array::from_fn(|lane| 0.003 * (start * LANES + lane) as f32);
             let together = bansho_base::dispatch_baseline!(simd => {
-                axis.middle_at(simd, Lanes::from_slice(simd, &heights)).map(|values| values.as_slice().to_vec())
+                axis.centers_at(simd, Lanes::from_slice(simd, &heights)).map(|values| values.as_slice().to_vec())
             });
             for (lane, height) in heights.into_iter().enumerate() {
                 let alone = axis.at(height);

@@ -1,157 +1,230 @@
-//! All that acts on the gas from outside in a step: wind, eddies, vortex rings, the draw toward the axis.
-
-use bansho_base::{
-    math::{DVec3, Vec3, random::Key},
-    phenomenon::surroundings::{Occluder, Surroundings},
-    world::{air::Air, gravity::STANDARD_GRAVITY},
-};
+//! External forces of a step: wind, eddies, vortex rings and inflow toward the plume axis, for each burner; sixteen particles at a
+//! time.
 
 use super::{
-    burner_forces::Draught,
-    entrainment_axis::{Axis, axes},
-    turbulence::{Eddies, Turbulence},
-    vortex_rings::{Ring, rings},
-    wind::Breeze,
+    entrainment_axis::{PlumeAxis, plume_axes},
+    turbulence::{EddyField, TurbulenceTile},
+    vortex_rings::{VortexRing, active_rings},
+    wind_field::WindField,
 };
 use crate::particles::{
     parameters::{FlameParticlesParameters, WindForce},
-    simulate::{derived::Design, particles::Particles},
+    simulate::{
+        derived::DerivedConstants,
+        particle_lanes::{add_scaled, length, subtract},
+        particles::Particles,
+    },
 };
+use bansho_base::{
+    math::{
+        DVec3, Vec3,
+        random::Key,
+        simd::{Lanes, Real},
+    },
+    phenomenon::surroundings::{Occluder, Surroundings},
+    world::{air::Air, gravity::STANDARD_GRAVITY},
+};
+use fearless_simd::{Simd, prelude::*};
 use rayon::prelude::*;
 
-/// Where turbulence has grown to half its strength, as a share of the time that gas takes to the tip.
+/// Age at which turbulence has grown to half its strength, as a fraction of the rise time.
 const TURBULENT_AGE: f32 = 0.1;
 
-/// Speed at which eddies drift beside the wind: the gas that holds them takes it up as it rises.
+/// Drift velocity of eddies as a fraction of the wind's: the gas that holds them takes up the wind as it rises.
 const EDDY_DRIFT: f64 = 0.5;
 
-/// Drag coefficient of a fire in wind from the side.
+/// Drag coefficient of a fire in cross wind.
 const CROSS_DRAG: f64 = 0.25;
 
-/// Share of its fuel that gas burns on a way as long as the flame is high, on the mean; and in the time that it takes there.
-const WAY_SHARE: f64 = 1.02;
-const TIME_SHARE: f64 = 0.25;
+/// Mean fraction of its fuel that gas burns per flame height of travel, and per rise time.
+const BURNED_PER_HEIGHT: f64 = 1.02;
+const BURNED_PER_RISE_TIME: f64 = 0.25;
 
-/// Particles of a task.
-const PARTICLES_OF_TASK: usize = 8192;
+/// Particles per task of the thread pool.
+const PARTICLES_PER_TASK: usize = 8192;
 
-/// What of a fire stays while it burns.
+/// What does not change while a fire burns.
 #[derive(Clone, Copy)]
-pub(crate) struct Setting<'a> {
+pub(crate) struct StepConstants<'a> {
     pub(crate) parameters: &'a FlameParticlesParameters,
-    pub(crate) design: &'a Design,
-    pub(crate) turbulence: &'a Turbulence,
+    pub(crate) constants: &'a DerivedConstants,
+    pub(crate) turbulence: &'a TurbulenceTile,
     pub(crate) key: Key,
 }
 
-/// What acts on the gas in a step.
-pub(crate) struct Weather<'a> {
-    setting: Setting<'a>,
-    around: &'a Surroundings<'a>,
+/// The external forces of one step.
+pub(crate) struct ExternalForces<'a> {
+    step: StepConstants<'a>,
+    surroundings: &'a Surroundings<'a>,
     pub(crate) origin: DVec3,
     pub(crate) occluders: &'a [Occluder],
     pub(crate) air_temperature: f32,
-    /// Gravity against which gas rises, m/s^2.
+    /// Gravity times the buoyancy parameter, m/s^2.
     pub(crate) buoyancy: f32,
     pub(crate) wind: WindForce,
     pub(crate) wind_gain: f32,
     /// Density of air at 1 K, kg K/m^3.
-    pub(crate) density_kelvin: f32,
-    /// The air's motion over each burner.
-    pub(crate) draughts: Vec<Draught<'a>>,
+    pub(crate) density_at_1_k: f32,
+    /// The forces on the gas of each burner.
+    pub(crate) burner_forces: Vec<BurnerForces<'a>>,
 }
 
-impl<'a> Weather<'a> {
-    /// The weather of a step that begins at `t`.
-    pub(crate) fn new(setting: Setting<'a>, particles: &Particles, around: &'a Surroundings, t: f64) -> Self {
-        let Setting { parameters: flame, design, .. } = setting;
-        let axes = axes(&design.burners, particles.positions(), &particles.burner, flame.motion.narrowing, t);
-        let bounds = bounds(particles, design.burners.len());
-        let draughts = axes.into_iter().zip(bounds).enumerate().map(|(number, (axis, bounds))| {
-            let breeze = Breeze::new(around.wind, particles.origin, bounds, t);
-            setting.draught(number, axis, breeze, around, t)
+impl<'a> ExternalForces<'a> {
+    /// The external forces of a step that begins at `t`.
+    pub(crate) fn new(step: StepConstants<'a>, particles: &Particles, surroundings: &'a Surroundings, t: f64) -> Self {
+        let StepConstants { parameters: flame, constants, .. } = step;
+        let plume_axes =
+            plume_axes(&constants.burners, particles.positions(), &particles.burner, flame.motion.narrowing, t);
+        let bounds = bounds(particles, constants.burners.len());
+        let burner_forces = plume_axes.into_iter().zip(bounds).enumerate().map(|(index, (axis, bounds))| {
+            let wind_field = WindField::new(surroundings.wind, particles.origin, bounds, t);
+            step.burner(index, axis, wind_field, surroundings, t)
         });
         Self {
-            draughts: draughts.collect(),
-            setting,
-            around,
+            burner_forces: burner_forces.collect(),
+            step,
+            surroundings,
             origin: particles.origin,
-            occluders: &around.others.occluders,
-            air_temperature: around.air.temperature_k as f32,
+            occluders: &surroundings.others.occluders,
+            air_temperature: surroundings.air.temperature_k as f32,
             buoyancy: (STANDARD_GRAVITY * flame.motion.buoyancy) as f32,
             wind: flame.motion.wind,
             wind_gain: flame.motion.wind_gain as f32,
-            density_kelvin: density_kelvin(around.air),
+            density_at_1_k: density_at_1_k(surroundings.air),
         }
     }
 
-    /// Lets rings and eddies go on to the moment `t`; axes and wind stay for the step.
-    pub(crate) fn pass(&mut self, t: f64) {
-        for (number, draught) in self.draughts.iter_mut().enumerate() {
-            draught.rings = self.setting.rings(number, &draught.axis, t);
-            draught.eddies = self.setting.eddies(number, self.around, t);
+    /// Advances vortex rings and eddies to `t`; plume axes and wind are kept for the whole step.
+    pub(crate) fn advance_vortex_rings(&mut self, t: f64) {
+        for (index, burner) in self.burner_forces.iter_mut().enumerate() {
+            burner.rings = self.step.rings(index, &burner.axis, t);
+            burner.eddies = self.step.eddies(index, self.surroundings, t);
         }
     }
 }
 
-impl<'a> Setting<'a> {
-    fn draught(self, number: usize, axis: Axis, breeze: Breeze, around: &Surroundings, t: f64) -> Draught<'a> {
-        let (burner, motion) = (&self.design.burners[number], &self.parameters.motion);
-        Draught {
-            breeze,
-            rings: self.rings(number, &axis, t),
+impl<'a> StepConstants<'a> {
+    fn burner(
+        self,
+        index: usize,
+        axis: PlumeAxis,
+        wind_field: WindField,
+        surroundings: &Surroundings,
+        t: f64,
+    ) -> BurnerForces<'a> {
+        let (burner, motion) = (&self.constants.burners[index], &self.parameters.motion);
+        BurnerForces {
+            wind_field,
+            rings: self.rings(index, &axis, t),
             axis,
-            eddies: self.eddies(number, around, t),
+            eddies: self.eddies(index, surroundings, t),
             turbulence: motion.turbulence as f32,
             turbulent_age: TURBULENT_AGE * burner.rise_time() as f32,
             entrainment: (motion.entrainment / (0.5 * burner.diameter)) as f32,
             drag: (CROSS_DRAG * motion.wind_gain / (0.5 * burner.diameter)) as f32,
-            burning: [(WAY_SHARE / burner.height) as f32, (TIME_SHARE / burner.rise_time()) as f32],
+            burning: [(BURNED_PER_HEIGHT / burner.height) as f32, (BURNED_PER_RISE_TIME / burner.rise_time()) as f32],
         }
     }
 
-    fn rings(self, number: usize, axis: &Axis, t: f64) -> Vec<Ring> {
-        rings(&self.design.burners[number], self.parameters, self.key, number as u32, t, axis)
+    fn rings(self, index: usize, axis: &PlumeAxis, t: f64) -> Vec<VortexRing> {
+        active_rings(&self.constants.burners[index], self.parameters, self.key, index as u32, t, axis)
     }
 
-    fn eddies(self, number: usize, around: &Surroundings, t: f64) -> Eddies<'a> {
-        let (burner, motion) = (&self.design.burners[number], &self.parameters.motion);
-        let drift = around.wind.travel(0.0, t) * (EDDY_DRIFT * motion.wind_gain);
+    fn eddies(self, index: usize, surroundings: &Surroundings, t: f64) -> EddyField<'a> {
+        let (burner, motion) = (&self.constants.burners[index], &self.parameters.motion);
+        let drift = surroundings.wind.travel(0.0, t) * (EDDY_DRIFT * motion.wind_gain);
         self.turbulence.at(t, motion.eddy_size * burner.diameter, burner.axis_speed(0.5 * burner.height), drift)
     }
 }
 
-fn density_kelvin(air: &Air) -> f32 {
+fn density_at_1_k(air: &Air) -> f32 {
     air.density_at(1.0) as f32
 }
 
-/// Corners of the box around the particles of each burner.
+/// Bounding box of the particles of each burner.
 fn bounds(particles: &Particles, burners: usize) -> Vec<[Vec3; 2]> {
-    const NOTHING: [Vec3; 2] = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+    const EMPTY: [Vec3; 2] = [Vec3::INFINITY, Vec3::NEG_INFINITY];
     let [x, y, z] = particles.positions();
     let of_task = |first: usize| {
-        let mut bounds = vec![NOTHING; burners];
-        for index in first..(first + PARTICLES_OF_TASK).min(particles.len()) {
-            let place = Vec3::new(x[index], y[index], z[index]);
+        let mut bounds = vec![EMPTY; burners];
+        for index in first..(first + PARTICLES_PER_TASK).min(particles.len()) {
+            let position = Vec3::new(x[index], y[index], z[index]);
             let [low, high] = &mut bounds[particles.burner[index] as usize];
-            (*low, *high) = (low.min(place), high.max(place));
+            (*low, *high) = (low.min(position), high.max(position));
         }
         bounds
     };
-    let both = |mut one: Vec<[Vec3; 2]>, other: Vec<[Vec3; 2]>| {
+    let merge = |mut one: Vec<[Vec3; 2]>, other: Vec<[Vec3; 2]>| {
         for ([low, high], [other_low, other_high]) in one.iter_mut().zip(other) {
             (*low, *high) = (low.min(other_low), high.max(other_high));
         }
         one
     };
-    let parts = (0..particles.len()).into_par_iter().step_by(PARTICLES_OF_TASK);
-    let bounds = parts.map(of_task).reduce(|| vec![NOTHING; burners], both);
-    // A burner that nothing came from yet has no wind to speak of.
+    let tasks = (0..particles.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
+    let bounds = tasks.map(of_task).reduce(|| vec![EMPTY; burners], merge);
+    // A burner without particles gets a unit box: its wind is not used.
     bounds.into_iter().map(|bounds| if bounds[0].x <= bounds[1].x { bounds } else { [Vec3::ZERO, Vec3::ONE] }).collect()
+}
+
+/// The forces on the gas of one burner.
+pub(crate) struct BurnerForces<'a> {
+    /// The wind around it.
+    pub(crate) wind_field: WindField,
+    pub(crate) rings: Vec<VortexRing>,
+    pub(crate) axis: PlumeAxis,
+    pub(crate) eddies: EddyField<'a>,
+    pub(crate) turbulence: f32,
+    /// Age at which turbulence has grown to half its strength, s.
+    pub(crate) turbulent_age: f32,
+    /// Entrainment coefficient divided by the radius of the fire, 1/m.
+    pub(crate) entrainment: f32,
+    /// Drag coefficient of cross wind divided by the radius of the fire, 1/m.
+    pub(crate) drag: f32,
+    /// Fraction of its fuel that gas burns per meter of travel, and per second.
+    pub(crate) burning: [f32; 2],
+}
+
+/// Velocity of the air at the positions of particles, m/s.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AirVelocity<R> {
+    /// That of vortex rings and of the inflow toward the axis.
+    pub(crate) steady: [R; 3],
+    /// That of eddies of unit strength.
+    pub(crate) eddies: [R; 3],
+}
+
+impl BurnerForces<'_> {
+    /// Entrainment rate, mass of air per own mass, 1/s: `alpha |u - w| / (D / 2)`, half of it for enclosed gas.
+    #[inline(always)]
+    pub(crate) fn mixing<R: Real>(&self, velocity: &[R; 3], wind: &[R; 3], air_exposure: R) -> R {
+        let splat = |value: f32| air_exposure.broadcast(value);
+        length(&subtract(velocity, wind)) * air_exposure.fma(splat(self.entrainment), splat(0.5 * self.entrainment))
+    }
+
+    /// Velocity with which the air advects gas of `speed` and `age`, m/s.
+    #[inline(always)]
+    pub(crate) fn velocity<R: Real>(&self, flow: &AirVelocity<R>, speed: R, age: R) -> [R; 3] {
+        let grown = age / (age + age.broadcast(self.turbulent_age));
+        add_scaled(&flow.steady, &flow.eddies, speed * grown * age.broadcast(self.turbulence))
+    }
+
+    /// Velocity of the air at sixteen positions.
+    #[inline(always)]
+    pub(crate) fn flow<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> AirVelocity<Lanes<S>> {
+        let mut steady = self.axis.velocity(simd, position);
+        for ring in &self.rings {
+            ring.add_velocity(position, &mut steady);
+        }
+        let none = [Lanes::splat(simd, 0.0); 3];
+        let eddies = if self.turbulence > 0.0 { self.eddies.velocity(simd, position) } else { none };
+        AirVelocity { steady, eddies }
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+    use crate::particles::{parameters::BurnerParameters, simulate::Simulation};
     use bansho_base::{
         host::assets::MemoryAssets,
         math::{random::Key, simd::Lanes},
@@ -161,11 +234,6 @@ mod tests {
         },
     };
 
-    use super::*;
-    use crate::particles::{parameters::BurnerParameters, simulate::simulation::Simulation};
-
-    use fearless_simd::prelude::*;
-
     #[test]
     fn each_burner_feels_the_wind_that_blows_where_it_stands() {
         let burners = [0.0, 50.0].map(|x| BurnerParameters { position: [x, 0.0, 0.0].into(), ..Default::default() });
@@ -174,26 +242,26 @@ mod tests {
             particles: 600,
             ..FlameParticlesParameters::default()
         };
-        let design = Design::new(&parameters, None, &MemoryAssets::default()).unwrap();
-        let mut simulation = Simulation::new(&parameters, design, Key::new(1, "flame"));
+        let constants = DerivedConstants::new(&parameters, None, &MemoryAssets::default()).unwrap();
+        let mut simulation = Simulation::new(&parameters, constants, Key::new(1, "flame"));
         let gusty = WindParameters { velocity: [2.0, 0.0, 0.0].into(), gust: 1.5, ..WindParameters::default() };
         let (wind, air) = (Wind::new(gusty, 3, None), Air::default());
-        let around = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
-        (0..30).for_each(|step| simulation.step(f64::from(step) * simulation.step_s(), &around));
-        let Simulation { parameters, design, turbulence, key, .. } = &simulation;
-        let setting = Setting { parameters, design, turbulence, key: *key };
-        let weather = Weather::new(setting, &simulation.particles, &around, 0.25);
-        let at = |burner: usize, place: Vec3| {
+        let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
+        (0..30).for_each(|step| simulation.step(f64::from(step) * simulation.step_s(), &surroundings));
+        let Simulation { parameters, constants, turbulence, key, .. } = &simulation;
+        let step = StepConstants { parameters, constants, turbulence, key: *key };
+        let forces = ExternalForces::new(step, &simulation.particles, &surroundings, 0.25);
+        let at = |burner: usize, position: Vec3| {
             bansho_base::dispatch_baseline!(simd => {
-                let lanes = place.to_array().map(|x| Lanes::splat(simd, x));
-                Vec3::from(weather.draughts[burner].breeze.at(simd, &lanes).map(|values| values.as_slice()[0]))
+                let lanes = position.to_array().map(|x| Lanes::splat(simd, x));
+                Vec3::from(forces.burner_forces[burner].wind_field.at(simd, &lanes).map(|values| values.as_slice()[0]))
             })
         };
         let (particles, mut off, mut apart) = (&simulation.particles, 0.0_f32, 0.0_f32);
         for index in 0..particles.len() {
-            let place = Vec3::from(particles.positions().map(|values| values[index]));
-            let exact = wind.at(place.as_dvec3(), 0.25).as_vec3();
-            let [own, other] = [0, 1].map(|swap| at(particles.burner[index] as usize ^ swap, place));
+            let position = Vec3::from(particles.positions().map(|values| values[index]));
+            let exact = wind.at(position.as_dvec3(), 0.25).as_vec3();
+            let [own, other] = [0, 1].map(|swap| at(particles.burner[index] as usize ^ swap, position));
             off = off.max((own - exact).length());
             apart = apart.max((other - exact).length());
         }

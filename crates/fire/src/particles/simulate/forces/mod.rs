@@ -1,8 +1,7 @@
-//! Forces beside those of pressure: buoyancy and wind, the burner's draft, entrainment, turbulence and vortex rings.
+//! External forces: buoyancy and wind, entrainment, turbulence and vortex rings.
 
-pub(crate) mod burner_forces;
 pub(crate) mod entrainment_axis;
 pub(crate) mod external_forces;
 pub(crate) mod turbulence;
 pub(crate) mod vortex_rings;
-pub(crate) mod wind;
+pub(crate) mod wind_field;

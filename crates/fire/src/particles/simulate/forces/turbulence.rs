@@ -1,7 +1,7 @@
-//! Turbulence: eddies of two sizes that rise with the gas, from tiles of divergence-free noise made once.
+//! Turbulence: curl noise in two layers that rise with the gas.
 //!
-//! The velocity is the curl of three noise potentials (Bridson, Hourihan and Nordenstam 2007), taken by central differences on a
-//! periodic grid. Two layers, one half as large, scroll at different speeds, so that eddies change while they rise.
+//! The velocity is the curl of three noise potentials (Bridson, Hourihan and Nordenstam 2007), computed once by central differences
+//! on a periodic grid. The second layer is half as large; both scroll at different speeds, so that eddies change while they rise.
 
 use std::sync::OnceLock;
 
@@ -20,53 +20,54 @@ use fearless_simd::{Simd, prelude::*, u32x16};
 const SIDE: usize = 32;
 /// Eddies along each side of the tile.
 const EDDIES: u32 = 5;
-/// Speed of the two layers beside the gas on the axis.
+/// Speed of the two layers relative to the gas on the axis.
 const LAYER_SPEED: [f64; 2] = [0.55, 0.3];
-/// Standard deviation of the two layers; their squares sum to 1.
-const LAYER_SHARE: [f32; 2] = [0.86, 0.51];
+/// Standard deviation of the two layers; the squares sum to 1.
+const LAYER_WEIGHT: [f32; 2] = [0.86, 0.51];
 
-/// A periodic field of velocity, of standard deviation 1 a component.
+/// A periodic velocity field whose components have a standard deviation of 1.
 #[derive(Clone, Debug)]
-pub(crate) struct Turbulence {
+pub(crate) struct TurbulenceTile {
     key: Key,
-    /// Velocities on the grid; the fourth number is 0.
+    /// Velocities on the grid, padded to four components.
     tile: OnceLock<Vec<[f32; 4]>>,
 }
 
-/// Turbulence at one moment.
+/// The two layers of the turbulence at one time.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Eddies<'a> {
+pub(crate) struct EddyField<'a> {
     tile: &'a [[f32; 4]],
-    /// Grid points a metre, and the place of the flame's position on the grid, for each layer.
+    /// Grid points per meter, and the origin on the grid, of each layer.
     layers: [(f32, [f32; 3]); 2],
 }
 
-impl Turbulence {
+impl TurbulenceTile {
     pub(crate) fn new(key: Key) -> Self {
         Self { key, tile: OnceLock::new() }
     }
 
-    /// The tile, made when a step first asks for it: a flame that is only checked does without.
+    /// The tile, computed when a step first needs it: a flame that is only checked does without.
     fn tile(&self) -> &[[f32; 4]] {
         get_or_make(&self.tile, || tile(self.key)).as_slice()
     }
 
-    /// A number of mean 0 and standard deviation 1 that changes over a unit of `place`.
-    pub(crate) fn patch(&self, place: DVec3) -> f32 {
-        let place = (place * (SIDE as f64 / f64::from(EDDIES))).rem_euclid(DVec3::splat(SIDE as f64));
-        sample(self.tile(), place.as_vec3())[0]
+    /// Noise of mean 0 and standard deviation 1 that varies over a unit of `position`.
+    pub(crate) fn noise(&self, position: DVec3) -> f32 {
+        let position = (position * (SIDE as f64 / f64::from(EDDIES))).rem_euclid(DVec3::splat(SIDE as f64));
+        sample(self.tile(), position.as_vec3())[0]
     }
 
-    /// The eddies at time `t`, the largest `eddy_size` m wide, rising in gas of `speed` and drifting with the wind's `drift` since time 0.
-    pub(crate) fn at(&self, t: f64, eddy_size: f64, speed: f64, drift: DVec3) -> Eddies<'_> {
+    /// The eddies at `t`, the largest `eddy_size` m wide, in gas that rises at `speed`, displaced by the wind's `drift` since time
+    /// 0.
+    pub(crate) fn at(&self, t: f64, eddy_size: f64, speed: f64, drift: DVec3) -> EddyField<'_> {
         let layer = |index: usize| {
             let scale = SIDE as f64 / (f64::from(EDDIES) * eddy_size) * (index + 1) as f64;
             let moved = DVec3::Y * (speed * LAYER_SPEED[index] * t) + drift;
-            // Shifted so that both layers do not share their zeros; reduced in f64, so that hours of time lose nothing.
+            // Offset so that the layers do not share their zeros; reduced in f64, so that hours of time lose no precision.
             let origin = (-moved * scale + 11.3 * index as f64).rem_euclid(DVec3::splat(SIDE as f64));
             (scale as f32, origin.as_vec3().to_array())
         };
-        Eddies { tile: self.tile(), layers: [layer(0), layer(1)] }
+        EddyField { tile: self.tile(), layers: [layer(0), layer(1)] }
     }
 }
 
@@ -81,84 +82,84 @@ fn tile(key: Key) -> Vec<[f32; 4]> {
     tile.into_iter().map(|velocity| velocity.extend(0.0).to_array()).collect()
 }
 
-impl Eddies<'_> {
-    /// Velocity at `place`, m from the flame's position, of standard deviation 1 a component.
+impl EddyField<'_> {
+    /// Velocity at `position`, m from the flame's position; each component has a standard deviation of 1.
     #[inline(always)]
-    pub(crate) fn velocity<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    pub(crate) fn velocity<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
         let mut sum = [Lanes::splat(simd, 0.0); 3];
         let Ok(tile) = <&[[f32; 4]; SIDE * SIDE * SIDE]>::try_from(self.tile) else { return sum };
-        for (layer, share) in LAYER_SHARE.into_iter().enumerate() {
+        for (layer, weight) in LAYER_WEIGHT.into_iter().enumerate() {
             let (scale, origin) = &self.layers[layer];
-            let mut on_grid = *place;
+            let mut grid_position = *position;
             for c in 0..3 {
-                on_grid[c] = place[c].fma(place[c].broadcast(*scale), place[c].broadcast(origin[c]));
+                grid_position[c] = position[c].fma(position[c].broadcast(*scale), position[c].broadcast(origin[c]));
             }
-            let velocity = sample_lanes(simd, tile, &on_grid);
+            let velocity = sample_lanes(simd, tile, &grid_position);
             for c in 0..3 {
-                sum[c] = velocity[c].fma(velocity[c].broadcast(share), sum[c]);
+                sum[c] = velocity[c].fma(velocity[c].broadcast(weight), sum[c]);
             }
         }
         sum
     }
 }
 
-/// A tile at places in grid points, straight between them.
+/// Trilinear interpolation of the tile at positions in grid points.
 #[inline(always)]
-fn sample_lanes<S: Simd>(simd: S, tile: &[[f32; 4]; SIDE * SIDE * SIDE], place: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+fn sample_lanes<S: Simd>(simd: S, tile: &[[f32; 4]; SIDE * SIDE * SIDE], position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
     const MASK: u32 = SIDE as u32 - 1;
     let ((x, across), (y, up), (z, along)) =
-        (wrap_split(place[0], MASK), wrap_split(place[1], MASK), wrap_split(place[2], MASK));
+        (wrap_split(position[0], MASK), wrap_split(position[1], MASK), wrap_split(position[2], MASK));
     let (next_x, next_y, next_z) = ((x + 1) & MASK, (y + 1) & MASK, (z + 1) & MASK);
     let row = Row { tile, x: [x, next_x], across };
-    let near = mixed(&row.at(simd, y, z), &row.at(simd, next_y, z), up);
-    let far = mixed(&row.at(simd, y, next_z), &row.at(simd, next_y, next_z), up);
-    let [x, y, z, _] = mixed(&near, &far, along);
+    let near = lerp4(&row.at(simd, y, z), &row.at(simd, next_y, z), up);
+    let far = lerp4(&row.at(simd, y, next_z), &row.at(simd, next_y, next_z), up);
+    let [x, y, z, _] = lerp4(&near, &far, along);
     [x, y, z]
 }
 
-/// Two neighbours in every row of the grid.
+/// Two adjacent grid columns.
 struct Row<'a, S: Simd> {
     tile: &'a [[f32; 4]; SIDE * SIDE * SIDE],
     x: [u32x16<S>; 2],
-    /// Share of the way from one to the other.
+    /// Interpolation weight along x.
     across: Lanes<S>,
 }
 
 impl<S: Simd> Row<'_, S> {
-    /// Velocity between them in the row at `y` and `z`.
+    /// Velocity interpolated along x in the row at `y` and `z`.
     #[inline(always)]
     fn at(&self, simd: S, y: u32x16<S>, z: u32x16<S>) -> [Lanes<S>; 4] {
         let start = ((z << SIDE.ilog2()) + y) << SIDE.ilog2();
-        mixed(&fetch(simd, self.tile, start + self.x[0]), &fetch(simd, self.tile, start + self.x[1]), self.across)
+        lerp4(&fetch(simd, self.tile, start + self.x[0]), &fetch(simd, self.tile, start + self.x[1]), self.across)
     }
 }
 
-/// Values at a share of the way from one to the other.
+/// Linear interpolation of four components.
 #[inline(always)]
-pub(crate) fn mixed<R: Real>(one: &[R; 4], other: &[R; 4], share: R) -> [R; 4] {
-    let mut mixed = *one;
+pub(crate) fn lerp4<R: Real>(one: &[R; 4], other: &[R; 4], weight: R) -> [R; 4] {
+    let mut lerp4 = *one;
     for c in 0..4 {
-        mixed[c] = share.fma(other[c] - one[c], one[c]);
+        lerp4[c] = weight.fma(other[c] - one[c], one[c]);
     }
-    mixed
+    lerp4
 }
 
-/// A tile at a place in grid points, straight between them.
-fn sample(tile: &[[f32; 4]], place: Vec3) -> [f32; 4] {
-    let floor = place.floor();
-    let f = place - floor;
+/// Trilinear interpolation of the tile at one position in grid points.
+fn sample(tile: &[[f32; 4]], position: Vec3) -> [f32; 4] {
+    let floor = position.floor();
+    let f = position - floor;
     let cell = floor.as_ivec3();
     let wrap = |coordinate: i32, step: i32| (coordinate.wrapping_add(step) & (SIDE as i32 - 1)) as usize;
     let row = |j: i32, k: i32| {
         let start = (wrap(cell.z, k) * SIDE + wrap(cell.y, j)) * SIDE;
-        mixed(&tile[start + wrap(cell.x, 0)], &tile[start + wrap(cell.x, 1)], f.x)
+        lerp4(&tile[start + wrap(cell.x, 0)], &tile[start + wrap(cell.x, 1)], f.x)
     };
-    mixed(&mixed(&row(0, 0), &row(1, 0), f.y), &mixed(&row(0, 1), &row(1, 1), f.y), f.z)
+    lerp4(&lerp4(&row(0, 0), &row(1, 0), f.y), &lerp4(&row(0, 1), &row(1, 1), f.y), f.z)
 }
 
-/// One potential on the grid.
+/// One noise potential on the grid.
 fn potential(seed: u32) -> Vec<f32> {
-    // The fractal and the period are constants within their bounds; without noise the tile is calm.
+    // The fractal and the period are constants within their bounds.
     let Ok(noise) = Noise::<3>::new(seed, Fractal::SINGLE, [EDDIES; 3]) else { return vec![0.0; SIDE * SIDE * SIDE] };
     let coordinate = |step: usize| Coordinate::from_f64((step * EDDIES as usize) as f64 / SIDE as f64);
     let at = |index: usize| {
@@ -169,12 +170,12 @@ fn potential(seed: u32) -> Vec<f32> {
 
 /// Curl of the potentials at a grid point, by central differences.
 fn curl(potentials: &[Vec<f32>; 3], index: usize) -> Vec3 {
-    let place = [index % SIDE, index / SIDE % SIDE, index / (SIDE * SIDE)];
+    let position = [index % SIDE, index / SIDE % SIDE, index / (SIDE * SIDE)];
     let slope = |of: usize, along: usize| {
         let value = |step: usize| {
-            let mut beside = place;
-            beside[along] = (beside[along] + step) % SIDE;
-            potentials[of][(beside[2] * SIDE + beside[1]) * SIDE + beside[0]]
+            let mut neighbor = position;
+            neighbor[along] = (neighbor[along] + step) % SIDE;
+            potentials[of][(neighbor[2] * SIDE + neighbor[1]) * SIDE + neighbor[0]]
         };
         value(1) - value(SIDE - 1)
     };
@@ -185,16 +186,16 @@ fn curl(potentials: &[Vec<f32>; 3], index: usize) -> Vec3 {
 mod tests {
     use super::*;
 
-    fn velocity(eddies: &Eddies, place: Vec3) -> Vec3 {
+    fn velocity(eddies: &EddyField, position: Vec3) -> Vec3 {
         bansho_base::dispatch_baseline!(simd => {
-            let velocity = eddies.velocity(simd, &place.to_array().map(|x| Lanes::splat(simd, x)));
+            let velocity = eddies.velocity(simd, &position.to_array().map(|x| Lanes::splat(simd, x)));
             Vec3::from(velocity.map(|values| values.as_slice()[9]))
         })
     }
 
     #[test]
     fn the_tile_is_free_of_divergence_and_of_unit_strength() {
-        let turbulence = Turbulence::new(Key::new(3, "turbulence"));
+        let turbulence = TurbulenceTile::new(Key::new(3, "turbulence"));
         let at = |x: usize, y: usize, z: usize| {
             Vec3::from_slice(&turbulence.tile()[((z % SIDE) * SIDE + y % SIDE) * SIDE + x % SIDE])
         };
@@ -207,34 +208,34 @@ mod tests {
             assert!(divergence.abs() < 1e-4, "{divergence}");
         }
         let eddies = turbulence.at(1.7, 0.3, 3.0, DVec3::ZERO);
-        let places = (0..20_000).map(|i| Vec3::new(0.013, 0.017, 0.023) * i as f32);
-        let squares: f32 = places.map(|place| velocity(&eddies, place).length_squared()).sum();
+        let positions = (0..20_000).map(|i| Vec3::new(0.013, 0.017, 0.023) * i as f32);
+        let squares: f32 = positions.map(|position| velocity(&eddies, position).length_squared()).sum();
         let deviation = (squares / 60_000.0).sqrt();
         assert!((0.7..1.1).contains(&deviation), "standard deviation {deviation}");
     }
 
     #[test]
     fn one_place_and_sixteen_find_the_same_velocity() {
-        let turbulence = Turbulence::new(Key::new(3, "turbulence"));
+        let turbulence = TurbulenceTile::new(Key::new(3, "turbulence"));
         let tile = <&[[f32; 4]; SIDE * SIDE * SIDE]>::try_from(turbulence.tile()).unwrap();
         for step in 0..200 {
-            let place = Vec3::new(0.37, 1.71, 0.83) * step as f32 - 40.0;
+            let position = Vec3::new(0.37, 1.71, 0.83) * step as f32 - 40.0;
             let together = bansho_base::dispatch_baseline!(simd => {
-                let lanes = place.to_array().map(|x| Lanes::splat(simd, x));
+                let lanes = position.to_array().map(|x| Lanes::splat(simd, x));
                 sample_lanes(simd, tile, &lanes).map(|values| values.as_slice()[7])
             });
-            let alone = sample(turbulence.tile(), place);
-            assert!((0..3).all(|c| (together[c] - alone[c]).abs() < 1e-5), "at {place}: {together:?} {alone:?}");
+            let alone = sample(turbulence.tile(), position);
+            assert!((0..3).all(|c| (together[c] - alone[c]).abs() < 1e-5), "at {position}: {together:?} {alone:?}");
         }
     }
 
     #[test]
     fn eddies_rise_with_the_gas_and_drift_with_the_wind() {
-        let turbulence = Turbulence::new(Key::new(3, "turbulence"));
-        let place = Vec3::new(0.1, 0.2, 0.3);
-        let still = velocity(&turbulence.at(0.0, 0.5, 2.0, DVec3::ZERO), place);
-        let drifted = velocity(&turbulence.at(0.0, 0.5, 2.0, DVec3::X * 0.7), place + Vec3::X * 0.7);
-        assert!((still - drifted).length() < 1e-3);
-        assert!((velocity(&turbulence.at(0.5, 0.5, 2.0, DVec3::ZERO), place) - still).length() > 0.01);
+        let turbulence = TurbulenceTile::new(Key::new(3, "turbulence"));
+        let position = Vec3::new(0.1, 0.2, 0.3);
+        let initial = velocity(&turbulence.at(0.0, 0.5, 2.0, DVec3::ZERO), position);
+        let drifted = velocity(&turbulence.at(0.0, 0.5, 2.0, DVec3::X * 0.7), position + Vec3::X * 0.7);
+        assert!((initial - drifted).length() < 1e-3);
+        assert!((velocity(&turbulence.at(0.5, 0.5, 2.0, DVec3::ZERO), position) - initial).length() > 0.01);
     }
 }

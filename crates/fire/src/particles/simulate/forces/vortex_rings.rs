@@ -1,10 +1,9 @@
-//! How a fire breathes: vortex rings that roll up around its base and rise with it.
+//! Puffing: vortex rings that roll up around the base of a fire and rise with it.
 //!
-//! Puffing is driven, not emergent: air is not simulated, so the instability that sheds the rings cannot appear by itself. Each
-//! burner sheds a ring at every beat of the frequency that Cetegen and Ahmed (1993) measured, a little early or late, strong or
-//! weak. A ring draws gas in below itself (the neck) and pushes it up and out above (the bulge), as the photographs of their fires
-//! show. Its flow has the stream function `C r^2 (1 - s^2/c^2)^4` within the distance c of its middle and none beyond, so it is
-//! free of divergence.
+//! Puffing is prescribed, not emergent: air is not simulated, so the instability that sheds the rings cannot appear. Each burner
+//! sheds a ring per period of the frequency measured by Cetegen and Ahmed (1993), with jitter of time and strength. Gas is drawn in
+//! below a ring (the neck) and pushed out above it (the bulge), as in their photographs. The flow has the Stokes stream function
+//! `psi = C r^2 (1 - s^2/c^2)^4` within the distance c of the ring's center and vanishes beyond, so it is divergence-free.
 
 use bansho_base::math::{
     DVec3, Vec3, cbrt,
@@ -12,109 +11,108 @@ use bansho_base::math::{
     simd::{Lanes, Real, any_positive},
 };
 
-use super::entrainment_axis::Axis;
-use crate::particles::{
-    parameters::FlameParticlesParameters,
-    simulate::{burner::Burner, vector_lanes::dot},
-};
+use super::entrainment_axis::PlumeAxis;
+use crate::particles::simulate::particle_lanes::dot;
+use crate::particles::{parameters::FlameParticlesParameters, simulate::burner::Burner};
 
 use fearless_simd::Simd;
 
 /// Most rings that a burner sheds side by side.
-const MOST_STREAMS: f64 = 6.0;
-/// Most rings of a stream that are alive, latest first,
-const MOST_ALIVE: i64 = 9;
-/// and the age at which one is gone, whatever holds it, beats: before the last of those is as old, at its earliest.
-const GREATEST_AGE: f64 = MOST_ALIVE as f64 - 2.2;
-/// Speed of a ring beside the gas on the axis.
+const MAX_STREAMS: f64 = 6.0;
+/// Most rings of a stream that are alive.
+const MAX_RINGS: i64 = 9;
+/// Age at which a ring has faded out, in periods; the last ring that is counted is always older.
+const MAX_AGE_BEATS: f64 = MAX_RINGS as f64 - 2.2;
+/// Speed of a ring relative to the gas on the axis.
 const RING_SPEED: f64 = 0.7;
-/// Speed in a ring's middle beside the gas on the axis at its height.
+/// Speed at a ring's center relative to the gas on the axis at its height.
 const RING_STRENGTH: f64 = 0.6;
-/// Extent c of a ring at birth, in diameters of the burner.
+/// Extent c of a new ring, in burner diameters.
 const RING_EXTENT: f64 = 0.85;
-/// Growth of the extent a beat, by the air that the ring takes up.
+/// Growth of the extent per period, by entrained air.
 const RING_GROWTH: f64 = 0.28;
 
-/// A ring at one moment.
+/// A vortex ring at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Ring {
-    /// Its middle, m from the flame's position.
-    centre: Vec3,
-    /// Unit vector along which its middle blows.
+pub(crate) struct VortexRing {
+    /// Its center, m from the flame's position.
+    center: Vec3,
+    /// Its axis: the direction of the flow at its center.
     axis: Vec3,
     /// 1 / c, 1/m.
     inverse_extent: f32,
-    /// C, 1/s times m: half the speed in its middle.
+    /// C: half the speed at its center, m/s.
     strength: f32,
 }
 
-impl Ring {
-    /// Adds the velocity of the air at `place`, m/s.
+impl VortexRing {
+    /// Adds the velocity of the air at `position`, m/s.
     #[inline(always)]
-    pub(crate) fn add_velocity<S: Simd>(&self, place: &[Lanes<S>; 3], sum: &mut [Lanes<S>; 3]) {
-        let like = |value: f32| place[0].broadcast(value);
-        let (centre, axis) = (self.centre.to_array(), self.axis.to_array());
-        let mut offset = *place;
+    pub(crate) fn add_velocity<S: Simd>(&self, position: &[Lanes<S>; 3], sum: &mut [Lanes<S>; 3]) {
+        let splat = |value: f32| position[0].broadcast(value);
+        let (center, axis) = (self.center.to_array(), self.axis.to_array());
+        let mut offset = *position;
         for c in 0..3 {
-            offset[c] = (place[c] - like(centre[c])) * like(self.inverse_extent);
+            offset[c] = (position[c] - splat(center[c])) * splat(self.inverse_extent);
         }
-        let beyond = like(1.0) - dot(&offset, &offset);
-        if !any_positive(beyond) {
+        let q = splat(1.0) - dot(&offset, &offset);
+        if !any_positive(q) {
             return;
         }
-        let beyond = beyond.simd_max(like(0.0));
-        let axis = [like(axis[0]), like(axis[1]), like(axis[2])];
+        let q = q.simd_max(splat(0.0));
+        let axis = [splat(axis[0]), splat(axis[1]), splat(axis[2])];
         let height = dot(&offset, &axis);
         let mut radial = offset;
         for c in 0..3 {
-            radial[c] = axis[c].fma(like(0.0) - height, offset[c]);
+            radial[c] = axis[c].fma(splat(0.0) - height, offset[c]);
         }
         // psi = C r^2 q^4 with q = 1 - s^2: u_h = (1/r) dpsi/dr = C (2 q^4 - 8 r^2 q^3), u_r = -(1/r) dpsi/dh = 8 C r h q^3.
-        let cubed = beyond * beyond * beyond * like(self.strength);
-        let along = cubed * dot(&radial, &radial).fma(like(-8.0), beyond * like(2.0));
-        let outward = cubed * height * like(8.0);
+        let cubed = q * q * q * splat(self.strength);
+        let along = cubed * dot(&radial, &radial).fma(splat(-8.0), q * splat(2.0));
+        let outward = cubed * height * splat(8.0);
         for c in 0..3 {
             sum[c] = radial[c].fma(outward, axis[c].fma(along, sum[c]));
         }
     }
 }
 
-/// The rings of `burner`, number `number`, that are alive at time `t`, along the `axis` of its gas.
-pub(crate) fn rings(
+/// The rings of `burner` that are alive at `t`; they follow the plume `axis`.
+pub(crate) fn active_rings(
     burner: &Burner,
     flame: &FlameParticlesParameters,
     key: Key,
-    number: u32,
+    burner_index: u32,
     t: f64,
-    axis: &Axis,
-) -> Vec<Ring> {
+    axis: &PlumeAxis,
+) -> Vec<VortexRing> {
     if flame.motion.puffing == 0.0 {
         return Vec::new();
     }
     let hz = burner.puffing_hz(flame);
     let side = std::f64::consts::FRAC_PI_4 * burner.diameter * burner.diameter;
-    let streams = (burner.square_metres / side).round().clamp(1.0, MOST_STREAMS) as u32;
+    let streams = (burner.area_m2 / side).round().clamp(1.0, MAX_STREAMS) as u32;
     let latest = (t * hz).floor() as i64 + 1;
     let stream_rings = |stream: u32| {
-        let shed = Shed { burner, key, purpose: Purpose(number * 64 + stream), streams, hz, t, axis };
-        (0..MOST_ALIVE).filter_map(move |back| shed.ring(latest - back, flame.motion.puffing))
+        let shedding =
+            VortexShedding { burner, key, purpose: Purpose(burner_index * 64 + stream), streams, hz, t, axis };
+        (0..MAX_RINGS).filter_map(move |back| shedding.ring(latest - back, flame.motion.puffing))
     };
     (0..streams).flat_map(stream_rings).collect()
 }
 
-struct Shed<'a> {
+struct VortexShedding<'a> {
     burner: &'a Burner,
     key: Key,
     purpose: Purpose,
     streams: u32,
     hz: f64,
     t: f64,
-    axis: &'a Axis,
+    axis: &'a PlumeAxis,
 }
 
-impl Shed<'_> {
-    /// Ring `beat`, if it is alive.
-    fn ring(&self, beat: i64, puffing: f64) -> Option<Ring> {
+impl VortexShedding<'_> {
+    /// The ring shed in period `beat`, if it is alive.
+    fn ring(&self, beat: i64, puffing: f64) -> Option<VortexRing> {
         let words = self.key.words(beat as u64, 1, self.purpose);
         let [early, strong, tilt_x, tilt_z] = words.map(|word| f64::from(uniform(word)));
         let phase = f64::from(self.purpose.0 % 64) * 0.618;
@@ -129,29 +127,29 @@ impl Shed<'_> {
             * burner.diameter
             * (1.0 + RING_GROWTH * beats)
             * cbrt(height / burner.diameter).clamp(0.6, 1.2);
-        // It rolls up within a beat and fades as it leaves the flame.
+        // A ring rolls up within a period and fades as it leaves the flame.
         let rolled = beats / (beats + 0.35);
-        let fade = (1.6 - height / burner.height).clamp(0.0, 0.6) / 0.6 * (GREATEST_AGE - beats).clamp(0.0, 1.0);
+        let fade = (1.6 - height / burner.height).clamp(0.0, 0.6) / 0.6 * (MAX_AGE_BEATS - beats).clamp(0.0, 1.0);
         let speed = burner.axis_speed(height) * RING_STRENGTH * (0.75 + 0.5 * strong) * rolled * fade * puffing;
         let [above, base] = [height, 0.0].map(|height| self.axis.at(height as f32).map(f64::from));
         let lean = DVec3::new(above[0] - base[0], height, above[1] - base[1]);
         let axis = DVec3::new(0.5 * (tilt_x - 0.5), 1.0, 0.5 * (tilt_z - 0.5)).normalize();
-        Some(Ring {
-            centre: (self.middle(beat, [tilt_x, tilt_z]) + lean).as_vec3(),
+        Some(VortexRing {
+            center: (self.middle(beat, [tilt_x, tilt_z]) + lean).as_vec3(),
             axis: axis.as_vec3(),
             inverse_extent: (1.0 / extent) as f32,
             strength: (0.5 * speed) as f32,
         })
     }
 
-    /// Where a ring begins: near the middle of a small burner, anywhere on a long one.
+    /// Where a ring is shed: near the center of a small burner, at a random point of a long one.
     fn middle(&self, beat: i64, [x, z]: [f64; 2]) -> DVec3 {
         let burner = self.burner;
         if self.streams == 1 {
             let offset = DVec3::new(z - 0.5, 0.0, x - 0.5) * (0.4 * burner.diameter);
             return burner.position(self.t) + offset;
         }
-        burner.birthplace(self.key, beat as u64 ^ u64::from(self.purpose.0) << 48, self.t).position
+        burner.spawn_point(self.key, beat as u64 ^ u64::from(self.purpose.0) << 48, self.t).position
     }
 }
 
@@ -160,28 +158,28 @@ mod tests {
     use bansho_base::host::assets::MemoryAssets;
 
     use super::*;
-    use crate::particles::{parameters::BurnerParameters, simulate::forces::entrainment_axis::axes};
+    use crate::particles::{parameters::BurnerParameters, simulate::forces::entrainment_axis::plume_axes};
     use fearless_simd::prelude::*;
 
-    fn velocity(ring: &Ring, place: Vec3) -> Vec3 {
+    fn velocity(ring: &VortexRing, position: Vec3) -> Vec3 {
         bansho_base::dispatch_baseline!(simd => {
             let mut sum = [Lanes::splat(simd, 0.0); 3];
-            ring.add_velocity(&place.to_array().map(|x| Lanes::splat(simd, x)), &mut sum);
+            ring.add_velocity(&position.to_array().map(|x| Lanes::splat(simd, x)), &mut sum);
             Vec3::from(sum.map(|values| values.as_slice()[5]))
         })
     }
 
-    fn ring() -> Ring {
-        Ring { centre: Vec3::new(0.1, 0.5, 0.0), axis: Vec3::Y, inverse_extent: 2.5, strength: 1.5 }
+    fn ring() -> VortexRing {
+        VortexRing { center: Vec3::new(0.1, 0.5, 0.0), axis: Vec3::Y, inverse_extent: 2.5, strength: 1.5 }
     }
 
     #[test]
     fn a_ring_has_no_divergence() {
         let ring = ring();
-        for place in [Vec3::new(0.15, 0.6, 0.1), Vec3::new(0.3, 0.45, -0.1), Vec3::new(0.0, 0.3, 0.05)] {
+        for position in [Vec3::new(0.15, 0.6, 0.1), Vec3::new(0.3, 0.45, -0.1), Vec3::new(0.0, 0.3, 0.05)] {
             let h = 2e-3;
             let slope = |axis: Vec3| {
-                (velocity(&ring, place + axis * h) - velocity(&ring, place - axis * h)).dot(axis) / (2.0 * h)
+                (velocity(&ring, position + axis * h) - velocity(&ring, position - axis * h)).dot(axis) / (2.0 * h)
             };
             let divergence = slope(Vec3::X) + slope(Vec3::Y) + slope(Vec3::Z);
             assert!(divergence.abs() < 0.01 * slope(Vec3::Y).abs().max(1.0), "{divergence}");
@@ -190,14 +188,14 @@ mod tests {
 
     #[test]
     fn rings_come_and_go_without_a_jump_however_many_there_are() {
-        // So many beats that rings go by their number, long before they are above the flame.
+        // A frequency at which rings are removed by their count, long before they rise above the flame.
         let mut flame = FlameParticlesParameters::default();
         flame.motion.puffing_hz = bansho_base::parameters::Auto::Set(40.0);
         let burner = Burner::new(&BurnerParameters::default(), &flame, &MemoryAssets::default()).unwrap();
-        let axis = axes(std::slice::from_ref(&burner), [&[]; 3], &[], 0.0, 0.0).remove(0);
+        let axis = plume_axes(std::slice::from_ref(&burner), [&[]; 3], &[], 0.0, 0.0).remove(0);
         let total = |t: f64| {
-            let rings = rings(&burner, &flame, Key::new(4, "rings"), 0, t, &axis);
-            (rings.iter().map(|ring| f64::from(ring.strength)).sum::<f64>(), rings.len())
+            let active_rings = active_rings(&burner, &flame, Key::new(4, "rings"), 0, t, &axis);
+            (active_rings.iter().map(|ring| f64::from(ring.strength)).sum::<f64>(), active_rings.len())
         };
         let (mut before, mut most) = (total(1.0).0, 0);
         for step in 1..4000 {
@@ -205,16 +203,16 @@ mod tests {
             assert!((now - before).abs() < 0.01 * before, "from {before} to {now}");
             (before, most) = (now, most.max(count));
         }
-        assert!(most as i64 >= MOST_ALIVE - 2, "{most} rings");
+        assert!(most as i64 >= MAX_RINGS - 2, "{most} rings");
     }
 
     #[test]
     fn a_ring_draws_in_below_and_pushes_out_above() {
         let ring = ring();
-        assert!((velocity(&ring, ring.centre) - Vec3::Y * 3.0).length() < 1e-6);
-        assert!(velocity(&ring, ring.centre + Vec3::new(0.15, -0.15, 0.0)).x < -0.1);
-        assert!(velocity(&ring, ring.centre + Vec3::new(0.15, 0.15, 0.0)).x > 0.1);
-        assert!(velocity(&ring, ring.centre + Vec3::new(0.3, 0.0, 0.0)).y < -0.05, "it rolls");
-        assert_eq!(velocity(&ring, ring.centre + Vec3::X * 0.5), Vec3::ZERO);
+        assert!((velocity(&ring, ring.center) - Vec3::Y * 3.0).length() < 1e-6);
+        assert!(velocity(&ring, ring.center + Vec3::new(0.15, -0.15, 0.0)).x < -0.1);
+        assert!(velocity(&ring, ring.center + Vec3::new(0.15, 0.15, 0.0)).x > 0.1);
+        assert!(velocity(&ring, ring.center + Vec3::new(0.3, 0.0, 0.0)).y < -0.05, "it rolls");
+        assert_eq!(velocity(&ring, ring.center + Vec3::X * 0.5), Vec3::ZERO);
     }
 }

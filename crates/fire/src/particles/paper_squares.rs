@@ -1,5 +1,12 @@
-//! The paper's figure 7: every particle a square, the redder the denser the gas around it.
+//! The paper's figure 7: each particle as a square, the redder the denser the gas.
 
+use crate::particles::{
+    parameters::LookParameters,
+    render::{
+        gas::Gas,
+        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+    },
+};
 use bansho_base::{
     color,
     image::Rect,
@@ -7,46 +14,38 @@ use bansho_base::{
     phenomenon::strip::{DepthInterval, Strip, View},
 };
 
-use crate::particles::{
-    look_parameters::LookParameters,
-    render::{
-        gas::Gas,
-        project::sprite::{Kind, Seen, seen},
-    },
-};
-
-/// Luminance of a square, cd/m^2: as bright as the flame, so that one exposure serves both pictures.
+/// Luminance of a square, cd/m^2: as bright as the flame, so that one exposure serves both.
 const LUMINANCE: f32 = 6000.0;
 
 /// A square in the picture.
 struct Square {
     rect: Rect,
     depth: f64,
-    colour: [f32; 3],
+    color: [f32; 3],
 }
 
-/// How all particles become squares.
-struct Drawn<'a> {
+/// Conversion of particles to squares.
+struct SquareSprites<'a> {
     gas: &'a Gas<'a>,
-    /// Side, support radii.
+    /// Side, in support radii.
     side: f32,
     window: Rect,
     densest: f64,
 }
 
-impl Kind for Drawn<'_> {
+impl SpriteKind for SquareSprites<'_> {
     type Record = Option<Square>;
 
-    fn wants(&self, _index: usize) -> bool {
+    fn includes(&self, _index: usize) -> bool {
         true
     }
 
-    fn record(&self, seen: &Seen) -> Option<Square> {
+    fn record(&self, seen: &ProjectedParticle) -> Option<Square> {
         let radius = self.gas.particles.support_radius[seen.index];
         let side = (self.side * radius * seen.scale).max(1.0);
-        let rect = square_rect(seen.ellipse.centre, side, self.window)?;
+        let rect = square_rect(seen.ellipse.center, side, self.window)?;
         let density = f64::from(self.gas.particles.density[seen.index]) / self.densest;
-        Some(Square { rect, depth: seen.depth, colour: colour(density) })
+        Some(Square { rect, depth: seen.depth, color: color(density) })
     }
 }
 
@@ -55,10 +54,15 @@ pub(crate) struct Squares(Vec<Square>);
 
 impl Squares {
     pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View) -> Self {
-        let kind = Drawn { gas, side: look.square_size as f32, window: view.window, densest: usual_density(gas) };
+        let kind = SquareSprites {
+            gas,
+            side: look.square_size as f32,
+            window: view.window,
+            densest: density_percentile_95(gas),
+        };
         let mut squares: Vec<Square> =
-            seen(gas, view, &kind).iter_mut().flat_map(|task| task.drain(..)).flatten().collect();
-        // A stable sort: at one depth the elder lies before the younger.
+            project_particles(gas, view, &kind).iter_mut().flat_map(|task| task.drain(..)).flatten().collect();
+        // A stable sort: at one depth the order of particles is kept.
         squares.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         Self(squares)
     }
@@ -75,7 +79,7 @@ impl Squares {
                 for x in rect.x..rect.right() {
                     let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
                     if strip.visible(index, square.depth as f32) {
-                        strip.add_behind(index, square.colour, [0.0; 3], square.depth as f32);
+                        strip.add_behind(index, square.color, [0.0; 3], square.depth as f32);
                     }
                 }
             }
@@ -83,24 +87,24 @@ impl Squares {
     }
 }
 
-/// The density that nineteen in twenty particles do not exceed, which is shown in full red.
-fn usual_density(gas: &Gas) -> f64 {
+/// The 95th percentile of the density, which is shown as full red.
+fn density_percentile_95(gas: &Gas) -> f64 {
     let mut densities = gas.particles.density.clone();
     densities.sort_by(f32::total_cmp);
     densities.get(densities.len() * 19 / 20).map_or(1.0, |density| f64::from(density.max(1e-12)))
 }
 
 /// From blue (thin) through violet to red (dense), ACEScg of [`LUMINANCE`].
-fn colour(share: f64) -> [f32; 3] {
-    let red = math::smoothstep(0.0, 1.0, share) as f32;
+fn color(density_ratio: f64) -> [f32; 3] {
+    let red = math::smoothstep(0.0, 1.0, density_ratio) as f32;
     let rgb = color::acescg_from_srgb([red, 0.08, 1.0 - red]);
     let scale = LUMINANCE / color::luminance(rgb);
     rgb.map(|value| value * scale * (0.35 + 0.65 * red))
 }
 
-fn square_rect(centre: [f32; 2], side: f32, window: Rect) -> Option<Rect> {
+fn square_rect(center: [f32; 2], side: f32, window: Rect) -> Option<Rect> {
     let clip = |value: f32, from: usize, to: usize| (value.max(0.0) as usize).clamp(from, to);
-    let low = centre.map(|value| (value - 0.5 * side).round());
+    let low = center.map(|value| (value - 0.5 * side).round());
     let high = low.map(|value| value + side.round().max(1.0));
     let (x, y) = (clip(low[0], window.x, window.right()), clip(low[1], window.y, window.bottom()));
     let (right, bottom) = (clip(high[0], window.x, window.right()), clip(high[1], window.y, window.bottom()));

@@ -1,0 +1,418 @@
+//! Combustion and thermochemistry of particles: heating, fuel consumption, entrainment of air, soot formation, radiative cooling;
+//! and XSPH smoothing of velocity and temperature.
+//!
+//! Sixteen particles at a time.
+
+use crate::particles::{
+    parameters::{LifeParameters, TemperatureLaw},
+    simulate::{
+        fluid::{NeighborSums, Neighborhood},
+        forces::external_forces::{BurnerForces, ExternalForces},
+        particle_lanes::{BatchUpdate, RowBatch, SharedColumns, add_scaled, for_each_burner_batch, length},
+        particles::Particles,
+    },
+};
+use bansho_base::math::simd::Real;
+use bansho_sph::KernelShape;
+use fearless_simd::Simd;
+use std::ops::Range;
+
+/// Specific heat of hot air at constant pressure, J/(kg K).
+const SPECIFIC_HEAT: f32 = 1200.0;
+/// Stefan-Boltzmann constant, W/(m^2 K^4).
+const STEFAN_BOLTZMANN: f32 = 5.670_374e-8;
+/// Planck-mean absorption of soot, 1/(m K), per volume fraction (Tien 1968): `kappa = 1862 f_v T`.
+const PLANCK_MEAN_SOOT_ABSORPTION: f32 = 1862.0;
+/// Temperature inside the flame, where gas lacks air, relative to that at its front.
+pub(crate) const INNER_TEMPERATURE: f32 = 0.72;
+/// Factor by which burnt gas cools faster by mixing than burning gas, whose heat release makes up for it.
+const BURNT_MIXING_FACTOR: f32 = 2.5;
+/// Fuel fractions between which soot exists: below the first it burns off, above the second it has not formed.
+const SOOT_FUEL_RANGE: [f32; 2] = [0.16, 0.97];
+/// Interval of the fuel fraction over which soot forms.
+const SOOT_FORMATION_WIDTH: f32 = 0.17;
+/// Greatest growth of a particle's drawing radius.
+const MAX_RADIUS_GROWTH: f32 = 3.0;
+
+/// Thermochemical state of a particle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct ParticleState<R> {
+    /// Temperature, K.
+    pub(crate) temperature: R,
+    /// Fraction of fuel left.
+    pub(crate) fuel: R,
+    /// Volume fraction of soot.
+    pub(crate) soot: R,
+    /// Support radius with which it is drawn, m.
+    pub(crate) support_radius: R,
+}
+
+/// Conditions that a particle is exposed to during a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct AmbientConditions<R> {
+    /// Fraction of the particle that is exposed to air: 0 inside the gas, 1 isolated.
+    pub(crate) air_exposure: R,
+    /// Entrainment rate: mass of air taken up per own mass, 1/s.
+    pub(crate) mixing: R,
+    /// Fuel consumption rate of a mean particle, 1/s.
+    pub(crate) burning: R,
+    /// Density of air at the particle's temperature, kg/m^3.
+    pub(crate) density: R,
+    /// Temperature of the air, K.
+    pub(crate) air_temperature: f32,
+    /// Support radius d at spawning, m.
+    pub(crate) smallest_radius: f32,
+}
+
+/// Parameters of the combustion model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct CombustionModel {
+    reacting: bool,
+    flame_temperature: f32,
+    heating_s: f32,
+    air_hunger: f32,
+    soot: f32,
+    smoke: f32,
+    radiation: f32,
+}
+
+impl From<&LifeParameters> for CombustionModel {
+    fn from(life: &LifeParameters) -> Self {
+        Self {
+            reacting: life.temperature == TemperatureLaw::Living,
+            flame_temperature: life.flame_temperature_k as f32,
+            heating_s: life.heating_s as f32,
+            air_hunger: life.air_hunger as f32,
+            soot: life.soot_ppm as f32 * 1e-6,
+            smoke: life.smoke as f32,
+            radiation: life.radiation as f32,
+        }
+    }
+}
+
+impl CombustionModel {
+    /// The state after `seconds`.
+    #[inline(always)]
+    pub(crate) fn advance<R: Real>(
+        &self,
+        state: ParticleState<R>,
+        conditions: &AmbientConditions<R>,
+        seconds: f32,
+    ) -> ParticleState<R> {
+        let splat = |value: f32| state.fuel.broadcast(value);
+        // Exposed gas burns faster than the mean, enclosed gas slower; a mean exposure of 1/3 burns at the mean rate.
+        let air = conditions.air_exposure.fma(splat(2.4 * self.air_hunger), splat(1.0 - 0.8 * self.air_hunger));
+        let fuel = (state.fuel - conditions.burning * air * splat(seconds)).simd_max(splat(0.0));
+        let growth = conditions.mixing.fma(splat(seconds * (1.0 / 3.0)), splat(1.0));
+        ParticleState {
+            fuel,
+            temperature: if self.reacting { self.temperature(state, conditions, seconds) } else { state.temperature },
+            soot: splat(self.soot) * self.soot_fraction(fuel),
+            support_radius: (state.support_radius * growth)
+                .simd_min(splat(MAX_RADIUS_GROWTH * conditions.smallest_radius)),
+        }
+    }
+
+    /// Temperature after heating, mixing and radiation. Each is integrated implicitly, so that any step is stable.
+    #[inline(always)]
+    fn temperature<R: Real>(&self, state: ParticleState<R>, conditions: &AmbientConditions<R>, seconds: f32) -> R {
+        let splat = |value: f32| state.fuel.broadcast(value);
+        let air = splat(conditions.air_temperature);
+        let front = conditions.air_exposure.simd_sqrt().fma(splat(1.0 - INNER_TEMPERATURE), splat(INNER_TEMPERATURE));
+        let (flame, heating) = (front * splat(self.flame_temperature), splat(seconds / self.heating_s));
+        // Burning gas approaches the flame temperature, burnt gas that of the air.
+        let target = state.fuel.select_lt(splat(f32::MIN_POSITIVE), air, flame);
+        let rate = state.fuel.select_lt(
+            splat(f32::MIN_POSITIVE),
+            conditions.mixing * splat(BURNT_MIXING_FACTOR * seconds),
+            heating,
+        );
+        let temperature = relax_implicit(state.temperature, target, rate);
+        // 4 sigma kappa (T^4 - T_air^4) / (rho c_p), as a relaxation rate toward the temperature of the air.
+        let absorption = state.soot * temperature * splat(PLANCK_MEAN_SOOT_ABSORPTION);
+        let fourth = temperature.fma(temperature, air * air) * (temperature + air);
+        let power = absorption * fourth * splat(self.radiation * 4.0 * STEFAN_BOLTZMANN * seconds / SPECIFIC_HEAT);
+        relax_implicit(temperature, air, power / conditions.density)
+    }
+
+    /// Soot relative to the greatest amount: none in fresh gas, 1 where it burns, the smoke fraction in burnt gas.
+    #[inline(always)]
+    pub(crate) fn soot_fraction<R: Real>(&self, fuel: R) -> R {
+        let splat = |value: f32| fuel.broadcast(value);
+        let formed = smoothstep((splat(SOOT_FUEL_RANGE[1]) - fuel) * splat(1.0 / SOOT_FORMATION_WIDTH));
+        let unburnt = smoothstep(fuel * splat(1.0 / SOOT_FUEL_RANGE[0]));
+        formed * unburnt.fma(splat(1.0 - self.smoke), splat(self.smoke))
+    }
+}
+
+/// One implicit Euler step of relaxation toward `target`; `rate` is the rate times the time step.
+#[inline(always)]
+fn relax_implicit<R: Real>(value: R, target: R, rate: R) -> R {
+    rate.fma(target, value) / (rate + rate.broadcast(1.0))
+}
+
+/// Cubic smoothstep from 0 to 1.
+#[inline(always)]
+fn smoothstep<R: Real>(x: R) -> R {
+    let x = x.simd_clamp01();
+    x * x * x.fma(x.broadcast(-2.0), x.broadcast(3.0))
+}
+
+/// Time to which the parameters `viscosity` and `conduction` refer, s.
+const SMOOTHING_TIME: f32 = 0.01;
+/// Greatest fraction of the difference to its neighbors that a step removes. A particle next to thinner gas has larger weights, and
+/// must not overshoot.
+const MAX_SMOOTHING: f32 = 0.5;
+/// Mean offset of the neighbors of a particle on a flat surface of the gas, in support radii.
+const SURFACE_OFFSET: f32 = 0.2;
+/// A particle counts as isolated where its own contribution to its density exceeds the first fraction, fully after a further
+/// second.
+const ISOLATED_FRACTION: [f32; 2] = [0.2, 0.5];
+
+/// One combustion step of all particles, over `seconds`.
+pub(crate) struct CombustionStep<'a> {
+    pub(crate) combustion: &'a CombustionModel,
+    pub(crate) forces: &'a ExternalForces<'a>,
+    pub(crate) neighbor_sums: &'a NeighborSums,
+    /// XSPH smoothing of velocity and of temperature over [`SMOOTHING_TIME`].
+    pub(crate) smoothing: [f32; 2],
+    /// How long burnt gas stays, s.
+    pub(crate) afterlife: f32,
+    /// Support radius d, m.
+    pub(crate) radius: f32,
+    pub(crate) seconds: f32,
+}
+
+/// Particle columns that the step reads.
+#[derive(Clone, Copy)]
+struct CombustionInputs<'a> {
+    position: [&'a [f32]; 3],
+    age: &'a [f32],
+    burn_rate: &'a [f32],
+    density: &'a [f32],
+    /// The particle's own weight, and the sums over its neighbors.
+    weight: &'a [f32],
+    sums: [&'a [f32]; 8],
+}
+
+impl SharedColumns for CombustionInputs<'_> {
+    fn slice(self, range: Range<usize>) -> Self {
+        Self {
+            position: self.position.map(|values| &values[range.clone()]),
+            age: &self.age[range.clone()],
+            burn_rate: &self.burn_rate[range.clone()],
+            density: &self.density[range.clone()],
+            weight: &self.weight[range.clone()],
+            sums: self.sums.map(|values| &values[range.clone()]),
+        }
+    }
+}
+
+impl<'a> BatchUpdate<CombustionInputs<'a>, 9> for CombustionStep<'_> {
+    #[inline(always)]
+    fn rows<S: Simd>(
+        &self,
+        simd: S,
+        burner: &BurnerForces,
+        rows: RowBatch,
+        inputs: CombustionInputs<'a>,
+        [u, v, w, temperature, fuel, soot, support_radius, max_age, exposure]: &mut [&mut [f32]; 9],
+    ) {
+        let neighborhood = Neighborhood::from(rows.load_all(simd, inputs.sums));
+        let air_exposure = self.air_exposure(rows.load(simd, inputs.weight), &neighborhood);
+        let velocity = rows.load_all(simd, [u, v, w]);
+        let wind = burner.wind_field.at(simd, &rows.load_all(simd, inputs.position));
+        let [viscosity, conduction] = self.smoothing_weights(rows.load(simd, inputs.density));
+        let old = ParticleState {
+            temperature: conduction.fma(neighborhood.temperature, rows.load(simd, temperature)),
+            fuel: rows.load(simd, fuel),
+            soot: rows.load(simd, soot),
+            support_radius: rows.load(simd, support_radius),
+        };
+        let mixing = burner.mixing(&velocity, &wind, air_exposure);
+        let burn_rate_at_speed = rows.load(simd, inputs.burn_rate) * self.burn_rate_at_speed(burner, length(&velocity));
+        let state = self.combustion.advance(
+            old,
+            &self.ambient_conditions(air_exposure, mixing, burn_rate_at_speed, old.temperature),
+            self.seconds,
+        );
+        let [age, removal_age] = rows.load_all(simd, [inputs.age, max_age]);
+        rows.store(self.removal_age(&old, &state, age, removal_age), max_age);
+        rows.store(state.temperature, temperature);
+        rows.store(state.fuel, fuel);
+        rows.store(state.soot, soot);
+        rows.store(state.support_radius, support_radius);
+        rows.store(air_exposure, exposure);
+        let velocity = add_scaled(&velocity, &neighborhood.velocity, viscosity);
+        for (batch, array) in velocity.into_iter().zip([u, v, w]) {
+            rows.store(batch, array);
+        }
+    }
+}
+
+impl CombustionStep<'_> {
+    /// Smooths, burns and cools all particles, and writes how much each is exposed to air.
+    pub(crate) fn update_thermochemistry(&self, particles: &mut Particles, air_exposure: &mut Vec<f32>) {
+        air_exposure.resize(particles.len(), 0.0);
+        let Particles { velocity: [u, v, w], temperature, fuel, soot, support_radius, max_age, .. } = particles;
+        let inputs = CombustionInputs {
+            position: particles.position.each_ref().map(Vec::as_slice),
+            age: &particles.age,
+            burn_rate: &particles.burn_rate,
+            density: &particles.density,
+            weight: &self.neighbor_sums.weights,
+            sums: self.neighbor_sums.sums.each_ref().map(Vec::as_slice),
+        };
+        let living = [u, v, w, temperature, fuel, soot, support_radius, max_age, air_exposure];
+        for_each_burner_batch(self, &self.forces.burner_forces, &particles.burner, inputs, living);
+    }
+
+    /// Exposure to air: from the offset of the neighbors' center (a surface), or from missing neighbors.
+    #[inline(always)]
+    fn air_exposure<R: Real>(&self, weight: R, neighborhood: &Neighborhood<R>) -> R {
+        let splat = |value: f32| weight.broadcast(value);
+        let one_over_sum = splat(1.0) / neighborhood.weight.simd_max(splat(f32::MIN_POSITIVE));
+        let offset = length(&neighborhood.offset) * one_over_sum * splat(1.0 / (self.radius * SURFACE_OFFSET));
+        let own = weight * one_over_sum * splat(KernelShape::Poly6.at_center::<3>(self.radius));
+        let isolated = (own - splat(ISOLATED_FRACTION[0])) * splat(1.0 / ISOLATED_FRACTION[1]);
+        offset.simd_max(isolated).simd_clamp01()
+    }
+
+    /// Weights with which differences of velocity and temperature to the neighbors are added.
+    #[inline(always)]
+    fn smoothing_weights<R: Real>(&self, density: R) -> [R; 2] {
+        let fraction = |smoothing: f32| (smoothing * self.seconds / SMOOTHING_TIME).min(MAX_SMOOTHING);
+        let per_weight = density.simd_rsqrt();
+        [
+            per_weight * density.broadcast(fraction(self.smoothing[0])),
+            per_weight * density.broadcast(fraction(self.smoothing[1])),
+        ]
+    }
+
+    /// Fuel consumption rate of a mean particle at a speed, 1/s.
+    #[inline(always)]
+    fn burn_rate_at_speed<R: Real>(&self, burner: &BurnerForces, speed: R) -> R {
+        speed.fma(speed.broadcast(burner.burning[0]), speed.broadcast(burner.burning[1]))
+    }
+
+    #[inline(always)]
+    fn ambient_conditions<R: Real>(
+        &self,
+        air_exposure: R,
+        mixing: R,
+        burning: R,
+        temperature: R,
+    ) -> AmbientConditions<R> {
+        let density =
+            air_exposure.broadcast(self.forces.density_at_1_k) / temperature.simd_max(air_exposure.broadcast(1.0));
+        let air_temperature = self.forces.air_temperature;
+        AmbientConditions { air_exposure, mixing, burning, density, air_temperature, smallest_radius: self.radius }
+    }
+
+    /// Age at which a particle is removed: unchanged, or its age plus the afterlife where it has just burnt out.
+    #[inline(always)]
+    fn removal_age<R: Real>(&self, old: &ParticleState<R>, new: &ParticleState<R>, age: R, removal_age: R) -> R {
+        let none = age.broadcast(f32::MIN_POSITIVE);
+        let burnt_out = old.fuel.select_lt(none, removal_age, age + age.broadcast(self.afterlife));
+        new.fuel.select_lt(none, burnt_out, removal_age)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bansho_base::math::simd::{LANES, Lanes};
+    use fearless_simd::prelude::*;
+
+    const STATE: ParticleState<f32> = ParticleState { temperature: 1200.0, fuel: 0.6, soot: 0.0, support_radius: 0.02 };
+    const CONDITIONS: AmbientConditions<f32> = AmbientConditions {
+        air_exposure: 1.0,
+        mixing: 5.0,
+        burning: 2.0,
+        density: 0.25,
+        air_temperature: 293.0,
+        smallest_radius: 0.02,
+    };
+
+    fn combustion() -> CombustionModel {
+        CombustionModel::from(&LifeParameters::default())
+    }
+
+    fn after(mut state: ParticleState<f32>, conditions: AmbientConditions<f32>, seconds: f32) -> ParticleState<f32> {
+        for _ in 0..1000 {
+            state = combustion().advance(state, &conditions, seconds / 1000.0);
+        }
+        state
+    }
+
+    #[test]
+    fn burning_gas_nears_the_flame_temperature_and_burnt_gas_the_air() {
+        let hot = after(STATE, AmbientConditions { burning: 0.0, ..CONDITIONS }, 0.3);
+        assert!((1600.0..1900.0).contains(&hot.temperature), "{}", hot.temperature);
+        let cold = after(ParticleState { fuel: 0.0, ..STATE }, CONDITIONS, 2.0);
+        assert!(cold.temperature < 294.0 && cold.soot == 0.0);
+        assert!((cold.support_radius - 0.06).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_outside_burns_first() {
+        let inside = after(STATE, AmbientConditions { air_exposure: 0.1, ..CONDITIONS }, 0.2);
+        let outside = after(STATE, CONDITIONS, 0.2);
+        assert!(outside.fuel < inside.fuel);
+        let mean = after(STATE, AmbientConditions { air_exposure: 1.0 / 3.0, ..CONDITIONS }, 0.2);
+        assert!((mean.fuel - 0.2).abs() < 1e-3);
+    }
+
+    #[test]
+    fn black_body_cooling_of_dense_soot_follows_the_fourth_power() {
+        // dT/dt = -4 sigma kappa T^4 / (rho c_p), worked by hand at 1500 K with 1e-6 of soot.
+        let combustion = CombustionModel { heating_s: 1e9, radiation: 1.0, ..combustion() };
+        let state = ParticleState { temperature: 1500.0, soot: 1e-6, ..STATE };
+        let cooled = combustion.advance(state, &AmbientConditions { mixing: 0.0, ..CONDITIONS }, 1e-5);
+        let kappa = 1862.0 * 1e-6 * 1500.0;
+        let fourth = |kelvin: f64| kelvin * kelvin * kelvin * kelvin;
+        let by_hand = 4.0 * 5.670_374e-8 * kappa * (fourth(1500.0) - fourth(293.0)) / (0.25 * 1200.0) * 1e-5;
+        assert!((f64::from(1500.0 - cooled.temperature) / by_hand - 1.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn one_particle_and_sixteen_live_alike() {
+        let fuel_fractions: [f32; LANES] = std::array::from_fn(|lane| (lane as f32 - 2.0).max(0.0) * 0.07);
+        let together = bansho_base::dispatch_baseline!(simd => {
+            let fuel = Lanes::from_slice(simd, &fuel_fractions);
+            let splat = |value: f32| Lanes::splat(simd, value);
+            let temperature = fuel.fma(splat(1500.0), splat(400.0));
+            let state = ParticleState { temperature, fuel, soot: splat(1e-6), support_radius: splat(0.02) };
+            let conditions = AmbientConditions {
+                air_exposure: fuel,
+                mixing: splat(5.0),
+                burning: splat(2.0),
+                density: splat(0.25),
+                air_temperature: 293.0,
+                smallest_radius: 0.02,
+            };
+            let ParticleState { temperature, fuel, soot, support_radius } = combustion().advance(state, &conditions, 0.02);
+            [temperature, fuel, soot, support_radius].map(|values| values.as_slice().to_vec())
+        });
+        for (lane, fuel) in fuel_fractions.into_iter().enumerate() {
+            let state = ParticleState { temperature: fuel.fma(1500.0, 400.0), fuel, soot: 1e-6, ..STATE };
+            let alone = combustion().advance(state, &AmbientConditions { air_exposure: fuel, ..CONDITIONS }, 0.02);
+            let alone = [alone.temperature, alone.fuel, alone.soot, alone.support_radius];
+            assert_eq!(together.each_ref().map(|values| values[lane]), alone, "with {fuel} of its fuel");
+        }
+    }
+
+    #[test]
+    fn constant_temperature_stays() {
+        let combustion = CombustionModel { reacting: false, ..combustion() };
+        assert_eq!(combustion.advance(STATE, &CONDITIONS, 0.1).temperature, 1200.0);
+    }
+
+    #[test]
+    fn soot_forms_in_burning_gas_and_burns_unless_it_is_smoke() {
+        let clean = combustion();
+        assert_eq!((clean.soot_fraction(1.0), clean.soot_fraction(0.5), clean.soot_fraction(0.0)), (0.0, 1.0, 0.0));
+        let smoky = CombustionModel { smoke: 0.4, ..clean };
+        assert!((smoky.soot_fraction(0.0) - 0.4).abs() < 1e-6);
+    }
+}

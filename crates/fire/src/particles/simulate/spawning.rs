@@ -1,0 +1,96 @@
+//! Spawning of particles, section 4.3 (1): each particle is a pure function of its id.
+
+use crate::particles::simulate::{
+    burner::{Burner, SpawnPoint},
+    derived::DerivedConstants,
+    forces::turbulence::TurbulenceTile,
+    particles::{Particle, Particles},
+};
+use bansho_base::math::{
+    self, DVec3,
+    random::{Key, Purpose, uniform},
+};
+
+/// Low bits of an id that count the particles of one burner; the high bits hold the burner's index.
+const ORDINAL_BITS: u32 = 40;
+/// Relative spread of the exit velocity.
+const SPEED_SPREAD: f32 = 0.3;
+/// Exit velocity relative to the mean at the center of the burner, and its decrease toward the rim.
+const SPEED_PROFILE: [f64; 2] = [1.25, 0.5];
+/// Burning rate relative to the mean at the center of the burner, and its increase toward the rim, which is exposed to air.
+const BURN_RATE_PROFILE: [f64; 2] = [0.62, 0.9];
+/// Amplitude of the burning rate's noise, which makes tongues.
+const BURN_RATE_NOISE: f64 = 0.3;
+/// Wavelength of that noise, in diameters.
+const BURN_RATE_NOISE_WAVELENGTH: f64 = 0.35;
+
+/// Spawns the particles of all burners.
+pub(crate) struct Spawner<'a> {
+    pub(crate) constants: &'a DerivedConstants,
+    pub(crate) turbulence: &'a TurbulenceTile,
+    pub(crate) key: Key,
+    pub(crate) afterlife_s: f64,
+}
+
+impl Spawner<'_> {
+    /// Spawns the particles of the interval from `start` to `start + seconds`, advanced to its end.
+    ///
+    /// They are counted since the beginning of the preroll, so that each is the same for any length of step.
+    pub(crate) fn spawn(&self, particles: &mut Particles, start: f64, seconds: f64) {
+        let constants = self.constants;
+        for (number, burner) in constants.burners.iter().enumerate() {
+            let [before, after] = [start, start + seconds].map(|t| self.spawned_count(number, burner, t));
+            for index_of_burner in before.ceil().max(0.0) as u64..after.ceil().max(0.0) as u64 {
+                if particles.len() >= constants.max_particles {
+                    return;
+                }
+                let age = seconds * ((after - index_of_burner as f64) / (after - before)).clamp(0.0, 1.0);
+                let id = (number as u64) << ORDINAL_BITS | index_of_burner;
+                self.spawn_one(particles, number, id, start + seconds - age, age);
+            }
+        }
+    }
+
+    /// Number of particles spawned until `t`, with its fraction.
+    fn spawned_count(&self, number: usize, burner: &Burner, t: f64) -> f64 {
+        let constants = self.constants;
+        // Warped time makes the flow pulsate and keeps its mean.
+        let beat = std::f64::consts::TAU * constants.puffing_hz[number];
+        let warped = |t: f64| t + constants.pulse / beat * math::sin(beat * t);
+        constants.rates[number] * burner.parameters.flow.integral(warped(-constants.preroll), warped(t))
+    }
+
+    /// Spawns particle `id` at `t`; it has reached `age` at the end of the step.
+    fn spawn_one(&self, particles: &mut Particles, number: usize, id: u64, t: f64, age: f64) {
+        let (constants, burner) = (self.constants, &self.constants.burners[number]);
+        let spawn_point = burner.spawn_point(self.key, id, t);
+        let random = uniform(self.key.words(id, 0, Purpose::named("birth speed"))[0]);
+        let radial_fraction = spawn_point.radial_fraction * spawn_point.radial_fraction;
+        let profile = (SPEED_PROFILE[0] - SPEED_PROFILE[1] * radial_fraction) as f32;
+        let speed = burner.speed as f32 * profile * (1.0 + SPEED_SPREAD * (random - 0.5));
+        let velocity = spawn_point.direction.as_vec3() * speed;
+        let particle = Particle {
+            id,
+            position: (spawn_point.position + velocity.as_dvec3() * age).as_vec3().to_array(),
+            velocity: velocity.to_array(),
+            mass: constants.mass,
+            density: constants.density,
+            temperature: burner.parameters.temperature_k as f32,
+            support_radius: constants.support_radius,
+            age: age as f32,
+            max_age: constants.max_age(number, self.afterlife_s) as f32,
+            fuel: 1.0,
+            soot: 0.0,
+        };
+        let burn_rate = self.burn_rate(burner, constants.puffing_hz[number], &spawn_point, t) as f32;
+        particles.push_from(number as u32, burn_rate, particle);
+    }
+
+    /// Burning rate relative to the mean: higher at the rim, and with noise that varies in space and time.
+    fn burn_rate(&self, burner: &Burner, hz: f64, spawn_point: &SpawnPoint, t: f64) -> f64 {
+        let profile =
+            BURN_RATE_PROFILE[0] + BURN_RATE_PROFILE[1] * spawn_point.radial_fraction * spawn_point.radial_fraction;
+        let noise = spawn_point.position / (BURN_RATE_NOISE_WAVELENGTH * burner.diameter) + DVec3::Y * (2.5 * hz * t);
+        profile * (1.0 + BURN_RATE_NOISE * f64::from(self.turbulence.noise(noise))).clamp(0.4, 2.0)
+    }
+}

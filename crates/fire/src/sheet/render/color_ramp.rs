@@ -1,0 +1,120 @@
+//! Color ramp: sharpening, eq. (6), and color, eq. (7), tabulated over T1.
+
+use crate::{
+    chemiluminescence_color,
+    sheet::{
+        parameters::{ColorParameters, Coloring, Stage, TextureParameters},
+        render::curve_tables::{CurvePair, from_origin},
+    },
+};
+use bansho_base::{
+    color,
+    math::{
+        self,
+        simd::{Lanes, Real, fetch, nearest_whole},
+    },
+    parameters::parameter_fault::ParameterFault,
+};
+use fearless_simd::Simd;
+
+/// Entries over T1: finer than a display can show, so that nearest-neighbor lookup suffices.
+const LEVELS: usize = 4096;
+
+/// Light, opacity and temperature over T1.
+#[derive(Clone, Debug)]
+pub(crate) struct ColorRamp {
+    /// Red, green, blue (ACEScg, the brightest of luminance 1) and opacity over T1; nearest neighbor.
+    light: Box<[[f32; 4]; LEVELS]>,
+    /// Soot temperature in K over T1.
+    pub(crate) temperature: CurvePair,
+    /// Whether soot hides what is behind.
+    pub(crate) absorbs: bool,
+    /// Light of the blue zone at the base: ACEScg of luminance 1, times the parameter.
+    pub(crate) base_blue: [f32; 3],
+}
+
+/// Soot temperature at T2, K.
+pub(crate) fn temperature(color: &ColorParameters, t2: f64) -> f64 {
+    math::lerp(color.edge_temperature_k, color.core_temperature_k, t2)
+}
+
+/// Opacity, and emissivity, of soot of the optical depth of T2.
+fn opacity(color: &ColorParameters, t2: f64) -> f64 {
+    -math::exp_m1(-color.soot_optical_depth * t2)
+}
+
+/// ACEScg of T2 before normalization.
+fn unscaled_color(color: &ColorParameters, t2: f64) -> [f64; 3] {
+    match color.kind {
+        Coloring::BlackBody => {
+            // Emission of optically thin soot is proportional to its depth; at zero depth the color is that of the thin limit.
+            let emissivity = if color.soot_optical_depth > 1e-6 { opacity(color, t2) } else { t2 };
+            color::black_body().radiance(temperature(color, t2) as f32).map(|value| f64::from(value) * emissivity)
+        }
+        Coloring::Paper => {
+            let display =
+                [&color.red, &color.green, &color.blue].map(|curve| color::decode_srgb(curve.eval(t2) as f32));
+            color::acescg_from_srgb(display).map(f64::from)
+        }
+    }
+}
+
+/// The value shown for a stage before color.
+fn stage_value(stage: Stage, t1: f64, t2: f64) -> f64 {
+    if stage == Stage::Sharpened { t2 } else { t1 }
+}
+
+impl ColorRamp {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// The sharpening curve does not begin at the origin.
+    pub(crate) fn check(texture: &TextureParameters) -> Result<(), ParameterFault> {
+        from_origin(&texture.sharpen, "texture.sharpen").map(drop)
+    }
+
+    /// The table for parameters that were [checked](Self::check).
+    pub(crate) fn new(texture: &TextureParameters, color: &ColorParameters, stage: Stage) -> Self {
+        let sharpen = from_origin(&texture.sharpen, "texture.sharpen").unwrap_or_else(|_| texture.sharpen.clone());
+        let luminance = |rgb: [f64; 3]| f64::from(color::luminance(rgb.map(|value| value as f32)));
+        let brightest = (0..=256).map(|i| luminance(unscaled_color(color, f64::from(i) / 256.0))).fold(0.0, f64::max);
+        let scale = if brightest > 0.0 { 1.0 / brightest } else { 0.0 };
+        let light = |t1: f64| {
+            let t2 = sharpen.eval(t1);
+            match stage {
+                Stage::Flame => {
+                    let [r, g, b] = unscaled_color(color, t2).map(|value| value * scale);
+                    [r, g, b, opacity(color, t2)]
+                }
+                Stage::Colored => {
+                    let [r, g, b] = unscaled_color(color, t2).map(|value| value * scale);
+                    [r, g, b, 1.0]
+                }
+                _ => [stage_value(stage, t1, t2), stage_value(stage, t1, t2), stage_value(stage, t1, t2), 1.0],
+            }
+        };
+        Self {
+            light: levels(light),
+            temperature: CurvePair::new(|t1| [temperature(color, sharpen.eval(t1)), 0.0]),
+            absorbs: color.soot_optical_depth > 0.0 || stage != Stage::Flame,
+            base_blue: chemiluminescence_color().map(|value| value * color.base_blue as f32),
+        }
+    }
+}
+
+fn levels(light: impl Fn(f64) -> [f64; 4]) -> Box<[[f32; 4]; LEVELS]> {
+    let mut levels = Box::new([[0.0; 4]; LEVELS]);
+    for (i, level) in levels.iter_mut().enumerate() {
+        *level = light(i as f64 / (LEVELS - 1) as f64).map(|value| value as f32);
+    }
+    levels
+}
+
+impl ColorRamp {
+    /// Red, green, blue of luminance up to 1, and opacity, at T1.
+    #[inline(always)]
+    pub(crate) fn light<S: Simd>(&self, t1: Lanes<S>) -> [Lanes<S>; 4] {
+        let scaled = t1.simd_clamp01() * t1.broadcast((LEVELS - 1) as f32);
+        fetch(t1.simd, &self.light, nearest_whole(scaled))
+    }
+}
