@@ -19,34 +19,34 @@ bansho_base::choice! {
         /// By the mean of infinitely many falls: no noise.
         Profile = "profile",
         /// By single collisions, as in the thesis (2.4).
-        Collisions = "collisions",
+        CollisionRenderer = "collisions",
     }
 }
 
 bansho_base::choice! {
     /// What stops the electrons and what shines where they are stopped.
-    pub enum FallModel {
+    pub enum TrackModel {
         /// Air as it is measured: heights after Fang et al. (2010), colours and brightness as observed.
         Fang = "fang",
         /// Hard spheres, as in the thesis (2.4): one radius for all energies, and green light only above 190 km.
-        HardSphere = "hard_sphere",
+        HardSphereAtmosphere = "hard_sphere",
     }
 }
 
-impl FallModel {
+impl TrackModel {
     /// The light that it gives for a spectrum.
     #[must_use]
     pub fn emission(self, spectrum: Spectrum) -> Emission {
         match self {
             Self::Fang => Emission::new(atmosphere(), spectrum),
-            Self::HardSphere => Emission::of_hard_spheres(atmosphere(), spectrum),
+            Self::HardSphereAtmosphere => Emission::of_hard_spheres(atmosphere(), spectrum),
         }
     }
 
     /// The same for a spectrum that a scene may state, made once for all auroras.
     pub(crate) fn shared_emission(self, shape: SpectrumShape) -> &'static Emission {
-        static KNOWN: [OnceLock<Emission>; FallModel::CHOICES.len() * SpectrumShape::CHOICES.len()] =
-            [const { OnceLock::new() }; FallModel::CHOICES.len() * SpectrumShape::CHOICES.len()];
+        static KNOWN: [OnceLock<Emission>; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()] =
+            [const { OnceLock::new() }; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()];
         let index = self as usize * SpectrumShape::CHOICES.len() + shape as usize;
         get_or_make(&KNOWN[index], || self.emission(shape.spectrum()))
     }
@@ -86,7 +86,7 @@ bansho_base::parameters! {
         /// By the mean fall, or by collisions.
         sampling: Sampling = Sampling::Profile;
         /// What stops the electrons: measured air, or the thesis's hard spheres.
-        fall: FallModel = FallModel::Fang;
+        fall: TrackModel = TrackModel::Fang;
         /// Where light is smoothed: on the sky in km, or in the picture in pixels.
         blur: Blur = Blur::Kilometres;
         /// Radii of the blur in pixels.

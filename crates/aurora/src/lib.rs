@@ -2,7 +2,7 @@
 //!
 //! K. Sekiguchi, "A study on artist-controllable aurora simulation". [`shapes`] are the foot of the aurora as it is drawn and as it
 //! becomes, [`simulate`] the electrons that follow it, [`physics::atmosphere`] is the air from 80 to 800 km, [`physics::precipitation`] says where
-//! electrons of an energy spend it, [`physics::emission`] what the struck atoms give back, for how long and in which colour; [`simulate::afterglow`] is
+//! electrons of an energy spend it, [`physics::emission`] what the struck atoms give back, for how long and in which color; [`simulate::afterglow`] is
 //! where it lingers, [`render`] makes pictures of it.
 
 pub(crate) mod drawing_parameters;
@@ -19,4 +19,4 @@ pub use parameters::{
     AuroraParameters, FieldCharge, FieldParameters, FieldSolver, FoldParameters, ParticleParameters,
     PulsationParameters, RayParameters, RelocationParameters, RepulsionKernel, SpectrumShape,
 };
-pub use render::{Aurora, Blur, BlurParameters, DrawingParameters, FallModel, Sampling};
+pub use render::{Aurora, Blur, BlurParameters, DrawingParameters, Sampling, TrackModel};

@@ -29,7 +29,7 @@ impl SpectrumShape {
         match self {
             Self::Arc => ARC,
             Self::Maxwellian => Spectrum::Maxwellian,
-            Self::Single => Spectrum::Monoenergetic,
+            Self::Single => Spectrum::MonoenergeticBeam,
         }
     }
 }

@@ -14,7 +14,7 @@ use crate::{
 };
 use bansho_aurora::{
     Aurora, AuroraParameters,
-    shapes::{Sequence, ShapeFaultKind},
+    shapes::{Sequence, ShapeErrorKind},
 };
 use bansho_environment::{
     ground::{Ground, GroundParameters},
@@ -151,7 +151,7 @@ impl Describe for AuroraParameters {
         match aurora {
             Ok(aurora) => Ok(Box::new(aurora)),
             Err(fault) => Err(match fault.kind {
-                ShapeFaultKind::Asset(error) => OpeningFault { key: fault.key, kind: error.into() },
+                ShapeErrorKind::Asset(error) => OpeningFault { key: fault.key, kind: error.into() },
                 other => opening_fault(fault.key, other),
             }),
         }

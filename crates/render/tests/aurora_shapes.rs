@@ -13,7 +13,7 @@ use bansho_render::{Backend, CpuBackend, Plan, PlanOptions, Scene, phenomena::KI
 
 use bansho_aurora::{
     AuroraParameters,
-    shapes::{FRAME_S, Neighbourhood, Sequence, Shape},
+    shapes::{FRAME_S, NearestSegmentGrid, Sequence, Shape},
     simulate::AuroraSimulation,
 };
 
@@ -54,7 +54,7 @@ fn sequence(scene: usize) -> Sequence {
 
 /// Greatest distance of any control point of one shape from the other.
 fn farthest(from: &Shape, to: &Shape) -> f64 {
-    let near = Neighbourhood::new(to, 50.0);
+    let near = NearestSegmentGrid::new(to, 50.0);
     let points = from.sheets.iter().flat_map(|sheet| &sheet.points);
     points.map(|&point| near.distance(point).unwrap_or(50.0)).fold(0.0, f64::max)
 }
@@ -95,7 +95,7 @@ fn the_scenes_have_as_many_sheets_as_the_thesis_tells() {
 #[test]
 fn the_fold_of_scene_1_leaves_a_gap() {
     let sequence = sequence(1);
-    let last = Neighbourhood::new(&sequence.at(sequence.duration()), 60.0);
+    let last = NearestSegmentGrid::new(&sequence.at(sequence.duration()), 60.0);
     assert!(last.distance(DVec2::new(95.0, -213.0)).is_none_or(|distance| distance > 45.0));
 }
 

@@ -51,9 +51,9 @@ impl Air {
     }
 
     /// The air between two others, every quantity geometrically: densities fall exponentially with altitude.
-    fn between(&self, above: &Self, part: f64) -> Self {
+    fn interpolate(&self, above: &Self, fraction: f64) -> Self {
         let (low, high) = (self.fields(), above.fields());
-        Self::from_fields(std::array::from_fn(|i| math::exp(math::lerp(math::ln(low[i]), math::ln(high[i]), part))))
+        Self::from_fields(std::array::from_fn(|i| math::exp(math::lerp(math::ln(low[i]), math::ln(high[i]), fraction))))
     }
 }
 
@@ -77,7 +77,7 @@ impl Atmosphere {
             let altitude_km = level_altitude_km(level);
             let above = rows.partition_point(|(row_km, _)| *row_km <= altitude_km).clamp(1, rows.len() - 1);
             let ((low_km, low), (high_km, high)) = (&rows[above - 1], &rows[above]);
-            low.between(high, (altitude_km - low_km) / (high_km - low_km))
+            low.interpolate(high, (altitude_km - low_km) / (high_km - low_km))
         });
         Self { levels: levels.collect() }
     }
@@ -91,8 +91,8 @@ impl Atmosphere {
     /// The air at an altitude, held to 80-800 km; logarithmic between levels.
     #[must_use]
     pub fn at(&self, altitude_km: f64) -> Air {
-        let (level, part) = locate_level(altitude_km);
-        self.levels[level].between(&self.levels[level + 1], part)
+        let (level, fraction) = locate_level(altitude_km);
+        self.levels[level].interpolate(&self.levels[level + 1], fraction)
     }
 }
 
@@ -105,9 +105,9 @@ pub fn level_altitude_km(level: usize) -> f64 {
 /// The level below an altitude and the part of the way to the next; held to 80-800 km.
 #[must_use]
 pub fn locate_level(altitude_km: f64) -> (usize, f64) {
-    let place = (altitude_km - LOWEST_KM).clamp(0.0, (LEVELS - 1) as f64);
-    let level = (place as usize).min(LEVELS - 2);
-    (level, place - level as f64)
+    let coordinate = (altitude_km - LOWEST_KM).clamp(0.0, (LEVELS - 1) as f64);
+    let level = (coordinate as usize).min(LEVELS - 2);
+    (level, coordinate - level as f64)
 }
 
 /// Whether an altitude lies within the levels.

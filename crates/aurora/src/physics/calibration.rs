@@ -10,15 +10,15 @@ use super::{
 use crate::physics::precipitation::spectrum::ARC;
 
 /// Share of N2+ ions, band and pairs in the column of Fang et al.: rayleighs of 427.8 nm per mW m^-2, by energy in keV.
-const BLUE_OF_FANG: [(f64, f64); 4] = [(1.0, 250.0), (3.0, 294.0), (10.0, 307.0), (30.0, 304.0)];
+const FANG_427_RAYLEIGH: [(f64, f64); 4] = [(1.0, 250.0), (3.0, 294.0), (10.0, 307.0), (30.0, 304.0)];
 /// Altitude of the greatest deposition of Fang et al., km, by energy in keV.
-const PEAKS_OF_FANG: [(f64, f64); 4] = [(1.0, 158.35), (3.0, 122.23), (10.0, 104.68), (30.0, 95.194)];
+const FANG_PEAK_KM: [(f64, f64); 4] = [(1.0, 158.35), (3.0, 122.23), (10.0, 104.68), (30.0, 95.194)];
 /// Energies of the figures, keV.
 const ENERGIES_KEV: [f64; 8] = [0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0];
 
 /// Figures of one energy.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Figures {
+pub struct ColumnMetrics {
     /// The energy that names the spectrum: its central or characteristic one, keV.
     pub energy_kev: f64,
     /// Altitude of the greatest deposition, km.
@@ -41,16 +41,16 @@ pub struct Figures {
 
 /// One demand on the light.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Check {
+pub struct CalibrationCheck {
     /// What is demanded.
-    pub demand: String,
+    pub requirement: String,
     /// What was found.
     pub found: f64,
     /// Least and greatest that is allowed.
     pub allowed: [f64; 2],
 }
 
-impl Check {
+impl CalibrationCheck {
     /// Whether the demand is met.
     #[must_use]
     pub fn holds(&self) -> bool {
@@ -60,72 +60,84 @@ impl Check {
 
 /// Figures of a spectrum by energy, rising.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SpectrumFigures {
+pub struct SpectrumMetrics {
     /// What scenes call the spectrum.
     pub spectrum: &'static str,
     /// Figures of each energy.
-    pub figures: Vec<Figures>,
+    pub metrics: Vec<ColumnMetrics>,
 }
 
 /// Figures and demands. `Display` prints both as tables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
     /// Figures of each spectrum, the default one first.
-    pub spectra: Vec<SpectrumFigures>,
+    pub spectra: Vec<SpectrumMetrics>,
     /// All demands.
-    pub checks: Vec<Check>,
+    pub checks: Vec<CalibrationCheck>,
 }
 
 /// A spectrum, and at which of its energies it is held against what is observed.
-struct Claim {
+struct SpectrumBounds {
     name: &'static str,
     spectrum: Spectrum,
-    /// Mean energy beside the one that names it: brightness and colours are observed by mean energy.
-    mean: f64,
+    /// Mean energy beside the one that names it: brightness and colors are observed by mean energy.
+    mean_ratio: f64,
     /// The energy that carries most of the flux beside the one that names it.
-    most: f64,
+    peak_flux_ratio: f64,
     /// Least mean energy at which green light peaks below 120 km, keV.
     low_green_kev: f64,
 }
 
-const CLAIMS: [Claim; 3] = [
-    Claim { name: "arc", spectrum: ARC, mean: 1.0, most: 1.0, low_green_kev: 3.0 },
+const SPECTRUM_BOUNDS: [SpectrumBounds; 3] = [
+    SpectrumBounds { name: "arc", spectrum: ARC, mean_ratio: 1.0, peak_flux_ratio: 1.0, low_green_kev: 3.0 },
     // 3 keV alone deposits at 122 km; only a spread of energies brings the green peak below 120 km.
-    Claim { name: "single", spectrum: Spectrum::Monoenergetic, mean: 1.0, most: 1.0, low_green_kev: 5.0 },
+    SpectrumBounds {
+        name: "single",
+        spectrum: Spectrum::MonoenergeticBeam,
+        mean_ratio: 1.0,
+        peak_flux_ratio: 1.0,
+        low_green_kev: 5.0,
+    },
     // Energy flux E^2 exp(-E / E_0), on a logarithmic scale E^3 exp(-E / E_0).
-    Claim { name: "maxwellian", spectrum: Spectrum::Maxwellian, mean: 2.0, most: 3.0, low_green_kev: 3.0 },
+    SpectrumBounds {
+        name: "maxwellian",
+        spectrum: Spectrum::Maxwellian,
+        mean_ratio: 2.0,
+        peak_flux_ratio: 3.0,
+        low_green_kev: 3.0,
+    },
 ];
 
 /// Measures the light of all spectra.
 #[must_use]
 pub fn calibrate(air: &Atmosphere) -> Calibration {
     let (mut spectra, mut checks) = (Vec::new(), check_violet());
-    for claim in &CLAIMS {
-        let figures = measure(air, claim.spectrum);
-        checks.extend(figures.iter().flat_map(|figure| check_colours(claim, figure)));
-        checks.extend(check_peaks(claim, &figures));
-        checks.extend(check_slopes(claim, &figures));
-        spectra.push(SpectrumFigures { spectrum: claim.name, figures });
+    for bounds in &SPECTRUM_BOUNDS {
+        let metrics = measure(air, bounds.spectrum);
+        checks.extend(metrics.iter().flat_map(|metrics_row| check_colors(bounds, metrics_row)));
+        checks.extend(check_peaks(bounds, &metrics));
+        checks.extend(check_slopes(bounds, &metrics));
+        spectra.push(SpectrumMetrics { spectrum: bounds.name, metrics });
     }
     Calibration { spectra, checks }
 }
 
 /// The figures of a spectrum.
 #[must_use]
-pub fn measure(air: &Atmosphere, spectrum: Spectrum) -> Vec<Figures> {
+pub fn measure(air: &Atmosphere, spectrum: Spectrum) -> Vec<ColumnMetrics> {
     let table = Emission::new(air, spectrum);
-    ENERGIES_KEV.into_iter().map(|energy_kev| figures_at(&table, energy_kev)).collect()
+    ENERGIES_KEV.into_iter().map(|energy_kev| metrics_at(&table, energy_kev)).collect()
 }
 
-fn figures_at(table: &Emission, energy_kev: f64) -> Figures {
+fn metrics_at(table: &Emission, energy_kev: f64) -> ColumnMetrics {
     let energy_ev = energy_kev * 1e3;
     let profile = table.profile(energy_ev);
     let [green, red, blue, first_positive] = table.column(energy_ev).kilorayleigh;
     let red_at = |level: usize| profile[level][Emitter::OxygenRed.index()];
     let above = (0..LEVELS).filter(|level| level_altitude_km(*level) >= 200.0).map(red_at).sum::<f64>();
-    Figures {
+    ColumnMetrics {
         energy_kev,
-        deposition_peak_km: peak_km(|level| table.deposition().ionisation(energy_ev, level_altitude_km(level))),
+        deposition_peak_km: peak_km(|level| table.deposition().ionization(energy_ev, level_altitude_km(level))),
         peaks_km: std::array::from_fn(|i| peak_km(|level| profile[level][i])),
         blue_rayleigh: blue * 1e3,
         green_to_blue: green / blue,
@@ -143,91 +155,97 @@ fn peak_km(value: impl Fn(usize) -> f64) -> f64 {
     level_altitude_km(greatest)
 }
 
-fn check(demand: String, found: f64, allowed: [f64; 2]) -> Check {
-    Check { demand, found, allowed }
+fn requirement(requirement: String, found: f64, allowed: [f64; 2]) -> CalibrationCheck {
+    CalibrationCheck { requirement, found, allowed }
 }
 
 /// Ratio of the bands of N2+, whatever the spectrum.
-fn check_violet() -> Vec<Check> {
+fn check_violet() -> Vec<CalibrationCheck> {
     let violet = LINES.iter().find(|line| line.name.contains("391.4"));
     violet
-        .map(|line| check("I(391.4)/I(427.8)".to_owned(), line.photons, [3.28 * 0.95, 3.28 * 1.05]))
+        .map(|line| requirement("I(391.4)/I(427.8)".to_owned(), line.photons, [3.28 * 0.95, 3.28 * 1.05]))
         .into_iter()
         .collect()
 }
 
 /// Demands on the column of one energy.
-fn check_colours(claim: &Claim, figure: &Figures) -> Vec<Check> {
-    let (kev, mean_kev) = (figure.energy_kev, claim.mean * figure.energy_kev);
-    let of = |what: &str| format!("{}: {what} at {kev} keV", claim.name);
-    let mut checks = vec![check(of("red above 200 km"), figure.red_above_200_km, [0.5, 1.0])];
+fn check_colors(bounds: &SpectrumBounds, metrics_row: &ColumnMetrics) -> Vec<CalibrationCheck> {
+    let (kev, mean_kev) = (metrics_row.energy_kev, bounds.mean_ratio * metrics_row.energy_kev);
+    let of = |what: &str| format!("{}: {what} at {kev} keV", bounds.name);
+    let mut checks = vec![requirement(of("red above 200 km"), metrics_row.red_above_200_km, [0.5, 1.0])];
     if (1.0..=30.0).contains(&mean_kev) {
-        checks.push(check(of("I(557.7)/I(427.8)"), figure.green_to_blue, [2.5, 7.0]));
+        checks.push(requirement(of("I(557.7)/I(427.8)"), metrics_row.green_to_blue, [2.5, 7.0]));
     }
     if mean_kev <= 1.0 {
-        checks.push(check(of("I(630.0)/I(427.8)"), figure.red_to_blue, [2.0, f64::INFINITY]));
+        checks.push(requirement(of("I(630.0)/I(427.8)"), metrics_row.red_to_blue, [2.0, f64::INFINITY]));
     }
     if mean_kev >= 10.0 {
-        checks.push(check(of("I(630.0)/I(427.8)"), figure.red_to_blue, [0.0, 0.5]));
+        checks.push(requirement(of("I(630.0)/I(427.8)"), metrics_row.red_to_blue, [0.0, 0.5]));
     }
-    for (_, rayleigh) in BLUE_OF_FANG.into_iter().filter(|(energy_kev, _)| *energy_kev == kev) {
-        checks.push(check(of("I(427.8) to Fang's column"), figure.blue_rayleigh / rayleigh, [0.75, 1.25]));
+    for (_, rayleigh) in FANG_427_RAYLEIGH.into_iter().filter(|(energy_kev, _)| *energy_kev == kev) {
+        checks.push(requirement(of("I(427.8) to Fang's column"), metrics_row.blue_rayleigh / rayleigh, [0.75, 1.25]));
     }
     checks
 }
 
-fn check_peaks(claim: &Claim, figures: &[Figures]) -> Vec<Check> {
-    let low_green = claim.low_green_kev..=10.0;
-    let green = figures.iter().filter(|figure| low_green.contains(&(claim.mean * figure.energy_kev))).map(|figure| {
-        check(
-            format!("{}: green peak at {} keV, km", claim.name, figure.energy_kev),
-            figure.peaks_km[0],
-            [100.0, 120.0],
-        )
-    });
-    let deposited = PEAKS_OF_FANG.into_iter().flat_map(|(kev, peak_km)| {
-        let at = figures.iter().find(|figure| claim.most * figure.energy_kev == kev);
-        at.map(|figure| {
-            let demand = format!("{}: deposition peak at {} keV beside Fang's, km", claim.name, figure.energy_kev);
-            check(demand, figure.deposition_peak_km - peak_km, [-4.0, 4.0])
+fn check_peaks(bounds: &SpectrumBounds, metrics: &[ColumnMetrics]) -> Vec<CalibrationCheck> {
+    let low_green = bounds.low_green_kev..=10.0;
+    let green = metrics
+        .iter()
+        .filter(|metrics_row| low_green.contains(&(bounds.mean_ratio * metrics_row.energy_kev)))
+        .map(|metrics_row| {
+            requirement(
+                format!("{}: green peak at {} keV, km", bounds.name, metrics_row.energy_kev),
+                metrics_row.peaks_km[0],
+                [100.0, 120.0],
+            )
+        });
+    let deposited = FANG_PEAK_KM.into_iter().flat_map(|(kev, peak_km)| {
+        let at = metrics.iter().find(|metrics_row| bounds.peak_flux_ratio * metrics_row.energy_kev == kev);
+        at.map(|metrics_row| {
+            let text = format!("{}: deposition peak at {} keV beside Fang's, km", bounds.name, metrics_row.energy_kev);
+            requirement(text, metrics_row.deposition_peak_km - peak_km, [-4.0, 4.0])
         })
     });
     green.chain(deposited).collect()
 }
 
 /// Both ratios fall from each energy to the next above a mean of 1 keV.
-fn check_slopes(claim: &Claim, figures: &[Figures]) -> Vec<Check> {
-    let pairs = figures.windows(2).filter(|pair| claim.mean * pair[0].energy_kev >= 1.0);
+fn check_slopes(bounds: &SpectrumBounds, metrics: &[ColumnMetrics]) -> Vec<CalibrationCheck> {
+    let pairs = metrics.windows(2).filter(|pair| bounds.mean_ratio * pair[0].energy_kev >= 1.0);
     let falls = pairs.flat_map(|pair| {
         let changes = |what: &str| {
-            format!("{}: {what} changes from {} to {} keV by", claim.name, pair[0].energy_kev, pair[1].energy_kev)
+            format!("{}: {what} changes from {} to {} keV by", bounds.name, pair[0].energy_kev, pair[1].energy_kev)
         };
         let [green, red] = [pair[1].green_to_blue / pair[0].green_to_blue, pair[1].red_to_blue / pair[0].red_to_blue];
-        [check(changes("I(557.7)/I(427.8)"), green, [0.0, 1.0]), check(changes("I(630.0)/I(427.8)"), red, [0.0, 0.8])]
+        [
+            requirement(changes("I(557.7)/I(427.8)"), green, [0.0, 1.0]),
+            requirement(changes("I(630.0)/I(427.8)"), red, [0.0, 0.8]),
+        ]
     });
     falls.collect()
 }
 
-impl fmt::Display for SpectrumFigures {
+impl fmt::Display for SpectrumMetrics {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let spectrum = self.spectrum;
         writeln!(
             f,
             "  keV  deposited  557.7  630.0  427.8 peak km   R(427.8)   G/B    R/B  red>200  1P/G  red tau s  \"{spectrum}\""
         )?;
-        for figure in &self.figures {
-            let [green, red, blue, _] = figure.peaks_km;
+        for metrics_row in &self.metrics {
+            let [green, red, blue, _] = metrics_row.peaks_km;
             writeln!(
                 f,
                 "{:5} {:10} {green:6} {red:6} {blue:6} {:18.0} {:6.2} {:6.3} {:7.2} {:6.1} {:9.1}",
-                figure.energy_kev,
-                figure.deposition_peak_km,
-                figure.blue_rayleigh,
-                figure.green_to_blue,
-                figure.red_to_blue,
-                figure.red_above_200_km,
-                figure.first_positive_to_green,
-                figure.red_lifetime,
+                metrics_row.energy_kev,
+                metrics_row.deposition_peak_km,
+                metrics_row.blue_rayleigh,
+                metrics_row.green_to_blue,
+                metrics_row.red_to_blue,
+                metrics_row.red_above_200_km,
+                metrics_row.first_positive_to_green,
+                metrics_row.red_lifetime,
             )?;
         }
         Ok(())
@@ -242,7 +260,7 @@ impl fmt::Display for Calibration {
         for check in &self.checks {
             let [least, greatest] = check.allowed;
             let verdict = if check.holds() { "holds" } else { "FAILS" };
-            writeln!(f, "{verdict}  {}: {:.4} in [{least:.4}, {greatest:.4}]", check.demand, check.found)?;
+            writeln!(f, "{verdict}  {}: {:.4} in [{least:.4}, {greatest:.4}]", check.requirement, check.found)?;
         }
         Ok(())
     }
@@ -262,12 +280,12 @@ mod tests {
         let (arc, single) = (8 + 7 + 2 + 3 + 4 + 3 + 4 + 12, 8 + 7 + 2 + 3 + 4 + 2 + 4 + 12);
         let maxwellian = 8 + 6 + 1 + 4 + 4 + 3 + 2 + 14;
         assert_eq!(calibration.checks.len(), arc + single + maxwellian + 1, "{calibration}");
-        assert!(calibration.checks.iter().all(Check::holds), "{calibration}");
+        assert!(calibration.checks.iter().all(CalibrationCheck::holds), "{calibration}");
     }
 
     #[test]
     fn a_broken_demand_is_said() {
-        let broken = check("nothing".to_owned(), 2.0, [0.0, 1.0]);
+        let broken = requirement("nothing".to_owned(), 2.0, [0.0, 1.0]);
         let printed = Calibration { spectra: Vec::new(), checks: vec![broken] }.to_string();
         assert!(printed.contains("FAILS  nothing: 2.0000 in [0.0000, 1.0000]"), "{printed}");
     }
@@ -296,8 +314,8 @@ mod tests {
         assert_eq!(rows.len(), 5);
         for row in &rows {
             let energy_kev = row[0].trim_end_matches(" keV").parse().unwrap();
-            let figures = figures_at(&table, energy_kev);
-            let Figures { deposition_peak_km, peaks_km, blue_rayleigh, green_to_blue, .. } = figures;
+            let metrics = metrics_at(&table, energy_kev);
+            let ColumnMetrics { deposition_peak_km, peaks_km, blue_rayleigh, green_to_blue, .. } = metrics;
             let spread_km = table.column(energy_kev * 1e3).spread_km[Emitter::OxygenRed.index()];
             let found = [
                 deposition_peak_km,
@@ -306,9 +324,9 @@ mod tests {
                 blue_rayleigh,
                 1e-3 * green_to_blue * blue_rayleigh,
                 green_to_blue,
-                figures.red_to_blue,
-                100.0 * figures.red_above_200_km,
-                figures.red_lifetime,
+                metrics.red_to_blue,
+                100.0 * metrics.red_above_200_km,
+                metrics.red_lifetime,
                 spread_km,
             ];
             for (cell, found) in row[1..].iter().zip(found) {
@@ -342,9 +360,9 @@ mod tests {
     #[test]
     fn what_is_not_claimed_is_as_the_page_says() {
         let at = |spectrum: Spectrum, kev: f64| {
-            measure(atmosphere(), spectrum).into_iter().find(|figure| figure.energy_kev == kev).unwrap()
+            measure(atmosphere(), spectrum).into_iter().find(|metrics_row| metrics_row.energy_kev == kev).unwrap()
         };
-        assert_eq!(at(Spectrum::Monoenergetic, 3.0).peaks_km[0], 122.0);
+        assert_eq!(at(Spectrum::MonoenergeticBeam, 3.0).peaks_km[0], 122.0);
         let [one, ten, thirty] = [1.0, 10.0, 30.0].map(|kev| at(Spectrum::Maxwellian, kev));
         assert_eq!((one.deposition_peak_km, ten.deposition_peak_km), (120.0, 97.0));
         assert!((ten.green_to_blue - 2.8).abs() < 0.05 && (thirty.green_to_blue - 1.8).abs() < 0.05);

@@ -37,26 +37,26 @@ pub(crate) const MAPS: [AovDescriptor; 4] = [
 ];
 
 /// The maps of a moment.
-pub(super) struct Maps<'a> {
+pub(super) struct CellMaps<'a> {
     simulation: &'a AuroraSimulation,
     particle_counts: Grid2,
 }
 
-impl<'a> Maps<'a> {
+impl<'a> CellMaps<'a> {
     pub(super) fn new(simulation: &'a AuroraSimulation) -> Self {
         Self { simulation, particle_counts: simulation.particle_counts() }
     }
 
     /// The values of [`MAPS`] at a place of the drawn plane, km.
-    pub(super) fn at(&self, place: DVec2) -> [f32; MAPS.len()] {
+    pub(super) fn at(&self, position: DVec2) -> [f32; MAPS.len()] {
         let potential = self.simulation.potential();
-        let Some([column, row]) = potential.cell(place.to_array()) else { return [0.0; MAPS.len()] };
+        let Some([column, row]) = potential.cell(position.to_array()) else { return [0.0; MAPS.len()] };
         let count = |counts: &Grid2| counts.at(column as isize, row as isize) as f32;
         [
             count(self.simulation.scatter_counts()),
             count(&self.particle_counts),
-            potential.sample(place.to_array()) as f32,
-            self.simulation.potential_noise(place) as f32,
+            potential.sample(position.to_array()) as f32,
+            self.simulation.potential_noise(position) as f32,
         ]
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! Field lines are seen as meridians about the magnetic zenith (`geometry`), so that an aurora is drawn on a `chart` of
 //! the sky in longitude and colatitude about that point. Precipitation is summed up by longitude and distance
-//! (`footprint`); then the light of every field line runs along its meridian (`meridians`), its altitudes from tables
-//! (`profile`). The chart is dimmed and coloured by the air below (`shading`, `seen`), and what a pixel of any lens shows
+//! (`source_bins`); then the light of every field line runs along its meridian (`meridians`), its altitudes from tables
+//! (`profile`). The chart is dimmed and colored by the air below (`emitter_colors`, `seen`), and what a pixel of any lens shows
 //! is looked up on it (`prepared`). The cost grows with pixels and particles, not with shapes.
 
 pub(crate) mod bin;
@@ -19,6 +19,6 @@ pub(crate) mod shutter;
 mod tests;
 
 pub use super::{
-    drawing_parameters::{Blur, BlurParameters, DrawingParameters, FallModel, Sampling},
+    drawing_parameters::{Blur, BlurParameters, DrawingParameters, Sampling, TrackModel},
     phenomenon::Aurora,
 };

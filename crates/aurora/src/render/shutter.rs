@@ -8,7 +8,7 @@ use bansho_base::{
 use super::Aurora;
 use crate::{
     render::{
-        bin::sources::{Moments, Sources},
+        bin::sources::{SampleTimes, Sources},
         project::field_lines::FieldLines,
     },
     simulate::AuroraSimulation,
@@ -43,11 +43,16 @@ impl Aurora {
     /// The state's particles wherever they get while the shutter is open, and its afterglow.
     fn short_exposure(&self, view: &View, field: &FieldLines) -> Sources {
         let light = self.light(self.simulation(), view.shutter.middle());
-        let way = rms_speed(self.simulation()) * view.shutter.duration();
-        let count = (2.0 * way / (SPREADS_PER_INSTANT * light.spread_km())).ceil().clamp(1.0, MOST_INSTANTS) as usize;
+        let distance_km = rms_speed(self.simulation()) * view.shutter.duration();
+        let count =
+            (2.0 * distance_km / (SPREADS_PER_INSTANT * light.spread_km())).ceil().clamp(1.0, MOST_INSTANTS) as usize;
         let now = self.simulation().time();
-        let later = (0..count).map(|instant| view.shutter.instant(instant, count) - now).collect();
-        Sources::new(&light, field, &Moments { later, first: 0, smear_km: smear_km(way / count as f64) })
+        let offsets_s = (0..count).map(|instant| view.shutter.instant(instant, count) - now).collect();
+        Sources::new(
+            &light,
+            field,
+            &SampleTimes { offsets_s, first_index: 0, smear_km: smear_km(distance_km / count as f64) },
+        )
     }
 
     /// The mean of the states that come while the shutter is open.
@@ -62,9 +67,13 @@ impl Aurora {
         for instant in 0..LONG_INSTANTS {
             let t = begin - shutter.open + shutter.instant(instant, LONG_INSTANTS);
             step_until(&mut simulation, t);
-            let way = rms_speed(&simulation) * shutter.duration() / LONG_INSTANTS as f64;
+            let distance_km = rms_speed(&simulation) * shutter.duration() / LONG_INSTANTS as f64;
             let first = instant as u32;
-            let moments = Moments { later: vec![t - simulation.time()], first, smear_km: smear_km(way) };
+            let moments = SampleTimes {
+                offsets_s: vec![t - simulation.time()],
+                first_index: first,
+                smear_km: smear_km(distance_km),
+            };
             mean.add(&Sources::new(&self.light(&simulation, t), field, &moments), 1.0 / LONG_INSTANTS as f32);
         }
         mean
@@ -79,8 +88,8 @@ fn rms_speed(simulation: &AuroraSimulation) -> f64 {
 }
 
 /// Standard deviation of an even spread over a way, along each of the two directions.
-fn smear_km(way: f64) -> f64 {
-    way * math::sqrt(1.0 / 24.0)
+fn smear_km(distance_km: f64) -> f64 {
+    distance_km * math::sqrt(1.0 / 24.0)
 }
 
 #[cfg(test)]

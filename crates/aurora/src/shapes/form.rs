@@ -29,7 +29,7 @@ const PIECES: usize = 256;
 
 impl Form {
     /// How far it bends unless told, degrees.
-    fn usual_bend_deg(self) -> f64 {
+    fn default_bend_deg(self) -> f64 {
         match self {
             Self::Arc => 40.0,
             Self::Band => 38.0,
@@ -42,7 +42,7 @@ impl Form {
         }
     }
 
-    fn usual_count(self) -> i64 {
+    fn default_count(self) -> i64 {
         match self {
             Self::Arc | Self::SShape | Self::Spiral | Self::Surge | Self::Peel => 1,
             Self::Fold => 2,
@@ -79,8 +79,8 @@ impl Form {
 
     /// The form's line of length 1 about the origin, x east and z south.
     pub(super) fn line(self, bend_deg: Option<f64>, count: Option<i64>) -> Vec<DVec2> {
-        let bend = bend_deg.unwrap_or_else(|| self.usual_bend_deg()).to_radians();
-        let count = count.unwrap_or_else(|| self.usual_count()) as f64;
+        let bend = bend_deg.unwrap_or_else(|| self.default_bend_deg()).to_radians();
+        let count = count.unwrap_or_else(|| self.default_count()) as f64;
         let mut at = DVec2::ZERO;
         let mut line = vec![at];
         for piece in 0..PIECES {

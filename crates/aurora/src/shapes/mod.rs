@@ -7,7 +7,7 @@
 
 pub(crate) mod correspondence;
 mod default_shapes;
-mod fault;
+mod error;
 mod form;
 pub(crate) mod geometry;
 pub(crate) mod interpolation;
@@ -16,19 +16,19 @@ mod sequence;
 mod shape;
 pub(crate) mod strokes;
 
-pub use fault::{ShapeFault, ShapeFaultKind};
+pub use error::{ShapeError, ShapeErrorKind};
 pub use form::Form;
-pub(crate) use geometry::polyline::lengths;
+pub(crate) use geometry::polyline::cumulative_lengths;
 pub use geometry::{
-    nearest_segment::Neighbourhood,
-    segments::{Sample, Segments},
+    nearest_segment::NearestSegmentGrid,
+    segments::{SheetSample, SheetSampler},
 };
 pub use interpolation::gap::Bridge;
 pub use parameters::{
     Correspondence, FRAME_S, LinkParameters, MergeParameters, MotionParameters, ShapeParameters, SheetParameters,
     Spacing, SplitParameters,
 };
-pub(crate) use sequence::Listing;
+pub(crate) use sequence::ControlPointIds;
 pub use sequence::Sequence;
 pub use shape::{Shape, Sheet};
 pub use strokes::intersection::{SegmentId, count_crossings, first_crossing};

@@ -29,11 +29,11 @@ pub struct AuroraParticles {
     /// The sheet that it is nearest to, as the shape's list has it; where it was last near one.
     pub sheets: Vec<u32>,
     /// Share of that sheet's length before it, 0 to 1.
-    pub shares: Vec<f32>,
+    pub arc_fractions: Vec<f32>,
 }
 
 /// Arrays of `f32` that a particle has an entry in.
-pub(super) const NUMBERS: usize = 9;
+pub(super) const FLOAT_ARRAYS: usize = 9;
 
 impl AuroraParticles {
     /// Number of particles.
@@ -56,18 +56,18 @@ impl AuroraParticles {
 
     /// Place of a particle, km.
     #[must_use]
-    pub fn place(&self, index: usize) -> DVec2 {
+    pub fn position(&self, index: usize) -> DVec2 {
         DVec2::new(f64::from(self.positions[0][index]), f64::from(self.positions[1][index]))
     }
 
     /// All arrays of `f32`: positions, velocities, fades, energies, powers, full powers, shares.
-    pub(super) fn numbers(&self) -> [&Vec<f32>; NUMBERS] {
+    pub(super) fn float_arrays(&self) -> [&Vec<f32>; FLOAT_ARRAYS] {
         let ([x, z], [u, w]) = (&self.positions, &self.velocities);
-        [x, z, u, w, &self.fades, &self.energies_ev, &self.powers_w, &self.full_powers_w, &self.shares]
+        [x, z, u, w, &self.fades, &self.energies_ev, &self.powers_w, &self.full_powers_w, &self.arc_fractions]
     }
 
     /// The same, to be changed.
-    pub(super) fn numbers_mut(&mut self) -> [&mut Vec<f32>; NUMBERS] {
+    pub(super) fn float_arrays_mut(&mut self) -> [&mut Vec<f32>; FLOAT_ARRAYS] {
         let ([x, z], [u, w]) = (&mut self.positions, &mut self.velocities);
         [
             x,
@@ -78,14 +78,14 @@ impl AuroraParticles {
             &mut self.energies_ev,
             &mut self.powers_w,
             &mut self.full_powers_w,
-            &mut self.shares,
+            &mut self.arc_fractions,
         ]
     }
 
     /// Adds one that has no power yet.
-    pub(super) fn push(&mut self, id: u64, place: DVec2, [east, south]: [f32; 2], fade: f32) {
-        let numbers = [place.x as f32, place.y as f32, east, south, fade, 0.0, 0.0, 0.0, 0.0];
-        self.numbers_mut().into_iter().zip(numbers).for_each(|(values, number)| values.push(number));
+    pub(super) fn push(&mut self, id: u64, position: DVec2, [east, south]: [f32; 2], fade: f32) {
+        let values = [position.x as f32, position.y as f32, east, south, fade, 0.0, 0.0, 0.0, 0.0];
+        self.float_arrays_mut().into_iter().zip(values).for_each(|(values, number)| values.push(number));
         self.ids.push(id);
         self.dying.push(false);
         self.sheets.push(0);
@@ -93,7 +93,7 @@ impl AuroraParticles {
 
     /// Keeps those of which `keep` says so, in their order.
     pub(super) fn retain(&mut self, keep: &[bool]) {
-        self.numbers_mut().into_par_iter().for_each(|values| bansho_sph::retain(values, keep));
+        self.float_arrays_mut().into_par_iter().for_each(|values| bansho_sph::retain(values, keep));
         bansho_sph::retain(&mut self.ids, keep);
         bansho_sph::retain(&mut self.dying, keep);
         bansho_sph::retain(&mut self.sheets, keep);
@@ -102,7 +102,7 @@ impl AuroraParticles {
     /// Sorts them into cells, by cell and then by id.
     pub(super) fn sort(&mut self, cells: &mut Cells<2>) {
         cells.assign(self.positions.each_ref().map(Vec::as_slice), &self.ids);
-        cells.reorder_all(self.numbers_mut());
+        cells.reorder_all(self.float_arrays_mut());
         cells.reorder(&mut self.ids);
         cells.reorder(&mut self.dying);
         cells.reorder(&mut self.sheets);

@@ -6,7 +6,7 @@ use bansho_base::{
 };
 
 use super::{AuroraParticles, AuroraSimulation};
-use crate::render::project::field_lines::{EARTH_RADIUS_KM, FOOT_KM};
+use crate::render::project::field_lines::{EARTH_RADIUS_KM, FOOT_ALTITUDE_KM};
 
 /// Half of the time over which a velocity is taken, s.
 const MOMENT_S: f64 = 1e-3;
@@ -18,7 +18,7 @@ pub(crate) fn point_cloud(particles: &AuroraParticles, later: f64) -> PointCloud
     let [us, ws] = &particles.velocities;
     let place = |index: usize, time: f64| {
         let velocity = DVec2::new(f64::from(us[index]), f64::from(ws[index]));
-        on_shell(particles.place(index) + velocity * time)
+        on_shell(particles.position(index) + velocity * time)
     };
     let velocity = |index: usize| (place(index, MOMENT_S) - place(index, -MOMENT_S)) / (2.0 * MOMENT_S);
     PointCloud {
@@ -32,7 +32,7 @@ pub(crate) fn point_cloud(particles: &AuroraParticles, later: f64) -> PointCloud
 
 /// A place of the drawn plane, km, on the shell that it is spread over, m: as far from the middle along it.
 fn on_shell(place: DVec2) -> DVec3 {
-    const SHELL_M: f64 = 1e3 * (EARTH_RADIUS_KM + FOOT_KM);
+    const SHELL_M: f64 = 1e3 * (EARTH_RADIUS_KM + FOOT_ALTITUDE_KM);
     let distance = place.length();
     let (sin, cos) = math::sin_cos(1e3 * distance / SHELL_M);
     let level = place.normalize_or_zero() * (sin * SHELL_M);

@@ -5,26 +5,26 @@ use fearless_simd::{Simd, prelude::*, u64x8};
 use bansho_base::math::simd::{LANES, Lanes, Real, nearest_whole, ramp};
 
 /// Collisions that are worked on at once.
-pub(super) const BATCH: usize = LANES;
+pub(super) const SPLAT_LANES: usize = LANES;
 
 /// Pairs of rows that collisions lie between, and the weights of both rows. Those outside have no weight and a pair each below the chart,
 /// for sums in one would wait for each other.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-pub(super) struct Points {
+pub(super) struct SplatBatch {
     /// Number of a pair: half its upper row if that is even; else half its lower row, counted from the first odd pair on.
-    pub(super) pairs: [u32; BATCH],
+    pub(super) pairs: [u32; SPLAT_LANES],
     /// Two numbers each, for they are read at once.
-    pub(super) weights: [u64; BATCH],
+    pub(super) weights: [u64; SPLAT_LANES],
 }
 
 /// The least and the greatest row of each lane.
-pub(super) struct LitRows<S: Simd> {
+pub(super) struct RowRange<S: Simd> {
     least: Lanes<S>,
     greatest: Lanes<S>,
 }
 
-impl<S: Simd> LitRows<S> {
+impl<S: Simd> RowRange<S> {
     #[inline(always)]
     pub(super) fn new(simd: S) -> Self {
         Self { least: Lanes::splat(simd, f32::INFINITY), greatest: Lanes::splat(simd, -1.0) }
@@ -38,31 +38,31 @@ impl<S: Simd> LitRows<S> {
     }
 }
 
-impl Points {
-    pub(super) const NONE: Self = Self { pairs: [0; BATCH], weights: [0; BATCH] };
+impl SplatBatch {
+    pub(super) const NONE: Self = Self { pairs: [0; SPLAT_LANES], weights: [0; SPLAT_LANES] };
 
     /// Places them, so bright, at rows above `last`, or outside.
     #[inline(always)]
-    pub(super) fn place<S: Simd>(
+    pub(super) fn project<S: Simd>(
         &mut self,
-        [rows, shown]: [Lanes<S>; 2],
+        [rows, brightness]: [Lanes<S>; 2],
         last: f32,
         odd_pairs: u32,
-        lit: &mut LitRows<S>,
+        row_range: &mut RowRange<S>,
     ) {
         let (zero, end, outside) = (rows.broadcast(0.0), rows.broadcast(last), ramp(rows.simd, last + 1.0, 2.0));
         let whole = rows.floor();
         let (least, greatest) = (rows.broadcast(f32::INFINITY), rows.broadcast(-1.0));
-        lit.least = lit.least.simd_min(inside(rows, end, [whole, least]));
-        lit.greatest = lit.greatest.simd_max(inside(rows, end, [whole, greatest]));
+        row_range.least = row_range.least.simd_min(inside(rows, end, [whole, least]));
+        row_range.greatest = row_range.greatest.simd_max(inside(rows, end, [whole, greatest]));
         let row = nearest_whole(inside(rows, end, [whole, outside]));
         (((row + 1) >> 1) + (row & 1) * odd_pairs).store_slice(&mut self.pairs);
-        let weights = inside(rows, end, [shown, zero]);
+        let weights = inside(rows, end, [brightness, zero]);
         let lower = weights * (rows - whole);
         let (first, second) = (weights - lower).interleave(lower);
         let [first, second]: [u64x8<S>; 2] = [first.bitcast(), second.bitcast()];
-        first.store_slice(&mut self.weights[..BATCH / 2]);
-        second.store_slice(&mut self.weights[BATCH / 2..]);
+        first.store_slice(&mut self.weights[..SPLAT_LANES / 2]);
+        second.store_slice(&mut self.weights[SPLAT_LANES / 2..]);
     }
 }
 

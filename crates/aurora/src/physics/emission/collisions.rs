@@ -10,7 +10,7 @@ use super::{
 };
 use crate::physics::{
     atmosphere::Air,
-    precipitation::{deposition::column, electron_track::collision_count},
+    precipitation::{deposition::column_ion_pairs, electron_track::collision_count},
 };
 
 /// k_b, J/K, and the atomic mass unit, kg.
@@ -27,7 +27,7 @@ impl Emission {
     /// For a node that is not of the grid of energies.
     #[must_use]
     pub fn ion_pairs_per_collision(&self, node: usize) -> f64 {
-        let pairs = column(self.deposition().monoenergetic(node));
+        let pairs = column_ion_pairs(self.deposition().monoenergetic_profile(node));
         pairs / collision_count(node) as f64 / PHOTONS_PER_KILORAYLEIGH
     }
 }
@@ -72,18 +72,18 @@ mod tests {
     use super::{super::PHOTONS_PER_KILORAYLEIGH, *};
     use crate::physics::{
         atmosphere::{LEVELS, atmosphere},
-        precipitation::{electron_track::Falls, spectrum::ARC},
+        precipitation::{electron_track::TrackSampler, spectrum::ARC},
     };
 
     /// Light by level and emitter, kR per mW m^-2, of so many falls of a spectrum.
-    fn light(table: &Emission, falls: &Falls, energy_ev: f64, particles: u64) -> Vec<PerEmitter<f64>> {
+    fn light(table: &Emission, tracks: &TrackSampler, energy_ev: f64, particles: u64) -> Vec<PerEmitter<f64>> {
         let key = Key::new(11, "aurora");
         let mut sum = vec![[0.0; 4]; LEVELS];
         for particle in 0..particles {
             let uniforms = key.uniforms(particle, 0, Purpose::named("energy")).map(f64::from);
-            let node = table.deposition().draw_node(energy_ev, [uniforms[0], uniforms[1]]);
+            let node = table.deposition().sample_node(energy_ev, [uniforms[0], uniforms[1]]);
             let pairs = table.ion_pairs_per_collision(node) / particles as f64;
-            for collision in falls.fall(node, key, particle) {
+            for collision in tracks.sample_track(node, key, particle) {
                 let level = collision.level as usize;
                 let photons = table.photons_per_ion_pair()[level];
                 sum[level] = std::array::from_fn(|i| sum[level][i] + photons[i] * pairs);
@@ -110,9 +110,9 @@ mod tests {
     #[test]
     fn the_mean_of_collisions_is_the_profile() {
         let table = Emission::new(atmosphere(), ARC);
-        let falls = Falls::new(table.deposition(), 0.02);
+        let tracks = TrackSampler::new(table.deposition(), 0.02);
         // 64 sets of 500 particles; a picture of 120,000 has a fifteenth of this noise.
-        let all = difference(&table, 4000.0, &light(&table, &falls, 4000.0, 32_000));
+        let all = difference(&table, 4000.0, &light(&table, &tracks, 4000.0, 32_000));
         assert!(all.iter().all(|difference| *difference < 0.03), "{all:?}");
     }
 
@@ -132,10 +132,10 @@ mod tests {
     /// What shines after a collision, drawn by the rules of the thesis.
     fn drawn(air: &Air, uniforms: [f64; 3]) -> Option<Emitter> {
         use Emitter::{Nitrogen, NitrogenIon, OxygenGreen, OxygenRed};
-        let place = uniforms[0] * air.number_density();
-        let struck = match place {
-            place if place < air.o => [OxygenGreen, OxygenRed],
-            place if place < air.o + air.n2 => [NitrogenIon, Nitrogen],
+        let species_draw = uniforms[0] * air.number_density();
+        let struck = match species_draw {
+            species_draw if species_draw < air.o => [OxygenGreen, OxygenRed],
+            species_draw if species_draw < air.o + air.n2 => [NitrogenIon, Nitrogen],
             _ => return None,
         };
         let rates = struck.map(|emitter| DIRECT_PHOTONS[emitter.index()]);

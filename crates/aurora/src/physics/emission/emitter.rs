@@ -71,9 +71,9 @@ impl Emitter {
     /// Absolute ACEScg of a kilorayleigh in its counting photons, all its lines and bands included; luminance in cd/m^2. The light lies
     /// outside AP1: components may be negative, keep them until the view transform.
     #[must_use]
-    pub fn colour_per_kilorayleigh(self) -> [f64; 3] {
-        static COLOURS: LazyLock<PerEmitter<[f64; 3]>> = LazyLock::new(|| EMITTERS.map(colour));
-        COLOURS[self.index()]
+    pub fn color_per_kilorayleigh(self) -> [f64; 3] {
+        static COLORS: LazyLock<PerEmitter<[f64; 3]>> = LazyLock::new(|| EMITTERS.map(color));
+        COLORS[self.index()]
     }
 
     /// Wavelength and photons of each of its lines or bands, for each counting photon.
@@ -88,12 +88,12 @@ impl Emitter {
 impl Line {
     /// Absolute ACEScg of a kilorayleigh of this line alone.
     #[must_use]
-    pub fn colour_per_kilorayleigh(&self) -> [f64; 3] {
+    pub fn color_per_kilorayleigh(&self) -> [f64; 3] {
         ACESCG_FROM_XYZ.apply(absolute_xyz(self.wavelength_nm))
     }
 }
 
-fn colour(emitter: Emitter) -> [f64; 3] {
+fn color(emitter: Emitter) -> [f64; 3] {
     let sum = emitter.spectrum().into_iter().fold([0.0; 3], |sum: [f64; 3], (wavelength_nm, photons)| {
         let xyz = absolute_xyz(wavelength_nm);
         std::array::from_fn(|i| sum[i] + photons * xyz[i])
@@ -122,28 +122,28 @@ mod tests {
     use super::*;
     use bansho_base::color::luminance;
 
-    fn luminance_of(colour: [f64; 3]) -> f64 {
-        luminance(colour.map(|value| value as f32)) as f64
+    fn luminance_of(color: [f64; 3]) -> f64 {
+        luminance(color.map(|value| value as f32)) as f64
     }
 
     #[test]
     fn bands_are_whole() {
         let bands = first_positive_bands();
         assert_eq!(bands.len(), 27);
-        assert!(bands.iter().all(|(nm, share)| (570.0..780.0).contains(nm) && *share > 0.0));
+        assert!(bands.iter().all(|(nm, weight)| (570.0..780.0).contains(nm) && *weight > 0.0));
         // 670.5 nm is one of them.
-        assert!(bands.iter().any(|(nm, share)| (nm - 670.5).abs() < 0.1 && (share - LINES[6].photons).abs() < 1e-9));
+        assert!(bands.iter().any(|(nm, weight)| (nm - 670.5).abs() < 0.1 && (weight - LINES[6].photons).abs() < 1e-9));
     }
 
     #[test]
     fn luminances_are_those_of_the_reference() {
         let mut compared = 0;
-        for row in include_str!("data/line_colours.csv").lines().skip(1) {
+        for row in include_str!("data/line_colors.csv").lines().skip(1) {
             let fields: Vec<&str> = row.split(',').collect();
             let number = |column: usize| fields[column].parse::<f64>().unwrap();
             if fields[2] == "CIE1931_2deg" && !fields[0].contains("composite") {
                 let line = LINES.iter().find(|line| (line.wavelength_nm - number(1)).abs() < 0.02).unwrap();
-                let found = luminance_of(line.colour_per_kilorayleigh());
+                let found = luminance_of(line.color_per_kilorayleigh());
                 assert!((found / number(19) - 1.0).abs() < 0.01, "{row}: {found}");
                 compared += 1;
             }
@@ -154,18 +154,18 @@ mod tests {
     #[test]
     fn composite_of_the_first_positive_bands_agrees_with_the_reference() {
         // 5.68975e-6 cd/m^2 per kR of the bands in 575-780 nm alone.
-        let visible: f64 = first_positive_bands().iter().map(|(_, share)| share).sum();
-        let found = luminance_of(Emitter::Nitrogen.colour_per_kilorayleigh()) / visible;
+        let visible: f64 = first_positive_bands().iter().map(|(_, weight)| weight).sum();
+        let found = luminance_of(Emitter::Nitrogen.color_per_kilorayleigh()) / visible;
         assert!((found / 5.68975e-6 - 1.0).abs() < 0.02, "{found}");
     }
 
     #[test]
     fn saturated_lines_lie_outside_the_working_space() {
-        let negative = |emitter: Emitter| emitter.colour_per_kilorayleigh().iter().any(|value| *value < 0.0);
+        let negative = |emitter: Emitter| emitter.color_per_kilorayleigh().iter().any(|value| *value < 0.0);
         assert!(negative(Emitter::OxygenGreen) || negative(Emitter::OxygenRed) || negative(Emitter::NitrogenIon));
-        let [r, g, b] = Emitter::OxygenGreen.colour_per_kilorayleigh();
+        let [r, g, b] = Emitter::OxygenGreen.color_per_kilorayleigh();
         assert!(g > r.max(b));
-        let [r, g, b] = Emitter::NitrogenIon.colour_per_kilorayleigh();
+        let [r, g, b] = Emitter::NitrogenIon.color_per_kilorayleigh();
         assert!(b > r.max(g));
     }
 }

@@ -8,7 +8,7 @@ use bansho_base::math;
 
 use super::{
     emitter::{Emitter, PerEmitter},
-    quenching::radiated_share,
+    quenching::radiated_fraction,
 };
 use crate::physics::atmosphere::Air;
 
@@ -39,32 +39,34 @@ const NITROGEN_A_BY_O2: f64 = 4.1e-18;
 
 /// Shares of the ion pairs that fall to each species.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Ionised {
+struct IonizationFractions {
     n2: f64,
     o2: f64,
     o: f64,
 }
 
 /// Weights 0.92, 1 and 0.56 of Rees (1989).
-fn ionised(air: &Air) -> Ionised {
+fn ionization_fractions(air: &Air) -> IonizationFractions {
     let (n2, o2, o) = (0.92 * air.n2, air.o2, 0.56 * air.o);
     let sum = n2 + o2 + o;
-    Ionised { n2: n2 / sum, o2: o2 / sum, o: o / sum }
+    IonizationFractions { n2: n2 / sum, o2: o2 / sum, o: o / sum }
 }
 
 /// Share of the ion pairs that end as O2+: N2+ and O+ hand their charge to O2, or go to NO+ (rates of Lindinger et al. 1974 and
 /// McFarland et al. 1973). It grows downward, where O2 abounds.
-fn molecular_oxygen_ions(air: &Air, ionised: &Ionised) -> f64 {
+fn o2_ion_fraction(air: &Air, ionization_fractions: &IonizationFractions) -> f64 {
     let cold = 300.0 / air.temperature;
     let n2_by_o2 = 5e-17 * math::pow(cold, 0.8) * air.o2;
     let n2_by_o = 1.4e-16 * math::pow(cold, 0.44) * air.o;
     let o_by_o2 = 2e-17 * math::sqrt(cold) * air.o2;
     let o_by_n2 = 1.2e-18 * air.n2;
-    ionised.o2 + ionised.n2 * n2_by_o2 / (n2_by_o2 + n2_by_o) + ionised.o * o_by_o2 / (o_by_o2 + o_by_n2)
+    ionization_fractions.o2
+        + ionization_fractions.n2 * n2_by_o2 / (n2_by_o2 + n2_by_o)
+        + ionization_fractions.o * o_by_o2 / (o_by_o2 + o_by_n2)
 }
 
 /// Share of N2(A) that gives its energy to O.
-fn transferred(air: &Air) -> f64 {
+fn n2a_transfer_fraction(air: &Air) -> f64 {
     let by_o = NITROGEN_A_BY_O * air.o;
     by_o / (NITROGEN_A_RADIATION + by_o + NITROGEN_A_BY_O2 * air.o2)
 }
@@ -72,18 +74,19 @@ fn transferred(air: &Air) -> f64 {
 /// Counting photons of each emitter for each ion pair made in this air.
 #[must_use]
 pub fn photons_per_ion_pair(air: &Air) -> PerEmitter<f64> {
-    let pairs = ionised(air);
-    let oxygen_ions = molecular_oxygen_ions(air, &pairs);
-    let green_made =
-        DIRECT_GREEN * pairs.o + TRANSFER_GREEN * pairs.n2 * transferred(air) + RECOMBINATION_GREEN * oxygen_ions;
-    let green = GREEN_TO_557 * green_made * radiated_share(Emitter::OxygenGreen, air);
+    let pairs = ionization_fractions(air);
+    let oxygen_ions = o2_ion_fraction(air, &pairs);
+    let green_made = DIRECT_GREEN * pairs.o
+        + TRANSFER_GREEN * pairs.n2 * n2a_transfer_fraction(air)
+        + RECOMBINATION_GREEN * oxygen_ions;
+    let green = GREEN_TO_557 * green_made * radiated_fraction(Emitter::OxygenGreen, air);
     // Each 557.7 nm photon leaves an O(1D).
     let red_made = DIRECT_RED * pairs.o + RECOMBINATION_RED * oxygen_ions + green;
     [
         green,
-        RED_TO_630 * red_made * radiated_share(Emitter::OxygenRed, air),
-        ION_B * ION_B_TO_427 * pairs.n2 * radiated_share(Emitter::NitrogenIon, air),
-        NITROGEN_B * pairs.n2 * radiated_share(Emitter::Nitrogen, air),
+        RED_TO_630 * red_made * radiated_fraction(Emitter::OxygenRed, air),
+        ION_B * ION_B_TO_427 * pairs.n2 * radiated_fraction(Emitter::NitrogenIon, air),
+        NITROGEN_B * pairs.n2 * radiated_fraction(Emitter::Nitrogen, air),
     ]
 }
 
@@ -101,13 +104,13 @@ mod tests {
     fn an_ion_pair_by_hand_at_110_km() {
         let air = atmosphere().at(110.0);
         // 0.92 x 1.48394e18, 2.74567e17, 0.56 x 1.3908e17 of their sum 1.717677e18.
-        let pairs = ionised(&air);
+        let pairs = ionization_fractions(&air);
         assert!(
             (pairs.n2 - 0.79481).abs() < 1e-4 && (pairs.o2 - 0.15985).abs() < 1e-4 && (pairs.o - 0.04534).abs() < 1e-4
         );
         // 4.31148 of 0.76982 + 4.31148 + 1.12572.
-        assert!((transferred(&air) - 0.69463).abs() < 1e-4);
-        assert!((molecular_oxygen_ions(&air, &pairs) - 0.538).abs() < 1e-3);
+        assert!((n2a_transfer_fraction(&air) - 0.69463).abs() < 1e-4);
+        assert!((o2_ion_fraction(&air, &pairs) - 0.538).abs() < 1e-3);
         let [green, red, ion, nitrogen] = photons_per_ion_pair(&air);
         assert!((ion - 0.022 * 0.79481).abs() < 1e-5 && (nitrogen - 0.78 * 0.79481).abs() < 1e-3);
         // 0.943367 x 0.9746 x (0.25 x 0.04534 + 0.088 x 0.79481 x 0.69463 + 0.028 x 0.538).

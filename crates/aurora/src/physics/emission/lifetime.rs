@@ -21,14 +21,14 @@ pub fn diffusion_coefficient(air: &Air) -> f64 {
 
 /// How long the light of one emitter lingers at an altitude, and how far its atoms get meanwhile.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Persistence {
+pub struct LifetimeAndDiffusion {
     /// Mean lifetime, s: the light decays as exp(-t / lifetime).
     pub lifetime: f64,
     /// Variance along each direction of the way from excitation to radiation, m^2.
     pub diffusion_variance: f64,
 }
 
-impl Persistence {
+impl LifetimeAndDiffusion {
     /// Of an emitter in this air. Excited atoms diffuse while they live, by a variance of 2 D tau, which shows in the red line alone.
     #[must_use]
     pub fn new(emitter: Emitter, air: &Air) -> Self {
@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn spread_is_metres_for_prompt_light_and_kilometres_for_red() {
-        let root = |emitter, altitude_km| Persistence::new(emitter, &atmosphere().at(altitude_km)).spread(1e4);
+        let root = |emitter, altitude_km| LifetimeAndDiffusion::new(emitter, &atmosphere().at(altitude_km)).spread(1e4);
         assert!((root(Emitter::NitrogenIon, 110.0) - 6.74).abs() < 0.01);
         assert!((10.0..100.0).contains(&root(Emitter::OxygenGreen, 110.0)));
         assert!((5e3..2e4).contains(&root(Emitter::OxygenRed, 250.0)));

@@ -13,8 +13,8 @@ pub(crate) mod lateral_spread;
 pub mod spectrum;
 
 pub use deposition::Deposition;
-pub use electron_track::{Collision, FallLibrary, Falls};
-pub use hard_sphere::HardSphere;
+pub use electron_track::{Collision, TrackLibrary, TrackSampler};
+pub use hard_sphere::HardSphereAtmosphere;
 pub use spectrum::Spectrum;
 
 /// Mean energy that an electron loses for each ion pair that it makes, eV (Rees 1989; Fang et al. 2010).

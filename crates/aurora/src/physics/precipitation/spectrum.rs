@@ -8,7 +8,7 @@ use super::energy_grid::{NODES, node_energy_ev};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Spectrum {
     /// All alike.
-    Monoenergetic,
+    MonoenergeticBeam,
     /// Number flux `exp(-((E - E_0) / (width E_0))^2 / 2)`: electrons that fell through one voltage, as in arcs.
     Gaussian {
         /// Standard deviation as a share of the central energy.
@@ -26,22 +26,22 @@ impl Spectrum {
     ///
     /// The spectrum is cut at the ends of the grid and what remains is scaled to the whole flux.
     #[must_use]
-    pub fn shares(self, node: usize) -> [f64; NODES] {
+    pub fn flux_fractions(self, node: usize) -> [f64; NODES] {
         let energy_ev = node_energy_ev(node);
-        let mut shares: [f64; NODES] = std::array::from_fn(|other| {
+        let mut fractions: [f64; NODES] = std::array::from_fn(|other| {
             let ratio = node_energy_ev(other) / energy_ev;
             // Energy flux over a step of the logarithm is the number flux times E^2.
             ratio * ratio * self.number_flux(ratio, other == node)
         });
-        let sum: f64 = shares.iter().sum();
-        shares.iter_mut().for_each(|share| *share /= sum);
-        shares
+        let sum: f64 = fractions.iter().sum();
+        fractions.iter_mut().for_each(|fraction| *fraction /= sum);
+        fractions
     }
 
     /// Number flux by E / E_0, in any unit.
     fn number_flux(self, ratio: f64, central: bool) -> f64 {
         match self {
-            Self::Monoenergetic => central as u8 as f64,
+            Self::MonoenergeticBeam => central as u8 as f64,
             // The centre itself is exact, also for widths below the grid's spacing.
             Self::Gaussian { .. } if central => 1.0,
             Self::Gaussian { width } => {
@@ -58,16 +58,16 @@ mod tests {
     use super::*;
 
     /// Mean of E over the number flux: the energy flux shares divided by E weigh the particles.
-    fn mean_energy_ev(shares: &[f64; NODES]) -> f64 {
-        let particles: f64 = (0..NODES).map(|node| shares[node] / node_energy_ev(node)).sum();
-        shares.iter().sum::<f64>() / particles
+    fn mean_energy_ev(fractions: &[f64; NODES]) -> f64 {
+        let particles: f64 = (0..NODES).map(|node| fractions[node] / node_energy_ev(node)).sum();
+        fractions.iter().sum::<f64>() / particles
     }
 
     #[test]
     fn spectra_have_their_mean_energies() {
         let node = 64;
-        let mean = |spectrum: Spectrum| mean_energy_ev(&spectrum.shares(node)) / node_energy_ev(node);
-        assert_eq!(mean(Spectrum::Monoenergetic), 1.0);
+        let mean = |spectrum: Spectrum| mean_energy_ev(&spectrum.flux_fractions(node)) / node_energy_ev(node);
+        assert_eq!(mean(Spectrum::MonoenergeticBeam), 1.0);
         // 0.35 reaches nothing negative to speak of: 2.9 standard deviations.
         assert!((mean(ARC) - 1.0).abs() < 0.01, "{}", mean(ARC));
         assert!((mean(Spectrum::Maxwellian) - 2.0).abs() < 0.02, "{}", mean(Spectrum::Maxwellian));
@@ -77,9 +77,9 @@ mod tests {
     fn shares_add_up_for_every_width_and_node() {
         for width in [0.0, 1e-9, 0.01, 0.35, 5.0] {
             for node in [0, 1, 50, NODES - 1] {
-                let shares = Spectrum::Gaussian { width }.shares(node);
-                assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{width} {node}");
-                assert!(shares.iter().all(|share| *share >= 0.0));
+                let fractions = Spectrum::Gaussian { width }.flux_fractions(node);
+                assert!((fractions.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{width} {node}");
+                assert!(fractions.iter().all(|fraction| *fraction >= 0.0));
             }
         }
     }

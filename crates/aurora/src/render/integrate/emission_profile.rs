@@ -8,20 +8,20 @@ use crate::physics::{
     atmosphere::{HIGHEST_KM, LEVELS, LOWEST_KM, level_altitude_km},
     emission::{
         EMITTERS, Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter,
-        red_line_levels::{RED_HEIGHTS, red_by_height},
+        red_line_altitudes::{RED_ALTITUDES, red_by_altitude},
     },
     precipitation::energy_grid::NODES,
 };
 
 /// Tables between two nodes of the grid of energies: the nearest is within 0.5 % of the energy, and the red column,
 /// which falls fastest, within 1 %.
-const FINENESS: usize = 8;
+const TABLES_PER_NODE: usize = 8;
 /// Tables of one energy, each of them smoothed to and sampled at twice the spacing of the one before, from 1 km on.
-pub(super) const SPACINGS: usize = 12;
+pub(super) const MIP_LEVELS: usize = 12;
 /// Where the table of each spacing begins among those of one energy, and the end of all.
-const STARTS: [usize; SPACINGS + 1] = starts();
+const STARTS: [usize; MIP_LEVELS + 1] = starts();
 /// A column is drawn from where this share of its light is left below up to where it is left above.
-const LEFT: f64 = 3e-4;
+const CUTOFF_FRACTION: f64 = 3e-4;
 
 /// Entries of the table of one spacing: one below the levels, and dark ones above them, so that smoothing loses
 /// nothing.
@@ -29,9 +29,9 @@ const fn entries(spacing: usize) -> usize {
     ((LEVELS - 1) >> spacing) + 4
 }
 
-const fn starts() -> [usize; SPACINGS + 1] {
-    let (mut starts, mut spacing) = ([0; SPACINGS + 1], 0);
-    while spacing < SPACINGS {
+const fn starts() -> [usize; MIP_LEVELS + 1] {
+    let (mut starts, mut spacing) = ([0; MIP_LEVELS + 1], 0);
+    while spacing < MIP_LEVELS {
         starts[spacing + 1] = starts[spacing] + entries(spacing);
         spacing += 1;
     }
@@ -41,17 +41,17 @@ const fn starts() -> [usize; SPACINGS + 1] {
 /// Light of precipitation by energy and altitude, in kR per km of sight and mW/m^2; tables are made when they are first
 /// asked for.
 #[derive(Clone, Debug)]
-pub(crate) struct Profiles {
+pub(crate) struct EmissionProfiles {
     emission: Emission,
     /// Whether it is red light alone, its heights in place of the emitters.
-    red_by_height: bool,
-    tables: Vec<OnceLock<Table>>,
+    red_by_altitude: bool,
+    tables: Vec<OnceLock<MipTables>>,
 }
 
 /// The tables of one energy, one after the other.
 #[derive(Clone, Debug)]
-struct Table {
-    light: Vec<PerEmitter<f32>>,
+struct MipTables {
+    values: Vec<PerEmitter<f32>>,
     /// Altitudes above which there is hardly any prompt, and any red light, km.
     tops_km: [f32; 2],
     /// Altitude below which there is hardly any light, km.
@@ -60,48 +60,52 @@ struct Table {
 
 /// Light by altitude of one energy.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Profile<'a> {
-    light: &'a [PerEmitter<f32>],
+pub(super) struct EmissionProfile<'a> {
+    values: &'a [PerEmitter<f32>],
     /// Altitudes between which nearly all light is, km.
     pub(super) bottom_km: f32,
     pub(super) top_km: f32,
 }
 
-impl Profiles {
+impl EmissionProfiles {
     /// The tables for a spectrum.
     pub(crate) fn new(emission: &Emission) -> Self {
-        let tables = vec![OnceLock::new(); (NODES - 1) * FINENESS + 1];
-        Self { emission: emission.clone(), red_by_height: false, tables }
+        let tables = vec![OnceLock::new(); (NODES - 1) * TABLES_PER_NODE + 1];
+        Self { emission: emission.clone(), red_by_altitude: false, tables }
     }
 
     /// The tables of red light alone, its heights in place of the emitters.
-    pub(crate) fn of_red_by_height(emission: &Emission) -> Self {
-        Self { red_by_height: true, ..Self::new(emission) }
+    pub(crate) fn red_by_altitude(emission: &Emission) -> Self {
+        Self { red_by_altitude: true, ..Self::new(emission) }
     }
 
     /// The light of an energy, given as its place among the nodes of the grid; `red` includes the red line's height.
     #[inline(always)]
-    pub(super) fn at(&self, node: f32, red: bool) -> Profile<'_> {
+    pub(super) fn at(&self, node: f32, red: bool) -> EmissionProfile<'_> {
         let last = self.tables.len() - 1;
-        let fine = ((node * FINENESS as f32 + 0.5).max(0.0) as usize).min(last);
-        let Table { light, tops_km: [prompt_km, red_km], bottom_km } = self.table(fine);
-        Profile { light, bottom_km: *bottom_km, top_km: if red { red_km.max(*prompt_km) } else { *prompt_km } }
+        let table_index = ((node * TABLES_PER_NODE as f32 + 0.5).max(0.0) as usize).min(last);
+        let MipTables { values, tops_km: [prompt_km, red_km], bottom_km } = self.table(table_index);
+        EmissionProfile { values, bottom_km: *bottom_km, top_km: if red { red_km.max(*prompt_km) } else { *prompt_km } }
     }
 
     #[inline(never)]
-    fn table(&self, fine: usize) -> &Table {
-        self.tables[fine].get_or_init(|| {
-            let profile = self.emission.profile(fine_energy_ev(fine));
-            if self.red_by_height { Table::of_heights(&red_by_height(&profile)) } else { Table::new(&profile) }
+    fn table(&self, table_index: usize) -> &MipTables {
+        self.tables[table_index].get_or_init(|| {
+            let profile = self.emission.profile(table_energy_ev(table_index));
+            if self.red_by_altitude {
+                MipTables::of_heights(&red_by_altitude(&profile))
+            } else {
+                MipTables::new(&profile)
+            }
         })
     }
 }
 
-impl Table {
+impl MipTables {
     /// From the volume emission at each level.
     fn new(profile: &[PerEmitter<f64>]) -> Self {
         Self {
-            light: smoothed(profile),
+            values: smoothed(profile),
             tops_km: [Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| top_km(profile, emitter.index())),
             bottom_km: bottom_km(profile, &EMITTERS.map(Emitter::index)),
         }
@@ -109,42 +113,42 @@ impl Table {
 
     /// From that of red light at each level, by its heights in place of the emitters.
     fn of_heights(profile: &[PerEmitter<f64>]) -> Self {
-        let top_km = top_km(profile, RED_HEIGHTS - 1);
-        let heights: [usize; RED_HEIGHTS] = std::array::from_fn(|height| height);
-        Self { light: smoothed(profile), tops_km: [top_km; 2], bottom_km: bottom_km(profile, &heights) }
+        let top_km = top_km(profile, RED_ALTITUDES - 1);
+        let heights: [usize; RED_ALTITUDES] = std::array::from_fn(|height| height);
+        Self { values: smoothed(profile), tops_km: [top_km; 2], bottom_km: bottom_km(profile, &heights) }
     }
 }
 
 /// The tables of all spacings one after the other, from the volume emission at each level.
 fn smoothed(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f32>> {
-    let mut light = Vec::with_capacity(STARTS[SPACINGS]);
+    let mut light = Vec::with_capacity(STARTS[MIP_LEVELS]);
     let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
     let mut table: Vec<PerEmitter<f64>> = std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect();
-    for spacing in 0..SPACINGS {
+    for spacing in 0..MIP_LEVELS {
         let entry = |at: usize| table.get(at).copied().unwrap_or_default();
         light.extend((0..entries(spacing)).map(|at| entry(at).map(|value| value as f32)));
-        table = halved(&table);
+        table = downsampled(&table);
     }
     light
 }
 
-impl<'a> Profile<'a> {
+impl<'a> EmissionProfile<'a> {
     /// The table smoothed over 2^`spacing` km. Entries lie so far apart, the second at 80 km; the last is dark.
     #[inline(always)]
     pub(super) fn table(&self, spacing: usize) -> &'a [PerEmitter<f32>] {
-        &self.light[STARTS[spacing]..STARTS[spacing + 1]]
+        &self.values[STARTS[spacing]..STARTS[spacing + 1]]
     }
 }
 
 /// Energy of a table, eV.
-fn fine_energy_ev(fine: usize) -> f64 {
+fn table_energy_ev(table_index: usize) -> f64 {
     use crate::physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV};
-    let share = fine as f64 / ((NODES - 1) * FINENESS) as f64;
+    let share = table_index as f64 / ((NODES - 1) * TABLES_PER_NODE) as f64;
     LOWEST_EV * math::pow(HIGHEST_EV / LOWEST_EV, share)
 }
 
 /// Every other entry from the second on, and one before, smoothed so that none of the light is lost.
-fn halved(table: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
+fn downsampled(table: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
     let entry = |at: Option<usize>| at.and_then(|at| table.get(at)).copied().unwrap_or_default();
     let smoothed = |number: usize| -> PerEmitter<f64> {
         let near = [2, 1, 0].map(|before| entry((2 * number).checked_sub(before)));
@@ -170,7 +174,7 @@ fn passed(levels: impl Iterator<Item = usize>, profile: &[PerEmitter<f64>], emit
     let mut sum = 0.0;
     let hardly_any = |level: &usize| {
         sum += light(*level);
-        sum < LEFT * whole
+        sum < CUTOFF_FRACTION * whole
     };
     levels.take_while(hardly_any).count()
 }
@@ -186,12 +190,12 @@ mod tests {
     #[test]
     fn every_table_of_an_energy_holds_the_same_column() {
         let table = table::Emission::new(atmosphere(), ARC);
-        let profiles = Profiles::new(&table);
+        let profiles = EmissionProfiles::new(&table);
         for node in [20.0, 48.0, 60.25] {
             let profile = profiles.at(node, true);
-            let energy = fine_energy_ev((node * FINENESS as f32) as usize);
+            let energy = table_energy_ev((node * TABLES_PER_NODE as f32) as usize);
             let expected = table.column(energy).kilorayleigh;
-            for spacing in 0..SPACINGS {
+            for spacing in 0..MIP_LEVELS {
                 let sum = profile.table(spacing).iter().fold([0.0; 4], |sum: [f64; 4], light| {
                     std::array::from_fn(|i| sum[i] + f64::from(light[i]) * f64::from(1 << spacing))
                 });
@@ -204,7 +208,7 @@ mod tests {
 
     #[test]
     fn hard_electrons_stop_lower() {
-        let profiles = Profiles::new(&table::Emission::new(atmosphere(), ARC));
+        let profiles = EmissionProfiles::new(&table::Emission::new(atmosphere(), ARC));
         assert!(profiles.at(64.0, false).top_km < profiles.at(32.0, false).top_km);
         assert!(profiles.at(48.0, true).top_km > 300.0);
     }

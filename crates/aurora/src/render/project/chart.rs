@@ -12,16 +12,16 @@ use bansho_base::{
 use super::field_lines::FieldLines;
 
 /// Columns of a strip, which one thread draws.
-pub(crate) const STRIP: usize = 16;
+pub(crate) const STRIP_COLUMNS: usize = 16;
 /// Places along each side of the picture at which its directions are sampled.
-const SAMPLES: usize = 24;
+const SAMPLES_PER_SIDE: usize = 24;
 /// Most columns and rows.
 const MOST: f64 = 16_384.0;
 /// Most cells of a chart for each of the picture's pixels: more are seen only where a camera zooms or turns far while its shutter is open,
 /// which blurs them.
 const MOST_PER_PIXEL: f64 = 16.0;
 /// Lower than this below the horizon nothing is drawn: sine of the elevation.
-const LOWEST: f64 = -0.35;
+const MIN_SINE_ELEVATION: f64 = -0.35;
 
 /// What a chart covers, radians.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +37,7 @@ pub(crate) struct Coverage {
 /// A grid of directions; columns are meridians, rows parallels.
 #[derive(Clone, Debug)]
 pub(crate) struct Chart {
-    /// Number of columns, a multiple of [`STRIP`].
+    /// Number of columns, a multiple of [`STRIP_COLUMNS`].
     pub(crate) columns: usize,
     /// Number of rows, at least 2.
     pub(crate) rows: usize,
@@ -48,7 +48,7 @@ pub(crate) struct Chart {
     first_longitude: f64,
     first_colatitude: f64,
     /// Whether it goes all around.
-    pub(crate) whole: bool,
+    pub(crate) wraps: bool,
 }
 
 impl Coverage {
@@ -62,13 +62,13 @@ impl Coverage {
         let (mut reach, mut least, mut greatest) = (0.0_f64, PI, 0.0_f64);
         for [along, x, y] in &directions {
             let colatitude = math::atan2(math::hypot(*x, *y), *along);
-            let turned = math::atan2(*y, *x) - middle;
-            reach = reach.max((turned - TAU * (turned / TAU).round()).abs());
+            let wrapped = math::atan2(*y, *x) - middle;
+            reach = reach.max((wrapped - TAU * (wrapped / TAU).round()).abs());
             (least, greatest) = (least.min(colatitude), greatest.max(colatitude));
         }
         let camera = &view.camera;
         let pixel = 1.0 / camera.focal_pixels;
-        let margin = 1.5 * camera.size[0].max(camera.size[1]) / (SAMPLES - 1) as f64 * pixel;
+        let margin = 1.5 * camera.size[0].max(camera.size[1]) / (SAMPLES_PER_SIDE - 1) as f64 * pixel;
         let around = least < margin || reach > 0.8 * PI;
         let sine = math::sin(least.min(FRAC_PI_2)).max(1e-3);
         let mut coverage = Self {
@@ -99,11 +99,15 @@ impl Coverage {
 
 /// Parts along and across the field of directions all over the picture, without those far below the horizon.
 fn directions<'a>(camera: &'a Camera, field: &'a FieldLines) -> impl Iterator<Item = [f64; 3]> + 'a {
-    (0..SAMPLES * SAMPLES).filter_map(move |index| {
-        let share = |at: usize| at as f64 / (SAMPLES - 1) as f64;
-        let pixel = DVec2::new(share(index % SAMPLES) * camera.size[0], share(index / SAMPLES) * camera.size[1]);
+    (0..SAMPLES_PER_SIDE * SAMPLES_PER_SIDE).filter_map(move |index| {
+        let fraction = |at: usize| at as f64 / (SAMPLES_PER_SIDE - 1) as f64;
+        let pixel = DVec2::new(
+            fraction(index % SAMPLES_PER_SIDE) * camera.size[0],
+            fraction(index / SAMPLES_PER_SIDE) * camera.size[1],
+        );
         let direction = camera.direction(pixel)?.normalize();
-        (direction.y > LOWEST).then(|| [field.along, field.across[0], field.across[1]].map(|axis| direction.dot(axis)))
+        (direction.y > MIN_SINE_ELEVATION)
+            .then(|| [field.along, field.across[0], field.across[1]].map(|axis| direction.dot(axis)))
     })
 }
 
@@ -112,17 +116,17 @@ impl Chart {
     pub(crate) fn new(coverage: &Coverage, column: f64, row: f64) -> Self {
         let ([least, greatest], widest) = (coverage.colatitude, coverage.widest());
         let [middle, reach] = coverage.longitude;
-        let whole = reach >= PI;
+        let wraps = reach >= PI;
         let range = 2.0 * reach;
         let columns = (range * widest / column).min(MOST).ceil() as usize;
-        let columns = columns.max(1).next_multiple_of(STRIP);
-        let column_step = if whole { range / columns as f64 } else { (column / widest).max(range / columns as f64) };
+        let columns = columns.max(1).next_multiple_of(STRIP_COLUMNS);
+        let column_step = if wraps { range / columns as f64 } else { (column / widest).max(range / columns as f64) };
         // On multiples of the step, so that a chart does not crawl over the sky as the camera turns.
-        let first_longitude = if whole { -PI } else { ((middle - reach) / column_step).floor() * column_step };
+        let first_longitude = if wraps { -PI } else { ((middle - reach) / column_step).floor() * column_step };
         let row = row.max((greatest - least) / MOST);
         let first_row = (least / row).floor();
         let rows = ((greatest / row).ceil() - first_row).max(2.0) as usize;
-        Self { columns, rows, column_step, row_step: row, first_longitude, first_colatitude: first_row * row, whole }
+        Self { columns, rows, column_step, row_step: row, first_longitude, first_colatitude: first_row * row, wraps }
     }
 
     /// Longitude of the middle of a column.
@@ -136,16 +140,16 @@ impl Chart {
     }
 
     /// Cosine and sine of the longitude of a column.
-    pub(crate) fn unit(&self, column: usize) -> [f64; 2] {
+    pub(crate) fn longitude_cos_sin(&self, column: usize) -> [f64; 2] {
         let (sin, cos) = math::sin_cos(self.longitude(column));
         [cos, sin]
     }
 
     /// Cosines and sines of the longitudes of a strip's columns.
-    pub(crate) fn single_units(&self, strip: usize) -> [[f32; STRIP]; 2] {
-        let mut units = [[0.0; STRIP]; 2];
-        for column in 0..STRIP {
-            for (values, value) in units.iter_mut().zip(self.unit(strip * STRIP + column)) {
+    pub(crate) fn strip_cos_sin(&self, strip: usize) -> [[f32; STRIP_COLUMNS]; 2] {
+        let mut units = [[0.0; STRIP_COLUMNS]; 2];
+        for column in 0..STRIP_COLUMNS {
+            for (values, value) in units.iter_mut().zip(self.longitude_cos_sin(strip * STRIP_COLUMNS + column)) {
                 values[column] = value as f32;
             }
         }
@@ -162,19 +166,19 @@ impl Chart {
 
     /// The column that stands for one less than a column beside the chart.
     #[inline(always)]
-    pub(crate) fn held(&self, column: i32) -> usize {
+    pub(crate) fn wrap_column(&self, column: i32) -> usize {
         let columns = self.columns as i32;
-        let turned = match (self.whole, column < 0, column >= columns) {
+        let wrapped = match (self.wraps, column < 0, column >= columns) {
             (true, true, _) => column + columns,
             (true, _, true) => column - columns,
             _ => column,
         };
-        turned.clamp(0, columns - 1) as usize
+        wrapped.clamp(0, columns - 1) as usize
     }
 
     /// How places on the chart are found.
-    pub(crate) fn finder(&self) -> Finder {
-        Finder {
+    pub(crate) fn projection(&self) -> ChartProjection {
+        ChartProjection {
             per_column: (1.0 / self.column_step) as f32,
             per_row: (1.0 / self.row_step) as f32,
             middle: (self.first_longitude + 0.5 * self.columns as f64 * self.column_step) as f32,
@@ -186,7 +190,7 @@ impl Chart {
 
 /// Places on a chart in cells: 0 is the chart's edge, 0.5 the middle of its first column or row.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Finder {
+pub(crate) struct ChartProjection {
     per_column: f32,
     per_row: f32,
     middle: f32,
@@ -194,7 +198,7 @@ pub(crate) struct Finder {
     first_row: f32,
 }
 
-impl Finder {
+impl ChartProjection {
     /// One for rows of so many radians from the magnetic zenith on.
     #[cfg(test)]
     pub(super) fn of_rows(step: f32) -> Self {
@@ -204,9 +208,9 @@ impl Finder {
     /// The column of a longitude in radians, within half a turn of the chart's middle.
     #[inline(always)]
     pub(crate) fn column(&self, longitude: f32) -> f32 {
-        let turned = longitude - self.middle;
-        let turned = turned - (turned * (1.0 / std::f32::consts::TAU)).round_ties_even() * std::f32::consts::TAU;
-        turned.fma(self.per_column, self.half)
+        let wrapped = longitude - self.middle;
+        let wrapped = wrapped - (wrapped * (1.0 / std::f32::consts::TAU)).round_ties_even() * std::f32::consts::TAU;
+        wrapped.fma(self.per_column, self.half)
     }
 
     /// How many rows an angle in radians is.

@@ -9,10 +9,10 @@ use bansho_base::math::{self, DVec2, DVec3, MulAdd, approximations};
 pub(crate) use bansho_base::world::sky::EARTH_RADIUS_KM;
 
 /// Altitude of the plane on which feet are drawn, km.
-pub(crate) const FOOT_KM: f64 = 100.0;
+pub(crate) const FOOT_ALTITUDE_KM: f64 = 100.0;
 /// Least dip that is drawn, degrees: nearer the magnetic equator there are no auroras, and field lines would not reach
 /// the ground.
-const LEAST_DIP_DEG: f64 = 30.0;
+const MIN_DIP_DEG: f64 = 30.0;
 
 /// The magnetic field about an observer. Lengths are km; x east, y up, z south from the point on the ground below the
 /// drawn square's middle.
@@ -28,56 +28,56 @@ pub(crate) struct FieldLines {
 
 /// Where a field line passes the foot's plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Foot {
+pub(crate) struct FootPoint {
     /// The line's place in the plane across the field through the observer, km.
     pub(crate) across: [f32; 2],
     /// Cosine of the angle between the field and the vertical there.
-    pub(crate) upright: f32,
+    pub(crate) vertical_cosine: f32,
 }
 
 impl FieldLines {
     /// The field of that dip and declination for an observer at a place in m.
-    pub(crate) fn new(dip_deg: f64, declination_deg: f64, place: DVec3) -> Self {
-        let dip = dip_deg.abs().max(LEAST_DIP_DEG).to_radians();
+    pub(crate) fn new(dip_deg: f64, declination_deg: f64, position: DVec3) -> Self {
+        let dip = dip_deg.abs().max(MIN_DIP_DEG).to_radians();
         let (sin, cos) = math::sin_cos(dip);
         let (east, north) = math::sin_cos(declination_deg.to_radians());
         // Lines lean away from the nearer pole: to the south in the north.
         let lean = if dip_deg < 0.0 { cos } else { -cos };
         let along = DVec3::new(lean * east, sin, -lean * north);
         let first = (DVec3::X - along * along.x).normalize();
-        let observer = place * 1e-3 + DVec3::Y * EARTH_RADIUS_KM;
+        let observer = position * 1e-3 + DVec3::Y * EARTH_RADIUS_KM;
         Self { observer, along, across: [first, along.cross(first)] }
     }
 
     /// The field line whose foot is at a place of the drawn plane, km east and south: that far from the middle along
     /// the shell at 100 km.
     #[inline(always)]
-    pub(crate) fn foot(&self, east: f32, south: f32) -> Foot {
-        const SHELL: f32 = (EARTH_RADIUS_KM + FOOT_KM) as f32;
-        const TURNS: f32 = (1.0 / (std::f64::consts::TAU * (EARTH_RADIUS_KM + FOOT_KM))) as f32;
+    pub(crate) fn foot_point(&self, east: f32, south: f32) -> FootPoint {
+        const SHELL: f32 = (EARTH_RADIUS_KM + FOOT_ALTITUDE_KM) as f32;
+        const TURNS: f32 = (1.0 / (std::f64::consts::TAU * (EARTH_RADIUS_KM + FOOT_ALTITUDE_KM))) as f32;
         let distance = east.fma(east, south * south).sqrt();
         let turns = distance * TURNS;
         let (sin, cos) = (approximations::sin_turns(turns), approximations::cos_turns(turns));
-        let share = if distance > 0.0 { sin / distance } else { 0.0 };
-        let up = [east * share, cos, south * share];
+        let scale = if distance > 0.0 { sin / distance } else { 0.0 };
+        let up = [east * scale, cos, south * scale];
         let observer = self.observer.as_vec3().to_array();
-        let mut place = [0.0; 3];
+        let mut position = [0.0; 3];
         for axis in 0..3 {
-            place[axis] = up[axis].fma(SHELL, -observer[axis]);
+            position[axis] = up[axis].fma(SHELL, -observer[axis]);
         }
         let [along, first, second] = self.single();
-        Foot { across: [dot(first, place), dot(second, place)], upright: dot(along, up).max(0.05) }
+        FootPoint { across: [dot(first, position), dot(second, position)], vertical_cosine: dot(along, up).max(0.05) }
     }
 
     /// The place of the drawn plane, km east and south, that is seen in a direction; none where it is not seen.
-    pub(crate) fn drawn(&self, direction: DVec3) -> Option<DVec2> {
-        const SHELL: f64 = EARTH_RADIUS_KM + FOOT_KM;
+    pub(crate) fn foot_position(&self, direction: DVec3) -> Option<DVec2> {
+        const SHELL: f64 = EARTH_RADIUS_KM + FOOT_ALTITUDE_KM;
         let direction = direction.normalize();
         let nearest = -self.observer.dot(direction);
         let squared = nearest * nearest + SHELL * SHELL - self.observer.length_squared();
-        let place = self.observer + direction * (nearest + math::sqrt(squared.max(0.0)));
-        let level = DVec2::new(place.x, place.z);
-        let distance = SHELL * math::atan2(level.length(), place.y);
+        let position = self.observer + direction * (nearest + math::sqrt(squared.max(0.0)));
+        let level = DVec2::new(position.x, position.z);
+        let distance = SHELL * math::atan2(level.length(), position.y);
         (squared >= 0.0).then(|| level.normalize_or_zero() * distance)
     }
 
@@ -99,7 +99,7 @@ impl FieldLines {
     }
 
     /// Cosine of the colatitude, and the two parts across the field, of a direction.
-    pub(crate) fn turned(&self, direction: DVec3) -> [f64; 3] {
+    pub(crate) fn to_field_frame(&self, direction: DVec3) -> [f64; 3] {
         [direction.dot(self.along), direction.dot(self.across[0]), direction.dot(self.across[1])]
     }
 
@@ -141,14 +141,14 @@ impl Meridian {
 
 impl FieldLine {
     /// Place of the line where it is so high; where it comes nearest if it is never so low.
-    pub(crate) fn place(&self, altitude_km: f64) -> f64 {
+    pub(crate) fn position_at_altitude(&self, altitude_km: f64) -> f64 {
         let squared = altitude_km * (2.0 * EARTH_RADIUS_KM + altitude_km);
         math::sqrt((self.along * self.along - self.excess + squared).max(0.0)) - self.along
     }
 
     /// The coefficients of the square of the distance from the Earth's middle less that of the ground, `(c0 + s (c1 +
     /// s))`.
-    pub(crate) fn square(&self) -> [f32; 2] {
+    pub(crate) fn quadratic(&self) -> [f32; 2] {
         [self.excess as f32, (2.0 * self.along) as f32]
     }
 }
@@ -188,21 +188,21 @@ mod tests {
     fn a_foot_lies_on_its_line_at_100_km() {
         let field = FieldLines::new(77.0, 5.0, DVec3::new(20.0, 1.7, -300.0));
         for [east, south] in [[0.0, 0.0], [120.0, -80.0], [-600.0, 900.0]] {
-            let foot = field.foot(east, south);
+            let foot = field.foot_point(east, south);
             let [x, y] = foot.across.map(f64::from);
             let distance = math::hypot(x, y);
             let line = field.meridian([x / distance, y / distance]).line(distance);
-            let place = line.place(100.0);
+            let position = line.position_at_altitude(100.0);
             // The same place, by the sphere.
             let radius = EARTH_RADIUS_KM + 100.0;
             let far = math::hypot(f64::from(east), f64::from(south)).max(1e-9);
             let (sin, cos) = math::sin_cos(far / radius);
             let up = DVec3::new(f64::from(east) / far * sin, cos, f64::from(south) / far * sin);
-            let from_lines = field.observer + field.across[0] * x + field.across[1] * y + field.along * place;
+            let from_lines = field.observer + field.across[0] * x + field.across[1] * y + field.along * position;
             assert!((up * radius - from_lines).length() < 0.02, "{east} {south}");
-            assert!((f64::from(foot.upright) - up.dot(field.along)).abs() < 1e-6);
-            let [constant, linear] = line.square();
-            let found = altitude((place as f32).fma(place as f32 + linear, constant));
+            assert!((f64::from(foot.vertical_cosine) - up.dot(field.along)).abs() < 1e-6);
+            let [constant, linear] = line.quadratic();
+            let found = altitude((position as f32).fma(position as f32 + linear, constant));
             assert!((found - 100.0).abs() < 0.01, "{found}");
         }
     }
@@ -210,25 +210,25 @@ mod tests {
     #[test]
     fn a_drawn_place_is_seen_where_it_is() {
         let field = FieldLines::new(77.0, 5.0, DVec3::new(20e3, 1.7, -300e3));
-        let radius = EARTH_RADIUS_KM + FOOT_KM;
-        for place in [DVec2::ZERO, DVec2::new(120.0, -80.0), DVec2::new(-300.0, -700.0)] {
-            let (sin, cos) = math::sin_cos(place.length() / radius);
-            let level = place.normalize_or_zero() * sin;
+        let radius = EARTH_RADIUS_KM + FOOT_ALTITUDE_KM;
+        for position in [DVec2::ZERO, DVec2::new(120.0, -80.0), DVec2::new(-300.0, -700.0)] {
+            let (sin, cos) = math::sin_cos(position.length() / radius);
+            let level = position.normalize_or_zero() * sin;
             let direction = DVec3::new(level.x, cos, level.y) * radius - field.observer;
-            assert!((field.drawn(direction).unwrap() - place).length() < 1e-6);
+            assert!((field.foot_position(direction).unwrap() - position).length() < 1e-6);
         }
         // From above the shell and looking away.
-        assert_eq!(FieldLines::new(77.0, 0.0, DVec3::Y * 2e5).drawn(DVec3::X), None);
+        assert_eq!(FieldLines::new(77.0, 0.0, DVec3::Y * 2e5).foot_position(DVec3::X), None);
     }
 
     #[test]
     fn a_field_line_keeps_its_longitude() {
         let field = FieldLines::new(77.0, 0.0, DVec3::ZERO);
-        let foot = field.foot(80.0, -150.0).across.map(f64::from);
+        let foot = field.foot_point(80.0, -150.0).across.map(f64::from);
         let longitude = math::atan2(foot[1], foot[0]);
-        for place in [90.0, 150.0, 400.0] {
-            let seen = field.across[0] * foot[0] + field.across[1] * foot[1] + field.along * place;
-            let [_, x, y] = field.turned(seen.normalize());
+        for position in [90.0, 150.0, 400.0] {
+            let seen = field.across[0] * foot[0] + field.across[1] * foot[1] + field.along * position;
+            let [_, x, y] = field.to_field_frame(seen.normalize());
             assert!((math::atan2(y, x) - longitude).abs() < 1e-9);
         }
     }

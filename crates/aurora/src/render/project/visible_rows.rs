@@ -14,7 +14,7 @@ use crate::physics::atmosphere::{HIGHEST_KM, LOWEST_KM};
 const MARGIN_ROWS: f64 = 2.0;
 
 /// The rows of a chart, for field lines anywhere.
-pub(crate) struct ShownRows {
+pub(crate) struct VisibleRowTest {
     /// Square of the observer's distance from the Earth's middle less that of the ground, and the parts of that distance along
     /// and across the field, km.
     squared: f32,
@@ -27,7 +27,7 @@ pub(crate) struct ShownRows {
     last: [f32; 2],
 }
 
-impl ShownRows {
+impl VisibleRowTest {
     pub(crate) fn new(chart: &Chart, field: &FieldLines) -> Self {
         // The same for every longitude but for the part outward.
         let [[squared, first, along], [_, second, _]] =
@@ -49,12 +49,12 @@ impl ShownRows {
     /// Whether light within `margin_km` of a field line, across the field, may show: the line's place across the field and its distance
     /// from the observer's own, km.
     #[inline(always)]
-    pub(crate) fn may_hold(&self, [x, y]: [f32; 2], distance: f32, margin_km: f32) -> bool {
+    pub(crate) fn may_contain(&self, [x, y]: [f32; 2], distance: f32, margin_km: f32) -> bool {
         let outward = x.fma(self.across[0], y * self.across[1]);
         let excess = distance.fma(distance, 2.0_f32.fma(outward, self.squared));
         let change = margin_km * 2.0_f32.fma(distance + self.lean, margin_km);
-        let highest = self.place(HIGHEST_KM as f32, excess - change);
-        let lowest = self.place(LOWEST_KM as f32, excess + change);
+        let highest = self.position_at_altitude(HIGHEST_KM as f32, excess - change);
+        let lowest = self.position_at_altitude(LOWEST_KM as f32, excess + change);
         // The sine of how much farther down than the first row its lowest light beside the margin's outer edge lies; and so on.
         let [sine, cosine] = self.first;
         let above = (distance + margin_km).fma(cosine, -lowest * sine) < 0.0;
@@ -63,10 +63,10 @@ impl ShownRows {
         !above && !below
     }
 
-    /// Place along a field line of that altitude, as [`FieldLine::place`](super::field_lines::FieldLine::place), by the square of the distance
+    /// Place along a field line of that altitude, as [`FieldLine::position`](super::field_lines::FieldLine::position), by the square of the distance
     /// from the Earth's middle at place 0 less that of the ground.
     #[inline(always)]
-    fn place(&self, altitude_km: f32, excess: f32) -> f32 {
+    fn position_at_altitude(&self, altitude_km: f32, excess: f32) -> f32 {
         const DIAMETER: f32 = 2.0 * EARTH_RADIUS_KM as f32;
         let squared = self.along.fma(self.along, altitude_km.fma(DIAMETER + altitude_km, -excess));
         (if squared > 0.0 { squared } else { 0.0 }).sqrt() - self.along
@@ -89,7 +89,7 @@ mod tests {
         let distance = math::hypot(f64::from(x), f64::from(y));
         let line = field.meridian([f64::from(x) / distance, f64::from(y) / distance]).line(distance);
         let rows = (0..=720).map(|step| {
-            let colatitude = math::atan2(distance, line.place(80.0 + f64::from(step)));
+            let colatitude = math::atan2(distance, line.position_at_altitude(80.0 + f64::from(step)));
             (colatitude - chart.colatitude(0)) / chart.row_step
         });
         rows.into_iter().any(|row| row > -0.5 && row < chart.rows as f64 - 0.5)
@@ -103,13 +103,14 @@ mod tests {
             let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [128, 72], 0);
             let coverage = Coverage::of_view(&view, &field);
             let chart = Chart::new(&coverage, coverage.pixel, coverage.pixel);
-            let shown = ShownRows::new(&chart, &field);
+            let shown = VisibleRowTest::new(&chart, &field);
             let (mut seen, mut kept, mut all) = (0, 0, 0);
             for east in -40..=40 {
                 for south in -40..=40 {
                     let across = [12.0 * east as f32 + 1.0, 12.0 * south as f32 + 1.0];
                     let distance = math::hypot(f64::from(across[0]), f64::from(across[1])) as f32;
-                    let (is_seen, is_kept) = (is_seen(&chart, &field, across), shown.may_hold(across, distance, 3.0));
+                    let (is_seen, is_kept) =
+                        (is_seen(&chart, &field, across), shown.may_contain(across, distance, 3.0));
                     assert!(is_kept || !is_seen, "dip {dip_deg}: {across:?}");
                     (seen, kept, all) = (seen + usize::from(is_seen), kept + usize::from(is_kept), all + 1);
                 }

@@ -58,9 +58,9 @@ mod tests {
             return vec![Vec::new()];
         }
         let insert = |shorter: Vec<usize>| {
-            (0..count).map(move |place| {
+            (0..count).map(move |slot| {
                 let mut longer = shorter.clone();
-                longer.insert(place, count - 1);
+                longer.insert(slot, count - 1);
                 longer
             })
         };

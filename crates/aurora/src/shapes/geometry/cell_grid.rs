@@ -31,8 +31,8 @@ impl CellGrid {
     }
 
     /// The middle of a cell.
-    pub(super) fn middle(&self, cell: usize) -> DVec2 {
-        let [column, row] = [cell % self.size[0], cell / self.size[0]].map(|place| place as f64 + 0.5);
+    pub(super) fn center(&self, cell: usize) -> DVec2 {
+        let [column, row] = [cell % self.size[0], cell / self.size[0]].map(|index| index as f64 + 0.5);
         self.low + DVec2::new(column, row) * self.cell
     }
 
@@ -53,7 +53,7 @@ impl CellGrid {
     }
 
     /// Visits every cell that the segment from `a` to `b` passes, and few others. Both ends must lie within the cells.
-    pub(crate) fn for_each_passed(&self, a: DVec2, b: DVec2, mut visit: impl FnMut(usize)) {
+    pub(crate) fn for_each_traversed(&self, a: DVec2, b: DVec2, mut visit: impl FnMut(usize)) {
         self.for_each_run(a, b, 0.0, |run| run.for_each(&mut visit));
     }
 
@@ -61,14 +61,14 @@ impl CellGrid {
     /// the cells.
     pub(super) fn for_each_run(&self, a: DVec2, b: DVec2, margin: f64, mut visit: impl FnMut(Range<usize>)) {
         let (top, bottom) = if a.y <= b.y { (a, b) } else { (b, a) };
-        let place_at = |height: f64| {
-            let share = ((height - top.y) / (bottom.y - top.y)).clamp(0.0, 1.0);
-            top.x + (bottom.x - top.x) * share
+        let x_at = |height: f64| {
+            let fraction = ((height - top.y) / (bottom.y - top.y)).clamp(0.0, 1.0);
+            top.x + (bottom.x - top.x) * fraction
         };
         for row in self.line(1, top.y - margin)..=self.line(1, bottom.y + margin) {
             let slab = self.low.y + row as f64 * self.cell;
             let ends = if bottom.y > top.y {
-                [place_at(slab - margin), place_at(slab + self.cell + margin)]
+                [x_at(slab - margin), x_at(slab + self.cell + margin)]
             } else {
                 [top.x, bottom.x]
             };

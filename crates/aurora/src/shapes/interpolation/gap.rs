@@ -5,7 +5,7 @@
 
 use bansho_base::math::smoothstep;
 
-use crate::shapes::{Sheet, geometry::polyline::lengths};
+use crate::shapes::{Sheet, geometry::polyline::cumulative_lengths};
 
 /// Light passes over gaps narrower than this, km, and narrower than half of what they are when they are widest.
 const BRIDGED_KM: f64 = 40.0;
@@ -45,24 +45,24 @@ pub struct Bridge {
 
 impl GapFlux {
     /// A gap of `width` km that is `widest` km when it is widest, at a share of the time from where it is closed to there.
-    pub(crate) fn new(width: f64, widest: f64, share: f64) -> Self {
+    pub(crate) fn new(width: f64, widest: f64, fraction: f64) -> Self {
         let limit = BRIDGED_KM.min(0.5 * widest);
         let closed = if limit > 0.0 { 1.0 - smoothstep(0.0, limit, width) } else { 1.0 };
         // At the wide side sheets are as they are drawn.
-        let free = 1.0 - smoothstep(1.0 - DARKENING, 1.0, share);
+        let free = 1.0 - smoothstep(1.0 - DARKENING, 1.0, fraction);
         Self { ends: 1.0 - (1.0 - closed) * free, across: closed * free }
     }
 }
 
 /// Lets the flux of a sheet fade toward its start, or its end, down to that share there.
-pub(crate) fn fade(sheet: &mut Sheet, at_end: bool, share: f64) {
-    let lengths = lengths(&sheet.points);
+pub(crate) fn fade_toward_gap(sheet: &mut Sheet, at_end: bool, fraction: f64) {
+    let lengths = cumulative_lengths(&sheet.points);
     let whole = lengths.last().copied().unwrap_or(0.0);
-    let way = FADE_KM.min(FADE_SHARE * whole);
+    let fade_km = FADE_KM.min(FADE_SHARE * whole);
     for (flux, length) in sheet.flux.iter_mut().zip(&lengths) {
         let from_end = if at_end { whole - length } else { *length };
-        let risen = if way > 0.0 { smoothstep(0.0, way, from_end) } else { 1.0 };
-        *flux *= 1.0 - (1.0 - share) * (1.0 - risen);
+        let risen = if fade_km > 0.0 { smoothstep(0.0, fade_km, from_end) } else { 1.0 };
+        *flux *= 1.0 - (1.0 - fraction) * (1.0 - risen);
     }
 }
 
@@ -88,7 +88,7 @@ mod tests {
     fn flux_fades_toward_the_gap_alone() {
         let points: Vec<DVec2> = (0..41).map(|index| DVec2::new(10.0 * f64::from(index), 0.0)).collect();
         let mut sheet = Sheet { flux: vec![2.0; points.len()], energy: vec![1.0; points.len()], points };
-        fade(&mut sheet, true, 0.25);
+        fade_toward_gap(&mut sheet, true, 0.25);
         assert_eq!((sheet.flux[40], sheet.flux[0], sheet.flux[34]), (0.5, 2.0, 2.0));
         assert!(sheet.flux.windows(2).all(|pair| pair[1] <= pair[0]));
         // Half of the way up between.

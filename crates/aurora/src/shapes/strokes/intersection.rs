@@ -101,7 +101,7 @@ fn for_each_meeting<S: AsRef<[DVec2]>>(sheets: &[S], meeting: Meeting, mut visit
     let mut compared_with = vec![NONE; segments.len()];
     let mut met: Vec<u32> = Vec::new();
     for (index, segment) in segments.iter().enumerate() {
-        grid.for_each_passed(segment.ends[0], segment.ends[1], |cell| {
+        grid.for_each_traversed(segment.ends[0], segment.ends[1], |cell| {
             let mut link = heads[cell];
             while link != NONE {
                 let (other, next) = links[link as usize];

@@ -37,13 +37,13 @@ fn side(point: DVec2, line: &[DVec2]) -> Option<f64> {
     let (mut least, mut nearest) = (f64::INFINITY, None);
     let last = line.len().saturating_sub(2);
     for (index, pair) in line.windows(2).enumerate() {
-        let way = pair[1] - pair[0];
-        let part = (point - pair[0]).dot(way) / way.length_squared().max(f64::MIN_POSITIVE);
-        let held = part.clamp(0.0, 1.0);
-        let distance = point.distance(pair[0] + way * held);
+        let direction = pair[1] - pair[0];
+        let unclamped = (point - pair[0]).dot(direction) / direction.length_squared().max(f64::MIN_POSITIVE);
+        let clamped = unclamped.clamp(0.0, 1.0);
+        let distance = point.distance(pair[0] + direction * clamped);
         if distance < least {
-            let beyond = (index == 0 && part < 0.0) || (index == last && part > 1.0);
-            (least, nearest) = (distance, (!beyond).then(|| distance.copysign(way.perp_dot(point - pair[0]))));
+            let beyond = (index == 0 && unclamped < 0.0) || (index == last && unclamped > 1.0);
+            (least, nearest) = (distance, (!beyond).then(|| distance.copysign(direction.perp_dot(point - pair[0]))));
         }
     }
     nearest

@@ -7,17 +7,17 @@ use bansho_base::{
     parameters::Auto,
 };
 
-use super::{factors::Factors, intersection::first_crossing};
+use super::{factors::FluxEnergyFactors, intersection::first_crossing};
 use crate::shapes::{
-    SegmentId, ShapeFault, ShapeFaultKind, ShapeParameters, SheetParameters, Spacing,
-    geometry::polyline::{Polyline, by_recorded_points, smoothed},
+    SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing,
+    geometry::polyline::{Polyline, resample_by_index, smooth_sketch},
 };
 
 /// Points closer than this are one, km.
 const SAME_KM: f64 = 1e-6;
 
 /// Length of a form as a share of the drawn square.
-const USUAL_LENGTH: f64 = 0.6;
+const DEFAULT_FORM_LENGTH: f64 = 0.6;
 
 /// Most sheets of a shape.
 const MOST_SHEETS: usize = 256;
@@ -31,8 +31,8 @@ pub(crate) struct DrawnSheet {
     /// Which point of the parameters each recorded one is.
     origins: Vec<usize>,
     /// Pieces of the line between two recorded points.
-    pieces: usize,
-    pub(crate) factors: Factors,
+    for_each_strip: usize,
+    pub(crate) factors: FluxEnergyFactors,
     /// The parameter that it comes from, below `sheets`, and whether that lists points.
     entry: usize,
     lists_points: bool,
@@ -42,14 +42,14 @@ impl DrawnSheet {
     /// `count` control points P_i.
     pub(crate) fn control_points(&self, count: usize, spacing: Spacing) -> Vec<DVec2> {
         match spacing {
-            Spacing::ArcLength => self.line.evenly(count),
-            Spacing::Recorded => by_recorded_points(&self.recorded, count),
+            Spacing::ArcLength => self.line.resample(count),
+            Spacing::Recorded => resample_by_index(&self.recorded, count),
         }
     }
 
     /// The parameter's point at or before a point of the line.
     fn origin(&self, point: usize) -> usize {
-        self.origins[(point / self.pieces).min(self.origins.len() - 1)]
+        self.origins[(point / self.for_each_strip).min(self.origins.len() - 1)]
     }
 }
 
@@ -61,14 +61,14 @@ pub(crate) struct ShapeContext {
 }
 
 impl ShapeContext {
-    fn fault(self, key: &str, kind: ShapeFaultKind) -> ShapeFault {
-        ShapeFault { key: format!("shapes.{}{key}", self.shape), kind }
+    fn error(self, key: &str, kind: ShapeErrorKind) -> ShapeError {
+        ShapeError { key: format!("shapes.{}{key}", self.shape), kind }
     }
 
     /// A fault at a point of a sheet.
-    fn fault_at(self, sheet: &DrawnSheet, point: usize, kind: ShapeFaultKind) -> ShapeFault {
+    fn error_at(self, sheet: &DrawnSheet, point: usize, kind: ShapeErrorKind) -> ShapeError {
         let point = if sheet.lists_points { format!(".points.{}", sheet.origin(point)) } else { String::new() };
-        self.fault(&format!(".sheets.{}{point}", sheet.entry), kind)
+        self.error(&format!(".sheets.{}{point}", sheet.entry), kind)
     }
 }
 
@@ -80,15 +80,15 @@ pub(crate) fn drawn_sheets(
     parameters: &ShapeParameters,
     context: ShapeContext,
     assets: &dyn Assets,
-) -> Result<Vec<DrawnSheet>, ShapeFault> {
+) -> Result<Vec<DrawnSheet>, ShapeError> {
     let arc = [SheetParameters::default()];
     let entries = if parameters.sheets.is_empty() { &arc[..] } else { &parameters.sheets[..] };
     let mut sheets = Vec::new();
     for (entry, parameters) in entries.iter().enumerate() {
         draw_entry(parameters, entry, context, assets, &mut sheets)?;
         if sheets.len() > MOST_SHEETS {
-            let kind = ShapeFaultKind::TooManySheets { found: sheets.len(), most: MOST_SHEETS };
-            return Err(context.fault(".sheets", kind));
+            let kind = ShapeErrorKind::TooManySheets { found: sheets.len(), most: MOST_SHEETS };
+            return Err(context.error(".sheets", kind));
         }
     }
     check_extent(&sheets, context)?;
@@ -103,33 +103,33 @@ fn draw_entry(
     context: ShapeContext,
     assets: &dyn Assets,
     sheets: &mut Vec<DrawnSheet>,
-) -> Result<(), ShapeFault> {
-    let fault = |key: &str, kind| context.fault(&format!(".sheets.{entry}{key}"), kind);
+) -> Result<(), ShapeError> {
+    let error_for = |key: &str, kind| context.error(&format!(".sheets.{entry}{key}"), kind);
     if parameters.stroke.is_some() && parameters.path.is_none() {
-        return Err(fault(".stroke", ShapeFaultKind::StrokeOfNoFile));
+        return Err(error_for(".stroke", ShapeErrorKind::StrokeWithoutFile));
     }
     let strokes = match (&parameters.points, &parameters.path, parameters.form) {
         (Some(points), None, None) => vec![points.iter().map(|&point| DVec2::from(point)).collect()],
         (None, Some(path), None) => {
             let id = parameters.stroke.as_deref();
             strokes(&path.0, id, context.extent_km, assets).map_err(|error| {
-                fault(
+                error_for(
                     if matches!(error.problem, AssetProblem::NoStroke(_)) { ".stroke" } else { ".path" },
                     error.into(),
                 )
             })?
         }
         (None, None, _) => vec![form_line(parameters, context.extent_km)],
-        _ => return Err(fault("", ShapeFaultKind::SeveralSources { sheet: sheets.len() + 1 })),
+        _ => return Err(error_for("", ShapeErrorKind::SeveralSources { sheet: sheets.len() + 1 })),
     };
-    let factors = Factors::new(parameters);
+    let factors = FluxEnergyFactors::new(parameters);
     for copy in 0..parameters.copies {
         let offset = (copy as f64 - (parameters.copies - 1) as f64 / 2.0) * parameters.spacing_km;
         for stroke in &strokes {
             let placed = stroke.iter().map(|&point| placed(point, offset, parameters)).collect();
             let sheet = sheet(placed, parameters, entry, factors.clone()).map_err(|found| {
                 let key = if parameters.points.is_some() { ".points" } else { "" };
-                fault(key, ShapeFaultKind::TooFewPoints { sheet: sheets.len() + 1, found })
+                error_for(key, ShapeErrorKind::TooFewPoints { sheet: sheets.len() + 1, found })
             })?;
             sheets.push(sheet);
         }
@@ -145,7 +145,7 @@ fn sheet(
     points: Vec<DVec2>,
     parameters: &SheetParameters,
     entry: usize,
-    factors: Factors,
+    factors: FluxEnergyFactors,
 ) -> Result<DrawnSheet, usize> {
     let mut recorded: Vec<DVec2> = Vec::with_capacity(points.len());
     let mut origins = Vec::with_capacity(points.len());
@@ -155,15 +155,24 @@ fn sheet(
             origins.push(origin);
         }
     }
-    let (line, pieces) = if parameters.smooth { smoothed(recorded.clone()) } else { (recorded.clone(), 1) };
+    let (line, for_each_strip) =
+        if parameters.smooth { smooth_sketch(recorded.clone()) } else { (recorded.clone(), 1) };
     let line = Polyline::new(line).filter(|_| recorded.len() > 1).ok_or(recorded.len())?;
-    Ok(DrawnSheet { line, recorded, origins, pieces, factors, entry, lists_points: parameters.points.is_some() })
+    Ok(DrawnSheet {
+        line,
+        recorded,
+        origins,
+        for_each_strip,
+        factors,
+        entry,
+        lists_points: parameters.points.is_some(),
+    })
 }
 
 fn form_line(parameters: &SheetParameters, extent_km: f64) -> Vec<DVec2> {
     let set = |auto: Auto<f64>| if let Auto::Set(value) = auto { Some(value) } else { None };
     let count = if let Auto::Set(count) = parameters.count { Some(count) } else { None };
-    let length = set(parameters.length_km).unwrap_or(USUAL_LENGTH * extent_km);
+    let length = set(parameters.length_km).unwrap_or(DEFAULT_FORM_LENGTH * extent_km);
     let line = parameters.form.unwrap_or_default().line(set(parameters.bend_deg), count);
     line.into_iter().map(|point| point * length).collect()
 }
@@ -198,38 +207,38 @@ fn fitted(points: &[DVec2], drawing: &Drawing, extent_km: f64) -> Vec<DVec2> {
 }
 
 /// The points that were given come first, so that a fault names one of them; then the smooth line between them.
-fn check_extent(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeFault> {
+fn check_extent(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeError> {
     let half = context.extent_km / 2.0;
     let outside = |point: &DVec2| point.abs().max_element() > half;
     for (index, sheet) in sheets.iter().enumerate() {
-        let given = sheet.recorded.iter().position(outside).map(|at| at * sheet.pieces);
+        let given = sheet.recorded.iter().position(outside).map(|at| at * sheet.for_each_strip);
         let Some(at) = given.or_else(|| sheet.line.points().iter().position(outside)) else { continue };
         let point = sheet.line.points()[at];
         let number = sheet.origin(at) + 1;
         let (x, z, sheet_number) = (point.x, point.y, index + 1);
         let kind = if given.is_some() {
-            ShapeFaultKind::Outside { sheet: sheet_number, point: number, x, z, half }
+            ShapeErrorKind::Outside { sheet: sheet_number, point: number, x, z, half }
         } else {
-            ShapeFaultKind::BendsOutside { sheet: sheet_number, point: number, x, z, half }
+            ShapeErrorKind::BendsOutside { sheet: sheet_number, point: number, x, z, half }
         };
-        return Err(context.fault_at(sheet, at, kind));
+        return Err(context.error_at(sheet, at, kind));
     }
     Ok(())
 }
 
-fn check_crossings(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeFault> {
+fn check_crossings(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeError> {
     let lines: Vec<&[DVec2]> = sheets.iter().map(|sheet| sheet.line.points()).collect();
     let Some([earlier, later]) = first_crossing(&lines) else { return Ok(()) };
     let point = |at: SegmentId| sheets[at.sheet].origin(at.segment) + 1;
     let kind = if earlier.sheet == later.sheet {
-        ShapeFaultKind::CrossesItself { sheet: later.sheet + 1, point: point(later), earlier: point(earlier) }
+        ShapeErrorKind::CrossesItself { sheet: later.sheet + 1, point: point(later), earlier: point(earlier) }
     } else {
-        ShapeFaultKind::CrossesSheet {
+        ShapeErrorKind::CrossesSheet {
             sheet: later.sheet + 1,
             point: point(later),
             other: earlier.sheet + 1,
             other_point: point(earlier),
         }
     };
-    Err(context.fault_at(&sheets[later.sheet], later.segment, kind))
+    Err(context.error_at(&sheets[later.sheet], later.segment, kind))
 }

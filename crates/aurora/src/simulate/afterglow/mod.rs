@@ -7,26 +7,26 @@
 mod map;
 
 use super::AuroraParticles;
-use crate::physics::emission::{Emission, Emitter, red_line_levels::RED_HEIGHTS};
-use map::Keeping;
-pub use map::{GlowCell, GlowMap};
+use crate::physics::emission::{Emission, Emitter, red_line_altitudes::RED_ALTITUDES};
+use map::DecayFactors;
+pub use map::{AfterglowCell, AfterglowMap};
 
 /// Cells of the green map along a cell of the field; the green is sharp.
 const GREEN_FINENESS: f64 = 8.0;
 
 /// What the maps of both slow emitters keep in a step.
 #[derive(Clone, Debug)]
-pub(crate) struct Fading {
-    green: Keeping<1>,
-    red: Keeping<RED_HEIGHTS>,
+pub(crate) struct AfterglowDecay {
+    green: DecayFactors<1>,
+    red: DecayFactors<RED_ALTITUDES>,
 }
 
-impl Fading {
+impl AfterglowDecay {
     /// In steps of so many seconds of the aurora. `emission` says how long light of electrons of an energy lives.
     pub(crate) fn new(emission: &Emission, seconds: f64) -> Self {
         let green = |energy_ev| [emission.column(energy_ev).lifetime[Emitter::OxygenGreen.index()]];
         let red = |energy_ev| emission.red_lifetimes(energy_ev);
-        Self { green: Keeping::new(seconds, green), red: Keeping::new(seconds, red) }
+        Self { green: DecayFactors::new(seconds, green), red: DecayFactors::new(seconds, red) }
     }
 }
 
@@ -34,26 +34,29 @@ impl Fading {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Afterglow {
     /// O(1S), 557.7 nm: cells an eighth as wide as the field's.
-    pub green: GlowMap<1>,
+    pub green: AfterglowMap<1>,
     /// O(1D), 630.0 and 636.4 nm, by its heights: cells as wide as the field's.
-    pub red: GlowMap<RED_HEIGHTS>,
+    pub red: AfterglowMap<RED_ALTITUDES>,
 }
 
 impl Afterglow {
     /// Dark maps of a square of side `extent_km` whose field has cells of `cell_km`.
     #[must_use]
     pub fn new(extent_km: f64, cell_km: f64) -> Self {
-        Self { green: GlowMap::new(extent_km, cell_km / GREEN_FINENESS), red: GlowMap::new(extent_km, cell_km) }
+        Self {
+            green: AfterglowMap::new(extent_km, cell_km / GREEN_FINENESS),
+            red: AfterglowMap::new(extent_km, cell_km),
+        }
     }
 
     /// Lets a step pass while `particles` feed both maps.
-    pub(crate) fn step(&mut self, particles: &AuroraParticles, fading: &Fading) {
-        rayon::join(|| self.green.step(particles, &fading.green), || self.red.step(particles, &fading.red));
+    pub(crate) fn step(&mut self, particles: &AuroraParticles, decay: &AfterglowDecay) {
+        rayon::join(|| self.green.step(particles, &decay.green), || self.red.step(particles, &decay.red));
     }
 
     /// Fills the maps as if `particles` had been as they are for long.
-    pub(crate) fn settle(&mut self, particles: &AuroraParticles) {
-        self.green.step(particles, &Keeping::at_once());
-        self.red.step(particles, &Keeping::at_once());
+    pub(crate) fn fill_steady_state(&mut self, particles: &AuroraParticles) {
+        self.green.step(particles, &DecayFactors::instantaneous());
+        self.red.step(particles, &DecayFactors::instantaneous());
     }
 }

@@ -8,7 +8,7 @@ use super::grid::Grid2;
 ///
 /// # Panics
 /// If potential and source are not of one size.
-pub fn relax(potential: &mut Grid2, source: &Grid2, screening: f64) -> f64 {
+pub fn gauss_seidel_sweep(potential: &mut Grid2, source: &Grid2, screening: f64) -> f64 {
     assert_eq!(potential.size(), source.size(), "one source a cell");
     let [columns, rows] = potential.size();
     let area = potential.spacing() * potential.spacing();
@@ -35,7 +35,7 @@ pub fn relax(potential: &mut Grid2, source: &Grid2, screening: f64) -> f64 {
 /// # Panics
 /// If potential and source are not of one size.
 #[must_use]
-pub fn residual(potential: &Grid2, source: &Grid2, screening: f64) -> f64 {
+pub fn relative_residual(potential: &Grid2, source: &Grid2, screening: f64) -> f64 {
     assert_eq!(potential.size(), source.size(), "one source a cell");
     let columns = potential.size()[0];
     let inverse = 1.0 / (potential.spacing() * potential.spacing());

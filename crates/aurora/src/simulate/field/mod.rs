@@ -8,6 +8,6 @@ pub(crate) mod sheet_charge;
 pub(crate) mod sheet_field;
 mod sine_transform;
 
-pub use gauss_seidel::{relax, residual};
+pub use gauss_seidel::{gauss_seidel_sweep, relative_residual};
 pub use grid::{Gradient2, Grid2};
 pub use poisson::PoissonSolver;

@@ -90,23 +90,23 @@ impl PoissonSolver {
     fn eliminate(&self, grid: &mut Grid2, scale: f64) {
         let scale = if cfg!(feature = "broken-kernel") { -scale } else { scale };
         let columns = self.size[0];
-        let mut stretches: Vec<Vec<&mut [f64]>> = Vec::new();
-        stretches.resize_with(columns.div_ceil(TASK_COLUMNS), Vec::new);
+        let mut blocks: Vec<Vec<&mut [f64]>> = Vec::new();
+        blocks.resize_with(columns.div_ceil(TASK_COLUMNS), Vec::new);
         for row in grid.values_mut().chunks_mut(columns) {
-            row.chunks_mut(TASK_COLUMNS).zip(&mut stretches).for_each(|(part, stretch)| stretch.push(part));
+            row.chunks_mut(TASK_COLUMNS).zip(&mut blocks).for_each(|(chunk, block)| block.push(chunk));
         }
         let level = Level::new();
-        stretches.into_par_iter().enumerate().for_each(|(number, mut stretch)| {
+        blocks.into_par_iter().enumerate().for_each(|(number, mut block)| {
             let factors: Vec<&[f64]> =
-                self.factors.chunks(columns).map(|row| &row[number * TASK_COLUMNS..][..stretch[0].len()]).collect();
-            dispatch!(level, _simd => eliminate_stretch(&mut stretch, &factors, scale));
+                self.factors.chunks(columns).map(|row| &row[number * TASK_COLUMNS..][..block[0].len()]).collect();
+            dispatch!(level, _simd => eliminate_block(&mut block, &factors, scale));
         });
     }
 }
 
 /// Down with the source, up with the potential.
 #[inline(always)]
-fn eliminate_stretch(rows: &mut [&mut [f64]], factors: &[&[f64]], scale: f64) {
+fn eliminate_block(rows: &mut [&mut [f64]], factors: &[&[f64]], scale: f64) {
     let mut above = [0.0; TASK_COLUMNS];
     for (row, factors) in rows.iter_mut().zip(factors) {
         for ((value, factor), above) in row.iter_mut().zip(*factors).zip(&mut above) {
@@ -127,8 +127,8 @@ fn eliminate_stretch(rows: &mut [&mut [f64]], factors: &[&[f64]], scale: f64) {
 mod tests {
     use bansho_base::math::random::{Key, Purpose};
 
-    use super::{super::residual, *};
-    use crate::simulate::field::relax;
+    use super::{super::relative_residual, *};
+    use crate::simulate::field::gauss_seidel_sweep;
 
     /// Charges on an arc, as a drawn aurora has them, and a little of a random one everywhere.
     fn charges(size: [usize; 2], spacing: f64) -> Grid2 {
@@ -150,7 +150,7 @@ mod tests {
                 let source = charges(size, 0.3);
                 let mut potential = source.clone();
                 PoissonSolver::new(size, 0.3, screening).solve(&mut potential);
-                let left = residual(&potential, &source, screening);
+                let left = relative_residual(&potential, &source, screening);
                 assert!(left < 1e-10, "{size:?}, screening {screening}: {left}");
             }
         }
@@ -162,7 +162,7 @@ mod tests {
         source.values_mut().fill(1.0);
         let mut potential = source.clone();
         PoissonSolver::new([256, 256], 1.0, 0.0).solve(&mut potential);
-        assert!(residual(&potential, &source, 0.0) < 1e-10);
+        assert!(relative_residual(&potential, &source, 0.0) < 1e-10);
         assert!(potential.values().iter().all(|value| *value < 0.0));
     }
 
@@ -190,7 +190,8 @@ mod tests {
         for screening in [0.0, 0.5] {
             let source = charges([48, 40], 0.3);
             let (mut relaxed, mut solved) = (Grid2::new([48, 40], 0.3, [0.0; 2]), source.clone());
-            let sweeps = (0..20_000).take_while(|_| relax(&mut relaxed, &source, screening) > 1e-12).count();
+            let sweeps =
+                (0..20_000).take_while(|_| gauss_seidel_sweep(&mut relaxed, &source, screening) > 1e-12).count();
             assert!(sweeps < 20_000, "not converged");
             PoissonSolver::new([48, 40], 0.3, screening).solve(&mut solved);
             let greatest = solved.values().iter().fold(0.0, |a: f64, b| a.max(b.abs()));

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::{Grid2, scatter::Scattered};
-use crate::simulate::sheets::{nodes::split, refined_shape::Course};
+use super::{Grid2, scatter::ScatteredParticle};
+use crate::simulate::sheets::{nodes::split, refined_shape::RefinedShape};
 
 /// How much a node changes at a time, and how little and how much charge it has at most beside one of a long, straight, lone sheet.
 const CHANGE: [f64; 2] = [0.5, 2.0];
@@ -23,7 +23,7 @@ const MOST_TILT: f64 = 0.9;
 /// pulls toward that side, so that particles would come to rest beside the drawn line: charge gathers on the other side until both are at one
 /// potential.
 #[derive(Clone, Debug)]
-pub(crate) struct LineCharge {
+pub(crate) struct SheetCharge {
     /// One sheet's after those of another; evenly spaced over its length, one at each end.
     nodes: Vec<f64>,
     /// How much denser it is at the one side (left of the way along) than in the middle, as a share of that, at the same places.
@@ -36,13 +36,13 @@ pub(crate) struct LineCharge {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SheetCoordinate {
     node: u32,
-    part: f32,
+    fraction: f32,
     side: f32,
 }
 
 /// What charge shall come to.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct WantedCharge {
+pub(super) struct ChargeTarget {
     /// Potential along the sheets, negative, km^2/s^2.
     pub(super) potential: f64,
     /// Charge density over eps of a lone sheet, 1/s^2, and half its thickness, km.
@@ -50,10 +50,10 @@ pub(super) struct WantedCharge {
     pub(super) half_thickness: f64,
 }
 
-impl LineCharge {
+impl SheetCharge {
     /// The same charge everywhere, at nodes about `spacing` km apart, or more where so many particles do not show as much.
-    pub(crate) fn even(course: &Course, spacing: f64, particles: f64) -> Self {
-        let lengths = course.sheet_lengths();
+    pub(crate) fn even(refined: &RefinedShape, spacing: f64, particles: f64) -> Self {
+        let lengths = refined.sheet_lengths();
         let spacing = spacing.max(lengths.iter().sum::<f64>() / (NODES_PER_PARTICLE * particles));
         let mut starts = vec![0];
         for length in lengths {
@@ -71,38 +71,39 @@ impl LineCharge {
     }
 
     /// Where a particle is.
-    pub(super) fn place(&self, particle: &Scattered) -> SheetCoordinate {
+    pub(super) fn coordinate(&self, particle: &ScatteredParticle) -> SheetCoordinate {
         let sheet = particle.sheet as usize;
         let (first, end) = (self.starts[sheet], self.starts[sheet + 1]);
-        let (node, part) = split(f64::from(particle.share), end - first);
-        SheetCoordinate { node: (first + node) as u32, part: part as f32, side: particle.side }
+        let (node, fraction) = split(f64::from(particle.arc_fraction), end - first);
+        SheetCoordinate { node: (first + node) as u32, fraction: fraction as f32, side: particle.side }
     }
 
     /// Charge of a particle that is there.
     #[inline]
-    pub(super) fn at(&self, place: SheetCoordinate) -> f64 {
-        let node = place.node as usize;
+    pub(super) fn charge(&self, position: SheetCoordinate) -> f64 {
+        let node = position.node as usize;
         let (before, after) = (self.nodes[node], self.nodes[node + 1]);
         let (tilt, next) = (self.tilts[node], self.tilts[node + 1]);
-        let (part, side) = (f64::from(place.part), f64::from(place.side));
-        (before + part * (after - before)) * (1.0 + (tilt + part * (next - tilt)) * side)
+        let (fraction, side) = (f64::from(position.fraction), f64::from(position.side));
+        (before + fraction * (after - before)) * (1.0 + (tilt + fraction * (next - tilt)) * side)
     }
 
     /// Changes it where the potential that it makes is not the one that is wanted, or not the same on both sides.
-    pub(super) fn adjust(&mut self, course: &Course, potential: &Grid2, wanted: WantedCharge) {
-        let WantedCharge { density, half_thickness, .. } = wanted;
+    pub(super) fn adjust_toward(&mut self, refined: &RefinedShape, potential: &Grid2, wanted: ChargeTarget) {
+        let ChargeTarget { density, half_thickness, .. } = wanted;
         let starts = &self.starts;
         let adjust = |(index, (charge, tilt)): (usize, (&mut f64, &mut f64))| {
             let sheet = starts.partition_point(|start| *start <= index) - 1;
             let last = (starts[sheet + 1] - starts[sheet] - 1) as f64;
             let share = (index - starts[sheet]) as f64 / last;
-            let place = course.place(sheet, share);
-            let found = potential.sample(place.to_array());
+            let position = refined.position(sheet, share);
+            let found = potential.sample(position.to_array());
             let change = if found < 0.0 { wanted.potential / found } else { CHANGE[1] };
             *charge = (*charge * change.clamp(CHANGE[0], CHANGE[1])).clamp(CHARGE[0], CHARGE[1]);
-            let way = course.place(sheet, share + 0.5 / last) - course.place(sheet, share - 0.5 / last);
+            let way = refined.position(sheet, share + 0.5 / last) - refined.position(sheet, share - 0.5 / last);
             let across = way.perp().normalize_or_zero() * half_thickness;
-            let rise = potential.sample((place + across).to_array()) - potential.sample((place - across).to_array());
+            let rise =
+                potential.sample((position + across).to_array()) - potential.sample((position - across).to_array());
             // Charge tilted by a makes the one edge lower than the other by 2/3 a density L^2.
             let change = 1.5 * rise / (density * *charge * half_thickness * half_thickness);
             *tilt = (*tilt + change).clamp(-MOST_TILT, MOST_TILT);

@@ -7,42 +7,42 @@ use super::{Emitter, PerEmitter};
 use crate::physics::atmosphere::level_altitude_km;
 
 /// How many heights there are.
-pub const RED_HEIGHTS: usize = 3;
+pub const RED_ALTITUDES: usize = 3;
 /// The heights, km: the best three round ones for electrons of 1 to 10 keV.
-const HEIGHTS_KM: [f64; RED_HEIGHTS] = [150.0, 220.0, 300.0];
+const RED_ALTITUDES_KM: [f64; RED_ALTITUDES] = [150.0, 220.0, 300.0];
 
 /// How much of the light at an altitude counts to each of the heights; 1 together.
 #[must_use]
-pub fn red_shares(altitude_km: f64) -> [f64; RED_HEIGHTS] {
-    let mut shares = [0.0; RED_HEIGHTS];
-    let above = HEIGHTS_KM.partition_point(|height| *height <= altitude_km).clamp(1, RED_HEIGHTS - 1);
-    let [low, high] = [HEIGHTS_KM[above - 1], HEIGHTS_KM[above]];
-    let part = ((altitude_km - low) / (high - low)).clamp(0.0, 1.0);
-    (shares[above - 1], shares[above]) = (1.0 - part, part);
-    shares
+pub fn red_altitude_weights(altitude_km: f64) -> [f64; RED_ALTITUDES] {
+    let mut weights = [0.0; RED_ALTITUDES];
+    let above = RED_ALTITUDES_KM.partition_point(|altitude| *altitude <= altitude_km).clamp(1, RED_ALTITUDES - 1);
+    let [low, high] = [RED_ALTITUDES_KM[above - 1], RED_ALTITUDES_KM[above]];
+    let fraction = ((altitude_km - low) / (high - low)).clamp(0.0, 1.0);
+    (weights[above - 1], weights[above]) = (1.0 - fraction, fraction);
+    weights
 }
 
 /// Red light of each level, divided among the heights in place of the emitters; the last has none.
 #[must_use]
-pub fn red_by_height(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
+pub fn red_by_altitude(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
     let divided = |(level, light): (usize, &PerEmitter<f64>)| {
         let [low, middle, high] =
-            red_shares(level_altitude_km(level)).map(|share| share * light[Emitter::OxygenRed.index()]);
+            red_altitude_weights(level_altitude_km(level)).map(|weight| weight * light[Emitter::OxygenRed.index()]);
         [low, middle, high, 0.0]
     };
     profile.iter().enumerate().map(divided).collect()
 }
 
 /// The mean over the levels of a lifetime in s, weighted by what of the light there counts to each of the heights.
-pub(super) fn mean_lifetimes(levels: impl Iterator<Item = (f64, f64)>) -> [f64; RED_HEIGHTS] {
-    let (mut light, mut lifetimes) = ([0.0; RED_HEIGHTS], [0.0; RED_HEIGHTS]);
+pub(super) fn mean_lifetimes(levels: impl Iterator<Item = (f64, f64)>) -> [f64; RED_ALTITUDES] {
+    let (mut light, mut lifetimes) = ([0.0; RED_ALTITUDES], [0.0; RED_ALTITUDES]);
     for (level, (own, lifetime)) in levels.enumerate() {
-        for (height, share) in red_shares(level_altitude_km(level)).into_iter().enumerate() {
-            light[height] += share * own;
-            lifetimes[height] += share * own * lifetime;
+        for (altitude, weight) in red_altitude_weights(level_altitude_km(level)).into_iter().enumerate() {
+            light[altitude] += weight * own;
+            lifetimes[altitude] += weight * own * lifetime;
         }
     }
-    std::array::from_fn(|height| lifetimes[height] / light[height].max(f64::MIN_POSITIVE))
+    std::array::from_fn(|altitude| lifetimes[altitude] / light[altitude].max(f64::MIN_POSITIVE))
 }
 
 #[cfg(test)]
@@ -59,10 +59,10 @@ mod tests {
     #[test]
     fn every_altitude_counts_once() {
         for altitude_km in [80.0, 150.0, 185.0, 220.0, 299.0, 300.0, 800.0] {
-            assert!((red_shares(altitude_km).iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            assert!((red_altitude_weights(altitude_km).iter().sum::<f64>() - 1.0).abs() < 1e-12);
         }
-        assert_eq!((red_shares(90.0), red_shares(500.0)), ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]));
-        assert_eq!(red_shares(185.0), [0.5, 0.5, 0.0]);
+        assert_eq!((red_altitude_weights(90.0), red_altitude_weights(500.0)), ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]));
+        assert_eq!(red_altitude_weights(185.0), [0.5, 0.5, 0.0]);
     }
 
     /// The share of the red light that is left at most too long, or too short, after electrons of an energy have gone: by the heights, and
@@ -72,8 +72,9 @@ mod tests {
         let (profile, air) = (emission.profile(energy_ev), atmosphere().levels());
         let light: Vec<f64> = profile.iter().map(|light| light[Emitter::OxygenRed.index()]).collect();
         let whole: f64 = light.iter().sum();
-        let by_height = red_by_height(&profile);
-        let sums: [f64; RED_HEIGHTS] = std::array::from_fn(|height| by_height.iter().map(|light| light[height]).sum());
+        let by_height = red_by_altitude(&profile);
+        let sums: [f64; RED_ALTITUDES] =
+            std::array::from_fn(|altitude| by_height.iter().map(|light| light[altitude]).sum());
         let lifetimes = emission.red_lifetimes(energy_ev);
         let column = emission.column(energy_ev).lifetime[Emitter::OxygenRed.index()];
         let mut errors = [0.0_f64; 2];
@@ -81,7 +82,7 @@ mod tests {
             let left = |lifetime: f64| math::exp(-f64::from(second) / lifetime);
             let exact: f64 =
                 (0..LEVELS).map(|level| light[level] * left(lifetime(Emitter::OxygenRed, &air[level]))).sum();
-            let found: f64 = (0..RED_HEIGHTS).map(|height| sums[height] * left(lifetimes[height])).sum();
+            let found: f64 = (0..RED_ALTITUDES).map(|altitude| sums[altitude] * left(lifetimes[altitude])).sum();
             errors[0] = errors[0].max((found - exact).abs() / whole);
             errors[1] = errors[1].max((whole * left(column) - exact).abs() / whole);
         }
