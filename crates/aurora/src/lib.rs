@@ -5,8 +5,6 @@
 //! electrons of an energy spend it, [`physics::emission`] what the struck atoms give back, for how long and in which color; [`simulate::afterglow`] is
 //! where it lingers, [`render`] makes pictures of it.
 
-pub(crate) mod drawing_parameters;
-mod energy_range;
 mod parameters;
 pub(crate) mod phenomenon;
 pub mod physics;

@@ -20,7 +20,8 @@ use bansho_base::{
 };
 
 use super::{
-    AuroraParameters, energy_range,
+    AuroraParameters,
+    parameters::check_energies,
     render::Sampling,
     shapes::{Sequence, ShapeError, ShapeErrorKind},
     simulate::AuroraSimulation,
@@ -128,7 +129,7 @@ impl Aurora {
         loop_s: Option<f64>,
     ) -> Result<Self, ShapeError> {
         let dissolve = loop_s.map_or(Ok(0.0), |turn| close_loop(&mut parameters, turn))?;
-        energy_range::check(&parameters)?;
+        check_energies(&parameters)?;
         let crossing = sequence.crossing();
         let factors: Vec<[f64; 2]> = sequence.factors().collect();
         let emission = parameters.drawing.fall.shared_emission(parameters.spectrum);

@@ -93,7 +93,7 @@ const SPECTRUM_BOUNDS: [SpectrumBounds; 3] = [
     // 3 keV alone deposits at 122 km; only a spread of energies brings the green peak below 120 km.
     SpectrumBounds {
         name: "single",
-        spectrum: Spectrum::MonoenergeticBeam,
+        spectrum: Spectrum::Monoenergetic,
         mean_ratio: 1.0,
         peak_flux_ratio: 1.0,
         low_green_kev: 5.0,
@@ -362,7 +362,7 @@ mod tests {
         let at = |spectrum: Spectrum, kev: f64| {
             measure(atmosphere(), spectrum).into_iter().find(|metrics_row| metrics_row.energy_kev == kev).unwrap()
         };
-        assert_eq!(at(Spectrum::MonoenergeticBeam, 3.0).peaks_km[0], 122.0);
+        assert_eq!(at(Spectrum::Monoenergetic, 3.0).peaks_km[0], 122.0);
         let [one, ten, thirty] = [1.0, 10.0, 30.0].map(|kev| at(Spectrum::Maxwellian, kev));
         assert_eq!((one.deposition_peak_km, ten.deposition_peak_km), (120.0, 97.0));
         assert!((ten.green_to_blue - 2.8).abs() < 0.05 && (thirty.green_to_blue - 1.8).abs() < 0.05);

@@ -8,7 +8,6 @@
 
 pub(crate) mod bin;
 mod emitted_light;
-pub mod extinction;
 pub(crate) mod integrate;
 pub(crate) mod maps;
 pub(crate) mod prepared;
@@ -19,6 +18,7 @@ pub(crate) mod shutter;
 mod tests;
 
 pub use super::{
-    drawing_parameters::{Blur, BlurParameters, DrawingParameters, Sampling, TrackModel},
+    parameters::{Blur, BlurParameters, DrawingParameters, Sampling},
     phenomenon::Aurora,
 };
+pub use crate::physics::precipitation::TrackModel;

@@ -6,7 +6,6 @@
 //! [`DVec2`](bansho_base::math::DVec2)s whose second component is z.
 
 pub(crate) mod correspondence;
-mod default_shapes;
 mod error;
 mod form;
 pub(crate) mod geometry;

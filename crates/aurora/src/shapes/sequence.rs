@@ -15,7 +15,7 @@ use crate::shapes::{
         gap::{self, Bridge, Gap, GapFlux},
         spline_track::{Knot, ShapeTiming, find_velocities},
     },
-    strokes::passing::passes,
+    strokes::intersection::passes,
 };
 use rayon::prelude::*;
 
@@ -88,8 +88,8 @@ impl Sequence {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
             return Err(ShapeError { key: "loop".into(), kind: ShapeErrorKind::LoopLength { seconds } });
         }
-        let usual = super::default_shapes::shapes(extent_km);
-        let shapes = if shapes.is_empty() { &usual[..] } else { shapes };
+        let default_shapes = super::parameters::default_shapes(extent_km);
+        let shapes = if shapes.is_empty() { &default_shapes[..] } else { shapes };
         let timing = timing(shapes)?;
         let drawn = drawn_shapes(shapes, extent_km, assets)?;
         let sequence = |evenness: f64| {

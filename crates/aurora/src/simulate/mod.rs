@@ -4,7 +4,6 @@
 //! shape is renewed some are born where they are missing and die where they are strays.
 
 pub mod afterglow;
-mod arc_intervals;
 mod energy_flux;
 pub mod field;
 mod forces;

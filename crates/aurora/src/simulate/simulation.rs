@@ -20,7 +20,7 @@ use crate::{
     shapes::{FRAME_S, Sequence},
     simulate::{
         field::{
-            scatter::{ScatteredParticle, scatter},
+            sheet_charge::{ScatteredParticle, scatter},
             sheet_field::{ElectricField, FieldBuilder},
         },
         sheets::{

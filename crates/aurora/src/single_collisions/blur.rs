@@ -11,7 +11,7 @@ use bansho_base::{
 };
 
 use crate::{
-    drawing_parameters::BlurParameters,
+    parameters::BlurParameters,
     physics::emission::{EMITTERS, Emitter, PerEmitter},
     render::{
         prepared::{PIXEL_BATCH, PixelBatch},

@@ -16,7 +16,7 @@ use bansho_base::math::{
 use super::{
     quantile_matched::QuantileMatchedTracks,
     rasterize::TrackRasterizer,
-    splat::{RowRange, SPLAT_LANES, SplatBatch},
+    rasterize::{RowRange, SPLAT_LANES, SplatBatch},
     track_table::{CollisionBatch, TrackTable},
 };
 use crate::{

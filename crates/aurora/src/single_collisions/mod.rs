@@ -4,5 +4,4 @@ pub(crate) mod blur;
 pub(crate) mod collision_pass;
 pub mod quantile_matched;
 pub(crate) mod rasterize;
-pub(crate) mod splat;
 pub(crate) mod track_table;

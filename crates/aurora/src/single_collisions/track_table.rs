@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::splat::SPLAT_LANES;
+use super::rasterize::SPLAT_LANES;
 use crate::{
     physics::{
         atmosphere::LEVELS,

@@ -3,7 +3,7 @@
 //! [`emitter`] lists the excited states and their lines; [`quenching`] says how many of them radiate, [`excitation`] how many are made.
 //! [`table`] is the table of photons by energy and altitude, [`lifetime`] how light lingers and spreads, [`red_line_altitudes`]
 //! how red light does by height. [`collisions`] turns single
-//! collisions into photons, with the rules of the thesis beside. [`extinction`](crate::render::extinction) is what the air below takes away. [`calibration`](super::calibration) holds the
+//! collisions into photons, with the rules of the thesis beside. [`extinction`](crate::physics::extinction) is what the air below takes away. [`calibration`](super::calibration) holds the
 //! whole against what is observed.
 
 pub mod collisions;

@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn deposition_peaks_where_fang_has_it() {
-        for (spectrum, tolerance_km) in [(Spectrum::MonoenergeticBeam, 1.0), (ARC, 4.0)] {
+        for (spectrum, tolerance_km) in [(Spectrum::Monoenergetic, 1.0), (ARC, 4.0)] {
             let table = Deposition::new(atmosphere(), spectrum);
             for (energy_ev, reference_km) in [(1e3, 158.35), (3e3, 122.23), (1e4, 104.68), (3e4, 95.194)] {
                 let profile = std::array::from_fn(|level| table.ionization(energy_ev, level_altitude_km(level)));
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn energies_between_nodes_differ_little_from_the_formula() {
-        let table = Deposition::new(atmosphere(), Spectrum::MonoenergeticBeam);
+        let table = Deposition::new(atmosphere(), Spectrum::Monoenergetic);
         for energy_ev in [137.0, 1037.0, 3333.0, 10_370.0, 44_000.0] {
             let beam = MonoenergeticBeam::new(energy_ev);
             let (mut difference, mut sum) = (0.0, 0.0);

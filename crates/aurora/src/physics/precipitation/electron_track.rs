@@ -222,7 +222,7 @@ mod tests {
     use crate::physics::{atmosphere::atmosphere, precipitation::energy_grid};
 
     fn sampler(deflection: f64) -> (Deposition, TrackSampler) {
-        let deposition = Deposition::new(atmosphere(), Spectrum::MonoenergeticBeam);
+        let deposition = Deposition::new(atmosphere(), Spectrum::Monoenergetic);
         let sampler = TrackSampler::new(&deposition, deflection);
         (deposition, sampler)
     }

@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use bansho_base::{host::once::get_or_make, math, math::random::Key};
 
+use super::TrackModel;
 use super::{
     Deposition,
     electron_track::{Collision, TrackSampler, collision_count},
@@ -11,7 +12,7 @@ use super::{
     hard_sphere::{DEFAULT_RADIUS_M, HardSphereAtmosphere},
     spectrum::ARC,
 };
-use crate::{physics::atmosphere::atmosphere, render::TrackModel};
+use crate::physics::atmosphere::atmosphere;
 use rayon::prelude::*;
 
 /// Collisions of each energy that are looked at, about, and the fewest falls: a few long ones have much of the wandering.

@@ -17,6 +17,16 @@ pub use electron_track::{Collision, TrackLibrary, TrackSampler};
 pub use hard_sphere::HardSphereAtmosphere;
 pub use spectrum::Spectrum;
 
+bansho_base::choice! {
+    /// What stops the electrons and what shines where they are stopped.
+    pub enum TrackModel {
+        /// Air as it is measured: heights after Fang et al. (2010), colours and brightness as observed.
+        Fang = "fang",
+        /// Hard spheres, as in the thesis (2.4): one radius for all energies, and green light only above 190 km.
+        HardSphereAtmosphere = "hard_sphere",
+    }
+}
+
 /// Mean energy that an electron loses for each ion pair that it makes, eV (Rees 1989; Fang et al. 2010).
 pub const ION_PAIR_EV: f64 = 35.0;
 /// Energy that an electron loses in a collision, eV (the thesis, section 2.4.1).

@@ -8,7 +8,7 @@ use super::energy_grid::{NODES, node_energy_ev};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Spectrum {
     /// All alike.
-    MonoenergeticBeam,
+    Monoenergetic,
     /// Number flux `exp(-((E - E_0) / (width E_0))^2 / 2)`: electrons that fell through one voltage, as in arcs.
     Gaussian {
         /// Standard deviation as a share of the central energy.
@@ -41,7 +41,7 @@ impl Spectrum {
     /// Number flux by E / E_0, in any unit.
     fn number_flux(self, ratio: f64, central: bool) -> f64 {
         match self {
-            Self::MonoenergeticBeam => central as u8 as f64,
+            Self::Monoenergetic => central as u8 as f64,
             // The centre itself is exact, also for widths below the grid's spacing.
             Self::Gaussian { .. } if central => 1.0,
             Self::Gaussian { width } => {
@@ -67,7 +67,7 @@ mod tests {
     fn spectra_have_their_mean_energies() {
         let node = 64;
         let mean = |spectrum: Spectrum| mean_energy_ev(&spectrum.flux_fractions(node)) / node_energy_ev(node);
-        assert_eq!(mean(Spectrum::MonoenergeticBeam), 1.0);
+        assert_eq!(mean(Spectrum::Monoenergetic), 1.0);
         // 0.35 reaches nothing negative to speak of: 2.9 standard deviations.
         assert!((mean(ARC) - 1.0).abs() < 0.01, "{}", mean(ARC));
         assert!((mean(Spectrum::Maxwellian) - 2.0).abs() < 0.02, "{}", mean(Spectrum::Maxwellian));

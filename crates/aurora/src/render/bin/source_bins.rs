@@ -137,22 +137,13 @@ impl DistanceBins {
     pub(super) fn new(spread_km: f64, step: f64) -> Self {
         let row = step * SCALE_KM;
         let width = (spread_km * f64::from(REACH) / BINS_PER_REACH).clamp(ROWS_PER_BIN[0] * row, ROWS_PER_BIN[1] * row);
-        let share = (STEP_KM / SCALE_KM).max(2.0 * step);
-        let near_limit_km = (width / share).min(MAX_DISTANCE_KM);
+        let relative_width = (STEP_KM / SCALE_KM).max(2.0 * step);
+        let near_limit_km = (width / relative_width).min(MAX_DISTANCE_KM);
         let near = near_limit_km / width;
-        let count = (near + math::ln(MAX_DISTANCE_KM / near_limit_km) / share).ceil().max(1.0) as usize;
-        let per_octave = LN_2 / share;
+        let count = (near + math::ln(MAX_DISTANCE_KM / near_limit_km) / relative_width).ceil().max(1.0) as usize;
+        let per_octave = LN_2 / relative_width;
         let far_offset = near - per_octave * math::log2(near_limit_km);
-        Self {
-            width,
-            per_width: 1.0 / width,
-            near_limit_km,
-            near,
-            relative_width: share,
-            per_octave,
-            far_offset,
-            count,
-        }
+        Self { width, per_width: 1.0 / width, near_limit_km, near, relative_width, per_octave, far_offset, count }
     }
 
     /// Width of a bin at a distance, km.
@@ -182,11 +173,11 @@ impl DistanceBins {
 
     /// Distance of a bin's middle, and its width, km.
     pub(crate) fn distance(&self, bin: usize) -> [f64; 2] {
-        let place = bin as f64 + 0.5;
-        if place < self.near {
-            return [place * self.width, self.width];
+        let coordinate = bin as f64 + 0.5;
+        if coordinate < self.near {
+            return [coordinate * self.width, self.width];
         }
-        let distance = self.near_limit_km * math::exp((place - self.near) * self.relative_width);
+        let distance = self.near_limit_km * math::exp((coordinate - self.near) * self.relative_width);
         [distance, self.relative_width * distance]
     }
 }
@@ -338,8 +329,8 @@ impl ColumnSpan {
             // It lies about the observer's own field line and may show anywhere.
             return Self { first: 0, count: chart.columns as i32 };
         }
-        let share = reach / distance;
-        let half = approximations::atan2(share, (1.0 - share * share).sqrt()) / step;
+        let sine = reach / distance;
+        let half = approximations::atan2(sine, (1.0 - sine * sine).sqrt()) / step;
         let column = projection.column(approximations::atan2(y, x));
         let (first, end) = ((column - half - 0.5).ceil(), (column + half - 0.5).floor() + 1.0);
         Self { first: first as i32, count: ((end - first) as i32).min(chart.columns as i32) }
@@ -380,8 +371,8 @@ impl PatchWeights {
         let per_reach = 1.0 / source.reach.max(MIN_REACH_CELLS * chart.column_step as f32 * source.distance());
         let (mut side, mut along) = ([0.0; STRIP_COLUMNS], [0.0; STRIP_COLUMNS]);
         for column in 0..STRIP_COLUMNS {
-            let away = y.fma(cosines[column], -(x * sines[column])) * per_reach;
-            let shape = away.fma(-away, 1.0).max(0.0);
+            let offset = y.fma(cosines[column], -(x * sines[column])) * per_reach;
+            let shape = offset.fma(-offset, 1.0).max(0.0);
             side[column] = shape * shape * (NORM * per_reach);
             along[column] = x.fma(cosines[column], y * sines[column]);
         }
@@ -421,11 +412,11 @@ impl PatchBins {
         let weights = weights * (NORM * per_reach);
         let filled = &mut sums.filled[column];
         *filled = [filled[0].min(first), filled[1].max(end)];
-        let mut away = (first as f32 + 0.5 - middle) * per_reach;
+        let mut offset = (first as f32 + 0.5 - middle) * per_reach;
         for bin in &mut sums.bins[column * bins.count..][first..end] {
-            let shape = away.fma(-away, 1.0);
+            let shape = offset.fma(-offset, 1.0);
             *bin = weights.broadcast(shape * shape).fma(weights, FourLanes::simd_from(weights.simd, *bin)).into();
-            away += per_reach;
+            offset += per_reach;
         }
     }
 }

@@ -143,8 +143,8 @@ impl<'a> EmissionProfile<'a> {
 /// Energy of a table, eV.
 fn table_energy_ev(table_index: usize) -> f64 {
     use crate::physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV};
-    let share = table_index as f64 / ((NODES - 1) * TABLES_PER_NODE) as f64;
-    LOWEST_EV * math::pow(HIGHEST_EV / LOWEST_EV, share)
+    let log_fraction = table_index as f64 / ((NODES - 1) * TABLES_PER_NODE) as f64;
+    LOWEST_EV * math::pow(HIGHEST_EV / LOWEST_EV, log_fraction)
 }
 
 /// Every other entry from the second on, and one before, smoothed so that none of the light is lost.

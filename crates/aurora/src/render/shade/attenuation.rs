@@ -9,7 +9,7 @@ use bansho_base::math::{
 
 use crate::{
     physics::emission::{EMITTERS, Emitter, LINES, PerEmitter},
-    render::extinction::Extinction,
+    physics::extinction::Extinction,
 };
 use fearless_simd::{Simd, prelude::*};
 
@@ -47,12 +47,12 @@ impl EmitterColors {
         held.sqrt().fma(STEPS as f32, 0.5)
     }
 
-    /// The color in which light by emitter, in kR, arrives from a [`place`](Self::table_coordinate), and after it its brightness in kR, but for that of
+    /// The color in which light by emitter, in kR, arrives from a [`coordinate`](Self::table_coordinate), and after it its brightness in kR, but for that of
     /// the dim first positive bands.
     #[inline(always)]
-    pub(crate) fn attenuated<S: Simd>(&self, simd: S, light: &PerEmitter<f32>, place: f32) -> FourLanes<S> {
+    pub(crate) fn attenuated<S: Simd>(&self, simd: S, light: &PerEmitter<f32>, coordinate: f32) -> FourLanes<S> {
         let mut sum = FourLanes::splat(simd, 0.0);
-        for (light, color) in light.iter().zip(&self.colors[(place as usize).min(STEPS)]) {
+        for (light, color) in light.iter().zip(&self.colors[(coordinate as usize).min(STEPS)]) {
             sum = sum.broadcast(*light).fma(FourLanes::simd_from(simd, *color), sum);
         }
         sum

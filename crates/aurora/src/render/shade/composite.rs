@@ -152,7 +152,10 @@ mod tests {
     };
 
     use super::*;
-    use crate::render::{extinction::Extinction, prepared::PixelBatch, project::chart::Coverage};
+    use crate::{
+        physics::extinction::Extinction,
+        render::{prepared::PixelBatch, project::chart::Coverage},
+    };
 
     /// Light that changes slowly over the sky, on a chart.
     fn painted(chart: Chart, scale: f32) -> ColumnBuffer {
@@ -187,7 +190,7 @@ mod tests {
             let both = std::array::from_fn(|i| a[i] + b[i]);
             dispatch!(Level::new(), simd => emitter_colors.attenuated(simd, &both, EmitterColors::table_coordinate(sine)).into())
         };
-        let places: Vec<_> = [[20, 10], [160, 100], [300, 60], [90, 180]]
+        let samples: Vec<_> = [[20, 10], [160, 100], [300, 60], [90, 180]]
             .map(|[x, y]| {
                 let PixelBatch { longitude, colatitude, .. } = PixelBatch::new(&view.camera, &field, x, y);
                 let direction = view.camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap();
@@ -196,7 +199,7 @@ mod tests {
             })
             .into();
         let seen = sharp.composite(&soft, &field, &emitter_colors);
-        for (longitude, colatitude, expected) in places {
+        for (longitude, colatitude, expected) in samples {
             let found = seen.sampler().light(longitude, colatitude);
             for i in 0..4 {
                 assert!((found[i] / expected[i] - 1.0).abs() < 0.005, "{found:?} {expected:?}");

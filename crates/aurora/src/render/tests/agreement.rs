@@ -1,7 +1,7 @@
 //! Pictures of collisions have the picture of the mean fall for their mean, each emitter by itself.
 
 use super::*;
-use crate::{drawing_parameters::MOST_WOBBLE, physics::precipitation::lateral_spread::lateral_spread_km};
+use crate::{parameters::MAX_WOBBLE, physics::precipitation::lateral_spread::lateral_spread_km};
 
 /// Sum of absolute differences over the sum, for each emitter but the red line, which is not drawn by collisions.
 fn differences(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> [f64; 3] {
@@ -55,7 +55,7 @@ fn usual_wobble() -> f64 {
 
 #[test]
 fn the_mean_of_many_collision_pictures_is_the_profile() {
-    for (seed, wobble) in [(5, usual_wobble()), (77, usual_wobble()), (5, 0.02), (5, MOST_WOBBLE), (77, MOST_WOBBLE)] {
+    for (seed, wobble) in [(5, usual_wobble()), (77, usual_wobble()), (5, 0.02), (5, MAX_WOBBLE), (77, MAX_WOBBLE)] {
         let (apart, _) = arc_beside_profile(TrackModel::Fang, wobble, seed, 8000);
         assert!(apart.iter().all(|apart| *apart < 0.03), "seed {seed}, wobble {wobble}: {apart:?}");
     }
@@ -64,7 +64,7 @@ fn the_mean_of_many_collision_pictures_is_the_profile() {
 #[test]
 fn the_mean_of_many_falls_of_the_thesis_is_their_profile() {
     // A fall has a single collision or two above 190 km, where all green light is: more noise, and so more particles.
-    for (seed, wobble) in [(5, usual_wobble()), (77, usual_wobble()), (5, MOST_WOBBLE)] {
+    for (seed, wobble) in [(5, usual_wobble()), (77, usual_wobble()), (5, MAX_WOBBLE)] {
         let (apart, _) = arc_beside_profile(TrackModel::HardSphereAtmosphere, wobble, seed, 40_000);
         assert!(apart.iter().all(|apart| *apart < 0.03), "seed {seed}, wobble {wobble}: {apart:?}");
     }

@@ -1,17 +1,14 @@
 //! From parameters to drawn sheets, checked one by one and against each other.
 
-use bansho_base::{
-    geometry::strokes::Drawing,
-    host::assets::{AssetError, AssetProblem, Assets},
-    math::{self, DVec2},
-    parameters::Auto,
-};
-
-use super::{factors::FluxEnergyFactors, intersection::first_crossing};
-use crate::shapes::{
-    SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing,
-    geometry::polyline::{Polyline, resample_by_index, smooth_sketch},
-};
+use super::intersection::first_crossing;
+use crate::shapes::geometry::polyline::{Polyline, resample_by_index, smooth_sketch};
+use crate::shapes::{SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing};
+use bansho_base::geometry::strokes::Drawing;
+use bansho_base::host::assets::{AssetError, AssetProblem, Assets};
+use bansho_base::math::curve::Curve;
+use bansho_base::math::{self, DVec2, smoothstep};
+use bansho_base::parameters::Auto;
+use std::sync::Arc;
 
 /// Points closer than this are one, km.
 const SAME_KM: f64 = 1e-6;
@@ -241,4 +238,53 @@ fn check_crossings(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), S
         }
     };
     Err(context.error_at(&sheets[later.sheet], later.segment, kind))
+}
+
+/// What a scene says of them, for all sheets of one entry.
+#[derive(Clone, Debug)]
+pub(crate) struct FluxEnergyFactors {
+    curves: Arc<[Curve; 2]>,
+    /// Share of the length over which the flux rises from nothing at both ends.
+    fade: f64,
+}
+
+impl FluxEnergyFactors {
+    pub(super) fn new(parameters: &SheetParameters) -> Self {
+        Self { curves: Arc::new([parameters.flux.clone(), parameters.energy.clone()]), fade: parameters.fade }
+    }
+
+    /// Flux and energy at that share of the length.
+    pub(crate) fn at(&self, fraction: f64) -> [f64; 2] {
+        let [flux, energy] = [0, 1].map(|index| self.curves[index].eval(fraction));
+        let from_end = fraction.min(1.0 - fraction).max(0.0);
+        [flux * smoothstep(0.0, self.fade, from_end), energy]
+    }
+
+    /// Whether both are the same at every place where a control point may be.
+    pub(crate) fn are_those_of(&self, other: &Self) -> bool {
+        const SAMPLES: usize = 512;
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+        let same_at = |fraction: f64| {
+            let [a, b] = [self.at(fraction), other.at(fraction)];
+            near(a[0], b[0]) && near(a[1], b[1])
+        };
+        (self.curves == other.curves && self.fade == other.fade)
+            || (0..=SAMPLES).all(|sample| same_at(sample as f64 / SAMPLES as f64))
+    }
+}
+
+#[cfg(test)]
+mod factors_tests {
+    use super::*;
+
+    #[test]
+    fn flux_rises_from_nothing_at_both_ends_and_energy_stays() {
+        let factors = |fade: f64| FluxEnergyFactors::new(&SheetParameters { fade, ..SheetParameters::default() });
+        let soft = factors(0.2);
+        assert_eq!([0.0, 1.0].map(|fraction| soft.at(fraction)), [[0.0, 1.0]; 2]);
+        assert_eq!([0.1, 0.9].map(|fraction| (soft.at(fraction)[0] - 0.5).abs() < 1e-12), [true; 2]);
+        assert_eq!([0.2, 0.5, 0.8].map(|fraction| soft.at(fraction)), [[1.0; 2]; 3]);
+        assert_eq!([0.0, 0.5, 1.0].map(|fraction| factors(0.0).at(fraction)), [[1.0; 2]; 3]);
+        assert!(soft.are_those_of(&factors(0.2)) && !soft.are_those_of(&factors(0.1)));
+    }
 }

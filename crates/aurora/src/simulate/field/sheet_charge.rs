@@ -1,9 +1,11 @@
 //! Charge that lies on the sheets as on conductors.
 
+use super::Grid2;
+use crate::simulate::sheets::nodes::split;
+use crate::simulate::sheets::refined_shape::RefinedShape;
+use bansho_base::math::DVec2;
+use bansho_base::math::random::{Key, Purpose, uniform};
 use rayon::prelude::*;
-
-use super::{Grid2, scatter::ScatteredParticle};
-use crate::simulate::sheets::{nodes::split, refined_shape::RefinedShape};
 
 /// How much a node changes at a time, and how little and how much charge it has at most beside one of a long, straight, lone sheet.
 const CHANGE: [f64; 2] = [0.5, 2.0];
@@ -95,13 +97,13 @@ impl SheetCharge {
         let adjust = |(index, (charge, tilt)): (usize, (&mut f64, &mut f64))| {
             let sheet = starts.partition_point(|start| *start <= index) - 1;
             let last = (starts[sheet + 1] - starts[sheet] - 1) as f64;
-            let share = (index - starts[sheet]) as f64 / last;
-            let position = refined.position(sheet, share);
+            let fraction = (index - starts[sheet]) as f64 / last;
+            let position = refined.position(sheet, fraction);
             let found = potential.sample(position.to_array());
             let change = if found < 0.0 { wanted.potential / found } else { CHANGE[1] };
             *charge = (*charge * change.clamp(CHANGE[0], CHANGE[1])).clamp(CHARGE[0], CHARGE[1]);
-            let way = refined.position(sheet, share + 0.5 / last) - refined.position(sheet, share - 0.5 / last);
-            let across = way.perp().normalize_or_zero() * half_thickness;
+            let chord = refined.position(sheet, fraction + 0.5 / last) - refined.position(sheet, fraction - 0.5 / last);
+            let across = chord.perp().normalize_or_zero() * half_thickness;
             let rise =
                 potential.sample((position + across).to_array()) - potential.sample((position - across).to_array());
             // Charge tilted by a makes the one edge lower than the other by 2/3 a density L^2.
@@ -110,4 +112,47 @@ impl SheetCharge {
         };
         self.nodes.par_iter_mut().zip(&mut self.tilts).with_min_len(TASK).enumerate().for_each(adjust);
     }
+}
+
+const SCATTER: Purpose = Purpose::named("aurora scatter");
+
+/// A particle that stands for the charge about a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ScatteredParticle {
+    /// Where it is, km.
+    pub(crate) position: DVec2,
+    /// The sheet that it is nearest to.
+    pub(crate) sheet: u32,
+    /// Share of that sheet's length before it.
+    pub(crate) arc_fraction: f32,
+    /// How far it is to the side, from -1 to 1 within L_thr.
+    pub(super) side: f32,
+}
+
+/// Particles within `half_thickness` km of the shape, evenly over the area that it covers; the `renewal`th set of `count` trials.
+///
+/// A place counts for the segment that it is nearest to, so that nothing is counted twice where segments overlap.
+pub(crate) fn scatter(
+    refined: &RefinedShape,
+    half_thickness: f64,
+    count: usize,
+    key: Key,
+    renewal: u32,
+) -> Vec<ScatteredParticle> {
+    let segments = refined.segments();
+    let particle = |index: usize| {
+        let [u, v, ..] = key.words(index as u64, renewal, SCATTER).map(|word| f64::from(uniform(word)));
+        let sample = segments.sample((index as f64 + u) / count as f64)?;
+        let side = 2.0 * v - 1.0;
+        let position = sample.point + sample.tangent.perp() * (half_thickness * side);
+        let own = [sample.segment.sheet, sample.segment.segment];
+        let scattered = ScatteredParticle {
+            position,
+            sheet: own[0] as u32,
+            arc_fraction: sample.fraction as f32,
+            side: side as f32,
+        };
+        (refined.nearest_segment(position) == Some(own)).then_some(scattered)
+    };
+    (0..count).into_par_iter().with_min_len(1024).filter_map(particle).collect()
 }

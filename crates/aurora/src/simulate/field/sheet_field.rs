@@ -14,7 +14,7 @@ use bansho_base::{
 
 use super::{
     Grid2, PoissonSolver, gauss_seidel_sweep,
-    scatter::ScatteredParticle,
+    sheet_charge::ScatteredParticle,
     sheet_charge::{ChargeTarget, SheetCharge, SheetCoordinate},
 };
 use crate::{
